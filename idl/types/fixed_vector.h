@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+#include <cassert>
+#include <cstddef>
+
+namespace tenon {
+
+/// A list with room for N values in place: it never allocates, so it may be used at 1 kHz.
+template <typename T, std::size_t N>
+class FixedVector {
+ public:
+  /// Adds a value; false (and no change) when all N places are taken.
+  bool push_back(const T& value) {
+    if (size_ == N) return false;
+    values_[size_++] = value;
+    return true;
+  }
+  void clear() { size_ = 0; }
+  void resize(std::size_t size) {
+    assert(size <= N);
+    size_ = size;
+  }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] bool empty() const { return size_ == 0; }
+  [[nodiscard]] bool full() const { return size_ == N; }
+  [[nodiscard]] static constexpr std::size_t capacity() { return N; }
+
+  T& operator[](std::size_t i) {
+    assert(i < size_);
+    return values_[i];
+  }
+  const T& operator[](std::size_t i) const {
+    assert(i < size_);
+    return values_[i];
+  }
+  T& back() { return (*this)[size_ - 1]; }
+  T* begin() { return values_.data(); }
+  T* end() { return values_.data() + size_; }
+  const T* begin() const { return values_.data(); }
+  const T* end() const { return values_.data() + size_; }
+
+ private:
+  std::array<T, N> values_{};
+  std::size_t size_ = 0;
+};
+
+}  // namespace tenon

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "idl/types/spatial.h"
+
+namespace tenon {
+
+/// A running 64-bit hash of what a tick left behind (FNV-1a over 64-bit words): equal states, equal hashes.
+/// It answers "did the same happen?", never "who made this?".
+class StateHash {
+ public:
+  void add(std::uint64_t word) {
+    value_ = (value_ ^ word) * 0x100000001B3ULL;
+    value_ ^= value_ >> 29U;
+  }
+  void add(double number) { add(std::bit_cast<std::uint64_t>(number)); }
+  void add(const Vector3& v) {
+    for (int i = 0; i < 3; ++i) add(v[i]);
+  }
+  void add(const Pose& X) {
+    add(X.translation());
+    for (int i = 0; i < 4; ++i) add(X.rotation().coeffs()[i]);
+  }
+  [[nodiscard]] std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 0xCBF29CE484222325ULL;
+};
+
+}  // namespace tenon

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/collision/motion_solver.h"
+#include "server/collision/pair_query.h"
+
+namespace tenon {
+
+/// How a held body is kept out of others.
+enum class ContactMethod : std::uint8_t {
+  kIsland,    ///< one quadratic programme per contact island (the default)
+  kBlocking,  ///< the paper's god-object heuristic, as baseline: block what opposes the penalty wrench
+  kPenalty,   ///< the paper's penalty force alone, as baseline: bodies follow their hands into each other
+};
+
+/// Two bodies of an island that may touch. Indices into the island's bodies; kStatic bodies stand at X_W*_static.
+struct IslandPair {
+  std::int32_t body_a = GapRow::kStatic;  ///< asked as a shell
+  std::int32_t body_b = GapRow::kStatic;  ///< asked as a field
+  const Pointshell* shell_A = nullptr;
+  const DistanceField* field_B = nullptr;
+  Pose X_WA_static;
+  Pose X_WB_static;
+  double dilation = 0.0;
+  std::uint32_t levels = 0xFFFFFFFFU;
+};
+
+/// What came out for a pair, at the final poses.
+struct IslandPairResult {
+  PairQueryResult query;
+  std::vector<double> multipliers;  ///< [N] a contact of query.contacts; sized kMaxPairContacts at start
+  Wrench F_Ao_W;                    ///< of B on A, about A's origin
+};
+
+struct SolveLimits {
+  std::uint32_t substeps = 8;
+  double substep_travel = 0.0005;  ///< [m] any point of a body moves at most, per sub-step
+  double contact_margin = 0.0005;  ///< [m] on top of the sub-step's travel, contacts are listed
+  ContactMethod method = ContactMethod::kIsland;
+  double penalty_stiffness = 1000.0;  ///< [N/m] for the baselines
+};
+
+struct SolveReport {
+  std::uint32_t substeps = 0;
+  std::uint32_t iterations = 0;
+  bool conflicting = false;
+  bool travel_capped = false;  ///< the rest of the way goes into the next tick
+};
+
+/// Moves the bodies of one contact island towards their springs' goals without letting them into each other
+/// (DESIGN "god object"; paper §3.1): sub-step by sub-step, query the pairs at the current poses, solve for poses,
+/// project first and clamp then, move.
+///
+/// Threads: one at a time (a worker owns one). Real-time: solve.
+class IslandSolver {
+ public:
+  IslandSolver(std::size_t max_bodies, std::size_t max_pairs);
+
+  /// Moves bodies[i].X_WB; fills results[i] for pairs[i].
+  SolveReport solve(std::span<MovableBody> bodies, std::span<const IslandPair> pairs, const SolveLimits& limits,
+                    std::span<IslandPairResult> results) noexcept;
+
+ private:
+  MotionSolver motion_;
+  std::vector<GapRow> rows_;
+  std::vector<double> multipliers_;
+  std::vector<Displacement> motions_;
+};
+
+}  // namespace tenon

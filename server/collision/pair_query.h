@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "idl/types/fixed_vector.h"
+#include "idl/types/spatial.h"
+#include "server/structures/distance_field.h"
+#include "server/structures/pointshell.h"
+
+namespace tenon {
+
+/// A point of body A's shell near body B's surface.
+struct Contact {
+  Vector3 p_WP = Vector3::Zero();
+  Vector3 n_W = Vector3::Zero();  ///< unit, from B into A: the direction in which B pushes A
+  double gap = 0.0;               ///< [m] signed distance minus the dilation; < 0: inside the dilated surface
+  double area = 0.0;              ///< [m^2] the point stands for
+  std::uint32_t point = 0;        ///< its index in the shell: a name that stays from tick to tick
+};
+
+inline constexpr std::size_t kMaxPairContacts = 512;
+using ContactList = FixedVector<Contact, kMaxPairContacts>;
+
+/// Work done by a query, counted: the same on every machine.
+struct QueryCounts {
+  std::uint32_t spheres_visited = 0;
+  std::uint32_t spheres_total = 0;
+  std::uint32_t points_visited = 0;
+  std::uint32_t points_colliding = 0;
+  std::uint32_t contacts_dropped = 0;  ///< for want of room: those with the largest gaps
+
+  /// The paper's load eta in percent (eq. 2), weights 0.5 and 0.5.
+  [[nodiscard]] double loadPercent() const;
+};
+
+struct PairQuery {
+  const Pointshell* shell_A = nullptr;
+  const DistanceField* field_B = nullptr;
+  Pose X_WA;
+  Pose X_WB;
+  double dilation = 0.0;  ///< [m] the surface of B is felt this far outside
+  double margin = 0.0;    ///< [m] contacts are listed up to this gap
+  std::uint32_t levels = 0xFFFFFFFFU;  ///< how many levels of the shell may be used
+};
+
+struct PairQueryResult {
+  ContactList contacts;
+  QueryCounts counts;
+  double smallest_gap = 0.0;  ///< of all points, a lower bound when nothing was near; dilation included
+  double deepest = 0.0;       ///< [m] depth in the undilated field of the deepest point, 0 when apart
+};
+
+/// All points of A's shell whose gap to B is at most `margin`. Spheres that the field proves to be farther away
+/// are skipped; the answer is the same as testing every point.
+///
+/// Threads: pure. Real-time.
+void queryPair(const PairQuery& query, PairQueryResult& result) noexcept;
+
+/// The paper's penalty: F = K sum a_i d_i n_i / A_ref of the points inside the (dilated) surface, about A's origin.
+/// A_ref = 1 cm^2, K in N/m.
+[[nodiscard]] Wrench penaltyWrench(const PairQueryResult& result, const Vector3& p_WAo, double stiffness) noexcept;
+
+/// At most `out.size()` contacts that stand for all: the smallest gap, then those that differ most in place and
+/// normal. Returns how many; indices into `contacts`, in order of choice.
+std::size_t reduceContacts(const ContactList& contacts, std::span<std::uint32_t> out) noexcept;
+
+}  // namespace tenon

@@ -1,0 +1,110 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "idl/types/hash.h"
+#include "idl/types/messages.h"
+#include "idl/types/result.h"
+#include "server/collision/island_solver.h"
+#include "server/simulation/force_buffer.h"
+#include "server/simulation/scene.h"
+
+namespace tenon {
+
+/// What moves, per object. Index = ObjectId.
+struct ObjectMotion {
+  Pose X_WO;
+  Twist V_WO;
+  std::uint32_t epoch = 1;
+  ObjectStatus status = ObjectStatus::kParked;
+  HandId holder;  ///< the first of its holders, none when free
+  bool in_contact = false;
+};
+
+/// What a hand does, per hand. Index = HandId.
+struct HandMotion {
+  bool present = false;  ///< a client moves it
+  bool frozen = false;   ///< its object is held still
+  ObjectId object;       ///< what it moves now; none: nothing
+  Pose X_WH;             ///< newest device pose
+  Twist V_WH;
+  Pose X_HO;             ///< the object in the hand since it was taken
+  Wrench F_Ho_W;         ///< of the coupling on the hand, about the hand's origin
+};
+
+/// What a pair did in the last tick. Index as in Scene::pairs.
+struct PairMotion {
+  bool enabled = true;
+  bool queried = false;       ///< in this tick; else skipped by coherence
+  Tick due = 0;               ///< next tick that has to look (spatio-temporal coherence)
+  const IslandPairResult* result = nullptr;  ///< of the last query
+};
+
+struct EnvironmentOptions {
+  unsigned workers = 1;           ///< threads that solve islands, this one included; never changes the result
+  SolveLimits limits;
+  double max_speed = 1.0;         ///< [m/s] of any point of a held object (travel cap; the paper's v_max)
+};
+
+/// All objects, one tick (paper §3.2). See DESIGN section 2 and 3.
+///
+/// Threads: one caller; its own workers inside step(). Real-time: everything but construction, save and restore.
+class Environment {
+ public:
+  Environment(std::shared_ptr<const Scene> scene, const EnvironmentOptions& options);
+  ~Environment();
+
+  // what people and the state machine decide, between ticks
+  void setHandPresent(HandId hand, bool present) noexcept;
+  void setHandPose(HandId hand, const Pose& X_WH, const Twist& V_WH) noexcept;
+  void setHandFrozen(HandId hand, bool frozen) noexcept;
+  /// `hand` moves `object` from now on, which stays where it is in the hand. What it moved before is parked; a
+  /// pointer (a hand's own first object) is hidden while the hand holds something else, and is put to the hand's
+  /// pose when it comes back.
+  void grab(HandId hand, ObjectId object) noexcept;
+  /// The hand moves its own first object again.
+  void release(HandId hand) noexcept;
+  void place(ObjectId object, const Pose& X_WO, ObjectStatus status) noexcept;  ///< a declared jump
+  void setPairEnabled(std::size_t pair, bool enabled) noexcept;
+  /// The force of a source that is not a contact (client contribution, guidance): expires by itself.
+  void contribute(ObjectId object, std::uint32_t source, const Wrench& F_Oo_W, std::uint32_t lifetime_ticks) noexcept;
+
+  void step() noexcept;
+
+  [[nodiscard]] const Scene& scene() const { return *scene_; }
+  [[nodiscard]] Tick tick() const { return tick_; }
+  [[nodiscard]] std::span<const ObjectMotion> objects() const { return objects_; }
+  [[nodiscard]] std::span<const HandMotion> hands() const { return hands_; }
+  [[nodiscard]] std::span<const PairMotion> pairs() const { return pairs_; }
+  /// "Force" as displays, conditions and reports mean it: of a held object its coupling's, else its ForceBuffer's.
+  [[nodiscard]] Wrench forceOn(ObjectId object) const noexcept;
+  [[nodiscard]] bool inContact(ObjectId a, ObjectId b) const noexcept;
+  /// The contacts of a hand's object for its client (fills everything but client-side fields).
+  void manifold(HandId hand, HandManifold& out) const noexcept;
+  void pairContact(std::size_t pair, PairContact& out) const noexcept;
+  /// Counted work of the last tick.
+  struct Work {
+    std::uint32_t active_pairs = 0, queried_pairs = 0, substeps = 0, iterations = 0;
+    std::uint64_t points_visited = 0;
+    double load_percent = 0.0;  ///< largest of the pairs
+    bool conflicting = false;
+  };
+  [[nodiscard]] const Work& work() const { return work_; }
+
+  /// Of all that moves and will matter for the next tick.
+  [[nodiscard]] std::uint64_t hash() const noexcept;
+  [[nodiscard]] std::vector<std::uint8_t> save() const;
+  [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
+
+ private:
+  std::shared_ptr<const Scene> scene_;
+  std::vector<ObjectMotion> objects_;
+  std::vector<HandMotion> hands_;
+  std::vector<PairMotion> pairs_;
+  Work work_;
+  Tick tick_ = 0;
+};
+
+}  // namespace tenon

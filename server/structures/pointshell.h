@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "idl/types/spatial.h"
+
+namespace tenon {
+
+/// A point on the surface of an object, in its mesh frame M.
+struct ShellPoint {
+  Vector3f p_MP = Vector3f::Zero();
+  Vector3f inward_M = Vector3f::Zero();  ///< unit normal, into the object
+  float area = 0.0F;                     ///< [m^2] of surface it stands for when all levels are used
+};
+
+/// A ball that holds `count` consecutive things: points (leaf) or leaves (cluster).
+struct ShellSphere {
+  Vector3f p_MC = Vector3f::Zero();
+  float radius = 0.0F;
+  std::uint32_t first = 0;
+  std::uint32_t count = 0;
+};
+
+/// Points added by one level. Levels 0..k together sample the whole object, about four times denser each.
+struct ShellLevel {
+  std::uint32_t first_point = 0, point_count = 0;
+  std::uint32_t first_leaf = 0, leaf_count = 0;
+  std::uint32_t first_cluster = 0, cluster_count = 0;
+  float spacing = 0.0F;     ///< [m] between neighbours when levels 0..this are used
+  float area_scale = 1.0F;  ///< point areas are multiplied by this when levels above this one are left out
+};
+
+/// An object as points on its skin with a tree of spheres over them (paper §3.1, "point-sphere tree").
+///
+/// Points are stored by level, inside a level by leaf (at most 16 neighbours), leaves by cluster (at most 16
+/// leaves). A query walks clusters, then leaves, then points of the levels that its budget allows.
+///
+/// A view, as DistanceField. Threads: constant. Real-time: all.
+class Pointshell {
+ public:
+  static constexpr std::uint32_t kLeafPoints = 16;
+  static constexpr std::uint32_t kClusterLeaves = 16;
+
+  struct Layout {
+    std::span<const ShellPoint> points;
+    std::span<const ShellSphere> leaves;
+    std::span<const ShellSphere> clusters;
+    std::span<const ShellLevel> levels;
+  };
+
+  Pointshell() = default;
+  Pointshell(const Layout& layout, std::shared_ptr<const void> owner);
+
+  [[nodiscard]] std::span<const ShellPoint> points() const { return layout_.points; }
+  [[nodiscard]] std::span<const ShellSphere> leaves() const { return layout_.leaves; }
+  [[nodiscard]] std::span<const ShellSphere> clusters() const { return layout_.clusters; }
+  [[nodiscard]] std::span<const ShellLevel> levels() const { return layout_.levels; }
+  [[nodiscard]] bool empty() const { return layout_.points.empty(); }
+
+  /// Largest distance of a point from the mesh origin [m]: bounds the speed of any point by |v| + |w| radius.
+  [[nodiscard]] double radius() const { return radius_; }
+  /// A ball that holds all points: centre in M and radius [m].
+  [[nodiscard]] const Vector3& ballCentre() const { return p_MC_; }
+  [[nodiscard]] double ballRadius() const { return ball_radius_; }
+
+ private:
+  Layout layout_;
+  std::shared_ptr<const void> owner_;
+  double radius_ = 0.0;
+  Vector3 p_MC_ = Vector3::Zero();
+  double ball_radius_ = 0.0;
+};
+
+}  // namespace tenon
