@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "idl/types/ids.h"
@@ -17,20 +18,20 @@ struct ObjectSpec {
   std::string title;  ///< on screen: the trainer's word
   std::string kind = "part";
   std::string color = "#b0b7bf";
-  std::uint32_t group = 0;  ///< objects of one group never touch; 0: no group
-  Pose X_WO;                ///< at the start
-  ObjectStatus status = ObjectStatus::kParked;                 ///< at the start
+  std::uint32_t group = 0;                             ///< objects of one group never touch; 0: no group
+  Pose X_WO;                                           ///< at the start
+  ObjectStatus status = ObjectStatus::kParked;         ///< at the start
   std::shared_ptr<const HapticStructures> structures;  ///< none: seen, never felt
   double stiffness = 1000.0;  ///< [N/m] of its penalty force (sensing pairs and the baselines)
 };
 
 /// Two objects that may touch.
 struct PairSpec {
-  ObjectId a;              ///< asked as a shell
-  ObjectId b;              ///< asked as a field
-  double dilation = 0.0;   ///< [m] of b's surface
-  bool enabled = true;     ///< at the start: a cell of the configuration matrix
-  bool sensing = false;    ///< felt as vibration, never resisted: a forearm
+  ObjectId a;             ///< asked as a shell
+  ObjectId b;             ///< asked as a field
+  double dilation = 0.0;  ///< [m] of b's surface
+  bool enabled = true;    ///< at the start: a cell of the configuration matrix
+  bool sensing = false;   ///< felt as vibration, never resisted: a forearm
 };
 
 enum class HandKind : std::uint8_t {
@@ -43,8 +44,8 @@ struct HandSpec {
   std::string name;
   Role role = Role::kTrainee;
   HandKind kind = HandKind::kCoupled;
-  ObjectId object;                   ///< what it moves when nothing else is said: pointer, drill, cube, forearm
-  double stiffness = 1000.0;         ///< [N/m] of the coupling
+  ObjectId object;            ///< what it moves when nothing else is said: pointer, drill, cube, forearm
+  double stiffness = 1000.0;  ///< [N/m] of the coupling
   double rotational_stiffness = 20.0;  ///< [Nm/rad]
 };
 

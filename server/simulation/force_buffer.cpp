@@ -1,0 +1,88 @@
+#include "server/simulation/force_buffer.h"
+
+#include <algorithm>
+#include <cassert>
+
+namespace tenon {
+namespace {
+
+Vector3 capped(const Vector3& v, double limit) {
+  const double norm = v.norm();
+  return norm > limit ? Vector3(v * (limit / norm)) : v;
+}
+
+bool alive(const ForceCell& cell, Tick now) { return cell.used && now - cell.stamp < cell.lifetime_ticks; }
+
+double weight(const ForceCell& cell, Tick now) {
+  if (cell.lifetime_ticks == 0) return 1.0;
+  if (!alive(cell, now)) return 0.0;
+  return 1.0 - static_cast<double>(now - cell.stamp) / cell.lifetime_ticks;
+}
+
+}  // namespace
+
+ForceBuffer::ForceBuffer(std::size_t own_cells, SendPolicy policy)
+    : cells_(own_cells + kContributions), own_cells_(own_cells), policy_(policy) {}
+
+bool ForceBuffer::write(std::size_t cell, const Wrench& F_Bo_W, Tick now) noexcept {
+  assert(cell < own_cells_);
+  const bool is_due = due(cell);
+  cells_[cell] = {F_Bo_W, now, 0, 0, true};
+  return is_due;
+}
+
+void ForceBuffer::clear(std::size_t cell) noexcept { cells_[cell] = ForceCell{}; }
+
+bool ForceBuffer::contribute(std::uint32_t source, const Wrench& F_Bo_W, std::uint32_t lifetime_ticks,
+                             Tick now) noexcept {
+  // beyond this the norm itself overflows
+  constexpr double kSane = 1e100;
+  const auto sane = [](const Vector3& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() < kSane; };
+  const auto outside = std::span(cells_).subspan(own_cells_);
+  auto place = std::find_if(outside.begin(), outside.end(),
+                            [&](const ForceCell& cell) { return cell.used && cell.source == source; });
+  if (place == outside.end()) {
+    place = std::find_if(outside.begin(), outside.end(),
+                         [&](const ForceCell& cell) { return !alive(cell, now); });
+  }
+  if (place == outside.end() || lifetime_ticks == 0 || !sane(F_Bo_W.force) || !sane(F_Bo_W.torque)) {
+    ++refused_;
+    return false;
+  }
+  *place = {{capped(F_Bo_W.force, kMaxContributedForce), capped(F_Bo_W.torque, kMaxContributedTorque)},
+            now,
+            source,
+            std::min(lifetime_ticks, kMaxLifetimeTicks),
+            true};
+  return true;
+}
+
+void ForceBuffer::expire(Tick now) noexcept {
+  for (ForceCell& cell : std::span(cells_).subspan(own_cells_)) {
+    if (cell.used && !alive(cell, now)) cell = ForceCell{};
+  }
+}
+
+Wrench ForceBuffer::total(Tick now) const noexcept {
+  Wrench sum;
+  for (const ForceCell& cell : cells_) sum += cell.F_Bo_W * weight(cell, now);
+  return sum;
+}
+
+Wrench ForceBuffer::contributed(Tick now) const noexcept {
+  Wrench sum;
+  for (const ForceCell& cell : std::span(cells_).subspan(own_cells_)) sum += cell.F_Bo_W * weight(cell, now);
+  return sum;
+}
+
+bool ForceBuffer::oldest(std::size_t cell) const noexcept {
+  return std::all_of(cells_.begin(), cells_.end(), [&](const ForceCell& other) {
+    return !other.used || !cells_[cell].used || other.stamp >= cells_[cell].stamp;
+  });
+}
+
+bool ForceBuffer::due(std::size_t cell) const noexcept {
+  return policy_ == SendPolicy::kEveryForce || oldest(cell);
+}
+
+}  // namespace tenon

@@ -1,0 +1,30 @@
+#include "server/simulation/scene.h"
+
+#include <algorithm>
+#include <string_view>
+
+namespace tenon {
+namespace {
+
+template <typename IdType, typename List>
+IdType named(const List& list, std::string_view name) {
+  const auto found =
+      std::find_if(list.begin(), list.end(), [&](const auto& one) { return one.name == name; });
+  if (found == list.end()) return {};
+  return {static_cast<std::uint32_t>(found - list.begin())};
+}
+
+}  // namespace
+
+ObjectId Scene::objectNamed(std::string_view name) const { return named<ObjectId>(objects, name); }
+
+HandId Scene::handNamed(std::string_view name) const { return named<HandId>(hands, name); }
+
+int Scene::pairOf(ObjectId a, ObjectId b) const {
+  const auto found = std::find_if(pairs.begin(), pairs.end(), [&](const PairSpec& pair) {
+    return (pair.a == a && pair.b == b) || (pair.a == b && pair.b == a);
+  });
+  return found == pairs.end() ? -1 : static_cast<int>(found - pairs.begin());
+}
+
+}  // namespace tenon
