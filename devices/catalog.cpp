@@ -1,0 +1,91 @@
+#include "devices/catalog.h"
+
+#include <array>
+#include <string>
+
+#include "devices/simulated/falcon.h"
+#include "devices/simulated/hug.h"
+#include "devices/simulated/omega3.h"
+#include "devices/simulated/sigma7.h"
+#include "devices/simulated/simulated_device.h"
+#include "devices/simulated/vibrotac.h"
+
+namespace tenon {
+namespace {
+
+using OpenedDevice = Result<std::unique_ptr<HapticDevice>>;
+using OpenedPair = Result<std::unique_ptr<DevicePair>>;
+
+template <SimulatedModel (*kModel)()>
+OpenedDevice openSimulated(std::uint64_t seed) {
+  auto device = std::make_unique<SimulatedDevice>(kModel(), seed);
+  if (auto opened = device->open(); !opened) return fail(opened.error().what);
+  return device;
+}
+
+OpenedDevice openVibrotac(std::uint64_t /*seed*/) { return std::make_unique<Vibrotac>(); }
+
+OpenedPair openHug(std::uint64_t seed) {
+  auto hug = std::make_unique<Hug>(seed);
+  if (auto opened = hug->open(); !opened) return fail(opened.error().what);
+  return hug;
+}
+
+template <typename Opened>
+struct Entry {
+  std::string_view name;
+  Opened (*open)(std::uint64_t seed);
+};
+
+constexpr std::array kDevices{
+    Entry<OpenedDevice>{"sigma7-sim", openSimulated<sigma7Model>},
+    Entry<OpenedDevice>{"omega3-sim", openSimulated<omega3Model>},
+    Entry<OpenedDevice>{"falcon-sim", openSimulated<falconModel>},
+    Entry<OpenedDevice>{"vibrotac-sim", openVibrotac},
+};
+
+constexpr std::array kPairs{
+    Entry<OpenedPair>{"hug-sim", openHug},
+};
+
+template <typename Table>
+auto findIn(const Table& table, std::string_view name) -> decltype(table.data()) {
+  for (const auto& entry : table)
+    if (entry.name == name) return &entry;
+  return nullptr;
+}
+
+template <typename Table>
+std::vector<std::string_view> namesIn(const Table& table) {
+  std::vector<std::string_view> names;
+  for (const auto& entry : table) names.push_back(entry.name);
+  return names;
+}
+
+template <typename Table>
+std::string listOf(const Table& table) {
+  std::string list;
+  for (const auto& entry : table) list += (list.empty() ? "" : ", ") + std::string(entry.name);
+  return list;
+}
+
+}  // namespace
+
+OpenedDevice openDevice(std::string_view name, std::uint64_t seed) {
+  if (const auto* entry = findIn(kDevices, name)) return entry->open(seed);
+  if (findIn(kPairs, name))
+    return fail("device '" + std::string(name) +
+                "' has two arms and wants a station with two hands; with one hand: " + listOf(kDevices));
+  return fail("no device is called '" + std::string(name) + "'; there are: " + listOf(kDevices) +
+              "; with two arms: " + listOf(kPairs));
+}
+
+OpenedPair openPair(std::string_view name, std::uint64_t seed) {
+  if (const auto* entry = findIn(kPairs, name)) return entry->open(seed);
+  return fail("no device with two arms is called '" + std::string(name) + "'; there are: " + listOf(kPairs));
+}
+
+std::vector<std::string_view> deviceNames() { return namesIn(kDevices); }
+std::vector<std::string_view> pairNames() { return namesIn(kPairs); }
+
+}  // namespace tenon
