@@ -46,7 +46,7 @@ struct Welcome {
   bool accepted = false;
   std::string reason;  ///< why not; empty when accepted
   ClientId client;
-  std::vector<HandId> hands;  ///< in the order asked for
+  std::vector<HandId> hands;  ///< in the order asked for; invalid for one that the scenario does not have
   std::string token;
   std::uint32_t server_epoch = 0;
   Tick tick = 0;  ///< of the server; in lockstep the first input answers this one plus one

@@ -1,0 +1,200 @@
+#include "server/session/exercise.h"
+
+#include <algorithm>
+
+#include "idl/types/bytes.h"
+
+namespace tenon {
+
+Exercise::Exercise(std::shared_ptr<const ScenarioFile> scenario, std::shared_ptr<const Scene> scene,
+                   const ExerciseOptions& options)
+    : scenario_(std::move(scenario)),
+      environment_(std::move(scene), options.environment),
+      machine_(scenario_),
+      limits_(options.limits),
+      needed_hands_(options.needed_hands),
+      ages_(environment_.hands().size()) {}
+
+void Exercise::tick(const TickInput& input) noexcept {
+  game_.clear();
+  for (const Change& change : input.changes) apply(change);
+  read(input);
+  judgeAges();
+  if (phase_ == RunPhase::kRunning) {
+    machine_.step(environment_, {game_.begin(), game_.size()});
+    if (machine_.status().finished) phase_ = RunPhase::kSucceeded;
+    if (machine_.status().failed) phase_ = RunPhase::kFailed;
+  }
+  beginWhenAllAreHere();
+  environment_.step();
+}
+
+void Exercise::apply(const Change& change) noexcept {
+  switch (change.kind) {
+    case ChangeKind::kAttach: return attach(change.hand);
+    case ChangeKind::kDetach: return detach(change.hand);
+    case ChangeKind::kGame: game_.push_back(change.game); return;
+    case ChangeKind::kRelease: return environment_.release(change.hand);
+    case ChangeKind::kPair: return environment_.setPairEnabled(change.index, change.value != 0.0);
+    case ChangeKind::kSwapHands: return swapHands(change.hand, HandId{change.index});
+    case ChangeKind::kEmergencyStop: emergency_stop_ = change.value != 0.0; return;
+    case ChangeKind::kContribute:
+      return environment_.contribute(change.object, change.index, change.F_Oo_W, change.lifetime_ticks);
+    case ChangeKind::kExternalPose:
+      return environment_.place(change.object, change.X_WO,
+                                environment_.objects()[change.object.value].status);
+    case ChangeKind::kPause:
+      if (phase_ == RunPhase::kRunning) phase_ = RunPhase::kPaused;
+      return;
+    case ChangeKind::kResume:
+      if (phase_ == RunPhase::kPaused) phase_ = RunPhase::kRunning;
+      return;
+    case ChangeKind::kStop:
+      if (!over()) phase_ = RunPhase::kStopped;
+      return;
+  }
+}
+
+void Exercise::attach(HandId hand) noexcept {
+  ages_[hand.value] = {.attached = true, .active = true, .age = 0, .seq = 0};
+}
+
+void Exercise::detach(HandId hand) noexcept {
+  ages_[hand.value] = {};
+  environment_.setHandPresent(hand, false);
+}
+
+void Exercise::swapHands(HandId a, HandId b) noexcept {
+  const ObjectId of_a = environment_.hands()[a.value].object;
+  const ObjectId of_b = environment_.hands()[b.value].object;
+  environment_.grab(a, of_b);
+  environment_.grab(b, of_a);
+}
+
+void Exercise::read(const TickInput& input) noexcept {
+  for (HandAge& age : ages_) ++age.age;
+  for (const HandReading& reading : input.readings) {
+    HandAge& age = ages_[reading.hand.value];
+    if (!age.attached) continue;
+    age.age = 0;
+    age.seq = reading.seq;
+    age.active = reading.active;
+    environment_.setHandPose(reading.hand, reading.X_WH, reading.V_WH);
+    if (environment_.hands()[reading.hand.value].present) continue;
+
+    // the hand is here (again): what it moves stays in it as it lies now
+    environment_.setHandPresent(reading.hand, true);
+    environment_.grab(reading.hand, environment_.hands()[reading.hand.value].object);
+  }
+}
+
+void Exercise::judgeAges() noexcept {
+  const bool stands_still = emergency_stop_ || phase_ == RunPhase::kPaused;
+  for (std::uint32_t i = 0; i < ages_.size(); ++i) {
+    const HandAge& age = ages_[i];
+    if (!age.attached) continue;
+    if (age.age == limits_.park) environment_.setHandPresent(HandId{i}, false);
+    environment_.setHandFrozen(HandId{i}, stands_still || !age.active || age.age > limits_.freeze);
+  }
+}
+
+void Exercise::beginWhenAllAreHere() noexcept {
+  if (phase_ != RunPhase::kWaitingForPeople) return;
+  const auto here = [&](HandId hand) { return environment_.hands()[hand.value].present; };
+  if (!std::all_of(needed_hands_.begin(), needed_hands_.end(), here)) return;
+  phase_ = RunPhase::kRunning;
+  machine_.start(environment_);
+}
+
+std::uint64_t Exercise::hash() const noexcept {
+  StateHash hash;
+  hash.add(environment_.hash());
+  machine_.addTo(hash);
+  for (const HandAge& age : ages_) {
+    hash.add(std::uint64_t{age.attached} | std::uint64_t{age.active} << 1U);
+    hash.add(age.age);
+  }
+  hash.add(std::uint64_t{static_cast<std::uint32_t>(phase_)} | std::uint64_t{emergency_stop_} << 32U);
+  return hash.value();
+}
+
+TickOutput Exercise::makeOutput() const {
+  TickOutput output;
+  output.objects.resize(environment_.objects().size());
+  output.manifolds.resize(environment_.hands().size());
+  output.present.resize(environment_.hands().size());
+  output.ages.resize(environment_.hands().size());
+  output.pairs.resize(environment_.pairs().size());
+  return output;
+}
+
+void Exercise::fill(TickOutput& output) const noexcept {
+  output.tick = now();
+  output.hash = hash();
+  output.phase = phase_;
+  output.emergency_stop = emergency_stop_;
+  output.step = machine_.status();
+
+  const auto objects = environment_.objects();
+  for (std::uint32_t i = 0; i < objects.size(); ++i) {
+    const ObjectMotion& motion = objects[i];
+    ObjectState& state = output.objects[i];
+    state.object = ObjectId{i};
+    state.epoch = motion.epoch;
+    state.X_WO = motion.X_WO;
+    state.V_WO << motion.V_WO.linear.cast<float>(), motion.V_WO.angular.cast<float>();
+    state.holder = motion.holder;
+    state.status = static_cast<std::uint8_t>(motion.status);
+    state.in_contact = motion.in_contact;
+  }
+  for (std::uint32_t i = 0; i < ages_.size(); ++i) {
+    output.present[i] = environment_.hands()[i].present;
+    output.ages[i] = static_cast<std::uint32_t>(std::min<Tick>(ages_[i].age, 0xFFFFFFFFU));
+    if (!output.present[i]) continue;
+    HandManifold& manifold = output.manifolds[i];
+    environment_.manifold(HandId{i}, manifold);
+    manifold.tick = output.tick;
+    manifold.answers_seq = ages_[i].seq;
+    manifold.step_revision = output.step.revision;
+  }
+  for (std::size_t i = 0; i < output.pairs.size(); ++i) environment_.pairContact(i, output.pairs[i]);
+
+  const Environment::Work& work = environment_.work();
+  output.stats.tick = output.tick;
+  output.stats.load_percent = work.load_percent;
+  output.stats.active_pairs = work.active_pairs;
+  output.stats.queried_pairs = work.queried_pairs;
+  output.stats.points_visited = work.points_visited;
+  output.stats.state_hash = output.hash;
+}
+
+void Exercise::save(std::vector<std::uint8_t>& bytes) const {
+  ByteWriter out(bytes);
+  const auto part = [&](const std::vector<std::uint8_t>& saved) {
+    out.put(static_cast<std::uint32_t>(saved.size()));
+    bytes.insert(bytes.end(), saved.begin(), saved.end());
+  };
+  out.put(phase_), out.put(emergency_stop_);
+  for (const HandAge& age : ages_) out.put(age.attached), out.put(age.active), out.put(age.age), out.put(age.seq);
+  part(environment_.save());
+  part(machine_.save());
+}
+
+Result<void> Exercise::restore(std::span<const std::uint8_t> bytes) {
+  ByteReader in(bytes);
+  in.get(phase_), in.get(emergency_stop_);
+  for (HandAge& age : ages_) in.get(age.attached), in.get(age.active), in.get(age.age), in.get(age.seq);
+  const auto part = [&](auto&& restoreFrom) -> Result<void> {
+    std::uint32_t size = 0;
+    in.get(size);
+    const std::size_t at = in.position();
+    if (!in.ok() || bytes.size() - at < size) return fail("a checkpoint in the journal is cut short");
+    if (auto done = restoreFrom(bytes.subspan(at, size)); !done) return done;
+    in.skip(size);
+    return {};
+  };
+  if (auto done = part([&](auto span) { return environment_.restore(span); }); !done) return done;
+  return part([&](auto span) { return machine_.restore(span); });
+}
+
+}  // namespace tenon
