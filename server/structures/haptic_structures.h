@@ -13,14 +13,14 @@ namespace tenon {
 
 /// Where structures came from and what they are, for people and caches.
 struct StructureInfo {
-  std::string source;           ///< names of the meshes
-  std::string content_hash;     ///< of meshes and options: the name in a cache
+  std::string source;        ///< names of the meshes
+  std::string content_hash;  ///< of meshes and options: the name in a cache
   std::uint64_t triangles = 0;
   double bake_seconds = 0.0;
-  Eigen::AlignedBox3d box_M;    ///< of the mesh
-  double surface_area = 0.0;    ///< [m^2] of the sampled outer surface
+  Eigen::AlignedBox3d box_M;  ///< of the mesh
+  double surface_area = 0.0;  ///< [m^2] of the sampled outer surface
   std::uint64_t bricks = 0;
-  std::string notes;            ///< one sentence a line: what a person should know (parts without an inside, ...)
+  std::string notes;  ///< one sentence a line: what a person should know (parts without an inside, ...)
 };
 
 /// Both haptic structures of one object: it is asked as a field or as a shell, whichever a pair needs.
@@ -30,10 +30,13 @@ struct HapticStructures {
   StructureInfo info;
 };
 
-/// Writes a structure file: versioned, checksummed, to a temporary name first, so a reader never sees half a file.
-[[nodiscard]] Result<void> writeStructures(const std::filesystem::path& file, const HapticStructures& structures);
+/// Writes a structure file: versioned, checksummed, to a temporary name first, so a reader never sees half a
+/// file.
+[[nodiscard]] Result<void> writeStructures(const std::filesystem::path& file,
+                                           const HapticStructures& structures);
 
 /// Maps a structure file. Fails with one sentence naming the file on a wrong version, size, or checksum.
-[[nodiscard]] Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesystem::path& file);
+[[nodiscard]] Result<std::shared_ptr<const HapticStructures>> openStructures(
+    const std::filesystem::path& file);
 
 }  // namespace tenon

@@ -1,0 +1,157 @@
+#include "server/structures/distance_field.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tenon {
+
+namespace {
+
+// Half the diagonal of a voxel: no point of space is further from the nearest sample [voxels].
+constexpr double kHalfDiagonal = 0.8661;
+
+double distanceToBox(const Eigen::AlignedBox3d& box, const Vector3& p) {
+  const Vector3 outside = (box.min() - p).cwiseMax(p - box.max()).cwiseMax(0.0);
+  return outside.norm();
+}
+
+}  // namespace
+
+/// A point's coarse brick: its index entry, and where in it the point is, each coordinate in [0, 1].
+struct DistanceField::Place {
+  std::size_t number = 0;
+  Entry entry = kFarOutside;
+  Vector3 p_brick = Vector3::Zero();
+};
+
+DistanceField::DistanceField(const Layout& layout, std::shared_ptr<const void> owner)
+    : layout_(layout),
+      brick_edge_(layout.voxel * kBrickVoxels),
+      inverse_brick_edge_(1.0 / (layout.voxel * kBrickVoxels)),
+      owner_(std::move(owner)) {}
+
+Eigen::AlignedBox3d DistanceField::box() const {
+  const Vector3 size(layout_.bricks[0], layout_.bricks[1], layout_.bricks[2]);
+  return {layout_.p_MoFo_M, layout_.p_MoFo_M + size * brick_edge_};
+}
+
+bool DistanceField::locate(const Vector3& p_MP, Place& place) const noexcept {
+  const Vector3 p = (p_MP - layout_.p_MoFo_M) * inverse_brick_edge_;
+  std::array<std::size_t, 3> brick{};
+  for (int axis = 0; axis < 3; ++axis) {
+    // written so that NaN is outside too
+    if (!(p[axis] >= 0.0 && p[axis] < layout_.bricks[axis])) return false;
+    brick[axis] = static_cast<std::size_t>(p[axis]);
+    place.p_brick[axis] = p[axis] - static_cast<double>(brick[axis]);
+  }
+  const auto nx = static_cast<std::size_t>(layout_.bricks[0]);
+  const auto ny = static_cast<std::size_t>(layout_.bricks[1]);
+  place.number = (brick[2] * ny + brick[1]) * nx + brick[0];
+  place.entry = layout_.index[place.number];
+  return true;
+}
+
+bool DistanceField::interpolate(Entry brick, const Vector3& p_brick, double voxel, double band,
+                                FieldSample& sample) const noexcept {
+  const Vector3 p = p_brick * kBrickVoxels;
+  const int x = std::min(static_cast<int>(p.x()), kBrickVoxels - 1);
+  const int y = std::min(static_cast<int>(p.y()), kBrickVoxels - 1);
+  const int z = std::min(static_cast<int>(p.z()), kBrickVoxels - 1);
+  const double u = p.x() - x;
+  const double v = p.y() - y;
+  const double w = p.z() - z;
+  const std::int16_t* s = layout_.samples.data() + static_cast<std::size_t>(brick) * kBrickSamples +
+                          (z * kBrickSide + y) * kBrickSide + x;
+  constexpr int kY = kBrickSide;
+  constexpr int kZ = kBrickSide * kBrickSide;
+
+  // along x, then y, then z; d* are differences along x, e* along y
+  const double d00 = s[1] - s[0];
+  const double d10 = s[kY + 1] - s[kY];
+  const double d01 = s[kZ + 1] - s[kZ];
+  const double d11 = s[kZ + kY + 1] - s[kZ + kY];
+  const double c00 = s[0] + d00 * u;
+  const double c10 = s[kY] + d10 * u;
+  const double c01 = s[kZ] + d01 * u;
+  const double c11 = s[kZ + kY] + d11 * u;
+  const double e0 = c10 - c00;
+  const double e1 = c11 - c01;
+  const double c0 = c00 + e0 * v;
+  const double c1 = c01 + e1 * v;
+  const double d0 = d00 + (d10 - d00) * v;
+  const double d1 = d01 + (d11 - d01) * v;
+
+  constexpr double kPerQuantum = 1.0 / kQuantaPerVoxel;
+  sample.distance = (c0 + (c1 - c0) * w) * kPerQuantum * voxel;
+  sample.gradient = Vector3(d0 + (d1 - d0) * w, e0 + (e1 - e0) * w, c1 - c0) * kPerQuantum;
+  sample.exact = std::abs(sample.distance) <= band;
+  return sample.exact;
+}
+
+double DistanceField::farMagnitude(const Place& place) const noexcept {
+  // a brick without samples has no sample nearer than the band
+  const double beyond_band = layout_.band - kHalfDiagonal * layout_.voxel;
+  const Vector3 p_CP = (place.p_brick - Vector3::Constant(0.5)) * brick_edge_;
+  const double at_centre = std::abs(layout_.far[place.number]) * layout_.voxel / kFarPerVoxel;
+  return std::max(beyond_band, at_centre - p_CP.norm());
+}
+
+FieldSample DistanceField::sample(const Vector3& p_MP) const noexcept {
+  FieldSample sample;
+  Place place;
+  if (!locate(p_MP, place)) {
+    sample.distance = distanceToBox(box(), p_MP) + layout_.margin;
+    return sample;
+  }
+  Entry brick = place.entry;
+  if (brick < 0) {
+    const double magnitude = farMagnitude(place);
+    sample.distance = brick == kFarInside ? -magnitude : magnitude;
+    return sample;
+  }
+  if (brick >= kRefined) {
+    // the child's answer if it is within its own band, else the coarse brick's
+    const int r = layout_.refinement;
+    const Vector3 p = place.p_brick * r;
+    std::array<int, 3> child{};
+    Vector3 p_child;
+    for (int axis = 0; axis < 3; ++axis) {
+      child[axis] = std::min(static_cast<int>(p[axis]), r - 1);
+      p_child[axis] = p[axis] - child[axis];
+    }
+    const Entry* children = layout_.index.data() + (brick - kRefined);
+    const Entry fine = children[(child[2] * r + child[1]) * r + child[0]];
+    const double fine_voxel = layout_.voxel / r;
+    if (fine >= 0 && interpolate(fine, p_child, fine_voxel, kBandVoxels * fine_voxel, sample)) return sample;
+    brick = children[r * r * r];
+  }
+  if (interpolate(brick, place.p_brick, layout_.voxel, layout_.band, sample)) return sample;
+  const double magnitude = std::abs(sample.distance) - kHalfDiagonal * layout_.voxel;
+  sample.distance = std::copysign(std::max(magnitude, 0.0), sample.distance);
+  sample.gradient = Vector3::Zero();
+  return sample;
+}
+
+double DistanceField::lowerBound(const Vector3& p_MP) const noexcept {
+  Place place;
+  if (!locate(p_MP, place)) return distanceToBox(box(), p_MP) + layout_.margin;
+  if (place.entry == kFarOutside) return farMagnitude(place);
+  // nothing in the box is deeper than half its diagonal
+  if (place.entry == kFarInside) return -0.5 * box().diagonal().norm();
+  // the interpolant may lie below the distance by half a voxel's diagonal, and samples are rounded
+  const Vector3 p_CP = (place.p_brick - Vector3::Constant(0.5)) * brick_edge_;
+  return (static_cast<double>(layout_.far[place.number]) / kFarPerVoxel - 1.0) * layout_.voxel - p_CP.norm();
+}
+
+double DistanceField::voxelAt(const Vector3& p_MP) const noexcept {
+  Place place;
+  if (!locate(p_MP, place) || place.entry < kRefined) return layout_.voxel;
+  const int r = layout_.refinement;
+  std::array<int, 3> child{};
+  for (int axis = 0; axis < 3; ++axis)
+    child[axis] = std::min(static_cast<int>(place.p_brick[axis] * r), r - 1);
+  const Entry fine = layout_.index[(place.entry - kRefined) + (child[2] * r + child[1]) * r + child[0]];
+  return fine >= 0 ? layout_.voxel / r : layout_.voxel;
+}
+
+}  // namespace tenon

@@ -1,0 +1,135 @@
+#include "server/structures/field_builder.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+namespace tenon {
+
+namespace {
+
+using Entry = DistanceField::Entry;
+constexpr int kSide = DistanceField::kBrickSide;
+// From a brick's centre to its corner [voxels].
+constexpr double kBrickRadius = 6.9283;
+
+/// Samples one brick and appends it when the surface is within the band of any of its samples.
+class BrickSampler {
+ public:
+  BrickSampler(const AnalyticDistance& distance, std::vector<std::int16_t>& samples)
+      : distance_(distance), samples_(samples) {}
+
+  Entry sample(const Vector3& p_MBo, double voxel) {
+    const double edge = voxel * DistanceField::kBrickVoxels;
+    const double at_centre = distance_(p_MBo + Vector3::Constant(edge / 2));
+    const Entry far = at_centre < 0.0 ? DistanceField::kFarInside : DistanceField::kFarOutside;
+    if (std::abs(at_centre) >= (DistanceField::kBandVoxels + kBrickRadius) * voxel) return far;
+
+    std::array<std::int16_t, DistanceField::kBrickSamples> brick{};
+    double nearest = std::numeric_limits<double>::infinity();
+    std::size_t place = 0;
+    for (int z = 0; z < kSide; ++z) {
+      for (int y = 0; y < kSide; ++y) {
+        for (int x = 0; x < kSide; ++x) {
+          const double d = distance_(p_MBo + Vector3(x, y, z) * voxel);
+          nearest = std::min(nearest, std::abs(d));
+          brick[place++] = quantizedSample(d, voxel);
+        }
+      }
+    }
+    if (nearest >= DistanceField::kBandVoxels * voxel) return far;
+    samples_.insert(samples_.end(), brick.begin(), brick.end());
+    return static_cast<Entry>(samples_.size() / DistanceField::kBrickSamples) - 1;
+  }
+
+ private:
+  const AnalyticDistance& distance_;
+  std::vector<std::int16_t>& samples_;
+};
+
+}  // namespace
+
+DistanceField makeField(FieldStorage storage) {
+  const auto owner = std::make_shared<const FieldStorage>(std::move(storage));
+  DistanceField::Layout layout = owner->layout;
+  layout.index = owner->index;
+  layout.samples = owner->samples;
+  layout.far = owner->far;
+  return {layout, owner};
+}
+
+FieldStorage makeGrid(const Eigen::AlignedBox3d& surface_box_M, double voxel) {
+  FieldStorage storage;
+  const double edge = voxel * DistanceField::kBrickVoxels;
+  storage.layout.voxel = voxel;
+  storage.layout.band = DistanceField::kBandVoxels * voxel;
+  storage.layout.margin = edge;
+  storage.layout.p_MoFo_M = surface_box_M.min() - Vector3::Constant(edge);
+  std::size_t count = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double bricks = std::max(1.0, std::ceil(surface_box_M.sizes()[axis] / edge - 1e-9)) + 2.0;
+    storage.layout.bricks[axis] = static_cast<std::int32_t>(bricks);
+    count *= static_cast<std::size_t>(storage.layout.bricks[axis]);
+  }
+  storage.index.assign(count, DistanceField::kFarOutside);
+  storage.far.assign(count, 0);
+  return storage;
+}
+
+std::int16_t quantizedSample(double distance, double voxel) {
+  constexpr double kClamp = DistanceField::kClampVoxels;
+  const double voxels = std::clamp(distance / voxel, -kClamp, kClamp);
+  return static_cast<std::int16_t>(std::lround(voxels * DistanceField::kQuantaPerVoxel));
+}
+
+std::int16_t quantizedFar(double bound, double voxel, bool inside_brick) {
+  const double scaled = bound / voxel * DistanceField::kFarPerVoxel;
+  const double rounded = inside_brick ? std::ceil(scaled) : std::floor(scaled);
+  return static_cast<std::int16_t>(std::clamp(rounded, -32767.0, 32767.0));
+}
+
+DistanceField buildField(const AnalyticDistance& distance, const Eigen::AlignedBox3d& surface_box_M,
+                         double voxel, std::span<const Eigen::AlignedBox3d> refine_M, int refinement) {
+  FieldStorage storage = makeGrid(surface_box_M, voxel);
+  DistanceField::Layout& layout = storage.layout;
+  layout.refinement = std::max(refinement, 1);
+  const double edge = voxel * DistanceField::kBrickVoxels;
+  BrickSampler sampler(distance, storage.samples);
+
+  std::size_t number = 0;
+  for (int z = 0; z < layout.bricks[2]; ++z) {
+    for (int y = 0; y < layout.bricks[1]; ++y) {
+      for (int x = 0; x < layout.bricks[0]; ++x, ++number) {
+        const Vector3 p_MBo = layout.p_MoFo_M + Vector3(x, y, z) * edge;
+        const double at_centre = distance(p_MBo + Vector3::Constant(edge / 2));
+        const Entry coarse = sampler.sample(p_MBo, voxel);
+        storage.index[number] = coarse;
+        storage.far[number] = quantizedFar(at_centre, voxel, coarse == DistanceField::kFarInside);
+        const Eigen::AlignedBox3d box(p_MBo, p_MBo + Vector3::Constant(edge));
+        const bool refined = layout.refinement > 1 && coarse >= 0 &&
+                             std::abs(at_centre) < kBrickRadius * voxel &&
+                             std::any_of(refine_M.begin(), refine_M.end(),
+                                         [&box](const auto& region) { return region.intersects(box); });
+        if (!refined) continue;
+
+        // its children, then the coarse brick itself
+        const double fine_voxel = voxel / layout.refinement;
+        storage.index[number] = DistanceField::kRefined + static_cast<Entry>(storage.index.size());
+        for (int k = 0; k < layout.refinement; ++k) {
+          for (int j = 0; j < layout.refinement; ++j) {
+            for (int i = 0; i < layout.refinement; ++i) {
+              const Vector3 p_BC = Vector3(i, j, k) * (fine_voxel * DistanceField::kBrickVoxels);
+              storage.index.push_back(sampler.sample(p_MBo + p_BC, fine_voxel));
+            }
+          }
+        }
+        storage.index.push_back(coarse);
+      }
+    }
+  }
+  return makeField(std::move(storage));
+}
+
+}  // namespace tenon
