@@ -82,7 +82,9 @@ TEST(DistanceField, LowerBoundIsNeverAboveTheDistanceNorAboveAnExactSample) {
       const double bound = field.lowerBound(p);
       EXPECT_LE(bound, is_ball ? ballDistance(p) : boxDistance(p)) << p.transpose();
       const FieldSample sample = field.sample(p);
-      if (sample.exact) EXPECT_LE(bound, sample.distance) << p.transpose();
+      if (sample.exact) {
+        EXPECT_LE(bound, sample.distance) << p.transpose();
+      }
     }
   }
 }
