@@ -16,7 +16,8 @@ enum class ContactMethod : std::uint8_t {
   kPenalty,   ///< the paper's penalty force alone, as baseline: bodies follow their hands into each other
 };
 
-/// Two bodies of an island that may touch. Indices into the island's bodies; kStatic bodies stand at X_W*_static.
+/// Two bodies of an island that may touch. Indices into the island's bodies; kStatic bodies stand at
+/// X_W*_static.
 struct IslandPair {
   std::int32_t body_a = GapRow::kStatic;  ///< asked as a shell
   std::int32_t body_b = GapRow::kStatic;  ///< asked as a field
@@ -43,16 +44,22 @@ struct SolveLimits {
   double penalty_stiffness = 1000.0;  ///< [N/m] for the baselines
 };
 
+/// Two surfaces this close [m] touch: less is what interpolation and a cut-off sub-step leave. A row that
+/// will bind only farther along the way has no force yet.
+inline constexpr double kTouchGap = 5e-5;
+
 struct SolveReport {
-  std::uint32_t substeps = 0;
+  std::uint32_t substeps = 0;  ///< that moved something
   std::uint32_t iterations = 0;
+  std::uint32_t queries = 0;         ///< of pairs, over all sub-steps
+  std::uint64_t points_visited = 0;  ///< likewise
   bool conflicting = false;
   bool travel_capped = false;  ///< the rest of the way goes into the next tick
 };
 
 /// Moves the bodies of one contact island towards their springs' goals without letting them into each other
-/// (DESIGN "god object"; paper §3.1): sub-step by sub-step, query the pairs at the current poses, solve for poses,
-/// project first and clamp then, move.
+/// (DESIGN "god object"; paper §3.1): sub-step by sub-step, query the pairs at the current poses, solve for
+/// poses, project first and clamp then, move.
 ///
 /// Threads: one at a time (a worker owns one). Real-time: solve.
 class IslandSolver {
@@ -60,14 +67,32 @@ class IslandSolver {
   IslandSolver(std::size_t max_bodies, std::size_t max_pairs);
 
   /// Moves bodies[i].X_WB; fills results[i] for pairs[i].
-  SolveReport solve(std::span<MovableBody> bodies, std::span<const IslandPair> pairs, const SolveLimits& limits,
-                    std::span<IslandPairResult> results) noexcept;
+  SolveReport solve(std::span<MovableBody> bodies, std::span<const IslandPair> pairs,
+                    const SolveLimits& limits, std::span<IslandPairResult> results) noexcept;
 
  private:
+  struct Job;  ///< the arguments of solve
+  void solveIsland(const Job& job, SolveReport& report);
+  void solveBlocking(const Job& job, SolveReport& report);
+  void solvePenalty(const Job& job, SolveReport& report);
+
+  static void queryPairs(const Job& job, double margin, SolveReport& report);
+  void buildRows(const Job& job);
+  void solveMotions(const Job& job, SolveReport& report);
+  /// [m] the farthest that any point of any body goes.
+  [[nodiscard]] double travel(const Job& job) const;
+  void move(const Job& job, double share);
+  void blockMotions(const Job& job);
+  void fillForces(const Job& job) const;
+  static void fillPenalties(const Job& job);
+
   MotionSolver motion_;
   std::vector<GapRow> rows_;
   std::vector<double> multipliers_;
   std::vector<Displacement> motions_;
+  std::vector<Wrench> wrenches_;       ///< for kBlocking: penalties on a body, about its origin
+  std::vector<double> depths_;         ///< for kBlocking: the deepest of a body's contacts
+  std::vector<std::uint8_t> touched_;  ///< a row holds the body back
 };
 
 }  // namespace tenon

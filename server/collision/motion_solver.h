@@ -1,8 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
-#include <vector>
 
 #include "idl/types/fixed_vector.h"
 #include "idl/types/spatial.h"
@@ -22,8 +22,8 @@ inline constexpr std::size_t kMaxSprings = 4;
 /// A body that the solver may move.
 struct MovableBody {
   Pose X_WB;
-  FixedVector<Spring, kMaxSprings> springs;  ///< at least one
-  double radius = 0.1;                       ///< [m] of the body about its origin: scales rotations
+  FixedVector<Spring, kMaxSprings> springs;  ///< at least one with a stiffness
+  double radius = 0.1;                       ///< [m] of the body about its origin: no point is farther
 };
 
 /// gap + n · (motion of A's point - motion of B's point) >= 0. A body index of kStatic does not move.
@@ -36,16 +36,17 @@ struct GapRow {
   double gap = 0.0;
 };
 
-/// The answer for each body: how to move its frame, about its own origin.
 struct MotionResult {
   std::uint32_t iterations = 0;
-  bool conflicting = false;  ///< the gaps could not all be kept: pushing out was given up, nothing sinks deeper
+  bool conflicting =
+      false;  ///< the gaps could not all be kept: pushing out was given up, nothing sinks deeper
 };
 
-/// The contact-island problem of one instant: minimise over all bodies the energy of their springs subject to the
-/// gaps (Gauss' principle of least constraint, as in Ortega et al. 2007, for positions). A strictly convex
-/// quadratic programme, solved by a dual active-set method (Goldfarb and Idnani 1983): exact, bounded iterations,
-/// and picking the most violated row at every step, so hundreds of rows may be offered without reducing them.
+/// The contact-island problem of one instant: minimise over all bodies the energy of their springs subject to
+/// the gaps (Gauss' principle of least constraint, as in Ortega et al. 2007, for positions). A strictly
+/// convex quadratic programme, solved by a dual active-set method (Goldfarb and Idnani 1983): exact, bounded
+/// iterations, and picking the most violated row at every step, so hundreds of rows may be offered without
+/// reducing them.
 ///
 /// Keeps its work space, sized at construction. Threads: one at a time. Real-time: solve.
 class MotionSolver {
@@ -55,14 +56,14 @@ class MotionSolver {
   MotionSolver(MotionSolver&&) noexcept;
   MotionSolver& operator=(MotionSolver&&) noexcept;
 
-  /// motions[i]: displacement of bodies[i]'s origin and its rotation, in W. multipliers[r] >= 0: force [N] along
-  /// rows[r].n_W on its body A (and the opposite on B). Both spans are as long as bodies and rows.
+  /// motions[i]: displacement of bodies[i]'s origin and its rotation, in W. multipliers[r] >= 0: force [N]
+  /// along rows[r].n_W on its body A (and the opposite on B). Both spans are as long as bodies and rows.
   MotionResult solve(std::span<const MovableBody> bodies, std::span<const GapRow> rows,
                      std::span<Displacement> motions, std::span<double> multipliers) noexcept;
 
  private:
   struct Workspace;
-  Workspace* workspace_;
+  std::unique_ptr<Workspace> workspace_;
 };
 
 /// The wrench of a spring on its body B, about B's origin, in W; minus that is what the hand feels.

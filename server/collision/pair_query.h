@@ -39,30 +39,35 @@ struct PairQuery {
   const DistanceField* field_B = nullptr;
   Pose X_WA;
   Pose X_WB;
-  double dilation = 0.0;  ///< [m] the surface of B is felt this far outside
-  double margin = 0.0;    ///< [m] contacts are listed up to this gap
+  double dilation = 0.0;               ///< [m] the surface of B is felt this far outside
+  double margin = 0.0;                 ///< [m] contacts are listed up to this gap
   std::uint32_t levels = 0xFFFFFFFFU;  ///< how many levels of the shell may be used
 };
 
 struct PairQueryResult {
   ContactList contacts;
   QueryCounts counts;
-  double smallest_gap = 0.0;  ///< of all points, a lower bound when nothing was near; dilation included
-  double deepest = 0.0;       ///< [m] depth in the undilated field of the deepest point, 0 when apart
+  double smallest_gap =
+      0.0;               ///< of all points, a lower bound when none is within the margin; dilation included
+  double deepest = 0.0;  ///< [m] depth in the undilated field of the deepest point, 0 when apart
 };
 
-/// All points of A's shell whose gap to B is at most `margin`. Spheres that the field proves to be farther away
-/// are skipped; the answer is the same as testing every point.
+/// All points of A's shell whose gap to B is at most `margin`. Spheres that the field proves to be farther
+/// away are skipped; the answer is the same as testing every point.
 ///
 /// Threads: pure. Real-time.
 void queryPair(const PairQuery& query, PairQueryResult& result) noexcept;
 
-/// The paper's penalty: F = K sum a_i d_i n_i / A_ref of the points inside the (dilated) surface, about A's origin.
-/// A_ref = 1 cm^2, K in N/m.
-[[nodiscard]] Wrench penaltyWrench(const PairQueryResult& result, const Vector3& p_WAo, double stiffness) noexcept;
+/// [N] the penalty of one contact along its normal; 0 when apart.
+[[nodiscard]] double penaltyForce(const Contact& contact, double stiffness) noexcept;
 
-/// At most `out.size()` contacts that stand for all: the smallest gap, then those that differ most in place and
-/// normal. Returns how many; indices into `contacts`, in order of choice.
+/// The paper's penalty: F = K sum a_i d_i n_i / A_ref of the points inside the (dilated) surface, about A's
+/// origin. A_ref = 1 cm^2, K in N/m.
+[[nodiscard]] Wrench penaltyWrench(const PairQueryResult& result, const Vector3& p_WAo,
+                                   double stiffness) noexcept;
+
+/// At most `out.size()` contacts that stand for all: the smallest gap, then those that differ most in place
+/// and normal. Returns how many; indices into `contacts`, in order of choice.
 std::size_t reduceContacts(const ContactList& contacts, std::span<std::uint32_t> out) noexcept;
 
 }  // namespace tenon

@@ -1,0 +1,356 @@
+#include "server/collision/motion_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace tenon {
+namespace {
+
+/// Uniform in [-1, 1], the same on every machine.
+class Noise {
+ public:
+  explicit Noise(std::uint64_t seed) : engine_(seed) {}
+  double number() { return 2.0 * (static_cast<double>(engine_() >> 11U) / 9007199254740992.0) - 1.0; }
+  Vector3 vector() {
+    const double x = number();
+    const double y = number();
+    return {x, y, number()};
+  }
+  Vector3 direction() {
+    while (true) {
+      const Vector3 v = vector();
+      if (v.norm() > 0.1 && v.norm() < 1.0) return v.normalized();
+    }
+  }
+  Pose pose(double size, double angle) { return {size * vector(), expRotation(angle * vector())}; }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+MovableBody bodyAt(const Pose& X_WB, const Pose& X_WG, double stiffness = 1000.0,
+                   double rotational_stiffness = 20.0) {
+  MovableBody body;
+  body.X_WB = X_WB;
+  body.springs.push_back({X_WG, Vector3::Zero(), stiffness, rotational_stiffness});
+  return body;
+}
+
+struct Solved {
+  std::vector<Displacement> motions;
+  std::vector<double> multipliers;
+  MotionResult result;
+};
+
+Solved solve(const std::vector<MovableBody>& bodies, const std::vector<GapRow>& rows) {
+  MotionSolver solver(bodies.size(), rows.size());
+  Solved out;
+  out.motions.resize(bodies.size());
+  out.multipliers.resize(rows.size());
+  out.result = solver.solve(bodies, rows, out.motions, out.multipliers);
+  return out;
+}
+
+double slack(const GapRow& row, const std::vector<MovableBody>& bodies,
+             const std::vector<Displacement>& motions) {
+  const auto pointMotion = [&](std::int32_t body) -> Vector3 {
+    if (body == GapRow::kStatic) return Vector3::Zero();
+    const auto i = static_cast<std::size_t>(body);
+    return motions[i].translation + motions[i].rotation.cross(row.p_WP - bodies[i].X_WB.translation());
+  };
+  return row.gap + row.n_W.dot(pointMotion(row.body_a) - pointMotion(row.body_b));
+}
+
+/// The energy's gradient (minus the springs' wrench after the motion, linearised) that the rows have to
+/// balance.
+std::vector<Wrench> residuals(const std::vector<MovableBody>& bodies, const std::vector<GapRow>& rows,
+                              const Solved& solved) {
+  std::vector<Wrench> sums(bodies.size());
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const Displacement& m = solved.motions[i];
+    for (const Spring& spring : bodies[i].springs) {
+      const Vector3 p_BoC_W = bodies[i].X_WB.rotation() * spring.p_BC;
+      const Vector3 p_CoGc_W = spring.X_WG * spring.p_BC - bodies[i].X_WB * spring.p_BC;
+      const Vector3 f = spring.stiffness * (p_CoGc_W - m.translation - m.rotation.cross(p_BoC_W));
+      const Vector3 turn = displacement(bodies[i].X_WB, spring.X_WG).rotation - m.rotation;
+      sums[i] += {f, p_BoC_W.cross(f) + spring.rotational_stiffness * turn};
+    }
+  }
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const Vector3 f = solved.multipliers[r] * rows[r].n_W;
+    const auto push = [&](std::int32_t body, const Vector3& force) {
+      if (body == GapRow::kStatic) return;
+      const auto i = static_cast<std::size_t>(body);
+      sums[i] += {force, (rows[r].p_WP - bodies[i].X_WB.translation()).cross(force)};
+    };
+    push(rows[r].body_a, f);
+    push(rows[r].body_b, -f);
+  }
+  return sums;
+}
+
+void expectOptimal(const std::vector<MovableBody>& bodies, const std::vector<GapRow>& rows,
+                   const Solved& solved) {
+  ASSERT_FALSE(solved.result.conflicting);
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const double s = slack(rows[r], bodies, solved.motions);
+    EXPECT_GE(s, -1e-9) << "row " << r;
+    EXPECT_GE(solved.multipliers[r], 0.0) << "row " << r;
+    EXPECT_LE(std::min(solved.multipliers[r], s), 1e-8) << "row " << r << " pushes from afar";
+  }
+  for (const Wrench& left : residuals(bodies, rows, solved)) {
+    EXPECT_LE(left.force.norm(), 1e-4);  // of forces near 100 N; the least rotation's stiffness is part of it
+    EXPECT_LE(left.torque.norm(), 1e-4);
+  }
+}
+
+/// The least energy over all choices of rows that hold with equality: slow and certain. One body, <= 10 rows.
+double leastEnergyByEnumeration(const MovableBody& body, const std::vector<GapRow>& rows,
+                                Displacement& best) {
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
+  const Spring& spring = body.springs[0];
+  H.topLeftCorner<3, 3>() = spring.stiffness * Matrix3::Identity();
+  H.bottomRightCorner<3, 3>() =
+      (spring.rotational_stiffness + 1e-6 * spring.stiffness * body.radius * body.radius) *
+      Matrix3::Identity();
+  const Displacement goal = displacement(body.X_WB, spring.X_WG);
+  Vector6 b;
+  b << spring.stiffness * goal.translation, spring.rotational_stiffness * goal.rotation;
+
+  double least = std::numeric_limits<double>::infinity();
+  for (unsigned choice = 0; choice < (1U << rows.size()); ++choice) {
+    std::vector<std::size_t> active;
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      if ((choice >> r) & 1U) active.push_back(r);
+    }
+    if (active.size() > 6) continue;
+    const auto q = static_cast<Eigen::Index>(active.size());
+    Eigen::MatrixXd kkt = Eigen::MatrixXd::Zero(6 + q, 6 + q);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(6 + q);
+    kkt.topLeftCorner(6, 6) = H;
+    right.head(6) = b;
+    for (Eigen::Index k = 0; k < q; ++k) {
+      const GapRow& row = rows[active[static_cast<std::size_t>(k)]];
+      Vector6 c;
+      c << row.n_W, (row.p_WP - body.X_WB.translation()).cross(row.n_W);
+      kkt.block(6 + k, 0, 1, 6) = c.transpose();
+      kkt.block(0, 6 + k, 6, 1) = -c;
+      right[6 + k] = -row.gap;
+    }
+    const Eigen::VectorXd answer = kkt.fullPivLu().solve(right);
+    if ((kkt * answer - right).norm() > 1e-6) continue;
+    const Vector6 x = answer.head(6);
+    const Displacement motion{x.head<3>(), x.tail<3>()};
+    bool feasible = true;
+    for (const GapRow& row : rows) feasible = feasible && slack(row, {body}, {motion}) >= -1e-9;
+    const double energy = 0.5 * x.dot(H * x) - b.dot(x);
+    if (feasible && energy < least) {
+      least = energy;
+      best = motion;
+    }
+  }
+  return least;
+}
+
+TEST(MotionSolver, GoesStraightToTheGoalWhenNothingIsInTheWay) {
+  Noise noise(1);
+  for (int trial = 0; trial < 100; ++trial) {
+    const MovableBody body = bodyAt(noise.pose(1.0, 1.0), noise.pose(1.0, 1.0));
+    const Solved solved = solve({body}, {});
+    const Displacement way = displacement(body.X_WB, body.springs[0].X_WG);
+    EXPECT_LE((solved.motions[0].translation - way.translation).norm(), 1e-12);
+    EXPECT_LE((solved.motions[0].rotation - way.rotation).norm(), 1e-4);
+  }
+}
+
+TEST(MotionSolver, FindsWhatTryingEveryChoiceOfContactsFinds) {
+  Noise noise(2);
+  int bounded = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    const MovableBody body = bodyAt(noise.pose(0.1, 1.0), noise.pose(0.1, 1.0));
+    std::vector<GapRow> rows;
+    const int count = 1 + trial % 8;
+    for (int r = 0; r < count; ++r) {
+      rows.push_back({0, GapRow::kStatic, noise.direction(), body.X_WB.translation() + 0.1 * noise.vector(),
+                      0.01 * std::abs(noise.number())});
+    }
+    Displacement truth;
+    ASSERT_TRUE(std::isfinite(leastEnergyByEnumeration(body, rows, truth)));
+    const Solved solved = solve({body}, rows);
+    expectOptimal({body}, rows, solved);
+    EXPECT_LE((solved.motions[0].translation - truth.translation).norm(), 1e-8) << trial;
+    EXPECT_LE((solved.motions[0].rotation - truth.rotation).norm(), 1e-7) << trial;
+    bounded += std::count_if(solved.multipliers.begin(), solved.multipliers.end(),
+                             [](double u) { return u > 0; }) > 2;
+  }
+  EXPECT_GT(bounded, 30) << "the trials were too easy";
+}
+
+// the device pulls a box down into a table that its whole underside lies on: 900 rows say the same
+TEST(MotionSolver, HundredsOfRowsThatSayTheSameAreNoDifficulty) {
+  const MovableBody body =
+      bodyAt(Pose::Identity(), Pose({0.02, -0.01, -0.05}, expRotation({0.05, 0.02, 0.3})));
+  std::vector<GapRow> rows;
+  for (int i = 0; i < 30; ++i) {
+    for (int k = 0; k < 30; ++k) {
+      rows.push_back(
+          {0, GapRow::kStatic, Vector3::UnitZ(), {0.01 * i - 0.145, 0.01 * k - 0.145, -0.05}, 0.0});
+    }
+  }
+  const Solved solved = solve({body}, rows);
+  expectOptimal({body}, rows, solved);
+  EXPECT_NEAR(solved.motions[0].translation.x(), 0.02, 1e-9);  // it slides freely
+  EXPECT_NEAR(solved.motions[0].rotation.z(), displacement(body.X_WB, body.springs[0].X_WG).rotation.z(),
+              1e-4);
+  EXPECT_NEAR(solved.motions[0].translation.z(), 0.0, 1e-10);
+  EXPECT_LT(solved.result.iterations, 60U);
+}
+
+//      wall | peg | wall        both walls touch: no way to turn, free along the slot
+TEST(MotionSolver, APegBetweenTwoWallsMovesAlongTheSlotOnly) {
+  const MovableBody body = bodyAt(Pose::Identity(), Pose({0.01, 0.02, 0.03}, expRotation({0.0, 0.1, 0.0})));
+  std::vector<GapRow> rows;
+  for (const double z : {-0.05, 0.0, 0.05}) {
+    for (const double y : {-0.01, 0.01}) {
+      rows.push_back({0, GapRow::kStatic, Vector3::UnitX(), {-0.01, y, z}, 0.0});
+      rows.push_back({0, GapRow::kStatic, -Vector3::UnitX(), {0.01, y, z}, 0.0});
+    }
+  }
+  const Solved solved = solve({body}, rows);
+  expectOptimal({body}, rows, solved);
+  EXPECT_LE((solved.motions[0].translation - Vector3(0.0, 0.02, 0.03)).norm(), 1e-9);
+  EXPECT_LE(solved.motions[0].rotation.norm(), 1e-9);
+}
+
+TEST(MotionSolver, WallsThatAskForTheImpossibleAreNotPassedAndSaidToConflict) {
+  const MovableBody body = bodyAt(Pose::Identity(), Pose(Vector3(0.05, 0.02, 0.0)));
+  const std::vector<GapRow> rows{{0, GapRow::kStatic, Vector3::UnitX(), {-0.01, 0.0, 0.0}, -0.001},
+                                 {0, GapRow::kStatic, -Vector3::UnitX(), {0.01, 0.0, 0.0}, -0.001}};
+  const Solved solved = solve({body}, rows);
+  EXPECT_TRUE(solved.result.conflicting);
+  EXPECT_NEAR(solved.motions[0].translation.x(), 0.0, 1e-10);  // no deeper into either
+  EXPECT_NEAR(solved.motions[0].translation.y(), 0.02, 1e-10);
+}
+
+//   goal of a ->  <- goal of b        two hands push their parts against each other
+//        [ a ][ b ]
+TEST(MotionSolver, TwoBodiesThatPushEachOtherShareTheWayByTheirStiffness) {
+  const std::vector<MovableBody> bodies{
+      bodyAt(Pose(Vector3(-0.1, 0.0, 0.0)), Pose(Vector3(-0.07, 0.0, 0.0)), 1000.0),
+      bodyAt(Pose(Vector3(0.1, 0.0, 0.0)), Pose(Vector3(0.1, 0.0, 0.0)), 2000.0)};
+  std::vector<GapRow> rows;
+  for (const double y : {-0.02, 0.02}) {
+    for (const double z : {-0.02, 0.02}) rows.push_back({0, 1, -Vector3::UnitX(), {0.0, y, z}, 0.0});
+  }
+  const Solved solved = solve(bodies, rows);
+  expectOptimal(bodies, rows, solved);
+  EXPECT_NEAR(solved.motions[0].translation.x(), 0.01, 1e-9);  // 1000 (0.03 - x) = 2000 x
+  EXPECT_NEAR(solved.motions[1].translation.x(), 0.01, 1e-9);
+  double force = 0.0;
+  for (const double u : solved.multipliers) force += u;
+  EXPECT_NEAR(force, 20.0, 1e-6);
+}
+
+TEST(MotionSolver, TwoHandsOnOneBodyAddUp) {
+  MovableBody body = bodyAt(Pose::Identity(), Pose(Vector3(0.0, 0.0, 0.03)), 1000.0);
+  body.springs.push_back({Pose(Vector3(0.0, 0.0, -0.01)), Vector3(0.1, 0.0, 0.0), 3000.0, 20.0});
+  const Solved solved = solve({body}, {});
+  const std::vector<Wrench> left = residuals({body}, {}, solved);
+  EXPECT_LE(left[0].force.norm(), 1e-4);
+  EXPECT_LE(left[0].torque.norm(), 1e-4);
+}
+
+TEST(MotionSolver, ATurnedWorldTurnsTheAnswer) {
+  Noise noise(3);
+  for (int trial = 0; trial < 50; ++trial) {
+    std::vector<MovableBody> bodies{bodyAt(noise.pose(0.1, 1.0), noise.pose(0.1, 0.5)),
+                                    bodyAt(noise.pose(0.1, 1.0), noise.pose(0.1, 0.5))};
+    std::vector<GapRow> rows;
+    for (int r = 0; r < 12; ++r) {
+      rows.push_back({r % 2, r % 3 == 0 ? 1 - r % 2 : GapRow::kStatic, noise.direction(),
+                      0.1 * noise.vector(), 0.005 * std::abs(noise.number())});
+    }
+    const Solved here = solve(bodies, rows);
+    const Pose X_VW(0.5 * noise.vector(), expRotation(3.0 * noise.vector()));
+    for (MovableBody& body : bodies) {
+      body.X_WB = X_VW * body.X_WB;
+      for (Spring& spring : body.springs) spring.X_WG = X_VW * spring.X_WG;
+    }
+    for (GapRow& row : rows)
+      row = {row.body_a, row.body_b, X_VW.rotation() * row.n_W, X_VW * row.p_WP, row.gap};
+    const Solved there = solve(bodies, rows);
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      EXPECT_LE((there.motions[i].translation - X_VW.rotation() * here.motions[i].translation).norm(), 1e-9);
+      EXPECT_LE((there.motions[i].rotation - X_VW.rotation() * here.motions[i].rotation).norm(), 1e-8);
+    }
+  }
+}
+
+TEST(MotionSolver, ManyBodiesInARowKeepTheirGaps) {
+  // a chain of eight: the first is pushed, each pushes the next
+  std::vector<MovableBody> bodies;
+  std::vector<GapRow> rows;
+  Noise noise(4);
+  for (int i = 0; i < 8; ++i) {
+    const Pose X_WB(Vector3(0.1 * i, 0.0, 0.0));
+    bodies.push_back(bodyAt(X_WB, Pose(X_WB.translation() + Vector3(i == 0 ? 0.05 : 0.0, 0.0, 0.0))));
+    for (int k = 0; i > 0 && k < 20; ++k) {
+      const Vector3 p(0.1 * i - 0.05, 0.03 * noise.number(), 0.03 * noise.number());
+      rows.push_back({i - 1, i, -Vector3::UnitX(), p, 0.001});
+    }
+  }
+  const Solved solved = solve(bodies, rows);
+  expectOptimal(bodies, rows, solved);
+}
+
+TEST(MotionSolver, RandomIslandsAreSolvedToTheLastBalance) {
+  Noise noise(5);
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<MovableBody> bodies;
+    for (int i = 0; i < 1 + trial % 4; ++i)
+      bodies.push_back(bodyAt(noise.pose(0.1, 1.0), noise.pose(0.1, 0.5)));
+    std::vector<GapRow> rows;
+    for (int r = 0; r < 5 + trial; ++r) {
+      const int a = r % static_cast<int>(bodies.size());
+      const int b =
+          r % 2 == 0 || bodies.size() == 1 ? GapRow::kStatic : (a + 1) % static_cast<int>(bodies.size());
+      rows.push_back({a, b, noise.direction(), 0.1 * noise.vector(), 0.01 * std::abs(noise.number())});
+    }
+    expectOptimal(bodies, rows, solve(bodies, rows));
+  }
+}
+
+TEST(MotionSolver, SaysTheSameBitsTwice) {
+  Noise noise(6);
+  const MovableBody body = bodyAt(noise.pose(0.1, 1.0), noise.pose(0.1, 0.5));
+  std::vector<GapRow> rows;
+  for (int r = 0; r < 200; ++r) {
+    rows.push_back(
+        {0, GapRow::kStatic, noise.direction(), 0.1 * noise.vector(), 0.01 * std::abs(noise.number())});
+  }
+  const Solved once = solve({body}, rows);
+  const Solved twice = solve({body}, rows);
+  EXPECT_EQ(once.motions[0].translation, twice.motions[0].translation);
+  EXPECT_EQ(once.motions[0].rotation, twice.motions[0].rotation);
+  EXPECT_EQ(once.multipliers, twice.multipliers);
+}
+
+TEST(SpringWrench, PullsTowardsTheGoalAboutTheOrigin) {
+  const Spring spring{Pose({0.0, 0.0, 0.01}, expRotation({0.0, 0.0, 0.1})), Vector3(0.2, 0.0, 0.0), 1000.0,
+                      20.0};
+  const Wrench F_Bo_W = springWrench(spring, Pose::Identity());
+  // the held point goes from (0.2, 0, 0) to 0.2 (cos 0.1, sin 0.1) and 10 mm up
+  EXPECT_NEAR(F_Bo_W.force.z(), 10.0, 1e-9);
+  EXPECT_NEAR(F_Bo_W.force.y(), 200.0 * std::sin(0.1), 1e-9);
+  EXPECT_NEAR(F_Bo_W.torque.y(), -2.0, 1e-9);
+  EXPECT_NEAR(F_Bo_W.torque.z(), 0.2 * 200.0 * std::sin(0.1) + 2.0, 1e-9);
+}
+
+}  // namespace
+}  // namespace tenon
