@@ -30,27 +30,38 @@ struct HandMotion {
   ObjectId object;       ///< what it moves now; none: nothing
   Pose X_WH;             ///< newest device pose
   Twist V_WH;
-  Pose X_HO;             ///< the object in the hand since it was taken
-  Wrench F_Ho_W;         ///< of the coupling on the hand, about the hand's origin
+  Pose X_HO;                        ///< the object in the hand since it was taken
+  Wrench F_Ho_W;                    ///< of the coupling on the hand, about the hand's origin
+  ObjectId own;                     ///< its own first object: pointer, drill, cube, forearm
+  bool posed = false;               ///< a pose was heard since it is present
+  bool taken = false;               ///< moves `object`; false: will from its first pose on
+  std::uint32_t refused_poses = 0;  ///< not finite, or no pose at all: ignored
 };
 
 /// What a pair did in the last tick. Index as in Scene::pairs.
 struct PairMotion {
   bool enabled = true;
-  bool queried = false;       ///< in this tick; else skipped by coherence
-  Tick due = 0;               ///< next tick that has to look (spatio-temporal coherence)
+  bool queried = false;                      ///< in this tick; else skipped by coherence
+  Tick due = 0;                              ///< next tick that has to look (spatio-temporal coherence)
   const IslandPairResult* result = nullptr;  ///< of the last query
 };
 
 struct EnvironmentOptions {
-  unsigned workers = 1;           ///< threads that solve islands, this one included; never changes the result
+  unsigned workers = 1;  ///< threads that solve islands, this one included; never changes the result
   SolveLimits limits;
-  double max_speed = 1.0;         ///< [m/s] of any point of a held object (travel cap; the paper's v_max)
+  double max_speed = 1.0;  ///< [m/s] of any point of a held object (travel cap; the paper's v_max)
+  bool coherence = true;   ///< false: look at every pair in every tick; never changes the result
+  SendPolicy send_policy = SendPolicy::kEveryForce;
 };
 
-/// All objects, one tick (paper §3.2). See DESIGN section 2 and 3.
+/// All objects, one tick (paper §3.2): follow the trackers, solve the contact islands for the poses of what
+/// is held, look at the remaining pairs that are due, sum the forces.
 ///
-/// Threads: one caller; its own workers inside step(). Real-time: everything but construction, save and restore.
+/// Everything that moves is in here, everything else in the Scene: so a snapshot is the Environment, and
+/// equal inputs from an equal snapshot give equal bits, for any number of workers.
+///
+/// Threads: one caller; its own workers inside step(). Real-time: everything but construction, save and
+/// restore.
 class Environment {
  public:
   Environment(std::shared_ptr<const Scene> scene, const EnvironmentOptions& options);
@@ -60,16 +71,21 @@ class Environment {
   void setHandPresent(HandId hand, bool present) noexcept;
   void setHandPose(HandId hand, const Pose& X_WH, const Twist& V_WH) noexcept;
   void setHandFrozen(HandId hand, bool frozen) noexcept;
-  /// `hand` moves `object` from now on, which stays where it is in the hand. What it moved before is parked; a
-  /// pointer (a hand's own first object) is hidden while the hand holds something else, and is put to the hand's
-  /// pose when it comes back.
+  /// `hand` moves `object` from now on, which stays where it is in the hand. What it moved before is parked;
+  /// a pointer (a hand's own first object) is hidden while the hand holds something else, and is put to the
+  /// hand's pose when it comes back.
   void grab(HandId hand, ObjectId object) noexcept;
   /// The hand moves its own first object again.
   void release(HandId hand) noexcept;
-  void place(ObjectId object, const Pose& X_WO, ObjectStatus status) noexcept;  ///< a declared jump
+  /// The two hands exchange what they hold and their own first objects; each object jumps to its other hand.
+  void swapHands(HandId one, HandId other) noexcept;
+  /// A declared jump. Whoever holds the object lets go of it (and then moves nothing, until grab or release),
+  /// unless `status` is kHeld: then it stays in the hand at its new place.
+  void place(ObjectId object, const Pose& X_WO, ObjectStatus status) noexcept;
   void setPairEnabled(std::size_t pair, bool enabled) noexcept;
   /// The force of a source that is not a contact (client contribution, guidance): expires by itself.
-  void contribute(ObjectId object, std::uint32_t source, const Wrench& F_Oo_W, std::uint32_t lifetime_ticks) noexcept;
+  void contribute(ObjectId object, std::uint32_t source, const Wrench& F_Oo_W,
+                  std::uint32_t lifetime_ticks) noexcept;
 
   void step() noexcept;
 
@@ -78,7 +94,8 @@ class Environment {
   [[nodiscard]] std::span<const ObjectMotion> objects() const { return objects_; }
   [[nodiscard]] std::span<const HandMotion> hands() const { return hands_; }
   [[nodiscard]] std::span<const PairMotion> pairs() const { return pairs_; }
-  /// "Force" as displays, conditions and reports mean it: of a held object its coupling's, else its ForceBuffer's.
+  /// "Force" as displays, conditions and reports mean it: of a held object its coupling's, else its
+  /// ForceBuffer's.
   [[nodiscard]] Wrench forceOn(ObjectId object) const noexcept;
   [[nodiscard]] bool inContact(ObjectId a, ObjectId b) const noexcept;
   /// The contacts of a hand's object for its client (fills everything but client-side fields).
@@ -99,10 +116,48 @@ class Environment {
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
 
  private:
+  struct Engine;
+
+  // hands and objects (environment_hands.cpp)
+  void take(HandId hand) noexcept;
+  void letGo(HandId hand) noexcept;
+  void park(ObjectId object, ObjectStatus status) noexcept;
+  void chooseHolder(ObjectId object) noexcept;
+  void jump(ObjectId object) noexcept;
+  void stir(ObjectId object) noexcept;
+  [[nodiscard]] bool engaged(const HandMotion& hand) const noexcept { return hand.present && hand.taken; }
+  [[nodiscard]] bool isHand(HandId hand) const noexcept { return hand.value < hands_.size(); }
+  [[nodiscard]] bool isObject(ObjectId object) const noexcept { return object.value < objects_.size(); }
+
+  // the tick (environment.cpp)
+  void followTrackers() noexcept;
+  void findMovable() noexcept;
+  void planIslands() noexcept;
+  void addIsland(std::int32_t island) noexcept;
+  void takeIslands() noexcept;
+  void lookAtOtherPairs() noexcept;
+  void sumForces() noexcept;
+  void judgeContacts() noexcept;
+  void countWork() noexcept;
+  void listContacts(ObjectId object, HandManifold& out) const noexcept;
+  [[nodiscard]] bool active(std::size_t pair) const noexcept;
+  [[nodiscard]] MovableBody movableBody(ObjectId object) const noexcept;
+  [[nodiscard]] Spring springOf(HandId hand) const noexcept;
+  [[nodiscard]] double speedCap(ObjectId object) const noexcept;
+  [[nodiscard]] double speedOf(ObjectId object) const noexcept;
+
+  [[nodiscard]] bool isSound() const noexcept;
+
+  /// The one list of everything that moves: written, read and hashed by the same words.
+  template <typename Archive, typename Self>
+  static void archive(Archive& archive, Self& self);
+
   std::shared_ptr<const Scene> scene_;
+  EnvironmentOptions options_;
   std::vector<ObjectMotion> objects_;
   std::vector<HandMotion> hands_;
   std::vector<PairMotion> pairs_;
+  std::unique_ptr<Engine> engine_;
   Work work_;
   Tick tick_ = 0;
 };

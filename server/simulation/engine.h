@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "server/simulation/coll_pair.h"
+#include "server/simulation/environment.h"
+#include "server/simulation/force_buffer.h"
+#include "server/simulation/island_work.h"
+#include "server/simulation/islands.h"
+#include "server/simulation/worker_pool.h"
+
+namespace tenon {
+
+/// What the tick works with, sized at start: the pairs' own states and force buffers (which matter for the
+/// next tick) and work space (which does not).
+///
+/// Threads: as Environment. Real-time: everything but the constructor.
+struct Environment::Engine {
+  Engine(const Scene& scene, const EnvironmentOptions& options);
+
+  [[nodiscard]] std::size_t couplingCell(ObjectId object, HandId hand) const {
+    return pair_cells[object.value] + hand.value;
+  }
+
+  // state
+  std::vector<CollPair> pairs;
+  std::vector<ForceBuffer> forces;  ///< cells of an object: its pairs, then the couplings of all hands
+
+  // what never changes
+  std::vector<std::size_t> pair_cells;            ///< by object: how many of its cells are pairs
+  std::vector<std::size_t> cell_in_a, cell_in_b;  ///< by pair: its cell in the buffers of its two objects
+  std::vector<double> radius;                     ///< by object: of its farthest point from its origin [m]
+  SolveLimits limits;                             ///< sub-steps cut so that a tick keeps the travel cap
+  double reach = 0.0;                             ///< [m] the largest margin any query of a tick may use
+
+  // work space
+  std::vector<std::uint8_t> movable;    ///< by object
+  std::vector<std::uint8_t> looked_at;  ///< by pair, in this tick
+  std::vector<std::size_t> others;      ///< pairs to look at outside the islands
+  std::size_t other_count = 0;
+  IslandPartition partition;
+  IslandWork islands;
+  WorkerPool pool;
+};
+
+/// Contacts are listed for clients as far ahead as their object gets in this many ticks: a LAN's round trip
+/// and a tick; never farther than kLookAheadReach [m], or a peg would list its whole slot.
+inline constexpr double kLookAheadTicks = 8.0;
+inline constexpr double kLookAheadReach = 2e-3;
+
+/// Speed of the fastest point of a body of `radius` about its origin, at most [m/s].
+[[nodiscard]] inline double fastestPoint(const Vector3& linear, const Vector3& angular, double radius) {
+  return linear.norm() + angular.norm() * radius;
+}
+
+/// The same wrench about another point: p_PQ_W leads from the old to the new one.
+[[nodiscard]] inline Wrench shifted(const Wrench& F_P_W, const Vector3& p_PQ_W) {
+  return {F_P_W.force, F_P_W.torque - p_PQ_W.cross(F_P_W.force)};
+}
+
+}  // namespace tenon

@@ -1,0 +1,352 @@
+#include "server/simulation/environment.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/collision/motion_solver.h"
+#include "server/simulation/engine.h"
+
+namespace tenon {
+namespace {
+
+/// A tick's travel is made in this many sub-steps: enough to meet a surface, turn along it and meet a second
+/// one.
+constexpr std::uint32_t kTravelSubsteps = 4;
+
+/// A shell's ball holds its points; the surface between them bulges a little more [m].
+constexpr double kBallSlack = 5e-3;
+
+/// The least body radius that scales rotations [m]: an object without structures still turns with its hand.
+constexpr double kLeastRadius = 0.01;
+
+SolveLimits cappedLimits(SolveLimits limits, double max_speed) {
+  const double travel = max_speed * kTickSeconds;
+  limits.substeps = std::clamp(limits.substeps, 1U, kTravelSubsteps);
+  limits.substep_travel = std::min(limits.substep_travel, travel / limits.substeps);
+  return limits;
+}
+
+std::size_t coupledHands(const Scene& scene) {
+  return static_cast<std::size_t>(
+      std::count_if(scene.hands.begin(), scene.hands.end(),
+                    [](const HandSpec& hand) { return hand.kind == HandKind::kCoupled; }));
+}
+
+/// A lower bound of the distance of two objects' surfaces [m], from the balls around their shells.
+double ballGap(const ObjectSpec& a, const Pose& X_WA, const ObjectSpec& b, const Pose& X_WB) {
+  const Pointshell& shell_a = a.structures->shell;
+  const Pointshell& shell_b = b.structures->shell;
+  const Vector3 between = X_WA * shell_a.ballCentre() - X_WB * shell_b.ballCentre();
+  return between.norm() - shell_a.ballRadius() - shell_b.ballRadius() - kBallSlack;
+}
+
+}  // namespace
+
+Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& options)
+    : pair_cells(scene.objects.size(), 0),
+      limits(cappedLimits(options.limits, options.max_speed)),
+      movable(scene.objects.size(), 0),
+      looked_at(scene.pairs.size(), 0),
+      others(scene.pairs.size(), 0),
+      partition(scene.objects.size()),
+      islands(coupledHands(scene), scene.pairs.size(), std::max(options.workers, 1U)),
+      pool(options.workers) {
+  reach = limits.contact_margin + kLookAheadReach + 2.0 * limits.substep_travel;
+  pairs.reserve(scene.pairs.size());
+  for (std::size_t pair = 0; pair < scene.pairs.size(); ++pair) {
+    pairs.emplace_back(scene, pair);
+    cell_in_a.push_back(pair_cells[scene.pairs[pair].a.value]++);
+    cell_in_b.push_back(pair_cells[scene.pairs[pair].b.value]++);
+  }
+  for (std::size_t object = 0; object < scene.objects.size(); ++object) {
+    forces.emplace_back(pair_cells[object] + scene.hands.size(), options.send_policy);
+    const auto& structures = scene.objects[object].structures;
+    radius.push_back(std::max(structures ? structures->shell.radius() : 0.0, kLeastRadius));
+  }
+}
+
+Environment::Environment(std::shared_ptr<const Scene> scene, const EnvironmentOptions& options)
+    : scene_(std::move(scene)),
+      options_(options),
+      objects_(scene_->objects.size()),
+      hands_(scene_->hands.size()),
+      pairs_(scene_->pairs.size()),
+      engine_(std::make_unique<Engine>(*scene_, options)) {
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    objects_[i].X_WO = scene_->objects[i].X_WO;
+    objects_[i].status = scene_->objects[i].status;
+    // only a hand makes an object held or tracked
+    const bool moved =
+        objects_[i].status == ObjectStatus::kHeld || objects_[i].status == ObjectStatus::kTracked;
+    if (moved) objects_[i].status = ObjectStatus::kParked;
+  }
+  for (std::size_t i = 0; i < hands_.size(); ++i) {
+    hands_[i].own = scene_->hands[i].object;
+    hands_[i].object = hands_[i].own;
+  }
+  for (std::size_t i = 0; i < pairs_.size(); ++i) pairs_[i].enabled = engine_->pairs[i].enabled();
+}
+
+Environment::~Environment() = default;
+
+void Environment::setPairEnabled(std::size_t pair, bool enabled) noexcept {
+  if (pair >= pairs_.size()) return;
+  engine_->pairs[pair].setEnabled(enabled);
+  pairs_[pair].enabled = enabled;
+  pairs_[pair].due = engine_->pairs[pair].dueTick();
+  pairs_[pair].result = engine_->pairs[pair].result();
+}
+
+void Environment::contribute(ObjectId object, std::uint32_t source, const Wrench& F_Oo_W,
+                             std::uint32_t lifetime_ticks) noexcept {
+  if (isObject(object)) engine_->forces[object.value].contribute(source, F_Oo_W, lifetime_ticks, tick_);
+}
+
+void Environment::step() noexcept {
+  ++tick_;
+  followTrackers();
+  planIslands();
+  engine_->islands.solve(engine_->pool);
+  takeIslands();
+  lookAtOtherPairs();
+  sumForces();
+  judgeContacts();
+  countWork();
+}
+
+void Environment::followTrackers() noexcept {
+  for (std::size_t i = 0; i < hands_.size(); ++i) {
+    const HandMotion& hand = hands_[i];
+    if (scene_->hands[i].kind != HandKind::kTracked || !engaged(hand) || hand.frozen) continue;
+    if (!isObject(hand.object)) continue;
+    ObjectMotion& object = objects_[hand.object.value];
+    const Pose X_WO = hand.X_WH * hand.X_HO;
+    const Displacement way = displacement(object.X_WO, X_WO);
+    object.X_WO = X_WO;
+    object.V_WO = {way.translation / kTickSeconds, way.rotation / kTickSeconds};
+    // a tracker keeps no speed limit: what was reckoned with it holds no longer
+    if (speedOf(hand.object) > options_.max_speed) stir(hand.object);
+  }
+}
+
+bool Environment::active(std::size_t pair) const noexcept {
+  const CollPair& one = engine_->pairs[pair];
+  return one.enabled() && one.possible() && objects_[one.spec().a.value].status != ObjectStatus::kHidden &&
+         objects_[one.spec().b.value].status != ObjectStatus::kHidden;
+}
+
+double Environment::speedCap(ObjectId object) const noexcept {
+  const bool moves =
+      engine_->movable[object.value] != 0 || objects_[object.value].status == ObjectStatus::kTracked;
+  return moves ? options_.max_speed : 0.0;
+}
+
+double Environment::speedOf(ObjectId object) const noexcept {
+  const Twist& V_WO = objects_[object.value].V_WO;
+  return fastestPoint(V_WO.linear, V_WO.angular, engine_->radius[object.value]);
+}
+
+Spring Environment::springOf(HandId hand) const noexcept {
+  const HandMotion& motion = hands_[hand.value];
+  const HandSpec& spec = scene_->hands[hand.value];
+  return {motion.X_WH * motion.X_HO, motion.X_HO.inverse().translation(), spec.stiffness,
+          spec.rotational_stiffness};
+}
+
+MovableBody Environment::movableBody(ObjectId object) const noexcept {
+  MovableBody body;
+  body.X_WB = objects_[object.value].X_WO;
+  body.radius = engine_->radius[object.value];
+  for (std::size_t i = 0; i < hands_.size(); ++i) {
+    const HandId hand{static_cast<std::uint32_t>(i)};
+    if (engaged(hands_[i]) && hands_[i].object == object) body.springs.push_back(springOf(hand));
+  }
+  // a constant wrench on the body is the same energy as a goal farther on
+  const Wrench F_Bo_W = engine_->forces[object.value].contributed(tick_);
+  Spring& first = body.springs[0];
+  const Wrench F_Bc_W = shifted(F_Bo_W, body.X_WB.rotation() * first.p_BC);
+  const Vector3 p_WC = first.X_WG * first.p_BC + F_Bc_W.force / first.stiffness;
+  if (first.rotational_stiffness > 0.0) {
+    const Vector3 turn = F_Bc_W.torque / first.rotational_stiffness;
+    first.X_WG.rotation() = (expRotation(turn) * first.X_WG.rotation()).normalized();
+  }
+  first.X_WG.translation() = p_WC - first.X_WG.rotation() * first.p_BC;
+  return body;
+}
+
+void Environment::findMovable() noexcept {
+  std::fill(engine_->movable.begin(), engine_->movable.end(), std::uint8_t{0});
+  for (std::size_t i = 0; i < hands_.size(); ++i) {
+    const HandMotion& hand = hands_[i];
+    if (scene_->hands[i].kind == HandKind::kCoupled && engaged(hand) && isObject(hand.object)) {
+      engine_->movable[hand.object.value] = 1;
+    }
+  }
+  // one frozen hand holds it still, whoever else pulls
+  for (const HandMotion& hand : hands_) {
+    if (isObject(hand.object) && engaged(hand) && hand.frozen) engine_->movable[hand.object.value] = 0;
+  }
+}
+
+void Environment::planIslands() noexcept {
+  Engine& engine = *engine_;
+  findMovable();
+  std::fill(engine.looked_at.begin(), engine.looked_at.end(), std::uint8_t{0});
+  engine.partition.begin(engine.movable);
+  const double near = engine.reach + 2.0 * options_.max_speed * kTickSeconds;
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    const PairSpec& spec = engine.pairs[i].spec();
+    if (!active(i) || spec.sensing || engine.movable[spec.a.value] == 0 ||
+        engine.movable[spec.b.value] == 0) {
+      continue;
+    }
+    // from the poses alone, so that skipping a look can never change who is solved with whom
+    const double gap = ballGap(scene_->objects[spec.a.value], objects_[spec.a.value].X_WO,
+                               scene_->objects[spec.b.value], objects_[spec.b.value].X_WO);
+    if (gap - spec.dilation <= near) engine.partition.join(spec.a, spec.b);
+  }
+  engine.partition.number();
+  engine.islands.clear();
+  for (std::size_t i = 0; i < engine.partition.count(); ++i) addIsland(static_cast<std::int32_t>(i));
+}
+
+void Environment::addIsland(std::int32_t island) noexcept {
+  Engine& engine = *engine_;
+  engine.islands.beginIsland(engine.limits);
+  double speed = 0.0;
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const ObjectId object{static_cast<std::uint32_t>(i)};
+    if (engine.partition.islandOf(object) != island) continue;
+    engine.islands.addBody(object, movableBody(object));
+    speed = std::max(speed, speedOf(object));
+  }
+  engine.islands.widenMargin(std::min(speed * kLookAheadTicks * kTickSeconds, kLookAheadReach));
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    CollPair& pair = engine.pairs[i];
+    const ObjectId a = pair.spec().a;
+    const ObjectId b = pair.spec().b;
+    const std::int32_t island_a = engine.partition.islandOf(a);
+    const std::int32_t island_b = engine.partition.islandOf(b);
+    if (pair.spec().sensing || !active(i) || (options_.coherence && !pair.due(tick_))) continue;
+    if (island_a != island && island_b != island) continue;
+    // two that move in different islands are too far apart to meet in this tick
+    if (island_a != IslandPartition::kNone && island_b != IslandPartition::kNone && island_a != island_b)
+      continue;
+    IslandPair one = pair.islandPair(objects_[a.value].X_WO, objects_[b.value].X_WO);
+    one.body_a = island_a == island ? engine.partition.placeOf(a) : GapRow::kStatic;
+    one.body_b = island_b == island ? engine.partition.placeOf(b) : GapRow::kStatic;
+    engine.islands.addPair(i, one);
+    engine.looked_at[i] = 1;
+  }
+}
+
+void Environment::takeIslands() noexcept {
+  const IslandWork& islands = engine_->islands;
+  for (std::size_t body = 0; body < islands.bodies(); ++body) {
+    ObjectMotion& object = objects_[islands.objectOf(body).value];
+    const Displacement way = displacement(object.X_WO, islands.poseOf(body));
+    object.X_WO = islands.poseOf(body);
+    object.V_WO = {way.translation / kTickSeconds, way.rotation / kTickSeconds};
+  }
+  for (std::size_t slot = 0; slot < islands.pairs(); ++slot) {
+    engine_->pairs[islands.pairOf(slot)].take(islands.resultOf(slot));
+  }
+}
+
+void Environment::lookAtOtherPairs() noexcept {
+  Engine& engine = *engine_;
+  engine.other_count = 0;
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    const bool due = engine.pairs[i].due(tick_) || !options_.coherence;
+    if (engine.looked_at[i] == 0 && active(i) && due) engine.others[engine.other_count++] = i;
+  }
+  auto look = [this](unsigned, std::size_t item) {
+    CollPair& pair = engine_->pairs[engine_->others[item]];
+    pair.query(objects_[pair.spec().a.value].X_WO, objects_[pair.spec().b.value].X_WO,
+               engine_->limits.contact_margin);
+    // a tracked limb feels what it is in; of two that stand still nobody presses the other
+    const bool felt = pair.spec().sensing || objects_[pair.spec().a.value].status == ObjectStatus::kTracked ||
+                      objects_[pair.spec().b.value].status == ObjectStatus::kTracked;
+    if (!felt) return;
+    pair.press(std::min(scene_->objects[pair.spec().a.value].stiffness,
+                        scene_->objects[pair.spec().b.value].stiffness),
+               objects_[pair.spec().a.value].X_WO);
+  };
+  engine.pool.run(engine.other_count, look);
+  for (std::size_t i = 0; i < engine.other_count; ++i) engine.looked_at[engine.others[i]] = 1;
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    CollPair& pair = engine.pairs[i];
+    if (engine.looked_at[i] == 0) continue;
+    pair.schedule(tick_, speedCap(pair.spec().a) + speedCap(pair.spec().b), engine.reach);
+  }
+}
+
+void Environment::sumForces() noexcept {
+  Engine& engine = *engine_;
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    CollPair& pair = engine.pairs[i];
+    const ObjectId a = pair.spec().a;
+    const ObjectId b = pair.spec().b;
+    if (pair.result() == nullptr) {
+      engine.forces[a.value].clear(engine.cell_in_a[i]);
+      engine.forces[b.value].clear(engine.cell_in_b[i]);
+    } else if (engine.looked_at[i] != 0) {
+      const Wrench F_Ao_W = pair.result()->F_Ao_W;
+      const Vector3 p_AB_W = objects_[b.value].X_WO.translation() - objects_[a.value].X_WO.translation();
+      engine.forces[a.value].write(engine.cell_in_a[i], F_Ao_W, tick_);
+      engine.forces[b.value].write(engine.cell_in_b[i], -shifted(F_Ao_W, p_AB_W), tick_);
+    }
+  }
+  for (std::size_t i = 0; i < hands_.size(); ++i) {
+    HandMotion& hand = hands_[i];
+    hand.F_Ho_W = Wrench{};
+    const HandId id{static_cast<std::uint32_t>(i)};
+    if (!isObject(hand.object) || !engaged(hand)) continue;
+    const std::size_t object = hand.object.value;
+    const Pose& X_WO = objects_[object].X_WO;
+    const Vector3 p_OH_W = hand.X_WH.translation() - X_WO.translation();
+    if (engine.movable[object] != 0) {
+      const Wrench F_Oo_W = springWrench(springOf(id), X_WO);
+      engine.forces[object].write(engine.couplingCell(hand.object, id), F_Oo_W, tick_);
+      hand.F_Ho_W = -shifted(F_Oo_W, p_OH_W);
+    } else if (scene_->hands[i].kind == HandKind::kTracked) {
+      hand.F_Ho_W = shifted(engine.forces[object].total(tick_), p_OH_W);
+    } else {
+      engine.forces[object].clear(engine.couplingCell(hand.object, id));
+    }
+  }
+  for (ForceBuffer& buffer : engine.forces) buffer.expire(tick_);
+}
+
+void Environment::judgeContacts() noexcept {
+  for (ObjectMotion& object : objects_) object.in_contact = false;
+  for (const CollPair& pair : engine_->pairs) {
+    if (!pair.touching()) continue;
+    // what only senses leaves no mark on what it touches
+    ObjectMotion& a = objects_[pair.spec().a.value];
+    ObjectMotion& b = objects_[pair.spec().b.value];
+    a.in_contact |= !pair.spec().sensing || a.status == ObjectStatus::kTracked;
+    b.in_contact |= !pair.spec().sensing || b.status == ObjectStatus::kTracked;
+  }
+}
+
+void Environment::countWork() noexcept {
+  work_ = Work{};
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    const CollPair& pair = engine_->pairs[i];
+    const bool queried = engine_->looked_at[i] != 0;
+    pairs_[i] = {pair.enabled(), queried, pair.dueTick(), pair.result()};
+    work_.active_pairs += active(i) ? 1U : 0U;
+    if (!queried) continue;
+    ++work_.queried_pairs;
+    work_.points_visited += pair.result()->query.counts.points_visited;
+    work_.load_percent = std::max(work_.load_percent, pair.result()->query.counts.loadPercent());
+  }
+  for (const IslandWork::Island& island : engine_->islands.islands()) {
+    work_.substeps += island.report.substeps;
+    work_.iterations += island.report.iterations;
+    work_.conflicting |= island.report.conflicting;
+  }
+}
+
+}  // namespace tenon

@@ -1,0 +1,147 @@
+#include <algorithm>
+#include <array>
+
+#include "server/simulation/engine.h"
+#include "server/simulation/environment.h"
+
+namespace tenon {
+namespace {
+
+/// The contacts of all pairs of one object in one list, and from which pair each came.
+struct Gathered {
+  ContactList contacts;
+  std::array<std::uint16_t, kMaxPairContacts> pair;
+};
+
+/// Two contacts with one body and normals closer than this (cosine of 15 degrees) are one to a small motion.
+constexpr double kSameNormal = 0.966;
+
+/// Adds the contacts that stand for all of a pair, so that no pair crowds another out.
+void gather(const ContactList& contacts, std::size_t pair, Gathered& all) {
+  std::array<std::uint32_t, kManifoldContacts> chosen{};
+  const std::size_t count = reduceContacts(contacts, chosen);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!all.contacts.push_back(contacts[chosen[i]])) return;
+    all.pair[all.contacts.size() - 1] = static_cast<std::uint16_t>(pair);
+  }
+}
+
+Vector3 velocityAt(const ObjectMotion& object, const Vector3& p_WP) {
+  return object.V_WO.linear + object.V_WO.angular.cross(p_WP - object.X_WO.translation());
+}
+
+/// The contact as a half-space of the other body for a point of the held one. When the held body was asked as
+/// the field, the roles change: its surface point opposite the other's point is the one that moves.
+ManifoldContact manifoldContact(const Contact& contact, ObjectId other_id, const ObjectMotion& other,
+                                const ObjectMotion& held, bool held_is_shell) {
+  const Vector3 n_W = held_is_shell ? contact.n_W : Vector3(-contact.n_W);
+  const Vector3 p_WP = held_is_shell ? contact.p_WP : Vector3(contact.p_WP - contact.gap * contact.n_W);
+  const Vector3 n_A = other.X_WO.rotation().conjugate() * n_W;
+  const Vector3 p_AP = other.X_WO.inverse() * p_WP;
+  ManifoldContact result;
+  result.other = other_id;
+  result.p_BoP_B = (held.X_WO.inverse() * p_WP).cast<float>();
+  result.normal_A = n_A.cast<float>();
+  result.offset = static_cast<float>(n_A.dot(p_AP) - contact.gap);
+  result.gap = static_cast<float>(contact.gap);
+  result.velocity_W = velocityAt(other, p_WP).cast<float>();
+  return result;
+}
+
+}  // namespace
+
+Wrench Environment::forceOn(ObjectId object) const noexcept {
+  if (!isObject(object)) return {};
+  const ForceBuffer& forces = engine_->forces[object.value];
+  if (objects_[object.value].status != ObjectStatus::kHeld) return forces.total(tick_);
+  Wrench F_Oo_W;
+  for (std::uint32_t hand = 0; hand < hands_.size(); ++hand) {
+    F_Oo_W += forces.cell(engine_->couplingCell(object, HandId{hand}));
+  }
+  return F_Oo_W;
+}
+
+bool Environment::inContact(ObjectId a, ObjectId b) const noexcept {
+  const int pair = scene_->pairOf(a, b);
+  return pair >= 0 && engine_->pairs[static_cast<std::size_t>(pair)].touching();
+}
+
+void Environment::pairContact(std::size_t pair, PairContact& out) const noexcept {
+  const CollPair& one = engine_->pairs[pair];
+  out = PairContact{};
+  out.a = one.spec().a;
+  out.b = one.spec().b;
+  out.enabled = one.enabled();
+  if (one.result() == nullptr) return;
+  const PairQueryResult& query = one.result()->query;
+  Vector3 sum = Vector3::Zero();
+  for (const Contact& contact : query.contacts) {
+    if (contact.gap > kTouchGap) continue;
+    sum += contact.p_WP;
+    ++out.contacts;
+  }
+  if (out.contacts > 0) out.p_WP = sum / out.contacts;
+  out.colliding = one.touching();
+  out.F_Ao_W = one.result()->F_Ao_W;
+  out.depth = query.deepest;
+  out.gap = query.smallest_gap;
+  out.load_percent = query.counts.loadPercent();
+  out.peak_force = out.F_Ao_W.force.norm();
+  out.peak_depth = out.depth;
+}
+
+void Environment::manifold(HandId hand, HandManifold& out) const noexcept {
+  if (!isHand(hand)) return;
+  const HandMotion& motion = hands_[hand.value];
+  const HandSpec& spec = scene_->hands[hand.value];
+  out.hand = hand;
+  out.tick = tick_;
+  out.object = motion.object;
+  out.X_HO = motion.X_HO;
+  out.F_Ho_W = motion.F_Ho_W;
+  out.stiffness = spec.stiffness;
+  out.rotational_stiffness = spec.rotational_stiffness;
+  out.frozen = motion.frozen;
+  out.validity_radius = 0.0;
+  out.contacts.clear();
+  if (!isObject(motion.object)) return;
+  const ObjectMotion& held = objects_[motion.object.value];
+  out.object_epoch = held.epoch;
+  out.X_WO = held.X_WO;
+  listContacts(motion.object, out);
+}
+
+void Environment::listContacts(ObjectId object, HandManifold& out) const noexcept {
+  Gathered all;
+  out.validity_radius = engine_->limits.contact_margin;
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    const CollPair& pair = engine_->pairs[i];
+    if (!active(i) || (pair.spec().a != object && pair.spec().b != object)) continue;
+    if (pair.result() != nullptr) gather(pair.result()->query.contacts, i, all);
+  }
+  std::array<std::uint32_t, kManifoldContacts> chosen{};
+  const std::size_t count = reduceContacts(all.contacts, chosen);
+  for (std::size_t i = 0; i < count; ++i) {
+    const CollPair& pair = engine_->pairs[all.pair[chosen[i]]];
+    const bool held_is_shell = pair.spec().a == object;
+    const ObjectId other = held_is_shell ? pair.spec().b : pair.spec().a;
+    out.contacts.push_back(manifoldContact(all.contacts[chosen[i]], other, objects_[other.value],
+                                           objects_[object.value], held_is_shell));
+  }
+
+  // what is not listed matters only where nothing listed stands for it
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    const CollPair& pair = engine_->pairs[i];
+    if (!active(i) || (pair.spec().a != object && pair.spec().b != object)) continue;
+    if (pair.result() == nullptr) continue;
+    for (const Contact& contact : pair.result()->query.contacts) {
+      const bool stood_for = std::any_of(
+          chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(count), [&](std::uint32_t one) {
+            return all.pair[one] == i && all.contacts[one].n_W.dot(contact.n_W) > kSameNormal;
+          });
+      if (!stood_for) out.validity_radius = std::min(out.validity_radius, std::max(contact.gap, 0.0));
+    }
+  }
+}
+
+}  // namespace tenon

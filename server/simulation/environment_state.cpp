@@ -1,0 +1,120 @@
+#include <algorithm>
+
+#include "server/simulation/engine.h"
+#include "server/simulation/environment.h"
+#include "server/simulation/state_archive.h"
+
+namespace tenon {
+namespace {
+
+/// Raised whenever the list of fields changes.
+constexpr std::uint32_t kStateVersion = 1;
+
+template <typename Archive, typename Motion>
+void archiveObject(Archive& archive, Motion& object) {
+  archive(object.X_WO);
+  archive(object.V_WO);
+  archive(object.epoch);
+  archive(object.status);
+  archive(object.holder);
+  archive(object.in_contact);
+}
+
+template <typename Archive, typename Motion>
+void archiveHand(Archive& archive, Motion& hand) {
+  archive(hand.present);
+  archive(hand.frozen);
+  archive(hand.object);
+  archive(hand.X_WH);
+  archive(hand.V_WH);
+  archive(hand.X_HO);
+  archive(hand.F_Ho_W);
+  archive(hand.own);
+  archive(hand.posed);
+  archive(hand.taken);
+}
+
+}  // namespace
+
+template <typename Archive, typename Self>
+void Environment::archive(Archive& archive, Self& self) {
+  archive(self.tick_);
+  for (auto& object : self.objects_) archiveObject(archive, object);
+  for (auto& hand : self.hands_) archiveHand(archive, hand);
+  for (auto& pair : self.engine_->pairs) CollPair::archive(archive, pair);
+  for (auto& buffer : self.engine_->forces) {
+    for (auto& cell : buffer.cells()) archive(cell);
+  }
+}
+
+std::uint64_t Environment::hash() const noexcept {
+  StateHasher hasher;
+  archive(hasher, *this);
+  return hasher.value();
+}
+
+std::vector<std::uint8_t> Environment::save() const {
+  std::vector<std::uint8_t> bytes;
+  StateWriter writer(bytes);
+  writer.number(kStateVersion);
+  writer.number(static_cast<std::uint32_t>(objects_.size()));
+  writer.number(static_cast<std::uint32_t>(hands_.size()));
+  writer.number(static_cast<std::uint32_t>(pairs_.size()));
+  archive(writer, *this);
+  return bytes;
+}
+
+Result<void> Environment::restore(std::span<const std::uint8_t> bytes) {
+  StateReader reader(bytes);
+  std::uint32_t version = 0;
+  std::uint32_t objects = 0;
+  std::uint32_t hands = 0;
+  std::uint32_t pairs = 0;
+  for (std::uint32_t* number : {&version, &objects, &hands, &pairs}) reader.number(*number);
+  if (!reader.ok()) return fail("checkpoint: it is empty or cut off in its first line");
+  if (version != kStateVersion) {
+    return fail("checkpoint: it is of version " + std::to_string(version) +
+                ", this server writes and reads version " + std::to_string(kStateVersion));
+  }
+  if (objects != objects_.size() || hands != hands_.size() || pairs != pairs_.size()) {
+    return fail("checkpoint: it is of another scene (" + std::to_string(objects) + " objects, " +
+                std::to_string(hands) + " hands, " + std::to_string(pairs) + " pairs)");
+  }
+  // into another one first: a bad checkpoint changes nothing
+  EnvironmentOptions options = options_;
+  options.workers = 1;
+  Environment copy(scene_, options);
+  archive(reader, copy);
+  if (!reader.atEnd()) return fail("checkpoint: it is cut off, or longer than what it describes");
+  if (!copy.isSound()) return fail("checkpoint: a pose, an id or a status in it is impossible");
+  objects_ = copy.objects_;
+  for (std::size_t i = 0; i < hands_.size(); ++i) {
+    copy.hands_[i].refused_poses = hands_[i].refused_poses;
+    hands_[i] = copy.hands_[i];
+  }
+  engine_->pairs = copy.engine_->pairs;
+  engine_->forces = copy.engine_->forces;
+  tick_ = copy.tick_;
+  std::fill(engine_->looked_at.begin(), engine_->looked_at.end(), std::uint8_t{0});
+  engine_->islands.clear();
+  findMovable();
+  countWork();
+  return {};
+}
+
+bool Environment::isSound() const noexcept {
+  const auto sound = [](const Pose& X) {
+    constexpr double kUnitTolerance = 1e-6;
+    return X.isFinite() && std::abs(X.rotation().squaredNorm() - 1.0) < kUnitTolerance;
+  };
+  const bool sound_objects = std::all_of(objects_.begin(), objects_.end(), [&](const ObjectMotion& object) {
+    return sound(object.X_WO) && object.status <= ObjectStatus::kFixed &&
+           (!object.holder.valid() || isHand(object.holder));
+  });
+  return sound_objects && std::all_of(hands_.begin(), hands_.end(), [&](const HandMotion& hand) {
+           return sound(hand.X_WH) && sound(hand.X_HO) && (!hand.object.valid() || isObject(hand.object)) &&
+                  (!hand.own.valid() || isObject(hand.own));
+         });
+}
+
+}  // namespace tenon
