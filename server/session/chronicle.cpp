@@ -8,6 +8,21 @@
 
 namespace tenon {
 
+SceneObject describe(ObjectId id, const ObjectSpec& spec) {
+  SceneObject object;
+  object.object = id;
+  object.name = spec.name;
+  object.title = spec.title;
+  object.kind = spec.kind;
+  object.color = spec.color;
+  object.X_WO = spec.X_WO;
+  if (spec.structures == nullptr) return object;
+  object.structure_hash = spec.structures->info.content_hash;
+  object.size = spec.structures->info.box_M.sizes();
+  object.centre = spec.structures->info.box_M.center();
+  return object;
+}
+
 Chronicle::Chronicle(std::shared_ptr<const ScenarioFile> scenario, std::uint32_t server_epoch)
     : scenario_(std::move(scenario)), server_epoch_(server_epoch) {}
 

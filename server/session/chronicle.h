@@ -8,6 +8,7 @@
 #include "idl/types/messages.h"
 #include "server/game_control/scenario.h"
 #include "server/session/tick_io.h"
+#include "server/simulation/scene.h"
 
 namespace tenon {
 
@@ -19,6 +20,9 @@ struct News {
   std::vector<ObjectSnapshot> snapshots;
   std::vector<EventLog> events;
 };
+
+/// An object as displays and clients are told of it.
+[[nodiscard]] SceneObject describe(ObjectId id, const ObjectSpec& spec);
 
 /// Compares each tick's output with the one before and says in words what happened.
 ///

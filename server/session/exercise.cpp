@@ -175,6 +175,8 @@ void Exercise::save(std::vector<std::uint8_t>& bytes) const {
     bytes.insert(bytes.end(), saved.begin(), saved.end());
   };
   out.put(phase_), out.put(emergency_stop_);
+  out.put(static_cast<std::uint32_t>(needed_hands_.size()));
+  for (const HandId hand : needed_hands_) out.put(hand);
   for (const HandAge& age : ages_) out.put(age.attached), out.put(age.active), out.put(age.age), out.put(age.seq);
   part(environment_.save());
   part(machine_.save());
@@ -183,6 +185,11 @@ void Exercise::save(std::vector<std::uint8_t>& bytes) const {
 Result<void> Exercise::restore(std::span<const std::uint8_t> bytes) {
   ByteReader in(bytes);
   in.get(phase_), in.get(emergency_stop_);
+  std::uint32_t needed = 0;
+  in.get(needed);
+  if (needed > ages_.size()) return fail("a checkpoint in the journal is of another scenario");
+  needed_hands_.resize(needed);
+  for (HandId& hand : needed_hands_) in.get(hand);
   for (HandAge& age : ages_) in.get(age.attached), in.get(age.active), in.get(age.age), in.get(age.seq);
   const auto part = [&](auto&& restoreFrom) -> Result<void> {
     std::uint32_t size = 0;

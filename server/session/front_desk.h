@@ -35,6 +35,8 @@ class FrontDesk {
 
   [[nodiscard]] const std::vector<Presence>& people() const { return people_; }
   [[nodiscard]] const Presence* person(ClientId client) const;
+  /// The random name a client asked with.
+  [[nodiscard]] const std::string& guidOf(ClientId client) const { return seats_[client.value - 1].guid; }
   [[nodiscard]] ClientId moverOf(HandId hand) const { return movers_[hand.value]; }
   [[nodiscard]] bool roleIsHere(Role role) const;
   [[nodiscard]] std::vector<std::string> freeHands() const;

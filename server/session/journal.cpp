@@ -72,7 +72,7 @@ class Rerunner {
     if (!part) return fail(part.error().what);
     if (!checkpoints_.add(*part) || in_step_) return {};
     if (auto restored = exercise_.restore(checkpoints_.bytes()); !restored) return restored;
-    ++report_.gaps;
+    if (report_.compared > 0) ++report_.gaps;
     in_step_ = true;
     return {};
   }
@@ -88,20 +88,19 @@ class Rerunner {
   Assembler<TickInputPart> inputs_;
   Assembler<CheckpointPart> checkpoints_;
   RerunReport report_;
-  bool in_step_ = true;
+  bool in_step_ = false;
 };
 
 }  // namespace
 
-Result<Journal> Journal::open(const std::filesystem::path& file, const std::string& scenario,
-                              std::uint32_t server_epoch) {
+Result<Journal> Journal::open(const std::filesystem::path& file, const JournalOrigin& origin) {
   auto writer = McapWriter::open(file);
   if (!writer) return fail(writer.error().what);
   Journal journal(std::move(*writer));
   journal.inputs_ = journal.writer_.addChannel(kTickInput.name, typeName<TickInputPart>(), idlText());
   journal.checkpoints_ = journal.writer_.addChannel(kCheckpoint.name, typeName<CheckpointPart>(), idlText());
   const auto noted = journal.writer_.addMetadata(
-      kMetadata, {{"scenario", scenario}, {"server epoch", std::to_string(server_epoch)}});
+      kMetadata, {{"scenario", origin.scenario}, {"detail", fmt::format("{}", origin.detail)}});
   if (!noted) return fail(noted.error().what);
   return journal;
 }
@@ -142,12 +141,13 @@ Result<RerunReport> rerun(const std::filesystem::path& file, Exercise& exercise)
   return rerunner.report();
 }
 
-Result<std::string> scenarioOf(const std::filesystem::path& file) {
+Result<JournalOrigin> originOf(const std::filesystem::path& file) {
   auto reader = McapReader::open(file);
   if (!reader) return fail(reader.error().what);
   for (const auto& [name, values] : reader->metadata())
-    if (name == kMetadata && values.contains("scenario")) return values.at("scenario");
-  return fail(fmt::format("{}: does not say which scenario it was made with; name it with --scenario", file.string()));
+    if (name == kMetadata && values.contains("scenario") && values.contains("detail"))
+      return JournalOrigin{values.at("scenario"), std::strtod(values.at("detail").c_str(), nullptr)};
+  return fail(fmt::format("{}: does not say which scenario it was made with; name it before --rerun", file.string()));
 }
 
 }  // namespace tenon

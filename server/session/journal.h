@@ -38,15 +38,19 @@ void forEachPart(Tick tick, std::uint64_t hash, std::span<const std::uint8_t> by
   }
 }
 
+/// What a journal was made with: enough to load the same scene again.
+struct JournalOrigin {
+  std::string scenario;  ///< path
+  double detail = 1.0;   ///< of generated parts
+};
+
 /// The server's own recording on its local disk: every TickInput with the hash of the state it left, and a Checkpoint
 /// a second. An MCAP file like any other recording.
 ///
 /// Threads: one (journal).
 class Journal {
  public:
-  /// `scenario` is the path to load again for a re-run.
-  [[nodiscard]] static Result<Journal> open(const std::filesystem::path& file, const std::string& scenario,
-                                            std::uint32_t server_epoch);
+  [[nodiscard]] static Result<Journal> open(const std::filesystem::path& file, const JournalOrigin& origin);
   [[nodiscard]] Result<void> write(const JournalEntry& entry);
   [[nodiscard]] Result<void> close(const RunState& run);
 
@@ -68,10 +72,11 @@ struct RerunReport {
   std::optional<Tick> first_difference;
 };
 
-/// Runs the ticks of a journal or recording again and compares the hash of every one (DESIGN section 5).
+/// Runs the ticks of a journal or recording again, from its first checkpoint on, and compares the hash of every one
+/// (DESIGN section 5).
 [[nodiscard]] Result<RerunReport> rerun(const std::filesystem::path& file, Exercise& exercise);
 
-/// The scenario path a journal was made with; fails when the file is no journal.
-[[nodiscard]] Result<std::string> scenarioOf(const std::filesystem::path& file);
+/// Fails when the file is no journal.
+[[nodiscard]] Result<JournalOrigin> originOf(const std::filesystem::path& file);
 
 }  // namespace tenon
