@@ -7,7 +7,6 @@
 #include <span>
 #include <vector>
 
-#include "idl/types/hash.h"
 #include "idl/types/ids.h"
 #include "idl/types/spatial.h"
 #include "server/game_control/game_command.h"
@@ -84,14 +83,27 @@ class ConditionProgress {
   /// Of a node, as of the last step.
   [[nodiscard]] const ConditionReading& reading(std::size_t node) const { return nodes_[node].reading; }
 
-  void addTo(StateHash& hash) const noexcept;
+  /// Calls `visit(number)` with each number of its memory, in a fixed order: what is hashed, saved and
+  /// restored.
+  template <typename Visitor>
+  void visitMemory(Visitor&& visit) {
+    for (Node& node : nodes_) {
+      visit(node.held);
+      visit(node.counted);
+      visit(node.away);
+      visit(node.latched);
+      visit(node.reading.value);
+      visit(node.reading.limit);
+      visit(node.reading.met);
+    }
+  }
 
  private:
   struct Node {
     std::uint32_t held = 0;     ///< [ticks] without a break
     std::uint32_t counted = 0;  ///< [ticks] of contact
     std::uint32_t away = 0;     ///< [ticks] since the last contact
-    std::uint32_t latched = 0;  ///< 1: met once under a latching group
+    bool latched = false;       ///< met once under a latching group
     ConditionReading reading;
   };
   [[nodiscard]] static bool isMetNow(const Condition& condition, Node& node, const SceneView& scene,

@@ -166,6 +166,10 @@ struct ScenarioFile {
     const ScenarioFile& scenario, ObjectId object,
     const std::vector<std::shared_ptr<const HapticStructures>>& structures);
 
+/// The side of a pair with a clearance that a part with a target goes into; invalid when targets do not tell,
+/// then the larger object is the field.
+[[nodiscard]] ObjectId fieldByTarget(const ScenarioFile& scenario, const ScenarioPair& pair);
+
 /// The dilation of `field`'s surface in a pair (DESIGN section 2): at least 0.87 of the voxel that answers
 /// there and at most a quarter of the clearance. Fails when both cannot hold.
 [[nodiscard]] Result<double> dilationOf(const ScenarioFile& scenario, const ScenarioPair& pair,

@@ -61,19 +61,22 @@ class StateMachine {
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
 
  private:
-  /// All that changes: copied whole by save and restore.
+  /// All that changes.
   struct Memory {
     StepStatus status;
     ConditionProgress progress;
     std::uint64_t elapsed = 0;        ///< [ticks] in this state
     std::uint64_t contact_ticks = 0;  ///< of the state's object
   };
+  template <typename Visitor>
+  static void visitMemory(Memory& memory, Visitor&& visit);
 
   void enter(Environment& environment, std::uint32_t step) noexcept;
   void leave(Environment& environment, StepPhase phase) noexcept;
   void reset(Environment& environment) noexcept;
   void obey(Environment& environment, const GameCommand& command) noexcept;
   void measure(const SceneView& scene) noexcept;
+  void listReadings() noexcept;
   [[nodiscard]] const ScenarioState& state() const { return scenario_->states[memory_.status.step]; }
 
   std::shared_ptr<const ScenarioFile> scenario_;

@@ -1,0 +1,105 @@
+#include "server/game_control/condition.h"
+
+#include <algorithm>
+#include <cassert>
+
+namespace tenon {
+namespace {
+
+bool anyCommand(std::span<const GameCommand> commands, CommandKind kind, std::uint32_t signal) noexcept {
+  return std::any_of(commands.begin(), commands.end(), [&](const GameCommand& command) {
+    return command.kind == kind && (kind != CommandKind::kSignal || command.signal == signal);
+  });
+}
+
+double seconds(std::uint32_t ticks) noexcept { return ticks * kTickSeconds; }
+
+}  // namespace
+
+double angleBetween(const Quaternion& q_WA, const Quaternion& q_WB) noexcept {
+  return logRotation(q_WB * q_WA.conjugate()).norm();
+}
+
+bool ConditionProgress::isMetNow(const Condition& condition, Node& node, const SceneView& scene,
+                                 std::span<const GameCommand> commands) noexcept {
+  ConditionReading& reading = node.reading;
+  switch (condition.kind) {
+    case ConditionKind::kPose: {
+      const Pose X_WO = scene.pose(condition.object);
+      reading.value = (X_WO.translation() - condition.X_WG.translation()).norm();
+      reading.limit = condition.within;
+      return reading.value <= condition.within &&
+             angleBetween(X_WO.rotation(), condition.X_WG.rotation()) <= condition.angle;
+    }
+    case ConditionKind::kForce:
+      reading.value = scene.force(condition.object).norm();
+      reading.limit = condition.above > 0.0 ? condition.above : condition.below;
+      return reading.value >= condition.above && reading.value <= condition.below;
+    case ConditionKind::kForceTarget:
+      reading.value = (scene.force(condition.object) - condition.F_W).norm();
+      reading.limit = condition.within;
+      return reading.value <= condition.within;
+    case ConditionKind::kContact:
+      if (scene.touching(condition.object, condition.other)) {
+        ++node.counted;
+        node.away = 0;
+      } else if (++node.away > condition.lapse) {
+        node.counted = 0;
+      }
+      reading.value = seconds(node.counted);
+      reading.limit = seconds(condition.limit_ticks);
+      return node.counted >= std::max(condition.limit_ticks, 1U);
+    case ConditionKind::kContactTime:
+      if (scene.touchesAnything(condition.object)) ++node.counted;
+      reading.value = seconds(node.counted);
+      reading.limit = seconds(condition.limit_ticks);
+      return node.counted >= condition.limit_ticks;
+    case ConditionKind::kFulfilled:
+    case ConditionKind::kSignal: {
+      const bool fulfilled = condition.kind == ConditionKind::kFulfilled;
+      const bool came =
+          anyCommand(commands, fulfilled ? CommandKind::kFulfilled : CommandKind::kSignal, condition.signal);
+      reading.value = came ? 1.0 : 0.0;
+      reading.limit = 1.0;
+      return came;
+    }
+    case ConditionKind::kAll:
+    case ConditionKind::kAny:
+      break;
+  }
+  return false;
+}
+
+bool ConditionProgress::step(std::span<const Condition> tree, const SceneView& scene,
+                             std::span<const GameCommand> commands) noexcept {
+  assert(tree.size() <= kMaxConditions);
+  // children stand behind their parent: going backwards, a group has heard all of them when its turn comes
+  std::array<std::uint32_t, kMaxConditions> children{};
+  std::array<std::uint32_t, kMaxConditions> met_children{};
+  for (std::size_t i = tree.size(); i-- > 0;) {
+    const Condition& condition = tree[i];
+    Node& node = nodes_[i];
+    bool met = false;
+    if (isGroup(condition.kind)) {
+      met = condition.kind == ConditionKind::kAll ? met_children[i] == children[i] : met_children[i] > 0;
+      node.reading.value = met_children[i];
+      node.reading.limit = condition.kind == ConditionKind::kAll ? children[i] : 1.0;
+    } else {
+      met = isMetNow(condition, node, scene, commands);
+    }
+    node.held = met ? node.held + 1 : 0;
+    met = met && node.held >= condition.dwell;
+    if (i > 0 && tree[condition.parent].latched) {
+      node.latched = node.latched || met;
+      met = node.latched;
+    }
+    node.reading.met = met;
+    if (i > 0) {
+      ++children[condition.parent];
+      met_children[condition.parent] += met ? 1 : 0;
+    }
+  }
+  return !tree.empty() && nodes_[0].reading.met;
+}
+
+}  // namespace tenon

@@ -1,0 +1,61 @@
+#include "server/game_control/scenario.h"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+
+#include "server/game_control/scenario_reader.h"
+
+namespace tenon {
+namespace {
+
+constexpr std::uintmax_t kLargestFile = 1 << 20;  // [bytes] a hundred times the largest exercise
+
+template <typename Things>
+std::uint32_t indexNamed(const Things& things, std::string_view name) {
+  const auto found =
+      std::find_if(things.begin(), things.end(), [&](const auto& thing) { return thing.name == name; });
+  return found == things.end() ? ObjectId::kNone : static_cast<std::uint32_t>(found - things.begin());
+}
+
+}  // namespace
+
+ObjectId ScenarioFile::objectNamed(std::string_view object) const {
+  return ObjectId{indexNamed(objects, object)};
+}
+
+HandId ScenarioFile::handNamed(std::string_view hand) const { return HandId{indexNamed(hands, hand)}; }
+
+int ScenarioFile::pairOf(ObjectId a, ObjectId b) const {
+  const auto found = std::find_if(pairs.begin(), pairs.end(), [&](const ScenarioPair& pair) {
+    return (pair.a == a && pair.b == b) || (pair.a == b && pair.b == a);
+  });
+  return found == pairs.end() ? -1 : static_cast<int>(found - pairs.begin());
+}
+
+int ScenarioFile::signalNamed(std::string_view signal) const {
+  const auto found = std::find(signals.begin(), signals.end(), signal);
+  return found == signals.end() ? -1 : static_cast<int>(found - signals.begin());
+}
+
+Result<ScenarioFile> readScenario(const std::filesystem::path& path) {
+  std::error_code problem;
+  const std::filesystem::path file =
+      std::filesystem::is_directory(path, problem) ? path / "scenario.yaml" : path;
+  const std::uintmax_t size = std::filesystem::file_size(file, problem);
+  if (problem)
+    return fail(file.string() + ": no such scenario file, expected a folder with a scenario.yaml or a file");
+  if (size > kLargestFile)
+    return fail(file.string() + ": larger than 1 MB, a scenario is a few pages of YAML");
+  std::ifstream stream(file, std::ios::binary);
+  const std::string text((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
+  if (stream.bad() || text.size() != size) return fail(file.string() + ": cannot be read");
+  return parseScenario(text, file);
+}
+
+Result<ScenarioFile> parseScenario(std::string_view text, const std::filesystem::path& path) {
+  return ScenarioReader(path).read(text);
+}
+
+}  // namespace tenon

@@ -1,0 +1,102 @@
+#include "server/game_control/scenario_keys.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <numeric>
+#include <vector>
+
+namespace tenon {
+namespace {
+
+using Key = std::string_view;
+
+constexpr std::array<Key, 8> kScenario{"title", "language", "reach", "objects",
+                                       "hands", "pairs",    "off",   "states"};
+constexpr std::array<Key, 11> kObject{"name", "title",      "kind",  "color",  "group",    "meshes",
+                                      "felt", "structures", "start", "status", "stiffness"};
+constexpr std::array<Key, 3> kMesh{"part", "file", "unit"};
+constexpr std::array<Key, 5> kStructures{"voxel", "refinement", "points", "spacing", "refine"};
+constexpr std::array<Key, 2> kBox{"from", "to"};
+constexpr std::array<Key, 3> kPose{"at", "turn", "q"};
+constexpr std::array<Key, 2> kTurn{"axis", "deg"};
+constexpr std::array<Key, 6> kHand{"name", "role", "kind", "object", "stiffness", "rotational_stiffness"};
+constexpr std::array<Key, 5> kPair{"between", "clearance", "dilation", "sensing", "enabled"};
+constexpr std::array<Key, 21> kState{
+    "name",  "title",  "instruction", "part",       "hands",   "show",       "hide",
+    "place", "fix",    "free",        "pairs",      "object",  "hand",       "touch",
+    "for",   "target", "approach",    "conditions", "timeout", "on_timeout", "snap"};
+constexpr std::array<Key, 2> kPairSwitches{"on", "off"};
+constexpr std::array<Key, 6> kTarget{"at", "turn", "q", "within", "angle", "dwell"};
+constexpr std::array<Key, 2> kApproach{"direction", "distance"};
+constexpr std::array<Key, 10> kCondition{"all",     "any",          "when",    "pose",   "force",
+                                         "contact", "contact_time", "command", "signal", "dwell"};
+constexpr std::array<Key, 4> kPoseCondition{"object", "target", "within", "angle"};
+constexpr std::array<Key, 5> kForceCondition{"object", "above", "below", "target", "within"};
+constexpr std::array<Key, 3> kContactCondition{"between", "for", "lapse"};
+constexpr std::array<Key, 2> kContactTimeCondition{"object", "at_least"};
+
+constexpr std::array kMappings{
+    ScenarioMapping{"scenario", kScenario},
+    ScenarioMapping{"object", kObject},
+    ScenarioMapping{"mesh", kMesh},
+    ScenarioMapping{"structures", kStructures},
+    ScenarioMapping{"box", kBox},
+    ScenarioMapping{"pose", kPose},
+    ScenarioMapping{"turn", kTurn},
+    ScenarioMapping{"hand", kHand},
+    ScenarioMapping{"pair", kPair},
+    ScenarioMapping{"state", kState},
+    ScenarioMapping{"pair_switches", kPairSwitches},
+    ScenarioMapping{"target", kTarget},
+    ScenarioMapping{"approach", kApproach},
+    ScenarioMapping{"condition", kCondition},
+    ScenarioMapping{"pose_condition", kPoseCondition},
+    ScenarioMapping{"force_condition", kForceCondition},
+    ScenarioMapping{"contact_condition", kContactCondition},
+    ScenarioMapping{"contact_time_condition", kContactTimeCondition},
+};
+
+/// How many letters must be typed, removed or changed to make one word of the other (Levenshtein).
+std::size_t typingErrors(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t changed = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({changed, row[j] + 1, row[j - 1] + 1});
+    }
+  }
+  return row[b.size()];
+}
+
+}  // namespace
+
+std::span<const ScenarioMapping> scenarioMappings() { return kMappings; }
+
+const ScenarioMapping& scenarioMapping(std::string_view name) {
+  const auto found = std::find_if(kMappings.begin(), kMappings.end(),
+                                  [&](const ScenarioMapping& mapping) { return mapping.name == name; });
+  assert(found != kMappings.end());
+  return *found;
+}
+
+std::string suggestion(std::string_view word, std::span<const std::string_view> candidates) {
+  constexpr std::size_t kLongestWord = 64;  // longer ones are no typing errors, and cost time
+  if (word.size() > kLongestWord) return {};
+  std::string_view nearest;
+  std::size_t errors = std::max<std::size_t>(2, word.size() / 3) + 1;
+  for (const std::string_view candidate : candidates) {
+    const std::size_t count = typingErrors(word, candidate);
+    if (count < errors) {
+      errors = count;
+      nearest = candidate;
+    }
+  }
+  return nearest.empty() ? std::string{} : "did you mean '" + std::string(nearest) + "'?";
+}
+
+}  // namespace tenon

@@ -1,0 +1,101 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "server/game_control/scenario_reader.h"
+
+namespace tenon {
+
+std::vector<bool> ScenarioReader::whoCanMove(const YAML::Node& states) const {
+  std::vector<bool> moves(scenario_.objects.size(), false);
+  for (std::size_t i = 0; i < moves.size(); ++i) {
+    const ObjectStatus status = scenario_.objects[i].status;
+    moves[i] = status == ObjectStatus::kHeld || status == ObjectStatus::kTracked;
+  }
+  for (const ScenarioHand& hand : scenario_.hands) moves[hand.object.value] = true;
+  // only what the states' hands take; what is wrong with them is said when the states are read
+  if (!states.IsDefined() || !states.IsSequence()) return moves;
+  for (const auto& state : states) {
+    if (!state.IsMap()) continue;
+    const YAML::Node hands = state["hands"];
+    if (!hands.IsDefined() || !hands.IsMap()) continue;
+    for (const auto& entry : hands) {
+      if (!entry.second.IsScalar()) continue;
+      const ObjectId object = scenario_.objectNamed(entry.second.Scalar());
+      if (object.valid()) moves[object.value] = true;
+    }
+  }
+  return moves;
+}
+
+void ScenarioReader::listPairs(const YAML::Node& states) {
+  const std::vector<bool> moves = whoCanMove(states);
+  const auto isTracked = [&](std::uint32_t object) {
+    return scenario_.objects[object].status == ObjectStatus::kTracked ||
+           std::any_of(scenario_.hands.begin(), scenario_.hands.end(), [&](const ScenarioHand& hand) {
+             return hand.kind == HandKind::kTracked && hand.object.value == object;
+           });
+  };
+  const auto count = static_cast<std::uint32_t>(scenario_.objects.size());
+  for (std::uint32_t a = 0; a < count; ++a) {
+    for (std::uint32_t b = a + 1; b < count; ++b) {
+      const ScenarioObject& first = scenario_.objects[a];
+      const ScenarioObject& second = scenario_.objects[b];
+      const bool same_group = !first.group.empty() && first.group == second.group;
+      if (same_group || !first.felt || !second.felt || !(moves[a] || moves[b])) continue;
+      ScenarioPair pair;
+      pair.a = ObjectId{a};
+      pair.b = ObjectId{b};
+      pair.sensing = isTracked(a) || isTracked(b);
+      scenario_.pairs.push_back(pair);
+    }
+  }
+}
+
+void ScenarioReader::readPair(const YAML::Node& node) {
+  if (yaml_.failed() || !yaml_.openMapping(node, "pair", "a pair")) return;
+  const auto index = names_.pair(node["between"], "'between' of a pair");
+  if (!index) return;
+  ScenarioPair& pair = scenario_.pairs[*index];
+  const std::string of = " of pair " + names_.nameOf(pair.a) + "-" + names_.nameOf(pair.b);
+  if (pair.line != 0) {
+    yaml_.fail(node, "pair " + names_.nameOf(pair.a) + "-" + names_.nameOf(pair.b) +
+                         " is listed twice, first in line " + std::to_string(pair.line));
+    return;
+  }
+  pair.line = yaml_.lineOf(node);
+  pair.clearance = yaml_.numberOr(node["clearance"], Quantity::kLength, "'clearance'" + of, 1e-6, 1.0, 0.0);
+  const YAML::Node dilation = node["dilation"];
+  if (dilation.IsDefined() && !(dilation.IsScalar() && dilation.Scalar() == "automatic")) {
+    pair.dilation = yaml_.number(dilation, Quantity::kLength, "'dilation'" + of, 0.0, 0.1);
+  }
+  pair.sensing = yaml_.yesNo(node["sensing"], "'sensing'" + of, pair.sensing);
+  pair.enabled = yaml_.yesNo(node["enabled"], "'enabled'" + of, true);
+}
+
+void ScenarioReader::readOff(const YAML::Node& node) {
+  if (yaml_.failed()) return;
+  // [drill, any]: all pairs of one object
+  if (node.IsSequence() && node.size() == 2 && node[1].IsScalar() && node[1].Scalar() == "any") {
+    const ObjectId object = names_.object(node[0], "'off'");
+    for (ScenarioPair& pair : scenario_.pairs) {
+      if (pair.a == object || pair.b == object) pair.enabled = false;
+    }
+  } else if (const auto pair = names_.pair(node, "'off'")) {
+    scenario_.pairs[*pair].enabled = false;
+  }
+}
+
+void ScenarioReader::checkClearances() {
+  for (const ScenarioPair& pair : scenario_.pairs) {
+    // which of two is the field is known here only for a part that has a target; others when their sizes are
+    // known
+    const ObjectId field = fieldByTarget(scenario_, pair);
+    if (!field.valid()) continue;
+    if (const auto dilation = dilationOf(scenario_, pair, field); !dilation) {
+      yaml_.failAt(pair.line, dilation.error().what);
+    }
+  }
+}
+
+}  // namespace tenon

@@ -1,0 +1,221 @@
+#include "server/game_control/scenario_reader.h"
+
+#include <algorithm>
+#include <array>
+#include <system_error>
+
+#include "server/game_control/state_reader.h"
+
+namespace tenon {
+namespace {
+
+constexpr std::size_t kMostObjects = 64;
+constexpr std::size_t kMostHands = 16;
+constexpr double kSmallestVoxel = 2e-5;  // [m]
+constexpr double kLargestVoxel = 0.1;
+
+template <typename Value, std::size_t N>
+using Words = std::array<std::pair<std::string_view, Value>, N>;
+
+constexpr Words<ObjectStatus, 5> kStatuses{{{"hidden", ObjectStatus::kHidden},
+                                            {"parked", ObjectStatus::kParked},
+                                            {"held", ObjectStatus::kHeld},
+                                            {"tracked", ObjectStatus::kTracked},
+                                            {"fixed", ObjectStatus::kFixed}}};
+constexpr Words<Role, 2> kRoles{{{"trainee", Role::kTrainee}, {"instructor", Role::kInstructor}}};
+constexpr Words<HandKind, 2> kHandKinds{{{"coupled", HandKind::kCoupled}, {"tracked", HandKind::kTracked}}};
+constexpr std::array<std::string_view, 7> kObjectKinds{"part",    "tool", "pointer", "assistant",
+                                                       "forearm", "head", "scene"};
+constexpr Words<double, 4> kUnits{{{"mm", 1e-3}, {"cm", 1e-2}, {"m", 1.0}, {"in", 0.0254}}};
+
+/// The value of a word, or a failure that lists the words.
+template <typename Value, std::size_t N>
+Value oneOf(YamlReader& yaml, const YAML::Node& node, const std::string& what, const Words<Value, N>& words,
+            Value when_missing) {
+  if (!node.IsDefined()) return when_missing;
+  const std::string word = yaml.text(node, what);
+  std::string expected;
+  for (const auto& [known, value] : words) {
+    if (known == word) return value;
+    expected += (expected.empty() ? "" : ", ") + std::string(known);
+  }
+  yaml.fail(node, what + " is '" + word + "', expected one of: " + expected);
+  return when_missing;
+}
+
+bool isColor(const std::string& word) {
+  return (word.size() == 7 || word.size() == 9) && word[0] == '#' &&
+         word.find_first_not_of("0123456789abcdefABCDEF", 1) == std::string::npos;
+}
+
+}  // namespace
+
+ScenarioReader::ScenarioReader(const std::filesystem::path& path)
+    : yaml_(path.string()), names_(yaml_, scenario_) {
+  scenario_.path = path;
+  std::error_code unknown;
+  scenario_.name = std::filesystem::absolute(path, unknown).parent_path().filename().string();
+}
+
+Result<ScenarioFile> ScenarioReader::read(std::string_view text) {
+  try {
+    readScenario(YAML::Load(std::string(text)));
+  } catch (const YAML::Exception& problem) {
+    const int line = problem.mark.is_null() ? 1 : problem.mark.line + 1;
+    yaml_.failAt(line, "not valid YAML: " + problem.msg);
+  }
+  if (yaml_.failed()) return tl::unexpected(yaml_.error());
+  return std::move(scenario_);
+}
+
+void ScenarioReader::readScenario(const YAML::Node& root) {
+  if (!yaml_.openMapping(root, "scenario", "a scenario")) return;
+  if (root["language"].IsDefined()) scenario_.language = yaml_.text(root["language"], "'language'");
+  scenario_.title = names_.texts(root["title"], "'title'");
+  if (scenario_.title.empty()) scenario_.title.push_back({scenario_.language, scenario_.name});
+  scenario_.reach =
+      yaml_.numberOr(root["reach"], Quantity::kLength, "'reach'", 0.01, 1000.0, scenario_.reach);
+
+  if (!yaml_.isList(root["objects"], "'objects'", kMostObjects)) return;
+  for (const auto& object : root["objects"]) readObject(object);
+  if (scenario_.objects.empty())
+    yaml_.fail(root["objects"], "'objects' is empty, expected at least one object");
+  if (yaml_.failed() || !yaml_.isList(root["hands"], "'hands'", kMostHands)) return;
+  for (const auto& hand : root["hands"]) readHand(hand);
+  if (scenario_.hands.empty()) yaml_.fail(root["hands"], "'hands' is empty, expected at least one hand");
+  if (yaml_.failed()) return;
+
+  listPairs(root["states"]);
+  if (root["pairs"].IsDefined() && yaml_.isList(root["pairs"], "'pairs'")) {
+    for (const auto& pair : root["pairs"]) readPair(pair);
+  }
+  if (root["off"].IsDefined() && yaml_.isList(root["off"], "'off'")) {
+    for (const auto& pair : root["off"]) readOff(pair);
+  }
+  if (yaml_.failed()) return;
+  StateReader(yaml_, scenario_).read(root["states"]);
+  if (!yaml_.failed()) checkClearances();
+}
+
+void ScenarioReader::readObject(const YAML::Node& node) {
+  if (yaml_.failed() || !yaml_.openMapping(node, "object", "an object")) return;
+  ScenarioObject object;
+  object.line = yaml_.lineOf(node);
+  object.name = yaml_.text(node["name"], "'name' of an object");
+  const std::string of = " of object '" + object.name + "'";
+  if (const ObjectId other = scenario_.objectNamed(object.name); other.valid()) {
+    yaml_.fail(node["name"], "two objects are named '" + object.name + "', the first in line " +
+                                 std::to_string(scenario_.objects[other.value].line));
+    return;
+  }
+  object.title = names_.texts(node["title"], "'title'" + of);
+  if (object.title.empty()) object.title.push_back({scenario_.language, object.name});
+  if (node["kind"].IsDefined()) object.kind = yaml_.text(node["kind"], "'kind'" + of);
+  if (std::find(kObjectKinds.begin(), kObjectKinds.end(), object.kind) == kObjectKinds.end()) {
+    yaml_.fail(node["kind"], "'kind'" + of + " is '" + object.kind +
+                                 "', expected one of: part, tool, pointer, assistant, forearm, head, scene");
+  }
+  if (node["color"].IsDefined()) object.color = yaml_.text(node["color"], "'color'" + of);
+  if (!isColor(object.color)) {
+    yaml_.fail(node["color"],
+               "'color'" + of + " is '" + object.color + "', expected '#rrggbb' or '#rrggbbaa'");
+  }
+  if (node["group"].IsDefined()) object.group = yaml_.text(node["group"], "'group'" + of);
+  object.felt = yaml_.yesNo(node["felt"], "'felt'" + of, true);
+  object.stiffness =
+      yaml_.numberOr(node["stiffness"], Quantity::kStiffness, "'stiffness'" + of, 1.0, 1e6, object.stiffness);
+  object.status = oneOf(yaml_, node["status"], "'status'" + of, kStatuses, ObjectStatus::kParked);
+  if (node["start"].IsDefined() && yaml_.openMapping(node["start"], "pose", "'start'" + of)) {
+    object.X_WO = yaml_.pose(node["start"], "'start'" + of);
+    if (object.X_WO.translation().norm() > scenario_.reach) {
+      yaml_.fail(node["start"], "'start'" + of + " is outside the scene ('reach')");
+    }
+  }
+  readMeshes(node["meshes"], object);
+  if (node["structures"].IsDefined()) readStructures(node["structures"], object);
+  scenario_.objects.push_back(std::move(object));
+}
+
+void ScenarioReader::readMeshes(const YAML::Node& node, ScenarioObject& object) {
+  const std::string what = "'meshes' of object '" + object.name + "'";
+  if (!node.IsDefined()) yaml_.fail(node, what + " is missing, expected a list such as [{part: peg}]");
+  if (yaml_.failed() || !yaml_.isList(node, what)) return;
+  if (node.size() == 0) yaml_.fail(node, what + " is empty, expected at least one mesh");
+  for (const auto& entry : node) {
+    if (!yaml_.openMapping(entry, "mesh", "a mesh of object '" + object.name + "'")) return;
+    if (entry["part"].IsDefined() == entry["file"].IsDefined()) {
+      yaml_.fail(entry, "a mesh of object '" + object.name + "' needs either 'part' or 'file'");
+      return;
+    }
+    MeshSource mesh;
+    if (entry["part"].IsDefined()) {
+      mesh.part = yaml_.text(entry["part"], "'part' of " + what);
+      if (entry["unit"].IsDefined())
+        yaml_.fail(entry["unit"], "a generated 'part' is in millimetres, remove 'unit'");
+    } else {
+      mesh.file = scenario_.path.parent_path() / yaml_.text(entry["file"], "'file' of " + what);
+      mesh.unit = oneOf(yaml_, entry["unit"], "'unit' of " + what, kUnits, 1e-3);
+      std::error_code problem;
+      if (!std::filesystem::is_regular_file(mesh.file, problem)) {
+        yaml_.fail(entry["file"], "object '" + object.name + "' has no mesh file " + mesh.file.string());
+      }
+    }
+    object.meshes.push_back(std::move(mesh));
+  }
+}
+
+void ScenarioReader::readStructures(const YAML::Node& node, ScenarioObject& object) {
+  const std::string of = "of 'structures' of object '" + object.name + "'";
+  if (!yaml_.openMapping(node, "structures", "'structures' of object '" + object.name + "'")) return;
+  StructureSettings& settings = object.structures;
+  settings.voxel = yaml_.numberOr(node["voxel"], Quantity::kLength, "'voxel' " + of, kSmallestVoxel,
+                                  kLargestVoxel, settings.voxel);
+  settings.refinement = static_cast<std::int32_t>(
+      yaml_.integer(node["refinement"], "'refinement' " + of, 1, 8, settings.refinement));
+  if ((settings.refinement & (settings.refinement - 1)) != 0) {
+    yaml_.fail(node["refinement"], "'refinement' " + of + " must be 1, 2, 4 or 8");
+  }
+  settings.points = static_cast<std::uint32_t>(
+      yaml_.integer(node["points"], "'points' " + of, 10, 10'000'000, settings.points));
+  settings.spacing = yaml_.numberOr(node["spacing"], Quantity::kLength, "'spacing' " + of, 1e-5, 1.0, 0.0);
+  const YAML::Node boxes = node["refine"];
+  if (!boxes.IsDefined() || !yaml_.isList(boxes, "'refine' " + of)) return;
+  for (const auto& entry : boxes) {
+    if (!yaml_.openMapping(entry, "box", "a box " + of)) return;
+    const Vector3 from = yaml_.vector(entry["from"], Quantity::kLength, "'from' of a box " + of);
+    const Vector3 to = yaml_.vector(entry["to"], Quantity::kLength, "'to' of a box " + of);
+    if (!(from.array() < to.array()).all()) {
+      yaml_.fail(entry, "a box " + of + " is inside out, expected 'from' below 'to' in x, y and z");
+    }
+    settings.refine.emplace_back(from, to);
+  }
+}
+
+void ScenarioReader::readHand(const YAML::Node& node) {
+  if (yaml_.failed() || !yaml_.openMapping(node, "hand", "a hand")) return;
+  ScenarioHand hand;
+  hand.line = yaml_.lineOf(node);
+  hand.name = yaml_.text(node["name"], "'name' of a hand");
+  const std::string of = " of hand '" + hand.name + "'";
+  if (const HandId other = scenario_.handNamed(hand.name); other.valid()) {
+    yaml_.fail(node["name"], "two hands are named '" + hand.name + "', the first in line " +
+                                 std::to_string(scenario_.hands[other.value].line));
+  }
+  hand.role = oneOf(yaml_, node["role"], "'role'" + of, kRoles, Role::kTrainee);
+  hand.kind = oneOf(yaml_, node["kind"], "'kind'" + of, kHandKinds, HandKind::kCoupled);
+  hand.object = names_.object(node["object"], "'object'" + of);
+  hand.stiffness =
+      yaml_.numberOr(node["stiffness"], Quantity::kStiffness, "'stiffness'" + of, 1.0, 1e5, hand.stiffness);
+  hand.rotational_stiffness =
+      yaml_.numberOr(node["rotational_stiffness"], Quantity::kRotationalStiffness,
+                     "'rotational_stiffness'" + of, 0.01, 1e4, hand.rotational_stiffness);
+  for (const ScenarioHand& other : scenario_.hands) {
+    if (hand.object.valid() && other.object == hand.object) {
+      yaml_.fail(node["object"], "hands '" + other.name + "' and '" + hand.name + "' have the same object '" +
+                                     names_.nameOf(hand.object) + "'");
+    }
+  }
+  if (!yaml_.failed()) scenario_.hands.push_back(hand);
+}
+
+}  // namespace tenon

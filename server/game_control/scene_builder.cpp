@@ -1,0 +1,246 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "server/game_control/scenario.h"
+
+namespace tenon {
+namespace {
+
+using Structures = std::vector<std::shared_ptr<const HapticStructures>>;
+
+constexpr double kDilationPerVoxel = 0.87;  // sqrt(3)/2 rounded up: half the diagonal of a voxel
+constexpr double kDilationPerClearance = 0.25;
+constexpr double kRounding = 1e-9;           // relative: typed numbers that meet a limit exactly are on it
+constexpr double kRoomAroundTheScene = 1.0;  // [m] an arm's length: beyond it no target can be meant
+
+/// "2.6 mm", three digits.
+std::string inMillimetres(double metres) {
+  std::array<char, 32> buffer{};
+  std::snprintf(buffer.data(), buffer.size(), "%.3g mm", metres * 1e3);
+  return buffer.data();
+}
+
+bool hasTarget(const ScenarioFile& scenario, ObjectId object) {
+  return std::any_of(scenario.states.begin(), scenario.states.end(),
+                     [&](const ScenarioState& state) { return state.object == object && state.X_WG; });
+}
+
+ObjectId otherOf(const ScenarioPair& pair, ObjectId object) { return pair.a == object ? pair.b : pair.a; }
+
+/// Edge of the voxels where a part with a clearance goes in.
+double mountingVoxel(const ScenarioFile& scenario, const ScenarioPair& pair, ObjectId field) {
+  const StructureSettings& settings = scenario.objects[field.value].structures;
+  const bool refined = !settings.refine.empty() || fieldByTarget(scenario, pair) == field;
+  return refined ? settings.voxel / settings.refinement : settings.voxel;
+}
+
+std::string tooSmall(const ScenarioFile& scenario, const ScenarioPair& pair, ObjectId field) {
+  const StructureSettings& settings = scenario.objects[field.value].structures;
+  const double voxel = mountingVoxel(scenario, pair, field);
+  const double needed = kDilationPerVoxel / kDilationPerClearance * voxel;
+  const double share = pair.clearance / needed;
+  // two digits, rounded down: what is advised holds
+  const double wanted = settings.voxel * share * 1e3;
+  const double digit = std::pow(10.0, std::floor(std::log10(wanted)) - 1.0);
+  const double advised = std::floor(wanted / digit + kRounding) * digit * 1e-3;
+  std::string refinement;
+  for (const int factor : {2, 4, 8}) {
+    const double finer = kDilationPerVoxel / kDilationPerClearance * settings.voxel / factor;
+    if (refinement.empty() && finer <= pair.clearance)
+      refinement = " or refinement " + std::to_string(factor);
+  }
+  const std::string divided = voxel < settings.voxel ? " / " + std::to_string(settings.refinement) : "";
+  return "clearance of " + scenario.objects[pair.a.value].name + "-" + scenario.objects[pair.b.value].name +
+         " (" + inMillimetres(pair.clearance) + ") is smaller than the field of '" +
+         scenario.objects[field.value].name + "' can resolve (voxel " + inMillimetres(settings.voxel) +
+         divided + " needs " + inMillimetres(needed) + "); use voxel " + inMillimetres(advised) + refinement;
+}
+
+Eigen::AlignedBox3d boxIn(const Pose& X_AB, const Eigen::AlignedBox3d& box_B) {
+  Eigen::AlignedBox3d box_A;
+  for (int corner = 0; corner < 8; ++corner) {
+    box_A.extend(X_AB * Vector3(box_B.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner))));
+  }
+  return box_A;
+}
+
+bool isAlwaysShell(const ScenarioObject& object) {
+  return object.kind == "pointer" || object.kind == "assistant";
+}
+
+/// Which of two is asked as a field: what a part goes into, never a pointer, else the larger one.
+ObjectId fieldOf(const ScenarioFile& scenario, const ScenarioPair& pair, const Structures& structures) {
+  const ObjectId by_target = fieldByTarget(scenario, pair);
+  if (by_target.valid()) return by_target;
+  const bool a_is_shell = isAlwaysShell(scenario.objects[pair.a.value]);
+  const bool b_is_shell = isAlwaysShell(scenario.objects[pair.b.value]);
+  if (a_is_shell != b_is_shell) return a_is_shell ? pair.b : pair.a;
+  const auto size = [&](ObjectId object) { return structures[object.value]->info.box_M.diagonal().norm(); };
+  return size(pair.a) > size(pair.b) ? pair.a : pair.b;
+}
+
+std::string at(const ScenarioFile& scenario, int line) {
+  return scenario.path.string() + ":" + std::to_string(line) + ": ";
+}
+
+Result<void> checkStructures(const ScenarioFile& scenario, const Structures& structures) {
+  if (structures.size() != scenario.objects.size()) {
+    return fail(scenario.path.string() + ": " + std::to_string(structures.size()) + " structures for " +
+                std::to_string(scenario.objects.size()) + " objects");
+  }
+  for (std::size_t i = 0; i < structures.size(); ++i) {
+    const ScenarioObject& object = scenario.objects[i];
+    if (object.felt && !structures[i]) {
+      return fail(at(scenario, object.line) + "object '" + object.name +
+                  "' has no haptic structures, expected them baked or 'felt: false'");
+    }
+  }
+  return {};
+}
+
+Result<void> checkTargets(const ScenarioFile& scenario, const Structures& structures) {
+  Eigen::AlignedBox3d scene_W;
+  for (std::size_t i = 0; i < structures.size(); ++i) {
+    if (structures[i]) scene_W.extend(boxIn(scenario.objects[i].X_WO, structures[i]->info.box_M));
+  }
+  if (scene_W.isEmpty()) return {};
+  for (const ScenarioState& state : scenario.states) {
+    if (!state.X_WG) continue;
+    const double outside = scene_W.exteriorDistance(state.X_WG->translation());
+    if (outside <= kRoomAroundTheScene) continue;
+    return fail(at(scenario, state.line) + "the target of state '" + state.name + "' is " +
+                inMillimetres(outside) + " outside the box of all objects, expected it within " +
+                inMillimetres(kRoomAroundTheScene));
+  }
+  return {};
+}
+
+/// Numbers of groups in order of appearance, from 1.
+std::uint32_t groupNumber(std::vector<std::string>& groups, const std::string& name) {
+  if (name.empty()) return 0;
+  const auto found = std::find(groups.begin(), groups.end(), name);
+  const auto number = static_cast<std::uint32_t>(found - groups.begin()) + 1;
+  if (found == groups.end()) groups.push_back(name);
+  return number;
+}
+
+}  // namespace
+
+ObjectId fieldByTarget(const ScenarioFile& scenario, const ScenarioPair& pair) {
+  if (pair.clearance <= 0.0) return {};
+  const bool a_goes = hasTarget(scenario, pair.a);
+  const bool b_goes = hasTarget(scenario, pair.b);
+  if (a_goes == b_goes) return {};
+  return a_goes ? pair.b : pair.a;
+}
+
+std::vector<ObjectId> bakeOrder(const ScenarioFile& scenario) {
+  const std::size_t count = scenario.objects.size();
+  std::vector<ObjectId> order;
+  std::vector<bool> listed(count, false);
+  const auto waitsForAPart = [&](ObjectId object) {
+    return std::any_of(scenario.pairs.begin(), scenario.pairs.end(), [&](const ScenarioPair& pair) {
+      return fieldByTarget(scenario, pair) == object && !listed[otherOf(pair, object).value];
+    });
+  };
+  while (order.size() < count) {
+    const std::size_t before = order.size();
+    ObjectId first_left;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      if (listed[i]) continue;
+      if (!first_left.valid()) first_left = ObjectId{i};
+      if (waitsForAPart(ObjectId{i})) continue;
+      listed[i] = true;
+      order.push_back(ObjectId{i});
+    }
+    // parts that go into each other: somebody has to be first
+    if (order.size() == before) {
+      listed[first_left.value] = true;
+      order.push_back(first_left);
+    }
+  }
+  return order;
+}
+
+std::vector<Eigen::AlignedBox3d> refineBoxes(const ScenarioFile& scenario, ObjectId object,
+                                             const Structures& structures) {
+  const ScenarioObject& spec = scenario.objects[object.value];
+  std::vector<Eigen::AlignedBox3d> boxes = spec.structures.refine;
+  const Pose X_OW = spec.X_WO.inverse();
+  for (const ScenarioPair& pair : scenario.pairs) {
+    if (fieldByTarget(scenario, pair) != object) continue;
+    const ObjectId part = otherOf(pair, object);
+    if (part.value >= structures.size() || !structures[part.value]) continue;
+    for (const ScenarioState& state : scenario.states) {
+      if (state.object != part || !state.X_WG) continue;
+      const Pose X_OG = X_OW * *state.X_WG;
+      const bool given =
+          std::any_of(spec.structures.refine.begin(), spec.structures.refine.end(),
+                      [&](const Eigen::AlignedBox3d& box_O) { return box_O.contains(X_OG.translation()); });
+      if (given) continue;
+      // where the part will be, and where it comes from
+      Eigen::AlignedBox3d box_O = boxIn(X_OG, structures[part.value]->info.box_M);
+      const Vector3 back_O = X_OW.rotation() * Vector3(-state.approach_W * state.approach_distance);
+      box_O.extend(box_O.translated(back_O));
+      const Vector3 margin = Vector3::Constant(pair.clearance + 2.0 * spec.structures.voxel);
+      boxes.emplace_back(box_O.min() - margin, box_O.max() + margin);
+    }
+  }
+  return boxes;
+}
+
+Result<double> dilationOf(const ScenarioFile& scenario, const ScenarioPair& pair, ObjectId field) {
+  const double voxel = scenario.objects[field.value].structures.voxel;
+  if (pair.clearance <= 0.0) return pair.dilation.value_or(kDilationPerVoxel * voxel);
+  const double least = kDilationPerVoxel * mountingVoxel(scenario, pair, field);
+  const double most = kDilationPerClearance * pair.clearance;
+  if (least > most * (1.0 + kRounding)) return fail(tooSmall(scenario, pair, field));
+  const double dilation = pair.dilation.value_or(least);
+  if (dilation < least * (1.0 - kRounding) || dilation > most * (1.0 + kRounding)) {
+    return fail("dilation of " + scenario.objects[pair.a.value].name + "-" +
+                scenario.objects[pair.b.value].name + " (" + inMillimetres(dilation) + ") must be between " +
+                inMillimetres(least) + " (0.87 voxels) and " + inMillimetres(most) +
+                " (a quarter of the clearance)");
+  }
+  return dilation;
+}
+
+Result<std::shared_ptr<const Scene>> makeScene(const ScenarioFile& scenario, Structures structures) {
+  if (const auto checked = checkStructures(scenario, structures); !checked)
+    return tl::unexpected(checked.error());
+  if (const auto checked = checkTargets(scenario, structures); !checked)
+    return tl::unexpected(checked.error());
+  auto scene = std::make_shared<Scene>();
+
+  std::vector<std::string> groups;
+  for (std::size_t i = 0; i < structures.size(); ++i) {
+    const ScenarioObject& object = scenario.objects[i];
+    ObjectSpec spec;
+    spec.name = object.name;
+    spec.title = object.title.front().text;
+    spec.kind = object.kind;
+    spec.color = object.color;
+    spec.group = groupNumber(groups, object.group);
+    spec.X_WO = object.X_WO;
+    spec.status = object.status;
+    spec.structures = object.felt ? structures[i] : nullptr;
+    spec.stiffness = object.stiffness;
+    scene->objects.push_back(std::move(spec));
+  }
+  for (const ScenarioPair& pair : scenario.pairs) {
+    const ObjectId field = fieldOf(scenario, pair, structures);
+    const auto dilation = dilationOf(scenario, pair, field);
+    if (!dilation) return fail(at(scenario, pair.line) + dilation.error().what);
+    scene->pairs.push_back({otherOf(pair, field), field, *dilation, pair.enabled, pair.sensing});
+  }
+  for (const ScenarioHand& hand : scenario.hands) {
+    scene->hands.push_back(
+        {hand.name, hand.role, hand.kind, hand.object, hand.stiffness, hand.rotational_stiffness});
+  }
+  return std::shared_ptr<const Scene>(std::move(scene));
+}
+
+}  // namespace tenon

@@ -1,0 +1,281 @@
+#include "server/game_control/yaml_reader.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <numbers>
+#include <set>
+#include <span>
+#include <vector>
+
+#include "server/game_control/scenario_keys.h"
+
+namespace tenon {
+namespace {
+
+struct Unit {
+  std::string_view name;
+  double si;
+};
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr std::array kLengths{Unit{"m", 1.0}, Unit{"mm", 1e-3}, Unit{"cm", 1e-2}, Unit{"in", 0.0254}};
+constexpr std::array kAngles{Unit{"deg", kDegree}, Unit{"rad", 1.0}};
+constexpr std::array kTimes{Unit{"s", 1.0}, Unit{"ms", 1e-3}, Unit{"min", 60.0}};
+constexpr std::array kForces{Unit{"N", 1.0}};
+constexpr std::array kStiffnesses{Unit{"N/m", 1.0}, Unit{"N/mm", 1e3}};
+constexpr std::array kRotationalStiffnesses{Unit{"Nm/rad", 1.0}};
+
+std::span<const Unit> unitsOf(Quantity quantity) {
+  switch (quantity) {
+    case Quantity::kLength:
+      return kLengths;
+    case Quantity::kAngle:
+      return kAngles;
+    case Quantity::kTime:
+      return kTimes;
+    case Quantity::kForce:
+      return kForces;
+    case Quantity::kStiffness:
+      return kStiffnesses;
+    case Quantity::kRotationalStiffness:
+      return kRotationalStiffnesses;
+    case Quantity::kPlain:
+      break;
+  }
+  return {};
+}
+
+std::string_view exampleOf(Quantity quantity) {
+  switch (quantity) {
+    case Quantity::kLength:
+      return "a length such as 2 mm or 0.5 m";
+    case Quantity::kAngle:
+      return "an angle with its unit such as 2 deg";
+    case Quantity::kTime:
+      return "a time such as 1 s or 200 ms";
+    case Quantity::kForce:
+      return "a force such as 5 N";
+    case Quantity::kStiffness:
+      return "a stiffness such as 1000 N/m";
+    case Quantity::kRotationalStiffness:
+      return "a stiffness such as 20 Nm/rad";
+    case Quantity::kPlain:
+      break;
+  }
+  return "a number";
+}
+
+std::string shortened(const std::string& text) {
+  constexpr std::size_t kLongest = 40;
+  return text.size() <= kLongest ? text : text.substr(0, kLongest) + "...";
+}
+
+std::string shown(double number) {
+  std::array<char, 32> buffer{};
+  const auto end =
+      std::to_chars(buffer.data(), buffer.data() + buffer.size(), number, std::chars_format::general, 6);
+  return {buffer.data(), end.ptr};
+}
+
+/// "2 mm" in SI; nothing when it is no number, has an unknown unit or needs one.
+std::optional<double> parsed(std::string_view text, Quantity quantity) {
+  double number = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc{} || !std::isfinite(number)) return std::nullopt;
+  std::string_view unit(end, static_cast<std::size_t>(text.data() + text.size() - end));
+  while (!unit.empty() && unit.front() == ' ') unit.remove_prefix(1);
+  if (unit.empty()) return quantity == Quantity::kAngle ? std::nullopt : std::optional(number);
+  for (const Unit& known : unitsOf(quantity)) {
+    if (known.name == unit) return number * known.si;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+void YamlReader::failAt(int line, const std::string& what) {
+  if (!error_) error_ = Error{file_ + ":" + std::to_string(line) + ": " + what};
+}
+
+int YamlReader::lineOf(const YAML::Node& node) const {
+  if (!node.IsDefined() || node.Mark().is_null()) return last_line_;
+  return node.Mark().line + 1;
+}
+
+bool YamlReader::openMapping(const YAML::Node& node, std::string_view mapping, const std::string& what) {
+  if (!node.IsDefined() || !node.IsMap()) {
+    fail(node, what + " must be a mapping (key: value)");
+    return false;
+  }
+  last_line_ = lineOf(node);
+  const std::span<const std::string_view> keys = scenarioMapping(mapping).keys;
+  std::set<std::string> seen;
+  for (const auto& entry : node) {
+    if (!entry.first.IsScalar()) {
+      fail(entry.first, what + " has a key that is not a word");
+      return false;
+    }
+    const std::string& key = entry.first.Scalar();
+    if (!seen.insert(key).second) {
+      fail(entry.first, what + " has two keys '" + shortened(key) + "'");
+      return false;
+    }
+    if (std::find(keys.begin(), keys.end(), key) != keys.end()) continue;
+    const std::string hint = suggestion(key, keys);
+    std::string known;
+    for (const std::string_view one : keys) known += (known.empty() ? "" : ", ") + std::string(one);
+    fail(entry.first, what + " has an unknown key '" + shortened(key) + "'; " +
+                          (hint.empty() ? "known keys: " + known : hint));
+    return false;
+  }
+  return true;
+}
+
+bool YamlReader::isList(const YAML::Node& node, const std::string& what, std::size_t most) {
+  if (!node.IsDefined() || !node.IsSequence()) {
+    fail(node, what + " must be a list");
+    return false;
+  }
+  if (node.size() > most) {
+    fail(node, what + " has " + std::to_string(node.size()) + " entries, at most " + std::to_string(most) +
+                   " are allowed");
+    return false;
+  }
+  return true;
+}
+
+std::string YamlReader::text(const YAML::Node& node, const std::string& what) {
+  if (!node.IsDefined()) {
+    fail(node, what + " is missing");
+    return {};
+  }
+  if (!node.IsScalar() || node.Scalar().empty()) {
+    fail(node, what + " must be a text");
+    return {};
+  }
+  return node.Scalar();
+}
+
+bool YamlReader::yesNo(const YAML::Node& node, const std::string& what, bool when_missing) {
+  if (!node.IsDefined()) return when_missing;
+  bool value = when_missing;
+  if (!node.IsScalar() || !YAML::convert<bool>::decode(node, value))
+    fail(node, what + " must be true or false");
+  return value;
+}
+
+std::int64_t YamlReader::integer(const YAML::Node& node, const std::string& what, std::int64_t least,
+                                 std::int64_t most, std::int64_t when_missing) {
+  if (!node.IsDefined()) return when_missing;
+  std::int64_t value = 0;
+  if (node.IsScalar()) {
+    const std::string& word = node.Scalar();
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error == std::errc{} && end == word.data() + word.size() && value >= least && value <= most)
+      return value;
+  }
+  fail(node,
+       what + " must be a whole number between " + std::to_string(least) + " and " + std::to_string(most));
+  return when_missing;
+}
+
+double YamlReader::number(const YAML::Node& node, Quantity quantity, const std::string& what, double least,
+                          double most) {
+  if (!node.IsDefined()) {
+    fail(node, what + " is missing, expected " + std::string(exampleOf(quantity)));
+    return least;
+  }
+  const std::optional<double> value = node.IsScalar() ? parsed(node.Scalar(), quantity) : std::nullopt;
+  if (!value) {
+    fail(node, what + (node.IsScalar() ? " is '" + shortened(node.Scalar()) + "'" : " is not a number") +
+                   ", expected " + std::string(exampleOf(quantity)));
+    return least;
+  }
+  if (*value < least || *value > most) {
+    const std::string_view unit = unitsOf(quantity).empty()      ? ""
+                                  : quantity == Quantity::kAngle ? "rad"
+                                                                 : unitsOf(quantity)[0].name;
+    fail(node, what + " is " + shortened(node.Scalar()) + ", expected between " + shown(least) + " and " +
+                   shown(most) + (unit.empty() ? "" : " " + std::string(unit)));
+    return least;
+  }
+  return *value;
+}
+
+double YamlReader::numberOr(const YAML::Node& node, Quantity quantity, const std::string& what, double least,
+                            double most, double when_missing) {
+  return node.IsDefined() ? number(node, quantity, what, least, most) : when_missing;
+}
+
+Vector3 YamlReader::vector(const YAML::Node& node, Quantity quantity, const std::string& what) {
+  Vector3 v = Vector3::Zero();
+  if (!node.IsDefined() || !node.IsSequence() || node.size() != 3) {
+    fail(node, what + " must be a list of three numbers [x, y, z]");
+    return v;
+  }
+  constexpr double kLargest = 1e6;
+  for (int i = 0; i < 3; ++i) v[i] = number(node[i], quantity, what, -kLargest, kLargest);
+  return v;
+}
+
+Pose YamlReader::pose(const YAML::Node& mapping, const std::string& what) {
+  Pose X;
+  const YAML::Node at = mapping["at"];
+  const YAML::Node turns = mapping["turn"];
+  const YAML::Node q = mapping["q"];
+  if (at.IsDefined()) X.translation() = vector(at, Quantity::kLength, "'at' of " + what);
+  if (turns.IsDefined() && q.IsDefined()) {
+    fail(q, what + " has both 'turn' and 'q', expected one of them");
+  } else if (turns.IsDefined()) {
+    X.rotation() = turned(turns, what);
+  } else if (q.IsDefined()) {
+    if (!q.IsSequence() || q.size() != 4) {
+      fail(q, "'q' of " + what + " must be a list of four numbers [w, x, y, z]");
+      return X;
+    }
+    std::array<double, 4> wxyz{};
+    for (std::size_t i = 0; i < 4; ++i) wxyz[i] = number(q[i], Quantity::kPlain, "'q' of " + what, -1e3, 1e3);
+    const Quaternion given(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+    constexpr double kUnitWithin = 0.01;  // a typed quaternion has two or three digits
+    if (std::abs(given.norm() - 1.0) > kUnitWithin) {
+      fail(q, "'q' of " + what + " has length " + shown(given.norm()) +
+                  ", expected a unit quaternion [w, x, y, z]");
+      return X;
+    }
+    X.rotation() = given.normalized();
+  }
+  return X;
+}
+
+Quaternion YamlReader::turned(const YAML::Node& turns, const std::string& what) {
+  if (!turns.IsSequence()) return turn(turns, what);
+  Quaternion q = Quaternion::Identity();
+  if (!isList(turns, "'turn' of " + what, 8)) return q;
+  for (const auto& one : turns) q = (turn(one, what) * q).normalized();
+  return q;
+}
+
+Quaternion YamlReader::turn(const YAML::Node& node, const std::string& what) {
+  if (!openMapping(node, "turn", "'turn' of " + what)) return Quaternion::Identity();
+  Vector3 axis = Vector3::Zero();
+  const YAML::Node given = node["axis"];
+  const std::string letter = given.IsDefined() && given.IsScalar() ? given.Scalar() : "";
+  if (letter == "x" || letter == "y" || letter == "z") {
+    axis[letter[0] - 'x'] = 1.0;
+  } else {
+    axis = vector(given, Quantity::kPlain, "'axis' of 'turn' of " + what);
+  }
+  const double degrees = number(node["deg"], Quantity::kPlain, "'deg' of 'turn' of " + what, -360.0, 360.0);
+  if (failed()) return Quaternion::Identity();
+  if (axis.norm() < 1e-9) {
+    fail(given, "'axis' of 'turn' of " + what + " has no length");
+    return Quaternion::Identity();
+  }
+  // expRotation wants at most half a turn
+  const double shorter = degrees > 180.0 ? degrees - 360.0 : degrees < -180.0 ? degrees + 360.0 : degrees;
+  return expRotation(axis.normalized() * (shorter * kDegree));
+}
+
+}  // namespace tenon
