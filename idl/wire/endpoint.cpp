@@ -1,0 +1,226 @@
+#include "idl/wire/endpoint.h"
+
+#include <utility>
+#include <vector>
+
+#include "idl/wire/convert.h"
+#include "idl/wire/core.h"
+
+namespace tenon {
+namespace {
+
+template <class M>
+wire::TopicSpec specOf(const Topic<M>& topic) {
+  return {topic.name, &wire::TypeOf<M>::descriptor(), topic.promise, topic.parameters};
+}
+
+/// Samples lent by a reader, given back at the end.
+template <class M>
+class Loan {
+ public:
+  explicit Loan(dds_entity_t reader, int most) : reader_(reader) {
+    count_ =
+        dds_take(reader, samples_, infos_, static_cast<std::size_t>(most), static_cast<std::uint32_t>(most));
+  }
+  ~Loan() {
+    if (count_ > 0) dds_return_loan(reader_, samples_, count_);
+  }
+  Loan(const Loan&) = delete;
+  Loan& operator=(const Loan&) = delete;
+
+  [[nodiscard]] int size() const { return count_ < 0 ? 0 : count_; }
+  [[nodiscard]] const dds_sample_info_t& info(int i) const { return infos_[i]; }
+  [[nodiscard]] const typename wire::TypeOf<M>::C& sample(int i) const {
+    return *static_cast<const typename wire::TypeOf<M>::C*>(samples_[i]);
+  }
+
+ private:
+  dds_entity_t reader_;
+  void* samples_[wire::kTakeAtOnce] = {nullptr};
+  dds_sample_info_t infos_[wire::kTakeAtOnce];
+  dds_return_t count_ = 0;
+};
+
+}  // namespace
+
+template <class M>
+struct Writer<M>::Impl {
+  std::unique_ptr<wire::Endpoint> endpoint;
+  std::string_view topic;
+  wire::Wire<M> wire{};
+
+  template <class Put>
+  Result<void> put(const M& message, Put dds_put) {
+    if (const auto good = wire::toWire(message, wire); !good) return good;
+    const dds_return_t code = dds_put(endpoint->entity(), &wire.sample);
+    if (code < 0) return fail(wire::because(topic, *endpoint->partition(), code));
+    return {};
+  }
+};
+
+template <class M>
+Writer<M>::Writer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+template <class M>
+Writer<M>::Writer(Writer&&) noexcept = default;
+template <class M>
+Writer<M>& Writer<M>::operator=(Writer&&) noexcept = default;
+template <class M>
+Writer<M>::~Writer() = default;
+
+template <class M>
+Result<Writer<M>> Writer<M>::open(Partition& partition, const Topic<M>& topic) {
+  auto endpoint = wire::openWriter(partition, specOf(topic));
+  if (!endpoint) return tl::unexpected(endpoint.error());
+  auto impl = std::make_unique<Impl>();
+  impl->endpoint = std::move(*endpoint);
+  impl->topic = topic.name;
+  return Writer(std::move(impl));
+}
+template <class M>
+Result<void> Writer<M>::write(const M& message) {
+  return impl_->put(message, dds_write);
+}
+template <class M>
+Result<void> Writer<M>::dispose(const M& key_holder) {
+  return impl_->put(key_holder, dds_dispose);
+}
+template <class M>
+std::size_t Writer<M>::matchedReaders() const {
+  return wire::matchedReaders(impl_->endpoint->entity());
+}
+
+template <class M>
+struct Reader<M>::Impl {
+  std::unique_ptr<wire::Endpoint> endpoint;
+};
+
+template <class M>
+Reader<M>::Reader(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+template <class M>
+Reader<M>::Reader(Reader&&) noexcept = default;
+template <class M>
+Reader<M>& Reader<M>::operator=(Reader&&) noexcept = default;
+template <class M>
+Reader<M>::~Reader() = default;
+
+template <class M>
+Result<Reader<M>> Reader<M>::open(Partition& partition, const Topic<M>& topic) {
+  auto endpoint = wire::openReader(partition, specOf(topic), false, nullptr);
+  if (!endpoint) return tl::unexpected(endpoint.error());
+  auto impl = std::make_unique<Impl>();
+  impl->endpoint = std::move(*endpoint);
+  return Reader(std::move(impl));
+}
+template <class M>
+bool Reader<M>::take(M& out) {
+  while (true) {
+    const Loan<M> loan(impl_->endpoint->entity(), 1);
+    if (loan.size() == 0) return false;
+    if (loan.info(0).valid_data && wire::fromWire(loan.sample(0), out)) return true;
+  }
+}
+template <class M>
+std::size_t Reader<M>::matchedWriters() const {
+  return wire::matchedWriters(impl_->endpoint->entity());
+}
+
+namespace {
+
+template <class M>
+class TypedSource : public wire::Source {
+ public:
+  explicit TypedSource(std::uint64_t& malformed) : malformed_(malformed) {}
+
+  std::size_t drain() override {
+    const Loan<M> loan(reader->entity(), wire::kTakeAtOnce);
+    for (int i = 0; i < loan.size(); ++i) deliver(loan.info(i), loan.sample(i));
+    return static_cast<std::size_t>(loan.size());
+  }
+
+  std::vector<std::function<void(const M&)>> handlers;
+  std::vector<std::function<void(const M&)>> gone_handlers;
+
+ private:
+  void deliver(const dds_sample_info_t& info, const typename wire::TypeOf<M>::C& sample) {
+    if (!wire::fromWire(sample, message_)) {
+      if (info.valid_data) ++malformed_;
+      return;
+    }
+    if (info.valid_data) {
+      for (const auto& handler : handlers) handler(message_);
+    }
+    // a key that went after its last sample has no sample of its own: the rank says this is the last
+    if (info.instance_state != DDS_ALIVE_INSTANCE_STATE && info.sample_rank == 0) {
+      for (const auto& handler : gone_handlers) handler(message_);
+    }
+  }
+
+  std::uint64_t& malformed_;
+  M message_;
+};
+
+}  // namespace
+
+struct Inbox::Impl {
+  wire::Mailbox mailbox;
+  std::uint64_t malformed = 0;
+
+  template <class M>
+  Result<TypedSource<M>*> source(Partition& partition, const Topic<M>& topic) {
+    for (const auto& known : mailbox.sources()) {
+      if (known->topic == topic.name && known->reader->partition() == partition.impl()) {
+        return static_cast<TypedSource<M>*>(known.get());
+      }
+    }
+    auto made = std::make_unique<TypedSource<M>>(malformed);
+    auto* const typed = made.get();
+    if (auto added = mailbox.add(std::move(made), partition, specOf(topic), false); !added) {
+      return tl::unexpected(added.error());
+    }
+    return typed;
+  }
+};
+
+Inbox::Inbox() : impl_(std::make_unique<Impl>()) {}
+Inbox::~Inbox() = default;
+Inbox::Inbox(Inbox&&) noexcept = default;
+Inbox& Inbox::operator=(Inbox&&) noexcept = default;
+
+template <class M>
+Result<void> Inbox::on(Partition& partition, const Topic<M>& topic, std::function<void(const M&)> handler) {
+  auto source = impl_->source(partition, topic);
+  if (!source) return tl::unexpected(source.error());
+  (*source)->handlers.push_back(std::move(handler));
+  return {};
+}
+
+template <class M>
+Result<void> Inbox::onGone(Partition& partition, const Topic<M>& topic,
+                           std::function<void(const M&)> handler) {
+  auto source = impl_->source(partition, topic);
+  if (!source) return tl::unexpected(source.error());
+  (*source)->gone_handlers.push_back(std::move(handler));
+  return {};
+}
+
+std::size_t Inbox::dispatch(std::chrono::nanoseconds timeout) { return impl_->mailbox.dispatch(timeout); }
+void Inbox::wake() noexcept { impl_->mailbox.wake(); }
+std::uint64_t Inbox::malformed() const { return impl_->malformed; }
+
+std::size_t Inbox::matchedWriters() const {
+  std::size_t count = 0;
+  for (const auto& source : impl_->mailbox.sources()) {
+    count += wire::matchedWriters(source->reader->entity());
+  }
+  return count;
+}
+
+#define TENON_INSTANTIATE(M)                                                                      \
+  template class Writer<M>;                                                                       \
+  template class Reader<M>;                                                                       \
+  template Result<void> Inbox::on<M>(Partition&, const Topic<M>&, std::function<void(const M&)>); \
+  template Result<void> Inbox::onGone<M>(Partition&, const Topic<M>&, std::function<void(const M&)>);
+TENON_WIRE_MESSAGES(TENON_INSTANTIATE)
+#undef TENON_INSTANTIATE
+
+}  // namespace tenon

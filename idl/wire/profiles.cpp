@@ -1,0 +1,117 @@
+#include "idl/wire/profiles.h"
+
+#include <algorithm>
+#include <cstdint>
+
+namespace tenon::wire {
+namespace {
+
+constexpr std::uint32_t kLockstepDepth = 32;
+constexpr Milliseconds kLockstepLease{5000};  ///< a machine busy with many lockstep processes still keeps it
+
+// how long a reliable event waits for room at slow readers before its write fails
+constexpr Milliseconds kLanBlocking{500};
+constexpr Milliseconds kLockstepBlocking{10000};
+
+dds_duration_t duration(Milliseconds time) { return DDS_MSECS(time.count()); }
+
+void setReliability(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile) {
+  const bool lockstep = profile == LinkProfile::kLockstep;
+  const bool reliable = topic.promise != Promise::kStream || lockstep;
+  dds_qset_reliability(qos, reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
+                       duration(lockstep ? kLockstepBlocking : kLanBlocking));
+}
+
+void setHistory(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile) {
+  if (topic.promise == Promise::kEvent) {
+    dds_qset_history(qos, DDS_HISTORY_KEEP_ALL, 0);
+  } else if (topic.promise == Promise::kStream && profile == LinkProfile::kLockstep) {
+    dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, kLockstepDepth);
+  } else {
+    dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, 1);
+  }
+}
+
+dds_qos_t* commonQos(const TopicSpec& topic, LinkProfile profile) {
+  dds_qos_t* qos = dds_create_qos();
+  setReliability(qos, topic, profile);
+  setHistory(qos, topic, profile);
+  dds_qset_durability(
+      qos, topic.parameters.late_joiner_depth > 0 ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
+  if (topic.parameters.latched) {
+    dds_qset_destination_order(qos, DDS_DESTINATIONORDER_BY_SOURCE_TIMESTAMP);
+  }
+  return qos;
+}
+
+}  // namespace
+
+dds_qos_t* writerQos(const TopicSpec& topic, LinkProfile profile) {
+  const TopicParameters& parameters = topic.parameters;
+  const bool lockstep = profile == LinkProfile::kLockstep;
+  dds_qos_t* qos = commonQos(topic, profile);
+  dds_data_representation_id_t xcdr1[] = {DDS_DATA_REPRESENTATION_XCDR1};
+  dds_qset_data_representation(qos, 1, xcdr1);
+  if (parameters.late_joiner_depth > 0) {
+    // what a late joiner gets is set here alone: Cyclone keeps one sample a key for it, whatever HISTORY says
+    dds_qset_durability_service(qos, 0, DDS_HISTORY_KEEP_LAST,
+                                static_cast<std::int32_t>(parameters.late_joiner_depth), DDS_LENGTH_UNLIMITED,
+                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+  }
+  if (parameters.lease != kNever) {
+    const bool by_topic = parameters.lease_by_topic && !lockstep;
+    const Milliseconds lease = lockstep ? std::max(parameters.lease, kLockstepLease) : parameters.lease;
+    dds_qset_liveliness(qos, by_topic ? DDS_LIVELINESS_MANUAL_BY_TOPIC : DDS_LIVELINESS_AUTOMATIC,
+                        duration(lease));
+  }
+  if (parameters.deadline != kNever && !lockstep) dds_qset_deadline(qos, duration(parameters.deadline));
+  if (parameters.lifespan != kNever && !lockstep) dds_qset_lifespan(qos, duration(parameters.lifespan));
+  dds_qset_writer_data_lifecycle(qos, !parameters.latched);
+  return qos;
+}
+
+dds_qos_t* readerQos(const TopicSpec& topic, LinkProfile profile, bool everything) {
+  dds_qos_t* qos = commonQos(topic, profile);
+  if (everything) dds_qset_history(qos, DDS_HISTORY_KEEP_ALL, 0);
+  return qos;
+}
+
+std::string_view loopbackConfig() {
+  return R"xml(<?xml version="1.0" encoding="UTF-8"?>
+<!-- Programs on one machine, and nothing leaves it: the default when neither an option nor CYCLONEDDS_URI says
+     otherwise. Unicast to up to 61 participants, so it also works where multicast does not. One receive thread,
+     so that the name `recv` in Threads covers it; fast heartbeats and acknowledgements, because a lost
+     sample of a lockstep session stops everybody until it has been sent again. -->
+<CycloneDDS xmlns="https://cdds.io/config">
+  <Domain Id="any">
+    <General>
+      <Interfaces>
+        <NetworkInterface address="127.0.0.1" multicast="false"/>
+      </Interfaces>
+      <AllowMulticast>false</AllowMulticast>
+    </General>
+    <Discovery>
+      <ParticipantIndex>auto</ParticipantIndex>
+      <MaxAutoParticipantIndex>60</MaxAutoParticipantIndex>
+      <Peers>
+        <Peer Address="127.0.0.1"/>
+      </Peers>
+      <SPDPInterval>2 s</SPDPInterval>
+    </Discovery>
+    <Internal>
+      <MultipleReceiveThreads>false</MultipleReceiveThreads>
+      <HeartbeatInterval min="2 ms" minsched="5 ms" max="1 s">10 ms</HeartbeatInterval>
+      <NackDelay>5 ms</NackDelay>
+      <AckDelay>2 ms</AckDelay>
+      <AutoReschedNackDelay>60 ms</AutoReschedNackDelay>
+      <Watermarks>
+        <WhcHighInit>2 MB</WhcHighInit>
+        <WhcHigh>8 MB</WhcHigh>
+      </Watermarks>
+    </Internal>
+  </Domain>
+</CycloneDDS>
+)xml";
+}
+
+}  // namespace tenon::wire
