@@ -33,6 +33,7 @@ class Coupling {
   void reset() noexcept;
   /// [N/m] in use: for the device's own stability checks.
   [[nodiscard]] double stiffness() const noexcept { return stiffness_; }
+  [[nodiscard]] double rotationalStiffness() const noexcept { return rotational_stiffness_; }
 
  private:
   CouplingOptions options_;
@@ -41,6 +42,7 @@ class Coupling {
   Wrench displayed_;
   Wrench fading_;  // what was displayed when the object jumped
   double stiffness_ = 0.0;
+  double rotational_stiffness_ = 0.0;
   std::uint32_t fade_left_ = 0;
   bool has_stretch_ = false;
 };

@@ -46,6 +46,7 @@ class LocalModel {
   [[nodiscard]] const HandManifold& manifold() const noexcept { return manifold_; }
   [[nodiscard]] bool heard() const noexcept { return heard_; }
   [[nodiscard]] const LocalProxy& proxy() const noexcept { return proxy_; }
+  [[nodiscard]] const StalenessLimits& limits() const noexcept { return limits_; }
   /// Ticks in which the object had left the region for which the manifold lists every contact.
   [[nodiscard]] std::uint64_t beyondValidity() const noexcept { return beyond_validity_; }
 

@@ -13,6 +13,8 @@
 
 namespace tenon {
 
+class HapticHand;
+
 inline constexpr std::size_t kMaxStationHands = 4;
 
 enum class StationEventKind : std::uint8_t {
@@ -88,6 +90,8 @@ class Station {
   virtual void stepChanged() {}
   virtual void stopChanged(bool engaged) = 0;
 
+  /// What changed for a hand in the last millisecond.
+  void report(const HapticHand& hand) noexcept;
   void report(StationEventKind kind, HandId hand, std::uint32_t detail, double value) noexcept;
   [[nodiscard]] const SceneObject* sceneObject(ObjectId object) const;
   [[nodiscard]] const std::vector<SceneObject>& sceneObjects() const { return objects_; }

@@ -44,6 +44,7 @@ class TraineeStation : public Station {
 
  private:
   struct Parts;
+  void trackBody(std::uint32_t seq, double dt) noexcept;
   explicit TraineeStation(std::unique_ptr<Parts> parts);
   std::unique_ptr<Parts> parts_;
 };

@@ -1,0 +1,62 @@
+#include "clients/haptic/coupling.h"
+
+#include <algorithm>
+
+namespace tenon {
+
+namespace {
+// The stretch's rate is the difference of two encoder readings; 5 ms tame their steps and stay well below the
+// 30 ms in which a hand and a wall settle.
+constexpr double kRateFilter = 0.005;  // [s]
+
+Vector3 masked(const Vector3& v, std::uint32_t axes) {
+  return {(axes & 1U) != 0 ? v.x() : 0.0, (axes & 2U) != 0 ? v.y() : 0.0, (axes & 4U) != 0 ? v.z() : 0.0};
+}
+}  // namespace
+
+Wrench Coupling::step(const LocalProxy& proxy, const Pose& X_WH, double dt) noexcept {
+  if (proxy.jumped) {
+    fading_ = displayed_;
+    fade_left_ = options_.fade_ticks;
+    has_stretch_ = false;
+  }
+  const Displacement before = stretch_;
+  stretch_ = proxy.active ? displacement(X_WH, proxy.X_WS) : Displacement{};
+  if (has_stretch_) {
+    const double blend = dt / (kRateFilter + dt);
+    stretch_rate_.translation +=
+        blend * ((stretch_.translation - before.translation) / dt - stretch_rate_.translation);
+    stretch_rate_.rotation += blend * ((stretch_.rotation - before.rotation) / dt - stretch_rate_.rotation);
+  } else {
+    stretch_rate_ = {};
+  }
+  has_stretch_ = proxy.active;
+
+  stiffness_ = std::min(proxy.stiffness, options_.max_stiffness);
+  rotational_stiffness_ = std::min(proxy.rotational_stiffness, options_.max_rotational_stiffness);
+  // a manifold too old to push is too old to damp
+  const double share = proxy.stiffness > 0.0 ? std::min(1.0, proxy.stiffness / options_.max_stiffness) : 0.0;
+  Wrench wrench;
+  wrench.force = stiffness_ * stretch_.translation + share * options_.damping * stretch_rate_.translation;
+  wrench.torque = rotational_stiffness_ * stretch_.rotation + share * options_.rotational_damping * stretch_rate_.rotation;
+  if (fade_left_ > 0) {
+    const double old_share = static_cast<double>(fade_left_) / static_cast<double>(options_.fade_ticks + 1);
+    wrench = wrench * (1.0 - old_share) + fading_ * old_share;
+    --fade_left_;
+  }
+  wrench.force = masked(wrench.force, options_.dof_mask);
+  wrench.torque = masked(wrench.torque, options_.dof_mask >> 3U);
+  displayed_ = wrench;
+  return wrench;
+}
+
+void Coupling::reset() noexcept {
+  stretch_ = {};
+  stretch_rate_ = {};
+  displayed_ = {};
+  fading_ = {};
+  fade_left_ = 0;
+  has_stretch_ = false;
+}
+
+}  // namespace tenon

@@ -1,0 +1,107 @@
+#include "clients/haptic/station.h"
+
+#include <algorithm>
+
+#include "clients/haptic/haptic_hand.h"
+#include "devices/device.h"
+
+namespace tenon {
+
+std::string describe(const StationEvent& event) {
+  const std::string hand = "hand " + std::to_string(event.hand.value);
+  const std::string when = " at " + std::to_string(event.seq);
+  switch (event.kind) {
+    case StationEventKind::kSafety:
+      return hand + ": the safety layer acts, flags " + std::to_string(event.detail) + when;
+    case StationEventKind::kDeviceFault:
+      return hand + ": the device reports a fault: " + toString(static_cast<DeviceFault>(event.detail)) + when;
+    case StationEventKind::kIndexingBegan:
+      return hand + ": the workspace begins to move" + when;
+    case StationEventKind::kIndexingEnded:
+      return hand + ": the workspace stands still" + when;
+    case StationEventKind::kBeyondValidity:
+      return hand + ": moved beyond what the server's contacts cover" + when;
+    case StationEventKind::kStale:
+      return hand + ": no contacts heard for " + std::to_string(static_cast<int>(event.value)) + " ms" + when;
+    case StationEventKind::kServerChanged:
+      return "the server began a new life, epoch " + std::to_string(event.detail) + when;
+    case StationEventKind::kEmergencyStop:
+      return (event.detail != 0 ? "emergency stop" : "emergency stop released") + when;
+  }
+  return "unknown event" + when;
+}
+
+void Station::welcome(const Welcome& welcome, std::span<const SceneObject> objects) {
+  client_ = welcome.client;
+  objects_.assign(objects.begin(), objects.end());
+  world_.begin(objects, welcome.server_epoch, welcome.tick);
+  std::vector<HandId> ids = welcome.hands;
+  ids.resize(handNames().size());
+  own_hands_.clear();
+  for (const HandId id : ids) {
+    if (id.valid()) own_hands_.push_back(id);
+  }
+  begin(ids);
+}
+
+void Station::receive(const WorldFrame& frame) noexcept {
+  const std::uint32_t epoch = world_.serverEpoch();
+  if (world_.receive(frame) && world_.serverEpoch() != epoch) {
+    report(StationEventKind::kServerChanged, {}, world_.serverEpoch(), 0.0);
+  }
+}
+
+void Station::receive(const HandManifold& manifold) noexcept {
+  if (std::find(own_hands_.begin(), own_hands_.end(), manifold.hand) != own_hands_.end()) heard(manifold);
+}
+
+void Station::receive(const StepState& step) {
+  step_ = step;
+  stepChanged();
+}
+
+void Station::receive(const EmergencyStop& stop) {
+  report(StationEventKind::kEmergencyStop, {}, stop.engaged ? 1U : 0U, 0.0);
+  stopChanged(stop.engaged);
+}
+
+void Station::receive(const GrabState& /*grab*/) {
+  // what a hand moves is in its manifold, together with the planes that fit it
+}
+
+bool Station::takeEvent(StationEvent& event) noexcept {
+  if (events_taken_ == events_written_) return false;
+  event = events_[events_taken_ % kEventRoom];
+  ++events_taken_;
+  return true;
+}
+
+void Station::report(const HapticHand& hand) noexcept {
+  const HandNews& news = hand.news();
+  if (news.safety_began != 0) report(StationEventKind::kSafety, hand.id(), news.safety_began, 0.0);
+  if (news.fault_began) {
+    report(StationEventKind::kDeviceFault, hand.id(), static_cast<std::uint32_t>(hand.device().fault), 0.0);
+  }
+  if (news.indexing_began) report(StationEventKind::kIndexingBegan, hand.id(), 0, 0.0);
+  if (news.indexing_ended) report(StationEventKind::kIndexingEnded, hand.id(), 0, 0.0);
+  if (news.stale_began) report(StationEventKind::kStale, hand.id(), 0, hand.local().proxy().age);
+  if (news.beyond_validity_began) {
+    const auto ticks = static_cast<double>(hand.local().beyondValidity());
+    report(StationEventKind::kBeyondValidity, hand.id(), 0, ticks);
+  }
+}
+
+void Station::report(StationEventKind kind, HandId hand, std::uint32_t detail, double value) noexcept {
+  events_[events_written_ % kEventRoom] = {seq_, kind, hand, detail, value};
+  ++events_written_;
+  if (events_written_ - events_taken_ > kEventRoom) events_taken_ = events_written_ - kEventRoom;
+}
+
+const SceneObject* Station::sceneObject(ObjectId object) const {
+  for (const SceneObject& candidate : objects_) {
+    if (candidate.object == object) return &candidate;
+  }
+  return nullptr;
+}
+
+}  // namespace tenon

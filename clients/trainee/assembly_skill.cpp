@@ -1,0 +1,432 @@
+#include "clients/trainee/assembly_skill.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tenon {
+
+namespace {
+constexpr double kPassBy = 0.03;       // [m] near enough to a point on the way
+constexpr double kThere = 0.004;       // [m] near enough to its end
+constexpr double kFacing = 0.02;       // [rad]
+constexpr double kStandOff = 0.12;     // [m] before a thing to be touched she slows down
+constexpr double kTouchForce = 1.5;    // [N]
+constexpr double kTouchSpeed = 0.08;   // [m/s]
+constexpr double kPushForce = 5.0;     // [N]
+constexpr double kSearchForce = 3.5;   // [N]
+constexpr double kSeatForce = 4.0;     // [N]
+constexpr double kInsertSpeed = 0.06;  // [m/s]
+constexpr double kPushGain = 0.012;    // [m/s per N] how quickly a hand gives way or follows
+constexpr double kLongestPush = 0.08;  // [m] the intent goes ahead of the object
+constexpr double kBump = 6.0;          // [N] on the way: she hit something
+constexpr double kSpiralPitch = 0.0008;  // [m]
+constexpr double kSpiralWidest = 0.009;  // [m]
+constexpr double kSpiralSpeed = 0.02;    // [m/s]
+constexpr double kTilt = 0.02;           // [rad] of the wiggle
+constexpr double kTiltPace = 8.0;        // [rad/s]
+constexpr double kBackOffWay = 0.03;     // [m]
+
+/// A turn of (cos, sin) by a small angle; stays on the circle without trigonometry.
+void turn(Vector3& phasor, double angle) {
+  phasor.x() -= angle * phasor.y();
+  phasor.y() += angle * phasor.x();
+}
+
+/// Two unit vectors that stand upright on `axis` and on each other.
+void besides(const Vector3& axis, Vector3& u, Vector3& v) {
+  const Vector3 other = std::abs(axis.z()) < 0.9 ? Vector3::UnitZ() : Vector3::UnitX();
+  u = axis.cross(other).normalized();
+  v = axis.cross(u);
+}
+
+Vector3 faded(const Vector3& v, double dt, double time) { return v * (1.0 - std::min(1.0, dt / time)); }
+}  // namespace
+
+void AssemblySkill::begin(const Pose& X_WH) noexcept {
+  X_WHome_ = X_WI_ = X_WH;
+  reach_.start(X_WH);
+  intent_velocity_ = {};
+  enter(Phase::kRest);
+}
+
+double AssemblySkill::contraction() const noexcept {
+  switch (phase_) {
+    case Phase::kTouch:
+    case Phase::kSearch:
+    case Phase::kSeated:
+      return 0.0;
+    case Phase::kInsert:
+      return task_.sure_of_it ? 0.0 : 0.1;
+    default:
+      return 0.4;
+  }
+}
+
+const char* AssemblySkill::doing() const noexcept {
+  switch (phase_) {
+    case Phase::kRest:
+      return "rests";
+    case Phase::kTravel:
+      return goal_ == Goal::kMount ? "carries" : goal_ == Goal::kTouch ? "reaches" : "withdraws";
+    case Phase::kTouch:
+      return "touches";
+    case Phase::kAlign:
+      return "aligns";
+    case Phase::kInsert:
+      return task_.sure_of_it ? "insists" : "pushes in";
+    case Phase::kSearch:
+      return "searches";
+    case Phase::kBackOff:
+      return "backs off";
+    case Phase::kSeated:
+      return "holds";
+  }
+  return "";
+}
+
+void AssemblySkill::enter(Phase phase) noexcept {
+  phase_ = phase;
+  phase_time_ = 0.0;
+  stall_time_ = 0.0;
+  bump_time_ = 0.0;
+}
+
+// ---- tasks
+
+void AssemblySkill::goHome(const HandSense& sense, const ClearWay& clear_way) noexcept {
+  goal_ = Goal::kHome;
+  travelTo(X_WHome_, sense, clear_way, 0.1);
+}
+
+void AssemblySkill::touch(const HandSense& sense, const ClearWay& clear_way, ObjectId object,
+                          const Pose& X_WO) noexcept {
+  goal_ = Goal::kTouch;
+  touched_ = object;
+  p_WTouch_ = X_WO.translation();
+  probe_ = 0;
+  const Vector3 way = p_WTouch_ - sense.X_WH.translation();
+  const Vector3 before = way.norm() > kStandOff ? Vector3(p_WTouch_ - kStandOff * way.normalized())
+                                                : sense.X_WH.translation();
+  travelTo({before, Quaternion::Identity()}, sense, clear_way, 0.08);
+}
+
+void AssemblySkill::mount(const HandSense& sense, const ClearWay& clear_way, const MountTask& task) noexcept {
+  goal_ = Goal::kMount;
+  task_ = task;
+  attempts_ = 0;
+  bias_scale_ = 1.0;
+  const bool any_way = task.approach_W.norm() < 0.5;
+  axis_W_ = any_way ? Vector3(-Vector3::UnitZ()) : task.approach_W.normalized();
+  if (any_way) task_.approach_distance = 0.0;
+
+  Vector3 u, v;
+  besides(axis_W_, u, v);
+  Vector3 direction = random_.uniform(-1.0, 1.0) * u + random_.uniform(-1.0, 1.0) * v;
+  direction = direction.norm() > 1e-3 ? direction.normalized() : u;
+  const Vector3 twist = Vector3(random_.uniform(-1.0, 1.0), random_.uniform(-1.0, 1.0), random_.uniform(-1.0, 1.0));
+  const double beside = random_.uniform(person_.aim_error_min, person_.aim_error_max);
+  const double turned = random_.uniform(person_.aim_angle_min, person_.aim_angle_max);
+  bias_W_ = direction * (task.sure_of_it ? person_.stubborn_offset : beside);
+  bias_rotation_W_ = task.sure_of_it || twist.norm() < 1e-3 ? Vector3(Vector3::Zero())
+                                                            : Vector3(twist.normalized() * turned);
+  if (!task.by_touch) {
+    bias_W_.setZero();
+    bias_rotation_W_.setZero();
+  }
+  aim();
+  Pose X_WBefore = X_WAim_;
+  X_WBefore.translation() -= axis_W_ * task_.approach_distance;
+  travelTo(X_WBefore * sense.X_HO.inverse(), sense, clear_way, task.radius + 0.05);
+}
+
+void AssemblySkill::aim() noexcept {
+  X_WAim_ = displaced(task_.X_WG, {bias_scale_ * bias_W_, bias_scale_ * bias_rotation_W_});
+}
+
+void AssemblySkill::travelTo(const Pose& X_WH_goal, const HandSense& sense, const ClearWay& clear_way,
+                             double margin) noexcept {
+  clear_way_ = &clear_way;
+  margin_ = margin;
+  const Vector3 from = sense.X_WH.translation() + back_out_W_;
+  way_.clear();
+  backing_out_ = back_out_W_.norm() > 0.0;
+  if (backing_out_) way_.push_back(from);
+  for (const Vector3& point : clear_way.plan(from, X_WH_goal.translation(), margin)) way_.push_back(point);
+  next_ = 0;
+  q_WTravel_ = X_WH_goal.rotation();
+  q_WDepart_ = sense.X_WH.rotation();
+  back_out_W_.setZero();
+  nudge_ = {};
+  carry_ = {};
+  // what was pushed against is let go: the hand starts from where it is, not from where it wanted to be
+  reach_.start(sense.X_WH);
+  enter(Phase::kTravel);
+}
+
+// ---- one millisecond
+
+void AssemblySkill::step(const HandSense& sense, const DelayedSight& sight, double dt) noexcept {
+  phase_time_ += dt;
+  const double against = -sense.F_Ho_W.force.dot(axis_W_);
+  felt_ += dt / (0.03 + dt) * (against - felt_);
+  carry_.translation = faded(carry_.translation, dt, 0.3);
+  carry_.rotation = faded(carry_.rotation, dt, 0.3);
+  switch (phase_) {
+    case Phase::kRest:
+      setIntent(reach_.pose(), dt);
+      break;
+    case Phase::kTravel:
+      travel(sense, dt);
+      break;
+    case Phase::kTouch:
+      touching(sense, dt);
+      break;
+    case Phase::kAlign:
+      align(sense, sight, dt);
+      break;
+    case Phase::kInsert:
+      insert(sense, sight, dt);
+      break;
+    case Phase::kSearch:
+      search(sense, sight, dt);
+      break;
+    case Phase::kBackOff:
+      backOff(sense, sight, dt);
+      break;
+    case Phase::kSeated:
+      seated(sense, sight, dt);
+      break;
+  }
+}
+
+void AssemblySkill::travel(const HandSense& sense, double dt) noexcept {
+  const bool last = next_ + 1 >= way_.size();
+  const bool backing = backing_out_ && next_ == 0;
+  const Pose X_WG(way_[next_], backing ? q_WDepart_ : q_WTravel_);
+  reach_.step(X_WG, person_.max_speed, person_.max_turn_speed, dt);
+  reach_.stayWithin(sense.p_WC, sense.reach);
+  setIntent(reach_.pose(), dt);
+
+  // something in the way: up and over it
+  bump_time_ = sense.F_Ho_W.force.norm() > kBump ? bump_time_ + dt : 0.0;
+  if (bump_time_ > 0.4 && !backing) {
+    const Vector3 goal = way_[way_.size() - 1];
+    const Vector3 above = sense.X_WH.translation() + Vector3(0.0, 0.0, 0.15);
+    way_.clear();
+    way_.push_back(above);
+    for (const Vector3& point : clear_way_->plan(above, goal, margin_)) way_.push_back(point);
+    next_ = 0;
+    backing_out_ = false;
+    reach_.start(sense.X_WH);
+    bump_time_ = 0.0;
+    return;
+  }
+  const Displacement left = displacement(reach_.pose(), X_WG);
+  const bool there = left.translation.norm() < (last ? kThere : kPassBy) && (!last || left.rotation.norm() < kFacing);
+  if (!there) return;
+  if (!last) {
+    ++next_;
+    return;
+  }
+  felt_ = 0.0;
+  switch (goal_) {
+    case Goal::kHome:
+      enter(Phase::kRest);
+      break;
+    case Goal::kTouch:
+      axis_W_ = (p_WTouch_ - reach_.pose().translation()).normalized();
+      depth_ = 0.0;
+      enter(Phase::kTouch);
+      break;
+    case Goal::kMount:
+      enter(Phase::kAlign);
+      break;
+  }
+}
+
+void AssemblySkill::touching(const HandSense& sense, double dt) noexcept {
+  pushAlong(kTouchForce, kTouchSpeed, dt);
+  Pose X_WI = reach_.pose();
+  X_WI.translation() += axis_W_ * depth_;
+  setIntent(X_WI, dt);
+  // through where it should be and nothing felt: it is open there; feel around in it
+  const double way_to_it = (p_WTouch_ - reach_.pose().translation()).dot(axis_W_);
+  if (felt_ > 0.3 || depth_ < way_to_it + 0.03) return;
+  static constexpr double kProbes[][3] = {{0.0, 0.0, -0.04}, {0.06, 0.0, 0.0},  {-0.06, 0.0, 0.0}, {0.0, 0.0, 0.04},
+                                          {0.0, 0.06, 0.0},  {0.0, -0.06, 0.0}, {0.0, 0.0, -0.1}};
+  const auto& probe = kProbes[probe_++ % std::size(kProbes)];
+  reach_.start(sense.X_WH);
+  axis_W_ = (p_WTouch_ + Vector3(probe[0], probe[1], probe[2]) - sense.X_WH.translation()).normalized();
+  depth_ = 0.0;
+  felt_ = 0.0;
+}
+
+void AssemblySkill::align(const HandSense& sense, const DelayedSight& sight, double dt) noexcept {
+  Pose X_WBefore = X_WAim_;
+  X_WBefore.translation() -= axis_W_ * task_.approach_distance;
+  reach_.step(X_WBefore * sense.X_HO.inverse(), person_.max_speed, person_.max_turn_speed, dt);
+  reach_.stayWithin(sense.p_WC, sense.reach);
+  setIntent(displaced(reach_.pose(), nudge_), dt);
+  if (!sight.knows(task_.object)) return;
+
+  // look, and lean towards where it should be: slower than a reaction takes
+  const Displacement off = displacement(sight.pose(task_.object), X_WBefore);
+  nudge_.translation += 1.2 * dt * off.translation;
+  nudge_.rotation += 1.2 * dt * off.rotation;
+  if (nudge_.translation.norm() > 0.05) nudge_.translation *= 0.05 / nudge_.translation.norm();
+  if (nudge_.rotation.norm() > 0.2) nudge_.rotation *= 0.2 / nudge_.rotation.norm();
+  const bool there = off.translation.norm() < std::min(0.001, 0.4 * task_.tolerance) && off.rotation.norm() < 0.008;
+  stall_time_ = there ? stall_time_ + dt : 0.0;
+  if (stall_time_ < 0.2 && phase_time_ < 6.0) return;
+  if (task_.approach_distance <= 0.0) {
+    // nothing to push into: stay there, looking
+    return;
+  }
+  depth_ = -task_.approach_distance;
+  stall_depth_ = depthSeen(sight);
+  ++attempts_;
+  enter(Phase::kInsert);
+}
+
+void AssemblySkill::insert(const HandSense& sense, const DelayedSight& sight, double dt) noexcept {
+  pushAlong(kPushForce, kInsertSpeed, dt);
+  const double seen = depthSeen(sight);
+  // what does not resist is not pushed beyond where it belongs
+  if (felt_ < 0.5) depth_ = std::min(depth_, 0.0);
+  depth_ = std::min(depth_, std::min(seen, 0.0) + kLongestPush);
+  if (task_.sure_of_it) {
+    // led by another's hand she goes along
+    const Vector3 sideways = sense.F_Ho_W.force + felt_ * axis_W_;
+    const Vector3 lateral = sideways - sideways.dot(axis_W_) * axis_W_;
+    if (lateral.norm() > 1.0) yieldTo(sight, 0.5, dt);
+  }
+  holdObject(sense, Vector3::Zero(), Quaternion::Identity(), dt);
+  if (!task_.by_touch) {
+    if (depth_ >= -1e-4) enter(Phase::kSeated);
+    return;
+  }
+  const bool home = -seen < std::max(0.003, 1.5 * task_.tolerance);
+  if (home && (stalled(sight, 0.0005) || depth_ >= 0.0)) {
+    enter(Phase::kSeated);
+    return;
+  }
+  if (felt_ < 0.6 * kPushForce || task_.sure_of_it || !stalled(sight, 0.001)) return;
+  search_depth_ = seen;
+  spiral_radius_ = 0.0;
+  spiral_ = Vector3::UnitX();
+  tilt_ = Vector3::UnitX();
+  enter(Phase::kSearch);
+}
+
+void AssemblySkill::search(const HandSense& sense, const DelayedSight& sight, double dt) noexcept {
+  pushAlong(kSearchForce, 0.03, dt);
+  depth_ = std::min(depth_, std::min(depthSeen(sight), 0.0) + kLongestPush);
+  const double pace = kSpiralSpeed / std::max(0.002, spiral_radius_);
+  turn(spiral_, pace * dt);
+  spiral_radius_ += kSpiralPitch * pace * dt / (2.0 * M_PI);
+  turn(tilt_, kTiltPace * dt);
+  Vector3 u, v;
+  besides(axis_W_, u, v);
+  const Vector3 beside = spiral_radius_ * (spiral_.x() * u + spiral_.y() * v);
+  const Quaternion tilt = expRotation(kTilt * (tilt_.x() * u + tilt_.y() * axis_W_));
+  holdObject(sense, beside, tilt, dt);
+
+  const double seen = depthSeen(sight);
+  if (seen > search_depth_ + 0.0025) {
+    // it gave way: go on from here, as it lies in the hand now
+    yieldTo(sight, 1.0 / dt, dt);
+    carry_ = displacement(X_WAim_ * sense.X_HO.inverse(), X_WI_);
+    carry_.translation -= nudge_.translation;
+    carry_.translation -= axis_W_ * carry_.translation.dot(axis_W_);
+    enter(Phase::kInsert);
+    stall_depth_ = seen;
+  } else if (spiral_radius_ > kSpiralWidest) {
+    bias_scale_ *= 0.6;
+    enter(Phase::kBackOff);
+  }
+}
+
+void AssemblySkill::backOff(const HandSense& sense, const DelayedSight& sight, double dt) noexcept {
+  const double out = search_depth_ - kBackOffWay;
+  depth_ = std::max(out, depth_ - kInsertSpeed * dt);
+  holdObject(sense, Vector3::Zero(), Quaternion::Identity(), dt);
+  if (depth_ > out || phase_time_ < 1.0) return;
+  aim();
+  stall_depth_ = depthSeen(sight);
+  ++attempts_;
+  enter(Phase::kInsert);
+}
+
+void AssemblySkill::seated(const HandSense& sense, const DelayedSight& sight, double dt) noexcept {
+  back_out_W_ = -axis_W_ * std::max(0.15, task_.approach_distance);
+  if (task_.by_touch) {
+    pushAlong(kSeatForce, 0.03, dt);
+    if (felt_ < 0.5) depth_ = std::min(depth_, 0.0);
+    depth_ = std::min(depth_, kLongestPush);
+    // held by its seat it needs no guiding: go limp sideways
+    if (felt_ > 1.0) yieldTo(sight, 1.5, dt);
+    holdObject(sense, Vector3::Zero(), Quaternion::Identity(), dt);
+    if (felt_ > 1.0 && phase_time_ > 5.0) {
+      search_depth_ = depthSeen(sight);
+      bias_scale_ *= 0.6;
+      enter(Phase::kBackOff);
+    }
+    return;
+  }
+  // by sight: keep correcting
+  const Displacement off = displacement(sight.pose(task_.object), X_WAim_);
+  nudge_.translation += 1.0 * dt * off.translation;
+  nudge_.rotation += 1.0 * dt * off.rotation;
+  holdObject(sense, Vector3::Zero(), Quaternion::Identity(), dt);
+}
+
+// ---- small abilities
+
+void AssemblySkill::yieldTo(const DelayedSight& sight, double rate, double dt) noexcept {
+  if (!sight.knows(task_.object)) return;
+  const Displacement off = displacement(X_WAim_, sight.pose(task_.object));
+  const double share = std::min(1.0, rate * dt);
+  const Vector3 lateral = off.translation - off.translation.dot(axis_W_) * axis_W_;
+  X_WAim_ = displaced(X_WAim_, {share * lateral, share * off.rotation});
+}
+
+void AssemblySkill::pushAlong(double wanted_force, double highest_speed, double dt) noexcept {
+  const double speed = std::clamp(kPushGain * (wanted_force - felt_), -highest_speed, highest_speed);
+  depth_ += speed * dt;
+}
+
+void AssemblySkill::holdObject(const HandSense& sense, const Vector3& beside_W, const Quaternion& tilt,
+                               double dt) noexcept {
+  const Pose X_WO(X_WAim_.translation() + axis_W_ * depth_ + beside_W, tilt * X_WAim_.rotation());
+  const Pose X_WH = displaced(displaced(X_WO * sense.X_HO.inverse(), nudge_), carry_);
+  reach_.start(X_WH);
+  reach_.stayWithin(sense.p_WC, sense.reach);
+  setIntent(reach_.pose(), dt);
+}
+
+void AssemblySkill::setIntent(const Pose& X_WI, double dt) noexcept {
+  const Displacement moved = displacement(X_WI_, X_WI);
+  intent_velocity_ = {moved.translation / dt, moved.rotation / dt};
+  // a decision is no motion: where the intent is put anew the arm does not hurry after it
+  if (intent_velocity_.linear.norm() > 2.0 * person_.max_speed) intent_velocity_.linear.setZero();
+  if (intent_velocity_.angular.norm() > 2.0 * person_.max_turn_speed) intent_velocity_.angular.setZero();
+  X_WI_ = X_WI;
+}
+
+double AssemblySkill::depthSeen(const DelayedSight& sight) const noexcept {
+  if (!sight.knows(task_.object)) return depth_;
+  return (sight.pose(task_.object).translation() - X_WAim_.translation()).dot(axis_W_);
+}
+
+bool AssemblySkill::stalled(const DelayedSight& sight, double way) noexcept {
+  constexpr double kLookAgain = 0.4;  // [s]
+  stall_time_ += 1e-3;
+  if (stall_time_ < kLookAgain) return false;
+  const double seen = depthSeen(sight);
+  const bool still = seen - stall_depth_ < way;
+  stall_depth_ = seen;
+  stall_time_ = 0.0;
+  return still;
+}
+
+}  // namespace tenon
