@@ -39,7 +39,9 @@ class CollPair {
 
   /// The lowest gap that is possible at `now` [m].
   [[nodiscard]] double clearance(Tick now) const noexcept;
-  [[nodiscard]] bool touching() const noexcept { return looked_ && !result_.query.contacts.empty() && result_.query.smallest_gap <= kTouchGap; }
+  [[nodiscard]] bool touching() const noexcept {
+    return looked_ && !result_.query.contacts.empty() && result_.query.smallest_gap <= kTouchGap;
+  }
 
   /// A look by itself, for pairs that no solver moves; lists contacts up to `margin`.
   void query(const Pose& X_WA, const Pose& X_WB, double margin) noexcept;

@@ -13,6 +13,13 @@
 
 namespace tenon {
 
+/// How large an object is: its skin lies in a ball about p_OC_O, and within `radius` of its origin [m].
+struct ObjectSize {
+  Vector3 p_OC_O = Vector3::Zero();
+  double ball = 0.0;
+  double radius = 0.0;
+};
+
 /// What the tick works with, sized at start: the pairs' own states and force buffers (which matter for the
 /// next tick) and work space (which does not).
 ///
@@ -31,7 +38,7 @@ struct Environment::Engine {
   // what never changes
   std::vector<std::size_t> pair_cells;            ///< by object: how many of its cells are pairs
   std::vector<std::size_t> cell_in_a, cell_in_b;  ///< by pair: its cell in the buffers of its two objects
-  std::vector<double> radius;                     ///< by object: of its farthest point from its origin [m]
+  std::vector<ObjectSize> sizes;                  ///< by object
   SolveLimits limits;                             ///< sub-steps cut so that a tick keeps the travel cap
   double reach = 0.0;                             ///< [m] the largest margin any query of a tick may use
 

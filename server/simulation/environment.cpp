@@ -32,12 +32,27 @@ std::size_t coupledHands(const Scene& scene) {
                     [](const HandSpec& hand) { return hand.kind == HandKind::kCoupled; }));
 }
 
-/// A lower bound of the distance of two objects' surfaces [m], from the balls around their shells.
-double ballGap(const ObjectSpec& a, const Pose& X_WA, const ObjectSpec& b, const Pose& X_WB) {
-  const Pointshell& shell_a = a.structures->shell;
-  const Pointshell& shell_b = b.structures->shell;
-  const Vector3 between = X_WA * shell_a.ballCentre() - X_WB * shell_b.ballCentre();
-  return between.norm() - shell_a.ballRadius() - shell_b.ballRadius() - kBallSlack;
+ObjectSize sizeOf(const ObjectSpec& spec) {
+  ObjectSize size;
+  size.radius = kLeastRadius;
+  if (!spec.structures) return size;
+  const Pointshell& shell = spec.structures->shell;
+  if (!shell.empty()) {
+    size.p_OC_O = shell.ballCentre();
+    size.ball = shell.ballRadius();
+    size.radius = std::max(size.radius, shell.radius());
+  } else if (!spec.structures->field.empty()) {
+    const Eigen::AlignedBox3d box = spec.structures->field.box();
+    size.p_OC_O = box.center();
+    size.ball = 0.5 * box.diagonal().norm();
+    size.radius = std::max(size.radius, size.p_OC_O.norm() + size.ball);
+  }
+  return size;
+}
+
+/// A lower bound of the distance of two objects' surfaces [m].
+double ballGap(const ObjectSize& a, const Pose& X_WA, const ObjectSize& b, const Pose& X_WB) {
+  return (X_WA * a.p_OC_O - X_WB * b.p_OC_O).norm() - a.ball - b.ball - kBallSlack;
 }
 
 }  // namespace
@@ -60,8 +75,7 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
   }
   for (std::size_t object = 0; object < scene.objects.size(); ++object) {
     forces.emplace_back(pair_cells[object] + scene.hands.size(), options.send_policy);
-    const auto& structures = scene.objects[object].structures;
-    radius.push_back(std::max(structures ? structures->shell.radius() : 0.0, kLeastRadius));
+    sizes.push_back(sizeOf(scene.objects[object]));
   }
 }
 
@@ -143,7 +157,7 @@ double Environment::speedCap(ObjectId object) const noexcept {
 
 double Environment::speedOf(ObjectId object) const noexcept {
   const Twist& V_WO = objects_[object.value].V_WO;
-  return fastestPoint(V_WO.linear, V_WO.angular, engine_->radius[object.value]);
+  return fastestPoint(V_WO.linear, V_WO.angular, engine_->sizes[object.value].radius);
 }
 
 Spring Environment::springOf(HandId hand) const noexcept {
@@ -156,7 +170,7 @@ Spring Environment::springOf(HandId hand) const noexcept {
 MovableBody Environment::movableBody(ObjectId object) const noexcept {
   MovableBody body;
   body.X_WB = objects_[object.value].X_WO;
-  body.radius = engine_->radius[object.value];
+  body.radius = engine_->sizes[object.value].radius;
   for (std::size_t i = 0; i < hands_.size(); ++i) {
     const HandId hand{static_cast<std::uint32_t>(i)};
     if (engaged(hands_[i]) && hands_[i].object == object) body.springs.push_back(springOf(hand));
@@ -201,8 +215,8 @@ void Environment::planIslands() noexcept {
       continue;
     }
     // from the poses alone, so that skipping a look can never change who is solved with whom
-    const double gap = ballGap(scene_->objects[spec.a.value], objects_[spec.a.value].X_WO,
-                               scene_->objects[spec.b.value], objects_[spec.b.value].X_WO);
+    const double gap = ballGap(engine.sizes[spec.a.value], objects_[spec.a.value].X_WO,
+                               engine.sizes[spec.b.value], objects_[spec.b.value].X_WO);
     if (gap - spec.dilation <= near) engine.partition.join(spec.a, spec.b);
   }
   engine.partition.number();
@@ -339,12 +353,15 @@ void Environment::countWork() noexcept {
     work_.active_pairs += active(i) ? 1U : 0U;
     if (!queried) continue;
     ++work_.queried_pairs;
-    work_.points_visited += pair.result()->query.counts.points_visited;
     work_.load_percent = std::max(work_.load_percent, pair.result()->query.counts.loadPercent());
+  }
+  for (std::size_t i = 0; i < engine_->other_count; ++i) {
+    work_.points_visited += engine_->pairs[engine_->others[i]].result()->query.counts.points_visited;
   }
   for (const IslandWork::Island& island : engine_->islands.islands()) {
     work_.substeps += island.report.substeps;
     work_.iterations += island.report.iterations;
+    work_.points_visited += island.report.points_visited;
     work_.conflicting |= island.report.conflicting;
   }
 }

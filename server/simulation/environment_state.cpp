@@ -96,6 +96,7 @@ Result<void> Environment::restore(std::span<const std::uint8_t> bytes) {
   engine_->forces = copy.engine_->forces;
   tick_ = copy.tick_;
   std::fill(engine_->looked_at.begin(), engine_->looked_at.end(), std::uint8_t{0});
+  engine_->other_count = 0;
   engine_->islands.clear();
   findMovable();
   countWork();

@@ -1,0 +1,125 @@
+#include "server/simulation/islands.h"
+
+#include <array>
+
+#include <gtest/gtest.h>
+
+#include "server/simulation/coll_pair.h"
+#include "tests/server/simulation/small_scene.h"
+
+namespace tenon {
+namespace {
+
+//   0 -- 1 -- (2 stands still) -- 3        4 -- 5
+TEST(IslandPartition, ABodyThatStandsStillJoinsNobody) {
+  IslandPartition partition(6);
+  const std::array<std::uint8_t, 6> movable{1, 1, 0, 1, 1, 1};
+  partition.begin(movable);
+  const auto join = [&](std::uint32_t a, std::uint32_t b) { partition.join(ObjectId{a}, ObjectId{b}); };
+  join(0, 1);
+  join(1, 2);
+  join(2, 3);
+  join(4, 5);
+  partition.number();
+  EXPECT_EQ(partition.count(), 3U);
+  EXPECT_EQ(partition.islandOf(ObjectId{0}), 0);
+  EXPECT_EQ(partition.islandOf(ObjectId{1}), 0);
+  EXPECT_EQ(partition.islandOf(ObjectId{2}), IslandPartition::kNone);
+  EXPECT_EQ(partition.islandOf(ObjectId{3}), 1);
+  EXPECT_EQ(partition.islandOf(ObjectId{4}), 2);
+  EXPECT_EQ(partition.islandOf(ObjectId{5}), 2);
+  EXPECT_EQ(partition.placeOf(ObjectId{5}), 1);
+}
+
+TEST(IslandPartition, NumbersIslandsAndBodiesAlikeForEveryOrderOfJoins) {
+  constexpr std::array<std::array<std::uint32_t, 2>, 4> joins{{{0, 4}, {4, 2}, {1, 3}, {3, 5}}};
+  const std::array<std::uint8_t, 6> movable{1, 1, 1, 1, 1, 1};
+  for (std::size_t first = 0; first < joins.size(); ++first) {
+    IslandPartition partition(6);
+    partition.begin(movable);
+    for (std::size_t i = 0; i < joins.size(); ++i) {
+      const auto& join = joins[(first + i) % joins.size()];
+      partition.join(ObjectId{join[i % 2]}, ObjectId{join[1 - i % 2]});
+    }
+    partition.number();
+    ASSERT_EQ(partition.count(), 2U);
+    for (std::uint32_t object = 0; object < 6; ++object) {
+      EXPECT_EQ(partition.islandOf(ObjectId{object}), static_cast<std::int32_t>(object % 2));
+      EXPECT_EQ(partition.placeOf(ObjectId{object}), static_cast<std::int32_t>(object / 2));
+    }
+  }
+}
+
+class CollPairTest : public testing::Test {
+ protected:
+  CollPairTest() {
+    const ObjectId pointer = scene_.object("pointer", test::pointerShape(), {0.0, 0.0, 0.1});
+    const ObjectId floor = scene_.object("floor", test::floorShape(), Vector3::Zero());
+    scene_.pair(pointer, floor);
+  }
+  test::SmallScene scene_;
+};
+
+// The gap is 88 mm; 8 mm of it have to stay: 80 mm at 1 m/s are 80 ticks.
+TEST_F(CollPairTest, IsNotDueWhileNothingCanHaveComeNear) {
+  const auto scene = scene_.build();
+  CollPair pair(*scene, 0);
+  EXPECT_TRUE(pair.due(1));
+  pair.query(Pose(Vector3(0.0, 0.0, 0.1)), Pose(), 0.001);
+  const double gap = pair.result()->query.smallest_gap;
+  ASSERT_GT(gap, 0.05);
+  ASSERT_LT(gap, 0.0885);
+  pair.schedule(10, 1.0, 0.008);
+  const auto ticks = static_cast<Tick>((gap - 0.008) / 1e-3);
+  EXPECT_FALSE(pair.due(10 + ticks));
+  EXPECT_TRUE(pair.due(10 + ticks + 1));
+  EXPECT_GE(pair.clearance(10 + ticks), 0.008);
+}
+
+TEST_F(CollPairTest, IsNeverDueBetweenTwoThatStandStill) {
+  const auto scene = scene_.build();
+  CollPair pair(*scene, 0);
+  pair.query(Pose(), Pose(), 0.001);
+  pair.schedule(10, 0.0, 0.008);
+  EXPECT_FALSE(pair.due(1000000000));
+}
+
+TEST_F(CollPairTest, AJumpOrASwitchMakesItDueAtOnceAndForgetsWhatWasFound) {
+  const auto scene = scene_.build();
+  CollPair pair(*scene, 0);
+  const auto look = [&] {
+    pair.query(Pose(Vector3(0.0, 0.0, 0.01)), Pose(), 0.001);
+    pair.schedule(10, 0.0, 0.008);
+    ASSERT_TRUE(pair.touching());
+  };
+  look();
+  pair.forget();
+  EXPECT_TRUE(pair.due(1));
+  EXPECT_FALSE(pair.touching());
+  EXPECT_EQ(pair.result(), nullptr);
+  look();
+  pair.setEnabled(false);
+  pair.setEnabled(true);
+  EXPECT_TRUE(pair.due(1));
+  EXPECT_FALSE(pair.touching());
+}
+
+TEST(Scene, FindsObjectsHandsAndPairsInEitherOrder) {
+  test::SmallScene small;
+  const ObjectId a = small.object("a", nullptr, Vector3::Zero());
+  const ObjectId b = small.object("b", nullptr, Vector3::Zero());
+  const ObjectId c = small.object("c", nullptr, Vector3::Zero());
+  const HandId right = small.hand("right", a);
+  small.pair(b, a);
+  const auto scene = small.build();
+  EXPECT_EQ(scene->objectNamed("b"), b);
+  EXPECT_FALSE(scene->objectNamed("d").valid());
+  EXPECT_EQ(scene->handNamed("right"), right);
+  EXPECT_FALSE(scene->handNamed("left").valid());
+  EXPECT_EQ(scene->pairOf(a, b), 0);
+  EXPECT_EQ(scene->pairOf(b, a), 0);
+  EXPECT_EQ(scene->pairOf(a, c), -1);
+}
+
+}  // namespace
+}  // namespace tenon
