@@ -83,8 +83,8 @@ class HapticDevice {
  public:
   virtual ~HapticDevice() = default;
   [[nodiscard]] virtual const DeviceCaps& caps() const = 0;
-  [[nodiscard]] virtual Result<void> arm() = 0;         ///< forces on
-  virtual void disarm() noexcept = 0;                   ///< forces off; always possible
+  [[nodiscard]] virtual Result<void> arm() = 0;  ///< forces on
+  virtual void disarm() noexcept = 0;  ///< forces off; always possible; a brake stays on until armed
   [[nodiscard]] virtual Result<void> resetFault() = 0;  ///< by the operator, after looking
   virtual void read(DeviceState& state) noexcept = 0;
   virtual void write(const DeviceCommand& command) noexcept = 0;

@@ -17,8 +17,8 @@ SimulatedModel hugArmModel() {
   caps.command_limit = 50.0;                // [paper] as the normal ceiling
   caps.thermal_time = 20.0;                 // [assumed]
   caps.torque = 10.0;                       // [assumed]; the wrist joints could do 38 Nm [published]
-  caps.force_slew = 1000.0;                 // [assumed] full force in 50 ms
-  caps.torque_slew = 100.0;                 // [assumed] likewise
+  caps.force_slew = 2000.0;                 // [assumed] full force in 25 ms
+  caps.torque_slew = 200.0;                 // [assumed]
   caps.max_stiffness = 5000.0;              // [published] end of the robot's stiffness range
   caps.max_rotational_stiffness = 100.0;    // [assumed]
   caps.physical_damping = 10.0;             // [assumed] the controller's, 10..20 Ns/m

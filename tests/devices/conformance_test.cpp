@@ -1,0 +1,217 @@
+#include <functional>
+#include <limits>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "devices/catalog.h"
+#include "devices/simulated/simulated_device.h"
+#include "tests/support/realtime_guard.h"
+
+// What every device of the catalog owes: a new one runs through all of this without a line written here.
+
+namespace tenon {
+namespace {
+
+struct Subject {
+  std::string name;
+  std::function<HapticDevice*()> open;
+};
+
+void PrintTo(const Subject& subject, std::ostream* out) { *out << subject.name; }
+
+/// The device or pair behind a subject lives as long as the test process.
+template <typename T>
+T* kept(Result<std::unique_ptr<T>> opened) {
+  static std::vector<std::unique_ptr<T>> keeper;
+  if (!opened) return nullptr;
+  keeper.push_back(std::move(*opened));
+  return keeper.back().get();
+}
+
+std::vector<Subject> everyDevice() {
+  std::vector<Subject> subjects;
+  for (const std::string_view view : deviceNames()) {
+    const std::string name(view);
+    subjects.push_back({name, [name] { return kept(openDevice(name)); }});
+  }
+  for (const std::string_view view : pairNames()) {
+    const std::string name(view);
+    subjects.push_back({name + "-right", [name] { return &kept(openPair(name))->right(); }});
+    subjects.push_back({name + "-left", [name] { return &kept(openPair(name))->left(); }});
+  }
+  return subjects;
+}
+
+class Conformance : public testing::TestWithParam<Subject> {
+ protected:
+  void SetUp() override {
+    device_ = GetParam().open();
+    ASSERT_NE(device_, nullptr);
+  }
+  DeviceState read() {
+    DeviceState state;
+    device_->read(state);
+    return state;
+  }
+  /// One servo cycle.
+  DeviceState cycle(const DeviceCommand& command) {
+    const DeviceState state = read();
+    device_->write(command);
+    return state;
+  }
+  static DeviceCommand push(double x) {
+    DeviceCommand command;
+    command.F_Ho_D.force.x() = x;
+    return command;
+  }
+
+  HapticDevice* device_ = nullptr;
+};
+
+/// What can only be seen while a simulated person holds the handle.
+class ConformanceInAHand : public Conformance {};
+
+std::vector<Subject> everyDeviceInAHand() {
+  std::vector<Subject> held;
+  for (const Subject& subject : everyDevice())
+    if (HapticDevice* const device = subject.open(); device && handOf(*device)) held.push_back(subject);
+  return held;
+}
+
+TEST_P(Conformance, SaysWhatItIs) {
+  const DeviceCaps& caps = device_->caps();
+  EXPECT_FALSE(caps.model.empty());
+  EXPECT_GT(caps.rate, 0.0);
+  if (caps.dof_mask == 0) {
+    EXPECT_GT(caps.tactors, 0U) << "it neither pushes nor shakes";
+    return;
+  }
+  EXPECT_GT(caps.workspace_radius, caps.indexing_radius);
+  EXPECT_GT(caps.indexing_radius, 0.0);
+  EXPECT_GT(caps.indexing_gain, 0.0);
+  EXPECT_GT(caps.peak_force, 0.0);
+  EXPECT_LE(caps.continuous_force, caps.peak_force);
+  EXPECT_LE(caps.command_limit, caps.peak_force);
+  EXPECT_GT(caps.max_stiffness, 0.0);
+  EXPECT_GT(caps.physical_damping, 0.0);
+  EXPECT_GT(caps.max_speed, 0.0);
+}
+
+TEST_P(Conformance, ArmsAndDisarmsAsOftenAsAsked) {
+  EXPECT_FALSE(read().forces_on);
+  for (int round = 0; round < 3; ++round) {
+    EXPECT_TRUE(device_->arm());
+    EXPECT_TRUE(device_->arm()) << "twice is once";
+    EXPECT_TRUE(read().forces_on);
+    device_->disarm();
+    device_->disarm();
+    EXPECT_FALSE(read().forces_on);
+  }
+}
+
+TEST_P(Conformance, CountsItsReadings) {
+  std::uint64_t last = read().seq;
+  for (int tick = 0; tick < 100; ++tick) {
+    const std::uint64_t now = read().seq;
+    EXPECT_GT(now, last);
+    last = now;
+  }
+}
+
+TEST_P(Conformance, StaysWhereItIsWithoutAForce) {
+  ASSERT_TRUE(device_->arm());
+  const Pose start = read().X_DH;
+  for (int tick = 0; tick < 1000; ++tick) {
+    const DeviceState state = cycle({});
+    EXPECT_LT((state.X_DH.translation() - start.translation()).norm(), 1e-4);
+    EXPECT_EQ(state.fault, DeviceFault::kNone);
+  }
+}
+
+TEST_P(Conformance, NeverMovesTheHandWhenDisarmed) {
+  const Pose start = read().X_DH;
+  for (int tick = 0; tick < 500; ++tick) cycle(push(5.0));
+  EXPECT_LT((read().X_DH.translation() - start.translation()).norm(), 1e-4);
+}
+
+TEST_P(ConformanceInAHand, PushesAlongTheForceAndNoHarderThanItSays) {
+  auto* const simulated = dynamic_cast<SimulatedDevice*>(device_);
+  ASSERT_NE(simulated, nullptr);
+  ASSERT_TRUE(device_->arm());
+  simulated->hand().stiffen(1.0);
+  const Pose start = read().X_DH;
+  for (int tick = 0; tick < 100; ++tick) cycle(push(2.0));
+  EXPECT_GT(read().X_DH.translation().x(), start.translation().x() + 1e-4);
+  for (int tick = 0; tick < 10; ++tick) {
+    cycle(push(1e4));
+    EXPECT_LE(simulated->motorWrench().force.norm(), device_->caps().peak_force + 1e-9);
+  }
+}
+
+TEST_P(ConformanceInAHand, BrakesWhenTold) {
+  HumanArm* const hand = handOf(*device_);
+  ASSERT_NE(hand, nullptr);
+  ASSERT_TRUE(device_->arm());
+  const double reach = 0.3 * device_->caps().workspace_radius;
+  hand->intend(Pose(Vector3(reach, 0.0, 0.0)));
+  DeviceCommand brake;
+  brake.brake = true;
+  for (int tick = 0; tick < 100; ++tick) cycle(brake);
+  const double braked = read().X_DH.translation().x();
+  for (int tick = 0; tick < 100; ++tick) cycle({});
+  EXPECT_GT(read().X_DH.translation().x() - braked, 3.0 * braked);
+}
+
+TEST_P(Conformance, TakesItsForcesOffWhenTheServoStopsWriting) {
+  ASSERT_TRUE(device_->arm());
+  for (int tick = 0; tick < 10; ++tick) cycle(push(1.0));
+  DeviceState state;
+  for (int tick = 0; tick < 150; ++tick) state = read();
+  EXPECT_FALSE(state.forces_on);
+  EXPECT_EQ(state.fault, DeviceFault::kStale);
+}
+
+TEST_P(Conformance, AFaultStaysUntilAnOperatorResetsIt) {
+  ASSERT_TRUE(device_->arm());
+  for (int tick = 0; tick < 150; ++tick) read();
+  const auto refused = device_->arm();
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().what.find(device_->caps().model), std::string::npos) << refused.error().what;
+  EXPECT_TRUE(device_->resetFault());
+  EXPECT_EQ(read().fault, DeviceFault::kNone);
+  EXPECT_FALSE(read().forces_on) << "a reset arms nothing";
+  EXPECT_TRUE(device_->arm());
+  EXPECT_TRUE(read().forces_on);
+}
+
+TEST_P(Conformance, NeverShowsAForceThatIsNoNumber) {
+  ASSERT_TRUE(device_->arm());
+  cycle(push(std::numeric_limits<double>::quiet_NaN()));
+  for (int tick = 0; tick < 20; ++tick) EXPECT_TRUE(cycle({}).X_DH.isFinite());
+}
+
+TEST_P(Conformance, ReadsAndWritesWithoutAllocatingOrLocking) {
+  ASSERT_TRUE(device_->arm());
+  cycle(push(1.0));
+  const test::RealtimeGuard guard;
+  for (int tick = 0; tick < 1000; ++tick) cycle(push(1.0));
+  EXPECT_EQ(guard.allocations(), 0);
+  EXPECT_EQ(guard.locks(), 0);
+}
+
+std::string nameOf(const testing::TestParamInfo<Subject>& subject) {
+  std::string name = subject.param.name;
+  for (char& c : name)
+    if (c == '-') c = '_';
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Catalog, Conformance, testing::ValuesIn(everyDevice()), nameOf);
+INSTANTIATE_TEST_SUITE_P(Catalog, ConformanceInAHand, testing::ValuesIn(everyDeviceInAHand()), nameOf);
+
+}  // namespace
+}  // namespace tenon

@@ -1,0 +1,87 @@
+#include "devices/simulated/hug.h"
+
+#include <gtest/gtest.h>
+
+namespace tenon {
+namespace {
+
+struct Both {
+  DeviceState right, left;
+};
+
+Both cycle(Hug& hug, double right_force) {
+  Both state;
+  hug.right().read(state.right);
+  hug.left().read(state.left);
+  DeviceCommand command;
+  hug.left().write(command);
+  command.F_Ho_D.force.x() = right_force;
+  hug.right().write(command);
+  return state;
+}
+
+class HugClutch : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(hug_.open());
+    ASSERT_TRUE(hug_.right().arm());
+    ASSERT_TRUE(hug_.left().arm());
+    // a person who resists with all strength
+    hug_.right().hand().stiffen(1.0);
+    hug_.left().hand().intend(Pose(Vector3(0.0, 0.1, 0.0)));
+  }
+  /// Pushes at the right hand until the clutch opens; how hard the hand had felt it.
+  double pushUntilItOpens() {
+    double felt = 0.0;
+    for (int tick = 0; tick < 2000 && !hug_.clutchOpen(); ++tick) {
+      felt = hug_.right().hand().felt().force.norm();
+      cycle(hug_, std::min(0.1 * tick, 120.0));
+    }
+    return felt;
+  }
+  Hug hug_{3};
+};
+
+TEST_F(HugClutch, HoldsAtAnythingUnderEightyNewton) {
+  for (int tick = 0; tick < 3000; ++tick) cycle(hug_, std::min(0.1 * tick, 75.0));
+  EXPECT_FALSE(hug_.clutchOpen());
+  EXPECT_NEAR(hug_.right().hand().felt().force.norm(), 75.0, 1.0);
+}
+
+TEST_F(HugClutch, OpensAboveEightyNewtonAndStopsBothArms) {
+  EXPECT_NEAR(pushUntilItOpens(), 80.0, 1.0);
+  ASSERT_TRUE(hug_.clutchOpen());
+  const Both stopped = cycle(hug_, 0.0);
+  EXPECT_EQ(stopped.right.fault, DeviceFault::kClutchOpen);
+  EXPECT_EQ(stopped.left.fault, DeviceFault::kClutchOpen);
+  EXPECT_FALSE(stopped.right.forces_on);
+  EXPECT_FALSE(stopped.left.forces_on);
+  EXPECT_FALSE(hug_.left().arm()) << "the innocent arm, too, waits for the operator";
+
+  // the robots stand, the hands are free
+  for (int tick = 0; tick < 1000; ++tick) cycle(hug_, 100.0);
+  const Both later = cycle(hug_, 100.0);
+  EXPECT_EQ(later.right.X_DH.translation(), stopped.right.X_DH.translation());
+  EXPECT_EQ(later.left.X_DH.translation(), stopped.left.X_DH.translation());
+  EXPECT_EQ(hug_.right().hand().felt().force, Vector3(Vector3::Zero()));
+  EXPECT_LT(hug_.right().hand().pose().translation().norm(), 1e-3) << "back where the person wanted it";
+}
+
+TEST_F(HugClutch, ClosesAgainOnlyWhenTheOperatorResets) {
+  pushUntilItOpens();
+  cycle(hug_, 0.0);
+  ASSERT_TRUE(hug_.right().resetFault());
+  ASSERT_TRUE(hug_.left().resetFault());
+  EXPECT_FALSE(hug_.clutchOpen());
+  EXPECT_TRUE(hug_.right().arm());
+  EXPECT_TRUE(hug_.left().arm());
+  Both state;
+  for (int tick = 0; tick < 2000; ++tick) state = cycle(hug_, 1.0);
+  EXPECT_EQ(state.right.fault, DeviceFault::kNone);
+  EXPECT_TRUE(state.right.forces_on);
+  EXPECT_TRUE(state.left.forces_on);
+  EXPECT_EQ(hug_.right().hand().pose().translation().x() > 0.0, true) << "hand and handle are one body again";
+}
+
+}  // namespace
+}  // namespace tenon
