@@ -1,0 +1,75 @@
+#include "idl/threads/latest.h"
+
+#include <array>
+#include <atomic>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/realtime_guard.h"
+
+namespace tenon {
+namespace {
+
+TEST(Latest, HasNothingNewUntilTheWriterWrites) {
+  Latest<int> latest(7);
+  EXPECT_FALSE(latest.update());
+  EXPECT_EQ(latest.read(), 7);
+}
+
+TEST(Latest, GivesTheNewestAndForgetsTheRest) {
+  Latest<int> latest;
+  for (int value = 1; value <= 5; ++value) latest.write(value);
+  EXPECT_TRUE(latest.update());
+  EXPECT_EQ(latest.value(), 5);
+  EXPECT_FALSE(latest.update());
+  EXPECT_EQ(latest.value(), 5);
+}
+
+TEST(Latest, KeepsTheReadersValueWhileTheWriterGoesOn) {
+  Latest<int> latest;
+  latest.write(1);
+  const int& seen = latest.read();
+  for (int value = 2; value <= 9; ++value) latest.write(value);
+  EXPECT_EQ(seen, 1);
+  EXPECT_EQ(latest.read(), 9);
+}
+
+TEST(Latest, NeverTearsAValueAndNeverGoesBack) {
+  using Block = std::array<int, 64>;
+  constexpr int kSeen = 20'000;
+  Latest<Block> latest;
+  std::atomic<bool> enough{false};
+  std::thread writer([&] {
+    for (int value = 1; !enough; ++value) {
+      latest.back().fill(value);
+      latest.publish();
+    }
+  });
+  int newest = 0;
+  for (int seen = 0; seen < kSeen;) {
+    if (!latest.update()) continue;
+    const Block& block = latest.value();
+    for (const int value : block) EXPECT_EQ(value, block[0]);
+    EXPECT_GT(block[0], newest);
+    newest = block[0];
+    ++seen;
+  }
+  enough = true;
+  writer.join();
+}
+
+TEST(Latest, AllocatesNothingAndLocksNothing) {
+  Latest<std::array<double, 100>> latest;
+  const test::RealtimeGuard guard;
+  for (int i = 0; i < 1000; ++i) {
+    latest.back()[0] = i;
+    latest.publish();
+    latest.update();
+  }
+  EXPECT_EQ(guard.allocations(), 0);
+  EXPECT_EQ(guard.locks(), 0);
+}
+
+}  // namespace
+}  // namespace tenon
