@@ -80,7 +80,7 @@ TEST(DistanceField, LowerBoundIsNeverAboveTheDistanceNorAboveAnExactSample) {
     for (int i = 0; i < 50'000; ++i) {
       const Vector3 p = somewhere(random, 0.15);
       const double bound = field.lowerBound(p);
-      EXPECT_LE(bound, is_ball ? ballDistance(p) : boxDistance(p)) << p.transpose();
+      EXPECT_LE(bound, (is_ball ? ballDistance(p) : boxDistance(p)) + 1e-12) << p.transpose();
       const FieldSample sample = field.sample(p);
       if (sample.exact) {
         EXPECT_LE(bound, sample.distance) << p.transpose();
