@@ -40,20 +40,15 @@ bool ConditionProgress::isMetNow(const Condition& condition, Node& node, const S
       reading.limit = condition.within;
       return reading.value <= condition.within;
     case ConditionKind::kContact:
-      if (scene.touching(condition.object, condition.other)) {
-        ++node.counted;
-        node.away = 0;
-      } else if (++node.away > condition.lapse) {
-        node.counted = 0;
-      }
-      reading.value = seconds(node.counted);
+      node.contact.step(scene.touching(condition.object, condition.other), condition.lapse);
+      reading.value = seconds(node.contact.touched);
       reading.limit = seconds(condition.limit_ticks);
-      return node.counted >= std::max(condition.limit_ticks, 1U);
+      return node.contact.touched >= std::max(condition.limit_ticks, 1U);
     case ConditionKind::kContactTime:
-      if (scene.touchesAnything(condition.object)) ++node.counted;
-      reading.value = seconds(node.counted);
+      if (scene.touchesAnything(condition.object)) ++node.contact.touched;
+      reading.value = seconds(node.contact.touched);
       reading.limit = seconds(condition.limit_ticks);
-      return node.counted >= condition.limit_ticks;
+      return node.contact.touched >= condition.limit_ticks;
     case ConditionKind::kFulfilled:
     case ConditionKind::kSignal: {
       const bool fulfilled = condition.kind == ConditionKind::kFulfilled;

@@ -69,6 +69,22 @@ struct ConditionReading {
   bool met = false;
 };
 
+/// Counts for how long two things have touched; a hand trembles, so short gaps are forgiven (and not
+/// counted).
+struct ContactTimer {
+  std::uint32_t touched = 0;  ///< [ticks]
+  std::uint32_t away = 0;     ///< [ticks] since the last touch
+
+  void step(bool touching, std::uint32_t lapse) noexcept {
+    if (touching) {
+      ++touched;
+      away = 0;
+    } else if (++away > lapse) {
+      touched = 0;
+    }
+  }
+};
+
 /// Evaluates one condition tree tick by tick; all memory is counters of ticks, so a replay decides the same.
 ///
 /// Threads: one caller. Real-time: all.
@@ -89,8 +105,8 @@ class ConditionProgress {
   void visitMemory(Visitor&& visit) {
     for (Node& node : nodes_) {
       visit(node.held);
-      visit(node.counted);
-      visit(node.away);
+      visit(node.contact.touched);
+      visit(node.contact.away);
       visit(node.latched);
       visit(node.reading.value);
       visit(node.reading.limit);
@@ -100,10 +116,9 @@ class ConditionProgress {
 
  private:
   struct Node {
-    std::uint32_t held = 0;     ///< [ticks] without a break
-    std::uint32_t counted = 0;  ///< [ticks] of contact
-    std::uint32_t away = 0;     ///< [ticks] since the last contact
-    bool latched = false;       ///< met once under a latching group
+    std::uint32_t held = 0;  ///< [ticks] without a break
+    ContactTimer contact;
+    bool latched = false;  ///< met once under a latching group
     ConditionReading reading;
   };
   [[nodiscard]] static bool isMetNow(const Condition& condition, Node& node, const SceneView& scene,

@@ -160,8 +160,8 @@ struct ScenarioFile {
 [[nodiscard]] std::vector<ObjectId> bakeOrder(const ScenarioFile& scenario);
 
 /// Boxes in `object`'s own frame whose surface needs the finer voxels: the given ones, and around every
-/// target of a part with a clearance to it (the part's box there, swept back along its approach).
-/// `structures` by ObjectId; a part not baked yet (null) adds nothing.
+/// target of a part with a clearance to it that no given box touches (the part's box, swept back along its
+/// approach). `structures` by ObjectId; a part not baked yet (null) adds nothing.
 [[nodiscard]] std::vector<Eigen::AlignedBox3d> refineBoxes(
     const ScenarioFile& scenario, ObjectId object,
     const std::vector<std::shared_ptr<const HapticStructures>>& structures);

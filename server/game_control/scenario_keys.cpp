@@ -11,8 +11,8 @@ namespace {
 
 using Key = std::string_view;
 
-constexpr std::array<Key, 8> kScenario{"title", "language", "reach", "objects",
-                                       "hands", "pairs",    "off",   "states"};
+constexpr std::array<Key, 8> kScenario{"title", "language", "reach",     "objects",
+                                       "hands", "pairs",    "pairs_off", "states"};
 constexpr std::array<Key, 11> kObject{"name", "title",      "kind",  "color",  "group",    "meshes",
                                       "felt", "structures", "start", "status", "stiffness"};
 constexpr std::array<Key, 3> kMesh{"part", "file", "unit"};
@@ -22,11 +22,10 @@ constexpr std::array<Key, 3> kPose{"at", "turn", "q"};
 constexpr std::array<Key, 2> kTurn{"axis", "deg"};
 constexpr std::array<Key, 6> kHand{"name", "role", "kind", "object", "stiffness", "rotational_stiffness"};
 constexpr std::array<Key, 5> kPair{"between", "clearance", "dilation", "sensing", "enabled"};
-constexpr std::array<Key, 21> kState{
-    "name",  "title",  "instruction", "part",       "hands",   "show",       "hide",
-    "place", "fix",    "free",        "pairs",      "object",  "hand",       "touch",
-    "for",   "target", "approach",    "conditions", "timeout", "on_timeout", "snap"};
-constexpr std::array<Key, 2> kPairSwitches{"on", "off"};
+constexpr std::array<Key, 22> kState{"name",       "title",   "instruction", "part", "hands",    "show",
+                                     "hide",       "place",   "fix",         "free", "pairs_on", "pairs_off",
+                                     "object",     "hand",    "touch",       "for",  "target",   "approach",
+                                     "conditions", "timeout", "on_timeout",  "snap"};
 constexpr std::array<Key, 6> kTarget{"at", "turn", "q", "within", "angle", "dwell"};
 constexpr std::array<Key, 2> kApproach{"direction", "distance"};
 constexpr std::array<Key, 10> kCondition{"all",     "any",          "when",    "pose",   "force",
@@ -47,7 +46,6 @@ constexpr std::array kMappings{
     ScenarioMapping{"hand", kHand},
     ScenarioMapping{"pair", kPair},
     ScenarioMapping{"state", kState},
-    ScenarioMapping{"pair_switches", kPairSwitches},
     ScenarioMapping{"target", kTarget},
     ScenarioMapping{"approach", kApproach},
     ScenarioMapping{"condition", kCondition},

@@ -77,11 +77,11 @@ void ScenarioReader::readOff(const YAML::Node& node) {
   if (yaml_.failed()) return;
   // [drill, any]: all pairs of one object
   if (node.IsSequence() && node.size() == 2 && node[1].IsScalar() && node[1].Scalar() == "any") {
-    const ObjectId object = names_.object(node[0], "'off'");
+    const ObjectId object = names_.object(node[0], "'pairs_off'");
     for (ScenarioPair& pair : scenario_.pairs) {
       if (pair.a == object || pair.b == object) pair.enabled = false;
     }
-  } else if (const auto pair = names_.pair(node, "'off'")) {
+  } else if (const auto pair = names_.pair(node, "'pairs_off'")) {
     scenario_.pairs[*pair].enabled = false;
   }
 }

@@ -89,8 +89,8 @@ void ScenarioReader::readScenario(const YAML::Node& root) {
   if (root["pairs"].IsDefined() && yaml_.isList(root["pairs"], "'pairs'")) {
     for (const auto& pair : root["pairs"]) readPair(pair);
   }
-  if (root["off"].IsDefined() && yaml_.isList(root["off"], "'off'")) {
-    for (const auto& pair : root["off"]) readOff(pair);
+  if (root["pairs_off"].IsDefined() && yaml_.isList(root["pairs_off"], "'pairs_off'")) {
+    for (const auto& pair : root["pairs_off"]) readOff(pair);
   }
   if (yaml_.failed()) return;
   StateReader(yaml_, scenario_).read(root["states"]);

@@ -177,12 +177,12 @@ std::vector<Eigen::AlignedBox3d> refineBoxes(const ScenarioFile& scenario, Objec
     for (const ScenarioState& state : scenario.states) {
       if (state.object != part || !state.X_WG) continue;
       const Pose X_OG = X_OW * *state.X_WG;
+      Eigen::AlignedBox3d box_O = boxIn(X_OG, structures[part.value]->info.box_M);
       const bool given =
           std::any_of(spec.structures.refine.begin(), spec.structures.refine.end(),
-                      [&](const Eigen::AlignedBox3d& box_O) { return box_O.contains(X_OG.translation()); });
+                      [&](const Eigen::AlignedBox3d& refined_O) { return refined_O.intersects(box_O); });
       if (given) continue;
       // where the part will be, and where it comes from
-      Eigen::AlignedBox3d box_O = boxIn(X_OG, structures[part.value]->info.box_M);
       const Vector3 back_O = X_OW.rotation() * Vector3(-state.approach_W * state.approach_distance);
       box_O.extend(box_O.translated(back_O));
       const Vector3 margin = Vector3::Constant(pair.clearance + 2.0 * spec.structures.voxel);

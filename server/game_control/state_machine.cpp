@@ -1,16 +1,16 @@
 #include "server/game_control/state_machine.h"
 
 #include <algorithm>
-#include <bit>
 #include <cassert>
-#include <concepts>
-#include <limits>
 #include <utility>
 
 #include "server/simulation/environment.h"
 
 namespace tenon {
 namespace {
+
+constexpr std::uint32_t kRetakeTicks = 1000;  // paper §5: 1 s of contact takes a part
+constexpr std::uint32_t kRetakeLapse = 50;
 
 /// The Environment, as conditions ask it.
 class EnvironmentView final : public SceneView {
@@ -34,47 +34,23 @@ class EnvironmentView final : public SceneView {
   const Environment& environment_;
 };
 
-/// Every number of a memory is one 64-bit word when hashed, saved and restored.
-template <typename Number>
-std::uint64_t toWord(const Number& number) {
-  if constexpr (std::same_as<Number, double>) {
-    return std::bit_cast<std::uint64_t>(number);
-  } else {
-    return static_cast<std::uint64_t>(number);
+/// Who plays a hand of the scenario now: whose own object is that hand's.
+HandId handInRole(const ScenarioFile& scenario, const Environment& environment, HandId role) noexcept {
+  for (std::uint32_t i = 0; i < scenario.hands.size(); ++i) {
+    if (environment.hands()[i].own == scenario.hands[role.value].object) return HandId{i};
   }
+  return role;
 }
 
-template <typename Number>
-void fromWord(std::uint64_t word, Number& number) {
-  if constexpr (std::same_as<Number, double>) {
-    number = std::bit_cast<double>(word);
-  } else if constexpr (std::same_as<Number, bool>) {
-    number = word != 0;
-  } else {
-    number = static_cast<Number>(word);
+/// Hands that have taken the object move their own again.
+void releaseFromHands(Environment& environment, ObjectId object) noexcept {
+  for (std::uint32_t i = 0; i < environment.hands().size(); ++i) {
+    const HandMotion& hand = environment.hands()[i];
+    if (hand.object == object && hand.own != object) environment.release(HandId{i});
   }
 }
 
 }  // namespace
-
-template <typename Visitor>
-void StateMachine::visitMemory(Memory& memory, Visitor&& visit) {
-  StepStatus& status = memory.status;
-  visit(status.revision);
-  visit(status.step);
-  visit(status.phase);
-  visit(status.started);
-  visit(status.changed);
-  visit(status.tick);
-  visit(status.finished);
-  visit(status.failed);
-  visit(status.position_error);
-  visit(status.angle_error);
-  visit(status.contact_seconds);
-  memory.progress.visitMemory(visit);
-  visit(memory.elapsed);
-  visit(memory.contact_ticks);
-}
 
 StateMachine::StateMachine(std::shared_ptr<const ScenarioFile> scenario) : scenario_(std::move(scenario)) {
   assert(!scenario_->states.empty());
@@ -98,6 +74,7 @@ void StateMachine::step(Environment& environment, std::span<const GameCommand> c
   const bool met = memory_.progress.step(state().conditions, scene, commands);
   ++memory_.elapsed;
   measure(scene);
+  takeAgain(environment, scene);
   const bool skipped = std::any_of(commands.begin(), commands.end(), [](const GameCommand& command) {
     return command.kind == CommandKind::kSkipStep;
   });
@@ -119,6 +96,9 @@ void StateMachine::obey(Environment& environment, const GameCommand& command) no
       if (command.signal < scenario_->pairs.size()) {
         environment.setPairEnabled(command.signal, command.value != 0.0);
       }
+      break;
+    case CommandKind::kSwapHands:
+      swapHands(environment);
       break;
     case CommandKind::kReset:
       reset(environment);
@@ -155,31 +135,63 @@ void StateMachine::enter(Environment& environment, std::uint32_t step) noexcept 
   memory_.progress.reset();
   memory_.elapsed = 0;
   memory_.contact_ticks = 0;
+  memory_.retake = {};
 
   for (const PairSwitch& change : state().pairs) environment.setPairEnabled(change.pair, change.enabled);
-  for (const Placement& placement : state().placements) {
-    const Pose X_WO = placement.X_WO.value_or(environment.objects()[placement.object.value].X_WO);
-    switch (placement.kind) {
-      case PlacementKind::kShow:
-      case PlacementKind::kFree:
-        environment.place(placement.object, X_WO, ObjectStatus::kParked);
-        break;
-      case PlacementKind::kHide:
-        environment.place(placement.object, X_WO, ObjectStatus::kHidden);
-        break;
-      case PlacementKind::kFix:
-        environment.place(placement.object, X_WO, ObjectStatus::kFixed);
-        break;
-    }
-  }
+  for (const Placement& placement : state().placements) place(environment, placement);
   for (const HandAssignment& assignment : state().hands) {
+    const HandId hand = handInRole(*scenario_, environment, assignment.hand);
     if (assignment.object == scenario_->hands[assignment.hand.value].object) {
-      environment.release(assignment.hand);
+      environment.release(hand);
     } else {
-      environment.grab(assignment.hand, assignment.object);
+      environment.grab(hand, assignment.object);
     }
   }
+  status.hand = handInRole(*scenario_, environment, state().hand);
   measure(EnvironmentView(environment));
+}
+
+void StateMachine::place(Environment& environment, const Placement& placement) noexcept {
+  const Pose X_WO = placement.X_WO.value_or(environment.objects()[placement.object.value].X_WO);
+  releaseFromHands(environment, placement.object);
+  switch (placement.kind) {
+    case PlacementKind::kShow:
+    case PlacementKind::kFree:
+      environment.place(placement.object, X_WO, ObjectStatus::kParked);
+      break;
+    case PlacementKind::kHide:
+      environment.place(placement.object, X_WO, ObjectStatus::kHidden);
+      break;
+    case PlacementKind::kFix:
+      environment.place(placement.object, X_WO, ObjectStatus::kFixed);
+      break;
+  }
+}
+
+void StateMachine::takeAgain(Environment& environment, const SceneView& scene) noexcept {
+  for (const HandAssignment& assignment : state().hands) {
+    const HandId hand = handInRole(*scenario_, environment, assignment.hand);
+    const ObjectId own = environment.hands()[hand.value].own;
+    if (assignment.object == own || environment.hands()[hand.value].object != own) continue;
+    memory_.retake.step(scene.touching(own, assignment.object), kRetakeLapse);
+    if (memory_.retake.touched < kRetakeTicks) return;
+    memory_.retake = {};
+    environment.grab(hand, assignment.object);
+    return;
+  }
+}
+
+void StateMachine::swapHands(Environment& environment) noexcept {
+  FixedVector<HandId, 2> hands;
+  for (std::uint32_t i = 0; i < scenario_->hands.size(); ++i) {
+    const ScenarioHand& hand = scenario_->hands[i];
+    if (hand.role == Role::kTrainee && hand.kind == HandKind::kCoupled) hands.push_back(HandId{i});
+  }
+  if (!hands.full()) return;
+  environment.swapHands(hands[0], hands[1]);
+  memory_.status.hand = handInRole(*scenario_, environment, state().hand);
+  memory_.status.changed = environment.tick();
+  ++memory_.status.revision;
 }
 
 void StateMachine::leave(Environment& environment, StepPhase phase) noexcept {
@@ -191,11 +203,7 @@ void StateMachine::leave(Environment& environment, StepPhase phase) noexcept {
   if (status.failed) return;
   status.finished = status.step + 1 == scenario_->states.size();
   if (!state().snap) return;
-  // every hand lets go first: what the object is placed as stays
-  for (std::uint32_t hand = 0; hand < scenario_->hands.size(); ++hand) {
-    const bool own = scenario_->hands[hand].object == state().object;
-    if (!own && environment.hands()[hand].object == state().object) environment.release(HandId{hand});
-  }
+  releaseFromHands(environment, state().object);
   environment.place(state().object, *state().X_WG, ObjectStatus::kFixed);
 }
 
@@ -222,45 +230,6 @@ void StateMachine::listReadings() noexcept {
   for (std::size_t i = 0; i < tree.size(); ++i) {
     if (!isGroup(tree[i].kind)) memory_.status.conditions.push_back(memory_.progress.reading(i));
   }
-}
-
-void StateMachine::addTo(StateHash& hash) const noexcept {
-  Memory copy = memory_;
-  visitMemory(copy, [&hash](const auto& number) { hash.add(toWord(number)); });
-}
-
-std::vector<std::uint8_t> StateMachine::save() const {
-  std::vector<std::uint8_t> bytes;
-  Memory copy = memory_;
-  visitMemory(copy, [&bytes](const auto& number) {
-    const std::uint64_t word = toWord(number);
-    for (unsigned shift = 0; shift < 64; shift += 8)
-      bytes.push_back(static_cast<std::uint8_t>(word >> shift));
-  });
-  return bytes;
-}
-
-Result<void> StateMachine::restore(std::span<const std::uint8_t> bytes) {
-  Memory memory;
-  std::size_t words = 0;
-  visitMemory(memory, [&words](const auto&) { ++words; });
-  if (bytes.size() != words * sizeof(std::uint64_t)) {
-    return fail("state machine: a saved state has " + std::to_string(words * sizeof(std::uint64_t)) +
-                " bytes, this one has " + std::to_string(bytes.size()));
-  }
-  std::size_t at = 0;
-  visitMemory(memory, [&](auto& number) {
-    std::uint64_t word = 0;
-    for (unsigned shift = 0; shift < 64; shift += 8) word |= std::uint64_t{bytes[at++]} << shift;
-    fromWord(word, number);
-  });
-  if (memory.status.step >= scenario_->states.size() || memory.status.phase > StepPhase::kSkipped) {
-    return fail("state machine: a saved state is at step " + std::to_string(memory.status.step) +
-                ", but the scenario has " + std::to_string(scenario_->states.size()));
-  }
-  memory_ = memory;
-  listReadings();
-  return {};
 }
 
 }  // namespace tenon

@@ -22,6 +22,7 @@ struct StepStatus {
   std::uint32_t revision = 0;  ///< raised whenever step or phase changes: publish then
   std::uint32_t step = 0;
   StepPhase phase = StepPhase::kWaiting;
+  HandId hand;                   ///< that is meant to do it, swapped hands followed
   Tick started = 0;              ///< tick of the Environment at which the state began
   Tick changed = 0;              ///< tick of the last revision
   Tick tick = 0;                 ///< of the Environment when this was measured
@@ -67,6 +68,7 @@ class StateMachine {
     ConditionProgress progress;
     std::uint64_t elapsed = 0;        ///< [ticks] in this state
     std::uint64_t contact_ticks = 0;  ///< of the state's object
+    ContactTimer retake;              ///< of a part that was let go and the hand that shall move it
   };
   template <typename Visitor>
   static void visitMemory(Memory& memory, Visitor&& visit);
@@ -75,6 +77,9 @@ class StateMachine {
   void leave(Environment& environment, StepPhase phase) noexcept;
   void reset(Environment& environment) noexcept;
   void obey(Environment& environment, const GameCommand& command) noexcept;
+  void place(Environment& environment, const Placement& placement) noexcept;
+  void takeAgain(Environment& environment, const SceneView& scene) noexcept;
+  void swapHands(Environment& environment) noexcept;
   void measure(const SceneView& scene) noexcept;
   void listReadings() noexcept;
   [[nodiscard]] const ScenarioState& state() const { return scenario_->states[memory_.status.step]; }

@@ -71,15 +71,12 @@ ScenarioState StateReader::readState(const YAML::Node& node) {
 }
 
 void StateReader::readEffects(const YAML::Node& node, ScenarioState& state) {
-  const YAML::Node pairs = node["pairs"];
-  if (pairs.IsDefined() && yaml_.openMapping(pairs, "pair_switches", in(state, "pairs"))) {
-    for (const bool enabled : {true, false}) {
-      const std::string key = enabled ? "on" : "off";
-      const YAML::Node list = pairs[key];
-      if (!list.IsDefined() || !yaml_.isList(list, in(state, "pairs"))) continue;
-      for (const auto& entry : list) {
-        if (const auto pair = names_.pair(entry, in(state, "pairs"))) state.pairs.push_back({*pair, enabled});
-      }
+  for (const std::string key : {"pairs_on", "pairs_off"}) {
+    const YAML::Node list = node[key];
+    if (!list.IsDefined() || !yaml_.isList(list, in(state, key))) continue;
+    for (const auto& entry : list) {
+      const auto pair = names_.pair(entry, in(state, key));
+      if (pair) state.pairs.push_back({*pair, key == "pairs_on"});
     }
   }
   readPlacements(node, "show", PlacementKind::kShow, state);

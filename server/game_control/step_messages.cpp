@@ -45,7 +45,7 @@ StepState describe(const ScenarioFile& scenario, const StepStatus& status) {
   step.phase = status.phase;
   step.part = state.part;
   step.object = state.object;
-  step.hand = state.hand;
+  step.hand = status.hand.valid() ? status.hand : state.hand;
   step.touch = state.touch;
   step.has_target = state.X_WG.has_value();
   if (state.X_WG) {
