@@ -1,0 +1,159 @@
+#include <gtest/gtest.h>
+
+#include "server/simulation/environment.h"
+#include "tests/server/simulation/busy_scene.h"
+#include "tests/support/realtime_guard.h"
+
+namespace tenon {
+namespace {
+
+constexpr Tick kTicks = 3000;
+
+EnvironmentOptions withWorkers(unsigned workers) {
+  EnvironmentOptions options;
+  options.workers = workers;
+  return options;
+}
+
+std::vector<std::uint64_t> hashes(Environment& environment, const test::BusyScene& busy, Tick until) {
+  std::vector<std::uint64_t> result;
+  while (environment.tick() < until) {
+    busy.play(environment, environment.tick() + 1);
+    result.push_back(environment.hash());
+  }
+  return result;
+}
+
+TEST(EnvironmentDeterminism, OneTwoAndFourWorkersLeaveTheSameBits) {
+  const test::BusyScene busy;
+  Environment one(busy.scene, withWorkers(1));
+  const auto expected = hashes(one, busy, kTicks);
+  for (const unsigned workers : {2U, 4U}) {
+    Environment many(busy.scene, withWorkers(workers));
+    EXPECT_EQ(hashes(many, busy, kTicks), expected) << workers << " workers";
+  }
+}
+
+TEST(EnvironmentDeterminism, TheSceneIsWorthPlaying) {
+  const test::BusyScene busy;
+  Environment environment(busy.scene, withWorkers(1));
+  int contact_ticks = 0;
+  int skipped = 0;
+  bool capped_load = true;
+  while (environment.tick() < kTicks) {
+    busy.play(environment, environment.tick() + 1);
+    contact_ticks += environment.objects()[busy.parts[0].value].in_contact ? 1 : 0;
+    skipped += static_cast<int>(environment.work().active_pairs - environment.work().queried_pairs);
+    capped_load = capped_load && environment.work().load_percent <= 100.0;
+    for (const ObjectMotion& object : environment.objects()) ASSERT_TRUE(object.X_WO.isFinite());
+  }
+  EXPECT_GT(contact_ticks, 200);
+  EXPECT_GT(skipped, 20 * static_cast<int>(kTicks)) << "most pairs are far apart at most times";
+  EXPECT_TRUE(capped_load);
+}
+
+TEST(EnvironmentDeterminism, SkippingFarPairsNeverMissesAContact) {
+  const test::BusyScene busy;
+  EnvironmentOptions every_pair;
+  every_pair.coherence = false;
+  Environment skipping(busy.scene, {});
+  Environment looking(busy.scene, every_pair);
+  while (skipping.tick() < kTicks) {
+    busy.play(skipping, skipping.tick() + 1);
+    busy.play(looking, looking.tick() + 1);
+    for (std::size_t i = 0; i < skipping.objects().size(); ++i) {
+      const ObjectMotion& one = skipping.objects()[i];
+      const ObjectMotion& other = looking.objects()[i];
+      ASSERT_EQ(one.X_WO, other.X_WO) << "object " << i << ", tick " << skipping.tick();
+      ASSERT_EQ(one.in_contact, other.in_contact) << "object " << i << ", tick " << skipping.tick();
+    }
+  }
+}
+
+TEST(EnvironmentDeterminism, ARestoredEnvironmentGoesOnWithTheSameBits) {
+  const test::BusyScene busy;
+  Environment original(busy.scene, withWorkers(1));
+  busy.play(original, 1000);
+  const std::vector<std::uint8_t> bytes = original.save();
+  const std::uint64_t hash = original.hash();
+  const auto expected = hashes(original, busy, 3000);
+
+  Environment fresh(busy.scene, withWorkers(2));
+  ASSERT_TRUE(fresh.restore(bytes));
+  EXPECT_EQ(fresh.tick(), 1000U);
+  EXPECT_EQ(fresh.hash(), hash);
+  EXPECT_EQ(fresh.save(), bytes);
+  EXPECT_EQ(hashes(fresh, busy, 3000), expected);
+
+  // and back: one that has already gone on
+  ASSERT_TRUE(original.restore(bytes));
+  EXPECT_EQ(hashes(original, busy, 3000), expected);
+}
+
+TEST(EnvironmentDeterminism, ABadCheckpointIsRefusedAndChangesNothing) {
+  const test::BusyScene busy;
+  Environment environment(busy.scene, withWorkers(1));
+  busy.play(environment, 400);
+  const std::vector<std::uint8_t> good = environment.save();
+  const std::uint64_t hash = environment.hash();
+  for (std::size_t size = 0; size < good.size(); size += 1 + size / 8) {
+    EXPECT_FALSE(environment.restore(std::span(good).first(size)));
+  }
+  std::vector<std::uint8_t> bad = good;
+  bad.push_back(0);
+  EXPECT_FALSE(environment.restore(bad));
+  bad = good;
+  bad[0] ^= 0xFF;
+  const Result<void> version = environment.restore(bad);
+  ASSERT_FALSE(version);
+  EXPECT_NE(version.error().what.find("version"), std::string::npos);
+  EXPECT_EQ(environment.hash(), hash);
+
+  test::SmallScene other;
+  other.object("alone", nullptr, Vector3::Zero());
+  Environment elsewhere(other.build(), {});
+  EXPECT_FALSE(elsewhere.restore(good));
+}
+
+TEST(EnvironmentDeterminism, DamagedBytesNeverBreakRestore) {
+  const test::BusyScene busy;
+  Environment environment(busy.scene, withWorkers(1));
+  busy.play(environment, 320);
+  const std::vector<std::uint8_t> good = environment.save();
+  std::uint64_t seed = 42;
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<std::uint8_t> bad = good;
+    for (int flip = 0; flip < 4; ++flip) {
+      seed = seed * 6364136223846793005ULL + 1442695040888963407ULL;
+      bad[(seed >> 20U) % bad.size()] ^= static_cast<std::uint8_t>(seed >> 56U);
+    }
+    if (environment.restore(bad)) {
+      environment.step();
+    }
+  }
+  ASSERT_TRUE(environment.restore(good));
+}
+
+TEST(EnvironmentDeterminism, StepAllocatesNothingAndLocksNothing) {
+  const test::BusyScene busy;
+  for (const unsigned workers : {1U, 2U}) {
+    Environment environment(busy.scene, withWorkers(workers));
+    busy.play(environment, 10);
+    HandManifold manifold;
+    PairContact contact;
+    const test::RealtimeGuard guard;
+    std::uint64_t hash = 0;
+    while (environment.tick() < 1300) {
+      busy.play(environment, environment.tick() + 1);
+      hash ^= environment.hash();
+      environment.manifold(busy.right, manifold);
+      environment.pairContact(0, contact);
+    }
+    EXPECT_NE(hash, 0U);
+    EXPECT_EQ(guard.allocations(), 0);
+    EXPECT_EQ(guard.locks(), 0);
+  }
+}
+
+}  // namespace
+}  // namespace tenon

@@ -1,0 +1,251 @@
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "server/simulation/environment.h"
+#include "tests/server/simulation/small_scene.h"
+
+namespace tenon {
+namespace {
+
+using test::enter;
+using test::moveTo;
+using test::stay;
+
+//   pointer o  [part]  [fixed]      two hands with a pointer each, two parts that may touch
+class HandsTest : public testing::Test {
+ protected:
+  HandsTest() {
+    pointer_ = small_.object("pointer", test::pointerShape(), {0.0, 0.0, 0.3});
+    tool_ = small_.object("tool", test::pointerShape(), {0.0, 0.2, 0.3});
+    part_ = small_.object("part", test::cubeShape(), {0.1, 0.0, 0.0});
+    other_ = small_.object("other", test::cubeShape(), {0.3, 0.0, 0.0});
+    right_ = small_.hand("right", pointer_);
+    left_ = small_.hand("left", tool_);
+    small_.pair(pointer_, part_);
+    parts_ = small_.pair(part_, other_);
+    environment_ = std::make_unique<Environment>(small_.build(), EnvironmentOptions{});
+  }
+  [[nodiscard]] const ObjectMotion& object(ObjectId id) const { return environment_->objects()[id.value]; }
+  [[nodiscard]] const HandMotion& hand(HandId id) const { return environment_->hands()[id.value]; }
+
+  test::SmallScene small_;
+  ObjectId pointer_, tool_, part_, other_;
+  HandId right_, left_;
+  std::size_t parts_ = 0;
+  std::unique_ptr<Environment> environment_;
+};
+
+TEST_F(HandsTest, APointerWaitsWhereItIsUntilItsHandGivesAPose) {
+  environment_->setHandPresent(right_, true);
+  stay(*environment_, 3);
+  EXPECT_EQ(object(pointer_).status, ObjectStatus::kParked);
+  EXPECT_EQ(object(pointer_).X_WO.translation(), Vector3(0.0, 0.0, 0.3));
+  environment_->setHandPose(right_, Pose(Vector3(0.0, 0.1, 0.2)), {});
+  environment_->step();
+  EXPECT_EQ(object(pointer_).status, ObjectStatus::kHeld);
+  EXPECT_EQ(object(pointer_).holder, right_);
+  EXPECT_EQ(object(pointer_).X_WO.translation(), Vector3(0.0, 0.1, 0.2));
+}
+
+TEST_F(HandsTest, GrabKeepsTheObjectWhereItIsInTheHand) {
+  enter(*environment_, right_, {0.1, 0.0, 0.032});
+  const std::uint32_t epoch = object(part_).epoch;
+  environment_->grab(right_, part_);
+  environment_->step();
+  EXPECT_NEAR((object(part_).X_WO.translation() - Vector3(0.1, 0.0, 0.0)).norm(), 0.0, 1e-12);
+  EXPECT_EQ(object(part_).epoch, epoch + 1);
+  EXPECT_EQ(object(part_).status, ObjectStatus::kHeld);
+  EXPECT_EQ(object(pointer_).status, ObjectStatus::kHidden);
+
+  // a quarter turn of the hand about z takes the part along on its lever
+  const Quaternion turn = expRotation({0.0, 0.0, std::acos(0.0)});
+  environment_->setHandPose(right_, Pose(Vector3(0.0, 0.0, 0.032), turn), {});
+  stay(*environment_, 300);
+  EXPECT_NEAR((object(part_).X_WO.translation() - Vector3(0.0, 0.0, 0.0)).norm(), 0.0, 1e-6);
+  EXPECT_NEAR(object(part_).X_WO.rotation().angularDistance(turn), 0.0, 1e-6);
+}
+
+TEST_F(HandsTest, ReleaseParksThePartAndBringsThePointerBackToTheHand) {
+  enter(*environment_, right_, {0.1, 0.0, 0.032});
+  environment_->grab(right_, part_);
+  moveTo(*environment_, right_, {0.1, 0.1, 0.1}, 200);
+  const Pose X_WP = object(part_).X_WO;
+  environment_->release(right_);
+  moveTo(*environment_, right_, {0.0, 0.0, 0.3}, 300);
+  EXPECT_EQ(object(part_).X_WO, X_WP);
+  EXPECT_EQ(object(part_).status, ObjectStatus::kParked);
+  EXPECT_FALSE(object(part_).holder.valid());
+  EXPECT_EQ(object(part_).V_WO.linear.norm(), 0.0);
+  EXPECT_EQ(object(pointer_).status, ObjectStatus::kHeld);
+  EXPECT_NEAR((object(pointer_).X_WO.translation() - Vector3(0.0, 0.0, 0.3)).norm(), 0.0, 1e-9);
+}
+
+TEST_F(HandsTest, APartFixedInItsPlaceStaysSoAndTheHandGetsItsPointerBack) {
+  enter(*environment_, right_, {0.1, 0.0, 0.032});
+  for (const bool place_first : {true, false}) {
+    environment_->grab(right_, part_);
+    stay(*environment_, 10);
+    const Pose X_WG(Vector3(0.1, 0.1, 0.0));
+    if (!place_first) environment_->release(right_);
+    environment_->place(part_, X_WG, ObjectStatus::kFixed);
+    if (place_first) {
+      EXPECT_FALSE(hand(right_).object.valid());
+      environment_->release(right_);
+    }
+    stay(*environment_, 10);
+    EXPECT_EQ(object(part_).X_WO, X_WG);
+    EXPECT_EQ(object(part_).status, ObjectStatus::kFixed);
+    EXPECT_EQ(hand(right_).object, pointer_);
+    EXPECT_EQ(object(pointer_).status, ObjectStatus::kHeld);
+  }
+}
+
+TEST_F(HandsTest, PlacingAHeldPartKeepsItInTheHandAtItsNewPlace) {
+  enter(*environment_, right_, {0.1, 0.0, 0.032});
+  environment_->grab(right_, part_);
+  environment_->place(part_, Pose(Vector3(0.0, 0.0, 0.1)), ObjectStatus::kHeld);
+  stay(*environment_, 50);
+  EXPECT_NEAR((object(part_).X_WO.translation() - Vector3(0.0, 0.0, 0.1)).norm(), 0.0, 1e-9);
+  EXPECT_EQ(object(part_).holder, right_);
+}
+
+TEST_F(HandsTest, AFrozenHandHoldsItsObjectStill) {
+  enter(*environment_, right_, {0.1, 0.0, 0.032});
+  environment_->grab(right_, part_);
+  environment_->step();
+  environment_->setHandFrozen(right_, true);
+  const Pose X_WP = object(part_).X_WO;
+  moveTo(*environment_, right_, {0.1, 0.1, 0.1}, 100);
+  EXPECT_EQ(object(part_).X_WO, X_WP);
+  EXPECT_EQ(hand(right_).F_Ho_W.force.norm(), 0.0);
+  environment_->setHandFrozen(right_, false);
+  stay(*environment_, 300);
+  EXPECT_NEAR(object(part_).X_WO.translation().y(), 0.1, 1e-6);
+}
+
+TEST_F(HandsTest, AHandThatIsGoneParksItsPartAndTakesItUpWhereItIsWhenItReturns) {
+  enter(*environment_, right_, {0.1, 0.0, 0.032});
+  environment_->grab(right_, part_);
+  moveTo(*environment_, right_, {0.1, 0.1, 0.1}, 200);
+  const Pose X_WP = object(part_).X_WO;
+  environment_->setHandPresent(right_, false);
+  stay(*environment_, 50);
+  EXPECT_EQ(object(part_).status, ObjectStatus::kParked);
+  EXPECT_EQ(object(part_).X_WO, X_WP);
+  EXPECT_FALSE(object(part_).holder.valid());
+  EXPECT_EQ(hand(right_).object, part_) << "it will go on with it";
+
+  enter(*environment_, right_, {0.3, 0.3, 0.3});
+  stay(*environment_, 50);
+  EXPECT_EQ(object(part_).status, ObjectStatus::kHeld);
+  EXPECT_NEAR((object(part_).X_WO.translation() - X_WP.translation()).norm(), 0.0, 1e-9);
+}
+
+TEST_F(HandsTest, APartHeldByTwoIsHeldByTheOtherWhenOneLetsGo) {
+  enter(*environment_, right_, {0.1, 0.05, 0.0});
+  enter(*environment_, left_, {0.1, -0.05, 0.0});
+  environment_->grab(left_, part_);
+  environment_->grab(right_, part_);
+  environment_->step();
+  EXPECT_EQ(object(part_).holder, left_);
+  environment_->release(left_);
+  environment_->step();
+  EXPECT_EQ(object(part_).holder, right_);
+  EXPECT_EQ(object(part_).status, ObjectStatus::kHeld);
+}
+
+TEST_F(HandsTest, SwappedHandsExchangeTheirObjectsAndKeepThemForGood) {
+  enter(*environment_, right_, {0.0, 0.0, 0.3});
+  enter(*environment_, left_, {0.0, 0.2, 0.3});
+  environment_->step();
+  environment_->swapHands(right_, left_);
+  environment_->step();
+  EXPECT_EQ(hand(right_).object, tool_);
+  EXPECT_EQ(hand(left_).object, pointer_);
+  EXPECT_EQ(object(tool_).holder, right_);
+  EXPECT_EQ(object(tool_).X_WO.translation(), Vector3(0.0, 0.0, 0.3));
+  environment_->grab(left_, part_);
+  environment_->release(left_);
+  EXPECT_EQ(hand(left_).object, pointer_);
+}
+
+TEST_F(HandsTest, ANotANumberPoseIsIgnoredAndCounted) {
+  enter(*environment_, right_, {0.1, 0.0, 0.3});
+  environment_->step();
+  const std::uint64_t hash = environment_->hash();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  environment_->setHandPose(right_, Pose(Vector3(nan, 0.0, 0.0)), {});
+  environment_->setHandPose(right_, Pose(Vector3::Zero(), Quaternion(nan, 0.0, 0.0, 0.0)), {});
+  environment_->setHandPose(right_, Pose(Vector3::Zero(), Quaternion(0.0, 0.0, 0.0, 0.0)), {});
+  environment_->setHandPose(right_, Pose(Vector3(1e200, 0.0, 0.0)), {});
+  environment_->setHandPose(right_, Pose(), {Vector3(0.0, nan, 0.0), Vector3::Zero()});
+  environment_->setHandPose(HandId{17}, Pose(), {});
+  environment_->setHandPose(HandId{}, Pose(), {});
+  EXPECT_EQ(environment_->hash(), hash);
+  EXPECT_EQ(hand(right_).refused_poses, 5U);
+  stay(*environment_, 5);
+  EXPECT_TRUE(object(pointer_).X_WO.isFinite());
+}
+
+TEST_F(HandsTest, EveryDeclaredJumpRaisesTheEpochAndNothingElseDoes) {
+  enter(*environment_, right_, {0.1, 0.0, 0.1});
+  environment_->grab(right_, part_);
+  std::uint32_t epoch = object(part_).epoch;
+  moveTo(*environment_, right_, {0.1, 0.0, 0.2}, 200);
+  EXPECT_EQ(object(part_).epoch, epoch);
+  environment_->place(part_, Pose(), ObjectStatus::kParked);
+  EXPECT_EQ(object(part_).epoch, ++epoch);
+  environment_->grab(right_, part_);
+  EXPECT_EQ(object(part_).epoch, ++epoch);
+  environment_->release(right_);
+  EXPECT_EQ(object(part_).epoch, ++epoch);
+}
+
+// The parts stand 0.2 m apart and nobody holds one: the pair is never due, until one is put next to the
+// other.
+TEST_F(HandsTest, AJumpIntoContactIsSeenAtOnce) {
+  stay(*environment_, 100);
+  EXPECT_FALSE(environment_->pairs()[parts_].queried);
+  EXPECT_FALSE(environment_->inContact(part_, other_));
+  environment_->place(part_, Pose(Vector3(0.3 - test::kCubeEdge, 0.0, 0.0)), ObjectStatus::kFixed);
+  environment_->step();
+  EXPECT_TRUE(environment_->pairs()[parts_].queried);
+  EXPECT_TRUE(environment_->inContact(part_, other_));
+  stay(*environment_, 10);
+  EXPECT_TRUE(object(other_).in_contact) << "two that stand still stay as they are, unasked";
+  environment_->place(part_, Pose(), ObjectStatus::kHidden);
+  environment_->step();
+  EXPECT_FALSE(environment_->inContact(part_, other_));
+}
+
+TEST_F(HandsTest, ThePairMatrixDecidesWhoMeetsWhom) {
+  enter(*environment_, right_, {0.1, 0.0, 0.0});
+  environment_->grab(right_, part_);
+  environment_->setPairEnabled(parts_, false);
+  moveTo(*environment_, right_, {0.3, 0.0, 0.0}, 400);
+  EXPECT_NEAR(object(part_).X_WO.translation().x(), 0.3, 1e-9);
+  EXPECT_FALSE(environment_->inContact(part_, other_));
+  moveTo(*environment_, right_, {0.1, 0.0, 0.0}, 400);
+  environment_->setPairEnabled(parts_, true);
+  moveTo(*environment_, right_, {0.3, 0.0, 0.0}, 400);
+  EXPECT_NEAR(object(part_).X_WO.translation().x(), 0.3 - test::kCubeEdge, 0.1e-3);
+  EXPECT_TRUE(environment_->inContact(part_, other_));
+}
+
+TEST(Environment, ObjectsOfOneGroupNeverTouch) {
+  test::SmallScene small;
+  const ObjectId part = small.object("part", test::cubeShape(), {0.1, 0.0, 0.0}, ObjectStatus::kParked, 1);
+  const ObjectId other = small.object("other", test::cubeShape(), {0.2, 0.0, 0.0}, ObjectStatus::kParked, 1);
+  const HandId right = small.hand("right", part);
+  small.pair(part, other);
+  Environment environment(small.build(), {});
+  enter(environment, right, {0.1, 0.0, 0.0});
+  moveTo(environment, right, {0.2, 0.0, 0.0}, 200);
+  EXPECT_NEAR(environment.objects()[part.value].X_WO.translation().x(), 0.2, 1e-9);
+  EXPECT_FALSE(environment.inContact(part, other));
+}
+
+}  // namespace
+}  // namespace tenon

@@ -1,0 +1,139 @@
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "server/simulation/environment.h"
+#include "tests/server/simulation/small_scene.h"
+
+namespace tenon {
+namespace {
+
+using test::enter;
+using test::kCubeEdge;
+using test::moveTo;
+using test::stay;
+
+/// The gap of a listed contact for poses of the two bodies, as a client reckons it.
+double gapOf(const ManifoldContact& contact, const Pose& X_WO, const Pose& X_WA) {
+  const Vector3 p_AP = X_WA.inverse() * (X_WO * Vector3(contact.p_BoP_B.cast<double>()));
+  return contact.normal_A.cast<double>().dot(p_AP) - static_cast<double>(contact.offset);
+}
+
+//    |##|      a held cube comes down on a floor that is turned and moved in the world
+//   ~~~~~~
+class ManifoldTest : public testing::Test {
+ protected:
+  ManifoldTest() {
+    part_ = small_.object("part", test::cubeShape(), {0.0, 0.0, 0.1});
+    floor_ = small_.object("floor", test::floorShape(), {0.05, 0.02, 0.0});
+    hand_ = small_.hand("right", part_);
+    small_.pair(part_, floor_);
+    environment_ = std::make_unique<Environment>(small_.build(), EnvironmentOptions{});
+    enter(*environment_, hand_, {0.0, 0.0, 0.1});
+  }
+  test::SmallScene small_;
+  ObjectId part_, floor_;
+  HandId hand_;
+  std::unique_ptr<Environment> environment_;
+  HandManifold manifold_;
+};
+
+TEST_F(ManifoldTest, ListsContactsBeforeTheyTouchWithTheirSignedGaps) {
+  moveTo(*environment_, hand_, {0.0, 0.0, 0.5 * kCubeEdge + 0.4e-3}, 400);
+  stay(*environment_, 20);
+  environment_->manifold(hand_, manifold_);
+  ASSERT_GE(manifold_.contacts.size(), 4U) << "the corners at least";
+  EXPECT_EQ(manifold_.object, part_);
+  EXPECT_EQ(manifold_.tick, environment_->tick());
+  EXPECT_FALSE(environment_->objects()[part_.value].in_contact);
+  for (const ManifoldContact& contact : manifold_.contacts) {
+    EXPECT_EQ(contact.other, floor_);
+    EXPECT_NEAR(contact.gap, 0.4e-3, 0.02e-3);
+    EXPECT_NEAR(contact.normal_A.z(), 1.0, 1e-3);
+    EXPECT_NEAR(gapOf(contact, manifold_.X_WO, environment_->objects()[floor_.value].X_WO), contact.gap,
+                1e-6);
+  }
+}
+
+TEST_F(ManifoldTest, ListsAFastObjectsContactsFartherAhead) {
+  moveTo(*environment_, hand_, {0.0, 0.0, 0.5 * kCubeEdge + 2.2e-3}, 200);
+  environment_->manifold(hand_, manifold_);
+  EXPECT_GE(manifold_.contacts.size(), 4U) << "0.4 m/s";
+  stay(*environment_, 200);
+  environment_->manifold(hand_, manifold_);
+  EXPECT_EQ(manifold_.contacts.size(), 0U) << "standing still, 2.2 mm are far";
+}
+
+TEST_F(ManifoldTest, TellsTheCouplingsWrenchAboutTheHand) {
+  environment_->release(hand_);
+  moveTo(*environment_, hand_, {0.0, 0.0, 0.5 * kCubeEdge - 0.005}, 400);
+  stay(*environment_, 20);
+  environment_->manifold(hand_, manifold_);
+  EXPECT_NEAR(manifold_.F_Ho_W.force.z(), 1000.0 * 0.005, 0.1);
+  EXPECT_NEAR(manifold_.F_Ho_W.torque.norm(), 0.0, 0.01);
+  EXPECT_EQ(manifold_.stiffness, 1000.0);
+  EXPECT_LE(manifold_.validity_radius, 1.1e-3);
+}
+
+//   [######]   the held plate is asked as the field, the cube below it as the shell:
+//     |##|     the same half-spaces in other roles
+TEST(Manifold, KeepsItsMeaningWhenTheHeldBodyIsAskedAsTheField) {
+  test::SmallScene small;
+  const ObjectId held =
+      small.object("held", test::boxStructures({0.1, 0.1, kCubeEdge}, 0.002, 0.01), {0.0, 0.0, 0.1});
+  const ObjectId still = small.object("still", test::cubeShape(), Vector3::Zero());
+  const HandId hand = small.hand("right", held);
+  small.pair(still, held);
+  Environment environment(small.build(), {});
+  enter(environment, hand, {0.0, 0.0, 0.1});
+  moveTo(environment, hand, {0.0, 0.0, kCubeEdge - 0.003}, 400);
+  stay(environment, 20);
+  HandManifold manifold;
+  environment.manifold(hand, manifold);
+  ASSERT_GE(manifold.contacts.size(), 4U);
+  const Pose X_WA = environment.objects()[still.value].X_WO;
+  for (const ManifoldContact& contact : manifold.contacts) {
+    EXPECT_NEAR(contact.normal_A.z(), 1.0, 1e-2);
+    EXPECT_NEAR(gapOf(contact, manifold.X_WO, X_WA), contact.gap, 1e-6);
+    Pose raised = manifold.X_WO;
+    raised.translation().z() += 0.01;
+    EXPECT_NEAR(gapOf(contact, raised, X_WA), contact.gap + 0.01, 1e-4) << "away is positive";
+  }
+  EXPECT_NEAR(manifold.F_Ho_W.force.z(), 3.0, 0.1);
+}
+
+TEST(Manifold, TellsHowFastTheOtherBodyComes) {
+  test::SmallScene small;
+  const ObjectId held = small.object("held", test::cubeShape(), Vector3::Zero());
+  const ObjectId cube = small.object("cube", test::cubeShape(), {0.1, 0.0, 0.0});
+  const HandId right = small.hand("right", held);
+  const HandId instructor = small.hand("instructor", cube);
+  small.pair(cube, held);
+  Environment environment(small.build(), {});
+  enter(environment, right, Vector3::Zero());
+  enter(environment, instructor, {0.1, 0.0, 0.0});
+  moveTo(environment, instructor, {kCubeEdge + 0.0005, 0.0, 0.0}, 297);  // 0.2 m/s
+  HandManifold manifold;
+  environment.manifold(right, manifold);
+  ASSERT_GT(manifold.contacts.size(), 0U);
+  for (const ManifoldContact& contact : manifold.contacts) {
+    EXPECT_NEAR(contact.velocity_W.x(), -0.2, 0.01);
+    EXPECT_NEAR(contact.velocity_W.tail<2>().norm(), 0.0, 0.01);
+  }
+}
+
+TEST(Manifold, IsEmptyButWellFormedForAHandThatMovesNothing) {
+  test::SmallScene small;
+  const ObjectId part = small.object("part", test::cubeShape(), Vector3::Zero());
+  const HandId hand = small.hand("right", part);
+  Environment environment(small.build(), {});
+  environment.place(part, Pose(), ObjectStatus::kFixed);
+  environment.step();
+  HandManifold manifold;
+  environment.manifold(hand, manifold);
+  EXPECT_FALSE(manifold.object.valid());
+  EXPECT_EQ(manifold.contacts.size(), 0U);
+}
+
+}  // namespace
+}  // namespace tenon
