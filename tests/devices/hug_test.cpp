@@ -1,6 +1,10 @@
 #include "devices/simulated/hug.h"
 
+#include <algorithm>
+
 #include <gtest/gtest.h>
+
+#include "devices/safety.h"
 
 namespace tenon {
 namespace {
@@ -80,7 +84,69 @@ TEST_F(HugClutch, ClosesAgainOnlyWhenTheOperatorResets) {
   EXPECT_EQ(state.right.fault, DeviceFault::kNone);
   EXPECT_TRUE(state.right.forces_on);
   EXPECT_TRUE(state.left.forces_on);
-  EXPECT_EQ(hug_.right().hand().pose().translation().x() > 0.0, true) << "hand and handle are one body again";
+  EXPECT_GT(hug_.right().hand().pose().translation().x(), 0.0) << "hand and handle are one body again";
+}
+
+/// Both arms behind their safety layers, as a station has them.
+class HugWithSafety : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(hug_.open());
+    arm();
+  }
+  void arm() {
+    ASSERT_TRUE(hug_.right().arm());
+    ASSERT_TRUE(hug_.left().arm());
+  }
+  void cycle(const Vector3& wanted_right) {
+    SafetyRequest request;
+    DeviceState state;
+    hug_.left().read(state);
+    hug_.left().write(left_.step(request, state, 1e-3));
+    if (left_.wantsDisarm()) hug_.left().disarm();
+    hug_.right().read(state);
+    request.wanted.F_Ho_D.force = wanted_right;
+    hug_.right().write(right_.step(request, state, 1e-3));
+    if (right_.wantsDisarm()) hug_.right().disarm();
+  }
+
+  Hug hug_{3};
+  ClutchLatch latch_;
+  Safety right_{hug_.right().caps(), &latch_};
+  Safety left_{hug_.left().caps(), &latch_};
+};
+
+TEST_F(HugWithSafety, NoForceThatAnybodyWantsOpensTheClutch) {
+  hug_.right().hand().stiffen(1.0);
+  for (int tick = 0; tick < 5000; ++tick) {
+    cycle({1000.0, -1000.0, 300.0});
+    EXPECT_LE(hug_.right().motorWrench().force.norm(), 50.0 + 1e-9);
+  }
+  EXPECT_FALSE(hug_.clutchOpen());
+  EXPECT_TRUE(right_.acts(SafetyRule::kForceLimited));
+}
+
+// A person who pulls with all strength against the end of the travel does what no command may.
+TEST_F(HugWithSafety, APersonsPullOpensItStopsBothAndAnOperatorBringsThemBack) {
+  hug_.right().hand().stiffen(1.0);
+  hug_.right().hand().intend(Pose(Vector3(0.0, 0.9, 0.0)));
+  for (int tick = 0; tick < 3000; ++tick) cycle({0.0, 0.0, 0.0});
+  ASSERT_TRUE(hug_.clutchOpen());
+  EXPECT_TRUE(right_.acts(SafetyRule::kClutchOpen));
+  EXPECT_TRUE(left_.acts(SafetyRule::kClutchOpen));
+  EXPECT_EQ(hug_.left().phase(), SimulatedDevice::Phase::kFault);
+
+  hug_.right().hand().intend(Pose::Identity());
+  ASSERT_TRUE(hug_.right().resetFault());
+  ASSERT_TRUE(hug_.left().resetFault());
+  right_.reset();
+  left_.reset();
+  arm();
+  for (int tick = 0; tick < 3000; ++tick) cycle({2.0, 0.0, 0.0});
+  EXPECT_EQ(right_.flags(), 0U);
+  EXPECT_EQ(hug_.right().phase(), SimulatedDevice::Phase::kArmed);
+  EXPECT_EQ(hug_.left().phase(), SimulatedDevice::Phase::kArmed);
+  EXPECT_NEAR(hug_.right().motorWrench().force.x(), 2.0, 1e-9);
 }
 
 }  // namespace
