@@ -7,7 +7,7 @@ namespace tenon {
 
 namespace {
 // Nearer than this one goes straight, whatever an outline says: it is the same opening.
-constexpr double kNear = 0.05;  // [m]
+constexpr double kNear = 0.05;        // [m]
 constexpr double kSameColumn = 0.02;  // [m]
 }  // namespace
 

@@ -9,8 +9,8 @@ namespace tenon {
 
 using Waypoints = FixedVector<Vector3, 4>;
 
-/// How a person carries something past the big things of a scene: straight where nothing is in between, else up,
-/// across above everything, and down.
+/// How a person carries something past the big things of a scene: straight where nothing is in between, else
+/// up, across above everything, and down.
 ///
 /// She knows big things (objects drawn as `scene`) by their outline only, so what is inside one, such as a
 /// pocket of an engine bay, is reached from above.
@@ -26,7 +26,8 @@ class ClearWay {
   struct Box {
     Vector3 low, high;
   };
-  [[nodiscard]] static bool crosses(const Box& box, const Vector3& from, const Vector3& to, double margin) noexcept;
+  [[nodiscard]] static bool crosses(const Box& box, const Vector3& from, const Vector3& to,
+                                    double margin) noexcept;
   FixedVector<Box, 8> boxes_;
 };
 

@@ -38,7 +38,8 @@ Wrench Coupling::step(const LocalProxy& proxy, const Pose& X_WH, double dt) noex
   const double share = proxy.stiffness > 0.0 ? std::min(1.0, proxy.stiffness / options_.max_stiffness) : 0.0;
   Wrench wrench;
   wrench.force = stiffness_ * stretch_.translation + share * options_.damping * stretch_rate_.translation;
-  wrench.torque = rotational_stiffness_ * stretch_.rotation + share * options_.rotational_damping * stretch_rate_.rotation;
+  wrench.torque = rotational_stiffness_ * stretch_.rotation +
+                  share * options_.rotational_damping * stretch_rate_.rotation;
   if (fade_left_ > 0) {
     const double old_share = static_cast<double>(fade_left_) / static_cast<double>(options_.fade_ticks + 1);
     wrench = wrench * (1.0 - old_share) + fading_ * old_share;

@@ -7,8 +7,8 @@
 namespace tenon {
 
 namespace {
-// Of the device's own damping, that a virtual damper adds on top of the spring: Colgate and Schenkel's condition
-// b > K T / 2 + |B| leaves this much when K is capped by the safety layer's limit.
+// Of the device's own damping, that a virtual damper adds on top of the spring: Colgate and Schenkel's
+// condition b > K T / 2 + |B| leaves this much when K is capped by the safety layer's limit.
 constexpr double kDampingShare = 0.2;
 // What the server calls contact (its own rounding included).
 constexpr float kTouchGap = 5e-5F;  // [m]

@@ -21,8 +21,8 @@ struct HandNews {
   bool beyond_validity_began = false;
 };
 
-/// One hand's kilohertz: device in, local model, coupling, safety, device out; and what the server and the others
-/// are told of it.
+/// One hand's kilohertz: device in, local model, coupling, safety, device out; and what the server and the
+/// others are told of it.
 ///
 /// Every force goes through the device's safety layer (devices/safety.h), whose slew limit lets a force grow
 /// slowly and fall at once.

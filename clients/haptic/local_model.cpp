@@ -72,7 +72,8 @@ void LocalModel::solve(const Pose& X_WH, const WorldView& world) noexcept {
   body_.springs.clear();
   // undecayed: where the object goes does not depend on how old the planes are, only how hard it is held does
   body_.springs.push_back({X_WH * manifold_.X_HO, manifold_.X_HO.inverse().translation(),
-                           std::max(1.0, manifold_.stiffness), std::max(0.1, manifold_.rotational_stiffness)});
+                           std::max(1.0, manifold_.stiffness),
+                           std::max(0.1, manifold_.rotational_stiffness)});
   rows_.clear();
   for (const ManifoldContact& contact : manifold_.contacts) {
     if (!world.knows(contact.other)) continue;

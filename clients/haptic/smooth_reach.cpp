@@ -3,7 +3,7 @@
 namespace tenon {
 
 namespace {
-constexpr double kGain = 4.0;       // [1/s] speed for the way left
+constexpr double kGain = 4.0;        // [1/s] speed for the way left
 constexpr double kSmoothing = 0.06;  // [s] of each of the two stages
 
 Vector3 capped(const Vector3& v, double limit) {

@@ -14,7 +14,8 @@ std::string describe(const StationEvent& event) {
     case StationEventKind::kSafety:
       return hand + ": the safety layer acts, flags " + std::to_string(event.detail) + when;
     case StationEventKind::kDeviceFault:
-      return hand + ": the device reports a fault: " + toString(static_cast<DeviceFault>(event.detail)) + when;
+      return hand + ": the device reports a fault: " + toString(static_cast<DeviceFault>(event.detail)) +
+             when;
     case StationEventKind::kIndexingBegan:
       return hand + ": the workspace begins to move" + when;
     case StationEventKind::kIndexingEnded:

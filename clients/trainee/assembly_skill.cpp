@@ -6,19 +6,19 @@
 namespace tenon {
 
 namespace {
-constexpr double kPassBy = 0.03;       // [m] near enough to a point on the way
-constexpr double kThere = 0.004;       // [m] near enough to its end
-constexpr double kFacing = 0.02;       // [rad]
-constexpr double kStandOff = 0.12;     // [m] before a thing to be touched she slows down
-constexpr double kTouchForce = 1.5;    // [N]
-constexpr double kTouchSpeed = 0.08;   // [m/s]
-constexpr double kPushForce = 5.0;     // [N]
-constexpr double kSearchForce = 3.5;   // [N]
-constexpr double kSeatForce = 4.0;     // [N]
-constexpr double kInsertSpeed = 0.06;  // [m/s]
-constexpr double kPushGain = 0.012;    // [m/s per N] how quickly a hand gives way or follows
-constexpr double kLongestPush = 0.08;  // [m] the intent goes ahead of the object
-constexpr double kBump = 6.0;          // [N] on the way: she hit something
+constexpr double kPassBy = 0.03;         // [m] near enough to a point on the way
+constexpr double kThere = 0.004;         // [m] near enough to its end
+constexpr double kFacing = 0.02;         // [rad]
+constexpr double kStandOff = 0.12;       // [m] before a thing to be touched she slows down
+constexpr double kTouchForce = 1.5;      // [N]
+constexpr double kTouchSpeed = 0.08;     // [m/s]
+constexpr double kPushForce = 5.0;       // [N]
+constexpr double kSearchForce = 3.5;     // [N]
+constexpr double kSeatForce = 4.0;       // [N]
+constexpr double kInsertSpeed = 0.06;    // [m/s]
+constexpr double kPushGain = 0.012;      // [m/s per N] how quickly a hand gives way or follows
+constexpr double kLongestPush = 0.08;    // [m] the intent goes ahead of the object
+constexpr double kBump = 6.0;            // [N] on the way: she hit something
 constexpr double kSpiralPitch = 0.0008;  // [m]
 constexpr double kSpiralWidest = 0.009;  // [m]
 constexpr double kSpiralSpeed = 0.02;    // [m/s]
@@ -105,8 +105,8 @@ void AssemblySkill::touch(const HandSense& sense, const ClearWay& clear_way, Obj
   p_WTouch_ = X_WO.translation();
   probe_ = 0;
   const Vector3 way = p_WTouch_ - sense.X_WH.translation();
-  const Vector3 before = way.norm() > kStandOff ? Vector3(p_WTouch_ - kStandOff * way.normalized())
-                                                : sense.X_WH.translation();
+  const Vector3 before =
+      way.norm() > kStandOff ? Vector3(p_WTouch_ - kStandOff * way.normalized()) : sense.X_WH.translation();
   travelTo({before, Quaternion::Identity()}, sense, clear_way, 0.08);
 }
 
@@ -123,7 +123,8 @@ void AssemblySkill::mount(const HandSense& sense, const ClearWay& clear_way, con
   besides(axis_W_, u, v);
   Vector3 direction = random_.uniform(-1.0, 1.0) * u + random_.uniform(-1.0, 1.0) * v;
   direction = direction.norm() > 1e-3 ? direction.normalized() : u;
-  const Vector3 twist = Vector3(random_.uniform(-1.0, 1.0), random_.uniform(-1.0, 1.0), random_.uniform(-1.0, 1.0));
+  const Vector3 twist =
+      Vector3(random_.uniform(-1.0, 1.0), random_.uniform(-1.0, 1.0), random_.uniform(-1.0, 1.0));
   const double beside = random_.uniform(person_.aim_error_min, person_.aim_error_max);
   const double turned = random_.uniform(person_.aim_angle_min, person_.aim_angle_max);
   bias_W_ = direction * (task.sure_of_it ? person_.stubborn_offset : beside);
@@ -222,7 +223,8 @@ void AssemblySkill::travel(const HandSense& sense, double dt) noexcept {
     return;
   }
   const Displacement left = displacement(reach_.pose(), X_WG);
-  const bool there = left.translation.norm() < (last ? kThere : kPassBy) && (!last || left.rotation.norm() < kFacing);
+  const bool there =
+      left.translation.norm() < (last ? kThere : kPassBy) && (!last || left.rotation.norm() < kFacing);
   if (!there) return;
   if (!last) {
     ++next_;
@@ -252,8 +254,9 @@ void AssemblySkill::touching(const HandSense& sense, double dt) noexcept {
   // through where it should be and nothing felt: it is open there; feel around in it
   const double way_to_it = (p_WTouch_ - reach_.pose().translation()).dot(axis_W_);
   if (felt_ > 0.3 || depth_ < way_to_it + 0.03) return;
-  static constexpr double kProbes[][3] = {{0.0, 0.0, -0.04}, {0.06, 0.0, 0.0},  {-0.06, 0.0, 0.0}, {0.0, 0.0, 0.04},
-                                          {0.0, 0.06, 0.0},  {0.0, -0.06, 0.0}, {0.0, 0.0, -0.1}};
+  static constexpr double kProbes[][3] = {{0.0, 0.0, -0.04}, {0.06, 0.0, 0.0}, {-0.06, 0.0, 0.0},
+                                          {0.0, 0.0, 0.04},  {0.0, 0.06, 0.0}, {0.0, -0.06, 0.0},
+                                          {0.0, 0.0, -0.1}};
   const auto& probe = kProbes[probe_++ % std::size(kProbes)];
   reach_.start(sense.X_WH);
   axis_W_ = (p_WTouch_ + Vector3(probe[0], probe[1], probe[2]) - sense.X_WH.translation()).normalized();
@@ -275,7 +278,8 @@ void AssemblySkill::align(const HandSense& sense, const DelayedSight& sight, dou
   nudge_.rotation += 1.2 * dt * off.rotation;
   if (nudge_.translation.norm() > 0.05) nudge_.translation *= 0.05 / nudge_.translation.norm();
   if (nudge_.rotation.norm() > 0.2) nudge_.rotation *= 0.2 / nudge_.rotation.norm();
-  const bool there = off.translation.norm() < std::min(0.001, 0.4 * task_.tolerance) && off.rotation.norm() < 0.008;
+  const bool there =
+      off.translation.norm() < std::min(0.001, 0.4 * task_.tolerance) && off.rotation.norm() < 0.008;
   stall_time_ = there ? stall_time_ + dt : 0.0;
   if (stall_time_ < 0.2 && phase_time_ < 6.0) return;
   if (task_.approach_distance <= 0.0) {

@@ -22,13 +22,13 @@ struct MountTask {
   bool sure_of_it = false;  ///< aims far beside the target and does not look for the way in
 };
 
-/// What one hand of a simulated person can do: rest, touch something and stay in touch, carry something somewhere
-/// and push it in.
+/// What one hand of a simulated person can do: rest, touch something and stay in touch, carry something
+/// somewhere and push it in.
 ///
-/// It decides where the hand wants to be, from what is seen and felt; an arm and a device make of that where it
-/// is. Inside the last centimetre nothing is corrected by sight: aiming is off by a seeded error, and only what
-/// is felt leads the part home. Pushing is by force, a few newtons; when it does not go on she wiggles in a
-/// small spiral, then backs off, looks again and tries anew.
+/// It decides where the hand wants to be, from what is seen and felt; an arm and a device make of that where
+/// it is. Inside the last centimetre nothing is corrected by sight: aiming is off by a seeded error, and only
+/// what is felt leads the part home. Pushing is by force, a few newtons; when it does not go on she wiggles
+/// in a small spiral, then backs off, looks again and tries anew.
 ///
 /// Threads: one. Real-time: everything but the constructor.
 class AssemblySkill {
@@ -53,7 +53,8 @@ class AssemblySkill {
   enum class Phase : std::uint8_t { kRest, kTravel, kTouch, kAlign, kInsert, kSearch, kBackOff, kSeated };
   enum class Goal : std::uint8_t { kHome, kTouch, kMount };
 
-  void travelTo(const Pose& X_WH_goal, const HandSense& sense, const ClearWay& clear_way, double margin) noexcept;
+  void travelTo(const Pose& X_WH_goal, const HandSense& sense, const ClearWay& clear_way,
+                double margin) noexcept;
   void enter(Phase phase) noexcept;
   void aim() noexcept;
   void travel(const HandSense& sense, double dt) noexcept;
@@ -65,7 +66,8 @@ class AssemblySkill {
   void seated(const HandSense& sense, const DelayedSight& sight, double dt) noexcept;
   void yieldTo(const DelayedSight& sight, double rate, double dt) noexcept;
   void pushAlong(double wanted_force, double highest_speed, double dt) noexcept;
-  void holdObject(const HandSense& sense, const Vector3& beside_W, const Quaternion& tilt, double dt) noexcept;
+  void holdObject(const HandSense& sense, const Vector3& beside_W, const Quaternion& tilt,
+                  double dt) noexcept;
   void setIntent(const Pose& X_WI, double dt) noexcept;
   [[nodiscard]] double depthSeen(const DelayedSight& sight) const noexcept;
   [[nodiscard]] bool stalled(const DelayedSight& sight, double way) noexcept;
@@ -86,18 +88,18 @@ class AssemblySkill {
 
   Waypoints way_;
   std::size_t next_ = 0;
-  Quaternion q_WTravel_;   // orientation of the hand at the end of the way
-  Quaternion q_WDepart_;   // and until it has backed out
+  Quaternion q_WTravel_;  // orientation of the hand at the end of the way
+  Quaternion q_WDepart_;  // and until it has backed out
   bool backing_out_ = false;
   Vector3 back_out_W_ = Vector3::Zero();  // way out of the last place, empty when there is none
   const ClearWay* clear_way_ = nullptr;
   double margin_ = 0.1;
 
-  Pose X_WAim_;                          // of the object: the target as she believes it to be
-  Vector3 axis_W_ = Vector3::UnitZ();    // pushing direction
-  double depth_ = 0.0;                   // [m] of the intent along the axis, 0 at the aim
-  double felt_ = 0.0;                    // [N] against the push, smoothed
-  double bias_scale_ = 1.0;              // she looks closer at every new attempt
+  Pose X_WAim_;                        // of the object: the target as she believes it to be
+  Vector3 axis_W_ = Vector3::UnitZ();  // pushing direction
+  double depth_ = 0.0;                 // [m] of the intent along the axis, 0 at the aim
+  double felt_ = 0.0;                  // [N] against the push, smoothed
+  double bias_scale_ = 1.0;            // she looks closer at every new attempt
   Vector3 bias_W_ = Vector3::Zero();
   Vector3 bias_rotation_W_ = Vector3::Zero();
   unsigned attempts_ = 0;

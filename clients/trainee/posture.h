@@ -6,9 +6,9 @@ namespace tenon {
 
 /// A body standing in the scene: where elbow and head are when a hand is where it is.
 ///
-/// Stands in for the trackers of arm band and head: the body goes with the workspace (who indexes does not walk,
-/// but sees herself carried along), the wrist is at the hand, the elbow hangs as low as upper arm and forearm
-/// allow, and the head follows the hand with its eyes, calmly.
+/// Stands in for the trackers of arm band and head: the body goes with the workspace (who indexes does not
+/// walk, but sees herself carried along), the wrist is at the hand, the elbow hangs as low as upper arm and
+/// forearm allow, and the head follows the hand with its eyes, calmly.
 ///
 /// Threads: one. Real-time: everything.
 class Posture {

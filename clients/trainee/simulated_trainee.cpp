@@ -12,7 +12,8 @@ constexpr double kWidest = 0.4;   // [m] nothing is kept farther away from thing
 SimulatedTrainee::SimulatedTrainee(const PersonOptions& person)
     : person_(person), right_(person, person.seed * 2 + 1), left_(person, person.seed * 2 + 2) {}
 
-void SimulatedTrainee::begin(std::span<const SceneObject> objects, const Pose& X_WRight, const Pose& X_WLeft) {
+void SimulatedTrainee::begin(std::span<const SceneObject> objects, const Pose& X_WRight,
+                             const Pose& X_WLeft) {
   objects_ = objects;
   clear_way_.begin(objects);
   std::size_t count = 0;
@@ -25,8 +26,8 @@ void SimulatedTrainee::begin(std::span<const SceneObject> objects, const Pose& X
 
 void SimulatedTrainee::read(const StepState& step) {
   const bool active = step.phase == StepPhase::kActive;
-  const bool same = instruction_.active == active && instruction_.step == step.step &&
-                    instruction_.started == step.started;
+  const bool same =
+      instruction_.active == active && instruction_.step == step.step && instruction_.started == step.started;
   if (same) return;
   instruction_ = {};
   instruction_.active = active;

@@ -12,8 +12,9 @@ namespace tenon {
 
 /// A trainee who does what she is told: reads the step, decides which hand does it and lets the other rest.
 ///
-/// She knows only what a person at the station would: where things are and where the ghost is, a reaction late, the
-/// instruction with its direction of approach, and the force in her hands; never a recorded solution.
+/// She knows only what a person at the station would: where things are and where the ghost is, a reaction
+/// late, the instruction with its direction of approach, and the force in her hands; never a recorded
+/// solution.
 ///
 /// Threads: one. Real-time: step.
 class SimulatedTrainee {

@@ -118,7 +118,8 @@ void TraineeStation::begin(std::span<const HandId> hand_ids) {
     if (!hand_ids[i].valid()) continue;
     HapticHand& hand = parts_->hands[i].emplace(parts_->arm(i), &parts_->clutch);
     if (!hand.begin(hand_ids[i], client_, starts[i].translation())) {
-      report(StationEventKind::kDeviceFault, hand_ids[i], static_cast<std::uint32_t>(hand.device().fault), 0.0);
+      report(StationEventKind::kDeviceFault, hand_ids[i], static_cast<std::uint32_t>(hand.device().fault),
+             0.0);
     }
     starts[i] = hand.pose();
   }
