@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
+#include <limits>
 
 namespace tenon {
 namespace {
@@ -11,6 +13,22 @@ constexpr double kArrived = 1e-9;
 
 /// [m] What may be left after the last sub-step without being called unfinished.
 constexpr double kUnfinished = 1e-6;
+
+/// A step back of more than this share of the last step means that the last one went too far.
+constexpr double kOvershoot = 0.1;
+
+/// Full lists shorten a sub-step to this share of its travel at most: a plate on a floor has to slide on.
+constexpr double kLeastReach = 0.25;
+
+/// A metre too deep costs this many times the forces of all springs: more than a wedge of them can gain by
+/// it.
+constexpr double kDepthPrice = 3.0;
+
+/// [m] A depth that the field's steps and a turned contact may leave behind.
+constexpr double kFieldNoise = 5e-6;
+
+/// So many sub-steps in a row may end in a worse place before the solver goes back to the best.
+constexpr int kWorsePlaces = 1;
 
 /// How much of its depth the blocking baseline takes back in a sub-step: the paper gives none, more than this
 /// makes the proxy jump at edges.
@@ -39,6 +57,8 @@ IslandSolver::IslandSolver(std::size_t max_bodies, std::size_t max_pairs)
     : motion_(max_bodies, max_pairs * kMaxPairContacts),
       multipliers_(max_pairs * kMaxPairContacts),
       motions_(max_bodies),
+      gone_(max_bodies),
+      best_(max_bodies),
       wrenches_(max_bodies),
       depths_(max_bodies),
       touched_(max_bodies) {
@@ -65,21 +85,72 @@ SolveReport IslandSolver::solve(std::span<MovableBody> bodies, std::span<const I
 }
 
 void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
-  while (true) {
+  for (MovableBody& body : job.bodies) body.brakes.clear();
+  std::fill(gone_.begin(), gone_.end(), Displacement{});
+  double best = std::numeric_limits<double>::infinity();
+  double reach = job.limits.substep_travel;
+  int worse = 0;
+  const auto look = [&] {
     queryPairs(job, job.limits.contact_margin, report);
     buildRows(job);
     solveMotions(job, report);
-    const double way = travel(job);
+  };
+
+  while (true) {
+    look();
+    const double here = merit(job);
+    if (here < best) {
+      best = here;
+      worse = 0;
+      reach = std::min(2.0 * reach, job.limits.substep_travel);
+      for (std::size_t i = 0; i < job.bodies.size(); ++i) best_[i] = job.bodies[i].X_WB;
+    } else {
+      ++worse;
+      reach *= 0.5;
+    }
+    if (brakeOvershoot(job)) solveMotions(job, report);
+    double way = travel(job);
     if (way < kArrived) break;
-    if (report.substeps == job.limits.substeps) {
+    const bool last = report.substeps == job.limits.substeps;
+    // a place or two may be worse on the way to a better one, but not the end of the way
+    if (worse > kWorsePlaces || (last && worse > 0)) {
+      for (std::size_t i = 0; i < job.bodies.size(); ++i) {
+        job.bodies[i].X_WB = best_[i];
+        job.bodies[i].brakes.clear();
+      }
+      std::fill(gone_.begin(), gone_.end(), Displacement{});
+      worse = 0;
+      look();
+      way = travel(job);
+    }
+    if (last) {
       report.travel_capped = way > kUnfinished;
       break;
     }
     // one share for all: between two admissible places every place is admissible
-    move(job, std::min(1.0, job.limits.substep_travel / way));
+    move(job, std::min(1.0, std::min(reach, knownReach(job)) / way));
     ++report.substeps;
   }
   fillForces(job);
+  for (MovableBody& body : job.bodies) body.brakes.clear();
+}
+
+double IslandSolver::merit(const Job& job) {
+  double energy = 0.0;
+  double force = 0.0;
+  for (const MovableBody& body : job.bodies) {
+    for (const Spring& spring : body.springs) {
+      const Displacement toGoal = displacement(body.X_WB, spring.X_WG);
+      const double stretch2 = (spring.X_WG * spring.p_BC - body.X_WB * spring.p_BC).squaredNorm();
+      energy +=
+          0.5 * (spring.stiffness * stretch2 + spring.rotational_stiffness * toGoal.rotation.squaredNorm());
+      force += spring.stiffness * std::sqrt(stretch2) +
+               spring.rotational_stiffness * toGoal.rotation.norm() / body.radius;
+    }
+  }
+  double depth = 0.0;
+  for (const IslandPairResult& result : job.results) depth = std::max(depth, -result.query.smallest_gap);
+  return energy + kDepthPrice * force * std::max(depth - kFieldNoise, 0.0);
 }
 
 void IslandSolver::solveBlocking(const Job& job, SolveReport& report) {
@@ -145,6 +216,14 @@ void IslandSolver::buildRows(const Job& job) {
   }
 }
 
+double IslandSolver::knownReach(const Job& job) {
+  double reach = job.limits.substep_travel;
+  for (const IslandPairResult& result : job.results) {
+    if (result.query.counts.contacts_dropped > 0) reach = std::min(reach, result.query.listed_to);
+  }
+  return std::max(reach, kLeastReach * job.limits.substep_travel);
+}
+
 void IslandSolver::solveMotions(const Job& job, SolveReport& report) {
   const std::span<double> multipliers(multipliers_.data(), rows_.size());
   const MotionResult result =
@@ -173,14 +252,29 @@ double IslandSolver::travel(const Job& job) const {
 void IslandSolver::move(const Job& job, double share) {
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
     MovableBody& body = job.bodies[i];
-    if (share == 1.0 && touched_[i] == 0 && body.springs.size() == 1 &&
-        job.limits.method != ContactMethod::kBlocking) {
-      // nothing is in the way: be there, not there up to the second order
-      body.X_WB = body.springs[0].X_WG;
-      continue;
-    }
-    body.X_WB = displaced(body.X_WB, {share * motions_[i].translation, share * motions_[i].rotation});
+    gone_[i] = {share * motions_[i].translation, share * motions_[i].rotation};
+    // nothing in the way: be there, not there up to the second order
+    const bool arrives = share == 1.0 && touched_[i] == 0 && body.springs.size() == 1 &&
+                         job.limits.method != ContactMethod::kBlocking;
+    body.X_WB = arrives ? body.springs[0].X_WG : displaced(body.X_WB, gone_[i]);
   }
+}
+
+bool IslandSolver::brakeOvershoot(const Job& job) {
+  bool braked = false;
+  for (std::size_t i = 0; i < job.bodies.size(); ++i) {
+    MovableBody& body = job.bodies[i];
+    const double radius2 = body.radius * body.radius;
+    const auto dot = [radius2](const Displacement& a, const Displacement& b) {
+      return a.translation.dot(b.translation) + radius2 * a.rotation.dot(b.rotation);
+    };
+    const double way2 = dot(gone_[i], gone_[i]);
+    const double back = -dot(gone_[i], motions_[i]);
+    if (touched_[i] == 0 || way2 < kArrived * kArrived || back < kOvershoot * way2) continue;
+    // secant: where the wish to move would have been zero
+    if (body.brakes.push_back({gone_[i], back / way2})) braked = true;
+  }
+  return braked;
 }
 
 void IslandSolver::blockMotions(const Job& job) {

@@ -78,10 +78,16 @@ class IslandSolver {
 
   static void queryPairs(const Job& job, double margin, SolveReport& report);
   void buildRows(const Job& job);
+  /// [m] a sub-step may go this far without meeting contacts that had no room in the lists.
+  [[nodiscard]] static double knownReach(const Job& job);
   void solveMotions(const Job& job, SolveReport& report);
   /// [m] the farthest that any point of any body goes.
   [[nodiscard]] double travel(const Job& job) const;
   void move(const Job& job, double share);
+  /// [J] how good a place is: the springs' energy, and a price on what is too deep that no spring can pay.
+  [[nodiscard]] static double merit(const Job& job);
+  /// True when a body is on its way back from where it has just gone; then it is braked along that way.
+  [[nodiscard]] bool brakeOvershoot(const Job& job);
   void blockMotions(const Job& job);
   void fillForces(const Job& job) const;
   static void fillPenalties(const Job& job);
@@ -90,6 +96,8 @@ class IslandSolver {
   std::vector<GapRow> rows_;
   std::vector<double> multipliers_;
   std::vector<Displacement> motions_;
+  std::vector<Displacement> gone_;     ///< in the last sub-step
+  std::vector<Pose> best_;             ///< of the places of this solve
   std::vector<Wrench> wrenches_;       ///< for kBlocking: penalties on a body, about its origin
   std::vector<double> depths_;         ///< for kBlocking: the deepest of a body's contacts
   std::vector<std::uint8_t> touched_;  ///< a row holds the body back

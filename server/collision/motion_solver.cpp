@@ -98,6 +98,13 @@ void MotionSolver::Workspace::setBody(std::size_t i, const MovableBody& body) {
   }
   H.bottomRightCorner<3, 3>() +=
       (kLeastRotation * stiffness * body.radius * body.radius) * Matrix3::Identity();
+  for (const Brake& brake : body.brakes) {
+    Vector6 along;
+    along << brake.along_W.translation, brake.along_W.rotation;
+    const Vector6 steep = H * along;
+    const double energy2 = along.dot(steep);
+    if (energy2 > 0.0) H += (brake.share / energy2) * (steep * steep.transpose());
+  }
   L[i] = H.llt().matrixL();
   segment(y0, i) = L[i].triangularView<Eigen::Lower>().solve(b);
 }

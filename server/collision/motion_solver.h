@@ -17,13 +17,22 @@ struct Spring {
   double rotational_stiffness = 0.0;  ///< [Nm/rad]
 };
 
+/// A direction along which a body had overshot: its energy is taken to be `share` times steeper there. This
+/// is how the curvature of the other surface, which the rows cannot tell, gets into the problem.
+struct Brake {
+  Displacement along_W;
+  double share = 0.0;
+};
+
 inline constexpr std::size_t kMaxSprings = 4;
+inline constexpr std::size_t kMaxBrakes = 4;
 
 /// A body that the solver may move.
 struct MovableBody {
   Pose X_WB;
   FixedVector<Spring, kMaxSprings> springs;  ///< at least one with a stiffness
   double radius = 0.1;                       ///< [m] of the body about its origin: no point is farther
+  FixedVector<Brake, kMaxBrakes> brakes;     ///< set and cleared by IslandSolver
 };
 
 /// gap + n · (motion of A's point - motion of B's point) >= 0. A body index of kStatic does not move.

@@ -154,6 +154,7 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
   result.counts = {};
   result.deepest = 0.0;
   result.smallest_gap = kNothingNear;
+  result.listed_to = query.margin;
   if (query.shell_A->empty() || query.field_B->empty()) return;
 
   const auto levels = query.shell_A->levels();
@@ -166,8 +167,9 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
   if (used > 0 && used < levels.size()) walk.setAreaScale(levels[used - 1].area_scale);
   walk.run(query.levels);
 
-  // a heap's order would depend on what was dropped; the order of points never does
   if (result.counts.contacts_dropped > 0) {
+    result.listed_to = result.contacts[0].gap;
+    // a heap's order would depend on what was dropped; the order of points never does
     std::sort(result.contacts.begin(), result.contacts.end(),
               [](const Contact& a, const Contact& b) { return a.point < b.point; });
   }

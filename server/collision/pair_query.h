@@ -48,7 +48,9 @@ struct PairQueryResult {
   ContactList contacts;
   QueryCounts counts;
   double smallest_gap =
-      0.0;               ///< of all points, a lower bound when none is within the margin; dilation included
+      0.0;  ///< of all points, a lower bound when none is within the margin; dilation included
+  double listed_to =
+      0.0;  ///< [m] every contact with a smaller gap is in the list: the margin, or less when full
   double deepest = 0.0;  ///< [m] depth in the undilated field of the deepest point, 0 when apart
 };
 

@@ -154,7 +154,7 @@ StructuresPtr sheetStructures(double edge, double thickness, double voxel, doubl
   return analyticStructures(boxAt(centre, size), boxAbout(centre, size), voxel);
 }
 
-StructuresPtr socketStructures(const Vector3& hole, double wall, double voxel) {
+StructuresPtr socketStructures(const Vector3& hole, double wall, double voxel, double rim_spacing) {
   const Vector3 size(hole.x() + 2.0 * wall, hole.y() + 2.0 * wall, hole.z() + wall);
   const Vector3 centre(0.0, 0.0, -0.5 * size.z());
   const AnalyticDistance block = boxAt(centre, size);
@@ -170,7 +170,22 @@ StructuresPtr socketStructures(const Vector3& hole, double wall, double voxel) {
     }
     return std::max(block(p), -inside(p));
   };
-  return analyticStructures(distance, boxAbout(centre, size), voxel);
+  std::vector<ShellSite> rim;
+  for (int axis = 0; axis < 2; ++axis) {
+    const int steps = std::max(1, static_cast<int>(std::lround(hole[axis] / rim_spacing)));
+    const double step = hole[axis] / steps;
+    for (const double side : {-1.0, 1.0}) {
+      for (int i = 0; i < steps; ++i) {
+        Vector3 p = Vector3::Zero();
+        p[axis] = (i + 0.5) * step - 0.5 * hole[axis];
+        p[1 - axis] = side * 0.5 * hole[1 - axis];
+        Vector3 inward = -Vector3::UnitZ();
+        inward[1 - axis] = side;
+        rim.push_back({p, inward.normalized(), step * step});
+      }
+    }
+  }
+  return analyticStructures(distance, boxAbout(centre, size), voxel, rim, rim_spacing);
 }
 
 }  // namespace tenon::test

@@ -40,7 +40,9 @@ using StructuresPtr = std::shared_ptr<const HapticStructures>;
 /// A square sheet across z at z = `offset`; thickness 0 has no inside. Field only.
 [[nodiscard]] StructuresPtr sheetStructures(double edge, double thickness, double voxel, double offset = 0.0);
 /// A block with a rectangular hole of size `hole` down from z = 0, open above, and `wall` of material round
-/// and below it. Field only.
-[[nodiscard]] StructuresPtr socketStructures(const Vector3& hole, double wall, double voxel);
+/// and below it. Its shell is the hole's rim: asked against a peg's field, it keeps the rim out of the peg's
+/// sides between the peg's points.
+[[nodiscard]] StructuresPtr socketStructures(const Vector3& hole, double wall, double voxel,
+                                             double rim_spacing = 0.001);
 
 }  // namespace tenon::test

@@ -32,6 +32,17 @@ class IslandRig {
     pair.dilation = dilation;
     push(pair);
   }
+  /// The shell of something that stands still against the body: what its points are too far apart to feel.
+  void addStaticShell(std::size_t body, const StructuresPtr& other, const Pose& X_WA, double dilation) {
+    statics_.push_back(other);
+    IslandPair pair;
+    pair.body_b = static_cast<std::int32_t>(body);
+    pair.shell_A = &other->shell;
+    pair.field_B = &structures_[body]->field;
+    pair.X_WA_static = X_WA;
+    pair.dilation = dilation;
+    push(pair);
+  }
   void addPair(std::size_t a, std::size_t b, double dilation) {
     IslandPair pair;
     pair.body_a = static_cast<std::int32_t>(a);

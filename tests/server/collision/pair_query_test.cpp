@@ -158,6 +158,7 @@ TEST(PairQuery, WhenRoomRunsOutTheDeepestStay) {
   for (const Contact& contact : asked->contacts) largest = std::max(largest, contact.gap);
   EXPECT_EQ(asked->contacts.size(), kMaxPairContacts);
   EXPECT_EQ(largest, flat[kMaxPairContacts - 1].gap);
+  EXPECT_EQ(asked->listed_to, largest);
 }
 
 TEST(PairQuery, AMiddleWithoutASlopePushesAlongTheShellsOwnNormal) {
