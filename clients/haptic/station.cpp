@@ -26,7 +26,7 @@ std::string describe(const StationEvent& event) {
       return hand + ": no contacts heard for " + std::to_string(static_cast<int>(event.value)) + " ms" + when;
     case StationEventKind::kServerChanged:
       return "the server began a new life, epoch " + std::to_string(event.detail) + when;
-    case StationEventKind::kEmergencyStop:
+    case StationEventKind::kStopChanged:
       return (event.detail != 0 ? "emergency stop" : "emergency stop released") + when;
   }
   return "unknown event" + when;
@@ -62,7 +62,7 @@ void Station::receive(const StepState& step) {
 }
 
 void Station::receive(const EmergencyStop& stop) {
-  report(StationEventKind::kEmergencyStop, {}, stop.engaged ? 1U : 0U, 0.0);
+  report(StationEventKind::kStopChanged, {}, stop.engaged ? 1U : 0U, 0.0);
   stopChanged(stop.engaged);
 }
 

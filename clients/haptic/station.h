@@ -25,7 +25,7 @@ enum class StationEventKind : std::uint8_t {
   kBeyondValidity,  ///< the local model had to guess; value: ticks so far
   kStale,           ///< the manifold is older than may be used; value: its age in ticks
   kServerChanged,   ///< frames of a newer life of the server came
-  kEmergencyStop,
+  kStopChanged,     ///< detail: 1 when an emergency stop was engaged, 0 when it was released
 };
 
 /// Something a person or a log should know of: plain data, so that the 1 kHz loop may write it.

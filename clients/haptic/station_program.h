@@ -1,0 +1,32 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <string>
+
+#include "clients/haptic/session_link.h"
+#include "clients/haptic/station.h"
+#include "idl/types/result.h"
+
+namespace tenon {
+
+struct StationProgramOptions {
+  LinkWishes link;                              ///< role and hands are the station's own
+  bool lockstep = false;                        ///< insist on a session in lockstep
+  bool real_time = true;                        ///< ask for SCHED_FIFO and locked memory
+  std::string language = "en";                  ///< of the instructions said
+  std::function<void(const std::string&)> say;  ///< to the person at the terminal
+};
+
+/// Runs a station in a session until the run is over or `stop` is set. By the clock, a servo thread steps the
+/// station each millisecond and never touches the network, and this thread carries the messages; in lockstep,
+/// one thread does both, a step for each tick it has heard completely.
+///
+/// Threads: the caller becomes the wire thread. Real-time: the servo thread's loop.
+Result<RunState> runStation(Station& station, const StationProgramOptions& options,
+                            const std::atomic<bool>& stop);
+
+/// Set by SIGINT and SIGTERM from the first call on.
+[[nodiscard]] const std::atomic<bool>& stopSignal();
+
+}  // namespace tenon
