@@ -1,0 +1,105 @@
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+/// The parts of the MCAP file format (version 0, public specification) that writer and reader share.
+namespace tenon::mcap {
+
+inline constexpr std::uint8_t kMagic[8] = {0x89, 'M', 'C', 'A', 'P', 0x30, '\r', '\n'};
+
+enum Opcode : std::uint8_t {
+  kHeader = 0x01,
+  kFooter = 0x02,
+  kSchema = 0x03,
+  kChannel = 0x04,
+  kMessage = 0x05,
+  kChunk = 0x06,
+  kMessageIndex = 0x07,
+  kChunkIndex = 0x08,
+  kAttachment = 0x09,
+  kAttachmentIndex = 0x0A,
+  kStatistics = 0x0B,
+  kMetadata = 0x0C,
+  kMetadataIndex = 0x0D,
+  kSummaryOffset = 0x0E,
+  kDataEnd = 0x0F,
+};
+
+inline constexpr std::size_t kRecordHead = 9;  // opcode and length
+
+/// The checksum of the format: CRC-32 as in zip and Ethernet. `crc` continues an earlier one.
+[[nodiscard]] std::uint32_t crc32(std::span<const std::uint8_t> bytes, std::uint32_t crc = 0);
+
+/// Little-endian fields, one after the other.
+class Fields {
+ public:
+  template <typename T>
+  void put(T value) {
+    const auto at = bytes.size();
+    bytes.resize(at + sizeof(T));
+    std::memcpy(bytes.data() + at, &value, sizeof(T));
+  }
+  void put(std::string_view text) {
+    put(static_cast<std::uint32_t>(text.size()));
+    putBytes({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  }
+  void put(const std::map<std::string, std::string>& values) {
+    Fields inner;
+    for (const auto& [key, value] : values)
+      inner.put(std::string_view(key)), inner.put(std::string_view(value));
+    put(static_cast<std::uint32_t>(inner.bytes.size()));
+    putBytes(inner.bytes);
+  }
+  void putBytes(std::span<const std::uint8_t> more) { bytes.insert(bytes.end(), more.begin(), more.end()); }
+
+  std::vector<std::uint8_t> bytes;
+};
+
+/// Reads fields back; past the end it gives nothing and `ok` stays false.
+class FieldReader {
+ public:
+  explicit FieldReader(std::span<const std::uint8_t> bytes) : rest(bytes) {}
+
+  template <typename T>
+  T get() {
+    T value{};
+    if (const auto part = take(sizeof(T)); part.size() == sizeof(T))
+      std::memcpy(&value, part.data(), sizeof(T));
+    return value;
+  }
+  std::string_view text() {
+    const auto part = take(get<std::uint32_t>());
+    return {reinterpret_cast<const char*>(part.data()), part.size()};
+  }
+  std::map<std::string, std::string> values() {
+    FieldReader inner(take(get<std::uint32_t>()));
+    std::map<std::string, std::string> found;
+    while (inner.ok && !inner.rest.empty()) {
+      const std::string key(inner.text());
+      found[key] = inner.text();
+    }
+    ok = ok && inner.ok;
+    return found;
+  }
+  std::span<const std::uint8_t> take(std::uint64_t count) {
+    if (rest.size() < count) {
+      ok = false;
+      rest = {};
+      return {};
+    }
+    const auto part = rest.first(count);
+    rest = rest.subspan(count);
+    return part;
+  }
+
+  std::span<const std::uint8_t> rest;
+  bool ok = true;
+};
+
+}  // namespace tenon::mcap

@@ -1,0 +1,377 @@
+#include "idl/record/mcap_writer.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <fcntl.h>
+#include <unistd.h>
+#include <zstd.h>
+
+#include "idl/record/mcap_format.h"
+
+namespace tenon {
+namespace {
+
+using mcap::Fields;
+using StopWatch = std::chrono::steady_clock;
+
+constexpr std::size_t kChunkBytes = 1U << 20U;
+constexpr auto kChunkAge = std::chrono::milliseconds(250);
+constexpr auto kSyncAge = std::chrono::seconds(1);
+constexpr int kCompressionLevel = 1;
+
+struct ChunkIndex {
+  std::int64_t first_time = 0, last_time = 0;
+  std::uint64_t offset = 0, length = 0;
+  std::map<std::uint16_t, std::uint64_t> message_indices;
+  std::uint64_t indices_length = 0, compressed = 0, plain = 0;
+};
+
+}  // namespace
+
+struct McapWriter::Impl {
+  std::filesystem::path file;
+  int descriptor = -1;
+  bool compress = true;
+  std::uint64_t offset = 0;
+  std::uint32_t data_crc = 0;
+  StopWatch::time_point synced = StopWatch::now();
+
+  // the chunk that is being filled
+  Fields chunk;
+  StopWatch::time_point chunk_began;
+  std::int64_t first_time = std::numeric_limits<std::int64_t>::max();
+  std::int64_t last_time = 0;
+  std::map<std::uint16_t, std::vector<std::pair<std::uint64_t, std::uint64_t>>> index;
+
+  // for the summary
+  std::map<std::string, std::uint16_t> schema_ids;
+  Fields schemas, channels, attachment_index, metadata_index;
+  std::map<std::uint16_t, std::uint64_t> counts;
+  std::vector<ChunkIndex> chunks;
+  std::uint64_t messages = 0;
+  std::uint32_t attachments = 0, metadata = 0;
+  std::int64_t start = std::numeric_limits<std::int64_t>::max();
+  std::int64_t end = 0;
+
+  ~Impl() {
+    if (descriptor >= 0) ::close(descriptor);
+  }
+
+  Result<void> put(std::span<const std::uint8_t> bytes) {
+    data_crc = mcap::crc32(bytes, data_crc);
+    offset += bytes.size();
+    while (!bytes.empty()) {
+      const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
+      if (written < 0 && errno == EINTR) continue;
+      if (written < 0) return fail(file.string() + ": cannot write (" + std::strerror(errno) + ")");
+      bytes = bytes.subspan(static_cast<std::size_t>(written));
+    }
+    return {};
+  }
+  Result<void> record(mcap::Opcode opcode, const Fields& fields) {
+    Fields whole;
+    append(whole, opcode, fields);
+    return put(whole.bytes);
+  }
+  static void append(Fields& to, mcap::Opcode opcode, const Fields& fields) {
+    to.put(opcode);
+    to.put(static_cast<std::uint64_t>(fields.bytes.size()));
+    to.putBytes(fields.bytes);
+  }
+
+  Result<void> endChunk();
+  Result<void> writeIndices(ChunkIndex& chunk_index);
+  Result<void> writeSummary();
+  void addStatistics(Fields& summary) const;
+  void addChunkIndices(Fields& summary) const;
+};
+
+McapWriter::McapWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+McapWriter::McapWriter(McapWriter&&) noexcept = default;
+McapWriter& McapWriter::operator=(McapWriter&&) noexcept = default;
+McapWriter::~McapWriter() {
+  if (impl_ != nullptr) (void)close();
+}
+
+Result<McapWriter> McapWriter::open(const std::filesystem::path& file, const McapOptions& options) {
+  auto impl = std::make_unique<Impl>();
+  impl->file = file;
+  impl->compress = options.compress;
+  std::error_code ignored;
+  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), ignored);
+  impl->descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (impl->descriptor < 0) return fail(file.string() + ": cannot be written (" + std::strerror(errno) + ")");
+  if (auto done = impl->put(mcap::kMagic); !done) return fail(done.error().what);
+  Fields header;
+  header.put(std::string_view("tenon"));
+  header.put(std::string_view("tenon"));
+  if (auto done = impl->record(mcap::kHeader, header); !done) return fail(done.error().what);
+  return McapWriter(std::move(impl));
+}
+
+std::uint16_t McapWriter::addChannel(std::string_view topic, std::string_view type_name,
+                                     std::string_view schema_text) {
+  Impl& to = *impl_;
+  auto [schema, is_new] = to.schema_ids.try_emplace(std::string(type_name), to.schema_ids.size() + 1);
+  Fields both;
+  if (is_new) {
+    Fields fields;
+    fields.put(schema->second);
+    fields.put(type_name);
+    fields.put(std::string_view("omgidl"));
+    fields.put(schema_text);
+    Impl::append(both, mcap::kSchema, fields);
+    to.schemas.putBytes(both.bytes);
+  }
+  const auto id = static_cast<std::uint16_t>(to.counts.size());
+  to.counts[id] = 0;
+  Fields channel;
+  channel.put(id);
+  channel.put(schema->second);
+  channel.put(topic);
+  channel.put(std::string_view("cdr"));
+  channel.put(std::map<std::string, std::string>{});
+  Fields record;
+  Impl::append(record, mcap::kChannel, channel);
+  to.channels.putBytes(record.bytes);
+  // schema and channel stand in the chunk before the channel's first message
+  if (to.chunk.bytes.empty()) to.chunk_began = StopWatch::now();
+  to.chunk.putBytes(both.bytes);
+  to.chunk.putBytes(record.bytes);
+  return id;
+}
+
+Result<void> McapWriter::write(std::uint16_t channel, std::int64_t log_time_ns, std::uint32_t sequence,
+                               std::span<const std::uint8_t> data) {
+  Impl& to = *impl_;
+  if (to.descriptor < 0) return fail(to.file.string() + ": is closed already");
+  if (to.chunk.bytes.empty()) to.chunk_began = StopWatch::now();
+  to.index[channel].emplace_back(log_time_ns, to.chunk.bytes.size());
+  constexpr std::size_t kMessageFields = 2 + 4 + 8 + 8;
+  to.chunk.put(mcap::kMessage);
+  to.chunk.put(static_cast<std::uint64_t>(kMessageFields + data.size()));
+  to.chunk.put(channel);
+  to.chunk.put(sequence);
+  to.chunk.put(log_time_ns);
+  to.chunk.put(log_time_ns);
+  to.chunk.putBytes(data);
+  to.first_time = std::min(to.first_time, log_time_ns);
+  to.last_time = std::max(to.last_time, log_time_ns);
+  ++to.counts[channel];
+  ++to.messages;
+
+  const auto now = StopWatch::now();
+  if (to.chunk.bytes.size() >= kChunkBytes || now - to.chunk_began > kChunkAge)
+    if (auto done = to.endChunk(); !done) return done;
+  if (now - to.synced > kSyncAge) {
+    ::fdatasync(to.descriptor);
+    to.synced = now;
+  }
+  return {};
+}
+
+Result<void> McapWriter::Impl::endChunk() {
+  if (chunk.bytes.empty()) return {};
+  const bool has_messages = !index.empty();
+  std::vector<std::uint8_t> packed;
+  if (compress) {
+    packed.resize(ZSTD_compressBound(chunk.bytes.size()));
+    const std::size_t size = ZSTD_compress(packed.data(), packed.size(), chunk.bytes.data(),
+                                           chunk.bytes.size(), kCompressionLevel);
+    if (ZSTD_isError(size) != 0) return fail(file.string() + ": " + ZSTD_getErrorName(size));
+    packed.resize(size);
+  }
+  ChunkIndex entry;
+  entry.first_time = has_messages ? first_time : 0;
+  entry.last_time = has_messages ? last_time : 0;
+  entry.offset = offset;
+  entry.plain = chunk.bytes.size();
+  entry.compressed = compress ? packed.size() : chunk.bytes.size();
+
+  Fields fields;
+  fields.put(entry.first_time);
+  fields.put(entry.last_time);
+  fields.put(entry.plain);
+  fields.put(mcap::crc32(chunk.bytes));
+  fields.put(std::string_view(compress ? "zstd" : ""));
+  fields.put(entry.compressed);
+  fields.putBytes(compress ? packed : chunk.bytes);
+  if (auto done = record(mcap::kChunk, fields); !done) return done;
+  entry.length = offset - entry.offset;
+  if (auto done = writeIndices(entry); !done) return done;
+  chunks.push_back(std::move(entry));
+
+  if (has_messages) {
+    start = std::min(start, first_time);
+    end = std::max(end, last_time);
+  }
+  chunk.bytes.clear();
+  index.clear();
+  first_time = std::numeric_limits<std::int64_t>::max();
+  last_time = 0;
+  return {};
+}
+
+Result<void> McapWriter::Impl::writeIndices(ChunkIndex& entry) {
+  const std::uint64_t begin = offset;
+  for (auto& [channel, records] : index) {
+    std::stable_sort(records.begin(), records.end(), [](const auto& a, const auto& b) {
+      return static_cast<std::int64_t>(a.first) < static_cast<std::int64_t>(b.first);
+    });
+    entry.message_indices[channel] = offset;
+    Fields fields;
+    fields.put(channel);
+    fields.put(static_cast<std::uint32_t>(records.size() * 16));
+    for (const auto& [time, at] : records) fields.put(time), fields.put(at);
+    if (auto done = record(mcap::kMessageIndex, fields); !done) return done;
+  }
+  entry.indices_length = offset - begin;
+  return {};
+}
+
+Result<void> McapWriter::addMetadata(std::string_view name,
+                                     const std::map<std::string, std::string>& values) {
+  Impl& to = *impl_;
+  if (auto done = to.endChunk(); !done) return done;
+  Fields fields;
+  fields.put(name);
+  fields.put(values);
+  const std::uint64_t at = to.offset;
+  if (auto done = to.record(mcap::kMetadata, fields); !done) return done;
+  Fields entry;
+  entry.put(at);
+  entry.put(to.offset - at);
+  entry.put(name);
+  Impl::append(to.metadata_index, mcap::kMetadataIndex, entry);
+  ++to.metadata;
+  return {};
+}
+
+Result<void> McapWriter::addAttachment(std::string_view name, std::string_view media_type,
+                                       std::span<const std::uint8_t> data) {
+  Impl& to = *impl_;
+  if (auto done = to.endChunk(); !done) return done;
+  Fields fields;
+  const std::int64_t time = to.end;
+  fields.put(time);
+  fields.put(time);
+  fields.put(name);
+  fields.put(media_type);
+  fields.put(static_cast<std::uint64_t>(data.size()));
+  fields.putBytes(data);
+  fields.put(mcap::crc32(fields.bytes));
+  const std::uint64_t at = to.offset;
+  if (auto done = to.record(mcap::kAttachment, fields); !done) return done;
+  Fields entry;
+  entry.put(at);
+  entry.put(to.offset - at);
+  entry.put(time);
+  entry.put(time);
+  entry.put(static_cast<std::uint64_t>(data.size()));
+  entry.put(name);
+  entry.put(media_type);
+  Impl::append(to.attachment_index, mcap::kAttachmentIndex, entry);
+  ++to.attachments;
+  return {};
+}
+
+Result<void> McapWriter::flush() {
+  if (impl_->descriptor < 0) return fail(impl_->file.string() + ": is closed already");
+  auto done = impl_->endChunk();
+  ::fdatasync(impl_->descriptor);
+  return done;
+}
+
+void McapWriter::Impl::addStatistics(Fields& summary) const {
+  Fields fields;
+  fields.put(messages);
+  fields.put(static_cast<std::uint16_t>(schema_ids.size()));
+  fields.put(static_cast<std::uint32_t>(counts.size()));
+  fields.put(attachments);
+  fields.put(metadata);
+  fields.put(static_cast<std::uint32_t>(chunks.size()));
+  fields.put(messages > 0 ? start : std::int64_t{0});
+  fields.put(end);
+  fields.put(static_cast<std::uint32_t>(counts.size() * 10));
+  for (const auto& [channel, count] : counts) fields.put(channel), fields.put(count);
+  append(summary, mcap::kStatistics, fields);
+}
+
+void McapWriter::Impl::addChunkIndices(Fields& summary) const {
+  for (const ChunkIndex& entry : chunks) {
+    Fields fields;
+    fields.put(entry.first_time);
+    fields.put(entry.last_time);
+    fields.put(entry.offset);
+    fields.put(entry.length);
+    fields.put(static_cast<std::uint32_t>(entry.message_indices.size() * 10));
+    for (const auto& [channel, at] : entry.message_indices) fields.put(channel), fields.put(at);
+    fields.put(entry.indices_length);
+    fields.put(std::string_view(compress ? "zstd" : ""));
+    fields.put(entry.compressed);
+    fields.put(entry.plain);
+    append(summary, mcap::kChunkIndex, fields);
+  }
+}
+
+Result<void> McapWriter::Impl::writeSummary() {
+  Fields data_end;
+  data_end.put(data_crc);
+  if (auto done = record(mcap::kDataEnd, data_end); !done) return done;
+
+  // groups of the summary, each with its place
+  const std::uint64_t summary_start = offset;
+  Fields summary, offsets;
+  const auto group = [&](mcap::Opcode opcode, auto&& add) {
+    const std::uint64_t at = summary_start + summary.bytes.size();
+    add();
+    const std::uint64_t length = summary_start + summary.bytes.size() - at;
+    if (length == 0) return;
+    Fields fields;
+    fields.put(opcode);
+    fields.put(at);
+    fields.put(length);
+    append(offsets, mcap::kSummaryOffset, fields);
+  };
+  group(mcap::kSchema, [&] { summary.putBytes(schemas.bytes); });
+  group(mcap::kChannel, [&] { summary.putBytes(channels.bytes); });
+  group(mcap::kStatistics, [&] { addStatistics(summary); });
+  group(mcap::kChunkIndex, [&] { addChunkIndices(summary); });
+  group(mcap::kAttachmentIndex, [&] { summary.putBytes(attachment_index.bytes); });
+  group(mcap::kMetadataIndex, [&] { summary.putBytes(metadata_index.bytes); });
+  const std::uint64_t offsets_start = summary_start + summary.bytes.size();
+  summary.putBytes(offsets.bytes);
+
+  // the checksum covers the footer up to itself
+  Fields footer;
+  footer.put(summary_start);
+  footer.put(offsets_start);
+  summary.put(mcap::kFooter);
+  summary.put(std::uint64_t{20});
+  summary.putBytes(footer.bytes);
+  summary.put(mcap::crc32(summary.bytes));
+  summary.putBytes(mcap::kMagic);
+  return put(summary.bytes);
+}
+
+Result<void> McapWriter::close() {
+  Impl& to = *impl_;
+  if (to.descriptor < 0) return {};
+  auto done = to.endChunk();
+  if (done) done = to.writeSummary();
+  ::fdatasync(to.descriptor);
+  const int closed = ::close(std::exchange(to.descriptor, -1));
+  if (done && closed != 0)
+    return fail(to.file.string() + ": cannot be closed (" + std::strerror(errno) + ")");
+  return done;
+}
+
+std::uint64_t McapWriter::messages() const { return impl_->messages; }
+
+}  // namespace tenon
