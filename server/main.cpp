@@ -1,5 +1,5 @@
-#include <csignal>
 #include <atomic>
+#include <csignal>
 #include <cstdio>
 #include <string>
 
@@ -26,7 +26,8 @@ struct Arguments {
 /// The command line, with every word a user may say.
 void declare(CLI::App& app, Arguments& arguments) {
   app.set_help_flag("-h,--help", "what this program does and how to call it");
-  app.add_option("scenario", arguments.scenario, "a scenario's folder or YAML file, as in scenarios/engine_bay");
+  app.add_option("scenario", arguments.scenario,
+                 "a scenario's folder or YAML file, as in scenarios/engine_bay");
   app.add_option("--session", arguments.session.name, "name by which people join")->capture_default_str();
   app.add_option("--domain", arguments.session.domain, "DDS domain, 0 to 230")->check(CLI::Range(0, 230));
   app.add_option("--detail", arguments.load.detail, "of generated parts, 0 to 1; 1 is 1.8 million triangles")
@@ -40,7 +41,8 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "threads that compute contacts; never changes the result")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
-  app.add_option("--journal", arguments.session.journal, "keep everything that each tick consumed in this file");
+  app.add_option("--journal", arguments.session.journal,
+                 "keep everything that each tick consumed in this file");
   app.add_option("--seed", arguments.session.seed, "of the tokens that clients get")->capture_default_str();
   app.add_flag("--lockstep", arguments.session.lockstep,
                "a tick waits for its inputs instead of the clock: repeatable to the last bit");
@@ -70,7 +72,8 @@ int runAgain(const Arguments& arguments, const tenon::LoadedScene& loaded) {
   tenon::Exercise exercise(loaded.scenario, loaded.scene, arguments.session.exercise);
   const auto report = tenon::rerun(arguments.rerun, exercise);
   if (!report) return complain(report.error().what);
-  sayOn(fmt::format("ticks {} to {}: {} compared, {} gaps", report->first, report->last, report->compared, report->gaps));
+  sayOn(fmt::format("ticks {} to {}: {} compared, {} gaps", report->first, report->last, report->compared,
+                    report->gaps));
   if (report->first_difference) {
     sayOn(fmt::format("first difference: tick {}", *report->first_difference));
     return 1;
@@ -107,7 +110,8 @@ int serve(Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Runs a training session: computes every contact and tells everybody over DDS.", "tenon serve");
+  CLI::App app("Runs a training session: computes every contact and tells everybody over DDS.",
+               "tenon serve");
   Arguments arguments;
   declare(app, arguments);
   CLI11_PARSE(app, argc, argv);

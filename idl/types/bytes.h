@@ -25,7 +25,9 @@ class ByteWriter {
     std::memcpy(bytes_.data() + at, &value, sizeof(T));
   }
   template <typename Tag>
-  void put(Id<Tag> id) { put(id.value); }
+  void put(Id<Tag> id) {
+    put(id.value);
+  }
   void put(const Vector3& v) {
     for (int i = 0; i < 3; ++i) put(v[i]);
   }
@@ -62,7 +64,9 @@ class ByteReader {
     at_ += sizeof(T);
   }
   template <typename Tag>
-  void get(Id<Tag>& id) { get(id.value); }
+  void get(Id<Tag>& id) {
+    get(id.value);
+  }
   void get(Vector3& v) {
     for (int i = 0; i < 3; ++i) get(v[i]);
   }

@@ -81,8 +81,8 @@ struct DeviceInput {
   std::uint32_t server_epoch = 0;
   Tick heard_tick = 0;  ///< newest server tick the client had heard: its age follows
   std::uint32_t dof_mask = kAllDofs;
-  bool active = false;          ///< false: the station's safety layer holds this device still
-  Vector3 p_WC = Vector3::Zero();  ///< C_w, the centre of the client's workspace (paper eq. 1)
+  bool active = false;                  ///< false: the station's safety layer holds this device still
+  Vector3 p_WC = Vector3::Zero();       ///< C_w, the centre of the client's workspace (paper eq. 1)
   std::array<DeviceSample, 4> samples;  ///< newest first; the older three repeat, against loss
 };
 
@@ -91,17 +91,17 @@ struct ObjectState {
   std::uint32_t epoch = 0;  ///< raised at every declared jump
   Pose X_WO;
   Eigen::Matrix<float, 6, 1> V_WO = Eigen::Matrix<float, 6, 1>::Zero();  ///< linear, angular
-  HandId holder;                                                        ///< none when nobody holds it
-  std::uint8_t status = 0;                                              ///< ObjectStatus
+  HandId holder;                                                         ///< none when nobody holds it
+  std::uint8_t status = 0;                                               ///< ObjectStatus
   bool in_contact = false;
 };
 
 enum class ObjectStatus : std::uint8_t {
-  kHidden,  ///< not in the scene yet: neither seen nor felt
-  kParked,  ///< stands still where it is, may be touched
-  kHeld,    ///< follows a hand through its coupling
+  kHidden,   ///< not in the scene yet: neither seen nor felt
+  kParked,   ///< stands still where it is, may be touched
+  kHeld,     ///< follows a hand through its coupling
   kTracked,  ///< follows a tracker as it is, feels nothing (forearm, head)
-  kFixed,   ///< mounted
+  kFixed,    ///< mounted
 };
 
 inline constexpr int kStatesPerFrame = 12;
@@ -122,10 +122,10 @@ inline constexpr int kManifoldContacts = 16;
 /// admissible while normal_A · (point of B, seen in A) >= offset.
 struct ManifoldContact {
   ObjectId other;
-  Vector3f p_BoP_B = Vector3f::Zero();   ///< the point, fixed in the held body
-  Vector3f normal_A = Vector3f::Zero();  ///< unit, away from A
-  float offset = 0.0F;                   ///< [m] of the plane from A's origin
-  float gap = 0.0F;                      ///< [m] at the tick of the manifold, signed, dilation included
+  Vector3f p_BoP_B = Vector3f::Zero();     ///< the point, fixed in the held body
+  Vector3f normal_A = Vector3f::Zero();    ///< unit, away from A
+  float offset = 0.0F;                     ///< [m] of the plane from A's origin
+  float gap = 0.0F;                        ///< [m] at the tick of the manifold, signed, dilation included
   Vector3f velocity_W = Vector3f::Zero();  ///< of A's material at the point
 };
 
@@ -136,10 +136,10 @@ struct HandManifold {
   std::uint32_t answers_seq = 0;  ///< the newest input the server had used
   ObjectId object;                ///< what this hand moves
   std::uint32_t object_epoch = 0;
-  Pose X_HO;  ///< where the object is in the hand, since it was taken
-  Pose X_WO;  ///< the proxy (god object)
+  Pose X_HO;      ///< where the object is in the hand, since it was taken
+  Pose X_WO;      ///< the proxy (god object)
   Wrench F_Ho_W;  ///< the coupling's wrench on the hand, about the hand's origin, as the server computed it
-  double stiffness = 0.0;           ///< [N/m] of the coupling
+  double stiffness = 0.0;             ///< [N/m] of the coupling
   double rotational_stiffness = 0.0;  ///< [Nm/rad]
   double validity_radius = 0.0;  ///< [m] the object may move this far before unlisted contacts can matter
   std::uint32_t step_revision = 0;
@@ -152,11 +152,11 @@ struct HandState {
   std::uint32_t seq = 0;
   Pose X_WH;
   Vector3 p_WC = Vector3::Zero();
-  Pose X_WO_local;  ///< the local proxy: what the person felt (telemetry only)
-  Wrench F_Ho_W;    ///< displayed on the hand
-  std::uint32_t manifold_age = 0;  ///< [ticks]
-  std::uint32_t safety_flags = 0;  ///< bit per rule of devices/safety.h that is acting
-  bool indexing = false;           ///< the workspace is moving
+  Pose X_WO_local;                        ///< the local proxy: what the person felt (telemetry only)
+  Wrench F_Ho_W;                          ///< displayed on the hand
+  std::uint32_t manifold_age = 0;         ///< [ticks]
+  std::uint32_t safety_flags = 0;         ///< bit per rule of devices/safety.h that is acting
+  bool indexing = false;                  ///< the workspace is moving
   std::array<std::uint8_t, 6> tactors{};  ///< intensities of an arm band, 0..255
 };
 
@@ -166,13 +166,13 @@ struct PairContact {
   bool enabled = true;
   bool colliding = false;
   std::uint32_t contacts = 0;
-  Wrench F_Ao_W;             ///< of b on a, about a's origin
+  Wrench F_Ao_W;                   ///< of b on a, about a's origin
   Vector3 p_WP = Vector3::Zero();  ///< where the force acts, as a mean of the contact points
-  double depth = 0.0;        ///< [m] of the deepest point in the undilated field, 0 when apart
-  double gap = 0.0;          ///< [m] smallest signed gap, dilation included
-  double load_percent = 0.0;  ///< paper eq. 2
-  double peak_force = 0.0;   ///< [N] since the last sample of this topic
-  double peak_depth = 0.0;   ///< [m] likewise
+  double depth = 0.0;              ///< [m] of the deepest point in the undilated field, 0 when apart
+  double gap = 0.0;                ///< [m] smallest signed gap, dilation included
+  double load_percent = 0.0;       ///< paper eq. 2
+  double peak_force = 0.0;         ///< [N] since the last sample of this topic
+  double peak_depth = 0.0;         ///< [m] likewise
 };
 
 inline constexpr int kPairsPerSample = 6;
@@ -187,10 +187,10 @@ struct ContactPairs {
 struct TickStats {
   std::uint32_t server_epoch = 0;
   Tick tick = 0;
-  double load_percent = 0.0;        ///< largest of the active pairs since the last sample
-  double compute_seconds = 0.0;     ///< of the last tick
+  double load_percent = 0.0;         ///< largest of the active pairs since the last sample
+  double compute_seconds = 0.0;      ///< of the last tick
   double compute_seconds_max = 0.0;  ///< since the last sample
-  std::uint64_t late_ticks = 0;     ///< since the start
+  std::uint64_t late_ticks = 0;      ///< since the start
   std::uint32_t active_pairs = 0;
   std::uint32_t queried_pairs = 0;
   std::uint64_t points_visited = 0;
@@ -245,10 +245,10 @@ struct SceneObject {
   ObjectId object;
   std::string name;
   std::string title;
-  std::string kind;          ///< what a display draws it as: part, tool, pointer, assistant, forearm, head, scene
-  std::string mesh_hash;     ///< of the display mesh, empty for none
+  std::string kind;  ///< what a display draws it as: part, tool, pointer, assistant, forearm, head, scene
+  std::string mesh_hash;       ///< of the display mesh, empty for none
   std::string structure_hash;  ///< of the haptic structures, empty for none
-  std::string color;         ///< `#rrggbb` or `#rrggbbaa`
+  std::string color;           ///< `#rrggbb` or `#rrggbbaa`
   Pose X_WO;
   Vector3 size = Vector3::Zero();  ///< of the bounding box in the object's frame
   Vector3 centre = Vector3::Zero();
@@ -275,17 +275,17 @@ struct StepState {
   std::vector<LocalizedText> title;
   std::vector<LocalizedText> instruction;
   StepPhase phase = StepPhase::kWaiting;
-  std::string part;    ///< title of the part this step belongs to, for grouping on displays; may be empty
-  ObjectId object;     ///< to be touched, moved or used; may be none
-  HandId hand;         ///< that is meant to do it
-  ObjectId touch;      ///< the object to touch, when the step asks for a touch
+  std::string part;  ///< title of the part this step belongs to, for grouping on displays; may be empty
+  ObjectId object;   ///< to be touched, moved or used; may be none
+  HandId hand;       ///< that is meant to do it
+  ObjectId touch;    ///< the object to touch, when the step asks for a touch
   bool has_target = false;
-  Pose X_WG;           ///< ghost: where `object` shall be
+  Pose X_WG;                             ///< ghost: where `object` shall be
   Vector3 approach_W = Vector3::Zero();  ///< unit: the direction in which it goes in; zero for any
-  double approach_distance = 0.0;        ///< [m] before the target, along it, where that direction starts to matter
-  double tolerance = 0.0;        ///< [m]
-  double angle_tolerance = 0.0;  ///< [rad]
-  double timeout = 0.0;          ///< [s], 0 for none
+  double approach_distance = 0.0;  ///< [m] before the target, along it, where that direction starts to matter
+  double tolerance = 0.0;          ///< [m]
+  double angle_tolerance = 0.0;    ///< [rad]
+  double timeout = 0.0;            ///< [s], 0 for none
   Tick started = 0;
 };
 
@@ -346,8 +346,8 @@ enum class CommandKind : std::uint32_t {
   kResume,
   kReset,
   kSkipStep,
-  kRelease,      ///< let go of what `hand` holds
-  kSwapHands,    ///< the trainee's two coupled hands change roles
+  kRelease,       ///< let go of what `hand` holds
+  kSwapHands,     ///< the trainee's two coupled hands change roles
   kSetCollision,  ///< text "a b", value 0 or 1
   kStop,
 };

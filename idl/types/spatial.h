@@ -46,9 +46,7 @@ class Pose {
   [[nodiscard]] Pose operator*(const Pose& X_BC) const {
     return {*this * X_BC.translation_, (rotation_ * X_BC.rotation_).normalized()};
   }
-  [[nodiscard]] bool isFinite() const {
-    return translation_.allFinite() && rotation_.coeffs().allFinite();
-  }
+  [[nodiscard]] bool isFinite() const { return translation_.allFinite() && rotation_.coeffs().allFinite(); }
   [[nodiscard]] bool operator==(const Pose& other) const {
     return translation_ == other.translation_ && rotation_.coeffs() == other.rotation_.coeffs();
   }

@@ -10,7 +10,8 @@ constexpr Tick kThirtyHertz = 33;
 
 }  // namespace
 
-Broadcast::Broadcast(std::shared_ptr<const ScenarioFile> scenario, std::uint32_t server_epoch, bool everything)
+Broadcast::Broadcast(std::shared_ptr<const ScenarioFile> scenario, std::uint32_t server_epoch,
+                     bool everything)
     : scenario_(std::move(scenario)),
       server_epoch_(server_epoch),
       everything_(everything),
@@ -75,7 +76,8 @@ void Broadcast::addPairs(const TickOutput& output) {
     }
     outgoing_.pairs.back().pairs.push_back(pair);
   }
-  for (ContactPairs& sample : outgoing_.pairs) sample.parts = static_cast<std::uint32_t>(outgoing_.pairs.size());
+  for (ContactPairs& sample : outgoing_.pairs)
+    sample.parts = static_cast<std::uint32_t>(outgoing_.pairs.size());
   std::fill(peaks_.begin(), peaks_.end(), PairContact{});
 }
 

@@ -12,8 +12,8 @@ namespace tenon {
 
 /// The messages of one tick, by rate tier. Valid until the next one is made.
 struct Outgoing {
-  std::vector<WorldFrame> frames;        ///< for WorldFrame_1k
-  std::vector<WorldFrame> frames_100;    ///< empty when it is not their turn, as are the following
+  std::vector<WorldFrame> frames;      ///< for WorldFrame_1k
+  std::vector<WorldFrame> frames_100;  ///< empty when it is not their turn, as are the following
   std::vector<WorldFrame> frames_30;
   std::vector<const HandManifold*> manifolds;
   std::vector<ContactPairs> pairs;
@@ -22,7 +22,8 @@ struct Outgoing {
   News news;
 };
 
-/// Turns the outputs of ticks into what is sent, tier by tier. A slower tier carries the maxima since its last sample.
+/// Turns the outputs of ticks into what is sent, tier by tier. A slower tier carries the maxima since its
+/// last sample.
 ///
 /// Threads: one (wire).
 class Broadcast {

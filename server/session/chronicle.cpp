@@ -48,14 +48,24 @@ void Chronicle::readRun(const TickOutput& output, News& news) {
   run.tick = output.tick;
   run.server_epoch = server_epoch_;
   switch (output.phase) {
-    case RunPhase::kWaitingForPeople: run.reason = "waiting for people"; break;
-    case RunPhase::kRunning: run.reason = output.emergency_stop ? "emergency stop" : "running"; break;
-    case RunPhase::kPaused: run.reason = "paused"; break;
-    case RunPhase::kSucceeded: run.reason = "everything is mounted"; break;
+    case RunPhase::kWaitingForPeople:
+      run.reason = "waiting for people";
+      break;
+    case RunPhase::kRunning:
+      run.reason = output.emergency_stop ? "emergency stop" : "running";
+      break;
+    case RunPhase::kPaused:
+      run.reason = "paused";
+      break;
+    case RunPhase::kSucceeded:
+      run.reason = "everything is mounted";
+      break;
     case RunPhase::kFailed:
       run.reason = fmt::format("step '{}' was not done in time", scenario_->states[output.step.step].name);
       break;
-    case RunPhase::kStopped: run.reason = "stopped"; break;
+    case RunPhase::kStopped:
+      run.reason = "stopped";
+      break;
   }
   if (output.phase >= RunPhase::kSucceeded) run.final_hash = output.hash;
   const bool bad = output.phase == RunPhase::kFailed || output.emergency_stop;
@@ -67,9 +77,10 @@ void Chronicle::readStep(const TickOutput& output, News& news) {
   if (before_ && before_->step.revision == output.step.revision) return;
   const ScenarioFile& scenario = *scenario_;
   if (before_ && before_->step.step != output.step.step)
-    news.events.push_back(event(Severity::kInfo, "step done",
-                                fmt::format("{} ({:.1f} s)", scenario.states[before_->step.step].name,
-                                            static_cast<double>(output.tick - before_->step.started) * kTickSeconds)));
+    news.events.push_back(
+        event(Severity::kInfo, "step done",
+              fmt::format("{} ({:.1f} s)", scenario.states[before_->step.step].name,
+                          static_cast<double>(output.tick - before_->step.started) * kTickSeconds)));
   news.step = describe(scenario, output.step);
   if (output.phase != RunPhase::kWaitingForPeople && output.step.phase == StepPhase::kActive)
     news.events.push_back(event(Severity::kInfo, "step", scenario.states[output.step.step].name));
@@ -109,8 +120,9 @@ void Chronicle::readHands(const TickOutput& output, News& news) {
                                   fmt::format("hand '{}' is gone: what it held is parked", name)));
     if (!before_ || before_->present[i] != output.present[i]) continue;
     if (is_frozen && !was_frozen)
-      news.events.push_back(event(Severity::kWarning, "hand frozen",
-                                  fmt::format("hand '{}' is held still (last input {} ms ago)", name, output.ages[i])));
+      news.events.push_back(
+          event(Severity::kWarning, "hand frozen",
+                fmt::format("hand '{}' is held still (last input {} ms ago)", name, output.ages[i])));
     if (was_frozen && !is_frozen && output.present[i])
       news.events.push_back(event(Severity::kInfo, "hand free", fmt::format("hand '{}' moves again", name)));
   }
@@ -142,9 +154,8 @@ void FramePacker::pack(const TickOutput& output, bool all, std::vector<WorldFram
   for (std::size_t k = 0; !all && k < count && !frames.empty() && !frames.back().states.full(); ++k) {
     turn_ = (turn_ + 1) % static_cast<std::uint32_t>(count);
     const auto& states = frames.back().states;
-    const bool listed = std::any_of(states.begin(), states.end(), [&](const ObjectState& state) {
-      return state.object.value == turn_;
-    });
+    const bool listed = std::any_of(states.begin(), states.end(),
+                                    [&](const ObjectState& state) { return state.object.value == turn_; });
     if (!listed) add(turn_);
   }
   if (frames.empty()) add(turn_ = (turn_ + 1) % static_cast<std::uint32_t>(count));

@@ -49,8 +49,8 @@ class Chronicle {
   std::uint64_t events_ = 0;
 };
 
-/// Packs the objects of a tick into frames: those that moved first, then a few others in turn, so that everybody has
-/// everything after a while at any loss; all of them when `all`.
+/// Packs the objects of a tick into frames: those that moved first, then a few others in turn, so that
+/// everybody has everything after a while at any loss; all of them when `all`.
 class FramePacker {
  public:
   explicit FramePacker(std::uint32_t server_epoch) : server_epoch_(server_epoch) {}

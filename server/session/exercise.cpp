@@ -31,13 +31,22 @@ void Exercise::tick(const TickInput& input) noexcept {
 
 void Exercise::apply(const Change& change) noexcept {
   switch (change.kind) {
-    case ChangeKind::kAttach: return attach(change.hand);
-    case ChangeKind::kDetach: return detach(change.hand);
-    case ChangeKind::kGame: game_.push_back(change.game); return;
-    case ChangeKind::kRelease: return environment_.release(change.hand);
-    case ChangeKind::kPair: return environment_.setPairEnabled(change.index, change.value != 0.0);
-    case ChangeKind::kSwapHands: return swapHands(change.hand, HandId{change.index});
-    case ChangeKind::kEmergencyStop: emergency_stop_ = change.value != 0.0; return;
+    case ChangeKind::kAttach:
+      return attach(change.hand);
+    case ChangeKind::kDetach:
+      return detach(change.hand);
+    case ChangeKind::kGame:
+      game_.push_back(change.game);
+      return;
+    case ChangeKind::kRelease:
+      return environment_.release(change.hand);
+    case ChangeKind::kPair:
+      return environment_.setPairEnabled(change.index, change.value != 0.0);
+    case ChangeKind::kSwapHands:
+      return swapHands(change.hand, HandId{change.index});
+    case ChangeKind::kEmergencyStop:
+      emergency_stop_ = change.value != 0.0;
+      return;
     case ChangeKind::kContribute:
       return environment_.contribute(change.object, change.index, change.F_Oo_W, change.lifetime_ticks);
     case ChangeKind::kExternalPose:
@@ -177,7 +186,8 @@ void Exercise::save(std::vector<std::uint8_t>& bytes) const {
   out.put(phase_), out.put(emergency_stop_);
   out.put(static_cast<std::uint32_t>(needed_hands_.size()));
   for (const HandId hand : needed_hands_) out.put(hand);
-  for (const HandAge& age : ages_) out.put(age.attached), out.put(age.active), out.put(age.age), out.put(age.seq);
+  for (const HandAge& age : ages_)
+    out.put(age.attached), out.put(age.active), out.put(age.age), out.put(age.seq);
   part(environment_.save());
   part(machine_.save());
 }

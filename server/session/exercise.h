@@ -12,8 +12,8 @@ namespace tenon {
 
 /// From which age of a hand's newest input the server does something about it.
 struct LinkLimits {
-  Tick freeze = 50;    ///< [ticks] the object is held still where it is
-  Tick park = 1000;    ///< [ticks] the hand counts as gone and its object is parked
+  Tick freeze = 50;  ///< [ticks] the object is held still where it is
+  Tick park = 1000;  ///< [ticks] the hand counts as gone and its object is parked
 };
 
 struct ExerciseOptions {
@@ -23,8 +23,8 @@ struct ExerciseOptions {
   std::vector<HandId> needed_hands;
 };
 
-/// The deterministic heart of a session: the scene, the state machine, the hands and their ages. What it does in a
-/// tick follows from its state and the TickInput alone, so a journal re-runs to the same hashes.
+/// The deterministic heart of a session: the scene, the state machine, the hands and their ages. What it does
+/// in a tick follows from its state and the TickInput alone, so a journal re-runs to the same hashes.
 ///
 /// Threads: one caller. Real-time: tick, fill.
 class Exercise {

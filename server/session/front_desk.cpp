@@ -28,16 +28,22 @@ bool isTeacher(Role role) { return role == Role::kInstructor || role == Role::kA
 
 std::string_view roleName(Role role) {
   switch (role) {
-    case Role::kAdmin: return "admin";
-    case Role::kInstructor: return "instructor";
-    case Role::kTrainee: return "trainee";
-    case Role::kObserver: return "observer";
-    case Role::kRecorder: return "recorder";
+    case Role::kAdmin:
+      return "admin";
+    case Role::kInstructor:
+      return "instructor";
+    case Role::kTrainee:
+      return "trainee";
+    case Role::kObserver:
+      return "observer";
+    case Role::kRecorder:
+      return "recorder";
   }
   return "unknown role";
 }
 
-FrontDesk::FrontDesk(const ScenarioFile& scenario, std::uint32_t server_epoch, bool lockstep, std::uint64_t seed)
+FrontDesk::FrontDesk(const ScenarioFile& scenario, std::uint32_t server_epoch, bool lockstep,
+                     std::uint64_t seed)
     : scenario_(scenario),
       server_epoch_(server_epoch),
       lockstep_(lockstep),
@@ -63,17 +69,17 @@ std::vector<std::string> FrontDesk::freeHands() const {
 
 std::string FrontDesk::refusal(const Join& join) const {
   if (join.protocol_version != kProtocolVersion)
-    return fmt::format("this server speaks protocol version {}, the client {}: update the older one", kProtocolVersion,
-                       join.protocol_version);
+    return fmt::format("this server speaks protocol version {}, the client {}: update the older one",
+                       kProtocolVersion, join.protocol_version);
   if (join.role > Role::kRecorder) return "unknown role";
   for (const std::string& name : join.hands) {
     const HandId hand = scenario_.handNamed(name);
     if (!hand.valid()) continue;  // a station may offer more hands than a scenario uses
     const Role owner = scenario_.hands[hand.value].role;
     if (!mayMoveHandOf(join.role, owner))
-      return fmt::format("hand '{}' belongs to the {}, not to the {}", name, roleName(owner), roleName(join.role));
-    if (movers_[hand.value].valid())
-      return fmt::format("hand '{}' is already moved by somebody else", name);
+      return fmt::format("hand '{}' belongs to the {}, not to the {}", name, roleName(owner),
+                         roleName(join.role));
+    if (movers_[hand.value].valid()) return fmt::format("hand '{}' is already moved by somebody else", name);
   }
   return {};
 }
@@ -147,14 +153,16 @@ bool FrontDesk::isMover(ClientId client, HandId hand) const {
 Result<HandReading> FrontDesk::reading(const DeviceInput& input) const {
   if (input.server_epoch != server_epoch_) return fail("an input meant for an earlier run of the server");
   if (input.hand.value >= movers_.size())
-    return fail(fmt::format("client {} sent input for hand {}, which this scenario does not have", input.client.value,
-                            input.hand.value));
+    return fail(fmt::format("client {} sent input for hand {}, which this scenario does not have",
+                            input.client.value, input.hand.value));
   const std::string& name = scenario_.hands[input.hand.value].name;
   if (!isMover(input.client, input.hand))
-    return fail(fmt::format("client {} sent input for hand '{}', which is not its own", input.client.value, name));
+    return fail(
+        fmt::format("client {} sent input for hand '{}', which is not its own", input.client.value, name));
   const DeviceSample& newest = input.samples[0];
   if (!isSane(newest.X_WH) || !isSane(newest.V_WH.linear, kFastest) || !isSane(newest.V_WH.angular, kFastest))
-    return fail(fmt::format("client {} sent a pose of hand '{}' that is not a pose: ignored", input.client.value, name));
+    return fail(fmt::format("client {} sent a pose of hand '{}' that is not a pose: ignored",
+                            input.client.value, name));
   return HandReading{input.hand, newest.seq, input.active, newest.X_WH, newest.V_WH, newest.buttons};
 }
 
@@ -165,7 +173,8 @@ Result<Change> FrontDesk::contribution(const ForceContribution& force) const {
   if (force.object.value >= scenario_.objects.size())
     return fail(fmt::format("client {} sent a force for an unknown object", force.client.value));
   if (!isSane(force.F_Oo_W.force, kLargestForce) || !isSane(force.F_Oo_W.torque, kLargestForce))
-    return fail(fmt::format("client {} sent a force that is not finite or above {} N", force.client.value, kLargestForce));
+    return fail(fmt::format("client {} sent a force that is not finite or above {} N", force.client.value,
+                            kLargestForce));
   return Change{.kind = ChangeKind::kContribute,
                 .object = force.object,
                 .index = force.source,
@@ -178,7 +187,8 @@ Result<Change> FrontDesk::externalPose(const ExternalPose& pose) const {
   if (who == nullptr || !who->alive || !isTeacher(who->role))
     return fail(fmt::format("client {} may not place objects", pose.client.value));
   if (pose.object.value >= scenario_.objects.size() || !isSane(pose.X_WO))
-    return fail(fmt::format("client {} sent a pose for an object that is unknown or no pose", pose.client.value));
+    return fail(
+        fmt::format("client {} sent a pose for an object that is unknown or no pose", pose.client.value));
   return Change{.kind = ChangeKind::kExternalPose, .object = pose.object, .X_WO = pose.X_WO};
 }
 
@@ -206,7 +216,9 @@ int FrontDesk::pairNamed(std::string_view a, std::string_view b) const {
 }
 
 Result<Change> FrontDesk::changeFor(const Command& command, Role role) const {
-  const auto not_for = [&] { return fail(fmt::format("not for the {}: ask the instructor", roleName(role))); };
+  const auto not_for = [&] {
+    return fail(fmt::format("not for the {}: ask the instructor", roleName(role)));
+  };
   if (role == Role::kObserver || role == Role::kRecorder) return not_for();
   const auto game = [&](std::uint32_t signal = 0) {
     Change change{.kind = ChangeKind::kGame};
@@ -214,7 +226,8 @@ Result<Change> FrontDesk::changeFor(const Command& command, Role role) const {
     return change;
   };
   switch (command.kind) {
-    case CommandKind::kFulfilled: return game();
+    case CommandKind::kFulfilled:
+      return game();
     case CommandKind::kSignal: {
       const int signal = scenario_.signalNamed(command.text);
       if (signal < 0) return fail(fmt::format("this scenario listens to no signal '{}'", command.text));
@@ -228,28 +241,36 @@ Result<Change> FrontDesk::changeFor(const Command& command, Role role) const {
       const auto other = static_cast<std::uint32_t>(command.value);
       if (command.value < 0.0 || other >= movers_.size() || command.hand.value >= movers_.size())
         return fail("there is no such hand");
-      if (!isTeacher(role) && (!isMover(command.client, command.hand) || !isMover(command.client, HandId{other})))
+      if (!isTeacher(role) &&
+          (!isMover(command.client, command.hand) || !isMover(command.client, HandId{other})))
         return fail("those are not your hands");
       return Change{.kind = ChangeKind::kSwapHands, .hand = command.hand, .index = other};
     }
-    default: break;
+    default:
+      break;
   }
   if (!isTeacher(role)) return not_for();
   switch (command.kind) {
-    case CommandKind::kPause: return Change{.kind = ChangeKind::kPause};
-    case CommandKind::kResume: return Change{.kind = ChangeKind::kResume};
-    case CommandKind::kStop: return Change{.kind = ChangeKind::kStop};
+    case CommandKind::kPause:
+      return Change{.kind = ChangeKind::kPause};
+    case CommandKind::kResume:
+      return Change{.kind = ChangeKind::kResume};
+    case CommandKind::kStop:
+      return Change{.kind = ChangeKind::kStop};
     case CommandKind::kReset:
-    case CommandKind::kSkipStep: return game();
+    case CommandKind::kSkipStep:
+      return game();
     case CommandKind::kSetCollision: {
       const std::size_t space = command.text.find(' ');
       const int pair = space == std::string::npos
                            ? -1
                            : pairNamed(command.text.substr(0, space), command.text.substr(space + 1));
       if (pair < 0) return fail(fmt::format("'{}' are not two objects that may touch", command.text));
-      return Change{.kind = ChangeKind::kPair, .index = static_cast<std::uint32_t>(pair), .value = command.value};
+      return Change{
+          .kind = ChangeKind::kPair, .index = static_cast<std::uint32_t>(pair), .value = command.value};
     }
-    default: return fail("unknown command");
+    default:
+      return fail("unknown command");
   }
 }
 

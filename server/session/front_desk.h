@@ -11,8 +11,8 @@
 
 namespace tenon {
 
-/// Who is here, what each may do, who moves which hand. Knows neither network nor time: it is told what arrived and
-/// says what follows, as Changes for the next tick and as answers to the sender.
+/// Who is here, what each may do, who moves which hand. Knows neither network nor time: it is told what
+/// arrived and says what follows, as Changes for the next tick and as answers to the sender.
 ///
 /// Threads: one (wire).
 class FrontDesk {

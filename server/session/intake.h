@@ -14,7 +14,8 @@ namespace tenon {
 /// Threads: one writer (wire: put), one reader (tick: collect). Real-time: all but construction.
 class Intake {
  public:
-  explicit Intake(std::size_t hands) : readings_(std::make_unique<Latest<HandReading>[]>(hands)), hands_(hands) {}
+  explicit Intake(std::size_t hands)
+      : readings_(std::make_unique<Latest<HandReading>[]>(hands)), hands_(hands) {}
 
   void put(const HandReading& reading) noexcept { readings_[reading.hand.value].write(reading); }
   /// False when the tick has fallen so far behind that there is no room.

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "idl/record/mcap_reader.h"
-#include "idl/wire/tap.h"
+#include "idl/wire/codec.h"
 #include "idl/wire/topics.h"
 
 namespace tenon {
@@ -109,11 +109,14 @@ Result<void> Journal::write(const JournalEntry& entry) {
   Result<void> result;
   const auto log_time = static_cast<std::int64_t>(entry.input.tick) * kNanosecondsPerTick;
   const auto put = [&](std::uint16_t channel, const auto& part) {
-    if (auto done = writer_.write(channel, log_time, part.part, encode(part)); !done) result = done;
+    const auto data = encode(part);
+    const auto done = data ? writer_.write(channel, log_time, part.part, *data) : fail(data.error().what);
+    if (!done) result = done;
   };
   bytes_.clear();
   appendBytes(entry.input, bytes_);
-  forEachPart<TickInputPart>(entry.input.tick, entry.hash, bytes_, [&](const auto& part) { put(inputs_, part); });
+  forEachPart<TickInputPart>(entry.input.tick, entry.hash, bytes_,
+                             [&](const auto& part) { put(inputs_, part); });
   if (!entry.checkpoint.empty())
     forEachPart<CheckpointPart>(entry.input.tick, entry.hash, entry.checkpoint,
                                 [&](const auto& part) { put(checkpoints_, part); });
@@ -121,9 +124,10 @@ Result<void> Journal::write(const JournalEntry& entry) {
 }
 
 Result<void> Journal::close(const RunState& run) {
-  const auto noted = writer_.addMetadata("tenon outcome", {{"reason", run.reason},
-                                                           {"tick", std::to_string(run.tick)},
-                                                           {"final hash", fmt::format("{:016x}", run.final_hash)}});
+  const auto noted =
+      writer_.addMetadata("tenon outcome", {{"reason", run.reason},
+                                            {"tick", std::to_string(run.tick)},
+                                            {"final hash", fmt::format("{:016x}", run.final_hash)}});
   if (!noted) return noted;
   return writer_.close();
 }
@@ -134,10 +138,12 @@ Result<RerunReport> rerun(const std::filesystem::path& file, Exercise& exercise)
   Rerunner rerunner(exercise);
   McapMessage message;
   while (reader->next(message))
-    if (auto read = rerunner.read(message); !read) return fail(fmt::format("{}: {}", file.string(), read.error().what));
+    if (auto read = rerunner.read(message); !read)
+      return fail(fmt::format("{}: {}", file.string(), read.error().what));
   if (rerunner.report().compared == 0)
-    return fail(fmt::format("{}: holds no ticks to run again (was it recorded by 'tenon record' or 'tenon serve'?)",
-                            file.string()));
+    return fail(
+        fmt::format("{}: holds no ticks to run again (was it recorded by 'tenon record' or 'tenon serve'?)",
+                    file.string()));
   return rerunner.report();
 }
 
@@ -147,7 +153,8 @@ Result<JournalOrigin> originOf(const std::filesystem::path& file) {
   for (const auto& [name, values] : reader->metadata())
     if (name == kMetadata && values.contains("scenario") && values.contains("detail"))
       return JournalOrigin{values.at("scenario"), std::strtod(values.at("detail").c_str(), nullptr)};
-  return fail(fmt::format("{}: does not say which scenario it was made with; name it before --rerun", file.string()));
+  return fail(
+      fmt::format("{}: does not say which scenario it was made with; name it before --rerun", file.string()));
 }
 
 }  // namespace tenon

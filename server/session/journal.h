@@ -30,9 +30,11 @@ void forEachPart(Tick tick, std::uint64_t hash, std::span<const std::uint8_t> by
   Part part;
   part.tick = tick;
   part.state_hash = hash;
-  part.parts = static_cast<std::uint32_t>(std::max<std::size_t>(1, (bytes.size() + kPartBytes - 1) / kPartBytes));
+  part.parts =
+      static_cast<std::uint32_t>(std::max<std::size_t>(1, (bytes.size() + kPartBytes - 1) / kPartBytes));
   for (part.part = 0; part.part < part.parts; ++part.part) {
-    const auto slice = bytes.subspan(part.part * kPartBytes, std::min(kPartBytes, bytes.size() - part.part * kPartBytes));
+    const auto slice =
+        bytes.subspan(part.part * kPartBytes, std::min(kPartBytes, bytes.size() - part.part * kPartBytes));
     part.bytes.assign(slice.begin(), slice.end());
     emit(part);
   }
@@ -44,8 +46,8 @@ struct JournalOrigin {
   double detail = 1.0;   ///< of generated parts
 };
 
-/// The server's own recording on its local disk: every TickInput with the hash of the state it left, and a Checkpoint
-/// a second. An MCAP file like any other recording.
+/// The server's own recording on its local disk: every TickInput with the hash of the state it left, and a
+/// Checkpoint a second. An MCAP file like any other recording.
 ///
 /// Threads: one (journal).
 class Journal {
@@ -65,15 +67,15 @@ class Journal {
 
 /// How a re-run went.
 struct RerunReport {
-  Tick first = 0, last = 0;    ///< ticks compared
+  Tick first = 0, last = 0;  ///< ticks compared
   std::uint64_t compared = 0;
-  std::uint64_t gaps = 0;      ///< places where ticks were missing: taken up again at the next checkpoint
+  std::uint64_t gaps = 0;  ///< places where ticks were missing: taken up again at the next checkpoint
   std::uint64_t final_hash = 0;
   std::optional<Tick> first_difference;
 };
 
-/// Runs the ticks of a journal or recording again, from its first checkpoint on, and compares the hash of every one
-/// (DESIGN section 5).
+/// Runs the ticks of a journal or recording again, from its first checkpoint on, and compares the hash of
+/// every one (DESIGN section 5).
 [[nodiscard]] Result<RerunReport> rerun(const std::filesystem::path& file, Exercise& exercise);
 
 /// Fails when the file is no journal.

@@ -1,13 +1,12 @@
 #include "server/session/scene_loader.h"
 
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <cstdlib>
 #include <vector>
 
 #include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "server/bake/bake.h"
 
@@ -51,8 +50,8 @@ Result<fs::path> generatedParts(const ScenarioFile& scenario, const LoadOptions&
   const fs::path making = folder.string() + fmt::format(".{}", getpid());
   fs::create_directories(making, error);
   if (error) return fail(fmt::format("{}: cannot make this folder ({})", making.string(), error.message()));
-  const auto done = run({program.string(), scenario.name, making.string(), "--detail", fmt::format("{}", options.detail),
-                         "--quiet"});
+  const auto done = run({program.string(), scenario.name, making.string(), "--detail",
+                         fmt::format("{}", options.detail), "--quiet"});
   if (!done) return fail(done.error().what);
   fs::remove_all(folder, error);
   fs::rename(making, folder, error);
@@ -66,8 +65,8 @@ Result<std::vector<fs::path>> meshFiles(const ScenarioFile& scenario, const Scen
   std::vector<fs::path> files;
   for (const MeshSource& mesh : object.meshes) {
     if (mesh.unit != object.meshes.front().unit)
-      return fail(fmt::format("{}:{}: the meshes of '{}' have different units", scenario.path.string(), object.line,
-                              object.name));
+      return fail(fmt::format("{}:{}: the meshes of '{}' have different units", scenario.path.string(),
+                              object.line, object.name));
     if (mesh.part.empty()) {
       files.push_back(mesh.file);
       continue;
@@ -95,15 +94,18 @@ Result<std::shared_ptr<const HapticStructures>> structuresOf(
     if (progress) progress(fmt::format("{}: {}", object.title.front().text, doing), share);
     return true;
   };
-  const auto file = bakeCached(*files, object.meshes.front().unit, bake, options.cache / "structures", report);
+  const auto file =
+      bakeCached(*files, object.meshes.front().unit, bake, options.cache / "structures", report);
   if (!file)
-    return fail(fmt::format("{}:{}: '{}': {}", scenario.path.string(), object.line, object.name, file.error().what));
+    return fail(
+        fmt::format("{}:{}: '{}': {}", scenario.path.string(), object.line, object.name, file.error().what));
   return openStructures(*file);
 }
 
 }  // namespace
 
-Result<LoadedScene> loadScene(const fs::path& path, const LoadOptions& options, const LoadProgress& progress) {
+Result<LoadedScene> loadScene(const fs::path& path, const LoadOptions& options,
+                              const LoadProgress& progress) {
   auto file = readScenario(path);
   if (!file) return fail(file.error().what);
   const auto scenario = std::make_shared<const ScenarioFile>(std::move(*file));

@@ -25,7 +25,8 @@ struct LoadedScene {
   std::shared_ptr<const Scene> scene;
 };
 
-/// Reads a scenario, has its parts generated and its meshes baked (both through the cache), and builds the scene.
+/// Reads a scenario, has its parts generated and its meshes baked (both through the cache), and builds the
+/// scene.
 [[nodiscard]] Result<LoadedScene> loadScene(const std::filesystem::path& scenario, const LoadOptions& options,
                                             const LoadProgress& progress = {});
 

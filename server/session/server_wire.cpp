@@ -50,8 +50,8 @@ struct ServerWire::Writers {
 
   auto inLobby() { return std::tie(announce, welcome); }
   auto inSession() {
-    return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, object, step, progress, run, grab,
-                    ack, guidance, event, clock, input, checkpoint);
+    return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, object, step, progress,
+                    run, grab, ack, guidance, event, clock, input, checkpoint);
   }
 };
 
@@ -87,8 +87,10 @@ ServerWire::ServerWire(const WireOptions& options, std::shared_ptr<Participant> 
 
 Result<std::unique_ptr<ServerWire>> ServerWire::open(const WireOptions& options, const LoadedScene& loaded,
                                                      FrontDesk& desk, Intake& intake, Broadcast& broadcast) {
-  auto participant = Participant::open(
-      {.domain = options.domain, .profile = options.lockstep ? LinkProfile::kLockstep : LinkProfile::kLan, .config = {}});
+  auto participant =
+      Participant::open({.domain = options.domain,
+                         .profile = options.lockstep ? LinkProfile::kLockstep : LinkProfile::kLan,
+                         .config = {}});
   if (!participant) return fail(participant.error().what);
   std::unique_ptr<ServerWire> wire(new ServerWire(options, std::move(*participant), desk, intake, broadcast));
   wire->title_ = loaded.scenario->title.front().text;
@@ -125,7 +127,8 @@ Result<void> ServerWire::openReaders() {
   };
   listenTo(session_, kForceContribution,
            [this, take](const ForceContribution& force) { take(desk_.contribution(force)); });
-  listenTo(session_, kExternalPose, [this, take](const ExternalPose& pose) { take(desk_.externalPose(pose)); });
+  listenTo(session_, kExternalPose,
+           [this, take](const ExternalPose& pose) { take(desk_.externalPose(pose)); });
   if (result)
     result = inbox_.onGone<Presence>(session_, kPresence, [this](const Presence& gone) { heardGone(gone); });
   return result;
@@ -194,7 +197,8 @@ void ServerWire::hear(const Command& command) {
   const CommandAck ack = desk_.command(command);
   (void)writers_->ack.writer->write(ack);
   if (!ack.accepted)
-    note(Severity::kWarning, "refused", fmt::format("command of client {}: {}", command.client.value, ack.reason));
+    note(Severity::kWarning, "refused",
+         fmt::format("command of client {}: {}", command.client.value, ack.reason));
 }
 
 void ServerWire::hear(const ClockSync& sync) {

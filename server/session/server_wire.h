@@ -31,8 +31,9 @@ struct WireOptions {
 /// Threads: one (wire). Real-time: no.
 class ServerWire {
  public:
-  [[nodiscard]] static Result<std::unique_ptr<ServerWire>> open(const WireOptions& options, const LoadedScene& loaded,
-                                                                FrontDesk& desk, Intake& intake, Broadcast& broadcast);
+  [[nodiscard]] static Result<std::unique_ptr<ServerWire>> open(const WireOptions& options,
+                                                                const LoadedScene& loaded, FrontDesk& desk,
+                                                                Intake& intake, Broadcast& broadcast);
 
   /// Hears what there is, waiting for it up to `timeout`; what the desk decided goes into the intake.
   void listen(std::chrono::nanoseconds timeout);
@@ -57,8 +58,8 @@ class ServerWire {
   std::function<void(const std::string&)> say;
 
  private:
-  ServerWire(const WireOptions& options, std::shared_ptr<Participant> participant, FrontDesk& desk, Intake& intake,
-             Broadcast& broadcast);
+  ServerWire(const WireOptions& options, std::shared_ptr<Participant> participant, FrontDesk& desk,
+             Intake& intake, Broadcast& broadcast);
 
   template <class M>
   struct Out;

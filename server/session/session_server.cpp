@@ -15,7 +15,7 @@ namespace tenon {
 namespace {
 
 using std::chrono::milliseconds;
-using SteadyClock = std::chrono::steady_clock;
+using StopWatch = std::chrono::steady_clock;
 
 constexpr auto kPatience = std::chrono::seconds(30);  // for a silent client in lockstep
 
@@ -42,7 +42,8 @@ Result<Awaited> awaited(const ScenarioFile& scenario, const std::vector<std::str
   for (const std::string& name : names) {
     const HandId hand = scenario.handNamed(name);
     const auto role = roleNamed(name);
-    if (!hand.valid() && !role) return fail(fmt::format("cannot wait for '{}': neither a hand of this scenario nor a role", name));
+    if (!hand.valid() && !role)
+      return fail(fmt::format("cannot wait for '{}': neither a hand of this scenario nor a role", name));
     if (hand.valid()) {
       all.hands.push_back(hand);
     } else {
@@ -106,9 +107,9 @@ class Server final : public SessionServer {
   /// One tick: the same in lockstep and by the clock.
   void tick(TickInput& input, TickOutput& output) noexcept {
     intake_.collect(exercise_.now() + 1, input);
-    const auto begin = SteadyClock::now();
+    const auto begin = StopWatch::now();
     exercise_.tick(input);
-    output.stats.compute_seconds = std::chrono::duration<double>(SteadyClock::now() - begin).count();
+    output.stats.compute_seconds = std::chrono::duration<double>(StopWatch::now() - begin).count();
     exercise_.fill(output);
     output.stats.late_ticks = late_ticks_;
     const auto oldest = std::max_element(output.ages.begin(), output.ages.end());
@@ -164,14 +165,14 @@ bool Server::awaitInputs(const std::atomic<bool>& stop) {
       if (desk_.moverOf(HandId{i}).valid() && wire_->newestSeq(HandId{i}) != next) return HandId{i};
     return {};
   };
-  auto deadline = SteadyClock::now() + kPatience;
+  auto deadline = StopWatch::now() + kPatience;
   for (HandId late = missing(); late.valid(); late = missing()) {
     wire_->listen(milliseconds(50));
     if (stop) return false;
     if (wire_->takeRepeatWish()) wire_->sendAgain();
-    if (SteadyClock::now() < deadline) continue;
+    if (StopWatch::now() < deadline) continue;
     wire_->dismiss(desk_.moverOf(late), "has been silent for 30 s and is taken out of the session");
-    deadline = SteadyClock::now() + kPatience;
+    deadline = StopWatch::now() + kPatience;
   }
   return true;
 }
@@ -204,10 +205,11 @@ void Server::runByTheClock(const std::atomic<bool>& stop) {
   while (entries_.front() != nullptr) entries_.pop();
 
   std::atomic<bool> over = false;
-  CyclicThread ticker({.name = "tick", .period = milliseconds(1), .priority = 70}, [this, &over]() noexcept {
-    tickByTheClock();
-    if (exercise_.over()) over = true;
-  });
+  CyclicThread ticker(std::make_shared<SteadyClock>(), {.name = "tick", .fifo_priority = 70},
+                      [&](std::uint64_t) {
+                        tickByTheClock();
+                        if (exercise_.over()) over = true;
+                      });
   std::thread scribe([&] {
     while (true) {
       const bool last_round = over || stop;
@@ -219,8 +221,9 @@ void Server::runByTheClock(const std::atomic<bool>& stop) {
       std::this_thread::sleep_for(milliseconds(20));
     }
   });
-  if (const std::string& missing = ticker.notGranted(); !missing.empty()) say(missing);
+  if (const std::string missing = lockMemory(); !missing.empty()) say(missing);
   ticker.start();
+  if (!ticker.notGranted().empty()) say(ticker.notGranted());
   while (!stop && !over) {
     wire_->listen(milliseconds(20));
     for (TickOutput* output = outputs_.front(); output != nullptr; output = outputs_.front()) {
@@ -266,8 +269,8 @@ Result<SessionReport> Server::finish() {
     if (auto closed = journal_->close(report.run); !closed) return fail(closed.error().what);
 
   // the last words must arrive before the writers go
-  const auto until = SteadyClock::now() + milliseconds(500);
-  while (SteadyClock::now() < until) wire_->listen(milliseconds(50));
+  const auto until = StopWatch::now() + milliseconds(500);
+  while (StopWatch::now() < until) wire_->listen(milliseconds(50));
   return report;
 }
 
@@ -280,7 +283,8 @@ std::vector<HandId> traineeHands(const ScenarioFile& scenario) {
   return hands;
 }
 
-Result<std::unique_ptr<SessionServer>> SessionServer::open(const LoadedScene& loaded, SessionOptions options) {
+Result<std::unique_ptr<SessionServer>> SessionServer::open(const LoadedScene& loaded,
+                                                           SessionOptions options) {
   auto whom = awaited(*loaded.scenario, options.wait_for);
   if (!whom) return fail(whom.error().what);
   options.exercise.needed_hands = whom->hands;

@@ -18,8 +18,8 @@ struct SessionOptions {
   std::string name = "default";  ///< of the session: clients ask for it
   std::uint32_t domain = 0;
   bool lockstep = false;
-  /// Who must be there before the first step: names of hands and roles (`recorder`, `observer`). Empty: all hands of
-  /// the trainee that the first state needs.
+  /// Who must be there before the first step: names of hands and roles (`recorder`, `observer`). Empty: all
+  /// hands of the trainee that the first state needs.
   std::vector<std::string> wait_for;
   std::uint64_t seed = 1;
   std::filesystem::path journal;  ///< empty: no journal
@@ -38,13 +38,15 @@ struct SessionReport {
   std::uint64_t dropped_outputs = 0;  ///< ticks whose output the wire thread had no room for
 };
 
-/// One training session on the bus: announces itself, lets people in, runs ticks by the clock or in lockstep, tells
-/// everybody what happened, until the run is over or `stop` is set.
+/// One training session on the bus: announces itself, lets people in, runs ticks by the clock or in lockstep,
+/// tells everybody what happened, until the run is over or `stop` is set.
 ///
-/// Threads: run() is the wire thread; in real time it has a tick and a journal thread beside it (DESIGN section 3).
+/// Threads: run() is the wire thread; in real time it has a tick and a journal thread beside it (DESIGN
+/// section 3).
 class SessionServer {
  public:
-  [[nodiscard]] static Result<std::unique_ptr<SessionServer>> open(const LoadedScene& loaded, SessionOptions options);
+  [[nodiscard]] static Result<std::unique_ptr<SessionServer>> open(const LoadedScene& loaded,
+                                                                   SessionOptions options);
   virtual ~SessionServer() = default;
 
   [[nodiscard]] virtual Result<SessionReport> run(const std::atomic<bool>& stop) = 0;

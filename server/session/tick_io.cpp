@@ -18,7 +18,8 @@ void get(ByteReader& in, HandReading& reading) {
 void put(ByteWriter& out, const Change& change) {
   out.put(change.kind), out.put(change.hand), out.put(change.object), out.put(change.index);
   out.put(change.lifetime_ticks), out.put(change.value);
-  out.put(change.game.kind), out.put(change.game.hand), out.put(change.game.signal), out.put(change.game.value);
+  out.put(change.game.kind), out.put(change.game.hand), out.put(change.game.signal),
+      out.put(change.game.value);
   out.put(change.F_Oo_W), out.put(change.X_WO);
 }
 

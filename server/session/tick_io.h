@@ -22,11 +22,11 @@ struct HandReading {
 };
 
 enum class ChangeKind : std::uint8_t {
-  kAttach,         ///< a client begins to move `hand`
-  kDetach,         ///< nobody moves `hand` any more: what it holds is parked
-  kGame,           ///< a command for the state machine
-  kRelease,        ///< let go of what `hand` holds
-  kPair,           ///< switch pair number `index` on or off (value)
+  kAttach,   ///< a client begins to move `hand`
+  kDetach,   ///< nobody moves `hand` any more: what it holds is parked
+  kGame,     ///< a command for the state machine
+  kRelease,  ///< let go of what `hand` holds
+  kPair,     ///< switch pair number `index` on or off (value)
   kPause,
   kResume,
   kSwapHands,      ///< the hands `hand` and `index` trade what they move

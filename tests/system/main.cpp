@@ -27,7 +27,8 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.set_help_flag("-h,--help", "what this program does and how to call it");
   app.add_option("scenario", arguments.scenario, "a scenario's folder or YAML file")->required();
   app.add_option("--seed", arguments.rehearsal.seed, "who the simulated people are")->capture_default_str();
-  app.add_option("--workers", arguments.rehearsal.workers, "threads that compute contacts; never changes the result")
+  app.add_option("--workers", arguments.rehearsal.workers,
+                 "threads that compute contacts; never changes the result")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
   app.add_option("--seconds", arguments.rehearsal.seconds, "of session time, at most")->capture_default_str();
@@ -36,9 +37,11 @@ void declare(CLI::App& app, Arguments& arguments) {
       ->capture_default_str();
   app.add_option("--cache", arguments.load.cache, "folder for generated parts and haptic structures");
   app.add_option("--device", arguments.device, "the instructor's device")->capture_default_str();
-  app.add_option("--stubborn", arguments.stubborn, "the n-th mount (from 0) that the trainee aims at a wrong place");
+  app.add_option("--stubborn", arguments.stubborn,
+                 "the n-th mount (from 0) that the trainee aims at a wrong place");
   app.add_flag("--no-instructor", arguments.alone, "the trainee is alone");
-  app.add_flag("--no-collisions", arguments.no_collisions, "nothing touches anything: the same people try the same");
+  app.add_flag("--no-collisions", arguments.no_collisions,
+               "nothing touches anything: the same people try the same");
   app.add_flag("--quiet", arguments.quiet, "print the outcome only");
   app.footer("Exit code: 0 when everything was mounted, 1 otherwise. Last line: the final state hash.");
 }
@@ -77,8 +80,8 @@ int rehearse(Arguments& arguments) {
   arguments.rehearsal.collisions = !arguments.no_collisions;
   if (!arguments.quiet)
     arguments.rehearsal.heard = [](const tenon::EventLog& event) {
-      std::printf("%8.3f s  %-12s %s\n", static_cast<double>(event.tick) * tenon::kTickSeconds, event.kind.c_str(),
-                  event.text.c_str());
+      std::printf("%8.3f s  %-12s %s\n", static_cast<double>(event.tick) * tenon::kTickSeconds,
+                  event.kind.c_str(), event.text.c_str());
     };
   const auto report = tenon::rehearse(*loaded, std::move(*stations), arguments.rehearsal);
   if (!report) return complain(report.error().what);
@@ -91,7 +94,8 @@ int rehearse(Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Runs a whole session in one process with simulated people, as fast as it computes.", "tenon rehearse");
+  CLI::App app("Runs a whole session in one process with simulated people, as fast as it computes.",
+               "tenon rehearse");
   Arguments arguments;
   declare(app, arguments);
   CLI11_PARSE(app, argc, argv);

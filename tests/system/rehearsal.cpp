@@ -11,13 +11,15 @@ constexpr std::uint32_t kServerEpoch = 1;
 
 std::vector<SceneObject> sceneObjects(const Scene& scene) {
   std::vector<SceneObject> objects;
-  for (std::uint32_t i = 0; i < scene.objects.size(); ++i) objects.push_back(describe(ObjectId{i}, scene.objects[i]));
+  for (std::uint32_t i = 0; i < scene.objects.size(); ++i)
+    objects.push_back(describe(ObjectId{i}, scene.objects[i]));
   return objects;
 }
 
 class Rehearsal {
  public:
-  Rehearsal(const LoadedScene& loaded, std::vector<std::unique_ptr<Station>> stations, const RehearsalOptions& options)
+  Rehearsal(const LoadedScene& loaded, std::vector<std::unique_ptr<Station>> stations,
+            const RehearsalOptions& options)
       : options_(options),
         stations_(std::move(stations)),
         desk_(*loaded.scenario, kServerEpoch, true, options.seed),

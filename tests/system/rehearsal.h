@@ -16,8 +16,8 @@ namespace tenon {
 struct RehearsalOptions {
   std::uint64_t seed = 1;
   unsigned workers = 1;
-  double seconds = 600.0;       ///< of session time, at most
-  bool collisions = true;       ///< false: nothing touches anything, the same people try the same
+  double seconds = 600.0;  ///< of session time, at most
+  bool collisions = true;  ///< false: nothing touches anything, the same people try the same
   std::function<void(const EventLog&)> heard;
   std::function<void(const TickInput&, const TickOutput&)> ticked;
 };
@@ -29,11 +29,13 @@ struct RehearsalReport {
   std::string reason;
 };
 
-/// A whole session in one process on a virtual clock: the server's exercise and the stations of people, each tick fed
-/// with what the other said one tick ago, as in lockstep over DDS and to the same bits (DESIGN section 5).
+/// A whole session in one process on a virtual clock: the server's exercise and the stations of people, each
+/// tick fed with what the other said one tick ago, as in lockstep over DDS and to the same bits (DESIGN
+/// section 5).
 ///
 /// Threads: one, and the exercise's workers.
-[[nodiscard]] Result<RehearsalReport> rehearse(const LoadedScene& loaded, std::vector<std::unique_ptr<Station>> stations,
+[[nodiscard]] Result<RehearsalReport> rehearse(const LoadedScene& loaded,
+                                               std::vector<std::unique_ptr<Station>> stations,
                                                const RehearsalOptions& options);
 
 }  // namespace tenon
