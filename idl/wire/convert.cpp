@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 namespace tenon::wire {
 namespace {
@@ -152,7 +153,7 @@ class FromWire {
     m.clear();
     if (c._length > bound) return reject();
     m.resize(c._length);
-    for (std::size_t i = 0; i < c._length; ++i) each(*this, c._buffer[i], m[i]);
+    for (std::size_t i = 0; i < c._length; ++i) each(*this, std::as_const(c._buffer[i]), m[i]);
   }
 
  private:

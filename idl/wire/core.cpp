@@ -137,6 +137,12 @@ std::size_t matchedReaders(dds_entity_t writer) {
   return static_cast<std::size_t>(std::max(0, dds_get_matched_subscriptions(writer, nullptr, 0)));
 }
 
+bool isGone(const dds_sample_info_t& info, bool latched) {
+  if (info.sample_rank != 0) return false;
+  return info.instance_state == DDS_NOT_ALIVE_DISPOSED_INSTANCE_STATE ||
+         (info.instance_state == DDS_NOT_ALIVE_NO_WRITERS_INSTANCE_STATE && !latched);
+}
+
 Mailbox::Mailbox() : wake_fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
 
 Mailbox::~Mailbox() {

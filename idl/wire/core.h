@@ -68,6 +68,10 @@ Result<std::unique_ptr<Endpoint>> openReader(const Partition& partition, const T
 [[nodiscard]] std::size_t matchedWriters(dds_entity_t reader);
 [[nodiscard]] std::size_t matchedReaders(dds_entity_t writer);
 
+/// Whether this sample, the last of its key that was taken (the rank says so: what comes after a valid sample
+/// may have none of its own), ends the key. A latched key outlives its writers.
+[[nodiscard]] bool isGone(const dds_sample_info_t& info, bool latched);
+
 /// "WorldFrame_1k in 's/demo': <what DDS says>"
 [[nodiscard]] std::string because(std::string_view what, const Partition::Impl& partition, dds_return_t code);
 

@@ -129,7 +129,7 @@ namespace {
 template <class M>
 class TypedSource : public wire::Source {
  public:
-  explicit TypedSource(std::uint64_t& malformed) : malformed_(malformed) {}
+  TypedSource(bool latched, std::uint64_t& malformed) : latched_(latched), malformed_(malformed) {}
 
   std::size_t drain() override {
     const Loan<M> loan(reader->entity(), wire::kTakeAtOnce);
@@ -149,12 +149,12 @@ class TypedSource : public wire::Source {
     if (info.valid_data) {
       for (const auto& handler : handlers) handler(message_);
     }
-    // a key that went after its last sample has no sample of its own: the rank says this is the last
-    if (info.instance_state != DDS_ALIVE_INSTANCE_STATE && info.sample_rank == 0) {
+    if (wire::isGone(info, latched_)) {
       for (const auto& handler : gone_handlers) handler(message_);
     }
   }
 
+  bool latched_;
   std::uint64_t& malformed_;
   M message_;
 };
@@ -172,7 +172,7 @@ struct Inbox::Impl {
         return static_cast<TypedSource<M>*>(known.get());
       }
     }
-    auto made = std::make_unique<TypedSource<M>>(malformed);
+    auto made = std::make_unique<TypedSource<M>>(topic.parameters.latched, malformed);
     auto* const typed = made.get();
     if (auto added = mailbox.add(std::move(made), partition, specOf(topic), false); !added) {
       return tl::unexpected(added.error());

@@ -41,9 +41,7 @@ class RawSource : public wire::Source {
     if (count <= 0) return 0;
     for (int i = 0; i < count; ++i) {
       if (infos[i].valid_data) hand(infos[i], samples[i], false);
-      if (infos[i].instance_state != DDS_ALIVE_INSTANCE_STATE && infos[i].sample_rank == 0) {
-        hand(infos[i], samples[i], true);
-      }
+      if (wire::isGone(infos[i], spec_.parameters.latched)) hand(infos[i], samples[i], true);
     }
     dds_return_loan(reader->entity(), samples, count);
     return static_cast<std::size_t>(count);

@@ -1,0 +1,167 @@
+#include "idl/wire/codec.h"
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include <gtest/gtest.h>
+
+#include "idl/wire/profiles.h"
+#include "tests/idl/wire/random_messages.h"
+
+namespace tenon {
+namespace {
+
+std::string fileText(const std::string& path_from_root) {
+  // this file is tests/idl/wire/codec_test.cpp of the tree
+  const auto root = std::filesystem::path(__FILE__).parent_path().parent_path().parent_path().parent_path();
+  std::ifstream file(root / path_from_root);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+TEST(IdlText, IsTheFile) { EXPECT_EQ(idlText(), fileText("idl/tenon.idl")); }
+
+TEST(LoopbackConfig, IsTheFile) { EXPECT_EQ(wire::loopbackConfig(), fileText("deploy/dds/loopback.xml")); }
+
+template <class M>
+class Codec : public ::testing::Test {};
+
+#define TENON_COMMA(M) M,
+using AllMessages = ::testing::Types<TENON_WIRE_MESSAGES(TENON_COMMA) WorldFrame>;
+TYPED_TEST_SUITE(Codec, AllMessages);
+
+// A message has no operator==, but its bytes say all of it: two conversions that lose the same thing would
+// have to lose it in encode(), and then decode() of other bytes would show it.
+TYPED_TEST(Codec, KeepsEveryBitBothWays) {
+  test::RandomMessages random(1);
+  for (int i = 0; i < 200; ++i) {
+    const auto message = random.template make<TypeParam>();
+    const auto bytes = encode(message);
+    ASSERT_TRUE(bytes) << bytes.error().what;
+    const auto back = decode<TypeParam>(*bytes);
+    ASSERT_TRUE(back) << back.error().what;
+    const auto again = encode(*back);
+    ASSERT_TRUE(again);
+    EXPECT_EQ(*bytes, *again);
+  }
+}
+
+TYPED_TEST(Codec, FitsTheLargestSample) {
+  test::RandomMessages random(2, true);
+  const auto bytes = encode(random.template make<TypeParam>());
+  ASSERT_TRUE(bytes) << bytes.error().what;
+  EXPECT_LE(bytes->size(), kMaxSampleBytes);
+}
+
+TYPED_TEST(Codec, DifferentMessagesHaveDifferentBytes) {
+  test::RandomMessages random(3);
+  EXPECT_NE(*encode(random.template make<TypeParam>()), *encode(random.template make<TypeParam>()));
+}
+
+TYPED_TEST(Codec, RefusesBytesThatEndTooSoon) {
+  test::RandomMessages random(4, true);
+  const auto bytes = encode(random.template make<TypeParam>());
+  ASSERT_TRUE(bytes);
+  for (std::size_t size = 0; size < bytes->size(); ++size) {
+    auto cut = *bytes;
+    cut.resize(size);
+    if (size > 3) cut[3] = 0;  // claims no padding
+    const auto back = decode<TypeParam>(cut);
+    const bool only_padding_is_gone = size + ((*bytes)[3] & 3U) >= bytes->size();
+    EXPECT_EQ(back.has_value(), only_padding_is_gone && size + ((*bytes)[3] & 3U) == bytes->size()) << size;
+  }
+}
+
+TYPED_TEST(Codec, SurvivesFlippedBits) {
+  test::RandomMessages random(5);
+  std::mt19937_64 where(6);
+  const auto bytes = encode(random.template make<TypeParam>());
+  ASSERT_TRUE(bytes);
+  for (int i = 0; i < 5000; ++i) {
+    auto bad = *bytes;
+    for (int flips = 0; flips < 4; ++flips) {
+      const auto bit = where() % (bad.size() * 8);
+      bad[bit / 8] ^= static_cast<std::uint8_t>(1U << (bit % 8));
+    }
+    // whatever it is taken for must be a message that can be sent again
+    if (const auto back = decode<TypeParam>(bad)) {
+      const auto again = encode(*back);
+      if (again) {
+        EXPECT_LE(again->size(), kMaxSampleBytes);
+      }
+    }
+  }
+}
+
+TYPED_TEST(Codec, NamesTheTypeInItsError) {
+  const auto back = decode<TypeParam>(std::vector<std::uint8_t>{0, 1, 0, 0});
+  ASSERT_FALSE(back);
+  EXPECT_EQ(back.error().what, "4 bytes are not a " + std::string(typeName<TypeParam>()));
+}
+
+TEST(CodecOf, FieldsAreWhereTheyBelong) {
+  HandManifold m;
+  m.hand = HandId{3};
+  m.tick = 0x1122334455667788ULL;
+  m.X_HO = Pose(Vector3(1, 2, 3), Quaternion(0.5, -0.5, 0.5, -0.5));
+  m.F_Ho_W.torque = Vector3(7, 8, 9);
+  m.contacts.push_back({.other = ObjectId{5}, .gap = -0.25F});
+  const auto back = decode<HandManifold>(*encode(m));
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->hand, m.hand);
+  EXPECT_EQ(back->tick, m.tick);
+  EXPECT_EQ(back->X_HO, m.X_HO);
+  EXPECT_EQ(back->F_Ho_W.torque, m.F_Ho_W.torque);
+  ASSERT_EQ(back->contacts.size(), 1U);
+  EXPECT_EQ(back->contacts[0].other, ObjectId{5});
+  EXPECT_EQ(back->contacts[0].gap, -0.25F);
+}
+
+TEST(CodecOf, BytesAreXcdr1AsTheStandardHasIt) {
+  // encapsulation CDR_LE, 1 byte of padding | key uint32 | id | accepted, 3 bytes to align | length 3 with
+  // its zero
+  CommandAck ack;
+  ack.client = ClientId{0x01020304};
+  ack.id = 7;
+  ack.accepted = true;
+  ack.reason = "no";
+  const std::vector<std::uint8_t> expected = {0, 1, 0, 1, 4, 3, 2, 1, 7,   0,   0, 0,
+                                              1, 0, 0, 0, 3, 0, 0, 0, 'n', 'o', 0, 0};
+  EXPECT_EQ(*encode(ack), expected);
+}
+
+TEST(CodecOf, ReadsTheOtherByteOrder) {
+  const std::vector<std::uint8_t> big_endian = {0, 0, 0, 1, 1, 2, 3, 4, 0,   0,   0, 7,
+                                                1, 0, 0, 0, 0, 0, 0, 3, 'n', 'o', 0, 0};
+  const auto ack = decode<CommandAck>(big_endian);
+  ASSERT_TRUE(ack) << ack.error().what;
+  EXPECT_EQ(ack->client, ClientId{0x01020304});
+  EXPECT_EQ(ack->id, 7U);
+  EXPECT_EQ(ack->reason, "no");
+}
+
+TEST(CodecOf, ATextThatIsTooLongIsAnErrorThatNamesIt) {
+  SceneObject object;
+  object.name = std::string(64, 'x');
+  const auto bytes = encode(object);
+  ASSERT_FALSE(bytes);
+  EXPECT_EQ(bytes.error().what,
+            "tenon::SceneObject: 'name' has 64 bytes or entries, only the first 63 can be sent");
+}
+
+TEST(CodecOf, AZeroByteInATextIsAnError) {
+  EventLog event;
+  event.text = std::string("a\0b", 3);
+  EXPECT_FALSE(encode(event));
+}
+
+TEST(CodecOf, AStatusThatDoesNotExistIsAnError) {
+  ObjectSnapshot snapshot;
+  snapshot.state.status = 5;
+  EXPECT_FALSE(decode<ObjectSnapshot>(*encode(snapshot)));
+}
+
+}  // namespace
+}  // namespace tenon
