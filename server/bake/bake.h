@@ -26,28 +26,28 @@ struct RefineBox {
 };
 
 struct BakeOptions {
-  double voxel = 0.003;        ///< [m]
+  double voxel = 0.003;         ///< [m]
   std::int32_t refinement = 4;  ///< of the boxes below; 1, 2, 4 or 8
   std::vector<RefineBox> refine;
-  double point_spacing = 0.0;  ///< [m] between shell points; 0: chosen from `points`
+  double point_spacing = 0.0;     ///< [m] between shell points; 0: chosen from `points`
   std::uint32_t points = 10'000;  ///< about how many shell points, when point_spacing is 0
 };
 
 /// Called with a share of 0..1 and what is being done; returning false cancels the bake.
 using BakeProgress = std::function<bool(double share, std::string_view doing)>;
 
-/// Reads a mesh with assimp in a child process that has limits on memory and time: a file that crashes or hangs
-/// the importer is one clear error here. `unit` is the length of one file unit [m].
+/// Reads a mesh with assimp in a child process that has limits on memory and time: a file that crashes or
+/// hangs the importer is one clear error here. `unit` is the length of one file unit [m].
 [[nodiscard]] Result<TriangleMesh> importMesh(const std::filesystem::path& file, double unit);
 
 /// Turns triangles into haptic structures (paper §3.1): field, shell and tree, from positions alone.
 [[nodiscard]] Result<HapticStructures> bake(const TriangleMesh& mesh, const BakeOptions& options,
                                             const BakeProgress& progress = {});
 
-/// `import` and `bake` of several files as one object, through a cache folder keyed by content and options. Gives
-/// the structure file's path.
-[[nodiscard]] Result<std::filesystem::path> bakeCached(const std::vector<std::filesystem::path>& meshes, double unit,
-                                                       const BakeOptions& options,
+/// `import` and `bake` of several files as one object, through a cache folder keyed by content and options.
+/// Gives the structure file's path.
+[[nodiscard]] Result<std::filesystem::path> bakeCached(const std::vector<std::filesystem::path>& meshes,
+                                                       double unit, const BakeOptions& options,
                                                        const std::filesystem::path& cache_folder,
                                                        const BakeProgress& progress = {});
 

@@ -1,0 +1,222 @@
+#include "server/bake/field_bake.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "server/bake/brick_level.h"
+#include "server/bake/exposed_surface.h"
+#include "server/bake/outside.h"
+#include "server/bake/parallel.h"
+#include "server/structures/field_builder.h"
+
+namespace tenon {
+
+namespace {
+
+using Cell = BrickLevel::Cell;
+using Entry = DistanceField::Entry;
+constexpr double kMaxBricks = 40e6;  // 250 MB of index, bounds and lists
+constexpr double kBrickRadius = 6.9283;
+constexpr int kCentreSample = (4 * BrickLevel::kSide + 4) * BrickLevel::kSide + 4;
+
+tl::unexpected<Error> tooMuch(double voxel) {
+  return fail("voxels of " + std::to_string(voxel * 1e3) +
+              " mm would need more than 3 GB for this mesh; choose larger ones");
+}
+
+std::vector<std::uint32_t> bricksToRefine(const BrickLevel& coarse, const BakeOptions& options) {
+  std::vector<std::uint32_t> refined;
+  if (options.refinement <= 1) return refined;
+  const double edge = coarse.voxel * BrickLevel::kVoxels;
+  for (std::size_t node = 0; node < coarse.nodes(); ++node) {
+    const std::int32_t slot = coarse.slot[node];
+    if (slot < 0) continue;
+    const double at_centre = coarse.samplesOf(slot)[kCentreSample] / double{DistanceField::kQuantaPerVoxel};
+    if (at_centre >= std::min(kBrickRadius, DistanceField::kClampVoxels)) {
+      // clamped at the centre: the surface is at a corner or not in the brick at all
+      const std::int16_t* s = coarse.samplesOf(slot);
+      if (*std::min_element(s, s + BrickLevel::kSamples) > DistanceField::kQuantaPerVoxel) continue;
+    }
+    const Vector3 p_MBo = coarse.position(coarse.brickOf(node) * BrickLevel::kVoxels);
+    const Eigen::AlignedBox3d box(p_MBo, p_MBo + Vector3::Constant(edge));
+    const bool wanted = std::any_of(options.refine.begin(), options.refine.end(),
+                                    [&box](const RefineBox& region) { return region.box_M.intersects(box); });
+    if (wanted) refined.push_back(static_cast<std::uint32_t>(node));
+  }
+  return refined;
+}
+
+/// Inside, distances count only to what is exposed; then signs are put in.
+void finishSamples(BrickLevel& level, const ExposedSurface& surface, ParallelWork& work) {
+  work.run(level.nodes(), 64, [&](std::size_t node) {
+    const std::int32_t slot = level.slot[node];
+    if (slot < 0) return;
+    std::int16_t* samples = level.samplesOf(slot);
+    const BrickLevel::SampleBits inside = ~level.outside[static_cast<std::size_t>(slot)];
+    const auto list = level.near(node);
+    const bool all_whole =
+        std::all_of(list.begin(), list.end(), [&](std::uint32_t i) { return surface.whole(i); });
+    if (inside.any() && !all_whole) {
+      const double edge = level.voxel * BrickLevel::kVoxels;
+      const Vector3 centre =
+          level.position(level.brickOf(node) * BrickLevel::kVoxels) + Vector3::Constant(edge / 2);
+      const double reach = (kBrickRadius + DistanceField::kClampVoxels) * level.voxel;
+      std::vector<Triangle> local;
+      for (const std::uint32_t i : list) {
+        for (const Triangle& t : surface.of(i)) {
+          if (squaredDistance(centre, t) <= reach * reach) local.push_back(t);
+        }
+      }
+      level.sampleBrick(node, local, &inside, samples);
+    }
+    for (int k = 0; k < BrickLevel::kSamples; ++k) {
+      if (inside[static_cast<std::size_t>(k)]) samples[k] = static_cast<std::int16_t>(-samples[k]);
+    }
+  });
+}
+
+/// Per coarse brick a lower bound of the distance from its centre to the surface [bricks]: the Euclidean
+/// distance to the nearest brick that the surface goes through, axis by axis.
+std::vector<float> brickDistances(const BrickLevel& coarse, ParallelWork& work) {
+  constexpr float kNone = std::numeric_limits<float>::max();
+  std::vector<float> squared(coarse.nodes(), kNone);
+  work.run(coarse.nodes(), 1024, [&](std::size_t node) {
+    const std::int32_t slot = coarse.slot[node];
+    if (slot < 0) return;
+    // a surface in the brick is within half a voxel's diagonal of one of its samples
+    constexpr auto kTouch = static_cast<int>(0.8661 * DistanceField::kQuantaPerVoxel) + 1;
+    const std::int16_t* samples = coarse.samplesOf(slot);
+    const bool surface =
+        std::any_of(samples, samples + BrickLevel::kSamples, [](int s) { return std::abs(s) <= kTouch; });
+    if (surface) squared[node] = 0.0F;
+  });
+  const std::array<std::size_t, 3> size{static_cast<std::size_t>(coarse.bricks.x()),
+                                        static_cast<std::size_t>(coarse.bricks.y()),
+                                        static_cast<std::size_t>(coarse.bricks.z())};
+  std::size_t stride = 1;
+  for (const std::size_t count : size) {
+    const std::size_t lines = coarse.nodes() / count;
+    work.run(lines, 64, [&](std::size_t line) {
+      const std::size_t first = line / stride * stride * count + line % stride;
+      std::vector<float> along(count);
+      for (std::size_t i = 0; i < count; ++i) along[i] = squared[first + i * stride];
+      for (std::size_t i = 0; i < count; ++i) {
+        float best = along[i];
+        for (std::size_t away = 1; away < count; ++away) {
+          const float gap = static_cast<float>(away) - 0.5F;
+          if (gap * gap >= best) break;
+          if (away <= i) best = std::min(best, along[i - away] + gap * gap);
+          if (i + away < count) best = std::min(best, along[i + away] + gap * gap);
+        }
+        squared[first + i * stride] = best;
+      }
+    });
+    stride *= count;
+  }
+  for (float& value : squared) value = std::sqrt(value) * 0.9999F;
+  return squared;
+}
+
+/// Gives the bricks of a level with surface in the band their final numbers; the others become far.
+class Assembler {
+ public:
+  explicit Assembler(FieldStorage& storage) : storage_(storage) {}
+
+  Entry entryOf(const BrickLevel& level, std::size_t node) {
+    const std::int32_t slot = level.slot[node];
+    if (slot < 0) return level.free[node] != 0 ? DistanceField::kFarOutside : DistanceField::kFarInside;
+    const std::int16_t* samples = level.samplesOf(slot);
+    constexpr auto kBand = static_cast<int>(DistanceField::kBandVoxels * DistanceField::kQuantaPerVoxel);
+    const bool in_band =
+        std::any_of(samples, samples + BrickLevel::kSamples, [](int s) { return std::abs(s) < kBand; });
+    if (!in_band) return samples[kCentreSample] < 0 ? DistanceField::kFarInside : DistanceField::kFarOutside;
+    storage_.samples.insert(storage_.samples.end(), samples, samples + BrickLevel::kSamples);
+    return static_cast<Entry>(storage_.samples.size() / DistanceField::kBrickSamples) - 1;
+  }
+
+ private:
+  FieldStorage& storage_;
+};
+
+DistanceField assemble(FieldStorage storage, const BrickLevel& coarse, const BrickLevel* fine,
+                       std::span<const std::uint32_t> refined, ParallelWork& work) {
+  const std::vector<float> away = brickDistances(coarse, work);
+  Assembler assembler(storage);
+  std::size_t block = 0;
+  for (std::size_t node = 0; node < coarse.nodes(); ++node) {
+    const Entry entry = assembler.entryOf(coarse, node);
+    storage.index[node] = entry;
+    if (entry >= 0) {
+      const double at_centre = coarse.samplesOf(coarse.slot[node])[kCentreSample];
+      storage.far[node] = quantizedFar(at_centre / DistanceField::kQuantaPerVoxel, 1.0, false);
+    } else {
+      const bool inside = entry == DistanceField::kFarInside;
+      const double bound = static_cast<double>(away[node]) * DistanceField::kBrickVoxels;
+      storage.far[node] = quantizedFar(inside ? -bound : bound, 1.0, inside);
+    }
+    if (block == refined.size() || refined[block] != node) continue;
+    const auto children = static_cast<std::size_t>(fine->refinement * fine->refinement * fine->refinement);
+    if (entry >= 0) {
+      storage.index[node] = DistanceField::kRefined + static_cast<Entry>(storage.index.size());
+      for (std::size_t child = 0; child < children; ++child) {
+        storage.index.push_back(assembler.entryOf(*fine, block * children + child));
+      }
+      storage.index.push_back(entry);
+    }
+    ++block;
+  }
+  return makeField(std::move(storage));
+}
+
+}  // namespace
+
+Result<BakedField> bakeField(std::span<const Triangle> triangles, const BakeOptions& options,
+                             ParallelWork& work) {
+  Eigen::AlignedBox3d box;
+  for (const Triangle& t : triangles) box.extend(boxOf(t));
+  const Vector3 bricks = (box.sizes() / (options.voxel * BrickLevel::kVoxels)).array().ceil() + 3.0;
+  if (!(bricks.prod() <= kMaxBricks)) return tooMuch(options.voxel);
+
+  FieldStorage storage = makeGrid(box, options.voxel);
+  const auto& counts = storage.layout.bricks;
+  BrickLevel coarse(storage.layout.p_MoFo_M, options.voxel, {counts[0], counts[1], counts[2]});
+  work.stage("finding triangles near bricks", 0.05, 0.15);
+  if (!coarse.listTriangles(triangles, work)) return tooMuch(options.voxel);
+  work.stage("measuring distances", 0.15, 0.45);
+  if (!coarse.sampleDistances(triangles, work)) return tooMuch(options.voxel);
+  work.stage("finding the outside", 0.45, 0.55);
+  if (!work.cancelled()) findOutside(coarse, nullptr, work);
+
+  std::unique_ptr<BrickLevel> fine;
+  const std::vector<std::uint32_t> refined = bricksToRefine(coarse, options);
+  if (!refined.empty() && !work.cancelled()) {
+    work.stage("refining", 0.55, 0.65);
+    fine = std::make_unique<BrickLevel>(coarse, options.refinement, refined);
+    const bool fits = fine->listTriangles(triangles, work) && fine->sampleDistances(triangles, work);
+    if (!fits) return tooMuch(options.voxel / options.refinement);
+    if (!work.cancelled()) findOutside(*fine, &coarse, work);
+    if (!work.cancelled()) adoptFineSigns(coarse, *fine, work);
+  }
+  if (work.cancelled()) return fail("cancelled");
+
+  work.stage("leaving out what is inside", 0.65, 0.75);
+  const ExposedSurface surface(triangles, coarse, fine.get(), work);
+  work.stage("measuring depths", 0.75, 0.85);
+  finishSamples(coarse, surface, work);
+  if (fine) finishSamples(*fine, surface, work);
+  if (work.cancelled()) return fail("cancelled");
+
+  storage.layout.refinement = fine ? options.refinement : 1;
+  BakedField baked;
+  baked.surface = surface.all();
+  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+    if (surface.of(i).empty()) ++baked.hidden_triangles;
+  }
+  work.stage("packing", 0.85, 0.88);
+  baked.field = assemble(std::move(storage), coarse, fine.get(), refined, work);
+  return baked;
+}
+
+}  // namespace tenon

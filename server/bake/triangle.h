@@ -1,0 +1,68 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+
+#include "idl/types/spatial.h"
+
+namespace tenon {
+
+/// Three corners in frame M. Which way it winds means nothing here.
+using Triangle = std::array<Vector3, 3>;
+
+/// Squared distance from p to the nearest point of a triangle (Ericson, Real-Time Collision
+/// Detection, 5.1.5). Any triangle is legal: one without area is a segment or a point.
+[[nodiscard]] inline double squaredDistance(const Vector3& p, const Triangle& t) {
+  const Vector3 ab = t[1] - t[0];
+  const Vector3 ac = t[2] - t[0];
+  const Vector3 ap = p - t[0];
+  const double d1 = ab.dot(ap);
+  const double d2 = ac.dot(ap);
+  if (d1 <= 0.0 && d2 <= 0.0) return ap.squaredNorm();
+  const Vector3 bp = p - t[1];
+  const double d3 = ab.dot(bp);
+  const double d4 = ac.dot(bp);
+  if (d3 >= 0.0 && d4 <= d3) return bp.squaredNorm();
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) {
+    const double along = d1 > d3 ? d1 / (d1 - d3) : 0.0;
+    return (ap - along * ab).squaredNorm();
+  }
+  const Vector3 cp = p - t[2];
+  const double d5 = ab.dot(cp);
+  const double d6 = ac.dot(cp);
+  if (d6 >= 0.0 && d5 <= d6) return cp.squaredNorm();
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) {
+    const double along = d2 > d6 ? d2 / (d2 - d6) : 0.0;
+    return (ap - along * ac).squaredNorm();
+  }
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0.0 && d4 >= d3 && d5 >= d6) {
+    const double length = (d4 - d3) + (d5 - d6);
+    const double along = length > 0.0 ? (d4 - d3) / length : 0.0;
+    return (bp - along * (t[2] - t[1])).squaredNorm();
+  }
+  const Vector3 normal = ab.cross(ac);
+  const double above = normal.dot(ap);
+  return above * above / normal.squaredNorm();
+}
+
+[[nodiscard]] inline Eigen::AlignedBox3d boxOf(const Triangle& t) {
+  Eigen::AlignedBox3d box(t[0]);
+  box.extend(t[1]);
+  box.extend(t[2]);
+  return box;
+}
+
+[[nodiscard]] inline double areaOf(const Triangle& t) { return (t[1] - t[0]).cross(t[2] - t[0]).norm() / 2; }
+
+/// The same corners in one order, so that winding cannot change a single bit of what is computed.
+[[nodiscard]] inline Triangle unwound(Triangle t) {
+  std::sort(t.begin(), t.end(), [](const Vector3& a, const Vector3& b) {
+    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+  });
+  return t;
+}
+
+}  // namespace tenon
