@@ -20,7 +20,7 @@ PartMesh makeBay(double detail) {
 PartSet engineBayParts() {
   using namespace engine_bay;
   return {"engine_bay",
-          0.25,
+          0.12,
           {{"engine_bay", "the front of a car in its assembly frame", makeBay},
            {"control_box", "control box with cooling ribs and connectors", makeControlBox},
            {"covering_board", "covering board with ribs and clips", makeCoveringBoard},

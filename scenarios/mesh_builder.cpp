@@ -64,7 +64,7 @@ Quaternion zTo(const Vector3& axis) {
 
 int MeshBuilder::segments(double radius) const {
   const double size = std::clamp(std::sqrt(radius / 0.03), 0.5, 1.7);
-  return std::max(8, 4 * static_cast<int>(std::lround((8.0 + 64.0 * detail_) * size / 4.0)));
+  return std::max(8, 4 * static_cast<int>(std::lround((8.0 + 72.0 * detail_) * size / 4.0)));
 }
 
 int MeshBuilder::steps(int coarse, int fine) const {
@@ -141,7 +141,7 @@ void MeshBuilder::chamferedTongue(const Vector3& low, const Vector3& high, doubl
 }
 
 void MeshBuilder::roundBox(const Vector3& low, const Vector3& high, double radius) {
-  const int n = steps(2, 8);
+  const int n = steps(2, 6);
   const Vector3 centre = 0.5 * (low + high);
   const Vector3 half = 0.5 * (high - low);
   const double r = std::min(radius, 0.999 * half.minCoeff());

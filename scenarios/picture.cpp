@@ -178,7 +178,7 @@ Vector3f Painter::shade(const SampleBuffer& buffer, int x, int y, float open) co
   const Vector3f sky(0.80F, 0.90F, 1.05F);
   const Vector3f floor(0.42F, 0.40F, 0.38F);
   const auto up = static_cast<float>(0.5 + 0.5 * normal.z());
-  const Vector3f ambient = 0.50F * open * (up * sky + (1.0F - up) * floor);
+  const Vector3f ambient = 0.58F * open * (up * sky + (1.0F - up) * floor);
   const Vector3f warm(1.30F, 1.22F, 1.10F);
   const Vector3 fill_from = Vector3(0.8, -0.5, 0.35).normalized();
   const float fill = 0.22F * static_cast<float>(std::max(0.0, normal.dot(fill_from))) * open;

@@ -58,7 +58,7 @@ std::vector<PictureObject> engineBayInAssembly(const Workshop& workshop) {
     scene.push_back({workshop.mesh(part.name), X_WT, kGhost, 0.55});
     scene.push_back({workshop.mesh(part.name), X_WP, std::nullopt, 1.0});
     const Vector3 wrist = X_WP * Vector3(0.05, -0.02, 0.07);
-    const Vector3 elbow = wrist + Vector3(0.12, -0.21, 0.10);
+    const Vector3 elbow = wrist + Vector3(0.23, -0.06, 0.10);
     const Quaternion q = Quaternion::FromTwoVectors(Vector3::UnitX(), (wrist - elbow).normalized());
     scene.push_back({workshop.mesh("forearm"), Pose(elbow, q), std::nullopt, 0.75});
     scene.push_back({workshop.mesh("assistant"), Pose(X_WP * Vector3(-0.22, 0.03, 0.05), X_WP.rotation()),
