@@ -1,0 +1,71 @@
+#pragma once
+
+#include "clients/haptic/local_model.h"
+#include "idl/types/messages.h"
+
+namespace tenon::test {
+
+inline constexpr HandId kHand{0};
+inline constexpr ObjectId kFloor{0};
+inline constexpr ObjectId kBall{1};
+
+/// A server that knows one floor (object 0, z = 0 of its frame) and one ball (object 1) by their formula.
+class PlaneServer {
+ public:
+  explicit PlaneServer(double stiffness = 1000.0) : stiffness_(stiffness) {
+    SceneObject floor;
+    floor.object = kFloor;
+    floor.kind = "scene";
+    SceneObject ball;
+    ball.object = kBall;
+    ball.kind = "pointer";
+    objects_ = {floor, ball};
+  }
+
+  /// Tick by tick: the floor's height and what the hand's ball does.
+  HandManifold manifold(Tick tick, const Pose& X_WH) const {
+    HandManifold manifold;
+    manifold.hand = kHand;
+    manifold.tick = tick;
+    manifold.object = kBall;
+    manifold.object_epoch = epoch;
+    manifold.stiffness = stiffness_;
+    manifold.rotational_stiffness = 20.0;
+    manifold.validity_radius = validity_radius;
+    manifold.X_WO = X_WH;
+    manifold.X_WO.translation().z() = std::max(floor_height + radius, X_WH.translation().z());
+    ManifoldContact contact;
+    contact.other = kFloor;
+    contact.p_BoP_B = Vector3f(0.0F, 0.0F, static_cast<float>(-radius));
+    contact.normal_A = Vector3f::UnitZ();
+    contact.gap = static_cast<float>(manifold.X_WO.translation().z() - radius - floor_height);
+    manifold.contacts.push_back(contact);
+    return manifold;
+  }
+  WorldFrame frame(Tick tick) const {
+    WorldFrame frame;
+    frame.tick = tick;
+    ObjectState floor;
+    floor.object = kFloor;
+    floor.epoch = 1;
+    floor.X_WO = Pose(Vector3(0.0, 0.0, floor_height));
+    ObjectState ball;
+    ball.object = kBall;
+    ball.epoch = epoch;
+    frame.states.push_back(floor);
+    frame.states.push_back(ball);
+    return frame;
+  }
+  const std::vector<SceneObject>& objects() const { return objects_; }
+
+  double radius = 0.012;
+  double floor_height = 0.0;
+  double validity_radius = 0.05;
+  std::uint32_t epoch = 1;
+
+ private:
+  double stiffness_;
+  std::vector<SceneObject> objects_;
+};
+
+}  // namespace tenon::test

@@ -1,0 +1,73 @@
+#include "clients/haptic/tactile_map.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace tenon {
+namespace {
+
+constexpr double kStep = 1e-3;
+
+//          0
+//      5   z   1        seen from the elbow along x, y to the right
+//          |__y
+//      4       2
+//          3
+HandManifold dent(double degrees, double depth) {
+  HandManifold manifold;
+  manifold.stiffness = 1000.0;
+  ManifoldContact contact;
+  const double angle = degrees * M_PI / 180.0;
+  contact.p_BoP_B =
+      Vector3f(0.1F, static_cast<float>(0.04 * std::sin(angle)), static_cast<float>(0.04 * std::cos(angle)));
+  contact.gap = static_cast<float>(-depth);
+  manifold.contacts.push_back(contact);
+  return manifold;
+}
+
+TEST(TactileMap, DrivesTheTactorAtTheContactAlone) {
+  for (int tactor = 0; tactor < kTactors; ++tactor) {
+    TactileMap map;
+    const TactorIntensities felt = map.step(dent(60.0 * tactor, 0.004), kStep);
+    for (int i = 0; i < kTactors; ++i)
+      EXPECT_EQ(felt[static_cast<std::size_t>(i)] > 0, i == tactor) << tactor;
+  }
+}
+
+TEST(TactileMap, SharesAContactBetweenTwoTactors) {
+  TactileMap map;
+  map.step(dent(30.0, 0.004), kStep);
+  EXPECT_NEAR(map.forces()[0], map.forces()[1], 1e-4);
+  EXPECT_GT(map.forces()[0], 0.0);
+  EXPECT_EQ(map.forces()[2], 0.0);
+}
+
+TEST(TactileMap, IsStrongerForDeeperContactsAndSilentWithout) {
+  TactileMap map;
+  const auto weak = map.step(dent(0.0, 0.001), kStep)[0];
+  const auto strong = map.step(dent(0.0, 0.006), kStep)[0];
+  EXPECT_LT(weak, strong);
+  EXPECT_EQ(map.step(dent(0.0, 0.020), kStep)[0], 255);
+  EXPECT_EQ(map.step(dent(0.0, -0.001), kStep), TactorIntensities{});
+  EXPECT_EQ(map.step(HandManifold{}, kStep), TactorIntensities{});
+}
+
+TEST(TactileMap, PulsesQuickerForStrongerContactsInPatternMode) {
+  const auto pulses = [](double depth) {
+    TactileMap map({.mode = TactileMode::kPattern});
+    int begun = 0;
+    bool on = false;
+    for (int i = 0; i < 3000; ++i) {
+      const bool now = map.step(dent(120.0, depth), kStep)[2] > 0;
+      if (now && !on) ++begun;
+      on = now;
+    }
+    return begun;
+  };
+  EXPECT_GE(pulses(0.0005), 4);
+  EXPECT_GT(pulses(0.008), 2 * pulses(0.0005));
+}
+
+}  // namespace
+}  // namespace tenon

@@ -1,0 +1,86 @@
+#include "clients/haptic/workspace.h"
+
+#include <gtest/gtest.h>
+
+namespace tenon {
+namespace {
+
+constexpr double kStep = 1e-3;
+
+//     ( C_w )---o C_h       inside the sphere nothing moves; outside C_w follows by eq. 1
+//       r_w
+TEST(Workspace, FollowsAHandOutsideItsSphereExactlyAsEquationOneSays) {
+  Workspace workspace({.radius = 0.2, .gain = 1.5});
+  const Vector3 p_WC(1.0, 2.0, 3.0);
+  workspace.place(p_WC);
+  const Vector3 p_DH(0.3, -0.1, 0.05);
+  workspace.step(p_DH, false, kStep);
+  const double r_h = p_DH.norm();
+  const Vector3 C_h = p_WC + p_DH;
+  const Vector3 expected = p_WC + 1.5 * kStep * (1.0 - 0.2 / r_h) * (C_h - p_WC);
+  EXPECT_LT((workspace.centre() - expected).norm(), 1e-15);
+  EXPECT_LT((workspace.velocity() - (expected - p_WC) / kStep).norm(), 1e-9);
+}
+
+TEST(Workspace, StandsStillWhileTheHandIsInside) {
+  Workspace workspace({.radius = 0.2, .gain = 1.5});
+  workspace.place(Vector3(1.0, 0.0, 0.0));
+  for (int i = 0; i < 1000; ++i) workspace.step(Vector3(0.0, 0.2, 0.0), false, kStep);
+  EXPECT_EQ(workspace.centre(), Vector3(1.0, 0.0, 0.0));
+  EXPECT_FALSE(workspace.moving());
+}
+
+TEST(Workspace, NeverMovesInContactAndWaitsALittleAfterIt) {
+  Workspace workspace({.radius = 0.2, .gain = 1.5, .settle_ticks = 50});
+  workspace.place(Vector3::Zero());
+  for (int i = 0; i < 1000; ++i) workspace.step(Vector3(0.4, 0.0, 0.0), true, kStep);
+  EXPECT_EQ(workspace.centre(), Vector3::Zero());
+  for (int i = 0; i < 49; ++i) workspace.step(Vector3(0.4, 0.0, 0.0), false, kStep);
+  EXPECT_EQ(workspace.centre(), Vector3::Zero());
+  workspace.step(Vector3(0.4, 0.0, 0.0), false, kStep);
+  EXPECT_GT(workspace.centre().x(), 0.0);
+}
+
+TEST(Workspace, GoesSmoothlyToAPlaceAndArrivesThereExactly) {
+  Workspace workspace({.go_to_speed = 0.4});
+  workspace.place(Vector3::Zero());
+  const Vector3 there(0.6, 0.8, 0.0);
+  workspace.goTo(there);
+  double fastest = 0.0;
+  double roughest = 0.0;
+  Vector3 before = Vector3::Zero();
+  for (int i = 0; i < 10000 && workspace.going(); ++i) {
+    workspace.step(Vector3::Zero(), false, kStep);
+    fastest = std::max(fastest, workspace.velocity().norm());
+    roughest = std::max(roughest, (workspace.velocity() - before).norm());
+    before = workspace.velocity();
+  }
+  EXPECT_LT((workspace.centre() - there).norm(), 1e-12);
+  EXPECT_NEAR(fastest, 0.4, 1e-3);
+  EXPECT_LT(roughest, 1e-3);  // [m/s] from one millisecond to the next
+}
+
+TEST(Workspace, StopsItsWayInContactAndStartsGentlyAgain) {
+  Workspace workspace({.go_to_speed = 0.4});
+  workspace.place(Vector3::Zero());
+  workspace.goTo(Vector3(1.0, 0.0, 0.0));
+  for (int i = 0; i < 800; ++i) workspace.step(Vector3::Zero(), false, kStep);
+  const Vector3 stopped = workspace.centre();
+  for (int i = 0; i < 100; ++i) workspace.step(Vector3::Zero(), true, kStep);
+  EXPECT_EQ(workspace.centre(), stopped);
+  for (int i = 0; i < 51; ++i) workspace.step(Vector3::Zero(), false, kStep);
+  EXPECT_LT(workspace.velocity().norm(), 0.001);
+  for (int i = 0; i < 10000; ++i) workspace.step(Vector3::Zero(), false, kStep);
+  EXPECT_LT((workspace.centre() - Vector3(1.0, 0.0, 0.0)).norm(), 1e-12);
+}
+
+TEST(Workspace, MapsPosesToTheWorldAndBack) {
+  Workspace workspace({});
+  workspace.place(Vector3(1.0, 2.0, 3.0));
+  const Pose X_DH(Vector3(0.1, 0.2, 0.3), expRotation(Vector3(0.3, -0.2, 0.1)));
+  EXPECT_EQ(workspace.toWorld(X_DH).translation(), Vector3(1.1, 2.2, 3.3));
+  EXPECT_LT((workspace.toDevice(workspace.toWorld(X_DH)).translation() - X_DH.translation()).norm(), 1e-15);
+}
+
+}  // namespace
+}  // namespace tenon

@@ -1,0 +1,95 @@
+#include "clients/trainee/trainee_station.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/clients/trainee/funnel_server.h"
+#include "tests/support/realtime_guard.h"
+
+namespace tenon {
+namespace {
+
+using test::FunnelServer;
+
+std::unique_ptr<TraineeStation> station(std::uint64_t seed, int stubborn = -1) {
+  TraineeOptions options;
+  options.person.seed = seed;
+  options.person.stubborn_mount = stubborn;
+  return std::move(*TraineeStation::open(options));
+}
+
+TEST(TraineeStation, ReachesThePartTouchesItAndBringsItHomeThroughContact) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    FunnelServer server;
+    const auto trainee = station(seed);
+    server.welcome(*trainee);
+    server.run(*trainee, 60.0);
+    EXPECT_TRUE(server.grabbed) << trainee->doing();
+    EXPECT_TRUE(server.over) << trainee->doing() << " off by " << server.error().translation.transpose()
+                             << " turned " << server.error().rotation.transpose();
+    EXPECT_LT(server.highest_force, 25.0);
+    EXPECT_LT(server.highest_speed, 0.45);
+    EXPECT_FALSE(server.indexed_in_contact);
+  }
+}
+
+TEST(TraineeStation, MissesTheTargetWithTheSameIntentWhenNothingGuidesIt) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    FunnelServer server;
+    server.collisions = false;
+    const auto trainee = station(seed);
+    server.welcome(*trainee);
+    server.run(*trainee, 45.0);
+    EXPECT_TRUE(server.grabbed);
+    EXPECT_FALSE(server.over);
+    EXPECT_GT(server.error().translation.norm(), 0.002);
+    EXPECT_LT(server.error().translation.norm(), 0.012);  // she tried
+  }
+}
+
+TEST(TraineeStation, PressesOnTheRimAndStaysThereWhenSheIsSureOfAWrongPlace) {
+  FunnelServer server;
+  const auto trainee = station(4, 0);
+  server.welcome(*trainee);
+  server.run(*trainee, 45.0);
+  EXPECT_TRUE(server.grabbed);
+  EXPECT_FALSE(server.over);
+  EXPECT_STREQ(trainee->doing(), "insists");
+  EXPECT_TRUE(server.in_contact);
+  EXPECT_GT(server.error().translation.head<2>().norm(), 0.018);
+}
+
+TEST(TraineeStation, DoesTheSameToTheLastBitWithTheSameSeed) {
+  FunnelServer one, two;
+  const auto first = station(7), second = station(7);
+  one.welcome(*first);
+  two.welcome(*second);
+  for (int i = 0; i < 12000; ++i) {
+    one.step(*first);
+    two.step(*second);
+    ASSERT_EQ(first->inputs()[0].samples[0].X_WH, second->inputs()[0].samples[0].X_WH) << i;
+  }
+}
+
+TEST(TraineeStation, LeavesOutHandsThatTheScenarioDoesNotHave) {
+  FunnelServer server;
+  const auto trainee = station(1);
+  EXPECT_EQ(trainee->handNames(), (std::vector<std::string>{"right", "left", "forearm", "head"}));
+  server.welcome(*trainee);
+  server.step(*trainee);
+  ASSERT_EQ(trainee->hands().size(), 1U);
+  EXPECT_EQ(trainee->inputs().size(), 1U);
+}
+
+TEST(TraineeStation, StepAllocatesNothingAndLocksNothing) {
+  FunnelServer server;
+  const auto trainee = station(1);
+  server.welcome(*trainee);
+  server.run(*trainee, 0.5);
+  const test::RealtimeGuard guard;
+  for (std::uint32_t i = 0; i < 500; ++i) trainee->step(501 + i);
+  EXPECT_EQ(guard.allocations(), 0);
+  EXPECT_EQ(guard.locks(), 0);
+}
+
+}  // namespace
+}  // namespace tenon
