@@ -1,0 +1,130 @@
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+
+#include "server/collision/island_solver.h"
+#include "server/collision/pair_query.h"
+#include "tests/support/analytic_structures.h"
+
+/// How long a query and a solve take, next to the flat loop over all points in the same run: times compare
+/// only within one run. The scene: a box of about 10,000 points that is dragged over a floor and into a
+/// corner.
+namespace tenon {
+namespace {
+
+constexpr int kPoses = 256;
+
+const test::StructuresPtr& box() {
+  static const test::StructuresPtr structures = test::boxStructures({0.3, 0.2, 0.1}, 0.003, 0.0046);
+  return structures;
+}
+
+const test::StructuresPtr& corner() {
+  static const test::StructuresPtr structures = test::cornerStructures(0.6, 0.003);
+  return structures;
+}
+
+/// 1.5 mm from one to the next, an edge some millimetres in the floor; `height` > 0 lifts it off.
+std::vector<Pose> path(double height) {
+  std::vector<Pose> poses;
+  for (int i = 0; i < kPoses; ++i) {
+    const Vector3 p(0.17 + 0.001 * i, 0.12 + 0.0005 * i, 0.06 + height);
+    poses.emplace_back(p, expRotation({0.12, 0.002 * (i % 40), 0.0}));
+  }
+  return poses;
+}
+
+PairQuery queryAt(const Pose& X_WA) { return {&box()->shell, &corner()->field, X_WA, Pose(), 0.0027, 0.001}; }
+
+void Query(benchmark::State& state, double height) {
+  const std::vector<Pose> poses = path(height);
+  const auto result = std::make_unique<PairQueryResult>();
+  double visited = 0.0;
+  double contacts = 0.0;
+  std::size_t i = 0;
+  for (auto _ : state) {
+    queryPair(queryAt(poses[i++ % kPoses]), *result);
+    visited += result->counts.points_visited;
+    contacts += static_cast<double>(result->contacts.size());
+  }
+  state.counters["points"] = static_cast<double>(box()->shell.points().size());
+  state.counters["visited"] = benchmark::Counter(visited, benchmark::Counter::kAvgIterations);
+  state.counters["contacts"] = benchmark::Counter(contacts, benchmark::Counter::kAvgIterations);
+}
+BENCHMARK_CAPTURE(Query, InContact, 0.0)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(Query, Free, 0.05)->Unit(benchmark::kMicrosecond);
+
+void FlatLoop(benchmark::State& state) {
+  const std::vector<Pose> poses = path(0.0);
+  std::size_t i = 0;
+  for (auto _ : state) {
+    const PairQuery query = queryAt(poses[i++ % kPoses]);
+    const Pose X_BA = query.X_WB.inverse() * query.X_WA;
+    const Matrix3 R_BA = X_BA.matrix();
+    double deepest = 0.0;
+    for (const ShellPoint& point : query.shell_A->points()) {
+      const FieldSample sample = query.field_B->sample(X_BA.translation() + R_BA * point.p_MP.cast<double>());
+      deepest = std::min(deepest, sample.distance);
+    }
+    benchmark::DoNotOptimize(deepest);
+  }
+}
+BENCHMARK(FlatLoop)->Unit(benchmark::kMicrosecond);
+
+/// The contacts of a body that stands a little askew in the corner, as many as there are.
+void Solve(benchmark::State& state) {
+  const auto result = std::make_unique<PairQueryResult>();
+  const Pose X_WB(Vector3(0.1525, 0.1025, 0.0525), expRotation({0.003, 0.002, 0.0}));
+  queryPair(queryAt(X_WB), *result);
+  MovableBody body;
+  body.X_WB = X_WB;
+  body.radius = box()->shell.radius();
+  body.springs.push_back({Pose(X_WB.translation() - Vector3::Constant(0.02)), Vector3::Zero(), 2000.0, 20.0});
+  std::vector<GapRow> rows;
+  for (const Contact& contact : result->contacts) {
+    rows.push_back({0, GapRow::kStatic, contact.n_W, contact.p_WP, std::max(contact.gap, 0.0)});
+  }
+  MotionSolver solver(1, rows.size());
+  std::vector<Displacement> motions(1);
+  std::vector<double> multipliers(rows.size());
+  double iterations = 0.0;
+  for (auto _ : state) {
+    iterations += solver.solve(std::span(&body, 1), rows, motions, multipliers).iterations;
+  }
+  state.counters["rows"] = static_cast<double>(rows.size());
+  state.counters["iterations"] = benchmark::Counter(iterations, benchmark::Counter::kAvgIterations);
+}
+BENCHMARK(Solve)->Unit(benchmark::kMicrosecond);
+
+/// Whole ticks: the hand drags the box along a wall and the floor at 0.5 m/s and back.
+void Tick(benchmark::State& state) {
+  std::vector<MovableBody> bodies(1);
+  bodies[0].X_WB = Pose(Vector3(0.16, 0.12, 0.06));
+  bodies[0].radius = box()->shell.radius();
+  bodies[0].springs.push_back({bodies[0].X_WB, Vector3::Zero(), 2000.0, 20.0});
+  std::vector<IslandPair> pairs(1);
+  pairs[0].body_a = 0;
+  pairs[0].shell_A = &box()->shell;
+  pairs[0].field_B = &corner()->field;
+  pairs[0].dilation = 0.0027;
+  std::vector<IslandPairResult> results(1);
+  results[0].multipliers.resize(kMaxPairContacts);
+  IslandSolver solver(1, 1);
+  double queries = 0.0;
+  int tick = 0;
+  for (auto _ : state) {
+    const double way = 0.0005 * std::abs(tick % 400 - 200);
+    ++tick;
+    bodies[0].springs[0].X_WG = Pose(Vector3(0.14, 0.13 + way, 0.045), expRotation({0.05, 0.0, 0.02}));
+    queries += solver.solve(bodies, pairs, SolveLimits{}, results).queries;
+  }
+  state.counters["queries"] = benchmark::Counter(queries, benchmark::Counter::kAvgIterations);
+}
+BENCHMARK(Tick)->Unit(benchmark::kMicrosecond);
+
+}  // namespace
+}  // namespace tenon
+
+BENCHMARK_MAIN();
