@@ -1,0 +1,77 @@
+"""What goes wrong around a session is said once, clearly, and does not end it."""
+import signal
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+from stage import SOURCE, Stage, tenon
+
+
+class Faults(unittest.TestCase):
+    def test_a_trainee_killed_while_holding_a_part_is_parked_and_may_come_back(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve("peg_and_box", "--wait-for", "right")
+            trainee = stage.start("trainee", "--seed", 1)
+            server.wait_for("taken: .*[Pp]eg", 120)
+            trainee.signal(signal.SIGKILL)
+            server.wait_for("is gone", 30)
+            server.wait_for("what it held is parked", 30)
+            self.assertIsNone(server.popen.poll(), "the session must go on")
+            stage.start("trainee", "--seed", 2)
+            server.wait_for("everything is mounted", 180)
+            self.assertEqual(server.wait(30), 0)
+
+    def test_a_trainee_that_hangs_freezes_and_then_moves_again(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve("peg_and_box", "--wait-for", "right")
+            trainee = stage.start("trainee", "--seed", 1)
+            server.wait_for("taken: .*[Pp]eg", 120)
+            trainee.signal(signal.SIGSTOP)
+            server.wait_for("held still", 30)
+            time.sleep(0.3)  # shorter than the lease: the person is still there
+            trainee.signal(signal.SIGCONT)
+            server.wait_for("moves again|hand gone", 30)
+            self.assertIsNone(server.popen.poll(), "the session must go on")
+
+    def test_a_second_trainee_is_told_that_the_hand_is_taken(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve("peg_and_box", "--wait-for", "right")
+            stage.start("trainee", "--seed", 1)
+            server.wait_for("is here", 60)
+            second = stage.start("trainee", "--seed", 2)
+            self.assertNotEqual(second.wait(60), 0)
+            self.assertIn("already moved by somebody else", second.text())
+
+    def test_no_server_is_one_clear_sentence(self):
+        with Stage(lockstep=False) as stage:
+            alone = stage.start("trainee", "--patience", 2)
+            self.assertNotEqual(alone.wait(60), 0)
+            self.assertIn("no session", alone.text())
+
+    def test_bad_scenarios_name_file_and_line(self):
+        cases = {
+            "nothing there": ("", "scenario"),
+            "unknown key": ("title: {en: x}\nobjekts: []\n", "objekts"),
+        }
+        for name, (text, expected) in cases.items():
+            with self.subTest(name=name), tempfile.TemporaryDirectory() as folder:
+                file = Path(folder) / "scenario.yaml"
+                file.write_text(text, encoding="utf-8")
+                done = tenon("serve", file)
+                self.assertEqual(done.returncode, 1)
+                self.assertIn(expected, done.stderr)
+                self.assertIn("scenario.yaml", done.stderr)
+
+    def test_a_missing_mesh_is_named(self):
+        original = (SOURCE / "scenarios" / "peg_and_box" / "scenario.yaml").read_text(encoding="utf-8")
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "scenario.yaml"
+            file.write_text(original.replace("{part: peg}", "{file: nowhere.stl, unit: mm}"), encoding="utf-8")
+            done = tenon("serve", file)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("nowhere.stl", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,50 @@
+"""A session between real processes: lockstep over DDS does to the bit what one process does, and re-runs to it."""
+import unittest
+
+from stage import Stage, final_hash, tenon
+
+SCENARIO = "peg_and_box"
+
+
+def rehearse(*words):
+    done = tenon("rehearse", f"scenarios/{SCENARIO}", "--seed", 1, "--no-instructor", *words)
+    return done, final_hash(done.stdout)
+
+
+class Session(unittest.TestCase):
+    def test_the_same_hash_for_any_number_of_workers(self):
+        one, hash_one = rehearse()
+        self.assertEqual(one.returncode, 0, one.stdout + one.stderr)
+        again, hash_again = rehearse()
+        two, hash_two = rehearse("--workers", 2)
+        self.assertEqual(hash_one, hash_again)
+        self.assertEqual(hash_one, hash_two)
+
+    def test_without_collisions_the_same_person_fails(self):
+        done, _ = rehearse("--no-collisions")
+        self.assertEqual(done.returncode, 1, done.stdout)
+
+    def test_lockstep_between_processes_equals_one_process_and_its_recordings_rerun(self):
+        with Stage() as stage:
+            journal, recording = stage.out / "journal.mcap", stage.out / "session.mcap"
+            server = stage.serve(SCENARIO, "--wait-for", "right,recorder", "--journal", journal)
+            recorder = stage.start("record", "-o", recording)
+            trainee = stage.start("trainee", "--seed", 1)
+            self.assertEqual(server.wait(), 0, server.text())
+            self.assertEqual(recorder.wait(30), 0, recorder.text())
+            self.assertEqual(trainee.wait(30), 0, trainee.text())
+
+            over_dds = final_hash(server.text())
+            self.assertEqual(over_dds, rehearse()[1])
+            for file in (journal, recording):
+                again = tenon("rerun", file, f"scenarios/{SCENARIO}")
+                self.assertEqual(again.returncode, 0, again.stdout + again.stderr)
+                self.assertEqual(final_hash(again.stdout), over_dds)
+
+            report = tenon("report", recording, "-o", stage.out)
+            self.assertEqual(report.returncode, 0, report.stdout + report.stderr)
+            self.assertTrue((stage.out / "report.html").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
