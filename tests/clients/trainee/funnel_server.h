@@ -20,6 +20,8 @@ class FunnelServer {
   static constexpr HandId kRight{0};
   static constexpr ObjectId kBlock{0}, kPointer{1}, kPart{2};
   static constexpr double kPartRadius = 0.05;
+  /// [rad] that she may be off: her aim, which nothing here corrects.
+  static constexpr double kTurned = 0.06;
 
   FunnelServer() {
     const auto add = [this](const char* kind, const Vector3& at, const Vector3& size) {
@@ -134,7 +136,7 @@ class FunnelServer {
       return;
     }
     const Displacement off = error();
-    if (off.translation.norm() < 0.002 && off.rotation.norm() < 0.037 && ++home_ > 300) over = true;
+    if (off.translation.norm() < 0.002 && off.rotation.norm() < kTurned && ++home_ > 300) over = true;
   }
 
   void tell(Station& station, const Pose& X_WH) {
@@ -176,9 +178,13 @@ class FunnelServer {
     }
     const HandState& state = station.states()[0];
     highest_force = std::max(highest_force, state.F_Ho_W.force.norm());
-    if (tick_ > 1)
-      highest_speed = std::max(highest_speed, (X_WH.translation() - last_.translation()).norm() * 1000.0);
-    last_ = X_WH;
+    // over 50 ms: a single reading is a multiple of the encoder's step
+    if (tick_ % 50 == 0) {
+      highest_speed = std::max(highest_speed, (X_WH.translation() - last_.translation()).norm() * 20.0);
+      last_ = X_WH;
+    } else if (tick_ == 1) {
+      last_ = X_WH;
+    }
     if (in_contact && contact_ticks_ > 2 && (station.inputs()[0].p_WC - centre_).norm() > 0.0)
       indexed_in_contact = true;
     contact_ticks_ = in_contact ? contact_ticks_ + 1 : 0;

@@ -1,0 +1,156 @@
+#include "clients/instructor/instructor_station.h"
+
+#include <gtest/gtest.h>
+
+#include "clients/haptic/local_model.h"
+#include "tests/support/realtime_guard.h"
+
+namespace tenon {
+namespace {
+
+constexpr HandId kHand{0};
+constexpr ObjectId kCube{0}, kPart{1};
+
+//   [cube] ->|part|   ghost is 20 mm to the left of the part; the part's right side is felt by the cube
+//            ^ stuck 50 mm above its ghost
+/// The part gives way sideways by a spring, and drops home when it is over its ghost.
+class StuckPart {
+ public:
+  explicit StuckPart(const char* device) {
+    InstructorOptions options;
+    options.device = device;
+    station = std::move(*InstructorStation::open(options));
+    SceneObject cube, part;
+    cube.object = kCube;
+    cube.kind = "assistant";
+    cube.size = Vector3::Constant(0.05);
+    cube.X_WO = Pose(Vector3(-0.1, -0.3, 1.25));
+    part.object = kPart;
+    part.kind = "part";
+    part.size = Vector3(0.2, 0.1, 0.1);
+    part.X_WO = part_ = Pose(Vector3(0.02, 0.5, 0.81));
+    objects_ = {cube, part};
+    cube_ = cube.X_WO;
+    world_.begin(objects_, 1, 0);
+    Welcome welcome;
+    welcome.accepted = true;
+    welcome.client = ClientId{2};
+    welcome.hands = {kHand};
+    welcome.server_epoch = 1;
+    station->welcome(welcome, objects_);
+    StepState step;
+    step.revision = 1;
+    step.phase = StepPhase::kActive;
+    step.object = kPart;
+    step.has_target = true;
+    step.X_WG = Pose(Vector3(0.0, 0.5, 0.76));
+    step.approach_W = -Vector3::UnitZ();
+    step.tolerance = 0.002;
+    station->receive(step);
+  }
+
+  void run(double seconds) {
+    for (int i = 0; i < static_cast<int>(seconds * 1000.0); ++i) step();
+  }
+
+  std::unique_ptr<InstructorStation> station;
+  double highest_force = 0.0;
+  bool helped = false;
+  [[nodiscard]] const Pose& cube() const { return cube_; }
+
+ private:
+  void step() {
+    ++tick_;
+    station->step(static_cast<std::uint32_t>(tick_));
+    const Pose& X_WH = station->inputs()[0].samples[0].X_WH;
+    HandManifold manifold;
+    manifold.hand = kHand;
+    manifold.server_epoch = 1;
+    manifold.tick = tick_;
+    manifold.object = kCube;
+    manifold.object_epoch = 1;
+    manifold.X_WO = tick_ == 1 ? X_WH : cube_;
+    manifold.stiffness = 1000.0;
+    manifold.rotational_stiffness = 20.0;
+    manifold.validity_radius = 1.0;
+    const Vector3 p = manifold.X_WO.translation() - part_.translation();
+    if (std::abs(p.y()) < 0.07 && std::abs(p.z()) < 0.07 && p.x() > 0.0) {
+      ManifoldContact contact;
+      contact.other = kPart;
+      contact.p_BoP_B = Vector3f(-0.025F, 0.0F, 0.0F);
+      contact.normal_A = Vector3f::UnitX();
+      contact.offset = 0.1F;
+      contact.gap = static_cast<float>(p.x() - 0.125);
+      manifold.contacts.push_back(contact);
+    }
+    model_.receive(manifold);
+    cube_ = model_.step(X_WH, world_).X_WO;
+    // the trainee's arm: 150 N/m about where she insists
+    const double push = std::max(0.0, 1000.0 * (cube_.translation().x() - X_WH.translation().x()));
+    if (!helped) part_.translation().x() += 0.2 * (0.02 - push / 150.0 - part_.translation().x()) * 0.05;
+    if (part_.translation().x() < 0.004) helped = true;
+    if (helped) part_.translation() = Vector3(0.0, 0.5, 0.76);
+    highest_force = std::max(highest_force, station->states()[0].F_Ho_W.force.norm());
+
+    WorldFrame frame;
+    frame.server_epoch = 1;
+    frame.tick = tick_;
+    for (const ObjectId object : {kCube, kPart}) {
+      ObjectState state;
+      state.object = object;
+      state.epoch = 1;
+      state.X_WO = object == kCube ? cube_ : part_;
+      state.status = static_cast<std::uint8_t>(ObjectStatus::kHeld);
+      frame.states.push_back(state);
+    }
+    world_.receive(frame);
+    station->receive(frame);
+    station->receive(manifold);
+  }
+
+  std::vector<SceneObject> objects_;
+  WorldView world_;
+  LocalModel model_;
+  Pose cube_, part_;
+  Tick tick_ = 0;
+};
+
+class InstructorWithEach : public testing::TestWithParam<const char*> {};
+
+TEST_P(InstructorWithEach, PushesAStuckPartTowardsItsGhostAndWithdraws) {
+  StuckPart scene(GetParam());
+  scene.run(3.5);
+  EXPECT_STREQ(scene.station->doing(), "watches");
+  scene.run(26.5);
+  EXPECT_TRUE(scene.helped) << scene.station->doing();
+  EXPECT_LT(scene.highest_force, 15.0);
+  scene.run(10.0);
+  EXPECT_STREQ(scene.station->doing(), "watches");
+  EXPECT_LT((scene.cube().translation() - Vector3(-0.1, -0.3, 1.25)).norm(), 0.05);
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, InstructorWithEach, testing::Values("sigma7-sim", "falcon-sim"),
+                         [](const auto& each) {
+                           const std::string name = each.param;
+                           return name.substr(0, name.find('-'));
+                         });
+
+TEST(InstructorStation, StepAllocatesNothingAndLocksNothing) {
+  StuckPart scene("sigma7-sim");
+  scene.run(0.5);
+  const test::RealtimeGuard guard;
+  for (std::uint32_t i = 0; i < 500; ++i) scene.station->step(501 + i);
+  EXPECT_EQ(guard.allocations(), 0);
+  EXPECT_EQ(guard.locks(), 0);
+}
+
+TEST(InstructorStation, NamesTheDevicesThereAreWhenItsOwnIsUnknown) {
+  InstructorOptions options;
+  options.device = "joystick";
+  const auto opened = InstructorStation::open(options);
+  ASSERT_FALSE(opened);
+  EXPECT_NE(opened.error().what.find("sigma7-sim"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tenon
