@@ -9,7 +9,7 @@ namespace tenon {
 /// How a simulated person is made: what limits her and how well she aims.
 struct PersonOptions {
   std::uint64_t seed = 1;
-  double max_speed = 0.35;        ///< [m/s] of the hand
+  double max_speed = 0.30;        ///< [m/s] she aims for; a swinging arm adds a little
   double max_turn_speed = 1.2;    ///< [rad/s]
   unsigned reaction_ticks = 150;  ///< from seeing or feeling to doing
   double aim_error_min = 0.003;   ///< [m] she aims beside the target, by a seeded amount between these two

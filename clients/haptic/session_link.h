@@ -34,6 +34,8 @@ class SessionLink {
   [[nodiscard]] const Welcome& welcome() const { return welcome_; }
   [[nodiscard]] const std::vector<SceneObject>& objects() const { return objects_; }
   [[nodiscard]] Partition& session() { return *session_; }
+  [[nodiscard]] Partition& lobby() { return *lobby_; }
+  [[nodiscard]] const std::string& sessionName() const { return announce_.session; }
   [[nodiscard]] Inbox& inbox() { return inbox_; }
   /// Waits until the server hears this client; call it when all topics are subscribed.
   [[nodiscard]] Result<void> settle(const std::atomic<bool>& stop);

@@ -74,6 +74,10 @@ class Program {
   void send(const Outbox& outbox);
   void sendEvents();
   void sayStep(const StepState& step);
+  [[nodiscard]] Result<RunState> ended() const {
+    if (server_gone_ && !over()) return fail("the server of session '" + link_.sessionName() + "' is gone");
+    return run_;
+  }
   [[nodiscard]] bool over() const {
     return run_.phase == RunPhase::kSucceeded || run_.phase == RunPhase::kFailed ||
            run_.phase == RunPhase::kStopped;
@@ -84,6 +88,7 @@ class Program {
   const StationProgramOptions& options_;
   bool direct_ = false;  // lockstep: what is heard goes to the station at once
   RunState run_;
+  bool server_gone_ = false;
 
   // what has been heard of the newest tick
   Tick frame_tick_ = 0;
@@ -147,6 +152,11 @@ Result<void> Program::subscribe() {
       stops_.push({stop.engaged, {}, {}});
     });
   }
+  if (all) {
+    all = inbox.onGone<SessionAnnounce>(link_.lobby(), kSessionAnnounce, [this](const SessionAnnounce& gone) {
+      if (gone.session == link_.sessionName()) server_gone_ = true;
+    });
+  }
   if (all) all = inbox.on<RunState>(session, kRunState, [this](const RunState& run) { run_ = run; });
   return all;
 }
@@ -194,7 +204,7 @@ Result<RunState> Program::runLockstep(const std::atomic<bool>& stop) {
   Tick tick = link_.welcome().tick;
   Outbox outbox;
   StationEvent event;
-  while (!stop && !over()) {
+  while (!stop && !over() && !server_gone_) {
     station_.step(static_cast<std::uint32_t>(tick + 1));
     outbox.fill(station_, static_cast<std::uint32_t>(tick + 1));
     send(outbox);
@@ -202,14 +212,14 @@ Result<RunState> Program::runLockstep(const std::atomic<bool>& stop) {
     sendEvents();
     ++tick;
     auto repeat_at = std::chrono::steady_clock::now() + kRepeatAfter;
-    while (!heardTick(tick) && !stop && !over()) {
+    while (!heardTick(tick) && !stop && !over() && !server_gone_) {
       link_.inbox().dispatch(milliseconds(50));
       if (std::chrono::steady_clock::now() < repeat_at) continue;
       for (const DeviceInput& input : outbox.inputs) static_cast<void>(link_.send(input));
       repeat_at = std::chrono::steady_clock::now() + kRepeatAfter;
     }
   }
-  return run_;
+  return ended();
 }
 
 void Program::servo() noexcept {
@@ -257,7 +267,7 @@ Result<RunState> Program::runByTheClock(const std::atomic<bool>& stop) {
   CyclicThread thread(std::make_shared<SteadyClock>(), cyclic, [this](std::uint64_t) noexcept { servo(); });
   thread.start();
   say(thread.notGranted());
-  while (!stop && !over()) {
+  while (!stop && !over() && !server_gone_) {
     link_.inbox().dispatch(milliseconds(20));
     if (outbox_.update()) send(outbox_.value());
     sendEvents();
@@ -268,7 +278,7 @@ Result<RunState> Program::runByTheClock(const std::atomic<bool>& stop) {
     static_cast<void>(link_.send(telemetry));
   }
   thread.stop();
-  return run_;
+  return ended();
 }
 
 std::atomic<bool>& stopFlag() {
