@@ -1,54 +1,14 @@
 #include "server/simulation/environment.h"
 
 #include <algorithm>
-#include <cmath>
 
-#include "server/collision/motion_solver.h"
 #include "server/simulation/engine.h"
 
 namespace tenon {
 namespace {
 
-/// A tick's travel is made in this many sub-steps: enough to meet a surface, turn along it and meet a second
-/// one.
-constexpr std::uint32_t kTravelSubsteps = 4;
-
 /// A shell's ball holds its points; the surface between them bulges a little more [m].
 constexpr double kBallSlack = 5e-3;
-
-/// The least body radius that scales rotations [m]: an object without structures still turns with its hand.
-constexpr double kLeastRadius = 0.01;
-
-SolveLimits cappedLimits(SolveLimits limits, double max_speed) {
-  const double travel = max_speed * kTickSeconds;
-  limits.substeps = std::clamp(limits.substeps, 1U, kTravelSubsteps);
-  limits.substep_travel = std::min(limits.substep_travel, travel / limits.substeps);
-  return limits;
-}
-
-std::size_t coupledHands(const Scene& scene) {
-  return static_cast<std::size_t>(
-      std::count_if(scene.hands.begin(), scene.hands.end(),
-                    [](const HandSpec& hand) { return hand.kind == HandKind::kCoupled; }));
-}
-
-ObjectSize sizeOf(const ObjectSpec& spec) {
-  ObjectSize size;
-  size.radius = kLeastRadius;
-  if (!spec.structures) return size;
-  const Pointshell& shell = spec.structures->shell;
-  if (!shell.empty()) {
-    size.p_OC_O = shell.ballCentre();
-    size.ball = shell.ballRadius();
-    size.radius = std::max(size.radius, shell.radius());
-  } else if (!spec.structures->field.empty()) {
-    const Eigen::AlignedBox3d box = spec.structures->field.box();
-    size.p_OC_O = box.center();
-    size.ball = 0.5 * box.diagonal().norm();
-    size.radius = std::max(size.radius, size.p_OC_O.norm() + size.ball);
-  }
-  return size;
-}
 
 /// A lower bound of the distance of two objects' surfaces [m].
 double ballGap(const ObjectSize& a, const Pose& X_WA, const ObjectSize& b, const Pose& X_WB) {
@@ -56,28 +16,6 @@ double ballGap(const ObjectSize& a, const Pose& X_WA, const ObjectSize& b, const
 }
 
 }  // namespace
-
-Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& options)
-    : pair_cells(scene.objects.size(), 0),
-      limits(cappedLimits(options.limits, options.max_speed)),
-      movable(scene.objects.size(), 0),
-      looked_at(scene.pairs.size(), 0),
-      others(scene.pairs.size(), 0),
-      partition(scene.objects.size()),
-      islands(coupledHands(scene), scene.pairs.size(), std::max(options.workers, 1U)),
-      pool(options.workers) {
-  reach = limits.contact_margin + kLookAheadReach + 2.0 * limits.substep_travel;
-  pairs.reserve(scene.pairs.size());
-  for (std::size_t pair = 0; pair < scene.pairs.size(); ++pair) {
-    pairs.emplace_back(scene, pair);
-    cell_in_a.push_back(pair_cells[scene.pairs[pair].a.value]++);
-    cell_in_b.push_back(pair_cells[scene.pairs[pair].b.value]++);
-  }
-  for (std::size_t object = 0; object < scene.objects.size(); ++object) {
-    forces.emplace_back(pair_cells[object] + scene.hands.size(), options.send_policy);
-    sizes.push_back(sizeOf(scene.objects[object]));
-  }
-}
 
 Environment::Environment(std::shared_ptr<const Scene> scene, const EnvironmentOptions& options)
     : scene_(std::move(scene)),
@@ -175,9 +113,10 @@ MovableBody Environment::movableBody(ObjectId object) const noexcept {
     const HandId hand{static_cast<std::uint32_t>(i)};
     if (engaged(hands_[i]) && hands_[i].object == object) body.springs.push_back(springOf(hand));
   }
+  Spring& first = body.springs[0];
+  if (first.stiffness <= 0.0) return body;
   // a constant wrench on the body is the same energy as a goal farther on
   const Wrench F_Bo_W = engine_->forces[object.value].contributed(tick_);
-  Spring& first = body.springs[0];
   const Wrench F_Bc_W = shifted(F_Bo_W, body.X_WB.rotation() * first.p_BC);
   const Vector3 p_WC = first.X_WG * first.p_BC + F_Bc_W.force / first.stiffness;
   if (first.rotational_stiffness > 0.0) {
@@ -292,77 +231,6 @@ void Environment::lookAtOtherPairs() noexcept {
     CollPair& pair = engine.pairs[i];
     if (engine.looked_at[i] == 0) continue;
     pair.schedule(tick_, speedCap(pair.spec().a) + speedCap(pair.spec().b), engine.reach);
-  }
-}
-
-void Environment::sumForces() noexcept {
-  Engine& engine = *engine_;
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    CollPair& pair = engine.pairs[i];
-    const ObjectId a = pair.spec().a;
-    const ObjectId b = pair.spec().b;
-    if (pair.result() == nullptr) {
-      engine.forces[a.value].clear(engine.cell_in_a[i]);
-      engine.forces[b.value].clear(engine.cell_in_b[i]);
-    } else if (engine.looked_at[i] != 0) {
-      const Wrench F_Ao_W = pair.result()->F_Ao_W;
-      const Vector3 p_AB_W = objects_[b.value].X_WO.translation() - objects_[a.value].X_WO.translation();
-      engine.forces[a.value].write(engine.cell_in_a[i], F_Ao_W, tick_);
-      engine.forces[b.value].write(engine.cell_in_b[i], -shifted(F_Ao_W, p_AB_W), tick_);
-    }
-  }
-  for (std::size_t i = 0; i < hands_.size(); ++i) {
-    HandMotion& hand = hands_[i];
-    hand.F_Ho_W = Wrench{};
-    const HandId id{static_cast<std::uint32_t>(i)};
-    if (!isObject(hand.object) || !engaged(hand)) continue;
-    const std::size_t object = hand.object.value;
-    const Pose& X_WO = objects_[object].X_WO;
-    const Vector3 p_OH_W = hand.X_WH.translation() - X_WO.translation();
-    if (engine.movable[object] != 0) {
-      const Wrench F_Oo_W = springWrench(springOf(id), X_WO);
-      engine.forces[object].write(engine.couplingCell(hand.object, id), F_Oo_W, tick_);
-      hand.F_Ho_W = -shifted(F_Oo_W, p_OH_W);
-    } else if (scene_->hands[i].kind == HandKind::kTracked) {
-      hand.F_Ho_W = shifted(engine.forces[object].total(tick_), p_OH_W);
-    } else {
-      engine.forces[object].clear(engine.couplingCell(hand.object, id));
-    }
-  }
-  for (ForceBuffer& buffer : engine.forces) buffer.expire(tick_);
-}
-
-void Environment::judgeContacts() noexcept {
-  for (ObjectMotion& object : objects_) object.in_contact = false;
-  for (const CollPair& pair : engine_->pairs) {
-    if (!pair.touching()) continue;
-    // what only senses leaves no mark on what it touches
-    ObjectMotion& a = objects_[pair.spec().a.value];
-    ObjectMotion& b = objects_[pair.spec().b.value];
-    a.in_contact |= !pair.spec().sensing || a.status == ObjectStatus::kTracked;
-    b.in_contact |= !pair.spec().sensing || b.status == ObjectStatus::kTracked;
-  }
-}
-
-void Environment::countWork() noexcept {
-  work_ = Work{};
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    const CollPair& pair = engine_->pairs[i];
-    const bool queried = engine_->looked_at[i] != 0;
-    pairs_[i] = {pair.enabled(), queried, pair.dueTick(), pair.result()};
-    work_.active_pairs += active(i) ? 1U : 0U;
-    if (!queried) continue;
-    ++work_.queried_pairs;
-    work_.load_percent = std::max(work_.load_percent, pair.result()->query.counts.loadPercent());
-  }
-  for (std::size_t i = 0; i < engine_->other_count; ++i) {
-    work_.points_visited += engine_->pairs[engine_->others[i]].result()->query.counts.points_visited;
-  }
-  for (const IslandWork::Island& island : engine_->islands.islands()) {
-    work_.substeps += island.report.substeps;
-    work_.iterations += island.report.iterations;
-    work_.points_visited += island.report.points_visited;
-    work_.conflicting |= island.report.conflicting;
   }
 }
 

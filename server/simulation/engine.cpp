@@ -1,0 +1,70 @@
+#include "server/simulation/engine.h"
+
+#include <algorithm>
+
+namespace tenon {
+namespace {
+
+/// A tick's travel is made in this many sub-steps: enough to meet a surface, turn along it and meet a second
+/// one.
+constexpr std::uint32_t kTravelSubsteps = 4;
+
+/// The least body radius that scales rotations [m]: an object without structures still turns with its hand.
+constexpr double kLeastRadius = 0.01;
+
+SolveLimits cappedLimits(SolveLimits limits, double max_speed) {
+  const double travel = max_speed * kTickSeconds;
+  limits.substeps = std::clamp(limits.substeps, 1U, kTravelSubsteps);
+  limits.substep_travel = std::min(limits.substep_travel, travel / limits.substeps);
+  return limits;
+}
+
+std::size_t coupledHands(const Scene& scene) {
+  return static_cast<std::size_t>(
+      std::count_if(scene.hands.begin(), scene.hands.end(),
+                    [](const HandSpec& hand) { return hand.kind == HandKind::kCoupled; }));
+}
+
+ObjectSize sizeOf(const ObjectSpec& spec) {
+  ObjectSize size;
+  size.radius = kLeastRadius;
+  if (!spec.structures) return size;
+  const Pointshell& shell = spec.structures->shell;
+  if (!shell.empty()) {
+    size.p_OC_O = shell.ballCentre();
+    size.ball = shell.ballRadius();
+    size.radius = std::max(size.radius, shell.radius());
+  } else if (!spec.structures->field.empty()) {
+    const Eigen::AlignedBox3d box = spec.structures->field.box();
+    size.p_OC_O = box.center();
+    size.ball = 0.5 * box.diagonal().norm();
+    size.radius = std::max(size.radius, size.p_OC_O.norm() + size.ball);
+  }
+  return size;
+}
+
+}  // namespace
+
+Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& options)
+    : pair_cells(scene.objects.size(), 0),
+      limits(cappedLimits(options.limits, options.max_speed)),
+      movable(scene.objects.size(), 0),
+      looked_at(scene.pairs.size(), 0),
+      others(scene.pairs.size(), 0),
+      partition(scene.objects.size()),
+      islands(coupledHands(scene), scene.pairs.size(), std::max(options.workers, 1U)),
+      pool(options.workers) {
+  reach = limits.contact_margin + kLookAheadReach + 2.0 * limits.substep_travel;
+  pairs.reserve(scene.pairs.size());
+  for (std::size_t pair = 0; pair < scene.pairs.size(); ++pair) {
+    pairs.emplace_back(scene, pair);
+    cell_in_a.push_back(pair_cells[scene.pairs[pair].a.value]++);
+    cell_in_b.push_back(pair_cells[scene.pairs[pair].b.value]++);
+  }
+  for (std::size_t object = 0; object < scene.objects.size(); ++object) {
+    forces.emplace_back(pair_cells[object] + scene.hands.size(), options.send_policy);
+    sizes.push_back(sizeOf(scene.objects[object]));
+  }
+}
+
+}  // namespace tenon
