@@ -1,0 +1,117 @@
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "server/structures/field_builder.h"
+#include "server/structures/haptic_structures.h"
+#include "server/structures/shell_builder.h"
+
+namespace tenon {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+/// A folder of its own for each test, gone afterwards.
+class StructureFile : public ::testing::Test {
+ protected:
+  StructureFile() {
+    fs::create_directories(folder_);
+    const Vector3 corner = Vector3::Constant(0.02);
+    const std::array refine{Eigen::AlignedBox3d(Vector3::Zero(), corner)};
+    structures_.field =
+        buildField([](const Vector3& p) { return p.norm() - 0.02; }, {-corner, corner}, 0.002, refine, 2);
+    std::vector<ShellSite> sites;
+    for (int i = 0; i < 100; ++i) sites.push_back({Vector3(0.001 * i, 0.0, 0.02), -Vector3::UnitZ(), 1e-6});
+    structures_.shell = buildShell(sites);
+    structures_.info.source = "ball.stl";
+    structures_.info.content_hash = "0123";
+    structures_.info.notes = "A note.\n";
+    structures_.info.triangles = 12;
+    structures_.info.box_M = {-corner, corner};
+  }
+  ~StructureFile() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] std::string written() {
+    const auto ok = writeStructures(file(), structures_);
+    EXPECT_TRUE(ok);
+    std::ifstream in(file(), std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  void put(const std::string& bytes) const {
+    std::ofstream(file(), std::ios::binary | std::ios::trunc) << bytes;
+  }
+  [[nodiscard]] fs::path file() const { return folder_ / "ball.tenon"; }
+
+  fs::path folder_ =
+      fs::temp_directory_path() / ("tenon-structure-file-" + std::to_string(::getpid()) +
+                                   ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  HapticStructures structures_;
+};
+
+TEST_F(StructureFile, ComesBackAsItWent) {
+  (void)written();
+  const auto opened = openStructures(file());
+  ASSERT_TRUE(opened) << opened.error().what;
+  const HapticStructures& read = **opened;
+  const auto& a = structures_.field.layout();
+  const auto& b = read.field.layout();
+  EXPECT_TRUE(std::equal(a.index.begin(), a.index.end(), b.index.begin(), b.index.end()));
+  EXPECT_TRUE(std::equal(a.samples.begin(), a.samples.end(), b.samples.begin(), b.samples.end()));
+  EXPECT_TRUE(std::equal(a.far.begin(), a.far.end(), b.far.begin(), b.far.end()));
+  EXPECT_EQ(read.shell.points().size(), 100U);
+  EXPECT_EQ(read.shell.ballRadius(), structures_.shell.ballRadius());
+  EXPECT_EQ(read.info.source, "ball.stl");
+  EXPECT_EQ(read.info.notes, "A note.\n");
+  EXPECT_EQ(read.info.box_M.max(), structures_.info.box_M.max());
+  const Vector3 p(0.011, 0.012, 0.013);
+  EXPECT_EQ(read.field.sample(p).distance, structures_.field.sample(p).distance);
+}
+
+TEST_F(StructureFile, WritingLeavesNoOtherFileBehind) {
+  (void)written();
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
+}
+
+TEST_F(StructureFile, ATruncatedFileIsRefusedWithItsName) {
+  const std::string bytes = written();
+  for (const std::size_t size : {bytes.size() - 1, bytes.size() / 2, std::size_t{100}, std::size_t{0}}) {
+    put(bytes.substr(0, size));
+    const auto opened = openStructures(file());
+    ASSERT_FALSE(opened) << size;
+    EXPECT_THAT(opened.error().what, HasSubstr("ball.tenon"));
+  }
+}
+
+TEST_F(StructureFile, AFlippedBitAnywhereIsRefused) {
+  const std::string bytes = written();
+  for (std::size_t i = 0; i < bytes.size(); i += 1 + bytes.size() / 97) {
+    std::string bad = bytes;
+    bad[i] = static_cast<char>(bad[i] ^ 0x10);
+    put(bad);
+    EXPECT_FALSE(openStructures(file())) << "byte " << i;
+  }
+}
+
+TEST_F(StructureFile, AnotherVersionSaysWhatToDo) {
+  std::string bytes = written();
+  bytes[8] = 77;
+  put(bytes);
+  const auto opened = openStructures(file());
+  ASSERT_FALSE(opened);
+  EXPECT_THAT(opened.error().what, HasSubstr("bake it again"));
+}
+
+TEST_F(StructureFile, MissingFilesAndFoldersAreNamed) {
+  EXPECT_THAT(openStructures("/no/such.tenon").error().what, HasSubstr("/no/such.tenon"));
+  EXPECT_THAT(writeStructures("/no/such/folder.tenon", structures_).error().what,
+              HasSubstr("/no/such/folder"));
+  EXPECT_FALSE(openStructures(folder_));
+}
+
+}  // namespace
+}  // namespace tenon
