@@ -44,12 +44,12 @@ void Exercise::apply(const Change& change) noexcept {
       return environment_.setPairEnabled(change.index, change.value != 0.0);
     case ChangeKind::kSwapHands:
       return swapHands(change.hand, HandId{change.index});
-    case ChangeKind::kEmergencyStop:
+    case ChangeKind::kHalt:
       emergency_stop_ = change.value != 0.0;
       return;
     case ChangeKind::kContribute:
       return environment_.contribute(change.object, change.index, change.F_Oo_W, change.lifetime_ticks);
-    case ChangeKind::kExternalPose:
+    case ChangeKind::kPlace:
       return environment_.place(change.object, change.X_WO,
                                 environment_.objects()[change.object.value].status);
     case ChangeKind::kPause:

@@ -143,7 +143,7 @@ void FrontDesk::leave(ClientId client) {
 }
 
 void FrontDesk::emergencyStop(const EmergencyStop& stop) {
-  changes_.push_back({.kind = ChangeKind::kEmergencyStop, .value = stop.engaged ? 1.0 : 0.0});
+  changes_.push_back({.kind = ChangeKind::kHalt, .value = stop.engaged ? 1.0 : 0.0});
 }
 
 bool FrontDesk::isMover(ClientId client, HandId hand) const {
@@ -189,7 +189,7 @@ Result<Change> FrontDesk::externalPose(const ExternalPose& pose) const {
   if (pose.object.value >= scenario_.objects.size() || !isSane(pose.X_WO))
     return fail(
         fmt::format("client {} sent a pose for an object that is unknown or no pose", pose.client.value));
-  return Change{.kind = ChangeKind::kExternalPose, .object = pose.object, .X_WO = pose.X_WO};
+  return Change{.kind = ChangeKind::kPlace, .object = pose.object, .X_WO = pose.X_WO};
 }
 
 CommandAck FrontDesk::command(const Command& command) {

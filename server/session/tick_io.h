@@ -30,9 +30,9 @@ enum class ChangeKind : std::uint8_t {
   kPause,
   kResume,
   kSwapHands,      ///< the hands `hand` and `index` trade what they move
-  kEmergencyStop,  ///< value 1 engages, 0 clears
+  kHalt,           ///< emergency stop: value 1 engages, 0 clears
   kContribute,     ///< a force from outside on `object`
-  kExternalPose,   ///< an outside tracker says where `object` is
+  kPlace,          ///< an outside tracker says where `object` is
   kStop,
 };
 
