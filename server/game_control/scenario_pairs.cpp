@@ -13,17 +13,20 @@ std::vector<bool> ScenarioReader::whoCanMove(const YAML::Node& states) const {
     moves[i] = status == ObjectStatus::kHeld || status == ObjectStatus::kTracked;
   }
   for (const ScenarioHand& hand : scenario_.hands) moves[hand.object.value] = true;
-  // only what the states' hands take; what is wrong with them is said when the states are read
+  // what a hand takes or shall bring somewhere; what is wrong with it is said when the states are read
+  const auto add = [&](const YAML::Node& name) {
+    if (!name.IsDefined() || !name.IsScalar()) return;
+    const ObjectId object = scenario_.objectNamed(name.Scalar());
+    if (object.valid()) moves[object.value] = true;
+  };
   if (!states.IsDefined() || !states.IsSequence()) return moves;
   for (const auto& state : states) {
     if (!state.IsMap()) continue;
     const YAML::Node hands = state["hands"];
-    if (!hands.IsDefined() || !hands.IsMap()) continue;
-    for (const auto& entry : hands) {
-      if (!entry.second.IsScalar()) continue;
-      const ObjectId object = scenario_.objectNamed(entry.second.Scalar());
-      if (object.valid()) moves[object.value] = true;
+    if (hands.IsDefined() && hands.IsMap()) {
+      for (const auto& entry : hands) add(entry.second);
     }
+    if (state["target"].IsDefined()) add(state["object"]);
   }
   return moves;
 }

@@ -1,0 +1,255 @@
+#include <filesystem>
+#include <fstream>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/game_control/scenario.h"
+#include "tests/server/game_control/scenario_text.h"
+
+namespace tenon {
+namespace {
+
+using test::smallScenario;
+using test::with;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+Result<ScenarioFile> parsed(const std::string& text) { return parseScenario(text, "small/scenario.yaml"); }
+
+std::filesystem::path shipped(const std::string& name) {
+  return std::filesystem::path(TENON_SOURCE) / "scenarios" / name;
+}
+
+TEST(Scenario, ReadsAFewLinesAndFillsInTheRest) {
+  const auto scenario = parsed(smallScenario());
+  ASSERT_TRUE(scenario) << scenario.error().what;
+  EXPECT_EQ(scenario->name, "small");
+  EXPECT_EQ(scenario->objectNamed("pointer").value, 2U);
+  EXPECT_EQ(scenario->handNamed("instructor").value, 1U);
+  EXPECT_EQ(scenario->objects[1].status, ObjectStatus::kHidden);
+  EXPECT_DOUBLE_EQ(scenario->objects[0].structures.voxel, 0.001);
+
+  const ScenarioState& take = scenario->states[0];
+  EXPECT_EQ(take.object, scenario->objectNamed("part")) << "what is touched is what it is about";
+  EXPECT_EQ(take.hand, scenario->handNamed("right"));
+  ASSERT_EQ(take.placements.size(), 1U) << "a hidden object appears when it is to be touched";
+  EXPECT_EQ(take.placements[0].kind, PlacementKind::kShow);
+  ASSERT_EQ(take.conditions.size(), 2U);
+  EXPECT_EQ(take.conditions[1].kind, ConditionKind::kContact);
+  EXPECT_EQ(take.conditions[1].limit_ticks, 100U);
+
+  const ScenarioState& mount = scenario->states[1];
+  EXPECT_EQ(mount.conditions[1].kind, ConditionKind::kPose);
+  EXPECT_EQ(mount.conditions[1].dwell, 50U);
+  EXPECT_DOUBLE_EQ(mount.X_WG->translation().z(), -0.02);
+  EXPECT_EQ(mount.approach_W, Vector3(0, 0, -1));
+  EXPECT_TRUE(mount.snap);
+  EXPECT_EQ(mount.timeout, 2000U);
+}
+
+TEST(Scenario, ListsEveryPairThatCanTouch) {
+  const auto scenario = parsed(smallScenario());
+  ASSERT_TRUE(scenario);
+  EXPECT_EQ(scenario->pairs.size(), 6U) << "bay, part, pointer, cube: nobody stands still with all others";
+  const auto grouped = parsed(with(with(smallScenario(), "kind: scene", "kind: scene, group: g"),
+                                   "name: cube,", "name: cube, group: g,"));
+  ASSERT_TRUE(grouped) << grouped.error().what;
+  EXPECT_EQ(grouped->pairs.size(), 5U) << "objects of one group never touch";
+  EXPECT_EQ(grouped->pairOf(grouped->objectNamed("bay"), grouped->objectNamed("cube")), -1);
+  const auto off = parsed(with(smallScenario(), "states:", "pairs_off: [[cube, any]]\nstates:"));
+  ASSERT_TRUE(off);
+  EXPECT_FALSE(off->pairs[static_cast<std::size_t>(off->pairOf(ObjectId{0}, ObjectId{3}))].enabled);
+  EXPECT_TRUE(off->pairs[static_cast<std::size_t>(off->pairOf(ObjectId{0}, ObjectId{1}))].enabled);
+}
+
+TEST(Scenario, UnderstandsUnitsTurnsAndQuaternions) {
+  const auto turned = parsed(
+      with(smallScenario(), "start: {at: [0.2, 0, 0.1]}",
+           "start: {at: [20 cm, 1 in, 100mm], turn: [{axis: x, deg: 90}, {axis: [0, 0, 2], deg: 270}]}"));
+  ASSERT_TRUE(turned) << turned.error().what;
+  const Pose& X_WO = turned->objects[1].X_WO;
+  EXPECT_TRUE(X_WO.translation().isApprox(Vector3(0.2, 0.0254, 0.1), 1e-12));
+  // y goes up first, z then comes down to where y was, and a quarter turn backwards makes -y to -x
+  EXPECT_TRUE((X_WO.rotation() * Vector3::UnitY()).isApprox(Vector3::UnitZ(), 1e-12));
+  EXPECT_TRUE((X_WO.rotation() * Vector3::UnitZ()).isApprox(-Vector3::UnitX(), 1e-12));
+  const auto quaternion =
+      parsed(with(smallScenario(), "start: {at: [0.2, 0, 0.1]}", "start: {q: [0.7071, 0.7071, 0, 0]}"));
+  ASSERT_TRUE(quaternion) << quaternion.error().what;
+  EXPECT_NEAR(quaternion->objects[1].X_WO.rotation().norm(), 1.0, 1e-15);
+}
+
+TEST(Scenario, KeepsTextsInItsLanguagesTheMainOneFirst) {
+  const auto scenario = parsed(with(smallScenario(), "title: Small", "title: {de: Klein, en: Small}"));
+  ASSERT_TRUE(scenario) << scenario.error().what;
+  ASSERT_EQ(scenario->title.size(), 2U);
+  EXPECT_EQ(scenario->title[0].text, "Small");
+  EXPECT_EQ(scenario->title[1].language, "de");
+}
+
+TEST(Scenario, ReadsATreeOfConditions) {
+  const std::string conditions = R"(    conditions:
+      any:
+        - all:
+            - {pose: target, dwell: 0.2 s}
+            - {force: {below: 5 N}}
+            - {contact_time: {at_least: 0.5 s}}
+          when: latched
+        - {force: {target: [0, 0, 10], within: 1 N}}
+        - {contact: {between: [cube, part], for: 1 s, lapse: 10 ms}}
+        - {command: fulfilled}
+        - {signal: gripper_closed}
+    snap: true)";
+  const auto scenario =
+      parsed(with(with(smallScenario(), ", dwell: 50 ms", ""), "    snap: true", conditions));
+  ASSERT_TRUE(scenario) << scenario.error().what;
+  const std::vector<Condition>& tree = scenario->states[1].conditions;
+  ASSERT_EQ(tree.size(), 9U);
+  EXPECT_EQ(tree[0].kind, ConditionKind::kAny);
+  EXPECT_TRUE(tree[1].latched);
+  EXPECT_EQ(tree[2].parent, 1U);
+  EXPECT_EQ(tree[2].dwell, 200U);
+  EXPECT_DOUBLE_EQ(tree[3].below, 5.0);
+  EXPECT_EQ(tree[4].limit_ticks, 500U);
+  EXPECT_EQ(tree[5].parent, 0U);
+  EXPECT_EQ(tree[5].F_W.z(), 10.0);
+  EXPECT_EQ(tree[6].lapse, 10U);
+  EXPECT_EQ(scenario->signalNamed("gripper_closed"), 0);
+}
+
+TEST(Scenario, ReadsFixedPosesFreeObjectsAndPairsOfAState) {
+  const std::string effects =
+      "    fix: {cube: {at: [0.4, 0, 0]}}\n    free: [part]\n    hide: [pointer]\n    pairs_off: [[part, "
+      "cube]]\n    snap: true";
+  const auto scenario = parsed(with(smallScenario(), "    snap: true", effects));
+  ASSERT_TRUE(scenario) << scenario.error().what;
+  const ScenarioState& mount = scenario->states[1];
+  ASSERT_EQ(mount.placements.size(), 3U);
+  EXPECT_EQ(mount.placements[0].kind, PlacementKind::kFix);
+  EXPECT_DOUBLE_EQ(mount.placements[0].X_WO->translation().x(), 0.4);
+  EXPECT_EQ(mount.placements[1].kind, PlacementKind::kFree);
+  EXPECT_EQ(mount.placements[2].kind, PlacementKind::kHide);
+  ASSERT_EQ(mount.pairs.size(), 1U);
+  EXPECT_FALSE(mount.pairs[0].enabled);
+}
+
+struct BadInput {
+  std::string name, from, to, line, says;
+  friend void PrintTo(const BadInput& input, std::ostream* out) { *out << input.name; }
+};
+
+class ScenarioErrors : public ::testing::TestWithParam<BadInput> {};
+
+TEST_P(ScenarioErrors, NameTheLineAndWhatWasExpected) {
+  const BadInput& input = GetParam();
+  const std::string text = with(smallScenario(), input.from, input.to);
+  ASSERT_NE(text, smallScenario()) << "the test changes nothing";
+  const auto scenario = parsed(text);
+  ASSERT_FALSE(scenario);
+  EXPECT_THAT(scenario.error().what, StartsWith("small/scenario.yaml:" + input.line + ": "));
+  EXPECT_THAT(scenario.error().what, HasSubstr(input.says));
+}
+
+const BadInput kBadInputs[] = {
+    {"syntax", "hands:", "hands: [", "8", "not valid YAML"},
+    {"unknown_key", "snap: true", "snapp: true", "21", "unknown key 'snapp'; did you mean 'snap'?"},
+    {"unknown_key_far", "title: Small", "zzzzzzzz: 1", "1", "known keys: title, language"},
+    {"key_twice", "title: Small", "title: Small\ntitle: Other", "2", "two keys 'title'"},
+    {"not_a_mapping", "  - {name: right, object: pointer}", "  - right", "8", "a hand must be a mapping"},
+    {"object_twice", "name: cube,", "name: part,", "6", "two objects are named 'part', the first in line 4"},
+    {"hand_twice", "name: instructor, role", "name: right, role", "9", "two hands are named 'right'"},
+    {"state_twice", "name: mount", "name: take", "16", "two states are named 'take', the first in line 13"},
+    {"name_missing", "name: right, ", "", "8", "'name' of a hand is missing"},
+    {"object_of_hand", "object: cube}", "object: cubee}", "9",
+     "unknown object 'cubee'; did you mean 'cube'?"},
+    {"touch_unknown", "touch: part", "touch: prat", "14", "unknown object 'prat'; did you mean 'part'?"},
+    {"hand_unknown", "hands: {right: part}", "hands: {rihgt: part}", "17",
+     "unknown hand 'rihgt'; did you mean 'right'?"},
+    {"kind_unknown", "kind: scene", "kind: scenery", "3", "expected one of: part, tool"},
+    {"status_unknown", "status: fixed", "status: stuck", "3", "expected one of: hidden, parked"},
+    {"color", "kind: scene", "kind: scene, color: red", "3", "expected '#rrggbb'"},
+    {"no_mesh", ", meshes: [{part: cube}]", "", "6", "'meshes' of object 'cube' is missing"},
+    {"mesh_file", "[{part: bay}]", "[{file: none.stl}]", "3", "has no mesh file small/none.stl"},
+    {"mesh_both", "[{part: bay}]", "[{part: bay, file: a.stl}]", "3", "either 'part' or 'file'"},
+    {"length_unit", "within: 2 mm", "within: 2 km", "19", "expected a length such as 2 mm"},
+    {"angle_without_unit", "angle: 2 deg", "angle: 2", "19", "expected an angle with its unit"},
+    {"not_finite", "at: [0, 0, -20 mm]", "at: [0, 0, nan]", "19", "is 'nan'"},
+    {"inside_out", "within: 2 mm", "within: -2 mm", "19", "expected between"},
+    {"angle_too_large", "angle: 2 deg", "angle: 400 deg", "19", "expected between"},
+    {"vector", "at: [0, 0, -20 mm]", "at: [0, 0]", "19", "a list of three numbers"},
+    {"quaternion", "at: [0, 0, -20 mm]", "at: [0, 0, 0], q: [1, 1, 0, 0]", "19",
+     "expected a unit quaternion"},
+    {"turn_and_q", "at: [0, 0, -20 mm]", "at: [0, 0, 0], q: [1, 0, 0, 0], turn: {axis: x, deg: 1}", "19",
+     "both 'turn' and 'q'"},
+    {"axis", "at: [0, 0, -20 mm]", "at: [0, 0, 0], turn: {axis: [0, 0, 0], deg: 1}", "19", "has no length"},
+    {"refinement", "refinement: 4", "refinement: 3", "3", "must be 1, 2, 4 or 8"},
+    {"box", "refinement: 4", "refine: [{from: [0, 0, 1], to: [1, 1, 0]}]", "3", "inside out"},
+    {"pair_twice", "pairs:", "pairs:\n  - {between: [bay, part]}", "12", "listed twice, first in line 11"},
+    {"pair_itself", "between: [part, bay]", "between: [part, part]", "11", "names 'part' twice"},
+    {"clearance_too_small", "clearance: 4 mm", "clearance: 0.4 mm", "11",
+     "clearance of bay-part (0.4 mm) is smaller than the field of 'bay' can resolve (voxel 1 mm / 4 needs "
+     "0.87 mm); use "
+     "voxel 0.45 mm"},
+    {"dilation_too_large", "clearance: 4 mm", "clearance: 4 mm, dilation: 2 mm", "11",
+     "a quarter of the clearance"},
+    {"target_missing",
+     "    target: {at: [0, 0, -20 mm], within: 2 mm, angle: 2 deg, dwell: 50 ms}\n    approach: {direction: "
+     "[0, 0, -1], distance: 50 mm}\n",
+     "", "19", "snaps 'part', but has no target pose"},
+    {"target_without_at", "at: [0, 0, -20 mm], ", "", "19", "has no 'at'"},
+    {"target_too_far", "at: [0, 0, -20 mm]", "at: [0, 0, -20 m]", "19", "the scene ends at"},
+    {"target_nobody", "    hands: {right: part}\n", "", "18", "nobody moves 'part'"},
+    {"target_without_object", "    object: part\n", "", "18", "no 'object' to bring there"},
+    {"hidden", "touch: part\n    for: 0.1 s", "object: part", "13", "'part' is still hidden"},
+    {"hand_of_other", "hands: {right: part}", "hands: {right: cube}", "17", "belongs to hand 'instructor'"},
+    {"approach", "direction: [0, 0, -1]", "direction: [0, 0, 0]", "20", "has no length"},
+    {"timeout_word", "timeout: 2 s", "timeout: 2 s\n    on_timeout: retry", "23",
+     "expected 'fail' or 'skip'"},
+    {"timeout_short", "for: 0.1 s", "for: 10 s\n    timeout: 1 s", "16",
+     "shorter than what its conditions ask for"},
+    {"for_without_touch", "snap: true", "for: 1 s", "21", "belongs to a 'touch'"},
+    {"conditions_two", "snap: true", "conditions: {command: fulfilled, signal: x}", "21", "has 2 of"},
+    {"conditions_empty", "snap: true", "conditions: {all: []}", "21", "is empty"},
+    {"conditions_when", "snap: true", "conditions: {all: [{command: fulfilled}], when: maybe}", "21",
+     "expected 'together' or 'latched'"},
+    {"conditions_dwell", "snap: true", "conditions: {command: fulfilled, dwell: 1 s}", "21", "one instant"},
+    {"conditions_force", "snap: true", "conditions: {force: {above: 5 N, below: 2 N}}", "21",
+     "'above' < 'below'"},
+    {"conditions_force_none", "snap: true", "conditions: {force: {}}", "21", "needs either 'above'"},
+    {"conditions_pose", "snap: true", "conditions: {pose: {object: cube}}", "21",
+     "expected a 'target' of its own"},
+    {"conditions_command", "snap: true", "conditions: {command: done}", "21", "expected 'fulfilled'"},
+    {"conditions_deep", "snap: true",
+     "conditions: {all: [{all: [{all: [{all: [{all: [{all: [{all: [{all: [{all: [{command: "
+     "fulfilled}]}]}]}]}]}]}]}]}]}",
+     "21", "nested more than"},
+    {"conditions_itself", "snap: true", "conditions: &loop {all: [*loop]}", "21", ""},
+    {"language", "title: Small", "title: {de: Klein}", "1", "no text in 'en'"},
+    {"states_empty", "states:", "states: []\nother:", "13", "unknown key 'other'"},
+};
+
+INSTANTIATE_TEST_SUITE_P(BadInputs, ScenarioErrors, ::testing::ValuesIn(kBadInputs),
+                         [](const auto& input) { return input.param.name; });
+
+TEST(Scenario, SaysWhichFileIsMissing) {
+  const auto scenario = readScenario("/nowhere/scenario.yaml");
+  ASSERT_FALSE(scenario);
+  EXPECT_THAT(scenario.error().what, HasSubstr("/nowhere/scenario.yaml: no such scenario file"));
+}
+
+TEST(Scenario, PegAndBoxIsAWholeExercise) {
+  const auto scenario = readScenario(shipped("peg_and_box"));
+  ASSERT_TRUE(scenario) << scenario.error().what;
+  EXPECT_EQ(scenario->name, "peg_and_box");
+  EXPECT_EQ(scenario->objects.size(), 4U);
+  EXPECT_EQ(scenario->states.size(), 2U);
+  const auto dilation = dilationOf(*scenario, scenario->pairs[0], scenario->objectNamed("box"));
+  ASSERT_TRUE(dilation) << dilation.error().what;
+  EXPECT_LE(*dilation, 0.5e-3 / 4);
+}
+
+}  // namespace
+}  // namespace tenon

@@ -1,0 +1,97 @@
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/game_control/scenario.h"
+#include "tests/server/game_control/exercise.h"
+
+namespace tenon {
+namespace {
+
+using test::smallScenario;
+using test::smallStructures;
+using test::with;
+using ::testing::HasSubstr;
+
+ScenarioFile parsed(const std::string& text) { return parseScenario(text, "small/scenario.yaml").value(); }
+
+TEST(SceneBuilder, AsksTheSmallerObjectAsAShell) {
+  const ScenarioFile scenario = parsed(smallScenario());
+  const auto scene = makeScene(scenario, smallStructures());
+  ASSERT_TRUE(scene) << scene.error().what;
+  ASSERT_EQ((*scene)->pairs.size(), scenario.pairs.size());
+  const auto pair = [&](const std::string& a, const std::string& b) -> const PairSpec& {
+    return (*scene)->pairs[static_cast<std::size_t>(
+        (*scene)->pairOf((*scene)->objectNamed(a), (*scene)->objectNamed(b)))];
+  };
+  EXPECT_EQ(pair("part", "bay").a, scenario.objectNamed("part"));
+  EXPECT_EQ(pair("part", "pointer").a, scenario.objectNamed("pointer"));
+  EXPECT_EQ(pair("part", "cube").a, scenario.objectNamed("cube")) << "an assistant is always a shell";
+  EXPECT_DOUBLE_EQ(pair("part", "bay").dilation, 0.87 * 0.00025) << "of the fine voxels at the target";
+  EXPECT_DOUBLE_EQ(pair("pointer", "bay").dilation, 0.87 * 0.001);
+}
+
+TEST(SceneBuilder, ChecksClearancesWhoseFieldOnlySizesTell) {
+  const std::string text =
+      with(smallScenario(), "pairs:", "pairs:\n  - {between: [pointer, bay], clearance: 1 mm}");
+  const auto scene = makeScene(parsed(text), smallStructures());
+  ASSERT_FALSE(scene);
+  EXPECT_THAT(scene.error().what, HasSubstr("small/scenario.yaml:11: clearance of bay-pointer (1 mm)"));
+  EXPECT_THAT(scene.error().what, HasSubstr("needs 3.48 mm); use voxel 0.28 mm or refinement 4"));
+}
+
+TEST(SceneBuilder, WantsStructuresOfEverythingThatIsFelt) {
+  auto structures = smallStructures();
+  structures[1] = nullptr;
+  const auto scene = makeScene(parsed(smallScenario()), structures);
+  ASSERT_FALSE(scene);
+  EXPECT_THAT(scene.error().what, HasSubstr("small/scenario.yaml:4: object 'part' has no haptic structures"));
+  const ScenarioFile seen = parsed(with(smallScenario(), "kind: assistant", "kind: assistant, felt: false"));
+  structures = smallStructures();
+  structures[3] = nullptr;
+  EXPECT_TRUE(makeScene(seen, structures));
+}
+
+TEST(SceneBuilder, RefusesATargetThatLiesOutsideEverything) {
+  const auto scene =
+      makeScene(parsed(with(smallScenario(), "at: [0, 0, -20 mm]", "at: [0, 4 m, 0]")), smallStructures());
+  ASSERT_FALSE(scene);
+  EXPECT_THAT(scene.error().what, HasSubstr("the target of state 'mount'"));
+}
+
+//   part's box, swept back up along its approach
+//        +----+
+//        |    |  50 mm
+//   ---+ |    | +---
+//      | +----+ |     target
+TEST(SceneBuilder, RefinesAroundTheTargetAndTheWayIn) {
+  const ScenarioFile scenario = parsed(smallScenario());
+  const auto boxes = refineBoxes(scenario, scenario.objectNamed("bay"), smallStructures());
+  ASSERT_EQ(boxes.size(), 1U);
+  EXPECT_TRUE(boxes[0].contains(Vector3(0.022, 0, -0.04)));
+  EXPECT_TRUE(boxes[0].contains(Vector3(0.0, 0, 0.045)));
+  EXPECT_FALSE(boxes[0].contains(Vector3(0.0, 0, 0.065)));
+  EXPECT_TRUE(refineBoxes(scenario, scenario.objectNamed("part"), smallStructures()).empty());
+
+  const ScenarioFile given =
+      parsed(with(smallScenario(), "refinement: 4",
+                  "refinement: 4, refine: [{from: [-0.03, -0.03, -0.05], to: [0.03, 0.03, 0]}]"));
+  EXPECT_EQ(refineBoxes(given, given.objectNamed("bay"), smallStructures()).size(), 1U)
+      << "what is given is enough";
+}
+
+TEST(SceneBuilder, BakesPartsBeforeWhatTheyGoInto) {
+  const ScenarioFile scenario = parsed(smallScenario());
+  const std::vector<ObjectId> order = bakeOrder(scenario);
+  ASSERT_EQ(order.size(), 4U);
+  const auto place = [&](const std::string& name) {
+    return std::find(order.begin(), order.end(), scenario.objectNamed(name)) - order.begin();
+  };
+  EXPECT_LT(place("part"), place("bay"));
+}
+
+}  // namespace
+}  // namespace tenon
