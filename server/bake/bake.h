@@ -44,7 +44,12 @@ using BakeProgress = std::function<bool(double share, std::string_view doing)>;
 [[nodiscard]] Result<HapticStructures> bake(const TriangleMesh& mesh, const BakeOptions& options,
                                             const BakeProgress& progress = {});
 
-/// `import` and `bake` of several files as one object, through a cache folder keyed by content and options.
+/// `importMesh` and `bake` of several files as one object.
+[[nodiscard]] Result<HapticStructures> bakeFiles(const std::vector<std::filesystem::path>& meshes,
+                                                 double unit, const BakeOptions& options,
+                                                 const BakeProgress& progress = {});
+
+/// `bakeFiles` through a cache folder keyed by content and options.
 /// Gives the structure file's path.
 [[nodiscard]] Result<std::filesystem::path> bakeCached(const std::vector<std::filesystem::path>& meshes,
                                                        double unit, const BakeOptions& options,

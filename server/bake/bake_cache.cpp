@@ -1,0 +1,136 @@
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <set>
+
+#include <xxhash.h>
+
+#include "server/bake/bake.h"
+
+namespace tenon {
+
+namespace {
+
+// Raised when the same meshes and options give other structures than before.
+constexpr std::uint32_t kBakeVersion = 1;
+
+/// A running hash of what a bake depends on.
+class ContentHash {
+ public:
+  ContentHash() : state_(XXH3_createState()) { XXH3_128bits_reset(state_); }
+  ContentHash(const ContentHash&) = delete;
+  ContentHash& operator=(const ContentHash&) = delete;
+  ~ContentHash() { XXH3_freeState(state_); }
+
+  template <typename T>
+  void add(const T& value) {
+    static_assert(std::is_arithmetic_v<T>);
+    XXH3_128bits_update(state_, &value, sizeof value);
+  }
+  bool addFile(const std::filesystem::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    std::vector<char> block(1U << 20U);
+    while (in) {
+      in.read(block.data(), static_cast<std::streamsize>(block.size()));
+      XXH3_128bits_update(state_, block.data(), static_cast<std::size_t>(in.gcount()));
+    }
+    return in.eof();
+  }
+  [[nodiscard]] std::string text() const {
+    const XXH128_hash_t hash = XXH3_128bits_digest(state_);
+    char digits[33];
+    std::snprintf(digits, sizeof digits, "%016llx%016llx", static_cast<unsigned long long>(hash.high64),
+                  static_cast<unsigned long long>(hash.low64));
+    return digits;
+  }
+
+ private:
+  XXH3_state_t* state_;
+};
+
+/// The files whose contents make the mesh: a glTF may keep its numbers in buffers beside it.
+std::vector<std::filesystem::path> filesOf(const std::filesystem::path& mesh) {
+  std::vector<std::filesystem::path> files{mesh};
+  if (mesh.extension() != ".gltf") return files;
+  std::error_code error;
+  const auto folder = mesh.parent_path().empty() ? std::filesystem::path(".") : mesh.parent_path();
+  std::set<std::filesystem::path> buffers;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    if (entry.path().extension() == ".bin") buffers.insert(entry.path());
+  }
+  files.insert(files.end(), buffers.begin(), buffers.end());
+  return files;
+}
+
+Result<std::string> contentHash(const std::vector<std::filesystem::path>& meshes, double unit,
+                                const BakeOptions& options) {
+  ContentHash hash;
+  hash.add(kBakeVersion);
+  hash.add(unit);
+  hash.add(options.voxel);
+  hash.add(options.refinement);
+  hash.add(options.point_spacing);
+  hash.add(options.points);
+  for (const RefineBox& region : options.refine) {
+    for (const Vector3& corner : {region.box_M.min(), region.box_M.max()}) {
+      for (const double c : corner) hash.add(c);
+    }
+  }
+  for (const auto& mesh : meshes) {
+    for (const auto& file : filesOf(mesh)) {
+      if (!hash.addFile(file)) return fail(file.string() + ": cannot be read");
+    }
+    hash.add(std::uint64_t{0});
+  }
+  return hash.text();
+}
+
+void append(TriangleMesh& whole, TriangleMesh part) {
+  const auto first = static_cast<std::uint32_t>(whole.vertices.size());
+  whole.vertices.insert(whole.vertices.end(), part.vertices.begin(), part.vertices.end());
+  for (const auto& [a, b, c] : part.triangles) whole.triangles.push_back({a + first, b + first, c + first});
+  whole.notes.insert(whole.notes.end(), part.notes.begin(), part.notes.end());
+}
+
+}  // namespace
+
+Result<HapticStructures> bakeFiles(const std::vector<std::filesystem::path>& meshes, double unit,
+                                   const BakeOptions& options, const BakeProgress& progress) {
+  if (meshes.empty()) return fail("no mesh to bake");
+  const auto hash = contentHash(meshes, unit, options);
+  if (!hash) return tl::unexpected(hash.error());
+  TriangleMesh whole;
+  std::string source;
+  for (const auto& file : meshes) {
+    if (progress && !progress(0.0, "reading meshes")) return fail("cancelled");
+    auto part = importMesh(file, unit);
+    if (!part) return tl::unexpected(part.error());
+    append(whole, std::move(*part));
+    source += (source.empty() ? "" : ", ") + file.filename().string();
+  }
+  auto structures = bake(whole, options, progress);
+  if (!structures) return fail(source + ": " + structures.error().what);
+  structures->info.source = source;
+  structures->info.content_hash = *hash;
+  return structures;
+}
+
+Result<std::filesystem::path> bakeCached(const std::vector<std::filesystem::path>& meshes, double unit,
+                                         const BakeOptions& options,
+                                         const std::filesystem::path& cache_folder,
+                                         const BakeProgress& progress) {
+  const auto hash = contentHash(meshes, unit, options);
+  if (!hash) return tl::unexpected(hash.error());
+  const std::filesystem::path file = cache_folder / (*hash + ".tenon");
+  std::error_code error;
+  // a damaged file in the cache is baked again
+  if (std::filesystem::exists(file, error) && openStructures(file)) return file;
+  std::filesystem::create_directories(cache_folder, error);
+  if (error) return fail(cache_folder.string() + ": cannot be made: " + error.message());
+  const auto structures = bakeFiles(meshes, unit, options, progress);
+  if (!structures) return tl::unexpected(structures.error());
+  if (const auto ok = writeStructures(file, *structures); !ok) return tl::unexpected(ok.error());
+  return file;
+}
+
+}  // namespace tenon

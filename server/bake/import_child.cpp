@@ -1,0 +1,154 @@
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include <assimp/DefaultIOSystem.h>
+#include <assimp/Importer.hpp>
+#include <assimp/config.h>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "idl/types/spatial.h"
+#include "server/bake/import_pipe.h"
+
+namespace tenon {
+
+namespace {
+
+constexpr std::size_t kMaxTriangles = 60'000'000;
+
+/// Opens files of the mesh's own folder only: a mesh may name others (materials, buffers), never elsewhere.
+class FolderOnly : public Assimp::DefaultIOSystem {
+ public:
+  explicit FolderOnly(const std::filesystem::path& folder)
+      : folder_(std::filesystem::weakly_canonical(std::filesystem::absolute(folder))) {}
+
+  bool Exists(const char* file) const override { return allowed(file) && DefaultIOSystem::Exists(file); }
+  Assimp::IOStream* Open(const char* file, const char* mode) override {
+    const bool reads = mode != nullptr && mode[0] == 'r';
+    return reads && allowed(file) ? DefaultIOSystem::Open(file, mode) : nullptr;
+  }
+
+ private:
+  [[nodiscard]] bool allowed(const char* file) const {
+    std::error_code error;
+    const auto path = std::filesystem::weakly_canonical(std::filesystem::absolute(file, error), error);
+    if (error) return false;
+    const auto relative = path.lexically_relative(folder_);
+    return !relative.empty() && *relative.begin() != "..";
+  }
+  std::filesystem::path folder_;
+};
+
+void limit(int resource, std::uint64_t value) {
+  const rlimit both{value, value};
+  (void)::setrlimit(static_cast<__rlimit_resource>(resource), &both);
+}
+
+/// Memory of the sanitizers cannot be told from the file's.
+constexpr bool kCanLimitMemory =
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    false;
+#else
+    true;
+#endif
+
+struct Collected {
+  std::vector<float> vertices;
+  std::vector<std::uint32_t> triangles;
+  std::string problem;
+};
+
+void collectMesh(const aiMesh& mesh, const aiMatrix4x4& X_MN, double unit, Collected& out) {
+  const auto first = static_cast<std::uint32_t>(out.vertices.size() / 3);
+  if (out.triangles.size() / 3 + mesh.mNumFaces > kMaxTriangles) {
+    out.problem = "has more than 60 million triangles";
+    return;
+  }
+  for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
+    const aiVector3D p = X_MN * mesh.mVertices[i];
+    for (const float c : {p.x, p.y, p.z})
+      out.vertices.push_back(static_cast<float>(static_cast<double>(c) * unit));
+  }
+  for (unsigned i = 0; i < mesh.mNumFaces; ++i) {
+    const aiFace& face = mesh.mFaces[i];
+    if (face.mNumIndices != 3) continue;
+    for (unsigned k = 0; k < 3; ++k) out.triangles.push_back(first + face.mIndices[k]);
+  }
+}
+
+void collectNode(const aiScene& scene, const aiNode& node, const aiMatrix4x4& X_MP, double unit,
+                 Collected& out) {
+  const aiMatrix4x4 X_MN = X_MP * node.mTransformation;
+  for (unsigned i = 0; i < node.mNumMeshes && out.problem.empty(); ++i) {
+    collectMesh(*scene.mMeshes[node.mMeshes[i]], X_MN, unit, out);
+  }
+  for (unsigned i = 0; i < node.mNumChildren && out.problem.empty(); ++i) {
+    collectNode(scene, *node.mChildren[i], X_MN, unit, out);
+  }
+}
+
+Collected importFile(const std::string& file, double unit) {
+  Collected out;
+  Assimp::Importer importer;
+  importer.SetIOHandler(new FolderOnly(std::filesystem::path(file).parent_path().empty()
+                                           ? std::filesystem::path(".")
+                                           : std::filesystem::path(file).parent_path()));
+  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
+  const aiScene* scene = importer.ReadFile(file, aiProcess_Triangulate | aiProcess_SortByPType);
+  if (scene == nullptr) {
+    out.problem = importer.GetErrorString();
+    return out;
+  }
+  if (scene->mRootNode != nullptr) collectNode(*scene, *scene->mRootNode, aiMatrix4x4(), unit, out);
+  return out;
+}
+
+bool writeAll(const void* data, std::size_t size) {
+  const char* next = static_cast<const char*>(data);
+  while (size > 0) {
+    const ssize_t written = ::write(kImportDescriptor, next, size);
+    if (written <= 0) return false;
+    next += written;
+    size -= static_cast<std::size_t>(written);
+  }
+  return true;
+}
+
+}  // namespace
+
+int runImportChild(int argc, const char* const* argv) {
+  if (argc != 4) return 2;
+  const std::string file = argv[0];
+  const double unit = std::strtod(argv[1], nullptr);
+  limit(RLIMIT_CORE, 0);
+  limit(RLIMIT_CPU, std::strtoull(argv[2], nullptr, 10));
+  if (kCanLimitMemory) limit(RLIMIT_AS, std::strtoull(argv[3], nullptr, 10));
+  Collected mesh;
+  try {
+    mesh = importFile(file, unit);
+  } catch (const std::bad_alloc&) {
+    mesh = {};
+    mesh.problem = "needs more memory than a file of its size may";
+  } catch (const std::exception& problem) {
+    mesh = {};
+    mesh.problem = problem.what();
+  }
+  ImportHeader header;
+  header.failed = mesh.problem.empty() ? 0 : 1;
+  header.vertices = mesh.vertices.size() / 3;
+  header.triangles = mesh.triangles.size() / 3;
+  header.text_bytes = mesh.problem.size();
+  const bool done = writeAll(&header, sizeof header) &&
+                    writeAll(mesh.vertices.data(), mesh.vertices.size() * sizeof(float)) &&
+                    writeAll(mesh.triangles.data(), mesh.triangles.size() * sizeof(std::uint32_t)) &&
+                    writeAll(mesh.problem.data(), mesh.problem.size());
+  // static destructors of other libraries have nothing left to do here
+  ::_exit(done ? 0 : 3);
+}
+
+}  // namespace tenon

@@ -1,0 +1,206 @@
+#include <csignal>
+#include <cstring>
+#include <iostream>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "server/bake/bake.h"
+#include "server/bake/import_pipe.h"
+#include "server/bake/length.h"
+
+namespace tenon {
+namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
+
+struct Arguments {
+  std::vector<std::string> meshes;
+  std::string output;
+  std::string info;
+  std::string cache;
+  std::string voxel = "3mm";
+  std::string unit = "mm";
+  std::uint32_t points = 10'000;
+  std::string spacing;
+  std::vector<std::string> refine;
+  std::int32_t refinement = 4;
+  bool quiet = false;
+};
+
+/// A length with the unit that makes it short to read.
+std::string readable(double metres) {
+  const double size = std::abs(metres);
+  if (size >= 1.0) return fmt::format("{:.4g} m", metres);
+  if (size >= 1e-4 || size == 0.0) return fmt::format("{:.4g} mm", metres * 1e3);
+  return fmt::format("{:.4g} um", metres * 1e6);
+}
+
+std::string readable(const Vector3& v) {
+  return fmt::format("({}, {}, {})", readable(v.x()), readable(v.y()), readable(v.z()));
+}
+
+Result<RefineBox> parseBox(const std::string& text) {
+  std::vector<double> numbers;
+  std::size_t begin = 0;
+  while (begin <= text.size()) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const auto length = parseLength(std::string_view(text).substr(begin, end - begin));
+    if (!length) return fail("--refine " + text + ": " + length.error().what);
+    numbers.push_back(*length);
+    begin = end + 1;
+  }
+  if (numbers.size() != 6) return fail("--refine " + text + ": expected x0,y0,z0,x1,y1,z1");
+  const Vector3 a = Vector3::Map(numbers.data());
+  const Vector3 b = Vector3::Map(numbers.data() + 3);
+  return RefineBox{{a.cwiseMin(b), a.cwiseMax(b)}};
+}
+
+Result<BakeOptions> optionsFrom(const Arguments& arguments) {
+  BakeOptions options;
+  const auto voxel = parseLength(arguments.voxel);
+  if (!voxel) return fail("--voxel: " + voxel.error().what);
+  options.voxel = *voxel;
+  options.points = arguments.points;
+  options.refinement = arguments.refinement;
+  if (!arguments.spacing.empty()) {
+    const auto spacing = parseLength(arguments.spacing);
+    if (!spacing) return fail("--spacing: " + spacing.error().what);
+    options.point_spacing = *spacing;
+  }
+  for (const std::string& text : arguments.refine) {
+    const auto box = parseBox(text);
+    if (!box) return tl::unexpected(box.error());
+    options.refine.push_back(*box);
+  }
+  return options;
+}
+
+/// A bar on a terminal, a line for each new stage elsewhere; an interrupt cancels.
+BakeProgress progressFor(const Arguments& arguments) {
+  const bool terminal = ::isatty(STDERR_FILENO) == 1;
+  const bool quiet = arguments.quiet;
+  return [terminal, quiet, last_stage = std::string(), last_percent = -1](double share,
+                                                                          std::string_view doing) mutable {
+    const int percent = static_cast<int>(share * 100.0);
+    const bool new_stage = doing != last_stage;
+    if (!quiet && terminal && (new_stage || percent != last_percent)) {
+      const int filled = percent * 30 / 100;
+      fmt::print(stderr, "\r[{:#<{}}{:.<{}}] {:3d} % {:<32}", "", filled, "", 30 - filled, percent, doing);
+      if (percent >= 100) fmt::print(stderr, "\n");
+    }
+    if (!quiet && !terminal && new_stage) fmt::print(stderr, "{:3d} % {}\n", percent, doing);
+    last_stage = doing;
+    last_percent = percent;
+    return interrupted == 0;
+  };
+}
+
+void printInfo(const HapticStructures& structures) {
+  const StructureInfo& info = structures.info;
+  const auto& layout = structures.field.layout();
+  const Vector3 size = info.box_M.sizes();
+  const auto coarse = static_cast<std::size_t>(layout.bricks[0]) *
+                      static_cast<std::size_t>(layout.bricks[1]) * static_cast<std::size_t>(layout.bricks[2]);
+  const double megabytes =
+      static_cast<double>(layout.samples.size_bytes() + layout.index.size_bytes() + layout.far.size_bytes()) /
+      1e6;
+  fmt::print("source        {}\n", info.source);
+  fmt::print("content hash  {}\n", info.content_hash);
+  fmt::print("mesh          {} triangles, {} x {} x {}\n", info.triangles, readable(size.x()),
+             readable(size.y()), readable(size.z()));
+  fmt::print("              from {} to {}\n", readable(info.box_M.min()), readable(info.box_M.max()));
+  fmt::print("field         {} voxels, {} of {} bricks with samples, {:.1f} MB\n", readable(layout.voxel),
+             info.bricks, coarse, megabytes);
+  fmt::print("              exact up to {} from the surface\n", readable(layout.band));
+  if (layout.refinement > 1) {
+    fmt::print("              refined in places to {} voxels\n", readable(layout.voxel / layout.refinement));
+  }
+  fmt::print("shell         {} points on {:.4g} m^2, {} leaves, {} clusters, radius {}\n",
+             structures.shell.points().size(), info.surface_area, structures.shell.leaves().size(),
+             structures.shell.clusters().size(), readable(structures.shell.ballRadius()));
+  std::size_t used = 0;
+  for (std::size_t k = 0; k < structures.shell.levels().size(); ++k) {
+    const ShellLevel& level = structures.shell.levels()[k];
+    used += level.point_count;
+    fmt::print("  level {}     {} points, {} apart\n", k, used, readable(level.spacing));
+  }
+  fmt::print("baked in      {:.2f} s\n", info.bake_seconds);
+  if (!info.notes.empty()) fmt::print("notes\n{}", info.notes);
+}
+
+int complain(const Error& error) {
+  fmt::print(stderr, "tenon-bake: {}\n", error.what);
+  return interrupted != 0 ? 130 : 1;
+}
+
+int run(const Arguments& arguments) {
+  if (!arguments.info.empty()) {
+    const auto structures = openStructures(arguments.info);
+    if (!structures) return complain(structures.error());
+    printInfo(**structures);
+    return 0;
+  }
+  const auto unit = parseUnit(arguments.unit);
+  if (!unit) return complain({"--unit: " + unit.error().what});
+  const auto options = optionsFrom(arguments);
+  if (!options) return complain(options.error());
+  const std::vector<std::filesystem::path> meshes(arguments.meshes.begin(), arguments.meshes.end());
+  const BakeProgress progress = progressFor(arguments);
+  if (!arguments.cache.empty()) {
+    const auto file = bakeCached(meshes, *unit, *options, arguments.cache, progress);
+    if (!file) return complain(file.error());
+    fmt::print("{}\n", file->string());
+    return 0;
+  }
+  const auto structures = bakeFiles(meshes, *unit, *options, progress);
+  if (!structures) return complain(structures.error());
+  if (const auto ok = writeStructures(arguments.output, *structures); !ok) return complain(ok.error());
+  if (!arguments.quiet) printInfo(*structures);
+  return 0;
+}
+
+int main(int argc, char** argv) {
+  if (argc > 1 && std::strcmp(argv[1], kImportChildFlag) == 0) return runImportChild(argc - 2, argv + 2);
+  Arguments arguments;
+  CLI::App app{
+      "Turns CAD meshes into the structures that contact is computed with: a distance field and a\n"
+      "pointshell. Needs no normals, no closed surface and no preparation; several meshes become one\n"
+      "object. Lengths are written 3mm, 0.5 mm or 0.003m.",
+      "tenon bake"};
+  app.add_option("MESH", arguments.meshes, "STL, OBJ, PLY, glTF/GLB, DAE, 3DS, 3MF or OFF files");
+  app.add_option("-o,--output", arguments.output, "the structure file to write");
+  app.add_option("--cache", arguments.cache,
+                 "write into this folder under a name made of the content instead");
+  app.add_option("--info", arguments.info, "print what is inside a structure file, and do nothing else");
+  app.add_option("--voxel", arguments.voxel, "edge of the field's voxels")->capture_default_str();
+  app.add_option("--unit", arguments.unit, "length of one unit of the files: mm, cm, m, in")
+      ->capture_default_str();
+  app.add_option("--points", arguments.points, "about how many points the shell has")->capture_default_str();
+  app.add_option("--spacing", arguments.spacing, "distance between shell points, instead of --points");
+  app.add_option(
+      "--refine", arguments.refine,
+      "x0,y0,z0,x1,y1,z1 of a box whose surface gets finer voxels (repeatable; bare numbers are metres)");
+  app.add_option("--refinement", arguments.refinement, "how much finer: 1, 2, 4 or 8")->capture_default_str();
+  app.add_flag("-q,--quiet", arguments.quiet, "no progress and no summary");
+  app.footer(
+      "Exit codes: 0 done, 1 could not be done (the reason is on stderr), 2 wrong usage, 130 interrupted.");
+  try {
+    app.parse(argc, argv);
+    if (arguments.info.empty() && arguments.meshes.empty()) throw CLI::RequiredError("MESH");
+    if (arguments.info.empty() && arguments.output.empty() && arguments.cache.empty()) {
+      throw CLI::RequiredError("-o FILE (or --cache FOLDER)");
+    }
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  std::signal(SIGINT, [](int) { interrupted = 1; });
+  std::signal(SIGTERM, [](int) { interrupted = 1; });
+  return run(arguments);
+}
+
+}  // namespace
+}  // namespace tenon
+
+int main(int argc, char** argv) { return tenon::main(argc, argv); }

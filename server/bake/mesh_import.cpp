@@ -1,0 +1,250 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <thread>
+
+#include <fcntl.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "server/bake/bake.h"
+#include "server/bake/import_pipe.h"
+#include "server/bake/mesh_file_checks.h"
+
+extern char** environ;
+
+namespace tenon {
+
+namespace {
+
+constexpr double kLargest = 1e5;    // [m] of any coordinate
+constexpr double kSmallest = 1e-6;  // [m] of the whole mesh
+// More broken triangles than this share and the rest is not to be trusted.
+constexpr double kMostBroken = 0.1;
+
+/// A descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int value) : value_(value) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (value_ >= 0) ::close(value_);
+  }
+  [[nodiscard]] int get() const { return value_; }
+
+ private:
+  int value_;
+};
+
+/// The program that imports: named by TENON_BAKE, or beside the running one.
+std::filesystem::path importerProgram() {
+  if (const char* named = std::getenv("TENON_BAKE"); named != nullptr && *named != '\0') return named;
+  std::error_code error;
+  return std::filesystem::read_symlink("/proc/self/exe", error).parent_path() / "tenon-bake";
+}
+
+ImportLimits limitsFor(std::uint64_t file_bytes) {
+  const double megabytes = static_cast<double>(file_bytes) / 1e6;
+  return {10.0 + std::ceil(megabytes), (768ULL << 20U) + 64 * file_bytes};
+}
+
+/// Waits for the child and ends it when its time is over. Gives its wait status, or -1 when it had to be
+/// ended.
+int waitFor(pid_t child, double seconds) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  int status = 0;
+  while (true) {
+    const pid_t done = ::waitpid(child, &status, WNOHANG);
+    if (done == child) return status;
+    if (done < 0 && errno != EINTR) return -1;
+    if (std::chrono::steady_clock::now() > end) {
+      ::kill(child, SIGKILL);
+      while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+      }
+      return -1;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+}
+
+Result<pid_t> startImporter(const std::filesystem::path& file, double unit, const ImportLimits& limits,
+                            int memory) {
+  const std::string program = importerProgram().string();
+  char number[40];
+  std::snprintf(number, sizeof number, "%.17g", unit);
+  std::vector<std::string> words{program,
+                                 kImportChildFlag,
+                                 std::filesystem::absolute(file).string(),
+                                 number,
+                                 std::to_string(static_cast<long>(std::ceil(limits.cpu_seconds))),
+                                 std::to_string(limits.memory_bytes)};
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, 2, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, memory, kImportDescriptor);
+  pid_t child = -1;
+  const int problem = ::posix_spawn(&child, program.c_str(), &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (problem != 0) return fail("the importer " + program + " cannot be started: " + std::strerror(problem));
+  return child;
+}
+
+std::string readText(int memory, std::uint64_t offset, std::uint64_t bytes) {
+  std::string text(std::min<std::uint64_t>(bytes, 400), '\0');
+  const ssize_t got = ::pread(memory, text.data(), text.size(), static_cast<off_t>(offset));
+  text.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
+  // one sentence on one line
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 32; }, ' ');
+  while (!text.empty() && text.back() == ' ') text.pop_back();
+  return text;
+}
+
+bool readArray(int memory, std::uint64_t offset, void* to, std::uint64_t bytes) {
+  auto* next = static_cast<char*>(to);
+  while (bytes > 0) {
+    const ssize_t got = ::pread(memory, next, bytes, static_cast<off_t>(offset));
+    if (got <= 0) return false;
+    next += got;
+    offset += static_cast<std::uint64_t>(got);
+    bytes -= static_cast<std::uint64_t>(got);
+  }
+  return true;
+}
+
+/// What the child left, taken only if its sizes add up and every index has a vertex.
+Result<TriangleMesh> readImported(const std::string& name, int memory) {
+  struct stat status {};
+  ImportHeader header;
+  if (::fstat(memory, &status) != 0 || !readArray(memory, 0, &header, sizeof header) ||
+      header.magic != ImportHeader::kMagic) {
+    return fail(name + ": the importer gave no answer");
+  }
+  const auto size = static_cast<std::uint64_t>(status.st_size);
+  constexpr std::uint64_t kMost = 1ULL << 32U;
+  if (header.vertices >= kMost || header.triangles >= kMost || header.text_bytes >= kMost ||
+      sizeof header + 12 * header.vertices + 12 * header.triangles + header.text_bytes != size) {
+    return fail(name + ": the importer gave an answer that does not add up");
+  }
+  const std::uint64_t text_at = size - header.text_bytes;
+  if (header.failed != 0) return fail(name + ": " + readText(memory, text_at, header.text_bytes));
+  TriangleMesh mesh;
+  mesh.vertices.resize(header.vertices);
+  mesh.triangles.resize(header.triangles);
+  if (!readArray(memory, sizeof header, mesh.vertices.data(), 12 * header.vertices) ||
+      !readArray(memory, sizeof header + 12 * header.vertices, mesh.triangles.data(),
+                 12 * header.triangles)) {
+    return fail(name + ": the importer's answer cannot be read");
+  }
+  for (const auto& triangle : mesh.triangles) {
+    for (const std::uint32_t corner : triangle) {
+      if (corner >= mesh.vertices.size())
+        return fail(name + ": a triangle names a corner that does not exist");
+    }
+  }
+  return mesh;
+}
+
+double signedVolume(const TriangleMesh& mesh) {
+  double volume = 0.0;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vector3 p = mesh.vertices[a].cast<double>();
+    volume += p.dot(mesh.vertices[b].cast<double>().cross(mesh.vertices[c].cast<double>())) / 6;
+  }
+  return volume;
+}
+
+/// Leaves out triangles without meaning, and refuses the mesh when too little is left or it has no sensible
+/// size.
+Result<TriangleMesh> checked(const std::string& name, TriangleMesh mesh) {
+  const std::size_t before = mesh.triangles.size();
+  if (before == 0) return fail(name + ": no triangles in it");
+  std::erase_if(mesh.triangles, [&](const auto& triangle) {
+    return !std::all_of(triangle.begin(), triangle.end(),
+                        [&](std::uint32_t corner) { return mesh.vertices[corner].allFinite(); });
+  });
+  const std::size_t broken = before - mesh.triangles.size();
+  if (static_cast<double>(broken) > kMostBroken * static_cast<double>(before)) {
+    return fail(name + ": " + std::to_string(broken) + " of " + std::to_string(before) +
+                " triangles have corners that are not numbers");
+  }
+  if (broken > 0) {
+    mesh.notes.push_back(name + ": " + std::to_string(broken) +
+                         " triangles have corners that are not numbers and were left out.");
+  }
+  // corners that no triangle uses any more may still be no numbers
+  for (Vector3f& p : mesh.vertices) {
+    if (!p.allFinite()) p.setZero();
+  }
+  Eigen::AlignedBox3d box;
+  bool any_area = false;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vector3 pa = mesh.vertices[a].cast<double>();
+    const Vector3 pb = mesh.vertices[b].cast<double>();
+    const Vector3 pc = mesh.vertices[c].cast<double>();
+    box.extend(pa).extend(pb).extend(pc);
+    any_area = any_area || (pb - pa).cross(pc - pa).norm() > 0.0;
+  }
+  if (box.min().cwiseAbs().maxCoeff() > kLargest || box.max().cwiseAbs().maxCoeff() > kLargest) {
+    return fail(name + ": reaches further than 100 km; is the unit right?");
+  }
+  if (box.diagonal().norm() < kSmallest)
+    return fail(name + ": is smaller than a micrometre; is the unit right?");
+  if (!any_area) return fail(name + ": no triangle has an area");
+  if (signedVolume(mesh) < 0.0) {
+    mesh.notes.push_back(name + ": winds inside out; winding is not used, so nothing is lost.");
+  }
+  return mesh;
+}
+
+}  // namespace
+
+Result<TriangleMesh> importMesh(const std::filesystem::path& file, double unit) {
+  const std::string name = file.string();
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return fail(name + ": no such file");
+  const auto bytes = std::filesystem::file_size(file, error);
+  if (error || bytes == 0) return fail(name + ": is empty");
+  if (!(unit > 0.0) || !std::isfinite(unit)) return fail(name + ": the unit must be a length of more than 0");
+  if (const auto problem = problemInMeshFile(file)) return fail(name + ": " + *problem);
+
+  // above descriptor 3, so that the child's copy is not the same number and loses close-on-exec
+  const Descriptor low(::memfd_create("tenon-import", MFD_CLOEXEC));
+  const Descriptor memory(::fcntl(low.get(), F_DUPFD_CLOEXEC, 16));
+  if (memory.get() < 0) return fail(name + ": no memory for the importer's answer");
+  const ImportLimits limits = limitsFor(bytes);
+  const auto child = startImporter(file, unit, limits, memory.get());
+  if (!child) return fail(name + ": " + child.error().what);
+  // the limit is on the child's own time; others may be using the processors
+  const int status = waitFor(*child, 4.0 * limits.cpu_seconds);
+  if (status == -1 || (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) ||
+      (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)) {
+    return fail(name + ": reading it took too long; the file is probably broken");
+  }
+  if (WIFSIGNALED(status)) {
+    return fail(name + ": the importer crashed on it (" + strsignal(WTERMSIG(status)) +
+                "); the file is broken");
+  }
+  if (WEXITSTATUS(status) != 0) {
+    return fail(name + ": the importer gave up (exit code " + std::to_string(WEXITSTATUS(status)) + ")");
+  }
+  auto mesh = readImported(name, memory.get());
+  if (!mesh) return mesh;
+  return checked(name, std::move(*mesh));
+}
+
+}  // namespace tenon

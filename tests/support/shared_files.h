@@ -1,0 +1,15 @@
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+
+namespace tenon::test {
+
+/// The folder of meshes that are too large or too hostile for the project: TENON_SHARED, or `shared` beside
+/// it. Tests that need it are skipped where it is absent.
+[[nodiscard]] inline std::filesystem::path sharedFolder() {
+  if (const char* named = std::getenv("TENON_SHARED"); named != nullptr) return named;
+  return std::filesystem::path(__FILE__).parent_path().parent_path().parent_path().parent_path() / "shared";
+}
+
+}  // namespace tenon::test
