@@ -132,8 +132,7 @@ void addFirewall(MeshBuilder& b) {
                                      circle({0.62, 0.20}, 0.030, b.segments(0.03)),
                                      roundedRectangle({0.70, 0.48}, {0.10, 0.16}, 0.020, b.steps(3, 12))};
   const Polygon wall{{0.20, -0.72}, {0.92, -0.76}, {0.92, 0.76}, {0.20, 0.72}};
-  Polygon turned(wall.rbegin(), wall.rend());
-  b.paint(kBodyColor).prism(turned, holes, 1.540, 1.543);
+  b.paint(kBodyColor).prism(wall, holes, 1.540, 1.543);
   b.at(Pose());
   b.paint(0x3B4247).roundBox({-0.26, 1.512, 0.40}, {0.14, 1.545, 0.86}, 0.012);
   for (int i = 0; i < 6; ++i)

@@ -178,7 +178,6 @@ PartMesh makeBracket(double detail) {
       const Vector2 d = direction(0.5 * kPi * i / n);
       bend.emplace_back(side * (0.0685 + 0.0040 * d.y()), 0.0230 - 0.0040 * d.x());
     }
-    if (side > 0.0) std::reverse(bend.begin(), bend.end());
     b.prism(bend, {}, -0.035, 0.035);
     b.at(Pose());
   }
@@ -193,9 +192,7 @@ PartMesh makeBracket(double detail) {
   for (const double z : {-0.060, 0.060}) {
     // gussets stiffen the bend
     const Polygon gusset{{0.014, 0.041}, {0.014, 0.012}, {-0.040, 0.041}};
-    Polygon turned = gusset;
-    std::reverse(turned.begin(), turned.end());
-    b.prism(turned, {}, z - 0.002, z + 0.002);
+    b.prism(gusset, {}, z - 0.002, z + 0.002);
   }
   b.paint(0xB4BABF);
   for (const double z : {-0.035, 0.040}) addHexBolt(b, {-0.055, 0.042, z}, -Vector3::UnitY(), 0.008);

@@ -64,7 +64,7 @@ Quaternion zTo(const Vector3& axis) {
 
 int MeshBuilder::segments(double radius) const {
   const double size = std::clamp(std::sqrt(radius / 0.03), 0.5, 1.7);
-  return std::max(8, 4 * static_cast<int>(std::lround((8.0 + 72.0 * detail_) * size / 4.0)));
+  return std::max(8, 4 * static_cast<int>(std::lround((8.0 + 84.0 * detail_) * size / 4.0)));
 }
 
 int MeshBuilder::steps(int coarse, int fine) const {
@@ -298,7 +298,9 @@ void MeshBuilder::spring(const Vector3& foot, double height, double coil_radius,
   pipe(path, wire_radius, 0.0);
 }
 
-void MeshBuilder::prism(const Polygon& outline, std::span<const Polygon> holes, double z_low, double z_high) {
+void MeshBuilder::prism(const Polygon& given, std::span<const Polygon> holes, double z_low, double z_high) {
+  Polygon outline(given);
+  if (signedArea(outline) < 0.0) std::reverse(outline.begin(), outline.end());
   const auto triangles = triangulate(outline, holes);
   std::vector<Vector2> points(outline);
   for (const Polygon& hole : holes) points.insert(points.end(), hole.begin(), hole.end());

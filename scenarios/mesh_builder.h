@@ -11,6 +11,8 @@ using Vector2 = Eigen::Vector2d;
 /// A closed outline in a plane, counter-clockwise, without the first point repeated.
 using Polygon = std::vector<Vector2>;
 
+/// Positive for a counter-clockwise outline.
+[[nodiscard]] double signedArea(const Polygon& outline);
 /// A circle as a polygon of `segments` corners, counter-clockwise.
 [[nodiscard]] Polygon circle(const Vector2& centre, double radius, int segments);
 /// A rectangle with its corners rounded.
@@ -69,7 +71,8 @@ class MeshBuilder {
   /// A coil spring about z from z_low to z_high.
   void spring(const Vector3& foot, double height, double coil_radius, double wire_radius, int turns);
 
-  /// An outline with holes, extruded from z_low to z_high: plates, ribs, brackets.
+  /// An outline with holes, extruded from z_low to z_high: plates, ribs, brackets. The outline may run
+  /// either way round, its holes counter-clockwise.
   void prism(const Polygon& outline, std::span<const Polygon> holes, double z_low, double z_high);
   /// A patch of surface p(u, v), u and v in 0..1: an open sheet without thickness.
   template <typename Surface>

@@ -78,6 +78,16 @@ Vector2 direction(double angle) {
   return {v.x(), v.y()};
 }
 
+double signedArea(const Polygon& outline) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const Vector2& a = outline[i];
+    const Vector2& b = outline[(i + 1) % outline.size()];
+    sum += 0.5 * (a.x() * b.y() - a.y() * b.x());
+  }
+  return sum;
+}
+
 Polygon circle(const Vector2& centre, double radius, int segments) {
   Polygon polygon;
   for (int i = 0; i < segments; ++i)

@@ -99,7 +99,7 @@ Result<void> drawScenario(const PartSet& set, double detail, Moment moment,
   if (moment == Moment::kStart) {
     camera.p_WE = {2.3, -3.3, 2.6};
     camera.p_WT = {0.05, 0.60, 0.62};
-    camera.half_angle_tangent = 0.36;
+    camera.half_angle_tangent = 0.30;
   } else {
     camera.p_WE = {1.05, -1.75, 2.15};
     camera.p_WT = {-0.02, 0.78, 0.66};
