@@ -43,7 +43,7 @@ void Exercise::apply(const Change& change) noexcept {
     case ChangeKind::kPair:
       return environment_.setPairEnabled(change.index, change.value != 0.0);
     case ChangeKind::kSwapHands:
-      return swapHands(change.hand, HandId{change.index});
+      return environment_.swapHands(change.hand, HandId{change.index});
     case ChangeKind::kHalt:
       emergency_stop_ = change.value != 0.0;
       return;
@@ -73,13 +73,6 @@ void Exercise::detach(HandId hand) noexcept {
   environment_.setHandPresent(hand, false);
 }
 
-void Exercise::swapHands(HandId a, HandId b) noexcept {
-  const ObjectId of_a = environment_.hands()[a.value].object;
-  const ObjectId of_b = environment_.hands()[b.value].object;
-  environment_.grab(a, of_b);
-  environment_.grab(b, of_a);
-}
-
 void Exercise::read(const TickInput& input) noexcept {
   for (HandAge& age : ages_) ++age.age;
   for (const HandReading& reading : input.readings) {
@@ -88,12 +81,8 @@ void Exercise::read(const TickInput& input) noexcept {
     age.age = 0;
     age.seq = reading.seq;
     age.active = reading.active;
-    environment_.setHandPose(reading.hand, reading.X_WH, reading.V_WH);
-    if (environment_.hands()[reading.hand.value].present) continue;
-
-    // the hand is here (again): what it moves stays in it as it lies now
     environment_.setHandPresent(reading.hand, true);
-    environment_.grab(reading.hand, environment_.hands()[reading.hand.value].object);
+    environment_.setHandPose(reading.hand, reading.X_WH, reading.V_WH);
   }
 }
 

@@ -65,7 +65,6 @@ class Exercise {
   void beginWhenAllAreHere() noexcept;
   void attach(HandId hand) noexcept;
   void detach(HandId hand) noexcept;
-  void swapHands(HandId a, HandId b) noexcept;
 
   std::shared_ptr<const ScenarioFile> scenario_;
   Environment environment_;
