@@ -1,0 +1,135 @@
+#include "clients/recorder/recording.h"
+
+#include <chrono>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "idl/record/instance_state.h"
+#include "idl/wire/codec.h"
+#include "idl/wire/topics.h"
+
+namespace tenon {
+namespace {
+
+constexpr std::int64_t kNanosecondsPerTick = 1'000'000;
+
+std::string_view nameOf(RunPhase phase) {
+  switch (phase) {
+    case RunPhase::kWaitingForPeople:
+      return "waiting for people";
+    case RunPhase::kRunning:
+      return "running";
+    case RunPhase::kPaused:
+      return "paused";
+    case RunPhase::kSucceeded:
+      return "succeeded";
+    case RunPhase::kFailed:
+      return "failed";
+    case RunPhase::kStopped:
+      return "stopped";
+  }
+  return "unknown";
+}
+
+}  // namespace
+
+Result<Recording> Recording::open(const std::filesystem::path& file, const SessionAnnounce& session) {
+  auto writer = McapWriter::open(file);
+  if (!writer) return fail(writer.error().what);
+  const auto noted =
+      writer->addMetadata("tenon recording", {{"session", session.session},
+                                              {"title", session.title},
+                                              {"protocol", std::to_string(session.protocol_version)},
+                                              {"lockstep", session.lockstep ? "yes" : "no"}});
+  if (!noted) return fail(noted.error().what);
+  Recording recording(std::move(*writer), session);
+  recording.status_.file = file.string();
+  recording.status_.recording = true;
+
+  // the announcement is the lobby's, but who reads the file wants to know what it is of
+  const auto bytes = encode(session);
+  if (!bytes) return fail(bytes.error().what);
+  const std::int64_t now = std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+  recording.add({kSessionAnnounce.name, typeName<SessionAnnounce>(), now, 0, false, *bytes});
+  return recording;
+}
+
+Recording::Recording(McapWriter writer, const SessionAnnounce& session)
+    : writer_(std::move(writer)), session_(session) {}
+
+void Recording::add(const RawSample& sample) {
+  if (start_ns_ == 0) start_ns_ = sample.source_ns;
+  if (sample.gone) {
+    const auto bytes =
+        encodeInstanceGone({std::string(sample.topic), {sample.bytes.begin(), sample.bytes.end()}});
+    write(channelOf(kInstanceStateTopic, kInstanceStateType, kInstanceStateIdl), sample.source_ns, gone_++,
+          bytes);
+    return;
+  }
+  follow(sample);
+  write(channelOf(sample.topic, sample.type, idlText()), sample.source_ns, sample.sequence, sample.bytes);
+}
+
+void Recording::follow(const RawSample& sample) {
+  if (sample.topic == kWorldFrame1k.name) {
+    const auto frame = decode<WorldFrame>(sample.bytes);
+    if (frame && frame->server_epoch == session_.server_epoch && frame->tick > newest_tick_)
+      newest_tick_ = frame->tick;
+  } else if (sample.topic == kTickInput.name) {
+    const auto input = decode<TickInputPart>(sample.bytes);
+    if (!input || input->tick <= newest_input_) return;
+    if (newest_input_ != 0) status_.lost += input->tick - newest_input_ - 1;
+    newest_input_ = input->tick;
+  } else if (sample.topic == kRunState.name) {
+    if (auto run = decode<RunState>(sample.bytes)) run_ = std::move(*run);
+  }
+}
+
+std::int64_t Recording::logTime(std::int64_t source_ns) {
+  if (!session_.lockstep || newest_tick_ == 0) return source_ns;
+  return start_ns_ + static_cast<std::int64_t>(newest_tick_) * kNanosecondsPerTick;
+}
+
+std::uint16_t Recording::channelOf(std::string_view topic, std::string_view type, std::string_view schema) {
+  const auto known = channels_.find(topic);
+  if (known != channels_.end()) return known->second;
+  const std::uint16_t channel = writer_.addChannel(topic, type, schema);
+  channels_.emplace(topic, channel);
+  return channel;
+}
+
+void Recording::write(std::uint16_t channel, std::int64_t source_ns, std::uint64_t sequence,
+                      std::span<const std::uint8_t> bytes) {
+  if (!status_.recording) return;
+  note(writer_.write(channel, logTime(source_ns), static_cast<std::uint32_t>(sequence), bytes));
+  status_.messages = writer_.messages();
+}
+
+void Recording::note(const Result<void>& done) {
+  if (done) return;
+  status_.recording = false;
+  status_.problem = done.error().what;
+}
+
+bool Recording::runIsOver() const {
+  return run_ && (run_->phase == RunPhase::kSucceeded || run_->phase == RunPhase::kFailed ||
+                  run_->phase == RunPhase::kStopped);
+}
+
+Result<void> Recording::close() {
+  const bool was_whole = status_.problem.empty();
+  if (run_ && was_whole) {
+    note(writer_.addMetadata("tenon outcome", {{"outcome", std::string(nameOf(run_->phase))},
+                                               {"reason", run_->reason},
+                                               {"tick", std::to_string(run_->tick)},
+                                               {"final hash", fmt::format("{:016x}", run_->final_hash)}}));
+  }
+  const auto closed = writer_.close();
+  if (was_whole) note(closed);
+  status_.recording = false;
+  if (!status_.problem.empty()) return fail(status_.problem);
+  return {};
+}
+
+}  // namespace tenon
