@@ -1,0 +1,129 @@
+#include "clients/recorder/recorder_program.h"
+
+#include <filesystem>
+#include <map>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "idl/record/mcap_reader.h"
+#include "idl/wire/codec.h"
+#include "tests/idl/wire/peer.h"
+
+namespace tenon {
+namespace {
+
+/// As much of a server as a recorder sees of one.
+class ServerMock {
+ public:
+  explicit ServerMock(std::uint32_t domain) : bus_(test::participant(domain)) {
+    EXPECT_TRUE(announce_.write({.session = "class", .title = "Peg and box"}));
+    EXPECT_TRUE(objects_.write({.object = ObjectId{0}, .name = "peg"}));
+    EXPECT_TRUE(inbox_.on<Join>(lobby_, kJoin, [this](const Join& join) {
+      role_ = join.role;
+      EXPECT_TRUE(welcome_.write({.client_guid = join.client_guid,
+                                  .accepted = accepts_,
+                                  .reason = accepts_ ? "" : "the house is full",
+                                  .client = ClientId{3}}));
+    }));
+    EXPECT_TRUE(inbox_.on<RecorderStatus>(session_, kRecorderStatus,
+                                          [this](const RecorderStatus& status) { status_ = status; }));
+  }
+
+  std::shared_ptr<Participant> bus_;
+  Partition lobby_{bus_, kLobby};
+  Partition session_{bus_, sessionPartition("class")};
+  Writer<SessionAnnounce> announce_ = std::move(*Writer<SessionAnnounce>::open(lobby_, kSessionAnnounce));
+  Writer<Welcome> welcome_ = std::move(*Writer<Welcome>::open(lobby_, kWelcome));
+  Writer<SceneObject> objects_ = std::move(*Writer<SceneObject>::open(session_, kSceneObject));
+  Writer<EventLog> events_ = std::move(*Writer<EventLog>::open(session_, kEventLog));
+  Writer<RunState> run_ = std::move(*Writer<RunState>::open(session_, kRunState));
+  Inbox inbox_;
+  bool accepts_ = true;
+  Role role_ = Role::kObserver;
+  RecorderStatus status_;
+};
+
+class RecorderProgramTest : public ::testing::Test {
+ protected:
+  ~RecorderProgramTest() override {
+    stop_ = true;
+    if (thread_.joinable()) thread_.join();
+    std::filesystem::remove(options_.file);
+  }
+  void start() {
+    thread_ = std::thread([this] { result_ = record(options_, stop_); });
+  }
+  std::map<std::string, int> counts() const {
+    std::map<std::string, int> counts;
+    auto reader = McapReader::open(options_.file);
+    EXPECT_TRUE(reader->complete()) << reader->problem();
+    for (McapMessage message; reader->next(message);) ++counts[std::string(message.topic)];
+    return counts;
+  }
+
+  ServerMock server_{test::ownDomain()};
+  RecorderOptions options_{
+      .file = std::filesystem::temp_directory_path() / ("recorder_" + std::to_string(getpid()) + ".mcap"),
+      .session = "class",
+      .domain = test::ownDomain()};
+  std::atomic<bool> stop_{false};
+  Result<RecorderStatus> result_;
+  std::thread thread_;
+};
+
+TEST_F(RecorderProgramTest, RecordsUntilTheRunIsOverAndClosesItsFile) {
+  start();
+  ASSERT_TRUE(test::dispatchUntil(server_.inbox_, [&] { return server_.status_.recording; }));
+  EXPECT_EQ(server_.role_, Role::kRecorder);
+  for (std::uint64_t seq = 0; seq < 50; ++seq) ASSERT_TRUE(server_.events_.write({.seq = seq}));
+  ASSERT_TRUE(server_.run_.write({.phase = RunPhase::kSucceeded, .reason = "done"}));
+  thread_.join();
+  ASSERT_TRUE(result_) << result_.error().what;
+  const auto found = counts();
+  EXPECT_EQ(found.at("EventLog"), 50);
+  EXPECT_EQ(found.at("SceneObject"), 1);
+  EXPECT_EQ(found.at("SessionAnnounce"), 1);
+  EXPECT_EQ(found.at("RunState"), 1);
+  EXPECT_TRUE(test::dispatchUntil(server_.inbox_, [&] { return !server_.status_.recording; }));
+}
+
+TEST_F(RecorderProgramTest, StoppedByAPersonItStillClosesItsFile) {
+  start();
+  ASSERT_TRUE(test::dispatchUntil(server_.inbox_, [&] { return server_.status_.recording; }));
+  stop_ = true;
+  thread_.join();
+  ASSERT_TRUE(result_) << result_.error().what;
+  EXPECT_EQ(counts().at("SceneObject"), 1);
+}
+
+TEST_F(RecorderProgramTest, ARefusalIsOneSentence) {
+  server_.accepts_ = false;
+  start();
+  ASSERT_TRUE(test::dispatchUntil(server_.inbox_, [&] { return server_.role_ == Role::kRecorder; }));
+  thread_.join();
+  ASSERT_FALSE(result_);
+  EXPECT_EQ(result_.error().what, "the server of session 'class' refuses: the house is full");
+}
+
+TEST_F(RecorderProgramTest, AskedForLockstepItRefusesASessionByTheClock) {
+  options_.lockstep = true;
+  start();
+  thread_.join();
+  ASSERT_FALSE(result_);
+  EXPECT_THAT(result_.error().what, testing::HasSubstr("does not run in lockstep"));
+}
+
+TEST_F(RecorderProgramTest, ASessionThatIsNotThereIsOneSentence) {
+  options_.session = "another";
+  options_.patience = std::chrono::seconds(0);
+  start();
+  thread_.join();
+  ASSERT_FALSE(result_);
+  EXPECT_THAT(result_.error().what, testing::HasSubstr("no server announced session 'another'"));
+}
+
+}  // namespace
+}  // namespace tenon
