@@ -18,7 +18,7 @@ def arguments():
     parser.add_argument("--scenario", default="engine_bay", help="a shipped scenario's name or a path (default: %(default)s)")
     parser.add_argument("--out", metavar="DIR", help="where recording, report and logs go (default: out/demo)")
     parser.add_argument("--seed", type=int, default=1, help="who the simulated people are (default: %(default)s)")
-    parser.add_argument("--detail", type=float, default=0.3, help="of the scene, 0 to 1; 1 is 1.8 million triangles (default: %(default)s)")
+    parser.add_argument("--detail", type=float, default=0.12, help="of the scene, 0 to 1; 1 is 1.8 million triangles (default: %(default)s)")
     parser.add_argument("--lockstep", action="store_true", help="ticks wait for each other instead of the clock: repeatable to the last bit")
     parser.add_argument("--headless", action="store_true", help="do not open the report in a browser at the end")
     parser.add_argument("--workers", type=int, default=1, help="threads of the server that compute contacts (default: %(default)s)")

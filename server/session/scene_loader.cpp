@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <fcntl.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -27,8 +28,13 @@ Result<void> run(const std::vector<std::string>& words) {
   std::vector<char*> argv;
   for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
   argv.push_back(nullptr);
+  posix_spawn_file_actions_t silent;
+  posix_spawn_file_actions_init(&silent);
+  posix_spawn_file_actions_addopen(&silent, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   pid_t child = 0;
-  if (posix_spawn(&child, argv[0], nullptr, nullptr, argv.data(), environ) != 0)
+  const int started = posix_spawn(&child, argv[0], &silent, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&silent);
+  if (started != 0)
     return fail(fmt::format("cannot start {}: is the installation complete?", words[0]));
   int status = 0;
   if (waitpid(child, &status, 0) != child || !WIFEXITED(status) || WEXITSTATUS(status) != 0)
@@ -51,7 +57,7 @@ Result<fs::path> generatedParts(const ScenarioFile& scenario, const LoadOptions&
   fs::create_directories(making, error);
   if (error) return fail(fmt::format("{}: cannot make this folder ({})", making.string(), error.message()));
   const auto done = run({program.string(), scenario.name, making.string(), "--detail",
-                         fmt::format("{}", options.detail), "--quiet"});
+                         fmt::format("{}", options.detail)});
   if (!done) return fail(done.error().what);
   fs::remove_all(folder, error);
   fs::rename(making, folder, error);

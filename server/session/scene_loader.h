@@ -13,7 +13,7 @@ namespace tenon {
 
 struct LoadOptions {
   std::filesystem::path cache;  ///< structures and generated parts are kept here
-  double detail = 0.3;          ///< of generated parts, 0..1; 1 is the paper's scene
+  double detail = 0.12;         ///< of generated parts, 0..1; 1 is the paper's scene
 };
 
 /// What is being done, for a person who waits: "engine bay: signs", 0.4.
