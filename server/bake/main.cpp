@@ -180,8 +180,9 @@ int main(int argc, char** argv) {
   app.add_option("--points", arguments.points, "about how many points the shell has")->capture_default_str();
   app.add_option("--spacing", arguments.spacing, "distance between shell points, instead of --points");
   app.add_option(
-      "--refine", arguments.refine,
-      "x0,y0,z0,x1,y1,z1 of a box whose surface gets finer voxels (repeatable; bare numbers are metres)");
+         "--refine", arguments.refine,
+         "x0,y0,z0,x1,y1,z1 of a box whose surface gets finer voxels (repeatable; bare numbers are metres)")
+      ->allow_extra_args(false);
   app.add_option("--refinement", arguments.refinement, "how much finer: 1, 2, 4 or 8")->capture_default_str();
   app.add_flag("-q,--quiet", arguments.quiet, "no progress and no summary");
   app.footer(

@@ -190,7 +190,7 @@ Pointshell bakeShell(const WeldedMesh& mesh, std::span<const Triangle> surface, 
   std::vector<ShellSite> sites = edgeSites(mesh, orienter, apart);
   const auto faces = faceSites(surface, area, std::min(candidates, kMaxCandidates), orienter, work);
   sites.insert(sites.end(), faces.begin(), faces.end());
-  return buildShell(thinOut(sites, apart), spacing);
+  return buildShell(thinOut(sites, apart), apart);
 }
 
 }  // namespace tenon
