@@ -1,6 +1,7 @@
 #include "server/collision/island_solver.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -10,6 +11,23 @@ namespace {
 
 /// [m] A body whose points all have less than this to go has arrived.
 constexpr double kArrived = 1e-9;
+
+/// [m] A body that others hold back has arrived earlier: what is left is the field's steps of 1.5 um, which
+/// change under every point as it goes.
+constexpr double kSettled = 2e-6;
+
+/// A walk lists this many sub-steps ahead, so that a tick's usual way needs no second one.
+constexpr double kWalkSubsteps = 2.0;
+
+/// [m] What a turn may cost in depth between listed points of a thinned list before it is made anew, and
+/// how far apart those are at most.
+constexpr double kThinDepth = 1e-5;
+constexpr double kThinSpan = 0.03;
+
+/// A surface's curve at a contact is seen this far to each side [voxels], and counts when its normal turns
+/// by more than this over both [rad]: the field's steps turn it by less.
+constexpr double kCurveStep = 0.25;
+constexpr double kLeastTurn = 0.02;
 
 /// [m] What may be left after the last sub-step without being called unfinished.
 constexpr double kUnfinished = 1e-6;
@@ -55,6 +73,7 @@ struct IslandSolver::Job {
 
 IslandSolver::IslandSolver(std::size_t max_bodies, std::size_t max_pairs)
     : motion_(max_bodies, max_pairs * kMaxPairContacts),
+      walked_(max_pairs),
       multipliers_(max_pairs * kMaxPairContacts),
       motions_(max_bodies),
       gone_(max_bodies),
@@ -63,6 +82,7 @@ IslandSolver::IslandSolver(std::size_t max_bodies, std::size_t max_pairs)
       depths_(max_bodies),
       touched_(max_bodies) {
   rows_.reserve(max_pairs * kMaxPairContacts);
+  held_.reserve(6 * max_bodies);
 }
 
 SolveReport IslandSolver::solve(std::span<MovableBody> bodies, std::span<const IslandPair> pairs,
@@ -70,6 +90,7 @@ SolveReport IslandSolver::solve(std::span<MovableBody> bodies, std::span<const I
   assert(bodies.size() <= motions_.size() && results.size() == pairs.size());
   const Job job{bodies, pairs, limits, results};
   SolveReport report;
+  held_.clear();
   switch (limits.method) {
     case ContactMethod::kIsland:
       solveIsland(job, report);
@@ -90,10 +111,13 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
   double best = std::numeric_limits<double>::infinity();
   double reach = job.limits.substep_travel;
   int worse = 0;
+  std::fill(walked_.begin(), walked_.end(), Walked{});
   const auto look = [&] {
-    queryPairs(job, job.limits.contact_margin, report);
+    lookAround(job, report);
     buildRows(job);
+    for (MovableBody& body : job.bodies) body.curves.clear();
     solveMotions(job, report);
+    if (findCurves(job)) solveMotions(job, report);
   };
 
   while (true) {
@@ -110,7 +134,8 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
     }
     if (brakeOvershoot(job)) solveMotions(job, report);
     double way = travel(job);
-    if (way < kArrived) break;
+    const bool held = std::any_of(touched_.begin(), touched_.end(), [](std::uint8_t t) { return t != 0; });
+    if (way < (held ? kSettled : kArrived)) break;
     const bool last = report.substeps == job.limits.substeps;
     // a place or two may be worse on the way to a better one, but not the end of the way
     if (worse > kWorsePlaces || (last && worse > 0)) {
@@ -132,7 +157,10 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
     ++report.substeps;
   }
   fillForces(job);
-  for (MovableBody& body : job.bodies) body.brakes.clear();
+  for (MovableBody& body : job.bodies) {
+    body.brakes.clear();
+    body.curves.clear();
+  }
 }
 
 double IslandSolver::merit(const Job& job) {
@@ -188,22 +216,96 @@ void IslandSolver::solvePenalty(const Job& job, SolveReport& report) {
   fillPenalties(job);
 }
 
+namespace {
+
+int movableBodies(const IslandPair& pair) {
+  return (pair.body_a != GapRow::kStatic ? 1 : 0) + (pair.body_b != GapRow::kStatic ? 1 : 0);
+}
+
+/// [m] Up to this gap everything has to be listed before a sub-step: its travel, and what others want to see.
+double neededMargin(const IslandPair& pair, const SolveLimits& limits) {
+  return std::max(limits.contact_margin, movableBodies(pair) * limits.substep_travel);
+}
+
+}  // namespace
+
 void IslandSolver::queryPairs(const Job& job, double margin, SolveReport& report) {
   for (std::size_t i = 0; i < job.pairs.size(); ++i) {
     const IslandPair& pair = job.pairs[i];
-    const int movable = (pair.body_a != GapRow::kStatic ? 1 : 0) + (pair.body_b != GapRow::kStatic ? 1 : 0);
+    queryPair(
+        {pair.shell_A, pair.field_B, job.poseA(pair), job.poseB(pair), pair.dilation, margin, pair.levels},
+        job.results[i].query);
+    ++report.queries;
+    report.points_visited += job.results[i].query.counts.points_visited;
+  }
+}
+
+void IslandSolver::lookAround(const Job& job, SolveReport& report) {
+  for (std::size_t i = 0; i < job.pairs.size(); ++i) {
+    if (mustWalk(job, i)) {
+      walkPair(job, i, report);
+      held_.clear();
+      continue;
+    }
+    const IslandPair& pair = job.pairs[i];
+    PairQueryResult& result = job.results[i].query;
+    const std::size_t listed = result.contacts.size();
     PairQuery query;
     query.shell_A = pair.shell_A;
     query.field_B = pair.field_B;
     query.X_WA = job.poseA(pair);
     query.X_WB = job.poseB(pair);
     query.dilation = pair.dilation;
-    query.margin = margin > 0.0 ? margin + movable * job.limits.substep_travel : 0.0;
-    query.levels = pair.levels;
-    queryPair(query, job.results[i].query);
-    ++report.queries;
-    report.points_visited += job.results[i].query.counts.points_visited;
+    resampleContacts(query, approach(job, i), result);
+    ++report.resamplings;
+    report.points_visited += listed;
+    if (result.contacts.size() != listed) held_.clear();
   }
+}
+
+void IslandSolver::walkPair(const Job& job, std::size_t i, SolveReport& report) {
+  const IslandPair& pair = job.pairs[i];
+  PairQuery query;
+  query.shell_A = pair.shell_A;
+  query.field_B = pair.field_B;
+  query.X_WA = job.poseA(pair);
+  query.X_WB = job.poseB(pair);
+  query.dilation = pair.dilation;
+  query.margin =
+      neededMargin(pair, job.limits) + kWalkSubsteps * movableBodies(pair) * job.limits.substep_travel;
+  query.levels = pair.levels;
+  query.thin = true;
+  queryPair(query, job.results[i].query);
+  walked_[i] = {true, query.X_WA, query.X_WB};
+  ++report.queries;
+  report.points_visited += job.results[i].query.counts.points_visited;
+}
+
+double IslandSolver::approach(const Job& job, std::size_t i) const {
+  const IslandPair& pair = job.pairs[i];
+  double sum = 0.0;
+  const auto add = [&](std::int32_t body, const Pose& X_WB_then) {
+    if (body == GapRow::kStatic) return;
+    const MovableBody& now = job.bodies[static_cast<std::size_t>(body)];
+    const Displacement gone = displacement(X_WB_then, now.X_WB);
+    sum += gone.translation.norm() + gone.rotation.norm() * now.radius;
+  };
+  add(pair.body_a, walked_[i].X_WA);
+  add(pair.body_b, walked_[i].X_WB);
+  return sum;
+}
+
+bool IslandSolver::mustWalk(const Job& job, std::size_t i) const {
+  if (!walked_[i].done) return true;
+  const IslandPair& pair = job.pairs[i];
+  const PairQueryResult& result = job.results[i].query;
+  const double gone = approach(job, i);
+  // a full list is as good as it gets at the place where it was made
+  if (gone > 0.0 && result.others_gap - gone < neededMargin(pair, job.limits)) return true;
+  if (!result.thinned) return false;
+  const Quaternion turn = (job.poseB(pair).rotation().conjugate() * job.poseA(pair).rotation()) *
+                          (walked_[i].X_WB.rotation().conjugate() * walked_[i].X_WA.rotation()).conjugate();
+  return 2.0 * turn.vec().norm() * kThinSpan > kThinDepth;
 }
 
 void IslandSolver::buildRows(const Job& job) {
@@ -227,13 +329,15 @@ double IslandSolver::knownReach(const Job& job) {
 void IslandSolver::solveMotions(const Job& job, SolveReport& report) {
   const std::span<double> multipliers(multipliers_.data(), rows_.size());
   const MotionResult result =
-      motion_.solve(job.bodies, rows_, std::span(motions_.data(), job.bodies.size()), multipliers);
+      motion_.solve(job.bodies, rows_, std::span(motions_.data(), job.bodies.size()), multipliers, held_);
   report.iterations += result.iterations;
   report.conflicting = result.conflicting;
 
   std::fill(touched_.begin(), touched_.end(), std::uint8_t{0});
+  held_.clear();
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     if (multipliers[r] <= 0.0) continue;
+    held_.push_back(static_cast<std::uint32_t>(r));
     for (const std::int32_t body : {rows_[r].body_a, rows_[r].body_b}) {
       if (body != GapRow::kStatic) touched_[static_cast<std::size_t>(body)] = 1;
     }
@@ -275,6 +379,75 @@ bool IslandSolver::brakeOvershoot(const Job& job) {
     if (body.brakes.push_back({gone_[i], back / way2})) braked = true;
   }
   return braked;
+}
+
+namespace {
+
+/// A principal curve of a field's level set, hollow as seen from outside.
+struct Hollow {
+  Vector3 along_W = Vector3::Zero();
+  double curvature = 0.0;  ///< [1/m]
+};
+
+/// The hollows round a contact: what pushes the point back to where it is, the more the farther it slides.
+FixedVector<Hollow, 2> hollowsAt(const DistanceField& field, const Pose& X_WB, const Contact& contact) {
+  FixedVector<Hollow, 2> hollows;
+  const Vector3 p_BP = X_WB.inverse() * contact.p_WP;
+  const Vector3 n_B = X_WB.rotation().conjugate() * contact.n_W;
+  const double h = kCurveStep * field.voxelAt(p_BP);
+  const std::array<Vector3, 2> t = [&n_B] {
+    Eigen::Index least = 0;
+    n_B.cwiseAbs().minCoeff(&least);
+    const Vector3 first = n_B.cross(Vector3::Unit(least)).normalized();
+    return std::array{first, Vector3(n_B.cross(first))};
+  }();
+  Eigen::Matrix2d turn;
+  for (int side = 0; side < 2; ++side) {
+    const Vector3& along = t[static_cast<std::size_t>(side)];
+    const FieldSample ahead = field.sample(p_BP + h * along);
+    const FieldSample behind = field.sample(p_BP - h * along);
+    if (!ahead.exact || !behind.exact) return hollows;
+    turn(0, side) = (behind.gradient - ahead.gradient).dot(t[0]);
+    turn(1, side) = (behind.gradient - ahead.gradient).dot(t[1]);
+  }
+  const double mean = 0.5 * (turn(0, 0) + turn(1, 1));
+  const double half = 0.5 * (turn(0, 0) - turn(1, 1));
+  const double mixed = 0.5 * (turn(0, 1) + turn(1, 0));
+  const double spread = std::sqrt(half * half + mixed * mixed);
+  for (const double sign : {1.0, -1.0}) {
+    const double value = mean + sign * spread;
+    if (value < kLeastTurn) continue;
+    // of the two ways to write the eigenvector the longer one
+    Vector3 along = half * sign >= 0.0 ? Vector3((spread + sign * half) * t[0] + sign * mixed * t[1])
+                                       : Vector3(mixed * t[0] + (sign * spread - half) * t[1]);
+    if (spread == 0.0) along = t[sign > 0.0 ? 0 : 1];
+    hollows.push_back({X_WB.rotation() * along.normalized(), value / (2.0 * h)});
+  }
+  return hollows;
+}
+
+}  // namespace
+
+bool IslandSolver::findCurves(const Job& job) {
+  bool any = false;
+  std::size_t i = 0;
+  std::size_t first = 0;
+  for (const std::uint32_t row : held_) {
+    while (row >= first + job.results[i].query.contacts.size())
+      first += job.results[i++].query.contacts.size();
+    const IslandPair& pair = job.pairs[i];
+    const Contact& contact = job.results[i].query.contacts[row - first];
+    for (const Hollow& hollow : hollowsAt(*pair.field_B, job.poseB(pair), contact)) {
+      for (const std::int32_t index : {pair.body_a, pair.body_b}) {
+        if (index == GapRow::kStatic) continue;
+        MovableBody& body = job.bodies[static_cast<std::size_t>(index)];
+        const Vector3 arm = contact.p_WP - body.X_WB.translation();
+        any |= body.curves.push_back(
+            {{hollow.along_W, arm.cross(hollow.along_W)}, multipliers_[row] * hollow.curvature});
+      }
+    }
+  }
+  return any;
 }
 
 void IslandSolver::blockMotions(const Job& job) {

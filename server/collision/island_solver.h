@@ -51,15 +51,17 @@ inline constexpr double kTouchGap = 5e-5;
 struct SolveReport {
   std::uint32_t substeps = 0;  ///< that moved something
   std::uint32_t iterations = 0;
-  std::uint32_t queries = 0;         ///< of pairs, over all sub-steps
-  std::uint64_t points_visited = 0;  ///< likewise
+  std::uint32_t queries = 0;         ///< walks of a pair's tree, over all sub-steps
+  std::uint32_t resamplings = 0;     ///< of a pair's listed points, likewise
+  std::uint64_t points_visited = 0;  ///< by both
   bool conflicting = false;
   bool travel_capped = false;  ///< the rest of the way goes into the next tick
 };
 
 /// Moves the bodies of one contact island towards their springs' goals without letting them into each other
 /// (DESIGN "god object"; paper §3.1): sub-step by sub-step, query the pairs at the current poses, solve for
-/// poses, project first and clamp then, move.
+/// poses, project first and clamp then, move. A body on a surface that has less than kSettled to go stays
+/// where it is, so that a still hand means a still body.
 ///
 /// Threads: one at a time (a worker owns one). Real-time: solve.
 class IslandSolver {
@@ -77,6 +79,13 @@ class IslandSolver {
   void solvePenalty(const Job& job, SolveReport& report);
 
   static void queryPairs(const Job& job, double margin, SolveReport& report);
+  /// Lists what may be met within a sub-step: again from the shell's tree when the bodies have gone too far
+  /// since it was last walked, else the same points at the new poses.
+  void lookAround(const Job& job, SolveReport& report);
+  void walkPair(const Job& job, std::size_t pair, SolveReport& report);
+  [[nodiscard]] bool mustWalk(const Job& job, std::size_t pair) const;
+  /// [m] no point of one came nearer to the other by more, since the walk.
+  [[nodiscard]] double approach(const Job& job, std::size_t pair) const;
   void buildRows(const Job& job);
   /// [m] a sub-step may go this far without meeting contacts that had no room in the lists.
   [[nodiscard]] static double knownReach(const Job& job);
@@ -88,11 +97,21 @@ class IslandSolver {
   [[nodiscard]] static double merit(const Job& job);
   /// True when a body is on its way back from where it has just gone; then it is braked along that way.
   [[nodiscard]] bool brakeOvershoot(const Job& job);
+  /// Gives the bodies the curves of what holds them; true when there are any.
+  bool findCurves(const Job& job);
   void blockMotions(const Job& job);
   void fillForces(const Job& job) const;
   static void fillPenalties(const Job& job);
 
+  /// Where a pair's bodies were when its tree was walked.
+  struct Walked {
+    bool done = false;
+    Pose X_WA, X_WB;
+  };
+
   MotionSolver motion_;
+  std::vector<Walked> walked_;
+  std::vector<std::uint32_t> held_;  ///< rows that held in the last solve, while the lists are the same
   std::vector<GapRow> rows_;
   std::vector<double> multipliers_;
   std::vector<Displacement> motions_;

@@ -48,40 +48,58 @@ void addSpring(const Spring& spring, const Pose& X_WB, Matrix6& H, Vector6& b) {
 
 }  // namespace
 
-/// Works in coordinates y = Lᵀ x of every body (H = L Lᵀ), where the energy is ½|y - y0|².
+/// Works in coordinates y = Lᵀ x of every body (H = L Lᵀ), where the energy is ½|y - y0|². All rows are
+/// looked at together as columns of numbers, in x, since there a row needs no preparation.
 struct MotionSolver::Workspace {
-  struct Row {
-    std::array<std::int32_t, 2> body;  ///< index, or kStatic
-    std::array<Vector6, 2> normal;     ///< in y of that body
-    double norm2 = 0.0;                ///< [1/N m] 0: moves nobody
-    double gap = 0.0;
-    bool active = false;
+  /// Neighbours in the list are neighbours in space: of this many, only the most violated row is tried.
+  static constexpr std::size_t kBlock = 16;
+
+  /// Rows [first, first + count) between the same two bodies.
+  struct Run {
+    std::size_t first = 0, count = 0;
+    std::array<std::int32_t, 2> body{};
   };
 
   Workspace(std::size_t max_bodies, std::size_t max_rows)
       : active(6 * max_bodies),
         L(max_bodies),
-        rows(max_rows),
+        slack(max_rows),
+        is_active(max_rows),
+        body_of(max_rows),
         y0(6 * max_bodies),
         y(6 * max_bodies),
+        x(6 * max_bodies),
         normal(6 * max_bodies),
         step(6 * max_bodies),
         r(6 * max_bodies),
-        u(6 * max_bodies + 1) {}
+        u(6 * max_bodies + 1) {
+    for (std::vector<double>& column : columns) column.resize(max_rows);
+    runs.reserve(max_rows);
+    tried.reserve(max_rows);
+  }
 
   void setBody(std::size_t i, const MovableBody& body);
-  void setRow(std::size_t r, const GapRow& row, std::span<const MovableBody> bodies);
+  void setRows(std::span<const GapRow> rows, std::span<const MovableBody> island);
   /// False: the rows contradict each other, or the iterations have run out.
-  bool run(bool push_out);
-  [[nodiscard]] double slack(const Row& row, bool push_out) const;
-  [[nodiscard]] std::size_t mostViolated(bool push_out) const;
-  bool enforce(std::size_t p, bool push_out);
+  bool run(std::span<const std::uint32_t> first);
+  void updateMotions();
+  [[nodiscard]] double slackOf(std::size_t row) const;
+  /// Of all rows; the worst of every block that does not hold goes into `tried`.
+  void findViolated();
+  [[nodiscard]] std::size_t mostViolatedOfTried() const;
+  bool enforceTried();
+  bool enforce(std::size_t p);
   void dropActive(std::size_t position);
 
   ActiveSet active;
   std::vector<Matrix6> L;
-  std::vector<Row> rows;
-  std::vector<double> y0, y, normal, step, r, u;  // u: multipliers in the order of `active`
+  std::array<std::vector<double>, 10> columns;  ///< gap, normal, its moment about A's origin, about B's
+  std::vector<double> slack;
+  std::vector<std::uint8_t> is_active;
+  std::vector<std::array<std::int32_t, 2>> body_of;
+  std::vector<Run> runs;
+  std::vector<std::uint32_t> tried;
+  std::vector<double> y0, y, x, normal, step, r, u;  // u: multipliers in the order of `active`
   std::size_t bodies = 0;
   std::size_t row_count = 0;
   std::uint32_t iterations = 0;
@@ -98,6 +116,11 @@ void MotionSolver::Workspace::setBody(std::size_t i, const MovableBody& body) {
   }
   H.bottomRightCorner<3, 3>() +=
       (kLeastRotation * stiffness * body.radius * body.radius) * Matrix3::Identity();
+  for (const Curve& curve : body.curves) {
+    Vector6 c;
+    c << curve.per_motion_W.translation, curve.per_motion_W.rotation;
+    H += curve.stiffness * (c * c.transpose());
+  }
   for (const Brake& brake : body.brakes) {
     Vector6 along;
     along << brake.along_W.translation, brake.along_W.rotation;
@@ -109,59 +132,127 @@ void MotionSolver::Workspace::setBody(std::size_t i, const MovableBody& body) {
   segment(y0, i) = L[i].triangularView<Eigen::Lower>().solve(b);
 }
 
-void MotionSolver::Workspace::setRow(std::size_t index, const GapRow& row,
-                                     std::span<const MovableBody> island) {
-  Row& out = rows[index];
-  out = {{row.body_a, row.body_b}, {Vector6::Zero(), Vector6::Zero()}, 0.0, row.gap, false};
-  if (row.body_a == row.body_b) return;
-  for (std::size_t side = 0; side < 2; ++side) {
-    if (out.body[side] == GapRow::kStatic) continue;
-    const auto body = static_cast<std::size_t>(out.body[side]);
-    assert(body < island.size());
-    Vector6 c;
-    c << row.n_W, (row.p_WP - island[body].X_WB.translation()).cross(row.n_W);
-    out.normal[side] = L[body].triangularView<Eigen::Lower>().solve(side == 0 ? c : Vector6(-c));
-    out.norm2 += out.normal[side].squaredNorm();
+void MotionSolver::Workspace::setRows(std::span<const GapRow> rows, std::span<const MovableBody> island) {
+  runs.clear();
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const GapRow& row = rows[i];
+    body_of[i] = {row.body_a, row.body_b};
+    is_active[i] = 0;
+    if (runs.empty() || runs.back().body[0] != row.body_a || runs.back().body[1] != row.body_b) {
+      runs.push_back({i, 0, body_of[i]});
+    }
+    ++runs.back().count;
+    std::array<Vector3, 2> moment{Vector3::Zero(), Vector3::Zero()};
+    for (std::size_t side = 0; side < 2; ++side) {
+      if (body_of[i][side] == GapRow::kStatic) continue;
+      const auto body = static_cast<std::size_t>(body_of[i][side]);
+      assert(body < island.size());
+      moment[side] = (row.p_WP - island[body].X_WB.translation()).cross(row.n_W);
+    }
+    // what moves nobody always holds
+    const bool idle = row.body_a == row.body_b || row.n_W.isZero(0.0);
+    columns[0][i] = idle ? std::numeric_limits<double>::infinity() : row.gap;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto k = static_cast<Eigen::Index>(axis);
+      columns[1 + axis][i] = row.n_W[k];
+      columns[4 + axis][i] = moment[0][k];
+      columns[7 + axis][i] = moment[1][k];
+    }
   }
 }
 
-double MotionSolver::Workspace::slack(const Row& row, bool push_out) const {
-  double sum = push_out ? row.gap : std::max(row.gap, 0.0);
+void MotionSolver::Workspace::updateMotions() {
+  for (std::size_t i = 0; i < bodies; ++i) {
+    segment(x, i) = L[i].transpose().triangularView<Eigen::Upper>().solve(segment(y, i));
+  }
+}
+
+double MotionSolver::Workspace::slackOf(std::size_t row) const {
+  double sum = columns[0][row];
   for (std::size_t side = 0; side < 2; ++side) {
-    if (row.body[side] == GapRow::kStatic) continue;
-    sum += row.normal[side].dot(Eigen::Map<const Vector6>(&y[6 * static_cast<std::size_t>(row.body[side])]));
+    const std::int32_t body = body_of[row][side];
+    if (body == GapRow::kStatic) continue;
+    const double* motion = &x[6 * static_cast<std::size_t>(body)];
+    const double sign = side == 0 ? 1.0 : -1.0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      sum += sign *
+             (columns[1 + axis][row] * motion[axis] + columns[4 + 3 * side + axis][row] * motion[3 + axis]);
+    }
   }
   return sum;
 }
 
-std::size_t MotionSolver::Workspace::mostViolated(bool push_out) const {
+void MotionSolver::Workspace::findViolated() {
+  for (const Run& run : runs) {
+    std::array<double, 9> m{};  // A's motion less B's, A's rotation, B's
+    for (std::size_t side = 0; side < 2; ++side) {
+      if (run.body[side] == GapRow::kStatic) continue;
+      const double* motion = &x[6 * static_cast<std::size_t>(run.body[side])];
+      const double sign = side == 0 ? 1.0 : -1.0;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        m[axis] += sign * motion[axis];
+        m[3 + 3 * side + axis] = sign * motion[3 + axis];
+      }
+    }
+    std::array<const double*, 10> c{};
+    for (std::size_t k = 0; k < c.size(); ++k) c[k] = columns[k].data() + run.first;
+    double* out = slack.data() + run.first;
+    for (std::size_t i = 0; i < run.count; ++i) {
+      out[i] = c[0][i] + (c[1][i] * m[0] + c[2][i] * m[1] + c[3][i] * m[2]) +
+               (c[4][i] * m[3] + c[5][i] * m[4] + c[6][i] * m[5]);
+    }
+    if (run.body[1] == GapRow::kStatic) continue;
+    for (std::size_t i = 0; i < run.count; ++i) {
+      out[i] += c[7][i] * m[6] + c[8][i] * m[7] + c[9][i] * m[8];
+    }
+  }
+  for (std::size_t k = 0; k < active.size(); ++k) slack[active.row(k)] = 0.0;
+
+  tried.clear();
+  for (std::size_t first = 0; first < row_count; first += kBlock) {
+    const std::size_t end = std::min(first + kBlock, row_count);
+    std::size_t worst = first;
+    for (std::size_t i = first + 1; i < end; ++i) {
+      if (slack[i] < slack[worst]) worst = i;
+    }
+    if (slack[worst] < -kGapTolerance) tried.push_back(static_cast<std::uint32_t>(worst));
+  }
+}
+
+std::size_t MotionSolver::Workspace::mostViolatedOfTried() const {
   std::size_t worst = row_count;
   double least = -kGapTolerance;
-  for (std::size_t i = 0; i < row_count; ++i) {
-    if (rows[i].active || rows[i].norm2 == 0.0) continue;
-    const double s = slack(rows[i], push_out);
+  for (const std::uint32_t row : tried) {
+    if (is_active[row] != 0) continue;
+    const double s = slackOf(row);
     if (s < least) {
       least = s;
-      worst = i;
+      worst = row;
     }
   }
   return worst;
 }
 
 void MotionSolver::Workspace::dropActive(std::size_t position) {
-  rows[active.row(position)].active = false;
+  is_active[active.row(position)] = 0;
   const std::size_t count = active.size();
   active.drop(position);
   // the multiplier of the row that is being enforced stands behind those of the active ones
   for (std::size_t k = position; k < count; ++k) u[k] = u[k + 1];
 }
 
-bool MotionSolver::Workspace::enforce(std::size_t p, bool push_out) {
-  const Row& row = rows[p];
+bool MotionSolver::Workspace::enforce(std::size_t p) {
   std::fill_n(normal.begin(), 6 * bodies, 0.0);
+  double norm2 = 0.0;
   for (std::size_t side = 0; side < 2; ++side) {
-    if (row.body[side] == GapRow::kStatic) continue;
-    segment(normal, static_cast<std::size_t>(row.body[side])) = row.normal[side];
+    if (body_of[p][side] == GapRow::kStatic) continue;
+    const auto body = static_cast<std::size_t>(body_of[p][side]);
+    const std::size_t moment = 4 + 3 * side;
+    Vector6 c;
+    c << columns[1][p], columns[2][p], columns[3][p], columns[moment][p], columns[moment + 1][p],
+        columns[moment + 2][p];
+    segment(normal, body) = L[body].triangularView<Eigen::Lower>().solve(side == 0 ? c : Vector6(-c));
+    norm2 += segment(normal, body).squaredNorm();
   }
   u[active.size()] = 0.0;
 
@@ -180,9 +271,9 @@ bool MotionSolver::Workspace::enforce(std::size_t p, bool push_out) {
     }
     // how far until the row holds
     const double free2 = active.freePart2();
-    const bool dependent = q == 6 * bodies || free2 <= kDependent * row.norm2;
+    const bool dependent = q == 6 * bodies || free2 <= kDependent * norm2;
     const double primal_step =
-        dependent ? std::numeric_limits<double>::infinity() : std::max(-slack(row, push_out), 0.0) / free2;
+        dependent ? std::numeric_limits<double>::infinity() : std::max(-slackOf(p), 0.0) / free2;
     if (dependent && vanishing == q) return false;
 
     const double t = std::min(dual_step, primal_step);
@@ -191,10 +282,11 @@ bool MotionSolver::Workspace::enforce(std::size_t p, bool push_out) {
     if (!dependent) {
       active.direction(step);
       for (std::size_t i = 0; i < 6 * bodies; ++i) y[i] += t * step[i];
+      updateMotions();
     }
     if (primal_step <= dual_step) {
       active.add(static_cast<std::uint32_t>(p));
-      rows[p].active = true;
+      is_active[p] = 1;
       return true;
     }
     dropActive(vanishing);
@@ -202,15 +294,28 @@ bool MotionSolver::Workspace::enforce(std::size_t p, bool push_out) {
   return false;
 }
 
-bool MotionSolver::Workspace::run(bool push_out) {
-  active.reset(6 * bodies);
-  std::copy_n(y0.begin(), 6 * bodies, y.begin());
-  for (std::size_t i = 0; i < row_count; ++i) rows[i].active = false;
-  iteration_limit = iterations + static_cast<std::uint32_t>(64 + 30 * bodies);
-  for (std::size_t p = mostViolated(push_out); p < row_count; p = mostViolated(push_out)) {
-    if (!enforce(p, push_out)) return false;
+bool MotionSolver::Workspace::enforceTried() {
+  for (std::size_t p = mostViolatedOfTried(); p < row_count; p = mostViolatedOfTried()) {
+    if (!enforce(p)) return false;
   }
   return true;
+}
+
+bool MotionSolver::Workspace::run(std::span<const std::uint32_t> first) {
+  active.reset(6 * bodies);
+  std::copy_n(y0.begin(), 6 * bodies, y.begin());
+  updateMotions();
+  std::fill_n(is_active.begin(), row_count, std::uint8_t{0});
+  iteration_limit = iterations + static_cast<std::uint32_t>(64 + 30 * bodies);
+  tried.assign(first.begin(), first.end());
+  if (!enforceTried()) return false;
+  while (true) {
+    findViolated();
+    const std::uint32_t before = iterations;
+    if (!enforceTried()) return false;
+    // what only rounding finds violated counts as kept
+    if (iterations == before) return true;
+  }
 }
 
 MotionSolver::MotionSolver(std::size_t max_bodies, std::size_t max_rows)
@@ -220,29 +325,29 @@ MotionSolver::MotionSolver(MotionSolver&&) noexcept = default;
 MotionSolver& MotionSolver::operator=(MotionSolver&&) noexcept = default;
 
 MotionResult MotionSolver::solve(std::span<const MovableBody> bodies, std::span<const GapRow> rows,
-                                 std::span<Displacement> motions, std::span<double> multipliers) noexcept {
+                                 std::span<Displacement> motions, std::span<double> multipliers,
+                                 std::span<const std::uint32_t> first) noexcept {
   Workspace& w = *workspace_;
-  assert(bodies.size() <= w.L.size() && rows.size() <= w.rows.size());
+  assert(bodies.size() <= w.L.size() && rows.size() <= w.slack.size() && first.size() <= rows.size());
   assert(motions.size() == bodies.size() && multipliers.size() == rows.size());
   w.bodies = bodies.size();
   w.row_count = rows.size();
   w.iterations = 0;
   for (std::size_t i = 0; i < bodies.size(); ++i) w.setBody(i, bodies[i]);
-  for (std::size_t i = 0; i < rows.size(); ++i) w.setRow(i, rows[i], bodies);
+  w.setRows(rows, bodies);
 
   MotionResult result;
-  bool solved = w.run(true);
+  bool solved = w.run(first);
   if (!solved) {
     // standing still is always admissible then
     result.conflicting = true;
-    solved = w.run(false);
+    for (std::size_t i = 0; i < rows.size(); ++i) w.columns[0][i] = std::max(w.columns[0][i], 0.0);
+    solved = w.run({});
   }
   result.iterations = w.iterations;
 
   for (std::size_t i = 0; i < bodies.size(); ++i) {
-    const Vector6 x = solved ? Vector6(w.L[i].transpose().triangularView<Eigen::Upper>().solve(
-                                   Eigen::Map<const Vector6>(&w.y[6 * i])))
-                             : Vector6(Vector6::Zero());
+    const Vector6 x = solved ? Vector6(segment(w.x, i)) : Vector6(Vector6::Zero());
     motions[i] = {x.head<3>(), x.tail<3>()};
   }
   std::fill(multipliers.begin(), multipliers.end(), 0.0);

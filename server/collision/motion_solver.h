@@ -24,8 +24,16 @@ struct Brake {
   double share = 0.0;
 };
 
+/// The other surface curves round a contact of the body: moving along costs as much as a spring would, since
+/// the force there turns against it. Second-order part of a gap, which a row cannot tell.
+struct Curve {
+  Displacement per_motion_W;  ///< [-, m] what a motion of the body moves the contact along the curve
+  double stiffness = 0.0;     ///< [N/m] force over the curve's radius
+};
+
 inline constexpr std::size_t kMaxSprings = 4;
 inline constexpr std::size_t kMaxBrakes = 4;
+inline constexpr std::size_t kMaxCurves = 12;
 
 /// A body that the solver may move.
 struct MovableBody {
@@ -33,6 +41,7 @@ struct MovableBody {
   FixedVector<Spring, kMaxSprings> springs;  ///< at least one with a stiffness
   double radius = 0.1;                       ///< [m] of the body about its origin: no point is farther
   FixedVector<Brake, kMaxBrakes> brakes;     ///< set and cleared by IslandSolver
+  FixedVector<Curve, kMaxCurves> curves;     ///< likewise
 };
 
 /// gap + n · (motion of A's point - motion of B's point) >= 0. A body index of kStatic does not move.
@@ -54,8 +63,8 @@ struct MotionResult {
 /// The contact-island problem of one instant: minimise over all bodies the energy of their springs subject to
 /// the gaps (Gauss' principle of least constraint, as in Ortega et al. 2007, for positions). A strictly
 /// convex quadratic programme, solved by a dual active-set method (Goldfarb and Idnani 1983): exact, bounded
-/// iterations, and picking the most violated row at every step, so hundreds of rows may be offered without
-/// reducing them.
+/// iterations, and picking the most violated of the rows' neighbourhoods at every step, so hundreds of rows
+/// may be offered without reducing them.
 ///
 /// Keeps its work space, sized at construction. Threads: one at a time. Real-time: solve.
 class MotionSolver {
@@ -67,8 +76,11 @@ class MotionSolver {
 
   /// motions[i]: displacement of bodies[i]'s origin and its rotation, in W. multipliers[r] >= 0: force [N]
   /// along rows[r].n_W on its body A (and the opposite on B). Both spans are as long as bodies and rows.
+  /// `first`: rows to try first, such as those that held in a problem like this one; the motions do not
+  /// depend on it.
   MotionResult solve(std::span<const MovableBody> bodies, std::span<const GapRow> rows,
-                     std::span<Displacement> motions, std::span<double> multipliers) noexcept;
+                     std::span<Displacement> motions, std::span<double> multipliers,
+                     std::span<const std::uint32_t> first = {}) noexcept;
 
  private:
   struct Workspace;

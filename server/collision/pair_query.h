@@ -42,6 +42,9 @@ struct PairQuery {
   double dilation = 0.0;               ///< [m] the surface of B is felt this far outside
   double margin = 0.0;                 ///< [m] contacts are listed up to this gap
   std::uint32_t levels = 0xFFFFFFFFU;  ///< how many levels of the shell may be used
+  /// When room runs out, points give way first that stand behind a neighbour (of the same leaf, with about
+  /// the same normal and a smaller gap): a flat patch then stays listed over all its width.
+  bool thin = false;
 };
 
 struct PairQueryResult {
@@ -51,7 +54,9 @@ struct PairQueryResult {
       0.0;  ///< of all points, a lower bound when none is within the margin; dilation included
   double listed_to =
       0.0;  ///< [m] every contact with a smaller gap is in the list: the margin, or less when full
-  double deepest = 0.0;  ///< [m] depth in the undilated field of the deepest point, 0 when apart
+  double others_gap = 0.0;  ///< [m] no point outside the list has a smaller gap, thinned ones aside
+  bool thinned = false;     ///< some points gave way to their neighbours
+  double deepest = 0.0;     ///< [m] depth in the undilated field of the deepest point, 0 when apart
 };
 
 /// All points of A's shell whose gap to B is at most `margin`. Spheres that the field proves to be farther
@@ -59,6 +64,11 @@ struct PairQueryResult {
 ///
 /// Threads: pure. Real-time.
 void queryPair(const PairQuery& query, PairQueryResult& result) noexcept;
+
+/// The listed contacts again, at the query's poses, while no point of A came nearer to B than by `moved` [m]
+/// since queryPair listed them: costs no walk. Gaps and normals are those that queryPair would give; what is
+/// not in the list is still not nearer than others_gap - moved.
+void resampleContacts(const PairQuery& query, double moved, PairQueryResult& result) noexcept;
 
 /// [N] the penalty of one contact along its normal; 0 when apart.
 [[nodiscard]] double penaltyForce(const Contact& contact, double stiffness) noexcept;
