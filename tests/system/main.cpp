@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -19,6 +20,7 @@ struct Arguments {
   bool alone = false;
   bool no_collisions = false;
   bool quiet = false;
+  bool follow = false;
   int stubborn = -1;
   std::string device = "sigma7-sim";
 };
@@ -42,6 +44,7 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_flag("--no-instructor", arguments.alone, "the trainee is alone");
   app.add_flag("--no-collisions", arguments.no_collisions,
                "nothing touches anything: the same people try the same");
+  app.add_flag("--follow", arguments.follow, "print twice a second what the trainee does and how far it is");
   app.add_flag("--quiet", arguments.quiet, "print the outcome only");
   app.footer("Exit code: 0 when everything was mounted, 1 otherwise. Last line: the final state hash.");
 }
@@ -51,8 +54,23 @@ int complain(const std::string& what) {
   return 1;
 }
 
+/// Has two lines a second printed on what the trainee does.
+void followTrainee(Arguments& arguments, const tenon::TraineeStation& trainee) {
+  arguments.rehearsal.ticked = [&trainee](const tenon::TickInput&, const tenon::TickOutput& output) {
+    if (output.tick % 500 != 0) return;
+    double force = 0.0;
+    double depth = 0.0;
+    for (const tenon::HandManifold& hand : output.manifolds) force = std::max(force, hand.F_Ho_W.force.norm());
+    for (const tenon::PairContact& pair : output.pairs) depth = std::max(depth, pair.depth);
+    std::printf("%8.3f s  %-22s %7.1f mm %6.2f deg  force %5.1f N  contact %5.2f s  depth %.2f mm\n",
+                static_cast<double>(output.tick) * tenon::kTickSeconds, trainee.doing(),
+                1e3 * output.step.position_error, output.step.angle_error * 57.29578, force,
+                output.step.contact_seconds, 1e3 * depth);
+  };
+}
+
 /// The people that the scenario has hands for.
-tenon::Result<std::vector<std::unique_ptr<tenon::Station>>> people(const Arguments& arguments,
+tenon::Result<std::vector<std::unique_ptr<tenon::Station>>> people(Arguments& arguments,
                                                                    const tenon::ScenarioFile& scenario) {
   std::vector<std::unique_ptr<tenon::Station>> stations;
   tenon::TraineeOptions trainee;
@@ -60,6 +78,7 @@ tenon::Result<std::vector<std::unique_ptr<tenon::Station>>> people(const Argumen
   trainee.person.stubborn_mount = arguments.stubborn;
   auto opened = tenon::TraineeStation::open(trainee);
   if (!opened) return tenon::fail(opened.error().what);
+  if (arguments.follow) followTrainee(arguments, **opened);
   stations.push_back(std::move(*opened));
   if (arguments.alone || !scenario.handNamed("instructor").valid()) return stations;
 
