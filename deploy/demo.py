@@ -105,10 +105,11 @@ def play(args, out, cast):
     threading.Thread(target=lines_until, args=(server, "\0", server_log), daemon=True).start()
 
     cast.start("record", "-o", recording, *cast.common())
-    observer = cast.start("observer", *cast.common(), show=True)
+    observer = cast.start("observer", "--session", "demo", "--domain", args.domain, show=True)
     watching = threading.Thread(target=echo, args=(observer, open(out / "observer.log", "w", encoding="utf-8")), daemon=True)
     watching.start()
-    cast.start("trainee", "--device", "hug-sim", "--seed", args.seed, *cast.common())
+    stubborn = ["--stubborn", 2] if scenario.name == "engine_bay" else []
+    cast.start("trainee", "--device", "hug-sim", "--seed", args.seed, *stubborn, *cast.common())
     if not args.no_instructor:
         cast.start("instructor", "--device", args.device, "--seed", args.seed, *cast.common())
 

@@ -20,7 +20,7 @@ DEVICES = {"devices", "devices/simulated"}
 ROOMS = {
     "idl/types": (set(), {"tl"}),
     "idl/threads": ({"idl/types"}, {"posix"}),
-    "idl/wire": ({"idl/types", "idl/threads"}, {"dds"}),
+    "idl/wire": ({"idl/types", "idl/threads"}, {"dds", "posix"}),
     "idl/record": ({"idl/types"}, {"zstd", "lz4", "posix"}),
     "server/structures": ({"idl/types"}, {"hwy", "xxhash", "posix"}),
     "server/bake": ({"idl/types", "server/structures"}, {"assimp", "octomap", "meshoptimizer", "xxhash", "posix", "fmt", "cli11"}),
