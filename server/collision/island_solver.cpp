@@ -29,6 +29,10 @@ constexpr double kThinSpan = 0.03;
 constexpr double kCurveStep = 0.25;
 constexpr double kLeastTurn = 0.02;
 
+/// [rad] So much turn over both sides, and the field's slope there, may be a kink between two of its cells.
+constexpr double kSharpTurn = 0.1;
+constexpr double kFlankSlope = 0.3;
+
 /// [m] What may be left after the last sub-step without being called unfinished.
 constexpr double kUnfinished = 1e-6;
 
@@ -112,7 +116,9 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
   double reach = job.limits.substep_travel;
   int worse = 0;
   std::fill(walked_.begin(), walked_.end(), Walked{});
+  flank_count_ = 0;
   const auto look = [&] {
+    dropFlanks(job);
     lookAround(job, report);
     buildRows(job);
     for (MovableBody& body : job.bodies) body.curves.clear();
@@ -390,7 +396,9 @@ struct Hollow {
 };
 
 /// The hollows round a contact: what pushes the point back to where it is, the more the farther it slides.
-FixedVector<Hollow, 2> hollowsAt(const DistanceField& field, const Pose& X_WB, const Contact& contact) {
+/// Where it turns abruptly, `flanks` takes the tangent planes to both sides: in a hollow they hold as well.
+FixedVector<Hollow, 2> hollowsAt(const DistanceField& field, const Pose& X_WB, double dilation,
+                                 const Contact& contact, FixedVector<Contact, 4>& flanks) {
   FixedVector<Hollow, 2> hollows;
   const Vector3 p_BP = X_WB.inverse() * contact.p_WP;
   const Vector3 n_B = X_WB.rotation().conjugate() * contact.n_W;
@@ -409,6 +417,18 @@ FixedVector<Hollow, 2> hollowsAt(const DistanceField& field, const Pose& X_WB, c
     if (!ahead.exact || !behind.exact) return hollows;
     turn(0, side) = (behind.gradient - ahead.gradient).dot(t[0]);
     turn(1, side) = (behind.gradient - ahead.gradient).dot(t[1]);
+    if (turn(side, side) < kSharpTurn) continue;
+    for (const double way : {h, -h}) {
+      const FieldSample& sample = way > 0.0 ? ahead : behind;
+      const double slope = sample.gradient.norm();
+      if (slope < kFlankSlope) continue;
+      Contact flank = contact;
+      flank.gap = (sample.distance - dilation - way * sample.gradient.dot(along)) / slope;
+      flank.n_W = X_WB.rotation() * (sample.gradient / slope);
+      flank.area = 0.0;
+      // elsewhere the surface bulges between here and there
+      if (flank.gap >= contact.gap - kFieldNoise) flanks.push_back(flank);
+    }
   }
   const double mean = 0.5 * (turn(0, 0) + turn(1, 1));
   const double half = 0.5 * (turn(0, 0) - turn(1, 1));
@@ -430,6 +450,7 @@ FixedVector<Hollow, 2> hollowsAt(const DistanceField& field, const Pose& X_WB, c
 
 bool IslandSolver::findCurves(const Job& job) {
   bool any = false;
+  flank_count_ = 0;
   std::size_t i = 0;
   std::size_t first = 0;
   for (const std::uint32_t row : held_) {
@@ -437,7 +458,12 @@ bool IslandSolver::findCurves(const Job& job) {
       first += job.results[i++].query.contacts.size();
     const IslandPair& pair = job.pairs[i];
     const Contact& contact = job.results[i].query.contacts[row - first];
-    for (const Hollow& hollow : hollowsAt(*pair.field_B, job.poseB(pair), contact)) {
+    FixedVector<Contact, 4> flanks;
+    const auto hollows = hollowsAt(*pair.field_B, job.poseB(pair), pair.dilation, contact, flanks);
+    for (const Contact& flank : flanks) {
+      if (flank_count_ < flanks_.size()) flanks_[flank_count_++] = {i, flank};
+    }
+    for (const Hollow& hollow : hollows) {
       for (const std::int32_t index : {pair.body_a, pair.body_b}) {
         if (index == GapRow::kStatic) continue;
         MovableBody& body = job.bodies[static_cast<std::size_t>(index)];
@@ -447,7 +473,26 @@ bool IslandSolver::findCurves(const Job& job) {
       }
     }
   }
-  return any;
+  std::size_t listed = 0;
+  for (std::size_t k = 0; k < flank_count_; ++k) {
+    if (job.results[flanks_[k].pair].query.contacts.push_back(flanks_[k].contact))
+      flanks_[listed++] = flanks_[k];
+  }
+  flank_count_ = listed;
+  const bool flanked = listed > 0;
+  if (flanked) {
+    buildRows(job);
+    held_.clear();
+  }
+  return any || flanked;
+}
+
+void IslandSolver::dropFlanks(const Job& job) {
+  if (flank_count_ > 0) held_.clear();
+  while (flank_count_ > 0) {
+    ContactList& contacts = job.results[flanks_[--flank_count_].pair].query.contacts;
+    contacts.resize(contacts.size() - 1);
+  }
 }
 
 void IslandSolver::blockMotions(const Job& job) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -97,8 +99,10 @@ class IslandSolver {
   [[nodiscard]] static double merit(const Job& job);
   /// True when a body is on its way back from where it has just gone; then it is braked along that way.
   [[nodiscard]] bool brakeOvershoot(const Job& job);
-  /// Gives the bodies the curves of what holds them; true when there are any.
+  /// Gives the bodies the curves of what holds them, and lists as contacts of no area the flanks of what is
+  /// too sharp to be a curve; true when there are any.
   bool findCurves(const Job& job);
+  void dropFlanks(const Job& job);
   void blockMotions(const Job& job);
   void fillForces(const Job& job) const;
   static void fillPenalties(const Job& job);
@@ -109,7 +113,15 @@ class IslandSolver {
     Pose X_WA, X_WB;
   };
 
+  /// A contact that the look at a place has added to the pair's list.
+  struct Flank {
+    std::size_t pair = 0;
+    Contact contact;
+  };
+
   MotionSolver motion_;
+  std::array<Flank, 64> flanks_;
+  std::size_t flank_count_ = 0;
   std::vector<Walked> walked_;
   std::vector<std::uint32_t> held_;  ///< rows that held in the last solve, while the lists are the same
   std::vector<GapRow> rows_;
