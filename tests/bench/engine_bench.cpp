@@ -98,10 +98,10 @@ void Solve(benchmark::State& state) {
 }
 BENCHMARK(Solve)->Unit(benchmark::kMicrosecond);
 
-/// Whole ticks: the hand drags the box along a wall and the floor at 0.5 m/s and back.
-void Tick(benchmark::State& state) {
+/// Whole ticks of the box on the hand that goes to and fro along y at `speed`, held where `X_WH` says.
+void Tick(benchmark::State& state, const Pose& X_WH, double speed) {
   std::vector<MovableBody> bodies(1);
-  bodies[0].X_WB = Pose(Vector3(0.16, 0.12, 0.06));
+  bodies[0].X_WB = Pose(Vector3(0.2, 0.15, 0.08), X_WH.rotation());
   bodies[0].radius = box()->shell.radius();
   bodies[0].springs.push_back({bodies[0].X_WB, Vector3::Zero(), 2000.0, 20.0});
   std::vector<IslandPair> pairs(1);
@@ -112,17 +112,34 @@ void Tick(benchmark::State& state) {
   std::vector<IslandPairResult> results(1);
   results[0].multipliers.resize(kMaxPairContacts);
   IslandSolver solver(1, 1);
-  double queries = 0.0;
   int tick = 0;
-  for (auto _ : state) {
-    const double way = 0.0005 * std::abs(tick % 400 - 200);
+  const auto step = [&] {
+    const double way = speed * 0.001 * std::abs(tick % 400 - 200);
     ++tick;
-    bodies[0].springs[0].X_WG = Pose(Vector3(0.14, 0.13 + way, 0.045), expRotation({0.05, 0.0, 0.02}));
-    queries += solver.solve(bodies, pairs, SolveLimits{}, results).queries;
+    bodies[0].springs[0].X_WG = Pose(X_WH.translation() + Vector3(0.0, way, 0.0), X_WH.rotation());
+    return solver.solve(bodies, pairs, SolveLimits{}, results);
+  };
+  for (int i = 0; i < 200; ++i) step();
+  double queries = 0.0;
+  double substeps = 0.0;
+  double contacts = 0.0;
+  for (auto _ : state) {
+    const SolveReport report = step();
+    queries += report.queries;
+    substeps += report.substeps;
+    contacts += static_cast<double>(results[0].query.contacts.size());
   }
   state.counters["queries"] = benchmark::Counter(queries, benchmark::Counter::kAvgIterations);
+  state.counters["substeps"] = benchmark::Counter(substeps, benchmark::Counter::kAvgIterations);
+  state.counters["contacts"] = benchmark::Counter(contacts, benchmark::Counter::kAvgIterations);
 }
-BENCHMARK(Tick)->Unit(benchmark::kMicrosecond);
+const Pose kFlatOnBoth(Vector3(0.14, 0.13, 0.045), expRotation({0.05, 0.0, 0.02}));
+const Pose kOnAnEdge(Vector3(0.25, 0.16, 0.06), expRotation({0.3, 0.0, 0.0}));
+const Pose kTilted(Vector3(0.25, 0.2, 0.1), expRotation({0.5, 0.4, 0.0}));
+BENCHMARK_CAPTURE(Tick, FlatInCorner, kFlatOnBoth, 0.5)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(Tick, FlatInCornerStill, kFlatOnBoth, 0.0)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(Tick, Edge, kOnAnEdge, 0.5)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(Tick, Tilted, kTilted, 0.5)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace tenon
