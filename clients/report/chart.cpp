@@ -12,7 +12,7 @@ namespace {
 constexpr double kWidth = 1000.0, kHeight = 230.0;
 constexpr double kLeft = 52.0, kRight = 988.0, kTop = 46.0, kBottom = 204.0;
 constexpr double kHole = 0.5;    // [s] without a value: the line is broken
-constexpr double kLetter = 6.2;  // width of one, for what fits into a band
+constexpr double kLetter = 5.8;  // width of one, for what fits into a band
 constexpr int kColumns = static_cast<int>(kRight - kLeft);
 
 /// A distance between ticks of 1, 2 or 5 times a power of ten, for about `count` of them.

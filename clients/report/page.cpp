@@ -27,8 +27,8 @@ h1 { font-size: 30px; line-height: 1.2; margin: 0 0 4px; }
 h2 { font-size: 18px; margin: 34px 0 10px; }
 .soft { color: var(--soft); }
 .outcome { display: inline-block; padding: 3px 12px; border-radius: 99px; color: #fff; font-weight: 600; }
-.outcome.good { background: var(--good); } .outcome.bad { background: var(--bad); }
-@media (prefers-color-scheme: dark) { .outcome { color: #10141a; } }
+.outcome.good { background: var(--good); color: #fff; } .outcome.bad { background: var(--bad); color: #fff; }
+@media screen and (prefers-color-scheme: dark) { .outcome.good, .outcome.bad { color: #10141a; } }
 .tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: 10px; margin: 22px 0 0; }
 .tile, .card { background: var(--card); border: 1px solid var(--line); border-radius: 10px; }
 .tile { padding: 10px 14px; } .tile b { display: block; font-size: 22px; font-variant-numeric: tabular-nums; }
@@ -42,6 +42,8 @@ td { text-align: right; padding: 6px 8px; border-top: 1px solid var(--line); }
 th:nth-child(-n+2), td:nth-child(-n+2) { text-align: left; } td.state, th.state { text-align: left; }
 tr.sum td { font-weight: 600; border-top: 2px solid var(--line); }
 .part { color: var(--soft); font-size: 13px; }
+.facts td { text-align: left; width: 34%; } .facts td + td { width: auto; }
+table tr:first-child td { border-top: 0; }
 .events td { text-align: left; vertical-align: top; } .events td:first-child { text-align: right; width: 80px; }
 .good { color: var(--good); } .warn { color: var(--warn); } .bad { color: var(--bad); }
 svg { display: block; width: 100%; height: auto; font: 11px system-ui, "Segoe UI", Roboto, sans-serif; }
@@ -187,9 +189,9 @@ std::string charts(const SessionStory& story) {
 }
 
 std::string machineTable(const SessionStory& story) {
-  std::string html = "<h2>How the machine kept up</h2>\n<div class=\"card\"><table class=\"events\">\n";
+  std::string html = "<h2>How the machine kept up</h2>\n<div class=\"card\"><table class=\"facts\">\n";
   const auto line = [&html](std::string_view what, const std::string& value) {
-    html += fmt::format("<tr><td></td><td>{}</td><td>{}</td></tr>\n", what, escaped(value));
+    html += fmt::format("<tr><td>{}</td><td>{}</td></tr>\n", what, escaped(value));
   };
   line("Computation time of a tick",
        fmt::format("median {:.3f} ms, p99 {:.3f} ms, max {:.3f} ms", 1e3 * story.compute_median,

@@ -1,0 +1,244 @@
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "idl/record/instance_state.h"
+#include "idl/record/mcap_format.h"
+#include "idl/record/mcap_reader.h"
+#include "idl/record/mcap_writer.h"
+
+namespace tenon {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+using testing::HasSubstr;
+
+struct Kept {
+  std::string topic;
+  std::int64_t time = 0;
+  std::uint32_t sequence = 0;
+  Bytes data;
+  bool operator==(const Kept&) const = default;
+};
+
+class McapTest : public ::testing::Test {
+ protected:
+  ~McapTest() override { std::filesystem::remove(file_); }
+
+  /// Messages on two topics in chunks of ten; all of them are returned.
+  std::vector<Kept> record(int count, bool compress = true) {
+    std::mt19937_64 random(7);
+    std::vector<Kept> all;
+    auto writer = McapWriter::open(file_, {.compress = compress});
+    const std::uint16_t channels[] = {writer->addChannel("A", "t::A", "module t { struct A {}; };"),
+                                      writer->addChannel("B", "t::B", "module t { struct B {}; };")};
+    for (int i = 0; i < count; ++i) {
+      Kept kept{i % 3 == 0 ? "B" : "A", 1000 + 10 * i, static_cast<std::uint32_t>(i), Bytes(random() % 40)};
+      for (std::uint8_t& byte : kept.data) byte = static_cast<std::uint8_t>(random() % 4);
+      EXPECT_TRUE(writer->write(channels[i % 3 == 0 ? 1 : 0], kept.time, kept.sequence, kept.data));
+      all.push_back(std::move(kept));
+      if (i % 10 == 9) {
+        EXPECT_TRUE(writer->flush());
+      }
+    }
+    EXPECT_TRUE(writer->addMetadata("about", {{"who", "Ada"}, {"why", ""}}));
+    EXPECT_TRUE(writer->addAttachment("note.txt", "text/plain", Bytes{'h', 'i'}));
+    EXPECT_TRUE(writer->close());
+    return all;
+  }
+  static std::vector<Kept> readAll(McapReader& reader) {
+    std::vector<Kept> all;
+    for (McapMessage message; reader.next(message);)
+      all.push_back({std::string(message.topic),
+                     message.log_time_ns,
+                     message.sequence,
+                     {message.data.begin(), message.data.end()}});
+    return all;
+  }
+  Bytes fileBytes() const {
+    std::ifstream in(file_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  void writeFile(std::span<const std::uint8_t> bytes) const {
+    std::ofstream out(file_, std::ios::binary);
+    out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  }
+
+  std::filesystem::path file_ =
+      std::filesystem::temp_directory_path() / ("mcap_" + std::to_string(getpid()) + ".mcap");
+};
+
+TEST_F(McapTest, WhatIsWrittenIsReadBackInFileOrder) {
+  for (const bool compress : {true, false}) {
+    const auto written = record(95, compress);
+    auto reader = McapReader::open(file_);
+    ASSERT_TRUE(reader) << reader.error().what;
+    EXPECT_TRUE(reader->complete());
+    EXPECT_EQ(reader->problem(), "");
+    EXPECT_EQ(readAll(*reader), written);
+  }
+}
+
+TEST_F(McapTest, ChannelsMetadataAndAttachmentsAreThereBeforeTheFirstMessage) {
+  record(30);
+  auto reader = McapReader::open(file_);
+  ASSERT_EQ(reader->channels().size(), 2U);
+  EXPECT_EQ(reader->channels()[0].topic, "A");
+  EXPECT_EQ(reader->channels()[0].type_name, "t::A");
+  EXPECT_THAT(reader->channels()[0].schema_text, HasSubstr("struct A"));
+  EXPECT_EQ(reader->channels()[0].messages, 20U);
+  EXPECT_EQ(reader->channels()[1].messages, 10U);
+  ASSERT_EQ(reader->metadata().size(), 1U);
+  EXPECT_EQ(reader->metadata().find("about")->second.at("who"), "Ada");
+  ASSERT_EQ(reader->attachments().size(), 1U);
+  EXPECT_EQ(reader->attachments()[0].media_type, "text/plain");
+  EXPECT_EQ(std::string(reader->attachments()[0].data.begin(), reader->attachments()[0].data.end()), "hi");
+}
+
+TEST_F(McapTest, SeekGoesToTheFirstMessageAtOrAfterATimeAndBackAgain) {
+  const auto written = record(100);
+  auto reader = McapReader::open(file_);
+  for (const int index : {70, 3, 99, 0}) {
+    reader->seek(written[static_cast<std::size_t>(index)].time - 5);
+    McapMessage message;
+    ASSERT_TRUE(reader->next(message));
+    EXPECT_EQ(message.sequence, static_cast<std::uint32_t>(index));
+  }
+  reader->seek(1'000'000);
+  McapMessage message;
+  EXPECT_FALSE(reader->next(message));
+}
+
+TEST_F(McapTest, AFileWithoutMessagesIsWhole) {
+  ASSERT_TRUE(McapWriter::open(file_)->close());
+  auto reader = McapReader::open(file_);
+  ASSERT_TRUE(reader);
+  EXPECT_TRUE(reader->complete());
+  EXPECT_TRUE(readAll(*reader).empty());
+}
+
+TEST_F(McapTest, AWriterThatIsClosedTakesNothingMore) {
+  auto writer = McapWriter::open(file_);
+  const auto channel = writer->addChannel("A", "t::A", "");
+  ASSERT_TRUE(writer->close());
+  EXPECT_FALSE(writer->write(channel, 0, 0, {}));
+  EXPECT_FALSE(writer->flush());
+  EXPECT_TRUE(writer->close());
+}
+
+TEST_F(McapTest, AFullDiskIsOneSentence) {
+  auto writer = McapWriter::open("/dev/full");
+  ASSERT_FALSE(writer);
+  EXPECT_THAT(writer.error().what, HasSubstr("/dev/full: cannot write"));
+}
+
+TEST_F(McapTest, CutAtAnyByteItGivesAllWholeChunksAndSaysThatItWasCut) {
+  const auto written = record(40);
+  const Bytes whole = fileBytes();
+  std::size_t before = 0;
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    writeFile(std::span(whole).first(size));
+    auto reader = McapReader::open(file_);
+    if (!reader) {
+      EXPECT_LT(size, sizeof(mcap::kMagic));
+      EXPECT_THAT(reader.error().what, HasSubstr(file_.string()));
+      continue;
+    }
+    ASSERT_FALSE(reader->complete()) << size;
+    ASSERT_THAT(reader->problem(), HasSubstr("was cut")) << size;
+    const auto read = readAll(*reader);
+    ASSERT_LE(read.size(), written.size());
+    ASSERT_TRUE(std::equal(read.begin(), read.end(), written.begin())) << size;
+    ASSERT_GE(read.size(), before) << "more bytes give no fewer messages";
+    before = read.size();
+  }
+  EXPECT_EQ(before, written.size());
+}
+
+TEST_F(McapTest, AFlippedBitNeverChangesAMessageAndNeverCrashes) {
+  const auto written = record(40);
+  const Bytes whole = fileBytes();
+  std::mt19937_64 random(11);
+  for (int round = 0; round < 1000; ++round) {
+    Bytes bytes = whole;
+    bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1U << (random() % 8));
+    writeFile(bytes);
+    auto reader = McapReader::open(file_);
+    if (!reader) continue;
+    for (const Kept& kept : readAll(*reader)) {
+      const bool known = std::any_of(written.begin(), written.end(), [&](const Kept& one) {
+        return one.data == kept.data && one.sequence == kept.sequence && one.time == kept.time;
+      });
+      ASSERT_TRUE(known) << "round " << round;
+    }
+  }
+}
+
+TEST_F(McapTest, DamageInsideAChunkLeavesOutThatChunkAndSaysSo) {
+  record(40, false);
+  Bytes bytes = fileBytes();
+  // the third chunk's first message: its data stand in the file as they are
+  std::size_t chunk = 0, at = sizeof(mcap::kMagic);
+  for (int seen = 0; seen < 3;) {
+    chunk = at;
+    if (bytes[at] == mcap::kChunk) ++seen;
+    std::uint64_t length = 0;
+    std::memcpy(&length, bytes.data() + at + 1, sizeof length);
+    at += mcap::kRecordHead + length;
+  }
+  bytes[chunk + 100] ^= 1U;
+  writeFile(bytes);
+  auto reader = McapReader::open(file_);
+  ASSERT_TRUE(reader);
+  EXPECT_EQ(readAll(*reader).size(), 30U);
+  EXPECT_THAT(reader->problem(), HasSubstr("checksum"));
+}
+
+TEST_F(McapTest, RandomBytesAfterTheMagicNeverCrash) {
+  std::mt19937_64 random(13);
+  for (int round = 0; round < 500; ++round) {
+    Bytes bytes(mcap::kMagic, mcap::kMagic + sizeof(mcap::kMagic));
+    for (int record = 0; record < 5; ++record) {
+      const std::uint64_t length = random() % 60;
+      bytes.push_back(static_cast<std::uint8_t>(1 + random() % 16));
+      for (int i = 0; i < 8; ++i) bytes.push_back(static_cast<std::uint8_t>(length >> (8 * i)));
+      for (std::uint64_t i = 0; i < length; ++i)
+        bytes.push_back(static_cast<std::uint8_t>(random() % 3 == 0 ? random() : 0));
+    }
+    writeFile(bytes);
+    auto reader = McapReader::open(file_);
+    ASSERT_TRUE(reader);
+    readAll(*reader);
+  }
+}
+
+TEST_F(McapTest, WhatIsNoRecordingIsOneSentence) {
+  EXPECT_THAT(McapReader::open("no/such.mcap").error().what, HasSubstr("no/such.mcap: cannot be opened"));
+  EXPECT_THAT(McapReader::open("/tmp").error().what, HasSubstr("is empty or not a file"));
+  writeFile(Bytes(100, 'x'));
+  EXPECT_THAT(McapReader::open(file_).error().what, HasSubstr("is not a recording"));
+}
+
+TEST(InstanceState, SurvivesTheWayThroughItsBytes) {
+  for (const char* topic : {"A", "Ab", "Abc", "ObjectSnapshot"}) {
+    const InstanceGone gone{topic, {0, 1, 0, 0, 7, 0, 0, 0}};
+    const auto bytes = encodeInstanceGone(gone);
+    const auto back = decodeInstanceGone(bytes);
+    ASSERT_TRUE(back) << topic;
+    EXPECT_EQ(back->topic, topic);
+    EXPECT_EQ(back->key_sample, gone.key_sample);
+    for (std::size_t size = 0; size < bytes.size(); ++size)
+      EXPECT_FALSE(decodeInstanceGone(std::span(bytes).first(size)));
+  }
+}
+
+}  // namespace
+}  // namespace tenon
