@@ -101,7 +101,8 @@ BENCHMARK(Solve)->Unit(benchmark::kMicrosecond);
 /// Whole ticks of the box on the hand that goes to and fro along y at `speed`, held where `X_WH` says.
 void Tick(benchmark::State& state, const Pose& X_WH, double speed) {
   std::vector<MovableBody> bodies(1);
-  bodies[0].X_WB = Pose(Vector3(0.2, 0.15, 0.08), X_WH.rotation());
+  // from well above, and free
+  bodies[0].X_WB = Pose(X_WH.translation() + Vector3(0.1, 0.1, 0.15), X_WH.rotation());
   bodies[0].radius = box()->shell.radius();
   bodies[0].springs.push_back({bodies[0].X_WB, Vector3::Zero(), 2000.0, 20.0});
   std::vector<IslandPair> pairs(1);
