@@ -46,7 +46,7 @@ Axes axesFor(const Chart& chart, double duration) {
 std::string drawBands(const Axes& axes, const std::vector<Band>& bands) {
   std::string svg;
   for (std::size_t i = 0; i < bands.size(); ++i) {
-    const double from = axes.x(bands[i].begin), width = axes.x(bands[i].end) - from;
+    const double from = axes.x(bands[i].begin), width = std::max(0.0, axes.x(bands[i].end) - from);
     svg += fmt::format(
         "<g><title>{}</title><rect class=\"band{}\" x=\"{:.1f}\" y=\"{}\" width=\"{:.1f}\" height=\"{}\"/>",
         escaped(bands[i].title), i % 2, from, kTop - 18.0, width, kBottom - kTop + 18.0);

@@ -69,6 +69,7 @@ struct McapReader::Impl {
   MappedFile mapped;
   std::string name;
   bool complete = false;
+  bool summary_is_good = true;
   std::string problem;
   std::vector<ChunkPlace> chunks;
   std::map<std::uint16_t, std::pair<std::string, std::string>> schemas;  // type name, text
@@ -83,6 +84,7 @@ struct McapReader::Impl {
   std::span<const std::uint8_t> rest;
 
   void scan(std::span<const std::uint8_t> bytes);
+  void checkSummary(std::span<const std::uint8_t> summary);
   void readDefinition(std::uint8_t opcode, std::span<const std::uint8_t> fields);
   void readTopLevel(std::uint8_t opcode, std::span<const std::uint8_t> fields);
   void readStatistics(std::span<const std::uint8_t> fields);
@@ -115,9 +117,9 @@ Result<McapReader> McapReader::open(const std::filesystem::path& file) {
     return fail(file.string() + ": is not a recording (no MCAP file)");
   impl->scan(bytes->subspan(sizeof(mcap::kMagic)));
 
-  // a cut file has no summary: its channels are defined in its chunks
-  if (!impl->complete) {
-    impl->complain("was cut: read up to its last whole chunk");
+  // without a summary the channels are those that the chunks define
+  if (!impl->complete || !impl->summary_is_good) {
+    if (!impl->complete) impl->complain("was cut: read up to its last whole chunk");
     for (const ChunkPlace& place : impl->chunks) {
       if (!impl->unpack(place)) continue;
       std::uint8_t opcode = 0;
@@ -131,14 +133,29 @@ Result<McapReader> McapReader::open(const std::filesystem::path& file) {
 
 void McapReader::Impl::scan(std::span<const std::uint8_t> bytes) {
   std::uint8_t opcode = 0;
-  std::span<const std::uint8_t> fields;
+  std::span<const std::uint8_t> fields, summary;
   while (takeRecord(bytes, opcode, fields)) {
     readTopLevel(opcode, fields);
+    if (opcode == mcap::kDataEnd) summary = bytes;
     if (opcode != mcap::kFooter) continue;
     complete =
         bytes.size() == sizeof(mcap::kMagic) && std::memcmp(bytes.data(), mcap::kMagic, bytes.size()) == 0;
+    checkSummary(summary.first(summary.empty() ? 0 : summary.size() - bytes.size()));
     return;
   }
+}
+
+void McapReader::Impl::checkSummary(std::span<const std::uint8_t> summary) {
+  std::uint32_t crc = 0;
+  if (summary.size() >= sizeof(crc)) {
+    std::memcpy(&crc, summary.data() + summary.size() - sizeof(crc), sizeof(crc));
+    if (crc == 0 || crc == mcap::crc32(summary.first(summary.size() - sizeof(crc)))) return;
+  }
+  complain("its summary is damaged, its chunks are read without it");
+  schemas.clear();
+  channel_places.clear();
+  channels.clear();
+  summary_is_good = false;
 }
 
 void McapReader::Impl::readTopLevel(std::uint8_t opcode, std::span<const std::uint8_t> fields) {

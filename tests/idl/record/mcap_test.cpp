@@ -141,7 +141,7 @@ TEST_F(McapTest, AFullDiskIsOneSentence) {
 }
 
 TEST_F(McapTest, CutAtAnyByteItGivesAllWholeChunksAndSaysThatItWasCut) {
-  const auto written = record(40);
+  const auto written = record(20);
   const Bytes whole = fileBytes();
   std::size_t before = 0;
   for (std::size_t size = 0; size < whole.size(); ++size) {
@@ -174,9 +174,7 @@ TEST_F(McapTest, AFlippedBitNeverChangesAMessageAndNeverCrashes) {
     auto reader = McapReader::open(file_);
     if (!reader) continue;
     for (const Kept& kept : readAll(*reader)) {
-      const bool known = std::any_of(written.begin(), written.end(), [&](const Kept& one) {
-        return one.data == kept.data && one.sequence == kept.sequence && one.time == kept.time;
-      });
+      const bool known = std::find(written.begin(), written.end(), kept) != written.end();
       ASSERT_TRUE(known) << "round " << round;
     }
   }
