@@ -12,8 +12,7 @@ namespace tenon {
 namespace {
 
 using Cell = BrickLevel::Cell;
-// From a brick's centre to its corner, from a sub-block's centre to its corner [voxels].
-constexpr double kBrickRadius = 6.9283;
+// From a sub-block's centre to its corner [voxels].
 constexpr double kBlockRadius = 1.7321;
 constexpr int kBlock = 3;
 // What fits into 3 GB: bricks of 1,458 bytes, and places in triangle lists of 4.
@@ -197,7 +196,7 @@ bool BrickLevel::sampleDistances(std::span<const Triangle> triangles, ParallelWo
   // bricks whose centre is too far away have no sample in the band
   std::vector<std::uint8_t> candidate(nodes(), 0);
   work.run(nodes(), 1024, [&](std::size_t node) {
-    const double reach = (DistanceField::kBandVoxels + kBrickRadius) * voxel;
+    const double reach = (DistanceField::kBandVoxels + BrickLevel::kBrickRadius) * voxel;
     const Vector3 centre = position(brickOf(node) * kVoxels + Cell::Constant(kVoxels / 2));
     const auto list = near(node);
     candidate[node] = std::any_of(list.begin(), list.end(), [&](std::uint32_t i) {

@@ -24,6 +24,7 @@ class ParallelWork;
 class BrickLevel {
  public:
   static constexpr int kVoxels = DistanceField::kBrickVoxels;
+  static constexpr double kBrickRadius = 6.9283;  ///< [voxels] from a brick's centre to its corner
   static constexpr int kSide = DistanceField::kBrickSide;
   static constexpr int kSamples = DistanceField::kBrickSamples;
   using Cell = Eigen::Vector3i;

@@ -18,7 +18,6 @@ namespace {
 using Cell = BrickLevel::Cell;
 using Entry = DistanceField::Entry;
 constexpr double kMaxBricks = 40e6;  // 250 MB of index, bounds and lists
-constexpr double kBrickRadius = 6.9283;
 constexpr int kCentreSample = (4 * BrickLevel::kSide + 4) * BrickLevel::kSide + 4;
 
 tl::unexpected<Error> tooMuch(double voxel) {
@@ -34,7 +33,7 @@ std::vector<std::uint32_t> bricksToRefine(const BrickLevel& coarse, const BakeOp
     const std::int32_t slot = coarse.slot[node];
     if (slot < 0) continue;
     const double at_centre = coarse.samplesOf(slot)[kCentreSample] / double{DistanceField::kQuantaPerVoxel};
-    if (at_centre >= std::min(kBrickRadius, DistanceField::kClampVoxels)) {
+    if (at_centre >= std::min(BrickLevel::kBrickRadius, DistanceField::kClampVoxels)) {
       // clamped at the centre: the surface is at a corner or not in the brick at all
       const std::int16_t* s = coarse.samplesOf(slot);
       if (*std::min_element(s, s + BrickLevel::kSamples) > DistanceField::kQuantaPerVoxel) continue;
@@ -62,7 +61,7 @@ void finishSamples(BrickLevel& level, const ExposedSurface& surface, ParallelWor
       const double edge = level.voxel * BrickLevel::kVoxels;
       const Vector3 centre =
           level.position(level.brickOf(node) * BrickLevel::kVoxels) + Vector3::Constant(edge / 2);
-      const double reach = (kBrickRadius + DistanceField::kClampVoxels) * level.voxel;
+      const double reach = (BrickLevel::kBrickRadius + DistanceField::kClampVoxels) * level.voxel;
       std::vector<Triangle> local;
       for (const std::uint32_t i : list) {
         for (const Triangle& t : surface.of(i)) {

@@ -112,8 +112,10 @@ class Server final : public SessionServer {
     output.stats.compute_seconds = std::chrono::duration<double>(StopWatch::now() - begin).count();
     exercise_.fill(output);
     output.stats.late_ticks = late_ticks_;
-    const auto oldest = std::max_element(output.ages.begin(), output.ages.end());
-    output.stats.input_age_seconds = oldest == output.ages.end() ? 0.0 : *oldest * kTickSeconds;
+    std::uint32_t oldest = 0;
+    for (std::size_t i = 0; i < output.ages.size(); ++i)
+      if (output.present[i]) oldest = std::max(oldest, output.ages[i]);
+    output.stats.input_age_seconds = oldest * kTickSeconds;
   }
 
   void keep(const TickInput& input, std::uint64_t hash, JournalEntry& entry) const {
@@ -207,12 +209,13 @@ void Server::runByTheClock(const std::atomic<bool>& stop) {
   std::atomic<bool> over = false;
   CyclicThread ticker(std::make_shared<SteadyClock>(), {.name = "tick", .fifo_priority = 70},
                       [&](std::uint64_t) {
+                        if (over) return;  // the last tick is the one that ended it
                         tickByTheClock();
                         if (exercise_.over()) over = true;
                       });
   std::thread scribe([&] {
     while (true) {
-      const bool last_round = over || stop;
+      const bool last_round = over;  // all ticks are made
       for (JournalEntry* entry = entries_.front(); entry != nullptr; entry = entries_.front()) {
         writeJournal(*entry);
         entries_.pop();
