@@ -9,6 +9,8 @@ namespace {
 // Nearer than this one goes straight, whatever an outline says: it is the same opening.
 constexpr double kNear = 0.05;        // [m]
 constexpr double kSameColumn = 0.02;  // [m]
+// What is reached into from above is open there: over its edges, which are no higher than where she works.
+constexpr double kLift = 0.15;  // [m]
 }  // namespace
 
 void ClearWay::begin(std::span<const SceneObject> objects) {
@@ -51,7 +53,8 @@ Waypoints ClearWay::plan(const Vector3& from, const Vector3& to, double margin) 
     blocked = true;
   }
   if (blocked && (to - from).norm() > kNear && (to - from).head<2>().norm() > kSameColumn) {
-    const double z = std::max(top + margin, std::max(from.z(), to.z()));
+    const double higher = std::max(from.z(), to.z());
+    const double z = std::max(higher, std::min(top + margin, higher + kLift));
     way.push_back({from.x(), from.y(), z});
     way.push_back({to.x(), to.y(), z});
   }

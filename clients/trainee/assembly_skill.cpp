@@ -6,25 +6,33 @@
 namespace tenon {
 
 namespace {
-constexpr double kPassBy = 0.03;         // [m] near enough to a point on the way
+constexpr double kPassBy = 0.08;         // [m] near enough to a point on the way
 constexpr double kThere = 0.004;         // [m] near enough to its end
 constexpr double kFacing = 0.02;         // [rad]
-constexpr double kStandOff = 0.12;       // [m] before a thing to be touched she slows down
+constexpr double kStandOff = 0.15;       // [m] before a thing to be touched she slows down
+constexpr double kUpright = 1.9;         // times as high as deep: it is taken from the front, not from above
 constexpr double kTouchForce = 1.5;      // [N]
-constexpr double kTouchSpeed = 0.08;     // [m/s]
+constexpr double kTouchSpeed = 0.06;     // [m/s]
+constexpr double kTouchGain = 0.04;      // [m/s per N]
 constexpr double kPushForce = 5.0;       // [N]
 constexpr double kSearchForce = 3.5;     // [N]
 constexpr double kSeatForce = 4.0;       // [N]
 constexpr double kInsertSpeed = 0.06;    // [m/s]
+constexpr double kFreeSpeed = 0.20;      // [m/s] as long as there is nothing near to push against
+constexpr double kNear = 0.09;           // [m] before the target she expects to meet something
+constexpr double kTiltSeen = 0.04;       // [rad] a tilt that strikes the eye
+constexpr double kTiltRate = 1.5;        // [1/s] at which she turns her hand against it
+constexpr double kMostTurned = 0.3;      // [rad] she turns her hand
 constexpr double kPushGain = 0.012;      // [m/s per N] how quickly a hand gives way or follows
 constexpr double kLongestPush = 0.08;    // [m] the intent goes ahead of the object
 constexpr double kBump = 6.0;            // [N] on the way: she hit something
 constexpr double kSpiralPitch = 0.0008;  // [m]
 constexpr double kSpiralWidest = 0.009;  // [m]
-constexpr double kSpiralSpeed = 0.02;    // [m/s]
+constexpr double kSpiralSpeed = 0.015;   // [m/s]
 constexpr double kTilt = 0.02;           // [rad] of the wiggle
 constexpr double kTiltPace = 8.0;        // [rad/s]
 constexpr double kBackOffWay = 0.03;     // [m]
+constexpr double kLookGain = 2.2;        // [1/s] at which a hand follows the eye
 
 /// A turn of (cos, sin) by a small angle; stays on the circle without trigonometry.
 void turn(Vector3& phasor, double angle) {
@@ -52,11 +60,15 @@ void AssemblySkill::begin(const Pose& X_WH) noexcept {
 double AssemblySkill::contraction() const noexcept {
   switch (phase_) {
     case Phase::kTouch:
-    case Phase::kSearch:
-    case Phase::kSeated:
       return 0.0;
+    case Phase::kSearch:
+      return 1.0;
+    case Phase::kSeated:
+      return task_.by_touch ? 0.5 : 1.0;
     case Phase::kInsert:
-      return task_.sure_of_it ? 0.0 : 0.1;
+      return task_.sure_of_it ? 0.25 : 0.8;
+    case Phase::kAlign:
+      return 0.8;
     default:
       return 0.4;
   }
@@ -98,16 +110,24 @@ void AssemblySkill::goHome(const HandSense& sense, const ClearWay& clear_way) no
   travelTo(X_WHome_, sense, clear_way, 0.1);
 }
 
-void AssemblySkill::touch(const HandSense& sense, const ClearWay& clear_way, ObjectId object,
-                          const Pose& X_WO) noexcept {
+void AssemblySkill::touch(const HandSense& sense, const ClearWay& clear_way, const TouchTask& task) noexcept {
   goal_ = Goal::kTouch;
-  touched_ = object;
-  p_WTouch_ = X_WO.translation();
+  p_WTouch_ = task.X_WO * task.centre;
   probe_ = 0;
-  const Vector3 way = p_WTouch_ - sense.X_WH.translation();
-  const Vector3 before =
-      way.norm() > kStandOff ? Vector3(p_WTouch_ - kStandOff * way.normalized()) : sense.X_WH.translation();
+  const Vector3 size_W = task.X_WO.matrix().cwiseAbs() * task.size;
+  const bool upright = size_W.z() > kUpright * size_W.y();
+  const Vector3 side = upright ? Vector3(-Vector3::UnitY()) : Vector3(Vector3::UnitZ());
+  const Vector3 before = p_WTouch_ + side * (0.5 * side.cwiseAbs().dot(size_W) + kStandOff);
   travelTo({before, Quaternion::Identity()}, sense, clear_way, 0.08);
+  // first to that side of it, so that the hand does not graze it on the way
+  const Vector3 from = sense.X_WH.translation() +
+                       (backing_out_ ? way_[0] - sense.X_WH.translation() : Vector3(Vector3::Zero()));
+  const double level = (before - from).dot(side);
+  if (level > 0.0 && way_.size() < 2) {
+    way_.clear();
+    way_.push_back(from + level * side);
+    way_.push_back(before);
+  }
 }
 
 void AssemblySkill::mount(const HandSense& sense, const ClearWay& clear_way, const MountTask& task) noexcept {
@@ -137,7 +157,7 @@ void AssemblySkill::mount(const HandSense& sense, const ClearWay& clear_way, con
   aim();
   Pose X_WBefore = X_WAim_;
   X_WBefore.translation() -= axis_W_ * task_.approach_distance;
-  travelTo(X_WBefore * sense.X_HO.inverse(), sense, clear_way, task.radius + 0.05);
+  travelTo(X_WBefore * sense.X_HO.inverse(), sense, clear_way, 0.05);
 }
 
 void AssemblySkill::aim() noexcept {
@@ -247,7 +267,7 @@ void AssemblySkill::travel(const HandSense& sense, double dt) noexcept {
 }
 
 void AssemblySkill::touching(const HandSense& sense, double dt) noexcept {
-  pushAlong(kTouchForce, kTouchSpeed, dt);
+  depth_ += dt * std::clamp(kTouchGain * (kTouchForce - felt_), -kTouchSpeed, kTouchSpeed);
   Pose X_WI = reach_.pose();
   X_WI.translation() += axis_W_ * depth_;
   setIntent(X_WI, dt);
@@ -274,8 +294,8 @@ void AssemblySkill::align(const HandSense& sense, const DelayedSight& sight, dou
 
   // look, and lean towards where it should be: slower than a reaction takes
   const Displacement off = displacement(sight.pose(task_.object), X_WBefore);
-  nudge_.translation += 1.2 * dt * off.translation;
-  nudge_.rotation += 1.2 * dt * off.rotation;
+  nudge_.translation += kLookGain * dt * off.translation;
+  nudge_.rotation += kLookGain * dt * off.rotation;
   if (nudge_.translation.norm() > 0.05) nudge_.translation *= 0.05 / nudge_.translation.norm();
   if (nudge_.rotation.norm() > 0.2) nudge_.rotation *= 0.2 / nudge_.rotation.norm();
   const bool there =
@@ -293,8 +313,15 @@ void AssemblySkill::align(const HandSense& sense, const DelayedSight& sight, dou
 }
 
 void AssemblySkill::insert(const HandSense& sense, const DelayedSight& sight, double dt) noexcept {
-  pushAlong(kPushForce, kInsertSpeed, dt);
+  const bool far = depth_ < -kNear && felt_ < 1.0;
+  if (far) {
+    const double ahead = -kNear - depth_;
+    depth_ += dt * std::min({kFreeSpeed, kInsertSpeed + 4.0 * ahead, 0.05 + 0.5 * phase_time_});
+  } else {
+    pushAlong(kPushForce, kInsertSpeed, dt);
+  }
   const double seen = depthSeen(sight);
+  uprightAgain(sight, dt);
   // what does not resist is not pushed beyond where it belongs
   if (felt_ < 0.5) depth_ = std::min(depth_, 0.0);
   depth_ = std::min(depth_, std::min(seen, 0.0) + kLongestPush);
@@ -324,6 +351,7 @@ void AssemblySkill::insert(const HandSense& sense, const DelayedSight& sight, do
 
 void AssemblySkill::search(const HandSense& sense, const DelayedSight& sight, double dt) noexcept {
   pushAlong(kSearchForce, 0.03, dt);
+  uprightAgain(sight, dt);
   depth_ = std::min(depth_, std::min(depthSeen(sight), 0.0) + kLongestPush);
   const double pace = kSpiralSpeed / std::max(0.002, spiral_radius_);
   turn(spiral_, pace * dt);
@@ -391,7 +419,18 @@ void AssemblySkill::yieldTo(const DelayedSight& sight, double rate, double dt) n
   const Displacement off = displacement(X_WAim_, sight.pose(task_.object));
   const double share = std::min(1.0, rate * dt);
   const Vector3 lateral = off.translation - off.translation.dot(axis_W_) * axis_W_;
-  X_WAim_ = displaced(X_WAim_, {share * lateral, share * off.rotation});
+  // what is plainly tilted does not lie as it should, however well it gives way
+  const bool tilted = displacement(task_.X_WG, sight.pose(task_.object)).rotation.norm() > kTiltSeen;
+  X_WAim_ = displaced(X_WAim_,
+                      {share * lateral, tilted ? Vector3(Vector3::Zero()) : Vector3(share * off.rotation)});
+}
+
+void AssemblySkill::uprightAgain(const DelayedSight& sight, double dt) noexcept {
+  if (!sight.knows(task_.object)) return;
+  const Vector3 off = displacement(sight.pose(task_.object), X_WAim_).rotation;
+  const double angle = off.norm();
+  if (angle > kTiltSeen) nudge_.rotation += kTiltRate * dt * (1.0 - kTiltSeen / angle) * off;
+  if (nudge_.rotation.norm() > kMostTurned) nudge_.rotation *= kMostTurned / nudge_.rotation.norm();
 }
 
 void AssemblySkill::pushAlong(double wanted_force, double highest_speed, double dt) noexcept {

@@ -17,9 +17,15 @@ struct MountTask {
   Vector3 approach_W = Vector3::Zero();  ///< unit, or zero for any
   double approach_distance = 0.0;
   double tolerance = 0.002;
-  double radius = 0.1;      ///< [m] of the object: what she keeps away from other things on the way
   bool by_touch = true;     ///< it goes in by contact: she aims roughly; false: by sight, exactly
   bool sure_of_it = false;  ///< aims far beside the target and does not look for the way in
+};
+
+/// What a hand is to touch: as large as it is seen to be.
+struct TouchTask {
+  Pose X_WO;
+  Vector3 size = Vector3::Zero();    ///< of its outline in its own frame
+  Vector3 centre = Vector3::Zero();  ///< of that outline, likewise
 };
 
 /// What one hand of a simulated person can do: rest, touch something and stay in touch, carry something
@@ -38,7 +44,8 @@ class AssemblySkill {
   void begin(const Pose& X_WH) noexcept;
   /// Back out of where the hand is, then to where it began.
   void goHome(const HandSense& sense, const ClearWay& clear_way) noexcept;
-  void touch(const HandSense& sense, const ClearWay& clear_way, ObjectId object, const Pose& X_WO) noexcept;
+  /// Lying things from above, upright ones from the front, near their middle.
+  void touch(const HandSense& sense, const ClearWay& clear_way, const TouchTask& task) noexcept;
   void mount(const HandSense& sense, const ClearWay& clear_way, const MountTask& task) noexcept;
   void step(const HandSense& sense, const DelayedSight& sight, double dt) noexcept;
 
@@ -65,6 +72,7 @@ class AssemblySkill {
   void backOff(const HandSense& sense, const DelayedSight& sight, double dt) noexcept;
   void seated(const HandSense& sense, const DelayedSight& sight, double dt) noexcept;
   void yieldTo(const DelayedSight& sight, double rate, double dt) noexcept;
+  void uprightAgain(const DelayedSight& sight, double dt) noexcept;
   void pushAlong(double wanted_force, double highest_speed, double dt) noexcept;
   void holdObject(const HandSense& sense, const Vector3& beside_W, const Quaternion& tilt,
                   double dt) noexcept;
@@ -77,7 +85,6 @@ class AssemblySkill {
   Phase phase_ = Phase::kRest;
   Goal goal_ = Goal::kHome;
   MountTask task_;
-  ObjectId touched_;
 
   Pose X_WI_;
   Twist intent_velocity_;

@@ -6,7 +6,6 @@ namespace tenon {
 
 namespace {
 constexpr double kReading = 0.4;  // [s] she takes to look at a new instruction
-constexpr double kWidest = 0.4;   // [m] nothing is kept farther away from things than this
 }  // namespace
 
 SimulatedTrainee::SimulatedTrainee(const PersonOptions& person)
@@ -44,7 +43,6 @@ void SimulatedTrainee::read(const StepState& step) {
   for (const SceneObject& object : objects_) {
     if (object.object != step.object) continue;
     instruction_.is_part = object.kind == "part";
-    instruction_.radius = std::min(kWidest, 0.5 * object.size.norm());
   }
   acted_ = false;
   since_read_ = 0.0;
@@ -70,7 +68,14 @@ void SimulatedTrainee::act(const HandSense& right, const HandSense& left) noexce
     return;
   }
   if (instruction_.touch.valid() && sight_.knows(instruction_.touch)) {
-    worker.touch(hand, clear_way_, instruction_.touch, sight_.pose(instruction_.touch));
+    TouchTask task;
+    task.X_WO = sight_.pose(instruction_.touch);
+    for (const SceneObject& object : objects_) {
+      if (object.object != instruction_.touch) continue;
+      task.size = object.size;
+      task.centre = object.centre;
+    }
+    worker.touch(hand, clear_way_, task);
   } else if (instruction_.has_target) {
     // what she is to move is not in her hand yet
     if (hand.object != instruction_.object) return;
@@ -80,7 +85,6 @@ void SimulatedTrainee::act(const HandSense& right, const HandSense& left) noexce
     task.approach_W = instruction_.approach_W;
     task.approach_distance = instruction_.approach_distance;
     task.tolerance = instruction_.tolerance;
-    task.radius = instruction_.radius;
     task.by_touch = instruction_.is_part;
     task.sure_of_it = instruction_.is_part && mounts_ == person_.stubborn_mount;
     if (instruction_.is_part) ++mounts_;

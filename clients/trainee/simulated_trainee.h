@@ -40,7 +40,6 @@ class SimulatedTrainee {
     HandId hand;
     bool has_target = false;
     bool is_part = false;
-    double radius = 0.1;
     Pose X_WG;
     Vector3 approach_W = Vector3::Zero();
     double approach_distance = 0.0;

@@ -15,7 +15,7 @@ namespace {
 enum HandIndex : std::size_t { kRight, kLeft, kForearm, kHead };
 constexpr std::array<const char*, 4> kHandNames{"right", "left", "forearm", "head"};
 // Short of the safety layer's wall, which is nothing to work against.
-constexpr double kComfortableReach = 0.9;
+constexpr double kComfortableReach = 0.94;
 
 /// Where a hand begins: where the thing stands that it moves.
 Vector3 startOf(std::span<const SceneObject> objects, std::string_view kind, const Vector3& otherwise) {

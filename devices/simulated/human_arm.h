@@ -10,16 +10,16 @@ namespace tenon {
 /// people on a HapticMaster (Scientific Reports 8, 2018, srep18004, fig. 3): [published]; the rest is
 /// [assumed].
 struct HumanArmModel {
-  double mass = 0.55;                        ///< [kg] [published]
-  double damping = 6.5;                      ///< [Ns/m] [published]
-  double stiffness = 135.0;                  ///< [N/m] relaxed [published]
-  double stiffness_braced = 500.0;           ///< [N/m] with all muscles tense [assumed]
-  double inertia = 2e-3;                     ///< [kgm2] of the hand about the grip [assumed]
-  double rotational_damping = 0.06;          ///< [Nms/rad] of the wrist [assumed]
-  double rotational_stiffness = 1.5;         ///< [Nm/rad] relaxed [assumed]
-  double rotational_stiffness_braced = 5.0;  ///< [Nm/rad] [assumed]
-  double strength = 120.0;                   ///< [N] it can pull at most [assumed]
-  double rotational_strength = 5.0;          ///< [Nm] it can twist at most [assumed]
+  double mass = 0.55;                         ///< [kg] [published]
+  double damping = 6.5;                       ///< [Ns/m] [published]
+  double stiffness = 135.0;                   ///< [N/m] relaxed [published]
+  double stiffness_braced = 500.0;            ///< [N/m] with all muscles tense [assumed]
+  double inertia = 2e-3;                      ///< [kgm2] of the hand about the grip [assumed]
+  double rotational_damping = 0.06;           ///< [Nms/rad] of the wrist [assumed]
+  double rotational_stiffness = 1.5;          ///< [Nm/rad] relaxed [assumed]
+  double rotational_stiffness_braced = 15.0;  ///< [Nm/rad] the forearm helps the wrist [assumed]
+  double strength = 120.0;                    ///< [N] it can pull at most [assumed]
+  double rotational_strength = 5.0;           ///< [Nm] it can twist at most [assumed]
 };
 
 /// The impedance of an arm in one moment: what pulls a hand at x towards its intent.
