@@ -174,8 +174,8 @@ std::string drawChart(const Chart& chart, double duration, const std::vector<Ban
   if (chart.limit > 0.0) {
     const double y = axes.y(chart.limit);
     svg += fmt::format("<path class=\"limit\" d=\"M{} {:.1f}H{}\"/>", kLeft, y, kRight);
-    svg += fmt::format("<text class=\"limit\" text-anchor=\"end\" x=\"{}\" y=\"{:.1f}\">{}</text>",
-                       kRight - 4.0, y - 4.0, escaped(chart.limit_name));
+    svg += fmt::format("<text class=\"limit\" x=\"{}\" y=\"{:.1f}\">{}</text>", kLeft + 4.0, y - 4.0,
+                       escaped(chart.limit_name));
   }
   return svg + drawHead(chart, axes) + "</svg>\n";
 }

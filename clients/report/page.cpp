@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <map>
 #include <vector>
 
 #include <fmt/format.h>
@@ -86,6 +87,35 @@ const char* markOf(const SessionEvent& event) {
   return nullptr;
 }
 
+/// A safety layer may act many times a second: what follows its like within two seconds is told with it.
+std::vector<SessionEvent> condensed(const std::vector<SessionEvent>& events) {
+  constexpr double kTogether = 2.0;
+  struct Group {
+    std::size_t place = 0;
+    double last = 0.0;
+    int more = 0;
+  };
+  std::vector<SessionEvent> few;
+  std::vector<Group> groups;
+  std::map<std::string, std::size_t> newest;  // group of each kind
+  for (const SessionEvent& event : events) {
+    const bool repeats = event.kind == "safety" || event.kind == "refused";
+    const auto known = newest.find(event.kind);
+    if (repeats && known != newest.end() && event.time - groups[known->second].last < kTogether) {
+      groups[known->second].last = event.time;
+      ++groups[known->second].more;
+      continue;
+    }
+    newest[event.kind] = groups.size();
+    groups.push_back({few.size(), event.time, 0});
+    few.push_back(event);
+  }
+  for (const Group& group : groups)
+    if (group.more > 0)
+      few[group.place].text += fmt::format(" (and {} more until {:.1f} s)", group.more, group.last);
+  return few;
+}
+
 std::string head(const SessionStory& story) {
   const std::string title = escaped(story.title.empty() ? "Session " + story.session : story.title);
   std::string html = fmt::format(
@@ -160,7 +190,7 @@ std::string charts(const SessionStory& story) {
          fmt::format("{}: {:.1f} s, {}", visit.title, visit.end - visit.begin, phaseName(visit.phase))});
   }
   std::vector<Mark> marks;
-  for (const SessionEvent& event : story.events)
+  for (const SessionEvent& event : condensed(story.events))
     if (const char* style = markOf(event))
       marks.push_back({event.time, style, event.kind + ": " + event.text});
 
@@ -209,18 +239,19 @@ std::string machineTable(const SessionStory& story) {
 
 std::string eventTable(const SessionStory& story) {
   constexpr std::size_t kMost = 200;
-  if (story.events.empty()) return "";
+  const std::vector<SessionEvent> events = condensed(story.events);
+  if (events.empty()) return "";
   std::string html = "<h2>What happened</h2>\n<div class=\"card\"><table class=\"events\">\n";
-  for (std::size_t i = 0; i < std::min(kMost, story.events.size()); ++i) {
-    const SessionEvent& event = story.events[i];
+  for (std::size_t i = 0; i < std::min(kMost, events.size()); ++i) {
+    const SessionEvent& event = events[i];
     const char* style = markOf(event);
     html +=
         fmt::format("<tr><td class=\"soft\">{:.1f} s</td><td class=\"{}\">{}</td><td>{}</td></tr>\n",
                     event.time, style == nullptr ? "soft" : style, escaped(event.kind), escaped(event.text));
   }
-  if (story.events.size() > kMost)
+  if (events.size() > kMost)
     html += fmt::format("<tr><td></td><td></td><td class=\"soft\">and {} more, see summary.json</td></tr>\n",
-                        story.events.size() - kMost);
+                        events.size() - kMost);
   return html + "</table></div>\n";
 }
 

@@ -99,7 +99,8 @@ class StoryReader {
     story_.events.push_back({seconds(event.tick), event.severity, event.kind, event.text});
   }
   void hear(const ClientEvent& event) {
-    story_.events.push_back({seconds(now_), Severity::kWarning, event.kind, event.text});
+    const Severity severity = event.kind == "safety" ? Severity::kWarning : Severity::kInfo;
+    story_.events.push_back({seconds(now_), severity, event.kind, event.text});
   }
   void hear(const EmergencyStop& stop) {
     story_.events.push_back(
@@ -369,11 +370,13 @@ Figures StoryReader::figures(double begin, double end) const {
 
 void StoryReader::summarize() {
   story_.whole = figures(0.0, story_.duration);
+  if (!story_.visits.empty()) story_.whole.contact_seconds = 0.0;
   for (StepVisit& visit : story_.visits) {
     visit.figures = figures(visit.begin, visit.end);
     // the server's own count is of the step's object alone, and exact
     const auto counted = contact_seconds_.find(visit.revision);
     if (counted != contact_seconds_.end()) visit.figures.contact_seconds = counted->second;
+    story_.whole.contact_seconds += visit.figures.contact_seconds;
   }
   std::vector<double> values;
   for (const SeriesPoint& point : story_.compute) values.push_back(point.value);

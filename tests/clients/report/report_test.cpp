@@ -135,6 +135,15 @@ TEST_F(ReportTest, TheSummaryForProgramsSaysTheSame) {
   EXPECT_EQ(summary["final_hash"], "000000000000feed");
 }
 
+TEST_F(ReportTest, ASafetyLayerThatActsOftenIsOneLineAndOneMark) {
+  SessionStory story = tell();
+  for (int i = 0; i < 50; ++i)
+    story.events.push_back({3.0 + 0.1 * i, Severity::kWarning, "safety", "acts " + std::to_string(i)});
+  const std::string page = reportPage(story, "");
+  EXPECT_THAT(page, HasSubstr("acts 0 (and 49 more until 7.9 s)"));
+  EXPECT_THAT(page, Not(HasSubstr("acts 1")));
+}
+
 // An hour at 1 kHz in a diagram a thousand columns wide: 3,600 values a column, one of them a spike.
 TEST(Chart, APeakOfOneSampleSurvivesAnHour) {
   Series series;
