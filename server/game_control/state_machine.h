@@ -59,6 +59,8 @@ class StateMachine {
 
   void addTo(StateHash& hash) const noexcept;
   [[nodiscard]] std::vector<std::uint8_t> save() const;
+  /// The same at the end of `bytes`: allocates nothing when there is room.
+  void append(std::vector<std::uint8_t>& bytes) const;
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
 
  private:

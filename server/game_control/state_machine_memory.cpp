@@ -60,13 +60,17 @@ void StateMachine::addTo(StateHash& hash) const noexcept {
 
 std::vector<std::uint8_t> StateMachine::save() const {
   std::vector<std::uint8_t> bytes;
+  append(bytes);
+  return bytes;
+}
+
+void StateMachine::append(std::vector<std::uint8_t>& bytes) const {
   Memory copy = memory_;
   visitMemory(copy, [&bytes](const auto& number) {
     const std::uint64_t word = toWord(number);
     for (unsigned shift = 0; shift < 64; shift += 8)
       bytes.push_back(static_cast<std::uint8_t>(word >> shift));
   });
-  return bytes;
 }
 
 Result<void> StateMachine::restore(std::span<const std::uint8_t> bytes) {

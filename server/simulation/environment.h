@@ -113,6 +113,8 @@ class Environment {
   /// Of all that moves and will matter for the next tick.
   [[nodiscard]] std::uint64_t hash() const noexcept;
   [[nodiscard]] std::vector<std::uint8_t> save() const;
+  /// The same at the end of `bytes`: allocates nothing when there is room.
+  void append(std::vector<std::uint8_t>& bytes) const;
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
 
  private:

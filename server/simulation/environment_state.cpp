@@ -55,13 +55,17 @@ std::uint64_t Environment::hash() const noexcept {
 
 std::vector<std::uint8_t> Environment::save() const {
   std::vector<std::uint8_t> bytes;
+  append(bytes);
+  return bytes;
+}
+
+void Environment::append(std::vector<std::uint8_t>& bytes) const {
   StateWriter writer(bytes);
   writer.number(kStateVersion);
   writer.number(static_cast<std::uint32_t>(objects_.size()));
   writer.number(static_cast<std::uint32_t>(hands_.size()));
   writer.number(static_cast<std::uint32_t>(pairs_.size()));
   archive(writer, *this);
-  return bytes;
 }
 
 Result<void> Environment::restore(std::span<const std::uint8_t> bytes) {
