@@ -45,13 +45,14 @@ struct ServerWire::Writers {
   Out<Guidance> guidance{kGuidance, {}};
   Out<EventLog> event{kEventLog, {}};
   Out<ClockSync> clock{kClockSync, {}};
+  Out<EmergencyStop> stop{kEmergencyStop, {}};
   Out<TickInputPart> input{kTickInput, {}};
   Out<CheckpointPart> checkpoint{kCheckpoint, {}};
 
   auto inLobby() { return std::tie(announce, welcome); }
   auto inSession() {
     return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, object, step, progress,
-                    run, grab, ack, guidance, event, clock, input, checkpoint);
+                    run, grab, ack, guidance, event, clock, stop, input, checkpoint);
   }
 };
 
@@ -116,11 +117,7 @@ Result<void> ServerWire::openReaders() {
   listenTo(session_, kDeviceInput, [this](const DeviceInput& input) { hear(input); });
   listenTo(session_, kCommand, [this](const Command& command) { hear(command); });
   listenTo(session_, kClockSync, [this](const ClockSync& sync) { hear(sync); });
-  listenTo(session_, kEmergencyStop, [this](const EmergencyStop& stop) {
-    desk_.emergencyStop(stop);
-    note(stop.engaged ? Severity::kError : Severity::kInfo, "emergency stop",
-         fmt::format("{} by {}: {}", stop.engaged ? "engaged" : "cleared", stop.who, stop.reason));
-  });
+  listenTo(session_, kEmergencyStop, [this](const EmergencyStop& stop) { hear(stop); });
   const auto take = [this](const Result<Change>& change) {
     if (!change) return refuse(change.error().what);
     intake_.put(*change);
@@ -199,6 +196,16 @@ void ServerWire::hear(const Command& command) {
   if (!ack.accepted)
     note(Severity::kWarning, "refused",
          fmt::format("command of client {}: {}", command.client.value, ack.reason));
+}
+
+/// Whoever stops may leave: the server says it again for late joiners, and hears itself.
+void ServerWire::hear(const EmergencyStop& stop) {
+  if (stop.engaged == stopped_) return;
+  stopped_ = stop.engaged;
+  desk_.emergencyStop(stop);
+  (void)writers_->stop.writer->write(stop);
+  note(stop.engaged ? Severity::kError : Severity::kInfo, "emergency stop",
+       fmt::format("{} by {}: {}", stop.engaged ? "engaged" : "cleared", stop.who, stop.reason));
 }
 
 void ServerWire::hear(const ClockSync& sync) {

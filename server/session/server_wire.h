@@ -72,6 +72,7 @@ class ServerWire {
   void hear(const DeviceInput& input);
   void hear(const Command& command);
   void hear(const ClockSync& sync);
+  void hear(const EmergencyStop& stop);
   void heardGone(const Presence& presence);
   void refuse(const std::string& why);
   void passChanges();
@@ -91,6 +92,7 @@ class ServerWire {
   std::set<std::string> said_;  ///< refusals told once, not a thousand times a second
   std::uint64_t refused_inputs_ = 0;
   bool repeat_wish_ = false;
+  bool stopped_ = false;
   Tick now_ = 0;
   const Outgoing* last_ = nullptr;
 };
