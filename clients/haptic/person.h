@@ -17,7 +17,7 @@ struct PersonOptions {
   double aim_angle_min = 0.0175;  ///< [rad] likewise
   double aim_angle_max = 0.035;   ///< [rad]
   int stubborn_mount = -1;        ///< the n-th mount (from 0) in which she is sure of a wrong place; -1: none
-  double stubborn_offset = 0.022;  ///< [m] beside the target, then
+  double stubborn_offset = 0.024;  ///< [m] beside the target, then
 };
 
 }  // namespace tenon

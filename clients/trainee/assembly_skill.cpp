@@ -6,33 +6,37 @@
 namespace tenon {
 
 namespace {
-constexpr double kPassBy = 0.08;         // [m] near enough to a point on the way
-constexpr double kThere = 0.004;         // [m] near enough to its end
-constexpr double kFacing = 0.02;         // [rad]
-constexpr double kStandOff = 0.15;       // [m] before a thing to be touched she slows down
-constexpr double kUpright = 1.9;         // times as high as deep: it is taken from the front, not from above
-constexpr double kTouchForce = 1.5;      // [N]
-constexpr double kTouchSpeed = 0.06;     // [m/s]
-constexpr double kTouchGain = 0.04;      // [m/s per N]
-constexpr double kPushForce = 5.0;       // [N]
-constexpr double kSearchForce = 3.5;     // [N]
-constexpr double kSeatForce = 4.0;       // [N]
-constexpr double kInsertSpeed = 0.06;    // [m/s]
-constexpr double kFreeSpeed = 0.20;      // [m/s] as long as there is nothing near to push against
-constexpr double kNear = 0.09;           // [m] before the target she expects to meet something
-constexpr double kTiltSeen = 0.04;       // [rad] a tilt that strikes the eye
-constexpr double kTiltRate = 1.5;        // [1/s] at which she turns her hand against it
-constexpr double kMostTurned = 0.3;      // [rad] she turns her hand
-constexpr double kPushGain = 0.012;      // [m/s per N] how quickly a hand gives way or follows
-constexpr double kLongestPush = 0.08;    // [m] the intent goes ahead of the object
-constexpr double kBump = 6.0;            // [N] on the way: she hit something
-constexpr double kSpiralPitch = 0.0008;  // [m]
-constexpr double kSpiralWidest = 0.009;  // [m]
-constexpr double kSpiralSpeed = 0.015;   // [m/s]
-constexpr double kTilt = 0.02;           // [rad] of the wiggle
-constexpr double kTiltPace = 8.0;        // [rad/s]
-constexpr double kBackOffWay = 0.03;     // [m]
-constexpr double kLookGain = 2.2;        // [1/s] at which a hand follows the eye
+constexpr double kPassBy = 0.08;          // [m] near enough to a point on the way
+constexpr double kThere = 0.004;          // [m] near enough to its end
+constexpr double kFacing = 0.02;          // [rad]
+constexpr double kStandOff = 0.15;        // [m] before a thing to be touched she slows down
+constexpr double kUpright = 1.9;          // times as high as deep: it is taken from the front, not from above
+constexpr double kTouchForce = 1.5;       // [N]
+constexpr double kTouchSpeed = 0.06;      // [m/s]
+constexpr double kTouchGain = 0.04;       // [m/s per N]
+constexpr double kPushForce = 5.0;        // [N]
+constexpr double kSearchForce = 3.5;      // [N]
+constexpr double kSeatForce = 4.0;        // [N]
+constexpr double kInsertSpeed = 0.06;     // [m/s]
+constexpr double kFreeSpeed = 0.20;       // [m/s] as long as there is nothing near to push against
+constexpr double kNear = 0.09;            // [m] before the target she expects to meet something
+constexpr double kTiltSeen = 0.04;        // [rad] a tilt that strikes the eye
+constexpr double kTiltRate = 1.5;         // [1/s] at which she turns her hand against it
+constexpr double kMostTurned = 0.3;       // [rad] she turns her hand
+constexpr double kPushGain = 0.012;       // [m/s per N] how quickly a hand gives way or follows
+constexpr double kLongestPush = 0.08;     // [m] the intent goes ahead of the object
+constexpr double kBump = 6.0;             // [N] on the way: she hit something
+constexpr double kSpiralPitch = 0.0008;   // [m]
+constexpr double kSpiralWidest = 0.0065;  // [m]
+constexpr double kSpiralSpeed = 0.015;    // [m/s]
+constexpr double kTilt = 0.012;           // [rad] of the wiggle
+constexpr double kTwist = 0.035;          // [rad] likewise, about the axis: nothing else turns it there
+constexpr double kTiltPace = 7.0;         // [rad/s]
+constexpr double kDip = 0.0005;           // [m] it goes deeper than it stood: the way in is near
+constexpr double kComply = 1.0;           // [1/s] at which a hand that presses takes on how the part lies
+constexpr double kHelped = 0.1;           // [m] between a part's outline and the helper's cube
+constexpr double kBackOffWay = 0.03;      // [m]
+constexpr double kLookGain = 2.2;         // [1/s] at which a hand follows the eye
 
 /// A turn of (cos, sin) by a small angle; stays on the circle without trigonometry.
 void turn(Vector3& phasor, double angle) {
@@ -147,7 +151,7 @@ void AssemblySkill::mount(const HandSense& sense, const ClearWay& clear_way, con
       Vector3(random_.uniform(-1.0, 1.0), random_.uniform(-1.0, 1.0), random_.uniform(-1.0, 1.0));
   const double beside = random_.uniform(person_.aim_error_min, person_.aim_error_max);
   const double turned = random_.uniform(person_.aim_angle_min, person_.aim_angle_max);
-  bias_W_ = direction * (task.sure_of_it ? person_.stubborn_offset : beside);
+  bias_W_ = task.sure_of_it ? Vector3(person_.stubborn_offset * u) : Vector3(direction * beside);
   bias_rotation_W_ = task.sure_of_it || twist.norm() < 1e-3 ? Vector3(Vector3::Zero())
                                                             : Vector3(twist.normalized() * turned);
   if (!task.by_touch) {
@@ -325,7 +329,7 @@ void AssemblySkill::insert(const HandSense& sense, const DelayedSight& sight, do
   // what does not resist is not pushed beyond where it belongs
   if (felt_ < 0.5) depth_ = std::min(depth_, 0.0);
   depth_ = std::min(depth_, std::min(seen, 0.0) + kLongestPush);
-  if (task_.sure_of_it) {
+  if (task_.sure_of_it && helped(sight)) {
     // led by another's hand she goes along
     const Vector3 sideways = sense.F_Ho_W.force + felt_ * axis_W_;
     const Vector3 lateral = sideways - sideways.dot(axis_W_) * axis_W_;
@@ -353,14 +357,17 @@ void AssemblySkill::search(const HandSense& sense, const DelayedSight& sight, do
   pushAlong(kSearchForce, 0.03, dt);
   uprightAgain(sight, dt);
   depth_ = std::min(depth_, std::min(depthSeen(sight), 0.0) + kLongestPush);
-  const double pace = kSpiralSpeed / std::max(0.002, spiral_radius_);
+  const bool near = depthSeen(sight) > search_depth_ + kDip;
+  const double pace = (near ? 0.3 : 1.0) * kSpiralSpeed / std::max(0.002, spiral_radius_);
   turn(spiral_, pace * dt);
   spiral_radius_ += kSpiralPitch * pace * dt / (2.0 * M_PI);
   turn(tilt_, kTiltPace * dt);
+  comply(sight, kComply, dt);
   Vector3 u, v;
   besides(axis_W_, u, v);
   const Vector3 beside = spiral_radius_ * (spiral_.x() * u + spiral_.y() * v);
-  const Quaternion tilt = expRotation(kTilt * (tilt_.x() * u + tilt_.y() * axis_W_));
+  const Quaternion tilt =
+      expRotation(kTilt * tilt_.x() * (spiral_.y() * u - spiral_.x() * v) + kTwist * tilt_.y() * axis_W_);
   holdObject(sense, beside, tilt, dt);
 
   const double seen = depthSeen(sight);
@@ -417,12 +424,25 @@ void AssemblySkill::seated(const HandSense& sense, const DelayedSight& sight, do
 void AssemblySkill::yieldTo(const DelayedSight& sight, double rate, double dt) noexcept {
   if (!sight.knows(task_.object)) return;
   const Displacement off = displacement(X_WAim_, sight.pose(task_.object));
-  const double share = std::min(1.0, rate * dt);
   const Vector3 lateral = off.translation - off.translation.dot(axis_W_) * axis_W_;
+  X_WAim_.translation() += std::min(1.0, rate * dt) * lateral;
+  comply(sight, rate, dt);
+}
+
+void AssemblySkill::comply(const DelayedSight& sight, double rate, double dt) noexcept {
+  if (!sight.knows(task_.object)) return;
+  const Pose& X_WO = sight.pose(task_.object);
   // what is plainly tilted does not lie as it should, however well it gives way
-  const bool tilted = displacement(task_.X_WG, sight.pose(task_.object)).rotation.norm() > kTiltSeen;
-  X_WAim_ = displaced(X_WAim_,
-                      {share * lateral, tilted ? Vector3(Vector3::Zero()) : Vector3(share * off.rotation)});
+  if (displacement(task_.X_WG, X_WO).rotation.norm() > kTiltSeen) return;
+  const Vector3 turned = std::min(1.0, rate * dt) * displacement(X_WAim_, X_WO).rotation;
+  X_WAim_ = displaced(X_WAim_, {Vector3::Zero(), turned});
+}
+
+bool AssemblySkill::helped(const DelayedSight& sight) const noexcept {
+  if (!sight.knows(task_.helper) || !sight.knows(task_.object)) return false;
+  const Vector3 p_OC =
+      sight.pose(task_.object).inverse() * sight.pose(task_.helper).translation() - task_.centre;
+  return (p_OC.cwiseAbs() - 0.5 * task_.size).cwiseMax(0.0).norm() < kHelped;
 }
 
 void AssemblySkill::uprightAgain(const DelayedSight& sight, double dt) noexcept {

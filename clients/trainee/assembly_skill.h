@@ -17,6 +17,9 @@ struct MountTask {
   Vector3 approach_W = Vector3::Zero();  ///< unit, or zero for any
   double approach_distance = 0.0;
   double tolerance = 0.002;
+  Vector3 size = Vector3::Zero();  ///< of the object's outline in its own frame
+  Vector3 centre = Vector3::Zero();
+  ObjectId helper;          ///< the instructor's cube, when there is one
   bool by_touch = true;     ///< it goes in by contact: she aims roughly; false: by sight, exactly
   bool sure_of_it = false;  ///< aims far beside the target and does not look for the way in
 };
@@ -72,6 +75,8 @@ class AssemblySkill {
   void backOff(const HandSense& sense, const DelayedSight& sight, double dt) noexcept;
   void seated(const HandSense& sense, const DelayedSight& sight, double dt) noexcept;
   void yieldTo(const DelayedSight& sight, double rate, double dt) noexcept;
+  void comply(const DelayedSight& sight, double rate, double dt) noexcept;
+  [[nodiscard]] bool helped(const DelayedSight& sight) const noexcept;
   void uprightAgain(const DelayedSight& sight, double dt) noexcept;
   void pushAlong(double wanted_force, double highest_speed, double dt) noexcept;
   void holdObject(const HandSense& sense, const Vector3& beside_W, const Quaternion& tilt,

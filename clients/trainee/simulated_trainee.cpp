@@ -86,6 +86,12 @@ void SimulatedTrainee::act(const HandSense& right, const HandSense& left) noexce
     task.approach_distance = instruction_.approach_distance;
     task.tolerance = instruction_.tolerance;
     task.by_touch = instruction_.is_part;
+    for (const SceneObject& object : objects_) {
+      if (object.kind == "assistant") task.helper = object.object;
+      if (object.object != instruction_.object) continue;
+      task.size = object.size;
+      task.centre = object.centre;
+    }
     task.sure_of_it = instruction_.is_part && mounts_ == person_.stubborn_mount;
     if (instruction_.is_part) ++mounts_;
     worker.mount(hand, clear_way_, task);

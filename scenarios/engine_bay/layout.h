@@ -151,7 +151,7 @@ inline Pose toolPose(const PartLayout& part) {
   Matrix3 R_WD = Matrix3::Identity();
   if (part.approach == Approach::kDown) R_WD << 0, -1, 0, 0, 0, 1, -1, 0, 0;
   if (part.approach == Approach::kAway) R_WD << 0, -1, 0, 1, 0, 0, 0, 0, 1;
-  if (part.approach == Approach::kRight) R_WD << 1, 0, 0, 0, -1, 0, 0, 0, -1;
+  if (part.approach == Approach::kRight) R_WD << 1, 0, 0, 0, 0, 1, 0, -1, 0;
   const Vector3 tip = part.p_WT + part.p_PS - kToolGap * approachDirection(part.approach);
   const Quaternion q_WD(R_WD);
   return {tip - q_WD * kDrillTip, q_WD};
