@@ -31,7 +31,7 @@ def main(files):
                 passed += 1
             elif case.get("status") == "notrun" or case.find("skipped") is not None:
                 skipped.append(f"{name}: {reason(output)}")
-                if not any(pattern.fullmatch(case.get("name")) for pattern in patterns):
+                if not any(pattern.fullmatch(name) for pattern in patterns):
                     forbidden.append(name)
             else:
                 failed.append(name)

@@ -15,8 +15,8 @@ class Faults(unittest.TestCase):
             trainee = stage.start("trainee", "--seed", 1)
             server.wait_for("taken: .*[Pp]eg", 120)
             trainee.signal(signal.SIGKILL)
-            server.wait_for("is gone", 30)
             server.wait_for("what it held is parked", 30)
+            server.wait_for(r"\(trainee\) is gone", 30)
             self.assertIsNone(server.popen.poll(), "the session must go on")
             stage.start("trainee", "--seed", 2)
             server.wait_for("everything is mounted", 180)
@@ -47,7 +47,7 @@ class Faults(unittest.TestCase):
         with Stage(lockstep=False) as stage:
             alone = stage.start("trainee", "--wait", 2)
             self.assertNotEqual(alone.wait(60), 0)
-            self.assertIn("no session", alone.text().lower())
+            self.assertIn("no server announced session", alone.text())
 
     def test_bad_scenarios_name_file_and_line(self):
         cases = {
