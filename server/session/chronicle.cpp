@@ -92,6 +92,12 @@ void Chronicle::readObjects(const TickOutput& output, News& news) {
     const ObjectState* then = before_ ? &before_->objects[i] : nullptr;
     const bool jumped = then == nullptr || then->epoch != now.epoch || then->status != now.status;
     if (jumped || (output.tick + i) % 1000 == 0) news.snapshots.push_back({output.tick, now});
+    const HandId former = then != nullptr ? then->holder : HandId{};
+    if (former != now.holder || (jumped && now.holder.valid())) {
+      GrabState grab{now.object, now.holder, now.epoch, {}, output.tick};
+      if (now.holder.valid()) grab.X_HO = output.manifolds[now.holder.value].X_HO;
+      news.grabs.push_back(grab);
+    }
     if (then == nullptr) continue;
 
     const std::string& title = scenario_->objects[i].title.front().text;
@@ -101,11 +107,6 @@ void Chronicle::readObjects(const TickOutput& output, News& news) {
       const HandId hand = now.holder.valid() ? now.holder : then->holder;
       news.events.push_back(event(Severity::kInfo, now.holder.valid() ? "taken" : "let go",
                                   fmt::format("{} ({} hand)", title, scenario_->hands[hand.value].name)));
-    }
-    if (then->holder != now.holder || (jumped && now.holder.valid())) {
-      GrabState grab{now.object, now.holder, now.epoch, {}, output.tick};
-      if (now.holder.valid()) grab.X_HO = output.manifolds[now.holder.value].X_HO;
-      news.grabs.push_back(grab);
     }
   }
 }
@@ -126,6 +127,13 @@ void Chronicle::readHands(const TickOutput& output, News& news) {
     if (was_frozen && !is_frozen && output.present[i])
       news.events.push_back(event(Severity::kInfo, "hand free", fmt::format("hand '{}' moves again", name)));
   }
+}
+
+bool FramePacker::isListed(const std::vector<WorldFrame>& frames, ObjectId object) {
+  return std::any_of(frames.begin(), frames.end(), [&](const WorldFrame& frame) {
+    return std::any_of(frame.states.begin(), frame.states.end(),
+                       [&](const ObjectState& state) { return state.object == object; });
+  });
 }
 
 void FramePacker::pack(const TickOutput& output, bool all, std::vector<WorldFrame>& frames) {
@@ -150,15 +158,16 @@ void FramePacker::pack(const TickOutput& output, bool all, std::vector<WorldFram
   for (std::size_t i = 0; i < count; ++i)
     if (all || epochs_[i] != output.objects[i].epoch || !(poses_[i] == output.objects[i].X_WO)) add(i);
 
-  // the refresh: those that stand still, in turn, as far as the last frame has room
-  for (std::size_t k = 0; !all && k < count && !frames.empty() && !frames.back().states.full(); ++k) {
+  // the refresh: of those that stand still one in turn, and more as far as a frame of moving ones has room
+  const bool nothing_moved = frames.empty();
+  bool refreshed = false;
+  for (std::size_t k = 0; !all && k < count; ++k) {
+    if (refreshed && (nothing_moved || frames.back().states.full())) break;
     turn_ = (turn_ + 1) % static_cast<std::uint32_t>(count);
-    const auto& states = frames.back().states;
-    const bool listed = std::any_of(states.begin(), states.end(),
-                                    [&](const ObjectState& state) { return state.object.value == turn_; });
-    if (!listed) add(turn_);
+    if (isListed(frames, ObjectId{turn_})) continue;
+    add(turn_);
+    refreshed = true;
   }
-  if (frames.empty()) add(turn_ = (turn_ + 1) % static_cast<std::uint32_t>(count));
   for (WorldFrame& frame : frames) frame.parts = static_cast<std::uint32_t>(frames.size());
 }
 

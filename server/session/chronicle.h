@@ -57,6 +57,8 @@ class FramePacker {
   void pack(const TickOutput& output, bool all, std::vector<WorldFrame>& frames);
 
  private:
+  [[nodiscard]] static bool isListed(const std::vector<WorldFrame>& frames, ObjectId object);
+
   std::uint32_t server_epoch_;
   std::vector<std::uint32_t> epochs_;
   std::vector<Pose> poses_;

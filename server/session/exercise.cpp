@@ -1,6 +1,7 @@
 #include "server/session/exercise.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "idl/types/bytes.h"
 
@@ -16,15 +17,16 @@ Exercise::Exercise(std::shared_ptr<const ScenarioFile> scenario, std::shared_ptr
       ages_(environment_.hands().size()) {}
 
 void Exercise::tick(const TickInput& input) noexcept {
-  game_.clear();
   for (const Change& change : input.changes) apply(change);
   read(input);
   judgeAges();
-  if (phase_ == RunPhase::kRunning) {
+  if (phase_ == RunPhase::kRunning && !emergency_stop_) {
     machine_.step(environment_, {game_.begin(), game_.size()});
     if (machine_.status().finished) phase_ = RunPhase::kSucceeded;
     if (machine_.status().failed) phase_ = RunPhase::kFailed;
   }
+  // what is commanded while all stand still is done when they go on
+  if (!standsStill()) game_.clear();
   beginWhenAllAreHere();
   environment_.step();
 }
@@ -42,14 +44,13 @@ void Exercise::apply(const Change& change) noexcept {
       return environment_.release(change.hand);
     case ChangeKind::kPair:
       return environment_.setPairEnabled(change.index, change.value != 0.0);
-    case ChangeKind::kSwapHands:
-      return environment_.swapHands(change.hand, HandId{change.index});
     case ChangeKind::kHalt:
       emergency_stop_ = change.value != 0.0;
       return;
     case ChangeKind::kContribute:
       return environment_.contribute(change.object, change.index, change.F_Oo_W, change.lifetime_ticks);
     case ChangeKind::kPlace:
+      if (change.object.value >= environment_.objects().size()) return;
       return environment_.place(change.object, change.X_WO,
                                 environment_.objects()[change.object.value].status);
     case ChangeKind::kPause:
@@ -65,10 +66,12 @@ void Exercise::apply(const Change& change) noexcept {
 }
 
 void Exercise::attach(HandId hand) noexcept {
+  if (hand.value >= ages_.size()) return;
   ages_[hand.value] = {.attached = true, .active = true, .age = 0, .seq = 0};
 }
 
 void Exercise::detach(HandId hand) noexcept {
+  if (hand.value >= ages_.size()) return;
   ages_[hand.value] = {};
   environment_.setHandPresent(hand, false);
 }
@@ -76,6 +79,7 @@ void Exercise::detach(HandId hand) noexcept {
 void Exercise::read(const TickInput& input) noexcept {
   for (HandAge& age : ages_) ++age.age;
   for (const HandReading& reading : input.readings) {
+    if (reading.hand.value >= ages_.size()) continue;
     HandAge& age = ages_[reading.hand.value];
     if (!age.attached) continue;
     age.age = 0;
@@ -87,12 +91,11 @@ void Exercise::read(const TickInput& input) noexcept {
 }
 
 void Exercise::judgeAges() noexcept {
-  const bool stands_still = emergency_stop_ || phase_ == RunPhase::kPaused;
   for (std::uint32_t i = 0; i < ages_.size(); ++i) {
     const HandAge& age = ages_[i];
     if (!age.attached) continue;
     if (age.age == limits_.park) environment_.setHandPresent(HandId{i}, false);
-    environment_.setHandFrozen(HandId{i}, stands_still || !age.active || age.age > limits_.freeze);
+    environment_.setHandFrozen(HandId{i}, standsStill() || !age.active || age.age > limits_.freeze);
   }
 }
 
@@ -113,6 +116,12 @@ std::uint64_t Exercise::hash() const noexcept {
     hash.add(age.age);
   }
   hash.add(std::uint64_t{static_cast<std::uint32_t>(phase_)} | std::uint64_t{emergency_stop_} << 32U);
+  for (const GameCommand& command : game_) {
+    hash.add(std::uint64_t{static_cast<std::uint32_t>(command.kind)} | std::uint64_t{command.hand.value}
+                                                                           << 32U);
+    hash.add(std::uint64_t{command.signal});
+    hash.add(command.value);
+  }
   return hash.value();
 }
 
@@ -168,17 +177,24 @@ void Exercise::fill(TickOutput& output) const noexcept {
 
 void Exercise::save(std::vector<std::uint8_t>& bytes) const {
   ByteWriter out(bytes);
-  const auto part = [&](const std::vector<std::uint8_t>& saved) {
-    out.put(static_cast<std::uint32_t>(saved.size()));
-    bytes.insert(bytes.end(), saved.begin(), saved.end());
+  // a part says its size first: known only once it is written
+  const auto part = [&](const auto& saved) {
+    const std::size_t at = bytes.size();
+    out.put(std::uint32_t{0});
+    saved.append(bytes);
+    const auto size = static_cast<std::uint32_t>(bytes.size() - at - sizeof(std::uint32_t));
+    std::memcpy(bytes.data() + at, &size, sizeof(size));
   };
   out.put(phase_), out.put(emergency_stop_);
   out.put(static_cast<std::uint32_t>(needed_hands_.size()));
   for (const HandId hand : needed_hands_) out.put(hand);
   for (const HandAge& age : ages_)
     out.put(age.attached), out.put(age.active), out.put(age.age), out.put(age.seq);
-  part(environment_.save());
-  part(machine_.save());
+  out.put(static_cast<std::uint32_t>(game_.size()));
+  for (const GameCommand& command : game_)
+    out.put(command.kind), out.put(command.hand), out.put(command.signal), out.put(command.value);
+  part(environment_);
+  part(machine_);
 }
 
 Result<void> Exercise::restore(std::span<const std::uint8_t> bytes) {
@@ -188,8 +204,17 @@ Result<void> Exercise::restore(std::span<const std::uint8_t> bytes) {
   in.get(needed);
   if (needed > ages_.size()) return fail("a checkpoint in the journal is of another scenario");
   needed_hands_.resize(needed);
-  for (HandId& hand : needed_hands_) in.get(hand);
+  for (HandId& hand : needed_hands_) {
+    in.get(hand);
+    if (hand.value >= ages_.size()) return fail("a checkpoint in the journal is of another scenario");
+  }
   for (HandAge& age : ages_) in.get(age.attached), in.get(age.active), in.get(age.age), in.get(age.seq);
+  std::uint32_t commands = 0;
+  in.get(commands);
+  if (commands > kMaxChanges) return fail("a checkpoint in the journal is damaged");
+  game_.resize(commands);
+  for (GameCommand& command : game_)
+    in.get(command.kind), in.get(command.hand), in.get(command.signal), in.get(command.value);
   const auto part = [&](auto&& restoreFrom) -> Result<void> {
     std::uint32_t size = 0;
     in.get(size);

@@ -63,6 +63,7 @@ class Exercise {
   void read(const TickInput& input) noexcept;
   void judgeAges() noexcept;
   void beginWhenAllAreHere() noexcept;
+  [[nodiscard]] bool standsStill() const { return emergency_stop_ || phase_ == RunPhase::kPaused; }
   void attach(HandId hand) noexcept;
   void detach(HandId hand) noexcept;
 
@@ -72,7 +73,7 @@ class Exercise {
   LinkLimits limits_;
   std::vector<HandId> needed_hands_;
   std::vector<HandAge> ages_;
-  FixedVector<GameCommand, kMaxChanges> game_;
+  FixedVector<GameCommand, kMaxChanges> game_;  ///< to be obeyed by the next step of the state machine
   RunPhase phase_ = RunPhase::kWaitingForPeople;
   bool emergency_stop_ = false;
 };

@@ -15,7 +15,7 @@ constexpr std::uint32_t kLongestLifetime = 100;
 
 bool isSane(const Pose& X) {
   return X.isFinite() && X.translation().cwiseAbs().maxCoeff() < kFarthest &&
-         std::abs(X.rotation().norm() - 1.0) < 1e-3;
+         std::abs(X.rotation().squaredNorm() - 1.0) < 1e-3;
 }
 
 bool isSane(const Vector3& v, double limit) { return v.allFinite() && v.norm() < limit; }
@@ -72,6 +72,7 @@ std::string FrontDesk::refusal(const Join& join) const {
     return fmt::format("this server speaks protocol version {}, the client {}: update the older one",
                        kProtocolVersion, join.protocol_version);
   if (join.role > Role::kRecorder) return "unknown role";
+  if (join.client_guid.empty()) return "a client needs a name of its own (client_guid) to be answered";
   for (const std::string& name : join.hands) {
     const HandId hand = scenario_.handNamed(name);
     if (!hand.valid()) continue;  // a station may offer more hands than a scenario uses
@@ -93,7 +94,8 @@ Welcome FrontDesk::join(const Join& join, Tick now) {
 
   // the same question again, because the answer was lost: the same answer
   for (const Seat& seat : seats_)
-    if (seat.guid == join.client_guid && person(seat.welcome.client)->alive) return seat.welcome;
+    if (!seat.guid.empty() && seat.guid == join.client_guid && person(seat.welcome.client)->alive)
+      return seat.welcome;
 
   // somebody comes back
   for (std::size_t i = 0; i < seats_.size(); ++i) {
@@ -215,6 +217,16 @@ int FrontDesk::pairNamed(std::string_view a, std::string_view b) const {
   return object_a.valid() && object_b.valid() ? scenario_.pairOf(object_a, object_b) : -1;
 }
 
+/// Every hand that feels what it moves, of the trainee.
+bool FrontDesk::movesBothHands(ClientId client) const {
+  for (std::uint32_t i = 0; i < movers_.size(); ++i) {
+    const ScenarioHand& hand = scenario_.hands[i];
+    const bool swaps = hand.role == Role::kTrainee && hand.kind == HandKind::kCoupled;
+    if (swaps && !isMover(client, HandId{i})) return false;
+  }
+  return true;
+}
+
 Result<Change> FrontDesk::changeFor(const Command& command, Role role) const {
   const auto not_for = [&] {
     return fail(fmt::format("not for the {}: ask the instructor", roleName(role)));
@@ -237,15 +249,9 @@ Result<Change> FrontDesk::changeFor(const Command& command, Role role) const {
       if (!isTeacher(role) && !isMover(command.client, command.hand)) return fail("that is not your hand");
       if (command.hand.value >= movers_.size()) return fail("there is no such hand");
       return Change{.kind = ChangeKind::kRelease, .hand = command.hand};
-    case CommandKind::kSwapHands: {
-      const auto other = static_cast<std::uint32_t>(command.value);
-      if (command.value < 0.0 || other >= movers_.size() || command.hand.value >= movers_.size())
-        return fail("there is no such hand");
-      if (!isTeacher(role) &&
-          (!isMover(command.client, command.hand) || !isMover(command.client, HandId{other})))
-        return fail("those are not your hands");
-      return Change{.kind = ChangeKind::kSwapHands, .hand = command.hand, .index = other};
-    }
+    case CommandKind::kSwapHands:
+      if (!isTeacher(role) && !movesBothHands(command.client)) return fail("those are not your hands");
+      return game();
     default:
       break;
   }

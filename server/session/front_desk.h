@@ -52,6 +52,7 @@ class FrontDesk {
   void seat(const Join& join, Welcome& welcome);
   [[nodiscard]] Result<Change> changeFor(const Command& command, Role role) const;
   [[nodiscard]] int pairNamed(std::string_view a, std::string_view b) const;
+  [[nodiscard]] bool movesBothHands(ClientId client) const;
   [[nodiscard]] bool isMover(ClientId client, HandId hand) const;
 
   const ScenarioFile& scenario_;

@@ -140,11 +140,12 @@ Result<RerunReport> rerun(const std::filesystem::path& file, Exercise& exercise)
   while (reader->next(message))
     if (auto read = rerunner.read(message); !read)
       return fail(fmt::format("{}: {}", file.string(), read.error().what));
-  if (rerunner.report().compared == 0)
-    return fail(
-        fmt::format("{}: holds no ticks to run again (was it recorded by 'tenon record' or 'tenon serve'?)",
-                    file.string()));
-  return rerunner.report();
+  RerunReport report = rerunner.report();
+  report.problem = reader->problem();
+  if (report.compared > 0) return report;
+  return fail(fmt::format("{}: holds no ticks to run again{}", file.string(),
+                          report.problem.empty() ? " (was it recorded by 'tenon record' or 'tenon serve'?)"
+                                                 : ": " + report.problem));
 }
 
 Result<JournalOrigin> originOf(const std::filesystem::path& file) {

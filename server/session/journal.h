@@ -72,6 +72,7 @@ struct RerunReport {
   std::uint64_t gaps = 0;  ///< places where ticks were missing: taken up again at the next checkpoint
   std::uint64_t final_hash = 0;
   std::optional<Tick> first_difference;
+  std::string problem;  ///< what was wrong with the file, or empty
 };
 
 /// Runs the ticks of a journal or recording again, from its first checkpoint on, and compares the hash of

@@ -3,8 +3,8 @@
 #include <cstdlib>
 #include <vector>
 
-#include <fmt/format.h>
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -34,8 +34,7 @@ Result<void> run(const std::vector<std::string>& words) {
   pid_t child = 0;
   const int started = posix_spawn(&child, argv[0], &silent, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&silent);
-  if (started != 0)
-    return fail(fmt::format("cannot start {}: is the installation complete?", words[0]));
+  if (started != 0) return fail(fmt::format("cannot start {}: is the installation complete?", words[0]));
   int status = 0;
   if (waitpid(child, &status, 0) != child || !WIFEXITED(status) || WEXITSTATUS(status) != 0)
     return fail(fmt::format("{} did not finish its work", words[0]));
@@ -56,8 +55,8 @@ Result<fs::path> generatedParts(const ScenarioFile& scenario, const LoadOptions&
   const fs::path making = folder.string() + fmt::format(".{}", getpid());
   fs::create_directories(making, error);
   if (error) return fail(fmt::format("{}: cannot make this folder ({})", making.string(), error.message()));
-  const auto done = run({program.string(), scenario.name, making.string(), "--detail",
-                         fmt::format("{}", options.detail)});
+  const auto done =
+      run({program.string(), scenario.name, making.string(), "--detail", fmt::format("{}", options.detail)});
   if (!done) return fail(done.error().what);
   fs::remove_all(folder, error);
   fs::rename(making, folder, error);

@@ -29,10 +29,9 @@ enum class ChangeKind : std::uint8_t {
   kPair,     ///< switch pair number `index` on or off (value)
   kPause,
   kResume,
-  kSwapHands,      ///< the hands `hand` and `index` trade what they move
-  kHalt,           ///< emergency stop: value 1 engages, 0 clears
-  kContribute,     ///< a force from outside on `object`
-  kPlace,          ///< an outside tracker says where `object` is
+  kHalt,        ///< emergency stop: value 1 engages, 0 clears
+  kContribute,  ///< a force from outside on `object`
+  kPlace,       ///< an outside tracker says where `object` is
   kStop,
 };
 
