@@ -11,12 +11,13 @@ constexpr double kThere = 0.004;          // [m] near enough to its end
 constexpr double kFacing = 0.02;          // [rad]
 constexpr double kStandOff = 0.15;        // [m] before a thing to be touched she slows down
 constexpr double kUpright = 1.9;          // times as high as deep: it is taken from the front, not from above
-constexpr double kTouchForce = 1.5;       // [N]
+constexpr double kTouchForce = 1.0;       // [N]
 constexpr double kTouchSpeed = 0.06;      // [m/s]
 constexpr double kTouchGain = 0.04;       // [m/s per N]
 constexpr double kPushForce = 5.0;        // [N]
 constexpr double kSearchForce = 3.5;      // [N]
-constexpr double kSeatForce = 4.0;        // [N]
+constexpr double kSeatForce = 2.0;        // [N]
+constexpr double kSeatNear = 0.008;       // [m] before the target she pushes no harder than that
 constexpr double kInsertSpeed = 0.06;     // [m/s]
 constexpr double kFreeSpeed = 0.20;       // [m/s] as long as there is nothing near to push against
 constexpr double kNear = 0.09;            // [m] before the target she expects to meet something
@@ -317,14 +318,15 @@ void AssemblySkill::align(const HandSense& sense, const DelayedSight& sight, dou
 }
 
 void AssemblySkill::insert(const HandSense& sense, const DelayedSight& sight, double dt) noexcept {
+  const double seen = depthSeen(sight);
+  const double force = seen > -kSeatNear ? kSeatForce : kPushForce;
   const bool far = depth_ < -kNear && felt_ < 1.0;
   if (far) {
     const double ahead = -kNear - depth_;
     depth_ += dt * std::min({kFreeSpeed, kInsertSpeed + 4.0 * ahead, 0.05 + 0.5 * phase_time_});
   } else {
-    pushAlong(kPushForce, kInsertSpeed, dt);
+    pushAlong(force, kInsertSpeed, dt);
   }
-  const double seen = depthSeen(sight);
   uprightAgain(sight, dt);
   // what does not resist is not pushed beyond where it belongs
   if (felt_ < 0.5) depth_ = std::min(depth_, 0.0);
@@ -345,7 +347,7 @@ void AssemblySkill::insert(const HandSense& sense, const DelayedSight& sight, do
     enter(Phase::kSeated);
     return;
   }
-  if (felt_ < 0.6 * kPushForce || task_.sure_of_it || !stalled(sight, 0.001)) return;
+  if (felt_ < 0.6 * force || task_.sure_of_it || !stalled(sight, 0.001)) return;
   search_depth_ = seen;
   spiral_radius_ = 0.0;
   spiral_ = Vector3::UnitX();
