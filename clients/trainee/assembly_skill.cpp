@@ -13,7 +13,7 @@ constexpr double kStandOff = 0.15;        // [m] before a thing to be touched sh
 constexpr double kUpright = 1.9;          // times as high as deep: it is taken from the front, not from above
 constexpr double kTouchForce = 1.0;       // [N]
 constexpr double kTouchSpeed = 0.06;      // [m/s]
-constexpr double kTouchGain = 0.04;       // [m/s per N]
+constexpr double kTouchGain = 0.06;       // [m/s per N]
 constexpr double kPushForce = 5.0;        // [N]
 constexpr double kSearchForce = 3.5;      // [N]
 constexpr double kSeatForce = 2.0;        // [N]
@@ -197,6 +197,7 @@ void AssemblySkill::step(const HandSense& sense, const DelayedSight& sight, doub
   felt_ += dt / (0.03 + dt) * (against - felt_);
   carry_.translation = faded(carry_.translation, dt, 0.3);
   carry_.rotation = faded(carry_.rotation, dt, 0.3);
+  letGoOfMounted(sense);
   switch (phase_) {
     case Phase::kRest:
       setIntent(reach_.pose(), dt);
@@ -223,6 +224,16 @@ void AssemblySkill::step(const HandSense& sense, const DelayedSight& sight, doub
       seated(sense, sight, dt);
       break;
   }
+}
+
+/// What is in its place has left the hand: it goes limp where it is, before it withdraws.
+void AssemblySkill::letGoOfMounted(const HandSense& sense) noexcept {
+  const bool holding = phase_ == Phase::kAlign || phase_ == Phase::kInsert || phase_ == Phase::kSearch ||
+                       phase_ == Phase::kBackOff || phase_ == Phase::kSeated;
+  if (!holding || sense.object == task_.object) return;
+  back_out_W_ = -axis_W_ * std::max(0.15, task_.approach_distance);
+  reach_.start(sense.X_WH);
+  enter(Phase::kRest);
 }
 
 void AssemblySkill::travel(const HandSense& sense, double dt) noexcept {

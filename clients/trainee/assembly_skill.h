@@ -67,6 +67,7 @@ class AssemblySkill {
                 double margin) noexcept;
   void enter(Phase phase) noexcept;
   void aim() noexcept;
+  void letGoOfMounted(const HandSense& sense) noexcept;
   void travel(const HandSense& sense, double dt) noexcept;
   void touching(const HandSense& sense, double dt) noexcept;
   void align(const HandSense& sense, const DelayedSight& sight, double dt) noexcept;
