@@ -43,7 +43,7 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "the n-th mount (from 0) that the trainee aims at a wrong place");
   app.add_flag("--no-instructor", arguments.alone, "the trainee is alone");
   app.add_flag("--no-collisions", arguments.no_collisions,
-               "nothing touches anything: the same people try the same");
+               "nothing touches the scene: the same people try the same");
   app.add_flag("--follow", arguments.follow, "print twice a second what the trainee does and how far it is");
   app.add_flag("--quiet", arguments.quiet, "print the outcome only");
   app.footer("Exit code: 0 when everything was mounted, 1 otherwise. Last line: the final state hash.");
@@ -60,7 +60,8 @@ void followTrainee(Arguments& arguments, const tenon::TraineeStation& trainee) {
     if (output.tick % 500 != 0) return;
     double force = 0.0;
     double depth = 0.0;
-    for (const tenon::HandManifold& hand : output.manifolds) force = std::max(force, hand.F_Ho_W.force.norm());
+    for (const tenon::HandManifold& hand : output.manifolds)
+      force = std::max(force, hand.F_Ho_W.force.norm());
     for (const tenon::PairContact& pair : output.pairs) depth = std::max(depth, pair.depth);
     std::printf("%8.3f s  %-22s %7.1f mm %6.2f deg  force %5.1f N  contact %5.2f s  depth %.2f mm\n",
                 static_cast<double>(output.tick) * tenon::kTickSeconds, trainee.doing(),

@@ -32,8 +32,7 @@ class Rehearsal {
     for (std::size_t i = 0; i < stations_.size(); ++i)
       if (auto seated = seat(i); !seated) return fail(seated.error().what);
     desk_.takeChanges(input_.changes);
-    for (std::size_t i = 0; !options_.collisions && i < exercise_.environment().pairs().size(); ++i)
-      ++switched_off_;
+    if (!options_.collisions) listScenePairs();
     const auto last = static_cast<Tick>(options_.seconds / kTickSeconds);
     while (!exercise_.over() && exercise_.now() < last) tick();
     RehearsalReport report;
@@ -82,10 +81,17 @@ class Rehearsal {
     input_.changes.clear();
   }
 
+  void listScenePairs() {
+    const Scene& scene = exercise_.environment().scene();
+    const auto isScene = [&](ObjectId id) { return scene.objects[id.value].kind == "scene"; };
+    for (std::uint32_t i = 0; i < scene.pairs.size(); ++i)
+      if (isScene(scene.pairs[i].a) || isScene(scene.pairs[i].b)) to_switch_off_.push_back(i);
+  }
+
   void switchOffCollisions() {
-    while (switched_off_ > 0 && !input_.changes.full()) {
-      --switched_off_;
-      input_.changes.push_back({.kind = ChangeKind::kPair, .index = switched_off_, .value = 0.0});
+    while (!to_switch_off_.empty() && !input_.changes.full()) {
+      input_.changes.push_back({.kind = ChangeKind::kPair, .index = to_switch_off_.back(), .value = 0.0});
+      to_switch_off_.pop_back();
     }
   }
 
@@ -110,7 +116,7 @@ class Rehearsal {
   TickInput input_;
   TickOutput output_;
   std::string reason_;
-  std::uint32_t switched_off_ = 0;
+  std::vector<std::uint32_t> to_switch_off_;
 };
 
 }  // namespace

@@ -17,7 +17,7 @@ struct RehearsalOptions {
   std::uint64_t seed = 1;
   unsigned workers = 1;
   double seconds = 600.0;  ///< of session time, at most
-  bool collisions = true;  ///< false: nothing touches anything, the same people try the same
+  bool collisions = true;  ///< false: nothing touches the scene, the same people try the same
   std::function<void(const EventLog&)> heard;
   std::function<void(const TickInput&, const TickOutput&)> ticked;
 };
