@@ -1,13 +1,13 @@
 """A session between real processes: lockstep over DDS does to the bit what one process does, and re-runs to it."""
 import unittest
 
-from stage import Stage, final_hash, tenon
+from stage import SOURCE, Stage, final_hash, tenon
 
 SCENARIO = "peg_and_box"
 
 
 def rehearse(*words):
-    done = tenon("rehearse", f"scenarios/{SCENARIO}", "--seed", 1, "--no-instructor", *words)
+    done = tenon("rehearse", SOURCE / "scenarios" / SCENARIO, "--seed", 1, "--no-instructor", *words)
     return done, final_hash(done.stdout)
 
 
@@ -37,7 +37,7 @@ class Session(unittest.TestCase):
             over_dds = final_hash(server.text())
             self.assertEqual(over_dds, rehearse()[1])
             for file in (journal, recording):
-                again = tenon("rerun", file, f"scenarios/{SCENARIO}")
+                again = tenon("rerun", file, SOURCE / "scenarios" / SCENARIO)
                 self.assertEqual(again.returncode, 0, again.stdout + again.stderr)
                 self.assertEqual(final_hash(again.stdout), over_dds)
 
