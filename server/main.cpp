@@ -74,6 +74,7 @@ int runAgain(const Arguments& arguments, const tenon::LoadedScene& loaded) {
   if (!report) return complain(report.error().what);
   sayOn(fmt::format("ticks {} to {}: {} compared, {} gaps", report->first, report->last, report->compared,
                     report->gaps));
+  if (!report->problem.empty()) sayOn(report->problem);
   if (report->first_difference) {
     sayOn(fmt::format("first difference: tick {}", *report->first_difference));
     return 1;
