@@ -156,6 +156,38 @@ TEST_F(HandsTest, APartHeldByTwoIsHeldByTheOtherWhenOneLetsGo) {
   EXPECT_EQ(object(part_).status, ObjectStatus::kHeld);
 }
 
+//   left o--[part]--o right      1000 N/m and 20 Nm/rad in each hand
+class TwoHandsTest : public HandsTest {
+ protected:
+  TwoHandsTest() {
+    enter(*environment_, right_, {0.1, 0.05, 0.0});
+    enter(*environment_, left_, {0.1, -0.05, 0.0});
+    environment_->grab(left_, part_);
+    environment_->grab(right_, part_);
+    environment_->step();
+  }
+};
+
+TEST_F(TwoHandsTest, APartHeldByTwoIsTwiceAsStiff) {
+  constexpr std::uint32_t kLifetime = 200;
+  for (int tick = 0; tick < 200; ++tick) {
+    environment_->contribute(part_, 1, {Vector3(10.0, 0.0, 0.0), Vector3::Zero()}, kLifetime);
+    environment_->step();
+  }
+  const double force = 10.0 * (1.0 - 1.0 / kLifetime);  // a contribution is one tick old when it counts
+  EXPECT_NEAR(object(part_).X_WO.translation().x() - 0.1, force / 2000.0, 1e-6);
+  EXPECT_NEAR(hand(right_).F_Ho_W.force.x(), 0.5 * force, 1e-3);
+  EXPECT_NEAR(hand(left_).F_Ho_W.force.x(), 0.5 * force, 1e-3);
+}
+
+TEST_F(TwoHandsTest, EachHandFeelsTheOtherPull) {
+  moveTo(*environment_, right_, {0.1, 0.06, 0.0}, 100);
+  stay(*environment_, 100);
+  EXPECT_NEAR(object(part_).X_WO.translation().y(), 0.005, 1e-6);
+  EXPECT_NEAR(hand(right_).F_Ho_W.force.y(), -5.0, 1e-3);
+  EXPECT_NEAR(hand(left_).F_Ho_W.force.y(), 5.0, 1e-3);
+}
+
 TEST_F(HandsTest, SwappedHandsExchangeTheirObjectsAndKeepThemForGood) {
   enter(*environment_, right_, {0.0, 0.0, 0.3});
   enter(*environment_, left_, {0.0, 0.2, 0.3});
