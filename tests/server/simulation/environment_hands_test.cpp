@@ -188,6 +188,21 @@ TEST_F(TwoHandsTest, EachHandFeelsTheOtherPull) {
   EXPECT_NEAR(hand(left_).F_Ho_W.force.y(), 5.0, 1e-3);
 }
 
+TEST_F(TwoHandsTest, WhenOneLetsGoThePartKeepsItsEpochAndTheForceOnTheOtherFallsByStepsOfANewton) {
+  moveTo(*environment_, right_, {0.1, 0.06, 0.0}, 100);
+  stay(*environment_, 100);
+  const std::uint32_t epoch = object(part_).epoch;
+  environment_->release(right_);
+  constexpr double kLargestStep = 1.0;  // [N] 1000 N/m over the way of a tick at 1 m/s
+  for (int tick = 0; tick < 50; ++tick) {
+    const Vector3 force = hand(left_).F_Ho_W.force;
+    environment_->step();
+    EXPECT_LE((hand(left_).F_Ho_W.force - force).norm(), kLargestStep + 1e-6);
+  }
+  EXPECT_EQ(object(part_).epoch, epoch);
+  EXPECT_NEAR(hand(left_).F_Ho_W.force.norm(), 0.0, 1e-3);
+}
+
 TEST_F(HandsTest, SwappedHandsExchangeTheirObjectsAndKeepThemForGood) {
   enter(*environment_, right_, {0.0, 0.0, 0.3});
   enter(*environment_, left_, {0.0, 0.2, 0.3});
