@@ -52,6 +52,9 @@ constexpr double kFieldNoise = 5e-6;
 /// So many sub-steps in a row may end in a worse place before the solver goes back to the best.
 constexpr int kWorsePlaces = 1;
 
+/// [m] A body that has no more to go than this may find that the field's steps let it go nowhere.
+constexpr double kLittleWay = 1e-4;
+
 /// How much of its depth the blocking baseline takes back in a sub-step: the paper gives none, more than this
 /// makes the proxy jump at edges.
 constexpr double kPushOutShare = 0.5;
@@ -113,6 +116,7 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
   for (MovableBody& body : job.bodies) body.brakes.clear();
   std::fill(gone_.begin(), gone_.end(), Displacement{});
   double best = std::numeric_limits<double>::infinity();
+  double at_start = best;
   double reach = job.limits.substep_travel;
   int worse = 0;
   std::fill(walked_.begin(), walked_.end(), Walked{});
@@ -129,6 +133,7 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
   while (true) {
     look();
     const double here = merit(job);
+    if (report.substeps == 0) at_start = here;
     if (here < best) {
       best = here;
       worse = 0;
@@ -143,6 +148,8 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
     const bool held = std::any_of(touched_.begin(), touched_.end(), [](std::uint8_t t) { return t != 0; });
     if (way < (held ? kSettled : kArrived)) break;
     const bool last = report.substeps == job.limits.substeps;
+    // where the tick began is where the field's steps let it go: every way on is a way back
+    const bool stays = best == at_start && worse > kWorsePlaces && way < kLittleWay;
     // a place or two may be worse on the way to a better one, but not the end of the way
     if (worse > kWorsePlaces || (last && worse > 0)) {
       for (std::size_t i = 0; i < job.bodies.size(); ++i) {
@@ -153,6 +160,7 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
       worse = 0;
       look();
       way = travel(job);
+      if (stays) break;
     }
     if (last) {
       report.travel_capped = way > kUnfinished;

@@ -9,6 +9,7 @@ namespace tenon {
 namespace {
 
 using test::boxStructures;
+using test::cornerStructures;
 using test::IslandRig;
 using test::sheetStructures;
 
@@ -73,6 +74,22 @@ INSTANTIATE_TEST_SUITE_P(GodObject, SheetAtEveryOffset,
                                          PushCase{"NothingAt3", 0.0, 3.0, 0.0},
                                          PushCase{"NothingTurning", 0.0, 1.0, 10.0}),
                          [](const auto& one) { return one.param.name; });
+
+// a large face on a floor and a wall, where every row has a field's step of its own
+TEST(GodObject, AStillHandStopsTheSearchEarly) {
+  IslandRig rig;
+  const Pose X_WH(Vector3(0.14, 0.13, 0.045), expRotation({0.05, 0.0, 0.02}));
+  const auto box = rig.addBody(boxStructures({0.3, 0.2, 0.1}, 0.003, 0.0046),
+                               Pose(X_WH.translation() + Vector3(0.1, 0.1, 0.15), X_WH.rotation()), 2000.0);
+  rig.addStatic(box, cornerStructures(0.6, 0.003), Pose(), 0.0027);
+  rig.setHand(box, X_WH);
+  rig.settle(200);
+  for (int tick = 0; tick < 50; ++tick) {
+    const Pose before = rig.pose(box);
+    ASSERT_LE(rig.step().substeps, 2U);
+    ASSERT_TRUE(rig.pose(box) == before);
+  }
+}
 
 }  // namespace
 }  // namespace tenon
