@@ -127,14 +127,13 @@ void forEachTopic(Visit&& visit) {
 }
 
 /// Every message type once: `#define X(M) ...` then `TENON_WIRE_MESSAGES(X)`.
-#define TENON_WIRE_MESSAGES(X)                                                                        \
-  X(SessionAnnounce)                                                                                  \
-  X(Join)                                                                                             \
-  X(Welcome)                                                                                          \
-  X(Presence)                                                                                         \
-  X(DeviceInput) X(WorldFrame) X(HandManifold) X(HandState) X(ContactPairs) X(TickStats) X(Guidance)  \
-      X(ForceContribution) X(ExternalPose) X(ClockSync) X(Telemetry) X(ObjectSnapshot) X(SceneObject) \
-          X(StepState) X(StepProgress) X(RunState) X(GrabState) X(RecorderStatus) X(EmergencyStop)    \
-              X(Command) X(CommandAck) X(EventLog) X(ClientEvent) X(TickInputPart) X(CheckpointPart)
+// clang-format off
+#define TENON_WIRE_MESSAGES(X) \
+  X(SessionAnnounce) X(Join) X(Welcome) X(Presence) X(DeviceInput) X(WorldFrame) X(HandManifold) \
+  X(HandState) X(ContactPairs) X(TickStats) X(Guidance) X(ForceContribution) X(ExternalPose) \
+  X(ClockSync) X(Telemetry) X(ObjectSnapshot) X(SceneObject) X(StepState) X(StepProgress) \
+  X(RunState) X(GrabState) X(RecorderStatus) X(EmergencyStop) X(Command) X(CommandAck) X(EventLog) \
+  X(ClientEvent) X(TickInputPart) X(CheckpointPart)
+// clang-format on
 
 }  // namespace tenon
