@@ -217,10 +217,10 @@ void Environment::lookAtOtherPairs() noexcept {
     CollPair& pair = engine_->pairs[engine_->others[item]];
     pair.query(objects_[pair.spec().a.value].X_WO, objects_[pair.spec().b.value].X_WO,
                engine_->limits.contact_margin);
-    // a tracked limb feels what it is in; of two that stand still nobody presses the other
-    const bool felt = pair.spec().sensing || objects_[pair.spec().a.value].status == ObjectStatus::kTracked ||
-                      objects_[pair.spec().b.value].status == ObjectStatus::kTracked;
-    if (!felt) return;
+    // what only senses overlaps without pressing, and of two that stand still nobody presses the other
+    const bool presses = objects_[pair.spec().a.value].status == ObjectStatus::kTracked ||
+                         objects_[pair.spec().b.value].status == ObjectStatus::kTracked;
+    if (pair.spec().sensing || !presses) return;
     pair.press(std::min(scene_->objects[pair.spec().a.value].stiffness,
                         scene_->objects[pair.spec().b.value].stiffness),
                objects_[pair.spec().a.value].X_WO);

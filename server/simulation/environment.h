@@ -33,6 +33,7 @@ struct HandMotion {
   Pose X_HO;                        ///< the object in the hand since it was taken
   Wrench F_Ho_W;                    ///< of the coupling on the hand, about the hand's origin
   ObjectId own;                     ///< its own first object: pointer, drill, cube, forearm
+  Pose X_OR;                        ///< its own first object in the one it holds instead, since it took that
   bool posed = false;               ///< a pose was heard since it is present
   bool taken = false;               ///< moves `object`; false: will from its first pose on
   std::uint32_t refused_poses = 0;  ///< not finite, or no pose at all: ignored
@@ -72,8 +73,8 @@ class Environment {
   void setHandPose(HandId hand, const Pose& X_WH, const Twist& V_WH) noexcept;
   void setHandFrozen(HandId hand, bool frozen) noexcept;
   /// `hand` moves `object` from now on, which stays where it is in the hand. What it moved before is parked;
-  /// a pointer (a hand's own first object) is hidden while the hand holds something else, and is put to the
-  /// hand's pose when it comes back.
+  /// a pointer (a hand's own first object) is hidden while the hand holds something else, and comes back on
+  /// what it took, where it took it: outside, wherever the hand itself is.
   void grab(HandId hand, ObjectId object) noexcept;
   /// The hand moves its own first object again.
   void release(HandId hand) noexcept;
@@ -123,6 +124,7 @@ class Environment {
   // hands and objects (environment_hands.cpp)
   void take(HandId hand) noexcept;
   void letGo(HandId hand) noexcept;
+  [[nodiscard]] Pose returnPlace(const HandMotion& hand) const noexcept;
   void park(ObjectId object, ObjectStatus status) noexcept;
   void chooseHolder(ObjectId object) noexcept;
   void jump(ObjectId object) noexcept;

@@ -62,17 +62,24 @@ void Environment::grab(HandId hand, ObjectId object) noexcept {
   if (!isHand(hand) || !isObject(object)) return;
   HandMotion& motion = hands_[hand.value];
   if (motion.object == object && motion.taken) return;
+  const Pose X_WR = returnPlace(motion);
   if (motion.object != object) letGo(hand);
   motion.object = object;
-  if (motion.present && motion.posed) take(hand);
+  if (!motion.present || !motion.posed) return;
+  take(hand);
+  motion.X_OR = objects_[object.value].X_WO.inverse() * X_WR;
 }
 
 void Environment::release(HandId hand) noexcept {
   if (!isHand(hand)) return;
   HandMotion& motion = hands_[hand.value];
   if (motion.object == motion.own) return;
+  const Pose X_WR = returnPlace(motion);
   letGo(hand);
-  if (isObject(motion.own)) grab(hand, motion.own);
+  if (!isObject(motion.own)) return;
+  grab(hand, motion.own);
+  // the hand is up to its coupling's stretch inside what it has held
+  if (motion.taken && objects_[motion.own.value].holder == hand) objects_[motion.own.value].X_WO = X_WR;
 }
 
 void Environment::swapHands(HandId one, HandId other) noexcept {
@@ -82,6 +89,7 @@ void Environment::swapHands(HandId one, HandId other) noexcept {
   std::swap(a.object, b.object);
   std::swap(a.own, b.own);
   std::swap(a.X_HO, b.X_HO);
+  std::swap(a.X_OR, b.X_OR);
   std::swap(a.taken, b.taken);
   for (const HandId hand : {one, other}) {
     HandMotion& motion = hands_[hand.value];
@@ -136,11 +144,19 @@ void Environment::take(HandId hand) noexcept {
   } else {
     motion.X_HO = motion.X_WH.inverse() * object.X_WO;
   }
+  motion.X_OR = object.X_WO.inverse() * motion.X_WH;
   motion.taken = true;
   chooseHolder(motion.object);
   object.status =
       scene_->hands[hand.value].kind == HandKind::kTracked ? ObjectStatus::kTracked : ObjectStatus::kHeld;
   jump(motion.object);
+}
+
+/// Where the hand's own first object is, or would be if it had stayed on what the hand holds.
+Pose Environment::returnPlace(const HandMotion& hand) const noexcept {
+  if (!hand.taken || !isObject(hand.object)) return hand.X_WH;
+  const Pose& X_WO = objects_[hand.object.value].X_WO;
+  return hand.object == hand.own ? X_WO : X_WO * hand.X_OR;
 }
 
 /// The hand moves nothing; its own first object leaves the scene, another one stays where it is.

@@ -8,7 +8,7 @@ namespace tenon {
 namespace {
 
 /// Raised whenever the list of fields changes.
-constexpr std::uint32_t kStateVersion = 1;
+constexpr std::uint32_t kStateVersion = 2;
 
 template <typename Archive, typename Motion>
 void archiveObject(Archive& archive, Motion& object) {
@@ -28,6 +28,7 @@ void archiveHand(Archive& archive, Motion& hand) {
   archive(hand.X_WH);
   archive(hand.V_WH);
   archive(hand.X_HO);
+  archive(hand.X_OR);
   archive(hand.F_Ho_W);
   archive(hand.own);
   archive(hand.posed);
@@ -117,7 +118,8 @@ bool Environment::isSound() const noexcept {
            (!object.holder.valid() || isHand(object.holder));
   });
   return sound_objects && std::all_of(hands_.begin(), hands_.end(), [&](const HandMotion& hand) {
-           return sound(hand.X_WH) && sound(hand.X_HO) && (!hand.object.valid() || isObject(hand.object)) &&
+           return sound(hand.X_WH) && sound(hand.X_HO) && sound(hand.X_OR) &&
+                  (!hand.object.valid() || isObject(hand.object)) &&
                   (!hand.own.valid() || isObject(hand.own));
          });
 }

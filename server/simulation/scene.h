@@ -22,7 +22,7 @@ struct ObjectSpec {
   Pose X_WO;                                           ///< at the start
   ObjectStatus status = ObjectStatus::kParked;         ///< at the start
   std::shared_ptr<const HapticStructures> structures;  ///< none: seen, never felt
-  double stiffness = 1000.0;  ///< [N/m] of its penalty force (sensing pairs and the baselines)
+  double stiffness = 1000.0;  ///< [N/m] of its penalty force (of what a tracker moves, and the baselines)
 };
 
 /// Two objects that may touch.

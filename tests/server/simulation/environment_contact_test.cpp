@@ -151,12 +151,12 @@ TEST(Environment, TwoHandsOnOneObjectAddUpTheirStiffness) {
   EXPECT_NEAR(environment.forceOn(part).force.z(), -2.0 * kStiffness * 0.01, 0.2);
 }
 
-TEST(Environment, AForearmFeelsWhatItIsInAndResistsNothing) {
+TEST(Environment, AForearmIsToldWhatItIsInAndExchangesNoForceWithIt) {
   test::SmallScene small;
   const ObjectId forearm = small.object("forearm", test::pointerShape(), {0.0, 0.0, 0.2});
   const ObjectId floor = small.object("floor", test::floorShape(), Vector3::Zero());
   const HandId arm = small.hand("forearm", forearm, HandKind::kTracked);
-  small.pair(forearm, floor, true);
+  const std::size_t pair = small.pair(forearm, floor, true);
   Environment environment(small.build(), {});
   enter(environment, arm, {0.0, 0.0, 0.05});
   moveTo(environment, arm, {0.0, 0.0, 0.005}, 60);
@@ -165,7 +165,13 @@ TEST(Environment, AForearmFeelsWhatItIsInAndResistsNothing) {
   EXPECT_EQ(environment.objects()[forearm.value].status, ObjectStatus::kTracked);
   EXPECT_TRUE(environment.objects()[forearm.value].in_contact);
   EXPECT_FALSE(environment.objects()[floor.value].in_contact);
-  EXPECT_GT(environment.hands()[arm.value].F_Ho_W.force.z(), 0.1);
+  PairContact contact;
+  environment.pairContact(pair, contact);
+  EXPECT_TRUE(contact.colliding);
+  EXPECT_NEAR(contact.depth, test::kPointerRadius - 0.005, 1e-4);
+  EXPECT_EQ(contact.F_Ao_W.force.norm(), 0.0);
+  EXPECT_EQ(environment.hands()[arm.value].F_Ho_W.force.norm(), 0.0);
+  EXPECT_EQ(environment.forceOn(floor).force.norm(), 0.0);
   HandManifold manifold;
   environment.manifold(arm, manifold);
   EXPECT_GT(manifold.contacts.size(), 0U);

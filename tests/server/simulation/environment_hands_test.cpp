@@ -102,6 +102,32 @@ TEST_F(HandsTest, APartFixedInItsPlaceStaysSoAndTheHandGetsItsPointerBack) {
   }
 }
 
+//   hand ->  o[part]     the pointer rests on the part's side, the hand is 10 mm inside; then the other
+//                 |      part stops them farther on, where the hand lets go
+TEST_F(HandsTest, APointerComesBackOutsideWhatItsHandHasHeldAndPullsToTheHand) {
+  enter(*environment_, right_, {0.0, 0.0, 0.0});
+  moveTo(*environment_, right_, {0.1 - 0.5 * test::kCubeEdge - test::kPointerRadius + 0.01, 0.0, 0.0}, 100);
+  stay(*environment_, 20);
+  const Vector3 p_PartPointer = object(pointer_).X_WO.translation() - object(part_).X_WO.translation();
+  EXPECT_NEAR(p_PartPointer.x(), -0.5 * test::kCubeEdge - test::kPointerRadius, 1e-4);
+  environment_->grab(right_, part_);
+  moveTo(*environment_, right_, {0.25, 0.0, 0.0}, 300);
+  stay(*environment_, 20);
+  const Vector3 p_WPart = object(part_).X_WO.translation();
+  EXPECT_NEAR(p_WPart.x(), 0.3 - test::kCubeEdge, 0.1e-3);
+  environment_->release(right_);
+  environment_->place(part_, object(part_).X_WO, ObjectStatus::kFixed);
+  EXPECT_LE((object(pointer_).X_WO.translation() - p_WPart - p_PartPointer).norm(), 1e-12);
+  for (int tick = 0; tick < 100; ++tick) {
+    environment_->step();
+    const Vector3 p = object(pointer_).X_WO.translation() - p_WPart;
+    ASSERT_LE(p.x(), -0.5 * test::kCubeEdge - test::kPointerRadius + 0.1e-3) << "outside";
+    ASSERT_LE(object(pointer_).V_WO.linear.norm(), 1.0 + 1e-9);
+  }
+  moveTo(*environment_, right_, {0.0, 0.0, 0.2}, 500);
+  EXPECT_NEAR((object(pointer_).X_WO.translation() - Vector3(0.0, 0.0, 0.2)).norm(), 0.0, 1e-9);
+}
+
 TEST_F(HandsTest, PlacingAHeldPartKeepsItInTheHandAtItsNewPlace) {
   enter(*environment_, right_, {0.1, 0.0, 0.032});
   environment_->grab(right_, part_);
