@@ -15,7 +15,6 @@ CollPair::CollPair(const Scene& scene, std::size_t pair) : spec_(&scene.pairs[pa
     field_B_ = &b.structures->field;
   }
   enabled_ = spec_->enabled;
-  result_.multipliers.resize(kMaxPairContacts);
 }
 
 void CollPair::setEnabled(bool enabled) noexcept {
@@ -27,46 +26,60 @@ void CollPair::setEnabled(bool enabled) noexcept {
 void CollPair::forget() noexcept {
   looked_ = false;
   due_ = 0;
-  looked_tick_ = 0;
-  closing_speed_ = 0.0;
-  result_.query.contacts.clear();
-  result_.F_Ao_W = Wrench{};
-}
-
-double CollPair::clearance(Tick now) const noexcept {
-  if (!looked_) return -std::numeric_limits<double>::infinity();
-  const double ticks = static_cast<double>(now - looked_tick_);
-  return result_.query.smallest_gap - closing_speed_ * kTickSeconds * ticks;
+  travelled_ = 0.0;
+  gap_ = 0.0;
+  deepest_ = 0.0;
+  counts_ = QueryCounts{};
+  if (room_ == nullptr) return;
+  room_->query.contacts.clear();
+  room_->F_Ao_W = Wrench{};
 }
 
 void CollPair::query(const Pose& X_WA, const Pose& X_WB, double margin) noexcept {
-  queryPair({shell_A_, field_B_, X_WA, X_WB, spec_->dilation, margin}, result_.query);
-  std::fill_n(result_.multipliers.begin(), result_.query.contacts.size(), 0.0);
-  result_.F_Ao_W = Wrench{};
-  looked_ = true;
+  queryPair({shell_A_, field_B_, X_WA, X_WB, spec_->dilation, margin}, room_->query);
+  std::fill_n(room_->multipliers.begin(), room_->query.contacts.size(), 0.0);
+  room_->F_Ao_W = Wrench{};
+  note(room_->query);
 }
 
 void CollPair::press(double stiffness, const Pose& X_WA) noexcept {
-  result_.F_Ao_W = penaltyWrench(result_.query, X_WA.translation(), stiffness);
+  room_->F_Ao_W = penaltyWrench(room_->query, X_WA.translation(), stiffness);
 }
 
 void CollPair::take(const IslandPairResult& result) noexcept {
-  copyResult(result, result_);
-  looked_ = true;
+  copyResult(result, *room_);
+  note(result.query);
 }
 
-void CollPair::schedule(Tick now, double closing_speed, double reach) noexcept {
-  looked_tick_ = now;
-  closing_speed_ = closing_speed;
-  const double slack = result_.query.smallest_gap - reach;
+void CollPair::note(const PairQueryResult& query) noexcept {
+  looked_ = true;
+  gap_ = query.smallest_gap;
+  deepest_ = query.deepest;
+  counts_ = query.counts;
+}
+
+Tick CollPair::wholeTicks(double way, double closing_speed) noexcept {
+  // an hour is as good as never, and keeps the conversion in range
+  constexpr double kManyTicks = 3.6e6;
+  return static_cast<Tick>(std::clamp(way / (closing_speed * kTickSeconds), 0.0, kManyTicks));
+}
+
+void CollPair::schedule(Tick now, double closing_speed, double reach, double travelled) noexcept {
+  travelled_ = travelled;
+  due_ = closing_speed <= 0.0 ? kNever : now + 1 + wholeTicks(gap_ - reach, closing_speed);
+}
+
+bool CollPair::putOff(Tick now, double closing_speed, double reach, double travelled) noexcept {
+  const double left = gap_ - (travelled - travelled_) - reach;
+  if (!looked_ || left <= 0.0) return false;
   if (closing_speed <= 0.0) {
     due_ = kNever;
-  } else {
-    // an hour is as good as never, and keeps the conversion in range
-    constexpr double kManyTicks = 3.6e6;
-    const double ticks = std::clamp(slack / (closing_speed * kTickSeconds), 0.0, kManyTicks);
-    due_ = now + 1 + static_cast<Tick>(ticks);
+    return true;
   }
+  const Tick ticks = wholeTicks(left, closing_speed);
+  if (ticks == 0) return false;
+  due_ = now + ticks;
+  return true;
 }
 
 IslandPair CollPair::islandPair(const Pose& X_WA, const Pose& X_WB) const noexcept {

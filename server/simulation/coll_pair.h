@@ -2,9 +2,11 @@
 
 #include <cstddef>
 #include <limits>
+#include <utility>
 
 #include "idl/types/ids.h"
 #include "server/collision/island_solver.h"
+#include "server/simulation/contact_rooms.h"
 #include "server/simulation/scene.h"
 
 namespace tenon {
@@ -13,9 +15,13 @@ namespace tenon {
 /// it has to be looked at again, and what the last look found.
 ///
 /// Spatio-temporal coherence: no point of either object travels faster than the enforced cap, so a pair with
-/// a smallest gap g has nothing to say for g / (v_a + v_b). A declared jump ends that at once.
+/// a smallest gap g has nothing to say for g / (v_a + v_b). When that is over, the way that the two have
+/// really gone since often puts it off again. A declared jump ends all that at once.
 ///
-/// Threads: one at a time. Real-time: everything but the constructor and copies.
+/// Its contacts are in a room of ContactRooms, which it has for the tick of a look, and as long as it lists
+/// any.
+///
+/// Threads: one at a time. Real-time: everything but the constructor.
 class CollPair {
  public:
   static constexpr Tick kNever = std::numeric_limits<Tick>::max();
@@ -28,8 +34,20 @@ class CollPair {
   [[nodiscard]] bool possible() const { return possible_; }
   [[nodiscard]] bool due(Tick tick) const { return due_ <= tick; }
   [[nodiscard]] Tick dueTick() const { return due_; }
-  /// Of the last look; null when there was none since the last jump.
-  [[nodiscard]] const IslandPairResult* result() const { return looked_ ? &result_ : nullptr; }
+
+  // of the last look since the last jump
+  [[nodiscard]] bool looked() const { return looked_; }
+  [[nodiscard]] double gap() const { return gap_; }          ///< [m] the smallest, dilation included
+  [[nodiscard]] double deepest() const { return deepest_; }  ///< [m] in the undilated field
+  [[nodiscard]] const QueryCounts& counts() const { return counts_; }
+  /// Null when it listed no contacts.
+  [[nodiscard]] const IslandPairResult* result() const { return lists() ? room_ : nullptr; }
+  [[nodiscard]] bool lists() const { return looked_ && room_ != nullptr && !room_->query.contacts.empty(); }
+  [[nodiscard]] bool touching() const noexcept { return lists() && gap_ <= kTouchGap; }
+
+  [[nodiscard]] bool hasRoom() const { return room_ != nullptr; }
+  void moveIn(IslandPairResult* room) noexcept { room_ = room; }
+  [[nodiscard]] IslandPairResult* moveOut() noexcept { return std::exchange(room_, nullptr); }
 
   void setEnabled(bool enabled) noexcept;
   /// What was found holds no longer; look again in the next tick.
@@ -37,37 +55,48 @@ class CollPair {
   /// What was found holds, but something may move differently from now on.
   void lookAgain() noexcept { due_ = 0; }
 
-  /// The lowest gap that is possible at `now` [m].
-  [[nodiscard]] double clearance(Tick now) const noexcept;
-  [[nodiscard]] bool touching() const noexcept {
-    return looked_ && !result_.query.contacts.empty() && result_.query.smallest_gap <= kTouchGap;
-  }
-
+  // these need a room
   /// A look by itself, for pairs that no solver moves; lists contacts up to `margin`.
   void query(const Pose& X_WA, const Pose& X_WB, double margin) noexcept;
   /// The penalty force of what query() found: the softer of the two gives way.
   void press(double stiffness, const Pose& X_WA) noexcept;
   /// Takes over what a solver found.
   void take(const IslandPairResult& result) noexcept;
+
   /// Sets when to look again, once the pair was looked at in `now`: while the fastest points approach each
-  /// other by at most `closing_speed` [m/s], the gap stays above `reach` [m].
-  void schedule(Tick now, double closing_speed, double reach) noexcept;
+  /// other by at most `closing_speed` [m/s], the gap stays above `reach` [m]. `travelled`: what the
+  /// odometers of both say now [m].
+  void schedule(Tick now, double closing_speed, double reach, double travelled) noexcept;
+  /// The same before the motion of `now`, without a look, from the way really gone. False, and no change,
+  /// when that does not spare the look.
+  [[nodiscard]] bool putOff(Tick now, double closing_speed, double reach, double travelled) noexcept;
 
   /// The pair as the island solver wants it, both bodies static.
   [[nodiscard]] IslandPair islandPair(const Pose& X_WA, const Pose& X_WB) const noexcept;
 
-  /// Every member that changes, to be written, read or hashed.
+  /// Every member that changes but the switch, to be written, read or hashed. What is read takes a room.
   template <typename Archive, typename Self>
-  static void archive(Archive& archive, Self& self) {
-    archive(self.enabled_);
+  static void archive(Archive& archive, Self& self, ContactRooms& rooms) {
     archive(self.looked_);
     archive(self.due_);
-    archive(self.looked_tick_);
-    archive(self.closing_speed_);
-    if (self.looked_) archive(self.result_);
+    archive(self.travelled_);
+    archive(self.gap_);
+    archive(self.deepest_);
+    archive(self.counts_);
+    bool lists = self.lists();
+    archive(lists);
+    if (!lists) return;
+    if constexpr (Archive::kReads) {
+      if (!self.hasRoom()) self.moveIn(rooms.take());
+      if (!self.hasRoom()) return archive.refuse();
+    }
+    archive(*self.room_);
   }
 
  private:
+  void note(const PairQueryResult& query) noexcept;
+  [[nodiscard]] static Tick wholeTicks(double way, double closing_speed) noexcept;
+
   const PairSpec* spec_;
   const Pointshell* shell_A_ = nullptr;
   const DistanceField* field_B_ = nullptr;
@@ -75,9 +104,11 @@ class CollPair {
   bool enabled_ = true;
   bool looked_ = false;
   Tick due_ = 0;
-  Tick looked_tick_ = 0;
-  double closing_speed_ = 0.0;
-  IslandPairResult result_;
+  double travelled_ = 0.0;
+  double gap_ = 0.0;
+  double deepest_ = 0.0;
+  QueryCounts counts_;
+  IslandPairResult* room_ = nullptr;
 };
 
 /// Copies as much of a list as it holds; a list has room for far more.

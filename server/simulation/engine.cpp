@@ -9,6 +9,10 @@ namespace {
 /// one.
 constexpr std::uint32_t kTravelSubsteps = 4;
 
+std::size_t roomsFor(const Scene& scene, const EnvironmentOptions& options) {
+  return std::min(scene.pairs.size(), options.rooms);
+}
+
 /// The least body radius that scales rotations [m]: an object without structures still turns with its hand.
 constexpr double kLeastRadius = 0.01;
 
@@ -46,16 +50,24 @@ ObjectSize sizeOf(const ObjectSpec& spec) {
 }  // namespace
 
 Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& options)
-    : pair_cells(scene.objects.size(), 0),
+    : rooms(roomsFor(scene, options)),
+      odometers(scene.objects.size(), 0.0),
+      pair_cells(scene.objects.size(), 0),
       limits(cappedLimits(options.limits, options.max_speed)),
-      movable(scene.objects.size(), 0),
+      broad_phase(scene),
       looked_at(scene.pairs.size(), 0),
-      others(scene.pairs.size(), 0),
+      movable(scene.objects.size(), 0),
+      solved(scene.objects.size(), 0),
+      hidden(scene.objects.size(), 0),
       partition(scene.objects.size()),
-      islands(coupledHands(scene), scene.pairs.size(), std::max(options.workers, 1U)),
+      islands(coupledHands(scene), roomsFor(scene, options), std::max(options.workers, 1U)),
       pool(options.workers) {
   reach = limits.contact_margin + kLookAheadReach + 2.0 * limits.substep_travel;
   pairs.reserve(scene.pairs.size());
+  near.reserve(scene.pairs.size());
+  left.reserve(scene.pairs.size());
+  due.reserve(rooms.size());
+  others.reserve(rooms.size());
   for (std::size_t pair = 0; pair < scene.pairs.size(); ++pair) {
     pairs.emplace_back(scene, pair);
     cell_in_a.push_back(pair_cells[scene.pairs[pair].a.value]++);
@@ -65,6 +77,16 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
     forces.emplace_back(pair_cells[object] + scene.hands.size(), options.send_policy);
     sizes.push_back(sizeOf(scene.objects[object]));
   }
+}
+
+void Environment::Engine::forgetTick() noexcept {
+  std::fill(looked_at.begin(), looked_at.end(), std::uint8_t{0});
+  left.clear();
+  due.clear();
+  others.clear();
+  refused = 0;
+  recount = true;
+  islands.clear();
 }
 
 }  // namespace tenon

@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "server/simulation/broad_phase.h"
 #include "server/simulation/coll_pair.h"
+#include "server/simulation/contact_rooms.h"
 #include "server/simulation/environment.h"
 #include "server/simulation/force_buffer.h"
 #include "server/simulation/island_work.h"
@@ -20,6 +22,11 @@ struct ObjectSize {
   double radius = 0.0;
 };
 
+/// Speed of the fastest point of a body of `radius` about its origin, at most [m/s].
+[[nodiscard]] inline double fastestPoint(const Vector3& linear, const Vector3& angular, double radius) {
+  return linear.norm() + angular.norm() * radius;
+}
+
 /// What the tick works with, sized at start: the pairs' own states and force buffers (which matter for the
 /// next tick) and work space (which does not).
 ///
@@ -31,8 +38,21 @@ struct Environment::Engine {
     return pair_cells[object.value] + hand.value;
   }
 
+  [[nodiscard]] double travelledBy(const PairSpec& pair) const {
+    return odometers[pair.a.value] + odometers[pair.b.value];
+  }
+  void addTravel(ObjectId object, const Displacement& way) {
+    odometers[object.value] += fastestPoint(way.translation, way.rotation, sizes[object.value].radius);
+  }
+
+  /// Leaves the work space as before the first tick.
+  void forgetTick() noexcept;
+
   // state
   std::vector<CollPair> pairs;
+  std::vector<std::uint32_t> near;  ///< pairs that may meet, in order; others have no state but their switch
+  ContactRooms rooms;
+  std::vector<double> odometers;    ///< by object: [m] its fastest point's way so far, jumps left out
   std::vector<ForceBuffer> forces;  ///< cells of an object: its pairs, then the couplings of all hands
 
   // what never changes
@@ -43,10 +63,17 @@ struct Environment::Engine {
   double reach = 0.0;                             ///< [m] the largest margin any query of a tick may use
 
   // work space
-  std::vector<std::uint8_t> movable;    ///< by object
+  BroadPhase broad_phase;
+  std::vector<std::uint32_t> left;      ///< pairs that were near until this tick
+  std::vector<std::uint32_t> due;       ///< near pairs to look at in this tick, in order
+  std::vector<std::uint32_t> others;    ///< those of them that no island solves
   std::vector<std::uint8_t> looked_at;  ///< by pair, in this tick
-  std::vector<std::size_t> others;      ///< pairs to look at outside the islands
-  std::size_t other_count = 0;
+  std::uint32_t refused = 0;            ///< due pairs that found no room
+  std::vector<std::uint8_t> movable;    ///< by object: a hand pulls at it
+  std::vector<std::uint8_t> solved;     ///< by object: and it moves in this tick
+  std::vector<std::uint8_t> hidden;     ///< by object, when active pairs were counted
+  std::uint32_t active_pairs = 0;
+  bool recount = true;
   IslandPartition partition;
   IslandWork islands;
   WorkerPool pool;
@@ -56,11 +83,6 @@ struct Environment::Engine {
 /// and a tick; never farther than kLookAheadReach [m], or a peg would list its whole slot.
 inline constexpr double kLookAheadTicks = 8.0;
 inline constexpr double kLookAheadReach = 2e-3;
-
-/// Speed of the fastest point of a body of `radius` about its origin, at most [m/s].
-[[nodiscard]] inline double fastestPoint(const Vector3& linear, const Vector3& angular, double radius) {
-  return linear.norm() + angular.norm() * radius;
-}
 
 /// The same wrench about another point: p_PQ_W leads from the old to the new one.
 [[nodiscard]] inline Wrench shifted(const Wrench& F_P_W, const Vector3& p_PQ_W) {

@@ -7,13 +7,8 @@
 namespace tenon {
 namespace {
 
-/// A shell's ball holds its points; the surface between them bulges a little more [m].
+/// A shell's ball holds its points; the surface between them bulges a little more: so much for a pair [m].
 constexpr double kBallSlack = 5e-3;
-
-/// A lower bound of the distance of two objects' surfaces [m].
-double ballGap(const ObjectSize& a, const Pose& X_WA, const ObjectSize& b, const Pose& X_WB) {
-  return (X_WA * a.p_OC_O - X_WB * b.p_OC_O).norm() - a.ball - b.ball - kBallSlack;
-}
 
 }  // namespace
 
@@ -44,9 +39,8 @@ Environment::~Environment() = default;
 void Environment::setPairEnabled(std::size_t pair, bool enabled) noexcept {
   if (pair >= pairs_.size()) return;
   engine_->pairs[pair].setEnabled(enabled);
-  pairs_[pair].enabled = enabled;
-  pairs_[pair].due = engine_->pairs[pair].dueTick();
-  pairs_[pair].result = engine_->pairs[pair].result();
+  engine_->recount = true;
+  note(static_cast<std::uint32_t>(pair));
 }
 
 void Environment::contribute(ObjectId object, std::uint32_t source, const Wrench& F_Oo_W,
@@ -57,6 +51,9 @@ void Environment::contribute(ObjectId object, std::uint32_t source, const Wrench
 void Environment::step() noexcept {
   ++tick_;
   followTrackers();
+  findMovable();
+  findNearPairs();
+  findDuePairs();
   planIslands();
   engine_->islands.solve(engine_->pool);
   takeIslands();
@@ -76,6 +73,7 @@ void Environment::followTrackers() noexcept {
     const Displacement way = displacement(object.X_WO, X_WO);
     object.X_WO = X_WO;
     object.V_WO = {way.translation / kTickSeconds, way.rotation / kTickSeconds};
+    engine_->addTravel(hand.object, way);
     // a tracker keeps no speed limit: what was reckoned with it holds no longer
     if (speedOf(hand.object) > options_.max_speed) stir(hand.object);
   }
@@ -141,22 +139,71 @@ void Environment::findMovable() noexcept {
   }
 }
 
-void Environment::planIslands() noexcept {
+void Environment::findNearPairs() noexcept {
   Engine& engine = *engine_;
-  findMovable();
-  std::fill(engine.looked_at.begin(), engine.looked_at.end(), std::uint8_t{0});
-  engine.partition.begin(engine.movable);
-  const double near = engine.reach + 2.0 * options_.max_speed * kTickSeconds;
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    const PairSpec& spec = engine.pairs[i].spec();
-    if (!active(i) || spec.sensing || engine.movable[spec.a.value] == 0 ||
-        engine.movable[spec.b.value] == 0) {
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const ObjectId object{static_cast<std::uint32_t>(i)};
+    const ObjectSize& size = engine.sizes[i];
+    if (objects_[i].status == ObjectStatus::kHidden || !scene_->objects[i].structures) {
+      engine.broad_phase.hide(object);
+    } else {
+      engine.broad_phase.place(object, objects_[i].X_WO * size.p_OC_O, size.ball + 0.5 * kBallSlack);
+    }
+  }
+  // from the poses alone, so that skipping a look can never change who is solved with whom
+  const double reach = engine.reach + 2.0 * options_.max_speed * kTickSeconds;
+  engine.left.clear();
+  std::swap(engine.left, engine.near);
+  for (const std::uint32_t pair : engine.broad_phase.find(reach)) {
+    if (active(pair)) engine.near.push_back(pair);
+  }
+  const auto gone = std::remove_if(engine.left.begin(), engine.left.end(), [&engine](std::uint32_t pair) {
+    return std::binary_search(engine.near.begin(), engine.near.end(), pair);
+  });
+  engine.left.erase(gone, engine.left.end());
+  for (const std::uint32_t pair : engine.left) {
+    CollPair& one = engine.pairs[pair];
+    one.forget();
+    engine.rooms.giveBack(one.moveOut());
+    engine.forces[one.spec().a.value].clear(engine.cell_in_a[pair]);
+    engine.forces[one.spec().b.value].clear(engine.cell_in_b[pair]);
+  }
+}
+
+void Environment::findDuePairs() noexcept {
+  Engine& engine = *engine_;
+  for (const std::uint32_t pair : engine.due) engine.looked_at[pair] = 0;
+  engine.due.clear();
+  engine.refused = 0;
+  std::copy(engine.movable.begin(), engine.movable.end(), engine.solved.begin());
+  for (const std::uint32_t i : engine.near) {
+    CollPair& pair = engine.pairs[i];
+    const PairSpec& spec = pair.spec();
+    if (options_.coherence) {
+      const double closing_speed = speedCap(spec.a) + speedCap(spec.b);
+      if (!pair.due(tick_)) continue;
+      if (pair.putOff(tick_, closing_speed, engine.reach, engine.travelledBy(spec))) continue;
+    }
+    if (!pair.hasRoom()) pair.moveIn(engine.rooms.take());
+    if (pair.hasRoom()) {
+      engine.due.push_back(i);
       continue;
     }
-    // from the poses alone, so that skipping a look can never change who is solved with whom
-    const double gap = ballGap(engine.sizes[spec.a.value], objects_[spec.a.value].X_WO,
-                               engine.sizes[spec.b.value], objects_[spec.b.value].X_WO);
-    if (gap - spec.dilation <= near) engine.partition.join(spec.a, spec.b);
+    ++engine.refused;
+    if (spec.sensing) continue;
+    for (const ObjectId object : {spec.a, spec.b}) {
+      if (engine.solved[object.value] != 0) objects_[object.value].V_WO = Twist{};
+      engine.solved[object.value] = 0;
+    }
+  }
+}
+
+void Environment::planIslands() noexcept {
+  Engine& engine = *engine_;
+  engine.partition.begin(engine.solved);
+  for (const std::uint32_t i : engine.near) {
+    const PairSpec& spec = engine.pairs[i].spec();
+    if (!spec.sensing) engine.partition.join(spec.a, spec.b);
   }
   engine.partition.number();
   engine.islands.clear();
@@ -174,17 +221,13 @@ void Environment::addIsland(std::int32_t island) noexcept {
     speed = std::max(speed, speedOf(object));
   }
   engine.islands.widenMargin(std::min(speed * kLookAheadTicks * kTickSeconds, kLookAheadReach));
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    CollPair& pair = engine.pairs[i];
+  for (const std::uint32_t i : engine.due) {
+    const CollPair& pair = engine.pairs[i];
     const ObjectId a = pair.spec().a;
     const ObjectId b = pair.spec().b;
     const std::int32_t island_a = engine.partition.islandOf(a);
     const std::int32_t island_b = engine.partition.islandOf(b);
-    if (pair.spec().sensing || !active(i) || (options_.coherence && !pair.due(tick_))) continue;
-    if (island_a != island && island_b != island) continue;
-    // two that move in different islands are too far apart to meet in this tick
-    if (island_a != IslandPartition::kNone && island_b != IslandPartition::kNone && island_a != island_b)
-      continue;
+    if (pair.spec().sensing || (island_a != island && island_b != island)) continue;
     IslandPair one = pair.islandPair(objects_[a.value].X_WO, objects_[b.value].X_WO);
     one.body_a = island_a == island ? engine.partition.placeOf(a) : GapRow::kStatic;
     one.body_b = island_b == island ? engine.partition.placeOf(b) : GapRow::kStatic;
@@ -198,6 +241,7 @@ void Environment::takeIslands() noexcept {
   for (std::size_t body = 0; body < islands.bodies(); ++body) {
     ObjectMotion& object = objects_[islands.objectOf(body).value];
     const Displacement way = displacement(object.X_WO, islands.poseOf(body));
+    engine_->addTravel(islands.objectOf(body), way);
     object.X_WO = islands.poseOf(body);
     object.V_WO = {way.translation / kTickSeconds, way.rotation / kTickSeconds};
   }
@@ -208,10 +252,10 @@ void Environment::takeIslands() noexcept {
 
 void Environment::lookAtOtherPairs() noexcept {
   Engine& engine = *engine_;
-  engine.other_count = 0;
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    const bool due = engine.pairs[i].due(tick_) || !options_.coherence;
-    if (engine.looked_at[i] == 0 && active(i) && due) engine.others[engine.other_count++] = i;
+  engine.others.clear();
+  for (const std::uint32_t i : engine.due) {
+    if (engine.looked_at[i] == 0) engine.others.push_back(i);
+    engine.looked_at[i] = 1;
   }
   auto look = [this](unsigned, std::size_t item) {
     CollPair& pair = engine_->pairs[engine_->others[item]];
@@ -225,12 +269,11 @@ void Environment::lookAtOtherPairs() noexcept {
                         scene_->objects[pair.spec().b.value].stiffness),
                objects_[pair.spec().a.value].X_WO);
   };
-  engine.pool.run(engine.other_count, look);
-  for (std::size_t i = 0; i < engine.other_count; ++i) engine.looked_at[engine.others[i]] = 1;
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+  engine.pool.run(engine.others.size(), look);
+  for (const std::uint32_t i : engine.due) {
     CollPair& pair = engine.pairs[i];
-    if (engine.looked_at[i] == 0) continue;
-    pair.schedule(tick_, speedCap(pair.spec().a) + speedCap(pair.spec().b), engine.reach);
+    pair.schedule(tick_, speedCap(pair.spec().a) + speedCap(pair.spec().b), engine.reach,
+                  engine.travelledBy(pair.spec()));
   }
 }
 

@@ -44,7 +44,7 @@ struct PairMotion {
   bool enabled = true;
   bool queried = false;                      ///< in this tick; else skipped by coherence
   Tick due = 0;                              ///< next tick that has to look (spatio-temporal coherence)
-  const IslandPairResult* result = nullptr;  ///< of the last query
+  const IslandPairResult* result = nullptr;  ///< of the last query; null: no contacts
 };
 
 struct EnvironmentOptions {
@@ -52,11 +52,17 @@ struct EnvironmentOptions {
   SolveLimits limits;
   double max_speed = 1.0;  ///< [m/s] of any point of a held object (travel cap; the paper's v_max)
   bool coherence = true;   ///< false: look at every pair in every tick; never changes the result
+  /// So many pairs may touch or be looked at in one tick: each costs some 120 kB.
+  std::size_t rooms = 256;
   SendPolicy send_policy = SendPolicy::kEveryForce;
 };
 
-/// All objects, one tick (paper §3.2): follow the trackers, solve the contact islands for the poses of what
-/// is held, look at the remaining pairs that are due, sum the forces.
+/// All objects, one tick (paper §3.2): follow the trackers, find the pairs that are near and due, solve the
+/// contact islands for the poses of what is held, look at the remaining due pairs, sum the forces.
+///
+/// Far pairs cost nothing, near ones a glance, due ones a look. There is room for the looks of so many pairs;
+/// when more are due, those that have contacts go first, and what a hand holds of the others stands still for
+/// the tick: late, never through.
 ///
 /// Everything that moves is in here, everything else in the Scene: so a snapshot is the Environment, and
 /// equal inputs from an equal snapshot give equal bits, for any number of workers.
@@ -106,7 +112,9 @@ class Environment {
   struct Work {
     std::uint32_t active_pairs = 0, queried_pairs = 0, substeps = 0, iterations = 0;
     std::uint64_t points_visited = 0;
-    double load_percent = 0.0;  ///< largest of the pairs
+    std::uint32_t near_pairs = 0;     ///< whose balls are near each other
+    std::uint32_t refused_pairs = 0;  ///< for want of room: what a hand holds of them stood still
+    double load_percent = 0.0;        ///< largest of the pairs
     bool conflicting = false;
   };
   [[nodiscard]] const Work& work() const { return work_; }
@@ -136,6 +144,9 @@ class Environment {
   // the tick (environment.cpp)
   void followTrackers() noexcept;
   void findMovable() noexcept;
+  void findNearPairs() noexcept;
+  void findDuePairs() noexcept;
+  void countActivePairs() noexcept;
   void planIslands() noexcept;
   void addIsland(std::int32_t island) noexcept;
   void takeIslands() noexcept;
@@ -143,6 +154,7 @@ class Environment {
   void sumForces() noexcept;
   void judgeContacts() noexcept;
   void countWork() noexcept;
+  void note(std::uint32_t pair) noexcept;
   void listContacts(ObjectId object, HandManifold& out) const noexcept;
   [[nodiscard]] bool active(std::size_t pair) const noexcept;
   [[nodiscard]] MovableBody movableBody(ObjectId object) const noexcept;

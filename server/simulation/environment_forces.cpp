@@ -8,11 +8,11 @@ namespace tenon {
 
 void Environment::sumForces() noexcept {
   Engine& engine = *engine_;
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    CollPair& pair = engine.pairs[i];
+  for (const std::uint32_t i : engine.near) {
+    const CollPair& pair = engine.pairs[i];
     const ObjectId a = pair.spec().a;
     const ObjectId b = pair.spec().b;
-    if (pair.result() == nullptr) {
+    if (!pair.lists()) {
       engine.forces[a.value].clear(engine.cell_in_a[i]);
       engine.forces[b.value].clear(engine.cell_in_b[i]);
     } else if (engine.looked_at[i] != 0) {
@@ -45,7 +45,8 @@ void Environment::sumForces() noexcept {
 
 void Environment::judgeContacts() noexcept {
   for (ObjectMotion& object : objects_) object.in_contact = false;
-  for (const CollPair& pair : engine_->pairs) {
+  for (const std::uint32_t i : engine_->near) {
+    const CollPair& pair = engine_->pairs[i];
     if (!pair.touching()) continue;
     // what only senses leaves no mark on what it touches
     ObjectMotion& a = objects_[pair.spec().a.value];
@@ -55,21 +56,42 @@ void Environment::judgeContacts() noexcept {
   }
 }
 
+void Environment::note(std::uint32_t pair) noexcept {
+  const CollPair& one = engine_->pairs[pair];
+  pairs_[pair] = {one.enabled(), engine_->looked_at[pair] != 0, one.dueTick(), one.result()};
+}
+
+void Environment::countActivePairs() noexcept {
+  Engine& engine = *engine_;
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const std::uint8_t hidden = objects_[i].status == ObjectStatus::kHidden ? 1 : 0;
+    engine.recount |= hidden != engine.hidden[i];
+    engine.hidden[i] = hidden;
+  }
+  if (!engine.recount) return;
+  engine.recount = false;
+  engine.active_pairs = 0;
+  for (std::size_t i = 0; i < pairs_.size(); ++i) engine.active_pairs += active(i) ? 1U : 0U;
+}
+
 void Environment::countWork() noexcept {
+  Engine& engine = *engine_;
+  countActivePairs();
   work_ = Work{};
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    const CollPair& pair = engine_->pairs[i];
-    const bool queried = engine_->looked_at[i] != 0;
-    pairs_[i] = {pair.enabled(), queried, pair.dueTick(), pair.result()};
-    work_.active_pairs += active(i) ? 1U : 0U;
-    if (!queried) continue;
-    ++work_.queried_pairs;
-    work_.load_percent = std::max(work_.load_percent, pair.result()->query.counts.loadPercent());
+  work_.active_pairs = engine.active_pairs;
+  work_.near_pairs = static_cast<std::uint32_t>(engine.near.size());
+  work_.queried_pairs = static_cast<std::uint32_t>(engine.due.size());
+  work_.refused_pairs = engine.refused;
+  for (const std::uint32_t i : engine.left) note(i);
+  for (const std::uint32_t i : engine.near) {
+    CollPair& pair = engine.pairs[i];
+    if (!pair.lists()) engine.rooms.giveBack(pair.moveOut());
+    note(i);
+    if (engine.looked_at[i] == 0) continue;
+    work_.load_percent = std::max(work_.load_percent, pair.counts().loadPercent());
   }
-  for (std::size_t i = 0; i < engine_->other_count; ++i) {
-    work_.points_visited += engine_->pairs[engine_->others[i]].result()->query.counts.points_visited;
-  }
-  for (const IslandWork::Island& island : engine_->islands.islands()) {
+  for (const std::uint32_t i : engine.others) work_.points_visited += engine.pairs[i].counts().points_visited;
+  for (const IslandWork::Island& island : engine.islands.islands()) {
     work_.substeps += island.report.substeps;
     work_.iterations += island.report.iterations;
     work_.points_visited += island.report.points_visited;

@@ -200,18 +200,18 @@ void Environment::chooseHolder(ObjectId object) noexcept {
 void Environment::jump(ObjectId object) noexcept {
   objects_[object.value].V_WO = Twist{};
   ++objects_[object.value].epoch;
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+  for (const std::uint32_t i : engine_->near) {
     CollPair& pair = engine_->pairs[i];
     if (pair.spec().a != object && pair.spec().b != object) continue;
     pair.forget();
-    pairs_[i].due = pair.dueTick();
-    pairs_[i].result = nullptr;
+    note(i);
   }
 }
 
 /// Something about the object's motion changes: its pairs are due at once.
 void Environment::stir(ObjectId object) noexcept {
-  for (CollPair& pair : engine_->pairs) {
+  for (const std::uint32_t i : engine_->near) {
+    CollPair& pair = engine_->pairs[i];
     if (pair.spec().a == object || pair.spec().b == object) pair.lookAgain();
   }
 }

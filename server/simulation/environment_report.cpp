@@ -62,8 +62,11 @@ Wrench Environment::forceOn(ObjectId object) const noexcept {
 }
 
 bool Environment::inContact(ObjectId a, ObjectId b) const noexcept {
-  const int pair = scene_->pairOf(a, b);
-  return pair >= 0 && engine_->pairs[static_cast<std::size_t>(pair)].touching();
+  return std::any_of(engine_->near.begin(), engine_->near.end(), [&](std::uint32_t i) {
+    const CollPair& pair = engine_->pairs[i];
+    const PairSpec& spec = pair.spec();
+    return ((spec.a == a && spec.b == b) || (spec.a == b && spec.b == a)) && pair.touching();
+  });
 }
 
 void Environment::pairContact(std::size_t pair, PairContact& out) const noexcept {
@@ -72,10 +75,14 @@ void Environment::pairContact(std::size_t pair, PairContact& out) const noexcept
   out.a = one.spec().a;
   out.b = one.spec().b;
   out.enabled = one.enabled();
-  if (one.result() == nullptr) return;
-  const PairQueryResult& query = one.result()->query;
+  if (!one.looked()) return;
+  out.depth = one.deepest();
+  out.gap = one.gap();
+  out.load_percent = one.counts().loadPercent();
+  out.peak_depth = out.depth;
+  if (!one.lists()) return;
   Vector3 sum = Vector3::Zero();
-  for (const Contact& contact : query.contacts) {
+  for (const Contact& contact : one.result()->query.contacts) {
     if (contact.gap > kTouchGap) continue;
     sum += contact.p_WP;
     ++out.contacts;
@@ -83,11 +90,7 @@ void Environment::pairContact(std::size_t pair, PairContact& out) const noexcept
   if (out.contacts > 0) out.p_WP = sum / out.contacts;
   out.colliding = one.touching();
   out.F_Ao_W = one.result()->F_Ao_W;
-  out.depth = query.deepest;
-  out.gap = query.smallest_gap;
-  out.load_percent = query.counts.loadPercent();
   out.peak_force = out.F_Ao_W.force.norm();
-  out.peak_depth = out.depth;
 }
 
 void Environment::manifold(HandId hand, HandManifold& out) const noexcept {
@@ -114,10 +117,10 @@ void Environment::manifold(HandId hand, HandManifold& out) const noexcept {
 void Environment::listContacts(ObjectId object, HandManifold& out) const noexcept {
   Gathered all;
   out.validity_radius = engine_->limits.contact_margin;
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+  for (const std::uint32_t i : engine_->near) {
     const CollPair& pair = engine_->pairs[i];
     if (!active(i) || (pair.spec().a != object && pair.spec().b != object)) continue;
-    if (pair.result() != nullptr) gather(pair.result()->query.contacts, i, all);
+    if (pair.lists()) gather(pair.result()->query.contacts, i, all);
   }
   std::array<std::uint32_t, kManifoldContacts> chosen{};
   const std::size_t count = reduceContacts(all.contacts, chosen);
@@ -130,10 +133,10 @@ void Environment::listContacts(ObjectId object, HandManifold& out) const noexcep
   }
 
   // what is not listed matters only where nothing listed stands for it
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+  for (const std::uint32_t i : engine_->near) {
     const CollPair& pair = engine_->pairs[i];
     if (!active(i) || (pair.spec().a != object && pair.spec().b != object)) continue;
-    if (pair.result() == nullptr) continue;
+    if (!pair.lists()) continue;
     for (const Contact& contact : pair.result()->query.contacts) {
       const bool stood_for = std::any_of(
           chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(count), [&](std::uint32_t one) {

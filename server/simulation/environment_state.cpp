@@ -8,7 +8,7 @@ namespace tenon {
 namespace {
 
 /// Raised whenever the list of fields changes.
-constexpr std::uint32_t kStateVersion = 2;
+constexpr std::uint32_t kStateVersion = 3;
 
 template <typename Archive, typename Motion>
 void archiveObject(Archive& archive, Motion& object) {
@@ -35,6 +35,36 @@ void archiveHand(Archive& archive, Motion& hand) {
   archive(hand.taken);
 }
 
+/// 64 pairs a number: most pairs have nothing else to say.
+template <typename Archive, typename Pairs>
+void archiveSwitches(Archive& archive, Pairs& pairs) {
+  for (std::size_t first = 0; first < pairs.size(); first += 64) {
+    const std::size_t count = std::min<std::size_t>(pairs.size() - first, 64);
+    std::uint64_t word = 0;
+    for (std::size_t i = 0; i < count; ++i) word |= std::uint64_t{pairs[first + i].enabled()} << i;
+    archive(word);
+    if constexpr (Archive::kReads) {
+      for (std::size_t i = 0; i < count; ++i) pairs[first + i].setEnabled((word >> i & 1U) != 0);
+    }
+  }
+}
+
+/// Ascending numbers below `end`.
+template <typename Archive, typename Indices>
+void archiveIndices(Archive& archive, Indices& indices, std::size_t end) {
+  auto size = static_cast<std::uint32_t>(indices.size());
+  archive(size);
+  if constexpr (Archive::kReads) indices.clear();
+  for (std::uint32_t i = 0; i < size; ++i) {
+    std::uint32_t index = Archive::kReads ? 0 : indices[i];
+    archive(index);
+    if constexpr (Archive::kReads) {
+      if (!archive.ok() || index >= end || (i > 0 && index <= indices.back())) return archive.refuse();
+      indices.push_back(index);
+    }
+  }
+}
+
 }  // namespace
 
 template <typename Archive, typename Self>
@@ -42,10 +72,12 @@ void Environment::archive(Archive& archive, Self& self) {
   archive(self.tick_);
   for (auto& object : self.objects_) archiveObject(archive, object);
   for (auto& hand : self.hands_) archiveHand(archive, hand);
-  for (auto& pair : self.engine_->pairs) CollPair::archive(archive, pair);
-  for (auto& buffer : self.engine_->forces) {
-    for (auto& cell : buffer.cells()) archive(cell);
-  }
+  auto& engine = *self.engine_;
+  archiveSwitches(archive, engine.pairs);
+  archiveIndices(archive, engine.near, engine.pairs.size());
+  for (const std::uint32_t pair : engine.near) CollPair::archive(archive, engine.pairs[pair], engine.rooms);
+  for (auto& odometer : engine.odometers) archive(odometer);
+  for (auto& buffer : engine.forces) ForceBuffer::archive(archive, buffer);
 }
 
 std::uint64_t Environment::hash() const noexcept {
@@ -97,14 +129,16 @@ Result<void> Environment::restore(std::span<const std::uint8_t> bytes) {
     copy.hands_[i].refused_poses = hands_[i].refused_poses;
     hands_[i] = copy.hands_[i];
   }
-  engine_->pairs = copy.engine_->pairs;
-  engine_->forces = copy.engine_->forces;
+  engine_->pairs = std::move(copy.engine_->pairs);
+  engine_->near = std::move(copy.engine_->near);
+  engine_->rooms = std::move(copy.engine_->rooms);
+  engine_->odometers = std::move(copy.engine_->odometers);
+  engine_->forces = std::move(copy.engine_->forces);
   tick_ = copy.tick_;
-  std::fill(engine_->looked_at.begin(), engine_->looked_at.end(), std::uint8_t{0});
-  engine_->other_count = 0;
-  engine_->islands.clear();
+  engine_->forgetTick();
   findMovable();
   countWork();
+  for (std::uint32_t pair = 0; pair < pairs_.size(); ++pair) note(pair);
   return {};
 }
 

@@ -22,16 +22,25 @@ double weight(const ForceCell& cell, Tick now) {
 }  // namespace
 
 ForceBuffer::ForceBuffer(std::size_t own_cells, SendPolicy policy)
-    : cells_(own_cells + kContributions), own_cells_(own_cells), policy_(policy) {}
+    : cells_(own_cells + kContributions), own_cells_(own_cells), policy_(policy) {
+  used_.reserve(own_cells);
+}
 
 bool ForceBuffer::write(std::size_t cell, const Wrench& F_Bo_W, Tick now) noexcept {
   assert(cell < own_cells_);
   const bool is_due = due(cell);
+  const auto index = static_cast<std::uint32_t>(cell);
+  if (!cells_[cell].used) used_.insert(std::lower_bound(used_.begin(), used_.end(), index), index);
   cells_[cell] = {F_Bo_W, now, 0, 0, true};
   return is_due;
 }
 
-void ForceBuffer::clear(std::size_t cell) noexcept { cells_[cell] = ForceCell{}; }
+void ForceBuffer::clear(std::size_t cell) noexcept {
+  assert(cell < own_cells_);
+  if (!cells_[cell].used) return;
+  used_.erase(std::lower_bound(used_.begin(), used_.end(), static_cast<std::uint32_t>(cell)));
+  cells_[cell] = ForceCell{};
+}
 
 bool ForceBuffer::contribute(std::uint32_t source, const Wrench& F_Bo_W, std::uint32_t lifetime_ticks,
                              Tick now) noexcept {
@@ -65,7 +74,8 @@ void ForceBuffer::expire(Tick now) noexcept {
 
 Wrench ForceBuffer::total(Tick now) const noexcept {
   Wrench sum;
-  for (const ForceCell& cell : cells_) sum += cell.F_Bo_W * weight(cell, now);
+  for (const std::uint32_t cell : used_) sum += cells_[cell].F_Bo_W;
+  for (const ForceCell& cell : std::span(cells_).subspan(own_cells_)) sum += cell.F_Bo_W * weight(cell, now);
   return sum;
 }
 
@@ -76,9 +86,12 @@ Wrench ForceBuffer::contributed(Tick now) const noexcept {
 }
 
 bool ForceBuffer::oldest(std::size_t cell) const noexcept {
-  return std::all_of(cells_.begin(), cells_.end(), [&](const ForceCell& other) {
-    return !other.used || !cells_[cell].used || other.stamp >= cells_[cell].stamp;
-  });
+  const Tick stamp = cells_[cell].stamp;
+  if (!cells_[cell].used) return true;
+  const auto outside = std::span(cells_).subspan(own_cells_);
+  return std::all_of(used_.begin(), used_.end(), [&](auto own) { return cells_[own].stamp >= stamp; }) &&
+         std::all_of(outside.begin(), outside.end(),
+                     [&](const ForceCell& other) { return !other.used || other.stamp >= stamp; });
 }
 
 bool ForceBuffer::due(std::size_t cell) const noexcept {

@@ -30,7 +30,8 @@ struct ForceCell {
 /// Every source owns one cell and overwrites it: first the own cells (pairs, couplings of hands), which stay
 /// until overwritten, so a pair skipped by coherence leaves its cell as it was; then cells for contributions
 /// from outside, which are checked, capped, fade linearly with age and expire. Cells are summed in cell
-/// order, never in arrival order: the total is the same to the last bit for any number of workers.
+/// order, never in arrival order: the total is the same to the last bit for any number of workers. Which own
+/// cells are in use is listed in order, so that a sum costs what pushes, not what could.
 ///
 /// Threads: one writer per own cell, contributions from one thread; total() after the tick's barrier.
 /// Real-time: everything but the constructor.
@@ -65,14 +66,39 @@ class ForceBuffer {
   [[nodiscard]] Tick age(std::size_t index, Tick now) const noexcept { return now - cells_[index].stamp; }
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
-  [[nodiscard]] std::span<ForceCell> cells() noexcept { return cells_; }
   [[nodiscard]] std::span<const ForceCell> cells() const noexcept { return cells_; }
+
+  /// The cells in use, to be written, read or hashed.
+  template <typename Archive, typename Self>
+  static void archive(Archive& archive, Self& self) {
+    auto own = static_cast<std::uint32_t>(self.used_.size());
+    archive(own);
+    if constexpr (Archive::kReads) {
+      for (const std::uint32_t cell : self.used_) self.cells_[cell] = ForceCell{};
+      self.used_.clear();
+    }
+    for (std::uint32_t i = 0; i < own; ++i) {
+      std::uint32_t cell = Archive::kReads ? 0 : self.used_[i];
+      archive(cell);
+      if constexpr (Archive::kReads) {
+        const bool next = cell < self.own_cells_ && (i == 0 || cell > self.used_.back());
+        if (!archive.ok() || !next) return archive.refuse();
+        self.used_.push_back(cell);
+      }
+      archive(self.cells_[cell]);
+      if constexpr (Archive::kReads) {
+        if (!self.cells_[cell].used) return archive.refuse();
+      }
+    }
+    for (auto& cell : std::span(self.cells_).subspan(self.own_cells_)) archive(cell);
+  }
 
  private:
   [[nodiscard]] bool oldest(std::size_t cell) const noexcept;
   [[nodiscard]] bool due(std::size_t cell) const noexcept;
 
   std::vector<ForceCell> cells_;
+  std::vector<std::uint32_t> used_;  // own cells, in order
   std::size_t own_cells_;
   SendPolicy policy_;
   std::uint64_t refused_ = 0;

@@ -66,18 +66,20 @@ class StateArchive {
     visit(cell.source);
     visit(cell.lifetime_ticks);
   }
-  template <typename R>
-  requires std::is_same_v<std::remove_const_t<R>, IslandPairResult>
-  void visit(R& result) {
-    visit(result.F_Ao_W);
-    visit(result.query.smallest_gap);
-    visit(result.query.deepest);
-    auto& counts = result.query.counts;
+  template <typename C>
+  requires std::is_same_v<std::remove_const_t<C>, QueryCounts>
+  void visit(C& counts) {
     visit(counts.spheres_visited);
     visit(counts.spheres_total);
     visit(counts.points_visited);
     visit(counts.points_colliding);
     visit(counts.contacts_dropped);
+  }
+  /// What is not also a member of CollPair.
+  template <typename R>
+  requires std::is_same_v<std::remove_const_t<R>, IslandPairResult>
+  void visit(R& result) {
+    visit(result.F_Ao_W);
     static_cast<Derived*>(this)->count(result.query.contacts);
     for (std::size_t i = 0; i < result.query.contacts.size(); ++i) {
       auto& contact = result.query.contacts[i];
@@ -94,6 +96,7 @@ class StateArchive {
 /// Appends to bytes. Numbers are stored as this machine has them: checkpoints belong to one build.
 class StateWriter : public StateArchive<StateWriter> {
  public:
+  static constexpr bool kReads = false;
   explicit StateWriter(std::vector<std::uint8_t>& bytes) : bytes_(&bytes) {}
 
   template <typename T>
@@ -111,6 +114,7 @@ class StateWriter : public StateArchive<StateWriter> {
 /// leaves everything as it is.
 class StateReader : public StateArchive<StateReader> {
  public:
+  static constexpr bool kReads = true;
   explicit StateReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
 
   template <typename T>
@@ -131,6 +135,8 @@ class StateReader : public StateArchive<StateReader> {
     ok_ = ok_ && size <= ContactList::capacity();
     contacts.resize(ok_ ? size : 0);
   }
+  /// What was read cannot be.
+  void refuse() { ok_ = false; }
   [[nodiscard]] bool ok() const { return ok_; }
   [[nodiscard]] bool atEnd() const { return ok_ && bytes_.empty(); }
 
@@ -142,6 +148,7 @@ class StateReader : public StateArchive<StateReader> {
 /// Hashes. Real-time.
 class StateHasher : public StateArchive<StateHasher> {
  public:
+  static constexpr bool kReads = false;
   template <typename T>
   void number(const T& value) {
     if constexpr (std::is_floating_point_v<T>) {

@@ -58,38 +58,57 @@ class CollPairTest : public testing::Test {
     scene_.pair(pointer, floor);
   }
   test::SmallScene scene_;
+  ContactRooms rooms_{1};
 };
 
 // The gap is 88 mm; 8 mm of it have to stay: 80 mm at 1 m/s are 80 ticks.
 TEST_F(CollPairTest, IsNotDueWhileNothingCanHaveComeNear) {
   const auto scene = scene_.build();
   CollPair pair(*scene, 0);
+  pair.moveIn(rooms_.take());
   EXPECT_TRUE(pair.due(1));
   pair.query(Pose(Vector3(0.0, 0.0, 0.1)), Pose(), 0.001);
-  const double gap = pair.result()->query.smallest_gap;
+  const double gap = pair.gap();
   ASSERT_GT(gap, 0.05);
   ASSERT_LT(gap, 0.0885);
-  pair.schedule(10, 1.0, 0.008);
+  pair.schedule(10, 1.0, 0.008, 0.0);
   const auto ticks = static_cast<Tick>((gap - 0.008) / 1e-3);
   EXPECT_FALSE(pair.due(10 + ticks));
   EXPECT_TRUE(pair.due(10 + ticks + 1));
-  EXPECT_GE(pair.clearance(10 + ticks), 0.008);
+}
+
+TEST_F(CollPairTest, IsPutOffByWhatTheTwoHaveNotTravelled) {
+  const auto scene = scene_.build();
+  CollPair pair(*scene, 0);
+  pair.moveIn(rooms_.take());
+  EXPECT_FALSE(pair.putOff(1, 1.0, 0.008, 0.0)) << "nobody has looked yet";
+  pair.query(Pose(Vector3(0.0, 0.0, 0.1)), Pose(), 0.001);
+  pair.schedule(10, 1.0, 0.008, 5.0);
+  const Tick due = pair.dueTick();
+  // of the way that would have been possible a tenth was gone
+  const double way = pair.gap() - 0.008;
+  ASSERT_TRUE(pair.putOff(due, 1.0, 0.008, 5.0 + 0.1 * way));
+  EXPECT_EQ(pair.dueTick(), due + static_cast<Tick>(0.9 * way / 1e-3));
+  EXPECT_FALSE(pair.putOff(pair.dueTick(), 1.0, 0.008, 5.0 + way - 0.5e-3))
+      << "the next tick may bring them near";
 }
 
 TEST_F(CollPairTest, IsNeverDueBetweenTwoThatStandStill) {
   const auto scene = scene_.build();
   CollPair pair(*scene, 0);
+  pair.moveIn(rooms_.take());
   pair.query(Pose(), Pose(), 0.001);
-  pair.schedule(10, 0.0, 0.008);
+  pair.schedule(10, 0.0, 0.008, 0.0);
   EXPECT_FALSE(pair.due(1000000000));
 }
 
 TEST_F(CollPairTest, AJumpOrASwitchMakesItDueAtOnceAndForgetsWhatWasFound) {
   const auto scene = scene_.build();
   CollPair pair(*scene, 0);
+  pair.moveIn(rooms_.take());
   const auto look = [&] {
     pair.query(Pose(Vector3(0.0, 0.0, 0.01)), Pose(), 0.001);
-    pair.schedule(10, 0.0, 0.008);
+    pair.schedule(10, 0.0, 0.008, 0.0);
     ASSERT_TRUE(pair.touching());
   };
   look();

@@ -1,0 +1,99 @@
+#include "tests/server/simulation/many_bodies.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/realtime_guard.h"
+
+namespace tenon {
+namespace {
+
+constexpr Tick kTicks = 600;
+
+std::vector<std::uint64_t> hashes(Environment& environment, const test::ManyBodies& bodies, Tick until) {
+  std::vector<std::uint64_t> result;
+  while (environment.tick() < until) {
+    bodies.step(environment);
+    result.push_back(environment.hash());
+  }
+  return result;
+}
+
+TEST(ManyBodies, TwoHundredThatMayAllMeetCostALookOnlyWhereTheyAreNear) {
+  const test::ManyBodies bodies(200, 4);
+  Environment environment(bodies.scene, {});
+  std::uint32_t looks = 0;
+  while (environment.tick() < kTicks) {
+    bodies.step(environment);
+    if (environment.tick() < 100) continue;
+    looks = std::max(looks, environment.work().queried_pairs);
+    ASSERT_EQ(environment.work().refused_pairs, 0U);
+  }
+  EXPECT_EQ(environment.work().active_pairs, 200U * 199U / 2U + 200U);
+  EXPECT_LT(environment.work().near_pairs, 2000U);
+  EXPECT_LE(looks, 60U) << "four cubes, each with the floor and its neighbours";
+  for (std::size_t i = 0; i < bodies.hands.size(); ++i) {
+    EXPECT_TRUE(environment.inContact(bodies.cubes[i], bodies.floor));
+  }
+}
+
+TEST(ManyBodies, LeaveTheSameBitsForAnyNumberOfWorkersAndAfterARestore) {
+  const test::ManyBodies bodies(50, 10, 0.06);
+  Environment one(bodies.scene, {});
+  const auto start = hashes(one, bodies, kTicks / 2);
+  const std::vector<std::uint8_t> bytes = one.save();
+  const auto rest = hashes(one, bodies, kTicks);
+  for (const unsigned workers : {2U, 4U}) {
+    EnvironmentOptions options;
+    options.workers = workers;
+    Environment many(bodies.scene, options);
+    EXPECT_EQ(hashes(many, bodies, kTicks / 2), start) << workers << " workers";
+    EXPECT_EQ(many.save(), bytes);
+    Environment restored(bodies.scene, options);
+    ASSERT_TRUE(restored.restore(bytes));
+    EXPECT_EQ(hashes(restored, bodies, kTicks), rest) << workers << " workers";
+  }
+}
+
+TEST(ManyBodies, AllocateNothing) {
+  const test::ManyBodies bodies(50, 10, 0.06);
+  Environment environment(bodies.scene, {});
+  const test::RealtimeGuard guard;
+  while (environment.tick() < 200) {
+    bodies.step(environment);
+    if (environment.tick() == 100) environment.place(bodies.cubes[20], Pose(), ObjectStatus::kHidden);
+    if (environment.tick() == 120) environment.setPairEnabled(3, false);
+  }
+  EXPECT_EQ(guard.allocations(), 0);
+  EXPECT_EQ(guard.locks(), 0);
+}
+
+// There is one room, and two that stand in each other have it.
+TEST(ManyBodies, WhatFindsNoRoomStandsStillInsteadOfGoingThrough) {
+  test::SmallScene small;
+  const ObjectId one = small.object("one", test::cubeShape(), {1.0, 0.0, 0.0});
+  const ObjectId other = small.object("other", test::cubeShape(), {1.03, 0.0, 0.0});
+  const ObjectId floor = small.object("floor", test::floorShape(), Vector3::Zero());
+  const ObjectId pointer = small.object("pointer", test::pointerShape(), {0.0, 0.0, 0.6});
+  const HandId hand = small.hand("hand", pointer);
+  small.pair(one, other);
+  small.pair(pointer, floor);
+  EnvironmentOptions options;
+  options.rooms = 1;
+  Environment environment(small.build(), options);
+  test::enter(environment, hand, {0.0, 0.0, 0.6});
+  test::moveTo(environment, hand, {0.0, 0.0, -0.1}, 1500);
+  EXPECT_EQ(environment.work().refused_pairs, 1U);
+  const auto height = [&] { return environment.objects()[pointer.value].X_WO.translation().z(); };
+  EXPECT_GT(height(), test::kPointerRadius);
+  EXPECT_EQ(environment.objects()[pointer.value].V_WO.linear.norm(), 0.0);
+  EXPECT_LT(environment.forceOn(pointer).force.z(), 0.0) << "the hand feels that it is held";
+
+  environment.place(one, Pose(), ObjectStatus::kHidden);
+  test::stay(environment, 1000);
+  EXPECT_EQ(environment.work().refused_pairs, 0U);
+  EXPECT_NEAR(height(), test::kPointerRadius, 0.1e-3);
+  EXPECT_TRUE(environment.inContact(pointer, floor));
+}
+
+}  // namespace
+}  // namespace tenon
