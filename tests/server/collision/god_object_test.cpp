@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -12,6 +13,8 @@ using test::boxStructures;
 using test::cornerStructures;
 using test::IslandRig;
 using test::sheetStructures;
+using test::sphereStructures;
+using test::StructuresPtr;
 
 constexpr double kVoxel = 0.003;
 constexpr double kDilation = 0.87 * kVoxel;  // the least that keeps a sheet of no thickness solid
@@ -74,6 +77,104 @@ INSTANTIATE_TEST_SUITE_P(GodObject, SheetAtEveryOffset,
                                          PushCase{"NothingAt3", 0.0, 3.0, 0.0},
                                          PushCase{"NothingTurning", 0.0, 1.0, 10.0}),
                          [](const auto& one) { return one.param.name; });
+
+//   |____|    the box's face on an edge that lies along x: the hand presses it down and goes along
+//     /\    edge
+TEST(GodObject, SlidesAlongAnOuterEdgeWithoutLag) {
+  const Pose X_WEdge(Vector3::Zero(), expRotation({0.25 * std::numbers::pi, 0.0, 0.0}));
+  const double top = std::sqrt(0.5) * 0.05 + 0.0005;  // of the dilated edge
+  // the edge's points, 4 mm apart, never lie exactly under the box's rims: there a row leans to the side
+  constexpr double kFrom = -0.0487;
+  IslandRig rig;
+  const auto box =
+      rig.addBody(boxStructures({0.04, 0.04, 0.02}, 0.002, 0.004), Pose(Vector3(kFrom, 0.0, top + 0.02)));
+  const StructuresPtr edge = boxStructures({0.3, 0.05, 0.05}, 0.002, 0.004);
+  rig.addStatic(box, edge, X_WEdge, 0.0005);
+  rig.addStaticShell(box, edge, X_WEdge, 0.0005);
+  rig.moveHand(box, Pose(Vector3(kFrom, 0.0, top + 0.002)), 50);
+  double lag = 0.0;
+  for (int tick = 1; tick <= 200; ++tick) {
+    const Vector3 hand(kFrom + 0.0005 * tick, 0.0, top + 0.002);
+    rig.setHand(box, Pose(hand));
+    rig.step();
+    lag = std::max(lag, (rig.pose(box).translation() - hand).head<2>().norm());
+    ASSERT_GT(rig.force(0).force.z() - rig.force(1).force.z(), 1.0);
+  }
+  EXPECT_LE(lag, 1e-5);
+  RecordProperty("lag_nm", static_cast<int>(std::lround(lag * 1e9)));
+}
+
+//    ---o---      the hand turns a bar about the edge that it presses the bar on: a lever turns freely
+//       ^
+TEST(GodObject, ALeverTurnsFreelyAboutItsFulcrum) {
+  const Pose X_WEdge(Vector3::Zero(), expRotation({0.0, 0.25 * std::numbers::pi, 0.0}));
+  const double top = std::sqrt(0.5) * 0.05 + 0.0005;
+  constexpr double kHalf = 0.01;
+  constexpr double kPress = 0.005;
+  IslandRig rig;
+  const auto bar =
+      rig.addBody(boxStructures({0.2, 0.02, 2.0 * kHalf}, 0.002, 0.004), Pose(Vector3(0.0, 0.0, top + 0.03)));
+  const StructuresPtr edge = boxStructures({0.05, 0.1, 0.05}, 0.002, 0.004);
+  rig.addStatic(bar, edge, X_WEdge, 0.0005);
+  rig.addStaticShell(bar, edge, X_WEdge, 0.0005);
+  rig.moveHand(bar, Pose(Vector3(0.0, 0.0, top + kHalf - kPress)), 50);
+  double error = 0.0;
+  for (int tick = 1; tick <= 300; ++tick) {
+    const Vector3 turn(0.0, 0.5 * std::sin(0.01 * std::numbers::pi * tick), 0.0);
+    const Quaternion q = expRotation(turn);
+    rig.setHand(bar, Pose(Vector3(0.0, 0.0, top) + q * Vector3(0.0, 0.0, kHalf - kPress), q));
+    rig.step();
+    error = std::max(error, logRotation(rig.pose(bar).rotation() * q.conjugate()).norm());
+    ASSERT_GT((rig.force(0).force - rig.force(1).force).norm(), 1.0);
+  }
+  EXPECT_LE(error, 2e-3);
+  RecordProperty("turn_error_urad", static_cast<int>(std::lround(error * 1e6)));
+}
+
+/// [N] The largest change of the force on the hand for 0.1 mm of its way, from and to in the frame of the box
+/// on which its ball rests; `turn`: of that box. Asked with the ball's points alone or with the box's too.
+double largestForceStep(bool both, const Vector3& turn, const Vector3& from, const Vector3& to) {
+  const Pose X_WBox(Vector3::Zero(), expRotation(turn));
+  IslandRig rig;
+  const auto ball =
+      rig.addBody(sphereStructures(0.012, 0.001, 0.001), X_WBox * Pose(from + 0.02 * Vector3::UnitZ()));
+  const StructuresPtr box = boxStructures({0.08, 0.08, 0.04}, 0.001, 0.001);
+  rig.addStatic(ball, box, X_WBox, 0.0005);
+  if (both) rig.addStaticShell(ball, box, X_WBox, 0.0005);
+  rig.moveHand(ball, X_WBox * Pose(from), 60);
+  rig.settle(20);
+  const int steps = static_cast<int>((to - from).norm() / 1e-4);
+  Vector3 before = springWrench(rig.body(ball).springs[0], rig.pose(ball)).force;
+  double largest = 0.0;
+  for (int i = 1; i <= steps; ++i) {
+    const double share = static_cast<double>(i) / steps;
+    rig.setHand(ball, Pose(X_WBox * Vector3(from + share * (to - from)), rig.pose(ball).rotation()));
+    rig.step();
+    const Vector3 now = springWrench(rig.body(ball).springs[0], rig.pose(ball)).force;
+    largest = std::max(largest, (now - before).norm());
+    before = now;
+  }
+  return largest;
+}
+
+// a hand 3 mm behind a face: its own way leaves the force as it is, whatever border of voxels is crossed
+TEST(GodObject, TheForceIsContinuousAcrossVoxelBorders) {
+  const double z = 0.02 + 0.0125 - 0.003;
+  const double step = largestForceStep(false, {0.2, 0.1, 0.3}, {-0.02, -0.01, z}, {0.02, 0.012, z});
+  EXPECT_LE(step, 0.02);
+  RecordProperty("largest_step_mN", static_cast<int>(std::lround(step * 1e3)));
+}
+
+// asked both ways, so that the edge does not catch in the ball's points
+TEST(GodObject, TheForceIsContinuousAcrossAnEdge) {
+  constexpr double kReach = 0.0125;
+  constexpr double kDepth = 0.003;
+  const double z = 0.02 + kReach - kDepth;
+  const double step = largestForceStep(true, {0.2, 0.1, 0.3}, {0.02, 0.004, z}, {0.06, 0.006, z});
+  // a smooth ball on a smooth edge: 0.065 N; points 1 mm apart on both leave steps of a quarter millimetre
+  EXPECT_LE(step, 0.3);
+  RecordProperty("largest_step_mN", static_cast<int>(std::lround(step * 1e3)));
+}
 
 // a large face on a floor and a wall, where every row has a field's step of its own
 TEST(GodObject, AStillHandStopsTheSearchEarly) {
