@@ -1,0 +1,39 @@
+#pragma once
+
+#include <span>
+
+#include "server/collision/island_solver.h"
+
+namespace tenon {
+
+/// [m] A body whose points all have less than this to go has arrived.
+inline constexpr double kArrived = 1e-9;
+
+/// [m] What may be left after the last sub-step without being called unfinished.
+inline constexpr double kUnfinished = 1e-6;
+
+/// [m] A depth that the field's steps and a turned contact may leave behind.
+inline constexpr double kFieldNoise = 5e-6;
+
+/// What an island solver is asked to do, passed from step to step of it; how its files share it. All spans
+/// live as long as the call.
+///
+/// Threads: one. Real-time: everything.
+struct IslandSolver::Job {
+  std::span<MovableBody> bodies;
+  std::span<const IslandPair> pairs;
+  const SolveLimits& limits;
+  std::span<IslandPairResult> results;
+
+  [[nodiscard]] const Pose& poseOf(std::int32_t body, const Pose& X_W_static) const {
+    return body == GapRow::kStatic ? X_W_static : bodies[static_cast<std::size_t>(body)].X_WB;
+  }
+  [[nodiscard]] const Pose& poseA(const IslandPair& pair) const {
+    return poseOf(pair.body_a, pair.X_WA_static);
+  }
+  [[nodiscard]] const Pose& poseB(const IslandPair& pair) const {
+    return poseOf(pair.body_b, pair.X_WB_static);
+  }
+};
+
+}  // namespace tenon

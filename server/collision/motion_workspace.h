@@ -1,0 +1,82 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/collision/active_set.h"
+#include "server/collision/motion_solver.h"
+
+namespace tenon {
+
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+/// The part of a long vector that belongs to a body.
+inline Eigen::Map<Vector6> segment(std::vector<double>& all, std::size_t body) {
+  return Eigen::Map<Vector6>(&all[6 * body]);
+}
+
+/// Works in coordinates y = Lᵀ x of every body (H = L Lᵀ), where the energy is ½|y - y0|². All rows are
+/// looked at together as columns of numbers, in x, since there a row needs no preparation.
+///
+/// Threads: one at a time. Real-time: everything but construction.
+struct MotionSolver::Workspace {
+  /// Neighbours in the list are neighbours in space: of this many, only the most violated row is tried.
+  static constexpr std::size_t kBlock = 16;
+
+  /// Rows [first, first + count) between the same two bodies.
+  struct Run {
+    std::size_t first = 0, count = 0;
+    std::array<std::int32_t, 2> body{};
+  };
+
+  Workspace(std::size_t max_bodies, std::size_t max_rows)
+      : active(6 * max_bodies),
+        L(max_bodies),
+        slack(max_rows),
+        is_active(max_rows),
+        body_of(max_rows),
+        y0(6 * max_bodies),
+        y(6 * max_bodies),
+        x(6 * max_bodies),
+        normal(6 * max_bodies),
+        step(6 * max_bodies),
+        r(6 * max_bodies),
+        u(6 * max_bodies + 1) {
+    for (std::vector<double>& column : columns) column.resize(max_rows);
+    runs.reserve(max_rows);
+    tried.reserve(max_rows);
+  }
+
+  void setBody(std::size_t i, const MovableBody& body);
+  void setRows(std::span<const GapRow> rows, std::span<const MovableBody> island);
+  /// False: the rows contradict each other, or the iterations have run out.
+  bool run(std::span<const std::uint32_t> first);
+  void updateMotions();
+  [[nodiscard]] double slackOf(std::size_t row) const;
+  /// Of all rows; the worst of every block that does not hold goes into `tried`.
+  void findViolated();
+  [[nodiscard]] std::size_t mostViolatedOfTried() const;
+  bool enforceTried();
+  bool enforce(std::size_t p);
+  void dropActive(std::size_t position);
+
+  ActiveSet active;
+  std::vector<Matrix6> L;
+  std::array<std::vector<double>, 10> columns;  ///< gap, normal, its moment about A's origin, about B's
+  std::vector<double> slack;
+  std::vector<std::uint8_t> is_active;
+  std::vector<std::array<std::int32_t, 2>> body_of;
+  std::vector<Run> runs;
+  std::vector<std::uint32_t> tried;
+  std::vector<double> y0, y, x, normal, step, r, u;  // u: multipliers in the order of `active`
+  std::size_t bodies = 0;
+  std::size_t row_count = 0;
+  std::uint32_t iterations = 0;
+  std::uint32_t iteration_limit = 0;
+};
+
+}  // namespace tenon
