@@ -1,35 +1,19 @@
 #include "server/collision/pair_query.h"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
+
+#include "server/collision/query_kernels.h"
 
 namespace tenon {
 namespace {
 
-/// [m] Sphere centres and radii are stored as floats: what rounding may take from a ball is given back.
-constexpr double kSphereSlack = 1e-6;
-
-/// Below this the interpolant's gradient says nothing: the point is near a medial axis (a thin sheet's
-/// middle).
-constexpr double kLeastGradient = 0.3;
-
 /// [m^2] The paper gives no unit for its stiffness; here K [N/m] is felt when 1 cm^2 of skin is inside.
 constexpr double kReferenceArea = 1e-4;
 
-/// [m] The gap of a pair that has nothing to test: far, yet a number that can be divided.
-constexpr double kNothingNear = 1e6;
-
-/// Half the diagonal of a voxel, rounded up: no interpolated distance is further from the truth [voxels].
-constexpr double kHalfDiagonal = 0.8661;
-
 /// Cosine of the angle up to which two normals push in the same direction.
 constexpr double kSameDirection = 0.95;
-
-/// The points of one leaf, as lanes: seen in M of the field, and what the field says there.
-struct Lanes {
-  std::array<double, Pointshell::kLeafPoints> x, y, z;
-  std::array<FieldSample, Pointshell::kLeafPoints> samples;
-};
 
 /// Some of a leaf's points, by their number in it or in the list.
 using LeafSubset = FixedVector<std::uint32_t, Pointshell::kLeafPoints>;
@@ -78,140 +62,129 @@ bool smallerGap(const Contact& a, const Contact& b) {
   return a.gap != b.gap ? a.gap < b.gap : a.point < b.point;
 }
 
-/// Both bodies of a query, as its points see them.
-class Frames {
- public:
-  explicit Frames(const PairQuery& query)
-      : field_(*query.field_B),
-        dilation_(query.dilation),
-        R_WA_(query.X_WA.matrix()),
-        R_WB_(query.X_WB.matrix()),
-        p_WA_(query.X_WA.translation()) {
-    const Pose X_BA = query.X_WB.inverse() * query.X_WA;
-    R_BA_ = X_BA.matrix();
-    p_BA_B_ = X_BA.translation();
+/// Sixteen points with all that a contact needs.
+struct Lanes {
+  SampleLanes samples;
+  ContactLanes contacts;
+
+  [[nodiscard]] Vector3 gradient(std::size_t i) const {
+    return {samples.gradient_x[i], samples.gradient_y[i], samples.gradient_z[i]};
   }
-
-  [[nodiscard]] Vector3 inB(const Vector3& p_AP) const { return p_BA_B_ + R_BA_ * p_AP; }
-
   /// Sets place, gap and normal.
-  void setContact(const ShellPoint& point, const FieldSample& sample, Contact& contact) const {
-    contact.p_WP = p_WA_ + R_WA_ * point.p_MP.cast<double>();
-    contact.gap = sample.distance - dilation_;
+  void setContact(const LaneFrame& frame, const ShellPoint& point, std::size_t i, Contact& contact) const {
+    contact.p_WP = Vector3(contacts.x[i], contacts.y[i], contacts.z[i]);
+    contact.gap = samples.distance[i] - frame.dilation;
     // B pushes A out along its own normal or, where it has none, into A's own inside
-    const double slope = sample.gradient.norm();
-    contact.n_W = slope >= kLeastGradient ? Vector3(R_WB_ * (sample.gradient / slope))
-                                          : Vector3(R_WA_ * point.inward_M.cast<double>()).normalized();
+    const bool sloping = (contacts.sloping >> i & 1U) != 0;
+    contact.n_W = sloping ? Vector3(contacts.n_x[i], contacts.n_y[i], contacts.n_z[i])
+                          : Vector3(frame.R_WA * point.inward_M.cast<double>()).normalized();
   }
-
- protected:
-  const DistanceField& field_;
-  double dilation_;
-
- private:
-  Matrix3 R_WA_, R_WB_, R_BA_;
-  Vector3 p_WA_, p_BA_B_;
 };
 
+/// Calls `visit(lane)` for every bit that is set, lowest first.
+template <typename Visit>
+void forEachLane(std::uint32_t bits, Visit&& visit) {
+  for (; bits != 0; bits &= bits - 1) visit(static_cast<std::uint32_t>(std::countr_zero(bits)));
+}
+
 /// One walk over a shell: what stays the same from sphere to sphere.
-class Walk : private Frames {
+class Walk {
  public:
   Walk(const PairQuery& query, PairQueryResult& result)
-      : Frames(query),
+      : frame_(*query.field_B, query.X_WA, query.X_WB, query.dilation, query.margin),
+        kernels_(kernelsFor(*query.field_B)),
         shell_(*query.shell_A),
-        margin_(query.margin),
+        sum_(query.sum),
+        prune_(query.prune),
         can_thin_(query.thin),
-        voxel_(field_.voxel()),
         result_(result) {}
 
-  void run(std::uint32_t levels) {
-    if (!reaches(shell_.ballCentre(), shell_.ballRadius())) return;
-    const std::uint32_t used =
-        std::min<std::uint32_t>(levels, static_cast<std::uint32_t>(shell_.levels().size()));
-    for (std::uint32_t k = 0; k < used; ++k) {
+  void run(std::size_t levels) {
+    if (!wholeReaches()) return;
+    std::size_t block = 0;
+    for (std::size_t k = 0; k < levels; ++k) {
       const ShellLevel& level = shell_.levels()[k];
-      for (std::uint32_t c = 0; c < level.cluster_count; ++c)
-        walk(shell_.clusters()[level.first_cluster + c]);
+      for (std::uint32_t c = 0; c < level.cluster_count; c += ShellBlock::kLanes) {
+        const std::uint32_t reaching = reachingOf(shell_.clusterBlocks()[block++], false);
+        forEachLane(reaching, [&](std::uint32_t i) { walk(level.first_cluster + c + i); });
+      }
     }
   }
 
   void setAreaScale(double scale) { area_scale_ = scale; }
 
  private:
-  /// False when no point of the ball can be a contact; then its bound counts as the gap of its points.
-  bool reaches(const Vector3& p_AC, double radius, bool look_closer = false) {
+  bool wholeReaches() {
     ++result_.counts.spheres_visited;
-    const Vector3 p_BC = inB(p_AC);
-    const double need = radius + kSphereSlack + dilation_;
-    double bound = field_.lowerBound(p_BC) - need;
-    if (bound <= margin_ && look_closer) {
-      // the interpolant at a point is above the true distance there less half a voxel's diagonal, that is
-      // above the true distance here less the way; and so back to the interpolant here
-      const FieldSample sample = field_.sample(p_BC);
-      bound = sample.distance - (sample.exact ? 2.0 : 1.0) * kHalfDiagonal * voxel_ - need;
-    }
-    if (bound <= margin_) return true;
-    result_.smallest_gap = std::min(result_.smallest_gap, bound);
-    result_.others_gap = std::min(result_.others_gap, bound);
+    const double need = shell_.ballRadius() + frame_.sphere_slack + frame_.dilation;
+    const double bound = frame_.field.lowerBound(frame_.inB(shell_.ballCentre())) - need;
+    if (!prune_ || bound <= frame_.margin) return true;
+    keepBound(bound);
     return false;
   }
 
-  void walk(const ShellSphere& cluster) {
-    if (!reaches(cluster.p_MC.cast<double>(), cluster.radius)) return;
-    for (std::uint32_t i = 0; i < cluster.count; ++i) {
-      const ShellSphere& leaf = shell_.leaves()[cluster.first + i];
-      if (reaches(leaf.p_MC.cast<double>(), leaf.radius, true)) test(leaf);
-    }
+  /// The balls that a contact may be in; the bounds of all others count as the gaps of their points.
+  std::uint32_t reachingOf(const ShellBlock& balls, bool closer) {
+    result_.counts.spheres_visited += balls.count;
+    if (!prune_) return (1U << balls.count) - 1U;
+    const BallLanes lanes = kernels_.balls(frame_, balls, closer);
+    keepBound(lanes.smallest_bound);
+    return lanes.reaching;
   }
 
-  void test(const ShellSphere& leaf) {
+  void keepBound(double bound) {
+    result_.smallest_gap = std::min(result_.smallest_gap, bound);
+    result_.others_gap = std::min(result_.others_gap, bound);
+  }
+
+  void walk(std::uint32_t cluster) {
+    const std::uint32_t first = shell_.clusters()[cluster].first;
+    const std::uint32_t reaching = reachingOf(shell_.leavesOfCluster(cluster), true);
+    forEachLane(reaching, [&](std::uint32_t i) { test(first + i); });
+  }
+
+  void test(std::uint32_t number) {
+    const ShellBlock& block = shell_.pointsOfLeaf(number);
     Lanes lanes;
-    const std::size_t count = std::min<std::size_t>(leaf.count, Pointshell::kLeafPoints);
-    const std::span<const ShellPoint> points = shell_.points().subspan(leaf.first, count);
-    sample(points, lanes);
-    result_.counts.points_visited += static_cast<std::uint32_t>(count);
-
+    SampleLanes& samples = lanes.samples;
+    kernels_.samples(frame_, block, samples);
+    result_.counts.points_visited += block.count;
+    result_.counts.points_colliding += samples.colliding;
+    result_.smallest_gap = std::min(result_.smallest_gap, samples.smallest_distance - frame_.dilation);
+    result_.deepest = std::max(result_.deepest, -samples.smallest_distance);
+    result_.others_gap = std::min(result_.others_gap, samples.smallest_gap_apart);
+    if (samples.near == 0) return;
+    kernels_.contacts(frame_, block, samples, lanes.contacts);
+    if (sum_) sumPush(shell_.leaves()[number].first, lanes);
     LeafSubset near;
-    for (std::uint32_t i = 0; i < count; ++i) {
-      const FieldSample& sample = lanes.samples[i];
-      const double gap = sample.distance - dilation_;
-      result_.smallest_gap = std::min(result_.smallest_gap, gap);
-      result_.deepest = std::max(result_.deepest, -sample.distance);
-      if (gap < 0.0) ++result_.counts.points_colliding;
-      if (sample.exact && gap <= margin_) {
-        near.push_back(i);
-      } else {
-        result_.others_gap = std::min(result_.others_gap, gap);
-      }
-    }
-    if (near.empty()) return;
+    forEachLane(samples.near, [&near](std::uint32_t i) { near.push_back(i); });
     if (can_thin_) near = thinned(near, lanes);
-    keep(leaf, points, lanes, near);
+    keep(shell_.leaves()[number].first, lanes, near);
   }
 
-  /// The kernel: everything that is done for a point whether or not it becomes a contact.
-  void sample(std::span<const ShellPoint> points, Lanes& lanes) const {
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const Vector3 p = inB(points[i].p_MP.cast<double>());
-      lanes.x[i] = p.x();
-      lanes.y[i] = p.y();
-      lanes.z[i] = p.z();
-    }
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      lanes.samples[i] = field_.sample(Vector3(lanes.x[i], lanes.y[i], lanes.z[i]));
-    }
+  void sumPush(std::uint32_t first, const Lanes& lanes) {
+    forEachLane(lanes.samples.near, [&](std::uint32_t i) {
+      Contact contact;
+      const ShellPoint& point = shell_.points()[first + i];
+      lanes.setContact(frame_, point, i, contact);
+      if (contact.gap >= 0.0) return;
+      contact.area = point.area * area_scale_;
+      const Vector3 push = penaltyForce(contact, 1.0) * contact.n_W;
+      result_.push_Ao_W += {push, (contact.p_WP - frame_.p_WA).cross(push)};
+      ++result_.pushing;
+    });
   }
 
-  void keep(const ShellSphere& leaf, std::span<const ShellPoint> points, const Lanes& lanes,
-            const LeafSubset& near) {
+  void keep(std::uint32_t first, const Lanes& lanes, const LeafSubset& near) {
     if (leaf_count_ < leaf_starts_.size()) {
       leaf_starts_[leaf_count_++] = static_cast<std::uint32_t>(result_.contacts.size());
     }
     for (const std::uint32_t i : near) {
       Contact contact;
-      setContact(points[i], lanes.samples[i], contact);
-      contact.area = points[i].area * area_scale_;
-      contact.point = leaf.first + i;
+      const ShellPoint& point = shell_.points()[first + i];
+      lanes.setContact(frame_, point, i, contact);
+      contact.area = point.area * area_scale_;
+      contact.point = first + i;
       add(contact);
     }
   }
@@ -222,8 +195,8 @@ class Walk : private Frames {
     while (true) {
       if (per_leaf_ < near.size()) {
         chosen = nearestOfEachDirection(
-            near, per_leaf_, [&](std::uint32_t i) { return lanes.samples[i].distance; },
-            [&](std::uint32_t i) -> const Vector3& { return lanes.samples[i].gradient; });
+            near, per_leaf_, [&](std::uint32_t i) { return lanes.samples.distance[i]; },
+            [&](std::uint32_t i) { return lanes.gradient(i); });
       }
       const bool fits = result_.contacts.size() + chosen.size() <= ContactList::capacity();
       if (fits || per_leaf_ == 1 || result_.counts.contacts_dropped > 0) break;
@@ -264,10 +237,12 @@ class Walk : private Frames {
     std::push_heap(contacts.begin(), contacts.end(), smallerGap);
   }
 
+  const LaneFrame frame_;
+  const QueryKernels& kernels_;
   const Pointshell& shell_;
-  double margin_;
+  bool sum_;
+  bool prune_;
   bool can_thin_;
-  double voxel_;
   double area_scale_ = 1.0;
   std::size_t per_leaf_ = Pointshell::kLeafPoints;           ///< and direction
   std::array<std::uint32_t, kMaxPairContacts> leaf_starts_;  ///< where the listed leaves begin
@@ -288,6 +263,8 @@ double QueryCounts::loadPercent() const {
 void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
   result.contacts.clear();
   result.counts = {};
+  result.push_Ao_W = {};
+  result.pushing = 0;
   result.deepest = 0.0;
   result.smallest_gap = kNothingNear;
   result.others_gap = kNothingNear;
@@ -303,7 +280,7 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
   }
   Walk walk(query, result);
   if (used > 0 && used < levels.size()) walk.setAreaScale(levels[used - 1].area_scale);
-  walk.run(query.levels);
+  walk.run(used);
 
   if (result.counts.contacts_dropped > 0) {
     result.listed_to = result.contacts[0].gap;
@@ -315,25 +292,38 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
 }
 
 void resampleContacts(const PairQuery& query, double moved, PairQueryResult& result) noexcept {
-  const Frames frames(query);
+  const LaneFrame frame(*query.field_B, query.X_WA, query.X_WB, query.dilation, query.margin);
+  const QueryKernels& kernels = kernelsFor(*query.field_B);
   const std::span<const ShellPoint> points = query.shell_A->points();
   ContactList& contacts = result.contacts;
   result.smallest_gap = result.others_gap - moved;
   result.deepest = std::max(-(result.smallest_gap + query.dilation), 0.0);
   std::uint32_t colliding = 0;
   std::size_t kept = 0;
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    Contact contact = contacts[i];
-    const ShellPoint& point = points[contact.point];
-    const FieldSample sample = query.field_B->sample(frames.inB(point.p_MP.cast<double>()));
-    frames.setContact(point, sample, contact);
-    result.smallest_gap = std::min(result.smallest_gap, contact.gap);
-    result.deepest = std::max(result.deepest, -sample.distance);
-    if (contact.gap < 0.0) ++colliding;
-    if (sample.exact) {
-      contacts[kept++] = contact;
-    } else {
-      result.others_gap = std::min(result.others_gap, contact.gap);
+  for (std::size_t first = 0; first < contacts.size(); first += ShellBlock::kLanes) {
+    ShellBlock block;
+    block.count = static_cast<std::uint32_t>(std::min(contacts.size() - first, ShellBlock::kLanes));
+    for (std::uint32_t i = 0; i < block.count; ++i) {
+      const Vector3f& p_AP = points[contacts[first + i].point].p_MP;
+      block.x[i] = p_AP.x();
+      block.y[i] = p_AP.y();
+      block.z[i] = p_AP.z();
+    }
+    Lanes lanes;
+    kernels.samples(frame, block, lanes.samples);
+    kernels.contacts(frame, block, lanes.samples, lanes.contacts);
+    const double smallest = lanes.samples.smallest_distance;
+    result.smallest_gap = std::min(result.smallest_gap, smallest - frame.dilation);
+    result.deepest = std::max(result.deepest, -smallest);
+    colliding += lanes.samples.colliding;
+    for (std::uint32_t i = 0; i < block.count; ++i) {
+      Contact contact = contacts[first + i];
+      lanes.setContact(frame, points[contact.point], i, contact);
+      if ((lanes.samples.exact >> i & 1U) != 0) {
+        contacts[kept++] = contact;
+      } else {
+        result.others_gap = std::min(result.others_gap, contact.gap);
+      }
     }
   }
   result.counts.points_visited += static_cast<std::uint32_t>(contacts.size());

@@ -45,6 +45,8 @@ struct PairQuery {
   /// When room runs out, points give way first that stand behind a neighbour (of the same leaf, with about
   /// the same normal and a smaller gap): a flat patch then stays listed over all its width.
   bool thin = false;
+  bool sum = false;   ///< also sum what all points inside push, listed or not
+  bool prune = true;  ///< false: every point is tested, for comparison
 };
 
 struct PairQueryResult {
@@ -54,9 +56,11 @@ struct PairQueryResult {
       0.0;  ///< of all points, a lower bound when none is within the margin; dilation included
   double listed_to =
       0.0;  ///< [m] every contact with a smaller gap is in the list: the margin, or less when full
-  double others_gap = 0.0;  ///< [m] no point outside the list has a smaller gap, thinned ones aside
-  bool thinned = false;     ///< some points gave way to their neighbours
-  double deepest = 0.0;     ///< [m] depth in the undilated field of the deepest point, 0 when apart
+  double others_gap = 0.0;    ///< [m] no point outside the list has a smaller gap, thinned ones aside
+  bool thinned = false;       ///< some points gave way to their neighbours
+  Wrench push_Ao_W;           ///< [m] and [m^2] of penalty a N/m of stiffness, when asked for
+  std::uint32_t pushing = 0;  ///< points in that sum; deeper than the field's band nothing pushes
+  double deepest = 0.0;       ///< [m] depth in the undilated field of the deepest point, 0 when apart
 };
 
 /// All points of A's shell whose gap to B is at most `margin`. Spheres that the field proves to be farther

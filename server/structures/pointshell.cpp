@@ -4,6 +4,35 @@
 
 namespace tenon {
 
+namespace {
+
+ShellBlock blockOf(std::span<const ShellPoint> points) {
+  ShellBlock block;
+  block.count = static_cast<std::uint32_t>(std::min(points.size(), ShellBlock::kLanes));
+  for (std::size_t lane = 0; lane < ShellBlock::kLanes && block.count > 0; ++lane) {
+    const Vector3f& p_MP = points[lane < block.count ? lane : 0].p_MP;
+    block.x[lane] = p_MP.x();
+    block.y[lane] = p_MP.y();
+    block.z[lane] = p_MP.z();
+  }
+  return block;
+}
+
+ShellBlock blockOf(std::span<const ShellSphere> balls) {
+  ShellBlock block;
+  block.count = static_cast<std::uint32_t>(std::min(balls.size(), ShellBlock::kLanes));
+  for (std::size_t lane = 0; lane < ShellBlock::kLanes && block.count > 0; ++lane) {
+    const ShellSphere& ball = balls[lane < block.count ? lane : 0];
+    block.x[lane] = ball.p_MC.x();
+    block.y[lane] = ball.p_MC.y();
+    block.z[lane] = ball.p_MC.z();
+    block.radius[lane] = ball.radius;
+  }
+  return block;
+}
+
+}  // namespace
+
 Pointshell::Pointshell(const Layout& layout, std::shared_ptr<const void> owner)
     : layout_(layout), owner_(std::move(owner)) {
   if (layout_.points.empty()) return;
@@ -15,6 +44,21 @@ Pointshell::Pointshell(const Layout& layout, std::shared_ptr<const void> owner)
     radius_ = std::max(radius_, p_MP.norm());
     ball_radius_ = std::max(ball_radius_, (p_MP - p_MC_).norm());
   }
+
+  auto blocks = std::make_shared<Blocks>();
+  for (const ShellSphere& leaf : layout_.leaves) {
+    blocks->leaves.push_back(blockOf(layout_.points.subspan(leaf.first, leaf.count)));
+  }
+  for (const ShellSphere& cluster : layout_.clusters) {
+    blocks->clusters.push_back(blockOf(layout_.leaves.subspan(cluster.first, cluster.count)));
+  }
+  for (const ShellLevel& level : layout_.levels) {
+    for (std::uint32_t c = 0; c < level.cluster_count; c += ShellBlock::kLanes) {
+      const std::size_t count = std::min<std::size_t>(level.cluster_count - c, ShellBlock::kLanes);
+      blocks->levels.push_back(blockOf(layout_.clusters.subspan(level.first_cluster + c, count)));
+    }
+  }
+  blocks_ = std::move(blocks);
 }
 
 }  // namespace tenon

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "idl/types/spatial.h"
 
@@ -32,10 +34,19 @@ struct ShellLevel {
   float area_scale = 1.0F;  ///< point areas are multiplied by this when levels above this one are left out
 };
 
+/// Sixteen points or balls side by side, as vector instructions read them; unused lanes repeat the first.
+struct alignas(64) ShellBlock {
+  static constexpr std::size_t kLanes = 16;
+  std::array<float, kLanes> x{}, y{}, z{};  ///< [m] in M
+  std::array<float, kLanes> radius{};       ///< [m] of balls; 0 for points
+  std::uint32_t count = 0;                  ///< lanes in use
+};
+
 /// An object as points on its skin with a tree of spheres over them (paper §3.1, "point-sphere tree").
 ///
 /// Points are stored by level, inside a level by leaf (at most 16 neighbours), leaves by cluster (at most 16
-/// leaves). A query walks clusters, then leaves, then points of the levels that its budget allows.
+/// leaves). A query walks clusters, then leaves, then points of the levels that its budget allows, sixteen at
+/// a time: blocks hold them side by side.
 ///
 /// A view, as DistanceField. Threads: constant. Real-time: all.
 class Pointshell {
@@ -59,6 +70,15 @@ class Pointshell {
   [[nodiscard]] std::span<const ShellLevel> levels() const { return layout_.levels; }
   [[nodiscard]] bool empty() const { return layout_.points.empty(); }
 
+  /// The points of a leaf, by its number.
+  [[nodiscard]] const ShellBlock& pointsOfLeaf(std::size_t leaf) const { return blocks_->leaves[leaf]; }
+  /// The leaves of a cluster, by its number.
+  [[nodiscard]] const ShellBlock& leavesOfCluster(std::size_t cluster) const {
+    return blocks_->clusters[cluster];
+  }
+  /// The clusters of all levels, sixteen at a time; each level begins a new block.
+  [[nodiscard]] std::span<const ShellBlock> clusterBlocks() const { return blocks_->levels; }
+
   /// Largest distance of a point from the mesh origin [m]: bounds the speed of any point by |v| + |w| radius.
   [[nodiscard]] double radius() const { return radius_; }
   /// A ball that holds all points: centre in M and radius [m].
@@ -66,8 +86,13 @@ class Pointshell {
   [[nodiscard]] double ballRadius() const { return ball_radius_; }
 
  private:
+  struct Blocks {
+    std::vector<ShellBlock> leaves, clusters, levels;
+  };
+
   Layout layout_;
   std::shared_ptr<const void> owner_;
+  std::shared_ptr<const Blocks> blocks_;  ///< the same numbers as the spans, side by side
   double radius_ = 0.0;
   Vector3 p_MC_ = Vector3::Zero();
   double ball_radius_ = 0.0;

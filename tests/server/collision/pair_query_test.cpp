@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/collision/query_kernels.h"
 #include "tests/support/analytic_structures.h"
 #include "tests/support/realtime_guard.h"
 
@@ -40,13 +41,11 @@ Asked ask(const StructuresPtr& a, const StructuresPtr& b, const Pose& X_WA, cons
 
 /// Every point, no tree: what the walk has to find.
 std::vector<Contact> flatContacts(const PairQuery& query) {
-  const Pose X_BA = query.X_WB.inverse() * query.X_WA;
-  const Matrix3 R_BA = X_BA.matrix();
+  const LaneFrame frame(*query.field_B, query.X_WA, query.X_WB, query.dilation, query.margin);
   std::vector<Contact> contacts;
   const auto points = query.shell_A->points();
   for (std::uint32_t i = 0; i < points.size(); ++i) {
-    const FieldSample sample =
-        query.field_B->sample(X_BA.translation() + R_BA * points[i].p_MP.cast<double>());
+    const FieldSample sample = query.field_B->sample(frame.inB(points[i].p_MP.cast<double>()));
     Contact contact;
     contact.gap = sample.distance - query.dilation;
     contact.point = i;
@@ -223,6 +222,21 @@ TEST(PenaltyWrench, OfABallInAFloorIsTheCapsVolume) {
   // integral of depth over the cap's skin: 2 pi r * depth^2 / 2
   const double truth = 1000.0 / 1e-4 * std::numbers::pi * r * depth * depth;
   EXPECT_NEAR(penaltyWrench(*asked, X_WA.translation(), 1000.0).force.z(), truth, 0.03 * truth);
+}
+
+TEST(PenaltyWrench, CountsThePointsThatTheListHasNoRoomFor) {
+  const StructuresPtr plate = boxStructures({0.1, 0.1, 0.01}, 0.002, 0.003);
+  const StructuresPtr floor = floorStructures(0.3, 0.002);
+  Asked asked = ask(plate, floor, Pose(Vector3(0.0, 0.0, 0.0048)), Pose(), 0.0, 0.0);
+  ASSERT_GT(asked->counts.contacts_dropped, 0U);
+  asked.query.sum = true;
+  queryPair(asked.query, *asked.result);
+  EXPECT_EQ(asked->pushing, asked->contacts.size() + asked->counts.contacts_dropped);
+  double area = 0.0;
+  for (const Contact& contact : flatContacts(asked.query)) {
+    area += static_cast<double>(plate->shell.points()[contact.point].area);
+  }
+  EXPECT_NEAR(asked->push_Ao_W.force.z(), 0.0002 * area / 1e-4, 1e-6 * area / 1e-4);
 }
 
 TEST(PenaltyWrench, TurnsWithTheWorld) {

@@ -1,0 +1,160 @@
+#include "server/collision/query_kernels.h"
+
+#include <bit>
+#include <memory>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "server/collision/pair_query.h"
+#include "tests/support/analytic_structures.h"
+
+namespace tenon {
+namespace {
+
+using test::boxStructures;
+using test::StructuresPtr;
+
+/// A box's field whose one corner has voxels four times finer.
+StructuresPtr refinedBox() {
+  const Vector3 size(0.06, 0.05, 0.04);
+  const Eigen::AlignedBox3d box(-size / 2, size / 2);
+  const std::vector<Eigen::AlignedBox3d> refine{{Vector3::Zero(), size}};
+  auto structures = std::make_shared<HapticStructures>();
+  structures->field = buildField(test::boxDistance(size), box, 0.002, refine, 4);
+  return structures;
+}
+
+std::vector<StructuresPtr> fields() {
+  return {boxStructures({0.06, 0.06, 0.06}, 0.002, 0.004), test::sphereStructures(0.04, 0.002, 0.004),
+          test::cornerStructures(0.1, 0.003), test::sheetStructures(0.1, 0.0, 0.002, 0.0007), refinedBox()};
+}
+
+Pose randomPose(std::mt19937_64& engine, double reach) {
+  const auto number = [&engine] {
+    return 2.0 * (static_cast<double>(engine() >> 11U) / 9007199254740992.0) - 1.0;
+  };
+  Vector3 p;
+  Vector3 w;
+  for (int i = 0; i < 3; ++i) p[i] = reach * number();
+  for (int i = 0; i < 3; ++i) w[i] = 2.5 * number();
+  return {p, expRotation(w)};
+}
+
+bool sameBits(const Vector3& a, const Vector3& b) {
+  for (int i = 0; i < 3; ++i) {
+    if (std::bit_cast<std::uint64_t>(a[i]) != std::bit_cast<std::uint64_t>(b[i])) return false;
+  }
+  return true;
+}
+
+void expectSame(const PairQueryResult& a, const PairQueryResult& b) {
+  ASSERT_EQ(a.contacts.size(), b.contacts.size());
+  for (std::size_t i = 0; i < a.contacts.size(); ++i) {
+    ASSERT_EQ(a.contacts[i].point, b.contacts[i].point);
+    ASSERT_EQ(a.contacts[i].gap, b.contacts[i].gap);
+    ASSERT_EQ(a.contacts[i].area, b.contacts[i].area);
+    ASSERT_TRUE(sameBits(a.contacts[i].p_WP, b.contacts[i].p_WP));
+    ASSERT_TRUE(sameBits(a.contacts[i].n_W, b.contacts[i].n_W));
+  }
+  ASSERT_EQ(a.smallest_gap, b.smallest_gap);
+  ASSERT_EQ(a.others_gap, b.others_gap);
+  ASSERT_EQ(a.deepest, b.deepest);
+  ASSERT_EQ(a.counts.spheres_visited, b.counts.spheres_visited);
+  ASSERT_EQ(a.counts.points_visited, b.counts.points_visited);
+  ASSERT_EQ(a.counts.points_colliding, b.counts.points_colliding);
+}
+
+/// Leaves the process with the kernels it began with.
+class QueryKernelsTest : public testing::Test {
+ protected:
+  ~QueryKernelsTest() override { chooseKernels(supportedKernels().back().isa); }
+};
+
+TEST_F(QueryKernelsTest, PlainCodeIsAlwaysThereAndAnUnknownSetIsRefused) {
+  EXPECT_EQ(supportedKernels().front().isa, "scalar");
+  for (const QueryKernels& kernels : supportedKernels()) EXPECT_TRUE(chooseKernels(kernels.isa));
+  EXPECT_FALSE(chooseKernels("abacus"));
+}
+
+TEST_F(QueryKernelsTest, EveryInstructionSetGivesTheSameBits) {
+  const StructuresPtr box = boxStructures({0.08, 0.05, 0.03}, 0.002, 0.004);
+  const std::vector<StructuresPtr> others = fields();
+  std::mt19937_64 engine(21);
+  const auto expected = std::make_unique<PairQueryResult>();
+  const auto expected_later = std::make_unique<PairQueryResult>();
+  const auto result = std::make_unique<PairQueryResult>();
+  std::size_t found = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    const StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
+    const Pose X_WA = randomPose(engine, trial % 7 == 0 ? 0.3 : 0.07);
+    PairQuery query{&box->shell, &other->field, X_WA, randomPose(engine, 0.02), 0.0004, 0.001};
+    query.thin = trial % 2 == 0;
+    PairQuery later = query;
+    later.X_WA.translation() += Vector3(1e-4, -2e-4, 1e-4);
+    for (const QueryKernels& kernels : supportedKernels()) {
+      ASSERT_TRUE(chooseKernels(kernels.isa));
+      SCOPED_TRACE(testing::Message() << kernels.isa << ", trial " << trial);
+      queryPair(query, *result);
+      found += result->contacts.size();
+      if (kernels.isa == "scalar") *expected = *result;
+      expectSame(*expected, *result);
+      if (HasFatalFailure()) return;
+      resampleContacts(later, 3e-4, *result);
+      if (kernels.isa == "scalar") *expected_later = *result;
+      expectSame(*expected_later, *result);
+      if (HasFatalFailure()) return;
+    }
+  }
+  EXPECT_GT(found, 50000U);
+}
+
+TEST_F(QueryKernelsTest, LanesAreTheFieldsOwnAnswers) {
+  const StructuresPtr box = boxStructures({0.08, 0.05, 0.03}, 0.002, 0.004);
+  std::mt19937_64 engine(22);
+  SampleLanes lanes;
+  for (const StructuresPtr& other : fields()) {
+    for (int trial = 0; trial < 50; ++trial) {
+      const LaneFrame frame(other->field, randomPose(engine, 0.07), Pose(), 0.0004, 0.001);
+      for (const QueryKernels& kernels : supportedKernels()) {
+        for (std::size_t leaf = 0; leaf < box->shell.leaves().size(); ++leaf) {
+          kernels.samples(frame, box->shell.pointsOfLeaf(leaf), lanes);
+          const ShellSphere& ball = box->shell.leaves()[leaf];
+          for (std::uint32_t i = 0; i < ball.count; ++i) {
+            const Vector3 p_AP = box->shell.points()[ball.first + i].p_MP.cast<double>();
+            const FieldSample sample = other->field.sample(frame.inB(p_AP));
+            ASSERT_EQ(lanes.distance[i], sample.distance) << kernels.isa;
+            ASSERT_EQ((lanes.exact >> i & 1U) != 0, sample.exact) << kernels.isa;
+            ASSERT_EQ(lanes.gradient_x[i], sample.gradient.x()) << kernels.isa;
+            ASSERT_EQ(lanes.gradient_y[i], sample.gradient.y()) << kernels.isa;
+            ASSERT_EQ(lanes.gradient_z[i], sample.gradient.z()) << kernels.isa;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST_F(QueryKernelsTest, PruningChangesNoContact) {
+  const StructuresPtr box = boxStructures({0.08, 0.05, 0.03}, 0.002, 0.006);
+  const std::vector<StructuresPtr> others = fields();
+  std::mt19937_64 engine(23);
+  const auto pruned = std::make_unique<PairQueryResult>();
+  const auto flat = std::make_unique<PairQueryResult>();
+  for (int trial = 0; trial < 3000; ++trial) {
+    const StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
+    PairQuery query{&box->shell, &other->field, randomPose(engine, 0.07), Pose(), 0.0004, 0.001};
+    queryPair(query, *pruned);
+    query.prune = false;
+    queryPair(query, *flat);
+    EXPECT_EQ(flat->counts.points_visited, box->shell.points().size());
+    ASSERT_EQ(pruned->contacts.size(), flat->contacts.size()) << "trial " << trial;
+    for (std::size_t i = 0; i < flat->contacts.size(); ++i) {
+      ASSERT_EQ(pruned->contacts[i].point, flat->contacts[i].point);
+      ASSERT_EQ(pruned->contacts[i].gap, flat->contacts[i].gap);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tenon
