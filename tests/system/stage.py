@@ -18,9 +18,9 @@ def free_domain():
     return 1 + os.getpid() % 90
 
 
-def tenon(*words, timeout=600, env=None):
+def tenon(*words, timeout=600, env=None, input=None):
     """Runs the front door to its end, on the programs of this build."""
-    return subprocess.run([FRONT_DOOR, *map(str, words)], capture_output=True, text=True, timeout=timeout,
+    return subprocess.run([FRONT_DOOR, *map(str, words)], capture_output=True, text=True, timeout=timeout, input=input,
                           env={**os.environ, "TENON_PROGRAMS": str(PROGRAMS), **(env or {})})
 
 

@@ -8,6 +8,17 @@ from pathlib import Path
 from stage import Stage, tenon
 
 
+def cube(folder):
+    """A cube of 20 mm about the origin, baked at 1 mm."""
+    mesh, baked = Path(folder) / "cube.off", Path(folder) / "cube.tenon"
+    corners = [f"{x} {y} {z}" for z in (-10, 10) for y in (-10, 10) for x in (-10, 10)]
+    sides = ("0 2 3 1", "4 5 7 6", "0 1 5 4", "2 6 7 3", "0 4 6 2", "1 3 7 5")
+    mesh.write_text("\n".join(["OFF", "8 6 0", *corners, *(f"4 {side}" for side in sides)]) + "\n", encoding="utf-8")
+    done = tenon("bake", mesh, "-o", baked, "--voxel", "1mm", "--points", "2000", "--quiet")
+    assert done.returncode == 0, done.stderr
+    return baked
+
+
 class Verbs(unittest.TestCase):
     def test_version_names_a_version(self):
         self.assertRegex(tenon("version").stdout, r"^tenon \d+\.\d+\.\d+$")
@@ -42,6 +53,61 @@ class Verbs(unittest.TestCase):
             info = tenon("bake", "--info", baked)
             self.assertNotEqual(info.returncode, 0)
             self.assertIn("peg.tenon", info.stderr)
+
+    def test_probe_tells_distance_and_normal_or_far(self):
+        with tempfile.TemporaryDirectory() as folder:
+            baked = cube(folder)
+            done = tenon("probe", baked, input="# beside, inside, away\n0.011 0 0\n0.0 0.001 0.0085\n\n0.5 0 0\n")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            beside, inside, away = [line.split() for line in done.stdout.splitlines()]
+            self.assertAlmostEqual(float(beside[0]), 0.001, places=5)
+            self.assertAlmostEqual(float(beside[1]), 1.0, places=4)
+            self.assertAlmostEqual(float(inside[0]), -0.0015, places=5)
+            self.assertAlmostEqual(float(inside[3]), 1.0, places=4)
+            self.assertEqual(away, ["far"])
+
+    def test_contact_is_the_penalty_of_the_points_inside_on_every_path(self):
+        with tempfile.TemporaryDirectory() as folder:
+            baked, poses = cube(folder), Path(folder) / "poses"
+            # a cube half a millimetre deep in the side of another, and one away from it
+            poses.write_text("0.0195 0 0 1 0 0 0\n0.1 0 0 1 0 0 0\n", encoding="utf-8")
+            tables = {}
+            for words in ((), ("--isa", "scalar"), ("--no-prune",)):
+                table = Path(folder) / "table.csv"
+                done = tenon("contact", baked, baked, "--poses", poses, "--csv", table, "--stiffness", "500", *words)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertIn("2, 1 in contact", done.stdout)
+                rows = [line.split(",") for line in table.read_text(encoding="utf-8").splitlines()]
+                self.assertEqual(rows[0], "index,microseconds,contacts,penetration_m,fx,fy,fz,tx,ty,tz,load_percent".split(","))
+                tables[words] = [row[:1] + row[2:10] for row in rows[1:]]
+            touching, away = tables[()]
+            self.assertAlmostEqual(float(touching[2]), 0.0005, places=5)
+            # 500 N/m for each cm^2 of the 4 cm^2 that are inside, rim points stand for some of the sides
+            self.assertAlmostEqual(float(touching[3]), 500 * 0.0005 * 4, delta=0.3)
+            self.assertEqual([float(number) for number in away[1:]], [0.0] * 8)
+            for words, table in tables.items():
+                self.assertEqual(table, tables[()], words)
+
+    def test_bad_points_and_poses_are_refused_by_line(self):
+        with tempfile.TemporaryDirectory() as folder:
+            baked, poses = cube(folder), Path(folder) / "poses"
+            for text, complaint in (("0 0 0\n0 nan 0\n", "points:2: 'nan' is not finite"),
+                                    ("\n0 0\n", "points:2: 2 numbers where 3 are expected"),
+                                    ("0 0 zero\n", "points:1: 'zero' is not a number")):
+                done = tenon("probe", baked, input=text)
+                self.assertEqual(done.returncode, 1)
+                self.assertIn(complaint, done.stderr)
+            for text, complaint in (("0 0 0 1 0 0 0\n0 0 inf 1 0 0 0\n", "poses:2: 'inf' is not finite"),
+                                    ("0 0 0 0 0 0 0\n", "poses:1: qw qx qy qz is not a unit quaternion"),
+                                    ("# nothing\n", "has no poses")):
+                poses.write_text(text, encoding="utf-8")
+                done = tenon("contact", baked, baked, "--poses", poses)
+                self.assertEqual(done.returncode, 1)
+                self.assertIn(complaint, done.stderr)
+            poses.write_text("0 0 0 1 0 0 0\n", encoding="utf-8")
+            self.assertIn("--isa abacus: this processor has scalar",
+                          tenon("contact", baked, baked, "--poses", poses, "--isa", "abacus").stderr)
+            self.assertEqual(tenon("contact", baked, "missing.tenon", "--poses", poses).returncode, 1)
 
     def test_an_observer_speaks_json(self):
         with Stage(lockstep=False) as stage:
