@@ -1,11 +1,15 @@
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <benchmark/benchmark.h>
 
 #include "server/collision/island_solver.h"
 #include "server/collision/pair_query.h"
+#include "server/collision/query_kernels.h"
 #include "tests/support/analytic_structures.h"
 
 /// How long a query and a solve take, next to the flat loop over all points in the same run: times compare
@@ -38,23 +42,47 @@ std::vector<Pose> path(double height) {
 
 PairQuery queryAt(const Pose& X_WA) { return {&box()->shell, &corner()->field, X_WA, Pose(), 0.0027, 0.001}; }
 
-void Query(benchmark::State& state, double height) {
+/// With one set of kernels; `prune` false tests every point.
+void Query(benchmark::State& state, std::string_view isa, double height, bool prune) {
+  chooseKernels(isa);
   const std::vector<Pose> poses = path(height);
   const auto result = std::make_unique<PairQueryResult>();
+  std::vector<double> times;
   double visited = 0.0;
   double contacts = 0.0;
   std::size_t i = 0;
   for (auto _ : state) {
-    queryPair(queryAt(poses[i++ % kPoses]), *result);
+    PairQuery query = queryAt(poses[i++ % kPoses]);
+    query.prune = prune;
+    const auto begin = std::chrono::steady_clock::now();
+    queryPair(query, *result);
+    const std::chrono::duration<double, std::micro> took = std::chrono::steady_clock::now() - begin;
+    times.push_back(took.count());
     visited += result->counts.points_visited;
     contacts += static_cast<double>(result->contacts.size());
   }
+  chooseKernels(supportedKernels().back().isa);
+  std::sort(times.begin(), times.end());
+  state.counters["median_us"] = times[times.size() / 2];
+  state.counters["p99_us"] = times[times.size() * 99 / 100];
   state.counters["points"] = static_cast<double>(box()->shell.points().size());
   state.counters["visited"] = benchmark::Counter(visited, benchmark::Counter::kAvgIterations);
   state.counters["contacts"] = benchmark::Counter(contacts, benchmark::Counter::kAvgIterations);
 }
-BENCHMARK_CAPTURE(Query, InContact, 0.0)->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(Query, Free, 0.05)->Unit(benchmark::kMicrosecond);
+
+void registerQueries() {
+  for (const QueryKernels& kernels : supportedKernels()) {
+    const std::string isa(kernels.isa);
+    const auto add = [&](const char* name, double height, bool prune) {
+      benchmark::RegisterBenchmark((std::string("Query/") + name + "/" + isa).c_str(), Query, kernels.isa,
+                                   height, prune)
+          ->Unit(benchmark::kMicrosecond);
+    };
+    add("InContact", 0.0, true);
+    add("Free", 0.05, true);
+    add("Flat", 0.0, false);
+  }
+}
 
 void FlatLoop(benchmark::State& state) {
   const std::vector<Pose> poses = path(0.0);
@@ -145,4 +173,10 @@ BENCHMARK_CAPTURE(Tick, Tilted, kTilted, 0.5)->Unit(benchmark::kMicrosecond);
 }  // namespace
 }  // namespace tenon
 
-BENCHMARK_MAIN();
+int main(int argc, char** argv) {
+  tenon::registerQueries();
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}
