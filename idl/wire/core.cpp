@@ -137,6 +137,19 @@ std::size_t matchedReaders(dds_entity_t writer) {
   return static_cast<std::size_t>(std::max(0, dds_get_matched_subscriptions(writer, nullptr, 0)));
 }
 
+const Origin& OriginsOf::find(dds_entity_t reader, dds_instance_handle_t writer) {
+  static const Origin unknown;
+  constexpr std::size_t kManyWriters = 1000;  // of a long session's comings and goings
+  if (const auto found = known_.find(writer); found != known_.end()) return found->second;
+  const std::unique_ptr<dds_builtintopic_endpoint_t, void (*)(dds_builtintopic_endpoint_t*)> data(
+      dds_get_matched_publication_data(reader, writer), &dds_builtintopic_free_endpoint);
+  if (!data) return unknown;
+  if (known_.size() >= kManyWriters) known_.clear();
+  Origin& origin = known_[writer];
+  std::copy_n(data->participant_key.v, origin.guid.size(), origin.guid.begin());
+  return origin;
+}
+
 bool isGone(const dds_sample_info_t& info, bool latched) {
   if (info.sample_rank != 0) return false;
   return info.instance_state == DDS_NOT_ALIVE_DISPOSED_INSTANCE_STATE ||
@@ -215,6 +228,13 @@ namespace tenon {
 Participant::Participant(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Participant::~Participant() = default;
 LinkProfile Participant::profile() const { return impl_->profile; }
+Origin Participant::origin() const {
+  Origin origin;
+  dds_guid_t guid{};
+  if (dds_get_guid(impl_->entity, &guid) == DDS_RETCODE_OK)
+    std::copy_n(guid.v, origin.guid.size(), origin.guid.begin());
+  return origin;
+}
 
 Result<std::shared_ptr<Participant>> Participant::open(const LinkOptions& options) {
   auto domain = wire::openDomain(options);

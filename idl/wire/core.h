@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include <dds/dds.h>
@@ -71,6 +72,15 @@ Result<std::unique_ptr<Endpoint>> openReader(const Partition& partition, const T
 /// Whether this sample, the last of its key that was taken (the rank says so: what comes after a valid sample
 /// may have none of its own), ends the key. A latched key outlives its writers.
 [[nodiscard]] bool isGone(const dds_sample_info_t& info, bool latched);
+
+/// The origins of what one reader gets. Asking DDS takes a lock and memory: done once a writer.
+class OriginsOf {
+ public:
+  [[nodiscard]] const Origin& find(dds_entity_t reader, dds_instance_handle_t writer);
+
+ private:
+  std::unordered_map<dds_instance_handle_t, Origin> known_;
+};
 
 /// "WorldFrame_1k in 's/demo': <what DDS says>"
 [[nodiscard]] std::string because(std::string_view what, const Partition::Impl& partition, dds_return_t code);

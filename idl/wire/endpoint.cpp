@@ -92,6 +92,7 @@ std::size_t Writer<M>::matchedReaders() const {
 template <class M>
 struct Reader<M>::Impl {
   std::unique_ptr<wire::Endpoint> endpoint;
+  wire::OriginsOf origins;
 };
 
 template <class M>
@@ -112,11 +113,14 @@ Result<Reader<M>> Reader<M>::open(Partition& partition, const Topic<M>& topic) {
   return Reader(std::move(impl));
 }
 template <class M>
-bool Reader<M>::take(M& out) {
+bool Reader<M>::take(M& out, Origin* from) {
   while (true) {
-    const Loan<M> loan(impl_->endpoint->entity(), 1);
+    const dds_entity_t reader = impl_->endpoint->entity();
+    const Loan<M> loan(reader, 1);
     if (loan.size() == 0) return false;
-    if (loan.info(0).valid_data && wire::fromWire(loan.sample(0), out)) return true;
+    if (!loan.info(0).valid_data || !wire::fromWire(loan.sample(0), out)) continue;
+    if (from != nullptr) *from = impl_->origins.find(reader, loan.info(0).publication_handle);
+    return true;
   }
 }
 template <class M>
@@ -137,8 +141,8 @@ class TypedSource : public wire::Source {
     return static_cast<std::size_t>(loan.size());
   }
 
-  std::vector<std::function<void(const M&)>> handlers;
-  std::vector<std::function<void(const M&)>> gone_handlers;
+  std::vector<Inbox::HandlerFrom<M>> handlers;
+  std::vector<Inbox::HandlerFrom<M>> gone_handlers;
 
  private:
   void deliver(const dds_sample_info_t& info, const typename wire::TypeOf<M>::C& sample) {
@@ -147,15 +151,19 @@ class TypedSource : public wire::Source {
       return;
     }
     if (info.valid_data) {
-      for (const auto& handler : handlers) handler(message_);
+      const Origin& origin = origins_.find(reader->entity(), info.publication_handle);
+      for (const auto& handler : handlers) handler(message_, origin);
     }
     if (wire::isGone(info, latched_)) {
-      for (const auto& handler : gone_handlers) handler(message_);
+      const bool disposed = info.instance_state == DDS_NOT_ALIVE_DISPOSED_INSTANCE_STATE;
+      const Origin who = disposed ? origins_.find(reader->entity(), info.publication_handle) : Origin{};
+      for (const auto& handler : gone_handlers) handler(message_, who);
     }
   }
 
   bool latched_;
   std::uint64_t& malformed_;
+  wire::OriginsOf origins_;
   M message_;
 };
 
@@ -187,7 +195,7 @@ Inbox::Inbox(Inbox&&) noexcept = default;
 Inbox& Inbox::operator=(Inbox&&) noexcept = default;
 
 template <class M>
-Result<void> Inbox::on(Partition& partition, const Topic<M>& topic, std::function<void(const M&)> handler) {
+Result<void> Inbox::onFrom(Partition& partition, const Topic<M>& topic, HandlerFrom<M> handler) {
   auto source = impl_->source(partition, topic);
   if (!source) return tl::unexpected(source.error());
   (*source)->handlers.push_back(std::move(handler));
@@ -195,8 +203,7 @@ Result<void> Inbox::on(Partition& partition, const Topic<M>& topic, std::functio
 }
 
 template <class M>
-Result<void> Inbox::onGone(Partition& partition, const Topic<M>& topic,
-                           std::function<void(const M&)> handler) {
+Result<void> Inbox::onGoneFrom(Partition& partition, const Topic<M>& topic, HandlerFrom<M> handler) {
   auto source = impl_->source(partition, topic);
   if (!source) return tl::unexpected(source.error());
   (*source)->gone_handlers.push_back(std::move(handler));
@@ -215,11 +222,11 @@ std::size_t Inbox::matchedWriters() const {
   return count;
 }
 
-#define TENON_INSTANTIATE(M)                                                                      \
-  template class Writer<M>;                                                                       \
-  template class Reader<M>;                                                                       \
-  template Result<void> Inbox::on<M>(Partition&, const Topic<M>&, std::function<void(const M&)>); \
-  template Result<void> Inbox::onGone<M>(Partition&, const Topic<M>&, std::function<void(const M&)>);
+#define TENON_INSTANTIATE(M)                                                           \
+  template class Writer<M>;                                                            \
+  template class Reader<M>;                                                            \
+  template Result<void> Inbox::onFrom<M>(Partition&, const Topic<M>&, HandlerFrom<M>); \
+  template Result<void> Inbox::onGoneFrom<M>(Partition&, const Topic<M>&, HandlerFrom<M>);
 TENON_WIRE_MESSAGES(TENON_INSTANTIATE)
 #undef TENON_INSTANTIATE
 

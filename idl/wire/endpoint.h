@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -7,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "idl/types/result.h"
 #include "idl/wire/topics.h"
@@ -26,6 +28,15 @@ struct LinkOptions {
   std::string config;
 };
 
+/// Which program put a message on the bus: the GUID of its participant, which the bus gives and checks and no
+/// message can claim. All zero: not known, as of a writer that has gone since.
+struct Origin {
+  std::array<std::uint8_t, 16> guid{};
+
+  [[nodiscard]] bool known() const { return *this != Origin{}; }
+  bool operator==(const Origin&) const = default;
+};
+
 /// A program's presence on the bus.
 ///
 /// All participants of one domain in one process share what the first one configured, because DDS
@@ -40,6 +51,8 @@ class Participant {
   Participant& operator=(const Participant&) = delete;
 
   [[nodiscard]] LinkProfile profile() const;
+  /// As others see it on what this participant writes.
+  [[nodiscard]] Origin origin() const;
 
   struct Impl;
   [[nodiscard]] Impl& impl() { return *impl_; }
@@ -114,7 +127,7 @@ class Reader {
   ~Reader();
 
   /// The next valid message; false when there is none. Keys that went are passed over: use an Inbox.
-  bool take(M& out);
+  bool take(M& out, Origin* from = nullptr);
   [[nodiscard]] std::size_t matchedWriters() const;
 
  private:
@@ -128,7 +141,7 @@ class Reader {
 /// Topics are served in the order in which they were added, messages of a topic in the order in which they
 /// came. A message that cannot be understood is counted, not delivered.
 ///
-/// Threads: on, onGone and dispatch from one thread; wake from any.
+/// Threads: on..., onGone... and dispatch from one thread; wake from any.
 /// Real-time: wake alone (one non-blocking eventfd write).
 class Inbox {
  public:
@@ -138,12 +151,26 @@ class Inbox {
   Inbox& operator=(Inbox&&) noexcept;
 
   template <class M>
-  Result<void> on(Partition& partition, const Topic<M>& topic, std::function<void(const M&)> handler);
+  using Handler = std::function<void(const M&)>;
+  template <class M>
+  using HandlerFrom = std::function<void(const M&, const Origin&)>;
+
+  template <class M>
+  Result<void> onFrom(Partition& partition, const Topic<M>& topic, HandlerFrom<M> handler);
+  template <class M>
+  Result<void> on(Partition& partition, const Topic<M>& topic, Handler<M> handler) {
+    return onFrom<M>(partition, topic, withoutOrigin<M>(std::move(handler)));
+  }
 
   /// Calls the handler with a message that has only its key fields when a key was disposed or lost its
-  /// writers. May be used with or without on() for the same topic.
+  /// writers. Who disposed it is its origin; of a key that lost its writers none is known. May be used with
+  /// or without on() for the same topic.
   template <class M>
-  Result<void> onGone(Partition& partition, const Topic<M>& topic, std::function<void(const M&)> handler);
+  Result<void> onGoneFrom(Partition& partition, const Topic<M>& topic, HandlerFrom<M> handler);
+  template <class M>
+  Result<void> onGone(Partition& partition, const Topic<M>& topic, Handler<M> handler) {
+    return onGoneFrom<M>(partition, topic, withoutOrigin<M>(std::move(handler)));
+  }
 
   /// Waits until there is mail, wake() was called or the time is over; then calls the handlers for all that
   /// is there. Zero does not wait. Returns how many samples it handled.
@@ -158,6 +185,11 @@ class Inbox {
   [[nodiscard]] std::size_t matchedWriters() const;
 
  private:
+  template <class M>
+  static HandlerFrom<M> withoutOrigin(Handler<M> handler) {
+    return [handler = std::move(handler)](const M& message, const Origin&) { handler(message); };
+  }
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
