@@ -4,8 +4,11 @@
 #include <csignal>
 #include <cstdio>
 #include <map>
+#include <optional>
 
 #include "clients/haptic/force_age.h"
+#include "clients/haptic/seat_file.h"
+#include "clients/haptic/station_link.h"
 #include "idl/threads/cyclic_thread.h"
 #include "idl/threads/latest.h"
 #include "idl/threads/spsc_queue.h"
@@ -19,6 +22,9 @@ constexpr std::uint32_t kTelemetryEvery = 1000;  // [ticks]
 constexpr milliseconds kRepeatAfter{500};
 constexpr int kServoPriority = 75;
 constexpr std::int64_t kPeriodNs = 1'000'000;
+// a seat that is lost again and again, each time so soon, is not worth looking for
+constexpr std::chrono::seconds kSoon{10};
+constexpr int kMostReturns = 3;
 
 std::int64_t nowNs() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
@@ -50,19 +56,14 @@ StepState withoutTexts(StepState step) {
 
 class Program {
  public:
-  Program(Station& station, SessionLink& link, const StationProgramOptions& options)
+  Program(Station& station, StationLink& link, const StationProgramOptions& options)
       : station_(station), link_(link), options_(options) {}
 
   Result<RunState> run(const std::atomic<bool>& stop) {
     if (auto heard = subscribe(); !heard) return fail(heard.error().what);
     if (auto settled = link_.settle(stop); !settled) return fail(settled.error().what);
     station_.welcome(link_.welcome(), link_.objects());
-    const bool lockstep = link_.welcome().lockstep;
-    if (options_.lockstep && !lockstep) {
-      return fail(
-          "the session does not run in lockstep: start the server with --lockstep, or leave it out here");
-    }
-    return lockstep ? runLockstep(stop) : runByTheClock(stop);
+    return direct_ ? runLockstep(stop) : runByTheClock(stop);
   }
 
  private:
@@ -74,9 +75,12 @@ class Program {
   void send(const Outbox& outbox);
   void sendEvents();
   void sayStep(const StepState& step);
-  [[nodiscard]] Result<RunState> ended() const {
-    if (server_gone_ && !over()) return fail("the server of session '" + link_.sessionName() + "' is gone");
-    return run_;
+  [[nodiscard]] bool seated() const { return !link_.member().lost(); }
+  /// The same seat again; `fresh` when the server does not know it any more, so that the station starts anew.
+  [[nodiscard]] Result<void> comeBack(const std::atomic<bool>& stop, bool& fresh);
+  void startAnew();
+  void say(const std::string& text) const {
+    if (options_.say && !text.empty()) options_.say(text);
   }
   [[nodiscard]] bool over() const {
     return run_.phase == RunPhase::kSucceeded || run_.phase == RunPhase::kFailed ||
@@ -84,11 +88,13 @@ class Program {
   }
 
   Station& station_;
-  SessionLink& link_;
+  StationLink& link_;
   const StationProgramOptions& options_;
   bool direct_ = false;  // lockstep: what is heard goes to the station at once
   RunState run_;
-  bool server_gone_ = false;
+  int returns_ = 0;
+  std::chrono::steady_clock::time_point returned_{};
+  std::optional<StepState> step_;
 
   // what has been heard of the newest tick
   Tick frame_tick_ = 0;
@@ -114,7 +120,7 @@ class Program {
 
 Result<void> Program::subscribe() {
   direct_ = link_.welcome().lockstep;
-  Partition& session = link_.session();
+  Partition& session = link_.member().session();
   Inbox& inbox = link_.inbox();
   Result<void> all = inbox.on<WorldFrame>(session, kWorldFrame1k, [this](const WorldFrame& frame) {
     if (!direct_) return static_cast<void>(frames_.push(frame));
@@ -138,24 +144,21 @@ Result<void> Program::subscribe() {
     all = inbox.on<StepState>(session, kStepState, [this](const StepState& step) {
       step_revision_ = step.revision;
       sayStep(step);
+      step_ = withoutTexts(step);
       if (direct_) return station_.receive(step);
-      steps_.push(withoutTexts(step));
+      steps_.push(*step_);
     });
   }
   if (all) {
-    all = inbox.on<EmergencyStop>(session, kEmergencyStop, [this](const EmergencyStop& stop) {
-      if (options_.say) {
-        options_.say((stop.engaged ? "emergency stop by " : "emergency stop released by ") + stop.who + ": " +
-                     stop.reason);
-      }
-      if (direct_) return station_.receive(stop);
-      stops_.push({stop.engaged, {}, {}});
-    });
-  }
-  if (all) {
-    all = inbox.onGone<SessionAnnounce>(link_.lobby(), kSessionAnnounce, [this](const SessionAnnounce& gone) {
-      if (gone.session == link_.sessionName()) server_gone_ = true;
-    });
+    all = inbox.onFrom<EmergencyStop>(
+        session, kEmergencyStop, [this](const EmergencyStop& stop, const Origin& from) {
+          // anybody may stop; that it goes on is believed of the server alone
+          if (!stop.engaged && !link_.member().isServer(from)) return;
+          say((stop.engaged ? "emergency stop by " : "emergency stop cleared by ") + stop.who + ": " +
+              stop.reason);
+          if (direct_) return station_.receive(stop);
+          stops_.push({stop.engaged, {}, {}});
+        });
   }
   if (all) all = inbox.on<RunState>(session, kRunState, [this](const RunState& run) { run_ = run; });
   return all;
@@ -200,11 +203,41 @@ void Program::sendEvents() {
   }
 }
 
+Result<void> Program::comeBack(const std::atomic<bool>& stop, bool& fresh) {
+  Membership& member = link_.member();
+  const std::string why = *member.lost();
+  const auto now = std::chrono::steady_clock::now();
+  returns_ = now - returned_ < kSoon ? returns_ + 1 : 1;
+  if (returns_ > kMostReturns) return fail(why);
+  say(why + "; looking for the seat");
+  const Welcome before = member.welcome();
+  auto back = member.comeBack(stop, [this] { link_.inbox().dispatch(milliseconds(0)); });
+  if (back) back = link_.settle(stop);
+  if (!back) return fail(why + "; " + back.error().what);
+  returned_ = std::chrono::steady_clock::now();
+  fresh = member.welcome().client != before.client || member.welcome().hands != before.hands ||
+          member.welcome().server_epoch != before.server_epoch;
+  say("back as client " + std::to_string(member.welcome().client.value));
+  if (auto kept = keepToken(options_.seat, member.welcome().token); !kept) say(kept.error().what);
+  return {};
+}
+
+void Program::startAnew() {
+  station_.welcome(link_.welcome(), link_.objects());
+  if (step_) station_.receive(*step_);
+}
+
 Result<RunState> Program::runLockstep(const std::atomic<bool>& stop) {
   Tick tick = link_.welcome().tick;
   Outbox outbox;
   StationEvent event;
-  while (!stop && !over() && !server_gone_) {
+  while (!stop && !over()) {
+    if (!seated()) {
+      bool fresh = false;
+      if (auto back = comeBack(stop, fresh); !back) return fail(back.error().what);
+      if (fresh) startAnew();
+      tick = link_.welcome().tick;
+    }
     station_.step(static_cast<std::uint32_t>(tick + 1));
     outbox.fill(station_, static_cast<std::uint32_t>(tick + 1));
     send(outbox);
@@ -212,14 +245,14 @@ Result<RunState> Program::runLockstep(const std::atomic<bool>& stop) {
     sendEvents();
     ++tick;
     auto repeat_at = std::chrono::steady_clock::now() + kRepeatAfter;
-    while (!heardTick(tick) && !stop && !over() && !server_gone_) {
+    while (!heardTick(tick) && !stop && !over() && seated()) {
       link_.inbox().dispatch(milliseconds(50));
       if (std::chrono::steady_clock::now() < repeat_at) continue;
       for (const DeviceInput& input : outbox.inputs) static_cast<void>(link_.send(input));
       repeat_at = std::chrono::steady_clock::now() + kRepeatAfter;
     }
   }
-  return ended();
+  return run_;
 }
 
 void Program::servo() noexcept {
@@ -255,30 +288,41 @@ void Program::servo() noexcept {
 }
 
 Result<RunState> Program::runByTheClock(const std::atomic<bool>& stop) {
-  const auto say = [this](const std::string& text) {
-    if (options_.say && !text.empty()) options_.say(text);
-  };
   CyclicOptions cyclic;
   cyclic.name = "servo";
   if (options_.real_time) {
     cyclic.fifo_priority = kServoPriority;
     say(lockMemory());
   }
-  CyclicThread thread(std::make_shared<SteadyClock>(), cyclic, [this](std::uint64_t) noexcept { servo(); });
-  thread.start();
-  say(thread.notGranted());
-  while (!stop && !over() && !server_gone_) {
+  std::optional<CyclicThread> thread;
+  const auto startServo = [&] {
+    thread.emplace(std::make_shared<SteadyClock>(), cyclic, [this](std::uint64_t) noexcept { servo(); });
+    thread->start();
+  };
+  startServo();
+  say(thread->notGranted());
+  while (!stop && !over()) {
     link_.inbox().dispatch(milliseconds(20));
+    if (!seated() && !over()) {
+      // the servo goes on meanwhile: what is felt fades with the age of the contacts
+      bool fresh = false;
+      if (auto back = comeBack(stop, fresh); !back) return fail(back.error().what);
+      if (fresh) {
+        thread.reset();
+        startAnew();
+        startServo();
+      }
+    }
     if (outbox_.update()) send(outbox_.value());
     sendEvents();
     if (!age_.update()) continue;
     Telemetry telemetry = age_.value();
     telemetry.client = link_.welcome().client;
-    telemetry.loop_overruns = thread.lateTicks();
+    telemetry.loop_overruns = thread->lateTicks();
     static_cast<void>(link_.send(telemetry));
   }
-  thread.stop();
-  return ended();
+  thread.reset();
+  return run_;
 }
 
 std::atomic<bool>& stopFlag() {
@@ -302,12 +346,15 @@ const std::atomic<bool>& stopSignal() {
 
 Result<RunState> runStation(Station& station, const StationProgramOptions& options,
                             const std::atomic<bool>& stop) {
-  LinkWishes wishes = options.link;
+  MembershipWishes wishes = options.link;
   wishes.role = station.role();
   wishes.hands = station.handNames();
-  auto link = SessionLink::join(wishes, stop);
+  if (!options.seat.empty()) wishes.token = readToken(options.seat);
+  auto link = StationLink::open(wishes, stop);
   if (!link) return fail(link.error().what);
   if (options.say) options.say("joined as client " + std::to_string((*link)->welcome().client.value));
+  if (auto kept = keepToken(options.seat, (*link)->welcome().token); !kept && options.say)
+    options.say(kept.error().what);
   auto program = std::make_unique<Program>(station, **link, options);
   return program->run(stop);
 }

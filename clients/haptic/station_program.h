@@ -1,24 +1,26 @@
 #pragma once
 
 #include <atomic>
+#include <filesystem>
 #include <functional>
 #include <string>
 
-#include "clients/haptic/session_link.h"
 #include "clients/haptic/station.h"
 #include "idl/types/result.h"
+#include "idl/wire/membership.h"
 
 namespace tenon {
 
 struct StationProgramOptions {
-  LinkWishes link;                              ///< role and hands are the station's own
-  bool lockstep = false;                        ///< insist on a session in lockstep
+  MembershipWishes link;                        ///< role and hands are the station's own
+  std::filesystem::path seat;                   ///< file of the seat's token; empty: a new seat each time
   bool real_time = true;                        ///< ask for SCHED_FIFO and locked memory
   std::string language = "en";                  ///< of the instructions said
   std::function<void(const std::string&)> say;  ///< to the person at the terminal
 };
 
-/// Runs a station in a session until the run is over or `stop` is set. By the clock, a servo thread steps the
+/// Runs a station in a session until the run is over or `stop` is set. When the server has lost it, or it the
+/// server, it looks for its seat as long as the link's patience. By the clock, a servo thread steps the
 /// station each millisecond and never touches the network, and this thread carries the messages; in lockstep,
 /// one thread does both, a step for each tick it has heard completely.
 ///

@@ -15,7 +15,7 @@ void onSignal(int /*signal*/) { stop = true; }
 int run(int argc, char** argv) {
   CLI::App app{"tenon-observer: follows a session: steps, contacts, events; ends with it, exit 0 on success"};
   tenon::ObserverOptions shown;
-  tenon::ObserverProgramOptions program;
+  tenon::MembershipWishes program{.person = "observer"};
   unsigned wait = 10;
   app.add_flag("--json", shown.json, "a JSON object a line instead of sentences");
   app.add_option("--session", program.session, "its name; the first one announced when left out");

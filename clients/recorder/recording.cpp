@@ -41,6 +41,7 @@ Result<Recording> Recording::open(const std::filesystem::path& file, const Sessi
       writer->addMetadata("tenon recording", {{"session", session.session},
                                               {"title", session.title},
                                               {"protocol", std::to_string(session.protocol_version)},
+                                              {"scenario hash", session.scenario_hash},
                                               {"lockstep", session.lockstep ? "yes" : "no"}});
   if (!noted) return fail(noted.error().what);
   Recording recording(std::move(*writer), session);

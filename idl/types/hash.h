@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string_view>
 
 #include "idl/types/spatial.h"
 
@@ -24,6 +25,10 @@ class StateHash {
   void add(const Pose& X) {
     add(X.translation());
     for (int i = 0; i < 4; ++i) add(X.rotation().coeffs()[i]);
+  }
+  void add(std::string_view text) {
+    for (const char letter : text) add(std::uint64_t{static_cast<unsigned char>(letter)});
+    add(std::uint64_t{text.size()});
   }
   [[nodiscard]] std::uint64_t value() const { return value_; }
 

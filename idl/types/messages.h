@@ -29,6 +29,7 @@ struct SessionAnnounce {
   std::uint32_t server_epoch = 0;
   bool lockstep = false;
   std::uint32_t asset_port = 0;
+  std::string scenario_hash;  ///< of the scenario's text: a recording says what it was made with
   std::vector<std::string> free_hands;
 };
 
@@ -44,8 +45,8 @@ struct Join {
 struct Welcome {
   std::string client_guid;
   bool accepted = false;
-  std::string reason;  ///< why not; empty when accepted
-  ClientId client;
+  std::string reason;         ///< why not; empty when accepted
+  ClientId client;            ///< not accepted and yet valid: the seat that this client had is taken away
   std::vector<HandId> hands;  ///< in the order asked for; invalid for one that the scenario does not have
   std::string token;
   std::uint32_t server_epoch = 0;
@@ -346,10 +347,11 @@ enum class CommandKind : std::uint32_t {
   kResume,
   kReset,
   kSkipStep,
-  kRelease,       ///< let go of what `hand` holds
+  kRelease,       ///< let go of what `hand` holds; without a hand, of the one that text names
   kSwapHands,     ///< the trainee's two coupled hands change roles
   kSetCollision,  ///< text "a b", value 0 or 1
   kStop,
+  kClearEmergencyStop,  ///< the only way out of an emergency stop: who says it must be allowed to
 };
 
 struct Command {

@@ -234,6 +234,7 @@ void fields(auto& d, auto& c, Is<SessionAnnounce> auto& m) {
   d("server_epoch", c.server_epoch, m.server_epoch);
   d("lockstep", c.lockstep, m.lockstep);
   d("asset_port", c.asset_port, m.asset_port);
+  d("scenario_hash", c.scenario_hash, m.scenario_hash);
   d.list("free_hands", c.free_hands, m.free_hands, 16, kNames);
 }
 void fields(auto& d, auto& c, Is<Join> auto& m) {

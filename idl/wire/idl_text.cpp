@@ -24,7 +24,7 @@ enum Role { ROLE_ADMIN, ROLE_INSTRUCTOR, ROLE_TRAINEE, ROLE_OBSERVER, ROLE_RECOR
 
 @final struct SessionAnnounce {
   @key string session; string<127> title; uint32 protocol_version; uint32 server_epoch; boolean lockstep;
-  uint32 asset_port; sequence<HandName, 16> free_hands;
+  uint32 asset_port; string<31> scenario_hash; sequence<HandName, 16> free_hands;
 };
 @final struct Join {
   @key string client_guid; string<63> name; Role role; sequence<HandName, 16> hands; string<63> token;
@@ -128,7 +128,7 @@ enum RunPhase { RUN_WAITING_FOR_PEOPLE, RUN_RUNNING, RUN_PAUSED, RUN_SUCCEEDED, 
 
 enum CommandKind {
   COMMAND_FULFILLED, COMMAND_SIGNAL, COMMAND_PAUSE, COMMAND_RESUME, COMMAND_RESET, COMMAND_SKIP_STEP,
-  COMMAND_RELEASE, COMMAND_SWAP_HANDS, COMMAND_SET_COLLISION, COMMAND_STOP
+  COMMAND_RELEASE, COMMAND_SWAP_HANDS, COMMAND_SET_COLLISION, COMMAND_STOP, COMMAND_CLEAR_EMERGENCY_STOP
 };
 @final struct Command {
   @key uint32 client_id; uint32 id; CommandKind kind; uint32 hand_id; string<255> text; double value;

@@ -22,6 +22,46 @@ class Faults(unittest.TestCase):
             server.wait_for("everything is mounted", 180)
             self.assertEqual(server.wait(30), 0)
 
+    def test_a_trainee_killed_while_holding_a_part_gets_it_back_with_its_seat(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve("peg_and_box", "--wait-for", "right")
+            seat = stage.out / "seat"
+            trainee = stage.start("trainee", "--seed", 1, "--seat", seat)
+            server.wait_for("taken: .*[Pp]eg", 120)
+            trainee.signal(signal.SIGKILL)
+            server.wait_for("what it held is parked", 30)
+            again = stage.start("trainee", "--seed", 1, "--seat", seat)
+            again.wait_for("joined as client 1", 60)
+            server.wait_for("is here again", 30)
+            server.wait_for("everything is mounted", 180)
+            self.assertEqual(server.wait(30), 0)
+            self.assertEqual(server.text().count("step done: take_peg"), 1, "it was in the hand, not to be taken again")
+
+    def test_a_trainee_that_hangs_for_long_loses_its_seat_and_comes_back(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve("peg_and_box", "--wait-for", "right")
+            trainee = stage.start("trainee", "--seed", 1)
+            server.wait_for("taken: .*[Pp]eg", 120)
+            trainee.signal(signal.SIGSTOP)
+            server.wait_for(r"\(trainee\) is gone", 30)
+            trainee.signal(signal.SIGCONT)
+            trainee.wait_for("back as client 1", 60)
+            server.wait_for("everything is mounted", 180)
+            self.assertEqual(server.wait(30), 0)
+            self.assertEqual(trainee.wait(30), 0, trainee.text())
+
+    def test_a_trainee_finds_a_server_that_was_killed_and_started_again(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve("peg_and_box", "--wait-for", "right")
+            trainee = stage.start("trainee", "--seed", 1, "--wait", 60)
+            server.wait_for("taken: .*[Pp]eg", 120)
+            server.signal(signal.SIGKILL)
+            trainee.wait_for("looking for the seat", 30)
+            again = stage.serve("peg_and_box", "--wait-for", "right")
+            trainee.wait_for("back as client", 60)
+            again.wait_for("everything is mounted", 180)
+            self.assertEqual(again.wait(30), 0)
+
     def test_a_trainee_that_hangs_freezes_and_then_moves_again(self):
         with Stage(lockstep=False) as stage:
             server = stage.serve("peg_and_box", "--wait-for", "right")

@@ -26,7 +26,7 @@ class ServerMock {
       EXPECT_TRUE(welcome_.write({.client_guid = join.client_guid,
                                   .accepted = accepts_,
                                   .reason = accepts_ ? "" : "the house is full",
-                                  .client = ClientId{3}}));
+                                  .client = accepts_ ? ClientId{3} : ClientId{}}));
     }));
     EXPECT_TRUE(inbox_.on<RecorderStatus>(session_, kRecorderStatus,
                                           [this](const RecorderStatus& status) { status_ = status; }));

@@ -102,6 +102,7 @@ class RandomMessages {
     text(m.session, 63);
     text(m.title, 127);
     fill(m.protocol_version, m.server_epoch, m.lockstep, m.asset_port);
+    text(m.scenario_hash, 31);
     names(m.free_hands);
   }
   void fill(Join& m) {
@@ -198,7 +199,7 @@ class RandomMessages {
     text(m.reason, 255);
   }
   void fill(Command& m) {
-    oneOf(m.kind, CommandKind::kStop);
+    oneOf(m.kind, CommandKind::kClearEmergencyStop);
     text(m.text, 255);
     fill(m.client, m.id, m.hand, m.value);
   }
