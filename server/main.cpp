@@ -43,7 +43,6 @@ void declare(CLI::App& app, Arguments& arguments) {
       ->capture_default_str();
   app.add_option("--journal", arguments.session.journal,
                  "keep everything that each tick consumed in this file");
-  app.add_option("--seed", arguments.session.seed, "of the tokens that clients get")->capture_default_str();
   app.add_flag("--lockstep", arguments.session.lockstep,
                "a tick waits for its inputs instead of the clock: repeatable to the last bit");
   app.add_option("--rerun", arguments.rerun,

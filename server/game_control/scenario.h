@@ -131,8 +131,9 @@ struct ScenarioState {
 ///
 /// Threads: constant once read. Real-time: reading its members.
 struct ScenarioFile {
-  std::filesystem::path path;  ///< of the YAML file
-  std::string name;            ///< of its folder: what the part generator calls it
+  std::filesystem::path path;   ///< of the YAML file
+  std::uint64_t text_hash = 0;  ///< of the text it was read from
+  std::string name;             ///< of its folder: what the part generator calls it
   std::string language = "en";
   Texts title;
   double reach = 10.0;                  ///< [m] no pose may be farther from the world's origin

@@ -4,6 +4,7 @@
 #include <array>
 #include <system_error>
 
+#include "idl/types/hash.h"
 #include "server/game_control/state_reader.h"
 
 namespace tenon {
@@ -58,6 +59,9 @@ ScenarioReader::ScenarioReader(const std::filesystem::path& path)
 }
 
 Result<ScenarioFile> ScenarioReader::read(std::string_view text) {
+  StateHash hash;
+  hash.add(text);
+  scenario_.text_hash = hash.value();
   try {
     readScenario(YAML::Load(std::string(text)));
   } catch (const YAML::Exception& problem) {

@@ -211,7 +211,7 @@ Result<void> Exercise::restore(std::span<const std::uint8_t> bytes) {
   for (HandAge& age : ages_) in.get(age.attached), in.get(age.active), in.get(age.age), in.get(age.seq);
   std::uint32_t commands = 0;
   in.get(commands);
-  if (commands > kMaxChanges) return fail("a checkpoint in the journal is damaged");
+  if (commands > 2 * kMaxChanges) return fail("a checkpoint in the journal is damaged");
   game_.resize(commands);
   for (GameCommand& command : game_)
     in.get(command.kind), in.get(command.hand), in.get(command.signal), in.get(command.value);

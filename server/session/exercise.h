@@ -73,7 +73,9 @@ class Exercise {
   LinkLimits limits_;
   std::vector<HandId> needed_hands_;
   std::vector<HandAge> ages_;
-  FixedVector<GameCommand, kMaxChanges> game_;  ///< to be obeyed by the next step of the state machine
+  /// To be obeyed by the next step of the state machine: those that waited while all stood still, and a
+  /// tick's own.
+  FixedVector<GameCommand, 2 * kMaxChanges> game_;
   RunPhase phase_ = RunPhase::kWaitingForPeople;
   bool emergency_stop_ = false;
 };

@@ -60,6 +60,10 @@ bool FrontDesk::roleIsHere(Role role) const {
                      [&](const Presence& person) { return person.alive && person.role == role; });
 }
 
+bool FrontDesk::someoneMovesAHand() const {
+  return std::any_of(movers_.begin(), movers_.end(), [](ClientId mover) { return mover.valid(); });
+}
+
 std::vector<std::string> FrontDesk::freeHands() const {
   std::vector<std::string> names;
   for (std::size_t i = 0; i < movers_.size(); ++i)
@@ -85,7 +89,11 @@ std::string FrontDesk::refusal(const Join& join) const {
   return {};
 }
 
-Welcome FrontDesk::join(const Join& join, Tick now) {
+bool FrontDesk::isFrom(ClientId client, const Origin& origin) const {
+  return person(client) != nullptr && seats_[client.value - 1].origin == origin;
+}
+
+Welcome FrontDesk::join(const Join& join, Tick now, const Origin& from) {
   Welcome welcome;
   welcome.client_guid = join.client_guid;
   welcome.server_epoch = server_epoch_;
@@ -93,9 +101,11 @@ Welcome FrontDesk::join(const Join& join, Tick now) {
   welcome.tick = now;
 
   // the same question again, because the answer was lost: the same answer
-  for (const Seat& seat : seats_)
-    if (!seat.guid.empty() && seat.guid == join.client_guid && person(seat.welcome.client)->alive)
-      return seat.welcome;
+  for (Seat& seat : seats_) {
+    if (seat.guid.empty() || seat.guid != join.client_guid || !person(seat.welcome.client)->alive) continue;
+    seat.welcome.tick = now;
+    return seat.welcome;
+  }
 
   // somebody comes back
   for (std::size_t i = 0; i < seats_.size(); ++i) {
@@ -103,18 +113,18 @@ Welcome FrontDesk::join(const Join& join, Tick now) {
     if (people_[i].alive) leave(people_[i].client);
   }
   welcome.reason = refusal(join);
-  if (welcome.reason.empty()) seat(join, welcome);
+  if (welcome.reason.empty()) seat(join, welcome, from);
   return welcome;
 }
 
-void FrontDesk::seat(const Join& join, Welcome& welcome) {
+void FrontDesk::seat(const Join& join, Welcome& welcome, const Origin& from) {
   const auto former = std::find_if(seats_.begin(), seats_.end(), [&](const Seat& seat) {
     return !join.token.empty() && seat.token == join.token;
   });
   const std::size_t place = static_cast<std::size_t>(former - seats_.begin());
   if (former == seats_.end()) {
     people_.emplace_back();
-    seats_.push_back({join.client_guid, fmt::format("{:016x}", random_()), {}});
+    seats_.push_back({join.client_guid, fmt::format("{:016x}", random_()), {}, {}});
   }
   welcome.accepted = true;
   welcome.client = ClientId{static_cast<std::uint32_t>(place + 1)};
@@ -131,6 +141,7 @@ void FrontDesk::seat(const Join& join, Welcome& welcome) {
   people_[place] = {welcome.client, join.name, join.role, given, true};
   seats_[place].guid = join.client_guid;
   seats_[place].welcome = welcome;
+  seats_[place].origin = from;
 }
 
 void FrontDesk::leave(ClientId client) {
@@ -145,6 +156,7 @@ void FrontDesk::leave(ClientId client) {
 }
 
 void FrontDesk::emergencyStop(const EmergencyStop& stop) {
+  halted_ = stop.engaged;
   changes_.push_back({.kind = ChangeKind::kHalt, .value = stop.engaged ? 1.0 : 0.0});
 }
 
@@ -194,6 +206,11 @@ Result<Change> FrontDesk::externalPose(const ExternalPose& pose) const {
   return Change{.kind = ChangeKind::kPlace, .object = pose.object, .X_WO = pose.X_WO};
 }
 
+void FrontDesk::follow(RunPhase phase, bool emergency_stop) {
+  phase_ = phase;
+  if (phase != RunPhase::kPaused && !emergency_stop) held_back_ = 0;
+}
+
 CommandAck FrontDesk::command(const Command& command) {
   CommandAck ack{command.client, command.id, false, {}};
   const Presence* who = person(command.client);
@@ -202,13 +219,30 @@ CommandAck FrontDesk::command(const Command& command) {
     return ack;
   }
   const auto change = changeFor(command, who->role);
-  if (!change) {
-    ack.reason = change.error().what;
-    return ack;
-  }
-  ack.accepted = true;
+  ack.reason = change ? untimely(command.kind) : change.error().what;
+  ack.accepted = ack.reason.empty();
+  if (!ack.accepted) return ack;
+  const bool stands_still = phase_ == RunPhase::kPaused || halted_;
+  if (change->kind == ChangeKind::kGame && stands_still) ++held_back_;
+  if (change->kind == ChangeKind::kHalt) halted_ = false;
+  stop_asked_ = stop_asked_ || change->kind == ChangeKind::kStop;
   changes_.push_back(*change);
   return ack;
+}
+
+/// Why the run cannot do this now, whoever asks; empty: it can. An accepted command is never lost.
+std::string FrontDesk::untimely(CommandKind kind) const {
+  const bool for_any_time = kind == CommandKind::kRelease || kind == CommandKind::kSetCollision ||
+                            kind == CommandKind::kStop || kind == CommandKind::kClearEmergencyStop;
+  if (phase_ >= RunPhase::kSucceeded) return "the run is over";
+  if (for_any_time) return {};
+  if (phase_ == RunPhase::kWaitingForPeople)
+    return "the session still waits for people: ask again once it runs";
+  if (kind == CommandKind::kResume) return phase_ == RunPhase::kPaused ? "" : "the session is not paused";
+  if (kind == CommandKind::kPause) return phase_ == RunPhase::kPaused ? "the session is paused already" : "";
+  if (held_back_ >= kMaxChanges)
+    return fmt::format("{} commands wait already for the session to go on", held_back_);
+  return {};
 }
 
 int FrontDesk::pairNamed(std::string_view a, std::string_view b) const {
@@ -227,35 +261,50 @@ bool FrontDesk::movesBothHands(ClientId client) const {
   return true;
 }
 
+namespace {
+
+Change gameChange(const Command& command, std::uint32_t signal = 0) {
+  Change change{.kind = ChangeKind::kGame};
+  change.game = {command.kind, command.hand, signal, command.value};
+  return change;
+}
+
+}  // namespace
+
 Result<Change> FrontDesk::changeFor(const Command& command, Role role) const {
   const auto not_for = [&] {
     return fail(fmt::format("not for the {}: ask the instructor", roleName(role)));
   };
   if (role == Role::kObserver || role == Role::kRecorder) return not_for();
-  const auto game = [&](std::uint32_t signal = 0) {
-    Change change{.kind = ChangeKind::kGame};
-    change.game = {command.kind, command.hand, signal, command.value};
-    return change;
-  };
   switch (command.kind) {
     case CommandKind::kFulfilled:
-      return game();
+      return gameChange(command);
     case CommandKind::kSignal: {
       const int signal = scenario_.signalNamed(command.text);
       if (signal < 0) return fail(fmt::format("this scenario listens to no signal '{}'", command.text));
-      return game(static_cast<std::uint32_t>(signal));
+      return gameChange(command, static_cast<std::uint32_t>(signal));
     }
     case CommandKind::kRelease:
-      if (!isTeacher(role) && !isMover(command.client, command.hand)) return fail("that is not your hand");
-      if (command.hand.value >= movers_.size()) return fail("there is no such hand");
-      return Change{.kind = ChangeKind::kRelease, .hand = command.hand};
+      return releaseOf(command, role);
     case CommandKind::kSwapHands:
       if (!isTeacher(role) && !movesBothHands(command.client)) return fail("those are not your hands");
-      return game();
+      return gameChange(command);
     default:
-      break;
+      if (!isTeacher(role)) return not_for();
+      return teachersChange(command);
   }
-  if (!isTeacher(role)) return not_for();
+}
+
+Result<Change> FrontDesk::releaseOf(const Command& command, Role role) const {
+  const HandId hand = command.hand.valid() ? command.hand : scenario_.handNamed(command.text);
+  if (!isTeacher(role) && !isMover(command.client, hand)) return fail("that is not your hand");
+  if (hand.value >= movers_.size())
+    return fail(command.text.empty() ? "there is no such hand"
+                                     : fmt::format("this scenario has no hand '{}'", command.text));
+  return Change{.kind = ChangeKind::kRelease, .hand = hand};
+}
+
+Result<Change> FrontDesk::teachersChange(const Command& command) const {
   switch (command.kind) {
     case CommandKind::kPause:
       return Change{.kind = ChangeKind::kPause};
@@ -263,9 +312,12 @@ Result<Change> FrontDesk::changeFor(const Command& command, Role role) const {
       return Change{.kind = ChangeKind::kResume};
     case CommandKind::kStop:
       return Change{.kind = ChangeKind::kStop};
+    case CommandKind::kClearEmergencyStop:
+      if (!halted_) return fail("there is no emergency stop");
+      return Change{.kind = ChangeKind::kHalt, .value = 0.0};
     case CommandKind::kReset:
     case CommandKind::kSkipStep:
-      return game();
+      return gameChange(command);
     case CommandKind::kSetCollision: {
       const std::size_t space = command.text.find(' ');
       const int pair = space == std::string::npos

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "idl/types/messages.h"
+#include "idl/wire/endpoint.h"
 #include "server/game_control/scenario.h"
 #include "server/session/tick_io.h"
 
@@ -19,8 +20,14 @@ class FrontDesk {
  public:
   FrontDesk(const ScenarioFile& scenario, std::uint32_t server_epoch, bool lockstep, std::uint64_t seed);
 
-  [[nodiscard]] Welcome join(const Join& join, Tick now);
+  /// The seat is bound to the program that `from` names.
+  [[nodiscard]] Welcome join(const Join& join, Tick now, const Origin& from = {});
+  /// Whether this program is the one that took the client's seat.
+  [[nodiscard]] bool isFrom(ClientId client, const Origin& origin) const;
+  /// What is accepted will be done; what cannot be done now is refused.
   [[nodiscard]] CommandAck command(const Command& command);
+  /// What the run had come to after the last tick.
+  void follow(RunPhase phase, bool emergency_stop);
   void leave(ClientId client);
   void emergencyStop(const EmergencyStop& stop);
 
@@ -38,6 +45,8 @@ class FrontDesk {
   /// The random name a client asked with.
   [[nodiscard]] const std::string& guidOf(ClientId client) const { return seats_[client.value - 1].guid; }
   [[nodiscard]] ClientId moverOf(HandId hand) const { return movers_[hand.value]; }
+  [[nodiscard]] bool someoneMovesAHand() const;
+  [[nodiscard]] bool stopIsAsked() const { return stop_asked_; }
   [[nodiscard]] bool roleIsHere(Role role) const;
   [[nodiscard]] std::vector<std::string> freeHands() const;
 
@@ -46,11 +55,15 @@ class FrontDesk {
     std::string guid;
     std::string token;
     Welcome welcome;
+    Origin origin;
   };
 
   [[nodiscard]] std::string refusal(const Join& join) const;
-  void seat(const Join& join, Welcome& welcome);
+  void seat(const Join& join, Welcome& welcome, const Origin& from);
+  [[nodiscard]] std::string untimely(CommandKind kind) const;
   [[nodiscard]] Result<Change> changeFor(const Command& command, Role role) const;
+  [[nodiscard]] Result<Change> teachersChange(const Command& command) const;
+  [[nodiscard]] Result<Change> releaseOf(const Command& command, Role role) const;
   [[nodiscard]] int pairNamed(std::string_view a, std::string_view b) const;
   [[nodiscard]] bool movesBothHands(ClientId client) const;
   [[nodiscard]] bool isMover(ClientId client, HandId hand) const;
@@ -63,6 +76,10 @@ class FrontDesk {
   std::vector<Seat> seats_;       ///< as people_
   std::vector<ClientId> movers_;  ///< index = HandId
   std::vector<Change> changes_;
+  RunPhase phase_ = RunPhase::kWaitingForPeople;
+  bool halted_ = false;        ///< an emergency stop is engaged
+  bool stop_asked_ = false;    ///< the run is to end
+  std::size_t held_back_ = 0;  ///< commands that wait until the session goes on
 };
 
 [[nodiscard]] std::string_view roleName(Role role);

@@ -20,6 +20,8 @@ class Intake {
   void put(const HandReading& reading) noexcept { readings_[reading.hand.value].write(reading); }
   /// False when the tick has fallen so far behind that there is no room.
   bool put(const Change& change) noexcept { return changes_.push(change); }
+  /// How many changes there is room for.
+  [[nodiscard]] std::size_t room() const noexcept { return changes_.capacity() - changes_.size(); }
 
   void collect(Tick tick, TickInput& input) noexcept {
     input.tick = tick;

@@ -95,6 +95,7 @@ Result<std::unique_ptr<ServerWire>> ServerWire::open(const WireOptions& options,
   if (!participant) return fail(participant.error().what);
   std::unique_ptr<ServerWire> wire(new ServerWire(options, std::move(*participant), desk, intake, broadcast));
   wire->title_ = loaded.scenario->title.front().text;
+  wire->scenario_hash_ = fmt::format("{:016x}", loaded.scenario->text_hash);
   wire->newest_seq_.resize(loaded.scenario->hands.size());
   if (auto opened = wire->openWriters(); !opened) return fail(opened.error().what);
   if (auto opened = wire->openReaders(); !opened) return fail(opened.error().what);
@@ -111,23 +112,29 @@ Result<void> ServerWire::openWriters() {
 Result<void> ServerWire::openReaders() {
   Result<void> result;
   const auto listenTo = [&]<class M>(Partition& partition, const Topic<M>& topic, auto handler) {
-    if (result) result = inbox_.on<M>(partition, topic, handler);
+    if (result) result = inbox_.onFrom<M>(partition, topic, handler);
   };
-  listenTo(lobby_, kJoin, [this](const Join& join) { hear(join); });
-  listenTo(session_, kDeviceInput, [this](const DeviceInput& input) { hear(input); });
-  listenTo(session_, kCommand, [this](const Command& command) { hear(command); });
-  listenTo(session_, kClockSync, [this](const ClockSync& sync) { hear(sync); });
-  listenTo(session_, kEmergencyStop, [this](const EmergencyStop& stop) { hear(stop); });
+  listenTo(lobby_, kJoin, [this](const Join& join, const Origin& from) { hear(join, from); });
+  listenTo(session_, kDeviceInput,
+           [this](const DeviceInput& input, const Origin& from) { hear(input, from); });
+  listenTo(session_, kCommand, [this](const Command& command, const Origin& from) { hear(command, from); });
+  listenTo(session_, kClockSync, [this](const ClockSync& sync, const Origin&) { hear(sync); });
+  listenTo(session_, kEmergencyStop,
+           [this](const EmergencyStop& stop, const Origin& from) { hear(stop, from); });
   const auto take = [this](const Result<Change>& change) {
     if (!change) return refuse(change.error().what);
     intake_.put(*change);
   };
-  listenTo(session_, kForceContribution,
-           [this, take](const ForceContribution& force) { take(desk_.contribution(force)); });
-  listenTo(session_, kExternalPose,
-           [this, take](const ExternalPose& pose) { take(desk_.externalPose(pose)); });
-  if (result)
-    result = inbox_.onGone<Presence>(session_, kPresence, [this](const Presence& gone) { heardGone(gone); });
+  listenTo(session_, kForceContribution, [this, take](const ForceContribution& force, const Origin& from) {
+    if (isGenuine(force.client, from, "force")) take(desk_.contribution(force));
+  });
+  listenTo(session_, kExternalPose, [this, take](const ExternalPose& pose, const Origin& from) {
+    if (isGenuine(pose.client, from, "pose")) take(desk_.externalPose(pose));
+  });
+  if (result) {
+    result = inbox_.onGoneFrom<Presence>(
+        session_, kPresence, [this](const Presence& gone, const Origin& from) { heardGone(gone, from); });
+  }
   return result;
 }
 
@@ -138,8 +145,12 @@ void ServerWire::sendScene(const LoadedScene& loaded) {
 }
 
 void ServerWire::announce() {
-  (void)writers_->announce.writer->write({options_.session, title_, kProtocolVersion, options_.server_epoch,
-                                          options_.lockstep, 0, desk_.freeHands()});
+  (void)writers_->announce.writer->write({.session = options_.session,
+                                          .title = title_,
+                                          .server_epoch = options_.server_epoch,
+                                          .lockstep = options_.lockstep,
+                                          .scenario_hash = scenario_hash_,
+                                          .free_hands = desk_.freeHands()});
 }
 
 void ServerWire::listen(std::chrono::nanoseconds timeout) {
@@ -148,9 +159,15 @@ void ServerWire::listen(std::chrono::nanoseconds timeout) {
 }
 
 void ServerWire::passChanges() {
+  if (intake_.room() < kMaxChanges) return;  // the desk keeps them until the tick has caught up
   FixedVector<Change, kMaxChanges> changes;
   desk_.takeChanges(changes);
   for (const Change& change : changes) intake_.put(change);
+}
+
+void ServerWire::follow(const TickOutput& output) {
+  now_ = output.tick;
+  desk_.follow(output.phase, output.emergency_stop);
 }
 
 void ServerWire::note(Severity severity, const std::string& kind, const std::string& text) {
@@ -164,48 +181,104 @@ void ServerWire::refuse(const std::string& why) {
   if (said_.size() < kManySentences && said_.insert(why).second) note(Severity::kWarning, "refused", why);
 }
 
-void ServerWire::hear(const Join& join) {
+/// Whether the program that took the client's seat wrote this. A sample that claims another's id is refused.
+bool ServerWire::isGenuine(ClientId client, const Origin& from, const std::string& what) {
+  if (desk_.person(client) == nullptr || desk_.isFrom(client, from))
+    return true;     // the desk knows the unknown
+  if (from.known())  // else its writer has gone in the meantime
+    refuse(
+        fmt::format("a {} under the id of client {} came from another program than the one that joined: "
+                    "ignored",
+                    what, client.value));
+  return false;
+}
+
+/// To a program that goes on as if it had a seat still: it may come back with its token.
+void ServerWire::tellLost(ClientId client, const std::string& why) {
+  constexpr auto kOnceIn = std::chrono::seconds(1);
+  const auto now = std::chrono::steady_clock::now();
+  const auto told = told_lost_.find(client);
+  if (told != told_lost_.end() && now - told->second < kOnceIn) return;
+  told_lost_[client] = now;
+  (void)writers_->welcome.writer->write({.client_guid = desk_.guidOf(client),
+                                         .accepted = false,
+                                         .reason = why,
+                                         .client = client,
+                                         .server_epoch = options_.server_epoch,
+                                         .tick = now_});
+}
+
+void ServerWire::hear(const Join& join, const Origin& from) {
   const bool is_new = desk_.people().empty() || join.client_guid.empty() ||
                       std::none_of(desk_.people().begin(), desk_.people().end(), [&](const Presence& who) {
                         return who.alive && desk_.guidOf(who.client) == join.client_guid;
                       });
-  const Welcome welcome = desk_.join(join, now_);
+  const std::size_t seats = desk_.people().size();
+  const Welcome welcome = desk_.join(join, now_, from);
   (void)writers_->welcome.writer->write(welcome);
   if (!is_new) return;
   for (const HandId hand : welcome.hands)
     if (hand.valid()) newest_seq_[hand.value] = 0;
+  const char* how = desk_.people().size() == seats ? "is here again" : "is here";
   note(welcome.accepted ? Severity::kInfo : Severity::kWarning, "join",
-       welcome.accepted ? fmt::format("{} ({}) is here", join.name, roleName(join.role))
+       welcome.accepted ? fmt::format("{} ({}) {}", join.name, roleName(join.role), how)
                         : fmt::format("{} may not join: {}", join.name, welcome.reason));
   announce();
 }
 
-void ServerWire::hear(const DeviceInput& input) {
+void ServerWire::hear(const DeviceInput& input, const Origin& from) {
+  if (!isGenuine(input.client, from, "device input")) return;
+  const Presence* who = desk_.person(input.client);
+  if (who != nullptr && !who->alive && input.server_epoch == options_.server_epoch)
+    return tellLost(input.client, "it was not heard for too long");
   const auto reading = desk_.reading(input);
   if (!reading) return refuse(reading.error().what);
   std::uint32_t& newest = newest_seq_[input.hand.value];
   if (options_.lockstep && reading->seq == newest && newest == now_) repeat_wish_ = true;
   if (reading->seq <= newest && newest - reading->seq < 0x80000000U) return;  // overtaken, or heard already
+  if (options_.lockstep && reading->seq > now_ + 1)
+    return dismiss(input.client,
+                   fmt::format("sent the input of tick {} when tick {} was the next, and is taken out: in "
+                               "lockstep an input answers a tick that was heard",
+                               reading->seq, now_ + 1));
   newest = reading->seq;
   intake_.put(*reading);
 }
 
-void ServerWire::hear(const Command& command) {
+void ServerWire::hear(const Command& command, const Origin& from) {
+  if (!isGenuine(command.client, from, "command")) return;
   const CommandAck ack = desk_.command(command);
   (void)writers_->ack.writer->write(ack);
-  if (!ack.accepted)
+  if (!ack.accepted) {
     note(Severity::kWarning, "refused",
          fmt::format("command of client {}: {}", command.client.value, ack.reason));
+  } else if (command.kind == CommandKind::kClearEmergencyStop) {
+    endEmergencyStop(command.client, command.text);
+  }
 }
 
-/// Whoever stops may leave: the server says it again for late joiners, and hears itself.
-void ServerWire::hear(const EmergencyStop& stop) {
-  if (stop.engaged == stopped_) return;
-  stopped_ = stop.engaged;
+/// Whoever stops may leave: the server says it again for late joiners. It hears itself. Anybody may stop, but
+/// going on is a command to be allowed, and devices believe it of the server alone.
+void ServerWire::hear(const EmergencyStop& stop, const Origin& from) {
+  if (from == participant_->origin() || (stop.engaged == stopped_ && stop.engaged)) return;
+  if (!stop.engaged) {
+    if (!stopped_) return;
+    refuse(fmt::format("{} may not clear the emergency stop like that: it takes a command of the instructor",
+                       stop.who));
+    (void)writers_->stop.writer->write({true, "server", "the emergency stop goes on"});
+    return;
+  }
+  stopped_ = true;
   desk_.emergencyStop(stop);
   (void)writers_->stop.writer->write(stop);
-  note(stop.engaged ? Severity::kError : Severity::kInfo, "emergency stop",
-       fmt::format("{} by {}: {}", stop.engaged ? "engaged" : "cleared", stop.who, stop.reason));
+  note(Severity::kError, "emergency stop", fmt::format("engaged by {}: {}", stop.who, stop.reason));
+}
+
+void ServerWire::endEmergencyStop(ClientId client, const std::string& reason) {
+  stopped_ = false;
+  const std::string& who = desk_.person(client)->name;
+  (void)writers_->stop.writer->write({false, who, reason});
+  note(Severity::kInfo, "emergency stop", fmt::format("cleared by {}: {}", who, reason));
 }
 
 void ServerWire::hear(const ClockSync& sync) {
@@ -216,13 +289,17 @@ void ServerWire::hear(const ClockSync& sync) {
   (void)writers_->clock.writer->write(answer);
 }
 
-void ServerWire::heardGone(const Presence& presence) { dismiss(presence.client, "is gone"); }
+void ServerWire::heardGone(const Presence& presence, const Origin& from) {
+  if (from.known() && !isGenuine(presence.client, from, "good-bye")) return;
+  dismiss(presence.client, "is gone");
+}
 
 void ServerWire::dismiss(ClientId client, const std::string& why) {
   const Presence* who = desk_.person(client);
   if (who == nullptr || !who->alive) return;
   const std::string text = fmt::format("{} ({}) {}", who->name, roleName(who->role), why);
   desk_.leave(client);
+  tellLost(client, why);
   note(Severity::kWarning, "leave", text);
   passChanges();
   announce();

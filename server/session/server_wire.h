@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <functional>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -53,7 +54,7 @@ class ServerWire {
   /// True once after a client repeated an input that was answered already: its answer was lost.
   [[nodiscard]] bool takeRepeatWish() { return std::exchange(repeat_wish_, false); }
   [[nodiscard]] std::uint64_t refusedInputs() const { return refused_inputs_; }
-  void setNow(Tick now) { now_ = now; }
+  void follow(const TickOutput& output);
 
   std::function<void(const std::string&)> say;
 
@@ -68,12 +69,15 @@ class ServerWire {
   Result<void> openWriters();
   Result<void> openReaders();
   void sendScene(const LoadedScene& loaded);
-  void hear(const Join& join);
-  void hear(const DeviceInput& input);
-  void hear(const Command& command);
+  void hear(const Join& join, const Origin& from);
+  void hear(const DeviceInput& input, const Origin& from);
+  void hear(const Command& command, const Origin& from);
   void hear(const ClockSync& sync);
-  void hear(const EmergencyStop& stop);
-  void heardGone(const Presence& presence);
+  void hear(const EmergencyStop& stop, const Origin& from);
+  void heardGone(const Presence& presence, const Origin& from);
+  [[nodiscard]] bool isGenuine(ClientId client, const Origin& from, const std::string& what);
+  void tellLost(ClientId client, const std::string& why);
+  void endEmergencyStop(ClientId client, const std::string& reason);
   void refuse(const std::string& why);
   void passChanges();
   void note(Severity severity, const std::string& kind, const std::string& text);
@@ -88,8 +92,10 @@ class ServerWire {
   Intake& intake_;
   Broadcast& broadcast_;
   std::string title_;
+  std::string scenario_hash_;
   std::vector<std::uint32_t> newest_seq_;
   std::set<std::string> said_;  ///< refusals told once, not a thousand times a second
+  std::map<ClientId, std::chrono::steady_clock::time_point> told_lost_;
   std::uint64_t refused_inputs_ = 0;
   bool repeat_wish_ = false;
   bool stopped_ = false;

@@ -53,9 +53,18 @@ Result<Awaited> awaited(const ScenarioFile& scenario, const std::vector<std::str
   return all;
 }
 
+/// Larger in every life of a server, so that clients know frames of an earlier one: quarters of a second.
 std::uint32_t newServerEpoch() {
+  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
+  constexpr std::int64_t kYear2025 = 1'735'689'600;  // [s] since 1970
+  return static_cast<std::uint32_t>(4 * (since_1970 / milliseconds(1) / 1000 - kYear2025) +
+                                    since_1970 / milliseconds(250) % 4);
+}
+
+/// Nobody shall guess another one's token.
+std::uint64_t newTokenSeed() {
   std::random_device random;
-  return random() | 1U;
+  return std::uint64_t{random()} << 32U | random();
 }
 
 class Server final : public SessionServer {
@@ -64,7 +73,7 @@ class Server final : public SessionServer {
       : options_(std::move(options)),
         awaited_(std::move(awaited)),
         exercise_(loaded.scenario, loaded.scene, options_.exercise),
-        desk_(*loaded.scenario, epoch, options_.lockstep, options_.seed),
+        desk_(*loaded.scenario, epoch, options_.lockstep, newTokenSeed()),
         intake_(loaded.scenario->hands.size()),
         broadcast_(loaded.scenario, epoch, options_.lockstep),
         epoch_(epoch) {}
@@ -88,7 +97,7 @@ class Server final : public SessionServer {
 
   Result<SessionReport> run(const std::atomic<bool>& stop) override {
     say(fmt::format("session '{}' is open, waiting for people", options_.name));
-    while (!stop && !awaited_.areHere(desk_)) wire_->listen(milliseconds(100));
+    while (!stop && !desk_.stopIsAsked() && !awaited_.areHere(desk_)) wire_->listen(milliseconds(100));
     if (!stop) options_.lockstep ? runLockstep(stop) : runByTheClock(stop);
     return finish();
   }
@@ -149,18 +158,18 @@ void Server::runLockstep(const std::atomic<bool>& stop) {
   JournalEntry entry;
   TickOutput output = exercise_.makeOutput();
   while (!stop && !exercise_.over()) {
-    wire_->setNow(exercise_.now());
     if (!awaitInputs(stop)) break;
     tick(input, output);
-    wire_->setNow(exercise_.now());
+    wire_->follow(output);
     wire_->send(broadcast_.read(output));
     keep(input, output.hash, entry);
     writeJournal(entry);
   }
 }
 
-/// Waits until every hand that somebody moves has an input for the next tick.
+/// Waits until somebody moves a hand, and every hand that somebody moves has an input for the next tick.
 bool Server::awaitInputs(const std::atomic<bool>& stop) {
+  while (!stop && !desk_.stopIsAsked() && !desk_.someoneMovesAHand()) wire_->listen(milliseconds(50));
   const auto next = static_cast<std::uint32_t>(exercise_.now() + 1);
   const auto missing = [&]() -> HandId {
     for (std::uint32_t i = 0; i < exercise_.environment().hands().size(); ++i)
@@ -230,7 +239,7 @@ void Server::runByTheClock(const std::atomic<bool>& stop) {
   while (!stop && !over) {
     wire_->listen(milliseconds(20));
     for (TickOutput* output = outputs_.front(); output != nullptr; output = outputs_.front()) {
-      wire_->setNow(output->tick);
+      wire_->follow(*output);
       output->stats.late_ticks = ticker.lateTicks();
       wire_->send(broadcast_.read(*output));
       outputs_.pop();

@@ -21,7 +21,6 @@ struct SessionOptions {
   /// Who must be there before the first step: names of hands and roles (`recorder`, `observer`). Empty: all
   /// hands of the trainee that the first state needs.
   std::vector<std::string> wait_for;
-  std::uint64_t seed = 1;
   std::filesystem::path journal;  ///< empty: no journal
   double detail = 1.0;            ///< noted in the journal
   bool publish_journal = true;    ///< TickInput and Checkpoint on the bus too

@@ -184,6 +184,7 @@ TEST_F(FrontDeskTest, RefusesNumbersThatAreNoPose) {
 }
 
 TEST_F(FrontDeskTest, CommandsAreForThoseWhoAreMeant) {
+  desk_.follow(RunPhase::kRunning, false);
   const ClientId trainee = join("a", Role::kTrainee, {"right"}).client;
   const ClientId teacher = join("b", Role::kInstructor).client;
   const ClientId observer = join("c", Role::kObserver).client;
@@ -195,6 +196,7 @@ TEST_F(FrontDeskTest, CommandsAreForThoseWhoAreMeant) {
   for (const CommandKind kind : {CommandKind::kPause, CommandKind::kResume, CommandKind::kReset,
                                  CommandKind::kSkipStep, CommandKind::kStop, CommandKind::kSetCollision}) {
     EXPECT_THAT(command(trainee, kind, "part bay").reason, HasSubstr("ask the instructor"));
+    desk_.follow(kind == CommandKind::kResume ? RunPhase::kPaused : RunPhase::kRunning, false);
     EXPECT_TRUE(command(teacher, kind, "part bay").accepted);
   }
   EXPECT_EQ(changes().size(), 6U);
@@ -207,6 +209,7 @@ TEST_F(FrontDeskTest, CommandsAreForThoseWhoAreMeant) {
 }
 
 TEST_F(FrontDeskTest, NamesInCommandsBecomeNumbers) {
+  desk_.follow(RunPhase::kRunning, false);
   const ClientId teacher = join("a", Role::kInstructor).client;
   EXPECT_THAT(command(teacher, CommandKind::kSignal, "whistle").reason, HasSubstr("'whistle'"));
   EXPECT_TRUE(command(teacher, CommandKind::kSignal, "bell").accepted);
@@ -226,6 +229,7 @@ TEST_F(FrontDeskTest, NamesInCommandsBecomeNumbers) {
 }
 
 TEST_F(FrontDeskTest, OnlyOnesOwnHandLetsGoOrSwaps) {
+  desk_.follow(RunPhase::kRunning, false);
   const ClientId one = join("a", Role::kTrainee, {"right"}).client;
   const ClientId other = join("b", Role::kTrainee, {"left"}).client;
   const ClientId teacher = join("c", Role::kInstructor, {"instructor"}).client;
@@ -295,6 +299,59 @@ TEST_F(FrontDeskTest, MoreChangesThanATickTakesWaitForTheNext) {
   ASSERT_EQ(rest.size(), 40 - 2 * kMaxChanges);
   EXPECT_EQ(rest[0].kind, ChangeKind::kHalt);
   EXPECT_EQ(rest[0].value, 1.0) << "number 32, in order";
+}
+
+TEST_F(FrontDeskTest, ASeatBelongsToTheProgramThatTookIt) {
+  const Origin ada{{1, 2, 3}};
+  const Origin rogue{{9, 9, 9}};
+  const Join join{"a", "Ada", Role::kTrainee, {"right"}};
+  const Welcome welcome = desk_.join(join, 0, ada);
+  EXPECT_TRUE(desk_.isFrom(welcome.client, ada));
+  EXPECT_FALSE(desk_.isFrom(welcome.client, rogue));
+  (void)desk_.join(join, 0, rogue);
+  EXPECT_TRUE(desk_.isFrom(welcome.client, ada)) << "asking as somebody else moves no seat";
+  EXPECT_FALSE(desk_.isFrom(ClientId{9}, ada));
+}
+
+TEST_F(FrontDeskTest, WhatCannotBeDoneNowIsRefusedWithTheReason) {
+  const ClientId teacher = join("t", Role::kInstructor).client;
+  const auto answer = [&](CommandKind kind) { return command(teacher, kind).reason; };
+  (void)changes();
+  for (const CommandKind kind : {CommandKind::kFulfilled, CommandKind::kPause, CommandKind::kResume,
+                                 CommandKind::kReset, CommandKind::kSkipStep, CommandKind::kSwapHands})
+    EXPECT_THAT(answer(kind), HasSubstr("waits for people"));
+  EXPECT_THAT(command(teacher, CommandKind::kSignal, "bell").reason, HasSubstr("waits for people"));
+  EXPECT_TRUE(changes().empty());
+
+  desk_.follow(RunPhase::kRunning, false);
+  EXPECT_THAT(answer(CommandKind::kResume), HasSubstr("not paused"));
+  EXPECT_THAT(answer(CommandKind::kPause), IsEmpty());
+  desk_.follow(RunPhase::kPaused, false);
+  EXPECT_THAT(answer(CommandKind::kPause), HasSubstr("paused already"));
+  EXPECT_THAT(answer(CommandKind::kResume), IsEmpty());
+  desk_.follow(RunPhase::kSucceeded, false);
+  EXPECT_THAT(answer(CommandKind::kReset), HasSubstr("over"));
+}
+
+TEST_F(FrontDeskTest, NoMoreIsHeldBackThanTheSessionCanTakeWhenItGoesOn) {
+  const ClientId teacher = join("t", Role::kInstructor).client;
+  desk_.follow(RunPhase::kPaused, false);
+  for (std::size_t i = 0; i < kMaxChanges; ++i)
+    EXPECT_TRUE(command(teacher, CommandKind::kFulfilled).accepted) << i;
+  EXPECT_THAT(command(teacher, CommandKind::kFulfilled).reason, HasSubstr("wait already"));
+  EXPECT_TRUE(command(teacher, CommandKind::kResume).accepted);
+  desk_.follow(RunPhase::kRunning, false);
+  EXPECT_TRUE(command(teacher, CommandKind::kFulfilled).accepted);
+}
+
+TEST_F(FrontDeskTest, AHandIsReleasedByItsName) {
+  const ClientId teacher = join("t", Role::kInstructor).client;
+  (void)changes();
+  EXPECT_TRUE(command(teacher, CommandKind::kRelease, "left").accepted);
+  const auto told = changes();
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].hand, kLeftHand);
+  EXPECT_THAT(command(teacher, CommandKind::kRelease, "third").reason, HasSubstr("no hand 'third'"));
 }
 
 }  // namespace

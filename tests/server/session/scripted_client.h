@@ -25,6 +25,7 @@ class ScriptedClient {
         joins_(Writer<Join>::open(lobby_, kJoin).value()),
         inputs_(Writer<DeviceInput>::open(room_, kDeviceInput).value()),
         commands_(Writer<Command>::open(room_, kCommand).value()),
+        stops_(Writer<EmergencyStop>::open(room_, kEmergencyStop).value()),
         presence_(Writer<Presence>::open(room_, kPresence).value()) {
     keep(lobby_, kSessionAnnounce, [this](const SessionAnnounce& announced) { announce = announced; });
     keep(lobby_, kWelcome, [this](const Welcome& answer) {
@@ -44,14 +45,15 @@ class ScriptedClient {
   void listen(std::chrono::milliseconds timeout) { inbox_.dispatch(timeout); }
 
   /// False when no answer came.
-  [[nodiscard]] bool join(const std::string& guid, Role role, const std::vector<std::string>& hands) {
+  [[nodiscard]] bool join(const std::string& guid, Role role, const std::vector<std::string>& hands,
+                          const std::string& token = {}) {
     guid_ = guid;
     const auto linked = [this] {
-      return joins_.matchedReaders() > 0 && inputs_.matchedReaders() > 0 && commands_.matchedReaders() > 0 &&
-             announce.server_epoch != 0;
+      return joins_.matchedReaders() > 0 && stops_.matchedReaders() > 0 && inputs_.matchedReaders() > 0 &&
+             commands_.matchedReaders() > 0 && announce.server_epoch != 0;
     };
     if (!hears(linked)) return false;
-    (void)joins_.write({.client_guid = guid, .name = guid, .role = role, .hands = hands});
+    (void)joins_.write({.client_guid = guid, .name = guid, .role = role, .hands = hands, .token = token});
     if (!hears([this] { return welcome.client_guid == guid_; })) return false;
     if (welcome.accepted) (void)presence_.write({welcome.client, guid, role, welcome.hands, true});
     return true;
@@ -64,6 +66,12 @@ class ScriptedClient {
                       .active = true};
     input.samples[0] = {.seq = seq, .X_WH = X_WH};
     (void)inputs_.write(input);
+  }
+  void emergencyStop(bool engaged) { (void)stops_.write({engaged, guid_, "a test"}); }
+  /// In the name of whom `welcome` is of.
+  void sayGoodBye() {
+    (void)presence_.write({.client = welcome.client, .name = guid_});
+    (void)presence_.dispose({.client = welcome.client});
   }
   void command(CommandKind kind) { (void)commands_.write({welcome.client, ++commands_sent_, kind}); }
 
@@ -95,6 +103,7 @@ class ScriptedClient {
   Writer<Join> joins_;
   Writer<DeviceInput> inputs_;
   Writer<Command> commands_;
+  Writer<EmergencyStop> stops_;
   Writer<Presence> presence_;
   Inbox inbox_;
   std::string guid_;

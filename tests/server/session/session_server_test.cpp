@@ -180,6 +180,108 @@ TEST(SessionServer, ARogueIsRefusedAndCountedWhileTheSessionGoesOn) {
   EXPECT_EQ(report.run.phase, RunPhase::kStopped);
 }
 
+TEST(SessionServer, AForgerOfAnotherOnesIdIsRefusedWhateverItSends) {
+  Running server({.name = "forger", .wait_for = {"right"}});
+  ScriptedClient client("forger", LinkProfile::kLan);
+  ScriptedClient forger("forger", LinkProfile::kLan);
+  ASSERT_TRUE(client.join("teacher", Role::kAdmin, {"right"}));
+  ASSERT_TRUE(forger.join("forger", Role::kObserver, {}));
+  forger.welcome = client.welcome;  // client id, hand and epoch: all that is on the bus to be read
+
+  std::uint32_t seq = 0;
+  const auto refused = [&] {
+    return forger.heard("refused", "device input under the id of client 1") &&
+           forger.heard("refused", "command under the id of client 1");
+  };
+  const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+  forger.command(CommandKind::kStop);
+  while ((!refused() || seq < 100) && std::chrono::steady_clock::now() < end) {
+    client.sendPose(++seq, Pose(Vector3(0.2, 0, 0.3)));
+    forger.sendPose(seq + 100'000, Pose(Vector3(0.2, 0, 0.1)));
+    client.listen(milliseconds(1));
+    forger.listen(milliseconds(1));
+  }
+  EXPECT_TRUE(refused());
+  forger.sayGoodBye();
+  EXPECT_TRUE(forger.hears([&] { return forger.heard("refused", "good-bye under the id of client 1"); }));
+  EXPECT_EQ(std::count_if(forger.events.begin(), forger.events.end(),
+                          [](const EventLog& event) { return event.kind == "refused"; }),
+            3)
+      << "each kind is told once";
+  const Tick heard = client.newest.tick;
+  EXPECT_TRUE(client.hears([&] {
+    client.sendPose(++seq, Pose(Vector3(0.2, 0, 0.3)));
+    return client.newest.tick > heard + 20;
+  })) << "the session goes on, and with whom it belongs to";
+  EXPECT_NEAR(client.newest.X_WO.translation().z(), 0.3, 1e-3);
+  EXPECT_GE(server.end().refused_inputs, 3U);
+}
+
+TEST(SessionServer, InLockstepAnInputAheadOfItsTickEndsInDismissalAtOnce) {
+  Running server({.name = "ahead", .lockstep = true, .wait_for = {"right"}});
+  ScriptedClient client("ahead", LinkProfile::kLockstep);
+  ASSERT_TRUE(client.join("right", Role::kTrainee, {"right"}));
+  playInLockstep(client, 1, 5);
+  client.sendPose(9, rightHandAt(9));
+  ASSERT_TRUE(client.hears([&] { return !client.welcome.accepted; }));
+  EXPECT_THAT(client.welcome.reason, HasSubstr("input of tick 9 when tick 6 was the next"));
+  EXPECT_TRUE(client.hears([&] { return client.heard("leave", "input of tick 9"); }));
+}
+
+TEST(SessionServer, WhoWasTakenOutAndGoesOnIsToldAndComesBackByToken) {
+  Running server({.name = "back", .lockstep = true, .wait_for = {"right"}});
+  ScriptedClient client("back", LinkProfile::kLockstep);
+  ASSERT_TRUE(client.join("right", Role::kTrainee, {"right"}));
+  const Welcome seat = client.welcome;
+  playInLockstep(client, 1, 5);
+  client.sendPose(9, rightHandAt(9));
+  ASSERT_TRUE(client.hears([&] { return !client.welcome.accepted; }));
+  ASSERT_TRUE(client.join("right, again", Role::kTrainee, {"right"}, seat.token));
+  ASSERT_TRUE(client.welcome.accepted) << client.welcome.reason;
+  EXPECT_EQ(client.welcome.client, seat.client);
+  EXPECT_THAT(client.welcome.hands, ElementsAre(kRightHand));
+  const Tick next = client.welcome.tick + 1;
+  playInLockstep(client, next, next + 20);
+}
+
+TEST(SessionServer, AnEmergencyStopIsAnybodysAndItsEndTheInstructors) {
+  Running server({.name = "emergency", .wait_for = {"right"}});
+  ScriptedClient trainee("emergency", LinkProfile::kLan);
+  ScriptedClient teacher("emergency", LinkProfile::kLan);
+  ASSERT_TRUE(trainee.join("trainee", Role::kTrainee, {"right"}));
+  ASSERT_TRUE(teacher.join("teacher", Role::kInstructor, {}));
+  trainee.emergencyStop(true);
+  ASSERT_TRUE(trainee.hears([&] { return trainee.heard("emergency stop", "engaged by trainee"); }));
+
+  trainee.emergencyStop(false);
+  EXPECT_TRUE(trainee.hears([&] { return trainee.heard("refused", "may not clear"); }));
+  trainee.command(CommandKind::kClearEmergencyStop);
+  ASSERT_TRUE(trainee.hears([&] { return trainee.ack.id == 1; }));
+  EXPECT_FALSE(trainee.ack.accepted);
+
+  teacher.command(CommandKind::kClearEmergencyStop);
+  ASSERT_TRUE(teacher.hears([&] { return teacher.ack.id == 1; }));
+  EXPECT_TRUE(teacher.ack.accepted) << teacher.ack.reason;
+  EXPECT_TRUE(teacher.hears([&] { return teacher.heard("emergency stop", "cleared by teacher"); }));
+  teacher.command(CommandKind::kClearEmergencyStop);
+  ASSERT_TRUE(teacher.hears([&] { return teacher.ack.id == 2; }));
+  EXPECT_EQ(teacher.ack.reason, "there is no emergency stop");
+}
+
+TEST(SessionServer, AStopEndsASessionThatStillWaitsForPeople) {
+  Running server({.name = "waiting", .wait_for = {"right"}});
+  ScriptedClient teacher("waiting", LinkProfile::kLan);
+  ASSERT_TRUE(teacher.join("teacher", Role::kInstructor, {}));
+  teacher.command(CommandKind::kFulfilled);
+  ASSERT_TRUE(teacher.hears([&] { return teacher.ack.id == 1; }));
+  EXPECT_FALSE(teacher.ack.accepted) << "not accepted and then forgotten";
+  EXPECT_THAT(teacher.ack.reason, HasSubstr("waits for people"));
+  teacher.command(CommandKind::kStop);
+  ASSERT_TRUE(teacher.hears([&] { return teacher.ack.id == 2; }));
+  EXPECT_TRUE(teacher.ack.accepted) << teacher.ack.reason;
+  EXPECT_EQ(server.end(false).run.phase, RunPhase::kStopped);
+}
+
 TEST(SessionServer, WaitsOnlyForWhomThereCanBe) {
   const auto server =
       SessionServer::open(test::smallSession(), {.domain = test::ownDomain(), .wait_for = {"third"}});
