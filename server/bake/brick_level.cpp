@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "server/bake/parallel.h"
+#include "server/bake/triangle_tree.h"
 #include "server/structures/field_builder.h"
 
 namespace tenon {
@@ -12,12 +12,8 @@ namespace tenon {
 namespace {
 
 using Cell = BrickLevel::Cell;
-// From a sub-block's centre to its corner [voxels].
-constexpr double kBlockRadius = 1.7321;
-constexpr int kBlock = 3;
-// What fits into 3 GB: bricks of 1,458 bytes, and places in triangle lists of 4.
+// What fits into 3 GB: bricks of 1,458 bytes.
 constexpr std::size_t kMaxSlots = 1'000'000;
-constexpr std::size_t kMaxListed = 250'000'000;
 
 std::size_t linear(const Cell& cell, const Cell& size) {
   return (static_cast<std::size_t>(cell.z()) * static_cast<std::size_t>(size.y()) +
@@ -33,24 +29,16 @@ Cell unlinear(std::size_t number, const Cell& size) {
           static_cast<int>(number / nx / ny)};
 }
 
-/// A triangle and its distance from some centre: at a point c away from there it is at least distance - c
-/// away.
-struct Ranked {
-  double distance;
-  const Triangle* triangle;
-};
-
-// Triangles lie in one array, so their addresses break ties the same way in every run.
-bool nearer(const Ranked& a, const Ranked& b) {
-  return a.distance != b.distance ? a.distance < b.distance : a.triangle < b.triangle;
-}
-
-std::vector<Ranked> ranked(std::span<const Triangle> triangles, const Vector3& centre) {
-  std::vector<Ranked> ranks;
-  ranks.reserve(triangles.size());
-  for (const Triangle& t : triangles) ranks.push_back({std::sqrt(squaredDistance(centre, t)), &t});
-  std::sort(ranks.begin(), ranks.end(), nearer);
-  return ranks;
+/// Calls visit for the samples of a brick that its neighbour `aside` (each 0 or 1) owns.
+template <typename Visit>
+void visitFace(const Cell& aside, Visit&& visit) {
+  const Cell from = aside * BrickLevel::kVoxels;
+  const Cell to = Cell::Constant(BrickLevel::kVoxels) + aside;
+  for (int z = from.z(); z < to.z(); ++z) {
+    for (int y = from.y(); y < to.y(); ++y) {
+      for (int x = from.x(); x < to.x(); ++x) visit(Cell(x, y, z));
+    }
+  }
 }
 
 bool inside(const Cell& cell, const Cell& size) {
@@ -104,105 +92,15 @@ Cell BrickLevel::brickOf(std::size_t node) const {
 
 BrickLevel::Point BrickLevel::at(const Cell& lattice) const {
   const Cell brick(lattice.x() >> 3, lattice.y() >> 3, lattice.z() >> 3);
-  const std::int64_t node = nodeAt(brick);
-  if (node < 0) return {};
-  Point point;
-  point.known = true;
-  const std::int32_t of_slot = slot[static_cast<std::size_t>(node)];
-  if (of_slot < 0) {
-    point.free = point.reached = free[static_cast<std::size_t>(node)] != 0;
-    point.distance = DistanceField::kBandVoxels;
-    return point;
-  }
-  const Cell in_brick = lattice - brick * kVoxels;
-  const int sample = sampleIndex(in_brick);
-  point.distance = std::abs(static_cast<double>(samplesOf(of_slot)[sample])) / DistanceField::kQuantaPerVoxel;
-  const auto s = static_cast<std::size_t>(of_slot);
-  if (!outside.empty()) point.free = outside[s][static_cast<std::size_t>(sample)];
-  if (!reached.empty()) {
-    const std::uint64_t word = reached[s][static_cast<std::size_t>(in_brick.z())];
-    point.reached = (word >> static_cast<unsigned>(in_brick.y() * kVoxels + in_brick.x()) & 1U) != 0;
-  }
-  return point;
+  return at(nodeAt(brick), lattice - brick * kVoxels);
 }
 
-/// Calls visit(node) for bricks of layers [z_begin, z_end) that are within kClampVoxels of the triangle.
-/// Ranges of bricks are halved until one is left: work grows with the triangle's surface, not with its box.
-template <typename Visit>
-void BrickLevel::visitNear(const Triangle& triangle, int z_begin, int z_end, Visit&& visit) const {
-  const double reach = DistanceField::kClampVoxels * voxel;
-  const double edge = voxel * kVoxels;
-  const Eigen::AlignedBox3d box = boxOf(triangle);
-  const auto brickAt = [&](const Vector3& p) -> Cell {
-    return ((p - p_MoFo_M) / edge).array().floor().matrix().template cast<int>();
-  };
-  Cell low = brickAt(box.min() - Vector3::Constant(reach)).cwiseMax(0);
-  Cell high = brickAt(box.max() + Vector3::Constant(reach)).cwiseMin(bricks - Cell::Ones());
-  low.z() = std::max(low.z(), z_begin);
-  high.z() = std::min(high.z(), z_end - 1);
-  if ((low.array() > high.array()).any()) return;
-
-  const auto descend = [&](const auto& self, const Cell& from, const Cell& to) -> void {
-    const Cell count = to - from + Cell::Ones();
-    const Vector3 half = count.cast<double>() * (edge / 2);
-    const Vector3 centre = p_MoFo_M + from.cast<double>() * edge + half;
-    const double radius = half.norm() + reach;
-    if (squaredDistance(centre, triangle) > radius * radius) return;
-    int axis = 0;
-    if (count.maxCoeff(&axis) == 1) {
-      const std::int64_t node = nodeAt(from);
-      if (node >= 0) visit(static_cast<std::size_t>(node));
-      return;
-    }
-    Cell middle = to;
-    middle[axis] = from[axis] + count[axis] / 2 - 1;
-    self(self, from, middle);
-    Cell next = from;
-    next[axis] = middle[axis] + 1;
-    self(self, next, to);
-  };
-  descend(descend, low, high);
-}
-
-bool BrickLevel::listTriangles(std::span<const Triangle> triangles, ParallelWork& work) {
-  // each piece of work owns a few layers of bricks, so no two write to one node
-  const int layers = std::max(1, (bricks.z() + 15) / 16);
-  const auto pieces = static_cast<std::size_t>((bricks.z() + layers - 1) / layers);
-  std::vector<std::uint32_t> counts(nodes(), 0);
-  const auto layersOf = [&](std::size_t piece) {
-    const int begin = static_cast<int>(piece) * layers;
-    return std::pair(begin, std::min(begin + layers, bricks.z()));
-  };
-  work.run(pieces, 1, [&](std::size_t piece) {
-    const auto [begin, end] = layersOf(piece);
-    for (const Triangle& t : triangles) visitNear(t, begin, end, [&](std::size_t node) { ++counts[node]; });
-  });
-  near_first.assign(nodes() + 1, 0);
-  for (std::size_t node = 0; node < nodes(); ++node) near_first[node + 1] = near_first[node] + counts[node];
-  if (near_first.back() > kMaxListed) return false;
-  near_triangles.resize(near_first.back());
-  std::fill(counts.begin(), counts.end(), 0U);
-  work.run(pieces, 1, [&](std::size_t piece) {
-    const auto [begin, end] = layersOf(piece);
-    for (std::uint32_t i = 0; i < triangles.size(); ++i) {
-      visitNear(triangles[i], begin, end,
-                [&](std::size_t node) { near_triangles[near_first[node] + counts[node]++] = i; });
-    }
-  });
-  return true;
-}
-
-bool BrickLevel::sampleDistances(std::span<const Triangle> triangles, ParallelWork& work) {
+bool BrickLevel::sampleDistances(const TriangleTree& tree, ParallelWork& work) {
   // bricks whose centre is too far away have no sample in the band
   std::vector<std::uint8_t> candidate(nodes(), 0);
-  work.run(nodes(), 1024, [&](std::size_t node) {
-    const double reach = (DistanceField::kBandVoxels + BrickLevel::kBrickRadius) * voxel;
-    const Vector3 centre = position(brickOf(node) * kVoxels + Cell::Constant(kVoxels / 2));
-    const auto list = near(node);
-    candidate[node] = std::any_of(list.begin(), list.end(), [&](std::uint32_t i) {
-      return squaredDistance(centre, triangles[i]) < reach * reach;
-    });
-  });
+  const double band_reach = (DistanceField::kBandVoxels + kBrickRadius) * voxel;
+  work.run(nodes(), 1024,
+           [&](std::size_t node) { candidate[node] = tree.anyWithin(centreOf(node), band_reach); });
   std::vector<std::uint32_t> of_slot;
   for (std::size_t node = 0; node < nodes(); ++node) {
     if (candidate[node] == 0) continue;
@@ -213,55 +111,85 @@ bool BrickLevel::sampleDistances(std::span<const Triangle> triangles, ParallelWo
   samples.resize(of_slot.size() * kSamples);
   work.run(of_slot.size(), 64, [&](std::size_t s) {
     const std::uint32_t node = of_slot[s];
-    std::vector<Triangle> local;
-    for (const std::uint32_t i : near(node)) local.push_back(triangles[i]);
-    std::int16_t* out = samplesOf(static_cast<std::int32_t>(s));
-    sampleBrick(node, local, nullptr, out);
-    const auto band = static_cast<std::int16_t>(DistanceField::kBandVoxels * DistanceField::kQuantaPerVoxel);
-    if (*std::min_element(out, out + kSamples) >= band) slot[node] = -1;
+    sampleBrick(node, tree, ownSamples(node), samplesOf(static_cast<std::int32_t>(s)));
   });
+  work.run(of_slot.size(), 1024, [&](std::size_t s) { copyApron(of_slot[s]); });
+  for (std::size_t s = 0; s < of_slot.size() && !work.cancelled(); ++s) {
+    const std::int16_t* own = samplesOf(static_cast<std::int32_t>(s));
+    const auto band = static_cast<std::int16_t>(DistanceField::kBandVoxels * DistanceField::kQuantaPerVoxel);
+    if (*std::min_element(own, own + kSamples) >= band) slot[of_slot[s]] = -1;
+  }
   return true;
 }
 
-void BrickLevel::sampleBrick(std::size_t node, std::span<const Triangle> triangles, const SampleBits* which,
+BrickLevel::SampleBits BrickLevel::ownSamples(std::size_t node) const {
+  SampleBits own;
+  const Cell brick = brickOf(node);
+  for (int face = 0; face < 8; ++face) {
+    const Cell aside(face & 1, face >> 1 & 1, face >> 2 & 1);
+    const std::int64_t neighbour = nodeAt(brick + aside);
+    if (face > 0 && neighbour >= 0 && slot[static_cast<std::size_t>(neighbour)] >= 0) continue;
+    visitFace(aside, [&](const Cell& in_brick) { own.set(static_cast<std::size_t>(sampleIndex(in_brick))); });
+  }
+  return own;
+}
+
+void BrickLevel::copyApron(std::size_t node) {
+  const Cell brick = brickOf(node);
+  std::int16_t* to = samplesOf(slot[node]);
+  for (int face = 1; face < 8; ++face) {
+    const Cell aside(face & 1, face >> 1 & 1, face >> 2 & 1);
+    const std::int64_t neighbour = nodeAt(brick + aside);
+    if (neighbour < 0 || slot[static_cast<std::size_t>(neighbour)] < 0) continue;
+    const std::int16_t* from = samplesOf(slot[static_cast<std::size_t>(neighbour)]);
+    visitFace(aside, [&](const Cell& in_brick) {
+      to[sampleIndex(in_brick)] = from[sampleIndex(in_brick - aside * kVoxels)];
+    });
+  }
+}
+
+void BrickLevel::sampleBrick(std::size_t node, const TriangleTree& tree, const SampleBits& which,
                              std::int16_t* out) const {
   const Cell corner = brickOf(node) * kVoxels;
-  const Vector3 middle = position(corner + Cell::Constant(kVoxels / 2));
-  const std::vector<Ranked> by_brick = ranked(triangles, middle);
-  std::vector<Ranked> by_block;
-  for (int block = 0; block < 27; ++block) {
-    // only triangles that can be nearest to some sample of the block, nearest to its centre first
-    const Cell first = corner + kBlock * Cell(block % 3, block / 3 % 3, block / 9);
-    const Vector3 centre = position(first + Cell::Ones());
-    const double from_middle = (centre - middle).norm();
-    double reach = std::numeric_limits<double>::infinity();
-    by_block.clear();
-    for (const Ranked& r : by_brick) {
-      if (r.distance - from_middle > reach) break;
-      const double distance = std::sqrt(squaredDistance(centre, *r.triangle));
-      if (distance > reach) continue;
-      reach = std::min(reach, distance + 2.0 * kBlockRadius * voxel);
-      by_block.push_back({distance, r.triangle});
-    }
-    std::sort(by_block.begin(), by_block.end(), nearer);
-    for (int k = 0; k < kBlock * kBlock * kBlock; ++k) {
-      const Cell lattice = first + Cell(k % 3, k / 3 % 3, k / 9);
-      const int sample = sampleIndex(lattice - corner);
-      if (which != nullptr && !(*which)[static_cast<std::size_t>(sample)]) continue;
-      const Vector3 p = position(lattice);
-      const double from_centre = (p - centre).norm();
-      double squared = std::numeric_limits<double>::infinity();
-      double enough = squared;
-      for (const Ranked& r : by_block) {
-        if (r.distance > enough) break;
-        const double candidate = squaredDistance(p, *r.triangle);
-        if (candidate >= squared) continue;
-        squared = candidate;
-        enough = std::sqrt(squared) + from_centre;
+  constexpr double kClamp = DistanceField::kClampVoxels;
+  constexpr double kWidestBlock = 3.4642;  // [voxels] from the middle of 5^3 samples to a corner
+  TriangleTree::Search search(tree, centreOf(node), kBrickRadius * voxel, (kClamp + kWidestBlock) * voxel);
+  // blocks of samples are halved; one whose middle is so far away that all are clamped is done
+  const auto fill = [&](const auto& self, const Cell& from, const Cell& to) -> void {
+    const Cell count = to - from;
+    if (count.maxCoeff() <= 2) {
+      for (int k = 0; k < count.prod(); ++k) {
+        const Cell in_block(k % count.x(), k / count.x() % count.y(), k / (count.x() * count.y()));
+        const int sample = sampleIndex(from + in_block);
+        if (!which[static_cast<std::size_t>(sample)]) continue;
+        const double squared = search.squaredDistance(position(corner + from + in_block), kClamp * voxel);
+        out[sample] = quantizedSample(std::sqrt(squared), voxel);
       }
-      out[sample] = quantizedSample(std::sqrt(squared), voxel);
+      return;
     }
-  }
+    const Vector3 middle = (from + to - Cell::Ones()).cast<double>() / 2;
+    const double reach = (kClamp + (to - from - Cell::Ones()).cast<double>().norm() / 2 + 1e-9) * voxel;
+    if (count.maxCoeff() <= 5 &&
+        search.squaredDistance(position(corner) + middle * voxel, reach) >= reach * reach) {
+      for (int z = from.z(); z < to.z(); ++z) {
+        for (int y = from.y(); y < to.y(); ++y) {
+          for (int x = from.x(); x < to.x(); ++x) {
+            const int sample = sampleIndex({x, y, z});
+            if (which[static_cast<std::size_t>(sample)]) out[sample] = quantizedSample(kClamp * voxel, voxel);
+          }
+        }
+      }
+      return;
+    }
+    const Cell half = (count + Cell::Ones()) / 2;
+    for (int part = 0; part < 8; ++part) {
+      const Cell upper(part & 1, part >> 1 & 1, part >> 2 & 1);
+      const Cell begin = from + upper.cwiseProduct(half);
+      const Cell end = (upper.array() > 0).select(to, from + half);
+      if ((begin.array() < end.array()).all()) self(self, begin, end);
+    }
+  };
+  fill(fill, Cell::Zero(), Cell::Constant(kSide));
 }
 
 }  // namespace tenon

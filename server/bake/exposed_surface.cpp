@@ -1,6 +1,8 @@
 #include "server/bake/exposed_surface.h"
 
+#include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "server/bake/parallel.h"
 
@@ -12,51 +14,120 @@ using Cell = BrickLevel::Cell;
 // A place of the surface is exposed when an empty ball about an outside sample comes this near to it
 // [voxels]: enough for concave corners, where no ball reaches the edge itself.
 constexpr double kTouch = 0.6;
+// Pieces longer than this are too wide for a ball of the band [voxels].
+constexpr double kWide = 6.0;
 constexpr std::size_t kChunk = 4096;
 
 enum class Exposure { kUnknown, kHidden, kExposed };
 
-Exposure exposureIn(const BrickLevel& level, const Vector3& p_MP) {
-  const Cell cell = level.cellAt(p_MP);
-  bool all_known = true;
-  for (int k = 0; k < 64; ++k) {
-    // the cell's own corners first: mostly one of them tells
-    constexpr std::array kOrder{0, 1, -1, 2};
-    const Cell lattice = cell + Cell(kOrder[static_cast<std::size_t>((k & 1) | (k >> 2 & 2))],
-                                     kOrder[static_cast<std::size_t>((k >> 1 & 1) | (k >> 3 & 2))],
-                                     kOrder[static_cast<std::size_t>((k >> 2 & 1) | (k >> 4 & 2))]);
-    const BrickLevel::Point point = level.at(lattice);
-    all_known = all_known && point.known;
-    if (!point.free || !point.known) continue;
-    const double away = (level.position(lattice) - p_MP).norm() / level.voxel;
-    if (away <= point.distance + kTouch) return Exposure::kExposed;
+constexpr int kVoxels = BrickLevel::kVoxels;
+constexpr int kPatch = kVoxels + 3;  // a brick's cells reach one lattice point below and two above
+
+/// What a level says about cells: whether a free point is among the 4^3 lattice points about one.
+class CellMap {
+ public:
+  CellMap(const BrickLevel& level, ParallelWork& work) : level_(level), near_(level.outside.size()) {
+    work.run(level.nodes(), 256, [&](std::size_t node) {
+      if (level.slot[node] >= 0) near_[static_cast<std::size_t>(level.slot[node])] = nearOutside(node);
+    });
   }
-  return all_known ? Exposure::kHidden : Exposure::kUnknown;
+
+  [[nodiscard]] const BrickLevel& level() const { return level_; }
+
+  [[nodiscard]] Exposure exposureOf(const Vector3& p_MP) const {
+    const Cell cell = level_.cellAt(p_MP);
+    const Cell brick = cell / kVoxels;
+    const std::int64_t node = level_.nodeAt(brick);
+    if (node < 0) return Exposure::kUnknown;
+    const Cell in_brick = cell - brick * kVoxels;
+    const std::int32_t slot = level_.slot[static_cast<std::size_t>(node)];
+    if (slot >= 0) {
+      const std::uint64_t word =
+          near_[static_cast<std::size_t>(slot)][static_cast<std::size_t>(in_brick.z())];
+      const auto bit = static_cast<unsigned>(in_brick.y() * kVoxels + in_brick.x());
+      if ((word >> bit & 1U) == 0) return Exposure::kHidden;
+    }
+    return lookAround(p_MP, cell, brick, node);
+  }
+
+ private:
+  [[nodiscard]] BrickLevel::Mask nearOutside(std::size_t node) const {
+    // a row of lattice points along x is a word; a point that is not known may be free
+    std::array<std::uint32_t, static_cast<std::size_t>(kPatch) * kPatch> rows{};
+    level_.visitAround(node, 1, 2, [&](const Cell& offset, const BrickLevel::Point& point) {
+      const bool free = point.free || !point.known;
+      rows[static_cast<std::size_t>((offset.z() + 1) * kPatch + offset.y() + 1)] |=
+          static_cast<std::uint32_t>(free) << static_cast<unsigned>(offset.x() + 1);
+    });
+    BrickLevel::Mask near{};
+    for (int z = 0; z < kVoxels; ++z) {
+      for (int y = 0; y < kVoxels; ++y) {
+        std::uint32_t row = 0;
+        for (int k = 0; k < 16; ++k) {
+          row |= rows[static_cast<std::size_t>((z + k / 4) * kPatch + y + k % 4)];
+        }
+        const std::uint64_t cells = (row | row >> 1U | row >> 2U | row >> 3U) & 0xFFU;
+        near[static_cast<std::size_t>(z)] |= cells << static_cast<unsigned>(y * kVoxels);
+      }
+    }
+    return near;
+  }
+
+  [[nodiscard]] Exposure lookAround(const Vector3& p_MP, const Cell& cell, const Cell& brick,
+                                    std::int64_t node) const {
+    const Vector3 p = (p_MP - level_.p_MoFo_M) / level_.voxel;
+    bool all_known = true;
+    for (int k = 0; k < 64; ++k) {
+      // the cell's own corners first: mostly one of them tells
+      constexpr std::array kOrder{0, 1, -1, 2};
+      const Cell lattice = cell + Cell(kOrder[static_cast<std::size_t>((k & 1) | (k >> 2 & 2))],
+                                       kOrder[static_cast<std::size_t>((k >> 1 & 1) | (k >> 3 & 2))],
+                                       kOrder[static_cast<std::size_t>((k >> 2 & 1) | (k >> 4 & 2))]);
+      const Cell in_brick = lattice - brick * kVoxels;
+      const bool here = (in_brick.array() >= 0).all() && (in_brick.array() < kVoxels).all();
+      const BrickLevel::Point point = here ? level_.at(node, in_brick) : level_.at(lattice);
+      all_known = all_known && point.known;
+      if (!point.free || !point.known) continue;
+      const double reach = point.distance + kTouch;
+      if ((lattice.cast<double>() - p).squaredNorm() <= reach * reach) return Exposure::kExposed;
+    }
+    return all_known ? Exposure::kHidden : Exposure::kUnknown;
+  }
+
+  const BrickLevel& level_;
+  std::vector<BrickLevel::Mask> near_;
+};
+
+double longestEdge(const Triangle& t, std::size_t& from) {
+  double squared = -1.0;
+  for (std::size_t edge = 0; edge < 3; ++edge) {
+    const double length = (t[(edge + 1) % 3] - t[edge]).squaredNorm();
+    if (length > squared) {
+      squared = length;
+      from = edge;
+    }
+  }
+  return std::sqrt(squared);
 }
 
 /// Sorts the pieces of one triangle.
 class Cutter {
  public:
-  Cutter(const BrickLevel& coarse, const BrickLevel* fine) : coarse_(coarse), fine_(fine) {}
+  Cutter(const CellMap& coarse, const CellMap* fine) : coarse_(coarse), fine_(fine) {}
 
   enum class Part { kAll, kNone, kSome };
 
-  Part exposedPart(const Triangle& t, std::vector<Triangle>& pieces) const {
-    int longest = 0;
-    double squared = 0.0;
-    for (int edge = 0; edge < 3; ++edge) {
-      const double length =
-          (t[static_cast<std::size_t>((edge + 1) % 3)] - t[static_cast<std::size_t>(edge)]).squaredNorm();
-      if (length > squared) {
-        squared = length;
-        longest = edge;
-      }
-    }
+  Part exposedPart(const Triangle& t, std::vector<Triangle>& pieces) {
+    std::size_t a = 0;
+    const double length = longestEdge(t, a);
     const Vector3 centre = (t[0] + t[1] + t[2]) / 3.0;
-    const double voxel = voxelAt(centre);
-    if (squared <= voxel * voxel) return isExposed(centre) ? Part::kAll : Part::kNone;
+    const BrickLevel& level = levelAt(centre);
+    if (length <= level.voxel) return isExposed(centre) ? Part::kAll : Part::kNone;
+    if (length <= kWide * level.voxel) {
+      if (inEmptyBall(level, t, centre)) return Part::kAll;
+      if (farFromOutside(level, t)) return Part::kNone;
+    }
 
-    const auto a = static_cast<std::size_t>(longest);
     const std::size_t b = (a + 1) % 3;
     const Vector3 middle = (t[a] + t[b]) / 2;
     Triangle first = t;
@@ -72,20 +143,67 @@ class Cutter {
   }
 
  private:
-  [[nodiscard]] double voxelAt(const Vector3& p) const {
-    const bool in_fine = fine_ != nullptr && fine_->at(fine_->cellAt(p)).known;
-    return in_fine ? fine_->voxel : coarse_.voxel;
+  /// Whether one empty ball touches all of the piece: balls are convex, so its corners tell.
+  [[nodiscard]] bool inEmptyBall(const BrickLevel& level, const Triangle& t, const Vector3& centre) {
+    const auto holds = [&t](const Ball& ball) {
+      return std::all_of(t.begin(), t.end(), [&ball](const Vector3& corner) {
+        return (corner - ball.centre).squaredNorm() <= ball.squared_radius;
+      });
+    };
+    // neighbouring pieces mostly touch the same ball
+    if (holds(last_)) return true;
+    const Vector3 normal = (t[1] - t[0]).cross(t[2] - t[0]).normalized();
+    if (!normal.allFinite()) return false;
+    const Vector3 half = Vector3::Constant(level.voxel / 2);
+    for (const double height : {5.0, -5.0, 2.5, -2.5}) {
+      const Cell lattice = level.cellAt(centre + normal * (height * level.voxel) + half);
+      const BrickLevel::Point point = level.at(lattice);
+      if (!point.known || !point.free) continue;
+      const double radius = (point.distance + kTouch) * level.voxel;
+      const Ball ball{level.position(lattice), radius * radius};
+      if (!holds(ball)) continue;
+      last_ = ball;
+      return true;
+    }
+    return false;
+  }
+
+  /// Whether no brick with a sample that could expose some of the piece has one outside.
+  [[nodiscard]] static bool farFromOutside(const BrickLevel& level, const Triangle& t) {
+    const Eigen::AlignedBox3d box = boxOf(t);
+    const Cell low = (level.cellAt(box.min()) - Cell::Ones()) / BrickLevel::kVoxels;
+    const Cell high = (level.cellAt(box.max()) + Cell::Constant(2)) / BrickLevel::kVoxels;
+    for (int z = low.z(); z <= high.z(); ++z) {
+      for (int y = low.y(); y <= high.y(); ++y) {
+        for (int x = low.x(); x <= high.x(); ++x) {
+          const std::int64_t node = level.nodeAt(Cell(x, y, z));
+          if (node < 0 || level.anyOutside(static_cast<std::size_t>(node))) return false;
+        }
+      }
+    }
+    return true;
+  }
+
+  [[nodiscard]] const BrickLevel& levelAt(const Vector3& p) const {
+    if (fine_ == nullptr) return coarse_.level();
+    const BrickLevel& fine = fine_->level();
+    return fine.nodeAt(fine.cellAt(p) / kVoxels) >= 0 ? fine : coarse_.level();
   }
   [[nodiscard]] bool isExposed(const Vector3& p) const {
     if (fine_ != nullptr) {
-      const Exposure exposure = exposureIn(*fine_, p);
+      const Exposure exposure = fine_->exposureOf(p);
       if (exposure != Exposure::kUnknown) return exposure == Exposure::kExposed;
     }
-    return exposureIn(coarse_, p) == Exposure::kExposed;
+    return coarse_.exposureOf(p) == Exposure::kExposed;
   }
 
-  const BrickLevel& coarse_;
-  const BrickLevel* fine_;
+  struct Ball {
+    Vector3 centre = Vector3::Zero();
+    double squared_radius = -1.0;
+  };
+  const CellMap& coarse_;
+  const CellMap* fine_;
+  Ball last_;
 };
 
 }  // namespace
@@ -99,8 +217,11 @@ ExposedSurface::ExposedSurface(std::span<const Triangle> triangles, const BrickL
     std::vector<Triangle> pieces;
   };
   std::vector<std::vector<Cut>> cuts((triangles.size() + kChunk - 1) / kChunk);
-  const Cutter cutter(coarse, fine);
+  const CellMap coarse_map(coarse, work);
+  std::optional<CellMap> fine_map;
+  if (fine != nullptr) fine_map.emplace(*fine, work);
   work.run(cuts.size(), 1, [&](std::size_t chunk) {
+    Cutter cutter(coarse_map, fine_map ? &*fine_map : nullptr);
     const std::size_t end = std::min(triangles.size(), (chunk + 1) * kChunk);
     for (std::size_t i = chunk * kChunk; i < end; ++i) {
       std::vector<Triangle> pieces;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "server/bake/brick_level.h"
+#include "server/bake/triangle.h"
 
 namespace tenon {
 

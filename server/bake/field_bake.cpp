@@ -9,6 +9,7 @@
 #include "server/bake/exposed_surface.h"
 #include "server/bake/outside.h"
 #include "server/bake/parallel.h"
+#include "server/bake/triangle_tree.h"
 #include "server/structures/field_builder.h"
 
 namespace tenon {
@@ -47,28 +48,18 @@ std::vector<std::uint32_t> bricksToRefine(const BrickLevel& coarse, const BakeOp
   return refined;
 }
 
-/// Inside, distances count only to what is exposed; then signs are put in.
-void finishSamples(BrickLevel& level, const ExposedSurface& surface, ParallelWork& work) {
+/// Inside, distances count only to what is exposed; then signs are put in. `gone` are the parts of the
+/// surface that are not.
+void finishSamples(BrickLevel& level, const TriangleTree& exposed, const TriangleTree& gone,
+                   ParallelWork& work) {
+  const double reach = (BrickLevel::kBrickRadius + DistanceField::kClampVoxels) * level.voxel;
   work.run(level.nodes(), 64, [&](std::size_t node) {
     const std::int32_t slot = level.slot[node];
     if (slot < 0) return;
     std::int16_t* samples = level.samplesOf(slot);
     const BrickLevel::SampleBits inside = ~level.outside[static_cast<std::size_t>(slot)];
-    const auto list = level.near(node);
-    const bool all_whole =
-        std::all_of(list.begin(), list.end(), [&](std::uint32_t i) { return surface.whole(i); });
-    if (inside.any() && !all_whole) {
-      const double edge = level.voxel * BrickLevel::kVoxels;
-      const Vector3 centre =
-          level.position(level.brickOf(node) * BrickLevel::kVoxels) + Vector3::Constant(edge / 2);
-      const double reach = (BrickLevel::kBrickRadius + DistanceField::kClampVoxels) * level.voxel;
-      std::vector<Triangle> local;
-      for (const std::uint32_t i : list) {
-        for (const Triangle& t : surface.of(i)) {
-          if (squaredDistance(centre, t) <= reach * reach) local.push_back(t);
-        }
-      }
-      level.sampleBrick(node, local, &inside, samples);
+    if (inside.any() && gone.anyWithin(level.centreOf(node), reach)) {
+      level.sampleBrick(node, exposed, inside, samples);
     }
     for (int k = 0; k < BrickLevel::kSamples; ++k) {
       if (inside[static_cast<std::size_t>(k)]) samples[k] = static_cast<std::int16_t>(-samples[k]);
@@ -181,10 +172,10 @@ Result<BakedField> bakeField(std::span<const Triangle> triangles, const BakeOpti
   FieldStorage storage = makeGrid(box, options.voxel);
   const auto& counts = storage.layout.bricks;
   BrickLevel coarse(storage.layout.p_MoFo_M, options.voxel, {counts[0], counts[1], counts[2]});
-  work.stage("finding triangles near bricks", 0.05, 0.15);
-  if (!coarse.listTriangles(triangles, work)) return tooMuch(options.voxel);
+  work.stage("sorting triangles", 0.05, 0.15);
+  const TriangleTree tree(triangles);
   work.stage("measuring distances", 0.15, 0.45);
-  if (!coarse.sampleDistances(triangles, work)) return tooMuch(options.voxel);
+  if (!coarse.sampleDistances(tree, work)) return tooMuch(options.voxel);
   work.stage("finding the outside", 0.45, 0.55);
   if (!work.cancelled()) findOutside(coarse, nullptr, work);
 
@@ -193,8 +184,7 @@ Result<BakedField> bakeField(std::span<const Triangle> triangles, const BakeOpti
   if (!refined.empty() && !work.cancelled()) {
     work.stage("refining", 0.55, 0.65);
     fine = std::make_unique<BrickLevel>(coarse, options.refinement, refined);
-    const bool fits = fine->listTriangles(triangles, work) && fine->sampleDistances(triangles, work);
-    if (!fits) return tooMuch(options.voxel / options.refinement);
+    if (!fine->sampleDistances(tree, work)) return tooMuch(options.voxel / options.refinement);
     if (!work.cancelled()) findOutside(*fine, &coarse, work);
     if (!work.cancelled()) adoptFineSigns(coarse, *fine, work);
   }
@@ -203,16 +193,20 @@ Result<BakedField> bakeField(std::span<const Triangle> triangles, const BakeOpti
   work.stage("leaving out what is inside", 0.65, 0.75);
   const ExposedSurface surface(triangles, coarse, fine.get(), work);
   work.stage("measuring depths", 0.75, 0.85);
-  finishSamples(coarse, surface, work);
-  if (fine) finishSamples(*fine, surface, work);
+  BakedField baked;
+  baked.surface = surface.all();
+  std::vector<Triangle> gone;
+  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+    if (surface.of(i).empty()) ++baked.hidden_triangles;
+    if (!surface.whole(i)) gone.push_back(triangles[i]);
+  }
+  const TriangleTree gone_tree(gone);
+  const TriangleTree exposed = gone.empty() ? TriangleTree({}) : TriangleTree(baked.surface);
+  finishSamples(coarse, exposed, gone_tree, work);
+  if (fine) finishSamples(*fine, exposed, gone_tree, work);
   if (work.cancelled()) return fail("cancelled");
 
   storage.layout.refinement = fine ? options.refinement : 1;
-  BakedField baked;
-  baked.surface = surface.all();
-  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
-    if (surface.of(i).empty()) ++baked.hidden_triangles;
-  }
   work.stage("packing", 0.85, 0.88);
   baked.field = assemble(std::move(storage), coarse, fine.get(), refined, work);
   return baked;

@@ -186,8 +186,8 @@ std::vector<Step> stepsByLength() {
 }
 
 /// The empty radius about a lattice point that the flood reached [voxels]; -1 where it did not.
-float reachedRadius(const BrickLevel& level, const BrickLevel* coarse, const Cell& lattice) {
-  const BrickLevel::Point point = level.at(lattice);
+float reachedRadius(const BrickLevel& level, const BrickLevel* coarse, const Cell& lattice,
+                    const BrickLevel::Point& point) {
   if (point.known) return point.reached ? static_cast<float>(point.distance) : -1.0F;
   if (coarse == nullptr) return static_cast<float>(kVoxels);
   return static_cast<float>(clearanceFromCoarse(*coarse, level.position(lattice)) / level.voxel);
@@ -199,11 +199,11 @@ BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* 
   const std::int32_t slot = level.slot[node];
   const Cell corner = level.brickOf(node) * kVoxels;
   std::vector<float> patch(static_cast<std::size_t>(kPatch) * kPatch * kPatch);
-  for (int k = 0; k < kPatch * kPatch * kPatch; ++k) {
-    const Cell offset(k % kPatch, k / kPatch % kPatch, k / (kPatch * kPatch));
-    patch[static_cast<std::size_t>(k)] =
-        reachedRadius(level, coarse, corner + offset - Cell::Constant(kReach));
-  }
+  level.visitAround(node, kReach, kReach + 1, [&](const Cell& offset, const BrickLevel::Point& point) {
+    const Cell in_patch = offset + Cell::Constant(kReach);
+    patch[static_cast<std::size_t>((in_patch.z() * kPatch + in_patch.y()) * kPatch + in_patch.x())] =
+        reachedRadius(level, coarse, corner + offset, point);
+  });
   BrickLevel::SampleBits outside;
   constexpr auto kSigmaQuanta = static_cast<std::int16_t>(kSigma * DistanceField::kQuantaPerVoxel);
   // a sample on the surface itself is outside in spite of rounding

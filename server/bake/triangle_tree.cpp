@@ -1,0 +1,206 @@
+#include "server/bake/triangle_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace tenon {
+
+namespace {
+
+// A search begins at about this many boxes instead of at the root.
+constexpr std::size_t kRoots = 24;
+// Rounding of the float arithmetic in squaredDistances, and some.
+constexpr float kRounding = 1e-5F;
+
+}  // namespace
+
+/// Splits at the median of the longest axis, twice for each node.
+struct TriangleTree::Builder {
+  TriangleTree& tree;
+  std::span<const Triangle> triangles;
+  std::vector<Vector3f> middles;
+  std::vector<std::uint32_t> order;
+
+  using Range = std::pair<std::uint32_t, std::uint32_t>;
+
+  std::uint32_t split(const Range& range) {
+    Eigen::AlignedBox3f box;
+    for (std::uint32_t i = range.first; i < range.second; ++i) box.extend(middles[order[i]]);
+    Eigen::Index axis = 0;
+    box.sizes().maxCoeff(&axis);
+    const std::uint32_t middle = range.first + (range.second - range.first) / 2;
+    std::nth_element(order.begin() + range.first, order.begin() + middle, order.begin() + range.second,
+                     [&](std::uint32_t a, std::uint32_t b) {
+                       const float ca = middles[a][axis];
+                       const float cb = middles[b][axis];
+                       return ca != cb ? ca < cb : a < b;
+                     });
+    return middle;
+  }
+
+  /// Makes the node of a range and gives the box about it.
+  Eigen::AlignedBox3f build(std::uint32_t number, const Range& range) {
+    std::array<Range, 4> parts{};
+    std::size_t count = 0;
+    if (range.second - range.first <= 4) {
+      for (std::uint32_t i = range.first; i < range.second; ++i) parts[count++] = {i, i + 1};
+    } else {
+      const std::uint32_t middle = split(range);
+      for (const Range& half : {Range{range.first, middle}, Range{middle, range.second}}) {
+        const std::uint32_t quarter = split(half);
+        parts[count++] = {half.first, quarter};
+        parts[count++] = {quarter, half.second};
+      }
+    }
+    Eigen::AlignedBox3f whole;
+    constexpr float kFar = std::numeric_limits<float>::max();
+    for (std::size_t lane = 0; lane < 4; ++lane) {
+      std::uint32_t child = kNothing;
+      Eigen::AlignedBox3f box(Vector3f::Constant(kFar), Vector3f::Constant(kFar));
+      if (lane < count && parts[lane].second - parts[lane].first == 1) {
+        child = kTriangle + parts[lane].first;
+        box = boxAbout(parts[lane].first);
+      } else if (lane < count) {
+        child = static_cast<std::uint32_t>(tree.nodes_.size());
+        tree.nodes_.emplace_back();
+        box = build(child, parts[lane]);
+      }
+      Node& node = tree.nodes_[number];
+      node.child[lane] = child;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        node.low[axis][static_cast<Eigen::Index>(lane)] = box.min()[static_cast<Eigen::Index>(axis)];
+        node.high[axis][static_cast<Eigen::Index>(lane)] = box.max()[static_cast<Eigen::Index>(axis)];
+      }
+      if (lane < count) whole.extend(box);
+    }
+    return whole;
+  }
+
+  [[nodiscard]] Eigen::AlignedBox3f boxAbout(std::uint32_t place) const {
+    Eigen::AlignedBox3f box;
+    for (const Vector3& corner : triangles[order[place]]) box.extend(tree.local(corner));
+    // twice: the point that asks is rounded too
+    const Vector3f slack = Vector3f::Constant(2.0F * tree.slack_);
+    return {box.min() - slack, box.max() + slack};
+  }
+};
+
+TriangleTree::TriangleTree(std::span<const Triangle> triangles) {
+  if (triangles.empty()) return;
+  Eigen::AlignedBox3d box;
+  for (const Triangle& t : triangles) box.extend(boxOf(t));
+  centre_ = box.center();
+  slack_ = static_cast<float>(box.diagonal().norm()) * std::numeric_limits<float>::epsilon();
+
+  Builder builder{*this, triangles, {}, std::vector<std::uint32_t>(triangles.size())};
+  std::iota(builder.order.begin(), builder.order.end(), 0U);
+  builder.middles.reserve(triangles.size());
+  for (const Triangle& t : triangles) builder.middles.push_back(local((t[0] + t[1] + t[2]) / 3.0));
+  nodes_.reserve(triangles.size() / 2 + 1);
+  nodes_.emplace_back();
+  builder.build(0, {0, static_cast<std::uint32_t>(triangles.size())});
+  triangles_.reserve(triangles.size());
+  for (const std::uint32_t i : builder.order) triangles_.push_back(triangles[i]);
+}
+
+bool TriangleTree::anyWithin(const Vector3& p, double reach) const {
+  if (nodes_.empty()) return false;
+  const Vector3f p_local = local(p);
+  const double squared = reach * reach;
+  std::array<std::uint32_t, 128> waiting;  // three for each level of the tree, which has at most 16
+  std::size_t count = 0;
+  waiting[count++] = 0;
+  while (count > 0) {
+    const Node& node = nodes_[waiting[--count]];
+    const Lanes away = node.squaredDistances(p_local) * (1.0F - kRounding);
+    for (std::size_t lane = 0; lane < 4; ++lane) {
+      if (!(away[static_cast<Eigen::Index>(lane)] < squared) || node.child[lane] == kNothing) continue;
+      if ((node.child[lane] & kTriangle) == 0) {
+        waiting[count++] = node.child[lane];
+      } else if (tenon::squaredDistance(p, triangles_[node.child[lane] - kTriangle]) < squared) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+TriangleTree::Search::Search(const TriangleTree& tree, const Vector3& centre, double radius, double reach)
+    : tree_(tree) {
+  if (tree.nodes_.empty()) return;
+  const Vector3f p_local = tree.local(centre);
+  const double far = (radius + reach) * (radius + reach);
+  struct Root {
+    std::uint32_t node;
+    std::size_t lane;
+  };
+  std::vector<Root> found;
+  std::vector<std::uint32_t> waiting{0};
+  for (std::size_t next = 0; next < waiting.size(); ++next) {
+    const Node& node = tree.nodes_[waiting[next]];
+    const Lanes away = node.squaredDistances(p_local) * (1.0F - kRounding);
+    for (std::size_t lane = 0; lane < 4; ++lane) {
+      if (!(away[static_cast<Eigen::Index>(lane)] < far) || node.child[lane] == kNothing) continue;
+      const bool open = (node.child[lane] & kTriangle) == 0 && found.size() + waiting.size() - next < kRoots;
+      if (open) {
+        waiting.push_back(node.child[lane]);
+      } else {
+        found.push_back({waiting[next], lane});
+      }
+    }
+  }
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (i % 4 == 0) {
+      Node empty;
+      empty.low.fill(Lanes::Constant(std::numeric_limits<float>::max()));
+      empty.high = empty.low;
+      empty.child.fill(kNothing);
+      roots_.push_back(empty);
+    }
+    const Node& from = tree.nodes_[found[i].node];
+    const auto source = static_cast<Eigen::Index>(found[i].lane);
+    const auto lane = static_cast<Eigen::Index>(i % 4);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      roots_.back().low[axis][lane] = from.low[axis][source];
+      roots_.back().high[axis][lane] = from.high[axis][source];
+    }
+    roots_.back().child[i % 4] = from.child[found[i].lane];
+  }
+}
+
+void TriangleTree::Search::visit(const Node& node, const Vector3& p, const Vector3f& p_local,
+                                 double& squared) {
+  const Lanes away = node.squaredDistances(p_local) * (1.0F - kRounding);
+  std::array<float, 4> lanes;
+  Lanes::Map(lanes.data()) = away;
+  // the nearest box first: it makes the others likely to be skipped
+  const auto first = static_cast<std::size_t>(std::min_element(lanes.begin(), lanes.end()) - lanes.begin());
+  for (std::size_t i = 0; i < 4; ++i) {
+    const std::size_t lane = i ^ first;
+    if (!(lanes[lane] < squared)) continue;
+    const std::uint32_t child = node.child[lane];
+    if (child == kNothing) continue;
+    if ((child & kTriangle) == 0) {
+      visit(tree_.nodes_[child], p, p_local, squared);
+      continue;
+    }
+    const double candidate = tenon::squaredDistance(p, tree_.triangles_[child - kTriangle]);
+    if (candidate >= squared) continue;
+    squared = candidate;
+    last_ = child - kTriangle;
+  }
+}
+
+double TriangleTree::Search::squaredDistance(const Vector3& p, double reach) {
+  double squared = reach * reach;
+  if (last_ != kNothing) {
+    squared = std::min(squared, tenon::squaredDistance(p, tree_.triangles_[last_]));
+  }
+  const Vector3f p_local = tree_.local(p);
+  for (const Node& root : roots_) visit(root, p, p_local, squared);
+  return squared;
+}
+
+}  // namespace tenon
