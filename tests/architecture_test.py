@@ -11,7 +11,7 @@ from pathlib import Path
 ANY_ROOM = {"idl/types", "idl/threads", "idl/wire", "idl/record", "server/structures", "server/bake",
             "server/collision", "server/simulation", "server/game_control", "server/session", "devices",
             "devices/simulated", "clients/haptic", "clients/trainee", "clients/instructor", "clients/observer",
-            "clients/recorder", "clients/report", "scenarios", "tests"}
+            "clients/recorder", "clients/tell", "clients/report", "scenarios", "tests"}
 IDL = {"idl/types", "idl/threads", "idl/wire", "idl/record"}
 SERVER = {room for room in ANY_ROOM if room.startswith("server")}
 DEVICES = {"devices", "devices/simulated"}
@@ -36,6 +36,7 @@ ROOMS = {
     "clients/instructor": (IDL | DEVICES | {"clients/haptic"}, {"fmt", "cli11"}),
     "clients/observer": (IDL, {"fmt", "cli11", "json", "posix"}),
     "clients/recorder": (IDL, {"fmt", "cli11", "posix"}),
+    "clients/tell": (IDL, {"fmt", "cli11", "posix"}),
     "clients/report": (IDL, {"fmt", "cli11", "json"}),
     "scenarios": ({"idl/types"}, {"png", "fmt", "cli11"}),
 }
@@ -44,7 +45,7 @@ LIBRARIES = {
     "tl": r"tl/", "dds": r"(dds/|tenon\.h$)", "zstd": r"zstd\.h$", "lz4": r"lz4", "hwy": r"hwy/", "xxhash": r"xxhash\.h$",
     "assimp": r"assimp/", "octomap": r"octomap/", "meshoptimizer": r"meshoptimizer\.h$", "yaml-cpp": r"yaml-cpp/",
     "fmt": r"fmt/", "cli11": r"CLI/", "json": r"nlohmann/", "png": r"png\.h$", "bullet": r"(btBullet|bullet/)",
-    "posix": r"(sys/|unistd\.h$|fcntl\.h$|poll\.h$|spawn\.h$|pthread\.h$|sched\.h$|signal\.h$|arpa/|netinet/|linux/|time\.h$)",
+    "posix": r"(sys/|unistd\.h$|fcntl\.h$|poll\.h$|termios\.h$|spawn\.h$|pthread\.h$|sched\.h$|signal\.h$|arpa/|netinet/|linux/|time\.h$)",
 }
 EVERYWHERE = r"(Eigen/|[a-z_0-9]+$|expected\.hpp$)"  # Eigen and the standard library
 
