@@ -7,7 +7,6 @@
 namespace tenon {
 
 namespace {
-using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 constexpr milliseconds kQuiet{300};  // after the last object of the scene
 
@@ -45,13 +44,14 @@ Result<void> StationLink::openWriters() {
 Result<void> StationLink::readScene(const MembershipWishes& wishes) {
   auto reader = Reader<SceneObject>::open(member_->session(), kSceneObject);
   if (!reader) return fail(reader.error().what);
-  const auto until = Clock::now() + wishes.patience;
-  auto last = Clock::now();
+  const auto until = std::chrono::steady_clock::now() + wishes.patience;
+  auto last = std::chrono::steady_clock::now();
   SceneObject object;
-  while (Clock::now() < until && (objects_.empty() || Clock::now() - last < kQuiet)) {
+  while (std::chrono::steady_clock::now() < until &&
+         (objects_.empty() || std::chrono::steady_clock::now() - last < kQuiet)) {
     while (reader->take(object)) {
       objects_.push_back(object);
-      last = Clock::now();
+      last = std::chrono::steady_clock::now();
     }
     std::this_thread::sleep_for(milliseconds(5));
   }
@@ -63,8 +63,8 @@ Result<void> StationLink::readScene(const MembershipWishes& wishes) {
 }
 
 Result<void> StationLink::settle(const Stop& stop) {
-  const auto until = Clock::now() + std::chrono::seconds(5);
-  while (!stop && Clock::now() < until) {
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  while (!stop && std::chrono::steady_clock::now() < until) {
     if (inputs_->matchedReaders() > 0 && inbox_.matchedWriters() > 0) return {};
     std::this_thread::sleep_for(milliseconds(5));
   }

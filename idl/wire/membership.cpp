@@ -8,7 +8,6 @@
 namespace tenon {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 constexpr milliseconds kAskAgain{500};
 constexpr milliseconds kLook{5};
@@ -28,9 +27,9 @@ std::string named(const std::string& session) {
 template <class Done>
 bool waitFor(std::chrono::seconds patience, const std::atomic<bool>& stop,
              const std::function<void()>& meanwhile, Done done) {
-  const auto until = Clock::now() + patience;
+  const auto until = std::chrono::steady_clock::now() + patience;
   while (!done()) {
-    if (stop || Clock::now() >= until) return false;
+    if (stop || std::chrono::steady_clock::now() >= until) return false;
     if (meanwhile) meanwhile();
     std::this_thread::sleep_for(kLook);
   }
@@ -93,11 +92,12 @@ Result<void> Membership::join(const Stop& stop, const std::function<void()>& mea
   if (!welcomes) return fail(welcomes.error().what);
   const Join join{guid_, wishes_.person, wishes_.role, wishes_.hands, wishes_.token, kProtocolVersion};
   Result<void> asked;
-  auto ask_at = Clock::now();
+  auto ask_at = std::chrono::steady_clock::now();
   const bool answered = waitFor(wishes_.patience, stop, meanwhile, [&] {
-    if (Clock::now() >= ask_at && joins->matchedReaders() > 0 && welcomes->matchedWriters() > 0) {
+    if (std::chrono::steady_clock::now() >= ask_at && joins->matchedReaders() > 0 &&
+        welcomes->matchedWriters() > 0) {
       asked = joins->write(join);
-      ask_at = Clock::now() + kAskAgain;
+      ask_at = std::chrono::steady_clock::now() + kAskAgain;
     }
     // a refusal that names a client is about the seat that was lost, not about this question
     while (asked && welcomes->take(welcome_, &server_))
