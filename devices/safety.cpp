@@ -5,8 +5,18 @@
 namespace tenon {
 namespace {
 
-constexpr double kReleaseShare = 0.5;       ///< of the speed limit, below which the brake lets go
-constexpr std::uint64_t kQuietTicks = 500;  ///< a rule that rested as long is told anew
+constexpr double kReleaseShare = 0.5;         ///< of the speed limit, below which the brake lets go
+constexpr std::uint64_t kQuietTicks = 500;    ///< a rule that rested as long has ended
+constexpr std::uint64_t kTellEvery = 10'000;  ///< [ticks] of a rule that is part of every day's work
+
+/// Works in every session, without anything being wrong.
+constexpr bool isRoutine(SafetyRule rule) noexcept {
+  constexpr std::uint32_t kRoutine =
+      bit(SafetyRule::kAged) | bit(SafetyRule::kStiffnessLowered) | bit(SafetyRule::kSoftStart) |
+      bit(SafetyRule::kSlewed) | bit(SafetyRule::kPassivity) | bit(SafetyRule::kWorkspaceWall) |
+      bit(SafetyRule::kForceLimited) | bit(SafetyRule::kWordClamped) | bit(SafetyRule::kClutchWarning);
+  return (bit(rule) & kRoutine) != 0;
+}
 
 }  // namespace
 
@@ -150,17 +160,41 @@ void Safety::reset() noexcept {
 void Safety::tell(double wanted_force) noexcept {
   for (int i = 0; i < kSafetyRules; ++i) {
     const auto rule = static_cast<SafetyRule>(1U << static_cast<unsigned>(i));
-    if (!acts(rule)) continue;
-    std::uint64_t& last = last_acted_[static_cast<std::size_t>(i)];
-    const bool anew = last == 0 || tick_ - last > kQuietTicks;
-    last = tick_;
-    if (!anew) continue;
-    if (told_ - taken_ == kRing) {
-      ++taken_;
-      ++lost_;
+    Episode& episode = episodes_[static_cast<std::size_t>(i)];
+    if (acts(rule)) {
+      if (!episode.open) begin(episode, rule, wanted_force);
+      ++episode.acted;
+      episode.last = tick_;
+    } else if (episode.open && tick_ - episode.last > kQuietTicks) {
+      episode.open = false;
+      if (episode.told) push({.tick = episode.last, .rule = rule, .began = false, .acted = episode.acted});
     }
-    ring_[told_++ % kRing] = {tick_, rule, wanted_force, shown_.force.norm()};
   }
+}
+
+void Safety::begin(Episode& episode, SafetyRule rule, double wanted_force) noexcept {
+  episode.open = true;
+  episode.acted = 0;
+  episode.told = !isRoutine(rule) || episode.told_at == 0 || tick_ - episode.told_at >= kTellEvery;
+  if (!episode.told) {
+    ++episode.untold;
+    return;
+  }
+  push({.tick = tick_,
+        .rule = rule,
+        .before = wanted_force,
+        .after = shown_.force.norm(),
+        .untold = episode.untold});
+  episode.untold = 0;
+  episode.told_at = tick_;
+}
+
+void Safety::push(const Intervention& intervention) noexcept {
+  if (told_ - taken_ == kRing) {
+    ++taken_;
+    ++lost_;
+  }
+  ring_[told_++ % kRing] = intervention;
 }
 
 bool Safety::next(Intervention& intervention) noexcept {

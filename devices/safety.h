@@ -25,12 +25,15 @@ struct SafetyRequest {
   bool emergency_stop = false;
 };
 
-/// That a rule began to act, for the event log.
+/// That a rule began to act, or that it has come to rest, for the event log.
 struct Intervention {
   std::uint64_t tick = 0;  ///< of this layer, from 1
   SafetyRule rule = SafetyRule::kForcesOff;
-  double before = 0.0;  ///< [N] wanted
-  double after = 0.0;   ///< [N] shown
+  bool began = true;
+  double before = 0.0;       ///< [N] wanted, at its beginning
+  double after = 0.0;        ///< [N] shown
+  std::uint64_t acted = 0;   ///< [ticks] of an intervention that ended
+  std::uint32_t untold = 0;  ///< earlier interventions of this rule that nobody was told of
 };
 
 /// Stands between any force source and any device: what leaves here may be felt by a person.
@@ -59,7 +62,9 @@ class Safety {
   /// again.
   void reset() noexcept;
 
-  /// Oldest first; false when there is none. A rule that flickers is told once in half a second.
+  /// Oldest first; false when there is none. A rule that flickers with rests of less than half a second is
+  /// one intervention. Of rules that are part of every day's work one is told in ten seconds, with the number
+  /// of those in between.
   [[nodiscard]] bool next(Intervention& intervention) noexcept;
   /// Interventions overwritten before anybody took them.
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
@@ -96,7 +101,19 @@ class Safety {
   MotorHeat heat_;
   PassivityObserver passivity_;
 
-  std::array<std::uint64_t, kSafetyRules> last_acted_{};  ///< tick, by bit
+  /// A rule from its first act to its rest.
+  struct Episode {
+    std::uint64_t last = 0;     ///< [tick] it acted
+    std::uint64_t acted = 0;    ///< [ticks]
+    std::uint64_t told_at = 0;  ///< [tick] the last beginning that was told; 0: none yet
+    std::uint32_t untold = 0;
+    bool open = false;
+    bool told = false;
+  };
+  void begin(Episode& episode, SafetyRule rule, double wanted_force) noexcept;
+  void push(const Intervention& intervention) noexcept;
+
+  std::array<Episode, kSafetyRules> episodes_{};  ///< by bit
   std::array<Intervention, kRing> ring_{};
   std::uint64_t told_ = 0;
   std::uint64_t taken_ = 0;

@@ -113,9 +113,10 @@ void HapticHand::sendOn(std::uint32_t seq, const WorldView& world, const Twist& 
 
 void HapticHand::notice() noexcept {
   news_ = {};
-  // told by the safety layer itself, which is quiet about a rule that flickers
+  // those for which there is no room now are told in the next millisecond
   Intervention intervention;
-  while (safety_.next(intervention)) news_.safety_began |= static_cast<std::uint32_t>(intervention.rule);
+  while (!news_.interventions.full() && safety_.next(intervention))
+    news_.interventions.push_back(intervention);
   const bool fault = device_state_.fault != DeviceFault::kNone;
   news_.fault_began = fault && !fault_before_;
   fault_before_ = fault;

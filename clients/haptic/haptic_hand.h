@@ -7,13 +7,14 @@
 #include "clients/haptic/workspace.h"
 #include "devices/device.h"
 #include "devices/safety.h"
+#include "idl/types/fixed_vector.h"
 #include "idl/types/messages.h"
 
 namespace tenon {
 
 /// What changed for a hand in one millisecond that somebody should be told.
 struct HandNews {
-  std::uint32_t safety_began = 0;  ///< flags of rules that began to act
+  FixedVector<Intervention, 8> interventions;  ///< of the safety layer
   bool fault_began = false;
   bool indexing_began = false;
   bool indexing_ended = false;

@@ -1,18 +1,37 @@
 #include "clients/haptic/station.h"
 
 #include <algorithm>
+#include <cstdio>
 
 #include "clients/haptic/haptic_hand.h"
 #include "devices/device.h"
+#include "devices/safety_rules.h"
 
 namespace tenon {
 
-std::string describe(const StationEvent& event) {
-  const std::string hand = "hand " + std::to_string(event.hand.value);
+namespace {
+
+std::string safetySentence(const StationEvent& event) {
+  const std::string rule = toString(static_cast<SafetyRule>(event.detail));
+  char number[32];
+  if (event.kind == StationEventKind::kSafetyEnded) {
+    std::snprintf(number, sizeof number, "%.2f s", event.value);
+    return "safety: " + rule + ": ended, acted for " + number;
+  }
+  std::snprintf(number, sizeof number, "%.1f N", event.value);
+  const std::string more = event.count > 0 ? ", " + std::to_string(event.count) + " times more before" : "";
+  return "safety: " + rule + " (" + number + " were wanted" + more + ")";
+}
+
+}  // namespace
+
+std::string describe(const StationEvent& event, const std::string& hand_name) {
+  const std::string hand = "hand " + hand_name;
   const std::string when = " at " + std::to_string(event.seq);
   switch (event.kind) {
-    case StationEventKind::kSafety:
-      return hand + ": the safety layer acts, flags " + std::to_string(event.detail) + when;
+    case StationEventKind::kSafetyBegan:
+    case StationEventKind::kSafetyEnded:
+      return hand + ": " + safetySentence(event) + when;
     case StationEventKind::kDeviceFault:
       return hand + ": the device reports a fault: " + toString(static_cast<DeviceFault>(event.detail)) +
              when;
@@ -32,12 +51,20 @@ std::string describe(const StationEvent& event) {
   return "unknown event" + when;
 }
 
+std::string Station::describe(const StationEvent& event) const {
+  const auto found = std::find(hand_ids_.begin(), hand_ids_.end(), event.hand);
+  if (!event.hand.valid() || found == hand_ids_.end())
+    return tenon::describe(event, std::to_string(event.hand.value));
+  return tenon::describe(event, handNames()[static_cast<std::size_t>(found - hand_ids_.begin())]);
+}
+
 void Station::welcome(const Welcome& welcome, std::span<const SceneObject> objects) {
   client_ = welcome.client;
   objects_.assign(objects.begin(), objects.end());
   world_.begin(objects, welcome.server_epoch, welcome.tick);
   std::vector<HandId> ids = welcome.hands;
   ids.resize(handNames().size());
+  hand_ids_ = ids;
   own_hands_.clear();
   for (const HandId id : ids) {
     if (id.valid()) own_hands_.push_back(id);
@@ -79,7 +106,11 @@ bool Station::takeEvent(StationEvent& event) noexcept {
 
 void Station::report(const HapticHand& hand) noexcept {
   const HandNews& news = hand.news();
-  if (news.safety_began != 0) report(StationEventKind::kSafety, hand.id(), news.safety_began, 0.0);
+  for (const Intervention& told : news.interventions) {
+    const double value = told.began ? told.before : static_cast<double>(told.acted) * kTickSeconds;
+    report(told.began ? StationEventKind::kSafetyBegan : StationEventKind::kSafetyEnded, hand.id(),
+           bit(told.rule), value, told.untold);
+  }
   if (news.fault_began) {
     report(StationEventKind::kDeviceFault, hand.id(), static_cast<std::uint32_t>(hand.device().fault), 0.0);
   }
@@ -92,8 +123,9 @@ void Station::report(const HapticHand& hand) noexcept {
   }
 }
 
-void Station::report(StationEventKind kind, HandId hand, std::uint32_t detail, double value) noexcept {
-  events_[events_written_ % kEventRoom] = {seq_, kind, hand, detail, value};
+void Station::report(StationEventKind kind, HandId hand, std::uint32_t detail, double value,
+                     std::uint32_t count) noexcept {
+  events_[events_written_ % kEventRoom] = {seq_, kind, hand, detail, value, count};
   ++events_written_;
   if (events_written_ - events_taken_ > kEventRoom) events_taken_ = events_written_ - kEventRoom;
 }

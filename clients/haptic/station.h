@@ -18,7 +18,8 @@ class HapticHand;
 inline constexpr std::size_t kMaxStationHands = 4;
 
 enum class StationEventKind : std::uint8_t {
-  kSafety,       ///< detail: the safety flags that began to act
+  kSafetyBegan,  ///< detail: the bit of a SafetyRule; value: [N] wanted; count: earlier ones not told
+  kSafetyEnded,  ///< detail: likewise; value: [s] it acted
   kDeviceFault,  ///< detail: DeviceFault
   kIndexingBegan,
   kIndexingEnded,
@@ -31,14 +32,15 @@ enum class StationEventKind : std::uint8_t {
 /// Something a person or a log should know of: plain data, so that the 1 kHz loop may write it.
 struct StationEvent {
   std::uint32_t seq = 0;
-  StationEventKind kind = StationEventKind::kSafety;
+  StationEventKind kind = StationEventKind::kSafetyBegan;
   HandId hand;
   std::uint32_t detail = 0;
   double value = 0.0;
+  std::uint32_t count = 0;
 };
 
-/// A sentence for the log.
-[[nodiscard]] std::string describe(const StationEvent& event);
+/// A sentence for the log; `hand` is the name of the event's hand.
+[[nodiscard]] std::string describe(const StationEvent& event, const std::string& hand);
 
 /// What one person's station does each millisecond, whoever carries the messages.
 ///
@@ -73,6 +75,8 @@ class Station {
 
   [[nodiscard]] std::span<const DeviceInput> inputs() const { return {inputs_.begin(), inputs_.size()}; }
   [[nodiscard]] std::span<const HandState> states() const { return {states_.begin(), states_.size()}; }
+  /// A sentence for the log.
+  [[nodiscard]] std::string describe(const StationEvent& event) const;
   /// The hands the server gave this station, without those left out.
   [[nodiscard]] std::span<const HandId> hands() const { return {own_hands_.begin(), own_hands_.size()}; }
 
@@ -92,7 +96,8 @@ class Station {
 
   /// What changed for a hand in the last millisecond.
   void report(const HapticHand& hand) noexcept;
-  void report(StationEventKind kind, HandId hand, std::uint32_t detail, double value) noexcept;
+  void report(StationEventKind kind, HandId hand, std::uint32_t detail, double value,
+              std::uint32_t count = 0) noexcept;
   [[nodiscard]] const SceneObject* sceneObject(ObjectId object) const;
   [[nodiscard]] const std::vector<SceneObject>& sceneObjects() const { return objects_; }
 
@@ -107,6 +112,7 @@ class Station {
   std::vector<SceneObject> objects_;
   StepState step_;
   FixedVector<HandId, kMaxStationHands> own_hands_;
+  std::vector<HandId> hand_ids_;  ///< in the order of handNames()
   std::array<StationEvent, kEventRoom> events_{};
   std::uint64_t events_written_ = 0;
   std::uint64_t events_taken_ = 0;

@@ -197,8 +197,10 @@ void Program::send(const Outbox& outbox) {
 void Program::sendEvents() {
   StationEvent event;
   while (events_.pop(event)) {
-    const std::string text = describe(event);
-    const char* kind = event.kind == StationEventKind::kSafety ? "safety" : "station";
+    const std::string text = station_.describe(event);
+    const bool is_safety =
+        event.kind == StationEventKind::kSafetyBegan || event.kind == StationEventKind::kSafetyEnded;
+    const char* kind = is_safety ? "safety" : "station";
     static_cast<void>(link_.send(ClientEvent{link_.welcome().client, ++event_seq_, kind, text}));
   }
 }

@@ -327,6 +327,7 @@ TEST(Safety, TellsEachInterventionOnceWithWhatItDid) {
   for (int tick = 0; tick < 100; ++tick) (void)safety.step(wantForce({60.0, 0.0, 0.0}), armed(), kTick);
   std::vector<SafetyRule> rules;
   while (safety.next(told)) {
+    if (!told.began) continue;
     rules.push_back(told.rule);
     EXPECT_NEAR(told.before, 60.0, 1e-9);
     EXPECT_LE(told.after, 50.0 + 1e-9);
@@ -335,6 +336,56 @@ TEST(Safety, TellsEachInterventionOnceWithWhatItDid) {
   // slewing rested since the settling only briefly, so it is not told anew; the limit is
   EXPECT_THAT(rules, testing::Contains(SafetyRule::kForceLimited));
   EXPECT_EQ(safety.lost(), 0U);
+}
+
+//  force limited   ####  ## #          rest           ##
+//  told            begin      end (acted 7)           one of an untold begin, ten seconds after the first
+TEST(Safety, AFlickeringRuleIsOneBeginningAndOneEndAndRoutineIsToldOnceInTenSeconds) {
+  Safety safety = settled(kHug, {10.0, 0.0, 0.0});
+  std::vector<Intervention> heard;
+  const auto run = [&](double force, int ticks) {
+    Intervention told;
+    for (int i = 0; i < ticks; ++i) {
+      (void)safety.step(wantForce({force, 0.0, 0.0}), armed(), kTick);
+      while (safety.next(told))
+        if (told.rule == SafetyRule::kForceLimited) heard.push_back(told);
+    }
+  };
+  run(60.0, 300);
+  run(10.0, 100);
+  run(60.0, 300);
+  ASSERT_EQ(heard.size(), 1U) << "a short rest ends nothing";
+  EXPECT_TRUE(heard[0].began);
+  EXPECT_NEAR(heard[0].before, 60.0, 1e-9);
+  run(10.0, 600);
+  ASSERT_EQ(heard.size(), 2U);
+  EXPECT_FALSE(heard[1].began);
+  EXPECT_GT(heard[1].acted, 300U);
+  EXPECT_LE(heard[1].acted, 600U) << "without the rest in between";
+
+  run(60.0, 300);
+  run(10.0, 600);
+  EXPECT_EQ(heard.size(), 2U) << "routine again, so soon";
+  run(10.0, 10'000);
+  run(60.0, 300);
+  ASSERT_EQ(heard.size(), 3U);
+  EXPECT_TRUE(heard[2].began);
+  EXPECT_EQ(heard[2].untold, 1U);
+}
+
+TEST(Safety, WhatIsNoRoutineIsToldEachTime) {
+  Safety safety = settled(kHug, {10.0, 0.0, 0.0});
+  int begins = 0;
+  for (int time = 0; time < 3; ++time) {
+    SafetyRequest let_go = wantForce({10.0, 0.0, 0.0});
+    let_go.dead_man = false;
+    (void)safety.step(let_go, armed(), kTick);
+    for (int tick = 0; tick < 600; ++tick) (void)safety.step(wantForce({10.0, 0.0, 0.0}), armed(), kTick);
+    Intervention told;
+    while (safety.next(told))
+      if (told.rule == SafetyRule::kDeadMan && told.began) ++begins;
+  }
+  EXPECT_EQ(begins, 3);
 }
 
 TEST(Safety, EveryRuleHasAName) {
