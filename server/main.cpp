@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include "server/session/journal.h"
@@ -21,6 +22,7 @@ struct Arguments {
   tenon::SessionOptions session;
   tenon::LoadOptions load{.cache = tenon::defaultCache()};
   std::string rerun;
+  bool anyway = false;
 };
 
 /// The command line, with every word a user may say.
@@ -47,6 +49,8 @@ void declare(CLI::App& app, Arguments& arguments) {
                "a tick waits for its inputs instead of the clock: repeatable to the last bit");
   app.add_option("--rerun", arguments.rerun,
                  "run a journal or recording again and compare the state after every tick; opens no session");
+  app.add_flag("--anyway", arguments.anyway,
+               "re-run although scenario or structures have changed since, to see where it differs");
   app.footer("Exit code: 0 when everything was mounted (or the re-run was equal), 1 otherwise.");
 }
 
@@ -67,7 +71,21 @@ void showLoading(std::string_view doing, double share) {
   if (is_terminal && share >= 1.0) std::fprintf(stderr, "\r\033[K");
 }
 
+/// Says what is not as it was; true when a re-run would compare two different things.
+bool hasChanged(const Arguments& arguments, const tenon::Fingerprint& then,
+                const tenon::LoadedScene& loaded) {
+  const auto changes = tenon::changesSince(then, loaded);
+  if (changes.empty()) return false;
+  complain(fmt::format("the scenario has changed since {} was recorded: {}", arguments.rerun,
+                       fmt::join(changes, ", ")));
+  if (!arguments.anyway) complain("not run again; --anyway does it nevertheless");
+  return !arguments.anyway;
+}
+
 int runAgain(const Arguments& arguments, const tenon::LoadedScene& loaded) {
+  const auto made_of = tenon::madeOf(arguments.rerun);
+  if (!made_of) return complain(made_of.error().what);
+  if (hasChanged(arguments, *made_of, loaded)) return 1;
   tenon::Exercise exercise(loaded.scenario, loaded.scene, arguments.session.exercise);
   const auto report = tenon::rerun(arguments.rerun, exercise);
   if (!report) return complain(report.error().what);

@@ -10,6 +10,9 @@ namespace tenon {
 namespace {
 
 constexpr std::string_view kMetadata = "tenon journal";
+constexpr std::string_view kRecordingMetadata = "tenon recording";  // of `tenon record`
+constexpr std::string_view kScenarioHash = "scenario hash";
+constexpr std::string_view kStructuresOf = "structures of ";
 constexpr std::int64_t kNanosecondsPerTick = 1'000'000;
 
 /// Collects the parts of one tick.
@@ -99,8 +102,12 @@ Result<Journal> Journal::open(const std::filesystem::path& file, const JournalOr
   Journal journal(std::move(*writer));
   journal.inputs_ = journal.writer_.addChannel(kTickInput.name, typeName<TickInputPart>(), idlText());
   journal.checkpoints_ = journal.writer_.addChannel(kCheckpoint.name, typeName<CheckpointPart>(), idlText());
-  const auto noted = journal.writer_.addMetadata(
-      kMetadata, {{"scenario", origin.scenario}, {"detail", fmt::format("{}", origin.detail)}});
+  std::map<std::string, std::string> made{{"scenario", origin.scenario},
+                                          {"detail", fmt::format("{}", origin.detail)},
+                                          {std::string(kScenarioHash), origin.made_of.scenario}};
+  for (const auto& [object, hash] : origin.made_of.structures)
+    made[std::string(kStructuresOf) + object] = hash;
+  const auto noted = journal.writer_.addMetadata(kMetadata, made);
   if (!noted) return fail(noted.error().what);
   return journal;
 }
@@ -148,12 +155,33 @@ Result<RerunReport> rerun(const std::filesystem::path& file, Exercise& exercise)
                                                  : ": " + report.problem));
 }
 
+Result<Fingerprint> madeOf(const std::filesystem::path& file) {
+  auto reader = McapReader::open(file);
+  if (!reader) return fail(reader.error().what);
+  Fingerprint made;
+  for (const auto& [name, values] : reader->metadata()) {
+    if (name != kMetadata && name != kRecordingMetadata) continue;
+    for (const auto& [key, value] : values) {
+      if (key == kScenarioHash) made.scenario = value;
+      if (key.starts_with(kStructuresOf)) made.structures[key.substr(kStructuresOf.size())] = value;
+    }
+  }
+  // a recorder has heard the scene before the first checkpoint, and nothing else tells it
+  if (!made.structures.empty()) return made;
+  for (McapMessage message; reader->next(message) && message.topic != kCheckpoint.name;) {
+    if (message.topic != kSceneObject.name) continue;
+    const auto object = decode<SceneObject>(message.data);
+    if (object && !object->structure_hash.empty()) made.structures[object->name] = object->structure_hash;
+  }
+  return made;
+}
+
 Result<JournalOrigin> originOf(const std::filesystem::path& file) {
   auto reader = McapReader::open(file);
   if (!reader) return fail(reader.error().what);
   for (const auto& [name, values] : reader->metadata())
     if (name == kMetadata && values.contains("scenario") && values.contains("detail"))
-      return JournalOrigin{values.at("scenario"), std::strtod(values.at("detail").c_str(), nullptr)};
+      return JournalOrigin{values.at("scenario"), std::strtod(values.at("detail").c_str(), nullptr), {}};
   return fail(
       fmt::format("{}: does not say which scenario it was made with; name it before --rerun", file.string()));
 }

@@ -9,6 +9,7 @@
 #include "idl/record/mcap_writer.h"
 #include "idl/types/result.h"
 #include "server/session/exercise.h"
+#include "server/session/scene_loader.h"
 #include "server/session/tick_io.h"
 
 namespace tenon {
@@ -40,10 +41,11 @@ void forEachPart(Tick tick, std::uint64_t hash, std::span<const std::uint8_t> by
   }
 }
 
-/// What a journal was made with: enough to load the same scene again.
+/// What a journal was made with: enough to load the same scene again, and to know whether it is the same.
 struct JournalOrigin {
   std::string scenario;  ///< path
   double detail = 1.0;   ///< of generated parts
+  Fingerprint made_of;
 };
 
 /// The server's own recording on its local disk: every TickInput with the hash of the state it left, and a
@@ -78,6 +80,9 @@ struct RerunReport {
 /// Runs the ticks of a journal or recording again, from its first checkpoint on, and compares the hash of
 /// every one (DESIGN section 5).
 [[nodiscard]] Result<RerunReport> rerun(const std::filesystem::path& file, Exercise& exercise);
+
+/// What a journal or a recording from the bus says of the scene it was made with.
+[[nodiscard]] Result<Fingerprint> madeOf(const std::filesystem::path& file);
 
 /// Fails when the file is no journal.
 [[nodiscard]] Result<JournalOrigin> originOf(const std::filesystem::path& file);

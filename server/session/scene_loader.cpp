@@ -127,6 +127,32 @@ Result<LoadedScene> loadScene(const fs::path& path, const LoadOptions& options,
   return LoadedScene{scenario, std::move(*scene)};
 }
 
+Fingerprint fingerprintOf(const LoadedScene& loaded) {
+  Fingerprint made{fmt::format("{:016x}", loaded.scenario->text_hash), {}};
+  for (const ObjectSpec& object : loaded.scene->objects)
+    if (object.structures != nullptr) made.structures[object.name] = object.structures->info.content_hash;
+  return made;
+}
+
+std::vector<std::string> changesSince(const Fingerprint& then, const LoadedScene& loaded) {
+  const Fingerprint now = fingerprintOf(loaded);
+  std::vector<std::string> changes;
+  if (!then.scenario.empty() && then.scenario != now.scenario)
+    changes.push_back(fmt::format("the text of {}", loaded.scenario->path.string()));
+  for (const auto& [object, hash] : then.structures) {
+    const auto found = now.structures.find(object);
+    if (found == now.structures.end()) {
+      changes.push_back(fmt::format("'{}' is not in it any more", object));
+    } else if (found->second != hash) {
+      changes.push_back(fmt::format("the structures of '{}'", object));
+    }
+  }
+  if (!then.structures.empty())
+    for (const auto& [object, hash] : now.structures)
+      if (!then.structures.contains(object)) changes.push_back(fmt::format("'{}' is new in it", object));
+  return changes;
+}
+
 fs::path defaultCache() {
   if (const char* cache = std::getenv("TENON_CACHE")) return cache;
   if (const char* cache = std::getenv("XDG_CACHE_HOME")) return fs::path(cache) / "tenon";

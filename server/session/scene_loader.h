@@ -2,8 +2,11 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "idl/types/result.h"
 #include "server/game_control/scenario.h"
@@ -24,6 +27,17 @@ struct LoadedScene {
   std::shared_ptr<const ScenarioFile> scenario;
   std::shared_ptr<const Scene> scene;
 };
+
+/// What a session was made of, to be compared years later. Empty where it is not known.
+struct Fingerprint {
+  std::string scenario;                           ///< hash of its text
+  std::map<std::string, std::string> structures;  ///< content hash, by name of the object
+};
+
+[[nodiscard]] Fingerprint fingerprintOf(const LoadedScene& loaded);
+
+/// What is not as it was, as a person calls it: "the text of scenario.yaml", "the structures of 'peg'".
+[[nodiscard]] std::vector<std::string> changesSince(const Fingerprint& then, const LoadedScene& now);
 
 /// Reads a scenario, has its parts generated and its meshes baked (both through the cache), and builds the
 /// scene.

@@ -89,7 +89,8 @@ class Server final : public SessionServer {
     wire_ = std::move(*wire);
     wire_->say = options_.say;
     if (options_.journal.empty()) return {};
-    auto journal = Journal::open(options_.journal, {loaded.scenario->path.string(), options_.detail});
+    auto journal = Journal::open(options_.journal,
+                                 {loaded.scenario->path.string(), options_.detail, fingerprintOf(loaded)});
     if (!journal) return fail(journal.error().what);
     journal_.emplace(std::move(*journal));
     return {};

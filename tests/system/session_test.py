@@ -41,6 +41,19 @@ class Session(unittest.TestCase):
                 self.assertEqual(again.returncode, 0, again.stdout + again.stderr)
                 self.assertEqual(final_hash(again.stdout), over_dds)
 
+            edited = stage.out / SCENARIO / "scenario.yaml"
+            edited.parent.mkdir()
+            text = (SOURCE / "scenarios" / SCENARIO / "scenario.yaml").read_text(encoding="utf-8")
+            edited.write_text(text + "\n# edited\n", encoding="utf-8")
+            for file in (journal, recording):
+                refused = tenon("rerun", file, edited)
+                self.assertEqual(refused.returncode, 1, refused.stdout)
+                self.assertIn(f"the scenario has changed since {file} was recorded", refused.stderr)
+                self.assertIn(str(edited), refused.stderr)
+            anyway = tenon("rerun", journal, edited, "--anyway")
+            self.assertEqual(anyway.returncode, 0, anyway.stdout + anyway.stderr)
+            self.assertEqual(final_hash(anyway.stdout), over_dds, "a comment changes nothing")
+
             report = tenon("report", recording, "-o", stage.out)
             self.assertEqual(report.returncode, 0, report.stdout + report.stderr)
             self.assertTrue((stage.out / "report.html").exists())

@@ -33,7 +33,7 @@ class JournalTest : public ::testing::Test {
   /// Journals the play; `alter` may change an entry, or leave it out by returning false.
   std::uint64_t write(const std::function<bool(JournalEntry&)>& alter = {}) {
     Exercise exercise = Stage::makeExercise(loaded_, 1, {kRightHand});
-    auto journal = Journal::open(file_, {"small/scenario.yaml", 0.25});
+    auto journal = Journal::open(file_, {"small/scenario.yaml", 0.25, fingerprintOf(loaded_)});
     EXPECT_TRUE(journal);
     for (Tick tick = 1; tick <= kTicks; ++tick) {
       JournalEntry entry;
@@ -75,6 +75,10 @@ TEST_F(JournalTest, SaysWhatItWasMadeWith) {
   ASSERT_TRUE(origin) << origin.error().what;
   EXPECT_EQ(origin->scenario, "small/scenario.yaml");
   EXPECT_EQ(origin->detail, 0.25);
+  const auto made = madeOf(file_);
+  ASSERT_TRUE(made) << made.error().what;
+  EXPECT_TRUE(changesSince(*made, loaded_).empty());
+  EXPECT_EQ(made->structures, fingerprintOf(loaded_).structures);
 }
 
 TEST_F(JournalTest, AChangedInputIsFoundAtItsTick) {
