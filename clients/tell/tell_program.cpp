@@ -9,6 +9,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 constexpr std::chrono::seconds kPatience{5};  // for an answer
+constexpr milliseconds kAskAgain{500};        // an answer that came before anybody could hear it is lost
 
 template <class M>
 Result<void> openWriter(std::unique_ptr<Writer<M>>& writer, Partition& partition, const Topic<M>& topic) {
@@ -19,8 +20,9 @@ Result<void> openWriter(std::unique_ptr<Writer<M>>& writer, Partition& partition
 }
 
 /// Listens until `done`; false when that does not come in time.
-bool heard(Inbox& inbox, const std::atomic<bool>& stop, const std::function<bool()>& done) {
-  const auto until = Clock::now() + kPatience;
+bool heard(Inbox& inbox, const std::atomic<bool>& stop, Clock::duration patience,
+           const std::function<bool()>& done) {
+  const auto until = Clock::now() + patience;
   while (!done()) {
     if (stop || Clock::now() >= until) return false;
     inbox.dispatch(milliseconds(20));
@@ -66,7 +68,7 @@ Result<void> Teller::begin(const Stop& stop) {
   }
   if (all) all = inbox_.on<RunState>(session, kRunState, [this](const RunState& run) { hear(run); });
   if (!all) return all;
-  const bool linked = heard(inbox_, stop, [this] {
+  const bool linked = heard(inbox_, stop, kPatience, [this] {
     return commands_->matchedReaders() > 0 && stops_->matchedReaders() > 0 && inbox_.matchedWriters() > 1;
   });
   if (!linked)
@@ -88,9 +90,13 @@ Result<void> Teller::tell(const Saying& saying, const Stop& stop) {
   if (!saying.command) return stopEverything(saying, stop);
   ack_.reset();
   const Command command{member_->welcome().client, ++said_, *saying.command, {}, saying.text, saying.value};
-  if (auto sent = commands_->write(command); !sent) return sent;
-  if (!heard(inbox_, stop, [&] { return ack_ && ack_->id == command.id; }))
-    return fail("the server does not answer: it may be hung or just gone");
+  const auto until = Clock::now() + kPatience;
+  const auto answered = [&] { return ack_ && ack_->id == command.id; };
+  do {
+    if (stop || Clock::now() >= until)
+      return fail("the server does not answer: it may be hung or just gone");
+    if (auto sent = commands_->write(command); !sent) return sent;
+  } while (!heard(inbox_, stop, kAskAgain, answered));
   if (!ack_->accepted) return fail("refused: " + ack_->reason);
   return {};
 }
@@ -99,7 +105,7 @@ Result<void> Teller::tell(const Saying& saying, const Stop& stop) {
 Result<void> Teller::stopEverything(const Saying& saying, const Stop& stop) {
   const std::string reason = saying.text.empty() ? "asked for" : saying.text;
   if (auto sent = stops_->write({true, wishes_.person, reason}); !sent) return sent;
-  if (!heard(inbox_, stop, [this] { return stopped_; }))
+  if (!heard(inbox_, stop, kPatience, [this] { return stopped_; }))
     return fail("the server does not answer: the devices were told, the scene may move still");
   return {};
 }

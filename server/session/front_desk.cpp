@@ -124,7 +124,7 @@ void FrontDesk::seat(const Join& join, Welcome& welcome, const Origin& from) {
   const std::size_t place = static_cast<std::size_t>(former - seats_.begin());
   if (former == seats_.end()) {
     people_.emplace_back();
-    seats_.push_back({join.client_guid, fmt::format("{:016x}", random_()), {}, {}});
+    seats_.push_back({join.client_guid, fmt::format("{:016x}", random_()), {}, {}, {}});
   }
   welcome.accepted = true;
   welcome.client = ClientId{static_cast<std::uint32_t>(place + 1)};
@@ -142,6 +142,7 @@ void FrontDesk::seat(const Join& join, Welcome& welcome, const Origin& from) {
   seats_[place].guid = join.client_guid;
   seats_[place].welcome = welcome;
   seats_[place].origin = from;
+  seats_[place].answer = {};
 }
 
 void FrontDesk::leave(ClientId client) {
@@ -212,13 +213,23 @@ void FrontDesk::follow(RunPhase phase, bool emergency_stop) {
 }
 
 CommandAck FrontDesk::command(const Command& command) {
-  CommandAck ack{command.client, command.id, false, {}};
   const Presence* who = person(command.client);
-  if (who == nullptr || !who->alive) {
-    ack.reason = "join first";
-    return ack;
-  }
-  const auto change = changeFor(command, who->role);
+  if (who == nullptr || !who->alive) return {command.client, command.id, false, "join first"};
+  CommandAck ack = decide(command, who->role);
+  seats_[command.client.value - 1].answer = ack;
+  return ack;
+}
+
+const CommandAck* FrontDesk::answerTo(const Command& command) const {
+  const Presence* who = person(command.client);
+  if (who == nullptr || !who->alive) return nullptr;
+  const CommandAck& answer = seats_[command.client.value - 1].answer;
+  return answer.id == command.id && command.id != 0 ? &answer : nullptr;
+}
+
+CommandAck FrontDesk::decide(const Command& command, Role role) {
+  CommandAck ack{command.client, command.id, false, {}};
+  const auto change = changeFor(command, role);
   ack.reason = change ? untimely(command.kind) : change.error().what;
   ack.accepted = ack.reason.empty();
   if (!ack.accepted) return ack;

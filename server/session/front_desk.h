@@ -26,6 +26,8 @@ class FrontDesk {
   [[nodiscard]] bool isFrom(ClientId client, const Origin& origin) const;
   /// What is accepted will be done; what cannot be done now is refused.
   [[nodiscard]] CommandAck command(const Command& command);
+  /// The answer to a command that is asked again because its answer got lost; null: it is a new one.
+  [[nodiscard]] const CommandAck* answerTo(const Command& command) const;
   /// What the run had come to after the last tick.
   void follow(RunPhase phase, bool emergency_stop);
   void leave(ClientId client);
@@ -56,10 +58,12 @@ class FrontDesk {
     std::string token;
     Welcome welcome;
     Origin origin;
+    CommandAck answer;  ///< to the last command; id 0: none yet
   };
 
   [[nodiscard]] std::string refusal(const Join& join) const;
   void seat(const Join& join, Welcome& welcome, const Origin& from);
+  [[nodiscard]] CommandAck decide(const Command& command, Role role);
   [[nodiscard]] std::string untimely(CommandKind kind) const;
   [[nodiscard]] Result<Change> changeFor(const Command& command, Role role) const;
   [[nodiscard]] Result<Change> teachersChange(const Command& command) const;

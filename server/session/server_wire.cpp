@@ -247,6 +247,10 @@ void ServerWire::hear(const DeviceInput& input, const Origin& from) {
 
 void ServerWire::hear(const Command& command, const Origin& from) {
   if (!isGenuine(command.client, from, "command")) return;
+  if (const CommandAck* again = desk_.answerTo(command)) {
+    (void)writers_->ack.writer->write(*again);
+    return;
+  }
   const CommandAck ack = desk_.command(command);
   (void)writers_->ack.writer->write(ack);
   if (!ack.accepted) {

@@ -152,6 +152,23 @@ TEST_F(FrontDeskTest, TakesAReadingOfAClientsOwnHandOver) {
   EXPECT_EQ(reading->X_WH.translation(), Vector3(0.1, 0.2, 0.3));
 }
 
+TEST_F(FrontDeskTest, AnswersACommandThatIsAskedAgainWithoutDoingItAgain) {
+  const Welcome welcome = join("b", Role::kInstructor);
+  const ClientId teacher = welcome.client;
+  desk_.follow(RunPhase::kRunning, false);
+  const Command pause{teacher, 7, CommandKind::kPause};
+  EXPECT_EQ(desk_.answerTo(pause), nullptr);
+  EXPECT_TRUE(desk_.command(pause).accepted);
+  desk_.follow(RunPhase::kPaused, false);
+  ASSERT_NE(desk_.answerTo(pause), nullptr);
+  EXPECT_TRUE(desk_.answerTo(pause)->accepted) << "though a new one would be refused now";
+  EXPECT_EQ(desk_.answerTo({teacher, 8, CommandKind::kPause}), nullptr);
+  EXPECT_EQ(desk_.answerTo({ClientId{9}, 7, CommandKind::kPause}), nullptr);
+  desk_.leave(teacher);
+  ASSERT_EQ(join("c", Role::kInstructor, {}, welcome.token).client, teacher);
+  EXPECT_EQ(desk_.answerTo(pause), nullptr) << "a program that took the seat over counts anew";
+}
+
 TEST_F(FrontDeskTest, RefusesReadingsOfOthers) {
   const ClientId client = join("a", Role::kTrainee, {"right"}).client;
   const ClientId teacher = join("b", Role::kInstructor, {"instructor"}).client;
