@@ -6,11 +6,11 @@
 
 #include <benchmark/benchmark.h>
 
-#include "server/bench/pose_sets.h"
-#include "server/bench/timing.h"
 #include "server/collision/pair_query.h"
 #include "server/collision/query_kernels.h"
 #include "server/structures/haptic_structures.h"
+#include "tests/bench/engine/pose_sets.h"
+#include "tests/bench/engine/timing.h"
 
 /// Queries of baked structures: `query_bench FIELD SHELL x y z [options of Google Benchmark]`, where the
 /// shell's body belongs at x y z [m] in the field's body and comes there along -z. Every instruction set,

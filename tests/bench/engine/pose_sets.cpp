@@ -1,4 +1,4 @@
-#include "server/bench/pose_sets.h"
+#include "tests/bench/engine/pose_sets.h"
 
 #include <algorithm>
 #include <memory>
