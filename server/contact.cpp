@@ -9,7 +9,7 @@
 
 #include "server/collision/pair_query.h"
 #include "server/collision/query_kernels.h"
-#include "server/number_lines.h"
+#include "server/pose_lines.h"
 #include "server/structures/haptic_structures.h"
 
 namespace tenon {
@@ -37,28 +37,6 @@ struct Row {
 int complain(const Error& error) {
   fmt::print(stderr, "tenon-contact: {}\n", error.what);
   return 1;
-}
-
-Result<std::vector<Pose>> readPoses(const std::string& file) {
-  std::ifstream in(file);
-  if (!in) return fail(file + ": cannot be read");
-  NumberLines lines(in, file, 7);
-  std::vector<Pose> poses;
-  while (true) {
-    const auto more = lines.next();
-    if (!more) return tl::unexpected(more.error());
-    if (!*more) break;
-    const std::vector<double>& n = lines.numbers();
-    const Quaternion q_BA(n[3], n[4], n[5], n[6]);
-    // digits that a text left out are forgiven, another kind of rotation is not
-    if (std::abs(q_BA.norm() - 1.0) > 0.01) {
-      return fail(lines.place() + ": qw qx qy qz is not a unit quaternion (its length is " +
-                  fmt::format("{:.4g}", q_BA.norm()) + ")");
-    }
-    poses.emplace_back(Vector3(n[0], n[1], n[2]), q_BA.normalized());
-  }
-  if (poses.empty()) return fail(file + ": has no poses");
-  return poses;
 }
 
 std::vector<Row> ask(const HapticStructures& field, const HapticStructures& shell,

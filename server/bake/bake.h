@@ -37,7 +37,8 @@ struct BakeOptions {
 using BakeProgress = std::function<bool(double share, std::string_view doing)>;
 
 /// Reads a mesh with assimp in a child process that has limits on memory and time: a file that crashes or
-/// hangs the importer is one clear error here. `unit` is the length of one file unit [m].
+/// hangs the importer is one clear error here. `unit` is the length of one file unit [m]. A scan (`.bt`,
+/// `.ot` of OctoMap) becomes the skin of its occupied cells, always in metres.
 [[nodiscard]] Result<TriangleMesh> importMesh(const std::filesystem::path& file, double unit);
 
 /// Turns triangles into haptic structures (paper §3.1): field, shell and tree, from positions alone.

@@ -14,6 +14,7 @@
 
 #include "idl/types/spatial.h"
 #include "server/bake/import_pipe.h"
+#include "server/bake/octree_file.h"
 
 namespace tenon {
 
@@ -92,7 +93,22 @@ void collectNode(const aiScene& scene, const aiNode& node, const aiMatrix4x4& X_
   }
 }
 
+Collected importOctree(const std::string& file) {
+  Collected out;
+  const auto corners = readOctreeSkin(file);
+  if (!corners) {
+    out.problem = corners.error().what;
+    return out;
+  }
+  for (const Vector3f& p : *corners) {
+    out.triangles.push_back(static_cast<std::uint32_t>(out.vertices.size() / 3));
+    out.vertices.insert(out.vertices.end(), {p.x(), p.y(), p.z()});
+  }
+  return out;
+}
+
 Collected importFile(const std::string& file, double unit) {
+  if (isOctree(file)) return importOctree(file);
   Collected out;
   Assimp::Importer importer;
   importer.SetIOHandler(new FolderOnly(std::filesystem::path(file).parent_path().empty()

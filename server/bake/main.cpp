@@ -169,7 +169,9 @@ int main(int argc, char** argv) {
       "pointshell. Needs no normals, no closed surface and no preparation; several meshes become one\n"
       "object. Lengths are written 3mm, 0.5 mm or 0.003m.",
       "tenon bake"};
-  app.add_option("MESH", arguments.meshes, "STL, OBJ, PLY, glTF/GLB, DAE, 3DS, 3MF or OFF files");
+  app.add_option(
+      "MESH", arguments.meshes,
+      "STL, OBJ, PLY, glTF/GLB, DAE, 3DS, 3MF or OFF files, or OctoMap scans (.bt, .ot; always in metres)");
   app.add_option("-o,--output", arguments.output, "the structure file to write");
   app.add_option("--cache", arguments.cache,
                  "write into this folder under a name made of the content instead");

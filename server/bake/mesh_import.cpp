@@ -17,6 +17,7 @@
 #include "server/bake/bake.h"
 #include "server/bake/import_pipe.h"
 #include "server/bake/mesh_file_checks.h"
+#include "server/bake/octree_file.h"
 
 extern char** environ;
 
@@ -51,9 +52,11 @@ std::filesystem::path importerProgram() {
   return std::filesystem::read_symlink("/proc/self/exe", error).parent_path() / "tenon-bake";
 }
 
-ImportLimits limitsFor(std::uint64_t file_bytes) {
+ImportLimits limitsFor(const std::filesystem::path& file, std::uint64_t file_bytes) {
   const double megabytes = static_cast<double>(file_bytes) / 1e6;
-  return {10.0 + std::ceil(megabytes), (768ULL << 20U) + 64 * file_bytes};
+  // an octree keeps eight leaves in two bytes
+  const std::uint64_t growth = isOctree(file) ? 512 : 64;
+  return {10.0 + std::ceil(megabytes), (768ULL << 20U) + growth * file_bytes};
 }
 
 /// Waits for the child and ends it when its time is over. Gives its wait status, or -1 when it had to be
@@ -226,7 +229,7 @@ Result<TriangleMesh> importMesh(const std::filesystem::path& file, double unit) 
   const Descriptor low(::memfd_create("tenon-import", MFD_CLOEXEC));
   const Descriptor memory(::fcntl(low.get(), F_DUPFD_CLOEXEC, 16));
   if (memory.get() < 0) return fail(name + ": no memory for the importer's answer");
-  const ImportLimits limits = limitsFor(bytes);
+  const ImportLimits limits = limitsFor(file, bytes);
   const auto child = startImporter(file, unit, limits, memory.get());
   if (!child) return fail(name + ": " + child.error().what);
   // the limit is on the child's own time; others may be using the processors

@@ -109,6 +109,34 @@ class Verbs(unittest.TestCase):
                           tenon("contact", baked, baked, "--poses", poses, "--isa", "abacus").stderr)
             self.assertEqual(tenon("contact", baked, "missing.tenon", "--poses", poses).returncode, 1)
 
+    def test_voxels_of_a_way_are_told_written_and_baked_again(self):
+        with tempfile.TemporaryDirectory() as folder:
+            baked, poses, tree, scan = cube(folder), Path(folder) / "poses", Path(folder) / "way.bt", Path(folder) / "way.tenon"
+            poses.write_text("0 0 0.0178 1 0 0 0\n0.1 0 0.0178 1 0 0 0\n", encoding="utf-8")
+            done = tenon("voxels", baked, "--poses", poses, "--cell", "1mm", "--scene", baked, "-o", tree)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(done.stderr, "")
+            volume = float(re.search(r"volume +(\S+) m\^3", done.stdout)[1])
+            self.assertAlmostEqual(volume, 0.12 * 0.02 * 0.02, delta=0.03 * 0.12 * 0.02 * 0.02)
+            # it begins 2.2 mm deep in another cube of its kind
+            self.assertAlmostEqual(float(re.search(r"clearance +(\S+) m", done.stdout)[1]), -0.0022, places=4)
+            again = tenon("bake", tree, "-o", scan, "--voxel", "1mm", "--points", "2000")
+            self.assertEqual(again.returncode, 0, again.stderr)
+            self.assertIn("120 mm x 20 mm x 20 mm", again.stdout)
+
+    def test_voxels_that_cannot_be_are_refused(self):
+        with tempfile.TemporaryDirectory() as folder:
+            baked = cube(folder)
+            for words, complaint in ((("-o", Path(folder) / "cube.stl"), "must end in .bt or .ot"),
+                                     (("--cell", "0.1um"), "choose larger ones"),
+                                     (("--cell", "50mm"), "no cell's middle is inside"),
+                                     (("--poses", "missing"), "missing: cannot be read"),
+                                     (("--scene", "missing"), "missing")):
+                done = tenon("voxels", baked, *words)
+                self.assertEqual(done.returncode, 1, words)
+                self.assertIn(complaint, done.stderr)
+                self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+
     def test_an_observer_speaks_json(self):
         with Stage(lockstep=False) as stage:
             stage.serve("peg_and_box", "--wait-for", "right,observer")
