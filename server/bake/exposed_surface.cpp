@@ -98,18 +98,6 @@ class CellMap {
   std::vector<BrickLevel::Mask> near_;
 };
 
-double longestEdge(const Triangle& t, std::size_t& from) {
-  double squared = -1.0;
-  for (std::size_t edge = 0; edge < 3; ++edge) {
-    const double length = (t[(edge + 1) % 3] - t[edge]).squaredNorm();
-    if (length > squared) {
-      squared = length;
-      from = edge;
-    }
-  }
-  return std::sqrt(squared);
-}
-
 /// Sorts the pieces of one triangle.
 class Cutter {
  public:

@@ -173,7 +173,8 @@ Result<BakedField> bakeField(std::span<const Triangle> triangles, const BakeOpti
   const auto& counts = storage.layout.bricks;
   BrickLevel coarse(storage.layout.p_MoFo_M, options.voxel, {counts[0], counts[1], counts[2]});
   work.stage("sorting triangles", 0.05, 0.15);
-  const TriangleTree tree(triangles);
+  const double longest = 2.0 * BrickLevel::kVoxels * options.voxel;
+  const TriangleTree tree(triangles, longest);
   work.stage("measuring distances", 0.15, 0.45);
   if (!coarse.sampleDistances(tree, work)) return tooMuch(options.voxel);
   work.stage("finding the outside", 0.45, 0.55);
@@ -200,8 +201,9 @@ Result<BakedField> bakeField(std::span<const Triangle> triangles, const BakeOpti
     if (surface.of(i).empty()) ++baked.hidden_triangles;
     if (!surface.whole(i)) gone.push_back(triangles[i]);
   }
-  const TriangleTree gone_tree(gone);
-  const TriangleTree exposed = gone.empty() ? TriangleTree({}) : TriangleTree(baked.surface);
+  const TriangleTree gone_tree(gone, longest);
+  const TriangleTree exposed =
+      gone.empty() ? TriangleTree({}, longest) : TriangleTree(baked.surface, longest);
   finishSamples(coarse, exposed, gone_tree, work);
   if (fine) finishSamples(*fine, exposed, gone_tree, work);
   if (work.cancelled()) return fail("cancelled");

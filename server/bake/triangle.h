@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "idl/types/spatial.h"
 
@@ -56,6 +57,18 @@ using Triangle = std::array<Vector3, 3>;
 }
 
 [[nodiscard]] inline double areaOf(const Triangle& t) { return (t[1] - t[0]).cross(t[2] - t[0]).norm() / 2; }
+
+/// The length of the longest edge, which begins at corner `from`.
+[[nodiscard]] inline double longestEdge(const Triangle& t, std::size_t& from) {
+  double squared = -1.0;
+  for (std::size_t edge = 0; edge < 3; ++edge) {
+    const double length = (t[(edge + 1) % 3] - t[edge]).squaredNorm();
+    if (length <= squared) continue;
+    squared = length;
+    from = edge;
+  }
+  return std::sqrt(squared);
+}
 
 /// The same corners in one order, so that winding cannot change a single bit of what is computed.
 [[nodiscard]] inline Triangle unwound(Triangle t) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 namespace tenon {
 
@@ -18,40 +17,63 @@ constexpr float kRounding = 1e-5F;
 
 /// Splits at the median of the longest axis, twice for each node.
 struct TriangleTree::Builder {
-  TriangleTree& tree;
-  std::span<const Triangle> triangles;
-  std::vector<Vector3f> middles;
-  std::vector<std::uint32_t> order;
-
-  using Range = std::pair<std::uint32_t, std::uint32_t>;
-
-  std::uint32_t split(const Range& range) {
+  /// A triangle, or a part of one.
+  struct Part {
     Eigen::AlignedBox3f box;
-    for (std::uint32_t i = range.first; i < range.second; ++i) box.extend(middles[order[i]]);
+    std::uint32_t triangle;
+  };
+  using Range = std::span<Part>;
+
+  TriangleTree& tree;
+  std::vector<Part> parts;
+
+  /// Long triangles are entered in parts: the box about a whole one would be nearly empty.
+  void enter(std::uint32_t triangle, const Triangle& t, double longest) {
+    std::size_t from = 0;
+    if (longestEdge(t, from) > longest) {
+      const std::size_t to = (from + 1) % 3;
+      Triangle half = t;
+      half[to] = (t[from] + t[to]) / 2;
+      enter(triangle, half, longest);
+      half = t;
+      half[from] = (t[from] + t[to]) / 2;
+      enter(triangle, half, longest);
+      return;
+    }
+    Eigen::AlignedBox3f box;
+    for (const Vector3& corner : t) box.extend(tree.local(corner));
+    // twice: the point that asks is rounded too
+    const Vector3f slack = Vector3f::Constant(2.0F * tree.slack_);
+    parts.push_back({{box.min() - slack, box.max() + slack}, triangle});
+  }
+
+  static std::size_t split(Range range) {
+    Eigen::AlignedBox3f box;
+    for (const Part& part : range) box.extend(part.box.center());
     Eigen::Index axis = 0;
     box.sizes().maxCoeff(&axis);
-    const std::uint32_t middle = range.first + (range.second - range.first) / 2;
-    std::nth_element(order.begin() + range.first, order.begin() + middle, order.begin() + range.second,
-                     [&](std::uint32_t a, std::uint32_t b) {
-                       const float ca = middles[a][axis];
-                       const float cb = middles[b][axis];
-                       return ca != cb ? ca < cb : a < b;
+    const auto middle = static_cast<std::ptrdiff_t>(range.size() / 2);
+    std::nth_element(range.begin(), range.begin() + middle, range.end(),
+                     [axis](const Part& a, const Part& b) {
+                       const float ca = a.box.min()[axis] + a.box.max()[axis];
+                       const float cb = b.box.min()[axis] + b.box.max()[axis];
+                       return ca != cb ? ca < cb : a.triangle < b.triangle;
                      });
-    return middle;
+    return range.size() / 2;
   }
 
   /// Makes the node of a range and gives the box about it.
-  Eigen::AlignedBox3f build(std::uint32_t number, const Range& range) {
-    std::array<Range, 4> parts{};
+  Eigen::AlignedBox3f build(std::uint32_t number, Range range) {
+    std::array<Range, 4> quarters{};
     std::size_t count = 0;
-    if (range.second - range.first <= 4) {
-      for (std::uint32_t i = range.first; i < range.second; ++i) parts[count++] = {i, i + 1};
+    if (range.size() <= 4) {
+      for (std::size_t i = 0; i < range.size(); ++i) quarters[count++] = range.subspan(i, 1);
     } else {
-      const std::uint32_t middle = split(range);
-      for (const Range& half : {Range{range.first, middle}, Range{middle, range.second}}) {
-        const std::uint32_t quarter = split(half);
-        parts[count++] = {half.first, quarter};
-        parts[count++] = {quarter, half.second};
+      const std::size_t middle = split(range);
+      for (const Range half : {range.first(middle), range.subspan(middle)}) {
+        const std::size_t quarter = split(half);
+        quarters[count++] = half.first(quarter);
+        quarters[count++] = half.subspan(quarter);
       }
     }
     Eigen::AlignedBox3f whole;
@@ -59,13 +81,13 @@ struct TriangleTree::Builder {
     for (std::size_t lane = 0; lane < 4; ++lane) {
       std::uint32_t child = kNothing;
       Eigen::AlignedBox3f box(Vector3f::Constant(kFar), Vector3f::Constant(kFar));
-      if (lane < count && parts[lane].second - parts[lane].first == 1) {
-        child = kTriangle + parts[lane].first;
-        box = boxAbout(parts[lane].first);
-      } else if (lane < count) {
+      if (quarters[lane].size() == 1) {
+        child = kTriangle + quarters[lane].front().triangle;
+        box = quarters[lane].front().box;
+      } else if (!quarters[lane].empty()) {
         child = static_cast<std::uint32_t>(tree.nodes_.size());
         tree.nodes_.emplace_back();
-        box = build(child, parts[lane]);
+        box = build(child, quarters[lane]);
       }
       Node& node = tree.nodes_[number];
       node.child[lane] = child;
@@ -73,36 +95,41 @@ struct TriangleTree::Builder {
         node.low[axis][static_cast<Eigen::Index>(lane)] = box.min()[static_cast<Eigen::Index>(axis)];
         node.high[axis][static_cast<Eigen::Index>(lane)] = box.max()[static_cast<Eigen::Index>(axis)];
       }
-      if (lane < count) whole.extend(box);
+      if (child != kNothing) whole.extend(box);
     }
     return whole;
   }
 
-  [[nodiscard]] Eigen::AlignedBox3f boxAbout(std::uint32_t place) const {
-    Eigen::AlignedBox3f box;
-    for (const Vector3& corner : triangles[order[place]]) box.extend(tree.local(corner));
-    // twice: the point that asks is rounded too
-    const Vector3f slack = Vector3f::Constant(2.0F * tree.slack_);
-    return {box.min() - slack, box.max() + slack};
+  /// A length that cuts the triangles into a few million parts at most.
+  static double affordable(std::span<const Triangle> triangles, double longest) {
+    const double most = 4e6 + static_cast<double>(triangles.size());
+    while (true) {
+      double count = 0.0;
+      for (const Triangle& t : triangles) {
+        std::size_t from = 0;
+        const double across = longestEdge(t, from) / longest;
+        count += across <= 1.0 ? 1.0 : 2.0 * across + 8.0 * areaOf(t) / (longest * longest);
+      }
+      if (!(count > most)) return longest;
+      longest *= 2.0;
+    }
   }
 };
 
-TriangleTree::TriangleTree(std::span<const Triangle> triangles) {
+TriangleTree::TriangleTree(std::span<const Triangle> triangles, double longest)
+    : triangles_(triangles.begin(), triangles.end()) {
   if (triangles.empty()) return;
   Eigen::AlignedBox3d box;
   for (const Triangle& t : triangles) box.extend(boxOf(t));
   centre_ = box.center();
   slack_ = static_cast<float>(box.diagonal().norm()) * std::numeric_limits<float>::epsilon();
-
-  Builder builder{*this, triangles, {}, std::vector<std::uint32_t>(triangles.size())};
-  std::iota(builder.order.begin(), builder.order.end(), 0U);
-  builder.middles.reserve(triangles.size());
-  for (const Triangle& t : triangles) builder.middles.push_back(local((t[0] + t[1] + t[2]) / 3.0));
-  nodes_.reserve(triangles.size() / 2 + 1);
+  Builder builder{*this, {}};
+  builder.parts.reserve(triangles.size());
+  longest = Builder::affordable(triangles, longest);
+  for (std::uint32_t i = 0; i < triangles.size(); ++i) builder.enter(i, triangles[i], longest);
+  nodes_.reserve(builder.parts.size() / 2 + 1);
   nodes_.emplace_back();
-  builder.build(0, {0, static_cast<std::uint32_t>(triangles.size())});
-  triangles_.reserve(triangles.size());
-  for (const std::uint32_t i : builder.order) triangles_.push_back(triangles[i]);
+  builder.build(0, builder.parts);
 }
 
 bool TriangleTree::anyWithin(const Vector3& p, double reach) const {

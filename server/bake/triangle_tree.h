@@ -19,7 +19,8 @@ class TriangleTree {
  public:
   class Search;
 
-  explicit TriangleTree(std::span<const Triangle> triangles);
+  /// Triangles longer than `longest` [m] are found through several boxes.
+  TriangleTree(std::span<const Triangle> triangles, double longest);
 
   /// Whether a triangle is nearer to p than `reach` [m].
   [[nodiscard]] bool anyWithin(const Vector3& p, double reach) const;
@@ -28,7 +29,7 @@ class TriangleTree {
   using Lanes = Eigen::Array<float, 4, 1>;
   struct Node {
     std::array<Lanes, 3> low, high;      // empty lanes are infinitely far away
-    std::array<std::uint32_t, 4> child;  // a node, or kTriangle + a triangle in tree order
+    std::array<std::uint32_t, 4> child;  // a node, or kTriangle + a triangle
     [[nodiscard]] EIGEN_ALWAYS_INLINE Lanes squaredDistances(const Vector3f& p) const {
       Lanes sum = Lanes::Zero();
       for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -210,6 +210,39 @@ TEST(FieldBake, LowerBoundIsNeverAboveTheTruth) {
   EXPECT_GT(best, 0.8);
 }
 
+TEST(FieldBake, TrianglesPresentTwiceOrBackToBackChangeNoDistance) {
+  const TriangleMesh once = test::torusMesh(0.06, 0.02, 60, 30);
+  TriangleMesh twice = test::together(once, test::randomlyFlipped(once, 3));
+  EXPECT_TRUE(sameBytes(baked(once), baked(twice)));
+}
+
+TEST(FieldBake, EverySampleIsTheDistanceToTheNearestTriangle) {
+  // long slivers and tiny facets at once: what the tree of boxes is worst at
+  const TriangleMesh mesh = test::together(test::torusMesh(0.06, 0.02, 200, 8),
+                                           boxMesh(Vector3(-0.4, 0.081, 0.02), Vector3(0.4, 0.09, 0.021)));
+  const ExactDistance truth(mesh.vertices, mesh.triangles);
+  const HapticStructures structures = baked(mesh, 0.004);
+  const DistanceField::Layout& layout = structures.field.layout();
+  const double quantum = layout.voxel / DistanceField::kQuantaPerVoxel;
+  std::size_t number = 0;
+  for (int z = 0; z < layout.bricks[2]; ++z) {
+    for (int y = 0; y < layout.bricks[1]; ++y) {
+      for (int x = 0; x < layout.bricks[0]; ++x, ++number) {
+        if (layout.index[number] < 0) continue;
+        const std::int16_t* samples = layout.samples.data() + static_cast<std::size_t>(layout.index[number]) *
+                                                                  DistanceField::kBrickSamples;
+        for (int k = 0; k < DistanceField::kBrickSamples; k += 7) {
+          const Vector3 in_brick(k % 9, k / 9 % 9, k / 81);
+          const Vector3 p = layout.p_MoFo_M + (Vector3(x, y, z) * 8.0 + in_brick) * layout.voxel;
+          const double exact =
+              std::min(truth.nearest(p).distance, DistanceField::kClampVoxels * layout.voxel);
+          ASSERT_NEAR(std::abs(samples[k]) * quantum, exact, 0.51 * quantum) << p.transpose();
+        }
+      }
+    }
+  }
+}
+
 TEST(FieldBake, CancelsWhenAskedTo) {
   const auto structures =
       bake(ballMesh(0.05, 4), {}, [](double share, std::string_view) { return share < 0.3; });
