@@ -1,11 +1,13 @@
 """What the verbs beside a session print and leave."""
 import json
 import re
+import signal
+import subprocess
 import tempfile
 import unittest
 from pathlib import Path
 
-from stage import Stage, tenon
+from stage import PROGRAMS, Stage, tenon
 
 
 def cube(folder):
@@ -41,6 +43,23 @@ class Verbs(unittest.TestCase):
             self.assertEqual(info.returncode, 0, info.stderr)
             for word in ("voxel", "points", "triangles"):
                 self.assertIn(word, info.stdout.lower())
+
+    def test_an_interrupted_bake_says_so_and_leaves_no_file(self):
+        with tempfile.TemporaryDirectory() as folder:
+            tenon("parts", "peg_and_box", folder)
+            baked = Path(folder) / "baked"
+            baked.mkdir()
+            for number, words in ((signal.SIGINT, ("-o", baked / "peg.tenon")), (signal.SIGTERM, ("--cache", baked))):
+                bake = subprocess.Popen([PROGRAMS / "tenon-bake", Path(folder) / "peg.stl", "--voxel", "0.25mm", *words],
+                                        stderr=subprocess.PIPE, text=True)
+                for line in bake.stderr:
+                    if "measuring distances" in line:
+                        bake.send_signal(number)
+                rest = line
+                self.assertEqual(bake.wait(60), 130)
+                bake.stderr.close()
+                self.assertEqual(rest.splitlines()[-1], "tenon-bake: peg.stl: cancelled")
+                self.assertEqual(list(baked.iterdir()), [])
 
     def test_a_damaged_structure_file_is_refused(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -82,6 +82,29 @@ TEST(MeshImport, ReadsAFileWhoseNameIsNotUtf8) {
   fs::remove_all(folder);
 }
 
+TEST(MeshImport, SizesThatNothingHasAreRefusedOrBakedInTheRightUnit) {
+  const fs::path folder = folderForThisTest();
+  const fs::path file = folder / "corner.obj";
+  const auto write = [&file](const char* size) {
+    std::ofstream(file) << "v 0 0 0\nv " << size << " 0 0\nv 0 " << size << " 0\nv 0 0 " << size
+                        << "\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n";
+  };
+  for (const char* size : {"1e8", "1e30", "1e-42", "1e-9"}) {
+    write(size);
+    const auto mesh = importMesh(file, 1.0);
+    ASSERT_FALSE(mesh) << size;
+    EXPECT_THAT(mesh.error().what, HasSubstr("is the unit right?"));
+  }
+  write("100");
+  const auto millimetres = bakeFiles({file}, 1e-3, {});
+  ASSERT_TRUE(millimetres) << millimetres.error().what;
+  // the same numbers as metres ask for 3 mm in a cube of 100 m
+  const auto metres = bakeFiles({file}, 1.0, {});
+  ASSERT_FALSE(metres);
+  EXPECT_THAT(metres.error().what, HasSubstr("more than 3 GB"));
+  fs::remove_all(folder);
+}
+
 TEST(MeshImport, NamesAFileThatIsNotThere) {
   EXPECT_THAT(importMesh("/no/such.stl", 1.0).error().what, HasSubstr("/no/such.stl"));
 }

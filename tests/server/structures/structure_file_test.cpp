@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <random>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -94,6 +95,31 @@ TEST_F(StructureFile, AFlippedBitAnywhereIsRefused) {
     bad[i] = static_cast<char>(bad[i] ^ 0x10);
     put(bad);
     EXPECT_FALSE(openStructures(file())) << "byte " << i;
+  }
+}
+
+TEST_F(StructureFile, AThousandRandomDamagesAreAllRefused) {
+  const std::string bytes = written();
+  std::mt19937_64 random(2016);
+  for (int i = 0; i < 1000; ++i) {
+    std::string bad = bytes;
+    switch (random() % 3) {
+      case 0:
+        bad[random() % bad.size()] ^= static_cast<char>(1 << random() % 8);
+        break;
+      case 1:
+        bad.resize(random() % bad.size());
+        break;
+      default:
+        // the header is where numbers say how much there is
+        for (int k = 0; k < 8; ++k) bad[random() % 400] = static_cast<char>(random());
+        break;
+    }
+    if (bad == bytes) continue;
+    put(bad);
+    const auto opened = openStructures(file());
+    ASSERT_FALSE(opened) << i;
+    EXPECT_THAT(opened.error().what, HasSubstr("ball.tenon"));
   }
 }
 
