@@ -95,6 +95,38 @@ BrickLevel::Point BrickLevel::at(const Cell& lattice) const {
   return at(nodeAt(brick), lattice - brick * kVoxels);
 }
 
+template <typename Visit>
+void BrickLevel::visitCopies(const Cell& lattice, Visit&& visit) const {
+  const Cell brick(lattice.x() >> 3, lattice.y() >> 3, lattice.z() >> 3);
+  const Cell in_brick = lattice - brick * kVoxels;
+  for (int part = 0; part < 8; ++part) {
+    // the bricks below hold what lies on their upper faces
+    const Cell below(part & 1, part >> 1 & 1, part >> 2 & 1);
+    if ((in_brick.array() * below.array() > 0).any()) continue;
+    const std::int64_t found = nodeAt(brick - below);
+    if (found < 0) continue;
+    const auto node = static_cast<std::size_t>(found);
+    if (slot[node] >= 0 && !visit(node, sampleIndex(in_brick + below * kVoxels))) return;
+  }
+}
+
+const std::int16_t* BrickLevel::findSample(const Cell& lattice) const {
+  const std::int16_t* found = nullptr;
+  visitCopies(lattice, [&](std::size_t node, int sample) {
+    found = samplesOf(slot[node]) + sample;
+    return false;
+  });
+  return found;
+}
+
+void BrickLevel::setSample(const Cell& lattice, std::int16_t value, std::span<std::uint8_t> marks) {
+  visitCopies(lattice, [&](std::size_t node, int sample) {
+    samplesOf(slot[node])[sample] = value;
+    marks[node] = 1;
+    return true;
+  });
+}
+
 bool BrickLevel::sampleDistances(const TriangleTree& tree, ParallelWork& work) {
   // bricks whose centre is too far away have no sample in the band
   std::vector<std::uint8_t> candidate(nodes(), 0);

@@ -73,6 +73,13 @@ class BrickLevel {
   [[nodiscard]] static int sampleIndex(const Cell& in_brick) {
     return (in_brick.z() * kSide + in_brick.y()) * kSide + in_brick.x();
   }
+  [[nodiscard]] static Cell cellOfSample(int sample) {
+    return {sample % kSide, sample / kSide % kSide, sample / (kSide * kSide)};
+  }
+  /// The sample at a lattice point, from any brick that has it; null where none does.
+  [[nodiscard]] const std::int16_t* findSample(const Cell& lattice) const;
+  /// Sets it in all of them, and marks their nodes.
+  void setSample(const Cell& lattice, std::int16_t value, std::span<std::uint8_t> marks);
   [[nodiscard]] bool anyOutside(std::size_t node) const {
     return slot[node] < 0 ? free[node] != 0 : outside[static_cast<std::size_t>(slot[node])].any();
   }
@@ -94,6 +101,9 @@ class BrickLevel {
   std::vector<SampleBits> outside;    ///< per slot, apron included
 
  private:
+  /// Calls visit(node, sample) for each brick with samples that has this lattice point, until it says no.
+  template <typename Visit>
+  void visitCopies(const Cell& lattice, Visit&& visit) const;
   /// Which samples of a brick no neighbour with a slot has as its own.
   [[nodiscard]] SampleBits ownSamples(std::size_t node) const;
   /// Takes the samples on the upper faces from the neighbours that own them.

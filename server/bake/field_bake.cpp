@@ -9,6 +9,7 @@
 #include "server/bake/exposed_surface.h"
 #include "server/bake/outside.h"
 #include "server/bake/parallel.h"
+#include "server/bake/slope_limit.h"
 #include "server/bake/triangle_tree.h"
 #include "server/structures/field_builder.h"
 
@@ -205,7 +206,11 @@ Result<BakedField> bakeField(std::span<const Triangle> triangles, const BakeOpti
   const TriangleTree exposed =
       gone.empty() ? TriangleTree({}, longest) : TriangleTree(baked.surface, longest);
   finishSamples(coarse, exposed, gone_tree, work);
-  if (fine) finishSamples(*fine, exposed, gone_tree, work);
+  limitSlope(coarse, nullptr, work);
+  if (fine) {
+    finishSamples(*fine, exposed, gone_tree, work);
+    limitSlope(*fine, &coarse, work);
+  }
   if (work.cancelled()) return fail("cancelled");
 
   storage.layout.refinement = fine ? options.refinement : 1;

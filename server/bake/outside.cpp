@@ -139,12 +139,11 @@ class Flood {
   std::vector<std::size_t> waiting_;
 };
 
-/// A lower bound of the distance at a point [m] from the coarse sample next to it, if the flood reached that
-/// one.
+/// A lower bound of the distance at a point [m] from the coarse sample next to it, if that one is outside.
 double clearanceFromCoarse(const BrickLevel& coarse, const Vector3& p_M) {
   const Cell lattice = ((p_M - coarse.p_MoFo_M) / coarse.voxel).array().round().matrix().cast<int>();
   const BrickLevel::Point point = coarse.at(lattice);
-  if (!point.reached) return -1.0;
+  if (!point.free) return -1.0;
   return point.distance * coarse.voxel - (coarse.position(lattice) - p_M).norm();
 }
 
