@@ -117,7 +117,7 @@ int run(const Arguments& arguments) {
   if (!arguments.csv.empty()) {
     if (const auto ok = writeCsv(arguments.csv, rows); !ok) return complain(ok.error());
   }
-  printSummary(rows, **shell, kernelsFor((*field)->field).isa);
+  printSummary(rows, **shell, chosenKernels().isa);
   return 0;
 }
 

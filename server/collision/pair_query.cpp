@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "server/collision/query_kernels.h"
 
@@ -27,39 +29,80 @@ bool sameDirection(const Vector3& a, const Vector3& b) {
 template <typename Gap, typename Normal>
 LeafSubset nearestOfEachDirection(const LeafSubset& points, std::size_t limit, const Gap& gap,
                                   const Normal& normal) {
-  enum : std::uint8_t { kOpen, kGroup, kKept, kOut };
-  std::array<std::uint8_t, Pointshell::kLeafPoints> state{};
-  const auto nearest = [&](std::uint8_t among) {
-    std::size_t best = points.size();
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (state[i] == among && (best == points.size() || gap(points[i]) < gap(points[best]))) best = i;
+  // by gap
+  std::array<double, Pointshell::kLeafPoints> gaps;
+  std::array<std::uint8_t, Pointshell::kLeafPoints> order;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double own = gap(points[i]);
+    std::size_t place = i;
+    for (; place > 0 && own < gaps[place - 1]; --place) {
+      gaps[place] = gaps[place - 1];
+      order[place] = order[place - 1];
     }
-    return best;
+    gaps[place] = own;
+    order[place] = static_cast<std::uint8_t>(i);
+  }
+  // the nearest leads its direction, and each joins the first leader that it agrees with
+  struct Direction {
+    Vector3 n;
+    std::size_t kept;
   };
-  for (std::size_t leader = nearest(kOpen); leader < points.size(); leader = nearest(kOpen)) {
-    const Vector3 n = normal(points[leader]);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (state[i] == kOpen && sameDirection(n, normal(points[i]))) state[i] = kGroup;
+  FixedVector<Direction, Pointshell::kLeafPoints> directions;
+  std::uint32_t kept = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vector3 n = normal(points[order[i]]);
+    Direction* direction = std::find_if(directions.begin(), directions.end(),
+                                        [&n](const Direction& each) { return sameDirection(each.n, n); });
+    if (direction == directions.end()) {
+      directions.push_back({n, 0});
+      direction = &directions.back();
     }
-    state[leader] = kKept;
-    for (std::size_t kept = 1; kept < limit; ++kept) {
-      const std::size_t next = nearest(kGroup);
-      if (next == points.size()) break;
-      state[next] = kKept;
-    }
-    for (std::uint8_t& each : state) {
-      if (each == kGroup) each = kOut;
-    }
+    if (direction->kept++ < limit) kept |= 1U << order[i];
   }
   LeafSubset chosen;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (state[i] == kKept) chosen.push_back(points[i]);
+    if ((kept >> i & 1U) != 0) chosen.push_back(points[i]);
   }
   return chosen;
 }
 
-bool smallerGap(const Contact& a, const Contact& b) {
-  return a.gap != b.gap ? a.gap < b.gap : a.point < b.point;
+/// How contacts are ranked: by gap, then by name.
+struct GapRank {
+  double gap;
+  std::uint32_t point;
+
+  bool operator<(const GapRank& other) const {
+    return gap != other.gap ? gap < other.gap : point < other.point;
+  }
+};
+
+/// The last contact that has a place when a full list and what found no room in it are one.
+GapRank largestOfNearest(const ContactList& full, const ContactList& more) {
+  // counted by gap in equal steps, then ranked within the step that the last place falls into
+  constexpr std::size_t kSteps = 256;
+  std::array<GapRank, 2 * kMaxPairContacts> all;
+  std::size_t count = 0;
+  for (const ContactList* from : {&full, &more}) {
+    for (const Contact& contact : *from) all[count++] = {contact.gap, contact.point};
+  }
+  double low = all[0].gap;
+  double high = low;
+  for (std::size_t i = 0; i < count; ++i) {
+    low = std::min(low, all[i].gap);
+    high = std::max(high, all[i].gap);
+  }
+  const double scale = high > low ? static_cast<double>(kSteps - 1) / (high - low) : 0.0;
+  const auto stepOf = [&](const GapRank& rank) { return static_cast<std::size_t>((rank.gap - low) * scale); };
+  std::array<std::uint16_t, kSteps> histogram{};
+  for (std::size_t i = 0; i < count; ++i) ++histogram[stepOf(all[i])];
+  std::size_t before = 0;
+  std::size_t step = 0;
+  while (before + histogram[step] < kMaxPairContacts) before += histogram[step++];
+  const auto end = std::remove_if(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count),
+                                  [&](const GapRank& rank) { return stepOf(rank) != step; });
+  const auto last = all.begin() + static_cast<std::ptrdiff_t>(kMaxPairContacts - before - 1);
+  std::nth_element(all.begin(), last, end);
+  return *last;
 }
 
 /// Sixteen points with all that a contact needs.
@@ -91,8 +134,8 @@ void forEachLane(std::uint32_t bits, Visit&& visit) {
 class Walk {
  public:
   Walk(const PairQuery& query, PairQueryResult& result)
-      : frame_(*query.field_B, query.X_WA, query.X_WB, query.dilation, query.margin),
-        kernels_(kernelsFor(*query.field_B)),
+      : frame_(*query.field_B, query.X_WA, query.X_WB, query.dilation, query.margin, query.shell_A->radius()),
+        kernels_(chosenKernels()),
         shell_(*query.shell_A),
         sum_(query.sum),
         prune_(query.prune),
@@ -105,10 +148,17 @@ class Walk {
     for (std::size_t k = 0; k < levels; ++k) {
       const ShellLevel& level = shell_.levels()[k];
       for (std::uint32_t c = 0; c < level.cluster_count; c += ShellBlock::kLanes) {
-        const std::uint32_t reaching = reachingOf(shell_.clusterBlocks()[block++], false);
+        const ShellBlock& balls = shell_.clusterBlocks()[block++];
+        const std::uint32_t reaching =
+            prune_ ? kernels_.clusters(frame_, balls, culled_) : (1U << balls.count) - 1U;
         forEachLane(reaching, [&](std::uint32_t i) { walk(level.first_cluster + c + i); });
       }
     }
+    judgeCandidates();
+    selectDeepest();
+    result_.counts.spheres_visited += culled_.spheres;
+    result_.counts.points_visited = culled_.points;
+    keepBound(std::min(frame_.gapOf(culled_.smallest_bound), kNothingNear));
   }
 
   void setAreaScale(double scale) { area_scale_ = scale; }
@@ -116,87 +166,130 @@ class Walk {
  private:
   bool wholeReaches() {
     ++result_.counts.spheres_visited;
-    const double need = shell_.ballRadius() + frame_.sphere_slack + frame_.dilation;
+    constexpr double kRounding = 1e-6;
+    const double need = shell_.ballRadius() + frame_.dilation + kRounding;
     const double bound = frame_.field.lowerBound(frame_.inB(shell_.ballCentre())) - need;
     if (!prune_ || bound <= frame_.margin) return true;
     keepBound(bound);
     return false;
   }
 
-  /// The balls that a contact may be in; the bounds of all others count as the gaps of their points.
-  std::uint32_t reachingOf(const ShellBlock& balls, bool closer) {
-    result_.counts.spheres_visited += balls.count;
-    if (!prune_) return (1U << balls.count) - 1U;
-    const BallLanes lanes = kernels_.balls(frame_, balls, closer);
-    keepBound(lanes.smallest_bound);
-    return lanes.reaching;
-  }
-
+  /// What was left out counts as the gap of its points.
   void keepBound(double bound) {
     result_.smallest_gap = std::min(result_.smallest_gap, bound);
     result_.others_gap = std::min(result_.others_gap, bound);
   }
 
   void walk(std::uint32_t cluster) {
-    const std::uint32_t first = shell_.clusters()[cluster].first;
-    const std::uint32_t reaching = reachingOf(shell_.leavesOfCluster(cluster), true);
-    forEachLane(reaching, [&](std::uint32_t i) { test(first + i); });
+    if (!candidates_.hasRoomForCluster()) judgeCandidates();
+    if (prune_) {
+      kernels_.candidates(frame_, shell_, cluster, candidates_, culled_);
+    } else {
+      appendAll(shell_.clusters()[cluster]);
+    }
   }
 
-  void test(std::uint32_t number) {
-    const ShellBlock& block = shell_.pointsOfLeaf(number);
-    Lanes lanes;
-    SampleLanes& samples = lanes.samples;
-    kernels_.samples(frame_, block, samples);
-    result_.counts.points_visited += block.count;
-    result_.counts.points_colliding += samples.colliding;
-    result_.smallest_gap = std::min(result_.smallest_gap, samples.smallest_distance - frame_.dilation);
-    result_.deepest = std::max(result_.deepest, -samples.smallest_distance);
-    result_.others_gap = std::min(result_.others_gap, samples.smallest_gap_apart);
-    if (samples.near == 0) return;
-    kernels_.contacts(frame_, block, samples, lanes.contacts);
-    if (sum_) sumPush(shell_.leaves()[number].first, lanes);
+  void appendAll(const ShellSphere& cluster) {
+    culled_.spheres += cluster.count;
+    for (std::uint32_t leaf = cluster.first; leaf < cluster.first + cluster.count; ++leaf) {
+      const ShellBlock& block = shell_.pointsOfLeaf(leaf);
+      for (std::uint32_t i = 0; i < block.count; ++i) {
+        const std::uint32_t n = candidates_.count++;
+        candidates_.x[n] = block.x[i];
+        candidates_.y[n] = block.y[i];
+        candidates_.z[n] = block.z[i];
+        candidates_.point[n] = shell_.leaves()[leaf].first + i;
+      }
+      culled_.points += block.count;
+      candidates_.leaf_end[candidates_.leaves++] = static_cast<std::uint16_t>(candidates_.count);
+    }
+  }
+
+  /// What the field says of the candidates, then the contacts among them leaf after leaf.
+  void judgeCandidates() {
+    padCandidates();
+    for (std::uint32_t first = 0; first < candidates_.count; first += ShellBlock::kLanes) {
+      const PointLanes points{candidates_.x.data() + first, candidates_.y.data() + first,
+                              candidates_.z.data() + first,
+                              std::min<std::size_t>(candidates_.count - first, ShellBlock::kLanes)};
+      Lanes& lanes = lanes_[first / ShellBlock::kLanes];
+      SampleLanes& samples = lanes.samples;
+      kernels_.samples(frame_, points, samples);
+      result_.counts.points_colliding += samples.colliding;
+      result_.smallest_gap = std::min(result_.smallest_gap, samples.smallest_distance - frame_.dilation);
+      result_.deepest = std::max(result_.deepest, -samples.smallest_distance);
+      result_.others_gap = std::min(result_.others_gap, samples.smallest_gap_apart);
+      if (samples.near != 0) kernels_.contacts(frame_, points, samples, lanes.contacts);
+    }
+    std::uint32_t first = 0;
+    for (std::uint32_t leaf = 0; leaf < candidates_.leaves; ++leaf) {
+      const std::uint32_t end = candidates_.leaf_end[leaf];
+      listLeaf(first, end);
+      first = end;
+    }
+    candidates_.count = candidates_.leaves = 0;
+  }
+
+  /// Kernels read whole vectors.
+  void padCandidates() {
+    for (std::size_t i = candidates_.count; i < candidates_.count + ShellBlock::kLanes; ++i) {
+      candidates_.x[i] = candidates_.y[i] = candidates_.z[i] = 0.0F;
+    }
+  }
+
+  [[nodiscard]] const Lanes& lanesOf(std::uint32_t candidate) const {
+    return lanes_[candidate / ShellBlock::kLanes];
+  }
+
+  void listLeaf(std::uint32_t first, std::uint32_t end) {
     LeafSubset near;
-    forEachLane(samples.near, [&near](std::uint32_t i) { near.push_back(i); });
-    if (can_thin_) near = thinned(near, lanes);
-    keep(shell_.leaves()[number].first, lanes, near);
+    for (std::uint32_t i = first; i < end; ++i) {
+      if ((lanesOf(i).samples.near >> i % ShellBlock::kLanes & 1U) != 0) near.push_back(i);
+    }
+    if (near.empty()) return;
+    if (can_thin_) {
+      if (sum_) {
+        for (const std::uint32_t i : near) sumPush(contactOf(i));
+      }
+      near = thinned(near);
+      if (leaf_count_ < leaf_starts_.size()) {
+        leaf_starts_[leaf_count_++] = static_cast<std::uint32_t>(result_.contacts.size());
+      }
+      for (const std::uint32_t i : near) list(contactOf(i));
+    } else {
+      for (const std::uint32_t i : near) {
+        const Contact contact = contactOf(i);
+        if (sum_) sumPush(contact);
+        list(contact);
+      }
+    }
   }
 
-  void sumPush(std::uint32_t first, const Lanes& lanes) {
-    forEachLane(lanes.samples.near, [&](std::uint32_t i) {
-      Contact contact;
-      const ShellPoint& point = shell_.points()[first + i];
-      lanes.setContact(frame_, point, i, contact);
-      if (contact.gap >= 0.0) return;
-      contact.area = point.area * area_scale_;
-      const Vector3 push = penaltyForce(contact, 1.0) * contact.n_W;
-      result_.push_Ao_W += {push, (contact.p_WP - frame_.p_WA).cross(push)};
-      ++result_.pushing;
-    });
+  [[nodiscard]] Contact contactOf(std::uint32_t candidate) const {
+    Contact contact;
+    contact.point = candidates_.point[candidate];
+    const ShellPoint& point = shell_.points()[contact.point];
+    lanesOf(candidate).setContact(frame_, point, candidate % ShellBlock::kLanes, contact);
+    contact.area = point.area * area_scale_;
+    return contact;
   }
 
-  void keep(std::uint32_t first, const Lanes& lanes, const LeafSubset& near) {
-    if (leaf_count_ < leaf_starts_.size()) {
-      leaf_starts_[leaf_count_++] = static_cast<std::uint32_t>(result_.contacts.size());
-    }
-    for (const std::uint32_t i : near) {
-      Contact contact;
-      const ShellPoint& point = shell_.points()[first + i];
-      lanes.setContact(frame_, point, i, contact);
-      contact.area = point.area * area_scale_;
-      contact.point = first + i;
-      add(contact);
-    }
+  void sumPush(const Contact& contact) {
+    if (contact.gap >= 0.0) return;
+    const Vector3 push = penaltyForce(contact, 1.0) * contact.n_W;
+    result_.push_Ao_W += {push, (contact.p_WP - frame_.p_WA).cross(push)};
+    ++result_.pushing;
   }
 
   /// What of a leaf's points may be listed; makes room for them if that is possible.
-  LeafSubset thinned(const LeafSubset& near, const Lanes& lanes) {
+  LeafSubset thinned(const LeafSubset& near) {
     LeafSubset chosen = near;
     while (true) {
       if (per_leaf_ < near.size()) {
         chosen = nearestOfEachDirection(
-            near, per_leaf_, [&](std::uint32_t i) { return lanes.samples.distance[i]; },
-            [&](std::uint32_t i) { return lanes.gradient(i); });
+            near, per_leaf_,
+            [&](std::uint32_t i) { return lanesOf(i).samples.distance[i % ShellBlock::kLanes]; },
+            [&](std::uint32_t i) { return lanesOf(i).gradient(i % ShellBlock::kLanes); });
       }
       const bool fits = result_.contacts.size() + chosen.size() <= ContactList::capacity();
       if (fits || per_leaf_ == 1 || result_.counts.contacts_dropped > 0) break;
@@ -226,15 +319,31 @@ class Walk {
     result_.thinned = result_.thinned || kept < size;
   }
 
-  void add(const Contact& contact) {
+  void list(const Contact& contact) {
+    if (result_.contacts.push_back(contact)) return;
+    if (!overflow_) overflow_.emplace();
+    if (overflow_->full()) selectDeepest();
+    if (contact.gap > largest_listed_) {
+      ++result_.counts.contacts_dropped;
+    } else {
+      overflow_->push_back(contact);
+    }
+  }
+
+  /// Of what is listed and what found no room, the smallest gaps stay, in the order of the shell.
+  void selectDeepest() {
+    if (!overflow_ || overflow_->empty()) return;
     ContactList& contacts = result_.contacts;
-    if (contacts.push_back(contact)) return;
-    // full: a heap keeps the largest gap in front
-    if (result_.counts.contacts_dropped++ == 0) std::make_heap(contacts.begin(), contacts.end(), smallerGap);
-    if (!smallerGap(contact, contacts[0])) return;
-    std::pop_heap(contacts.begin(), contacts.end(), smallerGap);
-    contacts.back() = contact;
-    std::push_heap(contacts.begin(), contacts.end(), smallerGap);
+    const GapRank largest = largestOfNearest(contacts, *overflow_);
+    std::size_t kept = 0;
+    for (const ContactList* from : {&std::as_const(contacts), &std::as_const(*overflow_)}) {
+      for (const Contact& contact : *from) {
+        if (!(largest < GapRank{contact.gap, contact.point})) contacts[kept++] = contact;
+      }
+    }
+    result_.counts.contacts_dropped += static_cast<std::uint32_t>(overflow_->size());
+    overflow_->clear();
+    largest_listed_ = largest.gap;
   }
 
   const LaneFrame frame_;
@@ -244,9 +353,14 @@ class Walk {
   bool prune_;
   bool can_thin_;
   double area_scale_ = 1.0;
-  std::size_t per_leaf_ = Pointshell::kLeafPoints;           ///< and direction
-  std::array<std::uint32_t, kMaxPairContacts> leaf_starts_;  ///< where the listed leaves begin
+  Culled culled_;
+  Candidates candidates_;
+  std::array<Lanes, Candidates::kMost / ShellBlock::kLanes> lanes_;  ///< of the candidates
+  std::size_t per_leaf_ = Pointshell::kLeafPoints;                   ///< and direction
+  std::array<std::uint32_t, kMaxPairContacts> leaf_starts_;          ///< where the listed leaves begin
   std::size_t leaf_count_ = 0;
+  std::optional<ContactList> overflow_;                              ///< contacts that found no room
+  double largest_listed_ = std::numeric_limits<double>::infinity();  ///< no larger gap is needed
   PairQueryResult& result_;
 };
 
@@ -283,17 +397,16 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
   walk.run(used);
 
   if (result.counts.contacts_dropped > 0) {
-    result.listed_to = result.contacts[0].gap;
+    result.listed_to = -kNothingNear;
+    for (const Contact& contact : result.contacts) result.listed_to = std::max(result.listed_to, contact.gap);
     result.others_gap = std::min(result.others_gap, result.listed_to);
-    // a heap's order would depend on what was dropped; the order of points never does
-    std::sort(result.contacts.begin(), result.contacts.end(),
-              [](const Contact& a, const Contact& b) { return a.point < b.point; });
   }
 }
 
 void resampleContacts(const PairQuery& query, double moved, PairQueryResult& result) noexcept {
-  const LaneFrame frame(*query.field_B, query.X_WA, query.X_WB, query.dilation, query.margin);
-  const QueryKernels& kernels = kernelsFor(*query.field_B);
+  const LaneFrame frame(*query.field_B, query.X_WA, query.X_WB, query.dilation, query.margin,
+                        query.shell_A->radius());
+  const QueryKernels& kernels = chosenKernels();
   const std::span<const ShellPoint> points = query.shell_A->points();
   ContactList& contacts = result.contacts;
   result.smallest_gap = result.others_gap - moved;
@@ -310,8 +423,9 @@ void resampleContacts(const PairQuery& query, double moved, PairQueryResult& res
       block.z[i] = p_AP.z();
     }
     Lanes lanes;
-    kernels.samples(frame, block, lanes.samples);
-    kernels.contacts(frame, block, lanes.samples, lanes.contacts);
+    const PointLanes places{block.x.data(), block.y.data(), block.z.data(), block.count};
+    kernels.samples(frame, places, lanes.samples);
+    kernels.contacts(frame, places, lanes.samples, lanes.contacts);
     const double smallest = lanes.samples.smallest_distance;
     result.smallest_gap = std::min(result.smallest_gap, smallest - frame.dilation);
     result.deepest = std::max(result.deepest, -smallest);

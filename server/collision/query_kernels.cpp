@@ -1,398 +1,36 @@
 #include "server/collision/query_kernels.h"
 
+#include <algorithm>
 #include <atomic>
-#include <limits>
 #include <vector>
 
 // this file is compiled once for every instruction set
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "server/collision/query_kernels.cpp"
-#define HWY_DISABLED_TARGETS HWY_SSSE3
+// without the imitated vectors the baseline is one lane, which is faster
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_EMU128)
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+
+#include "server/collision/cull_lanes_inl.h"
+#include "server/collision/sample_lanes_inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tenon {
 namespace HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
-// lanes are doubles; whole numbers have as many lanes of half the width
-constexpr HWY_CAPPED(double, 16) kD;
-constexpr hn::Rebind<std::int32_t, decltype(kD)> kI;
-constexpr hn::Rebind<float, decltype(kD)> kF;
-using Double = hn::Vec<decltype(kD)>;
-using Whole = hn::Vec<decltype(kI)>;
-using Mask = hn::Mask<decltype(kD)>;
-
-constexpr int kVoxels = DistanceField::kBrickVoxels;
-constexpr int kSide = DistanceField::kBrickSide;
-constexpr int kLayer = kSide * kSide;
-
-struct Place3 {
-  Double x, y, z;
-};
-
-HWY_INLINE Double all(double value) { return hn::Set(kD, value); }
-HWY_INLINE Whole allWhole(std::int32_t value) { return hn::Set(kI, value); }
-HWY_INLINE Double toDouble(Whole v) { return hn::PromoteTo(kD, v); }
-HWY_INLINE Whole truncated(Double v) { return hn::DemoteTo(kI, v); }
-
-HWY_INLINE std::uint32_t bitsOf(Mask mask) {
-  std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(kD, mask, bytes);
-  return bytes[0];
-}
-
-HWY_INLINE Double sum3(Double a, Double b, Double c) { return hn::Add(hn::Add(a, b), c); }
-HWY_INLINE Double norm(const Place3& v) {
-  return hn::Sqrt(sum3(hn::Mul(v.x, v.x), hn::Mul(v.y, v.y), hn::Mul(v.z, v.z)));
-}
-HWY_INLINE Place3 turned(const double* R, const Place3& v) {  // R column by column
-  return {sum3(hn::Mul(all(R[0]), v.x), hn::Mul(all(R[3]), v.y), hn::Mul(all(R[6]), v.z)),
-          sum3(hn::Mul(all(R[1]), v.x), hn::Mul(all(R[4]), v.y), hn::Mul(all(R[7]), v.z)),
-          sum3(hn::Mul(all(R[2]), v.x), hn::Mul(all(R[5]), v.y), hn::Mul(all(R[8]), v.z))};
-}
-HWY_INLINE Place3 moved(const double* p, const double* R, const Place3& v) {
-  const Place3 turn = turned(R, v);
-  return {hn::Add(all(p[0]), turn.x), hn::Add(all(p[1]), turn.y), hn::Add(all(p[2]), turn.z)};
-}
-HWY_INLINE Place3 placesOf(const ShellBlock& block, std::size_t first) {
-  return {hn::PromoteTo(kD, hn::LoadU(kF, block.x.data() + first)),
-          hn::PromoteTo(kD, hn::LoadU(kF, block.y.data() + first)),
-          hn::PromoteTo(kD, hn::LoadU(kF, block.z.data() + first))};
-}
-
-/// A field with its constants spread over the lanes where that pays.
-struct FieldLanes {
-  explicit FieldLanes(const LaneFrame& the_frame)
-      : frame(the_frame),
-        layout(the_frame.field.layout()),
-        edge(layout.voxel * kVoxels),
-        inverse_edge(1.0 / edge),
-        samples(reinterpret_cast<const std::int32_t*>(layout.samples.data())),
-        far(reinterpret_cast<const std::int32_t*>(layout.far.data())) {}
-
-  const LaneFrame& frame;
-  const DistanceField::Layout& layout;
-  double edge, inverse_edge;
-  const std::int32_t* samples;  ///< read at byte offsets, two samples at a time
-  const std::int32_t* far;
-};
-
-/// DistanceField::locate; lanes outside the grid stand at its lowest corner.
-struct Located {
-  Mask inside;
-  Whole number, entry;
-  Double entry_number;
-  Place3 p_brick;
-};
-
-HWY_INLINE Double inGrid(Double p, double origin, double inverse_edge) {
-  return hn::Mul(hn::Sub(p, all(origin)), all(inverse_edge));
-}
-
-HWY_INLINE Located locate(const FieldLanes& field, const Place3& p_B) {
-  const Vector3& origin = field.layout.p_MoFo_M;
-  const auto& bricks = field.layout.bricks;
-  const Double zero = hn::Zero(kD);
-  Double x = inGrid(p_B.x, origin[0], field.inverse_edge);
-  Double y = inGrid(p_B.y, origin[1], field.inverse_edge);
-  Double z = inGrid(p_B.z, origin[2], field.inverse_edge);
-  Located at;
-  at.inside = hn::And(hn::And(hn::And(hn::Ge(x, zero), hn::Lt(x, all(bricks[0]))),
-                              hn::And(hn::Ge(y, zero), hn::Lt(y, all(bricks[1])))),
-                      hn::And(hn::Ge(z, zero), hn::Lt(z, all(bricks[2]))));
-  x = hn::IfThenElseZero(at.inside, x);
-  y = hn::IfThenElseZero(at.inside, y);
-  z = hn::IfThenElseZero(at.inside, z);
-  const Whole bx = truncated(x);
-  const Whole by = truncated(y);
-  const Whole bz = truncated(z);
-  at.p_brick = {hn::Sub(x, toDouble(bx)), hn::Sub(y, toDouble(by)), hn::Sub(z, toDouble(bz))};
-  at.number = hn::Add(hn::Mul(hn::Add(hn::Mul(bz, allWhole(bricks[1])), by), allWhole(bricks[0])), bx);
-  at.entry = hn::GatherIndex(kI, field.layout.index.data(), at.number);
-  at.entry_number = toDouble(at.entry);
-  return at;
-}
-
-HWY_INLINE Double farOf(const FieldLanes& field, Whole number) {
-  // two at a time: the last is the upper half of the pair before it
-  const Whole last = allWhole(static_cast<std::int32_t>(2 * field.layout.far.size() - 4));
-  const Whole wanted = hn::ShiftLeft<1>(number);
-  const Whole pair = hn::GatherOffset(kI, field.far, hn::Min(wanted, last));
-  const Whole upper = hn::IfThenElse(hn::Gt(wanted, last), pair, hn::ShiftLeft<16>(pair));
-  return toDouble(hn::ShiftRight<16>(upper));
-}
-
-HWY_INLINE Double fromBrickCentre(const FieldLanes& field, const Place3& p_brick) {
-  const Double half = all(0.5);
-  const Double edge = all(field.edge);
-  return norm({hn::Mul(hn::Sub(p_brick.x, half), edge), hn::Mul(hn::Sub(p_brick.y, half), edge),
-               hn::Mul(hn::Sub(p_brick.z, half), edge)});
-}
-
-HWY_INLINE Double farMagnitude(const FieldLanes& field, const Located& at) {
-  const double voxel = field.layout.voxel;
-  const double beyond_band = field.layout.band - kHalfDiagonal * voxel;
-  const Double at_centre =
-      hn::Div(hn::Mul(hn::Abs(farOf(field, at.number)), all(voxel)), all(DistanceField::kFarPerVoxel));
-  return hn::Max(all(beyond_band), hn::Sub(at_centre, fromBrickCentre(field, at.p_brick)));
-}
-
-HWY_INLINE Double outsideOf(double low, double high, Double p) {
-  return hn::Max(hn::Max(hn::Sub(all(low), p), hn::Sub(p, all(high))), hn::Zero(kD));
-}
-
-HWY_INLINE Double distanceToGrid(const FieldLanes& field, const Place3& p) {
-  const Eigen::AlignedBox3d& box = field.frame.box_B;
-  const double* low = box.min().data();
-  const double* high = box.max().data();
-  const Place3 outside{outsideOf(low[0], high[0], p.x), outsideOf(low[1], high[1], p.y),
-                       outsideOf(low[2], high[2], p.z)};
-  return hn::Add(norm(outside), all(field.layout.margin));
-}
-
-struct Sampled {
-  Double distance;
-  Place3 gradient;
-  Mask exact;
-};
-
-/// DistanceField::interpolate
-HWY_INLINE Sampled interpolate(const FieldLanes& field, Whole brick, const Place3& p_brick, Double voxel,
-                               Double band) {
-  const Double voxels = all(kVoxels);
-  const Double px = hn::Mul(p_brick.x, voxels);
-  const Double py = hn::Mul(p_brick.y, voxels);
-  const Double pz = hn::Mul(p_brick.z, voxels);
-  const Whole most = allWhole(kVoxels - 1);
-  const Whole x = hn::Min(truncated(px), most);
-  const Whole y = hn::Min(truncated(py), most);
-  const Whole z = hn::Min(truncated(pz), most);
-  const Double u = hn::Sub(px, toDouble(x));
-  const Double v = hn::Sub(py, toDouble(y));
-  const Double w = hn::Sub(pz, toDouble(z));
-  const Whole row = hn::Add(hn::Mul(hn::Add(hn::Mul(z, allWhole(kSide)), y), allWhole(kSide)), x);
-  const Whole place = hn::ShiftLeft<1>(hn::Add(hn::Mul(brick, allWhole(DistanceField::kBrickSamples)), row));
-
-  // neighbours along x come together
-  const Whole g00 = hn::GatherOffset(kI, field.samples, place);
-  const Whole g10 = hn::GatherOffset(kI, field.samples, hn::Add(place, allWhole(2 * kSide)));
-  const Whole g01 = hn::GatherOffset(kI, field.samples, hn::Add(place, allWhole(2 * kLayer)));
-  const Whole g11 = hn::GatherOffset(kI, field.samples, hn::Add(place, allWhole(2 * (kLayer + kSide))));
-  const Whole s00 = hn::ShiftRight<16>(hn::ShiftLeft<16>(g00));
-  const Whole s10 = hn::ShiftRight<16>(hn::ShiftLeft<16>(g10));
-  const Whole s01 = hn::ShiftRight<16>(hn::ShiftLeft<16>(g01));
-  const Whole s11 = hn::ShiftRight<16>(hn::ShiftLeft<16>(g11));
-  const Double d00 = toDouble(hn::Sub(hn::ShiftRight<16>(g00), s00));
-  const Double d10 = toDouble(hn::Sub(hn::ShiftRight<16>(g10), s10));
-  const Double d01 = toDouble(hn::Sub(hn::ShiftRight<16>(g01), s01));
-  const Double d11 = toDouble(hn::Sub(hn::ShiftRight<16>(g11), s11));
-
-  const Double c00 = hn::Add(toDouble(s00), hn::Mul(d00, u));
-  const Double c10 = hn::Add(toDouble(s10), hn::Mul(d10, u));
-  const Double c01 = hn::Add(toDouble(s01), hn::Mul(d01, u));
-  const Double c11 = hn::Add(toDouble(s11), hn::Mul(d11, u));
-  const Double e0 = hn::Sub(c10, c00);
-  const Double e1 = hn::Sub(c11, c01);
-  const Double c0 = hn::Add(c00, hn::Mul(e0, v));
-  const Double c1 = hn::Add(c01, hn::Mul(e1, v));
-  const Double d0 = hn::Add(d00, hn::Mul(hn::Sub(d10, d00), v));
-  const Double d1 = hn::Add(d01, hn::Mul(hn::Sub(d11, d01), v));
-
-  const Double per_quantum = all(1.0 / DistanceField::kQuantaPerVoxel);
-  const Double rise = hn::Sub(c1, c0);
-  Sampled out;
-  out.distance = hn::Mul(hn::Mul(hn::Add(c0, hn::Mul(rise, w)), per_quantum), voxel);
-  out.gradient = {hn::Mul(hn::Add(d0, hn::Mul(hn::Sub(d1, d0), w)), per_quantum),
-                  hn::Mul(hn::Add(e0, hn::Mul(hn::Sub(e1, e0), w)), per_quantum), hn::Mul(rise, per_quantum)};
-  out.exact = hn::Le(hn::Abs(out.distance), band);
-  return out;
-}
-
-/// The child of a refined lane where it has samples, else the lane's own coarse brick.
-HWY_INLINE Sampled interpolateRefined(const FieldLanes& field, const Located& at, Mask refined) {
-  const DistanceField::Layout& layout = field.layout;
-  const int r = layout.refinement;
-  const Double coarse_voxel = all(layout.voxel);
-  const Double coarse_band = all(layout.band);
-  const Double fine_voxel = all(layout.voxel / r);
-  const Double fine_band = all(DistanceField::kBandVoxels * (layout.voxel / r));
-  const Double rd = all(r);
-  const Double zero = hn::Zero(kD);
-  const Place3 p{hn::Mul(at.p_brick.x, rd), hn::Mul(at.p_brick.y, rd), hn::Mul(at.p_brick.z, rd)};
-  const Whole most = allWhole(r - 1);
-  const Whole cx = hn::Min(truncated(p.x), most);
-  const Whole cy = hn::Min(truncated(p.y), most);
-  const Whole cz = hn::Min(truncated(p.z), most);
-  // lanes without children read any entry
-  const Double first = hn::IfThenElseZero(refined, hn::Sub(at.entry_number, all(DistanceField::kRefined)));
-  const Whole children = truncated(first);
-  const Whole child = hn::Add(hn::Mul(hn::Add(hn::Mul(cz, allWhole(r)), cy), allWhole(r)), cx);
-  const Whole child_place = truncated(hn::IfThenElseZero(refined, toDouble(hn::Add(children, child))));
-  const Whole own_place =
-      truncated(hn::IfThenElseZero(refined, toDouble(hn::Add(children, allWhole(r * r * r)))));
-  const Double fine = toDouble(hn::GatherIndex(kI, layout.index.data(), child_place));
-  const Double own = toDouble(hn::GatherIndex(kI, layout.index.data(), own_place));
-  const Mask has_fine = hn::And(refined, hn::Ge(fine, zero));
-  const Mask plain =
-      hn::And(hn::Ge(at.entry_number, zero), hn::Lt(at.entry_number, all(DistanceField::kRefined)));
-  const Double coarse = hn::IfThenElse(refined, own, hn::IfThenElseZero(plain, at.entry_number));
-  const Place3 p_child{hn::IfThenElse(has_fine, hn::Sub(p.x, toDouble(cx)), at.p_brick.x),
-                       hn::IfThenElse(has_fine, hn::Sub(p.y, toDouble(cy)), at.p_brick.y),
-                       hn::IfThenElse(has_fine, hn::Sub(p.z, toDouble(cz)), at.p_brick.z)};
-  Sampled out = interpolate(field, truncated(hn::IfThenElse(has_fine, fine, coarse)), p_child,
-                            hn::IfThenElse(has_fine, fine_voxel, coarse_voxel),
-                            hn::IfThenElse(has_fine, fine_band, coarse_band));
-  // out of its own narrow band a child knows less than the coarse brick
-  const Mask again = hn::AndNot(out.exact, has_fine);
-  if (hn::AllFalse(kD, again)) return out;
-  const Sampled wide = interpolate(field, truncated(coarse), at.p_brick, coarse_voxel, coarse_band);
-  out.distance = hn::IfThenElse(again, wide.distance, out.distance);
-  out.gradient = {hn::IfThenElse(again, wide.gradient.x, out.gradient.x),
-                  hn::IfThenElse(again, wide.gradient.y, out.gradient.y),
-                  hn::IfThenElse(again, wide.gradient.z, out.gradient.z)};
-  out.exact = hn::Or(out.exact, hn::And(again, wide.exact));
-  return out;
-}
-
-/// DistanceField::sample
-HWY_INLINE Sampled sample(const FieldLanes& field, const Place3& p_B, const Located& at) {
-  const DistanceField::Layout& layout = field.layout;
-  const Mask refined = hn::And(at.inside, hn::Ge(at.entry_number, all(DistanceField::kRefined)));
-  const Mask has_samples = hn::And(at.inside, hn::Ge(at.entry_number, hn::Zero(kD)));
-  Sampled out;
-  if (hn::AllFalse(kD, refined)) {
-    out =
-        interpolate(field, hn::Max(at.entry, hn::Zero(kI)), at.p_brick, all(layout.voxel), all(layout.band));
-  } else {
-    out = interpolateRefined(field, at, refined);
-  }
-  out.exact = hn::And(out.exact, has_samples);
-  out.gradient = {hn::IfThenElseZero(out.exact, out.gradient.x),
-                  hn::IfThenElseZero(out.exact, out.gradient.y),
-                  hn::IfThenElseZero(out.exact, out.gradient.z)};
-  if (hn::AllTrue(kD, out.exact)) return out;
-  const Double beyond =
-      hn::Max(hn::Sub(hn::Abs(out.distance), all(kHalfDiagonal * layout.voxel)), hn::Zero(kD));
-  out.distance = hn::IfThenElse(out.exact, out.distance, hn::CopySign(beyond, out.distance));
-  if (hn::AllTrue(kD, has_samples)) return out;
-  const Double magnitude = farMagnitude(field, at);
-  const Mask deep = hn::Eq(at.entry_number, all(DistanceField::kFarInside));
-  const Double far = hn::IfThenElse(deep, hn::Neg(magnitude), magnitude);
-  out.distance =
-      hn::IfThenElse(has_samples, out.distance, hn::IfThenElse(at.inside, far, distanceToGrid(field, p_B)));
-  return out;
-}
-
-/// DistanceField::lowerBound
-HWY_INLINE Double lowerBound(const FieldLanes& field, const Place3& p_B, const Located& at) {
-  const double voxel = field.layout.voxel;
-  const Double from_centre = fromBrickCentre(field, at.p_brick);
-  const Double far = farOf(field, at.number);
-  Double bound = hn::Sub(
-      hn::Mul(hn::Sub(hn::Div(far, all(DistanceField::kFarPerVoxel)), all(1.0)), all(voxel)), from_centre);
-  const Mask far_outside = hn::Eq(at.entry_number, all(DistanceField::kFarOutside));
-  if (!hn::AllFalse(kD, far_outside)) bound = hn::IfThenElse(far_outside, farMagnitude(field, at), bound);
-  const Mask far_inside = hn::Eq(at.entry_number, all(DistanceField::kFarInside));
-  bound = hn::IfThenElse(far_inside, all(-0.5 * field.frame.box_B.diagonal().norm()), bound);
-  if (hn::AllTrue(kD, at.inside)) return bound;
-  return hn::IfThenElse(at.inside, bound, distanceToGrid(field, p_B));
-}
-
-BallLanes balls(const LaneFrame& frame, const ShellBlock& block, bool closer) noexcept {
-  const FieldLanes field(frame);
-  const Double margin = all(frame.margin);
-  Double smallest = all(kNothingNear);
-  BallLanes out;
-  for (std::size_t i = 0; i < block.count; i += hn::Lanes(kD)) {
-    const Mask used = hn::FirstN(kD, block.count - i);
-    const Place3 p_B = moved(frame.p_BA_B.data(), frame.R_BA.data(), placesOf(block, i));
-    const Double radius = hn::PromoteTo(kD, hn::LoadU(kF, block.radius.data() + i));
-    const Double need = hn::Add(hn::Add(radius, all(frame.sphere_slack)), all(frame.dilation));
-    const Located at = locate(field, p_B);
-    Double bound = hn::Sub(lowerBound(field, p_B, at), need);
-    Mask reaching = hn::And(used, hn::Le(bound, margin));
-    if (closer && !hn::AllFalse(kD, reaching)) {
-      const Sampled there = sample(field, p_B, at);
-      const Double voxel = all(frame.field.voxel());
-      const Double slack =
-          hn::Mul(hn::IfThenElse(there.exact, all(2.0 * kHalfDiagonal), all(kHalfDiagonal)), voxel);
-      bound = hn::IfThenElse(reaching, hn::Sub(hn::Sub(there.distance, slack), need), bound);
-      reaching = hn::And(used, hn::Le(bound, margin));
-    }
-    out.reaching |= bitsOf(reaching) << i;
-    smallest = hn::Min(hn::IfThenElse(hn::AndNot(reaching, used), bound, smallest), smallest);
-  }
-  out.smallest_bound = hn::GetLane(hn::MinOfLanes(kD, smallest));
-  return out;
-}
-
-void samples(const LaneFrame& frame, const ShellBlock& block, SampleLanes& out) noexcept {
-  const FieldLanes field(frame);
-  const Double nothing = all(kNothingNear);
-  Double smallest = nothing;
-  Double apart = nothing;
-  out.exact = out.near = 0;
-  std::uint32_t colliding = 0;
-  for (std::size_t i = 0; i < block.count; i += hn::Lanes(kD)) {
-    const Mask used = hn::FirstN(kD, block.count - i);
-    const Place3 p_B = moved(frame.p_BA_B.data(), frame.R_BA.data(), placesOf(block, i));
-    const Sampled there = sample(field, p_B, locate(field, p_B));
-    const Double gap = hn::Sub(there.distance, all(frame.dilation));
-    const Mask exact = hn::And(used, there.exact);
-    const Mask near = hn::And(exact, hn::Le(gap, all(frame.margin)));
-    hn::Store(there.distance, kD, out.distance.data() + i);
-    hn::Store(there.gradient.x, kD, out.gradient_x.data() + i);
-    hn::Store(there.gradient.y, kD, out.gradient_y.data() + i);
-    hn::Store(there.gradient.z, kD, out.gradient_z.data() + i);
-    out.exact |= bitsOf(exact) << i;
-    out.near |= bitsOf(near) << i;
-    colliding |= bitsOf(hn::And(used, hn::Lt(gap, hn::Zero(kD)))) << i;
-    smallest = hn::Min(hn::IfThenElse(used, there.distance, nothing), smallest);
-    apart = hn::Min(hn::IfThenElse(hn::AndNot(near, used), gap, nothing), apart);
-  }
-  out.colliding = static_cast<std::uint32_t>(hwy::PopCount(colliding));
-  out.smallest_distance = hn::GetLane(hn::MinOfLanes(kD, smallest));
-  out.smallest_gap_apart = hn::GetLane(hn::MinOfLanes(kD, apart));
-}
-
-void contacts(const LaneFrame& frame, const ShellBlock& block, const SampleLanes& lanes,
-              ContactLanes& out) noexcept {
-  out.sloping = 0;
-  for (std::size_t i = 0; i < block.count; i += hn::Lanes(kD)) {
-    const Place3 p_W = moved(frame.p_WA.data(), frame.R_WA.data(), placesOf(block, i));
-    const Place3 gradient{hn::Load(kD, lanes.gradient_x.data() + i),
-                          hn::Load(kD, lanes.gradient_y.data() + i),
-                          hn::Load(kD, lanes.gradient_z.data() + i)};
-    const Double slope = norm(gradient);
-    const Place3 n_W = turned(frame.R_WB.data(), {hn::Div(gradient.x, slope), hn::Div(gradient.y, slope),
-                                                  hn::Div(gradient.z, slope)});
-    out.sloping |= bitsOf(hn::Ge(slope, all(kLeastGradient))) << i;
-    hn::Store(p_W.x, kD, out.x.data() + i);
-    hn::Store(p_W.y, kD, out.y.data() + i);
-    hn::Store(p_W.z, kD, out.z.data() + i);
-    hn::Store(n_W.x, kD, out.n_x.data() + i);
-    hn::Store(n_W.y, kD, out.n_y.data() + i);
-    hn::Store(n_W.z, kD, out.n_z.data() + i);
-  }
-}
-
-/// Lanes that the compiler only imitates are slower than plain code.
 QueryKernels kernels() {
   switch (HWY_TARGET) {
-    case HWY_EMU128:
-    case HWY_SCALAR:
-      return scalarKernels();
     case HWY_SSE4:
-      return {"sse4", balls, samples, contacts};
+      return {"sse4", cull::clusters, cull::candidates, exact::samples, exact::contacts};
     case HWY_AVX2:
-      return {"avx2", balls, samples, contacts};
+      return {"avx2", cull::clusters, cull::candidates, exact::samples, exact::contacts};
     case HWY_AVX3:
-      return {"avx512", balls, samples, contacts};
+      return {"avx512", cull::clusters, cull::candidates, exact::samples, exact::contacts};
+    case HWY_SCALAR:
+      return {"scalar", cull::clusters, cull::candidates, exact::samples, exact::contacts};
     default:
-      return {hwy::TargetName(HWY_TARGET), balls, samples, contacts};
+      return {hwy::TargetName(HWY_TARGET), cull::clusters, cull::candidates, exact::samples, exact::contacts};
   }
 }
 
@@ -412,7 +50,7 @@ struct Supported {
   std::atomic<std::size_t> chosen = 0;
 
   Supported() {
-    all[count++] = scalarKernels();
+    all[count++] = HWY_STATIC_DISPATCH(kernels)();
     // a target is a bit, the best has the lowest
     std::vector<std::int64_t> targets = hwy::SupportedAndGeneratedTargets();
     for (auto target = targets.rbegin(); target != targets.rend() && count < all.size(); ++target) {
@@ -429,31 +67,48 @@ struct Supported {
 
 Supported supported;
 
+float highest(const std::array<float, 3>& values) {
+  return std::max({std::abs(values[0]), std::abs(values[1]), std::abs(values[2])});
+}
+
 }  // namespace
 
+CullFrame::CullFrame(const DistanceField& field, const Matrix3& R_BA, const Vector3& p_BA_B, double reach_A,
+                     double limit_B) {
+  const DistanceField::Layout& layout = field.layout();
+  const double per = 1.0 / layout.voxel;
+  for (std::size_t i = 0; i < R.size(); ++i) R[i] = static_cast<float>(R_BA.data()[i] * per);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto k = static_cast<std::size_t>(axis);
+    p[k] = static_cast<float>((p_BA_B[axis] - layout.p_MoFo_M[axis]) * per);
+    end[k] = static_cast<float>(layout.bricks[k] * DistanceField::kBrickVoxels);
+  }
+  per_metre = static_cast<float>(per);
+  // a place is a sum of four products, each off by 2^-23 of at most this much; bounds are off by as little
+  const float most = highest(p) + highest(end) + static_cast<float>(2.0 * reach_A * per);
+  slack = 4e-6F * most + 1e-3F;
+  limit = static_cast<float>(limit_B * per) + slack;
+  outside = static_cast<float>(layout.margin * per);
+  beyond_band = static_cast<float>(layout.band * per - kHalfDiagonal);
+}
+
 LaneFrame::LaneFrame(const DistanceField& the_field, const Pose& X_WA, const Pose& X_WB, double the_dilation,
-                     double the_margin)
+                     double the_margin, double reach_A)
     : field(the_field),
       box_B(the_field.box()),
       dilation(the_dilation),
       margin(the_margin),
       R_WA(X_WA.matrix()),
       R_WB(X_WB.matrix()),
-      p_WA(X_WA.translation()) {
-  const Pose X_BA = X_WB.inverse() * X_WA;
-  R_BA = X_BA.matrix();
-  p_BA_B = X_BA.translation();
-}
+      R_BA((X_WB.rotation().conjugate() * X_WA.rotation()).normalized().toRotationMatrix()),
+      p_WA(X_WA.translation()),
+      p_BA_B(X_WB.inverse() * X_WA.translation()),
+      cull(the_field, R_BA, p_BA_B, reach_A, the_dilation + the_margin) {}
 
 std::span<const QueryKernels> supportedKernels() noexcept { return {supported.all.data(), supported.count}; }
 
-const QueryKernels& kernelsFor(const DistanceField& field) noexcept {
-  const DistanceField::Layout& layout = field.layout();
-  constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max();
-  const bool fits =
-      layout.samples.size_bytes() < kMost && layout.index.size() < kMost && layout.far.size_bytes() < kMost;
-  const bool lanes = fits && !layout.samples.empty() && layout.far.size() >= 2;
-  return supported.all[lanes ? supported.chosen.load(std::memory_order_relaxed) : 0];
+const QueryKernels& chosenKernels() noexcept {
+  return supported.all[supported.chosen.load(std::memory_order_relaxed)];
 }
 
 bool chooseKernels(std::string_view isa) noexcept {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string_view>
 
@@ -17,23 +18,51 @@ namespace tenon {
           R(2, 0) * v[0] + R(2, 1) * v[1] + R(2, 2) * v[2]};
 }
 
+/// The field's frame in floats: in voxels, from the grid's lowest corner. Good enough to tell what is
+/// certainly far; `slack` is more than rounding can do.
+struct CullFrame {
+  CullFrame(const DistanceField& field, const Matrix3& R_BA, const Vector3& p_BA_B, double reach_A,
+            double limit);
+
+  std::array<float, 9> R{};    ///< voxels a metre of A, column by column
+  std::array<float, 3> p{};    ///< where A's origin is
+  std::array<float, 3> end{};  ///< the grid's highest corner
+  float per_metre = 0.0F;
+  float slack = 0.0F;
+  float limit = 0.0F;        ///< a bound above this frees a point or a ball
+  float outside = 0.0F;      ///< distances outside the grid are not below this
+  float beyond_band = 0.0F;  ///< nor those in bricks without samples
+};
+
 /// What all lanes of a query share: the field, both poses, and how near is near.
 struct LaneFrame {
   LaneFrame(const DistanceField& the_field, const Pose& X_WA, const Pose& X_WB, double the_dilation,
-            double the_margin);
+            double the_margin, double reach_A);
 
   [[nodiscard]] Vector3 inB(const Vector3& p_AP) const { return p_BA_B + turned(R_BA, p_AP); }
+  /// A bound in voxels of `cull` as a gap [m].
+  [[nodiscard]] double gapOf(float bound) const {
+    return static_cast<double>(bound - cull.slack) * field.voxel() - dilation;
+  }
 
   const DistanceField& field;
   Eigen::AlignedBox3d box_B;  ///< of the field
   double dilation;
   double margin;
-  double sphere_slack = 1e-6;  ///< [m] what rounding centre and radius to floats may take from a ball
   Matrix3 R_WA, R_WB, R_BA;
   Vector3 p_WA, p_BA_B;
+  CullFrame cull;
 };
 
-/// What the field says at the sixteen points of a block.
+/// Up to sixteen points side by side, in A; sixteen of each can be read.
+struct PointLanes {
+  const float* x;
+  const float* y;
+  const float* z;
+  std::size_t count;
+};
+
+/// What the field says at them.
 struct alignas(64) SampleLanes {
   std::array<double, ShellBlock::kLanes> distance, gradient_x, gradient_y, gradient_z;
   std::uint32_t exact = 0;          ///< one bit a lane, as in `near`
@@ -49,24 +78,47 @@ struct alignas(64) ContactLanes {
   std::uint32_t sloping = 0;  ///< one bit a lane: the gradient says where outside is
 };
 
-/// Sixteen balls against the field: those that may hold a contact, and a bound for the gaps of the others.
-struct BallLanes {
-  std::uint32_t reaching = 0;  ///< one bit a lane
-  double smallest_bound = 0.0;
+/// Points that may be contacts, side by side in the order of the shell.
+struct Candidates {
+  static constexpr std::size_t kOfCluster = Pointshell::kClusterLeaves * Pointshell::kLeafPoints;
+  static constexpr std::size_t kMost = kOfCluster + 64;
+  template <typename T>
+  using Lanes = std::array<T, kMost + ShellBlock::kLanes>;  ///< whole vectors are written
+
+  alignas(64) Lanes<float> x, y, z;
+  Lanes<std::uint32_t> point;
+  std::array<std::uint16_t, kMost> leaf_end;  ///< where the points of each leaf end that has some
+  std::uint32_t count = 0;
+  std::uint32_t leaves = 0;
+
+  [[nodiscard]] bool hasRoomForCluster() const {
+    return count + kOfCluster <= kMost && leaves + Pointshell::kClusterLeaves <= kMost;
+  }
 };
 
-/// The inner loops of a query, once for every instruction set.
+/// What culling left out, and its work.
+struct Culled {
+  float smallest_bound = std::numeric_limits<float>::infinity();  ///< in voxels
+  std::uint32_t spheres = 0;
+  std::uint32_t points = 0;
+};
+
+/// The inner loops of a query, compiled for every instruction set.
 ///
-/// A lane is a point and does what DistanceField::sample and ::lowerBound do, in doubles, in the same order
-/// and without a fused multiply-add: every set of kernels gives the same bits, and so does the field itself.
+/// Culling is done in floats and only ever leaves out what is certainly too far. What is left is done in
+/// doubles: a lane is a point and does what DistanceField::sample does, in the same order. Nowhere is there a
+/// fused multiply-add, so every set of kernels gives the same bits.
 ///
 /// Threads: pure. Real-time.
 struct QueryKernels {
   std::string_view isa;  ///< "scalar", "sse4", "avx2", "avx512", or what else a processor has
-  /// `closer`: a ball that the far bound does not free gets a second chance by the sample at its centre.
-  BallLanes (*balls)(const LaneFrame& frame, const ShellBlock& block, bool closer) noexcept;
-  void (*samples)(const LaneFrame& frame, const ShellBlock& block, SampleLanes& out) noexcept;
-  void (*contacts)(const LaneFrame& frame, const ShellBlock& block, const SampleLanes& samples,
+  /// Which of sixteen clusters may hold a contact, a bit each.
+  std::uint32_t (*clusters)(const LaneFrame& frame, const ShellBlock& balls, Culled& culled) noexcept;
+  /// The points of a cluster that may be contacts, appended; there has to be room.
+  void (*candidates)(const LaneFrame& frame, const Pointshell& shell, std::uint32_t cluster,
+                     Candidates& candidates, Culled& culled) noexcept;
+  void (*samples)(const LaneFrame& frame, const PointLanes& points, SampleLanes& out) noexcept;
+  void (*contacts)(const LaneFrame& frame, const PointLanes& points, const SampleLanes& samples,
                    ContactLanes& out) noexcept;
 };
 
@@ -80,18 +132,14 @@ inline constexpr double kNothingNear = 1e6;
 /// Half the diagonal of a voxel, rounded up: no interpolated distance is further from the truth [voxels].
 inline constexpr double kHalfDiagonal = 0.8661;
 
-/// All that this processor can run, the fastest last.
+/// All that this processor can run: what every such processor has first, the fastest last.
 [[nodiscard]] std::span<const QueryKernels> supportedKernels() noexcept;
 
-/// Those for a query of this field: the chosen ones, or plain code when the field is too large for offsets of
-/// 32 bits or has no samples.
-[[nodiscard]] const QueryKernels& kernelsFor(const DistanceField& field) noexcept;
+/// Those that queries use.
+[[nodiscard]] const QueryKernels& chosenKernels() noexcept;
 
 /// Makes all later queries of the process use one set of kernels; false: not supported here. For tests,
 /// benchmarks and `--isa`; without it the fastest are used. Threads: any, between queries.
 bool chooseKernels(std::string_view isa) noexcept;
-
-/// Plain code, a point after the other.
-[[nodiscard]] QueryKernels scalarKernels() noexcept;
 
 }  // namespace tenon

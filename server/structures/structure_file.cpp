@@ -1,6 +1,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <limits>
 #include <type_traits>
 #include <vector>
 
@@ -166,6 +167,10 @@ bool fieldHolds(const DistanceField::Layout& field) {
   }
   if (coarse > field.index.size() || field.far.size() != coarse) return false;
   if (field.samples.size() % DistanceField::kBrickSamples != 0) return false;
+  // queries read pairs of numbers at byte offsets of 31 bits
+  constexpr std::size_t kMostBytes = std::numeric_limits<std::int32_t>::max();
+  if (field.samples.size_bytes() > kMostBytes || field.far.size_bytes() > kMostBytes / 2) return false;
+  if (field.far.size() < 2 || field.index.size() > kMostBytes / 2) return false;
   const std::size_t bricks = field.samples.size() / DistanceField::kBrickSamples;
   const auto cubed = static_cast<std::size_t>(field.refinement * field.refinement * field.refinement);
   for (std::size_t i = 0; i < field.index.size(); ++i) {

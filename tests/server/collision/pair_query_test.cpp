@@ -41,7 +41,8 @@ Asked ask(const StructuresPtr& a, const StructuresPtr& b, const Pose& X_WA, cons
 
 /// Every point, no tree: what the walk has to find.
 std::vector<Contact> flatContacts(const PairQuery& query) {
-  const LaneFrame frame(*query.field_B, query.X_WA, query.X_WB, query.dilation, query.margin);
+  const LaneFrame frame(*query.field_B, query.X_WA, query.X_WB, query.dilation, query.margin,
+                        query.shell_A->radius());
   std::vector<Contact> contacts;
   const auto points = query.shell_A->points();
   for (std::uint32_t i = 0; i < points.size(); ++i) {

@@ -115,10 +115,12 @@ TEST_F(QueryKernelsTest, LanesAreTheFieldsOwnAnswers) {
   SampleLanes lanes;
   for (const StructuresPtr& other : fields()) {
     for (int trial = 0; trial < 50; ++trial) {
-      const LaneFrame frame(other->field, randomPose(engine, 0.07), Pose(), 0.0004, 0.001);
+      const LaneFrame frame(other->field, randomPose(engine, 0.07), Pose(), 0.0004, 0.001,
+                            box->shell.radius());
       for (const QueryKernels& kernels : supportedKernels()) {
         for (std::size_t leaf = 0; leaf < box->shell.leaves().size(); ++leaf) {
-          kernels.samples(frame, box->shell.pointsOfLeaf(leaf), lanes);
+          const ShellBlock& block = box->shell.pointsOfLeaf(leaf);
+          kernels.samples(frame, {block.x.data(), block.y.data(), block.z.data(), block.count}, lanes);
           const ShellSphere& ball = box->shell.leaves()[leaf];
           for (std::uint32_t i = 0; i < ball.count; ++i) {
             const Vector3 p_AP = box->shell.points()[ball.first + i].p_MP.cast<double>();
