@@ -86,7 +86,7 @@ CullFrame::CullFrame(const DistanceField& field, const Matrix3& R_BA, const Vect
   per_metre = static_cast<float>(per);
   // a place is a sum of four products, each off by 2^-23 of at most this much; bounds are off by as little
   const float most = highest(p) + highest(end) + static_cast<float>(2.0 * reach_A * per);
-  slack = 4e-6F * most + 1e-3F;
+  slack = 4e-6F * most + 2e-3F;
   limit = static_cast<float>(limit_B * per) + slack;
   outside = static_cast<float>(layout.margin * per);
   beyond_band = static_cast<float>(layout.band * per - kHalfDiagonal);
