@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "idl/types/names.h"
+
 namespace tenon {
 
 namespace {
@@ -24,24 +26,6 @@ const char* nameOf(StepPhase phase) {
       return "timed out";
     case StepPhase::kSkipped:
       return "skipped";
-  }
-  return "unknown";
-}
-
-const char* nameOf(RunPhase phase) {
-  switch (phase) {
-    case RunPhase::kWaitingForPeople:
-      return "waiting for people";
-    case RunPhase::kRunning:
-      return "running";
-    case RunPhase::kPaused:
-      return "paused";
-    case RunPhase::kSucceeded:
-      return "succeeded";
-    case RunPhase::kFailed:
-      return "failed";
-    case RunPhase::kStopped:
-      return "stopped";
   }
   return "unknown";
 }
@@ -190,12 +174,12 @@ void Observer::hear(const RunState& run) {
   if (options_.json) {
     say(Json{{"kind", "run"},
              {"tick", run.tick},
-             {"phase", nameOf(run.phase)},
+             {"phase", runPhaseName(run.phase)},
              {"reason", run.reason},
              {"final_hash", fmt::format("{:016x}", run.final_hash)}}
             .dump());
   } else {
-    say(fmt::format("{}  the session is {}{}{}", seconds(run.tick), nameOf(run.phase),
+    say(fmt::format("{}  the session is {}{}{}", seconds(run.tick), runPhaseName(run.phase),
                     run.reason.empty() ? "" : ": ", run.reason));
   }
 }

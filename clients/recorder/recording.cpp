@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "idl/record/instance_state.h"
+#include "idl/types/names.h"
 #include "idl/wire/codec.h"
 #include "idl/wire/topics.h"
 
@@ -13,25 +14,6 @@ namespace tenon {
 namespace {
 
 constexpr std::int64_t kNanosecondsPerTick = 1'000'000;
-
-std::string_view nameOf(RunPhase phase) {
-  switch (phase) {
-    case RunPhase::kWaitingForPeople:
-      return "waiting for people";
-    case RunPhase::kRunning:
-      return "running";
-    case RunPhase::kPaused:
-      return "paused";
-    case RunPhase::kSucceeded:
-      return "succeeded";
-    case RunPhase::kFailed:
-      return "failed";
-    case RunPhase::kStopped:
-      return "stopped";
-  }
-  return "unknown";
-}
-
 }  // namespace
 
 Result<Recording> Recording::open(const std::filesystem::path& file, const SessionAnnounce& session) {
@@ -121,7 +103,7 @@ bool Recording::runIsOver() const {
 Result<void> Recording::close() {
   const bool was_whole = status_.problem.empty();
   if (run_ && was_whole) {
-    note(writer_.addMetadata("tenon outcome", {{"outcome", std::string(nameOf(run_->phase))},
+    note(writer_.addMetadata("tenon outcome", {{"outcome", std::string(runPhaseName(run_->phase))},
                                                {"reason", run_->reason},
                                                {"tick", std::to_string(run_->tick)},
                                                {"final hash", fmt::format("{:016x}", run_->final_hash)}}));

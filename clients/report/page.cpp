@@ -10,6 +10,7 @@
 
 #include "clients/report/chart.h"
 #include "clients/report/summary.h"
+#include "idl/types/names.h"
 
 namespace tenon {
 namespace {

@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "idl/types/names.h"
+
 namespace tenon {
 namespace {
 
@@ -47,22 +49,6 @@ std::string_view phaseName(StepPhase phase) {
       return "timed out";
     case StepPhase::kSkipped:
       return "skipped";
-  }
-  return "unknown";
-}
-
-std::string_view roleName(Role role) {
-  switch (role) {
-    case Role::kAdmin:
-      return "admin";
-    case Role::kInstructor:
-      return "instructor";
-    case Role::kTrainee:
-      return "trainee";
-    case Role::kObserver:
-      return "observer";
-    case Role::kRecorder:
-      return "recorder";
   }
   return "unknown";
 }

@@ -10,7 +10,6 @@
 namespace tenon {
 
 [[nodiscard]] std::string_view phaseName(StepPhase phase);
-[[nodiscard]] std::string_view roleName(Role role);
 
 /// "succeeded", or what it came to instead.
 [[nodiscard]] std::string outcomeOf(const SessionStory& story);

@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "idl/types/names.h"
+
 namespace tenon {
 namespace {
 
@@ -25,22 +27,6 @@ bool mayMoveHandOf(Role role, Role hand_role) { return role == hand_role || role
 bool isTeacher(Role role) { return role == Role::kInstructor || role == Role::kAdmin; }
 
 }  // namespace
-
-std::string_view roleName(Role role) {
-  switch (role) {
-    case Role::kAdmin:
-      return "admin";
-    case Role::kInstructor:
-      return "instructor";
-    case Role::kTrainee:
-      return "trainee";
-    case Role::kObserver:
-      return "observer";
-    case Role::kRecorder:
-      return "recorder";
-  }
-  return "unknown role";
-}
 
 FrontDesk::FrontDesk(const ScenarioFile& scenario, std::uint32_t server_epoch, bool lockstep,
                      std::uint64_t seed)

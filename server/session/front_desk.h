@@ -86,6 +86,4 @@ class FrontDesk {
   std::size_t held_back_ = 0;  ///< commands that wait until the session goes on
 };
 
-[[nodiscard]] std::string_view roleName(Role role);
-
 }  // namespace tenon

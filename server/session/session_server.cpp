@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "idl/threads/cyclic_thread.h"
+#include "idl/types/names.h"
 #include "server/session/server_wire.h"
 
 namespace tenon {

@@ -1,5 +1,8 @@
 #include "tests/system/rehearsal.h"
 
+#include <chrono>
+
+#include "idl/types/names.h"
 #include "server/session/broadcast.h"
 #include "server/session/front_desk.h"
 #include "server/session/session_server.h"
@@ -34,7 +37,7 @@ class Rehearsal {
     desk_.takeChanges(input_.changes);
     if (!options_.collisions) listScenePairs();
     const auto last = static_cast<Tick>(options_.seconds / kTickSeconds);
-    while (!exercise_.over() && exercise_.now() < last) tick();
+    while (!exercise_.over() && exercise_.now() < last && !(options_.enough && options_.enough())) tick();
     RehearsalReport report;
     report.phase = exercise_.phase();
     report.ticks = exercise_.now();
@@ -73,8 +76,11 @@ class Rehearsal {
         if (const auto reading = desk_.reading(input)) input_.readings.push_back(*reading);
     }
     switchOffCollisions();
+    const auto begin = std::chrono::steady_clock::now();
     exercise_.tick(input_);
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
     exercise_.fill(output_);
+    output_.stats.compute_seconds = took.count();
     if (options_.ticked) options_.ticked(input_, output_);
     deliver(broadcast_.read(output_));
     input_.readings.clear();

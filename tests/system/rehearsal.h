@@ -20,6 +20,7 @@ struct RehearsalOptions {
   bool collisions = true;  ///< false: nothing touches the scene, the same people try the same
   std::function<void(const EventLog&)> heard;
   std::function<void(const TickInput&, const TickOutput&)> ticked;
+  std::function<bool()> enough;  ///< ends the session after a tick
 };
 
 struct RehearsalReport {

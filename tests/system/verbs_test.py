@@ -156,6 +156,20 @@ class Verbs(unittest.TestCase):
                 self.assertIn(complaint, done.stderr)
                 self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
 
+    def test_the_bench_prints_tables_and_writes_json(self):
+        with tempfile.TemporaryDirectory() as folder:
+            written = Path(folder) / "bench.json"
+            done = tenon("bench", "engine", "--only", "many_bodies", "--json", written, timeout=600)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("median us", done.stdout)
+            tables = json.loads(written.read_text(encoding="utf-8"))["tables"]
+            self.assertEqual([table["name"] for table in tables], ["many_bodies"])
+            for row in tables[0]["rows"]:
+                self.assertGreaterEqual(row["p99 us"], row["median us"])
+            refused = tenon("bench", "flight")
+            self.assertNotEqual(refused.returncode, 0)
+            self.assertIn("engine", refused.stderr)
+
     def test_an_observer_speaks_json(self):
         with Stage(lockstep=False) as stage:
             stage.serve("peg_and_box", "--wait-for", "right,observer")

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+
+#include "idl/types/messages.h"
+
+/// What people call things of the protocol, where they read and type it.
+namespace tenon {
+
+[[nodiscard]] constexpr std::string_view roleName(Role role) noexcept {
+  constexpr std::array<std::string_view, 5> kNames{"admin", "instructor", "trainee", "observer", "recorder"};
+  const auto index = static_cast<std::size_t>(role);
+  return index < kNames.size() ? kNames[index] : "unknown role";
+}
+
+[[nodiscard]] constexpr std::string_view runPhaseName(RunPhase phase) noexcept {
+  switch (phase) {
+    case RunPhase::kWaitingForPeople:
+      return "waiting for people";
+    case RunPhase::kRunning:
+      return "running";
+    case RunPhase::kPaused:
+      return "paused";
+    case RunPhase::kSucceeded:
+      return "succeeded";
+    case RunPhase::kFailed:
+      return "failed";
+    case RunPhase::kStopped:
+      return "stopped";
+  }
+  return "unknown";
+}
+
+}  // namespace tenon

@@ -1,0 +1,161 @@
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "clients/report/page.h"
+#include "server/session/scene_loader.h"
+#include "tests/bench/engine/bench_scene.h"
+#include "tests/bench/engine/insertion.h"
+#include "tests/bench/engine/query_table.h"
+#include "tests/bench/engine/tick_table.h"
+
+namespace tenon::bench {
+namespace {
+
+struct Arguments {
+  std::string what;
+  double detail = 1.0;
+  int rounds = 5;
+  std::vector<std::string> only;
+  std::string json;
+  std::string figures;
+  std::filesystem::path cache = defaultCache();
+  std::string scenario;
+};
+
+int complain(const std::string& what) {
+  std::fprintf(stderr, "tenon bench: %s\n", what.c_str());
+  return 1;
+}
+
+/// On a terminal one line that is written over, elsewhere nothing: the tables follow.
+void say(std::string_view doing) {
+  static const bool kIsTerminal = isatty(STDERR_FILENO) == 1;
+  if (kIsTerminal) fmt::print(stderr, "\r\033[K{} ...", doing);
+}
+void sayNothing() {
+  if (isatty(STDERR_FILENO) == 1) fmt::print(stderr, "\r\033[K");
+}
+
+std::string processor() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);)
+    if (line.starts_with("model name")) return line.substr(line.find(':') + 2);
+  return "unknown processor";
+}
+
+double loadAverage() {
+  double load[1] = {0.0};
+  return getloadavg(load, 1) == 1 ? load[0] : 0.0;
+}
+
+bool save(const std::string& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  return static_cast<bool>(out.flush());
+}
+
+class Bench {
+ public:
+  explicit Bench(const Arguments& arguments)
+      : arguments_(arguments), only_(arguments.only.begin(), arguments.only.end()) {}
+
+  Result<void> run() {
+    machine_ = fmt::format("{}, {} threads, load {:.1f} at the start", processor(),
+                           sysconf(_SC_NPROCESSORS_ONLN), loadAverage());
+    fmt::print("{}; parts at detail {}\n\n", machine_, arguments_.detail);
+    if (wants("bake") || wants("query")) {
+      const auto scene = makeScene({arguments_.cache / "bench", arguments_.detail}, say);
+      if (!scene) return fail(scene.error().what);
+      add(scene->bake);
+      if (wants("query")) add(queryTable(*scene, arguments_.rounds, say));
+    }
+    if (wants("many_bodies")) add(manyBodiesTable(say));
+    if (wants("insertion")) {
+      const auto insertion = rehearseInsertion(arguments_.scenario, arguments_.cache, arguments_.detail, say);
+      if (!insertion) return fail(insertion.error().what);
+      add(insertion->table);
+      if (!arguments_.figures.empty() && !save(arguments_.figures, reportPage(insertion->story, "")))
+        return fail(arguments_.figures + ": cannot be written");
+    }
+    if (!arguments_.json.empty() && !save(arguments_.json, json().dump(2) + "\n"))
+      return fail(arguments_.json + ": cannot be written");
+    return {};
+  }
+
+ private:
+  [[nodiscard]] bool wants(const std::string& table) const { return only_.empty() || only_.contains(table); }
+
+  void add(const Table& table) {
+    sayNothing();
+    fmt::print("{}\n", toText(table));
+    std::fflush(stdout);
+    tables_.push_back(toJson(table));
+  }
+
+  [[nodiscard]] nlohmann::json json() const {
+    return {{"machine", machine_}, {"detail", arguments_.detail}, {"tables", tables_}};
+  }
+
+  const Arguments& arguments_;
+  std::set<std::string> only_;
+  std::string machine_;
+  nlohmann::json tables_ = nlohmann::json::array();
+};
+
+int run(int argc, char** argv) {
+  Arguments arguments;
+  CLI::App app("Measures what this machine can do, beside other engines and beside simpler ways, in one run.",
+               "tenon bench");
+  app.set_help_flag("-h,--help", "what this program does and how to call it");
+  app.add_option("what", arguments.what, "engine: the collision and force engine")
+      ->required()
+      ->check(CLI::IsMember({"engine"}));
+  app.add_option("--scenario", arguments.scenario, "folder of the engine bay's scenario");
+  app.add_option("--detail", arguments.detail, "of the generated parts, 0 to 1; 1 is the paper's scene")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  app.add_option("--rounds", arguments.rounds, "how often a pose is asked; its least time counts")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  app.add_option("--only", arguments.only,
+                 "tables to make: bake, query, many_bodies, insertion (default: all)")
+      ->check(CLI::IsMember({"bake", "query", "many_bodies", "insertion"}));
+  app.add_option("--json", arguments.json, "write the tables into this file, for programs");
+  app.add_option(
+      "--figures", arguments.figures,
+      "write a page with force, penetration, load and computation time of the insertion over time");
+  app.add_option("--cache", arguments.cache, "folder for generated parts and haptic structures")
+      ->option_text("DIR");
+  app.footer(
+      "Times compare only within one run, on a machine that does nothing else.\n"
+      "Exit code: 0 when all tables could be made, 1 otherwise.");
+  CLI11_PARSE(app, argc, argv);
+  if (arguments.scenario.empty()) {
+    const char* share = std::getenv("TENON_SHARE");
+    arguments.scenario = std::string(share != nullptr ? share : ".") + "/scenarios/engine_bay";
+  }
+  const auto done = Bench(arguments).run();
+  sayNothing();
+  return done ? 0 : complain(done.error().what);
+}
+
+}  // namespace
+}  // namespace tenon::bench
+
+int main(int argc, char** argv) {
+  try {
+    return tenon::bench::run(argc, argv);
+  } catch (const std::exception& problem) {
+    std::fprintf(stderr, "tenon bench: %s\n", problem.what());
+    return 1;
+  }
+}

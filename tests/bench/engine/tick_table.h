@@ -1,0 +1,11 @@
+#pragma once
+
+#include "tests/bench/engine/bench_scene.h"
+#include "tests/bench/engine/table.h"
+
+namespace tenon::bench {
+
+/// Item 7: whole ticks with many objects that may all meet each other.
+[[nodiscard]] Table manyBodiesTable(const Say& say);
+
+}  // namespace tenon::bench
