@@ -195,7 +195,9 @@ Result<Change> FrontDesk::externalPose(const ExternalPose& pose) const {
 
 void FrontDesk::follow(RunPhase phase, bool emergency_stop) {
   phase_ = phase;
-  if (phase != RunPhase::kPaused && !emergency_stop) held_back_ = 0;
+  const bool goes_on = phase == RunPhase::kRunning || phase == RunPhase::kPaused;
+  if (decided_ == phase || !goes_on) decided_.reset();
+  if (comingPhase() != RunPhase::kPaused && !emergency_stop) held_back_ = 0;
 }
 
 CommandAck FrontDesk::command(const Command& command) {
@@ -219,8 +221,10 @@ CommandAck FrontDesk::decide(const Command& command, Role role) {
   ack.reason = change ? untimely(command.kind) : change.error().what;
   ack.accepted = ack.reason.empty();
   if (!ack.accepted) return ack;
-  const bool stands_still = phase_ == RunPhase::kPaused || halted_;
+  const bool stands_still = comingPhase() == RunPhase::kPaused || halted_;
   if (change->kind == ChangeKind::kGame && stands_still) ++held_back_;
+  if (change->kind == ChangeKind::kPause) decided_ = RunPhase::kPaused;
+  if (change->kind == ChangeKind::kResume) decided_ = RunPhase::kRunning;
   if (change->kind == ChangeKind::kHalt) halted_ = false;
   stop_asked_ = stop_asked_ || change->kind == ChangeKind::kStop;
   changes_.push_back(*change);
@@ -235,8 +239,10 @@ std::string FrontDesk::untimely(CommandKind kind) const {
   if (for_any_time) return {};
   if (phase_ == RunPhase::kWaitingForPeople)
     return "the session still waits for people: ask again once it runs";
-  if (kind == CommandKind::kResume) return phase_ == RunPhase::kPaused ? "" : "the session is not paused";
-  if (kind == CommandKind::kPause) return phase_ == RunPhase::kPaused ? "the session is paused already" : "";
+  if (kind == CommandKind::kResume)
+    return comingPhase() == RunPhase::kPaused ? "" : "the session is not paused";
+  if (kind == CommandKind::kPause)
+    return comingPhase() == RunPhase::kPaused ? "the session is paused already" : "";
   if (held_back_ >= kMaxChanges)
     return fmt::format("{} commands wait already for the session to go on", held_back_);
   return {};

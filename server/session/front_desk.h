@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -65,6 +66,8 @@ class FrontDesk {
   void seat(const Join& join, Welcome& welcome, const Origin& from);
   [[nodiscard]] CommandAck decide(const Command& command, Role role);
   [[nodiscard]] std::string untimely(CommandKind kind) const;
+  /// The run's phase once all that was accepted is done.
+  [[nodiscard]] RunPhase comingPhase() const { return decided_.value_or(phase_); }
   [[nodiscard]] Result<Change> changeFor(const Command& command, Role role) const;
   [[nodiscard]] Result<Change> teachersChange(const Command& command) const;
   [[nodiscard]] Result<Change> releaseOf(const Command& command, Role role) const;
@@ -81,9 +84,10 @@ class FrontDesk {
   std::vector<ClientId> movers_;  ///< index = HandId
   std::vector<Change> changes_;
   RunPhase phase_ = RunPhase::kWaitingForPeople;
-  bool halted_ = false;        ///< an emergency stop is engaged
-  bool stop_asked_ = false;    ///< the run is to end
-  std::size_t held_back_ = 0;  ///< commands that wait until the session goes on
+  std::optional<RunPhase> decided_;  ///< by a pause or resume that no tick has done yet
+  bool halted_ = false;              ///< an emergency stop is engaged
+  bool stop_asked_ = false;          ///< the run is to end
+  std::size_t held_back_ = 0;        ///< commands that wait until the session goes on
 };
 
 }  // namespace tenon

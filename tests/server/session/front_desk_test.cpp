@@ -169,6 +169,21 @@ TEST_F(FrontDeskTest, AnswersACommandThatIsAskedAgainWithoutDoingItAgain) {
   EXPECT_EQ(desk_.answerTo(pause), nullptr) << "a program that took the seat over counts anew";
 }
 
+TEST_F(FrontDeskTest, CommandsThatComeFasterThanTicksAreJudgedByWhatWasDecided) {
+  const ClientId teacher = join("b", Role::kInstructor).client;
+  desk_.follow(RunPhase::kRunning, false);
+  EXPECT_TRUE(command(teacher, CommandKind::kPause).accepted);
+  desk_.follow(RunPhase::kRunning, false);  // a tick that was under way already
+  EXPECT_THAT(command(teacher, CommandKind::kPause).reason, HasSubstr("paused already"));
+  EXPECT_TRUE(command(teacher, CommandKind::kResume).accepted);
+  EXPECT_THAT(command(teacher, CommandKind::kResume).reason, HasSubstr("not paused"));
+  desk_.follow(RunPhase::kPaused, false);
+  desk_.follow(RunPhase::kRunning, false);
+  EXPECT_TRUE(command(teacher, CommandKind::kPause).accepted);
+  desk_.follow(RunPhase::kStopped, false);
+  EXPECT_THAT(command(teacher, CommandKind::kResume).reason, HasSubstr("over"));
+}
+
 TEST_F(FrontDeskTest, RefusesReadingsOfOthers) {
   const ClientId client = join("a", Role::kTrainee, {"right"}).client;
   const ClientId teacher = join("b", Role::kInstructor, {"instructor"}).client;
