@@ -93,8 +93,7 @@ Result<void> Teller::tell(const Saying& saying, const Stop& stop) {
   const auto until = Clock::now() + kPatience;
   const auto answered = [&] { return ack_ && ack_->id == command.id; };
   do {
-    if (stop || Clock::now() >= until)
-      return fail("the server does not answer: it may be hung or just gone");
+    if (stop || Clock::now() >= until) return fail("the server does not answer: it may be hung or just gone");
     if (auto sent = commands_->write(command); !sent) return sent;
   } while (!heard(inbox_, stop, kAskAgain, answered));
   if (!ack_->accepted) return fail("refused: " + ack_->reason);
