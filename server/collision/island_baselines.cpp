@@ -12,6 +12,7 @@ constexpr double kPushOutShare = 0.5;
 }  // namespace
 
 void IslandSolver::solveBlocking(const Job& job, SolveReport& report) {
+  held_.clear();
   while (true) {
     queryPairs(job, 0.0, report);
     rows_.clear();
@@ -30,6 +31,7 @@ void IslandSolver::solveBlocking(const Job& job, SolveReport& report) {
 }
 
 void IslandSolver::solvePenalty(const Job& job, SolveReport& report) {
+  held_.clear();
   rows_.clear();
   while (true) {
     solveMotions(job, report);

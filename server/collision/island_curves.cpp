@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -75,11 +76,19 @@ FixedVector<Hollow, 2> hollowsAt(const DistanceField& field, const Pose& X_WB, d
 }  // namespace
 
 bool IslandSolver::findCurves(const Job& job) {
-  bool any = false;
+  for (MovableBody& body : job.bodies) {
+    body.curves.clear();
+    body.drag_Bo_W = Wrench{};
+  }
+  rows_.resize(listed_);
+  curved_.clear();
   flank_count_ = 0;
+  bool any = false;
   std::size_t i = 0;
   std::size_t first = 0;
   for (const std::uint32_t row : held_) {
+    if (row >= listed_) break;
+    curved_.push_back(row);
     while (row >= first + job.results[i].query.contacts.size())
       first += job.results[i++].query.contacts.size();
     const IslandPair& pair = job.pairs[i];
@@ -87,7 +96,9 @@ bool IslandSolver::findCurves(const Job& job) {
     FixedVector<Contact, 4> flanks;
     const auto hollows = hollowsAt(*pair.field_B, job.poseB(pair), pair.dilation, contact, flanks);
     for (const Contact& flank : flanks) {
-      if (flank_count_ < flanks_.size()) flanks_[flank_count_++] = {i, flank};
+      if (flank_count_ == flanks_.size()) break;
+      flanks_[flank_count_++] = {i, flank};
+      rows_.push_back({pair.body_a, pair.body_b, flank.n_W, flank.p_WP, flank.gap});
     }
     for (const Hollow& hollow : hollows) {
       for (const std::int32_t index : {pair.body_a, pair.body_b}) {
@@ -99,26 +110,15 @@ bool IslandSolver::findCurves(const Job& job) {
       }
     }
   }
-  std::size_t listed = 0;
-  for (std::size_t k = 0; k < flank_count_; ++k) {
-    if (job.results[flanks_[k].pair].query.contacts.push_back(flanks_[k].contact))
-      flanks_[listed++] = flanks_[k];
-  }
-  flank_count_ = listed;
-  const bool flanked = listed > 0;
-  if (flanked) {
-    buildRows(job);
-    held_.clear();
-  }
-  return any || flanked;
+  // rows of flanks have other numbers now
+  held_.resize(curved_.size());
+  return any || flank_count_ > 0;
 }
 
-void IslandSolver::dropFlanks(const Job& job) {
-  if (flank_count_ > 0) held_.clear();
-  while (flank_count_ > 0) {
-    ContactList& contacts = job.results[flanks_[--flank_count_].pair].query.contacts;
-    contacts.resize(contacts.size() - 1);
-  }
+bool IslandSolver::curvesAreOfHeld() const {
+  const auto end =
+      std::find_if(held_.begin(), held_.end(), [this](std::uint32_t row) { return row >= listed_; });
+  return std::equal(held_.begin(), end, curved_.begin(), curved_.end());
 }
 
 }  // namespace tenon

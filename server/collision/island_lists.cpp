@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <utility>
 
 #include "server/collision/island_job.h"
 
@@ -15,6 +16,9 @@ constexpr double kThinSpan = 0.03;
 
 /// Full lists shorten a sub-step to this share of its travel at most: a plate on a floor has to slide on.
 constexpr double kLeastReach = 0.25;
+
+/// So many rows that held are remembered while lists change.
+constexpr std::size_t kMostHeld = 96;
 
 int movableBodies(const IslandPair& pair) {
   return (pair.body_a != GapRow::kStatic ? 1 : 0) + (pair.body_b != GapRow::kStatic ? 1 : 0);
@@ -33,32 +37,83 @@ void IslandSolver::queryPairs(const Job& job, double margin, SolveReport& report
     queryPair(
         {pair.shell_A, pair.field_B, job.poseA(pair), job.poseB(pair), pair.dilation, margin, pair.levels},
         job.results[i].query);
+    job.results[i].walked = WalkedAt{};
+    job.results[i].flanks = 0;
+    job.results[i].slides = false;
     ++report.queries;
     report.points_visited += job.results[i].query.counts.points_visited;
   }
 }
 
-void IslandSolver::lookAround(const Job& job, SolveReport& report) {
+void IslandSolver::takeLast(const Job& job) {
+  held_.clear();
+  std::size_t rows = 0;
   for (std::size_t i = 0; i < job.pairs.size(); ++i) {
-    if (mustWalk(job, i)) {
-      walkPair(job, i, report);
-      held_.clear();
-      continue;
-    }
     const IslandPair& pair = job.pairs[i];
-    PairQueryResult& result = job.results[i].query;
-    const std::size_t listed = result.contacts.size();
-    PairQuery query;
-    query.shell_A = pair.shell_A;
-    query.field_B = pair.field_B;
-    query.X_WA = job.poseA(pair);
-    query.X_WB = job.poseB(pair);
-    query.dilation = pair.dilation;
-    resampleContacts(query, approach(job, i), result);
-    ++report.resamplings;
-    report.points_visited += listed;
-    if (result.contacts.size() != listed) held_.clear();
+    IslandPairResult& result = job.results[i];
+    const IslandPairResult* last = pair.last;
+    const bool slid = last != nullptr && last->slides;
+    // what the solver does not move may have moved by itself
+    if (last == nullptr || !last->walked.done || last->walked.levels != pair.levels ||
+        (pair.body_a == GapRow::kStatic && !(last->walked.X_WA == pair.X_WA_static)) ||
+        (pair.body_b == GapRow::kStatic && !(last->walked.X_WB == pair.X_WB_static))) {
+      result.query.contacts.clear();
+      result.walked.done = false;
+    } else {
+      if (last != &result) copyResult(*last, result);
+      result.query.contacts.resize(result.query.contacts.size() - result.flanks);
+    }
+    result.slid = slid;
+    result.slides = false;
+    for (std::size_t c = 0; c < result.query.contacts.size(); ++c, ++rows) {
+      multipliers_[rows] = result.multipliers[c];
+      // fewer bodies than then may be left
+      const bool room = held_.size() < held_.capacity();
+      if (multipliers_[rows] > 0.0 && room) held_.push_back(static_cast<std::uint32_t>(rows));
+    }
   }
+}
+
+void IslandSolver::lookAround(const Job& job, SolveReport& report) {
+  // what goes on holding: in lists that stay the same, under its new number, whatever other lists become
+  FixedVector<std::pair<std::size_t, double>, kMostHeld> held;
+  std::size_t next = 0;
+  std::size_t first_before = 0;
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < job.pairs.size(); ++i) {
+    const std::size_t listed = job.results[i].query.contacts.size();
+    const bool same = lookAtPair(job, i, report);
+    for (; next < held_.size() && held_[next] < first_before + listed; ++next) {
+      if (same) held.push_back({held_[next] - first_before + first, multipliers_[held_[next]]});
+    }
+    first_before += listed;
+    first += job.results[i].query.contacts.size();
+  }
+  held_.clear();
+  for (const auto& [row, force] : held) {
+    held_.push_back(static_cast<std::uint32_t>(row));
+    multipliers_[row] = force;
+  }
+}
+
+bool IslandSolver::lookAtPair(const Job& job, std::size_t i, SolveReport& report) {
+  if (mustWalk(job, i)) {
+    walkPair(job, i, report);
+    return false;
+  }
+  const IslandPair& pair = job.pairs[i];
+  PairQueryResult& result = job.results[i].query;
+  const std::size_t listed = result.contacts.size();
+  PairQuery query;
+  query.shell_A = pair.shell_A;
+  query.field_B = pair.field_B;
+  query.X_WA = job.poseA(pair);
+  query.X_WB = job.poseB(pair);
+  query.dilation = pair.dilation;
+  resampleContacts(query, approach(job, i), result);
+  ++report.resamplings;
+  report.points_visited += listed;
+  return result.contacts.size() == listed;
 }
 
 void IslandSolver::walkPair(const Job& job, std::size_t i, SolveReport& report) {
@@ -74,12 +129,12 @@ void IslandSolver::walkPair(const Job& job, std::size_t i, SolveReport& report) 
   query.levels = pair.levels;
   query.thin = true;
   queryPair(query, job.results[i].query);
-  walked_[i] = {true, query.X_WA, query.X_WB};
+  job.results[i].walked = {true, query.X_WA, query.X_WB, pair.levels};
   ++report.queries;
   report.points_visited += job.results[i].query.counts.points_visited;
 }
 
-double IslandSolver::approach(const Job& job, std::size_t i) const {
+double IslandSolver::approach(const Job& job, std::size_t i) {
   const IslandPair& pair = job.pairs[i];
   double sum = 0.0;
   const auto add = [&](std::int32_t body, const Pose& X_WB_then) {
@@ -88,13 +143,14 @@ double IslandSolver::approach(const Job& job, std::size_t i) const {
     const Displacement gone = displacement(X_WB_then, now.X_WB);
     sum += gone.translation.norm() + gone.rotation.norm() * now.radius;
   };
-  add(pair.body_a, walked_[i].X_WA);
-  add(pair.body_b, walked_[i].X_WB);
+  add(pair.body_a, job.results[i].walked.X_WA);
+  add(pair.body_b, job.results[i].walked.X_WB);
   return sum;
 }
 
-bool IslandSolver::mustWalk(const Job& job, std::size_t i) const {
-  if (!walked_[i].done) return true;
+bool IslandSolver::mustWalk(const Job& job, std::size_t i) {
+  const WalkedAt& walked = job.results[i].walked;
+  if (!walked.done) return true;
   const IslandPair& pair = job.pairs[i];
   const PairQueryResult& result = job.results[i].query;
   const double gone = approach(job, i);
@@ -102,7 +158,7 @@ bool IslandSolver::mustWalk(const Job& job, std::size_t i) const {
   if (gone > 0.0 && result.others_gap - gone < neededMargin(pair, job.limits)) return true;
   if (!result.thinned) return false;
   const Quaternion turn = (job.poseB(pair).rotation().conjugate() * job.poseA(pair).rotation()) *
-                          (walked_[i].X_WB.rotation().conjugate() * walked_[i].X_WA.rotation()).conjugate();
+                          (walked.X_WB.rotation().conjugate() * walked.X_WA.rotation()).conjugate();
   return 2.0 * turn.vec().norm() * kThinSpan > kThinDepth;
 }
 
@@ -114,6 +170,15 @@ void IslandSolver::buildRows(const Job& job) {
       rows_.push_back({pair.body_a, pair.body_b, contact.n_W, contact.p_WP, contact.gap});
     }
   }
+  listed_ = rows_.size();
+}
+
+std::size_t IslandSolver::pairOfRow(const Job& job, std::size_t row) {
+  std::size_t i = 0;
+  for (std::size_t end = job.results[0].query.contacts.size(); row >= end;) {
+    end += job.results[++i].query.contacts.size();
+  }
+  return i;
 }
 
 double IslandSolver::knownReach(const Job& job) {

@@ -14,6 +14,9 @@ namespace {
 /// change under every point as it goes.
 constexpr double kSettled = 2e-6;
 
+/// [m] Once it has moved in a tick, what is left of this is for the next one.
+constexpr double kNearlySettled = 5e-6;
+
 /// A step back of more than this share of the last step means that the last one went too far.
 constexpr double kOvershoot = 0.1;
 
@@ -30,17 +33,17 @@ constexpr double kLittleWay = 1e-4;
 }  // namespace
 
 IslandSolver::IslandSolver(std::size_t max_bodies, std::size_t max_pairs)
-    : motion_(max_bodies, max_pairs * kMaxPairContacts),
-      walked_(max_pairs),
-      multipliers_(max_pairs * kMaxPairContacts),
+    : motion_(max_bodies, max_pairs * kMaxPairContacts + kMaxFlanks + kPatchRows * kMaxPatches),
+      multipliers_(max_pairs * kMaxPairContacts + kMaxFlanks + kPatchRows * kMaxPatches),
       motions_(max_bodies),
       gone_(max_bodies),
       best_(max_bodies),
       wrenches_(max_bodies),
       depths_(max_bodies),
       touched_(max_bodies) {
-  rows_.reserve(max_pairs * kMaxPairContacts);
+  rows_.reserve(multipliers_.size());
   held_.reserve(6 * max_bodies);
+  curved_.reserve(6 * max_bodies);
 }
 
 SolveReport IslandSolver::solve(std::span<MovableBody> bodies, std::span<const IslandPair> pairs,
@@ -48,7 +51,6 @@ SolveReport IslandSolver::solve(std::span<MovableBody> bodies, std::span<const I
   assert(bodies.size() <= motions_.size() && results.size() == pairs.size());
   const Job job{bodies, pairs, limits, results};
   SolveReport report;
-  held_.clear();
   switch (limits.method) {
     case ContactMethod::kIsland:
       solveIsland(job, report);
@@ -70,19 +72,10 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
   double at_start = best;
   double reach = job.limits.substep_travel;
   int worse = 0;
-  std::fill(walked_.begin(), walked_.end(), Walked{});
-  flank_count_ = 0;
-  const auto look = [&] {
-    dropFlanks(job);
-    lookAround(job, report);
-    buildRows(job);
-    for (MovableBody& body : job.bodies) body.curves.clear();
-    solveMotions(job, report);
-    if (findCurves(job)) solveMotions(job, report);
-  };
+  takeLast(job);
 
   while (true) {
-    look();
+    look(job, report);
     const double here = merit(job);
     if (report.substeps == 0) at_start = here;
     if (here < best) {
@@ -94,10 +87,10 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
       ++worse;
       reach *= 0.5;
     }
-    if (brakeOvershoot(job)) solveMotions(job, report);
+    if (brakeOvershoot(job)) solveMotions(job, report, rows_.size());
     double way = travel(job);
     const bool held = std::any_of(touched_.begin(), touched_.end(), [](std::uint8_t t) { return t != 0; });
-    if (way < (held ? kSettled : kArrived)) break;
+    if (way < (held ? (worse == 0 && report.substeps > 0 ? kNearlySettled : kSettled) : kArrived)) break;
     const bool last = report.substeps == job.limits.substeps;
     // where the tick began is where the field's steps let it go: every way on is a way back
     const bool stays = best == at_start && worse > kWorsePlaces && way < kLittleWay;
@@ -109,7 +102,7 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
       }
       std::fill(gone_.begin(), gone_.end(), Displacement{});
       worse = 0;
-      look();
+      look(job, report);
       way = travel(job);
       if (stays) break;
     }
@@ -125,6 +118,7 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
   for (MovableBody& body : job.bodies) {
     body.brakes.clear();
     body.curves.clear();
+    body.drag_Bo_W = Wrench{};
   }
 }
 
@@ -146,10 +140,41 @@ double IslandSolver::merit(const Job& job) {
   return energy + kDepthPrice * force * std::max(depth - kFieldNoise, 0.0);
 }
 
-void IslandSolver::solveMotions(const Job& job, SolveReport& report) {
+void copyResult(const IslandPairResult& from, IslandPairResult& to) noexcept {
+  const std::size_t size = from.query.contacts.size();
+  to.query.contacts.resize(size);
+  std::copy_n(from.query.contacts.begin(), size, to.query.contacts.begin());
+  std::copy_n(from.multipliers.begin(), size, to.multipliers.begin());
+  to.query.counts = from.query.counts;
+  to.query.smallest_gap = from.query.smallest_gap;
+  to.query.listed_to = from.query.listed_to;
+  to.query.others_gap = from.query.others_gap;
+  to.query.thinned = from.query.thinned;
+  to.query.deepest = from.query.deepest;
+  to.F_Ao_W = from.F_Ao_W;
+  to.walked = from.walked;
+  to.flanks = from.flanks;
+  to.slides = from.slides;
+  to.slid = from.slid;
+}
+
+void IslandSolver::look(const Job& job, SolveReport& report) {
+  lookAround(job, report);
+  buildRows(job);
+  // most often what held at the last place holds here too
+  const bool expected = findCurves(job);
+  solveMotions(job, report);
+  if (!curvesAreOfHeld()) {
+    const bool found = findCurves(job);
+    if (expected || found) solveMotions(job, report, listed_);
+  }
+  rub(job, report);
+}
+
+void IslandSolver::solveMotions(const Job& job, SolveReport& report, std::size_t unchanged) {
   const std::span<double> multipliers(multipliers_.data(), rows_.size());
-  const MotionResult result =
-      motion_.solve(job.bodies, rows_, std::span(motions_.data(), job.bodies.size()), multipliers, held_);
+  const std::span<Displacement> motions(motions_.data(), job.bodies.size());
+  const MotionResult result = motion_.solve(job.bodies, rows_, motions, multipliers, held_, unchanged);
   report.iterations += result.iterations;
   report.conflicting = result.conflicting;
 
@@ -205,16 +230,30 @@ void IslandSolver::fillForces(const Job& job) const {
   std::size_t row = 0;
   for (std::size_t i = 0; i < job.pairs.size(); ++i) {
     IslandPairResult& result = job.results[i];
-    const Vector3& p_WAo = job.poseA(job.pairs[i]).translation();
     result.F_Ao_W = {};
-    for (std::size_t c = 0; c < result.query.contacts.size(); ++c, ++row) {
-      const Contact& contact = result.query.contacts[c];
-      const double multiplier = contact.gap <= kTouchGap ? multipliers_[row] : 0.0;
-      result.multipliers[c] = multiplier;
-      const Vector3 f = multiplier * contact.n_W;
-      result.F_Ao_W += {f, (contact.p_WP - p_WAo).cross(f)};
-    }
+    result.flanks = 0;
+    const std::size_t listed = result.query.contacts.size();
+    for (std::size_t c = 0; c < listed; ++c) fillForce(job, i, c, multipliers_[row++]);
   }
+  for (std::size_t k = 0; k < flank_count_; ++k) {
+    ContactList& contacts = job.results[flanks_[k].pair].query.contacts;
+    const std::size_t c = contacts.size();
+    if (contacts.push_back(flanks_[k].contact)) {
+      ++job.results[flanks_[k].pair].flanks;
+      fillForce(job, flanks_[k].pair, c, multipliers_[row]);
+    }
+    ++row;
+  }
+  fillFriction(job);
+}
+
+void IslandSolver::fillForce(const Job& job, std::size_t pair, std::size_t c, double multiplier) {
+  IslandPairResult& result = job.results[pair];
+  const Contact& contact = result.query.contacts[c];
+  const double force = contact.gap <= kTouchGap ? multiplier : 0.0;
+  result.multipliers[c] = force;
+  const Vector3 f = force * contact.n_W;
+  result.F_Ao_W += {f, (contact.p_WP - job.poseA(job.pairs[pair]).translation()).cross(f)};
 }
 
 }  // namespace tenon

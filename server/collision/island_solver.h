@@ -18,6 +18,30 @@ enum class ContactMethod : std::uint8_t {
   kPenalty,   ///< the paper's penalty force alone, as baseline: bodies follow their hands into each other
 };
 
+/// Coulomb's coefficients of a pair; none by default.
+struct Friction {
+  double at_rest = 0.0;
+  double sliding = 0.0;  ///< not above `at_rest`
+};
+
+/// Where a pair's bodies were when its shell's tree was walked to list its contacts.
+struct WalkedAt {
+  bool done = false;
+  Pose X_WA, X_WB;
+  std::uint32_t levels = 0;
+};
+
+/// What came out for a pair, at the final poses.
+struct IslandPairResult {
+  PairQueryResult query;
+  std::vector<double> multipliers;  ///< [N] a contact of query.contacts; sized kMaxPairContacts at start
+  Wrench F_Ao_W;                    ///< of B on A, about A's origin
+  WalkedAt walked;
+  std::uint32_t flanks = 0;  ///< so many at the list's end are not the shell's: sharp hollows
+  bool slides = false;       ///< against friction, in this solve
+  bool slid = false;         ///< and in the last one
+};
+
 /// Two bodies of an island that may touch. Indices into the island's bodies; kStatic bodies stand at
 /// X_W*_static.
 struct IslandPair {
@@ -28,15 +52,15 @@ struct IslandPair {
   Pose X_WA_static;
   Pose X_WB_static;
   double dilation = 0.0;
+  Friction friction;
   std::uint32_t levels = 0xFFFFFFFFU;
+  /// Of the last solve, if nothing jumped since: while the bodies are near where they were when its list was
+  /// made, that list serves again. May be the result that is to be filled.
+  const IslandPairResult* last = nullptr;
 };
 
-/// What came out for a pair, at the final poses.
-struct IslandPairResult {
-  PairQueryResult query;
-  std::vector<double> multipliers;  ///< [N] a contact of query.contacts; sized kMaxPairContacts at start
-  Wrench F_Ao_W;                    ///< of B on A, about A's origin
-};
+/// Copies as much of the lists as they hold; they have room for far more.
+void copyResult(const IslandPairResult& from, IslandPairResult& to) noexcept;
 
 struct SolveLimits {
   std::uint32_t substeps = 8;
@@ -65,7 +89,7 @@ struct SolveReport {
 /// poses, project first and clamp then, move. A body on a surface that has less than kSettled to go stays
 /// where it is, so that a still hand means a still body.
 ///
-/// Threads: one at a time (a worker owns one). Real-time: solve.
+/// Threads: one at a time (a worker owns one); keeps nothing from solve to solve. Real-time: solve.
 class IslandSolver {
  public:
   IslandSolver(std::size_t max_bodies, std::size_t max_pairs);
@@ -76,6 +100,20 @@ class IslandSolver {
 
  private:
   struct Job;  ///< the arguments of solve
+
+  /// What holds a body in about one direction, rubbed as one thing at the centre of its load. Turning about
+  /// its normal is free.
+  struct Patch {
+    std::size_t pair = 0;
+    double load = 0.0;  ///< [N]
+    Vector3 n_W = Vector3::Zero();
+    Vector3 p_WP = Vector3::Zero();
+    Vector3 push_W = Vector3::Zero(), at_W = Vector3::Zero();  ///< sums over its rows, weighted by force
+    Vector3 along_W = Vector3::Zero();                         ///< in which it drags A, while it slides
+    std::size_t first_row = 0;                                 ///< of those that hold it, while it sticks
+    bool slides = false;
+    bool stuck_again = false;
+  };
   void solveIsland(const Job& job, SolveReport& report);
   void solveBlocking(const Job& job, SolveReport& report);
   void solvePenalty(const Job& job, SolveReport& report);
@@ -84,14 +122,19 @@ class IslandSolver {
   /// Lists what may be met within a sub-step: again from the shell's tree when the bodies have gone too far
   /// since it was last walked, else the same points at the new poses.
   void lookAround(const Job& job, SolveReport& report);
+  /// True when its list has the same points as before.
+  bool lookAtPair(const Job& job, std::size_t pair, SolveReport& report);
+  /// Takes over the lists of the last solve, and what held then.
+  void takeLast(const Job& job);
   void walkPair(const Job& job, std::size_t pair, SolveReport& report);
-  [[nodiscard]] bool mustWalk(const Job& job, std::size_t pair) const;
+  [[nodiscard]] static bool mustWalk(const Job& job, std::size_t pair);
   /// [m] no point of one came nearer to the other by more, since the walk.
-  [[nodiscard]] double approach(const Job& job, std::size_t pair) const;
+  [[nodiscard]] static double approach(const Job& job, std::size_t pair);
   void buildRows(const Job& job);
   /// [m] a sub-step may go this far without meeting contacts that had no room in the lists.
   [[nodiscard]] static double knownReach(const Job& job);
-  void solveMotions(const Job& job, SolveReport& report);
+  /// `unchanged`: so many of the rows, and all poses, are as in the call before.
+  void solveMotions(const Job& job, SolveReport& report, std::size_t unchanged = 0);
   /// [m] the farthest that any point of any body goes.
   [[nodiscard]] double travel(const Job& job) const;
   void move(const Job& job, double share);
@@ -99,31 +142,44 @@ class IslandSolver {
   [[nodiscard]] static double merit(const Job& job);
   /// True when a body is on its way back from where it has just gone; then it is braked along that way.
   [[nodiscard]] bool brakeOvershoot(const Job& job);
-  /// Gives the bodies the curves of what holds them, and lists as contacts of no area the flanks of what is
-  /// too sharp to be a curve; true when there are any.
+  /// Finds what the bodies can do at their places.
+  void look(const Job& job, SolveReport& report);
+  /// Gives the bodies the curves of what holds them, and rows for the flanks of what is too sharp to be a
+  /// curve;
+  /// true when there are any.
   bool findCurves(const Job& job);
-  void dropFlanks(const Job& job);
+  [[nodiscard]] bool curvesAreOfHeld() const;
   void blockMotions(const Job& job);
+  // friction (island_friction.cpp)
+  void rub(const Job& job, SolveReport& report);
+  bool loadPatches(const Job& job);
+  void setFriction(const Job& job);
+  bool judgePatches(const Job& job);
+  [[nodiscard]] Vector3 frictionOf(const Job& job, const Patch& patch) const;
+  void fillFriction(const Job& job) const;
+  [[nodiscard]] static std::size_t pairOfRow(const Job& job, std::size_t row);
+
   void fillForces(const Job& job) const;
+  static void fillForce(const Job& job, std::size_t pair, std::size_t contact, double multiplier);
   static void fillPenalties(const Job& job);
 
-  /// Where a pair's bodies were when its tree was walked.
-  struct Walked {
-    bool done = false;
-    Pose X_WA, X_WB;
-  };
-
-  /// A contact that the look at a place has added to the pair's list.
+  /// A contact, of no area, that the look at a place has added to those of the pair.
   struct Flank {
     std::size_t pair = 0;
     Contact contact;
   };
 
   MotionSolver motion_;
-  std::array<Flank, 64> flanks_;
+  static constexpr std::size_t kMaxFlanks = 64;
+  std::array<Flank, kMaxFlanks> flanks_;
   std::size_t flank_count_ = 0;
-  std::vector<Walked> walked_;
-  std::vector<std::uint32_t> held_;  ///< rows that held in the last solve, while the lists are the same
+  static constexpr std::size_t kMaxPatches = 16;
+  static constexpr std::size_t kPatchRows = 4;  ///< to both sides along two tangents
+  FixedVector<Patch, kMaxPatches> patches_;
+  std::size_t first_patch_row_ = 0;
+  std::vector<std::uint32_t> held_;    ///< rows that held in the last solve, while the lists are the same
+  std::vector<std::uint32_t> curved_;  ///< rows whose curves the bodies have
+  std::size_t listed_ = 0;             ///< rows of listed contacts; those of the flanks are behind them
   std::vector<GapRow> rows_;
   std::vector<double> multipliers_;
   std::vector<Displacement> motions_;

@@ -107,22 +107,24 @@ MotionSolver& MotionSolver::operator=(MotionSolver&&) noexcept = default;
 
 MotionResult MotionSolver::solve(std::span<const MovableBody> bodies, std::span<const GapRow> rows,
                                  std::span<Displacement> motions, std::span<double> multipliers,
-                                 std::span<const std::uint32_t> first) noexcept {
+                                 std::span<const std::uint32_t> first, std::size_t unchanged) noexcept {
   Workspace& w = *workspace_;
-  assert(bodies.size() <= w.L.size() && rows.size() <= w.slack.size() && first.size() <= rows.size());
+  assert(bodies.size() <= w.L.size() && rows.size() <= w.body_of.size());
   assert(motions.size() == bodies.size() && multipliers.size() == rows.size());
+  assert(first.size() <= rows.size() && unchanged <= std::min(rows.size(), w.row_count));
   w.bodies = bodies.size();
   w.row_count = rows.size();
   w.iterations = 0;
+  w.setRows(rows, bodies, w.clipped ? 0 : unchanged);
   for (std::size_t i = 0; i < bodies.size(); ++i) w.setBody(i, bodies[i]);
-  w.setRows(rows, bodies);
 
   MotionResult result;
   bool solved = w.run(first);
   if (!solved) {
     // standing still is always admissible then
     result.conflicting = true;
-    for (std::size_t i = 0; i < rows.size(); ++i) w.columns[0][i] = std::max(w.columns[0][i], 0.0);
+    w.clipped = true;
+    for (std::size_t i = 0; i < w.row_count; ++i) w.columns[0][i] = std::max(w.columns[0][i], 0.0);
     solved = w.run({});
   }
   result.iterations = w.iterations;

@@ -42,6 +42,7 @@ struct MovableBody {
   double radius = 0.1;                       ///< [m] of the body about its origin: no point is farther
   FixedVector<Brake, kMaxBrakes> brakes;     ///< set and cleared by IslandSolver
   FixedVector<Curve, kMaxCurves> curves;     ///< likewise
+  Wrench drag_Bo_W;                          ///< of what the body slides on; likewise
 };
 
 /// gap + n · (motion of A's point - motion of B's point) >= 0. A body index of kStatic does not move.
@@ -77,10 +78,10 @@ class MotionSolver {
   /// motions[i]: displacement of bodies[i]'s origin and its rotation, in W. multipliers[r] >= 0: force [N]
   /// along rows[r].n_W on its body A (and the opposite on B). Both spans are as long as bodies and rows.
   /// `first`: rows to try first, such as those that held in a problem like this one; the motions do not
-  /// depend on it.
+  /// depend on it. `unchanged`: so many of the rows, and all poses, are those of the last call.
   MotionResult solve(std::span<const MovableBody> bodies, std::span<const GapRow> rows,
                      std::span<Displacement> motions, std::span<double> multipliers,
-                     std::span<const std::uint32_t> first = {}) noexcept;
+                     std::span<const std::uint32_t> first = {}, std::size_t unchanged = 0) noexcept;
 
  private:
   struct Workspace;

@@ -40,6 +40,8 @@ void MotionSolver::Workspace::setBody(std::size_t i, const MovableBody& body) {
     addSpring(spring, body.X_WB, H, b);
     stiffness += spring.stiffness;
   }
+  b.head<3>() += body.drag_Bo_W.force;
+  b.tail<3>() += body.drag_Bo_W.torque;
   H.bottomRightCorner<3, 3>() +=
       (kLeastRotation * stiffness * body.radius * body.radius) * Matrix3::Identity();
   for (const Curve& curve : body.curves) {
@@ -58,31 +60,38 @@ void MotionSolver::Workspace::setBody(std::size_t i, const MovableBody& body) {
   segment(y0, i) = L[i].triangularView<Eigen::Lower>().solve(b);
 }
 
-void MotionSolver::Workspace::setRows(std::span<const GapRow> rows, std::span<const MovableBody> island) {
-  runs.clear();
-  for (std::size_t i = 0; i < rows.size(); ++i) {
+void MotionSolver::Workspace::setRows(std::span<const GapRow> rows, std::span<const MovableBody> island,
+                                      std::size_t unchanged) {
+  while (!runs.empty() && runs.back().first >= unchanged) runs.pop_back();
+  if (!runs.empty()) runs.back().count = std::min(runs.back().count, unchanged - runs.back().first);
+  clipped = false;
+  bool new_run = true;
+  std::array<const Pose*, 2> origin{};
+  for (std::size_t i = unchanged; i < rows.size(); ++i) {
     const GapRow& row = rows[i];
     body_of[i] = {row.body_a, row.body_b};
-    is_active[i] = 0;
-    if (runs.empty() || runs.back().body[0] != row.body_a || runs.back().body[1] != row.body_b) {
+    if (new_run || runs.back().body[0] != row.body_a || runs.back().body[1] != row.body_b) {
+      new_run = false;
       runs.push_back({i, 0, body_of[i]});
+      for (std::size_t side = 0; side < 2; ++side) {
+        const std::int32_t body = body_of[i][side];
+        assert(body < static_cast<std::int32_t>(island.size()));
+        origin[side] = body == GapRow::kStatic ? nullptr : &island[static_cast<std::size_t>(body)].X_WB;
+      }
     }
     ++runs.back().count;
-    std::array<Vector3, 2> moment{Vector3::Zero(), Vector3::Zero()};
-    for (std::size_t side = 0; side < 2; ++side) {
-      if (body_of[i][side] == GapRow::kStatic) continue;
-      const auto body = static_cast<std::size_t>(body_of[i][side]);
-      assert(body < island.size());
-      moment[side] = (row.p_WP - island[body].X_WB.translation()).cross(row.n_W);
-    }
     // what moves nobody always holds
     const bool idle = row.body_a == row.body_b || row.n_W.isZero(0.0);
     columns[0][i] = idle ? std::numeric_limits<double>::infinity() : row.gap;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto k = static_cast<Eigen::Index>(axis);
-      columns[1 + axis][i] = row.n_W[k];
-      columns[4 + axis][i] = moment[0][k];
-      columns[7 + axis][i] = moment[1][k];
+    columns[1][i] = row.n_W.x();
+    columns[2][i] = row.n_W.y();
+    columns[3][i] = row.n_W.z();
+    for (std::size_t side = 0; side < 2; ++side) {
+      if (origin[side] == nullptr) continue;
+      const Vector3 moment = (row.p_WP - origin[side]->translation()).cross(row.n_W);
+      columns[4 + 3 * side][i] = moment.x();
+      columns[5 + 3 * side][i] = moment.y();
+      columns[6 + 3 * side][i] = moment.z();
     }
   }
 }
@@ -109,6 +118,7 @@ double MotionSolver::Workspace::slackOf(std::size_t row) const {
 }
 
 void MotionSolver::Workspace::findViolated() {
+  tried.clear();
   for (const Run& run : runs) {
     std::array<double, 9> m{};  // A's motion less B's, A's rotation, B's
     for (std::size_t side = 0; side < 2; ++side) {
@@ -120,29 +130,37 @@ void MotionSolver::Workspace::findViolated() {
         m[3 + 3 * side + axis] = sign * motion[3 + axis];
       }
     }
-    std::array<const double*, 10> c{};
-    for (std::size_t k = 0; k < c.size(); ++k) c[k] = columns[k].data() + run.first;
-    double* out = slack.data() + run.first;
-    for (std::size_t i = 0; i < run.count; ++i) {
-      out[i] = c[0][i] + (c[1][i] * m[0] + c[2][i] * m[1] + c[3][i] * m[2]) +
-               (c[4][i] * m[3] + c[5][i] * m[4] + c[6][i] * m[5]);
-    }
-    if (run.body[1] == GapRow::kStatic) continue;
-    for (std::size_t i = 0; i < run.count; ++i) {
-      out[i] += c[7][i] * m[6] + c[8][i] * m[7] + c[9][i] * m[8];
+    const std::size_t end = run.first + run.count;
+    for (std::size_t first = run.first; first < end; first += kBlock) {
+      const std::uint32_t worst = worstOfBlock(first, std::min(first + kBlock, end), run, m);
+      if (worst != row_count) tried.push_back(worst);
     }
   }
-  for (std::size_t k = 0; k < active.size(); ++k) slack[active.row(k)] = 0.0;
+}
 
-  tried.clear();
-  for (std::size_t first = 0; first < row_count; first += kBlock) {
-    const std::size_t end = std::min(first + kBlock, row_count);
-    std::size_t worst = first;
-    for (std::size_t i = first + 1; i < end; ++i) {
-      if (slack[i] < slack[worst]) worst = i;
-    }
-    if (slack[worst] < -kGapTolerance) tried.push_back(static_cast<std::uint32_t>(worst));
+std::uint32_t MotionSolver::Workspace::worstOfBlock(std::size_t first, std::size_t end, const Run& run,
+                                                    const std::array<double, 9>& m) const {
+  std::array<const double*, 10> c{};
+  for (std::size_t k = 0; k < c.size(); ++k) c[k] = columns[k].data() + first;
+  // whole blocks, for the sake of vector instructions: what is behind the end is not looked at
+  std::array<double, kBlock> slack;
+  for (std::size_t i = 0; i < kBlock; ++i) {
+    slack[i] = c[0][i] + (c[1][i] * m[0] + c[2][i] * m[1] + c[3][i] * m[2]);
   }
+  if (run.body[0] != GapRow::kStatic) {
+    for (std::size_t i = 0; i < kBlock; ++i) slack[i] += c[4][i] * m[3] + c[5][i] * m[4] + c[6][i] * m[5];
+  }
+  if (run.body[1] != GapRow::kStatic) {
+    for (std::size_t i = 0; i < kBlock; ++i) slack[i] += c[7][i] * m[6] + c[8][i] * m[7] + c[9][i] * m[8];
+  }
+  double least = -kGapTolerance;
+  std::size_t worst = row_count;
+  for (std::size_t row = first; row < end; ++row) {
+    if (slack[row - first] >= least || is_active[row] != 0) continue;
+    least = slack[row - first];
+    worst = row;
+  }
+  return static_cast<std::uint32_t>(worst);
 }
 
 std::size_t MotionSolver::Workspace::mostViolatedOfTried() const {

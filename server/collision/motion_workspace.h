@@ -36,7 +36,6 @@ struct MotionSolver::Workspace {
   Workspace(std::size_t max_bodies, std::size_t max_rows)
       : active(6 * max_bodies),
         L(max_bodies),
-        slack(max_rows),
         is_active(max_rows),
         body_of(max_rows),
         y0(6 * max_bodies),
@@ -46,19 +45,23 @@ struct MotionSolver::Workspace {
         step(6 * max_bodies),
         r(6 * max_bodies),
         u(6 * max_bodies + 1) {
-    for (std::vector<double>& column : columns) column.resize(max_rows);
+    for (std::vector<double>& column : columns) column.resize(max_rows + kBlock);
     runs.reserve(max_rows);
     tried.reserve(max_rows);
   }
 
   void setBody(std::size_t i, const MovableBody& body);
-  void setRows(std::span<const GapRow> rows, std::span<const MovableBody> island);
+  /// Takes over the rows from `unchanged` on.
+  void setRows(std::span<const GapRow> rows, std::span<const MovableBody> island, std::size_t unchanged);
   /// False: the rows contradict each other, or the iterations have run out.
   bool run(std::span<const std::uint32_t> first);
   void updateMotions();
   [[nodiscard]] double slackOf(std::size_t row) const;
   /// Of all rows; the worst of every block that does not hold goes into `tried`.
   void findViolated();
+  /// Of rows [first, end), a block of a run with motions `m`; row_count when all hold.
+  [[nodiscard]] std::uint32_t worstOfBlock(std::size_t first, std::size_t end, const Run& run,
+                                           const std::array<double, 9>& m) const;
   [[nodiscard]] std::size_t mostViolatedOfTried() const;
   bool enforceTried();
   bool enforce(std::size_t p);
@@ -67,7 +70,6 @@ struct MotionSolver::Workspace {
   ActiveSet active;
   std::vector<Matrix6> L;
   std::array<std::vector<double>, 10> columns;  ///< gap, normal, its moment about A's origin, about B's
-  std::vector<double> slack;
   std::vector<std::uint8_t> is_active;
   std::vector<std::array<std::int32_t, 2>> body_of;
   std::vector<Run> runs;
@@ -75,6 +77,7 @@ struct MotionSolver::Workspace {
   std::vector<double> y0, y, x, normal, step, r, u;  // u: multipliers in the order of `active`
   std::size_t bodies = 0;
   std::size_t row_count = 0;
+  bool clipped = false;  ///< negative gaps were raised to zero
   std::uint32_t iterations = 0;
   std::uint32_t iteration_limit = 0;
 };

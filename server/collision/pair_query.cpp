@@ -17,6 +17,10 @@ constexpr double kReferenceArea = 1e-4;
 /// Cosine of the angle up to which two normals push in the same direction.
 constexpr double kSameDirection = 0.95;
 
+/// A list that may be thinned is kept this short while there is anything to thin: every row of it costs in
+/// every sub-step.
+constexpr std::size_t kThinnedTo = 256;
+
 /// Some of a leaf's points, by their number in it or in the list.
 using LeafSubset = FixedVector<std::uint32_t, Pointshell::kLeafPoints>;
 
@@ -291,7 +295,7 @@ class Walk {
             [&](std::uint32_t i) { return lanesOf(i).samples.distance[i % ShellBlock::kLanes]; },
             [&](std::uint32_t i) { return lanesOf(i).gradient(i % ShellBlock::kLanes); });
       }
-      const bool fits = result_.contacts.size() + chosen.size() <= ContactList::capacity();
+      const bool fits = result_.contacts.size() + chosen.size() <= kThinnedTo;
       if (fits || per_leaf_ == 1 || result_.counts.contacts_dropped > 0) break;
       per_leaf_ /= 2;
       thinList();
@@ -440,7 +444,6 @@ void resampleContacts(const PairQuery& query, double moved, PairQueryResult& res
       }
     }
   }
-  result.counts.points_visited += static_cast<std::uint32_t>(contacts.size());
   if (!result.thinned) result.counts.points_colliding = colliding;
   contacts.resize(kept);
 }

@@ -32,6 +32,7 @@ void CollPair::forget() noexcept {
   counts_ = QueryCounts{};
   if (room_ == nullptr) return;
   room_->query.contacts.clear();
+  room_->walked = WalkedAt{};
   room_->F_Ao_W = Wrench{};
 }
 
@@ -39,6 +40,9 @@ void CollPair::query(const Pose& X_WA, const Pose& X_WB, double margin) noexcept
   queryPair({shell_A_, field_B_, X_WA, X_WB, spec_->dilation, margin}, room_->query);
   std::fill_n(room_->multipliers.begin(), room_->query.contacts.size(), 0.0);
   room_->F_Ao_W = Wrench{};
+  room_->walked = WalkedAt{};
+  room_->flanks = 0;
+  room_->slides = false;
   note(room_->query);
 }
 
@@ -56,6 +60,14 @@ void CollPair::note(const PairQueryResult& query) noexcept {
   gap_ = query.smallest_gap;
   deepest_ = query.deepest;
   counts_ = query.counts;
+}
+
+bool CollPair::isSound(const IslandPairResult& room) const noexcept {
+  const ContactList& contacts = room.query.contacts;
+  return possible_ && room.flanks <= contacts.size() && room.walked.X_WA.isFinite() &&
+         room.walked.X_WB.isFinite() &&
+         std::all_of(contacts.begin(), contacts.end(),
+                     [this](const Contact& c) { return c.point < shell_A_->points().size(); });
 }
 
 Tick CollPair::wholeTicks(double way, double closing_speed) noexcept {
@@ -89,18 +101,9 @@ IslandPair CollPair::islandPair(const Pose& X_WA, const Pose& X_WB) const noexce
   pair.X_WA_static = X_WA;
   pair.X_WB_static = X_WB;
   pair.dilation = spec_->dilation;
+  pair.friction = spec_->friction;
+  pair.last = result();
   return pair;
-}
-
-void copyResult(const IslandPairResult& from, IslandPairResult& to) noexcept {
-  const std::size_t size = from.query.contacts.size();
-  to.query.contacts.resize(size);
-  std::copy_n(from.query.contacts.begin(), size, to.query.contacts.begin());
-  to.query.counts = from.query.counts;
-  to.query.smallest_gap = from.query.smallest_gap;
-  to.query.deepest = from.query.deepest;
-  std::copy_n(from.multipliers.begin(), size, to.multipliers.begin());
-  to.F_Ao_W = from.F_Ao_W;
 }
 
 }  // namespace tenon

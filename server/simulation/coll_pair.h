@@ -91,10 +91,18 @@ class CollPair {
       if (!self.hasRoom()) return archive.refuse();
     }
     archive(*self.room_);
+    if constexpr (Archive::kReads) {
+      if (!self.isSound(*self.room_)) return archive.refuse();
+      self.room_->query.counts = self.counts_;
+      self.room_->query.smallest_gap = self.gap_;
+      self.room_->query.deepest = self.deepest_;
+    }
   }
 
  private:
   void note(const PairQueryResult& query) noexcept;
+  /// A list that was read, before its numbers are used as places.
+  [[nodiscard]] bool isSound(const IslandPairResult& room) const noexcept;
   [[nodiscard]] static Tick wholeTicks(double way, double closing_speed) noexcept;
 
   const PairSpec* spec_;
@@ -110,8 +118,5 @@ class CollPair {
   QueryCounts counts_;
   IslandPairResult* room_ = nullptr;
 };
-
-/// Copies as much of a list as it holds; a list has room for far more.
-void copyResult(const IslandPairResult& from, IslandPairResult& to) noexcept;
 
 }  // namespace tenon

@@ -32,6 +32,7 @@ class ContactRooms {
     IslandPairResult* room = free_.back();
     free_.pop_back();
     room->query.contacts.clear();
+    room->walked = WalkedAt{};
     room->F_Ao_W = Wrench{};
     return room;
   }

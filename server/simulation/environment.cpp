@@ -229,6 +229,8 @@ void Environment::addIsland(std::int32_t island) noexcept {
     const std::int32_t island_b = engine.partition.islandOf(b);
     if (pair.spec().sensing || (island_a != island && island_b != island)) continue;
     IslandPair one = pair.islandPair(objects_[a.value].X_WO, objects_[b.value].X_WO);
+    // farther away, coherence decides when a pair is looked at, and must not decide what it lists
+    if (pair.gap() > engine.reach) one.last = nullptr;
     one.body_a = island_a == island ? engine.partition.placeOf(a) : GapRow::kStatic;
     one.body_b = island_b == island ? engine.partition.placeOf(b) : GapRow::kStatic;
     engine.islands.addPair(i, one);

@@ -8,7 +8,7 @@ namespace tenon {
 namespace {
 
 /// Raised whenever the list of fields changes.
-constexpr std::uint32_t kStateVersion = 3;
+constexpr std::uint32_t kStateVersion = 4;
 
 template <typename Archive, typename Motion>
 void archiveObject(Archive& archive, Motion& object) {

@@ -8,6 +8,7 @@
 #include "idl/types/ids.h"
 #include "idl/types/messages.h"
 #include "idl/types/spatial.h"
+#include "server/collision/island_solver.h"
 #include "server/structures/haptic_structures.h"
 
 namespace tenon {
@@ -32,6 +33,7 @@ struct PairSpec {
   double dilation = 0.0;  ///< [m] of b's surface
   bool enabled = true;    ///< at the start: a cell of the configuration matrix
   bool sensing = false;   ///< felt as vibration, never resisted: a forearm
+  Friction friction;
 };
 
 enum class HandKind : std::uint8_t {

@@ -90,6 +90,15 @@ class StateArchive {
       visit(contact.point);
       visit(result.multipliers[i]);
     }
+    visit(result.query.listed_to);
+    visit(result.query.others_gap);
+    visit(result.query.thinned);
+    visit(result.walked.done);
+    visit(result.walked.X_WA);
+    visit(result.walked.X_WB);
+    visit(result.walked.levels);
+    visit(result.flanks);
+    visit(result.slides);
   }
 };
 

@@ -140,6 +140,7 @@ void Tick(benchmark::State& state, const Pose& X_WH, double speed) {
   pairs[0].dilation = 0.0027;
   std::vector<IslandPairResult> results(1);
   results[0].multipliers.resize(kMaxPairContacts);
+  pairs[0].last = &results[0];
   IslandSolver solver(1, 1);
   int tick = 0;
   const auto step = [&] {

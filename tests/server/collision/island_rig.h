@@ -53,6 +53,9 @@ class IslandRig {
     push(pair);
   }
 
+  void setFriction(std::size_t pair, double at_rest, double sliding) {
+    pairs_[pair].friction = {at_rest, sliding};
+  }
   void setHand(std::size_t body, const Pose& X_WH) { bodies_[body].springs[0].X_WG = X_WH; }
   /// The hand goes evenly from where it is, a step a tick.
   void moveHand(std::size_t body, const Pose& X_WH, int ticks) {
@@ -69,6 +72,7 @@ class IslandRig {
     for (int tick = 0; tick < ticks; ++tick) step();
   }
   SolveReport step() {
+    for (std::size_t i = 0; i < pairs_.size(); ++i) pairs_[i].last = &results[i];
     const SolveReport report = solver_.solve(bodies_, pairs_, limits, results);
     for (const IslandPairResult& result : results) {
       deepest_overlap = std::min(deepest_overlap, result.query.smallest_gap);
@@ -90,7 +94,7 @@ class IslandRig {
  private:
   void push(const IslandPair& pair) {
     pairs_.push_back(pair);
-    results.emplace_back();
+    results.emplace_back();  // steps begin when all are there
     results.back().multipliers.resize(kMaxPairContacts);
   }
 
