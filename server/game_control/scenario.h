@@ -71,6 +71,7 @@ struct ScenarioPair {
   std::optional<double> dilation;  ///< [m] none: chosen by dilationOf
   bool sensing = false;
   bool enabled = true;
+  Friction friction;
   int line = 0;  ///< 0: listed automatically
 };
 

@@ -21,7 +21,8 @@ constexpr std::array<Key, 2> kBox{"from", "to"};
 constexpr std::array<Key, 3> kPose{"at", "turn", "q"};
 constexpr std::array<Key, 2> kTurn{"axis", "deg"};
 constexpr std::array<Key, 6> kHand{"name", "role", "kind", "object", "stiffness", "rotational_stiffness"};
-constexpr std::array<Key, 5> kPair{"between", "clearance", "dilation", "sensing", "enabled"};
+constexpr std::array<Key, 7> kPair{"between", "clearance", "dilation",        "sensing",
+                                   "enabled", "friction",  "sliding_friction"};
 constexpr std::array<Key, 22> kState{"name",       "title",   "instruction", "part", "hands",    "show",
                                      "hide",       "place",   "fix",         "free", "pairs_on", "pairs_off",
                                      "object",     "hand",    "touch",       "for",  "target",   "approach",

@@ -74,6 +74,11 @@ void ScenarioReader::readPair(const YAML::Node& node) {
   }
   pair.sensing = yaml_.yesNo(node["sensing"], "'sensing'" + of, pair.sensing);
   pair.enabled = yaml_.yesNo(node["enabled"], "'enabled'" + of, true);
+  pair.friction.at_rest =
+      yaml_.numberOr(node["friction"], Quantity::kPlain, "'friction'" + of, 0.0, 2.0, 0.0);
+  pair.friction.sliding =
+      yaml_.numberOr(node["sliding_friction"], Quantity::kPlain, "'sliding_friction'" + of, 0.0,
+                     pair.friction.at_rest, pair.friction.at_rest);
 }
 
 void ScenarioReader::readOff(const YAML::Node& node) {

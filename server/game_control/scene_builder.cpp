@@ -234,7 +234,8 @@ Result<std::shared_ptr<const Scene>> makeScene(const ScenarioFile& scenario, Str
     const ObjectId field = fieldOf(scenario, pair, structures);
     const auto dilation = dilationOf(scenario, pair, field);
     if (!dilation) return fail(at(scenario, pair.line) + dilation.error().what);
-    scene->pairs.push_back({otherOf(pair, field), field, *dilation, pair.enabled, pair.sensing});
+    scene->pairs.push_back(
+        {otherOf(pair, field), field, *dilation, pair.enabled, pair.sensing, pair.friction});
   }
   for (const ScenarioHand& hand : scenario.hands) {
     scene->hands.push_back(

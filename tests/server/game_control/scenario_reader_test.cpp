@@ -193,6 +193,10 @@ const BadInput kBadInputs[] = {
      "clearance of bay-part (0.4 mm) is smaller than the field of 'bay' can resolve (voxel 1 mm / 4 needs "
      "0.87 mm); use "
      "voxel 0.45 mm"},
+    {"friction_too_large", "clearance: 4 mm", "clearance: 4 mm, friction: 3", "11",
+     "expected between 0 and 2"},
+    {"sliding_friction_too_large", "clearance: 4 mm", "clearance: 4 mm, friction: 0.3, sliding_friction: 0.4",
+     "11", "expected between 0 and 0.3"},
     {"dilation_too_large", "clearance: 4 mm", "clearance: 4 mm, dilation: 2 mm", "11",
      "a quarter of the clearance"},
     {"target_missing",

@@ -34,6 +34,21 @@ TEST(SceneBuilder, AsksTheSmallerObjectAsAShell) {
   EXPECT_DOUBLE_EQ(pair("pointer", "bay").dilation, 0.87 * 0.001);
 }
 
+TEST(SceneBuilder, GivesAPairItsFriction) {
+  const std::string text =
+      with(smallScenario(),
+           "pairs:", "pairs:\n  - {between: [pointer, bay], friction: 0.4, sliding_friction: 0.3}");
+  const auto scene = makeScene(parsed(text), smallStructures());
+  ASSERT_TRUE(scene) << scene.error().what;
+  const auto pair = [&](const char* a, const char* b) {
+    const int number = (*scene)->pairOf((*scene)->objectNamed(a), (*scene)->objectNamed(b));
+    return (*scene)->pairs[static_cast<std::size_t>(number)].friction;
+  };
+  EXPECT_DOUBLE_EQ(pair("pointer", "bay").at_rest, 0.4);
+  EXPECT_DOUBLE_EQ(pair("pointer", "bay").sliding, 0.3);
+  EXPECT_DOUBLE_EQ(pair("part", "bay").at_rest, 0.0) << "off when nothing is said";
+}
+
 TEST(SceneBuilder, ChecksClearancesWhoseFieldOnlySizesTell) {
   const std::string text =
       with(smallScenario(), "pairs:", "pairs:\n  - {between: [pointer, bay], clearance: 1 mm}");
