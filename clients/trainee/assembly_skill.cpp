@@ -37,6 +37,9 @@ constexpr double kDip = 0.0005;           // [m] it goes deeper than it stood: t
 constexpr double kComply = 1.0;           // [1/s] at which a hand that presses takes on how the part lies
 constexpr double kHelped = 0.1;           // [m] between a part's outline and the helper's cube
 constexpr double kBackOffWay = 0.03;      // [m]
+constexpr double kHardlyFelt = 0.1;       // [N]
+constexpr double kPressedInVain = 5.0;    // [s] nobody says that it sits: she tries again
+constexpr double kWaitedInVain = 8.0;     // [s] likewise, when she hardly presses
 constexpr double kLookGain = 2.2;         // [1/s] at which a hand follows the eye
 
 /// A turn of (cos, sin) by a small angle; stays on the circle without trigonometry.
@@ -418,7 +421,8 @@ void AssemblySkill::seated(const HandSense& sense, const DelayedSight& sight, do
     // held by its seat it needs no guiding: go limp sideways
     if (felt_ > 1.0) yieldTo(sight, 1.5, dt);
     holdObject(sense, Vector3::Zero(), Quaternion::Identity(), dt);
-    if (felt_ > 1.0 && phase_time_ > 5.0) {
+    const double patience = felt_ > 1.0 ? kPressedInVain : kWaitedInVain;
+    if (sense.F_Ho_W.force.norm() > kHardlyFelt && phase_time_ > patience) {
       search_depth_ = depthSeen(sight);
       bias_scale_ *= 0.6;
       enter(Phase::kBackOff);
