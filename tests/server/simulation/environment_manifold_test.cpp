@@ -56,12 +56,15 @@ TEST_F(ManifoldTest, ListsContactsBeforeTheyTouchWithTheirSignedGaps) {
 }
 
 TEST_F(ManifoldTest, ListsAFastObjectsContactsFartherAhead) {
-  moveTo(*environment_, hand_, {0.0, 0.0, 0.5 * kCubeEdge + 2.2e-3}, 200);
+  const Vector3 near(0.0, 0.0, 0.5 * kCubeEdge + 2.2e-3);
+  const Vector3 away(0.0, 0.0, 0.5 * kCubeEdge + 0.08);
+  moveTo(*environment_, hand_, near, 4000);
+  environment_->manifold(hand_, manifold_);
+  EXPECT_EQ(manifold_.contacts.size(), 0U) << "at 20 mm/s, 2.2 mm are far";
+  moveTo(*environment_, hand_, away, 200);
+  moveTo(*environment_, hand_, near, 200);
   environment_->manifold(hand_, manifold_);
   EXPECT_GE(manifold_.contacts.size(), 4U) << "0.4 m/s";
-  stay(*environment_, 200);
-  environment_->manifold(hand_, manifold_);
-  EXPECT_EQ(manifold_.contacts.size(), 0U) << "standing still, 2.2 mm are far";
 }
 
 TEST_F(ManifoldTest, TellsTheCouplingsWrenchAboutTheHand) {
