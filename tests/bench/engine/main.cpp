@@ -14,6 +14,7 @@
 #include "server/session/scene_loader.h"
 #include "tests/bench/engine/bench_scene.h"
 #include "tests/bench/engine/insertion.h"
+#include "tests/bench/engine/methods.h"
 #include "tests/bench/engine/query_table.h"
 #include "tests/bench/engine/tick_table.h"
 
@@ -78,6 +79,7 @@ class Bench {
       add(scene->bake);
       if (wants("query")) add(queryTable(*scene, arguments_.rounds, say));
     }
+    if (wants("methods")) add(methodsTable(say));
     if (wants("many_bodies")) add(manyBodiesTable(say));
     if (wants("insertion")) {
       const auto insertion = rehearseInsertion(arguments_.scenario, arguments_.cache, arguments_.detail, say);
@@ -127,8 +129,8 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   app.add_option("--only", arguments.only,
-                 "tables to make: bake, query, many_bodies, insertion (default: all)")
-      ->check(CLI::IsMember({"bake", "query", "many_bodies", "insertion"}));
+                 "tables to make: bake, query, methods, many_bodies, insertion (default: all)")
+      ->check(CLI::IsMember({"bake", "query", "methods", "many_bodies", "insertion"}));
   app.add_option("--json", arguments.json, "write the tables into this file, for programs");
   app.add_option(
       "--figures", arguments.figures,
