@@ -5,8 +5,18 @@
 namespace tenon {
 namespace {
 
-constexpr Tick kHundredHertz = 10;
 constexpr Tick kThirtyHertz = 33;
+
+/// A pair that touched since the last sample and lists no contacts any more.
+PairContact partedFrom(const PairContact& pair) {
+  PairContact apart;
+  apart.a = pair.a;
+  apart.b = pair.b;
+  apart.enabled = pair.enabled;
+  apart.peak_force = pair.peak_force;
+  apart.peak_depth = pair.peak_depth;
+  return apart;
+}
 
 }  // namespace
 
@@ -54,21 +64,29 @@ void Broadcast::addManifolds(const TickOutput& output) {
 }
 
 void Broadcast::addPairs(const TickOutput& output) {
-  peaks_.resize(output.pairs.size());
-  for (std::size_t i = 0; i < peaks_.size(); ++i) {
-    peaks_[i].peak_force = std::max(peaks_[i].peak_force, output.pairs[i].F_Ao_W.force.norm());
-    peaks_[i].peak_depth = std::max(peaks_[i].peak_depth, output.pairs[i].depth);
-    peaks_[i].colliding = peaks_[i].colliding || output.pairs[i].colliding;
+  for (const PairState& state : output.pairs) {
+    const PairContact& now = state.contact;
+    Touch& touch = touches_[state.pair];
+    const PairContact before = touch.contact;
+    touch.contact = now;
+    touch.contact.peak_force = std::max(before.peak_force, now.peak_force);
+    touch.contact.peak_depth = std::max(before.peak_depth, now.peak_depth);
+    touch.tick = output.tick;
+    touch.lately = touch.lately || now.colliding;
   }
   if (output.tick % kHundredHertz != 0) return;
 
-  // those that touch or touched lately; the rest of the collision matrix once a second
-  const bool whole_matrix = output.tick % 1000 == 0;
-  for (std::size_t i = 0; i < peaks_.size(); ++i) {
-    PairContact pair = output.pairs[i];
-    if (!whole_matrix && !peaks_[i].colliding) continue;
-    pair.peak_force = peaks_[i].peak_force;
-    pair.peak_depth = peaks_[i].peak_depth;
+  for (const PairState& state : output.pairs_in_turn) {
+    Touch& touch = touches_[state.pair];
+    if (touch.lately) continue;
+    touch.contact = state.contact;
+    touch.tick = output.tick;
+    touch.lately = true;
+  }
+  for (auto& [number, touch] : touches_) {
+    if (!touch.lately) continue;
+    PairContact& pair = touch.contact;
+    if (touch.tick != output.tick) pair = partedFrom(pair);
     if (outgoing_.pairs.empty() || outgoing_.pairs.back().pairs.full()) {
       outgoing_.pairs.emplace_back();
       outgoing_.pairs.back().tick = output.tick;
@@ -78,7 +96,7 @@ void Broadcast::addPairs(const TickOutput& output) {
   }
   for (ContactPairs& sample : outgoing_.pairs)
     sample.parts = static_cast<std::uint32_t>(outgoing_.pairs.size());
-  std::fill(peaks_.begin(), peaks_.end(), PairContact{});
+  touches_.clear();
 }
 
 void Broadcast::addStats(const TickOutput& output) {

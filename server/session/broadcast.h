@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -35,6 +36,13 @@ class Broadcast {
   [[nodiscard]] Chronicle& chronicle() { return chronicle_; }
 
  private:
+  /// What a pair did since the last sample of the slow tier.
+  struct Touch {
+    PairContact contact;  ///< the newest, with the peaks
+    Tick tick = 0;        ///< of the newest
+    bool lately = false;  ///< to be told: it touched, or its turn has come
+  };
+
   void addManifolds(const TickOutput& output);
   void addPairs(const TickOutput& output);
   void addStats(const TickOutput& output);
@@ -46,7 +54,7 @@ class Broadcast {
   FramePacker packer_1k_, packer_100_, packer_30_;
   Outgoing outgoing_;
   std::vector<HandManifold> manifolds_;
-  std::vector<PairContact> peaks_;
+  std::map<std::uint32_t, Touch> touches_;  ///< by pair
   TickStats stats_peak_;
 };
 

@@ -131,7 +131,7 @@ TickOutput Exercise::makeOutput() const {
   output.manifolds.resize(environment_.hands().size());
   output.present.resize(environment_.hands().size());
   output.ages.resize(environment_.hands().size());
-  output.pairs.resize(environment_.pairs().size());
+  output.pairs.reserve(environment_.contactRooms());
   return output;
 }
 
@@ -164,7 +164,7 @@ void Exercise::fill(TickOutput& output) const noexcept {
     manifold.answers_seq = ages_[i].seq;
     manifold.step_revision = output.step.revision;
   }
-  for (std::size_t i = 0; i < output.pairs.size(); ++i) environment_.pairContact(i, output.pairs[i]);
+  fillPairs(output);
 
   const Environment::Work& work = environment_.work();
   output.stats.tick = output.tick;
@@ -173,6 +173,25 @@ void Exercise::fill(TickOutput& output) const noexcept {
   output.stats.queried_pairs = work.queried_pairs;
   output.stats.points_visited = work.points_visited;
   output.stats.state_hash = output.hash;
+}
+
+void Exercise::fillPairs(TickOutput& output) const noexcept {
+  const auto stateOf = [this](std::size_t pair) {
+    PairState state{static_cast<std::uint32_t>(pair), {}};
+    environment_.pairContact(pair, state.contact);
+    return state;
+  };
+  output.pairs.clear();
+  const auto pairs = environment_.pairs();
+  for (const std::uint32_t pair : environment_.nearPairs()) {
+    if (pairs[pair].result != nullptr) output.pairs.push_back(stateOf(pair));
+  }
+  output.pairs_in_turn.clear();
+  if (output.tick % kHundredHertz != 0 || pairs.empty()) return;
+  constexpr std::size_t kTurnsPerSecond = 100;
+  const std::size_t count = std::min((pairs.size() + kTurnsPerSecond - 1) / kTurnsPerSecond, kPairsInTurn);
+  const std::size_t first = output.tick / kHundredHertz * count;
+  for (std::size_t i = 0; i < count; ++i) output.pairs_in_turn.push_back(stateOf((first + i) % pairs.size()));
 }
 
 void Exercise::save(std::vector<std::uint8_t>& bytes) const {

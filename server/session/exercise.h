@@ -60,6 +60,7 @@ class Exercise {
   };
 
   void apply(const Change& change) noexcept;
+  void fillPairs(TickOutput& output) const noexcept;
   void read(const TickInput& input) noexcept;
   void judgeAges() noexcept;
   void beginWhenAllAreHere() noexcept;

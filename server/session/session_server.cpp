@@ -205,7 +205,10 @@ void Server::tickByTheClock() noexcept {
 
 void Server::runByTheClock(const std::atomic<bool>& stop) {
   // every slot gets its room now, none in a tick
-  for (std::size_t i = 0; i < outputs_.capacity(); ++i) outputs_.push(exercise_.makeOutput());
+  for (std::size_t i = 0; i < outputs_.capacity(); ++i) {
+    *outputs_.beginPush() = exercise_.makeOutput();
+    outputs_.commitPush();
+  }
   while (outputs_.front() != nullptr) outputs_.pop();
   unsent_ = exercise_.makeOutput();
   JournalEntry roomy;

@@ -48,6 +48,9 @@ struct Change {
   Pose X_WO;
 };
 
+/// [ticks] between the samples of the slow tier.
+inline constexpr Tick kHundredHertz = 10;
+
 inline constexpr std::size_t kMaxHands = 16;
 inline constexpr std::size_t kMaxChanges = 16;
 
@@ -58,7 +61,17 @@ struct TickInput {
   FixedVector<Change, kMaxChanges> changes;
 };
 
-/// What one tick leaves for everybody outside it. Sized once by `sizeFor`; filled without allocating.
+/// How a pair stands, with its number in the scene.
+struct PairState {
+  std::uint32_t pair = 0;
+  PairContact contact;
+};
+
+/// Of the collision and configuration matrices, so many cells are told in turn with each slow sample.
+inline constexpr std::size_t kPairsInTurn = kPairsPerSample;
+
+/// What one tick leaves for everybody outside it. Sized once by Exercise::makeOutput; filled without
+/// allocating.
 struct TickOutput {
   Tick tick = 0;
   std::uint64_t hash = 0;
@@ -69,7 +82,9 @@ struct TickOutput {
   std::vector<HandManifold> manifolds;  ///< index = HandId
   std::vector<bool> present;            ///< index = HandId: a client moves this hand
   std::vector<std::uint32_t> ages;      ///< index = HandId: ticks since its last reading
-  std::vector<PairContact> pairs;
+  std::vector<PairState> pairs;         ///< those that list contacts; no others press
+  /// Whatever they do, in turn: all of a scene within a second, or as many as fit.
+  FixedVector<PairState, kPairsInTurn> pairs_in_turn;
   TickStats stats;
 };
 

@@ -1,6 +1,7 @@
 #include "server/simulation/engine.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace tenon {
 namespace {
@@ -73,10 +74,33 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
     cell_in_a.push_back(pair_cells[scene.pairs[pair].a.value]++);
     cell_in_b.push_back(pair_cells[scene.pairs[pair].b.value]++);
   }
+  switches.assign((pairs.size() + 63) / 64, 0);
+  for (std::size_t pair = 0; pair < pairs.size(); ++pair) setEnabled(pair, pairs[pair].enabled());
+  pairs_from.push_back(0);
+  for (const std::size_t count : pair_cells) pairs_from.push_back(pairs_from.back() + count);
+  pairs_of.resize(pairs_from.back());
+  for (std::size_t pair = 0; pair < scene.pairs.size(); ++pair) {
+    for (const auto& [object, cell] :
+         {std::pair(scene.pairs[pair].a, cell_in_a[pair]), std::pair(scene.pairs[pair].b, cell_in_b[pair])}) {
+      pairs_of[pairs_from[object.value] + cell] = static_cast<std::uint32_t>(pair);
+    }
+  }
   for (std::size_t object = 0; object < scene.objects.size(); ++object) {
     forces.emplace_back(pair_cells[object] + scene.hands.size(), options.send_policy);
     sizes.push_back(sizeOf(scene.objects[object]));
   }
+}
+
+bool Environment::Engine::counts(std::size_t pair) const noexcept {
+  const CollPair& one = pairs[pair];
+  return one.enabled() && one.possible() && hidden[one.spec().a.value] == 0 &&
+         hidden[one.spec().b.value] == 0;
+}
+
+void Environment::Engine::setEnabled(std::size_t pair, bool enabled) noexcept {
+  pairs[pair].setEnabled(enabled);
+  const std::uint64_t bit = std::uint64_t{1} << pair % 64;
+  switches[pair / 64] = enabled ? switches[pair / 64] | bit : switches[pair / 64] & ~bit;
 }
 
 void Environment::Engine::forgetTick() noexcept {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "server/simulation/broad_phase.h"
@@ -45,11 +46,20 @@ struct Environment::Engine {
     odometers[object.value] += fastestPoint(way.translation, way.rotation, sizes[object.value].radius);
   }
 
+  /// The pairs that an object is in.
+  [[nodiscard]] std::span<const std::uint32_t> pairsOf(std::size_t object) const {
+    return std::span(pairs_of).subspan(pairs_from[object], pairs_from[object + 1] - pairs_from[object]);
+  }
+  /// On, possible, and nobody hidden when that was last looked at.
+  [[nodiscard]] bool counts(std::size_t pair) const noexcept;
+  void setEnabled(std::size_t pair, bool enabled) noexcept;
+
   /// Leaves the work space as before the first tick.
   void forgetTick() noexcept;
 
   // state
   std::vector<CollPair> pairs;
+  std::vector<std::uint64_t> switches;  ///< 64 pairs a word: those that are on, for the hash
   std::vector<std::uint32_t> near;  ///< pairs that may meet, in order; others have no state but their switch
   ContactRooms rooms;
   std::vector<double> odometers;    ///< by object: [m] its fastest point's way so far, jumps left out
@@ -59,6 +69,8 @@ struct Environment::Engine {
   std::vector<std::size_t> pair_cells;            ///< by object: how many of its cells are pairs
   std::vector<std::size_t> cell_in_a, cell_in_b;  ///< by pair: its cell in the buffers of its two objects
   std::vector<ObjectSize> sizes;                  ///< by object
+  std::vector<std::uint32_t> pairs_of;            ///< object after object
+  std::vector<std::size_t> pairs_from;            ///< by object: where its own begin, and one more
   SolveLimits limits;                             ///< sub-steps cut so that a tick keeps the travel cap
   double reach = 0.0;                             ///< [m] the largest margin any query of a tick may use
 

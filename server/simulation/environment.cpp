@@ -38,8 +38,9 @@ Environment::~Environment() = default;
 
 void Environment::setPairEnabled(std::size_t pair, bool enabled) noexcept {
   if (pair >= pairs_.size()) return;
-  engine_->pairs[pair].setEnabled(enabled);
-  engine_->recount = true;
+  engine_->active_pairs -= engine_->counts(pair) ? 1U : 0U;
+  engine_->setEnabled(pair, enabled);
+  engine_->active_pairs += engine_->counts(pair) ? 1U : 0U;
   note(static_cast<std::uint32_t>(pair));
 }
 

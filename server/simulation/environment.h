@@ -101,6 +101,10 @@ class Environment {
   [[nodiscard]] std::span<const ObjectMotion> objects() const { return objects_; }
   [[nodiscard]] std::span<const HandMotion> hands() const { return hands_; }
   [[nodiscard]] std::span<const PairMotion> pairs() const { return pairs_; }
+  /// The pairs whose balls are near each other, in order: only these can touch.
+  [[nodiscard]] std::span<const std::uint32_t> nearPairs() const noexcept;
+  /// So many pairs list contacts at most.
+  [[nodiscard]] std::size_t contactRooms() const noexcept;
   /// "Force" as displays, conditions and reports mean it: of a held object its coupling's, else its
   /// ForceBuffer's.
   [[nodiscard]] Wrench forceOn(ObjectId object) const noexcept;

@@ -63,15 +63,22 @@ void Environment::note(std::uint32_t pair) noexcept {
 
 void Environment::countActivePairs() noexcept {
   Engine& engine = *engine_;
+  const auto countOf = [&engine](std::size_t object) {
+    const auto pairs = engine.pairsOf(object);
+    return static_cast<std::uint32_t>(
+        std::count_if(pairs.begin(), pairs.end(), [&](std::uint32_t i) { return engine.counts(i); }));
+  };
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     const std::uint8_t hidden = objects_[i].status == ObjectStatus::kHidden ? 1 : 0;
-    engine.recount |= hidden != engine.hidden[i];
+    if (hidden == engine.hidden[i]) continue;
+    engine.active_pairs -= countOf(i);
     engine.hidden[i] = hidden;
+    engine.active_pairs += countOf(i);
   }
   if (!engine.recount) return;
   engine.recount = false;
   engine.active_pairs = 0;
-  for (std::size_t i = 0; i < pairs_.size(); ++i) engine.active_pairs += active(i) ? 1U : 0U;
+  for (std::size_t i = 0; i < pairs_.size(); ++i) engine.active_pairs += engine.counts(i) ? 1U : 0U;
 }
 
 void Environment::countWork() noexcept {

@@ -69,6 +69,10 @@ bool Environment::inContact(ObjectId a, ObjectId b) const noexcept {
   });
 }
 
+std::span<const std::uint32_t> Environment::nearPairs() const noexcept { return engine_->near; }
+
+std::size_t Environment::contactRooms() const noexcept { return engine_->rooms.size(); }
+
 void Environment::pairContact(std::size_t pair, PairContact& out) const noexcept {
   const CollPair& one = engine_->pairs[pair];
   out = PairContact{};

@@ -36,15 +36,12 @@ void archiveHand(Archive& archive, Motion& hand) {
 }
 
 /// 64 pairs a number: most pairs have nothing else to say.
-template <typename Archive, typename Pairs>
-void archiveSwitches(Archive& archive, Pairs& pairs) {
-  for (std::size_t first = 0; first < pairs.size(); first += 64) {
-    const std::size_t count = std::min<std::size_t>(pairs.size() - first, 64);
-    std::uint64_t word = 0;
-    for (std::size_t i = 0; i < count; ++i) word |= std::uint64_t{pairs[first + i].enabled()} << i;
-    archive(word);
-    if constexpr (Archive::kReads) {
-      for (std::size_t i = 0; i < count; ++i) pairs[first + i].setEnabled((word >> i & 1U) != 0);
+template <typename Archive, typename Engine>
+void archiveSwitches(Archive& archive, Engine& engine) {
+  for (auto& word : engine.switches) archive(word);
+  if constexpr (Archive::kReads) {
+    for (std::size_t pair = 0; pair < engine.pairs.size(); ++pair) {
+      engine.setEnabled(pair, (engine.switches[pair / 64] >> pair % 64 & 1U) != 0);
     }
   }
 }
@@ -73,7 +70,7 @@ void Environment::archive(Archive& archive, Self& self) {
   for (auto& object : self.objects_) archiveObject(archive, object);
   for (auto& hand : self.hands_) archiveHand(archive, hand);
   auto& engine = *self.engine_;
-  archiveSwitches(archive, engine.pairs);
+  archiveSwitches(archive, engine);
   archiveIndices(archive, engine.near, engine.pairs.size());
   for (const std::uint32_t pair : engine.near) CollPair::archive(archive, engine.pairs[pair], engine.rooms);
   for (auto& odometer : engine.odometers) archive(odometer);
@@ -130,6 +127,7 @@ Result<void> Environment::restore(std::span<const std::uint8_t> bytes) {
     hands_[i] = copy.hands_[i];
   }
   engine_->pairs = std::move(copy.engine_->pairs);
+  engine_->switches = std::move(copy.engine_->switches);
   engine_->near = std::move(copy.engine_->near);
   engine_->rooms = std::move(copy.engine_->rooms);
   engine_->odometers = std::move(copy.engine_->odometers);

@@ -63,24 +63,31 @@ bool ForceBuffer::contribute(std::uint32_t source, const Wrench& F_Bo_W, std::ui
             source,
             std::min(lifetime_ticks, kMaxLifetimeTicks),
             true};
+  contributing_ = static_cast<std::uint8_t>(contributing_ | 1U << (place - outside.begin()));
   return true;
 }
 
 void ForceBuffer::expire(Tick now) noexcept {
-  for (ForceCell& cell : std::span(cells_).subspan(own_cells_)) {
-    if (cell.used && !alive(cell, now)) cell = ForceCell{};
+  if (contributing_ == 0) return;
+  const auto outside = std::span(cells_).subspan(own_cells_);
+  for (std::size_t i = 0; i < outside.size(); ++i) {
+    if (!outside[i].used || alive(outside[i], now)) continue;
+    outside[i] = ForceCell{};
+    contributing_ = static_cast<std::uint8_t>(contributing_ & ~(1U << i));
   }
 }
 
 Wrench ForceBuffer::total(Tick now) const noexcept {
   Wrench sum;
   for (const std::uint32_t cell : used_) sum += cells_[cell].F_Bo_W;
+  if (contributing_ == 0) return sum;
   for (const ForceCell& cell : std::span(cells_).subspan(own_cells_)) sum += cell.F_Bo_W * weight(cell, now);
   return sum;
 }
 
 Wrench ForceBuffer::contributed(Tick now) const noexcept {
   Wrench sum;
+  if (contributing_ == 0) return sum;
   for (const ForceCell& cell : std::span(cells_).subspan(own_cells_)) sum += cell.F_Bo_W * weight(cell, now);
   return sum;
 }

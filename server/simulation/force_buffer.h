@@ -90,7 +90,13 @@ class ForceBuffer {
         if (!self.cells_[cell].used) return archive.refuse();
       }
     }
-    for (auto& cell : std::span(self.cells_).subspan(self.own_cells_)) archive(cell);
+    archive(self.contributing_);
+    if constexpr (Archive::kReads) {
+      for (ForceCell& cell : std::span(self.cells_).subspan(self.own_cells_)) cell = ForceCell{};
+    }
+    for (std::size_t i = 0; i < kContributions; ++i) {
+      if ((self.contributing_ >> i & 1U) != 0) archive(self.cells_[self.own_cells_ + i]);
+    }
   }
 
  private:
@@ -99,6 +105,7 @@ class ForceBuffer {
 
   std::vector<ForceCell> cells_;
   std::vector<std::uint32_t> used_;  // own cells, in order
+  std::uint8_t contributing_ = 0;    // one bit a contribution in use: most objects have none
   std::size_t own_cells_;
   SendPolicy policy_;
   std::uint64_t refused_ = 0;

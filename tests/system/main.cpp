@@ -62,7 +62,7 @@ void followTrainee(Arguments& arguments, const tenon::TraineeStation& trainee) {
     double depth = 0.0;
     for (const tenon::HandManifold& hand : output.manifolds)
       force = std::max(force, hand.F_Ho_W.force.norm());
-    for (const tenon::PairContact& pair : output.pairs) depth = std::max(depth, pair.depth);
+    for (const tenon::PairState& pair : output.pairs) depth = std::max(depth, pair.contact.depth);
     std::printf("%8.3f s  %-22s %7.1f mm %6.2f deg  force %5.1f N  contact %5.2f s  depth %.2f mm\n",
                 static_cast<double>(output.tick) * tenon::kTickSeconds, trainee.doing(),
                 1e3 * output.step.position_error, output.step.angle_error * 57.29578, force,

@@ -36,8 +36,10 @@ class Watch {
     const double time = static_cast<double>(output.tick - first_) * kTickSeconds;
     const HandManifold& manifold = output.manifolds[hand_.value];
     double depth = 0.0;
-    for (const PairContact& pair : output.pairs)
+    for (const PairState& state : output.pairs) {
+      const PairContact& pair = state.contact;
       if (pair.a == manifold.object || pair.b == manifold.object) depth = std::max(depth, pair.depth);
+    }
     add(story_.trainee_force, time, manifold.F_Ho_W.force.norm());
     add(story_.gap, time, (manifold.X_WO.translation() - (X_WH_ * manifold.X_HO).translation()).norm());
     add(story_.depth, time, depth);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -57,9 +59,12 @@ TEST(Broadcast, ASlowerTierCarriesTheLargestSinceItsLastSample) {
   for (int tick = 11; tick <= 30; ++tick) {
     TickOutput output = stage.tick();
     const bool peak = tick == 14;
-    output.pairs[2].colliding = peak;
-    output.pairs[2].F_Ao_W.force = Vector3(0, 0, peak ? 9.0 : 0.5);
-    output.pairs[2].depth = peak ? 0.002 : 0.0;
+    PairState pair{2, {}};
+    pair.contact.colliding = peak;
+    pair.contact.peak_force = peak ? 9.0 : 0.5;
+    pair.contact.peak_depth = peak ? 0.002 : 0.0;
+    if (tick <= 16) output.pairs.push_back(pair);
+    output.pairs_in_turn.clear();
     output.stats.load_percent = peak ? 80.0 : 1.0;
     output.stats.compute_seconds = peak ? 0.0007 : 0.0001;
     output.stats.input_age_seconds = peak ? 0.020 : 0.001;
@@ -85,18 +90,35 @@ TEST(Broadcast, ASlowerTierCarriesTheLargestSinceItsLastSample) {
   }
 }
 
-TEST(Broadcast, TheWholeMatrixComesOnceASecondInNumberedParts) {
+TEST(Broadcast, EveryPairOfTheMatrixIsToldWithinASecond) {
   Stage stage;
   Broadcast broadcast(stage.loaded().scenario, kEpoch, false);
-  TickOutput output = stage.tick(1000);
-  const Outgoing& outgoing = broadcast.read(output);
-  std::size_t pairs = 0;
-  for (std::size_t part = 0; part < outgoing.pairs.size(); ++part) {
-    EXPECT_EQ(outgoing.pairs[part].part, part);
-    EXPECT_EQ(outgoing.pairs[part].parts, outgoing.pairs.size());
-    pairs += outgoing.pairs[part].pairs.size();
+  std::set<std::pair<std::uint32_t, std::uint32_t>> told;
+  for (int tick = 0; tick < 1000; ++tick) {
+    const Outgoing& outgoing = broadcast.read(stage.tick());
+    for (const ContactPairs& sample : outgoing.pairs)
+      for (const PairContact& pair : sample.pairs) told.emplace(pair.a.value, pair.b.value);
   }
-  EXPECT_EQ(pairs, stage.loaded().scene->pairs.size());
+  EXPECT_EQ(told.size(), stage.loaded().scene->pairs.size());
+}
+
+TEST(Broadcast, ManyPairsComeInNumberedParts) {
+  Stage stage;
+  Broadcast broadcast(stage.loaded().scenario, kEpoch, false);
+  TickOutput output = stage.tick(10);
+  output.pairs.clear();
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    output.pairs.push_back({i, {.a = ObjectId{i}, .b = ObjectId{50}, .colliding = true}});
+  }
+  const Outgoing& outgoing = broadcast.read(output);
+  ASSERT_EQ(outgoing.pairs.size(), 4U);
+  std::uint32_t next = 0;
+  for (std::uint32_t part = 0; part < 4; ++part) {
+    EXPECT_EQ(outgoing.pairs[part].part, part);
+    EXPECT_EQ(outgoing.pairs[part].parts, 4U);
+    for (const PairContact& pair : outgoing.pairs[part].pairs) EXPECT_EQ(pair.a.value, next++);
+  }
+  EXPECT_EQ(next, 20U);
 }
 
 TEST(Broadcast, InLockstepEachTickSendsAllObjectsAndManifolds) {
