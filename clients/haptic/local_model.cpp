@@ -9,6 +9,9 @@ namespace tenon {
 namespace {
 // A row that pushes less than this only touches by rounding.
 constexpr double kTouchForce = 1e-9;  // [N]
+
+// Another hand's pull is gone so many ticks after it let go.
+constexpr double kFadeTicks = 20.0;
 }  // namespace
 
 LocalModel::LocalModel(const StalenessLimits& limits) : limits_(limits), solver_(1, kManifoldContacts) {}
@@ -23,6 +26,7 @@ void LocalModel::receive(const HandManifold& manifold) noexcept {
                     manifold.object == manifold_.object && manifold.object_epoch == manifold_.object_epoch;
   if (!same) new_object_ = true;
   manifold_ = manifold;
+  receivePulls(same);
   proxy_.age = 0;
   heard_ = true;
 }
@@ -50,10 +54,35 @@ const LocalProxy& LocalModel::step(const Pose& X_WH, const WorldView& world) noe
   proxy_.stiffness = manifold_.stiffness * freshness_now;
   proxy_.rotational_stiffness = manifold_.rotational_stiffness * freshness_now;
   solve(X_WH, world);
+  fadePulls();
   proxy_.X_WS = proxy_.X_WO * manifold_.X_HO.inverse();
   countValidity();
   ++proxy_.age;
   return proxy_;
+}
+
+void LocalModel::receivePulls(bool same_object) noexcept {
+  if (!same_object) pulls_.clear();
+  for (OtherPull& known : pulls_) known.listed = false;
+  for (const HandPull& pull : manifold_.others) {
+    if (!pull.X_WG.isFinite() || !pull.p_BoC_B.allFinite()) continue;
+    auto* const known = std::find_if(pulls_.begin(), pulls_.end(),
+                                     [&](const OtherPull& other) { return other.pull.hand == pull.hand; });
+    if (known != pulls_.end()) {
+      *known = {pull, 1.0, true};
+    } else {
+      pulls_.push_back({pull, 1.0, true});
+    }
+  }
+}
+
+void LocalModel::fadePulls() noexcept {
+  std::size_t kept = 0;
+  for (OtherPull& other : pulls_) {
+    if (!other.listed) other.weight -= 1.0 / kFadeTicks;
+    if (other.weight > 0.0) pulls_[kept++] = other;
+  }
+  pulls_.resize(kept);
 }
 
 bool LocalModel::outdated(const WorldView& world) const noexcept {
@@ -74,6 +103,11 @@ void LocalModel::solve(const Pose& X_WH, const WorldView& world) noexcept {
   body_.springs.push_back({X_WH * manifold_.X_HO, manifold_.X_HO.inverse().translation(),
                            std::max(1.0, manifold_.stiffness),
                            std::max(0.1, manifold_.rotational_stiffness)});
+  for (const OtherPull& other : pulls_) {
+    const HandPull& pull = other.pull;
+    body_.springs.push_back({pull.X_WG, pull.p_BoC_B, other.weight * std::max(0.0, pull.stiffness),
+                             other.weight * std::max(0.0, pull.rotational_stiffness)});
+  }
   rows_.clear();
   for (const ManifoldContact& contact : manifold_.contacts) {
     if (!world.knows(contact.other)) continue;

@@ -34,6 +34,10 @@ struct LocalProxy {
 /// millisecond, and no contact force that crossed the network is felt. The answer depends on planes and
 /// device alone, not on the path, so it cannot drift from the server's.
 ///
+/// Whoever else holds the object pulls at it here as well, from where he was last heard to be, so both feel
+/// each other. When he lets go his pull fades within ticks: a part that two have bent between them comes
+/// back no faster than at the server.
+///
 /// Threads: one. Real-time: everything but the constructor.
 class LocalModel {
  public:
@@ -51,6 +55,14 @@ class LocalModel {
   [[nodiscard]] std::uint64_t beyondValidity() const noexcept { return beyond_validity_; }
 
  private:
+  /// Another hand's pull, and how much of it is left once it is no longer listed.
+  struct OtherPull {
+    HandPull pull;
+    double weight = 1.0;
+    bool listed = true;
+  };
+  void receivePulls(bool same_object) noexcept;
+  void fadePulls() noexcept;
   [[nodiscard]] bool outdated(const WorldView& world) const noexcept;
   [[nodiscard]] double freshness() const noexcept;
   void solve(const Pose& X_WH, const WorldView& world) noexcept;
@@ -61,6 +73,7 @@ class LocalModel {
   HandManifold manifold_;
   LocalProxy proxy_;
   MovableBody body_;
+  FixedVector<OtherPull, 2 * kOtherPulls> pulls_;
   FixedVector<GapRow, kManifoldContacts> rows_;
   std::array<double, kManifoldContacts> multipliers_{};
   std::uint64_t beyond_validity_ = 0;

@@ -103,6 +103,7 @@ enum class ObjectStatus : std::uint8_t {
   kHeld,     ///< follows a hand through its coupling
   kTracked,  ///< follows a tracker as it is, feels nothing (forearm, head)
   kFixed,    ///< mounted
+  kFree,     ///< has a mass: falls, flies and is pushed
 };
 
 inline constexpr int kStatesPerFrame = 12;
@@ -130,6 +131,17 @@ struct ManifoldContact {
   Vector3f velocity_W = Vector3f::Zero();  ///< of A's material at the point
 };
 
+/// How another hand pulls at the object that this one holds.
+struct HandPull {
+  HandId hand;
+  Pose X_WG;                          ///< where it wants the object to be
+  Vector3 p_BoC_B = Vector3::Zero();  ///< the point of the object that it holds
+  double stiffness = 0.0;             ///< [N/m]
+  double rotational_stiffness = 0.0;  ///< [Nm/rad]
+};
+
+inline constexpr int kOtherPulls = 2;
+
 struct HandManifold {
   HandId hand;
   std::uint32_t server_epoch = 0;
@@ -145,6 +157,7 @@ struct HandManifold {
   double validity_radius = 0.0;  ///< [m] the object may move this far before unlisted contacts can matter
   std::uint32_t step_revision = 0;
   bool frozen = false;  ///< the server holds the object still: stale input, pause or emergency stop
+  FixedVector<HandPull, kOtherPulls> others;  ///< who else holds the object, in order of hands
   FixedVector<ManifoldContact, kManifoldContacts> contacts;
 };
 

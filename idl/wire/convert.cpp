@@ -198,6 +198,13 @@ void fields(auto& d, auto& c, Is<ManifoldContact> auto& m) {
   d("gap", c.gap, m.gap);
   d("velocity_W", c.velocity_W, m.velocity_W);
 }
+void fields(auto& d, auto& c, Is<HandPull> auto& m) {
+  d("hand", c.hand_id, m.hand);
+  fields(d, c.X_WG, m.X_WG);
+  d("p_BoC_B", c.p_BoC_B, m.p_BoC_B);
+  d("stiffness", c.stiffness, m.stiffness);
+  d("rotational_stiffness", c.rotational_stiffness, m.rotational_stiffness);
+}
 void fields(auto& d, auto& c, Is<PairContact> auto& m) {
   d("a", c.a, m.a);
   d("b", c.b, m.b);
@@ -296,6 +303,7 @@ void fields(auto& d, auto& c, Is<HandManifold> auto& m) {
   d("validity_radius", c.validity_radius, m.validity_radius);
   d("step_revision", c.step_revision, m.step_revision);
   d("frozen", c.frozen, m.frozen);
+  d.list("others", c.others, m.others, kOtherPulls, kStructs);
   d.list("contacts", c.contacts, m.contacts, kManifoldContacts, kStructs);
 }
 void fields(auto& d, auto& c, Is<HandState> auto& m) {
@@ -475,7 +483,7 @@ void fields(auto& d, auto& c, JournalPart auto& m) {
 }
 
 bool statusExists(const ObjectState& state) {
-  return state.status <= static_cast<std::uint8_t>(ObjectStatus::kFixed);
+  return state.status <= static_cast<std::uint8_t>(ObjectStatus::kFree);
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ enum Role { ROLE_ADMIN, ROLE_INSTRUCTOR, ROLE_TRAINEE, ROLE_OBSERVER, ROLE_RECOR
   boolean active; double p_WC[3]; DeviceSample samples[4];  // newest first
 };
 
-// status: 0 hidden, 1 parked, 2 held, 3 tracked, 4 fixed
+// status: 0 hidden, 1 parked, 2 held, 3 tracked, 4 fixed, 5 free
 @final @nested struct ObjectState {
   uint32 object_id; uint32 epoch; Pose X_WO; float V_WO[6]; uint32 holder; octet status; boolean in_contact;
 };
@@ -57,10 +57,14 @@ enum Role { ROLE_ADMIN, ROLE_INSTRUCTOR, ROLE_TRAINEE, ROLE_OBSERVER, ROLE_RECOR
 @final @nested struct ManifoldContact {
   uint32 other; float p_BoP_B[3]; float normal_A[3]; float plane_offset; float gap; float velocity_W[3];
 };
+@final @nested struct HandPull {
+  uint32 hand_id; Pose X_WG; double p_BoC_B[3]; double stiffness; double rotational_stiffness;
+};
 @final struct HandManifold {
   @key uint32 hand_id; uint32 server_epoch; uint64 tick; uint32 answers_seq; uint32 object_id;
   uint32 object_epoch; Pose X_HO; Pose X_WO; Wrench F_Ho_W; double stiffness; double rotational_stiffness;
-  double validity_radius; uint32 step_revision; boolean frozen; sequence<ManifoldContact, 16> contacts;
+  double validity_radius; uint32 step_revision; boolean frozen; sequence<HandPull, 2> others;
+  sequence<ManifoldContact, 16> contacts;
 };
 @final struct HandState {
   @key uint32 hand_id; uint32 seq; Pose X_WH; double p_WC[3]; Pose X_WO_local; Wrench F_Ho_W;

@@ -15,6 +15,11 @@ inline constexpr double kUnfinished = 1e-6;
 /// [m] A depth that the field's steps and a turned contact may leave behind.
 inline constexpr double kFieldNoise = 5e-6;
 
+/// [m] The way of a body's fastest point, at most.
+[[nodiscard]] inline double fastestWay(const Displacement& motion, double radius) {
+  return motion.translation.norm() + motion.rotation.norm() * radius;
+}
+
 /// What an island solver is asked to do, passed from step to step of it; how its files share it. All spans
 /// live as long as the call.
 ///

@@ -10,12 +10,8 @@
 namespace tenon {
 namespace {
 
-/// [m] A body that others hold back has arrived earlier: what is left is the field's steps of 1.5 um, which
-/// change under every point as it goes.
-constexpr double kSettled = 2e-6;
-
-/// [m] Once it has moved in a tick, what is left of this is for the next one.
-constexpr double kNearlySettled = 5e-6;
+/// Once it has moved in a tick, so many times what counts as settled may be left for the next one.
+constexpr double kLeftForNext = 2.5;
 
 /// A step back of more than this share of the last step means that the last one went too far.
 constexpr double kOvershoot = 0.1;
@@ -38,6 +34,7 @@ IslandSolver::IslandSolver(std::size_t max_bodies, std::size_t max_pairs)
       motions_(max_bodies),
       gone_(max_bodies),
       best_(max_bodies),
+      start_(max_bodies),
       wrenches_(max_bodies),
       depths_(max_bodies),
       touched_(max_bodies) {
@@ -66,7 +63,11 @@ SolveReport IslandSolver::solve(std::span<MovableBody> bodies, std::span<const I
 }
 
 void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
-  for (MovableBody& body : job.bodies) body.brakes.clear();
+  for (std::size_t i = 0; i < job.bodies.size(); ++i) {
+    start_[i] = job.bodies[i].X_WB;
+    job.bodies[i].brakes.clear();
+    job.bodies[i].pinned = false;
+  }
   std::fill(gone_.begin(), gone_.end(), Displacement{});
   double best = std::numeric_limits<double>::infinity();
   double at_start = best;
@@ -88,9 +89,8 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
       reach *= 0.5;
     }
     if (brakeOvershoot(job)) solveMotions(job, report, rows_.size());
+    if (arrived(job, worse == 0 && report.substeps > 0 ? kLeftForNext : 1.0)) break;
     double way = travel(job);
-    const bool held = std::any_of(touched_.begin(), touched_.end(), [](std::uint8_t t) { return t != 0; });
-    if (way < (held ? (worse == 0 && report.substeps > 0 ? kNearlySettled : kSettled) : kArrived)) break;
     const bool last = report.substeps == job.limits.substeps;
     // where the tick began is where the field's steps let it go: every way on is a way back
     const bool stays = best == at_start && worse > kWorsePlaces && way < kLittleWay;
@@ -111,7 +111,7 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
       break;
     }
     // one share for all: between two admissible places every place is admissible
-    move(job, std::min(1.0, std::min(reach, knownReach(job)) / way));
+    move(job, std::min({1.0, std::min(reach, knownReach(job)) / way, shareWithinReach(job)}));
     ++report.substeps;
   }
   fillForces(job);
@@ -128,11 +128,9 @@ double IslandSolver::merit(const Job& job) {
   for (const MovableBody& body : job.bodies) {
     for (const Spring& spring : body.springs) {
       const Displacement toGoal = displacement(body.X_WB, spring.X_WG);
-      const double stretch2 = (spring.X_WG * spring.p_BC - body.X_WB * spring.p_BC).squaredNorm();
-      energy +=
-          0.5 * (spring.stiffness * stretch2 + spring.rotational_stiffness * toGoal.rotation.squaredNorm());
-      force += spring.stiffness * std::sqrt(stretch2) +
-               spring.rotational_stiffness * toGoal.rotation.norm() / body.radius;
+      const double stretch = (spring.X_WG * spring.p_BC - body.X_WB * spring.p_BC).norm();
+      energy += springEnergy(spring, body.X_WB);
+      force += spring.stiffness * stretch + springTorque(spring, toGoal.rotation).norm() / body.radius;
     }
   }
   double depth = 0.0;
@@ -159,6 +157,7 @@ void copyResult(const IslandPairResult& from, IslandPairResult& to) noexcept {
 }
 
 void IslandSolver::look(const Job& job, SolveReport& report) {
+  pinWhatHasGoneItsReach(job);
   lookAround(job, report);
   buildRows(job);
   // most often what held at the last place holds here too
@@ -192,10 +191,38 @@ void IslandSolver::solveMotions(const Job& job, SolveReport& report, std::size_t
 double IslandSolver::travel(const Job& job) const {
   double farthest = 0.0;
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
-    farthest = std::max(farthest,
-                        motions_[i].translation.norm() + motions_[i].rotation.norm() * job.bodies[i].radius);
+    farthest = std::max(farthest, fastestWay(motions_[i], job.bodies[i].radius));
   }
   return farthest;
+}
+
+bool IslandSolver::arrived(const Job& job, double slack) const {
+  const bool held = std::any_of(touched_.begin(), touched_.end(), [](std::uint8_t t) { return t != 0; });
+  for (std::size_t i = 0; i < job.bodies.size(); ++i) {
+    const MovableBody& body = job.bodies[i];
+    if (fastestWay(motions_[i], body.radius) >= (held ? slack * body.settled : kArrived)) return false;
+  }
+  return true;
+}
+
+double IslandSolver::shareWithinReach(const Job& job) const {
+  double share = 1.0;
+  for (std::size_t i = 0; i < job.bodies.size(); ++i) {
+    const MovableBody& body = job.bodies[i];
+    const double way = fastestWay(motions_[i], body.radius);
+    if (body.pinned || way < kArrived) continue;
+    share = std::min(share, (body.reach - fastestWay(displacement(start_[i], body.X_WB), body.radius)) / way);
+  }
+  return std::max(share, 0.0);
+}
+
+void IslandSolver::pinWhatHasGoneItsReach(const Job& job) const {
+  for (std::size_t i = 0; i < job.bodies.size(); ++i) {
+    MovableBody& body = job.bodies[i];
+    if (!std::isfinite(body.reach)) continue;
+    const double gone = fastestWay(displacement(start_[i], body.X_WB), body.radius);
+    body.pinned = body.reach - gone < kArrived;
+  }
 }
 
 void IslandSolver::move(const Job& job, double share) {

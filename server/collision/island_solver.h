@@ -137,6 +137,11 @@ class IslandSolver {
   void solveMotions(const Job& job, SolveReport& report, std::size_t unchanged = 0);
   /// [m] the farthest that any point of any body goes.
   [[nodiscard]] double travel(const Job& job) const;
+  /// Nobody has more to go than is left to the next tick: `slack` times its `settled`.
+  [[nodiscard]] bool arrived(const Job& job, double slack) const;
+  /// Of the motions that takes nobody beyond its reach.
+  [[nodiscard]] double shareWithinReach(const Job& job) const;
+  void pinWhatHasGoneItsReach(const Job& job) const;
   void move(const Job& job, double share);
   /// [J] how good a place is: the springs' energy, and a price on what is too deep that no spring can pay.
   [[nodiscard]] static double merit(const Job& job);
@@ -185,6 +190,7 @@ class IslandSolver {
   std::vector<Displacement> motions_;
   std::vector<Displacement> gone_;     ///< in the last sub-step
   std::vector<Pose> best_;             ///< of the places of this solve
+  std::vector<Pose> start_;            ///< of this solve
   std::vector<Wrench> wrenches_;       ///< for kBlocking: penalties on a body, about its origin
   std::vector<double> depths_;         ///< for kBlocking: the deepest of a body's contacts
   std::vector<std::uint8_t> touched_;  ///< a row holds the body back

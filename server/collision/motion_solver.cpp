@@ -142,7 +142,13 @@ Wrench springWrench(const Spring& spring, const Pose& X_WB) noexcept {
   const Displacement toGoal = displacement(X_WB, spring.X_WG);
   const Vector3 p_BoC_W = X_WB.rotation() * spring.p_BC;
   const Vector3 f_C_W = spring.stiffness * (spring.X_WG * spring.p_BC - X_WB * spring.p_BC);
-  return {f_C_W, p_BoC_W.cross(f_C_W) + spring.rotational_stiffness * toGoal.rotation};
+  return {f_C_W, p_BoC_W.cross(f_C_W) + springTorque(spring, toGoal.rotation)};
+}
+
+double springEnergy(const Spring& spring, const Pose& X_WB) noexcept {
+  const Vector3 turn_W = displacement(X_WB, spring.X_WG).rotation;
+  const double stretch2 = (spring.X_WG * spring.p_BC - X_WB * spring.p_BC).squaredNorm();
+  return 0.5 * (spring.stiffness * stretch2 + springTorque(spring, turn_W).dot(turn_W));
 }
 
 }  // namespace tenon

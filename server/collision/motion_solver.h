@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 
@@ -15,6 +16,8 @@ struct Spring {
   Vector3 p_BC = Vector3::Zero();     ///< the point of the body it holds; moments are about it
   double stiffness = 0.0;             ///< [N/m]
   double rotational_stiffness = 0.0;  ///< [Nm/rad]
+  /// [Nm/rad] what depends on the axis: an inertia tensor over the tick squared. Zero for a hand.
+  Matrix3 rotational_tensor_W = Matrix3::Zero();
 };
 
 /// A direction along which a body had overshot: its energy is taken to be `share` times steeper there. This
@@ -35,14 +38,21 @@ inline constexpr std::size_t kMaxSprings = 4;
 inline constexpr std::size_t kMaxBrakes = 4;
 inline constexpr std::size_t kMaxCurves = 12;
 
+/// [m] A body that others hold back has arrived earlier: what is left is the field's steps of 1.5 um, which
+/// change under every point as it goes.
+inline constexpr double kSettled = 2e-6;
+
 /// A body that the solver may move.
 struct MovableBody {
   Pose X_WB;
   FixedVector<Spring, kMaxSprings> springs;  ///< at least one with a stiffness
   double radius = 0.1;                       ///< [m] of the body about its origin: no point is farther
-  FixedVector<Brake, kMaxBrakes> brakes;     ///< set and cleared by IslandSolver
-  FixedVector<Curve, kMaxCurves> curves;     ///< likewise
-  Wrench drag_Bo_W;                          ///< of what the body slides on; likewise
+  double settled = kSettled;  ///< [m] having less than this to go, a body in contact has arrived
+  double reach = std::numeric_limits<double>::infinity();  ///< [m] no point goes farther in one solve
+  bool pinned = false;                                     ///< has gone that far; set by IslandSolver
+  FixedVector<Brake, kMaxBrakes> brakes;                   ///< set and cleared by IslandSolver
+  FixedVector<Curve, kMaxCurves> curves;                   ///< likewise
+  Wrench drag_Bo_W;                                        ///< of what the body slides on; likewise
 };
 
 /// gap + n · (motion of A's point - motion of B's point) >= 0. A body index of kStatic does not move.
@@ -87,6 +97,14 @@ class MotionSolver {
   struct Workspace;
   std::unique_ptr<Workspace> workspace_;
 };
+
+/// [Nm] of a spring whose body still has `turn_W` to turn.
+[[nodiscard]] inline Vector3 springTorque(const Spring& spring, const Vector3& turn_W) {
+  return spring.rotational_stiffness * turn_W + spring.rotational_tensor_W * turn_W;
+}
+
+/// [J] stored in a spring.
+[[nodiscard]] double springEnergy(const Spring& spring, const Pose& X_WB) noexcept;
 
 /// The wrench of a spring on its body B, about B's origin, in W; minus that is what the hand feels.
 [[nodiscard]] Wrench springWrench(const Spring& spring, const Pose& X_WB) noexcept;

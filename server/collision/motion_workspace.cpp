@@ -14,6 +14,9 @@ constexpr double kGapTolerance = 1e-11;
 /// the body's radius makes the answer unique, and is too weak to be felt.
 constexpr double kLeastRotation = 1e-6;
 
+/// A body that may go no farther is this many times as hard to move.
+constexpr double kPinned = 1e9;
+
 /// A spring seen from the body's pose, to first order: its energy is ½ xᵀ H x - bᵀ x, x = (translation,
 /// rotation).
 void addSpring(const Spring& spring, const Pose& X_WB, Matrix6& H, Vector6& b) {
@@ -25,9 +28,10 @@ void addSpring(const Spring& spring, const Pose& X_WB, Matrix6& H, Vector6& b) {
                                     {-p_BoC_W.z(), 0.0, p_BoC_W.x()},
                                     {p_BoC_W.y(), -p_BoC_W.x(), 0.0}};
   H += spring.stiffness * (J.transpose() * J);
-  H.bottomRightCorner<3, 3>() += spring.rotational_stiffness * Matrix3::Identity();
+  H.bottomRightCorner<3, 3>() +=
+      spring.rotational_stiffness * Matrix3::Identity() + spring.rotational_tensor_W;
   b += spring.stiffness * (J.transpose() * p_CoGc_W);
-  b.tail<3>() += spring.rotational_stiffness * toGoal.rotation;
+  b.tail<3>() += springTorque(spring, toGoal.rotation);
 }
 
 }  // namespace
@@ -55,6 +59,10 @@ void MotionSolver::Workspace::setBody(std::size_t i, const MovableBody& body) {
     const Vector6 steep = H * along;
     const double energy2 = along.dot(steep);
     if (energy2 > 0.0) H += (brake.share / energy2) * (steep * steep.transpose());
+  }
+  if (body.pinned) {
+    H *= kPinned;
+    b.setZero();
   }
   L[i] = H.llt().matrixL();
   segment(y0, i) = L[i].triangularView<Eigen::Lower>().solve(b);

@@ -38,6 +38,18 @@ struct StructureSettings {
   std::vector<Eigen::AlignedBox3d> refine;  ///< given by hand, in the object's frame
 };
 
+/// What makes an object a free body; what is not given follows from its volume.
+struct ScenarioBody {
+  std::optional<double> mass;        ///< [kg]; else by density
+  double density = 0.0;              ///< [kg/m^3]
+  std::optional<Vector3> p_OC_O;     ///< centre of mass
+  std::optional<Vector3> inertia_C;  ///< [kg m^2] moments about it, along the object's axes
+  bool floating = false;
+  double damping = 0.0;  ///< [1/s]
+  double friction = 0.4;
+  int line = 0;
+};
+
 struct ScenarioObject {
   std::string name;
   Texts title;
@@ -50,6 +62,7 @@ struct ScenarioObject {
   Pose X_WO;
   ObjectStatus status = ObjectStatus::kParked;
   double stiffness = 1000.0;  ///< [N/m]
+  std::optional<ScenarioBody> body;
   int line = 0;
 };
 
@@ -76,7 +89,7 @@ struct ScenarioPair {
 };
 
 enum class PlacementKind : std::uint8_t {
-  kShow,  ///< parked at `X_WO`, or where it is
+  kShow,  ///< parked at `X_WO`, or where it is; a free body falls from there
   kHide,
   kFix,   ///< the paper's fixedPose
   kFree,  ///< may be taken again, stays where it is
@@ -99,6 +112,8 @@ struct PairSwitch {
   bool enabled = true;
 };
 
+inline constexpr std::size_t kMostHelpers = 4;  ///< `may_take` of a state
+
 enum class TimeoutAction : std::uint8_t { kFail, kSkip };
 
 /// One state of the array of paper Fig. 4.
@@ -111,6 +126,8 @@ struct ScenarioState {
   std::vector<PairSwitch> pairs;
   std::vector<Placement> placements;
   std::vector<HandAssignment> hands;  ///< the paper's hdIndex: who moves what from this state on
+  /// Hands that may take hold of a part as well for the time of this state, by touching it as one takes it.
+  std::vector<HandAssignment> may_take;
   // what is asked
   ObjectId object;
   HandId hand;
@@ -137,6 +154,7 @@ struct ScenarioFile {
   std::string name;             ///< of its folder: what the part generator calls it
   std::string language = "en";
   Texts title;
+  Vector3 gravity_W{0.0, 0.0, -9.81};   ///< [m/s^2]
   double reach = 10.0;                  ///< [m] no pose may be farther from the world's origin
   std::vector<ScenarioObject> objects;  ///< index = ObjectId
   std::vector<ScenarioHand> hands;      ///< index = HandId
@@ -176,6 +194,9 @@ struct ScenarioFile {
 /// there and at most a quarter of the clearance. Fails when both cannot hold.
 [[nodiscard]] Result<double> dilationOf(const ScenarioFile& scenario, const ScenarioPair& pair,
                                         ObjectId field);
+
+/// The mass of a free body, and how it is spread. Fails when the object encloses no volume to reckon with.
+[[nodiscard]] Result<BodySpec> bodyOf(const ScenarioObject& object, const HapticStructures& structures);
 
 /// The read-only scene. `structures` by ObjectId; null for an object that is only seen.
 [[nodiscard]] Result<std::shared_ptr<const Scene>> makeScene(

@@ -11,10 +11,11 @@ namespace {
 
 using Key = std::string_view;
 
-constexpr std::array<Key, 8> kScenario{"title", "language", "reach",     "objects",
+constexpr std::array<Key, 9> kScenario{"title", "language", "reach",     "gravity", "objects",
                                        "hands", "pairs",    "pairs_off", "states"};
-constexpr std::array<Key, 11> kObject{"name", "title",      "kind",  "color",  "group",    "meshes",
-                                      "felt", "structures", "start", "status", "stiffness"};
+constexpr std::array<Key, 12> kObject{"name", "title",      "kind",  "color",  "group",     "meshes",
+                                      "felt", "structures", "start", "status", "stiffness", "body"};
+constexpr std::array<Key, 7> kBody{"mass", "density", "centre", "inertia", "floating", "damping", "friction"};
 constexpr std::array<Key, 3> kMesh{"part", "file", "unit"};
 constexpr std::array<Key, 5> kStructures{"voxel", "refinement", "points", "spacing", "refine"};
 constexpr std::array<Key, 2> kBox{"from", "to"};
@@ -23,10 +24,10 @@ constexpr std::array<Key, 2> kTurn{"axis", "deg"};
 constexpr std::array<Key, 6> kHand{"name", "role", "kind", "object", "stiffness", "rotational_stiffness"};
 constexpr std::array<Key, 7> kPair{"between", "clearance", "dilation",        "sensing",
                                    "enabled", "friction",  "sliding_friction"};
-constexpr std::array<Key, 22> kState{"name",       "title",   "instruction", "part", "hands",    "show",
+constexpr std::array<Key, 23> kState{"name",       "title",   "instruction", "part", "hands",    "show",
                                      "hide",       "place",   "fix",         "free", "pairs_on", "pairs_off",
                                      "object",     "hand",    "touch",       "for",  "target",   "approach",
-                                     "conditions", "timeout", "on_timeout",  "snap"};
+                                     "conditions", "timeout", "on_timeout",  "snap", "may_take"};
 constexpr std::array<Key, 6> kTarget{"at", "turn", "q", "within", "angle", "dwell"};
 constexpr std::array<Key, 2> kApproach{"direction", "distance"};
 constexpr std::array<Key, 10> kCondition{"all",     "any",          "when",    "pose",   "force",
@@ -39,6 +40,7 @@ constexpr std::array<Key, 2> kContactTimeCondition{"object", "at_least"};
 constexpr std::array kMappings{
     ScenarioMapping{"scenario", kScenario},
     ScenarioMapping{"object", kObject},
+    ScenarioMapping{"body", kBody},
     ScenarioMapping{"mesh", kMesh},
     ScenarioMapping{"structures", kStructures},
     ScenarioMapping{"box", kBox},

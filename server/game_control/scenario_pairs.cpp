@@ -10,7 +10,7 @@ std::vector<bool> ScenarioReader::whoCanMove(const YAML::Node& states) const {
   std::vector<bool> moves(scenario_.objects.size(), false);
   for (std::size_t i = 0; i < moves.size(); ++i) {
     const ObjectStatus status = scenario_.objects[i].status;
-    moves[i] = status == ObjectStatus::kHeld || status == ObjectStatus::kTracked;
+    moves[i] = scenario_.objects[i].body || status == ObjectStatus::kHeld || status == ObjectStatus::kTracked;
   }
   for (const ScenarioHand& hand : scenario_.hands) moves[hand.object.value] = true;
   // what a hand takes or shall bring somewhere; what is wrong with it is said when the states are read

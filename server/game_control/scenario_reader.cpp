@@ -18,11 +18,12 @@ constexpr double kLargestVoxel = 0.1;
 template <typename Value, std::size_t N>
 using Words = std::array<std::pair<std::string_view, Value>, N>;
 
-constexpr Words<ObjectStatus, 5> kStatuses{{{"hidden", ObjectStatus::kHidden},
+constexpr Words<ObjectStatus, 6> kStatuses{{{"hidden", ObjectStatus::kHidden},
                                             {"parked", ObjectStatus::kParked},
                                             {"held", ObjectStatus::kHeld},
                                             {"tracked", ObjectStatus::kTracked},
-                                            {"fixed", ObjectStatus::kFixed}}};
+                                            {"fixed", ObjectStatus::kFixed},
+                                            {"free", ObjectStatus::kFree}}};
 constexpr Words<Role, 2> kRoles{{{"trainee", Role::kTrainee}, {"instructor", Role::kInstructor}}};
 constexpr Words<HandKind, 2> kHandKinds{{{"coupled", HandKind::kCoupled}, {"tracked", HandKind::kTracked}}};
 constexpr std::array<std::string_view, 7> kObjectKinds{"part",    "tool", "pointer", "assistant",
@@ -79,6 +80,8 @@ void ScenarioReader::readScenario(const YAML::Node& root) {
   if (scenario_.title.empty()) scenario_.title.push_back({scenario_.language, scenario_.name});
   scenario_.reach =
       yaml_.numberOr(root["reach"], Quantity::kLength, "'reach'", 0.01, 1000.0, scenario_.reach);
+  if (root["gravity"].IsDefined())
+    scenario_.gravity_W = yaml_.vector(root["gravity"], Quantity::kPlain, "'gravity'");
 
   if (!yaml_.isList(root["objects"], "'objects'", kMostObjects)) return;
   for (const auto& object : root["objects"]) readObject(object);
@@ -128,7 +131,11 @@ void ScenarioReader::readObject(const YAML::Node& node) {
   object.felt = yaml_.yesNo(node["felt"], "'felt'" + of, true);
   object.stiffness =
       yaml_.numberOr(node["stiffness"], Quantity::kStiffness, "'stiffness'" + of, 1.0, 1e6, object.stiffness);
-  object.status = oneOf(yaml_, node["status"], "'status'" + of, kStatuses, ObjectStatus::kParked);
+  if (node["body"].IsDefined()) readBody(node["body"], object);
+  object.status = oneOf(yaml_, node["status"], "'status'" + of, kStatuses,
+                        object.body ? ObjectStatus::kFree : ObjectStatus::kParked);
+  if (object.status == ObjectStatus::kFree && !object.body)
+    yaml_.fail(node["status"], "object '" + object.name + "' is free but has no 'body', expected its mass");
   if (node["start"].IsDefined() && yaml_.openMapping(node["start"], "pose", "'start'" + of)) {
     object.X_WO = yaml_.pose(node["start"], "'start'" + of);
     if (object.X_WO.translation().norm() > scenario_.reach) {

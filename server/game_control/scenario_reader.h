@@ -25,6 +25,7 @@ class ScenarioReader {
   void readScenario(const YAML::Node& root);
   void readObject(const YAML::Node& node);
   void readMeshes(const YAML::Node& node, ScenarioObject& object);
+  void readBody(const YAML::Node& node, ScenarioObject& object);  // scenario_bodies.cpp
   void readStructures(const YAML::Node& node, ScenarioObject& object);
   void readHand(const YAML::Node& node);
   /// Every two objects that can ever touch, one pair each.

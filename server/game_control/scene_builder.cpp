@@ -214,6 +214,7 @@ Result<std::shared_ptr<const Scene>> makeScene(const ScenarioFile& scenario, Str
   if (const auto checked = checkTargets(scenario, structures); !checked)
     return tl::unexpected(checked.error());
   auto scene = std::make_shared<Scene>();
+  scene->gravity_W = scenario.gravity_W;
 
   std::vector<std::string> groups;
   for (std::size_t i = 0; i < structures.size(); ++i) {
@@ -228,6 +229,11 @@ Result<std::shared_ptr<const Scene>> makeScene(const ScenarioFile& scenario, Str
     spec.status = object.status;
     spec.structures = object.felt ? structures[i] : nullptr;
     spec.stiffness = object.stiffness;
+    if (object.body) {
+      const auto body = bodyOf(object, *structures[i]);
+      if (!body) return fail(at(scenario, object.body->line) + body.error().what);
+      spec.body = *body;
+    }
     scene->objects.push_back(std::move(spec));
   }
   for (const ScenarioPair& pair : scenario.pairs) {

@@ -75,6 +75,7 @@ void StateMachine::step(Environment& environment, std::span<const GameCommand> c
   ++memory_.elapsed;
   measure(scene);
   takeAgain(environment, scene);
+  letHelpersTake(environment, scene);
   const bool skipped = std::any_of(commands.begin(), commands.end(), [](const GameCommand& command) {
     return command.kind == CommandKind::kSkipStep;
   });
@@ -136,6 +137,7 @@ void StateMachine::enter(Environment& environment, std::uint32_t step) noexcept 
   memory_.elapsed = 0;
   memory_.contact_ticks = 0;
   memory_.retake = {};
+  memory_.helping = {};
 
   for (const PairSwitch& change : state().pairs) environment.setPairEnabled(change.pair, change.enabled);
   for (const Placement& placement : state().placements) place(environment, placement);
@@ -154,10 +156,11 @@ void StateMachine::enter(Environment& environment, std::uint32_t step) noexcept 
 void StateMachine::place(Environment& environment, const Placement& placement) noexcept {
   const Pose X_WO = placement.X_WO.value_or(environment.objects()[placement.object.value].X_WO);
   releaseFromHands(environment, placement.object);
+  const bool has_mass = scenario_->objects[placement.object.value].body.has_value();
   switch (placement.kind) {
     case PlacementKind::kShow:
     case PlacementKind::kFree:
-      environment.place(placement.object, X_WO, ObjectStatus::kParked);
+      environment.place(placement.object, X_WO, has_mass ? ObjectStatus::kFree : ObjectStatus::kParked);
       break;
     case PlacementKind::kHide:
       environment.place(placement.object, X_WO, ObjectStatus::kHidden);
@@ -178,6 +181,27 @@ void StateMachine::takeAgain(Environment& environment, const SceneView& scene) n
     memory_.retake = {};
     environment.grab(hand, assignment.object);
     return;
+  }
+}
+
+void StateMachine::letHelpersTake(Environment& environment, const SceneView& scene) noexcept {
+  for (std::size_t i = 0; i < state().may_take.size(); ++i) {
+    const HandAssignment& helper = state().may_take[i];
+    const HandId hand = handInRole(*scenario_, environment, helper.hand);
+    const ObjectId own = environment.hands()[hand.value].own;
+    ContactTimer& timer = memory_.helping[i];
+    if (environment.hands()[hand.value].object != own) continue;
+    timer.step(scene.touching(own, helper.object), kRetakeLapse);
+    if (timer.touched < kRetakeTicks) continue;
+    timer = {};
+    environment.grab(hand, helper.object);
+  }
+}
+
+void StateMachine::dismissHelpers(Environment& environment) noexcept {
+  for (const HandAssignment& helper : state().may_take) {
+    const HandId hand = handInRole(*scenario_, environment, helper.hand);
+    if (environment.hands()[hand.value].object == helper.object) environment.release(hand);
   }
 }
 
@@ -202,6 +226,7 @@ void StateMachine::leave(Environment& environment, StepPhase phase) noexcept {
   status.failed = phase == StepPhase::kTimedOut && state().on_timeout == TimeoutAction::kFail;
   if (status.failed) return;
   status.finished = status.step + 1 == scenario_->states.size();
+  dismissHelpers(environment);
   if (!state().snap) return;
   releaseFromHands(environment, state().object);
   environment.place(state().object, *state().X_WG, ObjectStatus::kFixed);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -71,6 +72,7 @@ class StateMachine {
     std::uint64_t elapsed = 0;        ///< [ticks] in this state
     std::uint64_t contact_ticks = 0;  ///< of the state's object
     ContactTimer retake;              ///< of a part that was let go and the hand that shall move it
+    std::array<ContactTimer, kMostHelpers> helping;  ///< of the hands that may take a part as well
   };
   template <typename Visitor>
   static void visitMemory(Memory& memory, Visitor&& visit);
@@ -81,6 +83,8 @@ class StateMachine {
   void obey(Environment& environment, const GameCommand& command) noexcept;
   void place(Environment& environment, const Placement& placement) noexcept;
   void takeAgain(Environment& environment, const SceneView& scene) noexcept;
+  void letHelpersTake(Environment& environment, const SceneView& scene) noexcept;
+  void dismissHelpers(Environment& environment) noexcept;
   void swapHands(Environment& environment) noexcept;
   void measure(const SceneView& scene) noexcept;
   void listReadings() noexcept;

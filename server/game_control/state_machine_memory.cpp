@@ -51,6 +51,10 @@ void StateMachine::visitMemory(Memory& memory, Visitor&& visit) {
   visit(memory.contact_ticks);
   visit(memory.retake.touched);
   visit(memory.retake.away);
+  for (ContactTimer& timer : memory.helping) {
+    visit(timer.touched);
+    visit(timer.away);
+  }
 }
 
 void StateMachine::addTo(StateHash& hash) const noexcept {

@@ -88,6 +88,7 @@ void StateReader::readEffects(const YAML::Node& node, ScenarioState& state) {
     hidden_[placement.object.value] = placement.kind == PlacementKind::kHide;
   }
   readHands(node["hands"], state);
+  readHelpers(node["may_take"], state);
 }
 
 void StateReader::readPlacements(const YAML::Node& node, const std::string& key, PlacementKind kind,
@@ -145,6 +146,29 @@ void StateReader::readHands(const YAML::Node& node, ScenarioState& state) {
     }
     moved_by_[hand.value] = object;
     state.hands.push_back({hand, object});
+  }
+}
+
+void StateReader::readHelpers(const YAML::Node& node, ScenarioState& state) {
+  if (!node.IsDefined()) return;
+  const std::string what = in(state, "may_take");
+  if (!node.IsMap() || node.size() > kMostHelpers) {
+    yaml_.fail(node, what + " must be a mapping from hand to object, such as {left: peg}, of at most " +
+                         std::to_string(kMostHelpers));
+    return;
+  }
+  for (const auto& entry : node) {
+    const HandId hand = names_.hand(entry.first, what);
+    const ObjectId object = names_.object(entry.second, what);
+    if (!hand.valid() || !object.valid()) return;
+    const ScenarioHand& helper = scenario_.hands[hand.value];
+    if (moved_by_[hand.value] == object) {
+      yaml_.fail(entry.first, what + ": '" + helper.name + "' moves '" + names_.nameOf(object) + "' already");
+    } else if (scenario_.pairOf(helper.object, object) < 0) {
+      yaml_.fail(entry.second, what + ": '" + names_.nameOf(helper.object) + "' and '" +
+                                   names_.nameOf(object) + "' never touch");
+    }
+    state.may_take.push_back({hand, object});
   }
 }
 

@@ -26,6 +26,7 @@ class StateReader {
   void readPlacements(const YAML::Node& node, const std::string& key, PlacementKind kind,
                       ScenarioState& state);
   void readHands(const YAML::Node& node, ScenarioState& state);
+  void readHelpers(const YAML::Node& node, ScenarioState& state);
   void readTask(const YAML::Node& node, ScenarioState& state);
   void readTarget(const YAML::Node& node, ScenarioState& state);
   void readApproach(const YAML::Node& node, ScenarioState& state);

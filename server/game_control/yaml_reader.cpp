@@ -26,6 +26,8 @@ constexpr std::array kTimes{Unit{"s", 1.0}, Unit{"ms", 1e-3}, Unit{"min", 60.0}}
 constexpr std::array kForces{Unit{"N", 1.0}};
 constexpr std::array kStiffnesses{Unit{"N/m", 1.0}, Unit{"N/mm", 1e3}};
 constexpr std::array kRotationalStiffnesses{Unit{"Nm/rad", 1.0}};
+constexpr std::array kMasses{Unit{"kg", 1.0}, Unit{"g", 1e-3}};
+constexpr std::array kDensities{Unit{"kg/m3", 1.0}, Unit{"g/cm3", 1e3}};
 
 std::span<const Unit> unitsOf(Quantity quantity) {
   switch (quantity) {
@@ -41,6 +43,10 @@ std::span<const Unit> unitsOf(Quantity quantity) {
       return kStiffnesses;
     case Quantity::kRotationalStiffness:
       return kRotationalStiffnesses;
+    case Quantity::kMass:
+      return kMasses;
+    case Quantity::kDensity:
+      return kDensities;
     case Quantity::kPlain:
       break;
   }
@@ -61,6 +67,10 @@ std::string_view exampleOf(Quantity quantity) {
       return "a stiffness such as 1000 N/m";
     case Quantity::kRotationalStiffness:
       return "a stiffness such as 20 Nm/rad";
+    case Quantity::kMass:
+      return "a mass such as 0.4 kg or 250 g";
+    case Quantity::kDensity:
+      return "a density such as 2700 kg/m3 or 2.7 g/cm3";
     case Quantity::kPlain:
       break;
   }

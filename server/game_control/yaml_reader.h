@@ -21,6 +21,8 @@ enum class Quantity : std::uint8_t {
   kForce,
   kStiffness,
   kRotationalStiffness,
+  kMass,
+  kDensity,
   kPlain
 };
 

@@ -50,7 +50,8 @@ void CollPair::press(double stiffness, const Pose& X_WA) noexcept {
   room_->F_Ao_W = penaltyWrench(room_->query, X_WA.translation(), stiffness);
 }
 
-void CollPair::take(const IslandPairResult& result) noexcept {
+void CollPair::take(const IslandPairResult& result, Tick now) noexcept {
+  solved_ = now;
   copyResult(result, *room_);
   note(result.query);
 }
@@ -94,7 +95,7 @@ bool CollPair::putOff(Tick now, double closing_speed, double reach, double trave
   return true;
 }
 
-IslandPair CollPair::islandPair(const Pose& X_WA, const Pose& X_WB) const noexcept {
+IslandPair CollPair::islandPair(const Pose& X_WA, const Pose& X_WB, Tick now) const noexcept {
   IslandPair pair;
   pair.shell_A = shell_A_;
   pair.field_B = field_B_;
@@ -102,7 +103,7 @@ IslandPair CollPair::islandPair(const Pose& X_WA, const Pose& X_WB) const noexce
   pair.X_WB_static = X_WB;
   pair.dilation = spec_->dilation;
   pair.friction = spec_->friction;
-  pair.last = result();
+  pair.last = solvedBefore(now);
   return pair;
 }
 

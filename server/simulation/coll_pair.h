@@ -44,6 +44,11 @@ class CollPair {
   [[nodiscard]] const IslandPairResult* result() const { return lists() ? room_ : nullptr; }
   [[nodiscard]] bool lists() const { return looked_ && room_ != nullptr && !room_->query.contacts.empty(); }
   [[nodiscard]] bool touching() const noexcept { return lists() && gap_ <= kTouchGap; }
+  /// What an island's solver found in the tick before `now`; null when none did. Of a pair whose bodies
+  /// rested there may be older results, which depend on whether it was looked at meanwhile.
+  [[nodiscard]] const IslandPairResult* solvedBefore(Tick now) const {
+    return lists() && solved_ + 1 == now ? room_ : nullptr;
+  }
 
   [[nodiscard]] bool hasRoom() const { return room_ != nullptr; }
   void moveIn(IslandPairResult* room) noexcept { room_ = room; }
@@ -60,8 +65,8 @@ class CollPair {
   void query(const Pose& X_WA, const Pose& X_WB, double margin) noexcept;
   /// The penalty force of what query() found: the softer of the two gives way.
   void press(double stiffness, const Pose& X_WA) noexcept;
-  /// Takes over what a solver found.
-  void take(const IslandPairResult& result) noexcept;
+  /// Takes over what a solver found in `now`.
+  void take(const IslandPairResult& result, Tick now) noexcept;
 
   /// Sets when to look again, once the pair was looked at in `now`: while the fastest points approach each
   /// other by at most `closing_speed` [m/s], the gap stays above `reach` [m]. `travelled`: what the
@@ -71,14 +76,15 @@ class CollPair {
   /// when that does not spare the look.
   [[nodiscard]] bool putOff(Tick now, double closing_speed, double reach, double travelled) noexcept;
 
-  /// The pair as the island solver wants it, both bodies static.
-  [[nodiscard]] IslandPair islandPair(const Pose& X_WA, const Pose& X_WB) const noexcept;
+  /// The pair as the island solver of `now` wants it, both bodies static.
+  [[nodiscard]] IslandPair islandPair(const Pose& X_WA, const Pose& X_WB, Tick now) const noexcept;
 
   /// Every member that changes but the switch, to be written, read or hashed. What is read takes a room.
   template <typename Archive, typename Self>
   static void archive(Archive& archive, Self& self, ContactRooms& rooms) {
     archive(self.looked_);
     archive(self.due_);
+    archive(self.solved_);
     archive(self.travelled_);
     archive(self.gap_);
     archive(self.deepest_);
@@ -112,6 +118,7 @@ class CollPair {
   bool enabled_ = true;
   bool looked_ = false;
   Tick due_ = 0;
+  Tick solved_ = 0;  ///< by an island's solver, last
   double travelled_ = 0.0;
   double gap_ = 0.0;
   double deepest_ = 0.0;

@@ -24,10 +24,13 @@ SolveLimits cappedLimits(SolveLimits limits, double max_speed) {
   return limits;
 }
 
-std::size_t coupledHands(const Scene& scene) {
-  return static_cast<std::size_t>(
-      std::count_if(scene.hands.begin(), scene.hands.end(),
-                    [](const HandSpec& hand) { return hand.kind == HandKind::kCoupled; }));
+/// At most so many objects move at a time: what hands hold, and what has a mass.
+std::size_t mostMovable(const Scene& scene) {
+  const auto hands = std::count_if(scene.hands.begin(), scene.hands.end(),
+                                   [](const HandSpec& hand) { return hand.kind == HandKind::kCoupled; });
+  const auto bodies = std::count_if(scene.objects.begin(), scene.objects.end(),
+                                    [](const ObjectSpec& object) { return object.body.has_value(); });
+  return static_cast<std::size_t>(hands + bodies);
 }
 
 ObjectSize sizeOf(const ObjectSpec& spec) {
@@ -54,14 +57,16 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
     : rooms(roomsFor(scene, options)),
       odometers(scene.objects.size(), 0.0),
       pair_cells(scene.objects.size(), 0),
+      hand_count(scene.hands.size()),
       limits(cappedLimits(options.limits, options.max_speed)),
       broad_phase(scene),
       looked_at(scene.pairs.size(), 0),
       movable(scene.objects.size(), 0),
       solved(scene.objects.size(), 0),
+      at_rest(scene.objects.size(), 0),
       hidden(scene.objects.size(), 0),
       partition(scene.objects.size()),
-      islands(coupledHands(scene), roomsFor(scene, options), std::max(options.workers, 1U)),
+      islands(mostMovable(scene), roomsFor(scene, options), std::max(options.workers, 1U)),
       pool(options.workers) {
   reach = limits.contact_margin + kLookAheadReach + 2.0 * limits.substep_travel;
   pairs.reserve(scene.pairs.size());
@@ -69,6 +74,9 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
   left.reserve(scene.pairs.size());
   due.reserve(rooms.size());
   others.reserve(rooms.size());
+  // a body's contacts that push are about as many as it has ways to move
+  constexpr std::size_t kRubsPerObject = 16;
+  rubs.reserve(kRubsPerObject * scene.objects.size());
   for (std::size_t pair = 0; pair < scene.pairs.size(); ++pair) {
     pairs.emplace_back(scene, pair);
     cell_in_a.push_back(pair_cells[scene.pairs[pair].a.value]++);
@@ -86,8 +94,11 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
     }
   }
   for (std::size_t object = 0; object < scene.objects.size(); ++object) {
-    forces.emplace_back(pair_cells[object] + scene.hands.size(), options.send_policy);
+    forces.emplace_back(pair_cells[object] + scene.hands.size() + 1, options.send_policy);
     sizes.push_back(sizeOf(scene.objects[object]));
+    const std::optional<BodySpec>& body = scene.objects[object].body;
+    bodies.emplace_back();
+    if (body) bodies.back().emplace(FreeBody{RigidBody(*body, scene.gravity_W), {}});
   }
 }
 

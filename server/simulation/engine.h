@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "server/simulation/force_buffer.h"
 #include "server/simulation/island_work.h"
 #include "server/simulation/islands.h"
+#include "server/simulation/rigid_body.h"
 #include "server/simulation/worker_pool.h"
 
 namespace tenon {
@@ -39,6 +41,10 @@ struct Environment::Engine {
     return pair_cells[object.value] + hand.value;
   }
 
+  [[nodiscard]] std::size_t gravityCell(ObjectId object) const {
+    return pair_cells[object.value] + hand_count;
+  }
+
   [[nodiscard]] double travelledBy(const PairSpec& pair) const {
     return odometers[pair.a.value] + odometers[pair.b.value];
   }
@@ -53,6 +59,21 @@ struct Environment::Engine {
   /// On, possible, and nobody hidden when that was last looked at.
   [[nodiscard]] bool counts(std::size_t pair) const noexcept;
   void setEnabled(std::size_t pair, bool enabled) noexcept;
+
+  struct FreeBody {
+    RigidBody rigid;
+    // work space
+    Twist V_WC;                                       ///< how it wants to go in this tick, then how it went
+    Matrix3 inverse_inertia_W = Matrix3::Identity();  ///< about the centre of mass
+  };
+
+  /// A contact of a free body that rubs.
+  struct Rub {
+    ObjectId a, b;
+    Vector3 p_WP, n_W;
+    double most = 0.0;  ///< [N s]
+    Vector3 impulse_W;  ///< on a
+  };
 
   /// Leaves the work space as before the first tick.
   void forgetTick() noexcept;
@@ -71,8 +92,10 @@ struct Environment::Engine {
   std::vector<ObjectSize> sizes;                  ///< by object
   std::vector<std::uint32_t> pairs_of;            ///< object after object
   std::vector<std::size_t> pairs_from;            ///< by object: where its own begin, and one more
-  SolveLimits limits;                             ///< sub-steps cut so that a tick keeps the travel cap
-  double reach = 0.0;                             ///< [m] the largest margin any query of a tick may use
+  std::vector<std::optional<FreeBody>> bodies;    ///< by object: those that have a mass
+  std::size_t hand_count = 0;
+  SolveLimits limits;  ///< sub-steps cut so that a tick keeps the travel cap
+  double reach = 0.0;  ///< [m] the largest margin any query of a tick may use
 
   // work space
   BroadPhase broad_phase;
@@ -80,10 +103,12 @@ struct Environment::Engine {
   std::vector<std::uint32_t> due;       ///< near pairs to look at in this tick, in order
   std::vector<std::uint32_t> others;    ///< those of them that no island solves
   std::vector<std::uint8_t> looked_at;  ///< by pair, in this tick
-  std::uint32_t refused = 0;            ///< due pairs that found no room
-  std::vector<std::uint8_t> movable;    ///< by object: a hand pulls at it
-  std::vector<std::uint8_t> solved;     ///< by object: and it moves in this tick
-  std::vector<std::uint8_t> hidden;     ///< by object, when active pairs were counted
+  std::vector<Rub> rubs;
+  std::uint32_t refused = 0;          ///< due pairs that found no room
+  std::vector<std::uint8_t> movable;  ///< by object: a hand pulls at it
+  std::vector<std::uint8_t> solved;   ///< by object: and it moves in this tick
+  std::vector<std::uint8_t> at_rest;  ///< by object: touches something in this tick
+  std::vector<std::uint8_t> hidden;   ///< by object, when active pairs were counted
   std::uint32_t active_pairs = 0;
   bool recount = true;
   IslandPartition partition;

@@ -25,7 +25,8 @@ Environment::Environment(std::shared_ptr<const Scene> scene, const EnvironmentOp
     // only a hand makes an object held or tracked
     const bool moved =
         objects_[i].status == ObjectStatus::kHeld || objects_[i].status == ObjectStatus::kTracked;
-    if (moved) objects_[i].status = ObjectStatus::kParked;
+    const bool massless = objects_[i].status == ObjectStatus::kFree && !scene_->objects[i].body;
+    if (moved || massless) objects_[i].status = ObjectStatus::kParked;
   }
   for (std::size_t i = 0; i < hands_.size(); ++i) {
     hands_[i].own = scene_->hands[i].object;
@@ -42,17 +43,21 @@ void Environment::setPairEnabled(std::size_t pair, bool enabled) noexcept {
   engine_->setEnabled(pair, enabled);
   engine_->active_pairs += engine_->counts(pair) ? 1U : 0U;
   note(static_cast<std::uint32_t>(pair));
+  for (const ObjectId object : {scene_->pairs[pair].a, scene_->pairs[pair].b}) wake(object);
 }
 
 void Environment::contribute(ObjectId object, std::uint32_t source, const Wrench& F_Oo_W,
                              std::uint32_t lifetime_ticks) noexcept {
-  if (isObject(object)) engine_->forces[object.value].contribute(source, F_Oo_W, lifetime_ticks, tick_);
+  if (!isObject(object)) return;
+  if (engine_->forces[object.value].contribute(source, F_Oo_W, lifetime_ticks, tick_)) wake(object);
 }
 
 void Environment::step() noexcept {
   ++tick_;
   followTrackers();
   findMovable();
+  wakeWhatIsTouched();
+  fly();
   findNearPairs();
   findDuePairs();
   planIslands();
@@ -87,9 +92,8 @@ bool Environment::active(std::size_t pair) const noexcept {
 }
 
 double Environment::speedCap(ObjectId object) const noexcept {
-  const bool moves =
-      engine_->movable[object.value] != 0 || objects_[object.value].status == ObjectStatus::kTracked;
-  return moves ? options_.max_speed : 0.0;
+  if (!moves(object)) return 0.0;
+  return flies(object) ? options_.max_free_speed : options_.max_speed;
 }
 
 double Environment::speedOf(ObjectId object) const noexcept {
@@ -104,7 +108,11 @@ Spring Environment::springOf(HandId hand) const noexcept {
           spec.rotational_stiffness};
 }
 
-MovableBody Environment::movableBody(ObjectId object) const noexcept {
+MovableBody Environment::movableBody(ObjectId object) noexcept {
+  return flies(object) ? freeBody(object) : heldBody(object);
+}
+
+MovableBody Environment::heldBody(ObjectId object) const noexcept {
   MovableBody body;
   body.X_WB = objects_[object.value].X_WO;
   body.radius = engine_->sizes[object.value].radius;
@@ -134,6 +142,9 @@ void Environment::findMovable() noexcept {
       engine_->movable[hand.object.value] = 1;
     }
   }
+  for (std::uint32_t i = 0; i < objects_.size(); ++i) {
+    if (flies(ObjectId{i})) engine_->movable[i] = 1;
+  }
   // one frozen hand holds it still, whoever else pulls
   for (const HandMotion& hand : hands_) {
     if (isObject(hand.object) && engaged(hand) && hand.frozen) engine_->movable[hand.object.value] = 0;
@@ -148,7 +159,9 @@ void Environment::findNearPairs() noexcept {
     if (objects_[i].status == ObjectStatus::kHidden || !scene_->objects[i].structures) {
       engine.broad_phase.hide(object);
     } else {
-      engine.broad_phase.place(object, objects_[i].X_WO * size.p_OC_O, size.ball + 0.5 * kBallSlack);
+      const double faster = flies(object) ? options_.max_free_speed - options_.max_speed : 0.0;
+      engine.broad_phase.place(object, objects_[i].X_WO * size.p_OC_O,
+                               size.ball + 0.5 * kBallSlack + std::max(faster, 0.0) * kTickSeconds);
     }
   }
   // from the poses alone, so that skipping a look can never change who is solved with whom
@@ -229,7 +242,7 @@ void Environment::addIsland(std::int32_t island) noexcept {
     const std::int32_t island_a = engine.partition.islandOf(a);
     const std::int32_t island_b = engine.partition.islandOf(b);
     if (pair.spec().sensing || (island_a != island && island_b != island)) continue;
-    IslandPair one = pair.islandPair(objects_[a.value].X_WO, objects_[b.value].X_WO);
+    IslandPair one = pair.islandPair(objects_[a.value].X_WO, objects_[b.value].X_WO, tick_);
     // farther away, coherence decides when a pair is looked at, and must not decide what it lists
     if (pair.gap() > engine.reach) one.last = nullptr;
     one.body_a = island_a == island ? engine.partition.placeOf(a) : GapRow::kStatic;
@@ -237,20 +250,25 @@ void Environment::addIsland(std::int32_t island) noexcept {
     engine.islands.addPair(i, one);
     engine.looked_at[i] = 1;
   }
+  boundTravel(static_cast<std::size_t>(island));
 }
 
 void Environment::takeIslands() noexcept {
   const IslandWork& islands = engine_->islands;
+  for (std::size_t island = 0; island < islands.islands().size(); ++island) landIsland(island);
   for (std::size_t body = 0; body < islands.bodies(); ++body) {
     ObjectMotion& object = objects_[islands.objectOf(body).value];
     const Displacement way = displacement(object.X_WO, islands.poseOf(body));
     engine_->addTravel(islands.objectOf(body), way);
     object.X_WO = islands.poseOf(body);
-    object.V_WO = {way.translation / kTickSeconds, way.rotation / kTickSeconds};
+    if (!flies(islands.objectOf(body))) {
+      object.V_WO = {way.translation / kTickSeconds, way.rotation / kTickSeconds};
+    }
   }
   for (std::size_t slot = 0; slot < islands.pairs(); ++slot) {
-    engine_->pairs[islands.pairOf(slot)].take(islands.resultOf(slot));
+    engine_->pairs[islands.pairOf(slot)].take(islands.resultOf(slot), tick_);
   }
+  for (std::size_t island = 0; island < islands.islands().size(); ++island) restIsland(island);
 }
 
 void Environment::lookAtOtherPairs() noexcept {

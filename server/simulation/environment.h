@@ -21,6 +21,8 @@ struct ObjectMotion {
   ObjectStatus status = ObjectStatus::kParked;
   HandId holder;  ///< the first of its holders, none when free
   bool in_contact = false;
+  bool asleep = false;           ///< a free body that rests: it stands still until something stirs it
+  std::uint32_t calm_ticks = 0;  ///< of a free body: it has hardly moved for so long
 };
 
 /// What a hand does, per hand. Index = HandId.
@@ -50,15 +52,21 @@ struct PairMotion {
 struct EnvironmentOptions {
   unsigned workers = 1;  ///< threads that solve islands, this one included; never changes the result
   SolveLimits limits;
-  double max_speed = 1.0;  ///< [m/s] of any point of a held object (travel cap; the paper's v_max)
-  bool coherence = true;   ///< false: look at every pair in every tick; never changes the result
+  double max_speed = 1.0;       ///< [m/s] of any point of a held object (travel cap; the paper's v_max)
+  double max_free_speed = 3.0;  ///< [m/s] of any point of a free body: half a metre's fall
+  bool coherence = true;        ///< false: look at every pair in every tick; never changes the result
   /// So many pairs may touch or be looked at in one tick: each costs some 120 kB.
   std::size_t rooms = 256;
   SendPolicy send_policy = SendPolicy::kEveryForce;
 };
 
 /// All objects, one tick (paper §3.2): follow the trackers, find the pairs that are near and due, solve the
-/// contact islands for the poses of what is held, look at the remaining due pairs, sum the forces.
+/// contact islands for the poses of what is held or flies, look at the remaining due pairs, sum the forces.
+///
+/// A free body is one more pull in its island: its inertia, towards where it flies when nothing is in its
+/// way. So a hand that pushes it, a stack of them and a held part are the same problem, and what a body is
+/// pushed back by is the force on it. Its velocity is the way it went: impacts are inelastic, and an island
+/// moves with no more energy than it had and its hands gave.
 ///
 /// Far pairs cost nothing, near ones a glance, due ones a look. There is room for the looks of so many pairs;
 /// when more are due, those that have contacts go first, and what a hand holds of the others stands still for
@@ -82,7 +90,7 @@ class Environment {
   /// a pointer (a hand's own first object) is hidden while the hand holds something else, and comes back on
   /// what it took, where it took it: outside, wherever the hand itself is.
   void grab(HandId hand, ObjectId object) noexcept;
-  /// The hand moves its own first object again.
+  /// The hand moves its own first object again. What it held is parked, or flies on if it has a body.
   void release(HandId hand) noexcept;
   /// The two hands exchange what they hold and their own first objects; each object jumps to its other hand.
   void swapHands(HandId one, HandId other) noexcept;
@@ -141,6 +149,24 @@ class Environment {
   void chooseHolder(ObjectId object) noexcept;
   void jump(ObjectId object) noexcept;
   void stir(ObjectId object) noexcept;
+  // free bodies (environment_bodies.cpp)
+  [[nodiscard]] bool flies(ObjectId object) const noexcept;
+  [[nodiscard]] bool moves(ObjectId object) const noexcept;
+  void wake(ObjectId object) noexcept;
+  void wakeNeighbours(ObjectId object) noexcept;
+  void wakeWhatIsTouched() noexcept;
+  void fly() noexcept;
+  [[nodiscard]] MovableBody freeBody(ObjectId object) noexcept;
+  void boundTravel(std::size_t island) noexcept;
+  void landIsland(std::size_t island) noexcept;
+  void restIsland(std::size_t island) noexcept;
+  // their friction (environment_friction.cpp)
+  void rub() noexcept;
+  [[nodiscard]] double frictionOf(const PairSpec& pair) const noexcept;
+  [[nodiscard]] Vector3 velocityOf(ObjectId object, const Vector3& p_WP) const noexcept;
+  [[nodiscard]] double lightness(ObjectId object, const Vector3& p_WP, const Vector3& t_W) const noexcept;
+  void strike(ObjectId object, const Vector3& p_WP, const Vector3& impulse_W) noexcept;
+
   [[nodiscard]] bool engaged(const HandMotion& hand) const noexcept { return hand.present && hand.taken; }
   [[nodiscard]] bool isHand(HandId hand) const noexcept { return hand.value < hands_.size(); }
   [[nodiscard]] bool isObject(ObjectId object) const noexcept { return object.value < objects_.size(); }
@@ -156,12 +182,15 @@ class Environment {
   void takeIslands() noexcept;
   void lookAtOtherPairs() noexcept;
   void sumForces() noexcept;
+  void sumWeights() noexcept;
   void judgeContacts() noexcept;
   void countWork() noexcept;
   void note(std::uint32_t pair) noexcept;
   void listContacts(ObjectId object, HandManifold& out) const noexcept;
+  void listOtherPulls(HandId hand, HandManifold& out) const noexcept;
   [[nodiscard]] bool active(std::size_t pair) const noexcept;
-  [[nodiscard]] MovableBody movableBody(ObjectId object) const noexcept;
+  [[nodiscard]] MovableBody movableBody(ObjectId object) noexcept;
+  [[nodiscard]] MovableBody heldBody(ObjectId object) const noexcept;
   [[nodiscard]] Spring springOf(HandId hand) const noexcept;
   [[nodiscard]] double speedCap(ObjectId object) const noexcept;
   [[nodiscard]] double speedOf(ObjectId object) const noexcept;

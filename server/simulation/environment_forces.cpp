@@ -40,7 +40,23 @@ void Environment::sumForces() noexcept {
       engine.forces[object].clear(engine.couplingCell(hand.object, id));
     }
   }
+  sumWeights();
   for (ForceBuffer& buffer : engine.forces) buffer.expire(tick_);
+}
+
+void Environment::sumWeights() noexcept {
+  Engine& engine = *engine_;
+  for (std::uint32_t i = 0; i < objects_.size(); ++i) {
+    if (!engine.bodies[i]) continue;
+    const ObjectId object{i};
+    const RigidBody& rigid = engine.bodies[i]->rigid;
+    if (objects_[i].status != ObjectStatus::kFree) {
+      engine.forces[i].clear(engine.gravityCell(object));
+      continue;
+    }
+    const Vector3 p_OC_W = objects_[i].X_WO.rotation() * rigid.centre();
+    engine.forces[i].write(engine.gravityCell(object), {rigid.weight(), p_OC_W.cross(rigid.weight())}, tick_);
+  }
 }
 
 void Environment::judgeContacts() noexcept {

@@ -128,7 +128,8 @@ void Environment::place(ObjectId object, const Pose& X_WO, ObjectStatus status) 
     motion.holder = HandId{};
     // only a hand makes an object held or tracked
     const bool needs_hand = status == ObjectStatus::kHeld || status == ObjectStatus::kTracked;
-    motion.status = needs_hand ? ObjectStatus::kParked : status;
+    const bool massless = status == ObjectStatus::kFree && !scene_->objects[object.value].body;
+    motion.status = needs_hand || massless ? ObjectStatus::kParked : status;
   }
   jump(object);
 }
@@ -171,7 +172,10 @@ void Environment::letGo(HandId hand) noexcept {
   engine_->forces[object.value].clear(engine_->couplingCell(object, hand));
   chooseHolder(object);
   if (objects_[object.value].holder.valid()) return;
-  park(object, object == motion.own ? ObjectStatus::kHidden : ObjectStatus::kParked);
+  const bool has_mass = scene_->objects[object.value].body.has_value();
+  park(object, object == motion.own ? ObjectStatus::kHidden
+               : has_mass           ? ObjectStatus::kFree
+                                    : ObjectStatus::kParked);
 }
 
 /// Nobody holds the object any more. What the state machine has fixed or hidden stays so.
@@ -179,7 +183,9 @@ void Environment::park(ObjectId object, ObjectStatus status) noexcept {
   ObjectMotion& motion = objects_[object.value];
   const bool moved = motion.status == ObjectStatus::kHeld || motion.status == ObjectStatus::kTracked;
   if (moved || status == ObjectStatus::kHidden) motion.status = status;
+  const Twist V_WO = motion.V_WO;
   jump(object);
+  if (motion.status == ObjectStatus::kFree) motion.V_WO = V_WO;
 }
 
 /// The holder remains as long as it holds; then the first hand that does follows.
@@ -198,8 +204,12 @@ void Environment::chooseHolder(ObjectId object) noexcept {
 
 /// A declared jump: what was known about the object's contacts holds no longer.
 void Environment::jump(ObjectId object) noexcept {
-  objects_[object.value].V_WO = Twist{};
-  ++objects_[object.value].epoch;
+  ObjectMotion& motion = objects_[object.value];
+  motion.V_WO = Twist{};
+  motion.asleep = false;
+  motion.calm_ticks = 0;
+  ++motion.epoch;
+  wakeNeighbours(object);
   for (const std::uint32_t i : engine_->near) {
     CollPair& pair = engine_->pairs[i];
     if (pair.spec().a != object && pair.spec().b != object) continue;

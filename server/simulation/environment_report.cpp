@@ -110,12 +110,26 @@ void Environment::manifold(HandId hand, HandManifold& out) const noexcept {
   out.rotational_stiffness = spec.rotational_stiffness;
   out.frozen = motion.frozen;
   out.validity_radius = 0.0;
+  out.others.clear();
   out.contacts.clear();
   if (!isObject(motion.object)) return;
   const ObjectMotion& held = objects_[motion.object.value];
   out.object_epoch = held.epoch;
   out.X_WO = held.X_WO;
+  listOtherPulls(hand, out);
   listContacts(motion.object, out);
+}
+
+void Environment::listOtherPulls(HandId hand, HandManifold& out) const noexcept {
+  const ObjectId object = hands_[hand.value].object;
+  if (engine_->movable[object.value] == 0) return;
+  for (std::uint32_t i = 0; i < hands_.size() && !out.others.full(); ++i) {
+    const bool coupled = scene_->hands[i].kind == HandKind::kCoupled;
+    if (i == hand.value || !coupled || hands_[i].object != object || !engaged(hands_[i])) continue;
+    const Spring spring = springOf(HandId{i});
+    out.others.push_back(
+        {HandId{i}, spring.X_WG, spring.p_BC, spring.stiffness, spring.rotational_stiffness});
+  }
 }
 
 void Environment::listContacts(ObjectId object, HandManifold& out) const noexcept {

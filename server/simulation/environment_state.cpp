@@ -8,7 +8,7 @@ namespace tenon {
 namespace {
 
 /// Raised whenever the list of fields changes.
-constexpr std::uint32_t kStateVersion = 4;
+constexpr std::uint32_t kStateVersion = 5;
 
 template <typename Archive, typename Motion>
 void archiveObject(Archive& archive, Motion& object) {
@@ -18,6 +18,8 @@ void archiveObject(Archive& archive, Motion& object) {
   archive(object.status);
   archive(object.holder);
   archive(object.in_contact);
+  archive(object.asleep);
+  archive(object.calm_ticks);
 }
 
 template <typename Archive, typename Motion>
@@ -146,8 +148,8 @@ bool Environment::isSound() const noexcept {
     return X.isFinite() && std::abs(X.rotation().squaredNorm() - 1.0) < kUnitTolerance;
   };
   const bool sound_objects = std::all_of(objects_.begin(), objects_.end(), [&](const ObjectMotion& object) {
-    return sound(object.X_WO) && object.status <= ObjectStatus::kFixed &&
-           (!object.holder.valid() || isHand(object.holder));
+    return sound(object.X_WO) && object.status <= ObjectStatus::kFree && object.V_WO.linear.allFinite() &&
+           object.V_WO.angular.allFinite() && (!object.holder.valid() || isHand(object.holder));
   });
   return sound_objects && std::all_of(hands_.begin(), hands_.end(), [&](const HandMotion& hand) {
            return sound(hand.X_WH) && sound(hand.X_HO) && sound(hand.X_OR) &&

@@ -31,6 +31,7 @@ class IslandWork {
   void beginIsland(const SolveLimits& limits) noexcept;
   /// Contacts of the island begun last are listed this much [m] farther ahead.
   void widenMargin(double margin) noexcept { islands_[island_count_ - 1].limits.contact_margin += margin; }
+  [[nodiscard]] SolveLimits& limits(std::size_t island) { return islands_[island].limits; }
   /// To the island begun last.
   void addBody(ObjectId object, const MovableBody& body) noexcept;
   void addPair(std::size_t pair, const IslandPair& island_pair) noexcept;
@@ -40,6 +41,8 @@ class IslandWork {
   [[nodiscard]] std::span<const Island> islands() const { return {islands_.data(), island_count_}; }
   [[nodiscard]] std::size_t bodies() const { return body_count_; }
   [[nodiscard]] ObjectId objectOf(std::size_t body) const { return objects_[body]; }
+  [[nodiscard]] MovableBody& body(std::size_t body) { return bodies_[body]; }
+  [[nodiscard]] const MovableBody& body(std::size_t body) const { return bodies_[body]; }
   [[nodiscard]] const Pose& poseOf(std::size_t body) const { return bodies_[body].X_WB; }
   [[nodiscard]] std::size_t pairs() const { return pair_count_; }
   [[nodiscard]] std::size_t pairOf(std::size_t slot) const { return pair_of_slot_[slot]; }

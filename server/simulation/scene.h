@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,6 +14,16 @@
 
 namespace tenon {
 
+/// An object that has a mass: nobody holds it, it falls, flies and is pushed.
+struct BodySpec {
+  double mass = 1.0;                          ///< [kg]
+  Vector3 p_OC_O = Vector3::Zero();           ///< centre of mass
+  Matrix3 inertia_C_O = Matrix3::Identity();  ///< [kg m^2] about it
+  bool floating = false;                      ///< gravity does not pull at it
+  double damping = 0.0;                       ///< [1/s] share of its speed that the air takes
+  double friction = 0.0;                      ///< Coulomb's coefficient on what it rests on
+};
+
 /// An object of the scene as it never changes.
 struct ObjectSpec {
   std::string name;   ///< in files and logs
@@ -23,7 +34,8 @@ struct ObjectSpec {
   Pose X_WO;                                           ///< at the start
   ObjectStatus status = ObjectStatus::kParked;         ///< at the start
   std::shared_ptr<const HapticStructures> structures;  ///< none: seen, never felt
-  double stiffness = 1000.0;  ///< [N/m] of its penalty force (of what a tracker moves, and the baselines)
+  double stiffness = 1000.0;     ///< [N/m] of its penalty force (of what a tracker moves, and the baselines)
+  std::optional<BodySpec> body;  ///< none: it stands where it is put
 };
 
 /// Two objects that may touch.
@@ -56,6 +68,7 @@ struct Scene {
   std::vector<ObjectSpec> objects;
   std::vector<PairSpec> pairs;
   std::vector<HandSpec> hands;
+  Vector3 gravity_W{0.0, 0.0, -9.81};  ///< [m/s^2]
 
   [[nodiscard]] ObjectId objectNamed(std::string_view name) const;  ///< invalid when there is none
   [[nodiscard]] HandId handNamed(std::string_view name) const;

@@ -159,7 +159,7 @@ TEST(CodecOf, AZeroByteInATextIsAnError) {
 
 TEST(CodecOf, AStatusThatDoesNotExistIsAnError) {
   ObjectSnapshot snapshot;
-  snapshot.state.status = 5;
+  snapshot.state.status = 6;
   EXPECT_FALSE(decode<ObjectSnapshot>(*encode(snapshot)));
 }
 

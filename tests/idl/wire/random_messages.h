@@ -82,6 +82,7 @@ class RandomMessages {
     m.status = static_cast<std::uint8_t>(below(5));
   }
   void fill(ManifoldContact& m) { fill(m.other, m.p_BoP_B, m.normal_A, m.offset, m.gap, m.velocity_W); }
+  void fill(HandPull& m) { fill(m.hand, m.X_WG, m.p_BoC_B, m.stiffness, m.rotational_stiffness); }
   void fill(PairContact& m) {
     fill(m.a, m.b, m.enabled, m.colliding, m.contacts, m.F_Ao_W, m.p_WP, m.depth, m.gap, m.load_percent,
          m.peak_force, m.peak_depth);
@@ -137,6 +138,7 @@ class RandomMessages {
   void fill(HandManifold& m) {
     fill(m.hand, m.server_epoch, m.tick, m.answers_seq, m.object, m.object_epoch, m.X_HO, m.X_WO, m.F_Ho_W,
          m.stiffness, m.rotational_stiffness, m.validity_radius, m.step_revision, m.frozen);
+    many(m.others, kOtherPulls);
     many(m.contacts, kManifoldContacts);
   }
   void fill(HandState& m) {

@@ -206,6 +206,23 @@ TEST_F(TwoHandsTest, APartHeldByTwoIsTwiceAsStiff) {
   EXPECT_NEAR(hand(left_).F_Ho_W.force.x(), 0.5 * force, 1e-3);
 }
 
+// two springs of 1000 N/m on levers of 50 mm, and two of 20 Nm/rad: 45 Nm/rad about z
+TEST_F(TwoHandsTest, MomentsOfTwoHandsAddUpWithTheirLevers) {
+  constexpr std::uint32_t kLifetime = 200;
+  constexpr double kLever = 0.05;
+  for (int tick = 0; tick < 200; ++tick) {
+    environment_->contribute(part_, 1, {Vector3::Zero(), Vector3(0.0, 0.0, 0.2)}, kLifetime);
+    environment_->step();
+  }
+  const double moment = 0.2 * (1.0 - 1.0 / kLifetime);
+  const double angle = moment / (2.0 * 20.0 + 2.0 * 1000.0 * kLever * kLever);
+  EXPECT_NEAR(displacement(Pose(), object(part_).X_WO).rotation.z(), angle, 1e-3 * angle);
+  for (const HandId id : {right_, left_}) {
+    EXPECT_NEAR(hand(id).F_Ho_W.torque.z(), 20.0 * angle, 0.01 * 20.0 * angle);
+    EXPECT_NEAR(hand(id).F_Ho_W.force.norm(), 1000.0 * kLever * angle, 0.01 * 1000.0 * kLever * angle);
+  }
+}
+
 TEST_F(TwoHandsTest, EachHandFeelsTheOtherPull) {
   moveTo(*environment_, right_, {0.1, 0.06, 0.0}, 100);
   stay(*environment_, 100);

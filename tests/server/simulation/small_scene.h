@@ -3,11 +3,31 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "server/simulation/environment.h"
 #include "tests/support/analytic_structures.h"
 
 namespace tenon::test {
+
+/// One for each size, made once.
+inline StructuresPtr boxShape(const Vector3& size) {
+  static std::vector<std::pair<Vector3, StructuresPtr>> shapes;
+  for (const auto& [known, shape] : shapes) {
+    if (known == size) return shape;
+  }
+  return shapes.emplace_back(size, boxStructures(size, 0.002, 0.005)).second;
+}
+
+inline BodySpec boxBody(const Vector3& size, double mass, bool floating) {
+  const Vector3 squares = size.cwiseProduct(size);
+  const Vector3 moments(squares.y() + squares.z(), squares.x() + squares.z(), squares.x() + squares.y());
+  BodySpec body;
+  body.mass = mass;
+  body.inertia_C_O = (mass / 12.0) * Matrix3(moments.asDiagonal());
+  body.floating = floating;
+  return body;
+}
 
 /// Puts a scene together in the order of calls; ids are that order.
 class SmallScene {
@@ -23,6 +43,13 @@ class SmallScene {
     scene_.objects.push_back(spec);
     return {static_cast<std::uint32_t>(scene_.objects.size() - 1)};
   }
+  /// A box that falls and is pushed, of even density.
+  ObjectId freeBox(const std::string& name, const Vector3& size, double mass, const Vector3& p_WO,
+                   bool floating = false) {
+    const ObjectId object = this->object(name, boxShape(size), p_WO, ObjectStatus::kFree);
+    scene_.objects.back().body = boxBody(size, mass, floating);
+    return object;
+  }
   HandId hand(const std::string& name, ObjectId object, HandKind kind = HandKind::kCoupled) {
     HandSpec spec;
     spec.name = name;
@@ -35,6 +62,8 @@ class SmallScene {
     scene_.pairs.push_back({shell, field, dilation, true, sensing});
     return scene_.pairs.size() - 1;
   }
+  void gravity(const Vector3& gravity_W) { scene_.gravity_W = gravity_W; }
+  [[nodiscard]] ObjectSpec& spec(ObjectId object) { return scene_.objects[object.value]; }
   [[nodiscard]] std::shared_ptr<const Scene> build() const { return std::make_shared<Scene>(scene_); }
 
  private:

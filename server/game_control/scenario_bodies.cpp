@@ -1,0 +1,83 @@
+#include <cmath>
+
+#include "server/game_control/scenario_reader.h"
+#include "server/structures/volume.h"
+
+namespace tenon {
+namespace {
+
+constexpr double kLeastMass = 1e-6;  // [kg]
+constexpr double kLargestMass = 1e4;
+constexpr double kLeastDensity = 1.0;  // [kg/m^3]
+constexpr double kLargestDensity = 3e4;
+constexpr double kLargestDamping = 100.0;  // [1/s]
+constexpr double kLargestFriction = 10.0;
+
+/// [m^3] Less than a cubic millimetre is what the field of a sheet makes up.
+constexpr double kLeastVolume = 1e-9;
+
+/// Can a body have these moments of inertia along its axes? None is larger than the other two together.
+bool areMoments(const Vector3& moments) {
+  return moments.minCoeff() > 0.0 && 2.0 * moments.maxCoeff() <= moments.sum();
+}
+
+}  // namespace
+
+void ScenarioReader::readBody(const YAML::Node& node, ScenarioObject& object) {
+  const std::string of = " of 'body' of object '" + object.name + "'";
+  if (!yaml_.openMapping(node, "body", "'body' of object '" + object.name + "'")) return;
+  ScenarioBody body;
+  body.line = yaml_.lineOf(node);
+  if (node["mass"].IsDefined() == node["density"].IsDefined()) {
+    yaml_.fail(node, "'body' of object '" + object.name + "' needs either 'mass' or 'density'");
+  }
+  if (node["mass"].IsDefined())
+    body.mass = yaml_.number(node["mass"], Quantity::kMass, "'mass'" + of, kLeastMass, kLargestMass);
+  body.density = yaml_.numberOr(node["density"], Quantity::kDensity, "'density'" + of, kLeastDensity,
+                                kLargestDensity, 0.0);
+  if (node["centre"].IsDefined())
+    body.p_OC_O = yaml_.vector(node["centre"], Quantity::kLength, "'centre'" + of);
+  if (node["inertia"].IsDefined()) {
+    body.inertia_C = yaml_.vector(node["inertia"], Quantity::kPlain, "'inertia'" + of);
+    if (!areMoments(*body.inertia_C)) {
+      yaml_.fail(node["inertia"], "'inertia'" + of +
+                                      " is that of no body, expected three moments above 0, none larger than "
+                                      "the other two together");
+    }
+    if (!body.mass || !body.p_OC_O)
+      yaml_.fail(node["inertia"], "'inertia'" + of + " needs 'mass' and 'centre' with it");
+  }
+  body.floating = yaml_.yesNo(node["floating"], "'floating'" + of, body.floating);
+  body.damping =
+      yaml_.numberOr(node["damping"], Quantity::kPlain, "'damping'" + of, 0.0, kLargestDamping, 0.0);
+  body.friction = yaml_.numberOr(node["friction"], Quantity::kPlain, "'friction'" + of, 0.0, kLargestFriction,
+                                 body.friction);
+  if (!object.felt) yaml_.fail(node, "object '" + object.name + "' is not felt, it cannot have a 'body'");
+  object.body = body;
+}
+
+Result<BodySpec> bodyOf(const ScenarioObject& object, const HapticStructures& structures) {
+  const ScenarioBody& given = *object.body;
+  BodySpec body;
+  body.floating = given.floating;
+  body.damping = given.damping;
+  body.friction = given.friction;
+  if (given.inertia_C) {
+    body.mass = *given.mass;
+    body.p_OC_O = *given.p_OC_O;
+    body.inertia_C_O = given.inertia_C->asDiagonal();
+    return body;
+  }
+  const Volume volume = volumeOf(structures.field);
+  if (volume.volume < kLeastVolume) {
+    return fail("object '" + object.name +
+                "' encloses no volume that tells its inertia, expected 'mass', 'centre' and 'inertia' in its "
+                "'body'");
+  }
+  body.mass = given.mass.value_or(given.density * volume.volume);
+  body.p_OC_O = given.p_OC_O.value_or(volume.p_MC_M);
+  body.inertia_C_O = (body.mass / volume.volume) * volume.inertia_C_M;
+  return body;
+}
+
+}  // namespace tenon

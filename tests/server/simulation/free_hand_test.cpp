@@ -1,0 +1,168 @@
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "server/simulation/environment.h"
+#include "tests/server/simulation/small_scene.h"
+
+namespace tenon {
+namespace {
+
+using test::enter;
+using test::moveTo;
+using test::stay;
+
+constexpr double kG = 9.81;
+constexpr double kMass = 0.4;
+const Vector3 kSize(0.06, 0.05, 0.04);
+
+//   hand o->[  box  ]   floating; the hand pushes it off
+TEST(FreeBodyAndHand, WhatTheHandFeelsIsWhatTheBodyGains) {
+  test::SmallScene small;
+  const ObjectId box = small.freeBox("box", kSize, kMass, Vector3::Zero(), true);
+  const ObjectId pointer = small.object("pointer", test::pointerShape(), {-0.1, 0.0, 0.0});
+  const HandId hand = small.hand("hand", pointer);
+  small.pair(pointer, box);
+  Environment environment(small.build(), {});
+  enter(environment, hand, {-0.05, 0.0, 0.0});
+  Vector3 impulse = Vector3::Zero();
+  double speed = 0.0;
+  double x = -0.05;
+  for (int tick = 0; tick < 600; ++tick) {
+    speed = std::min(0.2, speed + 0.5 * kTickSeconds);
+    x += speed * kTickSeconds;
+    environment.setHandPose(hand, Pose(Vector3(x, 0.0, 0.0)), {});
+    environment.step();
+    impulse -= environment.hands()[hand.value].F_Ho_W.force * kTickSeconds;
+  }
+  const Vector3 momentum = kMass * environment.objects()[box.value].V_WO.linear;
+  EXPECT_GT(momentum.x(), 0.05);
+  EXPECT_LE((impulse - momentum).norm(), 0.02 * momentum.norm());
+}
+
+//   a box on the floor is pushed by a known force, without friction and with it
+TEST(FreeBodyAndHand, AKnownForceMovesABoxOnTheFloorByNewtonAndCoulomb) {
+  for (const double friction : {0.0, 0.3}) {
+    test::SmallScene small;
+    const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
+    const ObjectId box = small.freeBox("box", kSize, kMass, {-0.1, 0.0, 0.5 * kSize.z()});
+    small.spec(box).body->friction = friction;
+    small.pair(box, ground);
+    Environment environment(small.build(), {});
+    stay(environment, 200);
+    const double force = 2.0;  // [N] in the plane of its centre; 0.5 of its weight
+    constexpr int kTicks = 300;
+    for (int tick = 0; tick < kTicks; ++tick) {
+      environment.contribute(box, 1, {Vector3(force, 0.0, 0.0), Vector3::Zero()}, 200);
+      environment.step();
+    }
+    const double pull = force * (1.0 - 1.0 / 200.0);
+    const double expected = std::max(pull / kMass - friction * kG, 0.0) * kTicks * kTickSeconds;
+    EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.x(), expected, std::max(0.02 * expected, 1e-3))
+        << friction;
+  }
+}
+
+//  a floor that leans by 20 degrees about y
+TEST(FreeBodyAndHand, ABoxSlidesDownASlopeAsCoulombSays) {
+  const double angle = 20.0 / 180.0 * std::numbers::pi;
+  for (const double friction : {0.0, 0.2}) {
+    test::SmallScene small;
+    const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
+    const ObjectId box = small.freeBox("box", kSize, kMass, {-0.1, 0.0, 0.5 * kSize.z()});
+    small.spec(box).body->friction = friction;
+    small.pair(box, ground);
+    small.gravity({kG * std::sin(angle), 0.0, -kG * std::cos(angle)});
+    Environment environment(small.build(), {});
+    stay(environment, 300);
+    const double expected = std::max(std::sin(angle) - friction * std::cos(angle), 0.0) * kG * 0.3;
+    EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.x(), expected, std::max(0.02 * expected, 1e-3))
+        << friction;
+  }
+}
+
+//   a small box falls 1.5 m, at last at the fastest a body may be, on a sheet of 1 mm
+TEST(FreeBodyAndHand, NothingFallsThroughASheet) {
+  for (const double offset : {0.0, 0.0004, 0.0011}) {
+    test::SmallScene small;
+    const auto sheet = test::sheetStructures(0.2, 0.001, 0.003, offset);
+    const ObjectId floor = small.object("sheet", sheet, Vector3::Zero());
+    const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 1.5});
+    small.pair(box, floor, false, 0.87 * 0.003);
+    Environment environment(small.build(), {});
+    double fastest = 0.0;
+    for (int tick = 0; tick < 1500; ++tick) {
+      environment.step();
+      const ObjectMotion& motion = environment.objects()[box.value];
+      fastest = std::max(fastest, motion.V_WO.linear.norm());
+      ASSERT_GT(motion.X_WO.translation().z(), 0.5 * kSize.z()) << tick;
+    }
+    EXPECT_NEAR(fastest, EnvironmentOptions{}.max_free_speed, 0.01);
+    EXPECT_TRUE(environment.objects()[box.value].asleep);
+  }
+}
+
+TEST(FreeBodyAndHand, WhatIsLetGoOfFliesOnAndFalls) {
+  test::SmallScene small;
+  const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 1.0}, true);
+  small.spec(box).body->floating = false;
+  const ObjectId pointer = small.object("pointer", test::pointerShape(), {-0.1, 0.0, 1.0});
+  const HandId hand = small.hand("hand", pointer);
+  Environment environment(small.build(), {});
+  enter(environment, hand, {0.0, 0.0, 1.0});
+  environment.grab(hand, box);
+  environment.step();
+  EXPECT_EQ(environment.objects()[box.value].status, ObjectStatus::kHeld);
+  const Vector3 held = environment.objects()[box.value].X_WO.translation();
+  stay(environment, 100);
+  EXPECT_EQ(environment.objects()[box.value].X_WO.translation(), held) << "a hand carries it";
+  moveTo(environment, hand, {0.1, 0.0, 1.0}, 200);
+  environment.release(hand);
+  EXPECT_EQ(environment.objects()[box.value].status, ObjectStatus::kFree);
+  stay(environment, 100);
+  const ObjectMotion& motion = environment.objects()[box.value];
+  EXPECT_NEAR(motion.V_WO.linear.x(), 0.5, 0.01) << "thrown as fast as it was carried";
+  EXPECT_NEAR(motion.V_WO.linear.z(), -kG * 0.1, 1e-6);
+}
+
+TEST(FreeBodyAndHand, AHandThatIsGoneDropsNothing) {
+  test::SmallScene small;
+  const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 1.0});
+  const ObjectId pointer = small.object("pointer", test::pointerShape(), {-0.1, 0.0, 1.0});
+  const HandId hand = small.hand("hand", pointer);
+  Environment environment(small.build(), {});
+  enter(environment, hand, {0.0, 0.0, 1.0});
+  environment.grab(hand, box);
+  stay(environment, 10);
+  const Pose X_WB = environment.objects()[box.value].X_WO;
+  environment.setHandPresent(hand, false);
+  stay(environment, 100);
+  EXPECT_EQ(environment.objects()[box.value].X_WO, X_WB) << "it waits for its hand to come back";
+}
+
+TEST(FreeBodyAndHand, WhatWasPutIntoTheFloorDoesNotFlyAway) {
+  test::SmallScene small;
+  const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
+  const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 0.5 * kSize.z() - 0.004});
+  small.pair(box, ground);
+  Environment environment(small.build(), {});
+  double highest = 0.0;
+  for (int tick = 0; tick < 500; ++tick) {
+    environment.step();
+    highest = std::max(highest, environment.objects()[box.value].X_WO.translation().z());
+  }
+  EXPECT_LE(highest, 0.5 * kSize.z() + 1e-4);
+}
+
+TEST(FreeBodyAndHand, AnObjectWithoutAMassIsNeverFree) {
+  test::SmallScene small;
+  const ObjectId part = small.object("part", test::cubeShape(), Vector3::Zero(), ObjectStatus::kFree);
+  Environment environment(small.build(), {});
+  EXPECT_EQ(environment.objects()[part.value].status, ObjectStatus::kParked);
+  environment.place(part, Pose(), ObjectStatus::kFree);
+  EXPECT_EQ(environment.objects()[part.value].status, ObjectStatus::kParked);
+}
+
+}  // namespace
+}  // namespace tenon
