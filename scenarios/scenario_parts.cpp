@@ -5,7 +5,7 @@
 namespace tenon {
 
 const std::vector<PartSet>& partSets() {
-  static const std::vector<PartSet> kSets{pegAndBoxParts(), engineBayParts()};
+  static const std::vector<PartSet> kSets{pegAndBoxParts(), engineBayParts(), stackingParts()};
   return kSets;
 }
 

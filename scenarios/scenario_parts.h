@@ -28,6 +28,7 @@ struct PartSet {
 
 [[nodiscard]] PartSet pegAndBoxParts();
 [[nodiscard]] PartSet engineBayParts();
+[[nodiscard]] PartSet stackingParts();
 
 /// The detail at which all parts together have about `triangles` triangles, the bay being most of them.
 [[nodiscard]] double detailFor(const PartSet& set, std::size_t triangles);

@@ -87,6 +87,16 @@ TEST(ScenarioBodies, MassAndInertiaFollowFromTheVolume) {
   EXPECT_LE(body->p_OC_O.norm(), 1e-5);
 }
 
+TEST(ScenarioBodies, TheShippedBlocksAreFree) {
+  const auto scenario = readScenario(std::string(TENON_SOURCE) + "/scenarios/stacking");
+  ASSERT_TRUE(scenario) << scenario.error().what;
+  for (const char* block : {"red", "green", "blue"}) {
+    const ScenarioObject& object = scenario->objects[scenario->objectNamed(block).value];
+    EXPECT_EQ(object.status, ObjectStatus::kFree);
+    EXPECT_GE(scenario->pairOf(scenario->objectNamed(block), scenario->objectNamed("table")), 0);
+  }
+}
+
 TEST(ScenarioBodies, AnOpenShellHasToSayItsInertia) {
   ScenarioObject object;
   object.name = "sheet";
