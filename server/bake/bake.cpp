@@ -106,9 +106,12 @@ Result<HapticStructures> bake(const TriangleMesh& mesh, const BakeOptions& optio
   for (const Triangle& t : baked->surface) info.surface_area += areaOf(t);
   info.bricks = structures.field.layout().samples.size() / DistanceField::kBrickSamples;
   for (const std::string& note : mesh.notes) info.notes += note + "\n";
-  const std::size_t dropped = mesh.triangles.size() - welded.triangles.size();
-  if (dropped > 0) {
-    info.notes += std::to_string(dropped) + " triangles without area or present twice were left out.\n";
+  if (welded.left_out > 0) {
+    info.notes +=
+        std::to_string(welded.left_out) + " triangles without area or present twice were left out.\n";
+  }
+  if (welded.closed > 0) {
+    info.notes += std::to_string(welded.closed) + " holes of one missing triangle were closed.\n";
   }
   if (baked->hidden_triangles > 0) {
     info.notes +=

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <span>
 
 namespace tenon {
 
@@ -19,6 +20,19 @@ std::uint32_t opposite(const WeldedMesh::Corners& corners, std::uint32_t from, s
     if (corner != from && corner != to) return corner;
   }
   return corners[0];
+}
+
+/// Calls visit(halves) for the triangles at each edge.
+template <typename Half, typename Visit>
+void visitEdges(const std::vector<Half>& halves, Visit&& visit) {
+  for (std::size_t begin = 0; begin < halves.size();) {
+    std::size_t end = begin + 1;
+    while (end < halves.size() && halves[end].from == halves[begin].from &&
+           halves[end].to == halves[begin].to)
+      ++end;
+    visit(std::span(halves).subspan(begin, end - begin));
+    begin = end;
+  }
 }
 
 }  // namespace
@@ -55,43 +69,83 @@ WeldedMesh::WeldedMesh(const TriangleMesh& mesh) {
     corners.push_back(t);
     triangles.push_back(triangle);
   }
+  left_out = mesh.triangles.size() - triangles.size();
+  closeHoles();
+}
+
+std::vector<WeldedMesh::Half> WeldedMesh::halves() const {
+  std::vector<Half> all;
+  all.reserve(corners.size() * 3);
+  for (std::uint32_t i = 0; i < corners.size(); ++i) {
+    const auto& [a, b, c] = corners[i];
+    all.push_back({a, b, i});
+    all.push_back({b, c, i});
+    all.push_back({a, c, i});
+  }
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+double WeldedMesh::bend(std::uint32_t triangle, std::uint32_t a, std::uint32_t b,
+                        std::uint32_t beyond) const {
+  const Vector3& p_Ma = positions[a];
+  const Vector3& p_Mb = positions[b];
+  return awayFromEdge(p_Ma, p_Mb, positions[opposite(corners[triangle], a, b)])
+      .dot(awayFromEdge(p_Ma, p_Mb, positions[beyond]));
+}
+
+void WeldedMesh::closeHoles() {
+  // edges where the surface ends, found from either corner
+  std::vector<Half> open;
+  visitEdges(halves(), [&open](std::span<const Half> edge) {
+    if (edge.size() != 1) return;
+    const auto& [from, to, triangle] = edge.front();
+    open.push_back({from, to, triangle});
+    open.push_back({to, from, triangle});
+  });
+  std::sort(open.begin(), open.end());
+  const auto at = [&open](std::uint32_t corner) {
+    return std::ranges::equal_range(open, corner, {}, &Half::from);
+  };
+  constexpr double kCos120 = -0.5;
+  for (const auto& [a, b, of_ab] : open) {
+    if (a > b) continue;
+    const bool fewer_at_a = at(a).size() < at(b).size();
+    const auto others = fewer_at_a ? at(b) : at(a);
+    for (const Half& side : fewer_at_a ? at(a) : at(b)) {
+      const std::uint32_t c = side.to;
+      if (c <= b) continue;
+      const auto other = std::ranges::lower_bound(others, c, {}, &Half::to);
+      if (other == others.end() || other->to != c) continue;
+      // three edges of one triangle are no hole
+      if (of_ab == side.triangle && of_ab == other->triangle) continue;
+      const auto& [of_a, of_b] = fewer_at_a ? std::pair(side, *other) : std::pair(*other, side);
+      const double straightest =
+          std::min({bend(of_ab, a, b, c), bend(of_b.triangle, b, c, a), bend(of_a.triangle, a, c, b)});
+      const Triangle patch{positions[a], positions[b], positions[c]};
+      if (straightest > kCos120 || !(areaOf(patch) > 0.0)) continue;
+      corners.push_back({a, b, c});
+      triangles.push_back(patch);
+      ++closed;
+    }
+  }
 }
 
 std::vector<WeldedMesh::Edge> WeldedMesh::sharpEdges() const {
-  struct Half {
-    std::uint32_t from, to, triangle;
-    auto operator<=>(const Half&) const = default;
-  };
-  std::vector<Half> halves;
-  halves.reserve(corners.size() * 3);
-  for (std::uint32_t i = 0; i < corners.size(); ++i) {
-    const auto& [a, b, c] = corners[i];
-    halves.push_back({a, b, i});
-    halves.push_back({b, c, i});
-    halves.push_back({a, c, i});
-  }
-  std::sort(halves.begin(), halves.end());
-
   std::vector<Edge> open;
   std::vector<Edge> sharp;
   std::size_t edges = 0;
-  for (std::size_t begin = 0; begin < halves.size(); ++edges) {
-    const Half& half = halves[begin];
-    std::size_t end = begin + 1;
-    while (end < halves.size() && halves[end].from == half.from && halves[end].to == half.to) ++end;
-    if (end - begin == 1) open.push_back({half.from, half.to, half.triangle, Edge::kNone});
-    if (end - begin == 2) {
-      const std::uint32_t other = halves[begin + 1].triangle;
-      const Vector3& a = positions[half.from];
-      const Vector3& b = positions[half.to];
-      const Vector3 first =
-          awayFromEdge(a, b, positions[opposite(corners[half.triangle], half.from, half.to)]);
-      const Vector3 second = awayFromEdge(a, b, positions[opposite(corners[other], half.from, half.to)]);
-      constexpr double kCos140 = -0.766;
-      if (first.dot(second) > kCos140) sharp.push_back({half.from, half.to, half.triangle, other});
+  visitEdges(halves(), [&](std::span<const Half> edge) {
+    ++edges;
+    const auto& [from, to, triangle] = edge.front();
+    if (edge.size() == 1) open.push_back({from, to, triangle, Edge::kNone});
+    if (edge.size() != 2) return;
+    constexpr double kCos140 = -0.766;
+    const std::uint32_t other = edge[1].triangle;
+    if (bend(triangle, from, to, opposite(corners[other], from, to)) > kCos140) {
+      sharp.push_back({from, to, triangle, other});
     }
-    begin = end;
-  }
+  });
   // where nearly nothing is connected, an open edge says nothing about the shape
   if (open.size() * 3 < edges) sharp.insert(sharp.end(), open.begin(), open.end());
   return sharp;
