@@ -179,7 +179,7 @@ Result<BakedField> bakeField(std::span<const Triangle> triangles, const BakeOpti
   work.stage("measuring distances", 0.15, 0.45);
   if (!coarse.sampleDistances(tree, work)) return tooMuch(options.voxel);
   work.stage("finding the outside", 0.45, 0.55);
-  if (!work.cancelled()) findOutside(coarse, nullptr, work);
+  if (!work.cancelled()) findOutside(coarse, nullptr, tree, work);
 
   std::unique_ptr<BrickLevel> fine;
   const std::vector<std::uint32_t> refined = bricksToRefine(coarse, options);
@@ -187,7 +187,7 @@ Result<BakedField> bakeField(std::span<const Triangle> triangles, const BakeOpti
     work.stage("refining", 0.55, 0.65);
     fine = std::make_unique<BrickLevel>(coarse, options.refinement, refined);
     if (!fine->sampleDistances(tree, work)) return tooMuch(options.voxel / options.refinement);
-    if (!work.cancelled()) findOutside(*fine, &coarse, work);
+    if (!work.cancelled()) findOutside(*fine, &coarse, tree, work);
     if (!work.cancelled()) adoptFineSigns(coarse, *fine, work);
   }
   if (work.cancelled()) return fail("cancelled");

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/bake/flood.h"
+#include "server/bake/narrow_gaps.h"
 #include "server/bake/parallel.h"
 
 namespace tenon {
@@ -14,130 +16,20 @@ using Mask = BrickLevel::Mask;
 constexpr int kVoxels = BrickLevel::kVoxels;
 // Half the widest gap that is closed [voxels]: at 1.2 one triangle in a hundred may be missing.
 constexpr double kSigma = 1.2;
+constexpr auto kSigmaQuanta = static_cast<std::int16_t>(kSigma * DistanceField::kQuantaPerVoxel);
 constexpr int kReach = 3;                               // of the extension [voxels]
 constexpr int kPatch = BrickLevel::kSide + 2 * kReach;  // a brick's samples and all within reach
-constexpr std::uint64_t kLowX = 0x0101010101010101ULL;
-constexpr std::uint64_t kHighX = kLowX << 7U;
 
-/// Floods bricks by words of 64 samples; bricks without surface are one step each.
-class Flood {
- public:
-  explicit Flood(BrickLevel& level) : level_(level), queued_(level.nodes(), 0) {
-    std::size_t slots = level.samples.size() / BrickLevel::kSamples;
-    passable_.resize(slots);
-    level.reached.assign(slots, Mask{});
-    for (std::size_t s = 0; s < slots; ++s)
-      passable_[s] = passable(level.samplesOf(static_cast<std::int32_t>(s)));
-  }
-
-  void seed(std::size_t node, const Mask& mask) {
-    const std::int32_t slot = level_.slot[node];
-    if (slot < 0) {
-      if (level_.free[node] != 0) return;
-      level_.free[node] = 1;
-    } else {
-      Mask& reached = level_.reached[static_cast<std::size_t>(slot)];
-      std::uint64_t fresh = 0;
-      for (int z = 0; z < kVoxels; ++z) {
-        const auto w = static_cast<std::size_t>(z);
-        const std::uint64_t open = mask[w] & passable_[static_cast<std::size_t>(slot)][w] & ~reached[w];
-        reached[w] |= open;
-        fresh |= open;
-      }
-      if (fresh == 0) return;
-    }
-    if (queued_[node] != 0) return;
-    queued_[node] = 1;
-    waiting_.push_back(node);
-  }
-
-  void run() {
-    while (!waiting_.empty()) {
-      const std::size_t node = waiting_.back();
-      waiting_.pop_back();
-      queued_[node] = 0;
-      Mask mask;
-      mask.fill(~std::uint64_t{0});
-      if (const std::int32_t slot = level_.slot[node]; slot >= 0) {
-        spread(static_cast<std::size_t>(slot));
-        mask = level_.reached[static_cast<std::size_t>(slot)];
-      }
-      const Cell brick = level_.brickOf(node);
-      for (int face = 0; face < 6; ++face) {
-        const auto [onto, any] = through(mask, face);
-        if (!any) continue;
-        Cell neighbour = brick;
-        neighbour[face / 2] += face % 2 == 0 ? -1 : 1;
-        const std::int64_t other = level_.nodeAt(neighbour);
-        if (other >= 0) seed(static_cast<std::size_t>(other), onto);
-      }
-    }
-  }
-
- private:
-  static Mask passable(const std::int16_t* samples) {
-    constexpr auto kSigmaQuanta = static_cast<std::int16_t>(kSigma * DistanceField::kQuantaPerVoxel);
-    Mask mask{};
-    for (int z = 0; z < kVoxels; ++z) {
-      for (int bit = 0; bit < kVoxels * kVoxels; ++bit) {
-        const Cell in_brick(bit % kVoxels, bit / kVoxels, z);
-        const bool open = samples[BrickLevel::sampleIndex(in_brick)] > kSigmaQuanta;
-        mask[static_cast<std::size_t>(z)] |= static_cast<std::uint64_t>(open) << static_cast<unsigned>(bit);
-      }
-    }
-    return mask;
-  }
-
-  void spread(std::size_t slot) {
-    Mask& reached = level_.reached[slot];
-    bool changed = true;
-    while (changed) {
-      changed = false;
-      for (std::size_t z = 0; z < kVoxels; ++z) {
-        const std::uint64_t e = reached[z];
-        std::uint64_t next = e | (e & ~kHighX) << 1U | (e & ~kLowX) >> 1U | e << 8U | e >> 8U;
-        if (z > 0) next |= reached[z - 1];
-        if (z + 1 < kVoxels) next |= reached[z + 1];
-        next &= passable_[slot][z];
-        changed = changed || (next | e) != e;
-        reached[z] = next | e;
-      }
-    }
-  }
-
-  /// The samples of the brick beyond a face (-x +x -y +y -z +z) that touch reached ones of this brick.
-  static std::pair<Mask, bool> through(const Mask& mask, int face) {
-    Mask onto{};
-    std::uint64_t any = 0;
-    for (std::size_t z = 0; z < kVoxels; ++z) {
-      switch (face) {
-        case 0:
-          onto[z] = (mask[z] & kLowX) << 7U;
-          break;
-        case 1:
-          onto[z] = (mask[z] & kHighX) >> 7U;
-          break;
-        case 2:
-          onto[z] = mask[z] << 56U;
-          break;
-        case 3:
-          onto[z] = mask[z] >> 56U;
-          break;
-        default:
-          break;
-      }
-    }
-    if (face == 4) onto[kVoxels - 1] = mask[0];
-    if (face == 5) onto[0] = mask[kVoxels - 1];
-    for (const std::uint64_t word : onto) any |= word;
-    return {onto, any != 0};
-  }
-
-  BrickLevel& level_;
-  std::vector<Mask> passable_;
-  std::vector<std::uint8_t> queued_;
-  std::vector<std::size_t> waiting_;
-};
+/// The pairs of neighbours that are both further than sigma from the surface.
+std::vector<Flood::Links> wideLinks(const BrickLevel& level, ParallelWork& work) {
+  std::vector<Flood::Links> links(level.samples.size() / BrickLevel::kSamples);
+  work.run(links.size(), 256, [&](std::size_t slot) {
+    const std::int16_t* samples = level.samplesOf(static_cast<std::int32_t>(slot));
+    links[slot] = Flood::linksWhere(
+        [samples](int a, int b) { return samples[a] > kSigmaQuanta && samples[b] > kSigmaQuanta; });
+  });
+  return links;
+}
 
 /// A lower bound of the distance at a point [m] from the coarse sample next to it, if that one is outside.
 double clearanceFromCoarse(const BrickLevel& coarse, const Vector3& p_M) {
@@ -204,7 +96,6 @@ BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* 
         reachedRadius(level, coarse, corner + offset, point);
   });
   BrickLevel::SampleBits outside;
-  constexpr auto kSigmaQuanta = static_cast<std::int16_t>(kSigma * DistanceField::kQuantaPerVoxel);
   // a sample on the surface itself is outside in spite of rounding
   constexpr float kRounding = 0.002F;
   for (int sample = 0; sample < BrickLevel::kSamples; ++sample) {
@@ -223,10 +114,22 @@ BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* 
   return outside;
 }
 
+/// Whether a brick or one of its neighbours is marked.
+bool anyAround(const BrickLevel& level, std::size_t node, const std::vector<std::uint8_t>& marks) {
+  const Cell brick = level.brickOf(node);
+  for (int k = 0; k < 27; ++k) {
+    const std::int64_t found = level.nodeAt(brick + Cell(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
+    if (found >= 0 && marks[static_cast<std::size_t>(found)] != 0) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
-void findOutside(BrickLevel& level, const BrickLevel* coarse, ParallelWork& work) {
-  Flood flood(level);
+void findOutside(BrickLevel& level, const BrickLevel* coarse, const TriangleTree& tree, ParallelWork& work) {
+  const std::vector<Flood::Links> links = wideLinks(level, work);
+  level.reached.assign(links.size(), Mask{});
+  Flood flood(level, links, level.reached, true);
   if (coarse != nullptr) {
     seedFromCoarse(flood, level, *coarse);
   } else {
@@ -238,9 +141,15 @@ void findOutside(BrickLevel& level, const BrickLevel* coarse, ParallelWork& work
 
   const std::vector<Step> steps = stepsByLength();
   std::vector<BrickLevel::SampleBits> outside(level.reached.size());
-  work.run(level.nodes(), 256, [&](std::size_t node) {
+  const auto extend = [&](std::size_t node) {
     const std::int32_t slot = level.slot[node];
     if (slot >= 0) outside[static_cast<std::size_t>(slot)] = extendInBrick(level, coarse, node, steps);
+  };
+  work.run(level.nodes(), 256, extend);
+  level.outside = outside;
+  const std::vector<std::uint8_t> changed = openNarrowGaps(level, tree, work);
+  work.run(level.nodes(), 256, [&](std::size_t node) {
+    if (anyAround(level, node, changed)) extend(node);
   });
   level.outside = std::move(outside);
 }

@@ -49,6 +49,20 @@ using Triangle = std::array<Vector3, 3>;
   return above * above / normal.squaredNorm();
 }
 
+/// Whether the ray from p goes through a triangle.
+[[nodiscard]] inline bool crosses(const Vector3& p, const Vector3& direction, const Triangle& t) {
+  const Vector3 ab = t[1] - t[0];
+  const Vector3 ac = t[2] - t[0];
+  const Vector3 across = direction.cross(ac);
+  const double volume = ab.dot(across);
+  if (volume == 0.0) return false;
+  const Vector3 ap = p - t[0];
+  const double u = ap.dot(across) / volume;
+  const Vector3 turned = ap.cross(ab);
+  const double v = direction.dot(turned) / volume;
+  return u >= 0.0 && v >= 0.0 && u + v <= 1.0 && ac.dot(turned) / volume > 0.0;
+}
+
 [[nodiscard]] inline Eigen::AlignedBox3d boxOf(const Triangle& t) {
   Eigen::AlignedBox3d box(t[0]);
   box.extend(t[1]);

@@ -154,6 +154,50 @@ bool TriangleTree::anyWithin(const Vector3& p, double reach) const {
   return false;
 }
 
+std::array<bool, 4> TriangleTree::Node::metBy(const Vector3f& p, const Vector3f& inverse_direction) const {
+  Lanes enter = Lanes::Zero();
+  Lanes leave = Lanes::Constant(std::numeric_limits<float>::max());
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float c = p[static_cast<Eigen::Index>(axis)];
+    const float inverse = inverse_direction[static_cast<Eigen::Index>(axis)];
+    const Lanes a = (low[axis] - c) * inverse;
+    const Lanes b = (high[axis] - c) * inverse;
+    enter = enter.max(a.min(b));
+    leave = leave.min(a.max(b));
+  }
+  std::array<bool, 4> met{};
+  for (std::size_t lane = 0; lane < 4; ++lane) {
+    const auto i = static_cast<Eigen::Index>(lane);
+    met[lane] = leave[i] * (1.0F + kRounding) >= enter[i];
+  }
+  return met;
+}
+
+bool TriangleTree::oddCrossings(const Vector3& p, const Vector3& direction) const {
+  if (nodes_.empty()) return false;
+  const Vector3f p_local = local(p);
+  const Vector3f inverse = direction.cwiseInverse().cast<float>();
+  std::vector<std::uint32_t> crossed;
+  std::vector<std::uint32_t> waiting{0};
+  while (!waiting.empty()) {
+    const Node& node = nodes_[waiting.back()];
+    waiting.pop_back();
+    const std::array<bool, 4> met = node.metBy(p_local, inverse);
+    for (std::size_t lane = 0; lane < 4; ++lane) {
+      const std::uint32_t child = node.child[lane];
+      if (!met[lane] || child == kNothing) continue;
+      if ((child & kTriangle) == 0) {
+        waiting.push_back(child);
+      } else if (crosses(p, direction, triangles_[child - kTriangle])) {
+        crossed.push_back(child);
+      }
+    }
+  }
+  // a long triangle is found through several boxes
+  std::sort(crossed.begin(), crossed.end());
+  return (std::unique(crossed.begin(), crossed.end()) - crossed.begin()) % 2 == 1;
+}
+
 TriangleTree::Search::Search(const TriangleTree& tree, const Vector3& centre, double radius, double reach)
     : tree_(tree) {
   if (tree.nodes_.empty()) return;

@@ -25,6 +25,9 @@ class TriangleTree {
   /// Whether a triangle is nearer to p than `reach` [m].
   [[nodiscard]] bool anyWithin(const Vector3& p, double reach) const;
 
+  /// Whether a ray from p crosses an odd number of triangles. No component of `direction` may be 0.
+  [[nodiscard]] bool oddCrossings(const Vector3& p, const Vector3& direction) const;
+
  private:
   using Lanes = Eigen::Array<float, 4, 1>;
   struct Node {
@@ -39,6 +42,8 @@ class TriangleTree {
       }
       return sum;
     }
+    /// Which boxes a ray meets, a lane each.
+    [[nodiscard]] std::array<bool, 4> metBy(const Vector3f& p, const Vector3f& inverse_direction) const;
   };
   static constexpr std::uint32_t kTriangle = 0x80000000U;
   static constexpr std::uint32_t kNothing = 0xFFFFFFFFU;

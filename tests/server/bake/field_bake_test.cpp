@@ -179,16 +179,17 @@ TEST(FieldBake, ACavityIsSolid) {
   EXPECT_LT(structures.field.sample(Vector3(0.019, 0.0, 0.0)).distance, -0.01);
 }
 
-//   ##### 4 mm #####     a slot that coarse voxels close is open where bricks are refined
+//   ##### 2.8 mm #####     a slot that coarse voxels close is open where bricks are refined
 TEST(FieldBake, RefinementOpensASlotThatTheVoxelsWouldClose) {
-  const TriangleMesh mesh = test::together(boxMesh(Vector3(-0.05, -0.05, -0.02), Vector3(-0.002, 0.05, 0.02)),
-                                           boxMesh(Vector3(0.002, -0.05, -0.02), Vector3(0.05, 0.05, 0.02)));
+  const TriangleMesh mesh =
+      test::together(boxMesh(Vector3(-0.05, -0.05, -0.02), Vector3(-0.0014, 0.05, 0.02)),
+                     boxMesh(Vector3(0.0014, -0.05, -0.02), Vector3(0.05, 0.05, 0.02)));
   const Vector3 in_slot(0.0, 0.0, 0.0013);
   EXPECT_LT(baked(mesh).field.sample(in_slot).distance, 0.0);
   const RefineBox slot{{Vector3(-0.004, -0.06, -0.03), Vector3(0.004, 0.06, 0.03)}};
   const HapticStructures refined = baked(mesh, 0.003, {slot});
-  EXPECT_NEAR(refined.field.sample(in_slot).distance, 0.002, 4e-4);
-  EXPECT_NEAR(refined.field.sample(Vector3(-0.003, 0.0, 0.0)).distance, -0.001, 2e-4);
+  EXPECT_NEAR(refined.field.sample(in_slot).distance, 0.0014, 4e-4);
+  EXPECT_NEAR(refined.field.sample(Vector3(-0.003, 0.0, 0.0)).distance, -0.0016, 2e-4);
 }
 
 TEST(FieldBake, LowerBoundIsNeverAboveTheTruth) {
