@@ -43,6 +43,21 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "threads that compute contacts; never changes the result")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
+  app.add_option(
+         "--budget", arguments.session.exercise.environment.work.points,
+         "points of shells tested in a tick at most, at the start; what does not fit is left out from "
+         "the finest level on; 0: no limit")
+      ->capture_default_str();
+  app.add_option("--critical-load", arguments.session.exercise.environment.work.critical_load,
+                 "load of a pair, in percent, from which on it leaves out a level while there is a budget")
+      ->check(CLI::Range(1.0, 1000.0))
+      ->capture_default_str();
+  app.add_option_function<double>(
+         "--tick-goal", [&arguments](double ms) { arguments.session.tick_goal = 1e-3 * ms; },
+         "milliseconds that a tick by the clock should take at most: the budget is cut when ticks are slower "
+         "and grows again when they are not; 0: never")
+      ->check(CLI::Range(0.0, 1.0))
+      ->default_str("0.7");
   app.add_option("--journal", arguments.session.journal,
                  "keep everything that each tick consumed in this file");
   app.add_flag("--lockstep", arguments.session.lockstep,

@@ -34,9 +34,9 @@ double neededMargin(const IslandPair& pair, const SolveLimits& limits) {
 void IslandSolver::queryPairs(const Job& job, double margin, SolveReport& report) {
   for (std::size_t i = 0; i < job.pairs.size(); ++i) {
     const IslandPair& pair = job.pairs[i];
-    queryPair(
-        {pair.shell_A, pair.field_B, job.poseA(pair), job.poseB(pair), pair.dilation, margin, pair.levels},
-        job.results[i].query);
+    queryPair({pair.shell_A, pair.field_B, job.poseA(pair), job.poseB(pair), pair.dilation, margin,
+               pair.levels, pair.budget, pair.first},
+              job.results[i].query);
     job.results[i].walked = WalkedAt{};
     job.results[i].flanks = 0;
     job.results[i].slides = false;
@@ -58,7 +58,7 @@ void IslandSolver::takeLast(const Job& job) {
         (pair.body_a == GapRow::kStatic && !(last->walked.X_WA == pair.X_WA_static)) ||
         (pair.body_b == GapRow::kStatic && !(last->walked.X_WB == pair.X_WB_static))) {
       result.query.contacts.clear();
-      result.walked.done = false;
+      result.walked = WalkedAt{};
     } else {
       if (last != &result) copyResult(*last, result);
       result.query.contacts.resize(result.query.contacts.size() - result.flanks);
@@ -126,10 +126,12 @@ void IslandSolver::walkPair(const Job& job, std::size_t i, SolveReport& report) 
   query.dilation = pair.dilation;
   query.margin =
       neededMargin(pair, job.limits) + kWalkSubsteps * movableBodies(pair) * job.limits.substep_travel;
-  query.levels = pair.levels;
+  query.levels = std::min(pair.levels, job.results[i].walked.used);
+  query.budget = pair.budget;
+  query.first = pair.first;
   query.thin = true;
   queryPair(query, job.results[i].query);
-  job.results[i].walked = {true, query.X_WA, query.X_WB, pair.levels};
+  job.results[i].walked = {true, query.X_WA, query.X_WB, pair.levels, job.results[i].query.levels_used};
   ++report.queries;
   report.points_visited += job.results[i].query.counts.points_visited;
 }

@@ -75,6 +75,14 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
   int worse = 0;
   takeLast(job);
 
+  // a step more costs a look, and perhaps one to come back
+  std::uint64_t tested = 0;
+  const auto isSpent = [&] {
+    const std::uint64_t look_points = report.points_visited - tested;
+    tested = report.points_visited;
+    return report.points_visited + 2 * look_points > job.limits.points;
+  };
+
   while (true) {
     look(job, report);
     const double here = merit(job);
@@ -91,7 +99,8 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
     if (brakeOvershoot(job)) solveMotions(job, report, rows_.size());
     if (arrived(job, worse == 0 && report.substeps > 0 ? kLeftForNext : 1.0)) break;
     double way = travel(job);
-    const bool last = report.substeps == job.limits.substeps;
+    const bool spent = isSpent() && report.substeps > 0;
+    const bool last = report.substeps == job.limits.substeps || spent;
     // where the tick began is where the field's steps let it go: every way on is a way back
     const bool stays = best == at_start && worse > kWorsePlaces && way < kLittleWay;
     // a place or two may be worse on the way to a better one, but not the end of the way
@@ -149,6 +158,9 @@ void copyResult(const IslandPairResult& from, IslandPairResult& to) noexcept {
   to.query.others_gap = from.query.others_gap;
   to.query.thinned = from.query.thinned;
   to.query.deepest = from.query.deepest;
+  to.query.levels_used = from.query.levels_used;
+  to.query.left_out = from.query.left_out;
+  to.query.walk_points = from.query.walk_points;
   to.F_Ao_W = from.F_Ao_W;
   to.walked = from.walked;
   to.flanks = from.flanks;

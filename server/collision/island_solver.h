@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -28,7 +29,8 @@ struct Friction {
 struct WalkedAt {
   bool done = false;
   Pose X_WA, X_WB;
-  std::uint32_t levels = 0;
+  std::uint32_t levels = 0;          ///< of the shell that were asked for
+  std::uint32_t used = 0xFFFFFFFFU;  ///< that the budget was enough for; a solve's later walks use no more
 };
 
 /// What came out for a pair, at the final poses.
@@ -53,7 +55,10 @@ struct IslandPair {
   Pose X_WB_static;
   double dilation = 0.0;
   Friction friction;
+  // of every walk, as in PairQuery; a level that one walk of a solve leaves out is left out to its end
   std::uint32_t levels = 0xFFFFFFFFU;
+  std::uint32_t budget = 0xFFFFFFFFU;
+  std::span<const std::uint32_t> first = {};
   /// Of the last solve, if nothing jumped since: while the bodies are near where they were when its list was
   /// made, that list serves again. May be the result that is to be filled.
   const IslandPairResult* last = nullptr;
@@ -68,6 +73,8 @@ struct SolveLimits {
   double contact_margin = 0.0005;  ///< [m] on top of the sub-step's travel, contacts are listed
   ContactMethod method = ContactMethod::kIsland;
   double penalty_stiffness = 1000.0;  ///< [N/m] for the baselines
+  /// So many points may be tested: when that is spent, the rest of the way goes into the next tick.
+  std::uint64_t points = std::numeric_limits<std::uint64_t>::max();
 };
 
 /// Two surfaces this close [m] touch: less is what interpolation and a cut-off sub-step leave. A row that

@@ -146,11 +146,16 @@ class Walk {
         can_thin_(query.thin),
         result_(result) {}
 
-  void run(std::size_t levels) {
-    if (!wholeReaches()) return;
+  /// Returns how many levels were used.
+  std::size_t run(std::size_t levels, std::size_t budget) {
+    if (!wholeReaches()) return levels;
     std::size_t block = 0;
-    for (std::size_t k = 0; k < levels; ++k) {
+    std::size_t before = 0;
+    std::size_t k = 0;
+    for (; k < levels; ++k) {
       const ShellLevel& level = shell_.levels()[k];
+      if (k > 0 && culled_.points + expected(k, culled_.points - before) > budget) break;
+      before = culled_.points;
       for (std::uint32_t c = 0; c < level.cluster_count; c += ShellBlock::kLanes) {
         const ShellBlock& balls = shell_.clusterBlocks()[block++];
         const std::uint32_t reaching =
@@ -163,11 +168,40 @@ class Walk {
     result_.counts.spheres_visited += culled_.spheres;
     result_.counts.points_visited = culled_.points;
     keepBound(std::min(frame_.gapOf(culled_.smallest_bound), kNothingNear));
+    return k;
   }
 
-  void setAreaScale(double scale) { area_scale_ = scale; }
+  /// What points stand for; those beyond the end for nothing.
+  void setAreas(std::span<const float> areas) { areas_ = areas; }
+
+  /// Tests points of levels that were left out; others stand for their skin.
+  void testAlso(std::span<const std::uint32_t> points) {
+    can_thin_ = false;
+    for (const std::uint32_t point : points) {
+      if (point < areas_.size() || point >= shell_.points().size()) continue;
+      if (!candidates_.hasRoomForCluster()) judgeCandidates();
+      const Vector3f& p_AP = shell_.points()[point].p_MP;
+      const std::uint32_t n = candidates_.count++;
+      candidates_.x[n] = p_AP.x();
+      candidates_.y[n] = p_AP.y();
+      candidates_.z[n] = p_AP.z();
+      candidates_.point[n] = point;
+      candidates_.leaf_end[candidates_.leaves++] = static_cast<std::uint16_t>(candidates_.count);
+      ++result_.counts.points_visited;
+    }
+    judgeCandidates();
+    selectDeepest();
+  }
 
  private:
+  /// Points of level k that will be tested, if it is like the level before, of which `last` were.
+  [[nodiscard]] std::size_t expected(std::size_t k, std::size_t last) const {
+    const std::size_t seen = std::max<std::size_t>(last, Pointshell::kLeafPoints);
+    const std::size_t before = std::max(shell_.levels()[k - 1].point_count, 1U);
+    return std::min<std::size_t>(seen * shell_.levels()[k].point_count / before,
+                                 shell_.levels()[k].point_count);
+  }
+
   bool wholeReaches() {
     ++result_.counts.spheres_visited;
     constexpr double kRounding = 1e-6;
@@ -274,7 +308,7 @@ class Walk {
     contact.point = candidates_.point[candidate];
     const ShellPoint& point = shell_.points()[contact.point];
     lanesOf(candidate).setContact(frame_, point, candidate % ShellBlock::kLanes, contact);
-    contact.area = point.area * area_scale_;
+    contact.area = contact.point < areas_.size() ? areas_[contact.point] : 0.0;
     return contact;
   }
 
@@ -356,7 +390,7 @@ class Walk {
   bool sum_;
   bool prune_;
   bool can_thin_;
-  double area_scale_ = 1.0;
+  std::span<const float> areas_;  ///< of the levels in use
   Culled culled_;
   Candidates candidates_;
   std::array<Lanes, Candidates::kMost / ShellBlock::kLanes> lanes_;  ///< of the candidates
@@ -388,17 +422,30 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
   result.others_gap = kNothingNear;
   result.thinned = false;
   result.listed_to = query.margin;
+  result.levels_used = 0;
+  result.walk_points = 0;
+  result.left_out = 0.0;
   if (query.shell_A->empty() || query.field_B->empty()) return;
 
   const auto levels = query.shell_A->levels();
-  const std::size_t used = std::min<std::size_t>(query.levels, levels.size());
+  const std::size_t allowed = std::min<std::size_t>(query.levels, levels.size());
   result.counts.spheres_total = 1;
-  for (std::size_t k = 0; k < used; ++k) {
-    result.counts.spheres_total += levels[k].cluster_count + levels[k].leaf_count;
+  for (const ShellLevel& level : levels) {
+    result.counts.spheres_total += level.cluster_count + level.leaf_count;
   }
   Walk walk(query, result);
-  if (used > 0 && used < levels.size()) walk.setAreaScale(levels[used - 1].area_scale);
-  walk.run(used);
+  if (allowed > 0) walk.setAreas(query.shell_A->areasOfLevel(allowed - 1));
+  const std::size_t budget = std::max<std::size_t>(query.budget, query.first.size()) - query.first.size();
+  const std::size_t used = walk.run(allowed, budget);
+  result.levels_used = static_cast<std::uint32_t>(used);
+  if (used > 0 && used < levels.size()) {
+    const std::span<const float> areas = query.shell_A->areasOfLevel(used - 1);
+    for (Contact& contact : result.contacts) contact.area = areas[contact.point];
+    result.left_out = levels[used - 1].spacing;
+    walk.setAreas(areas);
+    walk.testAlso(query.first);
+  }
+  result.walk_points = result.counts.points_visited;
 
   if (result.counts.contacts_dropped > 0) {
     result.listed_to = -kNothingNear;

@@ -25,7 +25,7 @@ using ContactList = FixedVector<Contact, kMaxPairContacts>;
 /// Work done by a query, counted: the same on every machine.
 struct QueryCounts {
   std::uint32_t spheres_visited = 0;
-  std::uint32_t spheres_total = 0;
+  std::uint32_t spheres_total = 0;  ///< of all levels
   std::uint32_t points_visited = 0;
   std::uint32_t points_colliding = 0;
   std::uint32_t contacts_dropped = 0;  ///< for want of room: those with the largest gaps
@@ -42,10 +42,16 @@ struct PairQuery {
   double dilation = 0.0;               ///< [m] the surface of B is felt this far outside
   double margin = 0.0;                 ///< [m] contacts are listed up to this gap
   std::uint32_t levels = 0xFFFFFFFFU;  ///< how many levels of the shell may be used
+  /// So many points may be tested: a level of which more are expected is left out, and all finer ones. The
+  /// coarsest is always used. Points of coarser levels then stand for the skin of those left out.
+  std::uint32_t budget = 0xFFFFFFFFU;
+  /// Points that are tested whatever is left out, before all others of the budget: what touched a moment ago
+  /// holds on. Listed with no area when others stand for their skin.
+  std::span<const std::uint32_t> first = {};
   /// When room runs out, points give way first that stand behind a neighbour (of the same leaf, with about
   /// the same normal and a smaller gap): a flat patch then stays listed over all its width.
   bool thin = false;
-  bool sum = false;   ///< also sum what all points inside push, listed or not
+  bool sum = false;   ///< also sum what all points inside push, listed or not; not with a budget
   bool prune = true;  ///< false: every point is tested, for comparison
 };
 
@@ -61,6 +67,9 @@ struct PairQueryResult {
   Wrench push_Ao_W;           ///< [m] and [m^2] of penalty a N/m of stiffness, when asked for
   std::uint32_t pushing = 0;  ///< points in that sum; deeper than the field's band nothing pushes
   double deepest = 0.0;       ///< [m] depth in the undilated field of the deepest point, 0 when apart
+  std::uint32_t levels_used = 0;
+  std::uint32_t walk_points = 0;  ///< points tested by queryPair; resampling does not change it
+  double left_out = 0.0;          ///< [m] points of levels that were left out may be nearer by so much
 };
 
 /// All points of A's shell whose gap to B is at most `margin`. Spheres that the field proves to be farther

@@ -6,6 +6,15 @@
 #include "idl/types/bytes.h"
 
 namespace tenon {
+namespace {
+
+/// A number of points; what is no number is no limit.
+std::uint64_t pointsOf(double value) {
+  constexpr double kMost = 1e15;
+  return value > 0.0 ? static_cast<std::uint64_t>(std::min(value, kMost)) : 0;
+}
+
+}  // namespace
 
 Exercise::Exercise(std::shared_ptr<const ScenarioFile> scenario, std::shared_ptr<const Scene> scene,
                    const ExerciseOptions& options)
@@ -62,6 +71,10 @@ void Exercise::apply(const Change& change) noexcept {
     case ChangeKind::kStop:
       if (!over()) phase_ = RunPhase::kStopped;
       return;
+    case ChangeKind::kBudget:
+      return environment_.setBudget(pointsOf(change.value));
+    case ChangeKind::kGroup:
+      return environment_.setGroup(change.object, change.index);
   }
 }
 

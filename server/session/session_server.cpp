@@ -11,6 +11,7 @@
 #include "idl/threads/cyclic_thread.h"
 #include "idl/types/names.h"
 #include "server/session/server_wire.h"
+#include "server/simulation/governor.h"
 
 namespace tenon {
 namespace {
@@ -77,7 +78,8 @@ class Server final : public SessionServer {
         desk_(*loaded.scenario, epoch, options_.lockstep, newTokenSeed()),
         intake_(loaded.scenario->hands.size()),
         broadcast_(loaded.scenario, epoch, options_.lockstep),
-        epoch_(epoch) {}
+        epoch_(epoch),
+        governor_(options_.tick_goal) {}
 
   Result<void> start(const LoadedScene& loaded) {
     auto wire = ServerWire::open({.session = options_.name,
@@ -118,15 +120,27 @@ class Server final : public SessionServer {
   /// One tick: the same in lockstep and by the clock.
   void tick(TickInput& input, TickOutput& output) noexcept {
     intake_.collect(exercise_.now() + 1, input);
+    if (new_budget_ && input.changes.push_back({.kind = ChangeKind::kBudget, .value = *new_budget_}))
+      new_budget_.reset();
     const auto begin = StopWatch::now();
     exercise_.tick(input);
     output.stats.compute_seconds = std::chrono::duration<double>(StopWatch::now() - begin).count();
     exercise_.fill(output);
+    govern(output.stats.compute_seconds);
     output.stats.late_ticks = late_ticks_;
     std::uint32_t oldest = 0;
     for (std::size_t i = 0; i < output.ages.size(); ++i)
       if (output.present[i]) oldest = std::max(oldest, output.ages[i]);
     output.stats.input_age_seconds = oldest * kTickSeconds;
+  }
+
+  /// What the clock says changes only the next tick's input.
+  void govern(double seconds) noexcept {
+    if (options_.lockstep || options_.tick_goal <= 0.0 || new_budget_) return;
+    const Environment& environment = exercise_.environment();
+    const auto budget =
+        governor_.judge(seconds, environment.work().points_visited, environment.workLimits().points);
+    if (budget) new_budget_ = static_cast<double>(*budget);
   }
 
   void keep(const TickInput& input, std::uint64_t hash, JournalEntry& entry) const {
@@ -143,6 +157,8 @@ class Server final : public SessionServer {
   Intake intake_;
   Broadcast broadcast_;
   std::uint32_t epoch_;
+  Governor governor_;
+  std::optional<double> new_budget_;  ///< [points] for the next tick's input
   std::unique_ptr<ServerWire> wire_;
   std::optional<Journal> journal_;
   std::optional<std::string> journal_problem_;

@@ -24,6 +24,9 @@ struct SessionOptions {
   std::filesystem::path journal;  ///< empty: no journal
   double detail = 1.0;            ///< noted in the journal
   bool publish_journal = true;    ///< TickInput and Checkpoint on the bus too
+  /// [s] By the clock, ticks are kept under this by changing their budget; 0: never. A third of the
+  /// millisecond is the operating system's.
+  double tick_goal = 0.7e-3;
   ExerciseOptions exercise;
   /// What a person who looks at the server's terminal should know.
   std::function<void(const std::string&)> say;

@@ -1,13 +1,18 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <span>
 #include <utility>
 
+#include "idl/types/fixed_vector.h"
 #include "idl/types/ids.h"
 #include "server/collision/island_solver.h"
 #include "server/simulation/contact_rooms.h"
 #include "server/simulation/scene.h"
+#include "server/simulation/work_limits.h"
 
 namespace tenon {
 
@@ -18,19 +23,25 @@ namespace tenon {
 /// a smallest gap g has nothing to say for g / (v_a + v_b). When that is over, the way that the two have
 /// really gone since often puts it off again. A declared jump ends all that at once.
 ///
+/// When a look at all levels of the shell costs more than its share of a tick, or its load is critical, the
+/// pair leaves out the finest levels (graceful degradation). A level comes back after the budget had room for
+/// it for a while, and later each time that this was too early: so levels do not flutter.
+///
 /// Its contacts are in a room of ContactRooms, which it has for the tick of a look, and as long as it lists
 /// any.
 ///
 /// Threads: one at a time. Real-time: everything but the constructor.
 class CollPair {
  public:
+  using TouchingPoints = FixedVector<std::uint32_t, 64>;
+
   static constexpr Tick kNever = std::numeric_limits<Tick>::max();
 
   CollPair(const Scene& scene, std::size_t pair);
 
   [[nodiscard]] const PairSpec& spec() const { return *spec_; }
   [[nodiscard]] bool enabled() const { return enabled_; }
-  /// False for objects of one group or without structures: they never touch, whatever the matrix says.
+  /// False for objects without structures: they never touch, whatever the matrix says.
   [[nodiscard]] bool possible() const { return possible_; }
   [[nodiscard]] bool due(Tick tick) const { return due_ <= tick; }
   [[nodiscard]] Tick dueTick() const { return due_; }
@@ -40,6 +51,12 @@ class CollPair {
   [[nodiscard]] double gap() const { return gap_; }          ///< [m] the smallest, dilation included
   [[nodiscard]] double deepest() const { return deepest_; }  ///< [m] in the undilated field
   [[nodiscard]] const QueryCounts& counts() const { return counts_; }
+  /// Finest levels of the shell that the last look left out.
+  [[nodiscard]] std::uint32_t leftOut() const { return allLevels() - std::min(allLevels(), levels_used_); }
+  /// [%] What the last look would have cost with all levels, of their points as many as of those it used.
+  [[nodiscard]] double wholeLoad() const noexcept;
+  /// So many may be used by the next one.
+  [[nodiscard]] std::uint32_t levels() const { return levels_; }
   /// Null when it listed no contacts.
   [[nodiscard]] const IslandPairResult* result() const { return lists() ? room_ : nullptr; }
   [[nodiscard]] bool lists() const { return looked_ && room_ != nullptr && !room_->query.contacts.empty(); }
@@ -61,12 +78,19 @@ class CollPair {
   void lookAgain() noexcept { due_ = 0; }
 
   // these need a room
-  /// A look by itself, for pairs that no solver moves; lists contacts up to `margin`.
-  void query(const Pose& X_WA, const Pose& X_WB, double margin) noexcept;
+  /// A look by itself, for pairs that no solver moves; lists contacts up to `margin`, testing up to `budget`
+  /// points, `first` of them whatever is left out.
+  void query(const Pose& X_WA, const Pose& X_WB, double margin, std::uint32_t budget = 0xFFFFFFFFU,
+             std::span<const std::uint32_t> first = {}) noexcept;
   /// The penalty force of what query() found: the softer of the two gives way.
   void press(double stiffness, const Pose& X_WA) noexcept;
   /// Takes over what a solver found in `now`.
   void take(const IslandPairResult& result, Tick now) noexcept;
+
+  /// Points that held or touched in the last look, those with a force first.
+  void listTouching(TouchingPoints& points) const noexcept;
+  /// Chooses the levels for the next look, after one with `budget` points for a walk.
+  void adapt(const WorkLimits& limits, std::uint32_t budget) noexcept;
 
   /// Sets when to look again, once the pair was looked at in `now`: while the fastest points approach each
   /// other by at most `closing_speed` [m/s], the gap stays above `reach` [m]. `travelled`: what the
@@ -89,6 +113,15 @@ class CollPair {
     archive(self.gap_);
     archive(self.deepest_);
     archive(self.counts_);
+    archive(self.left_out_);
+    archive(self.levels_);
+    if constexpr (Archive::kReads) {
+      if (self.levels_ == 0) return archive.refuse();
+    }
+    archive(self.levels_used_);
+    archive(self.walk_points_);
+    archive(self.calm_);
+    archive(self.patience_);
     bool lists = self.lists();
     archive(lists);
     if (!lists) return;
@@ -102,10 +135,21 @@ class CollPair {
       self.room_->query.counts = self.counts_;
       self.room_->query.smallest_gap = self.gap_;
       self.room_->query.deepest = self.deepest_;
+      self.room_->query.left_out = self.left_out_;
+      self.room_->query.levels_used = self.levels_used_;
+      self.room_->query.walk_points = self.walk_points_;
     }
   }
 
  private:
+  static constexpr std::uint32_t kAllLevels = 0xFFFFFFFFU;
+
+  [[nodiscard]] std::uint32_t allLevels() const {
+    return possible_ ? static_cast<std::uint32_t>(shell_A_->levels().size()) : 0;
+  }
+  /// Points of the shell's first `levels` levels.
+  [[nodiscard]] double pointsOf(std::uint32_t levels) const noexcept;
+  [[nodiscard]] bool nextLevelFits(const WorkLimits& limits, std::uint32_t budget) const noexcept;
   void note(const PairQueryResult& query) noexcept;
   /// A list that was read, before its numbers are used as places.
   [[nodiscard]] bool isSound(const IslandPairResult& room) const noexcept;
@@ -123,6 +167,12 @@ class CollPair {
   double gap_ = 0.0;
   double deepest_ = 0.0;
   QueryCounts counts_;
+  double left_out_ = 0.0;  ///< [m] points of levels left out may be nearer by so much
+  std::uint32_t levels_ = kAllLevels;
+  std::uint32_t levels_used_ = kAllLevels;
+  std::uint32_t walk_points_ = 0;  ///< of the last look's last walk
+  std::uint32_t calm_ = 0;         ///< looks in a row with room for one level more
+  std::uint32_t patience_ = 0;     ///< so many are needed
   IslandPairResult* room_ = nullptr;
 };
 

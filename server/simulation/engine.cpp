@@ -60,6 +60,8 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
       hand_count(scene.hands.size()),
       limits(cappedLimits(options.limits, options.max_speed)),
       broad_phase(scene),
+      touching(rooms.size()),
+      budget(scene, rooms.size()),
       looked_at(scene.pairs.size(), 0),
       movable(scene.objects.size(), 0),
       solved(scene.objects.size(), 0),
@@ -93,6 +95,7 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
       pairs_of[pairs_from[object.value] + cell] = static_cast<std::uint32_t>(pair);
     }
   }
+  for (const ObjectSpec& object : scene.objects) groups.push_back(object.group);
   for (std::size_t object = 0; object < scene.objects.size(); ++object) {
     forces.emplace_back(pair_cells[object] + scene.hands.size() + 1, options.send_policy);
     sizes.push_back(sizeOf(scene.objects[object]));
@@ -104,7 +107,7 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
 
 bool Environment::Engine::counts(std::size_t pair) const noexcept {
   const CollPair& one = pairs[pair];
-  return one.enabled() && one.possible() && hidden[one.spec().a.value] == 0 &&
+  return one.enabled() && one.possible() && !grouped(pair) && hidden[one.spec().a.value] == 0 &&
          hidden[one.spec().b.value] == 0;
 }
 

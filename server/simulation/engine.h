@@ -14,6 +14,7 @@
 #include "server/simulation/island_work.h"
 #include "server/simulation/islands.h"
 #include "server/simulation/rigid_body.h"
+#include "server/simulation/work_budget.h"
 #include "server/simulation/worker_pool.h"
 
 namespace tenon {
@@ -56,6 +57,11 @@ struct Environment::Engine {
   [[nodiscard]] std::span<const std::uint32_t> pairsOf(std::size_t object) const {
     return std::span(pairs_of).subspan(pairs_from[object], pairs_from[object + 1] - pairs_from[object]);
   }
+  /// Its two objects are of one group.
+  [[nodiscard]] bool grouped(std::size_t pair) const noexcept {
+    const PairSpec& spec = pairs[pair].spec();
+    return groups[spec.a.value] != 0 && groups[spec.a.value] == groups[spec.b.value];
+  }
   /// On, possible, and nobody hidden when that was last looked at.
   [[nodiscard]] bool counts(std::size_t pair) const noexcept;
   void setEnabled(std::size_t pair, bool enabled) noexcept;
@@ -81,6 +87,7 @@ struct Environment::Engine {
   // state
   std::vector<CollPair> pairs;
   std::vector<std::uint64_t> switches;  ///< 64 pairs a word: those that are on, for the hash
+  std::vector<std::uint32_t> groups;    ///< by object; 0: none
   std::vector<std::uint32_t> near;  ///< pairs that may meet, in order; others have no state but their switch
   ContactRooms rooms;
   std::vector<double> odometers;    ///< by object: [m] its fastest point's way so far, jumps left out
@@ -99,9 +106,11 @@ struct Environment::Engine {
 
   // work space
   BroadPhase broad_phase;
-  std::vector<std::uint32_t> left;      ///< pairs that were near until this tick
-  std::vector<std::uint32_t> due;       ///< near pairs to look at in this tick, in order
-  std::vector<std::uint32_t> others;    ///< those of them that no island solves
+  std::vector<std::uint32_t> left;                 ///< pairs that were near until this tick
+  std::vector<std::uint32_t> due;                  ///< near pairs to look at in this tick, in order
+  std::vector<std::uint32_t> others;               ///< places in `due` of those that no island solves
+  std::vector<CollPair::TouchingPoints> touching;  ///< by place in `due`, while work is limited
+  WorkBudget budget;
   std::vector<std::uint8_t> looked_at;  ///< by pair, in this tick
   std::vector<Rub> rubs;
   std::uint32_t refused = 0;          ///< due pairs that found no room

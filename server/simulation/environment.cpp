@@ -10,6 +10,10 @@ namespace {
 /// A shell's ball holds its points; the surface between them bulges a little more: so much for a pair [m].
 constexpr double kBallSlack = 5e-3;
 
+/// A pair's walk may take this part of its budget: a tick walks again when a body goes far, looks at the
+/// listed points after each sub-step, and may have to come back.
+constexpr std::uint32_t kWalksPerTick = 3;
+
 }  // namespace
 
 Environment::Environment(std::shared_ptr<const Scene> scene, const EnvironmentOptions& options)
@@ -18,7 +22,8 @@ Environment::Environment(std::shared_ptr<const Scene> scene, const EnvironmentOp
       objects_(scene_->objects.size()),
       hands_(scene_->hands.size()),
       pairs_(scene_->pairs.size()),
-      engine_(std::make_unique<Engine>(*scene_, options)) {
+      engine_(std::make_unique<Engine>(*scene_, options)),
+      work_limits_(options.work) {
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     objects_[i].X_WO = scene_->objects[i].X_WO;
     objects_[i].status = scene_->objects[i].status;
@@ -46,6 +51,21 @@ void Environment::setPairEnabled(std::size_t pair, bool enabled) noexcept {
   for (const ObjectId object : {scene_->pairs[pair].a, scene_->pairs[pair].b}) wake(object);
 }
 
+void Environment::setGroup(ObjectId object, std::uint32_t group) noexcept {
+  if (!isObject(object) || engine_->groups[object.value] == group) return;
+  for (const std::uint32_t pair : engine_->pairsOf(object.value)) {
+    engine_->active_pairs -= engine_->counts(pair) ? 1U : 0U;
+  }
+  engine_->groups[object.value] = group;
+  for (const std::uint32_t pair : engine_->pairsOf(object.value)) {
+    engine_->active_pairs += engine_->counts(pair) ? 1U : 0U;
+  }
+}
+
+std::uint32_t Environment::groupOf(ObjectId object) const noexcept {
+  return isObject(object) ? engine_->groups[object.value] : 0;
+}
+
 void Environment::contribute(ObjectId object, std::uint32_t source, const Wrench& F_Oo_W,
                              std::uint32_t lifetime_ticks) noexcept {
   if (!isObject(object)) return;
@@ -60,6 +80,7 @@ void Environment::step() noexcept {
   fly();
   findNearPairs();
   findDuePairs();
+  shareWork();
   planIslands();
   engine_->islands.solve(engine_->pool);
   takeIslands();
@@ -87,7 +108,8 @@ void Environment::followTrackers() noexcept {
 
 bool Environment::active(std::size_t pair) const noexcept {
   const CollPair& one = engine_->pairs[pair];
-  return one.enabled() && one.possible() && objects_[one.spec().a.value].status != ObjectStatus::kHidden &&
+  return one.enabled() && one.possible() && !engine_->grouped(pair) &&
+         objects_[one.spec().a.value].status != ObjectStatus::kHidden &&
          objects_[one.spec().b.value].status != ObjectStatus::kHidden;
 }
 
@@ -212,6 +234,15 @@ void Environment::findDuePairs() noexcept {
   }
 }
 
+void Environment::shareWork() noexcept {
+  Engine& engine = *engine_;
+  engine.budget.share(work_limits_, engine.due, engine.pairs);
+  if (!work_limits_.any()) return;
+  for (std::size_t slot = 0; slot < engine.due.size(); ++slot) {
+    engine.pairs[engine.due[slot]].listTouching(engine.touching[slot]);
+  }
+}
+
 void Environment::planIslands() noexcept {
   Engine& engine = *engine_;
   engine.partition.begin(engine.solved);
@@ -235,7 +266,8 @@ void Environment::addIsland(std::int32_t island) noexcept {
     speed = std::max(speed, speedOf(object));
   }
   engine.islands.widenMargin(std::min(speed * kLookAheadTicks * kTickSeconds, kLookAheadReach));
-  for (const std::uint32_t i : engine.due) {
+  for (std::size_t slot = 0; slot < engine.due.size(); ++slot) {
+    const std::uint32_t i = engine.due[slot];
     const CollPair& pair = engine.pairs[i];
     const ObjectId a = pair.spec().a;
     const ObjectId b = pair.spec().b;
@@ -247,6 +279,12 @@ void Environment::addIsland(std::int32_t island) noexcept {
     if (pair.gap() > engine.reach) one.last = nullptr;
     one.body_a = island_a == island ? engine.partition.placeOf(a) : GapRow::kStatic;
     one.body_b = island_b == island ? engine.partition.placeOf(b) : GapRow::kStatic;
+    if (work_limits_.any()) {
+      one.levels = pair.levels();
+      one.budget = engine.budget.of(slot) / kWalksPerTick;
+      one.first = {engine.touching[slot].begin(), engine.touching[slot].end()};
+      engine.islands.addPoints(engine.budget.of(slot));
+    }
     engine.islands.addPair(i, one);
     engine.looked_at[i] = 1;
   }
@@ -274,14 +312,24 @@ void Environment::takeIslands() noexcept {
 void Environment::lookAtOtherPairs() noexcept {
   Engine& engine = *engine_;
   engine.others.clear();
-  for (const std::uint32_t i : engine.due) {
-    if (engine.looked_at[i] == 0) engine.others.push_back(i);
+  const bool limited = work_limits_.any();
+  for (std::size_t slot = 0; slot < engine.due.size(); ++slot) {
+    const std::uint32_t i = engine.due[slot];
+    const std::uint32_t walks = engine.looked_at[i] == 0 ? 1 : kWalksPerTick;
+    if (engine.looked_at[i] == 0) engine.others.push_back(static_cast<std::uint32_t>(slot));
+    // what an island has looked at chooses its levels here, the others after their look
+    if (walks > 1) engine.pairs[i].adapt(work_limits_, engine.budget.of(slot) / walks);
     engine.looked_at[i] = 1;
   }
-  auto look = [this](unsigned, std::size_t item) {
-    CollPair& pair = engine_->pairs[engine_->others[item]];
+  auto look = [this, limited](unsigned, std::size_t item) {
+    const std::uint32_t slot = engine_->others[item];
+    CollPair& pair = engine_->pairs[engine_->due[slot]];
+    const std::uint32_t budget = engine_->budget.of(slot);
+    std::span<const std::uint32_t> first;
+    if (limited) first = {engine_->touching[slot].begin(), engine_->touching[slot].end()};
     pair.query(objects_[pair.spec().a.value].X_WO, objects_[pair.spec().b.value].X_WO,
-               engine_->limits.contact_margin);
+               engine_->limits.contact_margin, budget, first);
+    pair.adapt(work_limits_, budget);
     // what only senses overlaps without pressing, and of two that stand still nobody presses the other
     const bool presses = objects_[pair.spec().a.value].status == ObjectStatus::kTracked ||
                          objects_[pair.spec().b.value].status == ObjectStatus::kTracked;

@@ -10,6 +10,7 @@
 #include "server/collision/island_solver.h"
 #include "server/simulation/force_buffer.h"
 #include "server/simulation/scene.h"
+#include "server/simulation/work_limits.h"
 
 namespace tenon {
 
@@ -45,6 +46,7 @@ struct HandMotion {
 struct PairMotion {
   bool enabled = true;
   bool queried = false;                      ///< in this tick; else skipped by coherence
+  std::uint32_t left_out = 0;                ///< finest levels of the shell that the last look left out
   Tick due = 0;                              ///< next tick that has to look (spatio-temporal coherence)
   const IslandPairResult* result = nullptr;  ///< of the last query; null: no contacts
 };
@@ -54,7 +56,9 @@ struct EnvironmentOptions {
   SolveLimits limits;
   double max_speed = 1.0;       ///< [m/s] of any point of a held object (travel cap; the paper's v_max)
   double max_free_speed = 3.0;  ///< [m/s] of any point of a free body: half a metre's fall
-  bool coherence = true;        ///< false: look at every pair in every tick; never changes the result
+  /// False: look at every pair in every tick; changes the result only where work is limited.
+  bool coherence = true;
+  WorkLimits work;  ///< at the start; setBudget changes it
   /// So many pairs may touch or be looked at in one tick: each costs some 120 kB.
   std::size_t rooms = 256;
   SendPolicy send_policy = SendPolicy::kEveryForce;
@@ -70,7 +74,8 @@ struct EnvironmentOptions {
 ///
 /// Far pairs cost nothing, near ones a glance, due ones a look. There is room for the looks of so many pairs;
 /// when more are due, those that have contacts go first, and what a hand holds of the others stands still for
-/// the tick: late, never through.
+/// the tick: late, never through. Likewise a budget of points may be set for a tick; then pairs leave out the
+/// finest levels of their shells, and motions the rest of their way.
 ///
 /// Everything that moves is in here, everything else in the Scene: so a snapshot is the Environment, and
 /// equal inputs from an equal snapshot give equal bits, for any number of workers.
@@ -98,6 +103,11 @@ class Environment {
   /// unless `status` is kHeld: then it stays in the hand at its new place.
   void place(ObjectId object, const Pose& X_WO, ObjectStatus status) noexcept;
   void setPairEnabled(std::size_t pair, bool enabled) noexcept;
+  /// Objects of one group never touch; 0: no group.
+  void setGroup(ObjectId object, std::uint32_t group) noexcept;
+  [[nodiscard]] std::uint32_t groupOf(ObjectId object) const noexcept;
+  /// A tick may test so many points from the next one on; 0: as many as there are.
+  void setBudget(std::uint64_t points) noexcept { work_limits_.points = points; }
   /// The force of a source that is not a contact (client contribution, guidance): expires by itself.
   void contribute(ObjectId object, std::uint32_t source, const Wrench& F_Oo_W,
                   std::uint32_t lifetime_ticks) noexcept;
@@ -109,6 +119,7 @@ class Environment {
   [[nodiscard]] std::span<const ObjectMotion> objects() const { return objects_; }
   [[nodiscard]] std::span<const HandMotion> hands() const { return hands_; }
   [[nodiscard]] std::span<const PairMotion> pairs() const { return pairs_; }
+  [[nodiscard]] const WorkLimits& workLimits() const { return work_limits_; }
   /// The pairs whose balls are near each other, in order: only these can touch.
   [[nodiscard]] std::span<const std::uint32_t> nearPairs() const noexcept;
   /// So many pairs list contacts at most.
@@ -126,6 +137,7 @@ class Environment {
     std::uint64_t points_visited = 0;
     std::uint32_t near_pairs = 0;     ///< whose balls are near each other
     std::uint32_t refused_pairs = 0;  ///< for want of room: what a hand holds of them stood still
+    std::uint32_t limited_pairs = 0;  ///< whose look left out levels for want of budget
     double load_percent = 0.0;        ///< largest of the pairs
     bool conflicting = false;
   };
@@ -177,6 +189,7 @@ class Environment {
   void findNearPairs() noexcept;
   void findDuePairs() noexcept;
   void countActivePairs() noexcept;
+  void shareWork() noexcept;
   void planIslands() noexcept;
   void addIsland(std::int32_t island) noexcept;
   void takeIslands() noexcept;
@@ -207,6 +220,7 @@ class Environment {
   std::vector<HandMotion> hands_;
   std::vector<PairMotion> pairs_;
   std::unique_ptr<Engine> engine_;
+  WorkLimits work_limits_;
   Work work_;
   Tick tick_ = 0;
 };

@@ -74,7 +74,7 @@ void Environment::judgeContacts() noexcept {
 
 void Environment::note(std::uint32_t pair) noexcept {
   const CollPair& one = engine_->pairs[pair];
-  pairs_[pair] = {one.enabled(), engine_->looked_at[pair] != 0, one.dueTick(), one.result()};
+  pairs_[pair] = {one.enabled(), engine_->looked_at[pair] != 0, one.leftOut(), one.dueTick(), one.result()};
 }
 
 void Environment::countActivePairs() noexcept {
@@ -112,8 +112,11 @@ void Environment::countWork() noexcept {
     note(i);
     if (engine.looked_at[i] == 0) continue;
     work_.load_percent = std::max(work_.load_percent, pair.counts().loadPercent());
+    work_.limited_pairs += pair.leftOut() > 0 ? 1U : 0U;
   }
-  for (const std::uint32_t i : engine.others) work_.points_visited += engine.pairs[i].counts().points_visited;
+  for (const std::uint32_t slot : engine.others) {
+    work_.points_visited += engine.pairs[engine.due[slot]].counts().points_visited;
+  }
   for (const IslandWork::Island& island : engine.islands.islands()) {
     work_.substeps += island.report.substeps;
     work_.iterations += island.report.iterations;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "server/simulation/engine.h"
 #include "server/simulation/environment.h"
@@ -8,7 +9,7 @@ namespace tenon {
 namespace {
 
 /// Raised whenever the list of fields changes.
-constexpr std::uint32_t kStateVersion = 5;
+constexpr std::uint32_t kStateVersion = 6;
 
 template <typename Archive, typename Motion>
 void archiveObject(Archive& archive, Motion& object) {
@@ -69,10 +70,13 @@ void archiveIndices(Archive& archive, Indices& indices, std::size_t end) {
 template <typename Archive, typename Self>
 void Environment::archive(Archive& archive, Self& self) {
   archive(self.tick_);
+  archive(self.work_limits_.points);
+  archive(self.work_limits_.critical_load);
   for (auto& object : self.objects_) archiveObject(archive, object);
   for (auto& hand : self.hands_) archiveHand(archive, hand);
   auto& engine = *self.engine_;
   archiveSwitches(archive, engine);
+  for (auto& group : engine.groups) archive(group);
   archiveIndices(archive, engine.near, engine.pairs.size());
   for (const std::uint32_t pair : engine.near) CollPair::archive(archive, engine.pairs[pair], engine.rooms);
   for (auto& odometer : engine.odometers) archive(odometer);
@@ -130,10 +134,12 @@ Result<void> Environment::restore(std::span<const std::uint8_t> bytes) {
   }
   engine_->pairs = std::move(copy.engine_->pairs);
   engine_->switches = std::move(copy.engine_->switches);
+  engine_->groups = std::move(copy.engine_->groups);
   engine_->near = std::move(copy.engine_->near);
   engine_->rooms = std::move(copy.engine_->rooms);
   engine_->odometers = std::move(copy.engine_->odometers);
   engine_->forces = std::move(copy.engine_->forces);
+  work_limits_ = copy.work_limits_;
   tick_ = copy.tick_;
   engine_->forgetTick();
   findMovable();
@@ -151,7 +157,9 @@ bool Environment::isSound() const noexcept {
     return sound(object.X_WO) && object.status <= ObjectStatus::kFree && object.V_WO.linear.allFinite() &&
            object.V_WO.angular.allFinite() && (!object.holder.valid() || isHand(object.holder));
   });
-  return sound_objects && std::all_of(hands_.begin(), hands_.end(), [&](const HandMotion& hand) {
+  const bool sound_limits = work_limits_.critical_load > 0.0 && std::isfinite(work_limits_.critical_load);
+  return sound_limits && sound_objects &&
+         std::all_of(hands_.begin(), hands_.end(), [&](const HandMotion& hand) {
            return sound(hand.X_WH) && sound(hand.X_HO) && sound(hand.X_OR) &&
                   (!hand.object.valid() || isObject(hand.object)) &&
                   (!hand.own.valid() || isObject(hand.own));

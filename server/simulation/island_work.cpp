@@ -30,6 +30,11 @@ void IslandWork::beginIsland(const SolveLimits& limits) noexcept {
   islands_[island_count_++] = {body_count_, 0, pair_count_, 0, limits, {}};
 }
 
+void IslandWork::addPoints(std::uint64_t points) noexcept {
+  std::uint64_t& limit = islands_[island_count_ - 1].limits.points;
+  limit = limit == SolveLimits{}.points ? points : limit + points;
+}
+
 void IslandWork::addBody(ObjectId object, const MovableBody& body) noexcept {
   assert(body_count_ < bodies_.size());
   objects_[body_count_] = object;

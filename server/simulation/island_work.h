@@ -32,6 +32,8 @@ class IslandWork {
   /// Contacts of the island begun last are listed this much [m] farther ahead.
   void widenMargin(double margin) noexcept { islands_[island_count_ - 1].limits.contact_margin += margin; }
   [[nodiscard]] SolveLimits& limits(std::size_t island) { return islands_[island].limits; }
+  /// The island begun last may test so many more points.
+  void addPoints(std::uint64_t points) noexcept;
   /// To the island begun last.
   void addBody(ObjectId object, const MovableBody& body) noexcept;
   void addPair(std::size_t pair, const IslandPair& island_pair) noexcept;

@@ -97,6 +97,7 @@ class StateArchive {
     visit(result.walked.X_WA);
     visit(result.walked.X_WB);
     visit(result.walked.levels);
+    visit(result.walked.used);
     visit(result.flanks);
     visit(result.slides);
   }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "server/structures/level_areas.h"
+
 namespace tenon {
 
 namespace {
@@ -58,6 +60,7 @@ Pointshell::Pointshell(const Layout& layout, std::shared_ptr<const void> owner)
       blocks->levels.push_back(blockOf(layout_.clusters.subspan(level.first_cluster + c, count)));
     }
   }
+  blocks->areas = levelAreas(layout_.points, layout_.levels);
   blocks_ = std::move(blocks);
 }
 

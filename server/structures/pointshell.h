@@ -31,7 +31,7 @@ struct ShellLevel {
   std::uint32_t first_leaf = 0, leaf_count = 0;
   std::uint32_t first_cluster = 0, cluster_count = 0;
   float spacing = 0.0F;     ///< [m] between neighbours when levels 0..this are used
-  float area_scale = 1.0F;  ///< point areas are multiplied by this when levels above this one are left out
+  float area_scale = 1.0F;  ///< all skin over the skin of its points and coarser ones
 };
 
 /// Sixteen points or balls side by side, as vector instructions read them; unused lanes repeat the first.
@@ -79,6 +79,9 @@ class Pointshell {
   /// The clusters of all levels, sixteen at a time; each level begins a new block.
   [[nodiscard]] std::span<const ShellBlock> clusterBlocks() const { return blocks_->levels; }
 
+  /// [m^2] Of the points of levels 0..k, what each stands for when finer levels are left out.
+  [[nodiscard]] std::span<const float> areasOfLevel(std::size_t k) const { return blocks_->areas[k]; }
+
   /// Largest distance of a point from the mesh origin [m]: bounds the speed of any point by |v| + |w| radius.
   [[nodiscard]] double radius() const { return radius_; }
   /// A ball that holds all points: centre in M and radius [m].
@@ -88,6 +91,7 @@ class Pointshell {
  private:
   struct Blocks {
     std::vector<ShellBlock> leaves, clusters, levels;
+    std::vector<std::vector<float>> areas;
   };
 
   Layout layout_;

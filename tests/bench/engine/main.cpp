@@ -15,6 +15,7 @@
 #include "tests/bench/engine/bench_scene.h"
 #include "tests/bench/engine/insertion.h"
 #include "tests/bench/engine/methods.h"
+#include "tests/bench/engine/overload_table.h"
 #include "tests/bench/engine/query_table.h"
 #include "tests/bench/engine/tick_table.h"
 
@@ -81,6 +82,7 @@ class Bench {
     }
     if (wants("methods")) add(methodsTable(say));
     if (wants("many_bodies")) add(manyBodiesTable(say));
+    if (wants("overload")) add(overloadTable(say));
     if (wants("insertion")) {
       const auto insertion = rehearseInsertion(arguments_.scenario, arguments_.cache, arguments_.detail, say);
       if (!insertion) return fail(insertion.error().what);
@@ -129,8 +131,8 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   app.add_option("--only", arguments.only,
-                 "tables to make: bake, query, methods, many_bodies, insertion (default: all)")
-      ->check(CLI::IsMember({"bake", "query", "methods", "many_bodies", "insertion"}));
+                 "tables to make: bake, query, methods, many_bodies, overload, insertion (default: all)")
+      ->check(CLI::IsMember({"bake", "query", "methods", "many_bodies", "overload", "insertion"}));
   app.add_option("--json", arguments.json, "write the tables into this file, for programs");
   app.add_option(
       "--figures", arguments.figures,

@@ -69,6 +69,39 @@ TEST_F(JournalTest, RunsAgainToEqualHashes) {
   EXPECT_FALSE(report->first_difference);
 }
 
+// Whatever a clock has decided is in the inputs: a re-run has no clock.
+TEST_F(JournalTest, BudgetsAndGroupsThatChangeOnTheWayAreRepeated) {
+  const auto play_with = [](Tick tick) {
+    TickInput input = play(tick);
+    if (tick % 150 == 0)
+      input.changes.push_back({.kind = ChangeKind::kBudget, .value = static_cast<double>(tick % 400)});
+    if (tick == 900 || tick == 950)
+      input.changes.push_back(
+          {.kind = ChangeKind::kGroup, .object = ObjectId{1}, .index = tick == 900 ? 5U : 0U});
+    return input;
+  };
+  Exercise exercise = Stage::makeExercise(loaded_, 1, {kRightHand});
+  auto journal = Journal::open(file_, {"small/scenario.yaml", 0.25, fingerprintOf(loaded_)});
+  ASSERT_TRUE(journal);
+  std::uint32_t limited = 0;
+  for (Tick tick = 1; tick <= kTicks; ++tick) {
+    JournalEntry entry;
+    entry.input = play_with(tick);
+    exercise.tick(entry.input);
+    entry.hash = exercise.hash();
+    limited += exercise.environment().work().limited_pairs;
+    if (tick % kCheckpointEvery == 1) exercise.save(entry.checkpoint);
+    ASSERT_TRUE(journal->write(entry));
+  }
+  EXPECT_GT(limited, 0U) << "the budgets did limit something";
+  ASSERT_TRUE(journal->close({.phase = exercise.phase(), .tick = kTicks, .reason = "done"}));
+  const auto report = again();
+  ASSERT_TRUE(report) << report.error().what;
+  EXPECT_EQ(report->compared, kTicks - 1);
+  EXPECT_FALSE(report->first_difference);
+  EXPECT_EQ(report->final_hash, exercise.hash());
+}
+
 TEST_F(JournalTest, SaysWhatItWasMadeWith) {
   write();
   const auto origin = originOf(file_);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tests/server/simulation/small_scene.h"
+#include "tests/server/simulation/wave.h"
 
 namespace tenon::test {
 
@@ -33,10 +34,11 @@ struct ManyBodies {
   void act(Environment& environment, Tick tick) const {
     for (std::size_t i = 0; i < hands.size(); ++i) {
       if (tick == 1) environment.setHandPresent(hands[i], true);
-      const double phase = 0.004 * static_cast<double>(tick) + static_cast<double>(i);
-      const Vector3 p(0.01 * std::sin(phase), 0.01 * std::cos(phase), tick < 20 ? 0.0 : -0.01);
-      environment.setHandPose(hands[i], Pose(places[i] + p, expRotation({0.0, 0.0, 0.1 * std::sin(phase)})),
-                              {});
+      constexpr Tick kRound = 1600;
+      const double x = wave(tick + 160 * i, kRound);
+      const double y = wave(tick + 160 * i + kRound / 4, kRound);
+      const Vector3 p(0.01 * x, 0.01 * y, tick < 20 ? 0.0 : -0.01);
+      environment.setHandPose(hands[i], Pose(places[i] + p, expRotation({0.0, 0.0, 0.1 * x})), {});
     }
   }
   void step(Environment& environment) const {

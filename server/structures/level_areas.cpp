@@ -1,0 +1,65 @@
+#include "server/structures/level_areas.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "server/structures/point_grid.h"
+
+namespace tenon {
+namespace {
+
+/// Points are stored by level, so levels 0..k are the first so many.
+std::size_t endOf(const ShellLevel& level) { return std::size_t{level.first_point} + level.point_count; }
+
+/// Hands the areas of the points from `coarse` on to the nearest among the first `coarse`.
+void handDown(std::span<const ShellPoint> points, std::size_t coarse, double cell,
+              std::vector<double>& areas) {
+  const double total = std::accumulate(areas.begin(), areas.end(), 0.0);
+  PointGrid grid(cell);
+  for (std::size_t i = 0; i < coarse; ++i) {
+    grid.add(points[i].p_MP.cast<double>(), static_cast<std::uint32_t>(i));
+  }
+  double kept = std::accumulate(areas.begin(), areas.begin() + static_cast<std::ptrdiff_t>(coarse), 0.0);
+  for (std::size_t i = coarse; i < areas.size(); ++i) {
+    double nearest = std::numeric_limits<double>::infinity();
+    std::size_t owner = coarse;
+    grid.visitNear(points[i].p_MP.cast<double>(), [&](std::uint32_t other, double squared) {
+      if (squared < nearest && points[other].inward_M.dot(points[i].inward_M) >= 0.0F) {
+        nearest = squared;
+        owner = other;
+      }
+      return true;
+    });
+    if (owner == coarse) continue;
+    areas[owner] += areas[i];
+    kept += areas[i];
+  }
+  areas.resize(coarse);
+  // what had nobody near is everybody's
+  if (!(kept > 0.0)) return;
+  for (double& area : areas) area *= total / kept;
+}
+
+}  // namespace
+
+std::vector<std::vector<float>> levelAreas(std::span<const ShellPoint> points,
+                                           std::span<const ShellLevel> levels) {
+  std::vector<std::vector<float>> result(levels.size());
+  Eigen::AlignedBox3d box;
+  for (const ShellPoint& point : points) box.extend(point.p_MP.cast<double>());
+  std::vector<double> areas(points.size());
+  std::transform(points.begin(), points.end(), areas.begin(), [](const ShellPoint& p) { return p.area; });
+  for (std::size_t k = levels.size(); k-- > 0;) {
+    const std::size_t end = std::min(endOf(levels[k]), areas.size());
+    // a cell is never so small that its number leaves an int
+    constexpr double kFinest = 1e-6;
+    const double cell = std::max<double>(levels[k].spacing, kFinest * box.diagonal().norm());
+    if (end < areas.size() && cell > 0.0) handDown(points, end, cell, areas);
+    areas.resize(end);
+    result[k].assign(areas.begin(), areas.end());
+  }
+  return result;
+}
+
+}  // namespace tenon

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tests/server/simulation/small_scene.h"
+#include "tests/server/simulation/wave.h"
+
+namespace tenon::test {
+
+/// A finely sampled block, 10 x 6 x 4 cm: some 25,000 points, a quarter of them on its underside.
+inline StructuresPtr fineBlockShape() {
+  static const StructuresPtr shape = boxStructures({0.1, 0.06, 0.04}, 0.002, 0.001);
+  return shape;
+}
+
+/// More than a tick has time for: blocks lie flat on a floor under hands that press and stir them, with
+/// thousands of points each in contact all the time.
+struct Overload {
+  explicit Overload(int blocks) {
+    floor = small.object("floor", floorStructures(1.4, 0.01), Vector3::Zero());
+    for (int i = 0; i < blocks; ++i) {
+      const Vector3 p_WO(0.15 * (i % 8) - 0.55, 0.12 * (i / 8) - 0.5, 0.021);
+      places.push_back(p_WO);
+      parts.push_back(small.object("block" + std::to_string(i), fineBlockShape(), p_WO));
+      hands.push_back(small.hand("hand" + std::to_string(i), parts.back()));
+      pairs.push_back(small.pair(parts.back(), floor));
+    }
+    scene = small.build();
+  }
+
+  /// What people do in this tick; depends on nothing but the tick.
+  void act(Environment& environment, Tick tick) const {
+    for (std::size_t i = 0; i < hands.size(); ++i) {
+      if (tick == 1) environment.setHandPresent(hands[i], true);
+      const double x = 0.01 * wave(tick + 37 * i, 400);
+      const double y = 0.01 * wave(tick + 91 * i, 700);
+      const Vector3 p = places[i] + Vector3(x, y, tick < 20 ? 0.0 : -0.004);
+      environment.setHandPose(hands[i], Pose(p, expRotation({0.0, 0.0, 0.1 * wave(tick, 900)})), {});
+    }
+  }
+  void step(Environment& environment) const {
+    act(environment, environment.tick() + 1);
+    environment.step();
+  }
+
+  SmallScene small;
+  std::shared_ptr<const Scene> scene;
+  ObjectId floor;
+  std::vector<ObjectId> parts;
+  std::vector<Vector3> places;
+  std::vector<HandId> hands;
+  std::vector<std::size_t> pairs;
+};
+
+}  // namespace tenon::test
