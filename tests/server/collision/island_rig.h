@@ -56,6 +56,8 @@ class IslandRig {
   void setFriction(std::size_t pair, double at_rest, double sliding) {
     pairs_[pair].friction = {at_rest, sliding};
   }
+  /// The hand holds the body there instead of at its origin.
+  void holdAt(std::size_t body, const Vector3& p_BC) { bodies_[body].springs[0].p_BC = p_BC; }
   void setHand(std::size_t body, const Pose& X_WH) { bodies_[body].springs[0].X_WG = X_WH; }
   /// The hand goes evenly from where it is, a step a tick.
   void moveHand(std::size_t body, const Pose& X_WH, int ticks) {
