@@ -111,6 +111,7 @@ Result<HapticStructures> bakeFiles(const std::vector<std::filesystem::path>& mes
   auto structures = bake(whole, options, progress);
   if (!structures) return fail(source + ": " + structures.error().what);
   structures->info.source = source;
+  structures->info.meshes = meshes;
   structures->info.content_hash = *hash;
   return structures;
 }

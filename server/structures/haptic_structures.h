@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "idl/types/result.h"
 #include "server/structures/distance_field.h"
@@ -20,6 +21,7 @@ struct StructureInfo {
   Eigen::AlignedBox3d box_M;  ///< of the mesh
   double surface_area = 0.0;  ///< [m^2] of the sampled outer surface
   std::uint64_t bricks = 0;
+  std::vector<std::filesystem::path> meshes;  ///< where they lay; a file keeps the way there from its folder
   std::string notes;  ///< one sentence a line: what a person should know (parts without an inside, ...)
 };
 

@@ -18,7 +18,7 @@ namespace tenon {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'T', 'E', 'N', 'O', 'N', 'H', 'S', '\n'};
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::uint32_t kByteOrder = 0x01020304U;
 constexpr std::size_t kAlignment = 64;
 
@@ -34,6 +34,7 @@ enum Section : std::size_t {
   kSource,
   kContentHash,
   kNotes,
+  kMeshes,
   kSections
 };
 constexpr std::array<std::size_t, kSections> kElementBytes{sizeof(DistanceField::Entry),
@@ -43,6 +44,7 @@ constexpr std::array<std::size_t, kSections> kElementBytes{sizeof(DistanceField:
                                                            sizeof(ShellSphere),
                                                            sizeof(ShellSphere),
                                                            sizeof(ShellLevel),
+                                                           1,
                                                            1,
                                                            1,
                                                            1};
@@ -67,15 +69,38 @@ static_assert(sizeof(ShellPoint) == 28 && sizeof(ShellSphere) == 24 && sizeof(Sh
 
 std::uint64_t aligned(std::uint64_t offset) { return (offset + kAlignment - 1) / kAlignment * kAlignment; }
 
+/// Paths as seen from the folder of the structure file, one a line: both may move together.
+std::string meshesFrom(const std::filesystem::path& file, const StructureInfo& info) {
+  std::error_code error;
+  const auto folder = std::filesystem::weakly_canonical(std::filesystem::absolute(file), error).parent_path();
+  std::string lines;
+  for (const std::filesystem::path& mesh : info.meshes) {
+    const auto whole = std::filesystem::weakly_canonical(std::filesystem::absolute(mesh), error);
+    lines += whole.lexically_relative(folder).generic_string() + "\n";
+  }
+  return lines;
+}
+
+std::vector<std::filesystem::path> meshesOf(const std::filesystem::path& file, const std::string& lines) {
+  std::vector<std::filesystem::path> meshes;
+  for (std::size_t begin = 0; begin < lines.size();) {
+    const std::size_t end = std::min(lines.find('\n', begin), lines.size());
+    meshes.push_back((file.parent_path() / lines.substr(begin, end - begin)).lexically_normal());
+    begin = end + 1;
+  }
+  return meshes;
+}
+
 /// What goes into each section.
-std::array<std::span<const std::byte>, kSections> sectionsOf(const HapticStructures& structures) {
+std::array<std::span<const std::byte>, kSections> sectionsOf(const HapticStructures& structures,
+                                                             const std::string& meshes) {
   const auto bytes = [](const auto& list) { return std::as_bytes(std::span(list.data(), list.size())); };
   const DistanceField::Layout& field = structures.field.layout();
   const Pointshell& shell = structures.shell;
   const StructureInfo& info = structures.info;
   return {bytes(field.index),       bytes(field.samples),    bytes(field.far),      bytes(shell.points()),
           bytes(shell.leaves()),    bytes(shell.clusters()), bytes(shell.levels()), bytes(info.source),
-          bytes(info.content_hash), bytes(info.notes)};
+          bytes(info.content_hash), bytes(info.notes),       bytes(meshes)};
 }
 
 Header headerOf(const HapticStructures& structures) {
@@ -234,7 +259,8 @@ Result<Header> readHeader(const std::string& name, std::span<const std::byte> by
 
 Result<void> writeStructures(const std::filesystem::path& file, const HapticStructures& structures) {
   Header header = headerOf(structures);
-  const auto sections = sectionsOf(structures);
+  const std::string meshes = meshesFrom(file, structures.info);
+  const auto sections = sectionsOf(structures, meshes);
   std::uint64_t offset = sizeof header;
   for (std::size_t i = 0; i < kSections; ++i) {
     header.first[i] = offset = aligned(offset);
@@ -296,6 +322,7 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
   info.source = text(bytes, *header, kSource);
   info.content_hash = text(bytes, *header, kContentHash);
   info.notes = text(bytes, *header, kNotes);
+  info.meshes = meshesOf(file, text(bytes, *header, kMeshes));
   info.triangles = header->triangles;
   info.bricks = header->info_bricks;
   info.bake_seconds = header->bake_seconds;

@@ -31,6 +31,7 @@ class StructureFile : public ::testing::Test {
     structures_.shell = buildShell(sites);
     structures_.info.source = "ball.stl";
     structures_.info.content_hash = "0123";
+    structures_.info.meshes = {folder_.parent_path() / "parts" / "ball.stl"};
     structures_.info.notes = "A note.\n";
     structures_.info.triangles = 12;
     structures_.info.box_M = {-corner, corner};
@@ -68,6 +69,7 @@ TEST_F(StructureFile, ComesBackAsItWent) {
   EXPECT_EQ(read.shell.ballRadius(), structures_.shell.ballRadius());
   EXPECT_EQ(read.info.source, "ball.stl");
   EXPECT_EQ(read.info.notes, "A note.\n");
+  EXPECT_EQ(read.info.meshes, structures_.info.meshes);
   EXPECT_EQ(read.info.box_M.max(), structures_.info.box_M.max());
   const Vector3 p(0.011, 0.012, 0.013);
   EXPECT_EQ(read.field.sample(p).distance, structures_.field.sample(p).distance);
