@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 
 namespace tenon::test {
@@ -103,6 +104,37 @@ ExactDistance::Nearest ExactDistance::nearest(const Vector3& p_MP) const {
   double squared = std::numeric_limits<double>::infinity();
   if (!nodes_.empty()) search(0, p_MP, best, squared);
   return best;
+}
+
+void ExactDistance::sumNormals(std::uint32_t number, const Vector3& q, Vector3& sum) const {
+  constexpr double kTouching = 1e-9;  // [m]
+  const Node& node = nodes_[number];
+  if (node.box.squaredExteriorDistance(q) > kTouching * kTouching) return;
+  if (node.count == 0) {
+    sumNormals(node.left, q, sum);
+    sumNormals(node.right, q, sum);
+    return;
+  }
+  for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
+    const std::array<Vector3, 3>& t = triangles_[order_[i]];
+    if ((nearestOnTriangle(q, t) - q).norm() > kTouching) continue;
+    double angle = std::numbers::pi;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vector3 to_next = t[(k + 1) % 3] - t[k];
+      const Vector3 to_last = t[(k + 2) % 3] - t[k];
+      if ((t[k] - q).norm() <= kTouching)
+        angle = std::atan2(to_next.cross(to_last).norm(), to_next.dot(to_last));
+    }
+    sum += angle * (t[1] - t[0]).cross(t[2] - t[0]).normalized();
+  }
+}
+
+bool ExactDistance::behindNearest(const Vector3& p_MP) const {
+  if (nodes_.empty()) return false;
+  const Vector3 q = nearest(p_MP).p_MQ;
+  Vector3 normal = Vector3::Zero();
+  sumNormals(0, q, normal);
+  return normal.dot(p_MP - q) < 0.0;
 }
 
 bool ExactDistance::inside(const Vector3& p_MP) const {

@@ -28,6 +28,10 @@ class ExactDistance {
   /// for consistent winding).
   [[nodiscard]] bool inside(const Vector3& p_MP) const;
 
+  /// The same, fast, for a closed mesh of consistent winding without overlaps: by the normals of all
+  /// triangles at the nearest point, weighted with their angles there (Baerentzen and Aanaes 2005).
+  [[nodiscard]] bool behindNearest(const Vector3& p_MP) const;
+
  private:
   struct Node {
     Eigen::AlignedBox3d box;
@@ -39,6 +43,8 @@ class ExactDistance {
 
   std::uint32_t build(std::uint32_t first, std::uint32_t count);
   void search(std::uint32_t node, const Vector3& p, Nearest& best, double& squared) const;
+  /// Adds the weighted normals of the triangles that touch q.
+  void sumNormals(std::uint32_t node, const Vector3& q, Vector3& sum) const;
 
   std::vector<std::array<Vector3, 3>> triangles_;
   std::vector<std::uint32_t> order_;
