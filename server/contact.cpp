@@ -7,6 +7,8 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "server/bake/surface_import.h"
+#include "server/collision/contact_refinement.h"
 #include "server/collision/pair_query.h"
 #include "server/collision/query_kernels.h"
 #include "server/pose_lines.h"
@@ -21,8 +23,10 @@ struct Arguments {
   std::string poses;
   std::string csv;
   std::string isa;
+  std::vector<std::string> meshes;
   double stiffness = 1000.0;
   bool no_prune = false;
+  bool refine = false;
 };
 
 /// One pose and its answer; B is the field's body, A the shell's.
@@ -39,7 +43,7 @@ int complain(const Error& error) {
   return 1;
 }
 
-std::vector<Row> ask(const HapticStructures& field, const HapticStructures& shell,
+std::vector<Row> ask(const HapticStructures& field, const HapticStructures& shell, const SurfaceTree& surface,
                      const std::vector<Pose>& poses, const Arguments& arguments) {
   const auto result = std::make_unique<PairQueryResult>();
   std::vector<Row> rows;
@@ -48,8 +52,11 @@ std::vector<Row> ask(const HapticStructures& field, const HapticStructures& shel
     PairQuery query{&shell.shell, &field.field, X_BA, Pose()};
     query.sum = true;
     query.prune = !arguments.no_prune;
+    // the mesh may have points inside that its field has outside
+    if (surface.size() > 0) query.margin = 0.25 * field.field.voxel();
     const auto begin = std::chrono::steady_clock::now();
     queryPair(query, *result);
+    if (surface.size() > 0) refineContacts(query, surface, RefinementBudget(), *result);
     const std::chrono::duration<double, std::micro> took = std::chrono::steady_clock::now() - begin;
     rows.push_back({took.count(), result->counts.points_colliding, result->deepest,
                     result->push_Ao_W * arguments.stiffness, result->counts.loadPercent()});
@@ -113,7 +120,12 @@ int run(const Arguments& arguments) {
   if ((*shell)->shell.empty()) return complain({arguments.shell + ": has no shell"});
   const auto poses = readPoses(arguments.poses);
   if (!poses) return complain(poses.error());
-  const std::vector<Row> rows = ask(**field, **shell, *poses, arguments);
+  Result<SurfaceTree> surface;
+  if (arguments.refine || !arguments.meshes.empty()) {
+    surface = importSurface(**field, {arguments.meshes.begin(), arguments.meshes.end()});
+    if (!surface) return complain({"--refine: " + surface.error().what + " (--mesh says where it is)"});
+  }
+  const std::vector<Row> rows = ask(**field, **shell, *surface, *poses, arguments);
   if (!arguments.csv.empty()) {
     if (const auto ok = writeCsv(arguments.csv, rows); !ok) return complain(ok.error());
   }
@@ -139,6 +151,11 @@ int main(int argc, char** argv) {
   app.add_option("--stiffness", arguments.stiffness, "K [N/m]")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
+  app.add_flag(
+      "--refine", arguments.refine,
+      "measure the deepest contacts against the mesh that FIELD was baked from, where its field bends");
+  app.add_option("--mesh", arguments.meshes, "that mesh, when it is not where it was then")
+      ->option_text("MESH...");
   app.add_flag("--no-prune", arguments.no_prune, "test every point, to compare");
   app.footer(
       "contacts counts the points inside; points deeper than the field's band push nothing.\n"

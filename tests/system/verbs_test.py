@@ -107,6 +107,29 @@ class Verbs(unittest.TestCase):
             for words, table in tables.items():
                 self.assertEqual(table, tables[()], words)
 
+    def test_refined_contacts_are_those_of_the_mesh_where_edges_meet(self):
+        with tempfile.TemporaryDirectory() as folder:
+            baked, poses, table = cube(folder), Path(folder) / "poses", Path(folder) / "table.csv"
+            # an edge half a millimetre under two sides of the other cube
+            poses.write_text("0.0195 0.0195 0.003 1 0 0 0\n", encoding="utf-8")
+            depths = []
+            for words in ((), ("--refine",), ("--refine", "--mesh", Path(folder) / "cube.off")):
+                done = tenon("contact", baked, baked, "--poses", poses, "--csv", table, *words)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                depths.append(float(table.read_text(encoding="utf-8").splitlines()[1].split(",")[3]))
+            self.assertLess(depths[0], 0.0004)
+            for depth in depths[1:]:
+                self.assertAlmostEqual(depth, 0.0005, places=5)
+            other = Path(folder) / "other.off"
+            other.write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", encoding="utf-8")
+            done = tenon("contact", baked, baked, "--poses", poses, "--refine", "--mesh", other)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("is not the mesh of cube.off", done.stderr)
+            (Path(folder) / "cube.off").unlink()
+            done = tenon("contact", baked, baked, "--poses", poses, "--refine")
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("cube.off", done.stderr)
+
     def test_bad_points_and_poses_are_refused_by_line(self):
         with tempfile.TemporaryDirectory() as folder:
             baked, poses = cube(folder), Path(folder) / "poses"

@@ -1,0 +1,60 @@
+#include "server/bake/surface_import.h"
+
+#include <array>
+#include <string>
+#include <utility>
+
+#include "server/bake/bake.h"
+#include "server/structures/outer_surface.h"
+
+namespace tenon {
+
+namespace {
+
+using Triangle = SurfaceTree::Triangle;
+
+constexpr std::array kUnits{0.001, 1.0, 0.01, 0.0254};
+
+Result<std::vector<Triangle>> trianglesOf(const std::vector<std::filesystem::path>& meshes, double unit) {
+  std::vector<Triangle> triangles;
+  for (const auto& file : meshes) {
+    const auto mesh = importMesh(file, unit);
+    if (!mesh) return tl::unexpected(mesh.error());
+    for (const auto& [a, b, c] : mesh->triangles) {
+      triangles.push_back({mesh->vertices[a], mesh->vertices[b], mesh->vertices[c]});
+    }
+  }
+  return triangles;
+}
+
+bool fills(const std::vector<Triangle>& triangles, const Eigen::AlignedBox3d& wanted) {
+  Eigen::AlignedBox3d box;
+  for (const Triangle& corners : triangles) {
+    for (const Vector3f& corner : corners) box.extend(corner.cast<double>());
+  }
+  const double most = 1e-4 * wanted.diagonal().norm();
+  return (box.min() - wanted.min()).norm() <= most && (box.max() - wanted.max()).norm() <= most;
+}
+
+}  // namespace
+
+Result<SurfaceTree> importSurface(const HapticStructures& structures,
+                                  std::vector<std::filesystem::path> meshes) {
+  if (meshes.empty()) meshes = structures.info.meshes;
+  if (meshes.empty()) return fail(structures.info.source + ": nothing tells where its mesh is");
+  Error reason{meshes.front().string() + ": is not the mesh of " + structures.info.source +
+               ": no unit makes it as large"};
+  for (const double unit : kUnits) {
+    auto triangles = trianglesOf(meshes, unit);
+    if (!triangles) {
+      reason = triangles.error();
+      break;
+    }
+    if (fills(*triangles, structures.info.box_M)) {
+      return SurfaceTree(outerTriangles(*triangles, structures.field));
+    }
+  }
+  return tl::unexpected(reason);
+}
+
+}  // namespace tenon
