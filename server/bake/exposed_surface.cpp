@@ -50,6 +50,34 @@ class CellMap {
     return lookAround(p_MP, cell, brick, node);
   }
 
+  /// Whether no cell of a box has a free point about it.
+  [[nodiscard]] bool hides(const Eigen::AlignedBox3d& box_M) const {
+    const Cell low = level_.cellAt(box_M.min());
+    const Cell high = level_.cellAt(box_M.max());
+    const Cell first = low / kVoxels;
+    const Cell last = high / kVoxels;
+    for (int z = first.z(); z <= last.z(); ++z) {
+      for (int y = first.y(); y <= last.y(); ++y) {
+        for (int x = first.x(); x <= last.x(); ++x) {
+          const Cell corner = Cell(x, y, z) * kVoxels;
+          const std::int64_t node = level_.nodeAt({x, y, z});
+          if (node < 0 || level_.slot[static_cast<std::size_t>(node)] < 0) return false;
+          const auto slot = static_cast<std::size_t>(level_.slot[static_cast<std::size_t>(node)]);
+          const Cell from = (low - corner).cwiseMax(0);
+          const Cell to = (high - corner).cwiseMin(kVoxels - 1);
+          const std::uint64_t row = (0xFFULL >> static_cast<unsigned>(7 - to.x() + from.x()))
+                                    << static_cast<unsigned>(from.x());
+          std::uint64_t layer = 0;
+          for (int i = from.y(); i <= to.y(); ++i) layer |= row << static_cast<unsigned>(i * kVoxels);
+          for (int i = from.z(); i <= to.z(); ++i) {
+            if ((near_[slot][static_cast<std::size_t>(i)] & layer) != 0) return false;
+          }
+        }
+      }
+    }
+    return true;
+  }
+
  private:
   [[nodiscard]] BrickLevel::Mask nearOutside(std::size_t node) const {
     // a row of lattice points along x is a word; a point that is not known may be free
@@ -109,11 +137,12 @@ class Cutter {
     std::size_t a = 0;
     const double length = longestEdge(t, a);
     const Vector3 centre = (t[0] + t[1] + t[2]) / 3.0;
-    const BrickLevel& level = levelAt(centre);
+    const CellMap& map = mapAt(centre);
+    const BrickLevel& level = map.level();
     if (length <= level.voxel) return isExposed(centre) ? Part::kAll : Part::kNone;
     if (length <= kWide * level.voxel) {
       if (inEmptyBall(level, t, centre)) return Part::kAll;
-      if (farFromOutside(level, t)) return Part::kNone;
+      if (map.hides(boxOf(t))) return Part::kNone;
     }
 
     const std::size_t b = (a + 1) % 3;
@@ -156,26 +185,10 @@ class Cutter {
     return false;
   }
 
-  /// Whether no brick with a sample that could expose some of the piece has one outside.
-  [[nodiscard]] static bool farFromOutside(const BrickLevel& level, const Triangle& t) {
-    const Eigen::AlignedBox3d box = boxOf(t);
-    const Cell low = (level.cellAt(box.min()) - Cell::Ones()) / BrickLevel::kVoxels;
-    const Cell high = (level.cellAt(box.max()) + Cell::Constant(2)) / BrickLevel::kVoxels;
-    for (int z = low.z(); z <= high.z(); ++z) {
-      for (int y = low.y(); y <= high.y(); ++y) {
-        for (int x = low.x(); x <= high.x(); ++x) {
-          const std::int64_t node = level.nodeAt(Cell(x, y, z));
-          if (node < 0 || level.anyOutside(static_cast<std::size_t>(node))) return false;
-        }
-      }
-    }
-    return true;
-  }
-
-  [[nodiscard]] const BrickLevel& levelAt(const Vector3& p) const {
-    if (fine_ == nullptr) return coarse_.level();
+  [[nodiscard]] const CellMap& mapAt(const Vector3& p) const {
+    if (fine_ == nullptr) return coarse_;
     const BrickLevel& fine = fine_->level();
-    return fine.nodeAt(fine.cellAt(p) / kVoxels) >= 0 ? fine : coarse_.level();
+    return fine.nodeAt(fine.cellAt(p) / kVoxels) >= 0 ? *fine_ : coarse_;
   }
   [[nodiscard]] bool isExposed(const Vector3& p) const {
     if (fine_ != nullptr) {
