@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "server/bake/parallel.h"
 #include "server/bake/triangle_tree.h"
@@ -143,7 +144,7 @@ bool BrickLevel::sampleDistances(const TriangleTree& tree, ParallelWork& work) {
   samples.resize(of_slot.size() * kSamples);
   work.run(of_slot.size(), 64, [&](std::size_t s) {
     const std::uint32_t node = of_slot[s];
-    sampleBrick(node, tree, ownSamples(node), samplesOf(static_cast<std::int32_t>(s)));
+    sampleBrick(node, tree, ownSamples(node));
   });
   work.run(of_slot.size(), 1024, [&](std::size_t s) { copyApron(of_slot[s]); });
   for (std::size_t s = 0; s < of_slot.size() && !work.cancelled(); ++s) {
@@ -180,48 +181,39 @@ void BrickLevel::copyApron(std::size_t node) {
   }
 }
 
-void BrickLevel::sampleBrick(std::size_t node, const TriangleTree& tree, const SampleBits& which,
-                             std::int16_t* out) const {
+void BrickLevel::sampleBrick(std::size_t node, const TriangleTree& tree, const SampleBits& which) {
+  if (which.none()) return;
   const Cell corner = brickOf(node) * kVoxels;
+  std::int16_t* out = samplesOf(slot[node]);
   constexpr double kClamp = DistanceField::kClampVoxels;
-  constexpr double kWidestBlock = 3.4642;  // [voxels] from the middle of 5^3 samples to a corner
+  constexpr double kWidestBlock = 2.5981;  // [voxels] from the middle of 4^3 samples to a corner
   TriangleTree::Search search(tree, centreOf(node), kBrickRadius * voxel, (kClamp + kWidestBlock) * voxel);
-  // blocks of samples are halved; one whose middle is so far away that all are clamped is done
-  const auto fill = [&](const auto& self, const Cell& from, const Cell& to) -> void {
-    const Cell count = to - from;
-    if (count.maxCoeff() <= 2) {
-      for (int k = 0; k < count.prod(); ++k) {
-        const Cell in_block(k % count.x(), k / count.x() % count.y(), k / (count.x() * count.y()));
-        const int sample = sampleIndex(from + in_block);
-        if (!which[static_cast<std::size_t>(sample)]) continue;
-        const double squared = search.squaredDistance(position(corner + from + in_block), kClamp * voxel);
-        out[sample] = quantizedSample(std::sqrt(squared), voxel);
-      }
-      return;
-    }
+  const std::int16_t clamped = quantizedSample(kClamp * voxel, voxel);
+  const auto fill = [&](const Cell& from, const Cell& to) {
     const Vector3 middle = (from + to - Cell::Ones()).cast<double>() / 2;
     const double reach = (kClamp + (to - from - Cell::Ones()).cast<double>().norm() / 2 + 1e-9) * voxel;
-    if (count.maxCoeff() <= 5 &&
-        search.squaredDistance(position(corner) + middle * voxel, reach) >= reach * reach) {
-      for (int z = from.z(); z < to.z(); ++z) {
-        for (int y = from.y(); y < to.y(); ++y) {
-          for (int x = from.x(); x < to.x(); ++x) {
-            const int sample = sampleIndex({x, y, z});
-            if (which[static_cast<std::size_t>(sample)]) out[sample] = quantizedSample(kClamp * voxel, voxel);
+    bool far = false;
+    bool first = true;
+    for (int z = from.z(); z < to.z(); ++z) {
+      for (int y = from.y(); y < to.y(); ++y) {
+        for (int x = from.x(); x < to.x(); ++x) {
+          const int sample = sampleIndex({x, y, z});
+          if (!which[static_cast<std::size_t>(sample)]) continue;
+          // a block whose middle is so far away that all are clamped is done
+          if (std::exchange(first, false)) {
+            far = search.squaredDistance(position(corner) + middle * voxel, reach) >= reach * reach;
           }
+          const Vector3 p = position(corner + Cell(x, y, z));
+          out[sample] =
+              far ? clamped : quantizedSample(std::sqrt(search.squaredDistance(p, kClamp * voxel)), voxel);
         }
       }
-      return;
-    }
-    const Cell half = (count + Cell::Ones()) / 2;
-    for (int part = 0; part < 8; ++part) {
-      const Cell upper(part & 1, part >> 1 & 1, part >> 2 & 1);
-      const Cell begin = from + upper.cwiseProduct(half);
-      const Cell end = (upper.array() > 0).select(to, from + half);
-      if ((begin.array() < end.array()).all()) self(self, begin, end);
     }
   };
-  fill(fill, Cell::Zero(), Cell::Constant(kSide));
+  for (int block = 0; block < 27; ++block) {
+    const Cell from = Cell(block % 3, block / 3 % 3, block / 9) * 4;
+    fill(from, (from + Cell::Constant(4)).cwiseMin(kSide));
+  }
 }
 
 }  // namespace tenon

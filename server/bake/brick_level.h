@@ -86,9 +86,12 @@ class BrickLevel {
 
   /// Finds the bricks near triangles and samples their distances. False when there is no room for them.
   bool sampleDistances(const TriangleTree& tree, ParallelWork& work);
-  /// Those samples of one node, from a tree of triangles.
-  void sampleBrick(std::size_t node, const TriangleTree& tree, const SampleBits& which,
-                   std::int16_t* out) const;
+  /// Measures those samples of one node that it has alone or owns, from a tree of triangles.
+  void sampleBrick(std::size_t node, const TriangleTree& tree, const SampleBits& which);
+  /// Takes the samples on the upper faces from the neighbours that own them.
+  void copyApron(std::size_t node);
+  /// Which samples of a brick no neighbour with a slot has as its own.
+  [[nodiscard]] SampleBits ownSamples(std::size_t node) const;
 
   Vector3 p_MoFo_M;
   double voxel;
@@ -104,10 +107,6 @@ class BrickLevel {
   /// Calls visit(node, sample) for each brick with samples that has this lattice point, until it says no.
   template <typename Visit>
   void visitCopies(const Cell& lattice, Visit&& visit) const;
-  /// Which samples of a brick no neighbour with a slot has as its own.
-  [[nodiscard]] SampleBits ownSamples(std::size_t node) const;
-  /// Takes the samples on the upper faces from the neighbours that own them.
-  void copyApron(std::size_t node);
 
   Cell coarse_bricks_;
   std::vector<std::int32_t> block_of_coarse_;  // fine level only: which block of children, or -1

@@ -49,19 +49,35 @@ std::vector<std::uint32_t> bricksToRefine(const BrickLevel& coarse, const BakeOp
   return refined;
 }
 
-/// Inside, distances count only to what is exposed; then signs are put in. `gone` are the parts of the
-/// surface that are not.
+/// Inside, distances count only to what is exposed; then signs are put in. `gone` are the triangles that are
+/// not, or not as a whole: a sample with none of them at its distance keeps it.
 void finishSamples(BrickLevel& level, const TriangleTree& exposed, const TriangleTree& gone,
                    ParallelWork& work) {
-  const double reach = (BrickLevel::kBrickRadius + DistanceField::kClampVoxels) * level.voxel;
-  work.run(level.nodes(), 64, [&](std::size_t node) {
-    const std::int32_t slot = level.slot[node];
-    if (slot < 0) return;
-    std::int16_t* samples = level.samplesOf(slot);
-    const BrickLevel::SampleBits inside = ~level.outside[static_cast<std::size_t>(slot)];
-    if (inside.any() && gone.anyWithin(level.centreOf(node), reach)) {
-      level.sampleBrick(node, exposed, inside, samples);
+  constexpr double kClamp = DistanceField::kClampVoxels;
+  const auto ofBrick = [&](auto&& act) {
+    work.run(level.nodes(), 64, [&](std::size_t node) {
+      if (level.slot[node] >= 0) act(node, ~level.outside[static_cast<std::size_t>(level.slot[node])]);
+    });
+  };
+  ofBrick([&](std::size_t node, const BrickLevel::SampleBits& inside) {
+    if (inside.none()) return;
+    const std::int16_t* samples = level.samplesOf(level.slot[node]);
+    const Cell corner = level.brickOf(node) * BrickLevel::kVoxels;
+    TriangleTree::Search search(gone, level.centreOf(node), BrickLevel::kBrickRadius * level.voxel,
+                                (kClamp + 0.01) * level.voxel);
+    BrickLevel::SampleBits stale = inside & level.ownSamples(node);
+    for (int k = 0; k < BrickLevel::kSamples; ++k) {
+      if (!stale[static_cast<std::size_t>(k)]) continue;
+      // what was rounded away
+      const double reach = (samples[k] + 1) * level.voxel / DistanceField::kQuantaPerVoxel;
+      const Vector3 p = level.position(corner + BrickLevel::cellOfSample(k));
+      if (search.squaredDistance(p, reach) >= reach * reach) stale.reset(static_cast<std::size_t>(k));
     }
+    level.sampleBrick(node, exposed, stale);
+  });
+  ofBrick([&](std::size_t node, const BrickLevel::SampleBits&) { level.copyApron(node); });
+  ofBrick([&](std::size_t node, const BrickLevel::SampleBits& inside) {
+    std::int16_t* samples = level.samplesOf(level.slot[node]);
     for (int k = 0; k < BrickLevel::kSamples; ++k) {
       if (inside[static_cast<std::size_t>(k)]) samples[k] = static_cast<std::int16_t>(-samples[k]);
     }
