@@ -14,14 +14,27 @@ using Cell = BrickLevel::Cell;
 // A place of the surface is exposed when an empty ball about an outside sample comes this near to it
 // [voxels]: enough for concave corners, where no ball reaches the edge itself.
 constexpr double kTouch = 0.6;
-// Pieces longer than this are too wide for a ball of the band [voxels].
-constexpr double kWide = 6.0;
+// Pieces longer than this are too wide for a ball of the band, or for being in a box that is hidden [voxels].
+constexpr double kWideBall = 5.0;
+constexpr double kWideBox = 12.0;
 constexpr std::size_t kChunk = 4096;
 
 enum class Exposure { kUnknown, kHidden, kExposed };
 
 constexpr int kVoxels = BrickLevel::kVoxels;
 constexpr int kPatch = kVoxels + 3;  // a brick's cells reach one lattice point below and two above
+
+/// The 4^3 lattice points about a cell, its own corners first: mostly one of them tells.
+const std::array<Cell, 64> kAround = [] {
+  std::array<Cell, 64> around;
+  constexpr std::array kOrder{0, 1, -1, 2};
+  for (int k = 0; k < 64; ++k) {
+    around[static_cast<std::size_t>(k)] = Cell(kOrder[static_cast<std::size_t>((k & 1) | (k >> 2 & 2))],
+                                               kOrder[static_cast<std::size_t>((k >> 1 & 1) | (k >> 3 & 2))],
+                                               kOrder[static_cast<std::size_t>((k >> 2 & 1) | (k >> 4 & 2))]);
+  }
+  return around;
+}();
 
 /// What a level says about cells: whether a free point is among the 4^3 lattice points about one.
 class CellMap {
@@ -103,21 +116,26 @@ class CellMap {
 
   [[nodiscard]] Exposure lookAround(const Vector3& p_MP, const Cell& cell, const Cell& brick,
                                     std::int64_t node) const {
-    const Vector3 p = (p_MP - level_.p_MoFo_M) / level_.voxel;
+    const Vector3 p_cell = (p_MP - level_.p_MoFo_M) / level_.voxel - cell.cast<double>();
+    const Cell in_brick = cell - brick * kVoxels;
+    const std::int32_t slot = level_.slot[static_cast<std::size_t>(node)];
+    const std::int16_t* samples = slot < 0 ? nullptr : level_.samplesOf(slot);
     bool all_known = true;
-    for (int k = 0; k < 64; ++k) {
-      // the cell's own corners first: mostly one of them tells
-      constexpr std::array kOrder{0, 1, -1, 2};
-      const Cell lattice = cell + Cell(kOrder[static_cast<std::size_t>((k & 1) | (k >> 2 & 2))],
-                                       kOrder[static_cast<std::size_t>((k >> 1 & 1) | (k >> 3 & 2))],
-                                       kOrder[static_cast<std::size_t>((k >> 2 & 1) | (k >> 4 & 2))]);
-      const Cell in_brick = lattice - brick * kVoxels;
-      const bool here = (in_brick.array() >= 0).all() && (in_brick.array() < kVoxels).all();
-      const BrickLevel::Point point = here ? level_.at(node, in_brick) : level_.at(lattice);
-      all_known = all_known && point.known;
-      if (!point.free || !point.known) continue;
-      const double reach = point.distance + kTouch;
-      if ((lattice.cast<double>() - p).squaredNorm() <= reach * reach) return Exposure::kExposed;
+    for (const Cell& aside : kAround) {
+      const Cell in_samples = in_brick + aside;
+      double distance = 0.0;
+      if (samples != nullptr && in_samples.minCoeff() >= 0 && in_samples.maxCoeff() < BrickLevel::kSide) {
+        const int sample = BrickLevel::sampleIndex(in_samples);
+        if (!level_.outside[static_cast<std::size_t>(slot)][static_cast<std::size_t>(sample)]) continue;
+        distance = samples[sample] / double{DistanceField::kQuantaPerVoxel};
+      } else {
+        const BrickLevel::Point point = level_.at(cell + aside);
+        all_known = all_known && point.known;
+        if (!point.free || !point.known) continue;
+        distance = point.distance;
+      }
+      const double reach = distance + kTouch;
+      if ((aside.cast<double>() - p_cell).squaredNorm() <= reach * reach) return Exposure::kExposed;
     }
     return all_known ? Exposure::kHidden : Exposure::kUnknown;
   }
@@ -140,10 +158,8 @@ class Cutter {
     const CellMap& map = mapAt(centre);
     const BrickLevel& level = map.level();
     if (length <= level.voxel) return isExposed(centre) ? Part::kAll : Part::kNone;
-    if (length <= kWide * level.voxel) {
-      if (inEmptyBall(level, t, centre)) return Part::kAll;
-      if (map.hides(boxOf(t))) return Part::kNone;
-    }
+    if (length <= kWideBall * level.voxel && inEmptyBall(level, t, centre)) return Part::kAll;
+    if (length <= kWideBox * level.voxel && map.hides(boxOf(t))) return Part::kNone;
 
     const std::size_t b = (a + 1) % 3;
     const Vector3 middle = (t[a] + t[b]) / 2;

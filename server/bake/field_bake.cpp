@@ -1,9 +1,11 @@
 #include "server/bake/field_bake.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include "server/bake/brick_level.h"
 #include "server/bake/exposed_surface.h"
@@ -218,13 +220,16 @@ Result<BakedField> bakeField(std::span<const Triangle> triangles, const BakeOpti
     if (surface.of(i).empty()) ++baked.hidden_triangles;
     if (!surface.whole(i)) gone.push_back(triangles[i]);
   }
-  const TriangleTree gone_tree(gone, longest);
-  const TriangleTree exposed =
-      gone.empty() ? TriangleTree({}, longest) : TriangleTree(baked.surface, longest);
-  finishSamples(coarse, exposed, gone_tree, work);
+  std::array<std::optional<TriangleTree>, 2> trees;
+  work.run(trees.size(), 1, [&](std::size_t i) {
+    trees[i].emplace(i == 0 || gone.empty() ? std::span<const Triangle>(gone) : baked.surface, longest);
+  });
+  if (work.cancelled()) return fail("cancelled");
+  const auto& [gone_tree, exposed] = trees;
+  finishSamples(coarse, *exposed, *gone_tree, work);
   limitSlope(coarse, nullptr, work);
   if (fine) {
-    finishSamples(*fine, exposed, gone_tree, work);
+    finishSamples(*fine, *exposed, *gone_tree, work);
     limitSlope(*fine, &coarse, work);
   }
   if (work.cancelled()) return fail("cancelled");

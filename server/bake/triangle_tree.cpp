@@ -1,6 +1,7 @@
 #include "server/bake/triangle_tree.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -243,14 +244,20 @@ TriangleTree::Search::Search(const TriangleTree& tree, const Vector3& centre, do
 
 void TriangleTree::Search::visit(const Node& node, const Vector3& p, const Vector3f& p_local,
                                  double& squared) {
-  const Lanes away = node.squaredDistances(p_local) * (1.0F - kRounding);
-  std::array<float, 4> lanes;
-  Lanes::Map(lanes.data()) = away;
-  // the nearest box first: it makes the others likely to be skipped
-  const auto first = static_cast<std::size_t>(std::min_element(lanes.begin(), lanes.end()) - lanes.begin());
-  for (std::size_t i = 0; i < 4; ++i) {
-    const std::size_t lane = i ^ first;
-    if (!(lanes[lane] < squared)) continue;
+  std::array<float, 4> away;
+  Lanes::Map(away.data()) = node.squaredDistances(p_local) * (1.0F - kRounding);
+  // squared, rounded up
+  const float limit = static_cast<float>(squared) * (1.0F + kRounding);
+  unsigned left = 0;
+  for (unsigned lane = 0; lane < 4; ++lane) left |= static_cast<unsigned>(away[lane] < limit) << lane;
+  while (left != 0) {
+    // the nearest box first: it makes the others likely to be skipped
+    auto lane = static_cast<unsigned>(std::countr_zero(left));
+    for (unsigned other = lane + 1; other < 4; ++other) {
+      if ((left >> other & 1U) != 0 && away[other] < away[lane]) lane = other;
+    }
+    if (!(away[lane] < squared)) return;
+    left &= ~(1U << lane);
     const std::uint32_t child = node.child[lane];
     if (child == kNothing) continue;
     if ((child & kTriangle) == 0) {

@@ -34,13 +34,10 @@ class TriangleTree {
     std::array<Lanes, 3> low, high;      // empty lanes are infinitely far away
     std::array<std::uint32_t, 4> child;  // a node, or kTriangle + a triangle
     [[nodiscard]] EIGEN_ALWAYS_INLINE Lanes squaredDistances(const Vector3f& p) const {
-      Lanes sum = Lanes::Zero();
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const float c = p[static_cast<Eigen::Index>(axis)];
-        const Lanes outside = (low[axis] - c).max(c - high[axis]).max(0.0F);
-        sum += outside * outside;
-      }
-      return sum;
+      const Lanes x = (low[0] - p.x()).max(p.x() - high[0]).max(0.0F);
+      const Lanes y = (low[1] - p.y()).max(p.y() - high[1]).max(0.0F);
+      const Lanes z = (low[2] - p.z()).max(p.z() - high[2]).max(0.0F);
+      return x * x + y * y + z * z;
     }
     /// Which boxes a ray meets, a lane each.
     [[nodiscard]] std::array<bool, 4> metBy(const Vector3f& p, const Vector3f& inverse_direction) const;
