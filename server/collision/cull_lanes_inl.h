@@ -290,7 +290,7 @@ void candidates(const LaneFrame& frame, const Pointshell& shell, std::uint32_t c
       const Float bound = pointBounds(field, inGrid(field.cull, points, i));
       const Mask near = hn::And(used, hn::Le(bound, limit));
       smallest = hn::Min(smallest, hn::IfThenElse(hn::AndNot(near, used), bound, smallest));
-      if (hn::Lanes(kF) < ShellBlock::kLanes && hn::AllFalse(kF, near)) continue;
+      if (hn::AllFalse(kF, near)) continue;
       const std::uint32_t n = out.count;
       const auto number = hn::Iota(kU, static_cast<std::uint32_t>(shell.leaves()[leaf].first + i));
       hn::StoreU(hn::Compress(hn::LoadU(kF, points.x.data() + i), near), kF, out.x.data() + n);

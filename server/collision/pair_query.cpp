@@ -3,111 +3,12 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
-#include <optional>
-#include <utility>
 
+#include "server/collision/contact_sink.h"
 #include "server/collision/query_kernels.h"
 
 namespace tenon {
 namespace {
-
-/// [m^2] The paper gives no unit for its stiffness; here K [N/m] is felt when 1 cm^2 of skin is inside.
-constexpr double kReferenceArea = 1e-4;
-
-/// Cosine of the angle up to which two normals push in the same direction.
-constexpr double kSameDirection = 0.95;
-
-/// A list that may be thinned is kept this short while there is anything to thin: every row of it costs in
-/// every sub-step.
-constexpr std::size_t kThinnedTo = 256;
-
-/// Some of a leaf's points, by their number in it or in the list.
-using LeafSubset = FixedVector<std::uint32_t, Pointshell::kLeafPoints>;
-
-bool sameDirection(const Vector3& a, const Vector3& b) {
-  const double dot = a.dot(b);
-  return dot > 0.0 && dot * dot > kSameDirection * kSameDirection * a.squaredNorm() * b.squaredNorm();
-}
-
-/// Of the points of one leaf, those with the smallest gaps, at most `limit` of each direction; in order.
-template <typename Gap, typename Normal>
-LeafSubset nearestOfEachDirection(const LeafSubset& points, std::size_t limit, const Gap& gap,
-                                  const Normal& normal) {
-  // by gap
-  std::array<double, Pointshell::kLeafPoints> gaps;
-  std::array<std::uint8_t, Pointshell::kLeafPoints> order;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const double own = gap(points[i]);
-    std::size_t place = i;
-    for (; place > 0 && own < gaps[place - 1]; --place) {
-      gaps[place] = gaps[place - 1];
-      order[place] = order[place - 1];
-    }
-    gaps[place] = own;
-    order[place] = static_cast<std::uint8_t>(i);
-  }
-  // the nearest leads its direction, and each joins the first leader that it agrees with
-  struct Direction {
-    Vector3 n;
-    std::size_t kept;
-  };
-  FixedVector<Direction, Pointshell::kLeafPoints> directions;
-  std::uint32_t kept = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vector3 n = normal(points[order[i]]);
-    Direction* direction = std::find_if(directions.begin(), directions.end(),
-                                        [&n](const Direction& each) { return sameDirection(each.n, n); });
-    if (direction == directions.end()) {
-      directions.push_back({n, 0});
-      direction = &directions.back();
-    }
-    if (direction->kept++ < limit) kept |= 1U << order[i];
-  }
-  LeafSubset chosen;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if ((kept >> i & 1U) != 0) chosen.push_back(points[i]);
-  }
-  return chosen;
-}
-
-/// How contacts are ranked: by gap, then by name.
-struct GapRank {
-  double gap;
-  std::uint32_t point;
-
-  bool operator<(const GapRank& other) const {
-    return gap != other.gap ? gap < other.gap : point < other.point;
-  }
-};
-
-/// The last contact that has a place when a full list and what found no room in it are one.
-GapRank largestOfNearest(const ContactList& full, const ContactList& more) {
-  // counted by gap in equal steps, then ranked within the step that the last place falls into
-  constexpr std::size_t kSteps = 256;
-  std::array<GapRank, 2 * kMaxPairContacts> all;
-  std::size_t count = 0;
-  for (const ContactList* from : {&full, &more}) {
-    for (const Contact& contact : *from) all[count++] = {contact.gap, contact.point};
-  }
-  double low = all[0].gap;
-  double high = low;
-  for (std::size_t i = 0; i < count; ++i) {
-    low = std::min(low, all[i].gap);
-    high = std::max(high, all[i].gap);
-  }
-  const double scale = high > low ? static_cast<double>(kSteps - 1) / (high - low) : 0.0;
-  const auto stepOf = [&](const GapRank& rank) { return static_cast<std::size_t>((rank.gap - low) * scale); };
-  std::array<std::uint16_t, kSteps> histogram{};
-  for (std::size_t i = 0; i < count; ++i) ++histogram[stepOf(all[i])];
-  std::size_t before = 0;
-  std::size_t step = 0;
-  while (before + histogram[step] < kMaxPairContacts) before += histogram[step++];
-  const auto end = std::remove_if(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count),
-                                  [&](const GapRank& rank) { return stepOf(rank) != step; });
-  const auto last = all.begin() + static_cast<std::ptrdiff_t>(kMaxPairContacts - before - 1);
-  std::nth_element(all.begin(), last, end);
-  return *last;
-}
 
 /// Sixteen points with all that a contact needs.
 struct Lanes {
@@ -117,14 +18,21 @@ struct Lanes {
   [[nodiscard]] Vector3 gradient(std::size_t i) const {
     return {samples.gradient_x[i], samples.gradient_y[i], samples.gradient_z[i]};
   }
+  [[nodiscard]] double gap(const LaneFrame& frame, std::size_t i) const {
+    return samples.distance[i] - frame.dilation;
+  }
+  /// B pushes A out along its own normal or, where it has none, into A's own inside.
+  void setNormal(std::size_t i, const Vector3& inward_W) {
+    const Vector3 n_W = inward_W.normalized();
+    contacts.n_x[i] = n_W.x();
+    contacts.n_y[i] = n_W.y();
+    contacts.n_z[i] = n_W.z();
+  }
   /// Sets place, gap and normal.
-  void setContact(const LaneFrame& frame, const ShellPoint& point, std::size_t i, Contact& contact) const {
+  void setContact(const LaneFrame& frame, std::size_t i, Contact& contact) const {
     contact.p_WP = Vector3(contacts.x[i], contacts.y[i], contacts.z[i]);
-    contact.gap = samples.distance[i] - frame.dilation;
-    // B pushes A out along its own normal or, where it has none, into A's own inside
-    const bool sloping = (contacts.sloping >> i & 1U) != 0;
-    contact.n_W = sloping ? Vector3(contacts.n_x[i], contacts.n_y[i], contacts.n_z[i])
-                          : Vector3(frame.R_WA * point.inward_M.cast<double>()).normalized();
+    contact.gap = gap(frame, i);
+    contact.n_W = Vector3(contacts.n_x[i], contacts.n_y[i], contacts.n_z[i]);
   }
 };
 
@@ -144,7 +52,8 @@ class Walk {
         sum_(query.sum),
         prune_(query.prune),
         can_thin_(query.thin),
-        result_(result) {}
+        result_(result),
+        sink_(result, -query.field_B->band() - query.dilation, query.margin) {}
 
   /// Returns how many levels were used.
   std::size_t run(std::size_t levels, std::size_t budget) {
@@ -164,7 +73,7 @@ class Walk {
       }
     }
     judgeCandidates();
-    selectDeepest();
+    sink_.selectDeepest();
     result_.counts.spheres_visited += culled_.spheres;
     result_.counts.points_visited = culled_.points;
     keepBound(std::min(frame_.gapOf(culled_.smallest_bound), kNothingNear));
@@ -190,7 +99,7 @@ class Walk {
       ++result_.counts.points_visited;
     }
     judgeCandidates();
-    selectDeepest();
+    sink_.selectDeepest();
   }
 
  private:
@@ -257,13 +166,16 @@ class Walk {
       result_.smallest_gap = std::min(result_.smallest_gap, samples.smallest_distance - frame_.dilation);
       result_.deepest = std::max(result_.deepest, -samples.smallest_distance);
       result_.others_gap = std::min(result_.others_gap, samples.smallest_gap_apart);
-      if (samples.near != 0) kernels_.contacts(frame_, points, samples, lanes.contacts);
+      if (samples.near == 0) continue;
+      kernels_.contacts(frame_, points, samples, lanes.contacts);
+      forEachLane(samples.near & ~lanes.contacts.sloping,
+                  [&](std::uint32_t i) { lanes.setNormal(i, inward_W(candidates_.point[first + i])); });
+      if (sum_) sumPushes(first, lanes);
     }
-    std::uint32_t first = 0;
-    for (std::uint32_t leaf = 0; leaf < candidates_.leaves; ++leaf) {
-      const std::uint32_t end = candidates_.leaf_end[leaf];
-      listLeaf(first, end);
-      first = end;
+    if (can_thin_) {
+      listThinned();
+    } else {
+      forEachNear(0, candidates_.count, [this](std::uint32_t i) { list(i); });
     }
     candidates_.count = candidates_.leaves = 0;
   }
@@ -279,109 +191,75 @@ class Walk {
     return lanes_[candidate / ShellBlock::kLanes];
   }
 
-  void listLeaf(std::uint32_t first, std::uint32_t end) {
-    LeafSubset near;
-    for (std::uint32_t i = first; i < end; ++i) {
-      if ((lanesOf(i).samples.near >> i % ShellBlock::kLanes & 1U) != 0) near.push_back(i);
+  /// Calls `visit(i)` for the candidates from `first` to before `end` that are contacts.
+  template <typename Visit>
+  void forEachNear(std::uint32_t first, std::uint32_t end, Visit&& visit) {
+    constexpr std::uint32_t kLanes = ShellBlock::kLanes;
+    for (std::uint32_t block = first / kLanes * kLanes; block < end; block += kLanes) {
+      std::uint32_t near = lanesOf(block).samples.near;
+      if (block < first) near &= ~0U << (first - block);
+      if (block + kLanes > end) near &= (1U << (end - block)) - 1U;
+      forEachLane(near, [&](std::uint32_t i) { visit(block + i); });
     }
-    if (near.empty()) return;
-    if (can_thin_) {
-      if (sum_) {
-        for (const std::uint32_t i : near) sumPush(contactOf(i));
-      }
-      near = thinned(near);
-      if (leaf_count_ < leaf_starts_.size()) {
-        leaf_starts_[leaf_count_++] = static_cast<std::uint32_t>(result_.contacts.size());
-      }
-      for (const std::uint32_t i : near) list(contactOf(i));
-    } else {
-      for (const std::uint32_t i : near) {
-        const Contact contact = contactOf(i);
-        if (sum_) sumPush(contact);
-        list(contact);
-      }
+  }
+
+  void list(std::uint32_t candidate) {
+    const double gap = lanesOf(candidate).gap(frame_, candidate % ShellBlock::kLanes);
+    if (sink_.wants(gap)) sink_.list(contactOf(candidate));
+  }
+
+  void listThinned() {
+    std::uint32_t first = 0;
+    for (std::uint32_t leaf = 0; leaf < candidates_.leaves; ++leaf) {
+      const std::uint32_t end = candidates_.leaf_end[leaf];
+      LeafContacts near;
+      std::array<std::uint32_t, LeafContacts::kMost> number;
+      forEachNear(first, end, [&](std::uint32_t i) {
+        number[near.count] = i;
+        near.gap[near.count] = lanesOf(i).samples.distance[i % ShellBlock::kLanes];
+        near.direction[near.count++] = lanesOf(i).gradient(i % ShellBlock::kLanes);
+      });
+      first = end;
+      if (near.count == 0) continue;
+      forEachLane(sink_.thinned(near), [&](std::uint32_t k) {
+        const Contact contact = contactOf(number[k]);
+        if (sink_.wants(contact.gap)) sink_.list(contact);
+      });
     }
   }
 
   [[nodiscard]] Contact contactOf(std::uint32_t candidate) const {
     Contact contact;
     contact.point = candidates_.point[candidate];
-    const ShellPoint& point = shell_.points()[contact.point];
-    lanesOf(candidate).setContact(frame_, point, candidate % ShellBlock::kLanes, contact);
-    contact.area = contact.point < areas_.size() ? areas_[contact.point] : 0.0;
+    lanesOf(candidate).setContact(frame_, candidate % ShellBlock::kLanes, contact);
+    contact.area = areaOf(contact.point);
     return contact;
   }
 
-  void sumPush(const Contact& contact) {
-    if (contact.gap >= 0.0) return;
-    const Vector3 push = penaltyForce(contact, 1.0) * contact.n_W;
-    result_.push_Ao_W += {push, (contact.p_WP - frame_.p_WA).cross(push)};
-    ++result_.pushing;
+  [[nodiscard]] double areaOf(std::uint32_t point) const {
+    return point < areas_.size() ? static_cast<double>(areas_[point]) : 0.0;
   }
 
-  /// What of a leaf's points may be listed; makes room for them if that is possible.
-  LeafSubset thinned(const LeafSubset& near) {
-    LeafSubset chosen = near;
-    while (true) {
-      if (per_leaf_ < near.size()) {
-        chosen = nearestOfEachDirection(
-            near, per_leaf_,
-            [&](std::uint32_t i) { return lanesOf(i).samples.distance[i % ShellBlock::kLanes]; },
-            [&](std::uint32_t i) { return lanesOf(i).gradient(i % ShellBlock::kLanes); });
-      }
-      const bool fits = result_.contacts.size() + chosen.size() <= kThinnedTo;
-      if (fits || per_leaf_ == 1 || result_.counts.contacts_dropped > 0) break;
-      per_leaf_ /= 2;
-      thinList();
-    }
-    result_.thinned = result_.thinned || chosen.size() < near.size();
-    return chosen;
+  void sumPushes(std::uint32_t first, const Lanes& lanes) {
+    alignas(64) std::array<float, ShellBlock::kLanes> area{};
+    forEachLane(lanes.samples.near, [&](std::uint32_t i) {
+      const std::uint32_t point = candidates_.point[first + i];
+      if (point < areas_.size()) area[i] = areas_[point];
+    });
+    PushLanes push;
+    const std::size_t count = std::min<std::size_t>(candidates_.count - first, ShellBlock::kLanes);
+    kernels_.pushes(frame_, lanes.samples, lanes.contacts, {area.data(), count}, push);
+    Wrench sum = result_.push_Ao_W;
+    forEachLane(push.pushing, [&](std::uint32_t i) {
+      sum.force += Vector3(push.f_x[i], push.f_y[i], push.f_z[i]);
+      sum.torque += Vector3(push.t_x[i], push.t_y[i], push.t_z[i]);
+    });
+    result_.push_Ao_W = sum;
+    result_.pushing += static_cast<std::uint32_t>(std::popcount(push.pushing));
   }
 
-  void thinList() {
-    ContactList& contacts = result_.contacts;
-    const std::size_t size = contacts.size();
-    std::size_t kept = 0;
-    for (std::size_t leaf = 0; leaf < leaf_count_; ++leaf) {
-      const std::uint32_t first = leaf_starts_[leaf];
-      const std::size_t end = leaf + 1 < leaf_count_ ? leaf_starts_[leaf + 1] : size;
-      LeafSubset all;
-      for (std::uint32_t i = first; i < end; ++i) all.push_back(i);
-      leaf_starts_[leaf] = static_cast<std::uint32_t>(kept);
-      const LeafSubset chosen = nearestOfEachDirection(
-          all, per_leaf_, [&](std::uint32_t i) { return contacts[i].gap; },
-          [&](std::uint32_t i) -> const Vector3& { return contacts[i].n_W; });
-      for (const std::uint32_t i : chosen) contacts[kept++] = contacts[i];
-    }
-    contacts.resize(kept);
-    result_.thinned = result_.thinned || kept < size;
-  }
-
-  void list(const Contact& contact) {
-    if (result_.contacts.push_back(contact)) return;
-    if (!overflow_) overflow_.emplace();
-    if (overflow_->full()) selectDeepest();
-    if (contact.gap > largest_listed_) {
-      ++result_.counts.contacts_dropped;
-    } else {
-      overflow_->push_back(contact);
-    }
-  }
-
-  /// Of what is listed and what found no room, the smallest gaps stay, in the order of the shell.
-  void selectDeepest() {
-    if (!overflow_ || overflow_->empty()) return;
-    ContactList& contacts = result_.contacts;
-    const GapRank largest = largestOfNearest(contacts, *overflow_);
-    std::size_t kept = 0;
-    for (const ContactList* from : {&std::as_const(contacts), &std::as_const(*overflow_)}) {
-      for (const Contact& contact : *from) {
-        if (!(largest < GapRank{contact.gap, contact.point})) contacts[kept++] = contact;
-      }
-    }
-    result_.counts.contacts_dropped += static_cast<std::uint32_t>(overflow_->size());
-    overflow_->clear();
-    largest_listed_ = largest.gap;
+  [[nodiscard]] Vector3 inward_W(std::uint32_t point) const {
+    return frame_.R_WA * shell_.points()[point].inward_M.cast<double>();
   }
 
   const LaneFrame frame_;
@@ -394,12 +272,8 @@ class Walk {
   Culled culled_;
   Candidates candidates_;
   std::array<Lanes, Candidates::kMost / ShellBlock::kLanes> lanes_;  ///< of the candidates
-  std::size_t per_leaf_ = Pointshell::kLeafPoints;                   ///< and direction
-  std::array<std::uint32_t, kMaxPairContacts> leaf_starts_;          ///< where the listed leaves begin
-  std::size_t leaf_count_ = 0;
-  std::optional<ContactList> overflow_;                              ///< contacts that found no room
-  double largest_listed_ = std::numeric_limits<double>::infinity();  ///< no larger gap is needed
   PairQueryResult& result_;
+  ContactSink sink_;
 };
 
 }  // namespace
@@ -483,7 +357,10 @@ void resampleContacts(const PairQuery& query, double moved, PairQueryResult& res
     colliding += lanes.samples.colliding;
     for (std::uint32_t i = 0; i < block.count; ++i) {
       Contact contact = contacts[first + i];
-      lanes.setContact(frame, points[contact.point], i, contact);
+      if ((lanes.contacts.sloping >> i & 1U) == 0) {
+        lanes.setNormal(i, frame.R_WA * points[contact.point].inward_M.cast<double>());
+      }
+      lanes.setContact(frame, i, contact);
       if ((lanes.samples.exact >> i & 1U) != 0) {
         contacts[kept++] = contact;
       } else {
@@ -493,56 +370,6 @@ void resampleContacts(const PairQuery& query, double moved, PairQueryResult& res
   }
   if (!result.thinned) result.counts.points_colliding = colliding;
   contacts.resize(kept);
-}
-
-double penaltyForce(const Contact& contact, double stiffness) noexcept {
-  return std::max(-contact.gap, 0.0) * stiffness * contact.area / kReferenceArea;
-}
-
-Wrench penaltyWrench(const PairQueryResult& result, const Vector3& p_WAo, double stiffness) noexcept {
-  Wrench F_Ao_W;
-  for (const Contact& contact : result.contacts) {
-    if (contact.gap >= 0.0) continue;
-    const Vector3 f = penaltyForce(contact, stiffness) * contact.n_W;
-    F_Ao_W += {f, (contact.p_WP - p_WAo).cross(f)};
-  }
-  return F_Ao_W;
-}
-
-std::size_t reduceContacts(const ContactList& contacts, std::span<std::uint32_t> out) noexcept {
-  const std::size_t wanted = std::min(out.size(), contacts.size());
-  if (wanted == 0) return 0;
-
-  // a turn of the normal by 1 rad counts as much as a step over the whole patch
-  std::size_t chosen = 0;
-  Vector3 low = contacts[0].p_WP;
-  Vector3 high = low;
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    if (contacts[i].gap < contacts[chosen].gap) chosen = i;
-    low = low.cwiseMin(contacts[i].p_WP);
-    high = high.cwiseMax(contacts[i].p_WP);
-  }
-  const double extent2 = std::max((high - low).squaredNorm(), 1e-12);
-
-  // then always the one farthest from all that are chosen
-  std::array<double, kMaxPairContacts> apart2;
-  apart2.fill(std::numeric_limits<double>::infinity());
-  std::size_t count = 0;
-  while (true) {
-    out[count++] = static_cast<std::uint32_t>(chosen);
-    if (count == wanted) return count;
-    const Contact& last = contacts[chosen];
-    apart2[chosen] = -1.0;
-    std::size_t next = chosen;
-    for (std::size_t i = 0; i < contacts.size(); ++i) {
-      if (apart2[i] < 0.0) continue;
-      const double d2 =
-          (contacts[i].p_WP - last.p_WP).squaredNorm() / extent2 + (contacts[i].n_W - last.n_W).squaredNorm();
-      apart2[i] = std::min(apart2[i], d2);
-      if (apart2[next] < 0.0 || apart2[i] > apart2[next]) next = i;
-    }
-    chosen = next;
-  }
 }
 
 }  // namespace tenon

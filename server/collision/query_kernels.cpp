@@ -22,15 +22,20 @@ namespace HWY_NAMESPACE {
 QueryKernels kernels() {
   switch (HWY_TARGET) {
     case HWY_SSE4:
-      return {"sse4", cull::clusters, cull::candidates, exact::samples, exact::contacts};
+      return {"sse4", cull::clusters, cull::candidates, exact::samples, exact::contacts, exact::pushes};
     case HWY_AVX2:
-      return {"avx2", cull::clusters, cull::candidates, exact::samples, exact::contacts};
+      return {"avx2", cull::clusters, cull::candidates, exact::samples, exact::contacts, exact::pushes};
     case HWY_AVX3:
-      return {"avx512", cull::clusters, cull::candidates, exact::samples, exact::contacts};
+      return {"avx512", cull::clusters, cull::candidates, exact::samples, exact::contacts, exact::pushes};
     case HWY_SCALAR:
-      return {"scalar", cull::clusters, cull::candidates, exact::samples, exact::contacts};
+      return {"scalar", cull::clusters, cull::candidates, exact::samples, exact::contacts, exact::pushes};
     default:
-      return {hwy::TargetName(HWY_TARGET), cull::clusters, cull::candidates, exact::samples, exact::contacts};
+      return {hwy::TargetName(HWY_TARGET),
+              cull::clusters,
+              cull::candidates,
+              exact::samples,
+              exact::contacts,
+              exact::pushes};
   }
 }
 

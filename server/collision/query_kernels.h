@@ -78,6 +78,12 @@ struct alignas(64) ContactLanes {
   std::uint32_t sloping = 0;  ///< one bit a lane: the gradient says where outside is
 };
 
+/// What B pushes at the contacts with 1 N/m, about A's origin; a lane without a push is not set.
+struct alignas(64) PushLanes {
+  std::array<double, ShellBlock::kLanes> f_x, f_y, f_z, t_x, t_y, t_z;
+  std::uint32_t pushing = 0;  ///< one bit a lane
+};
+
 /// Points that may be contacts, side by side in the order of the shell.
 struct Candidates {
   static constexpr std::size_t kOfCluster = Pointshell::kClusterLeaves * Pointshell::kLeafPoints;
@@ -120,7 +126,13 @@ struct QueryKernels {
   void (*samples)(const LaneFrame& frame, const PointLanes& points, SampleLanes& out) noexcept;
   void (*contacts)(const LaneFrame& frame, const PointLanes& points, const SampleLanes& samples,
                    ContactLanes& out) noexcept;
+  /// `area`: what each lane stands for, as many as there are points; sixteen can be read.
+  void (*pushes)(const LaneFrame& frame, const SampleLanes& samples, const ContactLanes& contacts,
+                 std::span<const float> area, PushLanes& out) noexcept;
 };
+
+/// [m^2] The paper gives no unit for its stiffness; here K [N/m] is felt when 1 cm^2 of skin is inside.
+inline constexpr double kReferenceArea = 1e-4;
 
 /// Below this the interpolant's gradient says nothing: the point is near a medial axis (a thin sheet's
 /// middle).

@@ -339,6 +339,30 @@ void contacts(const LaneFrame& frame, const PointLanes& points, const SampleLane
   }
 }
 
+void pushes(const LaneFrame& frame, const SampleLanes& lanes, const ContactLanes& contacts,
+            std::span<const float> area, PushLanes& out) noexcept {
+  std::uint32_t inside = 0;
+  for (std::size_t i = 0; i < area.size(); i += hn::Lanes(kD)) {
+    const Double gap = hn::Sub(hn::Load(kD, lanes.distance.data() + i), all(frame.dilation));
+    inside |= bitsOf(hn::Lt(gap, hn::Zero(kD))) << i;
+    const Double stands_for = hn::PromoteTo(kD, hn::LoadU(kF, area.data() + i));
+    const Double penalty = hn::Div(hn::Mul(hn::Neg(gap), stands_for), all(kReferenceArea));
+    const Place3 f{hn::Mul(penalty, hn::Load(kD, contacts.n_x.data() + i)),
+                   hn::Mul(penalty, hn::Load(kD, contacts.n_y.data() + i)),
+                   hn::Mul(penalty, hn::Load(kD, contacts.n_z.data() + i))};
+    const Place3 r{hn::Sub(hn::Load(kD, contacts.x.data() + i), all(frame.p_WA[0])),
+                   hn::Sub(hn::Load(kD, contacts.y.data() + i), all(frame.p_WA[1])),
+                   hn::Sub(hn::Load(kD, contacts.z.data() + i), all(frame.p_WA[2]))};
+    hn::Store(f.x, kD, out.f_x.data() + i);
+    hn::Store(f.y, kD, out.f_y.data() + i);
+    hn::Store(f.z, kD, out.f_z.data() + i);
+    hn::Store(hn::Sub(hn::Mul(r.y, f.z), hn::Mul(r.z, f.y)), kD, out.t_x.data() + i);
+    hn::Store(hn::Sub(hn::Mul(r.z, f.x), hn::Mul(r.x, f.z)), kD, out.t_y.data() + i);
+    hn::Store(hn::Sub(hn::Mul(r.x, f.y), hn::Mul(r.y, f.x)), kD, out.t_z.data() + i);
+  }
+  out.pushing = inside & lanes.near;
+}
+
 }  // namespace exact
 }  // namespace HWY_NAMESPACE
 }  // namespace tenon

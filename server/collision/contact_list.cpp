@@ -1,0 +1,60 @@
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "server/collision/pair_query.h"
+#include "server/collision/query_kernels.h"
+
+namespace tenon {
+
+double penaltyForce(const Contact& contact, double stiffness) noexcept {
+  return std::max(-contact.gap, 0.0) * stiffness * contact.area / kReferenceArea;
+}
+
+Wrench penaltyWrench(const PairQueryResult& result, const Vector3& p_WAo, double stiffness) noexcept {
+  Wrench F_Ao_W;
+  for (const Contact& contact : result.contacts) {
+    if (contact.gap >= 0.0) continue;
+    const Vector3 f = penaltyForce(contact, stiffness) * contact.n_W;
+    F_Ao_W += {f, (contact.p_WP - p_WAo).cross(f)};
+  }
+  return F_Ao_W;
+}
+
+std::size_t reduceContacts(const ContactList& contacts, std::span<std::uint32_t> out) noexcept {
+  const std::size_t wanted = std::min(out.size(), contacts.size());
+  if (wanted == 0) return 0;
+
+  // a turn of the normal by 1 rad counts as much as a step over the whole patch
+  std::size_t chosen = 0;
+  Vector3 low = contacts[0].p_WP;
+  Vector3 high = low;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    if (contacts[i].gap < contacts[chosen].gap) chosen = i;
+    low = low.cwiseMin(contacts[i].p_WP);
+    high = high.cwiseMax(contacts[i].p_WP);
+  }
+  const double extent2 = std::max((high - low).squaredNorm(), 1e-12);
+
+  // then always the one farthest from all that are chosen
+  std::array<double, kMaxPairContacts> apart2;
+  apart2.fill(std::numeric_limits<double>::infinity());
+  std::size_t count = 0;
+  while (true) {
+    out[count++] = static_cast<std::uint32_t>(chosen);
+    if (count == wanted) return count;
+    const Contact& last = contacts[chosen];
+    apart2[chosen] = -1.0;
+    std::size_t next = chosen;
+    for (std::size_t i = 0; i < contacts.size(); ++i) {
+      if (apart2[i] < 0.0) continue;
+      const double d2 =
+          (contacts[i].p_WP - last.p_WP).squaredNorm() / extent2 + (contacts[i].n_W - last.n_W).squaredNorm();
+      apart2[i] = std::min(apart2[i], d2);
+      if (apart2[next] < 0.0 || apart2[i] > apart2[next]) next = i;
+    }
+    chosen = next;
+  }
+}
+
+}  // namespace tenon

@@ -1,0 +1,155 @@
+#include "server/collision/contact_sink.h"
+
+#include <bit>
+#include <utility>
+
+namespace tenon {
+
+namespace {
+
+/// Cosine of the angle up to which two normals push in the same direction.
+constexpr double kSameDirection = 0.95;
+
+bool sameDirection(const Vector3& a, const Vector3& b) {
+  const double dot = a.dot(b);
+  return dot > 0.0 && dot * dot > kSameDirection * kSameDirection * a.squaredNorm() * b.squaredNorm();
+}
+
+/// Those with the smallest gaps, at most `limit` of each direction; a bit each.
+std::uint32_t nearestOfEachDirection(const LeafContacts& leaf, std::size_t limit) {
+  // by gap
+  std::array<double, LeafContacts::kMost> gaps;
+  std::array<std::uint8_t, LeafContacts::kMost> order;
+  for (std::size_t i = 0; i < leaf.count; ++i) {
+    const double own = leaf.gap[i];
+    std::size_t place = i;
+    for (; place > 0 && own < gaps[place - 1]; --place) {
+      gaps[place] = gaps[place - 1];
+      order[place] = order[place - 1];
+    }
+    gaps[place] = own;
+    order[place] = static_cast<std::uint8_t>(i);
+  }
+  // the nearest leads its direction, and each joins the first leader that it agrees with
+  struct Direction {
+    Vector3 n;
+    std::size_t kept;
+  };
+  FixedVector<Direction, LeafContacts::kMost> directions;
+  std::uint32_t kept = 0;
+  for (std::size_t i = 0; i < leaf.count; ++i) {
+    const Vector3& n = leaf.direction[order[i]];
+    Direction* direction = std::find_if(directions.begin(), directions.end(),
+                                        [&n](const Direction& each) { return sameDirection(each.n, n); });
+    if (direction == directions.end()) {
+      directions.push_back({n, 0});
+      direction = &directions.back();
+    }
+    if (direction->kept++ < limit) kept |= 1U << order[i];
+  }
+  return kept;
+}
+
+/// How contacts are ranked: by gap, then by name.
+struct GapRank {
+  double gap;
+  std::uint32_t point;
+
+  bool operator<(const GapRank& other) const {
+    return gap != other.gap ? gap < other.gap : point < other.point;
+  }
+};
+
+}  // namespace
+
+ContactSink::ContactSink(PairQueryResult& result, double lowest, double highest)
+    : result_(result), lowest_(lowest), steps_a_metre_(static_cast<double>(kSteps) / (highest - lowest)) {}
+
+std::uint32_t ContactSink::thinned(const LeafContacts& leaf) {
+  const std::uint32_t all = (1U << leaf.count) - 1U;
+  std::uint32_t chosen = all;
+  while (true) {
+    if (per_leaf_ < leaf.count) chosen = nearestOfEachDirection(leaf, per_leaf_);
+    const auto count = static_cast<std::size_t>(std::popcount(chosen));
+    const bool fits = result_.contacts.size() + count <= kThinnedTo;
+    if (fits || per_leaf_ == 1 || result_.counts.contacts_dropped > 0) break;
+    per_leaf_ /= 2;
+    thinList();
+  }
+  result_.thinned = result_.thinned || chosen != all;
+  if (leaf_count_ < leaf_starts_.size()) {
+    leaf_starts_[leaf_count_++] = static_cast<std::uint32_t>(result_.contacts.size());
+  }
+  return chosen;
+}
+
+void ContactSink::thinList() {
+  ContactList& contacts = result_.contacts;
+  const std::size_t size = contacts.size();
+  std::size_t kept = 0;
+  for (std::size_t leaf = 0; leaf < leaf_count_; ++leaf) {
+    const std::size_t first = leaf_starts_[leaf];
+    const std::size_t end = leaf + 1 < leaf_count_ ? leaf_starts_[leaf + 1] : size;
+    LeafContacts all;
+    all.count = end - first;
+    for (std::size_t i = 0; i < all.count; ++i) {
+      all.gap[i] = contacts[first + i].gap;
+      all.direction[i] = contacts[first + i].n_W;
+    }
+    leaf_starts_[leaf] = static_cast<std::uint32_t>(kept);
+    const std::uint32_t chosen = nearestOfEachDirection(all, per_leaf_);
+    for (std::size_t i = 0; i < all.count; ++i) {
+      if ((chosen >> i & 1U) != 0) contacts[kept++] = contacts[first + i];
+    }
+  }
+  contacts.resize(kept);
+  result_.thinned = result_.thinned || kept < size;
+}
+
+void ContactSink::count(double gap) {
+  ++histogram_[stepOf(gap)];
+  ++counted_;
+  while (counted_ - histogram_[last_step_] >= kMaxPairContacts) counted_ -= histogram_[last_step_--];
+}
+
+void ContactSink::listBeyond(const Contact& contact) {
+  if (!overflow_) {
+    overflow_.emplace();
+    histogram_.fill(0);
+    for (const Contact& listed : result_.contacts) count(listed.gap);
+  }
+  if (overflow_->full()) selectDeepest();
+  overflow_->push_back(contact);
+  count(contact.gap);
+}
+
+void ContactSink::selectDeepest() {
+  if (!overflow_ || overflow_->empty()) return;
+  // those of the last step have the places that are left
+  ContactList& contacts = result_.contacts;
+  std::array<GapRank, 2 * kMaxPairContacts> last;
+  std::size_t of_last = 0;
+  for (const ContactList* from : {&std::as_const(contacts), &std::as_const(*overflow_)}) {
+    for (const Contact& contact : *from) {
+      if (stepOf(contact.gap) == last_step_) last[of_last++] = {contact.gap, contact.point};
+    }
+  }
+  const std::size_t before = counted_ - histogram_[last_step_];
+  const std::size_t places = kMaxPairContacts - before;
+  const auto largest = last.begin() + static_cast<std::ptrdiff_t>(places - 1);
+  std::nth_element(last.begin(), largest, last.begin() + static_cast<std::ptrdiff_t>(of_last));
+  std::size_t kept = 0;
+  for (const ContactList* from : {&std::as_const(contacts), &std::as_const(*overflow_)}) {
+    for (const Contact& contact : *from) {
+      if (*largest < GapRank{contact.gap, contact.point}) continue;
+      Contact& place = contacts[kept++];
+      if (&place != &contact) place = contact;
+    }
+  }
+  result_.counts.contacts_dropped += static_cast<std::uint32_t>(overflow_->size());
+  overflow_->clear();
+  histogram_[last_step_] = static_cast<std::uint16_t>(places);
+  counted_ = kMaxPairContacts;
+}
+
+}  // namespace tenon

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "server/collision/pair_query.h"
+
+namespace tenon {
+
+/// Points of one leaf, as thinning looks at them.
+struct LeafContacts {
+  static constexpr std::size_t kMost = Pointshell::kLeafPoints;
+
+  std::array<double, kMost> gap;
+  std::array<Vector3, kMost> direction;  ///< of the push, of any length
+  std::size_t count = 0;
+};
+
+/// Decides which contacts have room in the list of a query, as they come in the order of the shell.
+///
+/// Without thinning those with the smallest gaps stay, of equal ones those with the lower names: gaps are
+/// counted in equal steps, and the step up to which there is room only ever falls, so most of what has to go
+/// is never listed. With thinning, points give way first that stand behind a neighbour.
+///
+/// Threads: one query's. Real-time: all.
+class ContactSink {
+ public:
+  /// Gaps lie between `lowest` and `highest` [m].
+  ContactSink(PairQueryResult& result, double lowest, double highest);
+
+  /// Whether a contact of that gap has to be listed; those that have not are counted as dropped.
+  bool wants(double gap) {
+    if (!overflow_ || stepOf(gap) <= last_step_) return true;
+    ++result_.counts.contacts_dropped;
+    return false;
+  }
+  /// A contact that is wanted.
+  void list(const Contact& contact) {
+    if (overflow_ || !result_.contacts.push_back(contact)) listBeyond(contact);
+  }
+  /// After the last: the list is what it shall be.
+  void selectDeepest();
+
+  /// Which of a leaf's points may be listed, a bit each, made room for if that is possible. They are listed
+  /// next.
+  std::uint32_t thinned(const LeafContacts& leaf);
+
+ private:
+  static constexpr std::size_t kSteps = 512;
+  /// A list that may be thinned is kept this short while there is anything to thin: every row of it costs in
+  /// every sub-step.
+  static constexpr std::size_t kThinnedTo = 256;
+
+  [[nodiscard]] std::size_t stepOf(double gap) const {
+    const double step = (gap - lowest_) * steps_a_metre_;
+    return step > 0.0 ? std::min(static_cast<std::size_t>(step), kSteps - 1) : 0;
+  }
+  void count(double gap);
+  void listBeyond(const Contact& contact);
+  void thinList();
+
+  PairQueryResult& result_;
+  double lowest_;
+  double steps_a_metre_;
+  // of what is listed and what found no room
+  std::array<std::uint16_t, kSteps> histogram_;
+  std::size_t last_step_ = kSteps - 1;  ///< what lies beyond has no room
+  std::size_t counted_ = 0;             ///< up to that step
+  std::optional<ContactList> overflow_;
+  // of leaves that were thinned
+  std::size_t per_leaf_ = Pointshell::kLeafPoints;           ///< and direction
+  std::array<std::uint32_t, kMaxPairContacts> leaf_starts_;  ///< where the listed leaves begin
+  std::size_t leaf_count_ = 0;
+};
+
+}  // namespace tenon
