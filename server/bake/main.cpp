@@ -1,9 +1,12 @@
+#include <algorithm>
 #include <csignal>
 #include <cstring>
+#include <fstream>
 #include <iostream>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include "server/bake/bake.h"
@@ -19,6 +22,7 @@ struct Arguments {
   std::vector<std::string> meshes;
   std::string output;
   std::string info;
+  std::string shell;
   std::string cache;
   std::string voxel = "3mm";
   std::string unit = "mm";
@@ -111,8 +115,9 @@ void printInfo(const HapticStructures& structures) {
   fmt::print("mesh          {} triangles, {} x {} x {}\n", info.triangles, readable(size.x()),
              readable(size.y()), readable(size.z()));
   fmt::print("              from {} to {}\n", readable(info.box_M.min()), readable(info.box_M.max()));
-  fmt::print("field         {} voxels, {} of {} bricks with samples, {:.1f} MB\n", readable(layout.voxel),
-             info.bricks, coarse, megabytes);
+  fmt::print("field         {} voxels, {} of {} bricks with samples, {:.1f} MB, {:.0f} bytes a brick\n",
+             readable(layout.voxel), info.bricks, coarse, megabytes,
+             1e6 * megabytes / static_cast<double>(std::max<std::size_t>(info.bricks, 1)));
   fmt::print("              exact up to {} from the surface\n", readable(layout.band));
   if (layout.refinement > 1) {
     fmt::print("              refined in places to {} voxels\n", readable(layout.voxel / layout.refinement));
@@ -130,6 +135,34 @@ void printInfo(const HapticStructures& structures) {
   if (!info.notes.empty()) fmt::print("notes\n{}", info.notes);
 }
 
+/// What this process has spent so far.
+void printUse() {
+  rusage use{};
+  if (::getrusage(RUSAGE_SELF, &use) != 0) return;
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_usec) * 1e-6;
+  };
+  fmt::print("used          {:.2f} s of processors, {:.0f} MB of memory at most\n",
+             seconds(use.ru_utime) + seconds(use.ru_stime), static_cast<double>(use.ru_maxrss) * 1024e-6);
+}
+
+Result<void> writeShell(const std::string& file, const Pointshell& shell) {
+  std::ofstream out(file);
+  out << "level,x,y,z,nx,ny,nz,area\n";
+  for (std::size_t k = 0; k < shell.levels().size(); ++k) {
+    const ShellLevel& level = shell.levels()[k];
+    for (const ShellPoint& point : shell.points().subspan(level.first_point, level.point_count)) {
+      const Vector3f& p = point.p_MP;
+      const Vector3f n = -point.inward_M;
+      out << fmt::format("{},{},{},{},{},{},{},{}\n", k, p.x(), p.y(), p.z(), n.x(), n.y(), n.z(),
+                         point.area);
+    }
+  }
+  out.close();
+  if (!out) return fail(file + ": cannot be written");
+  return {};
+}
+
 int complain(const Error& error) {
   fmt::print(stderr, "tenon-bake: {}\n", error.what);
   return interrupted != 0 ? 130 : 1;
@@ -140,7 +173,9 @@ int run(const Arguments& arguments) {
     const auto structures = openStructures(arguments.info);
     if (!structures) return complain(structures.error());
     printInfo(**structures);
-    return 0;
+    if (arguments.shell.empty()) return 0;
+    const auto ok = writeShell(arguments.shell, (*structures)->shell);
+    return ok ? 0 : complain(ok.error());
   }
   const auto unit = parseUnit(arguments.unit);
   if (!unit) return complain({"--unit: " + unit.error().what});
@@ -157,7 +192,10 @@ int run(const Arguments& arguments) {
   const auto structures = bakeFiles(meshes, *unit, *options, progress);
   if (!structures) return complain(structures.error());
   if (const auto ok = writeStructures(arguments.output, *structures); !ok) return complain(ok.error());
-  if (!arguments.quiet) printInfo(*structures);
+  if (!arguments.quiet) {
+    printInfo(*structures);
+    printUse();
+  }
   return 0;
 }
 
@@ -176,6 +214,10 @@ int main(int argc, char** argv) {
   app.add_option("--cache", arguments.cache,
                  "write into this folder under a name made of the content instead");
   app.add_option("--info", arguments.info, "print what is inside a structure file, and do nothing else");
+  app.add_option("--shell", arguments.shell,
+                 "with --info: write the shell's points into this file, `level,x,y,z,nx,ny,nz,area` a line: "
+                 "metres, mesh frame, normals outwards")
+      ->needs("--info");
   app.add_option("--voxel", arguments.voxel, "edge of the field's voxels")->capture_default_str();
   app.add_option("--unit", arguments.unit, "length of one unit of the files: mm, cm, m, in")
       ->capture_default_str();

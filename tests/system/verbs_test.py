@@ -3,9 +3,11 @@ import json
 import re
 import signal
 import subprocess
+import sys
 import tempfile
 import unittest
 from pathlib import Path
+from xml.etree import ElementTree
 
 from stage import PROGRAMS, Stage, tenon
 
@@ -41,8 +43,35 @@ class Verbs(unittest.TestCase):
             self.assertEqual(bake.returncode, 0, bake.stderr)
             info = tenon("bake", "--info", baked)
             self.assertEqual(info.returncode, 0, info.stderr)
-            for word in ("voxel", "points", "triangles"):
+            for word in ("voxel", "points", "triangles", "bytes a brick"):
                 self.assertIn(word, info.stdout.lower())
+            self.assertRegex(bake.stdout, r"used +\S+ s of processors, \d+ MB of memory at most")
+
+    def test_points_of_a_shell_are_listed_by_level(self):
+        with tempfile.TemporaryDirectory() as folder:
+            table = Path(folder) / "shell.csv"
+            done = tenon("bake", "--info", cube(folder), "--shell", table)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            head, *rows = [line.split(",") for line in table.read_text(encoding="utf-8").splitlines()]
+            self.assertEqual(head, "level,x,y,z,nx,ny,nz,area".split(","))
+            self.assertEqual(len(rows), int(re.search(r"shell +(\d+) points", done.stdout)[1]))
+            self.assertAlmostEqual(sum(float(row[7]) for row in rows), 6 * 0.02 * 0.02, places=6)
+            for row in rows:
+                p, n = [float(c) for c in row[1:4]], [float(c) for c in row[4:7]]
+                self.assertAlmostEqual(max(abs(c) for c in p), 0.01, places=5)
+                self.assertGreater(sum(a * b for a, b in zip(p, n)), 0.0)
+
+    def test_structures_are_drawn(self):
+        drawing = Path(__file__).parents[2] / "docs" / "pictures" / "structures.py"
+        with tempfile.TemporaryDirectory() as folder:
+            words = [sys.executable, drawing, cube(folder), "--across", "z", "--out", folder]
+            done = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            field, shell = (ElementTree.parse(Path(folder) / name).getroot() for name in ("field.svg", "shell.svg"))
+            words = [[text.text for text in root.iter("{http://www.w3.org/2000/svg}text")] for root in (field, shell)]
+            self.assertEqual(words[0], ["20 mm", *(f"\u2212{k}" for k in (4, 3, 2, 1)), "0", "+1", "+2", "+3",
+                                        "signed distance [mm]"])
+            self.assertEqual(words[1][:4:2], ["level 0", "level 1"])
 
     def test_an_interrupted_bake_says_so_and_leaves_no_file(self):
         with tempfile.TemporaryDirectory() as folder:
