@@ -103,10 +103,14 @@ void LocalModel::solve(const Pose& X_WH, const WorldView& world) noexcept {
   body_.springs.push_back({X_WH * manifold_.X_HO, manifold_.X_HO.inverse().translation(),
                            std::max(1.0, manifold_.stiffness),
                            std::max(0.1, manifold_.rotational_stiffness)});
-  for (const OtherPull& other : pulls_) {
-    const HandPull& pull = other.pull;
-    body_.springs.push_back({pull.X_WG, pull.p_BoC_B, other.weight * std::max(0.0, pull.stiffness),
-                             other.weight * std::max(0.0, pull.rotational_stiffness)});
+  // those that hold on come first, should there be too many
+  for (const bool listed : {true, false}) {
+    for (const OtherPull& other : pulls_) {
+      if (other.listed != listed) continue;
+      const HandPull& pull = other.pull;
+      body_.springs.push_back({pull.X_WG, pull.p_BoC_B, other.weight * std::max(0.0, pull.stiffness),
+                               other.weight * std::max(0.0, pull.rotational_stiffness)});
+    }
   }
   rows_.clear();
   for (const ManifoldContact& contact : manifold_.contacts) {

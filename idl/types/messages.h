@@ -15,7 +15,7 @@
 /// events hold strings and may not.
 namespace tenon {
 
-inline constexpr std::uint32_t kProtocolVersion = 1;
+inline constexpr std::uint32_t kProtocolVersion = 2;
 
 enum class Role : std::uint32_t { kAdmin, kInstructor, kTrainee, kObserver, kRecorder };
 

@@ -4,7 +4,7 @@ namespace tenon {
 
 std::string_view idlText() {
   // a copy of idl/tenon.idl, held equal by a test
-  return R"idl(// The protocol of Tenon, version 1: what its programs say to each other over DDS, and what recordings hold.
+  return R"idl(// The protocol of Tenon, version 2: what its programs say to each other over DDS, and what recordings hold.
 //
 // Every type is @final and encoded as XCDR1. No sample is longer than 1,300 bytes: what does not fit goes in
 // numbered parts. SI units. X_AB is frame B seen from frame A; W the world, O an object, H a hand. Ids are

@@ -58,8 +58,9 @@ bool IslandSolver::loadPatches(const Job& job) {
   for (const std::uint32_t row : held_) {
     if (row >= first_patch_row_) break;
     const std::size_t pair = row < listed_ ? pairOfRow(job, row) : flanks_[row - listed_].pair;
-    if (job.pairs[pair].friction.at_rest <= 0.0) continue;
     const GapRow& gap = rows_[row];
+    // what binds only farther along the way does not rub yet
+    if (job.pairs[pair].friction.at_rest <= 0.0 || gap.gap > kTouchGap) continue;
     Patch* found = std::find_if(patches_.begin(), patches_.end(), [&](const Patch& patch) {
       return patch.pair == pair && patch.n_W.dot(gap.n_W) > kSamePatch;
     });

@@ -84,7 +84,7 @@ struct ScenarioPair {
   std::optional<double> dilation;  ///< [m] none: chosen by dilationOf
   bool sensing = false;
   bool enabled = true;
-  Friction friction;
+  std::optional<Friction> friction;  ///< none: that of the bodies
   int line = 0;  ///< 0: listed automatically
 };
 

@@ -16,6 +16,10 @@ constexpr double kLargestFriction = 10.0;
 /// [m^3] Less than a cubic millimetre is what the field of a sheet makes up.
 constexpr double kLeastVolume = 1e-9;
 
+/// [m] No body's mass is nearer to its axes than this, nor farther away.
+constexpr double kLeastGyration = 1e-5;
+constexpr double kLargestGyration = 10.0;
+
 /// Can a body have these moments of inertia along its axes? None is larger than the other two together.
 bool areMoments(const Vector3& moments) {
   return moments.minCoeff() > 0.0 && 2.0 * moments.maxCoeff() <= moments.sum();
@@ -44,6 +48,13 @@ void ScenarioReader::readBody(const YAML::Node& node, ScenarioObject& object) {
                                       " is that of no body, expected three moments above 0, none larger than "
                                       "the other two together");
     }
+    const double mass = body.mass.value_or(kLeastMass);
+    if (body.inertia_C->minCoeff() < mass * kLeastGyration * kLeastGyration ||
+        body.inertia_C->maxCoeff() > mass * kLargestGyration * kLargestGyration) {
+      yaml_.fail(node["inertia"], "'inertia'" + of +
+                                      " does not go with its mass: that would be nearer than 0.01 mm to an "
+                                      "axis or farther than 10 m from it");
+    }
     if (!body.mass || !body.p_OC_O)
       yaml_.fail(node["inertia"], "'inertia'" + of + " needs 'mass' and 'centre' with it");
   }
@@ -62,6 +73,9 @@ Result<BodySpec> bodyOf(const ScenarioObject& object, const HapticStructures& st
   body.floating = given.floating;
   body.damping = given.damping;
   body.friction = given.friction;
+  if (given.p_OC_O && !structures.field.box().contains(*given.p_OC_O)) {
+    return fail("object '" + object.name + "': the 'centre' of its 'body' is outside it");
+  }
   if (given.inertia_C) {
     body.mass = *given.mass;
     body.p_OC_O = *given.p_OC_O;

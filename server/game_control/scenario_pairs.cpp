@@ -74,11 +74,14 @@ void ScenarioReader::readPair(const YAML::Node& node) {
   }
   pair.sensing = yaml_.yesNo(node["sensing"], "'sensing'" + of, pair.sensing);
   pair.enabled = yaml_.yesNo(node["enabled"], "'enabled'" + of, true);
-  pair.friction.at_rest =
-      yaml_.numberOr(node["friction"], Quantity::kPlain, "'friction'" + of, 0.0, 2.0, 0.0);
-  pair.friction.sliding =
-      yaml_.numberOr(node["sliding_friction"], Quantity::kPlain, "'sliding_friction'" + of, 0.0,
-                     pair.friction.at_rest, pair.friction.at_rest);
+  if (node["friction"].IsDefined()) {
+    const double at_rest = yaml_.number(node["friction"], Quantity::kPlain, "'friction'" + of, 0.0, 2.0);
+    const double sliding = yaml_.numberOr(node["sliding_friction"], Quantity::kPlain,
+                                          "'sliding_friction'" + of, 0.0, at_rest, at_rest);
+    pair.friction = Friction{at_rest, sliding};
+  } else if (node["sliding_friction"].IsDefined()) {
+    yaml_.fail(node["sliding_friction"], "'sliding_friction'" + of + " needs 'friction' with it");
+  }
 }
 
 void ScenarioReader::readOff(const YAML::Node& node) {

@@ -80,8 +80,12 @@ void ScenarioReader::readScenario(const YAML::Node& root) {
   if (scenario_.title.empty()) scenario_.title.push_back({scenario_.language, scenario_.name});
   scenario_.reach =
       yaml_.numberOr(root["reach"], Quantity::kLength, "'reach'", 0.01, 1000.0, scenario_.reach);
-  if (root["gravity"].IsDefined())
+  if (root["gravity"].IsDefined()) {
+    constexpr double kMostGravity = 100.0;  // [m/s^2] ten times the earth's
     scenario_.gravity_W = yaml_.vector(root["gravity"], Quantity::kPlain, "'gravity'");
+    if (scenario_.gravity_W.norm() > kMostGravity)
+      yaml_.fail(root["gravity"], "'gravity' is more than 100 m/s^2");
+  }
 
   if (!yaml_.isList(root["objects"], "'objects'", kMostObjects)) return;
   for (const auto& object : root["objects"]) readObject(object);

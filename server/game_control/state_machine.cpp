@@ -116,6 +116,7 @@ void StateMachine::reset(Environment& environment) noexcept {
     const bool in_a_hand = std::any_of(scenario_->hands.begin(), scenario_->hands.end(),
                                        [&](const ScenarioHand& hand) { return hand.object.value == object; });
     if (!in_a_hand) environment.place(ObjectId{object}, spec.X_WO, spec.status);
+    environment.setGroup(ObjectId{object}, environment.scene().objects[object].group);
   }
   for (std::size_t pair = 0; pair < scenario_->pairs.size(); ++pair) {
     environment.setPairEnabled(pair, scenario_->pairs[pair].enabled);

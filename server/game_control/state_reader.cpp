@@ -131,22 +131,28 @@ void StateReader::readHands(const YAML::Node& node, ScenarioState& state) {
   for (const auto& entry : node) {
     const HandId hand = names_.hand(entry.first, what);
     const ObjectId object = names_.object(entry.second, what);
-    if (!hand.valid() || !object.valid()) return;
-    if (scenario_.hands[hand.value].kind == HandKind::kTracked) {
-      yaml_.fail(entry.first,
-                 what + ": '" + scenario_.hands[hand.value].name + "' is tracked, it can take nothing");
-      return;
-    }
-    for (std::size_t other = 0; other < scenario_.hands.size(); ++other) {
-      if (other != hand.value && scenario_.hands[other].object == object) {
-        yaml_.fail(entry.second, what + ": '" + names_.nameOf(object) + "' belongs to hand '" +
-                                     scenario_.hands[other].name + "'");
-        return;
-      }
-    }
+    if (!hand.valid() || !object.valid() || !mayTake(entry, hand, object, what)) return;
     moved_by_[hand.value] = object;
     state.hands.push_back({hand, object});
   }
+}
+
+/// A hand that the file lets take an object has to be one that can, and the object nobody else's own.
+bool StateReader::mayTake(const YAML::detail::iterator_value& entry, HandId hand, ObjectId object,
+                          const std::string& what) {
+  if (scenario_.hands[hand.value].kind == HandKind::kTracked) {
+    yaml_.fail(entry.first,
+               what + ": '" + scenario_.hands[hand.value].name + "' is tracked, it can take nothing");
+    return false;
+  }
+  for (std::size_t other = 0; other < scenario_.hands.size(); ++other) {
+    if (other != hand.value && scenario_.hands[other].object == object) {
+      yaml_.fail(entry.second, what + ": '" + names_.nameOf(object) + "' belongs to hand '" +
+                                   scenario_.hands[other].name + "'");
+      return false;
+    }
+  }
+  return true;
 }
 
 void StateReader::readHelpers(const YAML::Node& node, ScenarioState& state) {
@@ -160,7 +166,7 @@ void StateReader::readHelpers(const YAML::Node& node, ScenarioState& state) {
   for (const auto& entry : node) {
     const HandId hand = names_.hand(entry.first, what);
     const ObjectId object = names_.object(entry.second, what);
-    if (!hand.valid() || !object.valid()) return;
+    if (!hand.valid() || !object.valid() || !mayTake(entry, hand, object, what)) return;
     const ScenarioHand& helper = scenario_.hands[hand.value];
     if (moved_by_[hand.value] == object) {
       yaml_.fail(entry.first, what + ": '" + helper.name + "' moves '" + names_.nameOf(object) + "' already");
@@ -169,6 +175,12 @@ void StateReader::readHelpers(const YAML::Node& node, ScenarioState& state) {
                                    names_.nameOf(object) + "' never touch");
     }
     state.may_take.push_back({hand, object});
+    const auto helpers = std::count_if(state.may_take.begin(), state.may_take.end(),
+                                       [object](const auto& one) { return one.object == object; });
+    if (helpers > kOtherPulls) {
+      yaml_.fail(entry.second, what + ": '" + names_.nameOf(object) + "' can have " +
+                                   std::to_string(kOtherPulls) + " helpers at most");
+    }
   }
 }
 

@@ -27,6 +27,8 @@ class StateReader {
                       ScenarioState& state);
   void readHands(const YAML::Node& node, ScenarioState& state);
   void readHelpers(const YAML::Node& node, ScenarioState& state);
+  bool mayTake(const YAML::detail::iterator_value& entry, HandId hand, ObjectId object,
+               const std::string& what);
   void readTask(const YAML::Node& node, ScenarioState& state);
   void readTarget(const YAML::Node& node, ScenarioState& state);
   void readApproach(const YAML::Node& node, ScenarioState& state);

@@ -37,6 +37,7 @@ void Exercise::tick(const TickInput& input) noexcept {
   // what is commanded while all stand still is done when they go on
   if (!standsStill()) game_.clear();
   beginWhenAllAreHere();
+  environment_.setStill(standsStill());
   environment_.step();
 }
 
@@ -227,6 +228,13 @@ void Exercise::save(std::vector<std::uint8_t>& bytes) const {
     out.put(command.kind), out.put(command.hand), out.put(command.signal), out.put(command.value);
   part(environment_);
   part(machine_);
+}
+
+std::size_t Exercise::mostSavedBytes() const {
+  constexpr std::size_t kMostCommands = 2 * kMaxChanges * sizeof(GameCommand);
+  std::vector<std::uint8_t> bytes;
+  save(bytes);
+  return environment_.mostSavedBytes() + bytes.size() + kMostCommands;
 }
 
 Result<void> Exercise::restore(std::span<const std::uint8_t> bytes) {

@@ -50,6 +50,8 @@ class Exercise {
   /// Appends the whole moving state; `restore` takes it back and then goes on to the same bits.
   void save(std::vector<std::uint8_t>& bytes) const;
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
+  /// No state of this session saves more bytes than these.
+  [[nodiscard]] std::size_t mostSavedBytes() const;
 
  private:
   struct HandAge {

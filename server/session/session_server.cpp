@@ -124,8 +124,8 @@ class Server final : public SessionServer {
       new_budget_.reset();
     const auto begin = StopWatch::now();
     exercise_.tick(input);
-    output.stats.compute_seconds = std::chrono::duration<double>(StopWatch::now() - begin).count();
     exercise_.fill(output);
+    output.stats.compute_seconds = std::chrono::duration<double>(StopWatch::now() - begin).count();
     govern(output.stats.compute_seconds);
     output.stats.late_ticks = late_ticks_;
     std::uint32_t oldest = 0;
@@ -143,11 +143,20 @@ class Server final : public SessionServer {
     if (budget) new_budget_ = static_cast<double>(*budget);
   }
 
-  void keep(const TickInput& input, std::uint64_t hash, JournalEntry& entry) const {
+  void keep(const TickInput& input, std::uint64_t hash, JournalEntry& entry) {
     entry.input = input;
     entry.hash = hash;
     entry.checkpoint.clear();
-    if (input.tick % kCheckpointEvery == 1) exercise_.save(entry.checkpoint);
+    if (input.tick % kCheckpointEvery != 1) return;
+    // by the clock it has its room already, unless the journal is seconds behind
+    if (!options_.lockstep) {
+      std::vector<std::uint8_t>* room = rooms_.front();
+      if (room == nullptr) return;
+      entry.checkpoint.swap(*room);
+      entry.checkpoint.clear();
+      rooms_.pop();
+    }
+    exercise_.save(entry.checkpoint);
   }
 
   SessionOptions options_;
@@ -166,9 +175,9 @@ class Server final : public SessionServer {
   // by the clock
   SpscQueue<TickOutput> outputs_{64};
   SpscQueue<JournalEntry> entries_{1024};
+  SpscQueue<std::vector<std::uint8_t>> rooms_{2};  ///< for checkpoints, on their way back to the tick
   TickInput input_;
   TickOutput unsent_;
-  JournalEntry unwritten_;
 };
 
 void Server::runLockstep(const std::atomic<bool>& stop) {
@@ -212,9 +221,10 @@ void Server::tickByTheClock() noexcept {
   const std::uint64_t hash = output != nullptr ? output->hash : unsent_.hash;
   if (output != nullptr) outputs_.commitPush();
   if (journal_ || options_.publish_journal) {
-    JournalEntry* entry = entries_.beginPush();
-    keep(input_, hash, entry != nullptr ? *entry : unwritten_);
-    if (entry != nullptr) entries_.commitPush();
+    if (JournalEntry* entry = entries_.beginPush()) {
+      keep(input_, hash, *entry);
+      entries_.commitPush();
+    }
   }
   wire_->wake();
 }
@@ -227,14 +237,10 @@ void Server::runByTheClock(const std::atomic<bool>& stop) {
   }
   while (outputs_.front() != nullptr) outputs_.pop();
   unsent_ = exercise_.makeOutput();
-  JournalEntry roomy;
-  exercise_.save(roomy.checkpoint);
-  for (std::size_t i = 0; i < entries_.capacity(); ++i) {
-    JournalEntry* entry = entries_.beginPush();
-    entry->checkpoint.reserve(2 * roomy.checkpoint.size());
-    entries_.commitPush();
+  while (std::vector<std::uint8_t>* room = rooms_.beginPush()) {
+    room->reserve(exercise_.mostSavedBytes());
+    rooms_.commitPush();
   }
-  while (entries_.front() != nullptr) entries_.pop();
 
   std::atomic<bool> over = false;
   CyclicThread ticker(std::make_shared<SteadyClock>(), {.name = "tick", .fifo_priority = 70},
@@ -248,6 +254,10 @@ void Server::runByTheClock(const std::atomic<bool>& stop) {
       const bool last_round = over;  // all ticks are made
       for (JournalEntry* entry = entries_.front(); entry != nullptr; entry = entries_.front()) {
         writeJournal(*entry);
+        if (!entry->checkpoint.empty()) {
+          rooms_.beginPush()->swap(entry->checkpoint);
+          rooms_.commitPush();
+        }
         entries_.pop();
       }
       if (last_round) return;

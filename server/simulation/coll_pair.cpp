@@ -43,6 +43,8 @@ void CollPair::forget() noexcept {
   left_out_ = 0.0;
   levels_ = levels_used_ = kAllLevels;
   calm_ = patience_ = 0;
+  walk_points_ = 0;
+  solved_ = 0;
   if (room_ == nullptr) return;
   room_->query.contacts.clear();
   room_->walked = WalkedAt{};
@@ -137,8 +139,13 @@ bool CollPair::isSound(const IslandPairResult& room) const noexcept {
   const ContactList& contacts = room.query.contacts;
   return possible_ && room.flanks <= contacts.size() && room.walked.X_WA.isFinite() &&
          room.walked.X_WB.isFinite() &&
-         std::all_of(contacts.begin(), contacts.end(),
-                     [this](const Contact& c) { return c.point < shell_A_->points().size(); });
+         std::all_of(room.multipliers.begin(),
+                     room.multipliers.begin() + static_cast<std::ptrdiff_t>(contacts.size()),
+                     [](double force) { return std::isfinite(force); }) &&
+         std::all_of(contacts.begin(), contacts.end(), [this](const Contact& c) {
+           return c.point < shell_A_->points().size() && c.p_WP.allFinite() && c.n_W.allFinite() &&
+                  std::isfinite(c.gap);
+         });
 }
 
 Tick CollPair::wholeTicks(double way, double closing_speed) noexcept {
@@ -172,7 +179,7 @@ IslandPair CollPair::islandPair(const Pose& X_WA, const Pose& X_WB, Tick now) co
   pair.X_WA_static = X_WA;
   pair.X_WB_static = X_WB;
   pair.dilation = spec_->dilation;
-  pair.friction = spec_->friction;
+  pair.friction = spec_->friction.value_or(Friction{});
   pair.last = solvedBefore(now);
   return pair;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -122,6 +123,10 @@ class CollPair {
     archive(self.walk_points_);
     archive(self.calm_);
     archive(self.patience_);
+    if constexpr (Archive::kReads) {
+      if (!std::isfinite(self.travelled_ + self.gap_ + self.deepest_ + self.left_out_))
+        return archive.refuse();
+    }
     bool lists = self.lists();
     archive(lists);
     if (!lists) return;

@@ -66,6 +66,7 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
       movable(scene.objects.size(), 0),
       solved(scene.objects.size(), 0),
       at_rest(scene.objects.size(), 0),
+      meets(scene.objects.size(), 0),
       hidden(scene.objects.size(), 0),
       partition(scene.objects.size()),
       islands(mostMovable(scene), roomsFor(scene, options), std::max(options.workers, 1U)),

@@ -117,6 +117,7 @@ struct Environment::Engine {
   std::vector<std::uint8_t> movable;  ///< by object: a hand pulls at it
   std::vector<std::uint8_t> solved;   ///< by object: and it moves in this tick
   std::vector<std::uint8_t> at_rest;  ///< by object: touches something in this tick
+  std::vector<std::uint8_t> meets;    ///< by object: of a near pair, looked at in this tick or not
   std::vector<std::uint8_t> hidden;   ///< by object, when active pairs were counted
   std::uint32_t active_pairs = 0;
   bool recount = true;

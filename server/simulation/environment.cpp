@@ -60,6 +60,8 @@ void Environment::setGroup(ObjectId object, std::uint32_t group) noexcept {
   for (const std::uint32_t pair : engine_->pairsOf(object.value)) {
     engine_->active_pairs += engine_->counts(pair) ? 1U : 0U;
   }
+  wake(object);
+  wakeNeighbours(object);
 }
 
 std::uint32_t Environment::groupOf(ObjectId object) const noexcept {
@@ -140,7 +142,8 @@ MovableBody Environment::heldBody(ObjectId object) const noexcept {
   body.radius = engine_->sizes[object.value].radius;
   for (std::size_t i = 0; i < hands_.size(); ++i) {
     const HandId hand{static_cast<std::uint32_t>(i)};
-    if (engaged(hands_[i]) && hands_[i].object == object) body.springs.push_back(springOf(hand));
+    const bool coupled = scene_->hands[i].kind == HandKind::kCoupled;
+    if (coupled && engaged(hands_[i]) && hands_[i].object == object) body.springs.push_back(springOf(hand));
   }
   Spring& first = body.springs[0];
   if (first.stiffness <= 0.0) return body;
@@ -215,6 +218,8 @@ void Environment::findDuePairs() noexcept {
   for (const std::uint32_t i : engine.near) {
     CollPair& pair = engine.pairs[i];
     const PairSpec& spec = pair.spec();
+    // two that rest do not change what was found
+    if (pair.dueTick() == CollPair::kNever) continue;
     if (options_.coherence) {
       const double closing_speed = speedCap(spec.a) + speedCap(spec.b);
       if (!pair.due(tick_)) continue;
@@ -246,9 +251,12 @@ void Environment::shareWork() noexcept {
 void Environment::planIslands() noexcept {
   Engine& engine = *engine_;
   engine.partition.begin(engine.solved);
+  std::fill(engine.meets.begin(), engine.meets.end(), std::uint8_t{0});
   for (const std::uint32_t i : engine.near) {
     const PairSpec& spec = engine.pairs[i].spec();
-    if (!spec.sensing) engine.partition.join(spec.a, spec.b);
+    if (spec.sensing) continue;
+    engine.partition.join(spec.a, spec.b);
+    engine.meets[spec.a.value] = engine.meets[spec.b.value] = 1;
   }
   engine.partition.number();
   engine.islands.clear();

@@ -91,9 +91,11 @@ class Environment {
   void setHandPresent(HandId hand, bool present) noexcept;
   void setHandPose(HandId hand, const Pose& X_WH, const Twist& V_WH) noexcept;
   void setHandFrozen(HandId hand, bool frozen) noexcept;
-  /// `hand` moves `object` from now on, which stays where it is in the hand. What it moved before is parked;
-  /// a pointer (a hand's own first object) is hidden while the hand holds something else, and comes back on
-  /// what it took, where it took it: outside, wherever the hand itself is.
+  /// Free bodies stand still where they are, and start from rest when they may go on: a pause.
+  void setStill(bool still) noexcept;
+  /// `hand` moves `object` from now on, which stays where it is in the hand. What it moved before it lets go
+  /// of as in release(); a pointer (a hand's own first object) is hidden while the hand holds something else,
+  /// and comes back on what it took, where it took it: outside, wherever the hand itself is.
   void grab(HandId hand, ObjectId object) noexcept;
   /// The hand moves its own first object again. What it held is parked, or flies on if it has a body.
   void release(HandId hand) noexcept;
@@ -149,6 +151,8 @@ class Environment {
   /// The same at the end of `bytes`: allocates nothing when there is room.
   void append(std::vector<std::uint8_t>& bytes) const;
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
+  /// No state of this scene appends more bytes than these.
+  [[nodiscard]] std::size_t mostSavedBytes() const;
 
  private:
   struct Engine;
@@ -167,6 +171,7 @@ class Environment {
   void wake(ObjectId object) noexcept;
   void wakeNeighbours(ObjectId object) noexcept;
   void wakeWhatIsTouched() noexcept;
+  [[nodiscard]] bool mayBeTouched(std::size_t pair) const noexcept;
   void fly() noexcept;
   [[nodiscard]] MovableBody freeBody(ObjectId object) noexcept;
   void boundTravel(std::size_t island) noexcept;
@@ -221,6 +226,7 @@ class Environment {
   std::vector<PairMotion> pairs_;
   std::unique_ptr<Engine> engine_;
   WorkLimits work_limits_;
+  bool still_ = false;  ///< nobody flies
   Work work_;
   Tick tick_ = 0;
 };

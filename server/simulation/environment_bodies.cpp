@@ -28,7 +28,18 @@ constexpr double kNobodyNear = 1.0;
 }  // namespace
 
 bool Environment::flies(ObjectId object) const noexcept {
-  return objects_[object.value].status == ObjectStatus::kFree && !objects_[object.value].asleep;
+  return objects_[object.value].status == ObjectStatus::kFree && !objects_[object.value].asleep && !still_;
+}
+
+void Environment::setStill(bool still) noexcept {
+  if (still_ == still) return;
+  still_ = still;
+  for (std::uint32_t i = 0; i < objects_.size(); ++i) {
+    if (objects_[i].status != ObjectStatus::kFree) continue;
+    objects_[i].V_WO = Twist{};
+    wake(ObjectId{i});
+    stir(ObjectId{i});
+  }
 }
 
 bool Environment::moves(ObjectId object) const noexcept {
@@ -51,6 +62,13 @@ void Environment::wakeNeighbours(ObjectId object) noexcept {
   }
 }
 
+/// Contacts that an island lists ahead count, so that who comes meets somebody awake; what two sleepers list
+/// depends on whether they were looked at.
+bool Environment::mayBeTouched(std::size_t pair) const noexcept {
+  const CollPair& one = engine_->pairs[pair];
+  return one.solvedBefore(tick_) != nullptr || (one.lists() && one.gap() <= engine_->limits.contact_margin);
+}
+
 /// Whoever lies at something that moves by itself, or at somebody who does, and so on.
 void Environment::wakeWhatIsTouched() noexcept {
   bool more = true;
@@ -58,7 +76,7 @@ void Environment::wakeWhatIsTouched() noexcept {
     more = false;
     for (const std::uint32_t i : engine_->near) {
       const CollPair& pair = engine_->pairs[i];
-      if (!pair.lists() || pair.spec().sensing || !active(i)) continue;
+      if (pair.spec().sensing || !active(i) || !mayBeTouched(i)) continue;
       for (const auto& [one, other] :
            {std::pair(pair.spec().a, pair.spec().b), std::pair(pair.spec().b, pair.spec().a)}) {
         if (!objects_[other.value].asleep || !moves(one)) continue;
@@ -91,9 +109,9 @@ MovableBody Environment::freeBody(ObjectId object) noexcept {
   Twist& V_WC = engine_->bodies[object.value]->V_WC;
   const double radius = engine_->sizes[object.value].radius;
   const Vector3 p_OC_W = motion.X_WO.rotation() * rigid.centre();
-  const Vector3 origin = V_WC.linear - V_WC.angular.cross(p_OC_W);
+  const Vector3 v_WOo = V_WC.linear - V_WC.angular.cross(p_OC_W);
   const double speed =
-      std::max(fastestPoint(origin, V_WC.angular, radius), fastestPoint(V_WC.linear, V_WC.angular, radius));
+      std::max(fastestPoint(v_WOo, V_WC.angular, radius), fastestPoint(V_WC.linear, V_WC.angular, radius));
   if (speed > options_.max_free_speed) {
     V_WC.linear *= options_.max_free_speed / speed;
     V_WC.angular *= options_.max_free_speed / speed;
@@ -123,8 +141,10 @@ void Environment::boundTravel(std::size_t island) noexcept {
   const IslandWork::Island& one = islands.islands()[island];
   double speed = 0.0;
   bool any = false;
+  bool meets = false;
   for (std::size_t i = one.first_body; i < one.first_body + one.bodies; ++i) {
     const ObjectId object = islands.objectOf(i);
+    meets = meets || engine_->meets[object.value] != 0;
     if (!flies(object)) continue;
     const Twist& V_WC = engine_->bodies[object.value]->V_WC;
     speed = std::max(speed, fastestPoint(V_WC.linear, V_WC.angular, engine_->sizes[object.value].radius));
@@ -135,7 +155,7 @@ void Environment::boundTravel(std::size_t island) noexcept {
     islands.body(i).reach = speedCap(islands.objectOf(i)) * kTickSeconds;
   }
   SolveLimits& limits = islands.limits(island);
-  if (one.pairs == 0) limits.substep_travel = kNobodyNear;
+  if (!meets) limits.substep_travel = kNobodyNear;
   const double travel = kSpareTravel * std::min(speed, options_.max_free_speed) * kTickSeconds;
   limits.substeps =
       std::max(kImpactSubsteps, static_cast<std::uint32_t>(std::ceil(travel / limits.substep_travel)));
@@ -146,9 +166,9 @@ void Environment::boundTravel(std::size_t island) noexcept {
 void Environment::landIsland(std::size_t island) noexcept {
   const IslandWork& islands = engine_->islands;
   const IslandWork::Island& one = islands.islands()[island];
-  double given = 0.0;
-  double before = 0.0;
-  double after = 0.0;
+  double given = 0.0;   // [J] by hands
+  double before = 0.0;  // [J] of motion
+  double after = 0.0;   // [J]
   for (std::size_t i = one.first_body; i < one.first_body + one.bodies; ++i) {
     const ObjectId object = islands.objectOf(i);
     const Pose& X_WO = objects_[object.value].X_WO;

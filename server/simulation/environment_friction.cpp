@@ -17,7 +17,7 @@ constexpr double kStill = 1e-9;
 /// Of two that rub, the smoother one's; 0 when neither has a body, or when the pair has a friction of its
 /// own: that acts in the island.
 double Environment::frictionOf(const PairSpec& pair) const noexcept {
-  if (pair.friction.at_rest > 0.0) return 0.0;
+  if (pair.friction) return 0.0;
   const std::optional<BodySpec>& a = scene_->objects[pair.a.value].body;
   const std::optional<BodySpec>& b = scene_->objects[pair.b.value].body;
   if (a && b) return std::min(a->friction, b->friction);

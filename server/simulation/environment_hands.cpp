@@ -176,6 +176,10 @@ void Environment::letGo(HandId hand) noexcept {
   park(object, object == motion.own ? ObjectStatus::kHidden
                : has_mass           ? ObjectStatus::kFree
                                     : ObjectStatus::kParked);
+  // it was parked when its hand was gone, and now nobody is to hold it any more
+  if (has_mass && objects_[object.value].status == ObjectStatus::kParked) {
+    objects_[object.value].status = ObjectStatus::kFree;
+  }
 }
 
 /// Nobody holds the object any more. What the state machine has fixed or hidden stays so.

@@ -9,7 +9,7 @@ namespace tenon {
 namespace {
 
 /// Raised whenever the list of fields changes.
-constexpr std::uint32_t kStateVersion = 6;
+constexpr std::uint32_t kStateVersion = 7;
 
 template <typename Archive, typename Motion>
 void archiveObject(Archive& archive, Motion& object) {
@@ -70,6 +70,7 @@ void archiveIndices(Archive& archive, Indices& indices, std::size_t end) {
 template <typename Archive, typename Self>
 void Environment::archive(Archive& archive, Self& self) {
   archive(self.tick_);
+  archive(self.still_);
   archive(self.work_limits_.points);
   archive(self.work_limits_.critical_load);
   for (auto& object : self.objects_) archiveObject(archive, object);
@@ -87,6 +88,14 @@ std::uint64_t Environment::hash() const noexcept {
   StateHasher hasher;
   archive(hasher, *this);
   return hasher.value();
+}
+
+std::size_t Environment::mostSavedBytes() const {
+  // a near pair's numbers and its two cells of force, and a full list with what held
+  constexpr std::size_t kPair = 512;
+  constexpr std::size_t kList = sizeof(IslandPairResult) + kMaxPairContacts * sizeof(double);
+  constexpr std::size_t kObject = 1024;
+  return save().size() + kObject * objects_.size() + kPair * engine_->pairs.size() + kList * contactRooms();
 }
 
 std::vector<std::uint8_t> Environment::save() const {
@@ -140,6 +149,7 @@ Result<void> Environment::restore(std::span<const std::uint8_t> bytes) {
   engine_->odometers = std::move(copy.engine_->odometers);
   engine_->forces = std::move(copy.engine_->forces);
   work_limits_ = copy.work_limits_;
+  still_ = copy.still_;
   tick_ = copy.tick_;
   engine_->forgetTick();
   findMovable();
@@ -153,12 +163,18 @@ bool Environment::isSound() const noexcept {
     constexpr double kUnitTolerance = 1e-6;
     return X.isFinite() && std::abs(X.rotation().squaredNorm() - 1.0) < kUnitTolerance;
   };
+  const auto hasBody = [this](const ObjectMotion& object) {
+    return scene_->objects[static_cast<std::size_t>(&object - objects_.data())].body.has_value();
+  };
   const bool sound_objects = std::all_of(objects_.begin(), objects_.end(), [&](const ObjectMotion& object) {
-    return sound(object.X_WO) && object.status <= ObjectStatus::kFree && object.V_WO.linear.allFinite() &&
+    return sound(object.X_WO) && object.status <= ObjectStatus::kFree &&
+           (object.status != ObjectStatus::kFree || hasBody(object)) && object.V_WO.linear.allFinite() &&
            object.V_WO.angular.allFinite() && (!object.holder.valid() || isHand(object.holder));
   });
   const bool sound_limits = work_limits_.critical_load > 0.0 && std::isfinite(work_limits_.critical_load);
-  return sound_limits && sound_objects &&
+  const bool sound_ways = std::all_of(engine_->odometers.begin(), engine_->odometers.end(),
+                                      [](double way) { return std::isfinite(way); });
+  return sound_limits && sound_objects && sound_ways &&
          std::all_of(hands_.begin(), hands_.end(), [&](const HandMotion& hand) {
            return sound(hand.X_WH) && sound(hand.X_HO) && sound(hand.X_OR) &&
                   (!hand.object.valid() || isObject(hand.object)) &&

@@ -27,8 +27,9 @@ std::optional<std::uint64_t> Governor::judge(double seconds, std::uint64_t point
     double wanted = kShare * goal_ * rate_;
     if (budget > 0) wanted = std::min(wanted, kCut * static_cast<double>(budget));
     forget();
-    const auto next = static_cast<std::uint64_t>(
+    auto next = static_cast<std::uint64_t>(
         std::clamp(wanted, static_cast<double>(kLeastBudget), static_cast<double>(kMostBudget)));
+    if (budget > 0) next = std::min(next, budget);
     return next == budget ? std::nullopt : std::optional(next);
   }
   if (budget == 0 || ++calm_ticks_ < kCalmTicks) return std::nullopt;

@@ -21,7 +21,9 @@ struct BodySpec {
   Matrix3 inertia_C_O = Matrix3::Identity();  ///< [kg m^2] about it
   bool floating = false;                      ///< gravity does not pull at it
   double damping = 0.0;                       ///< [1/s] share of its speed that the air takes
-  double friction = 0.0;                      ///< Coulomb's coefficient on what it rests on
+  /// Coulomb's coefficient while it is free, on whatever its pair has no friction of its own with
+  /// (environment_friction.cpp).
+  double friction = 0.0;
 };
 
 /// An object of the scene as it never changes.
@@ -45,7 +47,8 @@ struct PairSpec {
   double dilation = 0.0;  ///< [m] of b's surface
   bool enabled = true;    ///< at the start: a cell of the configuration matrix
   bool sensing = false;   ///< felt as vibration, never resisted: a forearm
-  Friction friction;
+  /// In the islands, on patches (island_friction.cpp), instead of the friction of bodies; none: theirs.
+  std::optional<Friction> friction;
 };
 
 enum class HandKind : std::uint8_t {

@@ -58,6 +58,8 @@ TEST(ScenarioBodies, WhatIsWrongWithABodyIsSaidWithItsLine) {
            Case{"{density: 2.7 kg/l}", "expected a density such as 2700 kg/m3"},
            Case{"{mass: 1 kg, inertia: [1, 1, 1]}", "needs 'mass' and 'centre' with it"},
            Case{"{mass: 1 kg, centre: [0, 0, 0], inertia: [1, 1, 3]}", "is that of no body"},
+           Case{"{mass: 1 kg, centre: [0, 0, 0], inertia: [1e-110, 1e-110, 1e-110]}",
+                "does not go with its mass"},
            Case{"{mass: 1 kg, friction: -1}", "'friction' of 'body' of object 'part'"},
            Case{"{mass: 1 kg, frction: 1}", "did you mean 'friction'?"},
            Case{"1 kg", "must be a mapping"},

@@ -44,9 +44,10 @@ TEST(SceneBuilder, GivesAPairItsFriction) {
     const int number = (*scene)->pairOf((*scene)->objectNamed(a), (*scene)->objectNamed(b));
     return (*scene)->pairs[static_cast<std::size_t>(number)].friction;
   };
-  EXPECT_DOUBLE_EQ(pair("pointer", "bay").at_rest, 0.4);
-  EXPECT_DOUBLE_EQ(pair("pointer", "bay").sliding, 0.3);
-  EXPECT_DOUBLE_EQ(pair("part", "bay").at_rest, 0.0) << "off when nothing is said";
+  ASSERT_TRUE(pair("pointer", "bay"));
+  EXPECT_DOUBLE_EQ(pair("pointer", "bay")->at_rest, 0.4);
+  EXPECT_DOUBLE_EQ(pair("pointer", "bay")->sliding, 0.3);
+  EXPECT_FALSE(pair("part", "bay")) << "that of the bodies when nothing is said";
 }
 
 TEST(SceneBuilder, ChecksClearancesWhoseFieldOnlySizesTell) {

@@ -141,6 +141,60 @@ TEST(FreeBodyAndHand, AHandThatIsGoneDropsNothing) {
   EXPECT_EQ(environment.objects()[box.value].X_WO, X_WB) << "it waits for its hand to come back";
 }
 
+TEST(FreeBodyAndHand, WhatAHandThatIsGoneIsRelievedOfFalls) {
+  test::SmallScene small;
+  const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 1.0});
+  const ObjectId pointer = small.object("pointer", test::pointerShape(), {-0.1, 0.0, 1.0});
+  const HandId hand = small.hand("hand", pointer);
+  Environment environment(small.build(), {});
+  enter(environment, hand, {0.0, 0.0, 1.0});
+  environment.grab(hand, box);
+  stay(environment, 10);
+  environment.setHandPresent(hand, false);
+  stay(environment, 10);
+  environment.release(hand);
+  EXPECT_EQ(environment.objects()[box.value].status, ObjectStatus::kFree);
+  stay(environment, 100);
+  EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.z(), -kG * 0.1, 1e-6);
+}
+
+TEST(FreeBodyAndHand, AFallThatIsHeldStillGoesOnFromRest) {
+  test::SmallScene small;
+  const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 1.0});
+  const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
+  small.pair(box, ground);
+  Environment environment(small.build(), {});
+  stay(environment, 100);
+  environment.setStill(true);
+  const Pose X_WB = environment.objects()[box.value].X_WO;
+  stay(environment, 50);
+  EXPECT_EQ(environment.objects()[box.value].X_WO, X_WB);
+  const std::vector<std::uint8_t> bytes = environment.save();
+  Environment other(small.build(), {});
+  ASSERT_TRUE(other.restore(bytes));
+  stay(other, 50);
+  EXPECT_EQ(other.objects()[box.value].X_WO, X_WB) << "held still after a restore too";
+  environment.setStill(false);
+  stay(environment, 100);
+  EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.z(), -kG * 0.1, 1e-6);
+  stay(environment, 1000);
+  EXPECT_NEAR(environment.objects()[box.value].X_WO.translation().z(), 0.5 * kSize.z(), 5e-5);
+}
+
+TEST(FreeBodyAndHand, WhatRestsOnAnObjectThatJoinsItsGroupFalls) {
+  test::SmallScene small;
+  const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
+  const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 0.5 * kSize.z() + 1e-4});
+  small.pair(box, ground);
+  Environment environment(small.build(), {});
+  stay(environment, 300);
+  ASSERT_TRUE(environment.objects()[box.value].asleep);
+  environment.setGroup(ground, 3);
+  environment.setGroup(box, 3);
+  stay(environment, 100);
+  EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.z(), -kG * 0.1, 1e-6);
+}
+
 TEST(FreeBodyAndHand, WhatWasPutIntoTheFloorDoesNotFlyAway) {
   test::SmallScene small;
   const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());

@@ -130,30 +130,32 @@ TEST_F(StackTest, TheFloorThatIsSwitchedOffHoldsNobody) {
 }
 
 TEST_F(StackTest, TheSameBitsForAnyNumberOfWorkersWithAndWithoutCoherence) {
-  const auto play = [&] {
+  EnvironmentOptions options;
+  const auto play = [&](double ticks) {
+    begin(options);
     std::vector<std::uint64_t> hashes;
     enter(*environment_, hand_, {0.2, 0.0, 1.5 * kEdge});
     for (int tick = 0; tick < 900; ++tick) {
-      const double x = 0.2 - 0.25 * std::min(1.0, tick / 600.0);
+      const double x = 0.2 - 0.25 * std::min(1.0, tick / ticks);
       environment_->setHandPose(hand_, Pose(Vector3(x, 0.0, 1.5 * kEdge)), {});
       environment_->step();
       hashes.push_back(environment_->hash());
     }
     return hashes;
   };
-  const auto expected = play();
-  for (const unsigned workers : {2U, 4U}) {
-    EnvironmentOptions options;
-    options.workers = workers;
-    begin(options);
-    EXPECT_EQ(play(), expected) << workers;
+  for (const double ticks : {600.0, 200.0}) {
+    options = {};
+    const auto expected = play(ticks);
+    const std::array last{box(0).X_WO, box(1).X_WO, box(2).X_WO};
+    for (const unsigned workers : {2U, 4U}) {
+      options.workers = workers;
+      EXPECT_EQ(play(ticks), expected) << workers;
+    }
+    options = {};
+    options.coherence = false;
+    play(ticks);
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(box(i).X_WO, last[i]) << "pushed within " << ticks << " ticks";
   }
-  const std::array last{box(0).X_WO, box(1).X_WO, box(2).X_WO};
-  EnvironmentOptions every_pair;
-  every_pair.coherence = false;
-  begin(every_pair);
-  play();
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(box(i).X_WO, last[i]);
 }
 
 TEST_F(StackTest, ASavedStackGoesOnWithTheSameBits) {
@@ -170,6 +172,30 @@ TEST_F(StackTest, ASavedStackGoesOnWithTheSameBits) {
     }
     ASSERT_EQ(other.hash(), environment_->hash()) << tick;
   }
+}
+
+TEST_F(StackTest, NoStateIsSavedInMoreBytesThanWereForetold) {
+  const std::size_t most = environment_->mostSavedBytes();
+  enter(*environment_, hand_, {0.2, 0.0, 1.5 * kEdge});
+  moveTo(*environment_, hand_, {0.03, 0.0, 1.5 * kEdge}, 300);
+  EXPECT_GT(environment_->save().size(), 20'000U) << "full lists";
+  EXPECT_LE(environment_->save().size(), most);
+}
+
+TEST_F(StackTest, ACheckpointBeforeAPairMeetsAgainGoesOnWithTheSameBits) {
+  stay(*environment_, 100);
+  environment_->place(boxes_[2], Pose(Vector3(0.5, 0.5, 0.5)), ObjectStatus::kParked);
+  stay(*environment_, 10);
+  const std::vector<std::uint8_t> bytes = environment_->save();
+  Environment other(small_.build(), {});
+  ASSERT_TRUE(other.restore(bytes));
+  for (Environment* one : {environment_.get(), &other}) {
+    one->place(boxes_[2], Pose(Vector3(0.004, 0.002, 2.5 * kEdge + 1e-4)), ObjectStatus::kParked);
+    stay(*one, 5);
+    one->place(boxes_[2], Pose(Vector3(0.004, 0.002, 2.5 * kEdge + 1e-4)), ObjectStatus::kFree);
+    stay(*one, 20);
+  }
+  EXPECT_EQ(other.hash(), environment_->hash());
 }
 
 TEST_F(StackTest, StepAllocatesNothingAndLocksNothing) {

@@ -59,5 +59,10 @@ TEST(Governor, NeverStarvesATick) {
   EXPECT_EQ(budget, Governor::kLeastBudget);
 }
 
+TEST(Governor, ASmallBudgetThatSomebodyGaveIsNotRaisedBySlowTicks) {
+  Governor governor(kGoal);
+  for (int tick = 0; tick < 100; ++tick) EXPECT_EQ(governor.judge(1.0, 10, 500).value_or(500), 500U);
+}
+
 }  // namespace
 }  // namespace tenon
