@@ -1,7 +1,6 @@
 #include "server/collision/contact_sink.h"
 
 #include <bit>
-#include <utility>
 
 namespace tenon {
 
@@ -106,50 +105,57 @@ void ContactSink::thinList() {
   result_.thinned = result_.thinned || kept < size;
 }
 
-void ContactSink::count(double gap) {
-  ++histogram_[stepOf(gap)];
-  ++counted_;
-  while (counted_ - histogram_[last_step_] >= kMaxPairContacts) counted_ -= histogram_[last_step_--];
+bool ContactSink::overflows(std::size_t count) {
+  if (overflow_) return true;
+  if (result_.contacts.size() + count <= kMaxPairContacts) return false;
+  overflow_.emplace();
+  histogram_.fill(0);
+  for (const Contact& listed : result_.contacts) announce(listed.gap);
+  return true;
 }
 
-void ContactSink::listBeyond(const Contact& contact) {
-  if (!overflow_) {
-    overflow_.emplace();
-    histogram_.fill(0);
-    for (const Contact& listed : result_.contacts) count(listed.gap);
-  }
-  if (overflow_->full()) selectDeepest();
-  overflow_->push_back(contact);
-  count(contact.gap);
+void ContactSink::announce(double gap) {
+  const std::size_t step = stepOf(gap);
+  if (step > last_step_) return;
+  ++histogram_[step];
+  ++counted_;
+  while (counted_ - histogram_[last_step_] >= kMaxPairContacts) counted_ -= histogram_[last_step_--];
 }
 
 void ContactSink::selectDeepest() {
   if (!overflow_ || overflow_->empty()) return;
   // those of the last step have the places that are left
   ContactList& contacts = result_.contacts;
-  std::array<GapRank, 2 * kMaxPairContacts> last;
+  std::array<GapRank, kMaxPairContacts + decltype(overflow_)::value_type::capacity()> last;
   std::size_t of_last = 0;
-  for (const ContactList* from : {&std::as_const(contacts), &std::as_const(*overflow_)}) {
-    for (const Contact& contact : *from) {
-      if (stepOf(contact.gap) == last_step_) last[of_last++] = {contact.gap, contact.point};
-    }
-  }
-  const std::size_t before = counted_ - histogram_[last_step_];
-  const std::size_t places = kMaxPairContacts - before;
-  const auto largest = last.begin() + static_cast<std::ptrdiff_t>(places - 1);
-  std::nth_element(last.begin(), largest, last.begin() + static_cast<std::ptrdiff_t>(of_last));
+  std::size_t before = 0;
+  const auto rank = [&](const Contact& contact) {
+    const std::size_t step = stepOf(contact.gap);
+    if (step < last_step_) ++before;
+    if (step == last_step_) last[of_last++] = {contact.gap, contact.point};
+  };
+  std::for_each(contacts.begin(), contacts.end(), rank);
+  std::for_each(overflow_->begin(), overflow_->end(), rank);
+  const std::size_t listed = contacts.size() + overflow_->size();
+  // of the steps before there are never too many
+  const std::size_t places = std::min(kMaxPairContacts - before, of_last);
+  const auto end = last.begin() + static_cast<std::ptrdiff_t>(of_last);
+  const auto beyond = last.begin() + static_cast<std::ptrdiff_t>(places);
+  if (beyond != end) std::nth_element(last.begin(), beyond, end);
   std::size_t kept = 0;
-  for (const ContactList* from : {&std::as_const(contacts), &std::as_const(*overflow_)}) {
-    for (const Contact& contact : *from) {
-      if (*largest < GapRank{contact.gap, contact.point}) continue;
-      Contact& place = contacts[kept++];
-      if (&place != &contact) place = contact;
-    }
-  }
-  result_.counts.contacts_dropped += static_cast<std::uint32_t>(overflow_->size());
+  const auto keep = [&](const Contact& contact) {
+    const std::size_t step = stepOf(contact.gap);
+    if (step > last_step_) return;
+    if (step == last_step_ && beyond != end && !(GapRank{contact.gap, contact.point} < *beyond)) return;
+    Contact& place = contacts[kept++];
+    if (&place != &contact) place = contact;
+  };
+  std::for_each(contacts.begin(), contacts.end(), keep);
+  contacts.resize(kMaxPairContacts);
+  std::for_each(overflow_->begin(), overflow_->end(), keep);
+  contacts.resize(kept);
+  result_.counts.contacts_dropped += static_cast<std::uint32_t>(listed - kept);
   overflow_->clear();
-  histogram_[last_step_] = static_cast<std::uint16_t>(places);
-  counted_ = kMaxPairContacts;
 }
 
 }  // namespace tenon

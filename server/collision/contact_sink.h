@@ -20,9 +20,10 @@ struct LeafContacts {
 
 /// Decides which contacts have room in the list of a query, as they come in the order of the shell.
 ///
-/// Without thinning those with the smallest gaps stay, of equal ones those with the lower names: gaps are
-/// counted in equal steps, and the step up to which there is room only ever falls, so most of what has to go
-/// is never listed. With thinning, points give way first that stand behind a neighbour.
+/// Without thinning those with the smallest gaps stay, of equal ones those with the lower names. What comes
+/// is announced first and counted in equal steps of gaps; the step up to which there is room only ever falls,
+/// so most of what has to go is never listed. With thinning, points give way first that stand behind a
+/// neighbour.
 ///
 /// Threads: one query's. Real-time: all.
 class ContactSink {
@@ -30,6 +31,9 @@ class ContactSink {
   /// Gaps lie between `lowest` and `highest` [m].
   ContactSink(PairQueryResult& result, double lowest, double highest);
 
+  /// Whether there is no room for so many more: they are to be announced before they are listed.
+  bool overflows(std::size_t count);
+  void announce(double gap);
   /// Whether a contact of that gap has to be listed; those that have not are counted as dropped.
   bool wants(double gap) {
     if (!overflow_ || stepOf(gap) <= last_step_) return true;
@@ -38,7 +42,10 @@ class ContactSink {
   }
   /// A contact that is wanted.
   void list(const Contact& contact) {
-    if (overflow_ || !result_.contacts.push_back(contact)) listBeyond(contact);
+    if (result_.contacts.push_back(contact)) return;
+    if (overflow_->push_back(contact)) return;
+    selectDeepest();
+    if (!result_.contacts.push_back(contact)) overflow_->push_back(contact);
   }
   /// After the last: the list is what it shall be.
   void selectDeepest();
@@ -57,18 +64,16 @@ class ContactSink {
     const double step = (gap - lowest_) * steps_a_metre_;
     return step > 0.0 ? std::min(static_cast<std::size_t>(step), kSteps - 1) : 0;
   }
-  void count(double gap);
-  void listBeyond(const Contact& contact);
   void thinList();
 
   PairQueryResult& result_;
   double lowest_;
   double steps_a_metre_;
-  // of what is listed and what found no room
-  std::array<std::uint16_t, kSteps> histogram_;
+  // of what is listed and what is announced
+  std::array<std::uint32_t, kSteps> histogram_;
   std::size_t last_step_ = kSteps - 1;  ///< what lies beyond has no room
   std::size_t counted_ = 0;             ///< up to that step
-  std::optional<ContactList> overflow_;
+  std::optional<FixedVector<Contact, 256>> overflow_;
   // of leaves that were thinned
   std::size_t per_leaf_ = Pointshell::kLeafPoints;           ///< and direction
   std::array<std::uint32_t, kMaxPairContacts> leaf_starts_;  ///< where the listed leaves begin

@@ -175,7 +175,7 @@ class Walk {
     if (can_thin_) {
       listThinned();
     } else {
-      forEachNear(0, candidates_.count, [this](std::uint32_t i) { list(i); });
+      listAll();
     }
     candidates_.count = candidates_.leaves = 0;
   }
@@ -203,9 +203,21 @@ class Walk {
     }
   }
 
-  void list(std::uint32_t candidate) {
-    const double gap = lanesOf(candidate).gap(frame_, candidate % ShellBlock::kLanes);
-    if (sink_.wants(gap)) sink_.list(contactOf(candidate));
+  [[nodiscard]] double gapOf(std::uint32_t candidate) const {
+    return lanesOf(candidate).gap(frame_, candidate % ShellBlock::kLanes);
+  }
+
+  void listAll() {
+    std::size_t near = 0;
+    for (std::uint32_t first = 0; first < candidates_.count; first += ShellBlock::kLanes) {
+      near += static_cast<std::size_t>(std::popcount(lanesOf(first).samples.near));
+    }
+    if (sink_.overflows(near)) {
+      forEachNear(0, candidates_.count, [this](std::uint32_t i) { sink_.announce(gapOf(i)); });
+    }
+    forEachNear(0, candidates_.count, [this](std::uint32_t i) {
+      if (sink_.wants(gapOf(i))) sink_.list(contactOf(i));
+    });
   }
 
   void listThinned() {
@@ -221,7 +233,11 @@ class Walk {
       });
       first = end;
       if (near.count == 0) continue;
-      forEachLane(sink_.thinned(near), [&](std::uint32_t k) {
+      const std::uint32_t chosen = sink_.thinned(near);
+      if (sink_.overflows(near.count)) {
+        forEachLane(chosen, [&](std::uint32_t k) { sink_.announce(gapOf(number[k])); });
+      }
+      forEachLane(chosen, [&](std::uint32_t k) {
         const Contact contact = contactOf(number[k]);
         if (sink_.wants(contact.gap)) sink_.list(contact);
       });

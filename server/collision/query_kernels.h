@@ -87,7 +87,7 @@ struct alignas(64) PushLanes {
 /// Points that may be contacts, side by side in the order of the shell.
 struct Candidates {
   static constexpr std::size_t kOfCluster = Pointshell::kClusterLeaves * Pointshell::kLeafPoints;
-  static constexpr std::size_t kMost = kOfCluster + 64;
+  static constexpr std::size_t kMost = kOfCluster + 1024;
   template <typename T>
   using Lanes = std::array<T, kMost + ShellBlock::kLanes>;  ///< whole vectors are written
 
