@@ -380,7 +380,8 @@ void resampleContacts(const PairQuery& query, double moved, PairQueryResult& res
       if ((lanes.samples.exact >> i & 1U) != 0) {
         contacts[kept++] = contact;
       } else {
-        result.others_gap = std::min(result.others_gap, contact.gap);
+        // as seen from where the list was made: from here back there it may come nearer again
+        result.others_gap = std::min(result.others_gap, contact.gap - moved);
       }
     }
   }
