@@ -11,12 +11,13 @@ namespace tenon {
 
 namespace {
 
-using Triangle = SurfaceTree::Triangle;
+using SurfaceTriangle = SurfaceTree::Triangle;
 
-constexpr std::array kUnits{0.001, 1.0, 0.01, 0.0254};
+constexpr std::array kMeshUnits{0.001, 1.0, 0.01, 0.0254};
 
-Result<std::vector<Triangle>> trianglesOf(const std::vector<std::filesystem::path>& meshes, double unit) {
-  std::vector<Triangle> triangles;
+Result<std::vector<SurfaceTriangle>> trianglesOf(const std::vector<std::filesystem::path>& meshes,
+                                                 double unit) {
+  std::vector<SurfaceTriangle> triangles;
   for (const auto& file : meshes) {
     const auto mesh = importMesh(file, unit);
     if (!mesh) return tl::unexpected(mesh.error());
@@ -27,9 +28,9 @@ Result<std::vector<Triangle>> trianglesOf(const std::vector<std::filesystem::pat
   return triangles;
 }
 
-bool fills(const std::vector<Triangle>& triangles, const Eigen::AlignedBox3d& wanted) {
+bool fills(const std::vector<SurfaceTriangle>& triangles, const Eigen::AlignedBox3d& wanted) {
   Eigen::AlignedBox3d box;
-  for (const Triangle& corners : triangles) {
+  for (const SurfaceTriangle& corners : triangles) {
     for (const Vector3f& corner : corners) box.extend(corner.cast<double>());
   }
   const double most = 1e-4 * wanted.diagonal().norm();
@@ -44,7 +45,7 @@ Result<SurfaceTree> importSurface(const HapticStructures& structures,
   if (meshes.empty()) return fail(structures.info.source + ": nothing tells where its mesh is");
   Error reason{meshes.front().string() + ": is not the mesh of " + structures.info.source +
                ": no unit makes it as large"};
-  for (const double unit : kUnits) {
+  for (const double unit : kMeshUnits) {
     auto triangles = trianglesOf(meshes, unit);
     if (!triangles) {
       reason = triangles.error();
