@@ -39,6 +39,11 @@ struct IslandSolver::Job {
   [[nodiscard]] const Pose& poseB(const IslandPair& pair) const {
     return poseOf(pair.body_b, pair.X_WB_static);
   }
+  /// The pair where its bodies are now, up to a gap of `margin` [m].
+  [[nodiscard]] PairQuery queryOf(const IslandPair& pair, double margin) const {
+    return {pair.shell_A, pair.field_B, poseA(pair), poseB(pair), pair.dilation,
+            margin,       pair.levels,  pair.budget, pair.first};
+  }
 };
 
 }  // namespace tenon

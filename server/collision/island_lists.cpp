@@ -33,10 +33,7 @@ double neededMargin(const IslandPair& pair, const SolveLimits& limits) {
 
 void IslandSolver::queryPairs(const Job& job, double margin, SolveReport& report) {
   for (std::size_t i = 0; i < job.pairs.size(); ++i) {
-    const IslandPair& pair = job.pairs[i];
-    queryPair({pair.shell_A, pair.field_B, job.poseA(pair), job.poseB(pair), pair.dilation, margin,
-               pair.levels, pair.budget, pair.first},
-              job.results[i].query);
+    queryPair(job.queryOf(job.pairs[i], margin), job.results[i].query);
     job.results[i].walked = WalkedAt{};
     job.results[i].flanks = 0;
     job.results[i].slides = false;
@@ -101,16 +98,9 @@ bool IslandSolver::lookAtPair(const Job& job, std::size_t i, SolveReport& report
     walkPair(job, i, report);
     return false;
   }
-  const IslandPair& pair = job.pairs[i];
   PairQueryResult& result = job.results[i].query;
   const std::size_t listed = result.contacts.size();
-  PairQuery query;
-  query.shell_A = pair.shell_A;
-  query.field_B = pair.field_B;
-  query.X_WA = job.poseA(pair);
-  query.X_WB = job.poseB(pair);
-  query.dilation = pair.dilation;
-  resampleContacts(query, approach(job, i), result);
+  resampleContacts(job.queryOf(job.pairs[i], 0.0), approach(job, i), result);
   ++report.resamplings;
   report.points_visited += listed;
   return result.contacts.size() == listed;
@@ -118,17 +108,9 @@ bool IslandSolver::lookAtPair(const Job& job, std::size_t i, SolveReport& report
 
 void IslandSolver::walkPair(const Job& job, std::size_t i, SolveReport& report) {
   const IslandPair& pair = job.pairs[i];
-  PairQuery query;
-  query.shell_A = pair.shell_A;
-  query.field_B = pair.field_B;
-  query.X_WA = job.poseA(pair);
-  query.X_WB = job.poseB(pair);
-  query.dilation = pair.dilation;
-  query.margin =
-      neededMargin(pair, job.limits) + kWalkSubsteps * movableBodies(pair) * job.limits.substep_travel;
+  PairQuery query = job.queryOf(
+      pair, neededMargin(pair, job.limits) + kWalkSubsteps * movableBodies(pair) * job.limits.substep_travel);
   query.levels = std::min(pair.levels, job.results[i].walked.used);
-  query.budget = pair.budget;
-  query.first = pair.first;
   query.thin = true;
   queryPair(query, job.results[i].query);
   job.results[i].walked = {true, query.X_WA, query.X_WB, pair.levels, job.results[i].query.levels_used};
