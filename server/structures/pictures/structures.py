@@ -3,7 +3,7 @@
 
     ./tenon parts engine_bay PARTS
     ./tenon bake PARTS/drill.stl -o drill.tenon --voxel 3mm --points 4000
-    docs/pictures/structures.py drill.tenon --across y --out docs/pictures
+    server/structures/pictures/structures.py drill.tenon --across y --out .
 
 Writes field.svg and shell.svg. Needs nothing but Python and Tenon."""
 import argparse
@@ -15,7 +15,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-TENON = Path(__file__).resolve().parents[2] / "tenon"
+TENON = Path(__file__).resolve().parents[3] / "tenon"
 INK, FAINT, PAPER, SHADOW = "#1d2733", "#6f7b87", "#ffffff", "#eef1f4"
 # from deep inside to the skin, then from the skin away: one colour a voxel, the first for all that is deeper
 INSIDE = ["#8f1d23", "#c1392b", "#e2703a", "#f3a64e", "#fbe09a"]
