@@ -30,12 +30,7 @@ FixedVector<Hollow, 2> hollowsAt(const DistanceField& field, const Pose& X_WB, d
   const Vector3 p_BP = X_WB.inverse() * contact.p_WP;
   const Vector3 n_B = X_WB.rotation().conjugate() * contact.n_W;
   const double h = kCurveStep * field.voxelAt(p_BP);
-  const std::array<Vector3, 2> t = [&n_B] {
-    Eigen::Index least = 0;
-    n_B.cwiseAbs().minCoeff(&least);
-    const Vector3 first = n_B.cross(Vector3::Unit(least)).normalized();
-    return std::array{first, Vector3(n_B.cross(first))};
-  }();
+  const std::array<Vector3, 2> t = tangentsOf(n_B);
   Eigen::Matrix2d turn;
   for (int side = 0; side < 2; ++side) {
     const Vector3& along = t[static_cast<std::size_t>(side)];

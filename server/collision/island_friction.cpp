@@ -19,17 +19,6 @@ constexpr double kNoSlide = 1e-10;
 /// A limit is passed when it is passed by more than rounding.
 constexpr double kBeyond = 1.0 + 1e-6;
 
-Vector3 pointMotion(const Displacement& motion, const Vector3& p_BoP_W) {
-  return motion.translation + motion.rotation.cross(p_BoP_W);
-}
-
-std::array<Vector3, 2> tangentsOf(const Vector3& n_W) {
-  Eigen::Index least = 0;
-  n_W.cwiseAbs().minCoeff(&least);
-  const Vector3 first = n_W.cross(Vector3::Unit(least)).normalized();
-  return {first, n_W.cross(first)};
-}
-
 }  // namespace
 
 void IslandSolver::rub(const Job& job, SolveReport& report) {
@@ -141,12 +130,7 @@ bool IslandSolver::judgePatches(const Job& job) {
       patch.along_W = friction[k].normalized();
       continue;
     }
-    Vector3 way_W = Vector3::Zero();
-    for (const auto& [index, sign] : {std::pair{pair.body_a, 1.0}, std::pair{pair.body_b, -1.0}}) {
-      if (index == GapRow::kStatic) continue;
-      const auto i = static_cast<std::size_t>(index);
-      way_W += sign * pointMotion(motions_[i], patch.p_WP - job.bodies[i].X_WB.translation());
-    }
+    Vector3 way_W = relativeMotion(job, pair, patch.p_WP);
     way_W -= way_W.dot(patch.n_W) * patch.n_W;
     const double way = way_W.norm();
     if (way < kNoSlide) continue;

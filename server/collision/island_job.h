@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <span>
 
 #include "server/collision/island_solver.h"
@@ -18,6 +19,19 @@ inline constexpr double kFieldNoise = 5e-6;
 /// [m] The way of a body's fastest point, at most.
 [[nodiscard]] inline double fastestWay(const Displacement& motion, double radius) {
   return motion.translation.norm() + motion.rotation.norm() * radius;
+}
+
+/// Of a point of a body that moves.
+inline Vector3 pointMotion(const Displacement& motion, const Vector3& p_BoP_W) {
+  return motion.translation + motion.rotation.cross(p_BoP_W);
+}
+
+/// Two directions across a normal, and across each other.
+inline std::array<Vector3, 2> tangentsOf(const Vector3& n_W) {
+  Eigen::Index least = 0;
+  n_W.cwiseAbs().minCoeff(&least);
+  const Vector3 first = n_W.cross(Vector3::Unit(least)).normalized();
+  return {first, n_W.cross(first)};
 }
 
 /// What an island solver is asked to do, passed from step to step of it; how its files share it. All spans

@@ -20,6 +20,9 @@ constexpr double kOvershoot = 0.1;
 /// it.
 constexpr double kDepthPrice = 3.0;
 
+/// Points that hold after others have been let past their kinks are looked at again.
+constexpr int kKinkRounds = 2;
+
 /// So many sub-steps in a row may end in a worse place before the solver goes back to the best.
 constexpr int kWorsePlaces = 1;
 
@@ -175,6 +178,7 @@ void IslandSolver::look(const Job& job, SolveReport& report) {
   // most often what held at the last place holds here too
   const bool expected = findCurves(job);
   solveMotions(job, report);
+  for (int round = 0; round < kKinkRounds && passKinks(job, report);) ++round;
   if (!curvesAreOfHeld()) {
     const bool found = findCurves(job);
     if (expected || found) solveMotions(job, report, listed_);

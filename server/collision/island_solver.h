@@ -161,6 +161,13 @@ class IslandSolver {
   /// true when there are any.
   bool findCurves(const Job& job);
   [[nodiscard]] bool curvesAreOfHeld() const;
+  // borders of cells (island_kinks.cpp)
+  /// A field's slope jumps from cell to cell. On a bulge a point may go on as soon as one of both sides lets
+  /// it: held points at a border get the side that is in their way least. True when another one.
+  bool passKinks(const Job& job, SolveReport& report);
+  bool findKink(const Job& job, std::size_t pair, std::size_t contact, std::size_t row);
+  /// Of A's point over B, by the motions of the last solve.
+  [[nodiscard]] Vector3 relativeMotion(const Job& job, const IslandPair& pair, const Vector3& p_WP) const;
   void blockMotions(const Job& job);
   // friction (island_friction.cpp)
   void rub(const Job& job, SolveReport& report);
@@ -181,7 +188,19 @@ class IslandSolver {
     Contact contact;
   };
 
+  /// A held contact at a border, with the planes of the surface beyond it.
+  struct Kink {
+    struct Side {
+      Vector3 n_W = Vector3::Zero();
+      double gap = 0.0;
+    };
+    std::size_t pair = 0, contact = 0, row = 0;
+    FixedVector<Side, 4> sides;
+  };
+
   MotionSolver motion_;
+  static constexpr std::size_t kMaxKinks = 24;
+  FixedVector<Kink, kMaxKinks> kinks_;
   static constexpr std::size_t kMaxFlanks = 64;
   std::array<Flank, kMaxFlanks> flanks_;
   std::size_t flank_count_ = 0;
