@@ -13,6 +13,7 @@
 #include "clients/report/page.h"
 #include "server/session/scene_loader.h"
 #include "tests/bench/engine/bench_scene.h"
+#include "tests/bench/engine/corner_path.h"
 #include "tests/bench/engine/insertion.h"
 #include "tests/bench/engine/methods.h"
 #include "tests/bench/engine/overload_table.h"
@@ -120,9 +121,10 @@ int run(int argc, char** argv) {
   CLI::App app("Measures what this machine can do, beside other engines and beside simpler ways, in one run.",
                "tenon bench");
   app.set_help_flag("-h,--help", "what this program does and how to call it");
-  app.add_option("what", arguments.what, "engine: the collision and force engine")
+  app.add_option("what", arguments.what,
+                 "engine: the collision and force engine; corner: the way of a held box in a corner, as CSV")
       ->required()
-      ->check(CLI::IsMember({"engine"}));
+      ->check(CLI::IsMember({"engine", "corner"}));
   app.add_option("--scenario", arguments.scenario, "folder of the engine bay's scenario");
   app.add_option("--detail", arguments.detail, "of the generated parts, 0 to 1; 1 is the paper's scene")
       ->check(CLI::Range(0.0, 1.0))
@@ -143,6 +145,10 @@ int run(int argc, char** argv) {
       "Times compare only within one run, on a machine that does nothing else.\n"
       "Exit code: 0 when all tables could be made, 1 otherwise.");
   CLI11_PARSE(app, argc, argv);
+  if (arguments.what == "corner") {
+    fmt::print("{}", cornerPath());
+    return 0;
+  }
   if (arguments.scenario.empty()) {
     const char* share = std::getenv("TENON_SHARE");
     arguments.scenario = std::string(share != nullptr ? share : ".") + "/scenarios/engine_bay";

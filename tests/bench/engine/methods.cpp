@@ -1,26 +1,20 @@
 #include "tests/bench/engine/methods.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
-#include "server/collision/island_solver.h"
+#include "tests/bench/engine/held_box.h"
 #include "tests/bench/engine/timing.h"
-#include "tests/support/analytic_structures.h"
 
 namespace tenon::bench {
 namespace {
 
-using test::StructuresPtr;
-
 constexpr double kVoxel = 0.003;
-constexpr double kDilation = 0.87 * kVoxel;
-constexpr double kStiffness = 1000.0;
+constexpr double kDilation = HeldBox::dilationOf(kVoxel);
 constexpr int kTicks = 300;
 constexpr int kSheets = 8;
 
@@ -35,55 +29,11 @@ struct MethodFigures {
   Percentiles tick;                ///< [us] of the slide
 };
 
-/// A box of some 1,100 points on a hand, against one thing that stands still.
-class HeldBox {
- public:
-  HeldBox(ContactMethod method, StructuresPtr other, const Pose& X_WB) : other_(std::move(other)) {
-    limits_.method = method;
-    bodies_[0].X_WB = X_WB;
-    bodies_[0].radius = box().shell.radius();
-    bodies_[0].springs.push_back({X_WB, Vector3::Zero(), kStiffness, 20.0});
-    pairs_[0].body_a = 0;
-    pairs_[0].shell_A = &box().shell;
-    pairs_[0].field_B = &other_->field;
-    pairs_[0].dilation = kDilation;
-    pairs_[0].last = &results_[0];
-    results_[0].multipliers.resize(kMaxPairContacts);
-  }
-
-  static const HapticStructures& box() {
-    static const StructuresPtr structures = test::boxStructures({0.08, 0.06, 0.04}, 0.002, 0.004);
-    return *structures;
-  }
-
-  void step(const Pose& X_WH) {
-    bodies_[0].springs[0].X_WG = X_WH;
-    solver_.solve(bodies_, pairs_, limits_, results_);
-    overlap_ = std::max(overlap_, -results_[0].query.smallest_gap);
-  }
-  [[nodiscard]] const Pose& pose() const { return bodies_[0].X_WB; }
-  [[nodiscard]] double overlap() const { return overlap_; }
-  /// What the hand feels: of penalties the sum, else the pull of its coupling.
-  [[nodiscard]] Vector3 force() const {
-    if (limits_.method == ContactMethod::kPenalty) return results_[0].F_Ao_W.force;
-    return -springWrench(bodies_[0].springs[0], pose()).force;
-  }
-
- private:
-  StructuresPtr other_;
-  SolveLimits limits_;
-  std::array<MovableBody, 1> bodies_;
-  std::array<IslandPair, 1> pairs_;
-  std::array<IslandPairResult, 1> results_;
-  IslandSolver solver_{1, 1};
-  double overlap_ = 0.0;
-};
-
 void measureSheets(ContactMethod method, MethodFigures& figures) {
   for (int i = 0; i < kSheets; ++i) {
     const double offset = kVoxel * i / kSheets;
     const Pose X_WH(Vector3(0.0, 0.0, 0.05), expRotation({0.17, 0.05, 0.0}));
-    HeldBox held(method, test::sheetStructures(0.3, 0.0, kVoxel, offset), X_WH);
+    HeldBox held(method, test::sheetStructures(0.3, 0.0, kVoxel, offset), kDilation, X_WH);
     for (int tick = 0; tick < kTicks; ++tick) {
       const double z = std::max(0.05 - 0.001 * tick, -0.05);
       held.step(Pose(Vector3(0.0, 0.0, z), X_WH.rotation()));
@@ -95,7 +45,7 @@ void measureSheets(ContactMethod method, MethodFigures& figures) {
 
 void measureCorner(ContactMethod method, MethodFigures& figures) {
   const Pose start(Vector3(0.08, 0.07, 0.06), expRotation({0.05, 0.03, 0.0}));
-  HeldBox held(method, test::cornerStructures(0.3, kVoxel), start);
+  HeldBox held(method, test::cornerStructures(0.3, kVoxel), kDilation, start);
   for (int tick = 0; tick < kTicks; ++tick) {
     const double way = std::min(0.0005 * tick, 0.06);
     held.step(Pose(start.translation() - Vector3(way, way, way), start.rotation()));
@@ -116,7 +66,8 @@ void measureSlide(ContactMethod method, MethodFigures& figures) {
   // penalties hold the box by overlap: there the hand presses a millimetre, elsewhere ten
   const double press = method == ContactMethod::kPenalty ? 0.001 : 0.01;
   const auto handAt = [&](int tick) { return Vector3(-0.07 + 0.0005 * tick, 0.003, height - press); };
-  HeldBox held(method, test::floorStructures(0.4, kVoxel), Pose(handAt(0) + 2.0 * press * Vector3::UnitZ()));
+  HeldBox held(method, test::floorStructures(0.4, kVoxel), kDilation,
+               Pose(handAt(0) + 2.0 * press * Vector3::UnitZ()));
   for (int tick = 0; tick < 50; ++tick) held.step(Pose(handAt(0)));
   Vector3 before = held.force();
   std::vector<double> times;
