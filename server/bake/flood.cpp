@@ -7,7 +7,7 @@ namespace tenon {
 namespace {
 
 using FloodMask = BrickLevel::Mask;
-constexpr std::size_t kVoxels = BrickLevel::kVoxels;
+constexpr std::size_t kFloodVoxels = BrickLevel::kVoxels;
 constexpr std::uint64_t kLowX = 0x0101010101010101ULL;
 constexpr std::uint64_t kHighX = kLowX << 7U;
 
@@ -19,14 +19,14 @@ bool any(const FloodMask& mask) {
 /// links are the neighbour's.
 FloodMask through(const FloodMask& mask, int face, const Flood::Links& own, const Flood::Links& neighbour) {
   FloodMask onto{};
-  for (std::size_t z = 0; z < kVoxels && face < 4; ++z) {
+  for (std::size_t z = 0; z < kFloodVoxels && face < 4; ++z) {
     if (face == 0) onto[z] = (mask[z] & kLowX) << 7U & neighbour.x[z];
     if (face == 1) onto[z] = (mask[z] & own.x[z] & kHighX) >> 7U;
     if (face == 2) onto[z] = mask[z] << 56U & neighbour.y[z];
     if (face == 3) onto[z] = (mask[z] & own.y[z]) >> 56U;
   }
-  if (face == 4) onto[kVoxels - 1] = mask[0] & neighbour.z[kVoxels - 1];
-  if (face == 5) onto[0] = mask[kVoxels - 1] & own.z[kVoxels - 1];
+  if (face == 4) onto[kFloodVoxels - 1] = mask[0] & neighbour.z[kFloodVoxels - 1];
+  if (face == 5) onto[0] = mask[kFloodVoxels - 1] & own.z[kFloodVoxels - 1];
   return onto;
 }
 
@@ -52,7 +52,7 @@ void Flood::seed(std::size_t node, const Mask& mask) {
   } else {
     Mask& reached = reached_[static_cast<std::size_t>(slot)];
     const Mask before = reached;
-    for (std::size_t z = 0; z < kVoxels; ++z) reached[z] |= mask[z];
+    for (std::size_t z = 0; z < kFloodVoxels; ++z) reached[z] |= mask[z];
     if (reached == before) return;
   }
   if (queued_[node] != 0) return;
@@ -96,12 +96,12 @@ void Flood::spread(std::size_t slot) {
   const Links& links = links_[slot];
   for (bool changed = true; changed;) {
     Mask next;
-    for (std::size_t z = 0; z < kVoxels; ++z) {
+    for (std::size_t z = 0; z < kFloodVoxels; ++z) {
       const std::uint64_t e = reached[z];
       next[z] = e | (e & links.x[z] & ~kHighX) << 1U | (e >> 1U & links.x[z] & ~kHighX) |
                 (e & links.y[z]) << 8U | (e >> 8U & links.y[z]);
       if (z > 0) next[z] |= reached[z - 1] & links.z[z - 1];
-      if (z + 1 < kVoxels) next[z] |= reached[z + 1] & links.z[z];
+      if (z + 1 < kFloodVoxels) next[z] |= reached[z + 1] & links.z[z];
     }
     changed = next != reached;
     reached = next;

@@ -14,7 +14,7 @@ namespace {
 
 using Cell = BrickLevel::Cell;
 using Mask = BrickLevel::Mask;
-constexpr int kVoxels = BrickLevel::kVoxels;
+constexpr int kGapVoxels = BrickLevel::kVoxels;
 // Rays by which a part is asked, at most; three quarters of them say that it is in a solid. Between sheets,
 // which have no inside, they are even odds.
 constexpr std::size_t kRays = 24;
@@ -68,7 +68,7 @@ class GapOpener {
       if (!part.outside) continue;
       for (const auto& [node, mask] : part.bricks) {
         const auto slot = static_cast<std::size_t>(level_.slot[node]);
-        for (std::size_t z = 0; z < kVoxels; ++z) level_.reached[slot][z] |= mask[z];
+        for (std::size_t z = 0; z < kGapVoxels; ++z) level_.reached[slot][z] |= mask[z];
         changed[node] = 1;
       }
     }
@@ -87,7 +87,8 @@ class GapOpener {
       const bool a_outside = outside[static_cast<std::size_t>(a)];
       const bool b_outside = outside[static_cast<std::size_t>(b)];
       if (a_outside != b_outside) {
-        doors_[node].push_back(level_.brickOf(node) * kVoxels + BrickLevel::cellOfSample(a_outside ? b : a));
+        doors_[node].push_back(level_.brickOf(node) * kGapVoxels +
+                               BrickLevel::cellOfSample(a_outside ? b : a));
       }
       return !a_outside && !b_outside;
     });
@@ -99,12 +100,12 @@ class GapOpener {
     for (const std::vector<Cell>& doors : doors_) {
       if (work_.cancelled()) break;
       for (const Cell& door : doors) {
-        const std::int64_t node = level_.nodeAt(door / kVoxels);
+        const std::int64_t node = level_.nodeAt(door / kGapVoxels);
         if (node < 0) continue;
-        const Cell in_brick = door - door / kVoxels * kVoxels;
+        const Cell in_brick = door - door / kGapVoxels * kGapVoxels;
         Mask first{};
         first[static_cast<std::size_t>(in_brick.z())] =
-            std::uint64_t{1} << static_cast<unsigned>(in_brick.y() * kVoxels + in_brick.x());
+            std::uint64_t{1} << static_cast<unsigned>(in_brick.y() * kGapVoxels + in_brick.x());
         flood.seed(static_cast<std::size_t>(node), first);
         flood.run();
         Part part = takePart(flood.takeTouched());
@@ -119,7 +120,7 @@ class GapOpener {
     for (const std::size_t node : nodes) {
       const auto slot = static_cast<std::size_t>(level_.slot[node]);
       Mask fresh{};
-      for (std::size_t z = 0; z < kVoxels; ++z) fresh[z] = reached_[slot][z] & ~taken_[slot][z];
+      for (std::size_t z = 0; z < kGapVoxels; ++z) fresh[z] = reached_[slot][z] & ~taken_[slot][z];
       taken_[slot] = reached_[slot];
       part.bricks.emplace_back(node, fresh);
     }
@@ -135,11 +136,11 @@ class GapOpener {
     std::vector<Vector3> places;
     std::size_t number = 0;
     for (const auto& [node, mask] : part.bricks) {
-      const Cell corner = level_.brickOf(node) * kVoxels;
-      for (int z = 0; z < kVoxels; ++z) {
+      const Cell corner = level_.brickOf(node) * kGapVoxels;
+      for (int z = 0; z < kGapVoxels; ++z) {
         for (std::uint64_t word = mask[static_cast<std::size_t>(z)]; word != 0; word &= word - 1) {
           const int bit = std::countr_zero(word);
-          const Cell lattice = corner + Cell(bit % kVoxels, bit / kVoxels, z);
+          const Cell lattice = corner + Cell(bit % kGapVoxels, bit / kGapVoxels, z);
           for (++number; places.size() * count < number * kRays;) places.push_back(level_.position(lattice));
         }
       }

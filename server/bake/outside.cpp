@@ -13,7 +13,7 @@ namespace {
 
 using Cell = BrickLevel::Cell;
 using Mask = BrickLevel::Mask;
-constexpr int kVoxels = BrickLevel::kVoxels;
+constexpr int kOutsideVoxels = BrickLevel::kVoxels;
 // Half the widest gap that is closed [voxels]: at 1.2 one triangle in a hundred may be missing.
 constexpr double kSigma = 1.2;
 constexpr auto kSigmaQuanta = static_cast<std::int16_t>(kSigma * DistanceField::kQuantaPerVoxel);
@@ -41,11 +41,12 @@ double clearanceFromCoarse(const BrickLevel& coarse, const Vector3& p_M) {
 
 void seedFromCoarse(Flood& flood, const BrickLevel& level, const BrickLevel& coarse) {
   for (std::size_t node = 0; node < level.nodes(); ++node) {
-    const Cell corner = level.brickOf(node) * kVoxels;
+    const Cell corner = level.brickOf(node) * kOutsideVoxels;
     Mask mask{};
     bool any = false;
-    for (int k = 0; k < kVoxels * kVoxels * kVoxels; ++k) {
-      const Cell in_brick(k % kVoxels, k / kVoxels % kVoxels, k / (kVoxels * kVoxels));
+    for (int k = 0; k < kOutsideVoxels * kOutsideVoxels * kOutsideVoxels; ++k) {
+      const Cell in_brick(k % kOutsideVoxels, k / kOutsideVoxels % kOutsideVoxels,
+                          k / (kOutsideVoxels * kOutsideVoxels));
       if (clearanceFromCoarse(coarse, level.position(corner + in_brick)) <= kSigma * level.voxel) continue;
       mask[static_cast<std::size_t>(in_brick.z())] |= std::uint64_t{1} << static_cast<unsigned>(k % 64);
       any = true;
@@ -80,7 +81,7 @@ std::vector<Step> stepsByLength() {
 float reachedRadius(const BrickLevel& level, const BrickLevel* coarse, const Cell& lattice,
                     const BrickLevel::Point& point) {
   if (point.known) return point.reached ? static_cast<float>(point.distance) : -1.0F;
-  if (coarse == nullptr) return static_cast<float>(kVoxels);
+  if (coarse == nullptr) return static_cast<float>(kOutsideVoxels);
   return static_cast<float>(clearanceFromCoarse(*coarse, level.position(lattice)) / level.voxel);
 }
 
@@ -88,7 +89,7 @@ float reachedRadius(const BrickLevel& level, const BrickLevel* coarse, const Cel
 BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* coarse, std::size_t node,
                                      const std::vector<Step>& steps) {
   const std::int32_t slot = level.slot[node];
-  const Cell corner = level.brickOf(node) * kVoxels;
+  const Cell corner = level.brickOf(node) * kOutsideVoxels;
   std::vector<float> patch(static_cast<std::size_t>(kPatch) * kPatch * kPatch);
   level.visitAround(node, kReach, kReach + 1, [&](const Cell& offset, const BrickLevel::Point& point) {
     const Cell in_patch = offset + Cell::Constant(kReach);
@@ -158,7 +159,7 @@ void adoptFineSigns(BrickLevel& coarse, const BrickLevel& fine, ParallelWork& wo
   work.run(coarse.nodes(), 256, [&](std::size_t node) {
     const std::int32_t slot = coarse.slot[node];
     if (slot < 0) return;
-    const Cell corner = coarse.brickOf(node) * kVoxels;
+    const Cell corner = coarse.brickOf(node) * kOutsideVoxels;
     for (int sample = 0; sample < BrickLevel::kSamples; ++sample) {
       const Cell in_brick(sample % BrickLevel::kSide, sample / BrickLevel::kSide % BrickLevel::kSide,
                           sample / (BrickLevel::kSide * BrickLevel::kSide));
