@@ -62,7 +62,7 @@ class Verbs(unittest.TestCase):
                 self.assertGreater(sum(a * b for a, b in zip(p, n)), 0.0)
 
     def test_structures_are_drawn(self):
-        drawing = Path(__file__).parents[2] / "docs" / "pictures" / "structures.py"
+        drawing = Path(__file__).parents[2] / "server" / "structures" / "pictures" / "structures.py"
         with tempfile.TemporaryDirectory() as folder:
             words = [sys.executable, drawing, cube(folder), "--across", "z", "--out", folder]
             done = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False)
