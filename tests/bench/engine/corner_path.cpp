@@ -11,7 +11,7 @@
 namespace tenon::bench {
 namespace {
 
-constexpr double kVoxel = 0.003;
+constexpr double kCornerVoxel = 0.003;
 constexpr double kTickWay = 0.0005;  // [m] 0.5 m/s
 
 struct NamedMethod {
@@ -27,7 +27,8 @@ const std::array<Vector3, 4> kHand{Vector3(0.12, kY, 0.06), Vector3(0.10, kY, -0
                                    Vector3(0.01, kY, -0.015), Vector3(0.02, kY, 0.08)};
 
 void follow(const NamedMethod& one, std::string& out) {
-  HeldBox held(one.method, test::cornerStructures(0.3, kVoxel), HeldBox::dilationOf(kVoxel), Pose(kHand[0]));
+  HeldBox held(one.method, test::cornerStructures(0.3, kCornerVoxel), HeldBox::dilationOf(kCornerVoxel),
+               Pose(kHand[0]));
   int tick = 0;
   for (std::size_t leg = 0; leg + 1 < kHand.size(); ++leg) {
     const Vector3 way = kHand[leg + 1] - kHand[leg];

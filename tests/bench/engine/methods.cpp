@@ -13,9 +13,9 @@
 namespace tenon::bench {
 namespace {
 
-constexpr double kVoxel = 0.003;
-constexpr double kDilation = HeldBox::dilationOf(kVoxel);
-constexpr int kTicks = 300;
+constexpr double kMethodVoxel = 0.003;
+constexpr double kDilation = HeldBox::dilationOf(kMethodVoxel);
+constexpr int kMethodTicks = 300;
 constexpr int kSheets = 8;
 
 /// What one way to keep a held body out of others does.
@@ -31,10 +31,10 @@ struct MethodFigures {
 
 void measureSheets(ContactMethod method, MethodFigures& figures) {
   for (int i = 0; i < kSheets; ++i) {
-    const double offset = kVoxel * i / kSheets;
+    const double offset = kMethodVoxel * i / kSheets;
     const Pose X_WH(Vector3(0.0, 0.0, 0.05), expRotation({0.17, 0.05, 0.0}));
-    HeldBox held(method, test::sheetStructures(0.3, 0.0, kVoxel, offset), kDilation, X_WH);
-    for (int tick = 0; tick < kTicks; ++tick) {
+    HeldBox held(method, test::sheetStructures(0.3, 0.0, kMethodVoxel, offset), kDilation, X_WH);
+    for (int tick = 0; tick < kMethodTicks; ++tick) {
       const double z = std::max(0.05 - 0.001 * tick, -0.05);
       held.step(Pose(Vector3(0.0, 0.0, z), X_WH.rotation()));
     }
@@ -45,14 +45,14 @@ void measureSheets(ContactMethod method, MethodFigures& figures) {
 
 void measureCorner(ContactMethod method, MethodFigures& figures) {
   const Pose start(Vector3(0.08, 0.07, 0.06), expRotation({0.05, 0.03, 0.0}));
-  HeldBox held(method, test::cornerStructures(0.3, kVoxel), kDilation, start);
-  for (int tick = 0; tick < kTicks; ++tick) {
+  HeldBox held(method, test::cornerStructures(0.3, kMethodVoxel), kDilation, start);
+  for (int tick = 0; tick < kMethodTicks; ++tick) {
     const double way = std::min(0.0005 * tick, 0.06);
     held.step(Pose(start.translation() - Vector3(way, way, way), start.rotation()));
   }
   double least = held.force().norm();
   double most = least;
-  for (int tick = 0; tick < kTicks; ++tick) {
+  for (int tick = 0; tick < kMethodTicks; ++tick) {
     held.step(Pose(start.translation() - Vector3::Constant(0.06), start.rotation()));
     least = std::min(least, held.force().norm());
     most = std::max(most, held.force().norm());
@@ -66,12 +66,12 @@ void measureSlide(ContactMethod method, MethodFigures& figures) {
   // penalties hold the box by overlap: there the hand presses a millimetre, elsewhere ten
   const double press = method == ContactMethod::kPenalty ? 0.001 : 0.01;
   const auto handAt = [&](int tick) { return Vector3(-0.07 + 0.0005 * tick, 0.003, height - press); };
-  HeldBox held(method, test::floorStructures(0.4, kVoxel), kDilation,
+  HeldBox held(method, test::floorStructures(0.4, kMethodVoxel), kDilation,
                Pose(handAt(0) + 2.0 * press * Vector3::UnitZ()));
   for (int tick = 0; tick < 50; ++tick) held.step(Pose(handAt(0)));
   Vector3 before = held.force();
   std::vector<double> times;
-  for (int tick = 1; tick <= kTicks; ++tick) {
+  for (int tick = 1; tick <= kMethodTicks; ++tick) {
     times.push_back(microsecondsOf([&] { held.step(Pose(handAt(tick))); }));
     figures.slide_lag =
         std::max(figures.slide_lag, (handAt(tick) - held.pose().translation()).head<2>().norm());

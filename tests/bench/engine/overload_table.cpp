@@ -14,8 +14,8 @@
 namespace tenon::bench {
 namespace {
 
-constexpr Tick kSettle = 300;
-constexpr Tick kTicks = 1800;
+constexpr Tick kCourseSettle = 300;
+constexpr Tick kCourseTicks = 1800;
 constexpr double kGoal = 0.7e-3;  // [s] of a governed tick
 constexpr double kLate = 1000.0;  // [us]
 
@@ -37,20 +37,20 @@ struct Course {
   Budgets budgets;  ///< what the governor changed, and for which tick
 };
 
-Course run(const test::Overload& overload, bool governed) {
+Course courseOf(const test::Overload& overload, bool governed) {
   Course course;
   Environment environment(overload.scene, {});
   Governor governor(kGoal);
   std::vector<double> times;
-  while (environment.tick() < kTicks) {
+  while (environment.tick() < kCourseTicks) {
     overload.act(environment, environment.tick() + 1);
     const double start = ownTime();
     environment.step();
     const double seconds = ownTime() - start;
     const std::uint64_t tested = environment.work().points_visited;
-    if (environment.tick() > kSettle) {
+    if (environment.tick() > kCourseSettle) {
       times.push_back(1e6 * seconds);
-      course.points += static_cast<double>(tested) / static_cast<double>(kTicks - kSettle);
+      course.points += static_cast<double>(tested) / static_cast<double>(kCourseTicks - kCourseSettle);
     }
     if (!governed) continue;
     const auto budget = governor.judge(seconds, tested, environment.workLimits().points);
@@ -70,7 +70,7 @@ bool repeats(const test::Overload& overload, const Course& course) {
   EnvironmentOptions options;
   options.workers = 2;
   Environment environment(overload.scene, options);
-  while (environment.tick() < kTicks) {
+  while (environment.tick() < kCourseTicks) {
     const auto budget = course.budgets.find(environment.tick() + 1);
     if (budget != course.budgets.end()) environment.setBudget(budget->second);
     overload.step(environment);
@@ -95,7 +95,7 @@ Table overloadTable(const Say& say) {
     const test::Overload overload(blocks);
     for (const bool governed : {false, true}) {
       say(fmt::format("ticks of {} blocks{}", blocks, governed ? ", governed" : ""));
-      const Course course = run(overload, governed);
+      const Course course = courseOf(overload, governed);
       table.rows.push_back({static_cast<double>(blocks), governed ? "yes" : "no", course.tick.median,
                             course.tick.p99, course.late_percent, course.points,
                             course.budget == 0 ? Cell::none() : Cell(static_cast<double>(course.budget)),
