@@ -8,6 +8,7 @@
 #include "server/bake/bake.h"
 #include "tests/scenarios/solid_probe.h"
 #include "tests/support/exact_distance.h"
+#include "tests/support/sanitized.h"
 #include "tests/support/test_meshes.h"
 
 namespace tenon {
@@ -115,12 +116,14 @@ Verdict judge(const DistanceField& field, std::size_t every) {
 }
 
 TEST(Sign, OfTheBayIsRightBeyondHalfAVoxel) {
+  if (test::kSanitized) GTEST_SKIP() << "takes minutes; other tests bake smaller parts";
   const Verdict verdict = judge(bakedBay(), 31);
   EXPECT_GT(verdict.band, 30'000U);
   EXPECT_LE(verdict.percent(), 0.02);
 }
 
 TEST(Sign, OfTheBayIsTheSameWhenHalfOfItsTrianglesAreFlipped) {
+  if (test::kSanitized) GTEST_SKIP() << "takes minutes; other tests bake smaller parts";
   const DistanceField flipped = baked(test::randomlyFlipped(bay().mesh, 5));
   EXPECT_TRUE(std::ranges::equal(bakedBay().layout().index, flipped.layout().index));
   EXPECT_TRUE(std::ranges::equal(bakedBay().layout().samples, flipped.layout().samples));
@@ -128,6 +131,7 @@ TEST(Sign, OfTheBayIsTheSameWhenHalfOfItsTrianglesAreFlipped) {
 }
 
 TEST(Sign, OfTheBayIsMostlyRightWithOneTriangleInAHundredGone) {
+  if (test::kSanitized) GTEST_SKIP() << "takes minutes; other tests bake smaller parts";
   const Verdict verdict = judge(baked(withHoles(bay().mesh, 100)), 31);
   EXPECT_GT(verdict.band, 30'000U);
   EXPECT_LE(verdict.percent(), 2.5);

@@ -7,6 +7,7 @@
 
 #include "tests/server/collision/island_rig.h"
 #include "tests/server/collision/real_parts.h"
+#include "tests/support/sanitized.h"
 
 namespace tenon {
 namespace {
@@ -63,6 +64,7 @@ class RealPegs : public testing::TestWithParam<PegCase> {};
 TEST_P(RealPegs, TheSheetHoldsThePegAndTheHoleTakesItInAskewAndGivesItBack) {
   const PegCase& one = GetParam();
   if (!std::filesystem::exists(test::pairsFolder() / one.hole)) GTEST_SKIP() << "no CAD pairs (TENON_SHARED)";
+  if (test::kSanitized) GTEST_SKIP() << "takes minutes; CAD pairs are baked and asked by other tests";
   constexpr double kHoleTop = 0.009;
   constexpr double kSheetVoxel = 0.003;
   constexpr double kSheetX = -0.06;
@@ -136,6 +138,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(RealThread, ANutPutOnAskewIsScrewedDownAndUpAgain) {
   const std::string folder = "nv_factory_nut_bolt_m16/";
   if (!std::filesystem::exists(test::pairsFolder() / folder)) GTEST_SKIP() << "no CAD pairs (TENON_SHARED)";
+  if (test::kSanitized) GTEST_SKIP() << "takes minutes; CAD pairs are baked and asked by other tests";
   constexpr double kPitch = 0.002;
   constexpr double kPlay = 0.0002;  // 0.1 mm on either flank
   constexpr double kTop = 0.025;    // the nut's lift where it leaves the bolt's tip
@@ -204,6 +207,7 @@ TEST(RealThread, ANutPutOnAskewIsScrewedDownAndUpAgain) {
 TEST(RealGears, AGearGoesOnItsShaftTurnsItsNeighbourAndComesOff) {
   const std::string folder = "nv_factory_gears/";
   if (!std::filesystem::exists(test::pairsFolder() / folder)) GTEST_SKIP() << "no CAD pairs (TENON_SHARED)";
+  if (test::kSanitized) GTEST_SKIP() << "takes minutes; CAD pairs are baked and asked by other tests";
   constexpr double kBorePlay = 0.000027;
   constexpr double kToothPlay = 0.00037;
   constexpr double kHigh = 0.0225;        // of what is off the shaft
