@@ -134,8 +134,7 @@ void LocalModel::solve(const Pose& X_WH, const WorldView& world) noexcept {
 }
 
 void LocalModel::countValidity() noexcept {
-  const Displacement moved = displacement(manifold_.X_WO, proxy_.X_WO);
-  const double way = moved.translation.norm() + moved.rotation.norm() * body_.radius;
+  const double way = fastestPoint(displacement(manifold_.X_WO, proxy_.X_WO), body_.radius);
   if (way > manifold_.validity_radius) ++beyond_validity_;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cassert>
 #include <cstddef>
@@ -10,6 +11,14 @@ namespace tenon {
 template <typename T, std::size_t N>
 class FixedVector {
  public:
+  FixedVector() = default;
+  /// Copying takes as long as what is held, not as long as the room.
+  FixedVector(const FixedVector& other) : size_(other.size_) { std::copy_n(other.begin(), size_, begin()); }
+  FixedVector& operator=(const FixedVector& other) {
+    size_ = other.size_;
+    if (this != &other) std::copy_n(other.begin(), size_, begin());
+    return *this;
+  }
   /// Adds a value; false (and no change) when all N places are taken.
   bool push_back(const T& value) {
     if (size_ == N) return false;

@@ -83,6 +83,11 @@ struct Displacement {
   Vector3 rotation = Vector3::Zero();
 };
 
+/// [m] The way of the fastest point, at most, of a body that reaches `radius` [m] from its origin.
+[[nodiscard]] inline double fastestPoint(const Displacement& motion, double radius) {
+  return motion.translation.norm() + motion.rotation.norm() * radius;
+}
+
 /// `displacement(X_WA, X_WB)` takes A to B; `displaced(X_WA, that)` is X_WB again.
 [[nodiscard]] Displacement displacement(const Pose& X_WA, const Pose& X_WB);
 [[nodiscard]] Pose displaced(const Pose& X_WA, const Displacement& motion_W);

@@ -10,9 +10,7 @@ namespace {
 constexpr double kMaxSteps = 2e6;
 
 double steps(const Pose& X_WA, const Pose& X_WB, double radius, double step) {
-  const Displacement motion = displacement(X_WA, X_WB);
-  const double longest = motion.translation.norm() + motion.rotation.norm() * radius;
-  return std::max(1.0, std::ceil(longest / step));
+  return std::max(1.0, std::ceil(fastestPoint(displacement(X_WA, X_WB), radius) / step));
 }
 
 /// Calls visit(pose number, X_WM) along a way; visit says whether to go on.

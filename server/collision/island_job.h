@@ -16,11 +16,6 @@ inline constexpr double kUnfinished = 1e-6;
 /// [m] A depth that the field's steps and a turned contact may leave behind.
 inline constexpr double kFieldNoise = 5e-6;
 
-/// [m] The way of a body's fastest point, at most.
-[[nodiscard]] inline double fastestWay(const Displacement& motion, double radius) {
-  return motion.translation.norm() + motion.rotation.norm() * radius;
-}
-
 /// Of a point of a body that moves.
 inline Vector3 pointMotion(const Displacement& motion, const Vector3& p_BoP_W) {
   return motion.translation + motion.rotation.cross(p_BoP_W);

@@ -57,7 +57,7 @@ void IslandSolver::takeLast(const Job& job) {
       result.query.contacts.clear();
       result.walked = WalkedAt{};
     } else {
-      if (last != &result) copyResult(*last, result);
+      if (last != &result) result = *last;
       result.query.contacts.resize(result.query.contacts.size() - result.flanks);
     }
     result.slid = slid;
@@ -125,7 +125,7 @@ double IslandSolver::approach(const Job& job, std::size_t i) {
     if (body == GapRow::kStatic) return;
     const MovableBody& now = job.bodies[static_cast<std::size_t>(body)];
     const Displacement gone = displacement(X_WB_then, now.X_WB);
-    sum += gone.translation.norm() + gone.rotation.norm() * now.radius;
+    sum += fastestPoint(gone, now.radius);
   };
   add(pair.body_a, job.results[i].walked.X_WA);
   add(pair.body_b, job.results[i].walked.X_WB);

@@ -150,27 +150,6 @@ double IslandSolver::merit(const Job& job) {
   return energy + kDepthPrice * force * std::max(depth - kFieldNoise, 0.0);
 }
 
-void copyResult(const IslandPairResult& from, IslandPairResult& to) noexcept {
-  const std::size_t size = from.query.contacts.size();
-  to.query.contacts.resize(size);
-  std::copy_n(from.query.contacts.begin(), size, to.query.contacts.begin());
-  std::copy_n(from.multipliers.begin(), size, to.multipliers.begin());
-  to.query.counts = from.query.counts;
-  to.query.smallest_gap = from.query.smallest_gap;
-  to.query.listed_to = from.query.listed_to;
-  to.query.others_gap = from.query.others_gap;
-  to.query.thinned = from.query.thinned;
-  to.query.deepest = from.query.deepest;
-  to.query.levels_used = from.query.levels_used;
-  to.query.left_out = from.query.left_out;
-  to.query.walk_points = from.query.walk_points;
-  to.F_Ao_W = from.F_Ao_W;
-  to.walked = from.walked;
-  to.flanks = from.flanks;
-  to.slides = from.slides;
-  to.slid = from.slid;
-}
-
 void IslandSolver::look(const Job& job, SolveReport& report) {
   pinWhatHasGoneItsReach(job);
   lookAround(job, report);
@@ -207,7 +186,7 @@ void IslandSolver::solveMotions(const Job& job, SolveReport& report, std::size_t
 double IslandSolver::travel(const Job& job) const {
   double farthest = 0.0;
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
-    farthest = std::max(farthest, fastestWay(motions_[i], job.bodies[i].radius));
+    farthest = std::max(farthest, fastestPoint(motions_[i], job.bodies[i].radius));
   }
   return farthest;
 }
@@ -216,7 +195,7 @@ bool IslandSolver::arrived(const Job& job, double slack) const {
   const bool held = std::any_of(touched_.begin(), touched_.end(), [](std::uint8_t t) { return t != 0; });
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
     const MovableBody& body = job.bodies[i];
-    if (fastestWay(motions_[i], body.radius) >= (held ? slack * body.settled : kArrived)) return false;
+    if (fastestPoint(motions_[i], body.radius) >= (held ? slack * body.settled : kArrived)) return false;
   }
   return true;
 }
@@ -225,9 +204,10 @@ double IslandSolver::shareWithinReach(const Job& job) const {
   double share = 1.0;
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
     const MovableBody& body = job.bodies[i];
-    const double way = fastestWay(motions_[i], body.radius);
+    const double way = fastestPoint(motions_[i], body.radius);
     if (body.pinned || way < kArrived) continue;
-    share = std::min(share, (body.reach - fastestWay(displacement(start_[i], body.X_WB), body.radius)) / way);
+    share =
+        std::min(share, (body.reach - fastestPoint(displacement(start_[i], body.X_WB), body.radius)) / way);
   }
   return std::max(share, 0.0);
 }
@@ -236,7 +216,7 @@ void IslandSolver::pinWhatHasGoneItsReach(const Job& job) const {
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
     MovableBody& body = job.bodies[i];
     if (!std::isfinite(body.reach)) continue;
-    const double gone = fastestWay(displacement(start_[i], body.X_WB), body.radius);
+    const double gone = fastestPoint(displacement(start_[i], body.X_WB), body.radius);
     body.pinned = body.reach - gone < kArrived;
   }
 }

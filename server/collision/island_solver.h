@@ -64,9 +64,6 @@ struct IslandPair {
   const IslandPairResult* last = nullptr;
 };
 
-/// Copies as much of the lists as they hold; they have room for far more.
-void copyResult(const IslandPairResult& from, IslandPairResult& to) noexcept;
-
 struct SolveLimits {
   std::uint32_t substeps = 8;
   double substep_travel = 0.0005;  ///< [m] any point of a body moves at most, per sub-step

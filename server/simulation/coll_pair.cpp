@@ -68,7 +68,7 @@ void CollPair::press(double stiffness, const Pose& X_WA) noexcept {
 
 void CollPair::take(const IslandPairResult& result, Tick now) noexcept {
   solved_ = now;
-  copyResult(result, *room_);
+  *room_ = result;
   note(result.query);
 }
 

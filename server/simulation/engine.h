@@ -27,8 +27,8 @@ struct ObjectSize {
 };
 
 /// Speed of the fastest point of a body of `radius` about its origin, at most [m/s].
-[[nodiscard]] inline double fastestPoint(const Vector3& linear, const Vector3& angular, double radius) {
-  return linear.norm() + angular.norm() * radius;
+[[nodiscard]] inline double fastestPoint(const Twist& V_WB, double radius) {
+  return V_WB.linear.norm() + V_WB.angular.norm() * radius;
 }
 
 /// What the tick works with, sized at start: the pairs' own states and force buffers (which matter for the
@@ -50,7 +50,7 @@ struct Environment::Engine {
     return odometers[pair.a.value] + odometers[pair.b.value];
   }
   void addTravel(ObjectId object, const Displacement& way) {
-    odometers[object.value] += fastestPoint(way.translation, way.rotation, sizes[object.value].radius);
+    odometers[object.value] += fastestPoint(way, sizes[object.value].radius);
   }
 
   /// The pairs that an object is in.

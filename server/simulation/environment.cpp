@@ -122,7 +122,7 @@ double Environment::speedCap(ObjectId object) const noexcept {
 
 double Environment::speedOf(ObjectId object) const noexcept {
   const Twist& V_WO = objects_[object.value].V_WO;
-  return fastestPoint(V_WO.linear, V_WO.angular, engine_->sizes[object.value].radius);
+  return fastestPoint(V_WO, engine_->sizes[object.value].radius);
 }
 
 Spring Environment::springOf(HandId hand) const noexcept {
@@ -323,10 +323,12 @@ void Environment::lookAtOtherPairs() noexcept {
   const bool limited = work_limits_.any();
   for (std::size_t slot = 0; slot < engine.due.size(); ++slot) {
     const std::uint32_t i = engine.due[slot];
-    const std::uint32_t walks = engine.looked_at[i] == 0 ? 1 : kWalksPerTick;
-    if (engine.looked_at[i] == 0) engine.others.push_back(static_cast<std::uint32_t>(slot));
     // what an island has looked at chooses its levels here, the others after their look
-    if (walks > 1) engine.pairs[i].adapt(work_limits_, engine.budget.of(slot) / walks);
+    if (engine.looked_at[i] != 0) {
+      engine.pairs[i].adapt(work_limits_, engine.budget.of(slot) / kWalksPerTick);
+    } else {
+      engine.others.push_back(static_cast<std::uint32_t>(slot));
+    }
     engine.looked_at[i] = 1;
   }
   auto look = [this, limited](unsigned, std::size_t item) {

@@ -35,9 +35,8 @@ void Environment::setStill(bool still) noexcept {
   if (still_ == still) return;
   still_ = still;
   for (std::uint32_t i = 0; i < objects_.size(); ++i) {
-    if (objects_[i].status != ObjectStatus::kFree) continue;
+    if (objects_[i].status != ObjectStatus::kFree || objects_[i].asleep) continue;
     objects_[i].V_WO = Twist{};
-    wake(ObjectId{i});
     stir(ObjectId{i});
   }
 }
@@ -71,7 +70,8 @@ bool Environment::mayBeTouched(std::size_t pair) const noexcept {
 
 /// Whoever lies at something that moves by itself, or at somebody who does, and so on.
 void Environment::wakeWhatIsTouched() noexcept {
-  bool more = true;
+  bool more =
+      std::any_of(objects_.begin(), objects_.end(), [](const ObjectMotion& one) { return one.asleep; });
   for (std::size_t pass = 0; more && pass < objects_.size(); ++pass) {
     more = false;
     for (const std::uint32_t i : engine_->near) {
@@ -110,8 +110,7 @@ MovableBody Environment::freeBody(ObjectId object) noexcept {
   const double radius = engine_->sizes[object.value].radius;
   const Vector3 p_OC_W = motion.X_WO.rotation() * rigid.centre();
   const Vector3 v_WOo = V_WC.linear - V_WC.angular.cross(p_OC_W);
-  const double speed =
-      std::max(fastestPoint(v_WOo, V_WC.angular, radius), fastestPoint(V_WC.linear, V_WC.angular, radius));
+  const double speed = std::max(fastestPoint(Twist{v_WOo, V_WC.angular}, radius), fastestPoint(V_WC, radius));
   if (speed > options_.max_free_speed) {
     V_WC.linear *= options_.max_free_speed / speed;
     V_WC.angular *= options_.max_free_speed / speed;
@@ -135,7 +134,7 @@ MovableBody Environment::freeBody(ObjectId object) noexcept {
 }
 
 /// An island with a free body gets as many sub-steps as its fastest body needs, and nobody in it goes
-/// farther than his own speed allows.
+/// farther than its own speed allows.
 void Environment::boundTravel(std::size_t island) noexcept {
   IslandWork& islands = engine_->islands;
   const IslandWork::Island& one = islands.islands()[island];
@@ -147,7 +146,7 @@ void Environment::boundTravel(std::size_t island) noexcept {
     meets = meets || engine_->meets[object.value] != 0;
     if (!flies(object)) continue;
     const Twist& V_WC = engine_->bodies[object.value]->V_WC;
-    speed = std::max(speed, fastestPoint(V_WC.linear, V_WC.angular, engine_->sizes[object.value].radius));
+    speed = std::max(speed, fastestPoint(V_WC, engine_->sizes[object.value].radius));
     any = true;
   }
   if (!any) return;
