@@ -102,6 +102,7 @@ class Server final : public SessionServer {
   Result<SessionReport> run(const std::atomic<bool>& stop) override {
     say(fmt::format("session '{}' is open, waiting for people", options_.name));
     while (!stop && !desk_.stopIsAsked() && !awaited_.areHere(desk_)) wire_->listen(milliseconds(100));
+    if (journal_ || options_.publish_journal) makeRooms();
     if (!stop) options_.lockstep ? runLockstep(stop) : runByTheClock(stop);
     return finish();
   }
@@ -147,16 +148,28 @@ class Server final : public SessionServer {
     entry.input = input;
     entry.hash = hash;
     entry.checkpoint.clear();
-    if (input.tick % kCheckpointEvery != 1) return;
-    // by the clock it has its room already, unless the journal is seconds behind
-    if (!options_.lockstep) {
-      std::vector<std::uint8_t>* room = rooms_.front();
-      if (room == nullptr) return;
-      entry.checkpoint.swap(*room);
-      entry.checkpoint.clear();
-      rooms_.pop();
+    if (input.tick % kCheckpointEvery == 1 && takeRoom(entry)) exercise_.save(entry.checkpoint);
+  }
+
+  void makeRooms() {
+    while (std::vector<std::uint8_t>* room = rooms_.beginPush()) {
+      room->reserve(exercise_.mostSavedBytes());
+      rooms_.commitPush();
     }
-    exercise_.save(entry.checkpoint);
+  }
+  /// Room for a checkpoint made at start; none when the journal is seconds behind.
+  bool takeRoom(JournalEntry& entry) {
+    std::vector<std::uint8_t>* room = rooms_.front();
+    if (room == nullptr) return false;
+    entry.checkpoint.swap(*room);
+    entry.checkpoint.clear();
+    rooms_.pop();
+    return true;
+  }
+  void giveBackRoom(JournalEntry& entry) {
+    if (entry.checkpoint.empty()) return;
+    rooms_.beginPush()->swap(entry.checkpoint);
+    rooms_.commitPush();
   }
 
   SessionOptions options_;
@@ -191,6 +204,7 @@ void Server::runLockstep(const std::atomic<bool>& stop) {
     wire_->send(broadcast_.read(output));
     keep(input, output.hash, entry);
     writeJournal(entry);
+    giveBackRoom(entry);
   }
 }
 
@@ -237,11 +251,6 @@ void Server::runByTheClock(const std::atomic<bool>& stop) {
   }
   while (outputs_.front() != nullptr) outputs_.pop();
   unsent_ = exercise_.makeOutput();
-  while (std::vector<std::uint8_t>* room = rooms_.beginPush()) {
-    room->reserve(exercise_.mostSavedBytes());
-    rooms_.commitPush();
-  }
-
   std::atomic<bool> over = false;
   CyclicThread ticker(std::make_shared<SteadyClock>(), {.name = "tick", .fifo_priority = 70},
                       [&](std::uint64_t) {
@@ -254,10 +263,7 @@ void Server::runByTheClock(const std::atomic<bool>& stop) {
       const bool last_round = over;  // all ticks are made
       for (JournalEntry* entry = entries_.front(); entry != nullptr; entry = entries_.front()) {
         writeJournal(*entry);
-        if (!entry->checkpoint.empty()) {
-          rooms_.beginPush()->swap(entry->checkpoint);
-          rooms_.commitPush();
-        }
+        giveBackRoom(*entry);
         entries_.pop();
       }
       if (last_round) return;
