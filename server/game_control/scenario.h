@@ -85,7 +85,7 @@ struct ScenarioPair {
   bool sensing = false;
   bool enabled = true;
   std::optional<Friction> friction;  ///< none: that of the bodies
-  int line = 0;  ///< 0: listed automatically
+  int line = 0;                      ///< 0: listed automatically
 };
 
 enum class PlacementKind : std::uint8_t {
