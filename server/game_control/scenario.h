@@ -55,7 +55,7 @@ struct ScenarioObject {
   Texts title;
   std::string kind = "part";
   std::string color = "#b0b7bf";
-  std::string group;  ///< objects of one group never touch; empty: none
+  std::uint32_t group = 0;  ///< number in ScenarioFile::groups, from 1; 0: none
   std::vector<MeshSource> meshes;
   bool felt = true;  ///< false: seen only, no structures
   StructureSettings structures;
@@ -112,6 +112,13 @@ struct PairSwitch {
   bool enabled = true;
 };
 
+/// Objects of one group never touch.
+struct GroupChange {
+  ObjectId object;
+  std::uint32_t group = 0;  ///< as in ScenarioObject
+  int line = 0;
+};
+
 inline constexpr std::size_t kMostHelpers = 4;  ///< `may_take` of a state
 
 enum class TimeoutAction : std::uint8_t { kFail, kSkip };
@@ -124,6 +131,7 @@ struct ScenarioState {
   std::string part;  ///< title of the part this belongs to, for grouping
   // effects at its beginning, in this order
   std::vector<PairSwitch> pairs;
+  std::vector<GroupChange> groups;
   std::vector<Placement> placements;
   std::vector<HandAssignment> hands;  ///< the paper's hdIndex: who moves what from this state on
   /// Hands that may take hold of a part as well for the time of this state, by touching it as one takes it.
@@ -159,6 +167,7 @@ struct ScenarioFile {
   std::vector<ScenarioObject> objects;  ///< index = ObjectId
   std::vector<ScenarioHand> hands;      ///< index = HandId
   std::vector<ScenarioPair> pairs;      ///< index as in Scene::pairs
+  std::vector<std::string> groups;      ///< their names, in order of first use
   std::vector<std::string> signals;     ///< names of external signals, in order of first use
   std::vector<ScenarioState> states;
 

@@ -24,10 +24,10 @@ constexpr std::array<Key, 2> kTurn{"axis", "deg"};
 constexpr std::array<Key, 6> kHand{"name", "role", "kind", "object", "stiffness", "rotational_stiffness"};
 constexpr std::array<Key, 7> kPair{"between", "clearance", "dilation",        "sensing",
                                    "enabled", "friction",  "sliding_friction"};
-constexpr std::array<Key, 23> kState{"name",       "title",   "instruction", "part", "hands",    "show",
+constexpr std::array<Key, 24> kState{"name",       "title",   "instruction", "part", "hands",    "show",
                                      "hide",       "place",   "fix",         "free", "pairs_on", "pairs_off",
                                      "object",     "hand",    "touch",       "for",  "target",   "approach",
-                                     "conditions", "timeout", "on_timeout",  "snap", "may_take"};
+                                     "conditions", "timeout", "on_timeout",  "snap", "may_take", "groups"};
 constexpr std::array<Key, 6> kTarget{"at", "turn", "q", "within", "angle", "dwell"};
 constexpr std::array<Key, 2> kApproach{"direction", "distance"};
 constexpr std::array<Key, 10> kCondition{"all",     "any",          "when",    "pose",   "force",

@@ -67,6 +67,16 @@ std::optional<std::uint32_t> ScenarioNames::pair(const YAML::Node& node, const s
   return static_cast<std::uint32_t>(index);
 }
 
+std::uint32_t ScenarioNames::group(const YAML::Node& node, const std::string& what) const {
+  const std::string name = yaml_.text(node, what);
+  if (name.empty() || name == "none") return 0;
+  std::vector<std::string>& groups = scenario_.groups;
+  const auto found = std::find(groups.begin(), groups.end(), name);
+  const auto number = static_cast<std::uint32_t>(found - groups.begin()) + 1;
+  if (found == groups.end()) groups.push_back(name);
+  return number;
+}
+
 Texts ScenarioNames::texts(const YAML::Node& node, const std::string& what) const {
   Texts texts;
   if (!node.IsDefined()) return texts;

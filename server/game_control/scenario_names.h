@@ -16,7 +16,7 @@ namespace tenon {
 /// Threads: one. Real-time: no.
 class ScenarioNames {
  public:
-  ScenarioNames(YamlReader& yaml, const ScenarioFile& scenario) : yaml_(yaml), scenario_(scenario) {}
+  ScenarioNames(YamlReader& yaml, ScenarioFile& scenario) : yaml_(yaml), scenario_(scenario) {}
 
   /// Invalid after a failure; `what` names the place: "'touch' of state 'take'".
   [[nodiscard]] ObjectId object(const YAML::Node& node, const std::string& what) const;
@@ -26,6 +26,8 @@ class ScenarioNames {
                                                                         const std::string& what) const;
   /// Of a list of two names that are checked against each other.
   [[nodiscard]] std::optional<std::uint32_t> pair(const YAML::Node& node, const std::string& what) const;
+  /// Number of a group; a new name makes one. 0: `none`.
+  [[nodiscard]] std::uint32_t group(const YAML::Node& node, const std::string& what) const;
   /// A text, or a mapping from language to text that has the scenario's main language.
   [[nodiscard]] Texts texts(const YAML::Node& node, const std::string& what) const;
 
@@ -35,7 +37,7 @@ class ScenarioNames {
 
  private:
   YamlReader& yaml_;
-  const ScenarioFile& scenario_;
+  ScenarioFile& scenario_;
 };
 
 }  // namespace tenon

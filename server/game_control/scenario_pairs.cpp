@@ -31,8 +31,23 @@ std::vector<bool> ScenarioReader::whoCanMove(const YAML::Node& states) const {
   return moves;
 }
 
+std::vector<bool> ScenarioReader::whoChangesGroup(const YAML::Node& states) const {
+  std::vector<bool> changes(scenario_.objects.size(), false);
+  if (!states.IsDefined() || !states.IsSequence()) return changes;
+  for (const auto& state : states) {
+    if (!state.IsMap() || !state["groups"].IsDefined() || !state["groups"].IsMap()) continue;
+    for (const auto& entry : state["groups"]) {
+      if (!entry.first.IsScalar()) continue;
+      const ObjectId object = scenario_.objectNamed(entry.first.Scalar());
+      if (object.valid()) changes[object.value] = true;
+    }
+  }
+  return changes;
+}
+
 void ScenarioReader::listPairs(const YAML::Node& states) {
   const std::vector<bool> moves = whoCanMove(states);
+  const std::vector<bool> regrouped = whoChangesGroup(states);
   const auto isTracked = [&](std::uint32_t object) {
     return scenario_.objects[object].status == ObjectStatus::kTracked ||
            std::any_of(scenario_.hands.begin(), scenario_.hands.end(), [&](const ScenarioHand& hand) {
@@ -44,8 +59,9 @@ void ScenarioReader::listPairs(const YAML::Node& states) {
     for (std::uint32_t b = a + 1; b < count; ++b) {
       const ScenarioObject& first = scenario_.objects[a];
       const ScenarioObject& second = scenario_.objects[b];
-      const bool same_group = !first.group.empty() && first.group == second.group;
-      if (same_group || !first.felt || !second.felt || !(moves[a] || moves[b])) continue;
+      const bool never_apart =
+          first.group != 0 && first.group == second.group && !regrouped[a] && !regrouped[b];
+      if (never_apart || !first.felt || !second.felt || !(moves[a] || moves[b])) continue;
       ScenarioPair pair;
       pair.a = ObjectId{a};
       pair.b = ObjectId{b};

@@ -131,7 +131,7 @@ void ScenarioReader::readObject(const YAML::Node& node) {
     yaml_.fail(node["color"],
                "'color'" + of + " is '" + object.color + "', expected '#rrggbb' or '#rrggbbaa'");
   }
-  if (node["group"].IsDefined()) object.group = yaml_.text(node["group"], "'group'" + of);
+  if (node["group"].IsDefined()) object.group = names_.group(node["group"], "'group'" + of);
   object.felt = yaml_.yesNo(node["felt"], "'felt'" + of, true);
   object.stiffness =
       yaml_.numberOr(node["stiffness"], Quantity::kStiffness, "'stiffness'" + of, 1.0, 1e6, object.stiffness);

@@ -33,6 +33,7 @@ class ScenarioReader {
   void readPair(const YAML::Node& node);
   void readOff(const YAML::Node& node);
   [[nodiscard]] std::vector<bool> whoCanMove(const YAML::Node& states) const;
+  [[nodiscard]] std::vector<bool> whoChangesGroup(const YAML::Node& states) const;
   void checkClearances();
 
   YamlReader yaml_;

@@ -118,15 +118,6 @@ Result<void> checkTargets(const ScenarioFile& scenario, const Structures& struct
   return {};
 }
 
-/// Numbers of groups in order of appearance, from 1.
-std::uint32_t groupNumber(std::vector<std::string>& groups, const std::string& name) {
-  if (name.empty()) return 0;
-  const auto found = std::find(groups.begin(), groups.end(), name);
-  const auto number = static_cast<std::uint32_t>(found - groups.begin()) + 1;
-  if (found == groups.end()) groups.push_back(name);
-  return number;
-}
-
 }  // namespace
 
 ObjectId fieldByTarget(const ScenarioFile& scenario, const ScenarioPair& pair) {
@@ -216,7 +207,6 @@ Result<std::shared_ptr<const Scene>> makeScene(const ScenarioFile& scenario, Str
   auto scene = std::make_shared<Scene>();
   scene->gravity_W = scenario.gravity_W;
 
-  std::vector<std::string> groups;
   for (std::size_t i = 0; i < structures.size(); ++i) {
     const ScenarioObject& object = scenario.objects[i];
     ObjectSpec spec;
@@ -224,7 +214,7 @@ Result<std::shared_ptr<const Scene>> makeScene(const ScenarioFile& scenario, Str
     spec.title = object.title.front().text;
     spec.kind = object.kind;
     spec.color = object.color;
-    spec.group = groupNumber(groups, object.group);
+    spec.group = object.group;
     spec.X_WO = object.X_WO;
     spec.status = object.status;
     spec.structures = object.felt ? structures[i] : nullptr;

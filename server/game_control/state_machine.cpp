@@ -141,6 +141,7 @@ void StateMachine::enter(Environment& environment, std::uint32_t step) noexcept 
   memory_.helping = {};
 
   for (const PairSwitch& change : state().pairs) environment.setPairEnabled(change.pair, change.enabled);
+  for (const GroupChange& change : state().groups) environment.setGroup(change.object, change.group);
   for (const Placement& placement : state().placements) place(environment, placement);
   for (const HandAssignment& assignment : state().hands) {
     const HandId hand = handInRole(*scenario_, environment, assignment.hand);

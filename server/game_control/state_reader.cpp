@@ -18,8 +18,10 @@ constexpr std::size_t kMostStates = 1000;
 StateReader::StateReader(YamlReader& yaml, ScenarioFile& scenario)
     : yaml_(yaml), scenario_(scenario), names_(yaml, scenario) {
   for (const ScenarioHand& hand : scenario.hands) moved_by_.push_back(hand.object);
-  for (const ScenarioObject& object : scenario.objects)
+  for (const ScenarioObject& object : scenario.objects) {
     hidden_.push_back(object.status == ObjectStatus::kHidden);
+    group_.push_back(object.group);
+  }
 }
 
 std::string StateReader::in(const ScenarioState& state, const std::string& key) const {
@@ -46,6 +48,7 @@ void StateReader::read(const YAML::Node& states) {
     scenario_.states.push_back(std::move(state));
   }
   if (scenario_.states.empty()) yaml_.fail(states, "'states' is empty, expected at least one state");
+  checkGroups();
 }
 
 ScenarioState StateReader::readState(const YAML::Node& node) {
@@ -68,120 +71,6 @@ ScenarioState StateReader::readState(const YAML::Node& node) {
   }
   if (!yaml_.failed()) checkDoable(node, state);
   return state;
-}
-
-void StateReader::readEffects(const YAML::Node& node, ScenarioState& state) {
-  for (const std::string key : {"pairs_on", "pairs_off"}) {
-    const YAML::Node list = node[key];
-    if (!list.IsDefined() || !yaml_.isList(list, in(state, key))) continue;
-    for (const auto& entry : list) {
-      const auto pair = names_.pair(entry, in(state, key));
-      if (pair) state.pairs.push_back({*pair, key == "pairs_on"});
-    }
-  }
-  readPlacements(node, "show", PlacementKind::kShow, state);
-  readPlacements(node, "place", PlacementKind::kShow, state);
-  readPlacements(node, "fix", PlacementKind::kFix, state);
-  readPlacements(node, "free", PlacementKind::kFree, state);
-  readPlacements(node, "hide", PlacementKind::kHide, state);
-  for (const Placement& placement : state.placements) {
-    hidden_[placement.object.value] = placement.kind == PlacementKind::kHide;
-  }
-  readHands(node["hands"], state);
-  readHelpers(node["may_take"], state);
-}
-
-void StateReader::readPlacements(const YAML::Node& node, const std::string& key, PlacementKind kind,
-                                 ScenarioState& state) {
-  const YAML::Node given = node[key];
-  if (!given.IsDefined()) return;
-  const std::string what = in(state, key);
-  const auto place = [&](const YAML::Node& name, std::optional<Pose> X_WO) {
-    const ObjectId object = names_.object(name, what);
-    if (!object.valid()) return;
-    if (X_WO && X_WO->translation().norm() > scenario_.reach)
-      yaml_.fail(name, what + " is outside the scene");
-    const auto same = std::find_if(state.placements.begin(), state.placements.end(),
-                                   [&](const Placement& other) { return other.object == object; });
-    if (same != state.placements.end()) {
-      yaml_.fail(name, "state '" + state.name + "' places '" + names_.nameOf(object) + "' twice");
-    }
-    state.placements.push_back({kind, object, X_WO});
-  };
-  // a mapping gives poses, a list leaves the objects where they are
-  if (given.IsMap() && (key == "place" || key == "fix")) {
-    for (const auto& entry : given) {
-      if (!yaml_.openMapping(entry.second, "pose", what)) return;
-      place(entry.first, yaml_.pose(entry.second, what));
-    }
-  } else if (key == "place") {
-    yaml_.fail(given, what + " must be a mapping from object to pose, such as {peg: {at: [0, 0, 0.1]}}");
-  } else if (yaml_.isList(given, what)) {
-    for (const auto& name : given) place(name, std::nullopt);
-  }
-}
-
-void StateReader::readHands(const YAML::Node& node, ScenarioState& state) {
-  if (!node.IsDefined()) return;
-  const std::string what = in(state, "hands");
-  if (!node.IsMap()) {
-    yaml_.fail(node, what + " must be a mapping from hand to object, such as {right: peg}");
-    return;
-  }
-  for (const auto& entry : node) {
-    const HandId hand = names_.hand(entry.first, what);
-    const ObjectId object = names_.object(entry.second, what);
-    if (!hand.valid() || !object.valid() || !mayTake(entry, hand, object, what)) return;
-    moved_by_[hand.value] = object;
-    state.hands.push_back({hand, object});
-  }
-}
-
-/// A hand that the file lets take an object has to be one that can, and the object nobody else's own.
-bool StateReader::mayTake(const YAML::detail::iterator_value& entry, HandId hand, ObjectId object,
-                          const std::string& what) {
-  if (scenario_.hands[hand.value].kind == HandKind::kTracked) {
-    yaml_.fail(entry.first,
-               what + ": '" + scenario_.hands[hand.value].name + "' is tracked, it can take nothing");
-    return false;
-  }
-  for (std::size_t other = 0; other < scenario_.hands.size(); ++other) {
-    if (other != hand.value && scenario_.hands[other].object == object) {
-      yaml_.fail(entry.second, what + ": '" + names_.nameOf(object) + "' belongs to hand '" +
-                                   scenario_.hands[other].name + "'");
-      return false;
-    }
-  }
-  return true;
-}
-
-void StateReader::readHelpers(const YAML::Node& node, ScenarioState& state) {
-  if (!node.IsDefined()) return;
-  const std::string what = in(state, "may_take");
-  if (!node.IsMap() || node.size() > kMostHelpers) {
-    yaml_.fail(node, what + " must be a mapping from hand to object, such as {left: peg}, of at most " +
-                         std::to_string(kMostHelpers));
-    return;
-  }
-  for (const auto& entry : node) {
-    const HandId hand = names_.hand(entry.first, what);
-    const ObjectId object = names_.object(entry.second, what);
-    if (!hand.valid() || !object.valid() || !mayTake(entry, hand, object, what)) return;
-    const ScenarioHand& helper = scenario_.hands[hand.value];
-    if (moved_by_[hand.value] == object) {
-      yaml_.fail(entry.first, what + ": '" + helper.name + "' moves '" + names_.nameOf(object) + "' already");
-    } else if (scenario_.pairOf(helper.object, object) < 0) {
-      yaml_.fail(entry.second, what + ": '" + names_.nameOf(helper.object) + "' and '" +
-                                   names_.nameOf(object) + "' never touch");
-    }
-    state.may_take.push_back({hand, object});
-    const auto helpers = std::count_if(state.may_take.begin(), state.may_take.end(),
-                                       [object](const auto& one) { return one.object == object; });
-    if (helpers > kOtherPulls) {
-      yaml_.fail(entry.second, what + ": '" + names_.nameOf(object) + "' can have " +
-                                   std::to_string(kOtherPulls) + " helpers at most");
-    }
-  }
 }
 
 void StateReader::readTask(const YAML::Node& node, ScenarioState& state) {
@@ -311,6 +200,11 @@ void StateReader::checkDoable(const YAML::Node& node, const ScenarioState& state
   for (const Condition& condition : state.conditions) {
     const bool counts =
         condition.kind == ConditionKind::kContact || condition.kind == ConditionKind::kContactTime;
+    if (condition.kind == ConditionKind::kContact && ofOneGroup(condition.object, condition.other)) {
+      yaml_.fail(node, "state '" + state.name + "' asks '" + names_.nameOf(condition.object) + "' and '" +
+                           names_.nameOf(condition.other) + "' to touch, which are both of group '" +
+                           scenario_.groups[group_[condition.other.value] - 1] + "'");
+    }
     const std::uint32_t needed = counts ? std::max(condition.limit_ticks, condition.dwell) : condition.dwell;
     if (state.timeout > 0 && needed > state.timeout) {
       yaml_.fail(node["timeout"], in(state, "timeout") + " is shorter than what its conditions ask for");

@@ -22,13 +22,17 @@ class StateReader {
 
  private:
   [[nodiscard]] ScenarioState readState(const YAML::Node& node);
+  // what a state does when it begins: state_effects.cpp
   void readEffects(const YAML::Node& node, ScenarioState& state);
+  void readGroups(const YAML::Node& node, ScenarioState& state);
   void readPlacements(const YAML::Node& node, const std::string& key, PlacementKind kind,
                       ScenarioState& state);
   void readHands(const YAML::Node& node, ScenarioState& state);
   void readHelpers(const YAML::Node& node, ScenarioState& state);
   bool mayTake(const YAML::detail::iterator_value& entry, HandId hand, ObjectId object,
                const std::string& what);
+  void checkGroups();
+  // what it asks
   void readTask(const YAML::Node& node, ScenarioState& state);
   void readTarget(const YAML::Node& node, ScenarioState& state);
   void readApproach(const YAML::Node& node, ScenarioState& state);
@@ -36,6 +40,7 @@ class StateReader {
   void appearWhatIsTouched(ScenarioState& state);
   void useDefaultConditions(const YAML::Node& node, ScenarioState& state);
   void checkDoable(const YAML::Node& node, const ScenarioState& state);
+  [[nodiscard]] bool ofOneGroup(ObjectId a, ObjectId b) const;  ///< in the state being read
   [[nodiscard]] HandId handMoving(ObjectId object) const;
   [[nodiscard]] HandId firstHand() const;  ///< of a trainee that feels what it moves
   [[nodiscard]] std::string in(const ScenarioState& state, const std::string& key) const;
@@ -43,8 +48,9 @@ class StateReader {
   YamlReader& yaml_;
   ScenarioFile& scenario_;
   ScenarioNames names_;
-  std::vector<ObjectId> moved_by_;  ///< by hand, in the state being read
-  std::vector<bool> hidden_;        ///< by object
+  std::vector<ObjectId> moved_by_;    ///< by hand, in the state being read
+  std::vector<bool> hidden_;          ///< by object
+  std::vector<std::uint32_t> group_;  ///< by object
 };
 
 }  // namespace tenon

@@ -136,6 +136,31 @@ TEST(Scenario, ReadsFixedPosesFreeObjectsAndPairsOfAState) {
   EXPECT_FALSE(mount.pairs[0].enabled);
 }
 
+TEST(Scenario, ReadsTheGroupsThatAStateChanges) {
+  const std::string grouped = with(smallScenario(), "name: cube,", "name: cube, group: kit,");
+  const auto scenario =
+      parsed(with(grouped, "    snap: true", "    groups: {part: kit, cube: none}\n    snap: true"));
+  ASSERT_TRUE(scenario) << scenario.error().what;
+  EXPECT_EQ(scenario->groups, std::vector<std::string>{"kit"});
+  EXPECT_EQ(scenario->objects[3].group, 1U);
+  const std::vector<GroupChange>& changes = scenario->states[1].groups;
+  ASSERT_EQ(changes.size(), 2U);
+  EXPECT_EQ(changes[0].object, scenario->objectNamed("part"));
+  EXPECT_EQ(changes[0].group, 1U);
+  EXPECT_EQ(changes[1].object, scenario->objectNamed("cube"));
+  EXPECT_EQ(changes[1].group, 0U);
+  EXPECT_EQ(changes[1].line, 21);
+}
+
+TEST(Scenario, ListsPairsOfAGroupThatSomebodyLeaves) {
+  const std::string grouped = with(with(smallScenario(), "kind: scene", "kind: scene, group: g"),
+                                   "name: cube,", "name: cube, group: g,");
+  const auto left = parsed(with(grouped, "    snap: true", "    groups: {cube: none}\n    snap: true"));
+  ASSERT_TRUE(left) << left.error().what;
+  EXPECT_EQ(left->pairs.size(), 6U);
+  EXPECT_GE(left->pairOf(left->objectNamed("bay"), left->objectNamed("cube")), 0);
+}
+
 struct BadInput {
   std::string name, from, to, line, says;
   friend void PrintTo(const BadInput& input, std::ostream* out) { *out << input.name; }
@@ -232,6 +257,19 @@ const BadInput kBadInputs[] = {
      "21", "nested more than"},
     {"conditions_itself", "snap: true", "conditions: &loop {all: [*loop]}", "21", ""},
     {"language", "title: Small", "title: {de: Klein}", "1", "no text in 'en'"},
+    {"groups_list", "snap: true", "groups: [part]", "21",
+     "'groups' of state 'mount' must be a mapping from object"},
+    {"groups_object", "snap: true", "groups: {prat: kit, cube: kit}", "21",
+     "unknown object 'prat'; did you mean 'part'?"},
+    {"groups_name", "snap: true", "groups:\n      part: [kit]\n      cube: kit", "22",
+     "'groups' of state 'mount', object 'part',"},
+    {"groups_twice", "snap: true", "groups: {part: kit, cube: kit, part: none}", "21", "names 'part' twice"},
+    {"groups_alone", "snap: true", "groups:\n      cube: kit\n      bay: kit\n      part: kitt", "24",
+     "'groups' of state 'mount' puts 'part' into 'kitt', where nobody else ever is; did you mean 'kit'?"},
+    {"groups_touch", "touch: part\n", "touch: part\n    groups: {part: kit, pointer: kit}\n", "13",
+     "state 'take' asks 'pointer' and 'part' to touch, which are both of group 'kit'"},
+    {"groups_may_take", "snap: true", "groups: {part: kit, cube: kit}\n    may_take: {instructor: part}",
+     "22", "'cube' and 'part' never touch"},
     {"states_empty", "states:", "states: []\nother:", "13", "unknown key 'other'"},
 };
 

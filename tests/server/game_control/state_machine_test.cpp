@@ -125,6 +125,54 @@ TEST(StateMachine, SwitchesPairsAsStatesAndPeopleSay) {
   exercise.step({GameCommand{.kind = CommandKind::kSetCollision, .signal = 1000, .value = 1.0}});
 }
 
+//   part ->  [cube]      a part goes through what is of its group, and is held back by it again when it left
+TEST(StateMachine, PutsObjectsIntoGroupsAndTakesThemOut) {
+  Exercise exercise(with(smallScenario(), "    snap: true\n    timeout: 2 s\n",
+                         "    groups: {part: kit, cube: kit}\n  - name: leave\n    groups: {part: none}\n"));
+  const ObjectId part = exercise.scenario().objectNamed("part");
+  const ObjectId cube = exercise.scenario().objectNamed("cube");
+  const Environment& environment = exercise.environment();
+  exercise.touchPart();
+  ASSERT_EQ(exercise.status().step, 1U);
+  EXPECT_EQ(environment.groupOf(part), 1U);
+  EXPECT_EQ(environment.groupOf(cube), 1U);
+
+  const Vector3 p_PH = -environment.hands()[0].X_HO.translation();
+  const auto apart = [&] {
+    return (exercise.object("part").X_WO.translation() - exercise.object("cube").X_WO.translation()).x();
+  };
+  exercise.moveTo(Vector3(-0.2, 0, 0.2) + p_PH);
+  exercise.moveTo(Vector3(-0.28, 0, 0.2) + p_PH);
+  EXPECT_FALSE(environment.inContact(part, cube));
+  EXPECT_NEAR(apart(), 0.02, 1e-4) << "half of each inside the other";
+
+  exercise.moveTo(Vector3(-0.2, 0, 0.2) + p_PH);
+  exercise.step({command(CommandKind::kSkipStep)});
+  exercise.step(1);
+  EXPECT_EQ(environment.groupOf(part), 0U);
+  EXPECT_EQ(environment.groupOf(cube), 1U);
+  exercise.moveTo(Vector3(-0.28, 0, 0.2) + p_PH);
+  EXPECT_TRUE(environment.inContact(part, cube));
+  EXPECT_GT(apart(), 0.0395);
+
+  exercise.step({command(CommandKind::kReset)});
+  EXPECT_EQ(environment.groupOf(cube), 0U) << "as the file says";
+}
+
+TEST(StateMachine, OverlappingObjectsThatLeaveTheirGroupTouchAtOnce) {
+  Exercise exercise(with(smallScenario(), "    snap: true\n    timeout: 2 s\n",
+                         "    groups: {part: kit, cube: kit}\n  - name: leave\n    groups: {cube: none}\n"));
+  const ObjectId part = exercise.scenario().objectNamed("part");
+  const ObjectId cube = exercise.scenario().objectNamed("cube");
+  exercise.touchPart();
+  const Vector3 p_PH = -exercise.environment().hands()[0].X_HO.translation();
+  exercise.moveTo(Vector3(-0.262, 0, 0.2) + p_PH);
+  EXPECT_FALSE(exercise.environment().inContact(part, cube));
+  exercise.step({command(CommandKind::kSkipStep)});
+  exercise.step(1);
+  EXPECT_TRUE(exercise.environment().inContact(part, cube));
+}
+
 TEST(StateMachine, SwappedHandsKeepTheirRoles) {
   Exercise exercise(with(smallScenario(), "role: instructor, object: cube", "object: cube"));
   exercise.environment().setHandPresent(HandId{1}, true);
