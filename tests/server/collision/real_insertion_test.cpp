@@ -1,7 +1,10 @@
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <functional>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -30,22 +33,49 @@ const Quaternion kAskew = expRotation({kTilt, 0.0, 0.0});
 
 double tiltOf(const Pose& X_WB) { return std::acos(std::min((X_WB.rotation() * Vector3::UnitZ()).z(), 1.0)); }
 
-/// What the hand that holds a body feels.
-double handForce(const IslandRig& rig, std::size_t body) {
-  return springWrench(rig.body(body).springs[0], rig.pose(body)).force.norm();
-}
-
-/// Looks now and then how deep one mesh is in another, whatever their fields say.
-class Witness {
+/// A part in a hand that meets others: what the hand feels, and now and then how deep one mesh is in another,
+/// whatever their fields say.
+class Insertion {
  public:
-  void look(const RealPart& a, const RealPart& b, const Pose& X_BA) {
-    overlap = std::max(overlap, overlapOfMeshes(a, b, X_BA, kOverlap));
+  /// A hand's grip is at `p_BH`.
+  std::size_t hold(const RealPart& part, const Pose& X_WB, const Vector3& p_BH) {
+    held_ = rig.addBody(part.structures, X_WB, 1000.0, kWrist);
+    rig.holdAt(held_, p_BH);
+    return held_;
   }
-  [[nodiscard]] bool isDue() { return ticks_++ % kLookEvery == 0; }
+  /// What stands where its file says, asked both ways.
+  void stand(std::size_t body, const RealPart& part, double play) {
+    rig.addStatic(body, part.structures, Pose(), dilationOf(play));
+    rig.addStaticShell(body, part.structures, Pose(), dilationOf(play));
+  }
+  /// `overlap` says how deep meshes are in each other now.
+  void watch(std::function<double()> overlap) { overlap_ = std::move(overlap); }
 
-  double overlap = 0.0;  ///< [m]
+  void step(const Pose& X_WH) {
+    rig.setHand(held_, X_WH);
+    rig.step();
+    strongest = std::max(strongest, force());
+    if (ticks_++ % kLookEvery == 0) deepest_ = std::max(deepest_, overlap_());
+  }
+  /// What the hand feels.
+  [[nodiscard]] double force() const {
+    return springWrench(rig.body(held_).springs[0], rig.pose(held_)).force.norm();
+  }
+  void expectGentle() const {
+    EXPECT_LE(strongest, 5.0);
+    EXPECT_EQ(deepest_, 0.0);
+    EXPECT_GE(rig.deepest_overlap, -1e-5);
+    EXPECT_EQ(rig.conflicts, 0);
+    testing::Test::RecordProperty("strongest_mN", static_cast<int>(std::lround(1e3 * strongest)));
+  }
+
+  IslandRig rig;
+  double strongest = 0.0;  ///< [N]
 
  private:
+  std::size_t held_ = 0;
+  std::function<double()> overlap_;
+  double deepest_ = 0.0;  ///< [m]
   int ticks_ = 0;
 };
 
@@ -73,25 +103,20 @@ TEST_P(RealPegs, TheSheetHoldsThePegAndTheHoleTakesItInAskewAndGivesItBack) {
   const auto peg = bakePart(one.peg, fine, {boxAboutAxis(0.0, one.half, -0.0005, 0.0105)}, 0.0005);
   ASSERT_TRUE(hole && peg);
 
-  IslandRig rig;
+  Insertion insertion;
+  IslandRig& rig = insertion.rig;
   const Pose start(Vector3(kSheetX, 0.0, 0.02), kAskew);
-  const auto held = rig.addBody(peg->structures, start, 1000.0, kWrist);
-  rig.holdAt(held, {0.0, 0.0, 0.02});
-  rig.addStatic(held, hole->structures, Pose(), dilationOf(one.play));
-  rig.addStaticShell(held, hole->structures, Pose(), dilationOf(one.play));
+  const auto held = insertion.hold(*peg, start, {0.0, 0.0, 0.02});
+  insertion.stand(held, *hole, one.play);
   rig.addStatic(held, test::sheetStructures(0.04, 0.0, kSheetVoxel, 0.0011), Pose(Vector3(kSheetX, 0.0, 0.0)),
                 test::kSolidVoxels * kSheetVoxel);
-  Witness witness;
-  double strongest = 0.0;
+  insertion.watch([&] { return overlapOfMeshes(*peg, *hole, rig.pose(held), kOverlap); });
   const auto go = [&](const Pose& X_WH, int ticks) {
     const Pose from = rig.body(held).springs[0].X_WG;
     for (int tick = 1; tick <= ticks; ++tick) {
       const Displacement way = displacement(from, X_WH);
       const double share = static_cast<double>(tick) / ticks;
-      rig.setHand(held, displaced(from, {share * way.translation, share * way.rotation}));
-      rig.step();
-      strongest = std::max(strongest, handForce(rig, held));
-      if (witness.isDue()) witness.look(*peg, *hole, rig.pose(held));
+      insertion.step(displaced(from, {share * way.translation, share * way.rotation}));
     }
   };
 
@@ -102,7 +127,7 @@ TEST_P(RealPegs, TheSheetHoldsThePegAndTheHoleTakesItInAskewAndGivesItBack) {
   EXPECT_GT(rig.force(2).force.z(), 20.0);
   go(start, 50);
   // over to the block, along it until the tip finds the hole, in, and out again
-  strongest = 0.0;
+  insertion.strongest = 0.0;
   go(Pose(Vector3(0.0003, -0.00015, 0.012), kAskew), 200);
   go(Pose(Vector3(0.0003, -0.00015, 0.0085), kAskew), 100);
   go(Pose(Vector3(0.0, 0.0, 0.0085), kAskew), 100);
@@ -112,14 +137,10 @@ TEST_P(RealPegs, TheSheetHoldsThePegAndTheHoleTakesItInAskewAndGivesItBack) {
   EXPECT_LE(tiltOf(rig.pose(held)), one.play / kHoleTop) << "the hole turns it straight";
   go(Pose(Vector3(0.0003, 0.0, 0.02), kAskew), 500);
   EXPECT_NEAR(rig.pose(held).translation().z(), 0.02, 1e-6) << "not out";
-  EXPECT_LE(strongest, 5.0);
-  EXPECT_EQ(witness.overlap, 0.0);
   const Pose aside(Vector3(one.play, 0.0, 0.0));
   EXPECT_NEAR(overlapOfMeshes(*peg, *hole, aside, kOverlap), 0.5 * one.play, 0.1 * one.play)
       << "blind witness";
-  EXPECT_GE(rig.deepest_overlap, -1e-5);
-  EXPECT_EQ(rig.conflicts, 0);
-  RecordProperty("strongest_mN", static_cast<int>(std::lround(1e3 * strongest)));
+  insertion.expectGentle();
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -152,25 +173,18 @@ TEST(RealThread, ANutPutOnAskewIsScrewedDownAndUpAgain) {
                             {boxAboutAxis(0.0, 0.0085, 0.0155, 0.0215)}, 0.0005);
   ASSERT_TRUE(bolt && nut);
 
-  IslandRig rig;
+  Insertion insertion;
+  IslandRig& rig = insertion.rig;
   // lifted, turned about the bolt's axis, then askew about its middle
   const auto placed = [&p_NC](double lift, double turn, double tilt) {
     const Quaternion q = expRotation({tilt, 0.0, 0.0}) * expRotation({0.0, 0.0, turn});
     return Pose(Vector3(0.0002, -0.0001, lift) + p_NC - q * p_NC, q);
   };
-  const auto held = rig.addBody(nut->structures, placed(0.0265, 0.0, kTilt), 1000.0, kWrist);
-  rig.holdAt(held, p_NC);
-  rig.addStatic(held, bolt->structures, Pose(), dilationOf(kPlay));
-  rig.addStaticShell(held, bolt->structures, Pose(), dilationOf(kPlay));
+  const auto held = insertion.hold(*nut, placed(0.0265, 0.0, kTilt), p_NC);
+  insertion.stand(held, *bolt, kPlay);
+  insertion.watch([&] { return overlapOfMeshes(*nut, *bolt, rig.pose(held), kOverlap); });
   const auto lift = [&] { return (rig.pose(held) * p_NC - p_NC).z(); };
-  Witness witness;
-  double strongest = 0.0;
-  const auto step = [&](const Pose& X_WH) {
-    rig.setHand(held, X_WH);
-    rig.step();
-    strongest = std::max(strongest, handForce(rig, held));
-    if (witness.isDue()) witness.look(*nut, *bolt, rig.pose(held));
-  };
+  const auto step = [&insertion](const Pose& X_WH) { insertion.step(X_WH); };
 
   constexpr double kPress = 0.002;  // the hand ahead of the thread: 2 N
   for (int tick = 1; tick <= 150; ++tick) step(placed(0.0265 - 0.0035 * tick / 150.0, 0.0, kTilt));
@@ -193,12 +207,8 @@ TEST(RealThread, ANutPutOnAskewIsScrewedDownAndUpAgain) {
   for (int tick = 1; tick <= 100; ++tick) {
     step(placed(deep + kPitch * kOff + 0.5 * kPress + 0.004 * tick / 100.0, 0.5 * kTurn, 0.0));
   }
-  EXPECT_EQ(handForce(rig, held), 0.0) << "not off";
-  EXPECT_LE(strongest, 5.0);
-  EXPECT_EQ(witness.overlap, 0.0);
-  EXPECT_GE(rig.deepest_overlap, -1e-5);
-  EXPECT_EQ(rig.conflicts, 0);
-  RecordProperty("strongest_mN", static_cast<int>(std::lround(1e3 * strongest)));
+  EXPECT_EQ(insertion.force(), 0.0) << "not off";
+  insertion.expectGentle();
 }
 
 //      |#|   the small gear goes on its shaft askew, its teeth between those of the medium one,
@@ -229,32 +239,25 @@ TEST(RealGears, AGearGoesOnItsShaftTurnsItsNeighbourAndComesOff) {
       0.0008);
   ASSERT_TRUE(base && medium && small);
 
-  IslandRig rig;
+  Insertion insertion;
+  IslandRig& rig = insertion.rig;
   const auto placed = [&p_WS](double high, const Vector3& beside, const Quaternion& q) {
     return Pose(Vector3(0.0, 0.0, high) + beside + p_WS - q * p_WS, q);
   };
   const Vector3 kBeside(0.0002, -0.0001, 0.0);
   const auto turning = rig.addBody(medium->structures, Pose(), 200.0, 0.0);
-  const auto held = rig.addBody(small->structures, placed(kHigh, kBeside, kAskew), 1000.0, kWrist);
   rig.holdAt(turning, p_WM);
-  rig.holdAt(held, p_WS);
-  for (const auto body : {turning, held}) {
-    rig.addStatic(body, base->structures, Pose(), dilationOf(kBorePlay));
-    rig.addStaticShell(body, base->structures, Pose(), dilationOf(kBorePlay));
-  }
+  const auto held = insertion.hold(*small, placed(kHigh, kBeside, kAskew), p_WS);
+  for (const auto body : {turning, held}) insertion.stand(body, *base, kBorePlay);
   rig.addPair(held, turning, dilationOf(kToothPlay));
   rig.addPair(turning, held, dilationOf(kToothPlay));
-  Witness witness;
-  double strongest = 0.0;
-  const auto step = [&](const Pose& X_WH) {
-    rig.setHand(held, X_WH);
-    rig.step();
-    strongest = std::max(strongest, handForce(rig, held));
-    if (!witness.isDue()) return;
-    witness.look(*small, *base, rig.pose(held));
-    witness.look(*medium, *base, rig.pose(turning));
-    witness.look(*small, *medium, rig.pose(turning).inverse() * rig.pose(held));
-  };
+  insertion.watch([&] {
+    const Pose X_TH = rig.pose(turning).inverse() * rig.pose(held);
+    return std::max({overlapOfMeshes(*small, *base, rig.pose(held), kOverlap),
+                     overlapOfMeshes(*medium, *base, rig.pose(turning), kOverlap),
+                     overlapOfMeshes(*small, *medium, X_TH, kOverlap)});
+  });
+  const auto step = [&insertion](const Pose& X_WH) { insertion.step(X_WH); };
 
   constexpr int kWayTicks = 500;
   for (int tick = 0; tick <= kWayTicks; ++tick) {
@@ -275,12 +278,8 @@ TEST(RealGears, AGearGoesOnItsShaftTurnsItsNeighbourAndComesOff) {
   for (int tick = 0; tick <= kWayTicks; ++tick) {
     step(placed((kHigh + 0.001) * tick / kWayTicks - 0.001, kBeside, kAskew));
   }
-  EXPECT_EQ(handForce(rig, held), 0.0) << "not off";
-  EXPECT_LE(strongest, 5.0);
-  EXPECT_EQ(witness.overlap, 0.0);
-  EXPECT_GE(rig.deepest_overlap, -1e-5);
-  EXPECT_EQ(rig.conflicts, 0);
-  RecordProperty("strongest_mN", static_cast<int>(std::lround(1e3 * strongest)));
+  EXPECT_EQ(insertion.force(), 0.0) << "not off";
+  insertion.expectGentle();
 }
 
 }  // namespace

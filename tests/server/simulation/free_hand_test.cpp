@@ -103,59 +103,51 @@ TEST(FreeBodyAndHand, NothingFallsThroughASheet) {
   }
 }
 
-TEST(FreeBodyAndHand, WhatIsLetGoOfFliesOnAndFalls) {
+/// A box in a hand, a metre above nothing.
+struct BoxInAHand {
+  BoxInAHand() {
+    enter(environment, hand, {0.0, 0.0, 1.0});
+    environment.grab(hand, box);
+    stay(environment, 10);
+  }
+  [[nodiscard]] const ObjectMotion& motion() const { return environment.objects()[box.value]; }
+
   test::SmallScene small;
-  const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 1.0}, true);
-  small.spec(box).body->floating = false;
-  const ObjectId pointer = small.object("pointer", test::pointerShape(), {-0.1, 0.0, 1.0});
-  const HandId hand = small.hand("hand", pointer);
-  Environment environment(small.build(), {});
-  enter(environment, hand, {0.0, 0.0, 1.0});
-  environment.grab(hand, box);
-  environment.step();
-  EXPECT_EQ(environment.objects()[box.value].status, ObjectStatus::kHeld);
-  const Vector3 held = environment.objects()[box.value].X_WO.translation();
-  stay(environment, 100);
-  EXPECT_EQ(environment.objects()[box.value].X_WO.translation(), held) << "a hand carries it";
-  moveTo(environment, hand, {0.1, 0.0, 1.0}, 200);
-  environment.release(hand);
-  EXPECT_EQ(environment.objects()[box.value].status, ObjectStatus::kFree);
-  stay(environment, 100);
-  const ObjectMotion& motion = environment.objects()[box.value];
-  EXPECT_NEAR(motion.V_WO.linear.x(), 0.5, 0.01) << "thrown as fast as it was carried";
-  EXPECT_NEAR(motion.V_WO.linear.z(), -kG * 0.1, 1e-6);
+  ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 1.0});
+  HandId hand = small.hand("hand", small.object("pointer", test::pointerShape(), {-0.1, 0.0, 1.0}));
+  Environment environment{small.build(), {}};
+};
+
+TEST(FreeBodyAndHand, WhatIsLetGoOfFliesOnAndFalls) {
+  BoxInAHand held;
+  EXPECT_EQ(held.motion().status, ObjectStatus::kHeld);
+  const Vector3 p_WB = held.motion().X_WO.translation();
+  stay(held.environment, 100);
+  EXPECT_EQ(held.motion().X_WO.translation(), p_WB) << "a hand carries it";
+  moveTo(held.environment, held.hand, {0.1, 0.0, 1.0}, 200);
+  held.environment.release(held.hand);
+  EXPECT_EQ(held.motion().status, ObjectStatus::kFree);
+  stay(held.environment, 100);
+  EXPECT_NEAR(held.motion().V_WO.linear.x(), 0.5, 0.01) << "thrown as fast as it was carried";
+  EXPECT_NEAR(held.motion().V_WO.linear.z(), -kG * 0.1, 1e-6);
 }
 
 TEST(FreeBodyAndHand, AHandThatIsGoneDropsNothing) {
-  test::SmallScene small;
-  const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 1.0});
-  const ObjectId pointer = small.object("pointer", test::pointerShape(), {-0.1, 0.0, 1.0});
-  const HandId hand = small.hand("hand", pointer);
-  Environment environment(small.build(), {});
-  enter(environment, hand, {0.0, 0.0, 1.0});
-  environment.grab(hand, box);
-  stay(environment, 10);
-  const Pose X_WB = environment.objects()[box.value].X_WO;
-  environment.setHandPresent(hand, false);
-  stay(environment, 100);
-  EXPECT_EQ(environment.objects()[box.value].X_WO, X_WB) << "it waits for its hand to come back";
+  BoxInAHand held;
+  const Pose X_WB = held.motion().X_WO;
+  held.environment.setHandPresent(held.hand, false);
+  stay(held.environment, 100);
+  EXPECT_EQ(held.motion().X_WO, X_WB) << "it waits for its hand to come back";
 }
 
 TEST(FreeBodyAndHand, WhatAHandThatIsGoneIsRelievedOfFalls) {
-  test::SmallScene small;
-  const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 1.0});
-  const ObjectId pointer = small.object("pointer", test::pointerShape(), {-0.1, 0.0, 1.0});
-  const HandId hand = small.hand("hand", pointer);
-  Environment environment(small.build(), {});
-  enter(environment, hand, {0.0, 0.0, 1.0});
-  environment.grab(hand, box);
-  stay(environment, 10);
-  environment.setHandPresent(hand, false);
-  stay(environment, 10);
-  environment.release(hand);
-  EXPECT_EQ(environment.objects()[box.value].status, ObjectStatus::kFree);
-  stay(environment, 100);
-  EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.z(), -kG * 0.1, 1e-6);
+  BoxInAHand held;
+  held.environment.setHandPresent(held.hand, false);
+  stay(held.environment, 10);
+  held.environment.release(held.hand);
+  EXPECT_EQ(held.motion().status, ObjectStatus::kFree);
+  stay(held.environment, 100);
+  EXPECT_NEAR(held.motion().V_WO.linear.z(), -kG * 0.1, 1e-6);
 }
 
 TEST(FreeBodyAndHand, AFallThatIsHeldStillGoesOnFromRest) {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/server/simulation/small_scene.h"
+#include "tests/server/simulation/stirred_scene.h"
 #include "tests/server/simulation/wave.h"
 
 namespace tenon::test {
@@ -16,8 +16,8 @@ inline StructuresPtr fineBlockShape() {
 
 /// More than a tick has time for: blocks lie flat on a floor under hands that press and stir them, with
 /// thousands of points each in contact all the time.
-struct Overload {
-  explicit Overload(int blocks) {
+struct Overload : StirredScene {
+  explicit Overload(int blocks) : StirredScene(stirred) {
     floor = small.object("floor", floorStructures(1.4, 0.01), Vector3::Zero());
     for (int i = 0; i < blocks; ++i) {
       const Vector3 p_WO(0.15 * (i % 8) - 0.55, 0.12 * (i / 8) - 0.5, 0.021);
@@ -29,27 +29,13 @@ struct Overload {
     scene = small.build();
   }
 
-  /// What people do in this tick; depends on nothing but the tick.
-  void act(Environment& environment, Tick tick) const {
-    for (std::size_t i = 0; i < hands.size(); ++i) {
-      if (tick == 1) environment.setHandPresent(hands[i], true);
-      const double x = 0.01 * wave(tick + 37 * i, 400);
-      const double y = 0.01 * wave(tick + 91 * i, 700);
-      const Vector3 p = places[i] + Vector3(x, y, tick < 20 ? 0.0 : -0.004);
-      environment.setHandPose(hands[i], Pose(p, expRotation({0.0, 0.0, 0.1 * wave(tick, 900)})), {});
-    }
-  }
-  void step(Environment& environment) const {
-    act(environment, environment.tick() + 1);
-    environment.step();
+  static Stir stirred(std::size_t hand, Tick tick) {
+    const double x = 0.01 * wave(tick + 37 * hand, 400);
+    const double y = 0.01 * wave(tick + 91 * hand, 700);
+    return {Vector3(x, y, tick < 20 ? 0.0 : -0.004), 0.1 * wave(tick, 900)};
   }
 
-  SmallScene small;
-  std::shared_ptr<const Scene> scene;
-  ObjectId floor;
   std::vector<ObjectId> parts;
-  std::vector<Vector3> places;
-  std::vector<HandId> hands;
   std::vector<std::size_t> pairs;
 };
 
