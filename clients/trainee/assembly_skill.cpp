@@ -1,7 +1,6 @@
 #include "clients/trainee/assembly_skill.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace tenon {
 
@@ -10,7 +9,6 @@ constexpr double kPassBy = 0.08;          // [m] near enough to a point on the w
 constexpr double kThere = 0.004;          // [m] near enough to its end
 constexpr double kFacing = 0.02;          // [rad]
 constexpr double kStandOff = 0.15;        // [m] before a thing to be touched she slows down
-constexpr double kUpright = 1.9;          // times as high as deep: it is taken from the front, not from above
 constexpr double kTouchForce = 1.0;       // [N]
 constexpr double kTouchSpeed = 0.06;      // [m/s]
 constexpr double kTouchGain = 0.06;       // [m/s per N]
@@ -21,18 +19,9 @@ constexpr double kSeatNear = 0.008;       // [m] before the target she pushes no
 constexpr double kInsertSpeed = 0.06;     // [m/s]
 constexpr double kFreeSpeed = 0.20;       // [m/s] as long as there is nothing near to push against
 constexpr double kNear = 0.09;            // [m] before the target she expects to meet something
-constexpr double kTiltSeen = 0.04;        // [rad] a tilt that strikes the eye
-constexpr double kTiltRate = 1.5;         // [1/s] at which she turns her hand against it
-constexpr double kMostTurned = 0.3;       // [rad] she turns her hand
-constexpr double kPushGain = 0.012;       // [m/s per N] how quickly a hand gives way or follows
 constexpr double kLongestPush = 0.08;     // [m] the intent goes ahead of the object
 constexpr double kBump = 6.0;             // [N] on the way: she hit something
-constexpr double kSpiralPitch = 0.0008;   // [m]
 constexpr double kSpiralWidest = 0.0065;  // [m]
-constexpr double kSpiralSpeed = 0.015;    // [m/s]
-constexpr double kTilt = 0.012;           // [rad] of the wiggle
-constexpr double kTwist = 0.035;          // [rad] likewise, about the axis: nothing else turns it there
-constexpr double kTiltPace = 7.0;         // [rad/s]
 constexpr double kDip = 0.0005;           // [m] it goes deeper than it stood: the way in is near
 constexpr double kComply = 1.0;           // [1/s] at which a hand that presses takes on how the part lies
 constexpr double kHelped = 0.1;           // [m] between a part's outline and the helper's cube
@@ -41,21 +30,6 @@ constexpr double kHardlyFelt = 0.1;       // [N]
 constexpr double kPressedInVain = 5.0;    // [s] nobody says that it sits: she tries again
 constexpr double kWaitedInVain = 8.0;     // [s] likewise, when she hardly presses
 constexpr double kLookGain = 2.2;         // [1/s] at which a hand follows the eye
-
-/// A turn of (cos, sin) by a small angle; stays on the circle without trigonometry.
-void turn(Vector3& phasor, double angle) {
-  phasor.x() -= angle * phasor.y();
-  phasor.y() += angle * phasor.x();
-}
-
-/// Two unit vectors that stand upright on `axis` and on each other.
-void besides(const Vector3& axis, Vector3& u, Vector3& v) {
-  const Vector3 other = std::abs(axis.z()) < 0.9 ? Vector3::UnitZ() : Vector3::UnitX();
-  u = axis.cross(other).normalized();
-  v = axis.cross(u);
-}
-
-Vector3 faded(const Vector3& v, double dt, double time) { return v * (1.0 - std::min(1.0, dt / time)); }
 }  // namespace
 
 void AssemblySkill::begin(const Pose& X_WH) noexcept {
@@ -107,11 +81,9 @@ const char* AssemblySkill::doing() const noexcept {
 void AssemblySkill::enter(Phase phase) noexcept {
   phase_ = phase;
   phase_time_ = 0.0;
-  stall_time_ = 0.0;
+  aligned_time_ = 0.0;
   bump_time_ = 0.0;
 }
-
-// ---- tasks
 
 void AssemblySkill::goHome(const HandSense& sense, const ClearWay& clear_way) noexcept {
   goal_ = Goal::kHome;
@@ -123,8 +95,7 @@ void AssemblySkill::touch(const HandSense& sense, const ClearWay& clear_way, con
   p_WTouch_ = task.X_WO * task.centre;
   probe_ = 0;
   const Vector3 size_W = task.X_WO.matrix().cwiseAbs() * task.size;
-  const bool upright = size_W.z() > kUpright * size_W.y();
-  const Vector3 side = upright ? Vector3(-Vector3::UnitY()) : Vector3(Vector3::UnitZ());
+  const Vector3 side = sideToTouch(size_W);
   const Vector3 before = p_WTouch_ + side * (0.5 * side.cwiseAbs().dot(size_W) + kStandOff);
   travelTo({before, Quaternion::Identity()}, sense, clear_way, 0.08);
   // first to that side of it, so that the hand does not graze it on the way
@@ -192,14 +163,11 @@ void AssemblySkill::travelTo(const Pose& X_WH_goal, const HandSense& sense, cons
   enter(Phase::kTravel);
 }
 
-// ---- one millisecond
-
 void AssemblySkill::step(const HandSense& sense, const DelayedSight& sight, double dt) noexcept {
   phase_time_ += dt;
   const double against = -sense.F_Ho_W.force.dot(axis_W_);
   felt_ += dt / (0.03 + dt) * (against - felt_);
-  carry_.translation = faded(carry_.translation, dt, 0.3);
-  carry_.rotation = faded(carry_.rotation, dt, 0.3);
+  carry_ = faded(carry_, dt, 0.3);
   letGoOfMounted(sense);
   switch (phase_) {
     case Phase::kRest:
@@ -293,12 +261,8 @@ void AssemblySkill::touching(const HandSense& sense, double dt) noexcept {
   // through where it should be and nothing felt: it is open there; feel around in it
   const double way_to_it = (p_WTouch_ - reach_.pose().translation()).dot(axis_W_);
   if (felt_ > 0.3 || depth_ < way_to_it + 0.03) return;
-  static constexpr double kProbes[][3] = {{0.0, 0.0, -0.04}, {0.06, 0.0, 0.0}, {-0.06, 0.0, 0.0},
-                                          {0.0, 0.0, 0.04},  {0.0, 0.06, 0.0}, {0.0, -0.06, 0.0},
-                                          {0.0, 0.0, -0.1}};
-  const auto& probe = kProbes[probe_++ % std::size(kProbes)];
   reach_.start(sense.X_WH);
-  axis_W_ = (p_WTouch_ + Vector3(probe[0], probe[1], probe[2]) - sense.X_WH.translation()).normalized();
+  axis_W_ = (p_WTouch_ + probeAround(probe_++) - sense.X_WH.translation()).normalized();
   depth_ = 0.0;
   felt_ = 0.0;
 }
@@ -315,18 +279,17 @@ void AssemblySkill::align(const HandSense& sense, const DelayedSight& sight, dou
   const Displacement off = displacement(sight.pose(task_.object), X_WBefore);
   nudge_.translation += kLookGain * dt * off.translation;
   nudge_.rotation += kLookGain * dt * off.rotation;
-  if (nudge_.translation.norm() > 0.05) nudge_.translation *= 0.05 / nudge_.translation.norm();
-  if (nudge_.rotation.norm() > 0.2) nudge_.rotation *= 0.2 / nudge_.rotation.norm();
+  nudge_ = {noLongerThan(nudge_.translation, 0.05), noLongerThan(nudge_.rotation, 0.2)};
   const bool there =
       off.translation.norm() < std::min(0.001, 0.4 * task_.tolerance) && off.rotation.norm() < 0.008;
-  stall_time_ = there ? stall_time_ + dt : 0.0;
-  if (stall_time_ < 0.2 && phase_time_ < 6.0) return;
+  aligned_time_ = there ? aligned_time_ + dt : 0.0;
+  if (aligned_time_ < 0.2 && phase_time_ < 6.0) return;
   if (task_.approach_distance <= 0.0) {
     // nothing to push into: stay there, looking
     return;
   }
   depth_ = -task_.approach_distance;
-  stall_depth_ = depthSeen(sight);
+  stall_watch_.start(depthSeen(sight));
   ++attempts_;
   enter(Phase::kInsert);
 }
@@ -339,9 +302,9 @@ void AssemblySkill::insert(const HandSense& sense, const DelayedSight& sight, do
     const double ahead = -kNear - depth_;
     depth_ += dt * std::min({kFreeSpeed, kInsertSpeed + 4.0 * ahead, 0.05 + 0.5 * phase_time_});
   } else {
-    pushAlong(force, kInsertSpeed, dt);
+    depth_ += pushStep(force, felt_, kInsertSpeed, dt);
   }
-  uprightAgain(sight, dt);
+  turnUpright(sight, dt);
   // what does not resist is not pushed beyond where it belongs
   if (felt_ < 0.5) depth_ = std::min(depth_, 0.0);
   depth_ = std::min(depth_, std::min(seen, 0.0) + kLongestPush);
@@ -357,34 +320,24 @@ void AssemblySkill::insert(const HandSense& sense, const DelayedSight& sight, do
     return;
   }
   const bool home = -seen < std::max(0.003, 1.5 * task_.tolerance);
-  if (home && (stalled(sight, 0.0005) || depth_ >= 0.0)) {
+  if (home && (stall_watch_.stalled(depthSeen(sight), 0.0005) || depth_ >= 0.0)) {
     enter(Phase::kSeated);
     return;
   }
-  if (felt_ < 0.6 * force || task_.sure_of_it || !stalled(sight, 0.001)) return;
+  if (felt_ < 0.6 * force || task_.sure_of_it || !stall_watch_.stalled(depthSeen(sight), 0.001)) return;
   search_depth_ = seen;
-  spiral_radius_ = 0.0;
-  spiral_ = Vector3::UnitX();
-  tilt_ = Vector3::UnitX();
+  wiggle_ = {};
   enter(Phase::kSearch);
 }
 
 void AssemblySkill::search(const HandSense& sense, const DelayedSight& sight, double dt) noexcept {
-  pushAlong(kSearchForce, 0.03, dt);
-  uprightAgain(sight, dt);
+  depth_ += pushStep(kSearchForce, felt_, 0.03, dt);
+  turnUpright(sight, dt);
   depth_ = std::min(depth_, std::min(depthSeen(sight), 0.0) + kLongestPush);
   const bool near = depthSeen(sight) > search_depth_ + kDip;
-  const double pace = (near ? 0.3 : 1.0) * kSpiralSpeed / std::max(0.002, spiral_radius_);
-  turn(spiral_, pace * dt);
-  spiral_radius_ += kSpiralPitch * pace * dt / (2.0 * M_PI);
-  turn(tilt_, kTiltPace * dt);
+  wiggle_.step(near, dt);
   comply(sight, kComply, dt);
-  Vector3 u, v;
-  besides(axis_W_, u, v);
-  const Vector3 beside = spiral_radius_ * (spiral_.x() * u + spiral_.y() * v);
-  const Quaternion tilt =
-      expRotation(kTilt * tilt_.x() * (spiral_.y() * u - spiral_.x() * v) + kTwist * tilt_.y() * axis_W_);
-  holdObject(sense, beside, tilt, dt);
+  holdObject(sense, wiggle_.way(axis_W_), wiggle_.tilt(axis_W_), dt);
 
   const double seen = depthSeen(sight);
   if (seen > search_depth_ + 0.0025) {
@@ -393,9 +346,9 @@ void AssemblySkill::search(const HandSense& sense, const DelayedSight& sight, do
     carry_ = displacement(X_WAim_ * sense.X_HO.inverse(), X_WI_);
     carry_.translation -= nudge_.translation;
     carry_.translation -= axis_W_ * carry_.translation.dot(axis_W_);
+    stall_watch_.start(seen);
     enter(Phase::kInsert);
-    stall_depth_ = seen;
-  } else if (spiral_radius_ > kSpiralWidest) {
+  } else if (wiggle_.radius() > kSpiralWidest) {
     bias_scale_ *= 0.6;
     enter(Phase::kBackOff);
   }
@@ -407,7 +360,7 @@ void AssemblySkill::backOff(const HandSense& sense, const DelayedSight& sight, d
   holdObject(sense, Vector3::Zero(), Quaternion::Identity(), dt);
   if (depth_ > out || phase_time_ < 1.0) return;
   aim();
-  stall_depth_ = depthSeen(sight);
+  stall_watch_.start(depthSeen(sight));
   ++attempts_;
   enter(Phase::kInsert);
 }
@@ -415,7 +368,7 @@ void AssemblySkill::backOff(const HandSense& sense, const DelayedSight& sight, d
 void AssemblySkill::seated(const HandSense& sense, const DelayedSight& sight, double dt) noexcept {
   back_out_W_ = -axis_W_ * std::max(0.15, task_.approach_distance);
   if (task_.by_touch) {
-    pushAlong(kSeatForce, 0.03, dt);
+    depth_ += pushStep(kSeatForce, felt_, 0.03, dt);
     if (felt_ < 0.5) depth_ = std::min(depth_, 0.0);
     depth_ = std::min(depth_, kLongestPush);
     // held by its seat it needs no guiding: go limp sideways
@@ -436,23 +389,15 @@ void AssemblySkill::seated(const HandSense& sense, const DelayedSight& sight, do
   holdObject(sense, Vector3::Zero(), Quaternion::Identity(), dt);
 }
 
-// ---- small abilities
-
 void AssemblySkill::yieldTo(const DelayedSight& sight, double rate, double dt) noexcept {
   if (!sight.knows(task_.object)) return;
-  const Displacement off = displacement(X_WAim_, sight.pose(task_.object));
-  const Vector3 lateral = off.translation - off.translation.dot(axis_W_) * axis_W_;
-  X_WAim_.translation() += std::min(1.0, rate * dt) * lateral;
+  X_WAim_ = yieldedTo(sight.pose(task_.object), X_WAim_, axis_W_, std::min(1.0, rate * dt));
   comply(sight, rate, dt);
 }
 
 void AssemblySkill::comply(const DelayedSight& sight, double rate, double dt) noexcept {
   if (!sight.knows(task_.object)) return;
-  const Pose& X_WO = sight.pose(task_.object);
-  // what is plainly tilted does not lie as it should, however well it gives way
-  if (displacement(task_.X_WG, X_WO).rotation.norm() > kTiltSeen) return;
-  const Vector3 turned = std::min(1.0, rate * dt) * displacement(X_WAim_, X_WO).rotation;
-  X_WAim_ = displaced(X_WAim_, {Vector3::Zero(), turned});
+  X_WAim_ = compliedWith(sight.pose(task_.object), X_WAim_, task_.X_WG, std::min(1.0, rate * dt));
 }
 
 bool AssemblySkill::helped(const DelayedSight& sight) const noexcept {
@@ -462,17 +407,9 @@ bool AssemblySkill::helped(const DelayedSight& sight) const noexcept {
   return (p_OC.cwiseAbs() - 0.5 * task_.size).cwiseMax(0.0).norm() < kHelped;
 }
 
-void AssemblySkill::uprightAgain(const DelayedSight& sight, double dt) noexcept {
+void AssemblySkill::turnUpright(const DelayedSight& sight, double dt) noexcept {
   if (!sight.knows(task_.object)) return;
-  const Vector3 off = displacement(sight.pose(task_.object), X_WAim_).rotation;
-  const double angle = off.norm();
-  if (angle > kTiltSeen) nudge_.rotation += kTiltRate * dt * (1.0 - kTiltSeen / angle) * off;
-  if (nudge_.rotation.norm() > kMostTurned) nudge_.rotation *= kMostTurned / nudge_.rotation.norm();
-}
-
-void AssemblySkill::pushAlong(double wanted_force, double highest_speed, double dt) noexcept {
-  const double speed = std::clamp(kPushGain * (wanted_force - felt_), -highest_speed, highest_speed);
-  depth_ += speed * dt;
+  nudge_.rotation = uprightAgain(nudge_.rotation, sight.pose(task_.object), X_WAim_, dt);
 }
 
 void AssemblySkill::holdObject(const HandSense& sense, const Vector3& beside_W, const Quaternion& tilt,
@@ -496,17 +433,6 @@ void AssemblySkill::setIntent(const Pose& X_WI, double dt) noexcept {
 double AssemblySkill::depthSeen(const DelayedSight& sight) const noexcept {
   if (!sight.knows(task_.object)) return depth_;
   return (sight.pose(task_.object).translation() - X_WAim_.translation()).dot(axis_W_);
-}
-
-bool AssemblySkill::stalled(const DelayedSight& sight, double way) noexcept {
-  constexpr double kLookAgain = 0.4;  // [s]
-  stall_time_ += 1e-3;
-  if (stall_time_ < kLookAgain) return false;
-  const double seen = depthSeen(sight);
-  const bool still = seen - stall_depth_ < way;
-  stall_depth_ = seen;
-  stall_time_ = 0.0;
-  return still;
 }
 
 }  // namespace tenon

@@ -7,6 +7,7 @@
 #include "clients/haptic/random.h"
 #include "clients/haptic/senses.h"
 #include "clients/haptic/smooth_reach.h"
+#include "clients/trainee/assembly_abilities.h"
 
 namespace tenon {
 
@@ -78,13 +79,11 @@ class AssemblySkill {
   void yieldTo(const DelayedSight& sight, double rate, double dt) noexcept;
   void comply(const DelayedSight& sight, double rate, double dt) noexcept;
   [[nodiscard]] bool helped(const DelayedSight& sight) const noexcept;
-  void uprightAgain(const DelayedSight& sight, double dt) noexcept;
-  void pushAlong(double wanted_force, double highest_speed, double dt) noexcept;
+  void turnUpright(const DelayedSight& sight, double dt) noexcept;
   void holdObject(const HandSense& sense, const Vector3& beside_W, const Quaternion& tilt,
                   double dt) noexcept;
   void setIntent(const Pose& X_WI, double dt) noexcept;
   [[nodiscard]] double depthSeen(const DelayedSight& sight) const noexcept;
-  [[nodiscard]] bool stalled(const DelayedSight& sight, double way) noexcept;
 
   PersonOptions person_;
   Random random_;
@@ -120,13 +119,11 @@ class AssemblySkill {
   Vector3 p_WTouch_ = Vector3::Zero();
 
   double phase_time_ = 0.0;
-  double stall_time_ = 0.0;
-  double stall_depth_ = 0.0;
+  double aligned_time_ = 0.0;
+  StallWatch stall_watch_;
   double bump_time_ = 0.0;
   double search_depth_ = 0.0;
-  double spiral_radius_ = 0.0;
-  Vector3 spiral_ = Vector3::UnitX();  // (cos, sin) of the spiral's angle, and its pace
-  Vector3 tilt_ = Vector3::UnitX();    // likewise of the tilt
+  Wiggle wiggle_;
 };
 
 }  // namespace tenon
