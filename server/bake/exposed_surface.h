@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "server/bake/brick_level.h"
-#include "server/bake/triangle.h"
+#include "server/structures/triangle.h"
 
 namespace tenon {
 

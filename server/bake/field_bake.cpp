@@ -95,7 +95,8 @@ std::vector<float> brickDistances(const BrickLevel& coarse, ParallelWork& work) 
     const std::int32_t slot = coarse.slot[node];
     if (slot < 0) return;
     // a surface in the brick is within half a voxel's diagonal of one of its samples
-    constexpr auto kTouch = static_cast<int>(0.8661 * DistanceField::kQuantaPerVoxel) + 1;
+    constexpr auto kTouch =
+        static_cast<int>(DistanceField::kHalfDiagonal * DistanceField::kQuantaPerVoxel) + 1;
     const std::int16_t* samples = coarse.samplesOf(slot);
     const bool surface =
         std::any_of(samples, samples + BrickLevel::kSamples, [](int s) { return std::abs(s) <= kTouch; });

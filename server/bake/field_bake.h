@@ -5,7 +5,7 @@
 
 #include "idl/types/result.h"
 #include "server/bake/bake.h"
-#include "server/bake/triangle.h"
+#include "server/structures/triangle.h"
 
 namespace tenon {
 

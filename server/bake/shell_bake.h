@@ -3,8 +3,8 @@
 #include <span>
 
 #include "server/bake/bake.h"
-#include "server/bake/triangle.h"
 #include "server/bake/welded_mesh.h"
+#include "server/structures/triangle.h"
 
 namespace tenon {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "server/bake/triangle.h"
+#include "server/structures/triangle.h"
 
 namespace tenon {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "server/bake/bake.h"
-#include "server/bake/triangle.h"
+#include "server/structures/triangle.h"
 
 namespace tenon {
 

@@ -141,8 +141,8 @@ inline constexpr double kLeastGradient = 0.3;
 /// The gap of a pair that has nothing to test [m]: far, yet a number that can be divided.
 inline constexpr double kNothingNear = 1e6;
 
-/// Half the diagonal of a voxel, rounded up: no interpolated distance is further from the truth [voxels].
-inline constexpr double kHalfDiagonal = 0.8661;
+/// [voxels]
+inline constexpr double kHalfDiagonal = DistanceField::kHalfDiagonal;
 
 /// All that this processor can run: what every such processor has first, the fastest last.
 [[nodiscard]] std::span<const QueryKernels> supportedKernels() noexcept;

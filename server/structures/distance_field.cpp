@@ -7,9 +7,6 @@ namespace tenon {
 
 namespace {
 
-// Half the diagonal of a voxel: no point of space is further from the nearest sample [voxels].
-constexpr double kHalfDiagonal = 0.8661;
-
 double distanceToBox(const Eigen::AlignedBox3d& box, const Vector3& p) {
   const Vector3 outside = (box.min() - p).cwiseMax(p - box.max()).cwiseMax(0.0);
   return outside.norm();

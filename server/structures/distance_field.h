@@ -40,6 +40,9 @@ class DistanceField {
   /// A cell's corners lie within sqrt(3) voxels of any of its points: below kBandVoxels none of them is
   /// clamped.
   static constexpr double kClampVoxels = kBandVoxels + 1.75;
+  /// [voxels] Half the diagonal of one, rounded up: no point is further from the nearest sample, and no
+  /// interpolated distance from the truth.
+  static constexpr double kHalfDiagonal = 0.8661;
 
   /// An index entry: < 0: see constants; else the number of a brick. Refined: kRefined + the place in `index`
   /// of its first child. The refinement^3 children (x fastest) are followed by one more entry: the coarse

@@ -2,20 +2,17 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+
+#include "server/structures/triangle.h"
 
 namespace tenon {
 
 namespace {
 
-using Triangle = std::array<Vector3, 3>;
-
 /// [voxels] An empty ball that comes as near as this to a place exposes it.
 constexpr double kTouch = 0.25;
 /// [voxels] Heights over a place at which such balls are looked for.
 constexpr std::array kHeights{0.5, 0.25, 1.0, 2.0};
-/// [voxels] Half the diagonal of one: no interpolated distance is further from the truth.
-constexpr double kHalfDiagonalVoxels = 0.8661;
 /// [voxels] No piece is longer: a tree of boxes does not like long triangles.
 constexpr double kPiece = 6.0;
 /// [voxels] Shorter ones are not cut.
@@ -43,10 +40,8 @@ class Cutter {
   struct Halves {
     explicit Halves(const Triangle& t) : first(t), second(t) {
       std::size_t a = 0;
-      const auto edge = [&t](std::size_t i) { return (t[(i + 1) % 3] - t[i]).norm(); };
-      for (std::size_t i = 1; i < 3; ++i) a = edge(i) > edge(a) ? i : a;
+      length = longestEdge(t, a);
       const std::size_t b = (a + 1) % 3;
-      length = edge(a);
       first[b] = second[a] = 0.5 * (t[a] + t[b]);
     }
     Triangle first, second;
@@ -82,7 +77,7 @@ class Cutter {
   /// Whether an empty ball over the place, on either side, comes near to it.
   [[nodiscard]] bool isExposed(const Vector3& p, const Vector3& normal, double voxel) const {
     const double here = field_.sample(p).distance;
-    if (here < -(kTouch + kHalfDiagonalVoxels) * voxel) return false;
+    if (here < -(kTouch + DistanceField::kHalfDiagonal) * voxel) return false;
     for (const double height : kHeights) {
       for (const double side : {height, -height}) {
         const double radius = field_.sample(p + side * voxel * normal).distance;
