@@ -6,6 +6,7 @@
 #include <xxhash.h>
 
 #include "server/bake/bake.h"
+#include "server/bake/octree_file.h"
 
 namespace tenon {
 
@@ -112,6 +113,7 @@ Result<HapticStructures> bakeFiles(const std::vector<std::filesystem::path>& mes
   if (!structures) return fail(source + ": " + structures.error().what);
   structures->info.source = source;
   structures->info.meshes = meshes;
+  structures->info.unit = std::all_of(meshes.begin(), meshes.end(), isOctree) ? 1.0 : unit;
   structures->info.content_hash = *hash;
   return structures;
 }

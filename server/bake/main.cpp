@@ -115,6 +115,7 @@ void printInfo(const HapticStructures& structures) {
   fmt::print("mesh          {} triangles, {} x {} x {}\n", info.triangles, readable(size.x()),
              readable(size.y()), readable(size.z()));
   fmt::print("              from {} to {}\n", readable(info.box_M.min()), readable(info.box_M.max()));
+  fmt::print("              one unit of its files is {}\n", readable(info.unit));
   fmt::print("field         {} voxels, {} of {} bricks with samples, {:.1f} MB, {:.0f} bytes a brick\n",
              readable(layout.voxel), info.bricks, coarse, megabytes,
              1e6 * megabytes / static_cast<double>(std::max<std::size_t>(info.bricks, 1)));

@@ -1,6 +1,5 @@
 #include "server/bake/surface_import.h"
 
-#include <array>
 #include <string>
 #include <utility>
 
@@ -12,8 +11,6 @@ namespace tenon {
 namespace {
 
 using SurfaceTriangle = SurfaceTree::Triangle;
-
-constexpr std::array kMeshUnits{0.001, 1.0, 0.01, 0.0254};
 
 Result<std::vector<SurfaceTriangle>> trianglesOf(const std::vector<std::filesystem::path>& meshes,
                                                  double unit) {
@@ -43,19 +40,13 @@ Result<SurfaceTree> importSurface(const HapticStructures& structures,
                                   std::vector<std::filesystem::path> meshes) {
   if (meshes.empty()) meshes = structures.info.meshes;
   if (meshes.empty()) return fail(structures.info.source + ": nothing tells where its mesh is");
-  Error reason{meshes.front().string() + ": is not the mesh of " + structures.info.source +
-               ": no unit makes it as large"};
-  for (const double unit : kMeshUnits) {
-    auto triangles = trianglesOf(meshes, unit);
-    if (!triangles) {
-      reason = triangles.error();
-      break;
-    }
-    if (fills(*triangles, structures.info.box_M)) {
-      return SurfaceTree(outerTriangles(*triangles, structures.field));
-    }
+  const auto triangles = trianglesOf(meshes, structures.info.unit);
+  if (!triangles) return tl::unexpected(triangles.error());
+  if (!fills(*triangles, structures.info.box_M)) {
+    return fail(meshes.front().string() + ": is not the mesh of " + structures.info.source +
+                ": it is of another size");
   }
-  return tl::unexpected(reason);
+  return SurfaceTree(outerTriangles(*triangles, structures.field));
 }
 
 }  // namespace tenon

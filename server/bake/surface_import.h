@@ -10,8 +10,7 @@
 namespace tenon {
 
 /// The outer surface of what structures were baked from, read again. `meshes` empty: from where they lay
-/// then. The unit of the files is the one that makes them as large as the structures say; files of another
-/// size are refused.
+/// then. Files that are not as large as the structures say, in the unit they were baked in, are refused.
 [[nodiscard]] Result<SurfaceTree> importSurface(const HapticStructures& structures,
                                                 std::vector<std::filesystem::path> meshes = {});
 

@@ -22,6 +22,7 @@ struct StructureInfo {
   double surface_area = 0.0;  ///< [m^2] of the sampled outer surface
   std::uint64_t bricks = 0;
   std::vector<std::filesystem::path> meshes;  ///< where they lay; a file keeps the way there from its folder
+  double unit = 1.0;                          ///< [m] of one unit of these files
   std::string notes;  ///< one sentence a line: what a person should know (parts without an inside, ...)
 };
 

@@ -18,7 +18,7 @@ namespace tenon {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'T', 'E', 'N', 'O', 'N', 'H', 'S', '\n'};
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVersion = 3;
 constexpr std::uint32_t kByteOrder = 0x01020304U;
 constexpr std::size_t kAlignment = 64;
 
@@ -61,7 +61,7 @@ struct Header {
   std::int32_t refinement = 1;
   std::array<std::uint64_t, kSections> first{}, count{};
   std::uint64_t triangles = 0, info_bricks = 0;
-  double bake_seconds = 0.0, surface_area = 0.0;
+  double bake_seconds = 0.0, surface_area = 0.0, unit = 1.0;
   std::array<double, 6> box_M{};
 };
 static_assert(std::is_trivially_copyable_v<Header>);
@@ -117,6 +117,7 @@ Header headerOf(const HapticStructures& structures) {
   header.info_bricks = info.bricks;
   header.bake_seconds = info.bake_seconds;
   header.surface_area = info.surface_area;
+  header.unit = info.unit;
   Vector3::Map(header.box_M.data()) = info.box_M.min();
   Vector3::Map(header.box_M.data() + 3) = info.box_M.max();
   return header;
@@ -327,6 +328,7 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
   info.bricks = header->info_bricks;
   info.bake_seconds = header->bake_seconds;
   info.surface_area = header->surface_area;
+  info.unit = header->unit;
   info.box_M = {Vector3::Map(header->box_M.data()), Vector3::Map(header->box_M.data() + 3)};
   return structures;
 }

@@ -12,13 +12,13 @@ from xml.etree import ElementTree
 from stage import PROGRAMS, Stage, tenon
 
 
-def cube(folder):
+def cube(folder, half=10, unit="mm"):
     """A cube of 20 mm about the origin, baked at 1 mm."""
     mesh, baked = Path(folder) / "cube.off", Path(folder) / "cube.tenon"
-    corners = [f"{x} {y} {z}" for z in (-10, 10) for y in (-10, 10) for x in (-10, 10)]
+    corners = [f"{x} {y} {z}" for z in (-half, half) for y in (-half, half) for x in (-half, half)]
     sides = ("0 2 3 1", "4 5 7 6", "0 1 5 4", "2 6 7 3", "0 4 6 2", "1 3 7 5")
     mesh.write_text("\n".join(["OFF", "8 6 0", *corners, *(f"4 {side}" for side in sides)]) + "\n", encoding="utf-8")
-    done = tenon("bake", mesh, "-o", baked, "--voxel", "1mm", "--points", "2000", "--quiet")
+    done = tenon("bake", mesh, "-o", baked, "--unit", unit, "--voxel", "1mm", "--points", "2000", "--quiet")
     assert done.returncode == 0, done.stderr
     return baked
 
@@ -158,6 +158,20 @@ class Verbs(unittest.TestCase):
             done = tenon("contact", baked, baked, "--poses", poses, "--refine")
             self.assertEqual(done.returncode, 1)
             self.assertIn("cube.off", done.stderr)
+
+    def test_a_mesh_is_read_again_in_the_unit_it_was_baked_in(self):
+        with tempfile.TemporaryDirectory() as folder:
+            baked, poses = cube(folder, half=1, unit="cm"), Path(folder) / "poses"
+            self.assertIn("one unit of its files is 10 mm", tenon("bake", "--info", baked).stdout)
+            poses.write_text("0.0195 0.0195 0.003 1 0 0 0\n", encoding="utf-8")
+            done = tenon("contact", baked, baked, "--poses", poses, "--refine")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertRegex(done.stdout, r"penetration +at most 0\.5 mm")
+            with tempfile.TemporaryDirectory() as elsewhere:
+                cube(elsewhere)
+                done = tenon("contact", baked, baked, "--poses", poses, "--mesh", Path(elsewhere) / "cube.off")
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("is of another size", done.stderr)
 
     def test_bad_points_and_poses_are_refused_by_line(self):
         with tempfile.TemporaryDirectory() as folder:

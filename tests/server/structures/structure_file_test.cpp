@@ -32,6 +32,7 @@ class StructureFile : public ::testing::Test {
     structures_.info.source = "ball.stl";
     structures_.info.content_hash = "0123";
     structures_.info.meshes = {folder_.parent_path() / "parts" / "ball.stl"};
+    structures_.info.unit = 0.0254;
     structures_.info.notes = "A note.\n";
     structures_.info.triangles = 12;
     structures_.info.box_M = {-corner, corner};
@@ -70,6 +71,7 @@ TEST_F(StructureFile, ComesBackAsItWent) {
   EXPECT_EQ(read.info.source, "ball.stl");
   EXPECT_EQ(read.info.notes, "A note.\n");
   EXPECT_EQ(read.info.meshes, structures_.info.meshes);
+  EXPECT_EQ(read.info.unit, 0.0254);
   EXPECT_EQ(read.info.box_M.max(), structures_.info.box_M.max());
   const Vector3 p(0.011, 0.012, 0.013);
   EXPECT_EQ(read.field.sample(p).distance, structures_.field.sample(p).distance);
@@ -127,11 +129,14 @@ TEST_F(StructureFile, AThousandRandomDamagesAreAllRefused) {
 
 TEST_F(StructureFile, AnotherVersionSaysWhatToDo) {
   std::string bytes = written();
-  bytes[8] = 77;
-  put(bytes);
-  const auto opened = openStructures(file());
-  ASSERT_FALSE(opened);
-  EXPECT_THAT(opened.error().what, HasSubstr("bake it again"));
+  for (const char version : {2, 77}) {
+    bytes[8] = version;
+    put(bytes);
+    const auto opened = openStructures(file());
+    ASSERT_FALSE(opened);
+    EXPECT_THAT(opened.error().what, HasSubstr("version " + std::to_string(version)));
+    EXPECT_THAT(opened.error().what, HasSubstr("bake it again"));
+  }
 }
 
 TEST_F(StructureFile, MissingFilesAndFoldersAreNamed) {
