@@ -108,11 +108,7 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
     const bool stays = best == at_start && worse > kWorsePlaces && way < kLittleWay;
     // a place or two may be worse on the way to a better one, but not the end of the way
     if (worse > kWorsePlaces || (last && worse > 0)) {
-      for (std::size_t i = 0; i < job.bodies.size(); ++i) {
-        job.bodies[i].X_WB = best_[i];
-        job.bodies[i].brakes.clear();
-      }
-      std::fill(gone_.begin(), gone_.end(), Displacement{});
+      goBackToBest(job);
       worse = 0;
       look(job, report);
       way = travel(job);
@@ -132,6 +128,14 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
     body.curves.clear();
     body.drag_Bo_W = Wrench{};
   }
+}
+
+void IslandSolver::goBackToBest(const Job& job) {
+  for (std::size_t i = 0; i < job.bodies.size(); ++i) {
+    job.bodies[i].X_WB = best_[i];
+    job.bodies[i].brakes.clear();
+  }
+  std::fill(gone_.begin(), gone_.end(), Displacement{});
 }
 
 double IslandSolver::merit(const Job& job) {

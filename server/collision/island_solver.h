@@ -147,6 +147,7 @@ class IslandSolver {
   [[nodiscard]] double shareWithinReach(const Job& job) const;
   void pinWhatHasGoneItsReach(const Job& job) const;
   void move(const Job& job, double share);
+  void goBackToBest(const Job& job);
   /// [J] how good a place is: the springs' energy, and a price on what is too deep that no spring can pay.
   [[nodiscard]] static double merit(const Job& job);
   /// True when a body is on its way back from where it has just gone; then it is braked along that way.
