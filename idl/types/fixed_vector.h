@@ -25,6 +25,8 @@ class FixedVector {
     values_[size_++] = value;
     return true;
   }
+  /// One more, as it comes; null when all N places are taken.
+  [[nodiscard]] T* extend() { return size_ == N ? nullptr : &values_[size_++]; }
   void clear() { size_ = 0; }
   void resize(std::size_t size) {
     assert(size <= N);

@@ -88,7 +88,7 @@ Result<Clearance> clearance(const HapticStructures& moved, std::span<const Pose>
     if (!any) return false;
     // a bound may still be replaced by anything in the band
     const double enough = certain(best) ? best.distance : std::max(best.distance, scene_W.band());
-    return scene_W.lowerBound(X_WM * ball.p_MC.cast<double>()) - static_cast<double>(ball.radius) > enough;
+    return scene_W.lowerBound(X_WM * ball.p_MC.cast<double>(), ball.radius) > enough;
   };
   const auto walked =
       walk(poses_WM, radiusOf(moved.field), step, progress, [&](std::size_t pose, const Pose& X_WM) {

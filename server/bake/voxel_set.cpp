@@ -44,7 +44,7 @@ void VoxelSet::addBlock(const Cell& block, const DistanceField& field, const Pos
   const Vector3 p_WB = block.cast<double>() * edge;
   const Vector3 middle = X_MW * (p_WB + Vector3::Constant(edge / 2));
   const double radius = 0.867 * edge;
-  if (field.lowerBound(middle) > radius + grow) return;
+  if (field.lowerBound(middle, radius) > grow) return;
   const std::array place{block.x(), block.y(), block.z()};
   if (field.sample(middle).distance < -radius) {
     blocks_[place].fill(~std::uint64_t{0});

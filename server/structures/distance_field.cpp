@@ -7,6 +7,9 @@ namespace tenon {
 
 namespace {
 
+/// A sample is off by half a quantum [voxels].
+constexpr double kRounding = 1e-3;
+
 double distanceToBox(const Eigen::AlignedBox3d& box, const Vector3& p) {
   const Vector3 outside = (box.min() - p).cwiseMax(p - box.max()).cwiseMax(0.0);
   return outside.norm();
@@ -129,15 +132,24 @@ FieldSample DistanceField::sample(const Vector3& p_MP) const noexcept {
   return sample;
 }
 
-double DistanceField::lowerBound(const Vector3& p_MP) const noexcept {
+double DistanceField::lowerBound(const Vector3& p_MP, double radius) const noexcept {
+  // A sample is no less than another one, or the centre's distance, minus the way between. The interpolant
+  // at a point is a mean of the samples about it, and the mean square of their ways is at most three quarters
+  // more than the square of the point's.
+  const auto bound = [this, radius](double value, double away) {
+    const double spread = kHalfDiagonal * layout_.voxel;
+    return value - std::sqrt((away + radius) * (away + radius) + spread * spread) - kRounding * layout_.voxel;
+  };
   Place place;
-  if (!locate(p_MP, place)) return distanceToBox(box(), p_MP) + layout_.margin;
-  if (place.entry == kFarOutside) return farMagnitude(place);
+  if (!locate(p_MP, place)) return bound(distanceToBox(box(), p_MP) + layout_.margin, 0.0);
   // nothing in the box is deeper than half its diagonal
   if (place.entry == kFarInside) return -0.5 * box().diagonal().norm();
-  // the interpolant may lie below the distance by half a voxel's diagonal, and samples are rounded
   const Vector3 p_CP = (place.p_brick - Vector3::Constant(0.5)) * brick_edge_;
-  return (static_cast<double>(layout_.far[place.number]) / kFarPerVoxel - 1.0) * layout_.voxel - p_CP.norm();
+  const double at_centre = layout_.far[place.number] * layout_.voxel / kFarPerVoxel;
+  const double from_centre = bound(at_centre, p_CP.norm());
+  if (place.entry != kFarOutside) return from_centre;
+  // the sample next to p is beyond the band
+  return std::max(from_centre, bound(layout_.band, kHalfDiagonal * layout_.voxel));
 }
 
 double DistanceField::voxelAt(const Vector3& p_MP) const noexcept {

@@ -74,10 +74,9 @@ class DistanceField {
   /// Distance and gradient at a point (trilinear in the finest brick there).
   [[nodiscard]] FieldSample sample(const Vector3& p_MP) const noexcept;
 
-  /// A number that the signed distance at p, and an exact sample() there, is certainly not below
-  /// (conservative; costs one look-up). For pruning: a ball of radius r about p is free when lowerBound(p) >
-  /// r.
-  [[nodiscard]] double lowerBound(const Vector3& p_MP) const noexcept;
+  /// A number that no signed distance within `radius` of p, and no exact sample() there, is below. For
+  /// pruning; costs one look-up.
+  [[nodiscard]] double lowerBound(const Vector3& p_MP, double radius = 0.0) const noexcept;
 
   /// Edge of the voxels that answer at p [m].
   [[nodiscard]] double voxelAt(const Vector3& p_MP) const noexcept;

@@ -89,6 +89,25 @@ TEST(DistanceField, LowerBoundIsNeverAboveTheDistanceNorAboveAnExactSample) {
   }
 }
 
+TEST(DistanceField, LowerBoundHoldsForAWholeBall) {
+  const Vector3 half = Vector3::Constant(0.5);
+  for (const DistanceField& field : {box(), ball({{-half, half}}, 4)}) {
+    const bool is_ball = field.layout().refinement > 1;
+    std::mt19937_64 random(4);
+    for (int i = 0; i < 50'000; ++i) {
+      const Vector3 p = somewhere(random, 0.15);
+      const double radius = 0.03 * std::abs(somewhere(random, 1.0).x());
+      const double bound = field.lowerBound(p, radius);
+      const Vector3 in_ball = p + radius * somewhere(random, 1.0).normalized();
+      EXPECT_LE(bound, (is_ball ? ballDistance(in_ball) : boxDistance(in_ball)) + 1e-12) << p.transpose();
+      const FieldSample sample = field.sample(in_ball);
+      if (sample.exact) {
+        EXPECT_LE(bound, sample.distance) << p.transpose();
+      }
+    }
+  }
+}
+
 TEST(DistanceField, LowerBoundGrowsWithTheDistanceSoThatPruningWorks) {
   const DistanceField field = ball();
   EXPECT_GT(field.lowerBound(Vector3(0.3, 0.0, 0.0)), 0.22);
