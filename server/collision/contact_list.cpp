@@ -8,7 +8,7 @@
 namespace tenon {
 
 double penaltyForce(const Contact& contact, double stiffness) noexcept {
-  return std::max(-contact.gap, 0.0) * stiffness * contact.area / kReferenceArea;
+  return std::max(-contact.gap, 0.0) * stiffness * contact.area * (1.0 / kReferenceArea);
 }
 
 Wrench penaltyWrench(const PairQueryResult& result, const Vector3& p_WAo, double stiffness) noexcept {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/collision/contact_blocks.h"
 #include "server/collision/query_kernels.h"
 
 namespace tenon {
@@ -27,16 +28,11 @@ using BentContacts = FixedVector<Bent, kMaxPairContacts>;
 void findBent(const LaneFrame& frame, const Pointshell& shell, const ContactList& contacts,
               BentContacts& bent) {
   for (std::size_t first = 0; first < contacts.size(); first += ShellBlock::kLanes) {
-    ShellBlock block;
-    block.count = static_cast<std::uint32_t>(std::min(contacts.size() - first, ShellBlock::kLanes));
-    for (std::uint32_t i = 0; i < block.count; ++i) {
-      const Vector3f& p_AP = shell.points()[contacts[first + i].point].p_MP;
-      block.x[i] = p_AP.x();
-      block.y[i] = p_AP.y();
-      block.z[i] = p_AP.z();
-    }
+    const ShellBlock block = blockOf(shell, contacts, first);
     SampleLanes lanes;
-    chosenKernels().samples(frame, {block.x.data(), block.y.data(), block.z.data(), block.count}, lanes);
+    SampleSums sums;
+    const PointLanes places{block.x.data(), block.y.data(), block.z.data(), block.count};
+    chosenKernels().samples(frame, places, &lanes, sums);
     for (std::uint32_t i = 0; i < block.count; ++i) {
       const Vector3 gradient(lanes.gradient_x[i], lanes.gradient_y[i], lanes.gradient_z[i]);
       if (std::abs(gradient.squaredNorm() - 1.0) < kBend) continue;
@@ -52,7 +48,7 @@ void findBent(const LaneFrame& frame, const Pointshell& shell, const ContactList
 /// from zero still tells.
 double sideOf(const DistanceField& field, const Vector3& p_BP, const Vector3& p_BQ, double by_field) {
   const double voxel = field.voxelAt(p_BQ);
-  if (std::abs(by_field) > kHalfDiagonal * voxel) return by_field > 0.0 ? 1.0 : -1.0;
+  if (std::abs(by_field) > DistanceField::kHalfDiagonal * voxel) return by_field > 0.0 ? 1.0 : -1.0;
   const Vector3 away = (p_BP - p_BQ).normalized() * voxel;
   return field.sample(p_BP + away).distance >= field.sample(p_BQ - away).distance ? 1.0 : -1.0;
 }
@@ -82,7 +78,7 @@ RefinementCounts refineContacts(const PairQuery& query, const SurfaceTree& surfa
   std::uint32_t left = budget.triangles;
   for (const Bent* next = bent.begin(); next != bent.begin() + wanted && left > 0; ++next) {
     const double by_field = next->gap + query.dilation;
-    const double reach = std::abs(by_field) + kHalfDiagonal * field.voxelAt(next->p_BP);
+    const double reach = std::abs(by_field) + DistanceField::kHalfDiagonal * field.voxelAt(next->p_BP);
     const SurfaceTree::Nearest nearest = surface_B.nearest(next->p_BP, reach, left);
     if (!nearest.found) continue;
     ++counts.contacts;

@@ -111,15 +111,8 @@ bool ContactSink::overflows(std::size_t count) {
   overflow_.emplace();
   histogram_.fill(0);
   for (const Contact& listed : result_.contacts) announce(listed.gap);
+  closeAnnouncement();
   return true;
-}
-
-void ContactSink::announce(double gap) {
-  const std::size_t step = stepOf(gap);
-  if (step > last_step_) return;
-  ++histogram_[step];
-  ++counted_;
-  while (counted_ - histogram_[last_step_] >= kMaxPairContacts) counted_ -= histogram_[last_step_--];
 }
 
 void ContactSink::selectDeepest() {
@@ -130,9 +123,9 @@ void ContactSink::selectDeepest() {
   std::size_t of_last = 0;
   std::size_t before = 0;
   const auto rank = [&](const Contact& contact) {
-    const std::size_t step = stepOf(contact.gap);
-    if (step < last_step_) ++before;
-    if (step == last_step_) last[of_last++] = {contact.gap, contact.point};
+    const double step = inSteps(contact.gap);
+    if (step < last_begin_) ++before;
+    if (step >= last_begin_ && step < last_end_) last[of_last++] = {contact.gap, contact.point};
   };
   std::for_each(contacts.begin(), contacts.end(), rank);
   std::for_each(overflow_->begin(), overflow_->end(), rank);
@@ -144,9 +137,9 @@ void ContactSink::selectDeepest() {
   if (beyond != end) std::nth_element(last.begin(), beyond, end);
   std::size_t kept = 0;
   const auto keep = [&](const Contact& contact) {
-    const std::size_t step = stepOf(contact.gap);
-    if (step > last_step_) return;
-    if (step == last_step_ && beyond != end && !(GapRank{contact.gap, contact.point} < *beyond)) return;
+    const double step = inSteps(contact.gap);
+    if (step >= last_end_) return;
+    if (step >= last_begin_ && beyond != end && !(GapRank{contact.gap, contact.point} < *beyond)) return;
     Contact& place = contacts[kept++];
     if (&place != &contact) place = contact;
   };

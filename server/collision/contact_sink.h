@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "server/collision/pair_query.h"
@@ -33,19 +34,32 @@ class ContactSink {
 
   /// Whether there is no room for so many more: they are to be announced before they are listed.
   bool overflows(std::size_t count);
-  void announce(double gap);
+  void announce(double gap) {
+    const std::size_t step = stepOf(gap);
+    if (step > last_step_) return;
+    ++histogram_[step];
+    ++counted_;
+  }
+  /// All of them are.
+  void closeAnnouncement() {
+    while (counted_ - histogram_[last_step_] >= kMaxPairContacts) counted_ -= histogram_[last_step_--];
+    constexpr double kEver = std::numeric_limits<double>::infinity();
+    last_begin_ = last_step_ == 0 ? -kEver : static_cast<double>(last_step_);
+    last_end_ = last_step_ + 1 == kSteps ? kEver : static_cast<double>(last_step_ + 1);
+  }
   /// Whether a contact of that gap has to be listed; those that have not are counted as dropped.
   bool wants(double gap) {
-    if (!overflow_ || stepOf(gap) <= last_step_) return true;
+    if (!overflow_ || inSteps(gap) < last_end_) return true;
     ++result_.counts.contacts_dropped;
     return false;
   }
-  /// A contact that is wanted.
-  void list(const Contact& contact) {
-    if (result_.contacts.push_back(contact)) return;
-    if (overflow_->push_back(contact)) return;
+  /// Where the next contact that is wanted goes; the place keeps what was there.
+  Contact& next() {
+    if (Contact* place = result_.contacts.extend()) return *place;
+    if (Contact* place = overflow_->extend()) return *place;
     selectDeepest();
-    if (!result_.contacts.push_back(contact)) overflow_->push_back(contact);
+    Contact* place = result_.contacts.extend();
+    return place != nullptr ? *place : *overflow_->extend();
   }
   /// After the last: the list is what it shall be.
   void selectDeepest();
@@ -60,9 +74,9 @@ class ContactSink {
   /// every sub-step.
   static constexpr std::size_t kThinnedTo = 256;
 
+  [[nodiscard]] double inSteps(double gap) const { return (gap - lowest_) * steps_a_metre_; }
   [[nodiscard]] std::size_t stepOf(double gap) const {
-    const double step = (gap - lowest_) * steps_a_metre_;
-    return step > 0.0 ? std::min(static_cast<std::size_t>(step), kSteps - 1) : 0;
+    return static_cast<std::size_t>(std::clamp(inSteps(gap), 0.0, static_cast<double>(kSteps - 1)));
   }
   void thinList();
 
@@ -71,8 +85,9 @@ class ContactSink {
   double steps_a_metre_;
   // of what is listed and what is announced
   std::array<std::uint32_t, kSteps> histogram_;
-  std::size_t last_step_ = kSteps - 1;  ///< what lies beyond has no room
-  std::size_t counted_ = 0;             ///< up to that step
+  std::size_t last_step_ = kSteps - 1;        ///< what lies beyond has no room
+  double last_begin_ = 0.0, last_end_ = 0.0;  ///< [steps]
+  std::size_t counted_ = 0;                   ///< up to that step
   std::optional<FixedVector<Contact, 256>> overflow_;
   // of leaves that were thinned
   std::size_t per_leaf_ = Pointshell::kLeafPoints;           ///< and direction

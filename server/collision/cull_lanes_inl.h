@@ -8,6 +8,8 @@
 #define TENON_CULL_LANES
 #endif
 
+#include <algorithm>
+#include <array>
 #include <bit>
 
 #include <hwy/highway.h>
@@ -32,11 +34,17 @@ using Mask = hn::Mask<decltype(kF)>;
 
 constexpr int kVoxels = DistanceField::kBrickVoxels;
 constexpr int kSide = DistanceField::kBrickSide;
+constexpr auto kHalfDiagonal = static_cast<float>(DistanceField::kHalfDiagonal);
 
 HWY_INLINE Float all(float value) { return hn::Set(kF, value); }
 HWY_INLINE Whole allWhole(std::int32_t value) { return hn::Set(kI, value); }
 HWY_INLINE Float toFloat(Whole v) { return hn::ConvertTo(kF, v); }
+#if HWY_TARGET == HWY_SCALAR
+// all values are in range: what is outside the grid stands at its corner
+HWY_INLINE Whole truncated(Float v) { return Whole(static_cast<std::int32_t>(v.raw)); }
+#else
 HWY_INLINE Whole truncated(Float v) { return hn::ConvertTo(kI, v); }
+#endif
 HWY_INLINE Mask asMask(hn::Mask<decltype(kI)> mask) { return hn::RebindMask(kF, mask); }
 HWY_INLINE hn::Mask<decltype(kI)> asWholeMask(Mask mask) { return hn::RebindMask(kI, mask); }
 
@@ -46,6 +54,13 @@ HWY_INLINE std::uint32_t bitsOf(Mask mask) {
   std::uint8_t bytes[8] = {};
   hn::StoreMaskBits(kF, mask, bytes);
   return bytes[0] | static_cast<std::uint32_t>(bytes[1]) << 8U;
+}
+
+/// The lowest bits, one for each lane.
+HWY_INLINE Mask maskOf(std::uint32_t bits) {
+  const std::array<std::uint8_t, 8> bytes{static_cast<std::uint8_t>(bits),
+                                          static_cast<std::uint8_t>(bits >> 8U)};
+  return hn::LoadMaskBits(kF, bytes.data());
 }
 
 struct Place3 {
@@ -71,15 +86,17 @@ struct Field {
   const std::int32_t* far;
 };
 
-HWY_INLINE Place3 inGrid(const CullFrame& cull, const ShellBlock& block, std::size_t i) {
-  const Float x = hn::LoadU(kF, block.x.data() + i);
-  const Float y = hn::LoadU(kF, block.y.data() + i);
-  const Float z = hn::LoadU(kF, block.z.data() + i);
+HWY_INLINE Place3 inGrid(const CullFrame& cull, const Place3& p_A) {
   const auto row = [&](std::size_t k) HWY_ATTR {
-    return hn::Add(all(cull.p[k]), sum3(hn::Mul(all(cull.R[k]), x), hn::Mul(all(cull.R[3 + k]), y),
-                                        hn::Mul(all(cull.R[6 + k]), z)));
+    return hn::Add(all(cull.p[k]), sum3(hn::Mul(all(cull.R[k]), p_A.x), hn::Mul(all(cull.R[3 + k]), p_A.y),
+                                        hn::Mul(all(cull.R[6 + k]), p_A.z)));
   };
   return {row(0), row(1), row(2)};
+}
+
+HWY_INLINE Place3 inGrid(const CullFrame& cull, const ShellBlock& block, std::size_t i) {
+  return inGrid(cull, {hn::LoadU(kF, block.x.data() + i), hn::LoadU(kF, block.y.data() + i),
+                       hn::LoadU(kF, block.z.data() + i)});
 }
 
 /// A lane's brick; lanes outside the grid stand at its lowest corner.
@@ -106,39 +123,50 @@ HWY_INLINE Spot spotOf(const Field& field, Place3 p) {
   const Whole bz = truncated(hn::Mul(p.z, per_voxel));
   spot.p_brick = {hn::Sub(p.x, hn::Mul(toFloat(bx), voxels)), hn::Sub(p.y, hn::Mul(toFloat(by), voxels)),
                   hn::Sub(p.z, hn::Mul(toFloat(bz), voxels))};
-  spot.number = hn::Add(hn::Mul(hn::Add(hn::Mul(bz, allWhole(bricks[1])), by), allWhole(bricks[0])), bx);
+  spot.number =
+      hn::Add(hn::Add(hn::Mul(bz, allWhole(bricks[0] * bricks[1])), hn::Mul(by, allWhole(bricks[0]))), bx);
   spot.entry = hn::GatherIndex(kI, field.layout.index.data(), spot.number);
   return spot;
 }
 
 /// The sample next to a place in a brick, and the way from there along each axis, 0 to 0.5.
 struct NextSample {
-  Float value;
+  Whole place;  ///< in bytes, of the pair that it is in
+  hn::Mask<decltype(kI)> upper;
   Place3 away;
 };
 
-HWY_INLINE NextSample nextSample(const Field& field, Whole brick, const Place3& p_brick) {
+HWY_INLINE NextSample nextSample(Whole brick, const Place3& p_brick) {
   const Float half = all(0.5F);
   const Whole x = truncated(hn::Add(p_brick.x, half));
   const Whole y = truncated(hn::Add(p_brick.y, half));
   const Whole z = truncated(hn::Add(p_brick.z, half));
   // the last along x is the upper half of the pair before it
   const Whole last = allWhole(kVoxels - 1);
-  const Whole row =
-      hn::Add(hn::Mul(hn::Add(hn::Mul(z, allWhole(kSide)), y), allWhole(kSide)), hn::Min(x, last));
-  const Whole place = hn::ShiftLeft<1>(hn::Add(hn::Mul(brick, allWhole(DistanceField::kBrickSamples)), row));
-  const Whole pair = hn::GatherOffset(kI, field.samples, place);
-  const Whole upper = hn::IfThenElse(hn::Gt(x, last), pair, hn::ShiftLeft<16>(pair));
-  constexpr float kPerQuantum = 1.0F / DistanceField::kQuantaPerVoxel;
-  return {hn::Mul(toFloat(hn::ShiftRight<16>(upper)), all(kPerQuantum)),
+  const Whole row = hn::Add(hn::Mul(z, allWhole(kSide * kSide)), hn::Mul(y, allWhole(kSide)));
+  const Whole pair = hn::Add(row, hn::Min(x, last));
+  const Whole first = hn::Mul(brick, allWhole(DistanceField::kBrickSamples));
+  return {hn::ShiftLeft<1>(hn::Add(first, pair)),
+          hn::Gt(x, last),
           {hn::Abs(hn::Sub(p_brick.x, toFloat(x))), hn::Abs(hn::Sub(p_brick.y, toFloat(y))),
            hn::Abs(hn::Sub(p_brick.z, toFloat(z)))}};
 }
 
+HWY_INLINE Float valueOf(const Field& field, const NextSample& next) {
+  const Whole pair = hn::GatherOffset(kI, field.samples, next.place);
+  const Whole upper = hn::IfThenElse(next.upper, pair, hn::ShiftLeft<16>(pair));
+  constexpr float kPerQuantum = 1.0F / DistanceField::kQuantaPerVoxel;
+  return hn::Mul(toFloat(hn::ShiftRight<16>(upper)), all(kPerQuantum));
+}
+
 /// For a point: the corners of its cell lie sqrt(1), sqrt(2) or sqrt(3) from the next sample, and weighted as
 /// the interpolation does their mean is at most the root of the mean square.
-HWY_INLINE Float boundOfPoint(const NextSample& next) {
-  return hn::Sub(next.value, hn::Sqrt(sum3(next.away.x, next.away.y, next.away.z)));
+HWY_INLINE Float lossOfPoint(const NextSample& next) {
+  return hn::Sqrt(sum3(next.away.x, next.away.y, next.away.z));
+}
+HWY_INLINE Float boundOfPoint(const Field& field, Whole brick, const Place3& p_brick) {
+  const NextSample next = nextSample(brick, p_brick);
+  return hn::Sub(valueOf(field, next), lossOfPoint(next));
 }
 
 /// The bricks behind refined entries: a child, and the coarse brick itself.
@@ -174,28 +202,45 @@ HWY_INLINE Mask isRefined(const Spot& spot) {
   return hn::And(spot.inside, asMask(hn::Gt(spot.entry, allWhole(DistanceField::kRefined - 1))));
 }
 
-HWY_INLINE Float pointBounds(const Field& field, const Place3& p) {
-  const Spot spot = spotOf(field, p);
-  const Mask deep = asMask(hn::Eq(spot.entry, allWhole(DistanceField::kFarInside)));
-  Float bound = hn::IfThenElse(deep, all(-1e9F), all(field.cull.beyond_band));
-  bound = hn::IfThenElse(spot.inside, bound, all(field.cull.outside));
-  const Mask sampled = hn::And(spot.inside, hasBrick(spot.entry));
-  if (hn::AllFalse(kF, sampled)) return bound;
-  const Mask refined = isRefined(spot);
-  if (hn::AllFalse(kF, refined)) {
-    const Whole brick = hn::IfThenElseZero(asWholeMask(sampled), spot.entry);
-    return hn::IfThenElse(sampled, boundOfPoint(nextSample(field, brick, spot.p_brick)), bound);
-  }
-  // a child answers in its band, its coarse brick beyond: neither may be near
+/// Of points in a field with refined bricks: a child answers in its band, its coarse brick beyond, and
+/// neither may be near.
+HWY_INLINE Float boundsAmongChildren(const Field& field, const Spot& spot, Mask sampled, Mask refined) {
   const Children children = childrenOf(field, spot, refined);
   const Whole own = hn::IfThenElse(asWholeMask(refined), children.own,
                                    hn::IfThenElseZero(asWholeMask(sampled), spot.entry));
-  bound = hn::IfThenElse(sampled, boundOfPoint(nextSample(field, own, spot.p_brick)), bound);
+  const Float bound = boundOfPoint(field, own, spot.p_brick);
   const Mask has_fine = hn::And(refined, hasBrick(children.fine));
   const Whole fine = hn::IfThenElseZero(asWholeMask(has_fine), children.fine);
   const Float fine_voxel = all(1.0F / static_cast<float>(field.layout.refinement));
-  const Float fine_bound = hn::Mul(boundOfPoint(nextSample(field, fine, children.p_fine)), fine_voxel);
+  const Float fine_bound = hn::Mul(boundOfPoint(field, fine, children.p_fine), fine_voxel);
   return hn::IfThenElse(has_fine, hn::Min(bound, fine_bound), bound);
+}
+
+/// What is known of a point before its sample is read: the bound is the sample minus the loss, or `least` if
+/// that is more.
+struct Prospect {
+  NextSample next;
+  Float loss, least;
+};
+
+HWY_INLINE Prospect prospectOf(const Field& field, const Place3& p) {
+  const Float none = all(-1e9F);
+  const Spot spot = spotOf(field, p);
+  const Mask deep = asMask(hn::Eq(spot.entry, allWhole(DistanceField::kFarInside)));
+  Prospect out;
+  out.least = hn::IfThenElse(deep, none, all(field.cull.beyond_band));
+  out.least = hn::IfThenElse(spot.inside, out.least, all(field.cull.outside));
+  Mask sampled = hn::And(spot.inside, hasBrick(spot.entry));
+  const Mask refined = isRefined(spot);
+  if (hn::AllFalse(kF, refined)) {
+    out.least = hn::IfThenElse(sampled, none, out.least);
+  } else {
+    out.least = hn::IfThenElse(sampled, boundsAmongChildren(field, spot, sampled, refined), out.least);
+    sampled = hn::FirstN(kF, 0);
+  }
+  out.next = nextSample(hn::IfThenElseZero(asWholeMask(sampled), spot.entry), spot.p_brick);
+  out.loss = hn::IfThenElse(sampled, lossOfPoint(out.next), all(1e9F));
+  return out;
 }
 
 HWY_INLINE Float farOf(const Field& field, Whole number) {
@@ -207,102 +252,215 @@ HWY_INLINE Float farOf(const Field& field, Whole number) {
   return hn::Mul(toFloat(hn::ShiftRight<16>(upper)), all(1.0F / DistanceField::kFarPerVoxel));
 }
 
-/// For places as DistanceField::lowerBound.
-HWY_INLINE Float farBounds(const Field& field, const Place3& p, const Spot& spot) {
-  const Float middle = all(0.5F * kVoxels);
-  const Float from_centre = norm(
-      {hn::Sub(spot.p_brick.x, middle), hn::Sub(spot.p_brick.y, middle), hn::Sub(spot.p_brick.z, middle)});
-  const Float at_centre = farOf(field, spot.number);
-  // the interpolant may lie below the distance by half a voxel's diagonal
-  Float bound = hn::Sub(hn::Sub(at_centre, all(1.0F)), from_centre);
-  const Mask outside = asMask(hn::Eq(spot.entry, allWhole(DistanceField::kFarOutside)));
-  bound =
-      hn::IfThenElse(outside, hn::Max(all(field.cull.beyond_band), hn::Sub(at_centre, from_centre)), bound);
+/// A value's bound over a ball of radius r whose centre is `away` from where the value is: a point of the
+/// ball takes its mean from corners about it, whose squares lie up to three quarters further in the mean.
+HWY_INLINE Float boundOfBall(Float value, Float away, Float r) {
+  const Float farthest = hn::Add(away, r);
+  return hn::Sub(value, hn::Sqrt(hn::Add(hn::Mul(farthest, farthest), all(kHalfDiagonal * kHalfDiagonal))));
+}
+
+/// Of balls whose centres are outside the grid, or whose centres' bricks have no samples.
+HWY_INLINE Float boundsApart(const Field& field, const Place3& p, const Spot& spot, Float r) {
   const Mask deep = asMask(hn::Eq(spot.entry, allWhole(DistanceField::kFarInside)));
-  bound = hn::IfThenElse(deep, all(-1e9F), bound);
+  const Float beyond_band =
+      boundOfBall(all(static_cast<float>(DistanceField::kBandVoxels)), all(kHalfDiagonal), r);
+  const Float bound = hn::IfThenElse(deep, all(-1e9F), beyond_band);
   if (hn::AllTrue(kF, spot.inside)) return bound;
   const auto& end = field.cull.end;
   const Float zero = hn::Zero(kF);
   const Place3 beyond{hn::Max(hn::Max(hn::Neg(p.x), hn::Sub(p.x, all(end[0]))), zero),
                       hn::Max(hn::Max(hn::Neg(p.y), hn::Sub(p.y, all(end[1]))), zero),
                       hn::Max(hn::Max(hn::Neg(p.z), hn::Sub(p.z, all(end[2]))), zero)};
-  return hn::IfThenElse(spot.inside, bound, hn::Add(norm(beyond), all(field.cull.outside)));
+  const Float to_surface = hn::Add(norm(beyond), all(field.cull.outside));
+  return hn::IfThenElse(spot.inside, bound, boundOfBall(to_surface, zero, r));
 }
 
-/// A ball whose centre's brick has samples: by the one next to the centre.
-HWY_INLINE Float closerBounds(const Field& field, const Spot& spot, Float bound, Mask wanted) {
-  const Mask sampled = hn::And(wanted, hn::And(spot.inside, hasBrick(spot.entry)));
-  if (hn::AllFalse(kF, sampled)) return bound;
+/// By the middle of the centre's brick, as DistanceField::lowerBound.
+HWY_INLINE Float boundsByBrick(const Field& field, const Spot& spot, Float r) {
+  const Float middle = all(0.5F * kVoxels);
+  const Float from_middle = norm(
+      {hn::Sub(spot.p_brick.x, middle), hn::Sub(spot.p_brick.y, middle), hn::Sub(spot.p_brick.z, middle)});
+  return boundOfBall(farOf(field, spot.number), from_middle, r);
+}
+
+/// By the sample next to the centre, of lanes whose brick has some.
+HWY_INLINE Float boundsBySample(const Field& field, const Spot& spot, Mask sampled, Float r) {
   Whole brick = spot.entry;
   const Mask refined = isRefined(spot);
   if (!hn::AllFalse(kF, refined)) {
     brick = hn::IfThenElse(asWholeMask(refined), childrenOf(field, spot, refined).own, brick);
   }
-  brick = hn::IfThenElseZero(asWholeMask(sampled), brick);
-  const NextSample next = nextSample(field, brick, spot.p_brick);
-  const Float closer = hn::Sub(hn::Sub(next.value, norm(next.away)), all(static_cast<float>(kHalfDiagonal)));
-  return hn::IfThenElse(sampled, hn::Max(bound, closer), bound);
+  const NextSample next = nextSample(hn::IfThenElseZero(asWholeMask(sampled), brick), spot.p_brick);
+  return boundOfBall(valueOf(field, next), norm(next.away), r);
 }
 
-/// Which balls of a block may hold a contact.
-HWY_INLINE std::uint32_t reachingBalls(const Field& field, const ShellBlock& balls, bool closer,
-                                       Culled& culled) {
+/// What balls are bounded by, large ones first.
+enum class By : std::uint8_t { kBrick, kBrickAndSample, kSample };
+
+template <By by>
+HWY_INLINE Float boundsOfBalls(const Field& field, const Place3& p, Float r, Mask used) {
+  const Spot spot = spotOf(field, p);
+  Float bound = boundsApart(field, p, spot, r);
+  const Mask sampled = hn::And(spot.inside, hasBrick(spot.entry));
+  if constexpr (by == By::kSample) {
+    if (hn::AllFalse(kF, hn::And(used, sampled))) return bound;
+    return hn::IfThenElse(sampled, boundsBySample(field, spot, sampled, r), bound);
+  }
+  const Mask deep = asMask(hn::Eq(spot.entry, allWhole(DistanceField::kFarInside)));
+  const Float by_brick = boundsByBrick(field, spot, r);
+  bound = hn::IfThenElse(hn::And(spot.inside, hn::Not(deep)), hn::Max(bound, by_brick), bound);
+  bound = hn::IfThenElse(sampled, by_brick, bound);
+  if constexpr (by == By::kBrick) return bound;
+  const Mask wanted = hn::And(hn::And(used, sampled), hn::Le(bound, all(field.cull.limit)));
+  if (hn::AllFalse(kF, wanted)) return bound;
+  return hn::IfThenElse(wanted, hn::Max(bound, boundsBySample(field, spot, sampled, r)), bound);
+}
+
+/// What was left out, lane by lane.
+struct LeftOut {
+  explicit LeftOut(Culled& the_culled) : culled(the_culled), smallest(all(the_culled.smallest_bound)) {}
+  ~LeftOut() { culled.smallest_bound = hn::GetLane(hn::MinOfLanes(kF, smallest)); }
+  LeftOut(const LeftOut&) = delete;
+  LeftOut& operator=(const LeftOut&) = delete;
+
+  HWY_INLINE void add(Mask lanes, Float bound) {
+    smallest = hn::Min(smallest, hn::IfThenElse(lanes, bound, smallest));
+  }
+
+  Culled& culled;
+  Float smallest;
+};
+
+/// Which of the `wanted` balls of a block may hold a contact.
+template <By by>
+HWY_INLINE std::uint32_t reachingBalls(const Field& field, const ShellBlock& balls, std::uint32_t wanted,
+                                       LeftOut& left_out) {
   const Float limit = all(field.cull.limit);
-  Float smallest = all(culled.smallest_bound);
   std::uint32_t reaching = 0;
   for (std::size_t i = 0; i < balls.count; i += hn::Lanes(kF)) {
-    const Mask used = hn::FirstN(kF, balls.count - i);
-    const Place3 p = inGrid(field.cull, balls, i);
+    const Mask used = maskOf(wanted >> i);
+    if (hn::AllFalse(kF, used)) continue;
     const Float radius = hn::Mul(hn::LoadU(kF, balls.radius.data() + i), all(field.cull.per_metre));
-    const Spot spot = spotOf(field, p);
-    Float bound = farBounds(field, p, spot);
-    Mask reaches = hn::And(used, hn::Le(hn::Sub(bound, radius), limit));
-    if (closer && !hn::AllFalse(kF, reaches)) {
-      bound = closerBounds(field, spot, bound, reaches);
-      reaches = hn::And(used, hn::Le(hn::Sub(bound, radius), limit));
-    }
-    const Float free = hn::IfThenElse(hn::AndNot(reaches, used), hn::Sub(bound, radius), smallest);
-    smallest = hn::Min(smallest, free);
+    const Float bound = boundsOfBalls<by>(field, inGrid(field.cull, balls, i), radius, used);
+    const Mask reaches = hn::And(used, hn::Le(bound, limit));
+    left_out.add(hn::AndNot(reaches, used), bound);
     reaching |= bitsOf(reaches) << i;
   }
-  culled.spheres += balls.count;
-  culled.smallest_bound = hn::GetLane(hn::MinOfLanes(kF, smallest));
+  left_out.culled.spheres += static_cast<std::uint32_t>(std::popcount(wanted));
   return reaching;
 }
 
 std::uint32_t clusters(const LaneFrame& frame, const ShellBlock& balls, Culled& culled) noexcept {
-  return reachingBalls(Field(frame), balls, false, culled);
+  LeftOut left_out(culled);
+  return reachingBalls<By::kBrick>(Field(frame), balls, balls.used, left_out);
 }
 
-void candidates(const LaneFrame& frame, const Pointshell& shell, std::uint32_t cluster, Candidates& out,
-                Culled& culled) noexcept {
-  const Field field(frame);
-  std::uint32_t reaching = reachingBalls(field, shell.leavesOfCluster(cluster), true, culled);
-  const std::uint32_t first_leaf = shell.clusters()[cluster].first;
-  const Float limit = all(field.cull.limit);
-  Float smallest = all(culled.smallest_bound);
-  for (; reaching != 0; reaching &= reaching - 1) {
-    const std::uint32_t leaf = first_leaf + static_cast<std::uint32_t>(std::countr_zero(reaching));
+/// Points of quads that reach, side by side.
+struct Gathered {
+  template <typename T>
+  using Lanes = std::array<T, Candidates::kAtOnce + ShellBlock::kLanes>;  ///< whole vectors are read
+
+  alignas(64) Lanes<float> x, y, z;
+  Lanes<std::uint32_t> point;
+  std::size_t count = 0;
+
+  void add(const Pointshell& shell, std::size_t leaf, std::size_t quad) {
     const ShellBlock& points = shell.pointsOfLeaf(leaf);
-    const std::uint32_t before = out.count;
-    for (std::size_t i = 0; i < points.count; i += hn::Lanes(kF)) {
-      const Mask used = hn::FirstN(kF, points.count - i);
-      const Float bound = pointBounds(field, inGrid(field.cull, points, i));
-      const Mask near = hn::And(used, hn::Le(bound, limit));
-      smallest = hn::Min(smallest, hn::IfThenElse(hn::AndNot(near, used), bound, smallest));
-      if (hn::AllFalse(kF, near)) continue;
-      const std::uint32_t n = out.count;
-      const auto number = hn::Iota(kU, static_cast<std::uint32_t>(shell.leaves()[leaf].first + i));
-      hn::StoreU(hn::Compress(hn::LoadU(kF, points.x.data() + i), near), kF, out.x.data() + n);
-      hn::StoreU(hn::Compress(hn::LoadU(kF, points.y.data() + i), near), kF, out.y.data() + n);
-      hn::StoreU(hn::Compress(hn::LoadU(kF, points.z.data() + i), near), kF, out.z.data() + n);
-      hn::StoreU(hn::Compress(number, hn::RebindMask(kU, near)), kU, out.point.data() + n);
-      out.count += static_cast<std::uint32_t>(hn::CountTrue(kF, near));
-    }
-    culled.points += points.count;
-    if (out.count > before) out.leaf_end[out.leaves++] = static_cast<std::uint16_t>(out.count);
+    const std::size_t first = quad * Pointshell::kQuadPoints;
+    std::copy_n(points.x.data() + first, Pointshell::kQuadPoints, x.data() + count);
+    std::copy_n(points.y.data() + first, Pointshell::kQuadPoints, y.data() + count);
+    std::copy_n(points.z.data() + first, Pointshell::kQuadPoints, z.data() + count);
+    const auto number = shell.leaves()[leaf].first + static_cast<std::uint32_t>(first);
+    for (std::uint32_t i = 0; i < Pointshell::kQuadPoints; ++i) point[count + i] = number + i;
+    count += std::min<std::size_t>(points.count - first, Pointshell::kQuadPoints);
   }
-  culled.smallest_bound = hn::GetLane(hn::MinOfLanes(kF, smallest));
+};
+
+/// Appends the lanes from i that are near.
+HWY_INLINE void append(const Gathered& points, std::size_t i, Mask near, Candidates& out) {
+#if HWY_TARGET <= HWY_AVX3
+  const std::uint32_t n = out.count;
+  hn::StoreU(hn::Compress(hn::LoadU(kF, points.x.data() + i), near), kF, out.x.data() + n);
+  hn::StoreU(hn::Compress(hn::LoadU(kF, points.y.data() + i), near), kF, out.y.data() + n);
+  hn::StoreU(hn::Compress(hn::LoadU(kF, points.z.data() + i), near), kF, out.z.data() + n);
+  const auto number = hn::LoadU(kU, points.point.data() + i);
+  hn::StoreU(hn::Compress(number, hn::RebindMask(kU, near)), kU, out.point.data() + n);
+  out.count += static_cast<std::uint32_t>(hn::CountTrue(kF, near));
+#else
+  for (std::uint32_t bits = bitsOf(near); bits != 0; bits &= bits - 1) {
+    const std::size_t lane = i + static_cast<std::size_t>(std::countr_zero(bits));
+    out.x[out.count] = points.x[lane];
+    out.y[out.count] = points.y[lane];
+    out.z[out.count] = points.z[lane];
+    out.point[out.count++] = points.point[lane];
+  }
+#endif
+}
+
+/// In two rounds: reading samples is waiting for memory, and for many of them at once in a short loop.
+HWY_INLINE void appendNear(const Field& field, const Gathered& points, Candidates& out, LeftOut& left_out) {
+  struct Prospects {
+    alignas(64) Gathered::Lanes<std::int32_t> place, upper;
+    Gathered::Lanes<float> loss, least;
+  } wait;
+  for (std::size_t i = 0; i < points.count; i += hn::Lanes(kF)) {
+    const Place3 p_A{hn::LoadU(kF, points.x.data() + i), hn::LoadU(kF, points.y.data() + i),
+                     hn::LoadU(kF, points.z.data() + i)};
+    const Prospect one = prospectOf(field, inGrid(field.cull, p_A));
+    hn::StoreU(one.next.place, kI, wait.place.data() + i);
+    hn::StoreU(hn::VecFromMask(kI, one.next.upper), kI, wait.upper.data() + i);
+    hn::StoreU(one.loss, kF, wait.loss.data() + i);
+    hn::StoreU(one.least, kF, wait.least.data() + i);
+  }
+  const Float limit = all(field.cull.limit);
+  for (std::size_t i = 0; i < points.count; i += hn::Lanes(kF)) {
+    NextSample next;
+    next.place = hn::LoadU(kI, wait.place.data() + i);
+    next.upper = hn::MaskFromVec(hn::LoadU(kI, wait.upper.data() + i));
+    const Float bound = hn::Max(hn::Sub(valueOf(field, next), hn::LoadU(kF, wait.loss.data() + i)),
+                                hn::LoadU(kF, wait.least.data() + i));
+    const Mask used = hn::FirstN(kF, points.count - i);
+    const Mask near = hn::And(used, hn::Le(bound, limit));
+    left_out.add(hn::AndNot(near, used), bound);
+    append(points, i, near, out);
+  }
+  left_out.culled.points += static_cast<std::uint32_t>(points.count);
+}
+
+/// Gathers the quads that reach, of the leaves that do.
+HWY_INLINE void gatherQuads(const Field& field, const Pointshell& shell, std::uint32_t cluster,
+                            std::uint32_t reaching, Gathered& points, LeftOut& left_out) {
+  constexpr std::uint32_t kQuads = Pointshell::kQuadsOfLeaf;
+  const std::size_t first_leaf = shell.clusters()[cluster].first;
+  for (std::size_t leaf = 0; reaching >> leaf != 0; leaf += kQuads) {
+    // four leaves have sixteen quads
+    const std::uint32_t four = reaching >> leaf & 0xFU;
+    if (four == 0) continue;
+    const ShellBlock& quads = shell.quadsOfCluster(cluster)[leaf / kQuads];
+    const std::uint32_t fourfold = (four & 1U) | (four & 2U) << 3U | (four & 4U) << 6U | (four & 8U) << 9U;
+    std::uint32_t near = reachingBalls<By::kSample>(field, quads, fourfold * 0xFU & quads.used, left_out);
+    for (; near != 0; near &= near - 1) {
+      const auto quad = static_cast<std::size_t>(std::countr_zero(near));
+      points.add(shell, first_leaf + leaf + quad / kQuads, quad % kQuads);
+    }
+  }
+}
+
+void candidates(const LaneFrame& frame, const Pointshell& shell, std::span<const std::uint32_t> of,
+                Candidates& out, Culled& culled) noexcept {
+  const Field field(frame);
+  LeftOut left_out(culled);
+  // step by step for all: each step's reads wait for memory together
+  std::array<std::uint32_t, Candidates::kClusters> reaching{};
+  for (std::size_t i = 0; i < of.size(); ++i) {
+    const ShellBlock& leaves = shell.leavesOfCluster(of[i]);
+    reaching[i] = reachingBalls<By::kBrickAndSample>(field, leaves, leaves.used, left_out);
+  }
+  Gathered points;
+  for (std::size_t i = 0; i < of.size(); ++i) {
+    gatherQuads(field, shell, of[i], reaching[i], points, left_out);
+  }
+  appendNear(field, points, out, left_out);
 }
 
 }  // namespace cull

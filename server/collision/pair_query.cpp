@@ -4,6 +4,7 @@
 #include <bit>
 #include <limits>
 
+#include "server/collision/contact_blocks.h"
 #include "server/collision/contact_sink.h"
 #include "server/collision/query_kernels.h"
 
@@ -11,29 +12,34 @@ namespace tenon {
 namespace {
 
 /// Sixteen points with all that a contact needs.
-struct Lanes {
-  SampleLanes samples;
-  ContactLanes contacts;
+class Lanes {
+ public:
+  Lanes(const LaneFrame& frame, const SampleLanes& samples, ContactLanes& contacts)
+      : frame_(frame), samples_(samples), contacts_(contacts) {}
 
+  [[nodiscard]] std::uint32_t near() const { return samples_.near; }
+  [[nodiscard]] double gap(std::size_t i) const { return samples_.distance[i] - frame_.dilation; }
   [[nodiscard]] Vector3 gradient(std::size_t i) const {
-    return {samples.gradient_x[i], samples.gradient_y[i], samples.gradient_z[i]};
-  }
-  [[nodiscard]] double gap(const LaneFrame& frame, std::size_t i) const {
-    return samples.distance[i] - frame.dilation;
+    return {samples_.gradient_x[i], samples_.gradient_y[i], samples_.gradient_z[i]};
   }
   /// B pushes A out along its own normal or, where it has none, into A's own inside.
-  void setNormal(std::size_t i, const Vector3& inward_W) {
-    const Vector3 n_W = inward_W.normalized();
-    contacts.n_x[i] = n_W.x();
-    contacts.n_y[i] = n_W.y();
-    contacts.n_z[i] = n_W.z();
+  void setNormal(std::size_t i, const Vector3f& inward_A) {
+    const Vector3 n_W = (frame_.R_WA * inward_A.cast<double>()).normalized();
+    contacts_.n_x[i] = n_W.x();
+    contacts_.n_y[i] = n_W.y();
+    contacts_.n_z[i] = n_W.z();
   }
   /// Sets place, gap and normal.
-  void setContact(const LaneFrame& frame, std::size_t i, Contact& contact) const {
-    contact.p_WP = Vector3(contacts.x[i], contacts.y[i], contacts.z[i]);
-    contact.gap = gap(frame, i);
-    contact.n_W = Vector3(contacts.n_x[i], contacts.n_y[i], contacts.n_z[i]);
+  void setContact(std::size_t i, Contact& contact) const {
+    contact.p_WP = Vector3(contacts_.x[i], contacts_.y[i], contacts_.z[i]);
+    contact.gap = gap(i);
+    contact.n_W = Vector3(contacts_.n_x[i], contacts_.n_y[i], contacts_.n_z[i]);
   }
+
+ private:
+  const LaneFrame& frame_;
+  const SampleLanes& samples_;
+  ContactLanes& contacts_;
 };
 
 /// Calls `visit(lane)` for every bit that is set, lowest first.
@@ -67,10 +73,10 @@ class Walk {
       before = culled_.points;
       for (std::uint32_t c = 0; c < level.cluster_count; c += ShellBlock::kLanes) {
         const ShellBlock& balls = shell_.clusterBlocks()[block++];
-        const std::uint32_t reaching =
-            prune_ ? kernels_.clusters(frame_, balls, culled_) : (1U << balls.count) - 1U;
+        const std::uint32_t reaching = prune_ ? kernels_.clusters(frame_, balls, culled_) : balls.used;
         forEachLane(reaching, [&](std::uint32_t i) { walk(level.first_cluster + c + i); });
       }
+      if (!clusters_.empty()) walkClusters();
     }
     judgeCandidates();
     sink_.selectDeepest();
@@ -88,14 +94,8 @@ class Walk {
     can_thin_ = false;
     for (const std::uint32_t point : points) {
       if (point < areas_.size() || point >= shell_.points().size()) continue;
-      if (!candidates_.hasRoomForCluster()) judgeCandidates();
-      const Vector3f& p_AP = shell_.points()[point].p_MP;
-      const std::uint32_t n = candidates_.count++;
-      candidates_.x[n] = p_AP.x();
-      candidates_.y[n] = p_AP.y();
-      candidates_.z[n] = p_AP.z();
-      candidates_.point[n] = point;
-      candidates_.leaf_end[candidates_.leaves++] = static_cast<std::uint16_t>(candidates_.count);
+      if (!candidates_.hasRoom()) judgeCandidates();
+      append(point);
       ++result_.counts.points_visited;
     }
     judgeCandidates();
@@ -114,8 +114,8 @@ class Walk {
   bool wholeReaches() {
     ++result_.counts.spheres_visited;
     constexpr double kRounding = 1e-6;
-    const double need = shell_.ballRadius() + frame_.dilation + kRounding;
-    const double bound = frame_.field.lowerBound(frame_.inB(shell_.ballCentre())) - need;
+    const Vector3 p_BC = frame_.inB(shell_.ballCentre());
+    const double bound = frame_.field.lowerBound(p_BC, shell_.ballRadius() + kRounding) - frame_.dilation;
     if (!prune_ || bound <= frame_.margin) return true;
     keepBound(bound);
     return false;
@@ -128,143 +128,156 @@ class Walk {
   }
 
   void walk(std::uint32_t cluster) {
-    if (!candidates_.hasRoomForCluster()) judgeCandidates();
+    clusters_.push_back(cluster);
+    if (clusters_.full()) walkClusters();
+  }
+
+  void walkClusters() {
+    if (!candidates_.hasRoom()) judgeCandidates();
     if (prune_) {
-      kernels_.candidates(frame_, shell_, cluster, candidates_, culled_);
+      kernels_.candidates(frame_, shell_, {clusters_.begin(), clusters_.end()}, candidates_, culled_);
     } else {
-      appendAll(shell_.clusters()[cluster]);
+      for (const std::uint32_t cluster : clusters_) appendAll(shell_.clusters()[cluster]);
     }
+    clusters_.clear();
+  }
+
+  void append(std::uint32_t point) {
+    const Vector3f& p_AP = shell_.points()[point].p_MP;
+    const std::uint32_t n = candidates_.count++;
+    candidates_.x[n] = p_AP.x();
+    candidates_.y[n] = p_AP.y();
+    candidates_.z[n] = p_AP.z();
+    candidates_.point[n] = point;
   }
 
   void appendAll(const ShellSphere& cluster) {
     culled_.spheres += cluster.count;
-    for (std::uint32_t leaf = cluster.first; leaf < cluster.first + cluster.count; ++leaf) {
-      const ShellBlock& block = shell_.pointsOfLeaf(leaf);
-      for (std::uint32_t i = 0; i < block.count; ++i) {
-        const std::uint32_t n = candidates_.count++;
-        candidates_.x[n] = block.x[i];
-        candidates_.y[n] = block.y[i];
-        candidates_.z[n] = block.z[i];
-        candidates_.point[n] = shell_.leaves()[leaf].first + i;
-      }
-      culled_.points += block.count;
-      candidates_.leaf_end[candidates_.leaves++] = static_cast<std::uint16_t>(candidates_.count);
+    for (const ShellSphere& leaf : shell_.leaves().subspan(cluster.first, cluster.count)) {
+      for (std::uint32_t i = 0; i < leaf.count; ++i) append(leaf.first + i);
+      culled_.points += leaf.count;
     }
   }
 
   /// What the field says of the candidates, then the contacts among them leaf after leaf.
   void judgeCandidates() {
     padCandidates();
-    for (std::uint32_t first = 0; first < candidates_.count; first += ShellBlock::kLanes) {
-      const PointLanes points{candidates_.x.data() + first, candidates_.y.data() + first,
-                              candidates_.z.data() + first,
-                              std::min<std::size_t>(candidates_.count - first, ShellBlock::kLanes)};
-      Lanes& lanes = lanes_[first / ShellBlock::kLanes];
-      SampleLanes& samples = lanes.samples;
-      kernels_.samples(frame_, points, samples);
-      result_.counts.points_colliding += samples.colliding;
-      result_.smallest_gap = std::min(result_.smallest_gap, samples.smallest_distance - frame_.dilation);
-      result_.deepest = std::max(result_.deepest, -samples.smallest_distance);
-      result_.others_gap = std::min(result_.others_gap, samples.smallest_gap_apart);
-      if (samples.near == 0) continue;
-      kernels_.contacts(frame_, points, samples, lanes.contacts);
-      forEachLane(samples.near & ~lanes.contacts.sloping,
-                  [&](std::uint32_t i) { lanes.setNormal(i, inward_W(candidates_.point[first + i])); });
-      if (sum_) sumPushes(first, lanes);
+    const PointLanes points{candidates_.x.data(), candidates_.y.data(), candidates_.z.data(),
+                            candidates_.count};
+    SampleSums sums;
+    kernels_.samples(frame_, points, samples_.data(), sums);
+    result_.counts.points_colliding += sums.colliding;
+    result_.smallest_gap = std::min(result_.smallest_gap, sums.smallest_distance - frame_.dilation);
+    result_.deepest = std::max(result_.deepest, -sums.smallest_distance);
+    result_.others_gap = std::min(result_.others_gap, sums.smallest_gap_apart);
+    if (sums.near > 0) {
+      kernels_.contacts(frame_, points, samples_.data(), contacts_.data());
+      for (std::uint32_t first = 0; first < candidates_.count; first += ShellBlock::kLanes) finish(first);
+      can_thin_ ? listThinned() : listAll(sums.near);
     }
-    if (can_thin_) {
-      listThinned();
-    } else {
-      listAll();
-    }
-    candidates_.count = candidates_.leaves = 0;
+    candidates_.count = 0;
   }
 
-  /// Kernels read whole vectors.
+  /// Kernels read whole blocks.
   void padCandidates() {
     for (std::size_t i = candidates_.count; i < candidates_.count + ShellBlock::kLanes; ++i) {
       candidates_.x[i] = candidates_.y[i] = candidates_.z[i] = 0.0F;
     }
   }
 
-  [[nodiscard]] const Lanes& lanesOf(std::uint32_t candidate) const {
-    return lanes_[candidate / ShellBlock::kLanes];
-  }
-
-  /// Calls `visit(i)` for the candidates from `first` to before `end` that are contacts.
-  template <typename Visit>
-  void forEachNear(std::uint32_t first, std::uint32_t end, Visit&& visit) {
-    constexpr std::uint32_t kLanes = ShellBlock::kLanes;
-    for (std::uint32_t block = first / kLanes * kLanes; block < end; block += kLanes) {
-      std::uint32_t near = lanesOf(block).samples.near;
-      if (block < first) near &= ~0U << (first - block);
-      if (block + kLanes > end) near &= (1U << (end - block)) - 1U;
-      forEachLane(near, [&](std::uint32_t i) { visit(block + i); });
-    }
-  }
-
-  [[nodiscard]] double gapOf(std::uint32_t candidate) const {
-    return lanesOf(candidate).gap(frame_, candidate % ShellBlock::kLanes);
-  }
-
-  void listAll() {
-    std::size_t near = 0;
-    for (std::uint32_t first = 0; first < candidates_.count; first += ShellBlock::kLanes) {
-      near += static_cast<std::size_t>(std::popcount(lanesOf(first).samples.near));
-    }
-    if (sink_.overflows(near)) {
-      forEachNear(0, candidates_.count, [this](std::uint32_t i) { sink_.announce(gapOf(i)); });
-    }
-    forEachNear(0, candidates_.count, [this](std::uint32_t i) {
-      if (sink_.wants(gapOf(i))) sink_.list(contactOf(i));
+  /// Normals of the block from `first` where the field has none, and what it pushes.
+  void finish(std::uint32_t first) {
+    Lanes lanes = lanesOf(first);
+    const ContactLanes& contacts = contacts_[first / ShellBlock::kLanes];
+    forEachLane(lanes.near() & ~contacts.sloping, [&](std::uint32_t i) {
+      lanes.setNormal(i, shell_.points()[candidates_.point[first + i]].inward_M);
     });
+    if (sum_ && lanes.near() != 0) sumPushes(first);
+  }
+
+  [[nodiscard]] Lanes lanesOf(std::uint32_t candidate) {
+    const std::size_t block = candidate / ShellBlock::kLanes;
+    return {frame_, samples_[block], contacts_[block]};
+  }
+
+  /// Calls `visit(lanes, i, point)` for the candidates that are contacts.
+  template <typename Visit>
+  void forEachNear(Visit&& visit) {
+    for (std::uint32_t first = 0; first < candidates_.count; first += ShellBlock::kLanes) {
+      const Lanes lanes = lanesOf(first);
+      forEachLane(lanes.near(), [&](std::uint32_t i) { visit(lanes, i, candidates_.point[first + i]); });
+    }
+  }
+
+  void listAll(std::size_t near) {
+    if (sink_.overflows(near)) {
+      forEachNear(
+          [this](const Lanes& lanes, std::uint32_t i, std::uint32_t) { sink_.announce(lanes.gap(i)); });
+      sink_.closeAnnouncement();
+      forEachNear([this](const Lanes& lanes, std::uint32_t i, std::uint32_t point) {
+        if (sink_.wants(lanes.gap(i))) list(lanes, i, point);
+      });
+    } else {
+      forEachNear(
+          [this](const Lanes& lanes, std::uint32_t i, std::uint32_t point) { list(lanes, i, point); });
+    }
   }
 
   void listThinned() {
-    std::uint32_t first = 0;
-    for (std::uint32_t leaf = 0; leaf < candidates_.leaves; ++leaf) {
-      const std::uint32_t end = candidates_.leaf_end[leaf];
-      LeafContacts near;
-      std::array<std::uint32_t, LeafContacts::kMost> number;
-      forEachNear(first, end, [&](std::uint32_t i) {
-        number[near.count] = i;
-        near.gap[near.count] = lanesOf(i).samples.distance[i % ShellBlock::kLanes];
-        near.direction[near.count++] = lanesOf(i).gradient(i % ShellBlock::kLanes);
-      });
-      first = end;
-      if (near.count == 0) continue;
-      const std::uint32_t chosen = sink_.thinned(near);
-      if (sink_.overflows(near.count)) {
-        forEachLane(chosen, [&](std::uint32_t k) { sink_.announce(gapOf(number[k])); });
-      }
-      forEachLane(chosen, [&](std::uint32_t k) {
-        const Contact contact = contactOf(number[k]);
-        if (sink_.wants(contact.gap)) sink_.list(contact);
+    std::array<std::uint32_t, LeafContacts::kMost> candidate;  // of the leaf's contacts
+    LeafContacts near;
+    std::uint32_t leaf = 0;
+    const auto close = [&] {
+      if (near.count > 0) listLeaf(near, candidate);
+      near.count = 0;
+    };
+    for (std::uint32_t first = 0; first < candidates_.count; first += ShellBlock::kLanes) {
+      const Lanes lanes = lanesOf(first);
+      forEachLane(lanes.near(), [&](std::uint32_t i) {
+        const std::uint32_t own = shell_.leafOf(candidates_.point[first + i]);
+        if (own != leaf) close();
+        leaf = own;
+        candidate[near.count] = first + i;
+        near.gap[near.count] = lanes.gap(i);
+        near.direction[near.count++] = lanes.gradient(i);
       });
     }
+    close();
   }
 
-  [[nodiscard]] Contact contactOf(std::uint32_t candidate) const {
-    Contact contact;
-    contact.point = candidates_.point[candidate];
-    lanesOf(candidate).setContact(frame_, candidate % ShellBlock::kLanes, contact);
-    contact.area = areaOf(contact.point);
-    return contact;
+  void listLeaf(const LeafContacts& near, const std::array<std::uint32_t, LeafContacts::kMost>& candidate) {
+    const std::uint32_t chosen = sink_.thinned(near);
+    if (sink_.overflows(near.count)) {
+      forEachLane(chosen, [&](std::uint32_t k) { sink_.announce(near.gap[k]); });
+      sink_.closeAnnouncement();
+    }
+    forEachLane(chosen, [&](std::uint32_t k) {
+      if (!sink_.wants(near.gap[k])) return;
+      list(lanesOf(candidate[k]), candidate[k] % ShellBlock::kLanes, candidates_.point[candidate[k]]);
+    });
+  }
+
+  void list(const Lanes& lanes, std::uint32_t i, std::uint32_t point) {
+    Contact& contact = sink_.next();
+    lanes.setContact(i, contact);
+    contact.point = point;
+    contact.area = areaOf(point);
   }
 
   [[nodiscard]] double areaOf(std::uint32_t point) const {
     return point < areas_.size() ? static_cast<double>(areas_[point]) : 0.0;
   }
 
-  void sumPushes(std::uint32_t first, const Lanes& lanes) {
+  void sumPushes(std::uint32_t first) {
+    const SampleLanes& samples = samples_[first / ShellBlock::kLanes];
     alignas(64) std::array<float, ShellBlock::kLanes> area{};
-    forEachLane(lanes.samples.near, [&](std::uint32_t i) {
+    forEachLane(samples.near, [&](std::uint32_t i) {
       const std::uint32_t point = candidates_.point[first + i];
       if (point < areas_.size()) area[i] = areas_[point];
     });
     PushLanes push;
     const std::size_t count = std::min<std::size_t>(candidates_.count - first, ShellBlock::kLanes);
-    kernels_.pushes(frame_, lanes.samples, lanes.contacts, {area.data(), count}, push);
+    kernels_.pushes(frame_, samples, contacts_[first / ShellBlock::kLanes], {area.data(), count}, push);
     Wrench sum = result_.push_Ao_W;
     forEachLane(push.pushing, [&](std::uint32_t i) {
       sum.force += Vector3(push.f_x[i], push.f_y[i], push.f_z[i]);
@@ -272,10 +285,6 @@ class Walk {
     });
     result_.push_Ao_W = sum;
     result_.pushing += static_cast<std::uint32_t>(std::popcount(push.pushing));
-  }
-
-  [[nodiscard]] Vector3 inward_W(std::uint32_t point) const {
-    return frame_.R_WA * shell_.points()[point].inward_M.cast<double>();
   }
 
   const LaneFrame frame_;
@@ -286,8 +295,11 @@ class Walk {
   bool can_thin_;
   std::span<const float> areas_;  ///< of the levels in use
   Culled culled_;
+  FixedVector<std::uint32_t, Candidates::kClusters> clusters_;  ///< to be walked
   Candidates candidates_;
-  std::array<Lanes, Candidates::kMost / ShellBlock::kLanes> lanes_;  ///< of the candidates
+  // of the candidates
+  std::array<SampleLanes, Candidates::kMost / ShellBlock::kLanes> samples_;
+  std::array<ContactLanes, Candidates::kMost / ShellBlock::kLanes> contacts_;
   PairQueryResult& result_;
   ContactSink sink_;
 };
@@ -319,10 +331,7 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
 
   const auto levels = query.shell_A->levels();
   const std::size_t allowed = std::min<std::size_t>(query.levels, levels.size());
-  result.counts.spheres_total = 1;
-  for (const ShellLevel& level : levels) {
-    result.counts.spheres_total += level.cluster_count + level.leaf_count;
-  }
+  result.counts.spheres_total = query.shell_A->spheres();
   Walk walk(query, result);
   if (allowed > 0) walk.setAreas(query.shell_A->areasOfLevel(allowed - 1));
   const std::size_t budget = std::max<std::size_t>(query.budget, query.first.size()) - query.first.size();
@@ -352,40 +361,31 @@ void resampleContacts(const PairQuery& query, double moved, PairQueryResult& res
   ContactList& contacts = result.contacts;
   result.smallest_gap = result.others_gap - moved;
   result.deepest = std::max(-(result.smallest_gap + query.dilation), 0.0);
-  std::uint32_t colliding = 0;
+  SampleSums sums;
   std::size_t kept = 0;
   for (std::size_t first = 0; first < contacts.size(); first += ShellBlock::kLanes) {
-    ShellBlock block;
-    block.count = static_cast<std::uint32_t>(std::min(contacts.size() - first, ShellBlock::kLanes));
-    for (std::uint32_t i = 0; i < block.count; ++i) {
-      const Vector3f& p_AP = points[contacts[first + i].point].p_MP;
-      block.x[i] = p_AP.x();
-      block.y[i] = p_AP.y();
-      block.z[i] = p_AP.z();
-    }
-    Lanes lanes;
+    const ShellBlock block = blockOf(*query.shell_A, contacts, first);
+    SampleLanes samples;
+    ContactLanes sides;
     const PointLanes places{block.x.data(), block.y.data(), block.z.data(), block.count};
-    kernels.samples(frame, places, lanes.samples);
-    kernels.contacts(frame, places, lanes.samples, lanes.contacts);
-    const double smallest = lanes.samples.smallest_distance;
-    result.smallest_gap = std::min(result.smallest_gap, smallest - frame.dilation);
-    result.deepest = std::max(result.deepest, -smallest);
-    colliding += lanes.samples.colliding;
+    kernels.samples(frame, places, &samples, sums);
+    kernels.contacts(frame, places, &samples, &sides);
+    Lanes lanes(frame, samples, sides);
     for (std::uint32_t i = 0; i < block.count; ++i) {
-      Contact contact = contacts[first + i];
-      if ((lanes.contacts.sloping >> i & 1U) == 0) {
-        lanes.setNormal(i, frame.R_WA * points[contact.point].inward_M.cast<double>());
-      }
-      lanes.setContact(frame, i, contact);
-      if ((lanes.samples.exact >> i & 1U) != 0) {
-        contacts[kept++] = contact;
-      } else {
+      Contact& contact = contacts[first + i];
+      if ((samples.exact >> i & 1U) == 0) {
         // as seen from where the list was made: from here back there it may come nearer again
-        result.others_gap = std::min(result.others_gap, contact.gap - moved);
+        result.others_gap = std::min(result.others_gap, samples.distance[i] - frame.dilation - moved);
+        continue;
       }
+      if ((sides.sloping >> i & 1U) == 0) lanes.setNormal(i, points[contact.point].inward_M);
+      lanes.setContact(i, contact);
+      contacts[kept++] = contact;
     }
   }
-  if (!result.thinned) result.counts.points_colliding = colliding;
+  result.smallest_gap = std::min(result.smallest_gap, sums.smallest_distance - frame.dilation);
+  result.deepest = std::max(result.deepest, -sums.smallest_distance);
+  if (!result.thinned) result.counts.points_colliding = sums.colliding;
   contacts.resize(kept);
 }
 

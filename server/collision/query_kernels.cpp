@@ -94,7 +94,7 @@ CullFrame::CullFrame(const DistanceField& field, const Matrix3& R_BA, const Vect
   slack = 4e-6F * most + 2e-3F;
   limit = static_cast<float>(limit_B * per) + slack;
   outside = static_cast<float>(layout.margin * per);
-  beyond_band = static_cast<float>(layout.band * per - kHalfDiagonal);
+  beyond_band = static_cast<float>(layout.band * per - DistanceField::kHalfDiagonal);
 }
 
 LaneFrame::LaneFrame(const DistanceField& the_field, const Pose& X_WA, const Pose& X_WB, double the_dilation,

@@ -54,7 +54,7 @@ struct LaneFrame {
   CullFrame cull;
 };
 
-/// Up to sixteen points side by side, in A; sixteen of each can be read.
+/// Points side by side, in A; whole blocks of sixteen can be read.
 struct PointLanes {
   const float* x;
   const float* y;
@@ -62,17 +62,25 @@ struct PointLanes {
   std::size_t count;
 };
 
-/// What the field says at them.
+/// The gap of a pair that has nothing to test [m]: far, yet a number that can be divided.
+inline constexpr double kNothingNear = 1e6;
+
+/// What the field says at sixteen of them.
 struct alignas(64) SampleLanes {
   std::array<double, ShellBlock::kLanes> distance, gradient_x, gradient_y, gradient_z;
-  std::uint32_t exact = 0;          ///< one bit a lane, as in `near`
-  std::uint32_t near = 0;           ///< exact, and the gap within the margin
-  std::uint32_t colliding = 0;      ///< how many gaps are negative
-  double smallest_distance = 0.0;   ///< [m]
-  double smallest_gap_apart = 0.0;  ///< [m] of the lanes that are not near
+  std::uint32_t exact = 0;  ///< one bit a lane, as in `near`
+  std::uint32_t near = 0;   ///< exact, and the gap within the margin
 };
 
-/// Where contacts are and how B pushes; lanes without a slope have no normal.
+/// And at all that were sampled.
+struct SampleSums {
+  double smallest_distance = kNothingNear;   ///< [m]
+  double smallest_gap_apart = kNothingNear;  ///< [m] of the lanes that are not near
+  std::uint32_t colliding = 0;               ///< how many gaps are negative
+  std::uint32_t near = 0;                    ///< how many lanes are
+};
+
+/// Where contacts are and how B pushes; lanes without a slope have no normal, lanes without a sample nothing.
 struct alignas(64) ContactLanes {
   std::array<double, ShellBlock::kLanes> x, y, z, n_x, n_y, n_z;
   std::uint32_t sloping = 0;  ///< one bit a lane: the gradient says where outside is
@@ -86,20 +94,17 @@ struct alignas(64) PushLanes {
 
 /// Points that may be contacts, side by side in the order of the shell.
 struct Candidates {
-  static constexpr std::size_t kOfCluster = Pointshell::kClusterLeaves * Pointshell::kLeafPoints;
-  static constexpr std::size_t kMost = kOfCluster + 1024;
+  static constexpr std::size_t kClusters = 4;  ///< are walked at once
+  static constexpr std::size_t kAtOnce = kClusters * Pointshell::kClusterLeaves * Pointshell::kLeafPoints;
+  static constexpr std::size_t kMost = kAtOnce + 1024;
   template <typename T>
   using Lanes = std::array<T, kMost + ShellBlock::kLanes>;  ///< whole vectors are written
 
   alignas(64) Lanes<float> x, y, z;
   Lanes<std::uint32_t> point;
-  std::array<std::uint16_t, kMost> leaf_end;  ///< where the points of each leaf end that has some
   std::uint32_t count = 0;
-  std::uint32_t leaves = 0;
 
-  [[nodiscard]] bool hasRoomForCluster() const {
-    return count + kOfCluster <= kMost && leaves + Pointshell::kClusterLeaves <= kMost;
-  }
+  [[nodiscard]] bool hasRoom() const { return count + kAtOnce <= kMost; }
 };
 
 /// What culling left out, and its work.
@@ -120,12 +125,14 @@ struct QueryKernels {
   std::string_view isa;  ///< "scalar", "sse4", "avx2", "avx512", or what else a processor has
   /// Which of sixteen clusters may hold a contact, a bit each.
   std::uint32_t (*clusters)(const LaneFrame& frame, const ShellBlock& balls, Culled& culled) noexcept;
-  /// The points of a cluster that may be contacts, appended; there has to be room.
-  void (*candidates)(const LaneFrame& frame, const Pointshell& shell, std::uint32_t cluster,
+  /// The points of up to Candidates::kClusters clusters that may be contacts, appended; there has to be room.
+  void (*candidates)(const LaneFrame& frame, const Pointshell& shell, std::span<const std::uint32_t> of,
                      Candidates& candidates, Culled& culled) noexcept;
-  void (*samples)(const LaneFrame& frame, const PointLanes& points, SampleLanes& out) noexcept;
-  void (*contacts)(const LaneFrame& frame, const PointLanes& points, const SampleLanes& samples,
-                   ContactLanes& out) noexcept;
+  /// Sixteen points for each of `out`, which are as many as that takes; so for contacts.
+  void (*samples)(const LaneFrame& frame, const PointLanes& points, SampleLanes* out,
+                  SampleSums& sums) noexcept;
+  void (*contacts)(const LaneFrame& frame, const PointLanes& points, const SampleLanes* samples,
+                   ContactLanes* out) noexcept;
   /// `area`: what each lane stands for, as many as there are points; sixteen can be read.
   void (*pushes)(const LaneFrame& frame, const SampleLanes& samples, const ContactLanes& contacts,
                  std::span<const float> area, PushLanes& out) noexcept;
@@ -137,12 +144,6 @@ inline constexpr double kReferenceArea = 1e-4;
 /// Below this the interpolant's gradient says nothing: the point is near a medial axis (a thin sheet's
 /// middle).
 inline constexpr double kLeastGradient = 0.3;
-
-/// The gap of a pair that has nothing to test [m]: far, yet a number that can be divided.
-inline constexpr double kNothingNear = 1e6;
-
-/// [voxels]
-inline constexpr double kHalfDiagonal = DistanceField::kHalfDiagonal;
 
 /// All that this processor can run: what every such processor has first, the fastest last.
 [[nodiscard]] std::span<const QueryKernels> supportedKernels() noexcept;

@@ -8,6 +8,8 @@
 #define TENON_SAMPLE_LANES
 #endif
 
+#include <algorithm>
+
 #include <hwy/highway.h>
 
 #include "server/collision/query_kernels.h"
@@ -39,7 +41,12 @@ struct Place3 {
 HWY_INLINE Double all(double value) { return hn::Set(kD, value); }
 HWY_INLINE Whole allWhole(std::int32_t value) { return hn::Set(kI, value); }
 HWY_INLINE Double toDouble(Whole v) { return hn::PromoteTo(kD, v); }
+#if HWY_TARGET == HWY_SCALAR
+// all values are in range: what is outside the grid stands at its corner
+HWY_INLINE Whole truncated(Double v) { return Whole(static_cast<std::int32_t>(v.raw)); }
+#else
 HWY_INLINE Whole truncated(Double v) { return hn::DemoteTo(kI, v); }
+#endif
 
 HWY_INLINE std::uint32_t bitsOf(Mask mask) {
   std::uint8_t bytes[8] = {};
@@ -137,7 +144,7 @@ HWY_INLINE Double fromBrickCentre(const FieldLanes& field, const Place3& p_brick
 
 HWY_INLINE Double farMagnitude(const FieldLanes& field, const Located& at) {
   const double voxel = field.layout.voxel;
-  const double beyond_band = field.layout.band - kHalfDiagonal * voxel;
+  const double beyond_band = field.layout.band - DistanceField::kHalfDiagonal * voxel;
   const Double at_centre =
       hn::Div(hn::Mul(hn::Abs(farOf(field, at.number)), all(voxel)), all(DistanceField::kFarPerVoxel));
   return hn::Max(all(beyond_band), hn::Sub(at_centre, fromBrickCentre(field, at.p_brick)));
@@ -278,7 +285,7 @@ HWY_INLINE Sampled sample(const FieldLanes& field, const Place3& p_B, const Loca
                   hn::IfThenElseZero(out.exact, out.gradient.z)};
   if (hn::AllTrue(kD, out.exact)) return out;
   const Double beyond =
-      hn::Max(hn::Sub(hn::Abs(out.distance), all(kHalfDiagonal * layout.voxel)), hn::Zero(kD));
+      hn::Max(hn::Sub(hn::Abs(out.distance), all(DistanceField::kHalfDiagonal * layout.voxel)), hn::Zero(kD));
   out.distance = hn::IfThenElse(out.exact, out.distance, hn::CopySign(beyond, out.distance));
   if (hn::AllTrue(kD, has_samples)) return out;
   const Double magnitude = farMagnitude(field, at);
@@ -289,53 +296,71 @@ HWY_INLINE Sampled sample(const FieldLanes& field, const Place3& p_B, const Loca
   return out;
 }
 
-void samples(const LaneFrame& frame, const PointLanes& points, SampleLanes& out) noexcept {
+void samples(const LaneFrame& frame, const PointLanes& points, SampleLanes* out, SampleSums& sums) noexcept {
   const FieldLanes field(frame);
   const Double nothing = all(kNothingNear);
   Double smallest = nothing;
   Double apart = nothing;
-  out.exact = out.near = 0;
-  std::uint32_t colliding = 0;
-  for (std::size_t i = 0; i < points.count; i += hn::Lanes(kD)) {
-    const Mask used = hn::FirstN(kD, points.count - i);
-    const Place3 p_B = moved(frame.p_BA_B.data(), frame.R_BA.data(), placesOf(points, i));
-    const Sampled there = sample(field, p_B, locate(field, p_B));
-    const Double gap = hn::Sub(there.distance, all(frame.dilation));
-    const Mask exact = hn::And(used, there.exact);
-    const Mask near = hn::And(exact, hn::Le(gap, all(frame.margin)));
-    hn::Store(there.distance, kD, out.distance.data() + i);
-    hn::Store(there.gradient.x, kD, out.gradient_x.data() + i);
-    hn::Store(there.gradient.y, kD, out.gradient_y.data() + i);
-    hn::Store(there.gradient.z, kD, out.gradient_z.data() + i);
-    out.exact |= bitsOf(exact) << i;
-    out.near |= bitsOf(near) << i;
-    colliding |= bitsOf(hn::And(used, hn::Lt(gap, hn::Zero(kD)))) << i;
-    smallest = hn::Min(hn::IfThenElse(used, there.distance, nothing), smallest);
-    apart = hn::Min(hn::IfThenElse(hn::AndNot(near, used), gap, nothing), apart);
+  for (std::size_t first = 0; first < points.count; first += ShellBlock::kLanes) {
+    SampleLanes& block = *out++;
+    const std::size_t end = std::min(first + ShellBlock::kLanes, points.count);
+    std::uint32_t all_exact = 0;
+    std::uint32_t all_near = 0;
+    std::uint32_t colliding = 0;
+    for (std::size_t i = first; i < end; i += hn::Lanes(kD)) {
+      const std::size_t lane = i - first;
+      const Mask used = hn::FirstN(kD, end - i);
+      const Place3 p_B = moved(frame.p_BA_B.data(), frame.R_BA.data(), placesOf(points, i));
+      const Sampled there = sample(field, p_B, locate(field, p_B));
+      const Double gap = hn::Sub(there.distance, all(frame.dilation));
+      const Mask exact = hn::And(used, there.exact);
+      const Mask near = hn::And(exact, hn::Le(gap, all(frame.margin)));
+      hn::Store(there.distance, kD, block.distance.data() + lane);
+      hn::Store(there.gradient.x, kD, block.gradient_x.data() + lane);
+      hn::Store(there.gradient.y, kD, block.gradient_y.data() + lane);
+      hn::Store(there.gradient.z, kD, block.gradient_z.data() + lane);
+      all_exact |= bitsOf(exact) << lane;
+      all_near |= bitsOf(near) << lane;
+      colliding |= bitsOf(hn::And(used, hn::Lt(gap, hn::Zero(kD)))) << lane;
+      smallest = hn::Min(hn::IfThenElse(used, there.distance, nothing), smallest);
+      apart = hn::Min(hn::IfThenElse(hn::AndNot(near, used), gap, nothing), apart);
+    }
+    block.exact = all_exact;
+    block.near = all_near;
+    sums.colliding += static_cast<std::uint32_t>(hwy::PopCount(colliding));
+    sums.near += static_cast<std::uint32_t>(hwy::PopCount(all_near));
   }
-  out.colliding = static_cast<std::uint32_t>(hwy::PopCount(colliding));
-  out.smallest_distance = hn::GetLane(hn::MinOfLanes(kD, smallest));
-  out.smallest_gap_apart = hn::GetLane(hn::MinOfLanes(kD, apart));
+  sums.smallest_distance = std::min(sums.smallest_distance, hn::GetLane(hn::MinOfLanes(kD, smallest)));
+  sums.smallest_gap_apart = std::min(sums.smallest_gap_apart, hn::GetLane(hn::MinOfLanes(kD, apart)));
 }
 
-void contacts(const LaneFrame& frame, const PointLanes& points, const SampleLanes& lanes,
-              ContactLanes& out) noexcept {
-  out.sloping = 0;
-  for (std::size_t i = 0; i < points.count; i += hn::Lanes(kD)) {
-    const Place3 p_W = moved(frame.p_WA.data(), frame.R_WA.data(), placesOf(points, i));
-    const Place3 gradient{hn::Load(kD, lanes.gradient_x.data() + i),
-                          hn::Load(kD, lanes.gradient_y.data() + i),
-                          hn::Load(kD, lanes.gradient_z.data() + i)};
-    const Double slope = norm(gradient);
-    const Place3 n_W = turned(frame.R_WB.data(), {hn::Div(gradient.x, slope), hn::Div(gradient.y, slope),
-                                                  hn::Div(gradient.z, slope)});
-    out.sloping |= bitsOf(hn::Ge(slope, all(kLeastGradient))) << i;
-    hn::Store(p_W.x, kD, out.x.data() + i);
-    hn::Store(p_W.y, kD, out.y.data() + i);
-    hn::Store(p_W.z, kD, out.z.data() + i);
-    hn::Store(n_W.x, kD, out.n_x.data() + i);
-    hn::Store(n_W.y, kD, out.n_y.data() + i);
-    hn::Store(n_W.z, kD, out.n_z.data() + i);
+void contacts(const LaneFrame& frame, const PointLanes& points, const SampleLanes* samples,
+              ContactLanes* out) noexcept {
+  for (std::size_t first = 0; first < points.count; first += ShellBlock::kLanes) {
+    const SampleLanes& lanes = *samples++;
+    ContactLanes& block = *out++;
+    block.sloping = 0;
+    if (lanes.exact == 0) continue;
+    const std::size_t end = std::min(first + ShellBlock::kLanes, points.count);
+    for (std::size_t i = first; i < end; i += hn::Lanes(kD)) {
+      const std::size_t lane = i - first;
+      const Place3 p_W = moved(frame.p_WA.data(), frame.R_WA.data(), placesOf(points, i));
+      const Place3 gradient{hn::Load(kD, lanes.gradient_x.data() + lane),
+                            hn::Load(kD, lanes.gradient_y.data() + lane),
+                            hn::Load(kD, lanes.gradient_z.data() + lane)};
+      const Double slope = norm(gradient);
+      const Double per_slope = hn::Div(all(1.0), slope);
+      const Place3 n_W = turned(
+          frame.R_WB.data(),
+          {hn::Mul(gradient.x, per_slope), hn::Mul(gradient.y, per_slope), hn::Mul(gradient.z, per_slope)});
+      block.sloping |= bitsOf(hn::Ge(slope, all(kLeastGradient))) << lane;
+      hn::Store(p_W.x, kD, block.x.data() + lane);
+      hn::Store(p_W.y, kD, block.y.data() + lane);
+      hn::Store(p_W.z, kD, block.z.data() + lane);
+      hn::Store(n_W.x, kD, block.n_x.data() + lane);
+      hn::Store(n_W.y, kD, block.n_y.data() + lane);
+      hn::Store(n_W.z, kD, block.n_z.data() + lane);
+    }
   }
 }
 
@@ -346,7 +371,7 @@ void pushes(const LaneFrame& frame, const SampleLanes& lanes, const ContactLanes
     const Double gap = hn::Sub(hn::Load(kD, lanes.distance.data() + i), all(frame.dilation));
     inside |= bitsOf(hn::Lt(gap, hn::Zero(kD))) << i;
     const Double stands_for = hn::PromoteTo(kD, hn::LoadU(kF, area.data() + i));
-    const Double penalty = hn::Div(hn::Mul(hn::Neg(gap), stands_for), all(kReferenceArea));
+    const Double penalty = hn::Mul(hn::Mul(hn::Neg(gap), stands_for), all(1.0 / kReferenceArea));
     const Place3 f{hn::Mul(penalty, hn::Load(kD, contacts.n_x.data() + i)),
                    hn::Mul(penalty, hn::Load(kD, contacts.n_y.data() + i)),
                    hn::Mul(penalty, hn::Load(kD, contacts.n_z.data() + i))};

@@ -20,12 +20,13 @@ void listAll(const std::vector<double>& gaps, std::size_t at_a_time, PairQueryRe
     const std::size_t end = std::min(gaps.size(), first + at_a_time);
     if (sink.overflows(end - first)) {
       for (std::size_t i = first; i < end; ++i) sink.announce(gaps[i]);
+      sink.closeAnnouncement();
     }
     for (std::size_t i = first; i < end; ++i) {
       Contact contact;
       contact.gap = gaps[i];
       contact.point = static_cast<std::uint32_t>(i);
-      if (sink.wants(gaps[i])) sink.list(contact);
+      if (sink.wants(gaps[i])) sink.next() = contact;
     }
   }
   sink.selectDeepest();

@@ -120,7 +120,8 @@ TEST_F(QueryKernelsTest, LanesAreTheFieldsOwnAnswers) {
       for (const QueryKernels& kernels : supportedKernels()) {
         for (std::size_t leaf = 0; leaf < box->shell.leaves().size(); ++leaf) {
           const ShellBlock& block = box->shell.pointsOfLeaf(leaf);
-          kernels.samples(frame, {block.x.data(), block.y.data(), block.z.data(), block.count}, lanes);
+          SampleSums sums;
+          kernels.samples(frame, {block.x.data(), block.y.data(), block.z.data(), block.count}, &lanes, sums);
           const ShellSphere& ball = box->shell.leaves()[leaf];
           for (std::uint32_t i = 0; i < ball.count; ++i) {
             const Vector3 p_AP = box->shell.points()[ball.first + i].p_MP.cast<double>();
