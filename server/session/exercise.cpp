@@ -74,8 +74,6 @@ void Exercise::apply(const Change& change) noexcept {
       return;
     case ChangeKind::kBudget:
       return environment_.setBudget(pointsOf(change.value));
-    case ChangeKind::kGroup:
-      return environment_.setGroup(change.object, change.index);
   }
 }
 

@@ -34,7 +34,6 @@ enum class ChangeKind : std::uint8_t {
   kPlace,       ///< an outside tracker says where `object` is
   kStop,
   kBudget,  ///< ticks may test `value` points from now on; 0: as many as there are
-  kGroup,   ///< `object` belongs to group `index` from now on; 0: to none
 };
 
 /// Something decided outside the tick that the tick takes over.

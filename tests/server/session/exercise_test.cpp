@@ -191,17 +191,13 @@ std::vector<std::uint64_t> hashesOfThePlay(unsigned workers) {
   return hashes;
 }
 
-TEST(Exercise, BudgetsAndGroupsComeAsInputs) {
+TEST(Exercise, BudgetsComeAsInputs) {
   Stage stage;
-  const ObjectId object{1};
   stage.change({.kind = ChangeKind::kBudget, .value = 3000.0});
-  stage.change({.kind = ChangeKind::kGroup, .object = object, .index = 9});
   stage.tick();
   const Environment& environment = stage.exercise().environment();
   EXPECT_EQ(environment.workLimits().points, 3000U);
-  EXPECT_EQ(environment.groupOf(object), 9U);
   stage.change({.kind = ChangeKind::kBudget, .value = -std::numeric_limits<double>::quiet_NaN()});
-  stage.change({.kind = ChangeKind::kGroup, .object = ObjectId{12345}, .index = 9});
   stage.tick();
   EXPECT_EQ(environment.workLimits().points, 0U) << "what is no number is no limit";
 }
