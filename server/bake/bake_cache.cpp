@@ -13,7 +13,7 @@ namespace tenon {
 namespace {
 
 // Raised when the same meshes and options give other structures than before.
-constexpr std::uint32_t kBakeVersion = 5;
+constexpr std::uint32_t kBakeVersion = 4;
 
 /// A running hash of what a bake depends on.
 class ContentHash {

@@ -12,7 +12,6 @@ namespace tenon {
                                         std::size_t first) {
   ShellBlock block;
   block.count = static_cast<std::uint32_t>(std::min(contacts.size() - first, ShellBlock::kLanes));
-  block.used = (1U << block.count) - 1U;
   for (std::uint32_t i = 0; i < block.count; ++i) {
     const Vector3f& p_AP = shell.points()[contacts[first + i].point].p_MP;
     block.x[i] = p_AP.x();

@@ -8,7 +8,6 @@
 #define TENON_CULL_LANES
 #endif
 
-#include <algorithm>
 #include <array>
 #include <bit>
 
@@ -54,13 +53,6 @@ HWY_INLINE std::uint32_t bitsOf(Mask mask) {
   std::uint8_t bytes[8] = {};
   hn::StoreMaskBits(kF, mask, bytes);
   return bytes[0] | static_cast<std::uint32_t>(bytes[1]) << 8U;
-}
-
-/// The lowest bits, one for each lane.
-HWY_INLINE Mask maskOf(std::uint32_t bits) {
-  const std::array<std::uint8_t, 8> bytes{static_cast<std::uint8_t>(bits),
-                                          static_cast<std::uint8_t>(bits >> 8U)};
-  return hn::LoadMaskBits(kF, bytes.data());
 }
 
 struct Place3 {
@@ -294,23 +286,17 @@ HWY_INLINE Float boundsBySample(const Field& field, const Spot& spot, Mask sampl
   return boundOfBall(valueOf(field, next), norm(next.away), r);
 }
 
-/// What balls are bounded by, large ones first.
-enum class By : std::uint8_t { kBrick, kBrickAndSample, kSample };
-
-template <By by>
+/// `closely`: also by the sample next to the centre, where the brick's middle does not tell.
+template <bool closely>
 HWY_INLINE Float boundsOfBalls(const Field& field, const Place3& p, Float r, Mask used) {
   const Spot spot = spotOf(field, p);
-  Float bound = boundsApart(field, p, spot, r);
   const Mask sampled = hn::And(spot.inside, hasBrick(spot.entry));
-  if constexpr (by == By::kSample) {
-    if (hn::AllFalse(kF, hn::And(used, sampled))) return bound;
-    return hn::IfThenElse(sampled, boundsBySample(field, spot, sampled, r), bound);
-  }
   const Mask deep = asMask(hn::Eq(spot.entry, allWhole(DistanceField::kFarInside)));
   const Float by_brick = boundsByBrick(field, spot, r);
+  Float bound = boundsApart(field, p, spot, r);
   bound = hn::IfThenElse(hn::And(spot.inside, hn::Not(deep)), hn::Max(bound, by_brick), bound);
   bound = hn::IfThenElse(sampled, by_brick, bound);
-  if constexpr (by == By::kBrick) return bound;
+  if constexpr (!closely) return bound;
   const Mask wanted = hn::And(hn::And(used, sampled), hn::Le(bound, all(field.cull.limit)));
   if (hn::AllFalse(kF, wanted)) return bound;
   return hn::IfThenElse(wanted, hn::Max(bound, boundsBySample(field, spot, sampled, r)), bound);
@@ -331,31 +317,29 @@ struct LeftOut {
   Float smallest;
 };
 
-/// Which of the `wanted` balls of a block may hold a contact.
-template <By by>
-HWY_INLINE std::uint32_t reachingBalls(const Field& field, const ShellBlock& balls, std::uint32_t wanted,
-                                       LeftOut& left_out) {
+/// Which balls of a block may hold a contact.
+template <bool closely>
+HWY_INLINE std::uint32_t reachingBalls(const Field& field, const ShellBlock& balls, LeftOut& left_out) {
   const Float limit = all(field.cull.limit);
   std::uint32_t reaching = 0;
   for (std::size_t i = 0; i < balls.count; i += hn::Lanes(kF)) {
-    const Mask used = maskOf(wanted >> i);
-    if (hn::AllFalse(kF, used)) continue;
+    const Mask used = hn::FirstN(kF, balls.count - i);
     const Float radius = hn::Mul(hn::LoadU(kF, balls.radius.data() + i), all(field.cull.per_metre));
-    const Float bound = boundsOfBalls<by>(field, inGrid(field.cull, balls, i), radius, used);
+    const Float bound = boundsOfBalls<closely>(field, inGrid(field.cull, balls, i), radius, used);
     const Mask reaches = hn::And(used, hn::Le(bound, limit));
     left_out.add(hn::AndNot(reaches, used), bound);
     reaching |= bitsOf(reaches) << i;
   }
-  left_out.culled.spheres += static_cast<std::uint32_t>(std::popcount(wanted));
+  left_out.culled.spheres += balls.count;
   return reaching;
 }
 
 std::uint32_t clusters(const LaneFrame& frame, const ShellBlock& balls, Culled& culled) noexcept {
   LeftOut left_out(culled);
-  return reachingBalls<By::kBrick>(Field(frame), balls, balls.used, left_out);
+  return reachingBalls<false>(Field(frame), balls, left_out);
 }
 
-/// Points of quads that reach, side by side.
+/// Points of leaves that reach, side by side.
 struct Gathered {
   template <typename T>
   using Lanes = std::array<T, Candidates::kAtOnce + ShellBlock::kLanes>;  ///< whole vectors are read
@@ -364,15 +348,17 @@ struct Gathered {
   Lanes<std::uint32_t> point;
   std::size_t count = 0;
 
-  void add(const Pointshell& shell, std::size_t leaf, std::size_t quad) {
+  /// All sixteen lanes are written, those in use count.
+  HWY_INLINE void add(const Pointshell& shell, std::uint32_t leaf) {
     const ShellBlock& points = shell.pointsOfLeaf(leaf);
-    const std::size_t first = quad * Pointshell::kQuadPoints;
-    std::copy_n(points.x.data() + first, Pointshell::kQuadPoints, x.data() + count);
-    std::copy_n(points.y.data() + first, Pointshell::kQuadPoints, y.data() + count);
-    std::copy_n(points.z.data() + first, Pointshell::kQuadPoints, z.data() + count);
-    const auto number = shell.leaves()[leaf].first + static_cast<std::uint32_t>(first);
-    for (std::uint32_t i = 0; i < Pointshell::kQuadPoints; ++i) point[count + i] = number + i;
-    count += std::min<std::size_t>(points.count - first, Pointshell::kQuadPoints);
+    const std::uint32_t first = shell.leaves()[leaf].first;
+    for (std::size_t i = 0; i < ShellBlock::kLanes; i += hn::Lanes(kF)) {
+      hn::StoreU(hn::Load(kF, points.x.data() + i), kF, x.data() + count + i);
+      hn::StoreU(hn::Load(kF, points.y.data() + i), kF, y.data() + count + i);
+      hn::StoreU(hn::Load(kF, points.z.data() + i), kF, z.data() + count + i);
+      hn::StoreU(hn::Iota(kU, first + static_cast<std::uint32_t>(i)), kU, point.data() + count + i);
+    }
+    count += points.count;
   }
 };
 
@@ -427,22 +413,12 @@ HWY_INLINE void appendNear(const Field& field, const Gathered& points, Candidate
   left_out.culled.points += static_cast<std::uint32_t>(points.count);
 }
 
-/// Gathers the quads that reach, of the leaves that do.
-HWY_INLINE void gatherQuads(const Field& field, const Pointshell& shell, std::uint32_t cluster,
-                            std::uint32_t reaching, Gathered& points, LeftOut& left_out) {
-  constexpr std::uint32_t kQuads = Pointshell::kQuadsOfLeaf;
-  const std::size_t first_leaf = shell.clusters()[cluster].first;
-  for (std::size_t leaf = 0; reaching >> leaf != 0; leaf += kQuads) {
-    // four leaves have sixteen quads
-    const std::uint32_t four = reaching >> leaf & 0xFU;
-    if (four == 0) continue;
-    const ShellBlock& quads = shell.quadsOfCluster(cluster)[leaf / kQuads];
-    const std::uint32_t fourfold = (four & 1U) | (four & 2U) << 3U | (four & 4U) << 6U | (four & 8U) << 9U;
-    std::uint32_t near = reachingBalls<By::kSample>(field, quads, fourfold * 0xFU & quads.used, left_out);
-    for (; near != 0; near &= near - 1) {
-      const auto quad = static_cast<std::size_t>(std::countr_zero(near));
-      points.add(shell, first_leaf + leaf + quad / kQuads, quad % kQuads);
-    }
+/// Gathers the points of the leaves that reach.
+HWY_INLINE void gatherLeaves(const Pointshell& shell, std::uint32_t cluster, std::uint32_t reaching,
+                             Gathered& points) {
+  const std::uint32_t first_leaf = shell.clusters()[cluster].first;
+  for (; reaching != 0; reaching &= reaching - 1) {
+    points.add(shell, first_leaf + static_cast<std::uint32_t>(std::countr_zero(reaching)));
   }
 }
 
@@ -453,12 +429,11 @@ void candidates(const LaneFrame& frame, const Pointshell& shell, std::span<const
   // step by step for all: each step's reads wait for memory together
   std::array<std::uint32_t, Candidates::kClusters> reaching{};
   for (std::size_t i = 0; i < of.size(); ++i) {
-    const ShellBlock& leaves = shell.leavesOfCluster(of[i]);
-    reaching[i] = reachingBalls<By::kBrickAndSample>(field, leaves, leaves.used, left_out);
+    reaching[i] = reachingBalls<true>(field, shell.leavesOfCluster(of[i]), left_out);
   }
   Gathered points;
   for (std::size_t i = 0; i < of.size(); ++i) {
-    gatherQuads(field, shell, of[i], reaching[i], points, left_out);
+    gatherLeaves(shell, of[i], reaching[i], points);
   }
   appendNear(field, points, out, left_out);
 }

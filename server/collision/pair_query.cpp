@@ -73,7 +73,8 @@ class Walk {
       before = culled_.points;
       for (std::uint32_t c = 0; c < level.cluster_count; c += ShellBlock::kLanes) {
         const ShellBlock& balls = shell_.clusterBlocks()[block++];
-        const std::uint32_t reaching = prune_ ? kernels_.clusters(frame_, balls, culled_) : balls.used;
+        const std::uint32_t reaching =
+            prune_ ? kernels_.clusters(frame_, balls, culled_) : (1U << balls.count) - 1U;
         forEachLane(reaching, [&](std::uint32_t i) { walk(level.first_cluster + c + i); });
       }
       if (!clusters_.empty()) walkClusters();

@@ -1,7 +1,6 @@
 #include "server/structures/pointshell.h"
 
 #include <algorithm>
-#include <bit>
 
 #include "server/structures/level_areas.h"
 
@@ -12,7 +11,6 @@ namespace {
 ShellBlock blockOf(std::span<const ShellPoint> points) {
   ShellBlock block;
   block.count = static_cast<std::uint32_t>(std::min(points.size(), ShellBlock::kLanes));
-  block.used = (1U << block.count) - 1U;
   for (std::size_t lane = 0; lane < ShellBlock::kLanes && block.count > 0; ++lane) {
     const Vector3f& p_MP = points[lane < block.count ? lane : 0].p_MP;
     block.x[lane] = p_MP.x();
@@ -25,45 +23,12 @@ ShellBlock blockOf(std::span<const ShellPoint> points) {
 ShellBlock blockOf(std::span<const ShellSphere> balls) {
   ShellBlock block;
   block.count = static_cast<std::uint32_t>(std::min(balls.size(), ShellBlock::kLanes));
-  block.used = (1U << block.count) - 1U;
   for (std::size_t lane = 0; lane < ShellBlock::kLanes && block.count > 0; ++lane) {
     const ShellSphere& ball = balls[lane < block.count ? lane : 0];
     block.x[lane] = ball.p_MC.x();
     block.y[lane] = ball.p_MC.y();
     block.z[lane] = ball.p_MC.z();
     block.radius[lane] = ball.radius;
-  }
-  return block;
-}
-
-/// About a quad's points; rounded up to hold them in floats.
-ShellSphere ballAbout(std::span<const ShellPoint> quad) {
-  Eigen::AlignedBox3f box;
-  for (const ShellPoint& point : quad) box.extend(point.p_MP);
-  ShellSphere ball;
-  ball.p_MC = box.center();
-  for (const ShellPoint& point : quad) ball.radius = std::max(ball.radius, (point.p_MP - ball.p_MC).norm());
-  ball.radius = ball.radius * 1.00001F + 1e-7F * ball.p_MC.norm();
-  return ball;
-}
-
-/// Of up to four leaves.
-ShellBlock quadsOf(std::span<const ShellPoint> points, std::span<const ShellSphere> leaves) {
-  constexpr std::uint32_t kQuad = Pointshell::kQuadPoints;
-  ShellBlock block;
-  for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf) {
-    const ShellSphere& one = leaves[leaf];
-    for (std::uint32_t first = 0; first < one.count; first += kQuad) {
-      const ShellSphere quad =
-          ballAbout(points.subspan(one.first + first, std::min(kQuad, one.count - first)));
-      const std::size_t lane = leaf * Pointshell::kQuadsOfLeaf + first / kQuad;
-      block.x[lane] = quad.p_MC.x();
-      block.y[lane] = quad.p_MC.y();
-      block.z[lane] = quad.p_MC.z();
-      block.radius[lane] = quad.radius;
-      block.used |= 1U << lane;
-      block.count = static_cast<std::uint32_t>(lane + 1);
-    }
   }
   return block;
 }
@@ -92,16 +57,8 @@ Pointshell::Pointshell(const Layout& layout, std::shared_ptr<const void> owner)
   }
   for (const ShellSphere& cluster : layout_.clusters) {
     blocks->clusters.push_back(blockOf(layout_.leaves.subspan(cluster.first, cluster.count)));
-    for (std::uint32_t leaf = 0; leaf < kClusterLeaves; leaf += kQuadsOfLeaf) {
-      const std::uint32_t left = std::max(cluster.count, leaf) - leaf;
-      blocks->quads.push_back(
-          quadsOf(layout_.points, layout_.leaves.subspan(cluster.first + std::min(leaf, cluster.count),
-                                                         std::min(left, kQuadsOfLeaf))));
-    }
   }
-  for (const ShellBlock& quads : blocks->quads)
-    spheres_ += static_cast<std::uint32_t>(std::popcount(quads.used));
-  spheres_ += static_cast<std::uint32_t>(1 + layout_.leaves.size() + layout_.clusters.size());
+  spheres_ = static_cast<std::uint32_t>(1 + layout_.leaves.size() + layout_.clusters.size());
   for (const ShellLevel& level : layout_.levels) {
     for (std::uint32_t c = 0; c < level.cluster_count; c += ShellBlock::kLanes) {
       const std::size_t count = std::min<std::size_t>(level.cluster_count - c, ShellBlock::kLanes);

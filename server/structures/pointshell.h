@@ -39,24 +39,20 @@ struct alignas(64) ShellBlock {
   static constexpr std::size_t kLanes = 16;
   std::array<float, kLanes> x{}, y{}, z{};  ///< [m] in M
   std::array<float, kLanes> radius{};       ///< [m] of balls; 0 for points
-  std::uint32_t count = 0;                  ///< lanes up to the last in use
-  std::uint32_t used = 0;                   ///< a bit for each lane in use
+  std::uint32_t count = 0;                  ///< lanes in use
 };
 
 /// An object as points on its skin with a tree of spheres over them (paper §3.1, "point-sphere tree").
 ///
 /// Points are stored by level, inside a level by leaf (at most 16 neighbours), leaves by cluster (at most 16
-/// leaves). Every four points of a leaf are a quad, with a ball of its own that is not stored. A query walks
-/// clusters, then leaves, then quads, then points of the levels that its budget allows, sixteen at a time:
-/// blocks hold them side by side.
+/// leaves). A query walks clusters, then leaves, then points of the levels that its budget allows, sixteen at
+/// a time: blocks hold them side by side.
 ///
 /// A view, as DistanceField. Threads: constant. Real-time: all.
 class Pointshell {
  public:
   static constexpr std::uint32_t kLeafPoints = 16;
   static constexpr std::uint32_t kClusterLeaves = 16;
-  static constexpr std::uint32_t kQuadPoints = 4;
-  static constexpr std::uint32_t kQuadsOfLeaf = kLeafPoints / kQuadPoints;
 
   struct Layout {
     std::span<const ShellPoint> points;
@@ -80,11 +76,6 @@ class Pointshell {
   [[nodiscard]] const ShellBlock& leavesOfCluster(std::size_t cluster) const {
     return blocks_->clusters[cluster];
   }
-  /// The quads of a cluster: four leaves in a block, four lanes for each.
-  [[nodiscard]] std::span<const ShellBlock> quadsOfCluster(std::size_t cluster) const {
-    return std::span(blocks_->quads)
-        .subspan(kClusterLeaves / kQuadsOfLeaf * cluster, kClusterLeaves / kQuadsOfLeaf);
-  }
   /// The leaf that a point is in, by its number.
   [[nodiscard]] std::uint32_t leafOf(std::size_t point) const { return blocks_->leaf_of_point[point]; }
   /// The clusters of all levels, sixteen at a time; each level begins a new block.
@@ -98,12 +89,12 @@ class Pointshell {
   /// A ball that holds all points: centre in M and radius [m].
   [[nodiscard]] const Vector3& ballCentre() const { return p_MC_; }
   [[nodiscard]] double ballRadius() const { return ball_radius_; }
-  /// How many balls there are: that of all points, those of clusters, of leaves and of quads.
+  /// How many balls there are: that of all points, those of clusters and of leaves.
   [[nodiscard]] std::uint32_t spheres() const { return spheres_; }
 
  private:
   struct Blocks {
-    std::vector<ShellBlock> leaves, quads, clusters, levels;
+    std::vector<ShellBlock> leaves, clusters, levels;
     std::vector<std::uint32_t> leaf_of_point;
     std::vector<std::vector<float>> areas;
   };

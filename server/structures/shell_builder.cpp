@@ -50,18 +50,17 @@ std::vector<std::vector<std::uint32_t>> sortIntoLevels(std::span<const ShellSite
   return added;
 }
 
-/// Orders numbers so that every run of 4 (of 16, of 256) is a compact neighbourhood: median splits at
+/// Orders numbers so that every run of 16 (and of 256) is a compact neighbourhood: median splits at
 /// multiples.
 void sortIntoRuns(std::span<const ShellSite> sites, std::span<std::uint32_t> numbers) {
-  constexpr std::size_t kQuad = Pointshell::kQuadPoints;
   constexpr std::size_t kLeaf = Pointshell::kLeafPoints;
   constexpr std::size_t kCluster = kLeaf * Pointshell::kClusterLeaves;
-  if (numbers.size() <= kQuad) return;
+  if (numbers.size() <= kLeaf) return;
   Eigen::AlignedBox3d box;
   for (const std::uint32_t i : numbers) box.extend(sites[i].p_MP);
   Eigen::Index axis = 0;
   box.sizes().maxCoeff(&axis);
-  const std::size_t run = numbers.size() > kCluster ? kCluster : numbers.size() > kLeaf ? kLeaf : kQuad;
+  const std::size_t run = numbers.size() > kCluster ? kCluster : kLeaf;
   const std::size_t half = (numbers.size() / run + 1) / 2 * run;
   const std::size_t middle = half < numbers.size() ? half : run;
   std::nth_element(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(middle), numbers.end(),

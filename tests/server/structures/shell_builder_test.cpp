@@ -62,39 +62,12 @@ TEST(ShellBuilder, SpheresHoldWhatTheySayTheyHold) {
         ++points_seen;
         EXPECT_LE((point.p_MP - leaf.p_MC).norm(), leaf.radius);
         EXPECT_LE((point.p_MP - cluster.p_MC).norm(), cluster.radius);
+        const auto number = static_cast<std::size_t>(&point - shell.points().data());
+        EXPECT_EQ(shell.leafOf(number), &leaf - shell.leaves().data());
       }
     }
   }
   EXPECT_EQ(points_seen, 3001U);
-}
-
-TEST(ShellBuilder, QuadsHoldFourNeighboursEachAndAllPoints) {
-  const Pointshell shell = buildShell(ballSites(3001));
-  std::size_t points_seen = 0;
-  double largest_leaf = 0.0;
-  double largest_quad = 0.0;
-  for (std::size_t c = 0; c < shell.clusters().size(); ++c) {
-    const ShellSphere& cluster = shell.clusters()[c];
-    for (std::uint32_t l = 0; l < cluster.count; ++l) {
-      const std::size_t number = cluster.first + l;
-      const ShellSphere& leaf = shell.leaves()[number];
-      const ShellBlock& quads = shell.quadsOfCluster(c)[l / Pointshell::kQuadsOfLeaf];
-      for (std::uint32_t i = 0; i < leaf.count; ++i) {
-        const std::size_t lane =
-            l % Pointshell::kQuadsOfLeaf * Pointshell::kQuadsOfLeaf + i / Pointshell::kQuadPoints;
-        ASSERT_TRUE((quads.used >> lane & 1U) != 0);
-        const Vector3f p_MC(quads.x[lane], quads.y[lane], quads.z[lane]);
-        EXPECT_LE((shell.points()[leaf.first + i].p_MP - p_MC).norm(), quads.radius[lane]);
-        EXPECT_EQ(shell.leafOf(leaf.first + i), number);
-        ++points_seen;
-        largest_quad = std::max(largest_quad, static_cast<double>(quads.radius[lane]));
-      }
-      largest_leaf = std::max(largest_leaf, static_cast<double>(leaf.radius));
-    }
-  }
-  EXPECT_EQ(points_seen, 3001U);
-  // neighbours, not any four of the leaf
-  EXPECT_LT(largest_quad, 0.8 * largest_leaf);
 }
 
 TEST(ShellBuilder, BothSidesOfAThinPlateKeepTheirPoints) {
