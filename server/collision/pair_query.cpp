@@ -373,15 +373,17 @@ void resampleContacts(const PairQuery& query, double moved, PairQueryResult& res
     kernels.contacts(frame, places, &samples, &sides);
     Lanes lanes(frame, samples, sides);
     for (std::uint32_t i = 0; i < block.count; ++i) {
-      Contact& contact = contacts[first + i];
+      const auto [point, area] = std::pair(contacts[first + i].point, contacts[first + i].area);
       if ((samples.exact >> i & 1U) == 0) {
         // as seen from where the list was made: from here back there it may come nearer again
         result.others_gap = std::min(result.others_gap, samples.distance[i] - frame.dilation - moved);
         continue;
       }
-      if ((sides.sloping >> i & 1U) == 0) lanes.setNormal(i, points[contact.point].inward_M);
+      if ((sides.sloping >> i & 1U) == 0) lanes.setNormal(i, points[point].inward_M);
+      Contact& contact = contacts[kept++];
       lanes.setContact(i, contact);
-      contacts[kept++] = contact;
+      contact.point = point;
+      contact.area = area;
     }
   }
   result.smallest_gap = std::min(result.smallest_gap, sums.smallest_distance - frame.dilation);
