@@ -5,95 +5,189 @@
 #include <cmath>
 
 namespace tenon {
+namespace {
 
-ActiveSet::ActiveSet(std::size_t max_variables)
-    : stride_(max_variables), J_(stride_ * stride_), R_(stride_ * stride_), d_(stride_) {
-  rows_.reserve(stride_);
-}
+/// A row whose free part is smaller than this share of it (squared) depends on the active rows.
+constexpr double kDependent = 1e-12;
 
-void ActiveSet::reset(std::size_t variables) {
-  assert(variables <= stride_);
-  n_ = variables;
-  rows_.clear();
-  for (std::size_t column = 0; column < n_; ++column) {
-    for (std::size_t row = 0; row < n_; ++row) j(row, column) = row == column ? 1.0 : 0.0;
+/// A pivot (squared) below this share of its row has lost too many digits to be a difference.
+constexpr double kCancelled = 1e-4;
+
+/// Sums in an order that depends on nothing but the length, four at a time.
+double dotOf(const double* a, const double* b, std::size_t count) {
+  Eigen::Array4d sums = Eigen::Array4d::Zero();
+  std::size_t i = 0;
+  for (; i + 4 <= count; i += 4) {
+    sums += Eigen::Map<const Eigen::Array4d>(a + i) * Eigen::Map<const Eigen::Array4d>(b + i);
   }
-}
-
-void ActiveSet::project(std::span<const double> normal) {
-  for (std::size_t column = 0; column < n_; ++column) {
-    double sum = 0.0;
-    for (std::size_t row = 0; row < n_; ++row) sum += j(row, column) * normal[row];
-    d_[column] = sum;
-  }
-}
-
-double ActiveSet::freePart2() const {
-  double sum = 0.0;
-  for (std::size_t k = size(); k < n_; ++k) sum += d_[k] * d_[k];
+  double sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
+  for (; i < count; ++i) sum += a[i] * b[i];
   return sum;
 }
 
-void ActiveSet::direction(std::span<double> step) const {
-  for (std::size_t row = 0; row < n_; ++row) {
-    double sum = 0.0;
-    for (std::size_t k = size(); k < n_; ++k) sum += j(row, k) * d_[k];
-    step[row] = sum;
+/// y += share * x
+void addTimes(double share, const double* x, double* y, std::size_t count) {
+  std::size_t i = 0;
+  for (; i + 4 <= count; i += 4) {
+    Eigen::Map<Eigen::Array4d>(y + i) += share * Eigen::Map<const Eigen::Array4d>(x + i);
+  }
+  for (; i < count; ++i) y[i] += share * x[i];
+}
+
+}  // namespace
+
+double RowNormal::dot(const RowNormal& other) const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (body[i] == kNone) continue;
+    for (std::size_t k = 0; k < 2; ++k) {
+      if (body[i] == other.body[k]) sum += part[i].dot(other.part[k]);
+    }
+  }
+  return sum;
+}
+
+double RowNormal::dot(std::span<const double> all) const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (body[i] == kNone) continue;
+    sum += part[i].dot(Eigen::Map<const Vector6>(&all[6 * static_cast<std::size_t>(body[i])]));
+  }
+  return sum;
+}
+
+void RowNormal::addTo(std::span<double> all, double share) const {
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (body[i] == kNone) continue;
+    Eigen::Map<Vector6>(&all[6 * static_cast<std::size_t>(body[i])]) += share * part[i];
   }
 }
 
-void ActiveSet::coordinates(std::span<double> coordinates) const {
+ActiveSet::ActiveSet(std::size_t max_variables)
+    : L_(max_variables * (max_variables + 1) / 2),
+      first_(max_variables),
+      normals_(max_variables),
+      l_(max_variables),
+      r_(max_variables),
+      free_(max_variables),
+      rest_(max_variables),
+      cosine_(max_variables),
+      sine_(max_variables) {
+  rows_.reserve(max_variables);
+}
+
+void ActiveSet::reset(std::size_t variables) {
+  assert(variables <= normals_.size());
+  n_ = variables;
+  rows_.clear();
+}
+
+void ActiveSet::solveLower(double* b, std::size_t first) const {
+  for (std::size_t i = first; i < size(); ++i) {
+    const double* L = line(i);
+    const std::size_t from = std::max(first_[i], first);
+    b[i] = (b[i] - (from < i ? dotOf(L + from, b + from, i - from) : 0.0)) / L[i];
+  }
+}
+
+void ActiveSet::solveUpper(double* b) const {
   for (std::size_t i = size(); i-- > 0;) {
-    double sum = d_[i];
-    for (std::size_t k = i + 1; k < size(); ++k) sum -= r(i, k) * coordinates[k];
-    coordinates[i] = sum / r(i, i);
+    if (b[i] == 0.0) continue;
+    const double* L = line(i);
+    b[i] /= L[i];
+    addTimes(-b[i], L + first_[i], b + first_[i], i - first_[i]);
   }
 }
 
-void ActiveSet::turn(std::size_t k, double cosine, double sine) {
-  for (std::size_t row = 0; row < n_; ++row) {
-    const double a = j(row, k);
-    const double b = j(row, k + 1);
-    j(row, k) = cosine * a + sine * b;
-    j(row, k + 1) = cosine * b - sine * a;
-  }
+void ActiveSet::solve(std::span<double> b) const {
+  solveLower(b.data(), 0);
+  solveUpper(b.data());
 }
 
-void ActiveSet::add(std::uint32_t row) {
+void ActiveSet::meet(const RowNormal& normal) {
+  projected_ = normal;
+  meets_from_ = size();
+  for (std::size_t i = 0; i < size(); ++i) {
+    l_[i] = normal.dot(normals_[i]);
+    if (l_[i] != 0.0) meets_from_ = std::min(meets_from_, i);
+  }
+  solveLower(l_.data(), meets_from_);
+}
+
+void ActiveSet::project(const RowNormal& normal) {
+  meet(normal);
+  std::copy_n(l_.begin(), size(), r_.begin());
+  solveUpper(r_.data());
+  const std::span<double> free{free_.data(), n_};
+  std::fill(free.begin(), free.end(), 0.0);
+  normal.addTo(free, 1.0);
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (r_[i] != 0.0) normals_[i].addTo(free, -r_[i]);
+  }
+  // once more, for what rounding has left of the active normals in the free part
+  for (std::size_t i = 0; i < size(); ++i) rest_[i] = normals_[i].dot(free);
+  solveLower(rest_.data(), 0);
+  addTimes(1.0, rest_.data() + meets_from_, l_.data() + meets_from_, size() - meets_from_);
+  solveUpper(rest_.data());
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (rest_[i] == 0.0) continue;
+    r_[i] += rest_[i];
+    normals_[i].addTo(free, -rest_[i]);
+  }
+  free2_ = dotOf(free_.data(), free_.data(), n_);
+}
+
+bool ActiveSet::dependent() const { return size() == n_ || free2_ <= kDependent * projected_.norm2(); }
+
+void ActiveSet::put(std::uint32_t row, double pivot) {
   const std::size_t q = size();
-  // turn the free columns until only the first of them sees the new row
-  for (std::size_t k = n_ - 1; k > q; --k) {
-    const double length = std::sqrt(d_[k - 1] * d_[k - 1] + d_[k] * d_[k]);
-    if (length == 0.0) continue;
-    turn(k - 1, d_[k - 1] / length, d_[k] / length);
-    d_[k - 1] = length;
-    d_[k] = 0.0;
-  }
-  for (std::size_t i = 0; i <= q; ++i) r(i, q) = d_[i];
+  double* L = line(q);
+  first_[q] = meets_from_;
+  std::copy(l_.data() + meets_from_, l_.data() + q, L + meets_from_);
+  L[q] = pivot;
+  normals_[q] = projected_;
   rows_.push_back(row);
 }
 
+void ActiveSet::add(std::uint32_t row) { put(row, std::sqrt(free2_)); }
+
+bool ActiveSet::append(std::uint32_t row, const RowNormal& normal) {
+  if (size() == n_) return false;
+  meet(normal);
+  const double norm2 = normal.norm2();
+  const double pivot2 = norm2 - dotOf(l_.data() + meets_from_, l_.data() + meets_from_, size() - meets_from_);
+  if (pivot2 > kCancelled * norm2) {
+    put(row, std::sqrt(pivot2));
+    return true;
+  }
+  project(normal);
+  if (dependent()) return false;
+  add(row);
+  return true;
+}
+
 void ActiveSet::drop(std::size_t position) {
-  const std::size_t last = size() - 1;
-  for (std::size_t column = position; column < last; ++column) {
-    for (std::size_t row = 0; row <= column + 1; ++row) r(row, column) = r(row, column + 1);
-    rows_[column] = rows_[column + 1];
+  // what the dropped column held of the rows behind it is turned into their own, one after the other
+  for (std::size_t i = position + 1; i < size(); ++i) {
+    const double* from = line(i);
+    double* to = line(i - 1);
+    const std::size_t first = first_[i];
+    double w = first <= position ? from[position] : 0.0;
+    if (first < position) std::copy(from + first, from + position, to + first);
+    for (std::size_t k = std::max(first, position + 1); k < i; ++k) {
+      const double a = from[k];
+      to[k - 1] = cosine_[k] * a + sine_[k] * w;
+      w = cosine_[k] * w - sine_[k] * a;
+    }
+    const double pivot = std::sqrt(from[i] * from[i] + w * w);
+    cosine_[i] = from[i] / pivot;
+    sine_[i] = w / pivot;
+    to[i - 1] = pivot;
+    first_[i - 1] = first > position ? first - 1 : first;
+    normals_[i - 1] = normals_[i];
+    rows_[i - 1] = rows_[i];
   }
   rows_.pop_back();
-  // the triangle has lost a column: turn its sub-diagonal away
-  for (std::size_t k = position; k < last; ++k) {
-    const double length = std::sqrt(r(k, k) * r(k, k) + r(k + 1, k) * r(k + 1, k));
-    if (length == 0.0) continue;
-    const double cosine = r(k, k) / length;
-    const double sine = r(k + 1, k) / length;
-    turn(k, cosine, sine);
-    for (std::size_t column = k; column < last; ++column) {
-      const double a = r(k, column);
-      const double b = r(k + 1, column);
-      r(k, column) = cosine * a + sine * b;
-      r(k + 1, column) = cosine * b - sine * a;
-    }
-  }
 }
 
 }  // namespace tenon

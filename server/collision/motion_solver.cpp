@@ -2,17 +2,12 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <limits>
 
 #include "server/collision/motion_workspace.h"
 
 namespace tenon {
-namespace {
-
-/// A row whose free part is smaller than this share of it (squared) depends on the active rows.
-constexpr double kDependent = 1e-12;
-
-}  // namespace
 
 void MotionSolver::Workspace::dropActive(std::size_t position) {
   is_active[active.row(position)] = 0;
@@ -22,24 +17,28 @@ void MotionSolver::Workspace::dropActive(std::size_t position) {
   for (std::size_t k = position; k < count; ++k) u[k] = u[k + 1];
 }
 
-bool MotionSolver::Workspace::enforce(std::size_t p) {
-  std::fill_n(normal.begin(), 6 * bodies, 0.0);
-  double norm2 = 0.0;
+RowNormal MotionSolver::Workspace::normalOf(std::size_t row) const {
+  RowNormal normal;
+  normal.body = body_of[row];
   for (std::size_t side = 0; side < 2; ++side) {
-    if (body_of[p][side] == GapRow::kStatic) continue;
-    const auto body = static_cast<std::size_t>(body_of[p][side]);
+    if (normal.body[side] == GapRow::kStatic) continue;
     const std::size_t moment = 4 + 3 * side;
     Vector6 c;
-    c << columns[1][p], columns[2][p], columns[3][p], columns[moment][p], columns[moment + 1][p],
-        columns[moment + 2][p];
-    segment(normal, body) = L[body].triangularView<Eigen::Lower>().solve(side == 0 ? c : Vector6(-c));
-    norm2 += segment(normal, body).squaredNorm();
+    c << columns[1][row], columns[2][row], columns[3][row], columns[moment][row], columns[moment + 1][row],
+        columns[moment + 2][row];
+    normal.part[side] = L[static_cast<std::size_t>(normal.body[side])].triangularView<Eigen::Lower>().solve(
+        side == 0 ? c : Vector6(-c));
   }
+  return normal;
+}
+
+bool MotionSolver::Workspace::enforce(std::size_t p) {
+  const RowNormal normal = normalOf(p);
   u[active.size()] = 0.0;
 
   while (++iterations <= iteration_limit) {
     active.project(normal);
-    active.coordinates(r);
+    const std::span<const double> r = active.coordinates();
     // how far until the multiplier of an active row vanishes
     const std::size_t q = active.size();
     double dual_step = std::numeric_limits<double>::infinity();
@@ -51,19 +50,18 @@ bool MotionSolver::Workspace::enforce(std::size_t p) {
       }
     }
     // how far until the row holds
-    const double free2 = active.freePart2();
-    const bool dependent = q == 6 * bodies || free2 <= kDependent * norm2;
+    const bool dependent = active.dependent();
+    const double slack = columns[0][p] + normal.dot(y);
     const double primal_step =
-        dependent ? std::numeric_limits<double>::infinity() : std::max(-slackOf(p), 0.0) / free2;
+        dependent ? std::numeric_limits<double>::infinity() : std::max(-slack, 0.0) / active.freePart2();
     if (dependent && vanishing == q) return false;
 
     const double t = std::min(dual_step, primal_step);
     for (std::size_t k = 0; k < q; ++k) u[k] = std::max(u[k] - t * r[k], 0.0);
     u[q] += t;
     if (!dependent) {
-      active.direction(step);
-      for (std::size_t i = 0; i < 6 * bodies; ++i) y[i] += t * step[i];
-      updateMotions();
+      const std::span<const double> direction = active.direction();
+      for (std::size_t i = 0; i < direction.size(); ++i) y[i] += t * direction[i];
     }
     if (primal_step <= dual_step) {
       active.add(static_cast<std::uint32_t>(p));
@@ -75,9 +73,42 @@ bool MotionSolver::Workspace::enforce(std::size_t p) {
   return false;
 }
 
+void MotionSolver::Workspace::takeAll(std::span<const std::uint32_t> first) {
+  for (const std::uint32_t row : first) {
+    if (!std::isfinite(columns[0][row]) || is_active[row] != 0 || !active.append(row, normalOf(row)))
+      continue;
+    is_active[row] = 1;
+    u[active.size() - 1] = 0.0;
+  }
+  if (active.size() == 0) return;
+  while (!settle()) ++iterations;
+  // for the digits that the first time has lost
+  while (!settle()) ++iterations;
+}
+
+bool MotionSolver::Workspace::settle() {
+  const std::span<double> all(y.data(), 6 * bodies);
+  std::copy_n(y0.begin(), all.size(), y.begin());
+  const std::size_t q = active.size();
+  for (std::size_t k = 0; k < q; ++k) active.normal(k).addTo(all, u[k]);
+  for (std::size_t k = 0; k < q; ++k) {
+    correction[k] = -columns[0][active.row(k)] - active.normal(k).dot(all);
+  }
+  active.solve({correction.data(), q});
+  for (std::size_t k = 0; k < q; ++k) {
+    u[k] += correction[k];
+    active.normal(k).addTo(all, correction[k]);
+  }
+  for (std::size_t k = q; k-- > 0;) {
+    if (u[k] < 0.0) dropActive(k);
+  }
+  return active.size() == q;
+}
+
 bool MotionSolver::Workspace::enforceTried() {
   for (std::size_t p = mostViolatedOfTried(); p < row_count; p = mostViolatedOfTried()) {
     if (!enforce(p)) return false;
+    updateMotions();
   }
   return true;
 }
@@ -88,14 +119,16 @@ bool MotionSolver::Workspace::run(std::span<const std::uint32_t> first) {
   updateMotions();
   std::fill_n(is_active.begin(), row_count, std::uint8_t{0});
   iteration_limit = iterations + static_cast<std::uint32_t>(64 + 30 * bodies);
-  tried.assign(first.begin(), first.end());
-  if (!enforceTried()) return false;
+  takeAll(first);
   while (true) {
+    updateMotions();
     findViolated();
     const std::uint32_t before = iterations;
     if (!enforceTried()) return false;
     // what only rounding finds violated counts as kept
     if (iterations == before) return true;
+    while (!settle()) {
+    }
   }
 }
 

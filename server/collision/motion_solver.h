@@ -75,7 +75,7 @@ struct MotionResult {
 /// the gaps (Gauss' principle of least constraint, as in Ortega et al. 2007, for positions). A strictly
 /// convex quadratic programme, solved by a dual active-set method (Goldfarb and Idnani 1983): exact, bounded
 /// iterations, and picking the most violated of the rows' neighbourhoods at every step, so hundreds of rows
-/// may be offered without reducing them.
+/// may be offered without reducing them. What held before is taken over in one go.
 ///
 /// Keeps its work space, sized at construction. Threads: one at a time. Real-time: solve.
 class MotionSolver {

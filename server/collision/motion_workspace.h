@@ -11,9 +11,6 @@
 
 namespace tenon {
 
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
-using Vector6 = Eigen::Matrix<double, 6, 1>;
-
 /// The part of a long vector that belongs to a body.
 inline Eigen::Map<Vector6> segment(std::vector<double>& all, std::size_t body) {
   return Eigen::Map<Vector6>(&all[6 * body]);
@@ -41,10 +38,8 @@ struct MotionSolver::Workspace {
         y0(6 * max_bodies),
         y(6 * max_bodies),
         x(6 * max_bodies),
-        normal(6 * max_bodies),
-        step(6 * max_bodies),
-        r(6 * max_bodies),
-        u(6 * max_bodies + 1) {
+        u(6 * max_bodies + 1),
+        correction(6 * max_bodies) {
     for (std::vector<double>& column : columns) column.resize(max_rows + kBlock);
     runs.reserve(max_rows);
     tried.reserve(max_rows);
@@ -63,6 +58,12 @@ struct MotionSolver::Workspace {
   [[nodiscard]] std::uint32_t worstOfBlock(std::size_t first, std::size_t end, const Run& run,
                                            const std::array<double, 9>& m) const;
   [[nodiscard]] std::size_t mostViolatedOfTried() const;
+  [[nodiscard]] RowNormal normalOf(std::size_t row) const;
+  /// What can hold of these rows holds then; those that would have to pull are left out again.
+  void takeAll(std::span<const std::uint32_t> first);
+  /// Rounding that has added up: the active rows hold to the last digit again. False: some would pull, which
+  /// are no longer active.
+  bool settle();
   bool enforceTried();
   bool enforce(std::size_t p);
   void dropActive(std::size_t position);
@@ -74,7 +75,8 @@ struct MotionSolver::Workspace {
   std::vector<std::array<std::int32_t, 2>> body_of;
   std::vector<Run> runs;
   std::vector<std::uint32_t> tried;
-  std::vector<double> y0, y, x, normal, step, r, u;  // u: multipliers in the order of `active`
+  std::vector<double> y0, y, x;
+  std::vector<double> u, correction;  ///< multipliers in the order of `active`, and what they lack
   std::size_t bodies = 0;
   std::size_t row_count = 0;
   bool clipped = false;  ///< negative gaps were raised to zero
