@@ -13,6 +13,7 @@
 
 #include <hwy/highway.h>
 
+#include "server/collision/brick_lanes_inl.h"
 #include "server/collision/query_kernels.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -21,285 +22,97 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Everything in voxels. A bound is a number that no distance, and no exact interpolated one, is below.
+/// A bound is a number [voxels] that no exact interpolated distance is below.
 namespace cull {
 
-constexpr HWY_CAPPED(float, 16) kF;
-constexpr hn::Rebind<std::int32_t, decltype(kF)> kI;
-constexpr hn::Rebind<std::uint32_t, decltype(kF)> kU;
-using Float = hn::Vec<decltype(kF)>;
-using Whole = hn::Vec<decltype(kI)>;
-using Mask = hn::Mask<decltype(kF)>;
-
-constexpr int kVoxels = DistanceField::kBrickVoxels;
-constexpr int kSide = DistanceField::kBrickSide;
-constexpr auto kHalfDiagonal = static_cast<float>(DistanceField::kHalfDiagonal);
-
-HWY_INLINE Float all(float value) { return hn::Set(kF, value); }
-HWY_INLINE Whole allWhole(std::int32_t value) { return hn::Set(kI, value); }
-HWY_INLINE Float toFloat(Whole v) { return hn::ConvertTo(kF, v); }
-#if HWY_TARGET == HWY_SCALAR
-// all values are in range: what is outside the grid stands at its corner
-HWY_INLINE Whole truncated(Float v) { return Whole(static_cast<std::int32_t>(v.raw)); }
-#else
-HWY_INLINE Whole truncated(Float v) { return hn::ConvertTo(kI, v); }
-#endif
-HWY_INLINE Mask asMask(hn::Mask<decltype(kI)> mask) { return hn::RebindMask(kF, mask); }
-HWY_INLINE hn::Mask<decltype(kI)> asWholeMask(Mask mask) { return hn::RebindMask(kI, mask); }
-
-HWY_INLINE Mask hasBrick(Whole entry) { return asMask(hn::Gt(entry, allWhole(-1))); }
-
-HWY_INLINE std::uint32_t bitsOf(Mask mask) {
-  std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(kF, mask, bytes);
-  return bytes[0] | static_cast<std::uint32_t>(bytes[1]) << 8U;
+/// By how much the interpolated distance at a point may be less than on the row next to it, b and c away
+/// along y and z: its mean is over rows 1 and sqrt(2) away too, of weights b + c - 2 b c and b c.
+HWY_INLINE Float lossOfPoint(const InBrick& at) {
+  constexpr float kLess = 0.585786F;   // 2 - sqrt(2)
+  constexpr float kWhole = 1.707107F;  // 1 / kLess
+  const Float rest = all(kWhole - 0.5F);
+  const Float b = hn::Add(hn::Abs(at.from_middle.y), rest);
+  const Float c = hn::Add(hn::Abs(at.from_middle.z), rest);
+  return hn::Sub(all(kWhole), hn::Mul(all(kLess), hn::Mul(b, c)));
 }
-
-struct Place3 {
-  Float x, y, z;
-};
-
-HWY_INLINE Float sum3(Float a, Float b, Float c) { return hn::Add(hn::Add(a, b), c); }
-HWY_INLINE Float norm(const Place3& v) {
-  return hn::Sqrt(sum3(hn::Mul(v.x, v.x), hn::Mul(v.y, v.y), hn::Mul(v.z, v.z)));
-}
-
-/// Field and frame as culling reads them.
-struct Field {
-  explicit Field(const LaneFrame& frame)
-      : layout(frame.field.layout()),
-        cull(frame.cull),
-        samples(reinterpret_cast<const std::int32_t*>(layout.samples.data())),
-        far(reinterpret_cast<const std::int32_t*>(layout.far.data())) {}
-
-  const DistanceField::Layout& layout;
-  const CullFrame& cull;
-  const std::int32_t* samples;  ///< read at byte offsets, two samples at a time
-  const std::int32_t* far;
-};
-
-HWY_INLINE Place3 inGrid(const CullFrame& cull, const Place3& p_A) {
-  const auto row = [&](std::size_t k) HWY_ATTR {
-    return hn::Add(all(cull.p[k]), sum3(hn::Mul(all(cull.R[k]), p_A.x), hn::Mul(all(cull.R[3 + k]), p_A.y),
-                                        hn::Mul(all(cull.R[6 + k]), p_A.z)));
-  };
-  return {row(0), row(1), row(2)};
-}
-
-HWY_INLINE Place3 inGrid(const CullFrame& cull, const ShellBlock& block, std::size_t i) {
-  return inGrid(cull, {hn::LoadU(kF, block.x.data() + i), hn::LoadU(kF, block.y.data() + i),
-                       hn::LoadU(kF, block.z.data() + i)});
-}
-
-/// A lane's brick; lanes outside the grid stand at its lowest corner.
-struct Spot {
-  Mask inside;
-  Whole number, entry;
-  Place3 p_brick;  ///< 0 to 8
-};
-
-HWY_INLINE Spot spotOf(const Field& field, Place3 p) {
-  const auto& end = field.cull.end;
-  const auto& bricks = field.layout.bricks;
-  const Float zero = hn::Zero(kF);
-  Spot spot;
-  spot.inside = hn::And(hn::And(hn::And(hn::Ge(p.x, zero), hn::Lt(p.x, all(end[0]))),
-                                hn::And(hn::Ge(p.y, zero), hn::Lt(p.y, all(end[1])))),
-                        hn::And(hn::Ge(p.z, zero), hn::Lt(p.z, all(end[2]))));
-  p = {hn::IfThenElseZero(spot.inside, p.x), hn::IfThenElseZero(spot.inside, p.y),
-       hn::IfThenElseZero(spot.inside, p.z)};
-  const Float per_voxel = all(1.0F / kVoxels);
-  const Float voxels = all(kVoxels);
-  const Whole bx = truncated(hn::Mul(p.x, per_voxel));
-  const Whole by = truncated(hn::Mul(p.y, per_voxel));
-  const Whole bz = truncated(hn::Mul(p.z, per_voxel));
-  spot.p_brick = {hn::Sub(p.x, hn::Mul(toFloat(bx), voxels)), hn::Sub(p.y, hn::Mul(toFloat(by), voxels)),
-                  hn::Sub(p.z, hn::Mul(toFloat(bz), voxels))};
-  spot.number =
-      hn::Add(hn::Add(hn::Mul(bz, allWhole(bricks[0] * bricks[1])), hn::Mul(by, allWhole(bricks[0]))), bx);
-  spot.entry = hn::GatherIndex(kI, field.layout.index.data(), spot.number);
-  return spot;
-}
-
-/// The sample next to a place in a brick, and the way from there along each axis, 0 to 0.5.
-struct NextSample {
-  Whole place;  ///< in bytes, of the pair that it is in
-  hn::Mask<decltype(kI)> upper;
-  Place3 away;
-};
-
-HWY_INLINE NextSample nextSample(Whole brick, const Place3& p_brick) {
-  const Float half = all(0.5F);
-  const Whole x = truncated(hn::Add(p_brick.x, half));
-  const Whole y = truncated(hn::Add(p_brick.y, half));
-  const Whole z = truncated(hn::Add(p_brick.z, half));
-  // the last along x is the upper half of the pair before it
-  const Whole last = allWhole(kVoxels - 1);
-  const Whole row = hn::Add(hn::Mul(z, allWhole(kSide * kSide)), hn::Mul(y, allWhole(kSide)));
-  const Whole pair = hn::Add(row, hn::Min(x, last));
-  const Whole first = hn::Mul(brick, allWhole(DistanceField::kBrickSamples));
-  return {hn::ShiftLeft<1>(hn::Add(first, pair)),
-          hn::Gt(x, last),
-          {hn::Abs(hn::Sub(p_brick.x, toFloat(x))), hn::Abs(hn::Sub(p_brick.y, toFloat(y))),
-           hn::Abs(hn::Sub(p_brick.z, toFloat(z)))}};
-}
-
-HWY_INLINE Float valueOf(const Field& field, const NextSample& next) {
-  const Whole pair = hn::GatherOffset(kI, field.samples, next.place);
-  const Whole upper = hn::IfThenElse(next.upper, pair, hn::ShiftLeft<16>(pair));
-  constexpr float kPerQuantum = 1.0F / DistanceField::kQuantaPerVoxel;
-  return hn::Mul(toFloat(hn::ShiftRight<16>(upper)), all(kPerQuantum));
-}
-
-/// For a point: the corners of its cell lie sqrt(1), sqrt(2) or sqrt(3) from the next sample, and weighted as
-/// the interpolation does their mean is at most the root of the mean square.
-HWY_INLINE Float lossOfPoint(const NextSample& next) {
-  return hn::Sqrt(sum3(next.away.x, next.away.y, next.away.z));
-}
-HWY_INLINE Float boundOfPoint(const Field& field, Whole brick, const Place3& p_brick) {
-  const NextSample next = nextSample(brick, p_brick);
-  return hn::Sub(valueOf(field, next), lossOfPoint(next));
-}
-
-/// The bricks behind refined entries: a child, and the coarse brick itself.
-struct Children {
-  Whole fine, own;
-  Place3 p_fine;
-};
-
-HWY_INLINE Children childrenOf(const Field& field, const Spot& spot, Mask refined) {
-  const std::int32_t r = field.layout.refinement;
-  const Float scale = all(static_cast<float>(r) / kVoxels);
-  const Whole most = allWhole(r - 1);
-  const Place3 p{hn::Mul(spot.p_brick.x, scale), hn::Mul(spot.p_brick.y, scale),
-                 hn::Mul(spot.p_brick.z, scale)};
-  const Whole x = hn::Min(truncated(p.x), most);
-  const Whole y = hn::Min(truncated(p.y), most);
-  const Whole z = hn::Min(truncated(p.z), most);
-  // lanes without children read any entry
-  const auto mask = asWholeMask(refined);
-  const Whole first = hn::IfThenElseZero(mask, hn::Sub(spot.entry, allWhole(DistanceField::kRefined)));
-  const Whole child = hn::Add(hn::Mul(hn::Add(hn::Mul(z, allWhole(r)), y), allWhole(r)), x);
-  const Whole fine = hn::IfThenElseZero(mask, hn::Add(first, child));
-  const Whole own = hn::IfThenElseZero(mask, hn::Add(first, allWhole(r * r * r)));
-  const Float voxels = all(kVoxels);
-  return {hn::GatherIndex(kI, field.layout.index.data(), fine),
-          hn::GatherIndex(kI, field.layout.index.data(), own),
-          {hn::Min(hn::Mul(hn::Sub(p.x, toFloat(x)), voxels), voxels),
-           hn::Min(hn::Mul(hn::Sub(p.y, toFloat(y)), voxels), voxels),
-           hn::Min(hn::Mul(hn::Sub(p.z, toFloat(z)), voxels), voxels)}};
-}
-
-HWY_INLINE Mask isRefined(const Spot& spot) {
-  return hn::And(spot.inside, asMask(hn::Gt(spot.entry, allWhole(DistanceField::kRefined - 1))));
+HWY_INLINE Float boundOfPoint(const Field& field, Whole brick, const InBrick& at) {
+  return hn::Sub(valueOf(field, rowOf(brick, at)), lossOfPoint(at));
 }
 
 /// Of points in a field with refined bricks: a child answers in its band, its coarse brick beyond, and
 /// neither may be near.
 HWY_INLINE Float boundsAmongChildren(const Field& field, const Spot& spot, Mask sampled, Mask refined) {
   const Children children = childrenOf(field, spot, refined);
-  const Whole own = hn::IfThenElse(asWholeMask(refined), children.own,
-                                   hn::IfThenElseZero(asWholeMask(sampled), spot.entry));
-  const Float bound = boundOfPoint(field, own, spot.p_brick);
+  const Whole own = hn::IfThenElse(asWholeMask(refined), children.own, whereSet(sampled, spot.entry));
+  const Float bound = boundOfPoint(field, own, spot.at);
   const Mask has_fine = hn::And(refined, hasBrick(children.fine));
-  const Whole fine = hn::IfThenElseZero(asWholeMask(has_fine), children.fine);
-  const Float fine_voxel = all(1.0F / static_cast<float>(field.layout.refinement));
-  const Float fine_bound = hn::Mul(boundOfPoint(field, fine, children.p_fine), fine_voxel);
+  const Whole fine = whereSet(has_fine, children.fine);
+  const Float fine_voxel = all(1.0F / static_cast<float>(field.refinement));
+  const Float fine_bound = hn::Mul(boundOfPoint(field, fine, children.at), fine_voxel);
   return hn::IfThenElse(has_fine, hn::Min(bound, fine_bound), bound);
 }
 
-/// What is known of a point before its sample is read: the bound is the sample minus the loss, or `least` if
-/// that is more.
-struct Prospect {
-  NextSample next;
-  Float loss, least;
-};
-
-HWY_INLINE Prospect prospectOf(const Field& field, const Place3& p) {
-  const Float none = all(-1e9F);
-  const Spot spot = spotOf(field, p);
-  const Mask deep = asMask(hn::Eq(spot.entry, allWhole(DistanceField::kFarInside)));
-  Prospect out;
-  out.least = hn::IfThenElse(deep, none, all(field.cull.beyond_band));
-  out.least = hn::IfThenElse(spot.inside, out.least, all(field.cull.outside));
-  Mask sampled = hn::And(spot.inside, hasBrick(spot.entry));
-  const Mask refined = isRefined(spot);
-  if (hn::AllFalse(kF, refined)) {
-    out.least = hn::IfThenElse(sampled, none, out.least);
-  } else {
-    out.least = hn::IfThenElse(sampled, boundsAmongChildren(field, spot, sampled, refined), out.least);
-    sampled = hn::FirstN(kF, 0);
-  }
-  out.next = nextSample(hn::IfThenElseZero(asWholeMask(sampled), spot.entry), spot.p_brick);
-  out.loss = hn::IfThenElse(sampled, lossOfPoint(out.next), all(1e9F));
-  return out;
-}
-
-HWY_INLINE Float farOf(const Field& field, Whole number) {
-  // two at a time: the last is the upper half of the pair before it
-  const Whole last = allWhole(static_cast<std::int32_t>(2 * field.layout.far.size() - 4));
-  const Whole wanted = hn::ShiftLeft<1>(number);
-  const Whole pair = hn::GatherOffset(kI, field.far, hn::Min(wanted, last));
-  const Whole upper = hn::IfThenElse(hn::Gt(wanted, last), pair, hn::ShiftLeft<16>(pair));
-  return hn::Mul(toFloat(hn::ShiftRight<16>(upper)), all(1.0F / DistanceField::kFarPerVoxel));
-}
-
-/// A value's bound over a ball of radius r whose centre is `away` from where the value is: a point of the
-/// ball takes its mean from corners about it, whose squares lie up to three quarters further in the mean.
+/// A value's bound over a ball of radius r whose centre is `away` from where the value is. A point of the
+/// ball takes its mean from corners about it, and the value may be one of two samples: squares are up to 3/4
+/// and 1/4 more in the mean.
 HWY_INLINE Float boundOfBall(Float value, Float away, Float r) {
   const Float farthest = hn::Add(away, r);
-  return hn::Sub(value, hn::Sqrt(hn::Add(hn::Mul(farthest, farthest), all(kHalfDiagonal * kHalfDiagonal))));
+  return hn::Sub(value, hn::Sqrt(hn::Add(hn::Mul(farthest, farthest), all(1.0F))));
 }
 
-/// Of balls whose centres are outside the grid, or whose centres' bricks have no samples.
-HWY_INLINE Float boundsApart(const Field& field, const Place3& p, const Spot& spot, Float r) {
-  const Mask deep = asMask(hn::Eq(spot.entry, allWhole(DistanceField::kFarInside)));
-  const Float beyond_band =
-      boundOfBall(all(static_cast<float>(DistanceField::kBandVoxels)), all(kHalfDiagonal), r);
-  const Float bound = hn::IfThenElse(deep, all(-1e9F), beyond_band);
-  if (hn::AllTrue(kF, spot.inside)) return bound;
-  const auto& end = field.cull.end;
-  const Float zero = hn::Zero(kF);
-  const Place3 beyond{hn::Max(hn::Max(hn::Neg(p.x), hn::Sub(p.x, all(end[0]))), zero),
-                      hn::Max(hn::Max(hn::Neg(p.y), hn::Sub(p.y, all(end[1]))), zero),
-                      hn::Max(hn::Max(hn::Neg(p.z), hn::Sub(p.z, all(end[2]))), zero)};
-  const Float to_surface = hn::Add(norm(beyond), all(field.cull.outside));
-  return hn::IfThenElse(spot.inside, bound, boundOfBall(to_surface, zero, r));
+/// Where the centre is outside the grid, by how far; elsewhere the bound that there is.
+HWY_INLINE Float boundsOutside(const Field& field, const Place3& p, Float bound, Float r) {
+  const auto& most = field.cull.most;
+  const Place3 beyond{hn::Sub(p.x, clamped(p.x, all(most[0]))), hn::Sub(p.y, clamped(p.y, all(most[1]))),
+                      hn::Sub(p.z, clamped(p.z, all(most[2])))};
+  const Float away = norm(beyond);
+  const Mask outside = hn::Gt(away, hn::Zero(kF));
+  if (hn::AllFalse(kF, outside)) return bound;
+  // the outermost voxels' middles are half a diagonal from the border
+  const Float to_surface = hn::Add(away, all(field.cull.outside - kHalfDiagonal));
+  return hn::IfThenElse(outside, hn::Max(bound, boundOfBall(to_surface, hn::Zero(kF), r)), bound);
 }
 
 /// By the middle of the centre's brick, as DistanceField::lowerBound.
 HWY_INLINE Float boundsByBrick(const Field& field, const Spot& spot, Float r) {
-  const Float middle = all(0.5F * kVoxels);
-  const Float from_middle = norm(
-      {hn::Sub(spot.p_brick.x, middle), hn::Sub(spot.p_brick.y, middle), hn::Sub(spot.p_brick.z, middle)});
-  return boundOfBall(farOf(field, spot.number), from_middle, r);
+  const auto from_middle = [](Whole voxel, Float from) HWY_ATTR {
+    return hn::Add(toFloat(voxel), hn::Sub(from, all(0.5F * (kVoxels - 1))));
+  };
+  const Float away =
+      norm({from_middle(spot.at.x, spot.at.from_middle.x), from_middle(spot.at.y, spot.at.from_middle.y),
+            from_middle(spot.at.z, spot.at.from_middle.z)});
+  return boundOfBall(farOf(field, spot.number), away, r);
 }
 
-/// By the sample next to the centre, of lanes whose brick has some.
-HWY_INLINE Float boundsBySample(const Field& field, const Spot& spot, Mask sampled, Float r) {
+/// By the row next to the centre, of lanes whose brick has samples.
+HWY_INLINE Float boundsByRow(const Field& field, const Spot& spot, Mask sampled, Float r) {
   Whole brick = spot.entry;
-  const Mask refined = isRefined(spot);
+  const Mask refined = isRefined(spot.entry);
   if (!hn::AllFalse(kF, refined)) {
     brick = hn::IfThenElse(asWholeMask(refined), childrenOf(field, spot, refined).own, brick);
   }
-  const NextSample next = nextSample(hn::IfThenElseZero(asWholeMask(sampled), brick), spot.p_brick);
-  return boundOfBall(valueOf(field, next), norm(next.away), r);
+  const Float half = all(0.5F);
+  const Float b = hn::Sub(half, hn::Abs(spot.at.from_middle.y));
+  const Float c = hn::Sub(half, hn::Abs(spot.at.from_middle.z));
+  const Float away = hn::Sqrt(hn::Add(hn::Mul(b, b), hn::Mul(c, c)));
+  return boundOfBall(valueOf(field, rowOf(whereSet(sampled, brick), spot.at)), away, r);
 }
 
-/// `closely`: also by the sample next to the centre, where the brick's middle does not tell.
+/// `closely`: also by the row next to the centre, where the brick's middle does not tell.
 template <bool closely>
-HWY_INLINE Float boundsOfBalls(const Field& field, const Place3& p, Float r, Mask used) {
+HWY_INLINE Float boundsOfBalls(const Field& field, const Place3& p, Float r) {
   const Spot spot = spotOf(field, p);
-  const Mask sampled = hn::And(spot.inside, hasBrick(spot.entry));
-  const Mask deep = asMask(hn::Eq(spot.entry, allWhole(DistanceField::kFarInside)));
+  const Mask sampled = hasBrick(spot.entry);
   const Float by_brick = boundsByBrick(field, spot, r);
-  Float bound = boundsApart(field, p, spot, r);
-  bound = hn::IfThenElse(hn::And(spot.inside, hn::Not(deep)), hn::Max(bound, by_brick), bound);
-  bound = hn::IfThenElse(sampled, by_brick, bound);
+  const Float beyond_band =
+      boundOfBall(all(static_cast<float>(DistanceField::kBandVoxels)), all(kHalfDiagonal), r);
+  Float bound = hn::IfThenElse(sampled, by_brick, hn::Max(by_brick, beyond_band));
+  bound = hn::IfThenElse(isDeep(spot.entry), all(-1e9F), bound);
+  bound = boundsOutside(field, p, bound, r);
   if constexpr (!closely) return bound;
-  const Mask wanted = hn::And(hn::And(used, sampled), hn::Le(bound, all(field.cull.limit)));
+  const Mask wanted = hn::And(sampled, hn::Le(bound, all(field.cull.limit)));
   if (hn::AllFalse(kF, wanted)) return bound;
-  return hn::IfThenElse(wanted, hn::Max(bound, boundsBySample(field, spot, sampled, r)), bound);
+  return hn::IfThenElse(wanted, hn::Max(bound, boundsByRow(field, spot, sampled, r)), bound);
 }
 
 /// What was left out, lane by lane.
@@ -309,8 +122,8 @@ struct LeftOut {
   LeftOut(const LeftOut&) = delete;
   LeftOut& operator=(const LeftOut&) = delete;
 
-  HWY_INLINE void add(Mask lanes, Float bound) {
-    smallest = hn::Min(smallest, hn::IfThenElse(lanes, bound, smallest));
+  HWY_INLINE void addUnless(Mask reaches, Float bound) {
+    smallest = hn::Min(smallest, hn::IfThenElse(reaches, smallest, bound));
   }
 
   Culled& culled;
@@ -322,16 +135,16 @@ template <bool closely>
 HWY_INLINE std::uint32_t reachingBalls(const Field& field, const ShellBlock& balls, LeftOut& left_out) {
   const Float limit = all(field.cull.limit);
   std::uint32_t reaching = 0;
+  // lanes that are not in use are as the first
   for (std::size_t i = 0; i < balls.count; i += hn::Lanes(kF)) {
-    const Mask used = hn::FirstN(kF, balls.count - i);
     const Float radius = hn::Mul(hn::LoadU(kF, balls.radius.data() + i), all(field.cull.per_metre));
-    const Float bound = boundsOfBalls<closely>(field, inGrid(field.cull, balls, i), radius, used);
-    const Mask reaches = hn::And(used, hn::Le(bound, limit));
-    left_out.add(hn::AndNot(reaches, used), bound);
+    const Float bound = boundsOfBalls<closely>(field, inGrid(field.cull, balls, i), radius);
+    const Mask reaches = hn::Le(bound, limit);
+    left_out.addUnless(reaches, bound);
     reaching |= bitsOf(reaches) << i;
   }
   left_out.culled.spheres += balls.count;
-  return reaching;
+  return reaching & ((1U << balls.count) - 1U);
 }
 
 std::uint32_t clusters(const LaneFrame& frame, const ShellBlock& balls, Culled& culled) noexcept {
@@ -339,87 +152,105 @@ std::uint32_t clusters(const LaneFrame& frame, const ShellBlock& balls, Culled& 
   return reachingBalls<false>(Field(frame), balls, left_out);
 }
 
-/// Points of leaves that reach, side by side.
-struct Gathered {
-  template <typename T>
-  using Lanes = std::array<T, Candidates::kAtOnce + ShellBlock::kLanes>;  ///< whole vectors are read
+/// Leaves whose points are looked at.
+struct Leaves {
+  static constexpr std::size_t kMost = Candidates::kClusters * Pointshell::kClusterLeaves;
 
-  alignas(64) Lanes<float> x, y, z;
-  Lanes<std::uint32_t> point;
+  std::array<std::uint32_t, kMost> number;
   std::size_t count = 0;
-
-  /// All sixteen lanes are written, those in use count.
-  HWY_INLINE void add(const Pointshell& shell, std::uint32_t leaf) {
-    const ShellBlock& points = shell.pointsOfLeaf(leaf);
-    const std::uint32_t first = shell.leaves()[leaf].first;
-    for (std::size_t i = 0; i < ShellBlock::kLanes; i += hn::Lanes(kF)) {
-      hn::StoreU(hn::Load(kF, points.x.data() + i), kF, x.data() + count + i);
-      hn::StoreU(hn::Load(kF, points.y.data() + i), kF, y.data() + count + i);
-      hn::StoreU(hn::Load(kF, points.z.data() + i), kF, z.data() + count + i);
-      hn::StoreU(hn::Iota(kU, first + static_cast<std::uint32_t>(i)), kU, point.data() + count + i);
-    }
-    count += points.count;
-  }
 };
 
-/// Appends the lanes from i that are near.
-HWY_INLINE void append(const Gathered& points, std::size_t i, Mask near, Candidates& out) {
+/// What is known of points before their samples are read: the bound is the row's value minus the loss.
+struct Prospects {
+  template <typename T>
+  using Lanes = std::array<T, Leaves::kMost * ShellBlock::kLanes>;
+
+  alignas(64) Lanes<std::int32_t> place;
+  Lanes<float> along, loss;
+};
+
+/// A loss after which nothing is near, and minus that.
+constexpr float kCertain = 1e9F;
+
+HWY_INLINE Float lossWithoutSamples(const Field& field, Whole entry) {
+  const bool near = field.cull.beyond_band <= field.cull.limit;
+  return hn::IfThenElse(isDeep(entry), all(kCertain), all(near ? kCertain : -kCertain));
+}
+
+/// Of one vector of points.
+HWY_INLINE void foresee(const Field& field, const Place3& p, std::size_t i, Prospects& out,
+                        LeftOut& left_out) {
+  const Spot spot = spotOf(field, p);
+  Mask sampled = hasBrick(spot.entry);
+  Float loss = lossWithoutSamples(field, spot.entry);
+  const Mask refined = isRefined(spot.entry);
+  if (hn::AllFalse(kF, refined)) {
+    loss = hn::IfThenElse(sampled, lossOfPoint(spot.at), loss);
+  } else {
+    const Float bound = boundsAmongChildren(field, spot, sampled, refined);
+    const Mask near = hn::Le(bound, all(field.cull.limit));
+    left_out.addUnless(hn::Or(near, hn::Not(sampled)), bound);
+    loss = hn::IfThenElse(sampled, hn::IfThenElse(near, all(kCertain), all(-kCertain)), loss);
+    sampled = hn::FirstN(kF, 0);
+  }
+  const Row row = rowOf(whereSet(sampled, spot.entry), spot.at);
+  hn::StoreU(row.place, kI, out.place.data() + i);
+  hn::StoreU(row.along, kF, out.along.data() + i);
+  hn::StoreU(loss, kF, out.loss.data() + i);
+}
+
+/// Appends the lanes from i of a leaf that are near.
+HWY_INLINE void append(const Pointshell& shell, std::uint32_t leaf, std::size_t i, Mask near,
+                       [[maybe_unused]] Number count_up, Candidates& out) {
+  const ShellBlock& points = shell.pointsOfLeaf(leaf);
+  const std::uint32_t first = shell.leaves()[leaf].first + static_cast<std::uint32_t>(i);
 #if HWY_TARGET <= HWY_AVX3
+  near = hn::And(near, hn::FirstN(kF, points.count - i));
   const std::uint32_t n = out.count;
   hn::StoreU(hn::Compress(hn::LoadU(kF, points.x.data() + i), near), kF, out.x.data() + n);
   hn::StoreU(hn::Compress(hn::LoadU(kF, points.y.data() + i), near), kF, out.y.data() + n);
   hn::StoreU(hn::Compress(hn::LoadU(kF, points.z.data() + i), near), kF, out.z.data() + n);
-  const auto number = hn::LoadU(kU, points.point.data() + i);
-  hn::StoreU(hn::Compress(number, hn::RebindMask(kU, near)), kU, out.point.data() + n);
+  hn::StoreU(hn::Compress(hn::Add(count_up, hn::Set(kU, first)), hn::RebindMask(kU, near)), kU,
+             out.point.data() + n);
   out.count += static_cast<std::uint32_t>(hn::CountTrue(kF, near));
 #else
-  for (std::uint32_t bits = bitsOf(near); bits != 0; bits &= bits - 1) {
-    const std::size_t lane = i + static_cast<std::size_t>(std::countr_zero(bits));
-    out.x[out.count] = points.x[lane];
-    out.y[out.count] = points.y[lane];
-    out.z[out.count] = points.z[lane];
-    out.point[out.count++] = points.point[lane];
+  const std::uint32_t used = (1U << (points.count - i)) - 1U;
+  for (std::uint32_t bits = bitsOf(near) & used; bits != 0; bits &= bits - 1) {
+    const auto lane = static_cast<std::uint32_t>(std::countr_zero(bits));
+    out.x[out.count] = points.x[i + lane];
+    out.y[out.count] = points.y[i + lane];
+    out.z[out.count] = points.z[i + lane];
+    out.point[out.count++] = first + lane;
   }
 #endif
 }
 
 /// In two rounds: reading samples is waiting for memory, and for many of them at once in a short loop.
-HWY_INLINE void appendNear(const Field& field, const Gathered& points, Candidates& out, LeftOut& left_out) {
-  struct Prospects {
-    alignas(64) Gathered::Lanes<std::int32_t> place, upper;
-    Gathered::Lanes<float> loss, least;
-  } wait;
-  for (std::size_t i = 0; i < points.count; i += hn::Lanes(kF)) {
-    const Place3 p_A{hn::LoadU(kF, points.x.data() + i), hn::LoadU(kF, points.y.data() + i),
-                     hn::LoadU(kF, points.z.data() + i)};
-    const Prospect one = prospectOf(field, inGrid(field.cull, p_A));
-    hn::StoreU(one.next.place, kI, wait.place.data() + i);
-    hn::StoreU(hn::VecFromMask(kI, one.next.upper), kI, wait.upper.data() + i);
-    hn::StoreU(one.loss, kF, wait.loss.data() + i);
-    hn::StoreU(one.least, kF, wait.least.data() + i);
+HWY_INLINE void appendNear(const Field& field, const Pointshell& shell, const Leaves& leaves, Candidates& out,
+                           LeftOut& left_out) {
+  Prospects prospects;
+  for (std::size_t leaf = 0; leaf < leaves.count; ++leaf) {
+    const ShellBlock& points = shell.pointsOfLeaf(leaves.number[leaf]);
+    for (std::size_t i = 0; i < points.count; i += hn::Lanes(kF)) {
+      foresee(field, inGrid(field.cull, points, i), leaf * ShellBlock::kLanes + i, prospects, left_out);
+    }
   }
   const Float limit = all(field.cull.limit);
-  for (std::size_t i = 0; i < points.count; i += hn::Lanes(kF)) {
-    NextSample next;
-    next.place = hn::LoadU(kI, wait.place.data() + i);
-    next.upper = hn::MaskFromVec(hn::LoadU(kI, wait.upper.data() + i));
-    const Float bound = hn::Max(hn::Sub(valueOf(field, next), hn::LoadU(kF, wait.loss.data() + i)),
-                                hn::LoadU(kF, wait.least.data() + i));
-    const Mask used = hn::FirstN(kF, points.count - i);
-    const Mask near = hn::And(used, hn::Le(bound, limit));
-    left_out.add(hn::AndNot(near, used), bound);
-    append(points, i, near, out);
+  const Number count_up = hn::Iota(kU, 0);
+  for (std::size_t leaf = 0; leaf < leaves.count; ++leaf) {
+    const std::uint32_t count = shell.pointsOfLeaf(leaves.number[leaf]).count;
+    for (std::size_t i = 0; i < count; i += hn::Lanes(kF)) {
+      const std::size_t at = leaf * ShellBlock::kLanes + i;
+      const Row row{hn::LoadU(kI, prospects.place.data() + at), hn::LoadU(kF, prospects.along.data() + at)};
+      const Float bound = hn::Sub(valueOf(field, row), hn::LoadU(kF, prospects.loss.data() + at));
+      const Mask near = hn::Le(bound, limit);
+      left_out.addUnless(near, bound);
+      append(shell, leaves.number[leaf], i, near, count_up, out);
+    }
+    left_out.culled.points += count;
   }
-  left_out.culled.points += static_cast<std::uint32_t>(points.count);
-}
-
-/// Gathers the points of the leaves that reach.
-HWY_INLINE void gatherLeaves(const Pointshell& shell, std::uint32_t cluster, std::uint32_t reaching,
-                             Gathered& points) {
-  const std::uint32_t first_leaf = shell.clusters()[cluster].first;
-  for (; reaching != 0; reaching &= reaching - 1) {
-    points.add(shell, first_leaf + static_cast<std::uint32_t>(std::countr_zero(reaching)));
-  }
+  // what has no samples lies beyond the band
+  if (leaves.count > 0) left_out.smallest = hn::Min(left_out.smallest, all(field.cull.beyond_band));
 }
 
 void candidates(const LaneFrame& frame, const Pointshell& shell, std::span<const std::uint32_t> of,
@@ -431,11 +262,14 @@ void candidates(const LaneFrame& frame, const Pointshell& shell, std::span<const
   for (std::size_t i = 0; i < of.size(); ++i) {
     reaching[i] = reachingBalls<true>(field, shell.leavesOfCluster(of[i]), left_out);
   }
-  Gathered points;
+  Leaves leaves;
   for (std::size_t i = 0; i < of.size(); ++i) {
-    gatherLeaves(shell, of[i], reaching[i], points);
+    const std::uint32_t first = shell.clusters()[of[i]].first;
+    for (std::uint32_t bits = reaching[i]; bits != 0; bits &= bits - 1) {
+      leaves.number[leaves.count++] = first + static_cast<std::uint32_t>(std::countr_zero(bits));
+    }
   }
-  appendNear(field, points, out, left_out);
+  appendNear(field, shell, leaves, out, left_out);
 }
 
 }  // namespace cull

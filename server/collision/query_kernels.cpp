@@ -83,18 +83,24 @@ CullFrame::CullFrame(const DistanceField& field, const Matrix3& R_BA, const Vect
   const DistanceField::Layout& layout = field.layout();
   const double per = 1.0 / layout.voxel;
   for (std::size_t i = 0; i < R.size(); ++i) R[i] = static_cast<float>(R_BA.data()[i] * per);
+  bool too_long = false;
   for (int axis = 0; axis < 3; ++axis) {
     const auto k = static_cast<std::size_t>(axis);
-    p[k] = static_cast<float>((p_BA_B[axis] - layout.p_MoFo_M[axis]) * per);
-    end[k] = static_cast<float>(layout.bricks[k] * DistanceField::kBrickVoxels);
+    p[k] = static_cast<float>((p_BA_B[axis] - layout.p_MoFo_M[axis]) * per - 0.5);
+    most[k] = static_cast<float>(layout.bricks[k]) * DistanceField::kBrickVoxels - 1.0F;
+    too_long = too_long || most[k] >= static_cast<float>(kMostVoxels);
   }
   per_metre = static_cast<float>(per);
   // a place is a sum of four products, each off by 2^-23 of at most this much; bounds are off by as little
-  const float most = highest(p) + highest(end) + static_cast<float>(2.0 * reach_A * per);
-  slack = 4e-6F * most + 2e-3F;
+  const float largest = highest(p) + highest(most) + static_cast<float>(2.0 * reach_A * per);
+  slack = 4e-6F * largest + 2e-3F;
   limit = static_cast<float>(limit_B * per) + slack;
   outside = static_cast<float>(layout.margin * per);
-  beyond_band = static_cast<float>(layout.band * per - DistanceField::kHalfDiagonal);
+  beyond_band = std::min(outside, static_cast<float>(layout.band * per - DistanceField::kHalfDiagonal));
+  if (too_long) {
+    limit = std::numeric_limits<float>::infinity();
+    most.fill(0.0F);
+  }
 }
 
 LaneFrame::LaneFrame(const DistanceField& the_field, const Pose& X_WA, const Pose& X_WB, double the_dilation,

@@ -18,20 +18,23 @@ namespace tenon {
           R(2, 0) * v[0] + R(2, 1) * v[1] + R(2, 2) * v[2]};
 }
 
-/// The field's frame in floats: in voxels, from the grid's lowest corner. Good enough to tell what is
-/// certainly far; `slack` is more than rounding can do.
+/// The field's frame in floats: in voxels, from the middle of the grid's first voxel. Good enough to tell
+/// what is certainly far; `slack` is more than rounding can do.
 struct CullFrame {
+  /// Along an axis. In longer grids floats cannot tell voxels apart, and nothing is certainly far.
+  static constexpr std::int32_t kMostVoxels = 1 << 22;
+
   CullFrame(const DistanceField& field, const Matrix3& R_BA, const Vector3& p_BA_B, double reach_A,
             double limit);
 
-  std::array<float, 9> R{};    ///< voxels a metre of A, column by column
-  std::array<float, 3> p{};    ///< where A's origin is
-  std::array<float, 3> end{};  ///< the grid's highest corner
+  std::array<float, 9> R{};     ///< voxels a metre of A, column by column
+  std::array<float, 3> p{};     ///< where A's origin is
+  std::array<float, 3> most{};  ///< the middle of the grid's last voxel
   float per_metre = 0.0F;
   float slack = 0.0F;
   float limit = 0.0F;        ///< a bound above this frees a point or a ball
   float outside = 0.0F;      ///< distances outside the grid are not below this
-  float beyond_band = 0.0F;  ///< nor those in bricks without samples
+  float beyond_band = 0.0F;  ///< nor, if that is less, those outside in bricks without samples
 };
 
 /// What all lanes of a query share: the field, both poses, and how near is near.

@@ -159,5 +159,50 @@ TEST_F(QueryKernelsTest, PruningChangesNoContact) {
   }
 }
 
+TEST_F(QueryKernelsTest, NoPointIsNearerThanWhatIsSaidOfAllThatWereLeftOut) {
+  const StructuresPtr box = boxStructures({0.08, 0.05, 0.03}, 0.002, 0.006);
+  const std::vector<StructuresPtr> others = fields();
+  std::mt19937_64 engine(24);
+  const auto result = std::make_unique<PairQueryResult>();
+  for (int trial = 0; trial < 500; ++trial) {
+    const StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
+    const Pose X_WA = randomPose(engine, trial % 4 == 0 ? 0.2 : 0.07);
+    queryPair({&box->shell, &other->field, X_WA, Pose(), 0.0004, 0.0}, *result);
+    for (const ShellPoint& point : box->shell.points()) {
+      const FieldSample sample = other->field.sample(X_WA * point.p_MP.cast<double>());
+      if (!sample.exact) continue;
+      ASSERT_LE(result->smallest_gap, sample.distance - 0.0004 + 1e-12) << "trial " << trial;
+    }
+  }
+}
+
+//   o o o o   A grid so long that floats do not tell its bricks apart. One of them holds a floor; a shell
+//   --------  lies in it.
+TEST_F(QueryKernelsTest, AGridTooLongForFloatsHasNothingLeftOut) {
+  constexpr double kVoxel = 0.001;
+  constexpr std::int32_t kBricks = 600'000;
+  constexpr std::int32_t kFloor = 599'990;
+  std::vector<DistanceField::Entry> index(kBricks, DistanceField::kFarOutside);
+  index[kFloor] = 0;
+  const std::vector<std::int16_t> far(kBricks, 0);
+  std::vector<std::int16_t> samples;
+  for (int i = 0; i < DistanceField::kBrickSamples; ++i) {
+    const int z = i / (DistanceField::kBrickSide * DistanceField::kBrickSide);
+    samples.push_back(static_cast<std::int16_t>((z - 4) * DistanceField::kQuantaPerVoxel));
+  }
+  const DistanceField::Layout layout{Vector3::Zero(), kVoxel, {kBricks, 1, 1}, 1,  4.0 * kVoxel,
+                                     kVoxel,          index,  samples,         far};
+  const DistanceField floor(layout, nullptr);
+  const StructuresPtr box = boxStructures({0.006, 0.006, 0.004}, 0.0005, 0.001);
+  const Pose X_WA(Vector3((kFloor + 0.5) * 8.0 * kVoxel, 0.004, 0.005), Eigen::Quaterniond::Identity());
+  const auto result = std::make_unique<PairQueryResult>();
+  for (const QueryKernels& kernels : supportedKernels()) {
+    ASSERT_TRUE(chooseKernels(kernels.isa));
+    queryPair({&box->shell, &floor, X_WA, Pose(), 0.0, 0.0}, *result);
+    EXPECT_GT(result->contacts.size(), 20U) << kernels.isa;
+    for (const Contact& contact : result->contacts) EXPECT_NEAR(contact.gap, contact.p_WP.z() - 0.004, 1e-9);
+  }
+}
+
 }  // namespace
 }  // namespace tenon
