@@ -1,6 +1,7 @@
 #include "server/collision/contact_sink.h"
 
 #include <bit>
+#include <cassert>
 
 namespace tenon {
 
@@ -49,16 +50,6 @@ std::uint32_t nearestOfEachDirection(const LeafContacts& leaf, std::size_t limit
   return kept;
 }
 
-/// How contacts are ranked: by gap, then by name.
-struct GapRank {
-  double gap;
-  std::uint32_t point;
-
-  bool operator<(const GapRank& other) const {
-    return gap != other.gap ? gap < other.gap : point < other.point;
-  }
-};
-
 }  // namespace
 
 ContactSink::ContactSink(PairQueryResult& result, double lowest, double highest)
@@ -105,50 +96,46 @@ void ContactSink::thinList() {
   result_.thinned = result_.thinned || kept < size;
 }
 
-bool ContactSink::overflows(std::size_t count) {
-  if (overflow_) return true;
-  if (result_.contacts.size() + count <= kMaxPairContacts) return false;
-  overflow_.emplace();
-  histogram_.fill(0);
-  for (const Contact& listed : result_.contacts) announce(listed.gap);
-  closeAnnouncement();
-  return true;
-}
-
-void ContactSink::selectDeepest() {
-  if (!overflow_ || overflow_->empty()) return;
-  // those of the last step have the places that are left
+GapRank ContactSink::makeRoom(const IncomingContacts& coming) {
   ContactList& contacts = result_.contacts;
-  std::array<GapRank, kMaxPairContacts + decltype(overflow_)::value_type::capacity()> last;
-  std::size_t of_last = 0;
-  std::size_t before = 0;
-  const auto rank = [&](const Contact& contact) {
-    const double step = inSteps(contact.gap);
-    if (step < last_begin_) ++before;
-    if (step >= last_begin_ && step < last_end_) last[of_last++] = {contact.gap, contact.point};
+  const std::size_t listed = contacts.size();
+  const std::size_t count = listed + coming.count;
+  assert(count > kMaxPairContacts);
+  const auto rankOf = [&](std::size_t i) {
+    return i < listed ? GapRank{contacts[i].gap, contacts[i].point}
+                      : GapRank{coming.gap[i - listed], coming.point[i - listed]};
   };
-  std::for_each(contacts.begin(), contacts.end(), rank);
-  std::for_each(overflow_->begin(), overflow_->end(), rank);
-  const std::size_t listed = contacts.size() + overflow_->size();
-  // of the steps before there are never too many
-  const std::size_t places = std::min(kMaxPairContacts - before, of_last);
-  const auto end = last.begin() + static_cast<std::ptrdiff_t>(of_last);
-  const auto beyond = last.begin() + static_cast<std::ptrdiff_t>(places);
-  if (beyond != end) std::nth_element(last.begin(), beyond, end);
+  // counted in equal steps of gaps
+  std::array<std::uint16_t, kMaxPairContacts + IncomingContacts::kMost> step;
+  for (std::size_t i = 0; i < listed; ++i) step[i] = stepOf(contacts[i].gap);
+  for (std::size_t i = 0; i < coming.count; ++i) step[listed + i] = stepOf(coming.gap[i]);
+  std::array<std::uint32_t, kSteps> counts{};
+  for (std::size_t i = 0; i < count; ++i) ++counts[step[i]];
+  // the last step for which there is room, and who is in it
+  std::size_t last_step = kSteps - 1;
+  std::size_t up_to_it = count;
+  while (up_to_it - counts[last_step] >= kMaxPairContacts) up_to_it -= counts[last_step--];
+  const std::size_t places = kMaxPairContacts - (up_to_it - counts[last_step]);
+  std::array<std::uint16_t, step.size()> in_it{};
+  auto end = in_it.begin();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (step[i] == last_step) *end++ = static_cast<std::uint16_t>(i);
+  }
+  const auto place = in_it.begin() + static_cast<std::ptrdiff_t>(places - 1);
+  std::nth_element(in_it.begin(), place, end,
+                   [&](std::size_t a, std::size_t b) { return rankOf(a) < rankOf(b); });
+  const GapRank last = rankOf(*place);
+
   std::size_t kept = 0;
-  const auto keep = [&](const Contact& contact) {
-    const double step = inSteps(contact.gap);
-    if (step >= last_end_) return;
-    if (step >= last_begin_ && beyond != end && !(GapRank{contact.gap, contact.point} < *beyond)) return;
-    Contact& place = contacts[kept++];
-    if (&place != &contact) place = contact;
-  };
-  std::for_each(contacts.begin(), contacts.end(), keep);
-  contacts.resize(kMaxPairContacts);
-  std::for_each(overflow_->begin(), overflow_->end(), keep);
+  for (std::size_t i = 0; i < listed; ++i) {
+    if (last < rankOf(i)) continue;
+    if (kept != i) contacts[kept] = contacts[i];
+    ++kept;
+  }
   contacts.resize(kept);
-  result_.counts.contacts_dropped += static_cast<std::uint32_t>(listed - kept);
-  overflow_->clear();
+  result_.counts.contacts_dropped += static_cast<std::uint32_t>(count - kMaxPairContacts);
+  result_.listed_to = last.gap;
+  return last;
 }
 
 }  // namespace tenon

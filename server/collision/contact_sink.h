@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <limits>
-#include <optional>
 
 #include "server/collision/pair_query.h"
 
@@ -19,12 +17,37 @@ struct LeafContacts {
   std::size_t count = 0;
 };
 
+/// How contacts are ranked: by gap, then by name.
+struct GapRank {
+  double gap;
+  std::uint32_t point;
+
+  bool operator<(const GapRank& other) const {
+    return gap != other.gap ? gap < other.gap : point < other.point;
+  }
+};
+
+/// Contacts that come together, in the order of the shell.
+struct IncomingContacts {
+  static constexpr std::size_t kMost = 2048;
+
+  std::array<double, kMost> gap;
+  std::array<std::uint32_t, kMost> point;
+  std::array<std::uint32_t, kMost> number;  ///< the caller's own
+  std::size_t count = 0;
+
+  void push_back(double the_gap, std::uint32_t the_point, std::uint32_t the_number) {
+    gap[count] = the_gap;
+    point[count] = the_point;
+    number[count++] = the_number;
+  }
+};
+
 /// Decides which contacts have room in the list of a query, as they come in the order of the shell.
 ///
-/// Without thinning those with the smallest gaps stay, of equal ones those with the lower names. What comes
-/// is announced first and counted in equal steps of gaps; the step up to which there is room only ever falls,
-/// so most of what has to go is never listed. With thinning, points give way first that stand behind a
-/// neighbour.
+/// Without thinning those with the smallest gaps stay, of equal ones those with the lower names: which they
+/// are is known before any of those that come together is written. With thinning, points give way first that
+/// stand behind a neighbour.
 ///
 /// Threads: one query's. Real-time: all.
 class ContactSink {
@@ -32,63 +55,33 @@ class ContactSink {
   /// Gaps lie between `lowest` and `highest` [m].
   ContactSink(PairQueryResult& result, double lowest, double highest);
 
-  /// Whether there is no room for so many more: they are to be announced before they are listed.
-  bool overflows(std::size_t count);
-  void announce(double gap) {
-    const std::size_t step = stepOf(gap);
-    if (step > last_step_) return;
-    ++histogram_[step];
-    ++counted_;
+  [[nodiscard]] bool hasRoom(std::size_t count) const {
+    return result_.contacts.size() + count <= kMaxPairContacts;
   }
-  /// All of them are.
-  void closeAnnouncement() {
-    while (counted_ - histogram_[last_step_] >= kMaxPairContacts) counted_ -= histogram_[last_step_--];
-    constexpr double kEver = std::numeric_limits<double>::infinity();
-    last_begin_ = last_step_ == 0 ? -kEver : static_cast<double>(last_step_);
-    last_end_ = last_step_ + 1 == kSteps ? kEver : static_cast<double>(last_step_ + 1);
-  }
-  /// Whether a contact of that gap has to be listed; those that have not are counted as dropped.
-  bool wants(double gap) {
-    if (!overflow_ || inSteps(gap) < last_end_) return true;
-    ++result_.counts.contacts_dropped;
-    return false;
-  }
-  /// Where the next contact that is wanted goes; the place keeps what was there.
-  Contact& next() {
-    if (Contact* place = result_.contacts.extend()) return *place;
-    if (Contact* place = overflow_->extend()) return *place;
-    selectDeepest();
-    Contact* place = result_.contacts.extend();
-    return place != nullptr ? *place : *overflow_->extend();
-  }
-  /// After the last: the list is what it shall be.
-  void selectDeepest();
+  /// Of more than there is room for: takes from the list what has to go for them, and returns the last of
+  /// all that stay. Those that come and are not behind it are listed next.
+  GapRank makeRoom(const IncomingContacts& coming);
 
   /// Which of a leaf's points may be listed, a bit each, made room for if that is possible. They are listed
   /// next.
   std::uint32_t thinned(const LeafContacts& leaf);
 
  private:
-  static constexpr std::size_t kSteps = 512;
+  static constexpr std::size_t kSteps = 256;
   /// A list that may be thinned is kept this short while there is anything to thin: every row of it costs in
   /// every sub-step.
   static constexpr std::size_t kThinnedTo = 256;
 
-  [[nodiscard]] double inSteps(double gap) const { return (gap - lowest_) * steps_a_metre_; }
-  [[nodiscard]] std::size_t stepOf(double gap) const {
-    return static_cast<std::size_t>(std::clamp(inSteps(gap), 0.0, static_cast<double>(kSteps - 1)));
+  [[nodiscard]] std::uint16_t stepOf(double gap) const {
+    const double in_steps = (gap - lowest_) * steps_a_metre_;
+    return static_cast<std::uint16_t>(
+        static_cast<std::int32_t>(std::clamp(in_steps, 0.0, static_cast<double>(kSteps - 1))));
   }
   void thinList();
 
   PairQueryResult& result_;
   double lowest_;
   double steps_a_metre_;
-  // of what is listed and what is announced
-  std::array<std::uint32_t, kSteps> histogram_;
-  std::size_t last_step_ = kSteps - 1;        ///< what lies beyond has no room
-  double last_begin_ = 0.0, last_end_ = 0.0;  ///< [steps]
-  std::size_t counted_ = 0;                   ///< up to that step
-  std::optional<FixedVector<Contact, 256>> overflow_;
   // of leaves that were thinned
   std::size_t per_leaf_ = Pointshell::kLeafPoints;           ///< and direction
   std::array<std::uint32_t, kMaxPairContacts> leaf_starts_;  ///< where the listed leaves begin

@@ -48,6 +48,8 @@ void forEachLane(std::uint32_t bits, Visit&& visit) {
   for (; bits != 0; bits &= bits - 1) visit(static_cast<std::uint32_t>(std::countr_zero(bits)));
 }
 
+static_assert(IncomingContacts::kMost >= Candidates::kMost);
+
 /// One walk over a shell: what stays the same from sphere to sphere.
 class Walk {
  public:
@@ -80,7 +82,6 @@ class Walk {
       if (!clusters_.empty()) walkClusters();
     }
     judgeCandidates();
-    sink_.selectDeepest();
     result_.counts.spheres_visited += culled_.spheres;
     result_.counts.points_visited = culled_.points;
     keepBound(std::min(frame_.gapOf(culled_.smallest_bound), kNothingNear));
@@ -100,7 +101,6 @@ class Walk {
       ++result_.counts.points_visited;
     }
     judgeCandidates();
-    sink_.selectDeepest();
   }
 
  private:
@@ -183,6 +183,7 @@ class Walk {
   void padCandidates() {
     for (std::size_t i = candidates_.count; i < candidates_.count + ShellBlock::kLanes; ++i) {
       candidates_.x[i] = candidates_.y[i] = candidates_.z[i] = 0.0F;
+      candidates_.point[i] = 0;
     }
   }
 
@@ -201,27 +202,35 @@ class Walk {
     return {frame_, samples_[block], contacts_[block]};
   }
 
-  /// Calls `visit(lanes, i, point)` for the candidates that are contacts.
+  /// Calls `visit(lanes, i, candidate)` for the candidates that are contacts.
   template <typename Visit>
   void forEachNear(Visit&& visit) {
     for (std::uint32_t first = 0; first < candidates_.count; first += ShellBlock::kLanes) {
       const Lanes lanes = lanesOf(first);
-      forEachLane(lanes.near(), [&](std::uint32_t i) { visit(lanes, i, candidates_.point[first + i]); });
+      forEachLane(lanes.near(), [&](std::uint32_t i) { visit(lanes, i, first + i); });
     }
   }
 
   void listAll(std::size_t near) {
-    if (sink_.overflows(near)) {
-      forEachNear(
-          [this](const Lanes& lanes, std::uint32_t i, std::uint32_t) { sink_.announce(lanes.gap(i)); });
-      sink_.closeAnnouncement();
-      forEachNear([this](const Lanes& lanes, std::uint32_t i, std::uint32_t point) {
-        if (sink_.wants(lanes.gap(i))) list(lanes, i, point);
+    if (sink_.hasRoom(near)) {
+      forEachNear([this](const Lanes& lanes, std::uint32_t i, std::uint32_t candidate) {
+        list(lanes, i, candidates_.point[candidate]);
       });
-    } else {
-      forEachNear(
-          [this](const Lanes& lanes, std::uint32_t i, std::uint32_t point) { list(lanes, i, point); });
+      return;
     }
+    forEachNear([this](const Lanes& lanes, std::uint32_t i, std::uint32_t candidate) {
+      coming_.push_back(lanes.gap(i), candidates_.point[candidate], candidate);
+    });
+    listDeepest();
+  }
+
+  /// Of those that come, what has room.
+  void listDeepest() {
+    const GapRank last = sink_.makeRoom(coming_);
+    for (std::size_t k = 0; k < coming_.count; ++k) {
+      if (!(last < GapRank{coming_.gap[k], coming_.point[k]})) listCandidate(coming_.number[k]);
+    }
+    coming_.count = 0;
   }
 
   void listThinned() {
@@ -244,22 +253,28 @@ class Walk {
       });
     }
     close();
+    if (coming_.count > 0) listDeepest();
   }
 
   void listLeaf(const LeafContacts& near, const std::array<std::uint32_t, LeafContacts::kMost>& candidate) {
     const std::uint32_t chosen = sink_.thinned(near);
-    if (sink_.overflows(near.count)) {
-      forEachLane(chosen, [&](std::uint32_t k) { sink_.announce(near.gap[k]); });
-      sink_.closeAnnouncement();
-    }
+    const bool has_room =
+        coming_.count == 0 && sink_.hasRoom(static_cast<std::size_t>(std::popcount(chosen)));
     forEachLane(chosen, [&](std::uint32_t k) {
-      if (!sink_.wants(near.gap[k])) return;
-      list(lanesOf(candidate[k]), candidate[k] % ShellBlock::kLanes, candidates_.point[candidate[k]]);
+      if (has_room) {
+        listCandidate(candidate[k]);
+      } else {
+        coming_.push_back(near.gap[k], candidates_.point[candidate[k]], candidate[k]);
+      }
     });
   }
 
+  void listCandidate(std::uint32_t candidate) {
+    list(lanesOf(candidate), candidate % ShellBlock::kLanes, candidates_.point[candidate]);
+  }
+
   void list(const Lanes& lanes, std::uint32_t i, std::uint32_t point) {
-    Contact& contact = sink_.next();
+    Contact& contact = *result_.contacts.extend();
     lanes.setContact(i, contact);
     contact.point = point;
     contact.area = areaOf(point);
@@ -271,19 +286,14 @@ class Walk {
 
   void sumPushes(std::uint32_t first) {
     const SampleLanes& samples = samples_[first / ShellBlock::kLanes];
-    alignas(64) std::array<float, ShellBlock::kLanes> area{};
-    forEachLane(samples.near, [&](std::uint32_t i) {
-      const std::uint32_t point = candidates_.point[first + i];
-      if (point < areas_.size()) area[i] = areas_[point];
-    });
     PushLanes push;
-    const std::size_t count = std::min<std::size_t>(candidates_.count - first, ShellBlock::kLanes);
-    kernels_.pushes(frame_, samples, contacts_[first / ShellBlock::kLanes], {area.data(), count}, push);
+    kernels_.pushes(frame_, samples, contacts_[first / ShellBlock::kLanes], &candidates_.point[first], areas_,
+                    push);
     Wrench sum = result_.push_Ao_W;
-    forEachLane(push.pushing, [&](std::uint32_t i) {
+    for (std::size_t i = 0; i < ShellBlock::kLanes; ++i) {
       sum.force += Vector3(push.f_x[i], push.f_y[i], push.f_z[i]);
       sum.torque += Vector3(push.t_x[i], push.t_y[i], push.t_z[i]);
-    });
+    }
     result_.push_Ao_W = sum;
     result_.pushing += static_cast<std::uint32_t>(std::popcount(push.pushing));
   }
@@ -303,6 +313,7 @@ class Walk {
   std::array<ContactLanes, Candidates::kMost / ShellBlock::kLanes> contacts_;
   PairQueryResult& result_;
   ContactSink sink_;
+  IncomingContacts coming_;  ///< when there is no room for all
 };
 
 }  // namespace
@@ -347,11 +358,7 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
   }
   result.walk_points = result.counts.points_visited;
 
-  if (result.counts.contacts_dropped > 0) {
-    result.listed_to = -kNothingNear;
-    for (const Contact& contact : result.contacts) result.listed_to = std::max(result.listed_to, contact.gap);
-    result.others_gap = std::min(result.others_gap, result.listed_to);
-  }
+  if (result.counts.contacts_dropped > 0) result.others_gap = std::min(result.others_gap, result.listed_to);
 }
 
 void resampleContacts(const PairQuery& query, double moved, PairQueryResult& result) noexcept {

@@ -71,8 +71,8 @@ inline constexpr double kNothingNear = 1e6;
 /// What the field says at sixteen of them.
 struct alignas(64) SampleLanes {
   std::array<double, ShellBlock::kLanes> distance, gradient_x, gradient_y, gradient_z;
-  std::uint32_t exact = 0;  ///< one bit a lane, as in `near`
-  std::uint32_t near = 0;   ///< exact, and the gap within the margin
+  std::uint32_t exact;  ///< one bit a lane, as in `near`
+  std::uint32_t near;   ///< exact, and the gap within the margin
 };
 
 /// And at all that were sampled.
@@ -86,13 +86,13 @@ struct SampleSums {
 /// Where contacts are and how B pushes; lanes without a slope have no normal, lanes without a sample nothing.
 struct alignas(64) ContactLanes {
   std::array<double, ShellBlock::kLanes> x, y, z, n_x, n_y, n_z;
-  std::uint32_t sloping = 0;  ///< one bit a lane: the gradient says where outside is
+  std::uint32_t sloping;  ///< one bit a lane: the gradient says where outside is
 };
 
-/// What B pushes at the contacts with 1 N/m, about A's origin; a lane without a push is not set.
+/// What B pushes at the contacts with 1 N/m, about A's origin; zero where it does not.
 struct alignas(64) PushLanes {
   std::array<double, ShellBlock::kLanes> f_x, f_y, f_z, t_x, t_y, t_z;
-  std::uint32_t pushing = 0;  ///< one bit a lane
+  std::uint32_t pushing;  ///< one bit a lane
 };
 
 /// Points that may be contacts, side by side in the order of the shell.
@@ -136,9 +136,9 @@ struct QueryKernels {
                   SampleSums& sums) noexcept;
   void (*contacts)(const LaneFrame& frame, const PointLanes& points, const SampleLanes* samples,
                    ContactLanes* out) noexcept;
-  /// `area`: what each lane stands for, as many as there are points; sixteen can be read.
+  /// `points`: the sixteen lanes' names; `areas`: what points stand for, those beyond the end for nothing.
   void (*pushes)(const LaneFrame& frame, const SampleLanes& samples, const ContactLanes& contacts,
-                 std::span<const float> area, PushLanes& out) noexcept;
+                 const std::uint32_t* points, std::span<const float> areas, PushLanes& out) noexcept;
 };
 
 /// [m^2] The paper gives no unit for its stiffness; here K [N/m] is felt when 1 cm^2 of skin is inside.

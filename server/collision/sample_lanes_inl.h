@@ -54,6 +54,11 @@ HWY_INLINE std::uint32_t bitsOf(Mask mask) {
   return bytes[0];
 }
 
+HWY_INLINE Mask maskOf(std::uint32_t bits) {
+  const std::uint8_t bytes[8] = {static_cast<std::uint8_t>(bits)};
+  return hn::LoadMaskBits(kD, bytes);
+}
+
 HWY_INLINE Double sum3(Double a, Double b, Double c) { return hn::Add(hn::Add(a, b), c); }
 HWY_INLINE Double norm(const Place3& v) {
   return hn::Sqrt(sum3(hn::Mul(v.x, v.x), hn::Mul(v.y, v.y), hn::Mul(v.z, v.z)));
@@ -364,28 +369,40 @@ void contacts(const LaneFrame& frame, const PointLanes& points, const SampleLane
   }
 }
 
+/// What the points stand for; those beyond the end for nothing.
+HWY_INLINE Double areasOf(const std::uint32_t* points, std::span<const float> areas) {
+  const Whole point = hn::LoadU(kI, reinterpret_cast<const std::int32_t*>(points));
+  const Whole last = allWhole(static_cast<std::int32_t>(areas.size()) - 1);
+  const auto area = hn::GatherIndex(kF, areas.data(), hn::Min(point, last));
+  return hn::PromoteTo(kD, hn::IfThenZeroElse(hn::RebindMask(kF, hn::Gt(point, last)), area));
+}
+
 void pushes(const LaneFrame& frame, const SampleLanes& lanes, const ContactLanes& contacts,
-            std::span<const float> area, PushLanes& out) noexcept {
-  std::uint32_t inside = 0;
-  for (std::size_t i = 0; i < area.size(); i += hn::Lanes(kD)) {
+            const std::uint32_t* points, std::span<const float> areas, PushLanes& out) noexcept {
+  std::uint32_t all_pushing = 0;
+  for (std::size_t i = 0; i < ShellBlock::kLanes; i += hn::Lanes(kD)) {
     const Double gap = hn::Sub(hn::Load(kD, lanes.distance.data() + i), all(frame.dilation));
-    inside |= bitsOf(hn::Lt(gap, hn::Zero(kD))) << i;
-    const Double stands_for = hn::PromoteTo(kD, hn::LoadU(kF, area.data() + i));
-    const Double penalty = hn::Mul(hn::Mul(hn::Neg(gap), stands_for), all(1.0 / kReferenceArea));
+    const Mask pushing = hn::And(maskOf(lanes.near >> i), hn::Lt(gap, hn::Zero(kD)));
+    const Double penalty =
+        hn::Mul(hn::Mul(hn::Neg(gap), areasOf(points + i, areas)), all(1.0 / kReferenceArea));
     const Place3 f{hn::Mul(penalty, hn::Load(kD, contacts.n_x.data() + i)),
                    hn::Mul(penalty, hn::Load(kD, contacts.n_y.data() + i)),
                    hn::Mul(penalty, hn::Load(kD, contacts.n_z.data() + i))};
     const Place3 r{hn::Sub(hn::Load(kD, contacts.x.data() + i), all(frame.p_WA[0])),
                    hn::Sub(hn::Load(kD, contacts.y.data() + i), all(frame.p_WA[1])),
                    hn::Sub(hn::Load(kD, contacts.z.data() + i), all(frame.p_WA[2]))};
-    hn::Store(f.x, kD, out.f_x.data() + i);
-    hn::Store(f.y, kD, out.f_y.data() + i);
-    hn::Store(f.z, kD, out.f_z.data() + i);
-    hn::Store(hn::Sub(hn::Mul(r.y, f.z), hn::Mul(r.z, f.y)), kD, out.t_x.data() + i);
-    hn::Store(hn::Sub(hn::Mul(r.z, f.x), hn::Mul(r.x, f.z)), kD, out.t_y.data() + i);
-    hn::Store(hn::Sub(hn::Mul(r.x, f.y), hn::Mul(r.y, f.x)), kD, out.t_z.data() + i);
+    const Place3 t{hn::Sub(hn::Mul(r.y, f.z), hn::Mul(r.z, f.y)),
+                   hn::Sub(hn::Mul(r.z, f.x), hn::Mul(r.x, f.z)),
+                   hn::Sub(hn::Mul(r.x, f.y), hn::Mul(r.y, f.x))};
+    hn::Store(hn::IfThenElseZero(pushing, f.x), kD, out.f_x.data() + i);
+    hn::Store(hn::IfThenElseZero(pushing, f.y), kD, out.f_y.data() + i);
+    hn::Store(hn::IfThenElseZero(pushing, f.z), kD, out.f_z.data() + i);
+    hn::Store(hn::IfThenElseZero(pushing, t.x), kD, out.t_x.data() + i);
+    hn::Store(hn::IfThenElseZero(pushing, t.y), kD, out.t_y.data() + i);
+    hn::Store(hn::IfThenElseZero(pushing, t.z), kD, out.t_z.data() + i);
+    all_pushing |= bitsOf(pushing) << i;
   }
-  out.pushing = inside & lanes.near;
+  out.pushing = all_pushing;
 }
 
 }  // namespace exact

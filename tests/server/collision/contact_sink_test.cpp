@@ -12,24 +12,29 @@ namespace {
 
 constexpr double kLowest = -0.012;
 constexpr double kHighest = 0.002;
+constexpr std::uint32_t kEvery = 0xFFFFFFFFU;
 
 /// Lists contacts of these gaps as a query does, some at a time.
 void listAll(const std::vector<double>& gaps, std::size_t at_a_time, PairQueryResult& result) {
   ContactSink sink(result, kLowest, kHighest);
+  const auto coming = std::make_unique<IncomingContacts>();
   for (std::size_t first = 0; first < gaps.size(); first += at_a_time) {
     const std::size_t end = std::min(gaps.size(), first + at_a_time);
-    if (sink.overflows(end - first)) {
-      for (std::size_t i = first; i < end; ++i) sink.announce(gaps[i]);
-      sink.closeAnnouncement();
-    }
+    const bool has_room = sink.hasRoom(end - first);
+    coming->count = 0;
     for (std::size_t i = first; i < end; ++i) {
+      const auto point = static_cast<std::uint32_t>(i);
+      coming->push_back(gaps[i], point, point);
+    }
+    const GapRank last = has_room ? GapRank{kHighest, kEvery} : sink.makeRoom(*coming);
+    for (std::size_t i = 0; i < coming->count; ++i) {
+      if (last < GapRank{coming->gap[i], coming->point[i]}) continue;
       Contact contact;
-      contact.gap = gaps[i];
-      contact.point = static_cast<std::uint32_t>(i);
-      if (sink.wants(gaps[i])) sink.next() = contact;
+      contact.gap = coming->gap[i];
+      contact.point = coming->point[i];
+      ASSERT_TRUE(result.contacts.push_back(contact));
     }
   }
-  sink.selectDeepest();
 }
 
 /// Names of those with the smallest gaps, in order.
@@ -62,6 +67,10 @@ TEST(ContactSink, KeepsTheSmallestGapsInTheOrderOfTheShell) {
       ASSERT_EQ(result->contacts[i].point, wanted[i]) << "trial " << trial;
     }
     EXPECT_EQ(result->counts.contacts_dropped, gaps.size() - wanted.size());
+    if (gaps.size() == wanted.size()) continue;
+    double largest = kLowest;
+    for (const std::uint32_t name : wanted) largest = std::max(largest, gaps[name]);
+    EXPECT_EQ(result->listed_to, largest);
   }
 }
 
