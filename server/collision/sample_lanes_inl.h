@@ -78,6 +78,10 @@ HWY_INLINE Place3 placesOf(const PointLanes& points, std::size_t first) {
           hn::PromoteTo(kD, hn::LoadU(kF, points.z + first))};
 }
 
+HWY_INLINE Place3 inB(const LaneFrame& frame, const PointLanes& points, std::size_t first) {
+  return moved(frame.p_BA_B.data(), frame.R_BA.data(), placesOf(points, first));
+}
+
 /// A field with its constants spread over the lanes where that pays.
 struct FieldLanes {
   explicit FieldLanes(const LaneFrame& the_frame)
@@ -273,7 +277,8 @@ HWY_INLINE Sampled interpolateRefined(const FieldLanes& field, const Located& at
 }
 
 /// DistanceField::sample
-HWY_INLINE Sampled sample(const FieldLanes& field, const Place3& p_B, const Located& at) {
+HWY_INLINE Sampled sample(const FieldLanes& field, const PointLanes& points, std::size_t i,
+                          const Located& at) {
   const DistanceField::Layout& layout = field.layout;
   const Mask refined = hn::And(at.inside, hn::Ge(at.entry_number, all(DistanceField::kRefined)));
   const Mask has_samples = hn::And(at.inside, hn::Ge(at.entry_number, hn::Zero(kD)));
@@ -297,16 +302,52 @@ HWY_INLINE Sampled sample(const FieldLanes& field, const Place3& p_B, const Loca
   const Mask deep = hn::Eq(at.entry_number, all(DistanceField::kFarInside));
   const Double far = hn::IfThenElse(deep, hn::Neg(magnitude), magnitude);
   out.distance =
-      hn::IfThenElse(has_samples, out.distance, hn::IfThenElse(at.inside, far, distanceToGrid(field, p_B)));
+      hn::IfThenElse(has_samples, out.distance,
+                     hn::IfThenElse(at.inside, far, distanceToGrid(field, inB(field.frame, points, i))));
   return out;
 }
+
+/// Points that are located, side by side.
+struct LocatedLanes {
+  static constexpr std::size_t kMost = 8 * ShellBlock::kLanes;
+
+  alignas(64) std::array<double, kMost> x, y, z;
+  alignas(64) std::array<std::int32_t, kMost> number, entry;
+  std::array<std::uint32_t, kMost> inside;  ///< a bit each of the lanes from here
+
+  HWY_INLINE void store(const Located& at, std::size_t i) {
+    hn::Store(at.p_brick.x, kD, x.data() + i);
+    hn::Store(at.p_brick.y, kD, y.data() + i);
+    hn::Store(at.p_brick.z, kD, z.data() + i);
+    hn::StoreU(at.number, kI, number.data() + i);
+    hn::StoreU(at.entry, kI, entry.data() + i);
+    inside[i] = bitsOf(at.inside);
+  }
+  [[nodiscard]] HWY_INLINE Located load(std::size_t i) const {
+    const Whole own = hn::LoadU(kI, entry.data() + i);
+    return {maskOf(inside[i]),
+            hn::LoadU(kI, number.data() + i),
+            own,
+            toDouble(own),
+            {hn::Load(kD, x.data() + i), hn::Load(kD, y.data() + i), hn::Load(kD, z.data() + i)}};
+  }
+};
 
 void samples(const LaneFrame& frame, const PointLanes& points, SampleLanes* out, SampleSums& sums) noexcept {
   const FieldLanes field(frame);
   const Double nothing = all(kNothingNear);
   Double smallest = nothing;
   Double apart = nothing;
+  LocatedLanes located;
   for (std::size_t first = 0; first < points.count; first += ShellBlock::kLanes) {
+    // in two rounds: reading the index is waiting for memory, and for many of them at once in a short loop
+    const std::size_t here = first % LocatedLanes::kMost;
+    if (here == 0) {
+      const std::size_t count = std::min(LocatedLanes::kMost, points.count - first);
+      for (std::size_t i = 0; i < count; i += hn::Lanes(kD)) {
+        located.store(locate(field, inB(frame, points, first + i)), i);
+      }
+    }
     SampleLanes& block = *out++;
     const std::size_t end = std::min(first + ShellBlock::kLanes, points.count);
     std::uint32_t all_exact = 0;
@@ -315,8 +356,7 @@ void samples(const LaneFrame& frame, const PointLanes& points, SampleLanes* out,
     for (std::size_t i = first; i < end; i += hn::Lanes(kD)) {
       const std::size_t lane = i - first;
       const Mask used = hn::FirstN(kD, end - i);
-      const Place3 p_B = moved(frame.p_BA_B.data(), frame.R_BA.data(), placesOf(points, i));
-      const Sampled there = sample(field, p_B, locate(field, p_B));
+      const Sampled there = sample(field, points, i, located.load(here + lane));
       const Double gap = hn::Sub(there.distance, all(frame.dilation));
       const Mask exact = hn::And(used, there.exact);
       const Mask near = hn::And(exact, hn::Le(gap, all(frame.margin)));
