@@ -154,11 +154,11 @@ HWY_INLINE Spot spotOf(const Field& field, const Place3& p) {
 /// The row of samples along x next to a place: the pair that the place is between, and how far from the
 /// first of them it is.
 struct Row {
-  Whole place;  ///< in bytes
+  Whole place;  ///< in bytes from the brick's first sample
   Float along;
 };
 
-HWY_INLINE Row rowOf(Whole brick, const InBrick& at) {
+HWY_INLINE Row rowOf(const InBrick& at) {
   // the upper one, or one less where the place is below the middle
   const auto nearest = [](Whole voxel, Float from_middle) HWY_ATTR {
     return hn::Add(voxel, hn::ShiftRight<31>(hn::BitCast(kI, from_middle)));
@@ -167,15 +167,14 @@ HWY_INLINE Row rowOf(Whole brick, const InBrick& at) {
   const Whole z = nearest(at.z, at.from_middle.z);
   const auto nine = [](Whole v) HWY_ATTR { return hn::Add(hn::ShiftLeft<3>(v), v); };
   static_assert(kSide == 9);
-  const Whole sample = hn::Add(nine(hn::Add(nine(z), y)), at.x);
   constexpr std::int32_t kUpper = kSide * kSide + kSide;
-  const Whole first = hn::Mul(brick, allWhole(DistanceField::kBrickSamples));
-  return {hn::ShiftLeft<1>(hn::Add(hn::Add(first, sample), allWhole(kUpper))),
-          hn::Add(at.from_middle.x, all(0.5F))};
+  const Whole sample = hn::Add(nine(hn::Add(nine(z), y)), hn::Add(at.x, allWhole(kUpper)));
+  return {hn::ShiftLeft<1>(sample), hn::Add(at.from_middle.x, all(0.5F))};
 }
 
-HWY_INLINE Float valueOf(const Field& field, const Row& row) {
-  const Whole pair = hn::GatherOffset(kI, field.samples, row.place);
+HWY_INLINE Float valueOf(const Field& field, Whole brick, const Row& row) {
+  const Whole first_sample = hn::Mul(brick, allWhole(2 * DistanceField::kBrickSamples));
+  const Whole pair = hn::GatherOffset(kI, field.samples, hn::Add(first_sample, row.place));
   const Whole first = hn::ShiftRight<16>(hn::ShiftLeft<16>(pair));
   const Whole rise = hn::Sub(hn::ShiftRight<16>(pair), first);
   constexpr float kPerQuantum = 1.0F / DistanceField::kQuantaPerVoxel;

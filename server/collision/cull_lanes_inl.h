@@ -36,12 +36,14 @@ HWY_INLINE Float lossOfPoint(const InBrick& at) {
   return hn::Sub(all(kWhole), hn::Mul(all(kLess), hn::Mul(b, c)));
 }
 HWY_INLINE Float boundOfPoint(const Field& field, Whole brick, const InBrick& at) {
-  return hn::Sub(valueOf(field, rowOf(brick, at)), lossOfPoint(at));
+  return hn::Sub(valueOf(field, brick, rowOf(at)), lossOfPoint(at));
 }
 
 /// Of points in a field with refined bricks: a child answers in its band, its coarse brick beyond, and
 /// neither may be near.
-HWY_INLINE Float boundsAmongChildren(const Field& field, const Spot& spot, Mask sampled, Mask refined) {
+HWY_INLINE Float boundsAmongChildren(const Field& field, const Spot& spot) {
+  const Mask sampled = hasBrick(spot.entry);
+  const Mask refined = isRefined(spot.entry);
   const Children children = childrenOf(field, spot, refined);
   const Whole own = hn::IfThenElse(asWholeMask(refined), children.own, whereSet(sampled, spot.entry));
   const Float bound = boundOfPoint(field, own, spot.at);
@@ -95,7 +97,7 @@ HWY_INLINE Float boundsByRow(const Field& field, const Spot& spot, Mask sampled,
   const Float b = hn::Sub(half, hn::Abs(spot.at.from_middle.y));
   const Float c = hn::Sub(half, hn::Abs(spot.at.from_middle.z));
   const Float away = hn::Sqrt(hn::Add(hn::Mul(b, b), hn::Mul(c, c)));
-  return boundOfBall(valueOf(field, rowOf(whereSet(sampled, brick), spot.at)), away, r);
+  return boundOfBall(valueOf(field, whereSet(sampled, brick), rowOf(spot.at)), away, r);
 }
 
 /// `closely`: also by the row next to the centre, where the brick's middle does not tell.
@@ -160,43 +162,35 @@ struct Leaves {
   std::size_t count = 0;
 };
 
-/// What is known of points before their samples are read: the bound is the row's value minus the loss.
+/// What is known of points before their samples are read.
 struct Prospects {
   template <typename T>
   using Lanes = std::array<T, Leaves::kMost * ShellBlock::kLanes>;
 
-  alignas(64) Lanes<std::int32_t> place;
+  alignas(64) Lanes<std::int32_t> entry, place;
   Lanes<float> along, loss;
+
+  HWY_INLINE void store(const Spot& spot, std::size_t i) {
+    const Row row = rowOf(spot.at);
+    hn::StoreU(spot.entry, kI, entry.data() + i);
+    hn::StoreU(row.place, kI, place.data() + i);
+    hn::StoreU(row.along, kF, along.data() + i);
+    hn::StoreU(lossOfPoint(spot.at), kF, loss.data() + i);
+  }
 };
 
-/// A loss after which nothing is near, and minus that.
-constexpr float kCertain = 1e9F;
-
-HWY_INLINE Float lossWithoutSamples(const Field& field, Whole entry) {
-  const bool near = field.cull.beyond_band <= field.cull.limit;
-  return hn::IfThenElse(isDeep(entry), all(kCertain), all(near ? kCertain : -kCertain));
-}
-
-/// Of one vector of points.
-HWY_INLINE void foresee(const Field& field, const Place3& p, std::size_t i, Prospects& out,
-                        LeftOut& left_out) {
-  const Spot spot = spotOf(field, p);
-  Mask sampled = hasBrick(spot.entry);
-  Float loss = lossWithoutSamples(field, spot.entry);
-  const Mask refined = isRefined(spot.entry);
-  if (hn::AllFalse(kF, refined)) {
-    loss = hn::IfThenElse(sampled, lossOfPoint(spot.at), loss);
-  } else {
-    const Float bound = boundsAmongChildren(field, spot, sampled, refined);
-    const Mask near = hn::Le(bound, all(field.cull.limit));
-    left_out.addUnless(hn::Or(near, hn::Not(sampled)), bound);
-    loss = hn::IfThenElse(sampled, hn::IfThenElse(near, all(kCertain), all(-kCertain)), loss);
-    sampled = hn::FirstN(kF, 0);
+/// Of one vector of points, from i of `prospects`, which are at p.
+template <typename P>
+HWY_INLINE Float boundsOfPoints(const Field& field, const Prospects& prospects, std::size_t i, P&& p) {
+  const Whole entry = hn::LoadU(kI, prospects.entry.data() + i);
+  const Mask sampled = hasBrick(entry);
+  const Float apart = hn::IfThenElse(isDeep(entry), all(-1e9F), all(field.cull.beyond_band));
+  if (!hn::AllFalse(kF, isRefined(entry))) {
+    return hn::IfThenElse(sampled, boundsAmongChildren(field, spotOf(field, p())), apart);
   }
-  const Row row = rowOf(whereSet(sampled, spot.entry), spot.at);
-  hn::StoreU(row.place, kI, out.place.data() + i);
-  hn::StoreU(row.along, kF, out.along.data() + i);
-  hn::StoreU(loss, kF, out.loss.data() + i);
+  const Row row{hn::LoadU(kI, prospects.place.data() + i), hn::LoadU(kF, prospects.along.data() + i)};
+  const Float value = valueOf(field, whereSet(sampled, entry), row);
+  return hn::IfThenElse(sampled, hn::Sub(value, hn::LoadU(kF, prospects.loss.data() + i)), apart);
 }
 
 /// Appends the lanes from i of a leaf that are near.
@@ -225,32 +219,29 @@ HWY_INLINE void append(const Pointshell& shell, std::uint32_t leaf, std::size_t 
 #endif
 }
 
-/// In two rounds: reading samples is waiting for memory, and for many of them at once in a short loop.
+/// In two rounds: reading is waiting for memory, and for many points at once in short loops.
 HWY_INLINE void appendNear(const Field& field, const Pointshell& shell, const Leaves& leaves, Candidates& out,
                            LeftOut& left_out) {
   Prospects prospects;
   for (std::size_t leaf = 0; leaf < leaves.count; ++leaf) {
     const ShellBlock& points = shell.pointsOfLeaf(leaves.number[leaf]);
     for (std::size_t i = 0; i < points.count; i += hn::Lanes(kF)) {
-      foresee(field, inGrid(field.cull, points, i), leaf * ShellBlock::kLanes + i, prospects, left_out);
+      prospects.store(spotOf(field, inGrid(field.cull, points, i)), leaf * ShellBlock::kLanes + i);
     }
   }
   const Float limit = all(field.cull.limit);
   const Number count_up = hn::Iota(kU, 0);
   for (std::size_t leaf = 0; leaf < leaves.count; ++leaf) {
-    const std::uint32_t count = shell.pointsOfLeaf(leaves.number[leaf]).count;
-    for (std::size_t i = 0; i < count; i += hn::Lanes(kF)) {
-      const std::size_t at = leaf * ShellBlock::kLanes + i;
-      const Row row{hn::LoadU(kI, prospects.place.data() + at), hn::LoadU(kF, prospects.along.data() + at)};
-      const Float bound = hn::Sub(valueOf(field, row), hn::LoadU(kF, prospects.loss.data() + at));
+    const ShellBlock& points = shell.pointsOfLeaf(leaves.number[leaf]);
+    for (std::size_t i = 0; i < points.count; i += hn::Lanes(kF)) {
+      const Float bound = boundsOfPoints(field, prospects, leaf * ShellBlock::kLanes + i,
+                                         [&]() HWY_ATTR { return inGrid(field.cull, points, i); });
       const Mask near = hn::Le(bound, limit);
       left_out.addUnless(near, bound);
       append(shell, leaves.number[leaf], i, near, count_up, out);
     }
-    left_out.culled.points += count;
+    left_out.culled.points += points.count;
   }
-  // what has no samples lies beyond the band
-  if (leaves.count > 0) left_out.smallest = hn::Min(left_out.smallest, all(field.cull.beyond_band));
 }
 
 void candidates(const LaneFrame& frame, const Pointshell& shell, std::span<const std::uint32_t> of,
