@@ -136,7 +136,8 @@ struct QueryKernels {
                   SampleSums& sums) noexcept;
   void (*contacts)(const LaneFrame& frame, const PointLanes& points, const SampleLanes* samples,
                    ContactLanes* out) noexcept;
-  /// `points`: the sixteen lanes' names; `areas`: what points stand for, those beyond the end for nothing.
+  /// `points`: the sixteen lanes' names; `areas`, at least one: what points stand for, those beyond the end
+  /// for nothing.
   void (*pushes)(const LaneFrame& frame, const SampleLanes& samples, const ContactLanes& contacts,
                  const std::uint32_t* points, std::span<const float> areas, PushLanes& out) noexcept;
 };

@@ -307,7 +307,8 @@ HWY_INLINE Sampled sample(const FieldLanes& field, const PointLanes& points, std
   return out;
 }
 
-/// Points that are located, side by side.
+/// Points that are located ahead, side by side: reading the index is waiting for memory, and for many points
+/// at once in a short loop.
 struct LocatedLanes {
   static constexpr std::size_t kMost = 8 * ShellBlock::kLanes;
 
@@ -315,15 +316,19 @@ struct LocatedLanes {
   alignas(64) std::array<std::int32_t, kMost> number, entry;
   std::array<std::uint32_t, kMost> inside;  ///< a bit each of the lanes from here
 
-  HWY_INLINE void store(const Located& at, std::size_t i) {
-    hn::Store(at.p_brick.x, kD, x.data() + i);
-    hn::Store(at.p_brick.y, kD, y.data() + i);
-    hn::Store(at.p_brick.z, kD, z.data() + i);
-    hn::StoreU(at.number, kI, number.data() + i);
-    hn::StoreU(at.entry, kI, entry.data() + i);
-    inside[i] = bitsOf(at.inside);
+  HWY_INLINE void locateFrom(const FieldLanes& field, const PointLanes& points, std::size_t first) {
+    const std::size_t count = std::min(kMost, points.count - first);
+    for (std::size_t i = 0; i < count; i += hn::Lanes(kD)) {
+      const Located at = locate(field, inB(field.frame, points, first + i));
+      hn::Store(at.p_brick.x, kD, x.data() + i);
+      hn::Store(at.p_brick.y, kD, y.data() + i);
+      hn::Store(at.p_brick.z, kD, z.data() + i);
+      hn::StoreU(at.number, kI, number.data() + i);
+      hn::StoreU(at.entry, kI, entry.data() + i);
+      inside[i] = bitsOf(at.inside);
+    }
   }
-  [[nodiscard]] HWY_INLINE Located load(std::size_t i) const {
+  [[nodiscard]] HWY_INLINE Located at(std::size_t i) const {
     const Whole own = hn::LoadU(kI, entry.data() + i);
     return {maskOf(inside[i]),
             hn::LoadU(kI, number.data() + i),
@@ -340,14 +345,8 @@ void samples(const LaneFrame& frame, const PointLanes& points, SampleLanes* out,
   Double apart = nothing;
   LocatedLanes located;
   for (std::size_t first = 0; first < points.count; first += ShellBlock::kLanes) {
-    // in two rounds: reading the index is waiting for memory, and for many of them at once in a short loop
     const std::size_t here = first % LocatedLanes::kMost;
-    if (here == 0) {
-      const std::size_t count = std::min(LocatedLanes::kMost, points.count - first);
-      for (std::size_t i = 0; i < count; i += hn::Lanes(kD)) {
-        located.store(locate(field, inB(frame, points, first + i)), i);
-      }
-    }
+    if (here == 0) located.locateFrom(field, points, first);
     SampleLanes& block = *out++;
     const std::size_t end = std::min(first + ShellBlock::kLanes, points.count);
     std::uint32_t all_exact = 0;
@@ -356,7 +355,7 @@ void samples(const LaneFrame& frame, const PointLanes& points, SampleLanes* out,
     for (std::size_t i = first; i < end; i += hn::Lanes(kD)) {
       const std::size_t lane = i - first;
       const Mask used = hn::FirstN(kD, end - i);
-      const Sampled there = sample(field, points, i, located.load(here + lane));
+      const Sampled there = sample(field, points, i, located.at(here + lane));
       const Double gap = hn::Sub(there.distance, all(frame.dilation));
       const Mask exact = hn::And(used, there.exact);
       const Mask near = hn::And(exact, hn::Le(gap, all(frame.margin)));
