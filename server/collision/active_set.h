@@ -19,6 +19,7 @@ struct RowNormal {
   std::array<std::int32_t, 2> body{kNone, kNone};
   std::array<Vector6, 2> part{Vector6::Zero(), Vector6::Zero()};
 
+  bool operator==(const RowNormal&) const = default;
   [[nodiscard]] double norm2() const { return part[0].squaredNorm() + part[1].squaredNorm(); }
   /// Their product with each other, and with a long vector of six numbers a body.
   [[nodiscard]] double dot(const RowNormal& other) const;
@@ -38,9 +39,12 @@ class ActiveSet {
  public:
   explicit ActiveSet(std::size_t max_variables);
 
+  /// No row is active.
   void reset(std::size_t variables);
+  [[nodiscard]] std::size_t variables() const { return n_; }
   [[nodiscard]] std::size_t size() const { return rows_.size(); }
   [[nodiscard]] std::uint32_t row(std::size_t i) const { return rows_[i]; }
+  [[nodiscard]] std::span<const std::uint32_t> rows() const { return rows_; }
   [[nodiscard]] const RowNormal& normal(std::size_t i) const { return normals_[i]; }
 
   /// Writes a normal as a sum of the active ones and what they leave free: what the next four tell about.

@@ -130,7 +130,7 @@ bool IslandSolver::judgePatches(const Job& job) {
       patch.along_W = friction[k].normalized();
       continue;
     }
-    Vector3 way_W = relativeMotion(job, pair, patch.p_WP);
+    Vector3 way_W = relativeMotion(job, motions_, pair, patch.p_WP);
     way_W -= way_W.dot(patch.n_W) * patch.n_W;
     const double way = way_W.norm();
     if (way < kNoSlide) continue;

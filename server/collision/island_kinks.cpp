@@ -52,14 +52,18 @@ bool IslandSolver::passKinks(const Job& job, SolveReport& report) {
   }
   if (kinks_.empty()) return false;
   // where would all go if these did not hold?
-  const std::size_t unchanged = kinks_[0].row;
-  for (const Kink& kink : kinks_) rows_[kink.row].gap = std::numeric_limits<double>::infinity();
-  solveMotions(job, report, unchanged);
+  FixedVector<std::uint32_t, kMaxKinks> left_out;
+  for (const Kink& kink : kinks_) left_out.push_back(static_cast<std::uint32_t>(kink.row));
+  const std::span<Displacement> motions(free_motions_.data(), job.bodies.size());
+  report.iterations +=
+      motion_.solve(job.bodies, rows_, motions, {}, held_, rows_.size(), {left_out.begin(), left_out.size()})
+          .iterations;
+  const std::span<const std::uint32_t> free_held = motion_.held();
   // there the side holds that is farthest out
   bool passed = false;
   for (const Kink& kink : kinks_) {
     Contact& contact = job.results[kink.pair].query.contacts[kink.contact];
-    const Vector3 motion_W = relativeMotion(job, job.pairs[kink.pair], contact.p_WP);
+    const Vector3 motion_W = relativeMotion(job, motions, job.pairs[kink.pair], contact.p_WP);
     double farthest = contact.gap + contact.n_W.dot(motion_W);
     for (const Kink::Side& side : kink.sides) {
       const double slack = side.gap + side.n_W.dot(motion_W);
@@ -72,16 +76,20 @@ bool IslandSolver::passKinks(const Job& job, SolveReport& report) {
     rows_[kink.row].n_W = contact.n_W;
     rows_[kink.row].gap = contact.gap;
   }
-  solveMotions(job, report, unchanged);
-  return passed;
+  if (!passed) return false;
+  held_.assign(free_held.begin(), free_held.end());
+  std::sort(held_.begin(), held_.end());
+  solveMotions(job, report, kinks_[0].row);
+  return true;
 }
 
-Vector3 IslandSolver::relativeMotion(const Job& job, const IslandPair& pair, const Vector3& p_WP) const {
+Vector3 IslandSolver::relativeMotion(const Job& job, std::span<const Displacement> motions,
+                                     const IslandPair& pair, const Vector3& p_WP) {
   Vector3 motion_W = Vector3::Zero();
   for (const auto& [index, sign] : {std::pair{pair.body_a, 1.0}, std::pair{pair.body_b, -1.0}}) {
     if (index == GapRow::kStatic) continue;
     const auto i = static_cast<std::size_t>(index);
-    motion_W += sign * pointMotion(motions_[i], p_WP - job.bodies[i].X_WB.translation());
+    motion_W += sign * pointMotion(motions[i], p_WP - job.bodies[i].X_WB.translation());
   }
   return motion_W;
 }

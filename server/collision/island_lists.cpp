@@ -17,9 +17,6 @@ constexpr double kThinSpan = 0.03;
 /// Full lists shorten a sub-step to this share of its travel at most: a plate on a floor has to slide on.
 constexpr double kLeastReach = 0.25;
 
-/// So many rows that held are remembered while lists change.
-constexpr std::size_t kMostHeld = 96;
-
 int movableBodies(const IslandPair& pair) {
   return (pair.body_a != GapRow::kStatic ? 1 : 0) + (pair.body_b != GapRow::kStatic ? 1 : 0);
 }
@@ -73,7 +70,7 @@ void IslandSolver::takeLast(const Job& job) {
 
 void IslandSolver::lookAround(const Job& job, SolveReport& report) {
   // what goes on holding: in lists that stay the same, under its new number, whatever other lists become
-  FixedVector<std::pair<std::size_t, double>, kMostHeld> held;
+  kept_.clear();
   std::size_t next = 0;
   std::size_t first_before = 0;
   std::size_t first = 0;
@@ -81,13 +78,13 @@ void IslandSolver::lookAround(const Job& job, SolveReport& report) {
     const std::size_t listed = job.results[i].query.contacts.size();
     const bool same = lookAtPair(job, i, report);
     for (; next < held_.size() && held_[next] < first_before + listed; ++next) {
-      if (same) held.push_back({held_[next] - first_before + first, multipliers_[held_[next]]});
+      if (same) kept_.emplace_back(held_[next] - first_before + first, multipliers_[held_[next]]);
     }
     first_before += listed;
     first += job.results[i].query.contacts.size();
   }
   held_.clear();
-  for (const auto& [row, force] : held) {
+  for (const auto& [row, force] : kept_) {
     held_.push_back(static_cast<std::uint32_t>(row));
     multipliers_[row] = force;
   }

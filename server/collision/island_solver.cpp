@@ -35,6 +35,7 @@ IslandSolver::IslandSolver(std::size_t max_bodies, std::size_t max_pairs)
     : motion_(max_bodies, max_pairs * kMaxPairContacts + kMaxFlanks + kPatchRows * kMaxPatches),
       multipliers_(max_pairs * kMaxPairContacts + kMaxFlanks + kPatchRows * kMaxPatches),
       motions_(max_bodies),
+      free_motions_(max_bodies),
       gone_(max_bodies),
       best_(max_bodies),
       start_(max_bodies),
@@ -43,6 +44,7 @@ IslandSolver::IslandSolver(std::size_t max_bodies, std::size_t max_pairs)
       touched_(max_bodies) {
   rows_.reserve(multipliers_.size());
   held_.reserve(6 * max_bodies);
+  kept_.reserve(held_.capacity());
   curved_.reserve(6 * max_bodies);
 }
 

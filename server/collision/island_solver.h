@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "server/collision/motion_solver.h"
@@ -164,8 +165,9 @@ class IslandSolver {
   /// it: held points at a border get the side that is in their way least. True when another one.
   bool passKinks(const Job& job, SolveReport& report);
   bool findKink(const Job& job, std::size_t pair, std::size_t contact, std::size_t row);
-  /// Of A's point over B, by the motions of the last solve.
-  [[nodiscard]] Vector3 relativeMotion(const Job& job, const IslandPair& pair, const Vector3& p_WP) const;
+  /// Of A's point over B.
+  [[nodiscard]] static Vector3 relativeMotion(const Job& job, std::span<const Displacement> motions,
+                                              const IslandPair& pair, const Vector3& p_WP);
   void blockMotions(const Job& job);
   // friction (island_friction.cpp)
   void rub(const Job& job, SolveReport& report);
@@ -206,18 +208,20 @@ class IslandSolver {
   static constexpr std::size_t kPatchRows = 4;  ///< to both sides along two tangents
   FixedVector<Patch, kMaxPatches> patches_;
   std::size_t first_patch_row_ = 0;
-  std::vector<std::uint32_t> held_;    ///< rows that held in the last solve, while the lists are the same
-  std::vector<std::uint32_t> curved_;  ///< rows whose curves the bodies have
-  std::size_t listed_ = 0;             ///< rows of listed contacts; those of the flanks are behind them
+  std::vector<std::uint32_t> held_;  ///< rows that held in the last solve, while the lists are the same
+  std::vector<std::pair<std::size_t, double>> kept_;  ///< of those, by new number, with their forces [N]
+  std::vector<std::uint32_t> curved_;                 ///< rows whose curves the bodies have
+  std::size_t listed_ = 0;  ///< rows of listed contacts; those of the flanks are behind them
   std::vector<GapRow> rows_;
   std::vector<double> multipliers_;
   std::vector<Displacement> motions_;
-  std::vector<Displacement> gone_;     ///< in the last sub-step
-  std::vector<Pose> best_;             ///< of the places of this solve
-  std::vector<Pose> start_;            ///< of this solve
-  std::vector<Wrench> wrenches_;       ///< for kBlocking: penalties on a body, about its origin
-  std::vector<double> depths_;         ///< for kBlocking: the deepest of a body's contacts
-  std::vector<std::uint8_t> touched_;  ///< a row holds the body back
+  std::vector<Displacement> free_motions_;  ///< if what is at a border did not hold
+  std::vector<Displacement> gone_;          ///< in the last sub-step
+  std::vector<Pose> best_;                  ///< of the places of this solve
+  std::vector<Pose> start_;                 ///< of this solve
+  std::vector<Wrench> wrenches_;            ///< for kBlocking: penalties on a body, about its origin
+  std::vector<double> depths_;              ///< for kBlocking: the deepest of a body's contacts
+  std::vector<std::uint8_t> touched_;       ///< a row holds the body back
 };
 
 }  // namespace tenon

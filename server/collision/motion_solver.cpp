@@ -10,7 +10,7 @@
 namespace tenon {
 
 void MotionSolver::Workspace::dropActive(std::size_t position) {
-  is_active[active.row(position)] = 0;
+  state[active.row(position)] = RowState::kIdle;
   const std::size_t count = active.size();
   active.drop(position);
   // the multiplier of the row that is being enforced stands behind those of the active ones
@@ -65,7 +65,7 @@ bool MotionSolver::Workspace::enforce(std::size_t p) {
     }
     if (primal_step <= dual_step) {
       active.add(static_cast<std::uint32_t>(p));
-      is_active[p] = 1;
+      state[p] = RowState::kActive;
       return true;
     }
     dropActive(vanishing);
@@ -73,36 +73,61 @@ bool MotionSolver::Workspace::enforce(std::size_t p) {
   return false;
 }
 
-void MotionSolver::Workspace::takeAll(std::span<const std::uint32_t> first) {
-  for (const std::uint32_t row : first) {
-    if (!std::isfinite(columns[0][row]) || is_active[row] != 0 || !active.append(row, normalOf(row)))
-      continue;
-    is_active[row] = 1;
-    u[active.size() - 1] = 0.0;
+void MotionSolver::Workspace::keepActive(std::span<const std::uint32_t> first,
+                                         std::span<const std::uint32_t> left_out) {
+  for (const std::uint32_t row : first) wanted[row] = 1;
+  for (const std::uint32_t row : left_out) wanted[row] = 0;
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < active.size(); ++k) {
+    const std::uint32_t row = active.row(k);
+    const bool stays = wanted[row] != 0 && normalOf(row) == active.normal(k);
+    wanted[row] = stays ? 1 : 0;
+    kept += stays ? 1 : 0;
   }
-  if (active.size() == 0) return;
-  while (!settle()) ++iterations;
-  // for the digits that the first time has lost
-  while (!settle()) ++iterations;
+  // turning a row out costs as much as a few new ones
+  if (4 * kept < 3 * active.size()) active.reset(6 * bodies);
+  for (std::size_t k = active.size(); k-- > 0;) {
+    if (wanted[active.row(k)] == 0) dropActive(k);
+  }
+  for (std::size_t k = 0; k < active.size(); ++k) state[active.row(k)] = RowState::kActive;
+  for (const std::uint32_t row : first) wanted[row] = 0;
+  for (const std::uint32_t row : left_out) state[row] = RowState::kLeftOut;
 }
 
-bool MotionSolver::Workspace::settle() {
+bool MotionSolver::Workspace::take(std::uint32_t row, double force) {
+  if (state[row] != RowState::kIdle || !std::isfinite(columns[0][row])) return false;
+  if (!active.append(row, normalOf(row))) return false;
+  state[row] = RowState::kActive;
+  u[active.size() - 1] = force;
+  return true;
+}
+
+bool MotionSolver::Workspace::ascend() {
   const std::span<double> all(y.data(), 6 * bodies);
-  std::copy_n(y0.begin(), all.size(), y.begin());
-  const std::size_t q = active.size();
-  for (std::size_t k = 0; k < q; ++k) active.normal(k).addTo(all, u[k]);
-  for (std::size_t k = 0; k < q; ++k) {
-    correction[k] = -columns[0][active.row(k)] - active.normal(k).dot(all);
+  // the second time for the digits that the first has lost
+  for (int whole_steps = 0; whole_steps < 2;) {
+    const std::size_t q = active.size();
+    std::copy_n(y0.begin(), all.size(), y.begin());
+    for (std::size_t k = 0; k < q; ++k) active.normal(k).addTo(all, u[k]);
+    for (std::size_t k = 0; k < q; ++k) {
+      lack[k] = -columns[0][active.row(k)] - active.normal(k).dot(all);
+    }
+    active.solve({lack.data(), q});
+    // so far no multiplier has to pull
+    double share = 1.0;
+    for (std::size_t k = 0; k < q; ++k) {
+      if (lack[k] < 0.0) share = std::min(share, u[k] / -lack[k]);
+    }
+    for (std::size_t k = q; k-- > 0;) {
+      active.normal(k).addTo(all, share * lack[k]);
+      const bool vanishes = share < 1.0 && lack[k] < 0.0 && u[k] / -lack[k] <= share;
+      u[k] = std::max(u[k] + share * lack[k], 0.0);
+      if (vanishes) dropActive(k);
+    }
+    whole_steps = share == 1.0 ? whole_steps + 1 : 0;
+    if (whole_steps == 0 && ++iterations > iteration_limit) return false;
   }
-  active.solve({correction.data(), q});
-  for (std::size_t k = 0; k < q; ++k) {
-    u[k] += correction[k];
-    active.normal(k).addTo(all, correction[k]);
-  }
-  for (std::size_t k = q; k-- > 0;) {
-    if (u[k] < 0.0) dropActive(k);
-  }
-  return active.size() == q;
+  return true;
 }
 
 bool MotionSolver::Workspace::enforceTried() {
@@ -113,13 +138,16 @@ bool MotionSolver::Workspace::enforceTried() {
   return true;
 }
 
-bool MotionSolver::Workspace::run(std::span<const std::uint32_t> first) {
-  active.reset(6 * bodies);
+bool MotionSolver::Workspace::run(std::span<const std::uint32_t> first, std::span<const double> forces,
+                                  std::span<const std::uint32_t> left_out, bool known) {
   std::copy_n(y0.begin(), 6 * bodies, y.begin());
-  updateMotions();
-  std::fill_n(is_active.begin(), row_count, std::uint8_t{0});
+  std::fill_n(state.begin(), row_count, RowState::kIdle);
   iteration_limit = iterations + static_cast<std::uint32_t>(64 + 30 * bodies);
-  takeAll(first);
+  if (!known || active.variables() != 6 * bodies) active.reset(6 * bodies);
+  keepActive(first, left_out);
+  for (std::size_t k = 0; k < active.size() && !forces.empty(); ++k) u[k] = forces[active.row(k)];
+  for (const std::uint32_t row : first) take(row, forces.empty() ? 0.0 : std::max(forces[row], 0.0));
+  if (!ascend()) return false;
   while (true) {
     updateMotions();
     findViolated();
@@ -127,8 +155,7 @@ bool MotionSolver::Workspace::run(std::span<const std::uint32_t> first) {
     if (!enforceTried()) return false;
     // what only rounding finds violated counts as kept
     if (iterations == before) return true;
-    while (!settle()) {
-    }
+    if (!ascend()) return false;
   }
 }
 
@@ -140,10 +167,12 @@ MotionSolver& MotionSolver::operator=(MotionSolver&&) noexcept = default;
 
 MotionResult MotionSolver::solve(std::span<const MovableBody> bodies, std::span<const GapRow> rows,
                                  std::span<Displacement> motions, std::span<double> multipliers,
-                                 std::span<const std::uint32_t> first, std::size_t unchanged) noexcept {
+                                 std::span<const std::uint32_t> first, std::size_t unchanged,
+                                 std::span<const std::uint32_t> left_out) noexcept {
   Workspace& w = *workspace_;
   assert(bodies.size() <= w.L.size() && rows.size() <= w.body_of.size());
-  assert(motions.size() == bodies.size() && multipliers.size() == rows.size());
+  assert(motions.size() == bodies.size());
+  assert(multipliers.empty() || multipliers.size() == rows.size());
   assert(first.size() <= rows.size() && unchanged <= std::min(rows.size(), w.row_count));
   w.bodies = bodies.size();
   w.row_count = rows.size();
@@ -152,13 +181,13 @@ MotionResult MotionSolver::solve(std::span<const MovableBody> bodies, std::span<
   for (std::size_t i = 0; i < bodies.size(); ++i) w.setBody(i, bodies[i]);
 
   MotionResult result;
-  bool solved = w.run(first);
+  bool solved = w.run(first, multipliers, left_out, unchanged > 0);
   if (!solved) {
     // standing still is always admissible then
     result.conflicting = true;
     w.clipped = true;
     for (std::size_t i = 0; i < w.row_count; ++i) w.columns[0][i] = std::max(w.columns[0][i], 0.0);
-    solved = w.run({});
+    solved = w.run({}, {}, left_out, false);
   }
   result.iterations = w.iterations;
 
@@ -167,9 +196,12 @@ MotionResult MotionSolver::solve(std::span<const MovableBody> bodies, std::span<
     motions[i] = {x.head<3>(), x.tail<3>()};
   }
   std::fill(multipliers.begin(), multipliers.end(), 0.0);
-  for (std::size_t k = 0; solved && k < w.active.size(); ++k) multipliers[w.active.row(k)] = w.u[k];
+  if (!solved || multipliers.empty()) return result;
+  for (std::size_t k = 0; k < w.active.size(); ++k) multipliers[w.active.row(k)] = w.u[k];
   return result;
 }
+
+std::span<const std::uint32_t> MotionSolver::held() const noexcept { return workspace_->active.rows(); }
 
 Wrench springWrench(const Spring& spring, const Pose& X_WB) noexcept {
   const Displacement toGoal = displacement(X_WB, spring.X_WG);

@@ -86,12 +86,17 @@ class MotionSolver {
   MotionSolver& operator=(MotionSolver&&) noexcept;
 
   /// motions[i]: displacement of bodies[i]'s origin and its rotation, in W. multipliers[r] >= 0: force [N]
-  /// along rows[r].n_W on its body A (and the opposite on B). Both spans are as long as bodies and rows.
-  /// `first`: rows to try first, such as those that held in a problem like this one; the motions do not
-  /// depend on it. `unchanged`: so many of the rows, and all poses, are those of the last call.
+  /// along rows[r].n_W on its body A (and the opposite on B). Both spans are as long as bodies and rows, or
+  /// nobody asks for multipliers.
+  /// `first`: rows to try first, such as those that held in a problem like this one, with forces like those
+  /// that stand in `multipliers`; the motions do not depend on it. `unchanged`: so many of the rows, and all
+  /// poses, are those of the last call. `left_out`: rows that count for nothing this time.
   MotionResult solve(std::span<const MovableBody> bodies, std::span<const GapRow> rows,
                      std::span<Displacement> motions, std::span<double> multipliers,
-                     std::span<const std::uint32_t> first = {}, std::size_t unchanged = 0) noexcept;
+                     std::span<const std::uint32_t> first = {}, std::size_t unchanged = 0,
+                     std::span<const std::uint32_t> left_out = {}) noexcept;
+  /// Rows that hold with equality since the last solve, in no order.
+  [[nodiscard]] std::span<const std::uint32_t> held() const noexcept;
 
  private:
   struct Workspace;

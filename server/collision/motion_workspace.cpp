@@ -164,7 +164,7 @@ std::uint32_t MotionSolver::Workspace::worstOfBlock(std::size_t first, std::size
   double least = -kGapTolerance;
   std::size_t worst = row_count;
   for (std::size_t row = first; row < end; ++row) {
-    if (slack[row - first] >= least || is_active[row] != 0) continue;
+    if (slack[row - first] >= least || state[row] != RowState::kIdle) continue;
     least = slack[row - first];
     worst = row;
   }
@@ -175,7 +175,7 @@ std::size_t MotionSolver::Workspace::mostViolatedOfTried() const {
   std::size_t worst = row_count;
   double least = -kGapTolerance;
   for (const std::uint32_t row : tried) {
-    if (is_active[row] != 0) continue;
+    if (state[row] != RowState::kIdle) continue;
     const double s = slackOf(row);
     if (s < least) {
       least = s;

@@ -24,6 +24,8 @@ struct MotionSolver::Workspace {
   /// Neighbours in the list are neighbours in space: of this many, only the most violated row is tried.
   static constexpr std::size_t kBlock = 16;
 
+  enum class RowState : std::uint8_t { kIdle, kActive, kLeftOut };
+
   /// Rows [first, first + count) between the same two bodies.
   struct Run {
     std::size_t first = 0, count = 0;
@@ -33,13 +35,14 @@ struct MotionSolver::Workspace {
   Workspace(std::size_t max_bodies, std::size_t max_rows)
       : active(6 * max_bodies),
         L(max_bodies),
-        is_active(max_rows),
+        state(max_rows),
+        wanted(max_rows),
         body_of(max_rows),
         y0(6 * max_bodies),
         y(6 * max_bodies),
         x(6 * max_bodies),
         u(6 * max_bodies + 1),
-        correction(6 * max_bodies) {
+        lack(6 * max_bodies) {
     for (std::vector<double>& column : columns) column.resize(max_rows + kBlock);
     runs.reserve(max_rows);
     tried.reserve(max_rows);
@@ -48,8 +51,10 @@ struct MotionSolver::Workspace {
   void setBody(std::size_t i, const MovableBody& body);
   /// Takes over the rows from `unchanged` on.
   void setRows(std::span<const GapRow> rows, std::span<const MovableBody> island, std::size_t unchanged);
-  /// False: the rows contradict each other, or the iterations have run out.
-  bool run(std::span<const std::uint32_t> first);
+  /// False: the rows contradict each other, or the iterations have run out. `known`: most
+  /// rows are those of the last run.
+  bool run(std::span<const std::uint32_t> first, std::span<const double> forces,
+           std::span<const std::uint32_t> left_out, bool known);
   void updateMotions();
   [[nodiscard]] double slackOf(std::size_t row) const;
   /// Of all rows; the worst of every block that does not hold goes into `tried`.
@@ -59,11 +64,13 @@ struct MotionSolver::Workspace {
                                            const std::array<double, 9>& m) const;
   [[nodiscard]] std::size_t mostViolatedOfTried() const;
   [[nodiscard]] RowNormal normalOf(std::size_t row) const;
-  /// What can hold of these rows holds then; those that would have to pull are left out again.
-  void takeAll(std::span<const std::uint32_t> first);
-  /// Rounding that has added up: the active rows hold to the last digit again. False: some would pull, which
-  /// are no longer active.
-  bool settle();
+  /// Of the active rows those stay that are among `first` and whose normals are the same to the last bit.
+  void keepActive(std::span<const std::uint32_t> first, std::span<const std::uint32_t> left_out);
+  /// A row becomes active if it can: holding with equality is not yet seen to.
+  bool take(std::uint32_t row, double force);
+  /// From any multipliers that push to those with which the active rows hold; on the way those that would
+  /// have to pull vanish. The dual energy grows with every step. False: the iterations have run out.
+  bool ascend();
   bool enforceTried();
   bool enforce(std::size_t p);
   void dropActive(std::size_t position);
@@ -71,12 +78,13 @@ struct MotionSolver::Workspace {
   ActiveSet active;
   std::vector<Matrix6> L;
   std::array<std::vector<double>, 10> columns;  ///< gap, normal, its moment about A's origin, about B's
-  std::vector<std::uint8_t> is_active;
+  std::vector<RowState> state;
+  std::vector<std::uint8_t> wanted;  ///< a row is one of those that held; all zero between uses
   std::vector<std::array<std::int32_t, 2>> body_of;
   std::vector<Run> runs;
   std::vector<std::uint32_t> tried;
   std::vector<double> y0, y, x;
-  std::vector<double> u, correction;  ///< multipliers in the order of `active`, and what they lack
+  std::vector<double> u, lack;  ///< multipliers in the order of `active`, and what they lack
   std::size_t bodies = 0;
   std::size_t row_count = 0;
   bool clipped = false;  ///< negative gaps were raised to zero

@@ -326,6 +326,102 @@ TEST(MotionSolver, RandomIslandsAreSolvedToTheLastBalance) {
   }
 }
 
+/// Boxes in a wall, five a layer, each set down on two of the layer below a hair too deep: its neighbours in
+/// the wall are all that a box meets, however large the wall is.
+struct Wall {
+  explicit Wall(int count) {
+    Noise noise(7);
+    for (int i = 0; i < count; ++i) {
+      const Pose X_WB(Vector3(0.05 * (i % 5) + 0.025 * (i / 5 % 2), 0.0, 0.05 * (i / 5)));
+      bodies.push_back(bodyAt(X_WB, Pose(X_WB.translation() - Vector3(0.0, 0.0, 1e-5)), 4e5, 170.0));
+      for (int k = 0; k < 40; ++k) {
+        const double x = 0.025 * noise.number();
+        const int below = i - 5 + (i / 5 % 2 == 0 ? (x < 0.0 ? -1 : 0) : (x < 0.0 ? 0 : 1));
+        const bool there = i >= 5 && below >= 0 && below / 5 == i / 5 - 1;
+        if (i >= 5 && !there) continue;
+        const Vector3 p = X_WB.translation() + Vector3(x, 0.025 * noise.number(), -0.025);
+        const Vector3 n = (Vector3::UnitZ() + 1e-3 * noise.vector()).normalized();
+        rows.push_back({i, there ? below : GapRow::kStatic, n, p, 1e-6 * noise.number()});
+      }
+    }
+  }
+  std::vector<MovableBody> bodies;
+  std::vector<GapRow> rows;
+};
+
+std::vector<std::uint32_t> heldRows(const Solved& solved) {
+  std::vector<std::uint32_t> held;
+  for (std::uint32_t r = 0; r < solved.multipliers.size(); ++r) {
+    if (solved.multipliers[r] > 0.0) held.push_back(r);
+  }
+  return held;
+}
+
+void expectSameMotions(const std::vector<Displacement>& one, const std::vector<Displacement>& other) {
+  ASSERT_EQ(one.size(), other.size());
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    EXPECT_LE((one[i].translation - other[i].translation).norm(), 1e-10) << i;
+    EXPECT_LE((one[i].rotation - other[i].rotation).norm(), 1e-8) << i;
+  }
+}
+
+TEST(MotionSolver, WhatIsKnownOfAWallIsTakenOverWithoutAnIteration) {
+  for (const int count : {10, 40, 80}) {
+    const Wall wall(count);
+    Solved solved = solve(wall.bodies, wall.rows);
+    expectOptimal(wall.bodies, wall.rows, solved);
+    const std::vector<Displacement> cold = solved.motions;
+    MotionSolver solver(wall.bodies.size(), wall.rows.size());
+    solved.result =
+        solver.solve(wall.bodies, wall.rows, solved.motions, solved.multipliers, heldRows(solved));
+    expectOptimal(wall.bodies, wall.rows, solved);
+    EXPECT_EQ(solved.result.iterations, 0U) << count << " boxes";
+    expectSameMotions(solved.motions, cold);
+  }
+}
+
+TEST(MotionSolver, AWrongGuessOfWhatHoldsChangesNothing) {
+  const Wall wall(20);
+  const Solved truth = solve(wall.bodies, wall.rows);
+  Noise noise(8);
+  for (int trial = 0; trial < 20; ++trial) {
+    MotionSolver solver(wall.bodies.size(), wall.rows.size());
+    Solved solved = truth;
+    std::vector<std::uint32_t> first;
+    for (std::uint32_t r = 0; r < wall.rows.size(); ++r) {
+      if (noise.number() < 0.7) continue;
+      first.push_back(r);
+      solved.multipliers[r] = 10.0 * std::max(noise.number(), 0.0);
+    }
+    solved.result = solver.solve(wall.bodies, wall.rows, solved.motions, solved.multipliers, first);
+    expectOptimal(wall.bodies, wall.rows, solved);
+    expectSameMotions(solved.motions, truth.motions);
+  }
+}
+
+TEST(MotionSolver, RowsThatAreLeftOutOrChangedAreSolvedAsIfForTheFirstTime) {
+  Wall wall(20);
+  MotionSolver solver(wall.bodies.size(), wall.rows.size());
+  Solved solved = solve(wall.bodies, wall.rows);
+  solver.solve(wall.bodies, wall.rows, solved.motions, solved.multipliers);
+  const std::vector<std::uint32_t> held = heldRows(solved);
+  std::vector<std::uint32_t> left_out;
+  for (std::size_t i = 0; i < held.size(); i += 7) left_out.push_back(held[i]);
+
+  std::vector<Displacement> motions(wall.bodies.size());
+  solver.solve(wall.bodies, wall.rows, motions, {}, held, wall.rows.size(), left_out);
+  std::vector<GapRow> fewer = wall.rows;
+  for (const std::uint32_t row : left_out) fewer[row].gap = std::numeric_limits<double>::infinity();
+  expectSameMotions(motions, solve(wall.bodies, fewer).motions);
+
+  for (const std::uint32_t row : left_out) {
+    wall.rows[row].n_W = (wall.rows[row].n_W + Vector3(0.1, 0.05, 0.0)).normalized();
+  }
+  solved.result = solver.solve(wall.bodies, wall.rows, solved.motions, solved.multipliers, held, left_out[0]);
+  expectOptimal(wall.bodies, wall.rows, solved);
+  expectSameMotions(solved.motions, solve(wall.bodies, wall.rows).motions);
+}
+
 TEST(MotionSolver, SaysTheSameBitsTwice) {
   Noise noise(6);
   const MovableBody body = bodyAt(noise.pose(0.1, 1.0), noise.pose(0.1, 0.5));
