@@ -14,6 +14,7 @@
 #include "server/session/scene_loader.h"
 #include "tests/bench/engine/bench_scene.h"
 #include "tests/bench/engine/corner_path.h"
+#include "tests/bench/engine/heap_table.h"
 #include "tests/bench/engine/insertion.h"
 #include "tests/bench/engine/methods.h"
 #include "tests/bench/engine/overload_table.h"
@@ -83,6 +84,7 @@ class Bench {
     }
     if (wants("methods")) add(methodsTable(say));
     if (wants("many_bodies")) add(manyBodiesTable(say));
+    if (wants("heaps")) add(heapsTable(say));
     if (wants("overload")) add(overloadTable(say));
     if (wants("insertion")) {
       const auto insertion = rehearseInsertion(arguments_.scenario, arguments_.cache, arguments_.detail, say);
@@ -132,9 +134,10 @@ int run(int argc, char** argv) {
   app.add_option("--rounds", arguments.rounds, "how often a pose is asked; its least time counts")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  app.add_option("--only", arguments.only,
-                 "tables to make: bake, query, methods, many_bodies, overload, insertion (default: all)")
-      ->check(CLI::IsMember({"bake", "query", "methods", "many_bodies", "overload", "insertion"}));
+  app.add_option(
+         "--only", arguments.only,
+         "tables to make: bake, query, methods, many_bodies, heaps, overload, insertion (default: all)")
+      ->check(CLI::IsMember({"bake", "query", "methods", "many_bodies", "heaps", "overload", "insertion"}));
   app.add_option("--json", arguments.json, "write the tables into this file, for programs");
   app.add_option(
       "--figures", arguments.figures,
