@@ -12,6 +12,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "server/collision/contact_lanes_inl.h"
 #include "server/collision/cull_lanes_inl.h"
 #include "server/collision/sample_lanes_inl.h"
 
