@@ -91,13 +91,14 @@ void IslandSolver::lookAround(const Job& job, SolveReport& report) {
 }
 
 bool IslandSolver::lookAtPair(const Job& job, std::size_t i, SolveReport& report) {
-  if (mustWalk(job, i)) {
+  const double gone = job.results[i].walked.done ? approach(job, i) : 0.0;
+  if (mustWalk(job, i, gone)) {
     walkPair(job, i, report);
     return false;
   }
   PairQueryResult& result = job.results[i].query;
   const std::size_t listed = result.contacts.size();
-  resampleContacts(job.queryOf(job.pairs[i], 0.0), approach(job, i), result);
+  resampleContacts(job.queryOf(job.pairs[i], 0.0), gone, result);
   ++report.resamplings;
   report.points_visited += listed;
   return result.contacts.size() == listed;
@@ -129,12 +130,11 @@ double IslandSolver::approach(const Job& job, std::size_t i) {
   return sum;
 }
 
-bool IslandSolver::mustWalk(const Job& job, std::size_t i) {
+bool IslandSolver::mustWalk(const Job& job, std::size_t i, double gone) {
   const WalkedAt& walked = job.results[i].walked;
   if (!walked.done) return true;
   const IslandPair& pair = job.pairs[i];
   const PairQueryResult& result = job.results[i].query;
-  const double gone = approach(job, i);
   // a full list is as good as it gets at the place where it was made
   if (gone > 0.0 && result.others_gap - gone < neededMargin(pair, job.limits)) return true;
   if (!result.thinned) return false;

@@ -132,7 +132,8 @@ class IslandSolver {
   /// Takes over the lists of the last solve, and what held then.
   void takeLast(const Job& job);
   void walkPair(const Job& job, std::size_t pair, SolveReport& report);
-  [[nodiscard]] static bool mustWalk(const Job& job, std::size_t pair);
+  /// Once its bodies have `gone` so far [m] towards each other.
+  [[nodiscard]] static bool mustWalk(const Job& job, std::size_t pair, double gone);
   /// [m] no point of one came nearer to the other by more, since the walk.
   [[nodiscard]] static double approach(const Job& job, std::size_t pair);
   void buildRows(const Job& job);
