@@ -7,6 +7,7 @@
 #include "server/collision/contact_blocks.h"
 #include "server/collision/contact_sink.h"
 #include "server/collision/query_kernels.h"
+#include "server/collision/straightening.h"
 
 namespace tenon {
 namespace {
@@ -60,6 +61,7 @@ class Walk {
         sum_(query.sum),
         prune_(query.prune),
         can_thin_(query.thin),
+        straighten_(query.straighten),
         result_(result),
         sink_(result, -query.field_B->band() - query.dilation, query.margin) {}
 
@@ -167,6 +169,10 @@ class Walk {
                             candidates_.count};
     SampleSums sums;
     kernels_.samples(frame_, points, samples_.data(), sums);
+    if (straighten_ && sums.colliding > 0) {
+      const std::size_t blocks = (points.count + ShellBlock::kLanes - 1) / ShellBlock::kLanes;
+      straighten(frame_, kernels_, points, {samples_.data(), blocks}, sums);
+    }
     result_.counts.points_colliding += sums.colliding;
     result_.smallest_gap = std::min(result_.smallest_gap, sums.smallest_distance - frame_.dilation);
     result_.deepest = std::max(result_.deepest, -sums.smallest_distance);
@@ -311,6 +317,7 @@ class Walk {
   // of the candidates
   std::array<SampleLanes, Candidates::kMost / ShellBlock::kLanes> samples_;
   std::array<ContactLanes, Candidates::kMost / ShellBlock::kLanes> contacts_;
+  bool straighten_;
   PairQueryResult& result_;
   ContactSink sink_;
   IncomingContacts coming_;  ///< when there is no room for all

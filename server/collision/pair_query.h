@@ -51,7 +51,9 @@ struct PairQuery {
   /// When room runs out, points give way first that stand behind a neighbour (of the same leaf, with about
   /// the same normal and a smaller gap): a flat patch then stays listed over all its width.
   bool thin = false;
-  bool sum = false;   ///< also sum what all points inside push, listed or not; not with a budget
+  bool sum = false;  ///< also sum what all points inside push, listed or not; not with a budget
+  /// Where the field bends inside, depths and normals are those of planes beside it: see straightening.h.
+  bool straighten = false;
   bool prune = true;  ///< false: every point is tested, for comparison
 };
 
@@ -79,8 +81,8 @@ struct PairQueryResult {
 void queryPair(const PairQuery& query, PairQueryResult& result) noexcept;
 
 /// The listed contacts again, at the query's poses, while no point of A came nearer to B than by `moved` [m]
-/// since queryPair listed them: costs no walk. Gaps and normals are those that queryPair would give; what is
-/// not in the list is still not nearer than others_gap - moved.
+/// since queryPair listed them: costs no walk. Gaps and normals are those that queryPair would give without
+/// straightening; what is not in the list is still not nearer than others_gap - moved.
 void resampleContacts(const PairQuery& query, double moved, PairQueryResult& result) noexcept;
 
 /// [N] the penalty of one contact along its normal; 0 when apart.

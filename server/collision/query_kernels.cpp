@@ -15,29 +15,31 @@
 #include "server/collision/contact_lanes_inl.h"
 #include "server/collision/cull_lanes_inl.h"
 #include "server/collision/sample_lanes_inl.h"
+// in doubles too, after them
+#include "server/collision/bend_lanes_inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tenon {
 namespace HWY_NAMESPACE {
 
-QueryKernels kernels() {
+const char* nameOfIsa() {
   switch (HWY_TARGET) {
     case HWY_SSE4:
-      return {"sse4", cull::clusters, cull::candidates, exact::samples, exact::contacts, exact::pushes};
+      return "sse4";
     case HWY_AVX2:
-      return {"avx2", cull::clusters, cull::candidates, exact::samples, exact::contacts, exact::pushes};
+      return "avx2";
     case HWY_AVX3:
-      return {"avx512", cull::clusters, cull::candidates, exact::samples, exact::contacts, exact::pushes};
+      return "avx512";
     case HWY_SCALAR:
-      return {"scalar", cull::clusters, cull::candidates, exact::samples, exact::contacts, exact::pushes};
+      return "scalar";
     default:
-      return {hwy::TargetName(HWY_TARGET),
-              cull::clusters,
-              cull::candidates,
-              exact::samples,
-              exact::contacts,
-              exact::pushes};
+      return hwy::TargetName(HWY_TARGET);
   }
+}
+
+QueryKernels kernels() {
+  return {nameOfIsa(),     cull::clusters, cull::candidates, exact::samples,
+          exact::contacts, exact::pushes,  exact::bent,      exact::planes};
 }
 
 }  // namespace HWY_NAMESPACE

@@ -95,6 +95,20 @@ struct alignas(64) PushLanes {
   std::uint32_t pushing;  ///< one bit a lane
 };
 
+/// The ways from a point to probes on eight sides of it [m], in B.
+struct alignas(64) ProbeSides {
+  static constexpr std::size_t kSides = 8;
+  std::array<double, kSides> x, y, z;
+};
+
+/// What the plane of a probe says where the field bends there too.
+inline constexpr double kNoPlane = -std::numeric_limits<double>::infinity();
+
+/// The planes that a field has at probes: what each says at the point [m], and its slope.
+struct alignas(64) Planes {
+  std::array<double, ProbeSides::kSides> distance, gradient_x, gradient_y, gradient_z;
+};
+
 /// Points that may be contacts, side by side in the order of the shell.
 struct Candidates {
   static constexpr std::size_t kClusters = 4;  ///< are walked at once
@@ -140,6 +154,13 @@ struct QueryKernels {
   /// for nothing.
   void (*pushes)(const LaneFrame& frame, const SampleLanes& samples, const ContactLanes& contacts,
                  const std::uint32_t* points, std::span<const float> areas, PushLanes& out) noexcept;
+  /// Of each block the lanes that are inside the dilated surface, but where the field's slope is not that of
+  /// a distance. Returns how many there are.
+  std::uint32_t (*bent)(const LaneFrame& frame, std::span<const SampleLanes> samples,
+                        std::uint32_t* lanes) noexcept;
+  /// Of probes about a point; `scale`: of the ways to them.
+  void (*planes)(const LaneFrame& frame, const ProbeSides& sides, const Vector3& p_BP, double scale,
+                 Planes& out) noexcept;
 };
 
 /// [m^2] The paper gives no unit for its stiffness; here K [N/m] is felt when 1 cm^2 of skin is inside.

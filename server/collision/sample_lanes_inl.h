@@ -276,12 +276,11 @@ HWY_INLINE Sampled interpolateRefined(const FieldLanes& field, const Located& at
   return out;
 }
 
-/// DistanceField::sample
-HWY_INLINE Sampled sample(const FieldLanes& field, const PointLanes& points, std::size_t i,
-                          const Located& at) {
+/// DistanceField::sample where that is exact; elsewhere there is no gradient, and the distance may be
+/// anything.
+HWY_INLINE Sampled sampleInBand(const FieldLanes& field, const Located& at, Mask has_samples) {
   const DistanceField::Layout& layout = field.layout;
   const Mask refined = hn::And(at.inside, hn::Ge(at.entry_number, all(DistanceField::kRefined)));
-  const Mask has_samples = hn::And(at.inside, hn::Ge(at.entry_number, hn::Zero(kD)));
   Sampled out{hn::Zero(kD), {hn::Zero(kD), hn::Zero(kD), hn::Zero(kD)}, has_samples};
   if (!hn::AllFalse(kD, refined)) {
     out = interpolateRefined(field, at, refined);
@@ -293,6 +292,19 @@ HWY_INLINE Sampled sample(const FieldLanes& field, const PointLanes& points, std
   out.gradient = {hn::IfThenElseZero(out.exact, out.gradient.x),
                   hn::IfThenElseZero(out.exact, out.gradient.y),
                   hn::IfThenElseZero(out.exact, out.gradient.z)};
+  return out;
+}
+
+HWY_INLINE Mask hasSamples(const Located& at) {
+  return hn::And(at.inside, hn::Ge(at.entry_number, hn::Zero(kD)));
+}
+
+/// DistanceField::sample
+HWY_INLINE Sampled sample(const FieldLanes& field, const PointLanes& points, std::size_t i,
+                          const Located& at) {
+  const DistanceField::Layout& layout = field.layout;
+  const Mask has_samples = hasSamples(at);
+  Sampled out = sampleInBand(field, at, has_samples);
   if (hn::AllTrue(kD, out.exact)) return out;
   const Double beyond =
       hn::Max(hn::Sub(hn::Abs(out.distance), all(DistanceField::kHalfDiagonal * layout.voxel)), hn::Zero(kD));

@@ -44,6 +44,7 @@ TEST(BakedQuery, FindsContactForContactWhatTheFlatLoopFinds) {
       const Pose X_BA = test::pressedSomewhere(*pair.a, *pair.b, 0.002 * chance.number(), 1.0, chance);
       PairQuery query{&pair.a->shell, &pair.b->field, X_BA, Pose(), 0.0004, 0.0006};
       query.sum = true;
+      query.straighten = trial % 2 == 0;
       queryPair(query, *pruned);
       query.prune = false;
       queryPair(query, *flat);

@@ -306,6 +306,7 @@ TEST(PairQuery, AllocatesNothing) {
   std::array<std::uint32_t, 16> chosen{};
   const test::RealtimeGuard guard;
   for (int i = 0; i < 20; ++i) {
+    asked.query.straighten = i % 2 == 0;
     queryPair(asked.query, *asked.result);
     reduceContacts(asked->contacts, chosen);
   }

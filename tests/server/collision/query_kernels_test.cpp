@@ -90,6 +90,7 @@ TEST_F(QueryKernelsTest, EveryInstructionSetGivesTheSameBits) {
     const Pose X_WA = randomPose(engine, trial % 7 == 0 ? 0.3 : 0.07);
     PairQuery query{&box->shell, &other->field, X_WA, randomPose(engine, 0.02), 0.0004, 0.001};
     query.thin = trial % 2 == 0;
+    query.straighten = trial % 4 < 2;
     PairQuery later = query;
     later.X_WA.translation() += Vector3(1e-4, -2e-4, 1e-4);
     for (const QueryKernels& kernels : supportedKernels()) {
