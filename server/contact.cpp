@@ -26,6 +26,7 @@ struct Arguments {
   std::vector<std::string> meshes;
   double stiffness = 1000.0;
   bool no_prune = false;
+  bool interpolated = false;
   bool refine = false;
 };
 
@@ -52,6 +53,7 @@ std::vector<Row> ask(const HapticStructures& field, const HapticStructures& shel
     PairQuery query{&shell.shell, &field.field, X_BA, Pose()};
     query.sum = true;
     query.prune = !arguments.no_prune;
+    query.straighten = !arguments.interpolated;
     // the mesh may have points inside that its field has outside
     if (surface.size() > 0) query.margin = 0.25 * field.field.voxel();
     const auto begin = std::chrono::steady_clock::now();
@@ -156,6 +158,9 @@ int main(int argc, char** argv) {
       "measure the deepest contacts against the mesh that FIELD was baked from, where its field bends");
   app.add_option("--mesh", arguments.meshes, "that mesh, when it is not where it was then")
       ->option_text("MESH...");
+  app.add_flag(
+      "--interpolated", arguments.interpolated,
+      "take distances as the field interpolates them, also where it bends: in thin walls, under edges");
   app.add_flag("--no-prune", arguments.no_prune, "test every point, to compare");
   app.footer(
       "contacts counts the points inside; points deeper than the field's band push nothing.\n"

@@ -142,12 +142,13 @@ class Verbs(unittest.TestCase):
             # an edge half a millimetre under two sides of the other cube
             poses.write_text("0.0195 0.0195 0.003 1 0 0 0\n", encoding="utf-8")
             depths = []
-            for words in ((), ("--refine",), ("--refine", "--mesh", Path(folder) / "cube.off")):
+            for words in (("--interpolated",), (), ("--refine",), ("--refine", "--mesh", Path(folder) / "cube.off")):
                 done = tenon("contact", baked, baked, "--poses", poses, "--csv", table, *words)
                 self.assertEqual(done.returncode, 0, done.stderr)
                 depths.append(float(table.read_text(encoding="utf-8").splitlines()[1].split(",")[3]))
             self.assertLess(depths[0], 0.0004)
-            for depth in depths[1:]:
+            self.assertAlmostEqual(depths[1], 0.0005, delta=0.00005)
+            for depth in depths[2:]:
                 self.assertAlmostEqual(depth, 0.0005, places=5)
             other = Path(folder) / "other.off"
             other.write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", encoding="utf-8")
