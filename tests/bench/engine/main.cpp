@@ -20,6 +20,7 @@
 #include "tests/bench/engine/overload_table.h"
 #include "tests/bench/engine/query_table.h"
 #include "tests/bench/engine/tick_table.h"
+#include "tests/bench/engine/truth_table.h"
 
 namespace tenon::bench {
 namespace {
@@ -76,11 +77,16 @@ class Bench {
     machine_ = fmt::format("{}, {} threads, load {:.1f} at the start", processor(),
                            sysconf(_SC_NPROCESSORS_ONLN), loadAverage());
     fmt::print("{}; parts at detail {}\n\n", machine_, arguments_.detail);
-    if (wants("bake") || wants("query")) {
+    if (wants("bake") || wants("query") || wants("truth")) {
       const auto scene = makeScene({arguments_.cache / "bench", arguments_.detail}, say);
       if (!scene) return fail(scene.error().what);
       add(scene->bake);
       if (wants("query")) add(queryTable(*scene, arguments_.rounds, say));
+      if (wants("truth")) {
+        const auto truth = truthTable(*scene, arguments_.detail, arguments_.rounds, say);
+        if (!truth) return fail(truth.error().what);
+        add(*truth);
+      }
     }
     if (wants("methods")) add(methodsTable(say));
     if (wants("many_bodies")) add(manyBodiesTable(say));
@@ -134,10 +140,11 @@ int run(int argc, char** argv) {
   app.add_option("--rounds", arguments.rounds, "how often a pose is asked; its least time counts")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  app.add_option(
-         "--only", arguments.only,
-         "tables to make: bake, query, methods, many_bodies, heaps, overload, insertion (default: all)")
-      ->check(CLI::IsMember({"bake", "query", "methods", "many_bodies", "heaps", "overload", "insertion"}));
+  app.add_option("--only", arguments.only,
+                 "tables to make: bake, query, truth, methods, many_bodies, heaps, overload, insertion "
+                 "(default: all)")
+      ->check(CLI::IsMember(
+          {"bake", "query", "truth", "methods", "many_bodies", "heaps", "overload", "insertion"}));
   app.add_option("--json", arguments.json, "write the tables into this file, for programs");
   app.add_option(
       "--figures", arguments.figures,

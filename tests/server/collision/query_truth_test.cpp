@@ -7,6 +7,7 @@
 #include "server/collision/contact_refinement.h"
 #include "server/structures/outer_surface.h"
 #include "tests/server/collision/baked_pair.h"
+#include "tests/support/contact_errors.h"
 #include "tests/support/shared_files.h"
 #include "tests/support/solid_union.h"
 
@@ -15,6 +16,7 @@ namespace {
 
 using test::baked;
 using test::Chance;
+using test::ContactErrors;
 using test::SolidUnion;
 
 /// A body that is asked: its structures, its mesh, and what is true of it.
@@ -43,86 +45,38 @@ struct Asked {
   SurfaceTree surface;
 };
 
-/// What the query says against what is true, over poses in contact.
-struct Errors {
-  std::vector<double> depth;  ///< [m] of points that are inside in truth or by the query
-  std::vector<double> force;  ///< share of the net force
-  std::size_t touching = 0;   ///< points that are inside in truth
-  std::size_t missed = 0;     ///< of these, those that the query does not have inside
-
-  static double at(std::vector<double> values, double share) {
-    std::sort(values.begin(), values.end());
-    return values.empty() ? 1e9
-                          : values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-  }
-  [[nodiscard]] double missedShare() const {
-    return static_cast<double>(missed) / static_cast<double>(std::max<std::size_t>(touching, 1));
-  }
-  [[nodiscard]] std::string text() const {
-    char line[256];
-    std::snprintf(line, sizeof line,
-                  "%zu points inside: depth error median %.5f mm, p99 %.4f mm; %.2f %% missed; net force "
-                  "error median %.2f %%",
-                  touching, 1e3 * at(depth, 0.5), 1e3 * at(depth, 0.99), 100.0 * missedShare(),
-                  100.0 * at(force, 0.5));
-    return line;
-  }
-};
-
-/// Adds what is wrong at one pose X_BA.
-void compare(const HapticStructures& a, const Asked& b, const Pose& X_BA, const PairQueryResult& result,
-             Errors& errors) {
-  const auto points = a.shell.points();
-  std::vector<double> said(points.size(), 1.0);
-  for (const Contact& contact : result.contacts) said[contact.point] = contact.gap;
-  Vector3 force = Vector3::Zero();
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vector3 p_BP = X_BA * points[i].p_MP.cast<double>();
-    if (b.structures->field.lowerBound(p_BP) > 0.003) continue;
-    const auto nearest = b.truth.nearest(p_BP);
-    const bool inside = b.truth.inside(p_BP);
-    if (inside) {
-      ++errors.touching;
-      if (said[i] > 0.0) ++errors.missed;
-      force += static_cast<double>(points[i].area) / 1e-4 * (nearest.p_MQ - p_BP);
-    }
-    if (said[i] > 0.0) continue;
-    errors.depth.push_back(std::abs(said[i] - (inside ? -1.0 : 1.0) * nearest.distance));
-  }
-  if (force.norm() > 0.0) errors.force.push_back((result.push_Ao_W.force - force).norm() / force.norm());
-}
-
 /// A pressed into B at `poses` places, along its axes but for `tilt`.
-Errors errorsOf(const HapticStructures& a, const Asked& b, int poses, double deepest, double tilt,
-                bool refine) {
+ContactErrors errorsOf(const HapticStructures& a, const Asked& b, int poses, double deepest, double tilt,
+                       bool refine) {
   Chance chance(43);
-  Errors errors;
+  ContactErrors errors;
   const auto result = std::make_unique<PairQueryResult>();
   for (int i = 0; i < poses; ++i) {
     const double depth = deepest * (0.55 + 0.45 * chance.number());
     PairQuery query{&a.shell, &b.structures->field, Pose(), Pose()};
     query.X_WA = test::pressedSomewhere(a, *b.structures, depth, tilt, chance);
     query.sum = true;
+    query.straighten = true;
     if (refine) query.margin = 0.25 * b.structures->field.voxel();
     queryPair(query, *result);
     if (result->smallest_gap > 0.0 || result->counts.contacts_dropped > 0) continue;
     if (refine) refineContacts(query, b.surface, RefinementBudget(), *result);
-    compare(a, b, query.X_WA, *result, errors);
+    errors.add(query, *result, b.truth);
   }
   return errors;
 }
 
-void expectTrueWithin(const Errors& errors, double p99) {
+void expectTrueWithin(const ContactErrors& errors, double p99) {
   SCOPED_TRACE(errors.text());
-  EXPECT_GT(errors.touching, 300U);
-  EXPECT_LE(Errors::at(errors.depth, 0.5), 0.01e-3);
-  EXPECT_LE(Errors::at(errors.depth, 0.99), p99);
-  EXPECT_LE(errors.missedShare(), 0.01);
-  EXPECT_LE(Errors::at(errors.force, 0.5), 0.03);
+  EXPECT_GT(errors.touching(), 300U);
+  EXPECT_LE(errors.depth(0.5), 0.01e-3);
+  EXPECT_LE(errors.depth(0.99), p99);
+  EXPECT_LE(errors.missed(), 0.01);
+  EXPECT_LE(errors.force(0.5), 0.03);
 }
 
-void expectFieldIsTrue(const Errors& errors) { expectTrueWithin(errors, 0.5e-3); }
-void expectRefinedIsTrue(const Errors& errors) { expectTrueWithin(errors, 0.02e-3); }
+void expectFieldIsTrue(const ContactErrors& errors) { expectTrueWithin(errors, 0.5e-3); }
+void expectRefinedIsTrue(const ContactErrors& errors) { expectTrueWithin(errors, 0.02e-3); }
 
 constexpr double kFlat = 0.03;  // [rad]
 constexpr double kAnyhow = 1.0;
