@@ -19,11 +19,11 @@ namespace HWY_NAMESPACE {
 
 namespace exact {
 
-/// A distance's slope is one. How far its square is from that.
+/// A distance's slope is one. How much less its square is here.
 HWY_INLINE Double bendOf(const Place3& gradient) {
   const Double squared =
       sum3(hn::Mul(gradient.x, gradient.x), hn::Mul(gradient.y, gradient.y), hn::Mul(gradient.z, gradient.z));
-  return hn::Abs(hn::Sub(squared, all(1.0)));
+  return hn::Sub(all(1.0), squared);
 }
 
 HWY_INLINE Place3 gradientOf(const SampleLanes& samples, std::size_t lane) {
@@ -63,7 +63,7 @@ void planes(const LaneFrame& frame, const ProbeSides& sides, const Vector3& p_BP
     const Double rise =
         sum3(hn::Mul(gradient.x, way.x), hn::Mul(gradient.y, way.y), hn::Mul(gradient.z, way.z));
     // a probe without a sample has no slope
-    const Mask straight = hn::Le(bendOf(gradient), all(kStraight));
+    const Mask straight = hn::Le(hn::Abs(bendOf(gradient)), all(kStraight));
     hn::Store(hn::IfThenElse(straight, hn::Sub(there.distance, rise), all(kNoPlane)), kD,
               out.distance.data() + i);
     hn::Store(gradient.x, kD, out.gradient_x.data() + i);

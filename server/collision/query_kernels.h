@@ -154,8 +154,8 @@ struct QueryKernels {
   /// for nothing.
   void (*pushes)(const LaneFrame& frame, const SampleLanes& samples, const ContactLanes& contacts,
                  const std::uint32_t* points, std::span<const float> areas, PushLanes& out) noexcept;
-  /// Of each block the lanes that are inside the dilated surface, but where the field's slope is not that of
-  /// a distance. Returns how many there are.
+  /// Of each block the lanes that are inside the dilated surface, but where the field's slope is less than a
+  /// distance's. Returns how many there are.
   std::uint32_t (*bent)(const LaneFrame& frame, std::span<const SampleLanes> samples,
                         std::uint32_t* lanes) noexcept;
   /// Of probes about a point; `scale`: of the ways to them.

@@ -13,8 +13,9 @@ namespace tenon {
 /// distance is convex: it is not above its interpolation, and not below any plane that touches it. Such
 /// planes are what the field says a little way off, where it does not bend. So of those on eight sides the
 /// highest that is not above the interpolation is taken, with its slope, if a second side tells of the same
-/// face or the field goes on like it outside. Nothing is done where the field is as straight as a distance
-/// should be, in concave corners and about what is round.
+/// face or the field goes on like it outside, and if the slope is so much less than one that interpolation
+/// may err by that. Nothing is done where the field is as straight as a distance should be, in concave
+/// corners and about what is round.
 ///
 /// Changes samples, sixteen points a block, of lanes inside the dilated surface; distances never rise.
 ///
