@@ -26,11 +26,6 @@ HWY_INLINE Double bendOf(const Place3& gradient) {
   return hn::Sub(all(1.0), squared);
 }
 
-HWY_INLINE Place3 gradientOf(const SampleLanes& samples, std::size_t lane) {
-  return {hn::Load(kD, samples.gradient_x.data() + lane), hn::Load(kD, samples.gradient_y.data() + lane),
-          hn::Load(kD, samples.gradient_z.data() + lane)};
-}
-
 std::uint32_t bent(const LaneFrame& frame, std::span<const SampleLanes> samples,
                    std::uint32_t* lanes) noexcept {
   constexpr double kBent = 0.1;  // less takes as long, and is worth little

@@ -35,9 +35,7 @@ void contacts(const LaneFrame& frame, const PointLanes& points, const SampleLane
     for (std::size_t i = first; i < end; i += hn::Lanes(kD)) {
       const std::size_t lane = i - first;
       const Place3 p_W = moved(frame.p_WA.data(), frame.R_WA.data(), placesOf(points, i));
-      const Place3 gradient{hn::Load(kD, lanes.gradient_x.data() + lane),
-                            hn::Load(kD, lanes.gradient_y.data() + lane),
-                            hn::Load(kD, lanes.gradient_z.data() + lane)};
+      const Place3 gradient = gradientOf(lanes, lane);
       const Double slope = norm(gradient);
       const Double per_slope = hn::Div(all(1.0), slope);
       const Place3 n_W = turned(

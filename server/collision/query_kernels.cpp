@@ -12,11 +12,10 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "server/collision/bend_lanes_inl.h"
 #include "server/collision/contact_lanes_inl.h"
 #include "server/collision/cull_lanes_inl.h"
 #include "server/collision/sample_lanes_inl.h"
-// in doubles too, after them
-#include "server/collision/bend_lanes_inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tenon {

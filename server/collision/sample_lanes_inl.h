@@ -82,6 +82,11 @@ HWY_INLINE Place3 inB(const LaneFrame& frame, const PointLanes& points, std::siz
   return moved(frame.p_BA_B.data(), frame.R_BA.data(), placesOf(points, first));
 }
 
+HWY_INLINE Place3 gradientOf(const SampleLanes& samples, std::size_t lane) {
+  return {hn::Load(kD, samples.gradient_x.data() + lane), hn::Load(kD, samples.gradient_y.data() + lane),
+          hn::Load(kD, samples.gradient_z.data() + lane)};
+}
+
 /// A field with its constants spread over the lanes where that pays.
 struct FieldLanes {
   explicit FieldLanes(const LaneFrame& the_frame)

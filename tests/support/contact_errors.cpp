@@ -22,7 +22,8 @@ void ContactErrors::add(const PairQuery& query, const PairQueryResult& result, c
     const bool inside = truth_B.inside(p_BP);
     if (inside) {
       ++touching_;
-      if (std::min(listed[i], query.field_B->sample(p_BP).distance) > 0.0) ++missed_;
+      const double said = listed[i] == kNotListed ? query.field_B->sample(p_BP).distance : listed[i];
+      if (said > 0.0) ++missed_;
       force_B += static_cast<double>(points[i].area) / kReferenceArea * (nearest.p_MQ - p_BP);
     }
     if (listed[i] <= 0.0) depth_.push_back(std::abs(listed[i] - (inside ? -1.0 : 1.0) * nearest.distance));

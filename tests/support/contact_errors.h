@@ -14,8 +14,8 @@ namespace tenon::test {
 /// Threads: one at a time. Real-time: no; a test tool.
 class ContactErrors {
  public:
-  /// `result` is the answer to `query`, refined or not, without dilation and with the sum. A point that is
-  /// not listed has the field's distance.
+  /// `result` is the answer to `query`, refined or not, without dilation and with the sum. Points that
+  /// the list has no room for have no depth; whether they are missed the field tells.
   void add(const PairQuery& query, const PairQueryResult& result, const SolidUnion& truth_B);
 
   /// Points that are inside in truth, and the share of them that the query has outside.
