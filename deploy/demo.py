@@ -108,8 +108,8 @@ def play(args, out, cast):
     observer = cast.start("observer", "--session", "demo", "--domain", args.domain, show=True)
     watching = threading.Thread(target=echo, args=(observer, open(out / "observer.log", "w", encoding="utf-8")), daemon=True)
     watching.start()
-    stubborn = ["--stubborn", 2] if scenario.name == "engine_bay" else []
-    cast.start("trainee", "--device", "hug-sim", "--seed", args.seed, *stubborn, *cast.common())
+    misplaced = ["--misplace-mount", 2] if scenario.name == "engine_bay" else []
+    cast.start("trainee", "--device", "hug-sim", "--seed", args.seed, *misplaced, *cast.common())
     if not args.no_instructor:
         cast.start("instructor", "--device", args.device, "--seed", args.seed, *cast.common())
 

@@ -10,11 +10,11 @@
 #include "devices/simulated/simulated_device.h"
 #include "devices/simulated/vibrotac.h"
 
-namespace tenon {
+namespace tenon::devices {
 namespace {
 
 using OpenedDevice = Result<std::unique_ptr<HapticDevice>>;
-using OpenedPair = Result<std::unique_ptr<DevicePair>>;
+using OpenedBimanual = Result<std::unique_ptr<BimanualDevice>>;
 
 template <SimulatedModel (*kModel)()>
 OpenedDevice openSimulated(std::uint64_t seed) {
@@ -25,27 +25,27 @@ OpenedDevice openSimulated(std::uint64_t seed) {
 
 OpenedDevice openVibrotac(std::uint64_t /*seed*/) { return std::make_unique<Vibrotac>(); }
 
-OpenedPair openHug(std::uint64_t seed) {
+OpenedBimanual openHug(std::uint64_t seed) {
   auto hug = std::make_unique<Hug>(seed);
   if (auto opened = hug->open(); !opened) return fail(opened.error().what);
   return hug;
 }
 
 template <typename Opened>
-struct Entry {
+struct CatalogEntry {
   std::string_view name;
   Opened (*open)(std::uint64_t seed);
 };
 
 constexpr std::array kDevices{
-    Entry<OpenedDevice>{"sigma7-sim", openSimulated<sigma7Model>},
-    Entry<OpenedDevice>{"omega3-sim", openSimulated<omega3Model>},
-    Entry<OpenedDevice>{"falcon-sim", openSimulated<falconModel>},
-    Entry<OpenedDevice>{"vibrotac-sim", openVibrotac},
+    CatalogEntry<OpenedDevice>{"sigma7-sim", openSimulated<sigma7Model>},
+    CatalogEntry<OpenedDevice>{"omega3-sim", openSimulated<omega3Model>},
+    CatalogEntry<OpenedDevice>{"falcon-sim", openSimulated<falconModel>},
+    CatalogEntry<OpenedDevice>{"vibrotac-sim", openVibrotac},
 };
 
-constexpr std::array kPairs{
-    Entry<OpenedPair>{"hug-sim", openHug},
+constexpr std::array kBimanualDevices{
+    CatalogEntry<OpenedBimanual>{"hug-sim", openHug},
 };
 
 template <typename Table>
@@ -73,19 +73,20 @@ std::string listOf(const Table& table) {
 
 OpenedDevice openDevice(std::string_view name, std::uint64_t seed) {
   if (const auto* entry = findIn(kDevices, name)) return entry->open(seed);
-  if (findIn(kPairs, name))
-    return fail("device '" + std::string(name) +
-                "' has two arms and wants a station with two hands; with one hand: " + listOf(kDevices));
-  return fail("no device is called '" + std::string(name) + "'; there are: " + listOf(kDevices) +
-              "; with two arms: " + listOf(kPairs));
+  if (findIn(kBimanualDevices, name))
+    return fail(
+        "device '" + std::string(name) +
+        "' is bimanual and needs a station with two hands; devices for one hand: " + listOf(kDevices));
+  return fail("unknown device '" + std::string(name) + "'; known devices: " + listOf(kDevices) +
+              "; bimanual: " + listOf(kBimanualDevices));
 }
 
-OpenedPair openPair(std::string_view name, std::uint64_t seed) {
-  if (const auto* entry = findIn(kPairs, name)) return entry->open(seed);
-  return fail("no device with two arms is called '" + std::string(name) + "'; there are: " + listOf(kPairs));
+OpenedBimanual openBimanualDevice(std::string_view name, std::uint64_t seed) {
+  if (const auto* entry = findIn(kBimanualDevices, name)) return entry->open(seed);
+  return fail("unknown bimanual device '" + std::string(name) + "'; known: " + listOf(kBimanualDevices));
 }
 
 std::vector<std::string_view> deviceNames() { return namesIn(kDevices); }
-std::vector<std::string_view> pairNames() { return namesIn(kPairs); }
+std::vector<std::string_view> bimanualDeviceNames() { return namesIn(kBimanualDevices); }
 
-}  // namespace tenon
+}  // namespace tenon::devices

@@ -7,18 +7,20 @@
 
 #include "devices/device.h"
 
-namespace tenon {
+namespace tenon::devices {
 
-/// Every device Tenon can open, by name; adding one is a line in catalog.cpp.
-/// `seed` makes a simulated specimen; a real device ignores it.
+/// Opens a device of the catalog by name; a new device is one line in catalog.cpp. An unknown name fails with
+/// a message that lists the known ones. `seed` varies the parameters of a simulated device; a real device
+/// ignores it.
 ///
 /// Threads: any. Real-time: no.
 [[nodiscard]] Result<std::unique_ptr<HapticDevice>> openDevice(std::string_view name, std::uint64_t seed = 1);
-/// A machine with an arm for each hand.
-[[nodiscard]] Result<std::unique_ptr<DevicePair>> openPair(std::string_view name, std::uint64_t seed = 1);
+/// Likewise, for a bimanual haptic device.
+[[nodiscard]] Result<std::unique_ptr<BimanualDevice>> openBimanualDevice(std::string_view name,
+                                                                         std::uint64_t seed = 1);
 
-/// For --help and for tests that visit them all.
+/// All names of the catalog.
 [[nodiscard]] std::vector<std::string_view> deviceNames();
-[[nodiscard]] std::vector<std::string_view> pairNames();
+[[nodiscard]] std::vector<std::string_view> bimanualDeviceNames();
 
-}  // namespace tenon
+}  // namespace tenon::devices

@@ -9,42 +9,43 @@
 #include "idl/types/result.h"
 #include "idl/types/spatial.h"
 
-namespace tenon {
+namespace tenon::devices {
 
-/// What a device can do. Numbers with their source and certainty stand where each device fills them in.
-/// A zero limit means: the device has no such thing.
+/// Capabilities and limits of a device. Where a device sets them it states each number's source and
+/// certainty: [paper], [published] by the vendor or in the literature, [measured] or [assumed]. 0 for a limit
+/// means that the device lacks the feature.
 struct DeviceCaps {
   std::string model;
-  std::uint32_t dof_mask = 0;     ///< sensed and driven axes: kAllDofs, kTranslationDofs
-  double workspace_radius = 0.0;  ///< [m] about the device's centre
-  double indexing_radius = 0.0;   ///< r_w of paper eq. 1
-  double indexing_gain = 0.0;     ///< lambda_w [1/s]
-  double continuous_force = 0.0;  ///< [N] it can hold for ever
-  double peak_force = 0.0;        ///< [N] its motors can do for a moment
-  double command_limit = 0.0;     ///< [N] never asked for more than this, whatever the motors could do
-  double thermal_time = 0.0;      ///< [s] of the motors' warming, between continuous and peak
-  double torque = 0.0;            ///< [Nm]
-  double force_slew = 500.0;      ///< [N/s] at which a force may grow
-  double torque_slew = 10.0;      ///< [Nm/s]
-  double max_stiffness = 0.0;     ///< [N/m] it can render
-  double max_rotational_stiffness = 0.0;     ///< [Nm/rad]
-  double physical_damping = 0.0;             ///< [Ns/m] of its own, for K < 2b/T
-  double physical_rotational_damping = 0.0;  ///< [Nms/rad]
-  double injected_damping = 0.0;             ///< [Ns/m] at most, that its velocity signal allows to add
-  double injected_rotational_damping = 0.0;  ///< [Nms/rad]
-  double delay = 0.0;           ///< [s] from a command to the force, on top of the hold of one period
-  double max_speed = 1.0;       ///< [m/s] beyond this the safety layer brakes
-  double rate = 1000.0;         ///< [Hz]
-  double force_quantum = 0.0;   ///< [N] of one motor word; the word saturates at +-4096
+  std::uint32_t dof_mask = 0;             ///< sensed and actuated axes: kAllDofs, kTranslationDofs
+  double workspace_radius = 0.0;          ///< [m] about the device's centre
+  double indexing_radius = 0.0;           ///< [m] r_w of paper eq. 1
+  double indexing_gain = 0.0;             ///< [1/s] lambda_w of paper eq. 1
+  double continuous_force = 0.0;          ///< [N] without a time limit
+  double peak_force = 0.0;                ///< [N] for a short time, see thermal_time
+  double command_limit = 0.0;             ///< [N] largest commanded force, even if the motors could do more
+  double thermal_time = 0.0;              ///< [s] time constant of motor heating
+  double torque = 0.0;                    ///< [Nm] largest
+  double force_slew = 500.0;              ///< [N/s] largest rate at which a force grows
+  double torque_slew = 10.0;              ///< [Nm/s] likewise
+  double max_stiffness = 0.0;             ///< [N/m] renderable
+  double max_rotational_stiffness = 0.0;  ///< [Nm/rad] likewise
+  double physical_damping = 0.0;          ///< [Ns/m] of the mechanics: b in the passivity condition K < 2b/T
+  double physical_rotational_damping = 0.0;  ///< [Nms/rad] likewise
+  double injected_damping = 0.0;  ///< [Ns/m] largest virtual damping that its velocity signal allows
+  double injected_rotational_damping = 0.0;  ///< [Nms/rad] likewise
+  double delay = 0.0;           ///< [s] from a command to the force, in addition to the hold of one period
+  double max_speed = 1.0;       ///< [m/s] above it the safety layer brakes
+  double rate = 1000.0;         ///< [Hz] of the servo loop
+  double force_quantum = 0.0;   ///< [N] of one motor count; a motor command saturates at +-4096 counts
   double clutch_force = 0.0;    ///< [N] at which its magnetic clutch opens
-  double clutch_warning = 0.0;  ///< [N]
-  std::uint32_t tactors = 0;
+  double clutch_warning = 0.0;  ///< [N] at which the safety layer warns of the clutch
+  std::uint32_t tactors = 0;    ///< number of vibration motors
 };
 
 enum class DeviceFault : std::uint8_t {
   kNone,
-  kNotANumber,
-  kStale,
+  kNonFinite,  ///< a commanded force was NaN or infinite
+  kStale,      ///< watchdog: no write for too long
   kVelocity,
   kForce,
   kWorkspace,
@@ -53,29 +54,29 @@ enum class DeviceFault : std::uint8_t {
   kCommunication,
 };
 
-/// What a device says, in its own frame D (origin at the middle of its workspace, axes as the user faces it:
-/// x right, y away, z up).
+/// One reading of a device, in its frame D: origin at the centre of the workspace; x right, y away from the
+/// user, z up.
 struct DeviceState {
-  std::uint64_t seq = 0;
+  std::uint64_t seq = 0;  ///< number of the reading
   Pose X_DH;
   Twist V_DH;
-  std::uint32_t buttons = 0;
-  Wrench F_Ho_D_measured;  ///< by a force sensor at the grip, on the hand; zero without one
+  std::uint32_t buttons = 0;  ///< bit i: button i is pressed
+  Wrench F_Ho_D_measured;     ///< on the hand, by a force sensor at the grip; zero without one
   bool forces_on = false;
   DeviceFault fault = DeviceFault::kNone;
 };
 
+/// Output of one servo cycle.
 struct DeviceCommand {
   Wrench F_Ho_D;  ///< to display on the hand
   bool brake = false;
-  std::array<std::uint8_t, 6> tactors{};
+  std::array<std::uint8_t, 6> tactors{};  ///< vibration intensities, 0 to 255
 };
 
-/// A haptic device of any make. One file pair each; knows neither network nor simulation.
+/// Interface of a haptic device; independent of network and simulation.
 ///
-/// Opened, it reads but does not push; armed, it pushes; a fault takes the forces off and stays until an
-/// operator resets it. A command is held until the next one, but not for ever: a device whose servo stops
-/// writing takes its forces off by itself.
+/// States: open (reads, no forces), armed (forces on), fault (forces off until an operator resets it). A
+/// command is held until the next one; a watchdog of the device turns the forces off when writes stop.
 ///
 /// Threads: read and write from one servo thread, one cycle being read, then write. Real-time: read, write,
 /// disarm.
@@ -83,46 +84,50 @@ class HapticDevice {
  public:
   virtual ~HapticDevice() = default;
   [[nodiscard]] virtual const DeviceCaps& caps() const = 0;
-  [[nodiscard]] virtual Result<void> arm() = 0;  ///< forces on
-  virtual void disarm() noexcept = 0;  ///< forces off; always possible; a brake stays on until armed
-  [[nodiscard]] virtual Result<void> resetFault() = 0;  ///< by the operator, after looking
+  /// Forces on. Fails in a fault or when the device is not open; arming an armed device does nothing.
+  [[nodiscard]] virtual Result<void> arm() = 0;
+  /// Forces off, in any state; an engaged brake stays on until the device is armed.
+  virtual void disarm() noexcept = 0;
+  /// From fault to open. Called on behalf of an operator who has inspected the device.
+  [[nodiscard]] virtual Result<void> resetFault() = 0;
   virtual void read(DeviceState& state) noexcept = 0;
+  /// Ignored unless armed.
   virtual void write(const DeviceCommand& command) noexcept = 0;
 };
 
-/// Two arms of one machine, one for each hand; what stops one may stop both.
+/// Bimanual haptic device: one arm for each hand. A fault of one arm may stop both.
 ///
 /// Threads: both arms from one servo thread. Real-time: as HapticDevice.
-class DevicePair {
+class BimanualDevice {
  public:
-  virtual ~DevicePair() = default;
+  virtual ~BimanualDevice() = default;
   [[nodiscard]] virtual HapticDevice& right() = 0;
   [[nodiscard]] virtual HapticDevice& left() = 0;
 };
 
-/// As a clause of a message to the operator.
+/// Text for a message to the operator.
 [[nodiscard]] constexpr const char* toString(DeviceFault fault) noexcept {
   switch (fault) {
     case DeviceFault::kNone:
       return "none";
-    case DeviceFault::kNotANumber:
-      return "a force that is not a number";
+    case DeviceFault::kNonFinite:
+      return "non-finite force command";
     case DeviceFault::kStale:
-      return "its servo stopped writing";
+      return "command timeout";
     case DeviceFault::kVelocity:
-      return "too fast";
+      return "overspeed";
     case DeviceFault::kForce:
-      return "too much force";
+      return "force limit exceeded";
     case DeviceFault::kWorkspace:
-      return "outside its workspace";
+      return "workspace limit exceeded";
     case DeviceFault::kClutchOpen:
       return "clutch open";
     case DeviceFault::kEmergencyStop:
       return "emergency stop";
     case DeviceFault::kCommunication:
-      return "no answer";
+      return "communication lost";
   }
   return "unknown";
 }
 
-}  // namespace tenon
+}  // namespace tenon::devices

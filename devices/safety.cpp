@@ -2,19 +2,19 @@
 
 #include "idl/types/messages.h"
 
-namespace tenon {
+namespace tenon::devices {
 namespace {
 
-constexpr double kReleaseShare = 0.5;         ///< of the speed limit, below which the brake lets go
-constexpr std::uint64_t kQuietTicks = 500;    ///< a rule that rested as long has ended
-constexpr std::uint64_t kTellEvery = 10'000;  ///< [ticks] of a rule that is part of every day's work
+constexpr double kBrakeReleaseFraction = 0.5;      ///< [-] of the speed limit: the brake is released below
+constexpr std::uint64_t kEndAfterTicks = 500;      ///< [ticks] without activity end an intervention
+constexpr std::uint64_t kReportInterval = 10'000;  ///< [ticks] between reports of a routine rule
 
-/// Works in every session, without anything being wrong.
+/// Rules that act in normal operation, without a defect.
 constexpr bool isRoutine(SafetyRule rule) noexcept {
   constexpr std::uint32_t kRoutine =
-      bit(SafetyRule::kAged) | bit(SafetyRule::kStiffnessLowered) | bit(SafetyRule::kSoftStart) |
-      bit(SafetyRule::kSlewed) | bit(SafetyRule::kPassivity) | bit(SafetyRule::kWorkspaceWall) |
-      bit(SafetyRule::kForceLimited) | bit(SafetyRule::kWordClamped) | bit(SafetyRule::kClutchWarning);
+      bit(SafetyRule::kAgeFading) | bit(SafetyRule::kStiffnessLimited) | bit(SafetyRule::kSoftStart) |
+      bit(SafetyRule::kSlewLimited) | bit(SafetyRule::kPassivity) | bit(SafetyRule::kWorkspaceWall) |
+      bit(SafetyRule::kForceLimited) | bit(SafetyRule::kMotorSaturated) | bit(SafetyRule::kClutchWarning);
   return (bit(rule) & kRoutine) != 0;
 }
 
@@ -26,120 +26,124 @@ Safety::Safety(const DeviceCaps& caps, ClutchLatch* clutch) noexcept
 DeviceCommand Safety::step(const SafetyRequest& request, const DeviceState& state, double dt) noexcept {
   ++tick_;
   flags_ = 0;
-  watchPort(state, dt);
+  observePort(state, dt);
 
   DeviceCommand command;
-  command.brake = mustBrake(request, state) || request.wanted.brake;
-  const bool push = mayPush(request, state) && !command.brake;
-  if (push) {
-    command.F_Ho_D = bounded(steadied(started(fit(request), dt), state, dt), dt);
-    command.tactors = request.wanted.tactors;
+  command.brake = evaluateStops(request, state) || request.requested.brake;
+  const bool forces_on = forcesPermitted(request, state) && !command.brake;
+  if (forces_on) {
+    command.F_Ho_D =
+        limitOutput(addDampingAndWall(applySoftStartAndSlew(prepareRequest(request), dt), state, dt), dt);
+    command.tactors = request.requested.tactors;
   } else {
     since_start_ = 0.0;
-    grown_ = {};
-    heat_.warm(0.0, dt, limits_);
+    slewed_ = {};
+    heat_.update(0.0, dt, limits_);
   }
-  shown_ = command.F_Ho_D;
-  tell(request.wanted.F_Ho_D.force.norm());
+  output_ = command.F_Ho_D;
+  updateEpisodes(request.requested.F_Ho_D.force.norm());
   return command;
 }
 
-void Safety::raise(SafetyRule rule, bool acts) noexcept {
+void Safety::setFlag(SafetyRule rule, bool acts) noexcept {
   if (acts) flags_ |= bit(rule);
 }
 
-void Safety::watchPort(const DeviceState& state, double dt) noexcept {
+void Safety::observePort(const DeviceState& state, double dt) noexcept {
   if (!state.X_DH.isFinite()) return;
-  if (seen_) passivity_.observe(shown_, displacement(X_DH_last_, state.X_DH), dt, limits_);
+  if (has_last_pose_) passivity_.observe(output_, displacement(X_DH_last_, state.X_DH), dt, limits_);
   X_DH_last_ = state.X_DH;
-  seen_ = true;
+  has_last_pose_ = true;
 }
 
-bool Safety::mustBrake(const SafetyRequest& request, const DeviceState& state) noexcept {
+bool Safety::evaluateStops(const SafetyRequest& request, const DeviceState& state) noexcept {
   // emergency stop
   stopped_ = stopped_ || request.emergency_stop || state.fault == DeviceFault::kEmergencyStop;
-  raise(SafetyRule::kEmergencyStop, stopped_);
+  setFlag(SafetyRule::kEmergencyStop, stopped_);
 
-  // clutch: written so that a measured force that is no number opens it
+  // clutch: the order of comparisons makes a NaN measurement open it
   if (limits_.clutch_force > 0.0) {
     const double force = state.F_Ho_D_measured.force.norm();
-    if (!(force <= limits_.clutch_force) || state.fault == DeviceFault::kClutchOpen) clutch_released_ = true;
-    raise(SafetyRule::kClutchWarning, !(force <= limits_.clutch_warning));
+    if (!(force <= limits_.clutch_force) || state.fault == DeviceFault::kClutchOpen) clutch_tripped_ = true;
+    setFlag(SafetyRule::kClutchWarning, !(force <= limits_.clutch_warning));
     if (clutch_) {
-      clutch_->open = clutch_->open || clutch_released_;
-      clutch_released_ = false;
+      clutch_->open = clutch_->open || clutch_tripped_;
+      clutch_tripped_ = false;
     }
   }
-  const bool open = clutch_released_ || (clutch_ && clutch_->open);
-  raise(SafetyRule::kClutchOpen, open);
+  const bool open = clutch_tripped_ || (clutch_ && clutch_->open);
+  setFlag(SafetyRule::kClutchOpen, open);
 
-  // velocity, with a gap between braking and letting go; one that is no number brakes
+  // speed limit with hysteresis; NaN brakes
   const double speed = state.V_DH.linear.norm();
-  braking_ = !(speed <= (braking_ ? kReleaseShare : 1.0) * limits_.max_speed);
-  raise(SafetyRule::kOverspeed, braking_);
+  braking_ = !(speed <= (braking_ ? kBrakeReleaseFraction : 1.0) * limits_.max_speed);
+  setFlag(SafetyRule::kOverspeed, braking_);
   return stopped_ || open || braking_;
 }
 
-bool Safety::mayPush(const SafetyRequest& request, const DeviceState& state) noexcept {
-  raise(SafetyRule::kDeadMan, !request.dead_man);
+bool Safety::forcesPermitted(const SafetyRequest& request, const DeviceState& state) noexcept {
+  setFlag(SafetyRule::kDeadMan, !request.dead_man_held);
   const bool off = !state.forces_on || state.fault != DeviceFault::kNone || !state.X_DH.isFinite();
-  raise(SafetyRule::kForcesOff, off);
-  raise(SafetyRule::kStale, !(request.age < limits_.stale_at));
-  return request.dead_man && !off;
+  setFlag(SafetyRule::kForcesOff, off);
+  setFlag(SafetyRule::kStale, !(request.age < limits_.stale_at));
+  return request.dead_man_held && !off;
 }
 
-Wrench Safety::fit(const SafetyRequest& request) noexcept {
-  Wrench wanted = request.wanted.F_Ho_D;
-  if (!isFinite(wanted)) {
-    raise(SafetyRule::kNotFinite, true);
+Wrench Safety::prepareRequest(const SafetyRequest& request) noexcept {
+  Wrench wrench = request.requested.F_Ho_D;
+  if (!isFinite(wrench)) {
+    setFlag(SafetyRule::kNonFinite, true);
     return {};
   }
   if (limits_.dof_mask != kAllDofs) {
     for (int axis = 0; axis < 3; ++axis) {
-      if ((limits_.dof_mask >> axis & 1U) == 0) wanted.force[axis] = 0.0;
-      if ((limits_.dof_mask >> (axis + 3) & 1U) == 0) wanted.torque[axis] = 0.0;
+      if ((limits_.dof_mask >> axis & 1U) == 0) wrench.force[axis] = 0.0;
+      if ((limits_.dof_mask >> (axis + 3) & 1U) == 0) wrench.torque[axis] = 0.0;
     }
   }
-  const double fresh = ageFactor(request.age, limits_);
-  raise(SafetyRule::kAged, fresh < 1.0);
-  const double soft = stiffnessFactor(request.stiffness, limits_.stiffness);
-  const double soft_turning = stiffnessFactor(request.rotational_stiffness, limits_.rotational_stiffness);
-  raise(SafetyRule::kStiffnessLowered, soft < 1.0 || (soft_turning < 1.0 && limits_.torque > 0.0));
-  return {wanted.force * (fresh * soft), wanted.torque * (fresh * soft_turning)};
+  const double age_factor = ageFactor(request.age, limits_);
+  setFlag(SafetyRule::kAgeFading, age_factor < 1.0);
+  const double stiffness_factor = stiffnessFactor(request.stiffness, limits_.stiffness);
+  const double rotational_factor =
+      stiffnessFactor(request.rotational_stiffness, limits_.rotational_stiffness);
+  setFlag(SafetyRule::kStiffnessLimited,
+          stiffness_factor < 1.0 || (rotational_factor < 1.0 && limits_.torque > 0.0));
+  return {wrench.force * (age_factor * stiffness_factor), wrench.torque * (age_factor * rotational_factor)};
 }
 
-Wrench Safety::started(const Wrench& wanted, double dt) noexcept {
+Wrench Safety::applySoftStartAndSlew(const Wrench& wrench, double dt) noexcept {
   since_start_ += dt;
   const double start = softStartFactor(since_start_, limits_);
-  raise(SafetyRule::kSoftStart, start < 1.0);
-  const Wrench begun = wanted * start;
-  grown_ = {slewed(grown_.force, begun.force, limits_.force_slew * dt),
-            slewed(grown_.torque, begun.torque, limits_.torque_slew * dt)};
-  raise(SafetyRule::kSlewed, grown_.force != begun.force || grown_.torque != begun.torque);
-  return grown_;
+  setFlag(SafetyRule::kSoftStart, start < 1.0);
+  const Wrench ramped = wrench * start;
+  slewed_ = {slewLimited(slewed_.force, ramped.force, limits_.force_slew * dt),
+             slewLimited(slewed_.torque, ramped.torque, limits_.torque_slew * dt)};
+  setFlag(SafetyRule::kSlewLimited, slewed_.force != ramped.force || slewed_.torque != ramped.torque);
+  return slewed_;
 }
 
-Wrench Safety::steadied(const Wrench& wanted, const DeviceState& state, double dt) noexcept {
+Wrench Safety::addDampingAndWall(const Wrench& wrench, const DeviceState& state, double dt) noexcept {
   const Wrench damping = passivity_.damping(state.V_DH, dt, limits_);
-  raise(SafetyRule::kPassivity, !damping.force.isZero(0.0) || !damping.torque.isZero(0.0));
+  setFlag(SafetyRule::kPassivity, !damping.force.isZero(0.0) || !damping.torque.isZero(0.0));
   const Vector3 wall = wallForce(state.X_DH.translation(), limits_);
-  raise(SafetyRule::kWorkspaceWall, !wall.isZero(0.0));
-  return wanted + damping + Wrench{wall, Vector3::Zero()};
+  setFlag(SafetyRule::kWorkspaceWall, !wall.isZero(0.0));
+  return wrench + damping + Wrench{wall, Vector3::Zero()};
 }
 
-Wrench Safety::bounded(const Wrench& wanted, double dt) noexcept {
-  const double warm_limit = heat_.forceLimit(limits_);
-  const double force = wanted.force.norm();
-  raise(SafetyRule::kForceLimited, force > limits_.peak_force || wanted.torque.norm() > limits_.torque);
-  raise(SafetyRule::kThermal, force > warm_limit && warm_limit < limits_.peak_force);
-  Wrench shown{limited(wanted.force, warm_limit), limited(wanted.torque, limits_.torque)};
+Wrench Safety::limitOutput(const Wrench& wrench, double dt) noexcept {
+  const double thermal_limit = heat_.forceLimit(limits_);
+  const double force = wrench.force.norm();
+  setFlag(SafetyRule::kForceLimited, force > limits_.peak_force || wrench.torque.norm() > limits_.torque);
+  setFlag(SafetyRule::kThermal, force > thermal_limit && thermal_limit < limits_.peak_force);
+  Wrench limited{limitNorm(wrench.force, thermal_limit), limitNorm(wrench.torque, limits_.torque)};
   if (limits_.force_quantum > 0.0) {
-    const Vector3 words = inWords(shown.force, limits_.force_quantum);
-    raise(SafetyRule::kWordClamped, (shown.force - words).cwiseAbs().maxCoeff() > limits_.force_quantum);
-    shown.force = words;
+    const Vector3 quantized = quantizeForce(limited.force, limits_.force_quantum);
+    setFlag(SafetyRule::kMotorSaturated,
+            (limited.force - quantized).cwiseAbs().maxCoeff() > limits_.force_quantum);
+    limited.force = quantized;
   }
-  heat_.warm(shown.force.norm(), dt, limits_);
-  return shown;
+  heat_.update(limited.force.norm(), dt, limits_);
+  return limited;
 }
 
 bool Safety::wantsDisarm() const noexcept {
@@ -149,58 +153,60 @@ bool Safety::wantsDisarm() const noexcept {
 
 void Safety::reset() noexcept {
   stopped_ = false;
-  clutch_released_ = false;
+  clutch_tripped_ = false;
   if (clutch_) clutch_->open = false;
   braking_ = false;
   since_start_ = 0.0;
-  grown_ = {};
-  passivity_.forget();
+  slewed_ = {};
+  passivity_.reset();
 }
 
-void Safety::tell(double wanted_force) noexcept {
+void Safety::updateEpisodes(double requested_force) noexcept {
   for (int i = 0; i < kSafetyRules; ++i) {
     const auto rule = static_cast<SafetyRule>(1U << static_cast<unsigned>(i));
     Episode& episode = episodes_[static_cast<std::size_t>(i)];
     if (acts(rule)) {
-      if (!episode.open) begin(episode, rule, wanted_force);
-      ++episode.acted;
+      if (!episode.open) openEpisode(episode, rule, requested_force);
+      ++episode.active_ticks;
       episode.last = tick_;
-    } else if (episode.open && tick_ - episode.last > kQuietTicks) {
+    } else if (episode.open && tick_ - episode.last > kEndAfterTicks) {
       episode.open = false;
-      if (episode.told) push({.tick = episode.last, .rule = rule, .began = false, .acted = episode.acted});
+      if (episode.reported)
+        queue({.tick = episode.last, .rule = rule, .began = false, .active_ticks = episode.active_ticks});
     }
   }
 }
 
-void Safety::begin(Episode& episode, SafetyRule rule, double wanted_force) noexcept {
+void Safety::openEpisode(Episode& episode, SafetyRule rule, double requested_force) noexcept {
   episode.open = true;
-  episode.acted = 0;
-  episode.told = !isRoutine(rule) || episode.told_at == 0 || tick_ - episode.told_at >= kTellEvery;
-  if (!episode.told) {
-    ++episode.untold;
+  episode.active_ticks = 0;
+  episode.reported =
+      !isRoutine(rule) || episode.reported_at == 0 || tick_ - episode.reported_at >= kReportInterval;
+  if (!episode.reported) {
+    ++episode.unreported;
     return;
   }
-  push({.tick = tick_,
-        .rule = rule,
-        .before = wanted_force,
-        .after = shown_.force.norm(),
-        .untold = episode.untold});
-  episode.untold = 0;
-  episode.told_at = tick_;
+  queue({.tick = tick_,
+         .rule = rule,
+         .requested_force = requested_force,
+         .output_force = output_.force.norm(),
+         .unreported = episode.unreported});
+  episode.unreported = 0;
+  episode.reported_at = tick_;
 }
 
-void Safety::push(const Intervention& intervention) noexcept {
-  if (told_ - taken_ == kRing) {
+void Safety::queue(const Intervention& intervention) noexcept {
+  if (queued_ - taken_ == kRing) {
     ++taken_;
     ++lost_;
   }
-  ring_[told_++ % kRing] = intervention;
+  ring_[queued_++ % kRing] = intervention;
 }
 
-bool Safety::next(Intervention& intervention) noexcept {
-  if (taken_ == told_) return false;
+bool Safety::takeIntervention(Intervention& intervention) noexcept {
+  if (taken_ == queued_) return false;
   intervention = ring_[taken_++ % kRing];
   return true;
 }
 
-}  // namespace tenon
+}  // namespace tenon::devices

@@ -6,83 +6,93 @@
 #include "devices/device.h"
 #include "devices/safety_rules.h"
 
-namespace tenon {
+namespace tenon::devices {
 
-/// The clutch as the safety layers of both arms of one machine see it: what one latches holds for the other.
+/// Latch of an open clutch, shared by the safety layers of both arms of a bimanual device: either arm stops
+/// both.
 ///
 /// Threads: one servo thread. Real-time: yes.
 struct ClutchLatch {
   bool open = false;
 };
 
-/// What a force source wants of a device for the next period.
+/// Input of the safety layer for one period.
 struct SafetyRequest {
-  DeviceCommand wanted;
-  double age = 0.0;        ///< [s] since the source last computed that force from something it heard
-  double stiffness = 0.0;  ///< [N/m] the force was made with; 0 when it is no spring
-  double rotational_stiffness = 0.0;  ///< [Nm/rad]
-  bool dead_man = true;               ///< somebody holds on
-  bool emergency_stop = false;
+  DeviceCommand requested;
+  double age = 0.0;        ///< [s] of the data from which the force was computed
+  double stiffness = 0.0;  ///< [N/m] of the spring that made the force; 0: the force is not a spring's
+  double rotational_stiffness = 0.0;  ///< [Nm/rad] likewise
+  bool dead_man_held = true;
+  bool emergency_stop = false;  ///< engages the latched stop
 };
 
-/// That a rule began to act, or that it has come to rest, for the event log.
+/// Begin or end of a rule's intervention, for the event log.
 struct Intervention {
-  std::uint64_t tick = 0;  ///< of this layer, from 1
+  std::uint64_t tick = 0;  ///< step of this layer, from 1
   SafetyRule rule = SafetyRule::kForcesOff;
   bool began = true;
-  double before = 0.0;       ///< [N] wanted, at its beginning
-  double after = 0.0;        ///< [N] shown
-  std::uint64_t acted = 0;   ///< [ticks] of an intervention that ended
-  std::uint32_t untold = 0;  ///< earlier interventions of this rule that nobody was told of
+  double requested_force = 0.0;    ///< [N] norm at the begin; 0 at an end
+  double output_force = 0.0;       ///< [N] likewise
+  std::uint64_t active_ticks = 0;  ///< [ticks] in which the rule acted; set at an end
+  std::uint32_t unreported = 0;    ///< interventions of this rule since the last reported one
 };
 
-/// Stands between any force source and any device: what leaves here may be felt by a person.
+/// Safety layer between any force source and a device: every force displayed on a person passes through it.
 ///
-/// The rules run in a fixed order, and everything that may add force (damping, the wall) stands before the
-/// limits. Fading and falling are always allowed at once; growing is not. Clutch and emergency stop are
-/// latched until reset(), which is for an operator who has looked; the others end with their cause and start
-/// softly again. It reads no clock: a tick is `dt`, so each rule is testable in virtual time.
+/// The rules run in a fixed order; those that may add force (damping, workspace wall) run before the limits.
+/// A force may fall at once and grow only at the slew rate. Clutch and emergency stop are latched until
+/// reset(), which an operator triggers after an inspection; the other rules end with their cause, and those
+/// that removed the force are followed by a soft start. Time is counted in steps of `dt`; no clock is read.
 ///
 /// Threads: the device's servo thread. Real-time: everything but the constructor.
 class Safety {
  public:
-  /// `clutch` is shared by the arms of one machine and outlives them; null for a device of its own.
+  /// `clutch` is shared by the arms of a bimanual device and outlives them; null for a single device.
   explicit Safety(const DeviceCaps& caps, ClutchLatch* clutch = nullptr) noexcept;
 
-  /// Between read and write of each cycle: what may be written.
+  /// Command that may be written to the device; called between its read and its write, every `dt` [s].
   [[nodiscard]] DeviceCommand step(const SafetyRequest& request, const DeviceState& state,
                                    double dt) noexcept;
 
-  /// The rules that acted in the last step, as bits of SafetyRule.
+  /// Rules that acted in the last step, as bits of SafetyRule.
   [[nodiscard]] std::uint32_t flags() const noexcept { return flags_; }
   [[nodiscard]] bool acts(SafetyRule rule) const noexcept { return (flags_ & bit(rule)) != 0; }
-  /// The force is stale or a stop is latched: the caller disarms the device.
+  /// The request is stale or a stop is latched: the caller disarms the device.
   [[nodiscard]] bool wantsDisarm() const noexcept;
-  /// By the operator, after the resetFault() of all arms of the machine: an arm still in fault would latch
-  /// again.
+  /// Releases the latches. Called for the operator after resetFault() of all arms, because an arm still in
+  /// fault latches again.
   void reset() noexcept;
 
-  /// Oldest first; false when there is none. A rule that flickers with rests of less than half a second is
-  /// one intervention. Of rules that are part of every day's work one is told in ten seconds, with the number
-  /// of those in between.
-  [[nodiscard]] bool next(Intervention& intervention) noexcept;
-  /// Interventions overwritten before anybody took them.
+  /// Takes the oldest intervention; false when there is none. Activity with pauses of up to 0.5 s is one
+  /// intervention. Rules that act in normal operation are reported at most once in 10 s; `unreported` counts
+  /// the others.
+  [[nodiscard]] bool takeIntervention(Intervention& intervention) noexcept;
+  /// Interventions overwritten before they were taken.
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
 
   [[nodiscard]] const SafetyLimits& limits() const noexcept { return limits_; }
-  /// [J] at the port between device and hand; in debt when negative.
+  /// [J] energy balance of the port: taken from the hand minus delivered to it.
   [[nodiscard]] double energy() const noexcept { return passivity_.energy(); }
 
  private:
-  void raise(SafetyRule rule, bool acts) noexcept;
-  void watchPort(const DeviceState& state, double dt) noexcept;
-  [[nodiscard]] bool mustBrake(const SafetyRequest& request, const DeviceState& state) noexcept;
-  [[nodiscard]] bool mayPush(const SafetyRequest& request, const DeviceState& state) noexcept;
-  [[nodiscard]] Wrench fit(const SafetyRequest& request) noexcept;
-  [[nodiscard]] Wrench started(const Wrench& wanted, double dt) noexcept;
-  [[nodiscard]] Wrench steadied(const Wrench& wanted, const DeviceState& state, double dt) noexcept;
-  [[nodiscard]] Wrench bounded(const Wrench& wanted, double dt) noexcept;
-  void tell(double wanted_force) noexcept;
+  void setFlag(SafetyRule rule, bool acts) noexcept;
+  // ---- stages of step(), in this order
+  /// Energy balance over `dt` [s].
+  void observePort(const DeviceState& state, double dt) noexcept;
+  /// Emergency stop, clutch and speed; true: brake.
+  [[nodiscard]] bool evaluateStops(const SafetyRequest& request, const DeviceState& state) noexcept;
+  /// Dead-man switch and state of the device.
+  [[nodiscard]] bool forcesPermitted(const SafetyRequest& request, const DeviceState& state) noexcept;
+  /// Non-finite values, axes the device lacks, age and stiffness.
+  [[nodiscard]] Wrench prepareRequest(const SafetyRequest& request) noexcept;
+  /// `dt` [s].
+  [[nodiscard]] Wrench applySoftStartAndSlew(const Wrench& wrench, double dt) noexcept;
+  /// `dt` [s].
+  [[nodiscard]] Wrench addDampingAndWall(const Wrench& wrench, const DeviceState& state, double dt) noexcept;
+  /// Command, thermal and motor limits; `dt` [s].
+  [[nodiscard]] Wrench limitOutput(const Wrench& wrench, double dt) noexcept;
+  /// `requested_force` [N].
+  void updateEpisodes(double requested_force) noexcept;
 
   static constexpr std::size_t kRing = 64;
 
@@ -90,34 +100,36 @@ class Safety {
   ClutchLatch* clutch_;
   std::uint64_t tick_ = 0;
   std::uint32_t flags_ = 0;
-  bool stopped_ = false;          ///< emergency stop, latched
-  bool clutch_released_ = false;  ///< latched here when nobody shares the clutch
+  bool stopped_ = false;         ///< emergency stop, latched
+  bool clutch_tripped_ = false;  ///< the latch when no other arm shares the clutch
   bool braking_ = false;
-  double since_start_ = 0.0;  ///< [s] of pushing
-  Wrench grown_;              ///< the last force after the slew limit
-  Wrench shown_;              ///< the last force that left here
+  double since_start_ = 0.0;  ///< [s] since the forces came on
+  Wrench slewed_;             ///< last output of the slew limit
+  Wrench output_;             ///< last commanded wrench
   Pose X_DH_last_;
-  bool seen_ = false;
-  MotorHeat heat_;
+  bool has_last_pose_ = false;
+  MotorThermalModel heat_;
   PassivityObserver passivity_;
 
-  /// A rule from its first act to its rest.
+  /// Activity of a rule, from its begin until it has paused for 0.5 s.
   struct Episode {
-    std::uint64_t last = 0;     ///< [tick] it acted
-    std::uint64_t acted = 0;    ///< [ticks]
-    std::uint64_t told_at = 0;  ///< [tick] the last beginning that was told; 0: none yet
-    std::uint32_t untold = 0;
+    std::uint64_t last = 0;          ///< [tick] in which it acted last
+    std::uint64_t active_ticks = 0;  ///< [ticks]
+    std::uint64_t reported_at = 0;   ///< [tick] of the last reported begin; 0: none yet
+    std::uint32_t unreported = 0;    ///< begins since then
     bool open = false;
-    bool told = false;
+    bool reported = false;  ///< this one's begin was reported
   };
-  void begin(Episode& episode, SafetyRule rule, double wanted_force) noexcept;
-  void push(const Intervention& intervention) noexcept;
+  /// `requested_force` [N].
+  void openEpisode(Episode& episode, SafetyRule rule, double requested_force) noexcept;
+  /// Overwrites the oldest when the ring is full.
+  void queue(const Intervention& intervention) noexcept;
 
   std::array<Episode, kSafetyRules> episodes_{};  ///< by bit
   std::array<Intervention, kRing> ring_{};
-  std::uint64_t told_ = 0;
-  std::uint64_t taken_ = 0;
+  std::uint64_t queued_ = 0;  ///< interventions written to the ring
+  std::uint64_t taken_ = 0;   ///< interventions read from it or overwritten
   std::uint64_t lost_ = 0;
 };
 
-}  // namespace tenon
+}  // namespace tenon::devices

@@ -5,25 +5,25 @@
 #include "devices/device.h"
 #include "idl/types/spatial.h"
 
-namespace tenon {
+namespace tenon::devices {
 
-/// A bit for each rule of the safety layer.
+/// Rules of the safety layer, one bit each.
 enum class SafetyRule : std::uint32_t {
-  kNotFinite = 1U << 0U,         ///< a wanted force is no number: none is shown
-  kAged = 1U << 1U,              ///< the wanted force is old and fades
-  kStale = 1U << 2U,             ///< too old: the device is to be disarmed
-  kStiffnessLowered = 1U << 3U,  ///< stiffer than the device can show passively
-  kSoftStart = 1U << 4U,         ///< just armed, or just released by another rule
-  kSlewed = 1U << 5U,            ///< growth of the force limited
-  kPassivity = 1U << 6U,         ///< damping added: the port gave more energy than it took
-  kWorkspaceWall = 1U << 7U,     ///< the end of the workspace pushes back
-  kForceLimited = 1U << 8U,      ///< over the command limit of force or torque
-  kThermal = 1U << 9U,           ///< motors warm: less than peak force
-  kWordClamped = 1U << 10U,      ///< more than a motor word can say
-  kOverspeed = 1U << 11U,        ///< too fast: brake
-  kClutchWarning = 1U << 12U,    ///< measured force near what opens the clutch
+  kNonFinite = 1U << 0U,         ///< a requested force is NaN or infinite: zero force instead
+  kAgeFading = 1U << 1U,         ///< the force fades because its request is old
+  kStale = 1U << 2U,             ///< the request is too old: the device is to be disarmed
+  kStiffnessLimited = 1U << 3U,  ///< the force is scaled to the stiffness the device renders passively
+  kSoftStart = 1U << 4U,         ///< ramp after arming or after a stop
+  kSlewLimited = 1U << 5U,       ///< force or torque grows at its largest rate
+  kPassivity = 1U << 6U,         ///< damping is injected: the port has delivered more energy than it took
+  kWorkspaceWall = 1U << 7U,     ///< a spring at the end of the workspace pushes back
+  kForceLimited = 1U << 8U,      ///< force or torque above its command limit
+  kThermal = 1U << 9U,           ///< motors warm: limit between continuous and peak force
+  kMotorSaturated = 1U << 10U,   ///< above the range of a motor command
+  kOverspeed = 1U << 11U,        ///< hand speed above the limit: brake
+  kClutchWarning = 1U << 12U,    ///< measured force near the clutch's opening force
   kClutchOpen = 1U << 13U,       ///< both arms stopped; latched
-  kDeadMan = 1U << 14U,          ///< nobody holds on: no force
+  kDeadMan = 1U << 14U,          ///< dead-man switch released: no force
   kEmergencyStop = 1U << 15U,    ///< latched
   kForcesOff = 1U << 16U,        ///< the device is not armed or in fault
 };
@@ -31,79 +31,97 @@ enum class SafetyRule : std::uint32_t {
 inline constexpr int kSafetyRules = 17;
 
 [[nodiscard]] constexpr std::uint32_t bit(SafetyRule rule) { return static_cast<std::uint32_t>(rule); }
-/// For people and logs.
+/// Text for messages and logs.
 [[nodiscard]] const char* toString(SafetyRule rule) noexcept;
 
-/// What the rules allow at one device. The numbers that belong to the make come from its DeviceCaps; the
-/// others are the house's own and [assumed].
+/// Limits that the safety layer applies to one device. Values of the make come from its DeviceCaps; the
+/// others are constants of the safety layer [assumed].
 struct SafetyLimits {
   std::uint32_t dof_mask = 0;
-  double continuous_force = 0.0, peak_force = 0.0, torque = 0.0;  ///< peak: never above the command limit
-  double thermal_time = 0.0;
-  double force_slew = 0.0, torque_slew = 0.0;
-  double stiffness = 0.0, rotational_stiffness = 0.0;  ///< passive at the device's rate, delay and damping
-  double injected_damping = 0.0, injected_rotational_damping = 0.0;
-  double max_speed = 0.0;
-  double wall_radius = 0.0, wall_stiffness = 0.0;
-  double clutch_force = 0.0, clutch_warning = 0.0;
-  double force_quantum = 0.0;
-  double energy_capacity = 0.0;  ///< [J] at most remembered as taken from the hand and free to give back
-  double active_power = 0.0;     ///< [W] a scene in which others push may give to the hand on top
+  double continuous_force = 0.0;             ///< [N]
+  double peak_force = 0.0;                   ///< [N] not above the command limit
+  double torque = 0.0;                       ///< [Nm]
+  double thermal_time = 0.0;                 ///< [s] time constant; 0: no thermal limit
+  double force_slew = 0.0;                   ///< [N/s]
+  double torque_slew = 0.0;                  ///< [Nm/s]
+  double stiffness = 0.0;                    ///< [N/m] passive at the device's rate, delay and damping
+  double rotational_stiffness = 0.0;         ///< [Nm/rad] likewise
+  double injected_damping = 0.0;             ///< [Ns/m]
+  double injected_rotational_damping = 0.0;  ///< [Nms/rad]
+  double max_speed = 0.0;                    ///< [m/s]
+  double wall_radius = 0.0;                  ///< [m] about the device's centre
+  double wall_stiffness = 0.0;               ///< [N/m]
+  double clutch_force = 0.0;                 ///< [N] 0: no clutch
+  double clutch_warning = 0.0;               ///< [N]
+  double force_quantum = 0.0;                ///< [N] of one motor count; 0: not quantised
+  double energy_capacity = 0.0;  ///< [J] bound of the energy balance: the most that may be returned later
+  double active_power = 0.0;     ///< [W] that the device may deliver without having taken it before
 
-  double fade_from = 0.010, stale_at = 0.030;  ///< [s]; a vendor's watchdog ends at 31.9 ms [published]
-  double soft_start = 0.5;                     ///< [s]
+  double fade_from = 0.010;  ///< [s] age of a request at which its force begins to fade
+  double stale_at = 0.030;   ///< [s] age at which it is 0; vendors' watchdogs end at 31.9 ms [published]
+  double soft_start = 0.5;   ///< [s] duration of the ramp
 };
 
 [[nodiscard]] SafetyLimits safetyLimits(const DeviceCaps& caps) noexcept;
 
-// ---- the rules: pure functions of one tick. All are real-time and may be called from any thread.
+// ---- the rules: pure functions of one tick. Threads: any. Real-time: all.
 
 [[nodiscard]] bool isFinite(const Wrench& wrench) noexcept;
-/// Of the wanted force: 1 while fresh, 0 from `stale_at` on.
+/// Factor [-] for the force of a request of `age` [s]: 1 up to `fade_from`, linearly to 0 at `stale_at`; 0
+/// for NaN.
 [[nodiscard]] double ageFactor(double age, const SafetyLimits& limits) noexcept;
-/// Of a force made with stiffness K where only `limit` is passive: the same as making it with `limit`.
+/// Factor [-] that turns the force of a spring of stiffness `K` [N/m, Nm/rad] into that of `limit` [N/m,
+/// Nm/rad] if K is above it; 0 for NaN.
 [[nodiscard]] double stiffnessFactor(double K, double limit) noexcept;
+/// Factor [-] of the ramp, `since_start` [s] after the forces came on.
 [[nodiscard]] double softStartFactor(double since_start, const SafetyLimits& limits) noexcept;
-/// From `shown` towards `wanted`: what is to fall falls at once, what is to grow grows by at most `step`.
-[[nodiscard]] Vector3 slewed(const Vector3& shown, const Vector3& wanted, double step) noexcept;
-/// [N] of the wall at the end of the workspace, inwards.
+/// Next output on the way from `output` to `target`: a decrease or a change of direction acts at once, the
+/// component along `target` grows by at most `step` [N or Nm].
+[[nodiscard]] Vector3 slewLimited(const Vector3& output, const Vector3& target, double step) noexcept;
+/// [N] inward force of the spring outside `wall_radius`; zero inside.
 [[nodiscard]] Vector3 wallForce(const Vector3& p_DH, const SafetyLimits& limits) noexcept;
-/// Shortened to `limit`, never turned.
-[[nodiscard]] Vector3 limited(const Vector3& v, double limit) noexcept;
-/// Rounded towards zero to whole motor words of +-4096.
-[[nodiscard]] Vector3 inWords(const Vector3& force, double quantum) noexcept;
+/// `v` scaled to a norm of at most `limit` [unit of v].
+[[nodiscard]] Vector3 limitNorm(const Vector3& v, double limit) noexcept;
+/// Per axis rounded towards zero to whole motor counts of `quantum` [N] and saturated at +-4096 counts.
+[[nodiscard]] Vector3 quantizeForce(const Vector3& force, double quantum) noexcept;
 
-/// The warmth of the motors as a share of what they bear for ever: a first-order lag of (F / F_continuous)^2.
-/// Real-time: everything.
-class MotorHeat {
+/// Motor temperature as a fraction of the steady temperature at continuous force: first-order lag of
+/// (F / F_continuous)^2.
+///
+/// Threads: one. Real-time: everything.
+class MotorThermalModel {
  public:
-  void warm(double force, double dt, const SafetyLimits& limits) noexcept;
-  /// Peak while cool, sinking to continuous as the heat nears 1: a limit that never jumps.
+  /// The motors produce `force` [N] for `dt` [s].
+  void update(double force, double dt, const SafetyLimits& limits) noexcept;
+  /// [N] peak force while cool, falling linearly to continuous force between 0.8 and 1: without steps.
   [[nodiscard]] double forceLimit(const SafetyLimits& limits) const noexcept;
 
  private:
-  double heat_ = 0.0;
+  double heat_ = 0.0;  ///< [-] 1: steady temperature at continuous force
 };
 
-/// Counts the energy that crosses between device and hand, and damps when more came out than went in
-/// (time-domain passivity, Hannaford and Ryu 2002).
+/// Time-domain passivity observer and controller at the port between device and hand (Hannaford and Ryu
+/// 2002).
 ///
-/// Two departures from the book, because a shared scene is active: others push. What is remembered as taken
-/// is bounded, so that an hour of friction does not pay for a burst; and a small power may flow out for ever.
-/// Real-time: everything.
+/// Two departures from the paper, because other people's forces make the shared scene active: the stored
+/// energy is bounded, so that dissipation by long friction cannot later pay for a burst; and a small power
+/// may be delivered at any time.
+///
+/// Threads: one. Real-time: everything.
 class PassivityObserver {
  public:
-  /// The hand moved by `motion` while `shown` pushed it.
-  void observe(const Wrench& shown, const Displacement& motion, double dt,
+  /// The hand moved by `motion` within `dt` [s] while the device applied `output`.
+  void observe(const Wrench& output, const Displacement& motion, double dt,
                const SafetyLimits& limits) noexcept;
-  /// The damping wrench that pays the debt back within a tick, or as much of it as may be injected.
+  /// Damping wrench, in D, that dissipates a negative balance within `dt` [s], limited to the damping that
+  /// may be injected.
   [[nodiscard]] Wrench damping(const Twist& V_DH, double dt, const SafetyLimits& limits) const noexcept;
-  /// [J] taken from the hand less given to it; in debt when negative.
+  /// [J] energy balance: taken from the hand minus delivered to it.
   [[nodiscard]] double energy() const noexcept { return energy_; }
-  void forget() noexcept { energy_ = 0.0; }
+  void reset() noexcept { energy_ = 0.0; }
 
  private:
-  double energy_ = 0.0;
+  double energy_ = 0.0;  ///< [J]
 };
 
-}  // namespace tenon
+}  // namespace tenon::devices

@@ -125,7 +125,7 @@ def self_test():
         "server/collision/a.cpp": ['#include "server/simulation/environment.h"', "#include <mutex>", "#include <dds/dds.h>"],
         "devices/b.h": ['#include "clients/haptic/coupling.h"'],
         "server/simulation/c.cpp": ["#include <assimp/scene.h>", '#include "force_buffer.h"', "#include <BulletDynamics/a.h>"],
-        "clients/report/d.cpp": ['#include "server/session/exercise.h"'],
+        "clients/report/d.cpp": ['#include "server/session/session_simulation.h"'],
     }
     good = {"server/simulation/e.cpp": ['#include "server/collision/pair_query.h"', "#include <vector>", "#include <Eigen/Core>"]}
     with tempfile.TemporaryDirectory() as folder:

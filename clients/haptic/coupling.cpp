@@ -2,11 +2,11 @@
 
 #include <algorithm>
 
-namespace tenon {
+namespace tenon::haptic {
 
 namespace {
-// The stretch's rate is the difference of two encoder readings; 5 ms tame their steps and stay well below the
-// 30 ms in which a hand and a wall settle.
+// Time constant of the low-pass filter of the stretch rate. It smooths encoder quantisation and is well below
+// the 30 ms in which a hand settles at a wall.
 constexpr double kRateFilter = 0.005;  // [s]
 
 Vector3 masked(const Vector3& v, std::uint32_t axes) {
@@ -15,7 +15,7 @@ Vector3 masked(const Vector3& v, std::uint32_t axes) {
 }  // namespace
 
 Wrench Coupling::step(const LocalProxy& proxy, const Pose& X_WH, double dt) noexcept {
-  if (proxy.jumped) {
+  if (proxy.discontinuous) {
     fading_ = displayed_;
     fade_left_ = options_.fade_ticks;
     has_stretch_ = false;
@@ -34,15 +34,17 @@ Wrench Coupling::step(const LocalProxy& proxy, const Pose& X_WH, double dt) noex
 
   stiffness_ = std::min(proxy.stiffness, options_.max_stiffness);
   rotational_stiffness_ = std::min(proxy.rotational_stiffness, options_.max_rotational_stiffness);
-  // a manifold too old to push is too old to damp
-  const double share = proxy.stiffness > 0.0 ? std::min(1.0, proxy.stiffness / options_.max_stiffness) : 0.0;
+  // damping fades with the stiffness of an old manifold
+  const double damping_factor =
+      proxy.stiffness > 0.0 ? std::min(1.0, proxy.stiffness / options_.max_stiffness) : 0.0;
   Wrench wrench;
-  wrench.force = stiffness_ * stretch_.translation + share * options_.damping * stretch_rate_.translation;
+  wrench.force =
+      stiffness_ * stretch_.translation + damping_factor * options_.damping * stretch_rate_.translation;
   wrench.torque = rotational_stiffness_ * stretch_.rotation +
-                  share * options_.rotational_damping * stretch_rate_.rotation;
+                  damping_factor * options_.rotational_damping * stretch_rate_.rotation;
   if (fade_left_ > 0) {
-    const double old_share = static_cast<double>(fade_left_) / static_cast<double>(options_.fade_ticks + 1);
-    wrench = wrench * (1.0 - old_share) + fading_ * old_share;
+    const double fade_out = static_cast<double>(fade_left_) / static_cast<double>(options_.fade_ticks + 1);
+    wrench = wrench * (1.0 - fade_out) + fading_ * fade_out;
     --fade_left_;
   }
   wrench.force = masked(wrench.force, options_.dof_mask);
@@ -60,4 +62,4 @@ void Coupling::reset() noexcept {
   has_stretch_ = false;
 }
 
-}  // namespace tenon
+}  // namespace tenon::haptic

@@ -4,27 +4,27 @@
 
 #include "devices/safety_rules.h"
 
-namespace tenon {
+namespace tenon::haptic {
 
 namespace {
-// Of the device's own damping, that a virtual damper adds on top of the spring: Colgate and Schenkel's
-// condition b > K T / 2 + |B| leaves this much when K is capped by the safety layer's limit.
-constexpr double kDampingShare = 0.2;
-// What the server calls contact (its own rounding included).
-constexpr float kTouchGap = 5e-5F;  // [m]
+// Virtual damping B as a fraction of the device's physical damping b. Passivity needs b > K T / 2 + |B|
+// (Colgate and Schenkel), where the safety layer limits K.
+constexpr double kDampingFraction = 0.2;  // [-]
+// Gap at which the server reports contact, rounding included.
+constexpr float kContactGap = 5e-5F;  // [m]
 
-CouplingOptions couplingOf(const DeviceCaps& caps) {
-  const SafetyLimits limits = safetyLimits(caps);
+CouplingOptions couplingOf(const devices::DeviceCaps& caps) {
+  const devices::SafetyLimits limits = devices::safetyLimits(caps);
   CouplingOptions options;
   options.max_stiffness = std::min(caps.max_stiffness, limits.stiffness);
   options.max_rotational_stiffness = std::min(caps.max_rotational_stiffness, limits.rotational_stiffness);
-  options.damping = kDampingShare * caps.physical_damping;
-  options.rotational_damping = kDampingShare * caps.physical_rotational_damping;
+  options.damping = kDampingFraction * caps.physical_damping;
+  options.rotational_damping = kDampingFraction * caps.physical_rotational_damping;
   options.dof_mask = caps.dof_mask;
   return options;
 }
 
-WorkspaceOptions workspaceOf(const DeviceCaps& caps) {
+WorkspaceOptions workspaceOf(const devices::DeviceCaps& caps) {
   WorkspaceOptions options;
   options.radius = caps.indexing_radius;
   options.gain = caps.indexing_gain;
@@ -33,11 +33,11 @@ WorkspaceOptions workspaceOf(const DeviceCaps& caps) {
 
 bool serverSeesContact(const HandManifold& manifold) {
   return std::any_of(manifold.contacts.begin(), manifold.contacts.end(),
-                     [](const ManifoldContact& contact) { return contact.gap <= kTouchGap; });
+                     [](const ManifoldContact& contact) { return contact.gap <= kContactGap; });
 }
 }  // namespace
 
-HapticHand::HapticHand(HapticDevice& device, ClutchLatch* clutch)
+HapticHand::HapticHand(devices::HapticDevice& device, devices::ClutchLatch* clutch)
     : device_(device),
       workspace_(workspaceOf(device.caps())),
       coupling_(couplingOf(device.caps())),
@@ -46,7 +46,7 @@ HapticHand::HapticHand(HapticDevice& device, ClutchLatch* clutch)
 Result<void> HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH) {
   if (auto armed = device_.arm(); !armed) return armed;
   device_.read(device_state_);
-  workspace_.place(p_WH - device_state_.X_DH.translation());
+  workspace_.setCentre(p_WH - device_state_.X_DH.translation());
   input_ = {};
   input_.hand = hand;
   input_.client = client;
@@ -60,13 +60,13 @@ Result<void> HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH
   return {};
 }
 
-void HapticHand::stop(bool engaged) noexcept {
+void HapticHand::setEmergencyStop(bool engaged) noexcept {
   stopped_ = engaged;
   if (engaged) return;
   safety_.reset();
   coupling_.reset();
-  // a device in fault stays as it is: its operator has to look at it first
-  if (device_state_.fault == DeviceFault::kNone) static_cast<void>(device_.arm());
+  // a device in fault needs resetFault() by its operator first
+  if (device_state_.fault == devices::DeviceFault::kNone) static_cast<void>(device_.arm());
 }
 
 void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noexcept {
@@ -76,31 +76,31 @@ void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noex
   const Twist V_WH{device_state_.V_DH.linear + workspace_.velocity(), device_state_.V_DH.angular};
 
   const LocalProxy& proxy = local_.step(X_WH, world);
-  in_contact_ = proxy.touching || (local_.heard() && serverSeesContact(local_.manifold()));
+  in_contact_ = proxy.touching || (local_.hasManifold() && serverSeesContact(local_.manifold()));
 
-  SafetyRequest request;
-  request.wanted.F_Ho_D = coupling_.step(proxy, X_WH, dt);
+  devices::SafetyRequest request;
+  request.requested.F_Ho_D = coupling_.step(proxy, X_WH, dt);
   request.stiffness = coupling_.stiffness();
   request.rotational_stiffness = coupling_.rotationalStiffness();
   request.emergency_stop = stopped_;
-  const DeviceCommand command = safety_.step(request, device_state_, dt);
+  const devices::DeviceCommand command = safety_.step(request, device_state_, dt);
   if (safety_.wantsDisarm()) {
     device_.disarm();
   } else {
     device_.write(command);
   }
   state_.F_Ho_W = command.F_Ho_D;
-  sendOn(seq, world, V_WH);
-  notice();
+  updateOutputs(seq, world, V_WH);
+  updateEvents();
 }
 
-void HapticHand::sendOn(std::uint32_t seq, const WorldView& world, const Twist& V_WH) noexcept {
+void HapticHand::updateOutputs(std::uint32_t seq, const WorldView& world, const Twist& V_WH) noexcept {
   for (std::size_t i = input_.samples.size() - 1; i > 0; --i) input_.samples[i] = input_.samples[i - 1];
   const LocalProxy& proxy = local_.proxy();
   input_.samples[0] = {seq, workspace_.toWorld(device_state_.X_DH), V_WH, device_state_.buttons};
   input_.server_epoch = world.serverEpoch();
   input_.heard_tick = world.tick();
-  input_.active = !stopped_ && !safety_.wantsDisarm() && device_state_.fault == DeviceFault::kNone;
+  input_.active = !stopped_ && !safety_.wantsDisarm() && device_state_.fault == devices::DeviceFault::kNone;
   input_.p_WC = workspace_.centre();
 
   state_.seq = seq;
@@ -111,25 +111,25 @@ void HapticHand::sendOn(std::uint32_t seq, const WorldView& world, const Twist& 
   state_.safety_flags = safety_.flags();
 }
 
-void HapticHand::notice() noexcept {
-  news_ = {};
-  // those for which there is no room now are told in the next millisecond
-  Intervention intervention;
-  while (!news_.interventions.full() && safety_.next(intervention))
-    news_.interventions.push_back(intervention);
-  const bool fault = device_state_.fault != DeviceFault::kNone;
-  news_.fault_began = fault && !fault_before_;
-  fault_before_ = fault;
-  news_.indexing_began = workspace_.moving() && !state_.indexing;
-  news_.indexing_ended = !workspace_.moving() && state_.indexing;
+void HapticHand::updateEvents() noexcept {
+  events_ = {};
+  // interventions beyond the capacity follow in the next step
+  devices::Intervention intervention;
+  while (!events_.interventions.full() && safety_.takeIntervention(intervention))
+    events_.interventions.push_back(intervention);
+  const bool fault = device_state_.fault != devices::DeviceFault::kNone;
+  events_.fault_began = fault && !fault_;
+  fault_ = fault;
+  events_.indexing_began = workspace_.moving() && !state_.indexing;
+  events_.indexing_ended = !workspace_.moving() && state_.indexing;
   state_.indexing = workspace_.moving();
-  const bool beyond = local_.beyondValidity() != beyond_before_;
-  beyond_before_ = local_.beyondValidity();
-  news_.beyond_validity_began = beyond && !beyond_;
-  beyond_ = beyond;
-  const bool stale = local_.heard() && local_.proxy().age > local_.limits().fresh;
-  news_.stale_began = stale && !stale_;
+  const bool beyond = local_.beyondValidity() != beyond_count_;
+  beyond_count_ = local_.beyondValidity();
+  events_.beyond_validity_began = beyond && !beyond_validity_;
+  beyond_validity_ = beyond;
+  const bool stale = local_.hasManifold() && local_.proxy().age > local_.limits().fade_start;
+  events_.stale_began = stale && !stale_;
   stale_ = stale;
 }
 
-}  // namespace tenon
+}  // namespace tenon::haptic

@@ -10,11 +10,11 @@
 #include "idl/types/fixed_vector.h"
 #include "idl/types/messages.h"
 
-namespace tenon {
+namespace tenon::haptic {
 
-/// What changed for a hand in one millisecond that somebody should be told.
-struct HandNews {
-  FixedVector<Intervention, 8> interventions;  ///< of the safety layer
+/// State changes of a hand within one millisecond, for the event log.
+struct HandEvents {
+  FixedVector<devices::Intervention, 8> interventions;  ///< begins and ends of safety rules
   bool fault_began = false;
   bool indexing_began = false;
   bool indexing_ended = false;
@@ -22,57 +22,60 @@ struct HandNews {
   bool beyond_validity_began = false;
 };
 
-/// One hand's kilohertz: device in, local model, coupling, safety, device out; and what the server and the
-/// others are told of it.
+/// Haptic loop of one hand at 1 kHz: read device, indexing, local model, virtual coupling, safety layer,
+/// write device. Also composes the messages to the server (input) and to the other participants (state).
 ///
-/// Every force goes through the device's safety layer (devices/safety.h), whose slew limit lets a force grow
-/// slowly and fall at once.
+/// Every force passes the safety layer (devices/safety.h).
 ///
 /// Threads: one. Real-time: step, receive.
 class HapticHand {
  public:
-  /// Numbers of workspace and coupling come from the device. `device` outlives the hand.
-  /// `clutch` is shared by the arms of one machine; null for a device of its own.
-  explicit HapticHand(HapticDevice& device, ClutchLatch* clutch = nullptr);
+  /// Parameters of workspace and coupling come from the device's capabilities. `device` and `clutch` outlive
+  /// the hand; `clutch` is shared by the arms of a bimanual device, null for a single device.
+  explicit HapticHand(devices::HapticDevice& device, devices::ClutchLatch* clutch = nullptr);
 
-  /// Forces on, and the workspace so that the hand is at p_WH now.
+  /// Arms the device and places the workspace so that the hand is at p_WH now. Fails when the device cannot
+  /// be armed.
   Result<void> begin(HandId hand, ClientId client, const Vector3& p_WH);
   void receive(const HandManifold& manifold) noexcept { local_.receive(manifold); }
+  /// One cycle of `dt` [s]; `seq` numbers the input.
   void step(std::uint32_t seq, const WorldView& world, double dt) noexcept;
-  /// Emergency stop: forces off and the object stays, latched until an operator releases it.
-  void stop(bool engaged) noexcept;
+  /// Engaged: forces off, brake on, input inactive. Released: resets the safety layer and arms the device
+  /// unless it is in fault.
+  void setEmergencyStop(bool engaged) noexcept;
+  /// Forces off.
   void end() noexcept { device_.disarm(); }
 
   [[nodiscard]] HandId id() const noexcept { return input_.hand; }
   [[nodiscard]] const DeviceInput& input() const noexcept { return input_; }
   [[nodiscard]] const HandState& state() const noexcept { return state_; }
-  [[nodiscard]] const HandNews& news() const noexcept { return news_; }
-  [[nodiscard]] const DeviceState& device() const noexcept { return device_state_; }
-  [[nodiscard]] const DeviceCaps& caps() const noexcept { return device_.caps(); }
+  [[nodiscard]] const HandEvents& events() const noexcept { return events_; }
+  [[nodiscard]] const devices::DeviceState& device() const noexcept { return device_state_; }
+  [[nodiscard]] const devices::DeviceCaps& caps() const noexcept { return device_.caps(); }
   [[nodiscard]] Workspace& workspace() noexcept { return workspace_; }
   [[nodiscard]] const LocalModel& local() const noexcept { return local_; }
   [[nodiscard]] const Pose& pose() const noexcept { return input_.samples[0].X_WH; }
   [[nodiscard]] bool inContact() const noexcept { return in_contact_; }
 
  private:
-  void sendOn(std::uint32_t seq, const WorldView& world, const Twist& V_WH) noexcept;
-  void notice() noexcept;
+  void updateOutputs(std::uint32_t seq, const WorldView& world, const Twist& V_WH) noexcept;
+  void updateEvents() noexcept;
 
-  HapticDevice& device_;
+  devices::HapticDevice& device_;
   Workspace workspace_;
   LocalModel local_;
   Coupling coupling_;
-  Safety safety_;
-  DeviceState device_state_;
+  devices::Safety safety_;
+  devices::DeviceState device_state_;
   DeviceInput input_;
   HandState state_;
-  HandNews news_;
-  std::uint64_t beyond_before_ = 0;
-  bool fault_before_ = false;
-  bool beyond_ = false;
+  HandEvents events_;
+  std::uint64_t beyond_count_ = 0;  // of LocalModel::beyondValidity() at the last step
+  bool fault_ = false;
+  bool beyond_validity_ = false;
   bool stale_ = false;
   bool in_contact_ = false;
   bool stopped_ = false;
 };
 
-}  // namespace tenon
+}  // namespace tenon::haptic

@@ -4,138 +4,141 @@
 #include <array>
 #include <span>
 
-namespace tenon {
+namespace tenon::haptic {
 
 namespace {
-// A row that pushes less than this only touches by rounding.
-constexpr double kTouchForce = 1e-9;  // [N]
+// A smaller multiplier is rounding: the constraint is not active.
+constexpr double kMinMultiplier = 1e-9;  // [N]
 
-// Another hand's pull is gone so many ticks after it let go.
-constexpr double kFadeTicks = 20.0;
+// Fade-out of another hand's spring after it has released the object.
+constexpr double kFadeTicks = 20.0;  // [ticks]
 }  // namespace
 
 LocalModel::LocalModel(const StalenessLimits& limits) : limits_(limits), solver_(1, kManifoldContacts) {}
 
 void LocalModel::receive(const HandManifold& manifold) noexcept {
   if (!manifold.X_WO.isFinite() || !manifold.X_HO.isFinite()) return;
-  if (heard_) {
+  if (has_manifold_) {
     if (manifold.server_epoch < manifold_.server_epoch) return;
     if (manifold.server_epoch == manifold_.server_epoch && manifold.tick < manifold_.tick) return;
   }
-  const bool same = heard_ && manifold.server_epoch == manifold_.server_epoch &&
+  const bool same = has_manifold_ && manifold.server_epoch == manifold_.server_epoch &&
                     manifold.object == manifold_.object && manifold.object_epoch == manifold_.object_epoch;
   if (!same) new_object_ = true;
   manifold_ = manifold;
-  receivePulls(same);
+  updateOtherSprings(same);
   proxy_.age = 0;
-  heard_ = true;
+  has_manifold_ = true;
 }
 
 const LocalProxy& LocalModel::step(const Pose& X_WH, const WorldView& world) noexcept {
   const bool was_active = proxy_.active;
-  proxy_.jumped = false;
-  proxy_.active = heard_ && manifold_.object.valid() && !manifold_.frozen && !outdated(world);
+  proxy_.discontinuous = false;
+  proxy_.active = has_manifold_ && manifold_.object.valid() && !manifold_.frozen && !outdated(world);
   if (!proxy_.active) {
-    proxy_.jumped = was_active;
+    proxy_.discontinuous = was_active;
     proxy_.touching = false;
     proxy_.stiffness = proxy_.rotational_stiffness = 0.0;
     proxy_.X_WS = X_WH;
-    proxy_.X_WO = heard_ ? X_WH * manifold_.X_HO : X_WH;
+    proxy_.X_WO = has_manifold_ ? X_WH * manifold_.X_HO : X_WH;
     ++proxy_.age;
     return proxy_;
   }
   if (new_object_ || !was_active) {
-    // the server's proxy is the only one that fits the new planes
-    proxy_.jumped = was_active;
+    // the new planes fit the server's proxy only
+    proxy_.discontinuous = was_active;
     proxy_.X_WO = manifold_.X_WO;
     new_object_ = false;
   }
-  const double freshness_now = freshness();
-  proxy_.stiffness = manifold_.stiffness * freshness_now;
-  proxy_.rotational_stiffness = manifold_.rotational_stiffness * freshness_now;
+  const double age_factor = ageFactor();
+  proxy_.stiffness = manifold_.stiffness * age_factor;
+  proxy_.rotational_stiffness = manifold_.rotational_stiffness * age_factor;
   solve(X_WH, world);
-  fadePulls();
+  fadeOtherSprings();
   proxy_.X_WS = proxy_.X_WO * manifold_.X_HO.inverse();
-  countValidity();
+  updateValidityCount();
   ++proxy_.age;
   return proxy_;
 }
 
-void LocalModel::receivePulls(bool same_object) noexcept {
-  if (!same_object) pulls_.clear();
-  for (OtherPull& known : pulls_) known.listed = false;
+void LocalModel::updateOtherSprings(bool same_object) noexcept {
+  if (!same_object) other_springs_.clear();
+  for (OtherHandSpring& known : other_springs_) known.listed = false;
   for (const HandPull& pull : manifold_.others) {
     if (!pull.X_WG.isFinite() || !pull.p_BoC_B.allFinite()) continue;
-    auto* const known = std::find_if(pulls_.begin(), pulls_.end(),
-                                     [&](const OtherPull& other) { return other.pull.hand == pull.hand; });
-    if (known != pulls_.end()) {
+    auto* const known =
+        std::find_if(other_springs_.begin(), other_springs_.end(),
+                     [&](const OtherHandSpring& other) { return other.pull.hand == pull.hand; });
+    if (known != other_springs_.end()) {
       *known = {pull, 1.0, true};
     } else {
-      pulls_.push_back({pull, 1.0, true});
+      other_springs_.push_back({pull, 1.0, true});
     }
   }
 }
 
-void LocalModel::fadePulls() noexcept {
+void LocalModel::fadeOtherSprings() noexcept {
   std::size_t kept = 0;
-  for (OtherPull& other : pulls_) {
+  for (OtherHandSpring& other : other_springs_) {
     if (!other.listed) other.weight -= 1.0 / kFadeTicks;
-    if (other.weight > 0.0) pulls_[kept++] = other;
+    if (other.weight > 0.0) other_springs_[kept++] = other;
   }
-  pulls_.resize(kept);
+  other_springs_.resize(kept);
 }
 
 bool LocalModel::outdated(const WorldView& world) const noexcept {
-  return world.knows(manifold_.object) && world.serverEpoch() == manifold_.server_epoch &&
+  return world.contains(manifold_.object) && world.serverEpoch() == manifold_.server_epoch &&
          world.object(manifold_.object).epoch > manifold_.object_epoch;
 }
 
-double LocalModel::freshness() const noexcept {
-  if (proxy_.age <= limits_.fresh) return 1.0;
-  if (proxy_.age >= limits_.gone) return 0.0;
-  return static_cast<double>(limits_.gone - proxy_.age) / static_cast<double>(limits_.gone - limits_.fresh);
+double LocalModel::ageFactor() const noexcept {
+  if (proxy_.age <= limits_.fade_start) return 1.0;
+  if (proxy_.age >= limits_.fade_end) return 0.0;
+  return static_cast<double>(limits_.fade_end - proxy_.age) /
+         static_cast<double>(limits_.fade_end - limits_.fade_start);
 }
 
 void LocalModel::solve(const Pose& X_WH, const WorldView& world) noexcept {
   body_.X_WB = proxy_.X_WO;
   body_.springs.clear();
-  // undecayed: where the object goes does not depend on how old the planes are, only how hard it is held does
+  // full stiffness: age reduces the displayed force, not the position of the proxy
   body_.springs.push_back({X_WH * manifold_.X_HO, manifold_.X_HO.inverse().translation(),
                            std::max(1.0, manifold_.stiffness),
                            std::max(0.1, manifold_.rotational_stiffness)});
-  // those that hold on come first, should there be too many
+  // listed hands first, because the capacity is limited
   for (const bool listed : {true, false}) {
-    for (const OtherPull& other : pulls_) {
+    for (const OtherHandSpring& other : other_springs_) {
       if (other.listed != listed) continue;
       const HandPull& pull = other.pull;
       body_.springs.push_back({pull.X_WG, pull.p_BoC_B, other.weight * std::max(0.0, pull.stiffness),
                                other.weight * std::max(0.0, pull.rotational_stiffness)});
     }
   }
-  rows_.clear();
+  constraints_.clear();
   for (const ManifoldContact& contact : manifold_.contacts) {
-    if (!world.knows(contact.other)) continue;
+    if (!world.contains(contact.other)) continue;
     const Pose& X_WA = world.object(contact.other).X_WO;
     const Vector3 n_A = contact.normal_A.cast<double>();
-    GapRow row;
-    row.body_a = 0;
-    row.n_W = X_WA.rotation() * n_A;
-    row.p_WP = body_.X_WB * contact.p_BoP_B.cast<double>();
-    row.gap = n_A.dot(X_WA.inverse() * row.p_WP) - static_cast<double>(contact.offset);
-    rows_.push_back(row);
+    collision::ContactConstraint constraint;
+    constraint.body_a = 0;
+    constraint.n_W = X_WA.rotation() * n_A;
+    constraint.p_WP = body_.X_WB * contact.p_BoP_B.cast<double>();
+    constraint.gap = n_A.dot(X_WA.inverse() * constraint.p_WP) - static_cast<double>(contact.offset);
+    constraints_.push_back(constraint);
   }
   std::array<Displacement, 1> motion{};
-  solver_.solve({&body_, 1}, {rows_.begin(), rows_.size()}, motion, {multipliers_.data(), rows_.size()});
+  solver_.solve({&body_, 1}, {constraints_.begin(), constraints_.size()}, motion,
+                {multipliers_.data(), constraints_.size()});
   proxy_.X_WO = displaced(proxy_.X_WO, motion[0]);
   proxy_.touching = false;
-  for (std::size_t i = 0; i < rows_.size(); ++i) {
-    if (multipliers_[i] > kTouchForce) proxy_.touching = true;
+  for (std::size_t i = 0; i < constraints_.size(); ++i) {
+    if (multipliers_[i] > kMinMultiplier) proxy_.touching = true;
   }
 }
 
-void LocalModel::countValidity() noexcept {
-  const double way = fastestPoint(displacement(manifold_.X_WO, proxy_.X_WO), body_.radius);
-  if (way > manifold_.validity_radius) ++beyond_validity_;
+void LocalModel::updateValidityCount() noexcept {
+  const double largest_displacement = maxPointMotion(displacement(manifold_.X_WO, proxy_.X_WO), body_.radius);
+  if (largest_displacement > manifold_.validity_radius) ++beyond_validity_;
 }
 
-}  // namespace tenon
+}  // namespace tenon::haptic

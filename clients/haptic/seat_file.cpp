@@ -2,16 +2,16 @@
 
 #include <fstream>
 
-namespace tenon {
+namespace tenon::haptic {
 
-std::string readToken(const std::filesystem::path& file) {
-  constexpr std::size_t kLongest = 63;  // of tenon.idl
+std::string readSeatToken(const std::filesystem::path& file) {
+  constexpr std::size_t kMaxLength = 63;  // bound in tenon.idl
   std::string token;
   std::ifstream(file) >> token;
-  return token.size() <= kLongest ? token : std::string();
+  return token.size() <= kMaxLength ? token : std::string();
 }
 
-Result<void> keepToken(const std::filesystem::path& file, const std::string& token) {
+Result<void> writeSeatToken(const std::filesystem::path& file, const std::string& token) {
   if (file.empty()) return {};
   using std::filesystem::perms;
   std::ofstream out(file, std::ios::trunc);
@@ -19,8 +19,8 @@ Result<void> keepToken(const std::filesystem::path& file, const std::string& tok
   std::filesystem::permissions(file, perms::owner_read | perms::owner_write, refused);
   out << token << '\n';
   out.flush();
-  if (!out) return fail(file.string() + ": cannot be written: a restarted station will get a new seat");
+  if (!out) return fail(file.string() + ": cannot be written; a restarted station will get a new seat");
   return {};
 }
 
-}  // namespace tenon
+}  // namespace tenon::haptic

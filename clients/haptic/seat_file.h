@@ -5,16 +5,17 @@
 
 #include "idl/types/result.h"
 
-namespace tenon {
+namespace tenon::haptic {
 
-/// Where a station keeps the token of its seat, so that it gets its hands and what they held back when it is
-/// started again. A token of another session or server is harmless: that server gives a new seat.
+/// File with the token of a station's seat: a restarted station gets its hands back, with the objects they
+/// held. A server that does not know the token assigns a new seat.
 ///
 /// Threads: any. Real-time: no.
 
-/// Empty when there is no such file.
-[[nodiscard]] std::string readToken(const std::filesystem::path& file);
-/// For the owner's eyes alone. An empty path keeps nothing.
-[[nodiscard]] Result<void> keepToken(const std::filesystem::path& file, const std::string& token);
+/// The token; empty when the file does not exist or holds no valid token.
+[[nodiscard]] std::string readSeatToken(const std::filesystem::path& file);
+/// Creates or replaces the file, readable by its owner only. An empty path writes nothing. Fails when the
+/// file cannot be written.
+[[nodiscard]] Result<void> writeSeatToken(const std::filesystem::path& file, const std::string& token);
 
-}  // namespace tenon
+}  // namespace tenon::haptic

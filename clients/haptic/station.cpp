@@ -7,46 +7,48 @@
 #include "devices/device.h"
 #include "devices/safety_rules.h"
 
-namespace tenon {
+namespace tenon::haptic {
 
 namespace {
 
-std::string safetySentence(const StationEvent& event) {
-  const std::string rule = toString(static_cast<SafetyRule>(event.detail));
+std::string describeSafety(const StationEvent& event) {
+  const std::string rule = devices::toString(static_cast<devices::SafetyRule>(event.detail));
   char number[32];
   if (event.kind == StationEventKind::kSafetyEnded) {
     std::snprintf(number, sizeof number, "%.2f s", event.value);
-    return "safety: " + rule + ": ended, acted for " + number;
+    return "safety: " + rule + " ended, active for " + number;
   }
   std::snprintf(number, sizeof number, "%.1f N", event.value);
-  const std::string more = event.count > 0 ? ", " + std::to_string(event.count) + " times more before" : "";
-  return "safety: " + rule + " (" + number + " were wanted" + more + ")";
+  const std::string more =
+      event.count > 0 ? ", " + std::to_string(event.count) + " earlier not reported" : "";
+  return "safety: " + rule + " (" + number + " requested" + more + ")";
 }
 
 }  // namespace
 
 std::string describe(const StationEvent& event, const std::string& hand_name) {
   const std::string hand = "hand " + hand_name;
-  const std::string when = " at " + std::to_string(event.seq);
+  const std::string when = ", step " + std::to_string(event.seq);
+  const auto milliseconds = [&event] { return std::to_string(static_cast<int>(event.value)) + " ms"; };
   switch (event.kind) {
     case StationEventKind::kSafetyBegan:
     case StationEventKind::kSafetyEnded:
-      return hand + ": " + safetySentence(event) + when;
+      return hand + ": " + describeSafety(event) + when;
     case StationEventKind::kDeviceFault:
-      return hand + ": the device reports a fault: " + toString(static_cast<DeviceFault>(event.detail)) +
+      return hand + ": device fault: " + devices::toString(static_cast<devices::DeviceFault>(event.detail)) +
              when;
     case StationEventKind::kIndexingBegan:
-      return hand + ": the workspace begins to move" + when;
+      return hand + ": indexing started" + when;
     case StationEventKind::kIndexingEnded:
-      return hand + ": the workspace stands still" + when;
+      return hand + ": indexing stopped" + when;
     case StationEventKind::kBeyondValidity:
-      return hand + ": moved beyond what the server's contacts cover" + when;
+      return hand + ": ahead of the contact set (" + milliseconds() + " in total)" + when;
     case StationEventKind::kStale:
-      return hand + ": no contacts heard for " + std::to_string(static_cast<int>(event.value)) + " ms" + when;
+      return hand + ": no contacts received for " + milliseconds() + when;
     case StationEventKind::kServerChanged:
-      return "the server began a new life, epoch " + std::to_string(event.detail) + when;
+      return "server restarted, epoch " + std::to_string(event.detail) + when;
     case StationEventKind::kStopChanged:
-      return (event.detail != 0 ? "emergency stop" : "emergency stop released") + when;
+      return (event.detail != 0 ? "emergency stop engaged" : "emergency stop released") + when;
   }
   return "unknown event" + when;
 }
@@ -54,8 +56,8 @@ std::string describe(const StationEvent& event, const std::string& hand_name) {
 std::string Station::describe(const StationEvent& event) const {
   const auto found = std::find(hand_ids_.begin(), hand_ids_.end(), event.hand);
   if (!event.hand.valid() || found == hand_ids_.end())
-    return tenon::describe(event, std::to_string(event.hand.value));
-  return tenon::describe(event, handNames()[static_cast<std::size_t>(found - hand_ids_.begin())]);
+    return tenon::haptic::describe(event, std::to_string(event.hand.value));
+  return tenon::haptic::describe(event, handNames()[static_cast<std::size_t>(found - hand_ids_.begin())]);
 }
 
 void Station::welcome(const Welcome& welcome, std::span<const SceneObject> objects) {
@@ -80,7 +82,8 @@ void Station::receive(const WorldFrame& frame) noexcept {
 }
 
 void Station::receive(const HandManifold& manifold) noexcept {
-  if (std::find(own_hands_.begin(), own_hands_.end(), manifold.hand) != own_hands_.end()) heard(manifold);
+  if (std::find(own_hands_.begin(), own_hands_.end(), manifold.hand) != own_hands_.end())
+    manifoldReceived(manifold);
 }
 
 void Station::receive(const StepState& step) {
@@ -94,30 +97,31 @@ void Station::receive(const EmergencyStop& stop) {
 }
 
 void Station::receive(const GrabState& /*grab*/) {
-  // what a hand moves is in its manifold, together with the planes that fit it
+  // a hand's object is taken from its manifold, together with the planes that belong to it
 }
 
 bool Station::takeEvent(StationEvent& event) noexcept {
   if (events_taken_ == events_written_) return false;
-  event = events_[events_taken_ % kEventRoom];
+  event = events_[events_taken_ % kEventCapacity];
   ++events_taken_;
   return true;
 }
 
 void Station::report(const HapticHand& hand) noexcept {
-  const HandNews& news = hand.news();
-  for (const Intervention& told : news.interventions) {
-    const double value = told.began ? told.before : static_cast<double>(told.acted) * kTickSeconds;
-    report(told.began ? StationEventKind::kSafetyBegan : StationEventKind::kSafetyEnded, hand.id(),
-           bit(told.rule), value, told.untold);
+  const HandEvents& events = hand.events();
+  for (const devices::Intervention& intervention : events.interventions) {
+    const double value = intervention.began ? intervention.requested_force
+                                            : static_cast<double>(intervention.active_ticks) * kTickSeconds;
+    report(intervention.began ? StationEventKind::kSafetyBegan : StationEventKind::kSafetyEnded, hand.id(),
+           devices::bit(intervention.rule), value, intervention.unreported);
   }
-  if (news.fault_began) {
+  if (events.fault_began) {
     report(StationEventKind::kDeviceFault, hand.id(), static_cast<std::uint32_t>(hand.device().fault), 0.0);
   }
-  if (news.indexing_began) report(StationEventKind::kIndexingBegan, hand.id(), 0, 0.0);
-  if (news.indexing_ended) report(StationEventKind::kIndexingEnded, hand.id(), 0, 0.0);
-  if (news.stale_began) report(StationEventKind::kStale, hand.id(), 0, hand.local().proxy().age);
-  if (news.beyond_validity_began) {
+  if (events.indexing_began) report(StationEventKind::kIndexingBegan, hand.id(), 0, 0.0);
+  if (events.indexing_ended) report(StationEventKind::kIndexingEnded, hand.id(), 0, 0.0);
+  if (events.stale_began) report(StationEventKind::kStale, hand.id(), 0, hand.local().proxy().age);
+  if (events.beyond_validity_began) {
     const auto ticks = static_cast<double>(hand.local().beyondValidity());
     report(StationEventKind::kBeyondValidity, hand.id(), 0, ticks);
   }
@@ -125,9 +129,9 @@ void Station::report(const HapticHand& hand) noexcept {
 
 void Station::report(StationEventKind kind, HandId hand, std::uint32_t detail, double value,
                      std::uint32_t count) noexcept {
-  events_[events_written_ % kEventRoom] = {seq_, kind, hand, detail, value, count};
+  events_[events_written_ % kEventCapacity] = {seq_, kind, hand, detail, value, count};
   ++events_written_;
-  if (events_written_ - events_taken_ > kEventRoom) events_taken_ = events_written_ - kEventRoom;
+  if (events_written_ - events_taken_ > kEventCapacity) events_taken_ = events_written_ - kEventCapacity;
 }
 
 const SceneObject* Station::sceneObject(ObjectId object) const {
@@ -137,4 +141,4 @@ const SceneObject* Station::sceneObject(ObjectId object) const {
   return nullptr;
 }
 
-}  // namespace tenon
+}  // namespace tenon::haptic

@@ -11,42 +11,42 @@
 #include "idl/types/fixed_vector.h"
 #include "idl/types/messages.h"
 
-namespace tenon {
+namespace tenon::haptic {
 
 class HapticHand;
 
 inline constexpr std::size_t kMaxStationHands = 4;
 
 enum class StationEventKind : std::uint8_t {
-  kSafetyBegan,  ///< detail: the bit of a SafetyRule; value: [N] wanted; count: earlier ones not told
-  kSafetyEnded,  ///< detail: likewise; value: [s] it acted
+  kSafetyBegan,  ///< detail: bit of a SafetyRule; value: [N] requested; count: unreported earlier ones
+  kSafetyEnded,  ///< detail: likewise; value: [s] of activity
   kDeviceFault,  ///< detail: DeviceFault
   kIndexingBegan,
   kIndexingEnded,
-  kBeyondValidity,  ///< the local model had to guess; value: ticks so far
-  kStale,           ///< the manifold is older than may be used; value: its age in ticks
-  kServerChanged,   ///< frames of a newer life of the server came
+  kBeyondValidity,  ///< the hand is ahead of the contact set; value: [ticks] in total so far
+  kStale,           ///< the manifold is too old for full stiffness; value: [ticks] its age
+  kServerChanged,   ///< frames of a newer server epoch arrived; detail: the epoch
   kStopChanged,     ///< detail: 1 when an emergency stop was engaged, 0 when it was released
 };
 
-/// Something a person or a log should know of: plain data, so that the 1 kHz loop may write it.
+/// Event for the log. Plain data, so that the 1 kHz loop can write it.
 struct StationEvent {
-  std::uint32_t seq = 0;
+  std::uint32_t seq = 0;  ///< step of the station
   StationEventKind kind = StationEventKind::kSafetyBegan;
   HandId hand;
   std::uint32_t detail = 0;
-  double value = 0.0;
+  double value = 0.0;  ///< [N], [s] or [ticks], see StationEventKind
   std::uint32_t count = 0;
 };
 
-/// A sentence for the log; `hand` is the name of the event's hand.
+/// Text for the log; `hand` is the name of the event's hand.
 [[nodiscard]] std::string describe(const StationEvent& event, const std::string& hand);
 
-/// What one person's station does each millisecond, whoever carries the messages.
+/// Haptic processing of one person's station: all devices, hands and, in simulation, the person.
 ///
-/// Knows neither threads nor network: a program feeds it what came in, calls step() and sends what inputs()
-/// and states() hold, be it over DDS in real time, tick-locked, or in one process on a virtual clock. With
-/// equal messages and seeds it does the same to the last bit.
+/// Independent of threads and network: a program passes received messages to receive(), calls step() each
+/// millisecond and sends inputs() and states(); over DDS in real time, in lockstep, or in one process on a
+/// virtual clock. Deterministic: equal messages and seeds give bit-equal outputs.
 ///
 /// Threads: one. Real-time: receive of WorldFrame and HandManifold, step.
 class Station {
@@ -56,12 +56,12 @@ class Station {
   Station(const Station&) = delete;
   Station& operator=(const Station&) = delete;
 
-  /// Asked for at join.
+  /// Hands requested at join.
   [[nodiscard]] virtual std::vector<std::string> handNames() const = 0;
   [[nodiscard]] virtual Role role() const = 0;
 
-  /// Before the first step. `welcome.hands` are in the order of handNames(); a hand the scenario does not
-  /// have has an invalid id there and is left out from then on.
+  /// Called before the first step and after a rejoin with a new seat. `welcome.hands` are in the order of
+  /// handNames(); a hand that the scenario lacks has an invalid id and is skipped.
   void welcome(const Welcome& welcome, std::span<const SceneObject> objects);
 
   void receive(const WorldFrame& frame) noexcept;
@@ -70,32 +70,35 @@ class Station {
   void receive(const EmergencyStop& stop);
   void receive(const GrabState& grab);
 
-  /// One millisecond: devices, people, local model.
+  /// One millisecond of devices, local models and simulated person; `seq` numbers the inputs.
   virtual void step(std::uint32_t seq) noexcept = 0;
 
   [[nodiscard]] std::span<const DeviceInput> inputs() const { return {inputs_.begin(), inputs_.size()}; }
   [[nodiscard]] std::span<const HandState> states() const { return {states_.begin(), states_.size()}; }
-  /// A sentence for the log.
+  /// Text for the log.
   [[nodiscard]] std::string describe(const StationEvent& event) const;
-  /// The hands the server gave this station, without those left out.
+  /// This station's hands that exist in the session.
   [[nodiscard]] std::span<const HandId> hands() const { return {own_hands_.begin(), own_hands_.size()}; }
 
-  /// Takes the oldest event not taken yet; false when there is none. When nobody takes them the oldest are
-  /// lost.
+  /// Takes the oldest event; false when there is none. When kEventCapacity is exceeded the oldest are lost.
   bool takeEvent(StationEvent& event) noexcept;
 
   [[nodiscard]] const WorldView& world() const { return world_; }
   [[nodiscard]] const StepState& currentStep() const { return step_; }
 
  protected:
-  /// Called by welcome(): hand_ids[i] is of handNames()[i].
+  /// Called by welcome(): hand_ids[i] belongs to handNames()[i].
   virtual void begin(std::span<const HandId> hand_ids) = 0;
-  virtual void heard(const HandManifold& manifold) noexcept = 0;
+  /// A manifold of one of this station's hands.
+  virtual void manifoldReceived(const HandManifold& manifold) noexcept = 0;
+  /// currentStep() is new.
   virtual void stepChanged() {}
+  /// Emergency stop engaged or released.
   virtual void stopChanged(bool engaged) = 0;
 
-  /// What changed for a hand in the last millisecond.
+  /// Queues the events of a hand's last step.
   void report(const HapticHand& hand) noexcept;
+  /// Queues one event; `value` [unit: see StationEventKind].
   void report(StationEventKind kind, HandId hand, std::uint32_t detail, double value,
               std::uint32_t count = 0) noexcept;
   [[nodiscard]] const SceneObject* sceneObject(ObjectId object) const;
@@ -108,14 +111,14 @@ class Station {
   FixedVector<HandState, kMaxStationHands> states_;
 
  private:
-  static constexpr std::size_t kEventRoom = 256;
+  static constexpr std::size_t kEventCapacity = 256;
   std::vector<SceneObject> objects_;
   StepState step_;
   FixedVector<HandId, kMaxStationHands> own_hands_;
   std::vector<HandId> hand_ids_;  ///< in the order of handNames()
-  std::array<StationEvent, kEventRoom> events_{};
+  std::array<StationEvent, kEventCapacity> events_{};
   std::uint64_t events_written_ = 0;
   std::uint64_t events_taken_ = 0;
 };
 
-}  // namespace tenon
+}  // namespace tenon::haptic

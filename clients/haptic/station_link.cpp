@@ -4,23 +4,25 @@
 #include <thread>
 #include <utility>
 
-namespace tenon {
+namespace tenon::haptic {
 
 namespace {
 using std::chrono::milliseconds;
-constexpr milliseconds kQuiet{300};  // after the last object of the scene
+constexpr milliseconds kSceneTimeout{300};  // without a further object the scene is complete
 
 template <class M>
-Result<void> openWriter(std::unique_ptr<Writer<M>>& writer, Partition& partition, const Topic<M>& topic) {
-  auto opened = Writer<M>::open(partition, topic);
+Result<void> openWriter(std::unique_ptr<wire::Writer<M>>& writer, wire::Partition& partition,
+                        const wire::Topic<M>& topic) {
+  auto opened = wire::Writer<M>::open(partition, topic);
   if (!opened) return fail(opened.error().what);
-  writer = std::make_unique<Writer<M>>(std::move(*opened));
+  writer = std::make_unique<wire::Writer<M>>(std::move(*opened));
   return {};
 }
 }  // namespace
 
-Result<std::unique_ptr<StationLink>> StationLink::open(const MembershipWishes& wishes, const Stop& stop) {
-  auto member = Membership::find(wishes, stop);
+Result<std::unique_ptr<StationLink>> StationLink::open(const wire::MembershipOptions& wishes,
+                                                       const Stop& stop) {
+  auto member = wire::Membership::find(wishes, stop);
   if (!member) return fail(member.error().what);
   std::unique_ptr<StationLink> link(new StationLink());
   link->member_ = std::move(*member);
@@ -33,22 +35,22 @@ Result<std::unique_ptr<StationLink>> StationLink::open(const MembershipWishes& w
 }
 
 Result<void> StationLink::openWriters() {
-  Partition& session = member_->session();
-  Result<void> opened = openWriter(inputs_, session, kDeviceInput);
-  if (opened) opened = openWriter(states_, session, kHandState100);
-  if (opened) opened = openWriter(events_, session, kClientEvent);
-  if (opened) opened = openWriter(telemetry_, session, kTelemetry);
+  wire::Partition& session = member_->session();
+  Result<void> opened = openWriter(inputs_, session, wire::kDeviceInput);
+  if (opened) opened = openWriter(states_, session, wire::kHandState100);
+  if (opened) opened = openWriter(events_, session, wire::kClientEvent);
+  if (opened) opened = openWriter(telemetry_, session, wire::kTelemetry);
   return opened;
 }
 
-Result<void> StationLink::readScene(const MembershipWishes& wishes) {
-  auto reader = Reader<SceneObject>::open(member_->session(), kSceneObject);
+Result<void> StationLink::readScene(const wire::MembershipOptions& wishes) {
+  auto reader = wire::Reader<SceneObject>::open(member_->session(), wire::kSceneObject);
   if (!reader) return fail(reader.error().what);
-  const auto until = std::chrono::steady_clock::now() + wishes.patience;
+  const auto until = std::chrono::steady_clock::now() + wishes.timeout;
   auto last = std::chrono::steady_clock::now();
   SceneObject object;
   while (std::chrono::steady_clock::now() < until &&
-         (objects_.empty() || std::chrono::steady_clock::now() - last < kQuiet)) {
+         (objects_.empty() || std::chrono::steady_clock::now() - last < kSceneTimeout)) {
     while (reader->take(object)) {
       objects_.push_back(object);
       last = std::chrono::steady_clock::now();
@@ -62,13 +64,13 @@ Result<void> StationLink::readScene(const MembershipWishes& wishes) {
   return {};
 }
 
-Result<void> StationLink::settle(const Stop& stop) {
+Result<void> StationLink::awaitMatch(const Stop& stop) {
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(5);
   while (!stop && std::chrono::steady_clock::now() < until) {
     if (inputs_->matchedReaders() > 0 && inbox_.matchedWriters() > 0) return {};
     std::this_thread::sleep_for(milliseconds(5));
   }
-  return fail("the server of session '" + member_->sessionName() + "' does not listen to inputs");
+  return fail("the server of session '" + member_->sessionName() + "' does not receive inputs");
 }
 
-}  // namespace tenon
+}  // namespace tenon::haptic

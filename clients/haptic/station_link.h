@@ -7,24 +7,26 @@
 #include "idl/wire/endpoint.h"
 #include "idl/wire/membership.h"
 
-namespace tenon {
+namespace tenon::haptic {
 
-/// A station's seat in a session, with the scene it was told of and what it hears and says there with.
+/// DDS endpoints of a station: its seat in a session, the scene, one inbox and the writers.
 ///
 /// Threads: one (wire). Real-time: no.
 class StationLink {
  public:
-  using Stop = Membership::Stop;
+  using Stop = wire::Membership::Stop;
 
-  /// Joins. Fails with a sentence when no server is found in time, or it refuses, or `stop` is set.
-  static Result<std::unique_ptr<StationLink>> open(const MembershipWishes& wishes, const Stop& stop);
+  /// Joins a session and reads its scene. Fails when no server is found in time, the server refuses or sends
+  /// no scene, or `stop` is set.
+  static Result<std::unique_ptr<StationLink>> open(const wire::MembershipOptions& wishes, const Stop& stop);
 
-  [[nodiscard]] Membership& member() { return *member_; }
+  [[nodiscard]] wire::Membership& member() { return *member_; }
   [[nodiscard]] const Welcome& welcome() const { return member_->welcome(); }
   [[nodiscard]] const std::vector<SceneObject>& objects() const { return objects_; }
-  [[nodiscard]] Inbox& inbox() { return inbox_; }
-  /// Waits until the server hears this client; call it when all topics are subscribed.
-  [[nodiscard]] Result<void> settle(const Stop& stop);
+  [[nodiscard]] wire::Inbox& inbox() { return inbox_; }
+  /// Waits until the endpoints of server and station have matched, for up to 5 s; call it after all
+  /// subscriptions.
+  [[nodiscard]] Result<void> awaitMatch(const Stop& stop);
   [[nodiscard]] Result<void> send(const DeviceInput& input) { return inputs_->write(input); }
   [[nodiscard]] Result<void> send(const HandState& state) { return states_->write(state); }
   [[nodiscard]] Result<void> send(const ClientEvent& event) { return events_->write(event); }
@@ -33,15 +35,15 @@ class StationLink {
  private:
   StationLink() = default;
   Result<void> openWriters();
-  Result<void> readScene(const MembershipWishes& wishes);
+  Result<void> readScene(const wire::MembershipOptions& wishes);
 
-  std::unique_ptr<Membership> member_;
+  std::unique_ptr<wire::Membership> member_;
   std::vector<SceneObject> objects_;
-  std::unique_ptr<Writer<DeviceInput>> inputs_;
-  std::unique_ptr<Writer<HandState>> states_;
-  std::unique_ptr<Writer<ClientEvent>> events_;
-  std::unique_ptr<Writer<Telemetry>> telemetry_;
-  Inbox inbox_;
+  std::unique_ptr<wire::Writer<DeviceInput>> inputs_;
+  std::unique_ptr<wire::Writer<HandState>> states_;
+  std::unique_ptr<wire::Writer<ClientEvent>> events_;
+  std::unique_ptr<wire::Writer<Telemetry>> telemetry_;
+  wire::Inbox inbox_;
 };
 
-}  // namespace tenon
+}  // namespace tenon::haptic

@@ -6,14 +6,14 @@
 #include <map>
 #include <optional>
 
-#include "clients/haptic/force_age.h"
+#include "clients/haptic/force_age_statistics.h"
 #include "clients/haptic/seat_file.h"
 #include "clients/haptic/station_link.h"
 #include "idl/threads/cyclic_thread.h"
 #include "idl/threads/latest.h"
 #include "idl/threads/spsc_queue.h"
 
-namespace tenon {
+namespace tenon::haptic {
 
 namespace {
 using std::chrono::milliseconds;
@@ -22,16 +22,16 @@ constexpr std::uint32_t kTelemetryEvery = 1000;  // [ticks]
 constexpr milliseconds kRepeatAfter{500};
 constexpr int kServoPriority = 75;
 constexpr std::int64_t kPeriodNs = 1'000'000;
-// a seat that is lost again and again, each time so soon, is not worth looking for
-constexpr std::chrono::seconds kSoon{10};
-constexpr int kMostReturns = 3;
+// Give up after kMaxRejoins rejoins with less than kMinSeatTime between a rejoin and the next loss.
+constexpr std::chrono::seconds kMinSeatTime{10};
+constexpr int kMaxRejoins = 3;
 
 std::int64_t nowNs() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
 }
 
-/// What a station says in one millisecond.
-struct Outbox {
+/// Output of a station in one millisecond.
+struct StationOutput {
   std::uint32_t seq = 0;
   FixedVector<DeviceInput, kMaxStationHands> inputs;
   FixedVector<HandState, kMaxStationHands> states;
@@ -45,7 +45,7 @@ struct Outbox {
   }
 };
 
-/// A step without its texts: copying it allocates nothing.
+/// A step without its texts, so that copying it does not allocate.
 StepState withoutTexts(StepState step) {
   step.name = {};
   step.part = {};
@@ -54,33 +54,33 @@ StepState withoutTexts(StepState step) {
   return step;
 }
 
-class Program {
+class StationRunner {
  public:
-  Program(Station& station, StationLink& link, const StationProgramOptions& options)
+  StationRunner(Station& station, StationLink& link, const StationProgramOptions& options)
       : station_(station), link_(link), options_(options) {}
 
   Result<RunState> run(const std::atomic<bool>& stop) {
-    if (auto heard = subscribe(); !heard) return fail(heard.error().what);
-    if (auto settled = link_.settle(stop); !settled) return fail(settled.error().what);
+    if (auto subscribed = subscribe(); !subscribed) return fail(subscribed.error().what);
+    if (auto matched = link_.awaitMatch(stop); !matched) return fail(matched.error().what);
     station_.welcome(link_.welcome(), link_.objects());
-    return direct_ ? runLockstep(stop) : runByTheClock(stop);
+    return lockstep_ ? runLockstep(stop) : runRealTime(stop);
   }
 
  private:
   Result<void> subscribe();
   Result<RunState> runLockstep(const std::atomic<bool>& stop);
-  Result<RunState> runByTheClock(const std::atomic<bool>& stop);
+  Result<RunState> runRealTime(const std::atomic<bool>& stop);
   void servo() noexcept;
-  [[nodiscard]] bool heardTick(Tick tick) const;
-  void send(const Outbox& outbox);
+  [[nodiscard]] bool tickComplete(Tick tick) const;
+  void send(const StationOutput& output);
   void sendEvents();
-  void sayStep(const StepState& step);
+  void printStep(const StepState& step);
   [[nodiscard]] bool seated() const { return !link_.member().lost(); }
-  /// The same seat again; `fresh` when the server does not know it any more, so that the station starts anew.
-  [[nodiscard]] Result<void> comeBack(const std::atomic<bool>& stop, bool& fresh);
-  void startAnew();
-  void say(const std::string& text) const {
-    if (options_.say && !text.empty()) options_.say(text);
+  /// Rejoins. `new_seat`: client, hands or server epoch differ from before, so the station has to restart.
+  [[nodiscard]] Result<void> rejoin(const std::atomic<bool>& stop, bool& new_seat);
+  void restartStation();
+  void print(const std::string& text) const {
+    if (options_.print && !text.empty()) options_.print(text);
   }
   [[nodiscard]] bool over() const {
     return run_.phase == RunPhase::kSucceeded || run_.phase == RunPhase::kFailed ||
@@ -90,13 +90,13 @@ class Program {
   Station& station_;
   StationLink& link_;
   const StationProgramOptions& options_;
-  bool direct_ = false;  // lockstep: what is heard goes to the station at once
+  bool lockstep_ = false;  // messages go directly to the station instead of to the servo's queues
   RunState run_;
-  int returns_ = 0;
-  std::chrono::steady_clock::time_point returned_{};
+  int rejoins_ = 0;
+  std::chrono::steady_clock::time_point rejoined_at_{};
   std::optional<StepState> step_;
 
-  // what has been heard of the newest tick
+  // received parts of the newest tick, in lockstep
   Tick frame_tick_ = 0;
   std::uint64_t frame_parts_ = 0;
   std::uint32_t frame_parts_expected_ = 0;
@@ -105,25 +105,25 @@ class Program {
   std::map<HandId, Tick> manifold_ticks_;
 
   // between servo and wire
-  SpscQueue<WorldFrame> frames_{128};
-  SpscQueue<HandManifold> manifolds_{128};
-  SpscQueue<StepState> steps_{16};
-  SpscQueue<EmergencyStop> stops_{16};
-  SpscQueue<StationEvent> events_{256};
-  Latest<Outbox> outbox_;
-  Latest<Telemetry> age_;
-  ForceAge force_age_;
+  threads::SpscQueue<WorldFrame> frames_{128};
+  threads::SpscQueue<HandManifold> manifolds_{128};
+  threads::SpscQueue<StepState> steps_{16};
+  threads::SpscQueue<EmergencyStop> stops_{16};
+  threads::SpscQueue<StationEvent> events_{256};
+  threads::Latest<StationOutput> output_;
+  threads::Latest<Telemetry> telemetry_;
+  ForceAgeStatistics force_age_;
   std::uint32_t seq_ = 0;
   std::uint64_t event_seq_ = 0;
-  std::string said_;
+  std::string printed_step_;
 };
 
-Result<void> Program::subscribe() {
-  direct_ = link_.welcome().lockstep;
-  Partition& session = link_.member().session();
-  Inbox& inbox = link_.inbox();
-  Result<void> all = inbox.on<WorldFrame>(session, kWorldFrame1k, [this](const WorldFrame& frame) {
-    if (!direct_) return static_cast<void>(frames_.push(frame));
+Result<void> StationRunner::subscribe() {
+  lockstep_ = link_.welcome().lockstep;
+  wire::Partition& session = link_.member().session();
+  wire::Inbox& inbox = link_.inbox();
+  Result<void> all = inbox.on<WorldFrame>(session, wire::kWorldFrame1k, [this](const WorldFrame& frame) {
+    if (!lockstep_) return static_cast<void>(frames_.push(frame));
     if (frame.tick > frame_tick_) {
       frame_tick_ = frame.tick;
       frame_parts_ = 0;
@@ -134,67 +134,67 @@ Result<void> Program::subscribe() {
     station_.receive(frame);
   });
   if (all) {
-    all = inbox.on<HandManifold>(session, kHandManifold, [this](const HandManifold& manifold) {
-      if (!direct_) return static_cast<void>(manifolds_.push(manifold));
+    all = inbox.on<HandManifold>(session, wire::kHandManifold, [this](const HandManifold& manifold) {
+      if (!lockstep_) return static_cast<void>(manifolds_.push(manifold));
       manifold_ticks_[manifold.hand] = manifold.tick;
       station_.receive(manifold);
     });
   }
   if (all) {
-    all = inbox.on<StepState>(session, kStepState, [this](const StepState& step) {
+    all = inbox.on<StepState>(session, wire::kStepState, [this](const StepState& step) {
       step_revision_ = step.revision;
-      sayStep(step);
+      printStep(step);
       step_ = withoutTexts(step);
-      if (direct_) return station_.receive(step);
+      if (lockstep_) return station_.receive(step);
       steps_.push(*step_);
     });
   }
   if (all) {
     all = inbox.onFrom<EmergencyStop>(
-        session, kEmergencyStop, [this](const EmergencyStop& stop, const Origin& from) {
-          // anybody may stop; that it goes on is believed of the server alone
+        session, wire::kEmergencyStop, [this](const EmergencyStop& stop, const wire::Origin& from) {
+          // anyone may engage the stop; only the server may release it
           if (!stop.engaged && !link_.member().isServer(from)) return;
-          say((stop.engaged ? "emergency stop by " : "emergency stop cleared by ") + stop.who + ": " +
-              stop.reason);
-          if (direct_) return station_.receive(stop);
+          print((stop.engaged ? "emergency stop by " : "emergency stop cleared by ") + stop.who + ": " +
+                stop.reason);
+          if (lockstep_) return station_.receive(stop);
           stops_.push({stop.engaged, {}, {}});
         });
   }
-  if (all) all = inbox.on<RunState>(session, kRunState, [this](const RunState& run) { run_ = run; });
+  if (all) all = inbox.on<RunState>(session, wire::kRunState, [this](const RunState& run) { run_ = run; });
   return all;
 }
 
-void Program::sayStep(const StepState& step) {
-  if (!options_.say || step.phase != StepPhase::kActive || step.instruction.empty()) return;
+void StationRunner::printStep(const StepState& step) {
+  if (!options_.print || step.phase != StepPhase::kActive || step.instruction.empty()) return;
   const LocalizedText* chosen = &step.instruction.front();
   for (const LocalizedText& text : step.instruction) {
     if (text.language == options_.language) chosen = &text;
   }
-  const std::string said =
+  const std::string line =
       std::to_string(step.step + 1) + "/" + std::to_string(step.steps) + " " + chosen->text;
-  if (said == said_) return;
-  said_ = said;
-  options_.say(said);
+  if (line == printed_step_) return;
+  printed_step_ = line;
+  options_.print(line);
 }
 
-bool Program::heardTick(Tick tick) const {
+bool StationRunner::tickComplete(Tick tick) const {
   if (frame_tick_ != tick || frame_parts_expected_ == 0) return false;
   if (frame_parts_ != (std::uint64_t{1} << frame_parts_expected_) - 1) return false;
   if (step_revision_ < frame_revision_) return false;
   for (const HandId hand : station_.hands()) {
-    const auto heard = manifold_ticks_.find(hand);
-    if (heard == manifold_ticks_.end() || heard->second != tick) return false;
+    const auto received = manifold_ticks_.find(hand);
+    if (received == manifold_ticks_.end() || received->second != tick) return false;
   }
   return true;
 }
 
-void Program::send(const Outbox& outbox) {
-  for (const DeviceInput& input : outbox.inputs) static_cast<void>(link_.send(input));
-  if (outbox.seq % kStatesEvery != 0) return;
-  for (const HandState& state : outbox.states) static_cast<void>(link_.send(state));
+void StationRunner::send(const StationOutput& output) {
+  for (const DeviceInput& input : output.inputs) static_cast<void>(link_.send(input));
+  if (output.seq % kStatesEvery != 0) return;
+  for (const HandState& state : output.states) static_cast<void>(link_.send(state));
 }
 
-void Program::sendEvents() {
+void StationRunner::sendEvents() {
   StationEvent event;
   while (events_.pop(event)) {
     const std::string text = station_.describe(event);
@@ -205,66 +205,66 @@ void Program::sendEvents() {
   }
 }
 
-Result<void> Program::comeBack(const std::atomic<bool>& stop, bool& fresh) {
-  Membership& member = link_.member();
+Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat) {
+  wire::Membership& member = link_.member();
   const std::string why = *member.lost();
   const auto now = std::chrono::steady_clock::now();
-  returns_ = now - returned_ < kSoon ? returns_ + 1 : 1;
-  if (returns_ > kMostReturns) return fail(why);
-  say(why + "; looking for the seat");
+  rejoins_ = now - rejoined_at_ < kMinSeatTime ? rejoins_ + 1 : 1;
+  if (rejoins_ > kMaxRejoins) return fail(why);
+  print(why + "; rejoining the session");
   const Welcome before = member.welcome();
-  auto back = member.comeBack(stop, [this] { link_.inbox().dispatch(milliseconds(0)); });
-  if (back) back = link_.settle(stop);
+  auto back = member.rejoin(stop, [this] { link_.inbox().dispatch(milliseconds(0)); });
+  if (back) back = link_.awaitMatch(stop);
   if (!back) return fail(why + "; " + back.error().what);
-  returned_ = std::chrono::steady_clock::now();
-  fresh = member.welcome().client != before.client || member.welcome().hands != before.hands ||
-          member.welcome().server_epoch != before.server_epoch;
-  say("back as client " + std::to_string(member.welcome().client.value));
-  if (auto kept = keepToken(options_.seat, member.welcome().token); !kept) say(kept.error().what);
+  rejoined_at_ = std::chrono::steady_clock::now();
+  new_seat = member.welcome().client != before.client || member.welcome().hands != before.hands ||
+             member.welcome().server_epoch != before.server_epoch;
+  print("rejoined as client " + std::to_string(member.welcome().client.value));
+  if (auto kept = writeSeatToken(options_.seat_file, member.welcome().token); !kept) print(kept.error().what);
   return {};
 }
 
-void Program::startAnew() {
+void StationRunner::restartStation() {
   station_.welcome(link_.welcome(), link_.objects());
   if (step_) station_.receive(*step_);
 }
 
-Result<RunState> Program::runLockstep(const std::atomic<bool>& stop) {
+Result<RunState> StationRunner::runLockstep(const std::atomic<bool>& stop) {
   Tick tick = link_.welcome().tick;
-  Outbox outbox;
+  StationOutput output;
   StationEvent event;
   while (!stop && !over()) {
     if (!seated()) {
-      bool fresh = false;
-      if (auto back = comeBack(stop, fresh); !back) return fail(back.error().what);
-      if (fresh) startAnew();
+      bool new_seat = false;
+      if (auto back = rejoin(stop, new_seat); !back) return fail(back.error().what);
+      if (new_seat) restartStation();
       tick = link_.welcome().tick;
     }
     station_.step(static_cast<std::uint32_t>(tick + 1));
-    outbox.fill(station_, static_cast<std::uint32_t>(tick + 1));
-    send(outbox);
+    output.fill(station_, static_cast<std::uint32_t>(tick + 1));
+    send(output);
     while (station_.takeEvent(event)) events_.push(event);
     sendEvents();
     ++tick;
     auto repeat_at = std::chrono::steady_clock::now() + kRepeatAfter;
-    while (!heardTick(tick) && !stop && !over() && seated()) {
+    while (!tickComplete(tick) && !stop && !over() && seated()) {
       link_.inbox().dispatch(milliseconds(50));
       if (std::chrono::steady_clock::now() < repeat_at) continue;
-      for (const DeviceInput& input : outbox.inputs) static_cast<void>(link_.send(input));
+      for (const DeviceInput& input : output.inputs) static_cast<void>(link_.send(input));
       repeat_at = std::chrono::steady_clock::now() + kRepeatAfter;
     }
   }
   return run_;
 }
 
-void Program::servo() noexcept {
+void StationRunner::servo() noexcept {
   const std::int64_t now = nowNs();
   while (const WorldFrame* frame = frames_.front()) {
     station_.receive(*frame);
     frames_.pop();
   }
   while (const HandManifold* manifold = manifolds_.front()) {
-    force_age_.answered(manifold->answers_seq, now);
+    force_age_.answerReceived(manifold->answers_seq, now);
     station_.receive(*manifold);
     manifolds_.pop();
   }
@@ -277,48 +277,49 @@ void Program::servo() noexcept {
     stops_.pop();
   }
   station_.step(++seq_);
-  force_age_.sent(seq_, now, kPeriodNs);
-  outbox_.back().fill(station_, seq_);
-  outbox_.publish();
+  force_age_.inputSent(seq_, now, kPeriodNs);
+  output_.back().fill(station_, seq_);
+  output_.publish();
   StationEvent event;
   while (station_.takeEvent(event)) events_.push(event);
   if (seq_ % kTelemetryEvery == 0) {
-    force_age_.fill(age_.back());
-    age_.publish();
+    force_age_.fill(telemetry_.back());
+    telemetry_.publish();
   }
   link_.inbox().wake();
 }
 
-Result<RunState> Program::runByTheClock(const std::atomic<bool>& stop) {
-  CyclicOptions cyclic;
+Result<RunState> StationRunner::runRealTime(const std::atomic<bool>& stop) {
+  threads::CyclicOptions cyclic;
   cyclic.name = "servo";
   if (options_.real_time) {
     cyclic.fifo_priority = kServoPriority;
-    say(lockMemory());
+    print(threads::lockMemory());
   }
-  std::optional<CyclicThread> thread;
+  std::optional<threads::CyclicThread> thread;
   const auto startServo = [&] {
-    thread.emplace(std::make_shared<SteadyClock>(), cyclic, [this](std::uint64_t) noexcept { servo(); });
+    thread.emplace(std::make_shared<threads::SteadyClock>(), cyclic,
+                   [this](std::uint64_t) noexcept { servo(); });
     thread->start();
   };
   startServo();
-  say(thread->notGranted());
+  print(thread->notGranted());
   while (!stop && !over()) {
     link_.inbox().dispatch(milliseconds(20));
     if (!seated() && !over()) {
-      // the servo goes on meanwhile: what is felt fades with the age of the contacts
-      bool fresh = false;
-      if (auto back = comeBack(stop, fresh); !back) return fail(back.error().what);
-      if (fresh) {
+      // the servo continues; forces fade with the age of the contacts
+      bool new_seat = false;
+      if (auto back = rejoin(stop, new_seat); !back) return fail(back.error().what);
+      if (new_seat) {
         thread.reset();
-        startAnew();
+        restartStation();
         startServo();
       }
     }
-    if (outbox_.update()) send(outbox_.value());
+    if (output_.update()) send(output_.value());
     sendEvents();
-    if (!age_.update()) continue;
-    Telemetry telemetry = age_.value();
+    if (!telemetry_.update()) continue;
+    Telemetry telemetry = telemetry_.value();
     telemetry.client = link_.welcome().client;
     telemetry.loop_overruns = thread->lateTicks();
     static_cast<void>(link_.send(telemetry));
@@ -348,17 +349,17 @@ const std::atomic<bool>& stopSignal() {
 
 Result<RunState> runStation(Station& station, const StationProgramOptions& options,
                             const std::atomic<bool>& stop) {
-  MembershipWishes wishes = options.link;
+  wire::MembershipOptions wishes = options.membership;
   wishes.role = station.role();
   wishes.hands = station.handNames();
-  if (!options.seat.empty()) wishes.token = readToken(options.seat);
+  if (!options.seat_file.empty()) wishes.token = readSeatToken(options.seat_file);
   auto link = StationLink::open(wishes, stop);
   if (!link) return fail(link.error().what);
-  if (options.say) options.say("joined as client " + std::to_string((*link)->welcome().client.value));
-  if (auto kept = keepToken(options.seat, (*link)->welcome().token); !kept && options.say)
-    options.say(kept.error().what);
-  auto program = std::make_unique<Program>(station, **link, options);
-  return program->run(stop);
+  if (options.print) options.print("joined as client " + std::to_string((*link)->welcome().client.value));
+  if (auto kept = writeSeatToken(options.seat_file, (*link)->welcome().token); !kept && options.print)
+    options.print(kept.error().what);
+  auto runner = std::make_unique<StationRunner>(station, **link, options);
+  return runner->run(stop);
 }
 
-}  // namespace tenon
+}  // namespace tenon::haptic

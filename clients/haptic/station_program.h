@@ -9,26 +9,30 @@
 #include "idl/types/result.h"
 #include "idl/wire/membership.h"
 
-namespace tenon {
+namespace tenon::haptic {
 
+/// Options of runStation().
 struct StationProgramOptions {
-  MembershipWishes link;                        ///< role and hands are the station's own
-  std::filesystem::path seat;                   ///< file of the seat's token; empty: a new seat each time
-  bool real_time = true;                        ///< ask for SCHED_FIFO and locked memory
-  std::string language = "en";                  ///< of the instructions said
-  std::function<void(const std::string&)> say;  ///< to the person at the terminal
+  wire::MembershipOptions membership;  ///< its role, hands and token are set by runStation()
+  std::filesystem::path seat_file;     ///< keeps the token of the seat; empty: a new seat at each start
+  bool real_time = true;               ///< request SCHED_FIFO and locked memory
+  std::string language = "en";         ///< of the printed instructions
+  std::function<void(const std::string&)> print;  ///< one line for the person at the terminal; may be empty
 };
 
-/// Runs a station in a session until the run is over or `stop` is set. When the server has lost it, or it the
-/// server, it looks for its seat as long as the link's patience. By the clock, a servo thread steps the
-/// station each millisecond and never touches the network, and this thread carries the messages; in lockstep,
-/// one thread does both, a step for each tick it has heard completely.
+/// Runs a station in a session until the run is over or `stop` is set; returns the last state of the run.
+/// After a loss of the connection it rejoins with its token within the timeout of the membership; fails when
+/// it cannot join or rejoin, or has lost its seat repeatedly.
+///
+/// In real time a servo thread steps the station each millisecond without access to the network, and the
+/// calling thread exchanges the messages. In lockstep the calling thread does both, one step for each
+/// completely received tick.
 ///
 /// Threads: the caller becomes the wire thread. Real-time: the servo thread's loop.
 Result<RunState> runStation(Station& station, const StationProgramOptions& options,
                             const std::atomic<bool>& stop);
 
-/// Set by SIGINT and SIGTERM from the first call on.
+/// Flag set by SIGINT and SIGTERM; the first call installs the handlers.
 [[nodiscard]] const std::atomic<bool>& stopSignal();
 
-}  // namespace tenon
+}  // namespace tenon::haptic

@@ -3,26 +3,26 @@
 #include <algorithm>
 #include <cmath>
 
-namespace tenon {
+namespace tenon::haptic {
 
 namespace {
 constexpr double kHalf = 0.5;
 constexpr double kHalfSqrt3 = 0.86602540378443864676;
-// (y, z) of each tactor around the arm, 60 degrees apart, from the top.
+// Direction (y, z) of each tactor from the axis of the forearm.
 constexpr std::array<std::array<double, 2>, kTactors> kDirections{{{0.0, 1.0},
                                                                    {kHalfSqrt3, kHalf},
                                                                    {kHalfSqrt3, -kHalf},
                                                                    {0.0, -1.0},
                                                                    {-kHalfSqrt3, -kHalf},
                                                                    {-kHalfSqrt3, kHalf}}};
-// A contact nearer to the arm's axis than this has no side: it is at an end.
+// A contact nearer to the axis has no defined direction: it drives all tactors.
 constexpr double kAxisRadius = 0.005;  // [m]
-// Below about a quarter of full drive an eccentric motor does not start to turn.
-constexpr double kWeakest = 64.0;
-constexpr double kStrongest = 255.0;
-constexpr double kPulse = 0.08;           // [s] a pulse lasts
-constexpr double kSlowestPeriod = 0.6;    // [s] between pulses at the threshold
-constexpr double kQuickestPeriod = 0.14;  // [s] at full force
+// An eccentric-mass motor does not start below about a quarter of full drive.
+constexpr double kMinIntensity = 64.0;
+constexpr double kMaxIntensity = 255.0;
+constexpr double kPulseDuration = 0.08;   // [s]
+constexpr double kMaxPulsePeriod = 0.6;   // [s] at the threshold
+constexpr double kMinPulsePeriod = 0.14;  // [s] at full force
 }  // namespace
 
 TactorIntensities TactileMap::step(const HandManifold& manifold, double dt) noexcept {
@@ -35,12 +35,12 @@ TactorIntensities TactileMap::step(const HandManifold& manifold, double dt) noex
     const double radius = std::sqrt(y * y + z * z);
     for (int tactor = 0; tactor < kTactors; ++tactor) {
       const auto& direction = kDirections[static_cast<std::size_t>(tactor)];
-      // 1 right at the tactor, 0 at the next one
-      const double nearness =
+      // 1 at the tactor, 0 at its neighbours
+      const double weight =
           radius < kAxisRadius ? 1.0 : (y * direction[0] + z * direction[1]) / radius * 2.0 - 1.0;
-      double& felt = forces_[static_cast<std::size_t>(tactor)];
-      // several points of one dent are one contact: the strongest counts
-      felt = std::max(felt, force * std::max(0.0, nearness));
+      double& tactor_force = forces_[static_cast<std::size_t>(tactor)];
+      // several points usually belong to one contact: the largest force counts
+      tactor_force = std::max(tactor_force, force * std::max(0.0, weight));
     }
   }
   TactorIntensities intensities{};
@@ -51,15 +51,16 @@ TactorIntensities TactileMap::step(const HandManifold& manifold, double dt) noex
     }
     const double strength = std::min(1.0, forces_[i] / options_.full_force);
     if (options_.mode == TactileMode::kIntensity) {
-      intensities[i] = static_cast<std::uint8_t>(kWeakest + strength * (kStrongest - kWeakest));
+      intensities[i] = static_cast<std::uint8_t>(kMinIntensity + strength * (kMaxIntensity - kMinIntensity));
       continue;
     }
-    const double period = kSlowestPeriod + strength * (kQuickestPeriod - kSlowestPeriod);
-    intensities[i] = pulse_clock_[i] < kPulse ? static_cast<std::uint8_t>(kStrongest) : std::uint8_t{0};
+    const double period = kMaxPulsePeriod + strength * (kMinPulsePeriod - kMaxPulsePeriod);
+    intensities[i] =
+        pulse_clock_[i] < kPulseDuration ? static_cast<std::uint8_t>(kMaxIntensity) : std::uint8_t{0};
     pulse_clock_[i] += dt;
     if (pulse_clock_[i] >= period) pulse_clock_[i] = 0.0;
   }
   return intensities;
 }
 
-}  // namespace tenon
+}  // namespace tenon::haptic

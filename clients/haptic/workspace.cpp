@@ -2,30 +2,30 @@
 
 #include <algorithm>
 
-namespace tenon {
+namespace tenon::haptic {
 
 namespace {
-// A minimum-jerk path's highest speed is 15/8 of its mean.
-constexpr double kMinimumJerkPeak = 1.875;
-constexpr double kShortestGoTo = 0.2;  // [s]
+// Peak over mean speed of a minimum-jerk path: 15/8.
+constexpr double kMinimumJerkPeak = 1.875;  // [-]
+constexpr double kShortestMove = 0.2;       // [s]
 
 double minimumJerk(double s) { return s * s * s * (10.0 + s * (-15.0 + s * 6.0)); }
 }  // namespace
 
-void Workspace::place(const Vector3& p_WC) noexcept {
+void Workspace::setCentre(const Vector3& p_WC) noexcept {
   p_WC_ = p_WC;
   v_WC_.setZero();
-  going_ = false;
+  move_in_progress_ = false;
   free_ticks_ = options_.settle_ticks;
 }
 
-void Workspace::goTo(const Vector3& p_WC) noexcept {
-  going_ = true;
-  go_from_ = p_WC_;
-  go_to_ = p_WC;
-  go_elapsed_ = 0.0;
-  const double distance = (go_to_ - go_from_).norm();
-  go_duration_ = std::max(kShortestGoTo, kMinimumJerkPeak * distance / options_.go_to_speed);
+void Workspace::moveTo(const Vector3& p_WC) noexcept {
+  move_in_progress_ = true;
+  move_from_ = p_WC_;
+  move_to_ = p_WC;
+  move_elapsed_ = 0.0;
+  const double distance = (move_to_ - move_from_).norm();
+  move_duration_ = std::max(kShortestMove, kMinimumJerkPeak * distance / options_.move_speed);
 }
 
 void Workspace::step(const Vector3& p_DH, bool in_contact, double dt) noexcept {
@@ -36,21 +36,21 @@ void Workspace::step(const Vector3& p_DH, bool in_contact, double dt) noexcept {
     ++free_ticks_;
   }
   if (free_ticks_ >= options_.settle_ticks) {
-    if (going_) {
-      go_elapsed_ += dt;
-      const double s = std::min(1.0, go_elapsed_ / go_duration_);
-      p_WC_ = go_from_ + minimumJerk(s) * (go_to_ - go_from_);
-      if (s >= 1.0) going_ = false;
+    if (move_in_progress_) {
+      move_elapsed_ += dt;
+      const double s = std::min(1.0, move_elapsed_ / move_duration_);
+      p_WC_ = move_from_ + minimumJerk(s) * (move_to_ - move_from_);
+      if (s >= 1.0) move_in_progress_ = false;
     } else if (const double r_h = p_DH.norm(); r_h > options_.radius) {
-      // eq. 1; C_h - C_w is the hand's place in the device
+      // paper eq. 1; C_h - C_w is p_DH
       p_WC_ += options_.gain * dt * (1.0 - options_.radius / r_h) * p_DH;
     }
-  } else if (going_) {
-    // a path broken by contact is planned anew from where it stopped, so it starts gently again
-    goTo(go_to_);
+  } else if (move_in_progress_) {
+    // after a contact the path starts anew from rest
+    moveTo(move_to_);
   }
   v_WC_ = (p_WC_ - before) / dt;
   moving_ = p_WC_ != before;
 }
 
-}  // namespace tenon
+}  // namespace tenon::haptic

@@ -2,39 +2,41 @@
 
 #include "idl/types/spatial.h"
 
-namespace tenon {
+namespace tenon::haptic {
 
-/// How a device's workspace moves through a larger scene; numbers are the device's own (DeviceCaps).
+/// Parameters of indexing; radius and gain come from DeviceCaps.
 struct WorkspaceOptions {
-  double radius = 0.2;         ///< r_w [m]
-  double gain = 1.5;           ///< lambda_w [1/s]
-  double go_to_speed = 0.4;    ///< [m/s] highest, half way of a "go to"
-  unsigned settle_ticks = 50;  ///< free of contact this long before the workspace moves again
+  double radius = 0.2;         ///< [m] r_w of paper eq. 1
+  double gain = 1.5;           ///< [1/s] lambda_w of paper eq. 1
+  double move_speed = 0.4;     ///< [m/s] peak speed of moveTo()
+  unsigned settle_ticks = 50;  ///< [ticks] without contact before the workspace moves again
 };
 
-/// Where the device's centre is in the scene: C_w of the paper (§4.3), and its two ways of moving.
+/// Position of the device's centre in the scene: C_w of the paper (§4.3).
 ///
-/// Indexing by eq. 1 moves it after a hand that leaves the sphere of radius r_w; "go to" takes it elsewhere
-/// on a smooth path. Both wait while the hand's object is in contact: the wall felt would otherwise move with
-/// the workspace. The device's axes are the world's, unscaled.
+/// Indexing by eq. 1 moves it while the hand is outside the sphere of radius r_w; moveTo() moves it to a
+/// given position on a minimum-jerk path. Both pause while the hand's object is in contact, because a contact
+/// would move with the workspace. The axes of D are parallel to W; the scale is 1.
 ///
 /// Threads: one. Real-time: everything.
 class Workspace {
  public:
   explicit Workspace(const WorkspaceOptions& options) : options_(options) {}
 
-  void place(const Vector3& p_WC) noexcept;
-  /// Takes C_w to another place; the hand may move meanwhile and keeps its place relative to C_w.
-  void goTo(const Vector3& p_WC) noexcept;
-  void stay() noexcept { going_ = false; }
-  [[nodiscard]] bool going() const noexcept { return going_; }
+  /// Places C_w and cancels a moveTo().
+  void setCentre(const Vector3& p_WC) noexcept;
+  /// Starts to move C_w to p_WC at up to move_speed. The hand may move relative to C_w meanwhile.
+  void moveTo(const Vector3& p_WC) noexcept;
+  void cancelMove() noexcept { move_in_progress_ = false; }
+  [[nodiscard]] bool moveInProgress() const noexcept { return move_in_progress_; }
 
-  /// One cycle of `dt` with the hand at p_DH. Contact stops it at once.
+  /// One cycle of `dt` [s] with the hand at p_DH. Contact stops the motion at once.
   void step(const Vector3& p_DH, bool in_contact, double dt) noexcept;
 
   [[nodiscard]] const Vector3& centre() const noexcept { return p_WC_; }
-  /// Of C_w, in the last cycle: adds to the hand's own velocity.
+  /// Velocity of C_w in the last cycle; the hand's velocity in W is the sum of it and the velocity in D.
   [[nodiscard]] const Vector3& velocity() const noexcept { return v_WC_; }
+  /// C_w moved in the last cycle.
   [[nodiscard]] bool moving() const noexcept { return moving_; }
   [[nodiscard]] Pose toWorld(const Pose& X_DH) const noexcept {
     return {p_WC_ + X_DH.translation(), X_DH.rotation()};
@@ -47,13 +49,13 @@ class Workspace {
   WorkspaceOptions options_;
   Vector3 p_WC_ = Vector3::Zero();
   Vector3 v_WC_ = Vector3::Zero();
-  Vector3 go_from_ = Vector3::Zero();
-  Vector3 go_to_ = Vector3::Zero();
-  double go_elapsed_ = 0.0;
-  double go_duration_ = 0.0;
-  unsigned free_ticks_ = 0;
-  bool going_ = false;
+  Vector3 move_from_ = Vector3::Zero();
+  Vector3 move_to_ = Vector3::Zero();
+  double move_elapsed_ = 0.0;   // [s]
+  double move_duration_ = 0.0;  // [s]
+  unsigned free_ticks_ = 0;     // since the last contact, up to settle_ticks
+  bool move_in_progress_ = false;
   bool moving_ = false;
 };
 
-}  // namespace tenon
+}  // namespace tenon::haptic

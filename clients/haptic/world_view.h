@@ -6,46 +6,49 @@
 
 #include "idl/types/messages.h"
 
-namespace tenon {
+namespace tenon::haptic {
 
-/// An object as this client last heard of it.
-struct SeenObject {
+/// Last received state of an object.
+struct ObservedObject {
   Pose X_WO;
   Twist V_WO;
   std::uint32_t epoch = 0;
   ObjectStatus status = ObjectStatus::kHidden;
   HandId holder;
   bool in_contact = false;
-  Tick heard = 0;  ///< the server's tick it is of
+  Tick updated_at = 0;  ///< server tick of this state
 
-  /// Can be seen and touched.
+  /// Visible and collidable.
   [[nodiscard]] bool present() const { return status != ObjectStatus::kHidden; }
 };
 
-/// The scene as one client last heard of it.
+/// Last received state of all objects of a session.
 ///
-/// A frame is packed and changed objects come first, so each object has its own age; a frame of an older life
-/// of the server is ignored, one of a newer life starts the picture anew.
+/// A frame may carry only some objects (changed ones first), so each object has its own age. A frame of an
+/// older server epoch is ignored; one of a newer epoch resets the ages.
 ///
 /// Threads: one. Real-time: everything but begin().
 class WorldView {
  public:
-  /// Sizes the view; objects stand where the scene says until a frame says otherwise.
+  /// Allocates; the objects take their initial poses from the scene.
   void begin(std::span<const SceneObject> objects, std::uint32_t server_epoch, Tick tick);
-  /// False when the frame was of an older life of the server.
+  /// False when the frame was ignored because of an older server epoch.
   bool receive(const WorldFrame& frame) noexcept;
 
-  [[nodiscard]] bool knows(ObjectId object) const noexcept { return object.value < objects_.size(); }
-  /// `knows(object)` must hold.
-  [[nodiscard]] const SeenObject& object(ObjectId object) const noexcept { return objects_[object.value]; }
+  [[nodiscard]] bool contains(ObjectId object) const noexcept { return object.value < objects_.size(); }
+  /// Precondition: contains(object).
+  [[nodiscard]] const ObservedObject& object(ObjectId object) const noexcept {
+    return objects_[object.value];
+  }
   [[nodiscard]] std::size_t size() const noexcept { return objects_.size(); }
+  /// Newest received tick.
   [[nodiscard]] Tick tick() const noexcept { return tick_; }
   [[nodiscard]] std::uint32_t serverEpoch() const noexcept { return server_epoch_; }
 
  private:
-  std::vector<SeenObject> objects_;
+  std::vector<ObservedObject> objects_;
   Tick tick_ = 0;
   std::uint32_t server_epoch_ = 0;
 };
 
-}  // namespace tenon
+}  // namespace tenon::haptic

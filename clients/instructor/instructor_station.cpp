@@ -3,42 +3,42 @@
 #include <optional>
 
 #include "clients/haptic/haptic_hand.h"
-#include "clients/instructor/simulated_instructor.h"
+#include "clients/simulated_person/simulated_instructor.h"
 #include "devices/catalog.h"
 #include "devices/simulated/simulated_device.h"
 
-namespace tenon {
+namespace tenon::instructor {
 
 namespace {
-// Short of the safety layer's wall, which is nothing to work against.
-constexpr double kComfortableReach = 0.9;
+// Fraction of the device's workspace radius that is used: stays clear of the wall of the safety layer.
+constexpr double kWorkspaceFraction = 0.9;
 }  // namespace
 
 struct InstructorStation::Parts {
   explicit Parts(const InstructorOptions& station) : options(station), person(station.person) {}
 
   InstructorOptions options;
-  std::unique_ptr<HapticDevice> device;
-  std::optional<HapticHand> hand;
-  SimulatedInstructor person;
+  std::unique_ptr<devices::HapticDevice> device;
+  std::optional<haptic::HapticHand> hand;
+  simulated_person::SimulatedInstructor person;
 
-  void movePerson(const WorldView& world, double dt) {
-    HumanArm* const flesh = handOf(*device);
-    if (flesh == nullptr) return;
-    HandSense sense;
-    sense.hand = hand->id();
-    sense.X_WH = hand->pose();
-    sense.F_Ho_W = hand->state().F_Ho_W;
-    if (hand->local().heard()) {
-      sense.object = hand->local().manifold().object;
-      sense.X_HO = hand->local().manifold().X_HO;
+  void movePerson(const haptic::WorldView& world, double dt) {
+    devices::HumanArm* const human_arm = devices::simulatedHumanArm(*device);
+    if (human_arm == nullptr) return;
+    simulated_person::HandPerception perception;
+    perception.hand = hand->id();
+    perception.X_WH = hand->pose();
+    perception.F_Ho_W = hand->state().F_Ho_W;
+    if (hand->local().hasManifold()) {
+      perception.object = hand->local().manifold().object;
+      perception.X_HO = hand->local().manifold().X_HO;
     }
-    Workspace& workspace = hand->workspace();
-    sense.p_WC = workspace.centre();
-    sense.reach = kComfortableReach * hand->caps().workspace_radius;
-    person.step(sense, workspace, world, dt);
-    flesh->intend(workspace.toDevice(person.intent()));
-    flesh->stiffen(person.contraction());
+    haptic::Workspace& workspace = hand->workspace();
+    perception.p_WC = workspace.centre();
+    perception.reach = kWorkspaceFraction * hand->caps().workspace_radius;
+    person.step(perception, workspace, world, dt);
+    human_arm->setIntent(workspace.toDevice(person.intendedPose()));
+    human_arm->setContraction(person.contraction());
   }
 };
 
@@ -50,7 +50,7 @@ InstructorStation::~InstructorStation() {
 
 Result<std::unique_ptr<InstructorStation>> InstructorStation::open(const InstructorOptions& options) {
   auto parts = std::make_unique<Parts>(options);
-  auto device = openDevice(options.device, options.person.seed);
+  auto device = devices::openDevice(options.device, options.person.seed);
   if (!device) return fail(device.error().what);
   parts->device = std::move(*device);
   return std::unique_ptr<InstructorStation>(new InstructorStation(std::move(parts)));
@@ -66,24 +66,24 @@ void InstructorStation::begin(std::span<const HandId> hand_ids) {
   }
   Pose X_WStart(start);
   if (hand_ids[0].valid()) {
-    HapticHand& hand = parts_->hand.emplace(*parts_->device);
+    haptic::HapticHand& hand = parts_->hand.emplace(*parts_->device);
     if (!hand.begin(hand_ids[0], client_, start)) {
-      report(StationEventKind::kDeviceFault, hand_ids[0], static_cast<std::uint32_t>(hand.device().fault),
-             0.0);
+      report(haptic::StationEventKind::kDeviceFault, hand_ids[0],
+             static_cast<std::uint32_t>(hand.device().fault), 0.0);
     }
     X_WStart = hand.pose();
   }
   parts_->person.begin(sceneObjects(), X_WStart);
 }
 
-void InstructorStation::heard(const HandManifold& manifold) noexcept {
+void InstructorStation::manifoldReceived(const HandManifold& manifold) noexcept {
   if (parts_->hand) parts_->hand->receive(manifold);
 }
 
 void InstructorStation::stepChanged() { parts_->person.read(currentStep()); }
 
 void InstructorStation::stopChanged(bool engaged) {
-  if (parts_->hand) parts_->hand->stop(engaged);
+  if (parts_->hand) parts_->hand->setEmergencyStop(engaged);
 }
 
 void InstructorStation::step(std::uint32_t seq) noexcept {
@@ -99,6 +99,6 @@ void InstructorStation::step(std::uint32_t seq) noexcept {
   if (parts_->options.simulated_person) parts_->movePerson(world_, dt);
 }
 
-const char* InstructorStation::doing() const noexcept { return parts_->person.doing(); }
+const char* InstructorStation::activity() const noexcept { return parts_->person.activity(); }
 
-}  // namespace tenon
+}  // namespace tenon::instructor

@@ -5,35 +5,38 @@
 #include <string>
 #include <vector>
 
-#include "clients/haptic/person.h"
 #include "clients/haptic/station.h"
+#include "clients/simulated_person/person.h"
 #include "idl/types/result.h"
 
-namespace tenon {
+namespace tenon::instructor {
 
 struct InstructorOptions {
   std::string device = "sigma7-sim";  ///< or falcon-sim, omega3-sim
-  PersonOptions person;
-  bool simulated_person = true;  ///< moves a simulated device; false: somebody else does
+  simulated_person::PersonOptions person;
+  bool simulated_person =
+      true;  ///< a simulated instructor moves the simulated device; false: it moves otherwise
 };
 
-/// The instructor's station: a desk device that moves the teaching assistant (hand `instructor`, paper §4.4).
+/// The instructor's station: a desktop haptic device that moves the pointer (teaching assistant; hand
+/// `instructor`, paper §4.4).
 ///
 /// Threads, Real-time: as Station.
-class InstructorStation : public Station {
+class InstructorStation : public haptic::Station {
  public:
+  /// Fails with a sentence when the device is unknown or cannot be opened.
   static Result<std::unique_ptr<InstructorStation>> open(const InstructorOptions& options);
   ~InstructorStation() override;
 
   [[nodiscard]] std::vector<std::string> handNames() const override;
   [[nodiscard]] Role role() const override { return Role::kInstructor; }
   void step(std::uint32_t seq) noexcept override;
-  /// What the instructor is doing, in a word or two: for progress and tests.
-  [[nodiscard]] const char* doing() const noexcept;
+  /// What the simulated instructor does, in a word or two: for progress output and tests.
+  [[nodiscard]] const char* activity() const noexcept;
 
  protected:
   void begin(std::span<const HandId> hand_ids) override;
-  void heard(const HandManifold& manifold) noexcept override;
+  void manifoldReceived(const HandManifold& manifold) noexcept override;
   void stepChanged() override;
   void stopChanged(bool engaged) override;
 
@@ -43,4 +46,4 @@ class InstructorStation : public Station {
   std::unique_ptr<Parts> parts_;
 };
 
-}  // namespace tenon
+}  // namespace tenon::instructor

@@ -13,22 +13,25 @@ std::atomic<bool> stop{false};
 void onSignal(int /*signal*/) { stop = true; }
 
 int run(int argc, char** argv) {
-  CLI::App app{"tenon-observer: follows a session: steps, contacts, events; ends with it, exit 0 on success"};
-  tenon::ObserverOptions shown;
-  tenon::MembershipWishes program{.person = "observer"};
+  CLI::App app{
+      "tenon-observer: prints steps, contacts and events of a session until it ends; exit 0 if it succeeded"};
+  tenon::observer::ObserverOptions options;
+  tenon::wire::MembershipOptions membership{.person = "observer"};
   unsigned wait = 10;
-  app.add_flag("--json", shown.json, "a JSON object a line instead of sentences");
-  app.add_option("--session", program.session, "its name; the first one announced when left out");
-  app.add_option("--domain", program.domain, "DDS domain")->capture_default_str();
-  app.add_option("--person", program.person, "the name others see")->capture_default_str();
-  app.add_option("--language", shown.language, "of titles and instructions")->capture_default_str();
-  app.add_option("--wait", wait, "seconds to look for a server")->capture_default_str();
+  app.add_flag("--json", options.json, "print one JSON object per line");
+  app.add_option("--session", membership.session, "name of the session; default: the first one announced");
+  app.add_option("--domain", membership.domain, "DDS domain")->capture_default_str();
+  app.add_option("--person", membership.person, "name shown to the other participants")
+      ->capture_default_str();
+  app.add_option("--language", options.language, "language of titles and instructions")
+      ->capture_default_str();
+  app.add_option("--wait", wait, "seconds to search for a server")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  program.patience = std::chrono::seconds(wait);
+  membership.timeout = std::chrono::seconds(wait);
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
-  tenon::Observer observer(shown);
-  if (const auto ended = tenon::observe(observer, program, stop); !ended) {
+  tenon::observer::Observer observer(options);
+  if (const auto ended = tenon::observer::observeSession(observer, membership, stop); !ended) {
     std::fprintf(stderr, "tenon-observer: %s\n", ended.error().what.c_str());
     return 1;
   }

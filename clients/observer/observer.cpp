@@ -5,11 +5,11 @@
 
 #include "idl/types/names.h"
 
-namespace tenon {
+namespace tenon::observer {
 
 namespace {
 using Json = nlohmann::json;
-constexpr Tick kProgressEvery = 2000;  // [ticks]
+constexpr Tick kProgressPeriod = 2000;  // [ticks]
 constexpr double kDegrees = 57.29577951308232;
 
 std::string seconds(Tick tick) { return fmt::format("{:7.2f} s", static_cast<double>(tick) * kTickSeconds); }
@@ -43,7 +43,7 @@ const char* nameOf(Severity severity) {
 }
 }  // namespace
 
-void Observer::say(const std::string& line) const {
+void Observer::print(const std::string& line) const {
   std::fprintf(options_.out, "%s\n", line.c_str());
   std::fflush(options_.out);
 }
@@ -54,39 +54,45 @@ std::string Observer::titleOf(ObjectId object) const {
   return object.valid() ? fmt::format("object {}", object.value) : "nothing";
 }
 
-std::string Observer::in(const std::vector<LocalizedText>& texts) const {
+std::string Observer::localized(const std::vector<LocalizedText>& texts) const {
   for (const LocalizedText& text : texts) {
     if (text.language == options_.language) return text.text;
   }
   return texts.empty() ? std::string() : texts.front().text;
 }
 
-void Observer::hear(const StepState& step) {
+void Observer::receive(const SceneObject& object) {
+  const std::string& title = object.title.empty() ? object.name : object.title;
+  titles_[object.object] = title;
+  if (object.kind == "pointer" || object.kind == "assistant") pointer_titles_.insert(title);
+}
+
+void Observer::receive(const StepState& step) {
   const bool same = step.step == step_.step && step.phase == step_.phase && step.started == step_.started &&
                     step_.revision != 0;
   step_ = step;
   if (same) return;
   if (options_.json) {
-    say(Json{{"kind", "step"},
-             {"tick", step.started},
-             {"step", step.step},
-             {"steps", step.steps},
-             {"name", step.name},
-             {"phase", nameOf(step.phase)},
-             {"part", step.part},
-             {"instruction", in(step.instruction)}}
-            .dump());
+    print(Json{{"kind", "step"},
+               {"tick", step.started},
+               {"step", step.step},
+               {"steps", step.steps},
+               {"name", step.name},
+               {"phase", nameOf(step.phase)},
+               {"part", step.part},
+               {"instruction", localized(step.instruction)}}
+              .dump());
     return;
   }
-  const std::string title = in(step.title).empty() ? step.name : in(step.title);
-  say(fmt::format("{}  step {}/{}  {}: {}", seconds(step.started), step.step + 1, step.steps, title,
-                  nameOf(step.phase)));
-  if (step.phase == StepPhase::kActive) say(fmt::format("{:11}{}", "", in(step.instruction)));
+  const std::string title = localized(step.title).empty() ? step.name : localized(step.title);
+  print(fmt::format("{}  step {}/{}  {}: {}", seconds(step.started), step.step + 1, step.steps, title,
+                    nameOf(step.phase)));
+  if (step.phase == StepPhase::kActive) print(fmt::format("{:11}{}", "", localized(step.instruction)));
 }
 
-void Observer::hear(const StepProgress& progress) {
-  if (progress.tick < told_progress_ + kProgressEvery && progress.tick >= told_progress_) return;
-  told_progress_ = progress.tick;
+void Observer::receive(const StepProgress& progress) {
+  if (progress.tick < last_progress_ + kProgressPeriod && progress.tick >= last_progress_) return;
+  last_progress_ = progress.tick;
   if (options_.json) {
     Json conditions = Json::array();
     for (const ConditionValue& condition : progress.conditions) {
@@ -95,92 +101,96 @@ void Observer::hear(const StepProgress& progress) {
                             {"limit", condition.limit},
                             {"met", condition.met}});
     }
-    say(Json{{"kind", "progress"},
-             {"tick", progress.tick},
-             {"position_error", progress.position_error},
-             {"angle_error", progress.angle_error},
-             {"contact_seconds", progress.contact_seconds},
-             {"conditions", conditions}}
-            .dump());
+    print(Json{{"kind", "progress"},
+               {"tick", progress.tick},
+               {"position_error", progress.position_error},
+               {"angle_error", progress.angle_error},
+               {"contact_seconds", progress.contact_seconds},
+               {"conditions", conditions}}
+              .dump());
     return;
   }
   if (!step_.has_target) return;
-  say(fmt::format("{}    {:.1f} mm and {:.1f} degrees to go, {:.1f} s in contact", seconds(progress.tick),
-                  progress.position_error * 1e3, progress.angle_error * kDegrees, progress.contact_seconds));
+  print(fmt::format("{}    position error {:.1f} mm, angle error {:.1f} degrees, {:.1f} s in contact",
+                    seconds(progress.tick), progress.position_error * 1e3, progress.angle_error * kDegrees,
+                    progress.contact_seconds));
 }
 
-void Observer::hear(const ContactPairs& pairs) {
+void Observer::receive(const ContactPairs& pairs) {
   for (const PairContact& pair : pairs.pairs) {
     bool& touching = touching_[{pair.a, pair.b}];
     if (touching == pair.colliding) continue;
     touching = pair.colliding;
     const double force = pair.F_Ao_W.force.norm();
     if (options_.json) {
-      say(Json{{"kind", "contact"},
-               {"tick", pairs.tick},
-               {"a", titleOf(pair.a)},
-               {"b", titleOf(pair.b)},
-               {"colliding", pair.colliding},
-               {"force", force},
-               {"depth", pair.depth}}
-              .dump());
+      print(Json{{"kind", "contact"},
+                 {"tick", pairs.tick},
+                 {"a", titleOf(pair.a)},
+                 {"b", titleOf(pair.b)},
+                 {"colliding", pair.colliding},
+                 {"force", force},
+                 {"depth", pair.depth}}
+                .dump());
     } else if (pair.colliding) {
-      say(fmt::format("{}    {} touches {}", seconds(pairs.tick), titleOf(pair.a), titleOf(pair.b)));
+      print(fmt::format("{}    {} touches {}", seconds(pairs.tick), titleOf(pair.a), titleOf(pair.b)));
     }
   }
 }
 
-void Observer::hear(const EventLog& event) {
+void Observer::receive(const EventLog& event) {
   if (options_.json) {
-    say(Json{{"kind", "event"},
-             {"tick", event.tick},
-             {"severity", nameOf(event.severity)},
-             {"what", event.kind},
-             {"text", event.text}}
-            .dump());
+    print(Json{{"kind", "event"},
+               {"tick", event.tick},
+               {"severity", nameOf(event.severity)},
+               {"what", event.kind},
+               {"text", event.text}}
+              .dump());
     return;
   }
+  const bool grab = event.kind == "taken" || event.kind == "let go";
+  if (grab && pointer_titles_.contains(event.text.substr(0, event.text.rfind(" (")))) return;
   const char* mark = event.severity == Severity::kError     ? "!!"
                      : event.severity == Severity::kWarning ? "! "
                                                             : "  ";
-  say(fmt::format("{}  {}{}: {}", seconds(event.tick), mark, event.kind, event.text));
+  print(fmt::format("{}  {}{}: {}", seconds(event.tick), mark, event.kind, event.text));
 }
 
-void Observer::hear(const Presence& presence) {
-  bool& alive = people_[presence.client];
+void Observer::receive(const Presence& presence) {
+  bool& alive = participants_[presence.client];
   if (alive == presence.alive) return;
   alive = presence.alive;
   if (options_.json) {
-    say(Json{{"kind", "person"}, {"name", presence.name}, {"here", presence.alive}}.dump());
+    print(Json{{"kind", "person"}, {"name", presence.name}, {"here", presence.alive}}.dump());
   } else {
-    say(fmt::format("{:11}{} {}", "", presence.name, presence.alive ? "is here" : "has left"));
+    print(fmt::format("{:11}{} {}", "", presence.name, presence.alive ? "has joined" : "has left"));
   }
 }
 
-void Observer::hear(const EmergencyStop& stop) {
+void Observer::receive(const EmergencyStop& stop) {
   if (options_.json) {
-    say(Json{
+    print(Json{
         {"kind", "emergency stop"}, {"engaged", stop.engaged}, {"who", stop.who}, {"reason", stop.reason}}
-            .dump());
+              .dump());
   } else if (stop.engaged) {
-    say(fmt::format("{:11}!! EMERGENCY STOP by {}: {}", "", stop.who, stop.reason));
+    print(fmt::format("{:11}!! EMERGENCY STOP by {}: {}", "", stop.who, stop.reason));
   }
 }
 
-void Observer::hear(const RunState& run) {
+void Observer::receive(const RunState& run) {
   const bool same = run.phase == run_.phase && run.server_epoch == run_.server_epoch;
   run_ = run;
   if (same) return;
   if (options_.json) {
-    say(Json{{"kind", "run"},
-             {"tick", run.tick},
-             {"phase", runPhaseName(run.phase)},
-             {"reason", run.reason},
-             {"final_hash", fmt::format("{:016x}", run.final_hash)}}
-            .dump());
+    print(Json{{"kind", "run"},
+               {"tick", run.tick},
+               {"phase", runPhaseName(run.phase)},
+               {"reason", run.reason},
+               {"final_hash", fmt::format("{:016x}", run.final_hash)}}
+              .dump());
   } else {
-    say(fmt::format("{}  the session is {}{}{}", seconds(run.tick), runPhaseName(run.phase),
-                    run.reason.empty() ? "" : ": ", run.reason));
+    const std::string reason =
+        run.phase == RunPhase::kSucceeded || run.reason.empty() ? "" : ": " + run.reason;
+    print(fmt::format("{}  session {}{}", seconds(run.tick), runPhaseName(run.phase), reason));
   }
 }
 
@@ -189,4 +199,4 @@ bool Observer::over() const {
          run_.phase == RunPhase::kStopped;
 }
 
-}  // namespace tenon
+}  // namespace tenon::observer

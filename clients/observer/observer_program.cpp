@@ -5,34 +5,35 @@
 
 #include "idl/wire/endpoint.h"
 
-namespace tenon {
+namespace tenon::observer {
 
-Result<void> observe(Observer& observer, MembershipWishes wishes, const std::atomic<bool>& stop) {
-  wishes.role = Role::kObserver;
-  wishes.only_watches = true;
-  auto found = Membership::find(wishes, stop);
+Result<void> observeSession(Observer& observer, wire::MembershipOptions options,
+                            const std::atomic<bool>& stop) {
+  options.role = Role::kObserver;
+  options.passive = true;
+  auto found = wire::Membership::find(options, stop);
   if (!found) return fail(found.error().what);
-  Membership& member = **found;
+  wire::Membership& member = **found;
   if (auto joined = member.join(stop); !joined) return joined;
 
-  Inbox inbox;
+  wire::Inbox inbox;
   Result<void> all = member.watch(inbox);
-  const auto listen = [&]<class M>(const Topic<M>& topic) {
+  const auto subscribe = [&]<class M>(const wire::Topic<M>& topic) {
     if (!all) return;
-    all = inbox.on<M>(member.session(), topic, [&observer](const M& message) { observer.hear(message); });
+    all = inbox.on<M>(member.session(), topic, [&observer](const M& message) { observer.receive(message); });
   };
-  listen(kSceneObject);
-  listen(kPresence);
-  listen(kStepState);
-  listen(kStepProgress);
-  listen(kContactPairs100);
-  listen(kEventLog);
-  listen(kEmergencyStop);
-  listen(kRunState);
+  subscribe(wire::kSceneObject);
+  subscribe(wire::kPresence);
+  subscribe(wire::kStepState);
+  subscribe(wire::kStepProgress);
+  subscribe(wire::kContactPairs100);
+  subscribe(wire::kEventLog);
+  subscribe(wire::kEmergencyStop);
+  subscribe(wire::kRunState);
   if (!all) return all;
   while (!stop && !observer.over() && !member.serverIsGone()) inbox.dispatch(std::chrono::milliseconds(100));
   if (member.serverIsGone() && !observer.over()) return fail(*member.lost());
   return {};
 }
 
-}  // namespace tenon
+}  // namespace tenon::observer

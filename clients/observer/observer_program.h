@@ -6,12 +6,13 @@
 #include "idl/types/result.h"
 #include "idl/wire/membership.h"
 
-namespace tenon {
+namespace tenon::observer {
 
-/// Joins a session as observer and feeds `observer` until the run is over, the server is gone or `stop` is
-/// set.
+/// Joins a session as observer and passes its messages to `observer` until the run is over or `stop` is set.
+/// Fails with a sentence when no session is found, joining is refused, or the server is lost.
 ///
 /// Threads: one. Real-time: no.
-Result<void> observe(Observer& observer, MembershipWishes wishes, const std::atomic<bool>& stop);
+[[nodiscard]] Result<void> observeSession(Observer& observer, wire::MembershipOptions options,
+                                          const std::atomic<bool>& stop);
 
-}  // namespace tenon
+}  // namespace tenon::observer

@@ -9,24 +9,25 @@
 #include "idl/types/messages.h"
 #include "idl/types/result.h"
 
-namespace tenon {
+namespace tenon::recorder {
 
 struct RecorderOptions {
   std::filesystem::path file;
   std::string session;  ///< empty: the first one announced
   std::uint32_t domain = 0;
-  bool lockstep = false;              ///< refuse a session that runs by the clock
-  std::chrono::seconds patience{10};  ///< for a server to be found and to answer
-  std::function<void(const std::string&)> say;
+  bool lockstep = false;                           ///< refuse a session that runs in real time
+  std::chrono::seconds timeout{10};                ///< for a server to be found and to answer
+  std::function<void(const std::string&)> report;  ///< progress, one line per call; may be empty
 };
 
-/// Joins a session as recorder and writes all of it until the run is over, the server is gone or `stop` is
-/// set. The file gets a proper end in each case.
+/// Joins a session as recorder and writes all its topics until the run is over, the server is lost or `stop`
+/// is set. The file is completed (summary and index) in each case. Fails with a sentence when no session is
+/// found, joining is refused, the file cannot be written, or the server is lost before the run is over.
 ///
-/// It listens before it asks for its seat, so a server that waits for a recorder is recorded from its first
-/// tick.
+/// Subscribes before it joins, so a server that waits for a recorder is recorded from its first tick.
 ///
 /// Threads: one. Real-time: no.
-Result<RecorderStatus> record(const RecorderOptions& options, const std::atomic<bool>& stop);
+[[nodiscard]] Result<RecorderStatus> recordSession(const RecorderOptions& options,
+                                                   const std::atomic<bool>& stop);
 
-}  // namespace tenon
+}  // namespace tenon::recorder

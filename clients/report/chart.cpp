@@ -5,17 +5,17 @@
 
 #include <fmt/format.h>
 
-namespace tenon {
+namespace tenon::report {
 namespace {
 
-// in units of the view box
+// all in units of the view box, but for kGap
 constexpr double kWidth = 1000.0, kHeight = 230.0;
 constexpr double kLeft = 52.0, kRight = 988.0, kTop = 46.0, kBottom = 204.0;
-constexpr double kHole = 0.5;    // [s] without a value: the line is broken
-constexpr double kLetter = 5.8;  // width of one, for what fits into a band
+constexpr double kGap = 0.5;          // [s] without a value breaks the line
+constexpr double kLetterWidth = 5.8;  // mean, to see whether a label fits
 constexpr int kColumns = static_cast<int>(kRight - kLeft);
 
-/// A distance between ticks of 1, 2 or 5 times a power of ten, for about `count` of them.
+/// Distance of about `count` axis ticks: 1, 2 or 5 times a power of ten.
 double tickStep(double range, int count) {
   const double rough = range / count;
   const double power = std::pow(10.0, std::floor(std::log10(rough)));
@@ -35,15 +35,15 @@ struct Axes {
 };
 
 Axes axesFor(const Chart& chart, double duration) {
-  double most = std::max(chart.least_top, chart.limit * 1.1);
-  for (const Curve& curve : chart.curves)
-    for (const SeriesPoint& point : *curve.series) most = std::max(most, point.value * curve.scale);
-  if (chart.cut > 0.0) most = std::min(most, chart.cut);
-  const double step = tickStep(most, 4);
-  return {std::max(duration, 1e-3), step * std::ceil(most / step - 1e-9)};
+  double highest = std::max(chart.least_top, chart.limit * 1.1);
+  for (const ChartCurve& curve : chart.curves)
+    for (const SeriesPoint& point : *curve.series) highest = std::max(highest, point.value * curve.scale);
+  if (chart.cut > 0.0) highest = std::min(highest, chart.cut);
+  const double step = tickStep(highest, 4);
+  return {std::max(duration, 1e-3), step * std::ceil(highest / step - 1e-9)};
 }
 
-std::string drawBands(const Axes& axes, const std::vector<Band>& bands) {
+std::string drawBands(const Axes& axes, const std::vector<ChartBand>& bands) {
   std::string svg;
   for (std::size_t i = 0; i < bands.size(); ++i) {
     const double from = axes.x(bands[i].begin), width = std::max(0.0, axes.x(bands[i].end) - from);
@@ -52,8 +52,8 @@ std::string drawBands(const Axes& axes, const std::vector<Band>& bands) {
         escaped(bands[i].title), i % 2, from, kTop - 18.0, width, kBottom - kTop + 18.0);
     const std::string number = std::to_string(i + 1);
     const std::string full = number + " " + bands[i].label;
-    const bool fits = kLetter * static_cast<double>(full.size()) < width;
-    if (fits || kLetter * static_cast<double>(number.size()) < width)
+    const bool fits = kLetterWidth * static_cast<double>(full.size()) < width;
+    if (fits || kLetterWidth * static_cast<double>(number.size()) < width)
       svg += fmt::format("<text class=\"step\" x=\"{:.1f}\" y=\"{}\">{}</text>", from + width / 2.0,
                          kTop - 6.0, escaped(fits ? full : number));
     svg += "</g>";
@@ -80,9 +80,9 @@ std::string drawGrid(const Axes& axes) {
   return svg;
 }
 
-std::string drawMarks(const Axes& axes, const std::vector<Mark>& marks) {
+std::string drawMarks(const Axes& axes, const std::vector<ChartMark>& marks) {
   std::string svg;
-  for (const Mark& mark : marks) {
+  for (const ChartMark& mark : marks) {
     const double x = axes.x(mark.time);
     svg += fmt::format(
         "<g class=\"mark {0}\"><title>{1}</title><path d=\"M{2:.1f} {3}V{4}\"/>"
@@ -92,12 +92,12 @@ std::string drawMarks(const Axes& axes, const std::vector<Mark>& marks) {
   return svg;
 }
 
-std::string drawCurve(const Axes& axes, const Curve& curve) {
+std::string drawCurve(const Axes& axes, const ChartCurve& curve) {
   std::string path;
   const Series& series = *curve.series;
-  double before = -1e9;
+  double previous = -1e9;
   for (std::size_t i = 0; i < series.size();) {
-    // all values of one column of pixels, the earlier of the two extremes first
+    // the two extremes of one column of pixels, the earlier first
     const auto column = static_cast<int>(series[i].time / axes.duration * kColumns);
     std::size_t low = i, high = i, last = i;
     for (; last < series.size() && static_cast<int>(series[last].time / axes.duration * kColumns) == column;
@@ -105,12 +105,12 @@ std::string drawCurve(const Axes& axes, const Curve& curve) {
       if (series[last].value < series[low].value) low = last;
       if (series[last].value > series[high].value) high = last;
     }
-    const bool is_new = series[i].time - before > std::max(kHole, 3.0 * axes.duration / kColumns);
+    const bool is_new = series[i].time - previous > std::max(kGap, 3.0 * axes.duration / kColumns);
     const double x = axes.x(series[i].time);
     path += fmt::format("{}{:.1f} {:.1f}", is_new ? "M" : "L", x,
                         axes.y(series[std::min(low, high)].value * curve.scale));
     if (low != high) path += fmt::format("V{:.1f}", axes.y(series[std::max(low, high)].value * curve.scale));
-    before = series[last - 1].time;
+    previous = series[last - 1].time;
     i = last;
   }
   return path.empty() ? "" : fmt::format("<path class=\"curve {}\" d=\"{}\"/>", curve.style, path);
@@ -123,16 +123,16 @@ std::string drawHead(const Chart& chart, const Axes& axes) {
   double x = kRight;
   for (auto curve = chart.curves.rbegin(); curve != chart.curves.rend(); ++curve) {
     std::size_t above = 0;
-    double most = 0.0;
+    double highest = 0.0;
     for (const SeriesPoint& point : *curve->series) {
-      most = std::max(most, point.value * curve->scale);
+      highest = std::max(highest, point.value * curve->scale);
       if (point.value * curve->scale > axes.top) ++above;
     }
     std::string name = curve->name;
-    if (above > 0) name += fmt::format(" ({} above, up to {:.3g})", above, most);
+    if (above > 0) name += fmt::format(" ({} above, up to {:.3g})", above, highest);
     svg += fmt::format("<text class=\"legend\" text-anchor=\"end\" x=\"{:.1f}\" y=\"16\">{}</text>", x,
                        escaped(name));
-    x -= kLetter * static_cast<double>(name.size()) + 6.0;
+    x -= kLetterWidth * static_cast<double>(name.size()) + 6.0;
     svg += fmt::format("<path class=\"curve thick {}\" d=\"M{:.1f} 12h-18\"/>", curve->style, x);
     x -= 34.0;
   }
@@ -164,13 +164,13 @@ std::string escaped(std::string_view text) {
   return safe;
 }
 
-std::string drawChart(const Chart& chart, double duration, const std::vector<Band>& bands,
-                      const std::vector<Mark>& marks) {
+std::string drawChart(const Chart& chart, double duration, const std::vector<ChartBand>& bands,
+                      const std::vector<ChartMark>& marks) {
   const Axes axes = axesFor(chart, duration);
   std::string svg = fmt::format("<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{} over time\">",
                                 kWidth, kHeight, escaped(chart.title));
   svg += drawBands(axes, bands) + drawGrid(axes) + drawMarks(axes, marks);
-  for (const Curve& curve : chart.curves) svg += drawCurve(axes, curve);
+  for (const ChartCurve& curve : chart.curves) svg += drawCurve(axes, curve);
   if (chart.limit > 0.0) {
     const double y = axes.y(chart.limit);
     svg += fmt::format("<path class=\"limit\" d=\"M{} {:.1f}H{}\"/>", kLeft, y, kRight);
@@ -180,4 +180,4 @@ std::string drawChart(const Chart& chart, double duration, const std::vector<Ban
   return svg + drawHead(chart, axes) + "</svg>\n";
 }
 
-}  // namespace tenon
+}  // namespace tenon::report

@@ -4,47 +4,51 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/report/session_story.h"
+#include "clients/report/session_analysis.h"
 
-namespace tenon {
+namespace tenon::report {
 
-struct Curve {
+/// One line of a chart.
+struct ChartCurve {
   std::string name;
-  std::string style;  ///< CSS class of its colour: c1, c2, ...
-  const Series* series = nullptr;
-  double scale = 1.0;  ///< from SI to the chart's unit
+  std::string style;               ///< CSS class of its colour: c1 to c4
+  const Series* series = nullptr;  ///< must outlive the chart
+  double scale = 1.0;              ///< [-] from SI to the chart's unit
 };
 
-struct Band {
+/// A stretch of time with a label, as one step.
+struct ChartBand {
   double begin = 0.0, end = 0.0;  ///< [s]
   std::string label;
-  std::string title;  ///< shown when pointed at
+  std::string title;  ///< tooltip
 };
 
-struct Mark {
+/// A dot at an event.
+struct ChartMark {
   double time = 0.0;  ///< [s]
-  std::string style;  ///< good, warn or bad
-  std::string title;
+  std::string style;  ///< CSS class: good, warn or bad
+  std::string title;  ///< tooltip
 };
 
+/// Lines over session time with one value axis, which begins at 0.
 struct Chart {
   std::string title;
   std::string unit;
-  std::vector<Curve> curves;
-  double limit = 0.0;  ///< a line that should not be crossed; 0 for none
+  std::vector<ChartCurve> curves;
+  double limit = 0.0;  ///< [unit] drawn as a dashed line; 0: none
   std::string limit_name;
-  double least_top = 1.0;  ///< the axis reaches at least here
-  double cut = 0.0;        ///< and at most here, 0 for any height; what is higher is cut off and counted
+  double least_top = 1.0;  ///< [unit] the axis reaches at least to here
+  double cut = 0.0;        ///< [unit] and at most to here; 0: no bound. Higher values are clipped and counted
 };
 
-/// Text as it may stand in HTML or SVG.
+/// Escapes text for HTML and SVG.
 [[nodiscard]] std::string escaped(std::string_view text);
 
-/// A diagram over session time as an SVG element. Of the values that share a column of pixels the smallest
-/// and the largest are drawn, so no peak is lost however long the session was.
+/// Draws a chart of `duration` [s] as an SVG element. Of the values in one column of pixels the smallest and
+/// the largest are drawn, so no peak is lost in long sessions.
 ///
 /// Threads: any. Real-time: no.
-[[nodiscard]] std::string drawChart(const Chart& chart, double duration, const std::vector<Band>& bands,
-                                    const std::vector<Mark>& marks);
+[[nodiscard]] std::string drawChart(const Chart& chart, double duration, const std::vector<ChartBand>& bands,
+                                    const std::vector<ChartMark>& marks);
 
-}  // namespace tenon
+}  // namespace tenon::report

@@ -6,12 +6,12 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/report/page.h"
-#include "clients/report/session_story.h"
+#include "clients/report/session_analysis.h"
 #include "clients/report/summary.h"
 
 namespace {
 
-int complain(const std::string& what) {
+int printError(const std::string& what) {
   std::fprintf(stderr, "tenon-report: %s\n", what.c_str());
   return 2;
 }
@@ -23,32 +23,33 @@ bool save(const std::filesystem::path& file, const std::string& text) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"tenon-report: tells a trainer what a recording holds: a table, report.html and summary.json"};
+  CLI::App app{"tenon-report: makes a report of a recording: a table, report.html and summary.json"};
   std::filesystem::path recording, folder;
   std::string language = "en";
   bool json = false;
   app.add_option("recording", recording, "an MCAP file of tenon-record")->required();
-  app.add_option("-o,--output", folder, "folder for report.html and summary.json; it is made if missing");
+  app.add_option("-o,--output", folder, "folder for report.html and summary.json; created if missing");
   app.add_flag("--json", json, "print the summary as JSON instead of a table");
-  app.add_option("--language", language, "of the steps' titles")->capture_default_str();
-  app.footer("Exit code: 0 only if the run succeeded and every step was done; 2 if there is no report.");
+  app.add_option("--language", language, "language of the steps' titles")->capture_default_str();
+  app.footer("Exit code: 0 if the run succeeded and every step was done, 1 if not, 2 if there is no report.");
   CLI11_PARSE(app, argc, argv);
 
-  const auto story = tenon::readStory(recording, language);
-  if (!story) return complain(story.error().what);
-  // texts of a recording may be any bytes
+  const auto analysis = tenon::report::analyzeRecording(recording, language);
+  if (!analysis) return printError(analysis.error().what);
+  // texts in a recording may be invalid UTF-8
   const std::string summary =
-      tenon::summaryJson(*story).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
-  std::fputs((json ? summary : tenon::summaryText(*story)).c_str(), stdout);
+      tenon::report::summaryJson(*analysis).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) +
+      "\n";
+  std::fputs((json ? summary : tenon::report::summaryText(*analysis)).c_str(), stdout);
   if (!folder.empty()) {
     std::error_code problem;
     std::filesystem::create_directories(folder, problem);
     const bool has_picture = std::filesystem::exists(folder / "scene.png", problem);
-    if (!save(folder / "report.html", tenon::reportPage(*story, has_picture ? "scene.png" : "")) ||
+    if (!save(folder / "report.html", tenon::report::reportPage(*analysis, has_picture ? "scene.png" : "")) ||
         !save(folder / "summary.json", summary))
-      return complain(folder.string() + ": the report cannot be written there");
+      return printError(folder.string() + ": the report cannot be written there");
   }
-  return story->succeeded() ? 0 : 1;
+  return analysis->succeeded() ? 0 : 1;
 }
 
 }  // namespace
@@ -57,6 +58,6 @@ int main(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const std::exception& problem) {
-    return complain(problem.what());
+    return printError(problem.what());
   }
 }

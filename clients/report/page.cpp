@@ -12,7 +12,7 @@
 #include "clients/report/summary.h"
 #include "idl/types/names.h"
 
-namespace tenon {
+namespace tenon::report {
 namespace {
 
 constexpr std::string_view kStyle = R"css(
@@ -79,8 +79,8 @@ std::string_view styleOf(StepPhase phase) {
   return phase == StepPhase::kTimedOut ? "bad" : "warn";
 }
 
-/// Of the log, what belongs into a diagram; nullptr for the rest.
-const char* markOf(const SessionEvent& event) {
+/// CSS class of an event that is marked in the charts; nullptr for all others.
+const char* markStyleOf(const SessionEvent& event) {
   if (event.kind == "mounted") return "good";
   if (event.severity == Severity::kError || event.kind == "emergency stop") return "bad";
   if (event.severity == Severity::kWarning || event.kind == "hand frozen" || event.kind == "safety")
@@ -88,12 +88,13 @@ const char* markOf(const SessionEvent& event) {
   return nullptr;
 }
 
-/// A safety layer may act many times a second: what follows its like within two seconds is told with it.
+/// Joins repeated events: a safety layer may act many times a second, so an event that follows one of its
+/// kind within 2 s is counted there.
 std::vector<SessionEvent> condensed(const std::vector<SessionEvent>& events) {
-  constexpr double kTogether = 2.0;
+  constexpr double kJoinTime = 2.0;  // [s]
   struct Group {
-    std::size_t place = 0;
-    double last = 0.0;
+    std::size_t index = 0;  // of its first event in `few`
+    double last = 0.0;      // [s]
     int more = 0;
   };
   std::vector<SessionEvent> few;
@@ -102,7 +103,7 @@ std::vector<SessionEvent> condensed(const std::vector<SessionEvent>& events) {
   for (const SessionEvent& event : events) {
     const bool repeats = event.kind == "safety" || event.kind == "refused";
     const auto known = newest.find(event.kind);
-    if (repeats && known != newest.end() && event.time - groups[known->second].last < kTogether) {
+    if (repeats && known != newest.end() && event.time - groups[known->second].last < kJoinTime) {
       groups[known->second].last = event.time;
       ++groups[known->second].more;
       continue;
@@ -113,29 +114,29 @@ std::vector<SessionEvent> condensed(const std::vector<SessionEvent>& events) {
   }
   for (const Group& group : groups)
     if (group.more > 0)
-      few[group.place].text += fmt::format(" (and {} more until {:.1f} s)", group.more, group.last);
+      few[group.index].text += fmt::format(" (and {} more until {:.1f} s)", group.more, group.last);
   return few;
 }
 
-std::string head(const SessionStory& story) {
-  const std::string title = escaped(story.title.empty() ? "Session " + story.session : story.title);
+std::string head(const SessionAnalysis& analysis) {
+  const std::string title = escaped(analysis.title.empty() ? "Session " + analysis.session : analysis.title);
   std::string html = fmt::format(
       "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{0}: report</title>\n"
       "<style>{1}</style>\n</head>\n<body>\n<main>\n<h1>{0}</h1>\n<p class=\"soft\">{2}",
-      title, kStyle, dateOf(story.began_ns));
-  for (const Person& person : story.people) {
-    if (person.role == Role::kRecorder) continue;
-    html += fmt::format(" · {} ({})", escaped(person.name), roleName(person.role));
+      title, kStyle, dateOf(analysis.began_ns));
+  for (const Participant& participant : analysis.participants) {
+    if (participant.role == Role::kRecorder) continue;
+    html += fmt::format(" · {} ({})", escaped(participant.name), roleName(participant.role));
   }
-  if (story.lockstep) html += " · lockstep, not in real time";
+  if (analysis.lockstep) html += " · lockstep, not in real time";
   html += "</p>\n";
-  html +=
-      fmt::format("<p><span class=\"outcome {}\">{}</span> <span class=\"soft\">{}</span></p>\n",
-                  story.succeeded() ? "good" : "bad", escaped(outcomeOf(story)), escaped(story.run.reason));
-  if (!story.problem.empty())
-    html += fmt::format("<p class=\"card warning\"><b class=\"warn\">Careful:</b> {}</p>\n",
-                        escaped(story.problem));
+  html += fmt::format("<p><span class=\"outcome {}\">{}</span> <span class=\"soft\">{}</span></p>\n",
+                      analysis.succeeded() ? "good" : "bad", escaped(outcomeOf(analysis)),
+                      escaped(analysis.run.reason));
+  if (!analysis.problem.empty())
+    html += fmt::format("<p class=\"card warning\"><b class=\"warn\">Warning:</b> {}</p>\n",
+                        escaped(analysis.problem));
   return html;
 }
 
@@ -143,128 +144,136 @@ std::string tile(const std::string& value, std::string_view what) {
   return fmt::format("<div class=\"tile\"><b>{}</b><span>{}</span></div>", value, what);
 }
 
-std::string tiles(const SessionStory& story) {
+std::string tiles(const SessionAnalysis& analysis) {
   std::string html = "<div class=\"tiles\">";
-  html +=
-      tile(fmt::format("{:.0f}:{:04.1f}", std::floor(story.duration / 60.0), std::fmod(story.duration, 60.0)),
-           "minutes in session");
-  html += tile(fmt::format("{:.1f} N", story.whole.peak_force), "largest force on a hand");
-  html += tile(fmt::format("{:.1f} s", story.whole.contact_seconds), "in contact");
-  html += tile(fmt::format("{:.2f} mm", 1e3 * story.whole.gap), "largest device–proxy gap");
-  html += tile(fmt::format("{:.2f} mm", 1e3 * story.whole.depth), "deepest in a part's field");
-  html += tile(fmt::format("{:.0f} %", story.whole.load), "largest load");
+  html += tile(fmt::format("{:.0f}:{:04.1f}", std::floor(analysis.duration / 60.0),
+                           std::fmod(analysis.duration, 60.0)),
+               "session time [min:s]");
+  html += tile(fmt::format("{:.1f} N", analysis.whole.peak_force), "largest force on a hand");
+  html += tile(fmt::format("{:.1f} s", analysis.whole.contact_seconds), "in contact");
+  html += tile(fmt::format("{:.2f} mm", 1e3 * analysis.whole.gap), "largest gap between hand and part");
+  html += tile(fmt::format("{:.2f} mm", 1e3 * analysis.whole.depth), "largest overlap of two parts");
+  html += tile(fmt::format("{:.0f} %", analysis.whole.load), "largest computational load");
   return html + "</div>\n";
 }
 
-std::string cells(double time, const Figures& figures) {
+std::string cells(double time, const SessionMetrics& metrics) {
   return fmt::format(
       "<td>{:.1f}</td><td>{:.1f}</td><td>{:.1f}</td><td>{:.1f}</td><td>{:.2f}</td><td>{:.2f}</td><td>{:.0f}</"
       "td>",
-      time, figures.peak_force, figures.mean_force, figures.contact_seconds, 1e3 * figures.gap,
-      1e3 * figures.depth, figures.load);
+      time, metrics.peak_force, metrics.mean_force, metrics.contact_seconds, 1e3 * metrics.gap,
+      1e3 * metrics.depth, metrics.load);
 }
 
-std::string stepTable(const SessionStory& story) {
+std::string stepTable(const SessionAnalysis& analysis) {
   std::string html =
       "<h2>Steps</h2>\n<div class=\"card\"><table>\n<tr><th></th><th>step</th><th>time<br>[s]</th>"
       "<th>peak force<br>[N]</th><th>mean force<br>in contact [N]</th><th>contact<br>[s]</th>"
-      "<th>device–proxy<br>gap [mm]</th><th>field depth<br>[mm]</th><th>load<br>[%]</th><th "
+      "<th>hand–part<br>gap [mm]</th><th>overlap<br>[mm]</th><th>comp. load<br>[%]</th><th "
       "class=\"state\"></th></tr>\n";
-  for (std::size_t i = 0; i < story.visits.size(); ++i) {
-    const StepVisit& visit = story.visits[i];
+  for (std::size_t i = 0; i < analysis.visits.size(); ++i) {
+    const StepVisit& visit = analysis.visits[i];
     html += fmt::format("<tr><td>{}</td><td>{}", i + 1, escaped(visit.title));
     if (!visit.part.empty()) html += fmt::format(" <span class=\"part\">{}</span>", escaped(visit.part));
     html += fmt::format("</td>{}<td class=\"state {}\">{}</td></tr>\n",
-                        cells(visit.end - visit.begin, visit.figures), styleOf(visit.phase),
+                        cells(visit.end - visit.begin, visit.metrics), styleOf(visit.phase),
                         phaseName(visit.phase));
   }
   html += fmt::format("<tr class=\"sum\"><td></td><td>whole session</td>{}<td></td></tr>\n",
-                      cells(story.duration, story.whole));
-  return html + "</table></div>\n";
+                      cells(analysis.duration, analysis.whole));
+  return html +
+         "</table></div>\n<p class=\"soft\">Gap: how far contacts hold the part back behind the hand. "
+         "Overlap: how "
+         "deep two parts are inside each other. Computational load: work of the most expensive pair of "
+         "parts, 100 % "
+         "is its limit.</p>\n";
 }
 
-std::string charts(const SessionStory& story) {
-  std::vector<Band> bands;
-  for (const StepVisit& visit : story.visits) {
+std::string charts(const SessionAnalysis& analysis) {
+  std::vector<ChartBand> bands;
+  for (const StepVisit& visit : analysis.visits) {
     bands.push_back(
         {visit.begin, visit.end, visit.title,
          fmt::format("{}: {:.1f} s, {}", visit.title, visit.end - visit.begin, phaseName(visit.phase))});
   }
-  std::vector<Mark> marks;
-  for (const SessionEvent& event : condensed(story.events))
-    if (const char* style = markOf(event))
+  std::vector<ChartMark> marks;
+  for (const SessionEvent& event : condensed(analysis.events))
+    if (const char* style = markStyleOf(event))
       marks.push_back({event.time, style, event.kind + ": " + event.text});
 
-  Chart force{"Force", "N", {{"trainee", "c1", &story.trainee_force}}};
-  if (!story.instructor_force.empty()) force.curves.push_back({"instructor", "c2", &story.instructor_force});
+  Chart force{"Force", "N", {{"trainee", "c1", &analysis.trainee_force}}};
+  if (!analysis.instructor_force.empty())
+    force.curves.push_back({"instructor", "c2", &analysis.instructor_force});
   const Chart penetration{
-      "Penetration",
+      "Gap and overlap",
       "mm",
-      {{"device–proxy gap", "c1", &story.gap, 1e3}, {"field depth", "c2", &story.depth, 1e3}}};
-  const Chart load{"Load", "%", {{"largest of the pairs", "c3", &story.load}}, 0.0, "", 10.0};
+      {{"hand–part gap", "c1", &analysis.gap, 1e3}, {"overlap", "c2", &analysis.depth, 1e3}}};
+  const Chart load{
+      "Computational load", "%", {{"largest of all pairs", "c3", &analysis.load}}, 0.0, "", 10.0};
   const Chart compute{"Computation time",
                       "ms",
-                      {{"longest of ten ticks", "c4", &story.compute_max, 1e3}},
+                      {{"longest of ten ticks", "c4", &analysis.compute_max, 1e3}},
                       1.0,
-                      "one tick: 1 ms",
+                      "real-time limit: 1 ms",
                       1.2,
                       4.0};
   std::string html = "<h2>Over time</h2>\n";
   for (const Chart* chart : {static_cast<const Chart*>(&force), &penetration, &load, &compute})
-    html += "<div class=\"card\">" + drawChart(*chart, story.duration, bands, marks) + "</div>\n";
+    html += "<div class=\"card\">" + drawChart(*chart, analysis.duration, bands, marks) + "</div>\n";
   html +=
-      "<p class=\"soft\">Bands are the steps of the table. Dots: <span class=\"good\">mounted</span>, "
-      "<span class=\"warn\">warning, hand frozen or safety</span>, <span class=\"bad\">fault or "
-      "stop</span>.</p>\n";
+      "<p class=\"soft\">Bands: the steps of the table. Dots: <span class=\"good\">mounted</span>, "
+      "<span class=\"warn\">warning, frozen hand or safety limit</span>, <span class=\"bad\">fault or "
+      "emergency stop</span>.</p>\n";
   return html;
 }
 
-std::string machineTable(const SessionStory& story) {
-  std::string html = "<h2>How the machine kept up</h2>\n<div class=\"card\"><table class=\"facts\">\n";
+std::string performanceTable(const SessionAnalysis& analysis) {
+  std::string html = "<h2>Real-time performance</h2>\n<div class=\"card\"><table class=\"facts\">\n";
   const auto line = [&html](std::string_view what, const std::string& value) {
     html += fmt::format("<tr><td>{}</td><td>{}</td></tr>\n", what, escaped(value));
   };
   line("Computation time of a tick",
-       fmt::format("median {:.3f} ms, p99 {:.3f} ms, max {:.3f} ms", 1e3 * story.compute_median,
-                   1e3 * story.compute_p99, 1e3 * story.compute_worst));
-  line("Late ticks", std::to_string(story.late_ticks));
-  line("Oldest input a tick used", fmt::format("{:.1f} ms", 1e3 * story.input_age));
-  for (const ForceAge& age : story.force_ages)
-    line("From input to force", fmt::format("{}: median {:.1f} ms, p99 {:.1f} ms, max {:.1f} ms", age.who,
-                                            1e3 * age.p50, 1e3 * age.p99, 1e3 * age.max));
+       fmt::format("median {:.3f} ms, p99 {:.3f} ms, max {:.3f} ms", 1e3 * analysis.compute_median,
+                   1e3 * analysis.compute_p99, 1e3 * analysis.compute_worst));
+  line("Late ticks", std::to_string(analysis.late_ticks));
+  line("Oldest input used by a tick", fmt::format("{:.1f} ms", 1e3 * analysis.input_age));
+  for (const ForceLatency& latency : analysis.force_latencies)
+    line("Latency from input to force",
+         fmt::format("{}: median {:.1f} ms, p99 {:.1f} ms, max {:.1f} ms", latency.who, 1e3 * latency.p50,
+                     1e3 * latency.p99, 1e3 * latency.max));
   std::string aids;
-  for (const std::string& aid : story.aids) aids += (aids.empty() ? "" : "; ") + aid;
+  for (const std::string& aid : analysis.aids) aids += (aids.empty() ? "" : "; ") + aid;
   line("Aids used", aids.empty() ? "none" : aids);
   return html + "</table></div>\n";
 }
 
-std::string eventTable(const SessionStory& story) {
-  constexpr std::size_t kMost = 200;
-  const std::vector<SessionEvent> events = condensed(story.events);
+std::string eventTable(const SessionAnalysis& analysis) {
+  constexpr std::size_t kMaxEvents = 200;
+  const std::vector<SessionEvent> events = condensed(analysis.events);
   if (events.empty()) return "";
-  std::string html = "<h2>What happened</h2>\n<div class=\"card\"><table class=\"events\">\n";
-  for (std::size_t i = 0; i < std::min(kMost, events.size()); ++i) {
+  std::string html = "<h2>Events</h2>\n<div class=\"card\"><table class=\"events\">\n";
+  for (std::size_t i = 0; i < std::min(kMaxEvents, events.size()); ++i) {
     const SessionEvent& event = events[i];
-    const char* style = markOf(event);
+    const char* style = markStyleOf(event);
     html +=
         fmt::format("<tr><td class=\"soft\">{:.1f} s</td><td class=\"{}\">{}</td><td>{}</td></tr>\n",
                     event.time, style == nullptr ? "soft" : style, escaped(event.kind), escaped(event.text));
   }
-  if (events.size() > kMost)
+  if (events.size() > kMaxEvents)
     html += fmt::format("<tr><td></td><td></td><td class=\"soft\">and {} more, see summary.json</td></tr>\n",
-                        events.size() - kMost);
+                        events.size() - kMaxEvents);
   return html + "</table></div>\n";
 }
 
 }  // namespace
 
-std::string reportPage(const SessionStory& story, const std::string& picture) {
-  std::string html = head(story) + tiles(story);
+std::string reportPage(const SessionAnalysis& analysis, const std::string& picture) {
+  std::string html = head(analysis) + tiles(analysis);
   if (!picture.empty()) html += fmt::format("<img src=\"{}\" alt=\"the scene\">\n", escaped(picture));
-  html += stepTable(story) + charts(story) + machineTable(story) + eventTable(story);
-  html += fmt::format("<footer>{}, {} messages", escaped(story.file), story.messages);
-  if (story.run.final_hash != 0) html += fmt::format(", final state {:016x}", story.run.final_hash);
+  html += stepTable(analysis) + charts(analysis) + performanceTable(analysis) + eventTable(analysis);
+  html += fmt::format("<footer>{}, {} messages", escaped(analysis.file), analysis.messages);
+  if (analysis.run.final_hash != 0) html += fmt::format(", final state {:016x}", analysis.run.final_hash);
   return html + "</footer>\n</main>\n</body>\n</html>\n";
 }
 
-}  // namespace tenon
+}  // namespace tenon::report

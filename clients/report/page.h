@@ -2,16 +2,16 @@
 
 #include <string>
 
-#include "clients/report/session_story.h"
+#include "clients/report/session_analysis.h"
 
-namespace tenon {
+namespace tenon::report {
 
-/// The report as one HTML page that needs nothing else: no script, no font, no network. Follows the reader's
-/// light or dark setting and prints in light.
+/// The report as one self-contained HTML page (no script, no font, no network), in light or dark colours as
+/// the reader's system is set; it prints in light.
 ///
-/// `picture`: path of a picture of the scene as seen from the page, or empty.
+/// `picture`: path of a picture of the scene relative to the page, or empty.
 ///
 /// Threads: any. Real-time: no.
-[[nodiscard]] std::string reportPage(const SessionStory& story, const std::string& picture);
+[[nodiscard]] std::string reportPage(const SessionAnalysis& analysis, const std::string& picture);
 
-}  // namespace tenon
+}  // namespace tenon::report

@@ -6,33 +6,33 @@
 
 #include "idl/types/names.h"
 
-namespace tenon {
+namespace tenon::report {
 namespace {
 
-/// Counts what a terminal shows: bytes that continue a UTF-8 letter take no room.
-std::size_t shownLength(std::string_view text) {
+/// Number of columns in a terminal: continuation bytes of UTF-8 are not counted.
+std::size_t columnsOf(std::string_view text) {
   return static_cast<std::size_t>(
       std::count_if(text.begin(), text.end(), [](char byte) { return (byte & 0xC0) != 0x80; }));
 }
 
 std::string padded(std::string text, std::size_t width) {
-  for (std::size_t length = shownLength(text); length < width; ++length) text += ' ';
+  for (std::size_t length = columnsOf(text); length < width; ++length) text += ' ';
   return text;
 }
 
-std::string row(const Figures& figures) {
-  return fmt::format("{:8.1f} {:8.1f} {:9.1f} {:8.2f} {:8.2f} {:7.0f}", figures.peak_force,
-                     figures.mean_force, figures.contact_seconds, 1e3 * figures.gap, 1e3 * figures.depth,
-                     figures.load);
+std::string row(const SessionMetrics& metrics) {
+  return fmt::format("{:8.1f} {:8.1f} {:9.1f} {:8.2f} {:8.2f} {:7.0f}", metrics.peak_force,
+                     metrics.mean_force, metrics.contact_seconds, 1e3 * metrics.gap, 1e3 * metrics.depth,
+                     metrics.load);
 }
 
-nlohmann::json jsonOf(const Figures& figures) {
-  return {{"peak_force", figures.peak_force},
-          {"mean_force", figures.mean_force},
-          {"contact_seconds", figures.contact_seconds},
-          {"device_proxy_gap", figures.gap},
-          {"field_depth", figures.depth},
-          {"load_percent", figures.load}};
+nlohmann::json jsonOf(const SessionMetrics& metrics) {
+  return {{"peak_force", metrics.peak_force},
+          {"mean_force", metrics.mean_force},
+          {"contact_seconds", metrics.contact_seconds},
+          {"device_proxy_gap", metrics.gap},
+          {"field_depth", metrics.depth},
+          {"load_percent", metrics.load}};
 }
 
 }  // namespace
@@ -40,7 +40,7 @@ nlohmann::json jsonOf(const Figures& figures) {
 std::string_view phaseName(StepPhase phase) {
   switch (phase) {
     case StepPhase::kWaiting:
-      return "left";
+      return "abandoned";
     case StepPhase::kActive:
       return "not finished";
     case StepPhase::kDone:
@@ -53,10 +53,10 @@ std::string_view phaseName(StepPhase phase) {
   return "unknown";
 }
 
-std::string outcomeOf(const SessionStory& story) {
-  if (story.succeeded()) return "succeeded";
-  if (!story.has_run) return "unknown: the recording holds no outcome";
-  switch (story.run.phase) {
+std::string outcomeOf(const SessionAnalysis& analysis) {
+  if (analysis.succeeded()) return "succeeded";
+  if (!analysis.has_run) return "unknown: the recording holds no outcome";
+  switch (analysis.run.phase) {
     case RunPhase::kSucceeded:
       return "not every step was done";
     case RunPhase::kFailed:
@@ -68,66 +68,71 @@ std::string outcomeOf(const SessionStory& story) {
   }
 }
 
-std::string summaryText(const SessionStory& story) {
+std::string summaryText(const SessionAnalysis& analysis) {
   std::size_t width = 10;
-  for (const StepVisit& visit : story.visits) width = std::max(width, shownLength(visit.title));
-  std::string text = fmt::format("{}: {} after {:.1f} s\n", story.title.empty() ? story.session : story.title,
-                                 outcomeOf(story), story.duration);
-  if (!story.run.reason.empty()) text += fmt::format("{}\n", story.run.reason);
-  if (!story.problem.empty()) text += fmt::format("warning: {}\n", story.problem);
+  for (const StepVisit& visit : analysis.visits) width = std::max(width, columnsOf(visit.title));
+  std::string text =
+      fmt::format("{}: {} after {:.1f} s\n", analysis.title.empty() ? analysis.session : analysis.title,
+                  outcomeOf(analysis), analysis.duration);
+  if (!analysis.run.reason.empty()) text += fmt::format("{}\n", analysis.run.reason);
+  if (!analysis.problem.empty()) text += fmt::format("warning: {}\n", analysis.problem);
 
   text += fmt::format("\n    {}  {:>7} {:>8} {:>8} {:>9} {:>8} {:>8} {:>7}\n", padded("step", width), "time",
-                      "peak", "mean", "contact", "gap", "depth", "load");
+                      "peak", "mean", "contact", "gap", "overlap", "load");
   text += fmt::format("    {}  {:>7} {:>8} {:>8} {:>9} {:>8} {:>8} {:>7}\n", padded("", width), "[s]", "[N]",
                       "[N]", "[s]", "[mm]", "[mm]", "[%]");
-  for (std::size_t i = 0; i < story.visits.size(); ++i) {
-    const StepVisit& visit = story.visits[i];
+  for (std::size_t i = 0; i < analysis.visits.size(); ++i) {
+    const StepVisit& visit = analysis.visits[i];
     text += fmt::format("{:3} {}  {:7.1f} {}  {}\n", i + 1, padded(visit.title, width),
-                        visit.end - visit.begin, row(visit.figures), phaseName(visit.phase));
+                        visit.end - visit.begin, row(visit.metrics), phaseName(visit.phase));
   }
-  text += fmt::format("    {}  {:7.1f} {}\n\n", padded("session", width), story.duration, row(story.whole));
+  text +=
+      fmt::format("    {}  {:7.1f} {}\n\n", padded("session", width), analysis.duration, row(analysis.whole));
 
-  text += fmt::format("computation time  median {:.3f} ms, p99 {:.3f} ms, max {:.3f} ms\n",
-                      1e3 * story.compute_median, 1e3 * story.compute_p99, 1e3 * story.compute_worst);
-  text += fmt::format("late ticks        {}\n", story.late_ticks);
-  text += fmt::format("oldest input      {:.1f} ms\n", 1e3 * story.input_age);
-  for (const ForceAge& age : story.force_ages)
+  text +=
+      fmt::format("computation time  median {:.3f} ms, p99 {:.3f} ms, max {:.3f} ms\n",
+                  1e3 * analysis.compute_median, 1e3 * analysis.compute_p99, 1e3 * analysis.compute_worst);
+  text += fmt::format("late ticks        {}\n", analysis.late_ticks);
+  text += fmt::format("oldest input      {:.1f} ms\n", 1e3 * analysis.input_age);
+  for (const ForceLatency& latency : analysis.force_latencies)
     text += fmt::format("input to force    median {:.1f} ms, p99 {:.1f} ms, max {:.1f} ms ({})\n",
-                        1e3 * age.p50, 1e3 * age.p99, 1e3 * age.max, age.who);
-  for (const std::string& aid : story.aids) text += fmt::format("aid               {}\n", aid);
-  text += "gap: device to proxy; depth: deepest point in a part's field; mean: while touching\n";
+                        1e3 * latency.p50, 1e3 * latency.p99, 1e3 * latency.max, latency.who);
+  for (const std::string& aid : analysis.aids) text += fmt::format("aid               {}\n", aid);
+  text +=
+      "gap: hand to part; overlap: depth of two parts inside each other; mean: while in contact; load: "
+      "computational\n";
   return text;
 }
 
-nlohmann::json summaryJson(const SessionStory& story) {
+nlohmann::json summaryJson(const SessionAnalysis& analysis) {
   nlohmann::json all = {
-      {"title", story.title},
-      {"session", story.session},
-      {"recording", story.file},
-      {"problem", story.problem},
-      {"began_ns", story.began_ns},
-      {"lockstep", story.lockstep},
-      {"succeeded", story.succeeded()},
-      {"outcome", outcomeOf(story)},
-      {"reason", story.run.reason},
-      {"final_hash", fmt::format("{:016x}", story.run.final_hash)},
-      {"seconds", story.duration},
-      {"whole", jsonOf(story.whole)},
+      {"title", analysis.title},
+      {"session", analysis.session},
+      {"recording", analysis.file},
+      {"problem", analysis.problem},
+      {"began_ns", analysis.began_ns},
+      {"lockstep", analysis.lockstep},
+      {"succeeded", analysis.succeeded()},
+      {"outcome", outcomeOf(analysis)},
+      {"reason", analysis.run.reason},
+      {"final_hash", fmt::format("{:016x}", analysis.run.final_hash)},
+      {"seconds", analysis.duration},
+      {"whole", jsonOf(analysis.whole)},
       {"compute_seconds",
-       {{"median", story.compute_median}, {"p99", story.compute_p99}, {"max", story.compute_worst}}},
-      {"late_ticks", story.late_ticks},
-      {"oldest_input_seconds", story.input_age},
-      {"messages", story.messages},
-      {"malformed_messages", story.malformed},
-      {"aids", story.aids},
+       {{"median", analysis.compute_median}, {"p99", analysis.compute_p99}, {"max", analysis.compute_worst}}},
+      {"late_ticks", analysis.late_ticks},
+      {"oldest_input_seconds", analysis.input_age},
+      {"messages", analysis.messages},
+      {"malformed_messages", analysis.malformed},
+      {"aids", analysis.aids},
       {"people", nlohmann::json::array()},
       {"steps", nlohmann::json::array()},
       {"input_to_force_seconds", nlohmann::json::array()},
       {"events", nlohmann::json::array()}};
-  for (const Person& person : story.people)
-    all["people"].push_back({{"name", person.name}, {"role", roleName(person.role)}});
-  for (const StepVisit& visit : story.visits) {
-    nlohmann::json step = jsonOf(visit.figures);
+  for (const Participant& participant : analysis.participants)
+    all["people"].push_back({{"name", participant.name}, {"role", roleName(participant.role)}});
+  for (const StepVisit& visit : analysis.visits) {
+    nlohmann::json step = jsonOf(visit.metrics);
     step["step"] = visit.step;
     step["name"] = visit.name;
     step["title"] = visit.title;
@@ -137,12 +142,12 @@ nlohmann::json summaryJson(const SessionStory& story) {
     step["seconds"] = visit.end - visit.begin;
     all["steps"].push_back(std::move(step));
   }
-  for (const ForceAge& age : story.force_ages)
+  for (const ForceLatency& latency : analysis.force_latencies)
     all["input_to_force_seconds"].push_back(
-        {{"who", age.who}, {"median", age.p50}, {"p99", age.p99}, {"max", age.max}});
-  for (const SessionEvent& event : story.events)
+        {{"who", latency.who}, {"median", latency.p50}, {"p99", latency.p99}, {"max", latency.max}});
+  for (const SessionEvent& event : analysis.events)
     all["events"].push_back({{"time", event.time}, {"kind", event.kind}, {"text", event.text}});
   return all;
 }
 
-}  // namespace tenon
+}  // namespace tenon::report

@@ -5,19 +5,20 @@
 
 #include <nlohmann/json.hpp>
 
-#include "clients/report/session_story.h"
+#include "clients/report/session_analysis.h"
 
-namespace tenon {
+namespace tenon::report {
 
+/// Result of a step in words.
 [[nodiscard]] std::string_view phaseName(StepPhase phase);
 
-/// "succeeded", or what it came to instead.
-[[nodiscard]] std::string outcomeOf(const SessionStory& story);
+/// "succeeded", or how the run ended instead.
+[[nodiscard]] std::string outcomeOf(const SessionAnalysis& analysis);
 
-/// The table of a session as aligned text for people.
-[[nodiscard]] std::string summaryText(const SessionStory& story);
+/// Table of the session as aligned text.
+[[nodiscard]] std::string summaryText(const SessionAnalysis& analysis);
 
-/// The same for programs; SI units, times in seconds.
-[[nodiscard]] nlohmann::json summaryJson(const SessionStory& story);
+/// The same as JSON; SI units, times in [s].
+[[nodiscard]] nlohmann::json summaryJson(const SessionAnalysis& analysis);
 
-}  // namespace tenon
+}  // namespace tenon::report

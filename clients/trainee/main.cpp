@@ -1,30 +1,52 @@
+#include <cstdio>
 #include <string>
 
-#include "clients/haptic/station_words.h"
+#include "clients/haptic/station_command_line.h"
 #include "clients/trainee/trainee_station.h"
 
+namespace {
+
+/// `--stubborn` is an error of one line that names the option to use instead.
+void refuseFormerOption(CLI::App& app) {
+  app.add_option_function<std::string>("--stubborn",
+                                       [](const std::string&) {
+                                         std::fputs("tenon-trainee: --stubborn is now --misplace-mount\n",
+                                                    stderr);
+                                         throw CLI::RuntimeError(2);
+                                       })
+      ->expected(0, 1)
+      ->group("");
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
-  tenon::TraineeOptions trainee;
+  tenon::trainee::TraineeOptions trainee;
   std::string tactile = "intensity";
   const auto declare = [&](CLI::App& app) {
-    app.add_option("--device", trainee.device, "a machine with two arms")->capture_default_str();
-    app.add_option("--tactors", trainee.tactors, "the arm band")->capture_default_str();
+    app.add_option("--device", trainee.device, "a bimanual haptic device")->capture_default_str();
+    app.add_option("--tactors", trainee.tactors, "the vibrotactile bracelet")->capture_default_str();
     app.add_option("--tactile", tactile, "how contacts of the forearm vibrate")
         ->check(CLI::IsMember({"intensity", "pattern"}))
         ->capture_default_str();
     app.add_flag("--swap-hands", trainee.swap_hands,
-                 "the right arm moves hand `left` and the other way round");
+                 "the right arm moves hand `left` and the left arm hand `right`");
     app.add_option(
-           "--stubborn", trainee.person.stubborn_mount,
-           "the mount (0: the first) in which the simulated trainee is sure of a wrong place; -1: none")
-        ->capture_default_str();
+           "--misplace-mount", trainee.person.misplaced_mount,
+           "the simulated trainee inserts the N-th mount, from 0, at a wrong pose and does not correct it; "
+           "-1: none")
+        ->option_text("N [-1]");
+    refuseFormerOption(app);
   };
-  const auto open = [&]() -> tenon::Result<std::unique_ptr<tenon::Station>> {
-    trainee.tactile = tactile == "pattern" ? tenon::TactileMode::kPattern : tenon::TactileMode::kIntensity;
-    return tenon::TraineeStation::open(trainee);
+  const auto open = [&]() -> tenon::Result<std::unique_ptr<tenon::haptic::Station>> {
+    trainee.tactile =
+        tactile == "pattern" ? tenon::haptic::TactileMode::kPattern : tenon::haptic::TactileMode::kIntensity;
+    return tenon::trainee::TraineeStation::open(trainee);
   };
-  return tenon::runStationMain(
+  return tenon::haptic::runStationMain(
       argc, argv,
-      {"tenon-trainee", "the trainee's station: two haptic arms, a tracked forearm with an arm band, a head",
+      {"tenon-trainee",
+       "the trainee's station: a bimanual haptic device, a tracked forearm with a "
+       "vibrotactile bracelet, a tracked head",
        "trainee", trainee.person.seed, declare, open});
 }

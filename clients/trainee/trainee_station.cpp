@@ -4,28 +4,31 @@
 #include <optional>
 
 #include "clients/haptic/haptic_hand.h"
-#include "clients/trainee/posture.h"
-#include "clients/trainee/simulated_trainee.h"
+#include "clients/simulated_person/posture.h"
+#include "clients/simulated_person/simulated_trainee.h"
 #include "devices/catalog.h"
 #include "devices/simulated/simulated_device.h"
 
-namespace tenon {
+namespace tenon::trainee {
 
 namespace {
 enum HandIndex : std::size_t { kRight, kLeft, kForearm, kHead };
 constexpr std::array<const char*, 4> kHandNames{"right", "left", "forearm", "head"};
-// Short of the safety layer's wall, which is nothing to work against.
-constexpr double kComfortableReach = 0.94;
+// Fraction of the device's workspace radius that is used: stays clear of the wall of the safety layer.
+constexpr double kWorkspaceFraction = 0.94;
 
-/// Where a hand begins: where the thing stands that it moves.
-Vector3 startOf(std::span<const SceneObject> objects, std::string_view kind, const Vector3& otherwise) {
+/// Initial position of a hand: that of the first object of `kind`, which the hand moves; `fallback` without
+/// one.
+Vector3 startOf(std::span<const SceneObject> objects, std::string_view kind, const Vector3& fallback) {
   for (const SceneObject& object : objects) {
     if (object.kind == kind) return object.X_WO.translation();
   }
-  return otherwise;
+  return fallback;
 }
 
-void track(DeviceInput& input, std::uint32_t seq, const Pose& X_WH, const WorldView& world, double dt) {
+/// Fills the input of a tracked body part at X_WH; its velocity is a difference quotient over `dt` [s].
+void track(DeviceInput& input, std::uint32_t seq, const Pose& X_WH, const haptic::WorldView& world,
+           double dt) {
   for (std::size_t i = input.samples.size() - 1; i > 0; --i) input.samples[i] = input.samples[i - 1];
   const Displacement moved = displacement(input.samples[1].X_WH, X_WH);
   const bool first = !input.active;
@@ -42,43 +45,44 @@ struct TraineeStation::Parts {
       : options(station), tactile({station.tactile}), posture(1.0), person(station.person) {}
 
   TraineeOptions options;
-  std::unique_ptr<DevicePair> arms;
-  std::unique_ptr<HapticDevice> band;
-  ClutchLatch clutch;
+  std::unique_ptr<devices::BimanualDevice> arms;
+  std::unique_ptr<devices::HapticDevice> bracelet;
+  devices::ClutchLatch clutch;
   std::array<HandId, kHandNames.size()> ids{};
-  std::array<std::optional<HapticHand>, 2> hands;
+  std::array<std::optional<haptic::HapticHand>, 2> hands;
   std::array<DeviceInput, kHandNames.size()> tracked{};
   HandManifold forearm_contacts;
-  TactileMap tactile;
-  Posture posture;
-  SimulatedTrainee person;
+  haptic::TactileMap tactile;
+  simulated_person::Posture posture;
+  simulated_person::SimulatedTrainee person;
 
-  HapticDevice& arm(std::size_t hand) {
+  devices::HapticDevice& arm(std::size_t hand) {
     const bool right = (hand == kRight) != options.swap_hands;
     return right ? arms->right() : arms->left();
   }
-  [[nodiscard]] HandSense sense(std::size_t hand) {
-    HandSense sense;
-    if (!hands[hand]) return sense;
-    HapticHand& haptic = *hands[hand];
-    sense.hand = haptic.id();
-    sense.X_WH = haptic.pose();
-    sense.F_Ho_W = haptic.state().F_Ho_W;
-    if (haptic.local().heard()) {
-      sense.object = haptic.local().manifold().object;
-      sense.X_HO = haptic.local().manifold().X_HO;
+  [[nodiscard]] simulated_person::HandPerception perceive(std::size_t hand) {
+    simulated_person::HandPerception perception;
+    if (!hands[hand]) return perception;
+    haptic::HapticHand& haptic = *hands[hand];
+    perception.hand = haptic.id();
+    perception.X_WH = haptic.pose();
+    perception.F_Ho_W = haptic.state().F_Ho_W;
+    if (haptic.local().hasManifold()) {
+      perception.object = haptic.local().manifold().object;
+      perception.X_HO = haptic.local().manifold().X_HO;
     }
-    sense.p_WC = haptic.workspace().centre();
-    sense.reach = kComfortableReach * haptic.caps().workspace_radius;
-    return sense;
+    perception.p_WC = haptic.workspace().centre();
+    perception.reach = kWorkspaceFraction * haptic.caps().workspace_radius;
+    return perception;
   }
-  void moveArm(std::size_t hand, const AssemblySkill& skill) {
-    HumanArm* const flesh = hands[hand] ? handOf(arm(hand)) : nullptr;
-    if (flesh == nullptr) return;
-    const Workspace& workspace = hands[hand]->workspace();
-    const Twist& wanted = skill.intentVelocity();
-    flesh->intend(workspace.toDevice(skill.intent()), {wanted.linear - workspace.velocity(), wanted.angular});
-    flesh->stiffen(skill.contraction());
+  void moveArm(std::size_t hand, const simulated_person::AssemblyBehavior& behavior) {
+    devices::HumanArm* const human_arm = hands[hand] ? devices::simulatedHumanArm(arm(hand)) : nullptr;
+    if (human_arm == nullptr) return;
+    const haptic::Workspace& workspace = hands[hand]->workspace();
+    const Twist& velocity = behavior.intendedVelocity();
+    human_arm->setIntent(workspace.toDevice(behavior.intendedPose()),
+                         {velocity.linear - workspace.velocity(), velocity.angular});
+    human_arm->setContraction(behavior.contraction());
   }
 };
 
@@ -92,12 +96,12 @@ TraineeStation::~TraineeStation() {
 
 Result<std::unique_ptr<TraineeStation>> TraineeStation::open(const TraineeOptions& options) {
   auto parts = std::make_unique<Parts>(options);
-  auto arms = openPair(options.device, options.person.seed);
+  auto arms = devices::openBimanualDevice(options.device, options.person.seed);
   if (!arms) return fail(arms.error().what);
   parts->arms = std::move(*arms);
-  auto band = openDevice(options.tactors, options.person.seed);
-  if (!band) return fail(band.error().what);
-  parts->band = std::move(*band);
+  auto bracelet = devices::openDevice(options.tactors, options.person.seed);
+  if (!bracelet) return fail(bracelet.error().what);
+  parts->bracelet = std::move(*bracelet);
   return std::unique_ptr<TraineeStation>(new TraineeStation(std::move(parts)));
 }
 
@@ -105,7 +109,7 @@ std::vector<std::string> TraineeStation::handNames() const { return {kHandNames.
 
 void TraineeStation::begin(std::span<const HandId> hand_ids) {
   constexpr std::array<const char*, 2> kinds{"pointer", "tool"};
-  const std::array<Vector3, 2> otherwise{Vector3(0.3, -0.35, 1.0), Vector3(-0.3, -0.35, 1.0)};
+  const std::array<Vector3, 2> fallback{Vector3(0.3, -0.35, 1.0), Vector3(-0.3, -0.35, 1.0)};
   std::array<Pose, 2> starts;
   for (std::size_t i = 0; i < kHandNames.size(); ++i) {
     parts_->ids[i] = hand_ids[i];
@@ -114,21 +118,21 @@ void TraineeStation::begin(std::span<const HandId> hand_ids) {
     parts_->tracked[i].client = client_;
     if (i > kLeft) continue;
     parts_->hands[i].reset();
-    starts[i] = Pose(startOf(sceneObjects(), kinds[i], otherwise[i]));
+    starts[i] = Pose(startOf(sceneObjects(), kinds[i], fallback[i]));
     if (!hand_ids[i].valid()) continue;
-    HapticHand& hand = parts_->hands[i].emplace(parts_->arm(i), &parts_->clutch);
+    haptic::HapticHand& hand = parts_->hands[i].emplace(parts_->arm(i), &parts_->clutch);
     if (!hand.begin(hand_ids[i], client_, starts[i].translation())) {
-      report(StationEventKind::kDeviceFault, hand_ids[i], static_cast<std::uint32_t>(hand.device().fault),
-             0.0);
+      report(haptic::StationEventKind::kDeviceFault, hand_ids[i],
+             static_cast<std::uint32_t>(hand.device().fault), 0.0);
     }
     starts[i] = hand.pose();
   }
-  // a band that does not vibrate hinders nobody
-  static_cast<void>(parts_->band->arm());
+  // the session goes on without vibration when the bracelet cannot be armed
+  static_cast<void>(parts_->bracelet->arm());
   parts_->person.begin(sceneObjects(), starts[kRight], starts[kLeft]);
 }
 
-void TraineeStation::heard(const HandManifold& manifold) noexcept {
+void TraineeStation::manifoldReceived(const HandManifold& manifold) noexcept {
   for (auto& hand : parts_->hands) {
     if (hand && hand->id() == manifold.hand) hand->receive(manifold);
   }
@@ -141,7 +145,7 @@ void TraineeStation::stepChanged() { parts_->person.read(currentStep()); }
 
 void TraineeStation::stopChanged(bool engaged) {
   for (auto& hand : parts_->hands) {
-    if (hand) hand->stop(engaged);
+    if (hand) hand->setEmergencyStop(engaged);
   }
 }
 
@@ -158,7 +162,7 @@ void TraineeStation::step(std::uint32_t seq) noexcept {
     states_.push_back(hand->state());
   }
   if (parts_->options.simulated_person) {
-    parts_->person.step(parts_->sense(kRight), parts_->sense(kLeft), world_, dt);
+    parts_->person.step(parts_->perceive(kRight), parts_->perceive(kLeft), world_, dt);
     parts_->moveArm(kRight, parts_->person.right());
     parts_->moveArm(kLeft, parts_->person.left());
   }
@@ -170,11 +174,11 @@ void TraineeStation::trackBody(std::uint32_t seq, double dt) noexcept {
   if (!right) return;
   parts_->posture.step(right->pose(), right->input().p_WC, dt);
 
-  DeviceState band_state;
-  parts_->band->read(band_state);
-  DeviceCommand vibration;
+  devices::DeviceState bracelet_state;
+  parts_->bracelet->read(bracelet_state);
+  devices::DeviceCommand vibration;
   vibration.tactors = parts_->tactile.step(parts_->forearm_contacts, dt);
-  parts_->band->write(vibration);
+  parts_->bracelet->write(vibration);
   const std::array<Pose, 2> poses{parts_->posture.forearm(), parts_->posture.head()};
   for (std::size_t i = kForearm; i <= kHead; ++i) {
     if (!parts_->ids[i].valid()) continue;
@@ -191,6 +195,6 @@ void TraineeStation::trackBody(std::uint32_t seq, double dt) noexcept {
   }
 }
 
-const char* TraineeStation::doing() const noexcept { return parts_->person.doing(); }
+const char* TraineeStation::activity() const noexcept { return parts_->person.activity(); }
 
-}  // namespace tenon
+}  // namespace tenon::trainee

@@ -2,11 +2,11 @@
 
 #include "devices/simulated/simulated_device.h"
 
-namespace tenon {
+namespace tenon::devices {
 
-/// Novint Falcon: three axes, the cheapest of all.
+/// Novint Falcon: three axes, a consumer device.
 ///
 /// Threads: any. Real-time: no.
 [[nodiscard]] SimulatedModel falconModel();
 
-}  // namespace tenon
+}  // namespace tenon::devices

@@ -6,18 +6,21 @@
 #include "devices/device.h"
 #include "devices/simulated/simulated_device.h"
 
-namespace tenon {
+namespace tenon::devices {
 
+/// One arm of the HUG.
+///
+/// Threads: any. Real-time: no.
 [[nodiscard]] SimulatedModel hugArmModel();
 
-/// DLR's HUG: two light-weight robots behind the person, one for each hand.
+/// Bimanual haptic device HUG of DLR: two light-weight robots behind the person, one for each hand.
 ///
-/// A magnetic clutch holds each hand. Above 80 N in any direction at either hand it opens and both robots
-/// stop where they are; the hands are free. Resetting a fault by the operator closes it, with the hand back
-/// at the handle; each arm is then armed again.
+/// Each hand is coupled by a magnetic clutch, which opens above 80 N in any direction; then both robots stop
+/// where they are and both hands are free. resetFault() closes the clutch, with the hand at the handle again;
+/// each arm has to be armed afterwards.
 ///
 /// Threads: both arms from one servo thread. Real-time: as HapticDevice.
-class Hug : public DevicePair {
+class Hug : public BimanualDevice {
  public:
   explicit Hug(std::uint64_t seed = 1);
   [[nodiscard]] Result<void> open();
@@ -32,4 +35,4 @@ class Hug : public DevicePair {
   SimulatedDevice left_;
 };
 
-}  // namespace tenon
+}  // namespace tenon::devices

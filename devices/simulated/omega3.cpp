@@ -2,7 +2,7 @@
 
 #include "idl/types/messages.h"
 
-namespace tenon {
+namespace tenon::devices {
 
 SimulatedModel omega3Model() {
   SimulatedModel model;
@@ -10,16 +10,16 @@ SimulatedModel omega3Model() {
   caps.model = "omega.3 (simulated)";
   caps.dof_mask = kTranslationDofs;
   caps.workspace_radius = 0.075;  // [published] CHAI3D
-  caps.indexing_radius = 0.045;   // [assumed] the outer 30 mm drive the workspace ...
-  caps.indexing_gain = 8.0;       // [assumed] ... at 0.24 m/s at the edge
+  caps.indexing_radius = 0.045;   // [assumed] indexing acts in the outer 30 mm
+  caps.indexing_gain = 8.0;       // [assumed] 0.24 m/s at the rim
   caps.continuous_force = 12.0;   // [published]
   caps.peak_force = 12.0;         // [published]
   caps.command_limit = 12.0;
   caps.force_slew = 500.0;           // [assumed]
-  caps.max_stiffness = 5000.0;       // [published] CHAI3D; its own damping allows less
+  caps.max_stiffness = 5000.0;       // [published] CHAI3D; the passivity condition allows less
   caps.physical_damping = 1.0;       // [assumed]
-  caps.injected_damping = 20.0;      // [assumed] under CHAI3D's largest, 30 Ns/m
-  caps.max_speed = 0.5;              // [assumed] desk devices
+  caps.injected_damping = 20.0;      // [assumed] below CHAI3D's maximum, 30 Ns/m
+  caps.max_speed = 0.5;              // [assumed] for desktop devices
   caps.rate = 1000.0;                // [published]
   model.mass = 0.2;                  // [assumed]
   model.friction = 0.3;              // [assumed]
@@ -28,4 +28,4 @@ SimulatedModel omega3Model() {
   return model;
 }
 
-}  // namespace tenon
+}  // namespace tenon::devices

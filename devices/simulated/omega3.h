@@ -2,11 +2,11 @@
 
 #include "devices/simulated/simulated_device.h"
 
-namespace tenon {
+namespace tenon::devices {
 
-/// Force Dimension omega.3: three axes, the stiffest of the desk devices.
+/// Force Dimension omega.3: three axes, the stiffest of the desktop devices.
 ///
 /// Threads: any. Real-time: no.
 [[nodiscard]] SimulatedModel omega3Model();
 
-}  // namespace tenon
+}  // namespace tenon::devices

@@ -2,7 +2,7 @@
 
 #include "idl/types/messages.h"
 
-namespace tenon {
+namespace tenon::devices {
 
 SimulatedModel sigma7Model() {
   SimulatedModel model;
@@ -10,23 +10,23 @@ SimulatedModel sigma7Model() {
   caps.model = "sigma.7 (simulated)";
   caps.dof_mask = kAllDofs;
   caps.workspace_radius = 0.060;  // [published] Tobergte 2011: sphere of 120 mm
-  caps.indexing_radius = 0.035;   // [assumed] the outer 25 mm drive the workspace ...
-  caps.indexing_gain = 10.0;      // [assumed] ... at 0.25 m/s at the edge
-  caps.continuous_force = 12.0;   // [published] what CHAI3D lets it do
+  caps.indexing_radius = 0.035;   // [assumed] indexing acts in the outer 25 mm
+  caps.indexing_gain = 10.0;      // [assumed] 0.25 m/s at the rim
+  caps.continuous_force = 12.0;   // [published] limit of CHAI3D
   caps.peak_force = 20.0;         // [published]
   caps.command_limit = 20.0;
   caps.thermal_time = 10.0;                 // [assumed]
   caps.torque = 0.4;                        // [published]
   caps.force_slew = 500.0;                  // [assumed]
   caps.torque_slew = 10.0;                  // [assumed]
-  caps.max_stiffness = 4000.0;              // [published] CHAI3D; its own damping allows less
+  caps.max_stiffness = 4000.0;              // [published] CHAI3D; the passivity condition allows less
   caps.max_rotational_stiffness = 1.0;      // [published] CHAI3D
   caps.physical_damping = 1.0;              // [assumed]
   caps.physical_rotational_damping = 2e-3;  // [assumed]
-  caps.injected_damping = 20.0;             // [assumed] under CHAI3D's largest, 30 Ns/m
-  caps.injected_rotational_damping = 0.03;  // [assumed] under CHAI3D's largest, 0.07 Nms/rad
-  caps.max_speed = 0.5;                     // [assumed] desk devices
-  caps.rate = 1000.0;                       // [published]; it could do 4 kHz
+  caps.injected_damping = 20.0;             // [assumed] below CHAI3D's maximum, 30 Ns/m
+  caps.injected_rotational_damping = 0.03;  // [assumed] below CHAI3D's maximum, 0.07 Nms/rad
+  caps.max_speed = 0.5;                     // [assumed] for desktop devices
+  caps.rate = 1000.0;                       // [published] up to 4 kHz
   model.mass = 0.35;                        // [assumed]
   model.inertia = 5e-4;                     // [assumed]
   model.friction = 0.3;                     // [assumed]
@@ -38,4 +38,4 @@ SimulatedModel sigma7Model() {
   return model;
 }
 
-}  // namespace tenon
+}  // namespace tenon::devices

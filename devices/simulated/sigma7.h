@@ -2,11 +2,11 @@
 
 #include "devices/simulated/simulated_device.h"
 
-namespace tenon {
+namespace tenon::devices {
 
-/// Force Dimension sigma.7: six axes, for an instructor's desk.
+/// Force Dimension sigma.7: six axes, a desktop device for an instructor.
 ///
 /// Threads: any. Real-time: no.
 [[nodiscard]] SimulatedModel sigma7Model();
 
-}  // namespace tenon
+}  // namespace tenon::devices

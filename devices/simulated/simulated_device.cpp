@@ -8,24 +8,25 @@
 
 #include "idl/types/messages.h"
 
-namespace tenon {
+namespace tenon::devices {
 namespace {
 
-constexpr double kPeriod = 1e-3;
+constexpr double kPeriod = 1e-3;  ///< [s]
 constexpr int kSubsteps = 4;
-/// An electromagnetic brake shorts the windings; on a strong arm it is a real brake [assumed].
-constexpr double kBrakeDamping = 400.0;
-constexpr double kBrakeRotationalDamping = 2.0;
-/// Rubber at the end of the travel [assumed].
-constexpr double kStopStiffness = 3000.0;
-constexpr double kStopDamping = 20.0;
-constexpr double kStopRotationalStiffness = 20.0;
-/// Sticking holds a third more than sliding, and the difference is gone at about this speed [assumed].
-constexpr double kStickingShare = 0.3;
-constexpr double kStribeckSpeed = 2e-3;
-constexpr double kStribeckRotationSpeed = 2e-2;
-constexpr double kForceNoise = 0.05;  ///< [N] of a six-axis sensor at the wrist, uniform [assumed]
-constexpr double kLargestWord = 4096.0;
+/// Electromagnetic brake by shorted windings, modelled as damping [assumed].
+constexpr double kBrakeDamping = 400.0;          ///< [Ns/m]
+constexpr double kBrakeRotationalDamping = 2.0;  ///< [Nms/rad]
+/// Rubber end stops [assumed].
+constexpr double kStopStiffness = 3000.0;          ///< [N/m]
+constexpr double kStopDamping = 20.0;              ///< [Ns/m]
+constexpr double kStopRotationalStiffness = 20.0;  ///< [Nm/rad]
+/// Stribeck curve: static friction exceeds kinetic friction by this fraction, which falls with speed
+/// [assumed].
+constexpr double kStictionExcess = 0.3;          ///< [-]
+constexpr double kStribeckSpeed = 2e-3;          ///< [m/s] where half of the excess is left
+constexpr double kStribeckRotationSpeed = 2e-2;  ///< [rad/s] likewise
+constexpr double kForceNoise = 0.05;             ///< [N] of a six-axis sensor at the wrist, uniform [assumed]
+constexpr double kMaxMotorCommand = 4096.0;      ///< [counts]
 
 std::uint64_t splitMix(std::uint64_t& state) {
   state += 0x9E3779B97F4A7C15ULL;
@@ -38,46 +39,47 @@ std::uint64_t splitMix(std::uint64_t& state) {
 /// Uniform in [-1, 1).
 double uniform(std::uint64_t& state) { return static_cast<double>(splitMix(state) >> 11U) * 0x1.0p-52 - 1.0; }
 
-Vector3 saturated(const Vector3& v, double limit) {
+Vector3 limitNorm(const Vector3& v, double limit) {
   const double length = v.norm();
   return length > limit ? Vector3(v * (limit / length)) : v;
 }
 
-Vector3 rounded(const Vector3& v, double step) {
+Vector3 quantize(const Vector3& v, double step) {
   if (step <= 0.0) return v;
   return (v / step).unaryExpr([](double x) { return std::floor(x + 0.5); }) * step;
 }
 
-/// What dry friction leaves of a velocity: all the momentum it can take in `dt`, so it sticks without
-/// chatter.
-Vector3 rubbed(const Vector3& v, double inertia, double friction, double stribeck_speed, double dt) {
+/// Velocity after dry friction has acted for `dt`. The impulse is limited to the momentum, so the body comes
+/// to rest without chatter.
+Vector3 applyDryFriction(const Vector3& v, double inertia, double friction, double stribeck_speed,
+                         double dt) {
   const double speed = v.norm();
   if (speed <= 0.0) return v;
   const double slide = speed / stribeck_speed;
-  const double lost = dt * friction * (1.0 + kStickingShare / (1.0 + slide * slide)) / inertia;
+  const double lost = dt * friction * (1.0 + kStictionExcess / (1.0 + slide * slide)) / inertia;
   return lost >= speed ? Vector3::Zero() : Vector3(v * (1.0 - lost / speed));
 }
 
-/// One kind of motion (along or about) of the body of hand and handle.
-struct Motion {
-  double own_inertia, hand_inertia;
-  double own_damping;
+/// Translational or rotational dynamics of the body of hand and handle.
+struct HandleDynamics {
+  double device_inertia, hand_inertia;
+  double device_damping;
   ArmImpedance arm;
   double friction, stribeck_speed;
 };
 
-/// Semi-implicit: dampers and the arm's spring at the end of the step, so no stiffness of a person makes it
-/// blow up. Returns what the handle does to the hand.
-Vector3 stepMotion(const Motion& motion, const Vector3& load, const Vector3& reach, const Vector3& v_intent,
-                   double dt, Vector3& v) {
-  const double inertia = motion.own_inertia + motion.hand_inertia;
-  const auto& [stiffness, damping] = motion.arm;
+/// Semi-implicit step: dampers and the arm's spring are evaluated at its end, so it is stable for any
+/// stiffness of the arm. Returns the force (torque) of the handle on the hand.
+Vector3 stepDynamics(const HandleDynamics& dynamics, const Vector3& load, const Vector3& stretch,
+                     const Vector3& v_intent, double dt, Vector3& v) {
+  const double inertia = dynamics.device_inertia + dynamics.hand_inertia;
+  const auto& [stiffness, damping] = dynamics.arm;
   const Vector3 before = v;
-  v = (inertia * v + dt * (load + stiffness * reach + damping * v_intent)) /
-      (inertia + dt * (motion.own_damping + damping) + dt * dt * stiffness);
-  v = rubbed(v, inertia, motion.friction, motion.stribeck_speed, dt);
-  const Vector3 pull = stiffness * (reach - dt * v) + damping * (v_intent - v);
-  return motion.hand_inertia / dt * (v - before) - pull;
+  v = (inertia * v + dt * (load + stiffness * stretch + damping * v_intent)) /
+      (inertia + dt * (dynamics.device_damping + damping) + dt * dt * stiffness);
+  v = applyDryFriction(v, inertia, dynamics.friction, dynamics.stribeck_speed, dt);
+  const Vector3 pull = stiffness * (stretch - dt * v) + damping * (v_intent - v);
+  return dynamics.hand_inertia / dt * (v - before) - pull;
 }
 
 }  // namespace
@@ -93,10 +95,10 @@ SimulatedDevice::SimulatedDevice(SimulatedModel model, std::uint64_t seed,
 }
 
 Result<void> SimulatedDevice::open() {
-  if (phase_ != Phase::kClosed) return fail(model_.caps.model + ": is open already");
+  if (phase_ != Phase::kClosed) return fail(model_.caps.model + ": is already open");
   phase_ = Phase::kOpen;
   state_.fault = DeviceFault::kNone;
-  readings_.fill(counted(X_DH_));
+  readings_.fill(quantizePose(X_DH_));
   return {};
 }
 
@@ -135,7 +137,7 @@ Result<void> SimulatedDevice::resetFault() {
   if (clutch_) {
     clutch_->open = false;
     clutch_openings_seen_ = clutch_->openings;
-    hand_.moved(X_DH_, {}, {});
+    arm_.setState(X_DH_, {}, {});
   }
   phase_ = Phase::kOpen;
   braked_ = false;
@@ -169,11 +171,11 @@ void SimulatedDevice::write(const DeviceCommand& command) noexcept {
   if (phase_ != Phase::kArmed) return;
   ticks_since_write_ = 0;
   if (!command.F_Ho_D.force.allFinite() || !command.F_Ho_D.torque.allFinite()) {
-    fault(DeviceFault::kNotANumber);
+    fault(DeviceFault::kNonFinite);
     return;
   }
   braked_ = command.brake;
-  F_Ho_D_newest_ = drivable(command.F_Ho_D);
+  F_Ho_D_newest_ = saturateCommand(command.F_Ho_D);
 }
 
 void SimulatedDevice::checkWatchdog() noexcept {
@@ -194,43 +196,46 @@ void SimulatedDevice::checkClutch() noexcept {
 
 void SimulatedDevice::advance() noexcept {
   if (state_.fault == DeviceFault::kClutchOpen) {
-    // the robot stands still where it was; the hand is alone
+    // the robot stands still, the hand moves alone
     V_DH_ = {};
-    hand_.moveFreely(kPeriod);
+    arm_.stepFree(kPeriod);
     return;
   }
-  // the newest command enters the delay line, the one due now leaves it
+  // delay line: the newest command enters, the one that is due leaves
   const std::size_t now = state_.seq % commands_.size();
   commands_[(now + model_.delay) % commands_.size()] = F_Ho_D_newest_;
-  const bool pushing = phase_ == Phase::kArmed && !braked_;
-  F_Ho_D_motor_ = pushing ? commands_[now] : Wrench{};
+  const bool motors_on = phase_ == Phase::kArmed && !braked_;
+  F_Ho_D_motor_ = motors_on ? commands_[now] : Wrench{};
 
-  Wrench felt;
-  for (int substep = 0; substep < kSubsteps; ++substep) felt += moveHandle(kPeriod / kSubsteps);
-  hand_.moved(X_DH_, V_DH_, felt * (1.0 / kSubsteps));
+  Wrench handle_wrench;
+  for (int substep = 0; substep < kSubsteps; ++substep) handle_wrench += stepHandle(kPeriod / kSubsteps);
+  arm_.setState(X_DH_, V_DH_, handle_wrench * (1.0 / kSubsteps));
 }
 
-Wrench SimulatedDevice::moveHandle(double dt) noexcept {
-  const Displacement reach = hand_.reach(X_DH_);
-  const Twist& V_DI = hand_.intentVelocity();
+Wrench SimulatedDevice::stepHandle(double dt) noexcept {
+  const Displacement stretch = arm_.springStretch(X_DH_);
+  const Twist& V_DI = arm_.intentVelocity();
   const Wrench load = F_Ho_D_motor_ + endStops();
-  const HumanArmModel& arm = hand_.model();
-  Wrench felt;
-  const Motion along{
-      model_.mass,       arm.mass,        model_.caps.physical_damping + (braked_ ? kBrakeDamping : 0.0),
-      hand_.impedance(), model_.friction, kStribeckSpeed};
-  felt.force = stepMotion(along, load.force, reach.translation, V_DI.linear, dt, V_DH_.linear);
+  const HumanArmModel& arm = arm_.model();
+  Wrench handle_wrench;
+  const HandleDynamics translational{
+      model_.mass,      arm.mass,        model_.caps.physical_damping + (braked_ ? kBrakeDamping : 0.0),
+      arm_.impedance(), model_.friction, kStribeckSpeed};
+  handle_wrench.force =
+      stepDynamics(translational, load.force, stretch.translation, V_DI.linear, dt, V_DH_.linear);
   if (rotates()) {
-    const Motion about{model_.inertia,
-                       arm.inertia,
-                       model_.caps.physical_rotational_damping + (braked_ ? kBrakeRotationalDamping : 0.0),
-                       hand_.rotationalImpedance(),
-                       model_.rotational_friction,
-                       kStribeckRotationSpeed};
-    felt.torque = stepMotion(about, load.torque, reach.rotation, V_DI.angular, dt, V_DH_.angular);
+    const HandleDynamics rotational{
+        model_.inertia,
+        arm.inertia,
+        model_.caps.physical_rotational_damping + (braked_ ? kBrakeRotationalDamping : 0.0),
+        arm_.rotationalImpedance(),
+        model_.rotational_friction,
+        kStribeckRotationSpeed};
+    handle_wrench.torque =
+        stepDynamics(rotational, load.torque, stretch.rotation, V_DI.angular, dt, V_DH_.angular);
   }
   X_DH_ = displaced(X_DH_, {dt * V_DH_.linear, dt * V_DH_.angular});
-  return felt;
+  return handle_wrench;
 }
 
 Wrench SimulatedDevice::endStops() const noexcept {
@@ -248,39 +253,39 @@ Wrench SimulatedDevice::endStops() const noexcept {
   return stop;
 }
 
-Wrench SimulatedDevice::drivable(const Wrench& F_Ho_D) const noexcept {
+Wrench SimulatedDevice::saturateCommand(const Wrench& F_Ho_D) const noexcept {
   const DeviceCaps& caps = model_.caps;
   Wrench motor = F_Ho_D;
   if (caps.force_quantum > 0.0) {
-    const double largest = kLargestWord * caps.force_quantum;
-    motor.force = rounded(motor.force.cwiseMax(-largest).cwiseMin(largest), caps.force_quantum);
+    const double range = kMaxMotorCommand * caps.force_quantum;
+    motor.force = quantize(motor.force.cwiseMax(-range).cwiseMin(range), caps.force_quantum);
   } else {
-    motor.force = saturated(motor.force, caps.peak_force);
+    motor.force = limitNorm(motor.force, caps.peak_force);
   }
-  motor.torque = rotates() ? saturated(motor.torque, caps.torque) : Vector3(Vector3::Zero());
+  motor.torque = rotates() ? limitNorm(motor.torque, caps.torque) : Vector3(Vector3::Zero());
   return motor;
 }
 
-Pose SimulatedDevice::counted(const Pose& X_DH) const noexcept {
-  const Vector3 p = rounded(X_DH.translation(), model_.position_resolution);
+Pose SimulatedDevice::quantizePose(const Pose& X_DH) const noexcept {
+  const Vector3 p = quantize(X_DH.translation(), model_.position_resolution);
   if (!rotates() || model_.angle_resolution <= 0.0) return {p, X_DH.rotation()};
-  return {p, expRotation(rounded(logRotation(X_DH.rotation()), model_.angle_resolution))};
+  return {p, expRotation(quantize(logRotation(X_DH.rotation()), model_.angle_resolution))};
 }
 
 void SimulatedDevice::sense() noexcept {
-  state_.X_DH = counted(X_DH_);
+  state_.X_DH = quantizePose(X_DH_);
   readings_[state_.seq % readings_.size()] = state_.X_DH;
-  const std::uint64_t old = state_.seq + readings_.size() - model_.velocity_window;
-  const Displacement moved = displacement(readings_[old % readings_.size()], state_.X_DH);
+  const std::uint64_t oldest = state_.seq + readings_.size() - model_.velocity_window;
+  const Displacement moved = displacement(readings_[oldest % readings_.size()], state_.X_DH);
   const double window = model_.velocity_window * kPeriod;
   state_.V_DH = {moved.translation / window, moved.rotation / window};
   const bool holding = state_.fault != DeviceFault::kClutchOpen;
-  state_.buttons = holding ? hand_.buttons() : 0;
+  state_.buttons = holding ? arm_.buttons() : 0;
   state_.F_Ho_D_measured = {};
   if (model_.force_sensor && holding) {
     const Vector3 error = kForceNoise * Vector3(noise(), noise(), noise());
-    state_.F_Ho_D_measured = {hand_.felt().force + error, hand_.felt().torque};
+    state_.F_Ho_D_measured = {arm_.handleWrench().force + error, arm_.handleWrench().torque};
   }
 }
 
-}  // namespace tenon
+}  // namespace tenon::devices

@@ -7,25 +7,25 @@
 #include "devices/device.h"
 #include "devices/simulated/human_arm.h"
 
-namespace tenon {
+namespace tenon::devices {
 
-/// The mechanics and electronics of one make; the devices' own files fill it with numbers and their sources.
+/// Mechanics and electronics of one make. The file of each make sets the numbers and states their sources.
 struct SimulatedModel {
-  DeviceCaps caps;                   ///< physical_damping is also what the mechanics have
-  double mass = 0.3;                 ///< [kg] apparent at the grip, the same in every direction
-  double inertia = 5e-4;             ///< [kgm2] apparent about the grip
-  double friction = 0.0;             ///< [N] Coulomb, while sliding
+  DeviceCaps caps;                   ///< its physical_damping is the damping of the mechanics
+  double mass = 0.3;                 ///< [kg] apparent mass at the grip, isotropic
+  double inertia = 5e-4;             ///< [kgm2] apparent inertia about the grip, isotropic
+  double friction = 0.0;             ///< [N] Coulomb friction while sliding
   double rotational_friction = 0.0;  ///< [Nm]
-  double rotation_range = 3.0;       ///< [rad] from the middle to the end stop, about any axis
-  double position_resolution = 0.0;  ///< [m] of one encoder count
-  double angle_resolution = 0.0;     ///< [rad]
-  unsigned velocity_window = 1;      ///< [ticks] the velocity is a mean of; at most kLongestWindow
-  unsigned delay = 0;                ///< [ticks] from write to force; at most kLongestDelay
+  double rotation_range = 3.0;       ///< [rad] from the centre to the end stop, about any axis
+  double position_resolution = 0.0;  ///< [m] of one encoder count; 0: not quantised
+  double angle_resolution = 0.0;     ///< [rad] likewise
+  unsigned velocity_window = 1;      ///< [ticks] over which velocity is averaged, 1 to kLongestWindow
+  unsigned delay = 0;                ///< [ticks] from write to force, at most kLongestDelay
   bool force_sensor = false;
 };
 
-/// The magnetic coupling between a hand and a strong arm; arms of one machine share it.
-/// Each opening is counted, so that an arm that looks late still notices it.
+/// Magnetic clutch between hand and robot, shared by both arms of a bimanual device. Openings are counted, so
+/// that an arm detects one even if the clutch was closed again before its next cycle.
 ///
 /// Threads: one servo thread. Real-time: yes.
 struct MagneticClutch {
@@ -33,21 +33,20 @@ struct MagneticClutch {
   std::uint32_t openings = 0;
 };
 
-/// A device that exists only here: mass, damping, dry friction, end stops, encoders, delay, force limits, and
-/// a person's arm that holds its handle.
+/// Simulated device: mass, damping, dry friction, end stops, encoders, delay and force limits, with a
+/// simulated arm that holds the handle.
 ///
-/// Time passes in read(), one period of 1 ms each time, with the newest command held as a true sampled-data
-/// loop would: what is unstable on the desk is unstable here. No clock is read and no number is random but
-/// for the seed's (friction as this one specimen has it, noise of the force sensor), so a session repeats bit
-/// by bit. Gravity is taken as compensated.
+/// Each read() advances time by 1 ms with the newest command held, as in a sampled-data loop, so that an
+/// unstable force law is unstable here, too. No clock is read; random numbers (friction of the specimen,
+/// noise of the force sensor) come from the seed, so a session repeats bit by bit. Gravity is compensated.
 ///
-/// Threads: one servo thread, the hand's intent included. Real-time: read, write, disarm and all of hand().
+/// Threads: one servo thread, also for humanArm(). Real-time: read, write, disarm and all of humanArm().
 class SimulatedDevice : public HapticDevice {
  public:
   static constexpr unsigned kLongestWindow = 31;
   static constexpr unsigned kLongestDelay = 7;
-  /// [ticks] without a write after which an armed device takes its forces off: Force Dimension's watchdog
-  /// ends at 255 x 125 us.
+  /// [ticks] without a write until an armed device turns its forces off: Force Dimension's watchdog ends at
+  /// 255 x 125 us.
   static constexpr unsigned kWatchdog = 32;
 
   enum class Phase : std::uint8_t { kClosed, kOpen, kArmed, kFault };
@@ -65,11 +64,11 @@ class SimulatedDevice : public HapticDevice {
   void read(DeviceState& state) noexcept override;
   void write(const DeviceCommand& command) noexcept override;
 
-  [[nodiscard]] HumanArm& hand() noexcept { return hand_; }
+  [[nodiscard]] HumanArm& humanArm() noexcept { return arm_; }
   [[nodiscard]] Phase phase() const noexcept { return phase_; }
-  /// Pulls the plug: the device says nothing more until it is opened again.
+  /// Loss of communication: readings stop until the device is opened again.
   void unplug() noexcept;
-  /// What the motors do to the handle now.
+  /// Wrench of the motors on the handle, about the hand's origin, in D.
   [[nodiscard]] const Wrench& motorWrench() const noexcept { return F_Ho_D_motor_; }
 
  private:
@@ -77,16 +76,19 @@ class SimulatedDevice : public HapticDevice {
   void checkWatchdog() noexcept;
   void checkClutch() noexcept;
   void advance() noexcept;
-  [[nodiscard]] Wrench moveHandle(double dt) noexcept;
+  /// Integrates hand and handle over `dt` [s]; returns the wrench of the handle on the hand.
+  [[nodiscard]] Wrench stepHandle(double dt) noexcept;
   [[nodiscard]] Wrench endStops() const noexcept;
-  [[nodiscard]] Wrench drivable(const Wrench& F_Ho_D) const noexcept;
+  /// The command as the motors can realise it: quantised, saturated, without axes that are not actuated.
+  [[nodiscard]] Wrench saturateCommand(const Wrench& F_Ho_D) const noexcept;
   void sense() noexcept;
-  [[nodiscard]] Pose counted(const Pose& X_DH) const noexcept;
+  [[nodiscard]] Pose quantizePose(const Pose& X_DH) const noexcept;
+  /// [-] uniform in [-1, 1).
   [[nodiscard]] double noise() noexcept;
   [[nodiscard]] bool rotates() const noexcept;
 
   SimulatedModel model_;
-  HumanArm hand_;
+  HumanArm arm_;
   std::shared_ptr<MagneticClutch> clutch_;
   std::uint32_t clutch_openings_seen_ = 0;
   std::uint64_t random_;
@@ -95,18 +97,18 @@ class SimulatedDevice : public HapticDevice {
   bool braked_ = false;
   unsigned ticks_since_write_ = 0;
 
-  Pose X_DH_;  ///< of the handle
+  Pose X_DH_;  ///< true pose of the handle
   Twist V_DH_;
-  Wrench F_Ho_D_newest_;  ///< as the motors could do it
+  Wrench F_Ho_D_newest_;  ///< newest command after saturateCommand()
   Wrench F_Ho_D_motor_;
-  std::array<Wrench, kLongestDelay + 1> commands_{};  ///< by tick modulo its size
-  std::array<Pose, kLongestWindow + 1> readings_{};   ///< likewise
+  std::array<Wrench, kLongestDelay + 1> commands_{};  ///< delay line, by tick modulo its size
+  std::array<Pose, kLongestWindow + 1> readings_{};   ///< past poses, likewise
 };
 
-/// The arm of the person who holds it, or null for a device without a simulated one.
-[[nodiscard]] inline HumanArm* handOf(HapticDevice& device) noexcept {
+/// The simulated arm that holds `device`; null if there is none.
+[[nodiscard]] inline HumanArm* simulatedHumanArm(HapticDevice& device) noexcept {
   auto* const simulated = dynamic_cast<SimulatedDevice*>(&device);
-  return simulated ? &simulated->hand() : nullptr;
+  return simulated ? &simulated->humanArm() : nullptr;
 }
 
-}  // namespace tenon
+}  // namespace tenon::devices

@@ -1,6 +1,6 @@
 #include "devices/simulated/vibrotac.h"
 
-namespace tenon {
+namespace tenon::devices {
 
 Vibrotac::Vibrotac() {
   caps_.model = "VibroTac (simulated)";
@@ -19,7 +19,7 @@ Result<void> Vibrotac::arm() {
 
 void Vibrotac::disarm() noexcept {
   state_.forces_on = false;
-  wanted_.fill(0);
+  requested_.fill(0);
 }
 
 Result<void> Vibrotac::resetFault() {
@@ -34,7 +34,7 @@ void Vibrotac::read(DeviceState& state) noexcept {
     state_.fault = DeviceFault::kStale;
   }
   if (ticks_to_send_ == 0) {
-    sent_ = wanted_;
+    sent_ = requested_;
     ticks_to_send_ = kTicksPerCommand;
   }
   --ticks_to_send_;
@@ -47,7 +47,7 @@ void Vibrotac::read(DeviceState& state) noexcept {
 void Vibrotac::write(const DeviceCommand& command) noexcept {
   if (!state_.forces_on) return;
   ticks_since_write_ = 0;
-  wanted_ = command.tactors;
+  requested_ = command.tactors;
 }
 
-}  // namespace tenon
+}  // namespace tenon::devices

@@ -2,7 +2,7 @@
 
 #include "idl/record/mcap_format.h"
 
-namespace tenon {
+namespace tenon::record {
 namespace {
 
 constexpr std::uint8_t kLittleEndianCdr[4] = {0, 1, 0, 0};
@@ -11,9 +11,9 @@ constexpr std::size_t kAlignment = 4;
 }  // namespace
 
 std::vector<std::uint8_t> encodeInstanceGone(const InstanceGone& gone) {
-  mcap::Fields out;
+  mcap::FieldWriter out;
   out.putBytes(kLittleEndianCdr);
-  // a CDR string counts and carries its closing zero
+  // the length of a CDR string includes its terminating zero, which is sent
   out.put(static_cast<std::uint32_t>(gone.topic.size() + 1));
   out.putBytes({reinterpret_cast<const std::uint8_t*>(gone.topic.c_str()), gone.topic.size() + 1});
   while (out.bytes.size() % kAlignment != 0) out.put(std::uint8_t{0});
@@ -37,4 +37,4 @@ Result<InstanceGone> decodeInstanceGone(std::span<const std::uint8_t> bytes) {
   return gone;
 }
 
-}  // namespace tenon
+}  // namespace tenon::record

@@ -8,17 +8,18 @@
 
 #include "idl/types/result.h"
 
-namespace tenon {
+namespace tenon::record {
 
-/// That a key of a topic ended: an object removed, a client gone.
+/// The end of a topic's instance (key): disposed, as an object that is removed, or without writers, as a
+/// client that has left.
 ///
-/// MCAP knows messages alone, so a recording keeps disposals on a channel of their own; without them a replay
-/// would show for ever what has left the session.
+/// MCAP has no instance states, so recordings keep them on a channel of their own; without it a replay would
+/// show objects and clients that have left the session.
 ///
 /// Threads: any. Real-time: no.
 struct InstanceGone {
   std::string topic;
-  std::vector<std::uint8_t> key_sample;  ///< a sample of the topic with only its key fields set, as encoded
+  std::vector<std::uint8_t> key_sample;  ///< encoded sample of the topic with only its key fields set
 };
 
 inline constexpr std::string_view kInstanceStateTopic = "__instance_state";
@@ -29,8 +30,9 @@ inline constexpr std::string_view kInstanceStateIdl =
     "@final struct InstanceGone { string topic; sequence<octet> key_sample; };\n"
     "};\n";
 
-/// As CDR, encapsulation included; written by hand because this room knows no DDS.
+/// CDR with encapsulation header; coded by hand because this folder does not depend on DDS.
 [[nodiscard]] std::vector<std::uint8_t> encodeInstanceGone(const InstanceGone& gone);
+/// Fails when `bytes` are no complete InstanceGone.
 [[nodiscard]] Result<InstanceGone> decodeInstanceGone(std::span<const std::uint8_t> bytes);
 
-}  // namespace tenon
+}  // namespace tenon::record

@@ -2,7 +2,7 @@
 
 #include <array>
 
-namespace tenon::mcap {
+namespace tenon::record::mcap {
 namespace {
 
 constexpr std::array<std::uint32_t, 256> makeTable() {
@@ -25,4 +25,4 @@ std::uint32_t crc32(std::span<const std::uint8_t> bytes, std::uint32_t crc) {
   return ~crc;
 }
 
-}  // namespace tenon::mcap
+}  // namespace tenon::record::mcap

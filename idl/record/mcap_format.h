@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-/// The parts of the MCAP file format (version 0, public specification) that writer and reader share.
-namespace tenon::mcap {
+/// What writer and reader share of the MCAP file format (version 0, https://mcap.dev/spec).
+namespace tenon::record::mcap {
 
 inline constexpr std::uint8_t kMagic[8] = {0x89, 'M', 'C', 'A', 'P', 0x30, '\r', '\n'};
 
@@ -31,13 +31,13 @@ enum Opcode : std::uint8_t {
   kDataEnd = 0x0F,
 };
 
-inline constexpr std::size_t kRecordHead = 9;  // opcode and length
+inline constexpr std::size_t kRecordHeaderBytes = 9;  // opcode and length
 
-/// The checksum of the format: CRC-32 as in zip and Ethernet. `crc` continues an earlier one.
+/// CRC-32 (IEEE 802.3), the checksum of the format. `crc`: result for the bytes before, to continue it.
 [[nodiscard]] std::uint32_t crc32(std::span<const std::uint8_t> bytes, std::uint32_t crc = 0);
 
-/// Little-endian fields, one after the other.
-class Fields {
+/// Builds a record from little-endian fields.
+class FieldWriter {
  public:
   template <typename T>
   void put(T value) {
@@ -50,7 +50,7 @@ class Fields {
     putBytes({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
   }
   void put(const std::map<std::string, std::string>& values) {
-    Fields inner;
+    FieldWriter inner;
     for (const auto& [key, value] : values)
       inner.put(std::string_view(key)), inner.put(std::string_view(value));
     put(static_cast<std::uint32_t>(inner.bytes.size()));
@@ -61,7 +61,7 @@ class Fields {
   std::vector<std::uint8_t> bytes;
 };
 
-/// Reads fields back; past the end it gives nothing and `ok` stays false.
+/// Reads the fields of a record. Past the end, values are zero or empty and `ok` stays false.
 class FieldReader {
  public:
   explicit FieldReader(std::span<const std::uint8_t> bytes) : rest(bytes) {}
@@ -98,8 +98,8 @@ class FieldReader {
     return part;
   }
 
-  std::span<const std::uint8_t> rest;
+  std::span<const std::uint8_t> rest;  ///< not read yet
   bool ok = true;
 };
 
-}  // namespace tenon::mcap
+}  // namespace tenon::record::mcap

@@ -12,14 +12,14 @@
 
 #include "idl/record/mcap_format.h"
 
-namespace tenon {
+namespace tenon::record {
 namespace {
 
 using mcap::FieldReader;
 
-constexpr std::uint64_t kLargestChunk = 256U << 20U;  // [bytes] unpacked: more is damage or an attack
+constexpr std::uint64_t kMaxChunkBytes = 256U << 20U;  // uncompressed; a larger size is damage or an attack
 
-/// A file's bytes, mapped; nothing when it cannot be.
+/// A file mapped read-only into memory.
 class MappedFile {
  public:
   ~MappedFile() {
@@ -45,21 +45,21 @@ class MappedFile {
   std::size_t size_ = 0;
 };
 
-struct ChunkPlace {
+struct ChunkLocation {
   std::int64_t first_time = 0, last_time = 0;
   std::span<const std::uint8_t> fields;
 };
 
-/// The next record of a list of records; false at its end or where it is cut.
+/// Takes the next record from `rest`; false at the end or when the record is incomplete.
 bool takeRecord(std::span<const std::uint8_t>& rest, std::uint8_t& opcode,
                 std::span<const std::uint8_t>& fields) {
-  if (rest.size() < mcap::kRecordHead) return false;
+  if (rest.size() < mcap::kRecordHeaderBytes) return false;
   std::uint64_t length = 0;
   opcode = rest[0];
   std::memcpy(&length, rest.data() + 1, sizeof(length));
-  if (rest.size() - mcap::kRecordHead < length) return false;
-  fields = rest.subspan(mcap::kRecordHead, length);
-  rest = rest.subspan(mcap::kRecordHead + length);
+  if (rest.size() - mcap::kRecordHeaderBytes < length) return false;
+  fields = rest.subspan(mcap::kRecordHeaderBytes, length);
+  rest = rest.subspan(mcap::kRecordHeaderBytes + length);
   return true;
 }
 
@@ -69,18 +69,18 @@ struct McapReader::Impl {
   MappedFile mapped;
   std::string name;
   bool complete = false;
-  bool summary_is_good = true;
+  bool summary_valid = true;
   std::string problem;
-  std::vector<ChunkPlace> chunks;
+  std::vector<ChunkLocation> chunks;
   std::map<std::uint16_t, std::pair<std::string, std::string>> schemas;  // type name, text
-  std::map<std::uint16_t, std::size_t> channel_places;                   // id -> index into channels
+  std::map<std::uint16_t, std::size_t> channel_indices;                  // id -> index into channels
   std::vector<McapChannel> channels;
   std::multimap<std::string, std::map<std::string, std::string>> metadata;
   std::vector<McapAttachment> attachments;
 
   std::size_t next_chunk = 0;
   std::int64_t not_before = std::numeric_limits<std::int64_t>::min();
-  std::vector<std::uint8_t> unpacked;
+  std::vector<std::uint8_t> decompressed;
   std::span<const std::uint8_t> rest;
 
   void scan(std::span<const std::uint8_t> bytes);
@@ -88,8 +88,8 @@ struct McapReader::Impl {
   void readDefinition(std::uint8_t opcode, std::span<const std::uint8_t> fields);
   void readTopLevel(std::uint8_t opcode, std::span<const std::uint8_t> fields);
   void readStatistics(std::span<const std::uint8_t> fields);
-  bool unpack(const ChunkPlace& place);
-  void complain(const std::string& what) {
+  bool decompress(const ChunkLocation& location);
+  void reportProblem(const std::string& what) {
     if (problem.empty()) problem = name + ": " + what;
   }
 };
@@ -118,10 +118,10 @@ Result<McapReader> McapReader::open(const std::filesystem::path& file) {
   impl->scan(bytes->subspan(sizeof(mcap::kMagic)));
 
   // without a summary the channels are those that the chunks define
-  if (!impl->complete || !impl->summary_is_good) {
-    if (!impl->complete) impl->complain("was cut: read up to its last whole chunk");
-    for (const ChunkPlace& place : impl->chunks) {
-      if (!impl->unpack(place)) continue;
+  if (!impl->complete || !impl->summary_valid) {
+    if (!impl->complete) impl->reportProblem("is truncated: read up to its last complete chunk");
+    for (const ChunkLocation& location : impl->chunks) {
+      if (!impl->decompress(location)) continue;
       std::uint8_t opcode = 0;
       std::span<const std::uint8_t> fields;
       while (takeRecord(impl->rest, opcode, fields)) impl->readDefinition(opcode, fields);
@@ -151,22 +151,22 @@ void McapReader::Impl::checkSummary(std::span<const std::uint8_t> summary) {
     std::memcpy(&crc, summary.data() + summary.size() - sizeof(crc), sizeof(crc));
     if (crc == 0 || crc == mcap::crc32(summary.first(summary.size() - sizeof(crc)))) return;
   }
-  complain("its summary is damaged, its chunks are read without it");
+  reportProblem("the summary is damaged: chunks are read without it");
   schemas.clear();
-  channel_places.clear();
+  channel_indices.clear();
   channels.clear();
-  summary_is_good = false;
+  summary_valid = false;
 }
 
 void McapReader::Impl::readTopLevel(std::uint8_t opcode, std::span<const std::uint8_t> fields) {
-  FieldReader in(fields);
+  record::mcap::FieldReader in(fields);
   switch (opcode) {
     case mcap::kChunk: {
-      ChunkPlace place;
-      place.first_time = in.get<std::int64_t>();
-      place.last_time = in.get<std::int64_t>();
-      place.fields = in.rest;
-      if (in.ok) chunks.push_back(place);
+      ChunkLocation location;
+      location.first_time = in.get<std::int64_t>();
+      location.last_time = in.get<std::int64_t>();
+      location.fields = in.rest;
+      if (in.ok) chunks.push_back(location);
       return;
     }
     case mcap::kMetadata: {
@@ -183,7 +183,7 @@ void McapReader::Impl::readTopLevel(std::uint8_t opcode, std::span<const std::ui
       attachment.data = in.take(in.get<std::uint64_t>());
       const auto crc = in.get<std::uint32_t>();
       if (!in.ok || crc != mcap::crc32(fields.first(fields.size() - sizeof(crc))))
-        return complain("an attachment is damaged and left out");
+        return reportProblem("an attachment is damaged and skipped");
       attachments.push_back(std::move(attachment));
       return;
     }
@@ -195,7 +195,7 @@ void McapReader::Impl::readTopLevel(std::uint8_t opcode, std::span<const std::ui
 }
 
 void McapReader::Impl::readDefinition(std::uint8_t opcode, std::span<const std::uint8_t> fields) {
-  FieldReader in(fields);
+  record::mcap::FieldReader in(fields);
   const auto id = in.get<std::uint16_t>();
   if (opcode == mcap::kSchema) {
     const std::string type(in.text());
@@ -203,58 +203,58 @@ void McapReader::Impl::readDefinition(std::uint8_t opcode, std::span<const std::
     const std::string text(in.text());
     if (in.ok) schemas[id] = {type, text};
   }
-  if (opcode == mcap::kChannel && !channel_places.contains(id)) {
+  if (opcode == mcap::kChannel && !channel_indices.contains(id)) {
     const auto schema = schemas.find(in.get<std::uint16_t>());
     const std::string topic(in.text());
-    if (!in.ok || schema == schemas.end()) return complain("a channel without a schema is left out");
-    channel_places[id] = channels.size();
+    if (!in.ok || schema == schemas.end()) return reportProblem("a channel without a schema is skipped");
+    channel_indices[id] = channels.size();
     channels.push_back({topic, schema->second.first, schema->second.second, 0});
   }
 }
 
 void McapReader::Impl::readStatistics(std::span<const std::uint8_t> fields) {
-  FieldReader in(fields);
+  record::mcap::FieldReader in(fields);
   in.take(8 + 2 + 4 + 4 + 4 + 4 + 8 + 8);
-  FieldReader counts(in.take(in.get<std::uint32_t>()));
+  record::mcap::FieldReader counts(in.take(in.get<std::uint32_t>()));
   while (counts.ok && !counts.rest.empty()) {
     const auto id = counts.get<std::uint16_t>();
     const auto count = counts.get<std::uint64_t>();
-    if (const auto place = channel_places.find(id); counts.ok && place != channel_places.end())
-      channels[place->second].messages = count;
+    if (const auto index = channel_indices.find(id); counts.ok && index != channel_indices.end())
+      channels[index->second].messages = count;
   }
 }
 
-bool McapReader::Impl::unpack(const ChunkPlace& place) {
-  FieldReader in(place.fields);
+bool McapReader::Impl::decompress(const ChunkLocation& location) {
+  record::mcap::FieldReader in(location.fields);
   const auto size = in.get<std::uint64_t>();
   const auto crc = in.get<std::uint32_t>();
   const std::string_view compression = in.text();
-  const auto packed = in.take(in.get<std::uint64_t>());
+  const auto compressed = in.take(in.get<std::uint64_t>());
   const bool known = compression.empty() || compression == "zstd";
-  if (!in.ok || !known || size > kLargestChunk) {
-    complain("a chunk cannot be read and is left out");
+  if (!in.ok || !known || size > kMaxChunkBytes) {
+    reportProblem("a chunk cannot be read and is skipped");
     return false;
   }
   if (compression.empty()) {
-    unpacked.assign(packed.begin(), packed.end());
+    decompressed.assign(compressed.begin(), compressed.end());
   } else {
-    // the frame itself says its size too: nothing is allocated on the word of one number alone
-    if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != size) {
-      complain("a chunk is damaged and left out");
+    // the size must be that of the zstd frame: one damaged number must not cause a huge allocation
+    if (ZSTD_getFrameContentSize(compressed.data(), compressed.size()) != size) {
+      reportProblem("a chunk is damaged and skipped");
       return false;
     }
-    unpacked.resize(size);
-    const std::size_t got = ZSTD_decompress(unpacked.data(), size, packed.data(), packed.size());
+    decompressed.resize(size);
+    const std::size_t got = ZSTD_decompress(decompressed.data(), size, compressed.data(), compressed.size());
     if (ZSTD_isError(got) != 0 || got != size) {
-      complain("a chunk is damaged and left out");
+      reportProblem("a chunk is damaged and skipped");
       return false;
     }
   }
-  if (crc != 0 && mcap::crc32(unpacked) != crc) {
-    complain("a chunk has the wrong checksum and is left out");
+  if (crc != 0 && mcap::crc32(decompressed) != crc) {
+    reportProblem("a chunk has a wrong checksum and is skipped");
     return false;
   }
-  rest = unpacked;
+  rest = decompressed;
   return true;
 }
 
@@ -268,12 +268,12 @@ bool McapReader::next(McapMessage& message) {
         from.readDefinition(opcode, fields);
         continue;
       }
-      FieldReader in(fields);
-      const auto channel = from.channel_places.find(in.get<std::uint16_t>());
+      record::mcap::FieldReader in(fields);
+      const auto channel = from.channel_indices.find(in.get<std::uint16_t>());
       message.sequence = in.get<std::uint32_t>();
       message.log_time_ns = in.get<std::int64_t>();
       in.get<std::int64_t>();
-      if (!in.ok || channel == from.channel_places.end() || message.log_time_ns < from.not_before) continue;
+      if (!in.ok || channel == from.channel_indices.end() || message.log_time_ns < from.not_before) continue;
       message.topic = from.channels[channel->second].topic;
       message.type_name = from.channels[channel->second].type_name;
       message.data = in.rest;
@@ -283,7 +283,7 @@ bool McapReader::next(McapMessage& message) {
       if (from.next_chunk == from.chunks.size()) return false;
     } while (from.chunks[from.next_chunk].last_time < from.not_before
                  ? (++from.next_chunk, true)
-                 : !from.unpack(from.chunks[from.next_chunk++]));
+                 : !from.decompress(from.chunks[from.next_chunk++]));
   }
 }
 
@@ -293,4 +293,4 @@ void McapReader::seek(std::int64_t log_time_ns) {
   impl_->rest = {};
 }
 
-}  // namespace tenon
+}  // namespace tenon::record

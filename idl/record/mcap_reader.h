@@ -11,35 +11,37 @@
 
 #include "idl/types/result.h"
 
-namespace tenon {
+namespace tenon::record {
 
+/// A message of a recording. Its views are valid until the next call of the reader.
 struct McapMessage {
   std::string_view topic;
   std::string_view type_name;
-  std::int64_t log_time_ns = 0;
+  std::int64_t log_time_ns = 0;  ///< [ns]
   std::uint32_t sequence = 0;
-  std::span<const std::uint8_t> data;  ///< valid until the next call of the reader
+  std::span<const std::uint8_t> data;  ///< in the channel's encoding
 };
 
 struct McapChannel {
   std::string topic;
   std::string type_name;
   std::string schema_text;
-  std::uint64_t messages = 0;  ///< as the file's statistics count them; 0 in a file that was cut
+  std::uint64_t messages = 0;  ///< by the statistics of the file; 0 in a truncated file
 };
 
 struct McapAttachment {
   std::string name;
   std::string media_type;
-  std::span<const std::uint8_t> data;  ///< valid as long as the reader
+  std::span<const std::uint8_t> data;  ///< valid during the life of the reader
 };
 
-/// Reads an MCAP file in file order. A file that was cut (a crash, a full disk) is read as far as its last
-/// whole chunk; a chunk whose checksum is wrong is left out; `problem` says so.
+/// Reads an MCAP file in file order. A truncated file (crash, full disk) is read up to its last complete
+/// chunk, and a damaged chunk is skipped; problem() reports both.
 ///
 /// Threads: one at a time. Real-time: no.
 class McapReader {
  public:
+  /// Fails when `file` cannot be read or is no MCAP file.
   [[nodiscard]] static Result<McapReader> open(const std::filesystem::path& file);
   ~McapReader();
   McapReader(McapReader&&) noexcept;
@@ -47,11 +49,12 @@ class McapReader {
 
   /// The next message; false at the end.
   bool next(McapMessage& message);
-  /// Goes on with the first chunk that holds messages at or after this time, leaving out earlier ones.
+  /// Continues with the first message in the file whose log time [ns] is not before `log_time_ns`; earlier
+  /// messages after it are skipped.
   void seek(std::int64_t log_time_ns);
 
-  [[nodiscard]] bool complete() const;               ///< false: the file has no proper end
-  [[nodiscard]] const std::string& problem() const;  ///< what was wrong with the file, or empty
+  [[nodiscard]] bool complete() const;               ///< false: the file is truncated
+  [[nodiscard]] const std::string& problem() const;  ///< first damage found so far, or empty
   [[nodiscard]] const std::vector<McapChannel>& channels() const;
   [[nodiscard]] const std::multimap<std::string, std::map<std::string, std::string>>& metadata() const;
   [[nodiscard]] const std::vector<McapAttachment>& attachments() const;
@@ -62,4 +65,4 @@ class McapReader {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace tenon
+}  // namespace tenon::record

@@ -14,10 +14,10 @@
 
 #include "idl/record/mcap_format.h"
 
-namespace tenon {
+namespace tenon::record {
 namespace {
 
-using mcap::Fields;
+using mcap::FieldWriter;
 using StopWatch = std::chrono::steady_clock;
 
 constexpr std::size_t kChunkBytes = 1U << 20U;
@@ -42,16 +42,16 @@ struct McapWriter::Impl {
   std::uint32_t data_crc = 0;
   StopWatch::time_point synced = StopWatch::now();
 
-  // the chunk that is being filled
-  Fields chunk;
-  StopWatch::time_point chunk_began;
+  // the current chunk
+  record::mcap::FieldWriter chunk;
+  StopWatch::time_point chunk_start;
   std::int64_t first_time = std::numeric_limits<std::int64_t>::max();
   std::int64_t last_time = 0;
   std::map<std::uint16_t, std::vector<std::pair<std::uint64_t, std::uint64_t>>> index;
 
   // for the summary
   std::map<std::string, std::uint16_t> schema_ids;
-  Fields schemas, channels, attachment_index, metadata_index;
+  record::mcap::FieldWriter schemas, channels, attachment_index, metadata_index;
   std::map<std::uint16_t, std::uint64_t> counts;
   std::vector<ChunkIndex> chunks;
   std::uint64_t messages = 0;
@@ -74,12 +74,13 @@ struct McapWriter::Impl {
     }
     return {};
   }
-  Result<void> record(mcap::Opcode opcode, const Fields& fields) {
-    Fields whole;
+  Result<void> record(mcap::Opcode opcode, const record::mcap::FieldWriter& fields) {
+    record::mcap::FieldWriter whole;
     append(whole, opcode, fields);
     return put(whole.bytes);
   }
-  static void append(Fields& to, mcap::Opcode opcode, const Fields& fields) {
+  static void append(record::mcap::FieldWriter& to, mcap::Opcode opcode,
+                     const record::mcap::FieldWriter& fields) {
     to.put(opcode);
     to.put(static_cast<std::uint64_t>(fields.bytes.size()));
     to.putBytes(fields.bytes);
@@ -88,8 +89,8 @@ struct McapWriter::Impl {
   Result<void> endChunk();
   Result<void> writeIndices(ChunkIndex& chunk_index);
   Result<void> writeSummary();
-  void addStatistics(Fields& summary) const;
-  void addChunkIndices(Fields& summary) const;
+  void addStatistics(record::mcap::FieldWriter& summary) const;
+  void addChunkIndices(record::mcap::FieldWriter& summary) const;
 };
 
 McapWriter::McapWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -108,7 +109,7 @@ Result<McapWriter> McapWriter::open(const std::filesystem::path& file, const Mca
   impl->descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (impl->descriptor < 0) return fail(file.string() + ": cannot be written (" + std::strerror(errno) + ")");
   if (auto done = impl->put(mcap::kMagic); !done) return fail(done.error().what);
-  Fields header;
+  record::mcap::FieldWriter header;
   header.put(std::string_view("tenon"));
   header.put(std::string_view("tenon"));
   if (auto done = impl->record(mcap::kHeader, header); !done) return fail(done.error().what);
@@ -119,9 +120,9 @@ std::uint16_t McapWriter::addChannel(std::string_view topic, std::string_view ty
                                      std::string_view schema_text) {
   Impl& to = *impl_;
   auto [schema, is_new] = to.schema_ids.try_emplace(std::string(type_name), to.schema_ids.size() + 1);
-  Fields both;
+  record::mcap::FieldWriter both;
   if (is_new) {
-    Fields fields;
+    record::mcap::FieldWriter fields;
     fields.put(schema->second);
     fields.put(type_name);
     fields.put(std::string_view("omgidl"));
@@ -131,17 +132,17 @@ std::uint16_t McapWriter::addChannel(std::string_view topic, std::string_view ty
   }
   const auto id = static_cast<std::uint16_t>(to.counts.size());
   to.counts[id] = 0;
-  Fields channel;
+  record::mcap::FieldWriter channel;
   channel.put(id);
   channel.put(schema->second);
   channel.put(topic);
   channel.put(std::string_view("cdr"));
   channel.put(std::map<std::string, std::string>{});
-  Fields record;
+  record::mcap::FieldWriter record;
   Impl::append(record, mcap::kChannel, channel);
   to.channels.putBytes(record.bytes);
-  // schema and channel stand in the chunk before the channel's first message
-  if (to.chunk.bytes.empty()) to.chunk_began = StopWatch::now();
+  // schema and channel precede the channel's first message in its chunk
+  if (to.chunk.bytes.empty()) to.chunk_start = StopWatch::now();
   to.chunk.putBytes(both.bytes);
   to.chunk.putBytes(record.bytes);
   return id;
@@ -150,8 +151,8 @@ std::uint16_t McapWriter::addChannel(std::string_view topic, std::string_view ty
 Result<void> McapWriter::write(std::uint16_t channel, std::int64_t log_time_ns, std::uint32_t sequence,
                                std::span<const std::uint8_t> data) {
   Impl& to = *impl_;
-  if (to.descriptor < 0) return fail(to.file.string() + ": is closed already");
-  if (to.chunk.bytes.empty()) to.chunk_began = StopWatch::now();
+  if (to.descriptor < 0) return fail(to.file.string() + ": is already closed");
+  if (to.chunk.bytes.empty()) to.chunk_start = StopWatch::now();
   to.index[channel].emplace_back(log_time_ns, to.chunk.bytes.size());
   constexpr std::size_t kMessageFields = 2 + 4 + 8 + 8;
   to.chunk.put(mcap::kMessage);
@@ -167,7 +168,7 @@ Result<void> McapWriter::write(std::uint16_t channel, std::int64_t log_time_ns, 
   ++to.messages;
 
   const auto now = StopWatch::now();
-  if (to.chunk.bytes.size() >= kChunkBytes || now - to.chunk_began > kChunkAge)
+  if (to.chunk.bytes.size() >= kChunkBytes || now - to.chunk_start > kChunkAge)
     if (auto done = to.endChunk(); !done) return done;
   if (now - to.synced > kSyncAge) {
     ::fdatasync(to.descriptor);
@@ -179,29 +180,29 @@ Result<void> McapWriter::write(std::uint16_t channel, std::int64_t log_time_ns, 
 Result<void> McapWriter::Impl::endChunk() {
   if (chunk.bytes.empty()) return {};
   const bool has_messages = !index.empty();
-  std::vector<std::uint8_t> packed;
+  std::vector<std::uint8_t> compressed_bytes;
   if (compress) {
-    packed.resize(ZSTD_compressBound(chunk.bytes.size()));
-    const std::size_t size = ZSTD_compress(packed.data(), packed.size(), chunk.bytes.data(),
-                                           chunk.bytes.size(), kCompressionLevel);
+    compressed_bytes.resize(ZSTD_compressBound(chunk.bytes.size()));
+    const std::size_t size = ZSTD_compress(compressed_bytes.data(), compressed_bytes.size(),
+                                           chunk.bytes.data(), chunk.bytes.size(), kCompressionLevel);
     if (ZSTD_isError(size) != 0) return fail(file.string() + ": " + ZSTD_getErrorName(size));
-    packed.resize(size);
+    compressed_bytes.resize(size);
   }
   ChunkIndex entry;
   entry.first_time = has_messages ? first_time : 0;
   entry.last_time = has_messages ? last_time : 0;
   entry.offset = offset;
   entry.plain = chunk.bytes.size();
-  entry.compressed = compress ? packed.size() : chunk.bytes.size();
+  entry.compressed = compress ? compressed_bytes.size() : chunk.bytes.size();
 
-  Fields fields;
+  record::mcap::FieldWriter fields;
   fields.put(entry.first_time);
   fields.put(entry.last_time);
   fields.put(entry.plain);
   fields.put(mcap::crc32(chunk.bytes));
   fields.put(std::string_view(compress ? "zstd" : ""));
   fields.put(entry.compressed);
-  fields.putBytes(compress ? packed : chunk.bytes);
+  fields.putBytes(compress ? compressed_bytes : chunk.bytes);
   if (auto done = record(mcap::kChunk, fields); !done) return done;
   entry.length = offset - entry.offset;
   if (auto done = writeIndices(entry); !done) return done;
@@ -225,7 +226,7 @@ Result<void> McapWriter::Impl::writeIndices(ChunkIndex& entry) {
       return static_cast<std::int64_t>(a.first) < static_cast<std::int64_t>(b.first);
     });
     entry.message_indices[channel] = offset;
-    Fields fields;
+    record::mcap::FieldWriter fields;
     fields.put(channel);
     fields.put(static_cast<std::uint32_t>(records.size() * 16));
     for (const auto& [time, at] : records) fields.put(time), fields.put(at);
@@ -239,12 +240,12 @@ Result<void> McapWriter::addMetadata(std::string_view name,
                                      const std::map<std::string, std::string>& values) {
   Impl& to = *impl_;
   if (auto done = to.endChunk(); !done) return done;
-  Fields fields;
+  record::mcap::FieldWriter fields;
   fields.put(name);
   fields.put(values);
   const std::uint64_t at = to.offset;
   if (auto done = to.record(mcap::kMetadata, fields); !done) return done;
-  Fields entry;
+  record::mcap::FieldWriter entry;
   entry.put(at);
   entry.put(to.offset - at);
   entry.put(name);
@@ -257,7 +258,7 @@ Result<void> McapWriter::addAttachment(std::string_view name, std::string_view m
                                        std::span<const std::uint8_t> data) {
   Impl& to = *impl_;
   if (auto done = to.endChunk(); !done) return done;
-  Fields fields;
+  record::mcap::FieldWriter fields;
   const std::int64_t time = to.end;
   fields.put(time);
   fields.put(time);
@@ -268,7 +269,7 @@ Result<void> McapWriter::addAttachment(std::string_view name, std::string_view m
   fields.put(mcap::crc32(fields.bytes));
   const std::uint64_t at = to.offset;
   if (auto done = to.record(mcap::kAttachment, fields); !done) return done;
-  Fields entry;
+  record::mcap::FieldWriter entry;
   entry.put(at);
   entry.put(to.offset - at);
   entry.put(time);
@@ -282,14 +283,14 @@ Result<void> McapWriter::addAttachment(std::string_view name, std::string_view m
 }
 
 Result<void> McapWriter::flush() {
-  if (impl_->descriptor < 0) return fail(impl_->file.string() + ": is closed already");
+  if (impl_->descriptor < 0) return fail(impl_->file.string() + ": is already closed");
   auto done = impl_->endChunk();
   ::fdatasync(impl_->descriptor);
   return done;
 }
 
-void McapWriter::Impl::addStatistics(Fields& summary) const {
-  Fields fields;
+void McapWriter::Impl::addStatistics(record::mcap::FieldWriter& summary) const {
+  record::mcap::FieldWriter fields;
   fields.put(messages);
   fields.put(static_cast<std::uint16_t>(schema_ids.size()));
   fields.put(static_cast<std::uint32_t>(counts.size()));
@@ -303,9 +304,9 @@ void McapWriter::Impl::addStatistics(Fields& summary) const {
   append(summary, mcap::kStatistics, fields);
 }
 
-void McapWriter::Impl::addChunkIndices(Fields& summary) const {
+void McapWriter::Impl::addChunkIndices(record::mcap::FieldWriter& summary) const {
   for (const ChunkIndex& entry : chunks) {
-    Fields fields;
+    record::mcap::FieldWriter fields;
     fields.put(entry.first_time);
     fields.put(entry.last_time);
     fields.put(entry.offset);
@@ -321,19 +322,19 @@ void McapWriter::Impl::addChunkIndices(Fields& summary) const {
 }
 
 Result<void> McapWriter::Impl::writeSummary() {
-  Fields data_end;
+  record::mcap::FieldWriter data_end;
   data_end.put(data_crc);
   if (auto done = record(mcap::kDataEnd, data_end); !done) return done;
 
-  // groups of the summary, each with its place
+  // groups of the summary and their offsets
   const std::uint64_t summary_start = offset;
-  Fields summary, offsets;
+  record::mcap::FieldWriter summary, offsets;
   const auto group = [&](mcap::Opcode opcode, auto&& add) {
     const std::uint64_t at = summary_start + summary.bytes.size();
     add();
     const std::uint64_t length = summary_start + summary.bytes.size() - at;
     if (length == 0) return;
-    Fields fields;
+    record::mcap::FieldWriter fields;
     fields.put(opcode);
     fields.put(at);
     fields.put(length);
@@ -348,8 +349,8 @@ Result<void> McapWriter::Impl::writeSummary() {
   const std::uint64_t offsets_start = summary_start + summary.bytes.size();
   summary.putBytes(offsets.bytes);
 
-  // the checksum covers the footer up to itself
-  Fields footer;
+  // the checksum covers the summary and the footer up to the checksum
+  record::mcap::FieldWriter footer;
   footer.put(summary_start);
   footer.put(offsets_start);
   summary.put(mcap::kFooter);
@@ -374,4 +375,4 @@ Result<void> McapWriter::close() {
 
 std::uint64_t McapWriter::messages() const { return impl_->messages; }
 
-}  // namespace tenon
+}  // namespace tenon::record

@@ -10,39 +10,42 @@
 
 #include "idl/types/result.h"
 
-namespace tenon {
+namespace tenon::record {
 
 struct McapOptions {
-  bool compress = true;
+  bool compress = true;  ///< chunks by zstd
 };
 
-/// Writes a recording as an MCAP file (encoding `cdr`, schemas `omgidl`) that public tools open.
+/// Writes a recording as an MCAP file (encoding `cdr`, schemas `omgidl`) for public tools.
 ///
-/// Messages go into zstd chunks of at most 1 MiB; a chunk is closed at least every 250 ms of writing and the
-/// file is brought to the disk every second, so after a crash all but the last moment is readable. Checksums
-/// over chunks, data and summary; indices for seeking.
+/// Messages are collected in chunks of about 1 MiB. A chunk is closed when it is 250 ms old at the next
+/// write, and the file is synchronised to disk (fdatasync) every second, so that after a crash all but the
+/// last second is readable. It has checksums of chunks, data and summary, and indices for seeking.
 ///
 /// Threads: one at a time. Real-time: no.
 class McapWriter {
  public:
+  /// Overwrites `file` and creates its folder. Fails when it cannot be written.
   [[nodiscard]] static Result<McapWriter> open(const std::filesystem::path& file,
                                                const McapOptions& options = {});
-  ~McapWriter();  ///< closes
+  ~McapWriter();  ///< closes the file and ignores errors
   McapWriter(McapWriter&&) noexcept;
   McapWriter& operator=(McapWriter&&) noexcept;
 
-  /// A channel with its schema; the same type name shares one schema.
+  /// Adds a channel and returns its id. Channels of one type name share the schema of the first.
   std::uint16_t addChannel(std::string_view topic, std::string_view type_name, std::string_view schema_text);
+  /// `log_time_ns` in [ns]. Fails when the disk is full or the file closed; so do all functions below.
   [[nodiscard]] Result<void> write(std::uint16_t channel, std::int64_t log_time_ns, std::uint32_t sequence,
                                    std::span<const std::uint8_t> data);
   [[nodiscard]] Result<void> addMetadata(std::string_view name,
                                          const std::map<std::string, std::string>& values);
   [[nodiscard]] Result<void> addAttachment(std::string_view name, std::string_view media_type,
                                            std::span<const std::uint8_t> data);
-  /// Everything so far is in the file.
+  /// Writes all messages so far to the disk.
   [[nodiscard]] Result<void> flush();
-  /// Writes the summary and ends the file; the writer takes nothing more.
+  /// Writes the summary and closes the file; without effect when it is closed.
   [[nodiscard]] Result<void> close();
+  /// Messages written so far.
   [[nodiscard]] std::uint64_t messages() const;
 
  private:
@@ -51,4 +54,4 @@ class McapWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace tenon
+}  // namespace tenon::record

@@ -2,19 +2,19 @@
 
 #include <ctime>
 
-namespace tenon {
+namespace tenon::threads {
 
 Nanoseconds SteadyClock::now() const noexcept {
-  timespec time{};
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  return std::chrono::seconds(time.tv_sec) + Nanoseconds(time.tv_nsec);
+  timespec spec{};
+  clock_gettime(CLOCK_MONOTONIC, &spec);
+  return std::chrono::seconds(spec.tv_sec) + Nanoseconds(spec.tv_nsec);
 }
 
-void SteadyClock::sleepUntil(Nanoseconds moment, const std::atomic<bool>&) noexcept {
-  timespec time{};
-  time.tv_sec = static_cast<time_t>(moment.count() / 1'000'000'000);
-  time.tv_nsec = static_cast<long>(moment.count() % 1'000'000'000);
-  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr);
+void SteadyClock::sleepUntil(Nanoseconds time, const std::atomic<bool>&) noexcept {
+  timespec spec{};
+  spec.tv_sec = static_cast<time_t>(time.count() / 1'000'000'000);
+  spec.tv_nsec = static_cast<long>(time.count() % 1'000'000'000);
+  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &spec, nullptr);
 }
 
 Nanoseconds VirtualClock::now() const noexcept {
@@ -22,29 +22,29 @@ Nanoseconds VirtualClock::now() const noexcept {
   return now_;
 }
 
-void VirtualClock::sleepUntil(Nanoseconds moment, const std::atomic<bool>& stop) noexcept {
+void VirtualClock::sleepUntil(Nanoseconds time, const std::atomic<bool>& stop) noexcept {
   std::unique_lock<std::mutex> lock(mutex_);
-  asleep_until_ = moment;
+  asleep_until_ = time;
   asleep_ = true;
-  slept_.notify_all();
-  moved_.wait(lock, [&] { return now_ >= moment || stop.load(std::memory_order_acquire); });
+  fell_asleep_.notify_all();
+  advanced_.wait(lock, [&] { return now_ >= time || stop.load(std::memory_order_acquire); });
   asleep_ = false;
 }
 
 void VirtualClock::interrupt() noexcept {
   const std::lock_guard<std::mutex> lock(mutex_);
-  moved_.notify_all();
+  advanced_.notify_all();
 }
 
 void VirtualClock::advance(Nanoseconds by) {
   const std::lock_guard<std::mutex> lock(mutex_);
   now_ += by;
-  moved_.notify_all();
+  advanced_.notify_all();
 }
 
 void VirtualClock::waitUntilAsleep() {
   std::unique_lock<std::mutex> lock(mutex_);
-  slept_.wait(lock, [&] { return asleep_ && asleep_until_ > now_; });
+  fell_asleep_.wait(lock, [&] { return asleep_ && asleep_until_ > now_; });
 }
 
-}  // namespace tenon
+}  // namespace tenon::threads

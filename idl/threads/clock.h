@@ -6,21 +6,22 @@
 #include <cstdint>
 #include <mutex>
 
-namespace tenon {
+namespace tenon::threads {
 
 using Nanoseconds = std::chrono::nanoseconds;
 
-/// Where a loop gets its time from, so that a test or a whole session can run on a virtual one.
+/// Time source of a loop, so that tests and whole sessions can run on virtual time.
 ///
 /// Threads: any. Real-time: see the implementations.
 class Clock {
  public:
   virtual ~Clock() = default;
-  /// Since some fixed moment; never goes back.
+  /// Time since an arbitrary fixed point; monotonic.
   [[nodiscard]] virtual Nanoseconds now() const noexcept = 0;
-  /// Returns at `moment`, or earlier once `stop` is set: look at now() again.
-  virtual void sleepUntil(Nanoseconds moment, const std::atomic<bool>& stop) noexcept = 0;
-  /// To be called after setting `stop`.
+  /// Returns at `time` or earlier; in any case soon after `stop` is set and interrupt() was called. The
+  /// caller checks now() again.
+  virtual void sleepUntil(Nanoseconds time, const std::atomic<bool>& stop) noexcept = 0;
+  /// Wakes sleepers; to be called after setting their `stop`.
   virtual void interrupt() noexcept = 0;
 };
 
@@ -28,29 +29,28 @@ class Clock {
 class SteadyClock : public Clock {
  public:
   [[nodiscard]] Nanoseconds now() const noexcept override;
-  void sleepUntil(Nanoseconds moment, const std::atomic<bool>& stop) noexcept override;
-  void interrupt() noexcept override {}  // a period is short: the sleeper looks by itself
+  void sleepUntil(Nanoseconds time, const std::atomic<bool>& stop) noexcept override;
+  void interrupt() noexcept override {}  // sleeps are at most one period: no need to wake
 };
 
-/// Stands still until someone moves it. Real-time: no (it is for tests and for sessions on virtual time).
+/// Virtual time that changes only by advance(), for one sleeping thread. Real-time: no.
 class VirtualClock : public Clock {
  public:
   [[nodiscard]] Nanoseconds now() const noexcept override;
-  void sleepUntil(Nanoseconds moment, const std::atomic<bool>& stop) noexcept override;
+  void sleepUntil(Nanoseconds time, const std::atomic<bool>& stop) noexcept override;
   void interrupt() noexcept override;
 
   void advance(Nanoseconds by);
-  /// Returns when the one thread of this clock sleeps towards a later moment: what the last advance started
-  /// has happened.
+  /// Blocks until the thread of this clock sleeps until a time after now(): all work due so far is done.
   void waitUntilAsleep();
 
  private:
   mutable std::mutex mutex_;
-  std::condition_variable moved_;
-  std::condition_variable slept_;
+  std::condition_variable advanced_;
+  std::condition_variable fell_asleep_;
   Nanoseconds now_{0};
   Nanoseconds asleep_until_{0};
   bool asleep_ = false;
 };
 
-}  // namespace tenon
+}  // namespace tenon::threads

@@ -9,7 +9,7 @@
 #include <sched.h>
 #include <sys/mman.h>
 
-namespace tenon {
+namespace tenon::threads {
 
 CyclicThread::CyclicThread(std::shared_ptr<Clock> clock, CyclicOptions options, Function function)
     : clock_(std::move(clock)), options_(std::move(options)), function_(std::move(function)) {}
@@ -70,14 +70,14 @@ void CyclicThread::loop() noexcept {
     function_(tick);
     ++tick;
     ticks_.store(tick, std::memory_order_relaxed);
-    // the next moment of the same grid; periods that went by meanwhile are left out
+    // the next due time of the same grid; missed periods are skipped
     due += period * (1 + delay / period);
   }
 }
 
 std::string lockMemory() {
   if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0) return {};
-  return std::string("memory is not locked (") + std::strerror(errno) + "): a page fault may stop a tick";
+  return std::string("memory is not locked (") + std::strerror(errno) + "): page faults may delay ticks";
 }
 
-}  // namespace tenon
+}  // namespace tenon::threads

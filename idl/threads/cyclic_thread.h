@@ -10,20 +10,20 @@
 
 #include "idl/threads/clock.h"
 
-namespace tenon {
+namespace tenon::threads {
 
 struct CyclicOptions {
-  std::string name = "cyclic";  ///< at most 15 characters, as in `top -H`
+  std::string name = "cyclic";  ///< of the thread, as `top -H` shows it; 15 characters are used
   Nanoseconds period{1'000'000};
-  std::optional<int> fifo_priority;  ///< SCHED_FIFO 1..99
-  std::optional<int> cpu;            ///< the only CPU it may run on
+  std::optional<int> fifo_priority;  ///< SCHED_FIFO 1..99; none: default scheduling
+  std::optional<int> cpu;            ///< pinned to this CPU; none: any
 };
 
-/// Runs a function once a period, at fixed moments of a clock.
+/// Calls a function periodically at fixed times of a clock.
 ///
-/// A tick that starts when the next one is already due is late and counted; the periods it missed are left
-/// out, never run in a burst: a device must not see several steps at once. What the operating system did not
-/// grant (real-time priority, a CPU) is said in a sentence, and the thread runs on without.
+/// A tick that starts a period or more after its due time is late and counted; missed periods are skipped and
+/// not caught up, because a device must not get several steps at once. Scheduling that the operating system
+/// does not grant (real-time priority, CPU) is reported by notGranted(), and the thread runs without it.
 ///
 /// Threads: start, stop and the destructor from one thread; counters from any.
 /// Real-time: the loop, as far as the function is; it must not throw.
@@ -36,16 +36,16 @@ class CyclicThread {
   CyclicThread(const CyclicThread&) = delete;
   CyclicThread& operator=(const CyclicThread&) = delete;
 
-  /// Returns when the thread has its scheduling. Once only.
+  /// Starts the thread; returns when its scheduling is set. Once only.
   void start();
-  /// Ends the loop after the tick that is going on, and joins. May be called again.
+  /// Ends the loop after the current tick and joins the thread. May be called repeatedly.
   void stop();
 
-  /// Empty when all that was asked for was granted.
+  /// What the operating system did not grant, in words; empty: everything was granted.
   [[nodiscard]] const std::string& notGranted() const { return not_granted_; }
   [[nodiscard]] std::uint64_t ticks() const { return ticks_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t lateTicks() const { return late_ticks_.load(std::memory_order_relaxed); }
-  /// Largest delay of a tick's start after its moment, since the start.
+  /// Largest delay of a tick's start after its due time.
   [[nodiscard]] Nanoseconds worstDelay() const {
     return Nanoseconds(worst_delay_.load(std::memory_order_relaxed));
   }
@@ -66,7 +66,8 @@ class CyclicThread {
   std::thread thread_;
 };
 
-/// Keeps all memory of this process, now and later, out of swap. Returns what was not granted, or nothing.
+/// Locks all present and future memory of the process in RAM (mlockall). Returns why that failed, or an empty
+/// string.
 [[nodiscard]] std::string lockMemory();
 
-}  // namespace tenon
+}  // namespace tenon::threads

@@ -4,13 +4,12 @@
 #include <atomic>
 #include <cstdint>
 
-namespace tenon {
+namespace tenon::threads {
 
-/// A fact that the next one replaces, passed from one thread to another (a pose, a manifold).
+/// Passes the newest value (a pose, a manifold) from one thread to another; older values are overwritten.
 ///
-/// Three slots: the writer fills one, the reader reads another, the third is exchanged in one atomic step.
-/// So neither ever waits, the reader always sees a whole value, and the newest one that was complete when it
-/// asked; values in between are lost on purpose.
+/// Wait-free triple buffer: the writer fills one slot, the reader reads another, and the third is exchanged
+/// atomically. The reader always gets the newest value published before update().
 ///
 /// Threads: one writer (write, or back and publish), one reader (update and value, or read).
 /// Real-time: everything, as far as copying T is.
@@ -20,7 +19,7 @@ class Latest {
   Latest() = default;
   explicit Latest(const T& initial) { slots_.fill(initial); }
 
-  /// The slot that the next publish() shows; what is in it is some older value.
+  /// The slot to be filled before publish(); it holds some older value.
   [[nodiscard]] T& back() noexcept { return slots_[back_]; }
   void publish() noexcept { back_ = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel) & kSlot; }
   void write(const T& value) noexcept {
@@ -28,13 +27,13 @@ class Latest {
     publish();
   }
 
-  /// Moves on to the newest value; false when it is the one the reader has already.
+  /// Makes the newest value that of value(); false when nothing was published since the last update.
   bool update() noexcept {
     if ((middle_.load(std::memory_order_relaxed) & kFresh) == 0) return false;
     front_ = middle_.exchange(front_, std::memory_order_acq_rel) & kSlot;
     return true;
   }
-  /// The value of the last update(); stays as it is until the next one.
+  /// The value of the last update(); unchanged until the next one.
   [[nodiscard]] const T& value() const noexcept { return slots_[front_]; }
   const T& read() noexcept {
     update();
@@ -51,4 +50,4 @@ class Latest {
   alignas(64) std::uint32_t front_ = 2;
 };
 
-}  // namespace tenon
+}  // namespace tenon::threads

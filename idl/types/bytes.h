@@ -11,8 +11,8 @@
 
 namespace tenon {
 
-/// Writes plain values one after the other, in this machine's order. Appends to a vector that keeps its room,
-/// so a warm one does not allocate.
+/// Appends values to a byte vector, unpadded and in native byte order. Allocates only when the vector's
+/// capacity is exceeded.
 class ByteWriter {
  public:
   explicit ByteWriter(std::vector<std::uint8_t>& bytes) : bytes_(bytes) {}
@@ -42,7 +42,7 @@ class ByteWriter {
   std::vector<std::uint8_t>& bytes_;
 };
 
-/// Reads them back. Past the end it gives zeros and `ok()` turns false for good: check once, at the end.
+/// Reads what ByteWriter wrote. Past the end values are zero and ok() stays false: check it once, at the end.
 class ByteReader {
  public:
   explicit ByteReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}

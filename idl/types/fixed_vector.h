@@ -7,27 +7,30 @@
 
 namespace tenon {
 
-/// A list with room for N values in place: it never allocates, so it may be used at 1 kHz.
+/// A vector with a capacity of N elements stored in place. Never allocates.
+///
+/// Threads: as std::vector. Real-time: everything, as far as copying T is.
 template <typename T, std::size_t N>
 class FixedVector {
  public:
   FixedVector() = default;
-  /// Copying takes as long as what is held, not as long as the room.
+  /// Copies the size() elements only.
   FixedVector(const FixedVector& other) : size_(other.size_) { std::copy_n(other.begin(), size_, begin()); }
   FixedVector& operator=(const FixedVector& other) {
     size_ = other.size_;
     if (this != &other) std::copy_n(other.begin(), size_, begin());
     return *this;
   }
-  /// Adds a value; false (and no change) when all N places are taken.
+  /// Appends `value`; false, and no change, when full.
   bool push_back(const T& value) {
     if (size_ == N) return false;
     values_[size_++] = value;
     return true;
   }
-  /// One more, as it comes; null when all N places are taken.
+  /// Appends an element that keeps whatever value its storage has; null when full.
   [[nodiscard]] T* extend() { return size_ == N ? nullptr : &values_[size_++]; }
   void clear() { size_ = 0; }
+  /// At most N; added elements keep whatever value their storage has.
   void resize(std::size_t size) {
     assert(size <= N);
     size_ = size;

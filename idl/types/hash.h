@@ -10,14 +10,15 @@
 
 namespace tenon {
 
-/// A running 64-bit hash of what a tick left behind (FNV-1a over 64-bit words): equal states, equal hashes.
-/// It answers "did the same happen?", never "who made this?".
+/// Running 64-bit hash of a simulation state (FNV-1a over 64-bit words, with a shift in between). Equal
+/// states have equal hashes; not cryptographic. The order of add() matters.
 class StateHash {
  public:
   void add(std::uint64_t word) {
     value_ = (value_ ^ word) * 0x100000001B3ULL;
     value_ ^= value_ >> 29U;
   }
+  /// Of the bits of `number` [-]: 0.0 and -0.0 differ.
   void add(double number) { add(std::bit_cast<std::uint64_t>(number)); }
   void add(const Vector3& v) {
     for (int i = 0; i < 3; ++i) add(v[i]);

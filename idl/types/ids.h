@@ -6,8 +6,8 @@
 
 namespace tenon {
 
-/// A number that means one kind of thing. Ids of objects and hands are their index in the scene, so they
-/// are dense, start at 0 and index arrays directly; client ids are handed out by the server and start at 1.
+/// An integer id with a type of its own. ObjectId and HandId are indices into the scene; ClientId is assigned
+/// by the server and starts at 1. The default is invalid.
 template <typename Tag>
 struct Id {
   std::uint32_t value = kNone;
@@ -21,9 +21,9 @@ using ObjectId = Id<struct ObjectTag>;
 using HandId = Id<struct HandTag>;
 using ClientId = Id<struct ClientTag>;
 
-/// A tick of the server: one millisecond. Tick 0 is the state before the first step.
+/// Number of server ticks since the start of the session. Tick 0 is the state before the first step.
 using Tick = std::uint64_t;
-inline constexpr double kTickSeconds = 1e-3;
+inline constexpr double kTickSeconds = 1e-3;  ///< [s]
 
 }  // namespace tenon
 

@@ -6,7 +6,7 @@
 
 #include "idl/types/messages.h"
 
-/// What people call things of the protocol, where they read and type it.
+/// Enumerators of the protocol as users read and type them.
 namespace tenon {
 
 [[nodiscard]] constexpr std::string_view roleName(Role role) noexcept {

@@ -7,14 +7,14 @@
 
 namespace tenon {
 
-/// Why something could not be done: one sentence that names the thing and, where it helps, what to do next,
-/// as in `engine_bay/scenario.yaml:12: part 'grid' has no target pose`.
+/// Why an operation failed: one sentence that names the object concerned and, where it helps, the remedy, as
+/// in `engine_bay/scenario.yaml:12: part 'grid' has no target pose`.
 struct Error {
   std::string what;
 };
 
-/// A value, or the sentence that says why there is none. The one vocabulary of failure at every edge
-/// (files, network, devices, people); inside the tick faults are data.
+/// A value or an Error. Used wherever files, network, devices or users can cause a failure; in the tick,
+/// faults are data instead.
 template <typename T>
 using Result = tl::expected<T, Error>;
 

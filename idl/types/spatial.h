@@ -12,17 +12,18 @@ using Vector3f = Eigen::Vector3f;
 using Matrix3 = Eigen::Matrix3d;
 using Quaternion = Eigen::Quaterniond;
 
-/// The angle atan2(y, x) for y >= 0, from +, *, / and sqrt alone: the C library's own may use other
-/// instructions on another processor and then give another last bit.
+/// [rad] atan2(y, x) of `y` [-] >= 0 and `x` [-], in 0..pi; 0 for y = x = 0. Computed with + - * / and sqrt
+/// alone, so that it has the same bits on every processor; std::atan2 has not.
 [[nodiscard]] double angleOf(double y, double x);
 
-/// The rotation by |w| about w (exponential map of SO(3)); same bits on every processor.
+/// Rotation by the angle |w| <= pi [rad] about w (exponential map of SO(3)); same bits on every processor.
 [[nodiscard]] Quaternion expRotation(const Vector3& w);
 
-/// The rotation vector of q, |w| <= pi (inverse of expRotation); same bits on every processor.
+/// Rotation vector w [rad], |w| <= pi, of the unit quaternion q: inverse of expRotation; same bits
+/// everywhere.
 [[nodiscard]] Vector3 logRotation(const Quaternion& q);
 
-/// A rigid transform X_AB: where frame B is, seen from frame A. p_AP = X_AB * p_BP; X_AC = X_AB * X_BC.
+/// A rigid transform X_AB: the pose of frame B in frame A. p_AP = X_AB * p_BP; X_AC = X_AB * X_BC.
 class Pose {
  public:
   Pose() : translation_(Vector3::Zero()), rotation_(Quaternion::Identity()) {}
@@ -33,7 +34,7 @@ class Pose {
 
   [[nodiscard]] const Vector3& translation() const { return translation_; }
   [[nodiscard]] Vector3& translation() { return translation_; }
-  /// A unit quaternion; whoever sets it keeps it so.
+  /// Unit quaternion q_AB; writers must keep it normalised.
   [[nodiscard]] const Quaternion& rotation() const { return rotation_; }
   [[nodiscard]] Quaternion& rotation() { return rotation_; }
   [[nodiscard]] Matrix3 matrix() const { return rotation_.toRotationMatrix(); }
@@ -56,16 +57,16 @@ class Pose {
   Quaternion rotation_;
 };
 
-/// Velocity of a body: of its origin [m/s] and about it [rad/s], both seen in one frame.
+/// Velocity of a body; the variable's name has the frames, V_WO: of O relative to and expressed in W.
 struct Twist {
-  Vector3 linear = Vector3::Zero();
-  Vector3 angular = Vector3::Zero();
+  Vector3 linear = Vector3::Zero();   ///< [m/s] of the body's origin
+  Vector3 angular = Vector3::Zero();  ///< [rad/s]
 };
 
-/// Force [N] and moment [Nm] on a body, about its origin unless the name says otherwise (F_Bo_W).
+/// Force and torque on a body; the variable's name has point and frame, F_Bo_W: on B about its origin, in W.
 struct Wrench {
-  Vector3 force = Vector3::Zero();
-  Vector3 torque = Vector3::Zero();
+  Vector3 force = Vector3::Zero();   ///< [N]
+  Vector3 torque = Vector3::Zero();  ///< [Nm]
 
   Wrench& operator+=(const Wrench& other) {
     force += other.force;
@@ -74,22 +75,25 @@ struct Wrench {
   }
   [[nodiscard]] Wrench operator+(const Wrench& other) const { return Wrench(*this) += other; }
   [[nodiscard]] Wrench operator-() const { return {-force, -torque}; }
+  /// `scale` [-].
   [[nodiscard]] Wrench operator*(double scale) const { return {force * scale, torque * scale}; }
 };
 
-/// The small motion from pose X_WA to X_WB: translation of the origin and rotation vector, both in W.
+/// The motion from pose X_WA to X_WB, in W.
 struct Displacement {
-  Vector3 translation = Vector3::Zero();
-  Vector3 rotation = Vector3::Zero();
+  Vector3 translation = Vector3::Zero();  ///< [m] of the origin, p_AB_W
+  Vector3 rotation = Vector3::Zero();     ///< [rad] rotation vector of R_WB R_WA^T, length <= pi
 };
 
-/// [m] The way of the fastest point, at most, of a body that reaches `radius` [m] from its origin.
-[[nodiscard]] inline double fastestPoint(const Displacement& motion, double radius) {
+/// [m] Upper bound of the path length of any point of a body within `radius` [m] of its origin, for a motion
+/// with constant velocity and angular velocity.
+[[nodiscard]] inline double maxPointMotion(const Displacement& motion, double radius) {
   return motion.translation.norm() + motion.rotation.norm() * radius;
 }
 
-/// `displacement(X_WA, X_WB)` takes A to B; `displaced(X_WA, that)` is X_WB again.
+/// The displacement from A to B.
 [[nodiscard]] Displacement displacement(const Pose& X_WA, const Pose& X_WB);
+/// X_WB for displacement(X_WA, X_WB): the inverse of displacement().
 [[nodiscard]] Pose displaced(const Pose& X_WA, const Displacement& motion_W);
 
 }  // namespace tenon

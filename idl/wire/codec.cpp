@@ -5,7 +5,7 @@
 #include "idl/wire/convert.h"
 #include "idl/wire/sample.h"
 
-namespace tenon {
+namespace tenon::wire {
 
 template <class M>
 Result<std::vector<std::uint8_t>> encode(const M& message) {
@@ -39,4 +39,4 @@ std::string_view typeName() {
 TENON_WIRE_MESSAGES(TENON_INSTANTIATE)
 #undef TENON_INSTANTIATE
 
-}  // namespace tenon
+}  // namespace tenon::wire

@@ -9,19 +9,19 @@
 #include "idl/types/result.h"
 #include "idl/wire/topics.h"
 
-namespace tenon {
+namespace tenon::wire {
 
-/// A sample never has more bytes than this, encapsulation included: larger ones would be sent in fragments,
-/// and Cyclone 0.10.2 loses fragmented reliable samples under loss.
+/// Upper bound of the size of a sample [bytes], encapsulation header included. Larger samples would be
+/// fragmented, and Cyclone DDS 0.10.2 loses fragmented reliable samples when datagrams are lost.
 inline constexpr std::size_t kMaxSampleBytes = 1300;
 
-/// The message as it is on the wire and in recordings: four bytes of encapsulation, then XCDR1 little-endian.
-/// Fails when a text or list is longer than tenon.idl allows.
+/// The serialised form on the wire and in recordings: encapsulation header of four bytes, then XCDR1
+/// little-endian. Fails when a text or list is longer than tenon.idl allows; the error names the field.
 template <class M>
 Result<std::vector<std::uint8_t>> encode(const M& message);
 
-/// The message of such bytes, of either byte order. Any bytes may be given: what is not a whole, valid sample
-/// of M is an error.
+/// Deserialises a message of either byte order. `bytes` may be arbitrary: fails unless they are one complete,
+/// valid sample of M.
 template <class M>
 Result<M> decode(std::span<const std::uint8_t> bytes);
 
@@ -29,7 +29,7 @@ Result<M> decode(std::span<const std::uint8_t> bytes);
 template <class M>
 std::string_view typeName();
 
-/// The text of idl/tenon.idl: the schema of recordings.
+/// The text of idl/tenon.idl, the schema in recordings.
 std::string_view idlText();
 
-}  // namespace tenon
+}  // namespace tenon::wire

@@ -12,7 +12,7 @@ namespace tenon::wire {
 namespace {
 
 constexpr std::size_t kKeyTextMax =
-    63;  ///< a key's text has no bound in IDL: a bounded one has no type object
+    63;  ///< key strings are unbounded in IDL, because Cyclone has no type object for bounded ones
 
 template <class T, class M>
 concept Is = std::same_as<std::remove_const_t<T>, M>;
@@ -26,7 +26,7 @@ concept IdNumber = requires(T id) {
   { T::kNone } -> std::convertible_to<std::uint32_t>;
 };
 
-/// Copies message -> C struct; remembers the first field that does not fit.
+/// Copies a message to its C struct and keeps the first field that exceeds its bound.
 class ToWire {
  public:
   explicit ToWire(std::span<std::byte> lists) : lists_(lists) {}
@@ -71,7 +71,7 @@ class ToWire {
     c._maximum = c._length = static_cast<std::uint32_t>(size);
     c._buffer = const_cast<std::uint8_t*>(m.data());
   }
-  /// each(c_element, m_element) for every element, in room taken from the lists
+  /// Converts element by element with each(*this, c_element, m_element); storage comes from `lists_`.
   template <class Sequence, class List, class Each>
   void list(const char* field, Sequence& c, const List& m, std::size_t bound, Each each) {
     using Element = std::remove_pointer_t<decltype(c._buffer)>;
@@ -95,7 +95,7 @@ class ToWire {
     return 0;
   }
   std::size_t checked(const char* field, const std::string& text, std::size_t bound) {
-    // a zero byte would end the text on the way: as good as too long
+    // a zero byte would truncate the text: it is refused like one that is too long
     return fit(field, text.size(), text.find('\0') == std::string::npos ? bound : text.find('\0'));
   }
 
@@ -105,7 +105,7 @@ class ToWire {
   std::size_t bad_bound_ = 0;
 };
 
-/// Copies C struct -> message.
+/// Copies a C struct to its message.
 class FromWire {
  public:
   [[nodiscard]] bool good() const { return good_; }
@@ -116,7 +116,7 @@ class FromWire {
     m = c;
   }
   void operator()(const char*, const bool& c, bool& m) {
-    unsigned char byte = 0;  // a hostile sender's bool may be any byte
+    unsigned char byte = 0;  // a received bool may have any byte value
     std::memcpy(&byte, &c, 1);
     m = byte != 0;
   }
@@ -160,8 +160,8 @@ class FromWire {
   bool good_ = true;
 };
 
-// One list of fields a type, read in both directions: what is not lost one way is not lost the other.
-// `d` is the direction, `c` the C struct, `m` the message.
+// One list of fields per type serves both directions: `d` is the direction (ToWire or FromWire), `c` the C
+// struct, `m` the message.
 
 void fields(auto& d, auto& c, Is<Pose> auto& m) {
   d("", c.p, m.translation());
@@ -388,7 +388,7 @@ void fields(auto& d, auto& c, Is<SceneObject> auto& m) {
 void fields(auto& d, auto& c, Is<ObjectSnapshot> auto& m) {
   d("tick", c.tick, m.tick);
   fields(d, c.state, m.state);
-  d("object", c.object_id, m.state.object);  // last: of a gone key it is all there is
+  d("object", c.object_id, m.state.object);  // last: the samples of ended instances have only this key
 }
 void fields(auto& d, auto& c, Is<StepState> auto& m) {
   d("revision", c.revision, m.revision);

@@ -9,12 +9,12 @@
 #include "idl/types/result.h"
 #include "idl/wire/topics.h"
 
-/// Messages as the programs know them, to and from the C structs that idlc made of idl/tenon.idl. Internal to
-/// idl/wire: whoever includes this includes DDS.
+/// Conversion between the messages of idl/types and the C structs that idlc generates from idl/tenon.idl.
+/// Internal to idl/wire, because it includes DDS.
 namespace tenon::wire {
 
 template <class M>
-struct TypeOf;  ///< C, the C struct of message M, and descriptor()
+struct TypeOf;  ///< `C`: the C struct of message M; descriptor(): its DDS type
 
 #define TENON_TYPE_OF(M)                                                             \
   template <>                                                                        \
@@ -25,19 +25,19 @@ struct TypeOf;  ///< C, the C struct of message M, and descriptor()
 TENON_WIRE_MESSAGES(TENON_TYPE_OF)
 #undef TENON_TYPE_OF
 
-/// The C struct of a message with room for the lists it points to: made once, filled again for each sample.
-/// Texts that are keys, and bytes, are not copied: they stay the message's own.
+/// The C struct of a message with storage for its sequences, to be reused for each sample. Key strings and
+/// octet sequences are not copied: they point into the message, which must outlive the use of the struct.
 template <class M>
 struct Wire {
   typename TypeOf<M>::C sample{};
   alignas(8) std::array<std::byte, 2048> lists{};
 };
 
-/// Fails when a text or a list is longer than tenon.idl allows: the sentence names the field.
+/// Fails when a text or list is longer than tenon.idl allows; the error names the field.
 template <class M>
 Result<void> toWire(const M& message, Wire<M>& wire);
 
-/// False when the sample holds what no message can: more elements than fit, a status that does not exist.
+/// False when the sample has values no message can have: too many elements, an unknown enumerator.
 template <class M>
 bool fromWire(const typename TypeOf<M>::C& sample, M& message);
 

@@ -20,7 +20,7 @@ struct Domain {
   ~Domain() { dds_delete(entity); }
 };
 
-/// Keeps the last thing Cyclone said about itself, to say it in an Error instead of on stderr.
+/// Captures the last log message of Cyclone DDS for an Error, instead of printing it to stderr.
 class LogCapture {
  public:
   LogCapture() : lock_(mutex()) { dds_set_log_sink(&LogCapture::sink, this); }
@@ -28,7 +28,7 @@ class LogCapture {
   LogCapture(const LogCapture&) = delete;
   LogCapture& operator=(const LogCapture&) = delete;
 
-  [[nodiscard]] std::string said() const { return said_.empty() ? "" : " (" + said_ + ")"; }
+  [[nodiscard]] std::string message() const { return message_.empty() ? "" : " (" + message_ + ")"; }
 
  private:
   static std::mutex& mutex() {
@@ -38,10 +38,10 @@ class LogCapture {
   static void sink(void* self, const dds_log_data_t* data) {
     std::string line(data->message, data->size);
     while (!line.empty() && (line.back() == '\n' || line.back() == ' ')) line.pop_back();
-    if (!line.empty()) static_cast<LogCapture*>(self)->said_ = std::move(line);
+    if (!line.empty()) static_cast<LogCapture*>(self)->message_ = std::move(line);
   }
   std::lock_guard<std::mutex> lock_;  ///< the sink is one for the whole process
-  std::string said_;
+  std::string message_;
 };
 
 Result<std::string> configText(const std::string& config) {
@@ -70,7 +70,7 @@ Result<std::shared_ptr<void>> openDomain(const LinkOptions& options) {
   const dds_entity_t entity = dds_create_domain(options.domain, config->c_str());
   if (entity < 0) {
     return fail("DDS domain " + std::to_string(options.domain) + " could not be opened: " + reason(entity) +
-                log.said());
+                log.message());
   }
   auto domain = std::make_shared<Domain>(entity);
   open_domains[options.domain] = domain;
@@ -84,7 +84,7 @@ Result<dds_entity_t> topicEntity(Participant::Impl& participant, const TopicSpec
   const std::string name(topic.name);
   const dds_entity_t entity =
       dds_create_topic(participant.entity, topic.type, name.c_str(), nullptr, nullptr);
-  if (entity < 0) return fail("topic '" + name + "' could not be made: " + reason(entity));
+  if (entity < 0) return fail("topic '" + name + "' could not be created: " + reason(entity));
   participant.topics.emplace(name, entity);
   return entity;
 }
@@ -99,19 +99,20 @@ Result<std::unique_ptr<Endpoint>> openEndpoint(const Partition& partition, const
   const auto topic_entity = topicEntity(partition.impl()->participant->impl(), topic);
   if (!topic_entity) return tl::unexpected(topic_entity.error());
   const dds_entity_t entity = create(*topic_entity);
-  if (entity < 0) return fail(because(topic.name, *partition.impl(), entity));
+  if (entity < 0) return fail(ddsError(topic.name, *partition.impl(), entity));
   return std::make_unique<Endpoint>(partition.impl(), entity);
 }
 
-void onSomething(void* source) {
-  static_cast<Source*>(source)->pending.store(true, std::memory_order_release);
+void markPending(void* subscription) {
+  static_cast<Subscription*>(subscription)->pending.store(true, std::memory_order_release);
   const std::uint64_t one = 1;
-  [[maybe_unused]] const auto written = write(static_cast<Source*>(source)->wake_fd, &one, sizeof(one));
+  [[maybe_unused]] const auto written =
+      write(static_cast<Subscription*>(subscription)->wake_fd, &one, sizeof(one));
 }
 
 }  // namespace
 
-std::string because(std::string_view what, const Partition::Impl& partition, dds_return_t code) {
+std::string ddsError(std::string_view what, const Partition::Impl& partition, dds_return_t code) {
   return std::string(what) + " in '" + partition.name + "': " + reason(code);
 }
 
@@ -123,8 +124,8 @@ Result<std::unique_ptr<Endpoint>> openWriter(const Partition& partition, const T
 }
 
 Result<std::unique_ptr<Endpoint>> openReader(const Partition& partition, const TopicSpec& topic,
-                                             bool everything, const dds_listener_t* listener) {
-  dds_qos_t* qos = readerQos(topic, partition.profile(), everything);
+                                             bool keep_all, const dds_listener_t* listener) {
+  dds_qos_t* qos = readerQos(topic, partition.profile(), keep_all);
   return openEndpoint(partition, topic, qos, [&](dds_entity_t entity) {
     return dds_create_reader(partition.impl()->subscriber, entity, qos, listener);
   });
@@ -137,9 +138,9 @@ std::size_t matchedReaders(dds_entity_t writer) {
   return static_cast<std::size_t>(std::max(0, dds_get_matched_subscriptions(writer, nullptr, 0)));
 }
 
-const Origin& OriginsOf::find(dds_entity_t reader, dds_instance_handle_t writer) {
+const Origin& OriginCache::find(dds_entity_t reader, dds_instance_handle_t writer) {
   static const Origin unknown;
-  constexpr std::size_t kManyWriters = 1000;  // of a long session's comings and goings
+  constexpr std::size_t kManyWriters = 1000;  // bounds the cache in long sessions
   if (const auto found = known_.find(writer); found != known_.end()) return found->second;
   const std::unique_ptr<dds_builtintopic_endpoint_t, void (*)(dds_builtintopic_endpoint_t*)> data(
       dds_get_matched_publication_data(reader, writer), &dds_builtintopic_free_endpoint);
@@ -156,40 +157,40 @@ bool isGone(const dds_sample_info_t& info, bool latched) {
          (info.instance_state == DDS_NOT_ALIVE_NO_WRITERS_INSTANCE_STATE && !latched);
 }
 
-Mailbox::Mailbox() : wake_fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
+ReaderWaitSet::ReaderWaitSet() : wake_fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
 
-Mailbox::~Mailbox() {
-  sources_.clear();  // after this no listener runs any more
+ReaderWaitSet::~ReaderWaitSet() {
+  subscriptions_.clear();  // no listener is called after this
   close(wake_fd_);
 }
 
-Result<void> Mailbox::add(std::unique_ptr<Source> source, const Partition& partition, const TopicSpec& topic,
-                          bool everything) {
-  source->topic = topic.name;
-  source->wake_fd = wake_fd_;
-  const std::unique_ptr<dds_listener_t, void (*)(dds_listener_t*)> listener(dds_create_listener(source.get()),
-                                                                            &dds_delete_listener);
-  dds_lset_data_available(listener.get(), [](dds_entity_t, void* self) { onSomething(self); });
-  // a writer that is lost changes keys without bringing data
+Result<void> ReaderWaitSet::add(std::unique_ptr<Subscription> subscription, const Partition& partition,
+                                const TopicSpec& topic, bool keep_all) {
+  subscription->topic = topic.name;
+  subscription->wake_fd = wake_fd_;
+  const std::unique_ptr<dds_listener_t, void (*)(dds_listener_t*)> listener(
+      dds_create_listener(subscription.get()), &dds_delete_listener);
+  dds_lset_data_available(listener.get(), [](dds_entity_t, void* self) { markPending(self); });
+  // a lost writer ends instances without new data
   dds_lset_liveliness_changed(listener.get(), [](dds_entity_t, const dds_liveliness_changed_status_t,
-                                                 void* self) { onSomething(self); });
+                                                 void* self) { markPending(self); });
   dds_lset_subscription_matched(listener.get(), [](dds_entity_t, const dds_subscription_matched_status_t,
-                                                   void* self) { onSomething(self); });
-  // the listener goes in with the reader: one set later would miss what came before it
-  auto reader = openReader(partition, topic, everything, listener.get());
+                                                   void* self) { markPending(self); });
+  // the reader is created with its listener: set later, it would miss earlier samples
+  auto reader = openReader(partition, topic, keep_all, listener.get());
   if (!reader) return tl::unexpected(reader.error());
-  source->reader = std::move(*reader);
-  onSomething(source.get());
-  sources_.push_back(std::move(source));
+  subscription->reader = std::move(*reader);
+  markPending(subscription.get());
+  subscriptions_.push_back(std::move(subscription));
   return {};
 }
 
-void Mailbox::wake() noexcept {
+void ReaderWaitSet::wake() noexcept {
   const std::uint64_t one = 1;
   [[maybe_unused]] const auto written = write(wake_fd_, &one, sizeof(one));
 }
 
-void Mailbox::waitFor(std::chrono::nanoseconds timeout) const {
+void ReaderWaitSet::waitFor(std::chrono::nanoseconds timeout) const {
   pollfd entry{wake_fd_, POLLIN, 0};
   timespec time{};
   time.tv_sec = static_cast<time_t>(timeout.count() / 1'000'000'000);
@@ -197,33 +198,33 @@ void Mailbox::waitFor(std::chrono::nanoseconds timeout) const {
   ppoll(&entry, 1, &time, nullptr);
 }
 
-std::size_t Mailbox::drainAll() {
-  constexpr int kMostTakes = 64;  // a writer faster than this reader must not keep the thread here
+std::size_t ReaderWaitSet::takeAll() {
+  constexpr int kMaxBatches = 64;  // per reader: a fast writer must not occupy the thread
   std::size_t handled = 0;
-  for (const auto& source : sources_) {
-    if (!source->pending.exchange(false, std::memory_order_acq_rel)) continue;
-    int takes = 0;
-    std::size_t taken = kTakeAtOnce;
-    while (taken == kTakeAtOnce && takes < kMostTakes) {
-      taken = source->drain();
+  for (const auto& subscription : subscriptions_) {
+    if (!subscription->pending.exchange(false, std::memory_order_acq_rel)) continue;
+    int batches = 0;
+    std::size_t taken = kTakeBatch;
+    while (taken == kTakeBatch && batches < kMaxBatches) {
+      taken = subscription->takeBatch();
       handled += taken;
-      ++takes;
+      ++batches;
     }
-    if (taken == kTakeAtOnce) onSomething(source.get());
+    if (taken == kTakeBatch) markPending(subscription.get());
   }
   return handled;
 }
 
-std::size_t Mailbox::dispatch(std::chrono::nanoseconds timeout) {
+std::size_t ReaderWaitSet::dispatch(std::chrono::nanoseconds timeout) {
   if (timeout.count() > 0) waitFor(timeout);
   std::uint64_t count = 0;
   [[maybe_unused]] const auto got = read(wake_fd_, &count, sizeof(count));
-  return drainAll();
+  return takeAll();
 }
 
 }  // namespace tenon::wire
 
-namespace tenon {
+namespace tenon::wire {
 
 Participant::Participant(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Participant::~Participant() = default;
@@ -246,7 +247,7 @@ Result<std::shared_ptr<Participant>> Participant::open(const LinkOptions& option
   impl->entity = dds_create_participant(options.domain, nullptr, nullptr);
   if (impl->entity < 0) {
     return fail("DDS domain " + std::to_string(options.domain) +
-                " could not be joined: " + wire::reason(impl->entity) + log.said());
+                " could not be joined: " + wire::reason(impl->entity) + log.message());
   }
   return std::shared_ptr<Participant>(new Participant(std::move(impl)));
 }
@@ -270,4 +271,4 @@ Partition& Partition::operator=(Partition&&) noexcept = default;
 const std::string& Partition::name() const { return impl_->name; }
 LinkProfile Partition::profile() const { return impl_->profile; }
 
-}  // namespace tenon
+}  // namespace tenon::wire

@@ -16,11 +16,11 @@
 #include "idl/wire/endpoint.h"
 #include "idl/wire/profiles.h"
 
-/// The DDS entities behind endpoint.h and tap.h, without message types. Internal to idl/wire.
-namespace tenon {
+/// The DDS entities behind endpoint.h and tap.h, independent of message types. Internal to idl/wire.
+namespace tenon::wire {
 
 struct Participant::Impl {
-  std::shared_ptr<void> domain;  ///< shared by all participants of it in this process
+  std::shared_ptr<void> domain;  ///< shared by all participants of this domain in the process
   dds_entity_t entity = 0;
   LinkProfile profile = LinkProfile::kLan;
   std::mutex topics_mutex;
@@ -42,11 +42,11 @@ struct Partition::Impl {
   }
 };
 
-}  // namespace tenon
+}  // namespace tenon::wire
 
 namespace tenon::wire {
 
-/// Closes a reader or writer, and keeps its partition until then.
+/// A DDS reader or writer; keeps its partition alive.
 class Endpoint {
  public:
   Endpoint(std::shared_ptr<Partition::Impl> partition, dds_entity_t entity)
@@ -64,64 +64,70 @@ class Endpoint {
 
 Result<std::unique_ptr<Endpoint>> openWriter(const Partition& partition, const TopicSpec& topic);
 Result<std::unique_ptr<Endpoint>> openReader(const Partition& partition, const TopicSpec& topic,
-                                             bool everything, const dds_listener_t* listener);
+                                             bool keep_all, const dds_listener_t* listener);
 
 [[nodiscard]] std::size_t matchedWriters(dds_entity_t reader);
 [[nodiscard]] std::size_t matchedReaders(dds_entity_t writer);
 
-/// Whether this sample, the last of its key that was taken (the rank says so: what comes after a valid sample
-/// may have none of its own), ends the key. A latched key outlives its writers.
+/// Whether the instance of this sample has ended: disposed or, unless `latched`, without writers. True only
+/// for the last taken sample of an instance (sample rank 0), so the end is reported once and after its data.
 [[nodiscard]] bool isGone(const dds_sample_info_t& info, bool latched);
 
-/// The origins of what one reader gets. Asking DDS takes a lock and memory: done once a writer.
-class OriginsOf {
+/// Caches the origin of each writer of a reader, because the DDS call locks and allocates.
+class OriginCache {
  public:
+  /// An unknown origin when the writer has gone.
   [[nodiscard]] const Origin& find(dds_entity_t reader, dds_instance_handle_t writer);
 
  private:
   std::unordered_map<dds_instance_handle_t, Origin> known_;
 };
 
-/// "WorldFrame_1k in 's/demo': <what DDS says>"
-[[nodiscard]] std::string because(std::string_view what, const Partition::Impl& partition, dds_return_t code);
+/// "WorldFrame_1k in 's/demo': <text of the DDS return code>"
+[[nodiscard]] std::string ddsError(std::string_view what, const Partition::Impl& partition,
+                                   dds_return_t code);
 
-inline constexpr int kTakeAtOnce = 64;
+inline constexpr int kTakeBatch = 64;
 
-/// One topic of a Mailbox: a reader and what is done with its samples.
-class Source {
+/// A reader of one topic and the handling of its samples, for a ReaderWaitSet.
+class Subscription {
  public:
-  virtual ~Source() = default;
-  /// Takes up to kTakeAtOnce samples; returns how many there were.
-  virtual std::size_t drain() = 0;
+  virtual ~Subscription() = default;
+  /// Takes and handles up to kTakeBatch samples; returns their number.
+  virtual std::size_t takeBatch() = 0;
 
   std::string topic;
-  std::atomic<bool> pending{false};  ///< DDS said there may be something to take
+  std::atomic<bool> pending{false};  ///< set by DDS: there may be samples to take
   int wake_fd = -1;
-  std::unique_ptr<Endpoint> reader;  ///< goes first: its listener writes to the members above
+  std::unique_ptr<Endpoint>
+      reader;  ///< last member: deleted first, because its listener writes to those above
 };
 
-/// Waits on many readers at once. DDS's own receive thread calls a listener that marks the reader and writes
-/// to an eventfd; that is 28 us faster than a DDS waitset, and any thread can end the waiting without a lock.
-class Mailbox {
+/// Waits for samples of many readers. A listener, called by the receive thread of DDS, marks the reader and
+/// writes to an eventfd: 28 us faster than a DDS WaitSet, and any thread can end the waiting without a lock.
+class ReaderWaitSet {
  public:
-  Mailbox();
-  ~Mailbox();
-  Mailbox(const Mailbox&) = delete;
-  Mailbox& operator=(const Mailbox&) = delete;
+  ReaderWaitSet();
+  ~ReaderWaitSet();
+  ReaderWaitSet(const ReaderWaitSet&) = delete;
+  ReaderWaitSet& operator=(const ReaderWaitSet&) = delete;
 
-  /// Opens the reader of a source (which the caller has filled) and serves it from now on.
-  Result<void> add(std::unique_ptr<Source> source, const Partition& partition, const TopicSpec& topic,
-                   bool everything);
+  /// Opens the reader of `subscription` and serves it from now on. `keep_all`: see readerQos.
+  Result<void> add(std::unique_ptr<Subscription> subscription, const Partition& partition,
+                   const TopicSpec& topic, bool keep_all);
+  /// Waits for samples, wake() or the timeout, then handles all samples received; returns their number.
   std::size_t dispatch(std::chrono::nanoseconds timeout);
   void wake() noexcept;
-  [[nodiscard]] const std::vector<std::unique_ptr<Source>>& sources() const { return sources_; }
+  [[nodiscard]] const std::vector<std::unique_ptr<Subscription>>& subscriptions() const {
+    return subscriptions_;
+  }
 
  private:
-  std::size_t drainAll();
+  std::size_t takeAll();
   void waitFor(std::chrono::nanoseconds timeout) const;
 
   int wake_fd_;
-  std::vector<std::unique_ptr<Source>> sources_;
+  std::vector<std::unique_ptr<Subscription>> subscriptions_;
 };
 
 }  // namespace tenon::wire

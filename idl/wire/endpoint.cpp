@@ -6,21 +6,21 @@
 #include "idl/wire/convert.h"
 #include "idl/wire/core.h"
 
-namespace tenon {
+namespace tenon::wire {
 namespace {
 
 template <class M>
 wire::TopicSpec specOf(const Topic<M>& topic) {
-  return {topic.name, &wire::TypeOf<M>::descriptor(), topic.promise, topic.parameters};
+  return {topic.name, &wire::TypeOf<M>::descriptor(), topic.qos_class, topic.parameters};
 }
 
-/// Samples lent by a reader, given back at the end.
+/// Samples on loan from a reader, returned at destruction.
 template <class M>
 class Loan {
  public:
-  explicit Loan(dds_entity_t reader, int most) : reader_(reader) {
-    count_ =
-        dds_take(reader, samples_, infos_, static_cast<std::size_t>(most), static_cast<std::uint32_t>(most));
+  explicit Loan(dds_entity_t reader, int max_samples) : reader_(reader) {
+    count_ = dds_take(reader, samples_, infos_, static_cast<std::size_t>(max_samples),
+                      static_cast<std::uint32_t>(max_samples));
   }
   ~Loan() {
     if (count_ > 0) dds_return_loan(reader_, samples_, count_);
@@ -36,8 +36,8 @@ class Loan {
 
  private:
   dds_entity_t reader_;
-  void* samples_[wire::kTakeAtOnce] = {nullptr};
-  dds_sample_info_t infos_[wire::kTakeAtOnce];
+  void* samples_[wire::kTakeBatch] = {nullptr};
+  dds_sample_info_t infos_[wire::kTakeBatch];
   dds_return_t count_ = 0;
 };
 
@@ -53,7 +53,7 @@ struct Writer<M>::Impl {
   Result<void> put(const M& message, Put dds_put) {
     if (const auto good = wire::toWire(message, wire); !good) return good;
     const dds_return_t code = dds_put(endpoint->entity(), &wire.sample);
-    if (code < 0) return fail(wire::because(topic, *endpoint->partition(), code));
+    if (code < 0) return fail(wire::ddsError(topic, *endpoint->partition(), code));
     return {};
   }
 };
@@ -92,7 +92,7 @@ std::size_t Writer<M>::matchedReaders() const {
 template <class M>
 struct Reader<M>::Impl {
   std::unique_ptr<wire::Endpoint> endpoint;
-  wire::OriginsOf origins;
+  wire::OriginCache origins;
 };
 
 template <class M>
@@ -131,12 +131,12 @@ std::size_t Reader<M>::matchedWriters() const {
 namespace {
 
 template <class M>
-class TypedSource : public wire::Source {
+class TypedSubscription : public wire::Subscription {
  public:
-  TypedSource(bool latched, std::uint64_t& malformed) : latched_(latched), malformed_(malformed) {}
+  TypedSubscription(bool latched, std::uint64_t& malformed) : latched_(latched), malformed_(malformed) {}
 
-  std::size_t drain() override {
-    const Loan<M> loan(reader->entity(), wire::kTakeAtOnce);
+  std::size_t takeBatch() override {
+    const Loan<M> loan(reader->entity(), wire::kTakeBatch);
     for (int i = 0; i < loan.size(); ++i) deliver(loan.info(i), loan.sample(i));
     return static_cast<std::size_t>(loan.size());
   }
@@ -163,26 +163,26 @@ class TypedSource : public wire::Source {
 
   bool latched_;
   std::uint64_t& malformed_;
-  wire::OriginsOf origins_;
+  wire::OriginCache origins_;
   M message_;
 };
 
 }  // namespace
 
 struct Inbox::Impl {
-  wire::Mailbox mailbox;
+  wire::ReaderWaitSet wait_set;
   std::uint64_t malformed = 0;
 
   template <class M>
-  Result<TypedSource<M>*> source(Partition& partition, const Topic<M>& topic) {
-    for (const auto& known : mailbox.sources()) {
+  Result<TypedSubscription<M>*> subscription(Partition& partition, const Topic<M>& topic) {
+    for (const auto& known : wait_set.subscriptions()) {
       if (known->topic == topic.name && known->reader->partition() == partition.impl()) {
-        return static_cast<TypedSource<M>*>(known.get());
+        return static_cast<TypedSubscription<M>*>(known.get());
       }
     }
-    auto made = std::make_unique<TypedSource<M>>(topic.parameters.latched, malformed);
-    auto* const typed = made.get();
-    if (auto added = mailbox.add(std::move(made), partition, specOf(topic), false); !added) {
+    auto created = std::make_unique<TypedSubscription<M>>(topic.parameters.latched, malformed);
+    auto* const typed = created.get();
+    if (auto added = wait_set.add(std::move(created), partition, specOf(topic), false); !added) {
       return tl::unexpected(added.error());
     }
     return typed;
@@ -196,28 +196,28 @@ Inbox& Inbox::operator=(Inbox&&) noexcept = default;
 
 template <class M>
 Result<void> Inbox::onFrom(Partition& partition, const Topic<M>& topic, HandlerFrom<M> handler) {
-  auto source = impl_->source(partition, topic);
-  if (!source) return tl::unexpected(source.error());
-  (*source)->handlers.push_back(std::move(handler));
+  auto subscription = impl_->subscription(partition, topic);
+  if (!subscription) return tl::unexpected(subscription.error());
+  (*subscription)->handlers.push_back(std::move(handler));
   return {};
 }
 
 template <class M>
 Result<void> Inbox::onGoneFrom(Partition& partition, const Topic<M>& topic, HandlerFrom<M> handler) {
-  auto source = impl_->source(partition, topic);
-  if (!source) return tl::unexpected(source.error());
-  (*source)->gone_handlers.push_back(std::move(handler));
+  auto subscription = impl_->subscription(partition, topic);
+  if (!subscription) return tl::unexpected(subscription.error());
+  (*subscription)->gone_handlers.push_back(std::move(handler));
   return {};
 }
 
-std::size_t Inbox::dispatch(std::chrono::nanoseconds timeout) { return impl_->mailbox.dispatch(timeout); }
-void Inbox::wake() noexcept { impl_->mailbox.wake(); }
+std::size_t Inbox::dispatch(std::chrono::nanoseconds timeout) { return impl_->wait_set.dispatch(timeout); }
+void Inbox::wake() noexcept { impl_->wait_set.wake(); }
 std::uint64_t Inbox::malformed() const { return impl_->malformed; }
 
 std::size_t Inbox::matchedWriters() const {
   std::size_t count = 0;
-  for (const auto& source : impl_->mailbox.sources()) {
-    count += wire::matchedWriters(source->reader->entity());
+  for (const auto& subscription : impl_->wait_set.subscriptions()) {
+    count += wire::matchedWriters(subscription->reader->entity());
   }
   return count;
 }
@@ -230,4 +230,4 @@ std::size_t Inbox::matchedWriters() const {
 TENON_WIRE_MESSAGES(TENON_INSTANTIATE)
 #undef TENON_INSTANTIATE
 
-}  // namespace tenon
+}  // namespace tenon::wire

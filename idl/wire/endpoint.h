@@ -13,23 +13,23 @@
 #include "idl/types/result.h"
 #include "idl/wire/topics.h"
 
-namespace tenon {
+namespace tenon::wire {
 
 enum class LinkProfile {
-  kLan,       ///< loopback or a local network, by the clock
-  kLockstep,  ///< every sample arrives: streams are reliable and 32 deep on both sides, nothing expires
+  kLan,       ///< loopback or a local network, in real time
+  kLockstep,  ///< streams are reliable with history depth 32 on both sides; no deadlines, no lifespans
 };
 
 struct LinkOptions {
-  std::uint32_t domain = 0;
+  std::uint32_t domain = 0;  ///< DDS domain
   LinkProfile profile = LinkProfile::kLan;
-  /// Cyclone DDS configuration: XML text or the path of a file. Empty: CYCLONEDDS_URI if set, else loopback
-  /// as in deploy/dds/loopback.xml.
+  /// Cyclone DDS configuration: XML text or path of a file. Empty: CYCLONEDDS_URI if set, else loopback as in
+  /// deploy/dds/loopback.xml.
   std::string config;
 };
 
-/// Which program put a message on the bus: the GUID of its participant, which the bus gives and checks and no
-/// message can claim. All zero: not known, as of a writer that has gone since.
+/// The program that wrote a sample: the GUID of its DDS participant, which DDS assigns and a message cannot
+/// claim. All zero: unknown, as of a writer that has ended since.
 struct Origin {
   std::array<std::uint8_t, 16> guid{};
 
@@ -37,21 +37,22 @@ struct Origin {
   bool operator==(const Origin&) const = default;
 };
 
-/// A program's presence on the bus.
+/// A DDS domain participant.
 ///
-/// All participants of one domain in one process share what the first one configured, because DDS
-/// configures a domain once per process.
+/// All participants of one domain in one process use the configuration of the first, because DDS configures a
+/// domain once per process.
 ///
 /// Threads: any. Real-time: no.
 class Participant {
  public:
+  /// Fails when the configuration is missing or wrong, or the domain cannot be joined.
   static Result<std::shared_ptr<Participant>> open(const LinkOptions& options);
   ~Participant();
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
 
   [[nodiscard]] LinkProfile profile() const;
-  /// As others see it on what this participant writes.
+  /// The origin of all samples that this participant writes.
   [[nodiscard]] Origin origin() const;
 
   struct Impl;
@@ -62,10 +63,11 @@ class Participant {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The readers and writers of one DDS partition: "lobby", or a session's own (sessionPartition).
+/// A DDS publisher and subscriber of one partition: "lobby", or that of a session (sessionPartition).
+/// Failures show when endpoints are opened in it.
 ///
-/// A partition may follow another link profile than its participant: the lobby is read by the clock before
-/// a client knows that the session runs in lockstep.
+/// A partition may have another link profile than its participant: the lobby uses kLan also for sessions in
+/// lockstep, because clients join it before they know.
 ///
 /// Threads: any. Real-time: no.
 class Partition {
@@ -80,7 +82,7 @@ class Partition {
   [[nodiscard]] LinkProfile profile() const;
 
   struct Impl;
-  /// Endpoints share it, so they may outlive the Partition.
+  /// Shared with the endpoints, which may outlive the Partition.
   [[nodiscard]] const std::shared_ptr<Impl>& impl() const { return impl_; }
 
  private:
@@ -90,10 +92,9 @@ class Partition {
 inline constexpr const char* kLobby = "lobby";
 [[nodiscard]] inline std::string sessionPartition(const std::string& session) { return "s/" + session; }
 
-/// Puts messages on a topic.
+/// Writes messages of type M to a topic.
 ///
-/// Threads: one at a time. Real-time: no (the DDS write locks and allocates); it belongs to a wire thread.
-/// Of its own it allocates nothing.
+/// Threads: one at a time. Real-time: no, because the DDS write locks and allocates; use it in a wire thread.
 template <class M>
 class Writer {
  public:
@@ -102,10 +103,10 @@ class Writer {
   Writer& operator=(Writer&&) noexcept;
   ~Writer();
 
-  /// Fails when a text is longer than tenon.idl allows, or when a reliable event found no room at its
-  /// readers in time.
+  /// Fails when a text or list is longer than tenon.idl allows, or when a reliable write is blocked by a slow
+  /// reader for longer than the link profile permits.
   Result<void> write(const M& message);
-  /// Ends the life of the key that `key_holder` carries; readers hear it as gone.
+  /// Disposes the instance with the key fields of `key_holder`; readers get it as gone.
   Result<void> dispose(const M& key_holder);
   [[nodiscard]] std::size_t matchedReaders() const;
 
@@ -115,7 +116,7 @@ class Writer {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Takes messages from a topic, one by one, without waiting.
+/// Takes messages of type M from a topic, one by one, without waiting.
 ///
 /// Threads: one at a time. Real-time: no.
 template <class M>
@@ -126,7 +127,8 @@ class Reader {
   Reader& operator=(Reader&&) noexcept;
   ~Reader();
 
-  /// The next valid message; false when there is none. Keys that went are passed over: use an Inbox.
+  /// The next valid message and its origin; false when there is none. Ends of instances are skipped: Inbox
+  /// has them.
   bool take(M& out, Origin* from = nullptr);
   [[nodiscard]] std::size_t matchedWriters() const;
 
@@ -136,10 +138,11 @@ class Reader {
   std::unique_ptr<Impl> impl_;
 };
 
-/// One thread's mail: waits on many topics and calls a handler for each message.
+/// Waits on many topics in one thread and calls a handler for each message, as a DDS WaitSet with typed
+/// readers.
 ///
-/// Topics are served in the order in which they were added, messages of a topic in the order in which they
-/// came. A message that cannot be understood is counted, not delivered.
+/// Topics are served in the order in which they were added, messages of a topic in the order of their
+/// reception. An invalid sample (fromWire) is counted and not delivered.
 ///
 /// Threads: on..., onGone... and dispatch from one thread; wake from any.
 /// Real-time: wake alone (one non-blocking eventfd write).
@@ -155,6 +158,8 @@ class Inbox {
   template <class M>
   using HandlerFrom = std::function<void(const M&, const Origin&)>;
 
+  /// Adds a handler that also gets the origin of each message. Fails when DDS does, as do the functions
+  /// below.
   template <class M>
   Result<void> onFrom(Partition& partition, const Topic<M>& topic, HandlerFrom<M> handler);
   template <class M>
@@ -162,9 +167,9 @@ class Inbox {
     return onFrom<M>(partition, topic, withoutOrigin<M>(std::move(handler)));
   }
 
-  /// Calls the handler with a message that has only its key fields when a key was disposed or lost its
-  /// writers. Who disposed it is its origin; of a key that lost its writers none is known. May be used with
-  /// or without on() for the same topic.
+  /// Calls the handler with a message that has only its key fields when an instance is disposed or, unless
+  /// the topic is latched, loses its writers. The origin is the participant that disposed it; unknown when it
+  /// lost its writers. May be used with or without on() for the same topic.
   template <class M>
   Result<void> onGoneFrom(Partition& partition, const Topic<M>& topic, HandlerFrom<M> handler);
   template <class M>
@@ -172,16 +177,16 @@ class Inbox {
     return onGoneFrom<M>(partition, topic, withoutOrigin<M>(std::move(handler)));
   }
 
-  /// Waits until there is mail, wake() was called or the time is over; then calls the handlers for all that
-  /// is there. Zero does not wait. Returns how many samples it handled.
+  /// Waits for samples, wake() or the timeout (zero: does not wait), then calls the handlers for all samples
+  /// received. Returns their number.
   std::size_t dispatch(std::chrono::nanoseconds timeout);
 
-  /// Ends the waiting of dispatch.
+  /// Ends the waiting of dispatch().
   void wake() noexcept;
 
-  /// Samples that could not be understood, since the start.
+  /// Number of invalid samples since the start.
   [[nodiscard]] std::uint64_t malformed() const;
-  /// Writers that the topics of this inbox are matched with, over all topics.
+  /// Number of matched writers, summed over all topics.
   [[nodiscard]] std::size_t matchedWriters() const;
 
  private:
@@ -194,4 +199,4 @@ class Inbox {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace tenon
+}  // namespace tenon::wire

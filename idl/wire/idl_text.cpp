@@ -1,15 +1,16 @@
 #include "idl/wire/codec.h"
 
-namespace tenon {
+namespace tenon::wire {
 
 std::string_view idlText() {
-  // a copy of idl/tenon.idl, held equal by a test
-  return R"idl(// The protocol of Tenon, version 2: what its programs say to each other over DDS, and what recordings hold.
+  // a copy of idl/tenon.idl; a test compares the two
+  return R"idl(// The protocol of Tenon, version 2: the messages its programs exchange over DDS, and that recordings contain.
 //
-// Every type is @final and encoded as XCDR1. No sample is longer than 1,300 bytes: what does not fit goes in
-// numbered parts. SI units. X_AB is frame B seen from frame A; W the world, O an object, H a hand. Ids are
-// indices into the scene, 0xFFFFFFFF is none. Keys are uint32; text where there is no number yet (a session,
-// a client before its Welcome). Which topic carries which type, and with which promise: idl/wire/topics.h.
+// Every type is @final and encoded as XCDR1. No sample is longer than 1,300 bytes: longer content is sent in
+// numbered parts. SI units, angles in radians; the fields are explained in idl/types/messages.h. X_AB is the pose
+// of frame B in A; W the world, O an object, H a hand. Ids are indices into the scene, 0xFFFFFFFF is invalid. Keys
+// are uint32, or text where there is no number yet (a session, a client before its Welcome). Topics, their types and
+// QoS classes: idl/wire/topics.h.
 
 module tenon {
 
@@ -154,4 +155,4 @@ enum Severity { SEVERITY_INFO, SEVERITY_WARNING, SEVERITY_ERROR };
 )idl";
 }
 
-}  // namespace tenon
+}  // namespace tenon::wire

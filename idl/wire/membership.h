@@ -12,65 +12,67 @@
 #include "idl/types/result.h"
 #include "idl/wire/endpoint.h"
 
-namespace tenon {
+namespace tenon::wire {
 
-/// What a program wants of a session.
-struct MembershipWishes {
-  std::string session;  ///< empty: the first one announced
-  std::uint32_t domain = 0;
-  std::string person = "somebody";
+/// Which session a program joins, and how.
+struct MembershipOptions {
+  std::string session;              ///< its name; empty: the first one announced
+  std::uint32_t domain = 0;         ///< DDS domain
+  std::string person = "somebody";  ///< display name of the client
   Role role = Role::kObserver;
-  std::vector<std::string> hands;
-  std::string token;                  ///< of an earlier seat: to get it and its hands back
-  bool lockstep = false;              ///< refuse a session that runs by the clock
-  bool only_watches = false;          ///< takes streams as they come, so that it holds nobody up in lockstep
-  std::chrono::seconds patience{10};  ///< for a server to be found and to answer
+  std::vector<std::string> hands;  ///< to control
+  std::string token;               ///< of an earlier seat, to rejoin it with its hands; or empty
+  bool lockstep = false;           ///< refuse a session in real time
+  bool passive = false;  ///< best-effort streams also in lockstep, so that it never blocks the session
+  std::chrono::seconds timeout{10};  ///< [s] for finding a server, and for its answer
 };
 
-/// A program's seat in a session: finds the server in the lobby, asks to be let in, says that it is here and,
-/// at the end, good-bye. When the server has lost it, or it the server, it comes back to the same seat.
+/// A client's seat in a session: finds the server in the lobby, joins, publishes Presence and disposes it at
+/// the end. When the connection was lost on either side, it can rejoin the same seat.
 ///
-/// Finding and joining are two steps, because a recorder listens to the session before it asks for its seat.
+/// Finding and joining are separate steps, because a recorder subscribes to the session before it joins.
 ///
 /// Threads: one (wire). Real-time: no.
 class Membership {
  public:
   using Stop = std::atomic<bool>;
 
-  /// Fails with a sentence when no server is found in time, or `stop` is set.
-  static Result<std::unique_ptr<Membership>> find(const MembershipWishes& wishes, const Stop& stop);
-  /// Says good-bye, so that nobody has to find out by waiting.
+  /// Fails when no session is announced in time, `stop` is set, or the protocol versions differ.
+  static Result<std::unique_ptr<Membership>> find(const MembershipOptions& options, const Stop& stop);
+  /// Disposes the presence, so that the server need not wait for its lease to expire.
   ~Membership();
   Membership(const Membership&) = delete;
   Membership& operator=(const Membership&) = delete;
 
-  /// Asks for the seat until the server answers; calls `meanwhile` between looks. Fails with the server's
-  /// reason when it refuses.
+  /// Repeats the request for a seat until the server answers; calls `meanwhile` every 5 ms. Fails with the
+  /// server's reason when it refuses, and when no answer comes in time.
   Result<void> join(const Stop& stop, const std::function<void()>& meanwhile = {});
 
-  /// From now on dispatching `inbox`, which the Membership outlives, shows here when the seat is lost.
+  /// From now on dispatching `inbox` updates lost() and serverIsGone(); `inbox` must not be dispatched after
+  /// the destruction of this.
   Result<void> watch(Inbox& inbox);
+  /// The server has ended or is unreachable.
   [[nodiscard]] bool serverIsGone() const { return server_gone_; }
-  /// Why there is no seat any more; none while there is one.
+  /// Why the seat is lost; none while it is held.
   [[nodiscard]] const std::optional<std::string>& lost() const { return lost_; }
-  /// Finds the session again and asks for the same seat.
-  Result<void> comeBack(const Stop& stop, const std::function<void()>& meanwhile = {});
+  /// Finds the session again and requests the same seat.
+  Result<void> rejoin(const Stop& stop, const std::function<void()>& meanwhile = {});
 
   [[nodiscard]] const SessionAnnounce& announce() const { return announce_; }
   [[nodiscard]] const std::string& sessionName() const { return announce_.session; }
   [[nodiscard]] const Welcome& welcome() const { return welcome_; }
-  /// Whether a message was written by the server that let this program in.
+  /// Whether a message was written by the server whose Welcome was received.
   [[nodiscard]] bool isServer(const Origin& origin) const { return origin.known() && origin == server_; }
   [[nodiscard]] Partition& lobby() { return *lobby_; }
   [[nodiscard]] Partition& session() { return *session_; }
 
  private:
-  explicit Membership(const MembershipWishes& wishes) : wishes_(wishes) {}
-  Result<SessionAnnounce> await(const Stop& stop, const std::function<void()>& meanwhile);
+  explicit Membership(const MembershipOptions& options) : options_(options) {}
+  Result<SessionAnnounce> awaitAnnounce(const Stop& stop, const std::function<void()>& meanwhile);
   Result<void> takeSeat();
 
-  MembershipWishes wishes_;
-  std::string guid_;
+  MembershipOptions options_;
+  std::string guid_;  ///< Join::client_guid
   std::unique_ptr<Partition> lobby_;
   std::unique_ptr<Partition> session_;
   std::unique_ptr<Writer<Presence>> presence_writer_;
@@ -82,4 +84,4 @@ class Membership {
   bool server_gone_ = false;
 };
 
-}  // namespace tenon
+}  // namespace tenon::wire

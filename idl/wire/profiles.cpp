@@ -7,9 +7,10 @@ namespace tenon::wire {
 namespace {
 
 constexpr std::uint32_t kLockstepDepth = 32;
-constexpr Milliseconds kLockstepLease{5000};  ///< a machine busy with many lockstep processes still keeps it
+constexpr Milliseconds kLockstepLease{
+    5000};  ///< long enough for a machine that is busy with many lockstep processes
 
-// how long a reliable event waits for room at slow readers before its write fails
+// longest time a reliable write blocks for a slow reader before it fails
 constexpr Milliseconds kLanBlocking{500};
 constexpr Milliseconds kLockstepBlocking{10000};
 
@@ -17,15 +18,15 @@ dds_duration_t duration(Milliseconds time) { return DDS_MSECS(time.count()); }
 
 void setReliability(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile) {
   const bool lockstep = profile == LinkProfile::kLockstep;
-  const bool reliable = topic.promise != Promise::kStream || lockstep;
+  const bool reliable = topic.qos_class != QosClass::kStream || lockstep;
   dds_qset_reliability(qos, reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
                        duration(lockstep ? kLockstepBlocking : kLanBlocking));
 }
 
 void setHistory(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile) {
-  if (topic.promise == Promise::kEvent) {
+  if (topic.qos_class == QosClass::kEvent) {
     dds_qset_history(qos, DDS_HISTORY_KEEP_ALL, 0);
-  } else if (topic.promise == Promise::kStream && profile == LinkProfile::kLockstep) {
+  } else if (topic.qos_class == QosClass::kStream && profile == LinkProfile::kLockstep) {
     dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, kLockstepDepth);
   } else {
     dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, 1);
@@ -53,7 +54,7 @@ dds_qos_t* writerQos(const TopicSpec& topic, LinkProfile profile) {
   dds_data_representation_id_t xcdr1[] = {DDS_DATA_REPRESENTATION_XCDR1};
   dds_qset_data_representation(qos, 1, xcdr1);
   if (parameters.late_joiner_depth > 0) {
-    // what a late joiner gets is set here alone: Cyclone keeps one sample a key for it, whatever HISTORY says
+    // Cyclone serves late joiners by DURABILITY_SERVICE alone; HISTORY does not matter for them
     dds_qset_durability_service(qos, 0, DDS_HISTORY_KEEP_LAST,
                                 static_cast<std::int32_t>(parameters.late_joiner_depth), DDS_LENGTH_UNLIMITED,
                                 DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
@@ -70,9 +71,9 @@ dds_qos_t* writerQos(const TopicSpec& topic, LinkProfile profile) {
   return qos;
 }
 
-dds_qos_t* readerQos(const TopicSpec& topic, LinkProfile profile, bool everything) {
+dds_qos_t* readerQos(const TopicSpec& topic, LinkProfile profile, bool keep_all) {
   dds_qos_t* qos = commonQos(topic, profile);
-  if (everything) dds_qset_history(qos, DDS_HISTORY_KEEP_ALL, 0);
+  if (keep_all) dds_qset_history(qos, DDS_HISTORY_KEEP_ALL, 0);
   return qos;
 }
 

@@ -7,24 +7,24 @@
 
 #include "idl/wire/endpoint.h"
 
-/// How a promise becomes DDS quality of service on a link. Internal to idl/wire.
+/// DDS policies of a topic by QoS class and link profile. Internal to idl/wire.
 namespace tenon::wire {
 
-/// A topic without its message type: what opening an endpoint needs.
+/// A Topic<M> without its C++ type.
 struct TopicSpec {
   std::string_view name;
   const dds_topic_descriptor_t* type = nullptr;
-  Promise promise = Promise::kStream;
+  QosClass qos_class = QosClass::kStream;
   TopicParameters parameters;
 };
 
-/// Delete with dds_delete_qos.
+/// The caller deletes the result with dds_delete_qos.
 [[nodiscard]] dds_qos_t* writerQos(const TopicSpec& topic, LinkProfile profile);
-/// `everything` keeps all samples until they are taken, streams too: for recorders, in a process of their
-/// own.
-[[nodiscard]] dds_qos_t* readerQos(const TopicSpec& topic, LinkProfile profile, bool everything);
+/// `keep_all`: all samples, streams included, are kept until they are taken; for recorders, in processes of
+/// their own. The caller deletes the result with dds_delete_qos.
+[[nodiscard]] dds_qos_t* readerQos(const TopicSpec& topic, LinkProfile profile, bool keep_all);
 
-/// The Cyclone configuration used when nobody gives another; the same text as deploy/dds/loopback.xml.
+/// The default Cyclone DDS configuration; the text of deploy/dds/loopback.xml.
 [[nodiscard]] std::string_view loopbackConfig();
 
 }  // namespace tenon::wire

@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t kHeader = 4;
 constexpr std::uint8_t kLittleEndian = 1;  ///< second byte of the encapsulation: CDR_LE; CDR_BE is 0
 constexpr std::uint32_t kXcdr1 = 1;
-static_assert(std::endian::native == std::endian::little, "encodeSample writes the machine's own order");
+static_assert(std::endian::native == std::endian::little, "encodeSample writes native byte order");
 
 }  // namespace
 
@@ -19,7 +19,7 @@ void encodeSample(const dds_topic_descriptor_t& type, const void* sample, std::v
   dds_ostream_t stream;
   dds_ostream_init(&stream, 256, kXcdr1);
   dds_stream_write(&stream, static_cast<const char*>(sample), type.m_ops);
-  // RTPS pads to four bytes and says in the header by how much
+  // RTPS pads to four bytes; the number of padding bytes is in the header
   const std::size_t padding = (4 - stream.m_index % 4) % 4;
   bytes.assign({0, kLittleEndian, 0, static_cast<std::uint8_t>(padding)});
   bytes.insert(bytes.end(), stream.m_buffer, stream.m_buffer + stream.m_index);
@@ -41,7 +41,7 @@ bool OwnedSample::decode(std::span<const std::uint8_t> bytes) {
   const std::size_t padding = bytes[3] & 3U;
   if (bytes.size() < kHeader + padding) return false;
   const std::size_t size = bytes.size() - kHeader - padding;
-  // whole words: an aligned copy, which normalizing turns into this machine's byte order
+  // an aligned copy, which is converted to native byte order in place
   std::vector<std::uint64_t> body((size + 7) / 8 + 1, 0);
   std::memcpy(body.data(), bytes.data() + kHeader, size);
   std::uint32_t used = 0;

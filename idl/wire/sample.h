@@ -9,14 +9,13 @@
 
 #include <dds/dds.h>
 
-/// CDR of any of our types, from the marshalling program that idlc wrote into the type's descriptor.
-/// Internal to idl/wire.
+/// CDR serialisation of any type of tenon.idl by its topic descriptor. Internal to idl/wire.
 namespace tenon::wire {
 
-/// Appends nothing to, but replaces, `bytes`.
+/// Replaces `bytes` by the serialised sample, encapsulation header included.
 void encodeSample(const dds_topic_descriptor_t& type, const void* sample, std::vector<std::uint8_t>& bytes);
 
-/// A C struct that owns what it points to.
+/// A C struct of `type` and all memory it points to.
 class OwnedSample {
  public:
   explicit OwnedSample(const dds_topic_descriptor_t& type);
@@ -25,7 +24,7 @@ class OwnedSample {
   OwnedSample& operator=(const OwnedSample&) = delete;
   [[nodiscard]] void* get() const { return memory_; }
 
-  /// Fills it from bytes; false when they are not a whole, valid sample of the type.
+  /// Deserialises `bytes`; false unless they are one complete, valid sample of the type.
   bool decode(std::span<const std::uint8_t> bytes);
 
  private:

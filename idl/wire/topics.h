@@ -6,91 +6,99 @@
 
 #include "idl/types/messages.h"
 
-/// Every topic of Tenon: its name and what it promises. A new one is a struct in idl/tenon.idl, its message
-/// in idl/types/messages.h, its fields in idl/wire/convert.h and one line here and in TENON_WIRE_MESSAGES.
-namespace tenon {
+/// All topics: name, message type and quality of service. A new one needs its struct in idl/tenon.idl, its
+/// message in idl/types/messages.h, its fields in idl/wire/convert.cpp, one line here and in forEachTopic,
+/// and, for a new type, one in TENON_WIRE_MESSAGES.
+namespace tenon::wire {
 
-enum class Promise {
-  kStream,  ///< best effort, the newest wins
-  kState,   ///< reliable, late joiners get the last of each key
-  kEvent,   ///< reliable, each one counts
+/// How samples of a topic are delivered; idl/wire/profiles.cpp maps it to DDS policies. In lockstep, streams
+/// are reliable too.
+enum class QosClass {
+  kStream,  ///< best effort, keep last 1
+  kState,   ///< reliable, keep last 1 per key; late joiners get it (transient local)
+  kEvent,   ///< reliable, keep all
 };
 
 using Milliseconds = std::chrono::milliseconds;
-inline constexpr Milliseconds kNever{0};
+inline constexpr Milliseconds kNever{0};  ///< the policy is not set
 
-/// What a promise leaves open. Writers offer these by link profile; readers request the loosest value of
-/// each, so a reader never fails to match because of them. On a lockstep link time does not pass by the
-/// clock: deadline, lease by topic and lifespan are not offered there.
+/// DDS policies of a topic that its QoS class does not determine. Readers request the weakest deadline,
+/// liveliness and lifespan, so that these never prevent a match. On a lockstep link, which may be slower than
+/// real time, deadline, lease by topic and lifespan are not offered.
 struct TopicParameters {
-  Milliseconds deadline = kNever;  ///< longest silence of a stream's writer
-  Milliseconds lease = kNever;     ///< a writer silent for longer is gone, and with it its keys
-  bool lease_by_topic = false;     ///< only writing this very topic renews the lease: shows a hung thread
-  Milliseconds lifespan = kNever;  ///< older samples are not delivered any more
-  std::uint32_t late_joiner_depth = 0;  ///< samples of each key that a late joiner gets; 0: none
-  bool latched = false;  ///< stays as it is when a writer goes; of several writers the latest by time counts
+  Milliseconds deadline = kNever;  ///< [ms] DEADLINE: longest time between two samples
+  Milliseconds lease =
+      kNever;  ///< [ms] LIVELINESS lease: without sign of life for so long, the writer's instances end
+  bool lease_by_topic =
+      false;  ///< MANUAL_BY_TOPIC: only writing this topic renews the lease, so a hung thread is detected
+  Milliseconds lifespan = kNever;  ///< [ms] LIFESPAN: older samples are not delivered
+  std::uint32_t late_joiner_depth =
+      0;  ///< samples per key that a late joiner gets (transient local); 0: none
+  bool latched =
+      false;  ///< instances outlive their writer; of several writers the latest source timestamp counts
 };
 
+/// A topic of messages M.
 template <class M>
 struct Topic {
   std::string_view name;
-  Promise promise = Promise::kStream;
+  QosClass qos_class = QosClass::kStream;
   TopicParameters parameters;
 };
 
 inline constexpr TopicParameters kServerStream{.lease = Milliseconds{1000}};
-inline constexpr TopicParameters kLastOfEach{.late_joiner_depth = 1};
+inline constexpr TopicParameters kLatestPerKey{.late_joiner_depth = 1};
 inline constexpr TopicParameters kLog{.late_joiner_depth = 1000};
 
 // ---- session
 inline constexpr Topic<SessionAnnounce> kSessionAnnounce{
-    "SessionAnnounce", Promise::kState, {.lease = Milliseconds{2000}, .late_joiner_depth = 1}};
-inline constexpr Topic<Join> kJoin{"Join", Promise::kEvent, {.lifespan = Milliseconds{5000}}};
-inline constexpr Topic<Welcome> kWelcome{"Welcome", Promise::kEvent, {.lifespan = Milliseconds{5000}}};
+    "SessionAnnounce", QosClass::kState, {.lease = Milliseconds{2000}, .late_joiner_depth = 1}};
+inline constexpr Topic<Join> kJoin{"Join", QosClass::kEvent, {.lifespan = Milliseconds{5000}}};
+inline constexpr Topic<Welcome> kWelcome{"Welcome", QosClass::kEvent, {.lifespan = Milliseconds{5000}}};
 inline constexpr Topic<Presence> kPresence{
-    "Presence", Promise::kState, {.lease = Milliseconds{2000}, .late_joiner_depth = 1}};
+    "Presence", QosClass::kState, {.lease = Milliseconds{2000}, .late_joiner_depth = 1}};
 
 // ---- streams
 inline constexpr Topic<DeviceInput> kDeviceInput{
     "DeviceInput",
-    Promise::kStream,
+    QosClass::kStream,
     {.deadline = Milliseconds{10}, .lease = Milliseconds{50}, .lease_by_topic = true}};
-inline constexpr Topic<WorldFrame> kWorldFrame1k{"WorldFrame_1k", Promise::kStream, kServerStream};
-inline constexpr Topic<WorldFrame> kWorldFrame100{"WorldFrame_100", Promise::kStream, kServerStream};
-inline constexpr Topic<WorldFrame> kWorldFrame30{"WorldFrame_30", Promise::kStream, kServerStream};
+inline constexpr Topic<WorldFrame> kWorldFrame1k{"WorldFrame_1k", QosClass::kStream, kServerStream};
+inline constexpr Topic<WorldFrame> kWorldFrame100{"WorldFrame_100", QosClass::kStream, kServerStream};
+inline constexpr Topic<WorldFrame> kWorldFrame30{"WorldFrame_30", QosClass::kStream, kServerStream};
 inline constexpr Topic<HandManifold> kHandManifold{
-    "HandManifold", Promise::kStream, {.deadline = Milliseconds{100}, .lease = Milliseconds{1000}}};
+    "HandManifold", QosClass::kStream, {.deadline = Milliseconds{100}, .lease = Milliseconds{1000}}};
 inline constexpr Topic<HandState> kHandState100{
-    "HandState_100", Promise::kStream, {.lease = Milliseconds{1000}}};
-inline constexpr Topic<ContactPairs> kContactPairs100{"ContactPairs_100", Promise::kStream, kServerStream};
-inline constexpr Topic<TickStats> kTickStats100{"TickStats_100", Promise::kStream, kServerStream};
-inline constexpr Topic<Guidance> kGuidance{"Guidance", Promise::kStream, kServerStream};
-inline constexpr Topic<ForceContribution> kForceContribution{"ForceContribution", Promise::kStream, {}};
-inline constexpr Topic<ExternalPose> kExternalPose{"ExternalPose", Promise::kStream, {}};
-inline constexpr Topic<ClockSync> kClockSync{"ClockSync", Promise::kStream, {}};
-inline constexpr Topic<Telemetry> kTelemetry{"Telemetry", Promise::kStream, {}};
+    "HandState_100", QosClass::kStream, {.lease = Milliseconds{1000}}};
+inline constexpr Topic<ContactPairs> kContactPairs100{"ContactPairs_100", QosClass::kStream, kServerStream};
+inline constexpr Topic<TickStats> kTickStats100{"TickStats_100", QosClass::kStream, kServerStream};
+inline constexpr Topic<Guidance> kGuidance{"Guidance", QosClass::kStream, kServerStream};
+inline constexpr Topic<ForceContribution> kForceContribution{"ForceContribution", QosClass::kStream, {}};
+inline constexpr Topic<ExternalPose> kExternalPose{"ExternalPose", QosClass::kStream, {}};
+inline constexpr Topic<ClockSync> kClockSync{"ClockSync", QosClass::kStream, {}};
+inline constexpr Topic<Telemetry> kTelemetry{"Telemetry", QosClass::kStream, {}};
 
 // ---- states
-inline constexpr Topic<ObjectSnapshot> kObjectSnapshot{"ObjectSnapshot", Promise::kState, kLastOfEach};
-inline constexpr Topic<SceneObject> kSceneObject{"SceneObject", Promise::kState, kLastOfEach};
-inline constexpr Topic<StepState> kStepState{"StepState", Promise::kState, kLastOfEach};
-inline constexpr Topic<StepProgress> kStepProgress{"StepProgress", Promise::kState, kLastOfEach};
-inline constexpr Topic<RunState> kRunState{"RunState", Promise::kState, kLastOfEach};
-inline constexpr Topic<GrabState> kGrabState{"GrabState", Promise::kState, kLastOfEach};
-inline constexpr Topic<RecorderStatus> kRecorderStatus{"RecorderStatus", Promise::kState, kLastOfEach};
+inline constexpr Topic<ObjectSnapshot> kObjectSnapshot{"ObjectSnapshot", QosClass::kState, kLatestPerKey};
+inline constexpr Topic<SceneObject> kSceneObject{"SceneObject", QosClass::kState, kLatestPerKey};
+inline constexpr Topic<StepState> kStepState{"StepState", QosClass::kState, kLatestPerKey};
+inline constexpr Topic<StepProgress> kStepProgress{"StepProgress", QosClass::kState, kLatestPerKey};
+inline constexpr Topic<RunState> kRunState{"RunState", QosClass::kState, kLatestPerKey};
+inline constexpr Topic<GrabState> kGrabState{"GrabState", QosClass::kState, kLatestPerKey};
+inline constexpr Topic<RecorderStatus> kRecorderStatus{"RecorderStatus", QosClass::kState, kLatestPerKey};
 inline constexpr Topic<EmergencyStop> kEmergencyStop{
-    "EmergencyStop", Promise::kState, {.late_joiner_depth = 1, .latched = true}};
+    "EmergencyStop", QosClass::kState, {.late_joiner_depth = 1, .latched = true}};
 
 // ---- events
-inline constexpr Topic<Command> kCommand{"Command", Promise::kEvent, {.lifespan = Milliseconds{5000}}};
+inline constexpr Topic<Command> kCommand{"Command", QosClass::kEvent, {.lifespan = Milliseconds{5000}}};
 inline constexpr Topic<CommandAck> kCommandAck{
-    "CommandAck", Promise::kEvent, {.lifespan = Milliseconds{5000}}};
-inline constexpr Topic<EventLog> kEventLog{"EventLog", Promise::kEvent, kLog};
-inline constexpr Topic<ClientEvent> kClientEvent{"ClientEvent", Promise::kEvent, kLog};
-inline constexpr Topic<TickInputPart> kTickInput{"TickInput", Promise::kEvent, {}};
-inline constexpr Topic<CheckpointPart> kCheckpoint{"Checkpoint", Promise::kEvent, {}};
+    "CommandAck", QosClass::kEvent, {.lifespan = Milliseconds{5000}}};
+inline constexpr Topic<EventLog> kEventLog{"EventLog", QosClass::kEvent, kLog};
+inline constexpr Topic<ClientEvent> kClientEvent{"ClientEvent", QosClass::kEvent, kLog};
+inline constexpr Topic<TickInputPart> kTickInput{"TickInput", QosClass::kEvent, {}};
+inline constexpr Topic<CheckpointPart> kCheckpoint{"Checkpoint", QosClass::kEvent, {}};
 
-/// Calls visit(topic) for every topic: recorders and replays take them all.
+/// Calls visit(topic) for every topic, in a fixed order.
 template <class Visit>
 void forEachTopic(Visit&& visit) {
   visit(kSessionAnnounce);
@@ -136,4 +144,4 @@ void forEachTopic(Visit&& visit) {
   X(ClientEvent) X(TickInputPart) X(CheckpointPart)
 // clang-format on
 
-}  // namespace tenon
+}  // namespace tenon::wire

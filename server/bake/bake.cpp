@@ -9,7 +9,7 @@
 #include "server/bake/shell_bake.h"
 #include "server/bake/welded_mesh.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
@@ -17,16 +17,17 @@ constexpr double kMaxPoints = 1e6;
 
 Result<void> checkOptions(const BakeOptions& options) {
   if (!(options.voxel > 0.0) || !std::isfinite(options.voxel))
-    return fail("the voxel size must be more than 0");
+    return fail("the voxel size must be greater than 0");
   const int r = options.refinement;
   if (r != 1 && r != 2 && r != 4 && r != 8) return fail("the refinement must be 1, 2, 4 or 8");
   if (!std::isfinite(options.point_spacing) || options.point_spacing < 0.0) {
     return fail("the spacing of shell points must be 0 or more");
   }
-  if (options.points == 0 || options.points > kMaxPoints) return fail("shell points must be 1 to 1,000,000");
+  if (options.points == 0 || options.points > kMaxPoints)
+    return fail("the number of shell points must be 1 to 1,000,000");
   for (const RefineBox& region : options.refine) {
     if (!region.box_M.min().allFinite() || !region.box_M.max().allFinite() || region.box_M.isEmpty()) {
-      return fail("a box to refine has no inside");
+      return fail("a box to refine is empty or not finite");
     }
   }
   return {};
@@ -34,26 +35,26 @@ Result<void> checkOptions(const BakeOptions& options) {
 
 Result<void> checkMesh(const TriangleMesh& mesh) {
   for (const Vector3f& p : mesh.vertices) {
-    if (!p.allFinite()) return fail("the mesh has a corner that is not a number");
+    if (!p.allFinite()) return fail("the mesh has a vertex that is not finite");
   }
   for (const auto& triangle : mesh.triangles) {
     for (const std::uint32_t corner : triangle) {
-      if (corner >= mesh.vertices.size()) return fail("the mesh has a triangle whose corner does not exist");
+      if (corner >= mesh.vertices.size())
+        return fail("the mesh has a triangle with a vertex index out of range");
     }
   }
   return {};
 }
 
-/// Says which connected parts the field knows no inside of: there it can only keep things out from both
-/// sides.
-std::string noteSheets(const WeldedMesh& mesh, const DistanceField& field) {
+/// A note about connected parts that have no inside in the field: contacts push out of them on both sides.
+std::string noteSheets(const WeldedMesh& mesh, const structures::DistanceField& field) {
   const auto [component, count] = mesh.components();
   std::vector<std::uint8_t> has_inside(count, 0);
   std::vector<std::uint32_t> first(count, 0);
   for (std::size_t i = mesh.triangles.size(); i-- > 0;) {
     first[component[i]] = static_cast<std::uint32_t>(i);
     if (has_inside[component[i]] != 0) continue;
-    const Triangle& t = mesh.triangles[i];
+    const structures::Triangle& t = mesh.triangles[i];
     const Vector3 centre = (t[0] + t[1] + t[2]) / 3.0;
     const double half_voxel = field.voxelAt(centre) / 2;
     const Vector3 step = (t[1] - t[0]).cross(t[2] - t[0]).normalized() * half_voxel;
@@ -74,15 +75,15 @@ std::string noteSheets(const WeldedMesh& mesh, const DistanceField& field) {
   char text[256];
   std::snprintf(text, sizeof text,
                 "%u of %u connected parts have no inside (open, or thinner than a voxel), the first at "
-                "(%.4g, %.4g, %.4g) m: they act as thin sheets.\n",
+                "(%.4g, %.4g, %.4g) m: they are treated as thin sheets.\n",
                 sheets, count, at.x(), at.y(), at.z());
   return text;
 }
 
 }  // namespace
 
-Result<HapticStructures> bake(const TriangleMesh& mesh, const BakeOptions& options,
-                              const BakeProgress& progress) {
+Result<structures::HapticStructures> bake(const TriangleMesh& mesh, const BakeOptions& options,
+                                          const BakeProgress& progress) {
   const auto start = std::chrono::steady_clock::now();
   if (const auto ok = checkOptions(options); !ok) return tl::unexpected(ok.error());
   if (const auto ok = checkMesh(mesh); !ok) return tl::unexpected(ok.error());
@@ -94,28 +95,27 @@ Result<HapticStructures> bake(const TriangleMesh& mesh, const BakeOptions& optio
   auto baked = bakeField(welded.triangles, options, work);
   if (!baked) return tl::unexpected(baked.error());
 
-  HapticStructures structures;
+  structures::HapticStructures structures;
   structures.field = baked->field;
   work.stage("sampling the shell", 0.88, 0.98);
   structures.shell = bakeShell(welded, baked->surface, baked->field, options, work);
   if (work.cancelled()) return fail("cancelled");
 
-  StructureInfo& info = structures.info;
+  structures::StructureInfo& info = structures.info;
   info.triangles = mesh.triangles.size();
-  for (const Triangle& t : welded.triangles) info.box_M.extend(boxOf(t));
-  for (const Triangle& t : baked->surface) info.surface_area += areaOf(t);
-  info.bricks = structures.field.layout().samples.size() / DistanceField::kBrickSamples;
+  for (const structures::Triangle& t : welded.triangles) info.box_M.extend(structures::boxOf(t));
+  for (const structures::Triangle& t : baked->surface) info.surface_area += structures::areaOf(t);
+  info.bricks = structures.field.layout().samples.size() / structures::DistanceField::kBrickSamples;
   for (const std::string& note : mesh.notes) info.notes += note + "\n";
-  if (welded.left_out > 0) {
-    info.notes +=
-        std::to_string(welded.left_out) + " triangles without area or present twice were left out.\n";
+  if (welded.skipped > 0) {
+    info.notes += std::to_string(welded.skipped) + " triangles without area or present twice were skipped.\n";
   }
   if (welded.closed > 0) {
     info.notes += std::to_string(welded.closed) + " holes of one missing triangle were closed.\n";
   }
   if (baked->hidden_triangles > 0) {
-    info.notes +=
-        std::to_string(baked->hidden_triangles) + " triangles lie inside the solid and do not count.\n";
+    info.notes += std::to_string(baked->hidden_triangles) +
+                  " triangles lie inside the solid and are not part of its surface.\n";
   }
   info.notes += noteSheets(welded, structures.field);
   info.bake_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -123,4 +123,4 @@ Result<HapticStructures> bake(const TriangleMesh& mesh, const BakeOptions& optio
   return structures;
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -11,50 +11,53 @@
 #include "idl/types/spatial.h"
 #include "server/structures/haptic_structures.h"
 
-namespace tenon {
+namespace tenon::bake {
 
-/// Triangles as they came: no welding, no normals, no promise of watertightness. Metres, frame M.
+/// A triangle soup as imported: not welded, without normals, not necessarily watertight. Frame M.
 struct TriangleMesh {
-  std::vector<Vector3f> vertices;
+  std::vector<Vector3f> vertices;  ///< [m]
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<std::string> notes;  ///< what the import dropped or changed, a sentence each
+  std::vector<std::string> notes;  ///< one sentence for each thing that the import skipped or changed
 };
 
-/// A region whose surface is baked at voxel / refinement (see DistanceField).
+/// A region whose surface is baked with edge voxel / refinement (see DistanceField).
 struct RefineBox {
   Eigen::AlignedBox3d box_M;
 };
 
 struct BakeOptions {
   double voxel = 0.003;         ///< [m]
-  std::int32_t refinement = 4;  ///< of the boxes below; 1, 2, 4 or 8
+  std::int32_t refinement = 4;  ///< in the boxes of `refine`; 1, 2, 4 or 8
   std::vector<RefineBox> refine;
   double point_spacing = 0.0;     ///< [m] between shell points; 0: chosen from `points`
-  std::uint32_t points = 10'000;  ///< about how many shell points, when point_spacing is 0
+  std::uint32_t points = 10'000;  ///< approximate number of shell points, when point_spacing is 0
 };
 
-/// Called with a share of 0..1 and what is being done; returning false cancels the bake.
-using BakeProgress = std::function<bool(double share, std::string_view doing)>;
+/// Called with the fraction done [0..1] and the name of the stage; returning false cancels the bake.
+using BakeProgress = std::function<bool(double fraction, std::string_view stage)>;
 
-/// Reads a mesh with assimp in a child process that has limits on memory and time: a file that crashes or
-/// hangs the importer is one clear error here. `unit` is the length of one file unit [m]. A scan (`.bt`,
-/// `.ot` of OctoMap) becomes the skin of its occupied cells, always in metres.
+/// Reads a mesh with assimp. `unit` [m] is the length of one unit of the file. A scan (`.bt`, `.ot` of
+/// OctoMap) gives the surface of its occupied cells, always in metres. The import runs in a child process
+/// with limits on memory and time: a file that crashes or hangs the importer is an error of one sentence that
+/// names the file.
 [[nodiscard]] Result<TriangleMesh> importMesh(const std::filesystem::path& file, double unit);
 
-/// Turns triangles into haptic structures (paper §3.1): field, shell and tree, from positions alone.
-[[nodiscard]] Result<HapticStructures> bake(const TriangleMesh& mesh, const BakeOptions& options,
-                                            const BakeProgress& progress = {});
+/// Computes field and pointshell of a triangle soup (paper §3.1) from positions alone: neither winding nor
+/// normals matter. An error when options are out of range, the mesh has no area, or voxels need more than 3
+/// GB.
+[[nodiscard]] Result<structures::HapticStructures> bake(const TriangleMesh& mesh, const BakeOptions& options,
+                                                        const BakeProgress& progress = {});
 
-/// `importMesh` and `bake` of several files as one object.
-[[nodiscard]] Result<HapticStructures> bakeFiles(const std::vector<std::filesystem::path>& meshes,
-                                                 double unit, const BakeOptions& options,
-                                                 const BakeProgress& progress = {});
+/// `importMesh` and `bake` of several files, of unit `unit` [m], as one object.
+[[nodiscard]] Result<structures::HapticStructures> bakeFiles(const std::vector<std::filesystem::path>& meshes,
+                                                             double unit, const BakeOptions& options,
+                                                             const BakeProgress& progress = {});
 
-/// `bakeFiles` through a cache folder keyed by content and options.
-/// Gives the structure file's path.
+/// `bakeFiles` of files of unit `unit` [m] through a cache folder; its key is a hash of contents and options.
+/// Returns the path of the structure file.
 [[nodiscard]] Result<std::filesystem::path> bakeCached(const std::vector<std::filesystem::path>& meshes,
                                                        double unit, const BakeOptions& options,
                                                        const std::filesystem::path& cache_folder,
                                                        const BakeProgress& progress = {});
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -8,14 +8,14 @@
 #include "server/bake/bake.h"
 #include "server/bake/octree_file.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
-// Raised when the same meshes and options give other structures than before.
+// Raised when a new release of this program computes other structures from the same meshes and options.
 constexpr std::uint32_t kBakeVersion = 4;
 
-/// A running hash of what a bake depends on.
+/// Incremental hash of all inputs of a bake.
 class ContentHash {
  public:
   ContentHash() : state_(XXH3_createState()) { XXH3_128bits_reset(state_); }
@@ -49,7 +49,7 @@ class ContentHash {
   XXH3_state_t* state_;
 };
 
-/// The files whose contents make the mesh: a glTF may keep its numbers in buffers beside it.
+/// The files that a mesh consists of: a glTF may have buffers (.bin) in its folder.
 std::vector<std::filesystem::path> filesOf(const std::filesystem::path& mesh) {
   std::vector<std::filesystem::path> files{mesh};
   if (mesh.extension() != ".gltf") return files;
@@ -95,8 +95,8 @@ void append(TriangleMesh& whole, TriangleMesh part) {
 
 }  // namespace
 
-Result<HapticStructures> bakeFiles(const std::vector<std::filesystem::path>& meshes, double unit,
-                                   const BakeOptions& options, const BakeProgress& progress) {
+Result<structures::HapticStructures> bakeFiles(const std::vector<std::filesystem::path>& meshes, double unit,
+                                               const BakeOptions& options, const BakeProgress& progress) {
   if (meshes.empty()) return fail("no mesh to bake");
   const auto hash = contentHash(meshes, unit, options);
   if (!hash) return tl::unexpected(hash.error());
@@ -126,14 +126,14 @@ Result<std::filesystem::path> bakeCached(const std::vector<std::filesystem::path
   if (!hash) return tl::unexpected(hash.error());
   const std::filesystem::path file = cache_folder / (*hash + ".tenon");
   std::error_code error;
-  // a damaged file in the cache is baked again
-  if (std::filesystem::exists(file, error) && openStructures(file)) return file;
+  // a damaged file in the cache is replaced
+  if (std::filesystem::exists(file, error) && structures::openStructures(file)) return file;
   std::filesystem::create_directories(cache_folder, error);
-  if (error) return fail(cache_folder.string() + ": cannot be made: " + error.message());
+  if (error) return fail(cache_folder.string() + ": cannot be created: " + error.message());
   const auto structures = bakeFiles(meshes, unit, options, progress);
   if (!structures) return tl::unexpected(structures.error());
-  if (const auto ok = writeStructures(file, *structures); !ok) return tl::unexpected(ok.error());
+  if (const auto ok = structures::writeStructures(file, *structures); !ok) return tl::unexpected(ok.error());
   return file;
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

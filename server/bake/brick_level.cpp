@@ -8,33 +8,33 @@
 #include "server/bake/triangle_tree.h"
 #include "server/structures/field_builder.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
 using Cell = BrickLevel::Cell;
-// What fits into 3 GB: bricks of 1,458 bytes.
+// Bricks of 1,458 bytes and working memory fit into 3 GB.
 constexpr std::size_t kMaxSlots = 1'000'000;
 
-std::size_t linear(const Cell& cell, const Cell& size) {
+std::size_t linearIndex(const Cell& cell, const Cell& size) {
   return (static_cast<std::size_t>(cell.z()) * static_cast<std::size_t>(size.y()) +
           static_cast<std::size_t>(cell.y())) *
              static_cast<std::size_t>(size.x()) +
          static_cast<std::size_t>(cell.x());
 }
 
-Cell unlinear(std::size_t number, const Cell& size) {
+Cell cellOfIndex(std::size_t number, const Cell& size) {
   const auto nx = static_cast<std::size_t>(size.x());
   const auto ny = static_cast<std::size_t>(size.y());
   return {static_cast<int>(number % nx), static_cast<int>(number / nx % ny),
           static_cast<int>(number / nx / ny)};
 }
 
-/// Calls visit for the samples of a brick that its neighbour `aside` (each 0 or 1) owns.
+/// Calls visit for the samples of a brick that its neighbour at `brick_offset` (components 0 or 1) owns.
 template <typename Visit>
-void visitFace(const Cell& aside, Visit&& visit) {
-  const Cell from = aside * BrickLevel::kVoxels;
-  const Cell to = Cell::Constant(BrickLevel::kVoxels) + aside;
+void visitFace(const Cell& brick_offset, Visit&& visit) {
+  const Cell from = brick_offset * BrickLevel::kVoxels;
+  const Cell to = Cell::Constant(BrickLevel::kVoxels) + brick_offset;
   for (int z = from.z(); z < to.z(); ++z) {
     for (int y = from.y(); y < to.y(); ++y) {
       for (int x = from.x(); x < to.x(); ++x) visit(Cell(x, y, z));
@@ -56,39 +56,40 @@ BrickLevel::BrickLevel(const Vector3& p_MoFo, double edge, const Cell& brick_cou
   free.assign(count, 0);
 }
 
-BrickLevel::BrickLevel(const BrickLevel& coarse, int cuts, std::span<const std::uint32_t> refined)
+BrickLevel::BrickLevel(const BrickLevel& coarse, int divisions, std::span<const std::uint32_t> refined)
     : p_MoFo_M(coarse.p_MoFo_M),
-      voxel(coarse.voxel / cuts),
-      bricks(coarse.bricks * cuts),
-      refinement(cuts),
+      voxel(coarse.voxel / divisions),
+      bricks(coarse.bricks * divisions),
+      refinement(divisions),
       coarse_bricks_(coarse.bricks),
       block_of_coarse_(coarse.nodes(), -1),
       coarse_of_block_(refined.begin(), refined.end()) {
   for (std::size_t block = 0; block < refined.size(); ++block) {
     block_of_coarse_[refined[block]] = static_cast<std::int32_t>(block);
   }
-  const std::size_t children = static_cast<std::size_t>(cuts) * static_cast<std::size_t>(cuts * cuts);
+  const std::size_t children =
+      static_cast<std::size_t>(divisions) * static_cast<std::size_t>(divisions * divisions);
   slot.assign(refined.size() * children, -1);
   free.assign(slot.size(), 0);
 }
 
 std::int64_t BrickLevel::nodeAt(const Cell& brick) const {
   if (!inside(brick, bricks)) return -1;
-  if (refinement == 1) return static_cast<std::int64_t>(linear(brick, bricks));
+  if (refinement == 1) return static_cast<std::int64_t>(linearIndex(brick, bricks));
   const Cell parent = brick / refinement;
-  const std::int32_t block = block_of_coarse_[linear(parent, coarse_bricks_)];
+  const std::int32_t block = block_of_coarse_[linearIndex(parent, coarse_bricks_)];
   if (block < 0) return -1;
   const Cell size = Cell::Constant(refinement);
   return static_cast<std::int64_t>(static_cast<std::size_t>(block) * static_cast<std::size_t>(size.prod()) +
-                                   linear(brick - parent * refinement, size));
+                                   linearIndex(brick - parent * refinement, size));
 }
 
 Cell BrickLevel::brickOf(std::size_t node) const {
-  if (refinement == 1) return unlinear(node, bricks);
+  if (refinement == 1) return cellOfIndex(node, bricks);
   const Cell size = Cell::Constant(refinement);
   const auto children = static_cast<std::size_t>(size.prod());
-  return unlinear(coarse_of_block_[node / children], coarse_bricks_) * refinement +
-         unlinear(node % children, size);
+  return cellOfIndex(coarse_of_block_[node / children], coarse_bricks_) * refinement +
+         cellOfIndex(node % children, size);
 }
 
 BrickLevel::Point BrickLevel::at(const Cell& lattice) const {
@@ -101,7 +102,7 @@ void BrickLevel::visitCopies(const Cell& lattice, Visit&& visit) const {
   const Cell brick(lattice.x() >> 3, lattice.y() >> 3, lattice.z() >> 3);
   const Cell in_brick = lattice - brick * kVoxels;
   for (int part = 0; part < 8; ++part) {
-    // the bricks below hold what lies on their upper faces
+    // lower neighbours contain the lattice points on their upper faces
     const Cell below(part & 1, part >> 1 & 1, part >> 2 & 1);
     if ((in_brick.array() * below.array() > 0).any()) continue;
     const std::int64_t found = nodeAt(brick - below);
@@ -131,7 +132,7 @@ void BrickLevel::setSample(const Cell& lattice, std::int16_t value, std::span<st
 bool BrickLevel::sampleDistances(const TriangleTree& tree, ParallelWork& work) {
   // bricks whose centre is too far away have no sample in the band
   std::vector<std::uint8_t> candidate(nodes(), 0);
-  const double band_reach = (DistanceField::kBandVoxels + kBrickRadius) * voxel;
+  const double band_reach = (structures::DistanceField::kBandVoxels + kBrickRadius) * voxel;
   work.run(nodes(), 1024,
            [&](std::size_t node) { candidate[node] = tree.anyWithin(centreOf(node), band_reach); });
   std::vector<std::uint32_t> of_slot;
@@ -149,7 +150,8 @@ bool BrickLevel::sampleDistances(const TriangleTree& tree, ParallelWork& work) {
   work.run(of_slot.size(), 1024, [&](std::size_t s) { copyApron(of_slot[s]); });
   for (std::size_t s = 0; s < of_slot.size() && !work.cancelled(); ++s) {
     const std::int16_t* own = samplesOf(static_cast<std::int32_t>(s));
-    const auto band = static_cast<std::int16_t>(DistanceField::kBandVoxels * DistanceField::kQuantaPerVoxel);
+    const auto band = static_cast<std::int16_t>(structures::DistanceField::kBandVoxels *
+                                                structures::DistanceField::kQuantaPerVoxel);
     if (*std::min_element(own, own + kSamples) >= band) slot[of_slot[s]] = -1;
   }
   return true;
@@ -159,10 +161,11 @@ BrickLevel::SampleBits BrickLevel::ownSamples(std::size_t node) const {
   SampleBits own;
   const Cell brick = brickOf(node);
   for (int face = 0; face < 8; ++face) {
-    const Cell aside(face & 1, face >> 1 & 1, face >> 2 & 1);
-    const std::int64_t neighbour = nodeAt(brick + aside);
+    const Cell brick_offset(face & 1, face >> 1 & 1, face >> 2 & 1);
+    const std::int64_t neighbour = nodeAt(brick + brick_offset);
     if (face > 0 && neighbour >= 0 && slot[static_cast<std::size_t>(neighbour)] >= 0) continue;
-    visitFace(aside, [&](const Cell& in_brick) { own.set(static_cast<std::size_t>(sampleIndex(in_brick))); });
+    visitFace(brick_offset,
+              [&](const Cell& in_brick) { own.set(static_cast<std::size_t>(sampleIndex(in_brick))); });
   }
   return own;
 }
@@ -171,12 +174,12 @@ void BrickLevel::copyApron(std::size_t node) {
   const Cell brick = brickOf(node);
   std::int16_t* to = samplesOf(slot[node]);
   for (int face = 1; face < 8; ++face) {
-    const Cell aside(face & 1, face >> 1 & 1, face >> 2 & 1);
-    const std::int64_t neighbour = nodeAt(brick + aside);
+    const Cell brick_offset(face & 1, face >> 1 & 1, face >> 2 & 1);
+    const std::int64_t neighbour = nodeAt(brick + brick_offset);
     if (neighbour < 0 || slot[static_cast<std::size_t>(neighbour)] < 0) continue;
     const std::int16_t* from = samplesOf(slot[static_cast<std::size_t>(neighbour)]);
-    visitFace(aside, [&](const Cell& in_brick) {
-      to[sampleIndex(in_brick)] = from[sampleIndex(in_brick - aside * kVoxels)];
+    visitFace(brick_offset, [&](const Cell& in_brick) {
+      to[sampleIndex(in_brick)] = from[sampleIndex(in_brick - brick_offset * kVoxels)];
     });
   }
 }
@@ -185,10 +188,10 @@ void BrickLevel::sampleBrick(std::size_t node, const TriangleTree& tree, const S
   if (which.none()) return;
   const Cell corner = brickOf(node) * kVoxels;
   std::int16_t* out = samplesOf(slot[node]);
-  constexpr double kClamp = DistanceField::kClampVoxels;
-  constexpr double kWidestBlock = 2.5981;  // [voxels] from the middle of 4^3 samples to a corner
-  TriangleTree::Search search(tree, centreOf(node), kBrickRadius * voxel, (kClamp + kWidestBlock) * voxel);
-  const std::int16_t clamped = quantizedSample(kClamp * voxel, voxel);
+  constexpr double kClamp = structures::DistanceField::kClampVoxels;
+  constexpr double kBlockRadius = 2.5981;  // [voxels] from the middle of 4^3 samples to a corner
+  TriangleTree::Search search(tree, centreOf(node), kBrickRadius * voxel, (kClamp + kBlockRadius) * voxel);
+  const std::int16_t clamped = structures::quantizedSample(kClamp * voxel, voxel);
   const auto fill = [&](const Cell& from, const Cell& to) {
     const Vector3 middle = (from + to - Cell::Ones()).cast<double>() / 2;
     const double reach = (kClamp + (to - from - Cell::Ones()).cast<double>().norm() / 2 + 1e-9) * voxel;
@@ -199,13 +202,14 @@ void BrickLevel::sampleBrick(std::size_t node, const TriangleTree& tree, const S
         for (int x = from.x(); x < to.x(); ++x) {
           const int sample = sampleIndex({x, y, z});
           if (!which[static_cast<std::size_t>(sample)]) continue;
-          // a block whose middle is so far away that all are clamped is done
+          // a block whose middle is so far away that all its samples are clamped needs no further search
           if (std::exchange(first, false)) {
             far = search.squaredDistance(position(corner) + middle * voxel, reach) >= reach * reach;
           }
           const Vector3 p = position(corner + Cell(x, y, z));
           out[sample] =
-              far ? clamped : quantizedSample(std::sqrt(search.squaredDistance(p, kClamp * voxel)), voxel);
+              far ? clamped
+                  : structures::quantizedSample(std::sqrt(search.squaredDistance(p, kClamp * voxel)), voxel);
         }
       }
     }
@@ -216,4 +220,4 @@ void BrickLevel::sampleBrick(std::size_t node, const TriangleTree& tree, const S
   }
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

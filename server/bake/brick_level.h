@@ -9,7 +9,7 @@
 
 #include "server/structures/distance_field.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 class ParallelWork;
 class TriangleTree;
@@ -17,34 +17,35 @@ class TriangleTree;
 /// The bricks of one voxel size while a field is baked: the whole grid, or the children of its refined
 /// bricks.
 ///
-/// A brick is a node, known by number. Nodes near triangles have a slot with 9^3 unsigned samples; the others
-/// hold no surface and are all free or all solid. Lattice points are counted from the grid's corner in voxels
-/// of this level; a point belongs to the brick whose lower faces it may lie on.
+/// A brick is a node with a number. Nodes near triangles have a slot with 9^3 samples; the others contain no
+/// surface and are entirely free or entirely solid. Lattice points have integer coordinates from the grid's
+/// corner [voxels of this level]; a lattice point on the face between two bricks belongs to the upper one.
 ///
-/// Threads: one step at a time; ParallelWork inside.
+/// Threads: one caller at a time; functions with a ParallelWork parameter use several threads inside.
 class BrickLevel {
  public:
-  static constexpr int kVoxels = DistanceField::kBrickVoxels;
+  static constexpr int kVoxels = structures::DistanceField::kBrickVoxels;
   static constexpr double kBrickRadius = 6.9283;  ///< [voxels] from a brick's centre to its corner
-  static constexpr int kSide = DistanceField::kBrickSide;
-  static constexpr int kSamples = DistanceField::kBrickSamples;
+  static constexpr int kSide = structures::DistanceField::kBrickSide;
+  static constexpr int kSamples = structures::DistanceField::kBrickSamples;
   using Cell = Eigen::Vector3i;
-  using Mask = std::array<std::uint64_t, kVoxels>;  ///< own samples: a word for each z, bit y * 8 + x
+  using Mask = std::array<std::uint64_t, kVoxels>;  ///< 8^3 own samples: one word per z, bit y * 8 + x
   using SampleBits = std::bitset<kSamples>;
 
-  /// What is known of one lattice point.
+  /// The state of one lattice point.
   struct Point {
     bool known = false;     ///< the point is in this level
-    bool free = false;      ///< connected to the outside
-    bool reached = false;   ///< by the flood itself, not by its extension
+    bool free = false;      ///< outside: connected to the grid's border
+    bool reached = false;   ///< by the flood fill itself, not by its extension to the surface
     double distance = 0.0;  ///< [voxel] unsigned
   };
 
-  /// The whole grid.
+  /// The whole grid, with edge `voxel` [m].
   BrickLevel(const Vector3& p_MoFo_M, double voxel, const Cell& bricks);
-  /// The children of some bricks of `coarse`.
+  /// The children of the bricks `refined` of `coarse`.
   BrickLevel(const BrickLevel& coarse, int refinement, std::span<const std::uint32_t> refined);
 
+  /// -1 where this level has no brick.
   [[nodiscard]] std::int64_t nodeAt(const Cell& brick) const;
   [[nodiscard]] Cell brickOf(std::size_t node) const;
   [[nodiscard]] std::size_t nodes() const { return slot.size(); }
@@ -58,10 +59,10 @@ class BrickLevel {
     return ((p_MP - p_MoFo_M) / voxel).array().floor().matrix().cast<int>();
   }
   [[nodiscard]] Point at(const Cell& lattice) const;
-  /// The same for a point of a brick that is known by its node (< 0: not in this level).
+  /// The same for the point `in_brick` of the brick `node` (< 0: not in this level).
   [[nodiscard]] Point at(std::int64_t node, const Cell& in_brick) const;
-  /// Calls visit(offset, point) for the lattice points from `below` under a brick's corner to `above` over
-  /// its last own one; each of the bricks they lie in is found once.
+  /// Calls visit(offset from the brick's corner, point) for the lattice points of a brick, `below` layers
+  /// under it and `above` layers over it. Looks up each neighbouring brick once.
   template <typename Visit>
   void visitAround(std::size_t node, int below, int above, Visit&& visit) const;
   [[nodiscard]] std::int16_t* samplesOf(std::int32_t of_slot) {
@@ -76,40 +77,42 @@ class BrickLevel {
   [[nodiscard]] static Cell cellOfSample(int sample) {
     return {sample % kSide, sample / kSide % kSide, sample / (kSide * kSide)};
   }
-  /// The sample at a lattice point, from any brick that has it; null where none does.
+  /// The sample at a lattice point, from any brick that contains it; null where none does.
   [[nodiscard]] const std::int16_t* findSample(const Cell& lattice) const;
-  /// Sets it in all of them, and marks their nodes.
+  /// Sets the sample in every brick that contains it, and sets `marks` of their nodes to 1.
   void setSample(const Cell& lattice, std::int16_t value, std::span<std::uint8_t> marks);
   [[nodiscard]] bool anyOutside(std::size_t node) const {
     return slot[node] < 0 ? free[node] != 0 : outside[static_cast<std::size_t>(slot[node])].any();
   }
 
-  /// Finds the bricks near triangles and samples their distances. False when there is no room for them.
+  /// Gives a slot to the bricks near triangles and samples their unsigned distances. False when there
+  /// are more than fit into 3 GB.
   bool sampleDistances(const TriangleTree& tree, ParallelWork& work);
-  /// Measures those samples of one node that it has alone or owns, from a tree of triangles.
+  /// Sets the samples `which` of a node to the unsigned distance to the nearest triangle.
   void sampleBrick(std::size_t node, const TriangleTree& tree, const SampleBits& which);
-  /// Takes the samples on the upper faces from the neighbours that own them.
+  /// Copies the apron samples (on the upper faces) from the neighbours that own them.
   void copyApron(std::size_t node);
-  /// Which samples of a brick no neighbour with a slot has as its own.
+  /// The samples of a brick that it owns: those of no neighbour with a slot.
   [[nodiscard]] SampleBits ownSamples(std::size_t node) const;
 
   Vector3 p_MoFo_M;
-  double voxel;
+  double voxel;  ///< [m]
   Cell bricks;
   int refinement = 1;
   std::vector<std::int32_t> slot;     ///< per node; < 0: no surface near
   std::vector<std::uint8_t> free;     ///< per node without slot
-  std::vector<std::int16_t> samples;  ///< per slot
-  std::vector<Mask> reached;          ///< per slot: flooded from outside
+  std::vector<std::int16_t> samples;  ///< kSamples per slot [voxels / kQuantaPerVoxel]
+  std::vector<Mask> reached;          ///< per slot: reached by the flood fill from outside
   std::vector<SampleBits> outside;    ///< per slot, apron included
 
  private:
-  /// Calls visit(node, sample) for each brick with samples that has this lattice point, until it says no.
+  /// Calls visit(node, sample) for each brick with a slot that contains this lattice point, until it returns
+  /// false.
   template <typename Visit>
   void visitCopies(const Cell& lattice, Visit&& visit) const;
 
   Cell coarse_bricks_;
-  std::vector<std::int32_t> block_of_coarse_;  // fine level only: which block of children, or -1
+  std::vector<std::int32_t> block_of_coarse_;  // fine level only: the number of the block of children, or -1
   std::vector<std::uint32_t> coarse_of_block_;
 };
 
@@ -120,11 +123,12 @@ inline BrickLevel::Point BrickLevel::at(std::int64_t node, const Cell& in_brick)
   const std::int32_t of_slot = slot[static_cast<std::size_t>(node)];
   if (of_slot < 0) {
     point.free = point.reached = free[static_cast<std::size_t>(node)] != 0;
-    point.distance = DistanceField::kBandVoxels;
+    point.distance = structures::DistanceField::kBandVoxels;
     return point;
   }
   const int sample = sampleIndex(in_brick);
-  point.distance = std::abs(static_cast<double>(samplesOf(of_slot)[sample])) / DistanceField::kQuantaPerVoxel;
+  point.distance =
+      std::abs(static_cast<double>(samplesOf(of_slot)[sample])) / structures::DistanceField::kQuantaPerVoxel;
   const auto s = static_cast<std::size_t>(of_slot);
   if (!outside.empty()) point.free = outside[s][static_cast<std::size_t>(sample)];
   if (!reached.empty()) {
@@ -138,19 +142,20 @@ template <typename Visit>
 void BrickLevel::visitAround(std::size_t node, int below, int above, Visit&& visit) const {
   const Cell brick = brickOf(node);
   for (int neighbour = 0; neighbour < 27; ++neighbour) {
-    const Cell aside = Cell(neighbour % 3, neighbour / 3 % 3, neighbour / 9) - Cell::Ones();
-    const auto first = [&](int axis) { return aside[axis] < 0 ? kVoxels - below : 0; };
-    const auto end = [&](int axis) { return aside[axis] > 0 ? above : kVoxels; };
-    const std::int64_t there = aside.isZero() ? static_cast<std::int64_t>(node) : nodeAt(brick + aside);
+    const Cell brick_offset = Cell(neighbour % 3, neighbour / 3 % 3, neighbour / 9) - Cell::Ones();
+    const auto first = [&](int axis) { return brick_offset[axis] < 0 ? kVoxels - below : 0; };
+    const auto end = [&](int axis) { return brick_offset[axis] > 0 ? above : kVoxels; };
+    const std::int64_t neighbour_node =
+        brick_offset.isZero() ? static_cast<std::int64_t>(node) : nodeAt(brick + brick_offset);
     for (int z = first(2); z < end(2); ++z) {
       for (int y = first(1); y < end(1); ++y) {
         for (int x = first(0); x < end(0); ++x) {
           const Cell in_brick(x, y, z);
-          visit(Cell(in_brick + aside * kVoxels), at(there, in_brick));
+          visit(Cell(in_brick + brick_offset * kVoxels), at(neighbour_node, in_brick));
         }
       }
     }
   }
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -6,17 +6,17 @@
 
 #include "server/bake/parallel.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
 using Cell = BrickLevel::Cell;
-// A place of the surface is exposed when an empty ball about an outside sample comes this near to it
-// [voxels]: enough for concave corners, where no ball reaches the edge itself.
+// [voxels] A surface point is exposed when the empty ball around an outside sample comes this near to it:
+// enough for concave corners, where no ball reaches the edge itself.
 constexpr double kTouch = 0.6;
-// Pieces longer than this are too wide for a ball of the band, or for being in a box that is hidden [voxels].
-constexpr double kWideBall = 5.0;
-constexpr double kWideBox = 12.0;
+// [voxels] Longest edge of pieces that are tested against a single empty ball, and against a hidden box.
+constexpr double kMaxEdgeForBall = 5.0;
+constexpr double kMaxEdgeForBox = 12.0;
 constexpr std::size_t kChunk = 4096;
 
 enum class Exposure { kUnknown, kHidden, kExposed };
@@ -24,7 +24,7 @@ enum class Exposure { kUnknown, kHidden, kExposed };
 constexpr int kVoxels = BrickLevel::kVoxels;
 constexpr int kPatch = kVoxels + 3;  // a brick's cells reach one lattice point below and two above
 
-/// The 4^3 lattice points about a cell, its own corners first: mostly one of them tells.
+/// The 4^3 lattice points around a cell, its own corners first: these usually decide.
 const std::array<Cell, 64> kAround = [] {
   std::array<Cell, 64> around;
   constexpr std::array kOrder{0, 1, -1, 2};
@@ -36,7 +36,7 @@ const std::array<Cell, 64> kAround = [] {
   return around;
 }();
 
-/// What a level says about cells: whether a free point is among the 4^3 lattice points about one.
+/// For each cell of a level, whether one of the 4^3 lattice points around it is free.
 class CellMap {
  public:
   CellMap(const BrickLevel& level, ParallelWork& work) : level_(level), near_(level.outside.size()) {
@@ -60,10 +60,10 @@ class CellMap {
       const auto bit = static_cast<unsigned>(in_brick.y() * kVoxels + in_brick.x());
       if ((word >> bit & 1U) == 0) return Exposure::kHidden;
     }
-    return lookAround(p_MP, cell, brick, node);
+    return exposureFromNeighbours(p_MP, cell, brick, node);
   }
 
-  /// Whether no cell of a box has a free point about it.
+  /// Whether no cell of a box has a free lattice point around it.
   [[nodiscard]] bool hides(const Eigen::AlignedBox3d& box_M) const {
     const Cell low = level_.cellAt(box_M.min());
     const Cell high = level_.cellAt(box_M.max());
@@ -93,7 +93,7 @@ class CellMap {
 
  private:
   [[nodiscard]] BrickLevel::Mask nearOutside(std::size_t node) const {
-    // a row of lattice points along x is a word; a point that is not known may be free
+    // one word per row of lattice points along x; a point outside this level counts as free
     std::array<std::uint32_t, static_cast<std::size_t>(kPatch) * kPatch> rows{};
     level_.visitAround(node, 1, 2, [&](const Cell& offset, const BrickLevel::Point& point) {
       const bool free = point.free || !point.known;
@@ -114,28 +114,28 @@ class CellMap {
     return near;
   }
 
-  [[nodiscard]] Exposure lookAround(const Vector3& p_MP, const Cell& cell, const Cell& brick,
-                                    std::int64_t node) const {
+  [[nodiscard]] Exposure exposureFromNeighbours(const Vector3& p_MP, const Cell& cell, const Cell& brick,
+                                                std::int64_t node) const {
     const Vector3 p_cell = (p_MP - level_.p_MoFo_M) / level_.voxel - cell.cast<double>();
     const Cell in_brick = cell - brick * kVoxels;
     const std::int32_t slot = level_.slot[static_cast<std::size_t>(node)];
     const std::int16_t* samples = slot < 0 ? nullptr : level_.samplesOf(slot);
     bool all_known = true;
-    for (const Cell& aside : kAround) {
-      const Cell in_samples = in_brick + aside;
+    for (const Cell& offset : kAround) {
+      const Cell in_samples = in_brick + offset;
       double distance = 0.0;
       if (samples != nullptr && in_samples.minCoeff() >= 0 && in_samples.maxCoeff() < BrickLevel::kSide) {
         const int sample = BrickLevel::sampleIndex(in_samples);
         if (!level_.outside[static_cast<std::size_t>(slot)][static_cast<std::size_t>(sample)]) continue;
-        distance = samples[sample] / double{DistanceField::kQuantaPerVoxel};
+        distance = samples[sample] / double{structures::DistanceField::kQuantaPerVoxel};
       } else {
-        const BrickLevel::Point point = level_.at(cell + aside);
+        const BrickLevel::Point point = level_.at(cell + offset);
         all_known = all_known && point.known;
         if (!point.free || !point.known) continue;
         distance = point.distance;
       }
       const double reach = distance + kTouch;
-      if ((aside.cast<double>() - p_cell).squaredNorm() <= reach * reach) return Exposure::kExposed;
+      if ((offset.cast<double>() - p_cell).squaredNorm() <= reach * reach) return Exposure::kExposed;
     }
     return all_known ? Exposure::kHidden : Exposure::kUnknown;
   }
@@ -144,47 +144,50 @@ class CellMap {
   std::vector<BrickLevel::Mask> near_;
 };
 
-/// Sorts the pieces of one triangle.
-class Cutter {
+/// Splits triangles into exposed and hidden pieces.
+class ExposureSplitter {
  public:
-  Cutter(const CellMap& coarse, const CellMap* fine) : coarse_(coarse), fine_(fine) {}
+  ExposureSplitter(const CellMap& coarse, const CellMap* fine) : coarse_(coarse), fine_(fine) {}
 
-  enum class Part { kAll, kNone, kSome };
+  enum class Exposed { kAll, kNone, kSome };
 
-  Part exposedPart(const Triangle& t, std::vector<Triangle>& pieces) {
+  /// With kSome, `pieces` contains the exposed parts of the triangle.
+  Exposed exposedPart(const structures::Triangle& t, std::vector<structures::Triangle>& pieces) {
     std::size_t a = 0;
-    const double length = longestEdge(t, a);
+    const double length = structures::longestEdge(t, a);
     const Vector3 centre = (t[0] + t[1] + t[2]) / 3.0;
     const CellMap& map = mapAt(centre);
     const BrickLevel& level = map.level();
-    if (length <= level.voxel) return isExposed(centre) ? Part::kAll : Part::kNone;
-    if (length <= kWideBall * level.voxel && inEmptyBall(level, t, centre)) return Part::kAll;
-    if (length <= kWideBox * level.voxel && map.hides(boxOf(t))) return Part::kNone;
+    if (length <= level.voxel) return isExposed(centre) ? Exposed::kAll : Exposed::kNone;
+    if (length <= kMaxEdgeForBall * level.voxel && inEmptyBall(level, t, centre)) return Exposed::kAll;
+    if (length <= kMaxEdgeForBox * level.voxel && map.hides(structures::boxOf(t))) return Exposed::kNone;
 
     const std::size_t b = (a + 1) % 3;
     const Vector3 middle = (t[a] + t[b]) / 2;
-    Triangle first = t;
-    Triangle second = t;
+    structures::Triangle first = t;
+    structures::Triangle second = t;
     first[b] = middle;
     second[a] = middle;
-    const Part of_first = exposedPart(first, pieces);
-    const Part of_second = exposedPart(second, pieces);
-    if (of_first == of_second && of_first != Part::kSome) return of_first;
-    if (of_first == Part::kAll) pieces.push_back(first);
-    if (of_second == Part::kAll) pieces.push_back(second);
-    return Part::kSome;
+    const Exposed of_first = exposedPart(first, pieces);
+    const Exposed of_second = exposedPart(second, pieces);
+    if (of_first == of_second && of_first != Exposed::kSome) return of_first;
+    if (of_first == Exposed::kAll) pieces.push_back(first);
+    if (of_second == Exposed::kAll) pieces.push_back(second);
+    return Exposed::kSome;
   }
 
  private:
-  /// Whether one empty ball touches all of the piece: balls are convex, so its corners tell.
-  [[nodiscard]] bool inEmptyBall(const BrickLevel& level, const Triangle& t, const Vector3& centre) {
-    const auto holds = [&t](const Ball& ball) {
+  /// Whether one empty ball, enlarged by kTouch, contains the whole piece: balls are convex, so its corners
+  /// suffice.
+  [[nodiscard]] bool inEmptyBall(const BrickLevel& level, const structures::Triangle& t,
+                                 const Vector3& centre) {
+    const auto contains = [&t](const Ball& ball) {
       return std::all_of(t.begin(), t.end(), [&ball](const Vector3& corner) {
         return (corner - ball.centre).squaredNorm() <= ball.squared_radius;
       });
     };
-    // neighbouring pieces mostly touch the same ball
-    if (holds(last_)) return true;
+    // neighbouring pieces are usually in the same ball
+    if (contains(last_)) return true;
     const Vector3 normal = (t[1] - t[0]).cross(t[2] - t[0]).normalized();
     if (!normal.allFinite()) return false;
     const Vector3 half = Vector3::Constant(level.voxel / 2);
@@ -194,7 +197,7 @@ class Cutter {
       if (!point.known || !point.free) continue;
       const double radius = (point.distance + kTouch) * level.voxel;
       const Ball ball{level.position(lattice), radius * radius};
-      if (!holds(ball)) continue;
+      if (!contains(ball)) continue;
       last_ = ball;
       return true;
     }
@@ -225,50 +228,50 @@ class Cutter {
 
 }  // namespace
 
-ExposedSurface::ExposedSurface(std::span<const Triangle> triangles, const BrickLevel& coarse,
+ExposedSurface::ExposedSurface(std::span<const structures::Triangle> triangles, const BrickLevel& coarse,
                                const BrickLevel* fine, ParallelWork& work)
     : triangles_(triangles), state_(triangles.size(), kWhole) {
-  // pieces are collected by chunk and numbered afterwards, so that threads leave no trace in the order
-  struct Cut {
+  // pieces are collected by chunk and numbered afterwards, so that their order does not depend on threads
+  struct SplitTriangle {
     std::uint32_t triangle;
-    std::vector<Triangle> pieces;
+    std::vector<structures::Triangle> pieces;
   };
-  std::vector<std::vector<Cut>> cuts((triangles.size() + kChunk - 1) / kChunk);
+  std::vector<std::vector<SplitTriangle>> splits((triangles.size() + kChunk - 1) / kChunk);
   const CellMap coarse_map(coarse, work);
   std::optional<CellMap> fine_map;
   if (fine != nullptr) fine_map.emplace(*fine, work);
-  work.run(cuts.size(), 1, [&](std::size_t chunk) {
-    Cutter cutter(coarse_map, fine_map ? &*fine_map : nullptr);
+  work.run(splits.size(), 1, [&](std::size_t chunk) {
+    ExposureSplitter splitter(coarse_map, fine_map ? &*fine_map : nullptr);
     const std::size_t end = std::min(triangles.size(), (chunk + 1) * kChunk);
     for (std::size_t i = chunk * kChunk; i < end; ++i) {
-      std::vector<Triangle> pieces;
-      const Cutter::Part part = cutter.exposedPart(triangles[i], pieces);
-      if (part == Cutter::Part::kNone) state_[i] = kHidden;
-      if (part == Cutter::Part::kSome)
-        cuts[chunk].push_back({static_cast<std::uint32_t>(i), std::move(pieces)});
+      std::vector<structures::Triangle> pieces;
+      const ExposureSplitter::Exposed part = splitter.exposedPart(triangles[i], pieces);
+      if (part == ExposureSplitter::Exposed::kNone) state_[i] = kHidden;
+      if (part == ExposureSplitter::Exposed::kSome)
+        splits[chunk].push_back({static_cast<std::uint32_t>(i), std::move(pieces)});
     }
   });
-  for (auto& chunk : cuts) {
-    for (Cut& cut : chunk) {
-      state_[cut.triangle] = static_cast<std::uint32_t>(pieces_.size());
-      pieces_.push_back(std::move(cut.pieces));
+  for (auto& chunk : splits) {
+    for (SplitTriangle& split : chunk) {
+      state_[split.triangle] = static_cast<std::uint32_t>(pieces_.size());
+      pieces_.push_back(std::move(split.pieces));
     }
   }
 }
 
-std::span<const Triangle> ExposedSurface::of(std::uint32_t i) const {
+std::span<const structures::Triangle> ExposedSurface::of(std::uint32_t i) const {
   if (state_[i] == kWhole) return triangles_.subspan(i, 1);
   if (state_[i] == kHidden) return {};
   return pieces_[state_[i]];
 }
 
-std::vector<Triangle> ExposedSurface::all() const {
-  std::vector<Triangle> surface;
+std::vector<structures::Triangle> ExposedSurface::all() const {
+  std::vector<structures::Triangle> surface;
   for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
-    const auto left = of(i);
-    surface.insert(surface.end(), left.begin(), left.end());
+    const auto exposed = of(i);
+    surface.insert(surface.end(), exposed.begin(), exposed.end());
   }
   return surface;
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

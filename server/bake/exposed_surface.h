@@ -7,35 +7,37 @@
 #include "server/bake/brick_level.h"
 #include "server/structures/triangle.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 class ParallelWork;
 
-/// The part of a soup of triangles that the outside touches.
+/// The part of a triangle soup that is exposed to the outside.
 ///
-/// CAD exports are unions: solids overlap, and the walls inside them are no surface of the whole. Left in,
-/// they would make everything within look shallow. A triangle that is partly inside is cut into pieces of
-/// about a voxel along the border. Threads: constant after construction.
+/// CAD exports are unions of overlapping solids, and walls inside the union are not part of its surface. If
+/// they were kept, penetration depths inside would be too small. A triangle that is partly interior is split
+/// into pieces of about a voxel along the border.
+///
+/// Threads: constant after construction. `triangles` must outlive it.
 class ExposedSurface {
  public:
-  /// `fine` (may be null) answers where it knows the place, `coarse` elsewhere.
-  ExposedSurface(std::span<const Triangle> triangles, const BrickLevel& coarse, const BrickLevel* fine,
-                 ParallelWork& work);
+  /// `fine` (may be null) is used where it has the lattice points, `coarse` elsewhere.
+  ExposedSurface(std::span<const structures::Triangle> triangles, const BrickLevel& coarse,
+                 const BrickLevel* fine, ParallelWork& work);
 
-  /// What is left of triangle i: itself, nothing, or pieces of it.
-  [[nodiscard]] std::span<const Triangle> of(std::uint32_t i) const;
+  /// The exposed part of triangle i: itself, nothing, or pieces of it.
+  [[nodiscard]] std::span<const structures::Triangle> of(std::uint32_t i) const;
   [[nodiscard]] bool whole(std::uint32_t i) const { return state_[i] == kWhole; }
 
-  /// All of it, in the order of the triangles.
-  [[nodiscard]] std::vector<Triangle> all() const;
+  /// All exposed parts, in the order of the triangles.
+  [[nodiscard]] std::vector<structures::Triangle> all() const;
 
  private:
   static constexpr std::uint32_t kWhole = 0xFFFFFFFFU;
   static constexpr std::uint32_t kHidden = 0xFFFFFFFEU;
 
-  std::span<const Triangle> triangles_;
-  std::vector<std::uint32_t> state_;  // or the number of a list of pieces
-  std::vector<std::vector<Triangle>> pieces_;
+  std::span<const structures::Triangle> triangles_;
+  std::vector<std::uint32_t> state_;  // kWhole, kHidden, or an index into pieces_
+  std::vector<std::vector<structures::Triangle>> pieces_;
 };
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -15,18 +15,18 @@
 #include "server/bake/triangle_tree.h"
 #include "server/structures/field_builder.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
 using Cell = BrickLevel::Cell;
-using Entry = DistanceField::Entry;
+using Entry = structures::DistanceField::Entry;
 constexpr double kMaxBricks = 40e6;  // 250 MB of index, bounds and lists
 constexpr int kCentreSample = (4 * BrickLevel::kSide + 4) * BrickLevel::kSide + 4;
 
-tl::unexpected<Error> tooMuch(double voxel) {
+tl::unexpected<Error> needsTooMuchMemory(double voxel) {
   return fail("voxels of " + std::to_string(voxel * 1e3) +
-              " mm would need more than 3 GB for this mesh; choose larger ones");
+              " mm need more than 3 GB for this mesh; choose larger voxels");
 }
 
 std::vector<std::uint32_t> bricksToRefine(const BrickLevel& coarse, const BakeOptions& options) {
@@ -36,11 +36,13 @@ std::vector<std::uint32_t> bricksToRefine(const BrickLevel& coarse, const BakeOp
   for (std::size_t node = 0; node < coarse.nodes(); ++node) {
     const std::int32_t slot = coarse.slot[node];
     if (slot < 0) continue;
-    const double at_centre = coarse.samplesOf(slot)[kCentreSample] / double{DistanceField::kQuantaPerVoxel};
-    if (at_centre >= std::min(BrickLevel::kBrickRadius, DistanceField::kClampVoxels)) {
+    const double at_centre =
+        coarse.samplesOf(slot)[kCentreSample] / double{structures::DistanceField::kQuantaPerVoxel};
+    if (at_centre >= std::min(BrickLevel::kBrickRadius, structures::DistanceField::kClampVoxels)) {
       // clamped at the centre: the surface is at a corner or not in the brick at all
       const std::int16_t* s = coarse.samplesOf(slot);
-      if (*std::min_element(s, s + BrickLevel::kSamples) > DistanceField::kQuantaPerVoxel) continue;
+      if (*std::min_element(s, s + BrickLevel::kSamples) > structures::DistanceField::kQuantaPerVoxel)
+        continue;
     }
     const Vector3 p_MBo = coarse.position(coarse.brickOf(node) * BrickLevel::kVoxels);
     const Eigen::AlignedBox3d box(p_MBo, p_MBo + Vector3::Constant(edge));
@@ -51,34 +53,34 @@ std::vector<std::uint32_t> bricksToRefine(const BrickLevel& coarse, const BakeOp
   return refined;
 }
 
-/// Inside, distances count only to what is exposed; then signs are put in. `gone` are the triangles that are
-/// not, or not as a whole: a sample with none of them at its distance keeps it.
-void finishSamples(BrickLevel& level, const TriangleTree& exposed, const TriangleTree& gone,
+/// Resamples inside samples as distances to the exposed surface only, and sets signs. `hidden` are the
+/// triangles that are not exposed, or not entirely: only a sample with one of them at its distance changes.
+void finishSamples(BrickLevel& level, const TriangleTree& exposed, const TriangleTree& hidden,
                    ParallelWork& work) {
-  constexpr double kClamp = DistanceField::kClampVoxels;
-  const auto ofBrick = [&](auto&& act) {
+  constexpr double kClamp = structures::DistanceField::kClampVoxels;
+  const auto forEachBrick = [&](auto&& act) {
     work.run(level.nodes(), 64, [&](std::size_t node) {
       if (level.slot[node] >= 0) act(node, ~level.outside[static_cast<std::size_t>(level.slot[node])]);
     });
   };
-  ofBrick([&](std::size_t node, const BrickLevel::SampleBits& inside) {
+  forEachBrick([&](std::size_t node, const BrickLevel::SampleBits& inside) {
     if (inside.none()) return;
     const std::int16_t* samples = level.samplesOf(level.slot[node]);
     const Cell corner = level.brickOf(node) * BrickLevel::kVoxels;
-    TriangleTree::Search search(gone, level.centreOf(node), BrickLevel::kBrickRadius * level.voxel,
+    TriangleTree::Search search(hidden, level.centreOf(node), BrickLevel::kBrickRadius * level.voxel,
                                 (kClamp + 0.01) * level.voxel);
     BrickLevel::SampleBits stale = inside & level.ownSamples(node);
     for (int k = 0; k < BrickLevel::kSamples; ++k) {
       if (!stale[static_cast<std::size_t>(k)]) continue;
-      // what was rounded away
-      const double reach = (samples[k] + 1) * level.voxel / DistanceField::kQuantaPerVoxel;
+      // the stored distance, one quantum larger because of rounding
+      const double reach = (samples[k] + 1) * level.voxel / structures::DistanceField::kQuantaPerVoxel;
       const Vector3 p = level.position(corner + BrickLevel::cellOfSample(k));
       if (search.squaredDistance(p, reach) >= reach * reach) stale.reset(static_cast<std::size_t>(k));
     }
     level.sampleBrick(node, exposed, stale);
   });
-  ofBrick([&](std::size_t node, const BrickLevel::SampleBits&) { level.copyApron(node); });
-  ofBrick([&](std::size_t node, const BrickLevel::SampleBits& inside) {
+  forEachBrick([&](std::size_t node, const BrickLevel::SampleBits&) { level.copyApron(node); });
+  forEachBrick([&](std::size_t node, const BrickLevel::SampleBits& inside) {
     std::int16_t* samples = level.samplesOf(level.slot[node]);
     for (int k = 0; k < BrickLevel::kSamples; ++k) {
       if (inside[static_cast<std::size_t>(k)]) samples[k] = static_cast<std::int16_t>(-samples[k]);
@@ -86,8 +88,8 @@ void finishSamples(BrickLevel& level, const TriangleTree& exposed, const Triangl
   });
 }
 
-/// Per coarse brick a lower bound of the distance from its centre to the surface [bricks]: the Euclidean
-/// distance to the nearest brick that the surface goes through, axis by axis.
+/// [bricks] Per coarse brick a lower bound of the distance from its centre to the surface: the Euclidean
+/// distance transform of the bricks that contain surface, separably along each axis.
 std::vector<float> brickDistances(const BrickLevel& coarse, ParallelWork& work) {
   constexpr float kNone = std::numeric_limits<float>::max();
   std::vector<float> squared(coarse.nodes(), kNone);
@@ -95,8 +97,9 @@ std::vector<float> brickDistances(const BrickLevel& coarse, ParallelWork& work) 
     const std::int32_t slot = coarse.slot[node];
     if (slot < 0) return;
     // a surface in the brick is within half a voxel's diagonal of one of its samples
-    constexpr auto kTouch =
-        static_cast<int>(DistanceField::kHalfDiagonal * DistanceField::kQuantaPerVoxel) + 1;
+    constexpr auto kTouch = static_cast<int>(structures::DistanceField::kHalfDiagonal *
+                                             structures::DistanceField::kQuantaPerVoxel) +
+                            1;
     const std::int16_t* samples = coarse.samplesOf(slot);
     const bool surface =
         std::any_of(samples, samples + BrickLevel::kSamples, [](int s) { return std::abs(s) <= kTouch; });
@@ -129,29 +132,35 @@ std::vector<float> brickDistances(const BrickLevel& coarse, ParallelWork& work) 
   return squared;
 }
 
-/// Gives the bricks of a level with surface in the band their final numbers; the others become far.
+/// Numbers the bricks that have the surface within their band; all others become far bricks.
 class Assembler {
  public:
-  explicit Assembler(FieldStorage& storage) : storage_(storage) {}
+  explicit Assembler(structures::FieldStorage& storage) : storage_(storage) {}
 
   Entry entryOf(const BrickLevel& level, std::size_t node) {
     const std::int32_t slot = level.slot[node];
-    if (slot < 0) return level.free[node] != 0 ? DistanceField::kFarOutside : DistanceField::kFarInside;
+    if (slot < 0)
+      return level.free[node] != 0 ? structures::DistanceField::kFarOutside
+                                   : structures::DistanceField::kFarInside;
     const std::int16_t* samples = level.samplesOf(slot);
-    constexpr auto kBand = static_cast<int>(DistanceField::kBandVoxels * DistanceField::kQuantaPerVoxel);
+    constexpr auto kBand =
+        static_cast<int>(structures::DistanceField::kBandVoxels * structures::DistanceField::kQuantaPerVoxel);
     const bool in_band =
         std::any_of(samples, samples + BrickLevel::kSamples, [](int s) { return std::abs(s) < kBand; });
-    if (!in_band) return samples[kCentreSample] < 0 ? DistanceField::kFarInside : DistanceField::kFarOutside;
+    if (!in_band)
+      return samples[kCentreSample] < 0 ? structures::DistanceField::kFarInside
+                                        : structures::DistanceField::kFarOutside;
     storage_.samples.insert(storage_.samples.end(), samples, samples + BrickLevel::kSamples);
-    return static_cast<Entry>(storage_.samples.size() / DistanceField::kBrickSamples) - 1;
+    return static_cast<Entry>(storage_.samples.size() / structures::DistanceField::kBrickSamples) - 1;
   }
 
  private:
-  FieldStorage& storage_;
+  structures::FieldStorage& storage_;
 };
 
-DistanceField assemble(FieldStorage storage, const BrickLevel& coarse, const BrickLevel* fine,
-                       std::span<const std::uint32_t> refined, ParallelWork& work) {
+structures::DistanceField assemble(structures::FieldStorage storage, const BrickLevel& coarse,
+                                   const BrickLevel* fine, std::span<const std::uint32_t> refined,
+                                   ParallelWork& work) {
   const std::vector<float> away = brickDistances(coarse, work);
   Assembler assembler(storage);
   std::size_t block = 0;
@@ -160,16 +169,17 @@ DistanceField assemble(FieldStorage storage, const BrickLevel& coarse, const Bri
     storage.index[node] = entry;
     if (entry >= 0) {
       const double at_centre = coarse.samplesOf(coarse.slot[node])[kCentreSample];
-      storage.far[node] = quantizedFar(at_centre / DistanceField::kQuantaPerVoxel, 1.0, false);
+      storage.far[node] =
+          structures::quantizedFar(at_centre / structures::DistanceField::kQuantaPerVoxel, 1.0, false);
     } else {
-      const bool inside = entry == DistanceField::kFarInside;
-      const double bound = static_cast<double>(away[node]) * DistanceField::kBrickVoxels;
-      storage.far[node] = quantizedFar(inside ? -bound : bound, 1.0, inside);
+      const bool inside = entry == structures::DistanceField::kFarInside;
+      const double bound = static_cast<double>(away[node]) * structures::DistanceField::kBrickVoxels;
+      storage.far[node] = structures::quantizedFar(inside ? -bound : bound, 1.0, inside);
     }
     if (block == refined.size() || refined[block] != node) continue;
     const auto children = static_cast<std::size_t>(fine->refinement * fine->refinement * fine->refinement);
     if (entry >= 0) {
-      storage.index[node] = DistanceField::kRefined + static_cast<Entry>(storage.index.size());
+      storage.index[node] = structures::DistanceField::kRefined + static_cast<Entry>(storage.index.size());
       for (std::size_t child = 0; child < children; ++child) {
         storage.index.push_back(assembler.entryOf(*fine, block * children + child));
       }
@@ -177,27 +187,27 @@ DistanceField assemble(FieldStorage storage, const BrickLevel& coarse, const Bri
     }
     ++block;
   }
-  return makeField(std::move(storage));
+  return structures::makeField(std::move(storage));
 }
 
 }  // namespace
 
-Result<BakedField> bakeField(std::span<const Triangle> triangles, const BakeOptions& options,
+Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, const BakeOptions& options,
                              ParallelWork& work) {
   Eigen::AlignedBox3d box;
-  for (const Triangle& t : triangles) box.extend(boxOf(t));
+  for (const structures::Triangle& t : triangles) box.extend(structures::boxOf(t));
   const Vector3 bricks = (box.sizes() / (options.voxel * BrickLevel::kVoxels)).array().ceil() + 3.0;
-  if (!(bricks.prod() <= kMaxBricks)) return tooMuch(options.voxel);
+  if (!(bricks.prod() <= kMaxBricks)) return needsTooMuchMemory(options.voxel);
 
-  FieldStorage storage = makeGrid(box, options.voxel);
+  structures::FieldStorage storage = structures::makeGrid(box, options.voxel);
   const auto& counts = storage.layout.bricks;
   BrickLevel coarse(storage.layout.p_MoFo_M, options.voxel, {counts[0], counts[1], counts[2]});
-  work.stage("sorting triangles", 0.05, 0.15);
+  work.stage("building the triangle tree", 0.05, 0.15);
   const double longest = 2.0 * BrickLevel::kVoxels * options.voxel;
   const TriangleTree tree(triangles, longest);
   work.stage("measuring distances", 0.15, 0.45);
-  if (!coarse.sampleDistances(tree, work)) return tooMuch(options.voxel);
-  work.stage("finding the outside", 0.45, 0.55);
+  if (!coarse.sampleDistances(tree, work)) return needsTooMuchMemory(options.voxel);
+  work.stage("flood fill from outside", 0.45, 0.55);
   if (!work.cancelled()) findOutside(coarse, nullptr, tree, work);
 
   std::unique_ptr<BrickLevel> fine;
@@ -205,40 +215,41 @@ Result<BakedField> bakeField(std::span<const Triangle> triangles, const BakeOpti
   if (!refined.empty() && !work.cancelled()) {
     work.stage("refining", 0.55, 0.65);
     fine = std::make_unique<BrickLevel>(coarse, options.refinement, refined);
-    if (!fine->sampleDistances(tree, work)) return tooMuch(options.voxel / options.refinement);
+    if (!fine->sampleDistances(tree, work)) return needsTooMuchMemory(options.voxel / options.refinement);
     if (!work.cancelled()) findOutside(*fine, &coarse, tree, work);
     if (!work.cancelled()) adoptFineSigns(coarse, *fine, work);
   }
   if (work.cancelled()) return fail("cancelled");
 
-  work.stage("leaving out what is inside", 0.65, 0.75);
+  work.stage("removing interior triangles", 0.65, 0.75);
   const ExposedSurface surface(triangles, coarse, fine.get(), work);
-  work.stage("measuring depths", 0.75, 0.85);
+  work.stage("measuring interior distances", 0.75, 0.85);
   BakedField baked;
   baked.surface = surface.all();
-  std::vector<Triangle> gone;
+  std::vector<structures::Triangle> hidden;
   for (std::uint32_t i = 0; i < triangles.size(); ++i) {
     if (surface.of(i).empty()) ++baked.hidden_triangles;
-    if (!surface.whole(i)) gone.push_back(triangles[i]);
+    if (!surface.whole(i)) hidden.push_back(triangles[i]);
   }
   std::array<std::optional<TriangleTree>, 2> trees;
   work.run(trees.size(), 1, [&](std::size_t i) {
-    trees[i].emplace(i == 0 || gone.empty() ? std::span<const Triangle>(gone) : baked.surface, longest);
+    trees[i].emplace(i == 0 || hidden.empty() ? std::span<const structures::Triangle>(hidden) : baked.surface,
+                     longest);
   });
   if (work.cancelled()) return fail("cancelled");
-  const auto& [gone_tree, exposed] = trees;
-  finishSamples(coarse, *exposed, *gone_tree, work);
+  const auto& [hidden_tree, exposed] = trees;
+  finishSamples(coarse, *exposed, *hidden_tree, work);
   limitSlope(coarse, nullptr, work);
   if (fine) {
-    finishSamples(*fine, *exposed, *gone_tree, work);
+    finishSamples(*fine, *exposed, *hidden_tree, work);
     limitSlope(*fine, &coarse, work);
   }
   if (work.cancelled()) return fail("cancelled");
 
   storage.layout.refinement = fine ? options.refinement : 1;
-  work.stage("packing", 0.85, 0.88);
+  work.stage("assembling the field", 0.85, 0.88);
   baked.field = assemble(std::move(storage), coarse, fine.get(), refined, work);
   return baked;
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -7,18 +7,19 @@
 #include "server/bake/bake.h"
 #include "server/structures/triangle.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 class ParallelWork;
 
 struct BakedField {
-  DistanceField field;
-  std::vector<Triangle> surface;  ///< what the outside touches
-  std::size_t hidden_triangles = 0;
+  structures::DistanceField field;
+  std::vector<structures::Triangle> surface;  ///< the exposed part of the triangles
+  std::size_t hidden_triangles = 0;           ///< entirely inside the solid
 };
 
-/// The signed distance field of a soup of triangles, magnitudes exact in the band, signs from a flood.
-[[nodiscard]] Result<BakedField> bakeField(std::span<const Triangle> triangles, const BakeOptions& options,
-                                           ParallelWork& work);
+/// The signed distance field of a triangle soup: magnitudes are exact in the band, signs come from a flood
+/// fill from outside. An error when it needs more than 3 GB.
+[[nodiscard]] Result<BakedField> bakeField(std::span<const structures::Triangle> triangles,
+                                           const BakeOptions& options, ParallelWork& work);
 
-}  // namespace tenon
+}  // namespace tenon::bake

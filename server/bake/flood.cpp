@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
@@ -15,9 +15,10 @@ bool any(const FloodMask& mask) {
   return std::any_of(mask.begin(), mask.end(), [](std::uint64_t word) { return word != 0; });
 }
 
-/// The samples beyond a face (-x +x -y +y -z +z) that are joined with those of a mask. On lower faces the
-/// links are the neighbour's.
-FloodMask through(const FloodMask& mask, int face, const Flood::Links& own, const Flood::Links& neighbour) {
+/// The samples beyond a face (-x +x -y +y -z +z) that are connected to those of a mask. For the lower faces
+/// the neighbour has the links.
+FloodMask connectedAcross(const FloodMask& mask, int face, const Flood::Links& own,
+                          const Flood::Links& neighbour) {
   FloodMask onto{};
   for (std::size_t z = 0; z < kFloodVoxels && face < 4; ++z) {
     if (face == 0) onto[z] = (mask[z] & kLowX) << 7U & neighbour.x[z];
@@ -45,7 +46,7 @@ void Flood::seed(std::size_t node, const Mask& mask) {
   if (slot < 0) {
     if (level_.free[node] != 0) return;
     if (!through_empty_) {
-      stopped_ = true;
+      blocked_ = true;
       return;
     }
     level_.free[node] = 1;
@@ -57,19 +58,19 @@ void Flood::seed(std::size_t node, const Mask& mask) {
   }
   if (queued_[node] != 0) return;
   queued_[node] = 1;
-  waiting_.push_back(node);
+  pending_.push_back(node);
 }
 
 void Flood::run() {
-  while (!waiting_.empty()) {
-    const std::size_t node = waiting_.back();
-    waiting_.pop_back();
+  while (!pending_.empty()) {
+    const std::size_t node = pending_.back();
+    pending_.pop_back();
     queued_[node] = 0;
     Mask mask;
     mask.fill(~std::uint64_t{0});
     if (const std::int32_t slot = level_.slot[node]; slot >= 0) {
-      touched_.push_back(node);
-      spread(static_cast<std::size_t>(slot));
+      reached_nodes_.push_back(node);
+      fillBrick(static_cast<std::size_t>(slot));
       mask = reached_[static_cast<std::size_t>(slot)];
     }
     const BrickLevel::Cell brick = level_.brickOf(node);
@@ -79,19 +80,19 @@ void Flood::run() {
       const std::int64_t found = level_.nodeAt(neighbour);
       if (found < 0) continue;
       const auto other = static_cast<std::size_t>(found);
-      const Mask onto = through(mask, face, linksOf(node), linksOf(other));
+      const Mask onto = connectedAcross(mask, face, linksOf(node), linksOf(other));
       if (any(onto)) seed(other, onto);
     }
   }
 }
 
-std::vector<std::size_t> Flood::takeTouched() {
-  std::sort(touched_.begin(), touched_.end());
-  touched_.erase(std::unique(touched_.begin(), touched_.end()), touched_.end());
-  return std::exchange(touched_, {});
+std::vector<std::size_t> Flood::takeReachedNodes() {
+  std::sort(reached_nodes_.begin(), reached_nodes_.end());
+  reached_nodes_.erase(std::unique(reached_nodes_.begin(), reached_nodes_.end()), reached_nodes_.end());
+  return std::exchange(reached_nodes_, {});
 }
 
-void Flood::spread(std::size_t slot) {
+void Flood::fillBrick(std::size_t slot) {
   Mask& reached = reached_[slot];
   const Links& links = links_[slot];
   for (bool changed = true; changed;) {
@@ -114,4 +115,4 @@ const Flood::Links& Flood::linksOf(std::size_t node) const {
   return slot < 0 ? all : links_[static_cast<std::size_t>(slot)];
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

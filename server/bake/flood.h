@@ -5,59 +5,61 @@
 
 #include "server/bake/brick_level.h"
 
-namespace tenon {
+namespace tenon::bake {
 
-/// Floods the free space of a level by words of 64 samples; bricks without samples are one step each.
+/// Flood fill of a level's lattice points, 64 samples per word. Bricks without samples are filled as a whole.
 ///
 /// Threads: one.
 class Flood {
  public:
   using Mask = BrickLevel::Mask;
-  /// Per own sample of a brick whether the flood passes between it and the next one along each axis, which
-  /// may be the neighbour's.
+  /// For each own sample of a brick, whether it is connected to the next one along each axis (which the
+  /// neighbouring brick may own).
   struct Links {
     Mask x{}, y{}, z{};
   };
 
-  /// Marks in `reached`, a mask for each slot. Bricks without samples are passed, and become free, only with
-  /// `through_empty`.
+  /// Marks reached samples in `reached`, one mask per slot. With `through_empty` bricks without samples are
+  /// filled and become free; otherwise they block the flood.
   Flood(BrickLevel& level, const std::vector<Links>& links, std::vector<Mask>& reached, bool through_empty);
 
+  /// Adds samples of a node to start from.
   void seed(std::size_t node, const Mask& mask);
+  /// Fills until no further sample is reached.
   void run();
 
-  /// The nodes with samples reached since the last call, in order.
-  [[nodiscard]] std::vector<std::size_t> takeTouched();
-  /// Whether a brick without samples was in the way since the last call.
-  [[nodiscard]] bool takeStopped() { return std::exchange(stopped_, false); }
+  /// The nodes with samples reached since the last call, in ascending order.
+  [[nodiscard]] std::vector<std::size_t> takeReachedNodes();
+  /// Whether a brick without samples blocked the flood since the last call.
+  [[nodiscard]] bool takeBlocked() { return std::exchange(blocked_, false); }
 
-  /// Links of a brick's samples for which joined(sample, next sample) is true.
-  template <typename Joined>
-  [[nodiscard]] static Links linksWhere(Joined&& joined);
+  /// Links of a brick's samples for which connected(sample, next sample) is true.
+  template <typename Connected>
+  [[nodiscard]] static Links linksWhere(Connected&& connected);
 
  private:
-  void spread(std::size_t slot);
+  void fillBrick(std::size_t slot);
   [[nodiscard]] const Links& linksOf(std::size_t node) const;
 
   BrickLevel& level_;
   const std::vector<Links>& links_;
   std::vector<Mask>& reached_;
   bool through_empty_;
-  bool stopped_ = false;
+  bool blocked_ = false;
   std::vector<std::uint8_t> queued_;
-  std::vector<std::size_t> waiting_;
-  std::vector<std::size_t> touched_;
+  std::vector<std::size_t> pending_;
+  std::vector<std::size_t> reached_nodes_;
 };
 
-template <typename Joined>
-Flood::Links Flood::linksWhere(Joined&& joined) {
+template <typename Connected>
+Flood::Links Flood::linksWhere(Connected&& connected) {
   constexpr int kSide = BrickLevel::kSide;
   Links links;
   for (int z = 0; z < BrickLevel::kVoxels; ++z) {
     for (int bit = 0; bit < 64; ++bit) {
       const int sample = BrickLevel::sampleIndex({bit % 8, bit / 8, z});
       const auto set = [&](Mask& mask, int next) {
-        mask[static_cast<std::size_t>(z)] |= static_cast<std::uint64_t>(joined(sample, sample + next))
+        mask[static_cast<std::size_t>(z)] |= static_cast<std::uint64_t>(connected(sample, sample + next))
                                              << static_cast<unsigned>(bit);
       };
       set(links.x, 1);
@@ -68,4 +70,4 @@ Flood::Links Flood::linksWhere(Joined&& joined) {
   return links;
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -16,13 +16,13 @@
 #include "server/bake/import_pipe.h"
 #include "server/bake/octree_file.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
 constexpr std::size_t kMaxTriangles = 60'000'000;
 
-/// Opens files of the mesh's own folder only: a mesh may name others (materials, buffers), never elsewhere.
+/// Opens only files in the mesh's own folder: a mesh may refer to others (materials, buffers) there.
 class FolderOnly : public Assimp::DefaultIOSystem {
  public:
   explicit FolderOnly(const std::filesystem::path& folder)
@@ -50,7 +50,7 @@ void limit(int resource, std::uint64_t value) {
   (void)::setrlimit(static_cast<__rlimit_resource>(resource), &both);
 }
 
-/// Memory of the sanitizers cannot be told from the file's.
+/// With sanitizers the address space cannot be limited: they reserve large parts of it.
 constexpr bool kCanLimitMemory =
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
     false;
@@ -58,16 +58,16 @@ constexpr bool kCanLimitMemory =
     true;
 #endif
 
-struct Collected {
+struct ImportedMesh {
   std::vector<float> vertices;
   std::vector<std::uint32_t> triangles;
-  std::string problem;
+  std::string error;
 };
 
-void collectMesh(const aiMesh& mesh, const aiMatrix4x4& X_MN, double unit, Collected& out) {
+void collectMesh(const aiMesh& mesh, const aiMatrix4x4& X_MN, double unit, ImportedMesh& out) {
   const auto first = static_cast<std::uint32_t>(out.vertices.size() / 3);
   if (out.triangles.size() / 3 + mesh.mNumFaces > kMaxTriangles) {
-    out.problem = "has more than 60 million triangles";
+    out.error = "has more than 60 million triangles";
     return;
   }
   for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
@@ -83,21 +83,21 @@ void collectMesh(const aiMesh& mesh, const aiMatrix4x4& X_MN, double unit, Colle
 }
 
 void collectNode(const aiScene& scene, const aiNode& node, const aiMatrix4x4& X_MP, double unit,
-                 Collected& out) {
+                 ImportedMesh& out) {
   const aiMatrix4x4 X_MN = X_MP * node.mTransformation;
-  for (unsigned i = 0; i < node.mNumMeshes && out.problem.empty(); ++i) {
+  for (unsigned i = 0; i < node.mNumMeshes && out.error.empty(); ++i) {
     collectMesh(*scene.mMeshes[node.mMeshes[i]], X_MN, unit, out);
   }
-  for (unsigned i = 0; i < node.mNumChildren && out.problem.empty(); ++i) {
+  for (unsigned i = 0; i < node.mNumChildren && out.error.empty(); ++i) {
     collectNode(scene, *node.mChildren[i], X_MN, unit, out);
   }
 }
 
-Collected importOctree(const std::string& file) {
-  Collected out;
-  const auto corners = readOctreeSkin(file);
+ImportedMesh importOctree(const std::string& file) {
+  ImportedMesh out;
+  const auto corners = readOctreeSurface(file);
   if (!corners) {
-    out.problem = corners.error().what;
+    out.error = corners.error().what;
     return out;
   }
   for (const Vector3f& p : *corners) {
@@ -107,9 +107,9 @@ Collected importOctree(const std::string& file) {
   return out;
 }
 
-Collected importFile(const std::string& file, double unit) {
+ImportedMesh importFile(const std::string& file, double unit) {
   if (isOctree(file)) return importOctree(file);
-  Collected out;
+  ImportedMesh out;
   Assimp::Importer importer;
   importer.SetIOHandler(new FolderOnly(std::filesystem::path(file).parent_path().empty()
                                            ? std::filesystem::path(".")
@@ -117,7 +117,7 @@ Collected importFile(const std::string& file, double unit) {
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   const aiScene* scene = importer.ReadFile(file, aiProcess_Triangulate | aiProcess_SortByPType);
   if (scene == nullptr) {
-    out.problem = importer.GetErrorString();
+    out.error = importer.GetErrorString();
     return out;
   }
   if (scene->mRootNode != nullptr) collectNode(*scene, *scene->mRootNode, aiMatrix4x4(), unit, out);
@@ -144,27 +144,27 @@ int runImportChild(int argc, const char* const* argv) {
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_CPU, std::strtoull(argv[2], nullptr, 10));
   if (kCanLimitMemory) limit(RLIMIT_AS, std::strtoull(argv[3], nullptr, 10));
-  Collected mesh;
+  ImportedMesh mesh;
   try {
     mesh = importFile(file, unit);
   } catch (const std::bad_alloc&) {
     mesh = {};
-    mesh.problem = "needs more memory than a file of its size may";
-  } catch (const std::exception& problem) {
+    mesh.error = "reading it needs more memory than allowed for a file of its size";
+  } catch (const std::exception& error) {
     mesh = {};
-    mesh.problem = problem.what();
+    mesh.error = error.what();
   }
   ImportHeader header;
-  header.failed = mesh.problem.empty() ? 0 : 1;
+  header.failed = mesh.error.empty() ? 0 : 1;
   header.vertices = mesh.vertices.size() / 3;
   header.triangles = mesh.triangles.size() / 3;
-  header.text_bytes = mesh.problem.size();
+  header.text_bytes = mesh.error.size();
   const bool done = writeAll(&header, sizeof header) &&
                     writeAll(mesh.vertices.data(), mesh.vertices.size() * sizeof(float)) &&
                     writeAll(mesh.triangles.data(), mesh.triangles.size() * sizeof(std::uint32_t)) &&
-                    writeAll(mesh.problem.data(), mesh.problem.size());
-  // static destructors of other libraries have nothing left to do here
+                    writeAll(mesh.error.data(), mesh.error.size());
+  // _exit skips static destructors of other libraries, which are not needed
   ::_exit(done ? 0 : 3);
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <filesystem>
 
-namespace tenon {
+namespace tenon::bake {
 
-/// What the importing child writes into the memory file that its parent gave it: this, then 3 floats a
-/// vertex, 3 numbers a triangle, and text (notes, or the reason of a failure).
+/// Header of the importing child's result in the memory file that its parent provides. It is followed by 3
+/// floats [m] per vertex, 3 vertex indices per triangle, and text (the reason of a failure).
 struct ImportHeader {
   static constexpr std::uint64_t kMagic = 0x544E2D4D45534831ULL;
   std::uint64_t magic = kMagic;
@@ -16,17 +16,17 @@ struct ImportHeader {
   std::uint64_t text_bytes = 0;
 };
 
-/// Limits that the child puts on itself before it touches the file.
+/// Limits that the child sets for itself (setrlimit) before it opens the file.
 struct ImportLimits {
-  double cpu_seconds = 0.0;        ///< 0: by the size of the file
-  std::uint64_t memory_bytes = 0;  ///< 0: by the size of the file
+  double cpu_seconds = 0.0;  ///< [s]
+  std::uint64_t memory_bytes = 0;
 };
 
-/// The child's whole life: `tenon-bake --import-child FILE UNIT CPU_SECONDS MEMORY_BYTES`, result to
-/// descriptor 3. Gives the exit code.
+/// Main function of the child, `tenon-bake --import-child FILE UNIT CPU_SECONDS MEMORY_BYTES`; writes the
+/// result to descriptor 3. Returns an exit code only for wrong arguments, otherwise it ends the process.
 int runImportChild(int argc, const char* const* argv);
 
 inline constexpr const char* kImportChildFlag = "--import-child";
 inline constexpr int kImportDescriptor = 3;
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-namespace tenon {
+namespace tenon::bake {
 
 Result<double> parseUnit(std::string_view text) {
   constexpr std::array<std::pair<std::string_view, double>, 5> kUnits{
@@ -14,22 +14,22 @@ Result<double> parseUnit(std::string_view text) {
   for (const auto& [name, metres] : kUnits) {
     if (text == name) return metres;
   }
-  return fail("'" + std::string(text) + "' is no unit of length (mm, cm, m, in)");
+  return fail("'" + std::string(text) + "' is not a unit of length (mm, cm, m, in)");
 }
 
 Result<double> parseLength(std::string_view text) {
   double number = 0.0;
   const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (problem != std::errc{} || !std::isfinite(number)) {
-    return fail("'" + std::string(text) + "' is no length (like 3mm or 0.003m)");
+    return fail("'" + std::string(text) + "' is not a length (like 3mm or 0.003m)");
   }
   std::string_view unit = text.substr(static_cast<std::size_t>(end - text.data()));
   while (!unit.empty() && unit.front() == ' ') unit.remove_prefix(1);
   if (unit.empty()) return number;
   const auto metres = parseUnit(unit);
-  if (!metres) return fail("'" + std::string(text) + "' is no length: " + metres.error().what);
-  // 3 mm is the number nearest to 0.003, as if it had been written so
+  if (!metres) return fail("'" + std::string(text) + "' is not a length: " + metres.error().what);
+  // dividing gives the double nearest to the decimal value: 3 mm equals 0.003 m exactly
   return *metres < 1.0 && unit != "in" ? number / std::round(1.0 / *metres) : number * *metres;
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

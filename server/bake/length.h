@@ -4,12 +4,13 @@
 
 #include "idl/types/result.h"
 
-namespace tenon {
+namespace tenon::bake {
 
-/// A length as a person writes it: `3mm`, `0.5 mm`, `0.003m`, `2 cm`, `1 in`; a bare number is metres.
+/// [m] A length with its unit: `3mm`, `0.5 mm`, `0.003m`, `2 cm`, `1 in`; a bare number is in metres. Text
+/// that is no finite length is an error that quotes it.
 [[nodiscard]] Result<double> parseLength(std::string_view text);
 
-/// The length of one `mm`, `cm`, `m` or `in` [m].
+/// [m] The length of one `um`, `mm`, `cm`, `m` or `in`.
 [[nodiscard]] Result<double> parseUnit(std::string_view text);
 
-}  // namespace tenon
+}  // namespace tenon::bake

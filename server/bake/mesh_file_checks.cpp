@@ -7,7 +7,7 @@
 #include <cstring>
 #include <fstream>
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
@@ -31,7 +31,7 @@ std::optional<std::string> problemInAsciiStl(const std::string& text) {
   for (std::size_t at = text.find("vertex"); at != std::string::npos; at = text.find("vertex", at + 6)) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
     const std::string line = text.substr(at, end - at);
-    // bytes of a binary file that happens to say "solid" are no coordinates
+    // a binary STL may also begin with "solid": a line with other characters is no line of coordinates
     if (line.find_first_not_of("vertex 0123456789+-.,eE\t\r") != std::string::npos) return {};
     if (line.find(',') != std::string::npos)
       return "numbers are written with a decimal comma: '" + line + "'";
@@ -55,7 +55,7 @@ std::optional<std::string> problemInGltf(const std::string& json) {
       next = end + std::strspn(end, " \t\r\n,");
     }
     if (count == 4 && !(std::abs(squared - 1.0) < 0.02)) {
-      return "a node's rotation is no unit quaternion (length " + std::to_string(std::sqrt(squared)) + ")";
+      return "a node's rotation is not a unit quaternion (length " + std::to_string(std::sqrt(squared)) + ")";
     }
   }
   return {};
@@ -64,11 +64,11 @@ std::optional<std::string> problemInGltf(const std::string& json) {
 }  // namespace
 
 std::optional<std::string> problemInMeshFile(const std::filesystem::path& file) {
-  constexpr std::size_t kLooked = 16U << 20U;
+  constexpr std::size_t kCheckedBytes = 16U << 20U;
   const std::string extension = lowerExtension(file);
-  if (extension == ".stl") return problemInAsciiStl(beginning(file, kLooked));
-  if (extension == ".gltf" || extension == ".glb") return problemInGltf(beginning(file, kLooked));
+  if (extension == ".stl") return problemInAsciiStl(beginning(file, kCheckedBytes));
+  if (extension == ".gltf" || extension == ".glb") return problemInGltf(beginning(file, kCheckedBytes));
   return {};
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

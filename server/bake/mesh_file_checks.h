@@ -4,10 +4,10 @@
 #include <optional>
 #include <string>
 
-namespace tenon {
+namespace tenon::bake {
 
-/// What is wrong with a mesh file that the importer would swallow and turn into nonsense: decimal commas in
-/// an ASCII STL, a glTF rotation that is none. Nothing when it looks right.
+/// An error in a mesh file that the importer would accept and misread: decimal commas in an ASCII STL, a glTF
+/// rotation that is not a unit quaternion. Empty when none is found in the first 16 MiB.
 [[nodiscard]] std::optional<std::string> problemInMeshFile(const std::filesystem::path& file);
 
-}  // namespace tenon
+}  // namespace tenon::bake

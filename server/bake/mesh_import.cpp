@@ -21,16 +21,16 @@
 
 extern char** environ;
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
-constexpr double kLargest = 1e5;    // [m] of any coordinate
-constexpr double kSmallest = 1e-6;  // [m] of the whole mesh
-// More broken triangles than this share and the rest is not to be trusted.
-constexpr double kMostBroken = 0.1;
+constexpr double kMaxCoordinate = 1e5;  // [m]
+constexpr double kMinSize = 1e-6;       // [m] of the whole mesh
+// A mesh with a larger fraction of invalid triangles is refused.
+constexpr double kMaxInvalid = 0.1;
 
-/// A descriptor that closes itself.
+/// A file descriptor, closed by the destructor.
 class Descriptor {
  public:
   explicit Descriptor(int value) : value_(value) {}
@@ -45,7 +45,8 @@ class Descriptor {
   int value_;
 };
 
-/// The program that imports: named by TENON_BAKE, or beside the running one.
+/// The importing program: named by the environment variable TENON_BAKE, or tenon-bake in the folder of the
+/// running program.
 std::filesystem::path importerProgram() {
   if (const char* named = std::getenv("TENON_BAKE"); named != nullptr && *named != '\0') return named;
   std::error_code error;
@@ -54,13 +55,12 @@ std::filesystem::path importerProgram() {
 
 ImportLimits limitsFor(const std::filesystem::path& file, std::uint64_t file_bytes) {
   const double megabytes = static_cast<double>(file_bytes) / 1e6;
-  // an octree keeps eight leaves in two bytes
+  // an octree file stores eight leaves in two bytes
   const std::uint64_t growth = isOctree(file) ? 512 : 64;
   return {10.0 + std::ceil(megabytes), (768ULL << 20U) + growth * file_bytes};
 }
 
-/// Waits for the child and ends it when its time is over. Gives its wait status, or -1 when it had to be
-/// ended.
+/// Waits for the child and kills it after `seconds` [s]. Returns its wait status, or -1 when it was killed.
 int waitFor(pid_t child, double seconds) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
   int status = 0;
@@ -110,7 +110,7 @@ std::string readText(int memory, std::uint64_t offset, std::uint64_t bytes) {
   std::string text(std::min<std::uint64_t>(bytes, 400), '\0');
   const ssize_t got = ::pread(memory, text.data(), text.size(), static_cast<off_t>(offset));
   text.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
-  // one sentence on one line
+  // control characters, so that the message is one line
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < 32; }, ' ');
   while (!text.empty() && text.back() == ' ') text.pop_back();
@@ -129,19 +129,19 @@ bool readArray(int memory, std::uint64_t offset, void* to, std::uint64_t bytes) 
   return true;
 }
 
-/// What the child left, taken only if its sizes add up and every index has a vertex.
+/// The child's result; an error unless its sizes are consistent and every index is in range.
 Result<TriangleMesh> readImported(const std::string& name, int memory) {
   struct stat status {};
   ImportHeader header;
   if (::fstat(memory, &status) != 0 || !readArray(memory, 0, &header, sizeof header) ||
       header.magic != ImportHeader::kMagic) {
-    return fail(name + ": the importer gave no answer");
+    return fail(name + ": the importer returned no result");
   }
   const auto size = static_cast<std::uint64_t>(status.st_size);
   constexpr std::uint64_t kMost = 1ULL << 32U;
   if (header.vertices >= kMost || header.triangles >= kMost || header.text_bytes >= kMost ||
       sizeof header + 12 * header.vertices + 12 * header.triangles + header.text_bytes != size) {
-    return fail(name + ": the importer gave an answer that does not add up");
+    return fail(name + ": the importer returned an inconsistent result");
   }
   const std::uint64_t text_at = size - header.text_bytes;
   if (header.failed != 0) return fail(name + ": " + readText(memory, text_at, header.text_bytes));
@@ -151,12 +151,11 @@ Result<TriangleMesh> readImported(const std::string& name, int memory) {
   if (!readArray(memory, sizeof header, mesh.vertices.data(), 12 * header.vertices) ||
       !readArray(memory, sizeof header + 12 * header.vertices, mesh.triangles.data(),
                  12 * header.triangles)) {
-    return fail(name + ": the importer's answer cannot be read");
+    return fail(name + ": the importer's result cannot be read");
   }
   for (const auto& triangle : mesh.triangles) {
     for (const std::uint32_t corner : triangle) {
-      if (corner >= mesh.vertices.size())
-        return fail(name + ": a triangle names a corner that does not exist");
+      if (corner >= mesh.vertices.size()) return fail(name + ": a triangle has a vertex index out of range");
     }
   }
   return mesh;
@@ -171,25 +170,24 @@ double signedVolume(const TriangleMesh& mesh) {
   return volume;
 }
 
-/// Leaves out triangles without meaning, and refuses the mesh when too little is left or it has no sensible
-/// size.
+/// Skips triangles that are not finite; an error when too few remain or the size is not plausible.
 Result<TriangleMesh> checked(const std::string& name, TriangleMesh mesh) {
   const std::size_t before = mesh.triangles.size();
-  if (before == 0) return fail(name + ": no triangles in it");
+  if (before == 0) return fail(name + ": has no triangles");
   std::erase_if(mesh.triangles, [&](const auto& triangle) {
     return !std::all_of(triangle.begin(), triangle.end(),
                         [&](std::uint32_t corner) { return mesh.vertices[corner].allFinite(); });
   });
-  const std::size_t broken = before - mesh.triangles.size();
-  if (static_cast<double>(broken) > kMostBroken * static_cast<double>(before)) {
-    return fail(name + ": " + std::to_string(broken) + " of " + std::to_string(before) +
-                " triangles have corners that are not numbers");
+  const std::size_t invalid = before - mesh.triangles.size();
+  if (static_cast<double>(invalid) > kMaxInvalid * static_cast<double>(before)) {
+    return fail(name + ": " + std::to_string(invalid) + " of " + std::to_string(before) +
+                " triangles have vertices that are not finite");
   }
-  if (broken > 0) {
-    mesh.notes.push_back(name + ": " + std::to_string(broken) +
-                         " triangles have corners that are not numbers and were left out.");
+  if (invalid > 0) {
+    mesh.notes.push_back(name + ": " + std::to_string(invalid) +
+                         " triangles have vertices that are not finite and were skipped.");
   }
-  // corners that no triangle uses any more may still be no numbers
+  // unused vertices may still not be finite
   for (Vector3f& p : mesh.vertices) {
     if (!p.allFinite()) p.setZero();
   }
@@ -202,14 +200,15 @@ Result<TriangleMesh> checked(const std::string& name, TriangleMesh mesh) {
     box.extend(pa).extend(pb).extend(pc);
     any_area = any_area || (pb - pa).cross(pc - pa).norm() > 0.0;
   }
-  if (box.min().cwiseAbs().maxCoeff() > kLargest || box.max().cwiseAbs().maxCoeff() > kLargest) {
-    return fail(name + ": reaches further than 100 km; is the unit right?");
+  if (box.min().cwiseAbs().maxCoeff() > kMaxCoordinate || box.max().cwiseAbs().maxCoeff() > kMaxCoordinate) {
+    return fail(name + ": has coordinates of more than 100 km; is the unit right?");
   }
-  if (box.diagonal().norm() < kSmallest)
+  if (box.diagonal().norm() < kMinSize)
     return fail(name + ": is smaller than a micrometre; is the unit right?");
   if (!any_area) return fail(name + ": no triangle has an area");
   if (signedVolume(mesh) < 0.0) {
-    mesh.notes.push_back(name + ": winds inside out; winding is not used, so nothing is lost.");
+    mesh.notes.push_back(name +
+                         ": its normals point inwards; this has no effect, since winding is not used.");
   }
   return mesh;
 }
@@ -222,32 +221,32 @@ Result<TriangleMesh> importMesh(const std::filesystem::path& file, double unit) 
   if (!std::filesystem::is_regular_file(file, error)) return fail(name + ": no such file");
   const auto bytes = std::filesystem::file_size(file, error);
   if (error || bytes == 0) return fail(name + ": is empty");
-  if (!(unit > 0.0) || !std::isfinite(unit)) return fail(name + ": the unit must be a length of more than 0");
+  if (!(unit > 0.0) || !std::isfinite(unit)) return fail(name + ": the unit must be a length greater than 0");
   if (const auto problem = problemInMeshFile(file)) return fail(name + ": " + *problem);
 
-  // above descriptor 3, so that the child's copy is not the same number and loses close-on-exec
+  // a descriptor above 3, so that dup2 onto 3 makes a copy without close-on-exec
   const Descriptor low(::memfd_create("tenon-import", MFD_CLOEXEC));
   const Descriptor memory(::fcntl(low.get(), F_DUPFD_CLOEXEC, 16));
-  if (memory.get() < 0) return fail(name + ": no memory for the importer's answer");
+  if (memory.get() < 0) return fail(name + ": cannot create a memory file for the importer");
   const ImportLimits limits = limitsFor(file, bytes);
   const auto child = startImporter(file, unit, limits, memory.get());
   if (!child) return fail(name + ": " + child.error().what);
-  // the limit is on the child's own time; others may be using the processors
+  // the child limits its own processor time; other processes may delay it
   const int status = waitFor(*child, 4.0 * limits.cpu_seconds);
   if (status == -1 || (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) ||
       (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)) {
-    return fail(name + ": reading it took too long; the file is probably broken");
+    return fail(name + ": reading it took too long; the file is probably damaged");
   }
   if (WIFSIGNALED(status)) {
     return fail(name + ": the importer crashed on it (" + strsignal(WTERMSIG(status)) +
-                "); the file is broken");
+                "); the file is damaged");
   }
   if (WEXITSTATUS(status) != 0) {
-    return fail(name + ": the importer gave up (exit code " + std::to_string(WEXITSTATUS(status)) + ")");
+    return fail(name + ": the importer failed (exit code " + std::to_string(WEXITSTATUS(status)) + ")");
   }
   auto mesh = readImported(name, memory.get());
   if (!mesh) return mesh;
   return checked(name, std::move(*mesh));
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -8,29 +8,29 @@
 #include "server/bake/parallel.h"
 #include "server/bake/triangle_tree.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
 using Cell = BrickLevel::Cell;
 using Mask = BrickLevel::Mask;
 constexpr int kGapVoxels = BrickLevel::kVoxels;
-// Rays by which a part is asked, at most; three quarters of them say that it is in a solid. Between sheets,
-// which have no inside, they are even odds.
+// Rays per region, and how many of them must have odd crossings for a solid. Between sheets, which have no
+// inside, odd and even are about equally likely.
 constexpr std::size_t kRays = 24;
 constexpr std::size_t kRaysForSolid = 18;
-// Sum of distances at which the balls of neighbours overlap, in spite of rounding [quanta].
-constexpr int kOverlap = static_cast<int>(DistanceField::kQuantaPerVoxel) + 2;
-// Nearer to the surface than this a sample may be on either side of it, whatever it is called [quanta].
-constexpr int kSure = 32;
+// [quanta] Sum of distances above which the empty balls of neighbouring samples overlap in spite of rounding.
+constexpr int kOverlap = static_cast<int>(structures::DistanceField::kQuantaPerVoxel) + 2;
+// [quanta] Samples nearer to the surface than this are not used: rounding leaves their side uncertain.
+constexpr int kMinDistance = 32;
 
-/// Samples that hang together, by node.
-struct Part {
+/// A connected set of samples, by node.
+struct GapRegion {
   std::vector<std::pair<std::size_t, Mask>> bricks;
   bool outside = false;
 };
 
-/// Spread over the sphere; no face or edge of what people make is likely to be parallel to one.
+/// Directions spread over the sphere, unlikely to be parallel to a face or an edge of a manufactured part.
 std::vector<Vector3> directions() {
   std::vector<Vector3> all;
   Eigen::Vector2d around(0.6391, 0.7691);
@@ -52,7 +52,7 @@ class GapOpener {
         work_(work),
         directions_(directions()),
         links_(level.outside.size()),
-        doors_(level.nodes()),
+        seeds_(level.nodes()),
         reached_(level.outside.size()),
         taken_(level.outside.size()) {
     work.run(level.nodes(), 256, [&](std::size_t node) {
@@ -61,12 +61,12 @@ class GapOpener {
   }
 
   std::vector<std::uint8_t> run() {
-    std::vector<Part> parts = findParts();
-    work_.run(parts.size(), 8, [&](std::size_t i) { parts[i].outside = !insideSolid(parts[i]); });
+    std::vector<GapRegion> regions = findRegions();
+    work_.run(regions.size(), 8, [&](std::size_t i) { regions[i].outside = !insideSolid(regions[i]); });
     std::vector<std::uint8_t> changed(level_.nodes(), 0);
-    for (const Part& part : parts) {
-      if (!part.outside) continue;
-      for (const auto& [node, mask] : part.bricks) {
+    for (const GapRegion& region : regions) {
+      if (!region.outside) continue;
+      for (const auto& [node, mask] : region.bricks) {
         const auto slot = static_cast<std::size_t>(level_.slot[node]);
         for (std::size_t z = 0; z < kGapVoxels; ++z) level_.reached[slot][z] |= mask[z];
         changed[node] = 1;
@@ -76,82 +76,85 @@ class GapOpener {
   }
 
  private:
-  /// Finds the pairs whose balls overlap: both not outside (links), or one of them (doors).
+  /// Finds the neighbouring samples whose empty balls overlap: both not outside (links), or one of them
+  /// (seeds).
   void readBrick(std::size_t node) {
     const auto slot = static_cast<std::size_t>(level_.slot[node]);
     const BrickLevel::SampleBits& outside = level_.outside[slot];
     if (outside.all()) return;
     const std::int16_t* samples = level_.samplesOf(level_.slot[node]);
     links_[slot] = Flood::linksWhere([&](int a, int b) {
-      if (samples[a] + samples[b] <= kOverlap || std::min(samples[a], samples[b]) < kSure) return false;
+      if (samples[a] + samples[b] <= kOverlap || std::min(samples[a], samples[b]) < kMinDistance)
+        return false;
       const bool a_outside = outside[static_cast<std::size_t>(a)];
       const bool b_outside = outside[static_cast<std::size_t>(b)];
       if (a_outside != b_outside) {
-        doors_[node].push_back(level_.brickOf(node) * kGapVoxels +
+        seeds_[node].push_back(level_.brickOf(node) * kGapVoxels +
                                BrickLevel::cellOfSample(a_outside ? b : a));
       }
       return !a_outside && !b_outside;
     });
   }
 
-  [[nodiscard]] std::vector<Part> findParts() {
-    std::vector<Part> parts;
+  [[nodiscard]] std::vector<GapRegion> findRegions() {
+    std::vector<GapRegion> regions;
     Flood flood(level_, links_, reached_, false);
-    for (const std::vector<Cell>& doors : doors_) {
+    for (const std::vector<Cell>& seeds : seeds_) {
       if (work_.cancelled()) break;
-      for (const Cell& door : doors) {
-        const std::int64_t node = level_.nodeAt(door / kGapVoxels);
+      for (const Cell& seed : seeds) {
+        const std::int64_t node = level_.nodeAt(seed / kGapVoxels);
         if (node < 0) continue;
-        const Cell in_brick = door - door / kGapVoxels * kGapVoxels;
+        const Cell in_brick = seed - seed / kGapVoxels * kGapVoxels;
         Mask first{};
         first[static_cast<std::size_t>(in_brick.z())] =
             std::uint64_t{1} << static_cast<unsigned>(in_brick.y() * kGapVoxels + in_brick.x());
         flood.seed(static_cast<std::size_t>(node), first);
         flood.run();
-        Part part = takePart(flood.takeTouched());
-        if (!flood.takeStopped() && !part.bricks.empty()) parts.push_back(std::move(part));
+        GapRegion region = takeRegion(flood.takeReachedNodes());
+        if (!flood.takeBlocked() && !region.bricks.empty()) regions.push_back(std::move(region));
       }
     }
-    return parts;
+    return regions;
   }
 
-  [[nodiscard]] Part takePart(const std::vector<std::size_t>& nodes) {
-    Part part;
+  [[nodiscard]] GapRegion takeRegion(const std::vector<std::size_t>& nodes) {
+    GapRegion region;
     for (const std::size_t node : nodes) {
       const auto slot = static_cast<std::size_t>(level_.slot[node]);
       Mask fresh{};
       for (std::size_t z = 0; z < kGapVoxels; ++z) fresh[z] = reached_[slot][z] & ~taken_[slot][z];
       taken_[slot] = reached_[slot];
-      part.bricks.emplace_back(node, fresh);
+      region.bricks.emplace_back(node, fresh);
     }
-    return part;
+    return region;
   }
 
-  /// Samples spread evenly over a part, as many as there are rays.
-  [[nodiscard]] std::vector<Vector3> placesIn(const Part& part) const {
+  /// The origins of the rays: kRays samples spread evenly over a region.
+  [[nodiscard]] std::vector<Vector3> rayOrigins(const GapRegion& region) const {
     std::size_t count = 0;
-    for (const auto& [node, mask] : part.bricks) {
+    for (const auto& [node, mask] : region.bricks) {
       for (const std::uint64_t word : mask) count += static_cast<std::size_t>(std::popcount(word));
     }
-    std::vector<Vector3> places;
+    std::vector<Vector3> origins;
     std::size_t number = 0;
-    for (const auto& [node, mask] : part.bricks) {
+    for (const auto& [node, mask] : region.bricks) {
       const Cell corner = level_.brickOf(node) * kGapVoxels;
       for (int z = 0; z < kGapVoxels; ++z) {
         for (std::uint64_t word = mask[static_cast<std::size_t>(z)]; word != 0; word &= word - 1) {
           const int bit = std::countr_zero(word);
           const Cell lattice = corner + Cell(bit % kGapVoxels, bit / kGapVoxels, z);
-          for (++number; places.size() * count < number * kRays;) places.push_back(level_.position(lattice));
+          for (++number; origins.size() * count < number * kRays;)
+            origins.push_back(level_.position(lattice));
         }
       }
     }
-    return places;
+    return origins;
   }
 
-  [[nodiscard]] bool insideSolid(const Part& part) const {
+  [[nodiscard]] bool insideSolid(const GapRegion& region) const {
     std::size_t odd = 0;
     std::size_t even = 0;
-    for (const Vector3& p : placesIn(part)) {
+    for (const Vector3& p : rayOrigins(region)) {
       (tree_.oddCrossings(p, directions_[odd + even]) ? odd : even) += 1;
       if (even > kRays - kRaysForSolid) return false;
     }
@@ -163,9 +166,9 @@ class GapOpener {
   ParallelWork& work_;
   const std::vector<Vector3> directions_;
   std::vector<Flood::Links> links_;       // per slot
-  std::vector<std::vector<Cell>> doors_;  // per node: lattice points next to the outside
-  std::vector<Mask> reached_;             // per slot, through doors
-  std::vector<Mask> taken_;               // per slot, into a part
+  std::vector<std::vector<Cell>> seeds_;  // per node: lattice points next to the outside
+  std::vector<Mask> reached_;             // per slot: reached from seeds
+  std::vector<Mask> taken_;               // per slot: already in a region
 };
 
 }  // namespace
@@ -174,4 +177,4 @@ std::vector<std::uint8_t> openNarrowGaps(BrickLevel& level, const TriangleTree& 
   return GapOpener(level, tree, work).run();
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -4,20 +4,20 @@
 
 #include "server/bake/brick_level.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 class ParallelWork;
 class TriangleTree;
 
-/// Opens the gaps that a flood with a wide sigma leaves closed.
+/// Opens narrow gaps, which the flood fill of findOutside does not enter.
 ///
-/// Two samples whose empty balls overlap are on the same side of every surface. So what hangs together with
-/// the outside through such pairs is outside too, unless triangles are missing. Therefore each part that
-/// would be won is asked, by rays, whether it is in a solid: crossings are odd there, whichever way triangles
-/// wind. A part that reaches into a chamber too large for the band remains closed.
+/// Two samples whose empty balls overlap are on the same side of every surface. So a region connected with
+/// the outside through such pairs is outside too, unless triangles are missing. Therefore rays are cast from
+/// each such region: in a solid their number of crossings is odd, whatever the winding. A region that extends
+/// into bricks without samples (a chamber larger than the band) remains closed.
 ///
-/// Gives the nodes where samples became outside; they are marked as reached as well.
+/// Returns 1 for each node where samples became outside; these are also marked in `level.reached`.
 [[nodiscard]] std::vector<std::uint8_t> openNarrowGaps(BrickLevel& level, const TriangleTree& tree,
                                                        ParallelWork& work);
 
-}  // namespace tenon
+}  // namespace tenon::bake

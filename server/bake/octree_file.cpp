@@ -5,13 +5,13 @@
 #include <memory>
 #include <string>
 
-#define OCTOMAP_NODEBUGOUT  // its templates would talk on stderr
+#define OCTOMAP_NODEBUGOUT  // its templates print on stderr otherwise
 #include <octomap/OcTree.h>
 #include <unistd.h>
 
 #include "server/bake/voxel_set.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
@@ -19,21 +19,22 @@ constexpr unsigned kDepth = 16;  // of every OctoMap
 constexpr std::size_t kMaxCorners = 180'000'000;
 constexpr int kKeys = 1 << kDepth;
 
-/// What the header promises: OctoMap itself goes on after a file that ends too early.
-Result<std::size_t> promisedNodes(std::istream& in) {
+/// The number of nodes according to the header: OctoMap itself does not report a truncated file.
+Result<std::size_t> statedNodes(std::istream& in) {
   std::string line;
-  if (!std::getline(in, line) || line.rfind("# Octomap OcTree", 0) != 0) return fail("is no OctoMap file");
+  if (!std::getline(in, line) || line.rfind("# Octomap OcTree", 0) != 0)
+    return fail("is not an OctoMap file");
   while (std::getline(in, line) && line != "data") {
     if (line.rfind("size ", 0) == 0)
       return static_cast<std::size_t>(std::strtoull(line.c_str() + 5, nullptr, 10));
   }
-  return fail("is an OctoMap file without a size");
+  return fail("has no `size` line in its header");
 }
 
-/// Walks the faces between what is occupied and what is not.
-class Skin {
+/// Collects the faces between occupied and other cells.
+class OctreeSurface {
  public:
-  explicit Skin(const octomap::OcTree& tree) : tree_(tree) {}
+  explicit OctreeSurface(const octomap::OcTree& tree) : tree_(tree) {}
 
   Result<std::vector<Vector3f>> all() {
     for (auto leaf = tree_.begin_leafs(); leaf != tree_.end_leafs(); ++leaf) {
@@ -42,14 +43,15 @@ class Skin {
       const Eigen::Vector3i low(key[0], key[1], key[2]);
       const int size = 1 << (kDepth - leaf.getDepth());
       for (int face = 0; face < 6; ++face) addFace(low, size, face);
-      if (corners_.size() > kMaxCorners) return fail("has more than 60 million triangles of skin");
+      if (corners_.size() > kMaxCorners) return fail("its surface has more than 60 million triangles");
     }
-    if (corners_.empty()) return fail("nothing in it is occupied");
+    if (corners_.empty()) return fail("has no occupied cell");
     return std::move(corners_);
   }
 
  private:
-  /// The face of a cube of keys where nothing occupied is behind it, in parts where something is.
+  /// Adds a face of a cube of keys where the cell behind it is not occupied; subdivides it where the cells
+  /// behind are smaller.
   void addFace(const Eigen::Vector3i& low, int size, int face) {
     const int axis = face / 2;
     Eigen::Vector3i behind = low;
@@ -101,10 +103,10 @@ bool isOctree(const std::filesystem::path& file) {
   return extension == ".bt" || extension == ".ot";
 }
 
-Result<std::vector<Vector3f>> readOctreeSkin(const std::filesystem::path& file) {
+Result<std::vector<Vector3f>> readOctreeSurface(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  const auto promised = promisedNodes(in);
-  if (!promised) return tl::unexpected(promised.error());
+  const auto stated = statedNodes(in);
+  if (!stated) return tl::unexpected(stated.error());
   in.clear();
   in.seekg(0);
   std::unique_ptr<octomap::OcTree> tree;
@@ -119,11 +121,11 @@ Result<std::vector<Vector3f>> readOctreeSkin(const std::filesystem::path& file) 
     }
   }
   if (!tree) return fail("cannot be read as an OctoMap of kind OcTree");
-  if (in.fail() || tree->calcNumNodes() != *promised)
-    return fail("is cut short: its header promises more nodes");
+  if (in.fail() || tree->calcNumNodes() != *stated)
+    return fail("is truncated: its header states another number of nodes");
   if (!(tree->getResolution() > 0.0) || !std::isfinite(tree->getResolution()))
-    return fail("has cells without a size");
-  return Skin(*tree).all();
+    return fail("has no valid resolution");
+  return OctreeSurface(*tree).all();
 }
 
 Result<void> writeOctree(const std::filesystem::path& file, const VoxelSet& cells) {
@@ -135,19 +137,19 @@ Result<void> writeOctree(const std::filesystem::path& file, const VoxelSet& cell
     const Eigen::Array3i key = cell.array() + kHalf;
     fits = fits && (key >= 0).all() && (key < kKeys).all();
     if (!fits) return;
-    const octomap::OcTreeKey place(static_cast<octomap::key_type>(key.x()),
-                                   static_cast<octomap::key_type>(key.y()),
-                                   static_cast<octomap::key_type>(key.z()));
-    tree.setNodeValue(place, tree.getClampingThresMaxLog(), true);
+    const octomap::OcTreeKey octree_key(static_cast<octomap::key_type>(key.x()),
+                                        static_cast<octomap::key_type>(key.y()),
+                                        static_cast<octomap::key_type>(key.z()));
+    tree.setNodeValue(octree_key, tree.getClampingThresMaxLog(), true);
   });
   if (!fits)
     return fail(file.string() +
-                ": an octree holds 32768 cells on each side of the origin; choose larger ones");
+                ": an octree has at most 32768 cells on each side of the origin; choose larger ones");
   tree.updateInnerOccupancy();
   tree.prune();
   const std::filesystem::path part = file.string() + ".part" + std::to_string(::getpid());
   std::ofstream out(part, std::ios::binary | std::ios::trunc);
-  // OctoMap's own write() is compiled in its library and talks on stderr
+  // not OctoMap's write(), which prints on stderr
   const bool binary = file.extension() == ".bt";
   out << "# Octomap OcTree " << (binary ? "binary file" : "file") << "\n"
       << "# (feel free to add / change comments, but leave the first line as it is!)\n#\n"
@@ -169,4 +171,4 @@ Result<void> writeOctree(const std::filesystem::path& file, const VoxelSet& cell
   return {};
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

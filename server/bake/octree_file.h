@@ -6,21 +6,21 @@
 #include "idl/types/result.h"
 #include "idl/types/spatial.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 class VoxelSet;
 
-/// Whether a file's name says that it is an OctoMap: `.bt` (free or occupied) or `.ot` (with probabilities).
+/// Whether the extension is that of an OctoMap: `.bt` (free or occupied) or `.ot` (occupancy probabilities).
 [[nodiscard]] bool isOctree(const std::filesystem::path& file);
 
-/// The skin of what an OctoMap holds for occupied: two triangles a face, three corners each [m]. Octrees are
-/// in metres, whatever the unit of meshes beside them.
+/// The surface of an OctoMap's occupied cells: two triangles per face, three corners [m] per triangle. An
+/// OctoMap is always in metres. Errors do not name the file.
 ///
-/// Reads with OctoMap's own reader, which trusts what it reads: call it where a crash does no harm.
-[[nodiscard]] Result<std::vector<Vector3f>> readOctreeSkin(const std::filesystem::path& file);
+/// OctoMap's reader does not validate its input: call this in a process that may crash.
+[[nodiscard]] Result<std::vector<Vector3f>> readOctreeSurface(const std::filesystem::path& file);
 
-/// Writes cells as occupied leaves, to a temporary name first; the name's end decides which of the two
-/// formats.
+/// Writes cells as occupied leaves, under a temporary name that is then renamed; the extension selects the
+/// format. An error when cells are more than 32768 edges away from the origin.
 [[nodiscard]] Result<void> writeOctree(const std::filesystem::path& file, const VoxelSet& cells);
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -7,20 +7,21 @@
 #include "server/bake/narrow_gaps.h"
 #include "server/bake/parallel.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
 using Cell = BrickLevel::Cell;
 using Mask = BrickLevel::Mask;
 constexpr int kOutsideVoxels = BrickLevel::kVoxels;
-// Half the widest gap that is closed [voxels]: at 1.2 one triangle in a hundred may be missing.
+// [voxels] Half the widest hole that the flood does not enter. At 1.2 one triangle in a hundred may be
+// missing.
 constexpr double kSigma = 1.2;
-constexpr auto kSigmaQuanta = static_cast<std::int16_t>(kSigma * DistanceField::kQuantaPerVoxel);
-constexpr int kReach = 3;                               // of the extension [voxels]
-constexpr int kPatch = BrickLevel::kSide + 2 * kReach;  // a brick's samples and all within reach
+constexpr auto kSigmaQuanta = static_cast<std::int16_t>(kSigma * structures::DistanceField::kQuantaPerVoxel);
+constexpr int kReach = 3;                               // [voxels] of the extension
+constexpr int kPatch = BrickLevel::kSide + 2 * kReach;  // samples along an edge of a brick with kReach around
 
-/// The pairs of neighbours that are both further than sigma from the surface.
+/// Links between neighbouring samples that are both further than sigma from the surface.
 std::vector<Flood::Links> wideLinks(const BrickLevel& level, ParallelWork& work) {
   std::vector<Flood::Links> links(level.samples.size() / BrickLevel::kSamples);
   work.run(links.size(), 256, [&](std::size_t slot) {
@@ -31,8 +32,9 @@ std::vector<Flood::Links> wideLinks(const BrickLevel& level, ParallelWork& work)
   return links;
 }
 
-/// A lower bound of the distance at a point [m] from the coarse sample next to it, if that one is outside.
-double clearanceFromCoarse(const BrickLevel& coarse, const Vector3& p_M) {
+/// [m] A lower bound of the distance at a point from the nearest coarse sample; negative if that is not
+/// outside.
+double distanceBoundFromCoarse(const BrickLevel& coarse, const Vector3& p_M) {
   const Cell lattice = ((p_M - coarse.p_MoFo_M) / coarse.voxel).array().round().matrix().cast<int>();
   const BrickLevel::Point point = coarse.at(lattice);
   if (!point.free) return -1.0;
@@ -47,7 +49,8 @@ void seedFromCoarse(Flood& flood, const BrickLevel& level, const BrickLevel& coa
     for (int k = 0; k < kOutsideVoxels * kOutsideVoxels * kOutsideVoxels; ++k) {
       const Cell in_brick(k % kOutsideVoxels, k / kOutsideVoxels % kOutsideVoxels,
                           k / (kOutsideVoxels * kOutsideVoxels));
-      if (clearanceFromCoarse(coarse, level.position(corner + in_brick)) <= kSigma * level.voxel) continue;
+      if (distanceBoundFromCoarse(coarse, level.position(corner + in_brick)) <= kSigma * level.voxel)
+        continue;
       mask[static_cast<std::size_t>(in_brick.z())] |= std::uint64_t{1} << static_cast<unsigned>(k % 64);
       any = true;
     }
@@ -55,39 +58,41 @@ void seedFromCoarse(Flood& flood, const BrickLevel& level, const BrickLevel& coa
   }
 }
 
-/// Steps to the lattice points within kReach, nearest first.
-struct Step {
+/// A vector to a neighbouring lattice point.
+struct LatticeOffset {
   int patch_offset;
-  float length;
+  float length;  // [voxels]
 };
 
-std::vector<Step> stepsByLength() {
-  std::vector<Step> steps;
+/// The lattice points within kReach, nearest first.
+std::vector<LatticeOffset> offsetsByLength() {
+  std::vector<LatticeOffset> offsets;
   for (int z = -kReach; z <= kReach; ++z) {
     for (int y = -kReach; y <= kReach; ++y) {
       for (int x = -kReach; x <= kReach; ++x) {
         const int squared = x * x + y * y + z * z;
         if (squared == 0 || squared > kReach * kReach) continue;
-        steps.push_back({(z * kPatch + y) * kPatch + x, std::sqrt(static_cast<float>(squared))});
+        offsets.push_back({(z * kPatch + y) * kPatch + x, std::sqrt(static_cast<float>(squared))});
       }
     }
   }
-  std::stable_sort(steps.begin(), steps.end(),
-                   [](const Step& a, const Step& b) { return a.length < b.length; });
-  return steps;
+  std::stable_sort(offsets.begin(), offsets.end(),
+                   [](const LatticeOffset& a, const LatticeOffset& b) { return a.length < b.length; });
+  return offsets;
 }
 
-/// The empty radius about a lattice point that the flood reached [voxels]; -1 where it did not.
+/// [voxels] The radius of the empty ball around a lattice point that the flood reached; negative where it did
+/// not.
 float reachedRadius(const BrickLevel& level, const BrickLevel* coarse, const Cell& lattice,
                     const BrickLevel::Point& point) {
   if (point.known) return point.reached ? static_cast<float>(point.distance) : -1.0F;
   if (coarse == nullptr) return static_cast<float>(kOutsideVoxels);
-  return static_cast<float>(clearanceFromCoarse(*coarse, level.position(lattice)) / level.voxel);
+  return static_cast<float>(distanceBoundFromCoarse(*coarse, level.position(lattice)) / level.voxel);
 }
 
-/// Which samples of a brick are outside: reached, or in an empty ball about a reached one.
+/// The samples of a brick that are outside: reached, or in the empty ball around a reached one.
 BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* coarse, std::size_t node,
-                                     const std::vector<Step>& steps) {
+                                     const std::vector<LatticeOffset>& offsets) {
   const std::int32_t slot = level.slot[node];
   const Cell corner = level.brickOf(node) * kOutsideVoxels;
   std::vector<float> patch(static_cast<std::size_t>(kPatch) * kPatch * kPatch);
@@ -97,17 +102,18 @@ BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* 
         reachedRadius(level, coarse, corner + offset, point);
   });
   BrickLevel::SampleBits outside;
-  // a sample on the surface itself is outside in spite of rounding
+  // [voxels] so that a sample exactly on the surface counts as outside in spite of rounding
   constexpr float kRounding = 0.002F;
   for (int sample = 0; sample < BrickLevel::kSamples; ++sample) {
     const Cell in_brick(sample % BrickLevel::kSide, sample / BrickLevel::kSide % BrickLevel::kSide,
                         sample / (BrickLevel::kSide * BrickLevel::kSide));
     const Cell in_patch = in_brick + Cell::Constant(kReach);
-    const int place = (in_patch.z() * kPatch + in_patch.y()) * kPatch + in_patch.x();
-    bool is_outside = patch[static_cast<std::size_t>(place)] > 0.0F;
+    const int position = (in_patch.z() * kPatch + in_patch.y()) * kPatch + in_patch.x();
+    bool is_outside = patch[static_cast<std::size_t>(position)] > 0.0F;
     if (!is_outside && level.samplesOf(slot)[sample] <= kSigmaQuanta) {
-      is_outside = std::any_of(steps.begin(), steps.end(), [&](const Step& step) {
-        return patch[static_cast<std::size_t>(place + step.patch_offset)] + kRounding >= step.length;
+      is_outside = std::any_of(offsets.begin(), offsets.end(), [&](const LatticeOffset& neighbour) {
+        return patch[static_cast<std::size_t>(position + neighbour.patch_offset)] + kRounding >=
+               neighbour.length;
       });
     }
     outside[static_cast<std::size_t>(sample)] = is_outside;
@@ -115,7 +121,7 @@ BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* 
   return outside;
 }
 
-/// Whether a brick or one of its neighbours is marked.
+/// Whether a brick or one of its 26 neighbours is marked.
 bool anyAround(const BrickLevel& level, std::size_t node, const std::vector<std::uint8_t>& marks) {
   const Cell brick = level.brickOf(node);
   for (int k = 0; k < 27; ++k) {
@@ -140,11 +146,11 @@ void findOutside(BrickLevel& level, const BrickLevel* coarse, const TriangleTree
   }
   flood.run();
 
-  const std::vector<Step> steps = stepsByLength();
+  const std::vector<LatticeOffset> offsets = offsetsByLength();
   std::vector<BrickLevel::SampleBits> outside(level.reached.size());
   const auto extend = [&](std::size_t node) {
     const std::int32_t slot = level.slot[node];
-    if (slot >= 0) outside[static_cast<std::size_t>(slot)] = extendInBrick(level, coarse, node, steps);
+    if (slot >= 0) outside[static_cast<std::size_t>(slot)] = extendInBrick(level, coarse, node, offsets);
   };
   work.run(level.nodes(), 256, extend);
   level.outside = outside;
@@ -171,4 +177,4 @@ void adoptFineSigns(BrickLevel& coarse, const BrickLevel& fine, ParallelWork& wo
   });
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -2,23 +2,25 @@
 
 #include "server/bake/brick_level.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 class ParallelWork;
 class TriangleTree;
 
-/// Finds what is outside from unsigned distances alone: no normals, no winding, no watertightness.
+/// Determines which samples are outside from unsigned distances alone, without normals, winding or
+/// watertightness.
 ///
-/// A flood from the grid's corner passes only where the surface is more than sigma away, so missing triangles
-/// of less than two sigma do not let it in; narrow gaps are opened afterwards (openNarrowGaps). What it
-/// reached is extended to the surface: a sample is outside when it lies in an empty ball about a reached one
-/// (after Xu and Barbic 2014). Both sides of a sheet without thickness are outside.
+/// A flood fill from the grid's corner passes only where the surface is more than sigma away, so it does not
+/// enter through holes of missing triangles narrower than two sigma; narrow gaps are opened afterwards
+/// (openNarrowGaps). The reached region is then extended to the surface: a sample is outside when it lies in
+/// the empty ball around a reached one (after Xu and Barbic 2014). Both sides of a sheet without thickness
+/// are outside.
 ///
-/// With `coarse`, a level of finer voxels starts from the coarse level's reached samples.
+/// With `coarse`, `level` has finer voxels and its flood starts from the coarse level's reached samples.
 void findOutside(BrickLevel& level, const BrickLevel* coarse, const TriangleTree& tree, ParallelWork& work);
 
-/// Carries the signs of the fine level over to the coarse samples that lie in refined bricks: only there a
-/// slot too narrow for coarse voxels is open.
+/// Copies the signs of the fine level to the coarse samples in refined bricks: a slot too narrow for coarse
+/// voxels is open only in the fine level.
 void adoptFineSigns(BrickLevel& coarse, const BrickLevel& fine, ParallelWork& work);
 
-}  // namespace tenon
+}  // namespace tenon::bake

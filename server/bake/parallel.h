@@ -9,20 +9,21 @@
 
 #include "server/bake/bake.h"
 
-namespace tenon {
+namespace tenon::bake {
 
-/// Shares numbered pieces of work among this machine's cores and tells a person how far it is.
+/// A parallel for loop over this machine's cores (at most 8) with progress reports.
 ///
-/// Each piece writes only what is its own, so the result is the same for any number of threads. `progress` is
-/// called on the thread that called run(), and once it returns false no further piece is begun.
+/// Each iteration writes only its own data, so the result is the same for any number of threads. `progress`
+/// is called on the thread that called run(); once it returns false no further iteration is started.
 class ParallelWork {
  public:
   explicit ParallelWork(const BakeProgress& progress)
       : progress_(progress), threads_(std::clamp(std::thread::hardware_concurrency(), 1U, 8U)) {}
 
-  /// What the following runs do, and from which to which share of the whole.
-  void stage(std::string_view doing, double from, double to) {
-    doing_ = doing;
+  /// The name of the stage that the following runs belong to. Their progress goes from the fraction `from`
+  /// [-] to the fraction `to` [-] of the whole.
+  void stage(std::string_view stage_name, double from, double to) {
+    stage_ = stage_name;
     from_ = from;
     to_ = to;
     report(0.0);
@@ -30,7 +31,7 @@ class ParallelWork {
 
   [[nodiscard]] bool cancelled() const { return cancelled_; }
 
-  /// Calls work(i) for every i < count; neighbours in i go to one thread in blocks of `grain`.
+  /// Calls work(i) for every i < count, unless cancelled; a thread takes `grain` consecutive i at a time.
   template <typename Work>
   void run(std::size_t count, std::size_t grain, Work&& work) {
     if (cancelled_ || count == 0) return;
@@ -45,22 +46,23 @@ class ParallelWork {
       }
     };
     std::vector<std::jthread> helpers;
-    const std::size_t useful = std::min<std::size_t>(threads_, (count + grain - 1) / grain);
-    for (std::size_t i = 1; i < useful; ++i) helpers.emplace_back(loop, false);
+    const std::size_t threads = std::min<std::size_t>(threads_, (count + grain - 1) / grain);
+    for (std::size_t i = 1; i < threads; ++i) helpers.emplace_back(loop, false);
     loop(true);
   }
 
  private:
-  void report(double share_of_stage) {
-    if (progress_ && !progress_(from_ + (to_ - from_) * share_of_stage, doing_)) cancelled_ = true;
+  /// `fraction_of_stage` [-]
+  void report(double fraction_of_stage) {
+    if (progress_ && !progress_(from_ + (to_ - from_) * fraction_of_stage, stage_)) cancelled_ = true;
   }
 
   const BakeProgress& progress_;
   unsigned threads_;
-  std::string_view doing_;
-  double from_ = 0.0;
-  double to_ = 0.0;
+  std::string_view stage_;
+  double from_ = 0.0;  ///< [-]
+  double to_ = 0.0;    ///< [-]
   std::atomic<bool> cancelled_{false};
 };
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -9,17 +9,17 @@
 #include "server/structures/point_grid.h"
 #include "server/structures/shell_builder.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
-// Candidates for each point that is kept: more are more even, and slower.
+// Candidates per selected point: more candidates give a more even sampling, and take longer.
 constexpr std::size_t kCandidatesPerPoint = 12;
 constexpr std::size_t kMaxCandidates = 12'000'000;
-// Of randomly placed points, each at least r from all others, about so many find room on an area of r^2.
+// Points per area r^2 of a dense random sampling with minimum distance r (maximal Poisson-disk sampling).
 constexpr double kDiscsPerArea = 0.59;
-// Below this the gradient is that of a medial axis, not of a surface.
-constexpr double kLeastGradient = 0.3;
+// A smaller gradient belongs to a point near the medial axis, where it is not the surface normal.
+constexpr double kMinGradient = 0.3;
 
 /// The k-th number of a fixed random sequence in [0, 1) (splitmix64).
 double randomUnit(std::uint64_t k) {
@@ -29,46 +29,48 @@ double randomUnit(std::uint64_t k) {
   return static_cast<double>((z ^ z >> 31U) >> 11U) * 0x1p-53;
 }
 
-/// Turns places on the surface into sites with an inward normal.
-class Orienter {
+/// Determines inward normals and edge convexity from the field.
+class NormalEstimator {
  public:
-  explicit Orienter(const DistanceField& field) : field_(field) {}
+  explicit NormalEstimator(const structures::DistanceField& field) : field_(field) {}
 
-  /// `normal_M` either way round: it decides only where the field cannot, and keeps its side on a sheet.
+  /// The inward normal at a surface point. `normal_M` of the triangle, of either sign, is used where the
+  /// gradient is not reliable, and gives the side on a sheet.
   [[nodiscard]] Vector3 inward(const Vector3& p_MP, const Vector3& normal_M) const {
-    // the side is asked for at a distance: in a thin plate the gradient may be that of the other face
+    // compare both sides at a distance: in a thin plate the gradient may be that of the other face
     const Vector3 step = normal_M * (0.75 * field_.voxelAt(p_MP));
     const bool outwards = field_.sample(p_MP + step).distance >= field_.sample(p_MP - step).distance;
     const Vector3 inward_M = outwards ? Vector3(-normal_M) : normal_M;
-    const FieldSample sample = field_.sample(p_MP);
+    const structures::FieldSample sample = field_.sample(p_MP);
     const double slope = sample.gradient.norm();
-    if (!sample.exact || slope < kLeastGradient || -sample.gradient.dot(inward_M) < 0.5 * slope)
+    if (!sample.exact || slope < kMinGradient || -sample.gradient.dot(inward_M) < 0.5 * slope)
       return inward_M;
     return -sample.gradient / slope;
   }
 
-  [[nodiscard]] bool onSkin(const Vector3& p_MP) const {
+  [[nodiscard]] bool onSurface(const Vector3& p_MP) const {
     return field_.sample(p_MP).distance > -0.5 * field_.voxelAt(p_MP);
   }
 
-  /// Whether the solid is on the narrow side of an edge: `into_M` halves the angle between its faces.
+  /// Whether an edge is convex: the solid is in the direction `into_M`, the bisector of its faces.
   [[nodiscard]] bool convex(const Vector3& p_MP, const Vector3& into_M) const {
     const Vector3 step = into_M * (0.5 * field_.voxelAt(p_MP));
     return field_.sample(p_MP + step).distance <= field_.sample(p_MP - step).distance;
   }
 
  private:
-  const DistanceField& field_;
+  const structures::DistanceField& field_;
 };
 
-Vector3 unitNormal(const Triangle& t) { return (t[1] - t[0]).cross(t[2] - t[0]).normalized(); }
+Vector3 unitNormal(const structures::Triangle& t) { return (t[1] - t[0]).cross(t[2] - t[0]).normalized(); }
 
-/// Corners, then points along edges no further apart than `spacing`.
-std::vector<ShellSite> edgeSites(const WeldedMesh& mesh, const Orienter& orienter, double spacing) {
-  std::vector<ShellSite> sites;
+/// Samples at corners, then along sharp convex edges at most `spacing` [m] apart.
+std::vector<structures::SurfaceSample> edgeSamples(const WeldedMesh& mesh, const NormalEstimator& normals,
+                                                   double spacing) {
+  std::vector<structures::SurfaceSample> samples;
   std::vector<std::vector<Vector3>> directions(mesh.positions.size());
   const auto add = [&](const Vector3& p, const Vector3& into) {
-    if (orienter.onSkin(p)) sites.push_back({p, orienter.inward(p, into), 0.0});
+    if (normals.onSurface(p)) samples.push_back({p, normals.inward(p, into), 0.0});
   };
   std::vector<WeldedMesh::Edge> convex;
   std::vector<Vector3> inwards;
@@ -76,9 +78,9 @@ std::vector<ShellSite> edgeSites(const WeldedMesh& mesh, const Orienter& oriente
     const Vector3& a = mesh.positions[edge.from];
     const Vector3& b = mesh.positions[edge.to];
     const Vector3 middle = (a + b) / 2;
-    // towards the middle of the faces: halves their angle well enough to tell its side
+    // the sum of the directions to both faces' centres is about the bisector
     const auto towards = [&](std::uint32_t triangle) {
-      const Triangle& t = mesh.triangles[triangle];
+      const structures::Triangle& t = mesh.triangles[triangle];
       const Vector3 to = (t[0] + t[1] + t[2]) / 3.0 - middle;
       const Vector3 along = (b - a).normalized();
       return Vector3((to - along * along.dot(to)).normalized());
@@ -87,7 +89,7 @@ std::vector<ShellSite> edgeSites(const WeldedMesh& mesh, const Orienter& oriente
     if (edge.second != WeldedMesh::Edge::kNone) into += towards(edge.second);
     if (!(into.norm() > 1e-6)) continue;
     into.normalize();
-    if (edge.second != WeldedMesh::Edge::kNone && !orienter.convex(middle, into)) continue;
+    if (edge.second != WeldedMesh::Edge::kNone && !normals.convex(middle, into)) continue;
     directions[edge.from].push_back((b - a).normalized());
     directions[edge.to].push_back((a - b).normalized());
     convex.push_back(edge);
@@ -106,17 +108,18 @@ std::vector<ShellSite> edgeSites(const WeldedMesh& mesh, const Orienter& oriente
     const int steps = std::max(1, static_cast<int>(std::ceil((b - a).norm() / spacing)));
     for (int k = 0; k < steps; ++k) add(a + (b - a) * ((k + 0.5) / steps), inwards[i]);
   }
-  return sites;
+  return samples;
 }
 
-/// `count` places spread over the surface, one in each equal share of its area, in random order.
-std::vector<ShellSite> faceSites(std::span<const Triangle> surface, double area, std::size_t count,
-                                 const Orienter& orienter, ParallelWork& work) {
+/// `count` samples of the surface, stratified by area (one in each equal part), in random order.
+std::vector<structures::SurfaceSample> faceSamples(std::span<const structures::Triangle> surface, double area,
+                                                   std::size_t count, const NormalEstimator& normals,
+                                                   ParallelWork& work) {
   std::vector<std::uint32_t> triangle_of(count);
   std::size_t next = 0;
   double covered = 0.0;
   for (std::uint32_t i = 0; i < surface.size(); ++i) {
-    covered += areaOf(surface[i]);
+    covered += structures::areaOf(surface[i]);
     while (next < count && (static_cast<double>(next) + randomUnit(3 * next)) * area <=
                                covered * static_cast<double>(count)) {
       triangle_of[next++] = i;
@@ -130,67 +133,73 @@ std::vector<ShellSite> faceSites(std::span<const Triangle> surface, double area,
     std::swap(order[i - 1],
               order[static_cast<std::size_t>(randomUnit(7 * count + i) * static_cast<double>(i))]);
   }
-  std::vector<ShellSite> sites(count);
-  work.run(count, 4096, [&](std::size_t place) {
-    const std::size_t k = order[place];
-    const Triangle& t = surface[triangle_of[k]];
+  std::vector<structures::SurfaceSample> samples(count);
+  work.run(count, 4096, [&](std::size_t i) {
+    const std::size_t k = order[i];
+    const structures::Triangle& t = surface[triangle_of[k]];
     const double root = std::sqrt(randomUnit(3 * k + 1));
     const double along = randomUnit(3 * k + 2);
     const Vector3 p = t[0] * (1.0 - root) + t[1] * (root * (1.0 - along)) + t[2] * (root * along);
-    sites[place] = {p, orienter.inward(p, unitNormal(t)), area / static_cast<double>(count)};
+    samples[i] = {p, normals.inward(p, unitNormal(t)), area / static_cast<double>(count)};
   });
-  return sites;
+  return samples;
 }
 
-bool sameSide(const ShellSite& a, const ShellSite& b) { return a.inward_M.dot(b.inward_M) >= 0.0; }
+bool sameSide(const structures::SurfaceSample& a, const structures::SurfaceSample& b) {
+  return a.inward_M.dot(b.inward_M) >= 0.0;
+}
 
-/// Keeps sites at least `apart` from every earlier one on the same side, and gives each the area about it.
-std::vector<ShellSite> thinOut(const std::vector<ShellSite>& sites, double apart) {
-  std::vector<ShellSite> kept;
-  PointGrid grid(apart);
-  for (const ShellSite& site : sites) {
-    const bool free = grid.visitNear(site.p_MP, [&](std::uint32_t other, double squared) {
-      return squared >= apart * apart || !sameSide(kept[other], site);
+/// Poisson-disk sampling by dart throwing: keeps samples at least `apart` [m] from every earlier one on the
+/// same side. The area of each candidate is added to the nearest kept sample.
+std::vector<structures::SurfaceSample> poissonDiskSubset(
+    const std::vector<structures::SurfaceSample>& samples, double apart) {
+  std::vector<structures::SurfaceSample> kept;
+  structures::PointGrid grid(apart);
+  for (const structures::SurfaceSample& sample : samples) {
+    const bool free = grid.visitNear(sample.p_MP, [&](std::uint32_t other, double squared) {
+      return squared >= apart * apart || !sameSide(kept[other], sample);
     });
     if (!free) continue;
-    grid.add(site.p_MP, static_cast<std::uint32_t>(kept.size()));
-    kept.push_back(site);
+    grid.add(sample.p_MP, static_cast<std::uint32_t>(kept.size()));
+    kept.push_back(sample);
     kept.back().area = 0.0;
   }
-  for (const ShellSite& site : sites) {
-    if (site.area == 0.0) continue;
+  for (const structures::SurfaceSample& sample : samples) {
+    if (sample.area == 0.0) continue;
     double nearest = std::numeric_limits<double>::infinity();
     std::uint32_t owner = 0;
-    grid.visitNear(site.p_MP, [&](std::uint32_t other, double squared) {
-      if (squared < nearest && sameSide(kept[other], site)) {
+    grid.visitNear(sample.p_MP, [&](std::uint32_t other, double squared) {
+      if (squared < nearest && sameSide(kept[other], sample)) {
         nearest = squared;
         owner = other;
       }
       return true;
     });
-    kept[owner].area += site.area;
+    kept[owner].area += sample.area;
   }
   return kept;
 }
 
 }  // namespace
 
-Pointshell bakeShell(const WeldedMesh& mesh, std::span<const Triangle> surface, const DistanceField& field,
-                     const BakeOptions& options, ParallelWork& work) {
+structures::Pointshell bakeShell(const WeldedMesh& mesh, std::span<const structures::Triangle> surface,
+                                 const structures::DistanceField& field, const BakeOptions& options,
+                                 ParallelWork& work) {
   if (surface.empty()) return {};
-  const double area = std::accumulate(surface.begin(), surface.end(), 0.0,
-                                      [](double sum, const Triangle& t) { return sum + areaOf(t); });
+  const double area =
+      std::accumulate(surface.begin(), surface.end(), 0.0,
+                      [](double sum, const structures::Triangle& t) { return sum + structures::areaOf(t); });
   const double wanted = options.point_spacing > 0.0 ? area / (options.point_spacing * options.point_spacing)
                                                     : static_cast<double>(options.points);
   const double spacing = std::sqrt(area / std::max(wanted, 1.0));
   const double apart = spacing * std::sqrt(kDiscsPerArea);
   const auto candidates = static_cast<std::size_t>(std::ceil(wanted)) * kCandidatesPerPoint;
 
-  const Orienter orienter(field);
-  std::vector<ShellSite> sites = edgeSites(mesh, orienter, apart);
-  const auto faces = faceSites(surface, area, std::min(candidates, kMaxCandidates), orienter, work);
-  sites.insert(sites.end(), faces.begin(), faces.end());
-  return buildShell(thinOut(sites, apart), apart);
+  const NormalEstimator normals(field);
+  std::vector<structures::SurfaceSample> samples = edgeSamples(mesh, normals, apart);
+  const auto faces = faceSamples(surface, area, std::min(candidates, kMaxCandidates), normals, work);
+  samples.insert(samples.end(), faces.begin(), faces.end());
+  return structures::buildShell(poissonDiskSubset(samples, apart), apart);
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -6,15 +6,15 @@
 #include "server/bake/welded_mesh.h"
 #include "server/structures/triangle.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 class ParallelWork;
 
-/// An even sampling of the surface that the outside touches, sharp convex edges and corners first, with
-/// normals from the field: a pointshell (paper §3.1). `surface` is what is left of the mesh after hiding the
-/// inside.
-[[nodiscard]] Pointshell bakeShell(const WeldedMesh& mesh, std::span<const Triangle> surface,
-                                   const DistanceField& field, const BakeOptions& options,
-                                   ParallelWork& work);
+/// The pointshell of a mesh (paper §3.1): an even sampling of its exposed surface, sharp convex edges and
+/// corners first, with normals from the field. `surface` is the exposed part of the mesh.
+[[nodiscard]] structures::Pointshell bakeShell(const WeldedMesh& mesh,
+                                               std::span<const structures::Triangle> surface,
+                                               const structures::DistanceField& field,
+                                               const BakeOptions& options, ParallelWork& work);
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -7,7 +7,7 @@
 
 #include "server/bake/parallel.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
@@ -15,39 +15,41 @@ using Cell = BrickLevel::Cell;
 constexpr int kSide = BrickLevel::kSide;
 constexpr int kLast = kSide - 1;
 
-/// What the empty ball about one lattice point says about another.
-struct Claim {
+/// The lower bound that the empty ball around one lattice point gives for the sample at another.
+struct BallBound {
   Cell at;
   Cell centre;
   int radius = 0;  // [quanta], like `value`
   int value = 0;
 };
 
-/// What a ball loses on its way over so many lattice steps. Rounding of samples is no reason to touch them.
-int lossOver(const Cell& steps) {
-  const double away = std::sqrt(static_cast<double>(steps.squaredNorm()));
-  return static_cast<int>(std::ceil(away * DistanceField::kQuantaPerVoxel)) + 1;
+/// [quanta] The decrease of a ball's bound over a lattice offset; one more, so that rounding alone raises no
+/// sample.
+int decreaseOver(const Cell& offset) {
+  const double away = std::sqrt(static_cast<double>(offset.squaredNorm()));
+  return static_cast<int>(std::ceil(away * structures::DistanceField::kQuantaPerVoxel)) + 1;
 }
 
-/// The same between samples of a brick, as rows along x: entry kLast is the row's own middle.
-using LossRow = std::array<int, 2 * kSide - 1>;
-using LossTable = std::array<std::array<LossRow, kSide>, kSide>;
+/// The same between samples of a brick, as rows along x; offset 0 is at entry kLast.
+using DecreaseRow = std::array<int, 2 * kSide - 1>;
+using DecreaseTable = std::array<std::array<DecreaseRow, kSide>, kSide>;
 
-LossTable lossesInBrick() {
-  LossTable table{};
+DecreaseTable decreasesInBrick() {
+  DecreaseTable table{};
   for (int z = 0; z < kSide; ++z) {
     for (int y = 0; y < kSide; ++y) {
       for (int x = -kLast; x < kSide; ++x) {
         table[static_cast<std::size_t>(z)][static_cast<std::size_t>(y)][static_cast<std::size_t>(x + kLast)] =
-            lossOver({x, y, z});
+            decreaseOver({x, y, z});
       }
     }
   }
   return table;
 }
 
-bool strongerFirst(const Claim& a, const Claim& b) {
-  const auto key = [](const Claim& c) {
+/// By sample, the highest bound first; ties by centre.
+bool highestFirst(const BallBound& a, const BallBound& b) {
+  const auto key = [](const BallBound& c) {
     return std::tuple(c.at.x(), c.at.y(), c.at.z(), -c.value, c.centre.x(), c.centre.y(), c.centre.z());
   };
   return key(a) < key(b);
@@ -68,46 +70,49 @@ bool hasBothSigns(const std::int16_t* samples) {
 class SlopeLimiter {
  public:
   SlopeLimiter(BrickLevel& level, ParallelWork& work)
-      : level_(level), work_(work), raised_(level.nodes(), 0), losses_(lossesInBrick()) {}
+      : level_(level), work_(work), raised_(level.nodes(), 0), decreases_(decreasesInBrick()) {}
 
-  /// Claims in all bricks of neighbours on each other, and of a brick's middle, from which queries bound it.
-  [[nodiscard]] std::vector<Claim> claimsOfNeighbours() const {
-    return collect([this](std::size_t node, std::vector<Claim>& claims) { claimNeighbours(node, claims); });
+  /// Bounds in all bricks: between neighbouring samples, and between every sample and the brick's middle,
+  /// from which queries bound the brick.
+  [[nodiscard]] std::vector<BallBound> boundsOfNeighbours() const {
+    return collect(
+        [this](std::size_t node, std::vector<BallBound>& bounds) { boundNeighbours(node, bounds); });
   }
 
-  /// Claims of any two samples on each other, in the bricks that something was raised in since the last call.
-  [[nodiscard]] std::vector<Claim> claimsWhereRaised() {
-    std::vector<Claim> claims = collect([this](std::size_t node, std::vector<Claim>& found) {
-      if (raised_[node] != 0) claimAll(node, found);
+  /// Bounds between any two samples, in the bricks with a sample raised since the last call.
+  [[nodiscard]] std::vector<BallBound> boundsWhereRaised() {
+    std::vector<BallBound> bounds = collect([this](std::size_t node, std::vector<BallBound>& found) {
+      if (raised_[node] != 0) boundAll(node, found);
     });
     std::fill(raised_.begin(), raised_.end(), std::uint8_t{0});
-    return claims;
+    return bounds;
   }
 
-  /// What coarse samples say about the fine ones next to them.
-  [[nodiscard]] std::vector<Claim> claimsOf(const BrickLevel& coarse) const {
-    return collect([&](std::size_t node, std::vector<Claim>& claims) { claimFrom(coarse, node, claims); });
+  /// Bounds from coarse samples for the nearest fine ones.
+  [[nodiscard]] std::vector<BallBound> boundsFrom(const BrickLevel& coarse) const {
+    return collect(
+        [&](std::size_t node, std::vector<BallBound>& bounds) { boundFrom(coarse, node, bounds); });
   }
 
-  /// Grants the strongest claim on each sample, then lets its ball claim the samples around, until none is
-  /// left. Rounds and their order depend on the samples alone.
-  void grant(std::vector<Claim> claims) {
-    std::vector<Claim> granted;
-    while (!claims.empty()) {
-      std::sort(claims.begin(), claims.end(), strongerFirst);
-      granted.clear();
-      for (const Claim& claim : claims) {
-        if (!granted.empty() && granted.back().at == claim.at) continue;
-        granted.push_back(claim);
-        level_.setSample(claim.at, static_cast<std::int16_t>(claim.value), raised_);
+  /// Applies the highest bound of each sample, then propagates it to the samples around, until no sample
+  /// rises. Rounds and their order depend on the samples alone.
+  void apply(std::vector<BallBound> bounds) {
+    std::vector<BallBound> applied;
+    while (!bounds.empty()) {
+      std::sort(bounds.begin(), bounds.end(), highestFirst);
+      applied.clear();
+      for (const BallBound& bound : bounds) {
+        if (!applied.empty() && applied.back().at == bound.at) continue;
+        applied.push_back(bound);
+        level_.setSample(bound.at, static_cast<std::int16_t>(bound.value), raised_);
       }
-      claims.clear();
-      for (const Claim& claim : granted) {
-        visitNeighbours([&](const Cell& aside) {
-          const Cell at = claim.at + aside;
-          const int value = claim.radius - lossOver(at - claim.centre);
+      bounds.clear();
+      for (const BallBound& bound : applied) {
+        visitNeighbours([&](const Cell& step) {
+          const Cell at = bound.at + step;
+          const int value = bound.radius - decreaseOver(at - bound.centre);
           const std::int16_t* sample = level_.findSample(at);
-          if (sample != nullptr && value > *sample) claims.push_back({at, claim.centre, claim.radius, value});
+          if (sample != nullptr && value > *sample) bounds.push_back({at, bound.centre, bound.radius, value});
         });
       }
     }
@@ -115,45 +120,45 @@ class SlopeLimiter {
 
  private:
   template <typename Work>
-  [[nodiscard]] std::vector<Claim> collect(Work&& work) const {
+  [[nodiscard]] std::vector<BallBound> collect(Work&& work) const {
     constexpr std::size_t kChunk = 256;
-    std::vector<std::vector<Claim>> found((level_.nodes() + kChunk - 1) / kChunk);
+    std::vector<std::vector<BallBound>> found((level_.nodes() + kChunk - 1) / kChunk);
     work_.run(found.size(), 4, [&](std::size_t chunk) {
       const std::size_t end = std::min(level_.nodes(), (chunk + 1) * kChunk);
       for (std::size_t node = chunk * kChunk; node < end; ++node) {
         if (level_.slot[node] >= 0) work(node, found[chunk]);
       }
     });
-    std::vector<Claim> claims;
-    for (const auto& some : found) claims.insert(claims.end(), some.begin(), some.end());
-    return claims;
+    std::vector<BallBound> bounds;
+    for (const auto& some : found) bounds.insert(bounds.end(), some.begin(), some.end());
+    return bounds;
   }
 
-  void claimNeighbours(std::size_t node, std::vector<Claim>& claims) const {
+  void boundNeighbours(std::size_t node, std::vector<BallBound>& bounds) const {
     const std::int16_t* samples = level_.samplesOf(level_.slot[node]);
     if (!hasBothSigns(samples)) return;
     const Cell corner = level_.brickOf(node) * BrickLevel::kVoxels;
     const Cell middle = Cell::Constant(kSide / 2);
-    const auto claim = [&](const Cell& at, const Cell& centre) {
+    const auto bound = [&](const Cell& at, const Cell& centre) {
       const int radius = samples[BrickLevel::sampleIndex(centre)];
-      const int value = radius - lossInBrick(at, centre);
+      const int value = radius - decreaseInBrick(at, centre);
       if (value > samples[BrickLevel::sampleIndex(at)]) {
-        claims.push_back({corner + at, corner + centre, radius, value});
+        bounds.push_back({corner + at, corner + centre, radius, value});
       }
     };
     for (int sample = 0; sample < BrickLevel::kSamples; ++sample) {
       const Cell at = BrickLevel::cellOfSample(sample);
-      claim(middle, at);
+      bound(middle, at);
       if (samples[sample] >= 0) continue;
-      claim(at, middle);
-      visitNeighbours([&](const Cell& aside) {
-        const Cell centre = at + aside;
-        if ((centre.array() >= 0).all() && (centre.array() < kSide).all()) claim(at, centre);
+      bound(at, middle);
+      visitNeighbours([&](const Cell& step) {
+        const Cell centre = at + step;
+        if ((centre.array() >= 0).all() && (centre.array() < kSide).all()) bound(at, centre);
       });
     }
   }
 
-  void claimAll(std::size_t node, std::vector<Claim>& claims) const {
+  void boundAll(std::size_t node, std::vector<BallBound>& bounds) const {
     const std::int16_t* samples = level_.samplesOf(level_.slot[node]);
     if (!hasBothSigns(samples)) return;
     const Cell corner = level_.brickOf(node) * BrickLevel::kVoxels;
@@ -162,65 +167,65 @@ class SlopeLimiter {
       int best = samples[sample];
       int best_centre = sample;
       for (int row = 0; row < kSide * kSide; ++row) {
-        const int* loss = lossesAlong(at, row) + (kLast - at.x());
+        const int* decrease = decreasesAlong(at, row) + (kLast - at.x());
         const std::int16_t* from = samples + row * kSide;
         int best_of_row = best;
-        for (int x = 0; x < kSide; ++x) best_of_row = std::max(best_of_row, from[x] - loss[x]);
+        for (int x = 0; x < kSide; ++x) best_of_row = std::max(best_of_row, from[x] - decrease[x]);
         for (int x = 0; best_of_row > best; ++x) {
-          if (from[x] - loss[x] != best_of_row) continue;
+          if (from[x] - decrease[x] != best_of_row) continue;
           best = best_of_row;
           best_centre = row * kSide + x;
         }
       }
       if (best_centre == sample) continue;
-      claims.push_back(
+      bounds.push_back(
           {corner + at, corner + BrickLevel::cellOfSample(best_centre), samples[best_centre], best});
     }
   }
 
-  [[nodiscard]] int lossInBrick(const Cell& at, const Cell& centre) const {
-    return lossesAlong(at, centre.z() * kSide + centre.y())[kLast - at.x() + centre.x()];
+  [[nodiscard]] int decreaseInBrick(const Cell& at, const Cell& centre) const {
+    return decreasesAlong(at, centre.z() * kSide + centre.y())[kLast - at.x() + centre.x()];
   }
 
-  [[nodiscard]] const int* lossesAlong(const Cell& at, int row) const {
+  [[nodiscard]] const int* decreasesAlong(const Cell& at, int row) const {
     const auto z = static_cast<std::size_t>(std::abs(row / kSide - at.z()));
     const auto y = static_cast<std::size_t>(std::abs(row % kSide - at.y()));
-    return losses_[z][y].data();
+    return decreases_[z][y].data();
   }
 
-  void claimFrom(const BrickLevel& coarse, std::size_t node, std::vector<Claim>& claims) const {
+  void boundFrom(const BrickLevel& coarse, std::size_t node, std::vector<BallBound>& bounds) const {
     const std::int16_t* samples = level_.samplesOf(level_.slot[node]);
     if (*std::min_element(samples, samples + BrickLevel::kSamples) >= 0) return;
     const Cell corner = level_.brickOf(node) * BrickLevel::kVoxels;
-    const int cuts = level_.refinement;
+    const int divisions = level_.refinement;
     for (int sample = 0; sample < BrickLevel::kSamples; ++sample) {
       if (samples[sample] >= 0) continue;
       const Cell at = corner + BrickLevel::cellOfSample(sample);
-      const Cell nearest = (at + Cell::Constant(cuts / 2)) / cuts;
+      const Cell nearest = (at + Cell::Constant(divisions / 2)) / divisions;
       const std::int16_t* outside = coarse.findSample(nearest);
       if (outside == nullptr || *outside < 0) continue;
-      const int radius = *outside * cuts;
-      const int value = radius - lossOver(at - nearest * cuts);
-      if (value > samples[sample]) claims.push_back({at, nearest * cuts, radius, value});
+      const int radius = *outside * divisions;
+      const int value = radius - decreaseOver(at - nearest * divisions);
+      if (value > samples[sample]) bounds.push_back({at, nearest * divisions, radius, value});
     }
   }
 
   BrickLevel& level_;
   ParallelWork& work_;
   std::vector<std::uint8_t> raised_;  // per node
-  const LossTable losses_;
+  const DecreaseTable decreases_;
 };
 
 }  // namespace
 
 void limitSlope(BrickLevel& level, const BrickLevel* coarse, ParallelWork& work) {
   SlopeLimiter limiter(level, work);
-  if (coarse != nullptr) limiter.grant(limiter.claimsOf(*coarse));
-  std::vector<Claim> claims = limiter.claimsOfNeighbours();
-  while (!claims.empty() && !work.cancelled()) {
-    limiter.grant(std::move(claims));
-    claims = limiter.claimsWhereRaised();
+  if (coarse != nullptr) limiter.apply(limiter.boundsFrom(*coarse));
+  std::vector<BallBound> bounds = limiter.boundsOfNeighbours();
+  while (!bounds.empty() && !work.cancelled()) {
+    limiter.apply(std::move(bounds));
+    bounds = limiter.boundsWhereRaised();
   }
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -2,18 +2,19 @@
 
 #include "server/bake/brick_level.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 class ParallelWork;
 
-/// Makes signed samples differ by no more than they are apart, as distances do: queries prune by that.
+/// Makes the signed samples 1-Lipschitz, as distances are: queries rely on it for pruning.
 ///
-/// Samples of one sign do so by themselves. Steeper is only the step from an outside sample to one that the
-/// flood did not reach: into a gap it closed. Nothing of the surface is nearer to the outside sample than its
-/// own distance, so whatever lies in that ball is outside as well. A sample is raised to the highest of these
-/// balls' slopes; none is lowered, and where the outside is right, none rises above the true distance.
+/// Samples of one sign fulfil it already. It is violated only between an outside sample and a neighbour that
+/// the flood fill did not reach, in a gap too narrow for it. The ball around an outside sample with its
+/// distance as radius is empty, so every point in it is outside too: radius minus distance to the centre is a
+/// lower bound of the sample there. Each sample is raised to the highest of these bounds. None is lowered;
+/// where outside samples are correct, none rises above the true distance.
 ///
-/// With `coarse`, whose samples are limited already, balls reach in from there too.
+/// With `coarse`, whose samples are limited already, its balls give bounds too.
 void limitSlope(BrickLevel& level, const BrickLevel* coarse, ParallelWork& work);
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -6,11 +6,11 @@
 #include "server/bake/bake.h"
 #include "server/structures/outer_surface.h"
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
-using SurfaceTriangle = SurfaceTree::Triangle;
+using SurfaceTriangle = structures::SurfaceTree::Triangle;
 
 Result<std::vector<SurfaceTriangle>> trianglesOf(const std::vector<std::filesystem::path>& meshes,
                                                  double unit) {
@@ -25,28 +25,28 @@ Result<std::vector<SurfaceTriangle>> trianglesOf(const std::vector<std::filesyst
   return triangles;
 }
 
-bool fills(const std::vector<SurfaceTriangle>& triangles, const Eigen::AlignedBox3d& wanted) {
+bool hasBoundingBox(const std::vector<SurfaceTriangle>& triangles, const Eigen::AlignedBox3d& wanted) {
   Eigen::AlignedBox3d box;
   for (const SurfaceTriangle& corners : triangles) {
     for (const Vector3f& corner : corners) box.extend(corner.cast<double>());
   }
-  const double most = 1e-4 * wanted.diagonal().norm();
-  return (box.min() - wanted.min()).norm() <= most && (box.max() - wanted.max()).norm() <= most;
+  const double tolerance = 1e-4 * wanted.diagonal().norm();
+  return (box.min() - wanted.min()).norm() <= tolerance && (box.max() - wanted.max()).norm() <= tolerance;
 }
 
 }  // namespace
 
-Result<SurfaceTree> importSurface(const HapticStructures& structures,
-                                  std::vector<std::filesystem::path> meshes) {
+Result<structures::SurfaceTree> importSurface(const structures::HapticStructures& structures,
+                                              std::vector<std::filesystem::path> meshes) {
   if (meshes.empty()) meshes = structures.info.meshes;
-  if (meshes.empty()) return fail(structures.info.source + ": nothing tells where its mesh is");
+  if (meshes.empty()) return fail(structures.info.source + ": the structures do not name their mesh files");
   const auto triangles = trianglesOf(meshes, structures.info.unit);
   if (!triangles) return tl::unexpected(triangles.error());
-  if (!fills(*triangles, structures.info.box_M)) {
+  if (!hasBoundingBox(*triangles, structures.info.box_M)) {
     return fail(meshes.front().string() + ": is not the mesh of " + structures.info.source +
                 ": it is of another size");
   }
-  return SurfaceTree(outerTriangles(*triangles, structures.field));
+  return structures::SurfaceTree(structures::outerTriangles(*triangles, structures.field));
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -7,11 +7,12 @@
 #include "server/structures/haptic_structures.h"
 #include "server/structures/surface_tree.h"
 
-namespace tenon {
+namespace tenon::bake {
 
-/// The outer surface of what structures were baked from, read again. `meshes` empty: from where they lay
-/// then. Files that are not as large as the structures say, in the unit they were baked in, are refused.
-[[nodiscard]] Result<SurfaceTree> importSurface(const HapticStructures& structures,
-                                                std::vector<std::filesystem::path> meshes = {});
+/// Imports again the meshes that structures were baked from, in the unit they were baked in, and returns
+/// their outer surface. With `meshes` empty the paths of baking time are used. An error when a file cannot be
+/// imported or the bounding box is not that of the structures.
+[[nodiscard]] Result<structures::SurfaceTree> importSurface(const structures::HapticStructures& structures,
+                                                            std::vector<std::filesystem::path> meshes = {});
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -5,30 +5,34 @@
 #include "server/bake/bake.h"
 #include "server/bake/voxel_set.h"
 
-namespace tenon {
+namespace tenon::bake {
 
-/// What a body passes through on its way from pose to pose: straight lines and even turns between them.
+/// Swept volumes and clearances along a path: a list of poses X_WM with linear translation and rotation at
+/// constant angular velocity between them.
 struct SweepOptions {
-  double cell = 0.005;  ///< [m]
-  double grow = 0.0;    ///< [m] added all round
+  double cell = 0.005;    ///< [m] edge of the cells
+  double dilation = 0.0;  ///< [m] offset of the body's surface, at most the band of its field
 };
 
-/// The cells a solid fills at some pose X_WM of the way, which is walked in steps of at most half a cell.
-[[nodiscard]] Result<VoxelSet> sweep(const HapticStructures& moved, std::span<const Pose> poses_WM,
-                                     const SweepOptions& options, const BakeProgress& progress = {});
+/// The swept volume: the cells that the body fills at some pose of the path, sampled so that no point moves
+/// more than half a cell per step. An error for bad options, too many steps or too many cells.
+[[nodiscard]] Result<VoxelSet> sweep(const structures::HapticStructures& moved,
+                                     std::span<const Pose> poses_WM, const SweepOptions& options,
+                                     const BakeProgress& progress = {});
 
-/// How near a body comes to a scene on its way.
+/// The smallest distance of a body to a scene along a path.
 struct Clearance {
-  double distance = 0.0;  ///< [m] of the nearest shell point; < 0: so deep
-  bool exact = false;     ///< false: outside the scene's band, and `distance` is a bound nearer to 0
-  std::size_t pose = 0;   ///< the pose before or at the nearest place
+  double distance = 0.0;  ///< [m] of the nearest shell point; < 0: penetration
+  bool exact = false;     ///< false: outside the scene's band; |distance| is then a lower bound
+  std::size_t pose = 0;   ///< number of the pose at which, or after which, it occurs
   Vector3 p_WP = Vector3::Zero();
 };
 
-/// The least distance of the body's shell points to a scene at rest in W, on the same way in steps of at most
-/// `step` [m].
-[[nodiscard]] Result<Clearance> clearance(const HapticStructures& moved, std::span<const Pose> poses_WM,
-                                          const DistanceField& scene_W, double step,
+/// The smallest distance of the body's shell points to a scene at rest in W, along a path in which no point
+/// moves more than `step` [m] per sample.
+[[nodiscard]] Result<Clearance> clearance(const structures::HapticStructures& moved,
+                                          std::span<const Pose> poses_WM,
+                                          const structures::DistanceField& scene_W, double step,
                                           const BakeProgress& progress = {});
 
-}  // namespace tenon
+}  // namespace tenon::bake

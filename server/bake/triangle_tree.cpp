@@ -5,57 +5,57 @@
 #include <cmath>
 #include <limits>
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
-// A search begins at about this many boxes instead of at the root.
+// A search starts from about this many boxes instead of the root.
 constexpr std::size_t kRoots = 24;
-// Rounding of the float arithmetic in squaredDistances, and some.
+// Relative rounding error of the float arithmetic in squaredDistances, with a margin.
 constexpr float kRounding = 1e-5F;
 
 }  // namespace
 
-/// Splits at the median of the longest axis, twice for each node.
+/// Builds the tree: splits at the median along the longest axis, twice for each node.
 struct TriangleTree::Builder {
-  /// A triangle, or a part of one.
-  struct Part {
+  /// The box of a triangle, or of a part of one.
+  struct BoundedPart {
     Eigen::AlignedBox3f box;
     std::uint32_t triangle;
   };
-  using Range = std::span<Part>;
+  using Range = std::span<BoundedPart>;
 
   TriangleTree& tree;
-  std::vector<Part> parts;
+  std::vector<BoundedPart> parts;
 
-  /// Long triangles are entered in parts: the box about a whole one would be nearly empty.
-  void enter(std::uint32_t triangle, const Triangle& t, double longest) {
+  /// Adds a triangle; long ones in parts, because the box around a whole one would be nearly empty.
+  void add(std::uint32_t triangle, const structures::Triangle& t, double longest) {
     std::size_t from = 0;
-    if (longestEdge(t, from) > longest) {
+    if (structures::longestEdge(t, from) > longest) {
       const std::size_t to = (from + 1) % 3;
-      Triangle half = t;
+      structures::Triangle half = t;
       half[to] = (t[from] + t[to]) / 2;
-      enter(triangle, half, longest);
+      add(triangle, half, longest);
       half = t;
       half[from] = (t[from] + t[to]) / 2;
-      enter(triangle, half, longest);
+      add(triangle, half, longest);
       return;
     }
     Eigen::AlignedBox3f box;
     for (const Vector3& corner : t) box.extend(tree.local(corner));
-    // twice: the point that asks is rounded too
+    // twice, for the rounding of the query point
     const Vector3f slack = Vector3f::Constant(2.0F * tree.slack_);
     parts.push_back({{box.min() - slack, box.max() + slack}, triangle});
   }
 
   static std::size_t split(Range range) {
     Eigen::AlignedBox3f box;
-    for (const Part& part : range) box.extend(part.box.center());
+    for (const BoundedPart& part : range) box.extend(part.box.center());
     Eigen::Index axis = 0;
     box.sizes().maxCoeff(&axis);
     const auto middle = static_cast<std::ptrdiff_t>(range.size() / 2);
     std::nth_element(range.begin(), range.begin() + middle, range.end(),
-                     [axis](const Part& a, const Part& b) {
+                     [axis](const BoundedPart& a, const BoundedPart& b) {
                        const float ca = a.box.min()[axis] + a.box.max()[axis];
                        const float cb = b.box.min()[axis] + b.box.max()[axis];
                        return ca != cb ? ca < cb : a.triangle < b.triangle;
@@ -63,7 +63,7 @@ struct TriangleTree::Builder {
     return range.size() / 2;
   }
 
-  /// Makes the node of a range and gives the box about it.
+  /// Builds the node of a range and returns its bounding box.
   Eigen::AlignedBox3f build(std::uint32_t number, Range range) {
     std::array<Range, 4> quarters{};
     std::size_t count = 0;
@@ -101,15 +101,15 @@ struct TriangleTree::Builder {
     return whole;
   }
 
-  /// A length that cuts the triangles into a few million parts at most.
-  static double affordable(std::span<const Triangle> triangles, double longest) {
+  /// [m] `longest`, doubled until the triangles have a few million parts at most.
+  static double limitParts(std::span<const structures::Triangle> triangles, double longest) {
     const double most = 4e6 + static_cast<double>(triangles.size());
     while (true) {
       double count = 0.0;
-      for (const Triangle& t : triangles) {
+      for (const structures::Triangle& t : triangles) {
         std::size_t from = 0;
-        const double across = longestEdge(t, from) / longest;
-        count += across <= 1.0 ? 1.0 : 2.0 * across + 8.0 * areaOf(t) / (longest * longest);
+        const double across = structures::longestEdge(t, from) / longest;
+        count += across <= 1.0 ? 1.0 : 2.0 * across + 8.0 * structures::areaOf(t) / (longest * longest);
       }
       if (!(count > most)) return longest;
       longest *= 2.0;
@@ -117,37 +117,37 @@ struct TriangleTree::Builder {
   }
 };
 
-TriangleTree::TriangleTree(std::span<const Triangle> triangles, double longest)
+TriangleTree::TriangleTree(std::span<const structures::Triangle> triangles, double longest)
     : triangles_(triangles.begin(), triangles.end()) {
   if (triangles.empty()) return;
   Eigen::AlignedBox3d box;
-  for (const Triangle& t : triangles) box.extend(boxOf(t));
+  for (const structures::Triangle& t : triangles) box.extend(structures::boxOf(t));
   centre_ = box.center();
   slack_ = static_cast<float>(box.diagonal().norm()) * std::numeric_limits<float>::epsilon();
   Builder builder{*this, {}};
   builder.parts.reserve(triangles.size());
-  longest = Builder::affordable(triangles, longest);
-  for (std::uint32_t i = 0; i < triangles.size(); ++i) builder.enter(i, triangles[i], longest);
+  longest = Builder::limitParts(triangles, longest);
+  for (std::uint32_t i = 0; i < triangles.size(); ++i) builder.add(i, triangles[i], longest);
   nodes_.reserve(builder.parts.size() / 2 + 1);
   nodes_.emplace_back();
   builder.build(0, builder.parts);
 }
 
-bool TriangleTree::anyWithin(const Vector3& p, double reach) const {
+bool TriangleTree::anyWithin(const Vector3& p, double radius) const {
   if (nodes_.empty()) return false;
   const Vector3f p_local = local(p);
-  const double squared = reach * reach;
-  std::array<std::uint32_t, 128> waiting;  // three for each level of the tree, which has at most 16
+  const double squared = radius * radius;
+  std::array<std::uint32_t, 128> stack;  // three for each level of the tree, which has at most 16
   std::size_t count = 0;
-  waiting[count++] = 0;
+  stack[count++] = 0;
   while (count > 0) {
-    const Node& node = nodes_[waiting[--count]];
+    const Node& node = nodes_[stack[--count]];
     const Lanes away = node.squaredDistances(p_local) * (1.0F - kRounding);
     for (std::size_t lane = 0; lane < 4; ++lane) {
       if (!(away[static_cast<Eigen::Index>(lane)] < squared) || node.child[lane] == kNothing) continue;
       if ((node.child[lane] & kTriangle) == 0) {
-        waiting[count++] = node.child[lane];
-      } else if (tenon::squaredDistance(p, triangles_[node.child[lane] - kTriangle]) < squared) {
+        stack[count++] = node.child[lane];
+      } else if (tenon::structures::squaredDistance(p, triangles_[node.child[lane] - kTriangle]) < squared) {
         return true;
       }
     }
@@ -155,7 +155,8 @@ bool TriangleTree::anyWithin(const Vector3& p, double reach) const {
   return false;
 }
 
-std::array<bool, 4> TriangleTree::Node::metBy(const Vector3f& p, const Vector3f& inverse_direction) const {
+std::array<bool, 4> TriangleTree::Node::intersectedBy(const Vector3f& p,
+                                                      const Vector3f& inverse_direction) const {
   Lanes enter = Lanes::Zero();
   Lanes leave = Lanes::Constant(std::numeric_limits<float>::max());
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -179,22 +180,22 @@ bool TriangleTree::oddCrossings(const Vector3& p, const Vector3& direction) cons
   const Vector3f p_local = local(p);
   const Vector3f inverse = direction.cwiseInverse().cast<float>();
   std::vector<std::uint32_t> crossed;
-  std::vector<std::uint32_t> waiting{0};
-  while (!waiting.empty()) {
-    const Node& node = nodes_[waiting.back()];
-    waiting.pop_back();
-    const std::array<bool, 4> met = node.metBy(p_local, inverse);
+  std::vector<std::uint32_t> stack{0};
+  while (!stack.empty()) {
+    const Node& node = nodes_[stack.back()];
+    stack.pop_back();
+    const std::array<bool, 4> met = node.intersectedBy(p_local, inverse);
     for (std::size_t lane = 0; lane < 4; ++lane) {
       const std::uint32_t child = node.child[lane];
       if (!met[lane] || child == kNothing) continue;
       if ((child & kTriangle) == 0) {
-        waiting.push_back(child);
-      } else if (crosses(p, direction, triangles_[child - kTriangle])) {
+        stack.push_back(child);
+      } else if (structures::rayIntersects(p, direction, triangles_[child - kTriangle])) {
         crossed.push_back(child);
       }
     }
   }
-  // a long triangle is found through several boxes
+  // a long triangle is found in several boxes
   std::sort(crossed.begin(), crossed.end());
   return (std::unique(crossed.begin(), crossed.end()) - crossed.begin()) % 2 == 1;
 }
@@ -209,17 +210,17 @@ TriangleTree::Search::Search(const TriangleTree& tree, const Vector3& centre, do
     std::size_t lane;
   };
   std::vector<Root> found;
-  std::vector<std::uint32_t> waiting{0};
-  for (std::size_t next = 0; next < waiting.size(); ++next) {
-    const Node& node = tree.nodes_[waiting[next]];
+  std::vector<std::uint32_t> queue{0};
+  for (std::size_t next = 0; next < queue.size(); ++next) {
+    const Node& node = tree.nodes_[queue[next]];
     const Lanes away = node.squaredDistances(p_local) * (1.0F - kRounding);
     for (std::size_t lane = 0; lane < 4; ++lane) {
       if (!(away[static_cast<Eigen::Index>(lane)] < far) || node.child[lane] == kNothing) continue;
-      const bool open = (node.child[lane] & kTriangle) == 0 && found.size() + waiting.size() - next < kRoots;
+      const bool open = (node.child[lane] & kTriangle) == 0 && found.size() + queue.size() - next < kRoots;
       if (open) {
-        waiting.push_back(node.child[lane]);
+        queue.push_back(node.child[lane]);
       } else {
-        found.push_back({waiting[next], lane});
+        found.push_back({queue[next], lane});
       }
     }
   }
@@ -248,23 +249,23 @@ void TriangleTree::Search::visit(const Node& node, const Vector3& p, const Vecto
   Lanes::Map(away.data()) = node.squaredDistances(p_local) * (1.0F - kRounding);
   // squared, rounded up
   const float limit = static_cast<float>(squared) * (1.0F + kRounding);
-  unsigned left = 0;
-  for (unsigned lane = 0; lane < 4; ++lane) left |= static_cast<unsigned>(away[lane] < limit) << lane;
-  while (left != 0) {
-    // the nearest box first: it makes the others likely to be skipped
-    auto lane = static_cast<unsigned>(std::countr_zero(left));
+  unsigned remaining = 0;
+  for (unsigned lane = 0; lane < 4; ++lane) remaining |= static_cast<unsigned>(away[lane] < limit) << lane;
+  while (remaining != 0) {
+    // the nearest box first, so that the others are likely to be pruned
+    auto lane = static_cast<unsigned>(std::countr_zero(remaining));
     for (unsigned other = lane + 1; other < 4; ++other) {
-      if ((left >> other & 1U) != 0 && away[other] < away[lane]) lane = other;
+      if ((remaining >> other & 1U) != 0 && away[other] < away[lane]) lane = other;
     }
     if (!(away[lane] < squared)) return;
-    left &= ~(1U << lane);
+    remaining &= ~(1U << lane);
     const std::uint32_t child = node.child[lane];
     if (child == kNothing) continue;
     if ((child & kTriangle) == 0) {
       visit(tree_.nodes_[child], p, p_local, squared);
       continue;
     }
-    const double candidate = tenon::squaredDistance(p, tree_.triangles_[child - kTriangle]);
+    const double candidate = tenon::structures::squaredDistance(p, tree_.triangles_[child - kTriangle]);
     if (candidate >= squared) continue;
     squared = candidate;
     last_ = child - kTriangle;
@@ -274,11 +275,11 @@ void TriangleTree::Search::visit(const Node& node, const Vector3& p, const Vecto
 double TriangleTree::Search::squaredDistance(const Vector3& p, double reach) {
   double squared = reach * reach;
   if (last_ != kNothing) {
-    squared = std::min(squared, tenon::squaredDistance(p, tree_.triangles_[last_]));
+    squared = std::min(squared, tenon::structures::squaredDistance(p, tree_.triangles_[last_]));
   }
   const Vector3f p_local = tree_.local(p);
   for (const Node& root : roots_) visit(root, p, p_local, squared);
   return squared;
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

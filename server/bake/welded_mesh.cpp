@@ -4,11 +4,11 @@
 #include <numeric>
 #include <span>
 
-namespace tenon {
+namespace tenon::bake {
 
 namespace {
 
-/// The direction in a triangle's plane, away from the edge a-b and square to it.
+/// The unit vector in a triangle's plane, perpendicular to the edge a-b and pointing away from it.
 Vector3 awayFromEdge(const Vector3& a, const Vector3& b, const Vector3& opposite) {
   const Vector3 along = (b - a).normalized();
   const Vector3 to = opposite - a;
@@ -22,15 +22,15 @@ std::uint32_t opposite(const WeldedMesh::Corners& corners, std::uint32_t from, s
   return corners[0];
 }
 
-/// Calls visit(halves) for the triangles at each edge.
-template <typename Half, typename Visit>
-void visitEdges(const std::vector<Half>& halves, Visit&& visit) {
-  for (std::size_t begin = 0; begin < halves.size();) {
+/// Calls visit(half-edges) for each edge.
+template <typename HalfEdge, typename Visit>
+void visitEdges(const std::vector<HalfEdge>& half_edges, Visit&& visit) {
+  for (std::size_t begin = 0; begin < half_edges.size();) {
     std::size_t end = begin + 1;
-    while (end < halves.size() && halves[end].from == halves[begin].from &&
-           halves[end].to == halves[begin].to)
+    while (end < half_edges.size() && half_edges[end].from == half_edges[begin].from &&
+           half_edges[end].to == half_edges[begin].to)
       ++end;
-    visit(std::span(halves).subspan(begin, end - begin));
+    visit(std::span(half_edges).subspan(begin, end - begin));
     begin = end;
   }
 }
@@ -38,7 +38,7 @@ void visitEdges(const std::vector<Half>& halves, Visit&& visit) {
 }  // namespace
 
 WeldedMesh::WeldedMesh(const TriangleMesh& mesh) {
-  // equal positions get equal numbers, by rank
+  // equal positions get equal numbers: their rank
   const auto before = [&](std::uint32_t a, std::uint32_t b) {
     const Vector3f& pa = mesh.vertices[a];
     const Vector3f& pb = mesh.vertices[b];
@@ -60,21 +60,21 @@ WeldedMesh::WeldedMesh(const TriangleMesh& mesh) {
     std::sort(t.begin(), t.end());
     if (t[0] != t[1] && t[1] != t[2]) all.push_back(t);
   }
-  // rank order is an order in space as well: neighbours stay near in memory
+  // ranks follow positions, so neighbours in space are near in memory
   std::sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
   for (const Corners& t : all) {
-    const Triangle triangle{positions[t[0]], positions[t[1]], positions[t[2]]};
-    if (!(areaOf(triangle) > 0.0)) continue;
+    const structures::Triangle triangle{positions[t[0]], positions[t[1]], positions[t[2]]};
+    if (!(structures::areaOf(triangle) > 0.0)) continue;
     corners.push_back(t);
     triangles.push_back(triangle);
   }
-  left_out = mesh.triangles.size() - triangles.size();
+  skipped = mesh.triangles.size() - triangles.size();
   closeHoles();
 }
 
-std::vector<WeldedMesh::Half> WeldedMesh::halves() const {
-  std::vector<Half> all;
+std::vector<WeldedMesh::HalfEdge> WeldedMesh::halfEdges() const {
+  std::vector<HalfEdge> all;
   all.reserve(corners.size() * 3);
   for (std::uint32_t i = 0; i < corners.size(); ++i) {
     const auto& [a, b, c] = corners[i];
@@ -86,8 +86,8 @@ std::vector<WeldedMesh::Half> WeldedMesh::halves() const {
   return all;
 }
 
-double WeldedMesh::bend(std::uint32_t triangle, std::uint32_t a, std::uint32_t b,
-                        std::uint32_t beyond) const {
+double WeldedMesh::dihedralCosine(std::uint32_t triangle, std::uint32_t a, std::uint32_t b,
+                                  std::uint32_t beyond) const {
   const Vector3& p_Ma = positions[a];
   const Vector3& p_Mb = positions[b];
   return awayFromEdge(p_Ma, p_Mb, positions[opposite(corners[triangle], a, b)])
@@ -95,9 +95,9 @@ double WeldedMesh::bend(std::uint32_t triangle, std::uint32_t a, std::uint32_t b
 }
 
 void WeldedMesh::closeHoles() {
-  // edges where the surface ends, found from either corner
-  std::vector<Half> open;
-  visitEdges(halves(), [&open](std::span<const Half> edge) {
+  // open edges, in both directions
+  std::vector<HalfEdge> open;
+  visitEdges(halfEdges(), [&open](std::span<const HalfEdge> edge) {
     if (edge.size() != 1) return;
     const auto& [from, to, triangle] = edge.front();
     open.push_back({from, to, triangle});
@@ -105,25 +105,26 @@ void WeldedMesh::closeHoles() {
   });
   std::sort(open.begin(), open.end());
   const auto at = [&open](std::uint32_t corner) {
-    return std::ranges::equal_range(open, corner, {}, &Half::from);
+    return std::ranges::equal_range(open, corner, {}, &HalfEdge::from);
   };
   constexpr double kCos120 = -0.5;
   for (const auto& [a, b, of_ab] : open) {
     if (a > b) continue;
     const bool fewer_at_a = at(a).size() < at(b).size();
     const auto others = fewer_at_a ? at(b) : at(a);
-    for (const Half& side : fewer_at_a ? at(a) : at(b)) {
+    for (const HalfEdge& side : fewer_at_a ? at(a) : at(b)) {
       const std::uint32_t c = side.to;
       if (c <= b) continue;
-      const auto other = std::ranges::lower_bound(others, c, {}, &Half::to);
+      const auto other = std::ranges::lower_bound(others, c, {}, &HalfEdge::to);
       if (other == others.end() || other->to != c) continue;
-      // three edges of one triangle are no hole
+      // the three edges of a single triangle are not a hole
       if (of_ab == side.triangle && of_ab == other->triangle) continue;
       const auto& [of_a, of_b] = fewer_at_a ? std::pair(side, *other) : std::pair(*other, side);
       const double straightest =
-          std::min({bend(of_ab, a, b, c), bend(of_b.triangle, b, c, a), bend(of_a.triangle, a, c, b)});
-      const Triangle patch{positions[a], positions[b], positions[c]};
-      if (straightest > kCos120 || !(areaOf(patch) > 0.0)) continue;
+          std::min({dihedralCosine(of_ab, a, b, c), dihedralCosine(of_b.triangle, b, c, a),
+                    dihedralCosine(of_a.triangle, a, c, b)});
+      const structures::Triangle patch{positions[a], positions[b], positions[c]};
+      if (straightest > kCos120 || !(structures::areaOf(patch) > 0.0)) continue;
       corners.push_back({a, b, c});
       triangles.push_back(patch);
       ++closed;
@@ -135,18 +136,18 @@ std::vector<WeldedMesh::Edge> WeldedMesh::sharpEdges() const {
   std::vector<Edge> open;
   std::vector<Edge> sharp;
   std::size_t edges = 0;
-  visitEdges(halves(), [&](std::span<const Half> edge) {
+  visitEdges(halfEdges(), [&](std::span<const HalfEdge> edge) {
     ++edges;
     const auto& [from, to, triangle] = edge.front();
     if (edge.size() == 1) open.push_back({from, to, triangle, Edge::kNone});
     if (edge.size() != 2) return;
     constexpr double kCos140 = -0.766;
     const std::uint32_t other = edge[1].triangle;
-    if (bend(triangle, from, to, opposite(corners[other], from, to)) > kCos140) {
+    if (dihedralCosine(triangle, from, to, opposite(corners[other], from, to)) > kCos140) {
       sharp.push_back({from, to, triangle, other});
     }
   });
-  // where nearly nothing is connected, an open edge says nothing about the shape
+  // in a mesh that is hardly connected, open edges are not features of the shape
   if (open.size() * 3 < edges) sharp.insert(sharp.end(), open.begin(), open.end());
   return sharp;
 }
@@ -173,4 +174,4 @@ std::pair<std::vector<std::uint32_t>, std::uint32_t> WeldedMesh::components() co
   return {std::move(numbers), count};
 }
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -7,48 +7,52 @@
 #include "server/bake/bake.h"
 #include "server/structures/triangle.h"
 
-namespace tenon {
+namespace tenon::bake {
 
-/// Triangles with equal corners known as equal, in an order that winding and duplicates do not change.
+/// A welded mesh: equal positions are one vertex. Its order does not depend on winding, duplicates or the
+/// order of the input.
 ///
-/// Corner numbers are ranks of positions, and each triangle lists its corners in rising order. Triangles
-/// without area and repeated ones are left out. A hole of one triangle, whose edges all end there and which
-/// goes on from a neighbour without a sharp bend, is closed: such a triangle was lost, and through a large
-/// one the outside would get into a solid.
+/// Vertex numbers are ranks of positions, and each triangle lists its vertices in ascending order. Triangles
+/// without area and duplicates are skipped. A hole of one triangle, bounded by three open edges and without a
+/// sharp angle to at least one neighbour, is closed: such a triangle is missing in the file, and the flood
+/// fill would enter the solid through a large one.
 struct WeldedMesh {
   using Corners = std::array<std::uint32_t, 3>;
 
   explicit WeldedMesh(const TriangleMesh& mesh);
 
-  /// Where two triangles meet at an angle, or one ends.
+  /// An edge with one or two triangles.
   struct Edge {
-    std::uint32_t from, to;       ///< corner numbers
-    std::uint32_t first, second;  ///< triangles; second is kNone where the surface ends
+    std::uint32_t from, to;       ///< vertices
+    std::uint32_t first, second;  ///< triangles; second is kNone for an open edge
     static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
   };
-  /// Edges with one triangle, or with two whose angle is sharper than 140 degrees.
+  /// Edges with one triangle, or with two whose dihedral angle is less than 140 degrees. Open edges are
+  /// returned only if they are less than a third of all edges.
   [[nodiscard]] std::vector<Edge> sharpEdges() const;
 
-  /// A number for each triangle, equal for those connected through corners; and how many numbers there are.
+  /// The number of each triangle's connected component (triangles with a common vertex), and the number of
+  /// components.
   [[nodiscard]] std::pair<std::vector<std::uint32_t>, std::uint32_t> components() const;
 
-  std::size_t left_out = 0;  ///< triangles without area, or repeated
-  std::size_t closed = 0;    ///< holes; their triangles are the last ones
+  std::size_t skipped = 0;  ///< triangles without area, or duplicates
+  std::size_t closed = 0;   ///< holes; the triangles that close them are the last ones
   std::vector<Vector3> positions;
   std::vector<Corners> corners;
-  std::vector<Triangle> triangles;
+  std::vector<structures::Triangle> triangles;
 
  private:
-  struct Half {
+  struct HalfEdge {
     std::uint32_t from, to, triangle;
-    auto operator<=>(const Half&) const = default;
+    auto operator<=>(const HalfEdge&) const = default;
   };
-  /// The edges of all triangles, those of one place beside each other.
-  [[nodiscard]] std::vector<Half> halves() const;
+  /// The edges of all triangles, sorted by their vertices.
+  [[nodiscard]] std::vector<HalfEdge> halfEdges() const;
   void closeHoles();
-  /// How a triangle goes on beyond its edge a-b to `beyond`: -1 straight on, 1 folded back.
-  [[nodiscard]] double bend(std::uint32_t triangle, std::uint32_t a, std::uint32_t b,
-                            std::uint32_t beyond) const;
+  /// [-] Cosine of the dihedral angle at edge a-b between a triangle and vertex `beyond`: -1 flat, 1 folded
+  /// back.
+  [[nodiscard]] double dihedralCosine(std::uint32_t triangle, std::uint32_t a, std::uint32_t b,
+                                      std::uint32_t beyond) const;
 };
 
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -4,16 +4,18 @@
 #include <cassert>
 #include <cmath>
 
-namespace tenon {
+namespace tenon::collision {
 namespace {
 
-/// A row whose free part is smaller than this share of it (squared) depends on the active rows.
-constexpr double kDependent = 1e-12;
+/// [-] A row depends on the active rows when its free part, squared and relative to it, is not above this.
+constexpr double kMinFree2 = 1e-12;
 
-/// A pivot (squared) below this share of its row has lost too many digits to be a difference.
-constexpr double kCancelled = 1e-4;
+/// [-] A pivot, squared and relative to its row, below this has lost too many digits by cancellation: the row
+/// is then projected instead.
+constexpr double kMinPivot2 = 1e-4;
 
-/// Sums in an order that depends on nothing but the length, four at a time.
+/// Dot product, four at a time: the order of summation depends on the length alone, so results are the same
+/// on all processors.
 double dotOf(const double* a, const double* b, std::size_t count) {
   Eigen::Array4d sums = Eigen::Array4d::Zero();
   std::size_t i = 0;
@@ -25,13 +27,13 @@ double dotOf(const double* a, const double* b, std::size_t count) {
   return sum;
 }
 
-/// y += share * x
-void addTimes(double share, const double* x, double* y, std::size_t count) {
+/// y += factor * x
+void addScaled(double factor, const double* x, double* y, std::size_t count) {
   std::size_t i = 0;
   for (; i + 4 <= count; i += 4) {
-    Eigen::Map<Eigen::Array4d>(y + i) += share * Eigen::Map<const Eigen::Array4d>(x + i);
+    Eigen::Map<Eigen::Array4d>(y + i) += factor * Eigen::Map<const Eigen::Array4d>(x + i);
   }
-  for (; i < count; ++i) y[i] += share * x[i];
+  for (; i < count; ++i) y[i] += factor * x[i];
 }
 
 }  // namespace
@@ -56,10 +58,10 @@ double RowNormal::dot(std::span<const double> all) const {
   return sum;
 }
 
-void RowNormal::addTo(std::span<double> all, double share) const {
+void RowNormal::addTo(std::span<double> all, double factor) const {
   for (std::size_t i = 0; i < 2; ++i) {
     if (body[i] == kNone) continue;
-    Eigen::Map<Vector6>(&all[6 * static_cast<std::size_t>(body[i])]) += share * part[i];
+    Eigen::Map<Vector6>(&all[6 * static_cast<std::size_t>(body[i])]) += factor * part[i];
   }
 }
 
@@ -70,7 +72,7 @@ ActiveSet::ActiveSet(std::size_t max_variables)
       l_(max_variables),
       r_(max_variables),
       free_(max_variables),
-      rest_(max_variables),
+      residual_(max_variables),
       cosine_(max_variables),
       sine_(max_variables) {
   rows_.reserve(max_variables);
@@ -82,7 +84,7 @@ void ActiveSet::reset(std::size_t variables) {
   rows_.clear();
 }
 
-void ActiveSet::solveLower(double* b, std::size_t first) const {
+void ActiveSet::solveForward(double* b, std::size_t first) const {
   for (std::size_t i = first; i < size(); ++i) {
     const double* L = line(i);
     const std::size_t from = std::max(first_[i], first);
@@ -90,74 +92,75 @@ void ActiveSet::solveLower(double* b, std::size_t first) const {
   }
 }
 
-void ActiveSet::solveUpper(double* b) const {
+void ActiveSet::solveBackward(double* b) const {
   for (std::size_t i = size(); i-- > 0;) {
     if (b[i] == 0.0) continue;
     const double* L = line(i);
     b[i] /= L[i];
-    addTimes(-b[i], L + first_[i], b + first_[i], i - first_[i]);
+    addScaled(-b[i], L + first_[i], b + first_[i], i - first_[i]);
   }
 }
 
 void ActiveSet::solve(std::span<double> b) const {
-  solveLower(b.data(), 0);
-  solveUpper(b.data());
+  solveForward(b.data(), 0);
+  solveBackward(b.data());
 }
 
-void ActiveSet::meet(const RowNormal& normal) {
+void ActiveSet::projectForward(const RowNormal& normal) {
   projected_ = normal;
-  meets_from_ = size();
+  first_coupled_ = size();
   for (std::size_t i = 0; i < size(); ++i) {
     l_[i] = normal.dot(normals_[i]);
-    if (l_[i] != 0.0) meets_from_ = std::min(meets_from_, i);
+    if (l_[i] != 0.0) first_coupled_ = std::min(first_coupled_, i);
   }
-  solveLower(l_.data(), meets_from_);
+  solveForward(l_.data(), first_coupled_);
 }
 
 void ActiveSet::project(const RowNormal& normal) {
-  meet(normal);
+  projectForward(normal);
   std::copy_n(l_.begin(), size(), r_.begin());
-  solveUpper(r_.data());
-  const std::span<double> free{free_.data(), n_};
-  std::fill(free.begin(), free.end(), 0.0);
-  normal.addTo(free, 1.0);
+  solveBackward(r_.data());
+  const std::span<double> free_part{free_.data(), n_};
+  std::fill(free_part.begin(), free_part.end(), 0.0);
+  normal.addTo(free_part, 1.0);
   for (std::size_t i = 0; i < size(); ++i) {
-    if (r_[i] != 0.0) normals_[i].addTo(free, -r_[i]);
+    if (r_[i] != 0.0) normals_[i].addTo(free_part, -r_[i]);
   }
-  // once more, for what rounding has left of the active normals in the free part
-  for (std::size_t i = 0; i < size(); ++i) rest_[i] = normals_[i].dot(free);
-  solveLower(rest_.data(), 0);
-  addTimes(1.0, rest_.data() + meets_from_, l_.data() + meets_from_, size() - meets_from_);
-  solveUpper(rest_.data());
+  // reorthogonalisation: removes what rounding left of the active normals in the free part
+  for (std::size_t i = 0; i < size(); ++i) residual_[i] = normals_[i].dot(free_part);
+  solveForward(residual_.data(), 0);
+  addScaled(1.0, residual_.data() + first_coupled_, l_.data() + first_coupled_, size() - first_coupled_);
+  solveBackward(residual_.data());
   for (std::size_t i = 0; i < size(); ++i) {
-    if (rest_[i] == 0.0) continue;
-    r_[i] += rest_[i];
-    normals_[i].addTo(free, -rest_[i]);
+    if (residual_[i] == 0.0) continue;
+    r_[i] += residual_[i];
+    normals_[i].addTo(free_part, -residual_[i]);
   }
-  free2_ = dotOf(free_.data(), free_.data(), n_);
+  free_norm2_ = dotOf(free_.data(), free_.data(), n_);
 }
 
-bool ActiveSet::dependent() const { return size() == n_ || free2_ <= kDependent * projected_.norm2(); }
+bool ActiveSet::dependent() const { return size() == n_ || free_norm2_ <= kMinFree2 * projected_.norm2(); }
 
-void ActiveSet::put(std::uint32_t row, double pivot) {
+void ActiveSet::push(std::uint32_t row, double pivot) {
   const std::size_t q = size();
   double* L = line(q);
-  first_[q] = meets_from_;
-  std::copy(l_.data() + meets_from_, l_.data() + q, L + meets_from_);
+  first_[q] = first_coupled_;
+  std::copy(l_.data() + first_coupled_, l_.data() + q, L + first_coupled_);
   L[q] = pivot;
   normals_[q] = projected_;
   rows_.push_back(row);
 }
 
-void ActiveSet::add(std::uint32_t row) { put(row, std::sqrt(free2_)); }
+void ActiveSet::add(std::uint32_t row) { push(row, std::sqrt(free_norm2_)); }
 
 bool ActiveSet::append(std::uint32_t row, const RowNormal& normal) {
   if (size() == n_) return false;
-  meet(normal);
+  projectForward(normal);
   const double norm2 = normal.norm2();
-  const double pivot2 = norm2 - dotOf(l_.data() + meets_from_, l_.data() + meets_from_, size() - meets_from_);
-  if (pivot2 > kCancelled * norm2) {
-    put(row, std::sqrt(pivot2));
+  const double pivot2 =
+      norm2 - dotOf(l_.data() + first_coupled_, l_.data() + first_coupled_, size() - first_coupled_);
+  if (pivot2 > kMinPivot2 * norm2) {
+    push(row, std::sqrt(pivot2));
     return true;
   }
   project(normal);
@@ -167,7 +170,7 @@ bool ActiveSet::append(std::uint32_t row, const RowNormal& normal) {
 }
 
 void ActiveSet::drop(std::size_t position) {
-  // what the dropped column held of the rows behind it is turned into their own, one after the other
+  // Givens rotations restore the triangle: they turn the dropped column into the pivots behind it
   for (std::size_t i = position + 1; i < size(); ++i) {
     const double* from = line(i);
     double* to = line(i - 1);
@@ -190,4 +193,4 @@ void ActiveSet::drop(std::size_t position) {
   rows_.pop_back();
 }
 
-}  // namespace tenon
+}  // namespace tenon::collision

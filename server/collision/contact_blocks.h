@@ -5,13 +5,13 @@
 #include "server/collision/pair_query.h"
 #include "server/structures/pointshell.h"
 
-namespace tenon {
+namespace tenon::collision {
 
-/// The points of up to sixteen listed contacts, from number `first`, as kernels read them.
-[[nodiscard]] inline ShellBlock blockOf(const Pointshell& shell, const ContactList& contacts,
-                                        std::size_t first) {
-  ShellBlock block;
-  block.count = static_cast<std::uint32_t>(std::min(contacts.size() - first, ShellBlock::kLanes));
+/// The points (in A) of up to sixteen listed contacts, starting with contact `first`, in the kernels' layout.
+[[nodiscard]] inline structures::ShellBlock blockOf(const structures::Pointshell& shell,
+                                                    const ContactList& contacts, std::size_t first) {
+  structures::ShellBlock block;
+  block.count = static_cast<std::uint32_t>(std::min(contacts.size() - first, structures::ShellBlock::kLanes));
   for (std::uint32_t i = 0; i < block.count; ++i) {
     const Vector3f& p_AP = shell.points()[contacts[first + i].point].p_MP;
     block.x[i] = p_AP.x();
@@ -21,4 +21,4 @@ namespace tenon {
   return block;
 }
 
-}  // namespace tenon
+}  // namespace tenon::collision

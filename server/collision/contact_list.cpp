@@ -5,7 +5,7 @@
 #include "server/collision/pair_query.h"
 #include "server/collision/query_kernels.h"
 
-namespace tenon {
+namespace tenon::collision {
 
 double penaltyForce(const Contact& contact, double stiffness) noexcept {
   return std::max(-contact.gap, 0.0) * stiffness * contact.area * (1.0 / kReferenceArea);
@@ -21,11 +21,11 @@ Wrench penaltyWrench(const PairQueryResult& result, const Vector3& p_WAo, double
   return F_Ao_W;
 }
 
-std::size_t reduceContacts(const ContactList& contacts, std::span<std::uint32_t> out) noexcept {
+std::size_t selectRepresentatives(const ContactList& contacts, std::span<std::uint32_t> out) noexcept {
   const std::size_t wanted = std::min(out.size(), contacts.size());
   if (wanted == 0) return 0;
 
-  // a turn of the normal by 1 rad counts as much as a step over the whole patch
+  // metric: a difference of 1 between unit normals counts as much as the extent of all contacts
   std::size_t chosen = 0;
   Vector3 low = contacts[0].p_WP;
   Vector3 high = low;
@@ -36,7 +36,7 @@ std::size_t reduceContacts(const ContactList& contacts, std::span<std::uint32_t>
   }
   const double extent2 = std::max((high - low).squaredNorm(), 1e-12);
 
-  // then always the one farthest from all that are chosen
+  // farthest-point selection: next is the contact with the largest distance to those selected
   std::array<double, kMaxPairContacts> apart2;
   apart2.fill(std::numeric_limits<double>::infinity());
   std::size_t count = 0;
@@ -57,4 +57,4 @@ std::size_t reduceContacts(const ContactList& contacts, std::span<std::uint32_t>
   }
 }
 
-}  // namespace tenon
+}  // namespace tenon::collision

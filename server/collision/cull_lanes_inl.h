@@ -1,5 +1,5 @@
-// Culling in floats: what is certainly too far. Included once for every instruction set, before its lanes of
-// doubles.
+// Culling in single precision. Included once for every instruction set, before the kernels in double
+// precision.
 
 #if defined(TENON_CULL_LANES) == defined(HWY_TARGET_TOGGLE)
 #ifdef TENON_CULL_LANES
@@ -17,186 +17,195 @@
 #include "server/collision/query_kernels.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tenon {
+namespace tenon::collision {
 namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// A bound is a number [voxels] that no exact interpolated distance is below.
+/// A bound is a lower bound [voxels] of all exact interpolated distances at a point or in a ball.
 namespace cull {
 
-/// By how much the interpolated distance at a point may be less than on the row next to it, b and c away
-/// along y and z: its mean is over rows 1 and sqrt(2) away too, of weights b + c - 2 b c and b c.
-HWY_INLINE Float lossOfPoint(const InBrick& at) {
-  constexpr float kLess = 0.585786F;   // 2 - sqrt(2)
-  constexpr float kWhole = 1.707107F;  // 1 / kLess
-  const Float rest = all(kWhole - 0.5F);
-  const Float b = hn::Add(hn::Abs(at.from_middle.y), rest);
-  const Float c = hn::Add(hn::Abs(at.from_middle.z), rest);
-  return hn::Sub(all(kWhole), hn::Mul(all(kLess), hn::Mul(b, c)));
+/// [voxels] By how much the interpolated distance at a point may be less than that on the nearest row of
+/// samples. For offsets b and c from that row along y and z, interpolation also weighs the rows at distance 1
+/// by b + c - 2 b c and the row at distance sqrt(2) by b c; samples differ by no more than their distance.
+HWY_INLINE Float rowErrorBound(const BrickPoint& at) {
+  constexpr float kWeight = 0.585786F;         // 2 - sqrt(2)
+  constexpr float kInverseWeight = 1.707107F;  // 1 / kWeight
+  const Float rest = splat(kInverseWeight - 0.5F);
+  const Float b = hn::Add(hn::Abs(at.from_centre.y), rest);
+  const Float c = hn::Add(hn::Abs(at.from_centre.z), rest);
+  return hn::Sub(splat(kInverseWeight), hn::Mul(splat(kWeight), hn::Mul(b, c)));
 }
-HWY_INLINE Float boundOfPoint(const Field& field, Whole brick, const InBrick& at) {
-  return hn::Sub(valueOf(field, brick, rowOf(at)), lossOfPoint(at));
+HWY_INLINE Float pointBound(const CullField& field, Int brick, const BrickPoint& at) {
+  return hn::Sub(interpolateRow(field, brick, nearestRow(at)), rowErrorBound(at));
 }
 
-/// Of points in a field with refined bricks: a child answers in its band, its coarse brick beyond, and
-/// neither may be near.
-HWY_INLINE Float boundsAmongChildren(const Field& field, const Spot& spot) {
-  const Mask sampled = hasBrick(spot.entry);
-  const Mask refined = isRefined(spot.entry);
-  const Children children = childrenOf(field, spot, refined);
-  const Whole own = hn::IfThenElse(asWholeMask(refined), children.own, whereSet(sampled, spot.entry));
-  const Float bound = boundOfPoint(field, own, spot.at);
+/// Bounds of points in a field with refined bricks. Inside its band the child is sampled, beyond it the
+/// coarse brick: the smaller bound of both.
+HWY_INLINE Float refinedPointBounds(const CullField& field, const VoxelLocation& location) {
+  const Mask sampled = hasBrick(location.entry);
+  const Mask refined = isRefined(location.entry);
+  const Children children = locateChildren(field, location, refined);
+  const Int own = hn::IfThenElse(asIntMask(refined), children.own, zeroUnless(sampled, location.entry));
+  const Float bound = pointBound(field, own, location.at);
   const Mask has_fine = hn::And(refined, hasBrick(children.fine));
-  const Whole fine = whereSet(has_fine, children.fine);
-  const Float fine_voxel = all(1.0F / static_cast<float>(field.refinement));
-  const Float fine_bound = hn::Mul(boundOfPoint(field, fine, children.at), fine_voxel);
+  const Int fine = zeroUnless(has_fine, children.fine);
+  const Float fine_voxel = splat(1.0F / static_cast<float>(field.refinement));
+  const Float fine_bound = hn::Mul(pointBound(field, fine, children.at), fine_voxel);
   return hn::IfThenElse(has_fine, hn::Min(bound, fine_bound), bound);
 }
 
-/// A value's bound over a ball of radius r whose centre is `away` from where the value is. A point of the
-/// ball takes its mean from corners about it, and the value may be one of two samples: squares are up to 3/4
-/// and 1/4 more in the mean.
-HWY_INLINE Float boundOfBall(Float value, Float away, Float r) {
-  const Float farthest = hn::Add(away, r);
-  return hn::Sub(value, hn::Sqrt(hn::Add(hn::Mul(farthest, farthest), all(1.0F))));
+/// Bound over a ball of radius r from a `value` at `distance` from the ball's centre. Interpolation averages
+/// the corners around a point of the ball, and the value may be the average of two samples: that adds at most
+/// 3/4 and 1/4 to the mean squared distance between them.
+HWY_INLINE Float ballBound(Float value, Float distance, Float r) {
+  const Float farthest = hn::Add(distance, r);
+  return hn::Sub(value, hn::Sqrt(hn::Add(hn::Mul(farthest, farthest), splat(1.0F))));
 }
 
-/// Where the centre is outside the grid, by how far; elsewhere the bound that there is.
-HWY_INLINE Float boundsOutside(const Field& field, const Place3& p, Float bound, Float r) {
-  const auto& most = field.cull.most;
-  const Place3 beyond{hn::Sub(p.x, clamped(p.x, all(most[0]))), hn::Sub(p.y, clamped(p.y, all(most[1]))),
-                      hn::Sub(p.z, clamped(p.z, all(most[2])))};
-  const Float away = norm(beyond);
-  const Mask outside = hn::Gt(away, hn::Zero(kF));
+/// Improves the bound of balls whose centre is outside the grid by the distance to the grid.
+HWY_INLINE Float boundsOutsideGrid(const CullField& field, const Vec3& p, Float bound, Float r) {
+  const auto& last_voxel = field.cull.last_voxel;
+  const Vec3 outside_by{hn::Sub(p.x, clamped(p.x, splat(last_voxel[0]))),
+                        hn::Sub(p.y, clamped(p.y, splat(last_voxel[1]))),
+                        hn::Sub(p.z, clamped(p.z, splat(last_voxel[2])))};
+  const Float distance = norm(outside_by);
+  const Mask outside = hn::Gt(distance, hn::Zero(kF));
   if (hn::AllFalse(kF, outside)) return bound;
-  // the outermost voxels' middles are half a diagonal from the border
-  const Float to_surface = hn::Add(away, all(field.cull.outside - kHalfDiagonal));
-  return hn::IfThenElse(outside, hn::Max(bound, boundOfBall(to_surface, hn::Zero(kF), r)), bound);
+  // the centres of the outermost voxels are up to half a diagonal from the border
+  const Float to_surface = hn::Add(distance, splat(field.cull.outside_grid - kHalfDiagonal));
+  return hn::IfThenElse(outside, hn::Max(bound, ballBound(to_surface, hn::Zero(kF), r)), bound);
 }
 
-/// By the middle of the centre's brick, as DistanceField::lowerBound.
-HWY_INLINE Float boundsByBrick(const Field& field, const Spot& spot, Float r) {
-  const auto from_middle = [](Whole voxel, Float from) HWY_ATTR {
-    return hn::Add(toFloat(voxel), hn::Sub(from, all(0.5F * (kVoxels - 1))));
+/// Bounds from the value at the centre of the brick that holds the ball's centre, as
+/// DistanceField::lowerBound.
+HWY_INLINE Float ballBoundsByBrick(const CullField& field, const VoxelLocation& location, Float r) {
+  const auto from_centre = [](Int voxel, Float from) HWY_ATTR {
+    return hn::Add(toFloat(voxel), hn::Sub(from, splat(0.5F * (kVoxels - 1))));
   };
-  const Float away =
-      norm({from_middle(spot.at.x, spot.at.from_middle.x), from_middle(spot.at.y, spot.at.from_middle.y),
-            from_middle(spot.at.z, spot.at.from_middle.z)});
-  return boundOfBall(farOf(field, spot.number), away, r);
+  const Float distance = norm({from_centre(location.at.x, location.at.from_centre.x),
+                               from_centre(location.at.y, location.at.from_centre.y),
+                               from_centre(location.at.z, location.at.from_centre.z)});
+  return ballBound(farBound(field, location.brick_index), distance, r);
 }
 
-/// By the row next to the centre, of lanes whose brick has samples.
-HWY_INLINE Float boundsByRow(const Field& field, const Spot& spot, Mask sampled, Float r) {
-  Whole brick = spot.entry;
-  const Mask refined = isRefined(spot.entry);
+/// Bounds from the row of samples nearest to the ball's centre, for lanes whose brick has samples.
+HWY_INLINE Float ballBoundsByRow(const CullField& field, const VoxelLocation& location, Mask sampled,
+                                 Float r) {
+  Int brick = location.entry;
+  const Mask refined = isRefined(location.entry);
   if (!hn::AllFalse(kF, refined)) {
-    brick = hn::IfThenElse(asWholeMask(refined), childrenOf(field, spot, refined).own, brick);
+    brick = hn::IfThenElse(asIntMask(refined), locateChildren(field, location, refined).own, brick);
   }
-  const Float half = all(0.5F);
-  const Float b = hn::Sub(half, hn::Abs(spot.at.from_middle.y));
-  const Float c = hn::Sub(half, hn::Abs(spot.at.from_middle.z));
-  const Float away = hn::Sqrt(hn::Add(hn::Mul(b, b), hn::Mul(c, c)));
-  return boundOfBall(valueOf(field, whereSet(sampled, brick), rowOf(spot.at)), away, r);
+  const Float half = splat(0.5F);
+  const Float b = hn::Sub(half, hn::Abs(location.at.from_centre.y));
+  const Float c = hn::Sub(half, hn::Abs(location.at.from_centre.z));
+  const Float distance = hn::Sqrt(hn::Add(hn::Mul(b, b), hn::Mul(c, c)));
+  return ballBound(interpolateRow(field, zeroUnless(sampled, brick), nearestRow(location.at)), distance, r);
 }
 
-/// `closely`: also by the row next to the centre, where the brick's middle does not tell.
-template <bool closely>
-HWY_INLINE Float boundsOfBalls(const Field& field, const Place3& p, Float r) {
-  const Spot spot = spotOf(field, p);
-  const Mask sampled = hasBrick(spot.entry);
-  const Float by_brick = boundsByBrick(field, spot, r);
+/// `use_row`: where the bound by brick does not suffice, also the bound by row.
+template <bool use_row>
+HWY_INLINE Float ballBounds(const CullField& field, const Vec3& p, Float r) {
+  const VoxelLocation location = locateVoxel(field, p);
+  const Mask sampled = hasBrick(location.entry);
+  const Float by_brick = ballBoundsByBrick(field, location, r);
   const Float beyond_band =
-      boundOfBall(all(static_cast<float>(DistanceField::kBandVoxels)), all(kHalfDiagonal), r);
+      ballBound(splat(static_cast<float>(structures::DistanceField::kBandVoxels)), splat(kHalfDiagonal), r);
   Float bound = hn::IfThenElse(sampled, by_brick, hn::Max(by_brick, beyond_band));
-  bound = hn::IfThenElse(isDeep(spot.entry), all(-1e9F), bound);
-  bound = boundsOutside(field, p, bound, r);
-  if constexpr (!closely) return bound;
-  const Mask wanted = hn::And(sampled, hn::Le(bound, all(field.cull.limit)));
-  if (hn::AllFalse(kF, wanted)) return bound;
-  return hn::IfThenElse(wanted, hn::Max(bound, boundsByRow(field, spot, sampled, r)), bound);
+  bound = hn::IfThenElse(isFarInside(location.entry), splat(-1e9F), bound);
+  bound = boundsOutsideGrid(field, p, bound, r);
+  if constexpr (!use_row) return bound;
+  const Mask refinable = hn::And(sampled, hn::Le(bound, splat(field.cull.limit)));
+  if (hn::AllFalse(kF, refinable)) return bound;
+  return hn::IfThenElse(refinable, hn::Max(bound, ballBoundsByRow(field, location, sampled, r)), bound);
 }
 
-/// What was left out, lane by lane.
-struct LeftOut {
-  explicit LeftOut(Culled& the_culled) : culled(the_culled), smallest(all(the_culled.smallest_bound)) {}
-  ~LeftOut() { culled.smallest_bound = hn::GetLane(hn::MinOfLanes(kF, smallest)); }
-  LeftOut(const LeftOut&) = delete;
-  LeftOut& operator=(const LeftOut&) = delete;
+/// Accumulates the smallest bound of what was culled, per lane; reduced to one value on destruction.
+struct CulledBound {
+  explicit CulledBound(CullResult& the_culled)
+      : culled(the_culled), smallest(splat(the_culled.smallest_bound)) {}
+  ~CulledBound() { culled.smallest_bound = hn::GetLane(hn::MinOfLanes(kF, smallest)); }
+  CulledBound(const CulledBound&) = delete;
+  CulledBound& operator=(const CulledBound&) = delete;
 
-  HWY_INLINE void addUnless(Mask reaches, Float bound) {
-    smallest = hn::Min(smallest, hn::IfThenElse(reaches, smallest, bound));
+  HWY_INLINE void addWhereNot(Mask is_in_reach, Float bound) {
+    smallest = hn::Min(smallest, hn::IfThenElse(is_in_reach, smallest, bound));
   }
 
-  Culled& culled;
+  CullResult& culled;
   Float smallest;
 };
 
-/// Which balls of a block may hold a contact.
-template <bool closely>
-HWY_INLINE std::uint32_t reachingBalls(const Field& field, const ShellBlock& balls, LeftOut& left_out) {
-  const Float limit = all(field.cull.limit);
-  std::uint32_t reaching = 0;
-  // lanes that are not in use are as the first
+/// Bit mask of the balls of a block that may hold a contact.
+template <bool use_row>
+HWY_INLINE std::uint32_t ballsInReach(const CullField& field, const structures::ShellBlock& balls,
+                                      CulledBound& skipped) {
+  const Float limit = splat(field.cull.limit);
+  std::uint32_t in_reach = 0;
+  // unused lanes repeat the first one
   for (std::size_t i = 0; i < balls.count; i += hn::Lanes(kF)) {
-    const Float radius = hn::Mul(hn::LoadU(kF, balls.radius.data() + i), all(field.cull.per_metre));
-    const Float bound = boundsOfBalls<closely>(field, inGrid(field.cull, balls, i), radius);
-    const Mask reaches = hn::Le(bound, limit);
-    left_out.addUnless(reaches, bound);
-    reaching |= bitsOf(reaches) << i;
+    const Float radius = hn::Mul(hn::LoadU(kF, balls.radius.data() + i), splat(field.cull.per_metre));
+    const Float bound = ballBounds<use_row>(field, inGrid(field.cull, balls, i), radius);
+    const Mask is_in_reach = hn::Le(bound, limit);
+    skipped.addWhereNot(is_in_reach, bound);
+    in_reach |= bitsOf(is_in_reach) << i;
   }
-  left_out.culled.spheres += balls.count;
-  return reaching & ((1U << balls.count) - 1U);
+  skipped.culled.spheres += balls.count;
+  return in_reach & ((1U << balls.count) - 1U);
 }
 
-std::uint32_t clusters(const LaneFrame& frame, const ShellBlock& balls, Culled& culled) noexcept {
-  LeftOut left_out(culled);
-  return reachingBalls<false>(Field(frame), balls, left_out);
+/// QueryKernels::clusters
+std::uint32_t clusters(const LaneFrame& frame, const structures::ShellBlock& balls,
+                       CullResult& culled) noexcept {
+  CulledBound skipped(culled);
+  return ballsInReach<false>(CullField(frame), balls, skipped);
 }
 
-/// Leaves whose points are looked at.
-struct Leaves {
-  static constexpr std::size_t kMost = Candidates::kClusters * Pointshell::kClusterLeaves;
+/// Indices of the leaves whose points are tested.
+struct LeafBatch {
+  static constexpr std::size_t kCapacity =
+      Candidates::kBatchClusters * structures::Pointshell::kClusterLeaves;
 
-  std::array<std::uint32_t, kMost> number;
+  std::array<std::uint32_t, kCapacity> index;
   std::size_t count = 0;
 };
 
-/// What is known of points before their samples are read.
-struct Prospects {
+/// Location and row error of points whose samples are not read yet.
+struct CandidateBounds {
   template <typename T>
-  using Lanes = std::array<T, Leaves::kMost * ShellBlock::kLanes>;
+  using Lanes = std::array<T, LeafBatch::kCapacity * structures::ShellBlock::kLanes>;
 
-  alignas(64) Lanes<std::int32_t> entry, place;
-  Lanes<float> along, loss;
+  alignas(64) Lanes<std::int32_t> entry, offset;
+  Lanes<float> fraction, row_error;
 
-  HWY_INLINE void store(const Spot& spot, std::size_t i) {
-    const Row row = rowOf(spot.at);
-    hn::StoreU(spot.entry, kI, entry.data() + i);
-    hn::StoreU(row.place, kI, place.data() + i);
-    hn::StoreU(row.along, kF, along.data() + i);
-    hn::StoreU(lossOfPoint(spot.at), kF, loss.data() + i);
+  HWY_INLINE void store(const VoxelLocation& location, std::size_t i) {
+    const SampleRow row = nearestRow(location.at);
+    hn::StoreU(location.entry, kI, entry.data() + i);
+    hn::StoreU(row.offset, kI, offset.data() + i);
+    hn::StoreU(row.fraction, kF, fraction.data() + i);
+    hn::StoreU(rowErrorBound(location.at), kF, row_error.data() + i);
   }
 };
 
-/// Of one vector of points, from i of `prospects`, which are at p.
+/// Bounds of one vector of points: those from number i in `bounds`; p() returns their positions.
 template <typename P>
-HWY_INLINE Float boundsOfPoints(const Field& field, const Prospects& prospects, std::size_t i, P&& p) {
-  const Whole entry = hn::LoadU(kI, prospects.entry.data() + i);
+HWY_INLINE Float pointBounds(const CullField& field, const CandidateBounds& bounds, std::size_t i, P&& p) {
+  const Int entry = hn::LoadU(kI, bounds.entry.data() + i);
   const Mask sampled = hasBrick(entry);
-  const Float apart = hn::IfThenElse(isDeep(entry), all(-1e9F), all(field.cull.beyond_band));
+  const Float unsampled = hn::IfThenElse(isFarInside(entry), splat(-1e9F), splat(field.cull.beyond_band));
   if (!hn::AllFalse(kF, isRefined(entry))) {
-    return hn::IfThenElse(sampled, boundsAmongChildren(field, spotOf(field, p())), apart);
+    return hn::IfThenElse(sampled, refinedPointBounds(field, locateVoxel(field, p())), unsampled);
   }
-  const Row row{hn::LoadU(kI, prospects.place.data() + i), hn::LoadU(kF, prospects.along.data() + i)};
-  const Float value = valueOf(field, whereSet(sampled, entry), row);
-  return hn::IfThenElse(sampled, hn::Sub(value, hn::LoadU(kF, prospects.loss.data() + i)), apart);
+  const SampleRow row{hn::LoadU(kI, bounds.offset.data() + i), hn::LoadU(kF, bounds.fraction.data() + i)};
+  const Float value = interpolateRow(field, zeroUnless(sampled, entry), row);
+  return hn::IfThenElse(sampled, hn::Sub(value, hn::LoadU(kF, bounds.row_error.data() + i)), unsampled);
 }
 
-/// Appends the lanes from i of a leaf that are near.
-HWY_INLINE void append(const Pointshell& shell, std::uint32_t leaf, std::size_t i, Mask near,
-                       [[maybe_unused]] Number count_up, Candidates& out) {
-  const ShellBlock& points = shell.pointsOfLeaf(leaf);
+/// Appends the `near` lanes of the vector that starts at point i of a leaf.
+HWY_INLINE void append(const structures::Pointshell& shell, std::uint32_t leaf, std::size_t i, Mask near,
+                       [[maybe_unused]] UInt iota, Candidates& out) {
+  const structures::ShellBlock& points = shell.pointsOfLeaf(leaf);
   const std::uint32_t first = shell.leaves()[leaf].first + static_cast<std::uint32_t>(i);
 #if HWY_TARGET <= HWY_AVX3
   near = hn::And(near, hn::FirstN(kF, points.count - i));
@@ -204,7 +213,7 @@ HWY_INLINE void append(const Pointshell& shell, std::uint32_t leaf, std::size_t 
   hn::StoreU(hn::Compress(hn::LoadU(kF, points.x.data() + i), near), kF, out.x.data() + n);
   hn::StoreU(hn::Compress(hn::LoadU(kF, points.y.data() + i), near), kF, out.y.data() + n);
   hn::StoreU(hn::Compress(hn::LoadU(kF, points.z.data() + i), near), kF, out.z.data() + n);
-  hn::StoreU(hn::Compress(hn::Add(count_up, hn::Set(kU, first)), hn::RebindMask(kU, near)), kU,
+  hn::StoreU(hn::Compress(hn::Add(iota, hn::Set(kU, first)), hn::RebindMask(kU, near)), kU,
              out.point.data() + n);
   out.count += static_cast<std::uint32_t>(hn::CountTrue(kF, near));
 #else
@@ -219,53 +228,57 @@ HWY_INLINE void append(const Pointshell& shell, std::uint32_t leaf, std::size_t 
 #endif
 }
 
-/// In two rounds: reading is waiting for memory, and for many points at once in short loops.
-HWY_INLINE void appendNear(const Field& field, const Pointshell& shell, const Leaves& leaves, Candidates& out,
-                           LeftOut& left_out) {
-  Prospects prospects;
+/// Appends the points that may be contacts. In two passes, index then samples: each pass is a short loop
+/// whose memory accesses overlap.
+HWY_INLINE void appendCandidates(const CullField& field, const structures::Pointshell& shell,
+                                 const LeafBatch& leaves, Candidates& out, CulledBound& skipped) {
+  CandidateBounds bounds;
   for (std::size_t leaf = 0; leaf < leaves.count; ++leaf) {
-    const ShellBlock& points = shell.pointsOfLeaf(leaves.number[leaf]);
+    const structures::ShellBlock& points = shell.pointsOfLeaf(leaves.index[leaf]);
     for (std::size_t i = 0; i < points.count; i += hn::Lanes(kF)) {
-      prospects.store(spotOf(field, inGrid(field.cull, points, i)), leaf * ShellBlock::kLanes + i);
+      bounds.store(locateVoxel(field, inGrid(field.cull, points, i)),
+                   leaf * structures::ShellBlock::kLanes + i);
     }
   }
-  const Float limit = all(field.cull.limit);
-  const Number count_up = hn::Iota(kU, 0);
+  const Float limit = splat(field.cull.limit);
+  const UInt iota = hn::Iota(kU, 0);
   for (std::size_t leaf = 0; leaf < leaves.count; ++leaf) {
-    const ShellBlock& points = shell.pointsOfLeaf(leaves.number[leaf]);
+    const structures::ShellBlock& points = shell.pointsOfLeaf(leaves.index[leaf]);
     for (std::size_t i = 0; i < points.count; i += hn::Lanes(kF)) {
-      const Float bound = boundsOfPoints(field, prospects, leaf * ShellBlock::kLanes + i,
-                                         [&]() HWY_ATTR { return inGrid(field.cull, points, i); });
+      const Float bound = pointBounds(field, bounds, leaf * structures::ShellBlock::kLanes + i,
+                                      [&]() HWY_ATTR { return inGrid(field.cull, points, i); });
       const Mask near = hn::Le(bound, limit);
-      left_out.addUnless(near, bound);
-      append(shell, leaves.number[leaf], i, near, count_up, out);
+      skipped.addWhereNot(near, bound);
+      append(shell, leaves.index[leaf], i, near, iota, out);
     }
-    left_out.culled.points += points.count;
+    skipped.culled.points += points.count;
   }
 }
 
-void candidates(const LaneFrame& frame, const Pointshell& shell, std::span<const std::uint32_t> of,
-                Candidates& out, Culled& culled) noexcept {
-  const Field field(frame);
-  LeftOut left_out(culled);
-  // step by step for all: each step's reads wait for memory together
-  std::array<std::uint32_t, Candidates::kClusters> reaching{};
-  for (std::size_t i = 0; i < of.size(); ++i) {
-    reaching[i] = reachingBalls<true>(field, shell.leavesOfCluster(of[i]), left_out);
+/// QueryKernels::candidates
+void candidates(const LaneFrame& frame, const structures::Pointshell& shell,
+                std::span<const std::uint32_t> cluster_indices, Candidates& out,
+                CullResult& culled) noexcept {
+  const CullField field(frame);
+  CulledBound skipped(culled);
+  // one step for all clusters, then the next: memory accesses of a step overlap
+  std::array<std::uint32_t, Candidates::kBatchClusters> in_reach{};
+  for (std::size_t i = 0; i < cluster_indices.size(); ++i) {
+    in_reach[i] = ballsInReach<true>(field, shell.leavesOfCluster(cluster_indices[i]), skipped);
   }
-  Leaves leaves;
-  for (std::size_t i = 0; i < of.size(); ++i) {
-    const std::uint32_t first = shell.clusters()[of[i]].first;
-    for (std::uint32_t bits = reaching[i]; bits != 0; bits &= bits - 1) {
-      leaves.number[leaves.count++] = first + static_cast<std::uint32_t>(std::countr_zero(bits));
+  LeafBatch leaves;
+  for (std::size_t i = 0; i < cluster_indices.size(); ++i) {
+    const std::uint32_t first = shell.clusters()[cluster_indices[i]].first;
+    for (std::uint32_t bits = in_reach[i]; bits != 0; bits &= bits - 1) {
+      leaves.index[leaves.count++] = first + static_cast<std::uint32_t>(std::countr_zero(bits));
     }
   }
-  appendNear(field, shell, leaves, out, left_out);
+  appendCandidates(field, shell, leaves, out, skipped);
 }
 
 }  // namespace cull
 }  // namespace HWY_NAMESPACE
-}  // namespace tenon
+}  // namespace tenon::collision
 HWY_AFTER_NAMESPACE();
 
 #endif

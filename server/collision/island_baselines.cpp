@@ -2,53 +2,53 @@
 
 #include "server/collision/island_job.h"
 
-namespace tenon {
+namespace tenon::collision {
 namespace {
 
-/// How much of its depth the blocking baseline takes back in a sub-step: the paper gives none, more than this
-/// makes the proxy jump at edges.
-constexpr double kPushOutShare = 0.5;
+/// [-] Fraction of a body's overlap that the blocking baseline removes per step. The paper gives none; with
+/// more the proxy jumps at edges.
+constexpr double kPushOutFraction = 0.5;
 
 }  // namespace
 
 void IslandSolver::solveBlocking(const Job& job, SolveReport& report) {
-  held_.clear();
+  active_.clear();
   while (true) {
     queryPairs(job, 0.0, report);
     rows_.clear();
-    solveMotions(job, report);
-    blockMotions(job);
-    const double way = travel(job);
-    if (way < kArrived) break;
-    if (report.substeps == job.limits.substeps) {
-      report.travel_capped = way > kUnfinished;
+    solveQp(job, report);
+    blockOpposedMotion(job);
+    const double length = stepLength(job);
+    if (length < kStepTolerance) break;
+    if (report.steps == job.limits.max_steps) {
+      report.unconverged = length > kUnconverged;
       break;
     }
-    move(job, std::min(1.0, job.limits.substep_travel / way));
-    ++report.substeps;
+    takeStep(job, std::min(1.0, job.limits.max_step_length / length));
+    ++report.steps;
   }
-  fillPenalties(job);
+  fillPenaltyForces(job);
 }
 
 void IslandSolver::solvePenalty(const Job& job, SolveReport& report) {
-  held_.clear();
+  active_.clear();
   rows_.clear();
   while (true) {
-    solveMotions(job, report);
-    const double way = travel(job);
-    if (way < kArrived) break;
-    if (report.substeps == job.limits.substeps) {
-      report.travel_capped = way > kUnfinished;
+    solveQp(job, report);
+    const double length = stepLength(job);
+    if (length < kStepTolerance) break;
+    if (report.steps == job.limits.max_steps) {
+      report.unconverged = length > kUnconverged;
       break;
     }
-    move(job, std::min(1.0, job.limits.substep_travel / way));
-    ++report.substeps;
+    takeStep(job, std::min(1.0, job.limits.max_step_length / length));
+    ++report.steps;
   }
   queryPairs(job, 0.0, report);
-  fillPenalties(job);
+  fillPenaltyForces(job);
 }
 
-void IslandSolver::blockMotions(const Job& job) {
+void IslandSolver::blockOpposedMotion(const Job& job) {
   std::fill(wrenches_.begin(), wrenches_.end(), Wrench{});
   std::fill(depths_.begin(), depths_.end(), 0.0);
   for (std::size_t i = 0; i < job.pairs.size(); ++i) {
@@ -56,32 +56,32 @@ void IslandSolver::blockMotions(const Job& job) {
     const PairQueryResult& query = job.results[i].query;
     const double depth = std::max(-query.smallest_gap, 0.0);
     const double stiffness = job.limits.penalty_stiffness;
-    if (pair.body_a != GapRow::kStatic) {
+    if (pair.body_a != ContactConstraint::kStatic) {
       const auto a = static_cast<std::size_t>(pair.body_a);
       wrenches_[a] += penaltyWrench(query, job.poseA(pair).translation(), stiffness);
       depths_[a] = std::max(depths_[a], depth);
     }
-    if (pair.body_b != GapRow::kStatic) {
+    if (pair.body_b != ContactConstraint::kStatic) {
       const auto b = static_cast<std::size_t>(pair.body_b);
       wrenches_[b] += -penaltyWrench(query, job.poseB(pair).translation(), stiffness);
       depths_[b] = std::max(depths_[b], depth);
     }
   }
-  // take away what opposes the summed force and the summed torque (paper §3.1)
+  // remove the components of the step that oppose the summed force and the summed torque (paper §3.1)
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
-    Displacement& motion = motions_[i];
+    Displacement& step = step_[i];
     if (wrenches_[i].force.squaredNorm() > 0.0) {
       const Vector3 n = wrenches_[i].force.normalized();
-      motion.translation += (std::max(-motion.translation.dot(n), 0.0) + kPushOutShare * depths_[i]) * n;
+      step.translation += (std::max(-step.translation.dot(n), 0.0) + kPushOutFraction * depths_[i]) * n;
     }
     if (wrenches_[i].torque.squaredNorm() > 0.0) {
       const Vector3 n = wrenches_[i].torque.normalized();
-      motion.rotation += std::max(-motion.rotation.dot(n), 0.0) * n;
+      step.rotation += std::max(-step.rotation.dot(n), 0.0) * n;
     }
   }
 }
 
-void IslandSolver::fillPenalties(const Job& job) {
+void IslandSolver::fillPenaltyForces(const Job& job) {
   for (std::size_t i = 0; i < job.pairs.size(); ++i) {
     IslandPairResult& result = job.results[i];
     result.F_Ao_W =
@@ -92,4 +92,4 @@ void IslandSolver::fillPenalties(const Job& job) {
   }
 }
 
-}  // namespace tenon
+}  // namespace tenon::collision

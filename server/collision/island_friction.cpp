@@ -3,83 +3,86 @@
 
 #include "server/collision/island_job.h"
 
-namespace tenon {
+namespace tenon::collision {
 namespace {
 
-/// Cosine of the angle up to which what holds a body belongs to one patch.
-constexpr double kSamePatch = 0.9;
+/// [-] Cosine of the largest angle between the normals of one patch.
+constexpr double kSamePatchCosine = 0.9;
 
-/// Loads and directions settle within this share, in so many solves at most.
-constexpr double kRubTolerance = 1e-3;
-constexpr int kRubRounds = 8;
+/// [-] Loads and directions have converged when they change by less than this fraction.
+constexpr double kFrictionTolerance = 1e-3;
 
-/// [m] Less is no sliding.
-constexpr double kNoSlide = 1e-10;
+/// After so many rounds the last loads and directions are used.
+constexpr int kFrictionRounds = 8;
 
-/// A limit is passed when it is passed by more than rounding.
-constexpr double kBeyond = 1.0 + 1e-6;
+/// [m] A smaller tangential displacement has no direction.
+constexpr double kMinSlip = 1e-10;
+
+/// [-] Factor on the friction limit that allows for rounding.
+constexpr double kLimitMargin = 1.0 + 1e-6;
 
 }  // namespace
 
-void IslandSolver::rub(const Job& job, SolveReport& report) {
+void IslandSolver::solveFriction(const Job& job, SolveReport& report) {
   patches_.clear();
-  const bool rough = std::any_of(job.pairs.begin(), job.pairs.end(),
-                                 [](const IslandPair& pair) { return pair.friction.at_rest > 0.0; });
-  if (!rough) return;
-  loadPatches(job);
-  bool changes = !patches_.empty();
-  for (int round = 0; changes && round < kRubRounds; ++round) {
-    setFriction(job);
-    solveMotions(job, report, first_patch_row_);
-    changes = judgePatches(job);
+  const bool frictional = std::any_of(job.pairs.begin(), job.pairs.end(),
+                                      [](const IslandPair& pair) { return pair.friction.at_rest > 0.0; });
+  if (!frictional) return;
+  collectPatches(job);
+  bool changed = !patches_.empty();
+  for (int round = 0; changed && round < kFrictionRounds; ++round) {
+    applyFriction(job);
+    solveQp(job, report, first_patch_row_);
+    changed = updatePatches(job);
   }
 }
 
-bool IslandSolver::loadPatches(const Job& job) {
-  std::array<double, kMaxPatches> before{};
+bool IslandSolver::collectPatches(const Job& job) {
+  std::array<double, kMaxPatches> load_before{};
   for (std::size_t k = 0; k < patches_.size(); ++k) {
-    before[k] = patches_[k].load;
+    load_before[k] = patches_[k].load;
     patches_[k].load = 0.0;
-    patches_[k].push_W = patches_[k].at_W = Vector3::Zero();
+    patches_[k].normal_force_W = patches_[k].weighted_p_W = Vector3::Zero();
   }
-  const std::size_t known = patches_.size();
-  first_patch_row_ = listed_ + flank_count_;
-  for (const std::uint32_t row : held_) {
+  const std::size_t patches_before = patches_.size();
+  first_patch_row_ = contact_row_count_ + secondary_plane_count_;
+  for (const std::uint32_t row : active_) {
     if (row >= first_patch_row_) break;
-    const std::size_t pair = row < listed_ ? pairOfRow(job, row) : flanks_[row - listed_].pair;
-    const GapRow& gap = rows_[row];
-    // what binds only farther along the way does not rub yet
-    if (job.pairs[pair].friction.at_rest <= 0.0 || gap.gap > kTouchGap) continue;
-    Patch* found = std::find_if(patches_.begin(), patches_.end(), [&](const Patch& patch) {
-      return patch.pair == pair && patch.n_W.dot(gap.n_W) > kSamePatch;
+    const std::size_t pair =
+        row < contact_row_count_ ? pairOfRow(job, row) : secondary_planes_[row - contact_row_count_].pair;
+    const ContactConstraint& contact = rows_[row];
+    // a contact that the step has yet to reach has no friction
+    if (job.pairs[pair].friction.at_rest <= 0.0 || contact.gap > kTouchGap) continue;
+    FrictionPatch* found = std::find_if(patches_.begin(), patches_.end(), [&](const FrictionPatch& patch) {
+      return patch.pair == pair && patch.n_W.dot(contact.n_W) > kSamePatchCosine;
     });
     if (found == patches_.end()) {
-      Patch patch;
+      FrictionPatch patch;
       patch.pair = pair;
-      patch.n_W = gap.n_W;
+      patch.n_W = contact.n_W;
       if (!patches_.push_back(patch)) continue;
       found = &patches_.back();
     }
     found->load += multipliers_[row];
-    found->push_W += multipliers_[row] * gap.n_W;
-    found->at_W += multipliers_[row] * gap.p_WP;
+    found->normal_force_W += multipliers_[row] * contact.n_W;
+    found->weighted_p_W += multipliers_[row] * contact.p_WP;
   }
-  bool changed = patches_.size() > known;
+  bool changed = patches_.size() > patches_before;
   for (std::size_t k = 0; k < patches_.size(); ++k) {
-    Patch& patch = patches_[k];
-    changed = changed || std::abs(patch.load - before[k]) > kRubTolerance * patch.load;
+    FrictionPatch& patch = patches_[k];
+    changed = changed || std::abs(patch.load - load_before[k]) > kFrictionTolerance * patch.load;
     if (patch.load <= 0.0) continue;
-    patch.n_W = patch.push_W.normalized();
-    patch.p_WP = patch.at_W / patch.load;
+    patch.n_W = patch.normal_force_W.normalized();
+    patch.p_WP = patch.weighted_p_W / patch.load;
   }
   return changed;
 }
 
-void IslandSolver::setFriction(const Job& job) {
+void IslandSolver::applyFriction(const Job& job) {
   rows_.resize(first_patch_row_);
-  held_.erase(std::lower_bound(held_.begin(), held_.end(), first_patch_row_), held_.end());
-  for (MovableBody& body : job.bodies) body.drag_Bo_W = Wrench{};
-  for (Patch& patch : patches_) {
+  active_.erase(std::lower_bound(active_.begin(), active_.end(), first_patch_row_), active_.end());
+  for (MovableBody& body : job.bodies) body.friction_Bo_W = Wrench{};
+  for (FrictionPatch& patch : patches_) {
     patch.first_row = 0;
     if (patch.load <= 0.0) continue;
     const IslandPair& pair = job.pairs[patch.pair];
@@ -91,18 +94,18 @@ void IslandSolver::setFriction(const Job& job) {
       }
       continue;
     }
-    const Vector3 drag_A_W = pair.friction.sliding * patch.load * patch.along_W;
+    const Vector3 f_A_W = pair.friction.sliding * patch.load * patch.direction_W;
     for (const auto& [index, sign] : {std::pair{pair.body_a, 1.0}, std::pair{pair.body_b, -1.0}}) {
-      if (index == GapRow::kStatic) continue;
+      if (index == ContactConstraint::kStatic) continue;
       MovableBody& body = job.bodies[static_cast<std::size_t>(index)];
-      const Vector3 drag_W = sign * drag_A_W;
-      body.drag_Bo_W += {drag_W, (patch.p_WP - body.X_WB.translation()).cross(drag_W)};
+      const Vector3 f_W = sign * f_A_W;
+      body.friction_Bo_W += {f_W, (patch.p_WP - body.X_WB.translation()).cross(f_W)};
     }
   }
 }
 
-Vector3 IslandSolver::frictionOf(const Job& job, const Patch& patch) const {
-  if (patch.slides) return job.pairs[patch.pair].friction.sliding * patch.load * patch.along_W;
+Vector3 IslandSolver::frictionForce(const Job& job, const FrictionPatch& patch) const {
+  if (patch.slides) return job.pairs[patch.pair].friction.sliding * patch.load * patch.direction_W;
   Vector3 sum = Vector3::Zero();
   if (patch.first_row == 0) return sum;
   for (std::size_t row = patch.first_row; row < patch.first_row + kPatchRows; ++row) {
@@ -111,48 +114,48 @@ Vector3 IslandSolver::frictionOf(const Job& job, const Patch& patch) const {
   return sum;
 }
 
-bool IslandSolver::judgePatches(const Job& job) {
-  // what held the patches in this solve, before their loads are found again
+bool IslandSolver::updatePatches(const Job& job) {
+  // friction forces of this solve, before collectPatches overwrites the loads
   std::array<Vector3, kMaxPatches> friction;
   const std::size_t solved = patches_.size();
-  for (std::size_t k = 0; k < solved; ++k) friction[k] = frictionOf(job, patches_[k]);
-  bool changed = loadPatches(job);
+  for (std::size_t k = 0; k < solved; ++k) friction[k] = frictionForce(job, patches_[k]);
+  bool changed = collectPatches(job);
   for (std::size_t k = 0; k < solved; ++k) {
-    Patch& patch = patches_[k];
+    FrictionPatch& patch = patches_[k];
     if (patch.load <= 0.0) continue;
     const IslandPair& pair = job.pairs[patch.pair];
     IslandPairResult& result = job.results[patch.pair];
     if (!patch.slides) {
-      const bool slid = result.slid || result.slides;
+      const bool slid = result.slid_before || result.slides;
       const double limit = (slid ? pair.friction.sliding : pair.friction.at_rest) * patch.load;
-      if (patch.stuck_again || friction[k].norm() <= kBeyond * limit) continue;
+      if (patch.stuck_again || friction[k].norm() <= kLimitMargin * limit) continue;
       patch.slides = result.slides = changed = true;
-      patch.along_W = friction[k].normalized();
+      patch.direction_W = friction[k].normalized();
       continue;
     }
-    Vector3 way_W = relativeMotion(job, motions_, pair, patch.p_WP);
-    way_W -= way_W.dot(patch.n_W) * patch.n_W;
-    const double way = way_W.norm();
-    if (way < kNoSlide) continue;
-    const Vector3 along_W = -way_W / way;
-    if (along_W.dot(patch.along_W) < 0.0) {
-      // it would be dragged along: it sticks
+    Vector3 slip_W = relativeDisplacement(job, step_, pair, patch.p_WP);
+    slip_W -= slip_W.dot(patch.n_W) * patch.n_W;
+    const double slip = slip_W.norm();
+    if (slip < kMinSlip) continue;
+    const Vector3 direction_W = -slip_W / slip;
+    if (direction_W.dot(patch.direction_W) < 0.0) {
+      // the sliding direction reversed: friction would drive the motion, so the patch sticks
       patch.slides = false;
       patch.stuck_again = changed = true;
       continue;
     }
-    changed = changed || (along_W - patch.along_W).norm() > kRubTolerance;
-    patch.along_W = along_W;
+    changed = changed || (direction_W - patch.direction_W).norm() > kFrictionTolerance;
+    patch.direction_W = direction_W;
   }
   return changed;
 }
 
-void IslandSolver::fillFriction(const Job& job) const {
-  for (const Patch& patch : patches_) {
+void IslandSolver::addFriction(const Job& job) const {
+  for (const FrictionPatch& patch : patches_) {
     IslandPairResult& result = job.results[patch.pair];
-    const Vector3 f_A_W = frictionOf(job, patch);
+    const Vector3 f_A_W = frictionForce(job, patch);
     result.F_Ao_W += {f_A_W, (patch.p_WP - job.poseA(job.pairs[patch.pair]).translation()).cross(f_A_W)};
   }
 }
 
-}  // namespace tenon
+}  // namespace tenon::collision

@@ -7,50 +7,50 @@
 
 #include "server/collision/island_job.h"
 
-namespace tenon {
+namespace tenon::collision {
 namespace {
 
-/// Once it has moved in a tick, so many times what counts as settled may be left for the next one.
-constexpr double kLeftForNext = 2.5;
+/// [-] Factor on the convergence tolerance after the first step of a solve: the next tick continues.
+constexpr double kRelaxedTolerance = 2.5;
 
-/// A step back of more than this share of the last step means that the last one went too far.
+/// [-] A step that goes back by more than this fraction of the last one shows that the last one overshot.
 constexpr double kOvershoot = 0.1;
 
-/// A metre too deep costs this many times the forces of all springs: more than a wedge of them can gain by
-/// it.
-constexpr double kDepthPrice = 3.0;
+/// [-] Penetration weight of the merit function, relative to the sum of the springs' forces: springs that
+/// wedge a body in gain less energy by an overlap than it costs.
+constexpr double kPenetrationWeight = 3.0;
 
-/// Points that hold after others have been let past their kinks are looked at again.
-constexpr int kKinkRounds = 2;
+/// Rounds of seam relaxation: a round may activate further contacts at seams.
+constexpr int kSeamRounds = 2;
 
-/// So many sub-steps in a row may end in a worse place before the solver goes back to the best.
-constexpr int kWorsePlaces = 1;
+/// So many steps in a row may fail to lower the merit function; one more, and all of them are rejected.
+constexpr int kMaxNonmonotoneSteps = 1;
 
-/// [m] A body that has no more to go than this may find that the field's steps let it go nowhere.
-constexpr double kLittleWay = 1e-4;
+/// [m] A step shorter than this may be blocked by the field's discretisation alone.
+constexpr double kSmallStep = 1e-4;
 
 }  // namespace
 
 IslandSolver::IslandSolver(std::size_t max_bodies, std::size_t max_pairs)
-    : motion_(max_bodies, max_pairs * kMaxPairContacts + kMaxFlanks + kPatchRows * kMaxPatches),
-      multipliers_(max_pairs * kMaxPairContacts + kMaxFlanks + kPatchRows * kMaxPatches),
-      motions_(max_bodies),
-      free_motions_(max_bodies),
-      gone_(max_bodies),
-      best_(max_bodies),
-      start_(max_bodies),
+    : motion_(max_bodies, max_pairs * kMaxPairContacts + kMaxSecondaryPlanes + kPatchRows * kMaxPatches),
+      multipliers_(max_pairs * kMaxPairContacts + kMaxSecondaryPlanes + kPatchRows * kMaxPatches),
+      step_(max_bodies),
+      step_without_seams_(max_bodies),
+      last_step_(max_bodies),
+      best_iterate_(max_bodies),
+      initial_poses_(max_bodies),
       wrenches_(max_bodies),
       depths_(max_bodies),
-      touched_(max_bodies) {
+      constrained_(max_bodies) {
   rows_.reserve(multipliers_.size());
-  held_.reserve(6 * max_bodies);
-  kept_.reserve(held_.capacity());
-  curved_.reserve(6 * max_bodies);
+  active_.reserve(6 * max_bodies);
+  carried_.reserve(active_.capacity());
+  curvature_rows_.reserve(6 * max_bodies);
 }
 
 SolveReport IslandSolver::solve(std::span<MovableBody> bodies, std::span<const IslandPair> pairs,
                                 const SolveLimits& limits, std::span<IslandPairResult> results) noexcept {
-  assert(bodies.size() <= motions_.size() && results.size() == pairs.size());
+  assert(bodies.size() <= step_.size() && results.size() == pairs.size());
   const Job job{bodies, pairs, limits, results};
   SolveReport report;
   switch (limits.method) {
@@ -69,75 +69,76 @@ SolveReport IslandSolver::solve(std::span<MovableBody> bodies, std::span<const I
 
 void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
-    start_[i] = job.bodies[i].X_WB;
-    job.bodies[i].brakes.clear();
+    initial_poses_[i] = job.bodies[i].X_WB;
+    job.bodies[i].stiffenings.clear();
     job.bodies[i].pinned = false;
   }
-  std::fill(gone_.begin(), gone_.end(), Displacement{});
+  std::fill(last_step_.begin(), last_step_.end(), Displacement{});
   double best = std::numeric_limits<double>::infinity();
   double at_start = best;
-  double reach = job.limits.substep_travel;
-  int worse = 0;
-  takeLast(job);
+  double trust_radius = job.limits.max_step_length;
+  int nonmonotone = 0;
+  warmStart(job);
 
-  // a step more costs a look, and perhaps one to come back
-  std::uint64_t tested = 0;
-  const auto isSpent = [&] {
-    const std::uint64_t look_points = report.points_visited - tested;
-    tested = report.points_visited;
-    return report.points_visited + 2 * look_points > job.limits.points;
+  // a further step costs one evaluation, and perhaps another one at the best iterate
+  std::uint64_t points_before = 0;
+  const auto isBudgetSpent = [&] {
+    const std::uint64_t evaluation_points = report.points_visited - points_before;
+    points_before = report.points_visited;
+    return report.points_visited + 2 * evaluation_points > job.limits.points;
   };
 
   while (true) {
-    look(job, report);
+    computeStep(job, report);
     const double here = merit(job);
-    if (report.substeps == 0) at_start = here;
+    if (report.steps == 0) at_start = here;
     if (here < best) {
       best = here;
-      worse = 0;
-      reach = std::min(2.0 * reach, job.limits.substep_travel);
-      for (std::size_t i = 0; i < job.bodies.size(); ++i) best_[i] = job.bodies[i].X_WB;
+      nonmonotone = 0;
+      trust_radius = std::min(2.0 * trust_radius, job.limits.max_step_length);
+      for (std::size_t i = 0; i < job.bodies.size(); ++i) best_iterate_[i] = job.bodies[i].X_WB;
     } else {
-      ++worse;
-      reach *= 0.5;
+      ++nonmonotone;
+      trust_radius *= 0.5;
     }
-    if (brakeOvershoot(job)) solveMotions(job, report, rows_.size());
-    if (arrived(job, worse == 0 && report.substeps > 0 ? kLeftForNext : 1.0)) break;
-    double way = travel(job);
-    const bool spent = isSpent() && report.substeps > 0;
-    const bool last = report.substeps == job.limits.substeps || spent;
-    // where the tick began is where the field's steps let it go: every way on is a way back
-    const bool stays = best == at_start && worse > kWorsePlaces && way < kLittleWay;
-    // a place or two may be worse on the way to a better one, but not the end of the way
-    if (worse > kWorsePlaces || (last && worse > 0)) {
-      goBackToBest(job);
-      worse = 0;
-      look(job, report);
-      way = travel(job);
+    if (dampOvershoot(job)) solveQp(job, report, rows_.size());
+    if (converged(job, nonmonotone == 0 && report.steps > 0 ? kRelaxedTolerance : 1.0)) break;
+    double length = stepLength(job);
+    const bool spent = isBudgetSpent() && report.steps > 0;
+    const bool last = report.steps == job.limits.max_steps || spent;
+    // no small step from the initial poses lowers the merit function: the bodies stay there
+    const bool stays = best == at_start && nonmonotone > kMaxNonmonotoneSteps && length < kSmallStep;
+    // an iterate may be worse on the path to a better one, but not the last iterate
+    if (nonmonotone > kMaxNonmonotoneSteps || (last && nonmonotone > 0)) {
+      restoreBestIterate(job);
+      nonmonotone = 0;
+      computeStep(job, report);
+      length = stepLength(job);
       if (stays) break;
     }
     if (last) {
-      report.travel_capped = way > kUnfinished;
+      report.unconverged = length > kUnconverged;
       break;
     }
-    // one share for all: between two admissible places every place is admissible
-    move(job, std::min({1.0, std::min(reach, knownReach(job)) / way, shareWithinReach(job)}));
-    ++report.substeps;
+    // one fraction for all bodies: between two feasible iterates every iterate is feasible
+    takeStep(job, std::min({1.0, std::min(trust_radius, validityRadius(job)) / length,
+                            fractionWithinLimits(job)}));
+    ++report.steps;
   }
   fillForces(job);
   for (MovableBody& body : job.bodies) {
-    body.brakes.clear();
-    body.curves.clear();
-    body.drag_Bo_W = Wrench{};
+    body.stiffenings.clear();
+    body.curvatures.clear();
+    body.friction_Bo_W = Wrench{};
   }
 }
 
-void IslandSolver::goBackToBest(const Job& job) {
+void IslandSolver::restoreBestIterate(const Job& job) {
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
-    job.bodies[i].X_WB = best_[i];
-    job.bodies[i].brakes.clear();
+    job.bodies[i].X_WB = best_iterate_[i];
+    job.bodies[i].stiffenings.clear();
   }
-  std::fill(gone_.begin(), gone_.end(), Displacement{});
+  std::fill(last_step_.begin(), last_step_.end(), Displacement{});
 }
 
 double IslandSolver::merit(const Job& job) {
@@ -145,114 +146,121 @@ double IslandSolver::merit(const Job& job) {
   double force = 0.0;
   for (const MovableBody& body : job.bodies) {
     for (const Spring& spring : body.springs) {
-      const Displacement toGoal = displacement(body.X_WB, spring.X_WG);
+      const Displacement to_goal = displacement(body.X_WB, spring.X_WG);
       const double stretch = (spring.X_WG * spring.p_BC - body.X_WB * spring.p_BC).norm();
       energy += springEnergy(spring, body.X_WB);
-      force += spring.stiffness * stretch + springTorque(spring, toGoal.rotation).norm() / body.radius;
+      force += spring.stiffness * stretch + springTorque(spring, to_goal.rotation).norm() / body.radius;
     }
   }
   double depth = 0.0;
   for (const IslandPairResult& result : job.results) depth = std::max(depth, -result.query.smallest_gap);
-  return energy + kDepthPrice * force * std::max(depth - kFieldNoise, 0.0);
+  return energy + kPenetrationWeight * force * std::max(depth - kFieldNoise, 0.0);
 }
 
-void IslandSolver::look(const Job& job, SolveReport& report) {
-  pinWhatHasGoneItsReach(job);
-  lookAround(job, report);
-  buildRows(job);
-  // most often what held at the last place holds here too
-  const bool expected = findCurves(job);
-  solveMotions(job, report);
-  for (int round = 0; round < kKinkRounds && passKinks(job, report);) ++round;
-  if (!curvesAreOfHeld()) {
-    const bool found = findCurves(job);
-    if (expected || found) solveMotions(job, report, listed_);
+void IslandSolver::evaluateConstraints(const Job& job, SolveReport& report) {
+  updateContacts(job, report);
+  buildConstraints(job);
+}
+
+void IslandSolver::computeStep(const Job& job, SolveReport& report) {
+  pinBodiesAtLimit(job);
+  evaluateConstraints(job, report);
+  // the active set seldom changes between iterates
+  const bool expected = evaluateCurvature(job);
+  solveQp(job, report);
+  for (int round = 0; round < kSeamRounds && relaxSeamNormals(job, report);) ++round;
+  if (!curvatureIsOfActiveRows()) {
+    const bool found = evaluateCurvature(job);
+    if (expected || found) solveQp(job, report, contact_row_count_);
   }
-  rub(job, report);
+  solveFriction(job, report);
 }
 
-void IslandSolver::solveMotions(const Job& job, SolveReport& report, std::size_t unchanged) {
+void IslandSolver::solveQp(const Job& job, SolveReport& report, std::size_t unchanged) {
   const std::span<double> multipliers(multipliers_.data(), rows_.size());
-  const std::span<Displacement> motions(motions_.data(), job.bodies.size());
-  const MotionResult result = motion_.solve(job.bodies, rows_, motions, multipliers, held_, unchanged);
+  const std::span<Displacement> step(step_.data(), job.bodies.size());
+  const MotionResult result = motion_.solve(job.bodies, rows_, step, multipliers, active_, unchanged);
   report.iterations += result.iterations;
-  report.conflicting = result.conflicting;
+  report.infeasible = result.infeasible;
 
-  std::fill(touched_.begin(), touched_.end(), std::uint8_t{0});
-  held_.clear();
+  std::fill(constrained_.begin(), constrained_.end(), std::uint8_t{0});
+  active_.clear();
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     if (multipliers[r] <= 0.0) continue;
-    held_.push_back(static_cast<std::uint32_t>(r));
+    active_.push_back(static_cast<std::uint32_t>(r));
     for (const std::int32_t body : {rows_[r].body_a, rows_[r].body_b}) {
-      if (body != GapRow::kStatic) touched_[static_cast<std::size_t>(body)] = 1;
+      if (body != ContactConstraint::kStatic) constrained_[static_cast<std::size_t>(body)] = 1;
     }
   }
 }
 
-double IslandSolver::travel(const Job& job) const {
+double IslandSolver::stepLength(const Job& job) const {
   double farthest = 0.0;
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
-    farthest = std::max(farthest, fastestPoint(motions_[i], job.bodies[i].radius));
+    farthest = std::max(farthest, maxPointMotion(step_[i], job.bodies[i].radius));
   }
   return farthest;
 }
 
-bool IslandSolver::arrived(const Job& job, double slack) const {
-  const bool held = std::any_of(touched_.begin(), touched_.end(), [](std::uint8_t t) { return t != 0; });
+bool IslandSolver::converged(const Job& job, double slack) const {
+  const bool in_contact =
+      std::any_of(constrained_.begin(), constrained_.end(), [](std::uint8_t t) { return t != 0; });
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
     const MovableBody& body = job.bodies[i];
-    if (fastestPoint(motions_[i], body.radius) >= (held ? slack * body.settled : kArrived)) return false;
+    if (maxPointMotion(step_[i], body.radius) >= (in_contact ? slack * body.tolerance : kStepTolerance))
+      return false;
   }
   return true;
 }
 
-double IslandSolver::shareWithinReach(const Job& job) const {
-  double share = 1.0;
+double IslandSolver::fractionWithinLimits(const Job& job) const {
+  double fraction = 1.0;
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
     const MovableBody& body = job.bodies[i];
-    const double way = fastestPoint(motions_[i], body.radius);
-    if (body.pinned || way < kArrived) continue;
-    share =
-        std::min(share, (body.reach - fastestPoint(displacement(start_[i], body.X_WB), body.radius)) / way);
+    const double length = maxPointMotion(step_[i], body.radius);
+    if (body.pinned || length < kStepTolerance) continue;
+    const double moved = maxPointMotion(displacement(initial_poses_[i], body.X_WB), body.radius);
+    fraction = std::min(fraction, (body.max_displacement - moved) / length);
   }
-  return std::max(share, 0.0);
+  return std::max(fraction, 0.0);
 }
 
-void IslandSolver::pinWhatHasGoneItsReach(const Job& job) const {
+void IslandSolver::pinBodiesAtLimit(const Job& job) const {
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
     MovableBody& body = job.bodies[i];
-    if (!std::isfinite(body.reach)) continue;
-    const double gone = fastestPoint(displacement(start_[i], body.X_WB), body.radius);
-    body.pinned = body.reach - gone < kArrived;
+    if (!std::isfinite(body.max_displacement)) continue;
+    const double moved = maxPointMotion(displacement(initial_poses_[i], body.X_WB), body.radius);
+    body.pinned = body.max_displacement - moved < kStepTolerance;
   }
 }
 
-void IslandSolver::move(const Job& job, double share) {
+void IslandSolver::takeStep(const Job& job, double fraction) {
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
     MovableBody& body = job.bodies[i];
-    gone_[i] = {share * motions_[i].translation, share * motions_[i].rotation};
-    // nothing in the way: be there, not there up to the second order
-    const bool arrives = share == 1.0 && touched_[i] == 0 && body.springs.size() == 1 &&
+    last_step_[i] = {fraction * step_[i].translation, fraction * step_[i].rotation};
+    // without contact the goal is reached exactly, not only to second order
+    const bool at_goal = fraction == 1.0 && constrained_[i] == 0 && body.springs.size() == 1 &&
                          job.limits.method != ContactMethod::kBlocking;
-    body.X_WB = arrives ? body.springs[0].X_WG : displaced(body.X_WB, gone_[i]);
+    body.X_WB = at_goal ? body.springs[0].X_WG : displaced(body.X_WB, last_step_[i]);
   }
 }
 
-bool IslandSolver::brakeOvershoot(const Job& job) {
-  bool braked = false;
+bool IslandSolver::dampOvershoot(const Job& job) {
+  bool damped = false;
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
     MovableBody& body = job.bodies[i];
     const double radius2 = body.radius * body.radius;
     const auto dot = [radius2](const Displacement& a, const Displacement& b) {
       return a.translation.dot(b.translation) + radius2 * a.rotation.dot(b.rotation);
     };
-    const double way2 = dot(gone_[i], gone_[i]);
-    const double back = -dot(gone_[i], motions_[i]);
-    if (touched_[i] == 0 || way2 < kArrived * kArrived || back < kOvershoot * way2) continue;
-    // secant: where the wish to move would have been zero
-    if (body.brakes.push_back({gone_[i], back / way2})) braked = true;
+    const double last2 = dot(last_step_[i], last_step_[i]);
+    const double back = -dot(last_step_[i], step_[i]);
+    if (constrained_[i] == 0 || last2 < kStepTolerance * kStepTolerance || back < kOvershoot * last2)
+      continue;
+    // secant: with this stiffness the last step would have ended where the step along it is zero
+    if (body.stiffenings.push_back({last_step_[i], back / last2})) damped = true;
   }
-  return braked;
+  return damped;
 }
 
 void IslandSolver::fillForces(const Job& job) const {
@@ -260,23 +268,23 @@ void IslandSolver::fillForces(const Job& job) const {
   for (std::size_t i = 0; i < job.pairs.size(); ++i) {
     IslandPairResult& result = job.results[i];
     result.F_Ao_W = {};
-    result.flanks = 0;
+    result.secondary_planes = 0;
     const std::size_t listed = result.query.contacts.size();
-    for (std::size_t c = 0; c < listed; ++c) fillForce(job, i, c, multipliers_[row++]);
+    for (std::size_t c = 0; c < listed; ++c) addForce(job, i, c, multipliers_[row++]);
   }
-  for (std::size_t k = 0; k < flank_count_; ++k) {
-    ContactList& contacts = job.results[flanks_[k].pair].query.contacts;
+  for (std::size_t k = 0; k < secondary_plane_count_; ++k) {
+    ContactList& contacts = job.results[secondary_planes_[k].pair].query.contacts;
     const std::size_t c = contacts.size();
-    if (contacts.push_back(flanks_[k].contact)) {
-      ++job.results[flanks_[k].pair].flanks;
-      fillForce(job, flanks_[k].pair, c, multipliers_[row]);
+    if (contacts.push_back(secondary_planes_[k].contact)) {
+      ++job.results[secondary_planes_[k].pair].secondary_planes;
+      addForce(job, secondary_planes_[k].pair, c, multipliers_[row]);
     }
     ++row;
   }
-  fillFriction(job);
+  addFriction(job);
 }
 
-void IslandSolver::fillForce(const Job& job, std::size_t pair, std::size_t c, double multiplier) {
+void IslandSolver::addForce(const Job& job, std::size_t pair, std::size_t c, double multiplier) {
   IslandPairResult& result = job.results[pair];
   const Contact& contact = result.query.contacts[c];
   const double force = contact.gap <= kTouchGap ? multiplier : 0.0;
@@ -285,4 +293,4 @@ void IslandSolver::fillForce(const Job& job, std::size_t pair, std::size_t c, do
   result.F_Ao_W += {f, (contact.p_WP - job.poseA(job.pairs[pair]).translation()).cross(f)};
 }
 
-}  // namespace tenon
+}  // namespace tenon::collision

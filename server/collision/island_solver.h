@@ -11,218 +11,273 @@
 #include "server/collision/motion_solver.h"
 #include "server/collision/pair_query.h"
 
-namespace tenon {
+namespace tenon::collision {
 
 /// How a held body is kept out of others.
 enum class ContactMethod : std::uint8_t {
-  kIsland,    ///< one quadratic programme per contact island (the default)
-  kBlocking,  ///< the paper's god-object heuristic, as baseline: block what opposes the penalty wrench
-  kPenalty,   ///< the paper's penalty force alone, as baseline: bodies follow their hands into each other
+  kIsland,    ///< sequential quadratic programming, one programme per contact island (the default)
+  kBlocking,  ///< baseline: the paper's god object, which removes the motion that opposes the penalty wrench
+  kPenalty,   ///< baseline: the paper's penalty force alone, bodies follow their hands into each other
 };
 
-/// Coulomb's coefficients of a pair; none by default.
+/// Coulomb friction coefficients of a pair; none by default.
 struct Friction {
-  double at_rest = 0.0;
-  double sliding = 0.0;  ///< not above `at_rest`
+  double at_rest = 0.0;  ///< [-] static coefficient
+  double sliding = 0.0;  ///< [-] dynamic coefficient, not above `at_rest`
 };
 
-/// Where a pair's bodies were when its shell's tree was walked to list its contacts.
-struct WalkedAt {
-  bool done = false;
+/// The poses and levels of the traversal that listed a pair's contacts.
+struct TraversalState {
+  bool valid = false;  ///< false: the pair has no list yet, and the next evaluation traverses
   Pose X_WA, X_WB;
-  std::uint32_t levels = 0;          ///< of the shell that were asked for
-  std::uint32_t used = 0xFFFFFFFFU;  ///< that the budget was enough for; a solve's later walks use no more
+  std::uint32_t levels = 0;  ///< IslandPair::levels at that traversal
+  /// that the budget allowed: later traversals use no more, until the pair starts without a list again
+  std::uint32_t levels_used = 0xFFFFFFFFU;
 };
 
-/// What came out for a pair, at the final poses.
+/// What a solve found for a pair, at the final poses.
 struct IslandPairResult {
   PairQueryResult query;
-  std::vector<double> multipliers;  ///< [N] a contact of query.contacts; sized kMaxPairContacts at start
-  Wrench F_Ao_W;                    ///< of B on A, about A's origin
-  WalkedAt walked;
-  std::uint32_t flanks = 0;  ///< so many at the list's end are not the shell's: sharp hollows
-  bool slides = false;       ///< against friction, in this solve
-  bool slid = false;         ///< and in the last one
+  /// [N] normal force of each contact of `query`, 0 above kTouchGap; sized kMaxPairContacts at start
+  std::vector<double> multipliers;
+  Wrench F_Ao_W;  ///< [N, Nm] of B on A, about A's origin; normal forces and friction
+  TraversalState traversal;
+  /// so many contacts at the list's end are secondary planes: not points of the pointshell, without area
+  std::uint32_t secondary_planes = 0;
+  bool slides = false;       ///< a friction patch of the pair slides in this solve
+  bool slid_before = false;  ///< one slid in the last solve: the dynamic coefficient applies from the start
 };
 
-/// Two bodies of an island that may touch. Indices into the island's bodies; kStatic bodies stand at
-/// X_W*_static.
+/// Two bodies of an island that may touch: A's pointshell against B's SDF. body_a and body_b are indices into
+/// the island's bodies; a kStatic body is fixed at X_WA_static or X_WB_static.
 struct IslandPair {
-  std::int32_t body_a = GapRow::kStatic;  ///< asked as a shell
-  std::int32_t body_b = GapRow::kStatic;  ///< asked as a field
-  const Pointshell* shell_A = nullptr;
-  const DistanceField* field_B = nullptr;
+  std::int32_t body_a = ContactConstraint::kStatic;  ///< pointshell side
+  std::int32_t body_b = ContactConstraint::kStatic;  ///< SDF side
+  const structures::Pointshell* shell_A = nullptr;
+  const structures::DistanceField* field_B = nullptr;
   Pose X_WA_static;
   Pose X_WB_static;
-  double dilation = 0.0;
+  double dilation = 0.0;  ///< [m] offset of B's zero level set
   Friction friction;
-  // of every walk, as in PairQuery; a level that one walk of a solve leaves out is left out to its end
+  // for every traversal, as in PairQuery
   std::uint32_t levels = 0xFFFFFFFFU;
-  std::uint32_t budget = 0xFFFFFFFFU;
+  std::uint32_t budget = 0xFFFFFFFFU;  ///< [points]
   std::span<const std::uint32_t> first = {};
-  /// Of the last solve, if nothing jumped since: while the bodies are near where they were when its list was
-  /// made, that list serves again. May be the result that is to be filled.
+  /// Result of the last solve, for the warm start: its list serves again while the bodies are near the poses
+  /// of its traversal. Null after a jump of a pose. May be the result that is to be filled.
   const IslandPairResult* last = nullptr;
 };
 
 struct SolveLimits {
-  std::uint32_t substeps = 8;
-  double substep_travel = 0.0005;  ///< [m] any point of a body moves at most, per sub-step
-  double contact_margin = 0.0005;  ///< [m] on top of the sub-step's travel, contacts are listed
+  std::uint32_t max_steps = 8;      ///< SQP steps in one solve
+  double max_step_length = 0.0005;  ///< [m] of any point; the trust region's initial and largest radius
+  double contact_margin = 0.0005;  ///< [m] contacts are listed up to this gap, and as far as a step may reach
   ContactMethod method = ContactMethod::kIsland;
-  double penalty_stiffness = 1000.0;  ///< [N/m] for the baselines
-  /// So many points may be tested: when that is spent, the rest of the way goes into the next tick.
+  double penalty_stiffness = 1000.0;  ///< [N/m] of the baselines
+  /// Work limit: points tested by the queries of one solve. At least one step is made.
   std::uint64_t points = std::numeric_limits<std::uint64_t>::max();
 };
 
-/// Two surfaces this close [m] touch: less is what interpolation and a cut-off sub-step leave. A row that
-/// will bind only farther along the way has no force yet.
+/// [m] Contacts with a gap up to this touch. It covers what interpolation and an unconverged step leave. The
+/// constraint of a larger gap limits the step, and has no force yet.
 inline constexpr double kTouchGap = 5e-5;
 
 struct SolveReport {
-  std::uint32_t substeps = 0;  ///< that moved something
-  std::uint32_t iterations = 0;
-  std::uint32_t queries = 0;         ///< walks of a pair's tree, over all sub-steps
-  std::uint32_t resamplings = 0;     ///< of a pair's listed points, likewise
-  std::uint64_t points_visited = 0;  ///< by both
-  bool conflicting = false;
-  bool travel_capped = false;  ///< the rest of the way goes into the next tick
+  std::uint32_t steps = 0;           ///< SQP steps that were taken
+  std::uint32_t iterations = 0;      ///< of the active-set method, over all QPs of the solve
+  std::uint32_t traversals = 0;      ///< queries that descended a pointshell's hierarchy, over all steps
+  std::uint32_t resamplings = 0;     ///< queries that evaluated listed points again
+  std::uint64_t points_visited = 0;  ///< by both kinds of queries
+  bool infeasible = false;           ///< of the last QP: MotionResult::infeasible
+  /// Steps or points ran out with a step of more than 1 um left: the bodies are at the best iterate, and the
+  /// next tick continues from there.
+  bool unconverged = false;
 };
 
-/// Moves the bodies of one contact island towards their springs' goals without letting them into each other
-/// (DESIGN "god object"; paper §3.1): sub-step by sub-step, query the pairs at the current poses, solve for
-/// poses, project first and clamp then, move. A body on a surface that has less than kSettled to go stays
-/// where it is, so that a still hand means a still body.
+/// God object of one contact island (paper §3.1): moves its bodies as near to their springs' goals as the
+/// contacts permit, by sequential quadratic programming over their poses.
 ///
-/// Threads: one at a time (a worker owns one); keeps nothing from solve to solve. Real-time: solve.
+/// Each iteration evaluates gaps and gradients at the iterate, solves the QP of the linearised problem for a
+/// step (MotionSolver), and takes as much of it as the trust region allows. All contacts are constraints of
+/// one problem: blocking what opposes the sum of their forces, as the paper does, is wrong by millimetres in
+/// corners.
+///
+/// * Merit function: the energy of the springs, and a penalty on the deepest overlap. A step that does not
+///   lower it halves the trust region; after a second one in a row the solver returns to the best iterate.
+/// * Trust region: no point of any body moves by more than its radius, at most `max_step_length`. One step
+///   fraction holds for all bodies: between two feasible iterates of the QP every iterate is feasible.
+/// * Second order: curvature of concave surfaces at active contacts, secondary planes where they are too
+///   sharp for a curvature, overshoot damping.
+/// * Seams: the gradient of an interpolated field jumps at cell borders. Free space outside a convex surface
+///   is the union of the half-spaces of both sides, so a contact there gets the side that restricts the
+///   step least.
+/// * Convergence: the step of every body in contact is shorter than its `tolerance`. The step is then not
+///   taken, so that a hand at rest means a body at rest.
+///
+/// When steps or points run out, the bodies are at the best iterate (SolveReport::unconverged); when the
+/// constraints of a QP contradict each other, see MotionResult::infeasible. Skipped without a report are
+/// * contacts beyond kMaxPairContacts of a pair, those with the largest gaps. Steps are shortened so as not
+///   to reach them, but not below a quarter of `max_step_length`;
+/// * seams beyond kMaxSeams (24): these contacts keep the normal of their own cell, and may hold the body
+///   back;
+/// * secondary planes beyond kMaxSecondaryPlanes (64): a step may overlap there, the next iterate corrects
+///   it. Where a pair's list is full, their force is missing in its F_Ao_W;
+/// * friction patches beyond kMaxPatches (16): the contacts of the others are frictionless.
+///
+/// Threads: one at a time (a worker owns one). Keeps nothing from solve to solve: what a warm start needs is
+/// in the results. Real-time: solve.
 class IslandSolver {
  public:
   IslandSolver(std::size_t max_bodies, std::size_t max_pairs);
 
-  /// Moves bodies[i].X_WB; fills results[i] for pairs[i].
+  /// Updates bodies[i].X_WB, and fills results[i] for pairs[i].
   SolveReport solve(std::span<MovableBody> bodies, std::span<const IslandPair> pairs,
                     const SolveLimits& limits, std::span<IslandPairResult> results) noexcept;
 
  private:
   struct Job;  ///< the arguments of solve
 
-  /// What holds a body in about one direction, rubbed as one thing at the centre of its load. Turning about
-  /// its normal is free.
-  struct Patch {
+  /// Active contacts of a pair with about one normal, treated as one frictional contact at the centre of
+  /// their normal forces. It transmits no moment about the normal.
+  struct FrictionPatch {
     std::size_t pair = 0;
-    double load = 0.0;  ///< [N]
+    double load = 0.0;  ///< [N] sum of the normal forces
     Vector3 n_W = Vector3::Zero();
     Vector3 p_WP = Vector3::Zero();
-    Vector3 push_W = Vector3::Zero(), at_W = Vector3::Zero();  ///< sums over its rows, weighted by force
-    Vector3 along_W = Vector3::Zero();                         ///< in which it drags A, while it slides
-    std::size_t first_row = 0;                                 ///< of those that hold it, while it sticks
+    Vector3 normal_force_W = Vector3::Zero();  ///< [N] sum over its rows
+    Vector3 weighted_p_W = Vector3::Zero();    ///< [N m] sum of force times position over its rows
+    Vector3 direction_W = Vector3::Zero();     ///< [-] of the friction force on A, while it slides
+    std::size_t first_row = 0;                 ///< of its kPatchRows tangential rows, while it sticks
     bool slides = false;
-    bool stuck_again = false;
+    bool stuck_again = false;  ///< it slid and returned to sticking in this solve, and stays so
   };
   void solveIsland(const Job& job, SolveReport& report);
   void solveBlocking(const Job& job, SolveReport& report);
   void solvePenalty(const Job& job, SolveReport& report);
 
+  // contact lists (island_lists.cpp)
+  /// Traverses all pairs, up to a gap of `margin` [m].
   static void queryPairs(const Job& job, double margin, SolveReport& report);
-  /// Lists what may be met within a sub-step: again from the shell's tree when the bodies have gone too far
-  /// since it was last walked, else the same points at the new poses.
-  void lookAround(const Job& job, SolveReport& report);
-  /// True when its list has the same points as before.
-  bool lookAtPair(const Job& job, std::size_t pair, SolveReport& report);
-  /// Takes over the lists of the last solve, and what held then.
-  void takeLast(const Job& job);
-  void walkPair(const Job& job, std::size_t pair, SolveReport& report);
-  /// Once its bodies have `gone` so far [m] towards each other.
-  [[nodiscard]] static bool mustWalk(const Job& job, std::size_t pair, double gone);
-  /// [m] no point of one came nearer to the other by more, since the walk.
-  [[nodiscard]] static double approach(const Job& job, std::size_t pair);
-  void buildRows(const Job& job);
-  /// [m] a sub-step may go this far without meeting contacts that had no room in the lists.
-  [[nodiscard]] static double knownReach(const Job& job);
-  /// `unchanged`: so many of the rows, and all poses, are as in the call before.
-  void solveMotions(const Job& job, SolveReport& report, std::size_t unchanged = 0);
-  /// [m] the farthest that any point of any body goes.
-  [[nodiscard]] double travel(const Job& job) const;
-  /// Nobody has more to go than is left to the next tick: `slack` times its `settled`.
-  [[nodiscard]] bool arrived(const Job& job, double slack) const;
-  /// Of the motions that takes nobody beyond its reach.
-  [[nodiscard]] double shareWithinReach(const Job& job) const;
-  void pinWhatHasGoneItsReach(const Job& job) const;
-  void move(const Job& job, double share);
-  void goBackToBest(const Job& job);
-  /// [J] how good a place is: the springs' energy, and a price on what is too deep that no spring can pay.
-  [[nodiscard]] static double merit(const Job& job);
-  /// True when a body is on its way back from where it has just gone; then it is braked along that way.
-  [[nodiscard]] bool brakeOvershoot(const Job& job);
-  /// Finds what the bodies can do at their places.
-  void look(const Job& job, SolveReport& report);
-  /// Gives the bodies the curves of what holds them, and rows for the flanks of what is too sharp to be a
-  /// curve;
-  /// true when there are any.
-  bool findCurves(const Job& job);
-  [[nodiscard]] bool curvesAreOfHeld() const;
-  // borders of cells (island_kinks.cpp)
-  /// A field's slope jumps from cell to cell. On a bulge a point may go on as soon as one of both sides lets
-  /// it: held points at a border get the side that is in their way least. True when another one.
-  bool passKinks(const Job& job, SolveReport& report);
-  bool findKink(const Job& job, std::size_t pair, std::size_t contact, std::size_t row);
-  /// Of A's point over B.
-  [[nodiscard]] static Vector3 relativeMotion(const Job& job, std::span<const Displacement> motions,
-                                              const IslandPair& pair, const Vector3& p_WP);
-  void blockMotions(const Job& job);
-  // friction (island_friction.cpp)
-  void rub(const Job& job, SolveReport& report);
-  bool loadPatches(const Job& job);
-  void setFriction(const Job& job);
-  bool judgePatches(const Job& job);
-  [[nodiscard]] Vector3 frictionOf(const Job& job, const Patch& patch) const;
-  void fillFriction(const Job& job) const;
+  /// Takes over the lists and the active rows of the last solve.
+  void warmStart(const Job& job);
+  /// Brings the lists to the iterate: by a traversal when the bodies have moved too far since the last one,
+  /// else by resampling.
+  void updateContacts(const Job& job, SolveReport& report);
+  /// True when the pair's list has the same points as before.
+  bool updatePair(const Job& job, std::size_t pair, SolveReport& report);
+  void traversePair(const Job& job, std::size_t pair, SolveReport& report);
+  /// `approach` [m]: approachSinceTraversal.
+  [[nodiscard]] static bool mustTraverse(const Job& job, std::size_t pair, double approach);
+  /// [m] Upper bound of how much any point of one body came nearer to the other since the last traversal.
+  [[nodiscard]] static double approachSinceTraversal(const Job& job, std::size_t pair);
+  void buildConstraints(const Job& job);
+  /// [m] Validity radius of the linearised problem: a step of this length meets no contact that had no room
+  /// in the lists.
+  [[nodiscard]] static double validityRadius(const Job& job);
   [[nodiscard]] static std::size_t pairOfRow(const Job& job, std::size_t row);
 
+  // SQP (island_solver.cpp)
+  /// Evaluates the constraints and their second-order terms at the iterate, and solves for step_.
+  void computeStep(const Job& job, SolveReport& report);
+  /// Gaps and gradients at the iterate.
+  void evaluateConstraints(const Job& job, SolveReport& report);
+  /// `unchanged`: so many leading rows, and all poses, are those of the last call.
+  void solveQp(const Job& job, SolveReport& report, std::size_t unchanged = 0);
+  /// [m] The longest displacement in step_ of any point of any body.
+  [[nodiscard]] double stepLength(const Job& job) const;
+  /// Every body's step is shorter than `slack` [-] times its tolerance; without any contact, than
+  /// kStepTolerance.
+  [[nodiscard]] bool converged(const Job& job, double slack) const;
+  /// Fraction of step_ with which no body exceeds its max_displacement.
+  [[nodiscard]] double fractionWithinLimits(const Job& job) const;
+  void pinBodiesAtLimit(const Job& job) const;
+  /// Takes `fraction` [-] of step_.
+  void takeStep(const Job& job, double fraction);
+  void restoreBestIterate(const Job& job);
+  /// [J] Merit function at the iterate: lower is better.
+  [[nodiscard]] static double merit(const Job& job);
+  /// Stiffens bodies whose step goes back along the last one. False when there is none.
+  [[nodiscard]] bool dampOvershoot(const Job& job);
   void fillForces(const Job& job) const;
-  static void fillForce(const Job& job, std::size_t pair, std::size_t contact, double multiplier);
-  static void fillPenalties(const Job& job);
+  /// Adds a contact's normal force of `multiplier` [N] to the pair's result.
+  static void addForce(const Job& job, std::size_t pair, std::size_t contact, double multiplier);
 
-  /// A contact, of no area, that the look at a place has added to those of the pair.
-  struct Flank {
+  // second order (island_curvature.cpp)
+  /// Gives the bodies the curvatures at their active contacts, and adds rows for secondary planes. False when
+  /// there are none.
+  bool evaluateCurvature(const Job& job);
+  [[nodiscard]] bool curvatureIsOfActiveRows() const;
+
+  // cell borders (island_seams.cpp)
+  /// Gives active contacts at seams the normal of the side that restricts the step least, and solves again.
+  /// False when no normal changed.
+  bool relaxSeamNormals(const Job& job, SolveReport& report);
+  bool findSeam(const Job& job, std::size_t pair, std::size_t contact, std::size_t row);
+  /// [m] Displacement of A's point at p_WP relative to B's.
+  [[nodiscard]] static Vector3 relativeDisplacement(const Job& job, std::span<const Displacement> step,
+                                                    const IslandPair& pair, const Vector3& p_WP);
+
+  // friction (island_friction.cpp)
+  /// Solves with Coulomb friction on patches: a patch sticks by tangential rows as long as their force is
+  /// within the limit, else it slides with a given force. Loads and directions are found by iteration; when
+  /// its rounds run out the last step is used.
+  void solveFriction(const Job& job, SolveReport& report);
+  /// Groups the active contact rows into patches. True when loads changed or patches were added.
+  bool collectPatches(const Job& job);
+  /// Tangential rows for sticking patches, wrenches on the bodies for sliding ones.
+  void applyFriction(const Job& job);
+  /// Loads, sticking or sliding, and directions after a solve. True when any changed.
+  bool updatePatches(const Job& job);
+  /// [N] On A, in W.
+  [[nodiscard]] Vector3 frictionForce(const Job& job, const FrictionPatch& patch) const;
+  void addFriction(const Job& job) const;
+
+  // baselines (island_baselines.cpp)
+  void blockOpposedMotion(const Job& job);
+  static void fillPenaltyForces(const Job& job);
+
+  /// A tangent plane beside an active contact, as a contact without area.
+  struct SecondaryPlane {
     std::size_t pair = 0;
     Contact contact;
   };
 
-  /// A held contact at a border, with the planes of the surface beyond it.
-  struct Kink {
+  /// An active contact at a cell border, with the tangent planes beyond it.
+  struct Seam {
     struct Side {
       Vector3 n_W = Vector3::Zero();
-      double gap = 0.0;
+      double gap = 0.0;  ///< [m]
     };
     std::size_t pair = 0, contact = 0, row = 0;
-    FixedVector<Side, 4> sides;
+    FixedVector<Side, 4> sides;  ///< to both sides along two tangents
   };
 
   MotionSolver motion_;
-  static constexpr std::size_t kMaxKinks = 24;
-  FixedVector<Kink, kMaxKinks> kinks_;
-  static constexpr std::size_t kMaxFlanks = 64;
-  std::array<Flank, kMaxFlanks> flanks_;
-  std::size_t flank_count_ = 0;
+  static constexpr std::size_t kMaxSeams = 24;
+  FixedVector<Seam, kMaxSeams> seams_;
+  static constexpr std::size_t kMaxSecondaryPlanes = 64;
+  std::array<SecondaryPlane, kMaxSecondaryPlanes> secondary_planes_;
+  std::size_t secondary_plane_count_ = 0;
   static constexpr std::size_t kMaxPatches = 16;
   static constexpr std::size_t kPatchRows = 4;  ///< to both sides along two tangents
-  FixedVector<Patch, kMaxPatches> patches_;
+  FixedVector<FrictionPatch, kMaxPatches> patches_;
+  // rows_ holds the listed contacts, then the secondary planes, then the tangential rows of patches
   std::size_t first_patch_row_ = 0;
-  std::vector<std::uint32_t> held_;  ///< rows that held in the last solve, while the lists are the same
-  std::vector<std::pair<std::size_t, double>> kept_;  ///< of those, by new number, with their forces [N]
-  std::vector<std::uint32_t> curved_;                 ///< rows whose curves the bodies have
-  std::size_t listed_ = 0;  ///< rows of listed contacts; those of the flanks are behind them
-  std::vector<GapRow> rows_;
-  std::vector<double> multipliers_;
-  std::vector<Displacement> motions_;
-  std::vector<Displacement> free_motions_;  ///< if what is at a border did not hold
-  std::vector<Displacement> gone_;          ///< in the last sub-step
-  std::vector<Pose> best_;                  ///< of the places of this solve
-  std::vector<Pose> start_;                 ///< of this solve
-  std::vector<Wrench> wrenches_;            ///< for kBlocking: penalties on a body, about its origin
-  std::vector<double> depths_;              ///< for kBlocking: the deepest of a body's contacts
-  std::vector<std::uint8_t> touched_;       ///< a row holds the body back
+  std::vector<std::uint32_t> active_;  ///< active rows of the last QP, ascending: its warm start
+  /// active rows carried over to the lists of a new iterate, by their new numbers, with their forces [N]
+  std::vector<std::pair<std::size_t, double>> carried_;
+  std::vector<std::uint32_t> curvature_rows_;  ///< rows whose curvatures the bodies have
+  std::size_t contact_row_count_ = 0;
+  std::vector<ContactConstraint> rows_;
+  std::vector<double> multipliers_;               ///< [N] by row
+  std::vector<Displacement> step_;                ///< the QP's solution, by body
+  std::vector<Displacement> step_without_seams_;  ///< the same if contacts at seams did not hold
+  std::vector<Displacement> last_step_;           ///< the step that led to the iterate
+  std::vector<Pose> best_iterate_;                ///< by the merit function, in this solve
+  std::vector<Pose> initial_poses_;               ///< of this solve
+  std::vector<Wrench> wrenches_;                  ///< for kBlocking: penalty on a body, about its origin
+  std::vector<double> depths_;                    ///< [m] for kBlocking: largest overlap of a body
+  std::vector<std::uint8_t> constrained_;         ///< body has an active row
 };
 
-}  // namespace tenon
+}  // namespace tenon::collision

@@ -7,13 +7,13 @@
 
 #include "server/collision/motion_workspace.h"
 
-namespace tenon {
+namespace tenon::collision {
 
 void MotionSolver::Workspace::dropActive(std::size_t position) {
-  state[active.row(position)] = RowState::kIdle;
+  state[active.row(position)] = RowState::kInactive;
   const std::size_t count = active.size();
   active.drop(position);
-  // the multiplier of the row that is being enforced stands behind those of the active ones
+  // the multiplier of the row that is being activated stands behind those of the active ones
   for (std::size_t k = position; k < count; ++k) u[k] = u[k + 1];
 }
 
@@ -21,7 +21,7 @@ RowNormal MotionSolver::Workspace::normalOf(std::size_t row) const {
   RowNormal normal;
   normal.body = body_of[row];
   for (std::size_t side = 0; side < 2; ++side) {
-    if (normal.body[side] == GapRow::kStatic) continue;
+    if (normal.body[side] == ContactConstraint::kStatic) continue;
     const std::size_t moment = 4 + 3 * side;
     Vector6 c;
     c << columns[1][row], columns[2][row], columns[3][row], columns[moment][row], columns[moment + 1][row],
@@ -32,14 +32,14 @@ RowNormal MotionSolver::Workspace::normalOf(std::size_t row) const {
   return normal;
 }
 
-bool MotionSolver::Workspace::enforce(std::size_t p) {
+bool MotionSolver::Workspace::activate(std::size_t p) {
   const RowNormal normal = normalOf(p);
   u[active.size()] = 0.0;
 
   while (++iterations <= iteration_limit) {
     active.project(normal);
     const std::span<const double> r = active.coordinates();
-    // how far until the multiplier of an active row vanishes
+    // dual step length: until the multiplier of an active row vanishes
     const std::size_t q = active.size();
     double dual_step = std::numeric_limits<double>::infinity();
     std::size_t vanishing = q;
@@ -49,11 +49,11 @@ bool MotionSolver::Workspace::enforce(std::size_t p) {
         vanishing = k;
       }
     }
-    // how far until the row holds
+    // primal step length: until row p holds with equality
     const bool dependent = active.dependent();
     const double slack = columns[0][p] + normal.dot(y);
     const double primal_step =
-        dependent ? std::numeric_limits<double>::infinity() : std::max(-slack, 0.0) / active.freePart2();
+        dependent ? std::numeric_limits<double>::infinity() : std::max(-slack, 0.0) / active.freeNorm2();
     if (dependent && vanishing == q) return false;
 
     const double t = std::min(dual_step, primal_step);
@@ -73,89 +73,91 @@ bool MotionSolver::Workspace::enforce(std::size_t p) {
   return false;
 }
 
-void MotionSolver::Workspace::keepActive(std::span<const std::uint32_t> first,
-                                         std::span<const std::uint32_t> left_out) {
-  for (const std::uint32_t row : first) wanted[row] = 1;
-  for (const std::uint32_t row : left_out) wanted[row] = 0;
-  std::size_t kept = 0;
+void MotionSolver::Workspace::retainActive(std::span<const std::uint32_t> warm_start,
+                                           std::span<const std::uint32_t> excluded) {
+  for (const std::uint32_t row : warm_start) requested[row] = 1;
+  for (const std::uint32_t row : excluded) requested[row] = 0;
+  std::size_t retained = 0;
   for (std::size_t k = 0; k < active.size(); ++k) {
     const std::uint32_t row = active.row(k);
-    const bool stays = wanted[row] != 0 && normalOf(row) == active.normal(k);
-    wanted[row] = stays ? 1 : 0;
-    kept += stays ? 1 : 0;
+    const bool stays = requested[row] != 0 && normalOf(row) == active.normal(k);
+    requested[row] = stays ? 1 : 0;
+    retained += stays ? 1 : 0;
   }
-  // turning a row out costs as much as a few new ones
-  if (4 * kept < 3 * active.size()) active.reset(6 * bodies);
+  // dropping a row costs as much as adding a few
+  if (4 * retained < 3 * active.size()) active.reset(6 * bodies);
   for (std::size_t k = active.size(); k-- > 0;) {
-    if (wanted[active.row(k)] == 0) dropActive(k);
+    if (requested[active.row(k)] == 0) dropActive(k);
   }
   for (std::size_t k = 0; k < active.size(); ++k) state[active.row(k)] = RowState::kActive;
-  for (const std::uint32_t row : first) wanted[row] = 0;
-  for (const std::uint32_t row : left_out) state[row] = RowState::kLeftOut;
+  for (const std::uint32_t row : warm_start) requested[row] = 0;
+  for (const std::uint32_t row : excluded) state[row] = RowState::kExcluded;
 }
 
-bool MotionSolver::Workspace::take(std::uint32_t row, double force) {
-  if (state[row] != RowState::kIdle || !std::isfinite(columns[0][row])) return false;
+bool MotionSolver::Workspace::warmStart(std::uint32_t row, double force) {
+  if (state[row] != RowState::kInactive || !std::isfinite(columns[0][row])) return false;
   if (!active.append(row, normalOf(row))) return false;
   state[row] = RowState::kActive;
   u[active.size() - 1] = force;
   return true;
 }
 
-bool MotionSolver::Workspace::ascend() {
+bool MotionSolver::Workspace::ascendDual() {
   const std::span<double> all(y.data(), 6 * bodies);
-  // the second time for the digits that the first has lost
-  for (int whole_steps = 0; whole_steps < 2;) {
+  // two full Newton steps: the second corrects the rounding of the first
+  for (int full_steps = 0; full_steps < 2;) {
     const std::size_t q = active.size();
     std::copy_n(y0.begin(), all.size(), y.begin());
     for (std::size_t k = 0; k < q; ++k) active.normal(k).addTo(all, u[k]);
     for (std::size_t k = 0; k < q; ++k) {
-      lack[k] = -columns[0][active.row(k)] - active.normal(k).dot(all);
+      multiplier_step[k] = -columns[0][active.row(k)] - active.normal(k).dot(all);
     }
-    active.solve({lack.data(), q});
-    // so far no multiplier has to pull
-    double share = 1.0;
+    active.solve({multiplier_step.data(), q});
+    // step fraction up to which all multipliers stay >= 0
+    double fraction = 1.0;
     for (std::size_t k = 0; k < q; ++k) {
-      if (lack[k] < 0.0) share = std::min(share, u[k] / -lack[k]);
+      if (multiplier_step[k] < 0.0) fraction = std::min(fraction, u[k] / -multiplier_step[k]);
     }
     for (std::size_t k = q; k-- > 0;) {
-      active.normal(k).addTo(all, share * lack[k]);
-      const bool vanishes = share < 1.0 && lack[k] < 0.0 && u[k] / -lack[k] <= share;
-      u[k] = std::max(u[k] + share * lack[k], 0.0);
+      active.normal(k).addTo(all, fraction * multiplier_step[k]);
+      const bool vanishes =
+          fraction < 1.0 && multiplier_step[k] < 0.0 && u[k] / -multiplier_step[k] <= fraction;
+      u[k] = std::max(u[k] + fraction * multiplier_step[k], 0.0);
       if (vanishes) dropActive(k);
     }
-    whole_steps = share == 1.0 ? whole_steps + 1 : 0;
-    if (whole_steps == 0 && ++iterations > iteration_limit) return false;
+    full_steps = fraction == 1.0 ? full_steps + 1 : 0;
+    if (full_steps == 0 && ++iterations > iteration_limit) return false;
   }
   return true;
 }
 
-bool MotionSolver::Workspace::enforceTried() {
-  for (std::size_t p = mostViolatedOfTried(); p < row_count; p = mostViolatedOfTried()) {
-    if (!enforce(p)) return false;
-    updateMotions();
+bool MotionSolver::Workspace::activateCandidates() {
+  for (std::size_t p = mostViolatedCandidate(); p < row_count; p = mostViolatedCandidate()) {
+    if (!activate(p)) return false;
+    updateDisplacements();
   }
   return true;
 }
 
-bool MotionSolver::Workspace::run(std::span<const std::uint32_t> first, std::span<const double> forces,
-                                  std::span<const std::uint32_t> left_out, bool known) {
+bool MotionSolver::Workspace::solve(std::span<const std::uint32_t> warm_start, std::span<const double> forces,
+                                    std::span<const std::uint32_t> excluded, bool reuse) {
   std::copy_n(y0.begin(), 6 * bodies, y.begin());
-  std::fill_n(state.begin(), row_count, RowState::kIdle);
+  std::fill_n(state.begin(), row_count, RowState::kInactive);
   iteration_limit = iterations + static_cast<std::uint32_t>(64 + 30 * bodies);
-  if (!known || active.variables() != 6 * bodies) active.reset(6 * bodies);
-  keepActive(first, left_out);
+  if (!reuse || active.variables() != 6 * bodies) active.reset(6 * bodies);
+  retainActive(warm_start, excluded);
   for (std::size_t k = 0; k < active.size() && !forces.empty(); ++k) u[k] = forces[active.row(k)];
-  for (const std::uint32_t row : first) take(row, forces.empty() ? 0.0 : std::max(forces[row], 0.0));
-  if (!ascend()) return false;
+  for (const std::uint32_t row : warm_start)
+    warmStart(row, forces.empty() ? 0.0 : std::max(forces[row], 0.0));
+  if (!ascendDual()) return false;
   while (true) {
-    updateMotions();
-    findViolated();
+    updateDisplacements();
+    findCandidates();
     const std::uint32_t before = iterations;
-    if (!enforceTried()) return false;
-    // what only rounding finds violated counts as kept
+    if (!activateCandidates()) return false;
+    // no candidate is violated in slackOf's order of summation: feasible up to rounding
     if (iterations == before) return true;
-    if (!ascend()) return false;
+    if (!ascendDual()) return false;
   }
 }
 
@@ -165,35 +167,35 @@ MotionSolver::~MotionSolver() = default;
 MotionSolver::MotionSolver(MotionSolver&&) noexcept = default;
 MotionSolver& MotionSolver::operator=(MotionSolver&&) noexcept = default;
 
-MotionResult MotionSolver::solve(std::span<const MovableBody> bodies, std::span<const GapRow> rows,
-                                 std::span<Displacement> motions, std::span<double> multipliers,
-                                 std::span<const std::uint32_t> first, std::size_t unchanged,
-                                 std::span<const std::uint32_t> left_out) noexcept {
+MotionResult MotionSolver::solve(std::span<const MovableBody> bodies, std::span<const ContactConstraint> rows,
+                                 std::span<Displacement> displacements, std::span<double> multipliers,
+                                 std::span<const std::uint32_t> warm_start, std::size_t unchanged,
+                                 std::span<const std::uint32_t> excluded) noexcept {
   Workspace& w = *workspace_;
   assert(bodies.size() <= w.L.size() && rows.size() <= w.body_of.size());
-  assert(motions.size() == bodies.size());
+  assert(displacements.size() == bodies.size());
   assert(multipliers.empty() || multipliers.size() == rows.size());
-  assert(first.size() <= rows.size() && unchanged <= std::min(rows.size(), w.row_count));
+  assert(warm_start.size() <= rows.size() && unchanged <= std::min(rows.size(), w.row_count));
   w.bodies = bodies.size();
   w.row_count = rows.size();
   w.iterations = 0;
-  w.setRows(rows, bodies, w.clipped ? 0 : unchanged);
+  w.setRows(rows, bodies, w.gaps_clamped ? 0 : unchanged);
   for (std::size_t i = 0; i < bodies.size(); ++i) w.setBody(i, bodies[i]);
 
   MotionResult result;
-  bool solved = w.run(first, multipliers, left_out, unchanged > 0);
+  bool solved = w.solve(warm_start, multipliers, excluded, unchanged > 0);
   if (!solved) {
-    // standing still is always admissible then
-    result.conflicting = true;
-    w.clipped = true;
+    // with gaps >= 0 no displacement at all is feasible
+    result.infeasible = true;
+    w.gaps_clamped = true;
     for (std::size_t i = 0; i < w.row_count; ++i) w.columns[0][i] = std::max(w.columns[0][i], 0.0);
-    solved = w.run({}, {}, left_out, false);
+    solved = w.solve({}, {}, excluded, false);
   }
   result.iterations = w.iterations;
 
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const Vector6 x = solved ? Vector6(segment(w.x, i)) : Vector6(Vector6::Zero());
-    motions[i] = {x.head<3>(), x.tail<3>()};
+    displacements[i] = {x.head<3>(), x.tail<3>()};
   }
   std::fill(multipliers.begin(), multipliers.end(), 0.0);
   if (!solved || multipliers.empty()) return result;
@@ -201,13 +203,13 @@ MotionResult MotionSolver::solve(std::span<const MovableBody> bodies, std::span<
   return result;
 }
 
-std::span<const std::uint32_t> MotionSolver::held() const noexcept { return workspace_->active.rows(); }
+std::span<const std::uint32_t> MotionSolver::activeRows() const noexcept { return workspace_->active.rows(); }
 
 Wrench springWrench(const Spring& spring, const Pose& X_WB) noexcept {
-  const Displacement toGoal = displacement(X_WB, spring.X_WG);
+  const Displacement to_goal = displacement(X_WB, spring.X_WG);
   const Vector3 p_BoC_W = X_WB.rotation() * spring.p_BC;
   const Vector3 f_C_W = spring.stiffness * (spring.X_WG * spring.p_BC - X_WB * spring.p_BC);
-  return {f_C_W, p_BoC_W.cross(f_C_W) + springTorque(spring, toGoal.rotation)};
+  return {f_C_W, p_BoC_W.cross(f_C_W) + springTorque(spring, to_goal.rotation)};
 }
 
 double springEnergy(const Spring& spring, const Pose& X_WB) noexcept {
@@ -216,4 +218,4 @@ double springEnergy(const Spring& spring, const Pose& X_WB) noexcept {
   return 0.5 * (spring.stiffness * stretch2 + springTorque(spring, turn_W).dot(turn_W));
 }
 
-}  // namespace tenon
+}  // namespace tenon::collision

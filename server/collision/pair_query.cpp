@@ -5,17 +5,17 @@
 #include <limits>
 
 #include "server/collision/contact_blocks.h"
-#include "server/collision/contact_sink.h"
+#include "server/collision/contact_reducer.h"
 #include "server/collision/query_kernels.h"
-#include "server/collision/straightening.h"
+#include "server/collision/ridge_correction.h"
 
-namespace tenon {
+namespace tenon::collision {
 namespace {
 
-/// Sixteen points with all that a contact needs.
-class Lanes {
+/// Access to the samples and contacts of a block of sixteen points.
+class ContactBlockView {
  public:
-  Lanes(const LaneFrame& frame, const SampleLanes& samples, ContactLanes& contacts)
+  ContactBlockView(const LaneFrame& frame, const SampleLanes& samples, ContactLanes& contacts)
       : frame_(frame), samples_(samples), contacts_(contacts) {}
 
   [[nodiscard]] std::uint32_t near() const { return samples_.near; }
@@ -23,14 +23,14 @@ class Lanes {
   [[nodiscard]] Vector3 gradient(std::size_t i) const {
     return {samples_.gradient_x[i], samples_.gradient_y[i], samples_.gradient_z[i]};
   }
-  /// B pushes A out along its own normal or, where it has none, into A's own inside.
+  /// For a lane without a usable gradient of B's field: B pushes along the inward normal of A's own surface.
   void setNormal(std::size_t i, const Vector3f& inward_A) {
     const Vector3 n_W = (frame_.R_WA * inward_A.cast<double>()).normalized();
     contacts_.n_x[i] = n_W.x();
     contacts_.n_y[i] = n_W.y();
     contacts_.n_z[i] = n_W.z();
   }
-  /// Sets place, gap and normal.
+  /// Sets position, gap and normal.
   void setContact(std::size_t i, Contact& contact) const {
     contact.p_WP = Vector3(contacts_.x[i], contacts_.y[i], contacts_.z[i]);
     contact.gap = gap(i);
@@ -43,100 +43,103 @@ class Lanes {
   ContactLanes& contacts_;
 };
 
-/// Calls `visit(lane)` for every bit that is set, lowest first.
+/// Calls `visit(lane)` for every set bit, lowest first.
 template <typename Visit>
 void forEachLane(std::uint32_t bits, Visit&& visit) {
   for (; bits != 0; bits &= bits - 1) visit(static_cast<std::uint32_t>(std::countr_zero(bits)));
 }
 
-static_assert(IncomingContacts::kMost >= Candidates::kMost);
+static_assert(IncomingContacts::kCapacity >= Candidates::kCapacity);
 
-/// One walk over a shell: what stays the same from sphere to sphere.
-class Walk {
+/// One traversal of a pointshell, level by level: culls clusters, leaves and points, then samples the
+/// remaining candidates and gathers the contacts among them.
+class Traversal {
  public:
-  Walk(const PairQuery& query, PairQueryResult& result)
+  Traversal(const PairQuery& query, PairQueryResult& result)
       : frame_(*query.field_B, query.X_WA, query.X_WB, query.dilation, query.margin, query.shell_A->radius()),
         kernels_(chosenKernels()),
         shell_(*query.shell_A),
-        sum_(query.sum),
+        sum_penalty_(query.sum_penalty),
         prune_(query.prune),
-        can_thin_(query.thin),
-        straighten_(query.straighten),
+        reduce_(query.reduce),
+        correct_ridges_(query.correct_ridges),
         result_(result),
-        sink_(result, -query.field_B->band() - query.dilation, query.margin) {}
+        reducer_(result, -query.field_B->band() - query.dilation, query.margin) {}
 
-  /// Returns how many levels were used.
+  /// Uses at most `levels` levels and about `budget` points; returns the number of levels used.
   std::size_t run(std::size_t levels, std::size_t budget) {
-    if (!wholeReaches()) return levels;
+    if (!shellInReach()) return levels;
     std::size_t block = 0;
     std::size_t before = 0;
     std::size_t k = 0;
     for (; k < levels; ++k) {
-      const ShellLevel& level = shell_.levels()[k];
-      if (k > 0 && culled_.points + expected(k, culled_.points - before) > budget) break;
+      const structures::ShellLevel& level = shell_.levels()[k];
+      if (k > 0 && culled_.points + expectedPoints(k, culled_.points - before) > budget) break;
       before = culled_.points;
-      for (std::uint32_t c = 0; c < level.cluster_count; c += ShellBlock::kLanes) {
-        const ShellBlock& balls = shell_.clusterBlocks()[block++];
-        const std::uint32_t reaching =
+      for (std::uint32_t c = 0; c < level.cluster_count; c += structures::ShellBlock::kLanes) {
+        const structures::ShellBlock& balls = shell_.clusterBlocks()[block++];
+        const std::uint32_t in_reach =
             prune_ ? kernels_.clusters(frame_, balls, culled_) : (1U << balls.count) - 1U;
-        forEachLane(reaching, [&](std::uint32_t i) { walk(level.first_cluster + c + i); });
+        forEachLane(in_reach, [&](std::uint32_t i) { traverseCluster(level.first_cluster + c + i); });
       }
-      if (!clusters_.empty()) walkClusters();
+      if (!clusters_.empty()) traverseClusters();
     }
-    judgeCandidates();
+    evaluateCandidates();
     result_.counts.spheres_visited += culled_.spheres;
     result_.counts.points_visited = culled_.points;
-    keepBound(std::min(frame_.gapOf(culled_.smallest_bound), kNothingNear));
+    lowerGapBound(std::min(frame_.gapOf(culled_.smallest_bound), kFarGap));
     return k;
   }
 
-  /// What points stand for; those beyond the end for nothing.
+  /// Areas by point [m^2]; points beyond the end have area 0.
   void setAreas(std::span<const float> areas) { areas_ = areas; }
 
-  /// Tests points of levels that were left out; others stand for their skin.
-  void testAlso(std::span<const std::uint32_t> points) {
-    can_thin_ = false;
+  /// Tests points of skipped levels; they are listed with area 0.
+  void testPriorityPoints(std::span<const std::uint32_t> points) {
+    reduce_ = false;
     for (const std::uint32_t point : points) {
       if (point < areas_.size() || point >= shell_.points().size()) continue;
-      if (!candidates_.hasRoom()) judgeCandidates();
+      if (!candidates_.fitsBatch()) evaluateCandidates();
       append(point);
       ++result_.counts.points_visited;
     }
-    judgeCandidates();
+    evaluateCandidates();
   }
 
  private:
-  /// Points of level k that will be tested, if it is like the level before, of which `last` were.
-  [[nodiscard]] std::size_t expected(std::size_t k, std::size_t last) const {
-    const std::size_t seen = std::max<std::size_t>(last, Pointshell::kLeafPoints);
+  /// Expected number of points of level k that will be tested, from the `last` tested of the level before.
+  [[nodiscard]] std::size_t expectedPoints(std::size_t k, std::size_t last) const {
+    const std::size_t seen = std::max<std::size_t>(last, structures::Pointshell::kLeafPoints);
     const std::size_t before = std::max(shell_.levels()[k - 1].point_count, 1U);
     return std::min<std::size_t>(seen * shell_.levels()[k].point_count / before,
                                  shell_.levels()[k].point_count);
   }
 
-  bool wholeReaches() {
+  /// Whether the bounding sphere of all points is within the margin.
+  bool shellInReach() {
     ++result_.counts.spheres_visited;
     constexpr double kRounding = 1e-6;
-    const Vector3 p_BC = frame_.inB(shell_.ballCentre());
-    const double bound = frame_.field.lowerBound(p_BC, shell_.ballRadius() + kRounding) - frame_.dilation;
+    const Vector3 p_BC = frame_.inB(shell_.boundingCentre());
+    const double bound = frame_.field.lowerBound(p_BC, shell_.boundingRadius() + kRounding) - frame_.dilation;
     if (!prune_ || bound <= frame_.margin) return true;
-    keepBound(bound);
+    lowerGapBound(bound);
     return false;
   }
 
-  /// What was left out counts as the gap of its points.
-  void keepBound(double bound) {
+  /// Includes `bound` [m], a lower bound of the gaps of culled points, in the result.
+  void lowerGapBound(double bound) {
     result_.smallest_gap = std::min(result_.smallest_gap, bound);
-    result_.others_gap = std::min(result_.others_gap, bound);
+    result_.unlisted_gap = std::min(result_.unlisted_gap, bound);
   }
 
-  void walk(std::uint32_t cluster) {
+  /// Adds a cluster to the next batch.
+  void traverseCluster(std::uint32_t cluster) {
     clusters_.push_back(cluster);
-    if (clusters_.full()) walkClusters();
+    if (clusters_.full()) traverseClusters();
   }
 
-  void walkClusters() {
-    if (!candidates_.hasRoom()) judgeCandidates();
+  void traverseClusters() {
+    if (!candidates_.fitsBatch()) evaluateCandidates();
     if (prune_) {
       kernels_.candidates(frame_, shell_, {clusters_.begin(), clusters_.end()}, candidates_, culled_);
     } else {
@@ -154,101 +157,103 @@ class Walk {
     candidates_.point[n] = point;
   }
 
-  void appendAll(const ShellSphere& cluster) {
+  void appendAll(const structures::ShellSphere& cluster) {
     culled_.spheres += cluster.count;
-    for (const ShellSphere& leaf : shell_.leaves().subspan(cluster.first, cluster.count)) {
+    for (const structures::ShellSphere& leaf : shell_.leaves().subspan(cluster.first, cluster.count)) {
       for (std::uint32_t i = 0; i < leaf.count; ++i) append(leaf.first + i);
       culled_.points += leaf.count;
     }
   }
 
-  /// What the field says of the candidates, then the contacts among them leaf after leaf.
-  void judgeCandidates() {
+  /// Samples the field at the candidates, then gathers the contacts among them, leaf by leaf.
+  void evaluateCandidates() {
     padCandidates();
     const PointLanes points{candidates_.x.data(), candidates_.y.data(), candidates_.z.data(),
                             candidates_.count};
     SampleSums sums;
     kernels_.samples(frame_, points, samples_.data(), sums);
-    if (straighten_ && sums.colliding > 0) {
-      const std::size_t blocks = (points.count + ShellBlock::kLanes - 1) / ShellBlock::kLanes;
-      straighten(frame_, kernels_, points, {samples_.data(), blocks}, sums);
+    if (correct_ridges_ && sums.colliding > 0) {
+      const std::size_t blocks =
+          (points.count + structures::ShellBlock::kLanes - 1) / structures::ShellBlock::kLanes;
+      correctRidges(frame_, kernels_, points, {samples_.data(), blocks}, sums);
     }
     result_.counts.points_colliding += sums.colliding;
     result_.smallest_gap = std::min(result_.smallest_gap, sums.smallest_distance - frame_.dilation);
     result_.deepest = std::max(result_.deepest, -sums.smallest_distance);
-    result_.others_gap = std::min(result_.others_gap, sums.smallest_gap_apart);
+    result_.unlisted_gap = std::min(result_.unlisted_gap, sums.smallest_far_gap);
     if (sums.near > 0) {
       kernels_.contacts(frame_, points, samples_.data(), contacts_.data());
-      for (std::uint32_t first = 0; first < candidates_.count; first += ShellBlock::kLanes) finish(first);
-      can_thin_ ? listThinned() : listAll(sums.near);
+      for (std::uint32_t first = 0; first < candidates_.count; first += structures::ShellBlock::kLanes)
+        completeBlock(first);
+      reduce_ ? gatherReduced() : gatherAll(sums.near);
     }
     candidates_.count = 0;
   }
 
-  /// Kernels read whole blocks.
+  /// Fills the last block up: kernels read whole blocks.
   void padCandidates() {
-    for (std::size_t i = candidates_.count; i < candidates_.count + ShellBlock::kLanes; ++i) {
+    for (std::size_t i = candidates_.count; i < candidates_.count + structures::ShellBlock::kLanes; ++i) {
       candidates_.x[i] = candidates_.y[i] = candidates_.z[i] = 0.0F;
       candidates_.point[i] = 0;
     }
   }
 
-  /// Normals of the block from `first` where the field has none, and what it pushes.
-  void finish(std::uint32_t first) {
-    Lanes lanes = lanesOf(first);
-    const ContactLanes& contacts = contacts_[first / ShellBlock::kLanes];
-    forEachLane(lanes.near() & ~contacts.sloping, [&](std::uint32_t i) {
+  /// Sets missing normals of the block that starts at `first`, and sums its penalties.
+  void completeBlock(std::uint32_t first) {
+    ContactBlockView lanes = blockAt(first);
+    const ContactLanes& contacts = contacts_[first / structures::ShellBlock::kLanes];
+    forEachLane(lanes.near() & ~contacts.has_normal, [&](std::uint32_t i) {
       lanes.setNormal(i, shell_.points()[candidates_.point[first + i]].inward_M);
     });
-    if (sum_ && lanes.near() != 0) sumPushes(first);
+    if (sum_penalty_ && lanes.near() != 0) sumPenalties(first);
   }
 
-  [[nodiscard]] Lanes lanesOf(std::uint32_t candidate) {
-    const std::size_t block = candidate / ShellBlock::kLanes;
+  [[nodiscard]] ContactBlockView blockAt(std::uint32_t candidate) {
+    const std::size_t block = candidate / structures::ShellBlock::kLanes;
     return {frame_, samples_[block], contacts_[block]};
   }
 
   /// Calls `visit(lanes, i, candidate)` for the candidates that are contacts.
   template <typename Visit>
   void forEachNear(Visit&& visit) {
-    for (std::uint32_t first = 0; first < candidates_.count; first += ShellBlock::kLanes) {
-      const Lanes lanes = lanesOf(first);
+    for (std::uint32_t first = 0; first < candidates_.count; first += structures::ShellBlock::kLanes) {
+      const ContactBlockView lanes = blockAt(first);
       forEachLane(lanes.near(), [&](std::uint32_t i) { visit(lanes, i, first + i); });
     }
   }
 
-  void listAll(std::size_t near) {
-    if (sink_.hasRoom(near)) {
-      forEachNear([this](const Lanes& lanes, std::uint32_t i, std::uint32_t candidate) {
-        list(lanes, i, candidates_.point[candidate]);
+  void gatherAll(std::size_t near) {
+    if (reducer_.fits(near)) {
+      forEachNear([this](const ContactBlockView& lanes, std::uint32_t i, std::uint32_t candidate) {
+        gather(lanes, i, candidates_.point[candidate]);
       });
       return;
     }
-    forEachNear([this](const Lanes& lanes, std::uint32_t i, std::uint32_t candidate) {
-      coming_.push_back(lanes.gap(i), candidates_.point[candidate], candidate);
+    forEachNear([this](const ContactBlockView& lanes, std::uint32_t i, std::uint32_t candidate) {
+      incoming_.push_back(lanes.gap(i), candidates_.point[candidate], candidate);
     });
-    listDeepest();
+    gatherSmallestGaps();
   }
 
-  /// Of those that come, what has room.
-  void listDeepest() {
-    const GapRank last = sink_.makeRoom(coming_);
-    for (std::size_t k = 0; k < coming_.count; ++k) {
-      if (!(last < GapRank{coming_.gap[k], coming_.point[k]})) listCandidate(coming_.number[k]);
+  /// Gathers those incoming contacts that stay.
+  void gatherSmallestGaps() {
+    const GapRank last = reducer_.evictFor(incoming_);
+    for (std::size_t k = 0; k < incoming_.count; ++k) {
+      if (!(last < GapRank{incoming_.gap[k], incoming_.point[k]})) gatherCandidate(incoming_.tag[k]);
     }
-    coming_.count = 0;
+    incoming_.count = 0;
   }
 
-  void listThinned() {
-    std::array<std::uint32_t, LeafContacts::kMost> candidate;  // of the leaf's contacts
+  void gatherReduced() {
+    std::array<std::uint32_t, LeafContacts::kCapacity> candidate;  // index of each contact of the leaf
     LeafContacts near;
     std::uint32_t leaf = 0;
     const auto close = [&] {
-      if (near.count > 0) listLeaf(near, candidate);
+      if (near.count > 0) gatherLeaf(near, candidate);
       near.count = 0;
     };
-    for (std::uint32_t first = 0; first < candidates_.count; first += ShellBlock::kLanes) {
-      const Lanes lanes = lanesOf(first);
+    for (std::uint32_t first = 0; first < candidates_.count; first += structures::ShellBlock::kLanes) {
+      const ContactBlockView lanes = blockAt(first);
       forEachLane(lanes.near(), [&](std::uint32_t i) {
         const std::uint32_t own = shell_.leafOf(candidates_.point[first + i]);
         if (own != leaf) close();
@@ -259,27 +264,27 @@ class Walk {
       });
     }
     close();
-    if (coming_.count > 0) listDeepest();
+    if (incoming_.count > 0) gatherSmallestGaps();
   }
 
-  void listLeaf(const LeafContacts& near, const std::array<std::uint32_t, LeafContacts::kMost>& candidate) {
-    const std::uint32_t chosen = sink_.thinned(near);
-    const bool has_room =
-        coming_.count == 0 && sink_.hasRoom(static_cast<std::size_t>(std::popcount(chosen)));
+  void gatherLeaf(const LeafContacts& near,
+                  const std::array<std::uint32_t, LeafContacts::kCapacity>& candidate) {
+    const std::uint32_t chosen = reducer_.reduceLeaf(near);
+    const bool fits = incoming_.count == 0 && reducer_.fits(static_cast<std::size_t>(std::popcount(chosen)));
     forEachLane(chosen, [&](std::uint32_t k) {
-      if (has_room) {
-        listCandidate(candidate[k]);
+      if (fits) {
+        gatherCandidate(candidate[k]);
       } else {
-        coming_.push_back(near.gap[k], candidates_.point[candidate[k]], candidate[k]);
+        incoming_.push_back(near.gap[k], candidates_.point[candidate[k]], candidate[k]);
       }
     });
   }
 
-  void listCandidate(std::uint32_t candidate) {
-    list(lanesOf(candidate), candidate % ShellBlock::kLanes, candidates_.point[candidate]);
+  void gatherCandidate(std::uint32_t candidate) {
+    gather(blockAt(candidate), candidate % structures::ShellBlock::kLanes, candidates_.point[candidate]);
   }
 
-  void list(const Lanes& lanes, std::uint32_t i, std::uint32_t point) {
+  void gather(const ContactBlockView& lanes, std::uint32_t i, std::uint32_t point) {
     Contact& contact = *result_.contacts.extend();
     lanes.setContact(i, contact);
     contact.point = point;
@@ -290,37 +295,37 @@ class Walk {
     return point < areas_.size() ? static_cast<double>(areas_[point]) : 0.0;
   }
 
-  void sumPushes(std::uint32_t first) {
-    const SampleLanes& samples = samples_[first / ShellBlock::kLanes];
-    PushLanes push;
-    kernels_.pushes(frame_, samples, contacts_[first / ShellBlock::kLanes], &candidates_.point[first], areas_,
-                    push);
-    Wrench sum = result_.push_Ao_W;
-    for (std::size_t i = 0; i < ShellBlock::kLanes; ++i) {
-      sum.force += Vector3(push.f_x[i], push.f_y[i], push.f_z[i]);
-      sum.torque += Vector3(push.t_x[i], push.t_y[i], push.t_z[i]);
+  void sumPenalties(std::uint32_t first) {
+    const SampleLanes& samples = samples_[first / structures::ShellBlock::kLanes];
+    PenaltyLanes penalty;
+    kernels_.penalties(frame_, samples, contacts_[first / structures::ShellBlock::kLanes],
+                       &candidates_.point[first], areas_, penalty);
+    Wrench sum = result_.penalty_Ao_W;
+    for (std::size_t i = 0; i < structures::ShellBlock::kLanes; ++i) {
+      sum.force += Vector3(penalty.f_x[i], penalty.f_y[i], penalty.f_z[i]);
+      sum.torque += Vector3(penalty.t_x[i], penalty.t_y[i], penalty.t_z[i]);
     }
-    result_.push_Ao_W = sum;
-    result_.pushing += static_cast<std::uint32_t>(std::popcount(push.pushing));
+    result_.penalty_Ao_W = sum;
+    result_.penalty_points += static_cast<std::uint32_t>(std::popcount(penalty.inside));
   }
 
   const LaneFrame frame_;
   const QueryKernels& kernels_;
-  const Pointshell& shell_;
-  bool sum_;
+  const structures::Pointshell& shell_;
+  bool sum_penalty_;
   bool prune_;
-  bool can_thin_;
+  bool reduce_;
   std::span<const float> areas_;  ///< of the levels in use
-  Culled culled_;
-  FixedVector<std::uint32_t, Candidates::kClusters> clusters_;  ///< to be walked
+  CullResult culled_;
+  FixedVector<std::uint32_t, Candidates::kBatchClusters> clusters_;  ///< of the next batch
   Candidates candidates_;
-  // of the candidates
-  std::array<SampleLanes, Candidates::kMost / ShellBlock::kLanes> samples_;
-  std::array<ContactLanes, Candidates::kMost / ShellBlock::kLanes> contacts_;
-  bool straighten_;
+  // by block of candidates
+  std::array<SampleLanes, Candidates::kCapacity / structures::ShellBlock::kLanes> samples_;
+  std::array<ContactLanes, Candidates::kCapacity / structures::ShellBlock::kLanes> contacts_;
+  bool correct_ridges_;
   PairQueryResult& result_;
-  ContactSink sink_;
-  IncomingContacts coming_;  ///< when there is no room for all
+  ContactReducer reducer_;
+  IncomingContacts incoming_;  ///< used when the list cannot take all
 };
 
 }  // namespace
@@ -336,64 +341,68 @@ double QueryCounts::loadPercent() const {
 void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
   result.contacts.clear();
   result.counts = {};
-  result.push_Ao_W = {};
-  result.pushing = 0;
+  result.penalty_Ao_W = {};
+  result.penalty_points = 0;
   result.deepest = 0.0;
-  result.smallest_gap = kNothingNear;
-  result.others_gap = kNothingNear;
-  result.thinned = false;
-  result.listed_to = query.margin;
+  result.smallest_gap = kFarGap;
+  result.unlisted_gap = kFarGap;
+  result.reduced = false;
+  result.complete_to = query.margin;
   result.levels_used = 0;
-  result.walk_points = 0;
-  result.left_out = 0.0;
+  result.traversal_points = 0;
+  result.skipped_gap_error = 0.0;
   if (query.shell_A->empty() || query.field_B->empty()) return;
 
   const auto levels = query.shell_A->levels();
   const std::size_t allowed = std::min<std::size_t>(query.levels, levels.size());
   result.counts.spheres_total = query.shell_A->spheres();
-  Walk walk(query, result);
-  if (allowed > 0) walk.setAreas(query.shell_A->areasOfLevel(allowed - 1));
-  const std::size_t budget = std::max<std::size_t>(query.budget, query.first.size()) - query.first.size();
-  const std::size_t used = walk.run(allowed, budget);
+  Traversal traversal(query, result);
+  if (allowed > 0) traversal.setAreas(query.shell_A->areasOfLevel(allowed - 1));
+  const std::size_t budget =
+      std::max<std::size_t>(query.budget, query.priority_points.size()) - query.priority_points.size();
+  const std::size_t used = traversal.run(allowed, budget);
   result.levels_used = static_cast<std::uint32_t>(used);
   if (used > 0 && used < levels.size()) {
     const std::span<const float> areas = query.shell_A->areasOfLevel(used - 1);
     for (Contact& contact : result.contacts) contact.area = areas[contact.point];
-    result.left_out = levels[used - 1].spacing;
-    walk.setAreas(areas);
-    walk.testAlso(query.first);
+    result.skipped_gap_error = levels[used - 1].spacing;
+    traversal.setAreas(areas);
+    traversal.testPriorityPoints(query.priority_points);
   }
-  result.walk_points = result.counts.points_visited;
+  result.traversal_points = result.counts.points_visited;
 
-  if (result.counts.contacts_dropped > 0) result.others_gap = std::min(result.others_gap, result.listed_to);
+  if (result.counts.contacts_dropped > 0)
+    result.unlisted_gap = std::min(result.unlisted_gap, result.complete_to);
 }
 
-void resampleContacts(const PairQuery& query, double moved, PairQueryResult& result) noexcept {
+void resampleContacts(const PairQuery& query, double displacement, PairQueryResult& result) noexcept {
   const LaneFrame frame(*query.field_B, query.X_WA, query.X_WB, query.dilation, query.margin,
                         query.shell_A->radius());
   const QueryKernels& kernels = chosenKernels();
-  const std::span<const ShellPoint> points = query.shell_A->points();
+  const std::span<const structures::ShellPoint> points = query.shell_A->points();
   ContactList& contacts = result.contacts;
-  result.smallest_gap = result.others_gap - moved;
+  result.smallest_gap = result.unlisted_gap - displacement;
   result.deepest = std::max(-(result.smallest_gap + query.dilation), 0.0);
   SampleSums sums;
   std::size_t kept = 0;
-  for (std::size_t first = 0; first < contacts.size(); first += ShellBlock::kLanes) {
-    const ShellBlock block = blockOf(*query.shell_A, contacts, first);
+  for (std::size_t first = 0; first < contacts.size(); first += structures::ShellBlock::kLanes) {
+    const structures::ShellBlock block = blockOf(*query.shell_A, contacts, first);
     SampleLanes samples;
-    ContactLanes sides;
-    const PointLanes places{block.x.data(), block.y.data(), block.z.data(), block.count};
-    kernels.samples(frame, places, &samples, sums);
-    kernels.contacts(frame, places, &samples, &sides);
-    Lanes lanes(frame, samples, sides);
+    ContactLanes contact_lanes;
+    const PointLanes points_A{block.x.data(), block.y.data(), block.z.data(), block.count};
+    kernels.samples(frame, points_A, &samples, sums);
+    kernels.contacts(frame, points_A, &samples, &contact_lanes);
+    ContactBlockView lanes(frame, samples, contact_lanes);
     for (std::uint32_t i = 0; i < block.count; ++i) {
       const auto [point, area] = std::pair(contacts[first + i].point, contacts[first + i].area);
       if ((samples.exact >> i & 1U) == 0) {
-        // as seen from where the list was made: from here back there it may come nearer again
-        result.others_gap = std::min(result.others_gap, samples.distance[i] - frame.dilation - moved);
+        // unlisted_gap is for the poses of the traversal: the point may come nearer again when A moves back
+        // there
+        result.unlisted_gap =
+            std::min(result.unlisted_gap, samples.distance[i] - frame.dilation - displacement);
         continue;
       }
-      if ((sides.sloping >> i & 1U) == 0) lanes.setNormal(i, points[point].inward_M);
+      if ((contact_lanes.has_normal >> i & 1U) == 0) lanes.setNormal(i, points[point].inward_M);
       Contact& contact = contacts[kept++];
       lanes.setContact(i, contact);
       contact.point = point;
@@ -402,8 +411,8 @@ void resampleContacts(const PairQuery& query, double moved, PairQueryResult& res
   }
   result.smallest_gap = std::min(result.smallest_gap, sums.smallest_distance - frame.dilation);
   result.deepest = std::max(result.deepest, -sums.smallest_distance);
-  if (!result.thinned) result.counts.points_colliding = sums.colliding;
+  if (!result.reduced) result.counts.points_colliding = sums.colliding;
   contacts.resize(kept);
 }
 
-}  // namespace tenon
+}  // namespace tenon::collision

@@ -8,93 +8,103 @@
 #include "server/structures/distance_field.h"
 #include "server/structures/pointshell.h"
 
-namespace tenon {
+namespace tenon::collision {
 
-/// A point of body A's shell near body B's surface.
+/// A point of body A's pointshell near body B's surface.
 struct Contact {
   Vector3 p_WP = Vector3::Zero();
   Vector3 n_W = Vector3::Zero();  ///< unit, from B into A: the direction in which B pushes A
   double gap = 0.0;               ///< [m] signed distance minus the dilation; < 0: inside the dilated surface
-  double area = 0.0;              ///< [m^2] the point stands for
-  std::uint32_t point = 0;        ///< its index in the shell: a name that stays from tick to tick
+  double area = 0.0;              ///< [m^2] surface of A that the point represents
+  std::uint32_t point = 0;        ///< index in the pointshell: identifies the contact from tick to tick
 };
 
 inline constexpr std::size_t kMaxPairContacts = 512;
 using ContactList = FixedVector<Contact, kMaxPairContacts>;
 
-/// Work done by a query, counted: the same on every machine.
+/// Work done by a query, as deterministic counts: the same on every machine.
 struct QueryCounts {
   std::uint32_t spheres_visited = 0;
   std::uint32_t spheres_total = 0;  ///< of all levels
   std::uint32_t points_visited = 0;
   std::uint32_t points_colliding = 0;
-  std::uint32_t contacts_dropped = 0;  ///< for want of room: those with the largest gaps
+  std::uint32_t contacts_dropped = 0;  ///< contacts beyond the list's capacity: those with the largest gaps
 
-  /// The paper's load eta in percent (eq. 2), weights 0.5 and 0.5.
+  /// [%] Load eta of the paper (eq. 2) with weights 0.5 and 0.5.
   [[nodiscard]] double loadPercent() const;
 };
 
+/// What to query: pointshell of A against the distance field of B at given poses.
 struct PairQuery {
-  const Pointshell* shell_A = nullptr;
-  const DistanceField* field_B = nullptr;
+  const structures::Pointshell* shell_A = nullptr;
+  const structures::DistanceField* field_B = nullptr;
   Pose X_WA;
   Pose X_WB;
-  double dilation = 0.0;               ///< [m] the surface of B is felt this far outside
+  double dilation = 0.0;               ///< [m] outward offset of B's contact surface
   double margin = 0.0;                 ///< [m] contacts are listed up to this gap
-  std::uint32_t levels = 0xFFFFFFFFU;  ///< how many levels of the shell may be used
-  /// So many points may be tested: a level of which more are expected is left out, and all finer ones. The
-  /// coarsest is always used. Points of coarser levels then stand for the skin of those left out.
+  std::uint32_t levels = 0xFFFFFFFFU;  ///< number of pointshell levels that may be used
+  /// Maximum number of points to test. A level that is expected to exceed it is skipped, with all finer ones;
+  /// the coarsest level is always used. The areas of the points in use then cover the whole surface.
   std::uint32_t budget = 0xFFFFFFFFU;
-  /// Points that are tested whatever is left out, before all others of the budget: what touched a moment ago
-  /// holds on. Listed with no area when others stand for their skin.
-  std::span<const std::uint32_t> first = {};
-  /// When room runs out, points give way first that stand behind a neighbour (of the same leaf, with about
-  /// the same normal and a smaller gap): a flat patch then stays listed over all its width.
-  bool thin = false;
-  bool sum = false;  ///< also sum what all points inside push, listed or not; not with a budget
-  /// Where the field bends inside, depths and normals are those of planes beside it: see straightening.h.
-  bool straighten = false;
+  /// Points of skipped levels that are tested nevertheless and count against the budget: those that touched
+  /// in the last tick, so that contact is not lost. Listed with area 0, since coarser points represent their
+  /// surface.
+  std::span<const std::uint32_t> priority_points = {};
+  /// When the list fills up, points are dropped first that have a neighbour of the same leaf with about the
+  /// same normal and a smaller gap: a flat patch then stays listed over its whole extent.
+  bool reduce = false;
+  /// Also sum the penalty of all points inside, listed or not. Not with a budget.
+  bool sum_penalty = false;
+  /// Correct depths and normals near gradient discontinuities of the field: see correctRidges().
+  bool correct_ridges = false;
   bool prune = true;  ///< false: every point is tested, for comparison
 };
 
 struct PairQueryResult {
   ContactList contacts;
   QueryCounts counts;
-  double smallest_gap =
-      0.0;  ///< of all points, a lower bound when none is within the margin; dilation included
-  double listed_to =
-      0.0;  ///< [m] every contact with a smaller gap is in the list: the margin, or less when full
-  double others_gap = 0.0;    ///< [m] no point outside the list has a smaller gap, thinned ones aside
-  bool thinned = false;       ///< some points gave way to their neighbours
-  Wrench push_Ao_W;           ///< [m] and [m^2] of penalty a N/m of stiffness, when asked for
-  std::uint32_t pushing = 0;  ///< points in that sum; deeper than the field's band nothing pushes
-  double deepest = 0.0;       ///< [m] depth in the undilated field of the deepest point, 0 when apart
+  /// [m] of all points, dilation included; a lower bound when no point is within the margin
+  double smallest_gap = 0.0;
+  /// [m] the list holds every contact with a smaller gap: the margin, or less when contacts were dropped
+  double complete_to = 0.0;
+  /// [m] lower bound of the gap of points that are not listed, those dropped by `reduce` excepted
+  double unlisted_gap = 0.0;
+  bool reduced = false;  ///< points were dropped in favour of neighbours (PairQuery::reduce)
+  /// Penalty wrench for a stiffness of 1 N/m, force [m] and torque [m^2], if asked for
+  Wrench penalty_Ao_W;
+  std::uint32_t penalty_points = 0;  ///< points in that sum; points deeper than the field's band are not
+  double deepest = 0.0;              ///< [m] depth of the deepest point in the undilated field, 0 when apart
   std::uint32_t levels_used = 0;
-  std::uint32_t walk_points = 0;  ///< points tested by queryPair; resampling does not change it
-  double left_out = 0.0;          ///< [m] points of levels that were left out may be nearer by so much
+  std::uint32_t traversal_points = 0;  ///< points tested by queryPair; resampling does not change it
+  double skipped_gap_error = 0.0;      ///< [m] points of skipped levels may be nearer by at most this
 };
 
-/// All points of A's shell whose gap to B is at most `margin`. Spheres that the field proves to be farther
-/// away are skipped; the answer is the same as testing every point.
+/// Lists all points of A's pointshell whose gap to B is at most `margin`. Spheres that the field proves to be
+/// farther away are pruned; the result is the same as that of testing every point. Beyond kMaxPairContacts
+/// the smallest gaps are kept (`complete_to`, `contacts_dropped`). Empty structures give an empty result.
 ///
 /// Threads: pure. Real-time.
 void queryPair(const PairQuery& query, PairQueryResult& result) noexcept;
 
-/// The listed contacts again, at the query's poses, while no point of A came nearer to B than by `moved` [m]
-/// since queryPair listed them: costs no walk. Gaps and normals are those that queryPair would give without
-/// straightening; what is not in the list is still not nearer than others_gap - moved.
-void resampleContacts(const PairQuery& query, double moved, PairQueryResult& result) noexcept;
+/// Evaluates the listed contacts at the query's poses without a traversal, as long as no point of A has come
+/// nearer to B than by `displacement` [m] since queryPair listed them. Gaps and normals are those of
+/// queryPair without ridge correction; points that are not listed have at least a gap of unlisted_gap -
+/// displacement. Contacts that left the field's band are removed from the list.
+///
+/// Threads: pure. Real-time.
+void resampleContacts(const PairQuery& query, double displacement, PairQueryResult& result) noexcept;
 
-/// [N] the penalty of one contact along its normal; 0 when apart.
+/// [N] Penalty force of one contact along its normal for `stiffness` [N/m]; 0 when apart.
 [[nodiscard]] double penaltyForce(const Contact& contact, double stiffness) noexcept;
 
-/// The paper's penalty: F = K sum a_i d_i n_i / A_ref of the points inside the (dilated) surface, about A's
-/// origin. A_ref = 1 cm^2, K in N/m.
+/// Penalty wrench of the paper (§3.1) on A about its origin, in W: F = K sum a_i d_i n_i / A_ref over the
+/// listed points inside the dilated surface, with A_ref = 1 cm^2 and K = `stiffness` [N/m].
 [[nodiscard]] Wrench penaltyWrench(const PairQueryResult& result, const Vector3& p_WAo,
                                    double stiffness) noexcept;
 
-/// At most `out.size()` contacts that stand for all: the smallest gap, then those that differ most in place
-/// and normal. Returns how many; indices into `contacts`, in order of choice.
-std::size_t reduceContacts(const ContactList& contacts, std::span<std::uint32_t> out) noexcept;
+/// Selects at most `out.size()` contacts that represent all: the smallest gap, then always the one that
+/// differs most from those selected in position and normal. Writes indices into `contacts` in order of
+/// selection and returns their number.
+std::size_t selectRepresentatives(const ContactList& contacts, std::span<std::uint32_t> out) noexcept;
 
-}  // namespace tenon
+}  // namespace tenon::collision

@@ -4,21 +4,21 @@
 #include <atomic>
 #include <vector>
 
-// this file is compiled once for every instruction set
+// Highway compiles this file once for every instruction set
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "server/collision/query_kernels.cpp"
-// without the imitated vectors the baseline is one lane, which is faster
+// without emulated vectors the baseline is scalar code, which is faster
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_EMU128)
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "server/collision/bend_lanes_inl.h"
 #include "server/collision/contact_lanes_inl.h"
 #include "server/collision/cull_lanes_inl.h"
+#include "server/collision/ridge_lanes_inl.h"
 #include "server/collision/sample_lanes_inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tenon {
+namespace tenon::collision {
 namespace HWY_NAMESPACE {
 
 const char* nameOfIsa() {
@@ -37,28 +37,28 @@ const char* nameOfIsa() {
 }
 
 QueryKernels kernels() {
-  return {nameOfIsa(),     cull::clusters, cull::candidates, exact::samples,
-          exact::contacts, exact::pushes,  exact::bent,      exact::planes};
+  return {nameOfIsa(),     cull::clusters,   cull::candidates,        exact::samples,
+          exact::contacts, exact::penalties, exact::nonUnitGradients, exact::tangentPlanes};
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace tenon
+}  // namespace tenon::collision
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace tenon {
+namespace tenon::collision {
 namespace {
 
 HWY_EXPORT(kernels);
 
-struct Supported {
+struct KernelRegistry {
   std::array<QueryKernels, 8> all{};
   std::size_t count = 0;
   std::atomic<std::size_t> chosen = 0;
 
-  Supported() {
+  KernelRegistry() {
     all[count++] = HWY_STATIC_DISPATCH(kernels)();
-    // a target is a bit, the best has the lowest
+    // a target is a bit; the fastest target has the lowest one
     std::vector<std::int64_t> targets = hwy::SupportedAndGeneratedTargets();
     for (auto target = targets.rbegin(); target != targets.rend() && count < all.size(); ++target) {
       hwy::SetSupportedTargetsForTest(*target);
@@ -72,41 +72,44 @@ struct Supported {
   }
 };
 
-Supported supported;
+KernelRegistry registry;
 
-float highest(const std::array<float, 3>& values) {
+float largestMagnitude(const std::array<float, 3>& values) {
   return std::max({std::abs(values[0]), std::abs(values[1]), std::abs(values[2])});
 }
 
 }  // namespace
 
-CullFrame::CullFrame(const DistanceField& field, const Matrix3& R_BA, const Vector3& p_BA_B, double reach_A,
-                     double limit_B) {
-  const DistanceField::Layout& layout = field.layout();
+CullFrame::CullFrame(const structures::DistanceField& field, const Matrix3& R_BA, const Vector3& p_BA_B,
+                     double reach_A, double limit_B) {
+  const structures::DistanceField::Layout& layout = field.layout();
   const double per = 1.0 / layout.voxel;
   for (std::size_t i = 0; i < R.size(); ++i) R[i] = static_cast<float>(R_BA.data()[i] * per);
   bool too_long = false;
   for (int axis = 0; axis < 3; ++axis) {
     const auto k = static_cast<std::size_t>(axis);
     p[k] = static_cast<float>((p_BA_B[axis] - layout.p_MoFo_M[axis]) * per - 0.5);
-    most[k] = static_cast<float>(layout.bricks[k]) * DistanceField::kBrickVoxels - 1.0F;
-    too_long = too_long || most[k] >= static_cast<float>(kMostVoxels);
+    last_voxel[k] = static_cast<float>(layout.bricks[k]) * structures::DistanceField::kBrickVoxels - 1.0F;
+    too_long = too_long || last_voxel[k] >= static_cast<float>(kMaxVoxels);
   }
   per_metre = static_cast<float>(per);
-  // a place is a sum of four products, each off by 2^-23 of at most this much; bounds are off by as little
-  const float largest = highest(p) + highest(most) + static_cast<float>(2.0 * reach_A * per);
+  // a coordinate is a sum of four terms, each with a rounding error of at most 2^-23 of `largest`; errors of
+  // the bounds computed from it are of the same size
+  const float largest =
+      largestMagnitude(p) + largestMagnitude(last_voxel) + static_cast<float>(2.0 * reach_A * per);
   slack = 4e-6F * largest + 2e-3F;
   limit = static_cast<float>(limit_B * per) + slack;
-  outside = static_cast<float>(layout.margin * per);
-  beyond_band = std::min(outside, static_cast<float>(layout.band * per - DistanceField::kHalfDiagonal));
+  outside_grid = static_cast<float>(layout.margin * per);
+  beyond_band = std::min(outside_grid,
+                         static_cast<float>(layout.band * per - structures::DistanceField::kHalfDiagonal));
   if (too_long) {
     limit = std::numeric_limits<float>::infinity();
-    most.fill(0.0F);
+    last_voxel.fill(0.0F);
   }
 }
 
-LaneFrame::LaneFrame(const DistanceField& the_field, const Pose& X_WA, const Pose& X_WB, double the_dilation,
-                     double the_margin, double reach_A)
+LaneFrame::LaneFrame(const structures::DistanceField& the_field, const Pose& X_WA, const Pose& X_WB,
+                     double the_dilation, double the_margin, double reach_A)
     : field(the_field),
       box_B(the_field.box()),
       dilation(the_dilation),
@@ -118,20 +121,20 @@ LaneFrame::LaneFrame(const DistanceField& the_field, const Pose& X_WA, const Pos
       p_BA_B(X_WB.inverse() * X_WA.translation()),
       cull(the_field, R_BA, p_BA_B, reach_A, the_dilation + the_margin) {}
 
-std::span<const QueryKernels> supportedKernels() noexcept { return {supported.all.data(), supported.count}; }
+std::span<const QueryKernels> supportedKernels() noexcept { return {registry.all.data(), registry.count}; }
 
 const QueryKernels& chosenKernels() noexcept {
-  return supported.all[supported.chosen.load(std::memory_order_relaxed)];
+  return registry.all[registry.chosen.load(std::memory_order_relaxed)];
 }
 
 bool chooseKernels(std::string_view isa) noexcept {
-  for (std::size_t i = 0; i < supported.count; ++i) {
-    if (supported.all[i].isa != isa) continue;
-    supported.chosen.store(i, std::memory_order_relaxed);
+  for (std::size_t i = 0; i < registry.count; ++i) {
+    if (registry.all[i].isa != isa) continue;
+    registry.chosen.store(i, std::memory_order_relaxed);
     return true;
   }
   return false;
 }
 
-}  // namespace tenon
+}  // namespace tenon::collision
 #endif  // HWY_ONCE

@@ -10,174 +10,187 @@
 #include "server/structures/distance_field.h"
 #include "server/structures/pointshell.h"
 
-namespace tenon {
+namespace tenon::collision {
 
-/// R v, summed from the left: Eigen's own order differs from row to row, and the bits with it.
-[[nodiscard]] inline Vector3 turned(const Matrix3& R, const Vector3& v) {
+/// R v, summed from left to right: Eigen's order differs from row to row, and with it the last bits.
+[[nodiscard]] inline Vector3 rotated(const Matrix3& R, const Vector3& v) {
   return {R(0, 0) * v[0] + R(0, 1) * v[1] + R(0, 2) * v[2], R(1, 0) * v[0] + R(1, 1) * v[1] + R(1, 2) * v[2],
           R(2, 0) * v[0] + R(2, 1) * v[1] + R(2, 2) * v[2]};
 }
 
-/// The field's frame in floats: in voxels, from the middle of the grid's first voxel. Good enough to tell
-/// what is certainly far; `slack` is more than rounding can do.
+/// Transform from A into the field's grid in single precision, for culling: unit is the voxel, origin the
+/// centre of the grid's first voxel. `slack` bounds the rounding error.
 struct CullFrame {
-  /// Along an axis. In longer grids floats cannot tell voxels apart, and nothing is certainly far.
-  static constexpr std::int32_t kMostVoxels = 1 << 22;
+  /// Largest number of voxels along an axis. In longer grids floats do not resolve voxels, and nothing is
+  /// culled.
+  static constexpr std::int32_t kMaxVoxels = 1 << 22;
 
-  CullFrame(const DistanceField& field, const Matrix3& R_BA, const Vector3& p_BA_B, double reach_A,
-            double limit);
+  /// `reach_A` [m]: largest distance of a point of A from its origin; `limit_B` [m]: signed distance in B up
+  /// to which points are kept.
+  CullFrame(const structures::DistanceField& field, const Matrix3& R_BA, const Vector3& p_BA_B,
+            double reach_A, double limit_B);
 
-  std::array<float, 9> R{};     ///< voxels a metre of A, column by column
-  std::array<float, 3> p{};     ///< where A's origin is
-  std::array<float, 3> most{};  ///< the middle of the grid's last voxel
-  float per_metre = 0.0F;
-  float slack = 0.0F;
-  float limit = 0.0F;        ///< a bound above this frees a point or a ball
-  float outside = 0.0F;      ///< distances outside the grid are not below this
-  float beyond_band = 0.0F;  ///< nor, if that is less, those outside in bricks without samples
+  std::array<float, 9> R{};           ///< [voxels/m] rotation and scale from A, column by column
+  std::array<float, 3> p{};           ///< [voxels] A's origin
+  std::array<float, 3> last_voxel{};  ///< [voxels] centre of the grid's last voxel
+  float per_metre = 0.0F;             ///< [voxels/m]
+  float slack = 0.0F;                 ///< [voxels] bound of the rounding error
+  float limit = 0.0F;                 ///< [voxels] a point or ball with a larger lower bound is culled
+  float outside_grid = 0.0F;          ///< [voxels] lower bound of distances outside the grid
+  float beyond_band = 0.0F;  ///< [voxels] lower bound of distances outside, in bricks without samples
 };
 
-/// What all lanes of a query share: the field, both poses, and how near is near.
+/// What all lanes of a query share: the field, both poses, dilation and margin.
 struct LaneFrame {
-  LaneFrame(const DistanceField& the_field, const Pose& X_WA, const Pose& X_WB, double the_dilation,
-            double the_margin, double reach_A);
+  /// `the_dilation` [m], `the_margin` [m]: as in PairQuery; `reach_A` [m]: as in CullFrame.
+  LaneFrame(const structures::DistanceField& the_field, const Pose& X_WA, const Pose& X_WB,
+            double the_dilation, double the_margin, double reach_A);
 
-  [[nodiscard]] Vector3 inB(const Vector3& p_AP) const { return p_BA_B + turned(R_BA, p_AP); }
-  /// A bound in voxels of `cull` as a gap [m].
+  [[nodiscard]] Vector3 inB(const Vector3& p_AP) const { return p_BA_B + rotated(R_BA, p_AP); }
+  /// [m] The gap for a lower bound of distance `bound` [voxels] of `cull`.
   [[nodiscard]] double gapOf(float bound) const {
     return static_cast<double>(bound - cull.slack) * field.voxel() - dilation;
   }
 
-  const DistanceField& field;
+  const structures::DistanceField& field;
   Eigen::AlignedBox3d box_B;  ///< of the field
-  double dilation;
-  double margin;
+  double dilation;            ///< [m]
+  double margin;              ///< [m]
   Matrix3 R_WA, R_WB, R_BA;
   Vector3 p_WA, p_BA_B;
   CullFrame cull;
 };
 
-/// Points side by side, in A; whole blocks of sixteen can be read.
+/// Points in A as structure of arrays [m]; arrays are readable up to a multiple of sixteen.
 struct PointLanes {
-  const float* x;
-  const float* y;
-  const float* z;
+  const float* x;  ///< [m]
+  const float* y;  ///< [m]
+  const float* z;  ///< [m]
   std::size_t count;
 };
 
-/// The gap of a pair that has nothing to test [m]: far, yet a number that can be divided.
-inline constexpr double kNothingNear = 1e6;
+/// [m] Gap of a pair without points to test: far, but finite, so that it can be divided.
+inline constexpr double kFarGap = 1e6;
 
-/// What the field says at sixteen of them.
+/// Field samples of sixteen points, frame B.
 struct alignas(64) SampleLanes {
-  std::array<double, ShellBlock::kLanes> distance, gradient_x, gradient_y, gradient_z;
-  std::uint32_t exact;  ///< one bit a lane, as in `near`
-  std::uint32_t near;   ///< exact, and the gap within the margin
+  std::array<double, structures::ShellBlock::kLanes> distance, gradient_x, gradient_y, gradient_z;
+  std::uint32_t exact;  ///< bit per lane: inside the field's band (FieldSample::exact)
+  std::uint32_t near;   ///< bit per lane: exact, and the gap is within the margin
 };
 
-/// And at all that were sampled.
+/// Summary over all sampled points.
 struct SampleSums {
-  double smallest_distance = kNothingNear;   ///< [m]
-  double smallest_gap_apart = kNothingNear;  ///< [m] of the lanes that are not near
-  std::uint32_t colliding = 0;               ///< how many gaps are negative
-  std::uint32_t near = 0;                    ///< how many lanes are
+  double smallest_distance = kFarGap;  ///< [m]
+  double smallest_far_gap = kFarGap;   ///< [m] of the points that are not near
+  std::uint32_t colliding = 0;         ///< number of points with a negative gap
+  std::uint32_t near = 0;              ///< number of near points
 };
 
-/// Where contacts are and how B pushes; lanes without a slope have no normal, lanes without a sample nothing.
+/// Position and normal of sixteen contacts, in W. Lanes without the `has_normal` bit have no valid normal,
+/// lanes that are not exact no valid values.
 struct alignas(64) ContactLanes {
-  std::array<double, ShellBlock::kLanes> x, y, z, n_x, n_y, n_z;
-  std::uint32_t sloping;  ///< one bit a lane: the gradient says where outside is
+  std::array<double, structures::ShellBlock::kLanes> x, y, z, n_x, n_y, n_z;
+  std::uint32_t has_normal;  ///< bit per lane: the gradient is at least kMinGradient long
 };
 
-/// What B pushes at the contacts with 1 N/m, about A's origin; zero where it does not.
-struct alignas(64) PushLanes {
-  std::array<double, ShellBlock::kLanes> f_x, f_y, f_z, t_x, t_y, t_z;
-  std::uint32_t pushing;  ///< one bit a lane
+/// Penalty force and torque of sixteen contacts on A about its origin, in W, for a stiffness of 1 N/m; zero
+/// for lanes that are not inside.
+struct alignas(64) PenaltyLanes {
+  std::array<double, structures::ShellBlock::kLanes> f_x, f_y, f_z, t_x, t_y, t_z;
+  std::uint32_t inside;  ///< bit per lane: the point is near with a negative gap
 };
 
-/// The ways from a point to probes on eight sides of it [m], in B.
-struct alignas(64) ProbeSides {
-  static constexpr std::size_t kSides = 8;
-  std::array<double, kSides> x, y, z;
+/// Vectors from a point to the probes around it [m], in B.
+struct alignas(64) ProbeOffsets {
+  static constexpr std::size_t kProbes = 8;
+  std::array<double, kProbes> x, y, z;
 };
 
-/// What the plane of a probe says where the field bends there too.
+/// [m] Distance that stands for no plane: the gradient at the probe is not of unit length.
 inline constexpr double kNoPlane = -std::numeric_limits<double>::infinity();
 
-/// The planes that a field has at probes: what each says at the point [m], and its slope.
-struct alignas(64) Planes {
-  std::array<double, ProbeSides::kSides> distance, gradient_x, gradient_y, gradient_z;
+/// Tangent planes of the field at the probes: distance of the point from each plane [m] or kNoPlane, and the
+/// plane's gradient.
+struct alignas(64) TangentPlanes {
+  std::array<double, ProbeOffsets::kProbes> distance, gradient_x, gradient_y, gradient_z;
 };
 
-/// Points that may be contacts, side by side in the order of the shell.
+/// Points that may be contacts, as structure of arrays in the order of the pointshell.
 struct Candidates {
-  static constexpr std::size_t kClusters = 4;  ///< are walked at once
-  static constexpr std::size_t kAtOnce = kClusters * Pointshell::kClusterLeaves * Pointshell::kLeafPoints;
-  static constexpr std::size_t kMost = kAtOnce + 1024;
+  static constexpr std::size_t kBatchClusters = 4;  ///< clusters of one kernel call
+  static constexpr std::size_t kBatchPoints =
+      kBatchClusters * structures::Pointshell::kClusterLeaves * structures::Pointshell::kLeafPoints;
+  static constexpr std::size_t kCapacity = kBatchPoints + 1024;
   template <typename T>
-  using Lanes = std::array<T, kMost + ShellBlock::kLanes>;  ///< whole vectors are written
+  using Lanes = std::array<T, kCapacity + structures::ShellBlock::kLanes>;  ///< kernels write whole vectors
 
   alignas(64) Lanes<float> x, y, z;
   Lanes<std::uint32_t> point;
   std::uint32_t count = 0;
 
-  [[nodiscard]] bool hasRoom() const { return count + kAtOnce <= kMost; }
+  [[nodiscard]] bool fitsBatch() const { return count + kBatchPoints <= kCapacity; }
 };
 
-/// What culling left out, and its work.
-struct Culled {
-  float smallest_bound = std::numeric_limits<float>::infinity();  ///< in voxels
-  std::uint32_t spheres = 0;
-  std::uint32_t points = 0;
+/// What culling skipped, and its work.
+struct CullResult {
+  /// [voxels] smallest lower bound of distance of everything culled
+  float smallest_bound = std::numeric_limits<float>::infinity();
+  std::uint32_t spheres = 0;  ///< tested
+  std::uint32_t points = 0;   ///< tested
 };
 
 /// The inner loops of a query, compiled for every instruction set.
 ///
-/// Culling is done in floats and only ever leaves out what is certainly too far. What is left is done in
-/// doubles: a lane is a point and does what DistanceField::sample does, in the same order. Nowhere is there a
-/// fused multiply-add, so every set of kernels gives the same bits.
+/// Culling uses floats and is conservative: it only skips what is proved to be beyond the margin. The rest is
+/// evaluated in doubles: a lane is a point and computes what DistanceField::sample does, in the same order.
+/// Fused multiply-add is never used, so every instruction set gives the same bits.
 ///
 /// Threads: pure. Real-time.
 struct QueryKernels {
-  std::string_view isa;  ///< "scalar", "sse4", "avx2", "avx512", or what else a processor has
-  /// Which of sixteen clusters may hold a contact, a bit each.
-  std::uint32_t (*clusters)(const LaneFrame& frame, const ShellBlock& balls, Culled& culled) noexcept;
-  /// The points of up to Candidates::kClusters clusters that may be contacts, appended; there has to be room.
-  void (*candidates)(const LaneFrame& frame, const Pointshell& shell, std::span<const std::uint32_t> of,
-                     Candidates& candidates, Culled& culled) noexcept;
-  /// Sixteen points for each of `out`, which are as many as that takes; so for contacts.
+  std::string_view isa;  ///< "scalar", "sse4", "avx2", "avx512", or Highway's name of the target
+  /// Bit mask of the up to sixteen clusters (bounding spheres `balls`) that may hold a contact.
+  std::uint32_t (*clusters)(const LaneFrame& frame, const structures::ShellBlock& balls,
+                            CullResult& culled) noexcept;
+  /// Appends the points that may be contacts of up to Candidates::kBatchClusters clusters, given by index;
+  /// requires candidates.fitsBatch().
+  void (*candidates)(const LaneFrame& frame, const structures::Pointshell& shell,
+                     std::span<const std::uint32_t> cluster_indices, Candidates& candidates,
+                     CullResult& culled) noexcept;
+  /// Samples the field. `out` has one block for each sixteen points, the last one incomplete.
   void (*samples)(const LaneFrame& frame, const PointLanes& points, SampleLanes* out,
                   SampleSums& sums) noexcept;
+  /// Positions and normals of sampled points; blocks as in `samples`.
   void (*contacts)(const LaneFrame& frame, const PointLanes& points, const SampleLanes* samples,
                    ContactLanes* out) noexcept;
-  /// `points`: the sixteen lanes' names; `areas`, at least one: what points stand for, those beyond the end
-  /// for nothing.
-  void (*pushes)(const LaneFrame& frame, const SampleLanes& samples, const ContactLanes& contacts,
-                 const std::uint32_t* points, std::span<const float> areas, PushLanes& out) noexcept;
-  /// Of each block the lanes that are inside the dilated surface, but where the field's slope is less than a
-  /// distance's. Returns how many there are.
-  std::uint32_t (*bent)(const LaneFrame& frame, std::span<const SampleLanes> samples,
-                        std::uint32_t* lanes) noexcept;
-  /// Of probes about a point; `scale`: of the ways to them.
-  void (*planes)(const LaneFrame& frame, const ProbeSides& sides, const Vector3& p_BP, double scale,
-                 Planes& out) noexcept;
+  /// Penalties of one block. `points`: sixteen pointshell indices; `areas` [m^2] by point, not empty: points
+  /// beyond its end have area 0.
+  void (*penalties)(const LaneFrame& frame, const SampleLanes& samples, const ContactLanes& contacts,
+                    const std::uint32_t* points, std::span<const float> areas, PenaltyLanes& out) noexcept;
+  /// Per block a bit mask of the lanes that are inside the dilated surface and have a gradient shorter than
+  /// 1, to `lanes`. Returns their number.
+  std::uint32_t (*non_unit_gradients)(const LaneFrame& frame, std::span<const SampleLanes> samples,
+                                      std::uint32_t* lanes) noexcept;
+  /// Tangent planes at probes around p_BP; `scale` [-] of the offsets.
+  void (*tangent_planes)(const LaneFrame& frame, const ProbeOffsets& offsets, const Vector3& p_BP,
+                         double scale, TangentPlanes& out) noexcept;
 };
 
-/// [m^2] The paper gives no unit for its stiffness; here K [N/m] is felt when 1 cm^2 of skin is inside.
+/// [m^2] The paper gives no unit for its stiffness; here K [N/m] acts when 1 cm^2 of surface is inside.
 inline constexpr double kReferenceArea = 1e-4;
 
-/// Below this the interpolant's gradient says nothing: the point is near a medial axis (a thin sheet's
-/// middle).
-inline constexpr double kLeastGradient = 0.3;
+/// [-] A shorter gradient of the interpolation gives no normal: the point is near the medial axis (the middle
+/// of a thin sheet).
+inline constexpr double kMinGradient = 0.3;
 
-/// All that this processor can run: what every such processor has first, the fastest last.
+/// Kernels for all instruction sets of this processor: the baseline first, the fastest last.
 [[nodiscard]] std::span<const QueryKernels> supportedKernels() noexcept;
 
-/// Those that queries use.
+/// The kernels that queries use.
 [[nodiscard]] const QueryKernels& chosenKernels() noexcept;
 
-/// Makes all later queries of the process use one set of kernels; false: not supported here. For tests,
-/// benchmarks and `--isa`; without it the fastest are used. Threads: any, between queries.
+/// Selects the kernels of all later queries of the process; false, and no change, when `isa` is not supported
+/// here. The fastest are the default. For tests, benchmarks and `--isa`. Threads: any, between queries.
 bool chooseKernels(std::string_view isa) noexcept;
 
-}  // namespace tenon
+}  // namespace tenon::collision

@@ -1,5 +1,5 @@
-// Distances in doubles, as DistanceField::sample has them, bit for bit. Included once for every instruction
-// set.
+// Kernels of DistanceField::sample in double precision, with the same bits. Included once for every
+// instruction set.
 
 #if defined(TENON_SAMPLE_LANES) == defined(HWY_TARGET_TOGGLE)
 #ifdef TENON_SAMPLE_LANES
@@ -15,37 +15,37 @@
 #include "server/collision/query_kernels.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace tenon {
+namespace tenon::collision {
 namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
 namespace exact {
 
-// lanes are doubles; whole numbers have as many lanes of half the width
+// lanes are doubles; integers have the same number of lanes at half the width
 constexpr HWY_CAPPED(double, 16) kD;
 constexpr hn::Rebind<std::int32_t, decltype(kD)> kI;
 constexpr hn::Rebind<float, decltype(kD)> kF;
 using Double = hn::Vec<decltype(kD)>;
-using Whole = hn::Vec<decltype(kI)>;
+using Int = hn::Vec<decltype(kI)>;
 using Mask = hn::Mask<decltype(kD)>;
 
-constexpr int kVoxels = DistanceField::kBrickVoxels;
-constexpr int kSide = DistanceField::kBrickSide;
+constexpr int kVoxels = structures::DistanceField::kBrickVoxels;
+constexpr int kSide = structures::DistanceField::kBrickSide;
 constexpr int kLayer = kSide * kSide;
 
-struct Place3 {
+struct Vec3 {
   Double x, y, z;
 };
 
-HWY_INLINE Double all(double value) { return hn::Set(kD, value); }
-HWY_INLINE Whole allWhole(std::int32_t value) { return hn::Set(kI, value); }
-HWY_INLINE Double toDouble(Whole v) { return hn::PromoteTo(kD, v); }
+HWY_INLINE Double splat(double value) { return hn::Set(kD, value); }
+HWY_INLINE Int splatInt(std::int32_t value) { return hn::Set(kI, value); }
+HWY_INLINE Double toDouble(Int v) { return hn::PromoteTo(kD, v); }
 #if HWY_TARGET == HWY_SCALAR
-// all values are in range: what is outside the grid stands at its corner
-HWY_INLINE Whole truncated(Double v) { return Whole(static_cast<std::int32_t>(v.raw)); }
+// all values are in range: positions outside the grid are set to its lowest corner
+HWY_INLINE Int truncated(Double v) { return Int(static_cast<std::int32_t>(v.raw)); }
 #else
-HWY_INLINE Whole truncated(Double v) { return hn::DemoteTo(kI, v); }
+HWY_INLINE Int truncated(Double v) { return hn::DemoteTo(kI, v); }
 #endif
 
 HWY_INLINE std::uint32_t bitsOf(Mask mask) {
@@ -60,34 +60,34 @@ HWY_INLINE Mask maskOf(std::uint32_t bits) {
 }
 
 HWY_INLINE Double sum3(Double a, Double b, Double c) { return hn::Add(hn::Add(a, b), c); }
-HWY_INLINE Double norm(const Place3& v) {
+HWY_INLINE Double norm(const Vec3& v) {
   return hn::Sqrt(sum3(hn::Mul(v.x, v.x), hn::Mul(v.y, v.y), hn::Mul(v.z, v.z)));
 }
-HWY_INLINE Place3 turned(const double* R, const Place3& v) {  // R column by column
-  return {sum3(hn::Mul(all(R[0]), v.x), hn::Mul(all(R[3]), v.y), hn::Mul(all(R[6]), v.z)),
-          sum3(hn::Mul(all(R[1]), v.x), hn::Mul(all(R[4]), v.y), hn::Mul(all(R[7]), v.z)),
-          sum3(hn::Mul(all(R[2]), v.x), hn::Mul(all(R[5]), v.y), hn::Mul(all(R[8]), v.z))};
+HWY_INLINE Vec3 rotated(const double* R, const Vec3& v) {  // R is column-major
+  return {sum3(hn::Mul(splat(R[0]), v.x), hn::Mul(splat(R[3]), v.y), hn::Mul(splat(R[6]), v.z)),
+          sum3(hn::Mul(splat(R[1]), v.x), hn::Mul(splat(R[4]), v.y), hn::Mul(splat(R[7]), v.z)),
+          sum3(hn::Mul(splat(R[2]), v.x), hn::Mul(splat(R[5]), v.y), hn::Mul(splat(R[8]), v.z))};
 }
-HWY_INLINE Place3 moved(const double* p, const double* R, const Place3& v) {
-  const Place3 turn = turned(R, v);
-  return {hn::Add(all(p[0]), turn.x), hn::Add(all(p[1]), turn.y), hn::Add(all(p[2]), turn.z)};
+HWY_INLINE Vec3 transformed(const double* p, const double* R, const Vec3& v) {
+  const Vec3 Rv = rotated(R, v);
+  return {hn::Add(splat(p[0]), Rv.x), hn::Add(splat(p[1]), Rv.y), hn::Add(splat(p[2]), Rv.z)};
 }
-HWY_INLINE Place3 placesOf(const PointLanes& points, std::size_t first) {
+HWY_INLINE Vec3 loadPoints(const PointLanes& points, std::size_t first) {
   return {hn::PromoteTo(kD, hn::LoadU(kF, points.x + first)),
           hn::PromoteTo(kD, hn::LoadU(kF, points.y + first)),
           hn::PromoteTo(kD, hn::LoadU(kF, points.z + first))};
 }
 
-HWY_INLINE Place3 inB(const LaneFrame& frame, const PointLanes& points, std::size_t first) {
-  return moved(frame.p_BA_B.data(), frame.R_BA.data(), placesOf(points, first));
+HWY_INLINE Vec3 inB(const LaneFrame& frame, const PointLanes& points, std::size_t first) {
+  return transformed(frame.p_BA_B.data(), frame.R_BA.data(), loadPoints(points, first));
 }
 
-HWY_INLINE Place3 gradientOf(const SampleLanes& samples, std::size_t lane) {
+HWY_INLINE Vec3 gradientOf(const SampleLanes& samples, std::size_t lane) {
   return {hn::Load(kD, samples.gradient_x.data() + lane), hn::Load(kD, samples.gradient_y.data() + lane),
           hn::Load(kD, samples.gradient_z.data() + lane)};
 }
 
-/// A field with its constants spread over the lanes where that pays.
+/// A field with constants of the kernels.
 struct FieldLanes {
   explicit FieldLanes(const LaneFrame& the_frame)
       : frame(the_frame),
@@ -98,117 +98,118 @@ struct FieldLanes {
         far(reinterpret_cast<const std::int32_t*>(layout.far.data())) {}
 
   const LaneFrame& frame;
-  const DistanceField::Layout& layout;
-  double edge, inverse_edge;
-  const std::int32_t* samples;  ///< read at byte offsets, two samples at a time
-  const std::int32_t* far;
+  const structures::DistanceField::Layout& layout;
+  double edge, inverse_edge;    ///< [m], [1/m] of a coarse brick
+  const std::int32_t* samples;  ///< gathered at byte offsets, two int16 samples at a time
+  const std::int32_t* far;      ///< likewise
 };
 
-/// DistanceField::locate; lanes outside the grid stand at its lowest corner.
+/// DistanceField::locate; lanes outside the grid are set to its lowest corner.
 struct Located {
-  Mask inside;
-  Whole number, entry;
-  Double entry_number;
-  Place3 p_brick;
+  Mask in_grid;
+  Int brick_index, entry;
+  Double entry_number;  ///< `entry` as double
+  Vec3 p_brick;         ///< position in the brick, 0 to 1
 };
 
-HWY_INLINE Double inGrid(Double p, double origin, double inverse_edge) {
-  return hn::Mul(hn::Sub(p, all(origin)), all(inverse_edge));
+HWY_INLINE Double toBricks(Double p, double origin, double inverse_edge) {
+  return hn::Mul(hn::Sub(p, splat(origin)), splat(inverse_edge));
 }
 
-HWY_INLINE Located locate(const FieldLanes& field, const Place3& p_B) {
+HWY_INLINE Located locate(const FieldLanes& field, const Vec3& p_B) {
   const Vector3& origin = field.layout.p_MoFo_M;
   const auto& bricks = field.layout.bricks;
   const Double zero = hn::Zero(kD);
-  Double x = inGrid(p_B.x, origin[0], field.inverse_edge);
-  Double y = inGrid(p_B.y, origin[1], field.inverse_edge);
-  Double z = inGrid(p_B.z, origin[2], field.inverse_edge);
+  Double x = toBricks(p_B.x, origin[0], field.inverse_edge);
+  Double y = toBricks(p_B.y, origin[1], field.inverse_edge);
+  Double z = toBricks(p_B.z, origin[2], field.inverse_edge);
   Located at;
-  at.inside = hn::And(hn::And(hn::And(hn::Ge(x, zero), hn::Lt(x, all(bricks[0]))),
-                              hn::And(hn::Ge(y, zero), hn::Lt(y, all(bricks[1])))),
-                      hn::And(hn::Ge(z, zero), hn::Lt(z, all(bricks[2]))));
-  x = hn::IfThenElseZero(at.inside, x);
-  y = hn::IfThenElseZero(at.inside, y);
-  z = hn::IfThenElseZero(at.inside, z);
-  const Whole bx = truncated(x);
-  const Whole by = truncated(y);
-  const Whole bz = truncated(z);
+  at.in_grid = hn::And(hn::And(hn::And(hn::Ge(x, zero), hn::Lt(x, splat(bricks[0]))),
+                               hn::And(hn::Ge(y, zero), hn::Lt(y, splat(bricks[1])))),
+                       hn::And(hn::Ge(z, zero), hn::Lt(z, splat(bricks[2]))));
+  x = hn::IfThenElseZero(at.in_grid, x);
+  y = hn::IfThenElseZero(at.in_grid, y);
+  z = hn::IfThenElseZero(at.in_grid, z);
+  const Int bx = truncated(x);
+  const Int by = truncated(y);
+  const Int bz = truncated(z);
   at.p_brick = {hn::Sub(x, toDouble(bx)), hn::Sub(y, toDouble(by)), hn::Sub(z, toDouble(bz))};
-  at.number = hn::Add(hn::Mul(hn::Add(hn::Mul(bz, allWhole(bricks[1])), by), allWhole(bricks[0])), bx);
-  at.entry = hn::GatherIndex(kI, field.layout.index.data(), at.number);
+  at.brick_index = hn::Add(hn::Mul(hn::Add(hn::Mul(bz, splatInt(bricks[1])), by), splatInt(bricks[0])), bx);
+  at.entry = hn::GatherIndex(kI, field.layout.index.data(), at.brick_index);
   at.entry_number = toDouble(at.entry);
   return at;
 }
 
-HWY_INLINE Double farOf(const FieldLanes& field, Whole number) {
-  // two at a time: the last is the upper half of the pair before it
-  const Whole last = allWhole(static_cast<std::int32_t>(2 * field.layout.far.size() - 4));
-  const Whole wanted = hn::ShiftLeft<1>(number);
-  const Whole pair = hn::GatherOffset(kI, field.far, hn::Min(wanted, last));
-  const Whole upper = hn::IfThenElse(hn::Gt(wanted, last), pair, hn::ShiftLeft<16>(pair));
+HWY_INLINE Double farValue(const FieldLanes& field, Int brick_index) {
+  // gathers read two values at a time: the last value is the upper half of the pair that ends there
+  const Int last = splatInt(static_cast<std::int32_t>(2 * field.layout.far.size() - 4));
+  const Int offset = hn::ShiftLeft<1>(brick_index);
+  const Int pair = hn::GatherOffset(kI, field.far, hn::Min(offset, last));
+  const Int upper = hn::IfThenElse(hn::Gt(offset, last), pair, hn::ShiftLeft<16>(pair));
   return toDouble(hn::ShiftRight<16>(upper));
 }
 
-HWY_INLINE Double fromBrickCentre(const FieldLanes& field, const Place3& p_brick) {
-  const Double half = all(0.5);
-  const Double edge = all(field.edge);
+HWY_INLINE Double fromBrickCentre(const FieldLanes& field, const Vec3& p_brick) {
+  const Double half = splat(0.5);
+  const Double edge = splat(field.edge);
   return norm({hn::Mul(hn::Sub(p_brick.x, half), edge), hn::Mul(hn::Sub(p_brick.y, half), edge),
                hn::Mul(hn::Sub(p_brick.z, half), edge)});
 }
 
 HWY_INLINE Double farMagnitude(const FieldLanes& field, const Located& at) {
   const double voxel = field.layout.voxel;
-  const double beyond_band = field.layout.band - DistanceField::kHalfDiagonal * voxel;
-  const Double at_centre =
-      hn::Div(hn::Mul(hn::Abs(farOf(field, at.number)), all(voxel)), all(DistanceField::kFarPerVoxel));
-  return hn::Max(all(beyond_band), hn::Sub(at_centre, fromBrickCentre(field, at.p_brick)));
+  const double beyond_band = field.layout.band - structures::DistanceField::kHalfDiagonal * voxel;
+  const Double at_centre = hn::Div(hn::Mul(hn::Abs(farValue(field, at.brick_index)), splat(voxel)),
+                                   splat(structures::DistanceField::kFarPerVoxel));
+  return hn::Max(splat(beyond_band), hn::Sub(at_centre, fromBrickCentre(field, at.p_brick)));
 }
 
-HWY_INLINE Double outsideOf(double low, double high, Double p) {
-  return hn::Max(hn::Max(hn::Sub(all(low), p), hn::Sub(p, all(high))), hn::Zero(kD));
+HWY_INLINE Double distanceBeyond(double low, double high, Double p) {
+  return hn::Max(hn::Max(hn::Sub(splat(low), p), hn::Sub(p, splat(high))), hn::Zero(kD));
 }
 
-HWY_INLINE Double distanceToGrid(const FieldLanes& field, const Place3& p) {
+HWY_INLINE Double distanceToGrid(const FieldLanes& field, const Vec3& p) {
   const Eigen::AlignedBox3d& box = field.frame.box_B;
   const double* low = box.min().data();
   const double* high = box.max().data();
-  const Place3 outside{outsideOf(low[0], high[0], p.x), outsideOf(low[1], high[1], p.y),
-                       outsideOf(low[2], high[2], p.z)};
-  return hn::Add(norm(outside), all(field.layout.margin));
+  const Vec3 outside{distanceBeyond(low[0], high[0], p.x), distanceBeyond(low[1], high[1], p.y),
+                     distanceBeyond(low[2], high[2], p.z)};
+  return hn::Add(norm(outside), splat(field.layout.margin));
 }
 
 struct Sampled {
   Double distance;
-  Place3 gradient;
+  Vec3 gradient;
   Mask exact;
 };
 
 /// DistanceField::interpolate
-HWY_INLINE Sampled interpolate(const FieldLanes& field, Whole brick, const Place3& p_brick, Double voxel,
+HWY_INLINE Sampled interpolate(const FieldLanes& field, Int brick, const Vec3& p_brick, Double voxel,
                                Double band) {
-  const Double voxels = all(kVoxels);
+  const Double voxels = splat(kVoxels);
   const Double px = hn::Mul(p_brick.x, voxels);
   const Double py = hn::Mul(p_brick.y, voxels);
   const Double pz = hn::Mul(p_brick.z, voxels);
-  const Whole most = allWhole(kVoxels - 1);
-  const Whole x = hn::Min(truncated(px), most);
-  const Whole y = hn::Min(truncated(py), most);
-  const Whole z = hn::Min(truncated(pz), most);
+  const Int last = splatInt(kVoxels - 1);
+  const Int x = hn::Min(truncated(px), last);
+  const Int y = hn::Min(truncated(py), last);
+  const Int z = hn::Min(truncated(pz), last);
   const Double u = hn::Sub(px, toDouble(x));
   const Double v = hn::Sub(py, toDouble(y));
   const Double w = hn::Sub(pz, toDouble(z));
-  const Whole row = hn::Add(hn::Mul(hn::Add(hn::Mul(z, allWhole(kSide)), y), allWhole(kSide)), x);
-  const Whole place = hn::ShiftLeft<1>(hn::Add(hn::Mul(brick, allWhole(DistanceField::kBrickSamples)), row));
+  const Int row = hn::Add(hn::Mul(hn::Add(hn::Mul(z, splatInt(kSide)), y), splatInt(kSide)), x);
+  const Int offset =
+      hn::ShiftLeft<1>(hn::Add(hn::Mul(brick, splatInt(structures::DistanceField::kBrickSamples)), row));
 
-  // neighbours along x come together
-  const Whole g00 = hn::GatherOffset(kI, field.samples, place);
-  const Whole g10 = hn::GatherOffset(kI, field.samples, hn::Add(place, allWhole(2 * kSide)));
-  const Whole g01 = hn::GatherOffset(kI, field.samples, hn::Add(place, allWhole(2 * kLayer)));
-  const Whole g11 = hn::GatherOffset(kI, field.samples, hn::Add(place, allWhole(2 * (kLayer + kSide))));
-  const Whole s00 = hn::ShiftRight<16>(hn::ShiftLeft<16>(g00));
-  const Whole s10 = hn::ShiftRight<16>(hn::ShiftLeft<16>(g10));
-  const Whole s01 = hn::ShiftRight<16>(hn::ShiftLeft<16>(g01));
-  const Whole s11 = hn::ShiftRight<16>(hn::ShiftLeft<16>(g11));
+  // each gather reads two neighbours along x
+  const Int g00 = hn::GatherOffset(kI, field.samples, offset);
+  const Int g10 = hn::GatherOffset(kI, field.samples, hn::Add(offset, splatInt(2 * kSide)));
+  const Int g01 = hn::GatherOffset(kI, field.samples, hn::Add(offset, splatInt(2 * kLayer)));
+  const Int g11 = hn::GatherOffset(kI, field.samples, hn::Add(offset, splatInt(2 * (kLayer + kSide))));
+  const Int s00 = hn::ShiftRight<16>(hn::ShiftLeft<16>(g00));
+  const Int s10 = hn::ShiftRight<16>(hn::ShiftLeft<16>(g10));
+  const Int s01 = hn::ShiftRight<16>(hn::ShiftLeft<16>(g01));
+  const Int s11 = hn::ShiftRight<16>(hn::ShiftLeft<16>(g11));
   const Double d00 = toDouble(hn::Sub(hn::ShiftRight<16>(g00), s00));
   const Double d10 = toDouble(hn::Sub(hn::ShiftRight<16>(g10), s10));
   const Double d01 = toDouble(hn::Sub(hn::ShiftRight<16>(g01), s01));
@@ -225,7 +226,7 @@ HWY_INLINE Sampled interpolate(const FieldLanes& field, Whole brick, const Place
   const Double d0 = hn::Add(d00, hn::Mul(hn::Sub(d10, d00), v));
   const Double d1 = hn::Add(d01, hn::Mul(hn::Sub(d11, d01), v));
 
-  const Double per_quantum = all(1.0 / DistanceField::kQuantaPerVoxel);
+  const Double per_quantum = splat(1.0 / structures::DistanceField::kQuantaPerVoxel);
   const Double rise = hn::Sub(c1, c0);
   Sampled out;
   out.distance = hn::Mul(hn::Mul(hn::Add(c0, hn::Mul(rise, w)), per_quantum), voxel);
@@ -235,63 +236,64 @@ HWY_INLINE Sampled interpolate(const FieldLanes& field, Whole brick, const Place
   return out;
 }
 
-/// The child of a refined lane where it has samples, else the lane's own coarse brick.
+/// Interpolates in the child of a refined brick where it has samples, else in the coarse brick.
 HWY_INLINE Sampled interpolateRefined(const FieldLanes& field, const Located& at, Mask refined) {
-  const DistanceField::Layout& layout = field.layout;
+  const structures::DistanceField::Layout& layout = field.layout;
   const int r = layout.refinement;
-  const Double coarse_voxel = all(layout.voxel);
-  const Double coarse_band = all(layout.band);
-  const Double fine_voxel = all(layout.voxel / r);
-  const Double fine_band = all(DistanceField::kBandVoxels * (layout.voxel / r));
-  const Double rd = all(r);
+  const Double coarse_voxel = splat(layout.voxel);
+  const Double coarse_band = splat(layout.band);
+  const Double fine_voxel = splat(layout.voxel / r);
+  const Double fine_band = splat(structures::DistanceField::kBandVoxels * (layout.voxel / r));
+  const Double rd = splat(r);
   const Double zero = hn::Zero(kD);
-  const Place3 p{hn::Mul(at.p_brick.x, rd), hn::Mul(at.p_brick.y, rd), hn::Mul(at.p_brick.z, rd)};
-  const Whole most = allWhole(r - 1);
-  const Whole cx = hn::Min(truncated(p.x), most);
-  const Whole cy = hn::Min(truncated(p.y), most);
-  const Whole cz = hn::Min(truncated(p.z), most);
-  // lanes without children read any entry
-  const Double first = hn::IfThenElseZero(refined, hn::Sub(at.entry_number, all(DistanceField::kRefined)));
-  const Whole children = truncated(first);
-  const Whole child = hn::Add(hn::Mul(hn::Add(hn::Mul(cz, allWhole(r)), cy), allWhole(r)), cx);
-  const Whole child_place = truncated(hn::IfThenElseZero(refined, toDouble(hn::Add(children, child))));
-  const Whole own_place =
-      truncated(hn::IfThenElseZero(refined, toDouble(hn::Add(children, allWhole(r * r * r)))));
-  const Double fine = toDouble(hn::GatherIndex(kI, layout.index.data(), child_place));
-  const Double own = toDouble(hn::GatherIndex(kI, layout.index.data(), own_place));
+  const Vec3 p{hn::Mul(at.p_brick.x, rd), hn::Mul(at.p_brick.y, rd), hn::Mul(at.p_brick.z, rd)};
+  const Int last = splatInt(r - 1);
+  const Int cx = hn::Min(truncated(p.x), last);
+  const Int cy = hn::Min(truncated(p.y), last);
+  const Int cz = hn::Min(truncated(p.z), last);
+  // lanes that are not refined read entry 0, which is not used
+  const Double first =
+      hn::IfThenElseZero(refined, hn::Sub(at.entry_number, splat(structures::DistanceField::kRefined)));
+  const Int children = truncated(first);
+  const Int child = hn::Add(hn::Mul(hn::Add(hn::Mul(cz, splatInt(r)), cy), splatInt(r)), cx);
+  const Int child_index = truncated(hn::IfThenElseZero(refined, toDouble(hn::Add(children, child))));
+  const Int own_index =
+      truncated(hn::IfThenElseZero(refined, toDouble(hn::Add(children, splatInt(r * r * r)))));
+  const Double fine = toDouble(hn::GatherIndex(kI, layout.index.data(), child_index));
+  const Double own = toDouble(hn::GatherIndex(kI, layout.index.data(), own_index));
   const Mask has_fine = hn::And(refined, hn::Ge(fine, zero));
-  const Mask plain =
-      hn::And(hn::Ge(at.entry_number, zero), hn::Lt(at.entry_number, all(DistanceField::kRefined)));
+  const Mask plain = hn::And(hn::Ge(at.entry_number, zero),
+                             hn::Lt(at.entry_number, splat(structures::DistanceField::kRefined)));
   const Double coarse = hn::IfThenElse(refined, own, hn::IfThenElseZero(plain, at.entry_number));
-  const Place3 p_child{hn::IfThenElse(has_fine, hn::Sub(p.x, toDouble(cx)), at.p_brick.x),
-                       hn::IfThenElse(has_fine, hn::Sub(p.y, toDouble(cy)), at.p_brick.y),
-                       hn::IfThenElse(has_fine, hn::Sub(p.z, toDouble(cz)), at.p_brick.z)};
+  const Vec3 p_child{hn::IfThenElse(has_fine, hn::Sub(p.x, toDouble(cx)), at.p_brick.x),
+                     hn::IfThenElse(has_fine, hn::Sub(p.y, toDouble(cy)), at.p_brick.y),
+                     hn::IfThenElse(has_fine, hn::Sub(p.z, toDouble(cz)), at.p_brick.z)};
   Sampled out = interpolate(field, truncated(hn::IfThenElse(has_fine, fine, coarse)), p_child,
                             hn::IfThenElse(has_fine, fine_voxel, coarse_voxel),
                             hn::IfThenElse(has_fine, fine_band, coarse_band));
-  // out of its own narrow band a child knows less than the coarse brick
-  const Mask again = hn::AndNot(out.exact, has_fine);
-  if (hn::AllFalse(kD, again)) return out;
-  const Sampled wide = interpolate(field, truncated(coarse), at.p_brick, coarse_voxel, coarse_band);
-  out.distance = hn::IfThenElse(again, wide.distance, out.distance);
-  out.gradient = {hn::IfThenElse(again, wide.gradient.x, out.gradient.x),
-                  hn::IfThenElse(again, wide.gradient.y, out.gradient.y),
-                  hn::IfThenElse(again, wide.gradient.z, out.gradient.z)};
-  out.exact = hn::Or(out.exact, hn::And(again, wide.exact));
+  // beyond the child's narrower band the coarse brick is more accurate
+  const Mask use_coarse = hn::AndNot(out.exact, has_fine);
+  if (hn::AllFalse(kD, use_coarse)) return out;
+  const Sampled coarse_sample = interpolate(field, truncated(coarse), at.p_brick, coarse_voxel, coarse_band);
+  out.distance = hn::IfThenElse(use_coarse, coarse_sample.distance, out.distance);
+  out.gradient = {hn::IfThenElse(use_coarse, coarse_sample.gradient.x, out.gradient.x),
+                  hn::IfThenElse(use_coarse, coarse_sample.gradient.y, out.gradient.y),
+                  hn::IfThenElse(use_coarse, coarse_sample.gradient.z, out.gradient.z)};
+  out.exact = hn::Or(out.exact, hn::And(use_coarse, coarse_sample.exact));
   return out;
 }
 
-/// DistanceField::sample where that is exact; elsewhere there is no gradient, and the distance may be
-/// anything.
+/// DistanceField::sample where that is exact; elsewhere the gradient is 0 and the distance is not valid.
 HWY_INLINE Sampled sampleInBand(const FieldLanes& field, const Located& at, Mask has_samples) {
-  const DistanceField::Layout& layout = field.layout;
-  const Mask refined = hn::And(at.inside, hn::Ge(at.entry_number, all(DistanceField::kRefined)));
+  const structures::DistanceField::Layout& layout = field.layout;
+  const Mask refined =
+      hn::And(at.in_grid, hn::Ge(at.entry_number, splat(structures::DistanceField::kRefined)));
   Sampled out{hn::Zero(kD), {hn::Zero(kD), hn::Zero(kD), hn::Zero(kD)}, has_samples};
   if (!hn::AllFalse(kD, refined)) {
     out = interpolateRefined(field, at, refined);
   } else if (!hn::AllFalse(kD, has_samples)) {
-    out =
-        interpolate(field, hn::Max(at.entry, hn::Zero(kI)), at.p_brick, all(layout.voxel), all(layout.band));
+    out = interpolate(field, hn::Max(at.entry, hn::Zero(kI)), at.p_brick, splat(layout.voxel),
+                      splat(layout.band));
   }
   out.exact = hn::And(out.exact, has_samples);
   out.gradient = {hn::IfThenElseZero(out.exact, out.gradient.x),
@@ -301,71 +303,74 @@ HWY_INLINE Sampled sampleInBand(const FieldLanes& field, const Located& at, Mask
 }
 
 HWY_INLINE Mask hasSamples(const Located& at) {
-  return hn::And(at.inside, hn::Ge(at.entry_number, hn::Zero(kD)));
+  return hn::And(at.in_grid, hn::Ge(at.entry_number, hn::Zero(kD)));
 }
 
 /// DistanceField::sample
 HWY_INLINE Sampled sample(const FieldLanes& field, const PointLanes& points, std::size_t i,
                           const Located& at) {
-  const DistanceField::Layout& layout = field.layout;
+  const structures::DistanceField::Layout& layout = field.layout;
   const Mask has_samples = hasSamples(at);
   Sampled out = sampleInBand(field, at, has_samples);
   if (hn::AllTrue(kD, out.exact)) return out;
   const Double beyond =
-      hn::Max(hn::Sub(hn::Abs(out.distance), all(DistanceField::kHalfDiagonal * layout.voxel)), hn::Zero(kD));
+      hn::Max(hn::Sub(hn::Abs(out.distance), splat(structures::DistanceField::kHalfDiagonal * layout.voxel)),
+              hn::Zero(kD));
   out.distance = hn::IfThenElse(out.exact, out.distance, hn::CopySign(beyond, out.distance));
   if (hn::AllTrue(kD, has_samples)) return out;
   const Double magnitude = farMagnitude(field, at);
-  const Mask deep = hn::Eq(at.entry_number, all(DistanceField::kFarInside));
+  const Mask deep = hn::Eq(at.entry_number, splat(structures::DistanceField::kFarInside));
   const Double far = hn::IfThenElse(deep, hn::Neg(magnitude), magnitude);
   out.distance =
       hn::IfThenElse(has_samples, out.distance,
-                     hn::IfThenElse(at.inside, far, distanceToGrid(field, inB(field.frame, points, i))));
+                     hn::IfThenElse(at.in_grid, far, distanceToGrid(field, inB(field.frame, points, i))));
   return out;
 }
 
-/// Points that are located ahead, side by side: reading the index is waiting for memory, and for many points
-/// at once in a short loop.
+/// Locations of a run of points, computed ahead of sampling: in a short loop the memory accesses to the index
+/// overlap.
 struct LocatedLanes {
-  static constexpr std::size_t kMost = 8 * ShellBlock::kLanes;
+  static constexpr std::size_t kCapacity = 8 * structures::ShellBlock::kLanes;
 
-  alignas(64) std::array<double, kMost> x, y, z;
-  alignas(64) std::array<std::int32_t, kMost> number, entry;
-  std::array<std::uint32_t, kMost> inside;  ///< a bit each of the lanes from here
+  alignas(64) std::array<double, kCapacity> x, y, z;
+  alignas(64) std::array<std::int32_t, kCapacity> brick_index, entry;
+  std::array<std::uint32_t, kCapacity>
+      in_grid;  ///< at the first lane of each vector: bit mask of its lanes in the grid
 
   HWY_INLINE void locateFrom(const FieldLanes& field, const PointLanes& points, std::size_t first) {
-    const std::size_t count = std::min(kMost, points.count - first);
+    const std::size_t count = std::min(kCapacity, points.count - first);
     for (std::size_t i = 0; i < count; i += hn::Lanes(kD)) {
       const Located at = locate(field, inB(field.frame, points, first + i));
       hn::Store(at.p_brick.x, kD, x.data() + i);
       hn::Store(at.p_brick.y, kD, y.data() + i);
       hn::Store(at.p_brick.z, kD, z.data() + i);
-      hn::StoreU(at.number, kI, number.data() + i);
+      hn::StoreU(at.brick_index, kI, brick_index.data() + i);
       hn::StoreU(at.entry, kI, entry.data() + i);
-      inside[i] = bitsOf(at.inside);
+      in_grid[i] = bitsOf(at.in_grid);
     }
   }
   [[nodiscard]] HWY_INLINE Located at(std::size_t i) const {
-    const Whole own = hn::LoadU(kI, entry.data() + i);
-    return {maskOf(inside[i]),
-            hn::LoadU(kI, number.data() + i),
+    const Int own = hn::LoadU(kI, entry.data() + i);
+    return {maskOf(in_grid[i]),
+            hn::LoadU(kI, brick_index.data() + i),
             own,
             toDouble(own),
             {hn::Load(kD, x.data() + i), hn::Load(kD, y.data() + i), hn::Load(kD, z.data() + i)}};
   }
 };
 
+/// QueryKernels::samples
 void samples(const LaneFrame& frame, const PointLanes& points, SampleLanes* out, SampleSums& sums) noexcept {
   const FieldLanes field(frame);
-  const Double nothing = all(kNothingNear);
-  Double smallest = nothing;
-  Double apart = nothing;
+  const Double far_gap = splat(kFarGap);
+  Double smallest = far_gap;
+  Double smallest_far = far_gap;
   LocatedLanes located;
-  for (std::size_t first = 0; first < points.count; first += ShellBlock::kLanes) {
-    const std::size_t here = first % LocatedLanes::kMost;
+  for (std::size_t first = 0; first < points.count; first += structures::ShellBlock::kLanes) {
+    const std::size_t here = first % LocatedLanes::kCapacity;
     if (here == 0) located.locateFrom(field, points, first);
     SampleLanes& block = *out++;
-    const std::size_t end = std::min(first + ShellBlock::kLanes, points.count);
+    const std::size_t end = std::min(first + structures::ShellBlock::kLanes, points.count);
     std::uint32_t all_exact = 0;
     std::uint32_t all_near = 0;
     std::uint32_t colliding = 0;
@@ -373,9 +378,9 @@ void samples(const LaneFrame& frame, const PointLanes& points, SampleLanes* out,
       const std::size_t lane = i - first;
       const Mask used = hn::FirstN(kD, end - i);
       const Sampled there = sample(field, points, i, located.at(here + lane));
-      const Double gap = hn::Sub(there.distance, all(frame.dilation));
+      const Double gap = hn::Sub(there.distance, splat(frame.dilation));
       const Mask exact = hn::And(used, there.exact);
-      const Mask near = hn::And(exact, hn::Le(gap, all(frame.margin)));
+      const Mask near = hn::And(exact, hn::Le(gap, splat(frame.margin)));
       hn::Store(there.distance, kD, block.distance.data() + lane);
       hn::Store(there.gradient.x, kD, block.gradient_x.data() + lane);
       hn::Store(there.gradient.y, kD, block.gradient_y.data() + lane);
@@ -383,8 +388,8 @@ void samples(const LaneFrame& frame, const PointLanes& points, SampleLanes* out,
       all_exact |= bitsOf(exact) << lane;
       all_near |= bitsOf(near) << lane;
       colliding |= bitsOf(hn::And(used, hn::Lt(gap, hn::Zero(kD)))) << lane;
-      smallest = hn::Min(hn::IfThenElse(used, there.distance, nothing), smallest);
-      apart = hn::Min(hn::IfThenElse(hn::AndNot(near, used), gap, nothing), apart);
+      smallest = hn::Min(hn::IfThenElse(used, there.distance, far_gap), smallest);
+      smallest_far = hn::Min(hn::IfThenElse(hn::AndNot(near, used), gap, far_gap), smallest_far);
     }
     block.exact = all_exact;
     block.near = all_near;
@@ -392,12 +397,12 @@ void samples(const LaneFrame& frame, const PointLanes& points, SampleLanes* out,
     sums.near += static_cast<std::uint32_t>(hwy::PopCount(all_near));
   }
   sums.smallest_distance = std::min(sums.smallest_distance, hn::GetLane(hn::MinOfLanes(kD, smallest)));
-  sums.smallest_gap_apart = std::min(sums.smallest_gap_apart, hn::GetLane(hn::MinOfLanes(kD, apart)));
+  sums.smallest_far_gap = std::min(sums.smallest_far_gap, hn::GetLane(hn::MinOfLanes(kD, smallest_far)));
 }
 
 }  // namespace exact
 }  // namespace HWY_NAMESPACE
-}  // namespace tenon
+}  // namespace tenon::collision
 HWY_AFTER_NAMESPACE();
 
 #endif

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cassert>
 
-namespace tenon {
+namespace tenon::game_control {
 namespace {
 
 bool anyCommand(std::span<const GameCommand> commands, CommandKind kind, std::uint32_t signal) noexcept {
@@ -40,23 +40,23 @@ bool ConditionProgress::isMetNow(const Condition& condition, Node& node, const S
       reading.limit = condition.within;
       return reading.value <= condition.within;
     case ConditionKind::kContact:
-      node.contact.step(scene.touching(condition.object, condition.other), condition.lapse);
-      reading.value = seconds(node.contact.touched);
+      node.contact.step(scene.inContact(condition.object, condition.other), condition.lapse);
+      reading.value = seconds(node.contact.contact_ticks);
       reading.limit = seconds(condition.limit_ticks);
-      return node.contact.touched >= std::max(condition.limit_ticks, 1U);
+      return node.contact.contact_ticks >= std::max(condition.limit_ticks, 1U);
     case ConditionKind::kContactTime:
-      if (scene.touchesAnything(condition.object)) ++node.contact.touched;
-      reading.value = seconds(node.contact.touched);
+      if (scene.inAnyContact(condition.object)) ++node.contact.contact_ticks;
+      reading.value = seconds(node.contact.contact_ticks);
       reading.limit = seconds(condition.limit_ticks);
-      return node.contact.touched >= condition.limit_ticks;
+      return node.contact.contact_ticks >= condition.limit_ticks;
     case ConditionKind::kFulfilled:
     case ConditionKind::kSignal: {
       const bool fulfilled = condition.kind == ConditionKind::kFulfilled;
-      const bool came =
+      const bool received =
           anyCommand(commands, fulfilled ? CommandKind::kFulfilled : CommandKind::kSignal, condition.signal);
-      reading.value = came ? 1.0 : 0.0;
+      reading.value = received ? 1.0 : 0.0;
       reading.limit = 1.0;
-      return came;
+      return received;
     }
     case ConditionKind::kAll:
     case ConditionKind::kAny:
@@ -68,7 +68,7 @@ bool ConditionProgress::isMetNow(const Condition& condition, Node& node, const S
 bool ConditionProgress::step(std::span<const Condition> tree, const SceneView& scene,
                              std::span<const GameCommand> commands) noexcept {
   assert(tree.size() <= kMaxConditions);
-  // children stand behind their parent: going backwards, a group has heard all of them when its turn comes
+  // parents precede their children: in reverse order a group is evaluated after all of its children
   std::array<std::uint32_t, kMaxConditions> children{};
   std::array<std::uint32_t, kMaxConditions> met_children{};
   for (std::size_t i = tree.size(); i-- > 0;) {
@@ -82,8 +82,8 @@ bool ConditionProgress::step(std::span<const Condition> tree, const SceneView& s
     } else {
       met = isMetNow(condition, node, scene, commands);
     }
-    node.held = met ? node.held + 1 : 0;
-    met = met && node.held >= condition.dwell;
+    node.held_ticks = met ? node.held_ticks + 1 : 0;
+    met = met && node.held_ticks >= condition.dwell;
     if (i > 0 && tree[condition.parent].latched) {
       node.latched = node.latched || met;
       met = node.latched;
@@ -97,4 +97,4 @@ bool ConditionProgress::step(std::span<const Condition> tree, const SceneView& s
   return !tree.empty() && nodes_[0].reading.met;
 }
 
-}  // namespace tenon
+}  // namespace tenon::game_control

@@ -11,102 +11,105 @@
 #include "idl/types/spatial.h"
 #include "server/game_control/game_command.h"
 
-namespace tenon {
+namespace tenon::game_control {
 
-inline constexpr std::size_t kMaxConditions = 32;  ///< of one state, groups included
+inline constexpr std::size_t kMaxConditions = 32;  ///< nodes of one state's condition tree, groups included
 
 enum class ConditionKind : std::uint8_t {
-  kAll,          ///< every child
-  kAny,          ///< at least one child
-  kPose,         ///< `object` is at X_WG within the tolerances
-  kForce,        ///< |F| on `object` is between above and below
-  kForceTarget,  ///< the force on `object` is F_W within the tolerance
-  kContact,      ///< `object` and `other` have touched for `limit_ticks`, gaps shorter than `lapse` forgiven
-  kContactTime,  ///< `object` has touched anything for `limit_ticks` in sum
-  kFulfilled,    ///< somebody says so
-  kSignal,       ///< an external program says so
+  kAll,          ///< group: every child is met
+  kAny,          ///< group: at least one child is met
+  kPose,         ///< `object` is at X_WG within the tolerances `within` and `angle`
+  kForce,        ///< the magnitude of the force on `object` is between `above` and `below`
+  kForceTarget,  ///< the force on `object` differs from F_W by at most `within`
+  kContact,      ///< `object` and `other` were in contact for `limit_ticks`; gaps up to `lapse` are tolerated
+  kContactTime,  ///< the accumulated time of `object` in contact with anything reaches `limit_ticks`
+  kFulfilled,    ///< a person sends the command kFulfilled in this tick
+  kSignal,       ///< an external program sends the signal number `signal` in this tick
 };
 
-/// A node of a condition tree (paper Fig. 4). Parents stand before their children; node 0 is the root.
+/// A node of a condition tree (paper Fig. 4). Parents precede their children; node 0 is the root.
 struct Condition {
   ConditionKind kind = ConditionKind::kAll;
-  std::uint32_t parent = 0;  ///< index in the tree; the root's is itself
-  bool latched = false;  ///< of a group: a child once met stays met; else they must be met in the same tick
-  std::uint32_t dwell = 0;  ///< [ticks] it must hold without a break before it counts
+  std::uint32_t parent = 0;  ///< index in the tree; the root is its own parent
+  bool latched =
+      false;  ///< group: a child that was met once stays met; else all must be met in the same tick
+  std::uint32_t dwell = 0;  ///< [ticks] it must hold without interruption before it is met
   ObjectId object;
-  ObjectId other;
-  Pose X_WG;
+  ObjectId other;                                          ///< kContact
+  Pose X_WG;                                               ///< kPose: target pose of `object`
   double within = 0.0;                                     ///< [m] of kPose, [N] of kForceTarget
-  double angle = 0.0;                                      ///< [rad]
-  double above = 0.0;                                      ///< [N]
-  double below = std::numeric_limits<double>::infinity();  ///< [N]
-  Vector3 F_W = Vector3::Zero();
-  std::uint32_t limit_ticks = 0;
-  std::uint32_t lapse = 0;  ///< [ticks]
-  std::uint32_t signal = 0;
+  double angle = 0.0;                                      ///< [rad] kPose
+  double above = 0.0;                                      ///< [N] kForce
+  double below = std::numeric_limits<double>::infinity();  ///< [N] kForce
+  Vector3 F_W = Vector3::Zero();                           ///< kForceTarget
+  std::uint32_t limit_ticks = 0;                           ///< [ticks] kContact, kContactTime
+  std::uint32_t lapse = 0;                                 ///< [ticks] kContact
+  std::uint32_t signal = 0;                                ///< kSignal: index into ScenarioFile::signals
 };
 
 [[nodiscard]] constexpr bool isGroup(ConditionKind kind) {
   return kind == ConditionKind::kAll || kind == ConditionKind::kAny;
 }
 
-/// What conditions ask of a scene: the Environment's answers, or a test's.
+/// Read access to the simulation state that conditions are evaluated on: an Environment, or a test's values.
 ///
 /// Threads: one caller. Real-time: all.
 class SceneView {
  public:
   virtual ~SceneView() = default;
   [[nodiscard]] virtual Pose pose(ObjectId object) const noexcept = 0;      ///< X_WO
-  [[nodiscard]] virtual Vector3 force(ObjectId object) const noexcept = 0;  ///< in W
-  [[nodiscard]] virtual bool touching(ObjectId a, ObjectId b) const noexcept = 0;
-  [[nodiscard]] virtual bool touchesAnything(ObjectId object) const noexcept = 0;
+  [[nodiscard]] virtual Vector3 force(ObjectId object) const noexcept = 0;  ///< [N] contact force on it, in W
+  [[nodiscard]] virtual bool inContact(ObjectId a, ObjectId b) const noexcept = 0;
+  [[nodiscard]] virtual bool inAnyContact(ObjectId object) const noexcept = 0;
 };
 
-/// How far a condition is, for displays.
+/// Progress of one condition, for displays.
 struct ConditionReading {
-  double value = 0.0;  ///< pose: position error [m]; force: [N]; contact: [s]; command, signal: 0 or 1
-  double limit = 0.0;
+  double value =
+      0.0;  ///< pose: position error [m]; force: [N]; contact: [s]; group, command, signal: count [-]
+  double limit = 0.0;  ///< [unit of `value`] at which it is met, other parts of the condition aside
   bool met = false;
 };
 
-/// Counts for how long two things have touched; a hand trembles, so short gaps are forgiven (and not
-/// counted).
+/// Measures how long two objects have been in contact. Gaps up to a limit (tremor of the hand) do not reset
+/// the time, but are not counted either.
 struct ContactTimer {
-  std::uint32_t touched = 0;  ///< [ticks]
-  std::uint32_t away = 0;     ///< [ticks] since the last touch
+  std::uint32_t contact_ticks = 0;  ///< [ticks] in contact
+  std::uint32_t gap_ticks = 0;      ///< [ticks] since the last contact
 
-  void step(bool touching, std::uint32_t lapse) noexcept {
-    if (touching) {
-      ++touched;
-      away = 0;
-    } else if (++away > lapse) {
-      touched = 0;
+  void step(bool in_contact, std::uint32_t tolerated_gap) noexcept {
+    if (in_contact) {
+      ++contact_ticks;
+      gap_ticks = 0;
+    } else if (++gap_ticks > tolerated_gap) {
+      contact_ticks = 0;
     }
   }
 };
 
-/// Evaluates one condition tree tick by tick; all memory is counters of ticks, so a replay decides the same.
+/// Evaluates one condition tree tick by tick. Its whole state is tick counters and the last readings, so a
+/// replay decides the same.
 ///
 /// Threads: one caller. Real-time: all.
 class ConditionProgress {
  public:
   void reset() noexcept { *this = {}; }
 
-  /// One tick: true when the root is met. At most kMaxConditions nodes.
+  /// One tick: true when the root is met, false for an empty tree. At most kMaxConditions nodes (assert).
   bool step(std::span<const Condition> tree, const SceneView& scene,
             std::span<const GameCommand> commands) noexcept;
 
-  /// Of a node, as of the last step.
+  /// Progress of a node (index in the tree), as of the last step.
   [[nodiscard]] const ConditionReading& reading(std::size_t node) const { return nodes_[node].reading; }
 
-  /// Calls `visit(number)` with each number of its memory, in a fixed order: what is hashed, saved and
-  /// restored.
+  /// Calls `visit(number)` for each number of the mutable state in a fixed order, for hashing, saving and
+  /// restoring.
   template <typename Visitor>
   void visitMemory(Visitor&& visit) {
     for (Node& node : nodes_) {
-      visit(node.held);
-      visit(node.contact.touched);
-      visit(node.contact.away);
+      visit(node.held_ticks);
+      visit(node.contact.contact_ticks);
+      visit(node.contact.gap_ticks);
       visit(node.latched);
       visit(node.reading.value);
       visit(node.reading.limit);
@@ -116,9 +119,9 @@ class ConditionProgress {
 
  private:
   struct Node {
-    std::uint32_t held = 0;  ///< [ticks] without a break
+    std::uint32_t held_ticks = 0;  ///< [ticks] it has held without interruption
     ContactTimer contact;
-    bool latched = false;  ///< met once under a latching group
+    bool latched = false;  ///< was met once under a latching group
     ConditionReading reading;
   };
   [[nodiscard]] static bool isMetNow(const Condition& condition, Node& node, const SceneView& scene,
@@ -127,7 +130,7 @@ class ConditionProgress {
   std::array<Node, kMaxConditions> nodes_{};
 };
 
-/// The angle between two orientations [rad].
+/// The angle [rad], 0 to pi, of the rotation between two orientations; q and -q are the same orientation.
 [[nodiscard]] double angleBetween(const Quaternion& q_WA, const Quaternion& q_WB) noexcept;
 
-}  // namespace tenon
+}  // namespace tenon::game_control

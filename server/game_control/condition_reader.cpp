@@ -7,10 +7,10 @@
 #include <string_view>
 #include <utility>
 
-namespace tenon {
+namespace tenon::game_control {
 namespace {
 
-constexpr int kDeepest = 8;  // groups in groups; no exercise needs more, and a file may refer to itself
+constexpr int kMaxNesting = 8;         // groups in groups; a YAML alias can make a group contain itself
 constexpr double kLargestForce = 1e4;  // [N]
 
 constexpr std::array<std::pair<std::string_view, ConditionKind>, 8> kKinds{{
@@ -50,13 +50,13 @@ void ConditionReader::add(const YAML::Node& node, std::uint32_t parent, int dept
   Condition condition;
   condition.parent = parent;
   int kinds = 0;
-  YAML::Node asked;
+  YAML::Node given;
   for (const auto& [word, kind] : kKinds) {
     const YAML::Node value = node[std::string(word)];
     if (!value.IsDefined()) continue;
     ++kinds;
     condition.kind = kind;
-    asked.reset(value);
+    given.reset(value);
   }
   if (kinds != 1) {
     yaml_.fail(node, "a condition has " + std::to_string(kinds) +
@@ -67,36 +67,36 @@ void ConditionReader::add(const YAML::Node& node, std::uint32_t parent, int dept
   const bool is_event =
       condition.kind == ConditionKind::kFulfilled || condition.kind == ConditionKind::kSignal;
   if (is_event && node["dwell"].IsDefined()) {
-    yaml_.fail(node["dwell"], "a command or signal comes in one instant, it cannot have a 'dwell'");
+    yaml_.fail(node["dwell"], "a command or signal lasts one tick, it cannot have a 'dwell'");
   }
   if (!isGroup(condition.kind) && node["when"].IsDefined()) {
     yaml_.fail(node["when"], "'when' belongs to 'all' or 'any'");
   }
   condition.dwell =
-      ticks(node["dwell"], "'dwell'", condition.kind == ConditionKind::kPose ? kPoseDwell : 0.0);
+      readTicks(node["dwell"], "'dwell'", condition.kind == ConditionKind::kPose ? kPoseDwell : 0.0);
   switch (condition.kind) {
     case ConditionKind::kAll:
     case ConditionKind::kAny:
-      addGroup(node, asked, condition, depth);
+      addGroup(node, given, condition, depth);
       return;
     case ConditionKind::kPose:
-      readPose(asked, condition);
+      readPose(given, condition);
       break;
     case ConditionKind::kForce:
     case ConditionKind::kForceTarget:
-      readForce(asked, condition);
+      readForce(given, condition);
       break;
     case ConditionKind::kContact:
-      readContact(asked, condition);
+      readContact(given, condition);
       break;
     case ConditionKind::kContactTime:
-      readContactTime(asked, condition);
+      readContactTime(given, condition);
       break;
     case ConditionKind::kFulfilled:
-      readCommand(asked, condition);
+      readCommand(given, condition);
       break;
     case ConditionKind::kSignal:
-      readSignal(asked, condition);
+      readSignal(given, condition);
       break;
   }
   tree_.push_back(condition);
@@ -104,11 +104,11 @@ void ConditionReader::add(const YAML::Node& node, std::uint32_t parent, int dept
 
 void ConditionReader::addGroup(const YAML::Node& node, const YAML::Node& children, Condition condition,
                                int depth) {
-  if (depth == kDeepest) {
-    yaml_.fail(children, "conditions are nested more than " + std::to_string(kDeepest) + " deep");
+  if (depth == kMaxNesting) {
+    yaml_.fail(children, "conditions are nested more than " + std::to_string(kMaxNesting) + " deep");
     return;
   }
-  if (!yaml_.isList(children, "'all' or 'any'", kMaxConditions)) return;
+  if (!yaml_.checkList(children, "'all' or 'any'", kMaxConditions)) return;
   if (children.size() == 0) {
     yaml_.fail(children, "'all' or 'any' is empty, expected at least one condition");
     return;
@@ -126,15 +126,16 @@ void ConditionReader::addGroup(const YAML::Node& node, const YAML::Node& childre
 }
 
 void ConditionReader::readPose(const YAML::Node& node, Condition& condition) {
-  // `pose: target` is the state's own object at its own target
-  const bool in_short = node.IsScalar() && node.Scalar() == "target";
-  if (!in_short && !yaml_.openMapping(node, "pose_condition", "a pose condition")) return;
+  // short form `pose: target`: the state's object at the state's target
+  const bool short_form = node.IsScalar() && node.Scalar() == "target";
+  if (!short_form && !yaml_.openMapping(node, "pose_condition", "a pose condition")) return;
   const YAML::Node nothing(YAML::NodeType::Undefined);
-  const YAML::Node target = in_short ? nothing : YAML::Node(node["target"]);
-  condition.object = in_short ? state_.object : objectOr(node["object"], "'object' of a pose condition");
+  const YAML::Node target = short_form ? nothing : YAML::Node(node["target"]);
+  condition.object =
+      short_form ? state_.object : objectOrDefault(node["object"], "'object' of a pose condition");
   condition.within = state_.tolerance;
   condition.angle = state_.angle_tolerance;
-  if (!in_short) {
+  if (!short_form) {
     condition.within = yaml_.numberOr(node["within"], Quantity::kLength, "'within'", kSmallestTolerance, 1e3,
                                       state_.tolerance);
     condition.angle = yaml_.numberOr(node["angle"], Quantity::kAngle, "'angle'", kSmallestTolerance,
@@ -143,9 +144,9 @@ void ConditionReader::readPose(const YAML::Node& node, Condition& condition) {
   const bool own_target = !target.IsDefined() || (target.IsScalar() && target.Scalar() == "target");
   if (own_target) {
     if (!state_.X_WG) {
-      yaml_.fail(node, "state '" + state_.name + "' asks for a pose, but has no target pose");
+      yaml_.fail(node, "state '" + state_.name + "' has a pose condition, but no target pose");
     } else if (condition.object.valid() && condition.object != state_.object) {
-      yaml_.fail(node, "the target pose of state '" + state_.name + "' is not one of '" +
+      yaml_.fail(node, "the target pose of state '" + state_.name + "' is not that of '" +
                            names_.nameOf(condition.object) + "', expected a 'target' of its own");
     } else {
       condition.X_WG = *state_.X_WG;
@@ -159,7 +160,7 @@ void ConditionReader::readPose(const YAML::Node& node, Condition& condition) {
 
 void ConditionReader::readForce(const YAML::Node& node, Condition& condition) {
   if (!yaml_.openMapping(node, "force_condition", "a force condition")) return;
-  condition.object = objectOr(node["object"], "'object' of a force condition");
+  condition.object = objectOrDefault(node["object"], "'object' of a force condition");
   if (!condition.object.valid())
     yaml_.fail(node, "a force condition of state '" + state_.name + "' has no object");
   const bool bounds = node["above"].IsDefined() || node["below"].IsDefined();
@@ -180,7 +181,7 @@ void ConditionReader::readForce(const YAML::Node& node, Condition& condition) {
   condition.below =
       yaml_.numberOr(node["below"], Quantity::kForce, "'below'", 0.0, kLargestForce, condition.below);
   if (condition.above >= condition.below) {
-    yaml_.fail(node, "a force can never be above and below these limits at once, expected 'above' < 'below'");
+    yaml_.fail(node, "no force is within these limits, expected 'above' < 'below'");
   }
 }
 
@@ -190,18 +191,18 @@ void ConditionReader::readContact(const YAML::Node& node, Condition& condition) 
   if (!objects || !names_.pair(node["between"], "'between' of a contact condition")) return;
   condition.object = objects->first;
   condition.other = objects->second;
-  condition.limit_ticks = ticks(node["for"], "'for'", 0.0);
-  condition.lapse = ticks(node["lapse"], "'lapse'", kContactLapse);
+  condition.limit_ticks = readTicks(node["for"], "'for'", 0.0);
+  condition.lapse = readTicks(node["lapse"], "'lapse'", kContactLapse);
 }
 
 void ConditionReader::readContactTime(const YAML::Node& node, Condition& condition) {
   if (!yaml_.openMapping(node, "contact_time_condition", "a contact time condition")) return;
-  condition.object = objectOr(node["object"], "'object' of a contact time condition");
+  condition.object = objectOrDefault(node["object"], "'object' of a contact time condition");
   if (!condition.object.valid())
     yaml_.fail(node, "a contact time of state '" + state_.name + "' has no object");
   if (!node["at_least"].IsDefined())
     yaml_.fail(node, "a contact time condition needs 'at_least', such as 0.5 s");
-  condition.limit_ticks = ticks(node["at_least"], "'at_least'", 0.0);
+  condition.limit_ticks = readTicks(node["at_least"], "'at_least'", 0.0);
 }
 
 void ConditionReader::readCommand(const YAML::Node& node, Condition& /*condition*/) {
@@ -216,12 +217,13 @@ void ConditionReader::readSignal(const YAML::Node& node, Condition& condition) {
   if (found == signals_.end()) signals_.push_back(name);
 }
 
-ObjectId ConditionReader::objectOr(const YAML::Node& node, const std::string& what) {
+ObjectId ConditionReader::objectOrDefault(const YAML::Node& node, const std::string& what) {
   return node.IsDefined() ? names_.object(node, what) : state_.object;
 }
 
-std::uint32_t ConditionReader::ticks(const YAML::Node& node, const std::string& what, double when_missing) {
-  return toTicks(yaml_.numberOr(node, Quantity::kTime, what, 0.0, kLongestTime, when_missing));
+std::uint32_t ConditionReader::readTicks(const YAML::Node& node, const std::string& what,
+                                         double default_value) {
+  return toTicks(yaml_.numberOr(node, Quantity::kTime, what, 0.0, kLongestTime, default_value));
 }
 
-}  // namespace tenon
+}  // namespace tenon::game_control

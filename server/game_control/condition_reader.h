@@ -7,19 +7,20 @@
 #include "server/game_control/scenario_names.h"
 #include "server/game_control/yaml_reader.h"
 
-namespace tenon {
+namespace tenon::game_control {
 
-/// Reads the condition tree of one state; what a leaf leaves out is the state's own (object, target,
-/// tolerances).
+/// Reads the condition tree of one state. An object, target or tolerance that a leaf omits is the state's.
+/// Errors go to the YamlReader.
 ///
 /// Threads: one. Real-time: no.
 class ConditionReader {
  public:
+  /// `signals` receives the names of signals that are new to the scenario.
   ConditionReader(YamlReader& yaml, const ScenarioNames& names, std::vector<std::string>& signals,
                   const ScenarioState& state)
       : yaml_(yaml), names_(names), signals_(signals), state_(state) {}
 
-  /// A condition, or a list of them that must all be met.
+  /// A condition, or a list of conditions that must all be met.
   [[nodiscard]] std::vector<Condition> read(const YAML::Node& node);
 
  private:
@@ -31,8 +32,11 @@ class ConditionReader {
   void readContactTime(const YAML::Node& node, Condition& condition);
   void readCommand(const YAML::Node& node, Condition& condition);
   void readSignal(const YAML::Node& node, Condition& condition);
-  [[nodiscard]] ObjectId objectOr(const YAML::Node& node, const std::string& what);
-  [[nodiscard]] std::uint32_t ticks(const YAML::Node& node, const std::string& what, double when_missing);
+  /// The named object; that of the state when the key is missing.
+  [[nodiscard]] ObjectId objectOrDefault(const YAML::Node& node, const std::string& what);
+  /// A time in ticks; `default_value` [s] when the key is missing.
+  [[nodiscard]] std::uint32_t readTicks(const YAML::Node& node, const std::string& what,
+                                        double default_value);
 
   YamlReader& yaml_;
   const ScenarioNames& names_;
@@ -41,12 +45,12 @@ class ConditionReader {
   std::vector<Condition> tree_;
 };
 
-/// A time of a scenario in whole ticks.
+/// `seconds` [s], at least 0, rounded to whole ticks.
 [[nodiscard]] std::uint32_t toTicks(double seconds);
 
-inline constexpr double kLongestTime = 86'400.0;    ///< [s] a day: any time of a scenario
-inline constexpr double kSmallestTolerance = 1e-6;  ///< [m], [rad], [N]: below, nothing could ever be met
-inline constexpr double kContactLapse = 0.05;       ///< [s] a trembling hand may lose contact for
-inline constexpr double kPoseDwell = 0.2;  ///< [s] a part rests at its target before it counts as mounted
+inline constexpr double kLongestTime = 86'400.0;    ///< [s] largest time a scenario may give: a day
+inline constexpr double kSmallestTolerance = 1e-6;  ///< [m], [rad], [N] smaller ones could never be met
+inline constexpr double kContactLapse = 0.05;       ///< [s] default tolerated gap in a contact: hand tremor
+inline constexpr double kPoseDwell = 0.2;  ///< [s] default dwell at a target before a part counts as mounted
 
-}  // namespace tenon
+}  // namespace tenon::game_control

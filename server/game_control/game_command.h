@@ -4,18 +4,18 @@
 
 #include "idl/types/messages.h"
 
-namespace tenon {
+namespace tenon::game_control {
 
-/// A person's or a program's command as the state machine takes it: names are already numbers, so a tick can
-/// read and a journal can keep it.
+/// A command to the state machine. Names are already resolved to numbers, so that a tick reads it without
+/// strings and a journal stores it as it is.
 ///
 /// Threads: a value. Real-time: all.
 struct GameCommand {
   CommandKind kind = CommandKind::kFulfilled;
-  HandId hand;  ///< of kRelease
-  std::uint32_t signal =
-      0;               ///< kSignal: index into ScenarioFile::signals; kSetCollision: into ScenarioFile::pairs
-  double value = 0.0;  ///< kSetCollision: 0 off, else on
+  HandId hand;  ///< kRelease
+  /// kSignal: index into ScenarioFile::signals; kSetCollision: index into ScenarioFile::pairs
+  std::uint32_t signal = 0;
+  double value = 0.0;  ///< [-] kSetCollision: 0 disables the pair, any other value enables it
 };
 
-}  // namespace tenon
+}  // namespace tenon::game_control

@@ -7,16 +7,16 @@
 
 #include "server/game_control/scenario_reader.h"
 
-namespace tenon {
+namespace tenon::game_control {
 namespace {
 
-constexpr std::uintmax_t kLargestFile = 1 << 20;  // [bytes] a hundred times the largest exercise
+constexpr std::uintmax_t kLargestFile = 1 << 20;  // [bytes] a hundred times the largest scenario
 
-template <typename Things>
-std::uint32_t indexNamed(const Things& things, std::string_view name) {
+template <typename Container>
+std::uint32_t indexNamed(const Container& container, std::string_view name) {
   const auto found =
-      std::find_if(things.begin(), things.end(), [&](const auto& thing) { return thing.name == name; });
-  return found == things.end() ? ObjectId::kNone : static_cast<std::uint32_t>(found - things.begin());
+      std::find_if(container.begin(), container.end(), [&](const auto& item) { return item.name == name; });
+  return found == container.end() ? ObjectId::kNone : static_cast<std::uint32_t>(found - container.begin());
 }
 
 }  // namespace
@@ -47,7 +47,7 @@ Result<ScenarioFile> readScenario(const std::filesystem::path& path) {
   if (problem)
     return fail(file.string() + ": no such scenario file, expected a folder with a scenario.yaml or a file");
   if (size > kLargestFile)
-    return fail(file.string() + ": larger than 1 MB, a scenario is a few pages of YAML");
+    return fail(file.string() + ": larger than 1 MB, expected a scenario of a few pages of YAML");
   std::ifstream stream(file, std::ios::binary);
   const std::string text((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
   if (stream.bad() || text.size() != size) return fail(file.string() + ": cannot be read");
@@ -58,4 +58,4 @@ Result<ScenarioFile> parseScenario(std::string_view text, const std::filesystem:
   return ScenarioReader(path).read(text);
 }
 
-}  // namespace tenon
+}  // namespace tenon::game_control

@@ -17,37 +17,38 @@
 #include "server/game_control/condition.h"
 #include "server/simulation/scene.h"
 
-namespace tenon {
+namespace tenon::game_control {
 
 /// One text in the languages of the scenario; the first is the scenario's main language.
 using Texts = std::vector<LocalizedText>;
 
-/// Where triangles come from: a part that the scenario's generator makes, or a file.
+/// A triangle mesh of an object: a part made by the scenario's generator, or a file.
 struct MeshSource {
-  std::string part;            ///< the generator's name of it: `<part>.stl`, millimetres; empty for a file
-  std::filesystem::path file;  ///< absolute, or relative to where the scenario was given; empty for a part
-  double unit = 1e-3;          ///< [m] length of one file unit
+  std::string part;  ///< name of the generated part: `<part>.stl`, in millimetres; empty for a file
+  /// Absolute, or relative to the working directory as the scenario's path is; empty for a part.
+  std::filesystem::path file;
+  double unit = 1e-3;  ///< [m] length of one unit of the file
 };
 
-/// How the haptic structures of an object are baked.
+/// Settings for baking the haptic structures of an object.
 struct StructureSettings {
-  double voxel = 0.003;                     ///< [m]
-  std::int32_t refinement = 4;              ///< 1, 2, 4 or 8: of the boxes
-  std::uint32_t points = 10'000;            ///< about how many shell points, when spacing is 0
-  double spacing = 0.0;                     ///< [m]
-  std::vector<Eigen::AlignedBox3d> refine;  ///< given by hand, in the object's frame
+  double voxel = 0.003;                     ///< [m] edge
+  std::int32_t refinement = 4;              ///< 1, 2, 4 or 8: voxel / refinement is the edge in refined boxes
+  std::uint32_t points = 10'000;            ///< approximate number of surface points, used when spacing is 0
+  double spacing = 0.0;                     ///< [m] between surface points
+  std::vector<Eigen::AlignedBox3d> refine;  ///< refined boxes from the file, in the object's frame
 };
 
-/// What makes an object a free body; what is not given follows from its volume.
+/// Mass properties of a dynamic object; what is not given follows from the volume its field encloses.
 struct ScenarioBody {
-  std::optional<double> mass;        ///< [kg]; else by density
+  std::optional<double> mass;        ///< [kg] none: from the density
   double density = 0.0;              ///< [kg/m^3]
   std::optional<Vector3> p_OC_O;     ///< centre of mass
-  std::optional<Vector3> inertia_C;  ///< [kg m^2] moments about it, along the object's axes
-  bool floating = false;
-  double damping = 0.0;  ///< [1/s]
-  double friction = 0.4;
-  int line = 0;
+  std::optional<Vector3> inertia_C;  ///< [kg m^2] moments about C, along the object's axes
+  bool floating = false;             ///< gravity does not act on it
+  double damping = 0.0;              ///< [1/s] decay rate of its linear and angular velocity
+  double friction = 0.4;             ///< [-] Coulomb coefficient while it moves freely
+  int line = 0;                      ///< in the file, as everywhere here
 };
 
 struct ScenarioObject {
@@ -57,49 +58,50 @@ struct ScenarioObject {
   std::string color = "#b0b7bf";
   std::uint32_t group = 0;  ///< number in ScenarioFile::groups, from 1; 0: none
   std::vector<MeshSource> meshes;
-  bool felt = true;  ///< false: seen only, no structures
+  bool collidable = true;  ///< false: it is displayed only, and has no haptic structures
   StructureSettings structures;
-  Pose X_WO;
-  ObjectStatus status = ObjectStatus::kParked;
-  double stiffness = 1000.0;  ///< [N/m]
-  std::optional<ScenarioBody> body;
+  Pose X_WO;                                    ///< at the start
+  ObjectStatus status = ObjectStatus::kParked;  ///< at the start
+  double stiffness = 1000.0;                    ///< [N/m] of its penalty force
+  std::optional<ScenarioBody> body;             ///< none: not dynamic
   int line = 0;
 };
 
 struct ScenarioHand {
   std::string name;
   Role role = Role::kTrainee;
-  HandKind kind = HandKind::kCoupled;
-  ObjectId object;
-  double stiffness = 1000.0;
-  double rotational_stiffness = 20.0;
+  simulation::HandKind kind = simulation::HandKind::kCoupled;
+  ObjectId object;                     ///< its own object, which it moves unless it has grabbed another
+  double stiffness = 1000.0;           ///< [N/m] of its coupling
+  double rotational_stiffness = 20.0;  ///< [Nm/rad] of its coupling
   int line = 0;
 };
 
-/// Two objects that may touch. Which one is the shell follows from sizes, known only after baking.
+/// A collision pair. Which object is the pointshell side depends on targets, kinds and sizes, and sizes are
+/// known only after baking: see makeScene().
 struct ScenarioPair {
   ObjectId a;
   ObjectId b;
-  double clearance = 0.0;          ///< [m] between the two when mounted, both sides together; 0: not said
+  double clearance = 0.0;          ///< [m] play between the two when mounted, sum of both sides; 0: not given
   std::optional<double> dilation;  ///< [m] none: chosen by dilationOf
-  bool sensing = false;
-  bool enabled = true;
-  std::optional<Friction> friction;  ///< none: that of the bodies
-  int line = 0;                      ///< 0: listed automatically
+  bool sensing = false;            ///< contacts are displayed as vibration only and constrain nothing
+  bool enabled = true;             ///< at the start
+  std::optional<collision::Friction> friction;  ///< none: that of the bodies
+  int line = 0;                                 ///< 0: listed automatically
 };
 
 enum class PlacementKind : std::uint8_t {
-  kShow,  ///< parked at `X_WO`, or where it is; a free body falls from there
+  kShow,  ///< visible at `X_WO`, or where it is: a dynamic object is free, any other parked
   kHide,
-  kFix,   ///< the paper's fixedPose
-  kFree,  ///< may be taken again, stays where it is
+  kFix,   ///< fixed (the paper's fixedPose)
+  kFree,  ///< no longer held or fixed; stays where it is, and may be grabbed
 };
 
 /// What a state does to an object when it begins.
 struct Placement {
   PlacementKind kind = PlacementKind::kShow;
   ObjectId object;
-  std::optional<Pose> X_WO;
+  std::optional<Pose> X_WO;  ///< none: where it is
 };
 
 struct HandAssignment {
@@ -112,58 +114,58 @@ struct PairSwitch {
   bool enabled = true;
 };
 
-/// Objects of one group never touch.
+/// Puts an object into a group. Objects of one group never collide.
 struct GroupChange {
   ObjectId object;
   std::uint32_t group = 0;  ///< as in ScenarioObject
   int line = 0;
 };
 
-inline constexpr std::size_t kMostHelpers = 4;  ///< `may_take` of a state
+inline constexpr std::size_t kMaxHelpers = 4;  ///< entries in `may_take` of a state
 
 enum class TimeoutAction : std::uint8_t { kFail, kSkip };
 
-/// One state of the array of paper Fig. 4.
+/// One state of the task state machine (the array of paper Fig. 4).
 struct ScenarioState {
   std::string name;
   Texts title;
   Texts instruction;
-  std::string part;  ///< title of the part this belongs to, for grouping
+  std::string part;  ///< title of the part it belongs to, by which displays group states
   // effects at its beginning, in this order
   std::vector<PairSwitch> pairs;
   std::vector<GroupChange> groups;
   std::vector<Placement> placements;
-  std::vector<HandAssignment> hands;  ///< the paper's hdIndex: who moves what from this state on
-  /// Hands that may take hold of a part as well for the time of this state, by touching it as one takes it.
+  std::vector<HandAssignment> hands;  ///< which hand moves which object from this state on (paper: hdIndex)
+  /// Helping hands: while this state lasts, each may grab its object as well by touching it for a second.
   std::vector<HandAssignment> may_take;
-  // what is asked
+  // the task
   ObjectId object;
   HandId hand;
-  ObjectId touch;
-  std::optional<Pose> X_WG;
-  double tolerance = 0.002;
-  double angle_tolerance = 0.0349066;  ///< 2 degrees
-  Vector3 approach_W = Vector3::Zero();
-  double approach_distance = 0.0;
-  std::vector<Condition> conditions;
+  ObjectId touch;                        ///< the object to touch; invalid: none
+  std::optional<Pose> X_WG;              ///< target pose of `object`
+  double tolerance = 0.002;              ///< [m] of the target position
+  double angle_tolerance = 0.0349066;    ///< [rad] of the target orientation: 2 degrees
+  Vector3 approach_W = Vector3::Zero();  ///< unit vector of the motion towards the target; zero: any
+  double approach_distance = 0.0;        ///< [m] before the target, from which on the direction matters
+  std::vector<Condition> conditions;     ///< tree; the state ends when its root is met
   // at its end
-  bool snap = false;          ///< `object` is fixed at its target, the hand moves its own object again
-  std::uint32_t timeout = 0;  ///< [ticks], 0: none
+  bool snap = false;  ///< `object` is fixed at its target, and hands that held it move their own again
+  std::uint32_t timeout = 0;  ///< [ticks] 0: none
   TimeoutAction on_timeout = TimeoutAction::kFail;
   int line = 0;
 };
 
-/// A training scenario, read from YAML and checked: every reference in it is an index that exists.
+/// A training scenario, read from YAML and checked: all ids and indices in it are valid.
 ///
 /// Threads: constant once read. Real-time: reading its members.
 struct ScenarioFile {
   std::filesystem::path path;   ///< of the YAML file
   std::uint64_t text_hash = 0;  ///< of the text it was read from
-  std::string name;             ///< of its folder: what the part generator calls it
-  std::string language = "en";
+  std::string name;             ///< of its folder, and of its set of generated parts
+  std::string language = "en";  ///< main language
   Texts title;
   Vector3 gravity_W{0.0, 0.0, -9.81};   ///< [m/s^2]
-  double reach = 10.0;                  ///< [m] no pose may be farther from the world's origin
+  double reach = 10.0;                  ///< [m] largest distance of any given pose from the world's origin
   std::vector<ScenarioObject> objects;  ///< index = ObjectId
   std::vector<ScenarioHand> hands;      ///< index = HandId
   std::vector<ScenarioPair> pairs;      ///< index as in Scene::pairs
@@ -172,9 +174,10 @@ struct ScenarioFile {
   std::vector<ScenarioState> states;
 
   [[nodiscard]] ObjectId objectNamed(std::string_view object) const;  ///< invalid when there is none
-  [[nodiscard]] HandId handNamed(std::string_view hand) const;
-  [[nodiscard]] int pairOf(ObjectId a, ObjectId b) const;  ///< -1: they never touch
-  /// -1 when no condition waits for it.
+  [[nodiscard]] HandId handNamed(std::string_view hand) const;        ///< invalid when there is none
+  /// Index of the pair of two objects, in either order; -1 when they never collide.
+  [[nodiscard]] int pairOf(ObjectId a, ObjectId b) const;
+  /// Index into `signals`; -1 when no condition uses it.
   [[nodiscard]] int signalNamed(std::string_view signal) const;
 };
 
@@ -182,33 +185,41 @@ struct ScenarioFile {
 /// expected`.
 [[nodiscard]] Result<ScenarioFile> readScenario(const std::filesystem::path& path);
 
-/// The same from a text; `path` names it in errors and is the place that mesh files are relative to.
+/// As readScenario(), from a text. `path` names it in errors; mesh files are relative to its folder.
 [[nodiscard]] Result<ScenarioFile> parseScenario(std::string_view text, const std::filesystem::path& path);
 
-/// The order in which objects are baked so that refineBoxes() knows the parts that are mounted into each.
+/// All objects in an order in which the parts that are mounted into an object are baked before it, as
+/// refineBoxes() needs. Parts that are mounted into each other come in the order of their ids.
 [[nodiscard]] std::vector<ObjectId> bakeOrder(const ScenarioFile& scenario);
 
-/// Boxes in `object`'s own frame whose surface needs the finer voxels: the given ones, and around every
-/// target of a part with a clearance to it that no given box touches (the part's box, swept back along its
-/// approach). `structures` by ObjectId; a part not baked yet (null) adds nothing.
+/// Boxes in the frame of `object` that need the refined voxels: those given in the file, and one around each
+/// target of a part that has a clearance to `object`, unless a given box intersects it (the part's bounding
+/// box, swept back along the approach). `structures` by ObjectId; a part not baked yet (null) adds nothing.
 [[nodiscard]] std::vector<Eigen::AlignedBox3d> refineBoxes(
     const ScenarioFile& scenario, ObjectId object,
-    const std::vector<std::shared_ptr<const HapticStructures>>& structures);
+    const std::vector<std::shared_ptr<const structures::HapticStructures>>& structures);
 
-/// The side of a pair with a clearance that a part with a target goes into; invalid when targets do not tell,
-/// then the larger object is the field.
-[[nodiscard]] ObjectId fieldByTarget(const ScenarioFile& scenario, const ScenarioPair& pair);
+/// The SDF side of a pair with a clearance: the object that the other one, which has a target, is mounted
+/// into. Invalid when both or none have a target; then kinds and sizes decide, see makeScene().
+[[nodiscard]] ObjectId sdfSideByTarget(const ScenarioFile& scenario, const ScenarioPair& pair);
 
-/// The dilation of `field`'s surface in a pair (DESIGN section 2): at least 0.87 of the voxel that answers
-/// there and at most a quarter of the clearance. Fails when both cannot hold.
+/// The dilation [m] of the SDF side `field` in a pair: at least 0.87 voxels (half a voxel's diagonal, so that
+/// thin sheets stay solid between samples) and at most a quarter of the clearance (so that the part still
+/// fits). Fails when both cannot hold, or when the given dilation is outside.
 [[nodiscard]] Result<double> dilationOf(const ScenarioFile& scenario, const ScenarioPair& pair,
                                         ObjectId field);
 
-/// The mass of a free body, and how it is spread. Fails when the object encloses no volume to reckon with.
-[[nodiscard]] Result<BodySpec> bodyOf(const ScenarioObject& object, const HapticStructures& structures);
+/// Mass properties of an object that has a body. Fails when they have to follow from its volume and its field
+/// encloses none, or when the given centre of mass is outside of the object.
+[[nodiscard]] Result<simulation::BodySpec> bodyOf(const ScenarioObject& object,
+                                                  const structures::HapticStructures& structures);
 
-/// The read-only scene. `structures` by ObjectId; null for an object that is only seen.
-[[nodiscard]] Result<std::shared_ptr<const Scene>> makeScene(
-    const ScenarioFile& scenario, std::vector<std::shared_ptr<const HapticStructures>> structures);
+/// The read-only scene. `structures` by ObjectId; null for an object that is not collidable. SDF side of a
+/// pair: by sdfSideByTarget(), else never a pointer or an assistant, else the larger object. Fails, with file
+/// and line, when structures are missing, a target is far from all objects, a clearance is too small for the
+/// voxels, or a body has no mass properties.
+[[nodiscard]] Result<std::shared_ptr<const simulation::Scene>> makeScene(
+    const ScenarioFile& scenario,
+    std::vector<std::shared_ptr<const structures::HapticStructures>> structures);
 
-}  // namespace tenon
+}  // namespace tenon::game_control

@@ -6,15 +6,15 @@
 #include <numeric>
 #include <vector>
 
-namespace tenon {
+namespace tenon::game_control {
 namespace {
 
 using Key = std::string_view;
 
 constexpr std::array<Key, 9> kScenario{"title", "language", "reach",     "gravity", "objects",
                                        "hands", "pairs",    "pairs_off", "states"};
-constexpr std::array<Key, 12> kObject{"name", "title",      "kind",  "color",  "group",     "meshes",
-                                      "felt", "structures", "start", "status", "stiffness", "body"};
+constexpr std::array<Key, 12> kObject{"name",       "title",      "kind",  "color",  "group",     "meshes",
+                                      "collidable", "structures", "start", "status", "stiffness", "body"};
 constexpr std::array<Key, 7> kBody{"mass", "density", "centre", "inertia", "floating", "damping", "friction"};
 constexpr std::array<Key, 3> kMesh{"part", "file", "unit"};
 constexpr std::array<Key, 5> kStructures{"voxel", "refinement", "points", "spacing", "refine"};
@@ -58,17 +58,18 @@ constexpr std::array kMappings{
     ScenarioMapping{"contact_time_condition", kContactTimeCondition},
 };
 
-/// How many letters must be typed, removed or changed to make one word of the other (Levenshtein).
-std::size_t typingErrors(std::string_view a, std::string_view b) {
+/// Levenshtein distance: insertions, deletions and substitutions of letters that turn one word into the
+/// other.
+std::size_t editDistance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
   for (std::size_t i = 1; i <= a.size(); ++i) {
     std::size_t diagonal = row[0];
     row[0] = i;
     for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t changed = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      const std::size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
       diagonal = row[j];
-      row[j] = std::min({changed, row[j] + 1, row[j - 1] + 1});
+      row[j] = std::min({substituted, row[j] + 1, row[j - 1] + 1});
     }
   }
   return row[b.size()];
@@ -85,19 +86,23 @@ const ScenarioMapping& scenarioMapping(std::string_view name) {
   return *found;
 }
 
+std::string_view renamedKey(std::string_view mapping, std::string_view key) {
+  return mapping == "object" && key == "felt" ? "collidable" : std::string_view{};
+}
+
 std::string suggestion(std::string_view word, std::span<const std::string_view> candidates) {
-  constexpr std::size_t kLongestWord = 64;  // longer ones are no typing errors, and cost time
+  constexpr std::size_t kLongestWord = 64;  // the distance takes quadratic time
   if (word.size() > kLongestWord) return {};
   std::string_view nearest;
-  std::size_t errors = std::max<std::size_t>(2, word.size() / 3) + 1;
+  std::size_t smallest = std::max<std::size_t>(2, word.size() / 3) + 1;
   for (const std::string_view candidate : candidates) {
-    const std::size_t count = typingErrors(word, candidate);
-    if (count < errors) {
-      errors = count;
+    const std::size_t distance = editDistance(word, candidate);
+    if (distance < smallest) {
+      smallest = distance;
       nearest = candidate;
     }
   }
   return nearest.empty() ? std::string{} : "did you mean '" + std::string(nearest) + "'?";
 }
 
-}  // namespace tenon
+}  // namespace tenon::game_control

@@ -4,10 +4,10 @@
 #include <string>
 #include <string_view>
 
-namespace tenon {
+namespace tenon::game_control {
 
-/// The keys a mapping of a scenario file may have. Its name is that of the definition in
-/// `scenarios/scenario.schema.json`, which a test holds equal to this list.
+/// The keys that one kind of mapping in a scenario file may have. `name` is that of its definition in
+/// `scenarios/scenario.schema.json`; a test compares schema and this list.
 ///
 /// Threads: constant. Real-time: no.
 struct ScenarioMapping {
@@ -17,10 +17,14 @@ struct ScenarioMapping {
 
 [[nodiscard]] std::span<const ScenarioMapping> scenarioMappings();
 
-/// The mapping of that name; one that does not exist is a broken promise between our own functions.
+/// The mapping of that name, which must exist (assert).
 [[nodiscard]] const ScenarioMapping& scenarioMapping(std::string_view name);
 
-/// `did you mean 'object'?`, or nothing when no candidate is near.
+/// The present name of a key that was renamed, empty for any other key: a file that uses the old one is
+/// refused with a message that names the new one.
+[[nodiscard]] std::string_view renamedKey(std::string_view mapping, std::string_view key);
+
+/// `did you mean 'object'?` with the candidate of the smallest edit distance; empty when none is near.
 [[nodiscard]] std::string suggestion(std::string_view word, std::span<const std::string_view> candidates);
 
-}  // namespace tenon
+}  // namespace tenon::game_control

@@ -6,13 +6,13 @@
 
 #include "server/game_control/scenario_keys.h"
 
-namespace tenon {
+namespace tenon::game_control {
 namespace {
 
-template <typename Things>
-std::string hintFor(const std::string& name, const Things& things) {
+template <typename Container>
+std::string hintFor(const std::string& name, const Container& container) {
   std::vector<std::string_view> names;
-  for (const auto& thing : things) names.push_back(thing.name);
+  for (const auto& item : container) names.push_back(item.name);
   const std::string hint = suggestion(name, names);
   return hint.empty() ? "" : "; " + hint;
 }
@@ -61,7 +61,7 @@ std::optional<std::uint32_t> ScenarioNames::pair(const YAML::Node& node, const s
   const int index = scenario_.pairOf(objects->first, objects->second);
   if (index < 0) {
     yaml_.fail(node, what + ": '" + nameOf(objects->first) + "' and '" + nameOf(objects->second) +
-                         "' never touch (same group, nobody moves either, or one is only seen)");
+                         "' never collide (same group, none of them ever moves, or one is not collidable)");
     return std::nullopt;
   }
   return static_cast<std::uint32_t>(index);
@@ -87,15 +87,15 @@ Texts ScenarioNames::texts(const YAML::Node& node, const std::string& what) cons
   for (const auto& entry : node) {
     texts.push_back({yaml_.text(entry.first, "a language of " + what), yaml_.text(entry.second, what)});
   }
-  const auto main_one = std::find_if(texts.begin(), texts.end(), [&](const LocalizedText& text) {
+  const auto main_text = std::find_if(texts.begin(), texts.end(), [&](const LocalizedText& text) {
     return text.language == scenario_.language;
   });
-  if (main_one == texts.end()) {
+  if (main_text == texts.end()) {
     yaml_.fail(node, what + " has no text in '" + scenario_.language + "', the scenario's main language");
     return texts;
   }
-  std::rotate(texts.begin(), main_one, main_one + 1);
+  std::rotate(texts.begin(), main_text, main_text + 1);
   return texts;
 }
 
-}  // namespace tenon
+}  // namespace tenon::game_control

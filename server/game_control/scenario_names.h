@@ -8,27 +8,28 @@
 #include "server/game_control/scenario.h"
 #include "server/game_control/yaml_reader.h"
 
-namespace tenon {
+namespace tenon::game_control {
 
-/// Turns names in a scenario file into ids, and says which name was probably meant when there is no such
-/// thing.
+/// Resolves names in a scenario file to ids. For an unknown name the error suggests the nearest known one.
+///
+/// `what` describes the value in errors: "'touch' of state 'take'".
 ///
 /// Threads: one. Real-time: no.
 class ScenarioNames {
  public:
   ScenarioNames(YamlReader& yaml, ScenarioFile& scenario) : yaml_(yaml), scenario_(scenario) {}
 
-  /// Invalid after a failure; `what` names the place: "'touch' of state 'take'".
+  /// Invalid after a failure.
   [[nodiscard]] ObjectId object(const YAML::Node& node, const std::string& what) const;
   [[nodiscard]] HandId hand(const YAML::Node& node, const std::string& what) const;
-  /// Of a list of two names.
+  /// From a list of two different names; empty after a failure.
   [[nodiscard]] std::optional<std::pair<ObjectId, ObjectId>> twoObjects(const YAML::Node& node,
                                                                         const std::string& what) const;
-  /// Of a list of two names that are checked against each other.
+  /// Index into ScenarioFile::pairs, from a list of two names; empty after a failure.
   [[nodiscard]] std::optional<std::uint32_t> pair(const YAML::Node& node, const std::string& what) const;
-  /// Number of a group; a new name makes one. 0: `none`.
+  /// Number of a group; a new name adds a group. 0: `none`.
   [[nodiscard]] std::uint32_t group(const YAML::Node& node, const std::string& what) const;
-  /// A text, or a mapping from language to text that has the scenario's main language.
+  /// A text, or a mapping from language to text that includes the scenario's main language.
   [[nodiscard]] Texts texts(const YAML::Node& node, const std::string& what) const;
 
   [[nodiscard]] const std::string& nameOf(ObjectId object) const {
@@ -40,4 +41,4 @@ class ScenarioNames {
   ScenarioFile& scenario_;
 };
 
-}  // namespace tenon
+}  // namespace tenon::game_control

@@ -4,22 +4,23 @@
 
 #include "server/game_control/scenario_reader.h"
 
-namespace tenon {
+namespace tenon::game_control {
 
-std::vector<bool> ScenarioReader::whoCanMove(const YAML::Node& states) const {
-  std::vector<bool> moves(scenario_.objects.size(), false);
-  for (std::size_t i = 0; i < moves.size(); ++i) {
+std::vector<bool> ScenarioReader::movableObjects(const YAML::Node& states) const {
+  std::vector<bool> movable(scenario_.objects.size(), false);
+  for (std::size_t i = 0; i < movable.size(); ++i) {
     const ObjectStatus status = scenario_.objects[i].status;
-    moves[i] = scenario_.objects[i].body || status == ObjectStatus::kHeld || status == ObjectStatus::kTracked;
+    movable[i] =
+        scenario_.objects[i].body || status == ObjectStatus::kHeld || status == ObjectStatus::kTracked;
   }
-  for (const ScenarioHand& hand : scenario_.hands) moves[hand.object.value] = true;
-  // what a hand takes or shall bring somewhere; what is wrong with it is said when the states are read
+  for (const ScenarioHand& hand : scenario_.hands) movable[hand.object.value] = true;
+  // objects that states give to hands or that have a target; errors are reported when the states are read
   const auto add = [&](const YAML::Node& name) {
     if (!name.IsDefined() || !name.IsScalar()) return;
     const ObjectId object = scenario_.objectNamed(name.Scalar());
-    if (object.valid()) moves[object.value] = true;
+    if (object.valid()) movable[object.value] = true;
   };
-  if (!states.IsDefined() || !states.IsSequence()) return moves;
+  if (!states.IsDefined() || !states.IsSequence()) return movable;
   for (const auto& state : states) {
     if (!state.IsMap()) continue;
     const YAML::Node hands = state["hands"];
@@ -28,30 +29,30 @@ std::vector<bool> ScenarioReader::whoCanMove(const YAML::Node& states) const {
     }
     if (state["target"].IsDefined()) add(state["object"]);
   }
-  return moves;
+  return movable;
 }
 
-std::vector<bool> ScenarioReader::whoChangesGroup(const YAML::Node& states) const {
-  std::vector<bool> changes(scenario_.objects.size(), false);
-  if (!states.IsDefined() || !states.IsSequence()) return changes;
+std::vector<bool> ScenarioReader::regroupedObjects(const YAML::Node& states) const {
+  std::vector<bool> regrouped(scenario_.objects.size(), false);
+  if (!states.IsDefined() || !states.IsSequence()) return regrouped;
   for (const auto& state : states) {
     if (!state.IsMap() || !state["groups"].IsDefined() || !state["groups"].IsMap()) continue;
     for (const auto& entry : state["groups"]) {
       if (!entry.first.IsScalar()) continue;
       const ObjectId object = scenario_.objectNamed(entry.first.Scalar());
-      if (object.valid()) changes[object.value] = true;
+      if (object.valid()) regrouped[object.value] = true;
     }
   }
-  return changes;
+  return regrouped;
 }
 
 void ScenarioReader::listPairs(const YAML::Node& states) {
-  const std::vector<bool> moves = whoCanMove(states);
-  const std::vector<bool> regrouped = whoChangesGroup(states);
+  const std::vector<bool> movable = movableObjects(states);
+  const std::vector<bool> regrouped = regroupedObjects(states);
   const auto isTracked = [&](std::uint32_t object) {
     return scenario_.objects[object].status == ObjectStatus::kTracked ||
            std::any_of(scenario_.hands.begin(), scenario_.hands.end(), [&](const ScenarioHand& hand) {
-             return hand.kind == HandKind::kTracked && hand.object.value == object;
+             return hand.kind == simulation::HandKind::kTracked && hand.object.value == object;
            });
   };
   const auto count = static_cast<std::uint32_t>(scenario_.objects.size());
@@ -59,9 +60,9 @@ void ScenarioReader::listPairs(const YAML::Node& states) {
     for (std::uint32_t b = a + 1; b < count; ++b) {
       const ScenarioObject& first = scenario_.objects[a];
       const ScenarioObject& second = scenario_.objects[b];
-      const bool never_apart =
+      const bool always_grouped =
           first.group != 0 && first.group == second.group && !regrouped[a] && !regrouped[b];
-      if (never_apart || !first.felt || !second.felt || !(moves[a] || moves[b])) continue;
+      if (always_grouped || !first.collidable || !second.collidable || !(movable[a] || movable[b])) continue;
       ScenarioPair pair;
       pair.a = ObjectId{a};
       pair.b = ObjectId{b};
@@ -88,19 +89,19 @@ void ScenarioReader::readPair(const YAML::Node& node) {
   if (dilation.IsDefined() && !(dilation.IsScalar() && dilation.Scalar() == "automatic")) {
     pair.dilation = yaml_.number(dilation, Quantity::kLength, "'dilation'" + of, 0.0, 0.1);
   }
-  pair.sensing = yaml_.yesNo(node["sensing"], "'sensing'" + of, pair.sensing);
-  pair.enabled = yaml_.yesNo(node["enabled"], "'enabled'" + of, true);
+  pair.sensing = yaml_.boolean(node["sensing"], "'sensing'" + of, pair.sensing);
+  pair.enabled = yaml_.boolean(node["enabled"], "'enabled'" + of, true);
   if (node["friction"].IsDefined()) {
     const double at_rest = yaml_.number(node["friction"], Quantity::kPlain, "'friction'" + of, 0.0, 2.0);
     const double sliding = yaml_.numberOr(node["sliding_friction"], Quantity::kPlain,
                                           "'sliding_friction'" + of, 0.0, at_rest, at_rest);
-    pair.friction = Friction{at_rest, sliding};
+    pair.friction = collision::Friction{at_rest, sliding};
   } else if (node["sliding_friction"].IsDefined()) {
     yaml_.fail(node["sliding_friction"], "'sliding_friction'" + of + " needs 'friction' with it");
   }
 }
 
-void ScenarioReader::readOff(const YAML::Node& node) {
+void ScenarioReader::readDisabledPair(const YAML::Node& node) {
   if (yaml_.failed()) return;
   // [drill, any]: all pairs of one object
   if (node.IsSequence() && node.size() == 2 && node[1].IsScalar() && node[1].Scalar() == "any") {
@@ -115,9 +116,8 @@ void ScenarioReader::readOff(const YAML::Node& node) {
 
 void ScenarioReader::checkClearances() {
   for (const ScenarioPair& pair : scenario_.pairs) {
-    // which of two is the field is known here only for a part that has a target; others when their sizes are
-    // known
-    const ObjectId field = fieldByTarget(scenario_, pair);
+    // only pairs whose SDF side follows from a target; makeScene() checks the others, when sizes are known
+    const ObjectId field = sdfSideByTarget(scenario_, pair);
     if (!field.valid()) continue;
     if (const auto dilation = dilationOf(scenario_, pair, field); !dilation) {
       yaml_.failAt(pair.line, dilation.error().what);
@@ -125,4 +125,4 @@ void ScenarioReader::checkClearances() {
   }
 }
 
-}  // namespace tenon
+}  // namespace tenon::game_control

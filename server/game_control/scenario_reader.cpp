@@ -5,44 +5,45 @@
 #include <system_error>
 
 #include "idl/types/hash.h"
-#include "server/game_control/state_reader.h"
+#include "server/game_control/scenario_state_reader.h"
 
-namespace tenon {
+namespace tenon::game_control {
 namespace {
 
-constexpr std::size_t kMostObjects = 64;
-constexpr std::size_t kMostHands = 16;
+constexpr std::size_t kMaxScenarioObjects = 64;
+constexpr std::size_t kMaxScenarioHands = 16;
 constexpr double kSmallestVoxel = 2e-5;  // [m]
-constexpr double kLargestVoxel = 0.1;
+constexpr double kLargestVoxel = 0.1;    // [m]
 
 template <typename Value, std::size_t N>
-using Words = std::array<std::pair<std::string_view, Value>, N>;
+using NamedValues = std::array<std::pair<std::string_view, Value>, N>;
 
-constexpr Words<ObjectStatus, 6> kStatuses{{{"hidden", ObjectStatus::kHidden},
-                                            {"parked", ObjectStatus::kParked},
-                                            {"held", ObjectStatus::kHeld},
-                                            {"tracked", ObjectStatus::kTracked},
-                                            {"fixed", ObjectStatus::kFixed},
-                                            {"free", ObjectStatus::kFree}}};
-constexpr Words<Role, 2> kRoles{{{"trainee", Role::kTrainee}, {"instructor", Role::kInstructor}}};
-constexpr Words<HandKind, 2> kHandKinds{{{"coupled", HandKind::kCoupled}, {"tracked", HandKind::kTracked}}};
+constexpr NamedValues<ObjectStatus, 6> kStatuses{{{"hidden", ObjectStatus::kHidden},
+                                                  {"parked", ObjectStatus::kParked},
+                                                  {"held", ObjectStatus::kHeld},
+                                                  {"tracked", ObjectStatus::kTracked},
+                                                  {"fixed", ObjectStatus::kFixed},
+                                                  {"free", ObjectStatus::kFree}}};
+constexpr NamedValues<Role, 2> kRoles{{{"trainee", Role::kTrainee}, {"instructor", Role::kInstructor}}};
+constexpr NamedValues<simulation::HandKind, 2> kHandKinds{
+    {{"coupled", simulation::HandKind::kCoupled}, {"tracked", simulation::HandKind::kTracked}}};
 constexpr std::array<std::string_view, 7> kObjectKinds{"part",    "tool", "pointer", "assistant",
                                                        "forearm", "head", "scene"};
-constexpr Words<double, 4> kUnits{{{"mm", 1e-3}, {"cm", 1e-2}, {"m", 1.0}, {"in", 0.0254}}};
+constexpr NamedValues<double, 4> kUnits{{{"mm", 1e-3}, {"cm", 1e-2}, {"m", 1.0}, {"in", 0.0254}}};
 
-/// The value of a word, or a failure that lists the words.
+/// The value with that name; an error lists all names.
 template <typename Value, std::size_t N>
-Value oneOf(YamlReader& yaml, const YAML::Node& node, const std::string& what, const Words<Value, N>& words,
-            Value when_missing) {
-  if (!node.IsDefined()) return when_missing;
+Value oneOf(YamlReader& yaml, const YAML::Node& node, const std::string& what,
+            const NamedValues<Value, N>& values, Value default_value) {
+  if (!node.IsDefined()) return default_value;
   const std::string word = yaml.text(node, what);
   std::string expected;
-  for (const auto& [known, value] : words) {
+  for (const auto& [known, value] : values) {
     if (known == word) return value;
     expected += (expected.empty() ? "" : ", ") + std::string(known);
   }
   yaml.fail(node, what + " is '" + word + "', expected one of: " + expected);
-  return when_missing;
+  return default_value;
 }
 
 bool isColor(const std::string& word) {
@@ -81,30 +82,30 @@ void ScenarioReader::readScenario(const YAML::Node& root) {
   scenario_.reach =
       yaml_.numberOr(root["reach"], Quantity::kLength, "'reach'", 0.01, 1000.0, scenario_.reach);
   if (root["gravity"].IsDefined()) {
-    constexpr double kMostGravity = 100.0;  // [m/s^2] ten times the earth's
+    constexpr double kMaxGravity = 100.0;  // [m/s^2] ten times that of the earth
     scenario_.gravity_W = yaml_.vector(root["gravity"], Quantity::kPlain, "'gravity'");
-    if (scenario_.gravity_W.norm() > kMostGravity)
+    if (scenario_.gravity_W.norm() > kMaxGravity)
       yaml_.fail(root["gravity"], "'gravity' is more than 100 m/s^2");
   }
 
-  if (!yaml_.isList(root["objects"], "'objects'", kMostObjects)) return;
+  if (!yaml_.checkList(root["objects"], "'objects'", kMaxScenarioObjects)) return;
   for (const auto& object : root["objects"]) readObject(object);
   if (scenario_.objects.empty())
     yaml_.fail(root["objects"], "'objects' is empty, expected at least one object");
-  if (yaml_.failed() || !yaml_.isList(root["hands"], "'hands'", kMostHands)) return;
+  if (yaml_.failed() || !yaml_.checkList(root["hands"], "'hands'", kMaxScenarioHands)) return;
   for (const auto& hand : root["hands"]) readHand(hand);
   if (scenario_.hands.empty()) yaml_.fail(root["hands"], "'hands' is empty, expected at least one hand");
   if (yaml_.failed()) return;
 
   listPairs(root["states"]);
-  if (root["pairs"].IsDefined() && yaml_.isList(root["pairs"], "'pairs'")) {
+  if (root["pairs"].IsDefined() && yaml_.checkList(root["pairs"], "'pairs'")) {
     for (const auto& pair : root["pairs"]) readPair(pair);
   }
-  if (root["pairs_off"].IsDefined() && yaml_.isList(root["pairs_off"], "'pairs_off'")) {
-    for (const auto& pair : root["pairs_off"]) readOff(pair);
+  if (root["pairs_off"].IsDefined() && yaml_.checkList(root["pairs_off"], "'pairs_off'")) {
+    for (const auto& pair : root["pairs_off"]) readDisabledPair(pair);
   }
   if (yaml_.failed()) return;
-  StateReader(yaml_, scenario_).read(root["states"]);
+  ScenarioStateReader(yaml_, scenario_).read(root["states"]);
   if (!yaml_.failed()) checkClearances();
 }
 
@@ -132,18 +133,19 @@ void ScenarioReader::readObject(const YAML::Node& node) {
                "'color'" + of + " is '" + object.color + "', expected '#rrggbb' or '#rrggbbaa'");
   }
   if (node["group"].IsDefined()) object.group = names_.group(node["group"], "'group'" + of);
-  object.felt = yaml_.yesNo(node["felt"], "'felt'" + of, true);
+  object.collidable = yaml_.boolean(node["collidable"], "'collidable'" + of, true);
   object.stiffness =
       yaml_.numberOr(node["stiffness"], Quantity::kStiffness, "'stiffness'" + of, 1.0, 1e6, object.stiffness);
   if (node["body"].IsDefined()) readBody(node["body"], object);
   object.status = oneOf(yaml_, node["status"], "'status'" + of, kStatuses,
                         object.body ? ObjectStatus::kFree : ObjectStatus::kParked);
   if (object.status == ObjectStatus::kFree && !object.body)
-    yaml_.fail(node["status"], "object '" + object.name + "' is free but has no 'body', expected its mass");
+    yaml_.fail(node["status"],
+               "object '" + object.name + "' is free but has no 'body', expected one with its mass");
   if (node["start"].IsDefined() && yaml_.openMapping(node["start"], "pose", "'start'" + of)) {
     object.X_WO = yaml_.pose(node["start"], "'start'" + of);
     if (object.X_WO.translation().norm() > scenario_.reach) {
-      yaml_.fail(node["start"], "'start'" + of + " is outside the scene ('reach')");
+      yaml_.fail(node["start"], "'start'" + of + " is farther from the world's origin than 'reach'");
     }
   }
   readMeshes(node["meshes"], object);
@@ -154,7 +156,7 @@ void ScenarioReader::readObject(const YAML::Node& node) {
 void ScenarioReader::readMeshes(const YAML::Node& node, ScenarioObject& object) {
   const std::string what = "'meshes' of object '" + object.name + "'";
   if (!node.IsDefined()) yaml_.fail(node, what + " is missing, expected a list such as [{part: peg}]");
-  if (yaml_.failed() || !yaml_.isList(node, what)) return;
+  if (yaml_.failed() || !yaml_.checkList(node, what)) return;
   if (node.size() == 0) yaml_.fail(node, what + " is empty, expected at least one mesh");
   for (const auto& entry : node) {
     if (!yaml_.openMapping(entry, "mesh", "a mesh of object '" + object.name + "'")) return;
@@ -194,13 +196,13 @@ void ScenarioReader::readStructures(const YAML::Node& node, ScenarioObject& obje
       yaml_.integer(node["points"], "'points' " + of, 10, 10'000'000, settings.points));
   settings.spacing = yaml_.numberOr(node["spacing"], Quantity::kLength, "'spacing' " + of, 1e-5, 1.0, 0.0);
   const YAML::Node boxes = node["refine"];
-  if (!boxes.IsDefined() || !yaml_.isList(boxes, "'refine' " + of)) return;
+  if (!boxes.IsDefined() || !yaml_.checkList(boxes, "'refine' " + of)) return;
   for (const auto& entry : boxes) {
     if (!yaml_.openMapping(entry, "box", "a box " + of)) return;
     const Vector3 from = yaml_.vector(entry["from"], Quantity::kLength, "'from' of a box " + of);
     const Vector3 to = yaml_.vector(entry["to"], Quantity::kLength, "'to' of a box " + of);
     if (!(from.array() < to.array()).all()) {
-      yaml_.fail(entry, "a box " + of + " is inside out, expected 'from' below 'to' in x, y and z");
+      yaml_.fail(entry, "a box " + of + " is empty, expected 'from' below 'to' in x, y and z");
     }
     settings.refine.emplace_back(from, to);
   }
@@ -217,7 +219,7 @@ void ScenarioReader::readHand(const YAML::Node& node) {
                                  std::to_string(scenario_.hands[other.value].line));
   }
   hand.role = oneOf(yaml_, node["role"], "'role'" + of, kRoles, Role::kTrainee);
-  hand.kind = oneOf(yaml_, node["kind"], "'kind'" + of, kHandKinds, HandKind::kCoupled);
+  hand.kind = oneOf(yaml_, node["kind"], "'kind'" + of, kHandKinds, simulation::HandKind::kCoupled);
   hand.object = names_.object(node["object"], "'object'" + of);
   hand.stiffness =
       yaml_.numberOr(node["stiffness"], Quantity::kStiffness, "'stiffness'" + of, 1.0, 1e5, hand.stiffness);
@@ -233,4 +235,4 @@ void ScenarioReader::readHand(const YAML::Node& node) {
   if (!yaml_.failed()) scenario_.hands.push_back(hand);
 }
 
-}  // namespace tenon
+}  // namespace tenon::game_control

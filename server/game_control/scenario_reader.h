@@ -10,15 +10,17 @@
 #include "server/game_control/scenario_names.h"
 #include "server/game_control/yaml_reader.h"
 
-namespace tenon {
+namespace tenon::game_control {
 
-/// Reads one scenario file: objects, hands, pairs; then its states by a StateReader.
+/// Reads one scenario file: objects, hands and pairs; the states are read by a ScenarioStateReader.
 ///
 /// Threads: one. Real-time: no.
 class ScenarioReader {
  public:
+  /// `path` names the file in errors; mesh files are relative to its folder. It is not opened.
   explicit ScenarioReader(const std::filesystem::path& path);
 
+  /// Fails with the first error, `file:line: what was wrong, what was expected`. May be called once.
   [[nodiscard]] Result<ScenarioFile> read(std::string_view text);
 
  private:
@@ -28,12 +30,14 @@ class ScenarioReader {
   void readBody(const YAML::Node& node, ScenarioObject& object);  // scenario_bodies.cpp
   void readStructures(const YAML::Node& node, ScenarioObject& object);
   void readHand(const YAML::Node& node);
-  /// Every two objects that can ever touch, one pair each.
+  /// Lists every pair of objects that can ever collide, once.
   void listPairs(const YAML::Node& states);
   void readPair(const YAML::Node& node);
-  void readOff(const YAML::Node& node);
-  [[nodiscard]] std::vector<bool> whoCanMove(const YAML::Node& states) const;
-  [[nodiscard]] std::vector<bool> whoChangesGroup(const YAML::Node& states) const;
+  void readDisabledPair(const YAML::Node& node);
+  /// By object: it is dynamic, tracked or held, or a state lets a hand move it.
+  [[nodiscard]] std::vector<bool> movableObjects(const YAML::Node& states) const;
+  /// By object: a state puts it into another group.
+  [[nodiscard]] std::vector<bool> regroupedObjects(const YAML::Node& states) const;
   void checkClearances();
 
   YamlReader yaml_;
@@ -41,4 +45,4 @@ class ScenarioReader {
   ScenarioNames names_;
 };
 
-}  // namespace tenon
+}  // namespace tenon::game_control

@@ -6,16 +6,16 @@
 
 #include "server/simulation/environment.h"
 
-namespace tenon {
+namespace tenon::game_control {
 namespace {
 
-constexpr std::uint32_t kRetakeTicks = 1000;  // paper §5: 1 s of contact takes a part
-constexpr std::uint32_t kRetakeLapse = 50;
+constexpr std::uint32_t kRegrabTicks = 1000;  // [ticks] paper §5: 1 s of contact grabs a part
+constexpr std::uint32_t kRegrabLapse = 50;    // [ticks] tolerated gap in that contact
 
-/// The Environment, as conditions ask it.
+/// The Environment as a SceneView.
 class EnvironmentView final : public SceneView {
  public:
-  explicit EnvironmentView(const Environment& environment) : environment_(environment) {}
+  explicit EnvironmentView(const simulation::Environment& environment) : environment_(environment) {}
 
   [[nodiscard]] Pose pose(ObjectId object) const noexcept override {
     return environment_.objects()[object.value].X_WO;
@@ -23,30 +23,32 @@ class EnvironmentView final : public SceneView {
   [[nodiscard]] Vector3 force(ObjectId object) const noexcept override {
     return environment_.forceOn(object).force;
   }
-  [[nodiscard]] bool touching(ObjectId a, ObjectId b) const noexcept override {
+  [[nodiscard]] bool inContact(ObjectId a, ObjectId b) const noexcept override {
     return environment_.inContact(a, b);
   }
-  [[nodiscard]] bool touchesAnything(ObjectId object) const noexcept override {
+  [[nodiscard]] bool inAnyContact(ObjectId object) const noexcept override {
     return environment_.objects()[object.value].in_contact;
   }
 
  private:
-  const Environment& environment_;
+  const simulation::Environment& environment_;
 };
 
-/// Who plays a hand of the scenario now: whose own object is that hand's.
-HandId handInRole(const ScenarioFile& scenario, const Environment& environment, HandId role) noexcept {
+/// The hand that currently has the role of a hand of the scenario: after hands were swapped, the one whose
+/// own object is that of the scenario's hand.
+HandId handInRole(const ScenarioFile& scenario, const simulation::Environment& environment,
+                  HandId role) noexcept {
   for (std::uint32_t i = 0; i < scenario.hands.size(); ++i) {
-    if (environment.hands()[i].own == scenario.hands[role.value].object) return HandId{i};
+    if (environment.hands()[i].default_object == scenario.hands[role.value].object) return HandId{i};
   }
   return role;
 }
 
-/// Hands that have taken the object move their own again.
-void releaseFromHands(Environment& environment, ObjectId object) noexcept {
+/// Hands that have grabbed the object release it.
+void releaseFromHands(simulation::Environment& environment, ObjectId object) noexcept {
   for (std::uint32_t i = 0; i < environment.hands().size(); ++i) {
-    const HandMotion& hand = environment.hands()[i];
-    if (hand.object == object && hand.own != object) environment.release(HandId{i});
+    const simulation::HandMotion& hand = environment.hands()[i];
+    if (hand.object == object && hand.default_object != object) environment.release(HandId{i});
   }
 }
 
@@ -56,14 +58,15 @@ StateMachine::StateMachine(std::shared_ptr<const ScenarioFile> scenario) : scena
   assert(!scenario_->states.empty());
 }
 
-void StateMachine::start(Environment& environment) noexcept { enter(environment, 0); }
+void StateMachine::start(simulation::Environment& environment) noexcept { enter(environment, 0); }
 
-void StateMachine::step(Environment& environment, std::span<const GameCommand> commands) noexcept {
+void StateMachine::step(simulation::Environment& environment,
+                        std::span<const GameCommand> commands) noexcept {
   StepStatus& status = memory_.status;
   status.tick = environment.tick();
-  for (const GameCommand& command : commands) obey(environment, command);
+  for (const GameCommand& command : commands) apply(environment, command);
 
-  // a state that ended in the last tick gives way to the next one
+  // the state that ended in the last tick is followed by the next one
   if (status.phase == StepPhase::kWaiting || status.finished || status.failed) return;
   if (status.phase != StepPhase::kActive) {
     enter(environment, status.step + 1);
@@ -73,9 +76,9 @@ void StateMachine::step(Environment& environment, std::span<const GameCommand> c
   const EnvironmentView scene(environment);
   const bool met = memory_.progress.step(state().conditions, scene, commands);
   ++memory_.elapsed;
-  measure(scene);
-  takeAgain(environment, scene);
-  letHelpersTake(environment, scene);
+  updateMeasurements(scene);
+  regrabReleasedPart(environment, scene);
+  grabByHelpers(environment, scene);
   const bool skipped = std::any_of(commands.begin(), commands.end(), [](const GameCommand& command) {
     return command.kind == CommandKind::kSkipStep;
   });
@@ -88,7 +91,7 @@ void StateMachine::step(Environment& environment, std::span<const GameCommand> c
   }
 }
 
-void StateMachine::obey(Environment& environment, const GameCommand& command) noexcept {
+void StateMachine::apply(simulation::Environment& environment, const GameCommand& command) noexcept {
   switch (command.kind) {
     case CommandKind::kRelease:
       if (command.hand.value < scenario_->hands.size()) environment.release(command.hand);
@@ -109,7 +112,7 @@ void StateMachine::obey(Environment& environment, const GameCommand& command) no
   }
 }
 
-void StateMachine::reset(Environment& environment) noexcept {
+void StateMachine::reset(simulation::Environment& environment) noexcept {
   for (std::uint32_t hand = 0; hand < scenario_->hands.size(); ++hand) environment.release(HandId{hand});
   for (std::uint32_t object = 0; object < scenario_->objects.size(); ++object) {
     const ScenarioObject& spec = scenario_->objects[object];
@@ -126,7 +129,7 @@ void StateMachine::reset(Environment& environment) noexcept {
   enter(environment, 0);
 }
 
-void StateMachine::enter(Environment& environment, std::uint32_t step) noexcept {
+void StateMachine::enter(simulation::Environment& environment, std::uint32_t step) noexcept {
   StepStatus& status = memory_.status;
   status.step = step;
   status.phase = StepPhase::kActive;
@@ -137,8 +140,8 @@ void StateMachine::enter(Environment& environment, std::uint32_t step) noexcept 
   memory_.progress.reset();
   memory_.elapsed = 0;
   memory_.contact_ticks = 0;
-  memory_.retake = {};
-  memory_.helping = {};
+  memory_.regrab = {};
+  memory_.helpers = {};
 
   for (const PairSwitch& change : state().pairs) environment.setPairEnabled(change.pair, change.enabled);
   for (const GroupChange& change : state().groups) environment.setGroup(change.object, change.group);
@@ -152,10 +155,10 @@ void StateMachine::enter(Environment& environment, std::uint32_t step) noexcept 
     }
   }
   status.hand = handInRole(*scenario_, environment, state().hand);
-  measure(EnvironmentView(environment));
+  updateMeasurements(EnvironmentView(environment));
 }
 
-void StateMachine::place(Environment& environment, const Placement& placement) noexcept {
+void StateMachine::place(simulation::Environment& environment, const Placement& placement) noexcept {
   const Pose X_WO = placement.X_WO.value_or(environment.objects()[placement.object.value].X_WO);
   releaseFromHands(environment, placement.object);
   const bool has_mass = scenario_->objects[placement.object.value].body.has_value();
@@ -173,45 +176,46 @@ void StateMachine::place(Environment& environment, const Placement& placement) n
   }
 }
 
-void StateMachine::takeAgain(Environment& environment, const SceneView& scene) noexcept {
+void StateMachine::regrabReleasedPart(simulation::Environment& environment, const SceneView& scene) noexcept {
   for (const HandAssignment& assignment : state().hands) {
     const HandId hand = handInRole(*scenario_, environment, assignment.hand);
-    const ObjectId own = environment.hands()[hand.value].own;
+    const ObjectId own = environment.hands()[hand.value].default_object;
     if (assignment.object == own || environment.hands()[hand.value].object != own) continue;
-    memory_.retake.step(scene.touching(own, assignment.object), kRetakeLapse);
-    if (memory_.retake.touched < kRetakeTicks) return;
-    memory_.retake = {};
+    memory_.regrab.step(scene.inContact(own, assignment.object), kRegrabLapse);
+    if (memory_.regrab.contact_ticks < kRegrabTicks) return;
+    memory_.regrab = {};
     environment.grab(hand, assignment.object);
     return;
   }
 }
 
-void StateMachine::letHelpersTake(Environment& environment, const SceneView& scene) noexcept {
+void StateMachine::grabByHelpers(simulation::Environment& environment, const SceneView& scene) noexcept {
   for (std::size_t i = 0; i < state().may_take.size(); ++i) {
     const HandAssignment& helper = state().may_take[i];
     const HandId hand = handInRole(*scenario_, environment, helper.hand);
-    const ObjectId own = environment.hands()[hand.value].own;
-    ContactTimer& timer = memory_.helping[i];
+    const ObjectId own = environment.hands()[hand.value].default_object;
+    ContactTimer& timer = memory_.helpers[i];
     if (environment.hands()[hand.value].object != own) continue;
-    timer.step(scene.touching(own, helper.object), kRetakeLapse);
-    if (timer.touched < kRetakeTicks) continue;
+    timer.step(scene.inContact(own, helper.object), kRegrabLapse);
+    if (timer.contact_ticks < kRegrabTicks) continue;
     timer = {};
     environment.grab(hand, helper.object);
   }
 }
 
-void StateMachine::dismissHelpers(Environment& environment) noexcept {
+void StateMachine::releaseHelpers(simulation::Environment& environment) noexcept {
   for (const HandAssignment& helper : state().may_take) {
     const HandId hand = handInRole(*scenario_, environment, helper.hand);
     if (environment.hands()[hand.value].object == helper.object) environment.release(hand);
   }
 }
 
-void StateMachine::swapHands(Environment& environment) noexcept {
+void StateMachine::swapHands(simulation::Environment& environment) noexcept {
   FixedVector<HandId, 2> hands;
   for (std::uint32_t i = 0; i < scenario_->hands.size(); ++i) {
     const ScenarioHand& hand = scenario_->hands[i];
-    if (hand.role == Role::kTrainee && hand.kind == HandKind::kCoupled) hands.push_back(HandId{i});
+    if (hand.role == Role::kTrainee && hand.kind == simulation::HandKind::kCoupled)
+      hands.push_back(HandId{i});
   }
   if (!hands.full()) return;
   environment.swapHands(hands[0], hands[1]);
@@ -220,7 +224,7 @@ void StateMachine::swapHands(Environment& environment) noexcept {
   ++memory_.status.revision;
 }
 
-void StateMachine::leave(Environment& environment, StepPhase phase) noexcept {
+void StateMachine::leave(simulation::Environment& environment, StepPhase phase) noexcept {
   StepStatus& status = memory_.status;
   status.phase = phase;
   status.changed = environment.tick();
@@ -228,30 +232,30 @@ void StateMachine::leave(Environment& environment, StepPhase phase) noexcept {
   status.failed = phase == StepPhase::kTimedOut && state().on_timeout == TimeoutAction::kFail;
   if (status.failed) return;
   status.finished = status.step + 1 == scenario_->states.size();
-  dismissHelpers(environment);
+  releaseHelpers(environment);
   if (!state().snap) return;
   releaseFromHands(environment, state().object);
   environment.place(state().object, *state().X_WG, ObjectStatus::kFixed);
 }
 
-void StateMachine::measure(const SceneView& scene) noexcept {
+void StateMachine::updateMeasurements(const SceneView& scene) noexcept {
   StepStatus& status = memory_.status;
-  const ScenarioState& asked = state();
+  const ScenarioState& current = state();
   status.position_error = 0.0;
   status.angle_error = 0.0;
-  if (asked.object.valid()) {
-    if (memory_.elapsed > 0 && scene.touchesAnything(asked.object)) ++memory_.contact_ticks;
-    if (asked.X_WG) {
-      const Pose X_WO = scene.pose(asked.object);
-      status.position_error = (X_WO.translation() - asked.X_WG->translation()).norm();
-      status.angle_error = angleBetween(X_WO.rotation(), asked.X_WG->rotation());
+  if (current.object.valid()) {
+    if (memory_.elapsed > 0 && scene.inAnyContact(current.object)) ++memory_.contact_ticks;
+    if (current.X_WG) {
+      const Pose X_WO = scene.pose(current.object);
+      status.position_error = (X_WO.translation() - current.X_WG->translation()).norm();
+      status.angle_error = angleBetween(X_WO.rotation(), current.X_WG->rotation());
     }
   }
   status.contact_seconds = static_cast<double>(memory_.contact_ticks) * kTickSeconds;
-  listReadings();
+  collectReadings();
 }
 
-void StateMachine::listReadings() noexcept {
+void StateMachine::collectReadings() noexcept {
   const std::vector<Condition>& tree = state().conditions;
   memory_.status.conditions.clear();
   for (std::size_t i = 0; i < tree.size(); ++i) {
@@ -259,4 +263,4 @@ void StateMachine::listReadings() noexcept {
   }
 }
 
-}  // namespace tenon
+}  // namespace tenon::game_control

@@ -14,90 +14,95 @@
 #include "server/game_control/game_command.h"
 #include "server/game_control/scenario.h"
 
-namespace tenon {
-
+namespace tenon::simulation {
 class Environment;
+}  // namespace tenon::simulation
 
-/// Where the training is, as of the last tick.
+namespace tenon::game_control {
+
+/// Progress of the training, as of the last tick.
 struct StepStatus {
-  std::uint32_t revision = 0;  ///< raised whenever step or phase changes: publish then
-  std::uint32_t step = 0;
+  std::uint32_t revision = 0;  ///< incremented whenever `step`, `phase` or `hand` changes: publish then
+  std::uint32_t step = 0;      ///< index of the current state
   StepPhase phase = StepPhase::kWaiting;
-  HandId hand;                   ///< that is meant to do it, swapped hands followed
+  HandId hand;                   ///< that shall do it; differs from the scenario's after hands were swapped
   Tick started = 0;              ///< tick of the Environment at which the state began
   Tick changed = 0;              ///< tick of the last revision
-  Tick tick = 0;                 ///< of the Environment when this was measured
-  bool finished = false;         ///< the last state is over
-  bool failed = false;           ///< a state timed out that may not
-  double position_error = 0.0;   ///< [m] of the state's object to its target
-  double angle_error = 0.0;      ///< [rad]
-  double contact_seconds = 0.0;  ///< that the object has been in contact in this state
-  FixedVector<ConditionReading, kMaxConditions> conditions;  ///< groups left out, in file order
+  Tick tick = 0;                 ///< tick of the Environment of the values below
+  bool finished = false;         ///< the last state has ended
+  bool failed = false;           ///< a state timed out whose timeout fails the training
+  double position_error = 0.0;   ///< [m] of the state's object to its target; 0 without a target
+  double angle_error = 0.0;      ///< [rad] likewise
+  double contact_seconds = 0.0;  ///< [s] that the object has been in contact in this state
+  FixedVector<ConditionReading, kMaxConditions> conditions;  ///< of the leaves, in file order
 };
 
-/// Leads the trainee through the scenario's states (paper §3.3) by the calls of the Environment.
+/// The task state machine (paper §3.3): leads the trainee through the scenario's states by calls of the
+/// Environment.
 ///
-/// A state that ends stays visible for one tick as kDone, kSkipped or kTimedOut before the next begins, so
-/// each has a revision that tells how it ended. Skipping a state that snaps puts its object where it belongs:
-/// the next states build on it. Time is counted in calls of step(): while the session is paused nothing times
-/// out.
+/// A state that ends stays current for one tick as kDone, kSkipped or kTimedOut before the next begins, so
+/// each has a revision that tells how it ended. Skipping a state that snaps fixes its object at its target,
+/// because the next states build on it. Time is counted in calls of step(): while the session is paused
+/// nothing times out.
 ///
 /// Threads: one caller, the tick. Real-time: start, step, status, addTo.
 class StateMachine {
  public:
+  /// The scenario has at least one state (assert).
   explicit StateMachine(std::shared_ptr<const ScenarioFile> scenario);
 
   /// Begins the first state.
-  void start(Environment& environment) noexcept;
+  void start(simulation::Environment& environment) noexcept;
 
-  /// One tick, before Environment::step: what the last tick left decides. Takes kFulfilled, kSignal,
-  /// kSkipStep, kRelease, kSetCollision and kReset (all objects and pairs as at the start, first state);
-  /// others are the session's.
-  void step(Environment& environment, std::span<const GameCommand> commands) noexcept;
+  /// One tick, before Environment::step: conditions are evaluated on the result of the last tick. Handles
+  /// kFulfilled, kSignal, kSkipStep, kRelease, kSetCollision, kSwapHands and kReset (all objects, groups and
+  /// pairs as at the start, first state); other commands are the session's.
+  void step(simulation::Environment& environment, std::span<const GameCommand> commands) noexcept;
 
   [[nodiscard]] const StepStatus& status() const { return memory_.status; }
   [[nodiscard]] const ScenarioFile& scenario() const { return *scenario_; }
 
   void addTo(StateHash& hash) const noexcept;
   [[nodiscard]] std::vector<std::uint8_t> save() const;
-  /// The same at the end of `bytes`: allocates nothing when there is room.
+  /// Appends what save() returns; does not allocate when `bytes` has the capacity.
   void append(std::vector<std::uint8_t>& bytes) const;
+  /// Fails, and changes nothing, when the size is wrong or the saved step does not exist.
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
 
  private:
-  /// All that changes.
+  /// The whole mutable state.
   struct Memory {
     StepStatus status;
     ConditionProgress progress;
     std::uint64_t elapsed = 0;        ///< [ticks] in this state
-    std::uint64_t contact_ticks = 0;  ///< of the state's object
-    ContactTimer retake;              ///< of a part that was let go and the hand that shall move it
-    std::array<ContactTimer, kMostHelpers> helping;  ///< of the hands that may take a part as well
+    std::uint64_t contact_ticks = 0;  ///< [ticks] of the state's object in contact
+    ContactTimer regrab;  ///< between a released part and the own object of the hand that shall move it
+    std::array<ContactTimer, kMaxHelpers> helpers;  ///< between a helping hand's own object and the part
   };
   template <typename Visitor>
   static void visitMemory(Memory& memory, Visitor&& visit);
 
-  void enter(Environment& environment, std::uint32_t step) noexcept;
-  void leave(Environment& environment, StepPhase phase) noexcept;
-  void reset(Environment& environment) noexcept;
-  void obey(Environment& environment, const GameCommand& command) noexcept;
-  void place(Environment& environment, const Placement& placement) noexcept;
-  void takeAgain(Environment& environment, const SceneView& scene) noexcept;
-  void letHelpersTake(Environment& environment, const SceneView& scene) noexcept;
-  void dismissHelpers(Environment& environment) noexcept;
-  void swapHands(Environment& environment) noexcept;
-  void measure(const SceneView& scene) noexcept;
-  void listReadings() noexcept;
+  void enter(simulation::Environment& environment, std::uint32_t step) noexcept;
+  void leave(simulation::Environment& environment, StepPhase phase) noexcept;
+  void reset(simulation::Environment& environment) noexcept;
+  void apply(simulation::Environment& environment, const GameCommand& command) noexcept;
+  void place(simulation::Environment& environment, const Placement& placement) noexcept;
+  void regrabReleasedPart(simulation::Environment& environment, const SceneView& scene) noexcept;
+  void grabByHelpers(simulation::Environment& environment, const SceneView& scene) noexcept;
+  void releaseHelpers(simulation::Environment& environment) noexcept;
+  void swapHands(simulation::Environment& environment) noexcept;
+  void updateMeasurements(const SceneView& scene) noexcept;
+  void collectReadings() noexcept;
   [[nodiscard]] const ScenarioState& state() const { return scenario_->states[memory_.status.step]; }
 
   std::shared_ptr<const ScenarioFile> scenario_;
   Memory memory_;
 };
 
-/// The state as a person is told it. Not real-time: strings.
+/// The current state as displays and recordings show it. Not real-time: strings.
 [[nodiscard]] StepState describe(const ScenarioFile& scenario, const StepStatus& status);
 
-/// How far it is. Not real-time: strings.
+/// Its progress. Not real-time: strings.
 [[nodiscard]] StepProgress progress(const ScenarioFile& scenario, const StepStatus& status);
 
-}  // namespace tenon
+}  // namespace tenon::game_control

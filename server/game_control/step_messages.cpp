@@ -2,7 +2,7 @@
 
 #include "server/game_control/state_machine.h"
 
-namespace tenon {
+namespace tenon::game_control {
 namespace {
 
 std::string textOf(const ScenarioFile& scenario, const Condition& condition) {
@@ -76,4 +76,4 @@ StepProgress progress(const ScenarioFile& scenario, const StepStatus& status) {
   return report;
 }
 
-}  // namespace tenon
+}  // namespace tenon::game_control

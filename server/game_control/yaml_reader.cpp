@@ -9,27 +9,30 @@
 #include <span>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "server/game_control/scenario_keys.h"
 
-namespace tenon {
+namespace tenon::game_control {
 namespace {
 
-struct Unit {
+struct UnitFactor {
   std::string_view name;
-  double si;
+  double si;  ///< [SI unit] one of this unit
 };
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr std::array kLengths{Unit{"m", 1.0}, Unit{"mm", 1e-3}, Unit{"cm", 1e-2}, Unit{"in", 0.0254}};
-constexpr std::array kAngles{Unit{"deg", kDegree}, Unit{"rad", 1.0}};
-constexpr std::array kTimes{Unit{"s", 1.0}, Unit{"ms", 1e-3}, Unit{"min", 60.0}};
-constexpr std::array kForces{Unit{"N", 1.0}};
-constexpr std::array kStiffnesses{Unit{"N/m", 1.0}, Unit{"N/mm", 1e3}};
-constexpr std::array kRotationalStiffnesses{Unit{"Nm/rad", 1.0}};
-constexpr std::array kMasses{Unit{"kg", 1.0}, Unit{"g", 1e-3}};
-constexpr std::array kDensities{Unit{"kg/m3", 1.0}, Unit{"g/cm3", 1e3}};
+constexpr std::array kLengths{UnitFactor{"m", 1.0}, UnitFactor{"mm", 1e-3}, UnitFactor{"cm", 1e-2},
+                              UnitFactor{"in", 0.0254}};
+constexpr std::array kAngles{UnitFactor{"deg", kDegree}, UnitFactor{"rad", 1.0}};
+constexpr std::array kTimes{UnitFactor{"s", 1.0}, UnitFactor{"ms", 1e-3}, UnitFactor{"min", 60.0}};
+constexpr std::array kForces{UnitFactor{"N", 1.0}};
+constexpr std::array kStiffnesses{UnitFactor{"N/m", 1.0}, UnitFactor{"N/mm", 1e3}};
+constexpr std::array kRotationalStiffnesses{UnitFactor{"Nm/rad", 1.0}};
+constexpr std::array kMasses{UnitFactor{"kg", 1.0}, UnitFactor{"g", 1e-3}};
+constexpr std::array kDensities{UnitFactor{"kg/m3", 1.0}, UnitFactor{"g/cm3", 1e3}};
 
-std::span<const Unit> unitsOf(Quantity quantity) {
+std::span<const UnitFactor> unitsOf(Quantity quantity) {
   switch (quantity) {
     case Quantity::kLength:
       return kLengths;
@@ -53,7 +56,7 @@ std::span<const Unit> unitsOf(Quantity quantity) {
   return {};
 }
 
-std::string_view exampleOf(Quantity quantity) {
+std::string_view exampleText(Quantity quantity) {
   switch (quantity) {
     case Quantity::kLength:
       return "a length such as 2 mm or 0.5 m";
@@ -79,17 +82,18 @@ std::string_view exampleOf(Quantity quantity) {
 
 std::string shortened(const std::string& text) {
   constexpr std::size_t kLongest = 40;
-  return text.size() <= kLongest ? text : text.substr(0, kLongest) + "...";
+  if (text.size() <= kLongest) return text;
+  return fmt::format("{}...", std::string_view(text).substr(0, kLongest));
 }
 
-std::string shown(double number) {
+std::string formatted(double number) {
   std::array<char, 32> buffer{};
   const auto end =
       std::to_chars(buffer.data(), buffer.data() + buffer.size(), number, std::chars_format::general, 6);
   return {buffer.data(), end.ptr};
 }
 
-/// "2 mm" in SI; nothing when it is no number, has an unknown unit or needs one.
+/// "2 mm" in SI; empty when it is no number, or its unit is unknown or missing.
 std::optional<double> parsed(std::string_view text, Quantity quantity) {
   double number = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -97,7 +101,7 @@ std::optional<double> parsed(std::string_view text, Quantity quantity) {
   std::string_view unit(end, static_cast<std::size_t>(text.data() + text.size() - end));
   while (!unit.empty() && unit.front() == ' ') unit.remove_prefix(1);
   if (unit.empty()) return quantity == Quantity::kAngle ? std::nullopt : std::optional(number);
-  for (const Unit& known : unitsOf(quantity)) {
+  for (const UnitFactor& known : unitsOf(quantity)) {
     if (known.name == unit) return number * known.si;
   }
   return std::nullopt;
@@ -124,7 +128,7 @@ bool YamlReader::openMapping(const YAML::Node& node, std::string_view mapping, c
   std::set<std::string> seen;
   for (const auto& entry : node) {
     if (!entry.first.IsScalar()) {
-      fail(entry.first, what + " has a key that is not a word");
+      fail(entry.first, what + " has a key that is not a scalar");
       return false;
     }
     const std::string& key = entry.first.Scalar();
@@ -133,6 +137,11 @@ bool YamlReader::openMapping(const YAML::Node& node, std::string_view mapping, c
       return false;
     }
     if (std::find(keys.begin(), keys.end(), key) != keys.end()) continue;
+    if (const std::string_view now = renamedKey(mapping, key); !now.empty()) {
+      fail(entry.first,
+           what + " has a key with an old name: '" + key + "' is now '" + std::string(now) + "'");
+      return false;
+    }
     const std::string hint = suggestion(key, keys);
     std::string known;
     for (const std::string_view one : keys) known += (known.empty() ? "" : ", ") + std::string(one);
@@ -143,14 +152,14 @@ bool YamlReader::openMapping(const YAML::Node& node, std::string_view mapping, c
   return true;
 }
 
-bool YamlReader::isList(const YAML::Node& node, const std::string& what, std::size_t most) {
+bool YamlReader::checkList(const YAML::Node& node, const std::string& what, std::size_t max_size) {
   if (!node.IsDefined() || !node.IsSequence()) {
     fail(node, what + " must be a list");
     return false;
   }
-  if (node.size() > most) {
-    fail(node, what + " has " + std::to_string(node.size()) + " entries, at most " + std::to_string(most) +
-                   " are allowed");
+  if (node.size() > max_size) {
+    fail(node, what + " has " + std::to_string(node.size()) + " entries, at most " +
+                   std::to_string(max_size) + " are allowed");
     return false;
   }
   return true;
@@ -168,55 +177,54 @@ std::string YamlReader::text(const YAML::Node& node, const std::string& what) {
   return node.Scalar();
 }
 
-bool YamlReader::yesNo(const YAML::Node& node, const std::string& what, bool when_missing) {
-  if (!node.IsDefined()) return when_missing;
-  bool value = when_missing;
+bool YamlReader::boolean(const YAML::Node& node, const std::string& what, bool default_value) {
+  if (!node.IsDefined()) return default_value;
+  bool value = default_value;
   if (!node.IsScalar() || !YAML::convert<bool>::decode(node, value))
     fail(node, what + " must be true or false");
   return value;
 }
 
-std::int64_t YamlReader::integer(const YAML::Node& node, const std::string& what, std::int64_t least,
-                                 std::int64_t most, std::int64_t when_missing) {
-  if (!node.IsDefined()) return when_missing;
+std::int64_t YamlReader::integer(const YAML::Node& node, const std::string& what, std::int64_t min,
+                                 std::int64_t max, std::int64_t default_value) {
+  if (!node.IsDefined()) return default_value;
   std::int64_t value = 0;
   if (node.IsScalar()) {
     const std::string& word = node.Scalar();
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error == std::errc{} && end == word.data() + word.size() && value >= least && value <= most)
+    if (error == std::errc{} && end == word.data() + word.size() && value >= min && value <= max)
       return value;
   }
-  fail(node,
-       what + " must be a whole number between " + std::to_string(least) + " and " + std::to_string(most));
-  return when_missing;
+  fail(node, what + " must be a whole number between " + std::to_string(min) + " and " + std::to_string(max));
+  return default_value;
 }
 
-double YamlReader::number(const YAML::Node& node, Quantity quantity, const std::string& what, double least,
-                          double most) {
+double YamlReader::number(const YAML::Node& node, Quantity quantity, const std::string& what, double min,
+                          double max) {
   if (!node.IsDefined()) {
-    fail(node, what + " is missing, expected " + std::string(exampleOf(quantity)));
-    return least;
+    fail(node, what + " is missing, expected " + std::string(exampleText(quantity)));
+    return min;
   }
   const std::optional<double> value = node.IsScalar() ? parsed(node.Scalar(), quantity) : std::nullopt;
   if (!value) {
     fail(node, what + (node.IsScalar() ? " is '" + shortened(node.Scalar()) + "'" : " is not a number") +
-                   ", expected " + std::string(exampleOf(quantity)));
-    return least;
+                   ", expected " + std::string(exampleText(quantity)));
+    return min;
   }
-  if (*value < least || *value > most) {
+  if (*value < min || *value > max) {
     const std::string_view unit = unitsOf(quantity).empty()      ? ""
                                   : quantity == Quantity::kAngle ? "rad"
                                                                  : unitsOf(quantity)[0].name;
-    fail(node, what + " is " + shortened(node.Scalar()) + ", expected between " + shown(least) + " and " +
-                   shown(most) + (unit.empty() ? "" : " " + std::string(unit)));
-    return least;
+    fail(node, what + " is " + shortened(node.Scalar()) + ", expected between " + formatted(min) + " and " +
+                   formatted(max) + (unit.empty() ? "" : " " + std::string(unit)));
+    return min;
   }
   return *value;
 }
 
-double YamlReader::numberOr(const YAML::Node& node, Quantity quantity, const std::string& what, double least,
-                            double most, double when_missing) {
-  return node.IsDefined() ? number(node, quantity, what, least, most) : when_missing;
+double YamlReader::numberOr(const YAML::Node& node, Quantity quantity, const std::string& what, double min,
+                            double max, double default_value) {
+  return node.IsDefined() ? number(node, quantity, what, min, max) : default_value;
 }
 
 Vector3 YamlReader::vector(const YAML::Node& node, Quantity quantity, const std::string& what) {
@@ -239,7 +247,7 @@ Pose YamlReader::pose(const YAML::Node& mapping, const std::string& what) {
   if (turns.IsDefined() && q.IsDefined()) {
     fail(q, what + " has both 'turn' and 'q', expected one of them");
   } else if (turns.IsDefined()) {
-    X.rotation() = turned(turns, what);
+    X.rotation() = rotations(turns, what);
   } else if (q.IsDefined()) {
     if (!q.IsSequence() || q.size() != 4) {
       fail(q, "'q' of " + what + " must be a list of four numbers [w, x, y, z]");
@@ -248,9 +256,9 @@ Pose YamlReader::pose(const YAML::Node& mapping, const std::string& what) {
     std::array<double, 4> wxyz{};
     for (std::size_t i = 0; i < 4; ++i) wxyz[i] = number(q[i], Quantity::kPlain, "'q' of " + what, -1e3, 1e3);
     const Quaternion given(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
-    constexpr double kUnitWithin = 0.01;  // a typed quaternion has two or three digits
+    constexpr double kUnitWithin = 0.01;  // [-] a typed quaternion has two or three digits
     if (std::abs(given.norm() - 1.0) > kUnitWithin) {
-      fail(q, "'q' of " + what + " has length " + shown(given.norm()) +
+      fail(q, "'q' of " + what + " has length " + formatted(given.norm()) +
                   ", expected a unit quaternion [w, x, y, z]");
       return X;
     }
@@ -259,15 +267,15 @@ Pose YamlReader::pose(const YAML::Node& mapping, const std::string& what) {
   return X;
 }
 
-Quaternion YamlReader::turned(const YAML::Node& turns, const std::string& what) {
-  if (!turns.IsSequence()) return turn(turns, what);
+Quaternion YamlReader::rotations(const YAML::Node& turns, const std::string& what) {
+  if (!turns.IsSequence()) return rotation(turns, what);
   Quaternion q = Quaternion::Identity();
-  if (!isList(turns, "'turn' of " + what, 8)) return q;
-  for (const auto& one : turns) q = (turn(one, what) * q).normalized();
+  if (!checkList(turns, "'turn' of " + what, 8)) return q;
+  for (const auto& one : turns) q = (rotation(one, what) * q).normalized();
   return q;
 }
 
-Quaternion YamlReader::turn(const YAML::Node& node, const std::string& what) {
+Quaternion YamlReader::rotation(const YAML::Node& node, const std::string& what) {
   if (!openMapping(node, "turn", "'turn' of " + what)) return Quaternion::Identity();
   Vector3 axis = Vector3::Zero();
   const YAML::Node given = node["axis"];
@@ -280,12 +288,14 @@ Quaternion YamlReader::turn(const YAML::Node& node, const std::string& what) {
   const double degrees = number(node["deg"], Quantity::kPlain, "'deg' of 'turn' of " + what, -360.0, 360.0);
   if (failed()) return Quaternion::Identity();
   if (axis.norm() < 1e-9) {
-    fail(given, "'axis' of 'turn' of " + what + " has no length");
+    fail(given, "'axis' of 'turn' of " + what + " has length 0");
     return Quaternion::Identity();
   }
-  // expRotation wants at most half a turn
-  const double shorter = degrees > 180.0 ? degrees - 360.0 : degrees < -180.0 ? degrees + 360.0 : degrees;
-  return expRotation(axis.normalized() * (shorter * kDegree));
+  // expRotation takes at most half a turn
+  const double within_half_turn = degrees > 180.0    ? degrees - 360.0
+                                  : degrees < -180.0 ? degrees + 360.0
+                                                     : degrees;
+  return expRotation(axis.normalized() * (within_half_turn * kDegree));
 }
 
-}  // namespace tenon
+}  // namespace tenon::game_control

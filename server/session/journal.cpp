@@ -6,7 +6,7 @@
 #include "idl/wire/codec.h"
 #include "idl/wire/topics.h"
 
-namespace tenon {
+namespace tenon::session {
 namespace {
 
 constexpr std::string_view kMetadata = "tenon journal";
@@ -15,11 +15,11 @@ constexpr std::string_view kScenarioHash = "scenario hash";
 constexpr std::string_view kStructuresOf = "structures of ";
 constexpr std::int64_t kNanosecondsPerTick = 1'000'000;
 
-/// Collects the parts of one tick.
+/// Joins the parts of one tick; parts out of order are dropped.
 template <typename Part>
-class Assembler {
+class PartJoiner {
  public:
-  /// True when `part` was the last one missing; the bytes are whole then.
+  /// True when `part` was the last one: bytes() are complete.
   bool add(const Part& part) {
     if (part.tick != tick_ || part.part == 0) {
       bytes_.clear();
@@ -39,76 +39,78 @@ class Assembler {
   std::vector<std::uint8_t> bytes_;
 };
 
-/// One re-run: the state it is in between messages.
-class Rerunner {
+/// A re-simulation in progress: restores checkpoints, applies inputs and compares hashes, message by message.
+class Resimulator {
  public:
-  explicit Rerunner(Exercise& exercise) : exercise_(exercise) {}
+  explicit Resimulator(SessionSimulation& simulation) : simulation_(simulation) {}
 
-  Result<void> read(const McapMessage& message) {
-    if (message.topic == kTickInput.name) return readInput(message);
-    if (message.topic == kCheckpoint.name) return readCheckpoint(message);
+  Result<void> read(const record::McapMessage& message) {
+    if (message.topic == wire::kTickInput.name) return readInput(message);
+    if (message.topic == wire::kCheckpoint.name) return readCheckpoint(message);
     return {};
   }
-  [[nodiscard]] const RerunReport& report() const { return report_; }
+  [[nodiscard]] const ResimulationReport& report() const { return report_; }
 
  private:
-  Result<void> readInput(const McapMessage& message) {
-    const auto part = decode<TickInputPart>(message.data);
+  Result<void> readInput(const record::McapMessage& message) {
+    const auto part = wire::decode<TickInputPart>(message.data);
     if (!part) return fail(part.error().what);
     if (!inputs_.add(*part)) return {};
     const auto input = readTickInput(inputs_.bytes());
     if (!input) return fail(input.error().what);
-    const Tick expected = exercise_.now() + 1;
+    const Tick expected = simulation_.now() + 1;
     if (input->tick < expected) return {};
     if (input->tick > expected) {
-      in_step_ = false;
+      synchronized_ = false;
       return {};
     }
-    if (!in_step_) return {};
-    exercise_.tick(*input);
+    if (!synchronized_) return {};
+    simulation_.tick(*input);
     compare(input->tick, part->state_hash);
     return {};
   }
 
-  Result<void> readCheckpoint(const McapMessage& message) {
-    const auto part = decode<CheckpointPart>(message.data);
+  Result<void> readCheckpoint(const record::McapMessage& message) {
+    const auto part = wire::decode<CheckpointPart>(message.data);
     if (!part) return fail(part.error().what);
-    if (!checkpoints_.add(*part) || in_step_) return {};
-    if (auto restored = exercise_.restore(checkpoints_.bytes()); !restored) return restored;
+    if (!checkpoints_.add(*part) || synchronized_) return {};
+    if (auto restored = simulation_.restore(checkpoints_.bytes()); !restored) return restored;
     if (report_.compared > 0) ++report_.gaps;
-    in_step_ = true;
+    synchronized_ = true;
     return {};
   }
 
   void compare(Tick tick, std::uint64_t hash) {
     if (report_.compared++ == 0) report_.first = tick;
     report_.last = tick;
-    report_.final_hash = exercise_.hash();
+    report_.final_hash = simulation_.hash();
     if (report_.final_hash != hash && !report_.first_difference) report_.first_difference = tick;
   }
 
-  Exercise& exercise_;
-  Assembler<TickInputPart> inputs_;
-  Assembler<CheckpointPart> checkpoints_;
-  RerunReport report_;
-  bool in_step_ = false;
+  SessionSimulation& simulation_;
+  PartJoiner<TickInputPart> inputs_;
+  PartJoiner<CheckpointPart> checkpoints_;
+  ResimulationReport report_;
+  bool synchronized_ = false;  ///< the simulation is in the state after the last recorded tick
 };
 
 }  // namespace
 
 Result<Journal> Journal::open(const std::filesystem::path& file, const JournalOrigin& origin) {
-  auto writer = McapWriter::open(file);
+  auto writer = record::McapWriter::open(file);
   if (!writer) return fail(writer.error().what);
   Journal journal(std::move(*writer));
-  journal.inputs_ = journal.writer_.addChannel(kTickInput.name, typeName<TickInputPart>(), idlText());
-  journal.checkpoints_ = journal.writer_.addChannel(kCheckpoint.name, typeName<CheckpointPart>(), idlText());
-  std::map<std::string, std::string> made{{"scenario", origin.scenario},
-                                          {"detail", fmt::format("{}", origin.detail)},
-                                          {std::string(kScenarioHash), origin.made_of.scenario}};
-  for (const auto& [object, hash] : origin.made_of.structures)
-    made[std::string(kStructuresOf) + object] = hash;
-  const auto noted = journal.writer_.addMetadata(kMetadata, made);
-  if (!noted) return fail(noted.error().what);
+  journal.input_channel_ =
+      journal.writer_.addChannel(wire::kTickInput.name, wire::typeName<TickInputPart>(), wire::idlText());
+  journal.checkpoint_channel_ =
+      journal.writer_.addChannel(wire::kCheckpoint.name, wire::typeName<CheckpointPart>(), wire::idlText());
+  std::map<std::string, std::string> metadata{{"scenario", origin.scenario},
+                                              {"detail", fmt::format("{}", origin.detail)},
+                                              {std::string(kScenarioHash), origin.fingerprint.scenario}};
+  for (const auto& [object, hash] : origin.fingerprint.structures)
+    metadata[std::string(kStructuresOf) + object] = hash;
+  const auto added = journal.writer_.addMetadata(kMetadata, metadata);
+  if (!added) return fail(added.error().what);
   return journal;
 }
 
@@ -116,74 +118,74 @@ Result<void> Journal::write(const JournalEntry& entry) {
   Result<void> result;
   const auto log_time = static_cast<std::int64_t>(entry.input.tick) * kNanosecondsPerTick;
   const auto put = [&](std::uint16_t channel, const auto& part) {
-    const auto data = encode(part);
+    const auto data = wire::encode(part);
     const auto done = data ? writer_.write(channel, log_time, part.part, *data) : fail(data.error().what);
     if (!done) result = done;
   };
   bytes_.clear();
   appendBytes(entry.input, bytes_);
   forEachPart<TickInputPart>(entry.input.tick, entry.hash, bytes_,
-                             [&](const auto& part) { put(inputs_, part); });
+                             [&](const auto& part) { put(input_channel_, part); });
   if (!entry.checkpoint.empty())
     forEachPart<CheckpointPart>(entry.input.tick, entry.hash, entry.checkpoint,
-                                [&](const auto& part) { put(checkpoints_, part); });
+                                [&](const auto& part) { put(checkpoint_channel_, part); });
   return result;
 }
 
 Result<void> Journal::close(const RunState& run) {
-  const auto noted =
+  const auto added =
       writer_.addMetadata("tenon outcome", {{"reason", run.reason},
                                             {"tick", std::to_string(run.tick)},
                                             {"final hash", fmt::format("{:016x}", run.final_hash)}});
-  if (!noted) return noted;
+  if (!added) return added;
   return writer_.close();
 }
 
-Result<RerunReport> rerun(const std::filesystem::path& file, Exercise& exercise) {
-  auto reader = McapReader::open(file);
+Result<ResimulationReport> resimulate(const std::filesystem::path& file, SessionSimulation& simulation) {
+  auto reader = record::McapReader::open(file);
   if (!reader) return fail(reader.error().what);
-  Rerunner rerunner(exercise);
-  McapMessage message;
+  Resimulator resimulator(simulation);
+  record::McapMessage message;
   while (reader->next(message))
-    if (auto read = rerunner.read(message); !read)
+    if (auto read = resimulator.read(message); !read)
       return fail(fmt::format("{}: {}", file.string(), read.error().what));
-  RerunReport report = rerunner.report();
+  ResimulationReport report = resimulator.report();
   report.problem = reader->problem();
   if (report.compared > 0) return report;
-  return fail(fmt::format("{}: holds no ticks to run again{}", file.string(),
+  return fail(fmt::format("{}: holds no ticks to re-simulate{}", file.string(),
                           report.problem.empty() ? " (was it recorded by 'tenon record' or 'tenon serve'?)"
                                                  : ": " + report.problem));
 }
 
-Result<Fingerprint> madeOf(const std::filesystem::path& file) {
-  auto reader = McapReader::open(file);
+Result<Fingerprint> readFingerprint(const std::filesystem::path& file) {
+  auto reader = record::McapReader::open(file);
   if (!reader) return fail(reader.error().what);
-  Fingerprint made;
+  Fingerprint fingerprint;
   for (const auto& [name, values] : reader->metadata()) {
     if (name != kMetadata && name != kRecordingMetadata) continue;
     for (const auto& [key, value] : values) {
-      if (key == kScenarioHash) made.scenario = value;
-      if (key.starts_with(kStructuresOf)) made.structures[key.substr(kStructuresOf.size())] = value;
+      if (key == kScenarioHash) fingerprint.scenario = value;
+      if (key.starts_with(kStructuresOf)) fingerprint.structures[key.substr(kStructuresOf.size())] = value;
     }
   }
-  // a recorder has heard the scene before the first checkpoint, and nothing else tells it
-  if (!made.structures.empty()) return made;
-  for (McapMessage message; reader->next(message) && message.topic != kCheckpoint.name;) {
-    if (message.topic != kSceneObject.name) continue;
-    const auto object = decode<SceneObject>(message.data);
-    if (object && !object->structure_hash.empty()) made.structures[object->name] = object->structure_hash;
+  // a recording has the structure hashes only in its SceneObject samples, which precede the first checkpoint
+  if (!fingerprint.structures.empty()) return fingerprint;
+  for (record::McapMessage message; reader->next(message) && message.topic != wire::kCheckpoint.name;) {
+    if (message.topic != wire::kSceneObject.name) continue;
+    const auto object = wire::decode<SceneObject>(message.data);
+    if (object && !object->structure_hash.empty())
+      fingerprint.structures[object->name] = object->structure_hash;
   }
-  return made;
+  return fingerprint;
 }
 
-Result<JournalOrigin> originOf(const std::filesystem::path& file) {
-  auto reader = McapReader::open(file);
+Result<JournalOrigin> readJournalOrigin(const std::filesystem::path& file) {
+  auto reader = record::McapReader::open(file);
   if (!reader) return fail(reader.error().what);
   for (const auto& [name, values] : reader->metadata())
     if (name == kMetadata && values.contains("scenario") && values.contains("detail"))
       return JournalOrigin{values.at("scenario"), std::strtod(values.at("detail").c_str(), nullptr), {}};
-  return fail(
-      fmt::format("{}: does not say which scenario it was made with; name it before --rerun", file.string()));
+  return fail(fmt::format("{}: does not name its scenario; give it before --resimulate", file.string()));
 }
 
-}  // namespace tenon
+}  // namespace tenon::session

@@ -8,22 +8,23 @@
 
 #include "idl/record/mcap_writer.h"
 #include "idl/types/result.h"
-#include "server/session/exercise.h"
 #include "server/session/scene_loader.h"
+#include "server/session/session_simulation.h"
 #include "server/session/tick_io.h"
 
-namespace tenon {
+namespace tenon::session {
 
-inline constexpr Tick kCheckpointEvery = 1000;  // [ticks] a second
+inline constexpr Tick kCheckpointEvery = 1000;  // [ticks]
 
-/// What the tick hands to the journal.
+/// What the tick thread hands to the journal thread.
 struct JournalEntry {
   TickInput input;
-  std::uint64_t hash = 0;
-  std::vector<std::uint8_t> checkpoint;  ///< of the state the tick left; empty between checkpoints
+  std::uint64_t hash = 0;                ///< SessionSimulation::hash after the tick
+  std::vector<std::uint8_t> checkpoint;  ///< state after the tick; empty in most ticks
 };
 
-/// Cuts bytes into the numbered parts that fit a sample, and puts them together again.
+/// Splits `bytes` into numbered parts that each fit one sample and calls `emit` for each in order; at least
+/// one part, even for no bytes. `Part` is TickInputPart or CheckpointPart.
 template <typename Part>
 void forEachPart(Tick tick, std::uint64_t hash, std::span<const std::uint8_t> bytes,
                  const std::function<void(const Part&)>& emit) {
@@ -41,50 +42,55 @@ void forEachPart(Tick tick, std::uint64_t hash, std::span<const std::uint8_t> by
   }
 }
 
-/// What a journal was made with: enough to load the same scene again, and to know whether it is the same.
+/// The scene a journal was recorded with: enough to load it again and to detect changes since.
 struct JournalOrigin {
-  std::string scenario;  ///< path
-  double detail = 1.0;   ///< of generated parts
-  Fingerprint made_of;
+  std::string scenario;     ///< path
+  double detail = 1.0;      ///< [-] LoadOptions::detail
+  Fingerprint fingerprint;  ///< empty when readJournalOrigin made it: see readFingerprint
 };
 
-/// The server's own recording on its local disk: every TickInput with the hash of the state it left, and a
-/// Checkpoint a second. An MCAP file like any other recording.
+/// The server's own recording on its local disk, an MCAP file: every TickInput with the state hash after it,
+/// and a checkpoint every kCheckpointEvery ticks.
 ///
-/// Threads: one (journal).
+/// Threads: one (journal). Real-time: no.
 class Journal {
  public:
+  /// Overwrites `file`. Fails when it cannot be written.
   [[nodiscard]] static Result<Journal> open(const std::filesystem::path& file, const JournalOrigin& origin);
   [[nodiscard]] Result<void> write(const JournalEntry& entry);
+  /// Writes the outcome and the file's summary.
   [[nodiscard]] Result<void> close(const RunState& run);
 
  private:
-  explicit Journal(McapWriter writer) : writer_(std::move(writer)) {}
+  explicit Journal(record::McapWriter writer) : writer_(std::move(writer)) {}
 
-  McapWriter writer_;
-  std::uint16_t inputs_ = 0;
-  std::uint16_t checkpoints_ = 0;
+  record::McapWriter writer_;
+  std::uint16_t input_channel_ = 0;
+  std::uint16_t checkpoint_channel_ = 0;
   std::vector<std::uint8_t> bytes_;
 };
 
-/// How a re-run went.
-struct RerunReport {
+/// Result of a re-simulation.
+struct ResimulationReport {
   Tick first = 0, last = 0;  ///< ticks compared
   std::uint64_t compared = 0;
-  std::uint64_t gaps = 0;  ///< places where ticks were missing: taken up again at the next checkpoint
+  std::uint64_t gaps = 0;  ///< ranges of missing ticks, after each of which the next checkpoint was restored
   std::uint64_t final_hash = 0;
-  std::optional<Tick> first_difference;
-  std::string problem;  ///< what was wrong with the file, or empty
+  std::optional<Tick> first_difference;  ///< first tick whose hash differs
+  std::string problem;                   ///< damage found in the file, or empty
 };
 
-/// Runs the ticks of a journal or recording again, from its first checkpoint on, and compares the hash of
-/// every one (DESIGN section 5).
-[[nodiscard]] Result<RerunReport> rerun(const std::filesystem::path& file, Exercise& exercise);
+/// Re-simulates the ticks of a journal or recording, from its first checkpoint on, and compares the state
+/// hash of each. It uses the recorded inputs alone and no clock: budgets chosen by measured time are among
+/// the inputs. A difference is reported and the remaining ticks are compared all the same. Fails when `file`
+/// cannot be read, is of another scenario, or has no tick after a checkpoint.
+[[nodiscard]] Result<ResimulationReport> resimulate(const std::filesystem::path& file,
+                                                    SessionSimulation& simulation);
 
-/// What a journal or a recording from the bus says of the scene it was made with.
-[[nodiscard]] Result<Fingerprint> madeOf(const std::filesystem::path& file);
+/// The fingerprint of the scene that a journal or a recording was made with; empty where it was not recorded.
+[[nodiscard]] Result<Fingerprint> readFingerprint(const std::filesystem::path& file);
 
-/// Fails when the file is no journal.
-[[nodiscard]] Result<JournalOrigin> originOf(const std::filesystem::path& file);
+/// Scenario and detail of a journal. Fails for other recordings, which do not name them.
+[[nodiscard]] Result<JournalOrigin> readJournalOrigin(const std::filesystem::path& file);
 
-}  // namespace tenon
+}  // namespace tenon::session

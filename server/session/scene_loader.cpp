@@ -13,20 +13,20 @@
 
 extern char** environ;
 
-namespace tenon {
+namespace tenon::session {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// A program that was built and installed beside this one.
+/// A program in the folder of the running executable.
 fs::path siblingProgram(const std::string& name) {
   std::error_code ignored;
   return fs::read_symlink("/proc/self/exe", ignored).parent_path() / name;
 }
 
-Result<void> run(const std::vector<std::string>& words) {
+Result<void> run(const std::vector<std::string>& arguments) {
   std::vector<char*> argv;
-  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
+  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
   posix_spawn_file_actions_t silent;
   posix_spawn_file_actions_init(&silent);
@@ -34,41 +34,43 @@ Result<void> run(const std::vector<std::string>& words) {
   pid_t child = 0;
   const int started = posix_spawn(&child, argv[0], &silent, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&silent);
-  if (started != 0) return fail(fmt::format("cannot start {}: is the installation complete?", words[0]));
+  if (started != 0) return fail(fmt::format("cannot start {}: is the installation complete?", arguments[0]));
   int status = 0;
   if (waitpid(child, &status, 0) != child || !WIFEXITED(status) || WEXITSTATUS(status) != 0)
-    return fail(fmt::format("{} did not finish its work", words[0]));
+    return fail(fmt::format("{} failed", arguments[0]));
   return {};
 }
 
-/// Has the parts of a scenario made, unless they are there already.
-Result<fs::path> generatedParts(const ScenarioFile& scenario, const LoadOptions& options) {
+/// The folder of a scenario's generated parts; runs the generator unless the cache is up to date.
+Result<fs::path> generatedParts(const game_control::ScenarioFile& scenario, const LoadOptions& options) {
   const fs::path program = std::getenv("TENON_PARTS") != nullptr ? fs::path(std::getenv("TENON_PARTS"))
                                                                  : siblingProgram("tenon-parts");
   const fs::path folder = options.cache / "parts" / fmt::format("{}-{:.2f}", scenario.name, options.detail);
   std::error_code error;
-  // made by another version of the generator: make them again
-  const bool fresh = fs::exists(folder, error) &&
-                     fs::last_write_time(folder, error) > fs::last_write_time(program, error) && !error;
-  if (fresh) return folder;
+  // parts older than the generator are generated again
+  const bool up_to_date = fs::exists(folder, error) &&
+                          fs::last_write_time(folder, error) > fs::last_write_time(program, error) && !error;
+  if (up_to_date) return folder;
 
-  const fs::path making = folder.string() + fmt::format(".{}", getpid());
-  fs::create_directories(making, error);
-  if (error) return fail(fmt::format("{}: cannot make this folder ({})", making.string(), error.message()));
-  const auto done =
-      run({program.string(), scenario.name, making.string(), "--detail", fmt::format("{}", options.detail)});
+  const fs::path temporary = folder.string() + fmt::format(".{}", getpid());
+  fs::create_directories(temporary, error);
+  if (error)
+    return fail(fmt::format("{}: cannot make this folder ({})", temporary.string(), error.message()));
+  const auto done = run(
+      {program.string(), scenario.name, temporary.string(), "--detail", fmt::format("{}", options.detail)});
   if (!done) return fail(done.error().what);
   fs::remove_all(folder, error);
-  fs::rename(making, folder, error);
+  fs::rename(temporary, folder, error);
   if (error && !fs::exists(folder)) return fail(fmt::format("{}: {}", folder.string(), error.message()));
   return folder;
 }
 
-/// All meshes of an object as files of one unit.
-Result<std::vector<fs::path>> meshFiles(const ScenarioFile& scenario, const ScenarioObject& object,
+/// The mesh files of an object; fails when their units differ.
+Result<std::vector<fs::path>> meshFiles(const game_control::ScenarioFile& scenario,
+                                        const game_control::ScenarioObject& object,
                                         const LoadOptions& options) {
   std::vector<fs::path> files;
-  for (const MeshSource& mesh : object.meshes) {
+  for (const game_control::MeshSource& mesh : object.meshes) {
     if (mesh.unit != object.meshes.front().unit)
       return fail(fmt::format("{}:{}: the meshes of '{}' have different units", scenario.path.string(),
                               object.line, object.name));
@@ -83,55 +85,58 @@ Result<std::vector<fs::path>> meshFiles(const ScenarioFile& scenario, const Scen
   return files;
 }
 
-Result<std::shared_ptr<const HapticStructures>> structuresOf(
-    const ScenarioFile& scenario, ObjectId id, const LoadOptions& options, const LoadProgress& progress,
-    const std::vector<std::shared_ptr<const HapticStructures>>& others) {
-  const ScenarioObject& object = scenario.objects[id.value];
+Result<std::shared_ptr<const structures::HapticStructures>> structuresOf(
+    const game_control::ScenarioFile& scenario, ObjectId id, const LoadOptions& options,
+    const LoadProgress& progress,
+    const std::vector<std::shared_ptr<const structures::HapticStructures>>& others) {
+  const game_control::ScenarioObject& object = scenario.objects[id.value];
   const auto files = meshFiles(scenario, object, options);
   if (!files) return fail(files.error().what);
-  BakeOptions bake;
+  bake::BakeOptions bake;
   bake.voxel = object.structures.voxel;
   bake.refinement = object.structures.refinement;
   bake.points = object.structures.points;
   bake.point_spacing = object.structures.spacing;
-  for (const Eigen::AlignedBox3d& box : refineBoxes(scenario, id, others)) bake.refine.push_back({box});
-  const auto report = [&](double share, std::string_view doing) {
-    if (progress) progress(fmt::format("{}: {}", object.title.front().text, doing), share);
+  for (const Eigen::AlignedBox3d& box : game_control::refineBoxes(scenario, id, others))
+    bake.refine.push_back({box});
+  const auto report = [&](double fraction, std::string_view activity) {
+    if (progress) progress(fmt::format("{}: {}", object.title.front().text, activity), fraction);
     return true;
   };
   const auto file =
-      bakeCached(*files, object.meshes.front().unit, bake, options.cache / "structures", report);
+      bake::bakeCached(*files, object.meshes.front().unit, bake, options.cache / "structures", report);
   if (!file)
     return fail(
         fmt::format("{}:{}: '{}': {}", scenario.path.string(), object.line, object.name, file.error().what));
-  return openStructures(*file);
+  return structures::openStructures(*file);
 }
 
 }  // namespace
 
 Result<LoadedScene> loadScene(const fs::path& path, const LoadOptions& options,
                               const LoadProgress& progress) {
-  auto file = readScenario(path);
+  auto file = game_control::readScenario(path);
   if (!file) return fail(file.error().what);
-  const auto scenario = std::make_shared<const ScenarioFile>(std::move(*file));
+  const auto scenario = std::make_shared<const game_control::ScenarioFile>(std::move(*file));
 
-  std::vector<std::shared_ptr<const HapticStructures>> structures(scenario->objects.size());
-  for (const ObjectId id : bakeOrder(*scenario)) {
-    if (!scenario->objects[id.value].felt) continue;
+  std::vector<std::shared_ptr<const structures::HapticStructures>> structures(scenario->objects.size());
+  for (const ObjectId id : game_control::bakeOrder(*scenario)) {
+    if (!scenario->objects[id.value].collidable) continue;
     auto baked = structuresOf(*scenario, id, options, progress, structures);
     if (!baked) return fail(baked.error().what);
     structures[id.value] = std::move(*baked);
   }
-  auto scene = makeScene(*scenario, std::move(structures));
+  auto scene = game_control::makeScene(*scenario, std::move(structures));
   if (!scene) return fail(scene.error().what);
   return LoadedScene{scenario, std::move(*scene)};
 }
 
 Fingerprint fingerprintOf(const LoadedScene& loaded) {
-  Fingerprint made{fmt::format("{:016x}", loaded.scenario->text_hash), {}};
-  for (const ObjectSpec& object : loaded.scene->objects)
-    if (object.structures != nullptr) made.structures[object.name] = object.structures->info.content_hash;
-  return made;
+  Fingerprint fingerprint{fmt::format("{:016x}", loaded.scenario->text_hash), {}};
+  for (const simulation::ObjectSpec& object : loaded.scene->objects)
+    if (object.structures != nullptr)
+      fingerprint.structures[object.name] = object.structures->info.content_hash;
+  return fingerprint;
 }
 
 std::vector<std::string> changesSince(const Fingerprint& then, const LoadedScene& loaded) {
@@ -142,14 +147,14 @@ std::vector<std::string> changesSince(const Fingerprint& then, const LoadedScene
   for (const auto& [object, hash] : then.structures) {
     const auto found = now.structures.find(object);
     if (found == now.structures.end()) {
-      changes.push_back(fmt::format("'{}' is not in it any more", object));
+      changes.push_back(fmt::format("'{}' was removed", object));
     } else if (found->second != hash) {
       changes.push_back(fmt::format("the structures of '{}'", object));
     }
   }
   if (!then.structures.empty())
     for (const auto& [object, hash] : now.structures)
-      if (!then.structures.contains(object)) changes.push_back(fmt::format("'{}' is new in it", object));
+      if (!then.structures.contains(object)) changes.push_back(fmt::format("'{}' was added", object));
   return changes;
 }
 
@@ -160,4 +165,4 @@ fs::path defaultCache() {
   return fs::temp_directory_path() / "tenon";
 }
 
-}  // namespace tenon
+}  // namespace tenon::session

@@ -12,39 +12,40 @@
 #include "server/game_control/scenario.h"
 #include "server/simulation/scene.h"
 
-namespace tenon {
+namespace tenon::session {
 
 struct LoadOptions {
-  std::filesystem::path cache;  ///< structures and generated parts are kept here
-  double detail = 0.12;         ///< of generated parts, 0..1; 1 is the paper's scene
+  std::filesystem::path cache;  ///< folder of baked structures and generated parts
+  double detail = 0.12;         ///< [-] mesh resolution of generated parts, 0..1; 1 is the scene of the paper
 };
 
-/// What is being done, for a person who waits: "engine bay: signs", 0.4.
-using LoadProgress = std::function<void(std::string_view doing, double share)>;
+/// Called with the current activity, as in "engine bay: signs", and its finished `fraction` [-], 0..1.
+using LoadProgress = std::function<void(std::string_view activity, double fraction)>;
 
-/// Everything of a scenario that a running session only reads.
+/// The constant data of a session.
 struct LoadedScene {
-  std::shared_ptr<const ScenarioFile> scenario;
-  std::shared_ptr<const Scene> scene;
+  std::shared_ptr<const game_control::ScenarioFile> scenario;
+  std::shared_ptr<const simulation::Scene> scene;
 };
 
-/// What a session was made of, to be compared years later. Empty where it is not known.
+/// Identifies scenario and structures of a session, to detect changes before a re-simulation. Empty members
+/// are unknown and compare as unchanged.
 struct Fingerprint {
-  std::string scenario;                           ///< hash of its text
-  std::map<std::string, std::string> structures;  ///< content hash, by name of the object
+  std::string scenario;                           ///< hash of its text, 16 hexadecimal digits
+  std::map<std::string, std::string> structures;  ///< content hash by object name
 };
 
 [[nodiscard]] Fingerprint fingerprintOf(const LoadedScene& loaded);
 
-/// What is not as it was, as a person calls it: "the text of scenario.yaml", "the structures of 'peg'".
+/// The differences in words: "the text of scenario.yaml", "the structures of 'peg'". Empty: none.
 [[nodiscard]] std::vector<std::string> changesSince(const Fingerprint& then, const LoadedScene& now);
 
-/// Reads a scenario, has its parts generated and its meshes baked (both through the cache), and builds the
-/// scene.
+/// Reads a scenario (its YAML file or the folder of it), generates its parts and bakes its meshes unless the
+/// cache has them, and builds the scene. Fails with the first problem, named with file and line where known.
 [[nodiscard]] Result<LoadedScene> loadScene(const std::filesystem::path& scenario, const LoadOptions& options,
                                             const LoadProgress& progress = {});
 
-/// Where programs keep what they can make again: $TENON_CACHE, $XDG_CACHE_HOME/tenon or ~/.cache/tenon.
+/// Folder for data that can be generated again: $TENON_CACHE, $XDG_CACHE_HOME/tenon or ~/.cache/tenon.
 [[nodiscard]] std::filesystem::path defaultCache();
 
-}  // namespace tenon
+}  // namespace tenon::session

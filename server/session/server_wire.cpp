@@ -10,16 +10,16 @@
 #include "idl/types/names.h"
 #include "server/session/scene_loader.h"
 
-namespace tenon {
+namespace tenon::session {
 
 /// A writer and its topic, opened together.
 template <class M>
-struct ServerWire::Out {
-  const Topic<M>& topic;
-  std::optional<Writer<M>> writer;
+struct ServerWire::TopicWriter {
+  const wire::Topic<M>& topic;
+  std::optional<wire::Writer<M>> writer;
 
-  Result<void> open(Partition& partition) {
-    auto opened = Writer<M>::open(partition, topic);
+  Result<void> open(wire::Partition& partition) {
+    auto opened = wire::Writer<M>::open(partition, topic);
     if (!opened) return fail(opened.error().what);
     writer.emplace(std::move(*opened));
     return {};
@@ -27,28 +27,28 @@ struct ServerWire::Out {
 };
 
 struct ServerWire::Writers {
-  Out<SessionAnnounce> announce{kSessionAnnounce, {}};
-  Out<Welcome> welcome{kWelcome, {}};
+  TopicWriter<SessionAnnounce> announce{wire::kSessionAnnounce, {}};
+  TopicWriter<Welcome> welcome{wire::kWelcome, {}};
 
-  Out<WorldFrame> frame_1k{kWorldFrame1k, {}};
-  Out<WorldFrame> frame_100{kWorldFrame100, {}};
-  Out<WorldFrame> frame_30{kWorldFrame30, {}};
-  Out<HandManifold> manifold{kHandManifold, {}};
-  Out<ContactPairs> pairs{kContactPairs100, {}};
-  Out<TickStats> stats{kTickStats100, {}};
-  Out<ObjectSnapshot> snapshot{kObjectSnapshot, {}};
-  Out<SceneObject> object{kSceneObject, {}};
-  Out<StepState> step{kStepState, {}};
-  Out<StepProgress> progress{kStepProgress, {}};
-  Out<RunState> run{kRunState, {}};
-  Out<GrabState> grab{kGrabState, {}};
-  Out<CommandAck> ack{kCommandAck, {}};
-  Out<Guidance> guidance{kGuidance, {}};
-  Out<EventLog> event{kEventLog, {}};
-  Out<ClockSync> clock{kClockSync, {}};
-  Out<EmergencyStop> stop{kEmergencyStop, {}};
-  Out<TickInputPart> input{kTickInput, {}};
-  Out<CheckpointPart> checkpoint{kCheckpoint, {}};
+  TopicWriter<WorldFrame> frame_1k{wire::kWorldFrame1k, {}};
+  TopicWriter<WorldFrame> frame_100{wire::kWorldFrame100, {}};
+  TopicWriter<WorldFrame> frame_30{wire::kWorldFrame30, {}};
+  TopicWriter<HandManifold> manifold{wire::kHandManifold, {}};
+  TopicWriter<ContactPairs> pairs{wire::kContactPairs100, {}};
+  TopicWriter<TickStats> stats{wire::kTickStats100, {}};
+  TopicWriter<ObjectSnapshot> snapshot{wire::kObjectSnapshot, {}};
+  TopicWriter<SceneObject> object{wire::kSceneObject, {}};
+  TopicWriter<StepState> step{wire::kStepState, {}};
+  TopicWriter<StepProgress> progress{wire::kStepProgress, {}};
+  TopicWriter<RunState> run{wire::kRunState, {}};
+  TopicWriter<GrabState> grab{wire::kGrabState, {}};
+  TopicWriter<CommandAck> ack{wire::kCommandAck, {}};
+  TopicWriter<Guidance> guidance{wire::kGuidance, {}};
+  TopicWriter<EventLog> event{wire::kEventLog, {}};
+  TopicWriter<ClockSync> clock{wire::kClockSync, {}};
+  TopicWriter<EmergencyStop> stop{wire::kEmergencyStop, {}};
+  TopicWriter<TickInputPart> input{wire::kTickInput, {}};
+  TopicWriter<CheckpointPart> checkpoint{wire::kCheckpoint, {}};
 
   auto inLobby() { return std::tie(announce, welcome); }
   auto inSession() {
@@ -60,7 +60,7 @@ struct ServerWire::Writers {
 namespace {
 
 template <class Tuple>
-Result<void> openAll(Tuple outs, Partition& partition) {
+Result<void> openAll(Tuple outs, wire::Partition& partition) {
   Result<void> result;
   const auto open = [&](auto& out) {
     if (!result) return;
@@ -76,25 +76,27 @@ std::int64_t nowNanoseconds() {
 
 }  // namespace
 
-ServerWire::ServerWire(const WireOptions& options, std::shared_ptr<Participant> participant, FrontDesk& desk,
-                       Intake& intake, Broadcast& broadcast)
+ServerWire::ServerWire(const WireOptions& options, std::shared_ptr<wire::Participant> participant,
+                       SessionRegistry& registry, InputBuffer& input_buffer, Publisher& publisher)
     : options_(options),
       participant_(std::move(participant)),
-      lobby_(participant_, kLobby, LinkProfile::kLan),
-      session_(participant_, sessionPartition(options.session)),
+      lobby_(participant_, wire::kLobby, wire::LinkProfile::kLan),
+      session_(participant_, wire::sessionPartition(options.session)),
       writers_(std::make_shared<Writers>()),
-      desk_(desk),
-      intake_(intake),
-      broadcast_(broadcast) {}
+      registry_(registry),
+      input_buffer_(input_buffer),
+      publisher_(publisher) {}
 
 Result<std::unique_ptr<ServerWire>> ServerWire::open(const WireOptions& options, const LoadedScene& loaded,
-                                                     FrontDesk& desk, Intake& intake, Broadcast& broadcast) {
-  auto participant =
-      Participant::open({.domain = options.domain,
-                         .profile = options.lockstep ? LinkProfile::kLockstep : LinkProfile::kLan,
-                         .config = {}});
+                                                     SessionRegistry& registry, InputBuffer& input_buffer,
+                                                     Publisher& publisher) {
+  auto participant = wire::Participant::open(
+      {.domain = options.domain,
+       .profile = options.lockstep ? wire::LinkProfile::kLockstep : wire::LinkProfile::kLan,
+       .config = {}});
   if (!participant) return fail(participant.error().what);
-  std::unique_ptr<ServerWire> wire(new ServerWire(options, std::move(*participant), desk, intake, broadcast));
+  std::unique_ptr<ServerWire> wire(
+      new ServerWire(options, std::move(*participant), registry, input_buffer, publisher));
   wire->title_ = loaded.scenario->title.front().text;
   wire->scenario_hash_ = fmt::format("{:016x}", loaded.scenario->text_hash);
   wire->newest_seq_.resize(loaded.scenario->hands.size());
@@ -112,29 +114,32 @@ Result<void> ServerWire::openWriters() {
 
 Result<void> ServerWire::openReaders() {
   Result<void> result;
-  const auto listenTo = [&]<class M>(Partition& partition, const Topic<M>& topic, auto handler) {
+  const auto listenTo = [&]<class M>(wire::Partition& partition, const wire::Topic<M>& topic, auto handler) {
     if (result) result = inbox_.onFrom<M>(partition, topic, handler);
   };
-  listenTo(lobby_, kJoin, [this](const Join& join, const Origin& from) { hear(join, from); });
-  listenTo(session_, kDeviceInput,
-           [this](const DeviceInput& input, const Origin& from) { hear(input, from); });
-  listenTo(session_, kCommand, [this](const Command& command, const Origin& from) { hear(command, from); });
-  listenTo(session_, kClockSync, [this](const ClockSync& sync, const Origin&) { hear(sync); });
-  listenTo(session_, kEmergencyStop,
-           [this](const EmergencyStop& stop, const Origin& from) { hear(stop, from); });
+  listenTo(lobby_, wire::kJoin, [this](const Join& join, const wire::Origin& from) { handle(join, from); });
+  listenTo(session_, wire::kDeviceInput,
+           [this](const DeviceInput& input, const wire::Origin& from) { handle(input, from); });
+  listenTo(session_, wire::kCommand,
+           [this](const Command& command, const wire::Origin& from) { handle(command, from); });
+  listenTo(session_, wire::kClockSync, [this](const ClockSync& sync, const wire::Origin&) { handle(sync); });
+  listenTo(session_, wire::kEmergencyStop,
+           [this](const EmergencyStop& stop, const wire::Origin& from) { handle(stop, from); });
   const auto take = [this](const Result<Change>& change) {
     if (!change) return refuse(change.error().what);
-    intake_.put(*change);
+    input_buffer_.put(*change);
   };
-  listenTo(session_, kForceContribution, [this, take](const ForceContribution& force, const Origin& from) {
-    if (isGenuine(force.client, from, "force")) take(desk_.contribution(force));
-  });
-  listenTo(session_, kExternalPose, [this, take](const ExternalPose& pose, const Origin& from) {
-    if (isGenuine(pose.client, from, "pose")) take(desk_.externalPose(pose));
+  listenTo(session_, wire::kForceContribution,
+           [this, take](const ForceContribution& force, const wire::Origin& from) {
+             if (isGenuine(force.client, from, "force")) take(registry_.validateForceContribution(force));
+           });
+  listenTo(session_, wire::kExternalPose, [this, take](const ExternalPose& pose, const wire::Origin& from) {
+    if (isGenuine(pose.client, from, "pose")) take(registry_.validateExternalPose(pose));
   });
   if (result) {
     result = inbox_.onGoneFrom<Presence>(
-        session_, kPresence, [this](const Presence& gone, const Origin& from) { heardGone(gone, from); });
+        session_, wire::kPresence,
+        [this](const Presence& gone, const wire::Origin& from) { handleGone(gone, from); });
   }
   return result;
 }
@@ -151,42 +156,44 @@ void ServerWire::announce() {
                                           .server_epoch = options_.server_epoch,
                                           .lockstep = options_.lockstep,
                                           .scenario_hash = scenario_hash_,
-                                          .free_hands = desk_.freeHands()});
+                                          .free_hands = registry_.freeHands()});
 }
 
-void ServerWire::listen(std::chrono::nanoseconds timeout) {
+void ServerWire::dispatch(std::chrono::nanoseconds timeout) {
   inbox_.dispatch(timeout);
-  passChanges();
+  forwardChanges();
 }
 
-void ServerWire::passChanges() {
-  if (intake_.room() < kMaxChanges) return;  // the desk keeps them until the tick has caught up
+void ServerWire::forwardChanges() {
+  if (input_buffer_.freeChanges() < kMaxChanges)
+    return;  // they stay in the registry until the tick has caught up
   FixedVector<Change, kMaxChanges> changes;
-  desk_.takeChanges(changes);
-  for (const Change& change : changes) intake_.put(change);
+  registry_.takeChanges(changes);
+  for (const Change& change : changes) input_buffer_.put(change);
 }
 
-void ServerWire::follow(const TickOutput& output) {
+void ServerWire::update(const TickOutput& output) {
   now_ = output.tick;
-  desk_.follow(output.phase, output.emergency_stop);
+  registry_.updatePhase(output.phase, output.emergency_stop);
 }
 
-void ServerWire::note(Severity severity, const std::string& kind, const std::string& text) {
-  send(broadcast_.chronicle().event(severity, kind, text));
-  if (say) say(text);
+void ServerWire::log(Severity severity, const std::string& kind, const std::string& text) {
+  send(publisher_.eventGenerator().makeEvent(severity, kind, text));
+  if (print) print(text);
 }
 
 void ServerWire::refuse(const std::string& why) {
   ++refused_inputs_;
-  constexpr std::size_t kManySentences = 100;
-  if (said_.size() < kManySentences && said_.insert(why).second) note(Severity::kWarning, "refused", why);
+  constexpr std::size_t kMaxLogged = 100;
+  if (logged_refusals_.size() < kMaxLogged && logged_refusals_.insert(why).second)
+    log(Severity::kWarning, "refused", why);
 }
 
-/// Whether the program that took the client's seat wrote this. A sample that claims another's id is refused.
-bool ServerWire::isGenuine(ClientId client, const Origin& from, const std::string& what) {
-  if (desk_.person(client) == nullptr || desk_.isFrom(client, from))
-    return true;     // the desk knows the unknown
-  if (from.known())  // else its writer has gone in the meantime
+/// Whether a sample that names `client` was written by the participant with its seat; if not, refuses it.
+bool ServerWire::isGenuine(ClientId client, const wire::Origin& from, const std::string& what) {
+  if (registry_.findClient(client) == nullptr || registry_.ownsSeat(client, from))
+    return true;     // unknown clients are refused by the registry
+  if (from.known())  // unknown: its writer ended in the meantime
     refuse(
         fmt::format("a {} under the id of client {} came from another program than the one that joined: "
                     "ignored",
@@ -194,14 +201,14 @@ bool ServerWire::isGenuine(ClientId client, const Origin& from, const std::strin
   return false;
 }
 
-/// To a program that goes on as if it had a seat still: it may come back with its token.
-void ServerWire::tellLost(ClientId client, const std::string& why) {
-  constexpr auto kOnceIn = std::chrono::seconds(1);
+/// To a program that still sends although its seat is lost, so that it can rejoin; at most once a second.
+void ServerWire::notifySeatLost(ClientId client, const std::string& why) {
+  constexpr auto kInterval = std::chrono::seconds(1);
   const auto now = std::chrono::steady_clock::now();
-  const auto told = told_lost_.find(client);
-  if (told != told_lost_.end() && now - told->second < kOnceIn) return;
-  told_lost_[client] = now;
-  (void)writers_->welcome.writer->write({.client_guid = desk_.guidOf(client),
+  const auto last = seat_lost_notified_.find(client);
+  if (last != seat_lost_notified_.end() && now - last->second < kInterval) return;
+  seat_lost_notified_[client] = now;
+  (void)writers_->welcome.writer->write({.client_guid = registry_.guidOf(client),
                                          .accepted = false,
                                          .reason = why,
                                          .client = client,
@@ -209,104 +216,106 @@ void ServerWire::tellLost(ClientId client, const std::string& why) {
                                          .tick = now_});
 }
 
-void ServerWire::hear(const Join& join, const Origin& from) {
-  const bool is_new = desk_.people().empty() || join.client_guid.empty() ||
-                      std::none_of(desk_.people().begin(), desk_.people().end(), [&](const Presence& who) {
-                        return who.alive && desk_.guidOf(who.client) == join.client_guid;
-                      });
-  const std::size_t seats = desk_.people().size();
-  const Welcome welcome = desk_.join(join, now_, from);
+void ServerWire::handle(const Join& join, const wire::Origin& from) {
+  const bool is_new =
+      registry_.clients().empty() || join.client_guid.empty() ||
+      std::none_of(registry_.clients().begin(), registry_.clients().end(), [&](const Presence& who) {
+        return who.alive && registry_.guidOf(who.client) == join.client_guid;
+      });
+  const std::size_t seats = registry_.clients().size();
+  const Welcome welcome = registry_.join(join, now_, from);
   (void)writers_->welcome.writer->write(welcome);
   if (!is_new) return;
   for (const HandId hand : welcome.hands)
     if (hand.valid()) newest_seq_[hand.value] = 0;
-  const char* how = desk_.people().size() == seats ? "is here again" : "is here";
-  note(welcome.accepted ? Severity::kInfo : Severity::kWarning, "join",
-       welcome.accepted ? fmt::format("{} ({}) {}", join.name, roleName(join.role), how)
-                        : fmt::format("{} may not join: {}", join.name, welcome.reason));
+  const char* how = registry_.clients().size() == seats ? "has rejoined" : "has joined";
+  log(welcome.accepted ? Severity::kInfo : Severity::kWarning, "join",
+      welcome.accepted ? fmt::format("{} ({}) {}", join.name, roleName(join.role), how)
+                       : fmt::format("{} may not join: {}", join.name, welcome.reason));
   announce();
 }
 
-void ServerWire::hear(const DeviceInput& input, const Origin& from) {
+void ServerWire::handle(const DeviceInput& input, const wire::Origin& from) {
   if (!isGenuine(input.client, from, "device input")) return;
-  const Presence* who = desk_.person(input.client);
-  if (who != nullptr && !who->alive && input.server_epoch == options_.server_epoch)
-    return tellLost(input.client, "it was not heard for too long");
-  const auto reading = desk_.reading(input);
+  const Presence* sender = registry_.findClient(input.client);
+  if (sender != nullptr && !sender->alive && input.server_epoch == options_.server_epoch)
+    return notifySeatLost(input.client, "its process or link was lost");
+  const auto reading = registry_.validateDeviceInput(input);
   if (!reading) return refuse(reading.error().what);
   std::uint32_t& newest = newest_seq_[input.hand.value];
-  if (options_.lockstep && reading->seq == newest && newest == now_) repeat_wish_ = true;
-  if (reading->seq <= newest && newest - reading->seq < 0x80000000U) return;  // overtaken, or heard already
+  if (options_.lockstep && reading->seq == newest && newest == now_) resend_requested_ = true;
+  if (reading->seq <= newest && newest - reading->seq < 0x80000000U) return;  // out of order, or a repetition
   if (options_.lockstep && reading->seq > now_ + 1)
     return dismiss(input.client,
-                   fmt::format("sent the input of tick {} when tick {} was the next, and is taken out: in "
-                               "lockstep an input answers a tick that was heard",
+                   fmt::format("sent the input of tick {} when tick {} was the next, and is removed: in "
+                               "lockstep an input answers a received tick",
                                reading->seq, now_ + 1));
   newest = reading->seq;
-  intake_.put(*reading);
+  input_buffer_.put(*reading);
 }
 
-void ServerWire::hear(const Command& command, const Origin& from) {
+void ServerWire::handle(const Command& command, const wire::Origin& from) {
   if (!isGenuine(command.client, from, "command")) return;
-  if (const CommandAck* again = desk_.answerTo(command)) {
+  if (const CommandAck* again = registry_.previousAck(command)) {
     (void)writers_->ack.writer->write(*again);
     return;
   }
-  const CommandAck ack = desk_.command(command);
+  const CommandAck ack = registry_.handleCommand(command);
   (void)writers_->ack.writer->write(ack);
   if (!ack.accepted) {
-    note(Severity::kWarning, "refused",
-         fmt::format("command of client {}: {}", command.client.value, ack.reason));
+    log(Severity::kWarning, "refused",
+        fmt::format("command of client {}: {}", command.client.value, ack.reason));
   } else if (command.kind == CommandKind::kClearEmergencyStop) {
     endEmergencyStop(command.client, command.text);
   }
 }
 
-/// Whoever stops may leave: the server says it again for late joiners. It hears itself. Anybody may stop, but
-/// going on is a command to be allowed, and devices believe it of the server alone.
-void ServerWire::hear(const EmergencyStop& stop, const Origin& from) {
-  if (from == participant_->origin() || (stop.engaged == stopped_ && stop.engaged)) return;
+/// The server publishes an engaged stop itself, for late joiners and in case its writer leaves, and ignores
+/// its own samples. Any participant may engage the stop; clearing it takes a command by instructor or admin,
+/// and devices accept it from the server alone.
+void ServerWire::handle(const EmergencyStop& stop, const wire::Origin& from) {
+  if (from == participant_->origin() || (stop.engaged == emergency_stop_ && stop.engaged)) return;
   if (!stop.engaged) {
-    if (!stopped_) return;
-    refuse(fmt::format("{} may not clear the emergency stop like that: it takes a command of the instructor",
-                       stop.who));
-    (void)writers_->stop.writer->write({true, "server", "the emergency stop goes on"});
+    if (!emergency_stop_) return;
+    refuse(
+        fmt::format("{} may not clear the emergency stop: it takes a command of the instructor", stop.who));
+    (void)writers_->stop.writer->write({true, "server", "the emergency stop stays engaged"});
     return;
   }
-  stopped_ = true;
-  desk_.emergencyStop(stop);
+  emergency_stop_ = true;
+  registry_.setEmergencyStop(stop);
   (void)writers_->stop.writer->write(stop);
-  note(Severity::kError, "emergency stop", fmt::format("engaged by {}: {}", stop.who, stop.reason));
+  log(Severity::kError, "emergency stop", fmt::format("engaged by {}: {}", stop.who, stop.reason));
 }
 
 void ServerWire::endEmergencyStop(ClientId client, const std::string& reason) {
-  stopped_ = false;
-  const std::string& who = desk_.person(client)->name;
+  emergency_stop_ = false;
+  const std::string& who = registry_.findClient(client)->name;
   (void)writers_->stop.writer->write({false, who, reason});
-  note(Severity::kInfo, "emergency stop", fmt::format("cleared by {}: {}", who, reason));
+  log(Severity::kInfo, "emergency stop", fmt::format("cleared by {}: {}", who, reason));
 }
 
-void ServerWire::hear(const ClockSync& sync) {
-  if (sync.server_sent_ns != 0) return;  // our own answer
+void ServerWire::handle(const ClockSync& sync) {
+  if (sync.server_sent_ns != 0) return;  // the server's own answer
   ClockSync answer = sync;
   answer.server_received_ns = nowNanoseconds();
   answer.server_sent_ns = nowNanoseconds();
   (void)writers_->clock.writer->write(answer);
 }
 
-void ServerWire::heardGone(const Presence& presence, const Origin& from) {
-  if (from.known() && !isGenuine(presence.client, from, "good-bye")) return;
-  dismiss(presence.client, "is gone");
+void ServerWire::handleGone(const Presence& presence, const wire::Origin& from) {
+  if (from.known() && !isGenuine(presence.client, from, "departure notice")) return;
+  dismiss(presence.client, "has left");
 }
 
 void ServerWire::dismiss(ClientId client, const std::string& why) {
-  const Presence* who = desk_.person(client);
-  if (who == nullptr || !who->alive) return;
-  const std::string text = fmt::format("{} ({}) {}", who->name, roleName(who->role), why);
-  desk_.leave(client);
-  tellLost(client, why);
-  note(Severity::kWarning, "leave", text);
-  passChanges();
+  const Presence* leaver = registry_.findClient(client);
+  if (leaver == nullptr || !leaver->alive) return;
+  const std::string text = fmt::format("{} ({}) {}", leaver->name, roleName(leaver->role), why);
+  registry_.leave(client);
+  notifySeatLost(client, why);
+  log(Severity::kWarning, "leave", text);
+  forwardChanges();
   announce();
 }
 
@@ -314,19 +323,19 @@ void ServerWire::send(const EventLog& event) { (void)writers_->event.writer->wri
 
 void ServerWire::send(const RunState& run) { (void)writers_->run.writer->write(run); }
 
-void ServerWire::sendAgain() {
+void ServerWire::resendLast() {
   if (last_ == nullptr) return;
   for (const WorldFrame& frame : last_->frames) (void)writers_->frame_1k.writer->write(frame);
   for (const HandManifold* manifold : last_->manifolds) (void)writers_->manifold.writer->write(*manifold);
 }
 
-void ServerWire::send(const Outgoing& outgoing) {
+void ServerWire::send(const OutgoingMessages& outgoing) {
   last_ = &outgoing;
   Writers& to = *writers_;
-  // states first: a frame names the step it belongs to
-  if (outgoing.news.step) (void)to.step.writer->write(*outgoing.news.step);
-  for (const GrabState& grab : outgoing.news.grabs) (void)to.grab.writer->write(grab);
-  for (const ObjectSnapshot& snapshot : outgoing.news.snapshots) (void)to.snapshot.writer->write(snapshot);
+  // the step before the frames, which refer to its revision
+  if (outgoing.events.step) (void)to.step.writer->write(*outgoing.events.step);
+  for (const GrabState& grab : outgoing.events.grabs) (void)to.grab.writer->write(grab);
+  for (const ObjectSnapshot& snapshot : outgoing.events.snapshots) (void)to.snapshot.writer->write(snapshot);
   for (const WorldFrame& frame : outgoing.frames) (void)to.frame_1k.writer->write(frame);
   for (const HandManifold* manifold : outgoing.manifolds) (void)to.manifold.writer->write(*manifold);
   for (const WorldFrame& frame : outgoing.frames_100) (void)to.frame_100.writer->write(frame);
@@ -334,11 +343,11 @@ void ServerWire::send(const Outgoing& outgoing) {
   for (const ContactPairs& pairs : outgoing.pairs) (void)to.pairs.writer->write(pairs);
   if (outgoing.stats) (void)to.stats.writer->write(*outgoing.stats);
   if (outgoing.progress) (void)to.progress.writer->write(*outgoing.progress);
-  for (const EventLog& event : outgoing.news.events) {
+  for (const EventLog& event : outgoing.events.log) {
     (void)to.event.writer->write(event);
-    if (say) say(fmt::format("{}: {}", event.kind, event.text));
+    if (print) print(fmt::format("{}: {}", event.kind, event.text));
   }
-  if (outgoing.news.run) (void)to.run.writer->write(*outgoing.news.run);
+  if (outgoing.events.run) (void)to.run.writer->write(*outgoing.events.run);
 }
 
 void ServerWire::send(const JournalEntry& entry) {
@@ -354,4 +363,4 @@ void ServerWire::send(const JournalEntry& entry) {
                                 [&](const auto& part) { (void)writers_->checkpoint.writer->write(part); });
 }
 
-}  // namespace tenon
+}  // namespace tenon::session

@@ -11,96 +11,110 @@
 
 #include "idl/wire/endpoint.h"
 #include "server/game_control/scenario.h"
-#include "server/session/broadcast.h"
-#include "server/session/front_desk.h"
-#include "server/session/intake.h"
+#include "server/session/input_buffer.h"
 #include "server/session/journal.h"
+#include "server/session/publisher.h"
 #include "server/session/scene_loader.h"
+#include "server/session/session_registry.h"
 
-namespace tenon {
+namespace tenon::session {
 
 struct WireOptions {
-  std::string session;
-  std::uint32_t domain = 0;
+  std::string session;       ///< its name: selects the DDS partition
+  std::uint32_t domain = 0;  ///< DDS domain
   bool lockstep = false;
-  bool publish_journal = true;
+  bool publish_journal = true;  ///< TickInput and Checkpoint are published too
   std::uint32_t server_epoch = 0;
 };
 
-/// The server's mouth and ears: every endpoint of a session, bound to the front desk and the intake.
+/// All DDS endpoints of a session's server, bound to its registry and input buffer.
 ///
-/// Threads: one (wire). Real-time: no.
+/// Every sample that names a client is accepted only from the DDS participant that has this client's seat.
+/// Samples that cannot be written are dropped: a topic's QoS class says what its readers may rely on.
+///
+/// Threads: one (wire); send(JournalEntry) from one thread, which may be another; wake from any.
+/// Real-time: wake alone.
 class ServerWire {
  public:
+  /// Opens all endpoints, publishes the scene and announces the session. Fails when DDS does. The references
+  /// must outlive the object.
   [[nodiscard]] static Result<std::unique_ptr<ServerWire>> open(const WireOptions& options,
-                                                                const LoadedScene& loaded, FrontDesk& desk,
-                                                                Intake& intake, Broadcast& broadcast);
+                                                                const LoadedScene& loaded,
+                                                                SessionRegistry& registry,
+                                                                InputBuffer& input_buffer,
+                                                                Publisher& publisher);
 
-  /// Hears what there is, waiting for it up to `timeout`; what the desk decided goes into the intake.
-  void listen(std::chrono::nanoseconds timeout);
+  /// Handles all received samples, waiting up to `timeout` for the first, and forwards the registry's changes
+  /// to the input buffer.
+  void dispatch(std::chrono::nanoseconds timeout);
+  /// Ends the waiting of dispatch().
   void wake() noexcept { inbox_.wake(); }
+  /// Publishes SessionAnnounce; to be repeated when the free hands change.
   void announce();
-  void send(const Outgoing& outgoing);
-  /// The frames and manifolds of the last tick once more, for a client that lost them.
-  void sendAgain();
+  void send(const OutgoingMessages& outgoing);
+  /// Repeats frames and manifolds of the last tick for a client that missed them (lockstep).
+  void resendLast();
   void send(const EventLog& event);
   void send(const RunState& run);
+  /// Only to matched readers, and only with `publish_journal`.
   void send(const JournalEntry& entry);
 
-  /// Takes a client out of the session; `why` is what the log says about it.
+  /// Removes a client from the session, tells it so and logs `why`, which continues "Ada (trainee) ...".
   void dismiss(ClientId client, const std::string& why);
-  /// The newest seq heard of a hand; 0: none yet.
+  /// The newest DeviceSample::seq received for a hand; 0: none yet.
   [[nodiscard]] std::uint32_t newestSeq(HandId hand) const { return newest_seq_[hand.value]; }
-  /// True once after a client repeated an input that was answered already: its answer was lost.
-  [[nodiscard]] bool takeRepeatWish() { return std::exchange(repeat_wish_, false); }
+  /// True once after a client repeated the input of the last tick, so its answer was lost (lockstep).
+  [[nodiscard]] bool takeResendRequest() { return std::exchange(resend_requested_, false); }
   [[nodiscard]] std::uint64_t refusedInputs() const { return refused_inputs_; }
-  void follow(const TickOutput& output);
+  /// Tick and phase of `output` decide about what is received from now on.
+  void update(const TickOutput& output);
 
-  std::function<void(const std::string&)> say;
+  /// Receives a line for each log entry, for the server's terminal; may be empty.
+  std::function<void(const std::string&)> print;
 
  private:
-  ServerWire(const WireOptions& options, std::shared_ptr<Participant> participant, FrontDesk& desk,
-             Intake& intake, Broadcast& broadcast);
+  ServerWire(const WireOptions& options, std::shared_ptr<wire::Participant> participant,
+             SessionRegistry& registry, InputBuffer& input_buffer, Publisher& publisher);
 
   template <class M>
-  struct Out;
+  struct TopicWriter;
   struct Writers;
 
   Result<void> openWriters();
   Result<void> openReaders();
   void sendScene(const LoadedScene& loaded);
-  void hear(const Join& join, const Origin& from);
-  void hear(const DeviceInput& input, const Origin& from);
-  void hear(const Command& command, const Origin& from);
-  void hear(const ClockSync& sync);
-  void hear(const EmergencyStop& stop, const Origin& from);
-  void heardGone(const Presence& presence, const Origin& from);
-  [[nodiscard]] bool isGenuine(ClientId client, const Origin& from, const std::string& what);
-  void tellLost(ClientId client, const std::string& why);
+  void handle(const Join& join, const wire::Origin& from);
+  void handle(const DeviceInput& input, const wire::Origin& from);
+  void handle(const Command& command, const wire::Origin& from);
+  void handle(const ClockSync& sync);
+  void handle(const EmergencyStop& stop, const wire::Origin& from);
+  void handleGone(const Presence& presence, const wire::Origin& from);
+  [[nodiscard]] bool isGenuine(ClientId client, const wire::Origin& from, const std::string& what);
+  void notifySeatLost(ClientId client, const std::string& why);
   void endEmergencyStop(ClientId client, const std::string& reason);
   void refuse(const std::string& why);
-  void passChanges();
-  void note(Severity severity, const std::string& kind, const std::string& text);
+  void forwardChanges();
+  void log(Severity severity, const std::string& kind, const std::string& text);
 
   WireOptions options_;
-  std::shared_ptr<Participant> participant_;
-  Partition lobby_;
-  Partition session_;
-  Inbox inbox_;
+  std::shared_ptr<wire::Participant> participant_;
+  wire::Partition lobby_;
+  wire::Partition session_;
+  wire::Inbox inbox_;
   std::shared_ptr<Writers> writers_;
-  FrontDesk& desk_;
-  Intake& intake_;
-  Broadcast& broadcast_;
+  SessionRegistry& registry_;
+  InputBuffer& input_buffer_;
+  Publisher& publisher_;
   std::string title_;
   std::string scenario_hash_;
-  std::vector<std::uint32_t> newest_seq_;
-  std::set<std::string> said_;  ///< refusals told once, not a thousand times a second
-  std::map<ClientId, std::chrono::steady_clock::time_point> told_lost_;
+  std::vector<std::uint32_t> newest_seq_;  ///< index = HandId
+  std::set<std::string> logged_refusals_;  ///< each text is logged once, although inputs come at 1 kHz
+  std::map<ClientId, std::chrono::steady_clock::time_point> seat_lost_notified_;  ///< last time
   std::uint64_t refused_inputs_ = 0;
-  bool repeat_wish_ = false;
-  bool stopped_ = false;
+  bool resend_requested_ = false;
+  bool emergency_stop_ = false;  ///< engaged
   Tick now_ = 0;
-  const Outgoing* last_ = nullptr;
+  const OutgoingMessages* last_ = nullptr;  ///< of the last send
 };
 
-}  // namespace tenon
+}  // namespace tenon::session

@@ -13,13 +13,13 @@
 #include "server/session/server_wire.h"
 #include "server/simulation/governor.h"
 
-namespace tenon {
+namespace tenon::session {
 namespace {
 
 using std::chrono::milliseconds;
 using StopWatch = std::chrono::steady_clock;
 
-constexpr auto kPatience = std::chrono::seconds(30);  // for a silent client in lockstep
+constexpr auto kInputTimeout = std::chrono::seconds(30);  // in lockstep, for the input of a client
 
 std::optional<Role> roleNamed(std::string_view name) {
   for (const Role role : {Role::kAdmin, Role::kInstructor, Role::kTrainee, Role::kObserver, Role::kRecorder})
@@ -27,19 +27,21 @@ std::optional<Role> roleNamed(std::string_view name) {
   return std::nullopt;
 }
 
-/// Whom the first step waits for.
-struct Awaited {
+/// Hands and roles that must be present before the first tick.
+struct StartCondition {
   std::vector<HandId> hands;
   std::vector<Role> roles;
 
-  [[nodiscard]] bool areHere(const FrontDesk& desk) const {
-    return std::all_of(hands.begin(), hands.end(), [&](HandId hand) { return desk.moverOf(hand).valid(); }) &&
-           std::all_of(roles.begin(), roles.end(), [&](Role role) { return desk.roleIsHere(role); });
+  [[nodiscard]] bool isMet(const SessionRegistry& registry) const {
+    return std::all_of(hands.begin(), hands.end(),
+                       [&](HandId hand) { return registry.controllerOf(hand).valid(); }) &&
+           std::all_of(roles.begin(), roles.end(), [&](Role role) { return registry.isRolePresent(role); });
   }
 };
 
-Result<Awaited> awaited(const ScenarioFile& scenario, const std::vector<std::string>& names) {
-  Awaited all;
+Result<StartCondition> makeStartCondition(const game_control::ScenarioFile& scenario,
+                                          const std::vector<std::string>& names) {
+  StartCondition all;
   if (names.empty()) all.hands = traineeHands(scenario);
   for (const std::string& name : names) {
     const HandId hand = scenario.handNamed(name);
@@ -55,7 +57,7 @@ Result<Awaited> awaited(const ScenarioFile& scenario, const std::vector<std::str
   return all;
 }
 
-/// Larger in every life of a server, so that clients know frames of an earlier one: quarters of a second.
+/// [0.25 s since 2025] Larger at each start of a server, so that clients recognise frames of an earlier one.
 std::uint32_t newServerEpoch() {
   const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
   constexpr std::int64_t kYear2025 = 1'735'689'600;  // [s] since 1970
@@ -63,7 +65,7 @@ std::uint32_t newServerEpoch() {
                                     since_1970 / milliseconds(250) % 4);
 }
 
-/// Nobody shall guess another one's token.
+/// Not reproducible, so that clients cannot guess each other's tokens.
 std::uint64_t newTokenSeed() {
   std::random_device random;
   return std::uint64_t{random()} << 32U | random();
@@ -71,13 +73,14 @@ std::uint64_t newTokenSeed() {
 
 class Server final : public SessionServer {
  public:
-  Server(const LoadedScene& loaded, SessionOptions options, Awaited awaited, std::uint32_t epoch)
+  Server(const LoadedScene& loaded, SessionOptions options, StartCondition start_condition,
+         std::uint32_t epoch)
       : options_(std::move(options)),
-        awaited_(std::move(awaited)),
-        exercise_(loaded.scenario, loaded.scene, options_.exercise),
-        desk_(*loaded.scenario, epoch, options_.lockstep, newTokenSeed()),
-        intake_(loaded.scenario->hands.size()),
-        broadcast_(loaded.scenario, epoch, options_.lockstep),
+        start_condition_(std::move(start_condition)),
+        simulation_(loaded.scenario, loaded.scene, options_.simulation),
+        registry_(*loaded.scenario, epoch, options_.lockstep, newTokenSeed()),
+        input_buffer_(loaded.scenario->hands.size()),
+        publisher_(loaded.scenario, epoch, options_.lockstep),
         epoch_(epoch),
         governor_(options_.tick_goal) {}
 
@@ -87,10 +90,10 @@ class Server final : public SessionServer {
                                   .lockstep = options_.lockstep,
                                   .publish_journal = options_.publish_journal,
                                   .server_epoch = epoch_},
-                                 loaded, desk_, intake_, broadcast_);
+                                 loaded, registry_, input_buffer_, publisher_);
     if (!wire) return fail(wire.error().what);
     wire_ = std::move(*wire);
-    wire_->say = options_.say;
+    wire_->print = options_.print;
     if (options_.journal.empty()) return {};
     auto journal = Journal::open(options_.journal,
                                  {loaded.scenario->path.string(), options_.detail, fingerprintOf(loaded)});
@@ -100,32 +103,33 @@ class Server final : public SessionServer {
   }
 
   Result<SessionReport> run(const std::atomic<bool>& stop) override {
-    say(fmt::format("session '{}' is open, waiting for people", options_.name));
-    while (!stop && !desk_.stopIsAsked() && !awaited_.areHere(desk_)) wire_->listen(milliseconds(100));
-    if (journal_ || options_.publish_journal) makeRooms();
-    if (!stop) options_.lockstep ? runLockstep(stop) : runByTheClock(stop);
+    print(fmt::format("session '{}' is open, waiting for people", options_.name));
+    while (!stop && !registry_.stopRequested() && !start_condition_.isMet(registry_))
+      wire_->dispatch(milliseconds(100));
+    if (journal_ || options_.publish_journal) fillCheckpointPool();
+    if (!stop) options_.lockstep ? runLockstep(stop) : runRealTime(stop);
     return finish();
   }
 
  private:
   void runLockstep(const std::atomic<bool>& stop);
-  void runByTheClock(const std::atomic<bool>& stop);
+  void runRealTime(const std::atomic<bool>& stop);
   bool awaitInputs(const std::atomic<bool>& stop);
-  void tickByTheClock() noexcept;
+  void realTimeTick() noexcept;
   Result<SessionReport> finish();
   void writeJournal(const JournalEntry& entry);
-  void say(const std::string& text) const {
-    if (options_.say) options_.say(text);
+  void print(const std::string& text) const {
+    if (options_.print) options_.print(text);
   }
 
-  /// One tick: the same in lockstep and by the clock.
+  /// One tick, in lockstep and in real time alike.
   void tick(TickInput& input, TickOutput& output) noexcept {
-    intake_.collect(exercise_.now() + 1, input);
+    input_buffer_.collect(simulation_.now() + 1, input);
     if (new_budget_ && input.changes.push_back({.kind = ChangeKind::kBudget, .value = *new_budget_}))
       new_budget_.reset();
     const auto begin = StopWatch::now();
-    exercise_.tick(input);
-    exercise_.fill(output);
+    simulation_.tick(input);
+    simulation_.fill(output);
     output.stats.compute_seconds = std::chrono::duration<double>(StopWatch::now() - begin).count();
     govern(output.stats.compute_seconds);
     output.stats.late_ticks = late_ticks_;
@@ -135,159 +139,163 @@ class Server final : public SessionServer {
     output.stats.input_age_seconds = oldest * kTickSeconds;
   }
 
-  /// What the clock says changes only the next tick's input.
+  /// Measured time changes nothing but the input of the next tick, so that journals re-simulate.
   void govern(double seconds) noexcept {
     if (options_.lockstep || options_.tick_goal <= 0.0 || new_budget_) return;
-    const Environment& environment = exercise_.environment();
+    const simulation::Environment& environment = simulation_.environment();
     const auto budget =
-        governor_.judge(seconds, environment.work().points_visited, environment.workLimits().points);
+        governor_.update(seconds, environment.work().points_visited, environment.workLimits().points);
     if (budget) new_budget_ = static_cast<double>(*budget);
   }
 
-  void keep(const TickInput& input, std::uint64_t hash, JournalEntry& entry) {
+  void fillEntry(const TickInput& input, std::uint64_t hash, JournalEntry& entry) {
     entry.input = input;
     entry.hash = hash;
     entry.checkpoint.clear();
-    if (input.tick % kCheckpointEvery == 1 && takeRoom(entry)) exercise_.save(entry.checkpoint);
+    if (input.tick % kCheckpointEvery == 1 && acquireCheckpointBuffer(entry))
+      simulation_.save(entry.checkpoint);
   }
 
-  void makeRooms() {
-    while (std::vector<std::uint8_t>* room = rooms_.beginPush()) {
-      room->reserve(exercise_.mostSavedBytes());
-      rooms_.commitPush();
+  void fillCheckpointPool() {
+    while (std::vector<std::uint8_t>* buffer = checkpoint_pool_.beginPush()) {
+      buffer->reserve(simulation_.maxSavedBytes());
+      checkpoint_pool_.commitPush();
     }
   }
-  /// Room for a checkpoint made at start; none when the journal is seconds behind.
-  bool takeRoom(JournalEntry& entry) {
-    std::vector<std::uint8_t>* room = rooms_.front();
-    if (room == nullptr) return false;
-    entry.checkpoint.swap(*room);
+  /// Swaps a preallocated buffer into `entry`; false when the journal thread is seconds behind and has all.
+  bool acquireCheckpointBuffer(JournalEntry& entry) {
+    std::vector<std::uint8_t>* buffer = checkpoint_pool_.front();
+    if (buffer == nullptr) return false;
+    entry.checkpoint.swap(*buffer);
     entry.checkpoint.clear();
-    rooms_.pop();
+    checkpoint_pool_.pop();
     return true;
   }
-  void giveBackRoom(JournalEntry& entry) {
+  void releaseCheckpointBuffer(JournalEntry& entry) {
     if (entry.checkpoint.empty()) return;
-    rooms_.beginPush()->swap(entry.checkpoint);
-    rooms_.commitPush();
+    checkpoint_pool_.beginPush()->swap(entry.checkpoint);
+    checkpoint_pool_.commitPush();
   }
 
   SessionOptions options_;
-  Awaited awaited_;
-  Exercise exercise_;
-  FrontDesk desk_;
-  Intake intake_;
-  Broadcast broadcast_;
+  StartCondition start_condition_;
+  SessionSimulation simulation_;
+  SessionRegistry registry_;
+  InputBuffer input_buffer_;
+  Publisher publisher_;
   std::uint32_t epoch_;
-  Governor governor_;
+  simulation::Governor governor_;
   std::optional<double> new_budget_;  ///< [points] for the next tick's input
   std::unique_ptr<ServerWire> wire_;
   std::optional<Journal> journal_;
   std::optional<std::string> journal_problem_;
   std::uint64_t late_ticks_ = 0;
-  // by the clock
-  SpscQueue<TickOutput> outputs_{64};
-  SpscQueue<JournalEntry> entries_{1024};
-  SpscQueue<std::vector<std::uint8_t>> rooms_{2};  ///< for checkpoints, on their way back to the tick
+  // real time
+  threads::SpscQueue<TickOutput> outputs_{64};
+  threads::SpscQueue<JournalEntry> entries_{1024};
+  threads::SpscQueue<std::vector<std::uint8_t>> checkpoint_pool_{
+      2};  ///< checkpoint buffers, from the journal thread to the tick
   TickInput input_;
-  TickOutput unsent_;
+  TickOutput overflow_output_;  ///< of a tick for which outputs_ is full: not sent
 };
 
 void Server::runLockstep(const std::atomic<bool>& stop) {
   TickInput input;
   JournalEntry entry;
-  TickOutput output = exercise_.makeOutput();
-  while (!stop && !exercise_.over()) {
+  TickOutput output = simulation_.makeOutput();
+  while (!stop && !simulation_.over()) {
     if (!awaitInputs(stop)) break;
     tick(input, output);
-    wire_->follow(output);
-    wire_->send(broadcast_.read(output));
-    keep(input, output.hash, entry);
+    wire_->update(output);
+    wire_->send(publisher_.prepare(output));
+    fillEntry(input, output.hash, entry);
     writeJournal(entry);
-    giveBackRoom(entry);
+    releaseCheckpointBuffer(entry);
   }
 }
 
-/// Waits until somebody moves a hand, and every hand that somebody moves has an input for the next tick.
+/// Waits until a hand is controlled and every controlled hand has an input for the next tick; a client that
+/// is silent for 30 s is removed. Returns early when a stop is requested; false: no further tick.
 bool Server::awaitInputs(const std::atomic<bool>& stop) {
-  while (!stop && !desk_.stopIsAsked() && !desk_.someoneMovesAHand()) wire_->listen(milliseconds(50));
-  const auto next = static_cast<std::uint32_t>(exercise_.now() + 1);
+  while (!stop && !registry_.stopRequested() && !registry_.anyHandControlled())
+    wire_->dispatch(milliseconds(50));
+  const auto next = static_cast<std::uint32_t>(simulation_.now() + 1);
   const auto missing = [&]() -> HandId {
-    for (std::uint32_t i = 0; i < exercise_.environment().hands().size(); ++i)
-      if (desk_.moverOf(HandId{i}).valid() && wire_->newestSeq(HandId{i}) != next) return HandId{i};
+    for (std::uint32_t i = 0; i < simulation_.environment().hands().size(); ++i)
+      if (registry_.controllerOf(HandId{i}).valid() && wire_->newestSeq(HandId{i}) != next) return HandId{i};
     return {};
   };
-  auto deadline = StopWatch::now() + kPatience;
+  auto deadline = StopWatch::now() + kInputTimeout;
   for (HandId late = missing(); late.valid(); late = missing()) {
-    wire_->listen(milliseconds(50));
+    wire_->dispatch(milliseconds(50));
     if (stop) return false;
-    if (wire_->takeRepeatWish()) wire_->sendAgain();
+    if (wire_->takeResendRequest()) wire_->resendLast();
     if (StopWatch::now() < deadline) continue;
-    wire_->dismiss(desk_.moverOf(late), "has been silent for 30 s and is taken out of the session");
-    deadline = StopWatch::now() + kPatience;
+    wire_->dismiss(registry_.controllerOf(late), "has been silent for 30 s and is removed from the session");
+    deadline = StopWatch::now() + kInputTimeout;
   }
   return true;
 }
 
-void Server::tickByTheClock() noexcept {
+void Server::realTimeTick() noexcept {
   TickOutput* output = outputs_.beginPush();
-  tick(input_, output != nullptr ? *output : unsent_);
-  const std::uint64_t hash = output != nullptr ? output->hash : unsent_.hash;
+  tick(input_, output != nullptr ? *output : overflow_output_);
+  const std::uint64_t hash = output != nullptr ? output->hash : overflow_output_.hash;
   if (output != nullptr) outputs_.commitPush();
   if (journal_ || options_.publish_journal) {
     if (JournalEntry* entry = entries_.beginPush()) {
-      keep(input_, hash, *entry);
+      fillEntry(input_, hash, *entry);
       entries_.commitPush();
     }
   }
   wire_->wake();
 }
 
-void Server::runByTheClock(const std::atomic<bool>& stop) {
-  // every slot gets its room now, none in a tick
+void Server::runRealTime(const std::atomic<bool>& stop) {
+  // allocate all slots before the first tick
   for (std::size_t i = 0; i < outputs_.capacity(); ++i) {
-    *outputs_.beginPush() = exercise_.makeOutput();
+    *outputs_.beginPush() = simulation_.makeOutput();
     outputs_.commitPush();
   }
   while (outputs_.front() != nullptr) outputs_.pop();
-  unsent_ = exercise_.makeOutput();
+  overflow_output_ = simulation_.makeOutput();
   std::atomic<bool> over = false;
-  CyclicThread ticker(std::make_shared<SteadyClock>(), {.name = "tick", .fifo_priority = 70},
-                      [&](std::uint64_t) {
-                        if (over) return;  // the last tick is the one that ended it
-                        tickByTheClock();
-                        if (exercise_.over()) over = true;
-                      });
-  std::thread scribe([&] {
+  threads::CyclicThread ticker(std::make_shared<threads::SteadyClock>(),
+                               {.name = "tick", .fifo_priority = 70}, [&](std::uint64_t) {
+                                 if (over) return;  // no tick after the one that ended the run
+                                 realTimeTick();
+                                 if (simulation_.over()) over = true;
+                               });
+  std::thread journal_thread([&] {
     while (true) {
-      const bool last_round = over;  // all ticks are made
+      const bool last_pass = over;  // no further entries will come
       for (JournalEntry* entry = entries_.front(); entry != nullptr; entry = entries_.front()) {
         writeJournal(*entry);
-        giveBackRoom(*entry);
+        releaseCheckpointBuffer(*entry);
         entries_.pop();
       }
-      if (last_round) return;
+      if (last_pass) return;
       std::this_thread::sleep_for(milliseconds(20));
     }
   });
-  if (const std::string missing = lockMemory(); !missing.empty()) say(missing);
+  if (const std::string missing = threads::lockMemory(); !missing.empty()) print(missing);
   ticker.start();
-  if (!ticker.notGranted().empty()) say(ticker.notGranted());
+  if (!ticker.notGranted().empty()) print(ticker.notGranted());
   while (!stop && !over) {
-    wire_->listen(milliseconds(20));
+    wire_->dispatch(milliseconds(20));
     for (TickOutput* output = outputs_.front(); output != nullptr; output = outputs_.front()) {
-      wire_->follow(*output);
+      wire_->update(*output);
       output->stats.late_ticks = ticker.lateTicks();
-      wire_->send(broadcast_.read(*output));
+      wire_->send(publisher_.prepare(*output));
       outputs_.pop();
     }
   }
   ticker.stop();
   late_ticks_ = ticker.lateTicks();
   over = true;
-  scribe.join();
+  journal_thread.join();
   for (TickOutput* output = outputs_.front(); output != nullptr; output = outputs_.front()) {
-    wire_->send(broadcast_.read(*output));
+    wire_->send(publisher_.prepare(*output));
     outputs_.pop();
   }
 }
@@ -297,35 +305,35 @@ void Server::writeJournal(const JournalEntry& entry) {
   if (!journal_ || journal_problem_) return;
   if (auto written = journal_->write(entry); !written) {
     journal_problem_ = written.error().what;
-    say(fmt::format("the journal stops here, the session goes on: {}", *journal_problem_));
+    print(fmt::format("the journal stops here, the session goes on: {}", *journal_problem_));
   }
 }
 
 Result<SessionReport> Server::finish() {
   SessionReport report;
-  report.run.phase = exercise_.over() ? exercise_.phase() : RunPhase::kStopped;
-  report.run.tick = exercise_.now();
-  report.run.final_hash = exercise_.hash();
+  report.run.phase = simulation_.over() ? simulation_.phase() : RunPhase::kStopped;
+  report.run.tick = simulation_.now();
+  report.run.final_hash = simulation_.hash();
   report.run.server_epoch = epoch_;
   report.run.reason = report.run.phase == RunPhase::kSucceeded ? "everything is mounted"
                       : report.run.phase == RunPhase::kFailed  ? "a step was not done in time"
                                                                : "stopped";
-  if (!exercise_.over()) wire_->send(report.run);
+  if (!simulation_.over()) wire_->send(report.run);
   report.late_ticks = late_ticks_;
   report.refused_inputs = wire_->refusedInputs();
   report.dropped_outputs = outputs_.dropped();
   if (journal_)
     if (auto closed = journal_->close(report.run); !closed) return fail(closed.error().what);
 
-  // the last words must arrive before the writers go
+  // let reliable samples arrive before the writers are deleted
   const auto until = StopWatch::now() + milliseconds(500);
-  while (StopWatch::now() < until) wire_->listen(milliseconds(50));
+  while (StopWatch::now() < until) wire_->dispatch(milliseconds(50));
   return report;
 }
 
 }  // namespace
 
-std::vector<HandId> traineeHands(const ScenarioFile& scenario) {
+std::vector<HandId> traineeHands(const game_control::ScenarioFile& scenario) {
   std::vector<HandId> hands;
   for (std::uint32_t i = 0; i < scenario.hands.size(); ++i)
     if (scenario.hands[i].role == Role::kTrainee) hands.push_back(HandId{i});
@@ -334,12 +342,13 @@ std::vector<HandId> traineeHands(const ScenarioFile& scenario) {
 
 Result<std::unique_ptr<SessionServer>> SessionServer::open(const LoadedScene& loaded,
                                                            SessionOptions options) {
-  auto whom = awaited(*loaded.scenario, options.wait_for);
-  if (!whom) return fail(whom.error().what);
-  options.exercise.needed_hands = whom->hands;
-  auto server = std::make_unique<Server>(loaded, std::move(options), std::move(*whom), newServerEpoch());
+  auto start_condition = makeStartCondition(*loaded.scenario, options.wait_for);
+  if (!start_condition) return fail(start_condition.error().what);
+  options.simulation.needed_hands = start_condition->hands;
+  auto server =
+      std::make_unique<Server>(loaded, std::move(options), std::move(*start_condition), newServerEpoch());
   if (auto started = server->start(loaded); !started) return fail(started.error().what);
   return server;
 }
 
-}  // namespace tenon
+}  // namespace tenon::session

@@ -9,52 +9,60 @@
 #include <vector>
 
 #include "idl/types/result.h"
-#include "server/session/exercise.h"
 #include "server/session/scene_loader.h"
+#include "server/session/session_simulation.h"
 
-namespace tenon {
+namespace tenon::session {
 
 struct SessionOptions {
-  std::string name = "default";  ///< of the session: clients ask for it
-  std::uint32_t domain = 0;
+  std::string name = "default";  ///< of the session, by which clients find it
+  std::uint32_t domain = 0;      ///< DDS domain
   bool lockstep = false;
-  /// Who must be there before the first step: names of hands and roles (`recorder`, `observer`). Empty: all
-  /// hands of the trainee that the first state needs.
+  /// Names of hands, and roles (`recorder`, `observer`), that must be present before the first tick. Empty:
+  /// all hands of traineeHands.
   std::vector<std::string> wait_for;
-  std::filesystem::path journal;  ///< empty: no journal
-  double detail = 1.0;            ///< noted in the journal
-  bool publish_journal = true;    ///< TickInput and Checkpoint on the bus too
-  /// [s] By the clock, ticks are kept under this by changing their budget; 0: never. A third of the
-  /// millisecond is the operating system's.
+  std::filesystem::path journal;  ///< empty: no journal file
+  double detail = 1.0;            ///< [-] LoadOptions::detail, noted in the journal
+  bool publish_journal = true;    ///< publish TickInput and Checkpoint for recorders
+  /// [s] In real time, the governor keeps the computing time of a tick below this by changing the work
+  /// budget; 0: never. The default leaves 0.3 ms of a tick to the operating system and other threads.
   double tick_goal = 0.7e-3;
-  ExerciseOptions exercise;
-  /// What a person who looks at the server's terminal should know.
-  std::function<void(const std::string&)> say;
+  /// `needed_hands` is set by SessionServer::open.
+  SessionSimulationOptions simulation;
+  /// Receives lines for the server's terminal, from the wire and the journal thread; may be empty.
+  std::function<void(const std::string&)> print;
 };
 
-/// How a session ended.
+/// Outcome of a session.
 struct SessionReport {
   RunState run;
-  std::uint64_t late_ticks = 0;
+  std::uint64_t late_ticks = 0;  ///< started a period or more after they were due
   std::uint64_t refused_inputs = 0;
-  std::uint64_t dropped_outputs = 0;  ///< ticks whose output the wire thread had no room for
+  std::uint64_t dropped_outputs =
+      0;  ///< ticks whose output was not sent: the queue to the wire thread was full
 };
 
-/// One training session on the bus: announces itself, lets people in, runs ticks by the clock or in lockstep,
-/// tells everybody what happened, until the run is over or `stop` is set.
+/// The server of one training session: announces it over DDS, accepts clients, runs ticks in real time or in
+/// lockstep, and publishes the results.
 ///
-/// Threads: run() is the wire thread; in real time it has a tick and a journal thread beside it (DESIGN
-/// section 3).
+/// Threads: open, run and the destructor from one thread. run() uses it as the wire thread; in real time it
+/// starts a tick thread (SCHED_FIFO where granted) and a journal thread, which share SpscQueues with it.
+/// `stop` may be set from any thread. Real-time: no (its tick thread is).
 class SessionServer {
  public:
+  /// Opens all DDS endpoints and the journal. Fails when one cannot be opened, or when `wait_for` names what
+  /// is neither a hand of the scenario nor a role.
   [[nodiscard]] static Result<std::unique_ptr<SessionServer>> open(const LoadedScene& loaded,
                                                                    SessionOptions options);
   virtual ~SessionServer() = default;
 
+  /// Waits for `wait_for`, then runs until the run is over or `stop` is set. Once only. Fails when the
+  /// journal cannot be closed; when writing it fails, `print` reports that and the session continues without
+  /// it.
   [[nodiscard]] virtual Result<SessionReport> run(const std::atomic<bool>& stop) = 0;
 };
 
-/// The hands that a scenario's people must bring by default: every coupled or tracked hand of the trainee.
-[[nodiscard]] std::vector<HandId> traineeHands(const ScenarioFile& scenario);
+/// All hands of the role trainee, coupled and tracked.
+[[nodiscard]] std::vector<HandId> traineeHands(const game_control::ScenarioFile& scenario);
 
-}  // namespace tenon
+}  // namespace tenon::session

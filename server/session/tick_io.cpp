@@ -2,7 +2,7 @@
 
 #include "idl/types/bytes.h"
 
-namespace tenon {
+namespace tenon::session {
 namespace {
 
 void put(ByteWriter& out, const HandReading& reading) {
@@ -62,8 +62,8 @@ Result<TickInput> readTickInput(std::span<const std::uint8_t> bytes) {
   TickInput input;
   in.get(input.tick);
   if (!getList(in, input.readings) || !getList(in, input.changes) || !in.ok() || !in.atEnd())
-    return fail("a tick's input in the journal is damaged (" + std::to_string(bytes.size()) + " bytes)");
+    return fail("the input of a tick in the journal is damaged (" + std::to_string(bytes.size()) + " bytes)");
   return input;
 }
 
-}  // namespace tenon
+}  // namespace tenon::session

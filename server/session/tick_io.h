@@ -9,88 +9,93 @@
 #include "idl/types/result.h"
 #include "server/game_control/state_machine.h"
 
-namespace tenon {
+namespace tenon::session {
 
-/// A fresh reading of one hand's device.
+/// A new device sample of one hand, already validated by the SessionRegistry.
 struct HandReading {
   HandId hand;
   std::uint32_t seq = 0;
-  bool active = true;  ///< false: the station holds its device still
+  bool active = true;  ///< false: the station's safety layer holds its device still
   Pose X_WH;
   Twist V_WH;
-  std::uint32_t buttons = 0;
+  std::uint32_t buttons = 0;  ///< as DeviceSample::buttons
 };
 
+/// Which members of a Change are used is said at each kind. The numbers are part of the journal.
 enum class ChangeKind : std::uint8_t {
-  kAttach,   ///< a client begins to move `hand`
-  kDetach,   ///< nobody moves `hand` any more: what it holds is parked
-  kGame,     ///< a command for the state machine
-  kRelease,  ///< let go of what `hand` holds
-  kPair,     ///< switch pair number `index` on or off (value)
-  kPause,
-  kResume,
-  kHalt,        ///< emergency stop: value 1 engages, 0 clears
-  kContribute,  ///< a force from outside on `object`
-  kPlace,       ///< an outside tracker says where `object` is
-  kStop,
-  kBudget,  ///< ticks may test `value` points from now on; 0: as many as there are
+  kAttach,            ///< a client starts to control `hand`
+  kDetach,            ///< no client controls `hand` any more: the object it holds is parked
+  kGameCommand,       ///< `game` for the state machine
+  kRelease,           ///< `hand` releases the object it holds
+  kEnablePair,        ///< collision pair `index` of the scene: `value` 0 disables, else enables
+  kPause,             ///< of a running session
+  kResume,            ///< of a paused session
+  kSetEmergencyStop,  ///< `value` 0 clears, else engages
+  kContributeForce,   ///< external wrench `F_Oo_W` on `object` from source `index` for `lifetime_ticks`
+  kPlaceObject,       ///< `object` is set to the externally tracked pose `X_WO`
+  kStop,              ///< the run ends
+  kBudget,            ///< from now on a tick may test `value` [points]; 0 or NaN: no limit
 };
 
-/// Something decided outside the tick that the tick takes over.
+/// An input of a tick other than device samples: decided outside the tick, applied at its start.
 struct Change {
-  ChangeKind kind = ChangeKind::kGame;
+  ChangeKind kind = ChangeKind::kGameCommand;
   HandId hand;
   ObjectId object;
-  std::uint32_t index = 0;
-  std::uint32_t lifetime_ticks = 0;
-  double value = 0.0;
-  GameCommand game;
+  std::uint32_t index = 0;           ///< of a collision pair or force source, by kind
+  std::uint32_t lifetime_ticks = 0;  ///< [ticks]
+  double value = 0.0;                ///< [-] or [points], by kind
+  game_control::GameCommand game;
   Wrench F_Oo_W;
   Pose X_WO;
 };
 
-/// [ticks] between the samples of the slow tier.
-inline constexpr Tick kHundredHertz = 10;
+/// [ticks] between samples of the 100 Hz topics.
+inline constexpr Tick kPeriod100Hz = 10;
 
 inline constexpr std::size_t kMaxHands = 16;
 inline constexpr std::size_t kMaxChanges = 16;
 
-/// Exactly what one tick consumes: with the state before it, it decides the state after it, to the last bit.
+/// All inputs of one tick. Together with the state before the tick it determines the state after it, bit for
+/// bit.
 struct TickInput {
   Tick tick = 0;
-  FixedVector<HandReading, kMaxHands> readings;
-  FixedVector<Change, kMaxChanges> changes;
+  FixedVector<HandReading, kMaxHands>
+      readings;                              ///< at most one per hand; none for a hand without a new sample
+  FixedVector<Change, kMaxChanges> changes;  ///< in the order of their application
 };
 
-/// How a pair stands, with its number in the scene.
+/// Contact state of one collision pair.
 struct PairState {
-  std::uint32_t pair = 0;
+  std::uint32_t pair = 0;  ///< index into Scene::pairs
   PairContact contact;
 };
 
-/// Of the collision and configuration matrices, so many cells are told in turn with each slow sample.
-inline constexpr std::size_t kPairsInTurn = kPairsPerSample;
+/// Pairs refreshed round robin with each 100 Hz sample, at most.
+inline constexpr std::size_t kRoundRobinPairs = kPairsPerSample;
 
-/// What one tick leaves for everybody outside it. Sized once by Exercise::makeOutput; filled without
-/// allocating.
+/// All outputs of one tick. Sized once by SessionSimulation::makeOutput; filled without allocating.
 struct TickOutput {
   Tick tick = 0;
-  std::uint64_t hash = 0;
+  std::uint64_t hash = 0;  ///< SessionSimulation::hash after the tick
   RunPhase phase = RunPhase::kWaitingForPeople;
   bool emergency_stop = false;
-  StepStatus step;
-  std::vector<ObjectState> objects;
-  std::vector<HandManifold> manifolds;  ///< index = HandId
-  std::vector<bool> present;            ///< index = HandId: a client moves this hand
-  std::vector<std::uint32_t> ages;      ///< index = HandId: ticks since its last reading
-  std::vector<PairState> pairs;         ///< those that list contacts; no others press
-  /// Whatever they do, in turn: all of a scene within a second, or as many as fit.
-  FixedVector<PairState, kPairsInTurn> pairs_in_turn;
+  game_control::StepStatus step;
+  std::vector<ObjectState> objects;     ///< index = ObjectId
+  std::vector<HandManifold> manifolds;  ///< index = HandId; valid where `present`
+  std::vector<bool> present;            ///< index = HandId: a client controls this hand and sends input
+  std::vector<std::uint32_t> ages;      ///< [ticks] index = HandId: since the last device sample
+  std::vector<PairState> pairs;         ///< pairs with a contact list; all others exert no force
+  /// Every tenth tick: the next pairs in order of their index, touching or not. All pairs of a scene of up to
+  /// 100 * kRoundRobinPairs are refreshed within a second.
+  FixedVector<PairState, kRoundRobinPairs> round_robin_pairs;
   TickStats stats;
 };
 
-/// The bytes of a TickInput in a journal, and back. Reading refuses anything that is not exactly one.
+/// Appends the journal's binary form of `input` (ByteWriter, native byte order) to `bytes`.
 void appendBytes(const TickInput& input, std::vector<std::uint8_t>& bytes);
+/// Reads what appendBytes wrote. Fails when `bytes` are truncated, have a rest, or a list exceeds its
+/// capacity.
 [[nodiscard]] Result<TickInput> readTickInput(std::span<const std::uint8_t> bytes);
 
-}  // namespace tenon
+}  // namespace tenon::session

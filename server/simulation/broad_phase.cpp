@@ -4,10 +4,10 @@
 #include <limits>
 #include <numeric>
 
-namespace tenon {
+namespace tenon::simulation {
 
 BroadPhase::BroadPhase(const Scene& scene)
-    : shadows_(scene.objects.size()),
+    : intervals_(scene.objects.size()),
       order_(scene.objects.size()),
       first_pair_(scene.objects.size() * scene.objects.size(), kNone),
       next_pair_(scene.pairs.size(), kNone) {
@@ -24,29 +24,29 @@ BroadPhase::BroadPhase(const Scene& scene)
   }
 }
 
-void BroadPhase::place(ObjectId object, const Vector3& p_WC, double radius) noexcept {
-  shadows_[object.value].p_WC = p_WC;
-  shadows_[object.value].radius = radius;
-  shadows_[object.value].there = true;
+void BroadPhase::setSphere(ObjectId object, const Vector3& p_WC, double radius) noexcept {
+  intervals_[object.value].p_WC = p_WC;
+  intervals_[object.value].radius = radius;
+  intervals_[object.value].present = true;
 }
 
-void BroadPhase::hide(ObjectId object) noexcept { shadows_[object.value].there = false; }
+void BroadPhase::remove(ObjectId object) noexcept { intervals_[object.value].present = false; }
 
-std::span<const std::uint32_t> BroadPhase::find(double reach) noexcept {
+std::span<const std::uint32_t> BroadPhase::findPairs(double margin) noexcept {
   found_.clear();
-  // what rounding may take from a sum of coordinates is given back
+  // [m] covers rounding errors of the sums of coordinates
   constexpr double kRounding = 1e-9;
-  const double pad = 0.5 * (reach + largest_dilation_) + kRounding;
-  for (Shadow& shadow : shadows_) {
-    shadow.low = shadow.p_WC.x() - shadow.radius - pad;
-    shadow.high = shadow.p_WC.x() + shadow.radius + pad;
-    if (!shadow.there) shadow.low = std::numeric_limits<double>::infinity();
+  const double pad = 0.5 * (margin + largest_dilation_) + kRounding;
+  for (Interval& interval : intervals_) {
+    interval.low = interval.p_WC.x() - interval.radius - pad;
+    interval.high = interval.p_WC.x() + interval.radius + pad;
+    if (!interval.present) interval.low = std::numeric_limits<double>::infinity();
   }
   sort();
-  for (std::size_t i = 0; i < order_.size() && shadows_[order_[i]].there; ++i) {
-    const double high = shadows_[order_[i]].high;
-    for (std::size_t j = i + 1; j < order_.size() && shadows_[order_[j]].low <= high; ++j) {
-      meet(order_[i], order_[j], reach);
+  for (std::size_t i = 0; i < order_.size() && intervals_[order_[i]].present; ++i) {
+    const double high = intervals_[order_[i]].high;
+    for (std::size_t j = i + 1; j < order_.size() && intervals_[order_[j]].low <= high; ++j) {
+      addPairsOf(order_[i], order_[j], margin);
     }
   }
   std::sort(found_.begin(), found_.end());
@@ -55,32 +55,34 @@ std::span<const std::uint32_t> BroadPhase::find(double reach) noexcept {
 
 void BroadPhase::sort() noexcept {
   const auto before = [this](std::uint32_t one, std::uint32_t other) {
-    const double low = shadows_[one].low;
-    const double other_low = shadows_[other].low;
+    const double low = intervals_[one].low;
+    const double other_low = intervals_[other].low;
     return low != other_low ? low < other_low : one < other;
   };
   for (std::size_t i = 1; i < order_.size(); ++i) {
-    const std::uint32_t moving = order_[i];
-    std::size_t place = i;
-    for (; place > 0 && before(moving, order_[place - 1]); --place) order_[place] = order_[place - 1];
-    order_[place] = moving;
+    const std::uint32_t inserted = order_[i];
+    std::size_t position = i;
+    for (; position > 0 && before(inserted, order_[position - 1]); --position) {
+      order_[position] = order_[position - 1];
+    }
+    order_[position] = inserted;
   }
 }
 
-void BroadPhase::meet(std::uint32_t one, std::uint32_t other, double reach) noexcept {
+void BroadPhase::addPairsOf(std::uint32_t one, std::uint32_t other, double margin) noexcept {
   std::int32_t pair = firstPair(one, other);
   if (pair == kNone) return;
-  const Shadow& a = shadows_[one];
-  const Shadow& b = shadows_[other];
+  const Interval& a = intervals_[one];
+  const Interval& b = intervals_[other];
   const double gap = (a.p_WC - b.p_WC).norm() - a.radius - b.radius;
   for (; pair != kNone; pair = next_pair_[static_cast<std::size_t>(pair)]) {
     const auto index = static_cast<std::size_t>(pair);
-    if (gap - dilations_[index] <= reach) found_.push_back(static_cast<std::uint32_t>(pair));
+    if (gap - dilations_[index] <= margin) found_.push_back(static_cast<std::uint32_t>(pair));
   }
 }
 
 std::int32_t& BroadPhase::firstPair(std::uint32_t one, std::uint32_t other) {
-  return first_pair_[std::min(one, other) * shadows_.size() + std::max(one, other)];
+  return first_pair_[std::min(one, other) * intervals_.size() + std::max(one, other)];
 }
 
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -8,48 +8,50 @@
 #include "idl/types/spatial.h"
 #include "server/simulation/scene.h"
 
-namespace tenon {
+namespace tenon::simulation {
 
-/// Finds the pairs whose two balls come near each other, of however many there are: a sweep along x over
-/// the balls' shadows, kept sorted from tick to tick (bodies hardly overtake each other in a millisecond).
+/// Broad phase by sweep and prune along x: finds the pairs whose bounding spheres are near each other. The
+/// interval order is kept from tick to tick and repaired by insertion sort.
 ///
-/// Equal ends are sorted by id, so the order is a function of the poses alone: it needs no place in a
-/// snapshot, and the answer is the same in every run.
+/// Intervals with equal lower ends are ordered by id, so the order depends on the poses only: it is not part
+/// of a checkpoint, and the result is the same in every run.
 ///
 /// Threads: one at a time. Real-time: everything but the constructor.
 class BroadPhase {
  public:
   explicit BroadPhase(const Scene& scene);
 
-  /// Where the object's surface is: within `radius` of p_WC.
-  void place(ObjectId object, const Vector3& p_WC, double radius) noexcept;
-  /// The object meets nobody until it is placed again.
-  void hide(ObjectId object) noexcept;
+  /// The object's bounding sphere: its surface is within `radius` [m] of p_WC.
+  void setSphere(ObjectId object, const Vector3& p_WC, double radius) noexcept;
+  /// The object is in no result until its sphere is set again.
+  void remove(ObjectId object) noexcept;
 
-  /// The pairs whose surfaces, dilated, may be within `reach` [m] of each other, in order of their index.
-  [[nodiscard]] std::span<const std::uint32_t> find(double reach) noexcept;
+  /// Indices, in ascending order, of the pairs whose spheres are at most `margin` [m] plus the pair's
+  /// dilation apart. Valid until the next call.
+  [[nodiscard]] std::span<const std::uint32_t> findPairs(double margin) noexcept;
 
  private:
   static constexpr std::int32_t kNone = -1;
 
-  struct Shadow {
+  struct Interval {
     Vector3 p_WC = Vector3::Zero();
-    double radius = 0.0;
-    double low = 0.0, high = 0.0;  ///< along x, widened by half of what is near
-    bool there = false;
+    double radius = 0.0;           ///< [m]
+    double low = 0.0, high = 0.0;  ///< [m] ends along x, padded by half of margin and largest dilation
+    bool present = false;
   };
 
   void sort() noexcept;
-  void meet(std::uint32_t one, std::uint32_t other, double reach) noexcept;
+  /// Adds the pairs of two objects whose spheres are within `margin` [m].
+  void addPairsOf(std::uint32_t one, std::uint32_t other, double margin) noexcept;
   [[nodiscard]] std::int32_t& firstPair(std::uint32_t one, std::uint32_t other);
 
-  std::vector<Shadow> shadows_;           // by object
-  std::vector<std::uint32_t> order_;      // objects by low end
-  std::vector<std::int32_t> first_pair_;  // by two objects
-  std::vector<std::int32_t> next_pair_;   // by pair: another one of the same two objects
-  std::vector<double> dilations_;         // by pair
+  std::vector<Interval> intervals_;       // by object
+  std::vector<std::uint32_t> order_;      // objects, by lower end
+  std::vector<std::int32_t> first_pair_;  // by two objects: row of the smaller id
+  std::vector<std::int32_t> next_pair_;   // by pair: next pair of the same two objects
+  std::vector<double> dilations_;         // [m] by pair
   std::vector<std::uint32_t> found_;
-  double largest_dilation_ = 0.0;
+  double largest_dilation_ = 0.0;  // [m]
 };
 
-}  // namespace tenon
+}  // namespace tenon::simulation

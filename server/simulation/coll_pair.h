@@ -11,25 +11,26 @@
 #include "idl/types/fixed_vector.h"
 #include "idl/types/ids.h"
 #include "server/collision/island_solver.h"
-#include "server/simulation/contact_rooms.h"
+#include "server/simulation/contact_list_pool.h"
 #include "server/simulation/scene.h"
 #include "server/simulation/work_limits.h"
 
-namespace tenon {
+namespace tenon::simulation {
 
-/// What the simulation knows about two objects that may touch (paper §3.2, ii): whether the pair is on, when
-/// it has to be looked at again, and what the last look found.
+/// The state of a collision pair (paper §3.2, ii): enabled or not, the tick of its next query, and the result
+/// of the last one.
 ///
-/// Spatio-temporal coherence: no point of either object travels faster than the enforced cap, so a pair with
-/// a smallest gap g has nothing to say for g / (v_a + v_b). When that is over, the way that the two have
-/// really gone since often puts it off again. A declared jump ends all that at once.
+/// Spatio-temporal coherence: no point of either object moves faster than its enforced speed cap, so a pair
+/// with smallest gap g cannot be in contact for g / (v_a + v_b). At the end of that time the path that the
+/// two have actually moved usually allows postponing the query again. A discontinuous pose change resets the
+/// pair.
 ///
-/// When a look at all levels of the shell costs more than its share of a tick, or its load is critical, the
-/// pair leaves out the finest levels (graceful degradation). A level comes back after the budget had room for
-/// it for a while, and later each time that this was too early: so levels do not flutter.
+/// When a query of all shell levels exceeds the pair's point budget, or its load is critical, the finest
+/// levels are skipped (graceful degradation). A level is restored after the budget has had headroom for it
+/// during a delay, which doubles each time a restored level had to be skipped again (hysteresis).
 ///
-/// Its contacts are in a room of ContactRooms, which it has for the tick of a look, and as long as it lists
-/// any.
+/// The contacts are in a list of the ContactListPool; the pair holds one in the tick of a query and for as
+/// long as there are contacts.
 ///
 /// Threads: one at a time. Real-time: everything but the constructor.
 class CollPair {
@@ -42,107 +43,113 @@ class CollPair {
 
   [[nodiscard]] const PairSpec& spec() const { return *spec_; }
   [[nodiscard]] bool enabled() const { return enabled_; }
-  /// False for objects without structures: they never touch, whatever the matrix says.
+  /// False when an object lacks a shell or field: such a pair never collides, enabled or not.
   [[nodiscard]] bool possible() const { return possible_; }
   [[nodiscard]] bool due(Tick tick) const { return due_ <= tick; }
   [[nodiscard]] Tick dueTick() const { return due_; }
 
-  // of the last look since the last jump
-  [[nodiscard]] bool looked() const { return looked_; }
-  [[nodiscard]] double gap() const { return gap_; }          ///< [m] the smallest, dilation included
-  [[nodiscard]] double deepest() const { return deepest_; }  ///< [m] in the undilated field
-  [[nodiscard]] const QueryCounts& counts() const { return counts_; }
-  /// Finest levels of the shell that the last look left out.
-  [[nodiscard]] std::uint32_t leftOut() const { return allLevels() - std::min(allLevels(), levels_used_); }
-  /// [%] What the last look would have cost with all levels, of their points as many as of those it used.
-  [[nodiscard]] double wholeLoad() const noexcept;
-  /// So many may be used by the next one.
+  // results of the last query since the last reset
+  [[nodiscard]] bool queried() const { return queried_; }
+  [[nodiscard]] double gap() const { return gap_; }      ///< [m] smallest signed gap, dilation included
+  [[nodiscard]] double depth() const { return depth_; }  ///< [m] penetration depth in the undilated field
+  [[nodiscard]] const collision::QueryCounts& counts() const { return counts_; }
+  /// Number of finest shell levels that the last query skipped.
+  [[nodiscard]] std::uint32_t skippedLevels() const {
+    return allLevels() - std::min(allLevels(), levels_used_);
+  }
+  /// [%] load of the last query, extrapolated to all shell levels by their numbers of points.
+  [[nodiscard]] double loadAtAllLevels() const noexcept;
+  /// Number of shell levels that the next query may use.
   [[nodiscard]] std::uint32_t levels() const { return levels_; }
-  /// Null when it listed no contacts.
-  [[nodiscard]] const IslandPairResult* result() const { return lists() ? room_ : nullptr; }
-  [[nodiscard]] bool lists() const { return looked_ && room_ != nullptr && !room_->query.contacts.empty(); }
-  [[nodiscard]] bool touching() const noexcept { return lists() && gap_ <= kTouchGap; }
-  /// What an island's solver found in the tick before `now`; null when none did. Of a pair whose bodies
-  /// rested there may be older results, which depend on whether it was looked at meanwhile.
-  [[nodiscard]] const IslandPairResult* solvedBefore(Tick now) const {
-    return lists() && solved_ + 1 == now ? room_ : nullptr;
+  /// Null when there are no contacts.
+  [[nodiscard]] const collision::IslandPairResult* result() const { return hasContacts() ? list_ : nullptr; }
+  [[nodiscard]] bool hasContacts() const {
+    return queried_ && list_ != nullptr && !list_->query.contacts.empty();
+  }
+  [[nodiscard]] bool touching() const noexcept { return hasContacts() && gap_ <= collision::kTouchGap; }
+  /// The result of an island solve in the tick before `now`, else null. Older results are not used: they
+  /// depend on which ticks coherence skipped.
+  [[nodiscard]] const collision::IslandPairResult* solvedBefore(Tick now) const {
+    return hasContacts() && solved_ + 1 == now ? list_ : nullptr;
   }
 
-  [[nodiscard]] bool hasRoom() const { return room_ != nullptr; }
-  void moveIn(IslandPairResult* room) noexcept { room_ = room; }
-  [[nodiscard]] IslandPairResult* moveOut() noexcept { return std::exchange(room_, nullptr); }
+  [[nodiscard]] bool hasList() const { return list_ != nullptr; }
+  void attachList(collision::IslandPairResult* list) noexcept { list_ = list; }
+  [[nodiscard]] collision::IslandPairResult* detachList() noexcept { return std::exchange(list_, nullptr); }
 
   void setEnabled(bool enabled) noexcept;
-  /// What was found holds no longer; look again in the next tick.
-  void forget() noexcept;
-  /// What was found holds, but something may move differently from now on.
-  void lookAgain() noexcept { due_ = 0; }
+  /// Drops all results; the pair is due in the next tick.
+  void reset() noexcept;
+  /// Cancels the skipping by coherence: the pair is due in the next tick. Results stay.
+  void invalidate() noexcept { due_ = 0; }
 
-  // these need a room
-  /// A look by itself, for pairs that no solver moves; lists contacts up to `margin`, testing up to `budget`
-  /// points, `first` of them whatever is left out.
+  // the following functions need a contact list
+  /// Queries a pair that is in no island: lists contacts with gaps up to `margin` [m], testing at most
+  /// `budget` points. The points `first` are tested even when their level is skipped.
   void query(const Pose& X_WA, const Pose& X_WB, double margin, std::uint32_t budget = 0xFFFFFFFFU,
              std::span<const std::uint32_t> first = {}) noexcept;
-  /// The penalty force of what query() found: the softer of the two gives way.
-  void press(double stiffness, const Pose& X_WA) noexcept;
-  /// Takes over what a solver found in `now`.
-  void take(const IslandPairResult& result, Tick now) noexcept;
+  /// Sets the contact wrench to the penalty force at `stiffness` [N/m] of the contacts of query().
+  void computePenaltyForce(double stiffness, const Pose& X_WA) noexcept;
+  /// Copies the result of the island solver of tick `now`.
+  void storeSolved(const collision::IslandPairResult& result, Tick now) noexcept;
 
-  /// Points that held or touched in the last look, those with a force first.
+  /// Shell points in contact at the last query: those with a contact force first, then those within
+  /// kTouchGap.
   void listTouching(TouchingPoints& points) const noexcept;
-  /// Chooses the levels for the next look, after one with `budget` points for a walk.
-  void adapt(const WorkLimits& limits, std::uint32_t budget) noexcept;
+  /// Chooses the levels of the next query after one that had `budget` points per traversal.
+  void adaptLevels(const WorkLimits& limits, std::uint32_t budget) noexcept;
 
-  /// Sets when to look again, once the pair was looked at in `now`: while the fastest points approach each
-  /// other by at most `closing_speed` [m/s], the gap stays above `reach` [m]. `travelled`: what the
-  /// odometers of both say now [m].
-  void schedule(Tick now, double closing_speed, double reach, double travelled) noexcept;
-  /// The same before the motion of `now`, without a look, from the way really gone. False, and no change,
-  /// when that does not spare the look.
-  [[nodiscard]] bool putOff(Tick now, double closing_speed, double reach, double travelled) noexcept;
+  /// Sets the due tick after a query in tick `now`: as long as points approach each other by at most
+  /// `closing_speed` [m/s], the gap stays above `margin` [m] until then. `path_length` [m]: sum of the
+  /// accumulated path lengths of both objects.
+  void schedule(Tick now, double closing_speed, double margin, double path_length) noexcept;
+  /// Moves the due tick before the motion of tick `now` without a query, from the path moved since the last
+  /// one; `closing_speed` [m/s], `margin` [m] and `path_length` [m] as in schedule(). False, and no change,
+  /// when the pair has to be queried in this tick.
+  [[nodiscard]] bool postpone(Tick now, double closing_speed, double margin, double path_length) noexcept;
 
-  /// The pair as the island solver of `now` wants it, both bodies static.
-  [[nodiscard]] IslandPair islandPair(const Pose& X_WA, const Pose& X_WB, Tick now) const noexcept;
+  /// Input of the island solver of tick `now`, with both bodies static.
+  [[nodiscard]] collision::IslandPair islandPair(const Pose& X_WA, const Pose& X_WB, Tick now) const noexcept;
 
-  /// Every member that changes but the switch, to be written, read or hashed. What is read takes a room.
+  /// Writes, reads or hashes every member that changes except `enabled`. Reading contacts acquires a list.
   template <typename Archive, typename Self>
-  static void archive(Archive& archive, Self& self, ContactRooms& rooms) {
-    archive(self.looked_);
+  static void archive(Archive& archive, Self& self, ContactListPool& pool) {
+    archive(self.queried_);
     archive(self.due_);
     archive(self.solved_);
-    archive(self.travelled_);
+    archive(self.path_length_);
     archive(self.gap_);
-    archive(self.deepest_);
+    archive(self.depth_);
     archive(self.counts_);
-    archive(self.left_out_);
+    archive(self.skipped_spacing_);
     archive(self.levels_);
     if constexpr (Archive::kReads) {
-      if (self.levels_ == 0) return archive.refuse();
+      if (self.levels_ == 0) return archive.reject();
     }
     archive(self.levels_used_);
-    archive(self.walk_points_);
-    archive(self.calm_);
-    archive(self.patience_);
+    archive(self.traversal_points_);
+    archive(self.queries_with_headroom_);
+    archive(self.restore_delay_);
     if constexpr (Archive::kReads) {
-      if (!std::isfinite(self.travelled_ + self.gap_ + self.deepest_ + self.left_out_))
-        return archive.refuse();
+      if (!std::isfinite(self.path_length_ + self.gap_ + self.depth_ + self.skipped_spacing_))
+        return archive.reject();
     }
-    bool lists = self.lists();
-    archive(lists);
-    if (!lists) return;
+    bool has_contacts = self.hasContacts();
+    archive(has_contacts);
+    if (!has_contacts) return;
     if constexpr (Archive::kReads) {
-      if (!self.hasRoom()) self.moveIn(rooms.take());
-      if (!self.hasRoom()) return archive.refuse();
+      if (!self.hasList()) self.attachList(pool.acquire());
+      if (!self.hasList()) return archive.reject();
     }
-    archive(*self.room_);
+    archive(*self.list_);
     if constexpr (Archive::kReads) {
-      if (!self.isSound(*self.room_)) return archive.refuse();
-      self.room_->query.counts = self.counts_;
-      self.room_->query.smallest_gap = self.gap_;
-      self.room_->query.deepest = self.deepest_;
-      self.room_->query.left_out = self.left_out_;
-      self.room_->query.levels_used = self.levels_used_;
-      self.room_->query.walk_points = self.walk_points_;
+      if (!self.isValid(*self.list_)) return archive.reject();
+      self.list_->query.counts = self.counts_;
+      self.list_->query.smallest_gap = self.gap_;
+      self.list_->query.deepest = self.depth_;
+      self.list_->query.skipped_gap_error = self.skipped_spacing_;
+      self.list_->query.levels_used = self.levels_used_;
+      self.list_->query.traversal_points = self.traversal_points_;
     }
   }
 
@@ -152,33 +159,34 @@ class CollPair {
   [[nodiscard]] std::uint32_t allLevels() const {
     return possible_ ? static_cast<std::uint32_t>(shell_A_->levels().size()) : 0;
   }
-  /// Points of the shell's first `levels` levels.
+  /// [points] of the shell's coarsest `levels` levels.
   [[nodiscard]] double pointsOf(std::uint32_t levels) const noexcept;
   [[nodiscard]] bool nextLevelFits(const WorkLimits& limits, std::uint32_t budget) const noexcept;
-  void note(const PairQueryResult& query) noexcept;
-  /// A list that was read, before its numbers are used as places.
-  [[nodiscard]] bool isSound(const IslandPairResult& room) const noexcept;
-  [[nodiscard]] static Tick wholeTicks(double way, double closing_speed) noexcept;
+  void store(const collision::PairQueryResult& query) noexcept;
+  /// Validates a list read from a checkpoint: indices in range, numbers finite.
+  [[nodiscard]] bool isValid(const collision::IslandPairResult& list) const noexcept;
+  /// Whole ticks in which `distance` [m] cannot be closed at `closing_speed` [m/s].
+  [[nodiscard]] static Tick ticksToClose(double distance, double closing_speed) noexcept;
 
   const PairSpec* spec_;
-  const Pointshell* shell_A_ = nullptr;
-  const DistanceField* field_B_ = nullptr;
+  const structures::Pointshell* shell_A_ = nullptr;
+  const structures::DistanceField* field_B_ = nullptr;
   bool possible_ = false;
   bool enabled_ = true;
-  bool looked_ = false;
+  bool queried_ = false;
   Tick due_ = 0;
-  Tick solved_ = 0;  ///< by an island's solver, last
-  double travelled_ = 0.0;
-  double gap_ = 0.0;
-  double deepest_ = 0.0;
-  QueryCounts counts_;
-  double left_out_ = 0.0;  ///< [m] points of levels left out may be nearer by so much
+  Tick solved_ = 0;           ///< tick of the last island solve
+  double path_length_ = 0.0;  ///< [m] of both objects at the last query
+  double gap_ = 0.0;          ///< [m]
+  double depth_ = 0.0;        ///< [m]
+  collision::QueryCounts counts_;
+  double skipped_spacing_ = 0.0;  ///< [m] points of skipped levels may have gaps smaller than gap_ by this
   std::uint32_t levels_ = kAllLevels;
   std::uint32_t levels_used_ = kAllLevels;
-  std::uint32_t walk_points_ = 0;  ///< of the last look's last walk
-  std::uint32_t calm_ = 0;         ///< looks in a row with room for one level more
-  std::uint32_t patience_ = 0;     ///< so many are needed
-  IslandPairResult* room_ = nullptr;
+  std::uint32_t traversal_points_ = 0;       ///< tested by the last traversal
+  std::uint32_t queries_with_headroom_ = 0;  ///< consecutive queries with budget for one more level
+  std::uint32_t restore_delay_ = 0;          ///< [queries] with headroom before a level is restored
+  collision::IslandPairResult* list_ = nullptr;
 };
 
-}  // namespace tenon
+}  // namespace tenon::simulation

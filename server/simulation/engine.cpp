@@ -3,29 +3,28 @@
 #include <algorithm>
 #include <utility>
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
-/// A tick's travel is made in this many sub-steps: enough to meet a surface, turn along it and meet a second
-/// one.
+/// Sub-steps of a held body per tick: enough to reach a surface, slide along it and reach a second one.
 constexpr std::uint32_t kTravelSubsteps = 4;
 
-std::size_t roomsFor(const Scene& scene, const EnvironmentOptions& options) {
-  return std::min(scene.pairs.size(), options.rooms);
+std::size_t listCount(const Scene& scene, const EnvironmentOptions& options) {
+  return std::min(scene.pairs.size(), options.contact_lists);
 }
 
-/// The least body radius that scales rotations [m]: an object without structures still turns with its hand.
-constexpr double kLeastRadius = 0.01;
+/// [m] Lower bound of the radius that scales rotations: objects without structures have a radius of 0.
+constexpr double kMinRadius = 0.01;
 
-SolveLimits cappedLimits(SolveLimits limits, double max_speed) {
+collision::SolveLimits cappedLimits(collision::SolveLimits limits, double max_speed) {
   const double travel = max_speed * kTickSeconds;
-  limits.substeps = std::clamp(limits.substeps, 1U, kTravelSubsteps);
-  limits.substep_travel = std::min(limits.substep_travel, travel / limits.substeps);
+  limits.max_steps = std::clamp(limits.max_steps, 1U, kTravelSubsteps);
+  limits.max_step_length = std::min(limits.max_step_length, travel / limits.max_steps);
   return limits;
 }
 
-/// At most so many objects move at a time: what hands hold, and what has a mass.
-std::size_t mostMovable(const Scene& scene) {
+/// Most objects that can be movable at a time: one per coupled hand, and all with a mass.
+std::size_t maxMovable(const Scene& scene) {
   const auto hands = std::count_if(scene.hands.begin(), scene.hands.end(),
                                    [](const HandSpec& hand) { return hand.kind == HandKind::kCoupled; });
   const auto bodies = std::count_if(scene.objects.begin(), scene.objects.end(),
@@ -35,18 +34,18 @@ std::size_t mostMovable(const Scene& scene) {
 
 ObjectSize sizeOf(const ObjectSpec& spec) {
   ObjectSize size;
-  size.radius = kLeastRadius;
+  size.radius = kMinRadius;
   if (!spec.structures) return size;
-  const Pointshell& shell = spec.structures->shell;
+  const structures::Pointshell& shell = spec.structures->shell;
   if (!shell.empty()) {
-    size.p_OC_O = shell.ballCentre();
-    size.ball = shell.ballRadius();
+    size.p_OC_O = shell.boundingCentre();
+    size.ball_radius = shell.boundingRadius();
     size.radius = std::max(size.radius, shell.radius());
   } else if (!spec.structures->field.empty()) {
     const Eigen::AlignedBox3d box = spec.structures->field.box();
     size.p_OC_O = box.center();
-    size.ball = 0.5 * box.diagonal().norm();
-    size.radius = std::max(size.radius, size.p_OC_O.norm() + size.ball);
+    size.ball_radius = 0.5 * box.diagonal().norm();
+    size.radius = std::max(size.radius, size.p_OC_O.norm() + size.ball_radius);
   }
   return size;
 }
@@ -54,46 +53,46 @@ ObjectSize sizeOf(const ObjectSpec& spec) {
 }  // namespace
 
 Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& options)
-    : rooms(roomsFor(scene, options)),
-      odometers(scene.objects.size(), 0.0),
+    : contact_lists(listCount(scene, options)),
+      path_lengths(scene.objects.size(), 0.0),
       pair_cells(scene.objects.size(), 0),
       hand_count(scene.hands.size()),
       limits(cappedLimits(options.limits, options.max_speed)),
       broad_phase(scene),
-      touching(rooms.size()),
-      budget(scene, rooms.size()),
-      looked_at(scene.pairs.size(), 0),
+      touching(contact_lists.size()),
+      budget(scene, contact_lists.size()),
+      queried(scene.pairs.size(), 0),
       movable(scene.objects.size(), 0),
       solved(scene.objects.size(), 0),
-      at_rest(scene.objects.size(), 0),
-      meets(scene.objects.size(), 0),
+      has_contact(scene.objects.size(), 0),
+      has_near_pair(scene.objects.size(), 0),
       hidden(scene.objects.size(), 0),
       partition(scene.objects.size()),
-      islands(mostMovable(scene), roomsFor(scene, options), std::max(options.workers, 1U)),
+      islands(maxMovable(scene), listCount(scene, options), std::max(options.workers, 1U)),
       pool(options.workers) {
-  reach = limits.contact_margin + kLookAheadReach + 2.0 * limits.substep_travel;
+  max_margin = limits.contact_margin + kMaxLookAhead + 2.0 * limits.max_step_length;
   pairs.reserve(scene.pairs.size());
   near.reserve(scene.pairs.size());
-  left.reserve(scene.pairs.size());
-  due.reserve(rooms.size());
-  others.reserve(rooms.size());
-  // a body's contacts that push are about as many as it has ways to move
-  constexpr std::size_t kRubsPerObject = 16;
-  rubs.reserve(kRubsPerObject * scene.objects.size());
+  separated.reserve(scene.pairs.size());
+  due.reserve(contact_lists.size());
+  non_island.reserve(contact_lists.size());
+  // a body has about as many contacts with a force as degrees of freedom; more contacts get no friction
+  constexpr std::size_t kFrictionContactsPerObject = 16;
+  friction_contacts.reserve(kFrictionContactsPerObject * scene.objects.size());
   for (std::size_t pair = 0; pair < scene.pairs.size(); ++pair) {
     pairs.emplace_back(scene, pair);
     cell_in_a.push_back(pair_cells[scene.pairs[pair].a.value]++);
     cell_in_b.push_back(pair_cells[scene.pairs[pair].b.value]++);
   }
-  switches.assign((pairs.size() + 63) / 64, 0);
+  enabled_bits.assign((pairs.size() + 63) / 64, 0);
   for (std::size_t pair = 0; pair < pairs.size(); ++pair) setEnabled(pair, pairs[pair].enabled());
-  pairs_from.push_back(0);
-  for (const std::size_t count : pair_cells) pairs_from.push_back(pairs_from.back() + count);
-  pairs_of.resize(pairs_from.back());
+  incident_begin.push_back(0);
+  for (const std::size_t count : pair_cells) incident_begin.push_back(incident_begin.back() + count);
+  incident_pairs.resize(incident_begin.back());
   for (std::size_t pair = 0; pair < scene.pairs.size(); ++pair) {
     for (const auto& [object, cell] :
          {std::pair(scene.pairs[pair].a, cell_in_a[pair]), std::pair(scene.pairs[pair].b, cell_in_b[pair])}) {
-      pairs_of[pairs_from[object.value] + cell] = static_cast<std::uint32_t>(pair);
+      incident_pairs[incident_begin[object.value] + cell] = static_cast<std::uint32_t>(pair);
     }
   }
   for (const ObjectSpec& object : scene.objects) groups.push_back(object.group);
@@ -106,26 +105,26 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
   }
 }
 
-bool Environment::Engine::counts(std::size_t pair) const noexcept {
+bool Environment::Engine::countsAsActive(std::size_t pair) const noexcept {
   const CollPair& one = pairs[pair];
-  return one.enabled() && one.possible() && !grouped(pair) && hidden[one.spec().a.value] == 0 &&
+  return one.enabled() && one.possible() && !inOneGroup(pair) && hidden[one.spec().a.value] == 0 &&
          hidden[one.spec().b.value] == 0;
 }
 
 void Environment::Engine::setEnabled(std::size_t pair, bool enabled) noexcept {
   pairs[pair].setEnabled(enabled);
   const std::uint64_t bit = std::uint64_t{1} << pair % 64;
-  switches[pair / 64] = enabled ? switches[pair / 64] | bit : switches[pair / 64] & ~bit;
+  enabled_bits[pair / 64] = enabled ? enabled_bits[pair / 64] | bit : enabled_bits[pair / 64] & ~bit;
 }
 
-void Environment::Engine::forgetTick() noexcept {
-  std::fill(looked_at.begin(), looked_at.end(), std::uint8_t{0});
-  left.clear();
+void Environment::Engine::resetWorkspace() noexcept {
+  std::fill(queried.begin(), queried.end(), std::uint8_t{0});
+  separated.clear();
   due.clear();
-  others.clear();
-  refused = 0;
+  non_island.clear();
+  without_list = 0;
   recount = true;
   islands.clear();
 }
 
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -8,7 +8,7 @@
 
 #include "server/simulation/broad_phase.h"
 #include "server/simulation/coll_pair.h"
-#include "server/simulation/contact_rooms.h"
+#include "server/simulation/contact_list_pool.h"
 #include "server/simulation/environment.h"
 #include "server/simulation/force_buffer.h"
 #include "server/simulation/island_work.h"
@@ -17,27 +17,28 @@
 #include "server/simulation/work_budget.h"
 #include "server/simulation/worker_pool.h"
 
-namespace tenon {
+namespace tenon::simulation {
 
-/// How large an object is: its skin lies in a ball about p_OC_O, and within `radius` of its origin [m].
+/// Bounds of an object's surface.
 struct ObjectSize {
-  Vector3 p_OC_O = Vector3::Zero();
-  double ball = 0.0;
-  double radius = 0.0;
+  Vector3 p_OC_O = Vector3::Zero();  ///< [m] centre of the bounding sphere
+  double ball_radius = 0.0;          ///< [m] of the bounding sphere
+  double radius = 0.0;               ///< [m] largest distance of the surface from the origin O
 };
 
-/// Speed of the fastest point of a body of `radius` about its origin, at most [m/s].
-[[nodiscard]] inline double fastestPoint(const Twist& V_WB, double radius) {
+/// [m/s] upper bound of the speed of any point of a body whose points are within `radius` [m] of its origin.
+[[nodiscard]] inline double maxPointSpeed(const Twist& V_WB, double radius) {
   return V_WB.linear.norm() + V_WB.angular.norm() * radius;
 }
 
-/// What the tick works with, sized at start: the pairs' own states and force buffers (which matter for the
-/// next tick) and work space (which does not).
+/// The parts of an Environment that its header does not show, sized at the start: state of pairs and force
+/// buffers, constants derived from the scene, and work space of a tick.
 ///
 /// Threads: as Environment. Real-time: everything but the constructor.
 struct Environment::Engine {
   Engine(const Scene& scene, const EnvironmentOptions& options);
 
+  /// Cell of the ForceBuffer of `object` for the coupling of `hand`, and for gravity; pairs come before them.
   [[nodiscard]] std::size_t couplingCell(ObjectId object, HandId hand) const {
     return pair_cells[object.value] + hand.value;
   }
@@ -46,94 +47,98 @@ struct Environment::Engine {
     return pair_cells[object.value] + hand_count;
   }
 
-  [[nodiscard]] double travelledBy(const PairSpec& pair) const {
-    return odometers[pair.a.value] + odometers[pair.b.value];
+  /// [m] accumulated path lengths of both objects of a pair.
+  [[nodiscard]] double pathLengthOf(const PairSpec& pair) const {
+    return path_lengths[pair.a.value] + path_lengths[pair.b.value];
   }
-  void addTravel(ObjectId object, const Displacement& way) {
-    odometers[object.value] += fastestPoint(way, sizes[object.value].radius);
+  void addPathLength(ObjectId object, const Displacement& motion) {
+    path_lengths[object.value] += maxPointMotion(motion, sizes[object.value].radius);
   }
 
-  /// The pairs that an object is in.
+  /// Indices of the pairs of an object.
   [[nodiscard]] std::span<const std::uint32_t> pairsOf(std::size_t object) const {
-    return std::span(pairs_of).subspan(pairs_from[object], pairs_from[object + 1] - pairs_from[object]);
+    return std::span(incident_pairs)
+        .subspan(incident_begin[object], incident_begin[object + 1] - incident_begin[object]);
   }
-  /// Its two objects are of one group.
-  [[nodiscard]] bool grouped(std::size_t pair) const noexcept {
+  /// Both objects are in one group and therefore never collide.
+  [[nodiscard]] bool inOneGroup(std::size_t pair) const noexcept {
     const PairSpec& spec = pairs[pair].spec();
     return groups[spec.a.value] != 0 && groups[spec.a.value] == groups[spec.b.value];
   }
-  /// On, possible, and nobody hidden when that was last looked at.
-  [[nodiscard]] bool counts(std::size_t pair) const noexcept;
+  /// Counted in active_pairs: enabled, possible, not in one group, and neither object hidden (by `hidden`,
+  /// which is updated at the end of a tick).
+  [[nodiscard]] bool countsAsActive(std::size_t pair) const noexcept;
   void setEnabled(std::size_t pair, bool enabled) noexcept;
 
   struct FreeBody {
     RigidBody rigid;
     // work space
-    Twist V_WC;                                       ///< how it wants to go in this tick, then how it went
-    Matrix3 inverse_inertia_W = Matrix3::Identity();  ///< about the centre of mass
+    Twist V_WC;  ///< of the centre of mass: predicted without contacts, after the solve the actual one
+    Matrix3 inverse_inertia_W = Matrix3::Identity();  ///< [1/(kg m^2)] about the centre of mass
   };
 
-  /// A contact of a free body that rubs.
-  struct Rub {
+  /// A contact with a free body, for friction by sequential impulses.
+  struct FrictionContact {
     ObjectId a, b;
     Vector3 p_WP, n_W;
-    double most = 0.0;  ///< [N s]
-    Vector3 impulse_W;  ///< on a
+    double max_impulse = 0.0;  ///< [N s] coefficient times normal force times tick
+    Vector3 impulse_W;         ///< [N s] accumulated, on a
   };
 
-  /// Leaves the work space as before the first tick.
-  void forgetTick() noexcept;
+  /// Resets the work space to its state before the first tick.
+  void resetWorkspace() noexcept;
 
   // state
   std::vector<CollPair> pairs;
-  std::vector<std::uint64_t> switches;  ///< 64 pairs a word: those that are on, for the hash
-  std::vector<std::uint32_t> groups;    ///< by object; 0: none
-  std::vector<std::uint32_t> near;  ///< pairs that may meet, in order; others have no state but their switch
-  ContactRooms rooms;
-  std::vector<double> odometers;    ///< by object: [m] its fastest point's way so far, jumps left out
-  std::vector<ForceBuffer> forces;  ///< cells of an object: its pairs, then the couplings of all hands
+  std::vector<std::uint64_t> enabled_bits;  ///< bit per pair, 64 pairs per word; as in the checkpoint
+  std::vector<std::uint32_t> groups;        ///< by object; 0: none
+  std::vector<std::uint32_t> near;  ///< found by the broad phase; other pairs only have an enabled bit
+  ContactListPool contact_lists;
+  std::vector<double> path_lengths;  ///< [m] by object: bound of any point's path, without discontinuities
+  std::vector<ForceBuffer> forces;   ///< by object; cells: its pairs, the couplings of all hands, gravity
 
-  // what never changes
-  std::vector<std::size_t> pair_cells;            ///< by object: how many of its cells are pairs
+  // constants
+  std::vector<std::size_t> pair_cells;            ///< by object: number of its pairs
   std::vector<std::size_t> cell_in_a, cell_in_b;  ///< by pair: its cell in the buffers of its two objects
   std::vector<ObjectSize> sizes;                  ///< by object
-  std::vector<std::uint32_t> pairs_of;            ///< object after object
-  std::vector<std::size_t> pairs_from;            ///< by object: where its own begin, and one more
-  std::vector<std::optional<FreeBody>> bodies;    ///< by object: those that have a mass
+  std::vector<std::uint32_t> incident_pairs;      ///< by object, concatenated: indices of its pairs
+  std::vector<std::size_t> incident_begin;  ///< by object: first entry in incident_pairs; one more at the end
+  std::vector<std::optional<FreeBody>> bodies;  ///< by object; none without a mass
   std::size_t hand_count = 0;
-  SolveLimits limits;  ///< sub-steps cut so that a tick keeps the travel cap
-  double reach = 0.0;  ///< [m] the largest margin any query of a tick may use
+  collision::SolveLimits limits;  ///< of an island; sub-steps limited so that a tick keeps the speed cap
+  double max_margin = 0.0;        ///< [m] largest contact margin of any query in a tick
 
   // work space
   BroadPhase broad_phase;
-  std::vector<std::uint32_t> left;                 ///< pairs that were near until this tick
-  std::vector<std::uint32_t> due;                  ///< near pairs to look at in this tick, in order
-  std::vector<std::uint32_t> others;               ///< places in `due` of those that no island solves
-  std::vector<CollPair::TouchingPoints> touching;  ///< by place in `due`, while work is limited
+  std::vector<std::uint32_t> separated;            ///< pairs that were near until the tick before
+  std::vector<std::uint32_t> due;                  ///< near pairs to be queried in this tick, ascending
+  std::vector<std::uint32_t> non_island;           ///< slots (positions in `due`) of pairs in no island
+  std::vector<CollPair::TouchingPoints> touching;  ///< by slot, with limited work only
   WorkBudget budget;
-  std::vector<std::uint8_t> looked_at;  ///< by pair, in this tick
-  std::vector<Rub> rubs;
-  std::uint32_t refused = 0;          ///< due pairs that found no room
-  std::vector<std::uint8_t> movable;  ///< by object: a hand pulls at it
-  std::vector<std::uint8_t> solved;   ///< by object: and it moves in this tick
-  std::vector<std::uint8_t> at_rest;  ///< by object: touches something in this tick
-  std::vector<std::uint8_t> meets;    ///< by object: of a near pair, looked at in this tick or not
-  std::vector<std::uint8_t> hidden;   ///< by object, when active pairs were counted
+  std::vector<std::uint8_t> queried;  ///< by pair: in this tick
+  std::vector<FrictionContact> friction_contacts;
+  std::uint32_t without_list = 0;           ///< due pairs that got no contact list
+  std::vector<std::uint8_t> movable;        ///< by object: moved by couplings or as a free body
+  std::vector<std::uint8_t> solved;         ///< by object: movable, and all its due pairs can be queried
+  std::vector<std::uint8_t> has_contact;    ///< by object: in contact in this tick
+  std::vector<std::uint8_t> has_near_pair;  ///< by object: in a near pair that exerts forces
+  std::vector<std::uint8_t> hidden;         ///< by object, as counted in active_pairs
   std::uint32_t active_pairs = 0;
-  bool recount = true;
+  bool recount = true;  ///< count active_pairs anew
   IslandPartition partition;
   IslandWork islands;
   WorkerPool pool;
 };
 
-/// Contacts are listed for clients as far ahead as their object gets in this many ticks: a LAN's round trip
-/// and a tick; never farther than kLookAheadReach [m], or a peg would list its whole slot.
+/// [ticks] Contacts are listed for clients within the distance that their object moves in this time: the
+/// round trip of a LAN and a tick.
 inline constexpr double kLookAheadTicks = 8.0;
-inline constexpr double kLookAheadReach = 2e-3;
+/// [m] Limit of that distance: with more, a peg would list all points of its hole.
+inline constexpr double kMaxLookAhead = 2e-3;
 
-/// The same wrench about another point: p_PQ_W leads from the old to the new one.
+/// The wrench F_P_W about point P, expressed about point Q.
 [[nodiscard]] inline Wrench shifted(const Wrench& F_P_W, const Vector3& p_PQ_W) {
   return {F_P_W.force, F_P_W.torque - p_PQ_W.cross(F_P_W.force)};
 }
 
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -12,108 +12,119 @@
 #include "server/simulation/scene.h"
 #include "server/simulation/work_limits.h"
 
-namespace tenon {
+namespace tenon::simulation {
 
-/// What moves, per object. Index = ObjectId.
+/// State of an object. Index = ObjectId.
 struct ObjectMotion {
   Pose X_WO;
   Twist V_WO;
-  std::uint32_t epoch = 1;
+  std::uint32_t epoch = 1;  ///< incremented at each discontinuity of the pose
   ObjectStatus status = ObjectStatus::kParked;
-  HandId holder;  ///< the first of its holders, none when free
+  HandId holder;  ///< the first hand that holds it; invalid when none does
   bool in_contact = false;
-  bool asleep = false;           ///< a free body that rests: it stands still until something stirs it
-  std::uint32_t calm_ticks = 0;  ///< of a free body: it has hardly moved for so long
+  bool asleep = false;           ///< free body at rest: not integrated until it is woken
+  std::uint32_t rest_ticks = 0;  ///< [ticks] a free body has been below the sleep speed
 };
 
-/// What a hand does, per hand. Index = HandId.
+/// State of a hand. Index = HandId.
 struct HandMotion {
-  bool present = false;  ///< a client moves it
-  bool frozen = false;   ///< its object is held still
-  ObjectId object;       ///< what it moves now; none: nothing
-  Pose X_WH;             ///< newest device pose
-  Twist V_WH;
-  Pose X_HO;                        ///< the object in the hand since it was taken
-  Wrench F_Ho_W;                    ///< of the coupling on the hand, about the hand's origin
-  ObjectId own;                     ///< its own first object: pointer, drill, cube, forearm
-  Pose X_OR;                        ///< its own first object in the one it holds instead, since it took that
-  bool posed = false;               ///< a pose was heard since it is present
-  bool taken = false;               ///< moves `object`; false: will from its first pose on
-  std::uint32_t refused_poses = 0;  ///< not finite, or no pose at all: ignored
+  bool present = false;     ///< a client controls it
+  bool frozen = false;      ///< its object is kept at its pose
+  ObjectId object;          ///< the object it moves; invalid: none
+  Pose X_WH;                ///< newest device pose
+  Twist V_WH;               ///< newest device twist
+  Pose X_HO;                ///< of the object in the hand, constant while held
+  Wrench F_Ho_W;            ///< of the coupling on the hand, about the hand's origin
+  ObjectId default_object;  ///< moved while the hand holds no other: pointer, drill, cube, forearm
+  Pose X_OR;                ///< pose of the default object in the held one, from when that was grabbed
+  bool has_pose = false;    ///< a pose has been received since the hand is present
+  bool attached = false;    ///< `object` follows the hand; false: from the hand's first pose on
+  std::uint32_t rejected_poses = 0;  ///< invalid poses (not finite, not unit, out of range), ignored
 };
 
-/// What a pair did in the last tick. Index as in Scene::pairs.
+/// What the last tick did with a pair. Index as in Scene::pairs.
 struct PairMotion {
   bool enabled = true;
-  bool queried = false;                      ///< in this tick; else skipped by coherence
-  std::uint32_t left_out = 0;                ///< finest levels of the shell that the last look left out
-  Tick due = 0;                              ///< next tick that has to look (spatio-temporal coherence)
-  const IslandPairResult* result = nullptr;  ///< of the last query; null: no contacts
+  bool queried = false;              ///< in that tick; else skipped by coherence
+  std::uint32_t skipped_levels = 0;  ///< finest shell levels that the last query skipped
+  Tick due = 0;                      ///< next tick with a query (spatio-temporal coherence)
+  const collision::IslandPairResult* result = nullptr;  ///< of the last query; null: no contacts
 };
 
 struct EnvironmentOptions {
-  unsigned workers = 1;  ///< threads that solve islands, this one included; never changes the result
-  SolveLimits limits;
-  double max_speed = 1.0;       ///< [m/s] of any point of a held object (travel cap; the paper's v_max)
-  double max_free_speed = 3.0;  ///< [m/s] of any point of a free body: half a metre's fall
-  /// False: look at every pair in every tick; changes the result only where work is limited.
+  unsigned workers = 1;  ///< threads that solve islands, the caller included; no influence on results
+  collision::SolveLimits limits;
+  double max_speed = 1.0;       ///< [m/s] cap for any point of a held object (the paper's v_max)
+  double max_free_speed = 3.0;  ///< [m/s] cap for any point of a free body: reached after falling 0.46 m
+  /// False: every near pair with a moving object is queried in every tick; changes results only with limited
+  /// work.
   bool coherence = true;
   WorkLimits work;  ///< at the start; setBudget changes it
-  /// So many pairs may touch or be looked at in one tick: each costs some 120 kB.
-  std::size_t rooms = 256;
+  /// Most pairs that may be queried in a tick or have contacts; about 120 kB each.
+  std::size_t contact_lists = 256;
   SendPolicy send_policy = SendPolicy::kEveryForce;
 };
 
-/// All objects, one tick (paper §3.2): follow the trackers, find the pairs that are near and due, solve the
-/// contact islands for the poses of what is held or flies, look at the remaining due pairs, sum the forces.
+/// The simulation state and its step (paper §3.2). One tick: set tracked objects, find near (broad phase) and
+/// due (coherence) pairs, solve the contact islands for the poses of held objects and free bodies, query the
+/// due pairs in no island, sum forces.
 ///
-/// A free body is one more pull in its island: its inertia, towards where it flies when nothing is in its
-/// way. So a hand that pushes it, a stack of them and a held part are the same problem, and what a body is
-/// pushed back by is the force on it. Its velocity is the way it went: impacts are inelastic, and an island
-/// moves with no more energy than it had and its hands gave.
+/// A free body enters its island's problem as a spring: inertia over the tick squared, towards the pose it
+/// would have without contacts. Hands, held objects and free bodies are thus one problem, and contact forces
+/// on both sides are equal and opposite. The velocity of a free body is its displacement per tick after the
+/// solve, so impacts are inelastic (restitution 0); velocities are scaled down where an island would have
+/// more energy than before the tick plus the work of its hands.
 ///
-/// Far pairs cost nothing, near ones a glance, due ones a look. There is room for the looks of so many pairs;
-/// when more are due, those that have contacts go first, and what a hand holds of the others stands still for
-/// the tick: late, never through. Likewise a budget of points may be set for a tick; then pairs leave out the
-/// finest levels of their shells, and motions the rest of their way.
+/// Of the near pairs only the due ones are queried. A query needs a contact list; when there are fewer than
+/// due pairs, pairs with contacts keep theirs and the movable objects of the pairs without a list stand still
+/// for the tick, so that none passes through another. With a point budget, pairs skip the finest shell levels
+/// and islands end early; the rest of a held object's motion is made in later ticks.
 ///
-/// Everything that moves is in here, everything else in the Scene: so a snapshot is the Environment, and
-/// equal inputs from an equal snapshot give equal bits, for any number of workers.
+/// The whole state is in here, all constants are in the Scene: from equal states, equal inputs give bit-equal
+/// states for any number of workers.
 ///
-/// Threads: one caller; its own workers inside step(). Real-time: everything but construction, save and
-/// restore.
+/// Threads: one caller; its own workers inside step(). Real-time: everything but constructor, save, restore,
+/// mostSavedBytes; append when the capacity suffices.
 class Environment {
  public:
   Environment(std::shared_ptr<const Scene> scene, const EnvironmentOptions& options);
   ~Environment();
 
-  // what people and the state machine decide, between ticks
+  // inputs, between ticks; unknown ids are ignored
+  /// A hand that is no longer present leaves its object kParked, and resumes holding it when it is back.
   void setHandPresent(HandId hand, bool present) noexcept;
+  /// Invalid poses are ignored and counted in HandMotion::rejected_poses.
   void setHandPose(HandId hand, const Pose& X_WH, const Twist& V_WH) noexcept;
+  /// While frozen, the hand's object keeps its pose and the coupling exerts no force.
   void setHandFrozen(HandId hand, bool frozen) noexcept;
-  /// Free bodies stand still where they are, and start from rest when they may go on: a pause.
-  void setStill(bool still) noexcept;
-  /// `hand` moves `object` from now on, which stays where it is in the hand. What it moved before it lets go
-  /// of as in release(); a pointer (a hand's own first object) is hidden while the hand holds something else,
-  /// and comes back on what it took, where it took it: outside, wherever the hand itself is.
+  /// While paused, free bodies keep their poses; they continue from rest.
+  void setFreeBodiesPaused(bool paused) noexcept;
+  /// From now on `hand` moves `object`, with X_HO as it is. The object moved before is let go as in
+  /// release(); the hand's default object (a pointer) is hidden while the hand holds another one. When it
+  /// returns, it has the pose relative to the held object that it had at the grab, so it is not inside that
+  /// object.
   void grab(HandId hand, ObjectId object) noexcept;
-  /// The hand moves its own first object again. What it held is parked, or flies on if it has a body.
+  /// The hand moves its default object again. The object it held is parked, or is a free body if it has a
+  /// mass.
   void release(HandId hand) noexcept;
-  /// The two hands exchange what they hold and their own first objects; each object jumps to its other hand.
+  /// Exchanges the held and the default objects of two hands; the poses of the objects are discontinuous.
   void swapHands(HandId one, HandId other) noexcept;
-  /// A declared jump. Whoever holds the object lets go of it (and then moves nothing, until grab or release),
-  /// unless `status` is kHeld: then it stays in the hand at its new place.
+  /// Sets the pose of an object discontinuously. Hands that hold it let go and move no object until grab or
+  /// release; with status kHeld they keep it, with X_HO for the new pose. Ignored for an invalid pose.
+  /// Without a hand kHeld and kTracked become kParked, and so does kFree without a mass.
   void place(ObjectId object, const Pose& X_WO, ObjectStatus status) noexcept;
   void setPairEnabled(std::size_t pair, bool enabled) noexcept;
-  /// Objects of one group never touch; 0: no group.
+  /// Objects of one group never collide; 0: no group.
   void setGroup(ObjectId object, std::uint32_t group) noexcept;
   [[nodiscard]] std::uint32_t groupOf(ObjectId object) const noexcept;
-  /// A tick may test so many points from the next one on; 0: as many as there are.
+  /// Point budget from the next tick on; 0: unlimited.
   void setBudget(std::uint64_t points) noexcept { work_limits_.points = points; }
-  /// The force of a source that is not a contact (client contribution, guidance): expires by itself.
+  /// A wrench of a source other than contacts and couplings, about the object's origin; see
+  /// ForceBuffer::contribute for validation, clamping and expiry.
   void contribute(ObjectId object, std::uint32_t source, const Wrench& F_Oo_W,
                   std::uint32_t lifetime_ticks) noexcept;
 
+  /// One tick of kTickSeconds.
   void step() noexcept;
 
   [[nodiscard]] const Scene& scene() const { return *scene_; }
@@ -122,69 +133,73 @@ class Environment {
   [[nodiscard]] std::span<const HandMotion> hands() const { return hands_; }
   [[nodiscard]] std::span<const PairMotion> pairs() const { return pairs_; }
   [[nodiscard]] const WorkLimits& workLimits() const { return work_limits_; }
-  /// The pairs whose balls are near each other, in order: only these can touch.
+  /// Indices of the pairs found by the broad phase, ascending: only these can be in contact.
   [[nodiscard]] std::span<const std::uint32_t> nearPairs() const noexcept;
-  /// So many pairs list contacts at most.
-  [[nodiscard]] std::size_t contactRooms() const noexcept;
-  /// "Force" as displays, conditions and reports mean it: of a held object its coupling's, else its
-  /// ForceBuffer's.
+  /// Most pairs that can have contacts.
+  [[nodiscard]] std::size_t contactListCapacity() const noexcept;
+  /// The wrench about the object's origin that displays, conditions and reports call its force: of a held
+  /// object the sum of its couplings, else the total of its ForceBuffer.
   [[nodiscard]] Wrench forceOn(ObjectId object) const noexcept;
   [[nodiscard]] bool inContact(ObjectId a, ObjectId b) const noexcept;
-  /// The contacts of a hand's object for its client (fills everything but client-side fields).
+  /// The manifold of a hand's object for the local model of its client; server_epoch, answers_seq and
+  /// step_revision are left to the caller.
   void manifold(HandId hand, HandManifold& out) const noexcept;
+  /// Contact summary of a pair for publication.
   void pairContact(std::size_t pair, PairContact& out) const noexcept;
-  /// Counted work of the last tick.
+  /// Work of the last tick, counted.
   struct Work {
     std::uint32_t active_pairs = 0, queried_pairs = 0, substeps = 0, iterations = 0;
     std::uint64_t points_visited = 0;
-    std::uint32_t near_pairs = 0;     ///< whose balls are near each other
-    std::uint32_t refused_pairs = 0;  ///< for want of room: what a hand holds of them stood still
-    std::uint32_t limited_pairs = 0;  ///< whose look left out levels for want of budget
-    double load_percent = 0.0;        ///< largest of the pairs
-    bool conflicting = false;
+    std::uint32_t near_pairs = 0;      ///< found by the broad phase
+    std::uint32_t deferred_pairs = 0;  ///< due, but without a contact list: their movable objects stood still
+    std::uint32_t limited_pairs = 0;   ///< queried with skipped levels
+    double load_percent = 0.0;         ///< [%] largest load of a pair
+    bool conflicting = false;          ///< constraints of an island could not all be satisfied
   };
   [[nodiscard]] const Work& work() const { return work_; }
 
-  /// Of all that moves and will matter for the next tick.
+  /// Hash of the state: everything that influences the next tick.
   [[nodiscard]] std::uint64_t hash() const noexcept;
   [[nodiscard]] std::vector<std::uint8_t> save() const;
-  /// The same at the end of `bytes`: allocates nothing when there is room.
+  /// Appends what save() returns; allocates only when the capacity of `bytes` is too small.
   void append(std::vector<std::uint8_t>& bytes) const;
+  /// Fails and changes nothing when `bytes` are no valid checkpoint of this scene and build.
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
-  /// No state of this scene appends more bytes than these.
+  /// [bytes] upper bound of what append() adds, for any state of this scene.
   [[nodiscard]] std::size_t mostSavedBytes() const;
 
  private:
   struct Engine;
 
   // hands and objects (environment_hands.cpp)
-  void take(HandId hand) noexcept;
-  void letGo(HandId hand) noexcept;
-  [[nodiscard]] Pose returnPlace(const HandMotion& hand) const noexcept;
+  void attachHand(HandId hand) noexcept;
+  void detachHand(HandId hand) noexcept;
+  [[nodiscard]] Pose returnPose(const HandMotion& hand) const noexcept;
   void park(ObjectId object, ObjectStatus status) noexcept;
-  void chooseHolder(ObjectId object) noexcept;
-  void jump(ObjectId object) noexcept;
-  void stir(ObjectId object) noexcept;
-  // free bodies (environment_bodies.cpp)
-  [[nodiscard]] bool flies(ObjectId object) const noexcept;
+  void updateHolder(ObjectId object) noexcept;
+  void beginEpoch(ObjectId object) noexcept;
+  void markDirty(ObjectId object) noexcept;
+  // free bodies and sleeping (environment_bodies.cpp)
+  [[nodiscard]] bool isDynamic(ObjectId object) const noexcept;
   [[nodiscard]] bool moves(ObjectId object) const noexcept;
   void wake(ObjectId object) noexcept;
   void wakeNeighbours(ObjectId object) noexcept;
-  void wakeWhatIsTouched() noexcept;
-  [[nodiscard]] bool mayBeTouched(std::size_t pair) const noexcept;
-  void fly() noexcept;
-  [[nodiscard]] MovableBody freeBody(ObjectId object) noexcept;
-  void boundTravel(std::size_t island) noexcept;
-  void landIsland(std::size_t island) noexcept;
-  void restIsland(std::size_t island) noexcept;
-  // their friction (environment_friction.cpp)
-  void rub() noexcept;
+  void wakeTouchedBodies() noexcept;
+  [[nodiscard]] bool mayTouch(std::size_t pair) const noexcept;
+  void integrateFreeMotion() noexcept;
+  [[nodiscard]] collision::MovableBody freeBody(ObjectId object) noexcept;
+  void limitTravel(std::size_t island) noexcept;
+  void updateVelocities(std::size_t island) noexcept;
+  void updateSleep(std::size_t island) noexcept;
+  // friction of free bodies (environment_friction.cpp)
+  void applyFreeBodyFriction() noexcept;
   [[nodiscard]] double frictionOf(const PairSpec& pair) const noexcept;
   [[nodiscard]] Vector3 velocityOf(ObjectId object, const Vector3& p_WP) const noexcept;
-  [[nodiscard]] double lightness(ObjectId object, const Vector3& p_WP, const Vector3& t_W) const noexcept;
-  void strike(ObjectId object, const Vector3& p_WP, const Vector3& impulse_W) noexcept;
+  [[nodiscard]] double inverseEffectiveMass(ObjectId object, const Vector3& p_WP,
+                                            const Vector3& t_W) const noexcept;
+  void applyImpulse(ObjectId object, const Vector3& p_WP, const Vector3& impulse_W) noexcept;
 
-  [[nodiscard]] bool engaged(const HandMotion& hand) const noexcept { return hand.present && hand.taken; }
+  [[nodiscard]] bool engaged(const HandMotion& hand) const noexcept { return hand.present && hand.attached; }
   [[nodiscard]] bool isHand(HandId hand) const noexcept { return hand.value < hands_.size(); }
   [[nodiscard]] bool isObject(ObjectId object) const noexcept { return object.value < objects_.size(); }
 
@@ -194,28 +209,28 @@ class Environment {
   void findNearPairs() noexcept;
   void findDuePairs() noexcept;
   void countActivePairs() noexcept;
-  void shareWork() noexcept;
-  void planIslands() noexcept;
+  void distributeBudget() noexcept;
+  void buildIslands() noexcept;
   void addIsland(std::int32_t island) noexcept;
-  void takeIslands() noexcept;
-  void lookAtOtherPairs() noexcept;
+  void applyIslandResults() noexcept;
+  void queryNonIslandPairs() noexcept;
   void sumForces() noexcept;
-  void sumWeights() noexcept;
-  void judgeContacts() noexcept;
+  void writeWeights() noexcept;
+  void updateContactFlags() noexcept;
   void countWork() noexcept;
-  void note(std::uint32_t pair) noexcept;
+  void updatePairMotion(std::uint32_t pair) noexcept;
   void listContacts(ObjectId object, HandManifold& out) const noexcept;
-  void listOtherPulls(HandId hand, HandManifold& out) const noexcept;
+  void listOtherCouplings(HandId hand, HandManifold& out) const noexcept;
   [[nodiscard]] bool active(std::size_t pair) const noexcept;
-  [[nodiscard]] MovableBody movableBody(ObjectId object) noexcept;
-  [[nodiscard]] MovableBody heldBody(ObjectId object) const noexcept;
-  [[nodiscard]] Spring springOf(HandId hand) const noexcept;
+  [[nodiscard]] collision::MovableBody movableBody(ObjectId object) noexcept;
+  [[nodiscard]] collision::MovableBody heldBody(ObjectId object) const noexcept;
+  [[nodiscard]] collision::Spring springOf(HandId hand) const noexcept;
   [[nodiscard]] double speedCap(ObjectId object) const noexcept;
   [[nodiscard]] double speedOf(ObjectId object) const noexcept;
 
-  [[nodiscard]] bool isSound() const noexcept;
+  [[nodiscard]] bool isValid() const noexcept;
 
-  /// The one list of everything that moves: written, read and hashed by the same words.
+  /// Writes, reads or hashes the whole state.
   template <typename Archive, typename Self>
   static void archive(Archive& archive, Self& self);
 
@@ -226,9 +241,9 @@ class Environment {
   std::vector<PairMotion> pairs_;
   std::unique_ptr<Engine> engine_;
   WorkLimits work_limits_;
-  bool still_ = false;  ///< nobody flies
+  bool free_bodies_paused_ = false;
   Work work_;
   Tick tick_ = 0;
 };
 
-}  // namespace tenon
+}  // namespace tenon::simulation

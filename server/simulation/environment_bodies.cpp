@@ -4,40 +4,40 @@
 #include "server/simulation/engine.h"
 #include "server/simulation/environment.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
-/// [m/s] A body that rests on others and stays slower than this for so many ticks is put to sleep. Slower
-/// than a step of the field a tick, faster than anybody sees; and a body that begins to fall leaves it
-/// within the time.
-constexpr double kCalmSpeed = 2e-3;
-constexpr std::uint32_t kCalmTicks = 30;
+/// [m/s] A body in contact is put to sleep after kSleepTicks below this speed: too slow to be seen, and a
+/// body that starts to fall exceeds it within that time.
+constexpr double kSleepSpeed = 2e-3;
+constexpr std::uint32_t kSleepTicks = 30;
 
-/// [m] A free body in contact goes on as long as it has this much to go: the smallest push shall move it.
-constexpr double kFreeSettled = 1e-9;
+/// [m] Convergence tolerance of a free body: smaller than for held ones, so that the smallest force moves it.
+constexpr double kFreeBodyTolerance = 1e-9;
 
-/// What stops short in a tick has lost momentum: an impact gets so many sub-steps to find its place.
+/// Sub-steps of an island with free bodies, at least: an unconverged step would lose momentum.
 constexpr std::uint32_t kImpactSubsteps = 10;
 
-/// Sub-steps of a fast body add up to this many times its way, for what turns aside at a contact.
+/// [-] Total sub-step travel of a fast body over its displacement: reserve for a deflection at a contact.
 constexpr double kSpareTravel = 1.25;
 
-/// [m] Whoever can meet nobody goes its way in one step.
-constexpr double kNobodyNear = 1.0;
+/// [m] Travel limit of a sub-step for islands without near pairs: the whole displacement in one step.
+constexpr double kFreeSubstepTravel = 1.0;
 
 }  // namespace
 
-bool Environment::flies(ObjectId object) const noexcept {
-  return objects_[object.value].status == ObjectStatus::kFree && !objects_[object.value].asleep && !still_;
+bool Environment::isDynamic(ObjectId object) const noexcept {
+  return objects_[object.value].status == ObjectStatus::kFree && !objects_[object.value].asleep &&
+         !free_bodies_paused_;
 }
 
-void Environment::setStill(bool still) noexcept {
-  if (still_ == still) return;
-  still_ = still;
+void Environment::setFreeBodiesPaused(bool paused) noexcept {
+  if (free_bodies_paused_ == paused) return;
+  free_bodies_paused_ = paused;
   for (std::uint32_t i = 0; i < objects_.size(); ++i) {
     if (objects_[i].status != ObjectStatus::kFree || objects_[i].asleep) continue;
     objects_[i].V_WO = Twist{};
-    stir(ObjectId{i});
+    markDirty(ObjectId{i});
   }
 }
 
@@ -47,10 +47,10 @@ bool Environment::moves(ObjectId object) const noexcept {
 
 void Environment::wake(ObjectId object) noexcept {
   ObjectMotion& motion = objects_[object.value];
-  motion.calm_ticks = 0;
+  motion.rest_ticks = 0;
   if (!motion.asleep) return;
   motion.asleep = false;
-  stir(object);
+  markDirty(object);
 }
 
 void Environment::wakeNeighbours(ObjectId object) noexcept {
@@ -61,22 +61,24 @@ void Environment::wakeNeighbours(ObjectId object) noexcept {
   }
 }
 
-/// Contacts that an island lists ahead count, so that who comes meets somebody awake; what two sleepers list
-/// depends on whether they were looked at.
-bool Environment::mayBeTouched(std::size_t pair) const noexcept {
+/// Whether a sleeping body of the pair has to be woken when the other one moves. After an island solve any
+/// listed contact counts, also one ahead, so that a body is awake before it is hit. Other results count up to
+/// the contact margin: whether they list more depends on coherence.
+bool Environment::mayTouch(std::size_t pair) const noexcept {
   const CollPair& one = engine_->pairs[pair];
-  return one.solvedBefore(tick_) != nullptr || (one.lists() && one.gap() <= engine_->limits.contact_margin);
+  return one.solvedBefore(tick_) != nullptr ||
+         (one.hasContacts() && one.gap() <= engine_->limits.contact_margin);
 }
 
-/// Whoever lies at something that moves by itself, or at somebody who does, and so on.
-void Environment::wakeWhatIsTouched() noexcept {
+/// Wakes bodies in contact with a moving object, and then those in contact with a woken one.
+void Environment::wakeTouchedBodies() noexcept {
   bool more =
       std::any_of(objects_.begin(), objects_.end(), [](const ObjectMotion& one) { return one.asleep; });
   for (std::size_t pass = 0; more && pass < objects_.size(); ++pass) {
     more = false;
     for (const std::uint32_t i : engine_->near) {
       const CollPair& pair = engine_->pairs[i];
-      if (pair.spec().sensing || !active(i) || !mayBeTouched(i)) continue;
+      if (pair.spec().sensing || !active(i) || !mayTouch(i)) continue;
       for (const auto& [one, other] :
            {std::pair(pair.spec().a, pair.spec().b), std::pair(pair.spec().b, pair.spec().a)}) {
         if (!objects_[other.value].asleep || !moves(one)) continue;
@@ -88,35 +90,37 @@ void Environment::wakeWhatIsTouched() noexcept {
   }
 }
 
-/// Velocities of all free bodies at the end of the tick, when nothing is in their way.
-void Environment::fly() noexcept {
+/// Predicts the velocities of all free bodies at the end of the tick: no contacts, but friction.
+void Environment::integrateFreeMotion() noexcept {
   for (std::uint32_t i = 0; i < objects_.size(); ++i) {
-    if (!flies(ObjectId{i})) continue;
+    if (!isDynamic(ObjectId{i})) continue;
     Engine::FreeBody& body = *engine_->bodies[i];
     const Pose& X_WO = objects_[i].X_WO;
     const Wrench F_Oo_W = engine_->forces[i].contributed(tick_);
-    body.V_WC = body.rigid.fly(X_WO.rotation(), atCentre(objects_[i].V_WO, X_WO, body.rigid.centre()),
-                               shifted(F_Oo_W, X_WO.rotation() * body.rigid.centre()));
+    body.V_WC =
+        body.rigid.integrateVelocity(X_WO.rotation(), atCentre(objects_[i].V_WO, X_WO, body.rigid.centre()),
+                                     shifted(F_Oo_W, X_WO.rotation() * body.rigid.centre()));
     body.inverse_inertia_W = body.rigid.inertia(X_WO.rotation()).inverse();
   }
-  rub();
+  applyFreeBodyFriction();
 }
 
-/// Where the body flies when nothing is in its way, as the spring that its inertia is over a tick.
-MovableBody Environment::freeBody(ObjectId object) noexcept {
+/// The free body as the island solver needs it: a spring of stiffness M / dt^2 towards its predicted pose.
+collision::MovableBody Environment::freeBody(ObjectId object) noexcept {
   const ObjectMotion& motion = objects_[object.value];
   const RigidBody& rigid = engine_->bodies[object.value]->rigid;
   Twist& V_WC = engine_->bodies[object.value]->V_WC;
   const double radius = engine_->sizes[object.value].radius;
   const Vector3 p_OC_W = motion.X_WO.rotation() * rigid.centre();
   const Vector3 v_WOo = V_WC.linear - V_WC.angular.cross(p_OC_W);
-  const double speed = std::max(fastestPoint(Twist{v_WOo, V_WC.angular}, radius), fastestPoint(V_WC, radius));
+  const double speed =
+      std::max(maxPointSpeed(Twist{v_WOo, V_WC.angular}, radius), maxPointSpeed(V_WC, radius));
   if (speed > options_.max_free_speed) {
     V_WC.linear *= options_.max_free_speed / speed;
     V_WC.angular *= options_.max_free_speed / speed;
   }
 
-  Spring inertia;
+  collision::Spring inertia;
   inertia.p_BC = rigid.centre();
   inertia.X_WG.rotation() = displaced(motion.X_WO, {Vector3::Zero(), kTickSeconds * V_WC.angular}).rotation();
   inertia.X_WG.translation() =
@@ -125,116 +129,118 @@ MovableBody Environment::freeBody(ObjectId object) noexcept {
   inertia.stiffness = kPerTick2 * rigid.mass();
   inertia.rotational_tensor_W = kPerTick2 * rigid.inertia(motion.X_WO.rotation());
 
-  MovableBody body;
+  collision::MovableBody body;
   body.X_WB = motion.X_WO;
   body.radius = radius;
-  body.settled = kFreeSettled;
+  body.tolerance = kFreeBodyTolerance;
   body.springs.push_back(inertia);
   return body;
 }
 
-/// An island with a free body gets as many sub-steps as its fastest body needs, and nobody in it goes
-/// farther than its own speed allows.
-void Environment::boundTravel(std::size_t island) noexcept {
+/// Sets the number of sub-steps of an island with free bodies for its fastest one, and limits the travel of
+/// each of its bodies by its speed cap.
+void Environment::limitTravel(std::size_t island) noexcept {
   IslandWork& islands = engine_->islands;
   const IslandWork::Island& one = islands.islands()[island];
   double speed = 0.0;
-  bool any = false;
-  bool meets = false;
+  bool any_free = false;
+  bool near = false;
   for (std::size_t i = one.first_body; i < one.first_body + one.bodies; ++i) {
     const ObjectId object = islands.objectOf(i);
-    meets = meets || engine_->meets[object.value] != 0;
-    if (!flies(object)) continue;
+    near = near || engine_->has_near_pair[object.value] != 0;
+    if (!isDynamic(object)) continue;
     const Twist& V_WC = engine_->bodies[object.value]->V_WC;
-    speed = std::max(speed, fastestPoint(V_WC, engine_->sizes[object.value].radius));
-    any = true;
+    speed = std::max(speed, maxPointSpeed(V_WC, engine_->sizes[object.value].radius));
+    any_free = true;
   }
-  if (!any) return;
+  if (!any_free) return;
   for (std::size_t i = one.first_body; i < one.first_body + one.bodies; ++i) {
-    islands.body(i).reach = speedCap(islands.objectOf(i)) * kTickSeconds;
+    islands.body(i).max_displacement = speedCap(islands.objectOf(i)) * kTickSeconds;
   }
-  SolveLimits& limits = islands.limits(island);
-  if (!meets) limits.substep_travel = kNobodyNear;
+  collision::SolveLimits& limits = islands.limits(island);
+  if (!near) limits.max_step_length = kFreeSubstepTravel;
   const double travel = kSpareTravel * std::min(speed, options_.max_free_speed) * kTickSeconds;
-  limits.substeps =
-      std::max(kImpactSubsteps, static_cast<std::uint32_t>(std::ceil(travel / limits.substep_travel)));
+  limits.max_steps =
+      std::max(kImpactSubsteps, static_cast<std::uint32_t>(std::ceil(travel / limits.max_step_length)));
 }
 
-/// The velocity of a free body is the way it has gone. What was pushed out of an overlap shall not fly away:
-/// an island moves with the energy it had and what its hands' springs have given, not more.
-void Environment::landIsland(std::size_t island) noexcept {
+/// The velocity of a free body is its displacement per tick. Bodies pushed out of an overlap must not gain
+/// energy: velocities of an island are scaled so that its kinetic energy is at most what it was predicted to
+/// be plus the work of the couplings.
+void Environment::updateVelocities(std::size_t island) noexcept {
   const IslandWork& islands = engine_->islands;
   const IslandWork::Island& one = islands.islands()[island];
-  double given = 0.0;   // [J] by hands
-  double before = 0.0;  // [J] of motion
-  double after = 0.0;   // [J]
+  double work = 0.0;    // [J] of the couplings
+  double before = 0.0;  // [J] predicted kinetic energy
+  double after = 0.0;   // [J] kinetic energy
   for (std::size_t i = one.first_body; i < one.first_body + one.bodies; ++i) {
     const ObjectId object = islands.objectOf(i);
     const Pose& X_WO = objects_[object.value].X_WO;
-    if (!flies(object)) {
-      for (const Spring& spring : islands.body(i).springs) {
-        given += springEnergy(spring, X_WO) - springEnergy(spring, islands.poseOf(i));
+    if (!isDynamic(object)) {
+      for (const collision::Spring& spring : islands.body(i).springs) {
+        work += collision::springEnergy(spring, X_WO) - collision::springEnergy(spring, islands.poseOf(i));
       }
       continue;
     }
     Engine::FreeBody& body = *engine_->bodies[object.value];
     before += body.rigid.energy(X_WO.rotation(), body.V_WC);
-    const Displacement way = displacement(X_WO, islands.poseOf(i));
-    const Vector3 p_CC = islands.poseOf(i) * body.rigid.centre() - X_WO * body.rigid.centre();
-    body.V_WC = {p_CC / kTickSeconds, way.rotation / kTickSeconds};
+    const Displacement motion = displacement(X_WO, islands.poseOf(i));
+    const Vector3 p_CC_W = islands.poseOf(i) * body.rigid.centre() - X_WO * body.rigid.centre();
+    body.V_WC = {p_CC_W / kTickSeconds, motion.rotation / kTickSeconds};
     after += body.rigid.energy(X_WO.rotation(), body.V_WC);
   }
-  const double most = before + std::max(given, 0.0);
-  const double share = after > most ? std::sqrt(most / after) : 1.0;
+  const double max_energy = before + std::max(work, 0.0);
+  const double scale = after > max_energy ? std::sqrt(max_energy / after) : 1.0;
   for (std::size_t i = one.first_body; i < one.first_body + one.bodies; ++i) {
     const ObjectId object = islands.objectOf(i);
-    if (!flies(object)) continue;
+    if (!isDynamic(object)) continue;
     const Engine::FreeBody& body = *engine_->bodies[object.value];
-    objects_[object.value].V_WO = atOrigin({share * body.V_WC.linear, share * body.V_WC.angular},
+    objects_[object.value].V_WO = atOrigin({scale * body.V_WC.linear, scale * body.V_WC.angular},
                                            islands.poseOf(i), body.rigid.centre());
   }
 }
 
-/// Bodies that have come to rest on something sleep, an island at a time, unless a hand is at one of them.
-void Environment::restIsland(std::size_t island) noexcept {
+/// Puts the free bodies of an island to sleep together when all of them are at rest in contact and none has a
+/// contact with a moving kinematic or held object.
+void Environment::updateSleep(std::size_t island) noexcept {
   Engine& engine = *engine_;
   const IslandWork::Island& one = engine.islands.islands()[island];
-  bool calm = true;
+  bool at_rest = true;
   for (std::size_t i = one.first_body; i < one.first_body + one.bodies; ++i) {
-    engine.at_rest[engine.islands.objectOf(i).value] = 0;
+    engine.has_contact[engine.islands.objectOf(i).value] = 0;
   }
   for (std::size_t slot = one.first_pair; slot < one.first_pair + one.pairs; ++slot) {
     const CollPair& pair = engine.pairs[engine.islands.pairOf(slot)];
-    if (!pair.lists()) continue;
+    if (!pair.hasContacts()) continue;
     const ObjectId a = pair.spec().a;
     const ObjectId b = pair.spec().b;
-    calm &= flies(a) == flies(b) || !(moves(a) && moves(b));
+    at_rest &= isDynamic(a) == isDynamic(b) || !(moves(a) && moves(b));
     if (!pair.touching()) continue;
-    engine.at_rest[a.value] = engine.at_rest[b.value] = 1;
+    engine.has_contact[a.value] = engine.has_contact[b.value] = 1;
   }
-  std::uint32_t calm_ticks = kCalmTicks;
+  std::uint32_t rest_ticks = kSleepTicks;
   for (std::size_t i = one.first_body; i < one.first_body + one.bodies; ++i) {
     const ObjectId object = engine.islands.objectOf(i);
-    if (!flies(object)) continue;
-    const double limit = engine.at_rest[object.value] != 0 ? kCalmSpeed : 0.0;
-    const Wrench pushed = engine.forces[object.value].contributed(tick_);
-    calm &= speedOf(object) <= limit && pushed.force.isZero(0.0) && pushed.torque.isZero(0.0);
+    if (!isDynamic(object)) continue;
+    const double limit = engine.has_contact[object.value] != 0 ? kSleepSpeed : 0.0;
+    const Wrench contributed = engine.forces[object.value].contributed(tick_);
+    at_rest &= speedOf(object) <= limit && contributed.force.isZero(0.0) && contributed.torque.isZero(0.0);
   }
   for (std::size_t i = one.first_body; i < one.first_body + one.bodies; ++i) {
     const ObjectId object = engine.islands.objectOf(i);
-    if (!flies(object)) continue;
-    std::uint32_t& ticks = objects_[object.value].calm_ticks;
-    ticks = calm ? ticks + 1 : 0;
-    calm_ticks = std::min(calm_ticks, ticks);
+    if (!isDynamic(object)) continue;
+    std::uint32_t& ticks = objects_[object.value].rest_ticks;
+    ticks = at_rest ? ticks + 1 : 0;
+    rest_ticks = std::min(rest_ticks, ticks);
   }
-  if (calm_ticks < kCalmTicks) return;
+  if (rest_ticks < kSleepTicks) return;
   for (std::size_t i = one.first_body; i < one.first_body + one.bodies; ++i) {
     const ObjectId object = engine.islands.objectOf(i);
-    if (!flies(object)) continue;
+    if (!isDynamic(object)) continue;
     engine.movable[object.value] = 0;
     objects_[object.value].asleep = true;
     objects_[object.value].V_WO = Twist{};
   }
 }
 
-}  // namespace tenon
+}  // namespace tenon::simulation

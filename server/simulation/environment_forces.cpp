@@ -4,7 +4,7 @@
 #include "server/simulation/engine.h"
 #include "server/simulation/environment.h"
 
-namespace tenon {
+namespace tenon::simulation {
 
 void Environment::sumForces() noexcept {
   Engine& engine = *engine_;
@@ -12,10 +12,10 @@ void Environment::sumForces() noexcept {
     const CollPair& pair = engine.pairs[i];
     const ObjectId a = pair.spec().a;
     const ObjectId b = pair.spec().b;
-    if (!pair.lists()) {
+    if (!pair.hasContacts()) {
       engine.forces[a.value].clear(engine.cell_in_a[i]);
       engine.forces[b.value].clear(engine.cell_in_b[i]);
-    } else if (engine.looked_at[i] != 0) {
+    } else if (engine.queried[i] != 0) {
       const Wrench F_Ao_W = pair.result()->F_Ao_W;
       const Vector3 p_AB_W = objects_[b.value].X_WO.translation() - objects_[a.value].X_WO.translation();
       engine.forces[a.value].write(engine.cell_in_a[i], F_Ao_W, tick_);
@@ -31,7 +31,7 @@ void Environment::sumForces() noexcept {
     const Pose& X_WO = objects_[object].X_WO;
     const Vector3 p_OH_W = hand.X_WH.translation() - X_WO.translation();
     if (engine.movable[object] != 0) {
-      const Wrench F_Oo_W = springWrench(springOf(id), X_WO);
+      const Wrench F_Oo_W = collision::springWrench(springOf(id), X_WO);
       engine.forces[object].write(engine.couplingCell(hand.object, id), F_Oo_W, tick_);
       hand.F_Ho_W = -shifted(F_Oo_W, p_OH_W);
     } else if (scene_->hands[i].kind == HandKind::kTracked) {
@@ -40,11 +40,11 @@ void Environment::sumForces() noexcept {
       engine.forces[object].clear(engine.couplingCell(hand.object, id));
     }
   }
-  sumWeights();
+  writeWeights();
   for (ForceBuffer& buffer : engine.forces) buffer.expire(tick_);
 }
 
-void Environment::sumWeights() noexcept {
+void Environment::writeWeights() noexcept {
   Engine& engine = *engine_;
   for (std::uint32_t i = 0; i < objects_.size(); ++i) {
     if (!engine.bodies[i]) continue;
@@ -59,12 +59,12 @@ void Environment::sumWeights() noexcept {
   }
 }
 
-void Environment::judgeContacts() noexcept {
+void Environment::updateContactFlags() noexcept {
   for (ObjectMotion& object : objects_) object.in_contact = false;
   for (const std::uint32_t i : engine_->near) {
     const CollPair& pair = engine_->pairs[i];
     if (!pair.touching()) continue;
-    // what only senses leaves no mark on what it touches
+    // in a sensing pair only the tracked object counts as in contact
     ObjectMotion& a = objects_[pair.spec().a.value];
     ObjectMotion& b = objects_[pair.spec().b.value];
     a.in_contact |= !pair.spec().sensing || a.status == ObjectStatus::kTracked;
@@ -72,9 +72,10 @@ void Environment::judgeContacts() noexcept {
   }
 }
 
-void Environment::note(std::uint32_t pair) noexcept {
+void Environment::updatePairMotion(std::uint32_t pair) noexcept {
   const CollPair& one = engine_->pairs[pair];
-  pairs_[pair] = {one.enabled(), engine_->looked_at[pair] != 0, one.leftOut(), one.dueTick(), one.result()};
+  pairs_[pair] = {one.enabled(), engine_->queried[pair] != 0, one.skippedLevels(), one.dueTick(),
+                  one.result()};
 }
 
 void Environment::countActivePairs() noexcept {
@@ -82,7 +83,7 @@ void Environment::countActivePairs() noexcept {
   const auto countOf = [&engine](std::size_t object) {
     const auto pairs = engine.pairsOf(object);
     return static_cast<std::uint32_t>(
-        std::count_if(pairs.begin(), pairs.end(), [&](std::uint32_t i) { return engine.counts(i); }));
+        std::count_if(pairs.begin(), pairs.end(), [&](std::uint32_t i) { return engine.countsAsActive(i); }));
   };
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     const std::uint8_t hidden = objects_[i].status == ObjectStatus::kHidden ? 1 : 0;
@@ -94,7 +95,7 @@ void Environment::countActivePairs() noexcept {
   if (!engine.recount) return;
   engine.recount = false;
   engine.active_pairs = 0;
-  for (std::size_t i = 0; i < pairs_.size(); ++i) engine.active_pairs += engine.counts(i) ? 1U : 0U;
+  for (std::size_t i = 0; i < pairs_.size(); ++i) engine.active_pairs += engine.countsAsActive(i) ? 1U : 0U;
 }
 
 void Environment::countWork() noexcept {
@@ -104,25 +105,25 @@ void Environment::countWork() noexcept {
   work_.active_pairs = engine.active_pairs;
   work_.near_pairs = static_cast<std::uint32_t>(engine.near.size());
   work_.queried_pairs = static_cast<std::uint32_t>(engine.due.size());
-  work_.refused_pairs = engine.refused;
-  for (const std::uint32_t i : engine.left) note(i);
+  work_.deferred_pairs = engine.without_list;
+  for (const std::uint32_t i : engine.separated) updatePairMotion(i);
   for (const std::uint32_t i : engine.near) {
     CollPair& pair = engine.pairs[i];
-    if (!pair.lists()) engine.rooms.giveBack(pair.moveOut());
-    note(i);
-    if (engine.looked_at[i] == 0) continue;
+    if (!pair.hasContacts()) engine.contact_lists.release(pair.detachList());
+    updatePairMotion(i);
+    if (engine.queried[i] == 0) continue;
     work_.load_percent = std::max(work_.load_percent, pair.counts().loadPercent());
-    work_.limited_pairs += pair.leftOut() > 0 ? 1U : 0U;
+    work_.limited_pairs += pair.skippedLevels() > 0 ? 1U : 0U;
   }
-  for (const std::uint32_t slot : engine.others) {
+  for (const std::uint32_t slot : engine.non_island) {
     work_.points_visited += engine.pairs[engine.due[slot]].counts().points_visited;
   }
   for (const IslandWork::Island& island : engine.islands.islands()) {
-    work_.substeps += island.report.substeps;
+    work_.substeps += island.report.steps;
     work_.iterations += island.report.iterations;
     work_.points_visited += island.report.points_visited;
-    work_.conflicting |= island.report.conflicting;
+    work_.conflicting |= island.report.infeasible;
   }
 }
 
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -1,15 +1,15 @@
 #include "server/simulation/engine.h"
 #include "server/simulation/environment.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
-/// No room is larger [m]; squares of much larger numbers leave the range of a double.
-constexpr double kFarthest = 1e3;
+/// [m] Largest coordinate of a valid pose, larger than any work space; squares stay in the range of a double.
+constexpr double kMaxCoordinate = 1e3;
 
 bool isPose(const Pose& X) {
   constexpr double kUnitTolerance = 1e-3;
-  if (!X.isFinite() || X.translation().cwiseAbs().maxCoeff() > kFarthest) return false;
+  if (!X.isFinite() || X.translation().cwiseAbs().maxCoeff() > kMaxCoordinate) return false;
   return std::abs(X.rotation().squaredNorm() - 1.0) < kUnitTolerance;
 }
 
@@ -23,14 +23,14 @@ void Environment::setHandPresent(HandId hand, bool present) noexcept {
   if (!isHand(hand) || hands_[hand.value].present == present) return;
   HandMotion& motion = hands_[hand.value];
   motion.present = present;
-  motion.posed = false;
+  motion.has_pose = false;
   if (present) return;
-  motion.taken = false;
+  motion.attached = false;
   motion.F_Ho_W = Wrench{};
   motion.V_WH = Twist{};
   if (isObject(motion.object)) {
     engine_->forces[motion.object.value].clear(engine_->couplingCell(motion.object, hand));
-    chooseHolder(motion.object);
+    updateHolder(motion.object);
     if (!objects_[motion.object.value].holder.valid()) park(motion.object, ObjectStatus::kParked);
   }
 }
@@ -39,14 +39,14 @@ void Environment::setHandPose(HandId hand, const Pose& X_WH, const Twist& V_WH) 
   if (!isHand(hand)) return;
   HandMotion& motion = hands_[hand.value];
   if (!isPose(X_WH) || !isFinite(V_WH)) {
-    ++motion.refused_poses;
+    ++motion.rejected_poses;
     return;
   }
   motion.X_WH = normalized(X_WH);
   motion.V_WH = V_WH;
   if (!motion.present) return;
-  motion.posed = true;
-  if (!motion.taken && isObject(motion.object)) take(hand);
+  motion.has_pose = true;
+  if (!motion.attached && isObject(motion.object)) attachHand(hand);
 }
 
 void Environment::setHandFrozen(HandId hand, bool frozen) noexcept {
@@ -55,31 +55,32 @@ void Environment::setHandFrozen(HandId hand, bool frozen) noexcept {
   const ObjectId object = hands_[hand.value].object;
   if (!isObject(object)) return;
   objects_[object.value].V_WO = Twist{};
-  stir(object);
+  markDirty(object);
 }
 
 void Environment::grab(HandId hand, ObjectId object) noexcept {
   if (!isHand(hand) || !isObject(object)) return;
   HandMotion& motion = hands_[hand.value];
-  if (motion.object == object && motion.taken) return;
-  const Pose X_WR = returnPlace(motion);
-  if (motion.object != object) letGo(hand);
+  if (motion.object == object && motion.attached) return;
+  const Pose X_WR = returnPose(motion);
+  if (motion.object != object) detachHand(hand);
   motion.object = object;
-  if (!motion.present || !motion.posed) return;
-  take(hand);
+  if (!motion.present || !motion.has_pose) return;
+  attachHand(hand);
   motion.X_OR = objects_[object.value].X_WO.inverse() * X_WR;
 }
 
 void Environment::release(HandId hand) noexcept {
   if (!isHand(hand)) return;
   HandMotion& motion = hands_[hand.value];
-  if (motion.object == motion.own) return;
-  const Pose X_WR = returnPlace(motion);
-  letGo(hand);
-  if (!isObject(motion.own)) return;
-  grab(hand, motion.own);
-  // the hand is up to its coupling's stretch inside what it has held
-  if (motion.taken && objects_[motion.own.value].holder == hand) objects_[motion.own.value].X_WO = X_WR;
+  if (motion.object == motion.default_object) return;
+  const Pose X_WR = returnPose(motion);
+  detachHand(hand);
+  if (!isObject(motion.default_object)) return;
+  grab(hand, motion.default_object);
+  // not at the hand's pose: it may be inside the held object by the deflection of the coupling
+  if (motion.attached && objects_[motion.default_object.value].holder == hand)
+    objects_[motion.default_object.value].X_WO = X_WR;
 }
 
 void Environment::swapHands(HandId one, HandId other) noexcept {
@@ -87,20 +88,20 @@ void Environment::swapHands(HandId one, HandId other) noexcept {
   HandMotion& a = hands_[one.value];
   HandMotion& b = hands_[other.value];
   std::swap(a.object, b.object);
-  std::swap(a.own, b.own);
+  std::swap(a.default_object, b.default_object);
   std::swap(a.X_HO, b.X_HO);
   std::swap(a.X_OR, b.X_OR);
-  std::swap(a.taken, b.taken);
+  std::swap(a.attached, b.attached);
   for (const HandId hand : {one, other}) {
     HandMotion& motion = hands_[hand.value];
     if (!isObject(motion.object)) continue;
     const HandId former = hand == one ? other : one;
     engine_->forces[motion.object.value].clear(engine_->couplingCell(motion.object, former));
-    motion.taken = motion.taken && motion.present && motion.posed;
-    chooseHolder(motion.object);
-    if (motion.taken) {
+    motion.attached = motion.attached && motion.present && motion.has_pose;
+    updateHolder(motion.object);
+    if (motion.attached) {
       objects_[motion.object.value].X_WO = motion.X_WH * motion.X_HO;
-      jump(motion.object);
+      beginEpoch(motion.object);
     } else if (!objects_[motion.object.value].holder.valid()) {
       park(motion.object, ObjectStatus::kParked);
     }
@@ -116,89 +117,91 @@ void Environment::place(ObjectId object, const Pose& X_WO, ObjectStatus status) 
     HandMotion& hand = hands_[i];
     if (hand.object != object) continue;
     if (stays) {
-      if (hand.taken) hand.X_HO = hand.X_WH.inverse() * motion.X_WO;
+      if (hand.attached) hand.X_HO = hand.X_WH.inverse() * motion.X_WO;
       continue;
     }
     engine_->forces[object.value].clear(engine_->couplingCell(object, {static_cast<std::uint32_t>(i)}));
     hand.object = ObjectId{};
-    hand.taken = false;
+    hand.attached = false;
     hand.F_Ho_W = Wrench{};
   }
   if (!stays) {
     motion.holder = HandId{};
-    // only a hand makes an object held or tracked
+    // an object is held or tracked through a hand only
     const bool needs_hand = status == ObjectStatus::kHeld || status == ObjectStatus::kTracked;
     const bool massless = status == ObjectStatus::kFree && !scene_->objects[object.value].body;
     motion.status = needs_hand || massless ? ObjectStatus::kParked : status;
   }
-  jump(object);
+  beginEpoch(object);
 }
 
-/// The hand has given a pose and moves its object from here on.
-void Environment::take(HandId hand) noexcept {
+/// The hand has a pose; from now on its object follows it.
+void Environment::attachHand(HandId hand) noexcept {
   HandMotion& motion = hands_[hand.value];
   ObjectMotion& object = objects_[motion.object.value];
-  const bool own = motion.object == motion.own || object.status == ObjectStatus::kHidden;
-  if (own && !object.holder.valid()) {
+  const bool starts_at_hand =
+      motion.object == motion.default_object || object.status == ObjectStatus::kHidden;
+  if (starts_at_hand && !object.holder.valid()) {
     motion.X_HO = Pose::Identity();
     object.X_WO = motion.X_WH;
   } else {
     motion.X_HO = motion.X_WH.inverse() * object.X_WO;
   }
   motion.X_OR = object.X_WO.inverse() * motion.X_WH;
-  motion.taken = true;
-  chooseHolder(motion.object);
+  motion.attached = true;
+  updateHolder(motion.object);
   object.status =
       scene_->hands[hand.value].kind == HandKind::kTracked ? ObjectStatus::kTracked : ObjectStatus::kHeld;
-  jump(motion.object);
+  beginEpoch(motion.object);
 }
 
-/// Where the hand's own first object is, or would be if it had stayed on what the hand holds.
-Pose Environment::returnPlace(const HandMotion& hand) const noexcept {
-  if (!hand.taken || !isObject(hand.object)) return hand.X_WH;
+/// Pose of the hand's default object; while the hand holds another one, its pose relative to that is
+/// constant.
+Pose Environment::returnPose(const HandMotion& hand) const noexcept {
+  if (!hand.attached || !isObject(hand.object)) return hand.X_WH;
   const Pose& X_WO = objects_[hand.object.value].X_WO;
-  return hand.object == hand.own ? X_WO : X_WO * hand.X_OR;
+  return hand.object == hand.default_object ? X_WO : X_WO * hand.X_OR;
 }
 
-/// The hand moves nothing; its own first object leaves the scene, another one stays where it is.
-void Environment::letGo(HandId hand) noexcept {
+/// The hand moves no object. Its default object is hidden, another one becomes free (with a mass) or parked.
+void Environment::detachHand(HandId hand) noexcept {
   HandMotion& motion = hands_[hand.value];
   const ObjectId object = motion.object;
   motion.object = ObjectId{};
-  motion.taken = false;
+  motion.attached = false;
   motion.X_HO = Pose::Identity();
   motion.F_Ho_W = Wrench{};
   if (!isObject(object)) return;
   engine_->forces[object.value].clear(engine_->couplingCell(object, hand));
-  chooseHolder(object);
+  updateHolder(object);
   if (objects_[object.value].holder.valid()) return;
   const bool has_mass = scene_->objects[object.value].body.has_value();
-  park(object, object == motion.own ? ObjectStatus::kHidden
-               : has_mass           ? ObjectStatus::kFree
-                                    : ObjectStatus::kParked);
-  // it was parked when its hand was gone, and now nobody is to hold it any more
+  park(object, object == motion.default_object ? ObjectStatus::kHidden
+               : has_mass                      ? ObjectStatus::kFree
+                                               : ObjectStatus::kParked);
+  // it was parked because its hand was not present; now no hand is assigned to it
   if (has_mass && objects_[object.value].status == ObjectStatus::kParked) {
     objects_[object.value].status = ObjectStatus::kFree;
   }
 }
 
-/// Nobody holds the object any more. What the state machine has fixed or hidden stays so.
+/// Sets the status of an object that no hand holds any more. Fixed and hidden objects remain so.
 void Environment::park(ObjectId object, ObjectStatus status) noexcept {
   ObjectMotion& motion = objects_[object.value];
-  const bool moved = motion.status == ObjectStatus::kHeld || motion.status == ObjectStatus::kTracked;
-  if (moved || status == ObjectStatus::kHidden) motion.status = status;
+  const bool was_held = motion.status == ObjectStatus::kHeld || motion.status == ObjectStatus::kTracked;
+  if (was_held || status == ObjectStatus::kHidden) motion.status = status;
   const Twist V_WO = motion.V_WO;
-  jump(object);
+  beginEpoch(object);
   if (motion.status == ObjectStatus::kFree) motion.V_WO = V_WO;
 }
 
-/// The holder remains as long as it holds; then the first hand that does follows.
-void Environment::chooseHolder(ObjectId object) noexcept {
+/// The holder remains the same while it holds the object; then it is the first hand that does.
+void Environment::updateHolder(ObjectId object) noexcept {
   HandId& holder = objects_[object.value].holder;
   const auto holds = [&](HandId hand) {
     return isHand(hand) && hands_[hand.value].object == object && engaged(hands_[hand.value]);
   };
-  stir(object);
+  markDirty(object);
   if (holds(holder)) return;
   holder = HandId{};
   for (std::uint32_t i = 0; i < hands_.size() && !holder.valid(); ++i) {
@@ -206,28 +209,28 @@ void Environment::chooseHolder(ObjectId object) noexcept {
   }
 }
 
-/// A declared jump: what was known about the object's contacts holds no longer.
-void Environment::jump(ObjectId object) noexcept {
+/// After a discontinuity of pose or holder: next epoch, velocity 0, all pairs of the object reset.
+void Environment::beginEpoch(ObjectId object) noexcept {
   ObjectMotion& motion = objects_[object.value];
   motion.V_WO = Twist{};
   motion.asleep = false;
-  motion.calm_ticks = 0;
+  motion.rest_ticks = 0;
   ++motion.epoch;
   wakeNeighbours(object);
   for (const std::uint32_t i : engine_->near) {
     CollPair& pair = engine_->pairs[i];
     if (pair.spec().a != object && pair.spec().b != object) continue;
-    pair.forget();
-    note(i);
+    pair.reset();
+    updatePairMotion(i);
   }
 }
 
-/// Something about the object's motion changes: its pairs are due at once.
-void Environment::stir(ObjectId object) noexcept {
+/// The object may move differently than assumed by the due ticks of its pairs: they are due at once.
+void Environment::markDirty(ObjectId object) noexcept {
   for (const std::uint32_t i : engine_->near) {
     CollPair& pair = engine_->pairs[i];
-    if (pair.spec().a == object || pair.spec().b == object) pair.lookAgain();
+    if (pair.spec().a == object || pair.spec().b == object) pair.invalidate();
   }
 }
 
-}  // namespace tenon
+}  // namespace tenon::simulation

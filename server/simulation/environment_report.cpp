@@ -4,22 +4,22 @@
 #include "server/simulation/engine.h"
 #include "server/simulation/environment.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
-/// The contacts of all pairs of one object in one list, and from which pair each came.
+/// Contacts of all pairs of one object, with the pair of each.
 struct Gathered {
-  ContactList contacts;
-  std::array<std::uint16_t, kMaxPairContacts> pair;
+  collision::ContactList contacts;
+  std::array<std::uint16_t, collision::kMaxPairContacts> pair;
 };
 
-/// Two contacts with one body and normals closer than this (cosine of 15 degrees) are one to a small motion.
+/// [-] cos(15 deg): for small motions, contacts of one pair with closer normals represent each other.
 constexpr double kSameNormal = 0.966;
 
-/// Adds the contacts that stand for all of a pair, so that no pair crowds another out.
-void gather(const ContactList& contacts, std::size_t pair, Gathered& all) {
+/// Adds the reduced contacts of a pair: reduced per pair, so that no pair displaces the contacts of another.
+void gather(const collision::ContactList& contacts, std::size_t pair, Gathered& all) {
   std::array<std::uint32_t, kManifoldContacts> chosen{};
-  const std::size_t count = reduceContacts(contacts, chosen);
+  const std::size_t count = collision::selectRepresentatives(contacts, chosen);
   for (std::size_t i = 0; i < count; ++i) {
     if (!all.contacts.push_back(contacts[chosen[i]])) return;
     all.pair[all.contacts.size() - 1] = static_cast<std::uint16_t>(pair);
@@ -30,10 +30,10 @@ Vector3 velocityAt(const ObjectMotion& object, const Vector3& p_WP) {
   return object.V_WO.linear + object.V_WO.angular.cross(p_WP - object.X_WO.translation());
 }
 
-/// The contact as a half-space of the other body for a point of the held one. When the held body was asked as
-/// the field, the roles change: its surface point opposite the other's point is the one that moves.
-ManifoldContact manifoldContact(const Contact& contact, ObjectId other_id, const ObjectMotion& other,
-                                const ObjectMotion& held, bool held_is_shell) {
+/// The contact as a half-space fixed to the other body and a point fixed to the held one. When the held body
+/// is the SDF side, its point is the shell point projected onto its surface along the normal.
+ManifoldContact manifoldContact(const collision::Contact& contact, ObjectId other_id,
+                                const ObjectMotion& other, const ObjectMotion& held, bool held_is_shell) {
   const Vector3 n_W = held_is_shell ? contact.n_W : Vector3(-contact.n_W);
   const Vector3 p_WP = held_is_shell ? contact.p_WP : Vector3(contact.p_WP - contact.gap * contact.n_W);
   const Vector3 n_A = other.X_WO.rotation().conjugate() * n_W;
@@ -71,7 +71,7 @@ bool Environment::inContact(ObjectId a, ObjectId b) const noexcept {
 
 std::span<const std::uint32_t> Environment::nearPairs() const noexcept { return engine_->near; }
 
-std::size_t Environment::contactRooms() const noexcept { return engine_->rooms.size(); }
+std::size_t Environment::contactListCapacity() const noexcept { return engine_->contact_lists.size(); }
 
 void Environment::pairContact(std::size_t pair, PairContact& out) const noexcept {
   const CollPair& one = engine_->pairs[pair];
@@ -79,15 +79,15 @@ void Environment::pairContact(std::size_t pair, PairContact& out) const noexcept
   out.a = one.spec().a;
   out.b = one.spec().b;
   out.enabled = one.enabled();
-  if (!one.looked()) return;
-  out.depth = one.deepest();
+  if (!one.queried()) return;
+  out.depth = one.depth();
   out.gap = one.gap();
   out.load_percent = one.counts().loadPercent();
   out.peak_depth = out.depth;
-  if (!one.lists()) return;
+  if (!one.hasContacts()) return;
   Vector3 sum = Vector3::Zero();
-  for (const Contact& contact : one.result()->query.contacts) {
-    if (contact.gap > kTouchGap) continue;
+  for (const collision::Contact& contact : one.result()->query.contacts) {
+    if (contact.gap > collision::kTouchGap) continue;
     sum += contact.p_WP;
     ++out.contacts;
   }
@@ -116,17 +116,17 @@ void Environment::manifold(HandId hand, HandManifold& out) const noexcept {
   const ObjectMotion& held = objects_[motion.object.value];
   out.object_epoch = held.epoch;
   out.X_WO = held.X_WO;
-  listOtherPulls(hand, out);
+  listOtherCouplings(hand, out);
   listContacts(motion.object, out);
 }
 
-void Environment::listOtherPulls(HandId hand, HandManifold& out) const noexcept {
+void Environment::listOtherCouplings(HandId hand, HandManifold& out) const noexcept {
   const ObjectId object = hands_[hand.value].object;
   if (engine_->movable[object.value] == 0) return;
   for (std::uint32_t i = 0; i < hands_.size() && !out.others.full(); ++i) {
     const bool coupled = scene_->hands[i].kind == HandKind::kCoupled;
     if (i == hand.value || !coupled || hands_[i].object != object || !engaged(hands_[i])) continue;
-    const Spring spring = springOf(HandId{i});
+    const collision::Spring spring = springOf(HandId{i});
     out.others.push_back(
         {HandId{i}, spring.X_WG, spring.p_BC, spring.stiffness, spring.rotational_stiffness});
   }
@@ -138,10 +138,10 @@ void Environment::listContacts(ObjectId object, HandManifold& out) const noexcep
   for (const std::uint32_t i : engine_->near) {
     const CollPair& pair = engine_->pairs[i];
     if (!active(i) || (pair.spec().a != object && pair.spec().b != object)) continue;
-    if (pair.lists()) gather(pair.result()->query.contacts, i, all);
+    if (pair.hasContacts()) gather(pair.result()->query.contacts, i, all);
   }
   std::array<std::uint32_t, kManifoldContacts> chosen{};
-  const std::size_t count = reduceContacts(all.contacts, chosen);
+  const std::size_t count = collision::selectRepresentatives(all.contacts, chosen);
   for (std::size_t i = 0; i < count; ++i) {
     const CollPair& pair = engine_->pairs[all.pair[chosen[i]]];
     const bool held_is_shell = pair.spec().a == object;
@@ -150,19 +150,19 @@ void Environment::listContacts(ObjectId object, HandManifold& out) const noexcep
                                            objects_[object.value], held_is_shell));
   }
 
-  // what is not listed matters only where nothing listed stands for it
+  // contacts that no listed one represents limit the validity of the manifold
   for (const std::uint32_t i : engine_->near) {
     const CollPair& pair = engine_->pairs[i];
     if (!active(i) || (pair.spec().a != object && pair.spec().b != object)) continue;
-    if (!pair.lists()) continue;
-    for (const Contact& contact : pair.result()->query.contacts) {
-      const bool stood_for = std::any_of(
+    if (!pair.hasContacts()) continue;
+    for (const collision::Contact& contact : pair.result()->query.contacts) {
+      const bool represented = std::any_of(
           chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(count), [&](std::uint32_t one) {
             return all.pair[one] == i && all.contacts[one].n_W.dot(contact.n_W) > kSameNormal;
           });
-      if (!stood_for) out.validity_radius = std::min(out.validity_radius, std::max(contact.gap, 0.0));
+      if (!represented) out.validity_radius = std::min(out.validity_radius, std::max(contact.gap, 0.0));
     }
   }
 }
 
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -5,10 +5,10 @@
 #include "server/simulation/environment.h"
 #include "server/simulation/state_archive.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
-/// Raised whenever the list of fields changes.
+/// Incremented with every change of the archived fields.
 constexpr std::uint32_t kStateVersion = 7;
 
 template <typename Archive, typename Motion>
@@ -20,7 +20,7 @@ void archiveObject(Archive& archive, Motion& object) {
   archive(object.holder);
   archive(object.in_contact);
   archive(object.asleep);
-  archive(object.calm_ticks);
+  archive(object.rest_ticks);
 }
 
 template <typename Archive, typename Motion>
@@ -33,23 +33,23 @@ void archiveHand(Archive& archive, Motion& hand) {
   archive(hand.X_HO);
   archive(hand.X_OR);
   archive(hand.F_Ho_W);
-  archive(hand.own);
-  archive(hand.posed);
-  archive(hand.taken);
+  archive(hand.default_object);
+  archive(hand.has_pose);
+  archive(hand.attached);
 }
 
-/// 64 pairs a number: most pairs have nothing else to say.
+/// One bit per pair; pairs that are not near have no other state.
 template <typename Archive, typename Engine>
-void archiveSwitches(Archive& archive, Engine& engine) {
-  for (auto& word : engine.switches) archive(word);
+void archiveEnabledBits(Archive& archive, Engine& engine) {
+  for (auto& word : engine.enabled_bits) archive(word);
   if constexpr (Archive::kReads) {
     for (std::size_t pair = 0; pair < engine.pairs.size(); ++pair) {
-      engine.setEnabled(pair, (engine.switches[pair / 64] >> pair % 64 & 1U) != 0);
+      engine.setEnabled(pair, (engine.enabled_bits[pair / 64] >> pair % 64 & 1U) != 0);
     }
   }
 }
 
-/// Ascending numbers below `end`.
+/// Indices below `end`, ascending.
 template <typename Archive, typename Indices>
 void archiveIndices(Archive& archive, Indices& indices, std::size_t end) {
   auto size = static_cast<std::uint32_t>(indices.size());
@@ -59,7 +59,7 @@ void archiveIndices(Archive& archive, Indices& indices, std::size_t end) {
     std::uint32_t index = Archive::kReads ? 0 : indices[i];
     archive(index);
     if constexpr (Archive::kReads) {
-      if (!archive.ok() || index >= end || (i > 0 && index <= indices.back())) return archive.refuse();
+      if (!archive.ok() || index >= end || (i > 0 && index <= indices.back())) return archive.reject();
       indices.push_back(index);
     }
   }
@@ -70,32 +70,35 @@ void archiveIndices(Archive& archive, Indices& indices, std::size_t end) {
 template <typename Archive, typename Self>
 void Environment::archive(Archive& archive, Self& self) {
   archive(self.tick_);
-  archive(self.still_);
+  archive(self.free_bodies_paused_);
   archive(self.work_limits_.points);
   archive(self.work_limits_.critical_load);
   for (auto& object : self.objects_) archiveObject(archive, object);
   for (auto& hand : self.hands_) archiveHand(archive, hand);
   auto& engine = *self.engine_;
-  archiveSwitches(archive, engine);
+  archiveEnabledBits(archive, engine);
   for (auto& group : engine.groups) archive(group);
   archiveIndices(archive, engine.near, engine.pairs.size());
-  for (const std::uint32_t pair : engine.near) CollPair::archive(archive, engine.pairs[pair], engine.rooms);
-  for (auto& odometer : engine.odometers) archive(odometer);
+  for (const std::uint32_t pair : engine.near)
+    CollPair::archive(archive, engine.pairs[pair], engine.contact_lists);
+  for (auto& path_length : engine.path_lengths) archive(path_length);
   for (auto& buffer : engine.forces) ForceBuffer::archive(archive, buffer);
 }
 
 std::uint64_t Environment::hash() const noexcept {
-  StateHasher hasher;
+  ArchiveHasher hasher;
   archive(hasher, *this);
   return hasher.value();
 }
 
 std::size_t Environment::mostSavedBytes() const {
-  // a near pair's numbers and its two cells of force, and a full list with what held
+  // [bytes] a near pair with its two force cells, a full contact list with multipliers, an object
   constexpr std::size_t kPair = 512;
-  constexpr std::size_t kList = sizeof(IslandPairResult) + kMaxPairContacts * sizeof(double);
+  constexpr std::size_t kList =
+      sizeof(collision::IslandPairResult) + collision::kMaxPairContacts * sizeof(double);
   constexpr std::size_t kObject = 1024;
-  return save().size() + kObject * objects_.size() + kPair * engine_->pairs.size() + kList * contactRooms();
+  return save().size() + kObject * objects_.size() + kPair * engine_->pairs.size() +
+         kList * contactListCapacity();
 }
 
 std::vector<std::uint8_t> Environment::save() const {
@@ -105,7 +108,7 @@ std::vector<std::uint8_t> Environment::save() const {
 }
 
 void Environment::append(std::vector<std::uint8_t>& bytes) const {
-  StateWriter writer(bytes);
+  ArchiveWriter writer(bytes);
   writer.number(kStateVersion);
   writer.number(static_cast<std::uint32_t>(objects_.size()));
   writer.number(static_cast<std::uint32_t>(hands_.size()));
@@ -114,72 +117,72 @@ void Environment::append(std::vector<std::uint8_t>& bytes) const {
 }
 
 Result<void> Environment::restore(std::span<const std::uint8_t> bytes) {
-  StateReader reader(bytes);
+  ArchiveReader reader(bytes);
   std::uint32_t version = 0;
   std::uint32_t objects = 0;
   std::uint32_t hands = 0;
   std::uint32_t pairs = 0;
   for (std::uint32_t* number : {&version, &objects, &hands, &pairs}) reader.number(*number);
-  if (!reader.ok()) return fail("checkpoint: it is empty or cut off in its first line");
+  if (!reader.ok()) return fail("checkpoint: empty or truncated header");
   if (version != kStateVersion) {
-    return fail("checkpoint: it is of version " + std::to_string(version) +
-                ", this server writes and reads version " + std::to_string(kStateVersion));
+    return fail("checkpoint: version " + std::to_string(version) + ", this server reads and writes version " +
+                std::to_string(kStateVersion));
   }
   if (objects != objects_.size() || hands != hands_.size() || pairs != pairs_.size()) {
-    return fail("checkpoint: it is of another scene (" + std::to_string(objects) + " objects, " +
+    return fail("checkpoint: written for another scene (" + std::to_string(objects) + " objects, " +
                 std::to_string(hands) + " hands, " + std::to_string(pairs) + " pairs)");
   }
-  // into another one first: a bad checkpoint changes nothing
+  // into a copy first, so that an invalid checkpoint changes nothing
   EnvironmentOptions options = options_;
   options.workers = 1;
   Environment copy(scene_, options);
   archive(reader, copy);
-  if (!reader.atEnd()) return fail("checkpoint: it is cut off, or longer than what it describes");
-  if (!copy.isSound()) return fail("checkpoint: a pose, an id or a status in it is impossible");
+  if (!reader.atEnd()) return fail("checkpoint: truncated or followed by other bytes");
+  if (!copy.isValid()) return fail("checkpoint: contains an invalid pose, id or status");
   objects_ = copy.objects_;
   for (std::size_t i = 0; i < hands_.size(); ++i) {
-    copy.hands_[i].refused_poses = hands_[i].refused_poses;
+    copy.hands_[i].rejected_poses = hands_[i].rejected_poses;
     hands_[i] = copy.hands_[i];
   }
   engine_->pairs = std::move(copy.engine_->pairs);
-  engine_->switches = std::move(copy.engine_->switches);
+  engine_->enabled_bits = std::move(copy.engine_->enabled_bits);
   engine_->groups = std::move(copy.engine_->groups);
   engine_->near = std::move(copy.engine_->near);
-  engine_->rooms = std::move(copy.engine_->rooms);
-  engine_->odometers = std::move(copy.engine_->odometers);
+  engine_->contact_lists = std::move(copy.engine_->contact_lists);
+  engine_->path_lengths = std::move(copy.engine_->path_lengths);
   engine_->forces = std::move(copy.engine_->forces);
   work_limits_ = copy.work_limits_;
-  still_ = copy.still_;
+  free_bodies_paused_ = copy.free_bodies_paused_;
   tick_ = copy.tick_;
-  engine_->forgetTick();
+  engine_->resetWorkspace();
   findMovable();
   countWork();
-  for (std::uint32_t pair = 0; pair < pairs_.size(); ++pair) note(pair);
+  for (std::uint32_t pair = 0; pair < pairs_.size(); ++pair) updatePairMotion(pair);
   return {};
 }
 
-bool Environment::isSound() const noexcept {
-  const auto sound = [](const Pose& X) {
+bool Environment::isValid() const noexcept {
+  const auto validPose = [](const Pose& X) {
     constexpr double kUnitTolerance = 1e-6;
     return X.isFinite() && std::abs(X.rotation().squaredNorm() - 1.0) < kUnitTolerance;
   };
   const auto hasBody = [this](const ObjectMotion& object) {
     return scene_->objects[static_cast<std::size_t>(&object - objects_.data())].body.has_value();
   };
-  const bool sound_objects = std::all_of(objects_.begin(), objects_.end(), [&](const ObjectMotion& object) {
-    return sound(object.X_WO) && object.status <= ObjectStatus::kFree &&
+  const bool valid_objects = std::all_of(objects_.begin(), objects_.end(), [&](const ObjectMotion& object) {
+    return validPose(object.X_WO) && object.status <= ObjectStatus::kFree &&
            (object.status != ObjectStatus::kFree || hasBody(object)) && object.V_WO.linear.allFinite() &&
            object.V_WO.angular.allFinite() && (!object.holder.valid() || isHand(object.holder));
   });
-  const bool sound_limits = work_limits_.critical_load > 0.0 && std::isfinite(work_limits_.critical_load);
-  const bool sound_ways = std::all_of(engine_->odometers.begin(), engine_->odometers.end(),
-                                      [](double way) { return std::isfinite(way); });
-  return sound_limits && sound_objects && sound_ways &&
+  const bool valid_limits = work_limits_.critical_load > 0.0 && std::isfinite(work_limits_.critical_load);
+  const bool finite_path_lengths = std::all_of(engine_->path_lengths.begin(), engine_->path_lengths.end(),
+                                               [](double length) { return std::isfinite(length); });
+  return valid_limits && valid_objects && finite_path_lengths &&
          std::all_of(hands_.begin(), hands_.end(), [&](const HandMotion& hand) {
-           return sound(hand.X_WH) && sound(hand.X_HO) && sound(hand.X_OR) &&
+           return validPose(hand.X_WH) && validPose(hand.X_HO) && validPose(hand.X_OR) &&
                   (!hand.object.valid() || isObject(hand.object)) &&
-                  (!hand.own.valid() || isObject(hand.own));
+                  (!hand.default_object.valid() || isObject(hand.default_object));
          });
 }
 
-}  // namespace tenon
+}  // namespace tenon::simulation

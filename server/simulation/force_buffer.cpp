@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cassert>
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
-Vector3 capped(const Vector3& v, double limit) {
+Vector3 clamped(const Vector3& v, double limit) {
   const double norm = v.norm();
   return norm > limit ? Vector3(v * (limit / norm)) : v;
 }
@@ -28,7 +28,7 @@ ForceBuffer::ForceBuffer(std::size_t own_cells, SendPolicy policy)
 
 bool ForceBuffer::write(std::size_t cell, const Wrench& F_Bo_W, Tick now) noexcept {
   assert(cell < own_cells_);
-  const bool is_due = due(cell);
+  const bool is_due = totalDue(cell);
   const auto index = static_cast<std::uint32_t>(cell);
   if (!cells_[cell].used) used_.insert(std::lower_bound(used_.begin(), used_.end(), index), index);
   cells_[cell] = {F_Bo_W, now, 0, 0, true};
@@ -44,35 +44,37 @@ void ForceBuffer::clear(std::size_t cell) noexcept {
 
 bool ForceBuffer::contribute(std::uint32_t source, const Wrench& F_Bo_W, std::uint32_t lifetime_ticks,
                              Tick now) noexcept {
-  // beyond this the norm itself overflows
-  constexpr double kSane = 1e100;
-  const auto sane = [](const Vector3& v) { return v.allFinite() && v.cwiseAbs().maxCoeff() < kSane; };
-  const auto outside = std::span(cells_).subspan(own_cells_);
-  auto place = std::find_if(outside.begin(), outside.end(),
-                            [&](const ForceCell& cell) { return cell.used && cell.source == source; });
-  if (place == outside.end()) {
-    place = std::find_if(outside.begin(), outside.end(),
-                         [&](const ForceCell& cell) { return !alive(cell, now); });
+  // [N], [Nm] the squared norm of larger values overflows
+  constexpr double kMaxComponent = 1e100;
+  const auto valid = [](const Vector3& v) {
+    return v.allFinite() && v.cwiseAbs().maxCoeff() < kMaxComponent;
+  };
+  const auto contributions = std::span(cells_).subspan(own_cells_);
+  auto slot = std::find_if(contributions.begin(), contributions.end(),
+                           [&](const ForceCell& cell) { return cell.used && cell.source == source; });
+  if (slot == contributions.end()) {
+    slot = std::find_if(contributions.begin(), contributions.end(),
+                        [&](const ForceCell& cell) { return !alive(cell, now); });
   }
-  if (place == outside.end() || lifetime_ticks == 0 || !sane(F_Bo_W.force) || !sane(F_Bo_W.torque)) {
-    ++refused_;
+  if (slot == contributions.end() || lifetime_ticks == 0 || !valid(F_Bo_W.force) || !valid(F_Bo_W.torque)) {
+    ++rejected_;
     return false;
   }
-  *place = {{capped(F_Bo_W.force, kMaxContributedForce), capped(F_Bo_W.torque, kMaxContributedTorque)},
-            now,
-            source,
-            std::min(lifetime_ticks, kMaxLifetimeTicks),
-            true};
-  contributing_ = static_cast<std::uint8_t>(contributing_ | 1U << (place - outside.begin()));
+  *slot = {{clamped(F_Bo_W.force, kMaxContributedForce), clamped(F_Bo_W.torque, kMaxContributedTorque)},
+           now,
+           source,
+           std::min(lifetime_ticks, kMaxLifetimeTicks),
+           true};
+  contributing_ = static_cast<std::uint8_t>(contributing_ | 1U << (slot - contributions.begin()));
   return true;
 }
 
 void ForceBuffer::expire(Tick now) noexcept {
   if (contributing_ == 0) return;
-  const auto outside = std::span(cells_).subspan(own_cells_);
-  for (std::size_t i = 0; i < outside.size(); ++i) {
-    if (!outside[i].used || alive(outside[i], now)) continue;
-    outside[i] = ForceCell{};
+  const auto contributions = std::span(cells_).subspan(own_cells_);
+  for (std::size_t i = 0; i < contributions.size(); ++i) {
+    if (!contributions[i].used || alive(contributions[i], now)) continue;
+    contributions[i] = ForceCell{};
     contributing_ = static_cast<std::uint8_t>(contributing_ & ~(1U << i));
   }
 }
@@ -95,14 +97,14 @@ Wrench ForceBuffer::contributed(Tick now) const noexcept {
 bool ForceBuffer::oldest(std::size_t cell) const noexcept {
   const Tick stamp = cells_[cell].stamp;
   if (!cells_[cell].used) return true;
-  const auto outside = std::span(cells_).subspan(own_cells_);
+  const auto contributions = std::span(cells_).subspan(own_cells_);
   return std::all_of(used_.begin(), used_.end(), [&](auto own) { return cells_[own].stamp >= stamp; }) &&
-         std::all_of(outside.begin(), outside.end(),
+         std::all_of(contributions.begin(), contributions.end(),
                      [&](const ForceCell& other) { return !other.used || other.stamp >= stamp; });
 }
 
-bool ForceBuffer::due(std::size_t cell) const noexcept {
+bool ForceBuffer::totalDue(std::size_t cell) const noexcept {
   return policy_ == SendPolicy::kEveryForce || oldest(cell);
 }
 
-}  // namespace tenon
+}  // namespace tenon::simulation

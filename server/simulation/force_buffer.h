@@ -8,67 +8,68 @@
 #include "idl/types/ids.h"
 #include "idl/types/spatial.h"
 
-namespace tenon {
+namespace tenon::simulation {
 
-/// When a new cell makes a new total worth sending (paper §3.2, iv).
+/// When writing a cell makes a new total due (paper §3.2, iv).
 enum class SendPolicy : std::uint8_t {
-  kEveryForce,  ///< whenever a force arrives
-  kOldestCell,  ///< when the cell that had waited longest is refreshed: about once for all sources
+  kEveryForce,  ///< after every write
+  kOldestCell,  ///< after a write to the oldest cell: about once for all sources
 };
 
-/// What one source exerts.
+/// The wrench of one source.
 struct ForceCell {
   Wrench F_Bo_W;
-  Tick stamp = 0;                    ///< of the last write
-  std::uint32_t source = 0;          ///< of a contribution: its sender's name for it
-  std::uint32_t lifetime_ticks = 0;  ///< 0: stays until overwritten
+  Tick stamp = 0;                    ///< tick of the last write
+  std::uint32_t source = 0;          ///< contributions only: id chosen by the sender
+  std::uint32_t lifetime_ticks = 0;  ///< [ticks] 0: valid until overwritten
   bool used = false;
 };
 
-/// Sums what several sources exert on one object (paper §3.2, iii-iv).
+/// Accumulates the wrenches of several sources on one object (paper §3.2, iii-iv).
 ///
-/// Every source owns one cell and overwrites it: first the own cells (pairs, couplings of hands), which stay
-/// until overwritten, so a pair skipped by coherence leaves its cell as it was; then cells for contributions
-/// from outside, which are checked, capped, fade linearly with age and expire. Cells are summed in cell
-/// order, never in arrival order: the total is the same to the last bit for any number of workers. Which own
-/// cells are in use is listed in order, so that a sum costs what pushes, not what could.
+/// Every source has one cell and overwrites it. The own cells (pairs, couplings of hands, gravity) come
+/// first; they stay valid until overwritten, so a pair skipped by coherence keeps its wrench. Then come cells
+/// for contributions of clients, which are validated, clamped, fade linearly with age and expire. Cells are
+/// summed in cell order, not in order of arrival: the total is bit-equal for any number of workers. The own
+/// cells in use are listed, so a sum costs only those.
 ///
 /// Threads: one writer per own cell, contributions from one thread; total() after the tick's barrier.
 /// Real-time: everything but the constructor.
 class ForceBuffer {
  public:
   static constexpr std::size_t kContributions = 8;
-  /// A hand-held device displays at most this, so nobody outside may ask for more.
-  static constexpr double kMaxContributedForce = 50.0;
-  static constexpr double kMaxContributedTorque = 5.0;
-  /// A source that has been silent for longer is not pushing any more.
+  /// Limits of a contribution: about the peak output of a haptic device.
+  static constexpr double kMaxContributedForce = 50.0;  ///< [N]
+  static constexpr double kMaxContributedTorque = 5.0;  ///< [Nm]
+  /// [ticks] a contribution ends at most this long after its last update.
   static constexpr std::uint32_t kMaxLifetimeTicks = 200;
 
   explicit ForceBuffer(std::size_t own_cells, SendPolicy policy = SendPolicy::kEveryForce);
 
-  /// Overwrites an own cell. True when a total is due.
+  /// Overwrites an own cell. True when a new total is due by the SendPolicy.
   bool write(std::size_t cell, const Wrench& F_Bo_W, Tick now) noexcept;
+  /// Marks an own cell as unused.
   void clear(std::size_t cell) noexcept;
 
-  /// Overwrites the cell of `source` or takes a free one. False, and counted in refused(), when the wrench is
-  /// not finite, its lifetime is zero or no cell is free; longer lifetimes and larger wrenches are cut.
+  /// Overwrites the cell of `source` or uses a free one; lifetime and wrench are clamped to the limits above.
+  /// False, and counted in rejected(), when the wrench is not finite, its lifetime is 0 or no cell is free.
   bool contribute(std::uint32_t source, const Wrench& F_Bo_W, std::uint32_t lifetime_ticks,
                   Tick now) noexcept;
-  /// Frees the contributions that have outlived their lifetime.
+  /// Frees the cells of contributions whose lifetime is over.
   void expire(Tick now) noexcept;
 
-  /// Of all cells, in cell order, at their weight of `now`.
+  /// Sum of all cells in cell order, contributions with their weight at tick `now`.
   [[nodiscard]] Wrench total(Tick now) const noexcept;
-  /// Of the contributions alone.
+  /// Sum of the contributions alone.
   [[nodiscard]] Wrench contributed(Tick now) const noexcept;
   [[nodiscard]] Wrench cell(std::size_t index) const noexcept { return cells_[index].F_Bo_W; }
   /// Ticks since the cell was written.
   [[nodiscard]] Tick age(std::size_t index, Tick now) const noexcept { return now - cells_[index].stamp; }
-  [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
+  [[nodiscard]] std::uint64_t rejected() const noexcept { return rejected_; }
 
   [[nodiscard]] std::span<const ForceCell> cells() const noexcept { return cells_; }
 
-  /// The cells in use, to be written, read or hashed.
+  /// Writes, reads or hashes the cells in use.
   template <typename Archive, typename Self>
   static void archive(Archive& archive, Self& self) {
     auto own = static_cast<std::uint32_t>(self.used_.size());
@@ -82,12 +83,12 @@ class ForceBuffer {
       archive(cell);
       if constexpr (Archive::kReads) {
         const bool next = cell < self.own_cells_ && (i == 0 || cell > self.used_.back());
-        if (!archive.ok() || !next) return archive.refuse();
+        if (!archive.ok() || !next) return archive.reject();
         self.used_.push_back(cell);
       }
       archive(self.cells_[cell]);
       if constexpr (Archive::kReads) {
-        if (!self.cells_[cell].used) return archive.refuse();
+        if (!self.cells_[cell].used) return archive.reject();
       }
     }
     archive(self.contributing_);
@@ -101,14 +102,14 @@ class ForceBuffer {
 
  private:
   [[nodiscard]] bool oldest(std::size_t cell) const noexcept;
-  [[nodiscard]] bool due(std::size_t cell) const noexcept;
+  [[nodiscard]] bool totalDue(std::size_t cell) const noexcept;
 
   std::vector<ForceCell> cells_;
-  std::vector<std::uint32_t> used_;  // own cells, in order
-  std::uint8_t contributing_ = 0;    // one bit a contribution in use: most objects have none
+  std::vector<std::uint32_t> used_;  // own cells in use, ascending
+  std::uint8_t contributing_ = 0;    // bit i: contribution i is in use
   std::size_t own_cells_;
   SendPolicy policy_;
-  std::uint64_t refused_ = 0;
+  std::uint64_t rejected_ = 0;
 };
 
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cassert>
 
-namespace tenon {
+namespace tenon::simulation {
 
 IslandWork::IslandWork(std::size_t max_bodies, std::size_t max_pairs, unsigned workers)
     : islands_(max_bodies),
@@ -12,7 +12,7 @@ IslandWork::IslandWork(std::size_t max_bodies, std::size_t max_pairs, unsigned w
       pairs_(max_pairs),
       pair_of_slot_(max_pairs),
       results_(max_pairs) {
-  for (IslandPairResult& result : results_) result.multipliers.resize(kMaxPairContacts);
+  for (collision::IslandPairResult& result : results_) result.multipliers.resize(collision::kMaxPairContacts);
   solvers_.reserve(workers);
   for (unsigned worker = 0; worker < workers; ++worker) {
     solvers_.emplace_back(std::max<std::size_t>(max_bodies, 1), std::max<std::size_t>(max_pairs, 1));
@@ -25,24 +25,24 @@ void IslandWork::clear() noexcept {
   pair_count_ = 0;
 }
 
-void IslandWork::beginIsland(const SolveLimits& limits) noexcept {
+void IslandWork::beginIsland(const collision::SolveLimits& limits) noexcept {
   assert(island_count_ < islands_.size());
   islands_[island_count_++] = {body_count_, 0, pair_count_, 0, limits, {}};
 }
 
-void IslandWork::addPoints(std::uint64_t points) noexcept {
+void IslandWork::addPointBudget(std::uint64_t points) noexcept {
   std::uint64_t& limit = islands_[island_count_ - 1].limits.points;
-  limit = limit == SolveLimits{}.points ? points : limit + points;
+  limit = limit == collision::SolveLimits{}.points ? points : limit + points;
 }
 
-void IslandWork::addBody(ObjectId object, const MovableBody& body) noexcept {
+void IslandWork::addBody(ObjectId object, const collision::MovableBody& body) noexcept {
   assert(body_count_ < bodies_.size());
   objects_[body_count_] = object;
   bodies_[body_count_++] = body;
   ++islands_[island_count_ - 1].bodies;
 }
 
-void IslandWork::addPair(std::size_t pair, const IslandPair& island_pair) noexcept {
+void IslandWork::addPair(std::size_t pair, const collision::IslandPair& island_pair) noexcept {
   assert(pair_count_ < pairs_.size());
   pair_of_slot_[pair_count_] = pair;
   pairs_[pair_count_++] = island_pair;
@@ -52,12 +52,12 @@ void IslandWork::addPair(std::size_t pair, const IslandPair& island_pair) noexce
 void IslandWork::solve(WorkerPool& pool) noexcept {
   auto solveOne = [this](unsigned worker, std::size_t item) {
     Island& island = islands_[item];
-    island.report =
-        solvers_[worker].solve(std::span(bodies_).subspan(island.first_body, island.bodies),
-                               std::span<const IslandPair>(pairs_).subspan(island.first_pair, island.pairs),
-                               island.limits, std::span(results_).subspan(island.first_pair, island.pairs));
+    island.report = solvers_[worker].solve(
+        std::span(bodies_).subspan(island.first_body, island.bodies),
+        std::span<const collision::IslandPair>(pairs_).subspan(island.first_pair, island.pairs),
+        island.limits, std::span(results_).subspan(island.first_pair, island.pairs));
   };
   pool.run(island_count_, solveOne);
 }
 
-}  // namespace tenon
+}  // namespace tenon::simulation

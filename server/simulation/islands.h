@@ -7,13 +7,12 @@
 
 #include "idl/types/ids.h"
 
-namespace tenon {
+namespace tenon::simulation {
 
-/// Which movable bodies have to be solved together (contact islands): union-find over pairs of bodies that
-/// could touch in this tick. A body that stands still joins nothing, so a bay with five parts in it does not
-/// make one island of two people's hands.
+/// Partition of the movable bodies into contact islands: union-find over the pairs that may touch in this
+/// tick. Immovable bodies do not connect islands: two hands that touch the same fixed part are independent.
 ///
-/// Islands are numbered by their lowest body and list their bodies in order: the same in every run.
+/// Islands are numbered by their lowest object id, and so are bodies within an island: the same in every run.
 ///
 /// Threads: one at a time. Real-time: everything but the constructor.
 class IslandPartition {
@@ -22,27 +21,27 @@ class IslandPartition {
 
   explicit IslandPartition(std::size_t objects);
 
-  /// Every movable object is alone; the others are in no island.
-  void begin(std::span<const std::uint8_t> movable) noexcept;
-  /// The two belong together. Ignored when one of them does not move.
+  /// Makes every movable object (flag not 0) an island of its own; the others are in none.
+  void reset(std::span<const std::uint8_t> movable) noexcept;
+  /// Merges the islands of `a` and `b`. Ignored when one of them is not movable.
   void join(ObjectId a, ObjectId b) noexcept;
-  /// Numbers the islands; to be called before the queries below.
-  void number() noexcept;
+  /// Numbers islands and their bodies; to be called after join() and before the functions below.
+  void assignIslands() noexcept;
 
   [[nodiscard]] std::size_t count() const { return count_; }
-  /// kNone for what does not move.
+  /// kNone for an object that is not movable.
   [[nodiscard]] std::int32_t islandOf(ObjectId object) const { return island_[object.value]; }
-  /// Place of an object among the bodies of its island.
-  [[nodiscard]] std::int32_t placeOf(ObjectId object) const { return place_[object.value]; }
+  /// Index of a movable object among the bodies of its island.
+  [[nodiscard]] std::int32_t bodyIndexOf(ObjectId object) const { return body_index_[object.value]; }
 
  private:
-  [[nodiscard]] std::int32_t root(std::int32_t object) noexcept;
+  [[nodiscard]] std::int32_t findRoot(std::int32_t object) noexcept;
 
   std::vector<std::int32_t> parent_;
   std::vector<std::int32_t> island_;
-  std::vector<std::int32_t> place_;
+  std::vector<std::int32_t> body_index_;
   std::vector<std::int32_t> size_;
   std::size_t count_ = 0;
 };
 
-}  // namespace tenon
+}  // namespace tenon::simulation

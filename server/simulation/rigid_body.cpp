@@ -7,7 +7,7 @@
 
 #include "idl/types/ids.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
 btVector3 toBullet(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
@@ -24,8 +24,8 @@ struct RigidBody::Bullet {
 };
 
 RigidBody::RigidBody(const BodySpec& spec, const Vector3& gravity_W) : spec_(spec) {
-  static_assert(sizeof(btScalar) == sizeof(double), "poses of a scene need Bullet in double precision");
-  // by rotations alone: the closed form takes a cosine
+  static_assert(sizeof(btScalar) == sizeof(double), "Bullet has to be built in double precision");
+  // the iterative decomposition: the closed form uses cos(), which differs between processors
   const Eigen::SelfAdjointEigenSolver<Matrix3> axes(spec.inertia_C_O);
   Matrix3 R_OP = axes.eigenvectors();
   if (R_OP.determinant() < 0.0) R_OP.col(2) = -R_OP.col(2);
@@ -38,7 +38,7 @@ RigidBody::~RigidBody() = default;
 RigidBody::RigidBody(RigidBody&&) noexcept = default;
 RigidBody& RigidBody::operator=(RigidBody&&) noexcept = default;
 
-Twist RigidBody::fly(const Quaternion& q_WO, const Twist& V_WC, const Wrench& F_Co_W) noexcept {
+Twist RigidBody::integrateVelocity(const Quaternion& q_WO, const Twist& V_WC, const Wrench& F_Co_W) noexcept {
   btRigidBody& body = bullet_->body;
   const Quaternion q_WP = q_WO * q_OP_;
   body.setCenterOfMassTransform(btTransform(btQuaternion(q_WP.x(), q_WP.y(), q_WP.z(), q_WP.w())));
@@ -50,9 +50,10 @@ Twist RigidBody::fly(const Quaternion& q_WO, const Twist& V_WC, const Wrench& F_
   body.applyCentralForce(toBullet(weight_W_ + F_Co_W.force));
   body.applyTorque(toBullet(F_Co_W.torque));
   body.integrateVelocities(kTickSeconds);
-  // not Bullet's own damping, which asks the C library for a power
-  const double kept = std::max(1.0 - spec_.damping * kTickSeconds, 0.0);
-  return {kept * fromBullet(body.getLinearVelocity()), kept * fromBullet(body.getAngularVelocity())};
+  // not Bullet's damping: it uses pow(), which differs between processors
+  const double damping_factor = std::max(1.0 - spec_.damping * kTickSeconds, 0.0);
+  return {damping_factor * fromBullet(body.getLinearVelocity()),
+          damping_factor * fromBullet(body.getAngularVelocity())};
 }
 
 Matrix3 RigidBody::inertia(const Quaternion& q_WO) const noexcept {
@@ -72,4 +73,4 @@ Twist atOrigin(const Twist& V_WC, const Pose& X_WO, const Vector3& p_OC_O) {
   return {V_WC.linear - V_WC.angular.cross(X_WO.rotation() * p_OC_O), V_WC.angular};
 }
 
-}  // namespace tenon
+}  // namespace tenon::simulation

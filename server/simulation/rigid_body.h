@@ -5,12 +5,12 @@
 #include "idl/types/spatial.h"
 #include "server/simulation/scene.h"
 
-namespace tenon {
+namespace tenon::simulation {
 
-/// The flight of a free body between two ticks: Bullet integrates its velocities under gravity, what else
-/// pushes, and the gyroscopic moment (implicitly, so that a long part does not spin itself up). Where the
-/// body then is, what it meets and how it turns there are ours: Bullet sees no collision and no pose of its
-/// own. In double precision; functions of the C library that differ between processors are kept out.
+/// Velocity integration of a free rigid body by Bullet's btRigidBody, in double precision: gravity, an
+/// applied wrench, and the gyroscopic moment (implicit, so that an elongated body does not gain energy).
+/// Poses and contacts are the island solver's: Bullet gets the current orientation and does no collision
+/// detection. Only operations whose results are equal on every processor are used.
 ///
 /// Threads: one at a time. Real-time: everything but the constructor.
 class RigidBody {
@@ -20,28 +20,31 @@ class RigidBody {
   RigidBody(RigidBody&&) noexcept;
   RigidBody& operator=(RigidBody&&) noexcept;
 
-  /// Velocities of the centre of mass and about it, a tick later.
-  [[nodiscard]] Twist fly(const Quaternion& q_WO, const Twist& V_WC, const Wrench& F_Co_W) noexcept;
-  /// About the centre of mass [kg m^2].
+  /// Advances the velocities by one tick: the twist of the centre of mass C at the end of the tick, in W, for
+  /// the twist `V_WC` at its start and the wrench `F_Co_W` about C (gravity is added).
+  [[nodiscard]] Twist integrateVelocity(const Quaternion& q_WO, const Twist& V_WC,
+                                        const Wrench& F_Co_W) noexcept;
+  /// [kg m^2] about C, in W, at the orientation `q_WO`.
   [[nodiscard]] Matrix3 inertia(const Quaternion& q_WO) const noexcept;
-  [[nodiscard]] double mass() const noexcept { return spec_.mass; }
+  [[nodiscard]] double mass() const noexcept { return spec_.mass; }  ///< [kg]
+  /// [m] p_OC_O, the centre of mass in the body's frame.
   [[nodiscard]] const Vector3& centre() const noexcept { return spec_.p_OC_O; }
-  /// Of gravity on it [N]; none when it floats.
+  /// [N] force of gravity in W; zero for a floating body.
   [[nodiscard]] const Vector3& weight() const noexcept { return weight_W_; }
-  /// [J] of motion.
+  /// [J] kinetic energy.
   [[nodiscard]] double energy(const Quaternion& q_WO, const Twist& V_WC) const noexcept;
 
  private:
   struct Bullet;
 
   BodySpec spec_;
-  Quaternion q_OP_ = Quaternion::Identity();  // P: axes along the principal moments of inertia
+  Quaternion q_OP_ = Quaternion::Identity();  // P: principal axes of inertia
   Vector3 weight_W_ = Vector3::Zero();
   std::unique_ptr<Bullet> bullet_;
 };
 
-/// Velocity of the centre of mass (and about it), of a body whose frame moves with V_WO; and back.
+/// Twist of the centre of mass C from the twist of the body's origin O; and back. All in W.
 [[nodiscard]] Twist atCentre(const Twist& V_WO, const Pose& X_WO, const Vector3& p_OC_O);
 [[nodiscard]] Twist atOrigin(const Twist& V_WC, const Pose& X_WO, const Vector3& p_OC_O);
 
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <string_view>
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
 template <typename IdType, typename List>
-IdType named(const List& list, std::string_view name) {
+IdType findNamed(const List& list, std::string_view name) {
   const auto found =
       std::find_if(list.begin(), list.end(), [&](const auto& one) { return one.name == name; });
   if (found == list.end()) return {};
@@ -16,9 +16,9 @@ IdType named(const List& list, std::string_view name) {
 
 }  // namespace
 
-ObjectId Scene::objectNamed(std::string_view name) const { return named<ObjectId>(objects, name); }
+ObjectId Scene::objectNamed(std::string_view name) const { return findNamed<ObjectId>(objects, name); }
 
-HandId Scene::handNamed(std::string_view name) const { return named<HandId>(hands, name); }
+HandId Scene::handNamed(std::string_view name) const { return findNamed<HandId>(hands, name); }
 
 int Scene::pairOf(ObjectId a, ObjectId b) const {
   const auto found = std::find_if(pairs.begin(), pairs.end(), [&](const PairSpec& pair) {
@@ -27,4 +27,4 @@ int Scene::pairOf(ObjectId a, ObjectId b) const {
   return found == pairs.end() ? -1 : static_cast<int>(found - pairs.begin());
 }
 
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -12,71 +12,74 @@
 #include "server/collision/island_solver.h"
 #include "server/structures/haptic_structures.h"
 
-namespace tenon {
+namespace tenon::simulation {
 
-/// An object that has a mass: nobody holds it, it falls, flies and is pushed.
+/// Mass properties of a free rigid body: while no hand holds it, it falls and moves under contact forces.
 struct BodySpec {
   double mass = 1.0;                          ///< [kg]
-  Vector3 p_OC_O = Vector3::Zero();           ///< centre of mass
-  Matrix3 inertia_C_O = Matrix3::Identity();  ///< [kg m^2] about it
-  bool floating = false;                      ///< gravity does not pull at it
-  double damping = 0.0;                       ///< [1/s] share of its speed that the air takes
-  /// Coulomb's coefficient while it is free, on whatever its pair has no friction of its own with
+  Vector3 p_OC_O = Vector3::Zero();           ///< [m] centre of mass C
+  Matrix3 inertia_C_O = Matrix3::Identity();  ///< [kg m^2] about C, in the axes of O
+  bool floating = false;                      ///< not subject to gravity
+  double damping = 0.0;                       ///< [1/s] damping rate of linear and angular velocity
+  /// [-] Coulomb's coefficient while the body is free, in pairs without a PairSpec::friction
   /// (environment_friction.cpp).
   double friction = 0.0;
 };
 
-/// An object of the scene as it never changes.
+/// The constant properties and the initial state of an object.
 struct ObjectSpec {
   std::string name;   ///< in files and logs
-  std::string title;  ///< on screen: the trainer's word
+  std::string title;  ///< on screens
   std::string kind = "part";
   std::string color = "#b0b7bf";
-  std::uint32_t group = 0;                             ///< objects of one group never touch; 0: no group
-  Pose X_WO;                                           ///< at the start
-  ObjectStatus status = ObjectStatus::kParked;         ///< at the start
-  std::shared_ptr<const HapticStructures> structures;  ///< none: seen, never felt
-  double stiffness = 1000.0;     ///< [N/m] of its penalty force (of what a tracker moves, and the baselines)
-  std::optional<BodySpec> body;  ///< none: it stands where it is put
+  std::uint32_t group = 0;                      ///< objects of one group never collide; 0: no group
+  Pose X_WO;                                    ///< at the start
+  ObjectStatus status = ObjectStatus::kParked;  ///< at the start
+  std::shared_ptr<const structures::HapticStructures> structures;  ///< null: visible, not collidable
+  double stiffness = 1000.0;     ///< [N/m] of penalty forces: tracked objects, and the baseline methods
+  std::optional<BodySpec> body;  ///< none: kinematic
 };
 
-/// Two objects that may touch.
+/// Two objects that may collide: one entry of the collision filter (the paper's configuration matrix).
 struct PairSpec {
-  ObjectId a;             ///< asked as a shell
-  ObjectId b;             ///< asked as a field
-  double dilation = 0.0;  ///< [m] of b's surface
-  bool enabled = true;    ///< at the start: a cell of the configuration matrix
-  bool sensing = false;   ///< felt as vibration, never resisted: a forearm
-  /// In the islands, on patches (island_friction.cpp), instead of the friction of bodies; none: theirs.
-  std::optional<Friction> friction;
+  ObjectId a;             ///< pointshell side
+  ObjectId b;             ///< SDF side
+  double dilation = 0.0;  ///< [m] outward offset of b's surface
+  bool enabled = true;    ///< at the start
+  bool sensing = false;   ///< contacts are reported (vibrotactile forearm) but exert no force
+  /// Friction of patches inside the island solver (island_friction.cpp), replaces BodySpec::friction in this
+  /// pair; none: BodySpec::friction applies.
+  std::optional<collision::Friction> friction;
 };
 
 enum class HandKind : std::uint8_t {
-  kCoupled,  ///< holds its object by a virtual coupling and feels it
-  kTracked,  ///< its object is where the tracker is
+  kCoupled,  ///< moves its object through a virtual coupling, with force feedback
+  kTracked,  ///< its object has the pose of the tracker; no force feedback
 };
 
-/// Somebody's hand (the paper's hdIndex) or tracked limb.
+/// A participant's hand (the paper's hdIndex) or tracked limb.
 struct HandSpec {
   std::string name;
   Role role = Role::kTrainee;
   HandKind kind = HandKind::kCoupled;
-  ObjectId object;            ///< what it moves when nothing else is said: pointer, drill, cube, forearm
-  double stiffness = 1000.0;  ///< [N/m] of the coupling
-  double rotational_stiffness = 20.0;  ///< [Nm/rad]
+  ObjectId object;            ///< default object: moved while the hand holds no other (pointer, forearm)
+  double stiffness = 1000.0;  ///< [N/m] of the virtual coupling
+  double rotational_stiffness = 20.0;  ///< [Nm/rad] of the virtual coupling
 };
 
-/// The read-only scene: built once, shared by all threads.
+/// The constant part of the simulation: objects, pairs and hands, with ids as indices.
+///
+/// Threads: built once, then read by any. Real-time: no (the searches by name are linear).
 struct Scene {
   std::vector<ObjectSpec> objects;
   std::vector<PairSpec> pairs;
   std::vector<HandSpec> hands;
   Vector3 gravity_W{0.0, 0.0, -9.81};  ///< [m/s^2]
 
-  [[nodiscard]] ObjectId objectNamed(std::string_view name) const;  ///< invalid when there is none
-  [[nodiscard]] HandId handNamed(std::string_view name) const;
-  /// The pair of these two, in either order; -1 when they never touch.
+  [[nodiscard]] ObjectId objectNamed(std::string_view name) const;  ///< invalid id when there is none
+  [[nodiscard]] HandId handNamed(std::string_view name) const;      ///< invalid id when there is none
+  /// Index of the pair of `a` and `b`, in either order; -1 when there is none.
   [[nodiscard]] int pairOf(ObjectId a, ObjectId b) const;
 };
 
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -13,11 +13,11 @@
 #include "server/collision/island_solver.h"
 #include "server/simulation/force_buffer.h"
 
-namespace tenon {
+namespace tenon::simulation {
 
-/// One list of fields, three uses: `Derived` writes, reads or hashes numbers one by one, this base takes the
-/// values of the simulation apart into numbers. So nothing can be saved and not hashed, or written and not
-/// read.
+/// Traversal of the simulation state for serialisation and hashing. This base splits the types of the
+/// simulation into numbers; `Derived` writes, reads or hashes a number. One list of fields serves all three,
+/// so what is saved is also hashed and restored.
 template <typename Derived>
 class StateArchive {
  public:
@@ -67,7 +67,7 @@ class StateArchive {
     visit(cell.lifetime_ticks);
   }
   template <typename C>
-  requires std::is_same_v<std::remove_const_t<C>, QueryCounts>
+  requires std::is_same_v<std::remove_const_t<C>, collision::QueryCounts>
   void visit(C& counts) {
     visit(counts.spheres_visited);
     visit(counts.spheres_total);
@@ -75,9 +75,9 @@ class StateArchive {
     visit(counts.points_colliding);
     visit(counts.contacts_dropped);
   }
-  /// What is not also a member of CollPair.
+  /// The members of IslandPairResult that CollPair does not archive as its own.
   template <typename R>
-  requires std::is_same_v<std::remove_const_t<R>, IslandPairResult>
+  requires std::is_same_v<std::remove_const_t<R>, collision::IslandPairResult>
   void visit(R& result) {
     visit(result.F_Ao_W);
     static_cast<Derived*>(this)->count(result.query.contacts);
@@ -90,42 +90,42 @@ class StateArchive {
       visit(contact.point);
       visit(result.multipliers[i]);
     }
-    visit(result.query.listed_to);
-    visit(result.query.others_gap);
-    visit(result.query.thinned);
-    visit(result.walked.done);
-    visit(result.walked.X_WA);
-    visit(result.walked.X_WB);
-    visit(result.walked.levels);
-    visit(result.walked.used);
-    visit(result.flanks);
+    visit(result.query.complete_to);
+    visit(result.query.unlisted_gap);
+    visit(result.query.reduced);
+    visit(result.traversal.valid);
+    visit(result.traversal.X_WA);
+    visit(result.traversal.X_WB);
+    visit(result.traversal.levels);
+    visit(result.traversal.levels_used);
+    visit(result.secondary_planes);
     visit(result.slides);
   }
 };
 
-/// Appends to bytes. Numbers are stored as this machine has them: checkpoints belong to one build.
-class StateWriter : public StateArchive<StateWriter> {
+/// Appends to `bytes` in the machine's own representation: a checkpoint is valid for one build only.
+class ArchiveWriter : public StateArchive<ArchiveWriter> {
  public:
   static constexpr bool kReads = false;
-  explicit StateWriter(std::vector<std::uint8_t>& bytes) : bytes_(&bytes) {}
+  explicit ArchiveWriter(std::vector<std::uint8_t>& bytes) : bytes_(&bytes) {}
 
   template <typename T>
   void number(const T& value) {
     const auto* first = reinterpret_cast<const std::uint8_t*>(&value);
     bytes_->insert(bytes_->end(), first, first + sizeof(T));
   }
-  void count(const ContactList& contacts) { number(static_cast<std::uint32_t>(contacts.size())); }
+  void count(const collision::ContactList& contacts) { number(static_cast<std::uint32_t>(contacts.size())); }
 
  private:
   std::vector<std::uint8_t>* bytes_;
 };
 
-/// Reads what StateWriter wrote. Past the end, or on a number that no writer writes, it stops being ok() and
-/// leaves everything as it is.
-class StateReader : public StateArchive<StateReader> {
+/// Reads what ArchiveWriter wrote. After the end of the bytes or an invalid value ok() is false and nothing
+/// more is assigned.
+class ArchiveReader : public StateArchive<ArchiveReader> {
  public:
   static constexpr bool kReads = true;
-  explicit StateReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
+  explicit ArchiveReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
 
   template <typename T>
   void number(T& value) {
@@ -139,14 +139,14 @@ class StateReader : public StateArchive<StateReader> {
     }
     bytes_ = bytes_.subspan(sizeof(T));
   }
-  void count(ContactList& contacts) {
+  void count(collision::ContactList& contacts) {
     std::uint32_t size = 0;
     number(size);
-    ok_ = ok_ && size <= ContactList::capacity();
+    ok_ = ok_ && size <= collision::ContactList::capacity();
     contacts.resize(ok_ ? size : 0);
   }
-  /// What was read cannot be.
-  void refuse() { ok_ = false; }
+  /// The caller found an invalid value.
+  void reject() { ok_ = false; }
   [[nodiscard]] bool ok() const { return ok_; }
   [[nodiscard]] bool atEnd() const { return ok_ && bytes_.empty(); }
 
@@ -155,8 +155,8 @@ class StateReader : public StateArchive<StateReader> {
   bool ok_ = true;
 };
 
-/// Hashes. Real-time.
-class StateHasher : public StateArchive<StateHasher> {
+/// Computes the state hash. Real-time.
+class ArchiveHasher : public StateArchive<ArchiveHasher> {
  public:
   static constexpr bool kReads = false;
   template <typename T>
@@ -167,11 +167,11 @@ class StateHasher : public StateArchive<StateHasher> {
       hash_.add(static_cast<std::uint64_t>(value));
     }
   }
-  void count(const ContactList& contacts) { number(contacts.size()); }
+  void count(const collision::ContactList& contacts) { number(contacts.size()); }
   [[nodiscard]] std::uint64_t value() const { return hash_.value(); }
 
  private:
   StateHash hash_;
 };
 
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -8,34 +8,34 @@
 #include "server/simulation/coll_pair.h"
 #include "server/simulation/scene.h"
 
-namespace tenon {
+namespace tenon::simulation {
 
-/// Shares the work of a tick among the pairs that have to be looked at (paper §3.2, graceful degradation).
+/// Distributes the point budget of a tick among the pairs that are due (paper §3.2, graceful degradation).
 ///
-/// The worst case of a pair is known from the start: as many points of its shell as lie on the skin that fits
-/// into the other's box. Of a tick's points it gets that share among the pairs at hand, scaled by how near
-/// its last load came to the critical one: who has much to do takes from those that hardly touch.
+/// The worst case of a pair is computed at the start: the shell points of a on the part of its surface that
+/// fits into b's bounding box. Budgets are proportional to the worst case, scaled by the last load over the
+/// critical load: pairs with many contacts get more than pairs that hardly touch.
 ///
-/// Threads: one at a time. Real-time: share, of.
+/// Threads: one at a time. Real-time: distribute, pointsFor.
 class WorkBudget {
  public:
   static constexpr std::uint32_t kUnlimited = 0xFFFFFFFFU;
 
-  /// Room for so many pairs at a time.
-  WorkBudget(const Scene& scene, std::size_t rooms);
+  /// `max_due`: most pairs that are due in one tick.
+  WorkBudget(const Scene& scene, std::size_t max_due);
 
-  /// `due` lists pairs by number.
-  void share(const WorkLimits& limits, std::span<const std::uint32_t> due,
-             std::span<const CollPair> pairs) noexcept;
-  /// Points for the pair at this place of the list; kUnlimited without limits.
-  [[nodiscard]] std::uint32_t of(std::size_t slot) const { return shares_[slot]; }
-  /// Points of the pair's shell that may touch at worst.
-  [[nodiscard]] double worstCase(std::size_t pair) const { return worst_[pair]; }
+  /// `due`: indices of the due pairs; a slot is a position in this list.
+  void distribute(const WorkLimits& limits, std::span<const std::uint32_t> due,
+                  std::span<const CollPair> pairs) noexcept;
+  /// Points that the pair in this slot may test; kUnlimited without limits.
+  [[nodiscard]] std::uint32_t pointsFor(std::size_t slot) const { return budgets_[slot]; }
+  /// [points] most points of the pair's shell that may be in contact.
+  [[nodiscard]] double worstCase(std::size_t pair) const { return worst_case_[pair]; }
 
  private:
-  std::vector<double> worst_;          // by pair
-  std::vector<double> wanted_;         // by slot
-  std::vector<std::uint32_t> shares_;  // by slot
+  std::vector<double> worst_case_;      // [points] by pair
+  std::vector<double> weights_;         // [points] by slot
+  std::vector<std::uint32_t> budgets_;  // [points] by slot
 };
 
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cassert>
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
-/// Some tens of microseconds: islands of one tick end about together, while the next tick is far away.
+/// Some tens of microseconds: longer than the islands of one tick differ, shorter than the pause to the next.
 constexpr int kSpins = 2000;
 
 constexpr unsigned kItemsShift = 16;
@@ -19,7 +19,7 @@ void pause() noexcept {
 #endif
 }
 
-/// Waits until `value` is no longer `old`: awake for a while, then asleep.
+/// Waits until `value` differs from `old`: spinning at first, then on a futex.
 void waitWhile(std::atomic<std::uint32_t>& value, std::uint32_t old) noexcept {
   for (int spin = 0; spin < kSpins; ++spin) {
     if (value.load(std::memory_order_acquire) != old) return;
@@ -74,7 +74,7 @@ void WorkerPool::takeItems(unsigned worker) noexcept {
                                        std::memory_order_acquire)) {
       continue;
     }
-    // until this item is reported done, the run cannot end and call_ stays what it is
+    // the run cannot end before this item is counted as done, so call_ and context_ are valid
     call_(context_, worker, item);
     if (done_.fetch_add(1, std::memory_order_acq_rel) + 1 == items) done_.notify_one();
     ticket = ticket_.load(std::memory_order_acquire);
@@ -90,4 +90,4 @@ void WorkerPool::work(unsigned worker) noexcept {
   }
 }
 
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -6,14 +6,14 @@
 #include <thread>
 #include <vector>
 
-namespace tenon {
+namespace tenon::simulation {
 
-/// Shares the independent items of one tick among threads, the caller included.
+/// Thread pool for the independent items of one tick; the calling thread is one of the workers.
 ///
-/// Items are taken by index; which worker takes which is left to chance, so an item may write only what is
-/// its own. Idle workers spin briefly, then sleep on a futex; with one worker there is no thread at all.
+/// Which worker processes which item is not determined, so an item may write only its own data. Idle workers
+/// spin briefly, then sleep on a futex. A pool of one worker starts no thread.
 ///
-/// Threads: run() from one thread. Real-time: run() (wakes sleepers, allocates and locks nothing).
+/// Threads: run() from one thread. Real-time: run() (wakes sleeping workers; no allocation, no lock).
 class WorkerPool {
  public:
   explicit WorkerPool(unsigned workers);
@@ -46,12 +46,12 @@ class WorkerPool {
   std::vector<std::thread> threads_;
   Call call_ = nullptr;
   void* context_ = nullptr;
-  /// Run number (32 bits), items (16), next item (16): in one word, so a late worker never takes an item of a
-  /// run it has not seen begin.
+  /// Run number (32 bits), number of items (16) and next item (16) in one word, so that a late worker cannot
+  /// take an item of a run whose start it has not observed.
   std::atomic<std::uint64_t> ticket_{0};
   std::atomic<std::uint32_t> done_{0};
   std::atomic<std::uint32_t> wake_{0};
   std::atomic<bool> stop_{false};
 };
 
-}  // namespace tenon
+}  // namespace tenon::simulation

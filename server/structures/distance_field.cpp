@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-namespace tenon {
+namespace tenon::structures {
 
 namespace {
 
-/// A sample is off by half a quantum [voxels].
+/// [voxels] Quantisation error of a sample (half a quantum), rounded up.
 constexpr double kRounding = 1e-3;
 
 double distanceToBox(const Eigen::AlignedBox3d& box, const Vector3& p) {
@@ -17,8 +17,8 @@ double distanceToBox(const Eigen::AlignedBox3d& box, const Vector3& p) {
 
 }  // namespace
 
-/// A point's coarse brick: its index entry, and where in it the point is, each coordinate in [0, 1].
-struct DistanceField::Place {
+/// The coarse brick that a point lies in, its index entry, and the point in it [bricks], in [0, 1].
+struct DistanceField::BrickLocation {
   std::size_t number = 0;
   Entry entry = kFarOutside;
   Vector3 p_brick = Vector3::Zero();
@@ -35,19 +35,19 @@ Eigen::AlignedBox3d DistanceField::box() const {
   return {layout_.p_MoFo_M, layout_.p_MoFo_M + size * brick_edge_};
 }
 
-bool DistanceField::locate(const Vector3& p_MP, Place& place) const noexcept {
+bool DistanceField::locate(const Vector3& p_MP, BrickLocation& location) const noexcept {
   const Vector3 p = (p_MP - layout_.p_MoFo_M) * inverse_brick_edge_;
   std::array<std::size_t, 3> brick{};
   for (int axis = 0; axis < 3; ++axis) {
-    // written so that NaN is outside too
+    // the comparison is false for NaN, which counts as outside
     if (!(p[axis] >= 0.0 && p[axis] < layout_.bricks[axis])) return false;
     brick[axis] = static_cast<std::size_t>(p[axis]);
-    place.p_brick[axis] = p[axis] - static_cast<double>(brick[axis]);
+    location.p_brick[axis] = p[axis] - static_cast<double>(brick[axis]);
   }
   const auto nx = static_cast<std::size_t>(layout_.bricks[0]);
   const auto ny = static_cast<std::size_t>(layout_.bricks[1]);
-  place.number = (brick[2] * ny + brick[1]) * nx + brick[0];
-  place.entry = layout_.index[place.number];
+  location.number = (brick[2] * ny + brick[1]) * nx + brick[0];
+  location.entry = layout_.index[location.number];
   return true;
 }
 
@@ -65,7 +65,7 @@ bool DistanceField::interpolate(Entry brick, const Vector3& p_brick, double voxe
   constexpr int kY = kBrickSide;
   constexpr int kZ = kBrickSide * kBrickSide;
 
-  // along x, then y, then z; d* are differences along x, e* along y
+  // interpolate along x, then y, then z; d* are differences along x, e* along y
   const double d00 = s[1] - s[0];
   const double d10 = s[kY + 1] - s[kY];
   const double d01 = s[kZ + 1] - s[kZ];
@@ -88,31 +88,31 @@ bool DistanceField::interpolate(Entry brick, const Vector3& p_brick, double voxe
   return sample.exact;
 }
 
-double DistanceField::farMagnitude(const Place& place) const noexcept {
-  // a brick without samples has no sample nearer than the band
+double DistanceField::farMagnitude(const BrickLocation& location) const noexcept {
+  // in a brick without samples all lattice points are beyond the band
   const double beyond_band = layout_.band - kHalfDiagonal * layout_.voxel;
-  const Vector3 p_CP = (place.p_brick - Vector3::Constant(0.5)) * brick_edge_;
-  const double at_centre = std::abs(layout_.far[place.number]) * layout_.voxel / kFarPerVoxel;
+  const Vector3 p_CP = (location.p_brick - Vector3::Constant(0.5)) * brick_edge_;
+  const double at_centre = std::abs(layout_.far[location.number]) * layout_.voxel / kFarPerVoxel;
   return std::max(beyond_band, at_centre - p_CP.norm());
 }
 
 FieldSample DistanceField::sample(const Vector3& p_MP) const noexcept {
   FieldSample sample;
-  Place place;
-  if (!locate(p_MP, place)) {
+  BrickLocation location;
+  if (!locate(p_MP, location)) {
     sample.distance = distanceToBox(box(), p_MP) + layout_.margin;
     return sample;
   }
-  Entry brick = place.entry;
+  Entry brick = location.entry;
   if (brick < 0) {
-    const double magnitude = farMagnitude(place);
+    const double magnitude = farMagnitude(location);
     sample.distance = brick == kFarInside ? -magnitude : magnitude;
     return sample;
   }
   if (brick >= kRefined) {
-    // the child's answer if it is within its own band, else the coarse brick's
+    // the child's value where it is within the child's band, else that of the coarse brick
     const int r = layout_.refinement;
-    const Vector3 p = place.p_brick * r;
+    const Vector3 p = location.p_brick * r;
     std::array<int, 3> child{};
     Vector3 p_child;
     for (int axis = 0; axis < 3; ++axis) {
@@ -125,7 +125,7 @@ FieldSample DistanceField::sample(const Vector3& p_MP) const noexcept {
     if (fine >= 0 && interpolate(fine, p_child, fine_voxel, kBandVoxels * fine_voxel, sample)) return sample;
     brick = children[r * r * r];
   }
-  if (interpolate(brick, place.p_brick, layout_.voxel, layout_.band, sample)) return sample;
+  if (interpolate(brick, location.p_brick, layout_.voxel, layout_.band, sample)) return sample;
   const double magnitude = std::abs(sample.distance) - kHalfDiagonal * layout_.voxel;
   sample.distance = std::copysign(std::max(magnitude, 0.0), sample.distance);
   sample.gradient = Vector3::Zero();
@@ -133,34 +133,34 @@ FieldSample DistanceField::sample(const Vector3& p_MP) const noexcept {
 }
 
 double DistanceField::lowerBound(const Vector3& p_MP, double radius) const noexcept {
-  // A sample is no less than another one, or the centre's distance, minus the way between. The interpolant
-  // at a point is a mean of the samples about it, and the mean square of their ways is at most three quarters
-  // more than the square of the point's.
+  // The distance is 1-Lipschitz: a sample is at least the value at a reference point minus the length between
+  // them. The interpolant is a weighted mean of the 8 samples about the point; the mean of their squared
+  // lengths exceeds the point's own squared length by at most 3/4 voxel^2.
   const auto bound = [this, radius](double value, double away) {
     const double spread = kHalfDiagonal * layout_.voxel;
     return value - std::sqrt((away + radius) * (away + radius) + spread * spread) - kRounding * layout_.voxel;
   };
-  Place place;
-  if (!locate(p_MP, place)) return bound(distanceToBox(box(), p_MP) + layout_.margin, 0.0);
-  // nothing in the box is deeper than half its diagonal
-  if (place.entry == kFarInside) return -0.5 * box().diagonal().norm();
-  const Vector3 p_CP = (place.p_brick - Vector3::Constant(0.5)) * brick_edge_;
-  const double at_centre = layout_.far[place.number] * layout_.voxel / kFarPerVoxel;
+  BrickLocation location;
+  if (!locate(p_MP, location)) return bound(distanceToBox(box(), p_MP) + layout_.margin, 0.0);
+  // no point in the box is deeper than half its diagonal
+  if (location.entry == kFarInside) return -0.5 * box().diagonal().norm();
+  const Vector3 p_CP = (location.p_brick - Vector3::Constant(0.5)) * brick_edge_;
+  const double at_centre = layout_.far[location.number] * layout_.voxel / kFarPerVoxel;
   const double from_centre = bound(at_centre, p_CP.norm());
-  if (place.entry != kFarOutside) return from_centre;
-  // the sample next to p is beyond the band
+  if (location.entry != kFarOutside) return from_centre;
+  // the lattice point nearest to p is beyond the band
   return std::max(from_centre, bound(layout_.band, kHalfDiagonal * layout_.voxel));
 }
 
 double DistanceField::voxelAt(const Vector3& p_MP) const noexcept {
-  Place place;
-  if (!locate(p_MP, place) || place.entry < kRefined) return layout_.voxel;
+  BrickLocation location;
+  if (!locate(p_MP, location) || location.entry < kRefined) return layout_.voxel;
   const int r = layout_.refinement;
   std::array<int, 3> child{};
   for (int axis = 0; axis < 3; ++axis)
-    child[axis] = std::min(static_cast<int>(place.p_brick[axis] * r), r - 1);
-  const Entry fine = layout_.index[(place.entry - kRefined) + (child[2] * r + child[1]) * r + child[0]];
+    child[axis] = std::min(static_cast<int>(location.p_brick[axis] * r), r - 1);
+  const Entry fine = layout_.index[(location.entry - kRefined) + (child[2] * r + child[1]) * r + child[0]];
   return fine >= 0 ? layout_.voxel / r : layout_.voxel;
 }
 
-}  // namespace tenon
+}  // namespace tenon::structures

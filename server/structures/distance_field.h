@@ -7,46 +7,49 @@
 
 #include "idl/types/spatial.h"
 
-namespace tenon {
+namespace tenon::structures {
 
-/// What a field knows about one point.
+/// The field at one point.
 struct FieldSample {
-  double distance = 0.0;  ///< [m] signed, < 0 inside; outside the band a bound: see `exact`
-  Vector3 gradient =
-      Vector3::Zero();  ///< of the trilinear interpolant, outwards, about unit; zero when !exact
-  bool exact =
-      false;  ///< false: outside the band, |distance| is only a lower bound of the true one, sign right
+  /// [m] signed, < 0 inside. Outside the band a bound: see `exact`.
+  double distance = 0.0;
+  /// [-] of the trilinear interpolant, in M: points outwards, length about 1. Zero when not `exact`.
+  Vector3 gradient = Vector3::Zero();
+  /// False outside the band: |distance| is then a lower bound of the true one; its sign is right.
+  bool exact = false;
 };
 
-/// A signed distance to a surface, sampled in a narrow band of 8x8x8-voxel bricks (paper §3.1, "voxelmap").
+/// A signed distance field (SDF) of a surface, sampled in a narrow band of 8x8x8-voxel bricks (paper §3.1,
+/// "voxelmap").
 ///
-/// The box is cut into a coarse grid of bricks; a flat index says for each: far outside, far inside, a brick
-/// of samples, or (where a small clearance asks for it) a refined brick, cut again into refinement^3 bricks
-/// of proportionally smaller voxels near the surface, its own coarse samples answering elsewhere. A brick
-/// keeps 9^3 int16 samples, one apron layer more than its voxels, so no interpolation ever leaves it. Samples
-/// stop growing at kClampVoxels: what lies further is only known to be further. Frame M is the mesh's own.
+/// The bounding box is divided into a coarse grid of bricks. A flat index holds for each brick: far outside,
+/// far inside, a brick of samples, or (where a small clearance requires it) a refined brick. A refined brick
+/// is subdivided into refinement^3 bricks of proportionally smaller voxels; its coarse samples are used
+/// where these have none. A brick stores 9^3 int16 samples, one apron layer more than its voxels, so that
+/// interpolation needs one brick only. Samples are clamped to +-kClampVoxels. Frame M is the mesh's own.
 ///
-/// A view over memory that somebody else owns (a mapped file, a vector): copying is cheap.
+/// A non-owning view (of a mapped file or vectors) with a shared owner: cheap to copy.
 ///
 /// Threads: constant after construction, any thread may read. Real-time: all queries.
 class DistanceField {
  public:
   static constexpr int kBrickVoxels = 8;
-  static constexpr int kBrickSide = 9;                                        // samples along an edge
+  static constexpr int kBrickSide = 9;                                        // samples along one edge
   static constexpr int kBrickSamples = kBrickSide * kBrickSide * kBrickSide;  // 729
   static constexpr int kQuantaPerVoxel = 2048;  // int16 +-16 voxels, steps of 1.5 um at 3 mm
-  static constexpr int kFarPerVoxel = 16;
+  static constexpr int kFarPerVoxel = 16;       // quanta of `Layout::far`
+  /// [voxels] |distance| up to which samples are exact.
   static constexpr double kBandVoxels = 4.0;
-  /// A cell's corners lie within sqrt(3) voxels of any of its points: below kBandVoxels none of them is
-  /// clamped.
+  /// [voxels] Samples are clamped here. A cell's corners are at most sqrt(3) voxels from any of its points:
+  /// no corner is clamped where the distance is below kBandVoxels.
   static constexpr double kClampVoxels = kBandVoxels + 1.75;
-  /// [voxels] Half the diagonal of one, rounded up: no point is further from the nearest sample, and no
-  /// interpolated distance from the truth.
+  /// [voxels] Half a voxel's diagonal, rounded up: no point is further from the nearest sample, and no
+  /// interpolated distance is further from the true one.
   static constexpr double kHalfDiagonal = 0.8661;
 
-  /// An index entry: < 0: see constants; else the number of a brick. Refined: kRefined + the place in `index`
-  /// of its first child. The refinement^3 children (x fastest) are followed by one more entry: the coarse
-  /// brick that answers where a child has no samples (< 0) or is out of its own narrower band.
+  /// An index entry. Negative: one of the constants below; below kRefined: the number of a brick of samples.
+  /// Refined: kRefined + the position in `index` of its first child. The refinement^3 children (x fastest)
+  /// are followed by the coarse brick, used where a child has no samples or is outside its own narrower band.
   using Entry = std::int32_t;
   static constexpr Entry kFarOutside = -1;
   static constexpr Entry kFarInside = -2;
@@ -56,14 +59,15 @@ class DistanceField {
     Vector3 p_MoFo_M = Vector3::Zero();    ///< the grid's lowest corner
     double voxel = 0.0;                    ///< [m] edge of a coarse voxel
     std::array<std::int32_t, 3> bricks{};  ///< coarse bricks along x, y, z (x runs fastest in `index`)
-    std::int32_t refinement = 1;           ///< children of a refined brick along an edge
+    std::int32_t refinement = 1;           ///< children of a refined brick along one edge
     double band = 0.0;                     ///< [m] |distance| up to which coarse samples are exact
-    double margin = 0.0;                   ///< [m] no surface is nearer than this to the grid's border
-    std::span<const Entry> index;  ///< bricks x*y*z entries, then refinement^3 + 1 for each refined brick
-    std::span<const std::int16_t>
-        samples;  ///< kBrickSamples a brick, in voxels / kQuantaPerVoxel of its level
-    /// Per coarse brick [voxel / kFarPerVoxel], for its centre: with samples or far outside, a lower bound of
-    /// the signed distance; far inside, minus a lower bound of the depth.
+    double margin = 0.0;                   ///< [m] least distance of the surface to the grid's border
+    /// One entry per coarse brick, then refinement^3 + 1 for each refined brick.
+    std::span<const Entry> index;
+    /// kBrickSamples per brick [voxels of its level / kQuantaPerVoxel].
+    std::span<const std::int16_t> samples;
+    /// One bound per coarse brick, for its centre [voxels / kFarPerVoxel]: a lower bound of the signed
+    /// distance; for far-inside bricks minus a lower bound of the depth.
     std::span<const std::int16_t> far;
   };
 
@@ -71,14 +75,15 @@ class DistanceField {
   /// `owner` keeps the memory of the spans alive.
   DistanceField(const Layout& layout, std::shared_ptr<const void> owner);
 
-  /// Distance and gradient at a point (trilinear in the finest brick there).
+  /// Distance and gradient at a point: trilinear in the finest brick there. A point outside the band or the
+  /// grid, or not finite, gives a sample that is not `exact`.
   [[nodiscard]] FieldSample sample(const Vector3& p_MP) const noexcept;
 
-  /// A number that no signed distance within `radius` of p, and no exact sample() there, is below. For
-  /// pruning; costs one look-up.
+  /// [m] A lower bound of the signed distance, and of every exact sample(), within `radius` [m] of p. For
+  /// pruning: one look-up.
   [[nodiscard]] double lowerBound(const Vector3& p_MP, double radius = 0.0) const noexcept;
 
-  /// Edge of the voxels that answer at p [m].
+  /// [m] Edge of the voxels that sample() interpolates at p.
   [[nodiscard]] double voxelAt(const Vector3& p_MP) const noexcept;
 
   [[nodiscard]] const Layout& layout() const { return layout_; }
@@ -88,16 +93,20 @@ class DistanceField {
   [[nodiscard]] Eigen::AlignedBox3d box() const;
 
  private:
-  struct Place;
-  [[nodiscard]] bool locate(const Vector3& p_MP, Place& place) const noexcept;
+  struct BrickLocation;
+  /// False outside the grid.
+  [[nodiscard]] bool locate(const Vector3& p_MP, BrickLocation& location) const noexcept;
+  /// Whether the distance at `p_brick` [bricks] is within `band` [m]; `voxel` [m] is that of the brick's
+  /// level.
   [[nodiscard]] bool interpolate(Entry brick, const Vector3& p_brick, double voxel, double band,
                                  FieldSample& sample) const noexcept;
-  [[nodiscard]] double farMagnitude(const Place& place) const noexcept;
+  /// [m] A lower bound of |distance| in a brick without samples.
+  [[nodiscard]] double farMagnitude(const BrickLocation& location) const noexcept;
 
   Layout layout_;
-  double brick_edge_ = 0.0;
-  double inverse_brick_edge_ = 0.0;
+  double brick_edge_ = 0.0;          ///< [m]
+  double inverse_brick_edge_ = 0.0;  ///< [1/m]
   std::shared_ptr<const void> owner_;
 };
 
-}  // namespace tenon
+}  // namespace tenon::structures

@@ -6,16 +6,16 @@
 #include <cmath>
 #include <limits>
 
-namespace tenon {
+namespace tenon::structures {
 
 namespace {
 
 using Entry = DistanceField::Entry;
 constexpr int kSide = DistanceField::kBrickSide;
-// From a brick's centre to its corner [voxels].
+// [voxels] From a brick's centre to its corner.
 constexpr double kBrickRadius = 6.9283;
 
-/// Samples one brick and appends it when the surface is within the band of any of its samples.
+/// Samples one brick and appends it when any of its samples is within the band.
 class BrickSampler {
  public:
   BrickSampler(const AnalyticDistance& distance, std::vector<std::int16_t>& samples)
@@ -29,13 +29,13 @@ class BrickSampler {
 
     std::array<std::int16_t, DistanceField::kBrickSamples> brick{};
     double nearest = std::numeric_limits<double>::infinity();
-    std::size_t place = 0;
+    std::size_t next = 0;
     for (int z = 0; z < kSide; ++z) {
       for (int y = 0; y < kSide; ++y) {
         for (int x = 0; x < kSide; ++x) {
           const double d = distance_(p_MBo + Vector3(x, y, z) * voxel);
           nearest = std::min(nearest, std::abs(d));
-          brick[place++] = quantizedSample(d, voxel);
+          brick[next++] = quantizedSample(d, voxel);
         }
       }
     }
@@ -132,4 +132,4 @@ DistanceField buildField(const AnalyticDistance& distance, const Eigen::AlignedB
   return makeField(std::move(storage));
 }
 
-}  // namespace tenon
+}  // namespace tenon::structures

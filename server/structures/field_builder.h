@@ -6,36 +6,39 @@
 
 #include "server/structures/distance_field.h"
 
-namespace tenon {
+namespace tenon::structures {
 
-/// The memory of a field while it is built; `makeField` turns it into a DistanceField that owns it.
+/// The arrays of a field under construction.
 struct FieldStorage {
-  DistanceField::Layout layout;  ///< its spans are set by makeField
+  DistanceField::Layout layout;  ///< makeField sets its spans
   std::vector<DistanceField::Entry> index;
   std::vector<std::int16_t> samples;
   std::vector<std::int16_t> far;
 };
 
+/// A field that owns the given arrays.
 [[nodiscard]] DistanceField makeField(FieldStorage storage);
 
-/// A grid of empty far-outside bricks about `surface_box_M`, with one brick of margin on every side.
+/// A grid of far-outside bricks with edge `voxel` [m] around `surface_box_M`, with one brick of margin on
+/// every side.
 [[nodiscard]] FieldStorage makeGrid(const Eigen::AlignedBox3d& surface_box_M, double voxel);
 
-/// A distance as a brick keeps it: in quanta of its voxel, clamped to +-kClampVoxels.
+/// The stored form of `distance` [m]: quanta of `voxel` [m], clamped to +-kClampVoxels.
 [[nodiscard]] std::int16_t quantizedSample(double distance, double voxel);
 
-/// A bound as `far` keeps it, rounded so that it stays a lower bound (of the depth where negative inside).
+/// The stored form in `Layout::far` of `bound` [m] with `voxel` [m]: rounded down, or, for a far-inside brick
+/// (`inside_brick`), towards less depth.
 [[nodiscard]] std::int16_t quantizedFar(double bound, double voxel, bool inside_brick);
 
-/// Signed distance at a point of M [m], < 0 inside; at most 1 m steeper a metre.
+/// Signed distance [m] at a point of M, < 0 inside; must be 1-Lipschitz.
 using AnalyticDistance = std::function<double(const Vector3& p_MP)>;
 
-/// A field of a shape with a formula. The whole surface lies in `surface_box_M`: outside the grid everything
-/// is free, so a floor is a slab. Bricks whose voxels meet the surface inside a box of `refine_M` are
-/// refined.
+/// The field of a shape given by a formula, with edge `voxel` [m]. The whole surface lies in `surface_box_M`,
+/// and outside the grid all space is free: a floor must be a slab. Bricks that contain surface and intersect
+/// a box of `refine_M` are refined.
 [[nodiscard]] DistanceField buildField(const AnalyticDistance& distance,
                                        const Eigen::AlignedBox3d& surface_box_M, double voxel,
                                        std::span<const Eigen::AlignedBox3d> refine_M = {},
                                        int refinement = 1);
 
-}  // namespace tenon
+}  // namespace tenon::structures

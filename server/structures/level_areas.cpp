@@ -6,21 +6,21 @@
 
 #include "server/structures/point_grid.h"
 
-namespace tenon {
+namespace tenon::structures {
 namespace {
 
-/// Points are stored by level, so levels 0..k are the first so many.
+/// Number of points of levels 0..k, which are stored in order of level.
 std::size_t endOf(const ShellLevel& level) { return std::size_t{level.first_point} + level.point_count; }
 
-/// Hands the areas of the points from `coarse` on to the nearest among the first `coarse`.
-void handDown(std::span<const ShellPoint> points, std::size_t coarse, double cell,
-              std::vector<double>& areas) {
+/// Adds the area of each point from `coarse` on to the nearest of the first `coarse` points.
+void addToNearest(std::span<const ShellPoint> points, std::size_t coarse, double cell,
+                  std::vector<double>& areas) {
   const double total = std::accumulate(areas.begin(), areas.end(), 0.0);
   PointGrid grid(cell);
   for (std::size_t i = 0; i < coarse; ++i) {
     grid.add(points[i].p_MP.cast<double>(), static_cast<std::uint32_t>(i));
   }
-  double kept = std::accumulate(areas.begin(), areas.begin() + static_cast<std::ptrdiff_t>(coarse), 0.0);
+  double assigned = std::accumulate(areas.begin(), areas.begin() + static_cast<std::ptrdiff_t>(coarse), 0.0);
   for (std::size_t i = coarse; i < areas.size(); ++i) {
     double nearest = std::numeric_limits<double>::infinity();
     std::size_t owner = coarse;
@@ -33,12 +33,12 @@ void handDown(std::span<const ShellPoint> points, std::size_t coarse, double cel
     });
     if (owner == coarse) continue;
     areas[owner] += areas[i];
-    kept += areas[i];
+    assigned += areas[i];
   }
   areas.resize(coarse);
-  // what had nobody near is everybody's
-  if (!(kept > 0.0)) return;
-  for (double& area : areas) area *= total / kept;
+  // the area of points without a near used point is distributed over all
+  if (!(assigned > 0.0)) return;
+  for (double& area : areas) area *= total / assigned;
 }
 
 }  // namespace
@@ -52,14 +52,14 @@ std::vector<std::vector<float>> levelAreas(std::span<const ShellPoint> points,
   std::transform(points.begin(), points.end(), areas.begin(), [](const ShellPoint& p) { return p.area; });
   for (std::size_t k = levels.size(); k-- > 0;) {
     const std::size_t end = std::min(endOf(levels[k]), areas.size());
-    // a cell is never so small that its number leaves an int
-    constexpr double kFinest = 1e-6;
-    const double cell = std::max<double>(levels[k].spacing, kFinest * box.diagonal().norm());
-    if (end < areas.size() && cell > 0.0) handDown(points, end, cell, areas);
+    // bounded below so that cell coordinates fit into an int
+    constexpr double kMinCell = 1e-6;
+    const double cell = std::max<double>(levels[k].spacing, kMinCell * box.diagonal().norm());
+    if (end < areas.size() && cell > 0.0) addToNearest(points, end, cell, areas);
     areas.resize(end);
     result[k].assign(areas.begin(), areas.end());
   }
   return result;
 }
 
-}  // namespace tenon
+}  // namespace tenon::structures

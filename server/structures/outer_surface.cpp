@@ -5,38 +5,38 @@
 
 #include "server/structures/triangle.h"
 
-namespace tenon {
+namespace tenon::structures {
 
 namespace {
 
-/// [voxels] An empty ball that comes as near as this to a place exposes it.
+/// [voxels] A point is exposed when an empty ball comes as near as this to it.
 constexpr double kTouch = 0.25;
-/// [voxels] Heights over a place at which such balls are looked for.
+/// [voxels] Heights of the centres of such balls over the point.
 constexpr std::array kHeights{0.5, 0.25, 1.0, 2.0};
-/// [voxels] No piece is longer: a tree of boxes does not like long triangles.
-constexpr double kPiece = 6.0;
-/// [voxels] Shorter ones are not cut.
-constexpr double kCrumb = 0.3;
+/// [voxels] Longest edge of a piece: boxes of long triangles overlap too much in a bounding-box hierarchy.
+constexpr double kMaxEdge = 6.0;
+/// [voxels] Triangles with a shorter longest edge are not split.
+constexpr double kMinEdge = 0.3;
 
-class Cutter {
+class OuterSurfaceSplitter {
  public:
-  Cutter(const DistanceField& field, std::vector<SurfaceTree::Triangle>& outer)
+  OuterSurfaceSplitter(const DistanceField& field, std::vector<SurfaceTree::Triangle>& outer)
       : field_(field), outer_(outer) {}
 
-  void cut(const Triangle& t) {
+  void split(const Triangle& t) {
     const Halves halves(t);
-    if (halves.length > kPiece * field_.voxelAt(centreOf(t))) {
-      cut(halves.first);
-      cut(halves.second);
-    } else if (exposedPart(t, halves) == Part::kAll) {
+    if (halves.length > kMaxEdge * field_.voxelAt(centreOf(t))) {
+      split(halves.first);
+      split(halves.second);
+    } else if (exposedPart(t, halves) == Exposed::kAll) {
       keep(t);
     }
   }
 
  private:
-  enum class Part { kAll, kNone, kSome };
+  enum class Exposed { kAll, kNone, kSome };
 
-  /// Both sides of the longest edge's middle.
+  /// The triangle bisected at the middle of its longest edge.
   struct Halves {
     explicit Halves(const Triangle& t) : first(t), second(t) {
       std::size_t a = 0;
@@ -50,31 +50,31 @@ class Cutter {
 
   static Vector3 centreOf(const Triangle& t) { return (t[0] + t[1] + t[2]) / 3.0; }
 
-  /// Of a triangle that is exposed in some places these are kept already.
-  Part exposedPart(const Triangle& t, const Halves& halves) {
+  /// How much of a triangle is exposed. With kSome the exposed pieces have been added to `outer_`.
+  Exposed exposedPart(const Triangle& t, const Halves& halves) {
     const Vector3 centre = centreOf(t);
     const double voxel = field_.voxelAt(centre);
     const Vector3 normal = (t[1] - t[0]).cross(t[2] - t[0]).normalized();
     const bool at_centre = isExposed(centre, normal, voxel);
     bool all_agree = true;
-    for (std::size_t i = 0; i < 3 && all_agree && halves.length > kCrumb * voxel; ++i) {
-      // a little within, so that neighbours behind an edge do not count
+    for (std::size_t i = 0; i < 3 && all_agree && halves.length > kMinEdge * voxel; ++i) {
+      // 5 % inside the corners, so that triangles beyond an edge have no influence
       const Vector3 corner = centre + 0.95 * (t[i] - centre);
       const Vector3 next = centre + 0.95 * (t[(i + 1) % 3] - centre);
       all_agree = isExposed(corner, normal, voxel) == at_centre &&
                   isExposed(0.5 * (corner + next), normal, voxel) == at_centre;
     }
-    if (all_agree) return at_centre ? Part::kAll : Part::kNone;
+    if (all_agree) return at_centre ? Exposed::kAll : Exposed::kNone;
 
-    const Part of_first = exposedPart(halves.first, Halves(halves.first));
-    const Part of_second = exposedPart(halves.second, Halves(halves.second));
-    if (of_first == of_second && of_first != Part::kSome) return of_first;
-    if (of_first == Part::kAll) keep(halves.first);
-    if (of_second == Part::kAll) keep(halves.second);
-    return Part::kSome;
+    const Exposed of_first = exposedPart(halves.first, Halves(halves.first));
+    const Exposed of_second = exposedPart(halves.second, Halves(halves.second));
+    if (of_first == of_second && of_first != Exposed::kSome) return of_first;
+    if (of_first == Exposed::kAll) keep(halves.first);
+    if (of_second == Exposed::kAll) keep(halves.second);
+    return Exposed::kSome;
   }
 
-  /// Whether an empty ball over the place, on either side, comes near to it.
+  /// Whether an empty ball above the point, on either side, reaches within kTouch of it.
   [[nodiscard]] bool isExposed(const Vector3& p, const Vector3& normal, double voxel) const {
     const double here = field_.sample(p).distance;
     if (here < -(kTouch + DistanceField::kHalfDiagonal) * voxel) return false;
@@ -100,11 +100,11 @@ class Cutter {
 std::vector<SurfaceTree::Triangle> outerTriangles(std::span<const SurfaceTree::Triangle> triangles,
                                                   const DistanceField& field) {
   std::vector<SurfaceTree::Triangle> outer;
-  Cutter cutter(field, outer);
+  OuterSurfaceSplitter splitter(field, outer);
   for (const SurfaceTree::Triangle& t : triangles) {
-    cutter.cut({t[0].cast<double>(), t[1].cast<double>(), t[2].cast<double>()});
+    splitter.split({t[0].cast<double>(), t[1].cast<double>(), t[2].cast<double>()});
   }
   return outer;
 }
 
-}  // namespace tenon
+}  // namespace tenon::structures

@@ -7,20 +7,23 @@
 
 #include "idl/types/spatial.h"
 
-namespace tenon {
+namespace tenon::structures {
 
-/// Numbered points hashed into cubes of one edge, to find those near a point while more are added.
+/// A spatial hash of numbered points: finds those near a point while more are added.
 ///
-/// Neighbours are visited cell by cell in a fixed order and by age in a cell, so what is built with it does
-/// not depend on the hash. Threads: one. Real-time: no; used while structures are built.
+/// Neighbours are visited cell by cell in a fixed order and within a cell in the order they were added, so
+/// results do not depend on the hash function.
+///
+/// Threads: one. Real-time: no; used while structures are built.
 class PointGrid {
  public:
+  /// Cubic cells with edge `cell` [m] > 0.
   explicit PointGrid(double cell) : inverse_cell_(1.0 / cell) {}
 
   void add(const Vector3& p, std::uint32_t number) { cells_[key(cellOf(p))].push_back({p, number}); }
 
-  /// Calls `visit(number, distance^2)` for every point within one cell edge of p (and some further ones),
-  /// until it returns false; false if it did.
+  /// Calls `visit(number, squared distance)` for every point within one cell edge of p (and some further
+  /// ones) until it returns false. Returns false in that case.
   template <typename Visit>
   bool visitNear(const Vector3& p, Visit&& visit) const {
     const Eigen::Vector3i middle = cellOf(p);
@@ -29,7 +32,7 @@ class PointGrid {
         for (int x = -1; x <= 1; ++x) {
           const auto cell = cells_.find(key(middle + Eigen::Vector3i(x, y, z)));
           if (cell == cells_.end()) continue;
-          for (const Entry& entry : cell->second) {
+          for (const NumberedPoint& entry : cell->second) {
             if (!visit(entry.number, (entry.p - p).squaredNorm())) return false;
           }
         }
@@ -39,7 +42,7 @@ class PointGrid {
   }
 
  private:
-  struct Entry {
+  struct NumberedPoint {
     Vector3 p;
     std::uint32_t number;
   };
@@ -48,15 +51,16 @@ class PointGrid {
     return (p * inverse_cell_).array().floor().matrix().cast<int>();
   }
   [[nodiscard]] static std::uint64_t key(const Eigen::Vector3i& cell) {
-    // 21 bits an axis: two cells share a key only when 2 million cells apart, and then distances tell
+    // 21 bits per axis: two cells share a key only when 2 million cells apart, and then the distance excludes
+    // their points
     const auto bits = [](int c) {
       return static_cast<std::uint64_t>(static_cast<std::uint32_t>(c)) & 0x1FFFFFU;
     };
     return bits(cell.x()) | bits(cell.y()) << 21U | bits(cell.z()) << 42U;
   }
 
-  double inverse_cell_;
-  std::unordered_map<std::uint64_t, std::vector<Entry>> cells_;
+  double inverse_cell_;  ///< [1/m]
+  std::unordered_map<std::uint64_t, std::vector<NumberedPoint>> cells_;
 };
 
-}  // namespace tenon
+}  // namespace tenon::structures

@@ -4,7 +4,7 @@
 
 #include "server/structures/level_areas.h"
 
-namespace tenon {
+namespace tenon::structures {
 
 namespace {
 
@@ -20,15 +20,15 @@ ShellBlock blockOf(std::span<const ShellPoint> points) {
   return block;
 }
 
-ShellBlock blockOf(std::span<const ShellSphere> balls) {
+ShellBlock blockOf(std::span<const ShellSphere> spheres) {
   ShellBlock block;
-  block.count = static_cast<std::uint32_t>(std::min(balls.size(), ShellBlock::kLanes));
+  block.count = static_cast<std::uint32_t>(std::min(spheres.size(), ShellBlock::kLanes));
   for (std::size_t lane = 0; lane < ShellBlock::kLanes && block.count > 0; ++lane) {
-    const ShellSphere& ball = balls[lane < block.count ? lane : 0];
-    block.x[lane] = ball.p_MC.x();
-    block.y[lane] = ball.p_MC.y();
-    block.z[lane] = ball.p_MC.z();
-    block.radius[lane] = ball.radius;
+    const ShellSphere& sphere = spheres[lane < block.count ? lane : 0];
+    block.x[lane] = sphere.p_MC.x();
+    block.y[lane] = sphere.p_MC.y();
+    block.z[lane] = sphere.p_MC.z();
+    block.radius[lane] = sphere.radius;
   }
   return block;
 }
@@ -44,7 +44,7 @@ Pointshell::Pointshell(const Layout& layout, std::shared_ptr<const void> owner)
   for (const ShellPoint& point : layout_.points) {
     const Vector3 p_MP = point.p_MP.cast<double>();
     radius_ = std::max(radius_, p_MP.norm());
-    ball_radius_ = std::max(ball_radius_, (p_MP - p_MC_).norm());
+    bounding_radius_ = std::max(bounding_radius_, (p_MP - p_MC_).norm());
   }
 
   auto blocks = std::make_shared<Blocks>();
@@ -69,4 +69,4 @@ Pointshell::Pointshell(const Layout& layout, std::shared_ptr<const void> owner)
   blocks_ = std::move(blocks);
 }
 
-}  // namespace tenon
+}  // namespace tenon::structures

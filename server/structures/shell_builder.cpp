@@ -7,11 +7,11 @@
 
 #include "server/structures/point_grid.h"
 
-namespace tenon {
+namespace tenon::structures {
 
 namespace {
 
-// A coarsest level of about this many points still says where an object is.
+// About how many points the coarsest level has.
 constexpr double kCoarsestPoints = 32.0;
 
 struct ShellStorage {
@@ -21,43 +21,44 @@ struct ShellStorage {
   std::vector<ShellLevel> levels;
 };
 
-/// The sites that each level adds, by number, in the order they came.
-std::vector<std::vector<std::uint32_t>> sortIntoLevels(std::span<const ShellSite> sites, double spacing) {
-  const double ratio = static_cast<double>(sites.size()) / kCoarsestPoints;
+/// The numbers of the samples that each level adds, in their order.
+std::vector<std::vector<std::uint32_t>> sortIntoLevels(std::span<const SurfaceSample> samples,
+                                                       double spacing) {
+  const double ratio = static_cast<double>(samples.size()) / kCoarsestPoints;
   const int levels = ratio <= 1.0 ? 1 : 1 + static_cast<int>(std::log2(ratio) / 2.0);
   std::vector<std::vector<std::uint32_t>> added(static_cast<std::size_t>(levels));
-  std::vector<bool> taken(sites.size(), false);
+  std::vector<bool> taken(samples.size(), false);
   for (int level = 0; level < levels; ++level) {
     const bool last = level == levels - 1;
     const double apart = spacing * std::exp2(levels - 1 - level);
     PointGrid grid(apart);
-    for (std::uint32_t i = 0; !last && i < sites.size(); ++i) {
-      if (taken[i]) grid.add(sites[i].p_MP, i);
+    for (std::uint32_t i = 0; !last && i < samples.size(); ++i) {
+      if (taken[i]) grid.add(samples[i].p_MP, i);
     }
-    for (std::uint32_t i = 0; i < sites.size(); ++i) {
+    for (std::uint32_t i = 0; i < samples.size(); ++i) {
       if (taken[i]) continue;
-      const ShellSite& site = sites[i];
-      const bool free = last || grid.visitNear(site.p_MP, [&](std::uint32_t other, double squared) {
-        return squared >= apart * apart || sites[other].inward_M.dot(site.inward_M) < 0.0;
+      const SurfaceSample& sample = samples[i];
+      const bool free = last || grid.visitNear(sample.p_MP, [&](std::uint32_t other, double squared) {
+        return squared >= apart * apart || samples[other].inward_M.dot(sample.inward_M) < 0.0;
       });
       if (!free) continue;
       taken[i] = true;
       added[static_cast<std::size_t>(level)].push_back(i);
-      if (!last) grid.add(site.p_MP, i);
+      if (!last) grid.add(sample.p_MP, i);
     }
   }
   std::erase_if(added, [](const auto& level) { return level.empty(); });
   return added;
 }
 
-/// Orders numbers so that every run of 16 (and of 256) is a compact neighbourhood: median splits at
-/// multiples.
-void sortIntoRuns(std::span<const ShellSite> sites, std::span<std::uint32_t> numbers) {
+/// Orders numbers so that every run of 16, and of 256, is spatially compact: median splits at multiples of
+/// the run length.
+void sortIntoRuns(std::span<const SurfaceSample> samples, std::span<std::uint32_t> numbers) {
   constexpr std::size_t kLeaf = Pointshell::kLeafPoints;
   constexpr std::size_t kCluster = kLeaf * Pointshell::kClusterLeaves;
   if (numbers.size() <= kLeaf) return;
   Eigen::AlignedBox3d box;
-  for (const std::uint32_t i : numbers) box.extend(sites[i].p_MP);
+  for (const std::uint32_t i : numbers) box.extend(samples[i].p_MP);
   Eigen::Index axis = 0;
   box.sizes().maxCoeff(&axis);
   const std::size_t run = numbers.size() > kCluster ? kCluster : kLeaf;
@@ -65,17 +66,18 @@ void sortIntoRuns(std::span<const ShellSite> sites, std::span<std::uint32_t> num
   const std::size_t middle = half < numbers.size() ? half : run;
   std::nth_element(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(middle), numbers.end(),
                    [&](std::uint32_t a, std::uint32_t b) {
-                     const double pa = sites[a].p_MP[axis];
-                     const double pb = sites[b].p_MP[axis];
+                     const double pa = samples[a].p_MP[axis];
+                     const double pb = samples[b].p_MP[axis];
                      return pa != pb ? pa < pb : a < b;
                    });
-  sortIntoRuns(sites, numbers.first(middle));
-  sortIntoRuns(sites, numbers.subspan(middle));
+  sortIntoRuns(samples, numbers.first(middle));
+  sortIntoRuns(samples, numbers.subspan(middle));
 }
 
-/// A ball about points: the box's centre, pulled towards the furthest point until that hardly helps
-/// (Badoiu and Clarkson 2003). The radius is rounded up to hold every point in float.
-ShellSphere ballAbout(std::span<const ShellPoint> points) {
+/// A bounding sphere of points: its centre starts at the box's centre and moves towards the furthest point in
+/// 32 decreasing steps; the smallest radius found is taken (Badoiu and Clarkson 2003). The radius is rounded
+/// up to bound every point in float arithmetic.
+ShellSphere boundingSphere(std::span<const ShellPoint> points) {
   Eigen::AlignedBox3f box;
   for (const ShellPoint& point : points) box.extend(point.p_MP);
   const auto furthest = [&points](const Vector3f& centre) {
@@ -83,41 +85,41 @@ ShellSphere ballAbout(std::span<const ShellPoint> points) {
       return (a.p_MP - centre).squaredNorm() < (b.p_MP - centre).squaredNorm();
     });
   };
-  ShellSphere ball;
-  ball.p_MC = box.center();
-  ball.radius = (furthest(ball.p_MC)->p_MP - ball.p_MC).norm();
-  Vector3f centre = ball.p_MC;
+  ShellSphere sphere;
+  sphere.p_MC = box.center();
+  sphere.radius = (furthest(sphere.p_MC)->p_MP - sphere.p_MC).norm();
+  Vector3f centre = sphere.p_MC;
   for (int step = 1; step <= 32; ++step) {
     const auto far = furthest(centre);
     const float radius = (far->p_MP - centre).norm();
-    if (radius < ball.radius) {
-      ball.radius = radius;
-      ball.p_MC = centre;
+    if (radius < sphere.radius) {
+      sphere.radius = radius;
+      sphere.p_MC = centre;
     }
     centre += (far->p_MP - centre) / static_cast<float>(step + 1);
   }
-  ball.radius = ball.radius * 1.00001F + 1e-7F * ball.p_MC.norm();
-  return ball;
+  sphere.radius = sphere.radius * 1.00001F + 1e-7F * sphere.p_MC.norm();
+  return sphere;
 }
 
-ShellLevel appendLevel(ShellStorage& storage, std::span<const ShellSite> sites,
+ShellLevel appendLevel(ShellStorage& storage, std::span<const SurfaceSample> samples,
                        std::vector<std::uint32_t> numbers) {
-  sortIntoRuns(sites, numbers);
+  sortIntoRuns(samples, numbers);
   ShellLevel level;
   level.first_point = static_cast<std::uint32_t>(storage.points.size());
   level.first_leaf = static_cast<std::uint32_t>(storage.leaves.size());
   level.first_cluster = static_cast<std::uint32_t>(storage.clusters.size());
   level.point_count = static_cast<std::uint32_t>(numbers.size());
   for (const std::uint32_t i : numbers) {
-    storage.points.push_back(
-        {sites[i].p_MP.cast<float>(), sites[i].inward_M.cast<float>(), static_cast<float>(sites[i].area)});
+    storage.points.push_back({samples[i].p_MP.cast<float>(), samples[i].inward_M.cast<float>(),
+                              static_cast<float>(samples[i].area)});
   }
   const std::span<const ShellPoint> points = std::span(storage.points).subspan(level.first_point);
   constexpr std::uint32_t kLeaf = Pointshell::kLeafPoints;
   constexpr std::uint32_t kCluster = kLeaf * Pointshell::kClusterLeaves;
   for (std::uint32_t first = 0; first < level.point_count; first += kLeaf) {
     const std::uint32_t count = std::min(kLeaf, level.point_count - first);
-    ShellSphere leaf = ballAbout(points.subspan(first, count));
+    ShellSphere leaf = boundingSphere(points.subspan(first, count));
     leaf.first = level.first_point + first;
     leaf.count = count;
     storage.leaves.push_back(leaf);
@@ -125,7 +127,7 @@ ShellLevel appendLevel(ShellStorage& storage, std::span<const ShellSite> sites,
   level.leaf_count = static_cast<std::uint32_t>(storage.leaves.size()) - level.first_leaf;
   for (std::uint32_t first = 0; first < level.point_count; first += kCluster) {
     const std::uint32_t count = std::min(kCluster, level.point_count - first);
-    ShellSphere cluster = ballAbout(points.subspan(first, count));
+    ShellSphere cluster = boundingSphere(points.subspan(first, count));
     cluster.first = level.first_leaf + first / kLeaf;
     cluster.count = (count + kLeaf - 1) / kLeaf;
     storage.clusters.push_back(cluster);
@@ -136,19 +138,20 @@ ShellLevel appendLevel(ShellStorage& storage, std::span<const ShellSite> sites,
 
 }  // namespace
 
-Pointshell buildShell(std::span<const ShellSite> sites, double spacing) {
-  if (sites.empty()) return {};
-  const double area = std::accumulate(sites.begin(), sites.end(), 0.0,
-                                      [](double sum, const ShellSite& site) { return sum + site.area; });
-  if (spacing <= 0.0) spacing = std::sqrt(area / static_cast<double>(sites.size()));
+Pointshell buildShell(std::span<const SurfaceSample> samples, double spacing) {
+  if (samples.empty()) return {};
+  const double area =
+      std::accumulate(samples.begin(), samples.end(), 0.0,
+                      [](double sum, const SurfaceSample& sample) { return sum + sample.area; });
+  if (spacing <= 0.0) spacing = std::sqrt(area / static_cast<double>(samples.size()));
   if (spacing <= 0.0) spacing = 1e-3;
 
   auto storage = std::make_shared<ShellStorage>();
-  const auto added = sortIntoLevels(sites, spacing);
+  const auto added = sortIntoLevels(samples, spacing);
   double used_area = 0.0;
   for (std::size_t k = 0; k < added.size(); ++k) {
-    for (const std::uint32_t i : added[k]) used_area += sites[i].area;
-    ShellLevel level = appendLevel(*storage, sites, added[k]);
+    for (const std::uint32_t i : added[k]) used_area += samples[i].area;
+    ShellLevel level = appendLevel(*storage, samples, added[k]);
     level.spacing = static_cast<float>(spacing * std::exp2(added.size() - 1 - k));
     level.area_scale = used_area > 0.0 ? static_cast<float>(area / used_area) : 1.0F;
     storage->levels.push_back(level);
@@ -156,4 +159,4 @@ Pointshell buildShell(std::span<const ShellSite> sites, double spacing) {
   return {{storage->points, storage->leaves, storage->clusters, storage->levels}, storage};
 }
 
-}  // namespace tenon
+}  // namespace tenon::structures

@@ -4,21 +4,22 @@
 
 #include "server/structures/pointshell.h"
 
-namespace tenon {
+namespace tenon::structures {
 
-/// A surface point before it has a place in a tree.
-struct ShellSite {
+/// A sample of the surface, not yet sorted into levels.
+struct SurfaceSample {
   Vector3 p_MP = Vector3::Zero();
-  Vector3 inward_M = Vector3::UnitZ();
-  double area = 0.0;  ///< [m^2] of surface it stands for
+  Vector3 inward_M = Vector3::UnitZ();  ///< unit normal, into the object
+  double area = 0.0;                    ///< [m^2] surface area it represents
 };
 
-/// Sorts sites into levels and builds the point-sphere tree over each (paper §3.1).
+/// Sorts surface samples into levels of detail and builds the bounding-sphere hierarchy of each (paper §3.1).
 ///
-/// Level 0 keeps sites at least 2^k spacings apart, every next level halves that, the last takes all the
-/// rest: each prefix of levels samples the whole object. Sites that look opposite ways (two sides of a thin
-/// plate) do not crowd each other out. Earlier sites win, so callers put corners and edges first. `spacing`
-/// [m] of the whole set; 0: the square root of the mean area.
-[[nodiscard]] Pointshell buildShell(std::span<const ShellSite> sites, double spacing = 0.0);
+/// With n + 1 levels, level 0 takes samples at least 2^n `spacing` [m] apart, every next level halves that,
+/// and the last takes all that remain: levels 0..k sample the whole object for any k. Samples with opposite
+/// normals (two sides of a thin plate) do not exclude each other. Earlier samples are preferred, so callers
+/// put corners and edges first. `spacing` is that of the whole set; 0: the square root of the mean area. No
+/// samples give an empty shell.
+[[nodiscard]] Pointshell buildShell(std::span<const SurfaceSample> sites, double spacing = 0.0);
 
-}  // namespace tenon
+}  // namespace tenon::structures

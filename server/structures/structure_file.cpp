@@ -13,7 +13,7 @@
 
 #include "server/structures/haptic_structures.h"
 
-namespace tenon {
+namespace tenon::structures {
 
 namespace {
 
@@ -22,8 +22,8 @@ constexpr std::uint32_t kVersion = 3;
 constexpr std::uint32_t kByteOrder = 0x01020304U;
 constexpr std::size_t kAlignment = 64;
 
-/// Arrays of a file, in this order, each begun at a multiple of kAlignment.
-enum Section : std::size_t {
+/// The arrays of a file, in this order; each begins at a multiple of kAlignment.
+enum FileSection : std::size_t {
   kIndex,
   kSamples,
   kFar,
@@ -49,7 +49,7 @@ constexpr std::array<std::size_t, kSections> kElementBytes{sizeof(DistanceField:
                                                            1,
                                                            1};
 
-struct Header {
+struct FileHeader {
   std::array<char, 8> magic = kMagic;
   std::uint32_t version = kVersion;
   std::uint32_t byte_order = kByteOrder;
@@ -64,12 +64,12 @@ struct Header {
   double bake_seconds = 0.0, surface_area = 0.0, unit = 1.0;
   std::array<double, 6> box_M{};
 };
-static_assert(std::is_trivially_copyable_v<Header>);
+static_assert(std::is_trivially_copyable_v<FileHeader>);
 static_assert(sizeof(ShellPoint) == 28 && sizeof(ShellSphere) == 24 && sizeof(ShellLevel) == 32);
 
 std::uint64_t aligned(std::uint64_t offset) { return (offset + kAlignment - 1) / kAlignment * kAlignment; }
 
-/// Paths as seen from the folder of the structure file, one a line: both may move together.
+/// Paths relative to the folder of the structure file, one per line, so that both may be moved together.
 std::string meshesFrom(const std::filesystem::path& file, const StructureInfo& info) {
   std::error_code error;
   const auto folder = std::filesystem::weakly_canonical(std::filesystem::absolute(file), error).parent_path();
@@ -91,7 +91,7 @@ std::vector<std::filesystem::path> meshesOf(const std::filesystem::path& file, c
   return meshes;
 }
 
-/// What goes into each section.
+/// The bytes of each section.
 std::array<std::span<const std::byte>, kSections> sectionsOf(const HapticStructures& structures,
                                                              const std::string& meshes) {
   const auto bytes = [](const auto& list) { return std::as_bytes(std::span(list.data(), list.size())); };
@@ -103,10 +103,10 @@ std::array<std::span<const std::byte>, kSections> sectionsOf(const HapticStructu
           bytes(info.content_hash), bytes(info.notes),       bytes(meshes)};
 }
 
-Header headerOf(const HapticStructures& structures) {
+FileHeader headerOf(const HapticStructures& structures) {
   const DistanceField::Layout& field = structures.field.layout();
   const StructureInfo& info = structures.info;
-  Header header;
+  FileHeader header;
   Vector3::Map(header.p_MoFo_M.data()) = field.p_MoFo_M;
   header.voxel = field.voxel;
   header.band = field.band;
@@ -123,7 +123,7 @@ Header headerOf(const HapticStructures& structures) {
   return header;
 }
 
-std::uint64_t checksumOf(Header header, std::span<const std::byte> rest) {
+std::uint64_t checksumOf(FileHeader header, std::span<const std::byte> rest) {
   header.checksum = 0;
   XXH64_state_t* state = XXH64_createState();
   XXH64_reset(state, 0);
@@ -134,10 +134,10 @@ std::uint64_t checksumOf(Header header, std::span<const std::byte> rest) {
   return checksum;
 }
 
-/// A file mapped for reading, as long as somebody refers to it.
-class Mapping {
+/// A file mapped for reading; unmapped with its last reference.
+class FileMapping {
  public:
-  static std::shared_ptr<const Mapping> open(const std::filesystem::path& file) {
+  static std::shared_ptr<const FileMapping> open(const std::filesystem::path& file) {
     const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0) return nullptr;
     struct stat status {};
@@ -149,31 +149,31 @@ class Mapping {
     }
     ::close(descriptor);
     if (memory == MAP_FAILED) return nullptr;
-    return std::shared_ptr<const Mapping>(new Mapping(static_cast<const std::byte*>(memory), size));
+    return std::shared_ptr<const FileMapping>(new FileMapping(static_cast<const std::byte*>(memory), size));
   }
-  Mapping(const Mapping&) = delete;
-  Mapping& operator=(const Mapping&) = delete;
-  ~Mapping() { ::munmap(const_cast<std::byte*>(memory_), size_); }
+  FileMapping(const FileMapping&) = delete;
+  FileMapping& operator=(const FileMapping&) = delete;
+  ~FileMapping() { ::munmap(const_cast<std::byte*>(memory_), size_); }
 
   [[nodiscard]] std::span<const std::byte> bytes() const { return {memory_, size_}; }
 
  private:
-  Mapping(const std::byte* memory, std::size_t size) : memory_(memory), size_(size) {}
+  FileMapping(const std::byte* memory, std::size_t size) : memory_(memory), size_(size) {}
   const std::byte* memory_;
   std::size_t size_;
 };
 
 template <typename T>
-std::span<const T> section(std::span<const std::byte> file, const Header& header, Section which) {
+std::span<const T> section(std::span<const std::byte> file, const FileHeader& header, FileSection which) {
   return {reinterpret_cast<const T*>(file.data() + header.first[which]), header.count[which]};
 }
 
-std::string text(std::span<const std::byte> file, const Header& header, Section which) {
+std::string text(std::span<const std::byte> file, const FileHeader& header, FileSection which) {
   const auto letters = section<char>(file, header, which);
   return {letters.begin(), letters.end()};
 }
 
-bool sectionsFit(const Header& header) {
+bool sectionsFit(const FileHeader& header) {
   for (std::size_t i = 0; i < kSections; ++i) {
     if (header.first[i] % kAlignment != 0 || header.first[i] > header.file_bytes) return false;
     if (header.count[i] > (header.file_bytes - header.first[i]) / kElementBytes[i]) return false;
@@ -181,8 +181,8 @@ bool sectionsFit(const Header& header) {
   return true;
 }
 
-/// Whether every number that is used as an index stays within its array.
-bool fieldHolds(const DistanceField::Layout& field) {
+/// Whether all sizes are sensible and every index of the field is within its array.
+bool fieldIsValid(const DistanceField::Layout& field) {
   if (!(field.voxel > 0.0) || !std::isfinite(field.voxel) || !field.p_MoFo_M.allFinite()) return false;
   if (!(field.band > 0.0) || !(field.margin >= 0.0) || field.refinement < 1 || field.refinement > 64)
     return false;
@@ -193,10 +193,10 @@ bool fieldHolds(const DistanceField::Layout& field) {
   }
   if (coarse > field.index.size() || field.far.size() != coarse) return false;
   if (field.samples.size() % DistanceField::kBrickSamples != 0) return false;
-  // queries read pairs of numbers at byte offsets of 31 bits
-  constexpr std::size_t kMostBytes = std::numeric_limits<std::int32_t>::max();
-  if (field.samples.size_bytes() > kMostBytes || field.far.size_bytes() > kMostBytes / 2) return false;
-  if (field.far.size() < 2 || field.index.size() > kMostBytes / 2) return false;
+  // queries gather pairs of numbers at byte offsets of 31 bits
+  constexpr std::size_t kMaxBytes = std::numeric_limits<std::int32_t>::max();
+  if (field.samples.size_bytes() > kMaxBytes || field.far.size_bytes() > kMaxBytes / 2) return false;
+  if (field.far.size() < 2 || field.index.size() > kMaxBytes / 2) return false;
   const std::size_t bricks = field.samples.size() / DistanceField::kBrickSamples;
   const auto cubed = static_cast<std::size_t>(field.refinement * field.refinement * field.refinement);
   for (std::size_t i = 0; i < field.index.size(); ++i) {
@@ -215,7 +215,8 @@ bool fieldHolds(const DistanceField::Layout& field) {
   return true;
 }
 
-bool shellHolds(const Pointshell::Layout& shell) {
+/// Whether every index of the shell is within its array.
+bool shellIsValid(const Pointshell::Layout& shell) {
   const auto within = [](std::uint64_t first, std::uint64_t count, std::size_t size) {
     return first <= size && count <= size - first;
   };
@@ -235,31 +236,32 @@ bool shellHolds(const Pointshell::Layout& shell) {
   return true;
 }
 
-Result<Header> readHeader(const std::string& name, std::span<const std::byte> bytes) {
-  Header header;
+Result<FileHeader> readHeader(const std::string& name, std::span<const std::byte> bytes) {
+  FileHeader header;
   if (bytes.size() < sizeof header) return fail(name + ": not a structure file (too short)");
   std::memcpy(&header, bytes.data(), sizeof header);
   if (header.magic != kMagic) return fail(name + ": not a structure file");
   if (header.byte_order != kByteOrder) return fail(name + ": written on a machine with another byte order");
   if (header.version != kVersion) {
     return fail(name + ": version " + std::to_string(header.version) +
-                " of structure files, this program reads " + std::to_string(kVersion) + "; bake it again");
+                " of the structure file format, this program reads version " + std::to_string(kVersion) +
+                "; bake it again");
   }
   if (header.file_bytes != bytes.size()) {
-    return fail(name + ": " + std::to_string(bytes.size()) + " bytes where its header promises " +
-                std::to_string(header.file_bytes) + ": cut short or grown; bake it again");
+    return fail(name + ": has " + std::to_string(bytes.size()) + " bytes where its header states " +
+                std::to_string(header.file_bytes) + ": truncated or damaged; bake it again");
   }
   if (checksumOf(header, bytes.subspan(sizeof header)) != header.checksum) {
-    return fail(name + ": the checksum does not fit: the file is damaged; bake it again");
+    return fail(name + ": wrong checksum: the file is damaged; bake it again");
   }
-  if (!sectionsFit(header)) return fail(name + ": its parts reach beyond its end");
+  if (!sectionsFit(header)) return fail(name + ": a section reaches beyond the end of the file");
   return header;
 }
 
 }  // namespace
 
 Result<void> writeStructures(const std::filesystem::path& file, const HapticStructures& structures) {
-  Header header = headerOf(structures);
+  FileHeader header = headerOf(structures);
   const std::string meshes = meshesFrom(file, structures.info);
   const auto sections = sectionsOf(structures, meshes);
   std::uint64_t offset = sizeof header;
@@ -293,7 +295,7 @@ Result<void> writeStructures(const std::filesystem::path& file, const HapticStru
 
 Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesystem::path& file) {
   const std::string name = file.string();
-  const auto mapping = Mapping::open(file);
+  const auto mapping = FileMapping::open(file);
   if (!mapping) return fail(name + ": cannot be read, or is empty");
   const auto bytes = mapping->bytes();
   const auto header = readHeader(name, bytes);
@@ -312,9 +314,9 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
   const Pointshell::Layout shell{
       section<ShellPoint>(bytes, *header, kPoints), section<ShellSphere>(bytes, *header, kLeaves),
       section<ShellSphere>(bytes, *header, kClusters), section<ShellLevel>(bytes, *header, kLevels)};
-  if (!field.index.empty() && !fieldHolds(field))
-    return fail(name + ": its field refers to bricks it does not have");
-  if (!shellHolds(shell)) return fail(name + ": its shell refers to points it does not have");
+  if (!field.index.empty() && !fieldIsValid(field))
+    return fail(name + ": its field has an index out of range");
+  if (!shellIsValid(shell)) return fail(name + ": its shell has an index out of range");
 
   auto structures = std::make_shared<HapticStructures>();
   if (!field.index.empty()) structures->field = DistanceField(field, mapping);
@@ -333,4 +335,4 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
   return structures;
 }
 
-}  // namespace tenon
+}  // namespace tenon::structures

@@ -4,15 +4,15 @@
 #include <cmath>
 #include <utility>
 
-namespace tenon {
+namespace tenon::structures {
 
 namespace {
 
 constexpr std::uint32_t kLeafTriangles = 4;
-/// Halving 2^32 triangles takes no more levels, and a search waits for one sibling on each.
-constexpr std::size_t kMostLevels = 40;
+/// Depth of a tree of 2^32 triangles, rounded up: the search stack holds one sibling per level.
+constexpr std::size_t kMaxLevels = 40;
 
-/// The point of a triangle nearest to p: inside its plane's region, on an edge, or a corner.
+/// The point of a triangle nearest to p: on its face, an edge or a corner.
 Vector3 nearestOnTriangle(const Vector3& p, const SurfaceTree::Triangle& triangle) {
   const Vector3 a = triangle[0].cast<double>();
   const Vector3 ab = triangle[1].cast<double>() - a;
@@ -24,7 +24,7 @@ Vector3 nearestOnTriangle(const Vector3& p, const SurfaceTree::Triangle& triangl
   const double pb = ab.dot(ap);
   const double pc = ac.dot(ap);
   const double determinant = bb * cc - bc * bc;
-  // the foot in the plane, as a + v ab + w ac
+  // the projection onto the plane, as a + (v ab + w ac) / determinant
   const double v = cc * pb - bc * pc;
   const double w = bb * pc - bc * pb;
   if (determinant > 0.0 && v >= 0.0 && w >= 0.0 && v + w <= determinant) {
@@ -32,8 +32,8 @@ Vector3 nearestOnTriangle(const Vector3& p, const SurfaceTree::Triangle& triangl
   }
   const auto onEdge = [&p](const Vector3& from, const Vector3& along) -> Vector3 {
     const double squared = along.squaredNorm();
-    const double share = squared > 0.0 ? std::clamp(along.dot(p - from) / squared, 0.0, 1.0) : 0.0;
-    return from + share * along;
+    const double fraction = squared > 0.0 ? std::clamp(along.dot(p - from) / squared, 0.0, 1.0) : 0.0;
+    return from + fraction * along;
   };
   Vector3 best = onEdge(a, ab);
   for (const Vector3& other : {onEdge(a, ac), onEdge(a + ab, ac - ab)}) {
@@ -83,11 +83,11 @@ SurfaceTree::Nearest SurfaceTree::nearest(const Vector3& p_MP, double radius,
     const Vector3 high = p_MP - nodes_[node].high.cast<double>();
     return low.cwiseMax(high).cwiseMax(0.0).squaredNorm();
   };
-  std::array<std::pair<std::uint32_t, double>, kMostLevels> waiting;
+  std::array<std::pair<std::uint32_t, double>, kMaxLevels> stack;
   std::size_t count = 0;
-  waiting[count++] = {0, distance2(0)};
+  stack[count++] = {0, distance2(0)};
   while (count > 0) {
-    const auto [number, away2] = waiting[--count];
+    const auto [number, away2] = stack[--count];
     if (away2 > squared) continue;
     const Node& node = nodes_[number];
     if (node.count == 0) {
@@ -95,8 +95,8 @@ SurfaceTree::Nearest SurfaceTree::nearest(const Vector3& p_MP, double radius,
       std::pair<std::uint32_t, double> near{number + 1, distance2(number + 1)};
       std::pair<std::uint32_t, double> far{node.first, distance2(node.first)};
       if (far.second < near.second) std::swap(near, far);
-      waiting[count++] = far;
-      waiting[count++] = near;
+      stack[count++] = far;
+      stack[count++] = near;
       continue;
     }
     if (budget < node.count) {
@@ -116,4 +116,4 @@ SurfaceTree::Nearest SurfaceTree::nearest(const Vector3& p_MP, double radius,
   return nearest;
 }
 
-}  // namespace tenon
+}  // namespace tenon::structures

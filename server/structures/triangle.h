@@ -6,13 +6,13 @@
 
 #include "idl/types/spatial.h"
 
-namespace tenon {
+namespace tenon::structures {
 
-/// Three corners in frame M. Which way it winds means nothing here.
+/// Three corners in frame M [m]. Its winding has no meaning.
 using Triangle = std::array<Vector3, 3>;
 
-/// Squared distance from p to the nearest point of a triangle (Ericson, Real-Time Collision
-/// Detection, 5.1.5). Any triangle is legal: one without area is a segment or a point.
+/// Squared distance [m^2] from p to the nearest point of a triangle (Ericson, Real-Time Collision Detection,
+/// 5.1.5). A triangle without area counts as a segment or a point.
 [[nodiscard]] inline double squaredDistance(const Vector3& p, const Triangle& t) {
   const Vector3 ab = t[1] - t[0];
   const Vector3 ac = t[2] - t[0];
@@ -49,8 +49,8 @@ using Triangle = std::array<Vector3, 3>;
   return above * above / normal.squaredNorm();
 }
 
-/// Whether the ray from p goes through a triangle.
-[[nodiscard]] inline bool crosses(const Vector3& p, const Vector3& direction, const Triangle& t) {
+/// Whether the ray from p intersects a triangle (Moeller and Trumbore 1997). A ray in its plane does not.
+[[nodiscard]] inline bool rayIntersects(const Vector3& p, const Vector3& direction, const Triangle& t) {
   const Vector3 ab = t[1] - t[0];
   const Vector3 ac = t[2] - t[0];
   const Vector3 across = direction.cross(ac);
@@ -70,9 +70,10 @@ using Triangle = std::array<Vector3, 3>;
   return box;
 }
 
+/// [m^2]
 [[nodiscard]] inline double areaOf(const Triangle& t) { return (t[1] - t[0]).cross(t[2] - t[0]).norm() / 2; }
 
-/// The length of the longest edge, which begins at corner `from`.
+/// [m] The length of the longest edge; `from` becomes the number of the corner where it begins.
 [[nodiscard]] inline double longestEdge(const Triangle& t, std::size_t& from) {
   double squared = -1.0;
   for (std::size_t edge = 0; edge < 3; ++edge) {
@@ -84,12 +85,12 @@ using Triangle = std::array<Vector3, 3>;
   return std::sqrt(squared);
 }
 
-/// The same corners in one order, so that winding cannot change a single bit of what is computed.
-[[nodiscard]] inline Triangle unwound(Triangle t) {
+/// The corners in lexicographic order, so that results do not depend on the winding.
+[[nodiscard]] inline Triangle sortedCorners(Triangle t) {
   std::sort(t.begin(), t.end(), [](const Vector3& a, const Vector3& b) {
     return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
   });
   return t;
 }
 
-}  // namespace tenon
+}  // namespace tenon::structures

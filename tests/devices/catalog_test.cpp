@@ -7,38 +7,38 @@
 
 #include "devices/simulated/simulated_device.h"
 
-namespace tenon {
+namespace tenon::devices {
 namespace {
 
 using testing::HasSubstr;
 
-TEST(Catalog, OpensEveryDeviceItNames) {
+TEST(Catalog, OpensEveryDeviceItLists) {
   for (const std::string_view name : deviceNames()) EXPECT_TRUE(openDevice(name)) << name;
-  for (const std::string_view name : pairNames()) EXPECT_TRUE(openPair(name)) << name;
+  for (const std::string_view name : bimanualDeviceNames()) EXPECT_TRUE(openBimanualDevice(name)) << name;
 }
 
-TEST(Catalog, AnswersAnUnknownNameWithTheNamesThereAre) {
+TEST(Catalog, AnUnknownNameFailsWithAListOfTheKnownNames) {
   const auto device = openDevice("sigma8");
   ASSERT_FALSE(device);
   EXPECT_THAT(device.error().what, HasSubstr("'sigma8'"));
   EXPECT_THAT(device.error().what, HasSubstr("sigma7-sim, omega3-sim, falcon-sim, vibrotac-sim"));
   EXPECT_THAT(device.error().what, HasSubstr("hug-sim"));
-  const auto pair = openPair("");
+  const auto pair = openBimanualDevice("");
   ASSERT_FALSE(pair);
   EXPECT_THAT(pair.error().what, HasSubstr("hug-sim"));
 }
 
-TEST(Catalog, SaysThatAMachineWithTwoArmsWantsTwoHands) {
+TEST(Catalog, ABimanualDeviceIsNotOpenedForOneHand) {
   const auto device = openDevice("hug-sim");
   ASSERT_FALSE(device);
-  EXPECT_THAT(device.error().what, HasSubstr("two arms"));
+  EXPECT_THAT(device.error().what, HasSubstr("bimanual"));
 }
 
-TEST(Catalog, ASimulatedDeviceIsHeldByAnArmAndTheArmBandByNone) {
-  EXPECT_NE(handOf(**openDevice("falcon-sim")), nullptr);
-  EXPECT_EQ(handOf(**openDevice("vibrotac-sim")), nullptr);
-  EXPECT_NE(handOf((*openPair("hug-sim"))->left()), nullptr);
+TEST(Catalog, ASimulatedHapticDeviceIsHeldByAHumanArmAndTheBraceletIsNot) {
+  EXPECT_NE(simulatedHumanArm(**openDevice("falcon-sim")), nullptr);
+  EXPECT_EQ(simulatedHumanArm(**openDevice("vibrotac-sim")), nullptr);
+  EXPECT_NE(simulatedHumanArm((*openBimanualDevice("hug-sim"))->left()), nullptr);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::devices

@@ -11,42 +11,42 @@
 #include "devices/simulated/simulated_device.h"
 #include "tests/support/realtime_guard.h"
 
-// What every device of the catalog owes: a new one runs through all of this without a line written here.
+// Contract of HapticDevice. Runs for every device of the catalog, new ones included.
 
-namespace tenon {
+namespace tenon::devices {
 namespace {
 
-struct Subject {
+struct CatalogDevice {
   std::string name;
   std::function<HapticDevice*()> open;
 };
 
-void PrintTo(const Subject& subject, std::ostream* out) { *out << subject.name; }
+void PrintTo(const CatalogDevice& entry, std::ostream* out) { *out << entry.name; }
 
-/// The device or pair behind a subject lives as long as the test process.
+/// Keeps an opened device alive until the test process ends.
 template <typename T>
-T* kept(Result<std::unique_ptr<T>> opened) {
+T* keepAlive(Result<std::unique_ptr<T>> opened) {
   static std::vector<std::unique_ptr<T>> keeper;
   if (!opened) return nullptr;
   keeper.push_back(std::move(*opened));
   return keeper.back().get();
 }
 
-std::vector<Subject> everyDevice() {
-  std::vector<Subject> subjects;
+std::vector<CatalogDevice> everyDevice() {
+  std::vector<CatalogDevice> devices;
   for (const std::string_view view : deviceNames()) {
     const std::string name(view);
-    subjects.push_back({name, [name] { return kept(openDevice(name)); }});
+    devices.push_back({name, [name] { return keepAlive(openDevice(name)); }});
   }
-  for (const std::string_view view : pairNames()) {
+  for (const std::string_view view : bimanualDeviceNames()) {
     const std::string name(view);
-    subjects.push_back({name + "-right", [name] { return &kept(openPair(name))->right(); }});
-    subjects.push_back({name + "-left", [name] { return &kept(openPair(name))->left(); }});
+    devices.push_back({name + "-right", [name] { return &keepAlive(openBimanualDevice(name))->right(); }});
+    devices.push_back({name + "-left", [name] { return &keepAlive(openBimanualDevice(name))->left(); }});
   }
-  return subjects;
+  return devices;
 }
 
-class Conformance : public testing::TestWithParam<Subject> {
+class Conformance : public testing::TestWithParam<CatalogDevice> {
  protected:
   void SetUp() override {
     device_ = GetParam().open();
@@ -72,22 +72,23 @@ class Conformance : public testing::TestWithParam<Subject> {
   HapticDevice* device_ = nullptr;
 };
 
-/// What can only be seen while a simulated person holds the handle.
-class ConformanceInAHand : public Conformance {};
+/// Tests that need a simulated human arm at the handle.
+class HeldDevice : public Conformance {};
 
-std::vector<Subject> everyDeviceInAHand() {
-  std::vector<Subject> held;
-  for (const Subject& subject : everyDevice())
-    if (HapticDevice* const device = subject.open(); device && handOf(*device)) held.push_back(subject);
+std::vector<CatalogDevice> everyHeldDevice() {
+  std::vector<CatalogDevice> held;
+  for (const CatalogDevice& entry : everyDevice())
+    if (HapticDevice* const device = entry.open(); device && simulatedHumanArm(*device))
+      held.push_back(entry);
   return held;
 }
 
-TEST_P(Conformance, SaysWhatItIs) {
+TEST_P(Conformance, ReportsConsistentCapabilities) {
   const DeviceCaps& caps = device_->caps();
   EXPECT_FALSE(caps.model.empty());
   EXPECT_GT(caps.rate, 0.0);
   if (caps.dof_mask == 0) {
-    EXPECT_GT(caps.tactors, 0U) << "it neither pushes nor shakes";
+    EXPECT_GT(caps.tactors, 0U) << "a device without axes has tactors";
     return;
   }
   EXPECT_GT(caps.workspace_radius, caps.indexing_radius);
@@ -101,11 +102,11 @@ TEST_P(Conformance, SaysWhatItIs) {
   EXPECT_GT(caps.max_speed, 0.0);
 }
 
-TEST_P(Conformance, ArmsAndDisarmsAsOftenAsAsked) {
+TEST_P(Conformance, ArmsAndDisarmsRepeatedly) {
   EXPECT_FALSE(read().forces_on);
   for (int round = 0; round < 3; ++round) {
     EXPECT_TRUE(device_->arm());
-    EXPECT_TRUE(device_->arm()) << "twice is once";
+    EXPECT_TRUE(device_->arm()) << "arming twice has no effect";
     EXPECT_TRUE(read().forces_on);
     device_->disarm();
     device_->disarm();
@@ -113,7 +114,7 @@ TEST_P(Conformance, ArmsAndDisarmsAsOftenAsAsked) {
   }
 }
 
-TEST_P(Conformance, CountsItsReadings) {
+TEST_P(Conformance, NumbersItsReadings) {
   std::uint64_t last = read().seq;
   for (int tick = 0; tick < 100; ++tick) {
     const std::uint64_t now = read().seq;
@@ -122,7 +123,7 @@ TEST_P(Conformance, CountsItsReadings) {
   }
 }
 
-TEST_P(Conformance, StaysWhereItIsWithoutAForce) {
+TEST_P(Conformance, StaysAtRestWithoutAForce) {
   ASSERT_TRUE(device_->arm());
   const Pose start = read().X_DH;
   for (int tick = 0; tick < 1000; ++tick) {
@@ -132,17 +133,17 @@ TEST_P(Conformance, StaysWhereItIsWithoutAForce) {
   }
 }
 
-TEST_P(Conformance, NeverMovesTheHandWhenDisarmed) {
+TEST_P(Conformance, DoesNotMoveTheHandWhileDisarmed) {
   const Pose start = read().X_DH;
   for (int tick = 0; tick < 500; ++tick) cycle(push(5.0));
   EXPECT_LT((read().X_DH.translation() - start.translation()).norm(), 1e-4);
 }
 
-TEST_P(ConformanceInAHand, PushesAlongTheForceAndNoHarderThanItSays) {
+TEST_P(HeldDevice, PushesAlongTheCommandedForceUpToItsPeakForce) {
   auto* const simulated = dynamic_cast<SimulatedDevice*>(device_);
   ASSERT_NE(simulated, nullptr);
   ASSERT_TRUE(device_->arm());
-  simulated->hand().stiffen(1.0);
+  simulated->humanArm().setContraction(1.0);
   const Pose start = read().X_DH;
   for (int tick = 0; tick < 100; ++tick) cycle(push(2.0));
   EXPECT_GT(read().X_DH.translation().x(), start.translation().x() + 1e-4);
@@ -152,12 +153,12 @@ TEST_P(ConformanceInAHand, PushesAlongTheForceAndNoHarderThanItSays) {
   }
 }
 
-TEST_P(ConformanceInAHand, BrakesWhenTold) {
-  HumanArm* const hand = handOf(*device_);
+TEST_P(HeldDevice, BrakesOnCommand) {
+  HumanArm* const hand = simulatedHumanArm(*device_);
   ASSERT_NE(hand, nullptr);
   ASSERT_TRUE(device_->arm());
   const double reach = 0.3 * device_->caps().workspace_radius;
-  hand->intend(Pose(Vector3(reach, 0.0, 0.0)));
+  hand->setIntent(Pose(Vector3(reach, 0.0, 0.0)));
   DeviceCommand brake;
   brake.brake = true;
   for (int tick = 0; tick < 100; ++tick) cycle(brake);
@@ -166,7 +167,7 @@ TEST_P(ConformanceInAHand, BrakesWhenTold) {
   EXPECT_GT(read().X_DH.translation().x() - braked, 3.0 * braked);
 }
 
-TEST_P(Conformance, TakesItsForcesOffWhenTheServoStopsWriting) {
+TEST_P(Conformance, TurnsItsForcesOffWhenWritesStop) {
   ASSERT_TRUE(device_->arm());
   for (int tick = 0; tick < 10; ++tick) cycle(push(1.0));
   DeviceState state;
@@ -183,12 +184,12 @@ TEST_P(Conformance, AFaultStaysUntilAnOperatorResetsIt) {
   EXPECT_NE(refused.error().what.find(device_->caps().model), std::string::npos) << refused.error().what;
   EXPECT_TRUE(device_->resetFault());
   EXPECT_EQ(read().fault, DeviceFault::kNone);
-  EXPECT_FALSE(read().forces_on) << "a reset arms nothing";
+  EXPECT_FALSE(read().forces_on) << "a reset does not arm";
   EXPECT_TRUE(device_->arm());
   EXPECT_TRUE(read().forces_on);
 }
 
-TEST_P(Conformance, NeverShowsAForceThatIsNoNumber) {
+TEST_P(Conformance, IgnoresANonFiniteForce) {
   ASSERT_TRUE(device_->arm());
   cycle(push(std::numeric_limits<double>::quiet_NaN()));
   for (int tick = 0; tick < 20; ++tick) EXPECT_TRUE(cycle({}).X_DH.isFinite());
@@ -203,15 +204,15 @@ TEST_P(Conformance, ReadsAndWritesWithoutAllocatingOrLocking) {
   EXPECT_EQ(guard.locks(), 0);
 }
 
-std::string nameOf(const testing::TestParamInfo<Subject>& subject) {
-  std::string name = subject.param.name;
+std::string nameOf(const testing::TestParamInfo<CatalogDevice>& device) {
+  std::string name = device.param.name;
   for (char& c : name)
     if (c == '-') c = '_';
   return name;
 }
 
 INSTANTIATE_TEST_SUITE_P(Catalog, Conformance, testing::ValuesIn(everyDevice()), nameOf);
-INSTANTIATE_TEST_SUITE_P(Catalog, ConformanceInAHand, testing::ValuesIn(everyDeviceInAHand()), nameOf);
+INSTANTIATE_TEST_SUITE_P(Catalog, HeldDevice, testing::ValuesIn(everyHeldDevice()), nameOf);
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::devices

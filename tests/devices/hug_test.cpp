@@ -6,15 +6,15 @@
 
 #include "devices/safety.h"
 
-namespace tenon {
+namespace tenon::devices {
 namespace {
 
-struct Both {
+struct BothArms {
   DeviceState right, left;
 };
 
-Both cycle(Hug& hug, double right_force) {
-  Both state;
+BothArms cycle(Hug& hug, double right_force) {
+  BothArms state;
   hug.right().read(state.right);
   hug.left().read(state.left);
   DeviceCommand command;
@@ -30,64 +30,64 @@ class HugClutch : public testing::Test {
     ASSERT_TRUE(hug_.open());
     ASSERT_TRUE(hug_.right().arm());
     ASSERT_TRUE(hug_.left().arm());
-    // a person who resists with all strength
-    hug_.right().hand().stiffen(1.0);
-    hug_.left().hand().intend(Pose(Vector3(0.0, 0.1, 0.0)));
+    // the person resists with full co-contraction
+    hug_.right().humanArm().setContraction(1.0);
+    hug_.left().humanArm().setIntent(Pose(Vector3(0.0, 0.1, 0.0)));
   }
-  /// Pushes at the right hand until the clutch opens; how hard the hand had felt it.
-  double pushUntilItOpens() {
-    double felt = 0.0;
+  /// Ramps the force on the right hand until the clutch opens; returns the last force [N] on the hand.
+  double pushUntilClutchOpens() {
+    double force = 0.0;
     for (int tick = 0; tick < 2000 && !hug_.clutchOpen(); ++tick) {
-      felt = hug_.right().hand().felt().force.norm();
+      force = hug_.right().humanArm().handleWrench().force.norm();
       cycle(hug_, std::min(0.1 * tick, 120.0));
     }
-    return felt;
+    return force;
   }
   Hug hug_{3};
 };
 
-TEST_F(HugClutch, HoldsAtAnythingUnderEightyNewton) {
+TEST_F(HugClutch, StaysClosedBelowEightyNewton) {
   for (int tick = 0; tick < 3000; ++tick) cycle(hug_, std::min(0.1 * tick, 75.0));
   EXPECT_FALSE(hug_.clutchOpen());
-  EXPECT_NEAR(hug_.right().hand().felt().force.norm(), 75.0, 1.0);
+  EXPECT_NEAR(hug_.right().humanArm().handleWrench().force.norm(), 75.0, 1.0);
 }
 
 TEST_F(HugClutch, OpensAboveEightyNewtonAndStopsBothArms) {
-  EXPECT_NEAR(pushUntilItOpens(), 80.0, 1.0);
+  EXPECT_NEAR(pushUntilClutchOpens(), 80.0, 1.0);
   ASSERT_TRUE(hug_.clutchOpen());
-  const Both stopped = cycle(hug_, 0.0);
+  const BothArms stopped = cycle(hug_, 0.0);
   EXPECT_EQ(stopped.right.fault, DeviceFault::kClutchOpen);
   EXPECT_EQ(stopped.left.fault, DeviceFault::kClutchOpen);
   EXPECT_FALSE(stopped.right.forces_on);
   EXPECT_FALSE(stopped.left.forces_on);
-  EXPECT_FALSE(hug_.left().arm()) << "the innocent arm, too, waits for the operator";
+  EXPECT_FALSE(hug_.left().arm()) << "the other arm, too, needs a reset";
 
-  // the robots stand, the hands are free
+  // the robots stand still, the hands move freely
   for (int tick = 0; tick < 1000; ++tick) cycle(hug_, 100.0);
-  const Both later = cycle(hug_, 100.0);
+  const BothArms later = cycle(hug_, 100.0);
   EXPECT_EQ(later.right.X_DH.translation(), stopped.right.X_DH.translation());
   EXPECT_EQ(later.left.X_DH.translation(), stopped.left.X_DH.translation());
-  EXPECT_EQ(hug_.right().hand().felt().force, Vector3(Vector3::Zero()));
-  EXPECT_LT(hug_.right().hand().pose().translation().norm(), 1e-3) << "back where the person wanted it";
+  EXPECT_EQ(hug_.right().humanArm().handleWrench().force, Vector3(Vector3::Zero()));
+  EXPECT_LT(hug_.right().humanArm().pose().translation().norm(), 1e-3) << "back at the intended pose";
 }
 
-TEST_F(HugClutch, ClosesAgainOnlyWhenTheOperatorResets) {
-  pushUntilItOpens();
+TEST_F(HugClutch, ClosesOnlyAfterAReset) {
+  pushUntilClutchOpens();
   cycle(hug_, 0.0);
   ASSERT_TRUE(hug_.right().resetFault());
   ASSERT_TRUE(hug_.left().resetFault());
   EXPECT_FALSE(hug_.clutchOpen());
   EXPECT_TRUE(hug_.right().arm());
   EXPECT_TRUE(hug_.left().arm());
-  Both state;
+  BothArms state;
   for (int tick = 0; tick < 2000; ++tick) state = cycle(hug_, 1.0);
   EXPECT_EQ(state.right.fault, DeviceFault::kNone);
   EXPECT_TRUE(state.right.forces_on);
   EXPECT_TRUE(state.left.forces_on);
-  EXPECT_GT(hug_.right().hand().pose().translation().x(), 0.0) << "hand and handle are one body again";
+  EXPECT_GT(hug_.right().humanArm().pose().translation().x(), 0.0) << "hand and handle are coupled again";
 }
 
-/// Both arms behind their safety layers, as a station has them.
+/// Both arms with their safety layers, as in a station.
 class HugWithSafety : public testing::Test {
  protected:
   void SetUp() override {
@@ -98,14 +98,14 @@ class HugWithSafety : public testing::Test {
     ASSERT_TRUE(hug_.right().arm());
     ASSERT_TRUE(hug_.left().arm());
   }
-  void cycle(const Vector3& wanted_right) {
+  void cycle(const Vector3& force_right) {
     SafetyRequest request;
     DeviceState state;
     hug_.left().read(state);
     hug_.left().write(left_.step(request, state, 1e-3));
     if (left_.wantsDisarm()) hug_.left().disarm();
     hug_.right().read(state);
-    request.wanted.F_Ho_D.force = wanted_right;
+    request.requested.F_Ho_D.force = force_right;
     hug_.right().write(right_.step(request, state, 1e-3));
     if (right_.wantsDisarm()) hug_.right().disarm();
   }
@@ -116,8 +116,8 @@ class HugWithSafety : public testing::Test {
   Safety left_{hug_.left().caps(), &latch_};
 };
 
-TEST_F(HugWithSafety, NoForceThatAnybodyWantsOpensTheClutch) {
-  hug_.right().hand().stiffen(1.0);
+TEST_F(HugWithSafety, NoRequestedForceOpensTheClutch) {
+  hug_.right().humanArm().setContraction(1.0);
   for (int tick = 0; tick < 5000; ++tick) {
     cycle({1000.0, -1000.0, 300.0});
     EXPECT_LE(hug_.right().motorWrench().force.norm(), 50.0 + 1e-9);
@@ -126,17 +126,17 @@ TEST_F(HugWithSafety, NoForceThatAnybodyWantsOpensTheClutch) {
   EXPECT_TRUE(right_.acts(SafetyRule::kForceLimited));
 }
 
-// A person who pulls with all strength against the end of the travel does what no command may.
-TEST_F(HugWithSafety, APersonsPullOpensItStopsBothAndAnOperatorBringsThemBack) {
-  hug_.right().hand().stiffen(1.0);
-  hug_.right().hand().intend(Pose(Vector3(0.0, 0.9, 0.0)));
+// The pull of a person against the end stop exceeds the clutch force, which no command can.
+TEST_F(HugWithSafety, APullAgainstTheEndStopOpensTheClutchStopsBothArmsAndAResetRestoresThem) {
+  hug_.right().humanArm().setContraction(1.0);
+  hug_.right().humanArm().setIntent(Pose(Vector3(0.0, 0.9, 0.0)));
   for (int tick = 0; tick < 3000; ++tick) cycle({0.0, 0.0, 0.0});
   ASSERT_TRUE(hug_.clutchOpen());
   EXPECT_TRUE(right_.acts(SafetyRule::kClutchOpen));
   EXPECT_TRUE(left_.acts(SafetyRule::kClutchOpen));
   EXPECT_EQ(hug_.left().phase(), SimulatedDevice::Phase::kFault);
 
-  hug_.right().hand().intend(Pose::Identity());
+  hug_.right().humanArm().setIntent(Pose::Identity());
   ASSERT_TRUE(hug_.right().resetFault());
   ASSERT_TRUE(hug_.left().resetFault());
   right_.reset();
@@ -150,4 +150,4 @@ TEST_F(HugWithSafety, APersonsPullOpensItStopsBothAndAnOperatorBringsThemBack) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::devices

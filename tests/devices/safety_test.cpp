@@ -12,7 +12,7 @@
 #include "idl/types/messages.h"
 #include "tests/support/realtime_guard.h"
 
-namespace tenon {
+namespace tenon::devices {
 namespace {
 
 constexpr double kTick = 1e-3;
@@ -24,17 +24,17 @@ DeviceState armed() {
   return state;
 }
 
-SafetyRequest wantForce(const Vector3& force, double age = 0.0) {
+SafetyRequest requestForce(const Vector3& force, double age = 0.0) {
   SafetyRequest request;
-  request.wanted.F_Ho_D.force = force;
+  request.requested.F_Ho_D.force = force;
   request.age = age;
   return request;
 }
 
-/// A layer that has shown `force` long enough for soft start and slew to be over.
+/// A safety layer after 1 s of `force`: soft start and slew are over.
 Safety settled(const DeviceCaps& caps, const Vector3& force, ClutchLatch* clutch = nullptr) {
   Safety safety(caps, clutch);
-  for (int tick = 0; tick < 1000; ++tick) (void)safety.step(wantForce(force), armed(), kTick);
+  for (int tick = 0; tick < 1000; ++tick) (void)safety.step(requestForce(force), armed(), kTick);
   return safety;
 }
 
@@ -42,69 +42,71 @@ const DeviceCaps kSigma = sigma7Model().caps;
 const DeviceCaps kHug = hugArmModel().caps;
 const DeviceCaps kFalcon = falconModel().caps;
 
-TEST(Safety, LetsAModestFreshForceThroughUnchanged) {
+TEST(Safety, PassesASmallFreshForceUnchanged) {
   Safety safety = settled(kSigma, {1.0, 2.0, 3.0});
-  const DeviceCommand shown = safety.step(wantForce({1.0, 2.0, 3.0}), armed(), kTick);
-  EXPECT_EQ(shown.F_Ho_D.force, Vector3(1.0, 2.0, 3.0));
-  EXPECT_FALSE(shown.brake);
+  const DeviceCommand output = safety.step(requestForce({1.0, 2.0, 3.0}), armed(), kTick);
+  EXPECT_EQ(output.F_Ho_D.force, Vector3(1.0, 2.0, 3.0));
+  EXPECT_FALSE(output.brake);
   EXPECT_EQ(safety.flags(), 0U);
 }
 
-TEST(Safety, ShowsNothingForAForceThatIsNoNumber) {
+TEST(Safety, OutputsNoForceForANonFiniteRequest) {
   Safety safety = settled(kSigma, {1.0, 0.0, 0.0});
   for (const double bad : {kNan, std::numeric_limits<double>::infinity()}) {
-    const DeviceCommand shown = safety.step(wantForce({1.0, bad, 0.0}), armed(), kTick);
-    EXPECT_EQ(shown.F_Ho_D.force, Vector3(Vector3::Zero()));
-    EXPECT_TRUE(safety.acts(SafetyRule::kNotFinite));
+    const DeviceCommand output = safety.step(requestForce({1.0, bad, 0.0}), armed(), kTick);
+    EXPECT_EQ(output.F_Ho_D.force, Vector3(Vector3::Zero()));
+    EXPECT_TRUE(safety.acts(SafetyRule::kNonFinite));
   }
-  SafetyRequest odd = wantForce({1.0, 0.0, 0.0});
-  odd.stiffness = kNan;
-  EXPECT_EQ(safety.step(odd, armed(), kTick).F_Ho_D.force, Vector3(Vector3::Zero()));
+  SafetyRequest nan_stiffness = requestForce({1.0, 0.0, 0.0});
+  nan_stiffness.stiffness = kNan;
+  EXPECT_EQ(safety.step(nan_stiffness, armed(), kTick).F_Ho_D.force, Vector3(Vector3::Zero()));
 }
 
-// share of the force
+// fraction of the force
 //   1 |-------.
 //     |        '.
 //   0 |__________'.____ age
 //     0     10   30 ms
 TEST(Safety, FadesAForceOlderThanTenMillisecondsAndDisarmsAtThirty) {
   Safety safety = settled(kSigma, {4.0, 0.0, 0.0});
-  const auto shownAt = [&](double age) {
-    return safety.step(wantForce({4.0, 0.0, 0.0}, age), armed(), kTick).F_Ho_D.force.x();
+  const auto outputAt = [&](double age) {
+    return safety.step(requestForce({4.0, 0.0, 0.0}, age), armed(), kTick).F_Ho_D.force.x();
   };
-  EXPECT_DOUBLE_EQ(shownAt(0.010), 4.0);
-  EXPECT_FALSE(safety.acts(SafetyRule::kAged));
-  EXPECT_NEAR(shownAt(0.020), 2.0, 1e-12);
-  EXPECT_TRUE(safety.acts(SafetyRule::kAged));
+  EXPECT_DOUBLE_EQ(outputAt(0.010), 4.0);
+  EXPECT_FALSE(safety.acts(SafetyRule::kAgeFading));
+  EXPECT_NEAR(outputAt(0.020), 2.0, 1e-12);
+  EXPECT_TRUE(safety.acts(SafetyRule::kAgeFading));
   EXPECT_FALSE(safety.wantsDisarm());
-  EXPECT_DOUBLE_EQ(shownAt(0.030), 0.0);
+  EXPECT_DOUBLE_EQ(outputAt(0.030), 0.0);
   EXPECT_TRUE(safety.acts(SafetyRule::kStale));
   EXPECT_TRUE(safety.wantsDisarm());
-  EXPECT_DOUBLE_EQ(shownAt(kNan), 0.0);
+  EXPECT_DOUBLE_EQ(outputAt(kNan), 0.0);
 }
 
-TEST(Safety, LimitsAForceWithoutTurningIt) {
+TEST(Safety, LimitsAForceWithoutChangingItsDirection) {
   Safety safety = settled(kHug, {300.0, 400.0, 0.0});
-  const Vector3 shown = safety.step(wantForce({300.0, 400.0, 0.0}), armed(), kTick).F_Ho_D.force;
-  EXPECT_NEAR(shown.norm(), 50.0, 1e-9) << "HUG's arms could do 150 N, the command ceiling is 50";
-  EXPECT_NEAR(shown.y() / shown.x(), 400.0 / 300.0, 1e-12);
+  const Vector3 output = safety.step(requestForce({300.0, 400.0, 0.0}), armed(), kTick).F_Ho_D.force;
+  EXPECT_NEAR(output.norm(), 50.0, 1e-9) << "peak force of a HUG arm 150 N, command limit 50 N";
+  EXPECT_NEAR(output.y() / output.x(), 400.0 / 300.0, 1e-12);
   EXPECT_TRUE(safety.acts(SafetyRule::kForceLimited));
 }
 
-TEST(Safety, LimitsTorqueToo) {
+TEST(Safety, LimitsTorque) {
   Safety safety(kSigma);
   SafetyRequest request;
-  request.wanted.F_Ho_D.torque = {0.0, 3.0, 0.0};
-  DeviceCommand shown;
-  for (int tick = 0; tick < 1000; ++tick) shown = safety.step(request, armed(), kTick);
-  EXPECT_NEAR(shown.F_Ho_D.torque.y(), 0.4, 1e-12);
+  request.requested.F_Ho_D.torque = {0.0, 3.0, 0.0};
+  DeviceCommand output;
+  for (int tick = 0; tick < 1000; ++tick) output = safety.step(request, armed(), kTick);
+  EXPECT_NEAR(output.F_Ho_D.torque.y(), 0.4, 1e-12);
   EXPECT_TRUE(safety.acts(SafetyRule::kForceLimited));
 }
 
-TEST(Safety, GivesPeakForceForAWhileAndThenWhatTheMotorsBearForEver) {
+TEST(Safety, LimitsTheForceFromPeakToContinuousAsTheMotorsWarm) {
   Safety safety = settled(kSigma, {20.0, 0.0, 0.0});
-  const auto push = [&] { return safety.step(wantForce({20.0, 0.0, 0.0}), armed(), kTick).F_Ho_D.force.x(); };
-  EXPECT_DOUBLE_EQ(push(), 20.0) << "a second at peak is fine";
+  const auto push = [&] {
+    return safety.step(requestForce({20.0, 0.0, 0.0}), armed(), kTick).F_Ho_D.force.x();
+  };
+  EXPECT_DOUBLE_EQ(push(), 20.0) << "peak force is permitted for a second";
   double last = 20.0;
   double largest_drop = 0.0;
   for (int tick = 0; tick < 120000; ++tick) {
@@ -114,30 +116,30 @@ TEST(Safety, GivesPeakForceForAWhileAndThenWhatTheMotorsBearForEver) {
   }
   EXPECT_LT(last, 13.0);
   EXPECT_GE(last, 12.0 - 1e-9);
-  EXPECT_LT(largest_drop, 0.05) << "the limit sinks, it does not jump";
+  EXPECT_LT(largest_drop, 0.05) << "the limit falls without steps";
   EXPECT_TRUE(safety.acts(SafetyRule::kThermal));
-  // a rest of a minute cools the motors
-  for (int tick = 0; tick < 60000; ++tick) (void)safety.step(wantForce({0.0, 0.0, 0.0}), armed(), kTick);
+  // one minute without force cools the motors
+  for (int tick = 0; tick < 60000; ++tick) (void)safety.step(requestForce({0.0, 0.0, 0.0}), armed(), kTick);
   for (int tick = 0; tick < 100; ++tick) last = push();
   EXPECT_DOUBLE_EQ(last, 20.0);
 }
 
-TEST(Safety, LimitsTheGrowthOfAForceButNeverItsFall) {
+TEST(Safety, LimitsTheIncreaseOfAForceButNotItsDecrease) {
   Safety safety = settled(kSigma, {2.0, 0.0, 0.0});
-  const auto shownFor = [&](double x) {
-    return safety.step(wantForce({x, 0.0, 0.0}), armed(), kTick).F_Ho_D.force.x();
+  const auto outputFor = [&](double x) {
+    return safety.step(requestForce({x, 0.0, 0.0}), armed(), kTick).F_Ho_D.force.x();
   };
-  EXPECT_NEAR(shownFor(10.0), 2.5, 1e-9) << "500 N/s";
-  EXPECT_TRUE(safety.acts(SafetyRule::kSlewed));
-  EXPECT_NEAR(shownFor(10.0), 3.0, 1e-9);
-  EXPECT_NEAR(shownFor(0.5), 0.5, 1e-9) << "falls at once";
-  EXPECT_FALSE(safety.acts(SafetyRule::kSlewed));
-  EXPECT_NEAR(shownFor(-10.0), -0.5, 1e-9) << "the old direction falls at once, the new one grows";
+  EXPECT_NEAR(outputFor(10.0), 2.5, 1e-9) << "500 N/s";
+  EXPECT_TRUE(safety.acts(SafetyRule::kSlewLimited));
+  EXPECT_NEAR(outputFor(10.0), 3.0, 1e-9);
+  EXPECT_NEAR(outputFor(0.5), 0.5, 1e-9) << "decreases at once";
+  EXPECT_FALSE(safety.acts(SafetyRule::kSlewLimited));
+  EXPECT_NEAR(outputFor(-10.0), -0.5, 1e-9) << "the old direction drops at once, the new one grows";
 }
 
-TEST(Safety, StartsSoftlyInHalfASecondAfterArming) {
+TEST(Safety, RampsTheForceOverHalfASecondAfterArming) {
   Safety safety(kHug);
-  const SafetyRequest request = wantForce({10.0, 0.0, 0.0});
+  const SafetyRequest request = requestForce({10.0, 0.0, 0.0});
   (void)safety.step(request, DeviceState{}, kTick);
   EXPECT_TRUE(safety.acts(SafetyRule::kForcesOff));
   double last = 0.0;
@@ -150,129 +152,129 @@ TEST(Safety, StartsSoftlyInHalfASecondAfterArming) {
   }
 }
 
-TEST(Safety, LowersAStiffnessTheDeviceCannotShowPassively) {
-  // sigma.7: b = 1 Ns/m at 1 kHz bears 2b/T = 2000 N/m; the spring was made with 8000 N/m
+TEST(Safety, ScalesAForceToThePassiveStiffnessOfTheDevice) {
+  // sigma.7: b = 1 Ns/m at 1 kHz permits 2b/T = 2000 N/m; the requested spring has 8000 N/m
   EXPECT_DOUBLE_EQ(safetyLimits(kSigma).stiffness, 2000.0);
   Safety safety = settled(kSigma, {8.0, 0.0, 0.0});
-  SafetyRequest request = wantForce({8.0, 0.0, 0.0});
+  SafetyRequest request = requestForce({8.0, 0.0, 0.0});
   request.stiffness = 8000.0;
   EXPECT_NEAR(safety.step(request, armed(), kTick).F_Ho_D.force.x(), 2.0, 1e-9);
-  EXPECT_TRUE(safety.acts(SafetyRule::kStiffnessLowered));
+  EXPECT_TRUE(safety.acts(SafetyRule::kStiffnessLimited));
   request.stiffness = 2000.0;
   for (int tick = 0; tick < 20; ++tick) (void)safety.step(request, armed(), kTick);
   EXPECT_NEAR(safety.step(request, armed(), kTick).F_Ho_D.force.x(), 8.0, 1e-9);
-  EXPECT_FALSE(safety.acts(SafetyRule::kStiffnessLowered));
+  EXPECT_FALSE(safety.acts(SafetyRule::kStiffnessLimited));
 }
 
-TEST(Safety, ADelayLowersTheStiffnessItAllows) {
+TEST(Safety, ADelayLowersThePassiveStiffness) {
   DeviceCaps slow = kSigma;
   slow.delay = 1e-3;
   EXPECT_NEAR(safetyLimits(slow).stiffness, 1.0 / (0.5e-3 + 1e-3), 1e-9);
 }
 
-TEST(Safety, DampsWhenThePortGaveMoreEnergyThanItTook) {
-  // a source that pushes along with the motion: negative damping, the mark of an unstable loop
+TEST(Safety, InjectsDampingWhenThePortHasDeliveredMoreEnergyThanItTook) {
+  // a force along the velocity: negative damping, as in an unstable loop
   Safety safety = settled(kHug, {20.0, 0.0, 0.0});
   DeviceState state = armed();
   state.V_DH.linear = {0.3, 0.0, 0.0};
-  DeviceCommand shown;
+  DeviceCommand output;
   for (int tick = 0; tick < 50; ++tick) {
     state.X_DH.translation() += kTick * state.V_DH.linear;
-    shown = safety.step(wantForce({20.0, 0.0, 0.0}), state, kTick);
+    output = safety.step(requestForce({20.0, 0.0, 0.0}), state, kTick);
   }
   EXPECT_LT(safety.energy(), 0.0);
   EXPECT_TRUE(safety.acts(SafetyRule::kPassivity));
-  EXPECT_NEAR(shown.F_Ho_D.force.x(), 20.0 - kHug.injected_damping * 0.3, 1e-9)
-      << "no more damping than the velocity's lag allows";
+  EXPECT_NEAR(output.F_Ho_D.force.x(), 20.0 - kHug.injected_damping * 0.3, 1e-9)
+      << "injected damping is limited";
 }
 
-TEST(Safety, ASpringThatGivesBackWhatItTookIsLeftAlone) {
+TEST(Safety, InjectsNoDampingIntoALosslessSpring) {
   Safety safety(kHug);
   DeviceState state = armed();
-  for (int tick = 0; tick < 1000; ++tick) (void)safety.step(wantForce({0, 0, 0}), state, kTick);
+  for (int tick = 0; tick < 1000; ++tick) (void)safety.step(requestForce({0, 0, 0}), state, kTick);
   double x = 0.0;
   for (int tick = 0; tick < 400; ++tick) {
     x += tick < 200 ? 5e-5 : -5e-5;
     state.X_DH.translation().x() = x;
     state.V_DH.linear.x() = tick < 200 ? 0.05 : -0.05;
-    // the force of the middle of the last and the next millisecond, as continuous contact would have it
+    // force at the midpoint of the step, so that the work equals that of a continuous spring
     const double middle = x + (tick < 200 ? 2.5e-5 : -2.5e-5);
-    (void)safety.step(wantForce({-1000.0 * middle, 0.0, 0.0}), state, kTick);
+    (void)safety.step(requestForce({-1000.0 * middle, 0.0, 0.0}), state, kTick);
     EXPECT_FALSE(safety.acts(SafetyRule::kPassivity)) << tick;
   }
 }
 
-TEST(Safety, BrakesAHandThatIsTooFastUntilItIsSlowAgain) {
+TEST(Safety, BrakesAboveTheSpeedLimitWithHysteresis) {
   Safety safety = settled(kSigma, {1.0, 0.0, 0.0});
   DeviceState state = armed();
   const auto brakesAt = [&](double speed) {
     state.V_DH.linear = {0.0, speed, 0.0};
-    return safety.step(wantForce({1.0, 0.0, 0.0}), state, kTick).brake;
+    return safety.step(requestForce({1.0, 0.0, 0.0}), state, kTick).brake;
   };
   EXPECT_FALSE(brakesAt(0.5));
   EXPECT_TRUE(brakesAt(0.51));
   EXPECT_TRUE(safety.acts(SafetyRule::kOverspeed));
-  EXPECT_TRUE(brakesAt(0.4)) << "no chatter about the limit";
+  EXPECT_TRUE(brakesAt(0.4)) << "hysteresis";
   EXPECT_FALSE(brakesAt(0.2));
-  EXPECT_TRUE(safety.acts(SafetyRule::kSoftStart)) << "and starts softly";
+  EXPECT_TRUE(safety.acts(SafetyRule::kSoftStart)) << "soft start after braking";
   EXPECT_TRUE(brakesAt(kNan));
 }
 
 // |F|        /
-//    |      /    the last twentieth of the radius pushes back
+//    |      /    a spring acts in the outer 5 % of the radius
 //    |_____/___ r
 //       .95 R  R
 TEST(Safety, PushesBackAtTheEndOfTheWorkspace) {
   Safety safety = settled(kSigma, {0.0, 0.0, 0.0});
   DeviceState state = armed();
   state.X_DH.translation() = {0.0, 0.0, 0.95 * 0.060 + 1e-3};
-  const DeviceCommand shown = safety.step(wantForce({0.0, 0.0, 0.0}), state, kTick);
-  EXPECT_NEAR(shown.F_Ho_D.force.z(), -1000.0 * 1e-3, 1e-9);
+  const DeviceCommand output = safety.step(requestForce({0.0, 0.0, 0.0}), state, kTick);
+  EXPECT_NEAR(output.F_Ho_D.force.z(), -1000.0 * 1e-3, 1e-9);
   EXPECT_TRUE(safety.acts(SafetyRule::kWorkspaceWall));
 }
 
-TEST(Safety, WarnsAtSixtyNewtonAndStopsBothArmsAtEightyUntilReset) {
+TEST(Safety, WarnsAtSixtyNewtonAndStopsBothArmsAboveEightyUntilReset) {
   ClutchLatch clutch;
   Safety right = settled(kHug, {1.0, 0.0, 0.0}, &clutch);
   Safety left = settled(kHug, {1.0, 0.0, 0.0}, &clutch);
   DeviceState state = armed();
 
   state.F_Ho_D_measured.force = {0.0, -61.0, 0.0};
-  EXPECT_FALSE(right.step(wantForce({1.0, 0.0, 0.0}), state, kTick).brake);
+  EXPECT_FALSE(right.step(requestForce({1.0, 0.0, 0.0}), state, kTick).brake);
   EXPECT_TRUE(right.acts(SafetyRule::kClutchWarning));
 
-  state.F_Ho_D_measured.force = {50.0, -50.0, 50.0};  // 87 N in a direction that is no axis
-  EXPECT_TRUE(right.step(wantForce({1.0, 0.0, 0.0}), state, kTick).brake);
+  state.F_Ho_D_measured.force = {50.0, -50.0, 50.0};  // 87 N in a direction off the axes
+  EXPECT_TRUE(right.step(requestForce({1.0, 0.0, 0.0}), state, kTick).brake);
   EXPECT_TRUE(right.acts(SafetyRule::kClutchOpen));
 
-  const DeviceCommand other = left.step(wantForce({1.0, 0.0, 0.0}), armed(), kTick);
+  const DeviceCommand other = left.step(requestForce({1.0, 0.0, 0.0}), armed(), kTick);
   EXPECT_TRUE(other.brake);
   EXPECT_EQ(other.F_Ho_D.force, Vector3(Vector3::Zero()));
   EXPECT_TRUE(left.wantsDisarm());
 
   for (int tick = 0; tick < 5000; ++tick) {
-    EXPECT_TRUE(right.step(wantForce({1.0, 0.0, 0.0}), armed(), kTick).brake) << "latched";
+    EXPECT_TRUE(right.step(requestForce({1.0, 0.0, 0.0}), armed(), kTick).brake) << "latched";
   }
   right.reset();
   left.reset();
-  EXPECT_FALSE(right.step(wantForce({1.0, 0.0, 0.0}), armed(), kTick).brake);
-  EXPECT_FALSE(left.step(wantForce({1.0, 0.0, 0.0}), armed(), kTick).brake);
+  EXPECT_FALSE(right.step(requestForce({1.0, 0.0, 0.0}), armed(), kTick).brake);
+  EXPECT_FALSE(left.step(requestForce({1.0, 0.0, 0.0}), armed(), kTick).brake);
   EXPECT_TRUE(left.acts(SafetyRule::kSoftStart));
 }
 
-TEST(Safety, AMeasuredForceThatIsNoNumberOpensTheClutch) {
+TEST(Safety, ANonFiniteMeasuredForceOpensTheClutch) {
   Safety safety = settled(kHug, {1.0, 0.0, 0.0});
   DeviceState state = armed();
   state.F_Ho_D_measured.force = {kNan, 0.0, 0.0};
-  EXPECT_TRUE(safety.step(wantForce({1.0, 0.0, 0.0}), state, kTick).brake);
-  EXPECT_TRUE(safety.step(wantForce({1.0, 0.0, 0.0}), armed(), kTick).brake)
-      << "latched without a partner, too";
+  EXPECT_TRUE(safety.step(requestForce({1.0, 0.0, 0.0}), state, kTick).brake);
+  EXPECT_TRUE(safety.step(requestForce({1.0, 0.0, 0.0}), armed(), kTick).brake)
+      << "latched without a shared latch, too";
 }
 
-TEST(Safety, AnEmergencyStopHoldsUntilAnOperatorResets) {
+TEST(Safety, AnEmergencyStopIsLatchedUntilReset) {
   Safety safety = settled(kSigma, {1.0, 0.0, 0.0});
-  SafetyRequest request = wantForce({1.0, 0.0, 0.0});
-  request.wanted.tactors = {255, 0, 0, 0, 0, 0};
+  SafetyRequest request = requestForce({1.0, 0.0, 0.0});
+  request.requested.tactors = {255, 0, 0, 0, 0, 0};
   request.emergency_stop = true;
   const DeviceCommand stop = safety.step(request, armed(), kTick);
   EXPECT_TRUE(stop.brake);
@@ -285,110 +287,111 @@ TEST(Safety, AnEmergencyStopHoldsUntilAnOperatorResets) {
   EXPECT_FALSE(safety.step(request, armed(), kTick).brake);
 }
 
-TEST(Safety, ShowsNoForceToAHandThatLetGo) {
+TEST(Safety, OutputsNoForceWhileTheDeadManSwitchIsReleased) {
   Safety safety = settled(kSigma, {1.0, 0.0, 0.0});
-  SafetyRequest request = wantForce({1.0, 0.0, 0.0});
-  request.dead_man = false;
+  SafetyRequest request = requestForce({1.0, 0.0, 0.0});
+  request.dead_man_held = false;
   EXPECT_EQ(safety.step(request, armed(), kTick).F_Ho_D.force, Vector3(Vector3::Zero()));
   EXPECT_TRUE(safety.acts(SafetyRule::kDeadMan));
-  request.dead_man = true;
-  EXPECT_LT(safety.step(request, armed(), kTick).F_Ho_D.force.x(), 0.01) << "soft start when it is back";
+  request.dead_man_held = true;
+  EXPECT_LT(safety.step(request, armed(), kTick).F_Ho_D.force.x(), 0.01)
+      << "soft start when it is held again";
 }
 
-TEST(Safety, ShowsWholeMotorWordsAndNeverMoreThanAWordCanSay) {
+TEST(Safety, QuantisesToMotorCountsAndSaturatesAtTheirRange) {
   const double quantum = kFalcon.force_quantum;
   Safety safety = settled(kFalcon, {3.0, 0.0, 0.0});
-  const double shown = safety.step(wantForce({3.0, 0.0, 0.0}), armed(), kTick).F_Ho_D.force.x();
-  EXPECT_NEAR(shown, 3.0, quantum);
-  EXPECT_DOUBLE_EQ(shown, std::floor(3.0 / quantum) * quantum) << "rounded towards zero";
+  const double output = safety.step(requestForce({3.0, 0.0, 0.0}), armed(), kTick).F_Ho_D.force.x();
+  EXPECT_NEAR(output, 3.0, quantum);
+  EXPECT_DOUBLE_EQ(output, std::floor(3.0 / quantum) * quantum) << "rounded towards zero";
 
   DeviceCaps weak = kFalcon;
-  weak.force_quantum /= 2.0;  // now 4096 words are only half the peak
-  Safety clamping = settled(weak, {5.0, 0.0, 0.0});
-  EXPECT_DOUBLE_EQ(clamping.step(wantForce({5.0, 0.0, 0.0}), armed(), kTick).F_Ho_D.force.x(), 4.0);
-  EXPECT_TRUE(clamping.acts(SafetyRule::kWordClamped));
+  weak.force_quantum /= 2.0;  // 4096 counts are half the peak force
+  Safety saturating = settled(weak, {5.0, 0.0, 0.0});
+  EXPECT_DOUBLE_EQ(saturating.step(requestForce({5.0, 0.0, 0.0}), armed(), kTick).F_Ho_D.force.x(), 4.0);
+  EXPECT_TRUE(saturating.acts(SafetyRule::kMotorSaturated));
 }
 
-TEST(Safety, AsksOnlyForAxesTheDeviceHas) {
+TEST(Safety, CommandsOnlyAxesTheDeviceHas) {
   Safety safety(kFalcon);
-  SafetyRequest request = wantForce({1.0, 0.0, 0.0});
-  request.wanted.F_Ho_D.torque = {1.0, 1.0, 1.0};
+  SafetyRequest request = requestForce({1.0, 0.0, 0.0});
+  request.requested.F_Ho_D.torque = {1.0, 1.0, 1.0};
   for (int tick = 0; tick < 600; ++tick) {
     EXPECT_EQ(safety.step(request, armed(), kTick).F_Ho_D.torque, Vector3(Vector3::Zero()));
   }
   EXPECT_EQ(safety.flags(), 0U);
 }
 
-TEST(Safety, TellsEachInterventionOnceWithWhatItDid) {
+TEST(Safety, ReportsEachInterventionOnceWithItsForces) {
   Safety safety = settled(kHug, {10.0, 0.0, 0.0});
-  Intervention told;
-  while (safety.next(told)) {
+  Intervention intervention;
+  while (safety.takeIntervention(intervention)) {
   }
-  for (int tick = 0; tick < 100; ++tick) (void)safety.step(wantForce({60.0, 0.0, 0.0}), armed(), kTick);
+  for (int tick = 0; tick < 100; ++tick) (void)safety.step(requestForce({60.0, 0.0, 0.0}), armed(), kTick);
   std::vector<SafetyRule> rules;
-  while (safety.next(told)) {
-    if (!told.began) continue;
-    rules.push_back(told.rule);
-    EXPECT_NEAR(told.before, 60.0, 1e-9);
-    EXPECT_LE(told.after, 50.0 + 1e-9);
-    EXPECT_GT(told.tick, 1000U);
+  while (safety.takeIntervention(intervention)) {
+    if (!intervention.began) continue;
+    rules.push_back(intervention.rule);
+    EXPECT_NEAR(intervention.requested_force, 60.0, 1e-9);
+    EXPECT_LE(intervention.output_force, 50.0 + 1e-9);
+    EXPECT_GT(intervention.tick, 1000U);
   }
-  // slewing rested since the settling only briefly, so it is not told anew; the limit is
+  // the slew limit paused for less than 0.5 s since settled(), so it continues; the force limit begins
   EXPECT_THAT(rules, testing::Contains(SafetyRule::kForceLimited));
   EXPECT_EQ(safety.lost(), 0U);
 }
 
-//  force limited   ####  ## #          rest           ##
-//  told            begin      end (acted 7)           one of an untold begin, ten seconds after the first
-TEST(Safety, AFlickeringRuleIsOneBeginningAndOneEndAndRoutineIsToldOnceInTenSeconds) {
+//  force limited   ####  ## #          pause          ##
+//  reported        begin      end (active 7 ticks)    begin with 1 unreported, more than 10 s after the first
+TEST(Safety, JoinsInterventionsAcrossShortPausesAndReportsARoutineRuleOncePerTenSeconds) {
   Safety safety = settled(kHug, {10.0, 0.0, 0.0});
-  std::vector<Intervention> heard;
+  std::vector<Intervention> reported;
   const auto run = [&](double force, int ticks) {
-    Intervention told;
+    Intervention intervention;
     for (int i = 0; i < ticks; ++i) {
-      (void)safety.step(wantForce({force, 0.0, 0.0}), armed(), kTick);
-      while (safety.next(told))
-        if (told.rule == SafetyRule::kForceLimited) heard.push_back(told);
+      (void)safety.step(requestForce({force, 0.0, 0.0}), armed(), kTick);
+      while (safety.takeIntervention(intervention))
+        if (intervention.rule == SafetyRule::kForceLimited) reported.push_back(intervention);
     }
   };
   run(60.0, 300);
   run(10.0, 100);
   run(60.0, 300);
-  ASSERT_EQ(heard.size(), 1U) << "a short rest ends nothing";
-  EXPECT_TRUE(heard[0].began);
-  EXPECT_NEAR(heard[0].before, 60.0, 1e-9);
+  ASSERT_EQ(reported.size(), 1U) << "a short pause does not end it";
+  EXPECT_TRUE(reported[0].began);
+  EXPECT_NEAR(reported[0].requested_force, 60.0, 1e-9);
   run(10.0, 600);
-  ASSERT_EQ(heard.size(), 2U);
-  EXPECT_FALSE(heard[1].began);
-  EXPECT_GT(heard[1].acted, 300U);
-  EXPECT_LE(heard[1].acted, 600U) << "without the rest in between";
+  ASSERT_EQ(reported.size(), 2U);
+  EXPECT_FALSE(reported[1].began);
+  EXPECT_GT(reported[1].active_ticks, 300U);
+  EXPECT_LE(reported[1].active_ticks, 600U) << "the pause does not count";
 
   run(60.0, 300);
   run(10.0, 600);
-  EXPECT_EQ(heard.size(), 2U) << "routine again, so soon";
+  EXPECT_EQ(reported.size(), 2U) << "a routine rule within 10 s";
   run(10.0, 10'000);
   run(60.0, 300);
-  ASSERT_EQ(heard.size(), 3U);
-  EXPECT_TRUE(heard[2].began);
-  EXPECT_EQ(heard[2].untold, 1U);
+  ASSERT_EQ(reported.size(), 3U);
+  EXPECT_TRUE(reported[2].began);
+  EXPECT_EQ(reported[2].unreported, 1U);
 }
 
-TEST(Safety, WhatIsNoRoutineIsToldEachTime) {
+TEST(Safety, ReportsEachInterventionOfANonRoutineRule) {
   Safety safety = settled(kHug, {10.0, 0.0, 0.0});
   int begins = 0;
-  for (int time = 0; time < 3; ++time) {
-    SafetyRequest let_go = wantForce({10.0, 0.0, 0.0});
-    let_go.dead_man = false;
-    (void)safety.step(let_go, armed(), kTick);
-    for (int tick = 0; tick < 600; ++tick) (void)safety.step(wantForce({10.0, 0.0, 0.0}), armed(), kTick);
-    Intervention told;
-    while (safety.next(told))
-      if (told.rule == SafetyRule::kDeadMan && told.began) ++begins;
+  for (int i = 0; i < 3; ++i) {
+    SafetyRequest released = requestForce({10.0, 0.0, 0.0});
+    released.dead_man_held = false;
+    (void)safety.step(released, armed(), kTick);
+    for (int tick = 0; tick < 600; ++tick) (void)safety.step(requestForce({10.0, 0.0, 0.0}), armed(), kTick);
+    Intervention intervention;
+    while (safety.takeIntervention(intervention))
+      if (intervention.rule == SafetyRule::kDeadMan && intervention.began) ++begins;
   }
   EXPECT_EQ(begins, 3);
 }
 
-TEST(Safety, EveryRuleHasAName) {
+TEST(Safety, EveryRuleHasAText) {
   for (unsigned i = 0; i < kSafetyRules; ++i)
     EXPECT_STRNE(toString(static_cast<SafetyRule>(1U << i)), "unknown rule") << i;
 }
@@ -399,11 +402,11 @@ TEST(Safety, StepsWithoutAllocatingOrLocking) {
   const test::RealtimeGuard guard;
   for (int tick = 0; tick < 1000; ++tick) {
     state.V_DH.linear.x() = tick % 200 == 0 ? 2.0 : 0.0;
-    (void)safety.step(wantForce({0.1 * tick, 0.0, 0.0}, 1e-4 * (tick % 300)), state, kTick);
+    (void)safety.step(requestForce({0.1 * tick, 0.0, 0.0}, 1e-4 * (tick % 300)), state, kTick);
   }
   EXPECT_EQ(guard.allocations(), 0);
   EXPECT_EQ(guard.locks(), 0);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::devices

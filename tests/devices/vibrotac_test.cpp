@@ -2,52 +2,52 @@
 
 #include <gtest/gtest.h>
 
-namespace tenon {
+namespace tenon::devices {
 namespace {
 
-void cycle(Vibrotac& band, std::uint8_t first) {
+void cycle(Vibrotac& bracelet, std::uint8_t intensity) {
   DeviceState state;
-  band.read(state);
+  bracelet.read(state);
   DeviceCommand command;
-  command.tactors[0] = first;
-  band.write(command);
+  command.tactors[0] = intensity;
+  bracelet.write(command);
 }
 
 TEST(Vibrotac, AMotorSpinsUpWithinItsTimeConstant) {
-  Vibrotac band;
-  ASSERT_TRUE(band.arm());
-  for (int tick = 0; tick < 20; ++tick) cycle(band, 255);  // until the link has sent it
-  cycle(band, 255);
-  const double start = band.felt()[0];
-  for (int tick = 0; tick < 60; ++tick) cycle(band, 255);
-  EXPECT_NEAR((band.felt()[0] - start) / (1.0 - start), 1.0 - 1.0 / 2.718, 0.02);
-  for (int tick = 0; tick < 500; ++tick) cycle(band, 255);
-  EXPECT_NEAR(band.felt()[0], 1.0, 1e-3);
-  EXPECT_EQ(band.felt()[1], 0.0);
-  for (int tick = 0; tick < 500; ++tick) cycle(band, 0);
-  EXPECT_NEAR(band.felt()[0], 0.0, 1e-3);
+  Vibrotac bracelet;
+  ASSERT_TRUE(bracelet.arm());
+  for (int tick = 0; tick < 20; ++tick) cycle(bracelet, 255);  // until the command is transmitted
+  cycle(bracelet, 255);
+  const double start = bracelet.amplitudes()[0];
+  for (int tick = 0; tick < 60; ++tick) cycle(bracelet, 255);
+  EXPECT_NEAR((bracelet.amplitudes()[0] - start) / (1.0 - start), 1.0 - 1.0 / 2.718, 0.02);
+  for (int tick = 0; tick < 500; ++tick) cycle(bracelet, 255);
+  EXPECT_NEAR(bracelet.amplitudes()[0], 1.0, 1e-3);
+  EXPECT_EQ(bracelet.amplitudes()[1], 0.0);
+  for (int tick = 0; tick < 500; ++tick) cycle(bracelet, 0);
+  EXPECT_NEAR(bracelet.amplitudes()[0], 0.0, 1e-3);
 }
 
-TEST(Vibrotac, TakesAtMostFiftyCommandsASecond) {
-  Vibrotac band;
-  ASSERT_TRUE(band.arm());
-  cycle(band, 0);
-  // on for 10 ms between two sends: the link never carries it
-  for (int tick = 1; tick < 20; ++tick) cycle(band, tick < 11 ? 255 : 0);
-  for (int tick = 0; tick < 50; ++tick) cycle(band, 0);
-  EXPECT_EQ(band.felt()[0], 0.0);
+TEST(Vibrotac, SendsAtMostFiftyCommandsPerSecond) {
+  Vibrotac bracelet;
+  ASSERT_TRUE(bracelet.arm());
+  cycle(bracelet, 0);
+  // on for 10 ms between two transmissions: never sent
+  for (int tick = 1; tick < 20; ++tick) cycle(bracelet, tick < 11 ? 255 : 0);
+  for (int tick = 0; tick < 50; ++tick) cycle(bracelet, 0);
+  EXPECT_EQ(bracelet.amplitudes()[0], 0.0);
 }
 
-TEST(Vibrotac, FallsSilentWhenDisarmedOrLeftAlone) {
-  Vibrotac band;
-  ASSERT_TRUE(band.arm());
-  for (int tick = 0; tick < 500; ++tick) cycle(band, 200);
-  EXPECT_NEAR(band.felt()[0], 200.0 / 255.0, 1e-2);
+TEST(Vibrotac, StopsWhenWritesStop) {
+  Vibrotac bracelet;
+  ASSERT_TRUE(bracelet.arm());
+  for (int tick = 0; tick < 500; ++tick) cycle(bracelet, 200);
+  EXPECT_NEAR(bracelet.amplitudes()[0], 200.0 / 255.0, 1e-2);
   DeviceState state;
-  for (int tick = 0; tick < 800; ++tick) band.read(state);
+  for (int tick = 0; tick < 800; ++tick) bracelet.read(state);
   EXPECT_EQ(state.fault, DeviceFault::kStale);
-  EXPECT_LT(band.felt()[0], 1e-3);
+  EXPECT_LT(bracelet.amplitudes()[0], 1e-3);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::devices

@@ -9,39 +9,51 @@
 
 namespace tenon::test {
 
-/// Shapes with a formula as haptic structures: what a test knows the right answer for.
-using StructuresPtr = std::shared_ptr<const HapticStructures>;
+/// Haptic structures of shapes with an analytic distance, for which a test knows the exact result.
+using StructuresPtr = std::shared_ptr<const structures::HapticStructures>;
 
-/// Any shape; without sites it can only be asked as a field.
-[[nodiscard]] StructuresPtr analyticStructures(const AnalyticDistance& distance,
+/// Structures of any shape. `voxel` [m] of the field, `spacing` [m] of the samples. Without samples there is
+/// no pointshell: the structures can only be the SDF side of a pair.
+[[nodiscard]] StructuresPtr analyticStructures(const structures::AnalyticDistance& distance,
                                                const Eigen::AlignedBox3d& box_M, double voxel,
-                                               std::span<const ShellSite> sites = {}, double spacing = 0.0);
+                                               std::span<const structures::SurfaceSample> samples = {},
+                                               double spacing = 0.0);
 
-// distances of shapes about M's origin
-[[nodiscard]] AnalyticDistance sphereDistance(double radius);
-[[nodiscard]] AnalyticDistance boxDistance(const Vector3& size);
-[[nodiscard]] AnalyticDistance movedDistance(AnalyticDistance distance, const Pose& X_MS);
-/// Exact outside; inside it is a bound, exact near a face that no other part covers.
-[[nodiscard]] AnalyticDistance unionDistance(AnalyticDistance a, AnalyticDistance b);
-/// Unsigned: a sheet without a thickness has no inside.
-[[nodiscard]] AnalyticDistance sheetDistance(double edge);
+// signed distances [m] of shapes centred at the origin of M
 
-// skins, evenly sampled; areas sum to the surface's
-[[nodiscard]] std::vector<ShellSite> sphereSites(double radius, double spacing);
-/// With its corners and edges, which come first.
-[[nodiscard]] std::vector<ShellSite> boxSites(const Vector3& size, double spacing);
+/// Sphere of `radius` [m].
+[[nodiscard]] structures::AnalyticDistance sphereDistance(double radius);
+[[nodiscard]] structures::AnalyticDistance boxDistance(const Vector3& size);
+[[nodiscard]] structures::AnalyticDistance movedDistance(structures::AnalyticDistance distance,
+                                                         const Pose& X_MS);
+/// Exact outside; inside an upper bound, exact near a face that the other shape does not cover.
+[[nodiscard]] structures::AnalyticDistance unionDistance(structures::AnalyticDistance a,
+                                                         structures::AnalyticDistance b);
+/// Square sheet of `edge` [m] without thickness, across z. Unsigned: it has no inside.
+[[nodiscard]] structures::AnalyticDistance sheetDistance(double edge);
 
+// evenly sampled surfaces; the areas sum to that of the surface
+
+/// Sphere of `radius` [m], with `spacing` [m] of points.
+[[nodiscard]] std::vector<structures::SurfaceSample> sphereSamples(double radius, double spacing);
+/// Box with `spacing` [m] of points, including its corners and edges, which come first.
+[[nodiscard]] std::vector<structures::SurfaceSample> boxSamples(const Vector3& size, double spacing);
+
+/// Sphere of `radius` [m] with `voxel` [m] and `spacing` [m] of points.
 [[nodiscard]] StructuresPtr sphereStructures(double radius, double voxel, double spacing);
+/// Box with `voxel` [m] and `spacing` [m] of points.
 [[nodiscard]] StructuresPtr boxStructures(const Vector3& size, double voxel, double spacing);
-/// A slab of `edge` x `edge` x 50 mm whose upper side is z = 0; a field only.
+/// A slab of `edge` [m] x `edge` x 50 mm whose upper side is z = 0, with `voxel` [m]. Field only.
 [[nodiscard]] StructuresPtr floorStructures(double edge, double voxel);
-/// The floor and walls at x = 0 and y = 0: free is x > 0, y > 0, z > 0. Field only.
+/// The floor and walls at x = 0 and y = 0, `edge` [m] long, with `voxel` [m]: free space is x > 0, y > 0,
+/// z > 0. Field only.
 [[nodiscard]] StructuresPtr cornerStructures(double edge, double voxel);
-/// A square sheet across z at z = `offset`; thickness 0 has no inside. Field only.
+/// A square sheet of `edge` [m] and `thickness` [m] across z, centred at z = `offset` [m], with `voxel` [m].
+/// Thickness 0 has no inside. Field only.
 [[nodiscard]] StructuresPtr sheetStructures(double edge, double thickness, double voxel, double offset = 0.0);
-/// A block with a rectangular hole of size `hole` down from z = 0, open above, and `wall` of material round
-/// and below it. Its shell is the hole's rim: asked against a peg's field, it keeps the rim out of the peg's
-/// sides between the peg's points.
+/// A block with a rectangular hole of size `hole` down from z = 0, open above, and `wall` [m] of material
+/// around and below it, with `voxel` [m]. Its pointshell is the hole's rim, with `rim_spacing` [m] of points:
+/// as pointshell side against a peg's field it keeps the rim out of the peg's sides between the peg's points.
 [[nodiscard]] StructuresPtr socketStructures(const Vector3& hole, double wall, double voxel,
                                              double rim_spacing = 0.001);
 

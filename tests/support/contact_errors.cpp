@@ -6,14 +6,15 @@
 
 namespace tenon::test {
 
-void ContactErrors::add(const PairQuery& query, const PairQueryResult& result, const SolidUnion& truth_B) {
-  constexpr double kNear = 0.003;  // [m] nothing that is farther by the field is inside
+void ContactErrors::add(const collision::PairQuery& query, const collision::PairQueryResult& result,
+                        const SolidUnion& truth_B) {
+  constexpr double kNear = 0.003;  // [m] points that are farther by the field are not inside
   constexpr double kReferenceArea = 1e-4;
   constexpr double kNotListed = 1e9;
   const auto points = query.shell_A->points();
   const Pose X_BA = query.X_WB.inverse() * query.X_WA;
   std::vector<double> listed(points.size(), kNotListed);
-  for (const Contact& contact : result.contacts) listed[contact.point] = contact.gap;
+  for (const collision::Contact& contact : result.contacts) listed[contact.point] = contact.gap;
   Vector3 force_B = Vector3::Zero();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vector3 p_BP = X_BA * points[i].p_MP.cast<double>();
@@ -21,26 +22,27 @@ void ContactErrors::add(const PairQuery& query, const PairQueryResult& result, c
     const auto nearest = truth_B.nearest(p_BP);
     const bool inside = truth_B.inside(p_BP);
     if (inside) {
-      ++touching_;
-      const double said = listed[i] == kNotListed ? query.field_B->sample(p_BP).distance : listed[i];
-      if (said > 0.0) ++missed_;
+      ++points_inside_;
+      const double reported_distance =
+          listed[i] == kNotListed ? query.field_B->sample(p_BP).distance : listed[i];
+      if (reported_distance > 0.0) ++missed_;
       force_B += static_cast<double>(points[i].area) / kReferenceArea * (nearest.p_MQ - p_BP);
     }
     if (listed[i] <= 0.0) depth_.push_back(std::abs(listed[i] - (inside ? -1.0 : 1.0) * nearest.distance));
   }
-  const Vector3 said_B = query.X_WB.rotation().conjugate() * result.push_Ao_W.force;
-  if (force_B.norm() > 0.0) force_.push_back((said_B - force_B).norm() / force_B.norm());
+  const Vector3 reported_force_B = query.X_WB.rotation().conjugate() * result.penalty_Ao_W.force;
+  if (force_B.norm() > 0.0) force_.push_back((reported_force_B - force_B).norm() / force_B.norm());
 }
 
 double ContactErrors::missed() const {
-  return static_cast<double>(missed_) / static_cast<double>(std::max<std::size_t>(touching_, 1));
+  return static_cast<double>(missed_) / static_cast<double>(std::max<std::size_t>(points_inside_, 1));
 }
 
-double ContactErrors::at(std::vector<double> values, double share) {
+double ContactErrors::quantileOf(std::vector<double> values, double quantile) {
   if (values.empty()) return 1e9;
-  const auto place = static_cast<std::size_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(place), values.end());
-  return values[place];
+  const auto position = static_cast<std::size_t>(quantile * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(position), values.end());
+  return values[position];
 }
 
 std::string ContactErrors::text() const {
@@ -48,7 +50,7 @@ std::string ContactErrors::text() const {
   std::snprintf(line, sizeof line,
                 "%zu points inside: depth error median %.5f mm, p99 %.4f mm; %.2f %% missed; net force error "
                 "median %.2f %%",
-                touching_, 1e3 * depth(0.5), 1e3 * depth(0.99), 100.0 * missed(), 100.0 * force(0.5));
+                points_inside_, 1e3 * depth(0.5), 1e3 * depth(0.99), 100.0 * missed(), 100.0 * force(0.5));
   return line;
 }
 

@@ -9,31 +9,37 @@
 
 namespace tenon::test {
 
-/// What queries say of a shell A in a body B against what is true of B, over poses in contact.
+/// Errors of query results of a pointshell A in a body B with respect to exact distances of B, over poses in
+/// contact.
 ///
-/// Threads: one at a time. Real-time: no; a test tool.
+/// Threads: one quantileOf a time. Real-time: no; a test tool.
 class ContactErrors {
  public:
-  /// `result` is the answer to `query`, refined or not, without dilation and with the sum. Points that
-  /// the list has no room for have no depth; whether they are missed the field tells.
-  void add(const PairQuery& query, const PairQueryResult& result, const SolidUnion& truth_B);
+  /// Adds the result of `query`, refined or not. The query has no dilation and sums penalties. Points that
+  /// are not listed count for missed(), by the sign of the field, but not for depth().
+  void add(const collision::PairQuery& query, const collision::PairQueryResult& result,
+           const SolidUnion& truth_B);
 
-  /// Points that are inside in truth, and the share of them that the query has outside.
-  [[nodiscard]] std::size_t touching() const { return touching_; }
+  /// Number of points inside the exact solids, over all poses.
+  [[nodiscard]] std::size_t pointsInside() const { return points_inside_; }
+  /// [-] Fraction of them that the query reports as outside.
   [[nodiscard]] double missed() const;
-  /// Quantile of the error of depth [m], of listed points inside.
-  [[nodiscard]] double depth(double share) const { return at(depth_, share); }
-  /// Quantile over poses of the error of the net force, as a share of the force.
-  [[nodiscard]] double force(double share) const { return at(force_, share); }
+  /// [m] Quantile of the depth error of listed points inside; `quantile` [-] 0 to 1.
+  [[nodiscard]] double depth(double quantile) const { return quantileOf(depth_, quantile); }
+  /// [-] Quantile over poses of the net force error relative to the exact net force; `quantile` [-] 0 to 1.
+  [[nodiscard]] double force(double quantile) const { return quantileOf(force_, quantile); }
   [[nodiscard]] std::size_t poses() const { return force_.size(); }
 
+  /// Summary in one line.
   [[nodiscard]] std::string text() const;
 
  private:
-  static double at(std::vector<double> values, double share);
+  /// `quantile` [-] 0 to 1.
+  static double quantileOf(std::vector<double> values, double quantile);
 
-  std::vector<double> depth_, force_;
-  std::size_t touching_ = 0;
+  std::vector<double> depth_;  ///< [m] absolute errors
+  std::vector<double> force_;  ///< [-] relative errors
+  std::size_t points_inside_ = 0;
   std::size_t missed_ = 0;
 };
 

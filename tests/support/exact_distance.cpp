@@ -19,8 +19,8 @@ Vector3 nearestOnSegment(const Vector3& p, const Vector3& a, const Vector3& b) {
   return a + along * ab;
 }
 
-/// The foot in the plane when it lies in the triangle, else the nearest of its three edges: another way than
-/// the one under test.
+/// The projection onto the plane if it lies in the triangle, else the nearest point of the three edges.
+/// Independent of the implementation under test.
 Vector3 nearestOnTriangle(const Vector3& p, const std::array<Vector3, 3>& t) {
   const Vector3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
   const double squared = normal.squaredNorm();
@@ -53,17 +53,17 @@ ExactDistance::ExactDistance(std::span<const Vector3f> vertices,
 }
 
 std::uint32_t ExactDistance::build(std::uint32_t first, std::uint32_t count) {
-  const auto number = static_cast<std::uint32_t>(nodes_.size());
+  const auto index = static_cast<std::uint32_t>(nodes_.size());
   nodes_.emplace_back();
   Eigen::AlignedBox3d box;
   for (std::uint32_t i = first; i < first + count; ++i) {
     for (const Vector3& p : triangles_[order_[i]]) box.extend(p);
   }
-  nodes_[number].box = box;
-  nodes_[number].first = first;
+  nodes_[index].box = box;
+  nodes_[index].first = first;
   if (count <= kLeaf) {
-    nodes_[number].count = count;
-    return number;
+    nodes_[index].count = count;
+    return index;
   }
   Eigen::Index axis = 0;
   box.sizes().maxCoeff(&axis);
@@ -76,13 +76,13 @@ std::uint32_t ExactDistance::build(std::uint32_t first, std::uint32_t count) {
   });
   const std::uint32_t left = build(first, count / 2);
   const std::uint32_t right = build(first + count / 2, count - count / 2);
-  nodes_[number].left = left;
-  nodes_[number].right = right;
-  return number;
+  nodes_[index].left = left;
+  nodes_[index].right = right;
+  return index;
 }
 
-void ExactDistance::search(std::uint32_t number, const Vector3& p, Nearest& best, double& squared) const {
-  const Node& node = nodes_[number];
+void ExactDistance::search(std::uint32_t index, const Vector3& p, Nearest& best, double& squared) const {
+  const Node& node = nodes_[index];
   if (node.count > 0) {
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
       const Vector3 q = nearestOnTriangle(p, triangles_[order_[i]]);
@@ -106,9 +106,9 @@ ExactDistance::Nearest ExactDistance::nearest(const Vector3& p_MP) const {
   return best;
 }
 
-void ExactDistance::sumNormals(std::uint32_t number, const Vector3& q, Vector3& sum) const {
+void ExactDistance::sumNormals(std::uint32_t index, const Vector3& q, Vector3& sum) const {
   constexpr double kTouching = 1e-9;  // [m]
-  const Node& node = nodes_[number];
+  const Node& node = nodes_[index];
   if (node.box.squaredExteriorDistance(q) > kTouching * kTouching) return;
   if (node.count == 0) {
     sumNormals(node.left, q, sum);

@@ -9,41 +9,44 @@
 
 namespace tenon::test {
 
-/// The truth about a mesh: the nearest point of any triangle, through a tree of boxes. Unsigned.
+/// Exact unsigned distance to a mesh, as reference for tests: nearest point of any triangle, by a tree of
+/// bounding boxes. Frame M.
 ///
 /// Threads: constant after construction. Real-time: no; a test tool.
 class ExactDistance {
  public:
   struct Nearest {
-    double distance = 0.0;
+    double distance = 0.0;           ///< [m] unsigned
     Vector3 p_MQ = Vector3::Zero();  ///< the nearest point of the surface
     std::uint32_t triangle = 0;
   };
 
   ExactDistance(std::span<const Vector3f> vertices, std::span<const std::array<std::uint32_t, 3>> triangles);
 
+  /// Nearest point of the mesh; a mesh without triangles gives distance 0 at the origin.
   [[nodiscard]] Nearest nearest(const Vector3& p_MP) const;
 
-  /// Whether p is inside a closed mesh: the sign of its solid angle, summed over all triangles (slow, certain
-  /// for consistent winding).
+  /// Whether P is inside a closed mesh, by the sum of the solid angles of all triangles: slow, and reliable
+  /// for consistent orientation.
   [[nodiscard]] bool inside(const Vector3& p_MP) const;
 
-  /// The same, fast, for a closed mesh of consistent winding without overlaps: by the normals of all
-  /// triangles at the nearest point, weighted with their angles there (Baerentzen and Aanaes 2005).
+  /// Likewise, fast, for a closed mesh of consistent orientation without overlaps: by the angle-weighted
+  /// pseudonormal at the nearest point (Baerentzen and Aanaes 2005).
   [[nodiscard]] bool behindNearest(const Vector3& p_MP) const;
 
  private:
   struct Node {
     Eigen::AlignedBox3d box;
     std::uint32_t first = 0;
-    std::uint32_t count = 0;  // 0: children follow at `left` and `right`
+    std::uint32_t count = 0;  // of triangles; 0: an inner node with children `left` and `right`
     std::uint32_t left = 0;
     std::uint32_t right = 0;
   };
 
   std::uint32_t build(std::uint32_t first, std::uint32_t count);
+  /// `squared` [m^2]: squared distance of `best`.
   void search(std::uint32_t node, const Vector3& p, Nearest& best, double& squared) const;
-  /// Adds the weighted normals of the triangles that touch q.
+  /// Adds the angle-weighted normals of the triangles that touch Q.
   void sumNormals(std::uint32_t node, const Vector3& q, Vector3& sum) const;
 
   std::vector<std::array<Vector3, 3>> triangles_;

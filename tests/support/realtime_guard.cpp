@@ -24,7 +24,7 @@ thread_local std::int64_t lock_calls = 0;
 
 namespace {
 
-// the C library's own function of that name, looked up at its first use
+// calls the C library's function of that name, resolved at its first use
 template <class Argument>
 int callReal(std::atomic<int (*)(Argument*)>& real, const char* name, Argument* argument) {
   auto function = real.load(std::memory_order_relaxed);

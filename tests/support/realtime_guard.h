@@ -4,13 +4,13 @@
 
 namespace tenon::test {
 
-/// Counts what a 1 kHz loop must not do: heap calls and locks of this thread while the guard lives.
+/// Counts heap calls and locks of this thread while the guard exists: a 1 kHz loop must have none.
 ///
-/// The test program's own malloc family and pthread lock functions stand before those of the C library, so
-/// what libraries do on this thread counts too. Under ASan and TSan these stand there themselves: then the
-/// guard counts nothing and available() is false.
+/// The test program's malloc family and pthread lock functions interpose those of the C library, so calls by
+/// libraries on this thread are counted as well. ASan and TSan interpose the same functions: then the guard
+/// counts nothing and available() is false.
 ///
-/// Threads: belongs to the thread that made it. Real-time: reading the counts.
+/// Threads: counts and belongs to the thread that constructed it. Real-time: reading the counts.
 class RealtimeGuard {
  public:
   RealtimeGuard();

@@ -2,7 +2,7 @@
 
 namespace tenon::test {
 
-/// Under a sanitizer everything takes ten to twenty times as long: tests of minutes stay out.
+/// Whether a sanitizer is active, which slows code down by 10 to 20 times: tests of minutes are skipped then.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 inline constexpr bool kSanitized = true;
 #else

@@ -7,9 +7,9 @@
 
 namespace tenon::test {
 
-/// Solids that may overlap, as one body: its surface is what of theirs lies in no other. The truth about
-/// parts as CAD leaves them, by another way than a field's: the sign of each solid, and triangles cut up
-/// where they enter another.
+/// Exact union of solids that may overlap, as reference for parts as CAD exports them. Its surface is that of
+/// the solids outside all others. Computed independently of a distance field: from the sign of each solid,
+/// and from triangles that are subdivided where they enter another solid.
 ///
 /// Threads: constant after construction. Real-time: no; a test tool.
 class SolidUnion {
@@ -17,13 +17,13 @@ class SolidUnion {
   using Triangle = std::array<Vector3, 3>;
   struct Solid {
     std::vector<Triangle> triangles;  ///< counter-clockwise from outside
-    bool closed = true;               ///< an open one has no inside
+    bool closed = true;               ///< an open surface has no inside
   };
 
   explicit SolidUnion(std::vector<Solid> solids);
 
   [[nodiscard]] bool inside(const Vector3& p_MP) const { return insideAnother(p_MP, solids_.size()); }
-  /// Of the surface.
+  /// Nearest point of the union's surface.
   [[nodiscard]] ExactDistance::Nearest nearest(const Vector3& p_MP) const { return surface_.nearest(p_MP); }
   [[nodiscard]] const std::vector<Triangle>& surface() const { return outer_; }
 
@@ -34,8 +34,10 @@ class SolidUnion {
     ExactDistance exact;
   };
 
-  [[nodiscard]] bool insideAnother(const Vector3& p_MP, std::size_t but) const;
-  void keepOuter(const Triangle& triangle, std::size_t solid);
+  /// Whether P is inside a solid other than number `excluded`.
+  [[nodiscard]] bool insideAnother(const Vector3& p_MP, std::size_t excluded) const;
+  /// Adds the pieces of a triangle of solid number `solid` that are outside all others.
+  void addOuterPieces(const Triangle& triangle, std::size_t solid);
 
   std::vector<Bounded> solids_;
   std::vector<Triangle> outer_;

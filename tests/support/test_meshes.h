@@ -4,22 +4,23 @@
 
 namespace tenon::test {
 
-/// A ball of 4^level * 20 triangles about `centre`.
-[[nodiscard]] TriangleMesh ballMesh(double radius, int level, const Vector3& centre = Vector3::Zero());
+/// A ball of `radius` [m] around `centre`, with 4^level * 20 triangles.
+[[nodiscard]] bake::TriangleMesh ballMesh(double radius, int level, const Vector3& centre = Vector3::Zero());
 
-/// A box of 12 triangles.
-[[nodiscard]] TriangleMesh boxMesh(const Vector3& from, const Vector3& to);
+/// A box between two corners, 12 triangles.
+[[nodiscard]] bake::TriangleMesh boxMesh(const Vector3& from, const Vector3& to);
 
-/// A ring about the z axis: radius of its middle line, radius of its tube, facets around each.
-[[nodiscard]] TriangleMesh torusMesh(double ring, double tube, int around_ring, int around_tube);
+/// A torus about the z axis: `ring` [m] is the radius of its centre line, `tube` [m] that of its tube;
+/// `around_ring` and `around_tube` are numbers of facets.
+[[nodiscard]] bake::TriangleMesh torusMesh(double ring, double tube, int around_ring, int around_tube);
 
-/// A flat rectangle at height z, without thickness, 2 n^2 triangles.
-[[nodiscard]] TriangleMesh sheetMesh(double half_edge, double z, int n);
+/// A flat square from -`half_edge` [m] to `half_edge` at height `z` [m], without thickness, 2 n^2 triangles.
+[[nodiscard]] bake::TriangleMesh sheetMesh(double half_edge, double z, int n);
 
-/// Both, as they are: a union when they overlap.
-[[nodiscard]] TriangleMesh together(const TriangleMesh& a, const TriangleMesh& b);
+/// The triangles of both meshes, unchanged.
+[[nodiscard]] bake::TriangleMesh together(const bake::TriangleMesh& a, const bake::TriangleMesh& b);
 
-/// The same triangles, each flipped or not by a fixed random choice.
-[[nodiscard]] TriangleMesh randomlyFlipped(TriangleMesh mesh, std::uint64_t seed);
+/// The same triangles with pseudo-random orientation.
+[[nodiscard]] bake::TriangleMesh randomlyFlipped(bake::TriangleMesh mesh, std::uint64_t seed);
 
 }  // namespace tenon::test

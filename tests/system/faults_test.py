@@ -1,4 +1,4 @@
-"""What goes wrong around a session is said once, clearly, and does not end it."""
+"""Failures of clients and wrong inputs are reported clearly; a failing client does not end the session."""
 import signal
 import tempfile
 import time
@@ -9,72 +9,72 @@ from stage import SOURCE, Stage, tenon
 
 
 class Faults(unittest.TestCase):
-    def test_a_trainee_killed_while_holding_a_part_is_parked_and_may_come_back(self):
+    def test_a_part_held_by_a_killed_trainee_is_parked_and_another_may_continue(self):
         with Stage(lockstep=False) as stage:
             server = stage.serve("peg_and_box", "--wait-for", "right")
             trainee = stage.start("trainee", "--seed", 1)
             server.wait_for("taken: .*[Pp]eg", 120)
             trainee.signal(signal.SIGKILL)
-            server.wait_for("what it held is parked", 30)
-            server.wait_for(r"\(trainee\) is gone", 30)
+            server.wait_for("is parked", 30)
+            server.wait_for(r"\(trainee\) has left", 30)
             self.assertIsNone(server.popen.poll(), "the session must go on")
             stage.start("trainee", "--seed", 2)
             server.wait_for("everything is mounted", 180)
             self.assertEqual(server.wait(30), 0)
 
-    def test_a_trainee_killed_while_holding_a_part_gets_it_back_with_its_seat(self):
+    def test_a_killed_trainee_gets_its_part_back_with_its_seat_file(self):
         with Stage(lockstep=False) as stage:
             server = stage.serve("peg_and_box", "--wait-for", "right")
             seat = stage.out / "seat"
             trainee = stage.start("trainee", "--seed", 1, "--seat", seat)
             server.wait_for("taken: .*[Pp]eg", 120)
             trainee.signal(signal.SIGKILL)
-            server.wait_for("what it held is parked", 30)
+            server.wait_for("is parked", 30)
             again = stage.start("trainee", "--seed", 1, "--seat", seat)
             again.wait_for("joined as client 1", 60)
-            server.wait_for("is here again", 30)
+            server.wait_for("has rejoined", 30)
             server.wait_for("everything is mounted", 180)
             self.assertEqual(server.wait(30), 0)
-            self.assertEqual(server.text().count("step done: take_peg"), 1, "it was in the hand, not to be taken again")
+            self.assertEqual(server.text().count("step done: take_peg"), 1, "the part is in the hand again without being taken")
 
-    def test_a_trainee_that_hangs_for_long_loses_its_seat_and_comes_back(self):
+    def test_a_trainee_that_hangs_beyond_its_lease_rejoins(self):
         with Stage(lockstep=False) as stage:
             server = stage.serve("peg_and_box", "--wait-for", "right")
             trainee = stage.start("trainee", "--seed", 1)
             server.wait_for("taken: .*[Pp]eg", 120)
             trainee.signal(signal.SIGSTOP)
-            server.wait_for(r"\(trainee\) is gone", 30)
+            server.wait_for(r"\(trainee\) has left", 30)
             trainee.signal(signal.SIGCONT)
-            trainee.wait_for("back as client 1", 60)
+            trainee.wait_for("rejoined as client 1", 60)
             server.wait_for("everything is mounted", 180)
             self.assertEqual(server.wait(30), 0)
             self.assertEqual(trainee.wait(30), 0, trainee.text())
 
-    def test_a_trainee_finds_a_server_that_was_killed_and_started_again(self):
+    def test_a_trainee_rejoins_a_restarted_server(self):
         with Stage(lockstep=False) as stage:
             server = stage.serve("peg_and_box", "--wait-for", "right")
             trainee = stage.start("trainee", "--seed", 1, "--wait", 60)
             server.wait_for("taken: .*[Pp]eg", 120)
             server.signal(signal.SIGKILL)
-            trainee.wait_for("looking for the seat", 30)
+            trainee.wait_for("rejoining the session", 30)
             again = stage.serve("peg_and_box", "--wait-for", "right")
-            trainee.wait_for("back as client", 60)
+            trainee.wait_for("rejoined as client", 60)
             again.wait_for("everything is mounted", 180)
             self.assertEqual(again.wait(30), 0)
 
-    def test_a_trainee_that_hangs_freezes_and_then_moves_again(self):
+    def test_the_hand_of_a_trainee_that_hangs_briefly_is_frozen(self):
         with Stage(lockstep=False) as stage:
             server = stage.serve("peg_and_box", "--wait-for", "right")
             trainee = stage.start("trainee", "--seed", 1)
             server.wait_for("taken: .*[Pp]eg", 120)
             trainee.signal(signal.SIGSTOP)
             server.wait_for("held still", 30)
-            time.sleep(0.3)  # shorter than the lease: the person is still there
+            time.sleep(0.3)  # shorter than the lease: the trainee stays in the session
             trainee.signal(signal.SIGCONT)
             server.wait_for("moves again|hand gone", 30)
             self.assertIsNone(server.popen.poll(), "the session must go on")
 
-    def test_a_second_trainee_is_told_that_the_hand_is_taken(self):
+    def test_a_second_trainee_is_refused_when_the_hand_is_taken(self):
         with Stage(lockstep=False) as stage:
             server = stage.serve("peg_and_box", "--wait-for", "right")
             stage.start("trainee", "--seed", 1)
@@ -83,7 +83,7 @@ class Faults(unittest.TestCase):
             self.assertNotEqual(second.wait(60), 0)
             self.assertIn("already moved by somebody else", second.text())
 
-    def test_no_server_is_one_clear_sentence(self):
+    def test_without_a_server_a_client_says_so(self):
         with Stage(lockstep=False) as stage:
             alone = stage.start("trainee", "--wait", 2)
             self.assertNotEqual(alone.wait(60), 0)

@@ -1,4 +1,4 @@
-"""Every verb that `tenon` offers tells what it takes."""
+"""Every verb of `tenon` has help, and unknown ones are refused."""
 import re
 import unittest
 
@@ -12,7 +12,7 @@ def verbs():
 
 
 class Help(unittest.TestCase):
-    def test_the_front_door_lists_its_verbs(self):
+    def test_tenon_lists_its_verbs(self):
         done = tenon("--help")
         self.assertEqual(done.returncode, 0)
         self.assertGreater(len(verbs()), 10)

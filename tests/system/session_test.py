@@ -1,4 +1,4 @@
-"""A session between real processes: lockstep over DDS does to the bit what one process does, and re-runs to it."""
+"""Sessions between processes: lockstep over DDS and re-simulation give the same state hash as one process."""
 import unittest
 
 from stage import SOURCE, Stage, final_hash, tenon
@@ -6,13 +6,13 @@ from stage import SOURCE, Stage, final_hash, tenon
 SCENARIO = "peg_and_box"
 
 
-def rehearse(*words):
-    done = tenon("rehearse", SOURCE / "scenarios" / SCENARIO, "--seed", 1, "--no-instructor", *words)
+def rehearse(*arguments):
+    done = tenon("rehearse", SOURCE / "scenarios" / SCENARIO, "--seed", 1, "--no-instructor", *arguments)
     return done, final_hash(done.stdout)
 
 
 class Session(unittest.TestCase):
-    def test_the_same_hash_for_any_number_of_workers(self):
+    def test_the_state_hash_does_not_depend_on_the_number_of_workers(self):
         one, hash_one = rehearse()
         self.assertEqual(one.returncode, 0, one.stdout + one.stderr)
         again, hash_again = rehearse()
@@ -20,9 +20,20 @@ class Session(unittest.TestCase):
         self.assertEqual(hash_one, hash_again)
         self.assertEqual(hash_one, hash_two)
 
-    def test_without_collisions_the_same_person_fails(self):
+    def test_without_collisions_the_simulated_trainee_fails(self):
         done, _ = rehearse("--no-collisions")
         self.assertEqual(done.returncode, 1, done.stdout)
+
+    def test_a_misplaced_mount_fails_without_an_instructor(self):
+        done, _ = rehearse("--misplace-mount", 0, "--seconds", 60, "--follow")
+        self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
+        self.assertIn("pushes at wrong pose", done.stdout)
+
+    def test_the_former_option_names_the_new_one(self):
+        done, _ = rehearse("--stubborn", 0)
+        self.assertEqual((done.returncode, done.stderr), (2, "tenon rehearse: --stubborn is now --misplace-mount\n"))
+        done = tenon("join", "--role", "trainee", "--stubborn", 0)
+        self.assertEqual((done.returncode, done.stderr), (2, "tenon-trainee: --stubborn is now --misplace-mount\n"))
 
     def test_lockstep_between_processes_equals_one_process_and_its_recordings_rerun(self):
         with Stage() as stage:

@@ -1,4 +1,4 @@
-"""What the system tests share: Tenon's programs as processes on loopback DDS, none of which stays behind."""
+"""Shared by the system tests: runs Tenon's programs as processes over DDS and ends them with the test."""
 import os
 import re
 import signal
@@ -10,17 +10,17 @@ from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[2]
 PROGRAMS = Path(os.environ.get("TENON_PROGRAMS", SOURCE / "build" / "release" / "bin"))
-FRONT_DOOR = SOURCE / "tenon"
+TENON = SOURCE / "tenon"
 
 
 def free_domain():
-    """A DDS domain that other tests on this machine are not likely to use."""
+    """A DDS domain that other tests on this machine are unlikely to use."""
     return 1 + os.getpid() % 90
 
 
-def tenon(*words, timeout=600, env=None, input=None):
-    """Runs the front door to its end, on the programs of this build."""
-    return subprocess.run([FRONT_DOOR, *map(str, words)], capture_output=True, text=True, timeout=timeout, input=input,
+def tenon(*arguments, timeout=600, env=None, input=None):
+    """Runs `tenon` with the programs of this build and waits for its end."""
+    return subprocess.run([TENON, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, input=input,
                           env={**os.environ, "TENON_PROGRAMS": str(PROGRAMS), **(env or {})})
 
 
@@ -30,56 +30,56 @@ def final_hash(text):
 
 
 class Process:
-    """A running program with its output so far."""
+    """A running program and its output."""
 
-    def __init__(self, name, words, log):
+    def __init__(self, name, arguments, log):
         self.name, self.log, self.lines = name, log, []
-        self.popen = subprocess.Popen([PROGRAMS / f"tenon-{name}", *map(str, words)], stdout=subprocess.PIPE,
+        self.popen = subprocess.Popen([PROGRAMS / f"tenon-{name}", *map(str, arguments)], stdout=subprocess.PIPE,
                                       stderr=subprocess.STDOUT, text=True)
-        self.news = threading.Condition()
+        self.changed = threading.Condition()
         threading.Thread(target=self.listen, daemon=True).start()
 
     def listen(self):
         for line in self.popen.stdout:
-            with self.news:
+            with self.changed:
                 self.lines.append(line.rstrip("\n"))
-                self.news.notify_all()
-        with self.news:
-            self.news.notify_all()
+                self.changed.notify_all()
+        with self.changed:
+            self.changed.notify_all()
 
     def text(self):
-        with self.news:
+        with self.changed:
             return "\n".join(self.lines)
 
     def wait_for(self, pattern, seconds=120):
-        """The first line that holds the pattern; fails with all the program said when none comes in time."""
+        """The first line that matches the pattern; fails with the newest output when none does in time."""
         deadline = time.monotonic() + seconds
         seen = 0
-        with self.news:
+        with self.changed:
             while True:
                 for line in self.lines[seen:]:
                     if re.search(pattern, line):
                         return line
                 seen = len(self.lines)
-                left = deadline - time.monotonic()
+                remaining = deadline - time.monotonic()
                 ended = self.popen.poll() is not None
-                if left <= 0 or (ended and not self.news.wait(1) and seen == len(self.lines)):
-                    said = "\n".join(self.lines[-40:])
-                    raise AssertionError(f"{self.name} never said {pattern!r}; it said:\n{said}")
-                self.news.wait(min(left, 1))
+                if remaining <= 0 or (ended and not self.changed.wait(1) and seen == len(self.lines)):
+                    output = "\n".join(self.lines[-40:])
+                    raise AssertionError(f"{self.name} never printed {pattern!r}; its output:\n{output}")
+                self.changed.wait(min(remaining, 1))
 
     def wait(self, seconds=300):
         try:
             return self.popen.wait(seconds)
         except subprocess.TimeoutExpired:
-            raise AssertionError(f"{self.name} did not end in {seconds} s; it said:\n{self.text()[-4000:]}") from None
+            raise AssertionError(f"{self.name} did not end in {seconds} s; its output:\n{self.text()[-4000:]}") from None
 
     def signal(self, which):
         self.popen.send_signal(which)
 
 
 class Stage:
-    """A session's processes; use it with `with`."""
+    """The processes of one session, as a context manager that kills those left at its end."""
 
     def __init__(self, **options):
         self.folder = tempfile.TemporaryDirectory(prefix="tenon-")
@@ -99,13 +99,13 @@ class Stage:
             process.popen.wait()
         self.folder.cleanup()
 
-    def start(self, name, *words):
+    def start(self, name, *arguments):
         common = ["--session", self.session, "--domain", self.domain] + (["--lockstep"] if self.lockstep else [])
-        process = Process(name, [*words, *common], self.out)
+        process = Process(name, [*arguments, *common], self.out)
         self.processes.append(process)
         return process
 
-    def serve(self, scenario, *words):
-        server = self.start("serve", SOURCE / "scenarios" / scenario, *words)
+    def serve(self, scenario, *arguments):
+        server = self.start("serve", SOURCE / "scenarios" / scenario, *arguments)
         server.wait_for("is open", 600)
         return server

@@ -1,4 +1,4 @@
-"""What the verbs beside a session print and leave."""
+"""Output and files of the verbs that need no running session."""
 import json
 import re
 import signal
@@ -27,7 +27,7 @@ class Verbs(unittest.TestCase):
     def test_version_names_a_version(self):
         self.assertRegex(tenon("version").stdout, r"^tenon \d+\.\d+\.\d+$")
 
-    def test_doctor_judges_every_point_and_sums_up(self):
+    def test_doctor_checks_every_item(self):
         done = tenon("doctor")
         self.assertEqual(done.returncode, 0, done.stdout)
         for point in ("system", "processor", "programs", "real time", "memory", "bus", "disk"):
@@ -43,11 +43,11 @@ class Verbs(unittest.TestCase):
             self.assertEqual(bake.returncode, 0, bake.stderr)
             info = tenon("bake", "--info", baked)
             self.assertEqual(info.returncode, 0, info.stderr)
-            for word in ("voxel", "points", "triangles", "bytes a brick"):
+            for word in ("voxel", "points", "triangles", "bytes per brick"):
                 self.assertIn(word, info.stdout.lower())
-            self.assertRegex(bake.stdout, r"used +\S+ s of processors, \d+ MB of memory at most")
+            self.assertRegex(bake.stdout, r"used +\S+ s processor time, \d+ MB peak memory")
 
-    def test_points_of_a_shell_are_listed_by_level(self):
+    def test_pointshell_points_are_listed_by_level(self):
         with tempfile.TemporaryDirectory() as folder:
             table = Path(folder) / "shell.csv"
             done = tenon("bake", "--info", cube(folder), "--shell", table)
@@ -64,22 +64,22 @@ class Verbs(unittest.TestCase):
     def test_structures_are_drawn(self):
         drawing = Path(__file__).parents[2] / "server" / "structures" / "pictures" / "structures.py"
         with tempfile.TemporaryDirectory() as folder:
-            words = [sys.executable, drawing, cube(folder), "--across", "z", "--out", folder]
-            done = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False)
+            arguments = [sys.executable, drawing, cube(folder), "--across", "z", "--out", folder]
+            done = subprocess.run(arguments, capture_output=True, text=True, timeout=300, check=False)
             self.assertEqual(done.returncode, 0, done.stderr)
             field, shell = (ElementTree.parse(Path(folder) / name).getroot() for name in ("field.svg", "shell.svg"))
-            words = [[text.text for text in root.iter("{http://www.w3.org/2000/svg}text")] for root in (field, shell)]
-            self.assertEqual(words[0], ["20 mm", *(f"\u2212{k}" for k in (4, 3, 2, 1)), "0", "+1", "+2", "+3",
+            labels = [[text.text for text in root.iter("{http://www.w3.org/2000/svg}text")] for root in (field, shell)]
+            self.assertEqual(labels[0], ["20 mm", *(f"\u2212{k}" for k in (4, 3, 2, 1)), "0", "+1", "+2", "+3",
                                         "signed distance [mm]"])
-            self.assertEqual(words[1][:4:2], ["level 0", "level 1"])
+            self.assertEqual(labels[1][:4:2], ["level 0", "level 1"])
 
-    def test_an_interrupted_bake_says_so_and_leaves_no_file(self):
+    def test_an_interrupted_bake_reports_it_and_leaves_no_file(self):
         with tempfile.TemporaryDirectory() as folder:
             tenon("parts", "peg_and_box", folder)
             baked = Path(folder) / "baked"
             baked.mkdir()
-            for number, words in ((signal.SIGINT, ("-o", baked / "peg.tenon")), (signal.SIGTERM, ("--cache", baked))):
-                bake = subprocess.Popen([PROGRAMS / "tenon-bake", Path(folder) / "peg.stl", "--voxel", "0.25mm", *words],
+            for number, arguments in ((signal.SIGINT, ("-o", baked / "peg.tenon")), (signal.SIGTERM, ("--cache", baked))):
+                bake = subprocess.Popen([PROGRAMS / "tenon-bake", Path(folder) / "peg.stl", "--voxel", "0.25mm", *arguments],
                                         stderr=subprocess.PIPE, text=True)
                 for line in bake.stderr:
                     if "measuring distances" in line:
@@ -102,7 +102,7 @@ class Verbs(unittest.TestCase):
             self.assertNotEqual(info.returncode, 0)
             self.assertIn("peg.tenon", info.stderr)
 
-    def test_probe_tells_distance_and_normal_or_far(self):
+    def test_probe_prints_distance_and_normal_or_far(self):
         with tempfile.TemporaryDirectory() as folder:
             baked = cube(folder)
             done = tenon("probe", baked, input="# beside, inside, away\n0.011 0 0\n0.0 0.001 0.0085\n\n0.5 0 0\n")
@@ -114,36 +114,36 @@ class Verbs(unittest.TestCase):
             self.assertAlmostEqual(float(inside[3]), 1.0, places=4)
             self.assertEqual(away, ["far"])
 
-    def test_contact_is_the_penalty_of_the_points_inside_on_every_path(self):
+    def test_contact_wrench_is_the_penalty_force_on_every_code_path(self):
         with tempfile.TemporaryDirectory() as folder:
             baked, poses = cube(folder), Path(folder) / "poses"
-            # a cube half a millimetre deep in the side of another, and one away from it
+            # a cube 0.5 mm deep in the side of another one, and a cube apart from it
             poses.write_text("0.0195 0 0 1 0 0 0\n0.1 0 0 1 0 0 0\n", encoding="utf-8")
             tables = {}
-            for words in ((), ("--isa", "scalar"), ("--no-prune",)):
+            for arguments in ((), ("--isa", "scalar"), ("--no-prune",)):
                 table = Path(folder) / "table.csv"
-                done = tenon("contact", baked, baked, "--poses", poses, "--csv", table, "--stiffness", "500", *words)
+                done = tenon("contact", baked, baked, "--poses", poses, "--csv", table, "--stiffness", "500", *arguments)
                 self.assertEqual(done.returncode, 0, done.stderr)
                 self.assertIn("2, 1 in contact", done.stdout)
                 rows = [line.split(",") for line in table.read_text(encoding="utf-8").splitlines()]
                 self.assertEqual(rows[0], "index,microseconds,contacts,penetration_m,fx,fy,fz,tx,ty,tz,load_percent".split(","))
-                tables[words] = [row[:1] + row[2:10] for row in rows[1:]]
+                tables[arguments] = [row[:1] + row[2:10] for row in rows[1:]]
             touching, away = tables[()]
             self.assertAlmostEqual(float(touching[2]), 0.0005, places=5)
             # 500 N/m for each cm^2 of the 4 cm^2 that are inside, rim points stand for some of the sides
             self.assertAlmostEqual(float(touching[3]), 500 * 0.0005 * 4, delta=0.3)
             self.assertEqual([float(number) for number in away[1:]], [0.0] * 8)
-            for words, table in tables.items():
-                self.assertEqual(table, tables[()], words)
+            for arguments, table in tables.items():
+                self.assertEqual(table, tables[()], arguments)
 
-    def test_refined_contacts_are_those_of_the_mesh_where_edges_meet(self):
+    def test_refined_contacts_agree_with_the_mesh_at_edges(self):
         with tempfile.TemporaryDirectory() as folder:
             baked, poses, table = cube(folder), Path(folder) / "poses", Path(folder) / "table.csv"
-            # an edge half a millimetre under two sides of the other cube
+            # an edge 0.5 mm below two sides of the other cube
             poses.write_text("0.0195 0.0195 0.003 1 0 0 0\n", encoding="utf-8")
             depths = []
-            for words in (("--interpolated",), (), ("--refine",), ("--refine", "--mesh", Path(folder) / "cube.off")):
-                done = tenon("contact", baked, baked, "--poses", poses, "--csv", table, *words)
+            for arguments in (("--interpolated",), (), ("--refine",), ("--refine", "--mesh", Path(folder) / "cube.off")):
+                done = tenon("contact", baked, baked, "--poses", poses, "--csv", table, *arguments)
                 self.assertEqual(done.returncode, 0, done.stderr)
                 depths.append(float(table.read_text(encoding="utf-8").splitlines()[1].split(",")[3]))
             self.assertLess(depths[0], 0.0004)
@@ -195,7 +195,7 @@ class Verbs(unittest.TestCase):
                           tenon("contact", baked, baked, "--poses", poses, "--isa", "abacus").stderr)
             self.assertEqual(tenon("contact", baked, "missing.tenon", "--poses", poses).returncode, 1)
 
-    def test_voxels_of_a_way_are_told_written_and_baked_again(self):
+    def test_voxels_of_a_path_are_measured_written_and_baked_again(self):
         with tempfile.TemporaryDirectory() as folder:
             baked, poses, tree, scan = cube(folder), Path(folder) / "poses", Path(folder) / "way.bt", Path(folder) / "way.tenon"
             poses.write_text("0 0 0.0178 1 0 0 0\n0.1 0 0.0178 1 0 0 0\n", encoding="utf-8")
@@ -204,22 +204,22 @@ class Verbs(unittest.TestCase):
             self.assertEqual(done.stderr, "")
             volume = float(re.search(r"volume +(\S+) m\^3", done.stdout)[1])
             self.assertAlmostEqual(volume, 0.12 * 0.02 * 0.02, delta=0.03 * 0.12 * 0.02 * 0.02)
-            # it begins 2.2 mm deep in another cube of its kind
+            # at its first pose it is 2.2 mm deep in the cube of the scene
             self.assertAlmostEqual(float(re.search(r"clearance +(\S+) m", done.stdout)[1]), -0.0022, places=4)
             again = tenon("bake", tree, "-o", scan, "--voxel", "1mm", "--points", "2000")
             self.assertEqual(again.returncode, 0, again.stderr)
             self.assertIn("120 mm x 20 mm x 20 mm", again.stdout)
 
-    def test_voxels_that_cannot_be_are_refused(self):
+    def test_voxels_with_wrong_arguments_are_refused(self):
         with tempfile.TemporaryDirectory() as folder:
             baked = cube(folder)
-            for words, complaint in ((("-o", Path(folder) / "cube.stl"), "must end in .bt or .ot"),
+            for arguments, complaint in ((("-o", Path(folder) / "cube.stl"), "must end in .bt or .ot"),
                                      (("--cell", "0.1um"), "choose larger ones"),
                                      (("--cell", "50mm"), "no cell's middle is inside"),
                                      (("--poses", "missing"), "missing: cannot be read"),
                                      (("--scene", "missing"), "missing")):
-                done = tenon("voxels", baked, *words)
-                self.assertEqual(done.returncode, 1, words)
+                done = tenon("voxels", baked, *arguments)
+                self.assertEqual(done.returncode, 1, arguments)
                 self.assertIn(complaint, done.stderr)
                 self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
 
@@ -237,7 +237,7 @@ class Verbs(unittest.TestCase):
             self.assertNotEqual(refused.returncode, 0)
             self.assertIn("engine", refused.stderr)
 
-    def test_an_observer_speaks_json(self):
+    def test_an_observer_prints_json(self):
         with Stage(lockstep=False) as stage:
             stage.serve("peg_and_box", "--wait-for", "right,observer")
             stage.lockstep = False

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Draws what contact is computed with: a slice of a baked field, and a pointshell with its levels.
+"""Draws the haptic structures of a part: a slice of its distance field, and its pointshell by level.
 
     ./tenon parts engine_bay PARTS
     ./tenon bake PARTS/drill.stl -o drill.tenon --voxel 3mm --points 4000
     server/structures/pictures/structures.py drill.tenon --across y --out .
 
-Writes field.svg and shell.svg. Needs nothing but Python and Tenon."""
+Writes field.svg and shell.svg. Uses only the Python standard library and Tenon."""
 import argparse
 import csv
 import math
@@ -17,10 +17,10 @@ from pathlib import Path
 
 TENON = Path(__file__).resolve().parents[3] / "tenon"
 INK, FAINT, PAPER, SHADOW = "#1d2733", "#6f7b87", "#ffffff", "#eef1f4"
-# from deep inside to the skin, then from the skin away: one colour a voxel, the first for all that is deeper
+# one colour per voxel of distance: from inside to the surface (the first for everything deeper), then outwards
 INSIDE = ["#8f1d23", "#c1392b", "#e2703a", "#f3a64e", "#fbe09a"]
 OUTSIDE = ["#1f93a6", "#5fb7c4", "#9fd5dc", "#d8eef1"]
-COARSER, NEW = "#d98e04", "#2f6f9f"  # points that a level has from the ones before, and its own
+COARSER, NEW = "#d98e04", "#2f6f9f"  # points of coarser levels, and those that the level adds
 FONT = "font-family='Helvetica,Arial,sans-serif'"
 
 
@@ -37,7 +37,7 @@ def length(text):
 
 
 class Baked:
-    """What `tenon bake --info` says of a structure file."""
+    """A structure file as printed by `tenon bake --info`."""
 
     def __init__(self, file):
         self.file = file
@@ -52,8 +52,8 @@ class Baked:
 
     def distances(self, points):
         """Signed distance for each point, None beyond the band."""
-        said = tenon("probe", self.file, text="".join(f"{x:.7g} {y:.7g} {z:.7g}\n" for x, y, z in points))
-        return [None if line == "far" else float(line.split()[0]) for line in said.splitlines()]
+        lines = tenon("probe", self.file, text="".join(f"{x:.7g} {y:.7g} {z:.7g}\n" for x, y, z in points))
+        return [None if line == "far" else float(line.split()[0]) for line in lines.splitlines()]
 
 
 def path(pieces, style):
@@ -83,7 +83,7 @@ class Slice:
         self.extend()
 
     def extend(self):
-        """Beyond the band: one sample on as its neighbours suggest, so that the band ends where it does; then by sign."""
+        """Fills samples beyond the band: one next to the band from its neighbours, the others by sign only."""
         known = [row[:] for row in self.grid]
         for row in range(self.rows):
             for column in range(self.columns):
@@ -109,7 +109,7 @@ class Slice:
                                     self.grid[row + 1][column + 1], self.grid[row + 1][column]]
 
     def line(self, level):
-        """Where the distance is `level`: loops, cell by cell."""
+        """The contour of distance `level` (marching squares)."""
         ends = {}
         for column, row, corner in self.cells():
             around = [(column, row), (column + 1, row), (column + 1, row + 1), (column, row + 1)]
@@ -117,9 +117,9 @@ class Slice:
             for i in range(4):
                 a, b = corner[i] - level, corner[(i + 1) % 4] - level
                 if (a < 0.0) != (b < 0.0):
-                    share = a / (a - b)
+                    fraction = a / (a - b)
                     (x, y), (s, t) = around[i], around[(i + 1) % 4]
-                    crossings.append((number(x + share * (s - x)), number(y + share * (t - y))))
+                    crossings.append((number(x + fraction * (s - x)), number(y + fraction * (t - y))))
             for a, b in zip(crossings[::2], crossings[1::2]):
                 ends.setdefault(a, []).append(b)
                 ends.setdefault(b, []).append(a)
@@ -165,7 +165,7 @@ def field_picture(baked, axis, at):
     height = cut.rows * unit
     body = f"<g transform='translate(36 {height + 12:.1f}) scale({unit:.4f} {-unit:.4f})' stroke-linejoin='round'>\n"
     steps = [(k - len(INSIDE), colour) for k, colour in enumerate(INSIDE)] + list(enumerate(OUTSIDE))
-    # what is under each limit, over what is under the next one
+    # areas below each limit, each painted over those of the next higher limit
     for low, colour in reversed(steps):
         body += path(cut.line(low + 1), f"fill='{colour}' fill-rule='evenodd' stroke='{PAPER}' stroke-width='0.18'")
     body += path(cut.line(0.0), f"fill='none' stroke='{INK}' stroke-width='0.7'")
@@ -184,14 +184,14 @@ def field_picture(baked, axis, at):
 
 
 class View:
-    """The points of a shell as seen from a place far away: to the right, up, towards the eye."""
+    """The points of a shell in orthographic projection: right, up, towards the viewer."""
 
     def __init__(self, points, turn, tilt):
         self.turn, self.tilt = math.radians(turn), math.radians(tilt)
         self.points = []
         for p in points:
-            place, normal = self.seen(p["x"], p["y"], p["z"]), self.seen(p["nx"], p["ny"], p["nz"])
-            # from the upper left, over the shoulder
+            place, normal = self.projected(p["x"], p["y"], p["z"]), self.projected(p["nx"], p["ny"], p["nz"])
+            # light from the upper left behind the viewer
             light = max(0.0, -0.45 * normal[0] + 0.65 * normal[1] + 0.62 * normal[2])
             self.points.append((int(p["level"]), *place, normal[2], light))
         self.low, self.high = ([edge(p[axis] for p in self.points) for axis in (1, 2)] for edge in (min, max))
@@ -201,7 +201,7 @@ class View:
             for cell in self.cells(p, 1):
                 self.front[cell] = max(self.front.get(cell, -1e9), p[3])
 
-    def seen(self, x, y, z):
+    def projected(self, x, y, z):
         x, y = math.cos(self.turn) * x - math.sin(self.turn) * y, math.sin(self.turn) * x + math.cos(self.turn) * y
         return x, math.sin(self.tilt) * y + math.cos(self.tilt) * z, -math.cos(self.tilt) * y + math.sin(self.tilt) * z
 
@@ -210,17 +210,17 @@ class View:
         return [(column + i, row + j) for i in range(-around, around + 1) for j in range(-around, around + 1)]
 
     def visible(self, p):
-        """On a side that faces the eye, with nothing much nearer before it."""
+        """Whether a point faces the viewer and is not occluded."""
         return p[4] > 0.0 and self.front[self.cells(p, 0)[0]] - p[3] < 4.0 * self.spacing
 
 
-def mixed(colour, share, other):
+def mixed(colour, fraction, other):
     channels = [(int(colour[i:i + 2], 16), int(other[i:i + 2], 16)) for i in (1, 3, 5)]
-    return "#" + "".join(f"{round(a + (b - a) * share):02x}" for a, b in channels)
+    return "#" + "".join(f"{round(a + (b - a) * fraction):02x}" for a, b in channels)
 
 
 def shell_picture(baked, turn=-28.0, tilt=16.0):
-    """A panel a level: its own points and those of the levels before, over the whole shell as a shadow."""
+    """One panel per level: its own points and those of coarser levels, over all points as a background."""
     view = View(baked.points, turn, tilt)
     levels = 1 + max(p[0] for p in view.points)
     columns = 2 if levels > 3 else levels
@@ -257,8 +257,8 @@ def shell_picture(baked, turn=-28.0, tilt=16.0):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("baked", metavar="STRUCTURES", help="structure file (from tenon bake)")
-    parser.add_argument("--across", choices="xyz", default="z", help="axis that the slice is square to")
-    parser.add_argument("--at", type=float, default=0.0, help="where on that axis [m]")
+    parser.add_argument("--across", choices="xyz", default="z", help="axis perpendicular to the slice")
+    parser.add_argument("--at", type=float, default=0.0, help="position on that axis [m]")
     parser.add_argument("--out", type=Path, default=Path("."), help="folder to write into")
     words = parser.parse_args()
     baked = Baked(words.baked)

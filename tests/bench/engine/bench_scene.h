@@ -13,24 +13,26 @@
 
 namespace tenon::bench {
 
-struct SceneWishes {
-  std::filesystem::path folder;  ///< parts and structures are made here
-  double detail = 1.0;           ///< of the generated parts; 1 is the paper's scene
+struct BenchSceneOptions {
+  std::filesystem::path folder;  ///< for generated parts and structures
+  double detail = 1.0;           ///< [-] of the generated parts, 0 to 1; 1 is the paper's scene
 };
 
-/// The paper's pair: the engine bay at 3 mm as a field, the control box as a shell of about 10,500 points.
+/// The paper's collision pair: the engine bay as SDF side with 3 mm voxels, the control box as pointshell
+/// side with about 10,500 points.
 struct BenchScene {
-  std::shared_ptr<const HapticStructures> bay, box;
-  TriangleMesh bay_mesh, box_mesh;
-  PoseSets poses;  ///< X of the box in the bay, on its way into its place
-  Table bake;      ///< what making them took
+  std::shared_ptr<const structures::HapticStructures> bay, box;
+  bake::TriangleMesh bay_mesh, box_mesh;
+  PoseSets poses;  ///< of the box in the bay, on its path to its target
+  Table bake;      ///< cost of baking both
 };
 
-/// What is being done, for a person who waits.
-using Say = std::function<void(std::string_view)>;
+/// Receives a description of the current step, for display.
+using ProgressCallback = std::function<void(std::string_view)>;
 
-/// Has the parts made and baked anew by the programs beside this one, so that their time and memory are those
-/// of a user.
-[[nodiscard]] Result<BenchScene> makeScene(const SceneWishes& wishes, const Say& say);
+/// Generates and bakes the parts by running the installed programs, so that time and memory are those of a
+/// user. Fails when a program fails or the files cannot be read.
+[[nodiscard]] Result<BenchScene> makeScene(const BenchSceneOptions& options,
+                                           const ProgressCallback& progress);
 
 }  // namespace tenon::bench

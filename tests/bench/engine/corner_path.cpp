@@ -11,35 +11,35 @@
 namespace tenon::bench {
 namespace {
 
-constexpr double kCornerVoxel = 0.003;
-constexpr double kTickWay = 0.0005;  // [m] 0.5 m/s
+constexpr double kCornerVoxel = 0.003;        // [m]
+constexpr double kTickDisplacement = 0.0005;  // [m] per tick: 0.5 m/s
 
 struct NamedMethod {
   const char* name;
-  ContactMethod method;
+  collision::ContactMethod method;
 };
-constexpr std::array kMethods{NamedMethod{"god object", ContactMethod::kIsland},
-                              NamedMethod{"blocking", ContactMethod::kBlocking}};
+constexpr std::array kMethods{NamedMethod{"god object", collision::ContactMethod::kIsland},
+                              NamedMethod{"blocking", collision::ContactMethod::kBlocking}};
 
-// walls at x = 0 and z = 0; y is far from everything
+// wall at x = 0, floor at z = 0; y is far from the third wall
 constexpr double kY = 0.15;
-const std::array<Vector3, 4> kHand{Vector3(0.12, kY, 0.06), Vector3(0.10, kY, -0.005),
-                                   Vector3(0.01, kY, -0.015), Vector3(0.02, kY, 0.08)};
+const std::array<Vector3, 4> kHandPath{Vector3(0.12, kY, 0.06), Vector3(0.10, kY, -0.005),
+                                       Vector3(0.01, kY, -0.015), Vector3(0.02, kY, 0.08)};
 
-void follow(const NamedMethod& one, std::string& out) {
-  HeldBox held(one.method, test::cornerStructures(0.3, kCornerVoxel), HeldBox::dilationOf(kCornerVoxel),
-               Pose(kHand[0]));
+void appendPath(const NamedMethod& method, std::string& out) {
+  HeldBox held(method.method, test::cornerStructures(0.3, kCornerVoxel), HeldBox::dilationOf(kCornerVoxel),
+               Pose(kHandPath[0]));
   int tick = 0;
-  for (std::size_t leg = 0; leg + 1 < kHand.size(); ++leg) {
-    const Vector3 way = kHand[leg + 1] - kHand[leg];
-    const int ticks = static_cast<int>(way.norm() / kTickWay);
+  for (std::size_t leg = 0; leg + 1 < kHandPath.size(); ++leg) {
+    const Vector3 displacement = kHandPath[leg + 1] - kHandPath[leg];
+    const int ticks = static_cast<int>(displacement.norm() / kTickDisplacement);
     for (int i = 1; i <= ticks; ++i) {
-      const Vector3 hand = kHand[leg] + way * (static_cast<double>(i) / ticks);
+      const Vector3 hand = kHandPath[leg] + displacement * (static_cast<double>(i) / ticks);
       held.step(Pose(hand));
       const Vector3 p = held.pose().translation();
       const Vector3 f = held.force();
-      fmt::format_to(std::back_inserter(out), "{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.3f},{:.3f}\n", one.name,
-                     tick++, hand.x(), hand.z(), p.x(), p.z(), f.x(), f.z());
+      fmt::format_to(std::back_inserter(out), "{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.3f},{:.3f}\n",
+                     method.name, tick++, hand.x(), hand.z(), p.x(), p.z(), f.x(), f.z());
     }
   }
 }
@@ -48,7 +48,7 @@ void follow(const NamedMethod& one, std::string& out) {
 
 std::string cornerPath() {
   std::string out = "method,tick,hand_x,hand_z,box_x,box_z,force_x,force_z\n";
-  for (const NamedMethod& one : kMethods) follow(one, out);
+  for (const NamedMethod& method : kMethods) appendPath(method, out);
   return out;
 }
 

@@ -4,9 +4,9 @@
 
 namespace tenon::bench {
 
-/// The way of a held box whose hand goes down through a floor, along it through a wall, and up again, as CSV:
-/// a line for each method and tick, where hand and box are and what the hand feels, in the plane across the
-/// corner [m, N].
+/// Path of a held box whose hand moves down through a floor, below it through a wall, and up again, as CSV:
+/// for each contact method and tick the positions of hand and box [m] and the force on the hand [N], in the
+/// x-z plane.
 [[nodiscard]] std::string cornerPath();
 
 }  // namespace tenon::bench

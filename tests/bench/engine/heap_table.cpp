@@ -13,12 +13,12 @@ namespace tenon::bench {
 namespace {
 
 constexpr int kTicks = 450;
-constexpr double kEdge = 0.05;
-constexpr double kMass = 0.4;
-constexpr double kFriction = 0.4;
+constexpr double kEdge = 0.05;     // [m]
+constexpr double kMass = 0.4;      // [kg]
+constexpr double kFriction = 0.4;  // [-]
 constexpr int kWallWidth = 5;
 
-/// Free boxes that may all meet each other, and the floor under them.
+/// A scene of free boxes and a floor; all may collide with each other.
 class FreeBoxes {
  public:
   FreeBoxes() : floor_(small_.object("floor", test::floorShape(), Vector3::Zero())) {}
@@ -32,7 +32,7 @@ class FreeBoxes {
     for (const ObjectId other : boxes_) small_.pair(box, other);
     boxes_.push_back(box);
   }
-  [[nodiscard]] std::shared_ptr<const Scene> scene() const { return small_.build(); }
+  [[nodiscard]] std::shared_ptr<const simulation::Scene> scene() const { return small_.build(); }
 
  private:
   test::SmallScene small_;
@@ -40,68 +40,72 @@ class FreeBoxes {
   std::vector<ObjectId> boxes_;
 };
 
-/// In [-1, 1], another one for each number.
-double scattered(int number) {
+/// Deterministic value in [-1, 1) for each number (golden ratio sequence).
+double hashed(int number) {
   const double turns = 0.618034 * number;
   return 2.0 * (turns - std::floor(turns)) - 1.0;
 }
 
-/// Five a layer, each upon two, let go a hair above each other: it gives way at its ends.
+/// Layers of five, each box on two, released 0.1 mm above each other. The ends are unsupported and collapse.
 FreeBoxes wall(int count) {
   FreeBoxes boxes;
   for (int i = 0; i < count; ++i) {
     const int layer = i / kWallWidth;
     const double x = (i % kWallWidth + 0.5 * (layer % 2) - 0.5 * kWallWidth) * (kEdge + 0.001);
-    boxes.add(Pose(Vector3(x, 0.0005 * scattered(i), (layer + 0.5) * kEdge + 1e-4 * (layer + 1))));
+    boxes.add(Pose(Vector3(x, 0.0005 * hashed(i), (layer + 0.5) * kEdge + 1e-4 * (layer + 1))));
   }
   return boxes;
 }
 
-/// Dropped askew, four or nine a layer.
+/// Layers of four or nine, dropped with different orientations.
 FreeBoxes heap(int count) {
   FreeBoxes boxes;
   const int side = count <= 20 ? 2 : 3;
   for (int i = 0; i < count; ++i) {
-    const int place = i % (side * side);
-    const Vector3 p(0.066 * (place % side - 0.5 * (side - 1)), 0.066 * (place / side - 0.5 * (side - 1)),
+    const int slot = i % (side * side);
+    const Vector3 p(0.066 * (slot % side - 0.5 * (side - 1)), 0.066 * (slot / side - 0.5 * (side - 1)),
                     0.045 + 0.07 * (i / (side * side)));
-    const Vector3 turn(scattered(3 * i), scattered(3 * i + 1), scattered(3 * i + 2));
+    const Vector3 turn(hashed(3 * i), hashed(3 * i + 1), hashed(3 * i + 2));
     boxes.add(Pose(p, expRotation(0.25 * turn)));
   }
   return boxes;
 }
 
-std::vector<Cell> row(const char* name, int count, const FreeBoxes& boxes) {
-  Environment environment(boxes.scene(), {});
+std::vector<TableCell> row(const char* name, int count, const FreeBoxes& boxes) {
+  simulation::Environment environment(boxes.scene(), {});
   std::vector<double> times;
-  double looks = 0.0;
+  double queries = 0.0;
   double substeps = 0.0;
   double iterations = 0.0;
   for (int i = 0; i < kTicks; ++i) {
     times.push_back(microsecondsOf([&] { environment.step(); }));
-    looks += environment.work().queried_pairs;
+    queries += environment.work().queried_pairs;
     substeps += environment.work().substeps;
     iterations += environment.work().iterations;
   }
-  const Percentiles all = percentilesOf(std::move(times));
-  return {
-      name,   static_cast<double>(count), looks / kTicks, substeps / kTicks, iterations / kTicks, all.median,
-      all.p99};
+  const Percentiles times_us = percentilesOf(std::move(times));
+  return {name,
+          static_cast<double>(count),
+          queries / kTicks,
+          substeps / kTicks,
+          iterations / kTicks,
+          times_us.median,
+          times_us.p99};
 }
 
 }  // namespace
 
-Table heapsTable(const Say& say) {
+Table heapsTable(const ProgressCallback& progress) {
   Table table;
   table.name = "heaps";
   table.title = "Whole ticks while free boxes settle on each other (item 9)";
-  table.columns = {"boxes as", "boxes", "looked at", "sub-steps", "iterations", "median us", "p99 us"};
+  table.columns = {"arrangement", "boxes", "queried pairs", "sub-steps", "iterations", "median us", "p99 us"};
   table.notes = {
-      fmt::format("boxes of {:.0f} mm from the moment they are let go, {} ticks, one worker; "
-                  "looked at, sub-steps, iterations: a tick",
+      fmt::format("boxes of {:.0f} mm, the first {} ticks after release, one worker; "
+                  "queried pairs, sub-steps, iterations: per tick",
                   1000.0 * kEdge, kTicks)};
   for (const int count : {10, 20, 40}) {
-    say(fmt::format("heaps of {} boxes", count));
+    progress(fmt::format("heaps of {} boxes", count));
     table.rows.push_back(row("heap", count, heap(count)));
     table.rows.push_back(row("wall", count, wall(count)));
   }

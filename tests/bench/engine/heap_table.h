@@ -5,7 +5,7 @@
 
 namespace tenon::bench {
 
-/// Item 9 at scale: whole ticks while free boxes settle on each other, all in one contact island.
-[[nodiscard]] Table heapsTable(const Say& say);
+/// Item 9 at scale: whole ticks while free boxes settle on each other, in one contact island.
+[[nodiscard]] Table heapsTable(const ProgressCallback& progress);
 
 }  // namespace tenon::bench

@@ -25,28 +25,28 @@
 namespace tenon::bench {
 namespace {
 
-struct Arguments {
-  std::string what;
+struct BenchArguments {
+  std::string benchmark;
   double detail = 1.0;
   int rounds = 5;
   std::vector<std::string> only;
   std::string json;
   std::string figures;
-  std::filesystem::path cache = defaultCache();
+  std::filesystem::path cache = session::defaultCache();
   std::string scenario;
 };
 
-int complain(const std::string& what) {
+int reportError(const std::string& what) {
   std::fprintf(stderr, "tenon bench: %s\n", what.c_str());
   return 1;
 }
 
-/// On a terminal one line that is written over, elsewhere nothing: the tables follow.
-void say(std::string_view doing) {
+/// On a terminal prints a line that the next output overwrites; elsewhere prints nothing.
+void printProgress(std::string_view step) {
   static const bool kIsTerminal = isatty(STDERR_FILENO) == 1;
-  if (kIsTerminal) fmt::print(stderr, "\r\033[K{} ...", doing);
+  if (kIsTerminal) fmt::print(stderr, "\r\033[K{} ...", step);
 }
-void sayNothing() {
+void clearProgress() {
   if (isatty(STDERR_FILENO) == 1) fmt::print(stderr, "\r\033[K");
 }
 
@@ -70,7 +70,7 @@ bool save(const std::string& file, const std::string& text) {
 
 class Bench {
  public:
-  explicit Bench(const Arguments& arguments)
+  explicit Bench(const BenchArguments& arguments)
       : arguments_(arguments), only_(arguments.only.begin(), arguments.only.end()) {}
 
   Result<void> run() {
@@ -78,25 +78,27 @@ class Bench {
                            sysconf(_SC_NPROCESSORS_ONLN), loadAverage());
     fmt::print("{}; parts at detail {}\n\n", machine_, arguments_.detail);
     if (wants("bake") || wants("query") || wants("truth")) {
-      const auto scene = makeScene({arguments_.cache / "bench", arguments_.detail}, say);
+      const auto scene = makeScene({arguments_.cache / "bench", arguments_.detail}, printProgress);
       if (!scene) return fail(scene.error().what);
       add(scene->bake);
-      if (wants("query")) add(queryTable(*scene, arguments_.rounds, say));
+      if (wants("query")) add(queryTable(*scene, arguments_.rounds, printProgress));
       if (wants("truth")) {
-        const auto truth = truthTable(*scene, arguments_.detail, arguments_.rounds, say);
+        const auto truth = truthTable(*scene, arguments_.detail, arguments_.rounds, printProgress);
         if (!truth) return fail(truth.error().what);
         add(*truth);
       }
     }
-    if (wants("methods")) add(methodsTable(say));
-    if (wants("many_bodies")) add(manyBodiesTable(say));
-    if (wants("heaps")) add(heapsTable(say));
-    if (wants("overload")) add(overloadTable(say));
+    if (wants("methods")) add(methodsTable(printProgress));
+    if (wants("many_bodies")) add(manyBodiesTable(printProgress));
+    if (wants("heaps")) add(heapsTable(printProgress));
+    if (wants("overload")) add(overloadTable(printProgress));
     if (wants("insertion")) {
-      const auto insertion = rehearseInsertion(arguments_.scenario, arguments_.cache, arguments_.detail, say);
+      const auto insertion =
+          rehearseInsertion(arguments_.scenario, arguments_.cache, arguments_.detail, printProgress);
       if (!insertion) return fail(insertion.error().what);
       add(insertion->table);
-      if (!arguments_.figures.empty() && !save(arguments_.figures, reportPage(insertion->story, "")))
+      if (!arguments_.figures.empty() &&
+          !save(arguments_.figures, report::reportPage(insertion->analysis, "")))
         return fail(arguments_.figures + ": cannot be written");
     }
     if (!arguments_.json.empty() && !save(arguments_.json, json().dump(2) + "\n"))
@@ -108,7 +110,7 @@ class Bench {
   [[nodiscard]] bool wants(const std::string& table) const { return only_.empty() || only_.contains(table); }
 
   void add(const Table& table) {
-    sayNothing();
+    clearProgress();
     fmt::print("{}\n", toText(table));
     std::fflush(stdout);
     tables_.push_back(toJson(table));
@@ -118,44 +120,47 @@ class Bench {
     return {{"machine", machine_}, {"detail", arguments_.detail}, {"tables", tables_}};
   }
 
-  const Arguments& arguments_;
+  const BenchArguments& arguments_;
   std::set<std::string> only_;
   std::string machine_;
   nlohmann::json tables_ = nlohmann::json::array();
 };
 
 int run(int argc, char** argv) {
-  Arguments arguments;
-  CLI::App app("Measures what this machine can do, beside other engines and beside simpler ways, in one run.",
-               "tenon bench");
+  BenchArguments arguments;
+  CLI::App app(
+      "Measures the performance of Tenon on this machine, compared with other engines and simpler methods in "
+      "one run.",
+      "tenon bench");
   app.set_help_flag("-h,--help", "what this program does and how to call it");
-  app.add_option("what", arguments.what,
-                 "engine: the collision and force engine; corner: the way of a held box in a corner, as CSV")
+  app.add_option("benchmark", arguments.benchmark,
+                 "engine: measure the collision and force engine; corner: path of a held box in a corner, as "
+                 "CSV")
       ->required()
       ->check(CLI::IsMember({"engine", "corner"}));
   app.add_option("--scenario", arguments.scenario, "folder of the engine bay's scenario");
-  app.add_option("--detail", arguments.detail, "of the generated parts, 0 to 1; 1 is the paper's scene")
+  app.add_option("--detail", arguments.detail,
+                 "level of detail of the generated parts, 0 to 1; 1 is the paper's scene")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  app.add_option("--rounds", arguments.rounds, "how often a pose is asked; its least time counts")
+  app.add_option("--rounds", arguments.rounds, "number of queries per pose; the smallest time counts")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   app.add_option("--only", arguments.only,
-                 "tables to make: bake, query, truth, methods, many_bodies, heaps, overload, insertion "
+                 "tables to produce: bake, query, truth, methods, many_bodies, heaps, overload, insertion "
                  "(default: all)")
       ->check(CLI::IsMember(
           {"bake", "query", "truth", "methods", "many_bodies", "heaps", "overload", "insertion"}));
-  app.add_option("--json", arguments.json, "write the tables into this file, for programs");
-  app.add_option(
-      "--figures", arguments.figures,
-      "write a page with force, penetration, load and computation time of the insertion over time");
+  app.add_option("--json", arguments.json, "write the tables to this file as JSON");
+  app.add_option("--figures", arguments.figures,
+                 "write a report page with force, penetration, load and computation time of the insertion");
   app.add_option("--cache", arguments.cache, "folder for generated parts and haptic structures")
       ->option_text("DIR");
   app.footer(
-      "Times compare only within one run, on a machine that does nothing else.\n"
-      "Exit code: 0 when all tables could be made, 1 otherwise.");
+      "Times are comparable only within one run, on an otherwise idle machine.\n"
+      "Exit code: 0 when all tables were produced, 1 otherwise.");
   CLI11_PARSE(app, argc, argv);
-  if (arguments.what == "corner") {
+  if (arguments.benchmark == "corner") {
     fmt::print("{}", cornerPath());
     return 0;
   }
@@ -164,8 +169,8 @@ int run(int argc, char** argv) {
     arguments.scenario = std::string(share != nullptr ? share : ".") + "/scenarios/engine_bay";
   }
   const auto done = Bench(arguments).run();
-  sayNothing();
-  return done ? 0 : complain(done.error().what);
+  clearProgress();
+  return done ? 0 : reportError(done.error().what);
 }
 
 }  // namespace

@@ -13,23 +13,23 @@
 namespace tenon::bench {
 namespace {
 
-constexpr double kMethodVoxel = 0.003;
+constexpr double kMethodVoxel = 0.003;  // [m]
 constexpr double kDilation = HeldBox::dilationOf(kMethodVoxel);
 constexpr int kMethodTicks = 300;
 constexpr int kSheets = 8;
 
-/// What one way to keep a held body out of others does.
+/// Results of one contact method.
 struct MethodFigures {
-  int sheets_passed = 0;           ///< of kSheets: the hand ends 50 mm behind a sheet of no thickness
-  double sheet_overlap = 0.0;      ///< [m] the deepest in the field that stands for it, dilation included
-  double corner_overlap = 0.0;     ///< [m] likewise, pressed askew into an inner corner
-  double slide_lag = 0.0;          ///< [m] behind the hand, along a floor at 0.5 m/s
-  double force_step = 0.0;         ///< [N] the largest change from tick to tick while it slides
-  double still_force_range = 0.0;  ///< [N] of the force on a hand that holds still in the corner
-  Percentiles tick;                ///< [us] of the slide
+  int sheets_passed = 0;          ///< of kSheets without thickness; the hand ends 50 mm behind them
+  double sheet_overlap = 0.0;     ///< [m] largest penetration of a sheet's dilated surface
+  double corner_overlap = 0.0;    ///< [m] likewise, pressed at an angle into a concave corner
+  double slide_lag = 0.0;         ///< [m] largest distance to the hand along a floor, at 0.5 m/s
+  double force_step = 0.0;        ///< [N] largest change per tick while sliding
+  double rest_force_range = 0.0;  ///< [N] largest minus smallest force on a hand at rest in the corner
+  Percentiles tick;               ///< [us] while sliding
 };
 
-void measureSheets(ContactMethod method, MethodFigures& figures) {
+void measureSheets(collision::ContactMethod method, MethodFigures& figures) {
   for (int i = 0; i < kSheets; ++i) {
     const double offset = kMethodVoxel * i / kSheets;
     const Pose X_WH(Vector3(0.0, 0.0, 0.05), expRotation({0.17, 0.05, 0.0}));
@@ -43,31 +43,32 @@ void measureSheets(ContactMethod method, MethodFigures& figures) {
   }
 }
 
-void measureCorner(ContactMethod method, MethodFigures& figures) {
+void measureCorner(collision::ContactMethod method, MethodFigures& figures) {
   const Pose start(Vector3(0.08, 0.07, 0.06), expRotation({0.05, 0.03, 0.0}));
   HeldBox held(method, test::cornerStructures(0.3, kMethodVoxel), kDilation, start);
   for (int tick = 0; tick < kMethodTicks; ++tick) {
-    const double way = std::min(0.0005 * tick, 0.06);
-    held.step(Pose(start.translation() - Vector3(way, way, way), start.rotation()));
+    const double depth = std::min(0.0005 * tick, 0.06);
+    held.step(Pose(start.translation() - Vector3(depth, depth, depth), start.rotation()));
   }
-  double least = held.force().norm();
-  double most = least;
+  double smallest = held.force().norm();
+  double largest = smallest;
   for (int tick = 0; tick < kMethodTicks; ++tick) {
     held.step(Pose(start.translation() - Vector3::Constant(0.06), start.rotation()));
-    least = std::min(least, held.force().norm());
-    most = std::max(most, held.force().norm());
+    smallest = std::min(smallest, held.force().norm());
+    largest = std::max(largest, held.force().norm());
   }
   figures.corner_overlap = held.overlap();
-  figures.still_force_range = most - least;
+  figures.rest_force_range = largest - smallest;
 }
 
-void measureSlide(ContactMethod method, MethodFigures& figures) {
+void measureSlide(collision::ContactMethod method, MethodFigures& figures) {
   const double height = 0.02 + kDilation;
-  // penalties hold the box by overlap: there the hand presses a millimetre, elsewhere ten
-  const double press = method == ContactMethod::kPenalty ? 0.001 : 0.01;
-  const auto handAt = [&](int tick) { return Vector3(-0.07 + 0.0005 * tick, 0.003, height - press); };
+  // [m] below the surface: 1 mm for the penalty force, which acts only where the box penetrates, 10 mm
+  // otherwise
+  const double press_depth = method == collision::ContactMethod::kPenalty ? 0.001 : 0.01;
+  const auto handAt = [&](int tick) { return Vector3(-0.07 + 0.0005 * tick, 0.003, height - press_depth); };
   HeldBox held(method, test::floorStructures(0.4, kMethodVoxel), kDilation,
-               Pose(handAt(0) + 2.0 * press * Vector3::UnitZ()));
+               Pose(handAt(0) + 2.0 * press_depth * Vector3::UnitZ()));
   for (int tick = 0; tick < 50; ++tick) held.step(Pose(handAt(0)));
   Vector3 before = held.force();
   std::vector<double> times;
@@ -81,7 +82,7 @@ void measureSlide(ContactMethod method, MethodFigures& figures) {
   figures.tick = percentilesOf(std::move(times));
 }
 
-MethodFigures measure(ContactMethod method) {
+MethodFigures measure(collision::ContactMethod method) {
   MethodFigures figures;
   measureSheets(method, figures);
   measureCorner(method, figures);
@@ -91,27 +92,28 @@ MethodFigures measure(ContactMethod method) {
 
 }  // namespace
 
-Table methodsTable(const Say& say) {
+Table methodsTable(const ProgressCallback& progress) {
   Table table;
   table.name = "methods";
-  table.title =
-      "God object, and the paper's blocking heuristic and penalty force, in the same scenes (item 5)";
+  table.title = "God object, blocking heuristic and penalty force of the paper, in the same scenes (item 5)";
   table.columns = {"method",       "sheets passed", "sheet overlap mm", "corner overlap mm",
-                   "slide lag mm", "force step N",  "still force N",    "median us",
+                   "slide lag mm", "force step N",  "rest force N",     "median us",
                    "p99 us"};
   table.notes = {
-      fmt::format("sheets passed: of {} of no thickness, with hands that end 50 mm behind them", kSheets),
-      "overlap: the deepest in the dilated field; corner: pressed askew into an inner corner",
-      "slide lag and force step: along a floor at 0.5 m/s; still force: its range while a hand stands in the "
-      "corner"};
-  using enum ContactMethod;
+      fmt::format("sheets passed: of {} sheets without thickness, by hands that end 50 mm behind them",
+                  kSheets),
+      "overlap: largest penetration of the dilated surface; corner: pressed at an angle into a concave "
+      "corner",
+      "slide lag and force step: along a floor at 0.5 m/s; rest force: range of the force on a hand at rest "
+      "in the corner"};
+  using enum collision::ContactMethod;
   for (const auto& [method, name] :
        {std::pair(kIsland, "god object"), std::pair(kBlocking, "blocking"), std::pair(kPenalty, "penalty")}) {
-    say(std::string("methods: ") + name);
-    const MethodFigures one = measure(method);
-    table.rows.push_back({name, static_cast<double>(one.sheets_passed), 1e3 * one.sheet_overlap,
-                          1e3 * one.corner_overlap, 1e3 * one.slide_lag, one.force_step,
-                          one.still_force_range, one.tick.median, one.tick.p99});
+    progress(std::string("methods: ") + name);
+    const MethodFigures figures = measure(method);
+    table.rows.push_back({name, static_cast<double>(figures.sheets_passed), 1e3 * figures.sheet_overlap,
+                          1e3 * figures.corner_overlap, 1e3 * figures.slide_lag, figures.force_step,
+                          figures.rest_force_range, figures.tick.median, figures.tick.p99});
   }
   return table;
 }

@@ -5,8 +5,8 @@
 
 namespace tenon::bench {
 
-/// Item 5: the god object beside the paper's blocking heuristic and its penalty force. Counted figures are
-/// the same on every machine.
-[[nodiscard]] Table methodsTable(const Say& say);
+/// Item 5: the god object compared with the paper's blocking heuristic and its penalty force. All figures but
+/// the times are the same on every machine.
+[[nodiscard]] Table methodsTable(const ProgressCallback& progress);
 
 }  // namespace tenon::bench

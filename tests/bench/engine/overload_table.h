@@ -5,8 +5,8 @@
 
 namespace tenon::bench {
 
-/// Item 8: more than a tick's work, with and without graceful degradation. What the governor decided is
-/// played again without a clock, and the hashes are compared.
-[[nodiscard]] Table overloadTable(const Say& say);
+/// Item 8: overload with and without graceful degradation. The run is repeated without a clock with the
+/// budgets that the governor chose, and the state hashes are compared.
+[[nodiscard]] Table overloadTable(const ProgressCallback& progress);
 
 }  // namespace tenon::bench

@@ -9,25 +9,27 @@
 
 namespace tenon::bench {
 
-/// Poses X_BA of a shell's body in a field's body, as hands make them: the same for the same structures, on
-/// every machine. Neighbours in a list lie near each other, as from one tick to the next.
+/// Poses X_BA of the pointshell's body A in the field's body B, as in manual insertion. Deterministic for
+/// given structures. Consecutive poses of a list are close to each other, as from tick to tick.
 struct PoseSets {
-  std::vector<Pose> free;     ///< nothing nearer than 15 mm
-  std::vector<Pose> near;     ///< apart, by at most 15 mm
-  std::vector<Pose> contact;  ///< pressed in, 0.5 to 5 mm deep
+  std::vector<Pose> free;     ///< gap of at least 15 mm
+  std::vector<Pose> near;     ///< gap of at most 15 mm
+  std::vector<Pose> contact;  ///< penetrating, 0.5 to 5 mm deep
 };
 
-/// A body is led to its place in another.
-struct Insertion {
-  Pose X_BT;                                ///< where it belongs
-  Vector3 direction_B = -Vector3::UnitZ();  ///< unit, the way in
-  double reach = 0.20;                      ///< [m] it begins so far before its place
-  double astray = 0.06;                     ///< [m] sideways at first, less from pose to pose
+/// Path of a body to its target pose in another.
+struct InsertionTask {
+  Pose X_BT;                                ///< target pose
+  Vector3 direction_B = -Vector3::UnitZ();  ///< unit, direction of insertion
+  double reach = 0.20;                      ///< [m] distance of the start from the target
+  double lateral_offset = 0.06;             ///< [m] sideways at the start, decreasing to 0
 };
 
-/// Of about `count` poses a third is of each kind. The body sways towards its place on a spiral, tilted by up
-/// to 3 degrees, and is pushed in from there along the direction until it is as deep as wanted.
-[[nodiscard]] PoseSets insertionPoses(const Pointshell& shell_A, const DistanceField& field_B,
-                                      const Insertion& insertion, std::size_t count);
+/// About `count` / 3 poses of each kind, fewer where a kind is not reached. The start poses are on a spiral
+/// around the direction of insertion, tilted by up to 3 degrees; from there the body moves along the
+/// direction until it has the wanted gap or depth.
+[[nodiscard]] PoseSets insertionPoses(const structures::Pointshell& shell_A,
+                                      const structures::DistanceField& field_B,
+                                      const InsertionTask& insertion, std::size_t count);
 
 }  // namespace tenon::bench

@@ -16,7 +16,7 @@ constexpr std::size_t kAllContacts = 100'000;
 
 using FclModel = fcl::BVHModel<fcl::OBBRSSd>;
 
-std::shared_ptr<FclModel> fclModel(const TriangleMesh& mesh) {
+std::shared_ptr<FclModel> fclModel(const bake::TriangleMesh& mesh) {
   auto model = std::make_shared<FclModel>();
   std::vector<fcl::Vector3d> vertices;
   for (const Vector3f& vertex : mesh.vertices) vertices.push_back(vertex.cast<double>());
@@ -32,7 +32,9 @@ class Fcl : public ReferenceEngine {
  public:
   Fcl(std::shared_ptr<FclModel> a, std::shared_ptr<FclModel> b, bool all)
       : a_(std::move(a)), b_(std::move(b)), request_(all ? kAllContacts : 1, all), all_(all) {}
-  [[nodiscard]] std::string name() const override { return all_ ? "FCL, all contacts" : "FCL, yes or no"; }
+  [[nodiscard]] std::string name() const override {
+    return all_ ? "FCL, all contacts" : "FCL, first contact only";
+  }
   std::size_t contacts(const Pose& X_BA) override {
     fcl::Transform3d X = fcl::Transform3d::Identity();
     X.linear() = X_BA.matrix();
@@ -48,10 +50,10 @@ class Fcl : public ReferenceEngine {
   bool all_;
 };
 
-/// The triangles in Bullet's own form; the shape refers to them.
+/// A mesh as Bullet shape, with the arrays that the shape refers to.
 class BulletBody {
  public:
-  explicit BulletBody(const TriangleMesh& mesh) {
+  explicit BulletBody(const bake::TriangleMesh& mesh) {
     for (const Vector3f& vertex : mesh.vertices)
       for (const float coordinate : vertex) vertices_.push_back(coordinate);
     for (const auto& triangle : mesh.triangles)
@@ -76,7 +78,7 @@ class BulletBody {
 
 class Bullet : public ReferenceEngine {
  public:
-  Bullet(const TriangleMesh& mesh_A, const TriangleMesh& mesh_B)
+  Bullet(const bake::TriangleMesh& mesh_A, const bake::TriangleMesh& mesh_B)
       : a_(mesh_A), b_(mesh_B), dispatcher_(&configuration_) {
     btGImpactCollisionAlgorithm::registerAlgorithm(&dispatcher_);
   }
@@ -93,7 +95,7 @@ class Bullet : public ReferenceEngine {
                                      b_.object.getWorldTransform(), -1, -1);
     Counter counter(&a, &b);
     btCollisionAlgorithm* algorithm = dispatcher_.findAlgorithm(&a, &b, nullptr, BT_CONTACT_POINT_ALGORITHMS);
-    algorithm->processCollision(&a, &b, how_, &counter);
+    algorithm->processCollision(&a, &b, dispatch_info_, &counter);
     algorithm->~btCollisionAlgorithm();
     dispatcher_.freeCollisionAlgorithm(algorithm);
     return counter.count;
@@ -112,13 +114,13 @@ class Bullet : public ReferenceEngine {
   BulletBody a_, b_;
   btDefaultCollisionConfiguration configuration_;
   btCollisionDispatcher dispatcher_;
-  btDispatcherInfo how_;
+  btDispatcherInfo dispatch_info_;
 };
 
 }  // namespace
 
-std::vector<std::unique_ptr<ReferenceEngine>> referenceEngines(const TriangleMesh& mesh_A,
-                                                               const TriangleMesh& mesh_B) {
+std::vector<std::unique_ptr<ReferenceEngine>> referenceEngines(const bake::TriangleMesh& mesh_A,
+                                                               const bake::TriangleMesh& mesh_B) {
   const auto a = fclModel(mesh_A);
   const auto b = fclModel(mesh_B);
   std::vector<std::unique_ptr<ReferenceEngine>> engines;

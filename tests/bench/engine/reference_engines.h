@@ -9,18 +9,20 @@
 
 namespace tenon::bench {
 
-/// Another engine, asked for the contacts of the same two meshes.
+/// Another collision engine, for the contacts of the same two meshes.
+///
+/// Threads: one at a time. Real-time: no.
 class ReferenceEngine {
  public:
   virtual ~ReferenceEngine() = default;
   [[nodiscard]] virtual std::string name() const = 0;
-  /// How many contacts it lists at X_BA (of the shell's body in the field's body).
+  /// Number of contacts at X_BA (pose of mesh A in mesh B).
   virtual std::size_t contacts(const Pose& X_BA) = 0;
 };
 
-/// What Debian has that takes two triangle meshes of this size: FCL (OBBRSS trees; all contacts, and the
-/// first alone) and Bullet (GImpact).
-[[nodiscard]] std::vector<std::unique_ptr<ReferenceEngine>> referenceEngines(const TriangleMesh& mesh_A,
-                                                                             const TriangleMesh& mesh_B);
+/// Engines packaged by Debian that handle two triangle meshes of this size: FCL (OBBRSS hierarchies; all
+/// contacts, and the first only) and Bullet (GImpact).
+[[nodiscard]] std::vector<std::unique_ptr<ReferenceEngine>> referenceEngines(
+    const bake::TriangleMesh& mesh_A, const bake::TriangleMesh& mesh_B);
 
 }  // namespace tenon::bench

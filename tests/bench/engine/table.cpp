@@ -10,7 +10,7 @@ namespace tenon::bench {
 
 namespace {
 
-/// Three digits that count, without an exponent.
+/// Three significant digits, without exponent down to 1e-4.
 std::string readable(double number) {
   const double size = std::abs(number);
   if (number == 0.0) return "0";
@@ -22,9 +22,9 @@ std::string readable(double number) {
 
 }  // namespace
 
-Cell::Cell(std::string words) : text(std::move(words)), value(text) {}
-Cell::Cell(const char* words) : Cell(std::string(words)) {}
-Cell::Cell(double number) : text(readable(number)), value(number) {}
+TableCell::TableCell(std::string the_text) : text(std::move(the_text)), value(text) {}
+TableCell::TableCell(const char* the_text) : TableCell(std::string(the_text)) {}
+TableCell::TableCell(double number) : text(readable(number)), value(number) {}
 
 std::string toText(const Table& table) {
   std::vector<std::size_t> widths;

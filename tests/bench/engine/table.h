@@ -7,30 +7,31 @@
 
 namespace tenon::bench {
 
-/// What stands in one place of a table: text for people, a value for programs.
-struct Cell {
-  Cell(std::string words);              // NOLINT(google-explicit-constructor): rows are written as lists
-  Cell(const char* words);              // NOLINT(google-explicit-constructor)
-  Cell(double number);                  // NOLINT(google-explicit-constructor): three digits that count
-  static Cell none() { return {"-"}; }  ///< not measured here
+/// One entry of a table: text for display, value for JSON.
+struct TableCell {
+  TableCell(std::string the_text);  // NOLINT(google-explicit-constructor): rows are written as lists
+  TableCell(const char* the_text);  // NOLINT(google-explicit-constructor)
+  /// `number` [unit of the column], displayed with three significant digits.
+  TableCell(double number);                  // NOLINT(google-explicit-constructor)
+  static TableCell none() { return {"-"}; }  ///< not measured
 
   std::string text;
   nlohmann::json value;
 };
 
-/// One measurement, as a person reads it and as a program does. Units stand in the columns' names.
+/// Results of one benchmark. Column names include the units.
 struct Table {
-  std::string name;   ///< for programs, without blanks
-  std::string title;  ///< for people
+  std::string name;   ///< identifier, without blanks
+  std::string title;  ///< for display
   std::vector<std::string> columns;
-  std::vector<std::vector<Cell>> rows;
-  std::vector<std::string> notes;  ///< how it was measured and what it leaves out
+  std::vector<std::vector<TableCell>> rows;
+  std::vector<std::string> notes;  ///< method and limitations
 };
 
-/// Columns that stand under each other.
+/// Text with aligned columns.
 [[nodiscard]] std::string toText(const Table& table);
 
-/// `rows` as objects whose keys are the columns.
+/// JSON with `rows` as objects whose keys are the column names.
 [[nodiscard]] nlohmann::json toJson(const Table& table);
 
 }  // namespace tenon::bench

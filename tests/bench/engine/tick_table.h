@@ -5,7 +5,7 @@
 
 namespace tenon::bench {
 
-/// Item 7: whole ticks with many objects that may all meet each other.
-[[nodiscard]] Table manyBodiesTable(const Say& say);
+/// Item 7: whole ticks with many objects that may all collide with each other.
+[[nodiscard]] Table manyBodiesTable(const ProgressCallback& progress);
 
 }  // namespace tenon::bench

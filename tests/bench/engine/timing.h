@@ -10,14 +10,15 @@
 
 namespace tenon::bench {
 
-/// What a list of times says. Microseconds.
+/// Percentiles of a list of times.
 struct Percentiles {
-  double median = 0.0;
-  double p90 = 0.0;
-  double p99 = 0.0;
-  double most = 0.0;
+  double median = 0.0;  ///< [us]
+  double p90 = 0.0;     ///< [us]
+  double p99 = 0.0;     ///< [us]
+  double max = 0.0;     ///< [us]
 };
 
+/// All 0 for an empty list.
 [[nodiscard]] inline Percentiles percentilesOf(std::vector<double> microseconds) {
   if (microseconds.empty()) return {};
   std::sort(microseconds.begin(), microseconds.end());
@@ -27,7 +28,7 @@ struct Percentiles {
   return {at(50), at(90), at(99), microseconds.back()};
 }
 
-/// How long one call takes [us].
+/// [us] Duration of one call.
 template <typename Work>
 [[nodiscard]] double microsecondsOf(Work&& work) {
   const auto begin = std::chrono::steady_clock::now();
@@ -35,18 +36,19 @@ template <typename Work>
   return std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count();
 }
 
-/// `work(i)` for every i below `count`, `rounds` times over, each call timed; `before()` untimed ahead of
-/// each. Of every i the least of its rounds counts: what other programs took is no property of ours.
+/// Times work(i) for every i below `count` in each of `rounds` rounds; before() is called before each and not
+/// timed. The smallest time of all rounds counts for each i, since longer ones contain interference by other
+/// programs.
 template <typename Work, typename Before>
 [[nodiscard]] Percentiles timed(std::size_t count, int rounds, Work&& work, Before&& before) {
-  std::vector<double> least(count, std::numeric_limits<double>::infinity());
+  std::vector<double> smallest(count, std::numeric_limits<double>::infinity());
   for (int round = 0; round < rounds; ++round) {
     for (std::size_t i = 0; i < count; ++i) {
       before();
-      least[i] = std::min(least[i], microsecondsOf([&] { work(i); }));
+      smallest[i] = std::min(smallest[i], microsecondsOf([&] { work(i); }));
     }
   }
-  return percentilesOf(std::move(least));
+  return percentilesOf(std::move(smallest));
 }
 
 template <typename Work>
@@ -54,7 +56,7 @@ template <typename Work>
   return timed(count, rounds, std::forward<Work>(work), [] {});
 }
 
-/// Writes over 100 MB, so that what comes next finds cold caches.
+/// Writes 100 MB to evict the processor caches.
 class ColdCaches {
  public:
   void operator()() {

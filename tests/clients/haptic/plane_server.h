@@ -9,9 +9,11 @@ inline constexpr HandId kHand{0};
 inline constexpr ObjectId kFloor{0};
 inline constexpr ObjectId kBall{1};
 
-/// A server that knows one floor (object 0, z = 0 of its frame) and one ball (object 1) by their formula.
+/// Server stand-in with analytic contacts of one ball (object 1) and one floor (object 0, plane z = 0 of its
+/// frame).
 class PlaneServer {
  public:
+  /// `stiffness` [N/m] of the hand.
   explicit PlaneServer(double stiffness = 1000.0) : stiffness_(stiffness) {
     SceneObject floor;
     floor.object = kFloor;
@@ -22,7 +24,7 @@ class PlaneServer {
     objects_ = {floor, ball};
   }
 
-  /// Tick by tick: the floor's height and what the hand's ball does.
+  /// Manifold of `tick`: the ball at the hand, kept above the floor.
   HandManifold manifold(Tick tick, const Pose& X_WH) const {
     HandManifold manifold;
     manifold.hand = kHand;
@@ -58,13 +60,13 @@ class PlaneServer {
   }
   const std::vector<SceneObject>& objects() const { return objects_; }
 
-  double radius = 0.012;
-  double floor_height = 0.0;
-  double validity_radius = 0.05;
-  std::uint32_t epoch = 1;
+  double radius = 0.012;          ///< [m] of the ball
+  double floor_height = 0.0;      ///< [m]
+  double validity_radius = 0.05;  ///< [m]
+  std::uint32_t epoch = 1;        ///< of the ball
 
  private:
-  double stiffness_;
+  double stiffness_;  ///< [N/m]
   std::vector<SceneObject> objects_;
 };
 

@@ -6,29 +6,29 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-namespace tenon {
+namespace tenon::haptic {
 namespace {
 
 namespace fs = std::filesystem;
 
-TEST(SeatFile, GivesBackTheTokenAndToNobodyElse) {
+TEST(SeatFile, KeepsTheTokenReadableByItsOwnerOnly) {
   const fs::path file = fs::temp_directory_path() / ("tenon_seat_" + std::to_string(getpid()));
-  EXPECT_EQ(readToken(file), "") << "the first time there is none";
-  ASSERT_TRUE(keepToken(file, "0123456789abcdef"));
-  ASSERT_TRUE(keepToken(file, "fedcba9876543210"));
-  EXPECT_EQ(readToken(file), "fedcba9876543210");
+  EXPECT_EQ(readSeatToken(file), "") << "no file";
+  ASSERT_TRUE(writeSeatToken(file, "0123456789abcdef"));
+  ASSERT_TRUE(writeSeatToken(file, "fedcba9876543210"));
+  EXPECT_EQ(readSeatToken(file), "fedcba9876543210");
   EXPECT_EQ(fs::status(file).permissions(), fs::perms::owner_read | fs::perms::owner_write);
   std::ofstream(file) << std::string(5000, 'x');
-  EXPECT_EQ(readToken(file), "") << "no token is so long";
+  EXPECT_EQ(readSeatToken(file), "") << "longer than a token";
   fs::remove(file);
 }
 
-TEST(SeatFile, WithoutAFileNothingIsKeptAndAnImpossibleOneIsASentence) {
-  EXPECT_TRUE(keepToken({}, "0123"));
-  const auto kept = keepToken("/nowhere/at/all", "0123");
+TEST(SeatFile, AnEmptyPathWritesNothingAndAnInvalidOneFails) {
+  EXPECT_TRUE(writeSeatToken({}, "0123"));
+  const auto kept = writeSeatToken("/nowhere/at/all", "0123");
   ASSERT_FALSE(kept);
   EXPECT_NE(kept.error().what.find("/nowhere/at/all"), std::string::npos);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::haptic

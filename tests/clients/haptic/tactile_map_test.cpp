@@ -4,17 +4,17 @@
 
 #include <gtest/gtest.h>
 
-namespace tenon {
+namespace tenon::haptic {
 namespace {
 
 constexpr double kStep = 1e-3;
 
 //          0
-//      5   z   1        seen from the elbow along x, y to the right
+//      5   z   1        view along x from the elbow, y to the right
 //          |__y
 //      4       2
 //          3
-HandManifold dent(double degrees, double depth) {
+HandManifold contactAt(double degrees, double depth) {
   HandManifold manifold;
   manifold.stiffness = 1000.0;
   ManifoldContact contact;
@@ -26,48 +26,48 @@ HandManifold dent(double degrees, double depth) {
   return manifold;
 }
 
-TEST(TactileMap, DrivesTheTactorAtTheContactAlone) {
+TEST(TactileMap, DrivesOnlyTheTactorAtTheContact) {
   for (int tactor = 0; tactor < kTactors; ++tactor) {
     TactileMap map;
-    const TactorIntensities felt = map.step(dent(60.0 * tactor, 0.004), kStep);
+    const TactorIntensities intensities = map.step(contactAt(60.0 * tactor, 0.004), kStep);
     for (int i = 0; i < kTactors; ++i)
-      EXPECT_EQ(felt[static_cast<std::size_t>(i)] > 0, i == tactor) << tactor;
+      EXPECT_EQ(intensities[static_cast<std::size_t>(i)] > 0, i == tactor) << tactor;
   }
 }
 
-TEST(TactileMap, SharesAContactBetweenTwoTactors) {
+TEST(TactileMap, DistributesAContactBetweenTwoTactors) {
   TactileMap map;
-  map.step(dent(30.0, 0.004), kStep);
+  map.step(contactAt(30.0, 0.004), kStep);
   EXPECT_NEAR(map.forces()[0], map.forces()[1], 1e-4);
   EXPECT_GT(map.forces()[0], 0.0);
   EXPECT_EQ(map.forces()[2], 0.0);
 }
 
-TEST(TactileMap, IsStrongerForDeeperContactsAndSilentWithout) {
+TEST(TactileMap, IntensityGrowsWithDepthAndIsZeroWithoutContact) {
   TactileMap map;
-  const auto weak = map.step(dent(0.0, 0.001), kStep)[0];
-  const auto strong = map.step(dent(0.0, 0.006), kStep)[0];
+  const auto weak = map.step(contactAt(0.0, 0.001), kStep)[0];
+  const auto strong = map.step(contactAt(0.0, 0.006), kStep)[0];
   EXPECT_LT(weak, strong);
-  EXPECT_EQ(map.step(dent(0.0, 0.020), kStep)[0], 255);
-  EXPECT_EQ(map.step(dent(0.0, -0.001), kStep), TactorIntensities{});
+  EXPECT_EQ(map.step(contactAt(0.0, 0.020), kStep)[0], 255);
+  EXPECT_EQ(map.step(contactAt(0.0, -0.001), kStep), TactorIntensities{});
   EXPECT_EQ(map.step(HandManifold{}, kStep), TactorIntensities{});
 }
 
-TEST(TactileMap, PulsesQuickerForStrongerContactsInPatternMode) {
+TEST(TactileMap, PulseRateGrowsWithContactForceInPatternMode) {
   const auto pulses = [](double depth) {
     TactileMap map({.mode = TactileMode::kPattern});
-    int begun = 0;
+    int pulse_count = 0;
     bool on = false;
     for (int i = 0; i < 3000; ++i) {
-      const bool now = map.step(dent(120.0, depth), kStep)[2] > 0;
-      if (now && !on) ++begun;
+      const bool now = map.step(contactAt(120.0, depth), kStep)[2] > 0;
+      if (now && !on) ++pulse_count;
       on = now;
     }
-    return begun;
+    return pulse_count;
   };
   EXPECT_GE(pulses(0.0005), 4);
   EXPECT_GT(pulses(0.008), 2 * pulses(0.0005));
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::haptic

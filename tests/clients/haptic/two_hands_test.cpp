@@ -8,33 +8,33 @@
 #include "server/simulation/environment.h"
 #include "tests/support/analytic_structures.h"
 
-namespace tenon {
+namespace tenon::haptic {
 namespace {
 
-constexpr double kStiffness = 1000.0;  // [N/m] of each hand
-constexpr double kLever = 0.12;        // [m] of each hand from the middle
-constexpr std::size_t kDelay = 2;      // [ticks] of the network
+constexpr double kStiffness = 1000.0;  // [N/m] of each coupling
+constexpr double kLever = 0.12;        // [m] from the centre of the bar to each hand
+constexpr std::size_t kDelay = 2;      // [ticks] of network delay
 
-//   left o======[   bar   ]======o right      a station at each hand, two ticks away from the server
+//   left o======[   bar   ]======o right      one station per hand, two ticks of delay to the server
 class TwoStations : public testing::Test {
  protected:
   TwoStations() {
     const auto pointer = test::sphereStructures(0.012, 0.002, 0.003);
-    const auto scene = std::make_shared<Scene>();
+    const auto scene = std::make_shared<simulation::Scene>();
     for (const char* name : {"left pointer", "right pointer", "bar"}) {
-      ObjectSpec spec;
+      simulation::ObjectSpec spec;
       spec.name = name;
       spec.structures = pointer;
       scene->objects.push_back(spec);
     }
     scene->objects[2].structures = test::boxStructures({0.3, 0.04, 0.04}, 0.004, 0.01);
     for (std::uint32_t hand = 0; hand < 2; ++hand) {
-      HandSpec spec;
+      simulation::HandSpec spec;
       spec.object = ObjectId{hand};
       spec.stiffness = kStiffness;
       scene->hands.push_back(spec);
     }
-    environment_ = std::make_unique<Environment>(scene, EnvironmentOptions{});
+    environment_ = std::make_unique<simulation::Environment>(scene, simulation::EnvironmentOptions{});
     std::vector<SceneObject> objects(3);
     for (std::uint32_t i = 0; i < 3; ++i) objects[i].object = ObjectId{i};
     for (std::uint32_t hand = 0; hand < 2; ++hand) {
@@ -47,12 +47,12 @@ class TwoStations : public testing::Test {
     run(200);
   }
 
-  struct Station {
+  struct HandStation {
     WorldView world;
     LocalModel model;
     Coupling coupling{CouplingOptions{.max_stiffness = 5000.0}};
-    std::deque<HandManifold> on_the_way;
-    Wrench felt;
+    std::deque<HandManifold> in_transit;
+    Wrench wrench;
   };
 
   /// One millisecond of the server and of both stations.
@@ -62,73 +62,79 @@ class TwoStations : public testing::Test {
     }
     environment_->step();
     for (std::uint32_t hand = 0; hand < 2; ++hand) {
-      Station& station = stations_[hand];
-      station.on_the_way.emplace_back();
-      environment_->manifold(HandId{hand}, station.on_the_way.back());
-      if (station.on_the_way.size() > kDelay) {
-        station.model.receive(station.on_the_way.front());
-        station.on_the_way.pop_front();
+      HandStation& station = stations_[hand];
+      station.in_transit.emplace_back();
+      environment_->manifold(HandId{hand}, station.in_transit.back());
+      if (station.in_transit.size() > kDelay) {
+        station.model.receive(station.in_transit.front());
+        station.in_transit.pop_front();
       }
-      station.felt =
+      station.wrench =
           station.coupling.step(station.model.step(X_WH_[hand], station.world), X_WH_[hand], kTickSeconds);
     }
   }
   void run(int ticks) {
     for (int i = 0; i < ticks; ++i) tick();
   }
-  void move(std::uint32_t hand, const Vector3& way, const Vector3& turn, int ticks) {
+  void move(std::uint32_t hand, const Vector3& translation, const Vector3& rotation, int ticks) {
     const Pose start = X_WH_[hand];
     for (int i = 1; i <= ticks; ++i) {
-      const double share = static_cast<double>(i) / ticks;
-      X_WH_[hand] = displaced(start, {share * way, share * turn});
+      const double fraction = static_cast<double>(i) / ticks;
+      X_WH_[hand] = displaced(start, {fraction * translation, fraction * rotation});
       tick();
     }
   }
-  [[nodiscard]] const Wrench& served(std::uint32_t hand) const { return environment_->hands()[hand].F_Ho_W; }
-  void expectFeltAsServed() {
+  [[nodiscard]] const Wrench& serverWrench(std::uint32_t hand) const {
+    return environment_->hands()[hand].F_Ho_W;
+  }
+  void expectRenderedAsByServer() {
     for (std::uint32_t hand = 0; hand < 2; ++hand) {
-      const Wrench& felt = stations_[hand].felt;
-      EXPECT_LE((felt.force - served(hand).force).norm(), 0.02 * served(hand).force.norm() + 1e-3) << hand;
-      EXPECT_LE((felt.torque - served(hand).torque).norm(), 0.02 * served(hand).torque.norm() + 1e-3) << hand;
+      const Wrench& rendered = stations_[hand].wrench;
+      EXPECT_LE((rendered.force - serverWrench(hand).force).norm(),
+                0.02 * serverWrench(hand).force.norm() + 1e-3)
+          << hand;
+      EXPECT_LE((rendered.torque - serverWrench(hand).torque).norm(),
+                0.02 * serverWrench(hand).torque.norm() + 1e-3)
+          << hand;
     }
   }
 
-  std::unique_ptr<Environment> environment_;
-  std::array<Station, 2> stations_;
+  std::unique_ptr<simulation::Environment> environment_;
+  std::array<HandStation, 2> stations_;
   std::array<Pose, 2> X_WH_;
 };
 
-TEST_F(TwoStations, EachFeelsTheOtherPull) {
+TEST_F(TwoStations, EachHandFeelsTheOthersForce) {
   move(1, {0.01, 0.0, 0.0}, Vector3::Zero(), 200);
   run(200);
-  EXPECT_NEAR(stations_[0].felt.force.x(), 5.0, 0.1);
-  EXPECT_NEAR(stations_[1].felt.force.x(), -5.0, 0.1);
-  expectFeltAsServed();
+  EXPECT_NEAR(stations_[0].wrench.force.x(), 5.0, 0.1);
+  EXPECT_NEAR(stations_[1].wrench.force.x(), -5.0, 0.1);
+  expectRenderedAsByServer();
 }
 
-TEST_F(TwoStations, EachFeelsTheOtherTurn) {
+TEST_F(TwoStations, EachHandFeelsTheOthersTorque) {
   move(1, Vector3::Zero(), {0.0, 0.0, 0.1}, 200);
   run(200);
-  EXPECT_GT(std::abs(stations_[0].felt.torque.z()), 0.05);
-  expectFeltAsServed();
+  EXPECT_GT(std::abs(stations_[0].wrench.torque.z()), 0.05);
+  expectRenderedAsByServer();
 }
 
-//   the right hand lifts its end: the bar leans, and the left one feels it in its wrist
-TEST_F(TwoStations, EachFeelsTheOtherLiftItsEnd) {
+//   the right hand lifts its end: the bar tilts and exerts a torque on the left hand
+TEST_F(TwoStations, EachHandFeelsTheTiltWhenTheOtherLiftsItsEnd) {
   move(1, {0.0, 0.0, 0.02}, Vector3::Zero(), 200);
   run(200);
-  EXPECT_GT(std::abs(stations_[0].felt.torque.y()), 0.05);
-  expectFeltAsServed();
+  EXPECT_GT(std::abs(stations_[0].wrench.torque.y()), 0.05);
+  expectRenderedAsByServer();
 }
 
-TEST_F(TwoStations, WhenOneLetsGoTheForceOnTheOtherFallsByStepsOfANewton) {
+TEST_F(TwoStations, AfterAReleaseTheForceOnTheOtherHandFallsByAtMostOneNewtonPerTick) {
   move(1, {0.01, 0.0, 0.0}, Vector3::Zero(), 200);
   run(200);
   environment_->release(HandId{1});
-  double before = stations_[0].felt.force.norm();
+  double before = stations_[0].wrench.force.norm();
   for (int i = 0; i < 100; ++i) {
     tick();
-    const double now = stations_[0].felt.force.norm();
+    const double now = stations_[0].wrench.force.norm();
     EXPECT_LE(now, before + 1e-6) << i;
     EXPECT_GE(now, before - 1.0) << i;
     before = now;
@@ -136,7 +142,7 @@ TEST_F(TwoStations, WhenOneLetsGoTheForceOnTheOtherFallsByStepsOfANewton) {
   EXPECT_LE(before, 1e-3);
 }
 
-TEST_F(TwoStations, AManifoldListsNobodyElseWhenNobodyElseHolds) {
+TEST_F(TwoStations, AManifoldListsOnlyHandsThatHoldTheObject) {
   HandManifold manifold;
   environment_->manifold(HandId{0}, manifold);
   ASSERT_EQ(manifold.others.size(), 1U);
@@ -148,4 +154,4 @@ TEST_F(TwoStations, AManifoldListsNobodyElseWhenNobodyElseHolds) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::haptic

@@ -2,17 +2,17 @@
 
 #include <gtest/gtest.h>
 
-namespace tenon {
+namespace tenon::haptic {
 namespace {
 
 constexpr double kStep = 1e-3;
 
-//     ( C_w )---o C_h       inside the sphere nothing moves; outside C_w follows by eq. 1
+//     ( C_w )---o C_h       C_h inside the sphere: C_w rests; outside: C_w follows by eq. 1
 //       r_w
-TEST(Workspace, FollowsAHandOutsideItsSphereExactlyAsEquationOneSays) {
+TEST(Workspace, FollowsAHandOutsideItsSphereByEquationOne) {
   Workspace workspace({.radius = 0.2, .gain = 1.5});
   const Vector3 p_WC(1.0, 2.0, 3.0);
-  workspace.place(p_WC);
+  workspace.setCentre(p_WC);
   const Vector3 p_DH(0.3, -0.1, 0.05);
   workspace.step(p_DH, false, kStep);
   const double r_h = p_DH.norm();
@@ -22,17 +22,17 @@ TEST(Workspace, FollowsAHandOutsideItsSphereExactlyAsEquationOneSays) {
   EXPECT_LT((workspace.velocity() - (expected - p_WC) / kStep).norm(), 1e-9);
 }
 
-TEST(Workspace, StandsStillWhileTheHandIsInside) {
+TEST(Workspace, RestsWhileTheHandIsInsideTheSphere) {
   Workspace workspace({.radius = 0.2, .gain = 1.5});
-  workspace.place(Vector3(1.0, 0.0, 0.0));
+  workspace.setCentre(Vector3(1.0, 0.0, 0.0));
   for (int i = 0; i < 1000; ++i) workspace.step(Vector3(0.0, 0.2, 0.0), false, kStep);
   EXPECT_EQ(workspace.centre(), Vector3(1.0, 0.0, 0.0));
   EXPECT_FALSE(workspace.moving());
 }
 
-TEST(Workspace, NeverMovesInContactAndWaitsALittleAfterIt) {
+TEST(Workspace, RestsInContactAndForTheSettlingTimeAfterIt) {
   Workspace workspace({.radius = 0.2, .gain = 1.5, .settle_ticks = 50});
-  workspace.place(Vector3::Zero());
+  workspace.setCentre(Vector3::Zero());
   for (int i = 0; i < 1000; ++i) workspace.step(Vector3(0.4, 0.0, 0.0), true, kStep);
   EXPECT_EQ(workspace.centre(), Vector3::Zero());
   for (int i = 0; i < 49; ++i) workspace.step(Vector3(0.4, 0.0, 0.0), false, kStep);
@@ -41,29 +41,29 @@ TEST(Workspace, NeverMovesInContactAndWaitsALittleAfterIt) {
   EXPECT_GT(workspace.centre().x(), 0.0);
 }
 
-TEST(Workspace, GoesSmoothlyToAPlaceAndArrivesThereExactly) {
-  Workspace workspace({.go_to_speed = 0.4});
-  workspace.place(Vector3::Zero());
-  const Vector3 there(0.6, 0.8, 0.0);
-  workspace.goTo(there);
-  double fastest = 0.0;
-  double roughest = 0.0;
+TEST(Workspace, MovesToAPositionSmoothlyAndReachesItExactly) {
+  Workspace workspace({.move_speed = 0.4});
+  workspace.setCentre(Vector3::Zero());
+  const Vector3 target(0.6, 0.8, 0.0);
+  workspace.moveTo(target);
+  double max_speed = 0.0;
+  double max_speed_change = 0.0;
   Vector3 before = Vector3::Zero();
-  for (int i = 0; i < 10000 && workspace.going(); ++i) {
+  for (int i = 0; i < 10000 && workspace.moveInProgress(); ++i) {
     workspace.step(Vector3::Zero(), false, kStep);
-    fastest = std::max(fastest, workspace.velocity().norm());
-    roughest = std::max(roughest, (workspace.velocity() - before).norm());
+    max_speed = std::max(max_speed, workspace.velocity().norm());
+    max_speed_change = std::max(max_speed_change, (workspace.velocity() - before).norm());
     before = workspace.velocity();
   }
-  EXPECT_LT((workspace.centre() - there).norm(), 1e-12);
-  EXPECT_NEAR(fastest, 0.4, 1e-3);
-  EXPECT_LT(roughest, 1e-3);  // [m/s] from one millisecond to the next
+  EXPECT_LT((workspace.centre() - target).norm(), 1e-12);
+  EXPECT_NEAR(max_speed, 0.4, 1e-3);
+  EXPECT_LT(max_speed_change, 1e-3);  // [m/s] from one millisecond to the next
 }
 
-TEST(Workspace, StopsItsWayInContactAndStartsGentlyAgain) {
-  Workspace workspace({.go_to_speed = 0.4});
-  workspace.place(Vector3::Zero());
-  workspace.goTo(Vector3(1.0, 0.0, 0.0));
+TEST(Workspace, PausesAMoveInContactAndRestartsItFromRest) {
+  Workspace workspace({.move_speed = 0.4});
+  workspace.setCentre(Vector3::Zero());
+  workspace.moveTo(Vector3(1.0, 0.0, 0.0));
   for (int i = 0; i < 800; ++i) workspace.step(Vector3::Zero(), false, kStep);
   const Vector3 stopped = workspace.centre();
   for (int i = 0; i < 100; ++i) workspace.step(Vector3::Zero(), true, kStep);
@@ -76,11 +76,11 @@ TEST(Workspace, StopsItsWayInContactAndStartsGentlyAgain) {
 
 TEST(Workspace, MapsPosesToTheWorldAndBack) {
   Workspace workspace({});
-  workspace.place(Vector3(1.0, 2.0, 3.0));
+  workspace.setCentre(Vector3(1.0, 2.0, 3.0));
   const Pose X_DH(Vector3(0.1, 0.2, 0.3), expRotation(Vector3(0.3, -0.2, 0.1)));
   EXPECT_EQ(workspace.toWorld(X_DH).translation(), Vector3(1.1, 2.2, 3.3));
   EXPECT_LT((workspace.toDevice(workspace.toWorld(X_DH)).translation() - X_DH.translation()).norm(), 1e-15);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::haptic

@@ -5,32 +5,33 @@
 #include "clients/haptic/local_model.h"
 #include "tests/support/realtime_guard.h"
 
-namespace tenon {
+namespace tenon::instructor {
 namespace {
 
 constexpr HandId kHand{0};
-constexpr ObjectId kCube{0}, kPart{1};
+constexpr ObjectId kPointer{0}, kPart{1};
 
-//   [cube] ->|part|   ghost is 20 mm to the left of the part; the part's right side is felt by the cube
-//            ^ stuck 50 mm above its ghost
-/// The part gives way sideways by a spring, and drops home when it is over its ghost.
+//   |part|<- [pointer]   the target is 20 mm to the left of the part and 50 mm below it; the pointer touches
+//   the
+//                        part's right side
+/// A part that is held by a lateral spring and enters when it is above its target.
 class StuckPart {
  public:
   explicit StuckPart(const char* device) {
     InstructorOptions options;
     options.device = device;
     station = std::move(*InstructorStation::open(options));
-    SceneObject cube, part;
-    cube.object = kCube;
-    cube.kind = "assistant";
-    cube.size = Vector3::Constant(0.05);
-    cube.X_WO = Pose(Vector3(-0.1, -0.3, 1.25));
+    SceneObject pointer, part;
+    pointer.object = kPointer;
+    pointer.kind = "assistant";
+    pointer.size = Vector3::Constant(0.05);
+    pointer.X_WO = Pose(Vector3(-0.1, -0.3, 1.25));
     part.object = kPart;
     part.kind = "part";
     part.size = Vector3(0.2, 0.1, 0.1);
     part.X_WO = part_ = Pose(Vector3(0.02, 0.5, 0.81));
-    objects_ = {cube, part};
-    cube_ = cube.X_WO;
+    objects_ = {pointer, part};
+    pointer_ = pointer.X_WO;
     world_.begin(objects_, 1, 0);
     Welcome welcome;
     welcome.accepted = true;
@@ -54,9 +55,9 @@ class StuckPart {
   }
 
   std::unique_ptr<InstructorStation> station;
-  double highest_force = 0.0;
+  double highest_force = 0.0;  // [N]
   bool helped = false;
-  [[nodiscard]] const Pose& cube() const { return cube_; }
+  [[nodiscard]] const Pose& pointer() const { return pointer_; }
 
  private:
   void step() {
@@ -67,9 +68,9 @@ class StuckPart {
     manifold.hand = kHand;
     manifold.server_epoch = 1;
     manifold.tick = tick_;
-    manifold.object = kCube;
+    manifold.object = kPointer;
     manifold.object_epoch = 1;
-    manifold.X_WO = tick_ == 1 ? X_WH : cube_;
+    manifold.X_WO = tick_ == 1 ? X_WH : pointer_;
     manifold.stiffness = 1000.0;
     manifold.rotational_stiffness = 20.0;
     manifold.validity_radius = 1.0;
@@ -84,9 +85,9 @@ class StuckPart {
       manifold.contacts.push_back(contact);
     }
     model_.receive(manifold);
-    cube_ = model_.step(X_WH, world_).X_WO;
-    // the trainee's arm: 150 N/m about where she insists
-    const double push = std::max(0.0, 1000.0 * (cube_.translation().x() - X_WH.translation().x()));
+    pointer_ = model_.step(X_WH, world_).X_WO;
+    // the trainee's arm: 150 N/m about a wrong pose
+    const double push = std::max(0.0, 1000.0 * (pointer_.translation().x() - X_WH.translation().x()));
     if (!helped) part_.translation().x() += 0.2 * (0.02 - push / 150.0 - part_.translation().x()) * 0.05;
     if (part_.translation().x() < 0.004) helped = true;
     if (helped) part_.translation() = Vector3(0.0, 0.5, 0.76);
@@ -95,11 +96,11 @@ class StuckPart {
     WorldFrame frame;
     frame.server_epoch = 1;
     frame.tick = tick_;
-    for (const ObjectId object : {kCube, kPart}) {
+    for (const ObjectId object : {kPointer, kPart}) {
       ObjectState state;
       state.object = object;
       state.epoch = 1;
-      state.X_WO = object == kCube ? cube_ : part_;
+      state.X_WO = object == kPointer ? pointer_ : part_;
       state.status = static_cast<std::uint8_t>(ObjectStatus::kHeld);
       frame.states.push_back(state);
     }
@@ -109,24 +110,24 @@ class StuckPart {
   }
 
   std::vector<SceneObject> objects_;
-  WorldView world_;
-  LocalModel model_;
-  Pose cube_, part_;
+  haptic::WorldView world_;
+  haptic::LocalModel model_;
+  Pose pointer_, part_;
   Tick tick_ = 0;
 };
 
 class InstructorWithEach : public testing::TestWithParam<const char*> {};
 
-TEST_P(InstructorWithEach, PushesAStuckPartTowardsItsGhostAndWithdraws) {
+TEST_P(InstructorWithEach, PushesAStuckPartTowardsItsTargetAndReturns) {
   StuckPart scene(GetParam());
   scene.run(3.5);
-  EXPECT_STREQ(scene.station->doing(), "watches");
+  EXPECT_STREQ(scene.station->activity(), "watches");
   scene.run(26.5);
-  EXPECT_TRUE(scene.helped) << scene.station->doing();
+  EXPECT_TRUE(scene.helped) << scene.station->activity();
   EXPECT_LT(scene.highest_force, 15.0);
   scene.run(10.0);
-  EXPECT_STREQ(scene.station->doing(), "watches");
-  EXPECT_LT((scene.cube().translation() - Vector3(-0.1, -0.3, 1.25)).norm(), 0.05);
+  EXPECT_STREQ(scene.station->activity(), "watches");
+  EXPECT_LT((scene.pointer().translation() - Vector3(-0.1, -0.3, 1.25)).norm(), 0.05);
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, InstructorWithEach, testing::Values("sigma7-sim", "falcon-sim"),
@@ -144,7 +145,7 @@ TEST(InstructorStation, StepAllocatesNothingAndLocksNothing) {
   EXPECT_EQ(guard.locks(), 0);
 }
 
-TEST(InstructorStation, NamesTheDevicesThereAreWhenItsOwnIsUnknown) {
+TEST(InstructorStation, AnUnknownDeviceIsRefusedWithAListOfAllDevices) {
   InstructorOptions options;
   options.device = "joystick";
   const auto opened = InstructorStation::open(options);
@@ -153,4 +154,4 @@ TEST(InstructorStation, NamesTheDevicesThereAreWhenItsOwnIsUnknown) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::instructor

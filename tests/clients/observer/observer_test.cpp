@@ -6,19 +6,19 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-namespace tenon {
+namespace tenon::observer {
 namespace {
 
-/// What an observer wrote, line by line.
-class Page {
+/// Memory file that an observer prints to.
+class MemoryFile {
  public:
-  Page() : file_(open_memstream(&text_, &size_)) {}
-  ~Page() {
+  MemoryFile() : file_(open_memstream(&text_, &size_)) {}
+  ~MemoryFile() {
     std::fclose(file_);
     std::free(text_);
   }
-  Page(const Page&) = delete;
-  Page& operator=(const Page&) = delete;
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
   std::FILE* file() { return file_; }
   std::string text() {
     std::fflush(file_);
@@ -45,25 +45,25 @@ StepState mountStep() {
   return step;
 }
 
-TEST(Observer, TellsAStepInTheLanguageAskedForAndOnce) {
-  Page page;
-  Observer observer({.language = "de", .out = page.file()});
-  observer.hear(mountStep());
-  observer.hear(mountStep());
-  EXPECT_EQ(page.text(),
+TEST(Observer, PrintsAStepOnceInTheLanguageOfTheOptions) {
+  MemoryFile output;
+  Observer observer({.language = "de", .out = output.file()});
+  observer.receive(mountStep());
+  observer.receive(mountStep());
+  EXPECT_EQ(output.text(),
             "  12.00 s  step 2/15  Gitter einsetzen: active\n           Von vorn einschieben.\n");
 }
 
-TEST(Observer, TellsWhenTwoThingsBeginToTouchByTheirTitles) {
-  Page page;
-  Observer observer({.out = page.file()});
+TEST(Observer, PrintsTheBeginOfAContactWithTheTitlesOfBothObjects) {
+  MemoryFile output;
+  Observer observer({.out = output.file()});
   SceneObject grid, bay;
   grid.object = ObjectId{1};
   grid.title = "grid";
   bay.object = ObjectId{0};
   bay.name = "engine_bay";
-  observer.hear(grid);
-  observer.hear(bay);
+  observer.receive(grid);
+  observer.receive(bay);
   ContactPairs pairs;
   pairs.tick = 1500;
   PairContact pair;
@@ -71,42 +71,65 @@ TEST(Observer, TellsWhenTwoThingsBeginToTouchByTheirTitles) {
   pair.b = bay.object;
   pair.colliding = true;
   pairs.pairs.push_back(pair);
-  observer.hear(pairs);
-  observer.hear(pairs);
-  EXPECT_EQ(page.text(), "   1.50 s    grid touches engine_bay\n");
+  observer.receive(pairs);
+  observer.receive(pairs);
+  EXPECT_EQ(output.text(), "   1.50 s    grid touches engine_bay\n");
 }
 
-TEST(Observer, WritesAJsonObjectALine) {
-  Page page;
-  Observer observer({.json = true, .out = page.file()});
-  observer.hear(mountStep());
+TEST(Observer, PrintsNoGrabOfAPointerAndNoReasonOfSuccess) {
+  MemoryFile output;
+  Observer observer({.out = output.file()});
+  SceneObject pointer;
+  pointer.object = ObjectId{2};
+  pointer.title = "Your right hand";
+  pointer.kind = "pointer";
+  observer.receive(pointer);
+  EventLog taken;
+  taken.tick = 1000;
+  taken.kind = "taken";
+  taken.text = "Your right hand (right hand)";
+  observer.receive(taken);
+  taken.text = "Grid (right hand)";
+  observer.receive(taken);
+  RunState run;
+  run.tick = 2000;
+  run.phase = RunPhase::kSucceeded;
+  run.reason = "all steps done";
+  observer.receive(run);
+  EXPECT_EQ(output.text(), "   1.00 s    taken: Grid (right hand)\n   2.00 s  session succeeded\n");
+}
+
+TEST(Observer, PrintsOneJsonObjectPerLine) {
+  MemoryFile output;
+  Observer observer({.json = true, .out = output.file()});
+  observer.receive(mountStep());
   RunState run;
   run.phase = RunPhase::kFailed;
   run.reason = "a step was not done in time";
-  observer.hear(run);
-  std::istringstream lines(page.text());
+  observer.receive(run);
+  std::istringstream lines(output.text());
   std::string line;
   std::vector<std::string> kinds;
   while (std::getline(lines, line)) kinds.push_back(nlohmann::json::parse(line).at("kind"));
   EXPECT_EQ(kinds, (std::vector<std::string>{"step", "run"}));
 }
 
-TEST(Observer, EndsWithTheRunAndSaysByItsExitCodeHowItWent) {
-  Page page;
-  Observer observer({.out = page.file()});
+TEST(Observer, IsOverWithTheRunAndItsExitCodeIsTheOutcome) {
+  MemoryFile output;
+  Observer observer({.out = output.file()});
   EXPECT_FALSE(observer.over());
   RunState run;
   run.phase = RunPhase::kRunning;
-  observer.hear(run);
+  observer.receive(run);
   EXPECT_FALSE(observer.over());
   run.phase = RunPhase::kFailed;
-  observer.hear(run);
+  observer.receive(run);
   EXPECT_TRUE(observer.over());
   EXPECT_EQ(observer.exitCode(), 1);
   run.phase = RunPhase::kSucceeded;
-  observer.hear(run);
+  observer.receive(run);
   EXPECT_EQ(observer.exitCode(), 0);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::observer

@@ -12,35 +12,37 @@
 #include "idl/wire/codec.h"
 #include "tests/idl/wire/peer.h"
 
-namespace tenon {
+namespace tenon::recorder {
 namespace {
 
-/// As much of a server as a recorder sees of one.
+/// The topics of a server that a recorder depends on.
 class ServerMock {
  public:
   explicit ServerMock(std::uint32_t domain) : bus_(test::participant(domain)) {
     EXPECT_TRUE(announce_.write({.session = "class", .title = "Peg and box"}));
     EXPECT_TRUE(objects_.write({.object = ObjectId{0}, .name = "peg"}));
-    EXPECT_TRUE(inbox_.on<Join>(lobby_, kJoin, [this](const Join& join) {
+    EXPECT_TRUE(inbox_.on<Join>(lobby_, wire::kJoin, [this](const Join& join) {
       role_ = join.role;
       EXPECT_TRUE(welcome_.write({.client_guid = join.client_guid,
                                   .accepted = accepts_,
-                                  .reason = accepts_ ? "" : "the house is full",
+                                  .reason = accepts_ ? "" : "the session is full",
                                   .client = accepts_ ? ClientId{3} : ClientId{}}));
     }));
-    EXPECT_TRUE(inbox_.on<RecorderStatus>(session_, kRecorderStatus,
+    EXPECT_TRUE(inbox_.on<RecorderStatus>(session_, wire::kRecorderStatus,
                                           [this](const RecorderStatus& status) { status_ = status; }));
   }
 
-  std::shared_ptr<Participant> bus_;
-  Partition lobby_{bus_, kLobby};
-  Partition session_{bus_, sessionPartition("class")};
-  Writer<SessionAnnounce> announce_ = std::move(*Writer<SessionAnnounce>::open(lobby_, kSessionAnnounce));
-  Writer<Welcome> welcome_ = std::move(*Writer<Welcome>::open(lobby_, kWelcome));
-  Writer<SceneObject> objects_ = std::move(*Writer<SceneObject>::open(session_, kSceneObject));
-  Writer<EventLog> events_ = std::move(*Writer<EventLog>::open(session_, kEventLog));
-  Writer<RunState> run_ = std::move(*Writer<RunState>::open(session_, kRunState));
-  Inbox inbox_;
+  std::shared_ptr<wire::Participant> bus_;
+  wire::Partition lobby_{bus_, wire::kLobby};
+  wire::Partition session_{bus_, wire::sessionPartition("class")};
+  wire::Writer<SessionAnnounce> announce_ =
+      std::move(*wire::Writer<SessionAnnounce>::open(lobby_, wire::kSessionAnnounce));
+  wire::Writer<Welcome> welcome_ = std::move(*wire::Writer<Welcome>::open(lobby_, wire::kWelcome));
+  wire::Writer<SceneObject> objects_ =
+      std::move(*wire::Writer<SceneObject>::open(session_, wire::kSceneObject));
+  wire::Writer<EventLog> events_ = std::move(*wire::Writer<EventLog>::open(session_, wire::kEventLog));
+  wire::Writer<RunState> run_ = std::move(*wire::Writer<RunState>::open(session_, wire::kRunState));
+  wire::Inbox inbox_;
   bool accepts_ = true;
   Role role_ = Role::kObserver;
   RecorderStatus status_;
@@ -54,13 +56,13 @@ class RecorderProgramTest : public ::testing::Test {
     std::filesystem::remove(options_.file);
   }
   void start() {
-    thread_ = std::thread([this] { result_ = record(options_, stop_); });
+    thread_ = std::thread([this] { result_ = recordSession(options_, stop_); });
   }
   std::map<std::string, int> counts() const {
     std::map<std::string, int> counts;
-    auto reader = McapReader::open(options_.file);
+    auto reader = record::McapReader::open(options_.file);
     EXPECT_TRUE(reader->complete()) << reader->problem();
-    for (McapMessage message; reader->next(message);) ++counts[std::string(message.topic)];
+    for (record::McapMessage message; reader->next(message);) ++counts[std::string(message.topic)];
     return counts;
   }
 
@@ -90,7 +92,7 @@ TEST_F(RecorderProgramTest, RecordsUntilTheRunIsOverAndClosesItsFile) {
   EXPECT_TRUE(test::dispatchUntil(server_.inbox_, [&] { return !server_.status_.recording; }));
 }
 
-TEST_F(RecorderProgramTest, StoppedByAPersonItStillClosesItsFile) {
+TEST_F(RecorderProgramTest, ClosesItsFileWhenStopped) {
   start();
   ASSERT_TRUE(test::dispatchUntil(server_.inbox_, [&] { return server_.status_.recording; }));
   stop_ = true;
@@ -99,16 +101,16 @@ TEST_F(RecorderProgramTest, StoppedByAPersonItStillClosesItsFile) {
   EXPECT_EQ(counts().at("SceneObject"), 1);
 }
 
-TEST_F(RecorderProgramTest, ARefusalIsOneSentence) {
+TEST_F(RecorderProgramTest, FailsWithTheReasonOfARefusal) {
   server_.accepts_ = false;
   start();
   ASSERT_TRUE(test::dispatchUntil(server_.inbox_, [&] { return server_.role_ == Role::kRecorder; }));
   thread_.join();
   ASSERT_FALSE(result_);
-  EXPECT_EQ(result_.error().what, "the server of session 'class' refuses: the house is full");
+  EXPECT_EQ(result_.error().what, "the server of session 'class' refuses: the session is full");
 }
 
-TEST_F(RecorderProgramTest, AskedForLockstepItRefusesASessionByTheClock) {
+TEST_F(RecorderProgramTest, WithLockstepItRefusesARealTimeSession) {
   options_.lockstep = true;
   start();
   thread_.join();
@@ -116,9 +118,9 @@ TEST_F(RecorderProgramTest, AskedForLockstepItRefusesASessionByTheClock) {
   EXPECT_THAT(result_.error().what, testing::HasSubstr("does not run in lockstep"));
 }
 
-TEST_F(RecorderProgramTest, ASessionThatIsNotThereIsOneSentence) {
+TEST_F(RecorderProgramTest, FailsWhenNoServerAnnouncesTheSession) {
   options_.session = "another";
-  options_.patience = std::chrono::seconds(0);
+  options_.timeout = std::chrono::seconds(0);
   start();
   thread_.join();
   ASSERT_FALSE(result_);
@@ -126,4 +128,4 @@ TEST_F(RecorderProgramTest, ASessionThatIsNotThereIsOneSentence) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::recorder

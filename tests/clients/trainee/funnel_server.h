@@ -7,21 +7,22 @@
 
 namespace tenon::test {
 
-/// A tiny session by formula: a ball-shaped part floats on the right; a funnel waits for it.
+/// Server of an analytic scene: a ball-shaped part at the right, to be inserted into a funnel.
 ///
 ///        \       /     rim 18 mm from the axis, 45 degrees down to
 ///         \     /      a guide of 1 mm play,
 ///          |   |       with a seat 55 mm below the rim
 ///          |___|
 ///
-/// The part is felt at its origin alone, so nothing turns it. Steps: touch the part for 1 s; bring it home.
+/// The part has contacts at its origin only, so no contact turns it. Steps: touch the part for 1 s; insert
+/// it.
 class FunnelServer {
  public:
   static constexpr HandId kRight{0};
   static constexpr ObjectId kBlock{0}, kPointer{1}, kPart{2};
-  static constexpr double kPartRadius = 0.05;
-  /// [rad] that she may be off: her aim, which nothing here corrects.
-  static constexpr double kTurned = 0.06;
+  static constexpr double kPartRadius = 0.05;  ///< [m]
+  /// [rad] accepted angle error: the aiming error, which no contact corrects here.
+  static constexpr double kAngleTolerance = 0.06;
 
   FunnelServer() {
     const auto add = [this](const char* kind, const Vector3& at, const Vector3& size) {
@@ -39,7 +40,7 @@ class FunnelServer {
     part_ = objects_[2].X_WO;
   }
 
-  void welcome(Station& station) const {
+  void welcome(haptic::Station& station) const {
     Welcome welcome;
     welcome.accepted = true;
     welcome.client = ClientId{1};
@@ -49,8 +50,8 @@ class FunnelServer {
     station.welcome(welcome, objects_);
   }
 
-  /// One millisecond of everybody.
-  void step(Station& station) {
+  /// One millisecond of station and server.
+  void step(haptic::Station& station) {
     ++tick_;
     station.step(static_cast<std::uint32_t>(tick_));
     const DeviceInput& input = station.inputs()[0];
@@ -60,10 +61,11 @@ class FunnelServer {
     const Pose X_WO = model_.step(X_WH, world_).X_WO;
     (grabbed ? part_ : pointer_) = X_WO;
     in_contact = model_.proxy().touching;
-    play(X_WH);
-    tell(station, X_WH);
+    updateTask(X_WH);
+    publish(station, X_WH);
   }
-  void run(Station& station, double seconds) {
+  /// At most `seconds` [s] of session time.
+  void run(haptic::Station& station, double seconds) {
     for (int i = 0; i < static_cast<int>(seconds * 1000.0) && !over; ++i) step(station);
   }
 
@@ -74,8 +76,8 @@ class FunnelServer {
   bool grabbed = false;
   bool over = false;
   bool in_contact = false;
-  double highest_force = 0.0;
-  double highest_speed = 0.0;
+  double highest_force = 0.0;  ///< [N]
+  double highest_speed = 0.0;  ///< [m/s]
   bool indexed_in_contact = false;
 
  private:
@@ -111,14 +113,14 @@ class FunnelServer {
     }
     const Vector3 seat = target().translation();
     Vector3 off = p - seat;
-    const double height = off.z() - 0.055;  // over the rim
+    const double height = off.z() - 0.055;  // above the rim
     off.z() = 0.0;
-    const double beside = off.norm();
-    const Vector3 out = beside > 1e-9 ? Vector3(off / beside) : Vector3(Vector3::UnitX());
+    const double radius = off.norm();
+    const Vector3 out = radius > 1e-9 ? Vector3(off / radius) : Vector3(Vector3::UnitX());
     const Vector3 rim = seat + Vector3(0.0, 0.0, 0.055);
     plane(kBlock, Vector3::UnitZ(), seat);
-    if (beside >= 0.018) plane(kBlock, Vector3::UnitZ(), rim);
-    if (beside < 0.018 && height > -0.0171) {
+    if (radius >= 0.018) plane(kBlock, Vector3::UnitZ(), rim);
+    if (radius < 0.018 && height > -0.0171) {
       plane(kBlock, (Vector3::UnitZ() - out).normalized(), rim + 0.018 * out);
     } else if (height <= -0.017) {
       plane(kBlock, -out, seat + 0.001 * out);
@@ -126,7 +128,7 @@ class FunnelServer {
     return manifold;
   }
 
-  void play(const Pose& X_WH) {
+  void updateTask(const Pose& X_WH) {
     if (!grabbed) {
       touched_ = in_contact ? touched_ + 1 : 0;
       if (touched_ < 1000) return;
@@ -136,10 +138,11 @@ class FunnelServer {
       return;
     }
     const Displacement off = error();
-    if (off.translation.norm() < 0.002 && off.rotation.norm() < kTurned && ++home_ > 300) over = true;
+    if (off.translation.norm() < 0.002 && off.rotation.norm() < kAngleTolerance && ++in_place_ > 300)
+      over = true;
   }
 
-  void tell(Station& station, const Pose& X_WH) {
+  void publish(haptic::Station& station, const Pose& X_WH) {
     WorldFrame frame;
     frame.server_epoch = 1;
     frame.tick = tick_;
@@ -154,8 +157,8 @@ class FunnelServer {
     world_.receive(frame);
     station.receive(frame);
     station.receive(contacts(X_WH));
-    if (revision_ != told_) {
-      told_ = revision_;
+    if (revision_ != published_) {
+      published_ = revision_;
       StepState step;
       step.revision = revision_;
       step.step = revision_ - 1;
@@ -178,7 +181,7 @@ class FunnelServer {
     }
     const HandState& state = station.states()[0];
     highest_force = std::max(highest_force, state.F_Ho_W.force.norm());
-    // over 50 ms: a single reading is a multiple of the encoder's step
+    // mean over 50 ms: a single reading is quantised by the encoder
     if (tick_ % 50 == 0) {
       highest_speed = std::max(highest_speed, (X_WH.translation() - last_.translation()).norm() * 20.0);
       last_ = X_WH;
@@ -192,16 +195,16 @@ class FunnelServer {
   }
 
   std::vector<SceneObject> objects_;
-  WorldView world_;
-  LocalModel model_;
+  haptic::WorldView world_;
+  haptic::LocalModel model_;
   Pose part_, pointer_, X_HPart_, last_;
   Vector3 centre_ = Vector3::Zero();
   Tick tick_ = 0;
   int touched_ = 0;
-  int home_ = 0;
+  int in_place_ = 0;
   int contact_ticks_ = 0;
   std::uint32_t revision_ = 1;
-  std::uint32_t told_ = 0;
+  std::uint32_t published_ = 0;
 };
 
 }  // namespace tenon::test

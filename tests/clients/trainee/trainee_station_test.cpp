@@ -5,36 +5,36 @@
 #include "tests/clients/trainee/funnel_server.h"
 #include "tests/support/realtime_guard.h"
 
-namespace tenon {
+namespace tenon::trainee {
 namespace {
 
 using test::FunnelServer;
 
-std::unique_ptr<TraineeStation> station(std::uint64_t seed, int stubborn = -1) {
+std::unique_ptr<TraineeStation> station(std::uint64_t seed, int misplaced_mount = -1) {
   TraineeOptions options;
   options.person.seed = seed;
-  options.person.stubborn_mount = stubborn;
+  options.person.misplaced_mount = misplaced_mount;
   return std::move(*TraineeStation::open(options));
 }
 
-TEST(TraineeStation, ReachesThePartTouchesItAndBringsItHomeThroughContact) {
+TEST(TraineeStation, ReachesTouchesAndInsertsAPartGuidedByContact) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    FunnelServer server;
+    test::FunnelServer server;
     const auto trainee = station(seed);
     server.welcome(*trainee);
     server.run(*trainee, 60.0);
-    EXPECT_TRUE(server.grabbed) << trainee->doing();
-    EXPECT_TRUE(server.over) << trainee->doing() << " off by " << server.error().translation.transpose()
-                             << " turned " << server.error().rotation.transpose();
+    EXPECT_TRUE(server.grabbed) << trainee->activity();
+    EXPECT_TRUE(server.over) << trainee->activity() << " off by " << server.error().translation.transpose()
+                             << " angle error " << server.error().rotation.transpose();
     EXPECT_LT(server.highest_force, 25.0);
     EXPECT_LT(server.highest_speed, 0.36);
     EXPECT_FALSE(server.indexed_in_contact);
   }
 }
 
-TEST(TraineeStation, MissesTheTargetWithTheSameIntentWhenNothingGuidesIt) {
+TEST(TraineeStation, MissesTheTargetWithoutCollisions) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    FunnelServer server;
+    test::FunnelServer server;
     server.collisions = false;
     const auto trainee = station(seed);
     server.welcome(*trainee);
@@ -42,24 +42,24 @@ TEST(TraineeStation, MissesTheTargetWithTheSameIntentWhenNothingGuidesIt) {
     EXPECT_TRUE(server.grabbed);
     EXPECT_FALSE(server.over);
     EXPECT_GT(server.error().translation.norm(), 0.002);
-    EXPECT_LT(server.error().translation.norm(), 0.012);  // she tried
+    EXPECT_LT(server.error().translation.norm(), 0.012);  // it did try
   }
 }
 
-TEST(TraineeStation, PressesOnTheRimAndStaysThereWhenSheIsSureOfAWrongPlace) {
-  FunnelServer server;
+TEST(TraineeStation, MisplacedMountPushesOnTheRimAndIsNotCorrected) {
+  test::FunnelServer server;
   const auto trainee = station(4, 0);
   server.welcome(*trainee);
   server.run(*trainee, 45.0);
   EXPECT_TRUE(server.grabbed);
   EXPECT_FALSE(server.over);
-  EXPECT_STREQ(trainee->doing(), "insists");
+  EXPECT_STREQ(trainee->activity(), "pushes at wrong pose");
   EXPECT_TRUE(server.in_contact);
   EXPECT_GT(server.error().translation.head<2>().norm(), 0.018);
 }
 
-TEST(TraineeStation, DoesTheSameToTheLastBitWithTheSameSeed) {
-  FunnelServer one, two;
+TEST(TraineeStation, EqualSeedsGiveBitEqualMotion) {
+  test::FunnelServer one, two;
   const auto first = station(7), second = station(7);
   one.welcome(*first);
   two.welcome(*second);
@@ -70,8 +70,8 @@ TEST(TraineeStation, DoesTheSameToTheLastBitWithTheSameSeed) {
   }
 }
 
-TEST(TraineeStation, LeavesOutHandsThatTheScenarioDoesNotHave) {
-  FunnelServer server;
+TEST(TraineeStation, SkipsHandsThatTheScenarioDoesNotHave) {
+  test::FunnelServer server;
   const auto trainee = station(1);
   EXPECT_EQ(trainee->handNames(), (std::vector<std::string>{"right", "left", "forearm", "head"}));
   server.welcome(*trainee);
@@ -81,7 +81,7 @@ TEST(TraineeStation, LeavesOutHandsThatTheScenarioDoesNotHave) {
 }
 
 TEST(TraineeStation, StepAllocatesNothingAndLocksNothing) {
-  FunnelServer server;
+  test::FunnelServer server;
   const auto trainee = station(1);
   server.welcome(*trainee);
   server.run(*trainee, 0.5);
@@ -92,4 +92,4 @@ TEST(TraineeStation, StepAllocatesNothingAndLocksNothing) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::trainee

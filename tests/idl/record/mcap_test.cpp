@@ -15,36 +15,37 @@
 #include "idl/record/mcap_reader.h"
 #include "idl/record/mcap_writer.h"
 
-namespace tenon {
+namespace tenon::record {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 using testing::HasSubstr;
 
-struct Kept {
+struct StoredMessage {
   std::string topic;
   std::int64_t time = 0;
   std::uint32_t sequence = 0;
   Bytes data;
-  bool operator==(const Kept&) const = default;
+  bool operator==(const StoredMessage&) const = default;
 };
 
 class McapTest : public ::testing::Test {
  protected:
   ~McapTest() override { std::filesystem::remove(file_); }
 
-  /// Messages on two topics in chunks of ten; all of them are returned.
-  std::vector<Kept> record(int count, bool compress = true) {
+  /// Writes messages on two topics in chunks of ten and returns them.
+  std::vector<StoredMessage> record(int count, bool compress = true) {
     std::mt19937_64 random(7);
-    std::vector<Kept> all;
+    std::vector<StoredMessage> all;
     auto writer = McapWriter::open(file_, {.compress = compress});
     const std::uint16_t channels[] = {writer->addChannel("A", "t::A", "module t { struct A {}; };"),
                                       writer->addChannel("B", "t::B", "module t { struct B {}; };")};
     for (int i = 0; i < count; ++i) {
-      Kept kept{i % 3 == 0 ? "B" : "A", 1000 + 10 * i, static_cast<std::uint32_t>(i), Bytes(random() % 40)};
-      for (std::uint8_t& byte : kept.data) byte = static_cast<std::uint8_t>(random() % 4);
-      EXPECT_TRUE(writer->write(channels[i % 3 == 0 ? 1 : 0], kept.time, kept.sequence, kept.data));
-      all.push_back(std::move(kept));
+      StoredMessage message{i % 3 == 0 ? "B" : "A", 1000 + 10 * i, static_cast<std::uint32_t>(i),
+                            Bytes(random() % 40)};
+      for (std::uint8_t& byte : message.data) byte = static_cast<std::uint8_t>(random() % 4);
+      EXPECT_TRUE(writer->write(channels[i % 3 == 0 ? 1 : 0], message.time, message.sequence, message.data));
+      all.push_back(std::move(message));
       if (i % 10 == 9) {
         EXPECT_TRUE(writer->flush());
       }
@@ -54,8 +55,8 @@ class McapTest : public ::testing::Test {
     EXPECT_TRUE(writer->close());
     return all;
   }
-  static std::vector<Kept> readAll(McapReader& reader) {
-    std::vector<Kept> all;
+  static std::vector<StoredMessage> readAll(McapReader& reader) {
+    std::vector<StoredMessage> all;
     for (McapMessage message; reader.next(message);)
       all.push_back({std::string(message.topic),
                      message.log_time_ns,
@@ -76,7 +77,7 @@ class McapTest : public ::testing::Test {
       std::filesystem::temp_directory_path() / ("mcap_" + std::to_string(getpid()) + ".mcap");
 };
 
-TEST_F(McapTest, WhatIsWrittenIsReadBackInFileOrder) {
+TEST_F(McapTest, MessagesAreReadBackInFileOrder) {
   for (const bool compress : {true, false}) {
     const auto written = record(95, compress);
     auto reader = McapReader::open(file_);
@@ -87,7 +88,7 @@ TEST_F(McapTest, WhatIsWrittenIsReadBackInFileOrder) {
   }
 }
 
-TEST_F(McapTest, ChannelsMetadataAndAttachmentsAreThereBeforeTheFirstMessage) {
+TEST_F(McapTest, ChannelsMetadataAndAttachmentsAreKnownAfterOpening) {
   record(30);
   auto reader = McapReader::open(file_);
   ASSERT_EQ(reader->channels().size(), 2U);
@@ -103,7 +104,7 @@ TEST_F(McapTest, ChannelsMetadataAndAttachmentsAreThereBeforeTheFirstMessage) {
   EXPECT_EQ(std::string(reader->attachments()[0].data.begin(), reader->attachments()[0].data.end()), "hi");
 }
 
-TEST_F(McapTest, SeekGoesToTheFirstMessageAtOrAfterATimeAndBackAgain) {
+TEST_F(McapTest, SeekFindsTheFirstMessageAtOrAfterATimeInBothDirections) {
   const auto written = record(100);
   auto reader = McapReader::open(file_);
   for (const int index : {70, 3, 99, 0}) {
@@ -117,7 +118,7 @@ TEST_F(McapTest, SeekGoesToTheFirstMessageAtOrAfterATimeAndBackAgain) {
   EXPECT_FALSE(reader->next(message));
 }
 
-TEST_F(McapTest, AFileWithoutMessagesIsWhole) {
+TEST_F(McapTest, AFileWithoutMessagesIsComplete) {
   ASSERT_TRUE(McapWriter::open(file_)->close());
   auto reader = McapReader::open(file_);
   ASSERT_TRUE(reader);
@@ -125,7 +126,7 @@ TEST_F(McapTest, AFileWithoutMessagesIsWhole) {
   EXPECT_TRUE(readAll(*reader).empty());
 }
 
-TEST_F(McapTest, AWriterThatIsClosedTakesNothingMore) {
+TEST_F(McapTest, AClosedWriterRefusesMessages) {
   auto writer = McapWriter::open(file_);
   const auto channel = writer->addChannel("A", "t::A", "");
   ASSERT_TRUE(writer->close());
@@ -134,13 +135,13 @@ TEST_F(McapTest, AWriterThatIsClosedTakesNothingMore) {
   EXPECT_TRUE(writer->close());
 }
 
-TEST_F(McapTest, AFullDiskIsOneSentence) {
+TEST_F(McapTest, AFullDiskIsAnErrorThatNamesTheFile) {
   auto writer = McapWriter::open("/dev/full");
   ASSERT_FALSE(writer);
   EXPECT_THAT(writer.error().what, HasSubstr("/dev/full: cannot write"));
 }
 
-TEST_F(McapTest, CutAtAnyByteItGivesAllWholeChunksAndSaysThatItWasCut) {
+TEST_F(McapTest, TruncatedAtAnyByteItHasAllCompleteChunksAndReportsTheTruncation) {
   const auto written = record(20);
   const Bytes whole = fileBytes();
   std::size_t before = 0;
@@ -153,7 +154,7 @@ TEST_F(McapTest, CutAtAnyByteItGivesAllWholeChunksAndSaysThatItWasCut) {
       continue;
     }
     ASSERT_FALSE(reader->complete()) << size;
-    ASSERT_THAT(reader->problem(), HasSubstr("was cut")) << size;
+    ASSERT_THAT(reader->problem(), HasSubstr("is truncated")) << size;
     const auto read = readAll(*reader);
     ASSERT_LE(read.size(), written.size());
     ASSERT_TRUE(std::equal(read.begin(), read.end(), written.begin())) << size;
@@ -173,24 +174,24 @@ TEST_F(McapTest, AFlippedBitNeverChangesAMessageAndNeverCrashes) {
     writeFile(bytes);
     auto reader = McapReader::open(file_);
     if (!reader) continue;
-    for (const Kept& kept : readAll(*reader)) {
-      const bool known = std::find(written.begin(), written.end(), kept) != written.end();
+    for (const StoredMessage& message : readAll(*reader)) {
+      const bool known = std::find(written.begin(), written.end(), message) != written.end();
       ASSERT_TRUE(known) << "round " << round;
     }
   }
 }
 
-TEST_F(McapTest, DamageInsideAChunkLeavesOutThatChunkAndSaysSo) {
+TEST_F(McapTest, ADamagedChunkIsSkippedAndReported) {
   record(40, false);
   Bytes bytes = fileBytes();
-  // the third chunk's first message: its data stand in the file as they are
+  // the first message of the third chunk, which is stored uncompressed
   std::size_t chunk = 0, at = sizeof(mcap::kMagic);
   for (int seen = 0; seen < 3;) {
     chunk = at;
     if (bytes[at] == mcap::kChunk) ++seen;
     std::uint64_t length = 0;
     std::memcpy(&length, bytes.data() + at + 1, sizeof length);
-    at += mcap::kRecordHead + length;
+    at += mcap::kRecordHeaderBytes + length;
   }
   bytes[chunk + 100] ^= 1U;
   writeFile(bytes);
@@ -218,25 +219,25 @@ TEST_F(McapTest, RandomBytesAfterTheMagicNeverCrash) {
   }
 }
 
-TEST_F(McapTest, WhatIsNoRecordingIsOneSentence) {
+TEST_F(McapTest, AFileThatIsNoRecordingIsAnErrorThatNamesIt) {
   EXPECT_THAT(McapReader::open("no/such.mcap").error().what, HasSubstr("no/such.mcap: cannot be opened"));
   EXPECT_THAT(McapReader::open("/tmp").error().what, HasSubstr("is empty or not a file"));
   writeFile(Bytes(100, 'x'));
   EXPECT_THAT(McapReader::open(file_).error().what, HasSubstr("is not a recording"));
 }
 
-TEST(InstanceState, SurvivesTheWayThroughItsBytes) {
+TEST(InstanceState, IsReadBackFromItsBytes) {
   for (const char* topic : {"A", "Ab", "Abc", "ObjectSnapshot"}) {
     const InstanceGone gone{topic, {0, 1, 0, 0, 7, 0, 0, 0}};
     const auto bytes = encodeInstanceGone(gone);
-    const auto back = decodeInstanceGone(bytes);
-    ASSERT_TRUE(back) << topic;
-    EXPECT_EQ(back->topic, topic);
-    EXPECT_EQ(back->key_sample, gone.key_sample);
+    const auto decoded = decodeInstanceGone(bytes);
+    ASSERT_TRUE(decoded) << topic;
+    EXPECT_EQ(decoded->topic, topic);
+    EXPECT_EQ(decoded->key_sample, gone.key_sample);
     for (std::size_t size = 0; size < bytes.size(); ++size)
       EXPECT_FALSE(decodeInstanceGone(std::span(bytes).first(size)));
   }
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::record

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace tenon {
+namespace tenon::threads {
 namespace {
 
 using std::chrono::microseconds;
@@ -13,47 +13,47 @@ using std::chrono::milliseconds;
 
 class CyclicThreadTest : public ::testing::Test {
  protected:
-  void moveOn(Nanoseconds by) {
+  void advance(Nanoseconds by) {
     clock_->advance(by);
     clock_->waitUntilAsleep();
   }
   std::shared_ptr<VirtualClock> clock_ = std::make_shared<VirtualClock>();
 };
 
-TEST_F(CyclicThreadTest, TicksOnceAPeriod) {
+TEST_F(CyclicThreadTest, TicksOncePerPeriod) {
   std::vector<std::uint64_t> ticks;
   CyclicThread thread(clock_, {}, [&](std::uint64_t tick) { ticks.push_back(tick); });
   thread.start();
   clock_->waitUntilAsleep();
-  for (int i = 0; i < 5; ++i) moveOn(milliseconds(1));
+  for (int i = 0; i < 5; ++i) advance(milliseconds(1));
   thread.stop();
   EXPECT_EQ(ticks, (std::vector<std::uint64_t>{0, 1, 2, 3, 4}));
   EXPECT_EQ(thread.lateTicks(), 0U);
 }
 
-TEST_F(CyclicThreadTest, DoesNothingBeforeThePeriodIsOver) {
+TEST_F(CyclicThreadTest, DoesNotTickBeforeTheEndOfThePeriod) {
   CyclicThread thread(clock_, {}, [](std::uint64_t) {});
   thread.start();
   clock_->waitUntilAsleep();
-  moveOn(microseconds(999));
+  advance(microseconds(999));
   EXPECT_EQ(thread.ticks(), 0U);
-  moveOn(microseconds(1));
+  advance(microseconds(1));
   EXPECT_EQ(thread.ticks(), 1U);
 }
 
 //  due    1   2   3   4   5   6 ms
-//  runs   |           .7      |        three periods went by while it did not get the processor:
-//  late                ^ one tick, late; then the grid again
-TEST_F(CyclicThreadTest, CountsALateTickAndLeavesOutThePeriodsItMissed) {
+//  runs   |           .7      |        the thread did not run for nearly three periods:
+//  late                ^ one late tick, then the grid again
+TEST_F(CyclicThreadTest, CountsALateTickAndSkipsMissedPeriods) {
   CyclicThread thread(clock_, {}, [](std::uint64_t) {});
   thread.start();
   clock_->waitUntilAsleep();
-  moveOn(milliseconds(1));
-  moveOn(microseconds(3700));  // the tick due at 2 starts at 4.7
+  advance(milliseconds(1));
+  advance(microseconds(3700));  // the tick due at 2 starts at 4.7
   EXPECT_EQ(thread.ticks(), 2U);
   EXPECT_EQ(thread.lateTicks(), 1U);
   EXPECT_EQ(thread.worstDelay(), microseconds(2700));
-  moveOn(microseconds(300));  // 5.0
+  advance(microseconds(300));  // 5.0
   EXPECT_EQ(thread.ticks(), 3U);
   EXPECT_EQ(thread.lateTicks(), 1U);
 }
@@ -64,25 +64,25 @@ TEST_F(CyclicThreadTest, ATickLongerThanItsPeriodMakesTheNextOneLate) {
   });
   thread.start();
   clock_->waitUntilAsleep();
-  moveOn(milliseconds(1));
+  advance(milliseconds(1));
   EXPECT_EQ(thread.ticks(), 2U);
   EXPECT_EQ(thread.lateTicks(), 1U);
 }
 
-TEST_F(CyclicThreadTest, SaysWhatItDidNotGetAndRunsOn) {
+TEST_F(CyclicThreadTest, ReportsWhatWasNotGrantedAndRuns) {
   CyclicOptions options;
   options.name = "haptic";
   options.cpu = 1000;
   CyclicThread thread(clock_, options, [](std::uint64_t) {});
   thread.start();
   clock_->waitUntilAsleep();
-  moveOn(milliseconds(1));
+  advance(milliseconds(1));
   EXPECT_EQ(thread.ticks(), 1U);
   EXPECT_NE(thread.notGranted().find("thread 'haptic' runs without CPU 1000"), std::string::npos)
       << thread.notGranted();
 }
 
-TEST_F(CyclicThreadTest, StopsWhileAsleepAndMayBeStoppedTwice) {
+TEST_F(CyclicThreadTest, StopsWhileAsleepAndCanBeStoppedTwice) {
   CyclicThread thread(clock_, {}, [](std::uint64_t) {});
   thread.start();
   clock_->waitUntilAsleep();
@@ -99,4 +99,4 @@ TEST(CyclicThreadOnTheSteadyClock, Ticks) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::threads

@@ -8,16 +8,16 @@
 
 #include "tests/support/realtime_guard.h"
 
-namespace tenon {
+namespace tenon::threads {
 namespace {
 
-TEST(Latest, HasNothingNewUntilTheWriterWrites) {
+TEST(Latest, HasNoUpdateBeforeAWrite) {
   Latest<int> latest(7);
   EXPECT_FALSE(latest.update());
   EXPECT_EQ(latest.read(), 7);
 }
 
-TEST(Latest, GivesTheNewestAndForgetsTheRest) {
+TEST(Latest, GivesTheNewestValueOnly) {
   Latest<int> latest;
   for (int value = 1; value <= 5; ++value) latest.write(value);
   EXPECT_TRUE(latest.update());
@@ -26,7 +26,7 @@ TEST(Latest, GivesTheNewestAndForgetsTheRest) {
   EXPECT_EQ(latest.value(), 5);
 }
 
-TEST(Latest, KeepsTheReadersValueWhileTheWriterGoesOn) {
+TEST(Latest, KeepsTheReadersValueDuringWrites) {
   Latest<int> latest;
   latest.write(1);
   const int& seen = latest.read();
@@ -35,19 +35,19 @@ TEST(Latest, KeepsTheReadersValueWhileTheWriterGoesOn) {
   EXPECT_EQ(latest.read(), 9);
 }
 
-TEST(Latest, NeverTearsAValueAndNeverGoesBack) {
+TEST(Latest, ValuesAreNeverTornAndNeverOlderThanBefore) {
   using Block = std::array<int, 64>;
-  constexpr int kSeen = 2'000;
+  constexpr int kUpdates = 2'000;
   Latest<Block> latest;
-  std::atomic<bool> enough{false};
+  std::atomic<bool> done{false};
   std::thread writer([&] {
-    for (int value = 1; !enough; ++value) {
+    for (int value = 1; !done; ++value) {
       latest.back().fill(value);
       latest.publish();
     }
   });
   int newest = 0;
-  for (int seen = 0; seen < kSeen;) {
+  for (int seen = 0; seen < kUpdates;) {
     if (!latest.update()) {
       std::this_thread::yield();
       continue;
@@ -58,7 +58,7 @@ TEST(Latest, NeverTearsAValueAndNeverGoesBack) {
     newest = block[0];
     ++seen;
   }
-  enough = true;
+  done = true;
   writer.join();
 }
 
@@ -75,4 +75,4 @@ TEST(Latest, AllocatesNothingAndLocksNothing) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::threads

@@ -13,11 +13,11 @@ namespace {
 class RealtimeGuardTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!RealtimeGuard::available()) GTEST_SKIP() << "a sanitizer stands where the guard counts";
+    if (!RealtimeGuard::available()) GTEST_SKIP() << "sanitizers replace the functions that the guard counts";
   }
 };
 
-TEST_F(RealtimeGuardTest, SeesNothingWhereNothingHappens) {
+TEST_F(RealtimeGuardTest, CountsNothingInPlainArithmetic) {
   const RealtimeGuard guard;
   volatile double x = 1.0;
   for (int i = 0; i < 100; ++i) x = x * 1.5;
@@ -41,7 +41,7 @@ TEST_F(RealtimeGuardTest, CountsALock) {
   EXPECT_EQ(guard.locks(), 1);
 }
 
-TEST_F(RealtimeGuardTest, LeavesOtherThreadsAlone) {
+TEST_F(RealtimeGuardTest, DoesNotCountOtherThreads) {
   std::mutex mutex;
   std::thread other;
   const RealtimeGuard before;

@@ -7,10 +7,10 @@
 
 #include "tests/support/realtime_guard.h"
 
-namespace tenon {
+namespace tenon::threads {
 namespace {
 
-TEST(SpscQueue, GivesEventsInOrder) {
+TEST(SpscQueue, GivesElementsInOrder) {
   SpscQueue<int> queue(4);
   int out = 0;
   EXPECT_FALSE(queue.pop(out));
@@ -24,7 +24,7 @@ TEST(SpscQueue, GivesEventsInOrder) {
   EXPECT_FALSE(queue.pop(out));
 }
 
-TEST(SpscQueue, DropsAndCountsTheNewEventWhenFull) {
+TEST(SpscQueue, DropsAndCountsTheNewElementWhenFull) {
   SpscQueue<int> queue(2);
   EXPECT_TRUE(queue.push(1));
   EXPECT_TRUE(queue.push(2));
@@ -42,7 +42,7 @@ TEST(SpscQueue, UsesItsSlotsInPlace) {
   SpscQueue<std::array<int, 1000>> queue(3);
   auto* slot = queue.beginPush();
   ASSERT_NE(slot, nullptr);
-  EXPECT_EQ(queue.front(), nullptr) << "not there before commitPush";
+  EXPECT_EQ(queue.front(), nullptr) << "not visible before commitPush";
   (*slot)[999] = 42;
   queue.commitPush();
   EXPECT_EQ(queue.front(), slot);
@@ -89,4 +89,4 @@ TEST(SpscQueue, AllocatesNothingAndLocksNothing) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::threads

@@ -9,7 +9,7 @@
 namespace tenon {
 namespace {
 
-TEST(FixedVector, TakesAsManyValuesAsItHasPlaces) {
+TEST(FixedVector, TakesAsManyValuesAsItsCapacity) {
   FixedVector<int, 3> list;
   EXPECT_TRUE(list.empty());
   for (int value = 1; value <= 3; ++value) EXPECT_TRUE(list.push_back(value));
@@ -20,7 +20,7 @@ TEST(FixedVector, TakesAsManyValuesAsItHasPlaces) {
   EXPECT_EQ(std::accumulate(list.begin(), list.end(), 0), 6);
 }
 
-TEST(FixedVector, ForgetsWhatWasCleared) {
+TEST(FixedVector, IsEmptyAfterClear) {
   FixedVector<int, 3> list;
   list.push_back(1);
   list.clear();

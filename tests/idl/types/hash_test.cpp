@@ -18,7 +18,7 @@ TEST(StateHash, IsEqualForEqualStates) {
   EXPECT_EQ(hashOf(X), hashOf(X));
 }
 
-TEST(StateHash, SeesTheLastBitOfEachNumber) {
+TEST(StateHash, DependsOnTheLastBitOfEachNumber) {
   const Pose X(Vector3(1, 2, 3), Quaternion(0.5, 0.5, 0.5, 0.5));
   std::set<std::uint64_t> hashes{hashOf(X)};
   for (int i = 0; i < 3; ++i) {

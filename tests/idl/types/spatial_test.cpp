@@ -11,8 +11,8 @@ namespace {
 
 class Spatial : public ::testing::Test {
  protected:
-  double number(double most) { return most * (2.0 * static_cast<double>(random_() >> 11U) * 0x1p-53 - 1.0); }
-  Vector3 vector(double most) { return {number(most), number(most), number(most)}; }
+  double number(double max) { return max * (2.0 * static_cast<double>(random_() >> 11U) * 0x1p-53 - 1.0); }
+  Vector3 vector(double max) { return {number(max), number(max), number(max)}; }
   /// A rotation vector shorter than pi.
   Vector3 rotationVector() {
     while (true) {
@@ -36,7 +36,7 @@ TEST_F(Spatial, AngleOfIsTheArcTangent) {
   EXPECT_DOUBLE_EQ(angleOf(0.0, -1.0), std::numbers::pi);
 }
 
-TEST_F(Spatial, ExpRotationTurnsAboutItsVectorByItsLength) {
+TEST_F(Spatial, ExpRotationRotatesAboutItsVectorByItsLength) {
   for (int i = 0; i < 2000; ++i) {
     const Vector3 w = rotationVector();
     const Matrix3 expected = Eigen::AngleAxisd(w.norm(), w.normalized()).toRotationMatrix();
@@ -45,44 +45,44 @@ TEST_F(Spatial, ExpRotationTurnsAboutItsVectorByItsLength) {
   EXPECT_TRUE(expRotation(Vector3::Zero()).isApprox(Quaternion::Identity()));
 }
 
-TEST_F(Spatial, LogRotationUndoesExpRotation) {
+TEST_F(Spatial, LogRotationIsTheInverseOfExpRotation) {
   for (int i = 0; i < 2000; ++i) {
     const Vector3 w = rotationVector();
     EXPECT_LT((logRotation(expRotation(w)) - w).norm(), 1e-12) << w.transpose();
   }
 }
 
-TEST_F(Spatial, LogRotationIsExactForTinyTurns) {
+TEST_F(Spatial, LogRotationIsExactForTinyRotations) {
   const Vector3 w(1e-12, -2e-12, 3e-12);
   EXPECT_LT((logRotation(expRotation(w)) - w).norm(), 1e-24);
 }
 
-TEST_F(Spatial, LogRotationTakesTheShortWayForEitherSignOfTheQuaternion) {
+TEST_F(Spatial, LogRotationIsTheShorterRotationForEitherSignOfTheQuaternion) {
   const Vector3 w(0.0, 0.0, 0.5);
   Quaternion q = expRotation(w);
   q.coeffs() = -q.coeffs();
   EXPECT_LT((logRotation(q) - w).norm(), 1e-14);
 }
 
-TEST_F(Spatial, ADisplacementLeadsFromOnePoseToTheOther) {
+TEST_F(Spatial, DisplacedIsTheInverseOfDisplacement) {
   for (int i = 0; i < 500; ++i) {
     const Pose X_WA(vector(2.0), expRotation(rotationVector()));
     const Pose X_WB(vector(2.0), expRotation(rotationVector()));
-    const Pose there = displaced(X_WA, displacement(X_WA, X_WB));
-    EXPECT_LT((there.translation() - X_WB.translation()).norm(), 1e-12);
-    EXPECT_LT(there.rotation().angularDistance(X_WB.rotation()), 1e-7);
+    const Pose X_WB_again = displaced(X_WA, displacement(X_WA, X_WB));
+    EXPECT_LT((X_WB_again.translation() - X_WB.translation()).norm(), 1e-12);
+    EXPECT_LT(X_WB_again.rotation().angularDistance(X_WB.rotation()), 1e-7);
   }
 }
 
 //   A --X_AB--> B --X_BC--> C
-TEST_F(Spatial, PosesChainAndInvert) {
+TEST_F(Spatial, PosesAreComposedAndInverted) {
   const Pose X_AB(Vector3(1, 0, 0), expRotation({0, 0, std::numbers::pi / 2}));
   const Pose X_BC(Vector3(2, 0, 0));
   EXPECT_LT((((X_AB * X_BC).translation()) - Vector3(1, 2, 0)).norm(), 1e-14);
   EXPECT_LT((X_AB.inverse() * (X_AB * Vector3(3, 4, 5)) - Vector3(3, 4, 5)).norm(), 1e-14);
 }
 
-TEST_F(Spatial, APoseKnowsWhenItIsNoNumber) {
+TEST_F(Spatial, APoseWithNanOrInfinityIsNotFinite) {
   EXPECT_TRUE(Pose().isFinite());
   EXPECT_FALSE(Pose(Vector3(0, std::nan(""), 0)).isFinite());
   EXPECT_FALSE(Pose(Vector3::Zero(), Quaternion(1, 0, 0, HUGE_VAL)).isFinite());

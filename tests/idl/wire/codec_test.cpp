@@ -9,7 +9,7 @@
 #include "idl/wire/profiles.h"
 #include "tests/idl/wire/random_messages.h"
 
-namespace tenon {
+namespace tenon::wire {
 namespace {
 
 std::string fileText(const std::string& path_from_root) {
@@ -32,9 +32,8 @@ class Codec : public ::testing::Test {};
 using AllMessages = ::testing::Types<TENON_WIRE_MESSAGES(TENON_COMMA) WorldFrame>;
 TYPED_TEST_SUITE(Codec, AllMessages);
 
-// A message has no operator==, but its bytes say all of it: two conversions that lose the same thing would
-// have to lose it in encode(), and then decode() of other bytes would show it.
-TYPED_TEST(Codec, KeepsEveryBitBothWays) {
+// Messages have no operator==, so the bytes of a second encoding are compared.
+TYPED_TEST(Codec, IsBitEqualAfterEncodingAndDecoding) {
   test::RandomMessages random(1);
   for (int i = 0; i < 200; ++i) {
     const auto message = random.template make<TypeParam>();
@@ -48,7 +47,7 @@ TYPED_TEST(Codec, KeepsEveryBitBothWays) {
   }
 }
 
-TYPED_TEST(Codec, FitsTheLargestSample) {
+TYPED_TEST(Codec, TheLargestMessageFitsOneSample) {
   test::RandomMessages random(2, true);
   const auto bytes = encode(random.template make<TypeParam>());
   ASSERT_TRUE(bytes) << bytes.error().what;
@@ -60,21 +59,21 @@ TYPED_TEST(Codec, DifferentMessagesHaveDifferentBytes) {
   EXPECT_NE(*encode(random.template make<TypeParam>()), *encode(random.template make<TypeParam>()));
 }
 
-TYPED_TEST(Codec, RefusesBytesThatEndTooSoon) {
+TYPED_TEST(Codec, RefusesTruncatedBytes) {
   test::RandomMessages random(4, true);
   const auto bytes = encode(random.template make<TypeParam>());
   ASSERT_TRUE(bytes);
   for (std::size_t size = 0; size < bytes->size(); ++size) {
     auto cut = *bytes;
     cut.resize(size);
-    if (size > 3) cut[3] = 0;  // claims no padding
+    if (size > 3) cut[3] = 0;  // padding 0 in the header
     const auto back = decode<TypeParam>(cut);
     const bool only_padding_is_gone = size + ((*bytes)[3] & 3U) >= bytes->size();
     EXPECT_EQ(back.has_value(), only_padding_is_gone && size + ((*bytes)[3] & 3U) == bytes->size()) << size;
   }
 }
 
-TYPED_TEST(Codec, SurvivesFlippedBits) {
+TYPED_TEST(Codec, AcceptsOrRefusesFlippedBits) {
   test::RandomMessages random(5);
   std::mt19937_64 where(6);
   const auto bytes = encode(random.template make<TypeParam>());
@@ -85,7 +84,7 @@ TYPED_TEST(Codec, SurvivesFlippedBits) {
       const auto bit = where() % (bad.size() * 8);
       bad[bit / 8] ^= static_cast<std::uint8_t>(1U << (bit % 8));
     }
-    // whatever it is taken for must be a message that can be sent again
+    // a message that is decoded from damaged bytes must be valid: it can be encoded
     if (const auto back = decode<TypeParam>(bad)) {
       const auto again = encode(*back);
       if (again) {
@@ -101,7 +100,7 @@ TYPED_TEST(Codec, NamesTheTypeInItsError) {
   EXPECT_EQ(back.error().what, "4 bytes are not a " + std::string(typeName<TypeParam>()));
 }
 
-TEST(CodecOf, FieldsAreWhereTheyBelong) {
+TEST(CodecOf, FieldsAreDecodedToTheirMembers) {
   HandManifold m;
   m.hand = HandId{3};
   m.tick = 0x1122334455667788ULL;
@@ -119,9 +118,9 @@ TEST(CodecOf, FieldsAreWhereTheyBelong) {
   EXPECT_EQ(back->contacts[0].gap, -0.25F);
 }
 
-TEST(CodecOf, BytesAreXcdr1AsTheStandardHasIt) {
-  // encapsulation CDR_LE, 1 byte of padding | key uint32 | id | accepted, 3 bytes to align | length 3 with
-  // its zero
+TEST(CodecOf, BytesAreXcdr1OfTheStandard) {
+  // encapsulation CDR_LE with 1 byte of padding | key uint32 | id | accepted, 3 bytes of alignment | string
+  // length 3 including its zero
   CommandAck ack;
   ack.client = ClientId{0x01020304};
   ack.id = 7;
@@ -142,7 +141,7 @@ TEST(CodecOf, ReadsTheOtherByteOrder) {
   EXPECT_EQ(ack->reason, "no");
 }
 
-TEST(CodecOf, ATextThatIsTooLongIsAnErrorThatNamesIt) {
+TEST(CodecOf, ATextThatIsTooLongIsAnErrorThatNamesTheField) {
   SceneObject object;
   object.name = std::string(64, 'x');
   const auto bytes = encode(object);
@@ -157,11 +156,11 @@ TEST(CodecOf, AZeroByteInATextIsAnError) {
   EXPECT_FALSE(encode(event));
 }
 
-TEST(CodecOf, AStatusThatDoesNotExistIsAnError) {
+TEST(CodecOf, AnUnknownStatusIsAnError) {
   ObjectSnapshot snapshot;
   snapshot.state.status = 6;
   EXPECT_FALSE(decode<ObjectSnapshot>(*encode(snapshot)));
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::wire

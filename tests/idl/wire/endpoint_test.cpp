@@ -6,23 +6,23 @@
 
 #include <gtest/gtest.h>
 
-#include "idl/wire/tap.h"
+#include "idl/wire/raw_subscriber.h"
 #include "tests/idl/wire/peer.h"
 #include "tests/idl/wire/random_messages.h"
 
-namespace tenon {
+namespace tenon::wire {
 namespace {
 
 class EndpointTest : public ::testing::Test {
  protected:
-  std::shared_ptr<Participant> bus_ = test::participant(test::ownDomain());
-  std::shared_ptr<Participant> other_bus_ = test::participant(test::ownDomain());
-  Partition here_{bus_, "s/test"};
-  Partition there_{other_bus_, "s/test"};
+  std::shared_ptr<Participant> participant_ = test::participant(test::ownDomain());
+  std::shared_ptr<Participant> other_participant_ = test::participant(test::ownDomain());
+  Partition here_{participant_, "s/test"};
+  Partition there_{other_participant_, "s/test"};
   Inbox inbox_;
 };
 
-TEST_F(EndpointTest, ALateJoinerGetsTheLastStateOfEachKeyAndNoStream) {
+TEST_F(EndpointTest, ALateJoinerGetsTheLastStateOfEachKeyAndNoStreamSample) {
   auto grabs = Writer<GrabState>::open(here_, kGrabState);
   auto frames = Writer<WorldFrame>::open(here_, kWorldFrame1k);
   for (std::uint32_t i = 0; i < 6; ++i) {
@@ -50,51 +50,51 @@ TEST_F(EndpointTest, ALateJoinerGetsTheLastThousandEventsInOrder) {
     event.seq = seq;
     ASSERT_TRUE(log->write(event));
   }
-  std::vector<std::uint64_t> heard;
+  std::vector<std::uint64_t> received;
   ASSERT_TRUE(
-      inbox_.on<EventLog>(there_, kEventLog, [&](const EventLog& event) { heard.push_back(event.seq); }));
-  ASSERT_TRUE(test::dispatchUntil(inbox_, [&] { return heard.size() >= 1000; }));
-  ASSERT_EQ(heard.size(), 1000U);
-  for (std::size_t i = 0; i < heard.size(); ++i) EXPECT_EQ(heard[i], 501 + i);
+      inbox_.on<EventLog>(there_, kEventLog, [&](const EventLog& event) { received.push_back(event.seq); }));
+  ASSERT_TRUE(test::dispatchUntil(inbox_, [&] { return received.size() >= 1000; }));
+  ASSERT_EQ(received.size(), 1000U);
+  for (std::size_t i = 0; i < received.size(); ++i) EXPECT_EQ(received[i], 501 + i);
 }
 
 TEST_F(EndpointTest, EveryEventArrives) {
-  int heard = 0;
-  ASSERT_TRUE(inbox_.on<Command>(there_, kCommand, [&](const Command&) { ++heard; }));
+  int received = 0;
+  ASSERT_TRUE(inbox_.on<Command>(there_, kCommand, [&](const Command&) { ++received; }));
   auto commands = Writer<Command>::open(here_, kCommand);
   ASSERT_TRUE(test::dispatchUntil(inbox_, [&] { return commands->matchedReaders() == 1; }));
   for (std::uint32_t id = 0; id < 500; ++id) ASSERT_TRUE(commands->write({.client = ClientId{1}, .id = id}));
-  EXPECT_TRUE(test::dispatchUntil(inbox_, [&] { return heard == 500; }));
+  EXPECT_TRUE(test::dispatchUntil(inbox_, [&] { return received == 500; }));
 }
 
-TEST_F(EndpointTest, AnotherPartitionHearsNothing) {
-  Partition elsewhere(other_bus_, "s/other");
+TEST_F(EndpointTest, AReaderInAnotherPartitionReceivesNothing) {
+  Partition elsewhere(other_participant_, "s/other");
   auto grabs = Writer<GrabState>::open(here_, kGrabState);
   ASSERT_TRUE(grabs->write({}));
-  int heard_there = 0;
-  int heard_elsewhere = 0;
-  ASSERT_TRUE(inbox_.on<GrabState>(elsewhere, kGrabState, [&](const GrabState&) { ++heard_elsewhere; }));
-  ASSERT_TRUE(inbox_.on<GrabState>(there_, kGrabState, [&](const GrabState&) { ++heard_there; }));
-  ASSERT_TRUE(test::dispatchUntil(inbox_, [&] { return heard_there == 1; }));
-  EXPECT_EQ(heard_elsewhere, 0);
+  int received_there = 0;
+  int received_elsewhere = 0;
+  ASSERT_TRUE(inbox_.on<GrabState>(elsewhere, kGrabState, [&](const GrabState&) { ++received_elsewhere; }));
+  ASSERT_TRUE(inbox_.on<GrabState>(there_, kGrabState, [&](const GrabState&) { ++received_there; }));
+  ASSERT_TRUE(test::dispatchUntil(inbox_, [&] { return received_there == 1; }));
+  EXPECT_EQ(received_elsewhere, 0);
 }
 
-TEST_F(EndpointTest, ADisposedKeyIsGoneAndTheOthersStay) {
+TEST_F(EndpointTest, ADisposedInstanceIsReportedAsGoneAndOthersStay) {
   auto objects = Writer<SceneObject>::open(here_, kSceneObject);
   for (std::uint32_t id = 0; id < 3; ++id)
     ASSERT_TRUE(objects->write({.object = ObjectId{id}, .name = "part"}));
   std::vector<ObjectId> gone;
-  int heard = 0;
-  ASSERT_TRUE(inbox_.on<SceneObject>(there_, kSceneObject, [&](const SceneObject&) { ++heard; }));
+  int received = 0;
+  ASSERT_TRUE(inbox_.on<SceneObject>(there_, kSceneObject, [&](const SceneObject&) { ++received; }));
   ASSERT_TRUE(inbox_.onGone<SceneObject>(there_, kSceneObject,
                                          [&](const SceneObject& key) { gone.push_back(key.object); }));
-  ASSERT_TRUE(test::dispatchUntil(inbox_, [&] { return heard == 3; }));
+  ASSERT_TRUE(test::dispatchUntil(inbox_, [&] { return received == 3; }));
   ASSERT_TRUE(objects->dispose({.object = ObjectId{1}}));
   ASSERT_TRUE(test::dispatchUntil(inbox_, [&] { return !gone.empty(); }));
   EXPECT_EQ(gone, std::vector<ObjectId>{ObjectId{1}});
 }
 
-TEST_F(EndpointTest, AnEmergencyStopStaysWhenItsWriterGoes) {
+TEST_F(EndpointTest, AnEmergencyStopOutlivesItsWriter) {
   bool engaged = false;
   bool gone = false;
   ASSERT_TRUE(inbox_.on<EmergencyStop>(there_, kEmergencyStop,
@@ -111,7 +111,7 @@ TEST_F(EndpointTest, AnEmergencyStopStaysWhenItsWriterGoes) {
   EXPECT_FALSE(gone);
 }
 
-TEST_F(EndpointTest, AReaderWithoutAnInboxTakesOneByOne) {
+TEST_F(EndpointTest, AReaderTakesSamplesOneByOne) {
   auto reader = Reader<RunState>::open(there_, kRunState);
   auto writer = Writer<RunState>::open(here_, kRunState);
   ASSERT_TRUE(writer->write({.phase = RunPhase::kRunning, .reason = "go"}));
@@ -128,17 +128,17 @@ TEST_F(EndpointTest, WakeEndsTheWaiting) {
   waker.join();
 }
 
-TEST_F(EndpointTest, AConfigurationFileThatIsNotThereIsOneSentence) {
-  const auto bus = Participant::open({.domain = 7, .config = "no/such/file.xml"});
-  ASSERT_FALSE(bus);
-  EXPECT_EQ(bus.error().what, "no/such/file.xml: there is no such DDS configuration file");
+TEST_F(EndpointTest, AMissingConfigurationFileIsAnErrorThatNamesIt) {
+  const auto opened = Participant::open({.domain = 7, .config = "no/such/file.xml"});
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().what, "no/such/file.xml: there is no such DDS configuration file");
 }
 
-TEST_F(EndpointTest, AWrongConfigurationIsOneSentence) {
-  const auto bus =
+TEST_F(EndpointTest, AWrongConfigurationIsAnError) {
+  const auto opened =
       Participant::open({.domain = 8, .config = "<CycloneDDS><Domain><Nonsense/></Domain></CycloneDDS>"});
-  ASSERT_FALSE(bus);
-  EXPECT_TRUE(bus.error().what.starts_with("DDS domain 8 could not be opened: ")) << bus.error().what;
+  ASSERT_FALSE(opened);
+  EXPECT_TRUE(opened.error().what.starts_with("DDS domain 8 could not be opened: ")) << opened.error().what;
 }
 
 TEST_F(EndpointTest, ATextThatIsTooLongIsNotWritten) {
@@ -148,9 +148,9 @@ TEST_F(EndpointTest, ATextThatIsTooLongIsNotWritten) {
   EXPECT_NE(written.error().what.find("'text' has 2000"), std::string::npos) << written.error().what;
 }
 
-TEST_F(EndpointTest, ATapGivesTheVeryBytesOfEncodeAndSeesDisposals) {
-  auto tap = Tap::open(there_);
-  ASSERT_TRUE(tap) << tap.error().what;
+TEST_F(EndpointTest, ARawSubscriberGivesTheBytesOfEncodeAndDisposals) {
+  auto subscriber = RawSubscriber::open(there_);
+  ASSERT_TRUE(subscriber) << subscriber.error().what;
   auto snapshots = Writer<ObjectSnapshot>::open(here_, kObjectSnapshot);
   while (snapshots->matchedReaders() == 0) std::this_thread::yield();
   const auto sent = test::RandomMessages(9).make<ObjectSnapshot>();
@@ -159,7 +159,7 @@ TEST_F(EndpointTest, ATapGivesTheVeryBytesOfEncodeAndSeesDisposals) {
   std::vector<std::uint8_t> bytes;
   bool gone = false;
   while (!gone) {
-    tap->dispatch(std::chrono::milliseconds(50), [&](const RawSample& sample) {
+    subscriber->dispatch(std::chrono::milliseconds(50), [&](const RawSample& sample) {
       EXPECT_EQ(sample.topic, "ObjectSnapshot");
       EXPECT_EQ(sample.type, "tenon::ObjectSnapshot");
       EXPECT_GT(sample.source_ns, 0);
@@ -173,12 +173,12 @@ TEST_F(EndpointTest, ATapGivesTheVeryBytesOfEncodeAndSeesDisposals) {
   EXPECT_EQ(bytes, *encode(sent));
 }
 
-TEST_F(EndpointTest, ARecordedSampleIsPlayedWithItsTimeAndBytes) {
-  Partition replay(bus_, "replay/test");
-  Partition watcher(other_bus_, "replay/test");
-  auto tap = Tap::open(watcher, {"EventLog"});
+TEST_F(EndpointTest, ARecordedSampleIsReplayedWithItsTimeAndBytes) {
+  Partition replay(participant_, "replay/test");
+  Partition watcher(other_participant_, "replay/test");
+  auto subscriber = RawSubscriber::open(watcher, {"EventLog"});
   auto writer = RawWriter::open(replay, "EventLog");
-  ASSERT_TRUE(tap);
+  ASSERT_TRUE(subscriber);
   ASSERT_TRUE(writer);
   EventLog event;
   event.text = "as it was";
@@ -186,7 +186,7 @@ TEST_F(EndpointTest, ARecordedSampleIsPlayedWithItsTimeAndBytes) {
   ASSERT_TRUE(writer->write({.source_ns = 1'234'567'890'123, .bytes = *bytes}));
   std::size_t count = 0;
   while (count == 0) {
-    count = tap->dispatch(std::chrono::milliseconds(50), [&](const RawSample& sample) {
+    count = subscriber->dispatch(std::chrono::milliseconds(50), [&](const RawSample& sample) {
       EXPECT_EQ(sample.source_ns, 1'234'567'890'123);
       EXPECT_TRUE(std::equal(sample.bytes.begin(), sample.bytes.end(), bytes->begin(), bytes->end()));
     });
@@ -194,7 +194,7 @@ TEST_F(EndpointTest, ARecordedSampleIsPlayedWithItsTimeAndBytes) {
   EXPECT_EQ(count, 1U);
 }
 
-TEST_F(EndpointTest, ARawWriterRefusesWhatIsNoSampleOfItsTopic) {
+TEST_F(EndpointTest, ARawWriterRefusesBytesThatAreNoSampleOfItsTopic) {
   auto writer = RawWriter::open(here_, "EventLog");
   const std::vector<std::uint8_t> bytes{0, 1, 0, 0, 1, 2, 3};
   const auto written = writer->write({.bytes = bytes});
@@ -204,4 +204,4 @@ TEST_F(EndpointTest, ARawWriterRefusesWhatIsNoSampleOfItsTopic) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::wire

@@ -9,19 +9,19 @@
 
 #include "tests/idl/wire/peer.h"
 
-namespace tenon {
+namespace tenon::wire {
 namespace {
 
 using std::chrono::milliseconds;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-/// A server of a process of its own that knows one seat: who asks for hand "taken" is refused, and whoever
-/// says hello by an event is taken out once.
-void runDoor(std::uint32_t domain) {
-  auto bus = test::participant(domain);
-  Partition lobby(bus, kLobby);
-  Partition session(bus, sessionPartition("test"));
+/// A server in a process of its own with one seat. It refuses a client that wants hand "taken", and removes
+/// the client once when it receives a ClientEvent.
+void runServer(std::uint32_t domain) {
+  auto participant = test::participant(domain);
+  Partition lobby(participant, kLobby);
+  Partition session(participant, sessionPartition("test"));
   auto announces = Writer<SessionAnnounce>::open(lobby, kSessionAnnounce);
   auto welcomes = Writer<Welcome>::open(lobby, kWelcome);
   if (!announces || !announces->write({.session = "test", .server_epoch = 7})) _exit(1);
@@ -50,45 +50,45 @@ void runDoor(std::uint32_t domain) {
   while (true) inbox.dispatch(std::chrono::seconds(1));
 }
 
-MembershipWishes wishes(std::uint32_t domain) {
-  return {.domain = domain, .person = "Ada", .role = Role::kTrainee, .patience = std::chrono::seconds(60)};
+MembershipOptions traineeOptions(std::uint32_t domain) {
+  return {.domain = domain, .person = "Ada", .role = Role::kTrainee, .timeout = std::chrono::seconds(60)};
 }
 
 //   this process: find, join        lobby        peer: announce, welcome
 TEST(Membership, FindsTheSessionOfAnotherProcessAndJoins) {
   const std::uint32_t domain = test::ownDomain();
-  const test::Peer peer([domain] { runDoor(domain); });
+  const test::Peer peer([domain] { runServer(domain); });
   const std::atomic<bool> stop = false;
-  auto member = Membership::find(wishes(domain), stop);
+  auto member = Membership::find(traineeOptions(domain), stop);
   ASSERT_TRUE(member) << member.error().what;
   EXPECT_EQ((*member)->sessionName(), "test");
-  int looks = 0;
-  const auto joined = (*member)->join(stop, [&] { ++looks; });
+  int calls = 0;
+  const auto joined = (*member)->join(stop, [&] { ++calls; });
   ASSERT_TRUE(joined) << joined.error().what;
-  EXPECT_GT(looks, 0) << "somebody who records listens while he waits";
+  EXPECT_GT(calls, 0) << "a recorder takes samples meanwhile";
   EXPECT_EQ((*member)->welcome().client, ClientId{1});
   EXPECT_EQ((*member)->welcome().server_epoch, 7U);
   EXPECT_FALSE((*member)->lost());
 }
 
-TEST(Membership, ARefusalIsTheServersReason) {
+TEST(Membership, ARefusalHasTheServersReason) {
   const std::uint32_t domain = test::ownDomain();
-  const test::Peer peer([domain] { runDoor(domain); });
+  const test::Peer peer([domain] { runServer(domain); });
   const std::atomic<bool> stop = false;
-  MembershipWishes wish = wishes(domain);
-  wish.hands = {"taken"};
-  auto member = Membership::find(wish, stop);
+  MembershipOptions options = traineeOptions(domain);
+  options.hands = {"taken"};
+  auto member = Membership::find(options, stop);
   ASSERT_TRUE(member) << member.error().what;
   const auto joined = (*member)->join(stop);
   ASSERT_FALSE(joined);
   EXPECT_THAT(joined.error().what, HasSubstr("refuses: that hand is taken"));
 }
 
-TEST(Membership, WhoIsTakenOutComesBackWithTheToken) {
+TEST(Membership, ARemovedClientRejoinsWithItsToken) {
   const std::uint32_t domain = test::ownDomain();
-  const test::Peer peer([domain] { runDoor(domain); });
+  const test::Peer peer([domain] { runServer(domain); });
   const std::atomic<bool> stop = false;
-  auto member = Membership::find(wishes(domain), stop);
+  auto member = Membership::find(traineeOptions(domain), stop);
   ASSERT_TRUE(member) << member.error().what;
   ASSERT_TRUE((*member)->join(stop));
   Inbox inbox;
@@ -102,18 +102,18 @@ TEST(Membership, WhoIsTakenOutComesBackWithTheToken) {
   EXPECT_THAT(*(*member)->lost(), HasSubstr("too loud"));
   EXPECT_FALSE((*member)->serverIsGone());
 
-  const auto back = (*member)->comeBack(stop, [&] { inbox.dispatch(milliseconds(0)); });
+  const auto back = (*member)->rejoin(stop, [&] { inbox.dispatch(milliseconds(0)); });
   ASSERT_TRUE(back) << back.error().what;
   EXPECT_EQ((*member)->welcome().token, "token of the first, again");
   inbox.dispatch(milliseconds(50));
   EXPECT_FALSE((*member)->lost());
 }
 
-TEST(Membership, AServerThatIsKilledIsGoneAndWhoHasNoneSaysSo) {
+TEST(Membership, AKilledServerIsReportedAsGoneAndAMissingOneAsNotAnnounced) {
   const std::uint32_t domain = test::ownDomain();
-  test::Peer peer([domain] { runDoor(domain); });
+  test::Peer peer([domain] { runServer(domain); });
   const std::atomic<bool> stop = false;
-  auto member = Membership::find(wishes(domain), stop);
+  auto member = Membership::find(traineeOptions(domain), stop);
   ASSERT_TRUE(member) << member.error().what;
   ASSERT_TRUE((*member)->join(stop));
   Inbox inbox;
@@ -126,41 +126,41 @@ TEST(Membership, AServerThatIsKilledIsGoneAndWhoHasNoneSaysSo) {
   ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return (*member)->serverIsGone(); }));
   EXPECT_THAT(*(*member)->lost(), HasSubstr("'test' is gone"));
 
-  MembershipWishes nobody = wishes(domain);
-  nobody.session = "nowhere";
-  nobody.patience = std::chrono::seconds(0);
-  const auto none = Membership::find(nobody, stop);
-  ASSERT_FALSE(none);
-  EXPECT_THAT(none.error().what, HasSubstr("no server announced session 'nowhere'"));
-  EXPECT_THAT(none.error().what, HasSubstr("tenon serve"));
+  MembershipOptions missing = traineeOptions(domain);
+  missing.session = "nowhere";
+  missing.timeout = std::chrono::seconds(0);
+  const auto found = Membership::find(missing, stop);
+  ASSERT_FALSE(found);
+  EXPECT_THAT(found.error().what, HasSubstr("no server announced session 'nowhere'"));
+  EXPECT_THAT(found.error().what, HasSubstr("tenon serve"));
 }
 
-// two programs of one process write the same topic: what they claim is equal, who they are is not
-TEST(Origin, IsTheWritersOwnWhateverTheMessageClaims) {
+// two participants write equal samples to one topic: their origins differ
+TEST(Origin, IsThatOfTheWritingParticipant) {
   const std::uint32_t domain = test::ownDomain();
-  auto server_bus = test::participant(domain);
-  auto ada_bus = test::participant(domain);
-  auto rogue_bus = test::participant(domain);
-  Partition room(server_bus, "s/test");
-  Partition ada_room(ada_bus, "s/test");
-  Partition rogue_room(rogue_bus, "s/test");
-  auto ada = Writer<Command>::open(ada_room, kCommand);
-  auto rogue = Writer<Command>::open(rogue_room, kCommand);
+  auto server = test::participant(domain);
+  auto client = test::participant(domain);
+  auto intruder = test::participant(domain);
+  Partition session(server, "s/test");
+  Partition client_session(client, "s/test");
+  Partition intruder_session(intruder, "s/test");
+  auto client_writer = Writer<Command>::open(client_session, kCommand);
+  auto intruder_writer = Writer<Command>::open(intruder_session, kCommand);
   Inbox inbox;
   std::vector<Origin> origins;
-  ASSERT_TRUE(inbox.onFrom<Command>(room, kCommand,
+  ASSERT_TRUE(inbox.onFrom<Command>(session, kCommand,
                                     [&](const Command&, const Origin& from) { origins.push_back(from); }));
   ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return inbox.matchedWriters() == 2; }));
   const Command same{.client = ClientId{1}, .id = 1};
-  ASSERT_TRUE(ada->write(same));
+  ASSERT_TRUE(client_writer->write(same));
   ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return origins.size() == 1; }));
-  ASSERT_TRUE(rogue->write(same));
+  ASSERT_TRUE(intruder_writer->write(same));
   ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return origins.size() == 2; }));
-  EXPECT_EQ(origins[0], ada_bus->origin());
-  EXPECT_EQ(origins[1], rogue_bus->origin());
+  EXPECT_EQ(origins[0], client->origin());
+  EXPECT_EQ(origins[1], intruder->origin());
   EXPECT_NE(origins[0], origins[1]);
   EXPECT_TRUE(origins[0].known());
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::wire

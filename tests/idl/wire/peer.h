@@ -15,18 +15,18 @@
 
 namespace tenon::test {
 
-/// A domain of this test process: programs of other test runs on this machine stay apart.
+/// A DDS domain by process id, to separate test runs on one machine.
 inline std::uint32_t ownDomain() { return 20 + static_cast<std::uint32_t>(getpid()) % 200; }
 
-inline std::shared_ptr<Participant> participant(std::uint32_t domain,
-                                                LinkProfile profile = LinkProfile::kLan) {
-  auto opened = Participant::open({.domain = domain, .profile = profile, .config = {}});
+inline std::shared_ptr<wire::Participant> participant(std::uint32_t domain,
+                                                      wire::LinkProfile profile = wire::LinkProfile::kLan) {
+  auto opened = wire::Participant::open({.domain = domain, .profile = profile, .config = {}});
   if (!opened) throw std::runtime_error(opened.error().what);
   return *opened;
 }
 
-/// Another process that runs a function; made before this one has touched DDS, because DDS does not survive a
-/// fork.
+/// Another process that runs a function; must be created before this process uses DDS, which does not survive
+/// a fork.
 class Peer {
  public:
   explicit Peer(const std::function<void()>& run) : pid_(fork()) {
@@ -41,7 +41,7 @@ class Peer {
   Peer(const Peer&) = delete;
   Peer& operator=(const Peer&) = delete;
 
-  /// Without a chance to say good-bye.
+  /// Without disposing its instances.
   void kill() {
     ::kill(pid_, SIGKILL);
     waitpid(pid_, nullptr, 0);
@@ -52,8 +52,8 @@ class Peer {
   pid_t pid_;
 };
 
-/// Dispatches until `done`; false when that has not come after a minute.
-inline bool dispatchUntil(Inbox& inbox, const std::function<bool()>& done) {
+/// Dispatches until `done`; false after a minute.
+inline bool dispatchUntil(wire::Inbox& inbox, const std::function<bool()>& done) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
   while (!done()) {
     if (std::chrono::steady_clock::now() > end) return false;

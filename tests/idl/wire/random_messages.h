@@ -10,11 +10,10 @@
 
 namespace tenon::test {
 
-/// Fills any message with values of every kind: finite doubles of any size, ids with and without a value,
-/// texts of any length that fits, lists from empty to full. With `full`, all texts and lists are as long as
-/// they may be.
+/// Fills any message with random values: finite numbers, valid and invalid ids, texts and lists up to their
+/// bounds. With `full`, all texts and lists have their maximum length.
 ///
-/// Threads: own it. Real-time: no.
+/// Threads: one. Real-time: no.
 class RandomMessages {
  public:
   explicit RandomMessages(std::uint64_t seed, bool full = false) : random_(seed), full_(full) {}
@@ -28,7 +27,7 @@ class RandomMessages {
 
  private:
   std::uint32_t below(std::uint32_t bound) { return static_cast<std::uint32_t>(random_() % bound); }
-  std::size_t upTo(std::size_t most) { return full_ ? most : random_() % (most + 1); }
+  std::size_t upTo(std::size_t max) { return full_ ? max : random_() % (max + 1); }
 
   void fill(bool& x) { x = below(2) == 1; }
   void fill(std::uint8_t& x) { x = static_cast<std::uint8_t>(below(256)); }
@@ -54,13 +53,13 @@ class RandomMessages {
     else
       fill(id.value);
   }
-  void text(std::string& s, std::size_t most) {
+  void text(std::string& s, std::size_t max) {
     s.clear();
-    for (std::size_t size = upTo(most); s.size() < size;) s += static_cast<char>(1 + below(255));
+    for (std::size_t size = upTo(max); s.size() < size;) s += static_cast<char>(1 + below(255));
   }
-  void many(auto& list, std::size_t most) {
+  void many(auto& list, std::size_t max) {
     list.clear();
-    list.resize(upTo(most));
+    list.resize(upTo(max));
     for (std::size_t i = 0; i < list.size(); ++i) fill(list[i]);
   }
   void names(std::vector<std::string>& list) {
@@ -91,11 +90,11 @@ class RandomMessages {
     text(m.text, 79);
     fill(m.value, m.limit, m.met);
   }
-  void texts(std::vector<LocalizedText>& list, std::size_t most) {
+  void texts(std::vector<LocalizedText>& list, std::size_t max) {
     list.resize(upTo(3));
     for (LocalizedText& entry : list) {
       text(entry.language, 7);
-      text(entry.text, most);
+      text(entry.text, max);
     }
   }
 

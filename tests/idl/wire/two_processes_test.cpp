@@ -7,56 +7,56 @@
 #include "idl/wire/endpoint.h"
 #include "tests/idl/wire/peer.h"
 
-namespace tenon {
+namespace tenon::wire {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// these tests fork: gtest runs each in a process of its own under ctest, and DDS is not used before the fork
+// These tests fork before DDS is used; ctest runs each of them in a process of its own.
 void echoManifolds(std::uint32_t domain) {
-  auto bus = test::participant(domain, LinkProfile::kLockstep);
-  Partition session(bus, "s/test");
+  auto participant = test::participant(domain, LinkProfile::kLockstep);
+  Partition session(participant, "s/test");
   auto manifolds = Writer<HandManifold>::open(session, kHandManifold);
   Inbox inbox;
-  const auto heard = inbox.on<DeviceInput>(session, kDeviceInput, [&](const DeviceInput& input) {
+  const auto added = inbox.on<DeviceInput>(session, kDeviceInput, [&](const DeviceInput& input) {
     HandManifold answer;
     answer.hand = input.hand;
     answer.answers_seq = input.samples[0].seq;
     answer.contacts.resize(kManifoldContacts);
     if (!manifolds->write(answer)) _exit(1);
   });
-  if (!heard || !manifolds) _exit(1);
+  if (!added || !manifolds) _exit(1);
   while (true) inbox.dispatch(std::chrono::seconds(1));
 }
 
 //   this process                      peer
 //     DeviceInput n  ------------->
-//                    <-------------  HandManifold that answers n          10,000 times, none may be missing
+//                    <-------------  HandManifold that answers n          10,000 times without loss
 TEST(TwoProcesses, ExchangeTenThousandLockstepTicksWithoutLoss) {
   constexpr std::uint32_t kTicks = 10'000;
   const std::uint32_t domain = test::ownDomain();
   const test::Peer peer([domain] { echoManifolds(domain); });
-  auto bus = test::participant(domain, LinkProfile::kLockstep);
-  Partition session(bus, "s/test");
+  auto participant = test::participant(domain, LinkProfile::kLockstep);
+  Partition session(participant, "s/test");
   Inbox inbox;
   std::uint32_t answered = 0;
   std::uint32_t out_of_order = 0;
-  bool met = false;
+  bool matched = false;
   ASSERT_TRUE(inbox.on<HandManifold>(session, kHandManifold, [&](const HandManifold& manifold) {
-    met = true;
+    matched = true;
     if (manifold.answers_seq == 0) return;
     if (manifold.answers_seq != answered + 1) ++out_of_order;
     answered = manifold.answers_seq;
   }));
   auto inputs = Writer<DeviceInput>::open(session, kDeviceInput);
   ASSERT_TRUE(inputs);
-  // that we know the peer does not mean that it knows us: greet with input 0 until it answers
+  // matching is not symmetric in time: input 0 is sent until the peer answers it
   ASSERT_TRUE(test::dispatchUntil(inbox, [&] {
-    DeviceInput greeting;
-    greeting.hand = HandId{0};
-    return met || !inputs->write(greeting);
+    DeviceInput first;
+    first.hand = HandId{0};
+    return matched || !inputs->write(first);
   }));
-  ASSERT_TRUE(met);
+  ASSERT_TRUE(matched);
 
   std::vector<double> rtt_us;
   for (std::uint32_t tick = 1; tick <= kTicks; ++tick) {
@@ -74,7 +74,7 @@ TEST(TwoProcesses, ExchangeTenThousandLockstepTicksWithoutLoss) {
   std::printf("round trip p50 %.0f us, p99 %.0f us\n", rtt_us[kTicks / 2], rtt_us[kTicks * 99 / 100]);
 }
 
-TEST(TwoProcesses, APersonWhoseProcessIsKilledGoesAway) {
+TEST(TwoProcesses, ThePresenceOfAKilledProcessIsReportedAsGone) {
   const std::uint32_t domain = test::ownDomain();
   test::Peer peer([domain] {
     Partition session(test::participant(domain), "s/test");
@@ -87,17 +87,17 @@ TEST(TwoProcesses, APersonWhoseProcessIsKilledGoesAway) {
   });
   Partition session(test::participant(domain), "s/test");
   Inbox inbox;
-  std::string came;
-  ClientId went;
-  ASSERT_TRUE(inbox.on<Presence>(session, kPresence, [&](const Presence& here) { came = here.name; }));
-  ASSERT_TRUE(inbox.onGone<Presence>(session, kPresence, [&](const Presence& gone) { went = gone.client; }));
-  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return !came.empty(); }));
-  EXPECT_EQ(came, "Ada");
-  EXPECT_FALSE(went.valid());
+  std::string present;
+  ClientId left;
+  ASSERT_TRUE(inbox.on<Presence>(session, kPresence, [&](const Presence& here) { present = here.name; }));
+  ASSERT_TRUE(inbox.onGone<Presence>(session, kPresence, [&](const Presence& gone) { left = gone.client; }));
+  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return !present.empty(); }));
+  EXPECT_EQ(present, "Ada");
+  EXPECT_FALSE(left.valid());
   peer.kill();
-  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return went.valid(); }));
-  EXPECT_EQ(went, ClientId{4});
+  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return left.valid(); }));
+  EXPECT_EQ(left, ClientId{4});
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::wire

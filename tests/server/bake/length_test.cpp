@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
-namespace tenon {
+namespace tenon::bake {
 namespace {
 
-TEST(Length, IsReadAsPeopleWriteIt) {
+TEST(Length, ReadsNumbersWithUnits) {
   EXPECT_EQ(parseLength("3mm").value_or(-1.0), 0.003);
   EXPECT_EQ(parseLength("0.5 mm").value_or(-1.0), 0.0005);
   EXPECT_EQ(parseLength("0.003m").value_or(-1.0), 0.003);
@@ -14,7 +14,7 @@ TEST(Length, IsReadAsPeopleWriteIt) {
   EXPECT_EQ(parseLength("-0.25").value_or(-1.0), -0.25);
 }
 
-TEST(Length, NonsenseIsRefusedByName) {
+TEST(Length, InvalidTextIsRefusedAndQuoted) {
   for (const char* text : {"", "mm", "3 furlongs", "nan", "1e999m", "0,5mm"}) {
     const auto length = parseLength(text);
     ASSERT_FALSE(length) << text;
@@ -23,4 +23,4 @@ TEST(Length, NonsenseIsRefusedByName) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -10,7 +10,7 @@
 #include "server/bake/bake.h"
 #include "tests/support/shared_files.h"
 
-namespace tenon {
+namespace tenon::bake {
 namespace {
 
 namespace fs = std::filesystem;
@@ -27,7 +27,7 @@ fs::path folderForThisTest() {
 TEST(MeshImport, LoadsOrRefusesEveryMalformedFileWithOneSentence) {
   const fs::path folder = test::sharedFolder() / "malformed";
   if (!fs::exists(folder)) GTEST_SKIP() << "no folder of malformed meshes (TENON_SHARED)";
-  // those that may load; all others must be refused
+  // files that must load, with the least number of triangles; all others must be refused
   const std::map<std::string, std::size_t> loads{
       {"stl_nan_vertices.stl", 12},       {"stl_inside_out.stl", 12},     {"obj_missing_mtl.obj", 12},
       {"obj_ngon_20000.obj", 19984},      {"obj_bad_utf8_group.obj", 12}, {"gltf_mirror_scale_node.gltf", 12},
@@ -53,13 +53,13 @@ TEST(MeshImport, LoadsOrRefusesEveryMalformedFileWithOneSentence) {
   EXPECT_GE(seen, 39);
 }
 
-TEST(MeshImport, SaysWhatItLeftOut) {
+TEST(MeshImport, NotesSkippedTriangles) {
   const fs::path file = test::sharedFolder() / "malformed" / "stl_nan_vertices.stl";
   if (!fs::exists(file)) GTEST_SKIP() << "no folder of malformed meshes (TENON_SHARED)";
   const auto mesh = importMesh(file, 1.0);
   ASSERT_TRUE(mesh) << mesh.error().what;
   ASSERT_EQ(mesh->notes.size(), 1U);
-  EXPECT_THAT(mesh->notes[0], HasSubstr("left out"));
+  EXPECT_THAT(mesh->notes[0], HasSubstr("skipped"));
 }
 
 TEST(MeshImport, AppliesUnitAndMirroredNodes) {
@@ -82,7 +82,7 @@ TEST(MeshImport, ReadsAFileWhoseNameIsNotUtf8) {
   fs::remove_all(folder);
 }
 
-TEST(MeshImport, SizesThatNothingHasAreRefusedOrBakedInTheRightUnit) {
+TEST(MeshImport, ImplausibleSizesAreRefused) {
   const fs::path folder = folderForThisTest();
   const fs::path file = folder / "corner.obj";
   const auto write = [&file](const char* size) {
@@ -98,18 +98,18 @@ TEST(MeshImport, SizesThatNothingHasAreRefusedOrBakedInTheRightUnit) {
   write("100");
   const auto millimetres = bakeFiles({file}, 1e-3, {});
   ASSERT_TRUE(millimetres) << millimetres.error().what;
-  // the same numbers as metres ask for 3 mm in a cube of 100 m
+  // in metres the same file is a cube of 100 m, too large for voxels of 3 mm
   const auto metres = bakeFiles({file}, 1.0, {});
   ASSERT_FALSE(metres);
   EXPECT_THAT(metres.error().what, HasSubstr("more than 3 GB"));
   fs::remove_all(folder);
 }
 
-TEST(MeshImport, NamesAFileThatIsNotThere) {
+TEST(MeshImport, AMissingFileIsNamed) {
   EXPECT_THAT(importMesh("/no/such.stl", 1.0).error().what, HasSubstr("/no/such.stl"));
 }
 
-TEST(BakeCache, BakesOnceAndAgainWhenTheMeshOrAnOptionChanges) {
+TEST(BakeCache, BakesAgainOnlyWhenTheMeshOrAnOptionChanges) {
   const fs::path folder = folderForThisTest();
   const fs::path mesh = folder / "corner.obj";
   const auto write = [&mesh](const char* height) {
@@ -118,8 +118,8 @@ TEST(BakeCache, BakesOnceAndAgainWhenTheMeshOrAnOptionChanges) {
   };
   write("0.1");
   int bakes = 0;
-  const auto count = [&bakes](double share, std::string_view) {
-    if (share >= 1.0) ++bakes;
+  const auto count = [&bakes](double fraction, std::string_view) {
+    if (fraction >= 1.0) ++bakes;
     return true;
   };
   BakeOptions options;
@@ -137,12 +137,12 @@ TEST(BakeCache, BakesOnceAndAgainWhenTheMeshOrAnOptionChanges) {
   write("0.2");
   options.points = 200;
   EXPECT_NE(bakeCached({mesh}, 1.0, options, folder / "cache").value_or(*first), *first);
-  // a damaged file is baked again
+  // a damaged file is replaced
   fs::resize_file(*first, 100);
   write("0.1");
   const auto repaired = bakeCached({mesh}, 1.0, options, folder / "cache");
   ASSERT_TRUE(repaired);
-  EXPECT_TRUE(openStructures(*repaired));
+  EXPECT_TRUE(structures::openStructures(*repaired));
   fs::remove_all(folder);
 }
 
@@ -151,11 +151,11 @@ TEST(BakeCache, ACancelledBakeLeavesNoFile) {
   const fs::path mesh = folder / "corner.obj";
   std::ofstream(mesh) << "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n";
   const auto file =
-      bakeCached({mesh}, 1.0, {}, folder / "cache", [](double share, auto) { return share < 0.5; });
+      bakeCached({mesh}, 1.0, {}, folder / "cache", [](double fraction, auto) { return fraction < 0.5; });
   EXPECT_FALSE(file);
   EXPECT_TRUE(fs::is_empty(folder / "cache"));
   fs::remove_all(folder);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::bake

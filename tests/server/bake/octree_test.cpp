@@ -11,7 +11,7 @@
 #include "server/bake/sweep.h"
 #include "tests/support/analytic_structures.h"
 
-namespace tenon {
+namespace tenon::bake {
 namespace {
 
 namespace fs = std::filesystem;
@@ -26,7 +26,7 @@ class Octree : public ::testing::Test {
                                    ::testing::UnitTest::GetInstance()->current_test_info()->name());
 };
 
-VoxelSet swept(const HapticStructures& body, const std::vector<Pose>& poses, double cell) {
+VoxelSet swept(const structures::HapticStructures& body, const std::vector<Pose>& poses, double cell) {
   auto cells = sweep(body, poses, {cell, 0.0});
   EXPECT_TRUE(cells) << cells.error().what;
   return cells ? *cells : VoxelSet(cell);
@@ -40,27 +40,27 @@ TEST_F(Octree, ABallAtRestFillsItsVolume) {
 }
 
 //    .-----------.
-//   (  o ----> o  )    two poses only: what lies between them is swept too
+//   (  o ----> o  )    two poses: the space between them is swept too
 //    '-----------'
-TEST_F(Octree, ABallOnAStraightWaySweepsACapsule) {
+TEST_F(Octree, ABallOnAStraightPathSweepsACapsule) {
   const auto ball = test::sphereStructures(0.03, 0.003, 0.005);
   const double truth = std::numbers::pi * 0.03 * 0.03 * (0.25 + 4.0 / 3.0 * 0.03);
   const VoxelSet cells = swept(*ball, {Pose(Vector3(0, 0, 0)), Pose(Vector3(0.15, 0.2, 0.0))}, 0.002);
   EXPECT_NEAR(cells.volume(), truth, 0.01 * truth);
 }
 
-TEST_F(Octree, ABarThatTurnsSweepsADisc) {
+TEST_F(Octree, ARotatingBarSweepsADisc) {
   const auto bar = test::boxStructures(Vector3(0.2, 0.02, 0.032), 0.002, 0.005);
   std::vector<Pose> poses;
   for (int k = 0; k <= 2; ++k) {
     poses.emplace_back(Vector3(0, 0, 0), expRotation(Vector3(0.0, 0.0, 0.5 * std::numbers::pi * k)));
   }
-  // the tips are corners, half the diagonal away; a cell's middle is never on the upper or lower side
+  // the radius is half the bar's diagonal; no cell's middle is on the upper or lower face
   const double truth = std::numbers::pi * (0.1 * 0.1 + 0.01 * 0.01) * 0.032;
   EXPECT_NEAR(swept(*bar, poses, 0.002).volume(), truth, 0.02 * truth);
 }
 
-TEST_F(Octree, ClearanceIsThatOfTheNearestPlaceOfTheWay) {
+TEST_F(Octree, ClearanceIsTheMinimumAlongThePath) {
   const auto ball = test::sphereStructures(0.03, 0.003, 0.002);
   const auto floor = test::floorStructures(0.4, 0.003);
   const auto above = [](double x, double z) { return Pose(Vector3(x, 0.0, z)); };
@@ -83,7 +83,7 @@ TEST_F(Octree, ClearanceIsThatOfTheNearestPlaceOfTheWay) {
   EXPECT_GT(far->distance, 0.008);
 }
 
-TEST_F(Octree, WhatIsWrittenIsReadAndBakedAgainAsTheSameSolid) {
+TEST_F(Octree, AWrittenOctreeIsBakedToTheSameSolid) {
   const auto box = test::boxStructures(Vector3(0.12, 0.08, 0.06), 0.003, 0.005);
   const VoxelSet cells = swept(*box, {Pose(Vector3(0.003, 0.001, 0.002))}, 0.01);
   for (const char* name : {"box.bt", "box.ot"}) {
@@ -107,12 +107,12 @@ TEST_F(Octree, WhatIsWrittenIsReadAndBakedAgainAsTheSameSolid) {
   }
 }
 
-TEST_F(Octree, ACellInsideIsNoSkin) {
+TEST_F(Octree, InteriorCellsHaveNoSurface) {
   VoxelSet cells =
       swept(*test::boxStructures(Vector3::Constant(0.16), 0.004, 0.02), {Pose::Identity()}, 0.01);
   const fs::path file = folder_ / "cube.bt";
   ASSERT_TRUE(writeOctree(file, cells));
-  const auto corners = readOctreeSkin(file);
+  const auto corners = readOctreeSurface(file);
   ASSERT_TRUE(corners) << corners.error().what;
   double area = 0.0;
   for (std::size_t i = 0; i + 2 < corners->size(); i += 3) {
@@ -122,29 +122,29 @@ TEST_F(Octree, ACellInsideIsNoSkin) {
   EXPECT_NEAR(area, 6 * 0.16 * 0.16, 1e-6);
 }
 
-TEST_F(Octree, ACutOrBrokenFileIsOneSentence) {
+TEST_F(Octree, ATruncatedOrDamagedFileIsAnErrorOfOneLine) {
   const auto ball = test::sphereStructures(0.05, 0.003, 0.005);
   const VoxelSet cells = swept(*ball, {Pose::Identity()}, 0.004);
   for (const char* name : {"ball.bt", "ball.ot"}) {
     const fs::path file = folder_ / name;
     ASSERT_TRUE(writeOctree(file, cells));
     const auto bytes = fs::file_size(file);
-    for (const double share : {0.99, 0.5, 0.1, 0.01}) {
+    for (const double fraction : {0.99, 0.5, 0.1, 0.01}) {
       ASSERT_TRUE(writeOctree(file, cells));
-      fs::resize_file(file, static_cast<std::uintmax_t>(share * static_cast<double>(bytes)));
+      fs::resize_file(file, static_cast<std::uintmax_t>(fraction * static_cast<double>(bytes)));
       const auto mesh = importMesh(file, 1.0);
-      ASSERT_FALSE(mesh) << name << " cut to " << share;
+      ASSERT_FALSE(mesh) << name << " cut to " << fraction;
       EXPECT_THAT(mesh.error().what, HasSubstr(name));
       EXPECT_EQ(mesh.error().what.find('\n'), std::string::npos);
     }
     std::ofstream(file) << "# Octomap OcTree binary file\nid OcTree\nsize 4000000000\nres 0\ndata\n";
     EXPECT_FALSE(importMesh(file, 1.0));
-    std::ofstream(file) << "an octree, honestly";
+    std::ofstream(file) << "not an octree";
     EXPECT_FALSE(importMesh(file, 1.0));
   }
 }
 
-TEST_F(Octree, WhatCannotBeSweptIsRefused) {
+TEST_F(Octree, InvalidSweepsAreRefused) {
   const auto ball = test::sphereStructures(0.05, 0.003, 0.005);
   EXPECT_FALSE(sweep(*ball, {}, {}));
   EXPECT_FALSE(sweep(*ball, std::vector{Pose::Identity()}, {0.0, 0.0}));
@@ -161,4 +161,4 @@ TEST_F(Octree, WhatCannotBeSweptIsRefused) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <ostream>
 
 #include <gtest/gtest.h>
 
@@ -7,21 +8,23 @@
 #include "tests/support/exact_distance.h"
 #include "tests/support/shared_files.h"
 
-namespace tenon {
+namespace tenon::bake {
 namespace {
 
-struct Pair {
+struct CadPair {
   const char* name;
   const char* fixed;
   const char* moving;
-  double lift;  ///< [m] along z from the files' own pose to one without overlap
+  double lift;  ///< [m] along z, from the pose in the files to one without overlap
 };
 
-class RealPairs : public ::testing::TestWithParam<Pair> {};
+void PrintTo(const CadPair& pair, std::ostream* out) { *out << pair.name; }
 
-// The moving part's shell, seated in the fixed part: what the field says of each point against the mesh
-// itself.
-TEST_P(RealPairs, FieldAgreesWithTheMeshAtThePointsOfTheSeatedPart) {
+class RealPairs : public ::testing::TestWithParam<CadPair> {};
+
+// The field of the fixed part at the shell points of the assembled moving part, compared with the exact mesh
+// distance.
+TEST_P(RealPairs, FieldAgreesWithTheMeshAtThePointsOfTheAssembledPart) {
   const auto folder = test::sharedFolder() / "cad" / "pairs" / GetParam().name;
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no folder of CAD pairs (TENON_SHARED)";
   const auto fixed = importMesh(folder / GetParam().fixed, 1.0);
@@ -39,9 +42,9 @@ TEST_P(RealPairs, FieldAgreesWithTheMeshAtThePointsOfTheSeatedPart) {
 
   const test::ExactDistance truth(fixed->vertices, fixed->triangles);
   std::vector<double> errors;
-  for (const ShellPoint& point : shell->shell.points()) {
+  for (const structures::ShellPoint& point : shell->shell.points()) {
     const Vector3 p = point.p_MP.cast<double>() + Vector3(0.0, 0.0, GetParam().lift);
-    const FieldSample sample = field->field.sample(p);
+    const structures::FieldSample sample = field->field.sample(p);
     EXPECT_LE(field->field.lowerBound(p), truth.nearest(p).distance + 1e-9);
     if (sample.exact) errors.push_back(std::abs(std::abs(sample.distance) - truth.nearest(p).distance));
   }
@@ -53,13 +56,13 @@ TEST_P(RealPairs, FieldAgreesWithTheMeshAtThePointsOfTheSeatedPart) {
 
 INSTANTIATE_TEST_SUITE_P(
     Factory, RealPairs,
-    ::testing::Values(Pair{"nv_factory_round_8mm", "factory_round_hole_8mm_subdiv_3x.obj",
-                           "factory_round_peg_8mm_loose.obj", 0.0},
-                      Pair{"nv_factory_rect_16mm", "factory_rectangular_hole_16mm_subdiv_3x.obj",
-                           "factory_rectangular_peg_16mm_loose_subdiv_3x.obj", 0.0},
-                      Pair{"nv_factory_nut_bolt_m16", "factory_bolt_m16_loose.obj",
-                           "factory_nut_m16_loose_subdiv_3x.obj", 0.002}),
+    ::testing::Values(CadPair{"nv_factory_round_8mm", "factory_round_hole_8mm_subdiv_3x.obj",
+                              "factory_round_peg_8mm_loose.obj", 0.0},
+                      CadPair{"nv_factory_rect_16mm", "factory_rectangular_hole_16mm_subdiv_3x.obj",
+                              "factory_rectangular_peg_16mm_loose_subdiv_3x.obj", 0.0},
+                      CadPair{"nv_factory_nut_bolt_m16", "factory_bolt_m16_loose.obj",
+                              "factory_nut_m16_loose_subdiv_3x.obj", 0.002}),
     [](const auto& test_info) { return std::string(test_info.param.name); });
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -6,50 +6,50 @@
 #include "server/bake/bake.h"
 #include "tests/support/test_meshes.h"
 
-namespace tenon {
+namespace tenon::bake {
 namespace {
 
-HapticStructures baked(const TriangleMesh& mesh, std::uint32_t points, double voxel = 0.003) {
+structures::HapticStructures baked(const TriangleMesh& mesh, std::uint32_t points, double voxel = 0.003) {
   BakeOptions options;
   options.voxel = voxel;
   options.points = points;
   auto structures = bake(mesh, options);
   EXPECT_TRUE(structures) << structures.error().what;
-  return structures.value_or(HapticStructures{});
+  return structures.value_or(structures::HapticStructures{});
 }
 
-double totalArea(const Pointshell& shell) {
+double totalArea(const structures::Pointshell& shell) {
   double sum = 0.0;
-  for (const ShellPoint& point : shell.points()) sum += point.area;
+  for (const structures::ShellPoint& point : shell.points()) sum += point.area;
   return sum;
 }
 
-TEST(ShellBake, SpreadsAboutTheAskedNumberOfPointsEvenly) {
-  const HapticStructures structures = baked(test::ballMesh(0.05, 5), 3000);
+TEST(ShellBake, SpreadsAboutTheRequestedNumberOfPointsEvenly) {
+  const structures::HapticStructures structures = baked(test::ballMesh(0.05, 5), 3000);
   const auto points = structures.shell.points();
   EXPECT_NEAR(static_cast<double>(points.size()), 3000.0, 450.0);
-  const double share = 4.0 * std::numbers::pi * 0.05 * 0.05 / static_cast<double>(points.size());
-  for (const ShellPoint& point : points) {
-    EXPECT_GT(point.area, 0.3 * share);
-    EXPECT_LT(point.area, 2.5 * share);
+  const double mean_area = 4.0 * std::numbers::pi * 0.05 * 0.05 / static_cast<double>(points.size());
+  for (const structures::ShellPoint& point : points) {
+    EXPECT_GT(point.area, 0.3 * mean_area);
+    EXPECT_LT(point.area, 2.5 * mean_area);
   }
   EXPECT_NEAR(totalArea(structures.shell), 4.0 * std::numbers::pi * 0.05 * 0.05, 1e-4);
 }
 
-TEST(ShellBake, NormalsPointIntoTheSolidWhateverTheWinding) {
+TEST(ShellBake, NormalsPointIntoTheSolidForAnyWinding) {
   const TriangleMesh mesh = test::randomlyFlipped(test::ballMesh(0.05, 5), 3);
-  const HapticStructures structures = baked(mesh, 2000);
-  for (const ShellPoint& point : structures.shell.points()) {
+  const structures::HapticStructures structures = baked(mesh, 2000);
+  for (const structures::ShellPoint& point : structures.shell.points()) {
     EXPECT_LT((point.inward_M + point.p_MP.normalized()).norm(), 0.15F);
   }
 }
 
-TEST(ShellBake, LeavesOutWallsInsideAUnion) {
-  const HapticStructures structures =
+TEST(ShellBake, SkipsWallsInsideAUnion) {
+  const structures::HapticStructures structures =
       baked(test::together(test::boxMesh(Vector3(0, 0, 0), Vector3(0.08, 0.08, 0.08)),
                            test::boxMesh(Vector3(0.05, 0.02, 0.02), Vector3(0.13, 0.06, 0.06))),
             3000);
-  for (const ShellPoint& point : structures.shell.points()) {
+  for (const structures::ShellPoint& point : structures.shell.points()) {
     const Vector3f& p = point.p_MP;
     const bool hidden_by_first = p.x() < 0.076F && (p.array() > 0.004F).all() && (p.array() < 0.076F).all();
     EXPECT_FALSE(hidden_by_first) << p.transpose();
@@ -59,10 +59,11 @@ TEST(ShellBake, LeavesOutWallsInsideAUnion) {
 }
 
 TEST(ShellBake, PutsPointsOnCornersAndAlongConvexEdges) {
-  const HapticStructures structures = baked(test::boxMesh(Vector3(0, 0, 0), Vector3(0.05, 0.04, 0.03)), 1500);
+  const structures::HapticStructures structures =
+      baked(test::boxMesh(Vector3(0, 0, 0), Vector3(0.05, 0.04, 0.03)), 1500);
   int corners = 0;
   int on_edge = 0;
-  for (const ShellPoint& point : structures.shell.points()) {
+  for (const structures::ShellPoint& point : structures.shell.points()) {
     int extremes = 0;
     const Vector3f size(0.05F, 0.04F, 0.03F);
     for (int axis = 0; axis < 3; ++axis) {
@@ -77,11 +78,11 @@ TEST(ShellBake, PutsPointsOnCornersAndAlongConvexEdges) {
 }
 
 TEST(ShellBake, BothSidesOfAThinPlateHavePoints) {
-  const HapticStructures structures =
+  const structures::HapticStructures structures =
       baked(test::boxMesh(Vector3(-0.05, -0.05, 0.0), Vector3(0.05, 0.05, 0.001)), 1000);
   int up = 0;
   int down = 0;
-  for (const ShellPoint& point : structures.shell.points()) {
+  for (const structures::ShellPoint& point : structures.shell.points()) {
     if (point.inward_M.z() < -0.9F) ++up;
     if (point.inward_M.z() > 0.9F) ++down;
   }
@@ -90,21 +91,21 @@ TEST(ShellBake, BothSidesOfAThinPlateHavePoints) {
 }
 
 TEST(ShellBake, ASheetHasPointsToo) {
-  const HapticStructures structures = baked(test::sheetMesh(0.05, 0.0, 5), 500);
+  const structures::HapticStructures structures = baked(test::sheetMesh(0.05, 0.0, 5), 500);
   EXPECT_GT(structures.shell.points().size(), 350U);
-  for (const ShellPoint& point : structures.shell.points()) {
+  for (const structures::ShellPoint& point : structures.shell.points()) {
     EXPECT_NEAR(point.inward_M.norm(), 1.0F, 1e-5F);
   }
 }
 
-TEST(ShellBake, FewerLevelsStillWeighTheWholeSurface) {
-  const Pointshell shell = baked(test::ballMesh(0.05, 4), 3000).shell;
+TEST(ShellBake, AreasOfEachPrefixOfLevelsAddUpToTheWholeSurface) {
+  const structures::Pointshell shell = baked(test::ballMesh(0.05, 4), 3000).shell;
   double sum = 0.0;
-  for (const ShellLevel& level : shell.levels()) {
+  for (const structures::ShellLevel& level : shell.levels()) {
     for (std::uint32_t k = 0; k < level.point_count; ++k) sum += shell.points()[level.first_point + k].area;
     EXPECT_NEAR(sum * level.area_scale, totalArea(shell), 1e-6);
   }
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::bake

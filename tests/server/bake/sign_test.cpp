@@ -4,14 +4,14 @@
 
 #include <gtest/gtest.h>
 
-#include "scenarios/scenario_parts.h"
+#include "scenarios/part_generator/scenario_parts.h"
 #include "server/bake/bake.h"
-#include "tests/scenarios/solid_probe.h"
+#include "tests/scenarios/part_generator/solid_probe.h"
 #include "tests/support/exact_distance.h"
 #include "tests/support/sanitized.h"
 #include "tests/support/test_meshes.h"
 
-namespace tenon {
+namespace tenon::bake {
 namespace {
 
 using test::boxMesh;
@@ -19,18 +19,18 @@ using test::together;
 
 constexpr double kVoxel = 0.003;
 
-/// The solids of the engine bay between radiator and engine at full detail, as its file says them: corners
-/// without connection. What was one solid is known here alone.
-class Bay {
+/// The solids of the engine bay between radiator and engine at full detail: `mesh` is the triangle soup as in
+/// its file; the separate solids give the ground truth.
+class EngineBay {
  public:
-  Bay() {
-    PartMesh whole;
-    for (const ScenarioPart& part : engineBayParts().parts) {
+  EngineBay() {
+    part_generator::PartMesh whole;
+    for (const part_generator::ScenarioPart& part : part_generator::engineBayParts().parts) {
       if (part.name == "engine_bay") whole = part.make(1.0);
     }
     const Eigen::AlignedBox3d region(Vector3(-0.5, 0.33, 0.3), Vector3(0.1, 0.9, 0.75));
-    PartMesh kept;
-    for (const PartMesh::Shell& shell : whole.shells) {
+    part_generator::PartMesh kept;
+    for (const part_generator::PartMesh::Shell& shell : whole.shells) {
       const auto first = whole.triangles.begin() + static_cast<std::ptrdiff_t>(shell.first);
       const auto end = first + static_cast<std::ptrdiff_t>(shell.count);
       if (!std::all_of(first, end, [&](const auto& t) { return region.contains(test::boxOf(t)); })) continue;
@@ -55,8 +55,8 @@ class Bay {
   std::unique_ptr<test::ExactDistance> surface_;
 };
 
-const Bay& bay() {
-  static const Bay the_bay;
+const EngineBay& bay() {
+  static const EngineBay the_bay;
   return the_bay;
 }
 
@@ -66,111 +66,112 @@ TriangleMesh withHoles(TriangleMesh mesh, unsigned one_in) {
   return mesh;
 }
 
-DistanceField baked(const TriangleMesh& mesh) {
+structures::DistanceField baked(const TriangleMesh& mesh) {
   BakeOptions options;
   options.voxel = kVoxel;
   options.points = 500;
   const auto structures = bake(mesh, options);
   EXPECT_TRUE(structures) << structures.error().what;
-  return structures ? structures->field : DistanceField{};
+  return structures ? structures->field : structures::DistanceField{};
 }
 
-const DistanceField& bakedBay() {
-  static const DistanceField field = baked(bay().mesh);
+const structures::DistanceField& bakedBay() {
+  static const structures::DistanceField field = baked(bay().mesh);
   return field;
 }
 
-struct Verdict {
-  std::size_t band = 0;
-  std::size_t wrong = 0;  ///< beyond half a voxel from the surface
+struct SignErrors {
+  std::size_t band = 0;   ///< samples in the band
+  std::size_t wrong = 0;  ///< of these, with a wrong sign and more than half a voxel from the surface
   [[nodiscard]] double percent() const {
     return 100.0 * static_cast<double>(wrong) / static_cast<double>(band);
   }
 };
 
-/// Every so-many-th sample of the band against the truth.
-Verdict judge(const DistanceField& field, std::size_t every) {
-  const DistanceField::Layout& layout = field.layout();
-  Verdict verdict;
+/// Compares the sign of every `every`-th sample with the ground truth.
+SignErrors countSignErrors(const structures::DistanceField& field, std::size_t every) {
+  const structures::DistanceField::Layout& layout = field.layout();
+  SignErrors errors;
   std::size_t number = 0;
   std::size_t next = 0;
-  for (const DistanceField::Entry entry : layout.index) {
-    const auto place = static_cast<int>(number++);
+  for (const structures::DistanceField::Entry entry : layout.index) {
+    const auto linear_index = static_cast<int>(number++);
     if (entry < 0) continue;
-    const Eigen::Array3d brick(place % layout.bricks[0], place / layout.bricks[0] % layout.bricks[1],
-                               place / layout.bricks[0] / layout.bricks[1]);
-    for (int k = 0; k < DistanceField::kBrickSamples; ++k) {
+    const Eigen::Array3d brick(linear_index % layout.bricks[0],
+                               linear_index / layout.bricks[0] % layout.bricks[1],
+                               linear_index / layout.bricks[0] / layout.bricks[1]);
+    for (int k = 0; k < structures::DistanceField::kBrickSamples; ++k) {
       if (++next % every != 0) continue;
-      const auto sample =
-          static_cast<std::size_t>(entry) * DistanceField::kBrickSamples + static_cast<std::size_t>(k);
-      const double voxels = layout.samples[sample] / double{DistanceField::kQuantaPerVoxel};
-      if (std::abs(voxels) > DistanceField::kBandVoxels) continue;
-      ++verdict.band;
+      const auto sample = static_cast<std::size_t>(entry) * structures::DistanceField::kBrickSamples +
+                          static_cast<std::size_t>(k);
+      const double voxels = layout.samples[sample] / double{structures::DistanceField::kQuantaPerVoxel};
+      if (std::abs(voxels) > structures::DistanceField::kBandVoxels) continue;
+      ++errors.band;
       const Vector3 in_brick(k % 9, k / 9 % 9, k / 81);
       const Vector3 p = layout.p_MoFo_M + (brick.matrix() * 8.0 + in_brick) * layout.voxel;
       if ((voxels < 0.0) == bay().inside(p)) continue;
-      if (bay().distance(p) > 0.501 * layout.voxel) ++verdict.wrong;
+      if (bay().distance(p) > 0.501 * layout.voxel) ++errors.wrong;
     }
   }
-  return verdict;
+  return errors;
 }
 
-TEST(Sign, OfTheBayIsRightBeyondHalfAVoxel) {
+TEST(Sign, OfTheEngineBayIsRightBeyondHalfAVoxel) {
   if (test::kSanitized) GTEST_SKIP() << "takes minutes; other tests bake smaller parts";
-  const Verdict verdict = judge(bakedBay(), 31);
-  EXPECT_GT(verdict.band, 30'000U);
-  EXPECT_LE(verdict.percent(), 0.02);
+  const SignErrors errors = countSignErrors(bakedBay(), 31);
+  EXPECT_GT(errors.band, 30'000U);
+  EXPECT_LE(errors.percent(), 0.02);
 }
 
-TEST(Sign, OfTheBayIsTheSameWhenHalfOfItsTrianglesAreFlipped) {
+TEST(Sign, OfTheEngineBayIsTheSameWithHalfOfItsTrianglesFlipped) {
   if (test::kSanitized) GTEST_SKIP() << "takes minutes; other tests bake smaller parts";
-  const DistanceField flipped = baked(test::randomlyFlipped(bay().mesh, 5));
+  const structures::DistanceField flipped = baked(test::randomlyFlipped(bay().mesh, 5));
   EXPECT_TRUE(std::ranges::equal(bakedBay().layout().index, flipped.layout().index));
   EXPECT_TRUE(std::ranges::equal(bakedBay().layout().samples, flipped.layout().samples));
   EXPECT_TRUE(std::ranges::equal(bakedBay().layout().far, flipped.layout().far));
 }
 
-TEST(Sign, OfTheBayIsMostlyRightWithOneTriangleInAHundredGone) {
+TEST(Sign, OfTheEngineBayIsMostlyRightWithOneTriangleInAHundredMissing) {
   if (test::kSanitized) GTEST_SKIP() << "takes minutes; other tests bake smaller parts";
-  const Verdict verdict = judge(baked(withHoles(bay().mesh, 100)), 31);
-  EXPECT_GT(verdict.band, 30'000U);
-  EXPECT_LE(verdict.percent(), 2.5);
+  const SignErrors errors = countSignErrors(baked(withHoles(bay().mesh, 100)), 31);
+  EXPECT_GT(errors.band, 30'000U);
+  EXPECT_LE(errors.percent(), 2.5);
 }
 
-//    #####| |#####      the flood does not pass a gap of less than 2.4 voxels
+//    #####| |#####      the flood fill does not enter a gap of less than 2.4 voxels
 //    #####|x|#####
 TEST(Sign, OfANarrowGapIsOutside) {
   for (const double gap : {0.0061, 0.0066, 0.0071}) {
     for (const double left : {0.05, 0.0493, 0.0487, 0.0482}) {
-      const DistanceField field =
-          baked(together(boxMesh(Vector3(-left, -0.05, -0.02), Vector3(-gap / 2, 0.05, 0.02)),
-                         boxMesh(Vector3(gap / 2, -0.05, -0.02), Vector3(0.05, 0.05, 0.02))));
+      const structures::DistanceField field =
+          baked(test::together(test::boxMesh(Vector3(-left, -0.05, -0.02), Vector3(-gap / 2, 0.05, 0.02)),
+                               test::boxMesh(Vector3(gap / 2, -0.05, -0.02), Vector3(0.05, 0.05, 0.02))));
       EXPECT_GT(field.sample(Vector3(0.0, 0.011, 0.004)).distance, 0.0) << gap << " beside " << left;
       EXPECT_LT(field.sample(Vector3(0.011, 0.011, 0.004)).distance, -0.004) << gap << " beside " << left;
     }
   }
 }
 
-//    ___  ____________      a plate of less than 2.4 voxels with a hole where triangles are missing:
-//    ___  ____________      inside it looks as in a gap, but rays say that it is solid
-TEST(Sign, OfAPlateIsInsideAlthoughItHasHoles) {
+//    ___  ____________      a plate of less than 2.4 voxels with holes of missing triangles: by
+//    ___  ____________      distances it resembles a gap, but rays find that it is solid
+TEST(Sign, OfAPlateWithHolesIsInside) {
   const auto side = [](double z) { return test::sheetMesh(0.06, z, 20); };
-  TriangleMesh plate = together(side(-0.003), side(0.003));
-  const TriangleMesh block = boxMesh(Vector3(-0.06, -0.06, -0.003), Vector3(0.06, 0.06, 0.003));
+  TriangleMesh plate = test::together(side(-0.003), side(0.003));
+  const TriangleMesh block = test::boxMesh(Vector3(-0.06, -0.06, -0.003), Vector3(0.06, 0.06, 0.003));
   TriangleMesh rim = block;
   std::erase_if(rim.triangles, [&](const auto& t) {
     const float z = block.vertices[t[0]].z();
     return block.vertices[t[1]].z() == z && block.vertices[t[2]].z() == z;
   });
-  plate = together(plate, rim);
-  const DistanceField whole = baked(plate);
+  plate = test::together(plate, rim);
+  const structures::DistanceField whole = baked(plate);
   EXPECT_LT(whole.sample(Vector3(0.013, 0.001, 0.0)).distance, -0.002);
   plate.triangles.erase(plate.triangles.begin() + 100);
   plate.triangles.erase(plate.triangles.begin() + 900);
-  const DistanceField holed = baked(plate);
-  EXPECT_LT(holed.sample(Vector3(0.013, 0.001, 0.0)).distance, -0.002);
-  EXPECT_LT(holed.sample(Vector3(-0.031, 0.021, 0.0)).distance, -0.002);
+  const structures::DistanceField with_holes = baked(plate);
+  EXPECT_LT(with_holes.sample(Vector3(0.013, 0.001, 0.0)).distance, -0.002);
+  EXPECT_LT(with_holes.sample(Vector3(-0.031, 0.021, 0.0)).distance, -0.002);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::bake

@@ -7,7 +7,7 @@
 #include "server/bake/bake.h"
 #include "tests/support/test_meshes.h"
 
-namespace tenon {
+namespace tenon::bake {
 namespace {
 
 using test::ballMesh;
@@ -15,12 +15,12 @@ using test::boxMesh;
 using test::together;
 
 constexpr double kVoxel = 0.003;
-constexpr int kSamples = DistanceField::kBrickSamples;
+constexpr int kSamples = structures::DistanceField::kBrickSamples;
 
 /// Two blocks with a gap of `gap` between them, 40 mm deep.
 TriangleMesh blocksApart(double gap) {
-  return together(boxMesh(Vector3(-0.05, -0.05, -0.02), Vector3(-gap / 2, 0.05, 0.02)),
-                  boxMesh(Vector3(gap / 2, -0.05, -0.02), Vector3(0.05, 0.05, 0.02)));
+  return test::together(test::boxMesh(Vector3(-0.05, -0.05, -0.02), Vector3(-gap / 2, 0.05, 0.02)),
+                        test::boxMesh(Vector3(gap / 2, -0.05, -0.02), Vector3(0.05, 0.05, 0.02)));
 }
 
 TriangleMesh withHoles(TriangleMesh mesh, unsigned one_in) {
@@ -29,73 +29,76 @@ TriangleMesh withHoles(TriangleMesh mesh, unsigned one_in) {
   return mesh;
 }
 
-DistanceField baked(const TriangleMesh& mesh, std::vector<RefineBox> refine = {}) {
+structures::DistanceField baked(const TriangleMesh& mesh, std::vector<RefineBox> refine = {}) {
   BakeOptions options;
   options.voxel = kVoxel;
   options.points = 500;
   options.refine = std::move(refine);
   const auto structures = bake(mesh, options);
   EXPECT_TRUE(structures) << structures.error().what;
-  return structures ? structures->field : DistanceField{};
+  return structures ? structures->field : structures::DistanceField{};
 }
 
 Vector3 inBrick(int sample) { return Vector3(sample % 9, sample / 9 % 9, sample / 81); }
 
-/// How much more than their distance two samples of a brick differ [quanta]: neighbours, everything against
-/// the middle (which bounds the brick for queries) and pairs by chance.
-int steepest(std::span<const std::int16_t> brick) {
+/// [quanta] The largest violation of the Lipschitz condition: difference of two samples of a brick minus
+/// their distance. Checks neighbours, all samples against the middle (which bounds the brick for queries) and
+/// random pairs.
+int worstViolation(std::span<const std::int16_t> brick) {
   std::mt19937 random(5);
   int worst = -1'000'000;
-  const auto judge = [&](int i, int j) {
-    const double apart = (inBrick(i) - inBrick(j)).norm() * DistanceField::kQuantaPerVoxel;
+  const auto check = [&](int i, int j) {
+    const double apart = (inBrick(i) - inBrick(j)).norm() * structures::DistanceField::kQuantaPerVoxel;
     worst = std::max(worst, std::abs(brick[i] - brick[j]) - static_cast<int>(std::ceil(apart)));
   };
   for (int i = 0; i < kSamples; ++i) {
     for (const int step : {1, 8, 9, 10, 72, 73, 80, 81, 82, 90, 91}) {
-      if (i + step < kSamples) judge(i, i + step);
+      if (i + step < kSamples) check(i, i + step);
     }
-    judge(i, kSamples / 2);
-    for (int k = 0; k < 8; ++k) judge(i, static_cast<int>(random() % kSamples));
+    check(i, kSamples / 2);
+    for (int k = 0; k < 8; ++k) check(i, static_cast<int>(random() % kSamples));
   }
   return worst;
 }
 
-int steepest(const DistanceField& field) {
+int worstViolation(const structures::DistanceField& field) {
   const auto samples = field.layout().samples;
   int worst = -1'000'000;
   for (std::size_t first = 0; first < samples.size(); first += kSamples) {
-    worst = std::max(worst, steepest(samples.subspan(first, kSamples)));
+    worst = std::max(worst, worstViolation(samples.subspan(first, kSamples)));
   }
   return worst;
 }
 
-//    #####| |#####      a gap of less than 2.4 voxels is closed: at its mouth what the flood
-//    #####|?|#####      reached and what it did not reach meet
+//    #####| |#####      the flood fill does not enter a gap of less than 2.4 voxels: at its mouth
+//    #####|?|#####      reached and unreached samples are neighbours
 //    #####| |#####
-TEST(SlopeLimit, SamplesDifferByNoMoreThanTheyAreApart) {
+TEST(SlopeLimit, SamplesOfABrickAreLipschitz) {
   for (const double gap : {0.001, 0.002, 0.004, 0.0065, 0.008}) {
-    EXPECT_LE(steepest(baked(blocksApart(gap))), 2) << gap;
+    EXPECT_LE(worstViolation(baked(blocksApart(gap))), 2) << gap;
   }
-  const TriangleMesh ball = ballMesh(0.03, 4);
-  EXPECT_LE(steepest(baked(ball)), 2);
-  EXPECT_LE(steepest(baked(withHoles(ball, 100))), 2);
-  EXPECT_LE(steepest(baked(withHoles(ball, 20))), 2);
-  EXPECT_LE(steepest(baked(together(ball, boxMesh(Vector3(0.02, -0.01, -0.01), Vector3(0.06, 0.01, 0.01))))),
+  const TriangleMesh ball = test::ballMesh(0.03, 4);
+  EXPECT_LE(worstViolation(baked(ball)), 2);
+  EXPECT_LE(worstViolation(baked(withHoles(ball, 100))), 2);
+  EXPECT_LE(worstViolation(baked(withHoles(ball, 20))), 2);
+  EXPECT_LE(worstViolation(baked(
+                test::together(ball, test::boxMesh(Vector3(0.02, -0.01, -0.01), Vector3(0.06, 0.01, 0.01))))),
             2);
 }
 
-TEST(SlopeLimit, HoldsBetweenCoarseSamplesAndTheFineOnesInTheirBrick) {
+TEST(SlopeLimit, CoarseAndFineSamplesOfABrickAreLipschitz) {
   const RefineBox mouth{{Vector3(-0.004, -0.06, 0.0), Vector3(0.004, 0.0, 0.03)}};
   for (const double gap : {0.001, 0.002, 0.004, 0.0065}) {
-    const DistanceField field = baked(blocksApart(gap), {mouth});
-    const DistanceField::Layout& layout = field.layout();
+    const structures::DistanceField field = baked(blocksApart(gap), {mouth});
+    const structures::DistanceField::Layout& layout = field.layout();
     ASSERT_EQ(layout.refinement, 4);
-    EXPECT_LE(steepest(field), 2) << gap;
+    EXPECT_LE(worstViolation(field), 2) << gap;
     std::size_t pairs = 0;
     double worst = -1.0;
-    for (const DistanceField::Entry entry : layout.index) {
-      if (entry < DistanceField::kRefined) continue;
-      const DistanceField::Entry* children = layout.index.data() + (entry - DistanceField::kRefined);
+    for (const structures::DistanceField::Entry entry : layout.index) {
+      if (entry < structures::DistanceField::kRefined) continue;
+      const structures::DistanceField::Entry* children =
+          layout.index.data() + (entry - structures::DistanceField::kRefined);
       const std::int16_t* coarse =
           layout.samples.data() + std::size_t{kSamples} * static_cast<std::size_t>(children[64]);
       for (int child = 0; child < 64; ++child) {
@@ -104,10 +107,10 @@ TEST(SlopeLimit, HoldsBetweenCoarseSamplesAndTheFineOnesInTheirBrick) {
             layout.samples.data() + std::size_t{kSamples} * static_cast<std::size_t>(children[child]);
         const Vector3 corner = Vector3(child % 4, child / 4 % 4, child / 16) * 2.0;
         for (int k = 0; k < kSamples; k += 5) {
-          if (std::abs(fine[k]) >= 4 * DistanceField::kQuantaPerVoxel) continue;
+          if (std::abs(fine[k]) >= 4 * structures::DistanceField::kQuantaPerVoxel) continue;
           for (int j = 0; j < kSamples; j += 7) {
             const double apart =
-                (corner + inBrick(k) / 4 - inBrick(j)).norm() * DistanceField::kQuantaPerVoxel;
+                (corner + inBrick(k) / 4 - inBrick(j)).norm() * structures::DistanceField::kQuantaPerVoxel;
             worst = std::max(worst, coarse[j] - fine[k] / 4.0 - apart);
             ++pairs;
           }
@@ -119,10 +122,10 @@ TEST(SlopeLimit, HoldsBetweenCoarseSamplesAndTheFineOnesInTheirBrick) {
   }
 }
 
-// what the flood reached is right, so raising what it did not reach may only come nearer to the truth
-TEST(SlopeLimit, RaisesNothingAboveTheTruth) {
+// reached samples are correct, so raising the others may only reduce their error
+TEST(SlopeLimit, RaisesNoSampleAboveTheTrueDistance) {
   for (const double gap : {0.002, 0.004, 0.0065}) {
-    const DistanceField field = baked(blocksApart(gap));
+    const structures::DistanceField field = baked(blocksApart(gap));
     const auto truth = [&](const Vector3& p) {
       const auto block = [&](double from, double to) {
         const Vector3 low(from, -0.05, -0.02);
@@ -132,22 +135,24 @@ TEST(SlopeLimit, RaisesNothingAboveTheTruth) {
       };
       return std::min(block(-0.05, -gap / 2), block(gap / 2, 0.05));
     };
-    const DistanceField::Layout& layout = field.layout();
+    const structures::DistanceField::Layout& layout = field.layout();
     std::size_t number = 0;
-    for (const DistanceField::Entry entry : layout.index) {
-      const auto place = static_cast<int>(number++);
+    for (const structures::DistanceField::Entry entry : layout.index) {
+      const auto linear_index = static_cast<int>(number++);
       if (entry < 0) continue;
-      const Eigen::Array3d brick(place % layout.bricks[0], place / layout.bricks[0] % layout.bricks[1],
-                                 place / layout.bricks[0] / layout.bricks[1]);
+      const Eigen::Array3d brick(linear_index % layout.bricks[0],
+                                 linear_index / layout.bricks[0] % layout.bricks[1],
+                                 linear_index / layout.bricks[0] / layout.bricks[1]);
       for (int k = 0; k < kSamples; ++k) {
         const double value = layout.samples[static_cast<std::size_t>(entry * kSamples + k)] * kVoxel /
-                             DistanceField::kQuantaPerVoxel;
+                             structures::DistanceField::kQuantaPerVoxel;
         const Vector3 p = layout.p_MoFo_M + kVoxel * (8.0 * brick.matrix() + inBrick(k));
-        ASSERT_LE(value, std::max(truth(p), -DistanceField::kClampVoxels * kVoxel) + 2e-6) << p.transpose();
+        ASSERT_LE(value, std::max(truth(p), -structures::DistanceField::kClampVoxels * kVoxel) + 2e-6)
+            << p.transpose();
       }
     }
   }
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::bake

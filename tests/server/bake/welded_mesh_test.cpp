@@ -4,11 +4,11 @@
 
 #include "tests/support/test_meshes.h"
 
-namespace tenon {
+namespace tenon::bake {
 namespace {
 
-TriangleMesh without(TriangleMesh mesh, std::initializer_list<int> gone) {
-  for (auto i = std::rbegin(gone); i != std::rend(gone); ++i) {
+TriangleMesh without(TriangleMesh mesh, std::initializer_list<int> missing) {
+  for (auto i = std::rbegin(missing); i != std::rend(missing); ++i) {
     mesh.triangles.erase(mesh.triangles.begin() + *i);
   }
   return mesh;
@@ -16,8 +16,8 @@ TriangleMesh without(TriangleMesh mesh, std::initializer_list<int> gone) {
 
 TEST(WeldedMesh, ClosesAHoleOfOneTriangle) {
   const TriangleMesh box = test::boxMesh(Vector3::Zero(), Vector3::Ones());
-  for (int gone = 0; gone < 12; ++gone) {
-    const WeldedMesh mesh(without(box, {gone}));
+  for (int missing = 0; missing < 12; ++missing) {
+    const WeldedMesh mesh(without(box, {missing}));
     EXPECT_EQ(mesh.closed, 1U);
     EXPECT_EQ(mesh.triangles.size(), 12U);
     EXPECT_TRUE(std::ranges::none_of(
@@ -25,12 +25,12 @@ TEST(WeldedMesh, ClosesAHoleOfOneTriangle) {
   }
 }
 
-TEST(WeldedMesh, LeavesWhatIsOpenOnPurpose) {
+TEST(WeldedMesh, DoesNotCloseLargerOpenings) {
   const TriangleMesh box = test::boxMesh(Vector3::Zero(), Vector3::Ones());
   EXPECT_EQ(WeldedMesh(box).closed, 0U);
   EXPECT_EQ(WeldedMesh(without(box, {2, 3})).closed, 0U);  // no lid
   EXPECT_EQ(WeldedMesh(test::sheetMesh(0.05, 0.0, 4)).closed, 0U);
-  TriangleMesh corner;  // of three walls, open where the fourth would be
+  TriangleMesh corner;  // three faces of a tetrahedron
   corner.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   corner.triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}};
   EXPECT_EQ(WeldedMesh(corner).closed, 0U);
@@ -38,7 +38,7 @@ TEST(WeldedMesh, LeavesWhatIsOpenOnPurpose) {
   EXPECT_EQ(WeldedMesh(corner).closed, 0U);
 }
 
-TEST(WeldedMesh, ClosesTheSameHolesWhicheverWayTrianglesWind) {
+TEST(WeldedMesh, ClosesTheSameHolesForAnyWinding) {
   TriangleMesh ball = test::ballMesh(0.05, 4);
   std::size_t number = 0;
   std::erase_if(ball.triangles, [&](const auto&) { return ++number % 53 == 0; });
@@ -48,8 +48,8 @@ TEST(WeldedMesh, ClosesTheSameHolesWhicheverWayTrianglesWind) {
   EXPECT_EQ(plain.corners, flipped.corners);
 }
 
-// a million triangles at one corner must not be compared with each other
-TEST(WeldedMesh, AFanOfLooseTrianglesIsReadInGoodTime) {
+// triangles with a common vertex must not be compared pairwise
+TEST(WeldedMesh, AFanOfUnconnectedTrianglesTakesNoQuadraticTime) {
   TriangleMesh fan;
   fan.vertices.emplace_back(9.0F, 9.0F, 9.0F);
   for (int i = 0; i < 200'000; ++i) {
@@ -63,4 +63,4 @@ TEST(WeldedMesh, AFanOfLooseTrianglesIsReadInGoodTime) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::bake

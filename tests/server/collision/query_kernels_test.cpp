@@ -9,35 +9,35 @@
 #include "server/collision/pair_query.h"
 #include "tests/support/analytic_structures.h"
 
-namespace tenon {
+namespace tenon::collision {
 namespace {
 
 using test::boxStructures;
 using test::StructuresPtr;
 
-/// A box's field whose one corner has voxels four times finer.
-StructuresPtr refinedBox() {
+/// Field of a box with four times finer voxels in one octant.
+test::StructuresPtr refinedBox() {
   const Vector3 size(0.06, 0.05, 0.04);
   const Eigen::AlignedBox3d box(-size / 2, size / 2);
   const std::vector<Eigen::AlignedBox3d> refine{{Vector3::Zero(), size}};
-  auto structures = std::make_shared<HapticStructures>();
-  structures->field = buildField(test::boxDistance(size), box, 0.002, refine, 4);
+  auto structures = std::make_shared<structures::HapticStructures>();
+  structures->field = structures::buildField(test::boxDistance(size), box, 0.002, refine, 4);
   return structures;
 }
 
-std::vector<StructuresPtr> fields() {
-  return {boxStructures({0.06, 0.06, 0.06}, 0.002, 0.004), test::sphereStructures(0.04, 0.002, 0.004),
+std::vector<test::StructuresPtr> fields() {
+  return {test::boxStructures({0.06, 0.06, 0.06}, 0.002, 0.004), test::sphereStructures(0.04, 0.002, 0.004),
           test::cornerStructures(0.1, 0.003), test::sheetStructures(0.1, 0.0, 0.002, 0.0007), refinedBox()};
 }
 
 Pose randomPose(std::mt19937_64& engine, double reach) {
-  const auto number = [&engine] {
+  const auto uniform = [&engine] {
     return 2.0 * (static_cast<double>(engine() >> 11U) / 9007199254740992.0) - 1.0;
   };
   Vector3 p;
   Vector3 w;
-  for (int i = 0; i < 3; ++i) p[i] = reach * number();
-  for (int i = 0; i < 3; ++i) w[i] = 2.5 * number();
+  for (int i = 0; i < 3; ++i) p[i] = reach * uniform();
+  for (int i = 0; i < 3; ++i) w[i] = 2.5 * uniform();
   return {p, expRotation(w)};
 }
 
@@ -58,39 +58,39 @@ void expectSame(const PairQueryResult& a, const PairQueryResult& b) {
     ASSERT_TRUE(sameBits(a.contacts[i].n_W, b.contacts[i].n_W));
   }
   ASSERT_EQ(a.smallest_gap, b.smallest_gap);
-  ASSERT_EQ(a.others_gap, b.others_gap);
+  ASSERT_EQ(a.unlisted_gap, b.unlisted_gap);
   ASSERT_EQ(a.deepest, b.deepest);
   ASSERT_EQ(a.counts.spheres_visited, b.counts.spheres_visited);
   ASSERT_EQ(a.counts.points_visited, b.counts.points_visited);
   ASSERT_EQ(a.counts.points_colliding, b.counts.points_colliding);
 }
 
-/// Leaves the process with the kernels it began with.
+/// Restores the default kernels of the process.
 class QueryKernelsTest : public testing::Test {
  protected:
   ~QueryKernelsTest() override { chooseKernels(supportedKernels().back().isa); }
 };
 
-TEST_F(QueryKernelsTest, PlainCodeIsAlwaysThereAndAnUnknownSetIsRefused) {
+TEST_F(QueryKernelsTest, ScalarCodeIsAlwaysSupportedAndUnknownInstructionSetsAreRejected) {
   EXPECT_EQ(supportedKernels().front().isa, "scalar");
   for (const QueryKernels& kernels : supportedKernels()) EXPECT_TRUE(chooseKernels(kernels.isa));
   EXPECT_FALSE(chooseKernels("abacus"));
 }
 
 TEST_F(QueryKernelsTest, EveryInstructionSetGivesTheSameBits) {
-  const StructuresPtr box = boxStructures({0.08, 0.05, 0.03}, 0.002, 0.004);
-  const std::vector<StructuresPtr> others = fields();
+  const test::StructuresPtr box = test::boxStructures({0.08, 0.05, 0.03}, 0.002, 0.004);
+  const std::vector<test::StructuresPtr> others = fields();
   std::mt19937_64 engine(21);
   const auto expected = std::make_unique<PairQueryResult>();
   const auto expected_later = std::make_unique<PairQueryResult>();
   const auto result = std::make_unique<PairQueryResult>();
   std::size_t found = 0;
   for (int trial = 0; trial < 2000; ++trial) {
-    const StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
+    const test::StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
     const Pose X_WA = randomPose(engine, trial % 7 == 0 ? 0.3 : 0.07);
     PairQuery query{&box->shell, &other->field, X_WA, randomPose(engine, 0.02), 0.0004, 0.001};
-    query.thin = trial % 2 == 0;
-    query.straighten = trial % 4 < 2;
+    query.reduce = trial % 2 == 0;
+    query.correct_ridges = trial % 4 < 2;
     PairQuery later = query;
     later.X_WA.translation() += Vector3(1e-4, -2e-4, 1e-4);
     for (const QueryKernels& kernels : supportedKernels()) {
@@ -110,23 +110,23 @@ TEST_F(QueryKernelsTest, EveryInstructionSetGivesTheSameBits) {
   EXPECT_GT(found, 50000U);
 }
 
-TEST_F(QueryKernelsTest, LanesAreTheFieldsOwnAnswers) {
-  const StructuresPtr box = boxStructures({0.08, 0.05, 0.03}, 0.002, 0.004);
+TEST_F(QueryKernelsTest, SampledLanesEqualTheSamplesOfTheField) {
+  const test::StructuresPtr box = test::boxStructures({0.08, 0.05, 0.03}, 0.002, 0.004);
   std::mt19937_64 engine(22);
   SampleLanes lanes;
-  for (const StructuresPtr& other : fields()) {
+  for (const test::StructuresPtr& other : fields()) {
     for (int trial = 0; trial < 50; ++trial) {
       const LaneFrame frame(other->field, randomPose(engine, 0.07), Pose(), 0.0004, 0.001,
                             box->shell.radius());
       for (const QueryKernels& kernels : supportedKernels()) {
         for (std::size_t leaf = 0; leaf < box->shell.leaves().size(); ++leaf) {
-          const ShellBlock& block = box->shell.pointsOfLeaf(leaf);
+          const structures::ShellBlock& block = box->shell.pointsOfLeaf(leaf);
           SampleSums sums;
           kernels.samples(frame, {block.x.data(), block.y.data(), block.z.data(), block.count}, &lanes, sums);
-          const ShellSphere& ball = box->shell.leaves()[leaf];
+          const structures::ShellSphere& ball = box->shell.leaves()[leaf];
           for (std::uint32_t i = 0; i < ball.count; ++i) {
             const Vector3 p_AP = box->shell.points()[ball.first + i].p_MP.cast<double>();
-            const FieldSample sample = other->field.sample(frame.inB(p_AP));
+            const structures::FieldSample sample = other->field.sample(frame.inB(p_AP));
             ASSERT_EQ(lanes.distance[i], sample.distance) << kernels.isa;
             ASSERT_EQ((lanes.exact >> i & 1U) != 0, sample.exact) << kernels.isa;
             ASSERT_EQ(lanes.gradient_x[i], sample.gradient.x()) << kernels.isa;
@@ -140,61 +140,61 @@ TEST_F(QueryKernelsTest, LanesAreTheFieldsOwnAnswers) {
 }
 
 TEST_F(QueryKernelsTest, PruningChangesNoContact) {
-  const StructuresPtr box = boxStructures({0.08, 0.05, 0.03}, 0.002, 0.006);
-  const std::vector<StructuresPtr> others = fields();
+  const test::StructuresPtr box = test::boxStructures({0.08, 0.05, 0.03}, 0.002, 0.006);
+  const std::vector<test::StructuresPtr> others = fields();
   std::mt19937_64 engine(23);
   const auto pruned = std::make_unique<PairQueryResult>();
-  const auto flat = std::make_unique<PairQueryResult>();
+  const auto unpruned = std::make_unique<PairQueryResult>();
   for (int trial = 0; trial < 3000; ++trial) {
-    const StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
+    const test::StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
     PairQuery query{&box->shell, &other->field, randomPose(engine, 0.07), Pose(), 0.0004, 0.001};
     queryPair(query, *pruned);
     query.prune = false;
-    queryPair(query, *flat);
-    EXPECT_EQ(flat->counts.points_visited, box->shell.points().size());
-    ASSERT_EQ(pruned->contacts.size(), flat->contacts.size()) << "trial " << trial;
-    for (std::size_t i = 0; i < flat->contacts.size(); ++i) {
-      ASSERT_EQ(pruned->contacts[i].point, flat->contacts[i].point);
-      ASSERT_EQ(pruned->contacts[i].gap, flat->contacts[i].gap);
+    queryPair(query, *unpruned);
+    EXPECT_EQ(unpruned->counts.points_visited, box->shell.points().size());
+    ASSERT_EQ(pruned->contacts.size(), unpruned->contacts.size()) << "trial " << trial;
+    for (std::size_t i = 0; i < unpruned->contacts.size(); ++i) {
+      ASSERT_EQ(pruned->contacts[i].point, unpruned->contacts[i].point);
+      ASSERT_EQ(pruned->contacts[i].gap, unpruned->contacts[i].gap);
     }
   }
 }
 
-TEST_F(QueryKernelsTest, NoPointIsNearerThanWhatIsSaidOfAllThatWereLeftOut) {
-  const StructuresPtr box = boxStructures({0.08, 0.05, 0.03}, 0.002, 0.006);
-  const std::vector<StructuresPtr> others = fields();
+TEST_F(QueryKernelsTest, NoPointIsNearerThanTheBoundOfCulledPoints) {
+  const test::StructuresPtr box = test::boxStructures({0.08, 0.05, 0.03}, 0.002, 0.006);
+  const std::vector<test::StructuresPtr> others = fields();
   std::mt19937_64 engine(24);
   const auto result = std::make_unique<PairQueryResult>();
   for (int trial = 0; trial < 500; ++trial) {
-    const StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
+    const test::StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
     const Pose X_WA = randomPose(engine, trial % 4 == 0 ? 0.2 : 0.07);
     queryPair({&box->shell, &other->field, X_WA, Pose(), 0.0004, 0.0}, *result);
-    for (const ShellPoint& point : box->shell.points()) {
-      const FieldSample sample = other->field.sample(X_WA * point.p_MP.cast<double>());
+    for (const structures::ShellPoint& point : box->shell.points()) {
+      const structures::FieldSample sample = other->field.sample(X_WA * point.p_MP.cast<double>());
       if (!sample.exact) continue;
       ASSERT_LE(result->smallest_gap, sample.distance - 0.0004 + 1e-12) << "trial " << trial;
     }
   }
 }
 
-//   o o o o   A grid so long that floats do not tell its bricks apart. One of them holds a floor; a shell
-//   --------  lies in it.
-TEST_F(QueryKernelsTest, AGridTooLongForFloatsHasNothingLeftOut) {
+//   o o o o   A grid so long that floats do not resolve its voxels. One brick
+//   --------  holds a floor, and the pointshell lies in that brick.
+TEST_F(QueryKernelsTest, NothingIsCulledInAGridTooLongForFloats) {
   constexpr double kVoxel = 0.001;
   constexpr std::int32_t kBricks = 600'000;
   constexpr std::int32_t kFloor = 599'990;
-  std::vector<DistanceField::Entry> index(kBricks, DistanceField::kFarOutside);
+  std::vector<structures::DistanceField::Entry> index(kBricks, structures::DistanceField::kFarOutside);
   index[kFloor] = 0;
   const std::vector<std::int16_t> far(kBricks, 0);
   std::vector<std::int16_t> samples;
-  for (int i = 0; i < DistanceField::kBrickSamples; ++i) {
-    const int z = i / (DistanceField::kBrickSide * DistanceField::kBrickSide);
-    samples.push_back(static_cast<std::int16_t>((z - 4) * DistanceField::kQuantaPerVoxel));
+  for (int i = 0; i < structures::DistanceField::kBrickSamples; ++i) {
+    const int z = i / (structures::DistanceField::kBrickSide * structures::DistanceField::kBrickSide);
+    samples.push_back(static_cast<std::int16_t>((z - 4) * structures::DistanceField::kQuantaPerVoxel));
   }
-  const DistanceField::Layout layout{Vector3::Zero(), kVoxel, {kBricks, 1, 1}, 1,  4.0 * kVoxel,
-                                     kVoxel,          index,  samples,         far};
-  const DistanceField floor(layout, nullptr);
-  const StructuresPtr box = boxStructures({0.006, 0.006, 0.004}, 0.0005, 0.001);
+  const structures::DistanceField::Layout layout{Vector3::Zero(), kVoxel, {kBricks, 1, 1}, 1,  4.0 * kVoxel,
+                                                 kVoxel,          index,  samples,         far};
+  const structures::DistanceField floor(layout, nullptr);
+  const test::StructuresPtr box = test::boxStructures({0.006, 0.006, 0.004}, 0.0005, 0.001);
   const Pose X_WA(Vector3((kFloor + 0.5) * 8.0 * kVoxel, 0.004, 0.005), Eigen::Quaterniond::Identity());
   const auto result = std::make_unique<PairQueryResult>();
   for (const QueryKernels& kernels : supportedKernels()) {
@@ -206,4 +206,4 @@ TEST_F(QueryKernelsTest, AGridTooLongForFloatsHasNothingLeftOut) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::collision

@@ -5,19 +5,19 @@
 
 #include <gtest/gtest.h>
 
-namespace tenon {
+namespace tenon::game_control {
 namespace {
 
-/// A scene in which a test says what is.
-struct Said final : SceneView {
+/// A SceneView with one pose, force and contact flag for all objects, set by the test.
+struct SceneStub final : SceneView {
   Pose X_WO;
   Vector3 F_W = Vector3::Zero();
-  bool touch = false;
+  bool contact = false;
 
   [[nodiscard]] Pose pose(ObjectId) const noexcept override { return X_WO; }
   [[nodiscard]] Vector3 force(ObjectId) const noexcept override { return F_W; }
-  [[nodiscard]] bool touching(ObjectId, ObjectId) const noexcept override { return touch; }
-  [[nodiscard]] bool touchesAnything(ObjectId) const noexcept override { return touch; }
+  [[nodiscard]] bool inContact(ObjectId, ObjectId) const noexcept override { return contact; }
+  [[nodiscard]] bool inAnyContact(ObjectId) const noexcept override { return contact; }
 };
 
 Condition group(ConditionKind kind, bool latched = false) {
@@ -51,7 +51,7 @@ class Conditions : public ::testing::Test {
   }
 
   std::vector<Condition> tree_;
-  Said scene_;
+  SceneStub scene_;
   ConditionProgress progress_;
 };
 
@@ -63,14 +63,14 @@ TEST_F(Conditions, APoseIsMetWithinBothTolerances) {
   scene_.X_WO = Pose(Vector3(0.0021, 0, 0));
   EXPECT_FALSE(step());
   scene_.X_WO = Pose(Vector3::Zero(), expRotation(Vector3(0.036, 0, 0)));
-  EXPECT_FALSE(step()) << "in place, but tilted";
+  EXPECT_FALSE(step()) << "position met, orientation not";
   scene_.X_WO = Pose(Vector3::Zero(), expRotation(Vector3(0, -0.034, 0)));
   EXPECT_TRUE(step());
   scene_.X_WO.rotation().coeffs() *= -1.0;
   EXPECT_TRUE(step()) << "q and -q are one orientation";
 }
 
-TEST_F(Conditions, DwellStartsAgainAfterABreak) {
+TEST_F(Conditions, DwellRestartsAfterAnInterruption) {
   tree_ = {leaf(ConditionKind::kPose)};
   tree_[0].dwell = 10;
   for (int i = 0; i < 9; ++i) EXPECT_FALSE(step());
@@ -80,7 +80,7 @@ TEST_F(Conditions, DwellStartsAgainAfterABreak) {
   EXPECT_EQ(stepsUntilMet(100), 10);
 }
 
-TEST_F(Conditions, ForceHasBoundsOrATarget) {
+TEST_F(Conditions, AForceIsMetWithinItsBoundsOrNearItsTarget) {
   tree_ = {leaf(ConditionKind::kForce)};
   tree_[0].above = 2.0;
   tree_[0].below = 5.0;
@@ -99,32 +99,32 @@ TEST_F(Conditions, ForceHasBoundsOrATarget) {
   EXPECT_FALSE(step()) << "the direction counts";
 }
 
-TEST_F(Conditions, AContactForgivesATremblingHandAndNothingLonger) {
+TEST_F(Conditions, AContactToleratesGapsUpToItsLapse) {
   tree_ = {leaf(ConditionKind::kContact)};
   tree_[0].limit_ticks = 100;
   tree_[0].lapse = 5;
-  scene_.touch = true;
+  scene_.contact = true;
   for (int i = 0; i < 60; ++i) EXPECT_FALSE(step());
-  scene_.touch = false;
+  scene_.contact = false;
   for (int i = 0; i < 5; ++i) EXPECT_FALSE(step());
-  scene_.touch = true;
-  EXPECT_EQ(stepsUntilMet(1000), 40) << "the gap is forgiven, but not counted";
-  scene_.touch = false;
+  scene_.contact = true;
+  EXPECT_EQ(stepsUntilMet(1000), 40) << "the gap is tolerated, but not counted";
+  scene_.contact = false;
   for (int i = 0; i < 6; ++i) step();
-  scene_.touch = true;
-  EXPECT_EQ(stepsUntilMet(1000), 100) << "too long a gap: from the beginning";
+  scene_.contact = true;
+  EXPECT_EQ(stepsUntilMet(1000), 100) << "too long a gap resets the time";
 }
 
-TEST_F(Conditions, ContactTimeIsASum) {
+TEST_F(Conditions, ContactTimeAccumulates) {
   tree_ = {leaf(ConditionKind::kContactTime)};
   tree_[0].limit_ticks = 10;
   for (int i = 0; i < 9; ++i) {
-    scene_.touch = true;
+    scene_.contact = true;
     EXPECT_FALSE(step());
-    scene_.touch = false;
+    scene_.contact = false;
     for (int k = 0; k < 100; ++k) EXPECT_FALSE(step());
   }
-  scene_.touch = true;
+  scene_.contact = true;
   EXPECT_TRUE(step());
   EXPECT_DOUBLE_EQ(progress_.reading(0).value, 0.01);
 }
@@ -140,27 +140,27 @@ TEST_F(Conditions, ACommandLastsOneTick) {
   EXPECT_TRUE(step({GameCommand{.kind = CommandKind::kSignal, .signal = 3}}));
 }
 
-TEST_F(Conditions, TogetherMeansInOneTickLatchedMeansEachOnce) {
+TEST_F(Conditions, ATogetherGroupNeedsAllInOneTickALatchedGroupEachOnce) {
   for (const bool latched : {false, true}) {
     progress_.reset();
     tree_ = {group(ConditionKind::kAll, latched), leaf(ConditionKind::kFulfilled),
              leaf(ConditionKind::kContactTime)};
     tree_[2].limit_ticks = 3;
-    scene_.touch = true;
+    scene_.contact = true;
     EXPECT_FALSE(step({GameCommand{}}));
     EXPECT_EQ(stepsUntilMet(50), latched ? 2 : -1);
-    EXPECT_TRUE(step({GameCommand{}})) << "at the same time it is met either way";
+    EXPECT_TRUE(step({GameCommand{}})) << "both in one tick meet either kind of group";
   }
 }
 
-TEST_F(Conditions, AnyNeedsOneAndGroupsNest) {
+TEST_F(Conditions, AnAnyGroupNeedsOneChildAndGroupsNest) {
   // any: [all: [pose, contact], command]
   tree_ = {group(ConditionKind::kAny), group(ConditionKind::kAll), leaf(ConditionKind::kPose),
            leaf(ConditionKind::kContact), leaf(ConditionKind::kFulfilled)};
   tree_[2].parent = 1;
   tree_[3].parent = 1;
-  EXPECT_FALSE(step()) << "in place, but not touching";
-  scene_.touch = true;
+  EXPECT_FALSE(step()) << "pose met, contact not";
+  scene_.contact = true;
   EXPECT_TRUE(step());
   scene_.X_WO = Pose(Vector3(1, 0, 0));
   EXPECT_FALSE(step());
@@ -170,9 +170,9 @@ TEST_F(Conditions, AnyNeedsOneAndGroupsNest) {
 TEST_F(Conditions, AGroupCanDwell) {
   tree_ = {group(ConditionKind::kAll), leaf(ConditionKind::kPose), leaf(ConditionKind::kContact)};
   tree_[0].dwell = 20;
-  scene_.touch = true;
+  scene_.contact = true;
   EXPECT_EQ(stepsUntilMet(100), 20);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::game_control

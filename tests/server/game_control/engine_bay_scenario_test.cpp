@@ -5,14 +5,15 @@
 
 #include <gtest/gtest.h>
 
-#include "scenarios/engine_bay/layout.h"
+#include "scenarios/part_generator/engine_bay_layout.h"
 #include "server/game_control/scenario.h"
+#include "tests/support/source_folder.h"
 
-namespace tenon {
+namespace tenon::game_control {
 namespace {
 
 ScenarioFile engineBay() {
-  auto scenario = readScenario(std::filesystem::path(TENON_SOURCE) / "scenarios" / "engine_bay");
+  auto scenario = readScenario(test::sourceFolder() / "scenarios" / "engine_bay");
   EXPECT_TRUE(scenario) << scenario.error().what;
   return scenario ? *std::move(scenario) : ScenarioFile{};
 }
@@ -33,49 +34,49 @@ TEST(EngineBayScenario, HasTheTenObjectsOfThePaper) {
   const ScenarioFile scenario = engineBay();
   const auto is_head = [](const ScenarioObject& object) { return object.kind == "head"; };
   EXPECT_EQ(std::count_if(scenario.objects.begin(), scenario.objects.end(), std::not_fn(is_head)), 10)
-      << "the user's head is an avatar, nothing touches it";
+      << "besides the user's head, an avatar that collides with nothing";
   EXPECT_EQ(scenario.states.size(), 15U) << "take, mount and tool for each of five parts";
 }
 
-TEST(EngineBayScenario, StandsWhereTheGeneratorPutsItsParts) {
+TEST(EngineBayScenario, HasThePosesOfTheGenerator) {
   const ScenarioFile scenario = engineBay();
-  for (const engine_bay::PartLayout& part : engine_bay::parts()) {
+  for (const part_generator::engine_bay::PartLayout& part : part_generator::engine_bay::parts()) {
     const std::string name(part.name);
     const ScenarioState& mount = stateNamed(scenario, "mount_" + name);
-    expectSamePose(*mount.X_WG, engine_bay::targetPose(part), name);
-    EXPECT_EQ(mount.approach_W, engine_bay::approachDirection(part.approach)) << name;
-    EXPECT_DOUBLE_EQ(mount.approach_distance, engine_bay::kApproachDistance);
-    expectSamePose(*stateNamed(scenario, "tool_" + name).X_WG, engine_bay::toolPose(part),
+    expectSamePose(*mount.X_WG, part_generator::engine_bay::targetPose(part), name);
+    EXPECT_EQ(mount.approach_W, part_generator::engine_bay::approachDirection(part.approach)) << name;
+    EXPECT_DOUBLE_EQ(mount.approach_distance, part_generator::engine_bay::kApproachDistance);
+    expectSamePose(*stateNamed(scenario, "tool_" + name).X_WG, part_generator::engine_bay::toolPose(part),
                    "drill at " + name);
     const ObjectId object = scenario.objectNamed(name);
-    expectSamePose(scenario.objects[object.value].X_WO, engine_bay::startPose(part), "start of " + name);
+    expectSamePose(scenario.objects[object.value].X_WO, part_generator::engine_bay::startPose(part), "start of " + name);
   }
-  for (const engine_bay::OtherObject& other : engine_bay::others()) {
+  for (const part_generator::engine_bay::OtherObject& other : part_generator::engine_bay::others()) {
     const ObjectId object = scenario.objectNamed(other.name);
     ASSERT_TRUE(object.valid()) << other.name;
     expectSamePose(scenario.objects[object.value].X_WO, other.X_WO, std::string(other.name));
   }
 }
 
-TEST(EngineBayScenario, ResolvesThePocketsFinerThanTheirClearance) {
+TEST(EngineBayScenario, RefinesThePocketsEnoughForTheirClearance) {
   const ScenarioFile scenario = engineBay();
   const ObjectId bay = scenario.objectNamed("engine_bay");
-  for (std::size_t i = 0; i < engine_bay::parts().size(); ++i) {
-    const engine_bay::PartLayout& part = engine_bay::parts()[i];
+  for (std::size_t i = 0; i < part_generator::engine_bay::parts().size(); ++i) {
+    const part_generator::engine_bay::PartLayout& part = part_generator::engine_bay::parts()[i];
     const int index = scenario.pairOf(scenario.objectNamed(part.name), bay);
     ASSERT_GE(index, 0);
     const ScenarioPair& pair = scenario.pairs[static_cast<std::size_t>(index)];
-    EXPECT_DOUBLE_EQ(pair.clearance, engine_bay::kClearance) << part.name;
+    EXPECT_DOUBLE_EQ(pair.clearance, part_generator::engine_bay::kClearance) << part.name;
     const auto dilation = dilationOf(scenario, pair, bay);
     ASSERT_TRUE(dilation) << dilation.error().what;
-    const Eigen::AlignedBox3d needed = engine_bay::refineBox(part);
+    const Eigen::AlignedBox3d needed = part_generator::engine_bay::refineBox(part);
     const Eigen::AlignedBox3d& given = scenario.objects[bay.value].structures.refine[i];
     EXPECT_LT((given.min() - needed.min()).cwiseAbs().maxCoeff(), 1e-3) << part.name;
     EXPECT_LT((given.max() - needed.max()).cwiseAbs().maxCoeff(), 1e-3) << part.name;
   }
 }
 
-TEST(EngineBayScenario, SpeaksEnglishAndGermanInEveryState) {
+TEST(EngineBayScenario, HasEnglishAndGermanTextsInEveryState) {
   for (const ScenarioState& state : engineBay().states) {
     for (const Texts* texts : {&state.title, &state.instruction}) {
       ASSERT_EQ(texts->size(), 2U) << state.name;
@@ -86,4 +87,4 @@ TEST(EngineBayScenario, SpeaksEnglishAndGermanInEveryState) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::game_control

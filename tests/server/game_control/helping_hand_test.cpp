@@ -1,12 +1,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/server/game_control/exercise.h"
+#include "tests/server/game_control/scenario_fixture.h"
 
-namespace tenon {
+namespace tenon::game_control {
 namespace {
 
-using test::Exercise;
+using test::ScenarioFixture;
 using test::smallScenario;
 using test::with;
 using ::testing::HasSubstr;
@@ -14,66 +14,68 @@ using ::testing::HasSubstr;
 constexpr HandId kInstructor{1};
 
 std::string withHelper(const std::string& helper) {
-  return with(smallScenario(), "    hands: {right: part}",
-              "    hands: {right: part}\n    may_take: " + helper);
+  return test::with(test::smallScenario(), "    hands: {right: part}",
+                    "    hands: {right: part}\n    may_take: " + helper);
 }
 
-//   right o--[part]<--# instructor's cube, pressed lightly to the part's side
+//   right o--[part]<--# instructor's cube; the test sets the gap between its side and the part's
 class HelpingHandTest : public testing::Test {
  protected:
-  HelpingHandTest() : exercise_(withHelper("{instructor: part}")) {
-    exercise_.touchPart();
-    part_ = exercise_.scenario().objectNamed("part");
-    exercise_.environment().setHandPresent(kInstructor, true);
-    comeTo(0.1);
+  HelpingHandTest() : fixture_(withHelper("{instructor: part}")) {
+    fixture_.touchPart();
+    part_ = fixture_.scenario().objectNamed("part");
+    fixture_.environment().setHandPresent(kInstructor, true);
+    moveInstructorTo(0.1);
   }
-  void comeTo(double gap) {
-    const Vector3 p_WPart = exercise_.object("part").X_WO.translation();
-    exercise_.environment().setHandPose(kInstructor, Pose(p_WPart + Vector3(0.04 + gap, 0.0, 0.0)), {});
+  void moveInstructorTo(double gap) {
+    const Vector3 p_WPart = fixture_.object("part").X_WO.translation();
+    fixture_.environment().setHandPose(kInstructor, Pose(p_WPart + Vector3(0.04 + gap, 0.0, 0.0)), {});
   }
-  [[nodiscard]] const HandMotion& instructor() { return exercise_.environment().hands()[kInstructor.value]; }
+  [[nodiscard]] const simulation::HandMotion& instructor() {
+    return fixture_.environment().hands()[kInstructor.value];
+  }
 
-  Exercise exercise_;
+  test::ScenarioFixture fixture_;
   ObjectId part_;
 };
 
-TEST_F(HelpingHandTest, ASecondHandTakesAHeldPartByTouchingItForASecond) {
-  exercise_.step(50);
-  ASSERT_EQ(exercise_.environment().hands()[0].object, part_);
-  comeTo(0.001);
-  exercise_.step(900);
+TEST_F(HelpingHandTest, AHelperGrabsAHeldPartByTouchingItForOneSecond) {
+  fixture_.step(50);
+  ASSERT_EQ(fixture_.environment().hands()[0].object, part_);
+  moveInstructorTo(0.001);
+  fixture_.step(900);
   EXPECT_NE(instructor().object, part_);
-  exercise_.step(400);
+  fixture_.step(400);
   EXPECT_EQ(instructor().object, part_);
-  EXPECT_EQ(exercise_.environment().hands()[0].object, part_) << "both hold it";
-  EXPECT_EQ(exercise_.object("cube").status, ObjectStatus::kHidden);
+  EXPECT_EQ(fixture_.environment().hands()[0].object, part_) << "both hold it";
+  EXPECT_EQ(fixture_.object("cube").status, ObjectStatus::kHidden);
 }
 
-TEST_F(HelpingHandTest, HelpEndsWithTheState) {
-  comeTo(0.001);
-  exercise_.step(1500);
+TEST_F(HelpingHandTest, HelpersReleaseAtTheEndOfTheState) {
+  moveInstructorTo(0.001);
+  fixture_.step(1500);
   ASSERT_EQ(instructor().object, part_);
-  exercise_.step({GameCommand{.kind = CommandKind::kSkipStep}});
-  exercise_.step(2);
+  fixture_.step({GameCommand{.kind = CommandKind::kSkipStep}});
+  fixture_.step(2);
   EXPECT_NE(instructor().object, part_);
-  EXPECT_EQ(exercise_.object("cube").status, ObjectStatus::kHeld);
+  EXPECT_EQ(fixture_.object("cube").status, ObjectStatus::kHeld);
 }
 
-TEST_F(HelpingHandTest, ASavedSecondOfTouchGoesOn) {
-  comeTo(0.001);
-  exercise_.step(600);
-  const auto environment = exercise_.environment().save();
-  const auto machine = exercise_.machine().save();
-  exercise_.step(700);
-  const std::uint64_t expected = exercise_.hash();
+TEST_F(HelpingHandTest, TheContactTimeOfAHelperIsSavedAndRestored) {
+  moveInstructorTo(0.001);
+  fixture_.step(600);
+  const auto environment = fixture_.environment().save();
+  const auto machine = fixture_.machine().save();
+  fixture_.step(700);
+  const std::uint64_t expected = fixture_.hash();
   ASSERT_EQ(instructor().object, part_);
-  ASSERT_TRUE(exercise_.environment().restore(environment));
-  ASSERT_TRUE(exercise_.machine().restore(machine));
-  exercise_.step(700);
-  EXPECT_EQ(exercise_.hash(), expected);
+  ASSERT_TRUE(fixture_.environment().restore(environment));
+  ASSERT_TRUE(fixture_.machine().restore(machine));
+  fixture_.step(700);
+  EXPECT_EQ(fixture_.hash(), expected);
 }
 
-TEST(MayTake, WhatIsWrongIsSaidWithItsLine) {
+TEST(MayTake, ErrorsNameFileLineAndReason) {
   const auto error = [](const std::string& helper) {
     const auto scenario = parseScenario(withHelper(helper), "small/scenario.yaml");
     return scenario ? std::string() : scenario.error().what;
@@ -82,9 +84,9 @@ TEST(MayTake, WhatIsWrongIsSaidWithItsLine) {
   EXPECT_THAT(error("[instructor]"), HasSubstr("'may_take' of state 'mount' must be a mapping"));
   EXPECT_THAT(error("{right: part}"), HasSubstr("'right' moves 'part' already"));
   EXPECT_THAT(error("{left: part}"), HasSubstr("small/scenario.yaml:"));
-  EXPECT_THAT(error("{instructor: pointer}"), HasSubstr("'pointer' belongs to hand 'right'"));
+  EXPECT_THAT(error("{instructor: pointer}"), HasSubstr("'pointer' is the own object of hand 'right'"));
   EXPECT_THAT(error("{instructor: prat}"), HasSubstr("did you mean 'part'?"));
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::game_control

@@ -8,11 +8,13 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-namespace tenon {
+#include "tests/support/source_folder.h"
+
+namespace tenon::game_control {
 namespace {
 
-TEST(ScenarioSchema, HasExactlyTheKeysThatTheReaderKnows) {
-  std::ifstream file(std::filesystem::path(TENON_SOURCE) / "scenarios" / "scenario.schema.json");
+TEST(ScenarioSchema, HasExactlyTheKeysOfTheReader) {
+  std::ifstream file(test::sourceFolder() / "scenarios" / "scenario.schema.json");
   const nlohmann::json schema = nlohmann::json::parse(file);
   std::set<std::string> mappings;
   for (const ScenarioMapping& mapping : scenarioMappings()) {
@@ -31,7 +33,7 @@ TEST(ScenarioSchema, HasExactlyTheKeysThatTheReaderKnows) {
   }
 }
 
-TEST(ScenarioKeys, SuggestsTheNearestWordOnly) {
+TEST(ScenarioKeys, SuggestsTheNearestWordWhenItIsNear) {
   constexpr std::string_view kWords[] = {"touch", "target", "timeout"};
   EXPECT_EQ(suggestion("tuch", kWords), "did you mean 'touch'?");
   EXPECT_EQ(suggestion("tiemout", kWords), "did you mean 'timeout'?");
@@ -39,5 +41,11 @@ TEST(ScenarioKeys, SuggestsTheNearestWordOnly) {
   EXPECT_EQ(suggestion(std::string(10'000, 't'), kWords), "");
 }
 
+TEST(ScenarioKeys, TheFormerNameOfAKeyLeadsToItsPresentName) {
+  EXPECT_EQ(renamedKey("object", "felt"), "collidable");
+  EXPECT_EQ(renamedKey("object", "group"), "");
+  EXPECT_EQ(renamedKey("hand", "felt"), "");
+}
+
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::game_control

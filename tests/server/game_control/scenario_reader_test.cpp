@@ -9,8 +9,9 @@
 
 #include "server/game_control/scenario.h"
 #include "tests/server/game_control/scenario_text.h"
+#include "tests/support/source_folder.h"
 
-namespace tenon {
+namespace tenon::game_control {
 namespace {
 
 using test::smallScenario;
@@ -20,12 +21,10 @@ using ::testing::StartsWith;
 
 Result<ScenarioFile> parsed(const std::string& text) { return parseScenario(text, "small/scenario.yaml"); }
 
-std::filesystem::path shipped(const std::string& name) {
-  return std::filesystem::path(TENON_SOURCE) / "scenarios" / name;
-}
+std::filesystem::path shipped(const std::string& name) { return test::sourceFolder() / "scenarios" / name; }
 
-TEST(Scenario, ReadsAFewLinesAndFillsInTheRest) {
-  const auto scenario = parsed(smallScenario());
+TEST(Scenario, FillsInDefaults) {
+  const auto scenario = parsed(test::smallScenario());
   ASSERT_TRUE(scenario) << scenario.error().what;
   EXPECT_EQ(scenario->name, "small");
   EXPECT_EQ(scenario->objectNamed("pointer").value, 2U);
@@ -34,9 +33,9 @@ TEST(Scenario, ReadsAFewLinesAndFillsInTheRest) {
   EXPECT_DOUBLE_EQ(scenario->objects[0].structures.voxel, 0.001);
 
   const ScenarioState& take = scenario->states[0];
-  EXPECT_EQ(take.object, scenario->objectNamed("part")) << "what is touched is what it is about";
+  EXPECT_EQ(take.object, scenario->objectNamed("part")) << "default: the touched object";
   EXPECT_EQ(take.hand, scenario->handNamed("right"));
-  ASSERT_EQ(take.placements.size(), 1U) << "a hidden object appears when it is to be touched";
+  ASSERT_EQ(take.placements.size(), 1U) << "a hidden object is shown when it is to be touched";
   EXPECT_EQ(take.placements[0].kind, PlacementKind::kShow);
   ASSERT_EQ(take.conditions.size(), 2U);
   EXPECT_EQ(take.conditions[1].kind, ConditionKind::kContact);
@@ -51,39 +50,41 @@ TEST(Scenario, ReadsAFewLinesAndFillsInTheRest) {
   EXPECT_EQ(mount.timeout, 2000U);
 }
 
-TEST(Scenario, ListsEveryPairThatCanTouch) {
-  const auto scenario = parsed(smallScenario());
+TEST(Scenario, ListsEveryPairThatCanCollide) {
+  const auto scenario = parsed(test::smallScenario());
   ASSERT_TRUE(scenario);
-  EXPECT_EQ(scenario->pairs.size(), 6U) << "bay, part, pointer, cube: nobody stands still with all others";
-  const auto grouped = parsed(with(with(smallScenario(), "kind: scene", "kind: scene, group: g"),
-                                   "name: cube,", "name: cube, group: g,"));
+  EXPECT_EQ(scenario->pairs.size(), 6U) << "all of bay, part, pointer and cube: only the bay never moves";
+  const auto grouped =
+      parsed(test::with(test::with(test::smallScenario(), "kind: scene", "kind: scene, group: g"),
+                        "name: cube,", "name: cube, group: g,"));
   ASSERT_TRUE(grouped) << grouped.error().what;
-  EXPECT_EQ(grouped->pairs.size(), 5U) << "objects of one group never touch";
+  EXPECT_EQ(grouped->pairs.size(), 5U) << "objects of one group never collide";
   EXPECT_EQ(grouped->pairOf(grouped->objectNamed("bay"), grouped->objectNamed("cube")), -1);
-  const auto off = parsed(with(smallScenario(), "states:", "pairs_off: [[cube, any]]\nstates:"));
+  const auto off = parsed(test::with(test::smallScenario(), "states:", "pairs_off: [[cube, any]]\nstates:"));
   ASSERT_TRUE(off);
   EXPECT_FALSE(off->pairs[static_cast<std::size_t>(off->pairOf(ObjectId{0}, ObjectId{3}))].enabled);
   EXPECT_TRUE(off->pairs[static_cast<std::size_t>(off->pairOf(ObjectId{0}, ObjectId{1}))].enabled);
 }
 
-TEST(Scenario, UnderstandsUnitsTurnsAndQuaternions) {
-  const auto turned = parsed(
-      with(smallScenario(), "start: {at: [0.2, 0, 0.1]}",
-           "start: {at: [20 cm, 1 in, 100mm], turn: [{axis: x, deg: 90}, {axis: [0, 0, 2], deg: 270}]}"));
+TEST(Scenario, ReadsUnitsRotationsAndQuaternions) {
+  const auto turned = parsed(test::with(
+      test::smallScenario(), "start: {at: [0.2, 0, 0.1]}",
+      "start: {at: [20 cm, 1 in, 100mm], turn: [{axis: x, deg: 90}, {axis: [0, 0, 2], deg: 270}]}"));
   ASSERT_TRUE(turned) << turned.error().what;
   const Pose& X_WO = turned->objects[1].X_WO;
   EXPECT_TRUE(X_WO.translation().isApprox(Vector3(0.2, 0.0254, 0.1), 1e-12));
-  // y goes up first, z then comes down to where y was, and a quarter turn backwards makes -y to -x
+  // 90 degrees about x take y to z and z to -y; 270 degrees about z then take -y to -x
   EXPECT_TRUE((X_WO.rotation() * Vector3::UnitY()).isApprox(Vector3::UnitZ(), 1e-12));
   EXPECT_TRUE((X_WO.rotation() * Vector3::UnitZ()).isApprox(-Vector3::UnitX(), 1e-12));
-  const auto quaternion =
-      parsed(with(smallScenario(), "start: {at: [0.2, 0, 0.1]}", "start: {q: [0.7071, 0.7071, 0, 0]}"));
+  const auto quaternion = parsed(
+      test::with(test::smallScenario(), "start: {at: [0.2, 0, 0.1]}", "start: {q: [0.7071, 0.7071, 0, 0]}"));
   ASSERT_TRUE(quaternion) << quaternion.error().what;
   EXPECT_NEAR(quaternion->objects[1].X_WO.rotation().norm(), 1.0, 1e-15);
 }
 
-TEST(Scenario, KeepsTextsInItsLanguagesTheMainOneFirst) {
-  const auto scenario = parsed(with(smallScenario(), "title: Small", "title: {de: Klein, en: Small}"));
+TEST(Scenario, KeepsTextsOfAllLanguagesTheMainOneFirst) {
+  const auto scenario =
+      parsed(test::with(test::smallScenario(), "title: Small", "title: {de: Klein, en: Small}"));
   ASSERT_TRUE(scenario) << scenario.error().what;
   ASSERT_EQ(scenario->title.size(), 2U);
   EXPECT_EQ(scenario->title[0].text, "Small");
@@ -103,8 +104,8 @@ TEST(Scenario, ReadsATreeOfConditions) {
         - {command: fulfilled}
         - {signal: gripper_closed}
     snap: true)";
-  const auto scenario =
-      parsed(with(with(smallScenario(), ", dwell: 50 ms", ""), "    snap: true", conditions));
+  const auto scenario = parsed(
+      test::with(test::with(test::smallScenario(), ", dwell: 50 ms", ""), "    snap: true", conditions));
   ASSERT_TRUE(scenario) << scenario.error().what;
   const std::vector<Condition>& tree = scenario->states[1].conditions;
   ASSERT_EQ(tree.size(), 9U);
@@ -120,11 +121,11 @@ TEST(Scenario, ReadsATreeOfConditions) {
   EXPECT_EQ(scenario->signalNamed("gripper_closed"), 0);
 }
 
-TEST(Scenario, ReadsFixedPosesFreeObjectsAndPairsOfAState) {
+TEST(Scenario, ReadsPlacementsAndPairSwitchesOfAState) {
   const std::string effects =
       "    fix: {cube: {at: [0.4, 0, 0]}}\n    free: [part]\n    hide: [pointer]\n    pairs_off: [[part, "
       "cube]]\n    snap: true";
-  const auto scenario = parsed(with(smallScenario(), "    snap: true", effects));
+  const auto scenario = parsed(test::with(test::smallScenario(), "    snap: true", effects));
   ASSERT_TRUE(scenario) << scenario.error().what;
   const ScenarioState& mount = scenario->states[1];
   ASSERT_EQ(mount.placements.size(), 3U);
@@ -136,10 +137,10 @@ TEST(Scenario, ReadsFixedPosesFreeObjectsAndPairsOfAState) {
   EXPECT_FALSE(mount.pairs[0].enabled);
 }
 
-TEST(Scenario, ReadsTheGroupsThatAStateChanges) {
-  const std::string grouped = with(smallScenario(), "name: cube,", "name: cube, group: kit,");
+TEST(Scenario, ReadsGroupChangesOfAState) {
+  const std::string grouped = test::with(test::smallScenario(), "name: cube,", "name: cube, group: kit,");
   const auto scenario =
-      parsed(with(grouped, "    snap: true", "    groups: {part: kit, cube: none}\n    snap: true"));
+      parsed(test::with(grouped, "    snap: true", "    groups: {part: kit, cube: none}\n    snap: true"));
   ASSERT_TRUE(scenario) << scenario.error().what;
   EXPECT_EQ(scenario->groups, std::vector<std::string>{"kit"});
   EXPECT_EQ(scenario->objects[3].group, 1U);
@@ -152,30 +153,31 @@ TEST(Scenario, ReadsTheGroupsThatAStateChanges) {
   EXPECT_EQ(changes[1].line, 21);
 }
 
-TEST(Scenario, ListsPairsOfAGroupThatSomebodyLeaves) {
-  const std::string grouped = with(with(smallScenario(), "kind: scene", "kind: scene, group: g"),
-                                   "name: cube,", "name: cube, group: g,");
-  const auto left = parsed(with(grouped, "    snap: true", "    groups: {cube: none}\n    snap: true"));
+TEST(Scenario, ListsPairsOfAGroupThatAnObjectLeaves) {
+  const std::string grouped =
+      test::with(test::with(test::smallScenario(), "kind: scene", "kind: scene, group: g"), "name: cube,",
+                 "name: cube, group: g,");
+  const auto left = parsed(test::with(grouped, "    snap: true", "    groups: {cube: none}\n    snap: true"));
   ASSERT_TRUE(left) << left.error().what;
   EXPECT_EQ(left->pairs.size(), 6U);
   EXPECT_GE(left->pairOf(left->objectNamed("bay"), left->objectNamed("cube")), 0);
 }
 
 struct BadInput {
-  std::string name, from, to, line, says;
+  std::string name, from, to, line, expected;
   friend void PrintTo(const BadInput& input, std::ostream* out) { *out << input.name; }
 };
 
 class ScenarioErrors : public ::testing::TestWithParam<BadInput> {};
 
-TEST_P(ScenarioErrors, NameTheLineAndWhatWasExpected) {
+TEST_P(ScenarioErrors, NameFileLineAndReason) {
   const BadInput& input = GetParam();
-  const std::string text = with(smallScenario(), input.from, input.to);
-  ASSERT_NE(text, smallScenario()) << "the test changes nothing";
+  const std::string text = test::with(test::smallScenario(), input.from, input.to);
+  ASSERT_NE(text, test::smallScenario()) << "the test changes nothing";
   const auto scenario = parsed(text);
   ASSERT_FALSE(scenario);
   EXPECT_THAT(scenario.error().what, StartsWith("small/scenario.yaml:" + input.line + ": "));
-  EXPECT_THAT(scenario.error().what, HasSubstr(input.says));
+  EXPECT_THAT(scenario.error().what, HasSubstr(input.expected));
 }
 
 const BadInput kBadInputs[] = {
@@ -209,9 +211,9 @@ const BadInput kBadInputs[] = {
      "expected a unit quaternion"},
     {"turn_and_q", "at: [0, 0, -20 mm]", "at: [0, 0, 0], q: [1, 0, 0, 0], turn: {axis: x, deg: 1}", "19",
      "both 'turn' and 'q'"},
-    {"axis", "at: [0, 0, -20 mm]", "at: [0, 0, 0], turn: {axis: [0, 0, 0], deg: 1}", "19", "has no length"},
+    {"axis", "at: [0, 0, -20 mm]", "at: [0, 0, 0], turn: {axis: [0, 0, 0], deg: 1}", "19", "has length 0"},
     {"refinement", "refinement: 4", "refinement: 3", "3", "must be 1, 2, 4 or 8"},
-    {"box", "refinement: 4", "refine: [{from: [0, 0, 1], to: [1, 1, 0]}]", "3", "inside out"},
+    {"box", "refinement: 4", "refine: [{from: [0, 0, 1], to: [1, 1, 0]}]", "3", "is empty"},
     {"pair_twice", "pairs:", "pairs:\n  - {between: [bay, part]}", "12", "listed twice, first in line 11"},
     {"pair_itself", "between: [part, bay]", "between: [part, part]", "11", "names 'part' twice"},
     {"clearance_too_small", "clearance: 4 mm", "clearance: 0.4 mm", "11",
@@ -229,22 +231,24 @@ const BadInput kBadInputs[] = {
      "[0, 0, -1], distance: 50 mm}\n",
      "", "19", "snaps 'part', but has no target pose"},
     {"target_without_at", "at: [0, 0, -20 mm], ", "", "19", "has no 'at'"},
-    {"target_too_far", "at: [0, 0, -20 mm]", "at: [0, 0, -20 m]", "19", "the scene ends at"},
-    {"target_nobody", "    hands: {right: part}\n", "", "18", "nobody moves 'part'"},
+    {"target_too_far", "at: [0, 0, -20 mm]", "at: [0, 0, -20 m]", "19", "expected at most 'reach'"},
+    {"target_nobody", "    hands: {right: part}\n", "", "18", "no hand moves 'part'"},
     {"target_without_object", "    object: part\n", "", "18", "no 'object' to bring there"},
-    {"hidden", "touch: part\n    for: 0.1 s", "object: part", "13", "'part' is still hidden"},
-    {"hand_of_other", "hands: {right: part}", "hands: {right: cube}", "17", "belongs to hand 'instructor'"},
-    {"approach", "direction: [0, 0, -1]", "direction: [0, 0, 0]", "20", "has no length"},
+    {"hidden", "touch: part\n    for: 0.1 s", "object: part", "13", "'part' is hidden"},
+    {"hand_of_other", "hands: {right: part}", "hands: {right: cube}", "17",
+     "is the own object of hand 'instructor'"},
+    {"approach", "direction: [0, 0, -1]", "direction: [0, 0, 0]", "20", "has length 0"},
     {"timeout_word", "timeout: 2 s", "timeout: 2 s\n    on_timeout: retry", "23",
      "expected 'fail' or 'skip'"},
     {"timeout_short", "for: 0.1 s", "for: 10 s\n    timeout: 1 s", "16",
-     "shorter than what its conditions ask for"},
+     "shorter than its conditions require"},
     {"for_without_touch", "snap: true", "for: 1 s", "21", "belongs to a 'touch'"},
     {"conditions_two", "snap: true", "conditions: {command: fulfilled, signal: x}", "21", "has 2 of"},
     {"conditions_empty", "snap: true", "conditions: {all: []}", "21", "is empty"},
     {"conditions_when", "snap: true", "conditions: {all: [{command: fulfilled}], when: maybe}", "21",
      "expected 'together' or 'latched'"},
-    {"conditions_dwell", "snap: true", "conditions: {command: fulfilled, dwell: 1 s}", "21", "one instant"},
+    {"conditions_dwell", "snap: true", "conditions: {command: fulfilled, dwell: 1 s}", "21",
+     "lasts one tick"},
     {"conditions_force", "snap: true", "conditions: {force: {above: 5 N, below: 2 N}}", "21",
      "'above' < 'below'"},
     {"conditions_force_none", "snap: true", "conditions: {force: {}}", "21", "needs either 'above'"},
@@ -265,24 +269,42 @@ const BadInput kBadInputs[] = {
      "'groups' of state 'mount', object 'part',"},
     {"groups_twice", "snap: true", "groups: {part: kit, cube: kit, part: none}", "21", "names 'part' twice"},
     {"groups_alone", "snap: true", "groups:\n      cube: kit\n      bay: kit\n      part: kitt", "24",
-     "'groups' of state 'mount' puts 'part' into 'kitt', where nobody else ever is; did you mean 'kit'?"},
+     "'groups' of state 'mount' puts 'part' into 'kitt', which no other object is ever in; did you mean "
+     "'kit'?"},
     {"groups_touch", "touch: part\n", "touch: part\n    groups: {part: kit, pointer: kit}\n", "13",
-     "state 'take' asks 'pointer' and 'part' to touch, which are both of group 'kit'"},
+     "state 'take' requires contact of 'pointer' and 'part', but both are in group 'kit'"},
     {"groups_may_take", "snap: true", "groups: {part: kit, cube: kit}\n    may_take: {instructor: part}",
-     "22", "'cube' and 'part' never touch"},
+     "22", "'cube' and 'part' never collide"},
     {"states_empty", "states:", "states: []\nother:", "13", "unknown key 'other'"},
 };
 
 INSTANTIATE_TEST_SUITE_P(BadInputs, ScenarioErrors, ::testing::ValuesIn(kBadInputs),
                          [](const auto& input) { return input.param.name; });
 
-TEST(Scenario, SaysWhichFileIsMissing) {
+TEST(Scenario, RefusesTheFormerKeyFeltInOneLine) {
+  const auto scenario =
+      parsed(test::with(test::smallScenario(), "kind: assistant", "kind: assistant, felt: false"));
+  ASSERT_FALSE(scenario);
+  EXPECT_EQ(scenario.error().what,
+            "small/scenario.yaml:6: an object has a key with an old name: 'felt' is now 'collidable'");
+}
+
+TEST(Scenario, AnObjectThatIsNotCollidableHasNoPairs) {
+  const auto scenario =
+      parsed(test::with(test::smallScenario(), "kind: assistant", "kind: assistant, collidable: false"));
+  ASSERT_TRUE(scenario) << scenario.error().what;
+  EXPECT_FALSE(scenario->objects[3].collidable);
+  EXPECT_TRUE(scenario->objects[0].collidable) << "default";
+  EXPECT_EQ(scenario->pairs.size(), 3U);
+}
+
+TEST(Scenario, NamesAMissingFile) {
   const auto scenario = readScenario("/nowhere/scenario.yaml");
   ASSERT_FALSE(scenario);
   EXPECT_THAT(scenario.error().what, HasSubstr("/nowhere/scenario.yaml: no such scenario file"));
 }
 
-TEST(Scenario, PegAndBoxIsAWholeExercise) {
+TEST(Scenario, ReadsPegAndBox) {
   const auto scenario = readScenario(shipped("peg_and_box"));
   ASSERT_TRUE(scenario) << scenario.error().what;
   EXPECT_EQ(scenario->name, "peg_and_box");
@@ -294,4 +316,4 @@ TEST(Scenario, PegAndBoxIsAWholeExercise) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::game_control

@@ -5,8 +5,8 @@
 
 namespace tenon::test {
 
-/// A scenario of a box with a socket, a part that fits in, a pointer and an instructor's cube; tests change
-/// single lines of it. Line numbers in errors count from its first line.
+/// A scenario of a box with a socket, a part that fits into it, a pointer and an instructor's cube; tests
+/// replace pieces of it. Its first line is line 1 in errors.
 inline std::string smallScenario() {
   return R"(title: Small
 objects:
@@ -33,7 +33,7 @@ states:
 )";
 }
 
-/// The text with the first `from` replaced.
+/// The text with the first occurrence of `from` replaced; unchanged when there is none.
 inline std::string with(std::string text, const std::string& from, const std::string& to) {
   const auto at = text.find(from);
   if (at != std::string::npos) text.replace(at, from.size(), to);

@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 
 #include "server/game_control/scenario.h"
-#include "tests/server/game_control/exercise.h"
+#include "tests/server/game_control/scenario_fixture.h"
 
-namespace tenon {
+namespace tenon::game_control {
 namespace {
 
 using test::smallScenario;
@@ -18,27 +18,28 @@ using ::testing::HasSubstr;
 
 ScenarioFile parsed(const std::string& text) { return parseScenario(text, "small/scenario.yaml").value(); }
 
-TEST(SceneBuilder, AsksTheSmallerObjectAsAShell) {
-  const ScenarioFile scenario = parsed(smallScenario());
-  const auto scene = makeScene(scenario, smallStructures());
+TEST(SceneBuilder, TheSmallerObjectIsThePointshellSide) {
+  const ScenarioFile scenario = parsed(test::smallScenario());
+  const auto scene = makeScene(scenario, test::smallStructures());
   ASSERT_TRUE(scene) << scene.error().what;
   ASSERT_EQ((*scene)->pairs.size(), scenario.pairs.size());
-  const auto pair = [&](const std::string& a, const std::string& b) -> const PairSpec& {
+  const auto pair = [&](const std::string& a, const std::string& b) -> const simulation::PairSpec& {
     return (*scene)->pairs[static_cast<std::size_t>(
         (*scene)->pairOf((*scene)->objectNamed(a), (*scene)->objectNamed(b)))];
   };
   EXPECT_EQ(pair("part", "bay").a, scenario.objectNamed("part"));
   EXPECT_EQ(pair("part", "pointer").a, scenario.objectNamed("pointer"));
-  EXPECT_EQ(pair("part", "cube").a, scenario.objectNamed("cube")) << "an assistant is always a shell";
-  EXPECT_DOUBLE_EQ(pair("part", "bay").dilation, 0.87 * 0.00025) << "of the fine voxels at the target";
+  EXPECT_EQ(pair("part", "cube").a, scenario.objectNamed("cube"))
+      << "an assistant is always the pointshell side";
+  EXPECT_DOUBLE_EQ(pair("part", "bay").dilation, 0.87 * 0.00025) << "0.87 refined voxels";
   EXPECT_DOUBLE_EQ(pair("pointer", "bay").dilation, 0.87 * 0.001);
 }
 
-TEST(SceneBuilder, GivesAPairItsFriction) {
+TEST(SceneBuilder, APairHasItsOwnFriction) {
   const std::string text =
-      with(smallScenario(),
-           "pairs:", "pairs:\n  - {between: [pointer, bay], friction: 0.4, sliding_friction: 0.3}");
-  const auto scene = makeScene(parsed(text), smallStructures());
+      test::with(test::smallScenario(),
+                 "pairs:", "pairs:\n  - {between: [pointer, bay], friction: 0.4, sliding_friction: 0.3}");
+  const auto scene = makeScene(parsed(text), test::smallStructures());
   ASSERT_TRUE(scene) << scene.error().what;
   const auto pair = [&](const char* a, const char* b) {
     const int number = (*scene)->pairOf((*scene)->objectNamed(a), (*scene)->objectNamed(b));
@@ -47,33 +48,35 @@ TEST(SceneBuilder, GivesAPairItsFriction) {
   ASSERT_TRUE(pair("pointer", "bay"));
   EXPECT_DOUBLE_EQ(pair("pointer", "bay")->at_rest, 0.4);
   EXPECT_DOUBLE_EQ(pair("pointer", "bay")->sliding, 0.3);
-  EXPECT_FALSE(pair("part", "bay")) << "that of the bodies when nothing is said";
+  EXPECT_FALSE(pair("part", "bay")) << "that of the bodies by default";
 }
 
-TEST(SceneBuilder, ChecksClearancesWhoseFieldOnlySizesTell) {
+TEST(SceneBuilder, ChecksClearancesOfPairsWhoseSdfSideFollowsFromSizes) {
   const std::string text =
-      with(smallScenario(), "pairs:", "pairs:\n  - {between: [pointer, bay], clearance: 1 mm}");
-  const auto scene = makeScene(parsed(text), smallStructures());
+      test::with(test::smallScenario(), "pairs:", "pairs:\n  - {between: [pointer, bay], clearance: 1 mm}");
+  const auto scene = makeScene(parsed(text), test::smallStructures());
   ASSERT_FALSE(scene);
   EXPECT_THAT(scene.error().what, HasSubstr("small/scenario.yaml:11: clearance of bay-pointer (1 mm)"));
   EXPECT_THAT(scene.error().what, HasSubstr("needs 3.48 mm); use voxel 0.28 mm or refinement 4"));
 }
 
-TEST(SceneBuilder, WantsStructuresOfEverythingThatIsFelt) {
-  auto structures = smallStructures();
+TEST(SceneBuilder, RequiresStructuresOfCollidableObjects) {
+  auto structures = test::smallStructures();
   structures[1] = nullptr;
-  const auto scene = makeScene(parsed(smallScenario()), structures);
+  const auto scene = makeScene(parsed(test::smallScenario()), structures);
   ASSERT_FALSE(scene);
   EXPECT_THAT(scene.error().what, HasSubstr("small/scenario.yaml:4: object 'part' has no haptic structures"));
-  const ScenarioFile seen = parsed(with(smallScenario(), "kind: assistant", "kind: assistant, felt: false"));
-  structures = smallStructures();
+  const ScenarioFile displayed_only =
+      parsed(test::with(test::smallScenario(), "kind: assistant", "kind: assistant, collidable: false"));
+  structures = test::smallStructures();
   structures[3] = nullptr;
-  EXPECT_TRUE(makeScene(seen, structures));
+  EXPECT_TRUE(makeScene(displayed_only, structures));
 }
 
-TEST(SceneBuilder, RefusesATargetThatLiesOutsideEverything) {
+TEST(SceneBuilder, RefusesATargetFarFromAllObjects) {
   const auto scene =
-      makeScene(parsed(with(smallScenario(), "at: [0, 0, -20 mm]", "at: [0, 4 m, 0]")), smallStructures());
+      makeScene(parsed(test::with(test::smallScenario(), "at: [0, 0, -20 mm]", "at: [0, 4 m, 0]")),
+                test::smallStructures());
   ASSERT_FALSE(scene);
   EXPECT_THAT(scene.error().what, HasSubstr("the target of state 'mount'"));
 }
@@ -83,31 +86,31 @@ TEST(SceneBuilder, RefusesATargetThatLiesOutsideEverything) {
 //        |    |  50 mm
 //   ---+ |    | +---
 //      | +----+ |     target
-TEST(SceneBuilder, RefinesAroundTheTargetAndTheWayIn) {
-  const ScenarioFile scenario = parsed(smallScenario());
-  const auto boxes = refineBoxes(scenario, scenario.objectNamed("bay"), smallStructures());
+TEST(SceneBuilder, RefinesAroundTheTargetAndTheApproach) {
+  const ScenarioFile scenario = parsed(test::smallScenario());
+  const auto boxes = refineBoxes(scenario, scenario.objectNamed("bay"), test::smallStructures());
   ASSERT_EQ(boxes.size(), 1U);
   EXPECT_TRUE(boxes[0].contains(Vector3(0.022, 0, -0.04)));
   EXPECT_TRUE(boxes[0].contains(Vector3(0.0, 0, 0.045)));
   EXPECT_FALSE(boxes[0].contains(Vector3(0.0, 0, 0.065)));
-  EXPECT_TRUE(refineBoxes(scenario, scenario.objectNamed("part"), smallStructures()).empty());
+  EXPECT_TRUE(refineBoxes(scenario, scenario.objectNamed("part"), test::smallStructures()).empty());
 
   const ScenarioFile given =
-      parsed(with(smallScenario(), "refinement: 4",
-                  "refinement: 4, refine: [{from: [-0.03, -0.03, -0.05], to: [0.03, 0.03, 0]}]"));
-  EXPECT_EQ(refineBoxes(given, given.objectNamed("bay"), smallStructures()).size(), 1U)
-      << "what is given is enough";
+      parsed(test::with(test::smallScenario(), "refinement: 4",
+                        "refinement: 4, refine: [{from: [-0.03, -0.03, -0.05], to: [0.03, 0.03, 0]}]"));
+  EXPECT_EQ(refineBoxes(given, given.objectNamed("bay"), test::smallStructures()).size(), 1U)
+      << "a given box at the target replaces the automatic one";
 }
 
-TEST(SceneBuilder, BakesPartsBeforeWhatTheyGoInto) {
-  const ScenarioFile scenario = parsed(smallScenario());
+TEST(SceneBuilder, BakesPartsBeforeTheObjectsTheyAreMountedInto) {
+  const ScenarioFile scenario = parsed(test::smallScenario());
   const std::vector<ObjectId> order = bakeOrder(scenario);
   ASSERT_EQ(order.size(), 4U);
-  const auto place = [&](const std::string& name) {
+  const auto position = [&](const std::string& name) {
     return std::find(order.begin(), order.end(), scenario.objectNamed(name)) - order.begin();
   };
-  EXPECT_LT(place("part"), place("bay"));
+  EXPECT_LT(position("part"), position("bay"));
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::game_control

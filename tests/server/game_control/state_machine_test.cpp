@@ -6,72 +6,73 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/server/game_control/exercise.h"
+#include "tests/server/game_control/scenario_fixture.h"
 #include "tests/support/realtime_guard.h"
 
-namespace tenon {
+namespace tenon::game_control {
 namespace {
 
-using test::Exercise;
+using test::ScenarioFixture;
 using test::smallScenario;
 using test::with;
 
 GameCommand command(CommandKind kind) { return GameCommand{.kind = kind, .hand = HandId{0}}; }
 
-TEST(StateMachine, LeadsFromTheTouchToTheMountedPart) {
-  Exercise exercise(smallScenario());
-  EXPECT_EQ(exercise.status().phase, StepPhase::kActive);
-  EXPECT_EQ(exercise.object("part").status, ObjectStatus::kParked) << "the part appears";
+TEST(StateMachine, GoesFromTouchingThePartToMountingIt) {
+  test::ScenarioFixture fixture(test::smallScenario());
+  EXPECT_EQ(fixture.status().phase, StepPhase::kActive);
+  EXPECT_EQ(fixture.object("part").status, ObjectStatus::kParked) << "the part appears";
 
-  exercise.touchPart();
-  EXPECT_EQ(exercise.status().step, 1U);
-  EXPECT_EQ(exercise.object("part").status, ObjectStatus::kHeld) << "it replaces the pointer";
-  EXPECT_EQ(exercise.object("pointer").status, ObjectStatus::kHidden);
-  EXPECT_NEAR(exercise.status().position_error, Vector3(0.2, 0, 0.12).norm(), 0.005);
+  fixture.touchPart();
+  EXPECT_EQ(fixture.status().step, 1U);
+  EXPECT_EQ(fixture.object("part").status, ObjectStatus::kHeld) << "instead of the pointer";
+  EXPECT_EQ(fixture.object("pointer").status, ObjectStatus::kHidden);
+  EXPECT_NEAR(fixture.status().position_error, Vector3(0.2, 0, 0.12).norm(), 0.005);
 
-  exercise.insertPart();
-  exercise.step(100);
-  EXPECT_TRUE(exercise.status().finished);
-  EXPECT_EQ(exercise.status().phase, StepPhase::kDone);
-  EXPECT_EQ(exercise.object("part").status, ObjectStatus::kFixed);
-  EXPECT_EQ(exercise.object("part").X_WO.translation(), Vector3(0, 0, -0.02)) << "exactly at its target";
-  EXPECT_EQ(exercise.object("pointer").status, ObjectStatus::kHeld) << "the pointer is back";
+  fixture.insertPart();
+  fixture.step(100);
+  EXPECT_TRUE(fixture.status().finished);
+  EXPECT_EQ(fixture.status().phase, StepPhase::kDone);
+  EXPECT_EQ(fixture.object("part").status, ObjectStatus::kFixed);
+  EXPECT_EQ(fixture.object("part").X_WO.translation(), Vector3(0, 0, -0.02)) << "exactly at its target";
+  EXPECT_EQ(fixture.object("pointer").status, ObjectStatus::kHeld) << "the pointer is back";
 }
 
-TEST(StateMachine, AShortTouchTakesNothing) {
-  Exercise exercise(smallScenario());
-  exercise.moveTo(Vector3(0.2, 0, 0.129));
-  exercise.moveTo(Vector3(0.2, 0, 0.2));
-  exercise.step(200);
-  EXPECT_EQ(exercise.status().step, 0U);
-  EXPECT_EQ(exercise.object("part").status, ObjectStatus::kParked);
+TEST(StateMachine, AShortTouchGrabsNothing) {
+  test::ScenarioFixture fixture(test::smallScenario());
+  fixture.moveTo(Vector3(0.2, 0, 0.129));
+  fixture.moveTo(Vector3(0.2, 0, 0.2));
+  fixture.step(200);
+  EXPECT_EQ(fixture.status().step, 0U);
+  EXPECT_EQ(fixture.object("part").status, ObjectStatus::kParked);
 }
 
-TEST(StateMachine, EveryEndingHasARevisionOfItsOwn) {
-  Exercise exercise(with(smallScenario(), "touch: part\n    for: 0.1 s", "show: [part]"));
-  const std::uint32_t before = exercise.status().revision;
-  exercise.step({command(CommandKind::kFulfilled)});
-  EXPECT_EQ(exercise.status().step, 0U);
-  EXPECT_EQ(exercise.status().phase, StepPhase::kDone);
-  EXPECT_EQ(exercise.status().revision, before + 1);
-  exercise.step(1);
-  EXPECT_EQ(exercise.status().step, 1U);
-  EXPECT_EQ(exercise.status().phase, StepPhase::kActive);
-  EXPECT_EQ(exercise.status().revision, before + 2);
+TEST(StateMachine, EveryEndOfAStateHasItsOwnRevision) {
+  test::ScenarioFixture fixture(
+      test::with(test::smallScenario(), "touch: part\n    for: 0.1 s", "show: [part]"));
+  const std::uint32_t before = fixture.status().revision;
+  fixture.step({command(CommandKind::kFulfilled)});
+  EXPECT_EQ(fixture.status().step, 0U);
+  EXPECT_EQ(fixture.status().phase, StepPhase::kDone);
+  EXPECT_EQ(fixture.status().revision, before + 1);
+  fixture.step(1);
+  EXPECT_EQ(fixture.status().step, 1U);
+  EXPECT_EQ(fixture.status().phase, StepPhase::kActive);
+  EXPECT_EQ(fixture.status().revision, before + 2);
 }
 
-TEST(StateMachine, AStateThatTakesTooLongFailsOrIsSkipped) {
-  const std::string quick = with(smallScenario(), "for: 0.1 s", "for: 0.1 s\n    timeout: 0.2 s");
-  Exercise fails(quick);
+TEST(StateMachine, ATimeoutFailsTheTrainingOrSkipsTheState) {
+  const std::string quick = test::with(test::smallScenario(), "for: 0.1 s", "for: 0.1 s\n    timeout: 0.2 s");
+  test::ScenarioFixture fails(quick);
   fails.step(199);
   EXPECT_EQ(fails.status().phase, StepPhase::kActive);
   fails.step(1);
   EXPECT_EQ(fails.status().phase, StepPhase::kTimedOut);
   EXPECT_TRUE(fails.status().failed);
   fails.step(100);
-  EXPECT_EQ(fails.status().step, 0U) << "a failed exercise stays where it is";
+  EXPECT_EQ(fails.status().step, 0U) << "a failed training stays in its state";
 
-  Exercise skips(with(quick, "timeout: 0.2 s", "timeout: 0.2 s\n    on_timeout: skip"));
+  test::ScenarioFixture skips(test::with(quick, "timeout: 0.2 s", "timeout: 0.2 s\n    on_timeout: skip"));
   skips.step(200);
   EXPECT_EQ(skips.status().phase, StepPhase::kTimedOut);
   skips.step(1);
@@ -79,181 +80,185 @@ TEST(StateMachine, AStateThatTakesTooLongFailsOrIsSkipped) {
   EXPECT_FALSE(skips.status().failed);
 }
 
-TEST(StateMachine, SkippingAMountPutsThePartWhereItBelongs) {
-  Exercise exercise(smallScenario());
-  exercise.step({command(CommandKind::kSkipStep)});
-  EXPECT_EQ(exercise.status().phase, StepPhase::kSkipped);
-  exercise.step(10);
-  EXPECT_EQ(exercise.object("part").status, ObjectStatus::kHeld);
-  exercise.step({command(CommandKind::kSkipStep)});
-  EXPECT_TRUE(exercise.status().finished);
-  EXPECT_EQ(exercise.object("part").status, ObjectStatus::kFixed);
-  EXPECT_EQ(exercise.object("part").X_WO.translation(), Vector3(0, 0, -0.02));
+TEST(StateMachine, SkippingAStateThatSnapsFixesThePartAtItsTarget) {
+  test::ScenarioFixture fixture(test::smallScenario());
+  fixture.step({command(CommandKind::kSkipStep)});
+  EXPECT_EQ(fixture.status().phase, StepPhase::kSkipped);
+  fixture.step(10);
+  EXPECT_EQ(fixture.object("part").status, ObjectStatus::kHeld);
+  fixture.step({command(CommandKind::kSkipStep)});
+  EXPECT_TRUE(fixture.status().finished);
+  EXPECT_EQ(fixture.object("part").status, ObjectStatus::kFixed);
+  EXPECT_EQ(fixture.object("part").X_WO.translation(), Vector3(0, 0, -0.02));
 }
 
-TEST(StateMachine, APartThatWasLetGoIsTakenAgainByTouch) {
-  Exercise exercise(smallScenario());
-  exercise.touchPart();
-  exercise.step({command(CommandKind::kRelease)});
-  EXPECT_EQ(exercise.object("part").status, ObjectStatus::kParked);
-  EXPECT_EQ(exercise.object("pointer").status, ObjectStatus::kHeld);
-  exercise.step(900);
-  EXPECT_EQ(exercise.object("part").status, ObjectStatus::kParked);
-  exercise.step(200);
-  EXPECT_EQ(exercise.object("part").status, ObjectStatus::kHeld);
+TEST(StateMachine, AReleasedPartIsGrabbedAgainByTouch) {
+  test::ScenarioFixture fixture(test::smallScenario());
+  fixture.touchPart();
+  fixture.step({command(CommandKind::kRelease)});
+  EXPECT_EQ(fixture.object("part").status, ObjectStatus::kParked);
+  EXPECT_EQ(fixture.object("pointer").status, ObjectStatus::kHeld);
+  fixture.step(900);
+  EXPECT_EQ(fixture.object("part").status, ObjectStatus::kParked);
+  fixture.step(200);
+  EXPECT_EQ(fixture.object("part").status, ObjectStatus::kHeld);
 }
 
-TEST(StateMachine, AResetStartsAgain) {
-  Exercise exercise(smallScenario());
-  exercise.touchPart();
-  exercise.step({command(CommandKind::kReset)});
-  EXPECT_EQ(exercise.status().step, 0U);
-  EXPECT_EQ(exercise.status().phase, StepPhase::kActive);
-  EXPECT_EQ(exercise.object("part").X_WO.translation(), Vector3(0.2, 0, 0.1));
-  EXPECT_EQ(exercise.object("pointer").status, ObjectStatus::kHeld);
+TEST(StateMachine, ResetRestoresTheStart) {
+  test::ScenarioFixture fixture(test::smallScenario());
+  fixture.touchPart();
+  fixture.step({command(CommandKind::kReset)});
+  EXPECT_EQ(fixture.status().step, 0U);
+  EXPECT_EQ(fixture.status().phase, StepPhase::kActive);
+  EXPECT_EQ(fixture.object("part").X_WO.translation(), Vector3(0.2, 0, 0.1));
+  EXPECT_EQ(fixture.object("pointer").status, ObjectStatus::kHeld);
 }
 
-TEST(StateMachine, SwitchesPairsAsStatesAndPeopleSay) {
-  Exercise exercise(with(smallScenario(), "    snap: true", "    pairs_off: [[part, cube]]\n    snap: true"));
-  const auto pair = static_cast<std::uint32_t>(exercise.scenario().pairOf(ObjectId{1}, ObjectId{3}));
-  EXPECT_TRUE(exercise.environment().pairs()[pair].enabled);
-  exercise.step({command(CommandKind::kSkipStep)});
-  exercise.step(1);
-  EXPECT_FALSE(exercise.environment().pairs()[pair].enabled);
-  exercise.step({GameCommand{.kind = CommandKind::kSetCollision, .signal = pair, .value = 1.0}});
-  EXPECT_TRUE(exercise.environment().pairs()[pair].enabled);
-  exercise.step({GameCommand{.kind = CommandKind::kSetCollision, .signal = 1000, .value = 1.0}});
+TEST(StateMachine, PairsAreSwitchedByStatesAndByCommands) {
+  test::ScenarioFixture fixture(
+      test::with(test::smallScenario(), "    snap: true", "    pairs_off: [[part, cube]]\n    snap: true"));
+  const auto pair = static_cast<std::uint32_t>(fixture.scenario().pairOf(ObjectId{1}, ObjectId{3}));
+  EXPECT_TRUE(fixture.environment().pairs()[pair].enabled);
+  fixture.step({command(CommandKind::kSkipStep)});
+  fixture.step(1);
+  EXPECT_FALSE(fixture.environment().pairs()[pair].enabled);
+  fixture.step({GameCommand{.kind = CommandKind::kSetCollision, .signal = pair, .value = 1.0}});
+  EXPECT_TRUE(fixture.environment().pairs()[pair].enabled);
+  fixture.step({GameCommand{.kind = CommandKind::kSetCollision, .signal = 1000, .value = 1.0}});
 }
 
-//   part ->  [cube]      a part goes through what is of its group, and is held back by it again when it left
-TEST(StateMachine, PutsObjectsIntoGroupsAndTakesThemOut) {
-  Exercise exercise(with(smallScenario(), "    snap: true\n    timeout: 2 s\n",
-                         "    groups: {part: kit, cube: kit}\n  - name: leave\n    groups: {part: none}\n"));
-  const ObjectId part = exercise.scenario().objectNamed("part");
-  const ObjectId cube = exercise.scenario().objectNamed("cube");
-  const Environment& environment = exercise.environment();
-  exercise.touchPart();
-  ASSERT_EQ(exercise.status().step, 1U);
+//   part ->  [cube]      a part passes through objects of its group, and collides with them after leaving it
+TEST(StateMachine, StatesPutObjectsIntoGroupsAndRemoveThem) {
+  test::ScenarioFixture fixture(
+      test::with(test::smallScenario(), "    snap: true\n    timeout: 2 s\n",
+                 "    groups: {part: kit, cube: kit}\n  - name: leave\n    groups: {part: none}\n"));
+  const ObjectId part = fixture.scenario().objectNamed("part");
+  const ObjectId cube = fixture.scenario().objectNamed("cube");
+  const simulation::Environment& environment = fixture.environment();
+  fixture.touchPart();
+  ASSERT_EQ(fixture.status().step, 1U);
   EXPECT_EQ(environment.groupOf(part), 1U);
   EXPECT_EQ(environment.groupOf(cube), 1U);
 
   const Vector3 p_PH = -environment.hands()[0].X_HO.translation();
   const auto apart = [&] {
-    return (exercise.object("part").X_WO.translation() - exercise.object("cube").X_WO.translation()).x();
+    return (fixture.object("part").X_WO.translation() - fixture.object("cube").X_WO.translation()).x();
   };
-  exercise.moveTo(Vector3(-0.2, 0, 0.2) + p_PH);
-  exercise.moveTo(Vector3(-0.28, 0, 0.2) + p_PH);
+  fixture.moveTo(Vector3(-0.2, 0, 0.2) + p_PH);
+  fixture.moveTo(Vector3(-0.28, 0, 0.2) + p_PH);
   EXPECT_FALSE(environment.inContact(part, cube));
   EXPECT_NEAR(apart(), 0.02, 1e-4) << "half of each inside the other";
 
-  exercise.moveTo(Vector3(-0.2, 0, 0.2) + p_PH);
-  exercise.step({command(CommandKind::kSkipStep)});
-  exercise.step(1);
+  fixture.moveTo(Vector3(-0.2, 0, 0.2) + p_PH);
+  fixture.step({command(CommandKind::kSkipStep)});
+  fixture.step(1);
   EXPECT_EQ(environment.groupOf(part), 0U);
   EXPECT_EQ(environment.groupOf(cube), 1U);
-  exercise.moveTo(Vector3(-0.28, 0, 0.2) + p_PH);
+  fixture.moveTo(Vector3(-0.28, 0, 0.2) + p_PH);
   EXPECT_TRUE(environment.inContact(part, cube));
   EXPECT_GT(apart(), 0.0395);
 
-  exercise.step({command(CommandKind::kReset)});
-  EXPECT_EQ(environment.groupOf(cube), 0U) << "as the file says";
+  fixture.step({command(CommandKind::kReset)});
+  EXPECT_EQ(environment.groupOf(cube), 0U) << "as at the start";
 }
 
-TEST(StateMachine, OverlappingObjectsThatLeaveTheirGroupTouchAtOnce) {
-  Exercise exercise(with(smallScenario(), "    snap: true\n    timeout: 2 s\n",
-                         "    groups: {part: kit, cube: kit}\n  - name: leave\n    groups: {cube: none}\n"));
-  const ObjectId part = exercise.scenario().objectNamed("part");
-  const ObjectId cube = exercise.scenario().objectNamed("cube");
-  exercise.touchPart();
-  const Vector3 p_PH = -exercise.environment().hands()[0].X_HO.translation();
-  exercise.moveTo(Vector3(-0.262, 0, 0.2) + p_PH);
-  EXPECT_FALSE(exercise.environment().inContact(part, cube));
-  exercise.step({command(CommandKind::kSkipStep)});
-  exercise.step(1);
-  EXPECT_TRUE(exercise.environment().inContact(part, cube));
+TEST(StateMachine, OverlappingObjectsCollideAsSoonAsTheirGroupEnds) {
+  test::ScenarioFixture fixture(
+      test::with(test::smallScenario(), "    snap: true\n    timeout: 2 s\n",
+                 "    groups: {part: kit, cube: kit}\n  - name: leave\n    groups: {cube: none}\n"));
+  const ObjectId part = fixture.scenario().objectNamed("part");
+  const ObjectId cube = fixture.scenario().objectNamed("cube");
+  fixture.touchPart();
+  const Vector3 p_PH = -fixture.environment().hands()[0].X_HO.translation();
+  fixture.moveTo(Vector3(-0.262, 0, 0.2) + p_PH);
+  EXPECT_FALSE(fixture.environment().inContact(part, cube));
+  fixture.step({command(CommandKind::kSkipStep)});
+  fixture.step(1);
+  EXPECT_TRUE(fixture.environment().inContact(part, cube));
 }
 
-TEST(StateMachine, SwappedHandsKeepTheirRoles) {
-  Exercise exercise(with(smallScenario(), "role: instructor, object: cube", "object: cube"));
-  exercise.environment().setHandPresent(HandId{1}, true);
-  exercise.environment().setHandPose(HandId{1}, Pose(Vector3(0.2, 0.3, 0.3)), Twist{});
-  const std::uint32_t before = exercise.status().revision;
-  exercise.step({command(CommandKind::kSwapHands)});
-  EXPECT_EQ(exercise.status().hand, HandId{1}) << "whoever moves the pointer is meant";
-  EXPECT_GT(exercise.status().revision, before);
-  exercise.step({command(CommandKind::kSkipStep)});
-  exercise.step(2);
-  EXPECT_EQ(exercise.environment().hands()[1].object, exercise.scenario().objectNamed("part"));
+TEST(StateMachine, RolesFollowTheOwnObjectsOfSwappedHands) {
+  test::ScenarioFixture fixture(
+      test::with(test::smallScenario(), "role: instructor, object: cube", "object: cube"));
+  fixture.environment().setHandPresent(HandId{1}, true);
+  fixture.environment().setHandPose(HandId{1}, Pose(Vector3(0.2, 0.3, 0.3)), Twist{});
+  const std::uint32_t before = fixture.status().revision;
+  fixture.step({command(CommandKind::kSwapHands)});
+  EXPECT_EQ(fixture.status().hand, HandId{1}) << "the hand whose own object is the pointer";
+  EXPECT_GT(fixture.status().revision, before);
+  fixture.step({command(CommandKind::kSkipStep)});
+  fixture.step(2);
+  EXPECT_EQ(fixture.environment().hands()[1].object, fixture.scenario().objectNamed("part"));
 }
 
-TEST(StateMachine, TellsAPersonWhatToDoAndHowFarItIs) {
-  Exercise exercise(smallScenario());
-  exercise.touchPart();
-  const StepState step = describe(exercise.scenario(), exercise.status());
+TEST(StateMachine, DescribesTheStateAndItsProgress) {
+  test::ScenarioFixture fixture(test::smallScenario());
+  fixture.touchPart();
+  const StepState step = describe(fixture.scenario(), fixture.status());
   EXPECT_EQ(step.name, "mount");
   EXPECT_EQ(step.steps, 2U);
   EXPECT_TRUE(step.has_target);
   EXPECT_EQ(step.approach_W, Vector3(0, 0, -1));
   EXPECT_DOUBLE_EQ(step.timeout, 2.0);
   EXPECT_EQ(step.hand, HandId{0});
-  const StepProgress report = progress(exercise.scenario(), exercise.status());
+  const StepProgress report = progress(fixture.scenario(), fixture.status());
   ASSERT_EQ(report.conditions.size(), 1U);
   EXPECT_EQ(report.conditions[0].text, "pose of part");
   EXPECT_DOUBLE_EQ(report.conditions[0].value, report.position_error);
   EXPECT_DOUBLE_EQ(report.conditions[0].limit, 0.002);
 }
 
-TEST(StateMachine, TheSameHandMakesTheSameBits) {
+TEST(StateMachine, TheSameHandMotionGivesTheSameHash) {
   std::vector<std::uint64_t> hashes;
   for (int run = 0; run < 2; ++run) {
-    Exercise exercise(smallScenario());
-    exercise.touchPart();
-    exercise.insertPart();
-    hashes.push_back(exercise.hash());
+    test::ScenarioFixture fixture(test::smallScenario());
+    fixture.touchPart();
+    fixture.insertPart();
+    hashes.push_back(fixture.hash());
   }
   EXPECT_EQ(hashes[0], hashes[1]);
 }
 
-TEST(StateMachine, GoesOnFromASavedState) {
-  Exercise one(smallScenario());
-  Exercise other(smallScenario());
+TEST(StateMachine, ContinuesFromASavedState) {
+  test::ScenarioFixture one(test::smallScenario());
+  test::ScenarioFixture other(test::smallScenario());
   one.moveTo(Vector3(0.2, 0, 0.129));
   one.step(50);
   ASSERT_TRUE(other.environment().restore(one.environment().save()));
   ASSERT_TRUE(other.machine().restore(one.machine().save()));
   EXPECT_EQ(one.hash(), other.hash());
-  for (Exercise* exercise : {&one, &other}) {
-    exercise->step(80);
-    exercise->insertPart();
+  for (test::ScenarioFixture* fixture : {&one, &other}) {
+    fixture->step(80);
+    fixture->insertPart();
   }
   EXPECT_EQ(one.hash(), other.hash());
   EXPECT_EQ(one.status().step, 1U);
 }
 
-TEST(StateMachine, RefusesASavedStateThatIsNone) {
-  Exercise exercise(smallScenario());
-  EXPECT_FALSE(exercise.machine().restore(std::vector<std::uint8_t>(7)));
-  std::vector<std::uint8_t> bytes = exercise.machine().save();
+TEST(StateMachine, RefusesAnInvalidSavedState) {
+  test::ScenarioFixture fixture(test::smallScenario());
+  EXPECT_FALSE(fixture.machine().restore(std::vector<std::uint8_t>(7)));
+  std::vector<std::uint8_t> bytes = fixture.machine().save();
   bytes[8] = 77;
-  const auto restored = exercise.machine().restore(bytes);
+  const auto restored = fixture.machine().restore(bytes);
   ASSERT_FALSE(restored);
   EXPECT_NE(restored.error().what.find("step 77"), std::string::npos) << restored.error().what;
 }
 
 TEST(StateMachine, StepAllocatesNothingAndLocksNothing) {
-  if (!test::RealtimeGuard::available()) GTEST_SKIP() << "a sanitizer stands before malloc";
-  Exercise exercise(smallScenario());
-  exercise.step(10);
+  if (!test::RealtimeGuard::available()) GTEST_SKIP() << "a sanitizer replaces malloc";
+  test::ScenarioFixture fixture(test::smallScenario());
+  fixture.step(10);
   const std::vector<GameCommand> skip{command(CommandKind::kSkipStep)};
   const test::RealtimeGuard guard;
-  for (int i = 0; i < 1000; ++i) exercise.machine().step(exercise.environment(), {});
-  exercise.machine().step(exercise.environment(), skip);
-  for (int i = 0; i < 100; ++i) exercise.machine().step(exercise.environment(), {});
-  exercise.machine().step(exercise.environment(), skip);
+  for (int i = 0; i < 1000; ++i) fixture.machine().step(fixture.environment(), {});
+  fixture.machine().step(fixture.environment(), skip);
+  for (int i = 0; i < 100; ++i) fixture.machine().step(fixture.environment(), {});
+  fixture.machine().step(fixture.environment(), skip);
   EXPECT_EQ(guard.allocations(), 0);
   EXPECT_EQ(guard.locks(), 0);
-  EXPECT_TRUE(exercise.status().finished);
+  EXPECT_TRUE(fixture.status().finished);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::game_control

@@ -11,13 +11,13 @@
 
 #include "tests/server/session/small_session.h"
 
-namespace tenon {
+namespace tenon::session {
 namespace {
 
 namespace fs = std::filesystem;
 using test::kRightHand;
-using test::play;
-using test::Stage;
+using test::playInput;
+using test::SessionRig;
 using ::testing::HasSubstr;
 
 constexpr Tick kTicks = 2100;
@@ -30,26 +30,27 @@ class JournalTest : public ::testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
 
-  /// Journals the play; `alter` may change an entry, or leave it out by returning false.
+  /// Journals the play and returns the final hash; `alter` may change an entry, or drop it by returning
+  /// false.
   std::uint64_t write(const std::function<bool(JournalEntry&)>& alter = {}) {
-    Exercise exercise = Stage::makeExercise(loaded_, 1, {kRightHand});
+    SessionSimulation simulation = test::SessionRig::makeSimulation(loaded_, 1, {test::kRightHand});
     auto journal = Journal::open(file_, {"small/scenario.yaml", 0.25, fingerprintOf(loaded_)});
     EXPECT_TRUE(journal);
     for (Tick tick = 1; tick <= kTicks; ++tick) {
       JournalEntry entry;
-      entry.input = play(tick);
-      exercise.tick(entry.input);
-      entry.hash = exercise.hash();
-      if (tick % kCheckpointEvery == 1) exercise.save(entry.checkpoint);
+      entry.input = test::playInput(tick);
+      simulation.tick(entry.input);
+      entry.hash = simulation.hash();
+      if (tick % kCheckpointEvery == 1) simulation.save(entry.checkpoint);
       if (alter && !alter(entry)) continue;
       EXPECT_TRUE(journal->write(entry));
     }
-    EXPECT_TRUE(journal->close({.phase = exercise.phase(), .tick = kTicks, .reason = "done"}));
-    return exercise.hash();
+    EXPECT_TRUE(journal->close({.phase = simulation.phase(), .tick = kTicks, .reason = "done"}));
+    return simulation.hash();
   }
-  Result<RerunReport> again() {
-    Exercise exercise = Stage::makeExercise(loaded_);
-    return rerun(file_, exercise);
+  Result<ResimulationReport> resimulateJournal() {
+    SessionSimulation simulation = test::SessionRig::makeSimulation(loaded_);
+    return resimulate(file_, simulation);
   }
 
   LoadedScene loaded_ = test::smallSession();
@@ -57,11 +58,11 @@ class JournalTest : public ::testing::Test {
   fs::path file_;
 };
 
-TEST_F(JournalTest, RunsAgainToEqualHashes) {
+TEST_F(JournalTest, ResimulatesToEqualHashes) {
   const std::uint64_t final_hash = write();
-  const auto report = again();
+  const auto report = resimulateJournal();
   ASSERT_TRUE(report) << report.error().what;
-  EXPECT_EQ(report->first, 2U) << "the first checkpoint is what the first tick left";
+  EXPECT_EQ(report->first, 2U) << "the first checkpoint is of the state after tick 1";
   EXPECT_EQ(report->last, kTicks);
   EXPECT_EQ(report->compared, kTicks - 1);
   EXPECT_EQ(report->gaps, 0U);
@@ -69,73 +70,73 @@ TEST_F(JournalTest, RunsAgainToEqualHashes) {
   EXPECT_FALSE(report->first_difference);
 }
 
-// Whatever a clock has decided is in the inputs: a re-run has no clock.
-TEST_F(JournalTest, BudgetsThatChangeOnTheWayAreRepeated) {
-  const auto play_with = [](Tick tick) {
-    TickInput input = play(tick);
+// Budgets chosen by measured time are inputs: a re-simulation uses no clock.
+TEST_F(JournalTest, ChangesOfTheBudgetAreRepeated) {
+  const auto input_with_budget = [](Tick tick) {
+    TickInput input = test::playInput(tick);
     if (tick % 150 == 0)
       input.changes.push_back({.kind = ChangeKind::kBudget, .value = static_cast<double>(tick % 400)});
     return input;
   };
-  Exercise exercise = Stage::makeExercise(loaded_, 1, {kRightHand});
+  SessionSimulation simulation = test::SessionRig::makeSimulation(loaded_, 1, {test::kRightHand});
   auto journal = Journal::open(file_, {"small/scenario.yaml", 0.25, fingerprintOf(loaded_)});
   ASSERT_TRUE(journal);
   std::uint32_t limited = 0;
   for (Tick tick = 1; tick <= kTicks; ++tick) {
     JournalEntry entry;
-    entry.input = play_with(tick);
-    exercise.tick(entry.input);
-    entry.hash = exercise.hash();
-    limited += exercise.environment().work().limited_pairs;
-    if (tick % kCheckpointEvery == 1) exercise.save(entry.checkpoint);
+    entry.input = input_with_budget(tick);
+    simulation.tick(entry.input);
+    entry.hash = simulation.hash();
+    limited += simulation.environment().work().limited_pairs;
+    if (tick % kCheckpointEvery == 1) simulation.save(entry.checkpoint);
     ASSERT_TRUE(journal->write(entry));
   }
-  EXPECT_GT(limited, 0U) << "the budgets did limit something";
-  ASSERT_TRUE(journal->close({.phase = exercise.phase(), .tick = kTicks, .reason = "done"}));
-  const auto report = again();
+  EXPECT_GT(limited, 0U) << "the budgets must limit some queries";
+  ASSERT_TRUE(journal->close({.phase = simulation.phase(), .tick = kTicks, .reason = "done"}));
+  const auto report = resimulateJournal();
   ASSERT_TRUE(report) << report.error().what;
   EXPECT_EQ(report->compared, kTicks - 1);
   EXPECT_FALSE(report->first_difference);
-  EXPECT_EQ(report->final_hash, exercise.hash());
+  EXPECT_EQ(report->final_hash, simulation.hash());
 }
 
-TEST_F(JournalTest, SaysWhatItWasMadeWith) {
+TEST_F(JournalTest, HasScenarioDetailAndFingerprint) {
   write();
-  const auto origin = originOf(file_);
+  const auto origin = readJournalOrigin(file_);
   ASSERT_TRUE(origin) << origin.error().what;
   EXPECT_EQ(origin->scenario, "small/scenario.yaml");
   EXPECT_EQ(origin->detail, 0.25);
-  const auto made = madeOf(file_);
-  ASSERT_TRUE(made) << made.error().what;
-  EXPECT_TRUE(changesSince(*made, loaded_).empty());
-  EXPECT_EQ(made->structures, fingerprintOf(loaded_).structures);
+  const auto fingerprint = readFingerprint(file_);
+  ASSERT_TRUE(fingerprint) << fingerprint.error().what;
+  EXPECT_TRUE(changesSince(*fingerprint, loaded_).empty());
+  EXPECT_EQ(fingerprint->structures, fingerprintOf(loaded_).structures);
 }
 
-TEST_F(JournalTest, AChangedInputIsFoundAtItsTick) {
+TEST_F(JournalTest, AChangedInputIsADifferenceAtItsTick) {
   write([](JournalEntry& entry) {
     if (entry.input.tick == 321) entry.input.readings[0].X_WH.translation().x() += 1e-12;
     return true;
   });
-  const auto report = again();
+  const auto report = resimulateJournal();
   ASSERT_TRUE(report) << report.error().what;
   EXPECT_EQ(report->first_difference, Tick{321});
-  EXPECT_EQ(report->compared, kTicks - 1) << "the rest is looked at too";
+  EXPECT_EQ(report->compared, kTicks - 1) << "the ticks after the difference are compared too";
 }
 
-TEST_F(JournalTest, AHandThatDoesNotExistIsADifferenceAndNoCrash) {
+TEST_F(JournalTest, AnInputOfAnUnknownHandIsADifference) {
   write([](JournalEntry& entry) {
     if (entry.input.tick == 321) entry.input.readings[0].hand = HandId{12345};
     return true;
   });
-  const auto report = again();
+  const auto report = resimulateJournal();
   ASSERT_TRUE(report) << report.error().what;
   EXPECT_EQ(report->first_difference, Tick{321});
 }
 
-TEST_F(JournalTest, AfterAGapItGoesOnFromTheNextCheckpoint) {
+TEST_F(JournalTest, AfterAGapItContinuesFromTheNextCheckpoint) {
   const std::uint64_t final_hash =
       write([](const JournalEntry& entry) { return entry.input.tick < 300 || entry.input.tick > 310; });
-  const auto report = again();
+  const auto report = resimulateJournal();
   ASSERT_TRUE(report) << report.error().what;
   EXPECT_EQ(report->gaps, 1U);
   EXPECT_EQ(report->compared, (299 - 1) + (kTicks - 1001));
@@ -144,50 +145,50 @@ TEST_F(JournalTest, AfterAGapItGoesOnFromTheNextCheckpoint) {
   EXPECT_FALSE(report->first_difference);
 }
 
-TEST_F(JournalTest, AJournalThatWasCutRunsAsFarAsItGoes) {
+TEST_F(JournalTest, ATruncatedJournalIsResimulatedUpToItsEnd) {
   write();
   fs::resize_file(file_, fs::file_size(file_) - 100);
-  const auto report = again();
+  const auto report = resimulateJournal();
   ASSERT_TRUE(report) << report.error().what;
   EXPECT_GT(report->compared, 0U);
   EXPECT_FALSE(report->first_difference);
-  EXPECT_FALSE(report->problem.empty()) << "and says that it was";
+  EXPECT_FALSE(report->problem.empty()) << "the truncation is reported";
 
   fs::resize_file(file_, 200);
-  const auto stump = again();
-  ASSERT_FALSE(stump);
-  EXPECT_THAT(stump.error().what, HasSubstr("session.mcap"));
+  const auto remainder = resimulateJournal();
+  ASSERT_FALSE(remainder);
+  EXPECT_THAT(remainder.error().what, HasSubstr("session.mcap"));
 }
 
-TEST_F(JournalTest, ASceneOfAnotherScenarioIsRefused) {
+TEST_F(JournalTest, AJournalOfAnotherScenarioIsAnError) {
   write();
-  Exercise other = Stage::makeExercise(test::smallSession(test::smallScenario()));
-  const auto report = rerun(file_, other);
+  SessionSimulation other = test::SessionRig::makeSimulation(test::smallSession(test::smallScenario()));
+  const auto report = resimulate(file_, other);
   ASSERT_FALSE(report);
   EXPECT_THAT(report.error().what, HasSubstr("session.mcap"));
 }
 
-TEST_F(JournalTest, WhatIsNoJournalIsAClearError) {
-  const auto missing = again();
+TEST_F(JournalTest, AFileThatIsNoJournalIsAnErrorThatNamesIt) {
+  const auto missing = resimulateJournal();
   ASSERT_FALSE(missing);
   EXPECT_THAT(missing.error().what, HasSubstr("session.mcap"));
 
-  std::ofstream(file_) << "this is a letter, not a recording\n";
-  const auto letter = again();
-  ASSERT_FALSE(letter);
-  EXPECT_THAT(letter.error().what, HasSubstr("session.mcap"));
-  EXPECT_FALSE(originOf(file_));
+  std::ofstream(file_) << "plain text, not a recording\n";
+  const auto text = resimulateJournal();
+  ASSERT_FALSE(text);
+  EXPECT_THAT(text.error().what, HasSubstr("session.mcap"));
+  EXPECT_FALSE(readJournalOrigin(file_));
 
   {
     auto empty = Journal::open(file_, {"small/scenario.yaml", 1.0});
     ASSERT_TRUE(empty);
     ASSERT_TRUE(empty->close({}));
   }
-  EXPECT_THAT(again().error().what, HasSubstr("no ticks"));
+  EXPECT_THAT(resimulateJournal().error().what, HasSubstr("no ticks"));
   EXPECT_FALSE(Journal::open(file_ / "in a file" / "session.mcap", {}));
 }
 
-TEST_F(JournalTest, FlippedBytesNeverPassAsTheSession) {
+TEST_F(JournalTest, DamagedBytesAreReportedOrSkippedAndNeverADifference) {
   write();
   const auto size = static_cast<std::streamoff>(fs::file_size(file_));
   for (int i = 1; i < 12; ++i) {
@@ -197,18 +198,18 @@ TEST_F(JournalTest, FlippedBytesNeverPassAsTheSession) {
     bytes.seekp(size * i / 12);
     for (int k = 0; k < 8; ++k) bytes.put('\x5A');
     bytes.close();
-    Exercise exercise = Stage::makeExercise(loaded_);
-    const auto report = rerun(damaged, exercise);
-    if (!report) continue;  // an error that says so, or whole chunks left out:
+    SessionSimulation simulation = test::SessionRig::makeSimulation(loaded_);
+    const auto report = resimulate(damaged, simulation);
+    if (!report) continue;  // else damaged chunks were skipped:
     EXPECT_FALSE(report->first_difference) << i;
   }
 }
 
-TEST(ForEachPart, CutsBytesIntoPartsThatFitASample) {
+TEST(ForEachPart, SplitsBytesIntoPartsThatFitASample) {
   for (const std::size_t size : {0, 1, 1023, 1024, 1025, 5000}) {
     std::vector<std::uint8_t> bytes(size);
     for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::uint8_t>(i * 7);
-    std::vector<std::uint8_t> together;
+    std::vector<std::uint8_t> joined;
     std::uint32_t parts = 0;
     forEachPart<CheckpointPart>(9, 4, bytes, [&](const CheckpointPart& part) {
       EXPECT_EQ(part.part, parts++);
@@ -216,12 +217,12 @@ TEST(ForEachPart, CutsBytesIntoPartsThatFitASample) {
       EXPECT_EQ(part.state_hash, 4U);
       EXPECT_LE(part.bytes.size(), 1024U);
       EXPECT_EQ(part.parts, std::max<std::size_t>(1, (size + 1023) / 1024));
-      together.insert(together.end(), part.bytes.begin(), part.bytes.end());
+      joined.insert(joined.end(), part.bytes.begin(), part.bytes.end());
     });
-    EXPECT_EQ(together, bytes);
+    EXPECT_EQ(joined, bytes);
     EXPECT_EQ(parts, std::max<std::size_t>(1, (size + 1023) / 1024));
   }
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::session

@@ -10,7 +10,7 @@
 
 #include "tests/server/session/small_session.h"
 
-namespace tenon {
+namespace tenon::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -18,13 +18,13 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-TEST(Fingerprint, OfTheSameSceneShowsNoChange) {
+TEST(Fingerprint, OfTheSameSceneHasNoChanges) {
   const LoadedScene loaded = test::smallSession();
   EXPECT_THAT(changesSince(fingerprintOf(loaded), loaded), IsEmpty());
-  EXPECT_THAT(changesSince({}, loaded), IsEmpty()) << "what is not known cannot have changed";
+  EXPECT_THAT(changesSince({}, loaded), IsEmpty()) << "unknown hashes compare as unchanged";
 }
 
-TEST(Fingerprint, NamesWhatHasChanged) {
+TEST(Fingerprint, ChangesAreNamed) {
   const LoadedScene loaded = test::smallSession();
   const LoadedScene edited = test::smallSession(test::twoHandedScenario() + "\n# a remark\n");
   EXPECT_THAT(changesSince(fingerprintOf(loaded), edited), ElementsAre("the text of small/scenario.yaml"));
@@ -33,8 +33,8 @@ TEST(Fingerprint, NamesWhatHasChanged) {
   then.structures["part"] = "another";
   then.structures["lid"] = "was there";
   then.structures.erase("pointer");
-  EXPECT_THAT(changesSince(then, loaded), ElementsAre("'lid' is not in it any more",
-                                                      "the structures of 'part'", "'pointer' is new in it"));
+  EXPECT_THAT(changesSince(then, loaded),
+              ElementsAre("'lid' was removed", "the structures of 'part'", "'pointer' was added"));
 }
 
 class SceneLoaderTest : public ::testing::Test {
@@ -46,27 +46,27 @@ class SceneLoaderTest : public ::testing::Test {
     const fs::path file = folder_ / "scene" / "scenario.yaml";
     std::ofstream(file) << text;
     return loadScene(file, {.cache = folder_ / "cache"},
-                     [this](std::string_view doing, double) { doing_ = std::string(doing); });
+                     [this](std::string_view activity, double) { activity_ = std::string(activity); });
   }
 
   fs::path folder_ = fs::temp_directory_path() / ("tenon_loader_" + std::to_string(getpid()));
-  std::string doing_;
+  std::string activity_;
 };
 
-TEST_F(SceneLoaderTest, WithoutAFileItNamesTheFile) {
+TEST_F(SceneLoaderTest, AMissingScenarioIsAnErrorThatNamesIt) {
   const auto none = loadScene(folder_ / "nowhere", {.cache = folder_ / "cache"});
   ASSERT_FALSE(none);
   EXPECT_THAT(none.error().what, HasSubstr("nowhere"));
 }
 
-TEST_F(SceneLoaderTest, AMeshThatIsMissingIsNamedWithObjectAndLine) {
+TEST_F(SceneLoaderTest, AMissingMeshIsAnErrorWithFileAndLine) {
   const auto none =
       load(test::with(test::twoHandedScenario(), "{part: spare}", "{file: gone.stl, unit: mm}"));
   ASSERT_FALSE(none);
   EXPECT_THAT(none.error().what, HasSubstr("scenario.yaml:"));
 }
 
-TEST(DefaultCache, FollowsTheEnvironment) {
+TEST(DefaultCache, IsTakenFromTheEnvironment) {
   const char* const before = std::getenv("TENON_CACHE");
   const std::string kept = before != nullptr ? before : "";
   setenv("TENON_CACHE", "/somewhere/else", 1);
@@ -77,4 +77,4 @@ TEST(DefaultCache, FollowsTheEnvironment) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::session

@@ -6,14 +6,14 @@
 #include <utility>
 #include <vector>
 
-#include "server/session/exercise.h"
 #include "server/session/scene_loader.h"
-#include "tests/server/game_control/exercise.h"
+#include "server/session/session_simulation.h"
+#include "tests/server/game_control/scenario_fixture.h"
 #include "tests/server/game_control/scenario_text.h"
 
 namespace tenon::test {
 
-inline constexpr HandId kRightHand{0}, kTeacherHand{1}, kLeftHand{2};
+inline constexpr HandId kRightHand{0}, kInstructorHand{1}, kLeftHand{2};
 
 /// The small scenario with a left hand, its own pointer and a signal.
 inline std::string twoHandedScenario() {
@@ -28,112 +28,112 @@ inline std::string twoHandedScenario() {
               "          - {signal: bell}\n");
 }
 
-inline LoadedScene smallSession(const std::string& text = twoHandedScenario()) {
-  const auto scenario =
-      std::make_shared<const ScenarioFile>(parseScenario(text, "small/scenario.yaml").value());
+inline session::LoadedScene smallSession(const std::string& text = twoHandedScenario()) {
+  const auto scenario = std::make_shared<const game_control::ScenarioFile>(
+      game_control::parseScenario(text, "small/scenario.yaml").value());
   std::vector<StructuresPtr> structures = smallStructures();
   if (scenario->objects.size() > structures.size()) structures.push_back(structures[2]);
-  return {scenario, makeScene(*scenario, std::move(structures)).value()};
+  return {scenario, game_control::makeScene(*scenario, std::move(structures)).value()};
 }
 
-/// Its exercise, and people whose hands are where the test says.
-class Stage {
+/// A SessionSimulation of the small scenario with hands whose inputs the test sets.
+class SessionRig {
  public:
-  explicit Stage(unsigned workers = 1, std::vector<HandId> needed = {})
-      : loaded_(smallSession()), exercise_(makeExercise(loaded_, workers, std::move(needed))) {
-    output_ = exercise_.makeOutput();
+  explicit SessionRig(unsigned workers = 1, std::vector<HandId> needed = {})
+      : loaded_(smallSession()), simulation_(makeSimulation(loaded_, workers, std::move(needed))) {
+    output_ = simulation_.makeOutput();
   }
-  static tenon::Exercise makeExercise(const LoadedScene& loaded, unsigned workers = 1,
-                                      std::vector<HandId> needed = {}) {
-    ExerciseOptions options;
+  static session::SessionSimulation makeSimulation(const session::LoadedScene& loaded, unsigned workers = 1,
+                                                   std::vector<HandId> needed = {}) {
+    session::SessionSimulationOptions options;
     options.environment.workers = workers;
     options.needed_hands = std::move(needed);
     return {loaded.scenario, loaded.scene, options};
   }
 
   void attach(HandId hand, const Vector3& p_WH) {
-    change({.kind = ChangeKind::kAttach, .hand = hand});
-    speaking_.push_back({.hand = hand, .X_WH = Pose(p_WH)});
+    change({.kind = session::ChangeKind::kAttach, .hand = hand});
+    readings_.push_back({.hand = hand, .X_WH = Pose(p_WH)});
   }
   void move(HandId hand, const Vector3& p_WH) { reading(hand).X_WH = Pose(p_WH); }
-  HandReading& reading(HandId hand) {
-    for (HandReading& reading : speaking_)
+  session::HandReading& reading(HandId hand) {
+    for (session::HandReading& reading : readings_)
       if (reading.hand == hand) return reading;
-    return speaking_.emplace_back(HandReading{.hand = hand});
+    return readings_.emplace_back(session::HandReading{.hand = hand});
   }
-  /// Its link is cut: no more readings.
-  void silence(HandId hand) {
-    std::erase_if(speaking_, [&](const HandReading& reading) { return reading.hand == hand; });
+  /// No more samples of this hand, as after a lost link.
+  void loseLink(HandId hand) {
+    std::erase_if(readings_, [&](const session::HandReading& reading) { return reading.hand == hand; });
   }
-  void change(const Change& change) { input_.changes.push_back(change); }
+  void change(const session::Change& change) { input_.changes.push_back(change); }
 
-  const TickOutput& tick(int ticks = 1) {
+  const session::TickOutput& tick(int ticks = 1) {
     for (int i = 0; i < ticks; ++i) {
-      input_.tick = exercise_.now() + 1;
-      for (HandReading& reading : speaking_) {
+      input_.tick = simulation_.now() + 1;
+      for (session::HandReading& reading : readings_) {
         reading.seq = static_cast<std::uint32_t>(input_.tick);
         input_.readings.push_back(reading);
       }
-      exercise_.tick(input_);
-      exercise_.fill(output_);
+      simulation_.tick(input_);
+      simulation_.fill(output_);
       input_.readings.clear();
       input_.changes.clear();
     }
     return output_;
   }
 
-  tenon::Exercise& exercise() { return exercise_; }
-  [[nodiscard]] const TickOutput& output() const { return output_; }
-  [[nodiscard]] const LoadedScene& loaded() const { return loaded_; }
-  [[nodiscard]] const HandMotion& hand(HandId hand) const {
-    return exercise_.environment().hands()[hand.value];
+  session::SessionSimulation& simulation() { return simulation_; }
+  [[nodiscard]] const session::TickOutput& output() const { return output_; }
+  [[nodiscard]] const session::LoadedScene& loaded() const { return loaded_; }
+  [[nodiscard]] const simulation::HandMotion& hand(HandId hand) const {
+    return simulation_.environment().hands()[hand.value];
   }
-  [[nodiscard]] const ObjectMotion& object(const std::string& name) const {
-    return exercise_.environment().objects()[loaded_.scenario->objectNamed(name).value];
+  [[nodiscard]] const simulation::ObjectMotion& object(const std::string& name) const {
+    return simulation_.environment().objects()[loaded_.scenario->objectNamed(name).value];
   }
 
  private:
-  LoadedScene loaded_;
-  tenon::Exercise exercise_;
-  std::vector<HandReading> speaking_;
-  TickInput input_;
-  TickOutput output_;
+  session::LoadedScene loaded_;
+  session::SessionSimulation simulation_;
+  std::vector<session::HandReading> readings_;
+  session::TickInput input_;
+  session::TickOutput output_;
 };
 
-/// The same whole exercise every time: the right hand touches the part, takes it, meets the socket's wall on
-/// the way and mounts it within kPlayTicks, while the teacher's cube runs into the left pointer.
+/// Scripted inputs of a whole session: the right hand touches the part, takes it, meets the wall of the
+/// socket and mounts the part within kPlayTicks, while the instructor's cube runs into the left pointer.
 ///
 ///   1        240     700      800        1500              1650              1800
 ///   above -> touch, wait  ->  lift  ->  over the socket -> at its wall  -> down
 inline constexpr Tick kPlayTicks = 2100;
 
-inline TickInput play(Tick tick) {
+inline session::TickInput playInput(Tick tick) {
   struct Waypoint {
-    double tick;
+    double tick;  // [ticks]
     Vector3 p_WH;
   };
   static const std::vector<Waypoint> right{{0, {0.2, 0, 0.2}},        {240, {0.2, 0, 0.129}},
                                            {700, {0.2, 0, 0.129}},    {800, {0.2, 0, 0.18}},
                                            {1500, {0.0015, 0, 0.08}}, {1650, {0.0015, 0, 0.04}},
                                            {1800, {0.001, 0, 0.009}}, {9000, {0.001, 0, 0.009}}};
-  static const std::vector<Waypoint> teacher{
+  static const std::vector<Waypoint> instructor{
       {0, {0.3, 0.2, 0.2}}, {1000, {0.48, 0, 0.2}}, {9000, {0.48, 0, 0.2}}};
   static const std::vector<Waypoint> left{{0, {0.5, 0, 0.2}}, {9000, {0.5, 0.01, 0.2}}};
-  const auto at = [&](const std::vector<Waypoint>& way) {
+  const auto at = [&](const std::vector<Waypoint>& path) {
     const auto now = static_cast<double>(tick);
     std::size_t i = 1;
-    while (i + 1 < way.size() && way[i].tick < now) ++i;
-    const double share = (now - way[i - 1].tick) / (way[i].tick - way[i - 1].tick);
-    return Vector3(way[i - 1].p_WH + (way[i].p_WH - way[i - 1].p_WH) * share);
+    while (i + 1 < path.size() && path[i].tick < now) ++i;
+    const double fraction = (now - path[i - 1].tick) / (path[i].tick - path[i - 1].tick);
+    return Vector3(path[i - 1].p_WH + (path[i].p_WH - path[i - 1].p_WH) * fraction);
   };
-  TickInput input;
+  session::TickInput input;
   input.tick = tick;
-  const auto add = [&](HandId hand, const std::vector<Waypoint>& way) {
-    if (tick == 1) input.changes.push_back({.kind = ChangeKind::kAttach, .hand = hand});
-    input.readings.push_back({.hand = hand, .seq = static_cast<std::uint32_t>(tick), .X_WH = Pose(at(way))});
+  const auto add = [&](HandId hand, const std::vector<Waypoint>& path) {
+    if (tick == 1) input.changes.push_back({.kind = session::ChangeKind::kAttach, .hand = hand});
+    input.readings.push_back({.hand = hand, .seq = static_cast<std::uint32_t>(tick), .X_WH = Pose(at(path))});
   };
   add(kRightHand, right);
-  add(kTeacherHand, teacher);
+  add(kInstructorHand, instructor);
   add(kLeftHand, left);
   return input;
 }

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace tenon {
+namespace tenon::session {
 namespace {
 
 TickInput fullInput() {
@@ -38,7 +38,7 @@ std::vector<std::uint8_t> bytesOf(const TickInput& input) {
   return bytes;
 }
 
-TEST(TickIo, WhatATickConsumedComesBackToTheLastBit) {
+TEST(TickIo, TickInputIsReadBackBitEqual) {
   const TickInput input = fullInput();
   const auto read = readTickInput(bytesOf(input));
   ASSERT_TRUE(read) << read.error().what;
@@ -52,10 +52,10 @@ TEST(TickIo, WhatATickConsumedComesBackToTheLastBit) {
   EXPECT_EQ(read->readings[3].V_WH.linear, Vector3(1, 2, 3));
   EXPECT_EQ(read->changes[5].game.signal, 5U);
   EXPECT_EQ(read->changes[5].F_Oo_W.torque, Vector3(0, 5, 0));
-  EXPECT_EQ(bytesOf(*read), bytesOf(input)) << "nothing is left out";
+  EXPECT_EQ(bytesOf(*read), bytesOf(input)) << "every field is written";
 }
 
-TEST(TickIo, ATickWithoutNewsIsAFewBytes) {
+TEST(TickIo, ATickWithoutInputTakesAFewBytes) {
   TickInput input;
   input.tick = 5;
   const auto bytes = bytesOf(input);
@@ -67,7 +67,7 @@ TEST(TickIo, ATickWithoutNewsIsAFewBytes) {
   EXPECT_TRUE(read->changes.empty());
 }
 
-TEST(TickIo, EveryCutAndEveryAddedByteIsRefused) {
+TEST(TickIo, TruncatedAndExtendedBytesAreRefused) {
   auto bytes = bytesOf(fullInput());
   for (std::size_t size = 0; size < bytes.size(); ++size)
     ASSERT_FALSE(readTickInput(std::span(bytes).first(size))) << size;
@@ -77,7 +77,7 @@ TEST(TickIo, EveryCutAndEveryAddedByteIsRefused) {
   EXPECT_NE(longer.error().what.find("damaged"), std::string::npos) << longer.error().what;
 }
 
-TEST(TickIo, MoreReadingsThanHandsAreRefused) {
+TEST(TickIo, ListsAboveTheirCapacityAreRefused) {
   auto bytes = bytesOf(fullInput());
   constexpr std::size_t kCountOfReadings = sizeof(Tick);
   ASSERT_EQ(bytes[kCountOfReadings], kMaxHands);
@@ -88,4 +88,4 @@ TEST(TickIo, MoreReadingsThanHandsAreRefused) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::session

@@ -8,96 +8,96 @@
 
 #include "tests/server/simulation/small_scene.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
-struct Ball {
+struct Sphere {
   Vector3 p_WC;
   double radius = 0.0;
-  bool there = true;
+  bool present = true;
 };
 
-/// What a loop over all pairs says.
-std::vector<std::uint32_t> allNear(const Scene& scene, const std::vector<Ball>& balls, double reach) {
+/// Brute force over all pairs.
+std::vector<std::uint32_t> bruteForce(const Scene& scene, const std::vector<Sphere>& spheres, double margin) {
   std::vector<std::uint32_t> result;
   for (std::uint32_t pair = 0; pair < scene.pairs.size(); ++pair) {
     const PairSpec& spec = scene.pairs[pair];
-    const Ball& a = balls[spec.a.value];
-    const Ball& b = balls[spec.b.value];
+    const Sphere& a = spheres[spec.a.value];
+    const Sphere& b = spheres[spec.b.value];
     const double gap = (a.p_WC - b.p_WC).norm() - a.radius - b.radius - spec.dilation;
-    if (a.there && b.there && gap <= reach) result.push_back(pair);
+    if (a.present && b.present && gap <= margin) result.push_back(pair);
   }
   return result;
 }
 
-std::vector<std::uint32_t> found(BroadPhase& sweep, const std::vector<Ball>& balls, double reach) {
-  for (std::uint32_t i = 0; i < balls.size(); ++i) {
-    if (balls[i].there) {
-      sweep.place(ObjectId{i}, balls[i].p_WC, balls[i].radius);
+std::vector<std::uint32_t> findPairs(BroadPhase& sweep, const std::vector<Sphere>& spheres, double margin) {
+  for (std::uint32_t i = 0; i < spheres.size(); ++i) {
+    if (spheres[i].present) {
+      sweep.setSphere(ObjectId{i}, spheres[i].p_WC, spheres[i].radius);
     } else {
-      sweep.hide(ObjectId{i});
+      sweep.remove(ObjectId{i});
     }
   }
-  const auto pairs = sweep.find(reach);
+  const auto pairs = sweep.findPairs(margin);
   return {pairs.begin(), pairs.end()};
 }
 
 class BroadPhaseTest : public testing::Test {
  protected:
-  static constexpr std::uint32_t kBalls = 60;
+  static constexpr std::uint32_t kSpheres = 60;
 
   BroadPhaseTest() {
-    for (std::uint32_t i = 0; i < kBalls; ++i) small_.object("ball", nullptr, Vector3::Zero());
-    for (std::uint32_t i = 0; i < kBalls; ++i) {
+    for (std::uint32_t i = 0; i < kSpheres; ++i) small_.object("sphere", nullptr, Vector3::Zero());
+    for (std::uint32_t i = 0; i < kSpheres; ++i) {
       for (std::uint32_t j = 0; j < i; ++j) {
         if ((i + j) % 5 != 0) small_.pair(ObjectId{i}, ObjectId{j}, false, 0.001 * (i % 4));
       }
     }
-    // both directions of one pair
+    // a second pair of the same two objects, in the other order
     small_.pair(ObjectId{0}, ObjectId{1});
     scene_ = small_.build();
-    balls_.resize(kBalls);
-    // the last is as large as a floor
-    for (std::uint32_t i = 0; i < kBalls; ++i)
-      balls_[i].radius = i + 1 == kBalls ? 0.7 : 0.01 + 0.001 * (i % 7);
+    spheres_.resize(kSpheres);
+    // the last one is as large as a floor
+    for (std::uint32_t i = 0; i < kSpheres; ++i)
+      spheres_[i].radius = i + 1 == kSpheres ? 0.7 : 0.01 + 0.001 * (i % 7);
   }
 
-  Vector3 anywhere() { return {place_(random_), place_(random_), place_(random_)}; }
+  Vector3 randomPosition() { return {coordinate_(random_), coordinate_(random_), coordinate_(random_)}; }
 
   test::SmallScene small_;
   std::shared_ptr<const Scene> scene_;
-  std::vector<Ball> balls_;
+  std::vector<Sphere> spheres_;
   std::mt19937 random_{7};
-  std::uniform_real_distribution<double> place_{-0.2, 0.2};
+  std::uniform_real_distribution<double> coordinate_{-0.2, 0.2};
 };
 
-TEST_F(BroadPhaseTest, FindsWhatALoopOverAllPairsFinds) {
+TEST_F(BroadPhaseTest, FindsTheSamePairsAsBruteForce) {
   BroadPhase sweep(*scene_);
-  for (Ball& ball : balls_) ball.p_WC = anywhere();
+  for (Sphere& sphere : spheres_) sphere.p_WC = randomPosition();
   std::size_t near = 0;
   for (int tick = 0; tick < 300; ++tick) {
-    for (Ball& ball : balls_) ball.p_WC += 0.02 * anywhere();
-    balls_[static_cast<std::size_t>(tick) % kBalls].p_WC = anywhere();
-    Ball& blinking = balls_[static_cast<std::size_t>(7 * tick) % kBalls];
-    blinking.there = !blinking.there;
-    const auto expected = allNear(*scene_, balls_, 0.005);
-    ASSERT_EQ(found(sweep, balls_, 0.005), expected) << "tick " << tick;
+    for (Sphere& sphere : spheres_) sphere.p_WC += 0.02 * randomPosition();
+    spheres_[static_cast<std::size_t>(tick) % kSpheres].p_WC = randomPosition();
+    Sphere& toggled = spheres_[static_cast<std::size_t>(7 * tick) % kSpheres];
+    toggled.present = !toggled.present;
+    const auto expected = bruteForce(*scene_, spheres_, 0.005);
+    ASSERT_EQ(findPairs(sweep, spheres_, 0.005), expected) << "tick " << tick;
     near += expected.size();
   }
   EXPECT_GT(near, 10U * 300U);
 }
 
-// Many stand at the same x: who is sorted before whom must not depend on the way here.
-TEST_F(BroadPhaseTest, AnswersFromThePosesAlone) {
+// All centres have the same x: the order of equal interval ends must not depend on earlier ticks.
+TEST_F(BroadPhaseTest, TheResultDependsOnThePosesAlone) {
   BroadPhase used(*scene_);
   for (int tick = 0; tick < 20; ++tick) {
-    for (Ball& ball : balls_) ball.p_WC = anywhere();
-    (void)found(used, balls_, 0.005);
+    for (Sphere& sphere : spheres_) sphere.p_WC = randomPosition();
+    (void)findPairs(used, spheres_, 0.005);
   }
-  for (Ball& ball : balls_) ball.p_WC.x() = 0.0;
+  for (Sphere& sphere : spheres_) sphere.p_WC.x() = 0.0;
   BroadPhase fresh(*scene_);
-  EXPECT_EQ(found(used, balls_, 0.005), found(fresh, balls_, 0.005));
+  EXPECT_EQ(findPairs(used, spheres_, 0.005), findPairs(fresh, spheres_, 0.005));
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -7,7 +7,7 @@
 
 namespace tenon::test {
 
-/// Ten objects, four hands and a day's worth of events in three seconds: what the determinism tests play.
+/// Ten objects, four hands and every kind of input within 3,000 ticks, for the determinism tests.
 ///
 ///        cube             forearm
 ///    o       o  pointers
@@ -28,7 +28,7 @@ struct BusyScene {
     right = small.hand("right", right_pointer);
     left = small.hand("left", left_pointer);
     instructor = small.hand("instructor", cube);
-    arm = small.hand("forearm", forearm, HandKind::kTracked);
+    arm = small.hand("forearm", forearm, simulation::HandKind::kTracked);
     for (const ObjectId moving :
          {right_pointer, left_pointer, cube, parts[0], parts[1], parts[2], parts[3]}) {
       small.pair(moving, floor);
@@ -49,16 +49,16 @@ struct BusyScene {
     return shape;
   }
 
-  /// What people do in this tick; depends on nothing but the tick.
-  void act(Environment& environment, Tick tick) const {
+  /// All inputs of this tick; a function of the tick only.
+  void act(simulation::Environment& environment, Tick tick) const {
     const double t = static_cast<double>(tick) * 1e-3;
     const auto wave = [t](double hertz, double phase) {
       return std::sin(6.283185307179586 * hertz * t + phase);
     };
-    const auto pose = [&](double x, double y, double z, double swing) {
-      return Pose(Vector3(x + 0.08 * wave(0.7, swing), y + 0.05 * wave(0.9, 2.0 * swing),
-                          z + 0.05 * wave(1.3, swing)),
-                  expRotation({0.3 * wave(0.5, swing), 0.2 * wave(0.8, swing), 0.4 * wave(0.3, swing)}));
+    const auto pose = [&](double x, double y, double z, double phase) {
+      return Pose(Vector3(x + 0.08 * wave(0.7, phase), y + 0.05 * wave(0.9, 2.0 * phase),
+                          z + 0.05 * wave(1.3, phase)),
+                  expRotation({0.3 * wave(0.5, phase), 0.2 * wave(0.8, phase), 0.4 * wave(0.3, phase)}));
     };
     if (tick == 1) {
       for (const HandId hand : {right, left, instructor, arm}) environment.setHandPresent(hand, true);
@@ -120,7 +120,7 @@ struct BusyScene {
     if (tick % 50 == 0) environment.contribute(parts[0], 5, {Vector3(3.0, 0.0, 1.0), Vector3::Zero()}, 80);
   }
 
-  void play(Environment& environment, Tick until) const {
+  void play(simulation::Environment& environment, Tick until) const {
     while (environment.tick() < until) {
       act(environment, environment.tick() + 1);
       environment.step();
@@ -128,7 +128,7 @@ struct BusyScene {
   }
 
   SmallScene small;
-  std::shared_ptr<const Scene> scene;
+  std::shared_ptr<const simulation::Scene> scene;
   ObjectId floor, wall, right_pointer, left_pointer, cube, forearm;
   ObjectId parts[4];
   HandId right, left, instructor, arm;

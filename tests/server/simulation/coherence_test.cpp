@@ -8,14 +8,14 @@
 #include "tests/server/simulation/small_scene.h"
 #include "tests/server/simulation/wave.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
 using test::cubeShape;
 using test::kCubeEdge;
 
 //        . - - - .              the hand turns a long rod about its middle, near posts that its ends
-//      .     |     .   o post   reach: the middle hardly moves, the ends go as fast as anything may
+//      .     |     .   o post   hit: the middle hardly moves, the ends move at the speed cap
 //     .  ====+====  .
 //      .     |     .
 //        ` - - - `
@@ -24,7 +24,7 @@ struct RodAndPosts {
     rod = small.object("rod", test::boxStructures({0.6, 0.02, 0.02}, 0.004, 0.005), {0.0, 0.0, 0.1});
     hand = small.hand("hand", rod);
     for (const Vector3& p : {Vector3(0.0, 0.29, 0.1), Vector3(-0.33, 0.0, 0.1), Vector3(0.2, -0.25, 0.1)}) {
-      posts.push_back(small.object("post", cubeShape(), p));
+      posts.push_back(small.object("post", test::cubeShape(), p));
       pairs.push_back(small.pair(rod, posts.back()));
     }
     scene = small.build();
@@ -32,9 +32,9 @@ struct RodAndPosts {
   void step(Environment& environment) const {
     const Tick tick = environment.tick() + 1;
     if (tick == 1) environment.setHandPresent(hand, true);
-    const Vector3 turn(0.0, 0.0, 1.2 * (1.0 - test::wave(tick, 1300)));
-    environment.setHandPose(hand, Pose(Vector3(0.03 * test::wave(tick, 700), 0.0, 0.1), expRotation(turn)),
-                            {});
+    const Vector3 rotation(0.0, 0.0, 1.2 * (1.0 - test::triangleWave(tick, 1300)));
+    environment.setHandPose(
+        hand, Pose(Vector3(0.03 * test::triangleWave(tick, 700), 0.0, 0.1), expRotation(rotation)), {});
     environment.step();
   }
 
@@ -46,32 +46,32 @@ struct RodAndPosts {
   std::vector<std::size_t> pairs;
 };
 
-TEST(Coherence, TheEndsOfATurningRodMissNothing) {
+TEST(Coherence, NoContactOfTheEndsOfATurningRodIsMissed) {
   const RodAndPosts rig;
   EnvironmentOptions every_pair;
   every_pair.coherence = false;
   Environment skipping(rig.scene, {});
-  Environment looking(rig.scene, every_pair);
+  Environment querying(rig.scene, every_pair);
   int touching = 0;
-  std::uint32_t looks_skipping = 0;
-  std::uint32_t looks_looking = 0;
+  std::uint32_t queries_skipping = 0;
+  std::uint32_t queries_querying = 0;
   for (int tick = 0; tick < 4000; ++tick) {
     rig.step(skipping);
-    rig.step(looking);
-    ASSERT_EQ(skipping.objects()[rig.rod.value].X_WO, looking.objects()[rig.rod.value].X_WO)
+    rig.step(querying);
+    ASSERT_EQ(skipping.objects()[rig.rod.value].X_WO, querying.objects()[rig.rod.value].X_WO)
         << "tick " << tick;
     for (const ObjectId post : rig.posts) {
-      ASSERT_EQ(skipping.inContact(rig.rod, post), looking.inContact(rig.rod, post)) << "tick " << tick;
-      touching += looking.inContact(rig.rod, post) ? 1 : 0;
+      ASSERT_EQ(skipping.inContact(rig.rod, post), querying.inContact(rig.rod, post)) << "tick " << tick;
+      touching += querying.inContact(rig.rod, post) ? 1 : 0;
     }
-    looks_skipping += skipping.work().queried_pairs;
-    looks_looking += looking.work().queried_pairs;
+    queries_skipping += skipping.work().queried_pairs;
+    queries_querying += querying.work().queried_pairs;
   }
   EXPECT_GT(touching, 200);
-  EXPECT_LT(2 * looks_skipping, looks_looking);
+  EXPECT_LT(2 * queries_skipping, queries_querying);
 }
 
-TEST(Coherence, TheFastestPointOfARodKeepsTheCapThatSkippingRestsOn) {
+TEST(Coherence, ThePointsOfARodKeepTheSpeedCapAssumedByCoherence) {
   const RodAndPosts rig;
   Environment environment(rig.scene, {});
   const double cap = EnvironmentOptions{}.max_speed * kTickSeconds;
@@ -87,23 +87,23 @@ TEST(Coherence, TheFastestPointOfARodKeepsTheCapThatSkippingRestsOn) {
     }
   }
   EXPECT_LE(farthest, cap * (1.0 + 1e-9));
-  EXPECT_GT(farthest, 0.9 * cap) << "and it was asked to go faster";
+  EXPECT_GT(farthest, 0.9 * cap) << "the hand moves faster than the cap";
 }
 
-// p / (v_i + v_j): two that both move may meet in half the time.
-TEST(Coherence, ASkipIsAsLongAsTheGapOverBothSpeeds) {
+// gap / (v_a + v_b): half as many ticks when both objects move.
+TEST(Coherence, APairIsSkippedForItsGapOverTheSumOfSpeedCaps) {
   test::SmallScene small;
-  const ObjectId left = small.object("left", cubeShape(), {0.0, 0.0, 0.0});
-  const ObjectId right = small.object("right", cubeShape(), {kCubeEdge + 0.02, 0.0, 0.0});
+  const ObjectId left = small.object("left", test::cubeShape(), {0.0, 0.0, 0.0});
+  const ObjectId right = small.object("right", test::cubeShape(), {test::kCubeEdge + 0.02, 0.0, 0.0});
   const HandId left_hand = small.hand("left", left);
   const HandId right_hand = small.hand("right", right);
   const std::size_t pair = small.pair(left, right);
   Environment environment(small.build(), {});
   EXPECT_TRUE(environment.pairs()[pair].due == 0);
   environment.step();
-  EXPECT_EQ(environment.pairs()[pair].due, std::numeric_limits<Tick>::max()) << "nobody moves either";
+  EXPECT_EQ(environment.pairs()[pair].due, std::numeric_limits<Tick>::max()) << "neither object moves";
 
-  // a look sees 3 mm ahead
+  // the margin of a query is 3 mm
   const auto expected = [&](double closing_speed) {
     PairContact contact;
     environment.pairContact(pair, contact);
@@ -111,50 +111,50 @@ TEST(Coherence, ASkipIsAsLongAsTheGapOverBothSpeeds) {
     EXPECT_LT(contact.gap, 0.02);
     return (contact.gap - 0.003) / (closing_speed * kTickSeconds);
   };
-  test::enter(environment, left_hand, {0.0, 0.0, 0.0});
+  test::activateHand(environment, left_hand, {0.0, 0.0, 0.0});
   environment.step();
   EXPECT_NEAR(static_cast<double>(environment.pairs()[pair].due - environment.tick()), expected(1.0), 1.0);
-  test::enter(environment, right_hand, {kCubeEdge + 0.02, 0.0, 0.0});
+  test::activateHand(environment, right_hand, {test::kCubeEdge + 0.02, 0.0, 0.0});
   environment.step();
   EXPECT_NEAR(static_cast<double>(environment.pairs()[pair].due - environment.tick()), expected(2.0), 1.0);
 }
 
-TEST(Groups, ChangeWhileRunning) {
+TEST(Groups, CanBeChangedBetweenTicks) {
   test::SmallScene small;
-  const ObjectId held = small.object("held", cubeShape(), {0.0, 0.0, 0.1});
-  const ObjectId block = small.object("block", cubeShape(), {0.0, 0.0, 0.0});
+  const ObjectId held = small.object("held", test::cubeShape(), {0.0, 0.0, 0.1});
+  const ObjectId block = small.object("block", test::cubeShape(), {0.0, 0.0, 0.0});
   const HandId hand = small.hand("hand", held);
   small.pair(held, block);
   Environment environment(small.build(), {});
-  test::enter(environment, hand, {0.0, 0.0, 0.1});
-  test::moveTo(environment, hand, {0.0, 0.0, 0.03}, 200);
+  test::activateHand(environment, hand, {0.0, 0.0, 0.1});
+  test::moveHandTo(environment, hand, {0.0, 0.0, 0.03}, 200);
   const auto height = [&] { return environment.objects()[held.value].X_WO.translation().z(); };
-  EXPECT_NEAR(height(), kCubeEdge, 1e-4);
+  EXPECT_NEAR(height(), test::kCubeEdge, 1e-4);
   EXPECT_EQ(environment.work().active_pairs, 1U);
 
   environment.setGroup(held, 7);
   environment.setGroup(block, 7);
   const std::vector<std::uint8_t> grouped = environment.save();
-  test::stay(environment, 50);
+  test::stepTicks(environment, 50);
   EXPECT_EQ(environment.work().active_pairs, 0U);
-  EXPECT_NEAR(height(), 0.03, 1e-6) << "of one group: nothing holds it";
+  EXPECT_NEAR(height(), 0.03, 1e-6) << "no collision within a group";
   EXPECT_FALSE(environment.inContact(held, block));
   EXPECT_EQ(environment.forceOn(block).force.norm(), 0.0);
 
-  test::moveTo(environment, hand, {0.0, 0.0, 0.1}, 200);
+  test::moveHandTo(environment, hand, {0.0, 0.0, 0.1}, 200);
   environment.setGroup(block, 8);
-  test::moveTo(environment, hand, {0.0, 0.0, 0.03}, 200);
-  EXPECT_NEAR(height(), kCubeEdge, 1e-4) << "of two groups again";
+  test::moveHandTo(environment, hand, {0.0, 0.0, 0.03}, 200);
+  EXPECT_NEAR(height(), test::kCubeEdge, 1e-4) << "in different groups again";
   EXPECT_TRUE(environment.inContact(held, block));
 
   ASSERT_TRUE(environment.restore(grouped));
   EXPECT_EQ(environment.groupOf(block), 7U);
 }
 
-TEST(Groups, WhoHasNoneMeetsEverybody) {
+TEST(Groups, ObjectsWithoutAGroupCollide) {
   test::SmallScene small;
-  const ObjectId one = small.object("one", cubeShape(), {0.0, 0.0, 0.0}, ObjectStatus::kParked, 4);
-  const ObjectId other = small.object("other", cubeShape(), {0.03, 0.0, 0.0}, ObjectStatus::kParked, 4);
+  const ObjectId one = small.object("one", test::cubeShape(), {0.0, 0.0, 0.0}, ObjectStatus::kParked, 4);
+  const ObjectId other = small.object("other", test::cubeShape(), {0.03, 0.0, 0.0}, ObjectStatus::kParked, 4);
   small.pair(one, other);
   Environment environment(small.build(), {});
   environment.step();
@@ -166,4 +166,4 @@ TEST(Groups, WhoHasNoneMeetsEverybody) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::simulation

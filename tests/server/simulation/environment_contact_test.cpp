@@ -7,32 +7,32 @@
 #include "server/simulation/environment.h"
 #include "tests/server/simulation/small_scene.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
-using test::enter;
+using test::activateHand;
 using test::kPointerRadius;
-using test::moveTo;
-using test::stay;
+using test::moveHandTo;
+using test::stepTicks;
 
 constexpr double kStiffness = 1000.0;
 
-//      o   the hand dives 20 mm below where the pointer can go
+//      o   the hand goes 20 mm below the pointer's contact position
 //   ~~~|~~~ floor, z = 0
 //      v
-TEST(Environment, AFloorHoldsThePointerAndPushesTheHandBack) {
+TEST(Environment, AFloorStopsThePointerAndItsCouplingPushesTheHandBack) {
   test::SmallScene small;
   const ObjectId pointer = small.object("pointer", test::pointerShape(), Vector3::Zero());
   const ObjectId floor = small.object("floor", test::floorShape(), Vector3::Zero());
   const HandId hand = small.hand("right", pointer);
   small.pair(pointer, floor);
   Environment environment(small.build(), {});
-  enter(environment, hand, {0.0, 0.0, 0.05});
-  moveTo(environment, hand, {0.0, 0.0, kPointerRadius - 0.02}, 200);
-  stay(environment, 20);
+  test::activateHand(environment, hand, {0.0, 0.0, 0.05});
+  test::moveHandTo(environment, hand, {0.0, 0.0, test::kPointerRadius - 0.02}, 200);
+  test::stepTicks(environment, 20);
 
   const ObjectMotion& object = environment.objects()[pointer.value];
-  EXPECT_NEAR(object.X_WO.translation().z(), kPointerRadius, 0.1e-3);
+  EXPECT_NEAR(object.X_WO.translation().z(), test::kPointerRadius, 0.1e-3);
   EXPECT_TRUE(object.in_contact);
   EXPECT_TRUE(environment.objects()[floor.value].in_contact);
   EXPECT_TRUE(environment.inContact(floor, pointer));
@@ -50,27 +50,27 @@ TEST(Environment, AFloorHoldsThePointerAndPushesTheHandBack) {
 //   |  o
 //   |   \    three faces meet: the pointer rests against all of them
 //   |____v__
-TEST(Environment, AnInnerCornerHoldsThePointerOnAllItsFaces) {
+TEST(Environment, AnInnerCornerStopsThePointerAtAllThreeFaces) {
   test::SmallScene small;
   const ObjectId pointer = small.object("pointer", test::pointerShape(), Vector3::Zero());
   const ObjectId corner = small.object("corner", test::cornerStructures(0.12, 0.003), Vector3::Zero());
   const HandId hand = small.hand("right", pointer);
   small.pair(pointer, corner);
   Environment environment(small.build(), {});
-  enter(environment, hand, Vector3::Constant(0.05));
-  moveTo(environment, hand, {0.002, -0.003, 0.0}, 200);
-  stay(environment, 20);
+  test::activateHand(environment, hand, Vector3::Constant(0.05));
+  test::moveHandTo(environment, hand, {0.002, -0.003, 0.0}, 200);
+  test::stepTicks(environment, 20);
   const Vector3 p = environment.objects()[pointer.value].X_WO.translation();
-  EXPECT_NEAR(p.x(), kPointerRadius, 0.2e-3);
-  EXPECT_NEAR(p.y(), kPointerRadius, 0.2e-3);
-  EXPECT_NEAR(p.z(), kPointerRadius, 0.2e-3);
+  EXPECT_NEAR(p.x(), test::kPointerRadius, 0.2e-3);
+  EXPECT_NEAR(p.y(), test::kPointerRadius, 0.2e-3);
+  EXPECT_NEAR(p.z(), test::kPointerRadius, 0.2e-3);
 }
 
 //      | |
 //   ___|#|___     39.5 mm peg, 40 mm hole, hand 5 mm off to the side while it pushes down
 //      |#|
 //      |_|
-TEST(Environment, APegGoesIntoItsSlotAndStaysBetweenTheWalls) {
+TEST(Environment, APegGoesIntoItsHoleAndStaysBetweenTheWalls) {
   test::SmallScene small;
   const Vector3 size(0.0395, 0.0395, 0.1);
   const ObjectId peg = small.object("peg", test::boxStructures(size, 0.002, 0.004), Vector3::Zero());
@@ -79,25 +79,25 @@ TEST(Environment, APegGoesIntoItsSlotAndStaysBetweenTheWalls) {
   const HandId hand = small.hand("right", peg);
   small.pair(peg, socket, false, 0.0001);
   Environment environment(small.build(), {});
-  enter(environment, hand, {0.0001, -0.0001, 0.06});
-  moveTo(environment, hand, {0.0001, -0.0001, 0.045}, 100);
-  double sideways = 0.0;
+  test::activateHand(environment, hand, {0.0001, -0.0001, 0.06});
+  test::moveHandTo(environment, hand, {0.0001, -0.0001, 0.045}, 100);
+  double lateral = 0.0;
   for (const double z : {0.03, 0.01, -0.005, -0.03}) {
-    moveTo(environment, hand, {0.005, 0.0, z}, 200);
+    test::moveHandTo(environment, hand, {0.005, 0.0, z}, 200);
     const Vector3& p = environment.objects()[peg.value].X_WO.translation();
-    sideways = std::max(sideways, std::max(std::abs(p.x()), std::abs(p.y())));
+    lateral = std::max(lateral, std::max(std::abs(p.x()), std::abs(p.y())));
     EXPECT_TRUE(environment.objects()[peg.value].in_contact);
   }
-  stay(environment, 100);
+  test::stepTicks(environment, 100);
   const Pose& X_WP = environment.objects()[peg.value].X_WO;
-  EXPECT_NEAR(X_WP.translation().z(), 0.05 - 0.06, 0.5e-3) << "at the bottom, leaning";
-  EXPECT_LT(sideways, 0.5 * 0.5e-3);
-  // the coupling held it 25 mm deeper and 5 mm to the side
+  EXPECT_NEAR(X_WP.translation().z(), 0.05 - 0.06, 0.5e-3) << "at the bottom, tilted within the clearance";
+  EXPECT_LT(lateral, 0.5 * 0.5e-3);
+  // the hand is 20 mm deeper and 5 mm to the side
   EXPECT_NEAR(environment.hands()[hand.value].F_Ho_W.force.z(), kStiffness * 0.02, 1.0);
   EXPECT_NEAR(environment.hands()[hand.value].F_Ho_W.force.x(), -kStiffness * 0.005, 0.5);
 }
 
-//   |##|<- hand A     hand B ->|##|     both push: what one feels the other feels reversed
+//   |##|<- hand A     hand B ->|##|     pushed against each other: opposite coupling forces
 TEST(Environment, TheInstructorsCubePushesAHeldPartWithEqualAndOppositeForces) {
   test::SmallScene small;
   const ObjectId part = small.object("part", test::cubeShape(), Vector3::Zero());
@@ -106,12 +106,12 @@ TEST(Environment, TheInstructorsCubePushesAHeldPartWithEqualAndOppositeForces) {
   const HandId instructor = small.hand("instructor", cube);
   small.pair(cube, part);
   Environment environment(small.build(), {});
-  enter(environment, trainee, {0.0, 0.0, 0.0});
-  enter(environment, instructor, {0.06, 0.0, 0.0});
-  moveTo(environment, instructor, {0.03, 0.0, 0.0}, 200);
-  stay(environment, 50);
+  test::activateHand(environment, trainee, {0.0, 0.0, 0.0});
+  test::activateHand(environment, instructor, {0.06, 0.0, 0.0});
+  test::moveHandTo(environment, instructor, {0.03, 0.0, 0.0}, 200);
+  test::stepTicks(environment, 50);
 
-  // 40 mm apart they would touch: 10 mm too near, 5 mm for each of two equal couplings
+  // the centres are 40 mm apart in contact, the hands 30 mm: each of two equal couplings deflects by 5 mm
   const Vector3 on_trainee = environment.hands()[trainee.value].F_Ho_W.force;
   const Vector3 on_instructor = environment.hands()[instructor.value].F_Ho_W.force;
   EXPECT_NEAR(on_trainee.x(), -5.0, 0.1);
@@ -122,7 +122,7 @@ TEST(Environment, TheInstructorsCubePushesAHeldPartWithEqualAndOppositeForces) {
   EXPECT_NEAR(contact.F_Ao_W.force.x(), 5.0, 0.1);
 }
 
-TEST(Environment, TwoHandsOnOneObjectAddUpTheirStiffness) {
+TEST(Environment, TwoHandsOnOneObjectAddTheirCouplingForces) {
   test::SmallScene small;
   const ObjectId left_pointer = small.object("left pointer", nullptr, Vector3::Zero());
   const ObjectId right_pointer = small.object("right pointer", nullptr, Vector3::Zero());
@@ -132,8 +132,8 @@ TEST(Environment, TwoHandsOnOneObjectAddUpTheirStiffness) {
   const HandId right = small.hand("right", right_pointer);
   const std::size_t pair = small.pair(part, floor);
   Environment environment(small.build(), {});
-  enter(environment, left, {-0.02, 0.0, 0.1});
-  enter(environment, right, {0.02, 0.0, 0.1});
+  test::activateHand(environment, left, {-0.02, 0.0, 0.1});
+  test::activateHand(environment, right, {0.02, 0.0, 0.1});
   environment.grab(left, part);
   environment.grab(right, part);
   for (int tick = 0; tick < 100; ++tick) {
@@ -142,7 +142,7 @@ TEST(Environment, TwoHandsOnOneObjectAddUpTheirStiffness) {
     environment.setHandPose(right, Pose(Vector3(0.02, 0.0, z)), {});
     environment.step();
   }
-  // 10 mm into the floor with one coupling each: 20 N on the floor, half of it in every hand
+  // goals 10 mm inside the floor, two couplings: 20 N on the floor, half of it at each hand
   PairContact contact;
   environment.pairContact(pair, contact);
   EXPECT_NEAR(contact.F_Ao_W.force.z(), 2.0 * kStiffness * 0.01, 0.2);
@@ -151,15 +151,15 @@ TEST(Environment, TwoHandsOnOneObjectAddUpTheirStiffness) {
   EXPECT_NEAR(environment.forceOn(part).force.z(), -2.0 * kStiffness * 0.01, 0.2);
 }
 
-TEST(Environment, AForearmIsToldWhatItIsInAndExchangesNoForceWithIt) {
+TEST(Environment, ASensingForearmDetectsContactAndExchangesNoForce) {
   test::SmallScene small;
   const ObjectId forearm = small.object("forearm", test::pointerShape(), {0.0, 0.0, 0.2});
   const ObjectId floor = small.object("floor", test::floorShape(), Vector3::Zero());
   const HandId arm = small.hand("forearm", forearm, HandKind::kTracked);
   const std::size_t pair = small.pair(forearm, floor, true);
   Environment environment(small.build(), {});
-  enter(environment, arm, {0.0, 0.0, 0.05});
-  moveTo(environment, arm, {0.0, 0.0, 0.005}, 60);
+  test::activateHand(environment, arm, {0.0, 0.0, 0.05});
+  test::moveHandTo(environment, arm, {0.0, 0.0, 0.005}, 60);
   EXPECT_EQ(environment.objects()[forearm.value].X_WO.translation(),
             environment.hands()[arm.value].X_WH.translation());
   EXPECT_EQ(environment.objects()[forearm.value].status, ObjectStatus::kTracked);
@@ -177,26 +177,26 @@ TEST(Environment, AForearmIsToldWhatItIsInAndExchangesNoForceWithIt) {
   EXPECT_GT(manifold.contacts.size(), 0U);
 }
 
-TEST(Environment, AForearmThatJumpsIntoSomethingIsNotMissed) {
+TEST(Environment, ContactOfATrackedForearmThatMovesFarInOneTickIsDetected) {
   test::SmallScene small;
   const ObjectId forearm = small.object("forearm", test::pointerShape(), {0.0, 0.0, 0.2});
   const ObjectId floor = small.object("floor", test::floorShape(), Vector3::Zero());
   const HandId arm = small.hand("forearm", forearm, HandKind::kTracked);
   small.pair(forearm, floor, true);
   Environment environment(small.build(), {});
-  enter(environment, arm, {0.0, 0.0, 0.25});
-  stay(environment, 5);
+  test::activateHand(environment, arm, {0.0, 0.0, 0.25});
+  test::stepTicks(environment, 5);
   environment.setHandPose(arm, Pose(Vector3(0.0, 0.0, 0.005)), {});
   environment.step();
   EXPECT_TRUE(environment.inContact(forearm, floor));
 }
 
-TEST(Environment, NoPointOfAHeldObjectTravelsFasterThanTheCap) {
+TEST(Environment, NoPointOfAHeldObjectExceedsTheSpeedCap) {
   test::SmallScene small;
   const ObjectId part = small.object("part", test::cubeShape(), Vector3::Zero());
   const HandId hand = small.hand("right", part);
   Environment environment(small.build(), {});
-  enter(environment, hand, Vector3::Zero());
+  test::activateHand(environment, hand, Vector3::Zero());
   const double radius = 0.5 * test::kCubeEdge * std::numbers::sqrt3;
   environment.setHandPose(hand, Pose(Vector3(0.05, 0.0, 0.0), expRotation({0.0, 0.0, 1.0})), {});
   int ticks = 0;
@@ -206,7 +206,7 @@ TEST(Environment, NoPointOfAHeldObjectTravelsFasterThanTheCap) {
     ASSERT_LE(V_WO.linear.norm() + V_WO.angular.norm() * radius, 1.0 + 1e-6);
   }
   EXPECT_GT(ticks, 50);
-  EXPECT_LT(ticks, 200) << "the rest of the way went into the next ticks";
+  EXPECT_LT(ticks, 200) << "the rest of the motion is made in the next ticks";
 }
 
 TEST(Environment, AContributionPushesAHeldObjectAgainstItsCoupling) {
@@ -214,16 +214,16 @@ TEST(Environment, AContributionPushesAHeldObjectAgainstItsCoupling) {
   const ObjectId part = small.object("part", test::cubeShape(), Vector3::Zero());
   const HandId hand = small.hand("right", part);
   Environment environment(small.build(), {});
-  enter(environment, hand, Vector3::Zero());
+  test::activateHand(environment, hand, Vector3::Zero());
   for (int tick = 0; tick < 50; ++tick) {
     environment.contribute(part, 1, {Vector3(5.0, 0.0, 0.0), Vector3::Zero()}, 200);
     environment.step();
   }
   EXPECT_NEAR(environment.objects()[part.value].X_WO.translation().x(), 5.0 / kStiffness, 0.05e-3);
   EXPECT_NEAR(environment.hands()[hand.value].F_Ho_W.force.x(), 5.0, 0.1);
-  stay(environment, 250);
+  test::stepTicks(environment, 250);
   EXPECT_NEAR(environment.objects()[part.value].X_WO.translation().x(), 0.0, 1e-9);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -4,7 +4,7 @@
 #include "tests/server/simulation/busy_scene.h"
 #include "tests/support/realtime_guard.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
 constexpr Tick kTicks = 3000;
@@ -29,7 +29,7 @@ std::vector<std::uint64_t> hashes(Environment& environment, const test::BusyScen
   return result;
 }
 
-TEST(EnvironmentDeterminism, OneTwoAndFourWorkersLeaveTheSameBits) {
+TEST(EnvironmentDeterminism, IsBitEqualForOneTwoAndFourWorkers) {
   const test::BusyScene busy;
   Environment one(busy.scene, withWorkers(1));
   const auto expected = hashes(one, busy, kManyTicks);
@@ -39,7 +39,7 @@ TEST(EnvironmentDeterminism, OneTwoAndFourWorkersLeaveTheSameBits) {
   }
 }
 
-TEST(EnvironmentDeterminism, TheSceneIsWorthPlaying) {
+TEST(EnvironmentDeterminism, TheSceneHasContactsAndSkippedPairs) {
   const test::BusyScene busy;
   Environment environment(busy.scene, withWorkers(1));
   int contact_ticks = 0;
@@ -53,29 +53,29 @@ TEST(EnvironmentDeterminism, TheSceneIsWorthPlaying) {
     for (const ObjectMotion& object : environment.objects()) ASSERT_TRUE(object.X_WO.isFinite());
   }
   EXPECT_GT(contact_ticks, 200);
-  EXPECT_GT(skipped, 20 * static_cast<int>(kTicks)) << "most pairs are far apart at most times";
+  EXPECT_GT(skipped, 20 * static_cast<int>(kTicks)) << "most pairs are far apart most of the time";
   EXPECT_TRUE(capped_load);
 }
 
-TEST(EnvironmentDeterminism, SkippingFarPairsNeverMissesAContact) {
+TEST(EnvironmentDeterminism, CoherenceNeverMissesAContact) {
   const test::BusyScene busy;
   EnvironmentOptions every_pair;
   every_pair.coherence = false;
   Environment skipping(busy.scene, {});
-  Environment looking(busy.scene, every_pair);
+  Environment querying(busy.scene, every_pair);
   while (skipping.tick() < kTicks) {
     busy.play(skipping, skipping.tick() + 1);
-    busy.play(looking, looking.tick() + 1);
+    busy.play(querying, querying.tick() + 1);
     for (std::size_t i = 0; i < skipping.objects().size(); ++i) {
       const ObjectMotion& one = skipping.objects()[i];
-      const ObjectMotion& other = looking.objects()[i];
+      const ObjectMotion& other = querying.objects()[i];
       ASSERT_EQ(one.X_WO, other.X_WO) << "object " << i << ", tick " << skipping.tick();
       ASSERT_EQ(one.in_contact, other.in_contact) << "object " << i << ", tick " << skipping.tick();
     }
   }
 }
 
-TEST(EnvironmentDeterminism, ARestoredEnvironmentGoesOnWithTheSameBits) {
+TEST(EnvironmentDeterminism, ContinuesBitEqualAfterARestore) {
   const test::BusyScene busy;
   Environment original(busy.scene, withWorkers(1));
   busy.play(original, 1000);
@@ -90,12 +90,12 @@ TEST(EnvironmentDeterminism, ARestoredEnvironmentGoesOnWithTheSameBits) {
   EXPECT_EQ(fresh.save(), bytes);
   EXPECT_EQ(hashes(fresh, busy, 3000), expected);
 
-  // and back: one that has already gone on
+  // and an environment that is already ahead of the checkpoint
   ASSERT_TRUE(original.restore(bytes));
   EXPECT_EQ(hashes(original, busy, 3000), expected);
 }
 
-TEST(EnvironmentDeterminism, ABadCheckpointIsRefusedAndChangesNothing) {
+TEST(EnvironmentDeterminism, AnInvalidCheckpointIsRejectedAndChangesNothing) {
   const test::BusyScene busy;
   Environment environment(busy.scene, withWorkers(1));
   busy.play(environment, 400);
@@ -120,7 +120,7 @@ TEST(EnvironmentDeterminism, ABadCheckpointIsRefusedAndChangesNothing) {
   EXPECT_FALSE(elsewhere.restore(good));
 }
 
-TEST(EnvironmentDeterminism, DamagedBytesNeverBreakRestore) {
+TEST(EnvironmentDeterminism, RestoreSurvivesCorruptedBytes) {
   const test::BusyScene busy;
   Environment environment(busy.scene, withWorkers(1));
   busy.play(environment, 320);
@@ -161,4 +161,4 @@ TEST(EnvironmentDeterminism, StepAllocatesNothingAndLocksNothing) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::simulation

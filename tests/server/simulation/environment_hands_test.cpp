@@ -6,14 +6,14 @@
 #include "server/simulation/environment.h"
 #include "tests/server/simulation/small_scene.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
-using test::enter;
-using test::moveTo;
-using test::stay;
+using test::activateHand;
+using test::moveHandTo;
+using test::stepTicks;
 
-//   pointer o  [part]  [fixed]      two hands with a pointer each, two parts that may touch
+//   pointer o  [part]  [other]      two hands with a pointer each, two parts that may collide
 class HandsTest : public testing::Test {
  protected:
   HandsTest() {
@@ -37,9 +37,9 @@ class HandsTest : public testing::Test {
   std::unique_ptr<Environment> environment_;
 };
 
-TEST_F(HandsTest, APointerWaitsWhereItIsUntilItsHandGivesAPose) {
+TEST_F(HandsTest, APointerStaysParkedUntilItsHandHasAPose) {
   environment_->setHandPresent(right_, true);
-  stay(*environment_, 3);
+  test::stepTicks(*environment_, 3);
   EXPECT_EQ(object(pointer_).status, ObjectStatus::kParked);
   EXPECT_EQ(object(pointer_).X_WO.translation(), Vector3(0.0, 0.0, 0.3));
   environment_->setHandPose(right_, Pose(Vector3(0.0, 0.1, 0.2)), {});
@@ -49,8 +49,8 @@ TEST_F(HandsTest, APointerWaitsWhereItIsUntilItsHandGivesAPose) {
   EXPECT_EQ(object(pointer_).X_WO.translation(), Vector3(0.0, 0.1, 0.2));
 }
 
-TEST_F(HandsTest, GrabKeepsTheObjectWhereItIsInTheHand) {
-  enter(*environment_, right_, {0.1, 0.0, 0.032});
+TEST_F(HandsTest, AGrabbedObjectKeepsItsPoseInTheHand) {
+  test::activateHand(*environment_, right_, {0.1, 0.0, 0.032});
   const std::uint32_t epoch = object(part_).epoch;
   environment_->grab(right_, part_);
   environment_->step();
@@ -59,21 +59,21 @@ TEST_F(HandsTest, GrabKeepsTheObjectWhereItIsInTheHand) {
   EXPECT_EQ(object(part_).status, ObjectStatus::kHeld);
   EXPECT_EQ(object(pointer_).status, ObjectStatus::kHidden);
 
-  // a quarter turn of the hand about z takes the part along on its lever
+  // a quarter turn of the hand about z moves the part about the hand
   const Quaternion turn = expRotation({0.0, 0.0, std::acos(0.0)});
   environment_->setHandPose(right_, Pose(Vector3(0.0, 0.0, 0.032), turn), {});
-  stay(*environment_, 300);
+  test::stepTicks(*environment_, 300);
   EXPECT_NEAR((object(part_).X_WO.translation() - Vector3(0.0, 0.0, 0.0)).norm(), 0.0, 1e-6);
   EXPECT_NEAR(object(part_).X_WO.rotation().angularDistance(turn), 0.0, 1e-6);
 }
 
-TEST_F(HandsTest, ReleaseParksThePartAndBringsThePointerBackToTheHand) {
-  enter(*environment_, right_, {0.1, 0.0, 0.032});
+TEST_F(HandsTest, ReleaseParksThePartAndTheHandMovesItsPointerAgain) {
+  test::activateHand(*environment_, right_, {0.1, 0.0, 0.032});
   environment_->grab(right_, part_);
-  moveTo(*environment_, right_, {0.1, 0.1, 0.1}, 200);
+  test::moveHandTo(*environment_, right_, {0.1, 0.1, 0.1}, 200);
   const Pose X_WP = object(part_).X_WO;
   environment_->release(right_);
-  moveTo(*environment_, right_, {0.0, 0.0, 0.3}, 300);
+  test::moveHandTo(*environment_, right_, {0.0, 0.0, 0.3}, 300);
   EXPECT_EQ(object(part_).X_WO, X_WP);
   EXPECT_EQ(object(part_).status, ObjectStatus::kParked);
   EXPECT_FALSE(object(part_).holder.valid());
@@ -82,11 +82,11 @@ TEST_F(HandsTest, ReleaseParksThePartAndBringsThePointerBackToTheHand) {
   EXPECT_NEAR((object(pointer_).X_WO.translation() - Vector3(0.0, 0.0, 0.3)).norm(), 0.0, 1e-9);
 }
 
-TEST_F(HandsTest, APartFixedInItsPlaceStaysSoAndTheHandGetsItsPointerBack) {
-  enter(*environment_, right_, {0.1, 0.0, 0.032});
+TEST_F(HandsTest, AFixedPartStaysFixedAndTheHandMovesItsPointerAgain) {
+  test::activateHand(*environment_, right_, {0.1, 0.0, 0.032});
   for (const bool place_first : {true, false}) {
     environment_->grab(right_, part_);
-    stay(*environment_, 10);
+    test::stepTicks(*environment_, 10);
     const Pose X_WG(Vector3(0.1, 0.1, 0.0));
     if (!place_first) environment_->release(right_);
     environment_->place(part_, X_WG, ObjectStatus::kFixed);
@@ -94,7 +94,7 @@ TEST_F(HandsTest, APartFixedInItsPlaceStaysSoAndTheHandGetsItsPointerBack) {
       EXPECT_FALSE(hand(right_).object.valid());
       environment_->release(right_);
     }
-    stay(*environment_, 10);
+    test::stepTicks(*environment_, 10);
     EXPECT_EQ(object(part_).X_WO, X_WG);
     EXPECT_EQ(object(part_).status, ObjectStatus::kFixed);
     EXPECT_EQ(hand(right_).object, pointer_);
@@ -102,17 +102,19 @@ TEST_F(HandsTest, APartFixedInItsPlaceStaysSoAndTheHandGetsItsPointerBack) {
   }
 }
 
-//   hand ->  o[part]     the pointer rests on the part's side, the hand is 10 mm inside; then the other
-//                 |      part stops them farther on, where the hand lets go
-TEST_F(HandsTest, APointerComesBackOutsideWhatItsHandHasHeldAndPullsToTheHand) {
-  enter(*environment_, right_, {0.0, 0.0, 0.0});
-  moveTo(*environment_, right_, {0.1 - 0.5 * test::kCubeEdge - test::kPointerRadius + 0.01, 0.0, 0.0}, 100);
-  stay(*environment_, 20);
+//   hand ->  o[part]     the pointer is in contact with the part, the hand 10 mm inside it; after the grab
+//   the
+//                        other part stops the held one, and there the hand releases it
+TEST_F(HandsTest, AfterAReleaseThePointerStartsOutsideThePartAndMovesToTheHand) {
+  test::activateHand(*environment_, right_, {0.0, 0.0, 0.0});
+  test::moveHandTo(*environment_, right_,
+                   {0.1 - 0.5 * test::kCubeEdge - test::kPointerRadius + 0.01, 0.0, 0.0}, 100);
+  test::stepTicks(*environment_, 20);
   const Vector3 p_PartPointer = object(pointer_).X_WO.translation() - object(part_).X_WO.translation();
   EXPECT_NEAR(p_PartPointer.x(), -0.5 * test::kCubeEdge - test::kPointerRadius, 1e-4);
   environment_->grab(right_, part_);
-  moveTo(*environment_, right_, {0.25, 0.0, 0.0}, 300);
-  stay(*environment_, 20);
+  test::moveHandTo(*environment_, right_, {0.25, 0.0, 0.0}, 300);
+  test::stepTicks(*environment_, 20);
   const Vector3 p_WPart = object(part_).X_WO.translation();
   EXPECT_NEAR(p_WPart.x(), 0.3 - test::kCubeEdge, 0.1e-3);
   environment_->release(right_);
@@ -124,54 +126,54 @@ TEST_F(HandsTest, APointerComesBackOutsideWhatItsHandHasHeldAndPullsToTheHand) {
     ASSERT_LE(p.x(), -0.5 * test::kCubeEdge - test::kPointerRadius + 0.1e-3) << "outside";
     ASSERT_LE(object(pointer_).V_WO.linear.norm(), 1.0 + 1e-9);
   }
-  moveTo(*environment_, right_, {0.0, 0.0, 0.2}, 500);
+  test::moveHandTo(*environment_, right_, {0.0, 0.0, 0.2}, 500);
   EXPECT_NEAR((object(pointer_).X_WO.translation() - Vector3(0.0, 0.0, 0.2)).norm(), 0.0, 1e-9);
 }
 
-TEST_F(HandsTest, PlacingAHeldPartKeepsItInTheHandAtItsNewPlace) {
-  enter(*environment_, right_, {0.1, 0.0, 0.032});
+TEST_F(HandsTest, PlacingAPartAsHeldKeepsItInTheHandAtTheNewPose) {
+  test::activateHand(*environment_, right_, {0.1, 0.0, 0.032});
   environment_->grab(right_, part_);
   environment_->place(part_, Pose(Vector3(0.0, 0.0, 0.1)), ObjectStatus::kHeld);
-  stay(*environment_, 50);
+  test::stepTicks(*environment_, 50);
   EXPECT_NEAR((object(part_).X_WO.translation() - Vector3(0.0, 0.0, 0.1)).norm(), 0.0, 1e-9);
   EXPECT_EQ(object(part_).holder, right_);
 }
 
-TEST_F(HandsTest, AFrozenHandHoldsItsObjectStill) {
-  enter(*environment_, right_, {0.1, 0.0, 0.032});
+TEST_F(HandsTest, TheObjectOfAFrozenHandDoesNotMove) {
+  test::activateHand(*environment_, right_, {0.1, 0.0, 0.032});
   environment_->grab(right_, part_);
   environment_->step();
   environment_->setHandFrozen(right_, true);
   const Pose X_WP = object(part_).X_WO;
-  moveTo(*environment_, right_, {0.1, 0.1, 0.1}, 100);
+  test::moveHandTo(*environment_, right_, {0.1, 0.1, 0.1}, 100);
   EXPECT_EQ(object(part_).X_WO, X_WP);
   EXPECT_EQ(hand(right_).F_Ho_W.force.norm(), 0.0);
   environment_->setHandFrozen(right_, false);
-  stay(*environment_, 300);
+  test::stepTicks(*environment_, 300);
   EXPECT_NEAR(object(part_).X_WO.translation().y(), 0.1, 1e-6);
 }
 
-TEST_F(HandsTest, AHandThatIsGoneParksItsPartAndTakesItUpWhereItIsWhenItReturns) {
-  enter(*environment_, right_, {0.1, 0.0, 0.032});
+TEST_F(HandsTest, AHandThatLeavesParksItsPartAndHoldsItAgainWhenItReturns) {
+  test::activateHand(*environment_, right_, {0.1, 0.0, 0.032});
   environment_->grab(right_, part_);
-  moveTo(*environment_, right_, {0.1, 0.1, 0.1}, 200);
+  test::moveHandTo(*environment_, right_, {0.1, 0.1, 0.1}, 200);
   const Pose X_WP = object(part_).X_WO;
   environment_->setHandPresent(right_, false);
-  stay(*environment_, 50);
+  test::stepTicks(*environment_, 50);
   EXPECT_EQ(object(part_).status, ObjectStatus::kParked);
   EXPECT_EQ(object(part_).X_WO, X_WP);
   EXPECT_FALSE(object(part_).holder.valid());
-  EXPECT_EQ(hand(right_).object, part_) << "it will go on with it";
+  EXPECT_EQ(hand(right_).object, part_) << "to be held again when the hand is back";
 
-  enter(*environment_, right_, {0.3, 0.3, 0.3});
-  stay(*environment_, 50);
+  test::activateHand(*environment_, right_, {0.3, 0.3, 0.3});
+  test::stepTicks(*environment_, 50);
   EXPECT_EQ(object(part_).status, ObjectStatus::kHeld);
   EXPECT_NEAR((object(part_).X_WO.translation() - X_WP.translation()).norm(), 0.0, 1e-9);
 }
 
-TEST_F(HandsTest, APartHeldByTwoIsHeldByTheOtherWhenOneLetsGo) {
-  enter(*environment_, right_, {0.1, 0.05, 0.0});
-  enter(*environment_, left_, {0.1, -0.05, 0.0});
+TEST_F(HandsTest, WhenOneOfTwoHandsReleasesAPartTheOtherHoldsIt) {
+  test::activateHand(*environment_, right_, {0.1, 0.05, 0.0});
+  test::activateHand(*environment_, left_, {0.1, -0.05, 0.0});
   environment_->grab(left_, part_);
   environment_->grab(right_, part_);
   environment_->step();
@@ -186,28 +188,28 @@ TEST_F(HandsTest, APartHeldByTwoIsHeldByTheOtherWhenOneLetsGo) {
 class TwoHandsTest : public HandsTest {
  protected:
   TwoHandsTest() {
-    enter(*environment_, right_, {0.1, 0.05, 0.0});
-    enter(*environment_, left_, {0.1, -0.05, 0.0});
+    test::activateHand(*environment_, right_, {0.1, 0.05, 0.0});
+    test::activateHand(*environment_, left_, {0.1, -0.05, 0.0});
     environment_->grab(left_, part_);
     environment_->grab(right_, part_);
     environment_->step();
   }
 };
 
-TEST_F(TwoHandsTest, APartHeldByTwoIsTwiceAsStiff) {
+TEST_F(TwoHandsTest, APartHeldByTwoHandsIsTwiceAsStiff) {
   constexpr std::uint32_t kLifetime = 200;
   for (int tick = 0; tick < 200; ++tick) {
     environment_->contribute(part_, 1, {Vector3(10.0, 0.0, 0.0), Vector3::Zero()}, kLifetime);
     environment_->step();
   }
-  const double force = 10.0 * (1.0 - 1.0 / kLifetime);  // a contribution is one tick old when it counts
+  const double force = 10.0 * (1.0 - 1.0 / kLifetime);  // contributions are one tick old when applied
   EXPECT_NEAR(object(part_).X_WO.translation().x() - 0.1, force / 2000.0, 1e-6);
   EXPECT_NEAR(hand(right_).F_Ho_W.force.x(), 0.5 * force, 1e-3);
   EXPECT_NEAR(hand(left_).F_Ho_W.force.x(), 0.5 * force, 1e-3);
 }
 
-// two springs of 1000 N/m on levers of 50 mm, and two of 20 Nm/rad: 45 Nm/rad about z
-TEST_F(TwoHandsTest, MomentsOfTwoHandsAddUpWithTheirLevers) {
+// two springs of 1000 N/m with lever arms of 50 mm, and two of 20 Nm/rad: 45 Nm/rad about z
+TEST_F(TwoHandsTest, TorquesOfTwoHandsAddWithTheirLeverArms) {
   constexpr std::uint32_t kLifetime = 200;
   constexpr double kLever = 0.05;
   for (int tick = 0; tick < 200; ++tick) {
@@ -223,20 +225,20 @@ TEST_F(TwoHandsTest, MomentsOfTwoHandsAddUpWithTheirLevers) {
   }
 }
 
-TEST_F(TwoHandsTest, EachHandFeelsTheOtherPull) {
-  moveTo(*environment_, right_, {0.1, 0.06, 0.0}, 100);
-  stay(*environment_, 100);
+TEST_F(TwoHandsTest, EachHandGetsTheForceOfTheOther) {
+  test::moveHandTo(*environment_, right_, {0.1, 0.06, 0.0}, 100);
+  test::stepTicks(*environment_, 100);
   EXPECT_NEAR(object(part_).X_WO.translation().y(), 0.005, 1e-6);
   EXPECT_NEAR(hand(right_).F_Ho_W.force.y(), -5.0, 1e-3);
   EXPECT_NEAR(hand(left_).F_Ho_W.force.y(), 5.0, 1e-3);
 }
 
-TEST_F(TwoHandsTest, WhenOneLetsGoThePartKeepsItsEpochAndTheForceOnTheOtherFallsByStepsOfANewton) {
-  moveTo(*environment_, right_, {0.1, 0.06, 0.0}, 100);
-  stay(*environment_, 100);
+TEST_F(TwoHandsTest, AfterOneReleasesThePartKeepsItsEpochAndTheForceOnTheOtherFallsByAtMostANewtonPerTick) {
+  test::moveHandTo(*environment_, right_, {0.1, 0.06, 0.0}, 100);
+  test::stepTicks(*environment_, 100);
   const std::uint32_t epoch = object(part_).epoch;
   environment_->release(right_);
-  constexpr double kLargestStep = 1.0;  // [N] 1000 N/m over the way of a tick at 1 m/s
+  constexpr double kLargestStep = 1.0;  // [N] 1000 N/m times the displacement per tick at 1 m/s
   for (int tick = 0; tick < 50; ++tick) {
     const Vector3 force = hand(left_).F_Ho_W.force;
     environment_->step();
@@ -246,9 +248,9 @@ TEST_F(TwoHandsTest, WhenOneLetsGoThePartKeepsItsEpochAndTheForceOnTheOtherFalls
   EXPECT_NEAR(hand(left_).F_Ho_W.force.norm(), 0.0, 1e-3);
 }
 
-TEST_F(HandsTest, SwappedHandsExchangeTheirObjectsAndKeepThemForGood) {
-  enter(*environment_, right_, {0.0, 0.0, 0.3});
-  enter(*environment_, left_, {0.0, 0.2, 0.3});
+TEST_F(HandsTest, SwappedHandsExchangeHeldAndDefaultObjects) {
+  test::activateHand(*environment_, right_, {0.0, 0.0, 0.3});
+  test::activateHand(*environment_, left_, {0.0, 0.2, 0.3});
   environment_->step();
   environment_->swapHands(right_, left_);
   environment_->step();
@@ -261,8 +263,8 @@ TEST_F(HandsTest, SwappedHandsExchangeTheirObjectsAndKeepThemForGood) {
   EXPECT_EQ(hand(left_).object, pointer_);
 }
 
-TEST_F(HandsTest, ANotANumberPoseIsIgnoredAndCounted) {
-  enter(*environment_, right_, {0.1, 0.0, 0.3});
+TEST_F(HandsTest, InvalidPosesAreIgnoredAndCounted) {
+  test::activateHand(*environment_, right_, {0.1, 0.0, 0.3});
   environment_->step();
   const std::uint64_t hash = environment_->hash();
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -274,16 +276,16 @@ TEST_F(HandsTest, ANotANumberPoseIsIgnoredAndCounted) {
   environment_->setHandPose(HandId{17}, Pose(), {});
   environment_->setHandPose(HandId{}, Pose(), {});
   EXPECT_EQ(environment_->hash(), hash);
-  EXPECT_EQ(hand(right_).refused_poses, 5U);
-  stay(*environment_, 5);
+  EXPECT_EQ(hand(right_).rejected_poses, 5U);
+  test::stepTicks(*environment_, 5);
   EXPECT_TRUE(object(pointer_).X_WO.isFinite());
 }
 
-TEST_F(HandsTest, EveryDeclaredJumpRaisesTheEpochAndNothingElseDoes) {
-  enter(*environment_, right_, {0.1, 0.0, 0.1});
+TEST_F(HandsTest, OnlyDiscontinuitiesIncrementTheEpoch) {
+  test::activateHand(*environment_, right_, {0.1, 0.0, 0.1});
   environment_->grab(right_, part_);
   std::uint32_t epoch = object(part_).epoch;
-  moveTo(*environment_, right_, {0.1, 0.0, 0.2}, 200);
+  test::moveHandTo(*environment_, right_, {0.1, 0.0, 0.2}, 200);
   EXPECT_EQ(object(part_).epoch, epoch);
   environment_->place(part_, Pose(), ObjectStatus::kParked);
   EXPECT_EQ(object(part_).epoch, ++epoch);
@@ -293,49 +295,48 @@ TEST_F(HandsTest, EveryDeclaredJumpRaisesTheEpochAndNothingElseDoes) {
   EXPECT_EQ(object(part_).epoch, ++epoch);
 }
 
-// The parts stand 0.2 m apart and nobody holds one: the pair is never due, until one is put next to the
-// other.
-TEST_F(HandsTest, AJumpIntoContactIsSeenAtOnce) {
-  stay(*environment_, 100);
+// The parts are 0.2 m apart and not held: the pair is never due until one part is placed next to the other.
+TEST_F(HandsTest, ContactAfterPlacingAnObjectIsDetectedInTheNextTick) {
+  test::stepTicks(*environment_, 100);
   EXPECT_FALSE(environment_->pairs()[parts_].queried);
   EXPECT_FALSE(environment_->inContact(part_, other_));
   environment_->place(part_, Pose(Vector3(0.3 - test::kCubeEdge, 0.0, 0.0)), ObjectStatus::kFixed);
   environment_->step();
   EXPECT_TRUE(environment_->pairs()[parts_].queried);
   EXPECT_TRUE(environment_->inContact(part_, other_));
-  stay(*environment_, 10);
-  EXPECT_TRUE(object(other_).in_contact) << "two that stand still stay as they are, unasked";
+  test::stepTicks(*environment_, 10);
+  EXPECT_TRUE(object(other_).in_contact) << "contacts of unmoved objects stay without queries";
   environment_->place(part_, Pose(), ObjectStatus::kHidden);
   environment_->step();
   EXPECT_FALSE(environment_->inContact(part_, other_));
 }
 
-TEST_F(HandsTest, ThePairMatrixDecidesWhoMeetsWhom) {
-  enter(*environment_, right_, {0.1, 0.0, 0.0});
+TEST_F(HandsTest, ObjectsOfADisabledPairDoNotCollide) {
+  test::activateHand(*environment_, right_, {0.1, 0.0, 0.0});
   environment_->grab(right_, part_);
   environment_->setPairEnabled(parts_, false);
-  moveTo(*environment_, right_, {0.3, 0.0, 0.0}, 400);
+  test::moveHandTo(*environment_, right_, {0.3, 0.0, 0.0}, 400);
   EXPECT_NEAR(object(part_).X_WO.translation().x(), 0.3, 1e-9);
   EXPECT_FALSE(environment_->inContact(part_, other_));
-  moveTo(*environment_, right_, {0.1, 0.0, 0.0}, 400);
+  test::moveHandTo(*environment_, right_, {0.1, 0.0, 0.0}, 400);
   environment_->setPairEnabled(parts_, true);
-  moveTo(*environment_, right_, {0.3, 0.0, 0.0}, 400);
+  test::moveHandTo(*environment_, right_, {0.3, 0.0, 0.0}, 400);
   EXPECT_NEAR(object(part_).X_WO.translation().x(), 0.3 - test::kCubeEdge, 0.1e-3);
   EXPECT_TRUE(environment_->inContact(part_, other_));
 }
 
-TEST(Environment, ObjectsOfOneGroupNeverTouch) {
+TEST(Environment, ObjectsOfOneGroupDoNotCollide) {
   test::SmallScene small;
   const ObjectId part = small.object("part", test::cubeShape(), {0.1, 0.0, 0.0}, ObjectStatus::kParked, 1);
   const ObjectId other = small.object("other", test::cubeShape(), {0.2, 0.0, 0.0}, ObjectStatus::kParked, 1);
   const HandId right = small.hand("right", part);
   small.pair(part, other);
   Environment environment(small.build(), {});
-  enter(environment, right, {0.1, 0.0, 0.0});
-  moveTo(environment, right, {0.2, 0.0, 0.0}, 200);
+  test::activateHand(environment, right, {0.1, 0.0, 0.0});
+  test::moveHandTo(environment, right, {0.2, 0.0, 0.0}, 200);
   EXPECT_NEAR(environment.objects()[part.value].X_WO.translation().x(), 0.2, 1e-9);
   EXPECT_FALSE(environment.inContact(part, other));
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::simulation

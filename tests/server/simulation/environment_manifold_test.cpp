@@ -5,21 +5,21 @@
 #include "server/simulation/environment.h"
 #include "tests/server/simulation/small_scene.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
-using test::enter;
+using test::activateHand;
 using test::kCubeEdge;
-using test::moveTo;
-using test::stay;
+using test::moveHandTo;
+using test::stepTicks;
 
-/// The gap of a listed contact for poses of the two bodies, as a client reckons it.
+/// [m] Gap of a listed contact for poses of the two bodies, as a client computes it.
 double gapOf(const ManifoldContact& contact, const Pose& X_WO, const Pose& X_WA) {
   const Vector3 p_AP = X_WA.inverse() * (X_WO * Vector3(contact.p_BoP_B.cast<double>()));
   return contact.normal_A.cast<double>().dot(p_AP) - static_cast<double>(contact.offset);
 }
 
-//    |##|      a held cube comes down on a floor that is turned and moved in the world
+//    |##|      a held cube comes down on a floor whose frame differs from the world frame
 //   ~~~~~~
 class ManifoldTest : public testing::Test {
  protected:
@@ -29,7 +29,7 @@ class ManifoldTest : public testing::Test {
     hand_ = small_.hand("right", part_);
     small_.pair(part_, floor_);
     environment_ = std::make_unique<Environment>(small_.build(), EnvironmentOptions{});
-    enter(*environment_, hand_, {0.0, 0.0, 0.1});
+    test::activateHand(*environment_, hand_, {0.0, 0.0, 0.1});
   }
   test::SmallScene small_;
   ObjectId part_, floor_;
@@ -38,9 +38,9 @@ class ManifoldTest : public testing::Test {
   HandManifold manifold_;
 };
 
-TEST_F(ManifoldTest, ListsContactsBeforeTheyTouchWithTheirSignedGaps) {
-  moveTo(*environment_, hand_, {0.0, 0.0, 0.5 * kCubeEdge + 0.4e-3}, 400);
-  stay(*environment_, 20);
+TEST_F(ManifoldTest, ListsContactsAheadWithSignedGaps) {
+  test::moveHandTo(*environment_, hand_, {0.0, 0.0, 0.5 * test::kCubeEdge + 0.4e-3}, 400);
+  test::stepTicks(*environment_, 20);
   environment_->manifold(hand_, manifold_);
   ASSERT_GE(manifold_.contacts.size(), 4U) << "the corners at least";
   EXPECT_EQ(manifold_.object, part_);
@@ -55,22 +55,22 @@ TEST_F(ManifoldTest, ListsContactsBeforeTheyTouchWithTheirSignedGaps) {
   }
 }
 
-TEST_F(ManifoldTest, ListsAFastObjectsContactsFartherAhead) {
-  const Vector3 near(0.0, 0.0, 0.5 * kCubeEdge + 2.2e-3);
-  const Vector3 away(0.0, 0.0, 0.5 * kCubeEdge + 0.08);
-  moveTo(*environment_, hand_, near, 4000);
+TEST_F(ManifoldTest, ListsContactsOfAFastObjectFartherAhead) {
+  const Vector3 near(0.0, 0.0, 0.5 * test::kCubeEdge + 2.2e-3);
+  const Vector3 away(0.0, 0.0, 0.5 * test::kCubeEdge + 0.08);
+  test::moveHandTo(*environment_, hand_, near, 4000);
   environment_->manifold(hand_, manifold_);
-  EXPECT_EQ(manifold_.contacts.size(), 0U) << "at 20 mm/s, 2.2 mm are far";
-  moveTo(*environment_, hand_, away, 200);
-  moveTo(*environment_, hand_, near, 200);
+  EXPECT_EQ(manifold_.contacts.size(), 0U) << "at 20 mm/s, 2.2 mm are beyond the look-ahead";
+  test::moveHandTo(*environment_, hand_, away, 200);
+  test::moveHandTo(*environment_, hand_, near, 200);
   environment_->manifold(hand_, manifold_);
   EXPECT_GE(manifold_.contacts.size(), 4U) << "0.4 m/s";
 }
 
-TEST_F(ManifoldTest, TellsTheCouplingsWrenchAboutTheHand) {
+TEST_F(ManifoldTest, ContainsTheCouplingWrenchAboutTheHand) {
   environment_->release(hand_);
-  moveTo(*environment_, hand_, {0.0, 0.0, 0.5 * kCubeEdge - 0.005}, 400);
-  stay(*environment_, 20);
+  test::moveHandTo(*environment_, hand_, {0.0, 0.0, 0.5 * test::kCubeEdge - 0.005}, 400);
+  test::stepTicks(*environment_, 20);
   environment_->manifold(hand_, manifold_);
   EXPECT_NEAR(manifold_.F_Ho_W.force.z(), 1000.0 * 0.005, 0.1);
   EXPECT_NEAR(manifold_.F_Ho_W.torque.norm(), 0.0, 0.01);
@@ -78,19 +78,19 @@ TEST_F(ManifoldTest, TellsTheCouplingsWrenchAboutTheHand) {
   EXPECT_LE(manifold_.validity_radius, 1.1e-3);
 }
 
-//   [######]   the held plate is asked as the field, the cube below it as the shell:
-//     |##|     the same half-spaces in other roles
-TEST(Manifold, KeepsItsMeaningWhenTheHeldBodyIsAskedAsTheField) {
+//   [######]   the held plate is the SDF side, the cube below it the pointshell side:
+//     |##|     the half-spaces have to be the same
+TEST(Manifold, HasTheSameConventionsWhenTheHeldBodyIsTheSdfSide) {
   test::SmallScene small;
   const ObjectId held =
-      small.object("held", test::boxStructures({0.1, 0.1, kCubeEdge}, 0.002, 0.01), {0.0, 0.0, 0.1});
+      small.object("held", test::boxStructures({0.1, 0.1, test::kCubeEdge}, 0.002, 0.01), {0.0, 0.0, 0.1});
   const ObjectId still = small.object("still", test::cubeShape(), Vector3::Zero());
   const HandId hand = small.hand("right", held);
   small.pair(still, held);
   Environment environment(small.build(), {});
-  enter(environment, hand, {0.0, 0.0, 0.1});
-  moveTo(environment, hand, {0.0, 0.0, kCubeEdge - 0.003}, 400);
-  stay(environment, 20);
+  test::activateHand(environment, hand, {0.0, 0.0, 0.1});
+  test::moveHandTo(environment, hand, {0.0, 0.0, test::kCubeEdge - 0.003}, 400);
+  test::stepTicks(environment, 20);
   HandManifold manifold;
   environment.manifold(hand, manifold);
   ASSERT_GE(manifold.contacts.size(), 4U);
@@ -100,12 +100,12 @@ TEST(Manifold, KeepsItsMeaningWhenTheHeldBodyIsAskedAsTheField) {
     EXPECT_NEAR(gapOf(contact, manifold.X_WO, X_WA), contact.gap, 1e-6);
     Pose raised = manifold.X_WO;
     raised.translation().z() += 0.01;
-    EXPECT_NEAR(gapOf(contact, raised, X_WA), contact.gap + 0.01, 1e-4) << "away is positive";
+    EXPECT_NEAR(gapOf(contact, raised, X_WA), contact.gap + 0.01, 1e-4) << "gaps are positive when apart";
   }
   EXPECT_NEAR(manifold.F_Ho_W.force.z(), 3.0, 0.1);
 }
 
-TEST(Manifold, TellsHowFastTheOtherBodyComes) {
+TEST(Manifold, ContainsTheVelocityOfTheOtherBody) {
   test::SmallScene small;
   const ObjectId held = small.object("held", test::cubeShape(), Vector3::Zero());
   const ObjectId cube = small.object("cube", test::cubeShape(), {0.1, 0.0, 0.0});
@@ -113,9 +113,9 @@ TEST(Manifold, TellsHowFastTheOtherBodyComes) {
   const HandId instructor = small.hand("instructor", cube);
   small.pair(cube, held);
   Environment environment(small.build(), {});
-  enter(environment, right, Vector3::Zero());
-  enter(environment, instructor, {0.1, 0.0, 0.0});
-  moveTo(environment, instructor, {kCubeEdge + 0.0005, 0.0, 0.0}, 297);  // 0.2 m/s
+  test::activateHand(environment, right, Vector3::Zero());
+  test::activateHand(environment, instructor, {0.1, 0.0, 0.0});
+  test::moveHandTo(environment, instructor, {test::kCubeEdge + 0.0005, 0.0, 0.0}, 297);  // 0.2 m/s
   HandManifold manifold;
   environment.manifold(right, manifold);
   ASSERT_GT(manifold.contacts.size(), 0U);
@@ -125,7 +125,7 @@ TEST(Manifold, TellsHowFastTheOtherBodyComes) {
   }
 }
 
-TEST(Manifold, IsEmptyButWellFormedForAHandThatMovesNothing) {
+TEST(Manifold, IsEmptyButWellFormedForAHandWithoutObject) {
   test::SmallScene small;
   const ObjectId part = small.object("part", test::cubeShape(), Vector3::Zero());
   const HandId hand = small.hand("right", part);
@@ -139,4 +139,4 @@ TEST(Manifold, IsEmptyButWellFormedForAHandThatMovesNothing) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::simulation

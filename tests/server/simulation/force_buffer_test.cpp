@@ -4,13 +4,13 @@
 
 #include <gtest/gtest.h>
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
 Wrench push(double x) { return {Vector3(x, 0.0, 0.0), Vector3::Zero()}; }
 
-TEST(ForceBuffer, SumsItsCellsInCellOrderWhateverTheOrderOfWriting) {
-  // 1e16 + 1 - 1e16 depends on the order: so does the last bit of any sum
+TEST(ForceBuffer, SumsCellsInCellOrderWhateverTheOrderOfWrites) {
+  // 1e16 + 1 - 1e16 depends on the order of summation
   ForceBuffer forward(3);
   ForceBuffer backward(3);
   const double values[] = {1e16, 1.0, -1e16};
@@ -19,7 +19,7 @@ TEST(ForceBuffer, SumsItsCellsInCellOrderWhateverTheOrderOfWriting) {
   EXPECT_EQ(forward.total(1).force, backward.total(1).force);
 }
 
-TEST(ForceBuffer, KeepsACellThatIsNotRefreshedAndTellsItsAge) {
+TEST(ForceBuffer, KeepsACellThatIsNotRefreshedAndReportsItsAge) {
   ForceBuffer buffer(2);
   buffer.write(0, push(3.0), 5);
   buffer.write(1, push(4.0), 9);
@@ -27,7 +27,7 @@ TEST(ForceBuffer, KeepsACellThatIsNotRefreshedAndTellsItsAge) {
   EXPECT_EQ(buffer.age(0, 9), 4U);
 }
 
-TEST(ForceBuffer, OwesATotalForEveryForceOrOnlyWhenTheOldestCellIsRefreshed) {
+TEST(ForceBuffer, ATotalIsDueAfterEveryWriteOrAfterAWriteToTheOldestCell) {
   ForceBuffer every(3, SendPolicy::kEveryForce);
   ForceBuffer oldest(3, SendPolicy::kOldestCell);
   for (std::size_t cell = 0; cell < 3; ++cell) {
@@ -36,12 +36,12 @@ TEST(ForceBuffer, OwesATotalForEveryForceOrOnlyWhenTheOldestCellIsRefreshed) {
   }
   EXPECT_TRUE(every.write(1, push(1.0), 2));
   EXPECT_TRUE(oldest.write(0, push(1.0), 2));
-  EXPECT_FALSE(oldest.write(0, push(1.0), 3)) << "cells 1 and 2 have waited longer";
+  EXPECT_FALSE(oldest.write(0, push(1.0), 3)) << "cells 1 and 2 are older";
   EXPECT_TRUE(oldest.write(1, push(1.0), 3));
   EXPECT_TRUE(oldest.write(2, push(1.0), 3));
 }
 
-TEST(ForceBuffer, FadesAContributionAndForgetsItAfterItsLifetime) {
+TEST(ForceBuffer, FadesAContributionLinearlyAndFreesItsCellAfterItsLifetime) {
   ForceBuffer buffer(1);
   ASSERT_TRUE(buffer.contribute(7, push(10.0), 10, 100));
   EXPECT_DOUBLE_EQ(buffer.total(100).force.x(), 10.0);
@@ -51,14 +51,14 @@ TEST(ForceBuffer, FadesAContributionAndForgetsItAfterItsLifetime) {
   EXPECT_FALSE(buffer.cells().back().used);
 }
 
-TEST(ForceBuffer, OverwritesTheCellOfASourceInsteadOfAddingASecondOne) {
+TEST(ForceBuffer, ASecondContributionOfASourceOverwritesItsCell) {
   ForceBuffer buffer(1);
   buffer.contribute(7, push(10.0), 10, 0);
   buffer.contribute(7, push(4.0), 10, 0);
   EXPECT_DOUBLE_EQ(buffer.total(0).force.x(), 4.0);
 }
 
-TEST(ForceBuffer, CapsWhatComesFromOutside) {
+TEST(ForceBuffer, ClampsForceTorqueAndLifetimeOfAContribution) {
   ForceBuffer buffer(1);
   buffer.contribute(1, {Vector3(0.0, 0.0, 1e6), Vector3(1e6, 0.0, 0.0)}, 1000000, 0);
   EXPECT_NEAR(buffer.total(0).force.norm(), ForceBuffer::kMaxContributedForce, 1e-9);
@@ -66,18 +66,18 @@ TEST(ForceBuffer, CapsWhatComesFromOutside) {
   EXPECT_EQ(buffer.total(ForceBuffer::kMaxLifetimeTicks).force.norm(), 0.0);
 }
 
-TEST(ForceBuffer, RefusesAndCountsWhatIsNoForce) {
+TEST(ForceBuffer, RejectsAndCountsInvalidContributions) {
   ForceBuffer buffer(1);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(buffer.contribute(1, push(nan), 10, 0));
   EXPECT_FALSE(buffer.contribute(1, push(std::numeric_limits<double>::infinity()), 10, 0));
   EXPECT_FALSE(buffer.contribute(1, push(1e300), 10, 0));
   EXPECT_FALSE(buffer.contribute(1, push(1.0), 0, 0));
-  EXPECT_EQ(buffer.refused(), 4U);
+  EXPECT_EQ(buffer.rejected(), 4U);
   EXPECT_EQ(buffer.total(0).force.norm(), 0.0);
 }
 
-TEST(ForceBuffer, RefusesASourceTooManyUntilAnotherHasExpired) {
+TEST(ForceBuffer, RejectsASourceWhileAllCellsAreInUse) {
   ForceBuffer buffer(0);
   for (std::uint32_t source = 0; source < ForceBuffer::kContributions; ++source) {
     EXPECT_TRUE(buffer.contribute(source, push(1.0), source == 3 ? 5 : 100, 0));
@@ -87,4 +87,4 @@ TEST(ForceBuffer, RefusesASourceTooManyUntilAnotherHasExpired) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::simulation

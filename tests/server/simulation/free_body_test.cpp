@@ -6,53 +6,52 @@
 #include "tests/server/simulation/small_scene.h"
 #include "tests/support/realtime_guard.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
-using test::enter;
-using test::moveTo;
-using test::stay;
+using test::activateHand;
+using test::moveHandTo;
+using test::stepTicks;
 
 constexpr double kG = 9.81;
 constexpr double kMass = 0.4;
 const Vector3 kSize(0.06, 0.05, 0.04);
 constexpr std::uint32_t kLifetime = 200;
-/// A contribution is one tick old when it counts.
-constexpr double kFresh = 1.0 - 1.0 / kLifetime;
+/// [-] Weight of a contribution when applied: it is one tick old.
+constexpr double kWeight = 1.0 - 1.0 / kLifetime;
 
 Vector3 velocityOf(const Environment& environment, ObjectId object) {
   return environment.objects()[object.value].V_WO.linear;
 }
-Vector3 placeOf(const Environment& environment, ObjectId object) {
+Vector3 positionOf(const Environment& environment, ObjectId object) {
   return environment.objects()[object.value].X_WO.translation();
 }
 
-// A tick's velocity takes effect in the tick (semi-implicit Euler): after n ticks v = n g dt, z = n (n+1)/2 g
-// dt^2.
-TEST(FreeBody, FallsAsGalileoSays) {
+// Semi-implicit Euler: after n ticks v = n g dt and z = n (n + 1) / 2 g dt^2.
+TEST(FreeBody, FallsWithConstantAcceleration) {
   test::SmallScene small;
   const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 1.0});
   Environment environment(small.build(), {});
   constexpr int kTicks = 250;
-  stay(environment, kTicks);
+  test::stepTicks(environment, kTicks);
   const double t = kTicks * kTickSeconds;
   EXPECT_NEAR(velocityOf(environment, box).z(), -kG * t, 1e-9);
-  EXPECT_NEAR(placeOf(environment, box).z(), 1.0 - 0.5 * kG * t * (t + kTickSeconds), 1e-9);
-  EXPECT_NEAR(environment.forceOn(box).force.z(), -kMass * kG, 1e-12) << "its weight alone pulls at it";
+  EXPECT_NEAR(positionOf(environment, box).z(), 1.0 - 0.5 * kG * t * (t + kTickSeconds), 1e-9);
+  EXPECT_NEAR(environment.forceOn(box).force.z(), -kMass * kG, 1e-12) << "gravity is the only force";
 }
 
-TEST(FreeBody, ANonCentralFrameFallsWithoutTurning) {
+TEST(FreeBody, ABodyWhoseOriginIsNotItsCentreOfMassFallsWithoutRotation) {
   test::SmallScene small;
   const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 1.0});
   small.spec(box).body->p_OC_O = {0.02, 0.01, -0.01};
   Environment environment(small.build(), {});
-  stay(environment, 200);
+  test::stepTicks(environment, 200);
   const ObjectMotion& motion = environment.objects()[box.value];
   EXPECT_LE(motion.V_WO.angular.norm(), 1e-12);
   EXPECT_NEAR(motion.V_WO.linear.z(), -kG * 0.2, 1e-9);
 }
 
-TEST(FreeBody, AKnownForceGivesTheKnownAcceleration) {
+TEST(FreeBody, AForceGivesForceOverMass) {
   test::SmallScene small;
   const ObjectId box = small.freeBox("box", kSize, kMass, Vector3::Zero(), true);
   Environment environment(small.build(), {});
@@ -63,12 +62,12 @@ TEST(FreeBody, AKnownForceGivesTheKnownAcceleration) {
     environment.step();
   }
   const double t = kTicks * kTickSeconds;
-  const Vector3 v = kFresh * force / kMass * t;
+  const Vector3 v = kWeight * force / kMass * t;
   EXPECT_LE((velocityOf(environment, box) - v).norm(), 1e-6 * v.norm());
-  EXPECT_LE((placeOf(environment, box) - 0.5 * v * (t + kTickSeconds)).norm(), 1e-6);
+  EXPECT_LE((positionOf(environment, box) - 0.5 * v * (t + kTickSeconds)).norm(), 1e-6);
 }
 
-TEST(FreeBody, AKnownMomentGivesTheKnownAngularAcceleration) {
+TEST(FreeBody, ATorqueGivesTorqueOverMomentOfInertia) {
   for (int axis = 0; axis < 3; ++axis) {
     test::SmallScene small;
     const ObjectId box = small.freeBox("box", kSize, kMass, Vector3::Zero(), true);
@@ -79,13 +78,13 @@ TEST(FreeBody, AKnownMomentGivesTheKnownAngularAcceleration) {
       environment.step();
     }
     const double inertia = small.spec(box).body->inertia_C_O(axis, axis);
-    const double expected = kFresh * 1e-3 / inertia * 0.5;
+    const double expected = kWeight * 1e-3 / inertia * 0.5;
     EXPECT_NEAR(environment.objects()[box.value].V_WO.angular[axis], expected, 1e-3 * expected);
   }
 }
 
-//   F ->[   box   ]        a force above the centre: the box slides as if pushed at its centre, and tips
-TEST(FreeBody, AForceBesideTheCentrePushesAndTurns) {
+//   F ->[   box   ]        a force above the centre of mass
+TEST(FreeBody, AnEccentricForceGivesLinearAndAngularAcceleration) {
   test::SmallScene small;
   const ObjectId box = small.freeBox("box", kSize, kMass, Vector3::Zero(), true);
   Environment environment(small.build(), {});
@@ -97,21 +96,21 @@ TEST(FreeBody, AForceBesideTheCentrePushesAndTurns) {
   }
   const double inertia = small.spec(box).body->inertia_C_O(1, 1);
   const ObjectMotion& motion = environment.objects()[box.value];
-  EXPECT_NEAR(motion.V_WO.linear.x(), kFresh * 0.2 / kMass * 0.05, 1e-6);
-  EXPECT_NEAR(motion.V_WO.angular.y(), kFresh * 0.2 * lever / inertia * 0.05, 1e-3);
+  EXPECT_NEAR(motion.V_WO.linear.x(), kWeight * 0.2 / kMass * 0.05, 1e-6);
+  EXPECT_NEAR(motion.V_WO.angular.y(), kWeight * 0.2 * lever / inertia * 0.05, 1e-3);
 }
 
-TEST(FreeBody, ASpinningBodyKeepsItsAngularMomentumAndGainsNoEnergy) {
+TEST(FreeBody, ATumblingBodyConservesAngularMomentumAndGainsNoEnergy) {
   test::SmallScene small;
   const Vector3 size(0.02, 0.06, 0.12);
   const ObjectId box = small.freeBox("box", size, kMass, Vector3::Zero(), true);
   Environment environment(small.build(), {});
-  // a kick about the axis in the middle: it will tumble
+  // rotation about the axis of the middle moment of inertia is unstable: the body tumbles
   for (int tick = 0; tick < 20; ++tick) {
     environment.contribute(box, 1, {Vector3::Zero(), Vector3(0.001, 0.1, 0.001)}, kLifetime);
     environment.step();
   }
-  stay(environment, 200);
+  test::stepTicks(environment, 200);
   const Matrix3& inertia = small.spec(box).body->inertia_C_O;
   const auto momentum = [&] {
     const ObjectMotion& motion = environment.objects()[box.value];
@@ -126,11 +125,11 @@ TEST(FreeBody, ASpinningBodyKeepsItsAngularMomentumAndGainsNoEnergy) {
     ASSERT_LE(energy(), last * (1.0 + 1e-3));
     last = energy();
   }
-  EXPECT_LE((momentum() - before).norm(), 0.05 * before.norm()) << "four turns in a second";
+  EXPECT_LE((momentum() - before).norm(), 0.05 * before.norm()) << "over four revolutions in a second";
 }
 
-//   [a]->   <-[b]      two floating boxes meet face to face and off the middle
-TEST(FreeBody, ACollisionKeepsMomentumAndGainsNoEnergy) {
+//   [a]->   <-[b]      two boxes without gravity collide centrally and off centre
+TEST(FreeBody, ACollisionConservesLinearAndAngularMomentum) {
   for (const double off : {0.0, 0.015}) {
     test::SmallScene small;
     const ObjectId a = small.freeBox("a", kSize, 0.3, {-0.09, 0.0, 0.0}, true);
@@ -142,7 +141,7 @@ TEST(FreeBody, ACollisionKeepsMomentumAndGainsNoEnergy) {
       environment.contribute(b, 1, {Vector3(-0.2, 0.0, 0.0), Vector3::Zero()}, kLifetime);
       environment.step();
     }
-    stay(environment, 201);  // contributions fade
+    test::stepTicks(environment, 201);  // contributions fade
     const auto momentum = [&] {
       return Vector3(0.3 * velocityOf(environment, a) + 0.5 * velocityOf(environment, b));
     };
@@ -169,7 +168,7 @@ TEST(FreeBody, ACollisionKeepsMomentumAndGainsNoEnergy) {
   }
 }
 
-TEST(FreeBody, AFallingBoxStopsOnTheFloorAndDoesNotBounce) {
+TEST(FreeBody, AFallingBoxStopsOnTheFloorWithoutBouncing) {
   test::SmallScene small;
   const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
   const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 0.3});
@@ -178,15 +177,15 @@ TEST(FreeBody, AFallingBoxStopsOnTheFloorAndDoesNotBounce) {
   double lowest = 1.0;
   for (int tick = 0; tick < 1000; ++tick) {
     environment.step();
-    lowest = std::min(lowest, placeOf(environment, box).z());
+    lowest = std::min(lowest, positionOf(environment, box).z());
     if (environment.inContact(box, ground)) {
       ASSERT_LE(velocityOf(environment, box).z(), 0.01) << tick;
     }
   }
   EXPECT_GE(lowest, 0.5 * kSize.z() - 5e-5);
-  EXPECT_NEAR(placeOf(environment, box).z(), 0.5 * kSize.z(), 5e-5);
+  EXPECT_NEAR(positionOf(environment, box).z(), 0.5 * kSize.z(), 5e-5);
   EXPECT_TRUE(environment.objects()[box.value].asleep);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -6,26 +6,26 @@
 #include "server/simulation/environment.h"
 #include "tests/server/simulation/small_scene.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
-using test::enter;
-using test::moveTo;
-using test::stay;
+using test::activateHand;
+using test::moveHandTo;
+using test::stepTicks;
 
 constexpr double kG = 9.81;
 constexpr double kMass = 0.4;
 const Vector3 kSize(0.06, 0.05, 0.04);
 
-//   hand o->[  box  ]   floating; the hand pushes it off
-TEST(FreeBodyAndHand, WhatTheHandFeelsIsWhatTheBodyGains) {
+//   hand o->[  box  ]   without gravity; the hand pushes it away
+TEST(FreeBodyAndHand, TheImpulseOnTheHandIsTheMomentumOfTheBody) {
   test::SmallScene small;
   const ObjectId box = small.freeBox("box", kSize, kMass, Vector3::Zero(), true);
   const ObjectId pointer = small.object("pointer", test::pointerShape(), {-0.1, 0.0, 0.0});
   const HandId hand = small.hand("hand", pointer);
   small.pair(pointer, box);
   Environment environment(small.build(), {});
-  enter(environment, hand, {-0.05, 0.0, 0.0});
+  test::activateHand(environment, hand, {-0.05, 0.0, 0.0});
   Vector3 impulse = Vector3::Zero();
   double speed = 0.0;
   double x = -0.05;
@@ -41,8 +41,8 @@ TEST(FreeBodyAndHand, WhatTheHandFeelsIsWhatTheBodyGains) {
   EXPECT_LE((impulse - momentum).norm(), 0.02 * momentum.norm());
 }
 
-//   a box on the floor is pushed by a known force, without friction and with it
-TEST(FreeBodyAndHand, AKnownForceMovesABoxOnTheFloorByNewtonAndCoulomb) {
+//   without friction the box accelerates by F / m; with it by F / m - mu g
+TEST(FreeBodyAndHand, ABoxPushedAlongTheFloorAcceleratesByForceMinusCoulombFriction) {
   for (const double friction : {0.0, 0.3}) {
     test::SmallScene small;
     const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
@@ -50,22 +50,22 @@ TEST(FreeBodyAndHand, AKnownForceMovesABoxOnTheFloorByNewtonAndCoulomb) {
     small.spec(box).body->friction = friction;
     small.pair(box, ground);
     Environment environment(small.build(), {});
-    stay(environment, 200);
-    const double force = 2.0;  // [N] in the plane of its centre; 0.5 of its weight
+    test::stepTicks(environment, 200);
+    const double force = 2.0;  // [N] through its centre; half of its weight
     constexpr int kTicks = 300;
     for (int tick = 0; tick < kTicks; ++tick) {
       environment.contribute(box, 1, {Vector3(force, 0.0, 0.0), Vector3::Zero()}, 200);
       environment.step();
     }
-    const double pull = force * (1.0 - 1.0 / 200.0);
-    const double expected = std::max(pull / kMass - friction * kG, 0.0) * kTicks * kTickSeconds;
+    const double applied = force * (1.0 - 1.0 / 200.0);
+    const double expected = std::max(applied / kMass - friction * kG, 0.0) * kTicks * kTickSeconds;
     EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.x(), expected, std::max(0.02 * expected, 1e-3))
         << friction;
   }
 }
 
-//  a floor that leans by 20 degrees about y
-TEST(FreeBodyAndHand, ABoxSlidesDownASlopeAsCoulombSays) {
+//  a slope of 20 degrees, by turning gravity
+TEST(FreeBodyAndHand, ABoxOnASlopeSlidesOrSticksByCoulombFriction) {
   const double angle = 20.0 / 180.0 * std::numbers::pi;
   for (const double friction : {0.0, 0.2}) {
     test::SmallScene small;
@@ -75,15 +75,15 @@ TEST(FreeBodyAndHand, ABoxSlidesDownASlopeAsCoulombSays) {
     small.pair(box, ground);
     small.gravity({kG * std::sin(angle), 0.0, -kG * std::cos(angle)});
     Environment environment(small.build(), {});
-    stay(environment, 300);
+    test::stepTicks(environment, 300);
     const double expected = std::max(std::sin(angle) - friction * std::cos(angle), 0.0) * kG * 0.3;
     EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.x(), expected, std::max(0.02 * expected, 1e-3))
         << friction;
   }
 }
 
-//   a small box falls 1.5 m, at last at the fastest a body may be, on a sheet of 1 mm
-TEST(FreeBodyAndHand, NothingFallsThroughASheet) {
+//   a small box falls 1.5 m, reaches the speed cap, and hits a sheet of 1 mm
+TEST(FreeBodyAndHand, ABoxAtTheSpeedCapDoesNotFallThroughAThinSheet) {
   for (const double offset : {0.0, 0.0004, 0.0011}) {
     test::SmallScene small;
     const auto sheet = test::sheetStructures(0.2, 0.001, 0.003, offset);
@@ -103,12 +103,12 @@ TEST(FreeBodyAndHand, NothingFallsThroughASheet) {
   }
 }
 
-/// A box in a hand, a metre above nothing.
+/// A box held by a hand, with nothing below it.
 struct BoxInAHand {
   BoxInAHand() {
-    enter(environment, hand, {0.0, 0.0, 1.0});
+    test::activateHand(environment, hand, {0.0, 0.0, 1.0});
     environment.grab(hand, box);
-    stay(environment, 10);
+    test::stepTicks(environment, 10);
   }
   [[nodiscard]] const ObjectMotion& motion() const { return environment.objects()[box.value]; }
 
@@ -118,76 +118,76 @@ struct BoxInAHand {
   Environment environment{small.build(), {}};
 };
 
-TEST(FreeBodyAndHand, WhatIsLetGoOfFliesOnAndFalls) {
+TEST(FreeBodyAndHand, AReleasedBodyKeepsItsVelocityAndFalls) {
   BoxInAHand held;
   EXPECT_EQ(held.motion().status, ObjectStatus::kHeld);
   const Vector3 p_WB = held.motion().X_WO.translation();
-  stay(held.environment, 100);
-  EXPECT_EQ(held.motion().X_WO.translation(), p_WB) << "a hand carries it";
-  moveTo(held.environment, held.hand, {0.1, 0.0, 1.0}, 200);
+  test::stepTicks(held.environment, 100);
+  EXPECT_EQ(held.motion().X_WO.translation(), p_WB) << "the hand holds it";
+  test::moveHandTo(held.environment, held.hand, {0.1, 0.0, 1.0}, 200);
   held.environment.release(held.hand);
   EXPECT_EQ(held.motion().status, ObjectStatus::kFree);
-  stay(held.environment, 100);
-  EXPECT_NEAR(held.motion().V_WO.linear.x(), 0.5, 0.01) << "thrown as fast as it was carried";
+  test::stepTicks(held.environment, 100);
+  EXPECT_NEAR(held.motion().V_WO.linear.x(), 0.5, 0.01) << "it keeps the velocity of the hand";
   EXPECT_NEAR(held.motion().V_WO.linear.z(), -kG * 0.1, 1e-6);
 }
 
-TEST(FreeBodyAndHand, AHandThatIsGoneDropsNothing) {
+TEST(FreeBodyAndHand, AHandThatLeavesDoesNotDropItsBody) {
   BoxInAHand held;
   const Pose X_WB = held.motion().X_WO;
   held.environment.setHandPresent(held.hand, false);
-  stay(held.environment, 100);
-  EXPECT_EQ(held.motion().X_WO, X_WB) << "it waits for its hand to come back";
+  test::stepTicks(held.environment, 100);
+  EXPECT_EQ(held.motion().X_WO, X_WB) << "parked until the hand is back";
 }
 
-TEST(FreeBodyAndHand, WhatAHandThatIsGoneIsRelievedOfFalls) {
+TEST(FreeBodyAndHand, ABodyReleasedFromAnAbsentHandFalls) {
   BoxInAHand held;
   held.environment.setHandPresent(held.hand, false);
-  stay(held.environment, 10);
+  test::stepTicks(held.environment, 10);
   held.environment.release(held.hand);
   EXPECT_EQ(held.motion().status, ObjectStatus::kFree);
-  stay(held.environment, 100);
+  test::stepTicks(held.environment, 100);
   EXPECT_NEAR(held.motion().V_WO.linear.z(), -kG * 0.1, 1e-6);
 }
 
-TEST(FreeBodyAndHand, AFallThatIsHeldStillGoesOnFromRest) {
+TEST(FreeBodyAndHand, AfterAPauseAFreeBodyFallsFromRest) {
   test::SmallScene small;
   const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 1.0});
   const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
   small.pair(box, ground);
   Environment environment(small.build(), {});
-  stay(environment, 100);
-  environment.setStill(true);
+  test::stepTicks(environment, 100);
+  environment.setFreeBodiesPaused(true);
   const Pose X_WB = environment.objects()[box.value].X_WO;
-  stay(environment, 50);
+  test::stepTicks(environment, 50);
   EXPECT_EQ(environment.objects()[box.value].X_WO, X_WB);
   const std::vector<std::uint8_t> bytes = environment.save();
   Environment other(small.build(), {});
   ASSERT_TRUE(other.restore(bytes));
-  stay(other, 50);
-  EXPECT_EQ(other.objects()[box.value].X_WO, X_WB) << "held still after a restore too";
-  environment.setStill(false);
-  stay(environment, 100);
+  test::stepTicks(other, 50);
+  EXPECT_EQ(other.objects()[box.value].X_WO, X_WB) << "the pause is restored too";
+  environment.setFreeBodiesPaused(false);
+  test::stepTicks(environment, 100);
   EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.z(), -kG * 0.1, 1e-6);
-  stay(environment, 1000);
+  test::stepTicks(environment, 1000);
   EXPECT_NEAR(environment.objects()[box.value].X_WO.translation().z(), 0.5 * kSize.z(), 5e-5);
 }
 
-TEST(FreeBodyAndHand, WhatRestsOnAnObjectThatJoinsItsGroupFalls) {
+TEST(FreeBodyAndHand, ABodyFallsWhenItJoinsTheGroupOfItsSupport) {
   test::SmallScene small;
   const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
   const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 0.5 * kSize.z() + 1e-4});
   small.pair(box, ground);
   Environment environment(small.build(), {});
-  stay(environment, 300);
+  test::stepTicks(environment, 300);
   ASSERT_TRUE(environment.objects()[box.value].asleep);
   environment.setGroup(ground, 3);
   environment.setGroup(box, 3);
-  stay(environment, 100);
+  test::stepTicks(environment, 100);
   EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.z(), -kG * 0.1, 1e-6);
 }
 
-TEST(FreeBodyAndHand, WhatWasPutIntoTheFloorDoesNotFlyAway) {
+TEST(FreeBodyAndHand, ABodyPlacedInsideTheFloorGainsNoEnergy) {
   test::SmallScene small;
   const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
   const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 0.5 * kSize.z() - 0.004});
@@ -201,7 +201,7 @@ TEST(FreeBodyAndHand, WhatWasPutIntoTheFloorDoesNotFlyAway) {
   EXPECT_LE(highest, 0.5 * kSize.z() + 1e-4);
 }
 
-TEST(FreeBodyAndHand, AnObjectWithoutAMassIsNeverFree) {
+TEST(FreeBodyAndHand, AnObjectWithoutMassIsNeverFree) {
   test::SmallScene small;
   const ObjectId part = small.object("part", test::cubeShape(), Vector3::Zero(), ObjectStatus::kFree);
   Environment environment(small.build(), {});
@@ -211,4 +211,4 @@ TEST(FreeBodyAndHand, AnObjectWithoutAMassIsNeverFree) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -6,18 +6,18 @@
 #include "tests/server/simulation/small_scene.h"
 #include "tests/support/realtime_guard.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
-using test::enter;
-using test::moveTo;
-using test::stay;
+using test::activateHand;
+using test::moveHandTo;
+using test::stepTicks;
 
 constexpr double kEdge = 0.05;
 constexpr double kMass = 0.4;
 
 //   [2]
-//   [1]        three boxes set down on each other, a hair apart; a pointer that may come by
+//   [1]        three boxes with gaps of 0.1 mm; a pointer that can push them
 //   [0]   o
 //  ~~~~~~~~~
 class StackTest : public testing::Test {
@@ -49,8 +49,8 @@ class StackTest : public testing::Test {
   std::unique_ptr<Environment> environment_;
 };
 
-TEST_F(StackTest, AStackOfThreeRests) {
-  stay(*environment_, 20);
+TEST_F(StackTest, AStackOfThreeComesToRestAndSleeps) {
+  test::stepTicks(*environment_, 20);
   std::array<Pose, 3> before;
   for (int i = 0; i < 3; ++i) before[i] = box(i).X_WO;
   int tick = 0;
@@ -61,12 +61,12 @@ TEST_F(StackTest, AStackOfThreeRests) {
     EXPECT_NEAR(box(i).X_WO.translation().z(), (i + 0.5) * kEdge, (i + 1) * 5e-5);
     before[i] = box(i).X_WO;
   }
-  stay(*environment_, 10'000);
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(box(i).X_WO, before[i]) << "it sleeps: nothing moves at all";
-  EXPECT_EQ(environment_->work().queried_pairs, 0U) << "and costs nothing";
+  test::stepTicks(*environment_, 10'000);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(box(i).X_WO, before[i]) << "a sleeping body does not move at all";
+  EXPECT_EQ(environment_->work().queried_pairs, 0U) << "sleeping bodies need no queries";
 }
 
-TEST_F(StackTest, AStackDroppedAskewComesToRest) {
+TEST_F(StackTest, AStackDroppedTiltedComesToRest) {
   for (const double yaw : {0.1, 0.5}) {
     begin({});
     for (int i = 0; i < 3; ++i) {
@@ -82,13 +82,13 @@ TEST_F(StackTest, AStackDroppedAskewComesToRest) {
       EXPECT_LE((box(i).X_WO.rotation() * Vector3::UnitZ() - Vector3::UnitZ()).norm(), 1e-3);
       rest[i] = box(i).X_WO;
     }
-    stay(*environment_, 10'000);
+    test::stepTicks(*environment_, 10'000);
     for (int i = 0; i < 3; ++i) EXPECT_EQ(box(i).X_WO, rest[i]);
   }
 }
 
-TEST_F(StackTest, ForcesOfAStackAreItsWeights) {
-  stay(*environment_, 500);
+TEST_F(StackTest, ContactForcesInAStackBalanceTheWeights) {
+  test::stepTicks(*environment_, 500);
   ASSERT_TRUE(allAsleep());
   for (int i = 0; i < 3; ++i) {
     PairContact contact;
@@ -99,42 +99,42 @@ TEST_F(StackTest, ForcesOfAStackAreItsWeights) {
   }
 }
 
-TEST_F(StackTest, AHandThatTouchesItWakesItAndPushesIt) {
-  stay(*environment_, 500);
+TEST_F(StackTest, AHandWakesAndPushesASleepingBoxItTouches) {
+  test::stepTicks(*environment_, 500);
   ASSERT_TRUE(allAsleep());
-  enter(*environment_, hand_, {0.2, 0.0, 2.5 * kEdge});
-  stay(*environment_, 10);
+  test::activateHand(*environment_, hand_, {0.2, 0.0, 2.5 * kEdge});
+  test::stepTicks(*environment_, 10);
   EXPECT_TRUE(allAsleep()) << "the hand is 150 mm away";
-  moveTo(*environment_, hand_, {0.02, 0.0, 2.5 * kEdge}, 500);
+  test::moveHandTo(*environment_, hand_, {0.02, 0.0, 2.5 * kEdge}, 500);
   EXPECT_FALSE(box(2).asleep);
   EXPECT_LT(box(2).X_WO.translation().x(), -0.005);
 }
 
-TEST_F(StackTest, WhatLosesItsSupportFalls) {
-  stay(*environment_, 500);
+TEST_F(StackTest, SleepingBoxesFallWhenTheirSupportIsRemoved) {
+  test::stepTicks(*environment_, 500);
   ASSERT_TRUE(allAsleep());
   environment_->place(boxes_[0], Pose(Vector3(0.3, 0.3, 0.5 * kEdge)), ObjectStatus::kFree);
-  stay(*environment_, 1000);
+  test::stepTicks(*environment_, 1000);
   EXPECT_NEAR(box(1).X_WO.translation().z(), 0.5 * kEdge, 1e-4);
   EXPECT_NEAR(box(2).X_WO.translation().z(), 1.5 * kEdge, 1e-4);
   EXPECT_TRUE(allAsleep());
 }
 
-TEST_F(StackTest, TheFloorThatIsSwitchedOffHoldsNobody) {
-  stay(*environment_, 500);
+TEST_F(StackTest, ASleepingBoxFallsWhenThePairWithItsSupportIsDisabled) {
+  test::stepTicks(*environment_, 500);
   ASSERT_TRUE(allAsleep());
   environment_->setPairEnabled(static_cast<std::size_t>(environment_->scene().pairOf(boxes_[0], ObjectId{0})),
                                false);
-  stay(*environment_, 100);
+  test::stepTicks(*environment_, 100);
   EXPECT_LT(box(0).X_WO.translation().z(), 0.4 * kEdge);
 }
 
-TEST_F(StackTest, TheSameBitsForAnyNumberOfWorkersWithAndWithoutCoherence) {
+TEST_F(StackTest, IsBitEqualForAnyNumberOfWorkersAndWithoutCoherence) {
   EnvironmentOptions options;
   const auto play = [&](double ticks) {
     begin(options);
     std::vector<std::uint64_t> hashes;
-    enter(*environment_, hand_, {0.2, 0.0, 1.5 * kEdge});
+    test::activateHand(*environment_, hand_, {0.2, 0.0, 1.5 * kEdge});
     for (int tick = 0; tick < 900; ++tick) {
       const double x = 0.2 - 0.25 * std::min(1.0, tick / ticks);
       environment_->setHandPose(hand_, Pose(Vector3(x, 0.0, 1.5 * kEdge)), {});
@@ -158,9 +158,9 @@ TEST_F(StackTest, TheSameBitsForAnyNumberOfWorkersWithAndWithoutCoherence) {
   }
 }
 
-TEST_F(StackTest, ASavedStackGoesOnWithTheSameBits) {
-  enter(*environment_, hand_, {0.2, 0.0, 1.5 * kEdge});
-  moveTo(*environment_, hand_, {0.03, 0.0, 1.5 * kEdge}, 300);
+TEST_F(StackTest, ContinuesBitEqualAfterARestore) {
+  test::activateHand(*environment_, hand_, {0.2, 0.0, 1.5 * kEdge});
+  test::moveHandTo(*environment_, hand_, {0.03, 0.0, 1.5 * kEdge}, 300);
   const std::vector<std::uint8_t> bytes = environment_->save();
   Environment other(small_.build(), {});
   ASSERT_TRUE(other.restore(bytes));
@@ -174,39 +174,39 @@ TEST_F(StackTest, ASavedStackGoesOnWithTheSameBits) {
   }
 }
 
-TEST_F(StackTest, NoStateIsSavedInMoreBytesThanWereForetold) {
+TEST_F(StackTest, NoCheckpointExceedsTheBoundOnItsSize) {
   const std::size_t most = environment_->mostSavedBytes();
-  enter(*environment_, hand_, {0.2, 0.0, 1.5 * kEdge});
-  moveTo(*environment_, hand_, {0.03, 0.0, 1.5 * kEdge}, 300);
+  test::activateHand(*environment_, hand_, {0.2, 0.0, 1.5 * kEdge});
+  test::moveHandTo(*environment_, hand_, {0.03, 0.0, 1.5 * kEdge}, 300);
   EXPECT_GT(environment_->save().size(), 20'000U) << "full lists";
   EXPECT_LE(environment_->save().size(), most);
 }
 
-TEST_F(StackTest, ACheckpointBeforeAPairMeetsAgainGoesOnWithTheSameBits) {
-  stay(*environment_, 100);
+TEST_F(StackTest, ContinuesBitEqualAfterARestoreWhenASeparatedPairComesNearAgain) {
+  test::stepTicks(*environment_, 100);
   environment_->place(boxes_[2], Pose(Vector3(0.5, 0.5, 0.5)), ObjectStatus::kParked);
-  stay(*environment_, 10);
+  test::stepTicks(*environment_, 10);
   const std::vector<std::uint8_t> bytes = environment_->save();
   Environment other(small_.build(), {});
   ASSERT_TRUE(other.restore(bytes));
   for (Environment* one : {environment_.get(), &other}) {
     one->place(boxes_[2], Pose(Vector3(0.004, 0.002, 2.5 * kEdge + 1e-4)), ObjectStatus::kParked);
-    stay(*one, 5);
+    test::stepTicks(*one, 5);
     one->place(boxes_[2], Pose(Vector3(0.004, 0.002, 2.5 * kEdge + 1e-4)), ObjectStatus::kFree);
-    stay(*one, 20);
+    test::stepTicks(*one, 20);
   }
   EXPECT_EQ(other.hash(), environment_->hash());
 }
 
 TEST_F(StackTest, StepAllocatesNothingAndLocksNothing) {
-  enter(*environment_, hand_, {0.2, 0.0, 1.5 * kEdge});
-  stay(*environment_, 50);
+  test::activateHand(*environment_, hand_, {0.2, 0.0, 1.5 * kEdge});
+  test::stepTicks(*environment_, 50);
   const test::RealtimeGuard guard;
-  moveTo(*environment_, hand_, {0.0, 0.0, 1.5 * kEdge}, 400);
-  stay(*environment_, 400);
+  test::moveHandTo(*environment_, hand_, {0.0, 0.0, 1.5 * kEdge}, 400);
+  test::stepTicks(*environment_, 400);
   EXPECT_EQ(guard.allocations(), 0);
   EXPECT_EQ(guard.locks(), 0);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -4,14 +4,14 @@
 
 #include "tests/support/realtime_guard.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
 constexpr Tick kTicks = 600;
 constexpr Tick kManyTicks = 10'000;
 
-/// Of ten cubes, three of them pressed and stirred, after kManyTicks. It changes when the engine does, and
-/// only then: not with the processor, its vector instructions, the workers or the optimisation.
+/// State hash of ten cubes, three of them moved by hands, after kManyTicks. Independent of the processor, its
+/// vector instructions, the number of workers and the optimisation level.
 constexpr std::uint64_t kGoldenHash = 10288515567654053216U;
 
 std::vector<std::uint64_t> hashes(Environment& environment, const test::ManyBodies& bodies, Tick until) {
@@ -23,25 +23,25 @@ std::vector<std::uint64_t> hashes(Environment& environment, const test::ManyBodi
   return result;
 }
 
-TEST(ManyBodies, TwoHundredThatMayAllMeetCostALookOnlyWhereTheyAreNear) {
+TEST(test::ManyBodies, OnlyNearPairsOfTwoHundredBodiesAreQueried) {
   const test::ManyBodies bodies(200, 4);
   Environment environment(bodies.scene, {});
-  std::uint32_t looks = 0;
+  std::uint32_t queries = 0;
   while (environment.tick() < kTicks) {
     bodies.step(environment);
     if (environment.tick() < 100) continue;
-    looks = std::max(looks, environment.work().queried_pairs);
-    ASSERT_EQ(environment.work().refused_pairs, 0U);
+    queries = std::max(queries, environment.work().queried_pairs);
+    ASSERT_EQ(environment.work().deferred_pairs, 0U);
   }
   EXPECT_EQ(environment.work().active_pairs, 200U * 199U / 2U + 200U);
   EXPECT_LT(environment.work().near_pairs, 2000U);
-  EXPECT_LE(looks, 60U) << "four cubes, each with the floor and its neighbours";
+  EXPECT_LE(queries, 60U) << "four cubes, each with the floor and its neighbours";
   for (std::size_t i = 0; i < bodies.hands.size(); ++i) {
     EXPECT_TRUE(environment.inContact(bodies.cubes[i], bodies.floor));
   }
 }
 
-TEST(ManyBodies, LeaveTheSameBitsForAnyNumberOfWorkersAndAfterARestore) {
+TEST(test::ManyBodies, AreBitEqualForAnyNumberOfWorkersAndAfterARestore) {
   const test::ManyBodies bodies(50, 10, 0.06);
   Environment one(bodies.scene, {});
   const auto start = hashes(one, bodies, kTicks / 2);
@@ -59,7 +59,7 @@ TEST(ManyBodies, LeaveTheSameBitsForAnyNumberOfWorkersAndAfterARestore) {
   }
 }
 
-TEST(ManyBodies, EndInTheGoldenHashForAnyNumberOfWorkers) {
+TEST(test::ManyBodies, ReachTheGoldenHashForAnyNumberOfWorkers) {
   const test::ManyBodies bodies(10, 3);
   for (const unsigned workers : {1U, 2U, 4U}) {
     EnvironmentOptions options;
@@ -70,7 +70,7 @@ TEST(ManyBodies, EndInTheGoldenHashForAnyNumberOfWorkers) {
   }
 }
 
-TEST(ManyBodies, AllocateNothing) {
+TEST(test::ManyBodies, StepAllocatesNothingAndLocksNothing) {
   const test::ManyBodies bodies(50, 10, 0.06);
   Environment environment(bodies.scene, {});
   const test::RealtimeGuard guard;
@@ -83,8 +83,8 @@ TEST(ManyBodies, AllocateNothing) {
   EXPECT_EQ(guard.locks(), 0);
 }
 
-// There is one room, and two that stand in each other have it.
-TEST(ManyBodies, WhatFindsNoRoomStandsStillInsteadOfGoingThrough) {
+// The only contact list is used by two overlapping cubes.
+TEST(test::ManyBodies, AnObjectWhosePairHasNoContactListStandsStill) {
   test::SmallScene small;
   const ObjectId one = small.object("one", test::cubeShape(), {1.0, 0.0, 0.0});
   const ObjectId other = small.object("other", test::cubeShape(), {1.03, 0.0, 0.0});
@@ -94,22 +94,22 @@ TEST(ManyBodies, WhatFindsNoRoomStandsStillInsteadOfGoingThrough) {
   small.pair(one, other);
   small.pair(pointer, floor);
   EnvironmentOptions options;
-  options.rooms = 1;
+  options.contact_lists = 1;
   Environment environment(small.build(), options);
-  test::enter(environment, hand, {0.0, 0.0, 0.6});
-  test::moveTo(environment, hand, {0.0, 0.0, -0.1}, 1500);
-  EXPECT_EQ(environment.work().refused_pairs, 1U);
+  test::activateHand(environment, hand, {0.0, 0.0, 0.6});
+  test::moveHandTo(environment, hand, {0.0, 0.0, -0.1}, 1500);
+  EXPECT_EQ(environment.work().deferred_pairs, 1U);
   const auto height = [&] { return environment.objects()[pointer.value].X_WO.translation().z(); };
   EXPECT_GT(height(), test::kPointerRadius);
   EXPECT_EQ(environment.objects()[pointer.value].V_WO.linear.norm(), 0.0);
-  EXPECT_LT(environment.forceOn(pointer).force.z(), 0.0) << "the hand feels that it is held";
+  EXPECT_LT(environment.forceOn(pointer).force.z(), 0.0) << "the coupling pulls the hand back";
 
   environment.place(one, Pose(), ObjectStatus::kHidden);
-  test::stay(environment, 1000);
-  EXPECT_EQ(environment.work().refused_pairs, 0U);
+  test::stepTicks(environment, 1000);
+  EXPECT_EQ(environment.work().deferred_pairs, 0U);
   EXPECT_NEAR(height(), test::kPointerRadius, 0.1e-3);
   EXPECT_TRUE(environment.inContact(pointer, floor));
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::simulation

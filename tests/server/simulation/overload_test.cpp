@@ -8,7 +8,7 @@
 #include "server/simulation/governor.h"
 #include "tests/support/realtime_guard.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
 constexpr Tick kTicks = 600;
@@ -34,7 +34,7 @@ std::vector<std::uint64_t> workOf(const test::Overload& overload, Environment& e
 
 std::uint64_t p99(const std::vector<std::uint64_t>& sorted) { return sorted[sorted.size() * 99 / 100]; }
 
-TEST(Overload, ABudgetIsKeptAndWithoutOneItIsNot) {
+TEST(test::Overload, TicksStayWithinTheirBudget) {
   const test::Overload overload(kBlocks);
   Environment unlimited(overload.scene, {});
   EXPECT_GT(p99(workOf(overload, unlimited)), 2 * kBudget);
@@ -44,8 +44,8 @@ TEST(Overload, ABudgetIsKeptAndWithoutOneItIsNot) {
   EXPECT_EQ(limited.work().limited_pairs, static_cast<std::uint32_t>(kBlocks));
 }
 
-// A level left out may not let a block sink, jump or stand still.
-TEST(Overload, WhatIsLimitedStaysOnTheFloorAndFollowsItsHand) {
+// Skipped levels must not make a block sink, jump or stand still.
+TEST(test::Overload, BlocksWithSkippedLevelsStayOnTheFloorAndFollowTheirHands) {
   const test::Overload overload(kBlocks);
   Environment unlimited(overload.scene, {});
   Environment limited(overload.scene, withBudget(kBudget));
@@ -64,23 +64,23 @@ TEST(Overload, WhatIsLimitedStaysOnTheFloorAndFollowsItsHand) {
   }
 }
 
-TEST(Overload, LevelsDoNotFlutter) {
+TEST(test::Overload, SkippedLevelsDoNotOscillate) {
   const test::Overload overload(kBlocks);
   Environment environment(overload.scene, withBudget(kBudget));
-  std::map<std::size_t, std::uint32_t> left_out;
+  std::map<std::size_t, std::uint32_t> skipped_levels;
   int changes = 0;
   for (Tick tick = 0; tick < 2000; ++tick) {
     overload.step(environment);
     for (const std::size_t pair : overload.pairs) {
-      const std::uint32_t now = environment.pairs()[pair].left_out;
-      if (tick > 100 && left_out[pair] != now) ++changes;
-      left_out[pair] = now;
+      const std::uint32_t now = environment.pairs()[pair].skipped_levels;
+      if (tick > 100 && skipped_levels[pair] != now) ++changes;
+      skipped_levels[pair] = now;
     }
   }
   EXPECT_LE(changes, 2 * kBlocks) << "in two seconds";
 }
 
-TEST(Overload, LevelsComeBackWhenThereIsRoomAgain) {
+TEST(test::Overload, SkippedLevelsAreRestoredWithALargerBudget) {
   const test::Overload overload(kBlocks);
   Environment environment(overload.scene, withBudget(kBudget));
   while (environment.tick() < 200) overload.step(environment);
@@ -91,15 +91,16 @@ TEST(Overload, LevelsComeBackWhenThereIsRoomAgain) {
   EXPECT_EQ(environment.work().limited_pairs, 0U);
   environment.setBudget(kBudget);
   overload.step(environment);
-  EXPECT_EQ(environment.work().limited_pairs, static_cast<std::uint32_t>(kBlocks)) << "and go at once";
+  EXPECT_EQ(environment.work().limited_pairs, static_cast<std::uint32_t>(kBlocks))
+      << "levels are skipped immediately";
   environment.setBudget(0);
   overload.step(environment);
   overload.step(environment);
-  EXPECT_EQ(environment.work().limited_pairs, 0U) << "without a limit nothing is left out";
+  EXPECT_EQ(environment.work().limited_pairs, 0U) << "without a budget no level is skipped";
 }
 
-// The times are made up; that they decide something is the point.
-TEST(Overload, AGovernedRunIsRepeatedFromItsBudgetsWithoutAClock) {
+// The governor gets synthetic times that change the budget several times.
+TEST(test::Overload, AGovernedRunIsReproducedFromItsBudgetsWithoutAClock) {
   const test::Overload overload(kBlocks);
   std::map<Tick, std::uint64_t> budgets;
   std::vector<std::uint64_t> hashes;
@@ -114,7 +115,7 @@ TEST(Overload, AGovernedRunIsRepeatedFromItsBudgetsWithoutAClock) {
       const double seconds = static_cast<double>(environment.work().points_visited) * 1e-8 *
                              (1.0 + 0.1 * static_cast<double>(noise >> 60U));
       const auto budget =
-          governor.judge(seconds, environment.work().points_visited, environment.workLimits().points);
+          governor.update(seconds, environment.work().points_visited, environment.workLimits().points);
       if (!budget) continue;
       budgets[environment.tick() + 1] = *budget;
       environment.setBudget(*budget);
@@ -134,7 +135,7 @@ TEST(Overload, AGovernedRunIsRepeatedFromItsBudgetsWithoutAClock) {
   EXPECT_EQ(hashes_again, hashes);
 }
 
-TEST(Overload, ARestoredEnvironmentGoesOnWithItsBudgetAndLevels) {
+TEST(test::Overload, BudgetAndLevelsAreRestoredFromACheckpoint) {
   const test::Overload overload(3);
   Environment original(overload.scene, withBudget(kBudget / 4));
   while (original.tick() < 150) overload.step(original);
@@ -149,12 +150,12 @@ TEST(Overload, ARestoredEnvironmentGoesOnWithItsBudgetAndLevels) {
 }
 
 //      |  |
-//    +------+     a block on a needle: only the finest level of its shell has the needle's point
+//    +------+     a block on a needle: only the finest shell level contains the needle's tip
 //    +------+
 //       \/
 //   ~~~~~~~~~~~
-TEST(Overload, WhatHoldsABodyIsNotLeftOut) {
-  std::vector<ShellSite> sites = test::boxSites({0.1, 0.06, 0.04}, 0.002);
+TEST(test::Overload, PointsThatSupportABodyAreNotSkipped) {
+  std::vector<structures::SurfaceSample> sites = test::boxSamples({0.1, 0.06, 0.04}, 0.002);
   sites.push_back({{0.0, 0.0, -0.025}, {0.0, 0.0, 1.0}, 1e-6});
   const auto needle = test::analyticStructures(
       test::boxDistance({0.1, 0.06, 0.04}),
@@ -165,23 +166,23 @@ TEST(Overload, WhatHoldsABodyIsNotLeftOut) {
   const HandId hand = small.hand("hand", block);
   const std::size_t pair = small.pair(block, floor);
   Environment environment(small.build(), {});
-  test::enter(environment, hand, {0.0, 0.0, 0.03});
-  test::moveTo(environment, hand, {0.0, 0.0, 0.023}, 100);
+  test::activateHand(environment, hand, {0.0, 0.0, 0.03});
+  test::moveHandTo(environment, hand, {0.0, 0.0, 0.023}, 100);
   const auto height = [&] { return environment.objects()[block.value].X_WO.translation().z(); };
   ASSERT_NEAR(height(), 0.025, 5e-5);
   environment.setBudget(100);
-  std::uint32_t left_out = 0;
+  std::uint32_t skipped_levels = 0;
   for (int tick = 0; tick < 300; ++tick) {
     environment.setHandPose(hand, Pose(Vector3(2e-4 * tick, 0.0, 0.023)), {});
     environment.step();
     ASSERT_NEAR(height(), 0.025, 1e-4);
-    left_out = std::max(left_out, environment.pairs()[pair].left_out);
+    skipped_levels = std::max(skipped_levels, environment.pairs()[pair].skipped_levels);
   }
-  EXPECT_GT(left_out, 0U);
+  EXPECT_GT(skipped_levels, 0U);
   EXPECT_NE(environment.pairs()[pair].result, nullptr);
 }
 
-TEST(Overload, ALimitedTickAllocatesNothing) {
+TEST(test::Overload, ALimitedTickAllocatesNothing) {
   const test::Overload overload(3);
   Environment environment(overload.scene, withBudget(kBudget / 4));
   overload.step(environment);
@@ -196,4 +197,4 @@ TEST(Overload, ALimitedTickAllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -6,8 +6,9 @@
 
 namespace tenon::test {
 
-/// To and fro between -1 and 1 at an even speed: no function of the C library, so the same everywhere.
-inline double wave(Tick tick, Tick period) {
+/// Triangle wave in [-1, 1] of `period` [ticks]; computed without functions of the C library, so bit-equal on
+/// every processor.
+inline double triangleWave(Tick tick, Tick period) {
   const auto phase = static_cast<double>(tick % period) / static_cast<double>(period);
   return std::abs(4.0 * phase - 2.0) - 1.0;
 }

@@ -9,12 +9,12 @@
 
 #include "tests/support/realtime_guard.h"
 
-namespace tenon {
+namespace tenon::simulation {
 namespace {
 
-class WorkerPoolOf : public testing::TestWithParam<unsigned> {};
+class WorkerPoolWithWorkers : public testing::TestWithParam<unsigned> {};
 
-TEST_P(WorkerPoolOf, CallsEveryItemOfEveryRunExactlyOnce) {
+TEST_P(WorkerPoolWithWorkers, CallsEveryItemOfEveryRunExactlyOnce) {
   WorkerPool pool(GetParam());
   for (int run = 0; run < 3000; ++run) {
     const auto items = static_cast<std::size_t>(run % 12);
@@ -28,7 +28,7 @@ TEST_P(WorkerPoolOf, CallsEveryItemOfEveryRunExactlyOnce) {
   }
 }
 
-TEST_P(WorkerPoolOf, SeesWhatTheItemsWroteWithoutFurtherSynchronization) {
+TEST_P(WorkerPoolWithWorkers, WritesOfTheItemsAreVisibleAfterRun) {
   WorkerPool pool(GetParam());
   std::array<double, 64> values{};
   for (int run = 1; run <= 200; ++run) {
@@ -40,7 +40,7 @@ TEST_P(WorkerPoolOf, SeesWhatTheItemsWroteWithoutFurtherSynchronization) {
   }
 }
 
-TEST_P(WorkerPoolOf, WakesWorkersThatHaveFallenAsleep) {
+TEST_P(WorkerPoolWithWorkers, WakesSleepingWorkers) {
   WorkerPool pool(GetParam());
   for (int run = 0; run < 5; ++run) {
     std::this_thread::sleep_for(std::chrono::milliseconds(3));
@@ -51,9 +51,9 @@ TEST_P(WorkerPoolOf, WakesWorkersThatHaveFallenAsleep) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Workers, WorkerPoolOf, testing::Values(1U, 2U, 4U));
+INSTANTIATE_TEST_SUITE_P(Workers, WorkerPoolWithWorkers, testing::Values(1U, 2U, 4U));
 
-TEST(WorkerPool, StartsNoThreadForOneWorker) {
+TEST(WorkerPool, APoolOfOneWorkerRunsInTheCallingThread) {
   WorkerPool pool(1);
   const std::thread::id here = std::this_thread::get_id();
   bool always_here = true;
@@ -74,4 +74,4 @@ TEST(WorkerPool, RunAllocatesNothingAndLocksNothing) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::simulation

@@ -8,7 +8,7 @@
 
 #include "server/structures/field_builder.h"
 
-namespace tenon {
+namespace tenon::structures {
 namespace {
 
 constexpr double kRadius = 0.05;
@@ -31,8 +31,8 @@ DistanceField box() {
   return buildField(boxDistance, {-corner, corner}, kVoxel);
 }
 
-/// A point within `reach` of the origin along each axis, the same for every run.
-Vector3 somewhere(std::mt19937_64& random, double reach) {
+/// A random point with coordinates in [-reach, reach].
+Vector3 randomPoint(std::mt19937_64& random, double reach) {
   const auto coordinate = [&] {
     return (static_cast<double>(random() >> 11U) * 0x1p-53 * 2.0 - 1.0) * reach;
   };
@@ -41,12 +41,12 @@ Vector3 somewhere(std::mt19937_64& random, double reach) {
   return {x, y, coordinate()};
 }
 
-TEST(DistanceField, AnswersTheDistanceToABallWithinItsBand) {
+TEST(DistanceField, IsTheDistanceToABallWithinTheBand) {
   const DistanceField field = ball();
   std::mt19937_64 random(1);
   int in_band = 0;
   for (int i = 0; i < 20'000; ++i) {
-    const Vector3 p = somewhere(random, 0.07);
+    const Vector3 p = randomPoint(random, 0.07);
     const FieldSample sample = field.sample(p);
     if (std::abs(ballDistance(p)) < field.band() - 0.001) {
       ASSERT_TRUE(sample.exact) << p.transpose();
@@ -59,11 +59,11 @@ TEST(DistanceField, AnswersTheDistanceToABallWithinItsBand) {
   EXPECT_GT(in_band, 3000);
 }
 
-TEST(DistanceField, OutsideTheBandBoundsTheDistanceAndKeepsTheSign) {
+TEST(DistanceField, OutsideTheBandIsALowerBoundWithTheRightSign) {
   const DistanceField field = ball();
   std::mt19937_64 random(2);
   for (int i = 0; i < 20'000; ++i) {
-    const Vector3 p = somewhere(random, 0.2);
+    const Vector3 p = randomPoint(random, 0.2);
     const FieldSample sample = field.sample(p);
     if (sample.exact) continue;
     EXPECT_EQ(sample.distance < 0.0, ballDistance(p) < 0.0) << p.transpose();
@@ -78,7 +78,7 @@ TEST(DistanceField, LowerBoundIsNeverAboveTheDistanceNorAboveAnExactSample) {
     const bool is_ball = field.layout().refinement > 1;
     std::mt19937_64 random(3);
     for (int i = 0; i < 50'000; ++i) {
-      const Vector3 p = somewhere(random, 0.15);
+      const Vector3 p = randomPoint(random, 0.15);
       const double bound = field.lowerBound(p);
       EXPECT_LE(bound, (is_ball ? ballDistance(p) : boxDistance(p)) + 1e-12) << p.transpose();
       const FieldSample sample = field.sample(p);
@@ -95,10 +95,10 @@ TEST(DistanceField, LowerBoundHoldsForAWholeBall) {
     const bool is_ball = field.layout().refinement > 1;
     std::mt19937_64 random(4);
     for (int i = 0; i < 50'000; ++i) {
-      const Vector3 p = somewhere(random, 0.15);
-      const double radius = 0.03 * std::abs(somewhere(random, 1.0).x());
+      const Vector3 p = randomPoint(random, 0.15);
+      const double radius = 0.03 * std::abs(randomPoint(random, 1.0).x());
       const double bound = field.lowerBound(p, radius);
-      const Vector3 in_ball = p + radius * somewhere(random, 1.0).normalized();
+      const Vector3 in_ball = p + radius * randomPoint(random, 1.0).normalized();
       EXPECT_LE(bound, (is_ball ? ballDistance(in_ball) : boxDistance(in_ball)) + 1e-12) << p.transpose();
       const FieldSample sample = field.sample(in_ball);
       if (sample.exact) {
@@ -114,7 +114,7 @@ TEST(DistanceField, LowerBoundGrowsWithTheDistanceSoThatPruningWorks) {
   EXPECT_GT(field.lowerBound(Vector3(0.0, 0.0, -0.075)), 0.005);
 }
 
-TEST(DistanceField, RefinedBricksFollowTheSurfaceMoreClosely) {
+TEST(DistanceField, RefinedBricksApproximateTheSurfaceMoreClosely) {
   const Vector3 half = Vector3::Constant(0.5);
   const DistanceField coarse = ball();
   const DistanceField fine = ball({{Vector3(0.0, -0.5, -0.5), half}}, 4);
@@ -122,7 +122,7 @@ TEST(DistanceField, RefinedBricksFollowTheSurfaceMoreClosely) {
   double worst_fine = 0.0;
   std::mt19937_64 random(4);
   for (int i = 0; i < 5'000; ++i) {
-    Vector3 p = somewhere(random, 1.0).normalized() * kRadius;
+    Vector3 p = randomPoint(random, 1.0).normalized() * kRadius;
     p.x() = std::abs(p.x());
     worst_coarse = std::max(worst_coarse, std::abs(coarse.sample(p).distance));
     worst_fine = std::max(worst_fine, std::abs(fine.sample(p).distance));
@@ -140,10 +140,10 @@ TEST(DistanceField, RefinementDoesNotNarrowTheBand) {
   EXPECT_NEAR(sample.distance, ballDistance(Vector3(kRadius + 0.009, 0.001, 0.002)), 1e-4);
 }
 
-TEST(DistanceField, ANanPointIsNowhere) {
+TEST(DistanceField, ASampleAtNanIsNotExact) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(ball().sample(Vector3(nan, 0.0, 0.0)).exact);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::structures

@@ -6,35 +6,35 @@
 
 #include <gtest/gtest.h>
 
-namespace tenon {
+namespace tenon::structures {
 namespace {
 
-/// A unit ball's surface in a golden spiral: even everywhere.
-std::vector<ShellSite> ballSites(int count) {
-  std::vector<ShellSite> sites;
+/// Evenly distributed samples of the unit sphere (Fibonacci lattice).
+std::vector<SurfaceSample> sphereSamples(int count) {
+  std::vector<SurfaceSample> samples;
   for (int i = 0; i < count; ++i) {
     const double z = 1.0 - (2.0 * i + 1.0) / count;
     const double angle = 2.399963229728653 * i;
     const double r = std::sqrt(1.0 - z * z);
     const Vector3 p(r * std::cos(angle), r * std::sin(angle), z);
-    sites.push_back({p, -p, 4.0 * std::numbers::pi / count});
+    samples.push_back({p, -p, 4.0 * std::numbers::pi / count});
   }
-  return sites;
+  return samples;
 }
 
 TEST(ShellBuilder, EveryPrefixOfLevelsSamplesTheWholeObject) {
-  const std::vector<ShellSite> sites = ballSites(5000);
-  const Pointshell shell = buildShell(sites);
+  const std::vector<SurfaceSample> samples = sphereSamples(5000);
+  const Pointshell shell = buildShell(samples);
   ASSERT_GE(shell.levels().size(), 4U);
   std::uint32_t used = 0;
   for (const ShellLevel& level : shell.levels()) {
     ASSERT_EQ(level.first_point, used);
     used += level.point_count;
-    // no place of the surface is further from a used point than the level's spacing
-    for (std::size_t i = 0; i < sites.size(); i += 7) {
+    // no point of the surface is further from a used point than the level's spacing
+    for (std::size_t i = 0; i < samples.size(); i += 7) {
       double nearest = 10.0;
       for (std::uint32_t k = 0; k < used; ++k) {
-        nearest = std::min(nearest, (shell.points()[k].p_MP.cast<double>() - sites[i].p_MP).norm());
+        nearest = std::min(nearest, (shell.points()[k].p_MP.cast<double>() - samples[i].p_MP).norm());
       }
       EXPECT_LE(nearest, level.spacing * 1.001) << "with " << used << " points";
     }
@@ -43,7 +43,7 @@ TEST(ShellBuilder, EveryPrefixOfLevelsSamplesTheWholeObject) {
 }
 
 TEST(ShellBuilder, AreasOfEveryPrefixAddUpToTheWholeSurface) {
-  const Pointshell shell = buildShell(ballSites(3000));
+  const Pointshell shell = buildShell(sphereSamples(3000));
   double sum = 0.0;
   for (const ShellLevel& level : shell.levels()) {
     for (std::uint32_t k = 0; k < level.point_count; ++k) sum += shell.points()[level.first_point + k].area;
@@ -51,8 +51,8 @@ TEST(ShellBuilder, AreasOfEveryPrefixAddUpToTheWholeSurface) {
   }
 }
 
-TEST(ShellBuilder, SpheresHoldWhatTheySayTheyHold) {
-  const Pointshell shell = buildShell(ballSites(3001));
+TEST(ShellBuilder, SpheresBoundTheirLeavesAndPoints) {
+  const Pointshell shell = buildShell(sphereSamples(3001));
   std::size_t points_seen = 0;
   for (const ShellSphere& cluster : shell.clusters()) {
     ASSERT_LE(cluster.count, Pointshell::kClusterLeaves);
@@ -72,15 +72,15 @@ TEST(ShellBuilder, SpheresHoldWhatTheySayTheyHold) {
 
 TEST(ShellBuilder, BothSidesOfAThinPlateKeepTheirPoints) {
   // a plate 1 mm thick, points 10 mm apart on each side
-  std::vector<ShellSite> sites;
+  std::vector<SurfaceSample> samples;
   for (int i = 0; i < 20; ++i) {
     for (int k = 0; k < 20; ++k) {
       for (const double side : {-1.0, 1.0}) {
-        sites.push_back({Vector3(0.01 * i, 0.01 * k, 0.0005 * side), Vector3(0.0, 0.0, -side), 1e-4});
+        samples.push_back({Vector3(0.01 * i, 0.01 * k, 0.0005 * side), Vector3(0.0, 0.0, -side), 1e-4});
       }
     }
   }
-  const Pointshell shell = buildShell(sites);
+  const Pointshell shell = buildShell(samples);
   const ShellLevel& coarsest = shell.levels()[0];
   int upper = 0;
   for (std::uint32_t k = 0; k < coarsest.point_count; ++k) {
@@ -89,21 +89,21 @@ TEST(ShellBuilder, BothSidesOfAThinPlateKeepTheirPoints) {
   EXPECT_NEAR(upper, coarsest.point_count / 2.0, coarsest.point_count * 0.1);
 }
 
-TEST(ShellBuilder, OnePointIsAShellAndNoneIsEmpty) {
-  const Pointshell one = buildShell(ballSites(1));
+TEST(ShellBuilder, OnePointGivesAShellAndNoPointAnEmptyOne) {
+  const Pointshell one = buildShell(sphereSamples(1));
   EXPECT_EQ(one.points().size(), 1U);
   EXPECT_EQ(one.levels().size(), 1U);
   EXPECT_TRUE(buildShell({}).empty());
 }
 
-TEST(ShellBuilder, KnowsTheBallThatHoldsItsPoints) {
-  std::vector<ShellSite> sites = ballSites(500);
-  for (ShellSite& site : sites) site.p_MP += Vector3(3.0, 0.0, 0.0);
-  const Pointshell shell = buildShell(sites);
+TEST(ShellBuilder, HasTheBoundingSphereOfItsPoints) {
+  std::vector<SurfaceSample> samples = sphereSamples(500);
+  for (SurfaceSample& sample : samples) sample.p_MP += Vector3(3.0, 0.0, 0.0);
+  const Pointshell shell = buildShell(samples);
   EXPECT_NEAR(shell.radius(), 4.0, 0.02);
-  EXPECT_NEAR(shell.ballRadius(), 1.0, 0.02);
-  EXPECT_NEAR(shell.ballCentre().x(), 3.0, 0.02);
+  EXPECT_NEAR(shell.boundingRadius(), 1.0, 0.02);
+  EXPECT_NEAR(shell.boundingCentre().x(), 3.0, 0.02);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::structures

@@ -11,13 +11,13 @@
 #include "server/structures/haptic_structures.h"
 #include "server/structures/shell_builder.h"
 
-namespace tenon {
+namespace tenon::structures {
 namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-/// A folder of its own for each test, gone afterwards.
+/// Each test has its own folder, removed afterwards.
 class StructureFile : public ::testing::Test {
  protected:
   StructureFile() {
@@ -26,9 +26,9 @@ class StructureFile : public ::testing::Test {
     const std::array refine{Eigen::AlignedBox3d(Vector3::Zero(), corner)};
     structures_.field =
         buildField([](const Vector3& p) { return p.norm() - 0.02; }, {-corner, corner}, 0.002, refine, 2);
-    std::vector<ShellSite> sites;
-    for (int i = 0; i < 100; ++i) sites.push_back({Vector3(0.001 * i, 0.0, 0.02), -Vector3::UnitZ(), 1e-6});
-    structures_.shell = buildShell(sites);
+    std::vector<SurfaceSample> samples;
+    for (int i = 0; i < 100; ++i) samples.push_back({Vector3(0.001 * i, 0.0, 0.02), -Vector3::UnitZ(), 1e-6});
+    structures_.shell = buildShell(samples);
     structures_.info.source = "ball.stl";
     structures_.info.content_hash = "0123";
     structures_.info.meshes = {folder_.parent_path() / "parts" / "ball.stl"};
@@ -45,7 +45,7 @@ class StructureFile : public ::testing::Test {
     std::ifstream in(file(), std::ios::binary);
     return {std::istreambuf_iterator<char>(in), {}};
   }
-  void put(const std::string& bytes) const {
+  void overwrite(const std::string& bytes) const {
     std::ofstream(file(), std::ios::binary | std::ios::trunc) << bytes;
   }
   [[nodiscard]] fs::path file() const { return folder_ / "ball.tenon"; }
@@ -56,7 +56,7 @@ class StructureFile : public ::testing::Test {
   HapticStructures structures_;
 };
 
-TEST_F(StructureFile, ComesBackAsItWent) {
+TEST_F(StructureFile, IsReadAsItWasWritten) {
   (void)written();
   const auto opened = openStructures(file());
   ASSERT_TRUE(opened) << opened.error().what;
@@ -67,7 +67,7 @@ TEST_F(StructureFile, ComesBackAsItWent) {
   EXPECT_TRUE(std::equal(a.samples.begin(), a.samples.end(), b.samples.begin(), b.samples.end()));
   EXPECT_TRUE(std::equal(a.far.begin(), a.far.end(), b.far.begin(), b.far.end()));
   EXPECT_EQ(read.shell.points().size(), 100U);
-  EXPECT_EQ(read.shell.ballRadius(), structures_.shell.ballRadius());
+  EXPECT_EQ(read.shell.boundingRadius(), structures_.shell.boundingRadius());
   EXPECT_EQ(read.info.source, "ball.stl");
   EXPECT_EQ(read.info.notes, "A note.\n");
   EXPECT_EQ(read.info.meshes, structures_.info.meshes);
@@ -85,7 +85,7 @@ TEST_F(StructureFile, WritingLeavesNoOtherFileBehind) {
 TEST_F(StructureFile, ATruncatedFileIsRefusedWithItsName) {
   const std::string bytes = written();
   for (const std::size_t size : {bytes.size() - 1, bytes.size() / 2, std::size_t{100}, std::size_t{0}}) {
-    put(bytes.substr(0, size));
+    overwrite(bytes.substr(0, size));
     const auto opened = openStructures(file());
     ASSERT_FALSE(opened) << size;
     EXPECT_THAT(opened.error().what, HasSubstr("ball.tenon"));
@@ -97,12 +97,12 @@ TEST_F(StructureFile, AFlippedBitAnywhereIsRefused) {
   for (std::size_t i = 0; i < bytes.size(); i += 1 + bytes.size() / 97) {
     std::string bad = bytes;
     bad[i] = static_cast<char>(bad[i] ^ 0x10);
-    put(bad);
+    overwrite(bad);
     EXPECT_FALSE(openStructures(file())) << "byte " << i;
   }
 }
 
-TEST_F(StructureFile, AThousandRandomDamagesAreAllRefused) {
+TEST_F(StructureFile, AThousandRandomlyDamagedFilesAreRefused) {
   const std::string bytes = written();
   std::mt19937_64 random(2016);
   for (int i = 0; i < 1000; ++i) {
@@ -115,23 +115,23 @@ TEST_F(StructureFile, AThousandRandomDamagesAreAllRefused) {
         bad.resize(random() % bad.size());
         break;
       default:
-        // the header is where numbers say how much there is
+        // damage in the header, which contains sizes and offsets
         for (int k = 0; k < 8; ++k) bad[random() % 400] = static_cast<char>(random());
         break;
     }
     if (bad == bytes) continue;
-    put(bad);
+    overwrite(bad);
     const auto opened = openStructures(file());
     ASSERT_FALSE(opened) << i;
     EXPECT_THAT(opened.error().what, HasSubstr("ball.tenon"));
   }
 }
 
-TEST_F(StructureFile, AnotherVersionSaysWhatToDo) {
+TEST_F(StructureFile, AnotherVersionIsRefusedWithAdviceToBakeAgain) {
   std::string bytes = written();
   for (const char version : {2, 77}) {
     bytes[8] = version;
-    put(bytes);
+    overwrite(bytes);
     const auto opened = openStructures(file());
     ASSERT_FALSE(opened);
     EXPECT_THAT(opened.error().what, HasSubstr("version " + std::to_string(version)));
@@ -139,7 +139,7 @@ TEST_F(StructureFile, AnotherVersionSaysWhatToDo) {
   }
 }
 
-TEST_F(StructureFile, MissingFilesAndFoldersAreNamed) {
+TEST_F(StructureFile, ErrorsNameMissingFilesAndFolders) {
   EXPECT_THAT(openStructures("/no/such.tenon").error().what, HasSubstr("/no/such.tenon"));
   EXPECT_THAT(writeStructures("/no/such/folder.tenon", structures_).error().what,
               HasSubstr("/no/such/folder"));
@@ -147,4 +147,4 @@ TEST_F(StructureFile, MissingFilesAndFoldersAreNamed) {
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::structures

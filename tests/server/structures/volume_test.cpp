@@ -6,10 +6,10 @@
 
 #include "tests/support/analytic_structures.h"
 
-namespace tenon {
+namespace tenon::structures {
 namespace {
 
-TEST(Volume, OfABoxAndItsInertiaAreThoseOfTheFormula) {
+TEST(Volume, VolumeAndInertiaOfABoxMatchTheFormula) {
   const Vector3 size(0.06, 0.04, 0.10);
   const auto box = test::boxStructures(size, 0.002, 0.01);
   const Volume volume = volumeOf(box->field);
@@ -25,7 +25,7 @@ TEST(Volume, OfABoxAndItsInertiaAreThoseOfTheFormula) {
   EXPECT_LE(Matrix3(volume.inertia_C_M - Matrix3(volume.inertia_C_M.diagonal().asDiagonal())).norm(), 1e-12);
 }
 
-TEST(Volume, OfABallAwayFromItsFrameIsWhereTheBallIs) {
+TEST(Volume, CentroidOfAnOffsetBallIsAtItsCentre) {
   const double radius = 0.03;
   const Vector3 p_MC(0.05, -0.02, 0.01);
   const Eigen::AlignedBox3d box(p_MC - Vector3::Constant(radius), p_MC + Vector3::Constant(radius));
@@ -39,9 +39,9 @@ TEST(Volume, OfABallAwayFromItsFrameIsWhereTheBallIs) {
   EXPECT_LE((volume.inertia_C_M - inertia * Matrix3::Identity()).cwiseAbs().maxCoeff(), 0.01 * inertia);
 }
 
-TEST(Volume, ASheetWithoutThicknessHasNone) {
+TEST(Volume, ASheetWithoutThicknessHasNoVolume) {
   EXPECT_LE(volumeOf(test::sheetStructures(0.1, 0.0, 0.002)->field).volume, 0.1 * 0.1 * 0.002);
 }
 
 }  // namespace
-}  // namespace tenon
+}  // namespace tenon::structures

@@ -22,7 +22,7 @@ class FileReadable {
   }
 }
 
-// the size is known from the chunk, so nothing is allocated on the word of the frame alone
+// the size comes from the chunk: the one in the frame header is not trusted for an allocation
 const decompressHandlers = { zstd: (bytes, size) => decompress(bytes, new Uint8Array(Number(size))) };
 
 function decoderOf(schema) {
@@ -56,8 +56,8 @@ async function main(file) {
       console.log(`${topic.padEnd(20)} ${count}`);
       total += count;
     }
-    const told = Number(recording.statistics.messageCount);
-    if (total !== told) throw new Error(`${total} messages were read, the file counts ${told}`);
+    const counted = Number(recording.statistics.messageCount);
+    if (total !== counted) throw new Error(`${total} messages were read, the file counts ${counted}`);
     console.log(`${"all".padEnd(20)} ${total}`);
   } finally {
     await handle.close();

@@ -1,0 +1,116 @@
+#include "clients/command/command_program.h"
+
+#include <utility>
+
+namespace tenon::command {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+constexpr std::chrono::seconds kPatience{5};  // for an answer
+constexpr milliseconds kResend{500};          // an answer sent before our reader was matched is lost
+
+template <class M>
+Result<void> openWriter(std::unique_ptr<wire::Writer<M>>& writer, wire::Partition& partition,
+                        const wire::Topic<M>& topic) {
+  auto opened = wire::Writer<M>::open(partition, topic);
+  if (!opened) return fail(opened.error().what);
+  writer = std::make_unique<wire::Writer<M>>(std::move(*opened));
+  return {};
+}
+
+/// Dispatches until `done`; false when that does not happen in time.
+bool dispatchUntil(wire::Inbox& inbox, const std::atomic<bool>& stop, Clock::duration timeout,
+                   const std::function<bool()>& done) {
+  const auto until = Clock::now() + timeout;
+  while (!done()) {
+    if (stop || Clock::now() >= until) return false;
+    inbox.dispatch(milliseconds(20));
+  }
+  return true;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<CommandClient>> CommandClient::open(wire::MembershipOptions options,
+                                                           const Stop& stop) {
+  options.passive = true;
+  std::unique_ptr<CommandClient> client(new CommandClient(std::move(options)));
+  if (auto connected = client->connect(stop); !connected) return fail(connected.error().what);
+  return client;
+}
+
+Result<void> CommandClient::connect(const Stop& stop) {
+  auto found = wire::Membership::find(options_, stop);
+  if (!found) return fail(found.error().what);
+  member_ = std::move(*found);
+  if (auto joined = member_->join(stop); !joined) return joined;
+  wire::Partition& session = member_->session();
+  Result<void> all = member_->watch(inbox_);
+  if (all) all = openWriter(commands_, session, wire::kCommand);
+  if (all) all = openWriter(stops_, session, wire::kEmergencyStop);
+  if (all) {
+    all = inbox_.on<CommandAck>(session, wire::kCommandAck, [this](const CommandAck& ack) {
+      if (ack.client == member_->welcome().client) ack_ = ack;
+    });
+  }
+  if (all) {
+    all = inbox_.onFrom<EmergencyStop>(session, wire::kEmergencyStop,
+                                       [this](const EmergencyStop& state, const wire::Origin& from) {
+                                         if (member_->isServer(from)) stopped_ = state.engaged;
+                                       });
+  }
+  if (all) {
+    all = inbox_.on<StepState>(session, wire::kStepState, [this](const StepState& step) {
+      if (step.phase != StepPhase::kActive || step.name == step_) return;
+      step_ = step.name;
+      if (report)
+        report("step " + std::to_string(step.step + 1) + "/" + std::to_string(step.steps) + ": " + step_);
+    });
+  }
+  if (all) all = inbox_.on<RunState>(session, wire::kRunState, [this](const RunState& run) { receive(run); });
+  if (!all) return all;
+  const bool matched = dispatchUntil(inbox_, stop, kPatience, [this] {
+    return commands_->matchedReaders() > 0 && stops_->matchedReaders() > 0 && inbox_.matchedWriters() > 1;
+  });
+  if (!matched) return fail("the server of session '" + member_->sessionName() + "' does not read commands");
+  return {};
+}
+
+void CommandClient::receive(const RunState& run) {
+  if (report && run.reason != run_.reason) report("session: " + run.reason);
+  run_ = run;
+}
+
+bool CommandClient::dispatch(milliseconds timeout) {
+  inbox_.dispatch(timeout);
+  return !member_->lost() && run_.phase < RunPhase::kSucceeded;
+}
+
+Result<void> CommandClient::send(const ParsedCommand& command, const Stop& stop) {
+  if (!command.command) return sendEmergencyStop(command, stop);
+  ack_.reset();
+  const Command message{
+      member_->welcome().client, ++sent_, *command.command, {}, command.text, command.value};
+  const auto until = Clock::now() + kPatience;
+  const auto answered = [&] { return ack_ && ack_->id == message.id; };
+  do {
+    if (stop || Clock::now() >= until) return fail("no answer from the server: it may hang or have ended");
+    if (auto sent = commands_->write(message); !sent) return sent;
+  } while (!dispatchUntil(inbox_, stop, kResend, answered));
+  if (!ack_->accepted) return fail("refused: " + ack_->reason);
+  return {};
+}
+
+/// Received by every device and by the server; the server confirms it by publishing the same state.
+Result<void> CommandClient::sendEmergencyStop(const ParsedCommand& command, const Stop& stop) {
+  const std::string reason = command.text.empty() ? "requested" : command.text;
+  if (auto sent = stops_->write({true, options_.person, reason}); !sent) return sent;
+  if (!dispatchUntil(inbox_, stop, kPatience, [this] { return stopped_; }))
+    return fail(
+        "no answer from the server: the stop was sent to the devices, but the simulation may still run");
+  return {};
+}
+
+}  // namespace tenon::command

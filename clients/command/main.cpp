@@ -1,0 +1,78 @@
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "clients/command/command_program.h"
+
+namespace {
+
+std::atomic<bool> stop{false};
+void onSignal(int /*signal*/) { stop = true; }
+
+struct CommandArguments {
+  tenon::wire::MembershipOptions options{.role = tenon::Role::kInstructor};
+  std::vector<std::string> words;
+  std::vector<std::string> signals;
+  bool keys = false;
+};
+
+void declare(CLI::App& app, CommandArguments& arguments) {
+  const std::vector<std::pair<std::string, tenon::Role>> roles{{"admin", tenon::Role::kAdmin},
+                                                               {"instructor", tenon::Role::kInstructor},
+                                                               {"trainee", tenon::Role::kTrainee}};
+  app.add_option("words", arguments.words, "a command and its arguments, see below");
+  app.add_flag("--keys", arguments.keys, "interactive: each key sends a command, until q");
+  app.add_option("--signal", arguments.signals, "with --keys: the signals that keys 1, 2, ... send");
+  app.add_option("--role", arguments.options.role, "admin, instructor or trainee (default: instructor)")
+      ->transform(CLI::CheckedTransformer(roles))
+      ->option_text("ROLE");
+  app.add_option("--session", arguments.options.session,
+                 "name of the session; default: the first one announced");
+  app.add_option("--domain", arguments.options.domain, "DDS domain, 0 to 230")
+      ->check(CLI::Range(0, 230))
+      ->capture_default_str();
+  app.add_option("--person", arguments.options.person, "name shown to the other participants")
+      ->capture_default_str();
+  app.add_option_function<unsigned>(
+         "--wait",
+         [&arguments](unsigned seconds) { arguments.options.timeout = std::chrono::seconds(seconds); },
+         "seconds to search for a server")
+      ->default_str("10");
+  app.footer(tenon::command::commandHelp());
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Sends commands to a running session.", "tenon command");
+  CommandArguments arguments;
+  arguments.options.person = "command line";
+  declare(app, arguments);
+  CLI11_PARSE(app, argc, argv);
+  const auto printError = [](const std::string& what) {
+    std::fprintf(stderr, "tenon command: %s\n", what.c_str());
+    return 1;
+  };
+  if (!arguments.keys)
+    if (const auto parsed = tenon::command::parseCommand(arguments.words); !parsed)
+      return printError(parsed.error().what);
+  std::signal(SIGINT, onSignal);
+  std::signal(SIGTERM, onSignal);
+  auto client = tenon::command::CommandClient::open(arguments.options, stop);
+  if (!client) return printError(client.error().what);
+  return arguments.keys ? tenon::command::commandByKeys(**client, arguments.signals, stop)
+                        : tenon::command::commandOnce(**client, arguments.words, stop);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& problem) {
+    std::fprintf(stderr, "tenon command: %s\n", problem.what());
+    return 1;
+  }
+}

@@ -1,0 +1,99 @@
+#include "clients/command/parser.h"
+
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
+
+namespace tenon::command {
+
+namespace {
+
+constexpr std::array kCommands{
+    CommandWord{"pause", "", "pauses the simulation", 'p', CommandKind::kPause},
+    CommandWord{"resume", "", "resumes it", 'r', CommandKind::kResume},
+    CommandWord{"fulfilled", "", "fulfils the condition that waits for confirmation by a person", 'f',
+                CommandKind::kFulfilled},
+    CommandWord{"signal", "NAME", "sends an external signal that the scenario waits for", 0,
+                CommandKind::kSignal},
+    CommandWord{"skip", "", "skips the current step", 'n', CommandKind::kSkipStep},
+    CommandWord{"reset", "", "starts the exercise again", 'b', CommandKind::kReset},
+    CommandWord{"swap", "", "swaps the objects that the trainee's two hands move", 'w',
+                CommandKind::kSwapHands},
+    CommandWord{"release", "HAND", "releases the object that this hand holds", 0, CommandKind::kRelease},
+    CommandWord{"collision", "OBJECT OBJECT on|off", "enables or disables collisions of two objects", 0,
+                CommandKind::kSetCollision},
+    CommandWord{"stop", "", "ends the session", 'e', CommandKind::kStop},
+    CommandWord{"emergency", "[REASON]", "emergency stop: all devices display no force, at once", ' ',
+                std::nullopt},
+    CommandWord{"clear", "[REASON]", "clears an emergency stop", 'c', CommandKind::kClearEmergencyStop},
+};
+
+std::string joined(const std::vector<std::string>& words, std::size_t from) {
+  std::string text;
+  for (std::size_t i = from; i < words.size(); ++i) text += (i > from ? " " : "") + words[i];
+  return text;
+}
+
+Result<ParsedCommand> withArguments(const CommandWord& word, const std::vector<std::string>& arguments) {
+  const std::size_t given = arguments.size() - 1;
+  const auto usage = [&] {
+    return fail(fmt::format("usage: {}{}{}", word.word, word.arguments.empty() ? "" : " ", word.arguments));
+  };
+  if (word.arguments.starts_with('[')) return ParsedCommand{word.command, joined(arguments, 1)};
+  if (word.command == CommandKind::kSetCollision) {
+    if (given != 3 || (arguments[3] != "on" && arguments[3] != "off")) return usage();
+    return ParsedCommand{word.command, arguments[1] + " " + arguments[2], arguments[3] == "on" ? 1.0 : 0.0};
+  }
+  if (given != (word.arguments.empty() ? 0U : 1U)) return usage();
+  return ParsedCommand{word.command, joined(arguments, 1)};
+}
+
+}  // namespace
+
+std::span<const CommandWord> commandWords() { return kCommands; }
+
+Result<ParsedCommand> parseCommand(const std::vector<std::string>& arguments) {
+  if (arguments.empty()) return fail("no command given; example: tenon command pause");
+  const auto* const word =
+      std::find_if(kCommands.begin(), kCommands.end(),
+                   [&](const CommandWord& candidate) { return candidate.word == arguments[0]; });
+  if (word == kCommands.end())
+    return fail(fmt::format("unknown command '{}'; tenon command --help lists all", arguments[0]));
+  return withArguments(*word, arguments);
+}
+
+std::optional<ParsedCommand> parseCommand(char key, const std::vector<std::string>& signals) {
+  if (key >= '1' && key <= '9') {
+    const auto number = static_cast<std::size_t>(key - '1');
+    if (number >= signals.size()) return std::nullopt;
+    return ParsedCommand{CommandKind::kSignal, signals[number]};
+  }
+  for (const CommandWord& word : kCommands)
+    if (word.key != 0 && word.key == key) return ParsedCommand{word.command, {}};
+  return std::nullopt;
+}
+
+std::string commandHelp() {
+  std::string help = "Commands:\n";
+  for (const CommandWord& word : kCommands)
+    help += fmt::format("  {:<32}{}\n", fmt::format("{} {}", word.word, word.arguments), word.effect);
+  return help +
+         "\nThe server checks whether the role may give the command. Exit code: 0 when it was accepted, 1 "
+         "when\n"
+         "it was refused or not answered.";
+}
+
+std::string keyLegend(const std::vector<std::string>& signals) {
+  std::string legend;
+  for (const CommandWord& word : kCommands) {
+    if (word.key == 0) continue;
+    const std::string key = word.key == ' ' ? "space" : std::string(1, word.key);
+    legend += fmt::format("  {:<6} {:<10} {}\n", key, word.word, word.effect);
+  }
+  for (std::size_t i = 0; i < signals.size() && i < 9; ++i)
+    legend += fmt::format("  {:<6} {:<10} {}\n", i + 1, "signal", signals[i]);
+  return legend + "  ?      shows these keys\n  q      leaves; the session goes on\n";
+}
+
+}  // namespace tenon::command

@@ -1,0 +1,139 @@
+#include "clients/rehearse/rehearsal.h"
+
+#include <chrono>
+
+#include "idl/types/names.h"
+#include "server/session/publisher.h"
+#include "server/session/session_registry.h"
+#include "server/session/session_server.h"
+
+namespace tenon::rehearse {
+namespace {
+
+constexpr std::uint32_t kServerEpoch = 1;
+
+std::vector<SceneObject> sceneObjects(const simulation::Scene& scene) {
+  std::vector<SceneObject> objects;
+  for (std::uint32_t i = 0; i < scene.objects.size(); ++i)
+    objects.push_back(session::describe(ObjectId{i}, scene.objects[i]));
+  return objects;
+}
+
+class Rehearsal {
+ public:
+  Rehearsal(const session::LoadedScene& loaded, std::vector<std::unique_ptr<haptic::Station>> stations,
+            const RehearsalOptions& options)
+      : options_(options),
+        stations_(std::move(stations)),
+        registry_(*loaded.scenario, kServerEpoch, true, options.seed),
+        simulation_(loaded.scenario, loaded.scene, simulationOptions(loaded, options)),
+        publisher_(loaded.scenario, kServerEpoch, true),
+        objects_(sceneObjects(*loaded.scene)),
+        output_(simulation_.makeOutput()) {}
+
+  Result<RehearsalReport> run() {
+    for (std::size_t i = 0; i < stations_.size(); ++i)
+      if (auto joined = join(i); !joined) return fail(joined.error().what);
+    registry_.takeChanges(input_.changes);
+    if (!options_.collisions) listPairsToDisable();
+    const auto last = static_cast<Tick>(options_.seconds / kTickSeconds);
+    while (!simulation_.over() && simulation_.now() < last && !(options_.stop_when && options_.stop_when()))
+      tick();
+    RehearsalReport report;
+    report.phase = simulation_.phase();
+    report.ticks = simulation_.now();
+    report.final_hash = simulation_.hash();
+    report.reason = reason_;
+    return report;
+  }
+
+ private:
+  static session::SessionSimulationOptions simulationOptions(const session::LoadedScene& loaded,
+                                                             const RehearsalOptions& options) {
+    session::SessionSimulationOptions all;
+    all.environment.workers = options.workers;
+    all.needed_hands = session::traineeHands(*loaded.scenario);
+    return all;
+  }
+
+  Result<void> join(std::size_t i) {
+    haptic::Station& station = *stations_[i];
+    Join request;
+    request.client_guid = std::to_string(i);
+    request.name = std::string(roleName(station.role()));
+    request.role = station.role();
+    request.hands = station.handNames();
+    const Welcome welcome = registry_.join(request, 0);
+    if (!welcome.accepted) return fail(welcome.reason);
+    station.welcome(welcome, objects_);
+    return {};
+  }
+
+  void tick() {
+    const Tick now = simulation_.now() + 1;
+    input_.tick = now;
+    for (const auto& station : stations_) {
+      station->step(static_cast<std::uint32_t>(now));
+      for (const DeviceInput& input : station->inputs())
+        if (const auto reading = registry_.validateDeviceInput(input)) input_.readings.push_back(*reading);
+    }
+    disablePairs();
+    const auto begin = std::chrono::steady_clock::now();
+    simulation_.tick(input_);
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+    simulation_.fill(output_);
+    output_.stats.compute_seconds = took.count();
+    if (options_.on_tick) options_.on_tick(input_, output_);
+    deliver(publisher_.prepare(output_));
+    input_.readings.clear();
+    input_.changes.clear();
+  }
+
+  void listPairsToDisable() {
+    const simulation::Scene& scene = simulation_.environment().scene();
+    const auto isScene = [&](ObjectId id) { return scene.objects[id.value].kind == "scene"; };
+    for (std::uint32_t i = 0; i < scene.pairs.size(); ++i)
+      if (isScene(scene.pairs[i].a) || isScene(scene.pairs[i].b)) pairs_to_disable_.push_back(i);
+  }
+
+  void disablePairs() {
+    while (!pairs_to_disable_.empty() && !input_.changes.full()) {
+      input_.changes.push_back(
+          {.kind = session::ChangeKind::kEnablePair, .index = pairs_to_disable_.back(), .value = 0.0});
+      pairs_to_disable_.pop_back();
+    }
+  }
+
+  void deliver(const session::OutgoingMessages& outgoing) {
+    for (const auto& station : stations_) {
+      if (outgoing.events.step) station->receive(*outgoing.events.step);
+      for (const GrabState& grab : outgoing.events.grabs) station->receive(grab);
+      for (const WorldFrame& frame : outgoing.frames) station->receive(frame);
+      for (const HandManifold* manifold : outgoing.manifolds) station->receive(*manifold);
+    }
+    if (outgoing.events.run) reason_ = outgoing.events.run->reason;
+    if (!options_.on_event) return;
+    for (const EventLog& event : outgoing.events.log) options_.on_event(event);
+  }
+
+  RehearsalOptions options_;
+  std::vector<std::unique_ptr<haptic::Station>> stations_;
+  session::SessionRegistry registry_;
+  session::SessionSimulation simulation_;
+  session::Publisher publisher_;
+  std::vector<SceneObject> objects_;
+  session::TickInput input_;
+  session::TickOutput output_;
+  std::string reason_;
+  std::vector<std::uint32_t> pairs_to_disable_;
+};
+
+}  // namespace
+
+Result<RehearsalReport> runRehearsal(const session::LoadedScene& loaded,
+                                     std::vector<std::unique_ptr<haptic::Station>> stations,
+                                     const RehearsalOptions& options) {
+  return Rehearsal(loaded, std::move(stations), options).run();
+}
+
+}  // namespace tenon::rehearse

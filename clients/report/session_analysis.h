@@ -1,0 +1,108 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "idl/types/messages.h"
+#include "idl/types/result.h"
+
+namespace tenon::report {
+
+/// A value over session time.
+struct SeriesPoint {
+  double time = 0.0;   ///< [s] since tick 0
+  double value = 0.0;  ///< [unit of the series]
+};
+using Series = std::vector<SeriesPoint>;
+
+/// Metrics of a part of a session. Forces are those on the trainee's hands.
+struct SessionMetrics {
+  double peak_force = 0.0;       ///< [N] of the virtual coupling on a hand
+  double mean_force = 0.0;       ///< [N] over the time in which the hand's object was in contact
+  double contact_seconds = 0.0;  ///< [s]
+  double gap = 0.0;              ///< [m] largest distance between device and proxy
+  double depth = 0.0;            ///< [m] largest penetration depth of a pair
+  double load = 0.0;             ///< [%] largest of a pair (paper eq. 2)
+};
+
+/// One visit of a step: from its begin to its end, or to the begin of the next one.
+struct StepVisit {
+  std::uint32_t step = 0;
+  std::uint32_t revision = 0;  ///< of the StepState that began it
+  std::string name;
+  std::string title;
+  std::string part;
+  StepPhase phase = StepPhase::kActive;
+  double begin = 0.0;  ///< [s]
+  double end = 0.0;    ///< [s]
+  SessionMetrics metrics;
+};
+
+/// An entry of the event log, or an event at a station.
+struct SessionEvent {
+  double time = 0.0;  ///< [s]
+  Severity severity = Severity::kInfo;
+  std::string kind;
+  std::string text;
+};
+
+/// A person or program that joined the session.
+struct Participant {
+  std::string name;
+  Role role = Role::kObserver;
+};
+
+/// Latency from an input to the force displayed in answer to it, as measured by one station.
+struct ForceLatency {
+  std::string who;                         ///< name of the participant
+  double p50 = 0.0, p99 = 0.0, max = 0.0;  ///< [s]
+};
+
+/// Analysis of a recorded session for the trainer: steps, events, forces, and real-time performance.
+///
+/// Threads: own it. Real-time: no.
+struct SessionAnalysis {
+  std::string file;
+  std::string problem;  ///< why the file is incomplete; empty: it is complete
+  std::string session;
+  std::string title;
+  std::int64_t began_ns = 0;  ///< since 1970
+  bool lockstep = false;
+  std::vector<Participant> participants;
+  RunState run;
+  bool has_run = false;
+  std::uint32_t steps = 0;  ///< of the exercise
+  std::vector<StepVisit> visits;
+  std::vector<SessionEvent> events;
+  std::vector<std::string> aids;  ///< help the trainee had, one phrase each
+  std::vector<ForceLatency> force_latencies;
+
+  Series trainee_force;     ///< [N] the larger of the two hands
+  Series instructor_force;  ///< [N]
+  Series gap;               ///< [m] between device and proxy, trainee's hands
+  Series depth;             ///< [m] largest penetration depth
+  Series load;              ///< [%]
+  Series compute;           ///< [s] of one tick, sampled at 100 Hz
+  Series compute_max;       ///< [s] largest since the previous sample
+
+  double duration = 0.0;  ///< [s]
+  SessionMetrics whole;
+  double compute_median = 0.0, compute_p99 = 0.0, compute_worst = 0.0;  ///< [s]
+  std::uint64_t late_ticks = 0;
+  double input_age = 0.0;  ///< [s] age of the oldest input that a tick used
+  std::uint64_t messages = 0;
+  std::uint64_t malformed = 0;  ///< messages that could not be decoded
+
+  /// The run succeeded, and every step was done in the recording.
+  [[nodiscard]] bool succeeded() const;
+};
+
+/// Analyses a recording; titles in `language`, or in the first language there is. Of a truncated recording
+/// the part that can be read is analysed and `problem` says so; fails with a sentence when the file holds no
+/// message.
+[[nodiscard]] Result<SessionAnalysis> analyzeRecording(const std::filesystem::path& file,
+                                                       const std::string& language = "en");
+
+}  // namespace tenon::report

@@ -1,0 +1,101 @@
+#include <algorithm>
+#include <limits>
+
+#include "server/collision/island_job.h"
+
+namespace tenon::collision {
+namespace {
+
+/// [m] Cell borders are searched for within this distance of an active contact: about the convergence
+/// tolerance, as a step often ends at a border.
+constexpr double kSeamDistance = 2.0 * kSettleTolerance;
+
+/// [rad] A normal that turns by more than this within that distance does so at a border.
+constexpr double kSeamTurn = 0.02;
+
+/// [-] Where the field's slope is less, the gradient gives no plane.
+constexpr double kMinSeamSlope = 0.3;
+
+/// [m] The plane beyond a border may be deeper than the contact by this: discretisation, not depth.
+constexpr double kSeamDepthNoise = 1e-6;
+
+}  // namespace
+
+bool IslandSolver::findSeam(const Job& job, std::size_t pair, std::size_t c, std::size_t row) {
+  const IslandPair& one = job.pairs[pair];
+  const Contact& contact = job.results[pair].query.contacts[c];
+  const Pose& X_WB = job.poseB(one);
+  Seam seam{pair, c, row, {}};
+  for (const Vector3& t_W : tangentsOf(contact.n_W)) {
+    for (const double offset : {kSeamDistance, -kSeamDistance}) {
+      const structures::FieldSample sample =
+          one.field_B->sample(X_WB.inverse() * (contact.p_WP + offset * t_W));
+      const double slope = sample.gradient.norm();
+      if (!sample.exact || slope < kMinSeamSlope) continue;
+      const Vector3 gradient_W = X_WB.rotation() * sample.gradient;
+      const Vector3 n_W = gradient_W / slope;
+      // on a concave surface both sides hold
+      if (offset * (n_W - contact.n_W).dot(t_W) < kSeamTurn * kSeamDistance) continue;
+      const double gap = sample.distance - one.dilation - offset * gradient_W.dot(t_W);
+      if (gap >= std::min(contact.gap, 0.0) - kSeamDepthNoise) seam.sides.push_back({n_W, gap});
+    }
+  }
+  return !seam.sides.empty() && seams_.push_back(seam);
+}
+
+bool IslandSolver::relaxSeamNormals(const Job& job, SolveReport& report) {
+  seams_.clear();
+  std::size_t pair = 0;
+  std::size_t first = 0;
+  for (const std::uint32_t row : active_) {
+    if (row >= contact_row_count_) break;
+    while (row >= first + job.results[pair].query.contacts.size()) {
+      first += job.results[pair++].query.contacts.size();
+    }
+    findSeam(job, pair, row - first, row);
+  }
+  if (seams_.empty()) return false;
+  // the step if the contacts at seams did not hold
+  FixedVector<std::uint32_t, kMaxSeams> excluded;
+  for (const Seam& seam : seams_) excluded.push_back(static_cast<std::uint32_t>(seam.row));
+  const std::span<Displacement> step(step_without_seams_.data(), job.bodies.size());
+  report.iterations +=
+      motion_.solve(job.bodies, rows_, step, {}, active_, rows_.size(), {excluded.begin(), excluded.size()})
+          .iterations;
+  const std::span<const std::uint32_t> active_without_seams = motion_.activeRows();
+  // outside a convex surface, free space is the union of both half-spaces: the largest slack decides
+  bool changed = false;
+  for (const Seam& seam : seams_) {
+    Contact& contact = job.results[seam.pair].query.contacts[seam.contact];
+    const Vector3 u_W = relativeDisplacement(job, step, job.pairs[seam.pair], contact.p_WP);
+    double largest_slack = contact.gap + contact.n_W.dot(u_W);
+    for (const Seam::Side& side : seam.sides) {
+      const double slack = side.gap + side.n_W.dot(u_W);
+      if (slack <= largest_slack) continue;
+      largest_slack = slack;
+      contact.n_W = side.n_W;
+      contact.gap = side.gap;
+      changed = true;
+    }
+    rows_[seam.row].n_W = contact.n_W;
+    rows_[seam.row].gap = contact.gap;
+  }
+  if (!changed) return false;
+  active_.assign(active_without_seams.begin(), active_without_seams.end());
+  std::sort(active_.begin(), active_.end());
+  solveQp(job, report, seams_[0].row);
+  return true;
+}
+
+Vector3 IslandSolver::relativeDisplacement(const Job& job, std::span<const Displacement> step,
+                                           const IslandPair& pair, const Vector3& p_WP) {
+  Vector3 u_W = Vector3::Zero();
+  for (const auto& [index, sign] : {std::pair{pair.body_a, 1.0}, std::pair{pair.body_b, -1.0}}) {
+    if (index == ContactConstraint::kStatic) continue;
+    const auto i = static_cast<std::size_t>(index);
+    u_W += sign * pointDisplacement(step[i], p_WP - job.bodies[i].X_WB.translation());
+  }
+  return u_W;
+}
+
+}  // namespace tenon::collision

@@ -1,0 +1,116 @@
+#include "server/collision/ridge_correction.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+namespace tenon::collision {
+
+namespace {
+
+/// [voxels] From the point to its probes: far enough to cross the middle of a wall of up to four voxels, and
+/// the surface of a thinner one.
+constexpr double kProbeDistance = 2.0;
+
+/// [voxels] Bound of the interpolation error per unit of the deficit 1 - |gradient|^2. The error is at most
+/// 0.87; a little less than in proportion was best on CAD parts.
+constexpr double kErrorPerDeficit = 0.65;
+
+/// [-] Cosine of 8 degrees.
+constexpr double kSameNormal = 0.99;
+
+/// [voxels] A plane may exceed the interpolation by this: next to a concave edge interpolation is too deep.
+constexpr double kMaxAbove = 0.1;
+
+/// Unit vectors to the corners of a cube rotated by 0.6 rad about (1, 2, 3), so that none is along an axis or
+/// a diagonal of the grid; the other four are their negatives.
+constexpr std::array<std::array<double, 3>, ProbeOffsets::kProbes / 2> kDirections{
+    {{0.43260, 0.73720, 0.51904},
+     {-0.53482, 0.18563, 0.82432},
+     {0.92654, -0.27344, 0.25835},
+     {0.04088, 0.82501, -0.56363}}};
+
+ProbeOffsets probeOffsets(double length) {
+  ProbeOffsets offsets;
+  for (std::size_t k = 0; k < ProbeOffsets::kProbes; ++k) {
+    const auto& [x, y, z] = kDirections[k / 2];
+    const double along = k % 2 == 0 ? length : -length;
+    offsets.x[k] = along * x;
+    offsets.y[k] = along * y;
+    offsets.z[k] = along * z;
+  }
+  return offsets;
+}
+
+Vector3 gradientOf(const TangentPlanes& planes, std::size_t k) {
+  return {planes.gradient_x[k], planes.gradient_y[k], planes.gradient_z[k]};
+}
+
+/// Whether another probe has a plane of about the same normal.
+bool seenBySecondProbe(const TangentPlanes& planes, std::size_t plane) {
+  for (std::size_t k = 0; k < ProbeOffsets::kProbes; ++k) {
+    if (k == plane || planes.distance[k] == kNoPlane) continue;
+    if (gradientOf(planes, k).dot(gradientOf(planes, plane)) > kSameNormal) return true;
+  }
+  return false;
+}
+
+/// Whether 1.5 voxels outside the plane the field has the plane's distance and gradient, as in front of a
+/// face.
+bool continuesOutside(const structures::DistanceField& field, const Vector3& p_BP, double distance,
+                      const Vector3& gradient, double voxel) {
+  const double beyond = 1.5 * voxel;
+  const structures::FieldSample there = field.sample(p_BP + (beyond - distance) * gradient);
+  return there.exact && there.gradient.dot(gradient) > kSameNormal &&
+         std::abs(there.distance - beyond) < 0.1 * voxel;
+}
+
+/// Index of the highest plane that is not above the interpolation, nor below it by more than the error bound;
+/// kProbes if there is none.
+std::size_t highestPlane(const TangentPlanes& planes, double interpolated, double voxel, double deficit) {
+  double best = interpolated - kErrorPerDeficit * deficit * voxel;
+  std::size_t highest = ProbeOffsets::kProbes;
+  for (std::size_t k = 0; k < ProbeOffsets::kProbes; ++k) {
+    if (planes.distance[k] <= best || planes.distance[k] > interpolated + kMaxAbove * voxel) continue;
+    best = planes.distance[k];
+    highest = k;
+  }
+  return highest;
+}
+
+}  // namespace
+
+void correctRidges(const LaneFrame& frame, const QueryKernels& kernels, const PointLanes& points,
+                   std::span<SampleLanes> samples, SampleSums& sums) noexcept {
+  std::array<std::uint32_t, Candidates::kCapacity / structures::ShellBlock::kLanes> non_unit;
+  if (kernels.non_unit_gradients(frame, samples, non_unit.data()) == 0) return;
+  const structures::DistanceField& field = frame.field;
+  const ProbeOffsets offsets = probeOffsets(kProbeDistance * field.voxel());
+  for (std::size_t b = 0; b < samples.size(); ++b) {
+    SampleLanes& block = samples[b];
+    for (; non_unit[b] != 0; non_unit[b] &= non_unit[b] - 1) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(non_unit[b]));
+      const std::size_t i = b * structures::ShellBlock::kLanes + lane;
+      const Vector3 p_BP = frame.inB(Vector3(points.x[i], points.y[i], points.z[i]));
+      const double voxel = field.layout().refinement > 1 ? field.voxelAt(p_BP) : field.voxel();
+      TangentPlanes planes;
+      kernels.tangent_planes(frame, offsets, p_BP, voxel / field.voxel(), planes);
+      const Vector3 interpolated(block.gradient_x[lane], block.gradient_y[lane], block.gradient_z[lane]);
+      const std::size_t highest =
+          highestPlane(planes, block.distance[lane], voxel, 1.0 - interpolated.squaredNorm());
+      if (highest == ProbeOffsets::kProbes) continue;
+      const Vector3 gradient = gradientOf(planes, highest);
+      const double distance = planes.distance[highest];
+      if (!seenBySecondProbe(planes, highest) && !continuesOutside(field, p_BP, distance, gradient, voxel))
+        continue;
+      block.distance[lane] = std::min(distance, block.distance[lane]);
+      block.gradient_x[lane] = gradient.x();
+      block.gradient_y[lane] = gradient.y();
+      block.gradient_z[lane] = gradient.z();
+      sums.smallest_distance = std::min(sums.smallest_distance, block.distance[lane]);
+    }
+  }
+}
+
+}  // namespace tenon::collision

@@ -1,0 +1,103 @@
+#include <bit>
+#include <concepts>
+#include <cstddef>
+#include <string>
+
+#include "server/game_control/state_machine.h"
+
+namespace tenon::game_control {
+namespace {
+
+/// Each number of the state is one 64-bit word when hashed, saved and restored.
+template <typename Number>
+std::uint64_t toWord(const Number& number) {
+  if constexpr (std::same_as<Number, double>) {
+    return std::bit_cast<std::uint64_t>(number);
+  } else {
+    return static_cast<std::uint64_t>(number);
+  }
+}
+
+template <typename Number>
+void fromWord(std::uint64_t word, Number& number) {
+  if constexpr (std::same_as<Number, double>) {
+    number = std::bit_cast<double>(word);
+  } else if constexpr (std::same_as<Number, bool>) {
+    number = word != 0;
+  } else {
+    number = static_cast<Number>(word);
+  }
+}
+
+}  // namespace
+
+template <typename Visitor>
+void StateMachine::visitMemory(Memory& memory, Visitor&& visit) {
+  StepStatus& status = memory.status;
+  visit(status.revision);
+  visit(status.step);
+  visit(status.phase);
+  visit(status.hand.value);
+  visit(status.started);
+  visit(status.changed);
+  visit(status.tick);
+  visit(status.finished);
+  visit(status.failed);
+  visit(status.position_error);
+  visit(status.angle_error);
+  visit(status.contact_seconds);
+  memory.progress.visitMemory(visit);
+  visit(memory.elapsed);
+  visit(memory.contact_ticks);
+  visit(memory.regrab.contact_ticks);
+  visit(memory.regrab.gap_ticks);
+  for (ContactTimer& timer : memory.helpers) {
+    visit(timer.contact_ticks);
+    visit(timer.gap_ticks);
+  }
+}
+
+void StateMachine::addTo(StateHash& hash) const noexcept {
+  Memory copy = memory_;
+  visitMemory(copy, [&hash](const auto& number) { hash.add(toWord(number)); });
+}
+
+std::vector<std::uint8_t> StateMachine::save() const {
+  std::vector<std::uint8_t> bytes;
+  append(bytes);
+  return bytes;
+}
+
+void StateMachine::append(std::vector<std::uint8_t>& bytes) const {
+  Memory copy = memory_;
+  visitMemory(copy, [&bytes](const auto& number) {
+    const std::uint64_t word = toWord(number);
+    for (unsigned shift = 0; shift < 64; shift += 8)
+      bytes.push_back(static_cast<std::uint8_t>(word >> shift));
+  });
+}
+
+Result<void> StateMachine::restore(std::span<const std::uint8_t> bytes) {
+  Memory memory;
+  std::size_t words = 0;
+  visitMemory(memory, [&words](const auto&) { ++words; });
+  if (bytes.size() != words * sizeof(std::uint64_t)) {
+    return fail("state machine: a saved state has " + std::to_string(words * sizeof(std::uint64_t)) +
+                " bytes, this one has " + std::to_string(bytes.size()));
+  }
+  std::size_t at = 0;
+  visitMemory(memory, [&](auto& number) {
+    std::uint64_t word = 0;
+    for (unsigned shift = 0; shift < 64; shift += 8) word |= std::uint64_t{bytes[at++]} << shift;
+    fromWord(word, number);
+  });
+  if (memory.status.step >= scenario_->states.size() || memory.status.phase > StepPhase::kSkipped) {
+    return fail("state machine: a saved state is at step " + std::to_string(memory.status.step) +
+                ", but the scenario has " + std::to_string(scenario_->states.size()));
+  }
+  memory_ = memory;
+  collectReadings();
+  return {};
+}
+
+}  // namespace tenon::game_control

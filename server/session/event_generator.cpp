@@ -1,0 +1,177 @@
+#include "server/session/event_generator.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "server/game_control/state_machine.h"
+
+namespace tenon::session {
+
+SceneObject describe(ObjectId id, const simulation::ObjectSpec& spec) {
+  SceneObject object;
+  object.object = id;
+  object.name = spec.name;
+  object.title = spec.title;
+  object.kind = spec.kind;
+  object.color = spec.color;
+  object.X_WO = spec.X_WO;
+  if (spec.structures == nullptr) return object;
+  object.structure_hash = spec.structures->info.content_hash;
+  object.size = spec.structures->info.box_M.sizes();
+  object.centre = spec.structures->info.box_M.center();
+  return object;
+}
+
+EventGenerator::EventGenerator(std::shared_ptr<const game_control::ScenarioFile> scenario,
+                               std::uint32_t server_epoch)
+    : scenario_(std::move(scenario)), server_epoch_(server_epoch) {}
+
+EventLog EventGenerator::makeEvent(Severity severity, std::string kind, std::string text) {
+  return {++event_count_, tick_, severity, std::move(kind), std::move(text)};
+}
+
+TickEvents EventGenerator::generate(const TickOutput& output) {
+  TickEvents events;
+  tick_ = output.tick;
+  addRun(output, events);
+  addStep(output, events);
+  addObjects(output, events);
+  addHands(output, events);
+  previous_ = output;
+  return events;
+}
+
+void EventGenerator::addRun(const TickOutput& output, TickEvents& events) {
+  if (previous_ && previous_->phase == output.phase && previous_->emergency_stop == output.emergency_stop)
+    return;
+  RunState run;
+  run.phase = output.phase;
+  run.tick = output.tick;
+  run.server_epoch = server_epoch_;
+  switch (output.phase) {
+    case RunPhase::kWaitingForPeople:
+      run.reason = "waiting for people";
+      break;
+    case RunPhase::kRunning:
+      run.reason = output.emergency_stop ? "emergency stop" : "running";
+      break;
+    case RunPhase::kPaused:
+      run.reason = "paused";
+      break;
+    case RunPhase::kSucceeded:
+      run.reason = "everything is mounted";
+      break;
+    case RunPhase::kFailed:
+      run.reason = fmt::format("step '{}' was not done in time", scenario_->states[output.step.step].name);
+      break;
+    case RunPhase::kStopped:
+      run.reason = "stopped";
+      break;
+  }
+  if (output.phase >= RunPhase::kSucceeded) run.final_hash = output.hash;
+  const bool is_error = output.phase == RunPhase::kFailed || output.emergency_stop;
+  events.log.push_back(makeEvent(is_error ? Severity::kError : Severity::kInfo, "run", run.reason));
+  events.run = std::move(run);
+}
+
+void EventGenerator::addStep(const TickOutput& output, TickEvents& events) {
+  if (previous_ && previous_->step.revision == output.step.revision) return;
+  const game_control::ScenarioFile& scenario = *scenario_;
+  if (previous_ && previous_->step.step != output.step.step)
+    events.log.push_back(
+        makeEvent(Severity::kInfo, "step done",
+                  fmt::format("{} ({:.1f} s)", scenario.states[previous_->step.step].name,
+                              static_cast<double>(output.tick - previous_->step.started) * kTickSeconds)));
+  events.step = describe(scenario, output.step);
+  if (output.phase != RunPhase::kWaitingForPeople && output.step.phase == StepPhase::kActive)
+    events.log.push_back(makeEvent(Severity::kInfo, "step", scenario.states[output.step.step].name));
+}
+
+void EventGenerator::addObjects(const TickOutput& output, TickEvents& events) {
+  for (std::size_t i = 0; i < output.objects.size(); ++i) {
+    const ObjectState& now = output.objects[i];
+    const ObjectState* then = previous_ ? &previous_->objects[i] : nullptr;
+    const bool jumped = then == nullptr || then->epoch != now.epoch || then->status != now.status;
+    if (jumped || (output.tick + i) % 1000 == 0) events.snapshots.push_back({output.tick, now});
+    const HandId previous_holder = then != nullptr ? then->holder : HandId{};
+    if (previous_holder != now.holder || (jumped && now.holder.valid())) {
+      GrabState grab{now.object, now.holder, now.epoch, {}, output.tick};
+      if (now.holder.valid()) grab.X_HO = output.manifolds[now.holder.value].X_HO;
+      events.grabs.push_back(grab);
+    }
+    if (then == nullptr) continue;
+
+    const std::string& title = scenario_->objects[i].title.front().text;
+    if (then->status != now.status && now.status == static_cast<std::uint8_t>(ObjectStatus::kFixed))
+      events.log.push_back(makeEvent(Severity::kInfo, "mounted", title));
+    if (then->holder != now.holder) {
+      const HandId hand = now.holder.valid() ? now.holder : then->holder;
+      events.log.push_back(makeEvent(Severity::kInfo, now.holder.valid() ? "taken" : "let go",
+                                     fmt::format("{} ({} hand)", title, scenario_->hands[hand.value].name)));
+    }
+  }
+}
+
+void EventGenerator::addHands(const TickOutput& output, TickEvents& events) {
+  for (std::size_t i = 0; i < output.present.size(); ++i) {
+    const bool was_frozen = previous_ && previous_->present[i] && previous_->manifolds[i].frozen;
+    const bool is_frozen = output.present[i] && output.manifolds[i].frozen;
+    const std::string& name = scenario_->hands[i].name;
+    if (previous_ && previous_->present[i] && !output.present[i])
+      events.log.push_back(makeEvent(Severity::kWarning, "hand gone",
+                                     fmt::format("hand '{}' is absent: the object it held is parked", name)));
+    if (!previous_ || previous_->present[i] != output.present[i]) continue;
+    if (is_frozen && !was_frozen)
+      events.log.push_back(
+          makeEvent(Severity::kWarning, "hand frozen",
+                    fmt::format("hand '{}' is held still (last input {} ms ago)", name, output.ages[i])));
+    if (was_frozen && !is_frozen && output.present[i])
+      events.log.push_back(
+          makeEvent(Severity::kInfo, "hand free", fmt::format("hand '{}' moves again", name)));
+  }
+}
+
+bool FramePacker::contains(const std::vector<WorldFrame>& frames, ObjectId object) {
+  return std::any_of(frames.begin(), frames.end(), [&](const WorldFrame& frame) {
+    return std::any_of(frame.states.begin(), frame.states.end(),
+                       [&](const ObjectState& state) { return state.object == object; });
+  });
+}
+
+void FramePacker::pack(const TickOutput& output, bool all, std::vector<WorldFrame>& frames) {
+  const std::size_t count = output.objects.size();
+  if (poses_.size() != count) {
+    poses_.assign(count, Pose::Identity());
+    epochs_.assign(count, 0);
+  }
+  frames.clear();
+  const auto add = [&](std::size_t i) {
+    if (frames.empty() || frames.back().states.full()) {
+      frames.emplace_back();
+      frames.back().server_epoch = server_epoch_;
+      frames.back().tick = output.tick;
+      frames.back().step_revision = output.step.revision;
+      frames.back().part = static_cast<std::uint32_t>(frames.size() - 1);
+    }
+    frames.back().states.push_back(output.objects[i]);
+    poses_[i] = output.objects[i].X_WO;
+    epochs_[i] = output.objects[i].epoch;
+  };
+  for (std::size_t i = 0; i < count; ++i)
+    if (all || epochs_[i] != output.objects[i].epoch || !(poses_[i] == output.objects[i].X_WO)) add(i);
+
+  // objects at rest, round robin: at least one, and more while the last frame of moved ones has room
+  const bool none_moved = frames.empty();
+  bool refreshed = false;
+  for (std::size_t k = 0; !all && k < count; ++k) {
+    if (refreshed && (none_moved || frames.back().states.full())) break;
+    refreshed_ = (refreshed_ + 1) % static_cast<std::uint32_t>(count);
+    if (contains(frames, ObjectId{refreshed_})) continue;
+    add(refreshed_);
+    refreshed = true;
+  }
+  for (WorldFrame& frame : frames) frame.parts = static_cast<std::uint32_t>(frames.size());
+}
+
+}  // namespace tenon::session

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "idl/types/messages.h"
+#include "server/session/event_generator.h"
+#include "server/session/tick_io.h"
+
+namespace tenon::session {
+
+/// The messages of one tick, by rate tier. Valid until the next call of Publisher::prepare.
+struct OutgoingMessages {
+  std::vector<WorldFrame> frames;  ///< WorldFrame_1k
+  std::vector<WorldFrame>
+      frames_100;                     ///< WorldFrame_100; this and all below: empty in ticks without a sample
+  std::vector<WorldFrame> frames_30;  ///< WorldFrame_30
+  std::vector<const HandManifold*> manifolds;
+  std::vector<ContactPairs> pairs;
+  std::optional<TickStats> stats;
+  std::optional<StepProgress> progress;
+  TickEvents events;
+};
+
+/// Turns the output of each tick into messages of the rate tiers 1 kHz, 100 Hz and 30 Hz. Peaks and maxima of
+/// a slower tier cover all ticks since its last sample.
+///
+/// Threads: one (wire).
+class Publisher {
+ public:
+  /// `complete`: each tick carries all objects and all manifolds (lockstep, where clients wait for them).
+  Publisher(std::shared_ptr<const game_control::ScenarioFile> scenario, std::uint32_t server_epoch,
+            bool complete);
+
+  /// Must be called for every tick, in order: the returned messages cover `output` and the ticks before it.
+  const OutgoingMessages& prepare(const TickOutput& output);
+  [[nodiscard]] EventGenerator& eventGenerator() { return event_generator_; }
+
+ private:
+  /// A collision pair since the last 100 Hz sample.
+  struct PairRecord {
+    PairContact contact;  ///< of the newest tick, with the peaks of all
+    Tick tick = 0;        ///< the newest tick
+    bool due = false;     ///< goes into the next sample: it touched, or is refreshed round robin
+  };
+
+  void addManifolds(const TickOutput& output);
+  void addPairs(const TickOutput& output);
+  void addStats(const TickOutput& output);
+
+  std::shared_ptr<const game_control::ScenarioFile> scenario_;
+  std::uint32_t server_epoch_;
+  bool complete_;
+  EventGenerator event_generator_;
+  FramePacker packer_1k_, packer_100_, packer_30_;
+  OutgoingMessages outgoing_;
+  std::vector<HandManifold> manifolds_;
+  std::map<std::uint32_t, PairRecord> pair_records_;  ///< by index of the pair
+  TickStats stats_peak_;                              ///< since the last sample
+};
+
+}  // namespace tenon::session

@@ -1,0 +1,272 @@
+#include "server/session/session_simulation.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "idl/types/bytes.h"
+
+namespace tenon::session {
+namespace {
+
+/// [points] of ChangeKind::kBudget; 0, no limit, for NaN and numbers below 1.
+std::uint64_t budgetPoints(double value) {
+  constexpr double kMaxPoints = 1e15;
+  return value > 0.0 ? static_cast<std::uint64_t>(std::min(value, kMaxPoints)) : 0;
+}
+
+}  // namespace
+
+SessionSimulation::SessionSimulation(std::shared_ptr<const game_control::ScenarioFile> scenario,
+                                     std::shared_ptr<const simulation::Scene> scene,
+                                     const SessionSimulationOptions& options)
+    : scenario_(std::move(scenario)),
+      environment_(std::move(scene), options.environment),
+      machine_(scenario_),
+      limits_(options.limits),
+      needed_hands_(options.needed_hands),
+      ages_(environment_.hands().size()) {}
+
+void SessionSimulation::tick(const TickInput& input) noexcept {
+  for (const Change& change : input.changes) apply(change);
+  applyReadings(input);
+  applyAgeLimits();
+  if (phase_ == RunPhase::kRunning && !emergency_stop_) {
+    machine_.step(environment_, {commands_.begin(), commands_.size()});
+    if (machine_.status().finished) phase_ = RunPhase::kSucceeded;
+    if (machine_.status().failed) phase_ = RunPhase::kFailed;
+  }
+  // commands received during a pause or emergency stop are deferred to its end
+  if (!isHeld()) commands_.clear();
+  startWhenHandsPresent();
+  environment_.setFreeBodiesPaused(isHeld());
+  environment_.step();
+}
+
+void SessionSimulation::apply(const Change& change) noexcept {
+  switch (change.kind) {
+    case ChangeKind::kAttach:
+      return attach(change.hand);
+    case ChangeKind::kDetach:
+      return detach(change.hand);
+    case ChangeKind::kGameCommand:
+      commands_.push_back(change.game);
+      return;
+    case ChangeKind::kRelease:
+      return environment_.release(change.hand);
+    case ChangeKind::kEnablePair:
+      return environment_.setPairEnabled(change.index, change.value != 0.0);
+    case ChangeKind::kSetEmergencyStop:
+      emergency_stop_ = change.value != 0.0;
+      return;
+    case ChangeKind::kContributeForce:
+      return environment_.contribute(change.object, change.index, change.F_Oo_W, change.lifetime_ticks);
+    case ChangeKind::kPlaceObject:
+      if (change.object.value >= environment_.objects().size()) return;
+      return environment_.place(change.object, change.X_WO,
+                                environment_.objects()[change.object.value].status);
+    case ChangeKind::kPause:
+      if (phase_ == RunPhase::kRunning) phase_ = RunPhase::kPaused;
+      return;
+    case ChangeKind::kResume:
+      if (phase_ == RunPhase::kPaused) phase_ = RunPhase::kRunning;
+      return;
+    case ChangeKind::kStop:
+      if (!over()) phase_ = RunPhase::kStopped;
+      return;
+    case ChangeKind::kBudget:
+      return environment_.setBudget(budgetPoints(change.value));
+  }
+}
+
+void SessionSimulation::attach(HandId hand) noexcept {
+  if (hand.value >= ages_.size()) return;
+  ages_[hand.value] = {.attached = true, .active = true, .age = 0, .seq = 0};
+}
+
+void SessionSimulation::detach(HandId hand) noexcept {
+  if (hand.value >= ages_.size()) return;
+  ages_[hand.value] = {};
+  environment_.setHandPresent(hand, false);
+}
+
+void SessionSimulation::applyReadings(const TickInput& input) noexcept {
+  for (HandAge& age : ages_) ++age.age;
+  for (const HandReading& reading : input.readings) {
+    if (reading.hand.value >= ages_.size()) continue;
+    HandAge& age = ages_[reading.hand.value];
+    if (!age.attached) continue;
+    age.age = 0;
+    age.seq = reading.seq;
+    age.active = reading.active;
+    environment_.setHandPresent(reading.hand, true);
+    environment_.setHandPose(reading.hand, reading.X_WH, reading.V_WH);
+  }
+}
+
+void SessionSimulation::applyAgeLimits() noexcept {
+  for (std::uint32_t i = 0; i < ages_.size(); ++i) {
+    const HandAge& age = ages_[i];
+    if (!age.attached) continue;
+    if (age.age == limits_.park) environment_.setHandPresent(HandId{i}, false);
+    environment_.setHandFrozen(HandId{i}, isHeld() || !age.active || age.age > limits_.freeze);
+  }
+}
+
+void SessionSimulation::startWhenHandsPresent() noexcept {
+  if (phase_ != RunPhase::kWaitingForPeople) return;
+  const auto present = [&](HandId hand) { return environment_.hands()[hand.value].present; };
+  if (!std::all_of(needed_hands_.begin(), needed_hands_.end(), present)) return;
+  phase_ = RunPhase::kRunning;
+  machine_.start(environment_);
+}
+
+std::uint64_t SessionSimulation::hash() const noexcept {
+  StateHash hash;
+  hash.add(environment_.hash());
+  machine_.addTo(hash);
+  for (const HandAge& age : ages_) {
+    hash.add(std::uint64_t{age.attached} | std::uint64_t{age.active} << 1U);
+    hash.add(age.age);
+  }
+  hash.add(std::uint64_t{static_cast<std::uint32_t>(phase_)} | std::uint64_t{emergency_stop_} << 32U);
+  for (const game_control::GameCommand& command : commands_) {
+    hash.add(std::uint64_t{static_cast<std::uint32_t>(command.kind)} | std::uint64_t{command.hand.value}
+                                                                           << 32U);
+    hash.add(std::uint64_t{command.signal});
+    hash.add(command.value);
+  }
+  return hash.value();
+}
+
+TickOutput SessionSimulation::makeOutput() const {
+  TickOutput output;
+  output.objects.resize(environment_.objects().size());
+  output.manifolds.resize(environment_.hands().size());
+  output.present.resize(environment_.hands().size());
+  output.ages.resize(environment_.hands().size());
+  output.pairs.reserve(environment_.contactListCapacity());
+  return output;
+}
+
+void SessionSimulation::fill(TickOutput& output) const noexcept {
+  output.tick = now();
+  output.hash = hash();
+  output.phase = phase_;
+  output.emergency_stop = emergency_stop_;
+  output.step = machine_.status();
+
+  const auto objects = environment_.objects();
+  for (std::uint32_t i = 0; i < objects.size(); ++i) {
+    const simulation::ObjectMotion& motion = objects[i];
+    ObjectState& state = output.objects[i];
+    state.object = ObjectId{i};
+    state.epoch = motion.epoch;
+    state.X_WO = motion.X_WO;
+    state.V_WO << motion.V_WO.linear.cast<float>(), motion.V_WO.angular.cast<float>();
+    state.holder = motion.holder;
+    state.status = static_cast<std::uint8_t>(motion.status);
+    state.in_contact = motion.in_contact;
+  }
+  for (std::uint32_t i = 0; i < ages_.size(); ++i) {
+    output.present[i] = environment_.hands()[i].present;
+    output.ages[i] = static_cast<std::uint32_t>(std::min<Tick>(ages_[i].age, 0xFFFFFFFFU));
+    if (!output.present[i]) continue;
+    HandManifold& manifold = output.manifolds[i];
+    environment_.manifold(HandId{i}, manifold);
+    manifold.tick = output.tick;
+    manifold.answers_seq = ages_[i].seq;
+    manifold.step_revision = output.step.revision;
+  }
+  fillPairs(output);
+
+  const simulation::Environment::Work& work = environment_.work();
+  output.stats.tick = output.tick;
+  output.stats.load_percent = work.load_percent;
+  output.stats.active_pairs = work.active_pairs;
+  output.stats.queried_pairs = work.queried_pairs;
+  output.stats.points_visited = work.points_visited;
+  output.stats.state_hash = output.hash;
+}
+
+void SessionSimulation::fillPairs(TickOutput& output) const noexcept {
+  const auto stateOf = [this](std::size_t pair) {
+    PairState state{static_cast<std::uint32_t>(pair), {}};
+    environment_.pairContact(pair, state.contact);
+    return state;
+  };
+  output.pairs.clear();
+  const auto pairs = environment_.pairs();
+  for (const std::uint32_t pair : environment_.nearPairs()) {
+    if (pairs[pair].result != nullptr) output.pairs.push_back(stateOf(pair));
+  }
+  output.round_robin_pairs.clear();
+  if (output.tick % kPeriod100Hz != 0 || pairs.empty()) return;
+  constexpr std::size_t kSamplesPerSecond = 100;
+  const std::size_t count =
+      std::min((pairs.size() + kSamplesPerSecond - 1) / kSamplesPerSecond, kRoundRobinPairs);
+  const std::size_t first = output.tick / kPeriod100Hz * count;
+  for (std::size_t i = 0; i < count; ++i)
+    output.round_robin_pairs.push_back(stateOf((first + i) % pairs.size()));
+}
+
+void SessionSimulation::save(std::vector<std::uint8_t>& bytes) const {
+  ByteWriter out(bytes);
+  // each section is preceded by its size, which is known only once it is written
+  const auto section = [&](const auto& saved) {
+    const std::size_t at = bytes.size();
+    out.put(std::uint32_t{0});
+    saved.append(bytes);
+    const auto size = static_cast<std::uint32_t>(bytes.size() - at - sizeof(std::uint32_t));
+    std::memcpy(bytes.data() + at, &size, sizeof(size));
+  };
+  out.put(phase_), out.put(emergency_stop_);
+  out.put(static_cast<std::uint32_t>(needed_hands_.size()));
+  for (const HandId hand : needed_hands_) out.put(hand);
+  for (const HandAge& age : ages_)
+    out.put(age.attached), out.put(age.active), out.put(age.age), out.put(age.seq);
+  out.put(static_cast<std::uint32_t>(commands_.size()));
+  for (const game_control::GameCommand& command : commands_)
+    out.put(command.kind), out.put(command.hand), out.put(command.signal), out.put(command.value);
+  section(environment_);
+  section(machine_);
+}
+
+std::size_t SessionSimulation::maxSavedBytes() const {
+  constexpr std::size_t kMaxCommandBytes = 2 * kMaxChanges * sizeof(game_control::GameCommand);
+  std::vector<std::uint8_t> bytes;
+  save(bytes);
+  return environment_.mostSavedBytes() + bytes.size() + kMaxCommandBytes;
+}
+
+Result<void> SessionSimulation::restore(std::span<const std::uint8_t> bytes) {
+  ByteReader in(bytes);
+  in.get(phase_), in.get(emergency_stop_);
+  std::uint32_t needed = 0;
+  in.get(needed);
+  if (needed > ages_.size()) return fail("a checkpoint in the journal is of another scenario");
+  needed_hands_.resize(needed);
+  for (HandId& hand : needed_hands_) {
+    in.get(hand);
+    if (hand.value >= ages_.size()) return fail("a checkpoint in the journal is of another scenario");
+  }
+  for (HandAge& age : ages_) in.get(age.attached), in.get(age.active), in.get(age.age), in.get(age.seq);
+  std::uint32_t commands = 0;
+  in.get(commands);
+  if (commands > 2 * kMaxChanges) return fail("a checkpoint in the journal is damaged");
+  commands_.resize(commands);
+  for (game_control::GameCommand& command : commands_)
+    in.get(command.kind), in.get(command.hand), in.get(command.signal), in.get(command.value);
+  const auto section = [&](auto&& restoreFrom) -> Result<void> {
+    std::uint32_t size = 0;
+    in.get(size);
+    const std::size_t at = in.position();
+    if (!in.ok() || bytes.size() - at < size) return fail("a checkpoint in the journal is truncated");
+    if (auto done = restoreFrom(bytes.subspan(at, size)); !done) return done;
+    in.skip(size);
+    return {};
+  };
+  if (auto done = section([&](auto span) { return environment_.restore(span); }); !done) return done;
+  return section([&](auto span) { return machine_.restore(span); });
+}
+
+}  // namespace tenon::session

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "server/game_control/scenario.h"
+#include "server/game_control/state_machine.h"
+#include "server/session/tick_io.h"
+#include "server/simulation/environment.h"
+
+namespace tenon::session {
+
+/// Reaction to the age of a hand's newest device sample.
+struct LinkLimits {
+  Tick freeze = 50;  ///< [ticks] above this age the hand's object is held still
+  Tick park = 1000;  ///< [ticks] at this age the hand counts as absent and its object is parked
+};
+
+struct SessionSimulationOptions {
+  simulation::EnvironmentOptions environment;
+  LinkLimits limits;
+  /// Hands that must be present before the first state starts. Empty: it starts in the first tick.
+  std::vector<HandId> needed_hands;
+};
+
+/// The deterministic core of a session: scene, state machine, and the hands with the age of their input.
+/// State and TickInput alone determine the next state, so a journal re-simulates to equal hashes.
+///
+/// Threads: one caller. Real-time: tick, fill.
+class SessionSimulation {
+ public:
+  SessionSimulation(std::shared_ptr<const game_control::ScenarioFile> scenario,
+                    std::shared_ptr<const simulation::Scene> scene, const SessionSimulationOptions& options);
+
+  /// One tick (1 ms): applies changes and device samples, freezes or parks hands by the age of their input,
+  /// steps the state machine, then the environment. Ids out of range in `input` are ignored.
+  void tick(const TickInput& input) noexcept;
+
+  /// An output sized for this scene.
+  [[nodiscard]] TickOutput makeOutput() const;
+  /// `output` must come from makeOutput().
+  void fill(TickOutput& output) const noexcept;
+
+  [[nodiscard]] Tick now() const { return environment_.tick(); }
+  [[nodiscard]] RunPhase phase() const { return phase_; }
+  /// Succeeded, failed or stopped.
+  [[nodiscard]] bool over() const { return phase_ >= RunPhase::kSucceeded; }
+  /// Of environment, state machine, input ages, phase, emergency stop and deferred commands.
+  [[nodiscard]] std::uint64_t hash() const noexcept;
+  [[nodiscard]] const simulation::Environment& environment() const { return environment_; }
+  [[nodiscard]] const game_control::StepStatus& step() const { return machine_.status(); }
+  [[nodiscard]] const game_control::ScenarioFile& scenario() const { return *scenario_; }
+
+  /// Appends a checkpoint, the whole changing state, to `bytes`.
+  void save(std::vector<std::uint8_t>& bytes) const;
+  /// Takes a checkpoint of the same scenario back; ticks from then on are bit-equal to those after save().
+  /// When it fails (truncated, of another scenario) the state is undefined until a later restore succeeds.
+  [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
+  /// Upper bound of the size of any checkpoint of this session [bytes].
+  [[nodiscard]] std::size_t maxSavedBytes() const;
+
+ private:
+  struct HandAge {
+    bool attached = false;
+    bool active = false;
+    Tick age = 0;  ///< [ticks] since the last device sample
+    std::uint32_t seq = 0;
+  };
+
+  void apply(const Change& change) noexcept;
+  void fillPairs(TickOutput& output) const noexcept;
+  void applyReadings(const TickInput& input) noexcept;
+  void applyAgeLimits() noexcept;
+  void startWhenHandsPresent() noexcept;
+  /// No hand moves an object: emergency stop or pause.
+  [[nodiscard]] bool isHeld() const { return emergency_stop_ || phase_ == RunPhase::kPaused; }
+  void attach(HandId hand) noexcept;
+  void detach(HandId hand) noexcept;
+
+  std::shared_ptr<const game_control::ScenarioFile> scenario_;
+  simulation::Environment environment_;
+  game_control::StateMachine machine_;
+  LinkLimits limits_;
+  std::vector<HandId> needed_hands_;
+  std::vector<HandAge> ages_;
+  /// Commands for the next step of the state machine: those deferred by pause or emergency stop, and those of
+  /// this tick.
+  FixedVector<game_control::GameCommand, 2 * kMaxChanges> commands_;
+  RunPhase phase_ = RunPhase::kWaitingForPeople;
+  bool emergency_stop_ = false;
+};
+
+}  // namespace tenon::session

@@ -1,0 +1,141 @@
+#pragma once
+
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <random>
+#include <string>
+
+#include "idl/record/mcap_writer.h"
+#include "idl/wire/codec.h"
+#include "idl/wire/topics.h"
+
+namespace tenon::test {
+
+/// Parameters of a synthetic session.
+struct SyntheticSession {
+  bool succeeds = true;
+  bool skips_a_step = false;
+  std::uint32_t steps = 4;
+  Tick ticks_per_step = 2000;
+  double peak_force = 18.0;  ///< [N] in the last step, for one tick
+};
+
+/// Writes the recording of a synthetic session: a trainee takes and inserts parts with contact in each step,
+/// and an instructor helps in one. All its numbers are known.
+class SyntheticRecording {
+ public:
+  SyntheticRecording(const std::filesystem::path& file, const SyntheticSession& parameters)
+      : parameters_(parameters), writer_(std::move(*record::McapWriter::open(file))) {
+    put(wire::kSessionAnnounce, SessionAnnounce{.session = "demo", .title = "Engine <bay>"});
+    put(wire::kPresence,
+        Presence{.client = ClientId{1}, .name = "Grace", .role = Role::kTrainee, .hands = {HandId{0}}});
+    put(wire::kPresence,
+        Presence{.client = ClientId{2}, .name = "Mikel", .role = Role::kInstructor, .hands = {HandId{1}}});
+    put(wire::kSceneObject, SceneObject{.object = ObjectId{0}, .name = "bay", .kind = "scene"});
+    put(wire::kSceneObject, SceneObject{.object = ObjectId{2}, .name = "cube", .kind = "assistant"});
+    put(wire::kEventLog, EventLog{8, 0, Severity::kInfo, "taken", "cube (instructor hand)"});
+    const Tick end = parameters_.ticks_per_step * parameters_.steps;
+    for (tick_ = 1; tick_ <= end; ++tick_) tick();
+    put(wire::kTelemetry, Telemetry{ClientId{1}, 0.003, 0.006, 0.011, 0.0, 0, 1000});
+    put(wire::kRunState,
+        RunState{.phase = parameters_.succeeds ? RunPhase::kSucceeded : RunPhase::kFailed,
+                 .tick = end,
+                 .reason = parameters_.succeeds ? "all steps done" : "a step was not done in time",
+                 .final_hash = 0xFEED});
+    static_cast<void>(writer_.close());
+  }
+
+ private:
+  template <class M>
+  void put(const wire::Topic<M>& topic, const M& message) {
+    auto [channel, is_new] = channels_.try_emplace(topic.name, 0);
+    if (is_new) channel->second = writer_.addChannel(topic.name, wire::typeName<M>(), wire::idlText());
+    constexpr std::int64_t kStart = 1'790'000'000'000'000'000;
+    static_cast<void>(writer_.write(channel->second, kStart + static_cast<std::int64_t>(tick_) * 1'000'000, 0,
+                                    *wire::encode(message)));
+  }
+
+  void tick() {
+    const Tick in_step = (tick_ - 1) % parameters_.ticks_per_step;
+    const auto step = static_cast<std::uint32_t>((tick_ - 1) / parameters_.ticks_per_step);
+    if (in_step == 0) beginStep(step);
+    // contact in the second half of each step
+    const double pressed = std::max(
+        0.0, 2.0 * static_cast<double>(in_step) / static_cast<double>(parameters_.ticks_per_step) - 1.0);
+    double force = 12.0 * std::sin(3.14159 * pressed) + (pressed > 0.0 ? noise() : 0.0);
+    if (tick_ == parameters_.ticks_per_step * parameters_.steps - 1) force = parameters_.peak_force;
+    if (tick_ % 10 == 0) addPairs(pressed > 0.0, step, force);
+    manifold(HandId{0}, ObjectId{1}, force);
+    manifold(HandId{1}, ObjectId{2}, step == 2 ? 4.0 * std::sin(3.14159 * pressed) : 0.0);
+    if (tick_ % 10 == 0) addStats(pressed);
+    if (tick_ % 33 == 0)
+      put(wire::kStepProgress,
+          StepProgress{.revision = step + 1, .tick = tick_, .contact_seconds = 1e-3 * pressed * 1000.0});
+  }
+
+  void beginStep(std::uint32_t step) {
+    if (parameters_.skips_a_step && step == 1) put(wire::kStepState, stepState(0, StepPhase::kSkipped));
+    put(wire::kStepState, stepState(step, StepPhase::kActive));
+    if (step > 0)
+      put(wire::kEventLog, EventLog{step, tick_, Severity::kInfo, "mounted", "Part " + std::to_string(step)});
+    if (step == 2)
+      put(wire::kEventLog,
+          EventLog{9, tick_ + 900, Severity::kWarning, "hand frozen", "hand 'right' is held still"});
+  }
+  StepState stepState(std::uint32_t step, StepPhase phase) const {
+    return {
+        .revision = step + 1,
+        .step = step,
+        .steps = parameters_.steps,
+        .name = "step_" + std::to_string(step),
+        .title = {{"de", "Teil einsetzen"}, {"en", step % 2 == 0 ? "Take the control box" : "Slide it in"}},
+        .phase = phase,
+        .part = "Control box",
+        .started = step * parameters_.ticks_per_step};
+  }
+  /// `force` [N] on the hand.
+  void manifold(HandId hand, ObjectId object, double force) {
+    HandManifold m;
+    m.hand = hand;
+    m.object = object;
+    m.tick = tick_;
+    m.stiffness = 1000.0;
+    m.F_Ho_W.force = Vector3(0.0, 0.0, force);
+    put(wire::kHandManifold, m);
+  }
+  /// `force` [N] sets the penetration depth of the pair.
+  void addPairs(bool colliding, std::uint32_t step, double force) {
+    ContactPairs pairs;
+    pairs.tick = tick_;
+    PairContact part;
+    part.a = ObjectId{1};
+    part.b = ObjectId{0};
+    part.colliding = colliding;
+    part.peak_depth = colliding ? 0.00004 * std::abs(force) : 0.0;
+    if (colliding) pairs.pairs.push_back(part);
+    if (colliding && step == 2)
+      pairs.pairs.push_back({.a = ObjectId{2}, .b = ObjectId{1}, .colliding = true});
+    if (!pairs.pairs.empty()) put(wire::kContactPairs100, pairs);
+  }
+  /// `pressed` [-]: how far the contact of the step is over, 0 to 1.
+  void addStats(double pressed) {
+    TickStats stats;
+    stats.tick = tick_;
+    stats.load_percent = 3.0 + 60.0 * pressed;
+    stats.compute_seconds = 2e-4 + 3e-4 * pressed + 2e-5 * std::abs(noise());
+    stats.compute_seconds_max = stats.compute_seconds + (tick_ == 3000 ? 7e-3 : 5e-5);
+    stats.late_ticks = tick_ >= 3000 ? 2 : 0;
+    stats.input_age_seconds = 0.002;
+    put(wire::kTickStats100, stats);
+  }
+  double noise() { return 2.0 * static_cast<double>(random_() % 1000) / 1000.0 - 1.0; }
+
+  SyntheticSession parameters_;
+  record::McapWriter writer_;
+  std::map<std::string_view, std::uint16_t> channels_;
+  Tick tick_ = 0;
+  std::mt19937_64 random_{5};
+};
+
+}  // namespace tenon::test

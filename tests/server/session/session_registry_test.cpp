@@ -1,0 +1,397 @@
+#include "server/session/session_registry.h"
+
+#include <limits>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/server/session/small_session.h"
+
+namespace tenon::session {
+namespace {
+
+using test::kInstructorHand;
+using test::kLeftHand;
+using test::kRightHand;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr std::uint32_t kEpoch = 77;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+class SessionRegistryTest : public ::testing::Test {
+ protected:
+  Welcome join(const std::string& guid, Role role, std::vector<std::string> hands = {},
+               const std::string& token = {}) {
+    return registry_.join({guid, guid + "'s station", role, std::move(hands), token}, 5);
+  }
+  FixedVector<Change, kMaxChanges> changes() {
+    FixedVector<Change, kMaxChanges> taken;
+    registry_.takeChanges(taken);
+    return taken;
+  }
+  CommandAck command(ClientId client, CommandKind kind, const std::string& text = {}, double value = 0.0,
+                     HandId hand = {}) {
+    return registry_.handleCommand({client, ++commands_, kind, hand, text, value});
+  }
+  static DeviceInput input(ClientId client, HandId hand) {
+    DeviceInput all{.hand = hand, .client = client, .server_epoch = kEpoch, .active = true};
+    all.samples[0] = {.seq = 9, .X_WH = Pose(Vector3(0.1, 0.2, 0.3)), .buttons = 1};
+    return all;
+  }
+
+  LoadedScene loaded_ = test::smallSession();
+  SessionRegistry registry_{*loaded_.scenario, kEpoch, false, 1};
+  std::uint32_t commands_ = 0;
+};
+
+TEST_F(SessionRegistryTest, AcceptsATraineeAndAttachesItsHands) {
+  EXPECT_THAT(registry_.freeHands(), ElementsAre("right", "instructor", "left"));
+  const Welcome welcome = join("a", Role::kTrainee, {"left", "right"});
+  ASSERT_TRUE(welcome.accepted) << welcome.reason;
+  EXPECT_EQ(welcome.client, ClientId{1});
+  EXPECT_THAT(welcome.hands, ElementsAre(test::kLeftHand, test::kRightHand)) << "in the requested order";
+  EXPECT_EQ(welcome.client_guid, "a");
+  EXPECT_EQ(welcome.server_epoch, kEpoch);
+  EXPECT_EQ(welcome.tick, 5U);
+  EXPECT_EQ(registry_.controllerOf(test::kRightHand), welcome.client);
+  EXPECT_TRUE(registry_.isRolePresent(Role::kTrainee));
+  EXPECT_THAT(registry_.freeHands(), ElementsAre("instructor"));
+
+  const auto taken = changes();
+  ASSERT_EQ(taken.size(), 2U);
+  EXPECT_EQ(taken[0].kind, ChangeKind::kAttach);
+  EXPECT_EQ(taken[0].hand, test::kLeftHand);
+  EXPECT_EQ(taken[1].hand, test::kRightHand);
+  EXPECT_TRUE(changes().empty()) << "each change is taken once";
+}
+
+TEST_F(SessionRegistryTest, RefusesWithAReason) {
+  Join old{.client_guid = "old", .role = Role::kObserver, .protocol_version = kProtocolVersion + 1};
+  EXPECT_THAT(registry_.join(old, 0).reason, HasSubstr("protocol version"));
+  EXPECT_THAT(join("b", Role::kTrainee, {"instructor"}).reason, HasSubstr("belongs to the instructor"));
+  EXPECT_THAT(join("c", Role::kObserver, {"right"}).reason, HasSubstr("belongs to the trainee"));
+  EXPECT_THAT(join("d", static_cast<Role>(99)).reason, HasSubstr("role"));
+  EXPECT_THAT(join("", Role::kObserver).reason, HasSubstr("client_guid"));
+  ASSERT_TRUE(join("e", Role::kTrainee, {"right"}).accepted);
+  const Welcome late = join("f", Role::kTrainee, {"left", "right"});
+  EXPECT_FALSE(late.accepted);
+  EXPECT_THAT(late.reason, HasSubstr("'right' is already moved"));
+  EXPECT_FALSE(late.client.valid());
+  EXPECT_FALSE(registry_.controllerOf(test::kLeftHand).valid()) << "a refused client gets none of the hands";
+  EXPECT_EQ(registry_.clients().size(), 1U);
+}
+
+TEST_F(SessionRegistryTest, AHandTheScenarioDoesNotHaveHasAnInvalidIdInItsPlace) {
+  const Welcome welcome = join("a", Role::kTrainee, {"head", "right", "arm"});
+  ASSERT_TRUE(welcome.accepted) << welcome.reason;
+  EXPECT_THAT(welcome.hands, ElementsAre(HandId{}, test::kRightHand, HandId{}));
+  EXPECT_EQ(changes().size(), 1U);
+}
+
+TEST_F(SessionRegistryTest, ARepeatedJoinGetsTheSameAnswer) {
+  const Welcome first = join("a", Role::kTrainee, {"right"});
+  const Welcome again = join("a", Role::kTrainee, {"right"});
+  EXPECT_TRUE(again.accepted);
+  EXPECT_EQ(again.client, first.client);
+  EXPECT_EQ(again.token, first.token);
+  EXPECT_EQ(again.hands, first.hands);
+  EXPECT_EQ(registry_.clients().size(), 1U);
+  EXPECT_EQ(changes().size(), 1U) << "the hand is attached once";
+}
+
+TEST_F(SessionRegistryTest, ATokenRejoinsAsTheSameClient) {
+  const Welcome first = join("a", Role::kTrainee, {"right"});
+  const Welcome other = join("b", Role::kObserver);
+  ASSERT_NE(first.token, other.token);
+  registry_.leave(first.client);
+  EXPECT_EQ(join("c", Role::kTrainee, {"right"}, first.token).client, first.client);
+  EXPECT_EQ(registry_.guidOf(first.client), "c");
+
+  // a station that was restarted before its former process was noticed to be gone
+  (void)changes();
+  const Welcome again = join("d", Role::kTrainee, {"right"}, first.token);
+  EXPECT_TRUE(again.accepted) << again.reason;
+  EXPECT_EQ(again.client, first.client);
+  const auto taken = changes();
+  ASSERT_EQ(taken.size(), 2U);
+  EXPECT_EQ(taken[0].kind, ChangeKind::kDetach);
+  EXPECT_EQ(taken[1].kind, ChangeKind::kAttach);
+  EXPECT_EQ(registry_.clients().size(), 2U);
+
+  EXPECT_EQ(join("e", Role::kObserver, {}, "no such token").client, ClientId{3});
+}
+
+TEST_F(SessionRegistryTest, AClientThatLeavesFreesItsHands) {
+  const Welcome welcome = join("a", Role::kTrainee, {"right", "left"});
+  (void)changes();
+  registry_.leave(welcome.client);
+  registry_.leave(welcome.client);
+  registry_.leave(ClientId{99});
+  registry_.leave(ClientId{});
+  const auto taken = changes();
+  ASSERT_EQ(taken.size(), 2U);
+  EXPECT_EQ(taken[0].kind, ChangeKind::kDetach);
+  EXPECT_FALSE(registry_.findClient(welcome.client)->alive);
+  EXPECT_FALSE(registry_.isRolePresent(Role::kTrainee));
+  EXPECT_FALSE(registry_.validateDeviceInput(input(welcome.client, test::kRightHand)));
+  EXPECT_FALSE(command(welcome.client, CommandKind::kFulfilled).accepted);
+  EXPECT_TRUE(join("b", Role::kTrainee, {"right"}).accepted);
+}
+
+TEST_F(SessionRegistryTest, AcceptsDeviceInputOfAControlledHand) {
+  const ClientId client = join("a", Role::kTrainee, {"right"}).client;
+  const auto reading = registry_.validateDeviceInput(input(client, test::kRightHand));
+  ASSERT_TRUE(reading) << reading.error().what;
+  EXPECT_EQ(reading->hand, test::kRightHand);
+  EXPECT_EQ(reading->seq, 9U);
+  EXPECT_TRUE(reading->active);
+  EXPECT_EQ(reading->buttons, 1U);
+  EXPECT_EQ(reading->X_WH.translation(), Vector3(0.1, 0.2, 0.3));
+}
+
+TEST_F(SessionRegistryTest, ARepeatedCommandGetsTheFormerAckAndIsNotAppliedAgain) {
+  const Welcome welcome = join("b", Role::kInstructor);
+  const ClientId instructor = welcome.client;
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const Command pause{instructor, 7, CommandKind::kPause};
+  EXPECT_EQ(registry_.previousAck(pause), nullptr);
+  EXPECT_TRUE(registry_.handleCommand(pause).accepted);
+  registry_.updatePhase(RunPhase::kPaused, false);
+  ASSERT_NE(registry_.previousAck(pause), nullptr);
+  EXPECT_TRUE(registry_.previousAck(pause)->accepted) << "although a new command would be refused now";
+  EXPECT_EQ(registry_.previousAck({instructor, 8, CommandKind::kPause}), nullptr);
+  EXPECT_EQ(registry_.previousAck({ClientId{9}, 7, CommandKind::kPause}), nullptr);
+  registry_.leave(instructor);
+  ASSERT_EQ(join("c", Role::kInstructor, {}, welcome.token).client, instructor);
+  EXPECT_EQ(registry_.previousAck(pause), nullptr) << "a rejoined client numbers its commands anew";
+}
+
+TEST_F(SessionRegistryTest, CommandsBetweenTwoTicksAreJudgedByThePendingPhase) {
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  registry_.updatePhase(RunPhase::kRunning, false);
+  EXPECT_TRUE(command(instructor, CommandKind::kPause).accepted);
+  registry_.updatePhase(RunPhase::kRunning, false);  // of a tick that was computed before
+  EXPECT_THAT(command(instructor, CommandKind::kPause).reason, HasSubstr("paused already"));
+  EXPECT_TRUE(command(instructor, CommandKind::kResume).accepted);
+  EXPECT_THAT(command(instructor, CommandKind::kResume).reason, HasSubstr("not paused"));
+  registry_.updatePhase(RunPhase::kPaused, false);
+  registry_.updatePhase(RunPhase::kRunning, false);
+  EXPECT_TRUE(command(instructor, CommandKind::kPause).accepted);
+  registry_.updatePhase(RunPhase::kStopped, false);
+  EXPECT_THAT(command(instructor, CommandKind::kResume).reason, HasSubstr("over"));
+}
+
+TEST_F(SessionRegistryTest, RefusesDeviceInputForHandsOfOthers) {
+  const ClientId client = join("a", Role::kTrainee, {"right"}).client;
+  const ClientId instructor = join("b", Role::kInstructor, {"instructor"}).client;
+  DeviceInput stale = input(client, test::kRightHand);
+  stale.server_epoch = kEpoch - 1;
+  EXPECT_THAT(registry_.validateDeviceInput(stale).error().what, HasSubstr("earlier run"));
+  EXPECT_THAT(registry_.validateDeviceInput(input(client, test::kInstructorHand)).error().what,
+              HasSubstr("not its own"));
+  EXPECT_THAT(registry_.validateDeviceInput(input(instructor, test::kRightHand)).error().what,
+              HasSubstr("not its own"));
+  EXPECT_THAT(registry_.validateDeviceInput(input(client, test::kLeftHand)).error().what,
+              HasSubstr("not its own"));
+  EXPECT_THAT(registry_.validateDeviceInput(input(client, HandId{17})).error().what,
+              HasSubstr("does not have"));
+  EXPECT_FALSE(registry_.validateDeviceInput(input(client, HandId{})));
+  EXPECT_FALSE(registry_.validateDeviceInput(input(ClientId{}, test::kLeftHand)))
+      << "an invalid id does not control a free hand";
+}
+
+TEST_F(SessionRegistryTest, RefusesImplausiblePosesAndVelocities) {
+  const ClientId client = join("a", Role::kTrainee, {"right"}).client;
+  const auto refuses = [&](auto&& corrupt) {
+    DeviceInput bad = input(client, test::kRightHand);
+    corrupt(bad.samples[0]);
+    return !registry_.validateDeviceInput(bad);
+  };
+  EXPECT_TRUE(refuses([](DeviceSample& s) { s.X_WH = Pose(Vector3(kNan, 0, 0)); }));
+  EXPECT_TRUE(refuses([](DeviceSample& s) { s.X_WH = Pose(Vector3(1e9, 0, 0)); }));
+  EXPECT_TRUE(refuses([](DeviceSample& s) { s.X_WH = Pose(Vector3::Zero(), Quaternion(0, 0, 0, 0)); }));
+  EXPECT_TRUE(refuses([](DeviceSample& s) { s.X_WH = Pose(Vector3::Zero(), Quaternion(1, 1, 0, 0)); }));
+  EXPECT_TRUE(refuses([](DeviceSample& s) { s.V_WH.linear = Vector3(0, kNan, 0); }));
+  EXPECT_TRUE(refuses([](DeviceSample& s) { s.V_WH.linear = Vector3(0, 1e300, 0); }));
+  EXPECT_TRUE(refuses([](DeviceSample& s) { s.V_WH.angular = Vector3(0, 0, 1e4); }));
+  EXPECT_FALSE(refuses([](DeviceSample& s) { s.V_WH.angular = Vector3(0, 0, 10); }));
+}
+
+TEST_F(SessionRegistryTest, CommandsArePermittedByRole) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId trainee = join("a", Role::kTrainee, {"right"}).client;
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  const ClientId observer = join("c", Role::kObserver).client;
+  const ClientId recorder = join("d", Role::kRecorder).client;
+  (void)changes();
+  EXPECT_EQ(command(ClientId{}, CommandKind::kFulfilled).reason, "join first");
+  EXPECT_THAT(command(observer, CommandKind::kFulfilled).reason, HasSubstr("not permitted for the observer"));
+  EXPECT_THAT(command(recorder, CommandKind::kStop).reason, HasSubstr("not permitted for the recorder"));
+  for (const CommandKind kind : {CommandKind::kPause, CommandKind::kResume, CommandKind::kReset,
+                                 CommandKind::kSkipStep, CommandKind::kStop, CommandKind::kSetCollision}) {
+    EXPECT_THAT(command(trainee, kind, "part bay").reason, HasSubstr("ask the instructor"));
+    registry_.updatePhase(kind == CommandKind::kResume ? RunPhase::kPaused : RunPhase::kRunning, false);
+    EXPECT_TRUE(command(instructor, kind, "part bay").accepted);
+  }
+  EXPECT_EQ(changes().size(), 6U);
+  EXPECT_TRUE(command(trainee, CommandKind::kFulfilled).accepted);
+  EXPECT_THAT(command(instructor, static_cast<CommandKind>(99)).reason, HasSubstr("unknown command"));
+
+  const CommandAck ack = command(instructor, CommandKind::kPause);
+  EXPECT_EQ(ack.client, instructor);
+  EXPECT_EQ(ack.id, commands_) << "the ack carries the id of its command";
+}
+
+TEST_F(SessionRegistryTest, NamesInCommandsAreResolvedToIndices) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId instructor = join("a", Role::kInstructor).client;
+  EXPECT_THAT(command(instructor, CommandKind::kSignal, "whistle").reason, HasSubstr("'whistle'"));
+  EXPECT_TRUE(command(instructor, CommandKind::kSignal, "bell").accepted);
+  for (const std::string wrong : {"", "part", "part nothing", "part part", " ", "part  bay"})
+    EXPECT_FALSE(command(instructor, CommandKind::kSetCollision, wrong).accepted) << wrong;
+  EXPECT_TRUE(command(instructor, CommandKind::kSetCollision, "bay part", 0.0).accepted);
+
+  const auto taken = changes();
+  ASSERT_EQ(taken.size(), 2U);
+  EXPECT_EQ(taken[0].kind, ChangeKind::kGameCommand);
+  EXPECT_EQ(taken[0].game.kind, CommandKind::kSignal);
+  EXPECT_EQ(loaded_.scenario->signals[taken[0].game.signal], "bell");
+  EXPECT_EQ(taken[1].kind, ChangeKind::kEnablePair);
+  const game_control::ScenarioPair& pair = loaded_.scenario->pairs[taken[1].index];
+  EXPECT_EQ(pair.a.value + pair.b.value, 1U) << "bay is object 0, part object 1";
+  EXPECT_EQ(taken[1].value, 0.0);
+}
+
+TEST_F(SessionRegistryTest, AClientReleasesAndSwapsOnlyHandsItControls) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId one = join("a", Role::kTrainee, {"right"}).client;
+  const ClientId other = join("b", Role::kTrainee, {"left"}).client;
+  const ClientId instructor = join("c", Role::kInstructor, {"instructor"}).client;
+  EXPECT_TRUE(command(one, CommandKind::kRelease, {}, 0.0, test::kRightHand).accepted);
+  EXPECT_FALSE(command(other, CommandKind::kRelease, {}, 0.0, test::kRightHand).accepted);
+  EXPECT_TRUE(command(instructor, CommandKind::kRelease, {}, 0.0, test::kRightHand).accepted);
+  EXPECT_FALSE(command(instructor, CommandKind::kRelease, {}, 0.0, HandId{17}).accepted);
+  EXPECT_FALSE(command(one, CommandKind::kSwapHands, {}, kNan).accepted)
+      << "the other hand is controlled by another client";
+  EXPECT_TRUE(command(instructor, CommandKind::kSwapHands).accepted);
+  registry_.leave(other);
+  registry_.leave(one);
+  const ClientId both = join("d", Role::kTrainee, {"right", "left"}).client;
+  EXPECT_TRUE(command(both, CommandKind::kSwapHands).accepted);
+}
+
+TEST_F(SessionRegistryTest, ExternalForcesAreLimited) {
+  const ClientId trainee = join("a", Role::kTrainee).client;
+  const ClientId observer = join("b", Role::kObserver).client;
+  const ForceContribution push{.source = 4,
+                               .client = trainee,
+                               .object = ObjectId{1},
+                               .F_Oo_W = {Vector3(0, 0, 5), Vector3::Zero()},
+                               .lifetime_ticks = 1'000'000};
+  const auto change = registry_.validateForceContribution(push);
+  ASSERT_TRUE(change) << change.error().what;
+  EXPECT_EQ(change->kind, ChangeKind::kContributeForce);
+  EXPECT_EQ(change->object, ObjectId{1});
+  EXPECT_EQ(change->index, 4U);
+  EXPECT_EQ(change->lifetime_ticks, 100U) << "the force of a source that has ended expires";
+  EXPECT_EQ(change->F_Oo_W.force, Vector3(0, 0, 5));
+
+  const auto refuses = [&](auto&& corrupt) {
+    ForceContribution bad = push;
+    corrupt(bad);
+    return !registry_.validateForceContribution(bad);
+  };
+  EXPECT_TRUE(refuses([&](ForceContribution& f) { f.client = observer; }));
+  EXPECT_TRUE(refuses([&](ForceContribution& f) { f.client = ClientId{9}; }));
+  EXPECT_TRUE(refuses([&](ForceContribution& f) { f.object = ObjectId{99}; }));
+  EXPECT_TRUE(refuses([&](ForceContribution& f) { f.object = {}; }));
+  EXPECT_TRUE(refuses([&](ForceContribution& f) { f.F_Oo_W.force = Vector3(0, 0, 201); }));
+  EXPECT_TRUE(refuses([&](ForceContribution& f) { f.F_Oo_W.torque = Vector3(0, kNan, 0); }));
+}
+
+TEST_F(SessionRegistryTest, OnlyWithInstructorRightsObjectsArePlaced) {
+  const ClientId trainee = join("a", Role::kTrainee).client;
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  const ExternalPose pose{.object = ObjectId{1}, .client = instructor, .X_WO = Pose(Vector3(1, 0, 0))};
+  ASSERT_TRUE(registry_.validateExternalPose(pose));
+  EXPECT_EQ(registry_.validateExternalPose(pose)->kind, ChangeKind::kPlaceObject);
+  ExternalPose bad = pose;
+  bad.client = trainee;
+  EXPECT_FALSE(registry_.validateExternalPose(bad));
+  bad = pose;
+  bad.object = ObjectId{99};
+  EXPECT_FALSE(registry_.validateExternalPose(bad));
+  bad = pose;
+  bad.X_WO = Pose(Vector3(0, 0, kNan));
+  EXPECT_FALSE(registry_.validateExternalPose(bad));
+}
+
+TEST_F(SessionRegistryTest, ChangesBeyondTheCapacityOfATickWaitForTheNext) {
+  for (int i = 0; i < 40; ++i) registry_.setEmergencyStop({.engaged = i % 2 == 0});
+  EXPECT_EQ(changes().size(), kMaxChanges);
+  EXPECT_EQ(changes().size(), kMaxChanges);
+  const auto rest = changes();
+  ASSERT_EQ(rest.size(), 40 - 2 * kMaxChanges);
+  EXPECT_EQ(rest[0].kind, ChangeKind::kSetEmergencyStop);
+  EXPECT_EQ(rest[0].value, 1.0) << "number 32, in order";
+}
+
+TEST_F(SessionRegistryTest, ASeatBelongsToTheParticipantThatJoined) {
+  const wire::Origin owner{{1, 2, 3}};
+  const wire::Origin intruder{{9, 9, 9}};
+  const Join join{"a", "Ada", Role::kTrainee, {"right"}};
+  const Welcome welcome = registry_.join(join, 0, owner);
+  EXPECT_TRUE(registry_.ownsSeat(welcome.client, owner));
+  EXPECT_FALSE(registry_.ownsSeat(welcome.client, intruder));
+  (void)registry_.join(join, 0, intruder);
+  EXPECT_TRUE(registry_.ownsSeat(welcome.client, owner))
+      << "a repeated join from elsewhere does not move the seat";
+  EXPECT_FALSE(registry_.ownsSeat(ClientId{9}, owner));
+}
+
+TEST_F(SessionRegistryTest, CommandsThatCannotTakeEffectNowAreRefusedWithAReason) {
+  const ClientId instructor = join("t", Role::kInstructor).client;
+  const auto answer = [&](CommandKind kind) { return command(instructor, kind).reason; };
+  (void)changes();
+  for (const CommandKind kind : {CommandKind::kFulfilled, CommandKind::kPause, CommandKind::kResume,
+                                 CommandKind::kReset, CommandKind::kSkipStep, CommandKind::kSwapHands})
+    EXPECT_THAT(answer(kind), HasSubstr("waits for people"));
+  EXPECT_THAT(command(instructor, CommandKind::kSignal, "bell").reason, HasSubstr("waits for people"));
+  EXPECT_TRUE(changes().empty());
+
+  registry_.updatePhase(RunPhase::kRunning, false);
+  EXPECT_THAT(answer(CommandKind::kResume), HasSubstr("not paused"));
+  EXPECT_THAT(answer(CommandKind::kPause), IsEmpty());
+  registry_.updatePhase(RunPhase::kPaused, false);
+  EXPECT_THAT(answer(CommandKind::kPause), HasSubstr("paused already"));
+  EXPECT_THAT(answer(CommandKind::kResume), IsEmpty());
+  registry_.updatePhase(RunPhase::kSucceeded, false);
+  EXPECT_THAT(answer(CommandKind::kReset), HasSubstr("over"));
+}
+
+TEST_F(SessionRegistryTest, DeferredCommandsAreLimitedToTheCapacityOfATick) {
+  const ClientId instructor = join("t", Role::kInstructor).client;
+  registry_.updatePhase(RunPhase::kPaused, false);
+  for (std::size_t i = 0; i < kMaxChanges; ++i)
+    EXPECT_TRUE(command(instructor, CommandKind::kFulfilled).accepted) << i;
+  EXPECT_THAT(command(instructor, CommandKind::kFulfilled).reason, HasSubstr("wait already"));
+  EXPECT_TRUE(command(instructor, CommandKind::kResume).accepted);
+  registry_.updatePhase(RunPhase::kRunning, false);
+  EXPECT_TRUE(command(instructor, CommandKind::kFulfilled).accepted);
+}
+
+TEST_F(SessionRegistryTest, AHandIsReleasedByItsName) {
+  const ClientId instructor = join("t", Role::kInstructor).client;
+  (void)changes();
+  EXPECT_TRUE(command(instructor, CommandKind::kRelease, "left").accepted);
+  const auto taken = changes();
+  ASSERT_EQ(taken.size(), 1U);
+  EXPECT_EQ(taken[0].hand, test::kLeftHand);
+  EXPECT_THAT(command(instructor, CommandKind::kRelease, "third").reason, HasSubstr("no hand 'third'"));
+}
+
+}  // namespace
+}  // namespace tenon::session

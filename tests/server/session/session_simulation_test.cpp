@@ -1,0 +1,292 @@
+#include "server/session/session_simulation.h"
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/server/session/small_session.h"
+#include "tests/support/realtime_guard.h"
+
+namespace tenon::session {
+namespace {
+
+using test::kInstructorHand;
+using test::kLeftHand;
+using test::kRightHand;
+using test::playInput;
+using test::SessionRig;
+
+const Vector3 kFreeSpace(0.2, 0, 0.3);
+
+Change game(CommandKind kind) { return {.kind = ChangeKind::kGameCommand, .game = {.kind = kind}}; }
+
+TEST(SessionSimulation, WaitsForTheNeededHands) {
+  test::SessionRig rig(1, {test::kRightHand, test::kLeftHand});
+  EXPECT_EQ(rig.tick(10).phase, RunPhase::kWaitingForPeople);
+  rig.attach(test::kRightHand, kFreeSpace);
+  EXPECT_EQ(rig.tick(10).phase, RunPhase::kWaitingForPeople);
+  EXPECT_EQ(rig.output().step.phase, StepPhase::kWaiting);
+  rig.change({.kind = ChangeKind::kAttach, .hand = test::kLeftHand});
+  EXPECT_EQ(rig.tick(10).phase, RunPhase::kWaitingForPeople) << "attached, but no sample yet";
+  rig.reading(test::kLeftHand).X_WH = Pose(Vector3(0.5, 0, 0.3));
+  EXPECT_EQ(rig.tick().phase, RunPhase::kRunning);
+  EXPECT_EQ(rig.output().step.phase, StepPhase::kActive);
+  EXPECT_EQ(rig.object("part").status, ObjectStatus::kParked) << "the first state has started";
+}
+
+TEST(SessionSimulation, StartsInTheFirstTickWithoutNeededHands) {
+  test::SessionRig rig;
+  EXPECT_EQ(rig.tick().phase, RunPhase::kRunning);
+}
+
+TEST(SessionSimulation, AHandWithoutInputIsFrozenThenParkedAndReturns) {
+  test::SessionRig rig;
+  rig.attach(test::kRightHand, kFreeSpace);
+  rig.tick(5);
+  EXPECT_EQ(rig.object("pointer").status, ObjectStatus::kHeld);
+  rig.loseLink(test::kRightHand);
+  rig.tick(50);
+  EXPECT_FALSE(rig.hand(test::kRightHand).frozen) << "a few lost samples do not freeze it";
+  EXPECT_EQ(rig.output().ages[0], 50U);
+  rig.tick();
+  EXPECT_TRUE(rig.hand(test::kRightHand).frozen);
+  EXPECT_TRUE(rig.output().manifolds[0].frozen) << "and its manifold says so";
+  rig.tick(948);
+  EXPECT_TRUE(rig.hand(test::kRightHand).present);
+  rig.tick();
+  EXPECT_FALSE(rig.hand(test::kRightHand).present);
+  EXPECT_FALSE(rig.output().present[0]);
+  EXPECT_EQ(rig.object("pointer").status, ObjectStatus::kParked);
+
+  const std::uint32_t epoch = rig.object("pointer").epoch;
+  rig.reading(test::kRightHand).X_WH = Pose(Vector3(0.3, 0, 0.3));
+  rig.tick(2);
+  EXPECT_TRUE(rig.hand(test::kRightHand).present);
+  EXPECT_FALSE(rig.hand(test::kRightHand).frozen);
+  EXPECT_EQ(rig.object("pointer").status, ObjectStatus::kHeld);
+  EXPECT_GT(rig.object("pointer").epoch, epoch) << "displays must not interpolate over the jump";
+  EXPECT_NEAR(rig.object("pointer").X_WO.translation().x(), 0.3, 1e-3);
+}
+
+TEST(SessionSimulation, ADetachedHandIsAbsentAtOnceAndItsSamplesAreIgnored) {
+  test::SessionRig rig;
+  rig.attach(test::kRightHand, kFreeSpace);
+  rig.tick(5);
+  rig.change({.kind = ChangeKind::kDetach, .hand = test::kRightHand});
+  rig.tick();
+  EXPECT_FALSE(rig.hand(test::kRightHand).present);
+  EXPECT_EQ(rig.object("pointer").status, ObjectStatus::kParked);
+  rig.tick(3);
+  EXPECT_FALSE(rig.hand(test::kRightHand).present);
+}
+
+TEST(SessionSimulation, AnInactiveDeviceFreezesItsObject) {
+  test::SessionRig rig;
+  rig.attach(test::kRightHand, kFreeSpace);
+  rig.tick(5);
+  rig.reading(test::kRightHand).active = false;
+  rig.move(test::kRightHand, Vector3(0.2, 0, 0.4));
+  const Vector3 p_WO = rig.object("pointer").X_WO.translation();
+  rig.tick(20);
+  EXPECT_TRUE(rig.hand(test::kRightHand).frozen);
+  EXPECT_EQ(rig.object("pointer").X_WO.translation(), p_WO);
+}
+
+TEST(SessionSimulation, AnEmergencyStopFreezesAllHandsUntilItIsCleared) {
+  test::SessionRig rig;
+  rig.attach(test::kRightHand, kFreeSpace);
+  rig.attach(test::kInstructorHand, Vector3(-0.3, 0, 0.3));
+  rig.tick(5);
+  rig.change({.kind = ChangeKind::kSetEmergencyStop, .value = 1.0});
+  rig.tick();
+  const Vector3 p_WO = rig.object("pointer").X_WO.translation();
+  const Vector3 p_WC = rig.object("cube").X_WO.translation();
+  rig.move(test::kRightHand, Vector3(0.2, 0, 0.4));
+  rig.move(test::kInstructorHand, Vector3(-0.3, 0, 0.4));
+  rig.change(game(CommandKind::kSkipStep));
+  rig.tick(100);
+  EXPECT_TRUE(rig.output().emergency_stop);
+  EXPECT_TRUE(rig.output().manifolds[0].frozen);
+  EXPECT_TRUE(rig.output().manifolds[1].frozen);
+  EXPECT_EQ(rig.object("pointer").X_WO.translation(), p_WO);
+  EXPECT_EQ(rig.object("cube").X_WO.translation(), p_WC);
+  EXPECT_EQ(rig.output().step.step, 0U);
+  rig.change({.kind = ChangeKind::kSetEmergencyStop, .value = 0.0});
+  rig.tick(300);
+  EXPECT_FALSE(rig.output().emergency_stop);
+  EXPECT_FALSE(rig.hand(test::kRightHand).frozen);
+  EXPECT_NEAR(rig.object("cube").X_WO.translation().z(), 0.4, 1e-3);
+  EXPECT_EQ(rig.output().step.step, 1U) << "a command received meanwhile takes effect now";
+}
+
+TEST(SessionSimulation, APauseFreezesHandsAndSuspendsTimeouts) {
+  test::SessionRig rig;
+  rig.attach(test::kRightHand, kFreeSpace);
+  rig.tick();
+  rig.change(game(CommandKind::kSkipStep));
+  rig.tick(2);
+  ASSERT_EQ(rig.output().step.step, 1U) << "its timeout is 2 s";
+  rig.change({.kind = ChangeKind::kPause});
+  EXPECT_EQ(rig.tick(3000).phase, RunPhase::kPaused);
+  EXPECT_TRUE(rig.hand(test::kRightHand).frozen);
+  rig.change({.kind = ChangeKind::kResume});
+  EXPECT_EQ(rig.tick(1900).phase, RunPhase::kRunning);
+  EXPECT_FALSE(rig.hand(test::kRightHand).frozen);
+  EXPECT_EQ(rig.tick(200).phase, RunPhase::kFailed) << "time in a pause does not count";
+  EXPECT_TRUE(rig.simulation().over());
+}
+
+TEST(SessionSimulation, PauseAndResumeHaveNoEffectInOtherPhases) {
+  test::SessionRig rig;
+  rig.change({.kind = ChangeKind::kResume});
+  EXPECT_EQ(rig.tick().phase, RunPhase::kRunning);
+  rig.change({.kind = ChangeKind::kStop});
+  EXPECT_EQ(rig.tick().phase, RunPhase::kStopped);
+  rig.change({.kind = ChangeKind::kPause});
+  rig.change({.kind = ChangeKind::kResume});
+  EXPECT_EQ(rig.tick().phase, RunPhase::kStopped);
+}
+
+TEST(SessionSimulation, SwappedHandsHoldEachOthersObjectsAndTheStepNamesTheNewHand) {
+  test::SessionRig rig;
+  rig.attach(test::kRightHand, kFreeSpace);
+  rig.attach(test::kLeftHand, Vector3(0.5, 0, 0.3));
+  rig.tick(5);
+  ASSERT_EQ(rig.output().step.hand, test::kRightHand);
+  const std::uint32_t revision = rig.output().step.revision;
+  rig.change(game(CommandKind::kSwapHands));
+  rig.tick(2);
+  EXPECT_EQ(rig.object("pointer").holder, test::kLeftHand);
+  EXPECT_EQ(rig.object("spare").holder, test::kRightHand);
+  EXPECT_NEAR(rig.object("pointer").X_WO.translation().x(), 0.5, 1e-3);
+  EXPECT_EQ(rig.output().step.hand, test::kLeftHand) << "the hand that holds the pointer";
+  EXPECT_GT(rig.output().step.revision, revision);
+}
+
+TEST(SessionSimulation, IdsOutOfRangeAreIgnored) {
+  test::SessionRig rig;
+  rig.attach(test::kRightHand, kFreeSpace);
+  rig.tick();
+  const HandId no_hand{99};
+  const ObjectId no_object{99};
+  for (int kind = 0; kind <= static_cast<int>(ChangeKind::kPlaceObject); ++kind)
+    rig.change({.kind = static_cast<ChangeKind>(kind), .hand = no_hand, .object = no_object, .index = 9999});
+  rig.reading(no_hand);
+  rig.tick();
+  EXPECT_EQ(rig.object("pointer").status, ObjectStatus::kHeld);
+}
+
+std::vector<std::uint64_t> hashesOfThePlay(unsigned workers) {
+  const LoadedScene loaded = test::smallSession();
+  SessionSimulation simulation = test::SessionRig::makeSimulation(loaded, workers, {test::kRightHand});
+  std::vector<std::uint64_t> hashes;
+  for (Tick tick = 1; tick <= test::kPlayTicks; ++tick) {
+    simulation.tick(test::playInput(tick));
+    hashes.push_back(simulation.hash());
+  }
+  EXPECT_EQ(simulation.phase(), RunPhase::kSucceeded) << "the play must get through all states";
+  return hashes;
+}
+
+TEST(SessionSimulation, ABudgetIsAnInput) {
+  test::SessionRig rig;
+  rig.change({.kind = ChangeKind::kBudget, .value = 3000.0});
+  rig.tick();
+  const simulation::Environment& environment = rig.simulation().environment();
+  EXPECT_EQ(environment.workLimits().points, 3000U);
+  rig.change({.kind = ChangeKind::kBudget, .value = -std::numeric_limits<double>::quiet_NaN()});
+  rig.tick();
+  EXPECT_EQ(environment.workLimits().points, 0U) << "NaN is no limit";
+}
+
+TEST(SessionSimulation, EqualInputsGiveEqualHashesForAnyNumberOfWorkers) {
+  const auto hashes = hashesOfThePlay(1);
+  EXPECT_EQ(hashes, hashesOfThePlay(1));
+  EXPECT_EQ(hashes, hashesOfThePlay(2));
+}
+
+TEST(SessionSimulation, ContinuesFromACheckpointWithEqualHashes) {
+  const LoadedScene loaded = test::smallSession();
+  SessionSimulation simulation = test::SessionRig::makeSimulation(loaded, 1, {test::kRightHand});
+  std::vector<std::vector<std::uint8_t>> saved;
+  std::vector<std::uint64_t> hashes;
+  for (Tick tick = 1; tick <= test::kPlayTicks; ++tick) {
+    simulation.tick(test::playInput(tick));
+    hashes.push_back(simulation.hash());
+    if (tick % 300 == 0) simulation.save(saved.emplace_back());
+  }
+  for (std::size_t i = 0; i < saved.size(); ++i) {
+    SessionSimulation again = test::SessionRig::makeSimulation(loaded);
+    const auto restored = again.restore(saved[i]);
+    ASSERT_TRUE(restored) << restored.error().what;
+    ASSERT_EQ(again.now(), 300 * (i + 1));
+    ASSERT_EQ(again.hash(), hashes[again.now() - 1]);
+    for (Tick tick = again.now() + 1; tick <= 300 * (i + 2) && tick <= test::kPlayTicks; ++tick) {
+      again.tick(test::playInput(tick));
+      ASSERT_EQ(again.hash(), hashes[tick - 1])
+          << "tick " << tick << " after the checkpoint of tick " << 300 * (i + 1);
+    }
+  }
+}
+
+TEST(SessionSimulation, ACheckpointKeepsDeferredCommands) {
+  test::SessionRig rig;
+  rig.change({.kind = ChangeKind::kPause});
+  rig.tick();
+  rig.change({.kind = ChangeKind::kPause});
+  rig.change(game(CommandKind::kSkipStep));
+  rig.tick();  // running since the first tick, paused since the second
+  ASSERT_EQ(rig.output().phase, RunPhase::kPaused);
+  std::vector<std::uint8_t> saved;
+  rig.simulation().save(saved);
+  SessionSimulation again = test::SessionRig::makeSimulation(rig.loaded());
+  ASSERT_TRUE(again.restore(saved));
+  EXPECT_EQ(again.hash(), rig.simulation().hash());
+  TickInput resume{.tick = 3};
+  resume.changes.push_back({.kind = ChangeKind::kResume});
+  again.tick(resume);
+  EXPECT_EQ(again.step().phase, StepPhase::kSkipped);
+}
+
+TEST(SessionSimulation, RefusesACheckpointThatIsTruncatedOrOfAnotherScenario) {
+  test::SessionRig rig(1, {test::kRightHand});
+  rig.tick(3);
+  std::vector<std::uint8_t> saved;
+  rig.simulation().save(saved);
+  SessionSimulation again = test::SessionRig::makeSimulation(rig.loaded());
+  for (std::size_t size = 0; size < saved.size(); size += 7)
+    ASSERT_FALSE(again.restore(std::span(saved).first(size))) << size << " of " << saved.size();
+  SessionSimulation other = test::SessionRig::makeSimulation(test::smallSession(test::smallScenario()));
+  const auto restored = other.restore(saved);
+  ASSERT_FALSE(restored);
+  EXPECT_FALSE(restored.error().what.empty());
+  ASSERT_TRUE(again.restore(saved)) << "a failed restore does not affect the next one";
+  EXPECT_EQ(again.hash(), rig.simulation().hash());
+}
+
+TEST(SessionSimulation, ATickAllocatesNothingAndLocksNothing) {
+  if (!test::RealtimeGuard::available()) GTEST_SKIP() << "sanitizers replace the allocator";
+  const LoadedScene loaded = test::smallSession();
+  SessionSimulation simulation = test::SessionRig::makeSimulation(loaded, 1, {test::kRightHand});
+  TickOutput output = simulation.makeOutput();
+  simulation.tick(test::playInput(1));  // warm-up
+  simulation.fill(output);
+  std::int64_t allocations = 0;
+  std::int64_t locks = 0;
+  for (Tick tick = 2; tick <= test::kPlayTicks; ++tick) {
+    const TickInput input = test::playInput(tick);
+    const test::RealtimeGuard guard;
+    simulation.tick(input);
+    simulation.fill(output);
+    allocations += guard.allocations();
+    locks += guard.locks();
+  }
+  EXPECT_EQ(simulation.phase(), RunPhase::kSucceeded);
+  EXPECT_EQ(allocations, 0);
+  EXPECT_EQ(locks, 0);
+}
+
+}  // namespace
+}  // namespace tenon::session

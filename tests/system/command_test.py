@@ -1,0 +1,78 @@
+"""Commands to a running session are accepted and carried out, or refused with the reason."""
+import subprocess
+import unittest
+
+from stage import PROGRAMS, Stage, tenon
+
+
+class Commands(unittest.TestCase):
+    def command(self, stage, *arguments):
+        return tenon("tell", *arguments, "--session", stage.session, "--domain", stage.domain)
+
+    def assert_accepted(self, stage, *arguments):
+        done = self.command(stage, *arguments)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertIn("accepted", done.stdout)
+
+    def assert_refused(self, stage, reason, *arguments):
+        done = self.command(stage, *arguments)
+        self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
+        self.assertIn("refused", done.stderr)
+        self.assertIn(reason, done.stderr)
+
+    def test_a_trainer_pauses_resumes_skips_and_ends_a_session(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve("peg_and_box", "--wait-for", "right")
+            self.assert_refused(stage, "waits for people", "pause")
+            stage.start("trainee", "--seed", 1)
+            server.wait_for("run: running", 60)
+            self.assert_accepted(stage, "pause")
+            server.wait_for("run: paused", 30)
+            self.assert_refused(stage, "paused already", "pause")
+            self.assert_refused(stage, "ask the instructor", "resume", "--role", "trainee")
+            self.assert_refused(stage, "no signal 'trumpet'", "signal", "trumpet")
+            self.assert_accepted(stage, "fulfilled", "--role", "trainee")
+            self.assert_accepted(stage, "resume", "--role", "admin")
+            self.assert_accepted(stage, "skip")
+            server.wait_for("step done", 30)
+            self.assert_accepted(stage, "stop")
+            server.wait_for("run: stopped", 30)
+            self.assertEqual(server.wait(30), 1)
+
+    def test_an_emergency_stop_halts_all_until_the_instructor_clears_it(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve("peg_and_box", "--wait-for", "right")
+            trainee = stage.start("trainee", "--seed", 1)
+            server.wait_for("run: running", 60)
+            self.assert_accepted(stage, "emergency", "a", "test", "--role", "trainee")
+            trainee.wait_for("emergency stop by .*a test", 30)
+            server.wait_for("run: emergency stop", 30)
+            self.assert_refused(stage, "ask the instructor", "clear", "--role", "trainee")
+            self.assert_accepted(stage, "clear")
+            trainee.wait_for("emergency stop cleared", 30)
+            server.wait_for("everything is mounted", 240)
+
+    def test_keys_do_the_same_in_lockstep(self):
+        with Stage() as stage:
+            server = stage.serve("peg_and_box", "--wait-for", "right")
+            stage.start("trainee", "--seed", 1)
+            server.wait_for("run: running", 60)
+            keys = subprocess.run([PROGRAMS / "tenon-tell", "--keys", "--session", stage.session, "--domain",
+                                   str(stage.domain)], input="?pprxe", capture_output=True, text=True, timeout=120)
+            self.assertEqual(keys.returncode, 0, keys.stderr)
+            self.assertIn("emergency stop", keys.stdout, "the legend lists every key")
+            for line in ("pause: accepted", "pause: refused: the session is paused already", "resume: accepted",
+                         "stop: accepted"):
+                self.assertIn(line, keys.stdout)
+            server.wait_for("run: stopped", 30)
+
+    def test_a_wrong_command_line_is_refused_with_the_usage(self):
+        for arguments, reason in ((["fly"], "unknown command 'fly'"), (["signal"], "usage: signal NAME"), ([], "no command given")):
+            with self.subTest(arguments=arguments):
+                done = tenon("tell", *arguments)
+                self.assertEqual(done.returncode, 1)
+                self.assertIn(reason, done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

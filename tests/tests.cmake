@@ -1,0 +1,94 @@
+# Every test of the project. A test program is a room's tests; a ctest test is one of its suites, or one script.
+# Labels: `gate` (what decides whether a change lands) or `nightly` (a suite or script whose name ends with Nightly), and the room.
+
+# What test programs need beside their own room.
+if(BUILD_TESTING OR TENON_BUILD_BENCH)
+  tenon_room(tests/support LINK idl_types server_structures server_collision)
+  set_source_files_properties(tests/support/source_folder.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON COMPILE_DEFINITIONS
+                              TENON_SOURCE="${CMAKE_SOURCE_DIR}")
+endif()
+
+set(test_environment TENON_PROGRAMS=${CMAKE_RUNTIME_OUTPUT_DIRECTORY} TENON_CACHE=${CMAKE_BINARY_DIR}/test_cache)
+add_custom_target(test_programs)
+add_custom_target(threaded_tests)
+
+# One program of a room's tests, one ctest test a suite.
+function(tenon_tests name)
+  cmake_parse_arguments(ARG "THREADS" "" "LINK" ${ARGN})
+  string(REPLACE "/" "_" target ${name}_tests)
+  file(GLOB sources CONFIGURE_DEPENDS tests/${name}/*_test.cpp)
+  if(NOT BUILD_TESTING OR NOT sources)
+    return()
+  endif()
+  add_executable(${target} ${sources})
+  target_link_libraries(${target} PRIVATE ${ARG_LINK} tests_support GTest::gmock GTest::gtest_main)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)
+  target_precompile_headers(${target} REUSE_FROM precompiled)
+  add_dependencies(test_programs ${target})
+  if(ARG_THREADS)
+    add_dependencies(threaded_tests ${target})
+  endif()
+  set(list ${CMAKE_BINARY_DIR}/suites/${target}.cmake)
+  add_custom_command(TARGET ${target} POST_BUILD VERBATIM COMMENT "" COMMAND ${CMAKE_COMMAND} -D "PROGRAM=$<TARGET_FILE:${target}>" -D "ROOM=${name}"
+                     -D "LIST=${list}" -D "RESULTS=${CMAKE_BINARY_DIR}/results" -D "ENVIRONMENT=${test_environment}"
+                     -P ${CMAKE_SOURCE_DIR}/tests/list_suites.cmake)
+  file(WRITE ${CMAKE_BINARY_DIR}/suites/${target}_if_built.cmake "if(EXISTS \"${list}\")\n  include(\"${list}\")\nendif()\n")
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${CMAKE_BINARY_DIR}/suites/${target}_if_built.cmake)
+endfunction()
+
+foreach(room idl/types idl/record server/structures server/game_control devices devices/simulated clients/simulated_person
+             clients/trainee clients/instructor clients/observer clients/recorder clients/command clients/report
+             scenarios/part_generator)
+  string(REPLACE "/" "_" target ${room})
+  tenon_tests(${room} LINK ${target})
+endforeach()
+tenon_tests(server/bake LINK server_bake scenarios_part_generator)  # a scene whose solids are known
+tenon_tests(server/collision LINK server_collision server_bake scenarios_part_generator)  # baked parts, beside their meshes
+tenon_tests(idl/wire LINK idl_wire)  # the bus's own threads are Cyclone's, which no sanitizer of ours can see into
+tenon_tests(idl/threads THREADS LINK idl_threads)
+tenon_tests(server/simulation THREADS LINK server_simulation)
+tenon_tests(server/session THREADS LINK server_session)
+tenon_tests(clients/haptic THREADS LINK clients_haptic server_simulation)  # two stations and their server in one process
+foreach(target server_bake_tests server_collision_tests server_session_tests)
+  if(TARGET ${target})
+    add_dependencies(${target} tenon-bake tenon-parts)  # started by them
+  endif()
+endforeach()
+
+# a whole session in one process: ends as it should, and without a report of the sanitizer that this preset has
+add_test(NAME rehearsal.short COMMAND ${Python3_EXECUTABLE} ${CMAKE_SOURCE_DIR}/tests/rehearsal_test.py)
+set_tests_properties(rehearsal.short PROPERTIES TIMEOUT 900 LABELS "gate;rehearsal" ENVIRONMENT "${test_environment}" COST 300)
+add_dependencies(threaded_tests tenon-rehearse tenon-parts tenon-bake)
+
+# scripts that run the programs as people do; alone those that measure against the clock
+set(quiet_scripts session_test faults_test)
+file(GLOB scripts CONFIGURE_DEPENDS tests/system/*_test.py)
+foreach(script ${scripts})
+  get_filename_component(name ${script} NAME_WE)
+  file(STRINGS ${script} nightly REGEX "^class .*Nightly")
+  file(STRINGS ${script} gate REGEX "^class [A-Za-z0-9]*\\((unittest\\.)?TestCase")
+  list(FILTER gate EXCLUDE REGEX "Nightly")
+  foreach(label gate nightly)
+    if(${label})
+      add_test(NAME system.${name}.${label} COMMAND ${Python3_EXECUTABLE} ${CMAKE_SOURCE_DIR}/tests/run_script.py ${name} ${label}
+               WORKING_DIRECTORY ${CMAKE_SOURCE_DIR}/tests/system)
+      set_tests_properties(system.${name}.${label} PROPERTIES TIMEOUT 1800 LABELS "${label};system" ENVIRONMENT "${test_environment}" COST 200)
+      if(name IN_LIST quiet_scripts)
+        set_tests_properties(system.${name}.${label} PROPERTIES RUN_SERIAL ON)
+      endif()
+    endif()
+  endforeach()
+endforeach()
+
+# speed is measured here and asserted nowhere
+if(TENON_BUILD_BENCH)
+  tenon_room(tests/bench/engine LINK server_bake server_simulation clients_rehearse clients_report tests_support
+             scenarios_part_generator fcl PkgConfig::bullet nlohmann_json::nlohmann_json)
+  tenon_program(tenon-bench tests/bench/engine/main.cpp tests_bench_engine)
+  file(GLOB benchmarks CONFIGURE_DEPENDS tests/bench/*_bench.cpp)
+  foreach(source ${benchmarks})
+    get_filename_component(name ${source} NAME_WE)
+    add_executable(${name} ${source})
+    target_link_libraries(${name} PRIVATE tests_support server_simulation tests_bench_engine benchmark::benchmark_main)
+  endforeach()
+endif()
