@@ -1,6 +1,6 @@
 #include "devices/safety.h"
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/hands.h"
 
 namespace tenon::devices {
 namespace {

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "idl/types/messages.h"
-
 namespace tenon::devices {
 namespace {
 

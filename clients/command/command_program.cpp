@@ -2,11 +2,12 @@
 
 #include <utility>
 
+#include "idl/types/messages/steps.h"
+
 namespace tenon::command {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 constexpr std::chrono::seconds kPatience{5};  // for an answer
 constexpr milliseconds kResend{500};          // an answer sent before our reader was matched is lost
@@ -21,11 +22,11 @@ Result<void> openWriter(std::unique_ptr<wire::Writer<M>>& writer, wire::Partitio
 }
 
 /// Dispatches until `done`; false when that does not happen in time.
-bool dispatchUntil(wire::Inbox& inbox, const std::atomic<bool>& stop, Clock::duration timeout,
-                   const std::function<bool()>& done) {
-  const auto until = Clock::now() + timeout;
+bool dispatchUntil(wire::Inbox& inbox, const std::atomic<bool>& stop,
+                   std::chrono::steady_clock::duration timeout, const std::function<bool()>& done) {
+  const auto until = std::chrono::steady_clock::now() + timeout;
   while (!done()) {
-    if (stop || Clock::now() >= until) return false;
+    if (stop || std::chrono::steady_clock::now() >= until) return false;
     inbox.dispatch(milliseconds(20));
   }
   return true;
@@ -93,10 +94,11 @@ Result<void> CommandClient::send(const ParsedCommand& command, const Stop& stop)
   ack_.reset();
   const Command message{
       member_->welcome().client, ++sent_, *command.command, {}, command.text, command.value};
-  const auto until = Clock::now() + kPatience;
+  const auto until = std::chrono::steady_clock::now() + kPatience;
   const auto answered = [&] { return ack_ && ack_->id == message.id; };
   do {
-    if (stop || Clock::now() >= until) return fail("no answer from the server: it may hang or have ended");
+    if (stop || std::chrono::steady_clock::now() >= until)
+      return fail("no answer from the server: it may hang or have ended");
     if (auto sent = commands_->write(message); !sent) return sent;
   } while (!dispatchUntil(inbox_, stop, kResend, answered));
   if (!ack_->accepted) return fail("refused: " + ack_->reason);

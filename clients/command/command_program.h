@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "clients/command/parser.h"
+#include "idl/types/messages/run.h"
 #include "idl/types/result.h"
 #include "idl/wire/membership.h"
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/commands.h"
 #include "idl/types/result.h"
 
 namespace tenon::command {

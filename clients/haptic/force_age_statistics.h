@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/timing.h"
 
 namespace tenon::haptic {
 

@@ -8,7 +8,8 @@
 #include "devices/device.h"
 #include "devices/safety.h"
 #include "idl/types/fixed_vector.h"
-#include "idl/types/messages.h"
+#include "idl/types/messages/contacts.h"
+#include "idl/types/messages/hands.h"
 
 namespace tenon::haptic {
 

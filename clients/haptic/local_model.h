@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "clients/haptic/world_view.h"
-#include "idl/types/messages.h"
+#include "idl/types/messages/contacts.h"
 #include "server/collision/motion_solver.h"
 
 namespace tenon::haptic {

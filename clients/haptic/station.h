@@ -9,7 +9,13 @@
 
 #include "clients/haptic/world_view.h"
 #include "idl/types/fixed_vector.h"
-#include "idl/types/messages.h"
+#include "idl/types/messages/contacts.h"
+#include "idl/types/messages/hands.h"
+#include "idl/types/messages/objects.h"
+#include "idl/types/messages/role.h"
+#include "idl/types/messages/run.h"
+#include "idl/types/messages/session.h"
+#include "idl/types/messages/steps.h"
 
 namespace tenon::haptic {
 

@@ -3,7 +3,11 @@
 #include <memory>
 #include <vector>
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/hands.h"
+#include "idl/types/messages/log.h"
+#include "idl/types/messages/objects.h"
+#include "idl/types/messages/session.h"
+#include "idl/types/messages/timing.h"
 #include "idl/wire/endpoint.h"
 #include "idl/wire/membership.h"
 

@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/contacts.h"
 
 namespace tenon::haptic {
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/objects.h"
 
 namespace tenon::haptic {
 

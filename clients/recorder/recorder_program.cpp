@@ -11,7 +11,6 @@
 namespace tenon::recorder {
 
 namespace {
-using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 constexpr milliseconds kQuiet{300};      // without a sample: nothing more is expected
 constexpr milliseconds kMaxDrain{3000};  // after the end of a session whose clients go on sending
@@ -77,10 +76,13 @@ Result<void> Recorder::subscribe() {
   // a first sample proves that the server has matched our readers; then wait until all transient-local states
   // came
   std::size_t received = 0;
-  for (const auto until = Clock::now() + options_.timeout; received == 0 && !stop_ && Clock::now() < until;)
+  for (const auto until = std::chrono::steady_clock::now() + options_.timeout;
+       received == 0 && !stop_ && std::chrono::steady_clock::now() < until;)
     received = take(milliseconds(100));
   if (received == 0) return fail("session '" + member_->sessionName() + "' is announced but sends nothing");
-  for (const auto until = Clock::now() + kQuiet; Clock::now() < until;) take(milliseconds(20));
+  for (const auto until = std::chrono::steady_clock::now() + kQuiet;
+       std::chrono::steady_clock::now() < until;)
+    take(milliseconds(20));
   return {};
 }
 
@@ -94,16 +96,16 @@ Result<void> Recorder::writeUntilOver() {
     options_.report("recording session '" + member_->sessionName() + "' into " + options_.file.string());
   }
 
-  auto next_status = Clock::now();
-  auto last_sample = Clock::now();
-  Clock::time_point over_since{};
+  auto next_status = std::chrono::steady_clock::now();
+  auto last_sample = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point over_since{};
   while (!stop_ && recording_->status().problem.empty()) {
     const bool received = take(milliseconds(50)) > 0;
     lobby.dispatch(milliseconds(0));
-    const auto now = Clock::now();
+    const auto now = std::chrono::steady_clock::now();
     if (received) last_sample = now;
     const bool over = recording_->runIsOver() || member_->serverIsGone();
-    if (over && over_since == Clock::time_point{}) over_since = now;
+    if (over && over_since == std::chrono::steady_clock::time_point{}) over_since = now;
     if (over && (now - last_sample >= kQuiet || now - over_since >= kMaxDrain)) break;
     // our own status is recorded as well, so it must not be sent while the end is awaited
     if (!over && now >= next_status) {

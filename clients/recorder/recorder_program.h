@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/run.h"
 #include "idl/types/result.h"
 
 namespace tenon::recorder {

@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 
 #include "idl/record/instance_state.h"
+#include "idl/types/messages/journal.h"
+#include "idl/types/messages/objects.h"
 #include "idl/types/names.h"
 #include "idl/wire/codec.h"
 #include "idl/wire/topics.h"

@@ -8,7 +8,8 @@
 #include <string_view>
 
 #include "idl/record/mcap_writer.h"
-#include "idl/types/messages.h"
+#include "idl/types/messages/run.h"
+#include "idl/types/messages/session.h"
 #include "idl/types/result.h"
 #include "idl/wire/raw_subscriber.h"
 

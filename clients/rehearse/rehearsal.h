@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "clients/haptic/station.h"
+#include "idl/types/messages/log.h"
 #include "server/session/scene_loader.h"
 #include "server/session/session_simulation.h"
 #include "server/session/tick_io.h"

@@ -125,7 +125,7 @@ std::string head(const SessionAnalysis& analysis) {
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{0}: report</title>\n"
       "<style>{1}</style>\n</head>\n<body>\n<main>\n<h1>{0}</h1>\n<p class=\"soft\">{2}",
       title, kStyle, dateOf(analysis.began_ns));
-  for (const Participant& participant : analysis.participants) {
+  for (const SessionParticipant& participant : analysis.participants) {
     if (participant.role == Role::kRecorder) continue;
     html += fmt::format(" · {} ({})", escaped(participant.name), roleName(participant.role));
   }

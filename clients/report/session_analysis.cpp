@@ -12,6 +12,13 @@
 #include <fmt/format.h>
 
 #include "idl/record/mcap_reader.h"
+#include "idl/types/messages/commands.h"
+#include "idl/types/messages/contacts.h"
+#include "idl/types/messages/external.h"
+#include "idl/types/messages/hands.h"
+#include "idl/types/messages/objects.h"
+#include "idl/types/messages/session.h"
+#include "idl/types/messages/timing.h"
 #include "idl/wire/codec.h"
 #include "idl/wire/topics.h"
 

@@ -5,7 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/log.h"
+#include "idl/types/messages/role.h"
+#include "idl/types/messages/run.h"
+#include "idl/types/messages/steps.h"
 #include "idl/types/result.h"
 
 namespace tenon::report {
@@ -49,7 +52,7 @@ struct SessionEvent {
 };
 
 /// A person or program that joined the session.
-struct Participant {
+struct SessionParticipant {
   std::string name;
   Role role = Role::kObserver;
 };
@@ -70,7 +73,7 @@ struct SessionAnalysis {
   std::string title;
   std::int64_t began_ns = 0;  ///< since 1970
   bool lockstep = false;
-  std::vector<Participant> participants;
+  std::vector<SessionParticipant> participants;
   RunState run;
   bool has_run = false;
   std::uint32_t steps = 0;  ///< of the exercise

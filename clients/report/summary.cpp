@@ -129,7 +129,7 @@ nlohmann::json summaryJson(const SessionAnalysis& analysis) {
       {"steps", nlohmann::json::array()},
       {"input_to_force_seconds", nlohmann::json::array()},
       {"events", nlohmann::json::array()}};
-  for (const Participant& participant : analysis.participants)
+  for (const SessionParticipant& participant : analysis.participants)
     all["people"].push_back({{"name", participant.name}, {"role", roleName(participant.role)}});
   for (const StepVisit& visit : analysis.visits) {
     nlohmann::json step = jsonOf(visit.metrics);

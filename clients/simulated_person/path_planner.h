@@ -3,7 +3,7 @@
 #include <span>
 
 #include "idl/types/fixed_vector.h"
-#include "idl/types/messages.h"
+#include "idl/types/messages/objects.h"
 
 namespace tenon::simulated_person {
 

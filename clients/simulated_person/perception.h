@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "clients/haptic/world_view.h"
-#include "idl/types/messages.h"
 
 namespace tenon::simulated_person {
 

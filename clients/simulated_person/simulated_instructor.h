@@ -8,6 +8,7 @@
 #include "clients/simulated_person/perception.h"
 #include "clients/simulated_person/person.h"
 #include "clients/simulated_person/reach_controller.h"
+#include "idl/types/messages/steps.h"
 
 namespace tenon::simulated_person {
 

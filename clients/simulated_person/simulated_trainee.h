@@ -7,6 +7,7 @@
 #include "clients/simulated_person/path_planner.h"
 #include "clients/simulated_person/perception.h"
 #include "clients/simulated_person/person.h"
+#include "idl/types/messages/steps.h"
 
 namespace tenon::simulated_person {
 

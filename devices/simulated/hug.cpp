@@ -1,6 +1,6 @@
 #include "devices/simulated/hug.h"
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/hands.h"
 
 namespace tenon::devices {
 

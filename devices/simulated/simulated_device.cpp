@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/hands.h"
 
 namespace tenon::devices {
 namespace {

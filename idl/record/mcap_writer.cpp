@@ -18,7 +18,6 @@ namespace tenon::record {
 namespace {
 
 using mcap::FieldWriter;
-using StopWatch = std::chrono::steady_clock;
 
 constexpr std::size_t kChunkBytes = 1U << 20U;
 constexpr auto kChunkAge = std::chrono::milliseconds(250);
@@ -40,11 +39,11 @@ struct McapWriter::Impl {
   bool compress = true;
   std::uint64_t offset = 0;
   std::uint32_t data_crc = 0;
-  StopWatch::time_point synced = StopWatch::now();
+  std::chrono::steady_clock::time_point synced = std::chrono::steady_clock::now();
 
   // the current chunk
   record::mcap::FieldWriter chunk;
-  StopWatch::time_point chunk_start;
+  std::chrono::steady_clock::time_point chunk_start;
   std::int64_t first_time = std::numeric_limits<std::int64_t>::max();
   std::int64_t last_time = 0;
   std::map<std::uint16_t, std::vector<std::pair<std::uint64_t, std::uint64_t>>> index;
@@ -142,7 +141,7 @@ std::uint16_t McapWriter::addChannel(std::string_view topic, std::string_view ty
   Impl::append(record, mcap::kChannel, channel);
   to.channels.putBytes(record.bytes);
   // schema and channel precede the channel's first message in its chunk
-  if (to.chunk.bytes.empty()) to.chunk_start = StopWatch::now();
+  if (to.chunk.bytes.empty()) to.chunk_start = std::chrono::steady_clock::now();
   to.chunk.putBytes(both.bytes);
   to.chunk.putBytes(record.bytes);
   return id;
@@ -152,7 +151,7 @@ Result<void> McapWriter::write(std::uint16_t channel, std::int64_t log_time_ns, 
                                std::span<const std::uint8_t> data) {
   Impl& to = *impl_;
   if (to.descriptor < 0) return fail(to.file.string() + ": is already closed");
-  if (to.chunk.bytes.empty()) to.chunk_start = StopWatch::now();
+  if (to.chunk.bytes.empty()) to.chunk_start = std::chrono::steady_clock::now();
   to.index[channel].emplace_back(log_time_ns, to.chunk.bytes.size());
   constexpr std::size_t kMessageFields = 2 + 4 + 8 + 8;
   to.chunk.put(mcap::kMessage);
@@ -167,7 +166,7 @@ Result<void> McapWriter::write(std::uint16_t channel, std::int64_t log_time_ns, 
   ++to.counts[channel];
   ++to.messages;
 
-  const auto now = StopWatch::now();
+  const auto now = std::chrono::steady_clock::now();
   if (to.chunk.bytes.size() >= kChunkBytes || now - to.chunk_start > kChunkAge)
     if (auto done = to.endChunk(); !done) return done;
   if (now - to.synced > kSyncAge) {

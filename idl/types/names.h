@@ -4,7 +4,8 @@
 #include <cstddef>
 #include <string_view>
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/role.h"
+#include "idl/types/messages/run.h"
 
 /// Enumerators of the protocol as users read and type them.
 namespace tenon {

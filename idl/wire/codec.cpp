@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "idl/types/messages.h"
 #include "idl/wire/convert.h"
 #include "idl/wire/sample.h"
 
@@ -9,19 +10,18 @@ namespace tenon::wire {
 
 template <class M>
 Result<std::vector<std::uint8_t>> encode(const M& message) {
-  wire::Wire<M> wire;
-  if (const auto good = wire::toWire(message, wire); !good) return tl::unexpected(good.error());
+  Wire<M> wire;
+  if (const auto good = toWire(message, wire); !good) return tl::unexpected(good.error());
   std::vector<std::uint8_t> bytes;
-  wire::encodeSample(wire::TypeOf<M>::descriptor(), &wire.sample, bytes);
+  encodeSample(TypeOf<M>::descriptor(), &wire.sample, bytes);
   return bytes;
 }
 
 template <class M>
 Result<M> decode(std::span<const std::uint8_t> bytes) {
-  wire::OwnedSample sample(wire::TypeOf<M>::descriptor());
+  OwnedSample sample(TypeOf<M>::descriptor());
   M message;
-  if (!sample.decode(bytes) ||
-      !wire::fromWire(*static_cast<const typename wire::TypeOf<M>::C*>(sample.get()), message)) {
+  if (!sample.decode(bytes) || !fromWire(*static_cast<const typename TypeOf<M>::C*>(sample.get()), message)) {
     return fail(std::to_string(bytes.size()) + " bytes are not a " + std::string(typeName<M>()));
   }
   return message;
@@ -29,7 +29,7 @@ Result<M> decode(std::span<const std::uint8_t> bytes) {
 
 template <class M>
 std::string_view typeName() {
-  return wire::TypeOf<M>::descriptor().m_typename;
+  return TypeOf<M>::descriptor().m_typename;
 }
 
 #define TENON_INSTANTIATE(M)                                      \

@@ -3,15 +3,17 @@
 #include <utility>
 #include <vector>
 
+#include "idl/types/messages.h"
 #include "idl/wire/convert.h"
-#include "idl/wire/core.h"
+#include "idl/wire/dds_endpoint.h"
+#include "idl/wire/reader_wait_set.h"
 
 namespace tenon::wire {
 namespace {
 
 template <class M>
-wire::TopicSpec specOf(const Topic<M>& topic) {
-  return {topic.name, &wire::TypeOf<M>::descriptor(), topic.qos_class, topic.parameters};
+TopicSpec specOf(const Topic<M>& topic) {
+  return {topic.name, &TypeOf<M>::descriptor(), topic.qos_class, topic.parameters};
 }
 
 /// Samples on loan from a reader, returned at destruction.
@@ -30,14 +32,14 @@ class Loan {
 
   [[nodiscard]] int size() const { return count_ < 0 ? 0 : count_; }
   [[nodiscard]] const dds_sample_info_t& info(int i) const { return infos_[i]; }
-  [[nodiscard]] const typename wire::TypeOf<M>::C& sample(int i) const {
-    return *static_cast<const typename wire::TypeOf<M>::C*>(samples_[i]);
+  [[nodiscard]] const typename TypeOf<M>::C& sample(int i) const {
+    return *static_cast<const typename TypeOf<M>::C*>(samples_[i]);
   }
 
  private:
   dds_entity_t reader_;
-  void* samples_[wire::kTakeBatch] = {nullptr};
-  dds_sample_info_t infos_[wire::kTakeBatch];
+  void* samples_[kTakeBatch] = {nullptr};
+  dds_sample_info_t infos_[kTakeBatch];
   dds_return_t count_ = 0;
 };
 
@@ -45,15 +47,15 @@ class Loan {
 
 template <class M>
 struct Writer<M>::Impl {
-  std::unique_ptr<wire::Endpoint> endpoint;
+  std::unique_ptr<DdsEndpoint> endpoint;
   std::string_view topic;
-  wire::Wire<M> wire{};
+  Wire<M> wire{};
 
   template <class Put>
   Result<void> put(const M& message, Put dds_put) {
-    if (const auto good = wire::toWire(message, wire); !good) return good;
+    if (const auto good = toWire(message, wire); !good) return good;
     const dds_return_t code = dds_put(endpoint->entity(), &wire.sample);
-    if (code < 0) return fail(wire::ddsError(topic, *endpoint->partition(), code));
+    if (code < 0) return fail(ddsError(topic, *endpoint->partition(), code));
     return {};
   }
 };
@@ -69,7 +71,7 @@ Writer<M>::~Writer() = default;
 
 template <class M>
 Result<Writer<M>> Writer<M>::open(Partition& partition, const Topic<M>& topic) {
-  auto endpoint = wire::openWriter(partition, specOf(topic));
+  auto endpoint = openWriter(partition, specOf(topic));
   if (!endpoint) return tl::unexpected(endpoint.error());
   auto impl = std::make_unique<Impl>();
   impl->endpoint = std::move(*endpoint);
@@ -91,8 +93,8 @@ std::size_t Writer<M>::matchedReaders() const {
 
 template <class M>
 struct Reader<M>::Impl {
-  std::unique_ptr<wire::Endpoint> endpoint;
-  wire::OriginCache origins;
+  std::unique_ptr<DdsEndpoint> endpoint;
+  OriginCache origins;
 };
 
 template <class M>
@@ -106,7 +108,7 @@ Reader<M>::~Reader() = default;
 
 template <class M>
 Result<Reader<M>> Reader<M>::open(Partition& partition, const Topic<M>& topic) {
-  auto endpoint = wire::openReader(partition, specOf(topic), false, nullptr);
+  auto endpoint = openReader(partition, specOf(topic), false, nullptr);
   if (!endpoint) return tl::unexpected(endpoint.error());
   auto impl = std::make_unique<Impl>();
   impl->endpoint = std::move(*endpoint);
@@ -118,7 +120,7 @@ bool Reader<M>::take(M& out, Origin* from) {
     const dds_entity_t reader = impl_->endpoint->entity();
     const Loan<M> loan(reader, 1);
     if (loan.size() == 0) return false;
-    if (!loan.info(0).valid_data || !wire::fromWire(loan.sample(0), out)) continue;
+    if (!loan.info(0).valid_data || !fromWire(loan.sample(0), out)) continue;
     if (from != nullptr) *from = impl_->origins.find(reader, loan.info(0).publication_handle);
     return true;
   }
@@ -131,12 +133,12 @@ std::size_t Reader<M>::matchedWriters() const {
 namespace {
 
 template <class M>
-class TypedSubscription : public wire::Subscription {
+class TypedSubscription : public Subscription {
  public:
   TypedSubscription(bool latched, std::uint64_t& malformed) : latched_(latched), malformed_(malformed) {}
 
   std::size_t takeBatch() override {
-    const Loan<M> loan(reader->entity(), wire::kTakeBatch);
+    const Loan<M> loan(reader->entity(), kTakeBatch);
     for (int i = 0; i < loan.size(); ++i) deliver(loan.info(i), loan.sample(i));
     return static_cast<std::size_t>(loan.size());
   }
@@ -145,8 +147,8 @@ class TypedSubscription : public wire::Subscription {
   std::vector<Inbox::HandlerFrom<M>> gone_handlers;
 
  private:
-  void deliver(const dds_sample_info_t& info, const typename wire::TypeOf<M>::C& sample) {
-    if (!wire::fromWire(sample, message_)) {
+  void deliver(const dds_sample_info_t& info, const typename TypeOf<M>::C& sample) {
+    if (!fromWire(sample, message_)) {
       if (info.valid_data) ++malformed_;
       return;
     }
@@ -154,7 +156,7 @@ class TypedSubscription : public wire::Subscription {
       const Origin& origin = origins_.find(reader->entity(), info.publication_handle);
       for (const auto& handler : handlers) handler(message_, origin);
     }
-    if (wire::isGone(info, latched_)) {
+    if (isGone(info, latched_)) {
       const bool disposed = info.instance_state == DDS_NOT_ALIVE_DISPOSED_INSTANCE_STATE;
       const Origin who = disposed ? origins_.find(reader->entity(), info.publication_handle) : Origin{};
       for (const auto& handler : gone_handlers) handler(message_, who);
@@ -163,20 +165,20 @@ class TypedSubscription : public wire::Subscription {
 
   bool latched_;
   std::uint64_t& malformed_;
-  wire::OriginCache origins_;
+  OriginCache origins_;
   M message_;
 };
 
 }  // namespace
 
 struct Inbox::Impl {
-  wire::ReaderWaitSet wait_set;
+  ReaderWaitSet wait_set;
   std::uint64_t malformed = 0;
 
   template <class M>
   Result<TypedSubscription<M>*> subscription(Partition& partition, const Topic<M>& topic) {
     for (const auto& known : wait_set.subscriptions()) {
-      if (known->topic == topic.name && known->reader->partition() == partition.impl()) {
+      if (known->topic == topic.name && known->reader->partition() == partition.entities()) {
         return static_cast<TypedSubscription<M>*>(known.get());
       }
     }

@@ -1,96 +1,17 @@
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
-#include <string>
 #include <utility>
 
 #include "idl/types/result.h"
+#include "idl/wire/participant.h"
 #include "idl/wire/topics.h"
 
 namespace tenon::wire {
-
-enum class LinkProfile {
-  kLan,       ///< loopback or a local network, in real time
-  kLockstep,  ///< streams are reliable with history depth 32 on both sides; no deadlines, no lifespans
-};
-
-struct LinkOptions {
-  std::uint32_t domain = 0;  ///< DDS domain
-  LinkProfile profile = LinkProfile::kLan;
-  /// Cyclone DDS configuration: XML text or path of a file. Empty: CYCLONEDDS_URI if set, else loopback as in
-  /// deploy/dds/loopback.xml.
-  std::string config;
-};
-
-/// The program that wrote a sample: the GUID of its DDS participant, which DDS assigns and a message cannot
-/// claim. All zero: unknown, as of a writer that has ended since.
-struct Origin {
-  std::array<std::uint8_t, 16> guid{};
-
-  [[nodiscard]] bool known() const { return *this != Origin{}; }
-  bool operator==(const Origin&) const = default;
-};
-
-/// A DDS domain participant.
-///
-/// All participants of one domain in one process use the configuration of the first, because DDS configures a
-/// domain once per process.
-///
-/// Threads: any. Real-time: no.
-class Participant {
- public:
-  /// Fails when the configuration is missing or wrong, or the domain cannot be joined.
-  static Result<std::shared_ptr<Participant>> open(const LinkOptions& options);
-  ~Participant();
-  Participant(const Participant&) = delete;
-  Participant& operator=(const Participant&) = delete;
-
-  [[nodiscard]] LinkProfile profile() const;
-  /// The origin of all samples that this participant writes.
-  [[nodiscard]] Origin origin() const;
-
-  struct Impl;
-  [[nodiscard]] Impl& impl() { return *impl_; }
-
- private:
-  explicit Participant(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
-};
-
-/// A DDS publisher and subscriber of one partition: "lobby", or that of a session (sessionPartition).
-/// Failures show when endpoints are opened in it.
-///
-/// A partition may have another link profile than its participant: the lobby uses kLan also for sessions in
-/// lockstep, because clients join it before they know.
-///
-/// Threads: any. Real-time: no.
-class Partition {
- public:
-  Partition(std::shared_ptr<Participant> participant, std::string name,
-            std::optional<LinkProfile> profile = std::nullopt);
-  ~Partition();
-  Partition(Partition&&) noexcept;
-  Partition& operator=(Partition&&) noexcept;
-
-  [[nodiscard]] const std::string& name() const;
-  [[nodiscard]] LinkProfile profile() const;
-
-  struct Impl;
-  /// Shared with the endpoints, which may outlive the Partition.
-  [[nodiscard]] const std::shared_ptr<Impl>& impl() const { return impl_; }
-
- private:
-  std::shared_ptr<Impl> impl_;
-};
-
-inline constexpr const char* kLobby = "lobby";
-[[nodiscard]] inline std::string sessionPartition(const std::string& session) { return "s/" + session; }
 
 /// Writes messages of type M to a topic.
 ///

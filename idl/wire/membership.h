@@ -8,7 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/role.h"
+#include "idl/types/messages/session.h"
 #include "idl/types/result.h"
 #include "idl/wire/endpoint.h"
 

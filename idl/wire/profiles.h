@@ -1,11 +1,10 @@
 #pragma once
 
-#include <string>
 #include <string_view>
 
 #include <dds/dds.h>
 
-#include "idl/wire/endpoint.h"
+#include "idl/wire/topics.h"
 
 /// DDS policies of a topic by QoS class and link profile. Internal to idl/wire.
 namespace tenon::wire {

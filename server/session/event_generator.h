@@ -5,7 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/log.h"
+#include "idl/types/messages/objects.h"
+#include "idl/types/messages/run.h"
+#include "idl/types/messages/steps.h"
 #include "server/game_control/scenario.h"
 #include "server/session/tick_io.h"
 #include "server/simulation/scene.h"

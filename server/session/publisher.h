@@ -5,7 +5,10 @@
 #include <optional>
 #include <vector>
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/contacts.h"
+#include "idl/types/messages/objects.h"
+#include "idl/types/messages/steps.h"
+#include "idl/types/messages/timing.h"
 #include "server/session/event_generator.h"
 #include "server/session/tick_io.h"
 

@@ -5,7 +5,10 @@
 #include <vector>
 
 #include "idl/types/fixed_vector.h"
-#include "idl/types/messages.h"
+#include "idl/types/messages/contacts.h"
+#include "idl/types/messages/objects.h"
+#include "idl/types/messages/run.h"
+#include "idl/types/messages/timing.h"
 #include "idl/types/result.h"
 #include "server/game_control/state_machine.h"
 

@@ -97,7 +97,7 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
   }
   for (const ObjectSpec& object : scene.objects) groups.push_back(object.group);
   for (std::size_t object = 0; object < scene.objects.size(); ++object) {
-    forces.emplace_back(pair_cells[object] + scene.hands.size() + 1, options.send_policy);
+    forces.emplace_back(pair_cells[object] + scene.hands.size() + 1);
     sizes.push_back(sizeOf(scene.objects[object]));
     const std::optional<BodySpec>& body = scene.objects[object].body;
     bodies.emplace_back();

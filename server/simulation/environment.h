@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "idl/types/hash.h"
-#include "idl/types/messages.h"
+#include "idl/types/messages/contacts.h"
+#include "idl/types/messages/objects.h"
 #include "idl/types/result.h"
 #include "server/collision/island_solver.h"
 #include "server/simulation/force_buffer.h"
@@ -62,7 +63,6 @@ struct EnvironmentOptions {
   WorkLimits work;  ///< at the start; setBudget changes it
   /// Most pairs that may be queried in a tick or have contacts; about 120 kB each.
   std::size_t contact_lists = 256;
-  SendPolicy send_policy = SendPolicy::kEveryForce;
 };
 
 /// The simulation state and its step (paper §3.2). One tick: set tracked objects, find near (broad phase) and

@@ -79,8 +79,12 @@ void Environment::archive(Archive& archive, Self& self) {
   archiveEnabledBits(archive, engine);
   for (auto& group : engine.groups) archive(group);
   archiveIndices(archive, engine.near, engine.pairs.size());
-  for (const std::uint32_t pair : engine.near)
+  for (const std::uint32_t pair : engine.near) {
+    if constexpr (Archive::kReads) {
+      if (!engine.pairs[pair].possible()) return archive.reject();
+    }
     CollPair::archive(archive, engine.pairs[pair], engine.contact_lists);
+  }
   for (auto& path_length : engine.path_lengths) archive(path_length);
   for (auto& buffer : engine.forces) ForceBuffer::archive(archive, buffer);
 }

@@ -21,18 +21,15 @@ double weight(const ForceCell& cell, Tick now) {
 
 }  // namespace
 
-ForceBuffer::ForceBuffer(std::size_t own_cells, SendPolicy policy)
-    : cells_(own_cells + kContributions), own_cells_(own_cells), policy_(policy) {
+ForceBuffer::ForceBuffer(std::size_t own_cells) : cells_(own_cells + kContributions), own_cells_(own_cells) {
   used_.reserve(own_cells);
 }
 
-bool ForceBuffer::write(std::size_t cell, const Wrench& F_Bo_W, Tick now) noexcept {
+void ForceBuffer::write(std::size_t cell, const Wrench& F_Bo_W, Tick now) noexcept {
   assert(cell < own_cells_);
-  const bool is_due = totalDue(cell);
   const auto index = static_cast<std::uint32_t>(cell);
   if (!cells_[cell].used) used_.insert(std::lower_bound(used_.begin(), used_.end(), index), index);
   cells_[cell] = {F_Bo_W, now, 0, 0, true};
-  return is_due;
 }
 
 void ForceBuffer::clear(std::size_t cell) noexcept {
@@ -92,19 +89,6 @@ Wrench ForceBuffer::contributed(Tick now) const noexcept {
   if (contributing_ == 0) return sum;
   for (const ForceCell& cell : std::span(cells_).subspan(own_cells_)) sum += cell.F_Bo_W * weight(cell, now);
   return sum;
-}
-
-bool ForceBuffer::oldest(std::size_t cell) const noexcept {
-  const Tick stamp = cells_[cell].stamp;
-  if (!cells_[cell].used) return true;
-  const auto contributions = std::span(cells_).subspan(own_cells_);
-  return std::all_of(used_.begin(), used_.end(), [&](auto own) { return cells_[own].stamp >= stamp; }) &&
-         std::all_of(contributions.begin(), contributions.end(),
-                     [&](const ForceCell& other) { return !other.used || other.stamp >= stamp; });
-}
-
-bool ForceBuffer::totalDue(std::size_t cell) const noexcept {
-  return policy_ == SendPolicy::kEveryForce || oldest(cell);
 }
 
 }  // namespace tenon::simulation

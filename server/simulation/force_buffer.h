@@ -10,12 +10,6 @@
 
 namespace tenon::simulation {
 
-/// When writing a cell makes a new total due (paper §3.2, iv).
-enum class SendPolicy : std::uint8_t {
-  kEveryForce,  ///< after every write
-  kOldestCell,  ///< after a write to the oldest cell: about once for all sources
-};
-
 /// The wrench of one source.
 struct ForceCell {
   Wrench F_Bo_W;
@@ -25,13 +19,14 @@ struct ForceCell {
   bool used = false;
 };
 
-/// Accumulates the wrenches of several sources on one object (paper §3.2, iii-iv).
+/// Accumulates the wrenches of several sources on one object (paper §3.2, iii).
 ///
 /// Every source has one cell and overwrites it. The own cells (pairs, couplings of hands, gravity) come
 /// first; they stay valid until overwritten, so a pair skipped by coherence keeps its wrench. Then come cells
 /// for contributions of clients, which are validated, clamped, fade linearly with age and expire. Cells are
 /// summed in cell order, not in order of arrival: the total is bit-equal for any number of workers. The own
-/// cells in use are listed, so a sum costs only those.
+/// cells in use are listed, so a sum costs only those. There is one total per tick, after all sources are
+/// written: the paper's sending policies (§3.2, iv) have no place here (DECISIONS.md).
 ///
 /// Threads: one writer per own cell, contributions from one thread; total() after the tick's barrier.
 /// Real-time: everything but the constructor.
@@ -44,10 +39,10 @@ class ForceBuffer {
   /// [ticks] a contribution ends at most this long after its last update.
   static constexpr std::uint32_t kMaxLifetimeTicks = 200;
 
-  explicit ForceBuffer(std::size_t own_cells, SendPolicy policy = SendPolicy::kEveryForce);
+  explicit ForceBuffer(std::size_t own_cells);
 
-  /// Overwrites an own cell. True when a new total is due by the SendPolicy.
-  bool write(std::size_t cell, const Wrench& F_Bo_W, Tick now) noexcept;
+  /// Overwrites an own cell.
+  void write(std::size_t cell, const Wrench& F_Bo_W, Tick now) noexcept;
   /// Marks an own cell as unused.
   void clear(std::size_t cell) noexcept;
 
@@ -101,14 +96,10 @@ class ForceBuffer {
   }
 
  private:
-  [[nodiscard]] bool oldest(std::size_t cell) const noexcept;
-  [[nodiscard]] bool totalDue(std::size_t cell) const noexcept;
-
   std::vector<ForceCell> cells_;
   std::vector<std::uint32_t> used_;  // own cells in use, ascending
   std::uint8_t contributing_ = 0;    // bit i: contribution i is in use
   std::size_t own_cells_;
-  SendPolicy policy_;
   std::uint64_t rejected_ = 0;
 };
 

@@ -7,7 +7,8 @@
 #include <vector>
 
 #include "idl/types/ids.h"
-#include "idl/types/messages.h"
+#include "idl/types/messages/objects.h"
+#include "idl/types/messages/role.h"
 #include "idl/types/spatial.h"
 #include "server/collision/island_solver.h"
 #include "server/structures/haptic_structures.h"

@@ -14,6 +14,7 @@
 #include "idl/record/mcap_format.h"
 #include "idl/record/mcap_reader.h"
 #include "idl/record/mcap_writer.h"
+#include "tests/support/file_damage.h"
 
 namespace tenon::record {
 namespace {
@@ -168,6 +169,7 @@ TEST_F(McapTest, AFlippedBitNeverChangesAMessageAndNeverCrashes) {
   const auto written = record(40);
   const Bytes whole = fileBytes();
   std::mt19937_64 random(11);
+  std::size_t read = 0;
   for (int round = 0; round < 1000; ++round) {
     Bytes bytes = whole;
     bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1U << (random() % 8));
@@ -177,8 +179,10 @@ TEST_F(McapTest, AFlippedBitNeverChangesAMessageAndNeverCrashes) {
     for (const StoredMessage& message : readAll(*reader)) {
       const bool known = std::find(written.begin(), written.end(), message) != written.end();
       ASSERT_TRUE(known) << "round " << round;
+      ++read;
     }
   }
+  EXPECT_GT(read, 500 * written.size()) << "most of the messages are still there";
 }
 
 TEST_F(McapTest, ADamagedChunkIsSkippedAndReported) {
@@ -217,6 +221,100 @@ TEST_F(McapTest, RandomBytesAfterTheMagicNeverCrash) {
     ASSERT_TRUE(reader);
     readAll(*reader);
   }
+}
+
+/// Sets the checksums of chunks, attachments and the summary to those of the bytes, as far as the records can
+/// be followed. Only chunks that are not compressed have one that damage can be hidden behind.
+void correctChecksums(Bytes& bytes) {
+  const auto number = [&bytes](std::size_t at, std::size_t size) {
+    std::uint64_t value = 0;
+    std::memcpy(&value, bytes.data() + at, size);
+    return value;
+  };
+  const auto setCrc = [&bytes](std::size_t at, std::size_t first, std::size_t last) {
+    const std::uint32_t crc = mcap::crc32(std::span(bytes).subspan(first, last - first));
+    std::memcpy(bytes.data() + at, &crc, sizeof crc);
+  };
+  std::size_t summary = 0;
+  for (std::size_t at = sizeof(mcap::kMagic); at + mcap::kRecordHeaderBytes <= bytes.size();) {
+    const std::uint64_t length = number(at + 1, 8);
+    const std::size_t fields = at + mcap::kRecordHeaderBytes;
+    if (bytes.size() - fields < length) return;
+    const std::size_t end = fields + length;
+    if (bytes[at] == mcap::kChunk && length >= 40) {
+      // two times, the size and the checksum come before the name of the compression
+      const std::size_t records = fields + 32 + number(fields + 28, 4) + 8;
+      const std::uint64_t size = records <= end ? number(records - 8, 8) : 0;
+      if (records <= end && size <= end - records) setCrc(fields + 24, records, records + size);
+    }
+    if (bytes[at] == mcap::kAttachment && length >= 4) setCrc(end - 4, fields, end - 4);
+    if (bytes[at] == mcap::kDataEnd) summary = end;
+    if (bytes[at] == mcap::kFooter && length >= 4 && summary != 0) return setCrc(end - 4, summary, end - 4);
+    at = end;
+  }
+}
+
+/// Reads `rounds` damaged recordings whose checksums are right.
+void readDamaged(const std::filesystem::path& file, const Bytes& whole, std::uint64_t rounds) {
+  std::uint64_t whole_files = 0;
+  std::uint64_t problems = 0;
+  for (std::uint64_t round = 0; round < rounds; ++round) {
+    SCOPED_TRACE("damage " + std::to_string(round));
+    Bytes bytes = whole;
+    test::FileDamage damage(round);
+    if (round % 16 == 0) damage.truncate(bytes);
+    damage.damage(bytes, sizeof(mcap::kMagic));
+    correctChecksums(bytes);
+    test::writeBytes(file, bytes);
+    auto reader = McapReader::open(file);
+    if (!reader) {
+      ASSERT_THAT(reader.error().what, HasSubstr(file.string()));
+      continue;
+    }
+    std::size_t read = 0;
+    for (const std::int64_t from : {std::int64_t{0}, std::int64_t{1300}}) {
+      reader->seek(from);
+      for (McapMessage message; reader->next(message);) {
+        ASSERT_GE(message.log_time_ns, from);
+        read += message.topic.size() + message.type_name.size();
+        for (const std::uint8_t byte : message.data) read += byte;
+      }
+    }
+    for (const McapChannel& channel : reader->channels())
+      read += channel.topic.size() + channel.schema_text.size();
+    for (const McapAttachment& attachment : reader->attachments())
+      for (const std::uint8_t byte : attachment.data) read += byte;
+    ASSERT_THAT(reader->problem(), testing::AnyOf("", HasSubstr(file.string())));
+    ASSERT_THAT(reader->problem(), testing::Not(HasSubstr("wrong checksum")));
+    if (!reader->problem().empty()) ++problems;
+    if (reader->complete() && reader->problem().empty() && read > 0) ++whole_files;
+  }
+  EXPECT_GT(problems, rounds / 50);
+  EXPECT_GT(whole_files, rounds / 10) << "damage of what a message holds is not detectable";
+}
+
+TEST_F(McapTest, DamageBehindRightChecksumsIsReportedOrHarmless) {
+  record(40, false);
+  readDamaged(file_, fileBytes(), 4000);
+}
+
+class McapNightly : public McapTest {};
+
+TEST_F(McapNightly, DamageBehindRightChecksumsIsReportedOrHarmless) {
+  record(40, false);
+  readDamaged(file_, fileBytes(), 100'000);
+}
+
+TEST_F(McapTest, TheChecksumsOfAnUndamagedFileAreLeftAsTheyAre) {
+  record(40, false);
+  const Bytes whole = fileBytes();
+  Bytes bytes = whole;
+  correctChecksums(bytes);
+  EXPECT_EQ(bytes, whole) << "else the damaged files are refused for their checksums";
+  bytes[whole.size() / 3] ^= 1U;
+  const Bytes damaged = bytes;
+  correctChecksums(bytes);
+  EXPECT_NE(bytes, damaged);
 }
 
 TEST_F(McapTest, AFileThatIsNoRecordingIsAnErrorThatNamesIt) {

@@ -35,9 +35,8 @@ TEST(Latest, KeepsTheReadersValueDuringWrites) {
   EXPECT_EQ(latest.read(), 9);
 }
 
-TEST(Latest, ValuesAreNeverTornAndNeverOlderThanBefore) {
+void expectWholeAndEverNewerValues(int updates) {
   using Block = std::array<int, 64>;
-  constexpr int kUpdates = 2'000;
   Latest<Block> latest;
   std::atomic<bool> done{false};
   std::thread writer([&] {
@@ -47,7 +46,7 @@ TEST(Latest, ValuesAreNeverTornAndNeverOlderThanBefore) {
     }
   });
   int newest = 0;
-  for (int seen = 0; seen < kUpdates;) {
+  for (int seen = 0; seen < updates;) {
     if (!latest.update()) {
       std::this_thread::yield();
       continue;
@@ -61,6 +60,9 @@ TEST(Latest, ValuesAreNeverTornAndNeverOlderThanBefore) {
   done = true;
   writer.join();
 }
+
+TEST(Latest, ValuesAreNeverTornAndNeverOlderThanBefore) { expectWholeAndEverNewerValues(100); }
+TEST(LatestNightly, ValuesAreNeverTornAndNeverOlderThanBefore) { expectWholeAndEverNewerValues(10'000); }
 
 TEST(Latest, AllocatesNothingAndLocksNothing) {
   Latest<std::array<double, 100>> latest;

@@ -1,27 +1,27 @@
 #include "idl/wire/codec.h"
 
-#include <filesystem>
 #include <fstream>
+#include <memory>
+#include <set>
 #include <sstream>
+#include <type_traits>
+#include <utility>
 
 #include <gtest/gtest.h>
 
 #include "idl/wire/profiles.h"
 #include "tests/idl/wire/random_messages.h"
+#include "tests/support/source_folder.h"
 
 namespace tenon::wire {
 namespace {
 
 std::string fileText(const std::string& path_from_root) {
-  // this file is tests/idl/wire/codec_test.cpp of the tree
-  const auto root = std::filesystem::path(__FILE__).parent_path().parent_path().parent_path().parent_path();
-  std::ifstream file(root / path_from_root);
+  std::ifstream file(test::sourceFolder() / path_from_root);
   std::ostringstream text;
   text << file.rdbuf();
   return text.str();
 }
-
-TEST(IdlText, IsTheFile) { EXPECT_EQ(idlText(), fileText("idl/tenon.idl")); }
 
 TEST(LoopbackConfig, IsTheFile) { EXPECT_EQ(wire::loopbackConfig(), fileText("deploy/dds/loopback.xml")); }
 
@@ -31,6 +31,19 @@ class Codec : public ::testing::Test {};
 #define TENON_COMMA(M) M,
 using AllMessages = ::testing::Types<TENON_WIRE_MESSAGES(TENON_COMMA) WorldFrame>;
 TYPED_TEST_SUITE(Codec, AllMessages);
+
+TEST(RandomMessages, HaveEveryStatusAndEnumerator) {
+  test::RandomMessages random(7);
+  std::set<std::uint8_t> statuses;
+  std::set<CommandKind> kinds;
+  for (int i = 0; i < 1000; ++i) {
+    statuses.insert(random.make<ObjectSnapshot>().state.status);
+    kinds.insert(random.make<Command>().kind);
+  }
+  EXPECT_EQ(statuses, (std::set<std::uint8_t>{0, 1, 2, 3, 4, 5}));
+  EXPECT_EQ(kinds.size(), 11U);
+  EXPECT_EQ(*kinds.rbegin(), CommandKind::kClearEmergencyStop);
+}
 
 // Messages have no operator==, so the bytes of a second encoding are compared.
 TYPED_TEST(Codec, IsBitEqualAfterEncodingAndDecoding) {
@@ -45,6 +58,45 @@ TYPED_TEST(Codec, IsBitEqualAfterEncodingAndDecoding) {
     ASSERT_TRUE(again);
     EXPECT_EQ(*bytes, *again);
   }
+}
+
+/// Counts the fields of a C struct that idl/wire/fields.h converts, as a direction of it.
+class FieldCounter {
+ public:
+  [[nodiscard]] std::size_t count() const { return fields_.size(); }
+
+  void operator()(const char*, const auto& c, auto&) { fields_.insert(&c); }
+  void status(const char*, const auto& c, auto&) { fields_.insert(&c); }
+  void bytes(const char*, const auto& c, auto&, std::size_t) { fields_.insert(&c); }
+  template <class C, class List>
+  void list(const char*, const C& c, List& m, std::size_t, auto each) {
+    fields_.insert(&c);
+    // elements stay, so that the addresses of their fields differ
+    const auto element = std::make_shared<std::remove_pointer_t<decltype(C::_buffer)>>();
+    elements_.push_back(element);
+    m.resize(1);
+    each(*this, std::as_const(*element), m[0]);
+  }
+
+ private:
+  std::set<const void*> fields_;
+  std::vector<std::shared_ptr<void>> elements_;
+};
+
+template <class M>
+inline constexpr std::size_t kFieldCount = 0;
+#define TENON_FIELD_COUNT(M, COUNT) \
+  template <>                       \
+  inline constexpr std::size_t kFieldCount<M> = COUNT;
+TENON_WIRE_FIELD_COUNTS(TENON_FIELD_COUNT)
+#undef TENON_FIELD_COUNT
+
+TYPED_TEST(Codec, ConvertsEveryFieldOfTheIdl) {
+  FieldCounter counter;
+  const typename TypeOf<TypeParam>::C sample{};
+  TypeParam message;
+  fields(counter, sample, message);
+  EXPECT_EQ(counter.count(), kFieldCount<TypeParam>);
 }
 
 TYPED_TEST(Codec, TheLargestMessageFitsOneSample) {

@@ -7,6 +7,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "idl/types/messages/commands.h"
+#include "idl/types/messages/log.h"
 #include "tests/idl/wire/peer.h"
 
 namespace tenon::wire {

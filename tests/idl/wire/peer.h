@@ -2,12 +2,15 @@
 
 #include <chrono>
 #include <csignal>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <stdexcept>
 #include <string>
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -15,8 +18,21 @@
 
 namespace tenon::test {
 
-/// A DDS domain by process id, to separate test runs on one machine.
-inline std::uint32_t ownDomain() { return 20 + static_cast<std::uint32_t>(getpid()) % 200; }
+/// A DDS domain that no other test of this machine uses while this process runs, or a child that it forks:
+/// claimed by a locked file, as tests/system/stage.py does.
+inline std::uint32_t ownDomain() {
+  static const std::uint32_t own = [] {
+    for (std::uint32_t domain = 1; domain < 100; ++domain) {
+      const auto file =
+          std::filesystem::temp_directory_path() / ("tenon-test-domain-" + std::to_string(domain));
+      const int opened = open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
+      if (opened >= 0 && flock(opened, LOCK_EX | LOCK_NB) == 0) return domain;
+      if (opened >= 0) close(opened);
+    }
+    throw std::runtime_error("all DDS domains of the tests are in use");
+  }();
+  return own;
+}
 
 inline std::shared_ptr<wire::Participant> participant(std::uint32_t domain,
                                                       wire::LinkProfile profile = wire::LinkProfile::kLan) {

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "idl/types/ids.h"
+#include "idl/types/spatial.h"
+
+/// The steps of a scenario.
+namespace tenon {
+
+struct LocalizedText {
+  std::string language;  ///< `en`, `de`, ...
+  std::string text;
+};
+
+enum class StepPhase : std::uint32_t { kWaiting, kActive, kDone, kTimedOut, kSkipped };
+
+/// The current step of the scenario as displays show it: what the trainee has to do.
+struct StepState {
+  std::uint32_t revision = 0;  ///< counts changes of this state
+  std::uint32_t step = 0;      ///< index of the current step
+  std::uint32_t steps = 0;     ///< of the scenario
+  std::string name;
+  std::vector<LocalizedText> title;
+  std::vector<LocalizedText> instruction;
+  StepPhase phase = StepPhase::kWaiting;
+  std::string part;  ///< title of the part this step belongs to, for grouping on displays; may be empty
+  ObjectId object;   ///< to be touched, moved or used; may be invalid
+  HandId hand;       ///< that has to do it
+  ObjectId touch;    ///< to be touched, when the step is a touch; else invalid
+  bool has_target = false;
+  Pose X_WG;                             ///< target pose of `object`, displayed as a ghost
+  Vector3 approach_W = Vector3::Zero();  ///< unit insertion direction; zero: any
+  double approach_distance = 0.0;        ///< [m] length of the insertion path before the target
+  double tolerance = 0.0;                ///< [m] of the target position
+  double angle_tolerance = 0.0;          ///< [rad] of the target orientation
+  double timeout = 0.0;                  ///< [s], 0 for none
+  Tick started = 0;
+};
+
+/// One condition of a step.
+struct ConditionValue {
+  std::string text;    ///< as in the scenario: "pose of control_box", "contact pointer-control_box"
+  double value = 0.0;  ///< [m], [N], [s] or [-], by the kind of the condition
+  double limit = 0.0;  ///< [m], [N], [s] or [-] in the unit of `value`
+  bool met = false;
+};
+
+/// How far the current step is fulfilled.
+struct StepProgress {
+  std::uint32_t revision = 0;  ///< of the StepState
+  Tick tick = 0;
+  double position_error = 0.0;   ///< [m] of the object from its target
+  double angle_error = 0.0;      ///< [rad] of the object from its target
+  double contact_seconds = 0.0;  ///< [s] of contact of the object in this step
+  std::vector<ConditionValue> conditions;
+};
+
+}  // namespace tenon
