@@ -9,10 +9,8 @@
 #include "scenarios/part_generator/scenario_parts.h"
 #include "scenarios/part_generator/scenario_pictures.h"
 
+namespace tenon::part_generator {
 namespace {
-
-using namespace tenon;
-using namespace tenon::part_generator;
 
 void printPartSet(const PartSet& set) {
   fmt::print("{}\n", set.name);
@@ -83,8 +81,6 @@ int writeParts(const PartSet& set, const std::filesystem::path& folder, double d
   fmt::print("{} files, {} triangles, detail {:.3f}\n", set.parts.size(), total, detail);
   return 0;
 }
-
-}  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app{
@@ -159,3 +155,8 @@ int main(int argc, char** argv) {
   }
   return 0;
 }
+
+}  // namespace
+}  // namespace tenon::part_generator
+
+int main(int argc, char** argv) { return tenon::part_generator::main(argc, argv); }

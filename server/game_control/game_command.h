@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/commands.h"
 
 namespace tenon::game_control {
 

@@ -11,7 +11,9 @@
 #include <Eigen/Geometry>
 
 #include "idl/types/ids.h"
-#include "idl/types/messages.h"
+#include "idl/types/messages/objects.h"
+#include "idl/types/messages/role.h"
+#include "idl/types/messages/steps.h"
 #include "idl/types/result.h"
 #include "idl/types/spatial.h"
 #include "server/game_control/condition.h"
@@ -22,12 +24,24 @@ namespace tenon::game_control {
 /// One text in the languages of the scenario; the first is the scenario's main language.
 using Texts = std::vector<LocalizedText>;
 
-/// A triangle mesh of an object: a part made by the scenario's generator, or a file.
+enum class ShapeKind : std::uint8_t { kBox, kSphere, kCylinder };
+
+/// A simple solid, centred on the origin of its frame P; a cylinder's axis is z.
+struct Shape {
+  ShapeKind kind = ShapeKind::kBox;
+  Vector3 size_P = Vector3::Zero();  ///< [m] along x, y and z
+  double deviation = 0.0;            ///< [m] of facets from a round surface, at most; a box has none
+  Pose X_OP;                         ///< in the frame of the object
+};
+
+/// A triangle mesh of an object: a part made by a generator, a file, or a shape. One of the three is given.
 struct MeshSource {
-  std::string part;  ///< name of the generated part: `<part>.stl`, in millimetres; empty for a file
-  /// Absolute, or relative to the working directory as the scenario's path is; empty for a part.
+  std::string part;  ///< name of the generated part: `<part>.stl`, in millimetres
+  /// Absolute, or relative to the working directory as the scenario's path is.
   std::filesystem::path file;
   double unit = 1e-3;  ///< [m] length of one unit of the file
+  std::optional<Shape> shape;
+  int line = 0;
 };
 
 /// Settings for baking the haptic structures of an object.
@@ -161,7 +175,9 @@ struct ScenarioState {
 struct ScenarioFile {
   std::filesystem::path path;   ///< of the YAML file
   std::uint64_t text_hash = 0;  ///< of the text it was read from
-  std::string name;             ///< of its folder, and of its set of generated parts
+  std::string name;             ///< of its folder
+  std::string part_set;         ///< set of generated parts that its meshes name; empty: not given
+  int part_set_line = 0;
   std::string language = "en";  ///< main language
   Texts title;
   Vector3 gravity_W{0.0, 0.0, -9.81};   ///< [m/s^2]

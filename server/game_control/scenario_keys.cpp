@@ -11,12 +11,14 @@ namespace {
 
 using Key = std::string_view;
 
-constexpr std::array<Key, 9> kScenario{"title", "language", "reach",     "gravity", "objects",
-                                       "hands", "pairs",    "pairs_off", "states"};
+constexpr std::array<Key, 10> kScenario{"title",   "language", "parts", "reach",     "gravity",
+                                        "objects", "hands",    "pairs", "pairs_off", "states"};
 constexpr std::array<Key, 12> kObject{"name",       "title",      "kind",  "color",  "group",     "meshes",
                                       "collidable", "structures", "start", "status", "stiffness", "body"};
 constexpr std::array<Key, 7> kBody{"mass", "density", "centre", "inertia", "floating", "damping", "friction"};
-constexpr std::array<Key, 3> kMesh{"part", "file", "unit"};
+constexpr std::array<Key, 9> kMesh{"part", "file", "unit", "box", "sphere", "cylinder", "at", "turn", "q"};
+constexpr std::array<Key, 3> kSphere{"radius", "diameter", "deviation"};
+constexpr std::array<Key, 4> kCylinder{"radius", "diameter", "length", "deviation"};
 constexpr std::array<Key, 5> kStructures{"voxel", "refinement", "points", "spacing", "refine"};
 constexpr std::array<Key, 2> kBox{"from", "to"};
 constexpr std::array<Key, 3> kPose{"at", "turn", "q"};
@@ -42,6 +44,8 @@ constexpr std::array kMappings{
     ScenarioMapping{"object", kObject},
     ScenarioMapping{"body", kBody},
     ScenarioMapping{"mesh", kMesh},
+    ScenarioMapping{"sphere", kSphere},
+    ScenarioMapping{"cylinder", kCylinder},
     ScenarioMapping{"structures", kStructures},
     ScenarioMapping{"box", kBox},
     ScenarioMapping{"pose", kPose},

@@ -5,6 +5,7 @@
 #include <system_error>
 
 #include "idl/types/hash.h"
+#include "server/game_control/named_values.h"
 #include "server/game_control/scenario_state_reader.h"
 
 namespace tenon::game_control {
@@ -14,9 +15,6 @@ constexpr std::size_t kMaxScenarioObjects = 64;
 constexpr std::size_t kMaxScenarioHands = 16;
 constexpr double kSmallestVoxel = 2e-5;  // [m]
 constexpr double kLargestVoxel = 0.1;    // [m]
-
-template <typename Value, std::size_t N>
-using NamedValues = std::array<std::pair<std::string_view, Value>, N>;
 
 constexpr NamedValues<ObjectStatus, 6> kStatuses{{{"hidden", ObjectStatus::kHidden},
                                                   {"parked", ObjectStatus::kParked},
@@ -29,22 +27,6 @@ constexpr NamedValues<simulation::HandKind, 2> kHandKinds{
     {{"coupled", simulation::HandKind::kCoupled}, {"tracked", simulation::HandKind::kTracked}}};
 constexpr std::array<std::string_view, 7> kObjectKinds{"part",    "tool", "pointer", "assistant",
                                                        "forearm", "head", "scene"};
-constexpr NamedValues<double, 4> kUnits{{{"mm", 1e-3}, {"cm", 1e-2}, {"m", 1.0}, {"in", 0.0254}}};
-
-/// The value with that name; an error lists all names.
-template <typename Value, std::size_t N>
-Value oneOf(YamlReader& yaml, const YAML::Node& node, const std::string& what,
-            const NamedValues<Value, N>& values, Value default_value) {
-  if (!node.IsDefined()) return default_value;
-  const std::string word = yaml.text(node, what);
-  std::string expected;
-  for (const auto& [known, value] : values) {
-    if (known == word) return value;
-    expected += (expected.empty() ? "" : ", ") + std::string(known);
-  }
-  yaml.fail(node, what + " is '" + word + "', expected one of: " + expected);
-  return default_value;
-}
 
 bool isColor(const std::string& word) {
   return (word.size() == 7 || word.size() == 9) && word[0] == '#' &&
@@ -78,6 +60,10 @@ void ScenarioReader::readScenario(const YAML::Node& root) {
   if (!yaml_.openMapping(root, "scenario", "a scenario")) return;
   if (root["language"].IsDefined()) scenario_.language = yaml_.text(root["language"], "'language'");
   scenario_.title = names_.texts(root["title"], "'title'");
+  if (root["parts"].IsDefined()) {
+    scenario_.part_set = yaml_.text(root["parts"], "'parts'");
+    scenario_.part_set_line = yaml_.lineOf(root["parts"]);
+  }
   if (scenario_.title.empty()) scenario_.title.push_back({scenario_.language, scenario_.name});
   scenario_.reach =
       yaml_.numberOr(root["reach"], Quantity::kLength, "'reach'", 0.01, 1000.0, scenario_.reach);
@@ -151,34 +137,6 @@ void ScenarioReader::readObject(const YAML::Node& node) {
   readMeshes(node["meshes"], object);
   if (node["structures"].IsDefined()) readStructures(node["structures"], object);
   scenario_.objects.push_back(std::move(object));
-}
-
-void ScenarioReader::readMeshes(const YAML::Node& node, ScenarioObject& object) {
-  const std::string what = "'meshes' of object '" + object.name + "'";
-  if (!node.IsDefined()) yaml_.fail(node, what + " is missing, expected a list such as [{part: peg}]");
-  if (yaml_.failed() || !yaml_.checkList(node, what)) return;
-  if (node.size() == 0) yaml_.fail(node, what + " is empty, expected at least one mesh");
-  for (const auto& entry : node) {
-    if (!yaml_.openMapping(entry, "mesh", "a mesh of object '" + object.name + "'")) return;
-    if (entry["part"].IsDefined() == entry["file"].IsDefined()) {
-      yaml_.fail(entry, "a mesh of object '" + object.name + "' needs either 'part' or 'file'");
-      return;
-    }
-    MeshSource mesh;
-    if (entry["part"].IsDefined()) {
-      mesh.part = yaml_.text(entry["part"], "'part' of " + what);
-      if (entry["unit"].IsDefined())
-        yaml_.fail(entry["unit"], "a generated 'part' is in millimetres, remove 'unit'");
-    } else {
-      mesh.file = scenario_.path.parent_path() / yaml_.text(entry["file"], "'file' of " + what);
-      mesh.unit = oneOf(yaml_, entry["unit"], "'unit' of " + what, kUnits, 1e-3);
-      std::error_code problem;
-      if (!std::filesystem::is_regular_file(mesh.file, problem)) {
-        yaml_.fail(entry["file"], "object '" + object.name + "' has no mesh file " + mesh.file.string());
-      }
-    }
-    object.meshes.push_back(std::move(mesh));
-  }
 }
 
 void ScenarioReader::readStructures(const YAML::Node& node, ScenarioObject& object) {

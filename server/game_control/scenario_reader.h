@@ -26,7 +26,9 @@ class ScenarioReader {
  private:
   void readScenario(const YAML::Node& root);
   void readObject(const YAML::Node& node);
-  void readMeshes(const YAML::Node& node, ScenarioObject& object);
+  void readMeshes(const YAML::Node& node, ScenarioObject& object);  // scenario_meshes.cpp
+  [[nodiscard]] MeshSource readMesh(const YAML::Node& node, const std::string& object);  // likewise
+  [[nodiscard]] Shape readShape(const YAML::Node& node, const std::string& object);      // likewise
   void readBody(const YAML::Node& node, ScenarioObject& object);  // scenario_bodies.cpp
   void readStructures(const YAML::Node& node, ScenarioObject& object);
   void readHand(const YAML::Node& node);

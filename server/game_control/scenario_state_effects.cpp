@@ -2,6 +2,7 @@
 #include <optional>
 #include <string_view>
 
+#include "idl/types/messages/contacts.h"
 #include "server/game_control/scenario_keys.h"
 #include "server/game_control/scenario_state_reader.h"
 

@@ -8,7 +8,7 @@
 
 #include "idl/types/fixed_vector.h"
 #include "idl/types/hash.h"
-#include "idl/types/messages.h"
+#include "idl/types/messages/steps.h"
 #include "idl/types/result.h"
 #include "server/game_control/condition.h"
 #include "server/game_control/game_command.h"

@@ -95,6 +95,11 @@ Result<void> StateMachine::restore(std::span<const std::uint8_t> bytes) {
     return fail("state machine: a saved state is at step " + std::to_string(memory.status.step) +
                 ", but the scenario has " + std::to_string(scenario_->states.size()));
   }
+  // a state that has ended is followed by the next one, unless the run is over
+  const bool ended = memory.status.phase != StepPhase::kWaiting && memory.status.phase != StepPhase::kActive;
+  if (ended && !memory.status.finished && !memory.status.failed &&
+      memory.status.step + 1 == scenario_->states.size())
+    return fail("state machine: a saved state goes on after the scenario's last step");
   memory_ = memory;
   collectReadings();
   return {};

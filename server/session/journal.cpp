@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "idl/record/mcap_reader.h"
+#include "idl/types/messages/journal.h"
 #include "idl/wire/codec.h"
 #include "idl/wire/topics.h"
 

@@ -1,97 +1,102 @@
 #include "server/session/scene_loader.h"
 
+#include <algorithm>
+#include <array>
 #include <cstdlib>
+#include <optional>
+#include <utility>
 #include <vector>
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
+#include "idl/types/hash.h"
 #include "server/bake/bake.h"
-
-extern char** environ;
+#include "server/bake/shapes.h"
+#include "server/session/generated_parts.h"
 
 namespace tenon::session {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// A program in the folder of the running executable.
-fs::path siblingProgram(const std::string& name) {
-  std::error_code ignored;
-  return fs::read_symlink("/proc/self/exe", ignored).parent_path() / name;
-}
-
-Result<void> run(const std::vector<std::string>& arguments) {
-  std::vector<char*> argv;
-  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
-  argv.push_back(nullptr);
-  posix_spawn_file_actions_t silent;
-  posix_spawn_file_actions_init(&silent);
-  posix_spawn_file_actions_addopen(&silent, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  pid_t child = 0;
-  const int started = posix_spawn(&child, argv[0], &silent, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&silent);
-  if (started != 0) return fail(fmt::format("cannot start {}: is the installation complete?", arguments[0]));
-  int status = 0;
-  if (waitpid(child, &status, 0) != child || !WIFEXITED(status) || WEXITSTATUS(status) != 0)
-    return fail(fmt::format("{} failed", arguments[0]));
-  return {};
-}
-
-/// The folder of a scenario's generated parts; runs the generator unless the cache is up to date.
-Result<fs::path> generatedParts(const game_control::ScenarioFile& scenario, const LoadOptions& options) {
-  const fs::path program = std::getenv("TENON_PARTS") != nullptr ? fs::path(std::getenv("TENON_PARTS"))
-                                                                 : siblingProgram("tenon-parts");
-  const fs::path folder = options.cache / "parts" / fmt::format("{}-{:.2f}", scenario.name, options.detail);
-  std::error_code error;
-  // parts older than the generator are generated again
-  const bool up_to_date = fs::exists(folder, error) &&
-                          fs::last_write_time(folder, error) > fs::last_write_time(program, error) && !error;
-  if (up_to_date) return folder;
-
-  const fs::path temporary = folder.string() + fmt::format(".{}", getpid());
-  fs::create_directories(temporary, error);
-  if (error)
-    return fail(fmt::format("{}: cannot make this folder ({})", temporary.string(), error.message()));
-  const auto done = run(
-      {program.string(), scenario.name, temporary.string(), "--detail", fmt::format("{}", options.detail)});
-  if (!done) return fail(done.error().what);
-  fs::remove_all(folder, error);
-  fs::rename(temporary, folder, error);
-  if (error && !fs::exists(folder)) return fail(fmt::format("{}: {}", folder.string(), error.message()));
-  return folder;
-}
-
-/// The mesh files of an object; fails when their units differ.
-Result<std::vector<fs::path>> meshFiles(const game_control::ScenarioFile& scenario,
-                                        const game_control::ScenarioObject& object,
-                                        const LoadOptions& options) {
+/// Mesh files of an object, all in one unit.
+struct ObjectMeshes {
   std::vector<fs::path> files;
+  double unit = 1e-3;  ///< [m] length of one unit of the files
+};
+
+bake::TriangleMesh meshOf(const game_control::Shape& shape) {
+  const Vector3& size_P = shape.size_P;
+  bake::TriangleMesh mesh;
+  switch (shape.kind) {
+    case game_control::ShapeKind::kBox:
+      mesh = bake::makeBox(size_P);
+      break;
+    case game_control::ShapeKind::kSphere:
+      mesh = bake::makeSphere(size_P.x() / 2, shape.deviation);
+      break;
+    case game_control::ShapeKind::kCylinder:
+      mesh = bake::makeCylinder(size_P.x() / 2, size_P.z(), shape.deviation);
+      break;
+  }
+  for (Vector3f& p : mesh.vertices) p = (shape.X_OP * p.cast<double>()).cast<float>();
+  return mesh;
+}
+
+/// The file of a shape below the folder `cache`, in a unit of `unit` [m]. Its name follows from the shape,
+/// and its contents are part of the key of the structures, as those of any mesh are. It is always written: a
+/// damaged one does not stay.
+Result<fs::path> shapeFile(const game_control::Shape& shape, double unit, const fs::path& cache) {
+  constexpr std::array<const char*, 3> kNames{"box", "sphere", "cylinder"};
+  StateHash hash;
+  hash.add(shape.size_P);
+  hash.add(shape.deviation);
+  hash.add(shape.X_OP);
+  hash.add(unit);
+  const fs::path file =
+      cache / "shapes" /
+      fmt::format("{}_{:016x}.stl", kNames[static_cast<std::size_t>(shape.kind)], hash.value());
+  std::error_code error;
+  fs::create_directories(file.parent_path(), error);
+  if (error)
+    return fail(
+        fmt::format("{}: cannot make this folder ({})", file.parent_path().string(), error.message()));
+  if (const auto written = bake::writeStl(file, meshOf(shape), unit); !written)
+    return fail(written.error().what);
+  return file;
+}
+
+/// `parts` is the folder of the generated parts. Fails when the units of the files differ; a shape takes that
+/// of the others.
+Result<ObjectMeshes> meshesOf(const game_control::ScenarioFile& scenario,
+                              const game_control::ScenarioObject& object, const fs::path& parts,
+                              const LoadOptions& options) {
+  ObjectMeshes meshes;
+  const auto isFile = [](const game_control::MeshSource& mesh) { return !mesh.shape; };
+  const auto first_file = std::find_if(object.meshes.begin(), object.meshes.end(), isFile);
+  if (first_file != object.meshes.end()) meshes.unit = first_file->unit;
   for (const game_control::MeshSource& mesh : object.meshes) {
-    if (mesh.unit != object.meshes.front().unit)
-      return fail(fmt::format("{}:{}: the meshes of '{}' have different units", scenario.path.string(),
-                              object.line, object.name));
-    if (mesh.part.empty()) {
-      files.push_back(mesh.file);
+    if (mesh.shape) {
+      auto file = shapeFile(*mesh.shape, meshes.unit, options.cache);
+      if (!file) return fail(file.error().what);
+      meshes.files.push_back(std::move(*file));
       continue;
     }
-    const auto folder = generatedParts(scenario, options);
-    if (!folder) return fail(folder.error().what);
-    files.push_back(*folder / (mesh.part + ".stl"));
+    if (mesh.unit != meshes.unit)
+      return fail(fmt::format("{}:{}: the meshes of '{}' have different units", scenario.path.string(),
+                              mesh.line, object.name));
+    meshes.files.push_back(mesh.part.empty() ? mesh.file : parts / (mesh.part + ".stl"));
   }
-  return files;
+  return meshes;
 }
 
 Result<std::shared_ptr<const structures::HapticStructures>> structuresOf(
-    const game_control::ScenarioFile& scenario, ObjectId id, const LoadOptions& options,
-    const LoadProgress& progress,
+    const game_control::ScenarioFile& scenario, ObjectId id, const fs::path& parts,
+    const LoadOptions& options, const LoadProgress& progress,
     const std::vector<std::shared_ptr<const structures::HapticStructures>>& others) {
   const game_control::ScenarioObject& object = scenario.objects[id.value];
-  const auto files = meshFiles(scenario, object, options);
-  if (!files) return fail(files.error().what);
+  const auto meshes = meshesOf(scenario, object, parts, options);
+  if (!meshes) return fail(meshes.error().what);
   bake::BakeOptions bake;
   bake.voxel = object.structures.voxel;
   bake.refinement = object.structures.refinement;
@@ -103,8 +108,7 @@ Result<std::shared_ptr<const structures::HapticStructures>> structuresOf(
     if (progress) progress(fmt::format("{}: {}", object.title.front().text, activity), fraction);
     return true;
   };
-  const auto file =
-      bake::bakeCached(*files, object.meshes.front().unit, bake, options.cache / "structures", report);
+  const auto file = bake::bakeCached(meshes->files, meshes->unit, bake, options.cache / "structures", report);
   if (!file)
     return fail(
         fmt::format("{}:{}: '{}': {}", scenario.path.string(), object.line, object.name, file.error().what));
@@ -119,10 +123,12 @@ Result<LoadedScene> loadScene(const fs::path& path, const LoadOptions& options,
   if (!file) return fail(file.error().what);
   const auto scenario = std::make_shared<const game_control::ScenarioFile>(std::move(*file));
 
+  const auto parts = generatedParts(*scenario, options.cache, options.detail);
+  if (!parts) return fail(parts.error().what);
   std::vector<std::shared_ptr<const structures::HapticStructures>> structures(scenario->objects.size());
   for (const ObjectId id : game_control::bakeOrder(*scenario)) {
     if (!scenario->objects[id.value].collidable) continue;
-    auto baked = structuresOf(*scenario, id, options, progress, structures);
+    auto baked = structuresOf(*scenario, id, *parts, options, progress, structures);
     if (!baked) return fail(baked.error().what);
     structures[id.value] = std::move(*baked);
   }

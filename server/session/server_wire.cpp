@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "idl/types/messages/journal.h"
 #include "idl/types/names.h"
 #include "server/session/scene_loader.h"
 

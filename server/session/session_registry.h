@@ -6,7 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "idl/types/messages.h"
+#include "idl/types/messages/commands.h"
+#include "idl/types/messages/external.h"
+#include "idl/types/messages/hands.h"
+#include "idl/types/messages/role.h"
+#include "idl/types/messages/run.h"
+#include "idl/types/messages/session.h"
 #include "idl/wire/endpoint.h"
 #include "server/game_control/scenario.h"
 #include "server/session/tick_io.h"

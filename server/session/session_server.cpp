@@ -17,7 +17,6 @@ namespace tenon::session {
 namespace {
 
 using std::chrono::milliseconds;
-using StopWatch = std::chrono::steady_clock;
 
 constexpr auto kInputTimeout = std::chrono::seconds(30);  // in lockstep, for the input of a client
 
@@ -127,10 +126,11 @@ class Server final : public SessionServer {
     input_buffer_.collect(simulation_.now() + 1, input);
     if (new_budget_ && input.changes.push_back({.kind = ChangeKind::kBudget, .value = *new_budget_}))
       new_budget_.reset();
-    const auto begin = StopWatch::now();
+    const auto begin = std::chrono::steady_clock::now();
     simulation_.tick(input);
     simulation_.fill(output);
-    output.stats.compute_seconds = std::chrono::duration<double>(StopWatch::now() - begin).count();
+    output.stats.compute_seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     govern(output.stats.compute_seconds);
     output.stats.late_ticks = late_ticks_;
     std::uint32_t oldest = 0;
@@ -225,14 +225,14 @@ bool Server::awaitInputs(const std::atomic<bool>& stop) {
       if (registry_.controllerOf(HandId{i}).valid() && wire_->newestSeq(HandId{i}) != next) return HandId{i};
     return {};
   };
-  auto deadline = StopWatch::now() + kInputTimeout;
+  auto deadline = std::chrono::steady_clock::now() + kInputTimeout;
   for (HandId late = missing(); late.valid(); late = missing()) {
     wire_->dispatch(milliseconds(50));
     if (stop) return false;
     if (wire_->takeResendRequest()) wire_->resendLast();
-    if (StopWatch::now() < deadline) continue;
+    if (std::chrono::steady_clock::now() < deadline) continue;
     wire_->dismiss(registry_.controllerOf(late), "has been silent for 30 s and is removed from the session");
-    deadline = StopWatch::now() + kInputTimeout;
+    deadline = std::chrono::steady_clock::now() + kInputTimeout;
   }
   return true;
 }
@@ -326,8 +326,8 @@ Result<SessionReport> Server::finish() {
     if (auto closed = journal_->close(report.run); !closed) return fail(closed.error().what);
 
   // let reliable samples arrive before the writers are deleted
-  const auto until = StopWatch::now() + milliseconds(500);
-  while (StopWatch::now() < until) wire_->dispatch(milliseconds(50));
+  const auto until = std::chrono::steady_clock::now() + milliseconds(500);
+  while (std::chrono::steady_clock::now() < until) wire_->dispatch(milliseconds(50));
   return report;
 }
 

@@ -77,7 +77,9 @@ TEST(EngineBayScenario, RefinesThePocketsEnoughForTheirClearance) {
 }
 
 TEST(EngineBayScenario, HasEnglishAndGermanTextsInEveryState) {
-  for (const ScenarioState& state : engineBay().states) {
+  const ScenarioFile scenario = engineBay();
+  ASSERT_GT(scenario.states.size(), 5U);
+  for (const ScenarioState& state : scenario.states) {
     for (const Texts* texts : {&state.title, &state.instruction}) {
       ASSERT_EQ(texts->size(), 2U) << state.name;
       EXPECT_EQ((*texts)[0].language, "en") << state.name;

@@ -66,6 +66,45 @@ TEST(Scenario, ListsEveryPairThatCanCollide) {
   EXPECT_TRUE(off->pairs[static_cast<std::size_t>(off->pairOf(ObjectId{0}, ObjectId{1}))].enabled);
 }
 
+TEST(Scenario, ReadsShapesAsMeshes) {
+  const auto scenario = parsed(test::with(
+      test::with(
+          test::smallScenario(), "[{part: bay}]",
+          "[{box: [20 mm, 3 cm, 0.04]}, {cylinder: {diameter: 10 mm, length: 1 in, deviation: 0.2 mm}, "
+          "at: [0, 0, 20 mm], turn: {axis: x, deg: 90}}]"),
+      "[{part: pointer}]",
+      "[{sphere: {radius: 12 mm}}, {sphere: {diameter: 2 mm}}, {sphere: {diameter: 4}}]"));
+  ASSERT_TRUE(scenario) << scenario.error().what;
+  ASSERT_EQ(scenario->objects[0].meshes.size(), 2U);
+  const Shape& box = scenario->objects[0].meshes[0].shape.value();
+  EXPECT_EQ(box.kind, ShapeKind::kBox);
+  EXPECT_TRUE(box.size_P.isApprox(Vector3(0.02, 0.03, 0.04), 1e-12));
+  EXPECT_TRUE(box.X_OP.translation().isZero());
+
+  const Shape& cylinder = scenario->objects[0].meshes[1].shape.value();
+  EXPECT_EQ(cylinder.kind, ShapeKind::kCylinder);
+  EXPECT_TRUE(cylinder.size_P.isApprox(Vector3(0.01, 0.01, 0.0254), 1e-12));
+  EXPECT_DOUBLE_EQ(cylinder.deviation, 2e-4);
+  EXPECT_TRUE((cylinder.X_OP * Vector3(0, 0, 0.01)).isApprox(Vector3(0, -0.01, 0.02), 1e-12));
+
+  const std::vector<MeshSource>& spheres = scenario->objects[2].meshes;
+  EXPECT_EQ(spheres[0].shape->kind, ShapeKind::kSphere);
+  EXPECT_TRUE(spheres[0].shape->size_P.isApprox(Vector3::Constant(0.024), 1e-12));
+  EXPECT_DOUBLE_EQ(spheres[0].shape->deviation, 5e-5) << "0.05 mm";
+  EXPECT_DOUBLE_EQ(spheres[1].shape->deviation, 1e-5) << "1 % of a small radius";
+  EXPECT_DOUBLE_EQ(spheres[2].shape->deviation, 2e-4) << "0.01 % of a large radius";
+  EXPECT_FALSE(scenario->objects[1].meshes[0].shape) << "a part";
+}
+
+TEST(Scenario, StatesItsSetOfParts) {
+  EXPECT_EQ(parsed(test::smallScenario())->part_set, "");
+  const auto stated =
+      parsed(test::with(test::smallScenario(), "title: Small", "title: Small\nparts: stacking"));
+  ASSERT_TRUE(stated) << stated.error().what;
+  EXPECT_EQ(stated->part_set, "stacking");
+  EXPECT_EQ(stated->part_set_line, 2);
+}
+
 TEST(Scenario, ReadsUnitsRotationsAndQuaternions) {
   const auto turned = parsed(test::with(
       test::smallScenario(), "start: {at: [0.2, 0, 0.1]}",
@@ -200,7 +239,36 @@ const BadInput kBadInputs[] = {
     {"color", "kind: scene", "kind: scene, color: red", "3", "expected '#rrggbb'"},
     {"no_mesh", ", meshes: [{part: cube}]", "", "6", "'meshes' of object 'cube' is missing"},
     {"mesh_file", "[{part: bay}]", "[{file: none.stl}]", "3", "has no mesh file small/none.stl"},
-    {"mesh_both", "[{part: bay}]", "[{part: bay, file: a.stl}]", "3", "either 'part' or 'file'"},
+    {"mesh_both", "[{part: bay}]", "[{part: bay, file: a.stl}]", "3",
+     "has several of part, file, box, sphere and cylinder, expected one"},
+    {"mesh_none", "[{part: bay}]", "[{unit: mm}]", "3", "has none of part, file, box"},
+    {"mesh_unknown", "[{part: bay}]", "[{cube: 2}]", "3", "unknown key 'cube'"},
+    {"mesh_two_shapes", "[{part: bay}]", "[{box: [1, 1, 1], sphere: {radius: 1}}]", "3",
+     "has several of part"},
+    {"part_unit", "[{part: bay}]", "[{part: bay, unit: mm}]", "3",
+     "'unit' of 'meshes' of object 'bay' is for files"},
+    {"box_unit", "[{part: bay}]", "[{box: [1, 1, 1], unit: mm}]", "3", "is for files only"},
+    {"part_moved", "[{part: bay}]", "[{part: bay, at: [0, 0, 1]}]", "3",
+     "'at' of 'meshes' of object 'bay' is for a box"},
+    {"box_edges", "[{part: bay}]", "[{box: [1, 1]}]", "3", "edge lengths along x, y and z, such as [20 mm"},
+    {"box_number", "[{part: bay}]", "[{box: 1}]", "3", "edge lengths along x, y and z"},
+    {"box_flat", "[{part: bay}]", "[{box: [1, 0, 1]}]", "3", "expected between 0.0001 and 20 m"},
+    {"box_unit_word", "[{part: bay}]", "[{box: [1 mm, 1 km, 1]}]", "3", "is '1 km', expected a length"},
+    {"sphere_number", "[{part: bay}]", "[{sphere: 12 mm}]", "3",
+     "must be a mapping such as {diameter: 24 mm}"},
+    {"sphere_size", "[{part: bay}]", "[{sphere: {}}]", "3", "needs either 'diameter' or 'radius'"},
+    {"sphere_sizes", "[{part: bay}]", "[{sphere: {radius: 1, diameter: 2}}]", "3", "needs either 'diameter'"},
+    {"sphere_key", "[{part: bay}]", "[{sphere: {diametre: 2}}]", "3", "did you mean 'diameter'?"},
+    {"sphere_large", "[{part: bay}]", "[{sphere: {radius: 11}}]", "3", "expected between 5e-05 and 10 m"},
+    {"sphere_fine", "[{part: bay}]", "[{sphere: {radius: 1, deviation: 1e-6}}]", "3",
+     "'deviation' of 'sphere' of object 'bay' is 1e-6, expected between 1e-05 and 0.2 m"},
+    {"cylinder_number", "[{part: bay}]", "[{cylinder: [1, 2]}]", "3",
+     "such as {diameter: 10 mm, length: 40 mm}"},
+    {"cylinder_length", "[{part: bay}]", "[{cylinder: {radius: 1}}]", "3",
+     "'length' of 'cylinder' of object 'bay' is missing"},
+    {"cylinder_coarse", "[{part: bay}]", "[{cylinder: {radius: 1, length: 1, deviation: 0.5}}]", "3",
+     "expected between"},
+    {"parts_list", "title: Small", "parts: [a, b]", "1", "'parts' must be a text"},
     {"length_unit", "within: 2 mm", "within: 2 km", "19", "expected a length such as 2 mm"},
     {"angle_without_unit", "angle: 2 deg", "angle: 2", "19", "expected an angle with its unit"},
     {"not_finite", "at: [0, 0, -20 mm]", "at: [0, 0, nan]", "19", "is 'nan'"},

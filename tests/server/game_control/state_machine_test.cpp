@@ -246,7 +246,6 @@ TEST(StateMachine, RefusesAnInvalidSavedState) {
 }
 
 TEST(StateMachine, StepAllocatesNothingAndLocksNothing) {
-  if (!test::RealtimeGuard::available()) GTEST_SKIP() << "a sanitizer replaces malloc";
   test::ScenarioFixture fixture(test::smallScenario());
   fixture.step(10);
   const std::vector<GameCommand> skip{command(CommandKind::kSkipStep)};

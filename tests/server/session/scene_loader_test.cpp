@@ -3,12 +3,17 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <set>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "server/bake/shapes.h"
 #include "tests/server/session/small_session.h"
+#include "tests/support/source_folder.h"
 
 namespace tenon::session {
 namespace {
@@ -35,6 +40,11 @@ TEST(Fingerprint, ChangesAreNamed) {
   then.structures.erase("pointer");
   EXPECT_THAT(changesSince(then, loaded),
               ElementsAre("'lid' was removed", "the structures of 'part'", "'pointer' was added"));
+}
+
+std::string readText(const fs::path& file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), {}};
 }
 
 class SceneLoaderTest : public ::testing::Test {
@@ -64,6 +74,78 @@ TEST_F(SceneLoaderTest, AMissingMeshIsAnErrorWithFileAndLine) {
       load(test::with(test::twoHandedScenario(), "{part: spare}", "{file: gone.stl, unit: mm}"));
   ASSERT_FALSE(none);
   EXPECT_THAT(none.error().what, HasSubstr("scenario.yaml:"));
+}
+
+/// A pointer of one shape, which is also the scene: the smallest scenario whose structures are baked.
+std::string shapeScenario(const std::string& mesh) {
+  return "objects:\n  - {name: pointer, kind: pointer, meshes: [" + mesh +
+         "], structures: {voxel: 2 mm, refinement: 1, points: 100}}\n"
+         "hands: [{name: right, object: pointer}]\n"
+         "states: [{name: wait, conditions: [{command: fulfilled}]}]\n";
+}
+
+TEST_F(SceneLoaderTest, ShapesAreBakedAndTheirSizesArePartOfTheKey) {
+  std::set<std::string> keys;
+  const char* const meshes[] = {"{box: [20 mm, 20 mm, 20 mm]}",
+                                "{box: [20 mm, 20 mm, 21 mm]}",
+                                "{box: [20 mm, 20 mm, 20 mm], at: [5 mm, 0, 0]}",
+                                "{sphere: {diameter: 20 mm}}",
+                                "{sphere: {diameter: 20 mm, deviation: 1 mm}}",
+                                "{cylinder: {diameter: 20 mm, length: 20 mm}}",
+                                "{cylinder: {diameter: 20 mm, length: 20 mm}, turn: {axis: x, deg: 90}}"};
+  for (const char* mesh : meshes) {
+    const auto loaded = load(shapeScenario(mesh));
+    ASSERT_TRUE(loaded) << mesh << ": " << loaded.error().what;
+    const structures::StructureInfo& info = loaded->scene->objects[0].structures->info;
+    keys.insert(info.content_hash);
+    EXPECT_NEAR(info.box_M.sizes().minCoeff(), 0.02, 1e-6) << mesh;
+    const auto again = load(shapeScenario(mesh));
+    ASSERT_TRUE(again);
+    EXPECT_EQ(again->scene->objects[0].structures->info.content_hash, info.content_hash) << mesh;
+  }
+  EXPECT_EQ(keys.size(), std::size(meshes)) << "two shapes have the same structures";
+}
+
+TEST_F(SceneLoaderTest, ShapesAndFilesOfAnyUnitMakeOneObject) {
+  // a block of 1 x 1 x 1 inch as a file, and a rod upon it
+  ASSERT_TRUE(
+      bake::writeStl(folder_ / "scene" / "block.stl", bake::makeBox(Vector3::Constant(0.0254)), 0.0254));
+  const auto loaded =
+      load(shapeScenario("{cylinder: {diameter: 10 mm, length: 20 mm}, at: [0, 0, 20 mm]}, "
+                         "{file: block.stl, unit: in}"));
+  ASSERT_TRUE(loaded) << loaded.error().what;
+  const Eigen::AlignedBox3d& box_M = loaded->scene->objects[0].structures->info.box_M;
+  EXPECT_TRUE(box_M.min().isApprox(Vector3::Constant(-0.0127), 1e-5));
+  EXPECT_TRUE(box_M.max().isApprox(Vector3(0.0127, 0.0127, 0.03), 1e-5));
+}
+
+TEST_F(SceneLoaderTest, FilesOfDifferentUnitsAreAnErrorWithTheLineOfTheMesh) {
+  ASSERT_TRUE(
+      bake::writeStl(folder_ / "scene" / "block.stl", bake::makeBox(Vector3::Constant(0.0254)), 0.0254));
+  const auto none = load(shapeScenario("{file: block.stl, unit: in},\n    {file: block.stl, unit: mm}"));
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().what, HasSubstr("scenario.yaml:3: the meshes of 'pointer' have different units"));
+}
+
+TEST_F(SceneLoaderTest, AShippedScenarioWorksUnderAnyName) {
+  const fs::path copy = folder_ / "exercise 7";
+  fs::copy(test::sourceFolder() / "scenarios" / "peg_and_box", copy);
+  // coarse structures are enough here
+  std::string text = readText(copy / "scenario.yaml");
+  for (const char* fine : {"voxel: 1 mm, refinement: 8", "voxel: 1 mm, refinement: 1"})
+    text = test::with(text, fine, "voxel: 4 mm, refinement: 1");
+  text = test::with(text, "clearance: 0.5 mm", "sensing: true");
+  std::ofstream(copy / "scenario.yaml") << text;
+  const auto loaded = loadScene(copy, {.cache = folder_ / "cache"});
+  ASSERT_TRUE(loaded) << loaded.error().what;
+  EXPECT_TRUE(fs::exists(folder_ / "cache" / "parts" / "peg_and_box-0.12" / "peg.stl"));
+  EXPECT_EQ(loaded->scenario->name, "exercise 7");
+}
+
+TEST_F(SceneLoaderTest, AnUnknownPartIsAnErrorWithItsLine) {
+  const auto none = load(shapeScenario("{part: gadget}"));
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().what, HasSubstr("scenario.yaml:2: there is no generated part 'gadget'"));
 }
 
 TEST(DefaultCache, IsTakenFromTheEnvironment) {

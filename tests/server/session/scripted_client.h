@@ -8,6 +8,13 @@
 #include <utility>
 #include <vector>
 
+#include "idl/types/messages/commands.h"
+#include "idl/types/messages/contacts.h"
+#include "idl/types/messages/hands.h"
+#include "idl/types/messages/log.h"
+#include "idl/types/messages/role.h"
+#include "idl/types/messages/run.h"
+#include "idl/types/messages/session.h"
 #include "idl/wire/endpoint.h"
 #include "tests/idl/wire/peer.h"
 

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "idl/types/result.h"
+#include "server/game_control/scenario.h"
+
+namespace tenon::session {
+
+/// A set of parts that the part generator makes.
+struct GeneratedSet {
+  std::string name;
+  std::vector<std::string> parts;
+};
+
+/// The sets in what `tenon-parts --list` prints: a set's name at the beginning of a line, below it its parts,
+/// indented.
+[[nodiscard]] std::vector<GeneratedSet> parseSetList(const std::string& list);
+
+/// The set that has the parts a scenario's meshes name: the one its key `parts` states; else the one with the
+/// name of its folder, if that has all of them; else the only one that has. Empty when the scenario names no
+/// part. Fails with file and line when a part is in no such set, or when several sets have all of them.
+[[nodiscard]] Result<std::string> generatedSetOf(const game_control::ScenarioFile& scenario,
+                                                 const std::vector<GeneratedSet>& sets);
+
+/// The folder of the generated parts of a scenario, at `detail` [-] 0..1, below the folder `cache`; runs the
+/// generator unless it is up to date. Empty when the scenario names no part. The generator is $TENON_PARTS,
+/// or tenon-parts beside this program.
+[[nodiscard]] Result<std::filesystem::path> generatedParts(const game_control::ScenarioFile& scenario,
+                                                           const std::filesystem::path& cache, double detail);
+
+}  // namespace tenon::session
