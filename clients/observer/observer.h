@@ -2,10 +2,10 @@
 
 #include <cstdio>
 #include <map>
-#include <set>
 #include <string>
-#include <vector>
+#include <utility>
 
+#include "clients/observer/timeline.h"
 #include "idl/types/messages.h"
 
 namespace tenon::observer {
@@ -16,18 +16,20 @@ struct ObserverOptions {
   std::FILE* out = stdout;
 };
 
-/// Prints what happens in a session, as sentences or as one JSON object per line.
+/// Prints what happens in a session: sentences in order of time (see Timeline), or one JSON object per line
+/// as messages arrive.
 ///
-/// Prints changes only: steps, contacts that begin, events, participants, the phase of the run; and the
-/// progress of the active step every 2 s. In sentences it omits that a hand takes or releases its own
-/// pointer.
+/// JSON tells changes only: steps, contacts that begin or end, events, participants, the phase of the run;
+/// and the progress of the active step every 2 s.
 ///
 /// Threads: one. Real-time: no.
 class Observer {
  public:
-  explicit Observer(ObserverOptions options) : options_(std::move(options)) {}
+  explicit Observer(ObserverOptions options)
+      : options_(std::move(options)), timeline_(options_.out, options_.language) {}
 
-  void receive(const SceneObject& object);
+  void receive(const SceneObject& object) { timeline_.receive(object); }
+  void receive(const GrabState& grab) { timeline_.receive(grab); }
   void receive(const StepState& step);
   void receive(const StepProgress& progress);
   void receive(const ContactPairs& pairs);
@@ -36,18 +38,19 @@ class Observer {
   void receive(const EmergencyStop& stop);
   void receive(const RunState& run);
 
+  /// Prints the sentences that waited long enough: those received before `limit` and all earlier ones.
+  void printReceivedBefore(Timeline::Clock::time_point limit) { timeline_.printReceivedBefore(limit); }
+  void printAll() { timeline_.printAll(); }
+
   [[nodiscard]] bool over() const;
   /// 0 when the session succeeded, else 1.
   [[nodiscard]] int exitCode() const { return run_.phase == RunPhase::kSucceeded ? 0 : 1; }
 
  private:
-  [[nodiscard]] std::string titleOf(ObjectId object) const;
-  [[nodiscard]] std::string localized(const std::vector<LocalizedText>& texts) const;
-  void print(const std::string& line) const;
+  void printJson(const std::string& line) const;
 
   ObserverOptions options_;
-  std::map<ObjectId, std::string> titles_;
-  std::set<std::string> pointer_titles_;  ///< of the objects that hands hold when they hold nothing else
+  Timeline timeline_;
   std::map<std::pair<ObjectId, ObjectId>, bool> touching_;
   std::map<ClientId, bool> participants_;  ///< present
   StepState step_;

@@ -7,6 +7,12 @@
 
 namespace tenon::observer {
 
+namespace {
+using Clock = Timeline::Clock;
+constexpr std::chrono::milliseconds kDelay{300};  // messages of one tick arrive within it
+constexpr std::chrono::seconds kLongestEnd{2};
+}  // namespace
+
 Result<void> observeSession(Observer& observer, wire::MembershipOptions options,
                             const std::atomic<bool>& stop) {
   options.role = Role::kObserver;
@@ -23,6 +29,7 @@ Result<void> observeSession(Observer& observer, wire::MembershipOptions options,
     all = inbox.on<M>(member.session(), topic, [&observer](const M& message) { observer.receive(message); });
   };
   subscribe(wire::kSceneObject);
+  subscribe(wire::kGrabState);
   subscribe(wire::kPresence);
   subscribe(wire::kStepState);
   subscribe(wire::kStepProgress);
@@ -31,7 +38,15 @@ Result<void> observeSession(Observer& observer, wire::MembershipOptions options,
   subscribe(wire::kEmergencyStop);
   subscribe(wire::kRunState);
   if (!all) return all;
-  while (!stop && !observer.over() && !member.serverIsGone()) inbox.dispatch(std::chrono::milliseconds(100));
+  while (!stop && !observer.over() && !member.serverIsGone()) {
+    inbox.dispatch(std::chrono::milliseconds(100));
+    observer.printReceivedBefore(Clock::now() - kDelay);
+  }
+  // the last messages of other topics may arrive after the end of the run
+  const auto until = Clock::now() + kLongestEnd;
+  while (!stop && Clock::now() < until && inbox.dispatch(kDelay) > 0) {
+  }
+  observer.printAll();
   if (member.serverIsGone() && !observer.over()) return fail(*member.lost());
   return {};
 }

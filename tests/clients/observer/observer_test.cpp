@@ -1,35 +1,14 @@
 #include "clients/observer/observer.h"
 
-#include <cstdlib>
 #include <sstream>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/clients/observer/memory_file.h"
+
 namespace tenon::observer {
 namespace {
-
-/// Memory file that an observer prints to.
-class MemoryFile {
- public:
-  MemoryFile() : file_(open_memstream(&text_, &size_)) {}
-  ~MemoryFile() {
-    std::fclose(file_);
-    std::free(text_);
-  }
-  MemoryFile(const MemoryFile&) = delete;
-  MemoryFile& operator=(const MemoryFile&) = delete;
-  std::FILE* file() { return file_; }
-  std::string text() {
-    std::fflush(file_);
-    return {text_, size_};
-  }
-
- private:
-  char* text_ = nullptr;
-  std::size_t size_ = 0;
-  std::FILE* file_;
-};
 
 StepState mountStep() {
   StepState step;
@@ -45,58 +24,15 @@ StepState mountStep() {
   return step;
 }
 
-TEST(Observer, PrintsAStepOnceInTheLanguageOfTheOptions) {
+TEST(Observer, PrintsSentencesAfterTheyWaited) {
   MemoryFile output;
   Observer observer({.language = "de", .out = output.file()});
   observer.receive(mountStep());
-  observer.receive(mountStep());
+  EXPECT_EQ(output.text(), "");
+  observer.printAll();
   EXPECT_EQ(output.text(),
-            "  12.00 s  step 2/15  Gitter einsetzen: active\n           Von vorn einschieben.\n");
-}
-
-TEST(Observer, PrintsTheBeginOfAContactWithTheTitlesOfBothObjects) {
-  MemoryFile output;
-  Observer observer({.out = output.file()});
-  SceneObject grid, bay;
-  grid.object = ObjectId{1};
-  grid.title = "grid";
-  bay.object = ObjectId{0};
-  bay.name = "engine_bay";
-  observer.receive(grid);
-  observer.receive(bay);
-  ContactPairs pairs;
-  pairs.tick = 1500;
-  PairContact pair;
-  pair.a = grid.object;
-  pair.b = bay.object;
-  pair.colliding = true;
-  pairs.pairs.push_back(pair);
-  observer.receive(pairs);
-  observer.receive(pairs);
-  EXPECT_EQ(output.text(), "   1.50 s    grid touches engine_bay\n");
-}
-
-TEST(Observer, PrintsNoGrabOfAPointerAndNoReasonOfSuccess) {
-  MemoryFile output;
-  Observer observer({.out = output.file()});
-  SceneObject pointer;
-  pointer.object = ObjectId{2};
-  pointer.title = "Your right hand";
-  pointer.kind = "pointer";
-  observer.receive(pointer);
-  EventLog taken;
-  taken.tick = 1000;
-  taken.kind = "taken";
-  taken.text = "Your right hand (right hand)";
-  observer.receive(taken);
-  taken.text = "Grid (right hand)";
-  observer.receive(taken);
-  RunState run;
-  run.tick = 2000;
-  run.phase = RunPhase::kSucceeded;
-  run.reason = "all steps done";
-  observer.receive(run);
-  EXPECT_EQ(output.text(), "   1.00 s    taken: Grid (right hand)\n   2.00 s  session succeeded\n");
+            "  12.00 s  step 2 of 15: Gitter einsetzen\n"
+            "  12.00 s    the trainee is told: Von vorn einschieben.\n");
 }
 
 TEST(Observer, PrintsOneJsonObjectPerLine) {

@@ -1,0 +1,25 @@
+"""What `tenon demo` has to know of a scenario before its server has read it."""
+import re
+from pathlib import Path
+
+
+def trainee_hands(scenario):
+    """Names of the hands that the trainee's station takes: those of a scenario (a folder or YAML file) without `role: instructor`."""
+    file = scenario / "scenario.yaml" if scenario.is_dir() else scenario
+    if not file.is_file():
+        return []  # the server says so
+    text = re.sub(r"(?m)(^|\s)#.*$", "", file.read_text(encoding="utf-8", errors="replace"))
+    hands = re.search(r"(?ms)^hands:(.*?)(?=^\w|\Z)", text)
+    entries = re.split(r"(?:^|\n)\s*-\s|\[\s*\{|\}\s*,\s*\{", hands[1])[1:] if hands else []
+    return [name[1] for entry in entries if not re.search(r"\brole:\s*instructor\b", entry)
+            and (name := re.search(r"\bname:\s*[\"']?([^\s,}\"']+)", entry))]
+
+
+def shipped_as(scenario, scenarios):
+    """Under which name a scenario is shipped in the folder `scenarios`, itself or unchanged as a copy; None: it is another one."""
+    file = scenario / "scenario.yaml" if scenario.is_dir() else scenario
+    if file.is_file():
+        for shipped in sorted(Path(scenarios).glob("*/scenario.yaml")):
+            if shipped.read_bytes() == file.read_bytes():
+                return shipped.parent.name
+    return None
