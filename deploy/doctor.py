@@ -50,7 +50,7 @@ def check_programs(args):
     missing = [f"tenon-{name}" for name in wanted if not os.access(Path(args.programs) / f"tenon-{name}", os.X_OK)]
     if not missing:
         return "good", f"{len(wanted)} programs are there", ""
-    return "bad", f"missing: {', '.join(missing)}", "build or install again: ./tenon demo does"
+    return "bad", f"missing: {', '.join(missing)}", "install the package again; in a source tree ./tenon demo builds them"
 
 
 def check_bus(args):
