@@ -78,9 +78,9 @@ class ActiveSet {
  private:
   [[nodiscard]] double* line(std::size_t i) { return &L_[i * (i + 1) / 2]; }
   [[nodiscard]] const double* line(std::size_t i) const { return &L_[i * (i + 1) / 2]; }
-  /// b becomes L⁻¹ b; its entries before `first` are zero.
+  /// `b` [-] becomes L⁻¹ b; its entries before `first` are zero.
   void solveForward(double* b, std::size_t first) const;
-  /// b becomes L⁻ᵀ b.
+  /// `b` [-] becomes L⁻ᵀ b.
   void solveBackward(double* b) const;
   /// Sets projected_ and l_ = L⁻¹ Nᵀ normal.
   void projectForward(const RowNormal& normal);

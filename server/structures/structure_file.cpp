@@ -1,7 +1,9 @@
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <optional>
 #include <type_traits>
 #include <vector>
 
@@ -215,25 +217,46 @@ bool fieldIsValid(const DistanceField::Layout& field) {
   return true;
 }
 
-/// Whether every index of the shell is within its array.
-bool shellIsValid(const Pointshell::Layout& shell) {
-  const auto within = [](std::uint64_t first, std::uint64_t count, std::size_t size) {
-    return first <= size && count <= size - first;
-  };
-  for (const ShellSphere& leaf : shell.leaves) {
-    if (leaf.count > Pointshell::kLeafPoints || !within(leaf.first, leaf.count, shell.points.size()))
-      return false;
+/// Whether `spheres` hold the elements `first` to `first` + `count` - 1 of the next finer list in order and
+/// without gaps, at most `most` each.
+bool tile(std::span<const ShellSphere> spheres, std::uint64_t first, std::uint64_t count,
+          std::uint32_t most) {
+  std::uint64_t next = first;
+  for (const ShellSphere& sphere : spheres) {
+    if (sphere.first != next || sphere.count > most) return false;
+    next += sphere.count;
   }
-  for (const ShellSphere& cluster : shell.clusters) {
-    if (cluster.count > Pointshell::kClusterLeaves) return false;
-    if (!within(cluster.first, cluster.count, shell.leaves.size())) return false;
-  }
+  return next == first + count;
+}
+
+/// What is wrong with a shell, or nothing. Levels, clusters and leaves must tile their points in order: a
+/// query takes a point's leaf and its area of a level by position.
+std::optional<std::string> problemOf(const Pointshell::Layout& shell) {
+  std::uint64_t points = 0;
+  std::uint64_t leaves = 0;
+  std::uint64_t clusters = 0;
   for (const ShellLevel& level : shell.levels) {
-    if (!within(level.first_point, level.point_count, shell.points.size())) return false;
-    if (!within(level.first_leaf, level.leaf_count, shell.leaves.size())) return false;
-    if (!within(level.first_cluster, level.cluster_count, shell.clusters.size())) return false;
+    if (level.first_point != points || level.first_leaf != leaves || level.first_cluster != clusters)
+      return "its levels do not follow one another";
+    points += level.point_count;
+    leaves += level.leaf_count;
+    clusters += level.cluster_count;
+    if (points > shell.points.size() || leaves > shell.leaves.size() || clusters > shell.clusters.size())
+      return "its levels have an index out of range";
+    if (!tile(shell.leaves.subspan(level.first_leaf, level.leaf_count), level.first_point, level.point_count,
+              Pointshell::kLeafPoints))
+      return "the leaves of a level do not hold each of its points once";
+    if (!tile(shell.clusters.subspan(level.first_cluster, level.cluster_count), level.first_leaf,
+              level.leaf_count, Pointshell::kClusterLeaves))
+      return "the clusters of a level do not hold each of its leaves once";
   }
-  return true;
+  if (points != shell.points.size() || leaves != shell.leaves.size() || clusters != shell.clusters.size())
+    return "its levels do not hold each point once";
+  const auto finite = [](const ShellPoint& point) {
+    return point.p_MP.allFinite() && point.inward_M.allFinite() && std::isfinite(point.area);
+  };
+  if (!std::all_of(shell.points.begin(), shell.points.end(), finite)) return "a point is not finite";
+  return {};
 }
 
 Result<FileHeader> readHeader(const std::string& name, std::span<const std::byte> bytes) {
@@ -254,7 +277,8 @@ Result<FileHeader> readHeader(const std::string& name, std::span<const std::byte
   if (checksumOf(header, bytes.subspan(sizeof header)) != header.checksum) {
     return fail(name + ": wrong checksum: the file is damaged; bake it again");
   }
-  if (!sectionsFit(header)) return fail(name + ": a section reaches beyond the end of the file");
+  if (!sectionsFit(header))
+    return fail(name + ": a section reaches beyond the end of the file; bake it again");
   return header;
 }
 
@@ -315,8 +339,9 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
       section<ShellPoint>(bytes, *header, kPoints), section<ShellSphere>(bytes, *header, kLeaves),
       section<ShellSphere>(bytes, *header, kClusters), section<ShellLevel>(bytes, *header, kLevels)};
   if (!field.index.empty() && !fieldIsValid(field))
-    return fail(name + ": its field has an index out of range");
-  if (!shellIsValid(shell)) return fail(name + ": its shell has an index out of range");
+    return fail(name + ": its field has an index out of range; bake it again");
+  if (const auto problem = problemOf(shell))
+    return fail(name + ": its pointshell is damaged, " + *problem + "; bake it again");
 
   auto structures = std::make_shared<HapticStructures>();
   if (!field.index.empty()) structures->field = DistanceField(field, mapping);

@@ -4,24 +4,31 @@
 
 namespace tenon::test {
 
-/// Counts heap calls and locks of this thread while the guard exists: a 1 kHz loop must have none.
+/// Whose calls a RealtimeGuard counts.
+enum class CountedThreads {
+  kCalling,  ///< the thread that constructed the guard
+  kAll,      ///< every thread of the process: a tick with workers
+};
+
+/// Counts heap calls and locks while the guard exists: a 1 kHz loop must have none.
 ///
-/// The test program's malloc family and pthread lock functions interpose those of the C library, so calls by
-/// libraries on this thread are counted as well. ASan and TSan interpose the same functions: then the guard
-/// counts nothing and available() is false.
+/// The test program's pthread lock functions interpose those of the C library, and so does its malloc family;
+/// under ASan and TSan, whose allocators replace it, the heap calls are counted by their hooks. Calls by
+/// libraries are counted as well.
 ///
-/// Threads: counts and belongs to the thread that constructed it. Real-time: reading the counts.
+/// Threads: belongs to the thread that constructed it, whichever threads it counts. Real-time: reading the
+/// counts.
 class RealtimeGuard {
  public:
-  RealtimeGuard();
+  explicit RealtimeGuard(CountedThreads threads = CountedThreads::kCalling);
 
   /// malloc, calloc, realloc, aligned allocation and free, operators new and delete included.
   [[nodiscard]] std::int64_t allocations() const;
   /// Mutexes and read-write locks taken, or tried.
   [[nodiscard]] std::int64_t locks() const;
-  [[nodiscard]] static bool available();
 
  private:
+  CountedThreads threads_;
   std::int64_t allocations_before_;
   std::int64_t locks_before_;
 };

@@ -2,15 +2,22 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <optional>
+
+#include "tests/support/source_folder.h"
 
 namespace tenon::test {
 
-/// The folder of test meshes that are not part of the repository (too large, or malformed on purpose):
-/// environment variable TENON_SHARED, or `shared` next to the repository. Tests that need it are skipped
-/// where it is absent.
-[[nodiscard]] inline std::filesystem::path sharedFolder() {
-  if (const char* named = std::getenv("TENON_SHARED"); named != nullptr) return named;
-  return std::filesystem::path(__FILE__).parent_path().parent_path().parent_path().parent_path() / "shared";
+/// The meshes that are part of the repository: tests/data, which its README describes.
+[[nodiscard]] inline std::filesystem::path dataFolder() { return sourceFolder() / "tests" / "data"; }
+
+/// The folder of a larger set of meshes, in the environment variable TENON_SHARED; none when that is not set.
+/// Nightly suites run over it beside tests/data: `cad/` holds CAD files, `malformed/` files that are
+/// malformed on purpose.
+[[nodiscard]] inline std::optional<std::filesystem::path> sharedFolder() {
+  const char* named = std::getenv("TENON_SHARED");
+  if (named == nullptr || *named == '\0') return {};
+  return named;
 }
 
 }  // namespace tenon::test

@@ -230,6 +230,7 @@ TEST(FieldBake, EverySampleIsTheDistanceToTheNearestTriangle) {
   const structures::DistanceField::Layout& layout = structures.field.layout();
   const double quantum = layout.voxel / structures::DistanceField::kQuantaPerVoxel;
   std::size_t number = 0;
+  std::size_t compared = 0;
   for (int z = 0; z < layout.bricks[2]; ++z) {
     for (int y = 0; y < layout.bricks[1]; ++y) {
       for (int x = 0; x < layout.bricks[0]; ++x, ++number) {
@@ -242,10 +243,12 @@ TEST(FieldBake, EverySampleIsTheDistanceToTheNearestTriangle) {
           const double exact =
               std::min(truth.nearest(p).distance, structures::DistanceField::kClampVoxels * layout.voxel);
           ASSERT_NEAR(std::abs(samples[k]) * quantum, exact, 0.51 * quantum) << p.transpose();
+          ++compared;
         }
       }
     }
   }
+  EXPECT_GT(compared, 10'000U);
 }
 
 TEST(FieldBake, StopsWhenTheProgressCallbackReturnsFalse) {

@@ -25,8 +25,7 @@ class RealPairs : public ::testing::TestWithParam<CadPair> {};
 // The field of the fixed part at the shell points of the assembled moving part, compared with the exact mesh
 // distance.
 TEST_P(RealPairs, FieldAgreesWithTheMeshAtThePointsOfTheAssembledPart) {
-  const auto folder = test::sharedFolder() / "cad" / "pairs" / GetParam().name;
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no folder of CAD pairs (TENON_SHARED)";
+  const auto folder = test::dataFolder() / "pairs" / GetParam().name;
   const auto fixed = importMesh(folder / GetParam().fixed, 1.0);
   const auto moving = importMesh(folder / GetParam().moving, 1.0);
   ASSERT_TRUE(fixed) << fixed.error().what;
@@ -60,8 +59,8 @@ INSTANTIATE_TEST_SUITE_P(
                               "factory_round_peg_8mm_loose.obj", 0.0},
                       CadPair{"nv_factory_rect_16mm", "factory_rectangular_hole_16mm_subdiv_3x.obj",
                               "factory_rectangular_peg_16mm_loose_subdiv_3x.obj", 0.0},
-                      CadPair{"nv_factory_nut_bolt_m16", "factory_bolt_m16_loose.obj",
-                              "factory_nut_m16_loose_subdiv_3x.obj", 0.002}),
+                      CadPair{"nv_factory_nut_bolt_m16", "factory_bolt_m16_loose.ply",
+                              "factory_nut_m16_loose_subdiv_3x.ply", 0.002}),
     [](const auto& test_info) { return std::string(test_info.param.name); });
 
 }  // namespace

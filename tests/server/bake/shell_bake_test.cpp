@@ -39,6 +39,7 @@ TEST(ShellBake, SpreadsAboutTheRequestedNumberOfPointsEvenly) {
 TEST(ShellBake, NormalsPointIntoTheSolidForAnyWinding) {
   const TriangleMesh mesh = test::randomlyFlipped(test::ballMesh(0.05, 5), 3);
   const structures::HapticStructures structures = baked(mesh, 2000);
+  ASSERT_GT(structures.shell.points().size(), 1000U);
   for (const structures::ShellPoint& point : structures.shell.points()) {
     EXPECT_LT((point.inward_M + point.p_MP.normalized()).norm(), 0.15F);
   }
@@ -100,6 +101,7 @@ TEST(ShellBake, ASheetHasPointsToo) {
 
 TEST(ShellBake, AreasOfEachPrefixOfLevelsAddUpToTheWholeSurface) {
   const structures::Pointshell shell = baked(test::ballMesh(0.05, 4), 3000).shell;
+  ASSERT_GT(shell.levels().size(), 2U);
   double sum = 0.0;
   for (const structures::ShellLevel& level : shell.levels()) {
     for (std::uint32_t k = 0; k < level.point_count; ++k) sum += shell.points()[level.first_point + k].area;

@@ -8,11 +8,11 @@ namespace {
 
 using test::baked;
 using test::SeededRandom;
-using StructuresPtr = std::shared_ptr<const structures::HapticStructures>;
+using BakedPtr = std::shared_ptr<const structures::HapticStructures>;
 
 struct BakedPair {
   const char* name;
-  StructuresPtr a, b;
+  BakedPtr a, b;
 };
 
 /// Overlapping solids, inconsistent triangle orientation, thin ribs, a refined region.
@@ -22,14 +22,14 @@ std::vector<BakedPair> bakedPairs() {
                                     test::ballMesh(0.02, 3, {0.02, 0.01, 0.01})),
                      test::torusMesh(0.03, 0.006, 48, 20)),
       5);
-  const StructuresPtr tool =
+  const BakedPtr tool =
       test::baked(test::boxMesh({-0.02, -0.01, -0.01}, {0.02, 0.01, 0.01}), 0.002, 2000);
-  const StructuresPtr bracket = test::baked(test::meshOf(test::partNamed("bracket", 0.1)), 0.003, 3000);
-  const StructuresPtr box = test::baked(test::meshOf(test::partNamed("control_box", 0.05)), 0.004, 3000);
-  const StructuresPtr hole =
+  const BakedPtr bracket = test::baked(test::meshOf(test::partNamed("bracket", 0.1)), 0.003, 3000);
+  const BakedPtr box = test::baked(test::meshOf(test::partNamed("control_box", 0.05)), 0.004, 3000);
+  const BakedPtr hole =
       test::baked(test::meshOf(test::partNamed("box_with_hole", 0.1)), 0.005, 2000,
                   {bake::RefineBox{{Vector3(-0.04, -0.04, -0.1), Vector3(0.04, 0.04, 0.1)}}});
-  const StructuresPtr peg = test::baked(test::meshOf(test::partNamed("peg", 0.1)), 0.003, 2000);
+  const BakedPtr peg = test::baked(test::meshOf(test::partNamed("peg", 0.1)), 0.003, 2000);
   return {{"tool and solids", tool, test::baked(solids, 0.002, 2000)},
           {"bracket and control box", bracket, box},
           {"control box and bracket", box, bracket},

@@ -26,7 +26,7 @@ std::vector<structures::SurfaceTree::Triangle> trianglesOf(const bake::TriangleM
   return triangles;
 }
 
-TEST(structures::SurfaceTree, ReturnsTheNearestPointOfAllTriangles) {
+TEST(SurfaceTree, ReturnsTheNearestPointOfAllTriangles) {
   const bake::TriangleMesh mesh =
       test::together(test::torusMesh(0.03, 0.006, 48, 20), test::ballMesh(0.02, 3));
   const structures::SurfaceTree tree(trianglesOf(mesh));
@@ -44,7 +44,7 @@ TEST(structures::SurfaceTree, ReturnsTheNearestPointOfAllTriangles) {
   }
 }
 
-TEST(structures::SurfaceTree, ReportsNotFoundWhenTheBudgetIsExhausted) {
+TEST(SurfaceTree, ReportsNotFoundWhenTheBudgetIsExhausted) {
   const structures::SurfaceTree tree(trianglesOf(test::ballMesh(0.02, 4)));
   std::uint32_t budget = 100;
   EXPECT_FALSE(tree.nearest(Vector3::Zero(), 0.1, budget).found);  // all triangles are at the same distance
@@ -134,6 +134,8 @@ TEST_F(EdgeOnEdge, WorkIsLimitedByTheBudgetAndDeepestContactsComeFirst) {
       shallowest_refined = std::max(shallowest_refined, field_gap);
     }
   }
+  EXPECT_LT(deepest_unrefined, 0.0) << "some are not refined";
+  EXPECT_GT(shallowest_refined, -0.01) << "some are";
   EXPECT_LE(shallowest_refined, deepest_unrefined);
 
   *refined_ = *field_;

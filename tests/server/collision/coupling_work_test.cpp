@@ -31,7 +31,7 @@ Vector3 quantised(const Vector3& x, double step) { return (x / step).array().rou
 
 enum class Obstacle { kFloor, kCorner, kEdge };
 
-struct HandLoop {
+struct CoupledHandLoop {
   const char* name;
   Obstacle obstacle;
   double frequency;                // [Hz]
@@ -39,9 +39,9 @@ struct HandLoop {
   Vector3 cosine, sine;            // [m] amplitudes of its position
   Vector3 turn_cosine, turn_sine;  // [rad] amplitudes of its rotation vector
 };
-void PrintTo(const HandLoop& loop, std::ostream* out) { *out << loop.name; }
+void PrintTo(const CoupledHandLoop& loop, std::ostream* out) { *out << loop.name; }
 
-class CouplingWork : public testing::TestWithParam<HandLoop> {
+class CouplingWork : public testing::TestWithParam<CoupledHandLoop> {
  protected:
   CouplingWork() {
     // with its lower side on the floor the box's origin is 10.5 mm high
@@ -61,7 +61,7 @@ class CouplingWork : public testing::TestWithParam<HandLoop> {
     }
   }
   [[nodiscard]] static Pose handAt(double t) {
-    const HandLoop& loop = GetParam();
+    const CoupledHandLoop& loop = GetParam();
     const double phase = 2.0 * std::numbers::pi * loop.frequency * t;
     const double c = std::cos(phase);
     const double s = std::sin(phase);
@@ -112,64 +112,64 @@ const Vector3 kNone = Vector3::Zero();
 INSTANTIATE_TEST_SUITE_P(
     GodObject, CouplingWork,
     testing::Values(
-        HandLoop{
+        CoupledHandLoop{
             "RockingSlowly", Obstacle::kFloor, 0.5, {0.0, 0.0, 0.009}, kNone, kNone, {0.1, 0.0, 0.0}, kNone},
-        HandLoop{"RockingQuickly",
-                 Obstacle::kFloor,
-                 5.0,
-                 {0.0, 0.0, 0.009},
-                 kNone,
-                 kNone,
-                 {0.05, 0.0, 0.0},
-                 kNone},
-        HandLoop{"PrecessingLikeACoin",
-                 Obstacle::kFloor,
-                 2.0,
-                 {0.0, 0.0, 0.01},
-                 kNone,
-                 kNone,
-                 {0.1, 0.0, 0.0},
-                 {0.0, 0.1, 0.0}},
-        HandLoop{"PrecessingAndTwisting",
-                 Obstacle::kFloor,
-                 2.0,
-                 {0.0, 0.0, 0.01},
-                 {0.002, 0.0, 0.001},
-                 {0.0, 0.002, 0.0},
-                 {0.08, 0.0, 0.1},
-                 {0.0, 0.08, 0.0}},
-        HandLoop{"OfOneEncoderStep",
-                 Obstacle::kFloor,
-                 10.0,
-                 {0.0, 0.0, 0.0095},
-                 kNone,
-                 kNone,
-                 {0.0012, 0.0, 0.0},
-                 {0.0, 0.0012, 0.0}},
-        HandLoop{"InAndOutOfContact",
-                 Obstacle::kFloor,
-                 2.0,
-                 {0.0, 0.0, 0.0125},
-                 {0.0, 0.0, 0.003},
-                 kNone,
-                 {0.0, 0.1, 0.0},
-                 {0.1, 0.0, 0.0}},
-        HandLoop{"InACorner",
-                 Obstacle::kCorner,
-                 2.0,
-                 {0.02, 0.02, 0.01},
-                 {0.001, 0.0, 0.0},
-                 {0.0, 0.001, 0.001},
-                 {0.05, 0.0, 0.05},
-                 {0.0, 0.05, 0.0}},
-        HandLoop{"RockingOnAnEdge",
-                 Obstacle::kEdge,
-                 2.0,
-                 {0.0, 0.0, 0.009},
-                 kNone,
-                 kNone,
-                 {0.1, 0.0, 0.0},
-                 {0.0, 0.1, 0.0}}),
+        CoupledHandLoop{"RockingQuickly",
+                        Obstacle::kFloor,
+                        5.0,
+                        {0.0, 0.0, 0.009},
+                        kNone,
+                        kNone,
+                        {0.05, 0.0, 0.0},
+                        kNone},
+        CoupledHandLoop{"PrecessingLikeACoin",
+                        Obstacle::kFloor,
+                        2.0,
+                        {0.0, 0.0, 0.01},
+                        kNone,
+                        kNone,
+                        {0.1, 0.0, 0.0},
+                        {0.0, 0.1, 0.0}},
+        CoupledHandLoop{"PrecessingAndTwisting",
+                        Obstacle::kFloor,
+                        2.0,
+                        {0.0, 0.0, 0.01},
+                        {0.002, 0.0, 0.001},
+                        {0.0, 0.002, 0.0},
+                        {0.08, 0.0, 0.1},
+                        {0.0, 0.08, 0.0}},
+        CoupledHandLoop{"OfOneEncoderStep",
+                        Obstacle::kFloor,
+                        10.0,
+                        {0.0, 0.0, 0.0095},
+                        kNone,
+                        kNone,
+                        {0.0012, 0.0, 0.0},
+                        {0.0, 0.0012, 0.0}},
+        CoupledHandLoop{"InAndOutOfContact",
+                        Obstacle::kFloor,
+                        2.0,
+                        {0.0, 0.0, 0.0125},
+                        {0.0, 0.0, 0.003},
+                        kNone,
+                        {0.0, 0.1, 0.0},
+                        {0.1, 0.0, 0.0}},
+        CoupledHandLoop{"InACorner",
+                        Obstacle::kCorner,
+                        2.0,
+                        {0.02, 0.02, 0.01},
+                        {0.001, 0.0, 0.0},
+                        {0.0, 0.001, 0.001},
+                        {0.05, 0.0, 0.05},
+                        {0.0, 0.05, 0.0}},
+        CoupledHandLoop{"RockingOnAnEdge",
+                        Obstacle::kEdge,
+                        2.0,
+                        {0.0, 0.0, 0.009},
+                        kNone,
+                        kNone,
+                        {0.1, 0.0, 0.0},
+                        {0.0, 0.1, 0.0}}),
     [](const auto& one) { return std::string(one.param.name); });
 
 //  the hand turns a little, the box stays flat on the floor: change of torque over change of angle

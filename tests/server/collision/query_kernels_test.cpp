@@ -143,6 +143,8 @@ TEST_F(QueryKernelsTest, PruningChangesNoContact) {
   const test::StructuresPtr box = test::boxStructures({0.08, 0.05, 0.03}, 0.002, 0.006);
   const std::vector<test::StructuresPtr> others = fields();
   std::mt19937_64 engine(23);
+  std::size_t contacts = 0;
+  std::size_t visited = 0;
   const auto pruned = std::make_unique<PairQueryResult>();
   const auto unpruned = std::make_unique<PairQueryResult>();
   for (int trial = 0; trial < 3000; ++trial) {
@@ -152,18 +154,23 @@ TEST_F(QueryKernelsTest, PruningChangesNoContact) {
     query.prune = false;
     queryPair(query, *unpruned);
     EXPECT_EQ(unpruned->counts.points_visited, box->shell.points().size());
+    contacts += unpruned->contacts.size();
+    visited += pruned->counts.points_visited;
     ASSERT_EQ(pruned->contacts.size(), unpruned->contacts.size()) << "trial " << trial;
     for (std::size_t i = 0; i < unpruned->contacts.size(); ++i) {
       ASSERT_EQ(pruned->contacts[i].point, unpruned->contacts[i].point);
       ASSERT_EQ(pruned->contacts[i].gap, unpruned->contacts[i].gap);
     }
   }
+  EXPECT_GT(contacts, 10'000U);
+  EXPECT_LT(visited, 3000 * box->shell.points().size() / 2) << "most points are culled";
 }
 
 TEST_F(QueryKernelsTest, NoPointIsNearerThanTheBoundOfCulledPoints) {
   const test::StructuresPtr box = test::boxStructures({0.08, 0.05, 0.03}, 0.002, 0.006);
   const std::vector<test::StructuresPtr> others = fields();
   std::mt19937_64 engine(24);
+  int compared = 0;
   const auto result = std::make_unique<PairQueryResult>();
   for (int trial = 0; trial < 500; ++trial) {
     const test::StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
@@ -173,8 +180,10 @@ TEST_F(QueryKernelsTest, NoPointIsNearerThanTheBoundOfCulledPoints) {
       const structures::FieldSample sample = other->field.sample(X_WA * point.p_MP.cast<double>());
       if (!sample.exact) continue;
       ASSERT_LE(result->smallest_gap, sample.distance - 0.0004 + 1e-12) << "trial " << trial;
+      ++compared;
     }
   }
+  EXPECT_GT(compared, 10'000);
 }
 
 //   o o o o   A grid so long that floats do not resolve its voxels. One brick

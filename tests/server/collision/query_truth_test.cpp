@@ -48,8 +48,8 @@ struct FieldSide {
 
 /// Errors of queries of A against B at `poses` random poses, up to `deepest` [m] deep, tilted by up to `tilt`
 /// [rad].
-test::ContactErrors errorsOf(const structures::HapticStructures& a, const FieldSide& b, int poses, double deepest,
-                       double tilt, bool refine) {
+test::ContactErrors errorsOf(const structures::HapticStructures& a, const FieldSide& b, int poses,
+                             double deepest, double tilt, bool refine) {
   test::SeededRandom random(43);
   test::ContactErrors errors;
   const auto result = std::make_unique<PairQueryResult>();
@@ -119,8 +119,7 @@ void PrintTo(const RealPair& pair, std::ostream* out) { *out << pair.folder; }
 class QueryTruthOfRealPairs : public ::testing::TestWithParam<RealPair> {};
 
 TEST_P(QueryTruthOfRealPairs, DepthsAreThoseOfTheMesh) {
-  const auto folder = test::sharedFolder() / "cad" / "pairs" / GetParam().folder;
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no folder of CAD pairs (TENON_SHARED)";
+  const auto folder = test::dataFolder() / "pairs" / GetParam().folder;
   const auto fixed = bake::importMesh(folder / GetParam().fixed, 1.0);
   const auto moving = bake::importMesh(folder / GetParam().moving, 1.0);
   ASSERT_TRUE(fixed) << fixed.error().what;

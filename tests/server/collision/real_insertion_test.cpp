@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <functional>
 #include <numbers>
 #include <ostream>
@@ -11,7 +10,6 @@
 
 #include "tests/server/collision/island_rig.h"
 #include "tests/server/collision/real_parts.h"
-#include "tests/support/sanitized.h"
 
 namespace tenon::collision {
 namespace {
@@ -89,31 +87,34 @@ struct PegCase {
 };
 void PrintTo(const PegCase& one, std::ostream* out) { *out << one.name; }
 
-class RealPegs : public testing::TestWithParam<PegCase> {};
+/// How much work an insertion takes.
+struct Effort {
+  double fine = 0.0;     ///< [m] voxels within the finely baked box
+  double spacing = 0.0;  ///< [m] of the points of hole and peg
+  bool sheet = false;    ///< first against a sheet of zero thickness beside the block
+};
 
 //        |  |  tilted by 2 degrees, a third of a millimetre beside the axis
 //  ----  ~|  |~~    a sheet of zero thickness beside the block with the hole
-TEST_P(RealPegs, TheSheetBlocksThePegAndTheHolePermitsTiltedInsertionAndRetraction) {
-  const PegCase& one = GetParam();
-  if (!std::filesystem::exists(test::pairsFolder() / one.hole)) GTEST_SKIP() << "no CAD pairs (TENON_SHARED)";
-  if (test::kSanitized) GTEST_SKIP() << "takes minutes; CAD pairs are baked and queried by other tests";
+void insertAndRetract(const PegCase& one, const Effort& effort) {
   constexpr double kHoleTop = 0.009;
   constexpr double kSheetVoxel = 0.003;
   constexpr double kSheetX = -0.06;
-  const double fine = test::voxelOf(one.clearance);
-  const auto hole =
-      test::bakePart(one.hole, fine, {test::boxAboutAxis(0.0, one.half, -0.0005, 0.0095)}, 0.0005);
-  const auto peg =
-      test::bakePart(one.peg, fine, {test::boxAboutAxis(0.0, one.half, -0.0005, 0.0105)}, 0.0005);
+  const auto hole = test::bakePart(one.hole, effort.fine,
+                                   {test::boxAboutAxis(0.0, one.half, -0.0005, 0.0095)}, effort.spacing);
+  const auto peg = test::bakePart(one.peg, effort.fine, {test::boxAboutAxis(0.0, one.half, -0.0005, 0.0105)},
+                                  effort.spacing);
   ASSERT_TRUE(hole && peg);
 
   InsertionTrial insertion;
   test::IslandRig& rig = insertion.rig;
-  const Pose start(Vector3(kSheetX, 0.0, 0.02), kTilted);
+  const Pose start(Vector3(effort.sheet ? kSheetX : 0.0003, 0.0, 0.02), kTilted);
   const auto held = insertion.hold(*peg, start, {0.0, 0.0, 0.02});
   insertion.addStatic(held, *hole, one.clearance);
-  rig.addStatic(held, test::sheetStructures(0.04, 0.0, kSheetVoxel, 0.0011), Pose(Vector3(kSheetX, 0.0, 0.0)),
-                test::kSolidVoxels * kSheetVoxel);
+  if (effort.sheet) {
+    rig.addStatic(held, test::sheetStructures(0.04, 0.0, kSheetVoxel, 0.0011),
+                  Pose(Vector3(kSheetX, 0.0, 0.0)), test::kSolidVoxels * kSheetVoxel);
+  }
   insertion.measureOverlap([&] { return test::overlapOfMeshes(*peg, *hole, rig.pose(held), kOverlap); });
   const auto go = [&](const Pose& X_WH, int ticks) {
     const Pose from = rig.body(held).springs[0].X_WG;
@@ -124,12 +125,14 @@ TEST_P(RealPegs, TheSheetBlocksThePegAndTheHolePermitsTiltedInsertionAndRetracti
     }
   };
 
-  // the hand goes through the sheet at 1 m/s, to 30 mm behind it
-  go(Pose(Vector3(kSheetX, 0.0, -0.03), kTilted), 50);
-  rig.settle(20);
-  EXPECT_GT(rig.pose(held).translation().z(), 0.0011) << "through the sheet";
-  EXPECT_GT(rig.force(2).force.z(), 20.0);
-  go(start, 50);
+  if (effort.sheet) {
+    // the hand goes through the sheet at 1 m/s, to 30 mm behind it
+    go(Pose(Vector3(kSheetX, 0.0, -0.03), kTilted), 50);
+    rig.settle(20);
+    EXPECT_GT(rig.pose(held).translation().z(), 0.0011) << "through the sheet";
+    EXPECT_GT(rig.force(2).force.z(), 20.0);
+    go(start, 50);
+  }
   // to the block, along it until the tip finds the hole, in, and out again
   insertion.largest_force = 0.0;
   go(Pose(Vector3(0.0003, -0.00015, 0.012), kTilted), 200);
@@ -147,23 +150,35 @@ TEST_P(RealPegs, TheSheetBlocksThePegAndTheHolePermitsTiltedInsertionAndRetracti
   insertion.expectSmallForcesAndNoOverlap();
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Factory, RealPegs,
-    testing::Values(PegCase{"Round8", "nv_factory_round_8mm/factory_round_hole_8mm_subdiv_3x.obj",
-                            "nv_factory_round_8mm/factory_round_peg_8mm_loose.obj", 0.000114, 0.0043},
-                    PegCase{"Rectangular16",
-                            "nv_factory_rect_16mm/factory_rectangular_hole_16mm_subdiv_3x.obj",
-                            "nv_factory_rect_16mm/factory_rectangular_peg_16mm_loose_subdiv_3x.obj", 0.000248,
-                            0.0085}),
-    [](const auto& one) { return std::string(one.param.name); });
+const PegCase kRound{"Round8", "nv_factory_round_8mm/factory_round_hole_8mm_subdiv_3x.obj",
+                     "nv_factory_round_8mm/factory_round_peg_8mm_loose.obj", 0.000114, 0.0043};
+const PegCase kRectangular{
+    "Rectangular16", "nv_factory_rect_16mm/factory_rectangular_hole_16mm_subdiv_3x.obj",
+    "nv_factory_rect_16mm/factory_rectangular_peg_16mm_loose_subdiv_3x.obj", 0.000248, 0.0085};
+
+class RealPegs : public testing::TestWithParam<PegCase> {};
+class RealPegsNightly : public testing::TestWithParam<PegCase> {};
+
+// Hole and peg are thick solids: larger voxels than their clearance asks for take seconds.
+TEST_P(RealPegs, TheHolePermitsTiltedInsertionAndRetraction) {
+  insertAndRetract(GetParam(), {.fine = 0.0001, .spacing = 0.001, .sheet = false});
+}
+
+TEST_P(RealPegsNightly, TheSheetBlocksThePegAndTheHolePermitsTiltedInsertionAndRetraction) {
+  insertAndRetract(GetParam(),
+                   {.fine = test::voxelOf(GetParam().clearance), .spacing = 0.0005, .sheet = true});
+}
+
+INSTANTIATE_TEST_SUITE_P(Factory, RealPegs, testing::Values(kRound, kRectangular),
+                         [](const auto& one) { return std::string(one.param.name); });
+INSTANTIATE_TEST_SUITE_P(Factory, RealPegsNightly, testing::Values(kRound, kRectangular),
+                         [](const auto& one) { return std::string(one.param.name); });
 
 //   [nut]  <- the hand turns it and presses a little; the thread guides it down, 2 mm a turn
 //    ~~
 //   bolt
-TEST(RealThread, ANutThatStartsTiltedIsScrewedOnAndOff) {
+TEST(RealThreadNightly, ANutThatStartsTiltedIsScrewedOnAndOff) {
   const std::string folder = "nv_factory_nut_bolt_m16/";
-  if (!std::filesystem::exists(test::pairsFolder() / folder)) GTEST_SKIP() << "no CAD pairs (TENON_SHARED)";
-  if (test::kSanitized) GTEST_SKIP() << "takes minutes; CAD pairs are baked and queried by other tests";
   constexpr double kPitch = 0.002;
   constexpr double kClearance = 0.0002;  // [m] 0.1 mm at either flank of the thread
   constexpr double kTop = 0.025;         // [m] height of the nut where it leaves the bolt's tip
@@ -171,9 +186,9 @@ TEST(RealThread, ANutThatStartsTiltedIsScrewedOnAndOff) {
   constexpr int kTurns = 3;
   const Vector3 p_NC(0.0, 0.0, 0.0225);  // the nut's centre
   const double fine = test::voxelOf(kClearance);
-  const auto bolt = test::bakePart(folder + "factory_bolt_m16_loose.obj", fine,
+  const auto bolt = test::bakePart(folder + "factory_bolt_m16_loose.ply", fine,
                                    {test::boxAboutAxis(0.0, 0.0085, 0.0355, 0.0415)}, 0.0005);
-  const auto nut = test::bakePart(folder + "factory_nut_m16_loose_subdiv_3x.obj", fine,
+  const auto nut = test::bakePart(folder + "factory_nut_m16_loose_subdiv_3x.ply", fine,
                                   {test::boxAboutAxis(0.0, 0.0085, 0.0155, 0.0215)}, 0.0005);
   ASSERT_TRUE(bolt && nut);
 
@@ -219,10 +234,8 @@ TEST(RealThread, ANutThatStartsTiltedIsScrewedOnAndOff) {
 //      turns
 //  ##|##|#|  freely on its own shaft; the small one turns the other half as far, and is taken off again
 //  ________
-TEST(RealGears, AGearIsPutOnItsShaftDrivesItsNeighbourAndIsTakenOff) {
+TEST(RealGearsNightly, AGearIsPutOnItsShaftDrivesItsNeighbourAndIsTakenOff) {
   const std::string folder = "nv_factory_gears/";
-  if (!std::filesystem::exists(test::pairsFolder() / folder)) GTEST_SKIP() << "no CAD pairs (TENON_SHARED)";
-  if (test::kSanitized) GTEST_SKIP() << "takes minutes; CAD pairs are baked and queried by other tests";
   constexpr double kBoreClearance = 0.000027;
   constexpr double kToothClearance = 0.00037;
   constexpr double kHigh = 0.0225;        // [m] height of a gear that is off its shaft
@@ -232,15 +245,15 @@ TEST(RealGears, AGearIsPutOnItsShaftDrivesItsNeighbourAndIsTakenOff) {
   // shafts and bores are thick solids, so their voxels need not be as small as their clearance asks for
   const double fine = test::voxelOf(kToothClearance);
   const double shaft = 0.0056;
-  const auto base = test::bakePart(folder + "factory_gear_base_loose_space_5e-4_subdiv_4x.obj", fine,
+  const auto base = test::bakePart(folder + "factory_gear_base_loose_space_5e-4_subdiv_4x.ply", fine,
                                    {test::boxAboutAxis(p_WM.x(), shaft, 0.0045, 0.0255),
                                     test::boxAboutAxis(p_WS.x(), shaft, 0.0045, 0.0255)},
                                    0.001);
   const auto medium = test::bakePart(
-      folder + "factory_gear_medium_space_5e-4.obj", fine,
+      folder + "factory_gear_medium_space_5e-4.ply", fine,
       {test::boxAboutAxis(p_WM.x(), shaft, 0.0045, 0.0255), test::boxAboutAxis(0.039, 0.007, 0.0045, 0.0155)},
       0.0008);
-  const auto small = test::bakePart(folder + "factory_gear_small_space_5e-4.obj", fine,
+  const auto small = test::bakePart(folder + "factory_gear_small_space_5e-4.ply", fine,
                                     {test::boxAboutAxis(p_WS.x(), 0.0115, 0.0045, 0.0155),
                                      test::boxAboutAxis(p_WS.x(), shaft, 0.0045, 0.0255)},
                                     0.0008);

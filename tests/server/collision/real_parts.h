@@ -29,7 +29,7 @@ inline double dilationOf(double clearance) { return 0.25 * clearance; }
 /// [m] Voxel size for a clearance of `clearance` [m].
 inline double voxelOf(double clearance) { return dilationOf(clearance) / kSolidVoxels; }
 
-inline std::filesystem::path pairsFolder() { return sharedFolder() / "cad" / "pairs"; }
+inline std::filesystem::path pairsFolder() { return dataFolder() / "pairs"; }
 
 /// Bakes a part: voxels of `fine` [m] within the boxes, eight times as large elsewhere, points `spacing` [m]
 /// apart. On an error it adds a test failure and returns null.

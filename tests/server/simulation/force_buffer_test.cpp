@@ -27,20 +27,6 @@ TEST(ForceBuffer, KeepsACellThatIsNotRefreshedAndReportsItsAge) {
   EXPECT_EQ(buffer.age(0, 9), 4U);
 }
 
-TEST(ForceBuffer, ATotalIsDueAfterEveryWriteOrAfterAWriteToTheOldestCell) {
-  ForceBuffer every(3, SendPolicy::kEveryForce);
-  ForceBuffer oldest(3, SendPolicy::kOldestCell);
-  for (std::size_t cell = 0; cell < 3; ++cell) {
-    every.write(cell, push(1.0), 1);
-    oldest.write(cell, push(1.0), 1);
-  }
-  EXPECT_TRUE(every.write(1, push(1.0), 2));
-  EXPECT_TRUE(oldest.write(0, push(1.0), 2));
-  EXPECT_FALSE(oldest.write(0, push(1.0), 3)) << "cells 1 and 2 are older";
-  EXPECT_TRUE(oldest.write(1, push(1.0), 3));
-  EXPECT_TRUE(oldest.write(2, push(1.0), 3));
-}
-
 TEST(ForceBuffer, FadesAContributionLinearlyAndFreesItsCellAfterItsLifetime) {
   ForceBuffer buffer(1);
   ASSERT_TRUE(buffer.contribute(7, push(10.0), 10, 100));

@@ -5,6 +5,7 @@
 
 #include "server/simulation/environment.h"
 #include "tests/server/simulation/small_scene.h"
+#include "tests/support/known_shortfall.h"
 
 namespace tenon::simulation {
 namespace {
@@ -78,6 +79,45 @@ TEST(FreeBodyAndHand, ABoxOnASlopeSlidesOrSticksByCoulombFriction) {
     test::stepTicks(environment, 300);
     const double expected = std::max(std::sin(angle) - friction * std::cos(angle), 0.0) * kG * 0.3;
     EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.x(), expected, std::max(0.02 * expected, 1e-3))
+        << friction;
+  }
+}
+
+/// [m/s] Mean speed along x from tick 100 to tick 400 of a box on the floor, of friction `friction` [-] at
+/// rest and sliding, under gravity turned by `slope` [rad] and a force of `push` [N].
+double creepOf(double friction, double slope, double push) {
+  test::SmallScene small;
+  const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
+  const ObjectId box = small.freeBox("box", kSize, kMass, {-0.1, 0.0, 0.5 * kSize.z()});
+  small.spec(box).body->friction = friction;
+  small.pair(box, ground);
+  small.gravity({kG * std::sin(slope), 0.0, -kG * std::cos(slope)});
+  Environment environment(small.build(), {});
+  const auto x = [&] { return environment.objects()[box.value].X_WO.translation().x(); };
+  const auto step = [&](int ticks) {
+    for (int tick = 0; tick < ticks; ++tick) {
+      if (push > 0.0) environment.contribute(box, 1, {Vector3(push, 0.0, 0.0), Vector3::Zero()}, 200);
+      environment.step();
+    }
+  };
+  step(100);
+  const double before = x();
+  step(300);
+  return (x() - before) / (300 * kTickSeconds);
+}
+
+// below the limit of friction a body at rest stays at rest: it must not creep
+constexpr double kStill = 1e-6;  // [m/s]
+
+TEST(FreeBodyAndHand, ABoxPushedWithLessThanTheLimitOfFrictionStaysAtRest) {
+  const double limit = 0.6 * kMass * kG;  // [N]
+  for (const double part : {0.5, 0.85})
+    EXPECT_TRUE(test::knownShortfall(creepOf(0.6, 0.0, part * limit), kStill, 5e-3)) << part;
+}
+
+TEST(FreeBodyAndHand, ABoxOnASlopeBelowTheLimitOfFrictionStaysAtRest) {
+  for (const double friction : {0.5, 0.8}) {
+    EXPECT_TRUE(test::knownShortfall(creepOf(friction, 20.0 / 180.0 * std::numbers::pi, 0.0), kStill, 5e-3))
         << friction;
   }
 }

@@ -199,9 +199,12 @@ TEST_F(StackTest, ContinuesBitEqualAfterARestoreWhenASeparatedPairComesNearAgain
 }
 
 TEST_F(StackTest, StepAllocatesNothingAndLocksNothing) {
+  EnvironmentOptions options;
+  options.workers = 2;
+  begin(options);
   test::activateHand(*environment_, hand_, {0.2, 0.0, 1.5 * kEdge});
   test::stepTicks(*environment_, 50);
-  const test::RealtimeGuard guard;
+  const test::RealtimeGuard guard(test::CountedThreads::kAll);
   test::moveHandTo(*environment_, hand_, {0.0, 0.0, 1.5 * kEdge}, 400);
   test::stepTicks(*environment_, 400);
   EXPECT_EQ(guard.allocations(), 0);

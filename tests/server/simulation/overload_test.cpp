@@ -34,7 +34,7 @@ std::vector<std::uint64_t> workOf(const test::Overload& overload, Environment& e
 
 std::uint64_t p99(const std::vector<std::uint64_t>& sorted) { return sorted[sorted.size() * 99 / 100]; }
 
-TEST(test::Overload, TicksStayWithinTheirBudget) {
+TEST(Overload, TicksStayWithinTheirBudget) {
   const test::Overload overload(kBlocks);
   Environment unlimited(overload.scene, {});
   EXPECT_GT(p99(workOf(overload, unlimited)), 2 * kBudget);
@@ -45,7 +45,7 @@ TEST(test::Overload, TicksStayWithinTheirBudget) {
 }
 
 // Skipped levels must not make a block sink, jump or stand still.
-TEST(test::Overload, BlocksWithSkippedLevelsStayOnTheFloorAndFollowTheirHands) {
+TEST(Overload, BlocksWithSkippedLevelsStayOnTheFloorAndFollowTheirHands) {
   const test::Overload overload(kBlocks);
   Environment unlimited(overload.scene, {});
   Environment limited(overload.scene, withBudget(kBudget));
@@ -64,7 +64,7 @@ TEST(test::Overload, BlocksWithSkippedLevelsStayOnTheFloorAndFollowTheirHands) {
   }
 }
 
-TEST(test::Overload, SkippedLevelsDoNotOscillate) {
+TEST(Overload, SkippedLevelsDoNotOscillate) {
   const test::Overload overload(kBlocks);
   Environment environment(overload.scene, withBudget(kBudget));
   std::map<std::size_t, std::uint32_t> skipped_levels;
@@ -80,7 +80,7 @@ TEST(test::Overload, SkippedLevelsDoNotOscillate) {
   EXPECT_LE(changes, 2 * kBlocks) << "in two seconds";
 }
 
-TEST(test::Overload, SkippedLevelsAreRestoredWithALargerBudget) {
+TEST(Overload, SkippedLevelsAreRestoredWithALargerBudget) {
   const test::Overload overload(kBlocks);
   Environment environment(overload.scene, withBudget(kBudget));
   while (environment.tick() < 200) overload.step(environment);
@@ -100,7 +100,7 @@ TEST(test::Overload, SkippedLevelsAreRestoredWithALargerBudget) {
 }
 
 // The governor gets synthetic times that change the budget several times.
-TEST(test::Overload, AGovernedRunIsReproducedFromItsBudgetsWithoutAClock) {
+TEST(Overload, AGovernedRunIsReproducedFromItsBudgetsWithoutAClock) {
   const test::Overload overload(kBlocks);
   std::map<Tick, std::uint64_t> budgets;
   std::vector<std::uint64_t> hashes;
@@ -135,7 +135,7 @@ TEST(test::Overload, AGovernedRunIsReproducedFromItsBudgetsWithoutAClock) {
   EXPECT_EQ(hashes_again, hashes);
 }
 
-TEST(test::Overload, BudgetAndLevelsAreRestoredFromACheckpoint) {
+TEST(Overload, BudgetAndLevelsAreRestoredFromACheckpoint) {
   const test::Overload overload(3);
   Environment original(overload.scene, withBudget(kBudget / 4));
   while (original.tick() < 150) overload.step(original);
@@ -154,7 +154,7 @@ TEST(test::Overload, BudgetAndLevelsAreRestoredFromACheckpoint) {
 //    +------+
 //       \/
 //   ~~~~~~~~~~~
-TEST(test::Overload, PointsThatSupportABodyAreNotSkipped) {
+TEST(Overload, PointsThatSupportABodyAreNotSkipped) {
   std::vector<structures::SurfaceSample> sites = test::boxSamples({0.1, 0.06, 0.04}, 0.002);
   sites.push_back({{0.0, 0.0, -0.025}, {0.0, 0.0, 1.0}, 1e-6});
   const auto needle = test::analyticStructures(
@@ -182,11 +182,13 @@ TEST(test::Overload, PointsThatSupportABodyAreNotSkipped) {
   EXPECT_NE(environment.pairs()[pair].result, nullptr);
 }
 
-TEST(test::Overload, ALimitedTickAllocatesNothing) {
+TEST(Overload, ALimitedTickAllocatesNothing) {
   const test::Overload overload(3);
-  Environment environment(overload.scene, withBudget(kBudget / 4));
+  EnvironmentOptions options = withBudget(kBudget / 4);
+  options.workers = 2;
+  Environment environment(overload.scene, options);
   overload.step(environment);
-  const test::RealtimeGuard guard;
+  const test::RealtimeGuard guard(test::CountedThreads::kAll);
   while (environment.tick() < 200) {
     overload.step(environment);
     if (environment.tick() == 100) environment.setBudget(kBudget / 8);

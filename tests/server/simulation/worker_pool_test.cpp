@@ -12,7 +12,36 @@
 namespace tenon::simulation {
 namespace {
 
+/// Work of which every item waits until `workers` items have begun: ends only when as many threads work at
+/// once. Threads: all.
+class Meeting {
+ public:
+  explicit Meeting(unsigned workers) : workers_(workers) {}
+  void operator()(unsigned, std::size_t) {
+    const auto limit = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+    begun_.fetch_add(1);
+    while (begun_.load() < workers_ && std::chrono::steady_clock::now() < limit) std::this_thread::yield();
+    if (begun_.load() >= workers_) met_.fetch_add(1);
+  }
+  [[nodiscard]] bool met() const { return met_.load() == workers_; }
+
+ private:
+  const unsigned workers_;
+  std::atomic<unsigned> begun_{0};
+  std::atomic<unsigned> met_{0};
+};
+
 class WorkerPoolWithWorkers : public testing::TestWithParam<unsigned> {};
+
+TEST_P(WorkerPoolWithWorkers, RunsAsManyItemsAtOnceAsItHasWorkers) {
+  WorkerPool pool(GetParam());
+  EXPECT_EQ(pool.workers(), GetParam());
+  for (int run = 0; run < 20; ++run) {
+    Meeting meeting(GetParam());
+    pool.run(GetParam(), meeting);
+    ASSERT_TRUE(meeting.met()) << "an item waited in vain for the others";
+  }
+}
 
 TEST_P(WorkerPoolWithWorkers, CallsEveryItemOfEveryRunExactlyOnce) {
   WorkerPool pool(GetParam());
@@ -43,11 +72,10 @@ TEST_P(WorkerPoolWithWorkers, WritesOfTheItemsAreVisibleAfterRun) {
 TEST_P(WorkerPoolWithWorkers, WakesSleepingWorkers) {
   WorkerPool pool(GetParam());
   for (int run = 0; run < 5; ++run) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(3));
-    std::atomic<int> calls{0};
-    auto work = [&](unsigned, std::size_t) { calls.fetch_add(1); };
-    pool.run(8, work);
-    EXPECT_EQ(calls.load(), 8);
+    std::this_thread::sleep_for(std::chrono::milliseconds(3));  // longer than they spin
+    Meeting meeting(GetParam());
+    pool.run(GetParam(), meeting);
+    ASSERT_TRUE(meeting.met());
   }
 }
 
@@ -64,13 +92,18 @@ TEST(WorkerPool, APoolOfOneWorkerRunsInTheCallingThread) {
 
 TEST(WorkerPool, RunAllocatesNothingAndLocksNothing) {
   WorkerPool pool(3);
-  std::array<int, 16> values{};
-  auto work = [&](unsigned, std::size_t item) { ++values[item]; };
-  pool.run(values.size(), work);
-  const test::RealtimeGuard guard;
-  for (int run = 0; run < 500; ++run) pool.run(values.size(), work);
+  Meeting warm_up(3);
+  pool.run(3, warm_up);
+  const test::RealtimeGuard guard(test::CountedThreads::kAll);
+  bool met = true;
+  for (int run = 0; run < 500 && met; ++run) {
+    Meeting meeting(3);
+    pool.run(3, meeting);
+    met = met && meeting.met();
+  }
   EXPECT_EQ(guard.allocations(), 0);
   EXPECT_EQ(guard.locks(), 0);
+  EXPECT_TRUE(met) << "all workers took part";
 }
 
 }  // namespace

@@ -62,14 +62,17 @@ TEST(DistanceField, IsTheDistanceToABallWithinTheBand) {
 TEST(DistanceField, OutsideTheBandIsALowerBoundWithTheRightSign) {
   const DistanceField field = ball();
   std::mt19937_64 random(2);
+  int outside = 0;
   for (int i = 0; i < 20'000; ++i) {
     const Vector3 p = randomPoint(random, 0.2);
     const FieldSample sample = field.sample(p);
     if (sample.exact) continue;
+    ++outside;
     EXPECT_EQ(sample.distance < 0.0, ballDistance(p) < 0.0) << p.transpose();
     EXPECT_LE(std::abs(sample.distance), std::abs(ballDistance(p)) + 1e-5) << p.transpose();
     EXPECT_EQ(sample.gradient, Vector3::Zero());
   }
+  EXPECT_GT(outside, 1000);
 }
 
 TEST(DistanceField, LowerBoundIsNeverAboveTheDistanceNorAboveAnExactSample) {

@@ -36,6 +36,7 @@ TEST(LevelAreas, OppositeFacesOfABoxHaveTheSameAreaAtEachLevel) {
   const Vector3 size(0.06, 0.04, 0.02);
   const auto box = test::boxStructures(size, 0.004, 0.001);
   const Pointshell& shell = box->shell;
+  ASSERT_GT(shell.levels().size(), 2U);
   for (std::size_t k = 1; k < shell.levels().size(); ++k) {
     const auto areas = shell.areasOfLevel(k);
     double top = 0.0;
@@ -44,6 +45,7 @@ TEST(LevelAreas, OppositeFacesOfABoxHaveTheSameAreaAtEachLevel) {
       if (shell.points()[i].inward_M.z() < -0.9F) top += areas[i];
       if (shell.points()[i].inward_M.z() > 0.9F) bottom += areas[i];
     }
+    EXPECT_GT(top, 0.0);
     EXPECT_NEAR(top, bottom, 0.1 * top) << "levels 0 to " << k;
   }
 }

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <cmath>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <random>
@@ -10,6 +12,7 @@
 #include "server/structures/field_builder.h"
 #include "server/structures/haptic_structures.h"
 #include "server/structures/shell_builder.h"
+#include "tests/support/damaged_structures.h"
 
 namespace tenon::structures {
 namespace {
@@ -125,6 +128,105 @@ TEST_F(StructureFile, AThousandRandomlyDamagedFilesAreRefused) {
     ASSERT_FALSE(opened) << i;
     EXPECT_THAT(opened.error().what, HasSubstr("ball.tenon"));
   }
+}
+
+/// Reads everything that a field and a shell can be asked for; returns how much that was.
+std::size_t useEverything(const HapticStructures& structures) {
+  std::size_t used = 0;
+  const DistanceField& field = structures.field;
+  if (!field.empty()) {
+    const Eigen::AlignedBox3d box = field.box();
+    const auto ask = [&](const Vector3& p_MP) {
+      used += field.sample(p_MP).exact ? 1 : 0;
+      used += std::isnan(field.lowerBound(p_MP, 0.001)) ? 0 : 1;
+      used += field.voxelAt(p_MP) > 0.0 ? 1 : 0;
+    };
+    constexpr int kSteps = 12;
+    for (int i = 0; i < kSteps * kSteps * kSteps; ++i) {
+      const Vector3 fraction(i % kSteps, i / kSteps % kSteps, i / (kSteps * kSteps));
+      ask(box.min() + box.sizes().cwiseProduct(fraction + Vector3::Constant(0.37)) / kSteps);
+    }
+    for (const double limit : {0.0, 1e300, -1e300, std::nan("")}) ask(Vector3::Constant(limit));
+    ask(box.min());
+    ask(box.max());
+  }
+  const Pointshell& shell = structures.shell;
+  if (shell.empty()) return used;
+  for (std::size_t leaf = 0; leaf < shell.leaves().size(); ++leaf) used += shell.pointsOfLeaf(leaf).count;
+  for (std::size_t i = 0; i < shell.clusters().size(); ++i) used += shell.leavesOfCluster(i).count;
+  for (std::size_t point = 0; point < shell.points().size(); ++point) {
+    EXPECT_LT(shell.leafOf(point), shell.leaves().size());
+  }
+  for (std::size_t k = 0; k < shell.levels().size(); ++k) {
+    const ShellLevel& level = shell.levels()[k];
+    EXPECT_EQ(shell.areasOfLevel(k).size(), level.first_point + level.point_count);
+    for (const float area : shell.areasOfLevel(k)) used += area > 0.0F ? 1 : 0;
+  }
+  return used;
+}
+
+/// Opens `count` damaged files whose checksums are right.
+void openDamaged(const fs::path& file, const std::vector<std::uint8_t>& whole, std::uint64_t count) {
+  std::uint64_t refused = 0;
+  std::uint64_t accepted = 0;
+  for (std::uint64_t seed = 0; seed < count; ++seed) {
+    SCOPED_TRACE("damage " + std::to_string(seed));
+    const auto bytes = test::damagedStructures(whole, seed);
+    if (bytes == whole) continue;
+    test::writeBytes(file, bytes);
+    const auto opened = openStructures(file);
+    if (opened) {
+      ++accepted;
+      (void)useEverything(**opened);
+    } else {
+      ++refused;
+      ASSERT_THAT(opened.error().what, HasSubstr("ball.tenon"));
+      ASSERT_THAT(opened.error().what, ::testing::Not(HasSubstr("wrong checksum")));
+    }
+    ASSERT_FALSE(::testing::Test::HasFailure());
+  }
+  EXPECT_GT(refused, count / 10);
+  EXPECT_GT(accepted, count / 10) << "damage of distances, texts and areas is not detectable";
+}
+
+TEST_F(StructureFile, DamageBehindARightChecksumIsRefusedOrHarmless) {
+  (void)written();
+  openDamaged(file(), test::bytesOf(file()), 4000);
+}
+
+class StructureFileNightly : public StructureFile {};
+
+TEST_F(StructureFileNightly, DamageBehindARightChecksumIsRefusedOrHarmless) {
+  (void)written();
+  openDamaged(file(), test::bytesOf(file()), 100'000);
+}
+
+TEST_F(StructureFile, AShellWhoseListsDoNotTileIsRefused) {
+  (void)written();
+  const std::vector<std::uint8_t> whole = test::bytesOf(file());
+  ASSERT_GT(structures_.shell.levels().size(), 0U);
+  const auto refusedWith = [&](std::size_t at, std::uint32_t number) {
+    std::vector<std::uint8_t> bytes = whole;
+    std::memcpy(bytes.data() + at, &number, sizeof number);
+    test::correctStructureChecksum(bytes);
+    test::writeBytes(file(), bytes);
+    const auto opened = openStructures(file());
+    return opened ? std::string("accepted") : opened.error().what;
+  };
+  const auto first = [&whole](std::size_t section) {
+    std::uint64_t at = 0;
+    std::memcpy(&at, whole.data() + test::kSectionsAt + 8 * section, sizeof at);
+    return static_cast<std::size_t>(at);
+  };
+  // sections 3..6: points, leaves, clusters, levels; a sphere's `first` and `count` follow four floats
+  const std::uint32_t leaf_count = structures_.shell.leaves()[0].count;
+  EXPECT_THAT(refusedWith(first(4) + 20, leaf_count - 1), HasSubstr("leaves"));
+  EXPECT_THAT(refusedWith(first(4) + 16, 1), HasSubstr("leaves"));
+  EXPECT_THAT(refusedWith(first(5) + 20, 0), HasSubstr("clusters"));
+  // fewer points in a level: the areas of the levels would have fewer entries than there are points
+  EXPECT_THAT(refusedWith(first(6) + 4, structures_.shell.levels()[0].point_count - 1), HasSubstr("the leaves of a level"));
+  EXPECT_THAT(refusedWith(first(3), 0x7FC00000U), HasSubstr("not finite"));
+  EXPECT_EQ(refusedWith(first(4) + 20, leaf_count), "accepted");
 }
 
 TEST_F(StructureFile, AnotherVersionIsRefusedWithAdviceToBakeAgain) {
