@@ -55,6 +55,10 @@ foreach(target server_bake_tests server_collision_tests server_session_tests)
   endif()
 endforeach()
 
+# what is generated from the IDL, and what is said to a line of it that cannot be understood
+add_test(NAME idl.generate COMMAND ${Python3_EXECUTABLE} ${CMAKE_SOURCE_DIR}/tests/idl/generate_test.py)
+set_tests_properties(idl.generate PROPERTIES TIMEOUT 300 LABELS "gate;idl")
+
 # a whole session in one process: ends as it should, and without a report of the sanitizer that this preset has
 add_test(NAME rehearsal.short COMMAND ${Python3_EXECUTABLE} ${CMAKE_SOURCE_DIR}/tests/rehearsal_test.py)
 set_tests_properties(rehearsal.short PROPERTIES TIMEOUT 900 LABELS "gate;rehearsal" ENVIRONMENT "${test_environment}" COST 300)

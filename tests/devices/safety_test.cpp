@@ -9,7 +9,6 @@
 #include "devices/simulated/falcon.h"
 #include "devices/simulated/hug.h"
 #include "devices/simulated/sigma7.h"
-#include "idl/types/messages.h"
 #include "tests/support/realtime_guard.h"
 
 namespace tenon::devices {

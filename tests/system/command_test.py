@@ -7,7 +7,7 @@ from stage import PROGRAMS, Stage, tenon
 
 class Commands(unittest.TestCase):
     def command(self, stage, *arguments):
-        return tenon("tell", *arguments, "--session", stage.session, "--domain", stage.domain)
+        return tenon("command", *arguments, "--session", stage.session, "--domain", stage.domain)
 
     def assert_accepted(self, stage, *arguments):
         done = self.command(stage, *arguments)
@@ -57,7 +57,7 @@ class Commands(unittest.TestCase):
             server = stage.serve("peg_and_box", "--wait-for", "right")
             stage.start("trainee", "--seed", 1)
             server.wait_for("run: running", 60)
-            keys = subprocess.run([PROGRAMS / "tenon-tell", "--keys", "--session", stage.session, "--domain",
+            keys = subprocess.run([PROGRAMS / "tenon-command", "--keys", "--session", stage.session, "--domain",
                                    str(stage.domain)], input="?pprxe", capture_output=True, text=True, timeout=120)
             self.assertEqual(keys.returncode, 0, keys.stderr)
             self.assertIn("emergency stop", keys.stdout, "the legend lists every key")
@@ -69,7 +69,7 @@ class Commands(unittest.TestCase):
     def test_a_wrong_command_line_is_refused_with_the_usage(self):
         for arguments, reason in ((["fly"], "unknown command 'fly'"), (["signal"], "usage: signal NAME"), ([], "no command given")):
             with self.subTest(arguments=arguments):
-                done = tenon("tell", *arguments)
+                done = tenon("command", *arguments)
                 self.assertEqual(done.returncode, 1)
                 self.assertIn(reason, done.stderr)
 

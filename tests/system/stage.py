@@ -1,4 +1,9 @@
-"""Shared by the system tests: runs Tenon's programs as processes over DDS and ends them with the test."""
+"""Shared by the system tests: runs Tenon's programs as processes over DDS and ends them with the test.
+
+Scripts may run at the same time: each session has a DDS domain and a folder of its own. Baked parts are shared in a cache that is
+apart from the user's.
+"""
+import fcntl
 import os
 import re
 import signal
@@ -11,11 +16,24 @@ from pathlib import Path
 SOURCE = Path(__file__).resolve().parents[2]
 PROGRAMS = Path(os.environ.get("TENON_PROGRAMS", SOURCE / "build" / "release" / "bin"))
 TENON = SOURCE / "tenon"
+# ctest names a cache of its build folder; a script that is started by hand uses one of its user
+os.environ.setdefault("TENON_CACHE", str(Path(tempfile.gettempdir()) / f"tenon-test-cache-{os.getuid()}"))
+
+claimed_domains = []  # locked files, until this process ends
 
 
 def free_domain():
-    """A DDS domain that other tests on this machine are unlikely to use."""
-    return 1 + os.getpid() % 90
+    """A DDS domain that no other test of this machine uses while this process runs. The C++ tests claim theirs likewise."""
+    for domain in range(1, 100):
+        file = os.open(Path(tempfile.gettempdir()) / f"tenon-test-domain-{domain}", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o666)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(file)
+            continue
+        claimed_domains.append(file)
+        return domain
+    raise AssertionError("all DDS domains of the tests are in use")
 
 
 def tenon(*arguments, timeout=600, env=None, input=None):
@@ -25,8 +43,11 @@ def tenon(*arguments, timeout=600, env=None, input=None):
 
 
 def final_hash(text):
-    found = re.findall(r"final state hash: ([0-9a-f]{16})", text)
-    return found[-1] if found else None
+    """The hash that ends a session's output; fails when there is none, so that two missing ones never count as equal."""
+    found = re.findall(r"(?m)^final state hash: ([0-9a-f]{16})$", text)
+    if not found:
+        raise AssertionError(f"no final state hash in:\n{text[-2000:]}")
+    return found[-1]
 
 
 class Process:

@@ -16,7 +16,8 @@ using test::PlaneServer;
 
 /// A simulated device held by a simulated arm; it moves a ball above a floor at z = 0.
 struct HandAboveFloor {
-  explicit HandAboveFloor(const std::string& name) : device(std::move(*openDevice(name))), hand(*device) {
+  explicit HandAboveFloor(const std::string& name)
+      : device(std::move(*devices::openDevice(name))), hand(*device) {
     world.begin(server.objects(), 0, 0);
     EXPECT_TRUE(hand.begin(test::kHand, ClientId{1}, Vector3(0.0, 0.0, 0.03)));
   }

@@ -1,7 +1,8 @@
 #pragma once
 
 #include "clients/haptic/local_model.h"
-#include "idl/types/messages.h"
+#include "idl/types/messages/contacts.h"
+#include "idl/types/messages/objects.h"
 
 namespace tenon::test {
 

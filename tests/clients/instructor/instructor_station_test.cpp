@@ -116,10 +116,10 @@ class StuckPart {
   Tick tick_ = 0;
 };
 
-class InstructorWithEach : public testing::TestWithParam<const char*> {};
+class InstructorWithEach : public testing::TestWithParam<std::string> {};
 
 TEST_P(InstructorWithEach, PushesAStuckPartTowardsItsTargetAndReturns) {
-  StuckPart scene(GetParam());
+  StuckPart scene(GetParam().c_str());
   scene.run(3.5);
   EXPECT_STREQ(scene.station->activity(), "watches");
   scene.run(26.5);
@@ -132,7 +132,7 @@ TEST_P(InstructorWithEach, PushesAStuckPartTowardsItsTargetAndReturns) {
 
 INSTANTIATE_TEST_SUITE_P(Devices, InstructorWithEach, testing::Values("sigma7-sim", "falcon-sim"),
                          [](const auto& each) {
-                           const std::string name = each.param;
+                           const std::string& name = each.param;
                            return name.substr(0, name.find('-'));
                          });
 

@@ -9,6 +9,10 @@
 #include <unistd.h>
 
 #include "idl/record/mcap_reader.h"
+#include "idl/types/messages/log.h"
+#include "idl/types/messages/objects.h"
+#include "idl/types/messages/role.h"
+#include "idl/types/messages/session.h"
 #include "idl/wire/codec.h"
 #include "tests/idl/wire/peer.h"
 

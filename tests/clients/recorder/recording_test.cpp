@@ -9,6 +9,9 @@
 
 #include "idl/record/instance_state.h"
 #include "idl/record/mcap_reader.h"
+#include "idl/types/messages/journal.h"
+#include "idl/types/messages/log.h"
+#include "idl/types/messages/objects.h"
 #include "idl/wire/codec.h"
 
 namespace tenon::recorder {

@@ -7,6 +7,14 @@
 #include <string>
 
 #include "idl/record/mcap_writer.h"
+#include "idl/types/messages/contacts.h"
+#include "idl/types/messages/log.h"
+#include "idl/types/messages/objects.h"
+#include "idl/types/messages/role.h"
+#include "idl/types/messages/run.h"
+#include "idl/types/messages/session.h"
+#include "idl/types/messages/steps.h"
+#include "idl/types/messages/timing.h"
 #include "idl/wire/codec.h"
 #include "idl/wire/topics.h"
 

@@ -89,7 +89,9 @@ TEST_P(EngineBayPart, TouchesNothingAtItsTarget) {
 TEST_P(EngineBayPart, ContainsNothingOfTheBayAtItsTarget) {
   const Eigen::AlignedBox3d region = enlarged(part().box_P.translated(part().p_WT), 0.002);
   const test::SolidProbe solid(mesh(part().name), target(), region);
-  for (const Vector3& p_W : test::surfacePoints(mesh("engine_bay"), Pose(), 0.005, region)) {
+  const std::vector<Vector3> points = test::surfacePoints(mesh("engine_bay"), Pose(), 0.005, region);
+  ASSERT_FALSE(points.empty());
+  for (const Vector3& p_W : points) {
     ASSERT_FALSE(solid.inside(p_W)) << p_W.transpose();
   }
 }
@@ -99,10 +101,13 @@ TEST_P(EngineBayPart, OnlyItsTonguesComeNearTheBay) {
   const test::SolidProbe bay(mesh("engine_bay"), Pose(), region);
   const Pose X_GW = (target() * engine_bay::guideFrame(part().approach)).inverse();
   const double mouth = part().tongues[0].tip + engine_bay::kInsertion;
+  std::size_t measured = 0;
   for (const Vector3& p_W : test::surfacePoints(mesh(part().name), target(), 0.008, region)) {
     if ((X_GW * p_W).z() < mouth + 0.005) continue;
     ASSERT_GT(bay.distance(p_W, 0.02), 0.004) << p_W.transpose();
+    ++measured;
   }
+  EXPECT_GT(measured, 100U);
 }
 
 TEST_P(EngineBayPart, HasACollisionFreeApproachToItsTarget) {
@@ -110,6 +115,7 @@ TEST_P(EngineBayPart, HasACollisionFreeApproachToItsTarget) {
   const test::SolidProbe bay(mesh("engine_bay"), Pose(), region);
   const auto points =
       test::onePointPerCell(test::surfacePoints(mesh(part().name), target(), 0.03, region), 0.03);
+  ASSERT_GT(points.size(), 10U);
   const Vector3 back = -engine_bay::approachDirection(part().approach);
   const Pose X_WG = target() * engine_bay::guideFrame(part().approach);
   const Vector3 x_W = X_WG.rotation() * Vector3::UnitX();
@@ -129,6 +135,7 @@ TEST_P(EngineBayPart, HasACollisionFreeApproachToItsTarget) {
 
 TEST_P(EngineBayPart, IsCapturedByItsFunnelsWithErrorsOfSixMillimetresAndFiveDegrees) {
   const double yaw = 5.0 * 3.141592653589793 / 180.0;
+  ASSERT_FALSE(part().usedTongues().empty());
   for (const engine_bay::Tongue& t : part().usedTongues()) {
     const double x = std::abs(t.x) + 0.5 * t.width;
     const double y = std::abs(t.y) + 0.5 * t.depth;
