@@ -34,6 +34,11 @@ WorkerPool::WorkerPool(unsigned workers) {
   for (unsigned worker = 1; worker < std::max(workers, 1U); ++worker) {
     threads_.emplace_back([this, worker] { work(worker); });
   }
+  // a thread allocates and locks while it starts: that is over before the first run
+  for (std::uint32_t running = done_.load(std::memory_order_acquire); running < threads_.size();
+       running = done_.load(std::memory_order_acquire)) {
+    waitWhile(done_, running);
+  }
 }
 
 WorkerPool::~WorkerPool() {
@@ -82,6 +87,8 @@ void WorkerPool::takeItems(unsigned worker) noexcept {
 }
 
 void WorkerPool::work(unsigned worker) noexcept {
+  done_.fetch_add(1, std::memory_order_acq_rel);
+  done_.notify_one();
   std::uint32_t seen = wake_.load(std::memory_order_acquire);
   while (!stop_.load(std::memory_order_acquire)) {
     takeItems(worker);
