@@ -54,6 +54,9 @@ foreach(target server_bake_tests server_collision_tests server_session_tests)
     add_dependencies(${target} tenon-bake tenon-parts)  # started by them
   endif()
 endforeach()
+if(TARGET server_session_tests)
+  add_dependencies(server_session_tests tenon-serve)
+endif()
 
 # what is generated from the IDL, and what is said to a line of it that cannot be understood
 add_test(NAME idl.generate COMMAND ${Python3_EXECUTABLE} ${CMAKE_SOURCE_DIR}/tests/idl/generate_test.py)
