@@ -21,8 +21,8 @@ namespace tenon::observer {
 /// arrived. Where two topics tell the same event, one is chosen. A step ends where the next one begins, or
 /// with the run: StepState carries the tick in which a step began, also when it says that the step is done.
 ///
-/// Not reported: that a hand takes or releases its own pointer, that a mounted part is let go, further contacts
-/// of two objects in one step, and what comes after the end of the run.
+/// Not reported: that a hand takes or releases its own pointer, that a mounted part is let go, further
+/// contacts of two objects in one step, and what comes after the end of the run.
 ///
 /// Threads: one. Real-time: no.
 class Timeline {

@@ -32,10 +32,8 @@ Eigen::AlignedBox3d enlarged(Eigen::AlignedBox3d box, double margin) {
 /// The part's box in W, swept along the approach to its target.
 Eigen::AlignedBox3d sweptBox(const engine_bay::PartLayout& part) {
   Eigen::AlignedBox3d box = part.box_P;
-  box.extend(part.box_P.min() -
-             engine_bay::kApproachDistance * engine_bay::approachDirection(part.approach));
-  box.extend(part.box_P.max() -
-             engine_bay::kApproachDistance * engine_bay::approachDirection(part.approach));
+  box.extend(part.box_P.min() - engine_bay::kApproachDistance * engine_bay::approachDirection(part.approach));
+  box.extend(part.box_P.max() - engine_bay::kApproachDistance * engine_bay::approachDirection(part.approach));
   return box.translated(part.p_WT);
 }
 

@@ -22,8 +22,7 @@ std::vector<BakedPair> bakedPairs() {
                                     test::ballMesh(0.02, 3, {0.02, 0.01, 0.01})),
                      test::torusMesh(0.03, 0.006, 48, 20)),
       5);
-  const BakedPtr tool =
-      test::baked(test::boxMesh({-0.02, -0.01, -0.01}, {0.02, 0.01, 0.01}), 0.002, 2000);
+  const BakedPtr tool = test::baked(test::boxMesh({-0.02, -0.01, -0.01}, {0.02, 0.01, 0.01}), 0.002, 2000);
   const BakedPtr bracket = test::baked(test::meshOf(test::partNamed("bracket", 0.1)), 0.003, 3000);
   const BakedPtr box = test::baked(test::meshOf(test::partNamed("control_box", 0.05)), 0.004, 3000);
   const BakedPtr hole =

@@ -49,7 +49,8 @@ TEST(EngineBayScenario, HasThePosesOfTheGenerator) {
     expectSamePose(*stateNamed(scenario, "tool_" + name).X_WG, part_generator::engine_bay::toolPose(part),
                    "drill at " + name);
     const ObjectId object = scenario.objectNamed(name);
-    expectSamePose(scenario.objects[object.value].X_WO, part_generator::engine_bay::startPose(part), "start of " + name);
+    expectSamePose(scenario.objects[object.value].X_WO, part_generator::engine_bay::startPose(part),
+                   "start of " + name);
   }
   for (const part_generator::engine_bay::OtherObject& other : part_generator::engine_bay::others()) {
     const ObjectId object = scenario.objectNamed(other.name);

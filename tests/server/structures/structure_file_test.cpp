@@ -224,7 +224,8 @@ TEST_F(StructureFile, AShellWhoseListsDoNotTileIsRefused) {
   EXPECT_THAT(refusedWith(first(4) + 16, 1), HasSubstr("leaves"));
   EXPECT_THAT(refusedWith(first(5) + 20, 0), HasSubstr("clusters"));
   // fewer points in a level: the areas of the levels would have fewer entries than there are points
-  EXPECT_THAT(refusedWith(first(6) + 4, structures_.shell.levels()[0].point_count - 1), HasSubstr("the leaves of a level"));
+  EXPECT_THAT(refusedWith(first(6) + 4, structures_.shell.levels()[0].point_count - 1),
+              HasSubstr("the leaves of a level"));
   EXPECT_THAT(refusedWith(first(3), 0x7FC00000U), HasSubstr("not finite"));
   EXPECT_EQ(refusedWith(first(4) + 20, leaf_count), "accepted");
 }
