@@ -138,6 +138,7 @@ int serve(ServeArguments& arguments) {
   if (!loaded) return reportError(loaded.error().what);
   if (!arguments.resimulate.empty()) return resimulateFile(arguments, *loaded);
 
+  for (const std::string& sentence : tenon::session::thinWallReport(*loaded->scene)) printLine(sentence);
   arguments.session.print = printLine;
   arguments.session.detail = arguments.load.detail;
   auto server = tenon::session::SessionServer::open(*loaded, arguments.session);

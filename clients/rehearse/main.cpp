@@ -108,6 +108,8 @@ tenon::Result<std::vector<std::unique_ptr<tenon::haptic::Station>>> openStations
 int run(RehearseArguments& arguments) {
   const auto loaded = tenon::session::loadScene(arguments.scenario, arguments.load);
   if (!loaded) return printError(loaded.error().what);
+  for (const std::string& sentence : tenon::session::thinWallReport(*loaded->scene))
+    if (!arguments.quiet) std::printf("%s\n", sentence.c_str());
   auto stations = openStations(arguments, *loaded->scenario);
   if (!stations) return printError(stations.error().what);
   arguments.rehearsal.collisions = !arguments.no_collisions;

@@ -11,6 +11,7 @@
 #include "server/bake/exposed_surface.h"
 #include "server/bake/outside.h"
 #include "server/bake/parallel.h"
+#include "server/bake/refined_bricks.h"
 #include "server/bake/slope_limit.h"
 #include "server/bake/triangle_tree.h"
 #include "server/structures/field_builder.h"
@@ -29,35 +30,10 @@ tl::unexpected<Error> needsTooMuchMemory(double voxel) {
               " mm need more than 3 GB for this mesh; choose larger voxels");
 }
 
-std::vector<std::uint32_t> bricksToRefine(const BrickLevel& coarse, const BakeOptions& options) {
-  std::vector<std::uint32_t> refined;
-  if (options.refinement <= 1) return refined;
-  const double edge = coarse.voxel * BrickLevel::kVoxels;
-  for (std::size_t node = 0; node < coarse.nodes(); ++node) {
-    const std::int32_t slot = coarse.slot[node];
-    if (slot < 0) continue;
-    const double at_centre =
-        coarse.samplesOf(slot)[kCentreSample] / double{structures::DistanceField::kQuantaPerVoxel};
-    if (at_centre >= std::min(BrickLevel::kBrickRadius, structures::DistanceField::kClampVoxels)) {
-      // clamped at the centre: the surface is at a corner or not in the brick at all
-      const std::int16_t* s = coarse.samplesOf(slot);
-      if (*std::min_element(s, s + BrickLevel::kSamples) > structures::DistanceField::kQuantaPerVoxel)
-        continue;
-    }
-    const Vector3 p_MBo = coarse.position(coarse.brickOf(node) * BrickLevel::kVoxels);
-    const Eigen::AlignedBox3d box(p_MBo, p_MBo + Vector3::Constant(edge));
-    const bool wanted = std::any_of(options.refine.begin(), options.refine.end(),
-                                    [&box](const RefineBox& region) { return region.box_M.intersects(box); });
-    if (wanted) refined.push_back(static_cast<std::uint32_t>(node));
-  }
-  return refined;
-}
-
 /// Resamples inside samples as distances to the exposed surface only, and sets signs. `hidden` are the
 /// triangles that are not exposed, or not entirely: only a sample with one of them at its distance changes.
 void finishSamples(BrickLevel& level, const TriangleTree& exposed, const TriangleTree& hidden,
                    ParallelWork& work) {
-  constexpr double kClamp = structures::DistanceField::kClampVoxels;
   const auto forEachBrick = [&](auto&& act) {
     work.run(level.nodes(), 64, [&](std::size_t node) {
       if (level.slot[node] >= 0) act(node, ~level.outside[static_cast<std::size_t>(level.slot[node])]);
@@ -68,7 +44,7 @@ void finishSamples(BrickLevel& level, const TriangleTree& exposed, const Triangl
     const std::int16_t* samples = level.samplesOf(level.slot[node]);
     const Cell corner = level.brickOf(node) * BrickLevel::kVoxels;
     TriangleTree::Search search(hidden, level.centreOf(node), BrickLevel::kBrickRadius * level.voxel,
-                                (kClamp + 0.01) * level.voxel);
+                                (level.clampOf(node) + 0.01) * level.voxel);
     BrickLevel::SampleBits stale = inside & level.ownSamples(node);
     for (int k = 0; k < BrickLevel::kSamples; ++k) {
       if (!stale[static_cast<std::size_t>(k)]) continue;
@@ -143,10 +119,9 @@ class Assembler {
       return level.free[node] != 0 ? structures::DistanceField::kFarOutside
                                    : structures::DistanceField::kFarInside;
     const std::int16_t* samples = level.samplesOf(slot);
-    constexpr auto kBand =
-        static_cast<int>(structures::DistanceField::kBandVoxels * structures::DistanceField::kQuantaPerVoxel);
+    const auto band = static_cast<int>(level.bandOf(node) * structures::DistanceField::kQuantaPerVoxel);
     const bool in_band =
-        std::any_of(samples, samples + BrickLevel::kSamples, [](int s) { return std::abs(s) < kBand; });
+        std::any_of(samples, samples + BrickLevel::kSamples, [band](int s) { return std::abs(s) < band; });
     if (!in_band)
       return samples[kCentreSample] < 0 ? structures::DistanceField::kFarInside
                                         : structures::DistanceField::kFarOutside;
@@ -158,9 +133,9 @@ class Assembler {
   structures::FieldStorage& storage_;
 };
 
-structures::DistanceField assemble(structures::FieldStorage storage, const BrickLevel& coarse,
-                                   const BrickLevel* fine, std::span<const std::uint32_t> refined,
-                                   ParallelWork& work) {
+structures::FieldStorage assemble(structures::FieldStorage storage, const BrickLevel& coarse,
+                                  const BrickLevel* fine, std::span<const std::uint32_t> refined,
+                                  ParallelWork& work) {
   const std::vector<float> away = brickDistances(coarse, work);
   Assembler assembler(storage);
   std::size_t block = 0;
@@ -187,7 +162,7 @@ structures::DistanceField assemble(structures::FieldStorage storage, const Brick
     }
     ++block;
   }
-  return structures::makeField(std::move(storage));
+  return storage;
 }
 
 }  // namespace
@@ -211,10 +186,10 @@ Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, co
   if (!work.cancelled()) findOutside(coarse, nullptr, tree, work);
 
   std::unique_ptr<BrickLevel> fine;
-  const std::vector<std::uint32_t> refined = bricksToRefine(coarse, options);
-  if (!refined.empty() && !work.cancelled()) {
+  const RefinedBricks refined = bricksToRefine(coarse, options);
+  if (!refined.bricks.empty() && !work.cancelled()) {
     work.stage("refining", 0.55, 0.65);
-    fine = std::make_unique<BrickLevel>(coarse, options.refinement, refined);
+    fine = std::make_unique<BrickLevel>(coarse, options.refinement, refined.bricks, refined.deep);
     if (!fine->sampleDistances(tree, work)) return needsTooMuchMemory(options.voxel / options.refinement);
     if (!work.cancelled()) findOutside(*fine, &coarse, tree, work);
     if (!work.cancelled()) adoptFineSigns(coarse, *fine, work);
@@ -248,7 +223,7 @@ Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, co
 
   storage.layout.refinement = fine ? options.refinement : 1;
   work.stage("assembling the field", 0.85, 0.88);
-  baked.field = assemble(std::move(storage), coarse, fine.get(), refined, work);
+  baked.storage = assemble(std::move(storage), coarse, fine.get(), refined.bricks, work);
   return baked;
 }
 

@@ -5,6 +5,7 @@
 
 #include "idl/types/result.h"
 #include "server/bake/bake.h"
+#include "server/structures/field_builder.h"
 #include "server/structures/triangle.h"
 
 namespace tenon::bake {
@@ -12,7 +13,7 @@ namespace tenon::bake {
 class ParallelWork;
 
 struct BakedField {
-  structures::DistanceField field;
+  structures::FieldStorage storage;           ///< of the field, without dilation
   std::vector<structures::Triangle> surface;  ///< the exposed part of the triangles
   std::size_t hidden_triangles = 0;           ///< entirely inside the solid
 };

@@ -28,7 +28,7 @@ struct ConcaveDirection {
 /// The concave principal directions at a contact. Where the normal turns abruptly, the tangent planes to both
 /// sides are appended to `secondary_planes`: in a concave place they constrain the point as well.
 FixedVector<ConcaveDirection, 2> concaveDirections(const structures::DistanceField& field, const Pose& X_WB,
-                                                   double dilation, const Contact& contact,
+                                                   const Contact& contact,
                                                    FixedVector<Contact, 4>& secondary_planes) {
   FixedVector<ConcaveDirection, 2> directions;
   const Vector3 p_BP = X_WB.inverse() * contact.p_WP;
@@ -49,7 +49,7 @@ FixedVector<ConcaveDirection, 2> concaveDirections(const structures::DistanceFie
       const double slope = sample.gradient.norm();
       if (slope < kMinPlaneSlope) continue;
       Contact plane = contact;
-      plane.gap = (sample.distance - dilation - offset * sample.gradient.dot(along)) / slope;
+      plane.gap = (sample.distance - offset * sample.gradient.dot(along)) / slope;
       plane.n_W = X_WB.rotation() * (sample.gradient / slope);
       plane.area = 0.0;
       // with a smaller gap, the surface is convex between the contact and the sample
@@ -93,8 +93,7 @@ bool IslandSolver::evaluateCurvature(const Job& job) {
     const IslandPair& pair = job.pairs[i];
     const Contact& contact = job.results[i].query.contacts[row - first];
     FixedVector<Contact, 4> secondary_planes;
-    const auto directions =
-        concaveDirections(*pair.field_B, job.poseB(pair), pair.dilation, contact, secondary_planes);
+    const auto directions = concaveDirections(*pair.field_B, job.poseB(pair), contact, secondary_planes);
     for (const Contact& plane : secondary_planes) {
       if (secondary_plane_count_ == secondary_planes_.size()) break;
       secondary_planes_[secondary_plane_count_++] = {i, plane};

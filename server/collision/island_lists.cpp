@@ -26,7 +26,8 @@ int movableBodies(const IslandPair& pair) {
 
 /// [m] Contacts up to this gap must be listed before a step: those it may reach, and contact_margin.
 double neededMargin(const IslandPair& pair, const SolveLimits& limits) {
-  return std::max(limits.contact_margin, movableBodies(pair) * limits.max_step_length);
+  const double slope = pair.field_B->slope();
+  return std::max(limits.contact_margin, slope * movableBodies(pair) * limits.max_step_length);
 }
 
 }  // namespace
@@ -109,8 +110,9 @@ bool IslandSolver::updatePair(const Job& job, std::size_t i, SolveReport& report
 
 void IslandSolver::traversePair(const Job& job, std::size_t i, SolveReport& report) {
   const IslandPair& pair = job.pairs[i];
-  PairQuery query = job.queryOf(pair, neededMargin(pair, job.limits) +
-                                          kTraversalSteps * movableBodies(pair) * job.limits.max_step_length);
+  PairQuery query = job.queryOf(
+      pair, neededMargin(pair, job.limits) +
+                kTraversalSteps * pair.field_B->slope() * movableBodies(pair) * job.limits.max_step_length);
   query.levels = std::min(pair.levels, job.results[i].traversal.levels_used);
   query.reduce = true;
   queryPair(query, job.results[i].query);
@@ -130,7 +132,7 @@ double IslandSolver::approachSinceTraversal(const Job& job, std::size_t i) {
   };
   add(pair.body_a, job.results[i].traversal.X_WA);
   add(pair.body_b, job.results[i].traversal.X_WB);
-  return sum;
+  return pair.field_B->slope() * sum;
 }
 
 bool IslandSolver::mustTraverse(const Job& job, std::size_t i, double approach) {

@@ -36,7 +36,7 @@ bool IslandSolver::findSeam(const Job& job, std::size_t pair, std::size_t c, std
       const Vector3 n_W = gradient_W / slope;
       // on a concave surface both sides hold
       if (offset * (n_W - contact.n_W).dot(t_W) < kSeamTurn * kSeamDistance) continue;
-      const double gap = sample.distance - one.dilation - offset * gradient_W.dot(t_W);
+      const double gap = sample.distance - offset * gradient_W.dot(t_W);
       if (gap >= std::min(contact.gap, 0.0) - kSeamDepthNoise) seam.sides.push_back({n_W, gap});
     }
   }

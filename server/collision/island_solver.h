@@ -57,7 +57,6 @@ struct IslandPair {
   const structures::DistanceField* field_B = nullptr;
   Pose X_WA_static;
   Pose X_WB_static;
-  double dilation = 0.0;  ///< [m] offset of B's zero level set
   Friction friction;
   // for every traversal, as in PairQuery
   std::uint32_t levels = 0xFFFFFFFFU;
@@ -168,7 +167,7 @@ class IslandSolver {
   void traversePair(const Job& job, std::size_t pair, SolveReport& report);
   /// `approach` [m]: approachSinceTraversal.
   [[nodiscard]] static bool mustTraverse(const Job& job, std::size_t pair, double approach);
-  /// [m] Upper bound of how much any point of one body came nearer to the other since the last traversal.
+  /// [m] Upper bound of how much the gap of any point became smaller since the last traversal.
   [[nodiscard]] static double approachSinceTraversal(const Job& job, std::size_t pair);
   void buildConstraints(const Job& job);
   /// [m] Validity radius of the linearised problem: a step of this length meets no contact that had no room

@@ -14,7 +14,7 @@ namespace tenon::collision {
 struct Contact {
   Vector3 p_WP = Vector3::Zero();
   Vector3 n_W = Vector3::Zero();  ///< unit, from B into A: the direction in which B pushes A
-  double gap = 0.0;               ///< [m] signed distance minus the dilation; < 0: inside the dilated surface
+  double gap = 0.0;               ///< [m] value of B's field; < 0: inside its zero level set
   double area = 0.0;              ///< [m^2] surface of A that the point represents
   std::uint32_t point = 0;        ///< index in the pointshell: identifies the contact from tick to tick
 };
@@ -40,7 +40,6 @@ struct PairQuery {
   const structures::DistanceField* field_B = nullptr;
   Pose X_WA;
   Pose X_WB;
-  double dilation = 0.0;               ///< [m] outward offset of B's contact surface
   double margin = 0.0;                 ///< [m] contacts are listed up to this gap
   std::uint32_t levels = 0xFFFFFFFFU;  ///< number of pointshell levels that may be used
   /// Maximum number of points to test. A level that is expected to exceed it is skipped, with all finer ones;
@@ -63,7 +62,7 @@ struct PairQuery {
 struct PairQueryResult {
   ContactList contacts;
   QueryCounts counts;
-  /// [m] of all points, dilation included; a lower bound when no point is within the margin
+  /// [m] of all points; a lower bound when no point is within the margin
   double smallest_gap = 0.0;
   /// [m] the list holds every contact with a smaller gap: the margin, or less when contacts were dropped
   double complete_to = 0.0;
@@ -73,7 +72,7 @@ struct PairQueryResult {
   /// Penalty wrench for a stiffness of 1 N/m, force [m] and torque [m^2], if asked for
   Wrench penalty_Ao_W;
   std::uint32_t penalty_points = 0;  ///< points in that sum; points deeper than the field's band are not
-  double deepest = 0.0;              ///< [m] depth of the deepest point in the undilated field, 0 when apart
+  double deepest = 0.0;              ///< [m] depth of the deepest point in B's field, 0 when apart
   std::uint32_t levels_used = 0;
   std::uint32_t traversal_points = 0;  ///< points tested by queryPair; resampling does not change it
   double skipped_gap_error = 0.0;      ///< [m] points of skipped levels may be nearer by at most this
@@ -86,10 +85,10 @@ struct PairQueryResult {
 /// Threads: pure. Real-time.
 void queryPair(const PairQuery& query, PairQueryResult& result) noexcept;
 
-/// Evaluates the listed contacts at the query's poses without a traversal, as long as no point of A has come
-/// nearer to B than by `displacement` [m] since queryPair listed them. Gaps and normals are those of
-/// queryPair without ridge correction; points that are not listed have at least a gap of unlisted_gap -
-/// displacement. Contacts that left the field's band are removed from the list.
+/// Evaluates the listed contacts at the query's poses without a traversal, as long as the gap of no point of
+/// A has become smaller by more than `displacement` [m] since queryPair listed them. Gaps and normals are
+/// those of queryPair without ridge correction; points that are not listed have at least a gap of
+/// unlisted_gap - displacement. Contacts that left the field's band are removed from the list.
 ///
 /// Threads: pure. Real-time.
 void resampleContacts(const PairQuery& query, double displacement, PairQueryResult& result) noexcept;
@@ -98,7 +97,7 @@ void resampleContacts(const PairQuery& query, double displacement, PairQueryResu
 [[nodiscard]] double penaltyForce(const Contact& contact, double stiffness) noexcept;
 
 /// Penalty wrench of the paper (§3.1) on A about its origin, in W: F = K sum a_i d_i n_i / A_ref over the
-/// listed points inside the dilated surface, with A_ref = 1 cm^2 and K = `stiffness` [N/m].
+/// listed points inside B's field, with A_ref = 1 cm^2 and K = `stiffness` [N/m].
 [[nodiscard]] Wrench penaltyWrench(const PairQueryResult& result, const Vector3& p_WAo,
                                    double stiffness) noexcept;
 

@@ -84,7 +84,7 @@ std::size_t highestPlane(const TangentPlanes& planes, double interpolated, doubl
 void correctRidges(const LaneFrame& frame, const QueryKernels& kernels, const PointLanes& points,
                    std::span<SampleLanes> samples, SampleSums& sums) noexcept {
   std::array<std::uint32_t, Candidates::kCapacity / structures::ShellBlock::kLanes> non_unit;
-  if (kernels.non_unit_gradients(frame, samples, non_unit.data()) == 0) return;
+  if (kernels.non_unit_gradients(samples, non_unit.data()) == 0) return;
   const structures::DistanceField& field = frame.field;
   const ProbeOffsets offsets = probeOffsets(kProbeDistance * field.voxel());
   for (std::size_t b = 0; b < samples.size(); ++b) {

@@ -92,7 +92,6 @@ void ScenarioReader::readScenario(const YAML::Node& root) {
   }
   if (yaml_.failed()) return;
   ScenarioStateReader(yaml_, scenario_).read(root["states"]);
-  if (!yaml_.failed()) checkClearances();
 }
 
 void ScenarioReader::readObject(const YAML::Node& node) {

@@ -11,8 +11,8 @@ namespace {
 
 using StructuresByObject = std::vector<std::shared_ptr<const structures::HapticStructures>>;
 
-constexpr double kDilationPerVoxel = 0.87;      // [-] sqrt(3)/2 rounded up: half the diagonal of a voxel
-constexpr double kDilationPerClearance = 0.25;  // [-]
+constexpr double kDilationPerClearance = 0.25;  // [-] on each side of the part
+constexpr double kEdgeError = 0.2;              // [voxels] of a solid at an edge, where it has no dilation
 constexpr double kRounding = 1e-9;              // [-] relative: a typed number equal to a limit is within it
 constexpr double kTargetMargin = 1.0;  // [m] a target farther outside the scene is taken for a mistake
 
@@ -37,10 +37,11 @@ double mountingVoxel(const ScenarioFile& scenario, const ScenarioPair& pair, Obj
   return refined ? settings.voxel / settings.refinement : settings.voxel;
 }
 
-std::string clearanceTooSmall(const ScenarioFile& scenario, const ScenarioPair& pair, ObjectId field) {
+/// `needed` [m]: the smallest clearance that the field resolves.
+std::string clearanceTooSmall(const ScenarioFile& scenario, const ScenarioPair& pair, ObjectId field,
+                              double needed) {
   const StructureSettings& settings = scenario.objects[field.value].structures;
   const double voxel = mountingVoxel(scenario, pair, field);
-  const double needed = kDilationPerVoxel / kDilationPerClearance * voxel;
   const double fraction = pair.clearance / needed;
   // two significant digits, rounded down: the advised voxel passes this check
   const double exact_mm = settings.voxel * fraction * 1e3;
@@ -48,15 +49,16 @@ std::string clearanceTooSmall(const ScenarioFile& scenario, const ScenarioPair& 
   const double advised = std::floor(exact_mm / step_mm + kRounding) * step_mm * 1e-3;
   std::string refinement;
   for (const int factor : {2, 4, 8}) {
-    const double finer = kDilationPerVoxel / kDilationPerClearance * settings.voxel / factor;
-    if (refinement.empty() && finer <= pair.clearance)
+    const double finer = needed / voxel * settings.voxel / factor;
+    if (refinement.empty() && finer <= pair.clearance && settings.voxel / factor < voxel)
       refinement = " or refinement " + std::to_string(factor);
   }
   const std::string divided = voxel < settings.voxel ? " / " + std::to_string(settings.refinement) : "";
   return "clearance of " + scenario.objects[pair.a.value].name + "-" + scenario.objects[pair.b.value].name +
          " (" + inMillimetres(pair.clearance) + ") is smaller than the field of '" +
          scenario.objects[field.value].name + "' can resolve (voxel " + inMillimetres(settings.voxel) +
-         divided + " needs " + inMillimetres(needed) + "); use voxel " + inMillimetres(advised) + refinement;
+         divided + " needs " + inMillimetres(needed) + " there); use voxel " + inMillimetres(advised) +
+         refinement;
 }
 
 Eigen::AlignedBox3d boxIn(const Pose& X_AB, const Eigen::AlignedBox3d& box_B) {
@@ -100,6 +102,34 @@ Result<void> checkStructures(const ScenarioFile& scenario, const StructuresByObj
     }
   }
   return {};
+}
+
+/// The boxes of `field`, in its frame, in which the other object of a pair is mounted: of the given ones
+/// those at its targets, and one around each target that none of these intersects.
+std::vector<Eigen::AlignedBox3d> mountingBoxes(const ScenarioFile& scenario, const ScenarioPair& pair,
+                                               ObjectId field, const StructuresByObject& structures) {
+  std::vector<Eigen::AlignedBox3d> boxes;
+  const ScenarioObject& spec = scenario.objects[field.value];
+  const ObjectId part = otherObject(pair, field);
+  if (part.value >= structures.size() || !structures[part.value]) return boxes;
+  const Pose X_OW = spec.X_WO.inverse();
+  for (const ScenarioState& state : scenario.states) {
+    if (state.object != part || !state.X_WG) continue;
+    Eigen::AlignedBox3d box_O = boxIn(X_OW * *state.X_WG, structures[part.value]->info.box_M);
+    bool covered = false;
+    for (const Eigen::AlignedBox3d& given_O : spec.structures.refine) {
+      if (!given_O.intersects(box_O)) continue;
+      boxes.push_back(given_O);
+      covered = true;
+    }
+    if (covered) continue;
+    // from the target back along the approach
+    const Vector3 back_O = X_OW.rotation() * Vector3(-state.approach_W * state.approach_distance);
+    box_O.extend(box_O.translated(back_O));
+    const Vector3 margin = Vector3::Constant(pair.clearance + 2.0 * spec.structures.voxel);
+    boxes.emplace_back(box_O.min() - margin, box_O.max() + margin);
+  }
+  return boxes;
 }
 
 Result<void> checkTargets(const ScenarioFile& scenario, const StructuresByObject& structures) {
@@ -159,45 +189,30 @@ std::vector<ObjectId> bakeOrder(const ScenarioFile& scenario) {
 
 std::vector<Eigen::AlignedBox3d> refineBoxes(const ScenarioFile& scenario, ObjectId object,
                                              const StructuresByObject& structures) {
-  const ScenarioObject& spec = scenario.objects[object.value];
-  std::vector<Eigen::AlignedBox3d> boxes = spec.structures.refine;
-  const Pose X_OW = spec.X_WO.inverse();
+  std::vector<Eigen::AlignedBox3d> boxes = scenario.objects[object.value].structures.refine;
   for (const ScenarioPair& pair : scenario.pairs) {
     if (sdfSideByTarget(scenario, pair) != object) continue;
-    const ObjectId part = otherObject(pair, object);
-    if (part.value >= structures.size() || !structures[part.value]) continue;
-    for (const ScenarioState& state : scenario.states) {
-      if (state.object != part || !state.X_WG) continue;
-      const Pose X_OG = X_OW * *state.X_WG;
-      Eigen::AlignedBox3d box_O = boxIn(X_OG, structures[part.value]->info.box_M);
-      const bool covered =
-          std::any_of(spec.structures.refine.begin(), spec.structures.refine.end(),
-                      [&](const Eigen::AlignedBox3d& refined_O) { return refined_O.intersects(box_O); });
-      if (covered) continue;
-      // from the target back along the approach
-      const Vector3 back_O = X_OW.rotation() * Vector3(-state.approach_W * state.approach_distance);
-      box_O.extend(box_O.translated(back_O));
-      const Vector3 margin = Vector3::Constant(pair.clearance + 2.0 * spec.structures.voxel);
-      boxes.emplace_back(box_O.min() - margin, box_O.max() + margin);
+    for (const Eigen::AlignedBox3d& box : mountingBoxes(scenario, pair, object, structures)) {
+      const bool given =
+          std::any_of(boxes.begin(), boxes.end(), [&](const auto& one) { return one.isApprox(box); });
+      if (!given) boxes.push_back(box);
     }
   }
   return boxes;
 }
 
-Result<double> dilationOf(const ScenarioFile& scenario, const ScenarioPair& pair, ObjectId field) {
-  const double voxel = scenario.objects[field.value].structures.voxel;
-  if (pair.clearance <= 0.0) return pair.dilation.value_or(kDilationPerVoxel * voxel);
-  const double min_dilation = kDilationPerVoxel * mountingVoxel(scenario, pair, field);
-  const double max_dilation = kDilationPerClearance * pair.clearance;
-  if (min_dilation > max_dilation * (1.0 + kRounding)) return fail(clearanceTooSmall(scenario, pair, field));
-  const double dilation = pair.dilation.value_or(min_dilation);
-  if (dilation < min_dilation * (1.0 - kRounding) || dilation > max_dilation * (1.0 + kRounding)) {
-    return fail("dilation of " + scenario.objects[pair.a.value].name + "-" +
-                scenario.objects[pair.b.value].name + " (" + inMillimetres(dilation) + ") must be between " +
-                inMillimetres(min_dilation) + " (0.87 voxels) and " + inMillimetres(max_dilation) +
-                " (a quarter of the clearance)");
-  }
-  return dilation;
+Result<void> checkClearance(const ScenarioFile& scenario, const ScenarioPair& pair, ObjectId field,
+                            const StructuresByObject& structures) {
+  if (pair.clearance <= 0.0) return {};
+  std::vector<Eigen::AlignedBox3d> places = mountingBoxes(scenario, pair, field, structures);
+  if (places.empty()) places = scenario.objects[field.value].structures.refine;
+  if (places.empty()) places.push_back(structures[field.value]->field.box());
+  double proud = kEdgeError * mountingVoxel(scenario, pair, field);
+  for (const Eigen::AlignedBox3d& place : places)
+    proud = std::max(proud, structures[field.value]->field.largestDilation(place));
+  const double needed = proud / kDilationPerClearance;
+  if (needed <= pair.clearance * (1.0 + kRounding)) return {};
+  return fail(fileAndLine(scenario, pair.line) + clearanceTooSmall(scenario, pair, field, needed));
 }
 
 Result<std::shared_ptr<const simulation::Scene>> makeScene(const ScenarioFile& scenario,
@@ -230,10 +245,9 @@ Result<std::shared_ptr<const simulation::Scene>> makeScene(const ScenarioFile& s
   }
   for (const ScenarioPair& pair : scenario.pairs) {
     const ObjectId field = sdfSideOf(scenario, pair, structures);
-    const auto dilation = dilationOf(scenario, pair, field);
-    if (!dilation) return fail(fileAndLine(scenario, pair.line) + dilation.error().what);
-    scene->pairs.push_back(
-        {otherObject(pair, field), field, *dilation, pair.enabled, pair.sensing, pair.friction});
+    if (const auto checked = checkClearance(scenario, pair, field, structures); !checked)
+      return tl::unexpected(checked.error());
+    scene->pairs.push_back({otherObject(pair, field), field, pair.enabled, pair.sensing, pair.friction});
   }
   for (const ScenarioHand& hand : scenario.hands) {
     scene->hands.push_back(

@@ -142,6 +142,10 @@ bool YamlReader::openMapping(const YAML::Node& node, std::string_view mapping, c
            what + " has a key with an old name: '" + key + "' is now '" + std::string(now) + "'");
       return false;
     }
+    if (const std::string_view instead = removedKey(mapping, key); !instead.empty()) {
+      fail(entry.first, what + " has the key '" + key + "', which is no more: " + std::string(instead));
+      return false;
+    }
     const std::string hint = suggestion(key, keys);
     std::string known;
     for (const std::string_view one : keys) known += (known.empty() ? "" : ", ") + std::string(one);

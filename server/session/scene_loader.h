@@ -45,6 +45,10 @@ struct Fingerprint {
 [[nodiscard]] Result<LoadedScene> loadScene(const std::filesystem::path& scenario, const LoadOptions& options,
                                             const LoadProgress& progress = {});
 
+/// A sentence for each object with walls thinner than its voxels resolve: how much of its surface they are,
+/// by how much the bake thickens them, and the share of the surface that is open, where a part could pass.
+[[nodiscard]] std::vector<std::string> thinWallReport(const simulation::Scene& scene);
+
 /// Folder for data that can be generated again: $TENON_CACHE, $XDG_CACHE_HOME/tenon or ~/.cache/tenon.
 [[nodiscard]] std::filesystem::path defaultCache();
 

@@ -19,8 +19,9 @@ BroadPhase::BroadPhase(const Scene& scene)
     std::int32_t& first = firstPair(spec.a.value, spec.b.value);
     next_pair_[pair] = first;
     first = static_cast<std::int32_t>(pair);
-    dilations_.push_back(spec.dilation);
-    largest_dilation_ = std::max(largest_dilation_, spec.dilation);
+    const auto& structures = scene.objects[spec.b.value].structures;
+    dilations_.push_back(structures ? structures->field.dilation() : 0.0);
+    largest_dilation_ = std::max(largest_dilation_, dilations_.back());
   }
 }
 

@@ -53,8 +53,7 @@ void CollPair::reset() noexcept {
 
 void CollPair::query(const Pose& X_WA, const Pose& X_WB, double margin, std::uint32_t budget,
                      std::span<const std::uint32_t> first) noexcept {
-  collision::queryPair({shell_A_, field_B_, X_WA, X_WB, spec_->dilation, margin, levels_, budget, first},
-                       list_->query);
+  collision::queryPair({shell_A_, field_B_, X_WA, X_WB, margin, levels_, budget, first}, list_->query);
   std::fill_n(list_->multipliers.begin(), list_->query.contacts.size(), 0.0);
   list_->F_Ao_W = Wrench{};
   list_->traversal = collision::TraversalState{};
@@ -159,18 +158,20 @@ Tick CollPair::ticksToClose(double distance, double closing_speed) noexcept {
 
 void CollPair::schedule(Tick now, double closing_speed, double margin, double path_length) noexcept {
   path_length_ = path_length;
-  due_ =
-      closing_speed <= 0.0 ? kNever : now + 1 + ticksToClose(gap_ - skipped_spacing_ - margin, closing_speed);
+  due_ = closing_speed <= 0.0
+             ? kNever
+             : now + 1 + ticksToClose(gap_ - skipped_spacing_ - margin, field_B_->slope() * closing_speed);
 }
 
 bool CollPair::postpone(Tick now, double closing_speed, double margin, double path_length) noexcept {
-  const double remaining = gap_ - skipped_spacing_ - (path_length - path_length_) - margin;
+  const double slope = possible_ ? field_B_->slope() : 1.0;
+  const double remaining = gap_ - skipped_spacing_ - slope * (path_length - path_length_) - margin;
   if (!queried_ || remaining <= 0.0) return false;
   if (closing_speed <= 0.0) {
     due_ = kNever;
     return true;
   }
-  const Tick ticks = ticksToClose(remaining, closing_speed);
+  const Tick ticks = ticksToClose(remaining, slope * closing_speed);
   if (ticks == 0) return false;
   due_ = now + ticks;
   return true;
@@ -182,7 +183,6 @@ collision::IslandPair CollPair::islandPair(const Pose& X_WA, const Pose& X_WB, T
   pair.field_B = field_B_;
   pair.X_WA_static = X_WA;
   pair.X_WB_static = X_WB;
-  pair.dilation = spec_->dilation;
   pair.friction = spec_->friction.value_or(collision::Friction{});
   pair.last = solvedBefore(now);
   return pair;

@@ -51,7 +51,7 @@ class CollPair {
   // results of the last query since the last reset
   [[nodiscard]] bool queried() const { return queried_; }
   [[nodiscard]] double gap() const { return gap_; }      ///< [m] smallest signed gap, dilation included
-  [[nodiscard]] double depth() const { return depth_; }  ///< [m] penetration depth in the undilated field
+  [[nodiscard]] double depth() const { return depth_; }  ///< [m] penetration depth in the field of b
   [[nodiscard]] const collision::QueryCounts& counts() const { return counts_; }
   /// Number of finest shell levels that the last query skipped.
   [[nodiscard]] std::uint32_t skippedLevels() const {

@@ -20,7 +20,7 @@ namespace tenon::structures {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'T', 'E', 'N', 'O', 'N', 'H', 'S', '\n'};
-constexpr std::uint32_t kVersion = 3;
+constexpr std::uint32_t kVersion = 4;
 constexpr std::uint32_t kByteOrder = 0x01020304U;
 constexpr std::size_t kAlignment = 64;
 
@@ -29,6 +29,7 @@ enum FileSection : std::size_t {
   kIndex,
   kSamples,
   kFar,
+  kDilations,
   kPoints,
   kLeaves,
   kClusters,
@@ -42,6 +43,7 @@ enum FileSection : std::size_t {
 constexpr std::array<std::size_t, kSections> kElementBytes{sizeof(DistanceField::Entry),
                                                            sizeof(std::int16_t),
                                                            sizeof(std::int16_t),
+                                                           sizeof(float),
                                                            sizeof(ShellPoint),
                                                            sizeof(ShellSphere),
                                                            sizeof(ShellSphere),
@@ -58,12 +60,12 @@ struct FileHeader {
   std::uint64_t file_bytes = 0;
   std::uint64_t checksum = 0;  ///< XXH64 of the whole file with this field 0
   std::array<double, 3> p_MoFo_M{};
-  double voxel = 0.0, band = 0.0, margin = 0.0;
+  double voxel = 0.0, band = 0.0, margin = 0.0, dilation = 0.0, slope = 1.0;
   std::array<std::int32_t, 3> bricks{};
   std::int32_t refinement = 1;
   std::array<std::uint64_t, kSections> first{}, count{};
   std::uint64_t triangles = 0, info_bricks = 0;
-  double bake_seconds = 0.0, surface_area = 0.0, unit = 1.0;
+  double bake_seconds = 0.0, surface_area = 0.0, thin_area = 0.0, open_area = 0.0, unit = 1.0;
   std::array<double, 6> box_M{};
 };
 static_assert(std::is_trivially_copyable_v<FileHeader>);
@@ -100,9 +102,9 @@ std::array<std::span<const std::byte>, kSections> sectionsOf(const HapticStructu
   const DistanceField::Layout& field = structures.field.layout();
   const Pointshell& shell = structures.shell;
   const StructureInfo& info = structures.info;
-  return {bytes(field.index),       bytes(field.samples),    bytes(field.far),      bytes(shell.points()),
-          bytes(shell.leaves()),    bytes(shell.clusters()), bytes(shell.levels()), bytes(info.source),
-          bytes(info.content_hash), bytes(info.notes),       bytes(meshes)};
+  return {bytes(field.index),    bytes(field.samples),     bytes(field.far),        bytes(field.dilations),
+          bytes(shell.points()), bytes(shell.leaves()),    bytes(shell.clusters()), bytes(shell.levels()),
+          bytes(info.source),    bytes(info.content_hash), bytes(info.notes),       bytes(meshes)};
 }
 
 FileHeader headerOf(const HapticStructures& structures) {
@@ -113,12 +115,16 @@ FileHeader headerOf(const HapticStructures& structures) {
   header.voxel = field.voxel;
   header.band = field.band;
   header.margin = field.margin;
+  header.dilation = field.dilation;
+  header.slope = field.slope;
   header.bricks = field.bricks;
   header.refinement = field.refinement;
   header.triangles = info.triangles;
   header.info_bricks = info.bricks;
   header.bake_seconds = info.bake_seconds;
   header.surface_area = info.surface_area;
+  header.thin_area = info.thin_area;
+  header.open_area = info.open_area;
   header.unit = info.unit;
   Vector3::Map(header.box_M.data()) = info.box_M.min();
   Vector3::Map(header.box_M.data() + 3) = info.box_M.max();
@@ -183,6 +189,18 @@ bool sectionsFit(const FileHeader& header) {
   return true;
 }
 
+/// Whether the dilations are of every brick's corners, none, or as large as a thin wall needs.
+bool dilationsAreValid(const DistanceField::Layout& field) {
+  std::uint64_t corners = 1;
+  for (const std::int32_t count : field.bricks) corners *= static_cast<std::uint64_t>(count) + 1;
+  if (!field.dilations.empty() && field.dilations.size() != corners) return false;
+  if (!(field.dilation >= 0.0 && field.dilation <= 2.0 * field.voxel)) return false;
+  if (!(field.slope >= 1.0 && field.slope <= 1.5)) return false;
+  return std::all_of(field.dilations.begin(), field.dilations.end(), [&field](float dilation) {
+    return dilation >= 0.0F && static_cast<double>(dilation) <= field.dilation;
+  });
+}
+
 /// Whether all sizes are sensible and every index of the field is within its array.
 bool fieldIsValid(const DistanceField::Layout& field) {
   if (!(field.voxel > 0.0) || !std::isfinite(field.voxel) || !field.p_MoFo_M.allFinite()) return false;
@@ -193,7 +211,7 @@ bool fieldIsValid(const DistanceField::Layout& field) {
     if (count < 1 || count > 1'000'000) return false;
     coarse *= static_cast<std::uint64_t>(count);
   }
-  if (coarse > field.index.size() || field.far.size() != coarse) return false;
+  if (coarse > field.index.size() || field.far.size() != coarse || !dilationsAreValid(field)) return false;
   if (field.samples.size() % DistanceField::kBrickSamples != 0) return false;
   // queries gather pairs of numbers at byte offsets of 31 bits
   constexpr std::size_t kMaxBytes = std::numeric_limits<std::int32_t>::max();
@@ -330,11 +348,14 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
   field.voxel = header->voxel;
   field.band = header->band;
   field.margin = header->margin;
+  field.dilation = header->dilation;
+  field.slope = header->slope;
   field.bricks = header->bricks;
   field.refinement = header->refinement;
   field.index = section<DistanceField::Entry>(bytes, *header, kIndex);
   field.samples = section<std::int16_t>(bytes, *header, kSamples);
   field.far = section<std::int16_t>(bytes, *header, kFar);
+  field.dilations = section<float>(bytes, *header, kDilations);
   const Pointshell::Layout shell{
       section<ShellPoint>(bytes, *header, kPoints), section<ShellSphere>(bytes, *header, kLeaves),
       section<ShellSphere>(bytes, *header, kClusters), section<ShellLevel>(bytes, *header, kLevels)};
@@ -355,6 +376,8 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
   info.bricks = header->info_bricks;
   info.bake_seconds = header->bake_seconds;
   info.surface_area = header->surface_area;
+  info.thin_area = header->thin_area;
+  info.open_area = header->open_area;
   info.unit = header->unit;
   info.box_M = {Vector3::Map(header->box_M.data()), Vector3::Map(header->box_M.data() + 3)};
   return structures;

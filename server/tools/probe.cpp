@@ -24,7 +24,7 @@ int run(const std::string& file) {
     const auto more = lines.next();
     if (!more) return printError(more.error());
     if (!*more) return 0;
-    const structures::FieldSample sample = field.sample(Vector3::Map(lines.numbers().data()));
+    const structures::FieldSample sample = field.undilated(Vector3::Map(lines.numbers().data()));
     if (!sample.exact) {
       fmt::print("far\n");
       continue;

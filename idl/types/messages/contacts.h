@@ -63,7 +63,7 @@ struct PairContact {
   std::uint32_t contacts = 0;      ///< listed points that touch
   Wrench F_Ao_W;                   ///< wrench of b on a, about a's origin
   Vector3 p_WP = Vector3::Zero();  ///< [m] mean of the contact points
-  double depth = 0.0;         ///< [m] penetration depth of the deepest point, without dilation, 0 when apart
+  double depth = 0.0;         ///< [m] penetration depth of the deepest point in the field, 0 when apart
   double gap = 0.0;           ///< [m] smallest signed gap to the dilated surface
   double load_percent = 0.0;  ///< [%] computational load (paper eq. 2)
   double peak_force = 0.0;    ///< [N] since the last sample of this topic

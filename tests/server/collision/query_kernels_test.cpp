@@ -88,7 +88,7 @@ TEST_F(QueryKernelsTest, EveryInstructionSetGivesTheSameBits) {
   for (int trial = 0; trial < 2000; ++trial) {
     const test::StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
     const Pose X_WA = randomPose(engine, trial % 7 == 0 ? 0.3 : 0.07);
-    PairQuery query{&box->shell, &other->field, X_WA, randomPose(engine, 0.02), 0.0004, 0.001};
+    PairQuery query{&box->shell, &other->field, X_WA, randomPose(engine, 0.02), 0.001};
     query.reduce = trial % 2 == 0;
     query.correct_ridges = trial % 4 < 2;
     PairQuery later = query;
@@ -116,8 +116,7 @@ TEST_F(QueryKernelsTest, SampledLanesEqualTheSamplesOfTheField) {
   SampleLanes lanes;
   for (const test::StructuresPtr& other : fields()) {
     for (int trial = 0; trial < 50; ++trial) {
-      const LaneFrame frame(other->field, randomPose(engine, 0.07), Pose(), 0.0004, 0.001,
-                            box->shell.radius());
+      const LaneFrame frame(other->field, randomPose(engine, 0.07), Pose(), 0.001, box->shell.radius());
       for (const QueryKernels& kernels : supportedKernels()) {
         for (std::size_t leaf = 0; leaf < box->shell.leaves().size(); ++leaf) {
           const structures::ShellBlock& block = box->shell.pointsOfLeaf(leaf);
@@ -149,7 +148,7 @@ TEST_F(QueryKernelsTest, PruningChangesNoContact) {
   const auto unpruned = std::make_unique<PairQueryResult>();
   for (int trial = 0; trial < 3000; ++trial) {
     const test::StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
-    PairQuery query{&box->shell, &other->field, randomPose(engine, 0.07), Pose(), 0.0004, 0.001};
+    PairQuery query{&box->shell, &other->field, randomPose(engine, 0.07), Pose(), 0.001};
     queryPair(query, *pruned);
     query.prune = false;
     queryPair(query, *unpruned);
@@ -175,7 +174,7 @@ TEST_F(QueryKernelsTest, NoPointIsNearerThanTheBoundOfCulledPoints) {
   for (int trial = 0; trial < 500; ++trial) {
     const test::StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
     const Pose X_WA = randomPose(engine, trial % 4 == 0 ? 0.2 : 0.07);
-    queryPair({&box->shell, &other->field, X_WA, Pose(), 0.0004, 0.0}, *result);
+    queryPair({&box->shell, &other->field, X_WA, Pose(), 0.0}, *result);
     for (const structures::ShellPoint& point : box->shell.points()) {
       const structures::FieldSample sample = other->field.sample(X_WA * point.p_MP.cast<double>());
       if (!sample.exact) continue;
