@@ -21,6 +21,7 @@ struct MountTask {
   Vector3 size = Vector3::Zero();        ///< [m] of the object's bounding box, in its own frame
   Vector3 centre = Vector3::Zero();      ///< [m] of that box, likewise
   ObjectId assistant;                    ///< the instructor's pointer; invalid when there is none
+  Vector3 assistant_centre = Vector3::Zero();  ///< [m] of its bounding box, in its own frame
   bool guided_by_contact = true;  ///< aims with an error and relies on contact; false: exactly, by sight
   bool misplaced = false;         ///< inserts at a wrong pose and does not search for the opening
 };

@@ -7,8 +7,8 @@
 
 namespace tenon::bake {
 
-/// Swept volumes and clearances along a path: a list of poses X_WM with linear translation and rotation at
-/// constant angular velocity between them.
+/// Swept volumes and clearances along a path: a list of poses X_WM with linear translation of the body's
+/// centre and rotation at constant angular velocity between them.
 struct SweepOptions {
   double cell = 0.005;    ///< [m] edge of the cells
   double dilation = 0.0;  ///< [m] offset of the body's surface, at most the band of its field

@@ -93,7 +93,7 @@ struct MotionSolver::Workspace {
 
   ActiveSet active;
   std::vector<Matrix6> L;                       ///< Cholesky factor of the Hessian, by body
-  std::array<std::vector<double>, 10> columns;  ///< gap, normal, its moment about A's origin, about B's; in W
+  std::array<std::vector<double>, 10> columns;  ///< gap, normal, its moment about A's centre, about B's; in W
   std::vector<RowState> state;
   std::vector<std::uint8_t> requested;  ///< row is in the warm start; all zero between uses
   std::vector<std::array<std::int32_t, 2>> body_of;

@@ -11,10 +11,12 @@ namespace {
 /// A SceneView with one pose, force and contact flag for all objects, set by the test.
 struct SceneStub final : SceneView {
   Pose X_WO;
+  Vector3 p_OQ_O = Vector3::Zero();
   Vector3 F_W = Vector3::Zero();
   bool contact = false;
 
   [[nodiscard]] Pose pose(ObjectId) const noexcept override { return X_WO; }
+  [[nodiscard]] Vector3 centre(ObjectId) const noexcept override { return p_OQ_O; }
   [[nodiscard]] Vector3 force(ObjectId) const noexcept override { return F_W; }
   [[nodiscard]] bool inContact(ObjectId, ObjectId) const noexcept override { return contact; }
   [[nodiscard]] bool inAnyContact(ObjectId) const noexcept override { return contact; }
