@@ -63,7 +63,8 @@ struct MovableBody {
   bool pinned = false;  ///< has used up `max_displacement`; set by IslandSolver
   FixedVector<DirectionalStiffening, kMaxStiffenings> stiffenings;  ///< set and cleared by IslandSolver
   FixedVector<ContactCurvature, kMaxCurvatures> curvatures;         ///< set and cleared by IslandSolver
-  Wrench friction_Bq_W;  ///< [N, Nm] about Q, of its sliding friction patches; set and cleared by IslandSolver
+  Wrench
+      friction_Bq_W;  ///< [N, Nm] about Q, of its sliding friction patches; set and cleared by IslandSolver
 
   [[nodiscard]] Vector3 p_WQ() const { return X_WB * p_BQ; }  ///< [m]
 };
@@ -104,9 +105,9 @@ class MotionSolver {
   MotionSolver(MotionSolver&&) noexcept;
   MotionSolver& operator=(MotionSolver&&) noexcept;
 
-  /// `displacements`[i] [m, rad]: of bodies[i]'s centre Q and its orientation, in W. `multipliers`[r] [N], >= 0:
-  /// force along rows[r].n_W on its body A, and the opposite on B. Both spans are as long as bodies and rows;
-  /// `multipliers` may be empty.
+  /// `displacements`[i] [m, rad]: of bodies[i]'s centre Q and its orientation, in W. `multipliers`[r] [N], >=
+  /// 0: force along rows[r].n_W on its body A, and the opposite on B. Both spans are as long as bodies and
+  /// rows; `multipliers` may be empty.
   ///
   /// `warm_start`: rows to activate first, with the forces that stand in `multipliers` at the call as initial
   /// multipliers. The solution does not depend on it, only the number of iterations. `unchanged`: so many

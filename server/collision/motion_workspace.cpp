@@ -17,17 +17,16 @@ constexpr double kRotationRegularisation = 1e-6;
 /// [-] Factor on the Hessian of a pinned body.
 constexpr double kPinnedScale = 1e9;
 
-/// Adds a spring, linearised at the body's pose: its energy is ½ xᵀ H x - bᵀ x, x = (translation of the centre
-/// Q, rotation).
+/// Adds a spring, linearised at the body's pose: its energy is ½ xᵀ H x - bᵀ x, x = (translation of the
+/// centre Q, rotation).
 void addSpring(const Spring& spring, const MovableBody& body, Matrix6& H, Vector6& b) {
   const Pose& X_WB = body.X_WB;
   const Displacement to_goal = displacement(X_WB, spring.X_WG);
   const Vector3 p_QC_W = X_WB.rotation() * (spring.p_BC - body.p_BQ);
   const Vector3 p_CoGc_W = spring.X_WG * spring.p_BC - X_WB * spring.p_BC;
   Eigen::Matrix<double, 3, 6> J;  // displacement of C per x
-  J << Matrix3::Identity(), Matrix3{{0.0, p_QC_W.z(), -p_QC_W.y()},
-                                    {-p_QC_W.z(), 0.0, p_QC_W.x()},
-                                    {p_QC_W.y(), -p_QC_W.x(), 0.0}};
+  J << Matrix3::Identity(),
+      Matrix3{{0.0, p_QC_W.z(), -p_QC_W.y()}, {-p_QC_W.z(), 0.0, p_QC_W.x()}, {p_QC_W.y(), -p_QC_W.x(), 0.0}};
   H += spring.stiffness * (J.transpose() * J);
   H.bottomRightCorner<3, 3>() +=
       spring.rotational_stiffness * Matrix3::Identity() + spring.rotational_tensor_W;

@@ -32,9 +32,8 @@ bool ConditionProgress::isMetNow(const Condition& condition, Node& node, const S
     case ConditionKind::kPose:
       reading.value = positionError(scene, condition.object, condition.X_WG);
       reading.limit = condition.within;
-      return reading.value <= condition.within &&
-             angleBetween(scene.pose(condition.object).rotation(), condition.X_WG.rotation()) <=
-                 condition.angle;
+      return reading.value <= condition.within && angleBetween(scene.pose(condition.object).rotation(),
+                                                               condition.X_WG.rotation()) <= condition.angle;
     case ConditionKind::kForce:
       reading.value = scene.force(condition.object).norm();
       reading.limit = condition.above > 0.0 ? condition.above : condition.below;

@@ -57,7 +57,7 @@ struct Condition {
 class SceneView {
  public:
   virtual ~SceneView() = default;
-  [[nodiscard]] virtual Pose pose(ObjectId object) const noexcept = 0;      ///< X_WO
+  [[nodiscard]] virtual Pose pose(ObjectId object) const noexcept = 0;  ///< X_WO
   /// [m] p_OQ_O: of its bounding sphere; an object's position is that of its centre.
   [[nodiscard]] virtual Vector3 centre(ObjectId object) const noexcept = 0;
   [[nodiscard]] virtual Vector3 force(ObjectId object) const noexcept = 0;  ///< [N] contact force on it, in W

@@ -14,7 +14,7 @@ using StructuresByObject = std::vector<std::shared_ptr<const structures::HapticS
 constexpr double kDilationPerVoxel = 0.87;      // [-] sqrt(3)/2 rounded up: half the diagonal of a voxel
 constexpr double kDilationPerClearance = 0.25;  // [-]
 constexpr double kRounding = 1e-9;              // [-] relative: a typed number equal to a limit is within it
-constexpr double kTargetMargin = 1.0;  // [m] a target farther outside the scene is taken for a mistake
+constexpr double kTargetMargin = 1.0;    // [m] a target farther outside the scene is taken for a mistake
 constexpr double kFarthestOrigin = 1e3;  // [m] of a frame: coordinates in it keep their micrometres
 
 /// "2.6 mm", three significant digits.
@@ -109,7 +109,11 @@ Result<void> checkReach(const ScenarioFile& scenario, const StructuresByObject& 
                          const std::string& what) -> Result<void> {
     const Vector3 p_OQ_O = simulation::boundingSphereOf(structures[object.value].get()).p_OQ_O;
     const double distance = (X_WO * p_OQ_O).norm();
-    if (distance <= scenario.reach && X_WO.translation().norm() <= kFarthestOrigin) return {};
+    if (X_WO.translation().norm() > kFarthestOrigin)
+      return fail(fileAndLine(scenario, line) + what +
+                  " has its 'at' more than 1 km from the world's origin, " +
+                  "expected a mesh with its origin nearer to the part");
+    if (distance <= scenario.reach) return {};
     return fail(fileAndLine(scenario, line) + what + " is " + inMillimetres(distance) +
                 " from the world's origin, expected at most 'reach', " + inMillimetres(scenario.reach));
   };
@@ -238,8 +242,7 @@ Result<std::shared_ptr<const simulation::Scene>> makeScene(const ScenarioFile& s
                                                            StructuresByObject structures) {
   if (const auto checked = checkStructures(scenario, structures); !checked)
     return tl::unexpected(checked.error());
-  if (const auto checked = checkReach(scenario, structures); !checked)
-    return tl::unexpected(checked.error());
+  if (const auto checked = checkReach(scenario, structures); !checked) return tl::unexpected(checked.error());
   if (const auto checked = checkTargets(scenario, structures); !checked)
     return tl::unexpected(checked.error());
   auto scene = std::make_shared<simulation::Scene>();

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kMaxPosition = 1000.0;  // [m] of a hand or object from the world's origin, each axis
 constexpr double kMaxSpeed = 50.0;       // [m/s], [rad/s] of a hand
-constexpr double kMaxForce = 200.0;      // [N], [Nm] of an external contribution
+constexpr double kMaxForce = 200.0;      // [N] of an external contribution
 constexpr std::uint32_t kMaxLifetimeTicks = 100;  // [ticks] of an external contribution
 
 bool isPlausible(const Pose& X) {
@@ -178,7 +178,9 @@ Result<Change> SessionRegistry::validateForceContribution(const ForceContributio
     return fail(fmt::format("client {} may not contribute forces", force.client.value));
   if (force.object.value >= scenario_.objects.size())
     return fail(fmt::format("client {} sent a force for an unknown object", force.client.value));
-  if (!isPlausible(force.F_Oo_W.force, kMaxForce) || !isPlausible(force.F_Oo_W.torque, kMaxForce))
+  // a torque about the origin may be large for a force near the object; that about its centre is limited
+  // later
+  if (!isPlausible(force.F_Oo_W.force, kMaxForce) || !force.F_Oo_W.torque.allFinite())
     return fail(fmt::format("client {} sent a force that is not finite or above {} N", force.client.value,
                             kMaxForce));
   return Change{.kind = ChangeKind::kContributeForce,

@@ -26,7 +26,8 @@ struct ObjectSize {
   double radius = 0.0;               ///< [m] that, but not 0, as it scales rotations
 };
 
-/// [m/s] upper bound of the speed of any point of a body whose points are within `radius` [m] of its centre Q.
+/// [m/s] upper bound of the speed of any point of a body whose points are within `radius` [m] of its centre
+/// Q.
 [[nodiscard]] inline double maxPointSpeed(const Twist& V_WQ, double radius) {
   return V_WQ.linear.norm() + V_WQ.angular.norm() * radius;
 }

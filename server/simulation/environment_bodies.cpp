@@ -97,9 +97,9 @@ void Environment::integrateFreeMotion() noexcept {
     Engine::FreeBody& body = *engine_->bodies[i];
     const Pose& X_WO = objects_[i].X_WO;
     const Wrench F_Oq_W = engine_->forces[i].contributed(tick_);
-    body.V_WC =
-        body.rigid.integrateVelocity(X_WO.rotation(), atCentre(objects_[i].V_WO, X_WO, body.rigid.centre()),
-                                     shifted(F_Oq_W, X_WO.rotation() * (body.rigid.centre() - centreOf(ObjectId{i}))));
+    body.V_WC = body.rigid.integrateVelocity(
+        X_WO.rotation(), atCentre(objects_[i].V_WO, X_WO, body.rigid.centre()),
+        shifted(F_Oq_W, X_WO.rotation() * (body.rigid.centre() - centreOf(ObjectId{i}))));
     body.inverse_inertia_W = body.rigid.inertia(X_WO.rotation()).inverse();
   }
   applyFreeBodyFriction();

@@ -19,8 +19,9 @@ struct ForceCell {
   bool used = false;
 };
 
-/// Accumulates the wrenches of several sources on one object (paper §3.2, iii). All are about its centre Q, that
-/// of its bounding sphere: a torque about the origin would grow with the distance from there to the object.
+/// Accumulates the wrenches of several sources on one object (paper §3.2, iii). All are about its centre Q,
+/// that of its bounding sphere: a torque about the origin would grow with the distance from there to the
+/// object.
 ///
 /// Every source has one cell and overwrites it. The own cells (pairs, couplings of hands, gravity) come
 /// first; they stay valid until overwritten, so a pair skipped by coherence keeps its wrench. Then come cells

@@ -15,8 +15,8 @@
 
 namespace tenon::simulation {
 
-/// The bounding sphere of an object's surface, constant in its structures. Its centre Q is the object's place: the
-/// frame's origin O is wherever CAD put it.
+/// The bounding sphere of an object's surface, constant in its structures. Its centre Q is the object's
+/// place: the frame's origin O is wherever CAD put it.
 struct BoundingSphere {
   Vector3 p_OQ_O = Vector3::Zero();  ///< [m]
   double radius = 0.0;               ///< [m]

@@ -36,8 +36,8 @@ TEST(InsertionPrimitives, SmallTiltsAreCompliedWithVisibleTiltsAreCorrected) {
   const Vector3 large(0.1, 0.0, 0.0);
   const Pose X_WSmall(Vector3::Zero(), expRotation(small));
   const Pose X_WLarge(Vector3::Zero(), expRotation(large));
-  EXPECT_TRUE(
-      logRotation(compliedInRotation(X_WSmall, X_WG, X_WG, Vector3::Zero(), 0.5).rotation()).isApprox(0.5 * small, 1e-6));
+  EXPECT_TRUE(logRotation(compliedInRotation(X_WSmall, X_WG, X_WG, Vector3::Zero(), 0.5).rotation())
+                  .isApprox(0.5 * small, 1e-6));
   EXPECT_EQ(compliedInRotation(X_WLarge, X_WG, X_WG, Vector3::Zero(), 0.5), X_WG);
   EXPECT_EQ(tiltCorrection(Vector3::Zero(), X_WSmall, X_WG, kDt), Vector3::Zero());
   EXPECT_LT(tiltCorrection(Vector3::Zero(), X_WLarge, X_WG, kDt).x(), 0.0) << "against the tilt";

@@ -72,6 +72,21 @@ TEST_F(Conditions, APoseIsMetWithinBothTolerances) {
   EXPECT_TRUE(step()) << "q and -q are one orientation";
 }
 
+// a peg 0.94 degrees from its target about its own centre, with the frame's origin 0.94 m away: that is 15 mm
+// off
+TEST_F(Conditions, APoseIsThatOfTheObjectsCentre) {
+  tree_ = {leaf(ConditionKind::kPose)};
+  scene_.p_OQ_O = Vector3(0.94, 0, 0);
+  tree_[0].X_WG = Pose(-scene_.p_OQ_O);
+  const Vector3 off(0.00049, 0, 0);
+  const Quaternion q_WO = expRotation(Vector3(0, 0, 0.0164));
+  scene_.X_WO = Pose(off - q_WO * scene_.p_OQ_O, q_WO);
+  EXPECT_TRUE(step());
+  EXPECT_NEAR(progress_.reading(0).value, 0.00049, 1e-12);
+  scene_.X_WO.translation() += Vector3(0.002, 0, 0);
+  EXPECT_FALSE(step());
+}
+
 TEST_F(Conditions, DwellRestartsAfterAnInterruption) {
   tree_ = {leaf(ConditionKind::kPose)};
   tree_[0].dwell = 10;
