@@ -37,7 +37,7 @@ class BrickLevel {
     bool known = false;     ///< the point is in this level
     bool free = false;      ///< outside: connected to the grid's border
     bool reached = false;   ///< by the flood fill itself, not by its extension to the surface
-    double distance = 0.0;  ///< [voxel] unsigned
+    double distance = 0.0;  ///< [voxels] unsigned
   };
 
   /// The whole grid, with edge `voxel` [m].
@@ -81,9 +81,6 @@ class BrickLevel {
   [[nodiscard]] const std::int16_t* findSample(const Cell& lattice) const;
   /// Sets the sample in every brick that contains it, and sets `marks` of their nodes to 1.
   void setSample(const Cell& lattice, std::int16_t value, std::span<std::uint8_t> marks);
-  [[nodiscard]] bool anyOutside(std::size_t node) const {
-    return slot[node] < 0 ? free[node] != 0 : outside[static_cast<std::size_t>(slot[node])].any();
-  }
 
   /// Gives a slot to the bricks near triangles and samples their unsigned distances. False when there
   /// are more than fit into 3 GB.
@@ -100,10 +97,10 @@ class BrickLevel {
   Cell bricks;
   int refinement = 1;
   std::vector<std::int32_t> slot;     ///< per node; < 0: no surface near
-  std::vector<std::uint8_t> free;     ///< per node without slot
+  std::vector<std::uint8_t> free;     ///< per node: 1 when it has no slot and is outside
   std::vector<std::int16_t> samples;  ///< kSamples per slot [voxels / kQuantaPerVoxel]
   std::vector<Mask> reached;          ///< per slot: reached by the flood fill from outside
-  std::vector<SampleBits> outside;    ///< per slot, apron included
+  std::vector<SampleBits> outside;    ///< per slot: the samples that are outside, apron included
 
  private:
   /// Calls visit(node, sample) for each brick with a slot that contains this lattice point, until it returns

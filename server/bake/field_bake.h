@@ -18,7 +18,9 @@ struct BakedField {
 };
 
 /// The signed distance field of a triangle soup: magnitudes are exact in the band, signs come from a flood
-/// fill from outside. An error when it needs more than 3 GB.
+/// fill from outside. An error when it needs more than 3 GB or is cancelled.
+///
+/// Threads: one caller; uses several threads inside.
 [[nodiscard]] Result<BakedField> bakeField(std::span<const structures::Triangle> triangles,
                                            const BakeOptions& options, ParallelWork& work);
 

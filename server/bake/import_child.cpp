@@ -82,6 +82,7 @@ void collectMesh(const aiMesh& mesh, const aiMatrix4x4& X_MN, double unit, Impor
   }
 }
 
+/// Frames: M of the whole mesh, P of the parent node, N of this node. A transform may also scale.
 void collectNode(const aiScene& scene, const aiNode& node, const aiMatrix4x4& X_MP, double unit,
                  ImportedMesh& out) {
   const aiMatrix4x4 X_MN = X_MP * node.mTransformation;

@@ -9,8 +9,10 @@ namespace {
 
 constexpr double kMaxSteps = 2e6;
 
-double steps(const Pose& X_WA, const Pose& X_WB, double radius, double step) {
-  return std::max(1.0, std::ceil(maxPointMotion(displacement(X_WA, X_WB), radius) / step));
+/// Steps between two poses of a body whose points are within `radius` [m] of its origin: none moves by more
+/// than `step` [m].
+double steps(const Pose& X_WM, const Pose& X_WM_next, double radius, double step) {
+  return std::max(1.0, std::ceil(maxPointMotion(displacement(X_WM, X_WM_next), radius) / step));
 }
 
 /// Calls visit(pose number, X_WM) along a path until visit returns false.

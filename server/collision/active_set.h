@@ -57,7 +57,8 @@ class ActiveSet {
   void project(const RowNormal& normal);
   /// The projected row is linearly dependent on the active rows.
   [[nodiscard]] bool dependent() const;
-  /// [m/N] Squared norm of the projected row's free part: what its gap grows by per newton along it.
+  /// [m/N] Squared norm of the projected row's free part: by how much its gap grows per newton of its
+  /// multiplier, while the active rows hold with equality.
   [[nodiscard]] double freeNorm2() const { return free_norm2_; }
   /// Free part of the projected row: the direction of its steepest increase that leaves the active rows
   /// unchanged.

@@ -76,7 +76,7 @@ struct ContactConstraint {
 
 struct MotionResult {
   std::uint32_t iterations = 0;  ///< of the active-set method
-  /// The constraints contradict each other, or the iterations ran out (64, and 30 a body). Negative gaps were
+  /// The constraints contradict each other, or the iterations ran out (64 + 30 per body). Negative gaps were
   /// then raised to 0 (bodies are not pushed apart, and sink no deeper) and the QP was solved again. If that
   /// failed too, all displacements and multipliers are 0.
   bool infeasible = false;

@@ -70,7 +70,7 @@ struct MotionSolver::Workspace {
   /// translation less B's, A's rotation, minus B's. row_count when none is violated.
   [[nodiscard]] std::uint32_t worstOfBlock(std::size_t first, std::size_t end, const Run& run,
                                            const std::array<double, 9>& m) const;
-  /// row_count when none is violated.
+  /// The most violated of the inactive candidates; row_count when none is violated.
   [[nodiscard]] std::size_t mostViolatedCandidate() const;
   /// A row's normal in the coordinates y.
   [[nodiscard]] RowNormal normalOf(std::size_t row) const;

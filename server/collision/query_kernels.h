@@ -69,7 +69,7 @@ struct PointLanes {
   std::size_t count;
 };
 
-/// [m] Gap of a pair without points to test: far, but finite, so that it can be divided.
+/// [m] Gap of a pair without points to test: far, but finite, so that arithmetic with it is valid.
 inline constexpr double kFarGap = 1e6;
 
 /// Field samples of sixteen points, frame B.

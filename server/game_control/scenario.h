@@ -85,8 +85,8 @@ struct ScenarioHand {
   std::string name;
   Role role = Role::kTrainee;
   simulation::HandKind kind = simulation::HandKind::kCoupled;
-  ObjectId object;                     ///< its own object, which it moves unless it has grabbed another
-  double stiffness = 1000.0;           ///< [N/m] of its coupling
+  ObjectId object;            ///< default object: moved while the hand holds no other (pointer, forearm)
+  double stiffness = 1000.0;  ///< [N/m] of its coupling
   double rotational_stiffness = 20.0;  ///< [Nm/rad] of its coupling
   int line = 0;
 };
@@ -163,7 +163,8 @@ struct ScenarioState {
   double approach_distance = 0.0;        ///< [m] before the target, from which on the direction matters
   std::vector<Condition> conditions;     ///< tree; the state ends when its root is met
   // at its end
-  bool snap = false;  ///< `object` is fixed at its target, and hands that held it move their own again
+  /// `object` is fixed at its target, and hands that held it move their default objects again
+  bool snap = false;
   std::uint32_t timeout = 0;  ///< [ticks] 0: none
   TimeoutAction on_timeout = TimeoutAction::kFail;
   int line = 0;

@@ -1,6 +1,4 @@
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
 
 #include "server/game_control/scenario_reader.h"
 

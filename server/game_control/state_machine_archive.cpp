@@ -50,10 +50,10 @@ void StateMachine::visitMemory(Memory& memory, Visitor&& visit) {
   visit(memory.elapsed);
   visit(memory.contact_ticks);
   visit(memory.regrab.contact_ticks);
-  visit(memory.regrab.gap_ticks);
+  visit(memory.regrab.apart_ticks);
   for (ContactTimer& timer : memory.helpers) {
     visit(timer.contact_ticks);
-    visit(timer.gap_ticks);
+    visit(timer.apart_ticks);
   }
 }
 

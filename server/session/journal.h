@@ -16,7 +16,7 @@ namespace tenon::session {
 
 inline constexpr Tick kCheckpointEvery = 1000;  // [ticks]
 
-/// What the tick thread hands to the journal thread.
+/// What the tick thread passes to the journal thread.
 struct JournalEntry {
   TickInput input;
   std::uint64_t hash = 0;                ///< SessionSimulation::hash after the tick

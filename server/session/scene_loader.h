@@ -42,6 +42,8 @@ struct Fingerprint {
 
 /// Reads a scenario (its YAML file or the folder of it), generates its parts and bakes its meshes unless the
 /// cache has them, and builds the scene. Fails with the first problem, named with file and line where known.
+///
+/// Threads: one; baking uses several inside. Real-time: no.
 [[nodiscard]] Result<LoadedScene> loadScene(const std::filesystem::path& scenario, const LoadOptions& options,
                                             const LoadProgress& progress = {});
 

@@ -166,8 +166,8 @@ void ServerWire::dispatch(std::chrono::nanoseconds timeout) {
 }
 
 void ServerWire::forwardChanges() {
-  if (input_buffer_.freeChanges() < kMaxChanges)
-    return;  // they stay in the registry until the tick has caught up
+  // while the queue is nearly full they stay in the registry, until the tick has caught up
+  if (input_buffer_.freeChanges() < kMaxChanges) return;
   FixedVector<Change, kMaxChanges> changes;
   registry_.takeChanges(changes);
   for (const Change& change : changes) input_buffer_.put(change);
@@ -192,9 +192,10 @@ void ServerWire::refuse(const std::string& why) {
 
 /// Whether a sample that names `client` was written by the participant with its seat; if not, refuses it.
 bool ServerWire::isGenuine(ClientId client, const wire::Origin& from, const std::string& what) {
-  if (registry_.findClient(client) == nullptr || registry_.ownsSeat(client, from))
-    return true;     // unknown clients are refused by the registry
-  if (from.known())  // unknown: its writer ended in the meantime
+  // unknown clients are refused by the registry
+  if (registry_.findClient(client) == nullptr || registry_.ownsSeat(client, from)) return true;
+  // an unknown origin: the writer of the sample ended in the meantime
+  if (from.known())
     refuse(
         fmt::format("a {} under the id of client {} came from another program than the one that joined: "
                     "ignored",

@@ -59,7 +59,7 @@ class ServerWire {
   /// Only to matched readers, and only with `publish_journal`.
   void send(const JournalEntry& entry);
 
-  /// Removes a client from the session, tells it so and logs `why`, which continues "Ada (trainee) ...".
+  /// Removes a client from the session, notifies it, and logs "Ada (trainee) <why>".
   void dismiss(ClientId client, const std::string& why);
   /// The newest DeviceSample::seq received for a hand; 0: none yet.
   [[nodiscard]] std::uint32_t newestSeq(HandId hand) const { return newest_seq_[hand.value]; }

@@ -226,8 +226,8 @@ CommandAck SessionRegistry::decide(const Command& command, Role role) {
   ack.reason = change ? refusalByPhase(command.kind) : change.error().what;
   ack.accepted = ack.reason.empty();
   if (!ack.accepted) return ack;
-  const bool held = expectedPhase() == RunPhase::kPaused || emergency_stop_;
-  if (change->kind == ChangeKind::kGameCommand && held) ++deferred_commands_;
+  const bool suspended = expectedPhase() == RunPhase::kPaused || emergency_stop_;
+  if (change->kind == ChangeKind::kGameCommand && suspended) ++deferred_commands_;
   if (change->kind == ChangeKind::kPause) pending_phase_ = RunPhase::kPaused;
   if (change->kind == ChangeKind::kResume) pending_phase_ = RunPhase::kRunning;
   if (change->kind == ChangeKind::kSetEmergencyStop) emergency_stop_ = false;

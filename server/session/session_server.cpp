@@ -193,8 +193,8 @@ class Server final : public SessionServer {
   // real time
   threads::SpscQueue<TickOutput> outputs_{64};
   threads::SpscQueue<JournalEntry> entries_{1024};
-  threads::SpscQueue<std::vector<std::uint8_t>> checkpoint_pool_{
-      2};  ///< checkpoint buffers, from the journal thread to the tick
+  /// empty checkpoint buffers, from the journal thread to the tick
+  threads::SpscQueue<std::vector<std::uint8_t>> checkpoint_pool_{2};
   TickInput input_;
   TickOutput overflow_output_;  ///< of a tick for which outputs_ is full: not sent
 };

@@ -38,8 +38,8 @@ struct SessionReport {
   RunState run;
   std::uint64_t late_ticks = 0;  ///< started a period or more after they were due
   std::uint64_t refused_inputs = 0;
-  std::uint64_t dropped_outputs =
-      0;  ///< ticks whose output was not sent: the queue to the wire thread was full
+  /// ticks whose output was not sent: the queue to the wire thread was full
+  std::uint64_t dropped_outputs = 0;
 };
 
 /// The server of one training session: announces it over DDS, accepts clients, runs ticks in real time or in

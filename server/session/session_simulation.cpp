@@ -36,9 +36,9 @@ void SessionSimulation::tick(const TickInput& input) noexcept {
     if (machine_.status().failed) phase_ = RunPhase::kFailed;
   }
   // commands received during a pause or emergency stop are deferred to its end
-  if (!isHeld()) commands_.clear();
+  if (!isSuspended()) commands_.clear();
   startWhenHandsPresent();
-  environment_.setFreeBodiesPaused(isHeld());
+  environment_.setFreeBodiesPaused(isSuspended());
   environment_.step();
 }
 
@@ -108,7 +108,7 @@ void SessionSimulation::applyAgeLimits() noexcept {
     const HandAge& age = ages_[i];
     if (!age.attached) continue;
     if (age.age == limits_.park) environment_.setHandPresent(HandId{i}, false);
-    environment_.setHandFrozen(HandId{i}, isHeld() || !age.active || age.age > limits_.freeze);
+    environment_.setHandFrozen(HandId{i}, isSuspended() || !age.active || age.age > limits_.freeze);
   }
 }
 
@@ -235,7 +235,7 @@ std::size_t SessionSimulation::maxSavedBytes() const {
   constexpr std::size_t kMaxCommandBytes = 2 * kMaxChanges * sizeof(game_control::GameCommand);
   std::vector<std::uint8_t> bytes;
   save(bytes);
-  return environment_.mostSavedBytes() + bytes.size() + kMaxCommandBytes;
+  return environment_.maxSavedBytes() + bytes.size() + kMaxCommandBytes;
 }
 
 Result<void> SessionSimulation::restore(std::span<const std::uint8_t> bytes) {

@@ -60,11 +60,12 @@ class SessionSimulation {
   [[nodiscard]] std::size_t maxSavedBytes() const;
 
  private:
+  /// The input of a hand.
   struct HandAge {
-    bool attached = false;
-    bool active = false;
-    Tick age = 0;  ///< [ticks] since the last device sample
-    std::uint32_t seq = 0;
+    bool attached = false;  ///< a client controls the hand
+    bool active = false;    ///< HandReading::active of the newest sample
+    Tick age = 0;           ///< [ticks] since the newest sample
+    std::uint32_t seq = 0;  ///< HandReading::seq of the newest sample
   };
 
   void apply(const Change& change) noexcept;
@@ -73,7 +74,7 @@ class SessionSimulation {
   void applyAgeLimits() noexcept;
   void startWhenHandsPresent() noexcept;
   /// No hand moves an object: emergency stop or pause.
-  [[nodiscard]] bool isHeld() const { return emergency_stop_ || phase_ == RunPhase::kPaused; }
+  [[nodiscard]] bool isSuspended() const { return emergency_stop_ || phase_ == RunPhase::kPaused; }
   void attach(HandId hand) noexcept;
   void detach(HandId hand) noexcept;
 

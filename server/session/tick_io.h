@@ -61,10 +61,12 @@ inline constexpr std::size_t kMaxChanges = 16;
 
 /// All inputs of one tick. Together with the state before the tick it determines the state after it, bit for
 /// bit.
+///
+/// Threads: a value. Real-time: filling it; appendBytes while the capacity suffices.
 struct TickInput {
   Tick tick = 0;
-  FixedVector<HandReading, kMaxHands>
-      readings;                              ///< at most one per hand; none for a hand without a new sample
+  /// at most one per hand; none for a hand without a new sample
+  FixedVector<HandReading, kMaxHands> readings;
   FixedVector<Change, kMaxChanges> changes;  ///< in the order of their application
 };
 

@@ -52,9 +52,10 @@ void CollPair::reset() noexcept {
 }
 
 void CollPair::query(const Pose& X_WA, const Pose& X_WB, double margin, std::uint32_t budget,
-                     std::span<const std::uint32_t> first) noexcept {
-  collision::queryPair({shell_A_, field_B_, X_WA, X_WB, spec_->dilation, margin, levels_, budget, first},
-                       list_->query);
+                     std::span<const std::uint32_t> priority_points) noexcept {
+  collision::queryPair(
+      {shell_A_, field_B_, X_WA, X_WB, spec_->dilation, margin, levels_, budget, priority_points},
+      list_->query);
   std::fill_n(list_->multipliers.begin(), list_->query.contacts.size(), 0.0);
   list_->F_Ao_W = Wrench{};
   list_->traversal = collision::TraversalState{};

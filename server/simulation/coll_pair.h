@@ -85,9 +85,9 @@ class CollPair {
 
   // the following functions need a contact list
   /// Queries a pair that is in no island: lists contacts with gaps up to `margin` [m], testing at most
-  /// `budget` points. The points `first` are tested even when their level is skipped.
+  /// `budget` points. The `priority_points` are tested even when their level is skipped.
   void query(const Pose& X_WA, const Pose& X_WB, double margin, std::uint32_t budget = 0xFFFFFFFFU,
-             std::span<const std::uint32_t> first = {}) noexcept;
+             std::span<const std::uint32_t> priority_points = {}) noexcept;
   /// Sets the contact wrench to the penalty force at `stiffness` [N/m] of the contacts of query().
   void computePenaltyForce(double stiffness, const Pose& X_WA) noexcept;
   /// Copies the result of the island solver of tick `now`.

@@ -37,9 +37,10 @@ struct HandMotion {
   Pose X_HO;                ///< of the object in the hand, constant while held
   Wrench F_Ho_W;            ///< of the coupling on the hand, about the hand's origin
   ObjectId default_object;  ///< moved while the hand holds no other: pointer, drill, cube, forearm
-  Pose X_OR;                ///< pose of the default object in the held one, from when that was grabbed
-  bool has_pose = false;    ///< a pose has been received since the hand is present
-  bool attached = false;    ///< `object` follows the hand; false: from the hand's first pose on
+  /// R: where the default object returns to, fixed to the held object O since that was grabbed.
+  Pose X_OR;
+  bool has_pose = false;             ///< a pose has been received since the hand is present
+  bool attached = false;             ///< `object` follows the hand; false: from the hand's first pose on
   std::uint32_t rejected_poses = 0;  ///< invalid poses (not finite, not unit, out of range), ignored
 };
 
@@ -61,13 +62,13 @@ struct EnvironmentOptions {
   /// work.
   bool coherence = true;
   WorkLimits work;  ///< at the start; setBudget changes it
-  /// Most pairs that may be queried in a tick or have contacts; about 120 kB each.
+  /// Most pairs that may be queried in a tick or have contacts; about 80 kB each, and 100 kB per worker.
   std::size_t contact_lists = 256;
 };
 
-/// The simulation state and its step (paper §3.2). One tick: set tracked objects, find near (broad phase) and
-/// due (coherence) pairs, solve the contact islands for the poses of held objects and free bodies, query the
-/// due pairs in no island, sum forces.
+/// The simulation state and its step (paper §3.2). One tick: move tracked objects to their trackers, find
+/// near (broad phase) and due (coherence) pairs, solve the contact islands for the poses of held objects and
+/// free bodies, query the due pairs in no island, sum forces.
 ///
 /// A free body enters its island's problem as a spring: inertia over the tick squared, towards the pose it
 /// would have without contacts. Hands, held objects and free bodies are thus one problem, and contact forces
@@ -84,7 +85,7 @@ struct EnvironmentOptions {
 /// states for any number of workers.
 ///
 /// Threads: one caller; its own workers inside step(). Real-time: everything but constructor, save, restore,
-/// mostSavedBytes; append when the capacity suffices.
+/// maxSavedBytes; append when the capacity suffices.
 class Environment {
  public:
   Environment(std::shared_ptr<const Scene> scene, const EnvironmentOptions& options);
@@ -120,7 +121,7 @@ class Environment {
   /// Point budget from the next tick on; 0: unlimited.
   void setBudget(std::uint64_t points) noexcept { work_limits_.points = points; }
   /// A wrench of a source other than contacts and couplings, about the object's origin; see
-  /// ForceBuffer::contribute for validation, clamping and expiry.
+  /// ForceBuffer::contribute for validation, clamping and expiry. A rejected one is ignored.
   void contribute(ObjectId object, std::uint32_t source, const Wrench& F_Oo_W,
                   std::uint32_t lifetime_ticks) noexcept;
 
@@ -142,19 +143,24 @@ class Environment {
   [[nodiscard]] Wrench forceOn(ObjectId object) const noexcept;
   [[nodiscard]] bool inContact(ObjectId a, ObjectId b) const noexcept;
   /// The manifold of a hand's object for the local model of its client; server_epoch, answers_seq and
-  /// step_revision are left to the caller.
+  /// step_revision are left to the caller. It has at most kManifoldContacts contacts; validity_radius is at
+  /// most the gap of any contact that none of them represents. It has at most kOtherPulls couplings of other
+  /// hands. An unknown hand leaves `out` as it is.
   void manifold(HandId hand, HandManifold& out) const noexcept;
-  /// Contact summary of a pair for publication.
+  /// Contact summary of a pair for publication; `pair` must be an index of Scene::pairs.
   void pairContact(std::size_t pair, PairContact& out) const noexcept;
   /// Work of the last tick, counted.
   struct Work {
-    std::uint32_t active_pairs = 0, queried_pairs = 0, substeps = 0, iterations = 0;
+    std::uint32_t active_pairs = 0;   ///< may collide, near or not
+    std::uint32_t queried_pairs = 0;  ///< near and due, with a contact list
+    std::uint32_t steps = 0;          ///< SQP steps of all islands
+    std::uint32_t iterations = 0;     ///< of the active-set method, in all islands
     std::uint64_t points_visited = 0;
     std::uint32_t near_pairs = 0;      ///< found by the broad phase
     std::uint32_t deferred_pairs = 0;  ///< due, but without a contact list: their movable objects stood still
     std::uint32_t limited_pairs = 0;   ///< queried with skipped levels
     double load_percent = 0.0;         ///< [%] largest load of a pair
-    bool conflicting = false;          ///< constraints of an island could not all be satisfied
+    bool infeasible = false;           ///< of any island: collision::SolveReport::infeasible
   };
   [[nodiscard]] const Work& work() const { return work_; }
 
@@ -166,7 +172,7 @@ class Environment {
   /// Fails and changes nothing when `bytes` are no valid checkpoint of this scene and build.
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
   /// [bytes] upper bound of what append() adds, for any state of this scene.
-  [[nodiscard]] std::size_t mostSavedBytes() const;
+  [[nodiscard]] std::size_t maxSavedBytes() const;
 
  private:
   struct Engine;
@@ -188,7 +194,7 @@ class Environment {
   [[nodiscard]] bool mayTouch(std::size_t pair) const noexcept;
   void integrateFreeMotion() noexcept;
   [[nodiscard]] collision::MovableBody freeBody(ObjectId object) noexcept;
-  void limitTravel(std::size_t island) noexcept;
+  void setStepLimits(std::size_t island) noexcept;
   void updateVelocities(std::size_t island) noexcept;
   void updateSleep(std::size_t island) noexcept;
   // friction of free bodies (environment_friction.cpp)
@@ -215,7 +221,7 @@ class Environment {
   void applyIslandResults() noexcept;
   void queryNonIslandPairs() noexcept;
   void sumForces() noexcept;
-  void writeWeights() noexcept;
+  void writeGravity() noexcept;
   void updateContactFlags() noexcept;
   void countWork() noexcept;
   void updatePairMotion(std::uint32_t pair) noexcept;

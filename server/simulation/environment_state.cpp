@@ -95,7 +95,7 @@ std::uint64_t Environment::hash() const noexcept {
   return hasher.value();
 }
 
-std::size_t Environment::mostSavedBytes() const {
+std::size_t Environment::maxSavedBytes() const {
   // [bytes] a near pair with its two force cells, a full contact list with multipliers, an object
   constexpr std::size_t kPair = 512;
   constexpr std::size_t kList =

@@ -26,7 +26,7 @@ struct ForceCell {
 /// for contributions of clients, which are validated, clamped, fade linearly with age and expire. Cells are
 /// summed in cell order, not in order of arrival: the total is bit-equal for any number of workers. The own
 /// cells in use are listed, so a sum costs only those. There is one total per tick, after all sources are
-/// written: the paper's sending policies (§3.2, iv) have no place here (DECISIONS.md).
+/// written: the paper's sending policies (§3.2, iv) have no place here (D-041).
 ///
 /// Threads: one writer per own cell, contributions from one thread; total() after the tick's barrier.
 /// Real-time: everything but the constructor.

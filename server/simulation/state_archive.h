@@ -18,6 +18,8 @@ namespace tenon::simulation {
 /// Traversal of the simulation state for serialisation and hashing. This base splits the types of the
 /// simulation into numbers; `Derived` writes, reads or hashes a number. One list of fields serves all three,
 /// so what is saved is also hashed and restored.
+///
+/// Threads: one. Real-time: hashing; writing while the capacity suffices.
 template <typename Derived>
 class StateArchive {
  public:

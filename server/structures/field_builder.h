@@ -9,6 +9,8 @@
 namespace tenon::structures {
 
 /// The arrays of a field under construction.
+///
+/// Threads: one; the functions below are pure. Real-time: no.
 struct FieldStorage {
   DistanceField::Layout layout;  ///< makeField sets its spans
   std::vector<DistanceField::Entry> index;

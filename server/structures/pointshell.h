@@ -31,8 +31,9 @@ struct ShellLevel {
   std::uint32_t first_point = 0, point_count = 0;
   std::uint32_t first_leaf = 0, leaf_count = 0;
   std::uint32_t first_cluster = 0, cluster_count = 0;
-  float spacing = 0.0F;     ///< [m] between neighbours when levels 0..this are used
-  float area_scale = 1.0F;  ///< [-] the whole surface area over the sum of `area` in levels 0..this
+  float spacing = 0.0F;  ///< [m] between neighbours when levels 0..this are used
+  float area_scale =
+      1.0F;  ///< [-] whole surface area over the sum of `area` in levels 0..this; see areasOfLevel
 };
 
 /// Up to sixteen points or spheres in structure-of-arrays form for SIMD; unused lanes repeat the first.

@@ -20,6 +20,8 @@ struct SurfaceSample {
 /// normals (two sides of a thin plate) do not exclude each other. Earlier samples are preferred, so callers
 /// put corners and edges first. `spacing` is that of the whole set; 0: the square root of the mean area. No
 /// samples give an empty shell.
-[[nodiscard]] Pointshell buildShell(std::span<const SurfaceSample> sites, double spacing = 0.0);
+///
+/// Threads: pure. Real-time: no.
+[[nodiscard]] Pointshell buildShell(std::span<const SurfaceSample> samples, double spacing = 0.0);
 
 }  // namespace tenon::structures

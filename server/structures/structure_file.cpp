@@ -339,7 +339,7 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
       section<ShellPoint>(bytes, *header, kPoints), section<ShellSphere>(bytes, *header, kLeaves),
       section<ShellSphere>(bytes, *header, kClusters), section<ShellLevel>(bytes, *header, kLevels)};
   if (!field.index.empty() && !fieldIsValid(field))
-    return fail(name + ": its field has an index out of range; bake it again");
+    return fail(name + ": its field is damaged, a size or an index is out of range; bake it again");
   if (const auto problem = problemOf(shell))
     return fail(name + ": its pointshell is damaged, " + *problem + "; bake it again");
 

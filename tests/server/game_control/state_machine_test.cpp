@@ -184,7 +184,7 @@ TEST(StateMachine, RolesFollowTheOwnObjectsOfSwappedHands) {
   fixture.environment().setHandPose(HandId{1}, Pose(Vector3(0.2, 0.3, 0.3)), Twist{});
   const std::uint32_t before = fixture.status().revision;
   fixture.step({command(CommandKind::kSwapHands)});
-  EXPECT_EQ(fixture.status().hand, HandId{1}) << "the hand whose own object is the pointer";
+  EXPECT_EQ(fixture.status().hand, HandId{1}) << "the hand whose default object is the pointer";
   EXPECT_GT(fixture.status().revision, before);
   fixture.step({command(CommandKind::kSkipStep)});
   fixture.step(2);

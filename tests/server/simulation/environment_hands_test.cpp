@@ -103,8 +103,7 @@ TEST_F(HandsTest, AFixedPartStaysFixedAndTheHandMovesItsPointerAgain) {
 }
 
 //   hand ->  o[part]     the pointer is in contact with the part, the hand 10 mm inside it; after the grab
-//   the
-//                        other part stops the held one, and there the hand releases it
+//                        the other part stops the held one, and there the hand releases it
 TEST_F(HandsTest, AfterAReleaseThePointerStartsOutsideThePartAndMovesToTheHand) {
   test::activateHand(*environment_, right_, {0.0, 0.0, 0.0});
   test::moveHandTo(*environment_, right_,
