@@ -163,7 +163,11 @@ int main(int argc, char** argv) {
     reportError(*answer);
     return kWrongUsage;
   }
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kWrongUsage;
+  }
   std::signal(SIGINT, onStopSignal);
   std::signal(SIGTERM, onStopSignal);
   return serve(arguments);

@@ -96,10 +96,6 @@ void Station::receive(const EmergencyStop& stop) {
   stopChanged(stop.engaged);
 }
 
-void Station::receive(const GrabState& /*grab*/) {
-  // a hand's object is taken from its manifold, together with the planes that belong to it
-}
-
 bool Station::takeEvent(StationEvent& event) noexcept {
   if (events_taken_ == events_written_) return false;
   event = events_[events_taken_ % kEventCapacity];

@@ -74,7 +74,6 @@ class Station {
   void receive(const HandManifold& manifold) noexcept;
   void receive(const StepState& step);
   void receive(const EmergencyStop& stop);
-  void receive(const GrabState& grab);
 
   /// One millisecond of devices, local models and simulated person; `seq` numbers the inputs.
   virtual void step(std::uint32_t seq) noexcept = 0;

@@ -35,7 +35,11 @@ int run(int argc, char** argv, const StationMainOptions& main) {
   program.membership.person = main.person;
   main.add_options(app);
   addCommonOptions(app, program, main.seed);
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
   program.print = [&main](const std::string& text) {
     std::fprintf(stderr, "%s: %s\n", main.name.c_str(), text.c_str());
   };

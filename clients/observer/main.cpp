@@ -26,7 +26,11 @@ int run(int argc, char** argv) {
   app.add_option("--language", options.language, "language of titles and instructions")
       ->capture_default_str();
   app.add_option("--wait", wait, "seconds to search for a server")->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
   membership.timeout = std::chrono::seconds(wait);
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);

@@ -10,7 +10,7 @@ namespace tenon::observer {
 
 namespace {
 constexpr Tick kProgressPeriod = 2000;  // [ticks]
-constexpr Tick kStepDelay = 1;  // a step that begins in a tick acts, and is told, from the next one on
+constexpr Tick kStepDelay = 1;  // [ticks] a step takes effect, and is published, in the tick after its begin
 constexpr double kDegrees = 57.29577951308232;
 
 double seconds(Tick ticks) { return static_cast<double>(ticks) * kTickSeconds; }
@@ -100,8 +100,7 @@ void Timeline::receive(const RunState& run) {
   const std::pair newest{run.phase, run.server_epoch};
   if (newest == run_) return;
   run_ = newest;
-  add(run.tick, run.phase >= RunPhase::kSucceeded ? Rank::kRunEnd : Rank::kRun,
-      [this, run] { printRun(run); });
+  add(run.tick, isOver(run.phase) ? Rank::kRunEnd : Rank::kRun, [this, run] { printRun(run); });
 }
 
 void Timeline::beginStep(const StepState& step) {
@@ -116,9 +115,9 @@ void Timeline::beginStep(const StepState& step) {
   progress_ = {};
   last_progress_ = step.started;
   contacts_.clear();
-  const std::string title = localized(step.title).empty() ? step.name : localized(step.title);
-  print(begin, fmt::format("{}: {}", stepNumber(), title));
-  if (const std::string instruction = localized(step.instruction); !instruction.empty())
+  const std::string title = localized(step.title, language_);
+  print(begin, fmt::format("{}: {}", stepNumber(), title.empty() ? step.name : title));
+  if (const std::string instruction = localized(step.instruction, language_); !instruction.empty())
     print(begin, fmt::format("  the trainee is told: {}", instruction));
 }
 
@@ -176,7 +175,7 @@ void Timeline::printEvent(const EventLog& event) const {
 }
 
 void Timeline::printRun(const RunState& run) {
-  const bool is_over = run.phase >= RunPhase::kSucceeded;
+  const bool is_over = isOver(run.phase);
   const bool has_timed_out = !step_ended_ && step_phases_[step_.started] == StepPhase::kTimedOut;
   if (run.phase == RunPhase::kSucceeded || has_timed_out) endStep(run.tick);
   const std::string_view phase = runPhaseName(run.phase);
@@ -191,13 +190,6 @@ std::string Timeline::titleOf(ObjectId object) const {
   const auto found = titles_.find(object);
   if (found != titles_.end()) return found->second;
   return object.valid() ? fmt::format("object {}", object.value) : "nothing";
-}
-
-std::string Timeline::localized(const std::vector<LocalizedText>& texts) const {
-  for (const LocalizedText& text : texts) {
-    if (text.language == language_) return text.text;
-  }
-  return texts.empty() ? std::string() : texts.front().text;
 }
 
 std::string Timeline::stepNumber() const { return fmt::format("step {} of {}", step_.step + 1, step_.steps); }

@@ -8,7 +8,6 @@
 #include <set>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "idl/types/messages.h"
 
@@ -18,7 +17,7 @@ namespace tenon::observer {
 ///
 /// Topics arrive in no order among each other. So a sentence waits until no earlier one can be expected any
 /// more (printReceivedBefore), and is made only then: from what had happened by its tick, whenever that
-/// arrived. Where two topics tell the same event, one is chosen. A step ends where the next one begins, or
+/// arrived. Where two topics report the same event, one is chosen. A step ends where the next one begins, or
 /// with the run: StepState carries the tick in which a step began, also when it says that the step is done.
 ///
 /// Not reported: that a hand takes or releases its own pointer, that a mounted part is let go, further
@@ -45,8 +44,6 @@ class Timeline {
   void printAll() { printReceivedBefore(Clock::time_point::max()); }
 
   [[nodiscard]] std::string titleOf(ObjectId object) const;
-  /// The text in the timeline's language, else the first one.
-  [[nodiscard]] std::string localized(const std::vector<LocalizedText>& texts) const;
 
  private:
   /// Order of sentences with the same tick.

@@ -22,7 +22,11 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--lockstep", options.lockstep, "refuse a session that does not run in lockstep");
   app.add_option("--wait", wait, "seconds to search for a server")->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
   options.timeout = std::chrono::seconds(wait);
   options.report = [](const std::string& text) {
     std::printf("%s\n", text.c_str());

@@ -87,9 +87,8 @@ Result<void> Recorder::subscribe() {
 }
 
 Result<void> Recorder::writeUntilOver() {
-  auto status = wire::Writer<RecorderStatus>::open(member_->session(), wire::kRecorderStatus);
-  if (!status) return fail(status.error().what);
-  status_writer_ = std::make_unique<wire::Writer<RecorderStatus>>(std::move(*status));
+  if (auto opened = openInto(status_writer_, member_->session(), wire::kRecorderStatus); !opened)
+    return opened;
   wire::Inbox lobby;
   if (auto watched = member_->watch(lobby); !watched) return watched;
   if (options_.report) {

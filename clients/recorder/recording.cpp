@@ -98,10 +98,7 @@ void Recording::keepProblem(const Result<void>& done) {
   status_.problem = done.error().what;
 }
 
-bool Recording::runIsOver() const {
-  return run_ && (run_->phase == RunPhase::kSucceeded || run_->phase == RunPhase::kFailed ||
-                  run_->phase == RunPhase::kStopped);
-}
+bool Recording::runIsOver() const { return run_ && isOver(run_->phase); }
 
 Result<void> Recording::close() {
   const bool was_whole = status_.problem.empty();

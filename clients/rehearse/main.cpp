@@ -58,7 +58,8 @@ void declare(CLI::App& app, RehearseArguments& arguments) {
   app.add_flag("--follow", arguments.follow,
                "print activity, errors and force of the trainee twice per second");
   app.add_flag("--quiet", arguments.quiet, "print the outcome only");
-  app.footer("Exit code: 0 if the session succeeded, else 1. Last line: the final state hash.");
+  app.footer(
+      "Exit code: 0 if the session succeeded, 1 if not, 2 for wrong usage. Last line: the final state hash.");
 }
 
 int printError(const std::string& what) {
@@ -130,6 +131,10 @@ int main(int argc, char** argv) {
   CLI::App app("Runs a session with simulated people in one process, on a virtual clock.", "tenon rehearse");
   RehearseArguments arguments;
   declare(app, arguments);
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
   return run(arguments);
 }

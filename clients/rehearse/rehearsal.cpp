@@ -107,7 +107,6 @@ class Rehearsal {
   void deliver(const session::OutgoingMessages& outgoing) {
     for (const auto& station : stations_) {
       if (outgoing.events.step) station->receive(*outgoing.events.step);
-      for (const GrabState& grab : outgoing.events.grabs) station->receive(grab);
       for (const WorldFrame& frame : outgoing.frames) station->receive(frame);
       for (const HandManifold* manifold : outgoing.manifolds) station->receive(*manifold);
     }

@@ -32,7 +32,11 @@ int run(int argc, char** argv) {
   app.add_flag("--json", json, "print the summary as JSON instead of a table");
   app.add_option("--language", language, "language of the steps' titles")->capture_default_str();
   app.footer("Exit code: 0 if the run succeeded and every step was done, 1 if not, 2 if there is no report.");
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
 
   const auto analysis = tenon::report::analyzeRecording(recording, language);
   if (!analysis) return printError(analysis.error().what);

@@ -130,7 +130,6 @@ class RecordingAnalyzer {
   static void add(Series& series, Tick tick, double value) {
     if (std::isfinite(value)) series.push_back({seconds(tick), value});
   }
-  [[nodiscard]] std::string localized(const std::vector<LocalizedText>& texts) const;
   void endVisits();
   void mergeHands();
   void listAids();
@@ -235,7 +234,7 @@ void RecordingAnalyzer::receive(const StepState& step) {
   visit.step = step.step;
   visit.revision = step.revision;
   visit.name = step.name;
-  visit.title = localized(step.title);
+  visit.title = localized(step.title, language_);
   if (visit.title.empty()) visit.title = step.name;
   visit.part = step.part;
   visit.phase = step.phase;
@@ -286,12 +285,6 @@ void RecordingAnalyzer::receive(const Command& command) {
     default:
       return;
   }
-}
-
-std::string RecordingAnalyzer::localized(const std::vector<LocalizedText>& texts) const {
-  for (const LocalizedText& text : texts)
-    if (text.language == language_) return text.text;
-  return texts.empty() ? std::string() : texts.front().text;
 }
 
 void RecordingAnalyzer::endVisits() {

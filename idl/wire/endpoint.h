@@ -37,6 +37,15 @@ class Writer {
   std::unique_ptr<Impl> impl_;
 };
 
+/// Writer<M>::open into `writer`.
+template <class M>
+Result<void> openInto(std::unique_ptr<Writer<M>>& writer, Partition& partition, const Topic<M>& topic) {
+  auto opened = Writer<M>::open(partition, topic);
+  if (!opened) return fail(opened.error().what);
+  writer = std::make_unique<Writer<M>>(std::move(*opened));
+  return {};
+}
+
 /// Takes messages of type M from a topic, one by one, without waiting.
 ///
 /// Threads: one at a time. Real-time: no.

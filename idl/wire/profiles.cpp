@@ -80,9 +80,9 @@ dds_qos_t* readerQos(const TopicSpec& topic, LinkProfile profile, bool keep_all)
 std::string_view loopbackConfig() {
   return R"xml(<?xml version="1.0" encoding="UTF-8"?>
 <!-- Programs on one machine, and nothing leaves it: the default when neither an option nor CYCLONEDDS_URI says
-     otherwise. Unicast to up to 61 participants, so it also works where multicast does not. One receive thread,
-     so that the name `recv` in Threads covers it; fast heartbeats and acknowledgements, because a lost
-     sample of a lockstep session stops everybody until it has been sent again. -->
+     otherwise. Unicast to up to 61 participants, so it also works where multicast does not. One receive thread
+     a process; fast heartbeats and acknowledgements, because a lost sample of a lockstep session stops all
+     its programs until it has been sent again. -->
 <CycloneDDS xmlns="https://cdds.io/config">
   <Domain Id="any">
     <General>

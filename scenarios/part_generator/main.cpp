@@ -111,7 +111,11 @@ int main(int argc, char** argv) {
   app.footer(
       "Examples:\n  tenon-parts peg_and_box out/\n  tenon-parts engine_bay out/ --triangles 300000\n"
       "  tenon-parts engine_bay --picture bay.png --detail 0.6");
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
 
   if (list && scenario.empty()) {
     for (const PartSet& set : partSets()) printPartSet(set);

@@ -35,6 +35,14 @@ class Help(unittest.TestCase):
                 self.assertEqual(done.returncode, 0, done.stderr)
                 self.assertIn("--session", done.stdout)
 
+    def test_an_unknown_option_is_wrong_usage(self):
+        for verb in ("serve", "record", "report", "rehearse", "parts", "command", "bake", "probe", "contact", "voxels"):
+            with self.subTest(verb=verb):
+                self.assertEqual(tenon(verb, "--fly").returncode, 2)
+        for role in ("trainee", "instructor", "observer"):
+            with self.subTest(role=role):
+                self.assertEqual(tenon("join", "--role", role, "--fly").returncode, 2)
+
     def test_an_unknown_verb_is_one_clear_error(self):
         done = tenon("fly")
         self.assertEqual(done.returncode, 2)

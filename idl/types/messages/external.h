@@ -5,10 +5,11 @@
 #include "idl/types/ids.h"
 #include "idl/types/spatial.h"
 
-/// Inputs to the simulation from programs that are no stations.
+/// Inputs to the simulation from programs other than stations.
 namespace tenon {
 
-/// External wrench on an object.
+/// External wrench on an object. The server ignores one that is not finite, clamps it to the force of a
+/// haptic device, and fades it linearly over its lifetime (limits: server/simulation/force_buffer.h).
 struct ForceContribution {
   std::uint32_t source = 0;  ///< its cell of the force accumulator
   ClientId client;

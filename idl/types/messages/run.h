@@ -10,6 +10,9 @@ namespace tenon {
 
 enum class RunPhase : std::uint32_t { kWaitingForPeople, kRunning, kPaused, kSucceeded, kFailed, kStopped };
 
+/// Succeeded, failed or stopped.
+[[nodiscard]] constexpr bool isOver(RunPhase phase) { return phase >= RunPhase::kSucceeded; }
+
 /// Phase of the session.
 struct RunState {
   RunPhase phase = RunPhase::kWaitingForPeople;
