@@ -15,12 +15,17 @@ constexpr std::size_t kMaxStates = 1000;
 
 }  // namespace
 
-ScenarioStateReader::ScenarioStateReader(YamlReader& yaml, ScenarioFile& scenario)
+ScenarioStateReader::ScenarioStateReader(YamlReader& yaml, ScenarioFile& scenario,
+                                         const std::vector<HandAssignment>& taken)
     : yaml_(yaml), scenario_(scenario), names_(yaml, scenario) {
   for (const ScenarioHand& hand : scenario.hands) object_of_hand_.push_back(hand.object);
   for (const ScenarioObject& object : scenario.objects) {
     hidden_.push_back(object.status == ObjectStatus::kHidden);
     group_.push_back(object.group);
+  }
+  for (const HandAssignment& take : taken) {
+    object_of_hand_[take.hand.value] = take.object;
+    hidden_[take.object.value] = false;
   }
 }
 
@@ -49,6 +54,16 @@ void ScenarioStateReader::read(const YAML::Node& states) {
   }
   if (scenario_.states.empty()) yaml_.fail(states, "'states' is empty, expected at least one state");
   checkGroups();
+}
+
+void ScenarioStateReader::addEndlessState() {
+  ScenarioState state;
+  state.name = "no states";
+  state.title.push_back({scenario_.language, state.name});
+  state.hand = firstCoupledHand();
+  state.conditions.resize(2);
+  state.conditions[1].kind = ConditionKind::kFulfilled;
+  scenario_.states.push_back(std::move(state));
 }
 
 ScenarioState ScenarioStateReader::readState(const YAML::Node& node) {
