@@ -127,9 +127,8 @@ Result<InsertionResult> rehearseInsertion(const std::filesystem::path& scenario,
   InsertionResult insertion;
   InsertionMonitor monitor(*loaded, insertion.analysis);
   rehearse::RehearsalOptions options;
-  options.on_tick = [&](const session::TickInput& input, const session::TickOutput& output) {
-    monitor.record(input, output);
-  };
+  options.on_tick = [&](const session::SessionSimulation&, const session::TickInput& input,
+                        const session::TickOutput& output) { monitor.record(input, output); };
   options.stop_when = [&] { return monitor.done(); };
   game_control::progress("mounting the control box");
   const auto report = rehearse::runRehearsal(*loaded, std::move(stations), options);
