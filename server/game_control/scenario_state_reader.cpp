@@ -17,16 +17,13 @@ constexpr std::size_t kMaxStates = 1000;
 
 ScenarioStateReader::ScenarioStateReader(YamlReader& yaml, ScenarioFile& scenario,
                                          const std::vector<HandAssignment>& taken)
-    : yaml_(yaml), scenario_(scenario), names_(yaml, scenario) {
+    : yaml_(yaml), scenario_(scenario), names_(yaml, scenario), taken_(taken) {
   for (const ScenarioHand& hand : scenario.hands) object_of_hand_.push_back(hand.object);
   for (const ScenarioObject& object : scenario.objects) {
     hidden_.push_back(object.status == ObjectStatus::kHidden);
     group_.push_back(object.group);
   }
-  for (const HandAssignment& take : taken) {
-    object_of_hand_[take.hand.value] = take.object;
-    hidden_[take.object.value] = false;
-  }
+  for (const HandAssignment& take : taken) hidden_[take.object.value] = false;
 }
 
 std::string ScenarioStateReader::describeKey(const ScenarioState& state, const std::string& key) const {
@@ -243,6 +240,8 @@ HandId ScenarioStateReader::handMoving(ObjectId object) const {
     for (std::uint32_t hand = 0; hand < object_of_hand_.size(); ++hand) {
       if (object_of_hand_[hand] == object) return HandId{hand};
     }
+    for (const HandAssignment& take : taken_)
+      if (take.object == object) return take.hand;
   }
   return {};
 }

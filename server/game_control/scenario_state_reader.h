@@ -53,6 +53,7 @@ class ScenarioStateReader {
   YamlReader& yaml_;
   ScenarioFile& scenario_;
   ScenarioNames names_;
+  std::vector<HandAssignment> taken_;
   std::vector<ObjectId> object_of_hand_;  ///< by hand: the object it moves in the state being read
   std::vector<bool> hidden_;              ///< by object
   std::vector<std::uint32_t> group_;      ///< by object

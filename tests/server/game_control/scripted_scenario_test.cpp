@@ -55,12 +55,13 @@ TEST(ScriptedScenario, StatesOfTheFileAreReadAndAHandThatTakesTheObjectCanReachI
   // neither a state nor a hand of its own gives the part to a hand
   const std::string text = test::with(test::smallScenario(), "    hands: {right: part}\n", "");
   EXPECT_THAT(parsed(text, {.needs_states = false}).error().what, HasSubstr("no hand moves 'part'"));
-  const auto scenario = parsed(test::with(text, "  - name: take\n    touch: part\n    for: 0.1 s\n", ""),
-                               {.taken = {{kRight, kPart}}, .needs_states = false});
+  const auto scenario = parsed(text, {.taken = {{kRight, kPart}}, .needs_states = false});
   ASSERT_TRUE(scenario) << scenario.error().what;
-  ASSERT_EQ(scenario->states.size(), 1U);
-  EXPECT_EQ(scenario->states[0].name, "mount");
-  EXPECT_EQ(scenario->states[0].hand, kRight);
+  ASSERT_EQ(scenario->states.size(), 2U);
+  EXPECT_EQ(scenario->states[0].conditions[1].object, scenario->objectNamed("pointer"))
+      << "a touch is that of the hand's own object, whatever it has taken";
+  EXPECT_EQ(scenario->states[1].name, "mount");
+  EXPECT_EQ(scenario->states[1].hand, kRight);
 }
 
 TEST(ScriptedScenario, NamesAloneAreReadOfAScenarioWhosePairsDependOnWhatIsTaken) {
