@@ -43,7 +43,7 @@ function(tenon_tests name)
 endfunction()
 
 foreach(room idl/types idl/record server/structures server/game_control devices devices/simulated clients/simulated_person
-             clients/trainee clients/instructor clients/observer clients/recorder clients/command clients/report
+             clients/trainee clients/instructor clients/observer clients/recorder clients/command clients/report clients/rehearse
              scenarios/part_generator)
   string(REPLACE "/" "_" target ${room})
   tenon_tests(${room} LINK ${target})

@@ -167,7 +167,7 @@ struct ScenarioState {
   bool snap = false;
   std::uint32_t timeout = 0;  ///< [ticks] 0: none
   TimeoutAction on_timeout = TimeoutAction::kFail;
-  int line = 0;
+  int line = 0;  ///< 0: not in the file, see ReadOptions::needs_states
 };
 
 /// A training scenario, read from YAML and checked: all ids and indices in it are valid.
@@ -198,12 +198,24 @@ struct ScenarioFile {
   [[nodiscard]] int signalNamed(std::string_view signal) const;
 };
 
+/// How a scenario is read where its hands follow files instead of people.
+struct ReadOptions {
+  /// Hands that hold an object from the start on: it counts as moved by that hand, so it has pairs. Ids that
+  /// the scenario does not have are ignored.
+  std::vector<HandAssignment> taken;
+  /// False: a file without states gets one, with line 0, that lasts until somebody sends kFulfilled.
+  bool needs_states = true;
+  bool only_names = false;  ///< stop after objects and hands: to look up their ids for `taken`
+};
+
 /// Reads a scenario file, or `scenario.yaml` in a folder. Fails with `file:line: what was wrong, what was
 /// expected`.
-[[nodiscard]] Result<ScenarioFile> readScenario(const std::filesystem::path& path);
+[[nodiscard]] Result<ScenarioFile> readScenario(const std::filesystem::path& path,
+                                                const ReadOptions& options = {});
 
 /// As readScenario(), from a text. `path` names it in errors; mesh files are relative to its folder.
-[[nodiscard]] Result<ScenarioFile> parseScenario(std::string_view text, const std::filesystem::path& path);
+[[nodiscard]] Result<ScenarioFile> parseScenario(std::string_view text, const std::filesystem::path& path,
+                                                 const ReadOptions& options = {});
 
 /// All objects in an order in which the parts that are mounted into an object are baked before it, as
 /// refineBoxes() needs. Parts that are mounted into each other come in the order of their ids.

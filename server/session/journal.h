@@ -16,6 +16,9 @@ namespace tenon::session {
 
 inline constexpr Tick kCheckpointEvery = 1000;  // [ticks]
 
+/// Whether the journal entry of this tick has a checkpoint.
+[[nodiscard]] constexpr bool hasCheckpoint(Tick tick) { return tick % kCheckpointEvery == 1; }
+
 /// What the tick thread passes to the journal thread.
 struct JournalEntry {
   TickInput input;

@@ -17,6 +17,7 @@ namespace tenon::session {
 struct LoadOptions {
   std::filesystem::path cache;  ///< folder of baked structures and generated parts
   double detail = 0.12;         ///< [-] mesh resolution of generated parts, 0..1; 1 is the scene of the paper
+  game_control::ReadOptions read;  ///< of the scenario file
 };
 
 /// Called with the current activity, as in "engine bay: signs", and its finished `fraction` [-], 0..1.

@@ -152,8 +152,7 @@ class Server final : public SessionServer {
     entry.input = input;
     entry.hash = hash;
     entry.checkpoint.clear();
-    if (input.tick % kCheckpointEvery == 1 && acquireCheckpointBuffer(entry))
-      simulation_.save(entry.checkpoint);
+    if (hasCheckpoint(input.tick) && acquireCheckpointBuffer(entry)) simulation_.save(entry.checkpoint);
   }
 
   void fillCheckpointPool() {

@@ -75,7 +75,16 @@ void SessionSimulation::apply(const Change& change) noexcept {
       return;
     case ChangeKind::kBudget:
       return environment_.setBudget(budgetPoints(change.value));
+    case ChangeKind::kTake:
+      return take(change.hand, change.object);
   }
+}
+
+/// A hidden object appears at the pose of the hand that grabs it, or at the first one of a hand without.
+void SessionSimulation::take(HandId hand, ObjectId object) noexcept {
+  if (hand.value >= ages_.size() || object.value >= environment_.objects().size()) return;
+  environment_.place(object, environment_.objects()[object.value].X_WO, ObjectStatus::kHidden);
+  environment_.grab(hand, object);
 }
 
 void SessionSimulation::attach(HandId hand) noexcept {

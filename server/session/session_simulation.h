@@ -75,6 +75,7 @@ class SessionSimulation {
   void startWhenHandsPresent() noexcept;
   /// No hand moves an object: emergency stop or pause.
   [[nodiscard]] bool isSuspended() const { return emergency_stop_ || phase_ == RunPhase::kPaused; }
+  void take(HandId hand, ObjectId object) noexcept;
   void attach(HandId hand) noexcept;
   void detach(HandId hand) noexcept;
 

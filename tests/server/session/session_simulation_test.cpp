@@ -266,6 +266,38 @@ TEST(SessionSimulation, RefusesACheckpointThatIsTruncatedOrOfAnotherScenario) {
   EXPECT_EQ(again.hash(), rig.simulation().hash());
 }
 
+TEST(SessionSimulation, AHandTakesAnObjectAtItsOwnPoseAndLetsItGoAsAnyOther) {
+  const Pose X_WH(Vector3(0.3, 0.1, 0.25), Quaternion(0.6, 0.0, 0.8, 0.0));
+  for (const bool attached_before : {false, true}) {
+    test::SessionRig rig(1, {kRightHand, kLeftHand});  // no state begins without the left hand
+    const ObjectId part = rig.loaded().scenario->objectNamed("part");
+    rig.attach(kRightHand, Vector3::Zero());
+    rig.reading(kRightHand).X_WH = X_WH;
+    if (attached_before) rig.tick(3);
+    rig.change({.kind = ChangeKind::kTake, .hand = kRightHand, .object = part});
+    rig.tick();
+    EXPECT_EQ(rig.hand(kRightHand).object, part);
+    EXPECT_EQ(rig.hand(kRightHand).X_HO, Pose::Identity()) << "the hand's frame is the object's";
+    EXPECT_EQ(rig.object("part").status, ObjectStatus::kHeld);
+    EXPECT_NEAR((rig.object("part").X_WO.translation() - X_WH.translation()).norm(), 0.0, 1e-12);
+    EXPECT_NEAR(game_control::angleBetween(rig.object("part").X_WO.rotation(), X_WH.rotation()), 0.0, 1e-7);
+    EXPECT_EQ(rig.object("pointer").status, ObjectStatus::kHidden) << "as while any other part is held";
+    EXPECT_LT(rig.hand(kRightHand).F_Ho_W.force.norm(), 1e-9);
+    rig.change({.kind = ChangeKind::kRelease, .hand = kRightHand});
+    rig.tick();
+    EXPECT_EQ(rig.object("part").status, ObjectStatus::kParked);
+    EXPECT_EQ(rig.object("pointer").status, ObjectStatus::kHeld);
+  }
+}
+
+TEST(SessionSimulation, TakingWithUnknownIdsChangesNothing) {
+  test::SessionRig rig;
+  test::SessionRig other;
+  rig.change({.kind = ChangeKind::kTake, .hand = HandId{9}, .object = ObjectId{1}});
+  rig.change({.kind = ChangeKind::kTake, .hand = kRightHand, .object = ObjectId{}});
+  EXPECT_EQ(rig.tick().hash, other.tick().hash);
+}
+
 TEST(SessionSimulation, ATickAllocatesNothingAndLocksNothing) {
   const LoadedScene loaded = test::smallSession();
   SessionSimulation simulation = test::SessionRig::makeSimulation(loaded, 2, {test::kRightHand});
