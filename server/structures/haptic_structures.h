@@ -35,12 +35,14 @@ struct HapticStructures {
 };
 
 /// Writes a structure file, versioned and with a checksum. It is written under a temporary name and renamed,
-/// so that a reader never sees an incomplete file.
+/// so that a reader never sees an incomplete file. Structures that could not be read again
+/// (structure_checks.h) are an error.
 [[nodiscard]] Result<void> writeStructures(const std::filesystem::path& file,
                                            const HapticStructures& structures);
 
-/// Maps a structure file into memory. A wrong version, size or checksum, or an index out of range, is an
-/// error of one sentence that names the file.
+/// Reads a structure file into memory of its own, in huge pages where the kernel has them. A wrong version,
+/// size or checksum, and structures that are not sound (structure_checks.h), are an error of one sentence
+/// that names the file.
 [[nodiscard]] Result<std::shared_ptr<const HapticStructures>> openStructures(
     const std::filesystem::path& file);
 
