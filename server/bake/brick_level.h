@@ -85,9 +85,9 @@ class BrickLevel {
     return slot[node] < 0 ? free[node] != 0 : outside[static_cast<std::size_t>(slot[node])].any();
   }
 
-  /// Gives a slot to the bricks near triangles and samples their unsigned distances. False when there
-  /// are more than fit into 3 GB.
-  bool sampleDistances(const TriangleTree& tree, ParallelWork& work);
+  /// Gives a slot to the bricks near triangles and samples their unsigned distances. Returns the number of
+  /// these bricks; when it is more than `most`, nothing was sampled.
+  std::size_t sampleDistances(const TriangleTree& tree, std::size_t most, ParallelWork& work);
   /// Sets the samples `which` of a node to the unsigned distance to the nearest triangle.
   void sampleBrick(std::size_t node, const TriangleTree& tree, const SampleBits& which);
   /// Copies the apron samples (on the upper faces) from the neighbours that own them.
