@@ -37,16 +37,17 @@ struct BakeOptions {
 using BakeProgress = std::function<bool(double fraction, std::string_view stage)>;
 
 /// Reads a mesh with assimp. `unit` [m] is the length of one unit of the file. A scan (`.bt`, `.ot` of
-/// OctoMap) gives the surface of its occupied cells, always in metres. The import runs in a child process
-/// ($TENON_BAKE, or tenon-bake beside this program) with limits on memory and time: a file that crashes the
-/// importer or exceeds a limit is an error of one sentence that names the file.
+/// OctoMap) gives the surface of its occupied cells, always in metres. No other files are read than those of
+/// referencesOf (mesh_references.h); the mesh and its folder may be symbolic links. The import runs in a
+/// child process ($TENON_BAKE, or tenon-bake beside this program) with limits on memory and time: a file that
+/// crashes the importer or exceeds a limit is an error of one sentence that names the file.
 ///
 /// Threads: any. Real-time: no.
 [[nodiscard]] Result<TriangleMesh> importMesh(const std::filesystem::path& file, double unit);
 
 /// Computes field and pointshell of a triangle soup (paper §3.1) from positions alone: neither winding nor
-/// normals matter. An error when options are out of range, the mesh is invalid or has no area, voxels need
-/// more than 3 GB, or `progress` cancels.
+/// normals matter. An error when options are out of range, the mesh is invalid or has no area, its field is
+/// larger than FieldLimits (field_size.h; with its size and a voxel that fits), or `progress` cancels.
 ///
 /// Threads: any; it uses up to eight threads of its own and calls `progress` on the caller's. Real-time: no.
 [[nodiscard]] Result<structures::HapticStructures> bake(const TriangleMesh& mesh, const BakeOptions& options,

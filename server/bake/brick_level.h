@@ -82,9 +82,9 @@ class BrickLevel {
   /// Sets the sample in every brick that contains it, and sets `marks` of their nodes to 1.
   void setSample(const Cell& lattice, std::int16_t value, std::span<std::uint8_t> marks);
 
-  /// Gives a slot to the bricks near triangles and samples their unsigned distances. False when there
-  /// are more than fit into 3 GB.
-  bool sampleDistances(const TriangleTree& tree, ParallelWork& work);
+  /// Gives a slot to the bricks near triangles and samples their unsigned distances. Returns the number of
+  /// these bricks; when it is more than `most`, nothing was sampled.
+  std::size_t sampleDistances(const TriangleTree& tree, std::size_t most, ParallelWork& work);
   /// Sets the samples `which` of a node to the unsigned distance to the nearest triangle.
   void sampleBrick(std::size_t node, const TriangleTree& tree, const SampleBits& which);
   /// Copies the apron samples (on the upper faces) from the neighbours that own them.

@@ -66,7 +66,10 @@ class StateMachine {
   [[nodiscard]] std::vector<std::uint8_t> save() const;
   /// Appends what save() returns; does not allocate when `bytes` has the capacity.
   void append(std::vector<std::uint8_t>& bytes) const;
-  /// Fails, and changes nothing, when the size is wrong or the saved step does not exist.
+  /// [bytes] Positions in save() of all its floating-point numbers: none of them may be infinite or NaN.
+  [[nodiscard]] std::vector<std::size_t> savedDoubles() const;
+  /// Fails, and changes nothing, when the size is wrong, a number is not finite or the saved step does not
+  /// exist.
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
 
  private:

@@ -285,6 +285,7 @@ Result<Change> SessionRegistry::changeFromCommand(const Command& command, Role r
     return fail(fmt::format("not permitted for the {}: ask the instructor", roleName(role)));
   };
   if (role == Role::kObserver || role == Role::kRecorder) return not_permitted();
+  if (!std::isfinite(command.value)) return fail("its value is not a finite number");
   switch (command.kind) {
     case CommandKind::kFulfilled:
       return gameChange(command);

@@ -259,12 +259,14 @@ void Server::runRealTime(const std::atomic<bool>& stop) {
   while (outputs_.front() != nullptr) outputs_.pop();
   overflow_output_ = simulation_.makeOutput();
   std::atomic<bool> over = false;
-  threads::CyclicThread ticker(std::make_shared<threads::SteadyClock>(),
-                               {.name = "tick", .fifo_priority = 70}, [&](std::uint64_t) {
-                                 if (over) return;  // no tick after the one that ended the run
-                                 realTimeTick();
-                                 if (simulation_.over()) over = true;
-                               });
+  threads::CyclicThread ticker(
+      std::make_shared<threads::SteadyClock>(),
+      {.name = "tick", .fifo_priority = 70, .prepare = [this] { return simulation_.shareScheduling(); }},
+      [&](std::uint64_t) {
+        if (over) return;  // no tick after the one that ended the run
+        realTimeTick();
+        if (simulation_.over()) over = true;
+      });
   std::thread journal_thread([&] {
     while (true) {
       const bool last_pass = over;  // no further entries will come

@@ -46,8 +46,8 @@ struct SessionReport {
 /// lockstep, and publishes the results.
 ///
 /// Threads: open, run and the destructor from one thread. run() uses it as the wire thread; in real time it
-/// starts a tick thread (SCHED_FIFO where granted) and a journal thread, which share SpscQueues with it.
-/// `stop` may be set from any thread. Real-time: no (its tick thread is).
+/// starts a tick thread (SCHED_FIFO where granted; its workers likewise) and a journal thread, which share
+/// SpscQueues with it. `stop` may be set from any thread. Real-time: no (its tick thread is).
 class SessionServer {
  public:
   /// Opens all DDS endpoints and the journal. Fails when one cannot be opened, or when `wait_for` names what

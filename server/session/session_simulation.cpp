@@ -1,6 +1,7 @@
 #include "server/session/session_simulation.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "idl/types/bytes.h"
@@ -265,6 +266,9 @@ Result<void> SessionSimulation::restore(std::span<const std::uint8_t> bytes) {
   commands_.resize(commands);
   for (game_control::GameCommand& command : commands_)
     in.get(command.kind), in.get(command.hand), in.get(command.signal), in.get(command.value);
+  const auto finite = [](const game_control::GameCommand& command) { return std::isfinite(command.value); };
+  if (phase_ > RunPhase::kStopped || !std::all_of(commands_.begin(), commands_.end(), finite))
+    return fail("a checkpoint in the journal is damaged");
   const auto section = [&](auto&& restoreFrom) -> Result<void> {
     std::uint32_t size = 0;
     in.get(size);
@@ -275,7 +279,9 @@ Result<void> SessionSimulation::restore(std::span<const std::uint8_t> bytes) {
     return {};
   };
   if (auto done = section([&](auto span) { return environment_.restore(span); }); !done) return done;
-  return section([&](auto span) { return machine_.restore(span); });
+  if (auto done = section([&](auto span) { return machine_.restore(span); }); !done) return done;
+  if (!in.atEnd()) return fail("a checkpoint in the journal is followed by other bytes");
+  return {};
 }
 
 }  // namespace tenon::session

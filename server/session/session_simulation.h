@@ -51,10 +51,14 @@ class SessionSimulation {
   [[nodiscard]] const game_control::StepStatus& step() const { return machine_.status(); }
   [[nodiscard]] const game_control::ScenarioFile& scenario() const { return *scenario_; }
 
+  /// Environment::shareScheduling.
+  [[nodiscard]] std::string shareScheduling() { return environment_.shareScheduling(); }
+
   /// Appends a checkpoint, the whole changing state, to `bytes`.
   void save(std::vector<std::uint8_t>& bytes) const;
   /// Takes a checkpoint of the same scenario back; ticks from then on are bit-equal to those after save().
-  /// When it fails (truncated, of another scenario) the state is undefined until a later restore succeeds.
+  /// When it fails (truncated, of another scenario, a number not finite) the state is undefined until a later
+  /// restore succeeds.
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
   /// Upper bound of the size of any checkpoint of this session [bytes].
   [[nodiscard]] std::size_t maxSavedBytes() const;

@@ -141,15 +141,9 @@ bool CollPair::nextLevelFits(const WorkLimits& limits, std::uint32_t budget) con
 
 bool CollPair::isValid(const collision::IslandPairResult& list) const noexcept {
   const collision::ContactList& contacts = list.query.contacts;
-  return possible_ && list.secondary_planes <= contacts.size() && list.traversal.X_WA.isFinite() &&
-         list.traversal.X_WB.isFinite() &&
-         std::all_of(list.multipliers.begin(),
-                     list.multipliers.begin() + static_cast<std::ptrdiff_t>(contacts.size()),
-                     [](double force) { return std::isfinite(force); }) &&
-         std::all_of(contacts.begin(), contacts.end(), [this](const collision::Contact& c) {
-           return c.point < shell_A_->points().size() && c.p_WP.allFinite() && c.n_W.allFinite() &&
-                  std::isfinite(c.gap);
-         });
+  return possible_ && list.secondary_planes <= contacts.size() &&
+         std::all_of(contacts.begin(), contacts.end(),
+                     [this](const collision::Contact& c) { return c.point < shell_A_->points().size(); });
 }
 
 Tick CollPair::ticksToClose(double distance, double closing_speed) noexcept {

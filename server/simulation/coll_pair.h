@@ -1,7 +1,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -130,10 +129,6 @@ class CollPair {
     archive(self.traversal_points_);
     archive(self.queries_with_headroom_);
     archive(self.restore_delay_);
-    if constexpr (Archive::kReads) {
-      if (!std::isfinite(self.path_length_ + self.gap_ + self.depth_ + self.skipped_spacing_))
-        return archive.reject();
-    }
     bool has_contacts = self.hasContacts();
     archive(has_contacts);
     if (!has_contacts) return;
@@ -163,7 +158,7 @@ class CollPair {
   [[nodiscard]] double pointsOf(std::uint32_t levels) const noexcept;
   [[nodiscard]] bool nextLevelFits(const WorkLimits& limits, std::uint32_t budget) const noexcept;
   void store(const collision::PairQueryResult& query) noexcept;
-  /// Validates a list read from a checkpoint: indices in range, numbers finite.
+  /// Validates a list read from a checkpoint: indices in range.
   [[nodiscard]] bool isValid(const collision::IslandPairResult& list) const noexcept;
   /// Whole ticks in which `distance` [m] cannot be closed at `closing_speed` [m/s].
   [[nodiscard]] static Tick ticksToClose(double distance, double closing_speed) noexcept;

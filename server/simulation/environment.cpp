@@ -42,6 +42,8 @@ Environment::Environment(std::shared_ptr<const Scene> scene, const EnvironmentOp
 
 Environment::~Environment() = default;
 
+std::string Environment::shareScheduling() { return engine_->pool.shareScheduling(); }
+
 void Environment::setPairEnabled(std::size_t pair, bool enabled) noexcept {
   if (pair >= pairs_.size()) return;
   engine_->active_pairs -= engine_->countsAsActive(pair) ? 1U : 0U;

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "idl/types/hash.h"
@@ -91,6 +92,10 @@ class Environment {
   Environment(std::shared_ptr<const Scene> scene, const EnvironmentOptions& options);
   ~Environment();
 
+  /// Gives the workers the scheduling class, priority and permitted CPUs of the calling thread, which is to
+  /// call step(). Returns what the operating system did not grant, or an empty string. Not real-time.
+  [[nodiscard]] std::string shareScheduling();
+
   // inputs, between ticks; unknown ids are ignored
   /// A hand that is no longer present leaves its object kParked, and resumes holding it when it is back.
   void setHandPresent(HandId hand, bool present) noexcept;
@@ -169,6 +174,8 @@ class Environment {
   [[nodiscard]] std::vector<std::uint8_t> save() const;
   /// Appends what save() returns; allocates only when the capacity of `bytes` is too small.
   void append(std::vector<std::uint8_t>& bytes) const;
+  /// [bytes] Positions in save() of all its floating-point numbers: none of them may be infinite or NaN.
+  [[nodiscard]] std::vector<std::size_t> savedDoubles() const;
   /// Fails and changes nothing when `bytes` are no valid checkpoint of this scene and build.
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
   /// [bytes] upper bound of what append() adds, for any state of this scene.
@@ -234,11 +241,14 @@ class Environment {
   [[nodiscard]] double speedCap(ObjectId object) const noexcept;
   [[nodiscard]] double speedOf(ObjectId object) const noexcept;
 
+  /// Of a state whose numbers are finite.
   [[nodiscard]] bool isValid() const noexcept;
 
   /// Writes, reads or hashes the whole state.
   template <typename Archive, typename Self>
   static void archive(Archive& archive, Self& self);
+  template <typename Archive>
+  void archiveWithHeader(Archive& to) const;
 
   std::shared_ptr<const Scene> scene_;
   EnvironmentOptions options_;

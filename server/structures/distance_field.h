@@ -54,6 +54,11 @@ class DistanceField {
   static constexpr Entry kFarOutside = -1;
   static constexpr Entry kFarInside = -2;
   static constexpr Entry kRefined = 1 << 30;
+  /// Most bricks with samples: queries gather samples at byte offsets of 31 bits.
+  static constexpr std::int32_t kMaxBricks = 0x7FFFFFFF / (2 * kBrickSamples);  // 1,472,896
+  /// Most index entries: positions in the index are below kRefined, bounds are gathered as samples are.
+  static constexpr std::int32_t kMaxIndexEntries = 0x7FFFFFFF / 4;
+  static constexpr std::int32_t kMaxBricksPerAxis = 1'000'000;
 
   struct Layout {
     Vector3 p_MoFo_M = Vector3::Zero();    ///< the grid's lowest corner

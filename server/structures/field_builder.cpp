@@ -18,7 +18,7 @@ constexpr double kBrickRadius = 6.9283;
 /// Samples one brick and appends it when any of its samples is within the band.
 class BrickSampler {
  public:
-  BrickSampler(const AnalyticDistance& distance, std::vector<std::int16_t>& samples)
+  BrickSampler(const AnalyticDistance& distance, HugeVector<std::int16_t>& samples)
       : distance_(distance), samples_(samples) {}
 
   Entry sample(const Vector3& p_MBo, double voxel) {
@@ -46,7 +46,7 @@ class BrickSampler {
 
  private:
   const AnalyticDistance& distance_;
-  std::vector<std::int16_t>& samples_;
+  HugeVector<std::int16_t>& samples_;
 };
 
 }  // namespace

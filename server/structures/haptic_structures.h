@@ -35,15 +35,16 @@ struct HapticStructures {
 };
 
 /// Writes a structure file, versioned and with a checksum. It is written under a temporary name and renamed,
-/// so that a reader never sees an incomplete file. An error names the file that cannot be written.
+/// so that a reader never sees an incomplete file. An error when the file cannot be written, or the structures
+/// could not be read again (structure_checks.h).
 ///
 /// Threads: any. Real-time: no.
 [[nodiscard]] Result<void> writeStructures(const std::filesystem::path& file,
                                            const HapticStructures& structures);
 
-/// Maps a structure file into memory. A wrong version, size or checksum, or an index out of range, is an
-/// error of one sentence that names the file. The mapping lasts until the last copy of field and shell is
-/// gone.
+/// Reads a structure file into memory of its own, in huge pages where the kernel has them. A wrong version,
+/// size or checksum, and structures that are not sound (structure_checks.h), are an error of one sentence
+/// that names the file.
 ///
 /// Threads: any. Real-time: no.
 [[nodiscard]] Result<std::shared_ptr<const HapticStructures>> openStructures(

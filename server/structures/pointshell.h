@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "idl/types/spatial.h"
+#include "server/structures/huge_pages.h"
 
 namespace tenon::structures {
 
@@ -102,8 +103,8 @@ class Pointshell {
 
  private:
   struct Blocks {
-    std::vector<ShellBlock> leaves, clusters, levels;
-    std::vector<std::uint32_t> leaf_of_point;
+    HugeVector<ShellBlock> leaves, clusters, levels;
+    HugeVector<std::uint32_t> leaf_of_point;
     std::vector<std::vector<float>> areas;
   };
 

@@ -2,9 +2,23 @@
 
 #include <span>
 
+#include "server/structures/huge_pages.h"
 #include "server/structures/pointshell.h"
 
 namespace tenon::structures {
+
+/// The arrays of a pointshell under construction.
+struct ShellStorage {
+  HugeVector<ShellPoint> points;
+  HugeVector<ShellSphere> leaves;
+  HugeVector<ShellSphere> clusters;
+  HugeVector<ShellLevel> levels;
+
+  [[nodiscard]] Pointshell::Layout layout() const { return {points, leaves, clusters, levels}; }
+};
+
+/// A pointshell that owns the given arrays, which are sound (structure_checks.h).
+[[nodiscard]] Pointshell makeShell(ShellStorage storage);
 
 /// A sample of the surface, not yet sorted into levels.
 struct SurfaceSample {

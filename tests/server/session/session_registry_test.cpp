@@ -1,5 +1,6 @@
 #include "server/session/session_registry.h"
 
+#include <cmath>
 #include <limits>
 #include <string>
 
@@ -243,6 +244,18 @@ TEST_F(SessionRegistryTest, CommandsArePermittedByRole) {
   const CommandAck ack = command(instructor, CommandKind::kPause);
   EXPECT_EQ(ack.client, instructor);
   EXPECT_EQ(ack.id, commands_) << "the ack carries the id of its command";
+}
+
+// it would be in the next checkpoint, which no reader takes
+TEST_F(SessionRegistryTest, ACommandWithAValueThatIsNotFiniteIsRefused) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId instructor = join("a", Role::kInstructor).client;
+  (void)changes();
+  const CommandAck ack = registry_.handleCommand(
+      {.client = instructor, .id = 1, .kind = CommandKind::kSkipStep, .value = std::nan("")});
+  EXPECT_FALSE(ack.accepted);
+  EXPECT_THAT(ack.reason, HasSubstr("not a finite number"));
+  EXPECT_TRUE(changes().empty());
 }
 
 TEST_F(SessionRegistryTest, NamesInCommandsAreResolvedToIndices) {

@@ -1,6 +1,8 @@
 #include "server/session/session_simulation.h"
 
+#include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <vector>
 
@@ -296,6 +298,54 @@ TEST(SessionSimulation, TakingWithUnknownIdsChangesNothing) {
   rig.change({.kind = ChangeKind::kTake, .hand = HandId{9}, .object = ObjectId{1}});
   rig.change({.kind = ChangeKind::kTake, .hand = kRightHand, .object = ObjectId{}});
   EXPECT_EQ(rig.tick().hash, other.tick().hash);
+}
+
+/// Where `part` begins in `whole`.
+std::size_t positionOf(const std::vector<std::uint8_t>& part, const std::vector<std::uint8_t>& whole) {
+  const auto found = std::search(whole.begin(), whole.end(), part.begin(), part.end());
+  EXPECT_NE(found, whole.end());
+  return static_cast<std::size_t>(found - whole.begin());
+}
+
+TEST(SessionSimulation, RefusesACheckpointWithANumberThatIsNotFinite) {
+  test::SessionRig rig(1, {});
+  rig.attach(test::kRightHand, kFreeSpace);
+  rig.tick(5);
+  rig.change({.kind = ChangeKind::kPause});
+  rig.tick();
+  Change deferred = game(CommandKind::kSkipStep);
+  deferred.game.value = 1234.5;
+  rig.change(deferred);
+  rig.tick();
+  std::vector<std::uint8_t> saved;
+  rig.simulation().save(saved);
+
+  // the value of the deferred command, all numbers of the environment, then (it ends the checkpoint) of the
+  // state machine
+  const auto* value = reinterpret_cast<const std::uint8_t*>(&deferred.game.value);
+  std::vector<std::size_t> doubles{positionOf({value, value + sizeof(double)}, saved)};
+  const simulation::Environment& environment = rig.simulation().environment();
+  const std::size_t environment_at = positionOf(environment.save(), saved);
+  for (const std::size_t at : environment.savedDoubles()) doubles.push_back(environment_at + at);
+  const game_control::StateMachine machine(rig.loaded().scenario);
+  const std::size_t machine_at = saved.size() - machine.save().size();
+  ASSERT_EQ(machine_at, environment_at + environment.save().size() + sizeof(std::uint32_t));
+  for (const std::size_t at : machine.savedDoubles()) doubles.push_back(machine_at + at);
+
+  SessionSimulation again = test::SessionRig::makeSimulation(rig.loaded());
+  for (const std::size_t at : doubles) {
+    for (const double number :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+      std::vector<std::uint8_t> bad = saved;
+      std::memcpy(bad.data() + at, &number, sizeof number);
+      ASSERT_FALSE(again.restore(bad)) << number << " at byte " << at;
+    }
+  }
+  std::vector<std::uint8_t> longer = saved;
+  longer.push_back(0);
+  EXPECT_FALSE(again.restore(longer));
+  ASSERT_TRUE(again.restore(saved));
+  EXPECT_EQ(again.hash(), rig.simulation().hash());
 }
 
 TEST(SessionSimulation, ATickAllocatesNothingAndLocksNothing) {
