@@ -35,8 +35,8 @@ struct HapticStructures {
 };
 
 /// Writes a structure file, versioned and with a checksum. It is written under a temporary name and renamed,
-/// so that a reader never sees an incomplete file. An error when the file cannot be written, or the structures
-/// could not be read again (structure_checks.h).
+/// so that a reader never sees an incomplete file. An error when the file cannot be written, or the
+/// structures could not be read again (structure_checks.h).
 ///
 /// Threads: any. Real-time: no.
 [[nodiscard]] Result<void> writeStructures(const std::filesystem::path& file,
