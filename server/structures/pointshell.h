@@ -104,7 +104,7 @@ class Pointshell {
   struct Blocks {
     std::vector<ShellBlock> leaves, clusters, levels;
     std::vector<std::uint32_t> leaf_of_point;
-    std::vector<std::vector<float>> areas;
+    std::vector<std::vector<float>> areas;  ///< [m^2] by level
   };
 
   Layout layout_;
