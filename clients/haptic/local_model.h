@@ -77,7 +77,7 @@ class LocalModel {
   collision::MovableBody body_;
   FixedVector<OtherHandSpring, 2 * kOtherPulls> other_springs_;
   FixedVector<collision::ContactConstraint, kManifoldContacts> constraints_;
-  std::array<double, kManifoldContacts> multipliers_{};
+  std::array<double, kManifoldContacts> multipliers_{};  ///< [N] of each constraint
   std::uint64_t beyond_validity_ = 0;
   bool has_manifold_ = false;
   bool new_object_ = false;

@@ -25,7 +25,7 @@ class TriangleTree;
 class BrickLevel {
  public:
   static constexpr int kVoxels = structures::DistanceField::kBrickVoxels;
-  static constexpr double kBrickRadius = 6.9283;  ///< [voxels] from a brick's centre to its corner
+  static constexpr double kBrickRadius = structures::DistanceField::kBrickRadius;  ///< [voxels]
   static constexpr int kSide = structures::DistanceField::kBrickSide;
   static constexpr int kSamples = structures::DistanceField::kBrickSamples;
   using Cell = Eigen::Vector3i;

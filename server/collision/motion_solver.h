@@ -99,9 +99,9 @@ class MotionSolver {
   MotionSolver(MotionSolver&&) noexcept;
   MotionSolver& operator=(MotionSolver&&) noexcept;
 
-  /// `displacements`[i] [m, rad]: of bodies[i]'s origin and orientation, in W. `multipliers`[r] [N], >= 0:
-  /// force along rows[r].n_W on its body A, and the opposite on B. Both spans are as long as bodies and rows;
-  /// `multipliers` may be empty.
+  /// `displacements`[i] [m, rad]: of bodies[i]'s origin and orientation, in W. `multipliers` [N], >= 0, by
+  /// row: force along rows[r].n_W on its body A, and the opposite on B. Both spans are as long as bodies and
+  /// rows; `multipliers` may be empty.
   ///
   /// `warm_start`: rows to activate first, with the forces that stand in `multipliers` at the call as initial
   /// multipliers. The solution does not depend on it, only the number of iterations. `unchanged`: so many

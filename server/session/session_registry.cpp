@@ -12,8 +12,6 @@ namespace {
 
 constexpr double kMaxPosition = 1000.0;  // [m] of a hand or object from the world's origin, each axis
 constexpr double kMaxSpeed = 50.0;       // [m/s], [rad/s] of a hand
-constexpr double kMaxForce = 200.0;      // [N], [Nm] of an external contribution
-constexpr std::uint32_t kMaxLifetimeTicks = 100;  // [ticks] of an external contribution
 
 bool isPlausible(const Pose& X) {
   return X.isFinite() && X.translation().cwiseAbs().maxCoeff() < kMaxPosition &&
@@ -178,13 +176,12 @@ Result<Change> SessionRegistry::validateForceContribution(const ForceContributio
     return fail(fmt::format("client {} may not contribute forces", force.client.value));
   if (force.object.value >= scenario_.objects.size())
     return fail(fmt::format("client {} sent a force for an unknown object", force.client.value));
-  if (!isPlausible(force.F_Oo_W.force, kMaxForce) || !isPlausible(force.F_Oo_W.torque, kMaxForce))
-    return fail(fmt::format("client {} sent a force that is not finite or above {} N", force.client.value,
-                            kMaxForce));
+  if (!force.F_Oo_W.force.allFinite() || !force.F_Oo_W.torque.allFinite())
+    return fail(fmt::format("client {} sent a force that is not finite", force.client.value));
   return Change{.kind = ChangeKind::kContributeForce,
                 .object = force.object,
                 .index = force.source,
-                .lifetime_ticks = std::min(force.lifetime_ticks, kMaxLifetimeTicks),
+                .lifetime_ticks = force.lifetime_ticks,
                 .F_Oo_W = force.F_Oo_W};
 }
 

@@ -33,11 +33,13 @@ struct ForceCell {
 class ForceBuffer {
  public:
   static constexpr std::size_t kContributions = 8;
-  /// Limits of a contribution: about the peak output of a haptic device.
+  /// Limits of a contribution, the only ones that there are: about the peak output of a haptic device. What
+  /// is above is clamped, not refused.
   static constexpr double kMaxContributedForce = 50.0;  ///< [N]
   static constexpr double kMaxContributedTorque = 5.0;  ///< [Nm]
-  /// [ticks] a contribution ends at most this long after its last update.
-  static constexpr std::uint32_t kMaxLifetimeTicks = 200;
+  /// [ticks] a contribution ends at most this long after its last update, so that of a source that has ended
+  /// nothing stays.
+  static constexpr std::uint32_t kMaxLifetimeTicks = 100;
 
   explicit ForceBuffer(std::size_t own_cells);
 

@@ -38,6 +38,8 @@ class DistanceField {
   static constexpr int kBrickSamples = kBrickSide * kBrickSide * kBrickSide;  // 729
   static constexpr int kQuantaPerVoxel = 2048;  // int16 +-16 voxels, steps of 1.5 um at 3 mm
   static constexpr int kFarPerVoxel = 16;       // resolution of `Layout::far`
+  /// [voxels] From a brick's centre to its corner, rounded up.
+  static constexpr double kBrickRadius = 6.9283;
   /// [voxels] |distance| up to which samples are exact.
   static constexpr double kBandVoxels = 4.0;
   /// [voxels] Samples are clamped here. A cell's corners are at most sqrt(3) voxels from any of its points:

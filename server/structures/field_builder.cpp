@@ -12,8 +12,6 @@ namespace {
 
 using Entry = DistanceField::Entry;
 constexpr int kSide = DistanceField::kBrickSide;
-// [voxels] From a brick's centre to its corner.
-constexpr double kBrickRadius = 6.9283;
 
 /// Samples one brick and appends it when any of its samples is within the band.
 class BrickSampler {
@@ -25,7 +23,7 @@ class BrickSampler {
     const double edge = voxel * DistanceField::kBrickVoxels;
     const double at_centre = distance_(p_MBo + Vector3::Constant(edge / 2));
     const Entry far = at_centre < 0.0 ? DistanceField::kFarInside : DistanceField::kFarOutside;
-    if (std::abs(at_centre) >= (DistanceField::kBandVoxels + kBrickRadius) * voxel) return far;
+    if (std::abs(at_centre) >= (DistanceField::kBandVoxels + DistanceField::kBrickRadius) * voxel) return far;
 
     std::array<std::int16_t, DistanceField::kBrickSamples> brick{};
     double nearest = std::numeric_limits<double>::infinity();
@@ -109,7 +107,7 @@ DistanceField buildField(const AnalyticDistance& distance, const Eigen::AlignedB
         storage.far[number] = quantizedFar(at_centre, voxel, coarse == DistanceField::kFarInside);
         const Eigen::AlignedBox3d box(p_MBo, p_MBo + Vector3::Constant(edge));
         const bool refined = layout.refinement > 1 && coarse >= 0 &&
-                             std::abs(at_centre) < kBrickRadius * voxel &&
+                             std::abs(at_centre) < DistanceField::kBrickRadius * voxel &&
                              std::any_of(refine_M.begin(), refine_M.end(),
                                          [&box](const auto& region) { return region.intersects(box); });
         if (!refined) continue;

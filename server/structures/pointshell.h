@@ -105,7 +105,7 @@ class Pointshell {
   struct Blocks {
     HugeVector<ShellBlock> leaves, clusters, levels;
     HugeVector<std::uint32_t> leaf_of_point;
-    std::vector<std::vector<float>> areas;
+    std::vector<std::vector<float>> areas;  ///< [m^2] by level
   };
 
   Layout layout_;

@@ -85,4 +85,13 @@ using Triangle = std::array<Vector3, 3>;
   return std::sqrt(squared);
 }
 
+/// Both halves of a triangle, split at the middle of the edge from corner `from` to the next; the first one
+/// has that corner.
+[[nodiscard]] inline std::array<Triangle, 2> bisected(const Triangle& t, std::size_t from) {
+  const std::size_t to = (from + 1) % 3;
+  std::array<Triangle, 2> halves{t, t};
+  halves[0][to] = halves[1][from] = (t[from] + t[to]) / 2;
+  return halves;
+}
+
 }  // namespace tenon::structures

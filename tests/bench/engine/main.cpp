@@ -158,8 +158,12 @@ int run(int argc, char** argv) {
       ->option_text("DIR");
   app.footer(
       "Times are comparable only within one run, on an otherwise idle machine.\n"
-      "Exit code: 0 when all tables were produced, 1 otherwise.");
-  CLI11_PARSE(app, argc, argv);
+      "Exit codes: 0 all tables were produced, 1 error (the reason is on stderr), 2 wrong usage.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
   if (arguments.benchmark == "corner") {
     fmt::print("{}", cornerPath());
     return 0;
