@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +12,7 @@
 #include "clients/instructor/instructor_station.h"
 #include "clients/rehearse/rehearsal.h"
 #include "clients/trainee/trainee_station.h"
+#include "devices/catalog.h"
 
 namespace {
 
@@ -35,12 +38,21 @@ void declare(CLI::App& app, RehearseArguments& arguments) {
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
   app.add_option("--seconds", arguments.rehearsal.seconds, "limit of the session time [s]")
+      ->check([](const std::string& text) {
+        const double number = std::strtod(text.c_str(), nullptr);
+        return std::isfinite(number) && number > 0.0 ? "" : "must be a number greater than 0";
+      })
       ->capture_default_str();
   app.add_option("--detail", arguments.load.detail, "level of detail of generated parts, 0 to 1")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--cache", arguments.load.cache, "folder for generated parts and haptic structures");
-  app.add_option("--device", arguments.device, "the instructor's device")->capture_default_str();
+  app.add_option("--device", arguments.device, "the instructor's device")
+      ->check([](const std::string& name) {
+        const auto known = tenon::devices::checkDeviceName(name);
+        return known ? std::string() : known.error().what;
+      })
+      ->capture_default_str();
   app.add_option(
          "--misplace-mount", arguments.misplaced_mount,
          "the simulated trainee inserts the N-th mount, from 0, at a wrong pose and does not correct it")
