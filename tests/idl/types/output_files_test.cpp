@@ -15,15 +15,16 @@ using testing::HasSubstr;
 
 class OutputFiles : public testing::Test {
  protected:
-  OutputFiles() {
-    std::string name = (fs::temp_directory_path() / "tenon_outputs_XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-    std::ofstream(there_) << "kept";
-  }
+  OutputFiles() { std::ofstream(there_) << "kept"; }
   ~OutputFiles() override { fs::remove_all(folder_); }
 
-  fs::path folder_;
-  fs::path there_{folder_ / "part.stl"};
+  static fs::path makeFolder() {
+    std::string name = (fs::temp_directory_path() / "tenon_outputs_XXXXXX").string();
+    return ::mkdtemp(name.data());
+  }
+
+  fs::path folder_ = makeFolder();
+  fs::path there_ = folder_ / "part.stl";
 };
 
 TEST_F(OutputFiles, AFileThatExistsIsRefusedWithoutOverwrite) {
