@@ -13,6 +13,24 @@ sys.dont_write_bytecode = True  # an installation stays as it was installed
 from demo_scene import shipped_as, trainee_hands
 
 
+# what it writes into its folder
+OUTPUTS = ("session.mcap", "journal.mcap", "report.html", "summary.json", "scene.png", "serve.log", "record.log", "observer.log",
+           "trainee.log", "instructor.log")
+
+
+def between(kind, low, high):
+    """A type of argparse: a number from `low` to `high`."""
+    def number(text):
+        try:
+            value = kind(text)
+        except ValueError:
+            value = None
+        if value is None or not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"'{text}' is not a number from {low} to {high}")
+        return value
+    return number
+
+
 def arguments():
     parser = argparse.ArgumentParser(
         prog="tenon demo",
@@ -21,15 +39,16 @@ def arguments():
                     "tolerance, 1 when not, 2 for wrong usage.")
     parser.add_argument("--scenario", default="engine_bay", help="a shipped scenario's name or a path (default: %(default)s)")
     parser.add_argument("--out", metavar="DIR", default="out/demo",
-                        help="where recording, report and logs go; those of the last demo are replaced (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=1, help="of the simulated people's skills and errors (default: %(default)s)")
-    parser.add_argument("--detail", type=float, default=0.12, help="of the scene, 0 to 1; 1 is 1.8 million triangles (default: %(default)s)")
+                        help="where recording, report and logs go (default: %(default)s)")
+    parser.add_argument("--overwrite", action="store_true", help="replace those of an earlier demo in that folder")
+    parser.add_argument("--seed", type=between(int, 0, 2**64 - 1), default=1, help="of the simulated people's skills and errors (default: %(default)s)")
+    parser.add_argument("--detail", type=between(float, 0, 1), default=0.12, help="of the scene, 0 to 1; 1 is 1.8 million triangles (default: %(default)s)")
     parser.add_argument("--lockstep", action="store_true", help="ticks wait for each other instead of the clock: repeatable to the last bit")
     parser.add_argument("--headless", action="store_true", help="do not open the report in a browser at the end")
-    parser.add_argument("--workers", type=int, default=1, help="threads of the server that compute contacts (default: %(default)s)")
+    parser.add_argument("--workers", type=between(int, 1, 64), default=1, help="threads of the server that compute contacts (default: %(default)s)")
     parser.add_argument("--no-instructor", action="store_true", help="nobody corrects the misplaced mount: its step runs out of time")
     parser.add_argument("--device", default="sigma7-sim", help="the instructor's device (default: %(default)s)")
-    parser.add_argument("--domain", type=int, default=100 + os.getpid() % 100, help="DDS domain (default: one that is likely free)")
+    parser.add_argument("--domain", type=between(int, 0, 230), default=100 + os.getpid() % 100, help="DDS domain (default: one that is likely free)")
     parser.add_argument("--programs", required=True, help=argparse.SUPPRESS)
     parser.add_argument("--scenarios", required=True, help=argparse.SUPPRESS)
     return parser.parse_args()
@@ -153,6 +172,11 @@ def main():
     out = Path(args.out)
     try:
         out.mkdir(parents=True, exist_ok=True)
+        for file in (out / name for name in OUTPUTS):
+            if file.exists() and not args.overwrite:
+                print(f"tenon demo: {file}: exists; --overwrite replaces it, --out DIR names another folder", file=sys.stderr)
+                return 1
+            file.unlink(missing_ok=True)
         (out / "serve.log").write_text("", encoding="utf-8")
     except OSError as problem:
         print(f"tenon demo: nothing can be written to {out} ({problem.strerror}): name a folder of yours with --out DIR", file=sys.stderr)

@@ -49,7 +49,8 @@ def check_memory_lock(_):
 
 
 def check_programs(args):
-    wanted = ("serve", "bake", "parts", "trainee", "instructor", "observer", "record", "report")
+    wanted = ("serve", "trainee", "instructor", "observer", "command", "record", "report", "rehearse", "parts", "bake", "probe",
+              "contact", "voxels")
     missing = [f"tenon-{name}" for name in wanted if not os.access(Path(args.programs) / f"tenon-{name}", os.X_OK)]
     if not missing:
         return "good", f"{len(wanted)} programs are there", ""
@@ -61,7 +62,7 @@ def check_bus(args):
     if not os.access(observer, os.X_OK):
         return "note", "not tried", "the observer is missing"
     try:
-        done = subprocess.run([observer, "--domain", "231", "--wait", "1"], capture_output=True, text=True, timeout=30)
+        done = subprocess.run([observer, "--domain", "230", "--session", "of tenon doctor", "--wait", "1"], capture_output=True, text=True, timeout=30)
     except subprocess.TimeoutExpired:
         return "bad", "DDS hangs on this machine's network", "unset CYCLONEDDS_URI and try again"
     if "session" in (done.stdout + done.stderr).lower():

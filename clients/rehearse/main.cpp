@@ -14,6 +14,8 @@
 #include "clients/rehearse/script.h"
 #include "clients/rehearse/tick_log.h"
 #include "clients/trainee/trainee_station.h"
+#include "devices/catalog.h"
+#include "idl/types/output_files.h"
 #include "server/game_control/scenario.h"
 
 namespace {
@@ -33,6 +35,7 @@ struct RehearseArguments {
   std::vector<std::string> inputs;
   std::vector<std::string> takes;
   std::string log;
+  bool overwrite = false;
   tenon::rehearse::TickLogOptions log_options;
   bool alone = false;
   bool no_collisions = false;
@@ -57,6 +60,7 @@ void declareScript(CLI::App& app, RehearseArguments& arguments) {
       ->needs(input);
   CLI::Option* log =
       app.add_option("--log", arguments.log, "write ticks to this file, a line of JSON each")->needs(input);
+  app.add_flag("--overwrite", arguments.overwrite, tenon::kOverwriteHelp)->needs(log);
   app.add_option("--every", arguments.log_options.every, "log every N-th tick only")
       ->option_text("N")
       ->check(CLI::Range(1, 1'000'000'000))
@@ -82,7 +86,12 @@ void declare(CLI::App& app, RehearseArguments& arguments) {
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--cache", arguments.load.cache, "folder for generated parts and haptic structures");
-  app.add_option("--device", arguments.device, "the instructor's device")->capture_default_str();
+  app.add_option("--device", arguments.device, "the instructor's device")
+      ->check([](const std::string& name) {
+        const auto known = tenon::devices::checkDeviceName(name);
+        return known ? std::string() : known.error().what;
+      })
+      ->capture_default_str();
   app.add_option(
          "--misplace-mount", arguments.misplaced_mount,
          "the simulated trainee inserts the N-th mount, from 0, at a wrong pose and does not correct it")
@@ -210,8 +219,10 @@ int rehearseScript(RehearseArguments& arguments) {
                       kWrongUsage);
   std::optional<tenon::rehearse::TickLog> log;
   if (!arguments.log.empty()) {
-    if (tenon::rehearse::isInput(*script, arguments.log))
-      return printError(fmt::format("--log {}: is a file of --input", arguments.log), kWrongUsage);
+    tenon::ProgramFiles files{{arguments.log}, {arguments.scenario}, arguments.overwrite};
+    for (const tenon::rehearse::ScriptedHand& hand : script->hands) files.inputs.push_back(hand.file);
+    if (const auto refusal = tenon::refuseOutputs(files))
+      return printError(refusal->what, refusal->exit_code);
     auto opened = tenon::rehearse::TickLog::open(arguments.log, arguments.log_options);
     if (!opened) return printError(opened.error().what);
     log = std::move(*opened);

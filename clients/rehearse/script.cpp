@@ -107,13 +107,6 @@ double endOf(const Script& script) {
   return end;
 }
 
-bool isInput(const Script& script, const std::filesystem::path& file) {
-  return std::any_of(script.hands.begin(), script.hands.end(), [&](const ScriptedHand& hand) {
-    std::error_code missing;
-    return std::filesystem::equivalent(hand.file, file, missing);
-  });
-}
-
 Result<RehearsalReport> runScript(const Script& script, const session::LoadedScene& loaded,
                                   RehearsalOptions options) {
   std::vector<std::unique_ptr<haptic::Station>> stations;

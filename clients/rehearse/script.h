@@ -44,9 +44,6 @@ struct Script {
 /// [s] Time of the last row of all files; they have been read.
 [[nodiscard]] double endOf(const Script& script);
 
-/// Whether `file` is one of the hands' files.
-[[nodiscard]] bool isInput(const Script& script, const std::filesystem::path& file);
-
 /// runRehearsal with a station for each hand of `script`, whose files have been read. `loaded` was read with
 /// Script::readOptions. An object that is taken starts at the first pose of its hand. Fails when the server
 /// refuses an input, as it does when a row is 1 km away or faster than 50 m/s or 50 rad/s; the error names

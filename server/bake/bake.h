@@ -33,6 +33,11 @@ struct BakeOptions {
   std::uint32_t points = 10'000;  ///< approximate number of shell points, when point_spacing is 0
 };
 
+/// Fails with the first option that is out of range.
+///
+/// Threads: pure.
+[[nodiscard]] Result<void> checkOptions(const BakeOptions& options);
+
 /// Called with the fraction done [0..1] and the name of the stage; returning false cancels the bake.
 using BakeProgress = std::function<bool(double fraction, std::string_view stage)>;
 

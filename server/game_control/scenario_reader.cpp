@@ -7,14 +7,13 @@
 #include "idl/types/hash.h"
 #include "server/game_control/named_values.h"
 #include "server/game_control/scenario_state_reader.h"
+#include "server/structures/voxel_limits.h"
 
 namespace tenon::game_control {
 namespace {
 
 constexpr std::size_t kMaxScenarioObjects = 64;
 constexpr std::size_t kMaxScenarioHands = 16;
-constexpr double kSmallestVoxel = 2e-5;  // [m]
-constexpr double kLargestVoxel = 0.1;    // [m]
 
 constexpr NamedValues<ObjectStatus, 6> kStatuses{{{"hidden", ObjectStatus::kHidden},
                                                   {"parked", ObjectStatus::kParked},
@@ -151,8 +150,8 @@ void ScenarioReader::readStructures(const YAML::Node& node, ScenarioObject& obje
   const std::string of = "of 'structures' of object '" + object.name + "'";
   if (!yaml_.openMapping(node, "structures", "'structures' of object '" + object.name + "'")) return;
   StructureSettings& settings = object.structures;
-  settings.voxel = yaml_.numberOr(node["voxel"], Quantity::kLength, "'voxel' " + of, kSmallestVoxel,
-                                  kLargestVoxel, settings.voxel);
+  settings.voxel = yaml_.numberOr(node["voxel"], Quantity::kLength, "'voxel' " + of,
+                                  structures::kSmallestVoxel, structures::kLargestVoxel, settings.voxel);
   settings.refinement = static_cast<std::int32_t>(
       yaml_.integer(node["refinement"], "'refinement' " + of, 1, 8, settings.refinement));
   if ((settings.refinement & (settings.refinement - 1)) != 0) {

@@ -96,4 +96,9 @@ struct ResimulationReport {
 /// Scenario and detail of a journal. Fails for other recordings, which do not name them.
 [[nodiscard]] Result<JournalOrigin> readJournalOrigin(const std::filesystem::path& file);
 
+/// The scenario of a journal: its recorded path, from the working directory or else from the journal's
+/// folder. Fails when neither exists.
+[[nodiscard]] Result<std::filesystem::path> findScenario(const std::filesystem::path& journal,
+                                                         const JournalOrigin& origin);
+
 }  // namespace tenon::session

@@ -341,6 +341,11 @@ std::vector<HandId> traineeHands(const game_control::ScenarioFile& scenario) {
   return hands;
 }
 
+Result<void> checkWaitFor(const game_control::ScenarioFile& scenario, const std::vector<std::string>& names) {
+  const auto condition = makeStartCondition(scenario, names);
+  return condition ? Result<void>() : fail(condition.error().what);
+}
+
 Result<std::unique_ptr<SessionServer>> SessionServer::open(const LoadedScene& loaded,
                                                            SessionOptions options) {
   auto start_condition = makeStartCondition(*loaded.scenario, options.wait_for);

@@ -34,8 +34,8 @@ struct HapticStructures {
   StructureInfo info;
 };
 
-/// Writes a structure file, versioned and with a checksum. It is written under a temporary name and renamed,
-/// so that a reader never sees an incomplete file. An error when the file cannot be written, or the
+/// Writes a structure file, versioned, with a checksum. A regular file is written under a temporary name and
+/// renamed: a reader never sees an incomplete one. An error when the file cannot be written, or the
 /// structures could not be read again (structure_checks.h).
 ///
 /// Threads: any. Real-time: no.

@@ -11,6 +11,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include "idl/types/output_files.h"
 #include "server/structures/field_builder.h"
 #include "server/structures/haptic_structures.h"
 #include "server/structures/shell_builder.h"
@@ -250,16 +251,18 @@ Result<void> writeStructures(const std::filesystem::path& file, const HapticStru
   }
   header.checksum = checksumOf(header, rest);
 
-  const std::filesystem::path part = file.string() + ".part" + std::to_string(::getpid());
+  const bool in_place = isWrittenInPlace(file);
+  const std::filesystem::path part =
+      in_place ? file : std::filesystem::path(file.string() + ".part" + std::to_string(::getpid()));
   std::ofstream out(part, std::ios::binary | std::ios::trunc);
   out.write(reinterpret_cast<const char*>(&header), sizeof header);
   out.write(reinterpret_cast<const char*>(rest.data()), static_cast<std::streamsize>(rest.size()));
   out.close();
   std::error_code error;
-  if (out) std::filesystem::rename(part, file, error);
+  if (out && !in_place) std::filesystem::rename(part, file, error);
   if (!out || error) {
     std::error_code ignored;
-    std::filesystem::remove(part, ignored);
+    if (!in_place) std::filesystem::remove(part, ignored);
     return fail(file.string() + ": cannot be written" + (error ? ": " + error.message() : std::string{}));
   }
   return {};

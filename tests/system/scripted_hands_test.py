@@ -54,7 +54,7 @@ class Scripted(unittest.TestCase):
 
     def logged(self, *arguments, scene=None):
         """The log of a run that must succeed, and what it printed."""
-        done = self.rehearse(*arguments, "--log", self.log, scene=scene)
+        done = self.rehearse(*arguments, "--log", self.log, "--overwrite", scene=scene)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         return [json.loads(line) for line in self.log.read_text(encoding="utf-8").splitlines()], done.stdout
 
@@ -155,7 +155,7 @@ class Log(Scripted):
 
     def test_a_log_that_cannot_be_written_is_an_error(self):
         arguments = ("--input", f"right={self.press()}", "--take", "right=part", "--seconds", 0.2, "--log")
-        for file, said in ((self.folder / "nowhere" / "log", ": cannot be written"), (self.folder, ": cannot be written"),
+        for file, said in ((self.folder / "nowhere" / "log", ": cannot be written"), (self.folder, ": is a folder"),
                            ("/dev/full", "/dev/full: could not be written completely")):
             done = self.rehearse(*arguments, file)
             self.assertEqual(done.returncode, 1, done.stdout)
@@ -220,7 +220,8 @@ class Errors(Scripted):
         self.refused(2, "--log requires --input", "--log", self.log)
         self.refused(2, "--every requires --log", *right, "--every", 2)
         self.refused(2, "--timing requires --log", *right, "--timing")
-        self.refused(2, "--log " + str(self.press()) + ": is a file of --input", *right, "--log", self.press())
+        self.refused(2, f"{self.press()}: is an input of this command", *right, "--log", self.press(), "--overwrite")
+        self.refused(1, f"{__file__}: exists; --overwrite replaces it", *right, "--log", __file__)
         self.refused(2, "the last row is at t = 0: give --seconds", "--input", f"right={self.file('one.csv', ABOVE)}")
         for option in (("--seed", 2), ("--device", "sigma7-sim"), ("--misplace-mount", 0), ("--no-instructor",), ("--follow",)):
             self.refused(2, f"{option[0]} is an option of simulated people; with --input there are none", *right, *option)

@@ -68,6 +68,11 @@ class Session(unittest.TestCase):
                 self.assertEqual(again.returncode, 0, again.stdout + again.stderr)
                 self.assertEqual(final_hash(again.stdout), over_dds)
 
+            beside = tenon("resimulate", "session.mcap", cwd=stage.out)
+            self.assertEqual(beside.returncode, 1)
+            self.assertEqual(beside.stderr, "tenon resimulate: session.mcap: does not name its scenario; name it as well, as in: "
+                                            "tenon resimulate session.mcap scenarios/engine_bay\n")
+
             edited = stage.out / SCENARIO / "scenario.yaml"
             edited.parent.mkdir()
             text = (SOURCE / "scenarios" / SCENARIO / "scenario.yaml").read_text(encoding="utf-8")
@@ -84,6 +89,10 @@ class Session(unittest.TestCase):
             report = tenon("report", recording, "-o", stage.out)
             self.assertEqual(report.returncode, 0, report.stdout + report.stderr)
             self.assertTrue((stage.out / "report.html").exists())
+            twice = tenon("report", recording, "-o", stage.out)
+            self.assertEqual(twice.returncode, 1)
+            self.assertEqual(twice.stderr, f"tenon-report: {stage.out / 'report.html'}: exists; --overwrite replaces it\n")
+            self.assertEqual(tenon("report", recording, "-o", stage.out, "--overwrite").returncode, 0)
 
     def test_the_workers_of_a_tick_are_scheduled_as_its_thread(self):
         with Stage(lockstep=False) as stage:
