@@ -92,8 +92,11 @@ int reportError(const std::string& what, int exit_code = 1) {
   return exit_code;
 }
 
-/// Shows the progress on one line of a terminal; nothing when stderr is no terminal.
+/// Says once that something has to be baked, and shows the progress on one line of a terminal.
 void showLoading(std::string_view activity, double fraction) {
+  static bool is_said = false;
+  if (!is_said) printLine("preparing the scene: what is not baked yet is baked, which can take a minute");
+  is_said = true;
   static const bool is_terminal = isatty(STDERR_FILENO) != 0;
   if (is_terminal)
     std::fprintf(stderr, "\r\033[K%3.0f %%  %s", 100.0 * fraction, std::string(activity).c_str());

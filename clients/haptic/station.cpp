@@ -125,7 +125,7 @@ void Station::report(const HapticHand& hand) noexcept {
 
 void Station::report(StationEventKind kind, HandId hand, std::uint32_t detail, double value,
                      std::uint32_t count) noexcept {
-  events_[events_written_ % kEventCapacity] = {seq_, kind, hand, detail, value, count};
+  events_[events_written_ % kEventCapacity] = {seq_, kind, hand, detail, value, count, world_.tick()};
   ++events_written_;
   if (events_written_ - events_taken_ > kEventCapacity) events_taken_ = events_written_ - kEventCapacity;
 }

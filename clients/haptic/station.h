@@ -43,6 +43,7 @@ struct StationEvent {
   std::uint32_t detail = 0;
   double value = 0.0;  ///< [N], [s] or [ticks], see StationEventKind
   std::uint32_t count = 0;
+  Tick tick = 0;  ///< newest one received when it happened
 };
 
 /// Text for the log; `hand` is the name of the event's hand.

@@ -194,7 +194,7 @@ void StationRunner::sendEvents() {
     const bool is_safety =
         event.kind == StationEventKind::kSafetyBegan || event.kind == StationEventKind::kSafetyEnded;
     const char* kind = is_safety ? "safety" : "station";
-    static_cast<void>(link_.send(ClientEvent{link_.welcome().client, ++event_seq_, kind, text}));
+    static_cast<void>(link_.send(ClientEvent{link_.welcome().client, ++event_seq_, event.tick, kind, text}));
   }
 }
 

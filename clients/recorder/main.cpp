@@ -46,8 +46,12 @@ int run(int argc, char** argv) {
     std::fprintf(stderr, "tenon-record: %s\n", recorded.error().what.c_str());
     return 1;
   }
-  options.report(recorded->file + ": " + std::to_string(recorded->messages) + " messages, " +
-                 std::to_string(recorded->lost) + " ticks missing");
+  const tenon::RecorderStatus& status = recorded->status;
+  options.report(status.file + ": " + std::to_string(status.messages) + " messages, " +
+                 std::to_string(status.lost) + " published samples missing");
+  for (const tenon::recorder::TopicCount& count : recorded->counts)
+    options.report("  " + count.topic + ": " + std::to_string(count.recorded) + " of " +
+                   std::to_string(count.published) + " samples");
   return 0;
 }
 

@@ -30,6 +30,8 @@ class Writer {
   /// Disposes the instance with the key fields of `key_holder`; readers get it as gone.
   Result<void> dispose(const M& key_holder);
   [[nodiscard]] std::size_t matchedReaders() const;
+  /// Waits until all reliable readers have received all samples; false when they have not within `timeout`.
+  bool waitForReaders(std::chrono::nanoseconds timeout);
 
  private:
   struct Impl;

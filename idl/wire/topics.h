@@ -20,7 +20,8 @@ enum class QosClass {
 /// Delivery on a link; streams differ by it.
 enum class LinkProfile {
   kLan,       ///< loopback or a local network, in real time
-  kLockstep,  ///< streams are reliable with history depth 32 on both sides; no deadlines, no lifespans
+  kLockstep,  ///< streams are reliable; writers keep all samples until all readers have them, readers the
+              ///< last 32 of a stream; no deadlines, no lifespans
 };
 
 using Milliseconds = std::chrono::milliseconds;

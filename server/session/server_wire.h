@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "idl/types/messages/log.h"
 #include "idl/wire/endpoint.h"
 #include "server/game_control/scenario.h"
 #include "server/session/input_buffer.h"
@@ -56,6 +57,11 @@ class ServerWire {
   void resendLast();
   void send(const EventLog& event);
   void send(const RunState& run);
+  /// States how many samples were written since the last statement (PublishedSamples); without a new tick
+  /// nothing.
+  void statePublished();
+  /// Waits until all readers have what was written to them reliably, for up to `timeout`.
+  void waitForReaders(std::chrono::nanoseconds timeout);
   /// Only to matched readers, and only with `publish_journal`.
   void send(const JournalEntry& entry);
 
@@ -115,6 +121,7 @@ class ServerWire {
   bool emergency_stop_ = false;  ///< engaged
   Tick now_ = 0;
   const OutgoingMessages* last_ = nullptr;  ///< of the last send
+  PublishedSamples published_;              ///< since the last statement
 };
 
 }  // namespace tenon::session

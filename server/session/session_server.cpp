@@ -18,6 +18,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
+constexpr auto kFarewell = std::chrono::seconds(10);  // at most, for the last samples to reach all clients
 constexpr auto kInputTimeout = std::chrono::seconds(30);  // in lockstep, for the input of a client
 
 std::optional<Role> roleNamed(std::string_view name) {
@@ -296,6 +297,7 @@ void Server::runRealTime(const std::atomic<bool>& stop) {
   over = true;
   journal_thread.join();
   for (TickOutput* output = outputs_.front(); output != nullptr; output = outputs_.front()) {
+    wire_->update(*output);
     wire_->send(publisher_.prepare(*output));
     outputs_.pop();
   }
@@ -326,7 +328,10 @@ Result<SessionReport> Server::finish() {
   if (journal_)
     if (auto closed = journal_->close(report.run); !closed) return fail(closed.error().what);
 
-  // let reliable samples arrive before the writers are deleted
+  wire_->statePublished();
+  // let reliable samples arrive before the writers are deleted: a client that has not received the end of the
+  // run takes the end of the server for a failure
+  wire_->waitForReaders(kFarewell);
   const auto until = std::chrono::steady_clock::now() + milliseconds(500);
   while (std::chrono::steady_clock::now() < until) wire_->dispatch(milliseconds(50));
   return report;

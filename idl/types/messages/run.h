@@ -26,7 +26,7 @@ struct RecorderStatus {
   std::string file;
   bool recording = false;
   std::uint64_t messages = 0;  ///< written
-  std::uint64_t lost = 0;      ///< ticks whose TickInput is missing in the recording
+  std::uint64_t lost = 0;      ///< samples that the server published and that are missing in the recording
   std::string problem;         ///< why it does not record; or empty
 };
 
