@@ -3,6 +3,7 @@
 import argparse
 import ctypes
 import functools
+import itertools
 import os
 import re
 import signal
@@ -40,9 +41,9 @@ def arguments():
                     "process of its own. People and devices are simulated. Exit code: 0 when every part was mounted within "
                     "tolerance, 1 when not, 2 for wrong usage.")
     parser.add_argument("--scenario", default="engine_bay", help="a shipped scenario's name or a path (default: %(default)s)")
-    parser.add_argument("--out", metavar="DIR", default="out/demo",
-                        help="where recording, report and logs go (default: %(default)s)")
-    parser.add_argument("--overwrite", action="store_true", help="replace those of an earlier demo in that folder")
+    parser.add_argument("--out", metavar="DIR", type=Path,
+                        help="where recording, report and logs go (default: out/demo; while that has an earlier demo, out/demo-2 and so on)")
+    parser.add_argument("--overwrite", action="store_true", help="replace those of an earlier demo in that folder (default: out/demo)")
     parser.add_argument("--seed", type=between(int, 0, 2**64 - 1), default=1, help="of the simulated people's skills and errors (default: %(default)s)")
     parser.add_argument("--detail", type=between(float, 0, 1), default=0.12, help="of the scene, 0 to 1; 1 is 1.8 million triangles (default: %(default)s)")
     parser.add_argument("--lockstep", action="store_true", help="ticks wait for each other instead of the clock: repeatable to the last bit")
@@ -253,9 +254,21 @@ def run_session(args, out, programs):
     return 1 if outcome or report.returncode else 0
 
 
+def has_demo(folder):
+    return any((folder / name).exists() for name in OUTPUTS)
+
+
+def output_folder(args):
+    """Where the files go: what was asked for, else a folder without an earlier demo."""
+    first = Path("out/demo")
+    if args.out or args.overwrite or not has_demo(first):
+        return args.out or first
+    return next(folder for number in itertools.count(2) if not has_demo(folder := Path(f"out/demo-{number}")))
+
+
 def main():
     args = arguments()
-    out = Path(args.out)
+    out = output_folder(args)
     try:
         out.mkdir(parents=True, exist_ok=True)
         for file in (out / name for name in OUTPUTS):

@@ -1,4 +1,6 @@
 """`tenon demo`: its lockstep recordings are complete, its reports repeatable, and it leaves no program running."""
+import argparse
+import contextlib
 import json
 import os
 import re
@@ -14,6 +16,7 @@ from pathlib import Path
 from stage import PROGRAMS, SOURCE, TENON, final_hash, free_domain, tenon
 
 sys.path.insert(0, str(SOURCE / "deploy"))
+from demo import output_folder  # noqa: E402
 from demo_scene import hands_of  # noqa: E402
 
 PEG_AND_BOX = SOURCE / "scenarios" / "peg_and_box"
@@ -174,6 +177,18 @@ class Endings(DemoCase):
         self.assert_nothing_runs()
 
 
+class Folder(unittest.TestCase):
+    def test_a_second_demo_goes_into_a_folder_of_its_own(self):
+        with tempfile.TemporaryDirectory(prefix="tenon-demo-") as folder, contextlib.chdir(folder):
+            for expected in ("out/demo", "out/demo-2", "out/demo-3"):
+                args = argparse.Namespace(out=None, overwrite=False)
+                self.assertEqual(output_folder(args), Path(expected))
+                Path(expected).mkdir(parents=True)
+                (Path(expected) / "report.html").touch()
+            self.assertEqual(output_folder(argparse.Namespace(out=None, overwrite=True)), Path("out/demo"))
+            self.assertEqual(output_folder(argparse.Namespace(out=Path("mine"), overwrite=False)), Path("mine"))
+
+
 class Instructor(DemoCase):
     def test_a_scenario_without_a_hand_for_one_starts_none(self):
         scenario = self.folder / "alone" / "scenario.yaml"
@@ -186,7 +201,8 @@ class Instructor(DemoCase):
         self.assertEqual(done.returncode, 0, done.stdout[-3000:] + done.stderr)
         self.assertFalse((self.folder / "out" / "instructor.log").exists())
         self.assertRegex(done.stdout, r"everything is mounted after [0-9.]+ s; late ticks: 0")
-        again = tenon(*self.words("--scenario", scenario.parent, "--lockstep"), timeout=900)
+        again = tenon(*self.words("--scenario", scenario.parent, "--lockstep", "--overwrite"), timeout=900)
+        self.assertEqual(again.returncode, 0, again.stdout[-3000:] + again.stderr)
         self.assertNotIn("preparing the scene", again.stdout, "everything is baked")
 
 
