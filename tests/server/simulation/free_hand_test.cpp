@@ -55,7 +55,7 @@ TEST(FreeBodyAndHand, ABoxPushedAlongTheFloorAcceleratesByForceMinusCoulombFrict
     const double force = 2.0;  // [N] through its centre; half of its weight
     constexpr int kTicks = 300;
     for (int tick = 0; tick < kTicks; ++tick) {
-      environment.contribute(box, 1, {Vector3(force, 0.0, 0.0), Vector3::Zero()}, 200);
+      environment.contribute(box, 1, {Vector3(force, 0.0, 0.0), Vector3::Zero()}, 100);
       environment.step();
     }
     const double applied = force * (1.0 - 1.0 / 200.0);
@@ -96,7 +96,7 @@ double creepOf(double friction, double slope, double push) {
   const auto x = [&] { return environment.objects()[box.value].X_WO.translation().x(); };
   const auto step = [&](int ticks) {
     for (int tick = 0; tick < ticks; ++tick) {
-      if (push > 0.0) environment.contribute(box, 1, {Vector3(push, 0.0, 0.0), Vector3::Zero()}, 200);
+      if (push > 0.0) environment.contribute(box, 1, {Vector3(push, 0.0, 0.0), Vector3::Zero()}, 100);
       environment.step();
     }
   };
