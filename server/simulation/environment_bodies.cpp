@@ -83,7 +83,7 @@ void Environment::wakeTouchedBodies() noexcept {
            {std::pair(pair.spec().a, pair.spec().b), std::pair(pair.spec().b, pair.spec().a)}) {
         if (!objects_[other.value].asleep || !moves(one)) continue;
         wake(other);
-        engine_->movable[other.value] = 1;
+        if (isDynamic(other)) engine_->movable[other.value] = 1;  // not while free bodies are paused
         more = true;
       }
     }

@@ -73,8 +73,9 @@ class DemoCase(unittest.TestCase):
     def process_of(self, program):
         return next(process for process, words in self.left_running().items() if words[0].endswith(f"tenon-{program}"))
 
-    def start(self, *more):
-        demo = subprocess.Popen([TENON, *map(str, self.words("--scenario", PEG_AND_BOX, "--lockstep", *more))], stdout=subprocess.PIPE,
+    def start(self, *more, lockstep=True):
+        words = self.words("--scenario", PEG_AND_BOX, *(["--lockstep"] if lockstep else []), *more)
+        demo = subprocess.Popen([TENON, *map(str, words)], stdout=subprocess.PIPE,
                                 stderr=subprocess.STDOUT, text=True, env={**os.environ, "TENON_PROGRAMS": str(PROGRAMS)})
         self.addCleanup(demo.stdout.close)
         self.addCleanup(demo.wait)
@@ -82,9 +83,11 @@ class DemoCase(unittest.TestCase):
         return demo
 
     def wait_for_first_step(self, demo):
+        said = ""
         for line in demo.stdout:
+            said += line
             if "step 1 of 2" in line:
-                return
+                return said
         self.fail("the demo ended before its first step")
 
     def assert_nothing_runs(self):
@@ -187,6 +190,33 @@ class Folder(unittest.TestCase):
                 (Path(expected) / "report.html").touch()
             self.assertEqual(output_folder(argparse.Namespace(out=None, overwrite=True)), Path("out/demo"))
             self.assertEqual(output_folder(argparse.Namespace(out=Path("mine"), overwrite=False)), Path("mine"))
+
+
+class RealTime(DemoCase):
+    def test_its_end_is_what_the_server_says_and_a_normal_end_is_no_failure(self):
+        scenario = self.folder / "hasty" / "scenario.yaml"
+        scenario.parent.mkdir()
+        text = (PEG_AND_BOX / "scenario.yaml").read_text(encoding="utf-8")
+        scenario.write_text(text.replace("timeout: 60 s", "timeout: 4 s"), encoding="utf-8")
+        demo = self.start("--scenario", scenario.parent, lockstep=False)
+        said = self.wait_for_first_step(demo)
+        for _ in range(10):  # a station that stalls, as on a busy machine
+            os.kill(self.process_of("trainee"), signal.SIGSTOP)
+            time.sleep(0.15)
+            os.kill(self.process_of("trainee"), signal.SIGCONT)
+            time.sleep(0.05)
+        said += demo.communicate(timeout=120)[0]
+        self.assertEqual(demo.returncode, 1, said)
+        server = (self.folder / "out" / "serve.log").read_text(encoding="utf-8")
+        ended = re.search(r"(?m)^a step was not done in time after .*$", server)
+        self.assertTrue(ended, server)
+        self.assertIn(ended[0], said.splitlines())
+        self.assertIn(": failed after ", said)
+        self.assertNotRegex(said, "(record|trainee|instructor|observer) failed")
+        told = [float(second) for second in re.findall(r"(?m)^ *([0-9.]+) s  ! hands? .* held still: ", said)]
+        self.assertTrue(told, said)
+        for earlier, later in zip(told, told[1:]):
+            self.assertGreaterEqual(later - earlier, 0.99, said)
 
 
 class Instructor(DemoCase):
