@@ -187,7 +187,7 @@ bool Environment::isValid() const noexcept {
   };
   const bool valid_objects = std::all_of(objects_.begin(), objects_.end(), [&](const ObjectMotion& object) {
     return validPose(object.X_WO) && object.status <= ObjectStatus::kFree &&
-           (object.status != ObjectStatus::kFree || hasBody(object)) &&
+           (object.status == ObjectStatus::kFree ? hasBody(object) : !object.asleep) &&
            (!object.holder.valid() || isHand(object.holder));
   });
   return work_limits_.critical_load > 0.0 && valid_objects &&

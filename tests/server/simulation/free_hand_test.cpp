@@ -213,6 +213,29 @@ TEST(FreeBodyAndHand, AfterAPauseAFreeBodyFallsFromRest) {
   EXPECT_NEAR(environment.objects()[box.value].X_WO.translation().z(), 0.5 * kSize.z(), 5e-5);
 }
 
+TEST(FreeBodyAndHand, ASleepingBodyStaysWhenAHandPushesAtItDuringAPause) {
+  test::SmallScene small;
+  const double height = 0.5 * kSize.z();
+  const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, height + 1e-4});
+  const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
+  const ObjectId pointer = small.object("pointer", test::pointerShape(), {-0.2, 0.0, height});
+  const HandId hand = small.hand("hand", pointer);
+  small.pair(box, ground);
+  small.pair(pointer, box);
+  Environment environment(small.build(), {});
+  test::activateHand(environment, hand, {-0.2, 0.0, height});
+  test::stepTicks(environment, 300);
+  ASSERT_TRUE(environment.objects()[box.value].asleep);
+  const Pose X_WB = environment.objects()[box.value].X_WO;
+  environment.setFreeBodiesPaused(true);
+  test::moveHandTo(environment, hand, {0.0, 0.0, height}, 400);
+  EXPECT_EQ(environment.objects()[box.value].X_WO, X_WB);
+  EXPECT_FALSE(environment.objects()[box.value].asleep) << "the hand has woken it";
+  environment.setFreeBodiesPaused(false);
+  test::stepTicks(environment, 100);
+  EXPECT_GT(environment.objects()[box.value].X_WO.translation().x(), 0.01) << "and pushes it now";
+}
+
 TEST(FreeBodyAndHand, ABodyFallsWhenItJoinsTheGroupOfItsSupport) {
   test::SmallScene small;
   const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
