@@ -113,7 +113,9 @@ class Program:
         return self.log.read_text(encoding="utf-8", errors="replace").splitlines()
 
     def last_line(self):
-        return next((line for line in reversed(self.lines()) if line.strip()), "it said nothing")
+        """What it said last; after an error of usage comes a hint to --help."""
+        said = (line for line in reversed(self.lines()) if line.strip() and not line.startswith("Run with --help"))
+        return next(said, "it said nothing")
 
     def is_running(self):
         return self.process.poll() is None

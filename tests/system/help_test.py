@@ -93,7 +93,7 @@ TABLE = (
     (2, ["voxels", "a", "--cell", "0mm"], "--cell 0mm: must be greater than 0"),
     (1, ["probe", "nosuch"], "nosuch: cannot be read"),
     (2, ["parts", "nosuch", "a"], "no scenario 'nosuch'"),
-    (2, ["rehearse", SCENARIO, "--seconds", "-1"], "--seconds: must be a number greater than 0"),
+    (2, ["rehearse", SCENARIO, "--seconds", "-1"], "--seconds -1: expected 0.001 to 1000000"),
     (2, ["rehearse", SCENARIO, "--device", "nosuch"], "--device: unknown device 'nosuch'"),
     (1, ["report", "nosuch.mcap"], "nosuch.mcap"),
     (1, ["resimulate", "nosuch.mcap"], "tenon resimulate: nosuch.mcap"),
