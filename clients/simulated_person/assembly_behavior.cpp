@@ -114,7 +114,6 @@ void AssemblyBehavior::mount(const HandPerception& hand, const PathPlanner& plan
                              const MountTask& task) noexcept {
   goal_ = Goal::kMount;
   task_ = task;
-  attempts_ = 0;
   aim_error_scale_ = 1.0;
   const bool any_approach = task.approach_W.norm() < 0.5;
   axis_W_ = any_approach ? Vector3(-Vector3::UnitZ()) : task.approach_W.normalized();
@@ -297,7 +296,6 @@ void AssemblyBehavior::align(const HandPerception& hand, const DelayedPerception
   }
   depth_ = -task_.approach_distance;
   stall_detector_.start(perceivedDepth(perception));
-  ++attempts_;
   enter(Phase::kInsert);
 }
 
@@ -373,7 +371,6 @@ void AssemblyBehavior::retract(const HandPerception& hand, const DelayedPercepti
   if (depth_ > retracted || phase_time_ < 1.0) return;
   aim();
   stall_detector_.start(perceivedDepth(perception));
-  ++attempts_;
   enter(Phase::kInsert);
 }
 

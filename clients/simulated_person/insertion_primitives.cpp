@@ -33,11 +33,6 @@ void orthonormalBasis(const Vector3& axis, Vector3& u, Vector3& v) noexcept {
   v = axis.cross(u);
 }
 
-Vector3 clampNorm(const Vector3& v, double limit) noexcept {
-  const double length = v.norm();
-  return length > limit ? Vector3(v * (limit / length)) : v;
-}
-
 Displacement decayed(const Displacement& offset, double dt, double time) noexcept {
   const double remaining = 1.0 - std::min(1.0, dt / time);
   return {offset.translation * remaining, offset.rotation * remaining};

@@ -11,9 +11,6 @@ namespace tenon::simulated_person {
 /// Unit vectors u and v such that u, v and the unit vector `axis` are orthogonal in pairs.
 void orthonormalBasis(const Vector3& axis, Vector3& u, Vector3& v) noexcept;
 
-/// `v`, scaled to a norm of `limit` [unit of v] when it is longer.
-[[nodiscard]] Vector3 clampNorm(const Vector3& v, double limit) noexcept;
-
 /// `offset` after `dt` [s] of first-order decay with the time constant `time` [s].
 [[nodiscard]] Displacement decayed(const Displacement& offset, double dt, double time) noexcept;
 
@@ -21,7 +18,7 @@ void orthonormalBasis(const Vector3& axis, Vector3& u, Vector3& v) noexcept;
 /// (-y) of upright objects, the top of all others.
 [[nodiscard]] Vector3 touchNormal(const Vector3& size_W) noexcept;
 
-/// Offset (in W) from the centre of an object to the point that is tried when nothing was felt there;
+/// Offset (in W) from the centre of an object to the point that is tried when a touch met no resistance;
 /// `attempt` counts from 0.
 [[nodiscard]] Vector3 probeOffset(unsigned attempt) noexcept;
 

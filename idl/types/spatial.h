@@ -12,6 +12,13 @@ using Vector3f = Eigen::Vector3f;
 using Matrix3 = Eigen::Matrix3d;
 using Quaternion = Eigen::Quaterniond;
 
+/// A vector in the direction of `v` with a norm of at most `limit` [unit of v] >= 0; zero stays zero, NaN
+/// stays NaN.
+[[nodiscard]] inline Vector3 clampNorm(const Vector3& v, double limit) {
+  const double norm = v.norm();
+  return norm > limit ? Vector3(v * (limit / norm)) : v;
+}
+
 /// [rad] atan2(y, x) of `y` [-] >= 0 and `x` [-], in 0..pi; 0 for y = x = 0. Computed with + - * / and sqrt
 /// alone, so that it has the same bits on every processor; std::atan2 has not.
 [[nodiscard]] double angleOf(double y, double x);

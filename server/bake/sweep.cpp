@@ -17,8 +17,9 @@ struct Extent {
   double radius;  // [m]
 };
 
-double steps(const Pose& X_WA, const Pose& X_WB, const Extent& extent, double step) {
-  const double length = maxPointMotion(displacement(X_WA, X_WB, extent.p_MQ), extent.radius);
+/// Steps between two poses of a body of `extent`: no point of it moves by more than `step` [m].
+double steps(const Pose& X_WM, const Pose& X_WM_next, const Extent& extent, double step) {
+  const double length = maxPointMotion(displacement(X_WM, X_WM_next, extent.p_MQ), extent.radius);
   return std::max(1.0, std::ceil(length / step));
 }
 

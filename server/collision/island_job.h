@@ -49,8 +49,8 @@ struct IslandSolver::Job {
   }
   /// The query of a pair at the current poses of its bodies, up to a gap of `margin` [m].
   [[nodiscard]] PairQuery queryOf(const IslandPair& pair, double margin) const {
-    return {pair.shell_A, pair.field_B, poseA(pair), poseB(pair), pair.dilation,
-            margin,       pair.levels,  pair.budget, pair.first};
+    return {pair.shell_A, pair.field_B, poseA(pair), poseB(pair),         pair.dilation,
+            margin,       pair.levels,  pair.budget, pair.priority_points};
   }
 };
 

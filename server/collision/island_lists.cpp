@@ -15,8 +15,8 @@ constexpr double kReducedListError = 1e-5;
 /// [m] Largest distance between those points.
 constexpr double kReducedListSpacing = 0.03;
 
-/// [-] Full lists shorten a step to this fraction of its largest length at most: a plate on a floor, which
-/// fills its list, still has to slide.
+/// [-] A full list shortens a step no further than to this fraction of max_step_length: a plate on a floor,
+/// which fills its list, still has to slide.
 constexpr double kMinValidity = 0.25;
 
 int movableBodies(const IslandPair& pair) {

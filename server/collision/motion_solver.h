@@ -82,7 +82,7 @@ struct ContactConstraint {
 
 struct MotionResult {
   std::uint32_t iterations = 0;  ///< of the active-set method
-  /// The constraints contradict each other, or the iterations ran out (64, and 30 a body). Negative gaps were
+  /// The constraints contradict each other, or the iterations ran out (64 + 30 per body). Negative gaps were
   /// then raised to 0 (bodies are not pushed apart, and sink no deeper) and the QP was solved again. If that
   /// failed too, all displacements and multipliers are 0.
   bool infeasible = false;
@@ -105,9 +105,9 @@ class MotionSolver {
   MotionSolver(MotionSolver&&) noexcept;
   MotionSolver& operator=(MotionSolver&&) noexcept;
 
-  /// `displacements`[i] [m, rad]: of bodies[i]'s centre Q and its orientation, in W. `multipliers`[r] [N], >=
-  /// 0: force along rows[r].n_W on its body A, and the opposite on B. Both spans are as long as bodies and
-  /// rows; `multipliers` may be empty.
+  /// `displacements`[i] [m, rad]: of bodies[i]'s centre Q and its orientation, in W. `multipliers` [N], >= 0,
+  /// by row: force along rows[r].n_W on its body A, and the opposite on B. Both spans are as long as bodies
+  /// and rows; `multipliers` may be empty.
   ///
   /// `warm_start`: rows to activate first, with the forces that stand in `multipliers` at the call as initial
   /// multipliers. The solution does not depend on it, only the number of iterations. `unchanged`: so many

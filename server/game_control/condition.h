@@ -21,7 +21,7 @@ enum class ConditionKind : std::uint8_t {
   kPose,         ///< `object` is at X_WG: its centre within `within`, its orientation within `angle`
   kForce,        ///< the magnitude of the force on `object` is between `above` and `below`
   kForceTarget,  ///< the force on `object` differs from F_W by at most `within`
-  kContact,      ///< `object` and `other` were in contact for `limit_ticks`; gaps up to `lapse` are tolerated
+  kContact,      ///< `object` and `other` were in contact for `limit_ticks`, interrupted for `lapse` at most
   kContactTime,  ///< the accumulated time of `object` in contact with anything reaches `limit_ticks`
   kFulfilled,    ///< a person sends the command kFulfilled in this tick
   kSignal,       ///< an external program sends the signal number `signal` in this tick
@@ -31,8 +31,8 @@ enum class ConditionKind : std::uint8_t {
 struct Condition {
   ConditionKind kind = ConditionKind::kAll;
   std::uint32_t parent = 0;  ///< index in the tree; the root is its own parent
-  bool latched =
-      false;  ///< group: a child that was met once stays met; else all must be met in the same tick
+  /// group: a child that was met once stays met; else all must be met in the same tick
+  bool latched = false;
   std::uint32_t dwell = 0;  ///< [ticks] it must hold without interruption before it is met
   ObjectId object;
   ObjectId other;                                          ///< kContact
@@ -41,10 +41,10 @@ struct Condition {
   double angle = 0.0;                                      ///< [rad] kPose
   double above = 0.0;                                      ///< [N] kForce
   double below = std::numeric_limits<double>::infinity();  ///< [N] kForce
-  Vector3 F_W = Vector3::Zero();                           ///< kForceTarget
+  Vector3 F_W = Vector3::Zero();                           ///< [N] kForceTarget
   std::uint32_t limit_ticks = 0;                           ///< [ticks] kContact, kContactTime
-  std::uint32_t lapse = 0;                                 ///< [ticks] kContact
-  std::uint32_t signal = 0;                                ///< kSignal: index into ScenarioFile::signals
+  std::uint32_t lapse = 0;   ///< [ticks] kContact: a longer interruption resets the time
+  std::uint32_t signal = 0;  ///< kSignal: index into ScenarioFile::signals
 };
 
 [[nodiscard]] constexpr bool isGroup(ConditionKind kind) {
@@ -60,37 +60,38 @@ class SceneView {
   [[nodiscard]] virtual Pose pose(ObjectId object) const noexcept = 0;  ///< X_WO
   /// [m] p_OQ_O: of its bounding sphere; an object's position is that of its centre.
   [[nodiscard]] virtual Vector3 centre(ObjectId object) const noexcept = 0;
-  [[nodiscard]] virtual Vector3 force(ObjectId object) const noexcept = 0;  ///< [N] contact force on it, in W
+  /// [N] in W, as Environment::forceOn
+  [[nodiscard]] virtual Vector3 force(ObjectId object) const noexcept = 0;
   [[nodiscard]] virtual bool inContact(ObjectId a, ObjectId b) const noexcept = 0;
   [[nodiscard]] virtual bool inAnyContact(ObjectId object) const noexcept = 0;
 };
 
 /// Progress of one condition, for displays.
 struct ConditionReading {
-  double value =
-      0.0;  ///< pose: position error [m]; force: [N]; contact: [s]; group, command, signal: count [-]
+  /// pose: position error [m]; force: [N]; contact: [s]; group, command, signal: count [-]
+  double value = 0.0;
   double limit = 0.0;  ///< [unit of `value`] at which it is met, other parts of the condition aside
   bool met = false;
 };
 
-/// Measures how long two objects have been in contact. Gaps up to a limit (tremor of the hand) do not reset
-/// the time, but are not counted either.
+/// Measures how long two objects have been in contact. Interruptions up to a limit (tremor of the hand) do
+/// not reset the time, but are not counted either.
 struct ContactTimer {
   std::uint32_t contact_ticks = 0;  ///< [ticks] in contact
-  std::uint32_t gap_ticks = 0;      ///< [ticks] since the last contact
+  std::uint32_t apart_ticks = 0;    ///< [ticks] since the last contact
 
-  void step(bool in_contact, std::uint32_t tolerated_gap) noexcept {
+  void step(bool in_contact, std::uint32_t lapse) noexcept {
     if (in_contact) {
       ++contact_ticks;
-      gap_ticks = 0;
-    } else if (++gap_ticks > tolerated_gap) {
+      apart_ticks = 0;
+    } else if (++apart_ticks > lapse) {
       contact_ticks = 0;
     }
   }
 };
 
 /// Evaluates one condition tree tick by tick. Its whole state is tick counters and the last readings, so a
-/// replay decides the same.
+/// re-simulation decides the same.
 ///
 /// Threads: one caller. Real-time: all.
 class ConditionProgress {
@@ -111,7 +112,7 @@ class ConditionProgress {
     for (Node& node : nodes_) {
       visit(node.held_ticks);
       visit(node.contact.contact_ticks);
-      visit(node.contact.gap_ticks);
+      visit(node.contact.apart_ticks);
       visit(node.latched);
       visit(node.reading.value);
       visit(node.reading.limit);

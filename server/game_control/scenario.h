@@ -85,8 +85,8 @@ struct ScenarioHand {
   std::string name;
   Role role = Role::kTrainee;
   simulation::HandKind kind = simulation::HandKind::kCoupled;
-  ObjectId object;                     ///< its own object, which it moves unless it has grabbed another
-  double stiffness = 1000.0;           ///< [N/m] of its coupling
+  ObjectId object;            ///< default object: moved while the hand holds no other (pointer, forearm)
+  double stiffness = 1000.0;  ///< [N/m] of its coupling
   double rotational_stiffness = 20.0;  ///< [Nm/rad] of its coupling
   int line = 0;
 };
@@ -163,10 +163,11 @@ struct ScenarioState {
   double approach_distance = 0.0;        ///< [m] before the target, from which on the direction matters
   std::vector<Condition> conditions;     ///< tree; the state ends when its root is met
   // at its end
-  bool snap = false;  ///< `object` is fixed at its target, and hands that held it move their own again
+  /// `object` is fixed at its target, and hands that held it move their default objects again
+  bool snap = false;
   std::uint32_t timeout = 0;  ///< [ticks] 0: none
   TimeoutAction on_timeout = TimeoutAction::kFail;
-  int line = 0;
+  int line = 0;  ///< 0: not in the file, see ReadOptions::needs_states
 };
 
 /// A training scenario, read from YAML and checked: all ids and indices in it are valid.
@@ -197,12 +198,24 @@ struct ScenarioFile {
   [[nodiscard]] int signalNamed(std::string_view signal) const;
 };
 
+/// How a scenario is read where its hands follow files instead of people.
+struct ReadOptions {
+  /// Hands that hold an object from the start on: it counts as moved by that hand, so it has pairs. Ids that
+  /// the scenario does not have are ignored.
+  std::vector<HandAssignment> taken;
+  /// False: a file without states gets one, with line 0, that lasts until somebody sends kFulfilled.
+  bool needs_states = true;
+  bool only_names = false;  ///< stop after objects and hands: to look up their ids for `taken`
+};
+
 /// Reads a scenario file, or `scenario.yaml` in a folder. Fails with `file:line: what was wrong, what was
 /// expected`.
-[[nodiscard]] Result<ScenarioFile> readScenario(const std::filesystem::path& path);
+[[nodiscard]] Result<ScenarioFile> readScenario(const std::filesystem::path& path,
+                                                const ReadOptions& options = {});
 
 /// As readScenario(), from a text. `path` names it in errors; mesh files are relative to its folder.
-[[nodiscard]] Result<ScenarioFile> parseScenario(std::string_view text, const std::filesystem::path& path);
+[[nodiscard]] Result<ScenarioFile> parseScenario(std::string_view text, const std::filesystem::path& path,
+                                                 const ReadOptions& options = {});
 
 /// All objects in an order in which the parts that are mounted into an object are baked before it, as
 /// refineBoxes() needs. Parts that are mounted into each other come in the order of their ids.

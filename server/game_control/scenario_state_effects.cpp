@@ -134,7 +134,8 @@ void ScenarioStateReader::readHands(const YAML::Node& node, ScenarioState& state
   }
 }
 
-/// A hand that grabs an object must be coupled, and the object must not be the own object of another hand.
+/// A hand that grabs an object must be coupled, and the object must not be the default object of another
+/// hand.
 bool ScenarioStateReader::checkGrab(const YAML::detail::iterator_value& entry, HandId hand, ObjectId object,
                                     const std::string& what) {
   if (scenario_.hands[hand.value].kind == simulation::HandKind::kTracked) {
@@ -144,7 +145,7 @@ bool ScenarioStateReader::checkGrab(const YAML::detail::iterator_value& entry, H
   }
   for (std::size_t other = 0; other < scenario_.hands.size(); ++other) {
     if (other != hand.value && scenario_.hands[other].object == object) {
-      yaml_.fail(entry.second, what + ": '" + names_.nameOf(object) + "' is the own object of hand '" +
+      yaml_.fail(entry.second, what + ": '" + names_.nameOf(object) + "' is the default object of hand '" +
                                    scenario_.hands[other].name + "'");
       return false;
     }

@@ -10,7 +10,7 @@ namespace tenon::game_control {
 namespace {
 
 constexpr std::uint32_t kRegrabTicks = 1000;  // [ticks] paper §5: 1 s of contact grabs a part
-constexpr std::uint32_t kRegrabLapse = 50;    // [ticks] tolerated gap in that contact
+constexpr std::uint32_t kRegrabLapse = 50;    // [ticks] tolerated interruption of that contact
 
 /// The Environment as a SceneView.
 class EnvironmentView final : public SceneView {
@@ -38,7 +38,7 @@ class EnvironmentView final : public SceneView {
 };
 
 /// The hand that currently has the role of a hand of the scenario: after hands were swapped, the one whose
-/// own object is that of the scenario's hand.
+/// default object is that of the scenario's hand.
 HandId handInRole(const ScenarioFile& scenario, const simulation::Environment& environment,
                   HandId role) noexcept {
   for (std::uint32_t i = 0; i < scenario.hands.size(); ++i) {

@@ -6,8 +6,9 @@
 namespace tenon::simulation {
 namespace {
 
-/// Sub-steps of a held body per tick: enough to reach a surface, slide along it and reach a second one.
-constexpr std::uint32_t kTravelSubsteps = 4;
+/// SQP steps per tick of an island without free bodies, at most: enough to reach a surface, slide along it
+/// and reach a second one.
+constexpr std::uint32_t kMaxHeldSteps = 4;
 
 std::size_t listCount(const Scene& scene, const EnvironmentOptions& options) {
   return std::min(scene.pairs.size(), options.contact_lists);
@@ -16,9 +17,10 @@ std::size_t listCount(const Scene& scene, const EnvironmentOptions& options) {
 /// [m] Lower bound of the radius that scales rotations: objects without structures have a radius of 0.
 constexpr double kMinRadius = 0.01;
 
+/// The limits with SQP steps so short that all of a tick together keep to `max_speed` [m/s].
 collision::SolveLimits cappedLimits(collision::SolveLimits limits, double max_speed) {
   const double travel = max_speed * kTickSeconds;
-  limits.max_steps = std::clamp(limits.max_steps, 1U, kTravelSubsteps);
+  limits.max_steps = std::clamp(limits.max_steps, 1U, kMaxHeldSteps);
   limits.max_step_length = std::min(limits.max_step_length, travel / limits.max_steps);
   return limits;
 }

@@ -107,7 +107,7 @@ struct Environment::Engine {
   std::vector<std::size_t> incident_begin;  ///< by object: first entry in incident_pairs; one more at the end
   std::vector<std::optional<FreeBody>> bodies;  ///< by object; none without a mass
   std::size_t hand_count = 0;
-  collision::SolveLimits limits;  ///< of an island; sub-steps limited so that a tick keeps the speed cap
+  collision::SolveLimits limits;  ///< of an island; its SQP steps in a tick keep to the speed cap
   double max_margin = 0.0;        ///< [m] largest contact margin of any query in a tick
 
   // work space

@@ -10,8 +10,8 @@ namespace {
 /// [m] Bounding spheres contain the shell points; the surface between them may bulge out by this, per pair.
 constexpr double kSphereSlack = 5e-3;
 
-/// A traversal may use the pair's budget over this: in one tick the solver may traverse again when a body
-/// moves far, resamples the listed points after each sub-step, and may reject a step.
+/// [-] A traversal may test the pair's budget divided by this: in one tick the solver may traverse again when
+/// a body moves far, resamples the listed points after each SQP step, and may reject a step.
 constexpr std::uint32_t kTraversalsPerTick = 3;
 
 }  // namespace
@@ -41,6 +41,8 @@ Environment::Environment(std::shared_ptr<const Scene> scene, const EnvironmentOp
 }
 
 Environment::~Environment() = default;
+
+std::string Environment::shareScheduling() { return engine_->pool.shareScheduling(); }
 
 void Environment::setPairEnabled(std::size_t pair, bool enabled) noexcept {
   if (pair >= pairs_.size()) return;
@@ -310,13 +312,13 @@ void Environment::addIsland(std::int32_t island) noexcept {
     if (work_limits_.any()) {
       one.levels = pair.levels();
       one.budget = engine.budget.pointsFor(slot) / kTraversalsPerTick;
-      one.first = {engine.touching[slot].begin(), engine.touching[slot].end()};
+      one.priority_points = {engine.touching[slot].begin(), engine.touching[slot].end()};
       engine.islands.addPointBudget(engine.budget.pointsFor(slot));
     }
     engine.islands.addPair(i, one);
     engine.queried[i] = 1;
   }
-  limitTravel(static_cast<std::size_t>(island));
+  setStepLimits(static_cast<std::size_t>(island));
 }
 
 void Environment::applyIslandResults() noexcept {
@@ -354,10 +356,10 @@ void Environment::queryNonIslandPairs() noexcept {
     const std::uint32_t slot = engine_->non_island[item];
     CollPair& pair = engine_->pairs[engine_->due[slot]];
     const std::uint32_t budget = engine_->budget.pointsFor(slot);
-    std::span<const std::uint32_t> first;
-    if (limited) first = {engine_->touching[slot].begin(), engine_->touching[slot].end()};
+    std::span<const std::uint32_t> priority_points;
+    if (limited) priority_points = {engine_->touching[slot].begin(), engine_->touching[slot].end()};
     pair.query(objects_[pair.spec().a.value].X_WO, objects_[pair.spec().b.value].X_WO,
-               engine_->limits.contact_margin, budget, first);
+               engine_->limits.contact_margin, budget, priority_points);
     pair.adaptLevels(work_limits_, budget);
     // sensing pairs exert no force; neither do overlapping objects of which none is tracked
     const bool exerts_force = objects_[pair.spec().a.value].status == ObjectStatus::kTracked ||

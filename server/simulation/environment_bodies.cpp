@@ -15,14 +15,14 @@ constexpr std::uint32_t kSleepTicks = 30;
 /// [m] Convergence tolerance of a free body: smaller than for held ones, so that the smallest force moves it.
 constexpr double kFreeBodyTolerance = 1e-9;
 
-/// Sub-steps of an island with free bodies, at least: an unconverged step would lose momentum.
-constexpr std::uint32_t kImpactSubsteps = 10;
+/// SQP steps that an island with free bodies may make, at least: an unconverged tick would lose momentum.
+constexpr std::uint32_t kMinImpactSteps = 10;
 
-/// [-] Total sub-step travel of a fast body over its displacement: reserve for a deflection at a contact.
+/// [-] Length of all SQP steps of a fast body over its displacement: reserve for a deflection at a contact.
 constexpr double kSpareTravel = 1.25;
 
-/// [m] Travel limit of a sub-step for islands without near pairs: the whole displacement in one step.
-constexpr double kFreeSubstepTravel = 1.0;
+/// [m] Largest SQP step of islands without near pairs: the whole displacement in one step.
+constexpr double kFreeStepLength = 1.0;
 
 }  // namespace
 
@@ -83,7 +83,7 @@ void Environment::wakeTouchedBodies() noexcept {
            {std::pair(pair.spec().a, pair.spec().b), std::pair(pair.spec().b, pair.spec().a)}) {
         if (!objects_[other.value].asleep || !moves(one)) continue;
         wake(other);
-        engine_->movable[other.value] = 1;
+        if (isDynamic(other)) engine_->movable[other.value] = 1;  // not while free bodies are paused
         more = true;
       }
     }
@@ -141,9 +141,9 @@ collision::MovableBody Environment::freeBody(ObjectId object) noexcept {
   return body;
 }
 
-/// Sets the number of sub-steps of an island with free bodies for its fastest one, and limits the travel of
+/// Sets the number of SQP steps of an island with free bodies for its fastest one, and limits the travel of
 /// each of its bodies by its speed cap.
-void Environment::limitTravel(std::size_t island) noexcept {
+void Environment::setStepLimits(std::size_t island) noexcept {
   IslandWork& islands = engine_->islands;
   const IslandWork::Island& one = islands.islands()[island];
   double speed = 0.0;
@@ -161,10 +161,10 @@ void Environment::limitTravel(std::size_t island) noexcept {
     islands.body(i).max_displacement = speedCap(islands.objectOf(i)) * kTickSeconds;
   }
   collision::SolveLimits& limits = islands.limits(island);
-  if (!near) limits.max_step_length = kFreeSubstepTravel;
+  if (!near) limits.max_step_length = kFreeStepLength;
   const double travel = kSpareTravel * std::min(speed, options_.max_free_speed) * kTickSeconds;
   limits.max_steps =
-      std::max(kImpactSubsteps, static_cast<std::uint32_t>(std::ceil(travel / limits.max_step_length)));
+      std::max(kMinImpactSteps, static_cast<std::uint32_t>(std::ceil(travel / limits.max_step_length)));
 }
 
 /// The velocity of a free body is its displacement per tick. Bodies pushed out of an overlap must not gain

@@ -40,11 +40,11 @@ void Environment::sumForces() noexcept {
       engine.forces[object].clear(engine.couplingCell(hand.object, id));
     }
   }
-  writeWeights();
+  writeGravity();
   for (ForceBuffer& buffer : engine.forces) buffer.expire(tick_);
 }
 
-void Environment::writeWeights() noexcept {
+void Environment::writeGravity() noexcept {
   Engine& engine = *engine_;
   for (std::uint32_t i = 0; i < objects_.size(); ++i) {
     if (!engine.bodies[i]) continue;
@@ -119,10 +119,10 @@ void Environment::countWork() noexcept {
     work_.points_visited += engine.pairs[engine.due[slot]].counts().points_visited;
   }
   for (const IslandWork::Island& island : engine.islands.islands()) {
-    work_.substeps += island.report.steps;
+    work_.steps += island.report.steps;
     work_.iterations += island.report.iterations;
     work_.points_visited += island.report.points_visited;
-    work_.conflicting |= island.report.infeasible;
+    work_.infeasible |= island.report.infeasible;
   }
 }
 

@@ -28,18 +28,20 @@ struct ForceCell {
 /// for contributions of clients, which are validated, clamped, fade linearly with age and expire. Cells are
 /// summed in cell order, not in order of arrival: the total is bit-equal for any number of workers. The own
 /// cells in use are listed, so a sum costs only those. There is one total per tick, after all sources are
-/// written: the paper's sending policies (§3.2, iv) have no place here (DECISIONS.md).
+/// written: the paper's sending policies (§3.2, iv) have no place here (D-041).
 ///
 /// Threads: one writer per own cell, contributions from one thread; total() after the tick's barrier.
 /// Real-time: everything but the constructor.
 class ForceBuffer {
  public:
   static constexpr std::size_t kContributions = 8;
-  /// Limits of a contribution: about the peak output of a haptic device.
+  /// Limits of a contribution, the only ones that there are: about the peak output of a haptic device. What
+  /// is above is clamped, not refused.
   static constexpr double kMaxContributedForce = 50.0;  ///< [N]
   static constexpr double kMaxContributedTorque = 5.0;  ///< [Nm]
-  /// [ticks] a contribution ends at most this long after its last update.
-  static constexpr std::uint32_t kMaxLifetimeTicks = 200;
+  /// [ticks] a contribution ends at most this long after its last update, so that of a source that has ended
+  /// nothing stays.
+  static constexpr std::uint32_t kMaxLifetimeTicks = 100;
 
   explicit ForceBuffer(std::size_t own_cells);
 

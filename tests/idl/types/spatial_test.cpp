@@ -24,6 +24,13 @@ class Spatial : public ::testing::Test {
   std::mt19937_64 random_{1};
 };
 
+TEST_F(Spatial, ClampNormKeepsTheDirectionAndBoundsTheNorm) {
+  EXPECT_EQ(clampNorm({3.0, 0.0, 4.0}, 5.0), Vector3(3.0, 0.0, 4.0));
+  EXPECT_TRUE(clampNorm({3.0, 0.0, -4.0}, 2.5).isApprox(Vector3(1.5, 0.0, -2.0)));
+  EXPECT_EQ(clampNorm({3.0, 0.0, 4.0}, 0.0), Vector3::Zero());
+  EXPECT_EQ(clampNorm(Vector3::Zero(), 0.0), Vector3::Zero());
+}
+
 TEST_F(Spatial, AngleOfIsTheArcTangent) {
   for (int i = 0; i < 10'000; ++i) {
     const double y = std::abs(number(10.0));

@@ -303,7 +303,7 @@ const BadInput kBadInputs[] = {
     {"target_without_object", "    object: part\n", "", "18", "no 'object' to bring there"},
     {"hidden", "touch: part\n    for: 0.1 s", "object: part", "13", "'part' is hidden"},
     {"hand_of_other", "hands: {right: part}", "hands: {right: cube}", "17",
-     "is the own object of hand 'instructor'"},
+     "is the default object of hand 'instructor'"},
     {"approach", "direction: [0, 0, -1]", "direction: [0, 0, 0]", "20", "has length 0"},
     {"timeout_word", "timeout: 2 s", "timeout: 2 s\n    on_timeout: retry", "23",
      "expected 'fail' or 'skip'"},

@@ -276,7 +276,7 @@ TEST(Environment, AContributionPushesAHeldObjectAgainstItsCoupling) {
   Environment environment(small.build(), {});
   test::activateHand(environment, hand, Vector3::Zero());
   for (int tick = 0; tick < 50; ++tick) {
-    environment.contribute(part, 1, {Vector3(5.0, 0.0, 0.0), Vector3::Zero()}, 200);
+    environment.contribute(part, 1, {Vector3(5.0, 0.0, 0.0), Vector3::Zero()}, 100);
     environment.step();
   }
   EXPECT_NEAR(environment.objects()[part.value].X_WO.translation().x(), 5.0 / kStiffness, 0.05e-3);
