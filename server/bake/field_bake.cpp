@@ -13,8 +13,10 @@
 #include "server/bake/parallel.h"
 #include "server/bake/refined_bricks.h"
 #include "server/bake/slope_limit.h"
+#include "server/bake/thin_bricks.h"
 #include "server/bake/triangle_tree.h"
 #include "server/structures/field_builder.h"
+#include "server/structures/structure_checks.h"
 
 namespace tenon::bake {
 
@@ -22,13 +24,7 @@ namespace {
 
 using Cell = BrickLevel::Cell;
 using Entry = structures::DistanceField::Entry;
-constexpr double kMaxBricks = 40e6;  // 250 MB of index, bounds and lists
 constexpr int kCentreSample = (4 * BrickLevel::kSide + 4) * BrickLevel::kSide + 4;
-
-tl::unexpected<Error> needsTooMuchMemory(double voxel) {
-  return fail("voxels of " + std::to_string(voxel * 1e3) +
-              " mm need more than 3 GB for this mesh; choose larger voxels");
-}
 
 /// Resamples inside samples as distances to the exposed surface only, and sets signs. `hidden` are the
 /// triangles that are not exposed, or not entirely: only a sample with one of them at its distance changes.
@@ -168,29 +164,36 @@ structures::FieldStorage assemble(structures::FieldStorage storage, const BrickL
 }  // namespace
 
 Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, const BakeOptions& options,
-                             ParallelWork& work) {
+                             ParallelWork& work, const FieldLimits& limits) {
+  if (const std::string why = whyTooLarge(triangles, options, limits); !why.empty()) return fail(why);
+  const auto tooMany = [&options](std::size_t bricks, std::size_t limit, bool refined) {
+    return fail(tooManyBricks(static_cast<double>(bricks), limit, refined, options));
+  };
   Eigen::AlignedBox3d box;
   for (const structures::Triangle& t : triangles) box.extend(structures::boxOf(t));
-  const Vector3 bricks = (box.sizes() / (options.voxel * BrickLevel::kVoxels)).array().ceil() + 3.0;
-  if (!(bricks.prod() <= kMaxBricks)) return needsTooMuchMemory(options.voxel);
-
   structures::FieldStorage storage = structures::makeGrid(box, options.voxel);
   const auto& counts = storage.layout.bricks;
+  if (*std::max_element(counts.begin(), counts.end()) > structures::DistanceField::kMaxBricksPerAxis)
+    return fail("the mesh is longer than 8,000,000 voxels; choose larger ones");
   BrickLevel coarse(storage.layout.p_MoFo_M, options.voxel, {counts[0], counts[1], counts[2]});
   work.stage("building the triangle tree", 0.05, 0.15);
   const double longest = 2.0 * BrickLevel::kVoxels * options.voxel;
   const TriangleTree tree(triangles, longest);
   work.stage("measuring distances", 0.15, 0.45);
-  if (!coarse.sampleDistances(tree, work)) return needsTooMuchMemory(options.voxel);
+  const std::size_t sampled = coarse.sampleDistances(tree, limits.level_bricks, work);
+  if (sampled > limits.level_bricks) return tooMany(sampled, limits.level_bricks, false);
   work.stage("flood fill from outside", 0.45, 0.55);
   if (!work.cancelled()) findOutside(coarse, nullptr, tree, work);
 
   std::unique_ptr<BrickLevel> fine;
-  const RefinedBricks refined = bricksToRefine(coarse, options);
+  RefinedBricks refined;
+  if (options.refinement > 1 && !options.refine.empty() && !work.cancelled())
+    refined = bricksToRefine(coarse, options, thinBricks(coarse, kSurelyThin, work));
   if (!refined.bricks.empty() && !work.cancelled()) {
     work.stage("refining", 0.55, 0.65);
     fine = std::make_unique<BrickLevel>(coarse, options.refinement, refined.bricks, refined.deep);
-    if (!fine->sampleDistances(tree, work)) return needsTooMuchMemory(options.voxel / options.refinement);
+    const std::size_t sampled_fine = fine->sampleDistances(tree, limits.level_bricks, work);
+    if (sampled_fine > limits.level_bricks) return tooMany(sampled_fine, limits.level_bricks, true);
     if (!work.cancelled()) findOutside(*fine, &coarse, tree, work);
     if (!work.cancelled()) adoptFineSigns(coarse, *fine, work);
   }
@@ -219,11 +222,16 @@ Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, co
     finishSamples(*fine, *exposed, *hidden_tree, work);
     limitSlope(*fine, &coarse, work);
   }
+  baked.thin = thinBricks(coarse, kMaybeThin, work);
   if (work.cancelled()) return fail("cancelled");
 
   storage.layout.refinement = fine ? options.refinement : 1;
   work.stage("assembling the field", 0.85, 0.88);
   baked.storage = assemble(std::move(storage), coarse, fine.get(), refined.bricks, work);
+  const std::size_t stored = baked.storage.samples.size() / BrickLevel::kSamples;
+  if (stored > limits.field_bricks) return tooMany(stored, limits.field_bricks, fine != nullptr);
+  if (const auto problem = structures::problemOf(structures::viewOf(baked.storage).layout()))
+    return fail("the field " + *problem + "; choose larger voxels");
   return baked;
 }
 

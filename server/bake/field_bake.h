@@ -5,6 +5,8 @@
 
 #include "idl/types/result.h"
 #include "server/bake/bake.h"
+#include "server/bake/field_size.h"
+#include "server/bake/thin_bricks.h"
 #include "server/structures/field_builder.h"
 #include "server/structures/triangle.h"
 
@@ -16,11 +18,15 @@ struct BakedField {
   structures::FieldStorage storage;           ///< of the field, without dilation
   std::vector<structures::Triangle> surface;  ///< the exposed part of the triangles
   std::size_t hidden_triangles = 0;           ///< entirely inside the solid
+  BrickMarks thin;                            ///< where material may be thin
 };
 
 /// The signed distance field of a triangle soup: magnitudes are exact in the band, signs come from a flood
-/// fill from outside. An error when it needs more than 3 GB.
+/// fill from outside. An error when it exceeds the limits (with its size) or is cancelled.
+///
+/// Threads: one caller; uses several threads inside.
 [[nodiscard]] Result<BakedField> bakeField(std::span<const structures::Triangle> triangles,
-                                           const BakeOptions& options, ParallelWork& work);
+                                           const BakeOptions& options, ParallelWork& work,
+                                           const FieldLimits& limits = {});
 
 }  // namespace tenon::bake

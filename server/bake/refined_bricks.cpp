@@ -1,8 +1,6 @@
 #include "server/bake/refined_bricks.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 
 namespace tenon::bake {
 
@@ -21,38 +19,9 @@ bool hasSurface(const BrickLevel& coarse, std::size_t node) {
   return *std::min_element(s, s + BrickLevel::kSamples) <= structures::DistanceField::kQuantaPerVoxel;
 }
 
-/// Whether a sample at the surface has none well inside the material within two voxels. A convex edge has
-/// one.
-bool isThin(const BrickLevel& coarse, std::size_t node) {
-  constexpr int kReach = 2;
-  constexpr int kPatch = BrickLevel::kSide + 2 * kReach;
-  constexpr double kInside = 0.75;  // [voxels]
-  std::array<std::uint8_t, static_cast<std::size_t>(kPatch) * kPatch * kPatch> inside{};
-  std::vector<Cell> at_surface;
-  coarse.visitAround(node, kReach, kReach + 1, [&](const Cell& offset, const BrickLevel::Point& point) {
-    const Cell at = offset + Cell::Constant(kReach);
-    const auto i = static_cast<std::size_t>((at.z() * kPatch + at.y()) * kPatch + at.x());
-    inside[i] = point.known && !point.free && point.distance >= kInside;
-    const bool in_brick = (offset.array() >= 0).all() && (offset.array() < BrickLevel::kSide).all();
-    if (in_brick && point.distance <= structures::DistanceField::kHalfDiagonal) at_surface.push_back(at);
-  });
-  return std::any_of(at_surface.begin(), at_surface.end(), [&inside](const Cell& at) {
-    for (int z = -kReach; z <= kReach; ++z) {
-      for (int y = -kReach; y <= kReach; ++y) {
-        for (int x = -kReach; x <= kReach; ++x) {
-          const Cell near = at + Cell(x, y, z);
-          if (inside[static_cast<std::size_t>((near.z() * kPatch + near.y()) * kPatch + near.x())] != 0)
-            return false;
-        }
-      }
-    }
-    return true;
-  });
-}
-
 }  // namespace
 
-RefinedBricks bricksToRefine(const BrickLevel& coarse, const BakeOptions& options) {
+RefinedBricks bricksToRefine(const BrickLevel& coarse, const BakeOptions& options, const BrickMarks& thin) {
   RefinedBricks refined;
   if (options.refinement <= 1) return refined;
   enum Mark : std::uint8_t { kNot, kWanted, kDeep };
@@ -72,7 +41,7 @@ RefinedBricks bricksToRefine(const BrickLevel& coarse, const BakeOptions& option
           coarse.nodeAt(coarse.brickOf(node) + Cell(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
       if (next < 0) continue;
       const auto neighbour = static_cast<std::size_t>(next);
-      if (marks[neighbour] == kNot && hasSurface(coarse, neighbour) && isThin(coarse, neighbour))
+      if (marks[neighbour] == kNot && thin[neighbour] && hasSurface(coarse, neighbour))
         marks[neighbour] = kDeep;
     }
   }

@@ -5,6 +5,7 @@
 
 #include "server/bake/bake.h"
 #include "server/bake/brick_level.h"
+#include "server/bake/thin_bricks.h"
 
 namespace tenon::bake {
 
@@ -16,7 +17,8 @@ struct RefinedBricks {
   std::vector<std::uint8_t> deep;
 };
 
-/// Bricks with surface that a box of `options` intersects, and those next to them where material is thin.
-[[nodiscard]] RefinedBricks bricksToRefine(const BrickLevel& coarse, const BakeOptions& options);
+/// Bricks with surface that a box of `options` intersects, and those next to them where material is `thin`.
+[[nodiscard]] RefinedBricks bricksToRefine(const BrickLevel& coarse, const BakeOptions& options,
+                                           const BrickMarks& thin);
 
 }  // namespace tenon::bake

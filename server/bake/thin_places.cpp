@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "server/bake/parallel.h"
+#include "server/bake/triangle_pieces.h"
 
 namespace tenon::bake {
 
@@ -42,7 +43,7 @@ double dilationFor(double outside, double voxel) {
 bool isAtSolid(const Field& field, Vector3 p_MP, const Vector3& normal_M, double voxel) {
   constexpr double kInside = -0.75;
   constexpr double kStep = 0.4;
-  constexpr int kSteps = 4;
+  constexpr int kSteps = 5;
   for (int i = 0; i <= kSteps; ++i) {
     const structures::FieldSample here = field.sample(p_MP);
     if (here.distance <= kInside * voxel) return true;
@@ -57,33 +58,13 @@ bool isAtSolid(const Field& field, Vector3 p_MP, const Vector3& normal_M, double
   return false;
 }
 
-/// Calls visit(point, area) for pieces of a triangle that are about `fraction` [-] of a voxel long.
-template <typename Visit>
-void forEachPiece(const Field& field, const structures::Triangle& t, double fraction, Visit&& visit) {
-  std::size_t a = 0;
-  const double length = structures::longestEdge(t, a);
-  if (length <= fraction * field.voxel()) {
-    const Vector3 centre = (t[0] + t[1] + t[2]) / 3.0;
-    if (field.layout().refinement == 1 || length <= fraction * field.voxelAt(centre)) {
-      visit(centre, structures::areaOf(t));
-      return;
-    }
-  }
-  const std::size_t b = (a + 1) % 3;
-  const Vector3 middle = (t[a] + t[b]) / 2;
-  structures::Triangle first = t;
-  structures::Triangle second = t;
-  first[b] = middle;
-  second[a] = middle;
-  forEachPiece(field, first, fraction, visit);
-  forEachPiece(field, second, fraction, visit);
-}
-
 class ThinPlaceFinder {
  public:
-  ThinPlaceFinder(const Field& field, std::span<const structures::Triangle> surface, ParallelWork& work)
+  ThinPlaceFinder(const Field& field, std::span<const structures::Triangle> surface, const BrickMarks& thin,
+                  ParallelWork& work)
       : field_(field),
         surface_(surface),
+        thin_(thin),
         work_(work),
         bricks_(field.layout().bricks),
         needed_(std::make_unique<std::atomic<float>[]>(field.layout().far.size())) {}
@@ -91,7 +72,7 @@ class ThinPlaceFinder {
   /// The dilation that each brick needs.
   void measure() {
     const std::vector<double> areas =
-        forEachThinPoint(0.5, [this](const Vector3& p, double outside, double voxel) {
+        forEachThinPoint(0.8, [this](const Vector3& p, double outside, double voxel) {
           raise(needed_[brickAt(p)], static_cast<float>(dilationFor(outside, voxel)));
           return true;
         });
@@ -110,7 +91,7 @@ class ThinPlaceFinder {
     Field::Layout layout = field_.layout();
     layout.dilations = places.dilations;
     const Field offsets(layout, nullptr);
-    for (const double area : forEachThinPoint(0.7, [&](const Vector3&p, double outside, double) {
+    for (const double area : forEachThinPoint(1.0, [&](const Vector3&p, double outside, double) {
            return outside - offsets.dilationAt(p) > kOpen;
          }))
       places.open_area += area;
@@ -130,8 +111,14 @@ class ThinPlaceFinder {
       for (std::size_t i = chunk * kChunk; i < end; ++i) {
         const structures::Triangle& t = surface_[i];
         const Vector3 normal_M = (t[1] - t[0]).cross(t[2] - t[0]).normalized();
-        if (!normal_M.allFinite()) continue;
-        forEachPiece(field_, t, fraction, [&](const Vector3& p, double area) {
+        if (!normal_M.allFinite() || !thin_.anyIn(structures::boxOf(t))) continue;
+        const auto fits = [&](const Vector3& centre, double length) {
+          if (length > fraction * field_.voxel()) return false;
+          return !thin_.at(centre) || field_.layout().refinement == 1 ||
+                 length <= fraction * field_.voxelAt(centre);
+        };
+        forEachPiece(t, fits, [&](const Vector3& p, double area) {
+          if (!thin_.at(p)) return;
           const double outside = field_.sample(p).distance;
           if (outside <= noise(field_.voxel())) {
             if (field_.layout().refinement == 1 || outside <= noise(field_.voxelAt(p))) return;
@@ -210,6 +197,7 @@ class ThinPlaceFinder {
 
   const Field& field_;
   const std::span<const structures::Triangle> surface_;
+  const BrickMarks& thin_;
   ParallelWork& work_;
   const std::array<std::int32_t, 3> bricks_;
   const std::unique_ptr<std::atomic<float>[]> needed_;  // [m] by coarse brick
@@ -219,8 +207,9 @@ class ThinPlaceFinder {
 }  // namespace
 
 ThinPlaces findThinPlaces(const structures::DistanceField& field,
-                          std::span<const structures::Triangle> surface, ParallelWork& work) {
-  ThinPlaceFinder finder(field, surface, work);
+                          std::span<const structures::Triangle> surface, const BrickMarks& thin,
+                          ParallelWork& work) {
+  ThinPlaceFinder finder(field, surface, thin, work);
   finder.measure();
   return finder.result();
 }

@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "server/bake/thin_bricks.h"
 #include "server/structures/distance_field.h"
 #include "server/structures/triangle.h"
 
@@ -24,7 +25,9 @@ struct ThinPlaces {
 /// makes the zero level set as flat as the wall (see dilationFor in the .cpp); a corner gets the largest of
 /// its eight bricks. It changes by at most 0.2 mm a mm. A point whose neighbourhood has an inside is at a
 /// convex edge of a solid and does not count: offset surfaces are for sheets alone (Xu and Barbic 2014).
+/// Only coarse bricks marked in `thin` are measured.
 [[nodiscard]] ThinPlaces findThinPlaces(const structures::DistanceField& field,
-                                        std::span<const structures::Triangle> surface, ParallelWork& work);
+                                        std::span<const structures::Triangle> surface, const BrickMarks& thin,
+                                        ParallelWork& work);
 
 }  // namespace tenon::bake

@@ -52,8 +52,9 @@ void CollPair::reset() noexcept {
 }
 
 void CollPair::query(const Pose& X_WA, const Pose& X_WB, double margin, std::uint32_t budget,
-                     std::span<const std::uint32_t> first) noexcept {
-  collision::queryPair({shell_A_, field_B_, X_WA, X_WB, margin, levels_, budget, first}, list_->query);
+                     std::span<const std::uint32_t> priority_points) noexcept {
+  collision::queryPair({shell_A_, field_B_, X_WA, X_WB, margin, levels_, budget, priority_points},
+                       list_->query);
   std::fill_n(list_->multipliers.begin(), list_->query.contacts.size(), 0.0);
   list_->F_Ao_W = Wrench{};
   list_->traversal = collision::TraversalState{};
@@ -139,15 +140,9 @@ bool CollPair::nextLevelFits(const WorkLimits& limits, std::uint32_t budget) con
 
 bool CollPair::isValid(const collision::IslandPairResult& list) const noexcept {
   const collision::ContactList& contacts = list.query.contacts;
-  return possible_ && list.secondary_planes <= contacts.size() && list.traversal.X_WA.isFinite() &&
-         list.traversal.X_WB.isFinite() &&
-         std::all_of(list.multipliers.begin(),
-                     list.multipliers.begin() + static_cast<std::ptrdiff_t>(contacts.size()),
-                     [](double force) { return std::isfinite(force); }) &&
-         std::all_of(contacts.begin(), contacts.end(), [this](const collision::Contact& c) {
-           return c.point < shell_A_->points().size() && c.p_WP.allFinite() && c.n_W.allFinite() &&
-                  std::isfinite(c.gap);
-         });
+  return possible_ && list.secondary_planes <= contacts.size() &&
+         std::all_of(contacts.begin(), contacts.end(),
+                     [this](const collision::Contact& c) { return c.point < shell_A_->points().size(); });
 }
 
 Tick CollPair::ticksToClose(double distance, double closing_speed) noexcept {

@@ -141,10 +141,10 @@ class Dilator {
 
 }  // namespace
 
-DistanceField makeDilatedField(FieldStorage storage, std::vector<float> dilations) {
+DistanceField makeDilatedField(FieldStorage storage, std::span<const float> dilations) {
   const bool none = std::all_of(dilations.begin(), dilations.end(), [](float d) { return d == 0.0F; });
   if (none) return makeField(std::move(storage));
-  storage.dilations = std::move(dilations);
+  storage.dilations.assign(dilations.begin(), dilations.end());
   Dilator(storage).run();
   return makeField(std::move(storage));
 }

@@ -2,19 +2,21 @@
 
 #include <functional>
 #include <span>
-#include <vector>
 
 #include "server/structures/distance_field.h"
+#include "server/structures/huge_pages.h"
 
 namespace tenon::structures {
 
 /// The arrays of a field under construction.
+///
+/// Threads: one; the functions below are pure. Real-time: no.
 struct FieldStorage {
   DistanceField::Layout layout;  ///< makeField sets its spans
-  std::vector<DistanceField::Entry> index;
-  std::vector<std::int16_t> samples;
-  std::vector<std::int16_t> far;
-  std::vector<float> dilations;
+  HugeVector<DistanceField::Entry> index;
+  HugeVector<std::int16_t> samples;
+  HugeVector<std::int16_t> far;
+  HugeVector<float> dilations;
 };
 
 /// A field on arrays that the caller keeps as they are while it is used.
@@ -26,7 +28,7 @@ struct FieldStorage {
 /// A field that owns the given arrays, with `dilations` [m] (see DistanceField::Layout) taken from its
 /// samples, which have none yet. A child of a refined brick whose samples do not reach that far is dropped:
 /// its coarse samples are used.
-[[nodiscard]] DistanceField makeDilatedField(FieldStorage storage, std::vector<float> dilations);
+[[nodiscard]] DistanceField makeDilatedField(FieldStorage storage, std::span<const float> dilations);
 
 /// A grid of far-outside bricks with edge `voxel` [m] around `surface_box_M`, with one brick of margin on
 /// every side.

@@ -2,8 +2,6 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <limits>
-#include <optional>
 #include <type_traits>
 #include <vector>
 
@@ -13,7 +11,11 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include "idl/types/output_files.h"
+#include "server/structures/field_builder.h"
 #include "server/structures/haptic_structures.h"
+#include "server/structures/shell_builder.h"
+#include "server/structures/structure_checks.h"
 
 namespace tenon::structures {
 
@@ -29,7 +31,6 @@ enum FileSection : std::size_t {
   kIndex,
   kSamples,
   kFar,
-  kDilations,
   kPoints,
   kLeaves,
   kClusters,
@@ -38,12 +39,12 @@ enum FileSection : std::size_t {
   kContentHash,
   kNotes,
   kMeshes,
+  kDilations,
   kSections
 };
 constexpr std::array<std::size_t, kSections> kElementBytes{sizeof(DistanceField::Entry),
                                                            sizeof(std::int16_t),
                                                            sizeof(std::int16_t),
-                                                           sizeof(float),
                                                            sizeof(ShellPoint),
                                                            sizeof(ShellSphere),
                                                            sizeof(ShellSphere),
@@ -51,7 +52,8 @@ constexpr std::array<std::size_t, kSections> kElementBytes{sizeof(DistanceField:
                                                            1,
                                                            1,
                                                            1,
-                                                           1};
+                                                           1,
+                                                           sizeof(float)};
 
 struct FileHeader {
   std::array<char, 8> magic = kMagic;
@@ -79,7 +81,9 @@ std::string meshesFrom(const std::filesystem::path& file, const StructureInfo& i
   const auto folder = std::filesystem::weakly_canonical(std::filesystem::absolute(file), error).parent_path();
   std::string lines;
   for (const std::filesystem::path& mesh : info.meshes) {
-    const auto whole = std::filesystem::weakly_canonical(std::filesystem::absolute(mesh), error);
+    // a mesh that is a link keeps its own name: files that it refers to may be beside the link
+    const auto named = std::filesystem::absolute(mesh).lexically_normal();
+    const auto whole = std::filesystem::weakly_canonical(named.parent_path(), error) / named.filename();
     lines += whole.lexically_relative(folder).generic_string() + "\n";
   }
   return lines;
@@ -102,9 +106,9 @@ std::array<std::span<const std::byte>, kSections> sectionsOf(const HapticStructu
   const DistanceField::Layout& field = structures.field.layout();
   const Pointshell& shell = structures.shell;
   const StructureInfo& info = structures.info;
-  return {bytes(field.index),    bytes(field.samples),     bytes(field.far),        bytes(field.dilations),
-          bytes(shell.points()), bytes(shell.leaves()),    bytes(shell.clusters()), bytes(shell.levels()),
-          bytes(info.source),    bytes(info.content_hash), bytes(info.notes),       bytes(meshes)};
+  return {bytes(field.index),       bytes(field.samples),    bytes(field.far),      bytes(shell.points()),
+          bytes(shell.leaves()),    bytes(shell.clusters()), bytes(shell.levels()), bytes(info.source),
+          bytes(info.content_hash), bytes(info.notes),       bytes(meshes),         bytes(field.dilations)};
 }
 
 FileHeader headerOf(const HapticStructures& structures) {
@@ -176,6 +180,14 @@ std::span<const T> section(std::span<const std::byte> file, const FileHeader& he
   return {reinterpret_cast<const T*>(file.data() + header.first[which]), header.count[which]};
 }
 
+/// Copies a section: an array of its own, in huge pages, that no other process can change or cut off.
+template <typename T>
+void copySection(std::span<const std::byte> file, const FileHeader& header, FileSection which,
+                 HugeVector<T>& to) {
+  const auto elements = section<T>(file, header, which);
+  to.assign(elements.begin(), elements.end());
+}
+
 std::string text(std::span<const std::byte> file, const FileHeader& header, FileSection which) {
   const auto letters = section<char>(file, header, which);
   return {letters.begin(), letters.end()};
@@ -189,92 +201,11 @@ bool sectionsFit(const FileHeader& header) {
   return true;
 }
 
-/// Whether the dilations are of every brick's corners, none, or as large as a thin wall needs.
-bool dilationsAreValid(const DistanceField::Layout& field) {
-  std::uint64_t corners = 1;
-  for (const std::int32_t count : field.bricks) corners *= static_cast<std::uint64_t>(count) + 1;
-  if (!field.dilations.empty() && field.dilations.size() != corners) return false;
-  if (!(field.dilation >= 0.0 && field.dilation <= 2.0 * field.voxel)) return false;
-  if (!(field.slope >= 1.0 && field.slope <= 1.5)) return false;
-  return std::all_of(field.dilations.begin(), field.dilations.end(), [&field](float dilation) {
-    return dilation >= 0.0F && static_cast<double>(dilation) <= field.dilation;
-  });
-}
-
-/// Whether all sizes are sensible and every index of the field is within its array.
-bool fieldIsValid(const DistanceField::Layout& field) {
-  if (!(field.voxel > 0.0) || !std::isfinite(field.voxel) || !field.p_MoFo_M.allFinite()) return false;
-  if (!(field.band > 0.0) || !(field.margin >= 0.0) || field.refinement < 1 || field.refinement > 64)
-    return false;
-  std::uint64_t coarse = 1;
-  for (const std::int32_t count : field.bricks) {
-    if (count < 1 || count > 1'000'000) return false;
-    coarse *= static_cast<std::uint64_t>(count);
-  }
-  if (coarse > field.index.size() || field.far.size() != coarse || !dilationsAreValid(field)) return false;
-  if (field.samples.size() % DistanceField::kBrickSamples != 0) return false;
-  // queries gather pairs of numbers at byte offsets of 31 bits
-  constexpr std::size_t kMaxBytes = std::numeric_limits<std::int32_t>::max();
-  if (field.samples.size_bytes() > kMaxBytes || field.far.size_bytes() > kMaxBytes / 2) return false;
-  if (field.far.size() < 2 || field.index.size() > kMaxBytes / 2) return false;
-  const std::size_t bricks = field.samples.size() / DistanceField::kBrickSamples;
-  const auto cubed = static_cast<std::size_t>(field.refinement * field.refinement * field.refinement);
-  for (std::size_t i = 0; i < field.index.size(); ++i) {
-    const DistanceField::Entry entry = field.index[i];
-    if (entry < DistanceField::kFarInside) return false;
-    if (entry < 0) continue;
-    if (entry < DistanceField::kRefined) {
-      if (static_cast<std::size_t>(entry) >= bricks) return false;
-      continue;
-    }
-    const auto children = static_cast<std::size_t>(entry - DistanceField::kRefined);
-    if (i >= coarse || children < coarse || children + cubed >= field.index.size()) return false;
-    const DistanceField::Entry own = field.index[children + cubed];
-    if (own < 0 || own >= DistanceField::kRefined) return false;
-  }
-  return true;
-}
-
-/// Whether `spheres` hold the elements `first` to `first` + `count` - 1 of the next finer list in order and
-/// without gaps, at most `most` each.
-bool tile(std::span<const ShellSphere> spheres, std::uint64_t first, std::uint64_t count,
-          std::uint32_t most) {
-  std::uint64_t next = first;
-  for (const ShellSphere& sphere : spheres) {
-    if (sphere.first != next || sphere.count > most) return false;
-    next += sphere.count;
-  }
-  return next == first + count;
-}
-
-/// What is wrong with a shell, or nothing. Levels, clusters and leaves must tile their points in order: a
-/// query takes a point's leaf and its area of a level by position.
-std::optional<std::string> problemOf(const Pointshell::Layout& shell) {
-  std::uint64_t points = 0;
-  std::uint64_t leaves = 0;
-  std::uint64_t clusters = 0;
-  for (const ShellLevel& level : shell.levels) {
-    if (level.first_point != points || level.first_leaf != leaves || level.first_cluster != clusters)
-      return "its levels do not follow one another";
-    points += level.point_count;
-    leaves += level.leaf_count;
-    clusters += level.cluster_count;
-    if (points > shell.points.size() || leaves > shell.leaves.size() || clusters > shell.clusters.size())
-      return "its levels have an index out of range";
-    if (!tile(shell.leaves.subspan(level.first_leaf, level.leaf_count), level.first_point, level.point_count,
-              Pointshell::kLeafPoints))
-      return "the leaves of a level do not hold each of its points once";
-    if (!tile(shell.clusters.subspan(level.first_cluster, level.cluster_count), level.first_leaf,
-              level.leaf_count, Pointshell::kClusterLeaves))
-      return "the clusters of a level do not hold each of its leaves once";
-  }
-  if (points != shell.points.size() || leaves != shell.leaves.size() || clusters != shell.clusters.size())
-    return "its levels do not hold each point once";
-  const auto finite = [](const ShellPoint& point) {
-    return point.p_MP.allFinite() && point.inward_M.allFinite() && std::isfinite(point.area);
-  };
-  if (!std::all_of(shell.points.begin(), shell.points.end(), finite)) return "a point is not finite";
-  return {};
+bool infoIsFinite(const FileHeader& header) {
+  const auto finite = [](double number) { return std::isfinite(number); };
+  return finite(header.bake_seconds) && finite(header.surface_area) && finite(header.thin_area) &&
+         finite(header.open_area) && finite(header.unit) &&
+         std::all_of(header.box_M.begin(), header.box_M.end(), finite);
 }
 
 Result<FileHeader> readHeader(const std::string& name, std::span<const std::byte> bytes) {
@@ -303,6 +234,13 @@ Result<FileHeader> readHeader(const std::string& name, std::span<const std::byte
 }  // namespace
 
 Result<void> writeStructures(const std::filesystem::path& file, const HapticStructures& structures) {
+  const Pointshell& shell = structures.shell;
+  const auto refused = [&file](const std::string& what) {
+    return fail(file.string() + ": not written, since it could not be read again: its " + what);
+  };
+  if (const auto problem = problemOf(structures.field.layout())) return refused("field " + *problem);
+  if (const auto problem = problemOf({shell.points(), shell.leaves(), shell.clusters(), shell.levels()}))
+    return refused("pointshell " + *problem);
   FileHeader header = headerOf(structures);
   const std::string meshes = meshesFrom(file, structures.info);
   const auto sections = sectionsOf(structures, meshes);
@@ -320,16 +258,18 @@ Result<void> writeStructures(const std::filesystem::path& file, const HapticStru
   }
   header.checksum = checksumOf(header, rest);
 
-  const std::filesystem::path part = file.string() + ".part" + std::to_string(::getpid());
+  const bool in_place = isWrittenInPlace(file);
+  const std::filesystem::path part =
+      in_place ? file : std::filesystem::path(file.string() + ".part" + std::to_string(::getpid()));
   std::ofstream out(part, std::ios::binary | std::ios::trunc);
   out.write(reinterpret_cast<const char*>(&header), sizeof header);
   out.write(reinterpret_cast<const char*>(rest.data()), static_cast<std::streamsize>(rest.size()));
   out.close();
   std::error_code error;
-  if (out) std::filesystem::rename(part, file, error);
+  if (out && !in_place) std::filesystem::rename(part, file, error);
   if (!out || error) {
     std::error_code ignored;
-    std::filesystem::remove(part, ignored);
+    if (!in_place) std::filesystem::remove(part, ignored);
     return fail(file.string() + ": cannot be written" + (error ? ": " + error.message() : std::string{}));
   }
   return {};
@@ -343,30 +283,34 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
   const auto header = readHeader(name, bytes);
   if (!header) return tl::unexpected(header.error());
 
-  DistanceField::Layout field;
-  field.p_MoFo_M = Vector3::Map(header->p_MoFo_M.data());
-  field.voxel = header->voxel;
-  field.band = header->band;
-  field.margin = header->margin;
-  field.dilation = header->dilation;
-  field.slope = header->slope;
-  field.bricks = header->bricks;
-  field.refinement = header->refinement;
-  field.index = section<DistanceField::Entry>(bytes, *header, kIndex);
-  field.samples = section<std::int16_t>(bytes, *header, kSamples);
-  field.far = section<std::int16_t>(bytes, *header, kFar);
-  field.dilations = section<float>(bytes, *header, kDilations);
-  const Pointshell::Layout shell{
-      section<ShellPoint>(bytes, *header, kPoints), section<ShellSphere>(bytes, *header, kLeaves),
-      section<ShellSphere>(bytes, *header, kClusters), section<ShellLevel>(bytes, *header, kLevels)};
-  if (!field.index.empty() && !fieldIsValid(field))
-    return fail(name + ": its field has an index out of range; bake it again");
-  if (const auto problem = problemOf(shell))
-    return fail(name + ": its pointshell is damaged, " + *problem + "; bake it again");
-
+  FieldStorage field;
+  field.layout.p_MoFo_M = Vector3::Map(header->p_MoFo_M.data());
+  field.layout.voxel = header->voxel;
+  field.layout.band = header->band;
+  field.layout.margin = header->margin;
+  field.layout.dilation = header->dilation;
+  field.layout.slope = header->slope;
+  field.layout.bricks = header->bricks;
+  field.layout.refinement = header->refinement;
+  copySection(bytes, *header, kIndex, field.index);
+  copySection(bytes, *header, kSamples, field.samples);
+  copySection(bytes, *header, kFar, field.far);
+  copySection(bytes, *header, kDilations, field.dilations);
+  ShellStorage shell;
+  copySection(bytes, *header, kPoints, shell.points);
+  copySection(bytes, *header, kLeaves, shell.leaves);
+  copySection(bytes, *header, kClusters, shell.clusters);
+  copySection(bytes, *header, kLevels, shell.levels);
+  const auto damaged = [&name](const std::string& what) {
+    return fail(name + ": its " + what + "; bake it again");
+  };
+  if (const auto problem = problemOf(shell.layout())) return damaged("pointshell " + *problem);
+  if (!infoIsFinite(*header)) return damaged("header has a number that is not finite");
   auto structures = std::make_shared<HapticStructures>();
-  if (!field.index.empty()) structures->field = DistanceField(field, mapping);
-  structures->shell = Pointshell(shell, mapping);
+  const bool has_field = !field.index.empty() || !field.samples.empty() || !field.far.empty();
+  if (has_field) structures->field = makeField(std::move(field));
+  if (const auto problem = problemOf(structures->field.layout())) return damaged("field " + *problem);
+  structures->shell = makeShell(std::move(shell));
   StructureInfo& info = structures->info;
   info.source = text(bytes, *header, kSource);
   info.content_hash = text(bytes, *header, kContentHash);

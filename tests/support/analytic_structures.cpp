@@ -156,9 +156,8 @@ StructuresPtr sheetStructures(double edge, double thickness, double voxel, doubl
   return analyticStructures(boxAt(centre, size), boxAbout(centre, size), voxel);
 }
 
-StructuresPtr dilated(const StructuresPtr& structures, double dilation) {
-  if (dilation == 0.0) return structures;
-  const structures::DistanceField::Layout& layout = structures->field.layout();
+structures::DistanceField dilated(const structures::DistanceField& field, double dilation) {
+  const structures::DistanceField::Layout& layout = field.layout();
   structures::FieldStorage storage{layout,
                                    {layout.index.begin(), layout.index.end()},
                                    {layout.samples.begin(), layout.samples.end()},
@@ -166,9 +165,14 @@ StructuresPtr dilated(const StructuresPtr& structures, double dilation) {
                                    {}};
   std::size_t corners = 1;
   for (const std::int32_t count : layout.bricks) corners *= static_cast<std::size_t>(count) + 1;
+  return structures::makeDilatedField(std::move(storage),
+                                      std::vector<float>(corners, static_cast<float>(dilation)));
+}
+
+StructuresPtr dilated(const StructuresPtr& structures, double dilation) {
+  if (dilation == 0.0) return structures;
   auto result = std::make_shared<structures::HapticStructures>(*structures);
-  result->field = structures::makeDilatedField(std::move(storage),
-                                               std::vector<float>(corners, static_cast<float>(dilation)));
+  result->field = dilated(structures->field, dilation);
   return result;
 }
 

@@ -54,6 +54,7 @@ using StructuresPtr = std::shared_ptr<const structures::HapticStructures>;
 /// The same with its surface moved outwards by `dilation` [m] everywhere, as the bake does it where walls are
 /// thin.
 [[nodiscard]] StructuresPtr dilated(const StructuresPtr& structures, double dilation);
+[[nodiscard]] structures::DistanceField dilated(const structures::DistanceField& field, double dilation);
 
 /// A block with a rectangular hole of size `hole` down from z = 0, open above, and `wall` [m] of material
 /// around and below it, with `voxel` [m]. Its pointshell is the hole's rim, with `rim_spacing` [m] of points:

@@ -160,7 +160,7 @@ TEST(FieldBake, OutsideOfAUnionIsExact) {
 TEST(FieldBake, BothSidesOfASheetAreOutside) {
   const structures::HapticStructures structures = baked(test::sheetMesh(0.05, 0.0011, 10));
   for (const Vector3& p : randomPointsIn({Vector3(-0.06, -0.06, -0.01), Vector3(0.06, 0.06, 0.01)}, 5'000)) {
-    EXPECT_GE(structures.field.sample(p).distance, 0.0);
+    EXPECT_GE(structures.field.undilated(p).distance, -2e-6) << "but for rounding";
   }
   EXPECT_NE(structures.info.notes.find("1 of 1 connected parts have no inside"), std::string::npos)
       << structures.info.notes;
@@ -242,7 +242,9 @@ TEST(FieldBake, EverySampleIsTheDistanceToTheNearestTriangle) {
           const Vector3 p = layout.p_MoFo_M + (Vector3(x, y, z) * 8.0 + in_brick) * layout.voxel;
           const double exact =
               std::min(truth.nearest(p).distance, structures::DistanceField::kClampVoxels * layout.voxel);
-          ASSERT_NEAR(std::abs(samples[k]) * quantum, exact, 0.51 * quantum) << p.transpose();
+          // the sliver is thin: its dilation is in the samples, rounded with them
+          const double distance = samples[k] * quantum + structures.field.dilationAt(p);
+          ASSERT_NEAR(std::abs(distance), exact, 1.02 * quantum) << p.transpose();
           ++compared;
         }
       }
@@ -263,7 +265,7 @@ TEST(FieldBake, RefusesVoxelsThatWouldNeedATerabyte) {
   options.voxel = 1e-6;
   const auto structures = bake(test::ballMesh(1.0, 3), options);
   ASSERT_FALSE(structures);
-  EXPECT_NE(structures.error().what.find("3 GB"), std::string::npos) << structures.error().what;
+  EXPECT_NE(structures.error().what.find("TB"), std::string::npos) << structures.error().what;
 }
 
 TEST(FieldBake, RefusesEmptyAndInvalidMeshes) {
