@@ -14,13 +14,14 @@ namespace tenon::simulated_person {
 /// Mounts the object that the hand holds.
 struct MountTask {
   ObjectId object;
-  Pose X_WG;                             ///< target pose (the ghost)
-  Vector3 approach_W = Vector3::Zero();  ///< unit direction of insertion; zero: any
-  double approach_distance = 0.0;        ///< [m] of the pose before the target where insertion begins
-  double tolerance = 0.002;              ///< [m] of the target position
-  Vector3 size = Vector3::Zero();        ///< [m] of the object's bounding box, in its own frame
-  Vector3 centre = Vector3::Zero();      ///< [m] of that box, likewise
-  ObjectId assistant;                    ///< the instructor's pointer; invalid when there is none
+  Pose X_WG;                                   ///< target pose (the ghost)
+  Vector3 approach_W = Vector3::Zero();        ///< unit direction of insertion; zero: any
+  double approach_distance = 0.0;              ///< [m] of the pose before the target where insertion begins
+  double tolerance = 0.002;                    ///< [m] of the target position
+  Vector3 size = Vector3::Zero();              ///< [m] of the object's bounding box, in its own frame
+  Vector3 centre = Vector3::Zero();            ///< [m] of that box, likewise
+  ObjectId assistant;                          ///< the instructor's pointer; invalid when there is none
+  Vector3 assistant_centre = Vector3::Zero();  ///< [m] of its bounding box, in its own frame
   bool guided_by_contact = true;  ///< aims with an error and relies on contact; false: exactly, by sight
   bool misplaced = false;         ///< inserts at a wrong pose and does not search for the opening
 };

@@ -27,15 +27,15 @@ void orthonormalBasis(const Vector3& axis, Vector3& u, Vector3& v) noexcept;
 [[nodiscard]] double pushStep(double target_force, double measured_force, double max_speed,
                               double dt) noexcept;
 
-/// The aim X_WAim, moved by `fraction` [-] of the offset across axis_W to the object's actual pose X_WO:
-/// lateral compliance.
-[[nodiscard]] Pose compliedLaterally(const Pose& X_WO, const Pose& X_WAim, const Vector3& axis_W,
-                                     double fraction) noexcept;
+/// The aim X_WAim, moved by `fraction` [-] of the offset across axis_W of the object's centre p_OQ_O to its
+/// actual pose X_WO: lateral compliance.
+[[nodiscard]] Pose compliedLaterally(const Pose& X_WO, const Pose& X_WAim, const Vector3& p_OQ_O,
+                                     const Vector3& axis_W, double fraction) noexcept;
 
-/// The aim X_WAim, turned by `fraction` [-] of the rotation to the object's actual pose X_WO; unchanged when
-/// the object is visibly tilted against the target X_WG.
+/// The aim X_WAim, turned about the object's centre p_OQ_O by `fraction` [-] of the rotation to its actual
+/// pose X_WO; unchanged when the object is visibly tilted against the target X_WG.
 [[nodiscard]] Pose compliedInRotation(const Pose& X_WO, const Pose& X_WAim, const Pose& X_WG,
-                                      double fraction) noexcept;
+                                      const Vector3& p_OQ_O, double fraction) noexcept;
 
 /// Rotation vector (in W) added to the hand against a visible tilt of the object, integrated over `dt` [s]
 /// from its value turned_W one tick ago. Bounded by what a wrist can turn.

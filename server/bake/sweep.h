@@ -7,8 +7,8 @@
 
 namespace tenon::bake {
 
-// A path is a list of poses X_WM of a body, with linear translation and rotation at constant angular velocity
-// between them. Threads: any; `progress` is called on the caller's. Real-time: no.
+// A path is a list of poses X_WM of a body, with linear translation of the body's centre and rotation at
+// constant angular velocity between them. Threads: any; `progress` is called on the caller's. Real-time: no.
 
 struct SweepOptions {
   double cell = 0.005;    ///< [m] edge of the cells

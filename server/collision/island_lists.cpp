@@ -125,7 +125,7 @@ double IslandSolver::approachSinceTraversal(const Job& job, std::size_t i) {
   const auto add = [&](std::int32_t body, const Pose& X_WB_traversal) {
     if (body == ContactConstraint::kStatic) return;
     const MovableBody& now = job.bodies[static_cast<std::size_t>(body)];
-    const Displacement moved = displacement(X_WB_traversal, now.X_WB);
+    const Displacement moved = displacement(X_WB_traversal, now.X_WB, now.p_BQ);
     sum += maxPointMotion(moved, now.radius);
   };
   add(pair.body_a, job.results[i].traversal.X_WA);

@@ -279,7 +279,7 @@ class IslandSolver {
   std::vector<Displacement> last_step_;           ///< the step that led to the iterate
   std::vector<Pose> best_iterate_;                ///< by the merit function, in this solve
   std::vector<Pose> initial_poses_;               ///< of this solve
-  std::vector<Wrench> wrenches_;                  ///< for kBlocking: penalty on a body, about its origin
+  std::vector<Wrench> wrenches_;                  ///< for kBlocking: penalty on a body, about its centre Q
   std::vector<double> depths_;                    ///< [m] for kBlocking: largest overlap of a body
   std::vector<std::uint8_t> constrained_;         ///< body has an active row
 };

@@ -93,7 +93,7 @@ struct MotionSolver::Workspace {
 
   ActiveSet active;
   std::vector<Matrix6> L;  ///< Cholesky factor of the Hessian, by body
-  /// [m] gap; [-] normal; [m] its moment about A's origin, about B's; in W
+  /// [m] gap; [-] normal; [m] its moment about A's centre, about B's; in W
   std::array<std::vector<double>, 10> columns;
   std::vector<RowState> state;
   std::vector<std::uint8_t> requested;  ///< row is in the warm start; all zero between uses

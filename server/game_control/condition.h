@@ -18,7 +18,7 @@ inline constexpr std::size_t kMaxConditions = 32;  ///< nodes of one state's con
 enum class ConditionKind : std::uint8_t {
   kAll,          ///< group: every child is met
   kAny,          ///< group: at least one child is met
-  kPose,         ///< `object` is at X_WG within the tolerances `within` and `angle`
+  kPose,         ///< `object` is at X_WG: its centre within `within`, its orientation within `angle`
   kForce,        ///< the magnitude of the force on `object` is between `above` and `below`
   kForceTarget,  ///< the force on `object` differs from F_W by at most `within`
   kContact,      ///< `object` and `other` were in contact for `limit_ticks`, interrupted for `lapse` at most
@@ -58,6 +58,8 @@ class SceneView {
  public:
   virtual ~SceneView() = default;
   [[nodiscard]] virtual Pose pose(ObjectId object) const noexcept = 0;  ///< X_WO
+  /// [m] p_OQ_O: of its bounding sphere; an object's position is that of its centre.
+  [[nodiscard]] virtual Vector3 centre(ObjectId object) const noexcept = 0;
   /// [N] in W, as Environment::forceOn
   [[nodiscard]] virtual Vector3 force(ObjectId object) const noexcept = 0;
   [[nodiscard]] virtual bool inContact(ObjectId a, ObjectId b) const noexcept = 0;
@@ -133,5 +135,8 @@ class ConditionProgress {
 
 /// The angle [rad], 0 to pi, of the rotation between two orientations; q and -q are the same orientation.
 [[nodiscard]] double angleBetween(const Quaternion& q_WA, const Quaternion& q_WB) noexcept;
+
+/// [m] Distance of an object's centre from where it is with the object at X_WG.
+[[nodiscard]] double positionError(const SceneView& scene, ObjectId object, const Pose& X_WG) noexcept;
 
 }  // namespace tenon::game_control

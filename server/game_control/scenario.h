@@ -157,7 +157,7 @@ struct ScenarioState {
   HandId hand;
   ObjectId touch;                        ///< the object to touch; invalid: none
   std::optional<Pose> X_WG;              ///< target pose of `object`
-  double tolerance = 0.002;              ///< [m] of the target position
+  double tolerance = 0.002;              ///< [m] of the centre's position at the target
   double angle_tolerance = 0.0349066;    ///< [rad] of the target orientation: 2 degrees
   Vector3 approach_W = Vector3::Zero();  ///< unit vector of the motion towards the target; zero: any
   double approach_distance = 0.0;        ///< [m] before the target, from which on the direction matters
@@ -181,8 +181,8 @@ struct ScenarioFile {
   int part_set_line = 0;
   std::string language = "en";  ///< main language
   Texts title;
-  Vector3 gravity_W{0.0, 0.0, -9.81};   ///< [m/s^2]
-  double reach = 10.0;                  ///< [m] largest distance of any given pose from the world's origin
+  Vector3 gravity_W{0.0, 0.0, -9.81};  ///< [m/s^2]
+  double reach = 10.0;                 ///< [m] largest distance of an object's centre from the world's origin
   std::vector<ScenarioObject> objects;  ///< index = ObjectId
   std::vector<ScenarioHand> hands;      ///< index = HandId
   std::vector<ScenarioPair> pairs;      ///< index as in Scene::pairs
@@ -245,8 +245,8 @@ struct ReadOptions {
 
 /// The read-only scene. `structures` by ObjectId; null for an object that is not collidable. SDF side of a
 /// pair: by sdfSideByTarget(), else never a pointer or an assistant, else the larger object. Fails, with file
-/// and line, when structures are missing, a target is far from all objects, a clearance is too small for the
-/// voxels, or a body has no mass properties.
+/// and line, when structures are missing, an object is out of reach, a target is far from all objects, a
+/// clearance is too small for the voxels, or a body has no mass properties.
 [[nodiscard]] Result<std::shared_ptr<const simulation::Scene>> makeScene(
     const ScenarioFile& scenario,
     std::vector<std::shared_ptr<const structures::HapticStructures>> structures);

@@ -137,9 +137,6 @@ void ScenarioReader::readObject(const YAML::Node& node) {
                "object '" + object.name + "' is free but has no 'body', expected one with its mass");
   if (node["start"].IsDefined() && yaml_.openMapping(node["start"], "pose", "'start'" + of)) {
     object.X_WO = yaml_.pose(node["start"], "'start'" + of);
-    if (object.X_WO.translation().norm() > scenario_.reach) {
-      yaml_.fail(node["start"], "'start'" + of + " is farther from the world's origin than 'reach'");
-    }
   }
   readMeshes(node["meshes"], object);
   if (node["structures"].IsDefined()) readStructures(node["structures"], object);

@@ -98,8 +98,6 @@ void ScenarioStateReader::readPlacements(const YAML::Node& node, const std::stri
   const auto place = [&](const YAML::Node& name, std::optional<Pose> X_WO) {
     const ObjectId object = names_.object(name, what);
     if (!object.valid()) return;
-    if (X_WO && X_WO->translation().norm() > scenario_.reach)
-      yaml_.fail(name, what + " is farther from the world's origin than 'reach'");
     const auto same = std::find_if(state.placements.begin(), state.placements.end(),
                                    [&](const Placement& other) { return other.object == object; });
     if (same != state.placements.end()) {

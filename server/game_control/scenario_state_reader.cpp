@@ -112,12 +112,6 @@ void ScenarioStateReader::readTarget(const YAML::Node& node, ScenarioState& stat
                                    kSmallestTolerance, 1.0, state.tolerance);
   state.angle_tolerance = yaml_.numberOr(node["angle"], Quantity::kAngle, "'angle' of " + what,
                                          kSmallestTolerance, std::numbers::pi, state.angle_tolerance);
-  const double distance = state.X_WG->translation().norm();
-  if (distance > scenario_.reach) {
-    yaml_.fail(node, "the target of state '" + state.name + "' is " + std::to_string(distance) +
-                         " m from the world's origin, expected at most 'reach', " +
-                         std::to_string(scenario_.reach) + " m");
-  }
 }
 
 void ScenarioStateReader::readApproach(const YAML::Node& node, ScenarioState& state) {

@@ -20,6 +20,9 @@ class EnvironmentView final : public SceneView {
   [[nodiscard]] Pose pose(ObjectId object) const noexcept override {
     return environment_.objects()[object.value].X_WO;
   }
+  [[nodiscard]] Vector3 centre(ObjectId object) const noexcept override {
+    return environment_.centreOf(object);
+  }
   [[nodiscard]] Vector3 force(ObjectId object) const noexcept override {
     return environment_.forceOn(object).force;
   }
@@ -246,9 +249,8 @@ void StateMachine::updateMeasurements(const SceneView& scene) noexcept {
   if (current.object.valid()) {
     if (memory_.elapsed > 0 && scene.inAnyContact(current.object)) ++memory_.contact_ticks;
     if (current.X_WG) {
-      const Pose X_WO = scene.pose(current.object);
-      status.position_error = (X_WO.translation() - current.X_WG->translation()).norm();
-      status.angle_error = angleBetween(X_WO.rotation(), current.X_WG->rotation());
+      status.position_error = positionError(scene, current.object, *current.X_WG);
+      status.angle_error = angleBetween(scene.pose(current.object).rotation(), current.X_WG->rotation());
     }
   }
   status.contact_seconds = static_cast<double>(memory_.contact_ticks) * kTickSeconds;

@@ -31,7 +31,7 @@ struct StepStatus {
   Tick tick = 0;                 ///< tick of the Environment of the values below
   bool finished = false;         ///< the last state has ended
   bool failed = false;           ///< a state timed out whose timeout fails the training
-  double position_error = 0.0;   ///< [m] of the state's object to its target; 0 without a target
+  double position_error = 0.0;   ///< [m] of its object's centre to the target; 0 without a target
   double angle_error = 0.0;      ///< [rad] likewise
   double contact_seconds = 0.0;  ///< [s] that the object has been in contact in this state
   FixedVector<ConditionReading, kMaxConditions> conditions;  ///< of the leaves, in file order

@@ -35,21 +35,8 @@ std::size_t maxMovable(const Scene& scene) {
 }
 
 ObjectSize sizeOf(const ObjectSpec& spec) {
-  ObjectSize size;
-  size.radius = kMinRadius;
-  if (!spec.structures) return size;
-  const structures::Pointshell& shell = spec.structures->shell;
-  if (!shell.empty()) {
-    size.p_OC_O = shell.boundingCentre();
-    size.ball_radius = shell.boundingRadius();
-    size.radius = std::max(size.radius, shell.radius());
-  } else if (!spec.structures->field.empty()) {
-    const Eigen::AlignedBox3d box = spec.structures->field.box();
-    size.p_OC_O = box.center();
-    size.ball_radius = 0.5 * box.diagonal().norm();
-    size.radius = std::max(size.radius, size.p_OC_O.norm() + size.ball_radius);
-  }
-  return size;
+  const BoundingSphere sphere = boundingSphereOf(spec.structures.get());
+  return {sphere.p_OQ_O, sphere.radius, std::max(kMinRadius, sphere.radius)};
 }
 
 }  // namespace

@@ -126,7 +126,8 @@ class Environment {
   /// Point budget from the next tick on; 0: unlimited.
   void setBudget(std::uint64_t points) noexcept { work_limits_.points = points; }
   /// A wrench of a source other than contacts and couplings, about the object's origin; see
-  /// ForceBuffer::contribute for validation, clamping and expiry. A rejected one is ignored.
+  /// ForceBuffer::contribute for validation, clamping (about the object's centre) and expiry. A rejected one
+  /// is ignored.
   void contribute(ObjectId object, std::uint32_t source, const Wrench& F_Oo_W,
                   std::uint32_t lifetime_ticks) noexcept;
 
@@ -143,7 +144,10 @@ class Environment {
   [[nodiscard]] std::span<const std::uint32_t> nearPairs() const noexcept;
   /// Most pairs that can have contacts.
   [[nodiscard]] std::size_t contactListCapacity() const noexcept;
-  /// The wrench about the object's origin that displays, conditions and reports call its force: of a held
+  /// [m] p_OQ_O: the object's centre, that of its bounding sphere; the origin without structures. What is
+  /// judged or limited of an object's place and motion is that of Q, wherever its mesh has the origin.
+  [[nodiscard]] const Vector3& centreOf(ObjectId object) const noexcept;
+  /// The wrench about the object's centre that displays, conditions and reports call its force: of a held
   /// object the sum of its couplings, else the total of its ForceBuffer.
   [[nodiscard]] Wrench forceOn(ObjectId object) const noexcept;
   [[nodiscard]] bool inContact(ObjectId a, ObjectId b) const noexcept;
@@ -200,6 +204,7 @@ class Environment {
   void wakeTouchedBodies() noexcept;
   [[nodiscard]] bool mayTouch(std::size_t pair) const noexcept;
   void integrateFreeMotion() noexcept;
+  [[nodiscard]] Twist twistOfCentre(ObjectId object) const noexcept;
   [[nodiscard]] collision::MovableBody freeBody(ObjectId object) noexcept;
   void setStepLimits(std::size_t island) noexcept;
   void updateVelocities(std::size_t island) noexcept;
@@ -240,6 +245,8 @@ class Environment {
   [[nodiscard]] collision::Spring springOf(HandId hand) const noexcept;
   [[nodiscard]] double speedCap(ObjectId object) const noexcept;
   [[nodiscard]] double speedOf(ObjectId object) const noexcept;
+  [[nodiscard]] Vector3 toCentre(ObjectId object) const noexcept;
+  [[nodiscard]] Twist twistOver(const Displacement& motion, ObjectId object) const noexcept;
 
   /// Of a state whose numbers are finite.
   [[nodiscard]] bool isValid() const noexcept;

@@ -96,13 +96,19 @@ void Environment::integrateFreeMotion() noexcept {
     if (!isDynamic(ObjectId{i})) continue;
     Engine::FreeBody& body = *engine_->bodies[i];
     const Pose& X_WO = objects_[i].X_WO;
-    const Wrench F_Oo_W = engine_->forces[i].contributed(tick_);
-    body.V_WC =
-        body.rigid.integrateVelocity(X_WO.rotation(), atCentre(objects_[i].V_WO, X_WO, body.rigid.centre()),
-                                     shifted(F_Oo_W, X_WO.rotation() * body.rigid.centre()));
+    const Wrench F_Oq_W = engine_->forces[i].contributed(tick_);
+    body.V_WC = body.rigid.integrateVelocity(
+        X_WO.rotation(), atCentre(objects_[i].V_WO, X_WO, body.rigid.centre()),
+        shifted(F_Oq_W, X_WO.rotation() * (body.rigid.centre() - centreOf(ObjectId{i}))));
     body.inverse_inertia_W = body.rigid.inertia(X_WO.rotation()).inverse();
   }
   applyFreeBodyFriction();
+}
+
+/// Predicted twist of a free body's centre Q: its centre of mass is elsewhere.
+Twist Environment::twistOfCentre(ObjectId object) const noexcept {
+  const Engine::FreeBody& body = *engine_->bodies[object.value];
+  return atCentre(body.V_WC, objects_[object.value].X_WO, centreOf(object) - body.rigid.centre());
 }
 
 /// The free body as the island solver needs it: a spring of stiffness M / dt^2 towards its predicted pose.
@@ -111,10 +117,7 @@ collision::MovableBody Environment::freeBody(ObjectId object) noexcept {
   const RigidBody& rigid = engine_->bodies[object.value]->rigid;
   Twist& V_WC = engine_->bodies[object.value]->V_WC;
   const double radius = engine_->sizes[object.value].radius;
-  const Vector3 p_OC_W = motion.X_WO.rotation() * rigid.centre();
-  const Vector3 v_WOo = V_WC.linear - V_WC.angular.cross(p_OC_W);
-  const double speed =
-      std::max(maxPointSpeed(Twist{v_WOo, V_WC.angular}, radius), maxPointSpeed(V_WC, radius));
+  const double speed = maxPointSpeed(twistOfCentre(object), radius);
   if (speed > options_.max_free_speed) {
     V_WC.linear *= options_.max_free_speed / speed;
     V_WC.angular *= options_.max_free_speed / speed;
@@ -131,6 +134,7 @@ collision::MovableBody Environment::freeBody(ObjectId object) noexcept {
 
   collision::MovableBody body;
   body.X_WB = motion.X_WO;
+  body.p_BQ = centreOf(object);
   body.radius = radius;
   body.tolerance = kFreeBodyTolerance;
   body.springs.push_back(inertia);
@@ -149,8 +153,7 @@ void Environment::setStepLimits(std::size_t island) noexcept {
     const ObjectId object = islands.objectOf(i);
     near = near || engine_->has_near_pair[object.value] != 0;
     if (!isDynamic(object)) continue;
-    const Twist& V_WC = engine_->bodies[object.value]->V_WC;
-    speed = std::max(speed, maxPointSpeed(V_WC, engine_->sizes[object.value].radius));
+    speed = std::max(speed, maxPointSpeed(twistOfCentre(object), engine_->sizes[object.value].radius));
     any_free = true;
   }
   if (!any_free) return;

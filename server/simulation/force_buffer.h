@@ -10,16 +10,18 @@
 
 namespace tenon::simulation {
 
-/// The wrench of one source.
+/// The wrench of one source, about the body's centre Q.
 struct ForceCell {
-  Wrench F_Bo_W;
+  Wrench F_Bq_W;
   Tick stamp = 0;                    ///< tick of the last write
   std::uint32_t source = 0;          ///< contributions only: id chosen by the sender
   std::uint32_t lifetime_ticks = 0;  ///< [ticks] 0: valid until overwritten
   bool used = false;
 };
 
-/// Accumulates the wrenches of several sources on one object (paper §3.2, iii).
+/// Accumulates the wrenches of several sources on one object (paper §3.2, iii). All are about its centre Q,
+/// that of its bounding sphere: a torque about the origin would grow with the distance from there to the
+/// object.
 ///
 /// Every source has one cell and overwrites it. The own cells (pairs, couplings of hands, gravity) come
 /// first; they stay valid until overwritten, so a pair skipped by coherence keeps its wrench. Then come cells
@@ -44,13 +46,13 @@ class ForceBuffer {
   explicit ForceBuffer(std::size_t own_cells);
 
   /// Overwrites an own cell.
-  void write(std::size_t cell, const Wrench& F_Bo_W, Tick now) noexcept;
+  void write(std::size_t cell, const Wrench& F_Bq_W, Tick now) noexcept;
   /// Marks an own cell as unused.
   void clear(std::size_t cell) noexcept;
 
   /// Overwrites the cell of `source` or uses a free one; lifetime and wrench are clamped to the limits above.
   /// False, and counted in rejected(), when the wrench is not finite, its lifetime is 0 or no cell is free.
-  bool contribute(std::uint32_t source, const Wrench& F_Bo_W, std::uint32_t lifetime_ticks,
+  bool contribute(std::uint32_t source, const Wrench& F_Bq_W, std::uint32_t lifetime_ticks,
                   Tick now) noexcept;
   /// Frees the cells of contributions whose lifetime is over.
   void expire(Tick now) noexcept;
@@ -59,7 +61,7 @@ class ForceBuffer {
   [[nodiscard]] Wrench total(Tick now) const noexcept;
   /// Sum of the contributions alone.
   [[nodiscard]] Wrench contributed(Tick now) const noexcept;
-  [[nodiscard]] Wrench cell(std::size_t index) const noexcept { return cells_[index].F_Bo_W; }
+  [[nodiscard]] Wrench cell(std::size_t index) const noexcept { return cells_[index].F_Bq_W; }
   /// Ticks since the cell was written.
   [[nodiscard]] Tick age(std::size_t index, Tick now) const noexcept { return now - cells_[index].stamp; }
   [[nodiscard]] std::uint64_t rejected() const noexcept { return rejected_; }

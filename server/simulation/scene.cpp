@@ -16,6 +16,15 @@ IdType findNamed(const List& list, std::string_view name) {
 
 }  // namespace
 
+BoundingSphere boundingSphereOf(const structures::HapticStructures* structures) {
+  if (structures == nullptr) return {};
+  const structures::Pointshell& shell = structures->shell;
+  if (!shell.empty()) return {shell.boundingCentre(), shell.boundingRadius()};
+  if (structures->field.empty()) return {};
+  const Eigen::AlignedBox3d box = structures->field.box();
+  return {box.center(), 0.5 * box.diagonal().norm()};
+}
+
 ObjectId Scene::objectNamed(std::string_view name) const { return findNamed<ObjectId>(objects, name); }
 
 HandId Scene::handNamed(std::string_view name) const { return findNamed<HandId>(hands, name); }

@@ -64,7 +64,7 @@ class StateArchive {
   void visit(C& cell) {
     visit(cell.used);
     if (!cell.used) return;
-    visit(cell.F_Bo_W);
+    visit(cell.F_Bq_W);
     visit(cell.stamp);
     visit(cell.source);
     visit(cell.lifetime_ticks);

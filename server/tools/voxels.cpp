@@ -108,7 +108,7 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Voxelises a baked body at rest or along a path (the swept volume of a part or an arm), prints the\n"
       "volume and the clearance to a scene, and writes the filled cells as an OctoMap. Between two poses\n"
-      "the body translates linearly and rotates at constant angular velocity.",
+      "the body's centre translates linearly and it rotates at constant angular velocity.",
       "tenon voxels"};
   app.add_option("BODY", arguments.body, "structure file of the body (from tenon bake)")->required();
   app.add_option("--poses", arguments.poses,

@@ -81,6 +81,22 @@ TEST_F(Spatial, DisplacedIsTheInverseOfDisplacement) {
   }
 }
 
+TEST_F(Spatial, TheDisplacementOfAnotherPointIsOfThatPoint) {
+  for (int i = 0; i < 500; ++i) {
+    const Pose X_WA(vector(2.0), expRotation(rotationVector()));
+    const Pose X_WB(vector(2.0), expRotation(rotationVector()));
+    const Vector3 p_OQ_O = vector(2.0);
+    const Displacement motion = displacement(X_WA, X_WB, p_OQ_O);
+    EXPECT_LT((motion.translation - (X_WB * p_OQ_O - X_WA * p_OQ_O)).norm(), 1e-12);
+    const Pose X_WB_again = displaced(X_WA, motion, p_OQ_O);
+    EXPECT_LT((X_WB_again.translation() - X_WB.translation()).norm(), 1e-12);
+    EXPECT_LT(X_WB_again.rotation().angularDistance(X_WB.rotation()), 1e-7);
+  }
+  const Pose turned = displaced(Pose(), {Vector3::Zero(), Vector3(0, 0, std::numbers::pi)}, Vector3(1, 0, 0));
+  EXPECT_LT((turned.translation() - Vector3(2, 0, 0)).norm(), 1e-12)
+      << "about that point, not about the origin";
+}
+
 //   A --X_AB--> B --X_BC--> C
 TEST_F(Spatial, PosesAreComposedAndInverted) {
   const Pose X_AB(Vector3(1, 0, 0), expRotation({0, 0, std::numbers::pi / 2}));

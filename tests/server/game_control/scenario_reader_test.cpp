@@ -299,7 +299,6 @@ const BadInput kBadInputs[] = {
      "[0, 0, -1], distance: 50 mm}\n",
      "", "19", "snaps 'part', but has no target pose"},
     {"target_without_at", "at: [0, 0, -20 mm], ", "", "19", "has no 'at'"},
-    {"target_too_far", "at: [0, 0, -20 mm]", "at: [0, 0, -20 m]", "19", "expected at most 'reach'"},
     {"target_nobody", "    hands: {right: part}\n", "", "18", "no hand moves 'part'"},
     {"target_without_object", "    object: part\n", "", "18", "no 'object' to bring there"},
     {"hidden", "touch: part\n    for: 0.1 s", "object: part", "13", "'part' is hidden"},
