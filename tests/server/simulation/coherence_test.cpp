@@ -125,7 +125,8 @@ TEST(Coherence, APairIsSkippedForItsGapOverTheSumOfSpeedCaps) {
   EXPECT_NEAR(static_cast<double>(environment.pairs()[pair].due - environment.tick()), expected(cap), 1.0);
   test::activateHand(environment, right_hand, {test::kCubeEdge + 0.02, 0.0, 0.0});
   environment.step();
-  EXPECT_NEAR(static_cast<double>(environment.pairs()[pair].due - environment.tick()), expected(2.0 * cap), 1.0);
+  EXPECT_NEAR(static_cast<double>(environment.pairs()[pair].due - environment.tick()), expected(2.0 * cap),
+              1.0);
 }
 
 TEST(Groups, CanBeChangedBetweenTicks) {

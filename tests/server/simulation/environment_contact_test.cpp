@@ -207,7 +207,7 @@ TEST(Environment, NoPointOfAHeldObjectExceedsTheSpeedCap) {
     // the hand jumps in the first tick; then the object comes after it at 1 m/s
     const EnvironmentOptions caps;
     ASSERT_LE(V_WO.linear.norm() + V_WO.angular.norm() * radius,
-              ticks == 1 ? caps.max_speed + caps.max_turn_rate * radius : 1.0 + 1e-6);
+              (ticks == 1 ? caps.max_speed + caps.max_turn_rate * radius : 1.0) + 1e-6);
   }
   EXPECT_GT(ticks, 50);
   EXPECT_LT(ticks, 200) << "the rest of the motion is made in the next ticks";
