@@ -114,7 +114,10 @@ void IslandSolver::traversePair(const Job& job, std::size_t i, SolveReport& repo
   query.levels = std::min(pair.levels, job.results[i].traversal.levels_used);
   query.reduce = true;
   queryPair(query, job.results[i].query);
-  job.results[i].traversal = {true, query.X_WA, query.X_WB, pair.levels, job.results[i].query.levels_used};
+  const PairQueryResult& found = job.results[i].query;
+  job.results[i].traversal = {true,        query.X_WA,
+                              query.X_WB,  found.smallest_gap - found.skipped_gap_error,
+                              pair.levels, found.levels_used};
   ++report.traversals;
   report.points_visited += job.results[i].query.counts.points_visited;
 }
@@ -131,6 +134,15 @@ double IslandSolver::approachSinceTraversal(const Job& job, std::size_t i) {
   add(pair.body_a, job.results[i].traversal.X_WA);
   add(pair.body_b, job.results[i].traversal.X_WB);
   return sum;
+}
+
+double IslandSolver::clearanceOf(const Job& job, std::size_t i) {
+  const PairQueryResult& query = job.results[i].query;
+  double clearance = query.smallest_gap - query.skipped_gap_error;
+  // points that the list left out in favour of neighbours are not in its gaps after a motion
+  if (query.reduced && clearance > 0.0)
+    clearance = std::min(clearance, job.results[i].traversal.smallest_gap - approachSinceTraversal(job, i));
+  return std::max(clearance, 0.0);
 }
 
 bool IslandSolver::mustTraverse(const Job& job, std::size_t i, double approach) {

@@ -60,6 +60,7 @@ class Traversal {
         kernels_(chosenKernels()),
         shell_(*query.shell_A),
         sum_penalty_(query.sum_penalty),
+        list_(query.list),
         prune_(query.prune),
         reduce_(query.reduce),
         correct_ridges_(query.correct_ridges),
@@ -181,7 +182,7 @@ class Traversal {
     result_.smallest_gap = std::min(result_.smallest_gap, sums.smallest_distance - frame_.dilation);
     result_.deepest = std::max(result_.deepest, -sums.smallest_distance);
     result_.unlisted_gap = std::min(result_.unlisted_gap, sums.smallest_far_gap);
-    if (sums.near > 0) {
+    if (list_ && sums.near > 0) {
       kernels_.contacts(frame_, points, samples_.data(), contacts_.data());
       for (std::uint32_t first = 0; first < candidates_.count; first += structures::ShellBlock::kLanes)
         completeBlock(first);
@@ -313,6 +314,7 @@ class Traversal {
   const QueryKernels& kernels_;
   const structures::Pointshell& shell_;
   bool sum_penalty_;
+  bool list_;
   bool prune_;
   bool reduce_;
   std::span<const float> areas_;  ///< of the levels in use

@@ -58,6 +58,7 @@ struct PairQuery {
   bool sum_penalty = false;
   /// Correct depths and normals near gradient discontinuities of the field: see correctRidges().
   bool correct_ridges = false;
+  bool list = true;   ///< false: no contacts are listed; for PairQueryResult::smallest_gap alone
   bool prune = true;  ///< false: every point is tested, for comparison
 };
 

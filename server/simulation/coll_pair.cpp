@@ -158,7 +158,8 @@ void CollPair::schedule(Tick now, double closing_speed, double margin, double pa
       closing_speed <= 0.0 ? kNever : now + 1 + ticksToClose(gap_ - skipped_spacing_ - margin, closing_speed);
 }
 
-bool CollPair::postpone(Tick now, double closing_speed, double margin, double path_length) noexcept {
+bool CollPair::postpone(Tick now, double closing_speed, double margin, double path_length,
+                        double reach) noexcept {
   const double remaining = gap_ - skipped_spacing_ - (path_length - path_length_) - margin;
   if (!queried_ || remaining <= 0.0) return false;
   if (closing_speed <= 0.0) {
@@ -166,8 +167,8 @@ bool CollPair::postpone(Tick now, double closing_speed, double margin, double pa
     return true;
   }
   const Tick ticks = ticksToClose(remaining, closing_speed);
-  if (ticks == 0) return false;
-  due_ = now + ticks;
+  if (ticks == 0 && remaining <= reach) return false;
+  due_ = now + std::max<Tick>(ticks, 1);
   return true;
 }
 
@@ -181,6 +182,21 @@ collision::IslandPair CollPair::islandPair(const Pose& X_WA, const Pose& X_WB, T
   pair.friction = spec_->friction.value_or(collision::Friction{});
   pair.last = solvedBefore(now);
   return pair;
+}
+
+double CollPair::findGap(const Pose& X_WA, const Pose& X_WB, double limit,
+                         collision::PairQueryResult& found) const noexcept {
+  collision::PairQuery query;
+  query.shell_A = shell_A_;
+  query.field_B = field_B_;
+  query.X_WA = X_WA;
+  query.X_WB = X_WB;
+  query.dilation = spec_->dilation;
+  query.margin = limit;
+  query.levels = levels_;
+  query.list = false;
+  collision::queryPair(query, found);
+  return found.smallest_gap - found.skipped_gap_error;
 }
 
 }  // namespace tenon::simulation

@@ -21,8 +21,8 @@ namespace tenon::simulation {
 ///
 /// Spatio-temporal coherence: no point of either object moves faster than its enforced speed cap, so a pair
 /// with smallest gap g cannot be in contact for g / (v_a + v_b). At the end of that time the path that the
-/// two have actually moved usually allows postponing the query again. A discontinuous pose change resets the
-/// pair.
+/// two have actually moved, and how far their hands can take them in this tick, usually allow postponing the
+/// query again. A discontinuous pose change resets the pair.
 ///
 /// When a query of all shell levels exceeds the pair's point budget, or its load is critical, the finest
 /// levels are skipped (graceful degradation). A level is restored after the budget has had headroom for it
@@ -103,12 +103,20 @@ class CollPair {
   /// accumulated path lengths of both objects.
   void schedule(Tick now, double closing_speed, double margin, double path_length) noexcept;
   /// Moves the due tick before the motion of tick `now` without a query, from the path moved since the last
-  /// one; `closing_speed` [m/s], `margin` [m] and `path_length` [m] as in schedule(). False, and no change,
-  /// when the pair has to be queried in this tick.
-  [[nodiscard]] bool postpone(Tick now, double closing_speed, double margin, double path_length) noexcept;
+  /// one; `closing_speed` [m/s], `margin` [m] and `path_length` [m] as in schedule(). In this tick the
+  /// objects approach each other by at most `reach` [m]. False, and no change, when the pair has to be
+  /// queried in this tick.
+  [[nodiscard]] bool postpone(Tick now, double closing_speed, double margin, double path_length,
+                              double reach = std::numeric_limits<double>::infinity()) noexcept;
 
   /// Input of the island solver of tick `now`, with both bodies static.
   [[nodiscard]] collision::IslandPair islandPair(const Pose& X_WA, const Pose& X_WB, Tick now) const noexcept;
+
+  /// Asks for the gap alone, for poses of this tick's start: `smallest_gap` of `found` is above `limit` [m],
+  /// or the gap as near as the field knows it. Returns a lower bound of the gap [m] over all points. Changes
+  /// nothing else.
+  [[nodiscard]] double findGap(const Pose& X_WA, const Pose& X_WB, double limit,
+                               collision::PairQueryResult& found) const noexcept;
 
   /// Writes, reads or hashes every member that changes except `enabled`. Reading contacts acquires a list.
   template <typename Archive, typename Self>

@@ -106,6 +106,7 @@ void Environment::countWork() noexcept {
   work_.near_pairs = static_cast<std::uint32_t>(engine.near.size());
   work_.queried_pairs = static_cast<std::uint32_t>(engine.due.size());
   work_.deferred_pairs = engine.without_list;
+  work_.points_visited = engine.gap_points;
   for (const std::uint32_t i : engine.separated) updatePairMotion(i);
   for (const std::uint32_t i : engine.near) {
     CollPair& pair = engine.pairs[i];

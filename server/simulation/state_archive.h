@@ -99,6 +99,7 @@ class StateArchive {
     visit(result.traversal.valid);
     visit(result.traversal.X_WA);
     visit(result.traversal.X_WB);
+    visit(result.traversal.smallest_gap);
     visit(result.traversal.levels);
     visit(result.traversal.levels_used);
     visit(result.secondary_planes);
