@@ -12,7 +12,8 @@
 namespace tenon::check {
 
 std::string inMillimetres(double metres) {
-  const double mm = 1e3 * metres;
+  // a check is not more exact than a hundredth of a millimetre
+  const double mm = std::abs(metres) < 50e-6 ? 1e3 * metres : std::round(1e5 * metres) / 100.0;
   return std::abs(mm) < 9999.5 ? fmt::format("{:.3g} mm", mm) : fmt::format("{:.3g} m", metres);
 }
 

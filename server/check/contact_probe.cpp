@@ -10,7 +10,7 @@ constexpr double kShortestStep = 50e-6;     // [m] while sliding
 constexpr double kStepVoxels = 0.25;        // [voxels] likewise
 constexpr double kSafeShare = 0.9;          // [-] of a gap: gradients of the field may exceed 1 a little
 constexpr double kBisection = 1e-6;         // [m]
-constexpr std::size_t kLongestPath = 2000;  // [steps]
+constexpr std::size_t kLongestPath = 4000;  // [steps]
 constexpr double kFar = 1e6;                // [m]
 
 double finestVoxel(const structures::DistanceField& field) {
@@ -18,6 +18,8 @@ double finestVoxel(const structures::DistanceField& field) {
 }
 
 }  // namespace
+
+double thickeningOf(const simulation::PairSpec& pair) { return pair.dilation; }
 
 ContactProbe::ContactProbe(const simulation::Scene& scene, ObjectId part)
     : scene_(scene), part_(part), result_(std::make_unique<collision::PairQueryResult>()) {}
@@ -47,7 +49,7 @@ NearestPlace ContactProbe::query(const structures::HapticStructures& a, const Po
 
 NearestPlace ContactProbe::nearest(const PartObstacle& obstacle, const Pose& X_WO, ProbedSurface surface) {
   const simulation::PairSpec& pair = scene_.pairs[obstacle.pair];
-  const double dilation = surface == ProbedSurface::kContact ? pair.dilation : 0.0;
+  const double dilation = surface == ProbedSurface::kContact ? thickeningOf(pair) : 0.0;
   const bool part_is_shell = pair.a == part_;
   const structures::HapticStructures& a = *scene_.objects[pair.a.value].structures;
   const structures::HapticStructures& b = *scene_.objects[pair.b.value].structures;

@@ -17,8 +17,11 @@ namespace tenon::check {
 /// Which surface of the SDF side counts.
 enum class ProbedSurface : std::uint8_t {
   kMesh,     ///< the zero level set of its field
-  kContact,  ///< what a part meets in a session: with the pair's dilation
+  kContact,  ///< what a part meets in a session: outside of it by thickeningOf the pair
 };
+
+/// [m] How far the surface that a part meets in a session is outside of the mesh of the pair's SDF side.
+[[nodiscard]] double thickeningOf(const simulation::PairSpec& pair);
 
 /// What a part may meet: another object at rest, and their pair in the Scene.
 struct PartObstacle {

@@ -53,7 +53,7 @@ void checkTurns(CheckedScene& checked);
                              const NearestPlace& place, double furthest);
 
 // words and numbers of sentences
-/// "2.6 mm": three significant digits; `metres` [m].
+/// "2.6 mm": three significant digits, to the hundredth; `metres` [m].
 [[nodiscard]] std::string inMillimetres(double metres);
 /// "12.5 deg"; `radians` [rad].
 [[nodiscard]] std::string inDegrees(double radians);

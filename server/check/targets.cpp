@@ -44,6 +44,7 @@ class TargetCheck {
         obstacles_(checked.obstaclesOf(part_, state, false)) {}
 
   void run() {
+    if (sphere_.radius <= 0.0) return;
     bool is_placed = true;
     for (const PartObstacle& obstacle : obstacles_) is_placed = checkObstacle(obstacle) && is_placed;
     if (is_placed && state_.approach_W.norm() > 0.0) checkApproach();
@@ -77,8 +78,7 @@ class TargetCheck {
       addOverlap(obstacle, place);
       return -place.gap <= state_.tolerance;
     }
-    checkFit(obstacle, place);
-    return true;
+    return checkFit(obstacle, place);
   }
 
   void addScale(ObjectId other, double ratio) {
@@ -175,8 +175,14 @@ class TargetCheck {
     return play;
   }
 
-  /// [-] The part's extent by that of the hole around it; none: it is in no hole.
+  /// [-] The part's extent by that of the hole around it; none: something near it is in its way, or it is in
+  /// no hole.
   [[nodiscard]] std::optional<double> sizeInHole(const PartObstacle& obstacle, const NearestPlace& place) {
+    const double floor = std::min(place.gap, 0.0);
+    const double near = boxOf(part_).diagonal().norm() / kLittle;
+    for (const Vector3& line : lines())
+      if (shift(obstacle, floor, line, near).blocked || shift(obstacle, floor, -line, near).blocked)
+        return std::nullopt;
     const Play play = playIn(obstacle, place, boxOf(obstacle.object).diagonal().norm());
     if (!play.isFit()) return std::nullopt;
     const double extent =
@@ -184,7 +190,8 @@ class TargetCheck {
     return extent / (extent + play.play);
   }
 
-  void checkFit(const PartObstacle& obstacle, const NearestPlace& place) {
+  /// False when the part cannot come to its place.
+  bool checkFit(const PartObstacle& obstacle, const NearestPlace& place) {
     const double stated = pairOf(obstacle).clearance;
     const double limit = std::max(kUsualFit, kFitsPerStated * stated);
     const NearestPlace contact = probe_.nearest(obstacle, X_WG_, ProbedSurface::kContact);
@@ -193,16 +200,19 @@ class TargetCheck {
     if (play.isFit() && stated > 0.0) {
       compareClearance(obstacle, play, stated);
     } else if (play.isFit() && play.play < resolvedPlay(obstacle, play)) {
-      const bool is_wider = play.play < 2.0 * checked_.scene.pairs[obstacle.pair].dilation;
-      addMissingClearance(obstacle, play, is_wider || held_off > state_.tolerance);
-      return;
+      const bool is_unreachable =
+          held_off > state_.tolerance || play.play < 2.0 * thickeningOf(checked_.scene.pairs[obstacle.pair]);
+      addMissingClearance(obstacle, play, is_unreachable);
+      return !is_unreachable;
     }
-    if (held_off > state_.tolerance) addHeldOff(obstacle, contact, held_off);
+    if (held_off <= state_.tolerance) return true;
+    addHeldOff(obstacle, contact, held_off);
+    return false;
   }
 
   /// [m] Play below which a part does not get in, or jams, where no clearance is stated.
   [[nodiscard]] double resolvedPlay(const PartObstacle& obstacle, const Play& play) const {
-    return 2.0 * (checked_.scene.pairs[obstacle.pair].dilation + kFieldError.at(play.place));
+    return 2.0 * (thickeningOf(checked_.scene.pairs[obstacle.pair]) + kFieldError.at(play.place));
   }
 
   void compareClearance(const PartObstacle& obstacle, const Play& play, double stated) {
@@ -229,7 +239,7 @@ class TargetCheck {
     finding.value = play.play;
     finding.severity = is_unreachable ? Severity::kError : Severity::kWarning;
     const bool is_resolved = play.play > 2.0 * play.place.voxel;
-    const double thicker = checked_.scene.pairs[obstacle.pair].dilation;
+    const double thicker = thickeningOf(checked_.scene.pairs[obstacle.pair]);
     finding.text =
         fmt::format("{} has {} of play in {}, no clearance is stated, and voxels of {} {}", title(part_),
                     (is_resolved ? "" : "about ") + inMillimetres(play.play), title(obstacle.object),

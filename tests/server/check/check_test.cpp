@@ -98,18 +98,18 @@ TEST(Check, AMissingClearanceIsNamedWithThePlayAndWhereToWriteIt) {
 }
 
 TEST(Check, AnOverlapAtTheStartIsFoundWithItsDepthPlaceAndAWayOut) {
-  // the part's lower side is 5 mm below the upper end of the socket's wall, which is 22 to 42 mm from the
+  // the part's lower side is 3 mm below the upper end of the socket's wall, which is 22 to 42 mm from the
   // middle
-  const std::string text = with(smallScenario(), "at: [0.2, 0, 0.1]", "at: [32 mm, 0, 15 mm]");
+  const std::string text = with(smallScenario(), "at: [0.2, 0, 0.1]", "at: [32 mm, 0, 17 mm]");
   const Finding overlap = theOnlyProblem(findingsIn(with(text, "status: hidden, ", ""), smallStructures()));
   EXPECT_EQ(overlap.kind, FindingKind::kOverlap);
   EXPECT_EQ(overlap.severity, Severity::kError);
   EXPECT_EQ(overlap.line, 4);
   EXPECT_TRUE(overlap.state.empty());
-  EXPECT_NEAR(overlap.value, 0.005, 50e-6);
-  EXPECT_THAT(overlap.text, HasSubstr("part is 5 mm inside bay at the start, at ("));
+  EXPECT_NEAR(overlap.value, 0.003, 50e-6);
+  EXPECT_THAT(overlap.text, HasSubstr("part is 3 mm inside bay at the start, at ("));
   ASSERT_TRUE(overlap.p_WP);
-  EXPECT_NEAR(overlap.p_WP->z(), -0.005, 1e-4);
+  EXPECT_NEAR(overlap.p_WP->z(), -0.003, 1e-4);
   EXPECT_GT(overlap.p_WP->x(), 0.022);
   EXPECT_THAT(overlap.hint, HasSubstr("it is free at [0.032, 0, 0.020"));
   EXPECT_EQ(countOf(findingsIn(text, smallStructures()), Severity::kError), 1U)
