@@ -1,8 +1,7 @@
 #include "server/check/check.h"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
 #include <fmt/format.h>
@@ -41,17 +40,24 @@ std::vector<PartObstacle> CheckedScene::obstaclesOf(ObjectId part, std::size_t s
   return obstacles;
 }
 
-Vector3 wayOut(ContactProbe& probe, const PartObstacle& obstacle, const Pose& X_WO, const NearestPlace& place,
-               double furthest) {
-  if (!place.located) return Vector3::Zero();
+std::string wayOut(ContactProbe& probe, std::span<const PartObstacle> obstacles, const Pose& X_WO,
+                   const NearestPlace& place, double furthest) {
+  if (!place.located) return {};
   constexpr double kMore = 1.02;  // [-] than the depth: the field is not exact
   for (double length = -kMore * place.gap; length <= furthest; length *= 1.5) {
-    const Vector3 motion_W = length * place.n_W;
-    const Pose X_WM(X_WO.translation() + motion_W, X_WO.rotation());
-    const NearestPlace after = probe.nearest(obstacle, X_WM, ProbedSurface::kMesh);
-    if (after.gap >= -kFieldError.at(after)) return motion_W;
+    const Pose X_WM(X_WO.translation() + length * place.n_W, X_WO.rotation());
+    const bool is_free = std::all_of(obstacles.begin(), obstacles.end(), [&](const PartObstacle& obstacle) {
+      const NearestPlace after = probe.nearest(obstacle, X_WM, ProbedSurface::kMesh);
+      return after.gap >= -kFieldError.at(after);
+    });
+    if (!is_free) continue;
+    // to a hundredth of a millimetre; -0.0 is 0
+    const auto rounded = [](double metres) { return std::round(1e5 * metres) / 1e5 + 0.0; };
+    const Vector3& p_WM = X_WM.translation();
+    return fmt::format("it is free at [{:g}, {:g}, {:g}]", rounded(p_WM.x()), rounded(p_WM.y()),
+                       rounded(p_WM.z()));
   }
-  return Vector3::Zero();
+  return {};
 }
 
 std::vector<Finding> checkScene(const game_control::ScenarioFile& scenario, const simulation::Scene& scene,

@@ -59,16 +59,18 @@ NearestPlace ContactProbe::nearest(const PartObstacle& obstacle, const Pose& X_W
   return place;
 }
 
-NearestPlace ContactProbe::nearestReversed(const PartObstacle& obstacle, const Pose& X_WO) {
+NearestPlace ContactProbe::deepest(const PartObstacle& obstacle, const Pose& X_WO,
+                                   const ProbeTolerance& tolerance) {
+  const NearestPlace place = nearest(obstacle, X_WO, ProbedSurface::kMesh);
   const simulation::PairSpec& pair = scene_.pairs[obstacle.pair];
   const bool part_is_shell = pair.a == part_;
   const structures::HapticStructures& a = *scene_.objects[pair.b.value].structures;
   const structures::HapticStructures& b = *scene_.objects[pair.a.value].structures;
-  if (a.shell.empty() || b.field.empty()) return {.gap = kFar};
-  NearestPlace place =
+  if (a.shell.empty() || b.field.empty()) return place;
+  NearestPlace reversed =
       part_is_shell ? query(a, obstacle.X_WO, b, X_WO, 0.0) : query(a, X_WO, b, obstacle.X_WO, 0.0);
-  if (part_is_shell) place.n_W = -place.n_W;
-  return place;
+  if (part_is_shell) reversed.n_W = -reversed.n_W;
+  return reversed.gap + tolerance.at(reversed) < place.gap ? reversed : place;
 }
 
 ContactProbe::Room ContactProbe::roomAt(std::span<const PartObstacle> obstacles,

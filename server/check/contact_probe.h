@@ -66,9 +66,10 @@ class ContactProbe {
   ContactProbe(const simulation::Scene& scene, ObjectId part);
 
   [[nodiscard]] NearestPlace nearest(const PartObstacle& obstacle, const Pose& X_WO, ProbedSurface surface);
-  /// With the sides exchanged: the obstacle's pointshell in the part's field. Finds corners of the obstacle
-  /// between points of the part. Not located and a gap of 1e6 m where one of the two is missing.
-  [[nodiscard]] NearestPlace nearestReversed(const PartObstacle& obstacle, const Pose& X_WO);
+  /// Of the meshes, and with the sides exchanged too, which finds corners of the SDF side between points of
+  /// the other: that counts where it is deeper by more than `tolerance`.
+  [[nodiscard]] NearestPlace deepest(const PartObstacle& obstacle, const Pose& X_WO,
+                                     const ProbeTolerance& tolerance);
 
   /// Moves the part until it is deeper in an obstacle than `floors` [m] (by obstacle, <= 0: a gap) by more
   /// than `tolerance`, or up to `limit` [m]. Steps are as long as the gap permits, and short where the part

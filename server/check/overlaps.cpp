@@ -49,22 +49,17 @@ void checkOverlaps(CheckedScene& checked) {
       if (!checked.scene.objects[object.value].structures) continue;
       ContactProbe probe(checked.scene, object);
       const Pose& X_WO = checked.moments[state].X_WO[object.value];
-      for (const PartObstacle& obstacle : checked.obstaclesOf(object, state, state == 0)) {
+      const std::vector<PartObstacle> obstacles = checked.obstaclesOf(object, state, state == 0);
+      for (const PartObstacle& obstacle : obstacles) {
         // where both are placed: once, of the one that is more likely to be moved
         const bool is_fixed = checked.scenario.objects[object.value].status == ObjectStatus::kFixed;
         if (is_fixed || reported.contains(obstacle.pair)) continue;
-        NearestPlace place = probe.nearest(obstacle, X_WO, ProbedSurface::kMesh);
-        const NearestPlace reversed = probe.nearestReversed(obstacle, X_WO);
-        if (reversed.gap + kFieldError.at(reversed) < place.gap) place = reversed;
+        const NearestPlace place = probe.deepest(obstacle, X_WO, kFieldError);
         if (place.gap >= -kFieldError.at(place)) continue;
         reported.insert(obstacle.pair);
         Finding finding = overlapFinding(checked, state, object, obstacle, place);
         const double size = checked.scene.objects[object.value].structures->info.box_M.diagonal().norm();
-        const Vector3 out_W = wayOut(probe, obstacle, X_WO, place, size);
-        if (out_W.norm() > 0.0)
-          finding.hint =
-              fmt::format("it is free at [{:.4g}, {:.4g}, {:.4g}]", X_WO.translation().x() + out_W.x(),
-                          X_WO.translation().y() + out_W.y(), X_WO.translation().z() + out_W.z());
+        finding.hint = wayOut(probe, obstacles, X_WO, place, size);
         checked.findings.push_back(std::move(finding));
       }
     }

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -47,10 +47,11 @@ void checkTurns(CheckedScene& checked);
 [[nodiscard]] Finding scaleFinding(const game_control::ScenarioFile& scenario, ObjectId part, ObjectId other,
                                    double ratio);
 
-/// The motion that frees a part at X_WO from an obstacle: a translation by at most `furthest` [m] along the
-/// normal of its deepest place; zero when there is none.
-[[nodiscard]] Vector3 wayOut(ContactProbe& probe, const PartObstacle& obstacle, const Pose& X_WO,
-                             const NearestPlace& place, double furthest);
+/// The position of the origin of a part, now at X_WO, that is free of all obstacles, as a hint: "it is free
+/// at [0, 0, 0.02]". Found by translations by up to `furthest` [m] along the normal
+/// of `place`, where it is deepest; empty when there is none.
+[[nodiscard]] std::string wayOut(ContactProbe& probe, std::span<const PartObstacle> obstacles,
+                                 const Pose& X_WO, const NearestPlace& place, double furthest);
 
 // words and numbers of sentences
 /// "2.6 mm": three significant digits, to the hundredth; `metres` [m].

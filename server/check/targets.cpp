@@ -74,9 +74,10 @@ class TargetCheck {
         return false;
       }
     }
-    if (place.gap < -kFieldError.at(place)) {
-      addOverlap(obstacle, place);
-      return -place.gap <= state_.tolerance;
+    const NearestPlace deepest = probe_.deepest(obstacle, X_WG_, kFieldError);
+    if (deepest.gap < -kFieldError.at(deepest)) {
+      addOverlap(obstacle, deepest);
+      return -deepest.gap <= state_.tolerance;
     }
     return checkFit(obstacle, place);
   }
@@ -107,11 +108,7 @@ class TargetCheck {
     if (finding.severity == Severity::kWarning)
       finding.text +=
           fmt::format("; it is taken for there because {} are tolerated", inMillimetres(state_.tolerance));
-    const Vector3 out_W = wayOut(probe_, obstacle, X_WG_, place, 2.0 * sphere_.radius);
-    const Vector3 p_WG = X_WG_.translation() + out_W;
-    if (out_W.norm() > 0.0)
-      finding.hint =
-          fmt::format("a target at [{:.4g}, {:.4g}, {:.4g}] is free", p_WG.x(), p_WG.y(), p_WG.z());
+    finding.hint = wayOut(probe_, obstacles_, X_WG_, place, 2.0 * sphere_.radius);
     checked_.findings.push_back(std::move(finding));
   }
 

@@ -54,9 +54,11 @@ void checkTurns(CheckedScene& checked) {
     finding.value = turn;
     finding.unit = "rad";
     finding.p_WP = state.X_WG->translation();
-    finding.text =
-        fmt::format("{} has to be turned by {} to its target, and {} turns by {} from its middle",
-                    checked.titleOf(state.object), inDegrees(turn), device.device, inDegrees(device.range));
+    const std::string range = device.range > 0.0
+                                  ? fmt::format("turns by {} from its middle", inDegrees(device.range))
+                                  : "does not turn";
+    finding.text = fmt::format("{} has to be turned by {} to its target, and {} {}",
+                               checked.titleOf(state.object), inDegrees(turn), device.device, range);
     // a part can be taken with the hand turned the other way
     const bool possible = !grab.own && beyond <= device.range;
     finding.severity = possible ? Severity::kWarning : Severity::kError;

@@ -131,7 +131,7 @@ class PlantedMistakes(CheckCase):
                          ("error", "peg", "block", "insert_peg"))
         self.assertAlmostEqual(overlap["value"], 0.003, delta=50e-6)
         self.assertAlmostEqual(overlap["place"][2], -0.033, delta=1e-4)
-        free = re.fullmatch(r"a target at \[0, 0, (-0\.\d+)\] is free", overlap["hint"])
+        free = re.fullmatch(r"it is free at \[0, 0, (-0\.\d+)\]", overlap["hint"])
         self.assertTrue(free, overlap["hint"])
         self.assertAlmostEqual(float(free[1]), -0.03, delta=2e-4)
         # the same at a target that is free

@@ -124,7 +124,7 @@ TEST(Check, ATargetInAWallIsAnErrorAndOneWithinTheToleranceAWarning) {
   EXPECT_EQ(deep.severity, Severity::kError);
   EXPECT_NEAR(deep.value, 0.003, 20e-6);
   EXPECT_THAT(deep.text, HasSubstr("inside bay"));
-  EXPECT_THAT(deep.hint, HasSubstr("a target at [0, 0, -0.02")) << "2.2 mm above the bottom at most";
+  EXPECT_THAT(deep.hint, HasSubstr("it is free at [0, 0, -0.02")) << "2.2 mm above the bottom at most";
   ASSERT_TRUE(deep.p_WP);
   EXPECT_NEAR(deep.p_WP->z(), -0.045, 1e-4);
   const Finding shallow = theOnlyProblem(
