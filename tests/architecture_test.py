@@ -36,9 +36,13 @@ ROOMS = {
     "server/simulation": ("tenon::simulation", ["idl/types", "idl/threads", "server/structures", "server/collision"],
                           ["Bullet"]),
     "server/game_control": ("tenon::game_control", ["idl/types", "server/structures", "server/simulation"], ["yaml-cpp", "fmt"]),
+    "server/check": ("tenon::check", ["idl/types", "server/structures", "server/collision", "server/simulation",
+                                      "server/game_control"], ["fmt"]),
     "server/session": ("tenon::session", IDL + DECIDES, ["fmt", "POSIX"]),
-    "server/tools": ("tenon::tools", ["idl/types"] + DECIDES, ["fmt", "CLI11", "POSIX"]),
-    "server": ("tenon::session", IDL + DECIDES + ["server/session"], ["fmt", "CLI11", "POSIX"]),
+    # the limits of devices, asked of their catalog, are what a check is made against
+    "server/tools": ("tenon::tools", ["idl/types"] + DECIDES + ["server/check", "server/session", "devices"],
+                     ["fmt", "CLI11", "JSON", "POSIX"]),
+    "server": ("tenon::session", IDL + DECIDES + ["server/check", "server/session", "devices"], ["fmt", "CLI11", "POSIX"]),
     "devices": ("tenon::devices", ["idl/types", "idl/threads", "devices/simulated", "devices/drivers"], []),
     "devices/simulated": ("tenon::devices", ["idl/types", "idl/threads", "devices"], []),
     "devices/drivers": ("tenon::devices", ["idl/types", "idl/threads", "devices"], ["POSIX"]),
@@ -106,6 +110,7 @@ UNITS = {
     "server/collision/motion_solver": "server/collision/motion_workspace",
     "server/structures/pointshell": "server/structures/level_areas",
     "server/simulation/environment": "server/simulation/{engine,environment_*}",
+    "server/check/check": "server/check/{overlaps,scene_checks,sizes,targets,turns}",
     "server/game_control/scenario": "server/game_control/{condition_reader,named_values,scenario_*,yaml_reader}",
 }
 
@@ -384,7 +389,7 @@ PLANTED = [
     ("server/simulation/c.cpp", "#include <unistd.h>", "not the door of POSIX"),
     ("server/simulation/c.cpp", '#include "tests/support/analytic.h"', "no room may include tests"),
     ("server/tools/probe.cpp", '#include "tests/support/analytic.h"', "no room may include tests"),
-    ("server/tools/probe.cpp", '#include "server/session/session_server.h"', "may not include server/session"),
+    ("server/bake/probe.cpp", '#include "server/session/session_server.h"', "may not include server/session"),
     ("server/main.cpp", '#include "tests/support/analytic.h"', "no room may include tests"),
     ("server/session/d.cpp", '#include "server/tools/lines.h"', "no room may include server/tools"),
     ("idl/types/messages/hands.h", "#include <vector>", None),

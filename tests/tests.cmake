@@ -45,7 +45,7 @@ function(tenon_tests name)
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${CMAKE_BINARY_DIR}/suites/${target}_if_built.cmake)
 endfunction()
 
-foreach(room idl/types idl/record server/structures server/game_control devices devices/simulated clients/simulated_person
+foreach(room idl/types idl/record server/structures server/game_control server/check devices devices/simulated clients/simulated_person
              clients/trainee clients/instructor clients/observer clients/recorder clients/command clients/report clients/rehearse
              scenarios/part_generator)
   string(REPLACE "/" "_" target ${room})

@@ -48,6 +48,22 @@ struct Fingerprint {
 [[nodiscard]] Result<LoadedScene> loadScene(const std::filesystem::path& scenario, const LoadOptions& options,
                                             const LoadProgress& progress = {});
 
+/// A scenario and the structures of its objects, by ObjectId; null for one that is not collidable.
+struct LoadedStructures {
+  std::shared_ptr<const game_control::ScenarioFile> scenario;
+  std::vector<std::shared_ptr<const structures::HapticStructures>> structures;
+};
+
+/// The part of loadScene() before the scene is built, of a scenario that has been read.
+[[nodiscard]] Result<LoadedStructures> loadStructures(
+    std::shared_ptr<const game_control::ScenarioFile> scenario, const LoadOptions& options,
+    const LoadProgress& progress = {});
+
+/// [m] Bounding boxes of the meshes of each object, in its frame, by ObjectId; empty where they cannot be
+/// read. Reads every mesh and bakes nothing.
+[[nodiscard]] std::vector<Eigen::AlignedBox3d> meshBoxes(const game_control::ScenarioFile& scenario,
+                                                         const LoadOptions& options);
+
 /// Folder for data that can be generated again: $TENON_CACHE, $XDG_CACHE_HOME/tenon or ~/.cache/tenon.
 [[nodiscard]] std::filesystem::path defaultCache();
 
