@@ -102,9 +102,9 @@ ShellSphere boundingSphere(std::span<const ShellPoint> points) {
   return sphere;
 }
 
+/// Appends a level with the samples `numbers`, which are sorted into runs.
 ShellLevel appendLevel(ShellStorage& storage, std::span<const SurfaceSample> samples,
-                       std::vector<std::uint32_t> numbers) {
-  sortIntoRuns(samples, numbers);
+                       std::span<const std::uint32_t> numbers) {
   ShellLevel level;
   level.first_point = static_cast<std::uint32_t>(storage.points.size());
   level.first_leaf = static_cast<std::uint32_t>(storage.leaves.size());
@@ -147,15 +147,29 @@ Pointshell buildShell(std::span<const SurfaceSample> samples, double spacing) {
   if (spacing <= 0.0) spacing = 1e-3;
 
   auto storage = std::make_shared<ShellStorage>();
-  const auto added = sortIntoLevels(samples, spacing);
+  auto added = sortIntoLevels(samples, spacing);
   double used_area = 0.0;
   for (std::size_t k = 0; k < added.size(); ++k) {
+    sortIntoRuns(samples, added[k]);
     for (const std::uint32_t i : added[k]) used_area += samples[i].area;
     ShellLevel level = appendLevel(*storage, samples, added[k]);
     level.spacing = static_cast<float>(spacing * std::exp2(added.size() - 1 - k));
     level.area_scale = used_area > 0.0 ? static_cast<float>(area / used_area) : 1.0F;
     storage->levels.push_back(level);
   }
+  return {{storage->points, storage->leaves, storage->clusters, storage->levels}, storage};
+}
+
+Pointshell buildFlatShell(std::span<const SurfaceSample> samples, double spacing,
+                          std::vector<std::uint32_t>& order) {
+  order.resize(samples.size());
+  std::iota(order.begin(), order.end(), 0U);
+  if (samples.empty()) return {};
+  sortIntoRuns(samples, order);
+  auto storage = std::make_shared<ShellStorage>();
+  ShellLevel level = appendLevel(*storage, samples, order);
+  level.spacing = static_cast<float>(spacing);
+  storage->levels.push_back(level);
   return {{storage->points, storage->leaves, storage->clusters, storage->levels}, storage};
 }
 

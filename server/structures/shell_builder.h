@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "server/structures/pointshell.h"
 
@@ -21,5 +22,10 @@ struct SurfaceSample {
 /// put corners and edges first. `spacing` is that of the whole set; 0: the square root of the mean area. No
 /// samples give an empty shell.
 [[nodiscard]] Pointshell buildShell(std::span<const SurfaceSample> sites, double spacing = 0.0);
+
+/// A shell with all samples in one level, which a query never skips; `spacing` [m] is stored. Sample
+/// `order[i]` becomes point i.
+[[nodiscard]] Pointshell buildFlatShell(std::span<const SurfaceSample> samples, double spacing,
+                                        std::vector<std::uint32_t>& order);
 
 }  // namespace tenon::structures

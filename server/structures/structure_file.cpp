@@ -20,7 +20,7 @@ namespace tenon::structures {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'T', 'E', 'N', 'O', 'N', 'H', 'S', '\n'};
-constexpr std::uint32_t kVersion = 3;
+constexpr std::uint32_t kVersion = 4;
 constexpr std::uint32_t kByteOrder = 0x01020304U;
 constexpr std::size_t kAlignment = 64;
 
@@ -37,6 +37,11 @@ enum FileSection : std::size_t {
   kContentHash,
   kNotes,
   kMeshes,
+  kFeaturePoints,
+  kFeatureLeaves,
+  kFeatureClusters,
+  kFeatureLevels,
+  kFeatureEdges,
   kSections
 };
 constexpr std::array<std::size_t, kSections> kElementBytes{sizeof(DistanceField::Entry),
@@ -49,7 +54,12 @@ constexpr std::array<std::size_t, kSections> kElementBytes{sizeof(DistanceField:
                                                            1,
                                                            1,
                                                            1,
-                                                           1};
+                                                           1,
+                                                           sizeof(ShellPoint),
+                                                           sizeof(ShellSphere),
+                                                           sizeof(ShellSphere),
+                                                           sizeof(ShellLevel),
+                                                           sizeof(FeatureEdge)};
 
 struct FileHeader {
   std::array<char, 8> magic = kMagic;
@@ -67,7 +77,8 @@ struct FileHeader {
   std::array<double, 6> box_M{};
 };
 static_assert(std::is_trivially_copyable_v<FileHeader>);
-static_assert(sizeof(ShellPoint) == 28 && sizeof(ShellSphere) == 24 && sizeof(ShellLevel) == 32);
+static_assert(sizeof(ShellPoint) == 28 && sizeof(ShellSphere) == 24 && sizeof(ShellLevel) == 32 &&
+              sizeof(FeatureEdge) == 36);
 
 std::uint64_t aligned(std::uint64_t offset) { return (offset + kAlignment - 1) / kAlignment * kAlignment; }
 
@@ -99,10 +110,14 @@ std::array<std::span<const std::byte>, kSections> sectionsOf(const HapticStructu
   const auto bytes = [](const auto& list) { return std::as_bytes(std::span(list.data(), list.size())); };
   const DistanceField::Layout& field = structures.field.layout();
   const Pointshell& shell = structures.shell;
+  const Pointshell& features = structures.features.points();
   const StructureInfo& info = structures.info;
-  return {bytes(field.index),       bytes(field.samples),    bytes(field.far),      bytes(shell.points()),
-          bytes(shell.leaves()),    bytes(shell.clusters()), bytes(shell.levels()), bytes(info.source),
-          bytes(info.content_hash), bytes(info.notes),       bytes(meshes)};
+  return {bytes(field.index),       bytes(field.samples),      bytes(field.far),
+          bytes(shell.points()),    bytes(shell.leaves()),     bytes(shell.clusters()),
+          bytes(shell.levels()),    bytes(info.source),        bytes(info.content_hash),
+          bytes(info.notes),        bytes(meshes),             bytes(features.points()),
+          bytes(features.leaves()), bytes(features.clusters()), bytes(features.levels()),
+          bytes(structures.features.edges())};
 }
 
 FileHeader headerOf(const HapticStructures& structures) {
@@ -259,6 +274,17 @@ std::optional<std::string> problemOf(const Pointshell::Layout& shell) {
   return {};
 }
 
+/// What is wrong with features, or nothing: their points are those of a shell, each has an edge.
+std::optional<std::string> problemOf(const Pointshell::Layout& points, std::span<const FeatureEdge> edges) {
+  if (const auto problem = problemOf(points)) return problem;
+  if (edges.size() != points.points.size()) return "there is not an edge for each point";
+  const auto finite = [](const FeatureEdge& edge) {
+    return edge.half_M.allFinite() && edge.into_M[0].allFinite() && edge.into_M[1].allFinite();
+  };
+  if (!std::all_of(edges.begin(), edges.end(), finite)) return "an edge is not finite";
+  return {};
+}
+
 Result<FileHeader> readHeader(const std::string& name, std::span<const std::byte> bytes) {
   FileHeader header;
   if (bytes.size() < sizeof header) return fail(name + ": not a structure file (too short)");
@@ -342,10 +368,18 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
     return fail(name + ": its field has an index out of range; bake it again");
   if (const auto problem = problemOf(shell))
     return fail(name + ": its pointshell is damaged, " + *problem + "; bake it again");
+  const Pointshell::Layout features{section<ShellPoint>(bytes, *header, kFeaturePoints),
+                                    section<ShellSphere>(bytes, *header, kFeatureLeaves),
+                                    section<ShellSphere>(bytes, *header, kFeatureClusters),
+                                    section<ShellLevel>(bytes, *header, kFeatureLevels)};
+  const auto edges = section<FeatureEdge>(bytes, *header, kFeatureEdges);
+  if (const auto problem = problemOf(features, edges))
+    return fail(name + ": its features are damaged, " + *problem + "; bake it again");
 
   auto structures = std::make_shared<HapticStructures>();
   if (!field.index.empty()) structures->field = DistanceField(field, mapping);
   structures->shell = Pointshell(shell, mapping);
+  structures->features = FeatureShell(Pointshell(features, mapping), edges, mapping);
   StructureInfo& info = structures->info;
   info.source = text(bytes, *header, kSource);
   info.content_hash = text(bytes, *header, kContentHash);
