@@ -288,6 +288,7 @@ class Traversal {
     Contact& contact = *result_.contacts.extend();
     lanes.setContact(i, contact);
     contact.point = point;
+    contact.kind = ContactKind::kShellPoint;
     contact.area = areaOf(point);
   }
 

@@ -13,6 +13,10 @@ constexpr std::uint32_t kMaxRestoreDelay = 1600;
 /// [-] There is headroom for a level when the expected points are below this fraction of the budget.
 constexpr double kRestoreHeadroom = 0.7;
 
+/// [-] The pair's dilation, which is that of B's field, holds for A's surface as well, as far as A's field is
+/// exact: features have to be seen before they touch.
+constexpr double kDilationPerBand = 0.5;
+
 }  // namespace
 
 CollPair::CollPair(const Scene& scene, std::size_t pair) : spec_(&scene.pairs[pair]) {
@@ -23,6 +27,8 @@ CollPair::CollPair(const Scene& scene, std::size_t pair) : spec_(&scene.pairs[pa
   if (possible_) {
     shell_A_ = &a.structures->shell;
     field_B_ = &b.structures->field;
+    features_ = {&a.structures->features, &b.structures->features, &a.structures->field,
+                 std::min(spec_->dilation, kDilationPerBand * a.structures->field.band())};
   }
   enabled_ = spec_->enabled;
 }
@@ -51,10 +57,12 @@ void CollPair::reset() noexcept {
   list_->F_Ao_W = Wrench{};
 }
 
-void CollPair::query(const Pose& X_WA, const Pose& X_WB, double margin, std::uint32_t budget,
-                     std::span<const std::uint32_t> first) noexcept {
-  collision::queryPair({shell_A_, field_B_, X_WA, X_WB, spec_->dilation, margin, levels_, budget, first},
-                       list_->query);
+void CollPair::query(const Pose& X_WA, const Pose& X_WB, double margin, collision::FeatureScratch& scratch,
+                     std::uint32_t budget, std::span<const std::uint32_t> first) noexcept {
+  const collision::PairQuery query{shell_A_, field_B_, X_WA,   X_WB, spec_->dilation,
+                                   margin,   levels_,  budget, first};
+  collision::queryPair(query, list_->query);
+  collision::queryFeatures(query, features_, scratch, list_->query);
   std::fill_n(list_->multipliers.begin(), list_->query.contacts.size(), 0.0);
   list_->F_Ao_W = Wrench{};
   list_->traversal = collision::TraversalState{};
@@ -90,6 +98,7 @@ void CollPair::listTouching(TouchingPoints& points) const noexcept {
   for (const bool with_force : {true, false}) {
     for (std::size_t i = 0; i < contacts.size(); ++i) {
       const bool has_force = list_->multipliers[i] > 0.0;
+      if (contacts[i].kind != collision::ContactKind::kShellPoint) continue;
       if (has_force != with_force || (!has_force && contacts[i].gap > collision::kTouchGap)) continue;
       if (!points.push_back(contacts[i].point)) return;
     }
@@ -138,6 +147,19 @@ bool CollPair::nextLevelFits(const WorkLimits& limits, std::uint32_t budget) con
          grown.loadPercent() < limits.critical_load;
 }
 
+bool CollPair::isIndexValid(const collision::Contact& contact) const noexcept {
+  switch (contact.kind) {
+    case collision::ContactKind::kShellPoint:
+      return contact.point < shell_A_->points().size();
+    case collision::ContactKind::kFeaturePoint:
+      return features_.any() && contact.point < features_.features_B->edges().size();
+    case collision::ContactKind::kCrossing:
+      return features_.any() && contact.point < features_.features_A->edges().size() &&
+             contact.other < features_.features_B->edges().size();
+  }
+  return false;
+}
+
 bool CollPair::isValid(const collision::IslandPairResult& list) const noexcept {
   const collision::ContactList& contacts = list.query.contacts;
   return possible_ && list.secondary_planes <= contacts.size() && list.traversal.X_WA.isFinite() &&
@@ -146,8 +168,7 @@ bool CollPair::isValid(const collision::IslandPairResult& list) const noexcept {
                      list.multipliers.begin() + static_cast<std::ptrdiff_t>(contacts.size()),
                      [](double force) { return std::isfinite(force); }) &&
          std::all_of(contacts.begin(), contacts.end(), [this](const collision::Contact& c) {
-           return c.point < shell_A_->points().size() && c.p_WP.allFinite() && c.n_W.allFinite() &&
-                  std::isfinite(c.gap);
+           return isIndexValid(c) && c.p_WP.allFinite() && c.n_W.allFinite() && std::isfinite(c.gap);
          });
 }
 
@@ -183,6 +204,7 @@ collision::IslandPair CollPair::islandPair(const Pose& X_WA, const Pose& X_WB, T
   pair.X_WA_static = X_WA;
   pair.X_WB_static = X_WB;
   pair.dilation = spec_->dilation;
+  pair.features = features_;
   pair.friction = spec_->friction.value_or(collision::Friction{});
   pair.last = solvedBefore(now);
   return pair;

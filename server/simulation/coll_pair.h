@@ -86,8 +86,8 @@ class CollPair {
   // the following functions need a contact list
   /// Queries a pair that is in no island: lists contacts with gaps up to `margin` [m], testing at most
   /// `budget` points. The points `first` are tested even when their level is skipped.
-  void query(const Pose& X_WA, const Pose& X_WB, double margin, std::uint32_t budget = 0xFFFFFFFFU,
-             std::span<const std::uint32_t> first = {}) noexcept;
+  void query(const Pose& X_WA, const Pose& X_WB, double margin, collision::FeatureScratch& scratch,
+             std::uint32_t budget = 0xFFFFFFFFU, std::span<const std::uint32_t> first = {}) noexcept;
   /// Sets the contact wrench to the penalty force at `stiffness` [N/m] of the contacts of query().
   void computePenaltyForce(double stiffness, const Pose& X_WA) noexcept;
   /// Copies the result of the island solver of tick `now`.
@@ -164,6 +164,7 @@ class CollPair {
   [[nodiscard]] bool nextLevelFits(const WorkLimits& limits, std::uint32_t budget) const noexcept;
   void store(const collision::PairQueryResult& query) noexcept;
   /// Validates a list read from a checkpoint: indices in range, numbers finite.
+  [[nodiscard]] bool isIndexValid(const collision::Contact& contact) const noexcept;
   [[nodiscard]] bool isValid(const collision::IslandPairResult& list) const noexcept;
   /// Whole ticks in which `distance` [m] cannot be closed at `closing_speed` [m/s].
   [[nodiscard]] static Tick ticksToClose(double distance, double closing_speed) noexcept;
@@ -171,6 +172,7 @@ class CollPair {
   const PairSpec* spec_;
   const structures::Pointshell* shell_A_ = nullptr;
   const structures::DistanceField* field_B_ = nullptr;
+  collision::PairFeatures features_;
   bool possible_ = false;
   bool enabled_ = true;
   bool queried_ = false;

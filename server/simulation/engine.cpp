@@ -40,7 +40,10 @@ ObjectSize sizeOf(const ObjectSpec& spec) {
   if (!shell.empty()) {
     size.p_OC_O = shell.boundingCentre();
     size.ball_radius = shell.boundingRadius();
-    size.radius = std::max(size.radius, shell.radius());
+    size.radius = std::max({size.radius, shell.radius(), spec.structures->features.points().radius()});
+    for (const structures::ShellPoint& point : spec.structures->features.points().points()) {
+      size.ball_radius = std::max(size.ball_radius, (point.p_MP.cast<double>() - size.p_OC_O).norm());
+    }
   } else if (!spec.structures->field.empty()) {
     const Eigen::AlignedBox3d box = spec.structures->field.box();
     size.p_OC_O = box.center();
@@ -69,6 +72,7 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
       hidden(scene.objects.size(), 0),
       partition(scene.objects.size()),
       islands(maxMovable(scene), listCount(scene, options), std::max(options.workers, 1U)),
+      feature_scratch(std::max(options.workers, 1U)),
       pool(options.workers) {
   max_margin = limits.contact_margin + kMaxLookAhead + 2.0 * limits.max_step_length;
   pairs.reserve(scene.pairs.size());
