@@ -25,7 +25,7 @@ constexpr double kMaxCrossingDepth = 5e-4;
 /// [-] Relative to half a piece: a crossing at the border of two pieces is in one of them.
 constexpr double kEndTolerance = 1e-3;
 
-/// A piece of an edge in W.
+/// A piece of an edge in W, or in any other frame.
 struct Piece {
   Piece(const structures::FeatureShell& features, std::uint32_t point, const Pose& X_WM)
       : p_W(X_WM * Vector3(features.points().points()[point].p_MP.cast<double>())) {
@@ -133,57 +133,97 @@ void makeRoom(std::size_t wanted, PairQueryResult& result) {
   contacts.resize(kept);
 }
 
-/// The pieces of edges among listed features, by centre.
-struct PieceList {
-  explicit PieceList(const structures::FeatureShell& features, const ContactList& contacts) {
-    for (const Contact& contact : contacts) {
-      const Vector3f& half_M = features.edges()[contact.point].half_M;
-      if (half_M.isZero()) continue;
-      x[count] = contact.p_WP.x();
-      y[count] = contact.p_WP.y();
-      z[count] = contact.p_WP.z();
-      half[count] = static_cast<double>(half_M.norm());
-      point[count++] = contact.point;
-    }
-  }
-  std::array<double, kMaxPairContacts> x, y, z, half;  // [m] in W
-  std::array<std::uint32_t, kMaxPairContacts> point;
-  std::size_t count = 0;
-};
+/// Finds the crossings of B's pieces near A with pieces of A, by A's bounding spheres. In A's frame: A's
+/// pieces are many, those of B few.
+class CrossingSearch {
+ public:
+  CrossingSearch(const PairQuery& query, const PairFeatures& features, PairQueryResult& result)
+      : query_(query), features_(features), result_(result), X_AB_(query.X_WA.inverse() * query.X_WB) {}
 
-/// Adds the crossings of two lists of pieces.
-void listCrossings(const PairQuery& query, const PairFeatures& features, const FeatureScratch& scratch,
-                   PairQueryResult& result) {
-  const PieceList of_A(*features.features_A, scratch.of_A.contacts);
-  const PieceList of_B(*features.features_B, scratch.of_B.contacts);
-  std::size_t listed = 0;
-  for (std::size_t i = 0; i < of_A.count; ++i) {
-    for (std::size_t j = 0; j < of_B.count; ++j) {
-      const double reach = of_A.half[i] + of_B.half[j] + query.dilation + query.margin;
-      const double x = of_A.x[i] - of_B.x[j];
-      const double y = of_A.y[i] - of_B.y[j];
-      const double z = of_A.z[i] - of_B.z[j];
-      if (x * x + y * y + z * z > reach * reach) continue;
-      const Piece a(*features.features_A, of_A.point[i], query.X_WA);
-      const Piece b(*features.features_B, of_B.point[j], query.X_WB);
-      Contact contact;
-      if (!cross(a, b, query.margin, kListedTolerance, contact)) continue;
-      const double gap = contact.gap - query.dilation;
-      if (gap > query.margin) continue;
-      contact.kind = ContactKind::kCrossing;
-      contact.area = 0.0;
-      contact.point = of_A.point[i];
-      contact.other = of_B.point[j];
-      evaluateCrossing(a, b, query.dilation, contact);
-      result.smallest_gap = std::min(result.smallest_gap, contact.gap);
-      if (listed < kMaxCrossings && result.contacts.push_back(contact)) {
-        ++listed;
-      } else {
-        drop(std::min(contact.gap, query.margin), result);
+  /// `near_A`: B's features near A.
+  void run(const ContactList& near_A) {
+    const double reach_A = features_.features_A->longestHalf() + query_.dilation + query_.margin;
+    for (const Contact& contact : near_A) {
+      const FeatureEdge& edge = features_.features_B->edges()[contact.point];
+      if (edge.half_M.isZero()) continue;
+      const Vector3f p_A = (X_AB_ * Vector3(pointOf(*features_.features_B, contact.point))).cast<float>();
+      centres_[count_] = p_A;
+      reach_[count_] = static_cast<float>(reach_A) + edge.half_M.norm();
+      all_[count_] = static_cast<std::uint16_t>(count_);
+      point_[count_++] = contact.point;
+    }
+    const structures::Pointshell& shell = features_.features_A->points();
+    for (const structures::ShellSphere& cluster : shell.clusters()) {
+      const auto by_cluster = narrowed(cluster.p_MC, cluster.radius, {all_.data(), count_}, by_cluster_);
+      if (by_cluster.empty()) continue;
+      for (const structures::ShellSphere& leaf : shell.leaves().subspan(cluster.first, cluster.count)) {
+        const auto by_leaf = narrowed(leaf.p_MC, leaf.radius, by_cluster, by_leaf_);
+        if (by_leaf.empty()) continue;
+        for (std::uint32_t i = leaf.first; i < leaf.first + leaf.count; ++i) crossPiece(i, by_leaf);
       }
     }
   }
-}
+
+ private:
+  using Indices = std::array<std::uint16_t, kMaxPairContacts>;
+
+  static Vector3 pointOf(const structures::FeatureShell& features, std::uint32_t point) {
+    return features.points().points()[point].p_MP.cast<double>();
+  }
+
+  /// Those of B's pieces that may cross a piece of A within a sphere about `p_AC` of `radius` [m].
+  std::span<const std::uint16_t> narrowed(const Vector3f& p_AC, float radius,
+                                          std::span<const std::uint16_t> from, Indices& to) const {
+    std::size_t count = 0;
+    for (const std::uint16_t j : from) {
+      const float reach = reach_[j] + radius;
+      to[count] = j;
+      count += (centres_[j] - p_AC).squaredNorm() <= reach * reach ? 1U : 0U;
+    }
+    return {to.data(), count};
+  }
+
+  void crossPiece(std::uint32_t i, std::span<const std::uint16_t> near) {
+    const FeatureEdge& edge = features_.features_A->edges()[i];
+    if (edge.half_M.isZero()) return;
+    const Vector3f p_A = features_.features_A->points().points()[i].p_MP;
+    for (const std::uint16_t j : near) {
+      if ((centres_[j] - p_A).squaredNorm() > reach_[j] * reach_[j]) continue;
+      Contact contact;
+      if (!cross(Piece(*features_.features_A, i, Pose()), Piece(*features_.features_B, point_[j], X_AB_),
+                 query_.margin, kListedTolerance, contact) ||
+          contact.gap - query_.dilation > query_.margin)
+        continue;
+      list(i, point_[j], contact);
+    }
+  }
+
+  void list(std::uint32_t point, std::uint32_t other, Contact& contact) {
+    contact.kind = ContactKind::kCrossing;
+    contact.point = point;
+    contact.other = other;
+    evaluateCrossing(Piece(*features_.features_A, point, query_.X_WA),
+                     Piece(*features_.features_B, other, query_.X_WB), query_.dilation, contact);
+    result_.smallest_gap = std::min(result_.smallest_gap, contact.gap);
+    if (listed_ < kMaxCrossings && result_.contacts.push_back(contact)) {
+      ++listed_;
+    } else {
+      drop(std::min(contact.gap, query_.margin), result_);
+    }
+  }
+
+  const PairQuery& query_;
+  const PairFeatures& features_;
+  PairQueryResult& result_;
+  const Pose X_AB_;
+  // B's pieces near A, in A's frame
+  std::size_t count_ = 0;
+  std::array<Vector3f, kMaxPairContacts> centres_;
+  std::array<float, kMaxPairContacts> reach_;  ///< [m] centres of pieces that cross it are no farther
+  std::array<std::uint32_t, kMaxPairContacts> point_;
+  Indices all_, by_cluster_, by_leaf_;
+  std::size_t listed_ = 0;
+};
 
 }  // namespace
 
@@ -213,17 +253,9 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
   }
   if (half_A == 0.0 || half_B == 0.0) return;
 
-  // a crossing is nearer than the centre of a piece by half its length at most
-  double crossing_bound = of_B.smallest_gap - half_B;
-  if (!of_B.contacts.empty()) {
-    PairQueryResult& of_A = scratch.of_A;
-    queryPair({&features.features_A->points(), query.field_B, query.X_WA, query.X_WB, query.dilation,
-               query.margin + half_A},
-              of_A);
-    addCounts(of_A.counts, result.counts);
-    crossing_bound = of_A.contacts.empty() ? of_A.smallest_gap - half_A : query.margin;
-    if (!of_A.contacts.empty()) listCrossings(query, features, scratch, result);
-  }
+  // a crossing is nearer than the centre of B's piece by half its length at most
+  const double crossing_bound = of_B.contacts.empty() ? of_B.smallest_gap - half_B : query.margin;
+  if (!of_B.contacts.empty()) CrossingSearch(query, features, result).run(of_B.contacts);
   result.smallest_gap = std::min(result.smallest_gap, crossing_bound);
   result.unlisted_gap = std::min(result.unlisted_gap, crossing_bound);
 }
@@ -235,7 +267,7 @@ void resampleFeatures(const PairQuery& query, const PairFeatures& features, doub
     return contact.kind != ContactKind::kShellPoint;
   });
   ContactList& points = scratch.of_B.contacts;
-  ContactList& crossings = scratch.of_A.contacts;
+  ContactList& crossings = scratch.crossings;
   points.clear();
   crossings.clear();
   for (const Contact* contact = first; contact != contacts.end(); ++contact)

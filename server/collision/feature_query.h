@@ -24,7 +24,8 @@ struct PairFeatures {
 
 /// Memory of the functions below; one for each thread.
 struct FeatureScratch {
-  PairQueryResult of_A, of_B;  ///< features of one body in the field of the other
+  PairQueryResult of_B;   ///< B's features in A's field
+  ContactList crossings;  ///< that are evaluated again
 };
 
 /// Adds to the result of queryPair the contacts of features up to `query.margin`: of kFeaturePoint, then of
@@ -40,7 +41,7 @@ struct FeatureScratch {
 void queryFeatures(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
                    PairQueryResult& result) noexcept;
 
-/// resampleContacts() for a list with contacts of features.
+/// resampleContacts() for a list with contacts of features; `displacement` [m] as there.
 ///
 /// Threads: pure, but for the scratch. Real-time.
 void resampleFeatures(const PairQuery& query, const PairFeatures& features, double displacement,
