@@ -18,10 +18,10 @@ using Edge = WeldedMesh::Edge;
 using structures::FeatureEdge;
 using structures::SurfaceSample;
 
-constexpr double kCos3 = -0.99863;   // [-] -cos of the turn between faces from which an edge counts
+constexpr double kCos3 = -0.99863;    // [-] -cos of the turn between faces from which an edge counts
 constexpr double kTanHalf20 = 0.176;  // [-] tan of half the turn from which an edge is sharp at any radius
-constexpr double kCos6 = 0.995;      // [-] a polyline that turns less at a vertex is straight there
-constexpr double kCos20 = 0.94;      // [-] faces of edges that are merged turn by less
+constexpr double kCos6 = 0.995;       // [-] a polyline that turns less at a vertex is straight there
+constexpr double kCos20 = 0.94;       // [-] faces of edges that are merged turn by less
 
 /// [m] Features are sampled for a pointshell of the other part with about this spacing at most, and at least.
 constexpr double kLargestSpacing = 0.004;
@@ -153,8 +153,7 @@ class FeatureFinder {
   /// Whether the vertices of the chain between i and j are on the segment of these two, and the faces of the
   /// edges turn little.
   [[nodiscard]] bool isStraight(const std::vector<std::uint32_t>& chain,
-                                const std::vector<std::uint32_t>& edges, std::size_t i,
-                                std::size_t j) const {
+                                const std::vector<std::uint32_t>& edges, std::size_t i, std::size_t j) const {
     const Vector3 a = at(chain[i]);
     const Vector3 along = (at(chain[j]) - a).normalized();
     const double tolerance = sizes_.piece / 200.0;

@@ -112,11 +112,21 @@ std::array<std::span<const std::byte>, kSections> sectionsOf(const HapticStructu
   const Pointshell& shell = structures.shell;
   const Pointshell& features = structures.features.points();
   const StructureInfo& info = structures.info;
-  return {bytes(field.index),       bytes(field.samples),      bytes(field.far),
-          bytes(shell.points()),    bytes(shell.leaves()),     bytes(shell.clusters()),
-          bytes(shell.levels()),    bytes(info.source),        bytes(info.content_hash),
-          bytes(info.notes),        bytes(meshes),             bytes(features.points()),
-          bytes(features.leaves()), bytes(features.clusters()), bytes(features.levels()),
+  return {bytes(field.index),
+          bytes(field.samples),
+          bytes(field.far),
+          bytes(shell.points()),
+          bytes(shell.leaves()),
+          bytes(shell.clusters()),
+          bytes(shell.levels()),
+          bytes(info.source),
+          bytes(info.content_hash),
+          bytes(info.notes),
+          bytes(meshes),
+          bytes(features.points()),
+          bytes(features.leaves()),
+          bytes(features.clusters()),
+          bytes(features.levels()),
           bytes(structures.features.edges())};
 }
 

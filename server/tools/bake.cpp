@@ -128,9 +128,8 @@ void printInfo(const structures::HapticStructures& structures) {
              structures.shell.points().size(), info.surface_area, structures.shell.leaves().size(),
              structures.shell.clusters().size(), readable(structures.shell.boundingRadius()));
   const auto edges = structures.features.edges();
-  const auto pieces = std::count_if(edges.begin(), edges.end(), [](const structures::FeatureEdge& edge) {
-    return !edge.half_M.isZero();
-  });
+  const auto pieces = std::count_if(
+      edges.begin(), edges.end(), [](const structures::FeatureEdge& edge) { return !edge.half_M.isZero(); });
   fmt::print("features      {} points, {} of them on edges in pieces of up to {}\n", edges.size(), pieces,
              readable(2.0 * structures.features.longestHalf()));
   std::size_t used = 0;
