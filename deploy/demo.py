@@ -1,16 +1,37 @@
 #!/usr/bin/env python3
 """`tenon demo`: a whole training session with simulated people, as separate processes over DDS on the loopback interface."""
 import argparse
+import ctypes
+import functools
+import itertools
 import os
+import re
 import signal
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
 sys.dont_write_bytecode = True  # an installation stays as it was installed
-from demo_scene import shipped_as, trainee_hands
+from demo_scene import hands_of, shipped_as
+
+
+# what it writes into its folder
+OUTPUTS = ("session.mcap", "journal.mcap", "report.html", "summary.json", "scene.png", "serve.log", "record.log", "observer.log",
+           "trainee.log", "instructor.log")
+
+
+def between(kind, low, high):
+    """A type of argparse: a number from `low` to `high`."""
+    def number(text):
+        try:
+            value = kind(text)
+        except ValueError:
+            value = None
+        if value is None or not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"'{text}' is not a number from {low} to {high}")
+        return value
+    return number
 
 
 def arguments():
@@ -20,44 +41,110 @@ def arguments():
                     "process of its own. People and devices are simulated. Exit code: 0 when every part was mounted within "
                     "tolerance, 1 when not, 2 for wrong usage.")
     parser.add_argument("--scenario", default="engine_bay", help="a shipped scenario's name or a path (default: %(default)s)")
-    parser.add_argument("--out", metavar="DIR", default="out/demo",
-                        help="where recording, report and logs go; those of the last demo are replaced (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=1, help="of the simulated people's skills and errors (default: %(default)s)")
-    parser.add_argument("--detail", type=float, default=0.12, help="of the scene, 0 to 1; 1 is 1.8 million triangles (default: %(default)s)")
+    parser.add_argument("--out", metavar="DIR", type=Path,
+                        help="where recording, report and logs go (default: out/demo; while that has an earlier demo, out/demo-2 and so on)")
+    parser.add_argument("--overwrite", action="store_true", help="replace those of an earlier demo in that folder (default: out/demo)")
+    parser.add_argument("--seed", type=between(int, 0, 2**64 - 1), default=1, help="of the simulated people's skills and errors (default: %(default)s)")
+    parser.add_argument("--detail", type=between(float, 0, 1), default=0.12, help="of the scene, 0 to 1; 1 is 1.8 million triangles (default: %(default)s)")
     parser.add_argument("--lockstep", action="store_true", help="ticks wait for each other instead of the clock: repeatable to the last bit")
     parser.add_argument("--headless", action="store_true", help="do not open the report in a browser at the end")
-    parser.add_argument("--workers", type=int, default=1, help="threads of the server that compute contacts (default: %(default)s)")
+    parser.add_argument("--workers", type=between(int, 1, 64), default=1, help="threads of the server that compute contacts (default: %(default)s)")
     parser.add_argument("--no-instructor", action="store_true", help="nobody corrects the misplaced mount: its step runs out of time")
     parser.add_argument("--device", default="sigma7-sim", help="the instructor's device (default: %(default)s)")
-    parser.add_argument("--domain", type=int, default=100 + os.getpid() % 100, help="DDS domain (default: one that is likely free)")
+    parser.add_argument("--domain", type=between(int, 0, 230), default=100 + os.getpid() % 100, help="DDS domain (default: one that is likely free)")
     parser.add_argument("--programs", required=True, help=argparse.SUPPRESS)
     parser.add_argument("--scenarios", required=True, help=argparse.SUPPRESS)
     return parser.parse_args()
 
 
-class Processes:
+class Stopped(Exception):
+    """A signal asked the demo to end."""
+
+    def __init__(self, number):
+        super().__init__(number)
+        self.number = number
+
+
+def stop_at_signals():
+    def stop(number, _frame):
+        raise Stopped(number)
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, stop)
+
+
+LIBC = ctypes.CDLL(None)
+DEMO = os.getpid()
+PR_SET_PDEATHSIG = 1
+
+
+def die_with_the_demo():
+    """In a child before it becomes another program: the system kills it when the demo ends, however it ends."""
+    LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != DEMO:
+        os._exit(1)
+
+
+def run(*words, **options):
+    return subprocess.run(words, preexec_fn=die_with_the_demo, check=False, **options)
+
+
+class Program:
+    """A program of the session, which writes to a log."""
+
+    def __init__(self, name, words, log):
+        self.name, self.log, self.read_until = name, log, 0
+        shows_loading = name == "serve" and sys.stderr.isatty()
+        with open(log, "wb") as out:
+            self.process = subprocess.Popen(words, stdout=out, stderr=None if shows_loading else out, stdin=subprocess.DEVNULL,
+                                            start_new_session=True, preexec_fn=die_with_the_demo)
+
+    def new_lines(self):
+        """The lines that it has written since the last call."""
+        with open(self.log, "rb") as file:
+            file.seek(self.read_until)
+            whole = file.read().rpartition(b"\n")[0:2]
+        written = b"".join(whole)
+        self.read_until += len(written)
+        return written.decode("utf-8", "replace").splitlines()
+
+    def lines(self):
+        return self.log.read_text(encoding="utf-8", errors="replace").splitlines()
+
+    def last_line(self):
+        """What it said last; after an error of usage comes a hint to --help."""
+        said = (line for line in reversed(self.lines()) if line.strip() and not line.startswith("Run with --help"))
+        return next(said, "it said nothing")
+
+    def is_running(self):
+        return self.process.poll() is None
+
+    def has_failed(self):
+        """Whether it has ended and not as it should. The observer's exit code is that of the session, unless it names itself."""
+        if self.process.poll() in (None, 0):
+            return False
+        return self.name != "observer" or self.process.returncode < 0 or self.last_line().startswith("tenon-observer:")
+
+
+class Programs:
     """The programs of a session; none is left running at the end."""
 
     def __init__(self, args, out):
-        self.args, self.out = args, out
-        self.programs = Path(args.programs)
-        self.running = {}
+        self.args, self.out, self.folder = args, out, Path(args.programs)
+        self.started = {}
 
-    def start(self, name, *words, piped=False):
-        """Starts tenon-<name>; its output goes to its log, or its standard output to a pipe."""
-        log = open(self.out / f"{name}.log", "w", encoding="utf-8")
-        shows_loading = name == "serve" and sys.stderr.isatty()
-        self.running[name] = subprocess.Popen([self.programs / f"tenon-{name}", *map(str, words)], stdout=subprocess.PIPE if piped else log,
-                                              stderr=None if shows_loading else log, text=True, start_new_session=True)
-        return self.running[name]
-
-    def common(self):
-        words = ["--session", "demo", "--domain", self.args.domain]
-        return words + (["--lockstep"] if self.args.lockstep else [])
+    def start(self, name, *words):
+        """Starts tenon-<name>; its output goes to its log."""
+        words = [self.folder / f"tenon-{name}", *map(str, words), "--session", "demo", "--domain", str(self.args.domain)]
+        if self.args.lockstep and name != "observer":
+            words.append("--lockstep")
+        self.started[name] = Program(name, words, self.out / f"{name}.log")
+        return self.started[name]
 
     def stop(self):
         for number in (signal.SIGINT, signal.SIGKILL):
-            alive = [process for process in self.running.values() if process.poll() is None]
+            alive = [program.process for program in self.started.values() if program.is_running()]
             for process in alive:
                 process.send_signal(number)
             deadline = time.monotonic() + 10
@@ -68,103 +155,142 @@ class Processes:
                     pass
 
     def failed(self):
-        return [name for name, process in self.running.items() if process.poll() not in (None, 0)]
-
-
-def echo(process, log):
-    for line in process.stdout:
-        print(line, end="", flush=True)
-        log.write(line)
-
-
-def log_until(process, text, log):
-    """Logs a program's output up to the line that holds `text`; False when the program ended before."""
-    for line in process.stdout:
-        log.write(line)
-        log.flush()
-        if text in line:
-            return True
-    return False
+        return [program for program in self.started.values() if program.name != "serve" and program.has_failed()]
 
 
 def say(text):
     print(text, flush=True)
 
 
-def run_session(args, out, processes):
+def wait_until(done, seconds=None, meanwhile=lambda: None):
+    """Whether `done` came true in time."""
+    deadline = None if seconds is None else time.monotonic() + seconds
+    while not done():
+        if deadline is not None and time.monotonic() > deadline:
+            return False
+        meanwhile()
+        time.sleep(0.05)
+    return True
+
+
+def say_new_lines(program):
+    for line in program.new_lines():
+        say(line)
+
+
+def is_open(server):
+    """Whether the session is open; says what the server says while it prepares the scene."""
+    for line in server.new_lines():
+        if "is open" in line:
+            return True
+        say(line)
+    return False
+
+
+def session_result(server):
+    """How the session ended, in the server's words; None when the server ended without saying it."""
+    return next((line for line in server.lines() if re.search(r" after [0-9.]+ s; late ticks: ", line)), None)
+
+
+def run_session(args, out, programs):
     scenario = Path(args.scenarios) / args.scenario
     scenario = scenario if scenario.exists() else Path(args.scenario)
     recording = out / "session.mcap"
     shipped = shipped_as(scenario, args.scenarios)
-    awaited = [*trainee_hands(scenario), "recorder", "observer"] + ([] if args.no_instructor else ["instructor"])
+    hands = hands_of(scenario)
+    has_instructor = not args.no_instructor and "instructor" in hands.values()
+    awaited = [*(name for name, role in hands.items() if role == "trainee"), "recorder", "observer"]
 
-    say("preparing the scene (the first time this takes a minute: parts are made and baked)")
-    server = processes.start("serve", scenario, "--session", "demo", "--domain", args.domain, "--detail", args.detail,
-                             "--wait-for", ",".join(awaited), "--workers", args.workers, "--journal", out / "journal.mcap",
-                             *(["--lockstep"] if args.lockstep else []), piped=True)
-    server_log = open(out / "serve.log", "a", encoding="utf-8")
-    if not log_until(server, "is open", server_log):
-        say(f"the server did not start:\n{(out / 'serve.log').read_text(encoding='utf-8')[-2000:]}")
+    server = programs.start("serve", scenario, "--detail", args.detail, "--workers", args.workers, "--journal", out / "journal.mcap",
+                            "--wait-for", ",".join(awaited + (["instructor"] if has_instructor else [])))
+    opened = False
+    while not opened and server.is_running():
+        opened = is_open(server)
+        time.sleep(0.05)
+    if not opened:
+        say("the server did not start:\n" + "\n".join(server.lines()[-20:]))
         return 1
-    threading.Thread(target=log_until, args=(server, "\0", server_log), daemon=True).start()
 
-    processes.start("record", "-o", recording, *processes.common())
-    observer = processes.start("observer", "--session", "demo", "--domain", args.domain, piped=True)
-    watching = threading.Thread(target=echo, args=(observer, open(out / "observer.log", "w", encoding="utf-8")), daemon=True)
-    watching.start()
+    programs.start("record", "-o", recording)
+    observer = programs.start("observer")
     misplaced = ["--misplace-mount", 2] if shipped == "engine_bay" else []
-    processes.start("trainee", "--device", "hug-sim", "--seed", args.seed, *misplaced, *processes.common())
-    if not args.no_instructor:
-        processes.start("instructor", "--device", args.device, "--seed", args.seed, *processes.common())
+    programs.start("trainee", "--device", "hug-sim", "--seed", args.seed, *misplaced)
+    if has_instructor:
+        programs.start("instructor", "--device", args.device, "--seed", args.seed)
 
-    outcome = server.wait()
-    for name in ("record", "observer", "trainee", "instructor"):
-        if name in processes.running:
-            try:
-                processes.running[name].wait(15)
-            except subprocess.TimeoutExpired:
-                say(f"{name} did not end by itself")
-    watching.join(5)
-    if failed := [name for name in processes.failed() if name not in ("serve", "observer")]:
-        say(f"these programs failed: {', '.join(failed)} (see {out}/*.log)")
-        outcome = outcome or 1
+    show = functools.partial(say_new_lines, observer)
+    wait_until(lambda: not server.is_running() or programs.failed(), meanwhile=show)
+    # a server that fails takes the others with it
+    if not wait_until(lambda: not server.is_running(), 3, show):
+        for program in programs.failed():
+            say(f"{program.name} has ended, so the session is stopped: {program.last_line()}")
+        return 1
+    outcome = server.process.returncode
+    others = [program for program in programs.started.values() if program is not server]
+    wait_until(lambda: not any(program.is_running() for program in others), 20, show)
+    show()
+    for program in others:
+        if program.is_running():
+            say(f"{program.name} did not end by itself")
+        elif program.has_failed():
+            say(f"{program.name} failed: {program.last_line()}")
+            outcome = outcome or 1
+    say(session_result(server) or f"the server ended without a result: {server.last_line()}")
 
     say("")
     if shipped is None:
         say("no picture: those of the shipped scenarios only can be drawn")
-    elif subprocess.run([processes.programs / "tenon-parts", shipped, "--picture", out / "scene.png", "--detail", str(args.detail)],
-                        capture_output=True).returncode != 0:
+    elif run(programs.folder / "tenon-parts", shipped, "--picture", out / "scene.png", "--detail", str(args.detail),
+             capture_output=True).returncode != 0:
         say("no picture of the scene could be made")
-    report = subprocess.run([processes.programs / "tenon-report", recording, "-o", out])
+    report = run(programs.folder / "tenon-report", recording, "-o", out)
     say(f"\nrecording: {recording}\nreport:    {out / 'report.html'}")
     if not args.headless:
         try:
-            subprocess.run(["xdg-open", out / "report.html"], stderr=subprocess.DEVNULL, check=False)
+            run("xdg-open", out / "report.html", stderr=subprocess.DEVNULL)
         except FileNotFoundError:
             pass  # a machine without a desktop: the report's path was said
     if args.lockstep:
-        hashes = [line for line in (out / "serve.log").read_text(encoding="utf-8").splitlines() if "final state hash" in line]
+        hashes = [line for line in server.lines() if "final state hash" in line]
         say(hashes[-1] if hashes else "final state hash: unknown")
     return 1 if outcome or report.returncode else 0
 
 
+def has_demo(folder):
+    return any((folder / name).exists() for name in OUTPUTS)
+
+
+def output_folder(args):
+    """Where the files go: what was asked for, else a folder without an earlier demo."""
+    first = Path("out/demo")
+    if args.out or args.overwrite or not has_demo(first):
+        return args.out or first
+    return next(folder for number in itertools.count(2) if not has_demo(folder := Path(f"out/demo-{number}")))
+
+
 def main():
     args = arguments()
-    out = Path(args.out)
+    out = output_folder(args)
     try:
         out.mkdir(parents=True, exist_ok=True)
+        for file in (out / name for name in OUTPUTS):
+            if file.exists() and not args.overwrite:
+                print(f"tenon demo: {file}: exists; --overwrite replaces it, --out DIR names another folder", file=sys.stderr)
+                return 1
+            file.unlink(missing_ok=True)
         (out / "serve.log").write_text("", encoding="utf-8")
     except OSError as problem:
         print(f"tenon demo: nothing can be written to {out} ({problem.strerror}): name a folder of yours with --out DIR", file=sys.stderr)
         return 1
-    processes = Processes(args, out)
+    stop_at_signals()
+    programs = Programs(args, out)
     try:
-        return run_session(args, out, processes)
-    except KeyboardInterrupt:
+        return run_session(args, out, programs)
+    except Stopped as stopped:
         say("\nstopped")
-        return 130
+        return 128 + stopped.number
     finally:
-        processes.stop()
+        programs.stop()
 
 
 if __name__ == "__main__":

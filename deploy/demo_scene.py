@@ -3,16 +3,17 @@ import re
 from pathlib import Path
 
 
-def trainee_hands(scenario):
-    """Names of the hands that the trainee's station takes: those of a scenario (a folder or YAML file) without `role: instructor`."""
+def hands_of(scenario):
+    """Role by name of each hand of a scenario (a folder or YAML file); a hand without `role:` is the trainee's."""
     file = scenario / "scenario.yaml" if scenario.is_dir() else scenario
     if not file.is_file():
-        return []  # the server says so
+        return {}  # the server says so
     text = re.sub(r"(?m)(^|\s)#.*$", "", file.read_text(encoding="utf-8", errors="replace"))
     hands = re.search(r"(?ms)^hands:(.*?)(?=^\w|\Z)", text)
     entries = re.split(r"(?:^|\n)\s*-\s|\[\s*\{|\}\s*,\s*\{", hands[1])[1:] if hands else []
-    return [name[1] for entry in entries if not re.search(r"\brole:\s*instructor\b", entry)
-            and (name := re.search(r"\bname:\s*[\"']?([^\s,}\"']+)", entry))]
+    value = r":\s*[\"']?([^\s,}\"']+)"
+    return {name[1]: role[1] if (role := re.search(r"\brole" + value, entry)) else "trainee" for entry in entries
+            if (name := re.search(r"\bname" + value, entry))}
 
 
 def shipped_as(scenario, scenarios):

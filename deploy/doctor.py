@@ -30,12 +30,15 @@ def check_cores(_):
     return "note", f"{cores} cores", "server, stations and observers share them: expect late ticks; --lockstep is not affected"
 
 
+PRIORITY = 75  # of a station's servo thread; the server's tick has 70
+
+
 def check_real_time(_):
     limit = resource.getrlimit(resource.RLIMIT_RTPRIO)[1]
-    if os.geteuid() == 0 or limit >= 70:
+    if os.geteuid() == 0 or limit >= PRIORITY:
         return "good", "real-time priority is permitted", ""
-    return "note", f"real-time priority up to {limit}, 70 is wanted", \
-        "add 'YOURNAME - rtprio 80' to /etc/security/limits.d/tenon.conf and log in again; without it Tenon runs on, later ticks are likelier"
+    return "note", f"real-time priority up to {limit}, {PRIORITY} is wanted", \
+        "add 'YOURNAME - rtprio 80' to /etc/security/limits.d/tenon.conf and log in again; without it Tenon runs too, but late ticks are likelier"
 
 
 def check_memory_lock(_):
@@ -46,7 +49,8 @@ def check_memory_lock(_):
 
 
 def check_programs(args):
-    wanted = ("serve", "bake", "parts", "trainee", "instructor", "observer", "record", "report")
+    wanted = ("serve", "trainee", "instructor", "observer", "command", "record", "report", "rehearse", "parts", "bake", "probe",
+              "contact", "voxels")
     missing = [f"tenon-{name}" for name in wanted if not os.access(Path(args.programs) / f"tenon-{name}", os.X_OK)]
     if not missing:
         return "good", f"{len(wanted)} programs are there", ""
@@ -58,12 +62,13 @@ def check_bus(args):
     if not os.access(observer, os.X_OK):
         return "note", "not tried", "the observer is missing"
     try:
-        done = subprocess.run([observer, "--domain", "231", "--wait", "1"], capture_output=True, text=True, timeout=30)
+        done = subprocess.run([observer, "--domain", "230", "--session", "of tenon doctor", "--wait", "1"], capture_output=True, text=True, timeout=30)
     except subprocess.TimeoutExpired:
         return "bad", "DDS hangs on this machine's network", "unset CYCLONEDDS_URI and try again"
     if "session" in (done.stdout + done.stderr).lower():
         return "good", "DDS works on loopback", ""
-    return "bad", (done.stderr or done.stdout).strip().splitlines()[-1:] or "DDS did not start", \
+    lines = (done.stderr or done.stdout).strip().splitlines()
+    return "bad", lines[-1] if lines else "DDS did not start", \
         "is the loopback interface up (ip link show lo)? is CYCLONEDDS_URI set to something else?"
 
 

@@ -71,8 +71,8 @@ std::string listOf(const Table& table) {
 
 }  // namespace
 
-OpenedDevice openDevice(std::string_view name, std::uint64_t seed) {
-  if (const auto* entry = findIn(kDevices, name)) return entry->open(seed);
+Result<void> checkDeviceName(std::string_view name) {
+  if (findIn(kDevices, name)) return {};
   if (findIn(kBimanualDevices, name))
     return fail(
         "device '" + std::string(name) +
@@ -81,9 +81,19 @@ OpenedDevice openDevice(std::string_view name, std::uint64_t seed) {
               "; bimanual: " + listOf(kBimanualDevices));
 }
 
-OpenedBimanual openBimanualDevice(std::string_view name, std::uint64_t seed) {
-  if (const auto* entry = findIn(kBimanualDevices, name)) return entry->open(seed);
+Result<void> checkBimanualDeviceName(std::string_view name) {
+  if (findIn(kBimanualDevices, name)) return {};
   return fail("unknown bimanual device '" + std::string(name) + "'; known: " + listOf(kBimanualDevices));
+}
+
+OpenedDevice openDevice(std::string_view name, std::uint64_t seed) {
+  if (const auto known = checkDeviceName(name); !known) return fail(known.error().what);
+  return findIn(kDevices, name)->open(seed);
+}
+
+OpenedBimanual openBimanualDevice(std::string_view name, std::uint64_t seed) {
+  if (const auto known = checkBimanualDeviceName(name); !known) return fail(known.error().what);
+  return findIn(kBimanualDevices, name)->open(seed);
 }
 
 std::vector<std::string_view> deviceNames() { return namesIn(kDevices); }

@@ -19,6 +19,11 @@ namespace tenon::devices {
 [[nodiscard]] Result<std::unique_ptr<BimanualDevice>> openBimanualDevice(std::string_view name,
                                                                          std::uint64_t seed = 1);
 
+/// Whether the catalog has the name; otherwise fails as openDevice and openBimanualDevice do, and opens
+/// nothing. Threads: any. Real-time: no.
+[[nodiscard]] Result<void> checkDeviceName(std::string_view name);
+[[nodiscard]] Result<void> checkBimanualDeviceName(std::string_view name);
+
 /// All names of the catalog.
 [[nodiscard]] std::vector<std::string_view> deviceNames();
 [[nodiscard]] std::vector<std::string_view> bimanualDeviceNames();

@@ -11,6 +11,9 @@
 
 namespace tenon::devices {
 
+inline constexpr double kMaxMotorCounts =
+    4096.0;  ///< [-] motor counts at which a command saturates, either sign
+
 /// Capabilities and limits of a device. Where a device sets them it states each number's source and
 /// certainty: [paper], [published] by the vendor or in the literature, [measured] or [assumed]. 0 for a limit
 /// means that the device lacks the feature.
@@ -29,14 +32,14 @@ struct DeviceCaps {
   double torque_slew = 10.0;              ///< [Nm/s] likewise
   double max_stiffness = 0.0;             ///< [N/m] renderable
   double max_rotational_stiffness = 0.0;  ///< [Nm/rad] likewise
-  double physical_damping = 0.0;          ///< [Ns/m] of the mechanics: b in the passivity condition K < 2b/T
+  double physical_damping = 0.0;          ///< [Ns/m] of the mechanics: b in K <= b / (T/2 + delay)
   double physical_rotational_damping = 0.0;  ///< [Nms/rad] likewise
   double injected_damping = 0.0;  ///< [Ns/m] largest virtual damping that its velocity signal allows
   double injected_rotational_damping = 0.0;  ///< [Nms/rad] likewise
   double delay = 0.0;           ///< [s] from a command to the force, in addition to the hold of one period
   double max_speed = 1.0;       ///< [m/s] above it the safety layer brakes
   double rate = 1000.0;         ///< [Hz] of the servo loop
-  double force_quantum = 0.0;   ///< [N] of one motor count; a motor command saturates at +-4096 counts
+  double force_quantum = 0.0;   ///< [N] of one motor count; commands saturate at kMaxMotorCounts
   double clutch_force = 0.0;    ///< [N] at which its magnetic clutch opens
   double clutch_warning = 0.0;  ///< [N] at which the safety layer warns of the clutch
   std::uint32_t tactors = 0;    ///< number of vibration motors
@@ -46,12 +49,12 @@ enum class DeviceFault : std::uint8_t {
   kNone,
   kNonFinite,  ///< a commanded force was NaN or infinite
   kStale,      ///< watchdog: no write for too long
-  kVelocity,
-  kForce,
-  kWorkspace,
+  kVelocity,   ///< faster than the device permits
+  kForce,      ///< measured or commanded force above what the device permits
+  kWorkspace,  ///< outside of what its kinematics permit
   kClutchOpen,
-  kEmergencyStop,
-  kCommunication,
+  kEmergencyStop,  ///< its own emergency stop
+  kCommunication,  ///< readings do not arrive any more
 };
 
 /// One reading of a device, in its frame D: origin at the centre of the workspace; x right, y away from the
@@ -90,8 +93,9 @@ class HapticDevice {
   virtual void disarm() noexcept = 0;
   /// From fault to open. Called on behalf of an operator who has inspected the device.
   [[nodiscard]] virtual Result<void> resetFault() = 0;
+  /// The newest reading; does not wait. Once the communication is lost: the last one, with the fault set.
   virtual void read(DeviceState& state) noexcept = 0;
-  /// Ignored unless armed.
+  /// The command to display until the next write. Ignored unless armed; one that is not finite is a fault.
   virtual void write(const DeviceCommand& command) noexcept = 0;
 };
 

@@ -135,7 +135,7 @@ Wrench Safety::limitOutput(const Wrench& wrench, double dt) noexcept {
   const double force = wrench.force.norm();
   setFlag(SafetyRule::kForceLimited, force > limits_.peak_force || wrench.torque.norm() > limits_.torque);
   setFlag(SafetyRule::kThermal, force > thermal_limit && thermal_limit < limits_.peak_force);
-  Wrench limited{limitNorm(wrench.force, thermal_limit), limitNorm(wrench.torque, limits_.torque)};
+  Wrench limited{clampNorm(wrench.force, thermal_limit), clampNorm(wrench.torque, limits_.torque)};
   if (limits_.force_quantum > 0.0) {
     const Vector3 quantized = quantizeForce(limited.force, limits_.force_quantum);
     setFlag(SafetyRule::kMotorSaturated,

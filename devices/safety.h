@@ -19,7 +19,7 @@ struct ClutchLatch {
 /// Input of the safety layer for one period.
 struct SafetyRequest {
   DeviceCommand requested;
-  double age = 0.0;        ///< [s] of the data from which the force was computed
+  double age = 0.0;  ///< [s] of the data from which the force was computed; 0 where it is computed each cycle
   double stiffness = 0.0;  ///< [N/m] of the spring that made the force; 0: the force is not a spring's
   double rotational_stiffness = 0.0;  ///< [Nm/rad] likewise
   bool dead_man_held = true;

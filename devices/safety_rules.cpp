@@ -6,7 +6,6 @@
 namespace tenon::devices {
 namespace {
 
-constexpr double kMaxMotorCommand = 4096.0;   ///< [counts]
 constexpr double kWallRadiusFraction = 0.95;  ///< [-] of the workspace radius
 constexpr double kStorageTravel = 0.02;       ///< [m] energy capacity = peak force along this displacement
 constexpr double kActiveSpeed = 0.01;         ///< [m/s] active power = peak force at this speed
@@ -119,14 +118,9 @@ Vector3 wallForce(const Vector3& p_DH, const SafetyLimits& limits) noexcept {
   return p_DH.normalized() * (-limits.wall_stiffness * beyond);
 }
 
-Vector3 limitNorm(const Vector3& v, double limit) noexcept {
-  const double norm = v.norm();
-  return norm > limit ? Vector3(v * (limit / norm)) : v;
-}
-
 Vector3 quantizeForce(const Vector3& force, double quantum) noexcept {
   const auto quantized = [quantum](double newton) {
-    return std::trunc(std::clamp(newton / quantum, -kMaxMotorCommand, kMaxMotorCommand)) * quantum;
+    return std::trunc(std::clamp(newton / quantum, -kMaxMotorCounts, kMaxMotorCounts)) * quantum;
   };
   return force.unaryExpr(quantized);
 }

@@ -75,14 +75,12 @@ struct SafetyLimits {
 [[nodiscard]] double stiffnessFactor(double K, double limit) noexcept;
 /// Factor [-] of the ramp, `since_start` [s] after the forces came on.
 [[nodiscard]] double softStartFactor(double since_start, const SafetyLimits& limits) noexcept;
-/// Next output on the way from `output` to `target`: a decrease or a change of direction acts at once, the
-/// component along `target` grows by at most `step` [N or Nm].
+/// Output of the next cycle, from `output` towards `target`: a decrease or a change of direction acts at
+/// once, the component along `target` grows by at most `step` [N or Nm].
 [[nodiscard]] Vector3 slewLimited(const Vector3& output, const Vector3& target, double step) noexcept;
 /// [N] inward force of the spring outside `wall_radius`; zero inside.
 [[nodiscard]] Vector3 wallForce(const Vector3& p_DH, const SafetyLimits& limits) noexcept;
-/// `v` scaled to a norm of at most `limit` [unit of v].
-[[nodiscard]] Vector3 limitNorm(const Vector3& v, double limit) noexcept;
-/// Per axis rounded towards zero to whole motor counts of `quantum` [N] and saturated at +-4096 counts.
+/// Per axis rounded towards zero to whole motor counts of `quantum` [N] and saturated at +-kMaxMotorCounts.
 [[nodiscard]] Vector3 quantizeForce(const Vector3& force, double quantum) noexcept;
 
 /// Motor temperature as a fraction of the steady temperature at continuous force: first-order lag of
@@ -104,8 +102,8 @@ class MotorThermalModel {
 /// 2002).
 ///
 /// Two departures from the paper, because other people's forces make the shared scene active: the stored
-/// energy is bounded, so that dissipation by long friction cannot later pay for a burst; and a small power
-/// may be delivered at any time.
+/// energy is bounded, so that energy dissipated by long friction cannot be returned in a burst later; and a
+/// small power may be delivered at any time.
 ///
 /// Threads: one. Real-time: everything.
 class PassivityObserver {

@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 #include <unistd.h>
 
+#include "idl/types/output_files.h"
 #include "server/session/journal.h"
 #include "server/session/renamed_options.h"
 #include "server/session/session_server.h"
@@ -26,6 +27,7 @@ struct ServeArguments {
   tenon::session::LoadOptions load{.cache = tenon::session::defaultCache()};
   std::string resimulate;  ///< journal or recording; empty: open a session
   bool despite_changes = false;
+  bool overwrite = false;
 };
 
 void declareOptions(CLI::App& app, ServeArguments& arguments) {
@@ -64,6 +66,7 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
       ->default_str("0.7");
   app.add_option("--journal", arguments.session.journal,
                  "record the inputs of each tick, and a checkpoint a second, in this file");
+  app.add_flag("--overwrite", arguments.overwrite, tenon::kOverwriteHelp);
   app.add_flag("--lockstep", arguments.session.lockstep,
                "a tick waits for the inputs of all hands instead of the clock: repeatable to the last bit");
   app.add_option(
@@ -74,8 +77,7 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
                "it differs");
   app.footer(
       "Exit code: 0 when everything was mounted (or all hashes of the re-simulation were equal), 1 "
-      "otherwise; 2 for an "
-      "option that has been renamed.");
+      "otherwise; 2 for wrong usage.");
 }
 
 void printLine(const std::string& text) {
@@ -83,13 +85,18 @@ void printLine(const std::string& text) {
   std::fflush(stdout);
 }
 
-int reportError(const std::string& what) {
-  std::fprintf(stderr, "tenon serve: %s\n", what.c_str());
-  return 1;
+const char* verb = "serve";  ///< of this run: or resimulate
+
+int reportError(const std::string& what, int exit_code = 1) {
+  std::fprintf(stderr, "tenon %s: %s\n", verb, what.c_str());
+  return exit_code;
 }
 
-/// Shows the progress on one line of a terminal; nothing when stderr is no terminal.
+/// Says once that something has to be baked, and shows the progress on one line of a terminal.
 void showLoading(std::string_view activity, double fraction) {
+  static bool is_said = false;
+  if (!is_said) printLine("preparing the scene: what is not baked yet is baked, which can take a minute");
+  is_said = true;
   static const bool is_terminal = isatty(STDERR_FILENO) != 0;
   if (is_terminal)
     std::fprintf(stderr, "\r\033[K%3.0f %%  %s", 100.0 * fraction, std::string(activity).c_str());
@@ -125,15 +132,32 @@ int resimulateFile(const ServeArguments& arguments, const tenon::session::Loaded
   return 0;
 }
 
+/// Checks before anything is baked what the scenario's text suffices for; the exit code, 0 for none.
+int checkArguments(const ServeArguments& arguments) {
+  const auto scenario = tenon::game_control::readScenario(arguments.scenario);
+  if (!scenario) return reportError(scenario.error().what);
+  if (const auto known = tenon::session::checkWaitFor(*scenario, arguments.session.wait_for); !known)
+    return reportError("--wait-for: " + known.error().what, kWrongUsage);
+  tenon::ProgramFiles files{{arguments.session.journal}, {scenario->path}, arguments.overwrite};
+  for (const tenon::game_control::ScenarioObject& object : scenario->objects)
+    for (const tenon::game_control::MeshSource& mesh : object.meshes) files.inputs.push_back(mesh.file);
+  const auto refusal = tenon::refuseOutputs(files);
+  return refusal ? reportError(refusal->what, refusal->exit_code) : 0;
+}
+
 int serve(ServeArguments& arguments) {
   if (arguments.scenario.empty() && !arguments.resimulate.empty()) {
     const auto origin = tenon::session::readJournalOrigin(arguments.resimulate);
     if (!origin) return reportError(origin.error().what);
-    arguments.scenario = origin->scenario;
+    const auto scenario = tenon::session::findScenario(arguments.resimulate, *origin);
+    if (!scenario) return reportError(scenario.error().what);
+    arguments.scenario = scenario->string();
     arguments.load.detail = origin->detail;
   }
   if (arguments.scenario.empty())
-    return reportError("name a scenario, as in: tenon serve scenarios/engine_bay");
+    return reportError("name a scenario, as in: tenon serve scenarios/engine_bay", kWrongUsage);
+  if (arguments.resimulate.empty())
+    if (const int wrong = checkArguments(arguments); wrong != 0) return wrong;
   const auto loaded = tenon::session::loadScene(arguments.scenario, arguments.load, showLoading);
   if (!loaded) return reportError(loaded.error().what);
   if (!arguments.resimulate.empty()) return resimulateFile(arguments, *loaded);
@@ -159,11 +183,14 @@ int main(int argc, char** argv) {
       "tenon serve");
   ServeArguments arguments;
   declareOptions(app, arguments);
-  if (const auto answer = tenon::session::renamedOption({argv, static_cast<std::size_t>(argc)})) {
-    reportError(*answer);
-    return kWrongUsage;
+  if (const auto answer = tenon::session::renamedOption({argv, static_cast<std::size_t>(argc)}))
+    return reportError(*answer, kWrongUsage);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kWrongUsage;
   }
-  CLI11_PARSE(app, argc, argv);
+  if (!arguments.resimulate.empty()) verb = "resimulate";
   std::signal(SIGINT, onStopSignal);
   std::signal(SIGTERM, onStopSignal);
   return serve(arguments);

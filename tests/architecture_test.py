@@ -18,7 +18,7 @@ sys.dont_write_bytecode = True  # the tree that is judged stays as it is
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import names_test
 import units_test
-from source_text import files_below, includes_of, read
+from source_text import SKIPPED_FOLDERS, files_below, includes_of, read
 
 IDL = ["idl/types", "idl/threads", "idl/wire", "idl/record"]
 STATION = IDL + ["devices", "clients/haptic"]
@@ -99,8 +99,8 @@ version""".split())
 # Units: a header and the .cpp of its name. These are units of more files: an interface and internals that know it.
 UNITS = {
     # the stages of one bake; bake.h has their options and results
-    "server/bake/bake": "server/bake/{brick_level,exposed_surface,face_sides,feature_bake,field_bake,flood,narrow_gaps,outside,parallel,"
-                        "shell_bake,slope_limit,welded_mesh}",
+    "server/bake/bake": "server/bake/{brick_level,exposed_surface,face_sides,feature_bake,field_bake,field_size,flood,narrow_gaps,"
+                        "outside,parallel,shell_bake,slope_limit,welded_mesh}",
     "server/collision/pair_query": "server/collision/{contact_blocks,contact_reducer,query_kernels,ridge_correction,*_lanes_inl}",
     "server/collision/island_solver": "server/collision/island_*",
     "server/collision/motion_solver": "server/collision/motion_workspace",
@@ -110,6 +110,10 @@ UNITS = {
 }
 
 TOPS = ("idl", "server", "devices", "clients", "scenarios", "tests")
+SOURCES = {".h", ".cpp"}
+# what C++, C and CUDA files are called elsewhere; whatever else a file includes is "not in the tree"
+OTHER_SOURCES = set(""".hpp .hh .hxx .h++ .H .HPP .cc .cxx .c++ .cp .C .CC .CPP .c .inl .inc .ipp .tpp .txx .tcc .icc .ixx .cppm .mpp .ii .def
+.cu .cuh .m .mm""".split())
 BEGIN = "<!-- printed by tests/architecture_test.py --table -->"
 END = "<!-- end of what is printed -->"
 
@@ -305,8 +309,11 @@ def text_with_table(text):
 
 def include_faults(root):
     """Faults of includes, of circles and of what the data claim, in the tree below root."""
+    folders = [folder.name for folder in root.iterdir() if folder.name not in SKIPPED_FOLDERS and not folder.name.startswith(".")]
     faults, includes = [], {}
-    for path, file in files_below(root, TOPS, {".h", ".cpp"}):
+    for path, _ in files_below(root, folders, OTHER_SOURCES):
+        faults.append(f"{path}: sources end with .h or .cpp: no test, formatter or build reads others")
+    for path, file in files_below(root, folders, SOURCES):
         includes[path] = includes_of(read(file))
         if room_of(path) is None:
             faults.append(f"{path}: stands in no room of the plan (ROOMS in tests/architecture_test.py)")
@@ -382,6 +389,15 @@ PLANTED = [
     ("server/session/d.cpp", '#include "server/tools/lines.h"', "no room may include server/tools"),
     ("idl/types/messages/hands.h", "#include <vector>", None),
     ("idl/types/messages/hands.h", '#include "idl/wire/second.h"', "idl/types may not include idl/wire"),
+    ("server/collision/a.hpp", "#include <mutex>", "sources end with .h or .cpp"),
+    ("server/collision/a.cc", '#include "server/session/session_server.h"', "sources end with .h or .cpp"),
+    ("clients/haptic/a_lanes.inl", "#include <vector>", "sources end with .h or .cpp"),
+    ("tests/server/a_test.cxx", "#include <vector>", "sources end with .h or .cpp"),
+    ("devices/a.H", "#include <vector>", "sources end with .h or .cpp"),
+    ("server/collision/a.cpp", '#include "server/collision/a.table"', "is not in the tree"),
+    ("build/dev/a.hpp", "#include <vector>", None),
+    ("docs/e.cpp", "#include <vector>", "stands in no room"),
+    ("deploy/e.hh", "#include <vector>", "sources end with .h or .cpp"),
     ("server/odd/e.cpp", "#include <vector>", "stands in no room"),
     ("clients/stray/f.cpp", "#include <vector>", "stands in no room"),
     ("devices/b.h", '#include "clients/haptic/coupling.h"', "may not include clients/haptic"),

@@ -1,5 +1,7 @@
-# Writes LIST: a ctest test for each suite of a GoogleTest PROGRAM. Run after the program was linked.
+# Writes LIST: a ctest test for each suite of a GoogleTest PROGRAM. Run after the program was linked. Suites are nightly by the
+# end of their name, or by NIGHTLY_SUITES, which lists them without the prefix of an instantiation.
 cmake_policy(SET CMP0007 NEW)
+cmake_policy(SET CMP0057 NEW)
 execute_process(COMMAND ${PROGRAM} --gtest_list_tests OUTPUT_VARIABLE output RESULT_VARIABLE failed)
 if(failed)
   message(FATAL_ERROR "${PROGRAM} --gtest_list_tests: ${failed}")
@@ -13,7 +15,8 @@ foreach(line IN LISTS suites)
     continue()
   endif()
   set(label gate)
-  if(suite MATCHES "Nightly(/|$)")
+  string(REGEX REPLACE "^[^/]*/" "" class "${suite}")
+  if(suite MATCHES "Nightly(/|$)" OR suite IN_LIST NIGHTLY_SUITES OR class IN_LIST NIGHTLY_SUITES)
     set(label nightly)
   endif()
   string(REPLACE "/" "." name "${ROOM}.${suite}")

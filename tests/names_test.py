@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""What names the tree may use: one namespace a room, no type name twice, no word that the glossary replaced.
+"""What names the tree may use: one namespace a room, no type name twice, no word that the glossary replaced, nor as a part of a
+compound name.
 
 Run by tests/architecture_test.py, which holds the rooms and their namespaces; alone, `tests/names_test.py WORD...` prints the
 lines of the tree that retired words match in the given files or folders.
@@ -146,16 +147,30 @@ def retired_words(text):
     return words, allowed
 
 
+COMPOUND = re.compile(r"\b(?=\w*(?:[a-z0-9][A-Z]|[A-Z]{2}[a-z]|[A-Za-z]\d|_))[A-Za-z_]\w*")
+PART = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
+
+
+def compound_faults(identifier, words):
+    """What to write instead of retired words that are parts of an identifier: "kinkAngle" and "kink_angle" are judged as "kink angle"."""
+    parts = " ".join(PART.findall(identifier))
+    return [instead for pattern, instead in words
+            if not pattern.search(identifier) and (pattern.search(parts) or pattern.search(parts.lower()))]
+
+
 def word_faults_in_text(path, text, words, allowed):
     if path in (WORD_LIST, "tests/names_test.py") or any(fnmatch(path, glob) for glob in allowed):
         return []
     faults = []
-    for pattern, instead, globs in words:
-        if any(fnmatch(path, glob) for glob in globs):
-            continue
+    words = [(pattern, instead) for pattern, instead, globs in words if not any(fnmatch(path, glob) for glob in globs)]
+    for pattern, instead in words:
         for found in pattern.finditer(text):
             shown = " ".join(found.group().split())
             faults.append(f"{path}:{line_at(text, found.start())}: `{shown}`: write {instead}")
+    for identifier in sorted(set(COMPOUND.findall(text))):
+        for instead in compound_faults(identifier, words):
+            line = line_at(text, re.search(rf"\b{identifier}\b", text).start())
+            faults.append(f"{path}:{line}: `{identifier}`: write {instead}")
     return faults
 
 
@@ -220,13 +235,17 @@ who\s+pays | who bears it
 allow | server/words.h
 """, encoding="utf-8")
         (root / "docs").mkdir()
-        (root / "docs/new.md").write_text("a rubber that rubs\nwho\npays, rub_count\n", encoding="utf-8")
+        (root / "docs/new.md").write_text("a rubber that rubs\nwho\npays, rub_count rub_count\n", encoding="utf-8")
+        (root / "docs/compound.md").write_text("rubber_count scrubAll rUb\nfooRubAll kRub\nCPURub who_pays whoPays\n", encoding="utf-8")
         (root / "docs/old.md").write_text("a rub\n", encoding="utf-8")
         (root / "docs/picture.txt").write_bytes(b"\xff\xfe rub")
         (root / "server/words.h").write_text("// rubbed\nnamespace tenon::collision { }\n", encoding="utf-8")
         found = faults_in(root, {**rooms, "server": "tenon::collision"})
     expected = [said for _, _, faults in planted for said in faults]
-    expected += ["docs/new.md:1: `rubs`: write friction", "docs/new.md:2: `who pays`: write who bears it"]
+    expected += ["docs/new.md:1: `rubs`: write friction", "docs/new.md:2: `who pays`: write who bears it",
+                 "docs/new.md:3: `rub_count`: write friction", "docs/compound.md:2: `fooRubAll`: write friction",
+                 "docs/compound.md:2: `kRub`: write friction", "docs/compound.md:3: `CPURub`: write friction",
+                 "docs/compound.md:3: `who_pays`: write who bears it", "docs/compound.md:3: `whoPays`: write who bears it"]
     left = list(found)
     for said in expected:
         hit = next((fault for fault in left if said in fault), None)

@@ -9,6 +9,12 @@ if(BUILD_TESTING OR TENON_BUILD_BENCH)
 endif()
 
 set(test_environment TENON_PROGRAMS=${CMAKE_RUNTIME_OUTPUT_DIRECTORY} TENON_CACHE=${CMAKE_BINARY_DIR}/test_cache)
+# Long suites that compare numbers with a truth, over code that other suites reach too: with the address sanitizer they are nightly.
+set(suites_of_numbers)
+if(TENON_SANITIZE MATCHES address)
+  set(suites_of_numbers RealPegs QueryTruth QueryTruthOfRealPairs CouplingWork SheetAtEveryOffset EnvironmentDeterminism Overload
+                        FrictionOnASlope FrictionOfAPull)
+endif()
 add_custom_target(test_programs)
 add_custom_target(threaded_tests)
 
@@ -30,14 +36,14 @@ function(tenon_tests name)
   endif()
   set(list ${CMAKE_BINARY_DIR}/suites/${target}.cmake)
   add_custom_command(TARGET ${target} POST_BUILD VERBATIM COMMENT "" COMMAND ${CMAKE_COMMAND} -D "PROGRAM=$<TARGET_FILE:${target}>" -D "ROOM=${name}"
-                     -D "LIST=${list}" -D "RESULTS=${CMAKE_BINARY_DIR}/results" -D "ENVIRONMENT=${test_environment}"
+                     -D "LIST=${list}" -D "RESULTS=${CMAKE_BINARY_DIR}/results" -D "ENVIRONMENT=${test_environment}" -D "NIGHTLY_SUITES=${suites_of_numbers}"
                      -P ${CMAKE_SOURCE_DIR}/tests/list_suites.cmake)
   file(WRITE ${CMAKE_BINARY_DIR}/suites/${target}_if_built.cmake "if(EXISTS \"${list}\")\n  include(\"${list}\")\nendif()\n")
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${CMAKE_BINARY_DIR}/suites/${target}_if_built.cmake)
 endfunction()
 
 foreach(room idl/types idl/record server/structures server/game_control devices devices/simulated clients/simulated_person
-             clients/trainee clients/instructor clients/observer clients/recorder clients/command clients/report
+             clients/trainee clients/instructor clients/observer clients/recorder clients/command clients/report clients/rehearse
              scenarios/part_generator)
   string(REPLACE "/" "_" target ${room})
   tenon_tests(${room} LINK ${target})
@@ -47,7 +53,7 @@ tenon_tests(server/collision LINK server_collision server_bake scenarios_part_ge
 tenon_tests(idl/wire LINK idl_wire)  # the bus's own threads are Cyclone's, which no sanitizer of ours can see into
 tenon_tests(idl/threads THREADS LINK idl_threads)
 tenon_tests(server/simulation THREADS LINK server_simulation)
-tenon_tests(server/session THREADS LINK server_session)
+tenon_tests(server/session THREADS LINK server_session clients_haptic)  # a session and its station
 tenon_tests(clients/haptic THREADS LINK clients_haptic server_simulation)  # two stations and their server in one process
 foreach(target server_bake_tests server_collision_tests server_session_tests)
   if(TARGET ${target})

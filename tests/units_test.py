@@ -4,7 +4,8 @@
 A member: `[unit]` in the comment on its lines, or in the comment block above it. A parameter: "`name` [unit]" in the comment
 block above the function ("`a`, `b` [m]" and "`a` and `b` [m]" stand for both), or `[unit]` in a comment on its own line. `[-]`
 stands for a number without a unit; a name with a frame (`x_W`) needs no unit. References, pointers and arrays of numbers count,
-what a template holds (`std::vector<double>`) and what a function returns (`Result<double>`) does not.
+and so does what a container holds (`std::vector<double>`, `std::optional<float>`, also one in another); what other templates hold
+(`std::map<int, double>`) and what a function returns (`Result<double>`) does not.
 
 Run it from anywhere, with files or folders to check or none for all rooms; `--self-test` shows that it can fail.
 """
@@ -21,7 +22,10 @@ px pixel pixels tick ticks step steps point points sample samples voxel voxels c
 brick bricks query queries kgm2 Nms kFarPerVoxel kQuantaPerVoxel SI""".split())
 BRACKET = re.compile(r"\[([^\[\]]{1,40})\]")
 SCOPE = re.compile(r"\b(namespace|class|struct|union|enum)\b[^;(){}=]*$|\bextern\s*$")
+ALIGNED = re.compile(r"\balignas\s*\([^()]*\)")
 NUMBER = re.compile(r"\b(?:double|float)\b")
+CONTAINER = re.compile(r"\bstd::(?:vector|array|span|optional|deque|atomic|initializer_list)\s*<\s*(?:const\s+)?(?:double|float)"
+                       r"\s*(?:,[^<>]*)?>")
 FRAME = re.compile(r"_[A-Z]\w*$")
 CLOSING = {")": "(", "]": "[", "}": "{", ">": "<"}
 
@@ -77,7 +81,7 @@ def declarations(text):
                 depth = max(0, depth - 1)
             inside = any(kind != "scope" for kind in stack)
             if character == "{" and depth == 0:
-                opened = now is not None and SCOPE.search(now.code)
+                opened = now is not None and SCOPE.search(ALIGNED.sub("", now.code))
                 if inside:
                     stack.append("body")
                 elif opened:
@@ -129,8 +133,12 @@ def pieces(text, offset=0):
 
 
 def without_templates(text):
-    """The text with what stands in <...> blanked; `operator<` stays."""
+    """The text with what stands in <...> blanked, and containers of numbers as the number; `operator<` stays."""
     text = re.sub(r"operator\s*(<=>|<<=?|>>=?|<=?|>=?|->\*?)", lambda found: "operator" + "_" * (len(found.group()) - 8), text)
+    before = None
+    while before != text:
+        before = text
+        text = CONTAINER.sub(lambda found: "double".ljust(len(found.group())), text)
     before = None
     while before != text:
         before = text
@@ -234,7 +242,11 @@ namespace tenon {
 struct A {
   double x = 0.0;
   double y;  ///< a height
-  std::array<double, 3> skipped;
+  std::array<double, 3> three;
+  std::vector<std::array<float, kSize>> nested;
+  std::optional<double> maybe = std::nullopt;  ///< when known
+  void spans(std::span<const double> all, const std::vector<float>& some, std::optional<double> one = {}, std::vector<int> ints = {});
+  std::atomic<double> shared{0.0}, other_shared;
   void f(double a);
   /// Moves by `b` [m].
   void g(double b, double c);
@@ -263,12 +275,15 @@ struct A {
   enum class Kind { kOne };
   double index = 0.0;  ///< by cell [i], see [1], [measured], [0]
 };
+struct alignas(64) Lanes {
+  std::array<double, 8> lanes;
+};
 double outside(double r);
 inline constexpr double kConstant = 1.0;
 }
 """
-BAD_NAMES = ["x", "y", "a", "c", "z", "first", "second", "samples", "table", "split", "d", "e", "far", "fourth", "argument", "inner",
-             "(without a name)", "last", "k", "o", "p", "q", "index", "r", "kConstant"]
+BAD_NAMES = ["x", "y", "three", "nested", "maybe", "all", "some", "one", "shared", "other_shared", "a", "c", "z", "first", "second", "samples", "table", "split", "d", "e", "far", "fourth", "argument", "inner",
+             "(without a name)", "last", "k", "o", "p", "q", "index", "lanes", "r", "kConstant"]
 GOOD = """
 #include <vector>
 namespace tenon {
@@ -290,7 +305,12 @@ struct A {
              float e = 1.0f   ///< [Nm/rad]
   );
   Result<double> returned();
-  std::optional<double> held;
+  std::optional<double> held;  ///< [m]
+  std::array<std::vector<double>, 10> columns, rows;  ///< [N]
+  /// Adds to `all` [N], by `index`.
+  std::span<const double> sum(std::span<double> all, std::span<const int> index, std::array<float, 3> p_W);
+  std::map<int, double> by_name;
+  std::vector<std::pair<int, double>> pairs;
   std::function<double(double)> called;
   /// `s` [s]
   double (*pointer)(double s);
@@ -300,7 +320,8 @@ struct A {
   double relative;     ///< [unit of `first`]
   static constexpr double kThird = sqrt(2.0);  ///< [m^3] a volume
  private:
-  std::vector<double> values_;
+  std::vector<double> values_;  // [s]
+  std::vector<int> counts_;
   bool operator<(const A& other) const;
 };
 }

@@ -12,15 +12,6 @@ using std::chrono::milliseconds;
 constexpr std::chrono::seconds kPatience{5};  // for an answer
 constexpr milliseconds kResend{500};          // an answer sent before our reader was matched is lost
 
-template <class M>
-Result<void> openWriter(std::unique_ptr<wire::Writer<M>>& writer, wire::Partition& partition,
-                        const wire::Topic<M>& topic) {
-  auto opened = wire::Writer<M>::open(partition, topic);
-  if (!opened) return fail(opened.error().what);
-  writer = std::make_unique<wire::Writer<M>>(std::move(*opened));
-  return {};
-}
-
 /// Dispatches until `done`; false when that does not happen in time.
 bool dispatchUntil(wire::Inbox& inbox, const std::atomic<bool>& stop,
                    std::chrono::steady_clock::duration timeout, const std::function<bool()>& done) {
@@ -49,8 +40,8 @@ Result<void> CommandClient::connect(const Stop& stop) {
   if (auto joined = member_->join(stop); !joined) return joined;
   wire::Partition& session = member_->session();
   Result<void> all = member_->watch(inbox_);
-  if (all) all = openWriter(commands_, session, wire::kCommand);
-  if (all) all = openWriter(stops_, session, wire::kEmergencyStop);
+  if (all) all = openInto(commands_, session, wire::kCommand);
+  if (all) all = openInto(stops_, session, wire::kEmergencyStop);
   if (all) {
     all = inbox_.on<CommandAck>(session, wire::kCommandAck, [this](const CommandAck& ack) {
       if (ack.client == member_->welcome().client) ack_ = ack;
@@ -86,7 +77,7 @@ void CommandClient::receive(const RunState& run) {
 
 bool CommandClient::dispatch(milliseconds timeout) {
   inbox_.dispatch(timeout);
-  return !member_->lost() && run_.phase < RunPhase::kSucceeded;
+  return !member_->lost() && !isOver(run_.phase);
 }
 
 Result<void> CommandClient::send(const ParsedCommand& command, const Stop& stop) {

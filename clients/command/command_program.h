@@ -54,10 +54,12 @@ class CommandClient {
   wire::Inbox inbox_;
 };
 
-/// Sends the command of a command line and prints the answer; the exit code, 0 when it was accepted.
+/// Sends the command of a command line and prints the answer. Returns the exit code: 0 when it was accepted,
+/// else 1.
 [[nodiscard]] int commandOnce(CommandClient& client, const std::vector<std::string>& arguments,
                               const std::atomic<bool>& stop);
-/// Sends the command of each key pressed, until `q`, the end of the input or of the session; the exit code.
+/// Sends the command of each key pressed, until `q`, the end of the input or of the session. Returns the exit
+/// code: 0.
 [[nodiscard]] int commandByKeys(CommandClient& client, const std::vector<std::string>& signals,
                                 const std::atomic<bool>& stop);
 

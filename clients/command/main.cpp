@@ -50,18 +50,27 @@ int run(int argc, char** argv) {
   CommandArguments arguments;
   arguments.options.person = "command line";
   declare(app, arguments);
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
   const auto printError = [](const std::string& what) {
     std::fprintf(stderr, "tenon command: %s\n", what.c_str());
-    return 1;
   };
-  if (!arguments.keys)
-    if (const auto parsed = tenon::command::parseCommand(arguments.words); !parsed)
-      return printError(parsed.error().what);
+  if (!arguments.keys) {
+    if (const auto parsed = tenon::command::parseCommand(arguments.words); !parsed) {
+      printError(parsed.error().what);
+      return 2;
+    }
+  }
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
   auto client = tenon::command::CommandClient::open(arguments.options, stop);
-  if (!client) return printError(client.error().what);
+  if (!client) {
+    printError(client.error().what);
+    return 1;
+  }
   return arguments.keys ? tenon::command::commandByKeys(**client, arguments.signals, stop)
                         : tenon::command::commandOnce(**client, arguments.words, stop);
 }

@@ -79,9 +79,8 @@ std::string commandHelp() {
   for (const CommandWord& word : kCommands)
     help += fmt::format("  {:<32}{}\n", fmt::format("{} {}", word.word, word.arguments), word.effect);
   return help +
-         "\nThe server checks whether the role may give the command. Exit code: 0 when it was accepted, 1 "
-         "when\n"
-         "it was refused or not answered.";
+         "\nThe server checks whether the role may give the command. Exit code: 0 when it was accepted,\n"
+         "1 when it was refused or not answered, 2 for wrong usage.";
 }
 
 std::string keyLegend(const std::vector<std::string>& signals) {

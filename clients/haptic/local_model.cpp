@@ -10,6 +10,9 @@ namespace {
 // A smaller multiplier is rounding: the constraint is not active.
 constexpr double kMinMultiplier = 1e-9;  // [N]
 
+// Scale of rotations of an object of unknown size.
+constexpr double kUnknownRadius = 0.1;  // [m]
+
 // Fade-out of another hand's spring after it has released the object.
 constexpr double kFadeTicks = 20.0;  // [ticks]
 }  // namespace
@@ -99,6 +102,9 @@ double LocalModel::ageFactor() const noexcept {
 }
 
 void LocalModel::solve(const Pose& X_WH, const WorldView& world) noexcept {
+  const bool known = world.contains(manifold_.object) && world.object(manifold_.object).radius > 0.0;
+  body_.p_BQ = known ? world.object(manifold_.object).p_OQ_O : Vector3::Zero();
+  body_.radius = known ? world.object(manifold_.object).radius : kUnknownRadius;
   body_.X_WB = proxy_.X_WO;
   body_.springs.clear();
   // full stiffness: age reduces the displayed force, not the position of the proxy
@@ -129,7 +135,7 @@ void LocalModel::solve(const Pose& X_WH, const WorldView& world) noexcept {
   std::array<Displacement, 1> motion{};
   solver_.solve({&body_, 1}, {constraints_.begin(), constraints_.size()}, motion,
                 {multipliers_.data(), constraints_.size()});
-  proxy_.X_WO = displaced(proxy_.X_WO, motion[0]);
+  proxy_.X_WO = displaced(proxy_.X_WO, motion[0], body_.p_BQ);
   proxy_.touching = false;
   for (std::size_t i = 0; i < constraints_.size(); ++i) {
     if (multipliers_[i] > kMinMultiplier) proxy_.touching = true;
@@ -137,7 +143,8 @@ void LocalModel::solve(const Pose& X_WH, const WorldView& world) noexcept {
 }
 
 void LocalModel::updateValidityCount() noexcept {
-  const double largest_displacement = maxPointMotion(displacement(manifold_.X_WO, proxy_.X_WO), body_.radius);
+  const double largest_displacement =
+      maxPointMotion(displacement(manifold_.X_WO, proxy_.X_WO, body_.p_BQ), body_.radius);
   if (largest_displacement > manifold_.validity_radius) ++beyond_validity_;
 }
 

@@ -53,7 +53,7 @@ class LocalModel {
   [[nodiscard]] const LocalProxy& proxy() const noexcept { return proxy_; }
   [[nodiscard]] const StalenessLimits& limits() const noexcept { return limits_; }
   /// [ticks] so far ahead of the contact set: the object had left the region for which the manifold lists all
-  /// contacts.
+  /// contacts. Manifolds do not tell its size: its points are taken to be within 0.1 m of its origin.
   [[nodiscard]] std::uint64_t beyondValidity() const noexcept { return beyond_validity_; }
 
  private:
@@ -77,7 +77,7 @@ class LocalModel {
   collision::MovableBody body_;
   FixedVector<OtherHandSpring, 2 * kOtherPulls> other_springs_;
   FixedVector<collision::ContactConstraint, kManifoldContacts> constraints_;
-  std::array<double, kManifoldContacts> multipliers_{};
+  std::array<double, kManifoldContacts> multipliers_{};  ///< [N] of each constraint
   std::uint64_t beyond_validity_ = 0;
   bool has_manifold_ = false;
   bool new_object_ = false;

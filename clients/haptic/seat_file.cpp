@@ -4,8 +4,17 @@
 
 namespace tenon::haptic {
 
+namespace {
+constexpr std::size_t kMaxLength = 63;  // bound in tenon.idl
+}  // namespace
+
+bool mayBeSeatFile(const std::filesystem::path& file) {
+  std::string token, more;
+  std::ifstream(file) >> token >> more;
+  return token.size() <= kMaxLength && more.empty();
+}
+
 std::string readSeatToken(const std::filesystem::path& file) {
-  constexpr std::size_t kMaxLength = 63;  // bound in tenon.idl
   std::string token;
   std::ifstream(file) >> token;
   return token.size() <= kMaxLength ? token : std::string();

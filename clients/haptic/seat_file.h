@@ -12,6 +12,8 @@ namespace tenon::haptic {
 ///
 /// Threads: any. Real-time: no.
 
+/// False when the file has more than a token in it: it is another file, which must not be replaced.
+[[nodiscard]] bool mayBeSeatFile(const std::filesystem::path& file);
 /// The token; empty when the file does not exist or holds no valid token.
 [[nodiscard]] std::string readSeatToken(const std::filesystem::path& file);
 /// Creates or replaces the file, readable by its owner only. An empty path writes nothing. Fails when the

@@ -96,10 +96,6 @@ void Station::receive(const EmergencyStop& stop) {
   stopChanged(stop.engaged);
 }
 
-void Station::receive(const GrabState& /*grab*/) {
-  // a hand's object is taken from its manifold, together with the planes that belong to it
-}
-
 bool Station::takeEvent(StationEvent& event) noexcept {
   if (events_taken_ == events_written_) return false;
   event = events_[events_taken_ % kEventCapacity];
@@ -129,7 +125,7 @@ void Station::report(const HapticHand& hand) noexcept {
 
 void Station::report(StationEventKind kind, HandId hand, std::uint32_t detail, double value,
                      std::uint32_t count) noexcept {
-  events_[events_written_ % kEventCapacity] = {seq_, kind, hand, detail, value, count};
+  events_[events_written_ % kEventCapacity] = {seq_, kind, hand, detail, value, count, world_.tick()};
   ++events_written_;
   if (events_written_ - events_taken_ > kEventCapacity) events_taken_ = events_written_ - kEventCapacity;
 }

@@ -43,6 +43,7 @@ struct StationEvent {
   std::uint32_t detail = 0;
   double value = 0.0;  ///< [N], [s] or [ticks], see StationEventKind
   std::uint32_t count = 0;
+  Tick tick = 0;  ///< newest one received when it happened
 };
 
 /// Text for the log; `hand` is the name of the event's hand.
@@ -74,7 +75,6 @@ class Station {
   void receive(const HandManifold& manifold) noexcept;
   void receive(const StepState& step);
   void receive(const EmergencyStop& stop);
-  void receive(const GrabState& grab);
 
   /// One millisecond of devices, local models and simulated person; `seq` numbers the inputs.
   virtual void step(std::uint32_t seq) noexcept = 0;

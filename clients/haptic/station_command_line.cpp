@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <exception>
 
+#include "clients/haptic/seat_file.h"
+
 namespace tenon::haptic {
 
 namespace {
@@ -35,10 +37,18 @@ int run(int argc, char** argv, const StationMainOptions& main) {
   program.membership.person = main.person;
   main.add_options(app);
   addCommonOptions(app, program, main.seed);
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
   program.print = [&main](const std::string& text) {
     std::fprintf(stderr, "%s: %s\n", main.name.c_str(), text.c_str());
   };
+  if (!mayBeSeatFile(program.seat_file)) {
+    program.print(program.seat_file.string() + ": is not the file of a seat; name another one with --seat");
+    return 1;
+  }
   auto station = main.open();
   if (!station) {
     program.print(station.error().what);

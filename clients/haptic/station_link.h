@@ -22,7 +22,7 @@ class StationLink {
 
   /// Joins a session and reads its scene. Fails when no server is found in time, the server refuses or sends
   /// no scene, or `stop` is set.
-  static Result<std::unique_ptr<StationLink>> open(const wire::MembershipOptions& wishes, const Stop& stop);
+  static Result<std::unique_ptr<StationLink>> open(const wire::MembershipOptions& options, const Stop& stop);
 
   [[nodiscard]] wire::Membership& member() { return *member_; }
   [[nodiscard]] const Welcome& welcome() const { return member_->welcome(); }
@@ -39,7 +39,7 @@ class StationLink {
  private:
   StationLink() = default;
   Result<void> openWriters();
-  Result<void> readScene(const wire::MembershipOptions& wishes);
+  Result<void> readScene(const wire::MembershipOptions& options);
 
   std::unique_ptr<wire::Membership> member_;
   std::vector<SceneObject> objects_;

@@ -82,10 +82,7 @@ class StationRunner {
   void print(const std::string& text) const {
     if (options_.print && !text.empty()) options_.print(text);
   }
-  [[nodiscard]] bool over() const {
-    return run_.phase == RunPhase::kSucceeded || run_.phase == RunPhase::kFailed ||
-           run_.phase == RunPhase::kStopped;
-  }
+  [[nodiscard]] bool over() const { return isOver(run_.phase); }
 
   Station& station_;
   StationLink& link_;
@@ -166,12 +163,8 @@ Result<void> StationRunner::subscribe() {
 
 void StationRunner::printStep(const StepState& step) {
   if (!options_.print || step.phase != StepPhase::kActive || step.instruction.empty()) return;
-  const LocalizedText* chosen = &step.instruction.front();
-  for (const LocalizedText& text : step.instruction) {
-    if (text.language == options_.language) chosen = &text;
-  }
-  const std::string line =
-      std::to_string(step.step + 1) + "/" + std::to_string(step.steps) + " " + chosen->text;
+  const std::string line = std::to_string(step.step + 1) + "/" + std::to_string(step.steps) + " " +
+                           localized(step.instruction, options_.language);
   if (line == printed_step_) return;
   printed_step_ = line;
   options_.print(line);
@@ -201,7 +194,7 @@ void StationRunner::sendEvents() {
     const bool is_safety =
         event.kind == StationEventKind::kSafetyBegan || event.kind == StationEventKind::kSafetyEnded;
     const char* kind = is_safety ? "safety" : "station";
-    static_cast<void>(link_.send(ClientEvent{link_.welcome().client, ++event_seq_, kind, text}));
+    static_cast<void>(link_.send(ClientEvent{link_.welcome().client, ++event_seq_, event.tick, kind, text}));
   }
 }
 
@@ -349,11 +342,11 @@ const std::atomic<bool>& stopSignal() {
 
 Result<RunState> runStation(Station& station, const StationProgramOptions& options,
                             const std::atomic<bool>& stop) {
-  wire::MembershipOptions wishes = options.membership;
-  wishes.role = station.role();
-  wishes.hands = station.handNames();
-  if (!options.seat_file.empty()) wishes.token = readSeatToken(options.seat_file);
-  auto link = StationLink::open(wishes, stop);
+  wire::MembershipOptions membership = options.membership;
+  membership.role = station.role();
+  membership.hands = station.handNames();
+  if (!options.seat_file.empty()) membership.token = readSeatToken(options.seat_file);
+  auto link = StationLink::open(membership, stop);
   if (!link) return fail(link.error().what);
   if (options.print) options.print("joined as client " + std::to_string((*link)->welcome().client.value));
   if (auto kept = writeSeatToken(options.seat_file, (*link)->welcome().token); !kept && options.print)

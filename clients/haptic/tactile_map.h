@@ -39,7 +39,7 @@ class TactileMap {
 
  private:
   TactileOptions options_;
-  std::array<double, kTactors> forces_{};
+  std::array<double, kTactors> forces_{};       // [N]
   std::array<double, kTactors> pulse_clock_{};  // [s] since the begin of the pulse period
 };
 

@@ -27,7 +27,6 @@ class Workspace {
   void setCentre(const Vector3& p_WC) noexcept;
   /// Starts to move C_w to p_WC at up to move_speed. The hand may move relative to C_w meanwhile.
   void moveTo(const Vector3& p_WC) noexcept;
-  void cancelMove() noexcept { move_in_progress_ = false; }
   [[nodiscard]] bool moveInProgress() const noexcept { return move_in_progress_; }
 
   /// One cycle of `dt` [s] with the hand at p_DH. Contact stops the motion at once.

@@ -11,7 +11,11 @@ void WorldView::begin(std::span<const SceneObject> objects, std::uint32_t server
   }
   objects_.assign(count, ObservedObject{});
   for (const SceneObject& object : objects) {
-    if (object.object.valid()) objects_[object.object.value].X_WO = object.X_WO;
+    if (!object.object.valid()) continue;
+    ObservedObject& observed = objects_[object.object.value];
+    observed.X_WO = object.X_WO;
+    observed.p_OQ_O = object.centre;
+    observed.radius = 0.5 * object.size.norm();
   }
   server_epoch_ = server_epoch;
   tick_ = tick;

@@ -8,7 +8,7 @@
 
 namespace tenon::haptic {
 
-/// Last received state of an object.
+/// Last received state of an object, and the place and size of its surface in its frame.
 struct ObservedObject {
   Pose X_WO;
   Twist V_WO;
@@ -16,7 +16,9 @@ struct ObservedObject {
   ObjectStatus status = ObjectStatus::kHidden;
   HandId holder;
   bool in_contact = false;
-  Tick updated_at = 0;  ///< server tick of this state
+  Tick updated_at = 0;               ///< server tick of this state
+  Vector3 p_OQ_O = Vector3::Zero();  ///< [m] its centre, of its bounding box
+  double radius = 0.0;               ///< [m] half the diagonal of that box; 0 when it is not known
 
   /// Visible and collidable.
   [[nodiscard]] bool present() const { return status != ObjectStatus::kHidden; }

@@ -20,13 +20,19 @@ int run(int argc, char** argv) {
   unsigned wait = 10;
   app.add_flag("--json", options.json, "print one JSON object per line");
   app.add_option("--session", membership.session, "name of the session; default: the first one announced");
-  app.add_option("--domain", membership.domain, "DDS domain")->capture_default_str();
+  app.add_option("--domain", membership.domain, "DDS domain, 0 to 230")
+      ->check(CLI::Range(0, 230))
+      ->capture_default_str();
   app.add_option("--person", membership.person, "name shown to the other participants")
       ->capture_default_str();
   app.add_option("--language", options.language, "language of titles and instructions")
       ->capture_default_str();
   app.add_option("--wait", wait, "seconds to search for a server")->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
   membership.timeout = std::chrono::seconds(wait);
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);

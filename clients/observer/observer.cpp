@@ -58,7 +58,7 @@ void Observer::receive(const StepState& step) {
                  {"name", step.name},
                  {"phase", nameOf(step.phase)},
                  {"part", step.part},
-                 {"instruction", timeline_.localized(step.instruction)}}
+                 {"instruction", localized(step.instruction, options_.language)}}
                 .dump());
 }
 
@@ -118,7 +118,7 @@ void Observer::receive(const Presence& presence) {
 }
 
 void Observer::receive(const EmergencyStop& stop) {
-  if (!options_.json) return;  // the event log tells it
+  if (!options_.json) return;  // the event log reports it
   printJson(
       Json{{"kind", "emergency stop"}, {"engaged", stop.engaged}, {"who", stop.who}, {"reason", stop.reason}}
           .dump());
@@ -135,11 +135,6 @@ void Observer::receive(const RunState& run) {
                  {"reason", run.reason},
                  {"final_hash", fmt::format("{:016x}", run.final_hash)}}
                 .dump());
-}
-
-bool Observer::over() const {
-  return run_.phase == RunPhase::kSucceeded || run_.phase == RunPhase::kFailed ||
-         run_.phase == RunPhase::kStopped;
 }
 
 }  // namespace tenon::observer

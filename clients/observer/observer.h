@@ -19,7 +19,7 @@ struct ObserverOptions {
 /// Prints what happens in a session: sentences in order of time (see Timeline), or one JSON object per line
 /// as messages arrive.
 ///
-/// JSON tells changes only: steps, contacts that begin or end, events, participants, the phase of the run;
+/// JSON has changes only: steps, contacts that begin or end, events, participants, the phase of the run;
 /// and the progress of the active step every 2 s.
 ///
 /// Threads: one. Real-time: no.
@@ -42,7 +42,7 @@ class Observer {
   void printReceivedBefore(Timeline::Clock::time_point limit) { timeline_.printReceivedBefore(limit); }
   void printAll() { timeline_.printAll(); }
 
-  [[nodiscard]] bool over() const;
+  [[nodiscard]] bool over() const { return isOver(run_.phase); }
   /// 0 when the session succeeded, else 1.
   [[nodiscard]] int exitCode() const { return run_.phase == RunPhase::kSucceeded ? 0 : 1; }
 

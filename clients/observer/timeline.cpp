@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "idl/types/names.h"
 
@@ -10,8 +11,11 @@ namespace tenon::observer {
 
 namespace {
 constexpr Tick kProgressPeriod = 2000;  // [ticks]
-constexpr Tick kStepDelay = 1;  // a step that begins in a tick acts, and is told, from the next one on
+constexpr Tick kStepDelay = 1;  // [ticks] a step takes effect, and is published, in the tick after its begin
 constexpr double kDegrees = 57.29577951308232;
+
+constexpr Tick kHandsPeriod = 1000;  // [ticks] at most one sentence of a kind about hands in it
+const std::set<std::string> kOwnKinds{"pointer", "assistant", "forearm", "head"};
 
 double seconds(Tick ticks) { return static_cast<double>(ticks) * kTickSeconds; }
 
@@ -26,6 +30,25 @@ std::string errorText(const StepProgress& progress) {
   const double mm = progress.position_error * 1e3;
   return fmt::format("{:.{}f} mm and {:.1f} degrees", mm, mm < 100.0 ? 1 : 0,
                      progress.angle_error * kDegrees);
+}
+
+/// The name in "hand 'right' is held still"; empty when there is none.
+std::string quotedName(const std::string& text) {
+  const std::size_t begin = text.find('\'');
+  const std::size_t end = text.find('\'', begin + 1);
+  return end == std::string::npos ? std::string() : text.substr(begin, end + 1 - begin);
+}
+
+/// A sentence about one or several hands, for a trainer.
+std::string handsText(const std::string& kind, const std::vector<std::string>& names) {
+  const bool one = names.size() == 1;
+  const std::string hands = fmt::format("{} {}", one ? "hand" : "hands", fmt::join(names, ", "));
+  if (kind == "hand free") return fmt::format("{} {} again", hands, one ? "moves" : "move");
+  if (kind == "hand gone")
+    return fmt::format("! {} {} absent: what {} held is parked", hands, one ? "is" : "are",
+                       one ? "it" : "they");
+  return fmt::format("! {} {} still: no movement arrives from the station in time", hands,
+                     one ? "is held" : "are held");
 }
 
 /// A step of which only the begin was heard was done: otherwise no next one would have begun.
@@ -60,7 +83,7 @@ void Timeline::print(Tick tick, const std::string& text) const {
 void Timeline::receive(const SceneObject& object) {
   const std::string& title = object.title.empty() ? object.name : object.title;
   titles_[object.object] = title;
-  if (object.kind == "pointer" || object.kind == "assistant") pointer_titles_.insert(title);
+  if (kOwnKinds.contains(object.kind)) own_titles_.insert(title);
 }
 
 void Timeline::receive(const StepState& step) {
@@ -90,18 +113,31 @@ void Timeline::receive(const EventLog& event) {
     add(event.tick, Rank::kGrab, [this, event] { printGrab(event, event.kind == "taken"); });
   } else if (event.kind == "mounted") {
     add(event.tick, Rank::kGrab, [this, event] { printMounted(event); });
+  } else if (event.kind == "hand frozen" || event.kind == "hand free" || event.kind == "hand gone") {
+    receiveHand(event);
   } else {
     add(event.tick, event.kind == "leave" ? Rank::kLeave : Rank::kParticipant,
         [this, event] { printEvent(event); });
   }
 }
 
+/// Hands of one station stall together, and on a busy machine many times a second.
+void Timeline::receiveHand(const EventLog& event) {
+  const std::string name = quotedName(event.text);
+  if (event.kind == "hand frozen") frozen_since_[name] = event.tick;
+  if (event.kind == "hand free" && event.tick < frozen_since_[name] + kHandsPeriod) return;
+  const std::pair period{event.kind, event.tick / kHandsPeriod};
+  auto& names = hands_[period];
+  if (names.empty())
+    add(event.tick, Rank::kParticipant, [this, event, period] { printHands(event, hands_[period]); });
+  if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+}
+
 void Timeline::receive(const RunState& run) {
   const std::pair newest{run.phase, run.server_epoch};
   if (newest == run_) return;
   run_ = newest;
-  add(run.tick, run.phase >= RunPhase::kSucceeded ? Rank::kRunEnd : Rank::kRun,
-      [this, run] { printRun(run); });
+  add(run.tick, isOver(run.phase) ? Rank::kRunEnd : Rank::kRun, [this, run] { printRun(run); });
 }
 
 void Timeline::beginStep(const StepState& step) {
@@ -116,9 +152,9 @@ void Timeline::beginStep(const StepState& step) {
   progress_ = {};
   last_progress_ = step.started;
   contacts_.clear();
-  const std::string title = localized(step.title).empty() ? step.name : localized(step.title);
-  print(begin, fmt::format("{}: {}", stepNumber(), title));
-  if (const std::string instruction = localized(step.instruction); !instruction.empty())
+  const std::string title = localized(step.title, language_);
+  print(begin, fmt::format("{}: {}", stepNumber(), title.empty() ? step.name : title));
+  if (const std::string instruction = localized(step.instruction, language_); !instruction.empty())
     print(begin, fmt::format("  the trainee is told: {}", instruction));
 }
 
@@ -147,7 +183,7 @@ void Timeline::printContact(Tick tick, ObjectId a, ObjectId b) {
 
 void Timeline::printGrab(const EventLog& event, bool is_taken) {
   const auto [title, hand] = splitGrab(event.text);
-  if (pointer_titles_.contains(title)) return;
+  if (own_titles_.contains(title)) return;
   if (is_taken) holders_[title] = holderOf(title, event.tick);
   if (!is_taken && mounted_ == std::pair(title, event.tick)) return;
   const std::string& holder = holders_[title];
@@ -171,12 +207,19 @@ void Timeline::printEvent(const EventLog& event) const {
     const std::string role = " (" + text.substr(0, at) + ")";
     if (text.compare(at, role.size(), role) == 0) text.erase(at, role.size());  // "trainee (trainee) is here"
   }
-  const bool says_what = event.kind == "join" || event.kind == "leave" || event.kind.starts_with("hand");
+  const bool says_what = event.kind == "join" || event.kind == "leave";
   print(event.tick, fmt::format("{}{}{}", mark, says_what ? "" : event.kind + ": ", text));
 }
 
+void Timeline::printHands(const EventLog& event, const std::vector<std::string>& names) {
+  const auto last = hands_told_.find(event.kind);
+  if (last != hands_told_.end() && event.tick < last->second + kHandsPeriod) return;
+  hands_told_[event.kind] = event.tick;
+  print(event.tick, handsText(event.kind, names));
+}
+
 void Timeline::printRun(const RunState& run) {
-  const bool is_over = run.phase >= RunPhase::kSucceeded;
+  const bool is_over = isOver(run.phase);
   const bool has_timed_out = !step_ended_ && step_phases_[step_.started] == StepPhase::kTimedOut;
   if (run.phase == RunPhase::kSucceeded || has_timed_out) endStep(run.tick);
   const std::string_view phase = runPhaseName(run.phase);
@@ -191,13 +234,6 @@ std::string Timeline::titleOf(ObjectId object) const {
   const auto found = titles_.find(object);
   if (found != titles_.end()) return found->second;
   return object.valid() ? fmt::format("object {}", object.value) : "nothing";
-}
-
-std::string Timeline::localized(const std::vector<LocalizedText>& texts) const {
-  for (const LocalizedText& text : texts) {
-    if (text.language == language_) return text.text;
-  }
-  return texts.empty() ? std::string() : texts.front().text;
 }
 
 std::string Timeline::stepNumber() const { return fmt::format("step {} of {}", step_.step + 1, step_.steps); }

@@ -18,11 +18,13 @@ namespace tenon::observer {
 ///
 /// Topics arrive in no order among each other. So a sentence waits until no earlier one can be expected any
 /// more (printReceivedBefore), and is made only then: from what had happened by its tick, whenever that
-/// arrived. Where two topics tell the same event, one is chosen. A step ends where the next one begins, or
+/// arrived. Where two topics report the same event, one is chosen. A step ends where the next one begins, or
 /// with the run: StepState carries the tick in which a step began, also when it says that the step is done.
 ///
-/// Not reported: that a hand takes or releases its own pointer, that a mounted part is let go, further
-/// contacts of two objects in one step, and what comes after the end of the run.
+/// Not reported: that a hand takes or releases its own object (pointer, forearm, head), that a mounted part
+/// is let go, further contacts of two objects in one step, and what comes after the end of the run. Hands
+/// whose inputs do not arrive in time are reported together, once a second at most, and that they move again
+/// if it took a second.
 ///
 /// Threads: one. Real-time: no.
 class Timeline {
@@ -45,8 +47,6 @@ class Timeline {
   void printAll() { printReceivedBefore(Clock::time_point::max()); }
 
   [[nodiscard]] std::string titleOf(ObjectId object) const;
-  /// The text in the timeline's language, else the first one.
-  [[nodiscard]] std::string localized(const std::vector<LocalizedText>& texts) const;
 
  private:
   /// Order of sentences with the same tick.
@@ -56,6 +56,7 @@ class Timeline {
     std::function<void()> print;
   };
 
+  void receiveHand(const EventLog& event);
   void add(Tick tick, Rank rank, std::function<void()> print);
   void print(Tick tick, const std::string& text) const;
   void beginStep(const StepState& step);
@@ -64,6 +65,7 @@ class Timeline {
   void printContact(Tick tick, ObjectId a, ObjectId b);
   void printGrab(const EventLog& event, bool is_taken);
   void printMounted(const EventLog& event);
+  void printHands(const EventLog& event, const std::vector<std::string>& names);
   void printEvent(const EventLog& event) const;
   void printRun(const RunState& run);
 
@@ -77,15 +79,18 @@ class Timeline {
 
   // as received
   std::map<ObjectId, std::string> titles_;
-  std::set<std::string> pointer_titles_;  ///< of the objects that hands hold when they hold nothing else
+  std::set<std::string> own_titles_;  ///< of the objects that hands hold when they hold nothing else
   std::map<ClientId, Presence> participants_;
   std::map<std::pair<ObjectId, Tick>, HandId> grabs_;
   std::map<Tick, StepPhase> step_phases_;  ///< newest of the step that began in that tick
   std::map<std::pair<ObjectId, ObjectId>, bool> touching_;
-  std::optional<std::pair<RunPhase, std::uint32_t>> run_;  ///< phase, server epoch
+  std::map<std::string, Tick> frozen_since_;                                ///< by hand
+  std::map<std::pair<std::string, Tick>, std::vector<std::string>> hands_;  ///< by kind of event and second
+  std::optional<std::pair<RunPhase, std::uint32_t>> run_;                   ///< phase, server epoch
 
   // as printed
   bool is_over_ = false;
+  std::map<std::string, Tick> hands_told_;  ///< newest sentence about hands, by kind of event
   StepState step_;
   bool step_ended_ = true;
   StepProgress progress_;

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/recorder/recorder_program.h"
+#include "idl/types/output_files.h"
 
 namespace {
 
@@ -15,14 +16,24 @@ int run(int argc, char** argv) {
   CLI::App app{"tenon-record: records all topics of a session to an MCAP file until the session ends"};
   tenon::recorder::RecorderOptions options;
   unsigned wait = 10;
+  bool overwrite = false;
   app.add_option("-o,--output", options.file, "file to write, e.g. session.mcap")->required();
   app.add_option("--session", options.session, "name of the session; default: the first one announced");
   app.add_option("--domain", options.domain, "DDS domain, 0 to 230")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
   app.add_flag("--lockstep", options.lockstep, "refuse a session that does not run in lockstep");
+  app.add_flag("--overwrite", overwrite, tenon::kOverwriteHelp);
   app.add_option("--wait", wait, "seconds to search for a server")->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (const auto refusal = tenon::refuseOutputs({.outputs = {options.file}, .overwrite = overwrite})) {
+    std::fprintf(stderr, "tenon-record: %s\n", refusal->what.c_str());
+    return refusal->exit_code;
+  }
   options.timeout = std::chrono::seconds(wait);
   options.report = [](const std::string& text) {
     std::printf("%s\n", text.c_str());
@@ -35,8 +46,12 @@ int run(int argc, char** argv) {
     std::fprintf(stderr, "tenon-record: %s\n", recorded.error().what.c_str());
     return 1;
   }
-  options.report(recorded->file + ": " + std::to_string(recorded->messages) + " messages, " +
-                 std::to_string(recorded->lost) + " ticks missing");
+  const tenon::RecorderStatus& status = recorded->status;
+  options.report(status.file + ": " + std::to_string(status.messages) + " messages, " +
+                 std::to_string(status.lost) + " published samples missing");
+  for (const tenon::recorder::TopicCount& count : recorded->counts)
+    options.report("  " + count.topic + ": " + std::to_string(count.recorded) + " of " +
+                   std::to_string(count.published) + " samples");
   return 0;
 }
 

@@ -12,16 +12,19 @@ namespace tenon::recorder {
 
 namespace {
 using std::chrono::milliseconds;
-constexpr milliseconds kQuiet{300};      // without a sample: nothing more is expected
-constexpr milliseconds kMaxDrain{3000};  // after the end of a session whose clients go on sending
+constexpr milliseconds kQuiet{300};       // without a sample: nothing more is expected
+constexpr milliseconds kMaxDrain{10000};  // after the end of a session, for samples on their way
 constexpr milliseconds kStatusPeriod{1000};
 
 /// Checkpoints first: within a batch the state that a re-simulation starts from precedes the inputs that
-/// follow it.
+/// follow it. The objects of the scene last: every server has published them before, and DDS announces our
+/// readers in the order of their creation, so their arrival proves that the server has matched all readers.
 std::vector<std::string> topicsInOrder() {
   std::vector<std::string> topics{std::string(wire::kCheckpoint.name)};
   for (const wire::TopicName& name : wire::allTopics())
-    if (name.topic != wire::kCheckpoint.name) topics.emplace_back(name.topic);
+    if (name.topic != wire::kCheckpoint.name && name.topic != wire::kSceneObject.name)
+      topics.emplace_back(name.topic);
+  topics.emplace_back(wire::kSceneObject.name);
   return topics;
 }
 
@@ -29,7 +32,7 @@ class Recorder {
  public:
   Recorder(const RecorderOptions& options, const std::atomic<bool>& stop) : options_(options), stop_(stop) {}
 
-  Result<RecorderStatus> run() {
+  Result<RecordingReport> run() {
     auto member = wire::Membership::find({.session = options_.session,
                                           .domain = options_.domain,
                                           .person = "recorder",
@@ -41,20 +44,28 @@ class Recorder {
     member_ = std::move(*member);
     auto done = subscribe();
     if (done) done = member_->join(stop_, [this] { take(milliseconds(1)); });
+    if (done) recording_->joined(member_->welcome().tick);
     if (done) done = writeUntilOver();
     const Result<void> closed = recording_ ? recording_->close() : Result<void>{};
     if (status_writer_) static_cast<void>(status_writer_->write(recording_->status()));
     if (!done) return fail(done.error().what);
     if (!closed) return fail(closed.error().what);
-    return recording_->status();
+    return RecordingReport{recording_->status(), recording_->counts()};
   }
 
  private:
   Result<void> subscribe();
   Result<void> writeUntilOver();
+  /// All that the server published and that can still be expected is recorded.
+  [[nodiscard]] bool isComplete() const {
+    return recording_->hasStatement() && (!member_->announce().lockstep || recording_->status().lost == 0);
+  }
   /// Writes what has arrived within `timeout`; the number of samples.
   std::size_t take(milliseconds timeout) {
-    return subscriber_->dispatch(timeout, [this](const wire::RawSample& sample) { recording_->add(sample); });
+    return subscriber_->dispatch(timeout, [this](const wire::RawSample& sample) {
+      has_scene_ = has_scene_ || sample.topic == wire::kSceneObject.name;
+      recording_->add(sample);
+    });
   }
 
   const RecorderOptions& options_;
@@ -63,6 +74,7 @@ class Recorder {
   std::unique_ptr<Recording> recording_;
   std::unique_ptr<wire::RawSubscriber> subscriber_;
   std::unique_ptr<wire::Writer<RecorderStatus>> status_writer_;
+  bool has_scene_ = false;
 };
 
 Result<void> Recorder::subscribe() {
@@ -73,13 +85,12 @@ Result<void> Recorder::subscribe() {
   if (!subscriber) return fail(subscriber.error().what);
   subscriber_ = std::make_unique<wire::RawSubscriber>(std::move(*subscriber));
 
-  // a first sample proves that the server has matched our readers; then wait until all transient-local states
-  // came
-  std::size_t received = 0;
+  // the scene proves that the server has matched our readers; then wait until all transient-local states came
   for (const auto until = std::chrono::steady_clock::now() + options_.timeout;
-       received == 0 && !stop_ && std::chrono::steady_clock::now() < until;)
-    received = take(milliseconds(100));
-  if (received == 0) return fail("session '" + member_->sessionName() + "' is announced but sends nothing");
+       !has_scene_ && !stop_ && std::chrono::steady_clock::now() < until;)
+    take(milliseconds(100));
+  if (!has_scene_)
+    return fail("session '" + member_->sessionName() + "' is announced but sends no objects of its scene");
   for (const auto until = std::chrono::steady_clock::now() + kQuiet;
        std::chrono::steady_clock::now() < until;)
     take(milliseconds(20));
@@ -87,9 +98,8 @@ Result<void> Recorder::subscribe() {
 }
 
 Result<void> Recorder::writeUntilOver() {
-  auto status = wire::Writer<RecorderStatus>::open(member_->session(), wire::kRecorderStatus);
-  if (!status) return fail(status.error().what);
-  status_writer_ = std::make_unique<wire::Writer<RecorderStatus>>(std::move(*status));
+  if (auto opened = openInto(status_writer_, member_->session(), wire::kRecorderStatus); !opened)
+    return opened;
   wire::Inbox lobby;
   if (auto watched = member_->watch(lobby); !watched) return watched;
   if (options_.report) {
@@ -99,23 +109,25 @@ Result<void> Recorder::writeUntilOver() {
   auto next_status = std::chrono::steady_clock::now();
   auto last_sample = std::chrono::steady_clock::now();
   std::chrono::steady_clock::time_point over_since{};
-  while (!stop_ && recording_->status().problem.empty()) {
+  while (!stop_ && recording_->problem().empty()) {
     const bool received = take(milliseconds(50)) > 0;
     lobby.dispatch(milliseconds(0));
     const auto now = std::chrono::steady_clock::now();
     if (received) last_sample = now;
     const bool over = recording_->runIsOver() || member_->serverIsGone();
     if (over && over_since == std::chrono::steady_clock::time_point{}) over_since = now;
-    if (over && (now - last_sample >= kQuiet || now - over_since >= kMaxDrain)) break;
+    const bool quiet = now - last_sample >= kQuiet;
+    if (over && ((quiet && (isComplete() || member_->serverIsGone())) || now - over_since >= kMaxDrain))
+      break;
     // our own status is recorded as well, so it must not be sent while the end is awaited
     if (!over && now >= next_status) {
       static_cast<void>(status_writer_->write(recording_->status()));
       next_status = now + kStatusPeriod;
     }
   }
-  if (!recording_->status().problem.empty()) {
+  if (!recording_->problem().empty()) {
     static_cast<void>(status_writer_->write(recording_->status()));
-    return fail(recording_->status().problem);
+    return fail(recording_->problem());
   }
   if (member_->serverIsGone() && !recording_->runIsOver())
     return fail(*member_->lost() + "; the recording up to then is in " + options_.file.string());
@@ -124,7 +136,7 @@ Result<void> Recorder::writeUntilOver() {
 
 }  // namespace
 
-Result<RecorderStatus> recordSession(const RecorderOptions& options, const std::atomic<bool>& stop) {
+Result<RecordingReport> recordSession(const RecorderOptions& options, const std::atomic<bool>& stop) {
   return Recorder(options, stop).run();
 }
 

@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
+#include "clients/recorder/recording.h"
 #include "idl/types/messages/run.h"
 #include "idl/types/result.h"
 
@@ -20,14 +22,22 @@ struct RecorderOptions {
   std::function<void(const std::string&)> report;  ///< progress, one line per call; may be empty
 };
 
+/// What a recording holds.
+struct RecordingReport {
+  RecorderStatus status;
+  std::vector<TopicCount> counts;  ///< by topic
+};
+
 /// Joins a session as recorder and writes all its topics until the run is over, the server is lost or `stop`
 /// is set. The file is completed (summary and index) in each case. Fails with a sentence when no session is
 /// found, joining is refused, the file cannot be written, or the server is lost before the run is over.
 ///
-/// Subscribes before it joins, so a server that waits for a recorder is recorded from its first tick.
+/// Subscribes before it joins, so a server that waits for a recorder is recorded from its first tick. At the
+/// end it waits for all that the server states to have published; in real time, where streams are best
+/// effort, a part of them may never come.
 ///
 /// Threads: one. Real-time: no.
-[[nodiscard]] Result<RecorderStatus> recordSession(const RecorderOptions& options,
-                                                   const std::atomic<bool>& stop);
+[[nodiscard]] Result<RecordingReport> recordSession(const RecorderOptions& options,
+                                                    const std::atomic<bool>& stop);
 
 }  // namespace tenon::recorder

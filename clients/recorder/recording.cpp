@@ -1,13 +1,14 @@
 #include "clients/recorder/recording.h"
 
+#include <algorithm>
 #include <chrono>
+#include <concepts>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "idl/record/instance_state.h"
-#include "idl/types/messages/journal.h"
-#include "idl/types/messages/objects.h"
+#include "idl/types/messages.h"
 #include "idl/types/names.h"
 #include "idl/wire/codec.h"
 #include "idl/wire/topics.h"
@@ -16,6 +17,19 @@ namespace tenon::recorder {
 namespace {
 
 constexpr std::int64_t kNanosecondsPerTick = 1'000'000;
+
+// of complete types alone: this file includes all messages
+template <class M>
+concept HasTick = requires(const M& message) {
+  Tick{message.tick};
+};
+template <class M>
+concept HasEpoch = requires(const M& message) {
+  message.server_epoch;
+};
+
+/// Number of the period of PublishedSamples.
+Tick periodOf(Tick tick) { return tick == 0 ? 0 : (tick - 1) / kPublishedSamplesPeriod + 1; }
 }  // namespace
 
 Result<Recording> Recording::open(const std::filesystem::path& file, const SessionAnnounce& session) {
@@ -49,32 +63,99 @@ void Recording::add(const wire::RawSample& sample) {
     const auto bytes =
         record::encodeInstanceGone({std::string(sample.topic), {sample.bytes.begin(), sample.bytes.end()}});
     write(channelOf(record::kInstanceStateTopic, record::kInstanceStateType, record::kInstanceStateIdl),
-          sample.source_ns, ended_++, bytes);
+          logTime(sample.source_ns, 0), ended_++, bytes);
     return;
   }
-  follow(sample);
-  write(channelOf(sample.topic, sample.type, wire::idlText()), sample.source_ns, sample.sequence,
-        sample.bytes);
+  const Tick tick = follow(sample);
+  write(channelOf(sample.topic, sample.type, wire::idlText()), logTime(sample.source_ns, tick),
+        sample.sequence, sample.bytes);
 }
 
-void Recording::follow(const wire::RawSample& sample) {
-  if (sample.topic == wire::kWorldFrame1k.name) {
-    const auto frame = wire::decode<WorldFrame>(sample.bytes);
-    if (frame && frame->server_epoch == session_.server_epoch && frame->tick > newest_tick_)
-      newest_tick_ = frame->tick;
-  } else if (sample.topic == wire::kTickInput.name) {
-    const auto input = wire::decode<TickInputPart>(sample.bytes);
-    if (!input || input->tick <= newest_input_) return;
-    if (newest_input_ != 0) status_.lost += input->tick - newest_input_ - 1;
-    newest_input_ = input->tick;
-  } else if (sample.topic == wire::kRunState.name) {
-    if (auto run = wire::decode<RunState>(sample.bytes)) run_ = std::move(*run);
+Tick Recording::follow(const wire::RawSample& sample) {
+  Tick tick = 0;
+  wire::forEachTopic([&]<class M>(const wire::Topic<M>& topic) {
+    if (sample.topic != topic.name) return;
+    if constexpr (HasTick<M> || std::same_as<M, PublishedSamples>) {
+      auto message = wire::decode<M>(sample.bytes);
+      if (!message) return;
+      if constexpr (HasEpoch<M>)
+        if (message->server_epoch != session_.server_epoch) return;
+      if constexpr (HasTick<M>) {
+        tick = message->tick;
+        ++recorded_[std::string(topic.name)][periodOf(tick)];
+      }
+      if constexpr (std::same_as<M, WorldFrame>)
+        if (topic.name == wire::kWorldFrame1k.name) newest_tick_ = std::max(newest_tick_, tick);
+      if constexpr (std::same_as<M, TickInputPart>) follow(*message);
+      if constexpr (std::same_as<M, RunState>) run_ = std::move(*message);
+      if constexpr (std::same_as<M, PublishedSamples>) keep(*message);
+    }
+  });
+  return tick;
+}
+
+void Recording::keep(const PublishedSamples& published) {
+  stated_until_ = std::max(stated_until_, published.last_tick);
+  // of the period in which this recorder joined a part is not expected
+  if (published.first_tick > joined_) published_[periodOf(published.first_tick)] = published;
+}
+
+void Recording::follow(const TickInputPart& input) {
+  if (input.tick <= joined_) return;
+  ++input_parts_;
+  if (input.part != 0 || input.tick <= newest_input_) return;
+  if (first_input_ == 0) first_input_ = input.tick;
+  newest_input_ = input.tick;
+  ++input_ticks_;
+  input_parts_expected_ += input.parts;
+}
+
+/// In ticks. Without a run state that says where the run ended, up to the newest one received; a server that
+/// publishes no inputs publishes 0 of them.
+TopicCount Recording::inputCount() const {
+  const Tick end = std::max(newest_input_, runIsOver() ? run_->tick : 0);
+  TopicCount count{std::string(wire::kTickInput.name), input_ticks_, first_input_ == 0 ? 0 : end - joined_};
+  const std::uint64_t parts = std::min(input_parts_, input_parts_expected_);
+  count.recorded -= std::min(count.recorded, input_parts_expected_ - parts);
+  return count;
+}
+
+std::vector<TopicCount> Recording::counts() const {
+  std::vector<TopicCount> all;
+  std::map<std::string, TopicCount> by_topic;
+  for (const auto& [period, published] : published_) {
+    for (const TopicSamples& topic : published.topics) {
+      static const std::map<Tick, std::uint64_t> kNone;
+      const auto found = recorded_.find(topic.topic);
+      const auto& recorded = found == recorded_.end() ? kNone : found->second;
+      // samples of a period come before those of a later one
+      if (!runIsOver() && recorded.upper_bound(period) == recorded.end()) continue;
+      const auto in_period = recorded.find(period);
+      TopicCount& count = by_topic[topic.topic];
+      count.recorded += in_period == recorded.end() ? 0 : std::min(in_period->second, topic.samples);
+      count.published += topic.samples;
+    }
   }
+  by_topic[std::string(wire::kTickInput.name)] = inputCount();
+  for (auto& [topic, count] : by_topic) {
+    count.topic = topic;
+    if (count.published > 0) all.push_back(count);
+  }
+  return all;
 }
 
-std::int64_t Recording::logTime(std::int64_t source_ns) {
-  if (!session_.lockstep || newest_tick_ == 0) return source_ns;
-  return start_ns_ + static_cast<std::int64_t>(newest_tick_) * kNanosecondsPerTick;
+RecorderStatus Recording::status() const {
+  RecorderStatus status = status_;
+  for (const TopicCount& count : counts()) status.lost += count.published - count.recorded;
+  return status;
+}
+
+bool Recording::hasStatement() const { return runIsOver() && stated_until_ >= run_->tick; }
+
+std::int64_t Recording::logTime(std::int64_t source_ns, Tick tick) const {
+  if (tick == 0) tick = newest_tick_;
+  if (!session_.lockstep || tick == 0) return source_ns;
+  return start_ns_ + static_cast<std::int64_t>(tick) * kNanosecondsPerTick;
 }
 
 std::uint16_t Recording::channelOf(std::string_view topic, std::string_view type, std::string_view schema) {
@@ -85,10 +166,10 @@ std::uint16_t Recording::channelOf(std::string_view topic, std::string_view type
   return channel;
 }
 
-void Recording::write(std::uint16_t channel, std::int64_t source_ns, std::uint64_t sequence,
+void Recording::write(std::uint16_t channel, std::int64_t log_time_ns, std::uint64_t sequence,
                       std::span<const std::uint8_t> bytes) {
   if (!status_.recording) return;
-  keepProblem(writer_.write(channel, logTime(source_ns), static_cast<std::uint32_t>(sequence), bytes));
+  keepProblem(writer_.write(channel, log_time_ns, static_cast<std::uint32_t>(sequence), bytes));
   status_.messages = writer_.messages();
 }
 
@@ -98,10 +179,7 @@ void Recording::keepProblem(const Result<void>& done) {
   status_.problem = done.error().what;
 }
 
-bool Recording::runIsOver() const {
-  return run_ && (run_->phase == RunPhase::kSucceeded || run_->phase == RunPhase::kFailed ||
-                  run_->phase == RunPhase::kStopped);
-}
+bool Recording::runIsOver() const { return run_ && isOver(run_->phase); }
 
 Result<void> Recording::close() {
   const bool was_whole = status_.problem.empty();
@@ -112,6 +190,10 @@ Result<void> Recording::close() {
                                               {"tick", std::to_string(run_->tick)},
                                               {"final hash", fmt::format("{:016x}", run_->final_hash)}}));
   }
+  std::map<std::string, std::string> samples;
+  for (const TopicCount& count : counts())
+    samples[count.topic] = fmt::format("{} of {}", count.recorded, count.published);
+  if (was_whole && !samples.empty()) keepProblem(writer_.addMetadata("tenon samples", samples));
   const auto closed = writer_.close();
   if (was_whole) keepProblem(closed);
   status_.recording = false;

@@ -6,8 +6,11 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "idl/record/mcap_writer.h"
+#include "idl/types/messages/journal.h"
+#include "idl/types/messages/log.h"
 #include "idl/types/messages/run.h"
 #include "idl/types/messages/session.h"
 #include "idl/types/result.h"
@@ -15,11 +18,19 @@
 
 namespace tenon::recorder {
 
+/// Samples of a topic, in the ticks for which the server has stated what it published.
+struct TopicCount {
+  std::string topic;
+  std::uint64_t recorded = 0;  ///< at most `published`: those that are missing are not made up for by others
+  std::uint64_t published = 0;
+};
+
 /// The recording of one session while it is written: samples in the order of arrival.
 ///
 /// Log times are session time, so that a file plays back at the pace of the session. In a real-time session
 /// that is the sample's source time. A lockstep session runs as fast as its machines allow: there it is the
-/// source time of the first sample plus one millisecond per tick of the newest WorldFrame_1k.
+/// source time of the first sample plus one millisecond per tick of the sample; one without a tick has that
+/// of the newest WorldFrame_1k.
 ///
 /// Threads: one at a time. Real-time: no.
 class Recording {
@@ -28,6 +39,8 @@ class Recording {
   [[nodiscard]] static Result<Recording> open(const std::filesystem::path& file,
                                               const SessionAnnounce& session);
 
+  /// From the tick after `tick` on, every sample of the server is expected.
+  void joined(Tick tick) { joined_ = tick; }
   /// Writes one sample, or the end of its instance; a failure shows in status().
   void add(const wire::RawSample& sample);
   /// Writes outcome and summary; the recording is complete after that. Fails with the first problem there
@@ -35,7 +48,13 @@ class Recording {
   [[nodiscard]] Result<void> close();
 
   /// As published. Once the file cannot be written `recording` is false and `problem` says why.
-  [[nodiscard]] const RecorderStatus& status() const { return status_; }
+  [[nodiscard]] RecorderStatus status() const;
+  [[nodiscard]] const std::string& problem() const { return status_.problem; }
+  /// What was recorded and what was published, by topic, since joined(): in periods that the server has
+  /// stated, of which no further samples are expected.
+  [[nodiscard]] std::vector<TopicCount> counts() const;
+  /// Whether the run is over and the server has stated what it published up to its end.
+  [[nodiscard]] bool hasStatement() const;
   [[nodiscard]] bool runIsOver() const;
   /// The newest one recorded.
   [[nodiscard]] const std::optional<RunState>& run() const { return run_; }
@@ -44,12 +63,15 @@ class Recording {
   Recording(record::McapWriter writer, const SessionAnnounce& session);
   [[nodiscard]] std::uint16_t channelOf(std::string_view topic, std::string_view type,
                                         std::string_view schema);
-  void write(std::uint16_t channel, std::int64_t source_ns, std::uint64_t sequence,
+  void write(std::uint16_t channel, std::int64_t log_time_ns, std::uint64_t sequence,
              std::span<const std::uint8_t> bytes);
-  /// Keeps the newest tick and run state, and counts missing inputs.
-  void follow(const wire::RawSample& sample);
-  /// [ns] since 1970.
-  [[nodiscard]] std::int64_t logTime(std::int64_t source_ns);
+  /// Keeps the newest tick, the run state and the counts; the tick of the sample, 0 when it has none.
+  Tick follow(const wire::RawSample& sample);
+  void follow(const TickInputPart& input);
+  void keep(const PublishedSamples& published);
+  /// [ns] since 1970, of a sample of `tick`; 0: it has none.
+  [[nodiscard]] std::int64_t logTime(std::int64_t source_ns, Tick tick) const;
+  [[nodiscard]] TopicCount inputCount() const;
   void keepProblem(const Result<void>& done);
 
   record::McapWriter writer_;
@@ -57,8 +79,14 @@ class Recording {
   std::map<std::string, std::uint16_t, std::less<>> channels_;
   RecorderStatus status_;
   std::optional<RunState> run_;
-  Tick newest_tick_ = 0;       ///< of WorldFrame_1k
-  Tick newest_input_ = 0;      ///< of TickInput: a gap in these prevents re-simulation
+  Tick newest_tick_ = 0;  ///< of WorldFrame_1k
+  Tick joined_ = 0;
+  std::map<std::string, std::map<Tick, std::uint64_t>, std::less<>> recorded_;  ///< samples by topic, period
+  std::map<Tick, PublishedSamples> published_;                                  ///< by period
+  Tick stated_until_ = 0;
+  // TickInput: a gap in its ticks prevents re-simulation
+  Tick first_input_ = 0, newest_input_ = 0;
+  std::uint64_t input_ticks_ = 0, input_parts_ = 0, input_parts_expected_ = 0;
   std::int64_t start_ns_ = 0;  ///< source time of the first sample
   std::uint64_t ended_ = 0;    ///< ended instances written
 };

@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,14 +11,32 @@
 
 #include "clients/instructor/instructor_station.h"
 #include "clients/rehearse/rehearsal.h"
+#include "clients/rehearse/script.h"
+#include "clients/rehearse/tick_log.h"
 #include "clients/trainee/trainee_station.h"
+#include "devices/catalog.h"
+#include "idl/types/output_files.h"
+#include "server/game_control/scenario.h"
 
 namespace {
+
+constexpr int kCouldNot = 1;
+constexpr int kWrongUsage = 2;
+constexpr double kLongestSession = 1e6;  // [s]
+
+/// Options of simulated people, which --input does without.
+constexpr std::array kPeopleOptions{"--seed", "--device", "--misplace-mount", "--no-instructor", "--follow"};
 
 struct RehearseArguments {
   std::string scenario;
   tenon::session::LoadOptions load{.cache = tenon::session::defaultCache()};
   tenon::rehearse::RehearsalOptions rehearsal;
+  std::optional<double> seconds;
+  std::vector<std::string> inputs;
+  std::vector<std::string> takes;
+  std::string log;
+  bool overwrite = false;
+  tenon::rehearse::TickLogOptions log_options;
   bool alone = false;
   bool no_collisions = false;
   bool quiet = false;
@@ -24,6 +44,32 @@ struct RehearseArguments {
   int misplaced_mount = -1;
   std::string device = "sigma7-sim";
 };
+
+void declareScript(CLI::App& app, RehearseArguments& arguments) {
+  const auto one = [](CLI::Option* option, const char* text) {
+    return option->allow_extra_args(false)->option_text(text);
+  };
+  CLI::Option* input =
+      one(app.add_option("--input", arguments.inputs, "HAND follows the poses in this CSV file"),
+          "HAND=FILE.csv ...");
+  one(app.add_option(
+          "--take", arguments.takes,
+          "HAND holds OBJECT from the start on, with the hand's frame at the object's: the file has "
+          "the poses where the device wants the object, and the object starts at the first one"),
+      "HAND=OBJECT ...")
+      ->needs(input);
+  CLI::Option* log =
+      app.add_option("--log", arguments.log, "write ticks to this file, a line of JSON each")->needs(input);
+  app.add_flag("--overwrite", arguments.overwrite, tenon::kOverwriteHelp)->needs(log);
+  app.add_option("--every", arguments.log_options.every, "log every N-th tick only")
+      ->option_text("N")
+      ->check(CLI::Range(1, 1'000'000'000))
+      ->needs(log);
+  app.add_flag(
+         "--timing", arguments.log_options.timing,
+         "log what each tick took, as compute_us [us]: simulation, output, hash, checkpoint, journal entry")
+      ->needs(log);
+}
 
 void declare(CLI::App& app, RehearseArguments& arguments) {
   app.set_help_flag("-h,--help", "print this help");
@@ -34,13 +80,18 @@ void declare(CLI::App& app, RehearseArguments& arguments) {
                  "threads that compute contacts; the result does not depend on them")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
-  app.add_option("--seconds", arguments.rehearsal.seconds, "limit of the session time [s]")
-      ->capture_default_str();
+  app.add_option("--seconds", arguments.seconds,
+                 "limit of the session time [s]; default: 600, or the last row's time with --input");
   app.add_option("--detail", arguments.load.detail, "level of detail of generated parts, 0 to 1")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--cache", arguments.load.cache, "folder for generated parts and haptic structures");
-  app.add_option("--device", arguments.device, "the instructor's device")->capture_default_str();
+  app.add_option("--device", arguments.device, "the instructor's device")
+      ->check([](const std::string& name) {
+        const auto known = tenon::devices::checkDeviceName(name);
+        return known ? std::string() : known.error().what;
+      })
+      ->capture_default_str();
   app.add_option(
          "--misplace-mount", arguments.misplaced_mount,
          "the simulated trainee inserts the N-th mount, from 0, at a wrong pose and does not correct it")
@@ -58,17 +109,38 @@ void declare(CLI::App& app, RehearseArguments& arguments) {
   app.add_flag("--follow", arguments.follow,
                "print activity, errors and force of the trainee twice per second");
   app.add_flag("--quiet", arguments.quiet, "print the outcome only");
-  app.footer("Exit code: 0 if the session succeeded, else 1. Last line: the final state hash.");
+  declareScript(app, arguments);
+  app.footer(
+      "With --input, hands follow files instead of people: CSV with the header t,x,y,z,qw,qx,qy,qz, the\n"
+      "device's pose in the world in seconds and metres; linear between rows (orientations by slerp), the\n"
+      "first row held before its time, the last one after it. Hands without a file are absent, and the\n"
+      "scenario need not have states.\n"
+      "Exit code: 0 if the session succeeded, or has no states and ran to its limit; 1 if not; 2 for wrong\n"
+      "usage. Last line: the final state hash.");
 }
 
-int printError(const std::string& what) {
+int printError(const std::string& what, int exit_code = kCouldNot) {
   std::fprintf(stderr, "tenon rehearse: %s\n", what.c_str());
-  return 1;
+  return exit_code;
+}
+
+bool isSessionTime(double seconds) { return seconds >= tenon::kTickSeconds && seconds <= kLongestSession; }
+
+/// Why the options do not fit together; empty: they do.
+std::string wrongUsage(const CLI::App& app, const RehearseArguments& arguments) {
+  if (arguments.seconds && !isSessionTime(*arguments.seconds))
+    return fmt::format("--seconds {}: expected {} to {:.0f}", *arguments.seconds, tenon::kTickSeconds,
+                       kLongestSession);
+  for (const char* option : kPeopleOptions)
+    if (!arguments.inputs.empty() && app.count(option) > 0)
+      return fmt::format("{} is an option of simulated people; with --input there are none", option);
+  return {};
 }
 
 /// Prints a line on the trainee twice per second of session time.
 void followTrainee(RehearseArguments& arguments, const tenon::trainee::TraineeStation& trainee) {
-  arguments.rehearsal.on_tick = [&trainee](const tenon::session::TickInput&,
+  arguments.rehearsal.on_tick = [&trainee](const tenon::session::SessionSimulation&,
+                                           const tenon::session::TickInput&,
                                            const tenon::session::TickOutput& output) {
     if (output.tick % 500 != 0) return;
     double force = 0.0;
@@ -105,31 +177,87 @@ tenon::Result<std::vector<std::unique_ptr<tenon::haptic::Station>>> openStations
   return stations;
 }
 
-int run(RehearseArguments& arguments) {
+void setOptions(RehearseArguments& arguments) {
+  arguments.rehearsal.collisions = !arguments.no_collisions;
+  if (arguments.seconds) arguments.rehearsal.seconds = *arguments.seconds;
+  if (arguments.quiet) return;
+  arguments.rehearsal.on_event = [](const tenon::EventLog& event) {
+    std::printf("%8.3f s  %-12s %s\n", static_cast<double>(event.tick) * tenon::kTickSeconds,
+                event.kind.c_str(), event.text.c_str());
+  };
+}
+
+void printOutcome(const tenon::rehearse::RehearsalReport& report) {
+  std::printf("%s after %.3f s\nfinal state hash: %016llx\n", report.reason.c_str(),
+              static_cast<double>(report.ticks) * tenon::kTickSeconds,
+              static_cast<unsigned long long>(report.final_hash));
+}
+
+int rehearsePeople(RehearseArguments& arguments) {
   const auto loaded = tenon::session::loadScene(arguments.scenario, arguments.load);
   if (!loaded) return printError(loaded.error().what);
   auto stations = openStations(arguments, *loaded->scenario);
   if (!stations) return printError(stations.error().what);
-  arguments.rehearsal.collisions = !arguments.no_collisions;
-  if (!arguments.quiet)
-    arguments.rehearsal.on_event = [](const tenon::EventLog& event) {
-      std::printf("%8.3f s  %-12s %s\n", static_cast<double>(event.tick) * tenon::kTickSeconds,
-                  event.kind.c_str(), event.text.c_str());
-    };
+  setOptions(arguments);
   const auto report = tenon::rehearse::runRehearsal(*loaded, std::move(*stations), arguments.rehearsal);
   if (!report) return printError(report.error().what);
-  std::printf("%s after %.3f s\nfinal state hash: %016llx\n", report->reason.c_str(),
-              static_cast<double>(report->ticks) * tenon::kTickSeconds,
-              static_cast<unsigned long long>(report->final_hash));
-  return report->phase == tenon::RunPhase::kSucceeded ? 0 : 1;
+  printOutcome(*report);
+  return report->phase == tenon::RunPhase::kSucceeded ? 0 : kCouldNot;
+}
+
+int rehearseScript(RehearseArguments& arguments) {
+  // what was typed and the files are checked before parts are baked
+  const auto names = tenon::game_control::readScenario(arguments.scenario, {.only_names = true});
+  if (!names) return printError(names.error().what);
+  auto script = tenon::rehearse::makeScript(arguments.inputs, arguments.takes, *names);
+  if (!script) return printError(script.error().what, kWrongUsage);
+  if (const auto read = tenon::rehearse::readTrajectories(*script); !read)
+    return printError(read.error().what);
+  if (!arguments.seconds) arguments.seconds = tenon::rehearse::endOf(*script);
+  if (!isSessionTime(*arguments.seconds))
+    return printError(fmt::format("the last row is at t = {}: give --seconds", *arguments.seconds),
+                      kWrongUsage);
+  std::optional<tenon::rehearse::TickLog> log;
+  if (!arguments.log.empty()) {
+    tenon::ProgramFiles files{{arguments.log}, {arguments.scenario}, arguments.overwrite};
+    for (const tenon::rehearse::ScriptedHand& hand : script->hands) files.inputs.push_back(hand.file);
+    if (const auto refusal = tenon::refuseOutputs(files))
+      return printError(refusal->what, refusal->exit_code);
+    auto opened = tenon::rehearse::TickLog::open(arguments.log, arguments.log_options);
+    if (!opened) return printError(opened.error().what);
+    log = std::move(*opened);
+    arguments.rehearsal.on_tick = [&log](const auto& simulation, const auto&, const auto& output) {
+      log->write(simulation, output);
+    };
+  }
+  arguments.load.read = script->readOptions();
+  const auto loaded = tenon::session::loadScene(arguments.scenario, arguments.load);
+  if (!loaded) return printError(loaded.error().what);
+  setOptions(arguments);
+  const auto report = tenon::rehearse::runScript(*script, *loaded, arguments.rehearsal);
+  if (log)
+    if (const auto closed = log->close(); !closed) return printError(closed.error().what);
+  if (!report) return printError(report.error().what);
+  printOutcome(*report);
+  const bool endless = loaded->scenario->states.front().line == 0;
+  return endless || report->phase == tenon::RunPhase::kSucceeded ? 0 : kCouldNot;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Runs a session with simulated people in one process, on a virtual clock.", "tenon rehearse");
+  CLI::App app(
+      "Runs a session in one process, on a virtual clock: with simulated people, or with hands that\n"
+      "follow files.",
+      "tenon rehearse");
   RehearseArguments arguments;
   declare(app, arguments);
-  CLI11_PARSE(app, argc, argv);
-  return run(arguments);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kWrongUsage;
+  }
+  if (const std::string wrong = wrongUsage(app, arguments); !wrong.empty())
+    return printError(wrong, kWrongUsage);
+  return arguments.inputs.empty() ? rehearsePeople(arguments) : rehearseScript(arguments);
 }

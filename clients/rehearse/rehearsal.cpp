@@ -1,8 +1,10 @@
 #include "clients/rehearse/rehearsal.h"
 
 #include <chrono>
+#include <cmath>
 
 #include "idl/types/names.h"
+#include "server/session/journal.h"
 #include "server/session/publisher.h"
 #include "server/session/session_registry.h"
 #include "server/session/session_server.h"
@@ -29,14 +31,16 @@ class Rehearsal {
         simulation_(loaded.scenario, loaded.scene, simulationOptions(loaded, options)),
         publisher_(loaded.scenario, kServerEpoch, true),
         objects_(sceneObjects(*loaded.scene)),
-        output_(simulation_.makeOutput()) {}
+        output_(simulation_.makeOutput()) {
+    entry_.checkpoint.reserve(simulation_.maxSavedBytes());
+  }
 
   Result<RehearsalReport> run() {
     for (std::size_t i = 0; i < stations_.size(); ++i)
       if (auto joined = join(i); !joined) return fail(joined.error().what);
     registry_.takeChanges(input_.changes);
-    if (!options_.collisions) listPairsToDisable();
-    const auto last = static_cast<Tick>(options_.seconds / kTickSeconds);
+    listChanges();
+    const auto last = static_cast<Tick>(std::llround(options_.seconds / kTickSeconds));
     while (!simulation_.over() && simulation_.now() < last && !(options_.stop_when && options_.stop_when()))
       tick();
     RehearsalReport report;
@@ -52,7 +56,7 @@ class Rehearsal {
                                                              const RehearsalOptions& options) {
     session::SessionSimulationOptions all;
     all.environment.workers = options.workers;
-    all.needed_hands = session::traineeHands(*loaded.scenario);
+    all.needed_hands = options.needed_hands.value_or(session::traineeHands(*loaded.scenario));
     return all;
   }
 
@@ -74,40 +78,51 @@ class Rehearsal {
     input_.tick = now;
     for (const auto& station : stations_) {
       station->step(static_cast<std::uint32_t>(now));
-      for (const DeviceInput& input : station->inputs())
-        if (const auto reading = registry_.validateDeviceInput(input)) input_.readings.push_back(*reading);
+      for (const DeviceInput& input : station->inputs()) receive(input);
     }
-    disablePairs();
+    while (!changes_.empty() && input_.changes.push_back(changes_.back())) changes_.pop_back();
     const auto begin = std::chrono::steady_clock::now();
     simulation_.tick(input_);
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
     simulation_.fill(output_);
+    fillEntry();
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
     output_.stats.compute_seconds = took.count();
-    if (options_.on_tick) options_.on_tick(input_, output_);
+    if (options_.on_tick) options_.on_tick(simulation_, input_, output_);
     deliver(publisher_.prepare(output_));
     input_.readings.clear();
     input_.changes.clear();
   }
 
-  void listPairsToDisable() {
-    const simulation::Scene& scene = simulation_.environment().scene();
-    const auto isScene = [&](ObjectId id) { return scene.objects[id.value].kind == "scene"; };
-    for (std::uint32_t i = 0; i < scene.pairs.size(); ++i)
-      if (isScene(scene.pairs[i].a) || isScene(scene.pairs[i].b)) pairs_to_disable_.push_back(i);
+  void receive(const DeviceInput& input) {
+    if (const auto reading = registry_.validateDeviceInput(input)) {
+      input_.readings.push_back(*reading);
+    } else if (options_.on_refused) {
+      options_.on_refused(input, reading.error().what);
+    }
   }
 
-  void disablePairs() {
-    while (!pairs_to_disable_.empty() && !input_.changes.full()) {
-      input_.changes.push_back(
-          {.kind = session::ChangeKind::kEnablePair, .index = pairs_to_disable_.back(), .value = 0.0});
-      pairs_to_disable_.pop_back();
-    }
+  /// What the server's tick thread hands to its journal thread; here nobody takes it.
+  void fillEntry() {
+    entry_.input = input_;
+    entry_.hash = output_.hash;
+    entry_.checkpoint.clear();
+    if (session::hasCheckpoint(input_.tick)) simulation_.save(entry_.checkpoint);
+  }
+
+  /// Changes for the first ticks, the last one first.
+  void listChanges() {
+    const simulation::Scene& scene = simulation_.environment().scene();
+    const auto isScene = [&](ObjectId id) { return scene.objects[id.value].kind == "scene"; };
+    for (std::uint32_t i = 0; i < scene.pairs.size() && !options_.collisions; ++i)
+      if (isScene(scene.pairs[i].a) || isScene(scene.pairs[i].b))
+        changes_.push_back({.kind = session::ChangeKind::kEnablePair, .index = i, .value = 0.0});
+    for (const game_control::HandAssignment& take : options_.takes)
+      changes_.push_back({.kind = session::ChangeKind::kTake, .hand = take.hand, .object = take.object});
   }
 
   void deliver(const session::OutgoingMessages& outgoing) {
     for (const auto& station : stations_) {
       if (outgoing.events.step) station->receive(*outgoing.events.step);
-      for (const GrabState& grab : outgoing.events.grabs) station->receive(grab);
       for (const WorldFrame& frame : outgoing.frames) station->receive(frame);
       for (const HandManifold* manifold : outgoing.manifolds) station->receive(*manifold);
     }
@@ -125,7 +140,8 @@ class Rehearsal {
   session::TickInput input_;
   session::TickOutput output_;
   std::string reason_;
-  std::vector<std::uint32_t> pairs_to_disable_;
+  session::JournalEntry entry_;
+  std::vector<session::Change> changes_;  ///< that no tick has had yet, the last one first
 };
 
 }  // namespace

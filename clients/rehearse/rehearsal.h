@@ -3,16 +3,22 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "clients/haptic/station.h"
 #include "idl/types/messages/log.h"
+#include "server/game_control/scenario.h"
 #include "server/session/scene_loader.h"
 #include "server/session/session_simulation.h"
 #include "server/session/tick_io.h"
 
 namespace tenon::rehearse {
+
+/// [s] Session time after a tick. A quotient: the double nearest to the decimal number of milliseconds, as in
+/// files.
+[[nodiscard]] constexpr double secondsAt(Tick tick) { return static_cast<double>(tick) / 1000.0; }
 
 /// Of a rehearsal: seed, threads, limits and observers.
 struct RehearsalOptions {
@@ -20,9 +26,18 @@ struct RehearsalOptions {
   unsigned workers = 1;
   double seconds = 600.0;  ///< [s] of session time, at most
   bool collisions = true;  ///< false: collisions with objects of kind `scene` are disabled
+  /// Hands that must be present before the first state starts; none: the trainee's.
+  std::optional<std::vector<HandId>> needed_hands;
+  /// What hands hold from the start on, see session::ChangeKind::kTake.
+  std::vector<game_control::HandAssignment> takes;
   std::function<void(const EventLog&)> on_event;  ///< each logged event; may be empty
-  std::function<void(const session::TickInput&, const session::TickOutput&)>
-      on_tick;                      ///< after each tick; may be empty
+  /// After each tick; may be empty. TickStats::compute_seconds is the time that the tick thread of a server
+  /// would have taken: simulation, output, state hash, journal entry and checkpoint.
+  std::function<void(const session::SessionSimulation&, const session::TickInput&,
+                     const session::TickOutput&)>
+      on_tick;
+  /// A device input that the server refuses, with its reason: the tick does not get it. May be empty.
+  std::function<void(const DeviceInput&, const std::string&)> on_refused;
   std::function<bool()> stop_when;  ///< true ends the rehearsal; may be empty
 };
 

@@ -8,12 +8,13 @@
 #include "clients/report/page.h"
 #include "clients/report/session_analysis.h"
 #include "clients/report/summary.h"
+#include "idl/types/output_files.h"
 
 namespace {
 
 int printError(const std::string& what) {
   std::fprintf(stderr, "tenon-report: %s\n", what.c_str());
-  return 2;
+  return 1;
 }
 
 bool save(const std::filesystem::path& file, const std::string& text) {
@@ -27,13 +28,29 @@ int run(int argc, char** argv) {
   std::filesystem::path recording, folder;
   std::string language = "en";
   bool json = false;
+  bool overwrite = false;
   app.add_option("recording", recording, "an MCAP file of tenon-record")->required();
   app.add_option("-o,--output", folder, "folder for report.html and summary.json; created if missing");
   app.add_flag("--json", json, "print the summary as JSON instead of a table");
   app.add_option("--language", language, "language of the steps' titles")->capture_default_str();
-  app.footer("Exit code: 0 if the run succeeded and every step was done, 1 if not, 2 if there is no report.");
-  CLI11_PARSE(app, argc, argv);
+  app.add_flag("--overwrite", overwrite, tenon::kOverwriteHelp);
+  app.footer(
+      "Exit code: 0 if the run succeeded and every step was done, 1 if not or if there is no report, 2 for "
+      "wrong usage.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
 
+  if (!folder.empty()) {
+    const tenon::ProgramFiles files{
+        {folder / "report.html", folder / "summary.json"}, {recording}, overwrite};
+    if (const auto refusal = tenon::refuseOutputs(files)) {
+      printError(refusal->what);
+      return refusal->exit_code;
+    }
+  }
   const auto analysis = tenon::report::analyzeRecording(recording, language);
   if (!analysis) return printError(analysis.error().what);
   // texts in a recording may be invalid UTF-8

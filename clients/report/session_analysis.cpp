@@ -1,13 +1,14 @@
 #include "clients/report/session_analysis.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
 #include <string_view>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -30,19 +31,43 @@ constexpr Tick kContactHold = 20;  // [ticks]
 
 double seconds(Tick tick) { return static_cast<double>(tick) * kTickSeconds; }
 
-/// Hand position of an input, for the manifold that answers it.
-struct SentPose {
+/// Number of an input, and how often the numbers of its hand had begun anew before (with a new station).
+struct InputNumber {
+  std::uint32_t beginnings = 0;
   std::uint32_t seq = 0;
-  Vector3 p_WH = Vector3::Zero();
+
+  auto operator<=>(const InputNumber&) const = default;
+  [[nodiscard]] InputNumber followedBy(std::uint32_t next) const {
+    return {beginnings + (next < seq ? 1 : 0), next};
+  }
+};
+
+struct SentPose {
+  InputNumber number;
+  Eigen::Vector3f p_WH = Eigen::Vector3f::Zero();  ///< as float: there is one a tick
+};
+
+/// What a manifold says of its hand.
+struct HandSample {
+  Tick tick = 0;
+  ObjectId object;
+  InputNumber answers;
+  double force = 0.0;  ///< [N]
+  Eigen::Vector3f p_WH_proxy = Eigen::Vector3f::Zero();
+  double extension = 0.0;  ///< [m] of the coupling; not a number without one
 };
 
 struct HandSeries {
   Role role = Role::kTrainee;
-  std::array<SentPose, 64> sent;
+  std::vector<SentPose> sent;
+  std::vector<HandSample> samples;
   Series force, gap, contact_force;
 };
 
-/// Reads the messages of a recording in file order.
+/// Reads the messages of a recording.
+///
+/// Topics reach a recorder in no order among each other, and on a busy machine in long batches. So what is
+/// computed from several topics is computed at the end, by tick: equal sessions give equal figures.
 class RecordingAnalyzer {
  public:
   RecordingAnalyzer(SessionAnalysis& analysis, std::string language)
@@ -97,8 +122,9 @@ class RecordingAnalyzer {
   void receive(const Presence& presence);
   void receive(const SceneObject& object) {
     kinds_[object.object] = object.kind;
-    if (object.kind == "pointer" || object.kind == "assistant")
-      pointer_titles_.insert(object.title.empty() ? object.name : object.title);
+    if (object.kind == "pointer" || object.kind == "assistant" || object.kind == "forearm" ||
+        object.kind == "head")
+      own_titles_.insert(object.title.empty() ? object.name : object.title);
   }
   void receive(const WorldFrame& frame) { advanceTo(frame.tick); }
   void receive(const DeviceInput& input);
@@ -114,7 +140,7 @@ class RecordingAnalyzer {
   }
   void receive(const ClientEvent& event) {
     const Severity severity = event.kind == "safety" ? Severity::kWarning : Severity::kInfo;
-    analysis_.events.push_back({seconds(now_), severity, event.kind, event.text});
+    client_events_.push_back({seconds(event.tick), severity, event.kind, event.text});
   }
   void receive(const EmergencyStop& stop) {
     analysis_.events.push_back(
@@ -130,11 +156,13 @@ class RecordingAnalyzer {
   static void add(Series& series, Tick tick, double value) {
     if (std::isfinite(value)) series.push_back({seconds(tick), value});
   }
-  [[nodiscard]] std::string localized(const std::vector<LocalizedText>& texts) const;
   void endVisits();
+  void evaluate(HandSeries& hand);
+  [[nodiscard]] bool touches(ObjectId object, Tick tick) const;
   void mergeHands();
+  void sortEvents();
   void listAids();
-  void dropPointerGrabs();
+  void dropOwnGrabs();
   void summarize();
   [[nodiscard]] SessionMetrics metrics(double begin, double end) const;
 
@@ -145,8 +173,9 @@ class RecordingAnalyzer {
   std::map<HandId, HandSeries> hands_;
   std::map<ClientId, Presence> present_;
   std::map<ObjectId, std::string> kinds_;
-  std::set<std::string> pointer_titles_;
-  std::map<ObjectId, Tick> last_contact_;
+  std::set<std::string> own_titles_;
+  std::map<ObjectId, std::set<Tick>> contacts_;  ///< of each object
+  std::vector<SessionEvent> client_events_;
   std::map<std::uint32_t, double> contact_seconds_;  ///< [s] by step revision
   std::map<ClientId, ForceLatency> force_latencies_;
   Series contact_;                 ///< 1 while a trainee's object is in contact, else 0
@@ -164,28 +193,48 @@ void RecordingAnalyzer::receive(const Presence& presence) {
 
 void RecordingAnalyzer::receive(const DeviceInput& input) {
   const DeviceSample& newest = input.samples.front();
-  HandSeries& hand = hands_[input.hand];
-  hand.sent[newest.seq % hand.sent.size()] = {newest.seq, newest.X_WH.translation()};
+  auto& sent = hands_[input.hand].sent;
+  const InputNumber before = sent.empty() ? InputNumber{} : sent.back().number;
+  sent.push_back({before.followedBy(newest.seq), newest.X_WH.translation().cast<float>()});
 }
 
 void RecordingAnalyzer::receive(const HandManifold& manifold) {
   advanceTo(manifold.tick);
-  HandSeries& hand = hands_[manifold.hand];
   const double force = manifold.F_Ho_W.force.norm();
-  add(hand.force, manifold.tick, force);
-  const auto contact = last_contact_.find(manifold.object);
-  const bool touches = contact != last_contact_.end() && contact->second + kContactHold >= manifold.tick;
-  if (touches) add(hand.contact_force, manifold.tick, force);
-  if (hand.role == Role::kTrainee) add(contact_, manifold.tick, touches ? 1.0 : 0.0);
-
-  // distance of the proxy's hand pose from the device's; without the input, the extension of the coupling
-  const SentPose& sent = hand.sent[manifold.answers_seq % hand.sent.size()];
+  const double extension =
+      manifold.stiffness > 0.0 ? force / manifold.stiffness : std::numeric_limits<double>::quiet_NaN();
   const Vector3 p_WH_proxy = (manifold.X_WO * manifold.X_HO.inverse()).translation();
-  if (sent.seq == manifold.answers_seq && manifold.answers_seq != 0) {
-    add(hand.gap, manifold.tick, (p_WH_proxy - sent.p_WH).norm());
-  } else if (manifold.stiffness > 0.0) {
-    add(hand.gap, manifold.tick, force / manifold.stiffness);
+  auto& samples = hands_[manifold.hand].samples;
+  // in lockstep a server repeats what a station has not answered
+  if (!samples.empty() && samples.back().tick >= manifold.tick) return;
+  const InputNumber before = samples.empty() ? InputNumber{} : samples.back().answers;
+  samples.push_back({manifold.tick, manifold.object, before.followedBy(manifold.answers_seq), force,
+                     p_WH_proxy.cast<float>(), extension});
+}
+
+bool RecordingAnalyzer::touches(ObjectId object, Tick tick) const {
+  const auto contacts = contacts_.find(object);
+  if (contacts == contacts_.end()) return false;
+  const auto after = contacts->second.upper_bound(tick);
+  return after != contacts->second.begin() && *std::prev(after) + kContactHold >= tick;
+}
+
+void RecordingAnalyzer::evaluate(HandSeries& hand) {
+  auto sent = hand.sent.begin();
+  for (const HandSample& sample : hand.samples) {
+    add(hand.force, sample.tick, sample.force);
+    const bool in_contact = touches(sample.object, sample.tick);
+    if (in_contact) add(hand.contact_force, sample.tick, sample.force);
+    if (hand.role == Role::kTrainee) add(contact_, sample.tick, in_contact ? 1.0 : 0.0);
+    // distance of the proxy's hand pose from the device's; without the input, the extension of the coupling
+    while (sent != hand.sent.end() && sent->number < sample.answers) ++sent;
+    const bool is_answer =
+        sent != hand.sent.end() && sent->number == sample.answers && sample.answers.seq != 0;
+    const double distance = is_answer ? (sample.p_WH_proxy - sent->p_WH).norm() : sample.extension;
+    add(hand.gap, sample.tick, distance);
   }
+  hand.sent = {};
+  hand.samples = {};
 }
 
 void RecordingAnalyzer::receive(const ContactPairs& pairs) {
@@ -196,7 +245,8 @@ void RecordingAnalyzer::receive(const ContactPairs& pairs) {
   for (const PairContact& pair : pairs.pairs) {
     depth = std::max({depth, pair.depth, pair.peak_depth});
     if (!pair.colliding) continue;
-    last_contact_[pair.a] = last_contact_[pair.b] = pairs.tick;
+    contacts_[pair.a].insert(pairs.tick);
+    contacts_[pair.b].insert(pairs.tick);
     assisted = assisted || kinds_[pair.a] == "assistant" || kinds_[pair.b] == "assistant";
   }
   add(analysis_.depth, pairs.tick, depth);
@@ -220,22 +270,20 @@ void RecordingAnalyzer::receive(const StepState& step) {
   const bool same = !visits.empty() && visits.back().step == step.step &&
                     (visits.back().begin == seconds(step.started) || step.phase != StepPhase::kActive);
   if (same) {
-    if (visits.back().phase == StepPhase::kActive && step.phase != StepPhase::kActive)
-      visits.back().end = seconds(std::max(now_, step.started));
     visits.back().phase = step.phase;
     return;
   }
   if (step.phase == StepPhase::kWaiting) return;
-  // a step that ends without a message was done if a later one follows, else abandoned
-  if (!visits.empty() && visits.back().phase == StepPhase::kActive) {
-    visits.back().end = seconds(step.started);
+  // a step ends where the next one begins; one that ends without a message was done if a later one follows,
+  // else abandoned
+  if (!visits.empty()) visits.back().end = seconds(step.started);
+  if (!visits.empty() && visits.back().phase == StepPhase::kActive)
     visits.back().phase = step.step > visits.back().step ? StepPhase::kDone : StepPhase::kWaiting;
-  }
   StepVisit visit;
   visit.step = step.step;
   visit.revision = step.revision;
   visit.name = step.name;
-  visit.title = localized(step.title);
+  visit.title = localized(step.title, language_);
   if (visit.title.empty()) visit.title = step.name;
   visit.part = step.part;
   visit.phase = step.phase;
@@ -288,16 +336,10 @@ void RecordingAnalyzer::receive(const Command& command) {
   }
 }
 
-std::string RecordingAnalyzer::localized(const std::vector<LocalizedText>& texts) const {
-  for (const LocalizedText& text : texts)
-    if (text.language == language_) return text.text;
-  return texts.empty() ? std::string() : texts.front().text;
-}
-
 void RecordingAnalyzer::endVisits() {
+  if (!analysis_.visits.empty()) analysis_.visits.back().end = analysis_.duration;
   for (StepVisit& visit : analysis_.visits) {
     if (visit.phase != StepPhase::kActive) continue;
-    visit.end = analysis_.duration;
     if (analysis_.run.phase == RunPhase::kSucceeded) visit.phase = StepPhase::kDone;
     if (analysis_.run.phase == RunPhase::kFailed) visit.phase = StepPhase::kTimedOut;
   }
@@ -324,6 +366,7 @@ Series mergedToLargest(Series series) {
 
 void RecordingAnalyzer::mergeHands() {
   for (auto& [id, hand] : hands_) {
+    evaluate(hand);
     const bool instructor = hand.role == Role::kInstructor;
     Series& force = instructor ? analysis_.instructor_force : analysis_.trainee_force;
     force.insert(force.end(), hand.force.begin(), hand.force.end());
@@ -385,11 +428,11 @@ SessionMetrics RecordingAnalyzer::metrics(double begin, double end) const {
   return result;
 }
 
-/// That a hand takes or releases its own pointer is no event for a trainer.
-void RecordingAnalyzer::dropPointerGrabs() {
+/// That a hand takes or releases its own object is no event for a trainer.
+void RecordingAnalyzer::dropOwnGrabs() {
   std::erase_if(analysis_.events, [this](const SessionEvent& event) {
     const bool grab = event.kind == "taken" || event.kind == "let go";
-    return grab && pointer_titles_.contains(event.text.substr(0, event.text.rfind(" (")));
+    return grab && own_titles_.contains(event.text.substr(0, event.text.rfind(" (")));
   });
 }
 
@@ -415,13 +458,23 @@ void RecordingAnalyzer::finish() {
   endVisits();
   mergeHands();
   listAids();
-  dropPointerGrabs();
+  dropOwnGrabs();
   summarize();
   for (auto& [client, latency] : force_latencies_) {
     latency.who = present_.contains(client) ? present_[client].name : fmt::format("client {}", client.value);
     analysis_.force_latencies.push_back(latency);
   }
-  std::stable_sort(analysis_.events.begin(), analysis_.events.end(),
+  sortEvents();
+}
+
+/// By time; of equal times those of the server first, in their order.
+void RecordingAnalyzer::sortEvents() {
+  std::sort(client_events_.begin(), client_events_.end(), [](const SessionEvent& a, const SessionEvent& b) {
+    return std::tie(a.time, a.text) < std::tie(b.time, b.text);
+  });
+  auto& events = analysis_.events;
+  events.insert(events.end(), client_events_.begin(), client_events_.end());
+  std::stable_sort(events.begin(), events.end(),
                    [](const SessionEvent& a, const SessionEvent& b) { return a.time < b.time; });
 }
 

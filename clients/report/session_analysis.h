@@ -65,13 +65,13 @@ struct ForceLatency {
 
 /// Analysis of a recorded session for the trainer: steps, events, forces, and real-time performance.
 ///
-/// Threads: own it. Real-time: no.
+/// Threads: one at a time. Real-time: no.
 struct SessionAnalysis {
   std::string file;
   std::string problem;  ///< why the file is incomplete; empty: it is complete
   std::string session;
   std::string title;
-  std::int64_t began_ns = 0;  ///< since 1970
+  std::int64_t began_ns = 0;  ///< [ns] since 1970
   bool lockstep = false;
   std::vector<SessionParticipant> participants;
   RunState run;

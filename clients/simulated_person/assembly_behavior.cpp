@@ -114,7 +114,6 @@ void AssemblyBehavior::mount(const HandPerception& hand, const PathPlanner& plan
                              const MountTask& task) noexcept {
   goal_ = Goal::kMount;
   task_ = task;
-  attempts_ = 0;
   aim_error_scale_ = 1.0;
   const bool any_approach = task.approach_W.norm() < 0.5;
   axis_W_ = any_approach ? Vector3(-Vector3::UnitZ()) : task.approach_W.normalized();
@@ -142,7 +141,8 @@ void AssemblyBehavior::mount(const HandPerception& hand, const PathPlanner& plan
 }
 
 void AssemblyBehavior::aim() noexcept {
-  X_WAim_ = displaced(task_.X_WG, {aim_error_scale_ * aim_error_W_, aim_error_scale_ * aim_rotation_W_});
+  X_WAim_ = displaced(task_.X_WG, {aim_error_scale_ * aim_error_W_, aim_error_scale_ * aim_rotation_W_},
+                      task_.centre);
 }
 
 void AssemblyBehavior::travelTo(const Pose& X_WH_goal, const HandPerception& hand, const PathPlanner& planner,
@@ -281,7 +281,7 @@ void AssemblyBehavior::align(const HandPerception& hand, const DelayedPerception
   if (!perception.knows(task_.object)) return;
 
   // integral correction by sight; its gain is low enough to be stable with the reaction delay
-  const Displacement error = displacement(perception.pose(task_.object), X_WStart);
+  const Displacement error = displacement(perception.pose(task_.object), X_WStart, task_.centre);
   visual_correction_.translation += kVisualGain * dt * error.translation;
   visual_correction_.rotation += kVisualGain * dt * error.rotation;
   visual_correction_ = {clampNorm(visual_correction_.translation, 0.05),
@@ -296,7 +296,6 @@ void AssemblyBehavior::align(const HandPerception& hand, const DelayedPerception
   }
   depth_ = -task_.approach_distance;
   stall_detector_.start(perceivedDepth(perception));
-  ++attempts_;
   enter(Phase::kInsert);
 }
 
@@ -372,7 +371,6 @@ void AssemblyBehavior::retract(const HandPerception& hand, const DelayedPercepti
   if (depth_ > retracted || phase_time_ < 1.0) return;
   aim();
   stall_detector_.start(perceivedDepth(perception));
-  ++attempts_;
   enter(Phase::kInsert);
 }
 
@@ -395,7 +393,7 @@ void AssemblyBehavior::holdSeated(const HandPerception& hand, const DelayedPerce
     return;
   }
   // not guided by contact: keep aligning by sight
-  const Displacement error = displacement(perception.pose(task_.object), X_WAim_);
+  const Displacement error = displacement(perception.pose(task_.object), X_WAim_, task_.centre);
   visual_correction_.translation += 1.0 * dt * error.translation;
   visual_correction_.rotation += 1.0 * dt * error.rotation;
   intendObjectPose(hand, Vector3::Zero(), Quaternion::Identity(), dt);
@@ -403,20 +401,22 @@ void AssemblyBehavior::holdSeated(const HandPerception& hand, const DelayedPerce
 
 void AssemblyBehavior::comply(const DelayedPerception& perception, double rate, double dt) noexcept {
   if (!perception.knows(task_.object)) return;
-  X_WAim_ = compliedLaterally(perception.pose(task_.object), X_WAim_, axis_W_, std::min(1.0, rate * dt));
+  X_WAim_ = compliedLaterally(perception.pose(task_.object), X_WAim_, task_.centre, axis_W_,
+                              std::min(1.0, rate * dt));
   complyInRotation(perception, rate, dt);
 }
 
 void AssemblyBehavior::complyInRotation(const DelayedPerception& perception, double rate,
                                         double dt) noexcept {
   if (!perception.knows(task_.object)) return;
-  X_WAim_ = compliedInRotation(perception.pose(task_.object), X_WAim_, task_.X_WG, std::min(1.0, rate * dt));
+  X_WAim_ = compliedInRotation(perception.pose(task_.object), X_WAim_, task_.X_WG, task_.centre,
+                               std::min(1.0, rate * dt));
 }
 
 bool AssemblyBehavior::isHelped(const DelayedPerception& perception) const noexcept {
   if (!perception.knows(task_.assistant) || !perception.knows(task_.object)) return false;
-  const Vector3 p_OC =
-      perception.pose(task_.object).inverse() * perception.pose(task_.assistant).translation() - task_.centre;
+  const Vector3 p_WPointer = perception.pose(task_.assistant) * task_.assistant_centre;
+  const Vector3 p_OC = perception.pose(task_.object).inverse() * p_WPointer - task_.centre;
   return (p_OC.cwiseAbs() - 0.5 * task_.size).cwiseMax(0.0).norm() < kAssistRange;
 }
 
@@ -428,7 +428,9 @@ void AssemblyBehavior::correctTilt(const DelayedPerception& perception, double d
 
 void AssemblyBehavior::intendObjectPose(const HandPerception& hand, const Vector3& offset_W,
                                         const Quaternion& tilt, double dt) noexcept {
-  const Pose X_WO(X_WAim_.translation() + axis_W_ * depth_ + offset_W, tilt * X_WAim_.rotation());
+  const Quaternion q_WO = tilt * X_WAim_.rotation();
+  const Vector3 p_WCentre = X_WAim_ * task_.centre + axis_W_ * depth_ + offset_W;
+  const Pose X_WO(p_WCentre - q_WO * task_.centre, q_WO);
   const Pose X_WH = displaced(displaced(X_WO * hand.X_HO.inverse(), visual_correction_), transition_);
   reach_controller_.start(X_WH);
   reach_controller_.stayWithin(hand.p_WC, hand.reach);
@@ -446,7 +448,7 @@ void AssemblyBehavior::setIntended(const Pose& X_WI, double dt) noexcept {
 
 double AssemblyBehavior::perceivedDepth(const DelayedPerception& perception) const noexcept {
   if (!perception.knows(task_.object)) return depth_;
-  return (perception.pose(task_.object).translation() - X_WAim_.translation()).dot(axis_W_);
+  return displacement(X_WAim_, perception.pose(task_.object), task_.centre).translation.dot(axis_W_);
 }
 
 }  // namespace tenon::simulated_person

@@ -6,21 +6,22 @@
 #include "clients/simulated_person/path_planner.h"
 #include "clients/simulated_person/perception.h"
 #include "clients/simulated_person/person.h"
-#include "clients/simulated_person/random.h"
 #include "clients/simulated_person/reach_controller.h"
+#include "idl/types/random.h"
 
 namespace tenon::simulated_person {
 
 /// Mounts the object that the hand holds.
 struct MountTask {
   ObjectId object;
-  Pose X_WG;                             ///< target pose (the ghost)
-  Vector3 approach_W = Vector3::Zero();  ///< unit direction of insertion; zero: any
-  double approach_distance = 0.0;        ///< [m] of the pose before the target where insertion begins
-  double tolerance = 0.002;              ///< [m] of the target position
-  Vector3 size = Vector3::Zero();        ///< [m] of the object's bounding box, in its own frame
-  Vector3 centre = Vector3::Zero();      ///< [m] of that box, likewise
-  ObjectId assistant;                    ///< the instructor's pointer; invalid when there is none
+  Pose X_WG;                                   ///< target pose (the ghost)
+  Vector3 approach_W = Vector3::Zero();        ///< unit direction of insertion; zero: any
+  double approach_distance = 0.0;              ///< [m] of the pose before the target where insertion begins
+  double tolerance = 0.002;                    ///< [m] of the target position
+  Vector3 size = Vector3::Zero();              ///< [m] of the object's bounding box, in its own frame
+  Vector3 centre = Vector3::Zero();            ///< [m] of that box, likewise
+  ObjectId assistant;                          ///< the instructor's pointer; invalid when there is none
+  Vector3 assistant_centre = Vector3::Zero();  ///< [m] of its bounding box, in its own frame
   bool guided_by_contact = true;  ///< aims with an error and relies on contact; false: exactly, by sight
   bool misplaced = false;         ///< inserts at a wrong pose and does not search for the opening
 };
@@ -35,11 +36,11 @@ struct TouchTask {
 /// Behaviour of one hand of a simulated person: rest, touch an object and stay in touch, carry the held
 /// object to a target and insert it.
 ///
-/// Decides the intended hand pose I from delayed perception and from the displayed force; the simulated arm
-/// and the device make the actual pose of it. In the last centimetre before the target nothing is corrected
-/// by sight: the aim has a seeded error, and contact alone guides the part. Insertion controls the force (a
-/// few newtons); when it stalls it searches in a small spiral, then retracts, aims again with a smaller error
-/// and retries.
+/// Decides the intended hand pose I from delayed perception and from the displayed force; the actual pose
+/// follows from the simulated arm and the device. Up to the begin of the insertion the pose is corrected by
+/// sight, from then on a visible tilt only: the aim has a seeded error, and contact guides the part
+/// laterally. Insertion controls the force (a few newtons); when it stalls it searches in a small spiral,
+/// then retracts, aims again with a smaller error and retries.
 ///
 /// Threads: one. Real-time: everything but the constructor.
 class AssemblyBehavior {
@@ -64,8 +65,6 @@ class AssemblyBehavior {
   [[nodiscard]] double contraction() const noexcept;
   /// A word or two for progress output and tests.
   [[nodiscard]] const char* activity() const noexcept;
-  /// Insertions begun in this mount.
-  [[nodiscard]] unsigned attempts() const noexcept { return attempts_; }
 
  private:
   enum class Phase : std::uint8_t { kRest, kTravel, kTouch, kAlign, kInsert, kSearch, kRetract, kSeated };
@@ -140,7 +139,6 @@ class AssemblyBehavior {
   double aim_error_scale_ = 1.0;              // [-] falls with every new attempt
   Vector3 aim_error_W_ = Vector3::Zero();     // [m]
   Vector3 aim_rotation_W_ = Vector3::Zero();  // [rad] rotation vector
-  unsigned attempts_ = 0;
   unsigned probe_ = 0;
   Vector3 p_WTouch_ = Vector3::Zero();
 

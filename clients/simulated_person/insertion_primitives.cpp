@@ -33,11 +33,6 @@ void orthonormalBasis(const Vector3& axis, Vector3& u, Vector3& v) noexcept {
   v = axis.cross(u);
 }
 
-Vector3 clampNorm(const Vector3& v, double limit) noexcept {
-  const double length = v.norm();
-  return length > limit ? Vector3(v * (limit / length)) : v;
-}
-
 Displacement decayed(const Displacement& offset, double dt, double time) noexcept {
   const double remaining = 1.0 - std::min(1.0, dt / time);
   return {offset.translation * remaining, offset.rotation * remaining};
@@ -60,19 +55,20 @@ double pushStep(double target_force, double measured_force, double max_speed, do
   return std::clamp(kPushGain * (target_force - measured_force), -max_speed, max_speed) * dt;
 }
 
-Pose compliedLaterally(const Pose& X_WO, const Pose& X_WAim, const Vector3& axis_W,
+Pose compliedLaterally(const Pose& X_WO, const Pose& X_WAim, const Vector3& p_OQ_O, const Vector3& axis_W,
                        double fraction) noexcept {
-  const Displacement off = displacement(X_WAim, X_WO);
+  const Displacement off = displacement(X_WAim, X_WO, p_OQ_O);
   const Vector3 lateral = off.translation - off.translation.dot(axis_W) * axis_W;
   Pose X_WComplied = X_WAim;
   X_WComplied.translation() += fraction * lateral;
   return X_WComplied;
 }
 
-Pose compliedInRotation(const Pose& X_WO, const Pose& X_WAim, const Pose& X_WG, double fraction) noexcept {
+Pose compliedInRotation(const Pose& X_WO, const Pose& X_WAim, const Pose& X_WG, const Vector3& p_OQ_O,
+                        double fraction) noexcept {
   if (displacement(X_WG, X_WO).rotation.norm() > kVisibleTilt) return X_WAim;
   const Vector3 turned = fraction * displacement(X_WAim, X_WO).rotation;
-  return displaced(X_WAim, {Vector3::Zero(), turned});
+  return displaced(X_WAim, {Vector3::Zero(), turned}, p_OQ_O);
 }
 
 Vector3 tiltCorrection(const Vector3& turned_W, const Pose& X_WO, const Pose& X_WAim, double dt) noexcept {

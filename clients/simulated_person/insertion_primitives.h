@@ -11,9 +11,6 @@ namespace tenon::simulated_person {
 /// Unit vectors u and v such that u, v and the unit vector `axis` are orthogonal in pairs.
 void orthonormalBasis(const Vector3& axis, Vector3& u, Vector3& v) noexcept;
 
-/// `v`, scaled to a norm of `limit` [unit of v] when it is longer.
-[[nodiscard]] Vector3 clampNorm(const Vector3& v, double limit) noexcept;
-
 /// `offset` after `dt` [s] of first-order decay with the time constant `time` [s].
 [[nodiscard]] Displacement decayed(const Displacement& offset, double dt, double time) noexcept;
 
@@ -21,7 +18,7 @@ void orthonormalBasis(const Vector3& axis, Vector3& u, Vector3& v) noexcept;
 /// (-y) of upright objects, the top of all others.
 [[nodiscard]] Vector3 touchNormal(const Vector3& size_W) noexcept;
 
-/// Offset (in W) from the centre of an object to the point that is tried when nothing was felt there;
+/// Offset (in W) from the centre of an object to the point that is tried when a touch met no resistance;
 /// `attempt` counts from 0.
 [[nodiscard]] Vector3 probeOffset(unsigned attempt) noexcept;
 
@@ -30,15 +27,15 @@ void orthonormalBasis(const Vector3& axis, Vector3& u, Vector3& v) noexcept;
 [[nodiscard]] double pushStep(double target_force, double measured_force, double max_speed,
                               double dt) noexcept;
 
-/// The aim X_WAim, moved by `fraction` [-] of the offset across axis_W to the object's actual pose X_WO:
-/// lateral compliance.
-[[nodiscard]] Pose compliedLaterally(const Pose& X_WO, const Pose& X_WAim, const Vector3& axis_W,
-                                     double fraction) noexcept;
+/// The aim X_WAim, moved by `fraction` [-] of the offset across axis_W of the object's centre p_OQ_O to its
+/// actual pose X_WO: lateral compliance.
+[[nodiscard]] Pose compliedLaterally(const Pose& X_WO, const Pose& X_WAim, const Vector3& p_OQ_O,
+                                     const Vector3& axis_W, double fraction) noexcept;
 
-/// The aim X_WAim, turned by `fraction` [-] of the rotation to the object's actual pose X_WO; unchanged when
-/// the object is visibly tilted against the target X_WG.
+/// The aim X_WAim, turned about the object's centre p_OQ_O by `fraction` [-] of the rotation to its actual
+/// pose X_WO; unchanged when the object is visibly tilted against the target X_WG.
 [[nodiscard]] Pose compliedInRotation(const Pose& X_WO, const Pose& X_WAim, const Pose& X_WG,
-                                      double fraction) noexcept;
+                                      const Vector3& p_OQ_O, double fraction) noexcept;
 
 /// Rotation vector (in W) added to the hand against a visible tilt of the object, integrated over `dt` [s]
 /// from its value turned_W one tick ago. Bounded by what a wrist can turn.

@@ -5,11 +5,6 @@ namespace tenon::simulated_person {
 namespace {
 constexpr double kGain = 4.0;        // [1/s] velocity command per position error
 constexpr double kSmoothing = 0.06;  // [s] time constant of each of the two filter stages
-
-Vector3 clampNorm(const Vector3& v, double limit) {
-  const double length = v.norm();
-  return length > limit ? Vector3(v * (limit / length)) : v;
-}
 }  // namespace
 
 void ReachController::start(const Pose& X_WH) noexcept {

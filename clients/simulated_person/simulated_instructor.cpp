@@ -80,7 +80,7 @@ void SimulatedInstructor::enter(Phase phase) noexcept {
 }
 
 Vector3 SimulatedInstructor::targetOffset() const noexcept {
-  return perception_.pose(task_.object).translation() - task_.X_WG.translation();
+  return displacement(task_.X_WG, perception_.pose(task_.object), task_.centre).translation;
 }
 
 double SimulatedInstructor::depth() const noexcept { return targetOffset().dot(task_.approach_W); }

@@ -87,7 +87,10 @@ void SimulatedTrainee::act(const HandPerception& right, const HandPerception& le
     task.tolerance = instruction_.tolerance;
     task.guided_by_contact = instruction_.is_part;
     for (const SceneObject& object : objects_) {
-      if (object.kind == "assistant") task.assistant = object.object;
+      if (object.kind == "assistant") {
+        task.assistant = object.object;
+        task.assistant_centre = object.centre;
+      }
       if (object.object != instruction_.object) continue;
       task.size = object.size;
       task.centre = object.centre;

@@ -3,6 +3,7 @@
 
 #include "clients/haptic/station_command_line.h"
 #include "clients/trainee/trainee_station.h"
+#include "devices/catalog.h"
 
 namespace {
 
@@ -24,8 +25,18 @@ int main(int argc, char** argv) {
   tenon::trainee::TraineeOptions trainee;
   std::string tactile = "intensity";
   const auto declare = [&](CLI::App& app) {
-    app.add_option("--device", trainee.device, "a bimanual haptic device")->capture_default_str();
-    app.add_option("--tactors", trainee.tactors, "the vibrotactile bracelet")->capture_default_str();
+    app.add_option("--device", trainee.device, "a bimanual haptic device")
+        ->check([](const std::string& name) {
+          const auto known = tenon::devices::checkBimanualDeviceName(name);
+          return known ? std::string() : known.error().what;
+        })
+        ->capture_default_str();
+    app.add_option("--tactors", trainee.tactors, "the vibrotactile bracelet")
+        ->check([](const std::string& name) {
+          const auto known = tenon::devices::checkDeviceName(name);
+          return known ? std::string() : known.error().what;
+        })
+        ->capture_default_str();
     app.add_option("--tactile", tactile, "how contacts of the forearm vibrate")
         ->check(CLI::IsMember({"intensity", "pattern"}))
         ->capture_default_str();

@@ -19,7 +19,7 @@ SimulatedModel falconModel() {
   caps.force_slew = 500.0;   // [assumed]
   // Each of its three motors takes a command of +-4096 counts, and the public driver lets a larger one wrap
   // to the opposite sign. Modelled per Cartesian axis instead of per motor [assumed].
-  caps.force_quantum = caps.peak_force / 4096.0;
+  caps.force_quantum = caps.peak_force / kMaxMotorCounts;
   caps.max_stiffness = 3000.0;       // [published] CHAI3D; the passivity condition allows less
   caps.physical_damping = 3.0;       // [assumed]
   caps.injected_damping = 15.0;      // [assumed] below CHAI3D's maximum, 20 Ns/m

@@ -16,8 +16,8 @@ namespace tenon::devices {
 /// Bimanual haptic device HUG of DLR: two light-weight robots behind the person, one for each hand.
 ///
 /// Each hand is coupled by a magnetic clutch, which opens above 80 N in any direction; then both robots stop
-/// where they are and both hands are free. resetFault() closes the clutch, with the hand at the handle again;
-/// each arm has to be armed afterwards.
+/// where they are and both hands are released. resetFault() closes the clutch and couples the hand to the
+/// handle again; each arm has to be armed afterwards.
 ///
 /// Threads: both arms from one servo thread. Real-time: as HapticDevice.
 class Hug : public BimanualDevice {

@@ -6,11 +6,6 @@
 namespace tenon::devices {
 namespace {
 
-Vector3 limitNorm(const Vector3& v, double limit) {
-  const double length = v.norm();
-  return length > limit ? Vector3(v * (limit / length)) : v;
-}
-
 ArmImpedance contractedImpedance(double relaxed, double braced, double damping, double contraction) {
   const double stiffness = relaxed + contraction * (braced - relaxed);
   return {stiffness, damping * std::sqrt(stiffness / relaxed)};
@@ -40,8 +35,8 @@ ArmImpedance HumanArm::rotationalImpedance() const noexcept {
 
 Displacement HumanArm::springStretch(const Pose& X_DH) const noexcept {
   const Displacement full = displacement(X_DH, X_DI_);
-  return {limitNorm(full.translation, model_.strength / impedance().stiffness),
-          limitNorm(full.rotation, model_.rotational_strength / rotationalImpedance().stiffness)};
+  return {clampNorm(full.translation, model_.strength / impedance().stiffness),
+          clampNorm(full.rotation, model_.rotational_strength / rotationalImpedance().stiffness)};
 }
 
 void HumanArm::setState(const Pose& X_DH, const Twist& V_DH, const Wrench& F_Ho_D) noexcept {

@@ -45,7 +45,6 @@ class HumanArm {
   void setButtons(std::uint32_t buttons) noexcept { buttons_ = buttons; }
 
   [[nodiscard]] const HumanArmModel& model() const noexcept { return model_; }
-  [[nodiscard]] const Pose& intent() const noexcept { return X_DI_; }
   [[nodiscard]] std::uint32_t buttons() const noexcept { return buttons_; }
   /// True pose of the hand, without the device's quantisation and delay.
   [[nodiscard]] const Pose& pose() const noexcept { return X_DH_; }

@@ -26,23 +26,6 @@ constexpr double kStictionExcess = 0.3;          ///< [-]
 constexpr double kStribeckSpeed = 2e-3;          ///< [m/s] where half of the excess is left
 constexpr double kStribeckRotationSpeed = 2e-2;  ///< [rad/s] likewise
 constexpr double kForceNoise = 0.05;             ///< [N] of a six-axis sensor at the wrist, uniform [assumed]
-constexpr double kMaxMotorCommand = 4096.0;      ///< [counts]
-
-std::uint64_t splitMix(std::uint64_t& state) {
-  state += 0x9E3779B97F4A7C15ULL;
-  std::uint64_t z = state;
-  z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9ULL;
-  z = (z ^ (z >> 27U)) * 0x94D049BB133111EBULL;
-  return z ^ (z >> 31U);
-}
-
-/// Uniform in [-1, 1).
-double uniform(std::uint64_t& state) { return static_cast<double>(splitMix(state) >> 11U) * 0x1.0p-52 - 1.0; }
-
-Vector3 limitNorm(const Vector3& v, double limit) {
-  const double length = v.norm();
-  return length > limit ? Vector3(v * (limit / length)) : v;
-}
 
 Vector3 quantize(const Vector3& v, double step) {
   if (step <= 0.0) return v;
@@ -89,9 +72,9 @@ SimulatedDevice::SimulatedDevice(SimulatedModel model, std::uint64_t seed,
     : model_(std::move(model)), clutch_(std::move(clutch)), random_(seed) {
   assert(model_.velocity_window >= 1 && model_.velocity_window <= kLongestWindow);
   assert(model_.delay <= kLongestDelay);
-  const double specimen = 1.0 + 0.1 * uniform(random_);
-  model_.friction *= specimen;
-  model_.rotational_friction *= specimen;
+  const double variation = 1.0 + 0.1 * noise();
+  model_.friction *= variation;
+  model_.rotational_friction *= variation;
 }
 
 Result<void> SimulatedDevice::open() {
@@ -152,8 +135,6 @@ void SimulatedDevice::fault(DeviceFault why) noexcept {
 }
 
 bool SimulatedDevice::rotates() const noexcept { return model_.caps.dof_mask != kTranslationDofs; }
-
-double SimulatedDevice::noise() noexcept { return uniform(random_); }
 
 void SimulatedDevice::read(DeviceState& state) noexcept {
   if (phase_ != Phase::kClosed) {
@@ -257,12 +238,12 @@ Wrench SimulatedDevice::saturateCommand(const Wrench& F_Ho_D) const noexcept {
   const DeviceCaps& caps = model_.caps;
   Wrench motor = F_Ho_D;
   if (caps.force_quantum > 0.0) {
-    const double range = kMaxMotorCommand * caps.force_quantum;
+    const double range = kMaxMotorCounts * caps.force_quantum;
     motor.force = quantize(motor.force.cwiseMax(-range).cwiseMin(range), caps.force_quantum);
   } else {
-    motor.force = limitNorm(motor.force, caps.peak_force);
+    motor.force = clampNorm(motor.force, caps.peak_force);
   }
-  motor.torque = rotates() ? limitNorm(motor.torque, caps.torque) : Vector3(Vector3::Zero());
+  motor.torque = rotates() ? clampNorm(motor.torque, caps.torque) : Vector3(Vector3::Zero());
   return motor;
 }
 

@@ -6,6 +6,7 @@
 
 #include "devices/device.h"
 #include "devices/simulated/human_arm.h"
+#include "idl/types/random.h"
 
 namespace tenon::devices {
 
@@ -37,8 +38,9 @@ struct MagneticClutch {
 /// simulated arm that holds the handle.
 ///
 /// Each read() advances time by 1 ms with the newest command held, as in a sampled-data loop, so that an
-/// unstable force law is unstable here, too. No clock is read; random numbers (friction of the specimen,
-/// noise of the force sensor) come from the seed, so a session repeats bit by bit. Gravity is compensated.
+/// unstable force law is unstable here, too. No clock is read; random numbers (friction of this device
+/// within 10 % of the make's, noise of the force sensor) come from the seed, so a session repeats bit by bit.
+/// Gravity is compensated.
 ///
 /// Threads: one servo thread, also for humanArm(). Real-time: read, write, disarm and all of humanArm().
 class SimulatedDevice : public HapticDevice {
@@ -84,14 +86,14 @@ class SimulatedDevice : public HapticDevice {
   void sense() noexcept;
   [[nodiscard]] Pose quantizePose(const Pose& X_DH) const noexcept;
   /// [-] uniform in [-1, 1).
-  [[nodiscard]] double noise() noexcept;
+  [[nodiscard]] double noise() noexcept { return random_.uniform(-1.0, 1.0); }
   [[nodiscard]] bool rotates() const noexcept;
 
   SimulatedModel model_;
   HumanArm arm_;
   std::shared_ptr<MagneticClutch> clutch_;
   std::uint32_t clutch_openings_seen_ = 0;
-  std::uint64_t random_;
+  Random random_;
   Phase phase_ = Phase::kClosed;
   DeviceState state_;
   bool braked_ = false;

@@ -38,7 +38,7 @@ class Vibrotac : public HapticDevice {
   DeviceState state_;
   std::array<std::uint8_t, 6> requested_{};  ///< newest command of the servo
   std::array<std::uint8_t, 6> sent_{};       ///< last command sent over the link
-  std::array<double, 6> amplitude_{};
+  std::array<double, 6> amplitude_{};        ///< [-] 0 to 1
   unsigned ticks_to_send_ = 0;
   unsigned ticks_since_write_ = 0;
 };

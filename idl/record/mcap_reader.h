@@ -17,7 +17,7 @@ namespace tenon::record {
 struct McapMessage {
   std::string_view topic;
   std::string_view type_name;
-  std::int64_t log_time_ns = 0;  ///< [ns]
+  std::int64_t log_time_ns = 0;  ///< [ns] since 1970, as the writer gave it
   std::uint32_t sequence = 0;
   std::span<const std::uint8_t> data;  ///< in the channel's encoding
 };

@@ -34,7 +34,8 @@ class McapWriter {
 
   /// Adds a channel and returns its id. Channels of one type name share the schema of the first.
   std::uint16_t addChannel(std::string_view topic, std::string_view type_name, std::string_view schema_text);
-  /// `log_time_ns` in [ns]. Fails when the disk is full or the file closed; so do all functions below.
+  /// `log_time_ns` in [ns], by convention since 1970. Fails when the disk is full or the file closed; so do
+  /// all functions below.
   [[nodiscard]] Result<void> write(std::uint16_t channel, std::int64_t log_time_ns, std::uint32_t sequence,
                                    std::span<const std::uint8_t> data);
   [[nodiscard]] Result<void> addMetadata(std::string_view name,

@@ -9,6 +9,8 @@
 #include <sched.h>
 #include <sys/mman.h>
 
+#include "idl/threads/scheduling.h"
+
 namespace tenon::threads {
 
 CyclicThread::CyclicThread(std::shared_ptr<Clock> clock, CyclicOptions options, Function function)
@@ -34,11 +36,14 @@ void CyclicThread::stop() {
 }
 
 void CyclicThread::schedule() {
-  const auto refuse = [this](const std::string& what, int error) {
-    if (!not_granted_.empty()) not_granted_ += "; ";
-    not_granted_ += "thread '" + options_.name + "' runs without " + what + " (" + std::strerror(error) + ")";
+  const auto add = [this](const std::string& sentence) {
+    if (!not_granted_.empty() && !sentence.empty()) not_granted_ += "; ";
+    not_granted_ += sentence;
   };
-  pthread_setname_np(pthread_self(), options_.name.substr(0, 15).c_str());
+  const auto refuse = [&](const std::string& what, int error) {
+    add("thread '" + options_.name + "' runs without " + what + " (" + std::strerror(error) + ")");
+  };
+  nameThisThread(options_.name);
   if (options_.cpu) {
     cpu_set_t cpus;
     CPU_ZERO(&cpus);
@@ -52,6 +57,7 @@ void CyclicThread::schedule() {
     const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameter);
     if (error != 0) refuse("real-time priority " + std::to_string(*options_.fifo_priority), error);
   }
+  if (options_.prepare) add(options_.prepare());
 }
 
 void CyclicThread::loop() noexcept {

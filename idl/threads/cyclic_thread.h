@@ -17,6 +17,9 @@ struct CyclicOptions {
   Nanoseconds period{1'000'000};
   std::optional<int> fifo_priority;  ///< SCHED_FIFO 1..99; none: default scheduling
   std::optional<int> cpu;            ///< pinned to this CPU; none: any
+  /// Called once on the thread, when its scheduling is set and before its first tick; may be empty. Returns
+  /// what the operating system did not grant, for notGranted().
+  std::function<std::string()> prepare;
 };
 
 /// Calls a function periodically at fixed times of a clock.

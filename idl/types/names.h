@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <string_view>
 
+#include "idl/types/messages/objects.h"
 #include "idl/types/messages/role.h"
 #include "idl/types/messages/run.h"
 
@@ -14,6 +15,12 @@ namespace tenon {
   constexpr std::array<std::string_view, 5> kNames{"admin", "instructor", "trainee", "observer", "recorder"};
   const auto index = static_cast<std::size_t>(role);
   return index < kNames.size() ? kNames[index] : "unknown role";
+}
+
+[[nodiscard]] constexpr std::string_view objectStatusName(ObjectStatus status) noexcept {
+  constexpr std::array<std::string_view, 6> kNames{"hidden", "parked", "held", "tracked", "fixed", "free"};
+  const auto index = static_cast<std::size_t>(status);
+  return index < kNames.size() ? kNames[index] : "unknown status";
 }
 
 [[nodiscard]] constexpr std::string_view runPhaseName(RunPhase phase) noexcept {

@@ -56,9 +56,18 @@ Displacement displacement(const Pose& X_WA, const Pose& X_WB) {
           logRotation(X_WB.rotation() * X_WA.rotation().conjugate())};
 }
 
+Displacement displacement(const Pose& X_WA, const Pose& X_WB, const Vector3& p_OQ_O) {
+  return {X_WB * p_OQ_O - X_WA * p_OQ_O, logRotation(X_WB.rotation() * X_WA.rotation().conjugate())};
+}
+
 Pose displaced(const Pose& X_WA, const Displacement& motion_W) {
   return {X_WA.translation() + motion_W.translation,
           (expRotation(motion_W.rotation) * X_WA.rotation()).normalized()};
+}
+
+Pose displaced(const Pose& X_WA, const Displacement& motion_W, const Vector3& p_OQ_O) {
+  const Quaternion q_WB = (expRotation(motion_W.rotation) * X_WA.rotation()).normalized();
+  return {X_WA * p_OQ_O + motion_W.translation - q_WB * p_OQ_O, q_WB};
 }
 
 }  // namespace tenon

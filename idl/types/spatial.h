@@ -12,6 +12,13 @@ using Vector3f = Eigen::Vector3f;
 using Matrix3 = Eigen::Matrix3d;
 using Quaternion = Eigen::Quaterniond;
 
+/// A vector in the direction of `v` with a norm of at most `limit` [unit of v] >= 0; zero stays zero, NaN
+/// stays NaN.
+[[nodiscard]] inline Vector3 clampNorm(const Vector3& v, double limit) {
+  const double norm = v.norm();
+  return norm > limit ? Vector3(v * (limit / norm)) : v;
+}
+
 /// [rad] atan2(y, x) of `y` [-] >= 0 and `x` [-], in 0..pi; 0 for y = x = 0. Computed with + - * / and sqrt
 /// alone, so that it has the same bits on every processor; std::atan2 has not.
 [[nodiscard]] double angleOf(double y, double x);
@@ -81,19 +88,23 @@ struct Wrench {
 
 /// The motion from pose X_WA to X_WB, in W.
 struct Displacement {
-  Vector3 translation = Vector3::Zero();  ///< [m] of the origin, p_AB_W
+  Vector3 translation = Vector3::Zero();  ///< [m] of the origin, p_AB_W; or of another point of the body
   Vector3 rotation = Vector3::Zero();     ///< [rad] rotation vector of R_WB R_WA^T, length <= pi
 };
 
-/// [m] Upper bound of the path length of any point of a body within `radius` [m] of its origin, for a motion
-/// with constant velocity and angular velocity.
+/// [m] Upper bound of the path length of any point of a body within `radius` [m] of the point that
+/// `motion.translation` is of, for a motion with constant velocity and angular velocity.
 [[nodiscard]] inline double maxPointMotion(const Displacement& motion, double radius) {
   return motion.translation.norm() + motion.rotation.norm() * radius;
 }
 
 /// The displacement from A to B.
 [[nodiscard]] Displacement displacement(const Pose& X_WA, const Pose& X_WB);
+/// The same with the translation of the point Q, fixed at p_OQ_O [m] in the frame O that moves from A to B.
+[[nodiscard]] Displacement displacement(const Pose& X_WA, const Pose& X_WB, const Vector3& p_OQ_O);
 /// X_WB for displacement(X_WA, X_WB): the inverse of displacement().
 [[nodiscard]] Pose displaced(const Pose& X_WA, const Displacement& motion_W);
+/// The same for the displacement of the point Q: its inverse.
+[[nodiscard]] Pose displaced(const Pose& X_WA, const Displacement& motion_W, const Vector3& p_OQ_O);
 
 }  // namespace tenon

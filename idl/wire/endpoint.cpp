@@ -90,6 +90,10 @@ template <class M>
 std::size_t Writer<M>::matchedReaders() const {
   return wire::matchedReaders(impl_->endpoint->entity());
 }
+template <class M>
+bool Writer<M>::waitForReaders(std::chrono::nanoseconds timeout) {
+  return dds_wait_for_acks(impl_->endpoint->entity(), timeout.count()) == DDS_RETCODE_OK;
+}
 
 template <class M>
 struct Reader<M>::Impl {

@@ -30,12 +30,23 @@ class Writer {
   /// Disposes the instance with the key fields of `key_holder`; readers get it as gone.
   Result<void> dispose(const M& key_holder);
   [[nodiscard]] std::size_t matchedReaders() const;
+  /// Waits until all reliable readers have received all samples; false when they have not within `timeout`.
+  bool waitForReaders(std::chrono::nanoseconds timeout);
 
  private:
   struct Impl;
   explicit Writer(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
+
+/// Writer<M>::open into `writer`.
+template <class M>
+Result<void> openInto(std::unique_ptr<Writer<M>>& writer, Partition& partition, const Topic<M>& topic) {
+  auto opened = Writer<M>::open(partition, topic);
+  if (!opened) return fail(opened.error().what);
+  writer = std::make_unique<Writer<M>>(std::move(*opened));
+  return {};
+}
 
 /// Takes messages of type M from a topic, one by one, without waiting.
 ///

@@ -88,6 +88,10 @@ void fields(auto& d, auto& c, Is<ConditionValue> auto& m) {
   d("limit", c.limit, m.limit);
   d("met", c.met, m.met);
 }
+void fields(auto& d, auto& c, Is<TopicSamples> auto& m) {
+  d("topics.topic", c.topic, m.topic);
+  d("samples", c.samples, m.samples);
+}
 
 inline constexpr auto kStructs = [](auto& d, auto& c, auto& m) { fields(d, c, m); };
 inline constexpr auto kNumbers = [](auto& d, auto& c, auto& m) { d("", c, m); };
@@ -328,8 +332,14 @@ void fields(auto& d, auto& c, Is<EventLog> auto& m) {
 void fields(auto& d, auto& c, Is<ClientEvent> auto& m) {
   d("client", c.client_id, m.client);
   d("seq", c.seq, m.seq);
+  d("tick", c.tick, m.tick);
   d("kind", c.kind, m.kind);
   d("text", c.text, m.text);
+}
+void fields(auto& d, auto& c, Is<PublishedSamples> auto& m) {
+  d("first_tick", c.first_tick, m.first_tick);
+  d("last_tick", c.last_tick, m.last_tick);
+  d.list("topics", c.topics, m.topics, 16, kStructs);
 }
 template <class M>
 concept JournalPart = Is<M, TickInputPart> || Is<M, CheckpointPart>;

@@ -122,11 +122,8 @@ Result<void> Membership::takeSeat() {
   presence_ = {welcome_.client, options_.person, options_.role, {}, true};
   for (const HandId hand : welcome_.hands)
     if (hand.valid()) presence_.hands.push_back(hand);
-  if (!presence_writer_) {
-    auto writer = Writer<Presence>::open(*session_, kPresence);
-    if (!writer) return fail(writer.error().what);
-    presence_writer_ = std::make_unique<Writer<Presence>>(std::move(*writer));
-  }
+  if (!presence_writer_)
+    if (auto opened = openInto(presence_writer_, *session_, kPresence); !opened) return opened;
   return presence_writer_->write(presence_);
 }
 

@@ -19,7 +19,7 @@ namespace tenon::wire {
 struct MembershipOptions {
   std::string session;              ///< its name; empty: the first one announced
   std::uint32_t domain = 0;         ///< DDS domain
-  std::string person = "somebody";  ///< display name of the client
+  std::string person = "somebody";  ///< name of the participant, for display
   Role role = Role::kObserver;
   std::vector<std::string> hands;  ///< to control
   std::string token;               ///< of an earlier seat, to rejoin it with its hands; or empty

@@ -59,7 +59,8 @@ class Participant {
 /// Failures show when endpoints are opened in it.
 ///
 /// A partition may have another link profile than its participant: the lobby uses kLan also for sessions in
-/// lockstep, because clients join it before they know.
+/// lockstep, because a client joins it before it knows whether its
+/// session is one.
 ///
 /// Threads: any. Real-time: no.
 class Partition {

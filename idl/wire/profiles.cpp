@@ -23,7 +23,7 @@ void setReliability(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile)
                        duration(lockstep ? kLockstepBlocking : kLanBlocking));
 }
 
-void setHistory(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile) {
+void setReaderHistory(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile) {
   if (topic.qos_class == QosClass::kEvent) {
     dds_qset_history(qos, DDS_HISTORY_KEEP_ALL, 0);
   } else if (topic.qos_class == QosClass::kStream && profile == LinkProfile::kLockstep) {
@@ -33,10 +33,19 @@ void setHistory(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile) {
   }
 }
 
+/// A lockstep writer keeps every sample until all its readers have it: with a history of limited depth it
+/// would replace samples that a recorder on a busy machine has yet to acknowledge.
+void setWriterHistory(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile) {
+  if (topic.qos_class == QosClass::kEvent || profile == LinkProfile::kLockstep) {
+    dds_qset_history(qos, DDS_HISTORY_KEEP_ALL, 0);
+  } else {
+    dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, 1);
+  }
+}
+
 dds_qos_t* commonQos(const TopicSpec& topic, LinkProfile profile) {
   dds_qos_t* qos = dds_create_qos();
   setReliability(qos, topic, profile);
-  setHistory(qos, topic, profile);
   dds_qset_durability(
       qos, topic.parameters.late_joiner_depth > 0 ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   if (topic.parameters.latched) {
@@ -51,6 +60,7 @@ dds_qos_t* writerQos(const TopicSpec& topic, LinkProfile profile) {
   const TopicParameters& parameters = topic.parameters;
   const bool lockstep = profile == LinkProfile::kLockstep;
   dds_qos_t* qos = commonQos(topic, profile);
+  setWriterHistory(qos, topic, profile);
   dds_data_representation_id_t xcdr1[] = {DDS_DATA_REPRESENTATION_XCDR1};
   dds_qset_data_representation(qos, 1, xcdr1);
   if (parameters.late_joiner_depth > 0) {
@@ -73,16 +83,20 @@ dds_qos_t* writerQos(const TopicSpec& topic, LinkProfile profile) {
 
 dds_qos_t* readerQos(const TopicSpec& topic, LinkProfile profile, bool keep_all) {
   dds_qos_t* qos = commonQos(topic, profile);
-  if (keep_all) dds_qset_history(qos, DDS_HISTORY_KEEP_ALL, 0);
+  if (keep_all) {
+    dds_qset_history(qos, DDS_HISTORY_KEEP_ALL, 0);
+  } else {
+    setReaderHistory(qos, topic, profile);
+  }
   return qos;
 }
 
 std::string_view loopbackConfig() {
   return R"xml(<?xml version="1.0" encoding="UTF-8"?>
 <!-- Programs on one machine, and nothing leaves it: the default when neither an option nor CYCLONEDDS_URI says
-     otherwise. Unicast to up to 61 participants, so it also works where multicast does not. One receive thread,
-     so that the name `recv` in Threads covers it; fast heartbeats and acknowledgements, because a lost
-     sample of a lockstep session stops everybody until it has been sent again. -->
+     otherwise. Unicast to up to 61 participants, so it also works where multicast does not. One receive thread
+     a process; fast heartbeats and acknowledgements, because a lost sample of a lockstep session stops all
+     its programs until it has been sent again. -->
 <CycloneDDS xmlns="https://cdds.io/config">
   <Domain Id="any">
     <General>

@@ -17,18 +17,19 @@ enum class QosClass {
   kEvent,   ///< reliable, keep all
 };
 
-/// What a link promises; streams differ by it.
+/// Delivery on a link; streams differ by it.
 enum class LinkProfile {
   kLan,       ///< loopback or a local network, in real time
-  kLockstep,  ///< streams are reliable with history depth 32 on both sides; no deadlines, no lifespans
+  kLockstep,  ///< streams are reliable; writers keep all samples until all readers have them, readers the
+              ///< last 32 of a stream; no deadlines, no lifespans
 };
 
 using Milliseconds = std::chrono::milliseconds;
 inline constexpr Milliseconds kNever{0};  ///< the policy is not set
 
-/// DDS policies of a topic that its QoS class does not determine. Readers request the weakest deadline,
-/// liveliness and lifespan, so that these never prevent a match. On a lockstep link, which may be slower than
-/// real time, deadline, lease by topic and lifespan are not offered.
+/// DDS policies of a topic that its QoS class does not determine; writers offer them. Readers request the
+/// weakest deadline and liveliness, so that these never prevent a match. On a lockstep link, which may be
+/// slower than real time, deadline, lease by topic and lifespan are not offered, and leases are 5 s at least.
 struct TopicParameters {
   Milliseconds deadline = kNever;  ///< [ms] DEADLINE: longest time between two samples
   Milliseconds lease =

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "idl/types/output_files.h"
 #include "scenarios/part_generator/engine_bay_layout.h"
 #include "scenarios/part_generator/scenario_parts.h"
 #include "scenarios/part_generator/scenario_pictures.h"
@@ -58,6 +59,11 @@ void printLayout() {
   }
 }
 
+/// The file of a part in `folder`.
+std::filesystem::path fileOf(const ScenarioPart& part, const std::filesystem::path& folder) {
+  return folder / fmt::format("{}.stl", part.name);
+}
+
 int writeParts(const PartSet& set, const std::filesystem::path& folder, double detail) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
@@ -68,7 +74,7 @@ int writeParts(const PartSet& set, const std::filesystem::path& folder, double d
   std::size_t total = 0;
   for (const ScenarioPart& part : set.parts) {
     const PartMesh mesh = part.make(detail);
-    const std::filesystem::path file = folder / fmt::format("{}.stl", part.name);
+    const std::filesystem::path file = fileOf(part, folder);
     if (const auto written = writeStl(file, mesh); !written) {
       fmt::print(stderr, "tenon-parts: {}\n", written.error().what);
       return 1;
@@ -92,6 +98,7 @@ int main(int argc, char** argv) {
   std::size_t triangles = 0;
   bool list = false;
   bool layout = false;
+  ProgramFiles files;
   std::string picture;
   PictureMoment moment = PictureMoment::kAssembly;
   app.add_option("SCENARIO", scenario, "scenario: " + knownSets());
@@ -108,10 +115,15 @@ int main(int argc, char** argv) {
   app.add_option("--moment", moment, "what the picture shows: start or assembly (default)")
       ->transform(CLI::CheckedTransformer(std::map<std::string, PictureMoment>{
           {"start", PictureMoment::kStart}, {"assembly", PictureMoment::kAssembly}}));
+  app.add_flag("--overwrite", files.overwrite, kOverwriteHelp);
   app.footer(
       "Examples:\n  tenon-parts peg_and_box out/\n  tenon-parts engine_bay out/ --triangles 300000\n"
       "  tenon-parts engine_bay --picture bay.png --detail 0.6");
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
 
   if (list && scenario.empty()) {
     for (const PartSet& set : partSets()) printPartSet(set);
@@ -140,6 +152,13 @@ int main(int argc, char** argv) {
     fmt::print(stderr,
                "tenon-parts: nothing to do: expected a folder for the files, or --picture FILE.png\n");
     return 2;
+  }
+  files.outputs = {picture};
+  if (!folder.empty())
+    for (const ScenarioPart& part : set->parts) files.outputs.push_back(fileOf(part, folder));
+  if (const auto refusal = refuseOutputs(files)) {
+    fmt::print(stderr, "tenon-parts: {}\n", refusal->what);
+    return refusal->exit_code;
   }
   if (triangles > 0) detail = detailFor(*set, triangles);
   if (detail < 0.0) detail = set->default_detail;

@@ -29,6 +29,13 @@ class PartMeshes {
   std::vector<PartMesh> meshes_;
 };
 
+PictureCamera cameraOfWidth(int width) {
+  PictureCamera camera;
+  camera.width = width;
+  camera.height = width * 5 / 8;
+  return camera;
+}
+
 std::vector<PictureObject> engineBayAtStart(const PartMeshes& meshes) {
   std::vector<PictureObject> scene;
   for (const engine_bay::OtherObject& other : engine_bay::others()) {
@@ -69,7 +76,7 @@ std::vector<PictureObject> engineBayInAssembly(const PartMeshes& meshes) {
   return scene;
 }
 
-Result<void> drawPegAndBox(const PartMeshes& meshes, PictureMoment moment,
+Result<void> drawPegAndBox(const PartMeshes& meshes, PictureMoment moment, int width,
                            const std::filesystem::path& file) {
   const Pose X_WB(Vector3(0.0, 0.0, 0.080));
   const double height = moment == PictureMoment::kStart ? 0.16 : 0.02;
@@ -80,22 +87,51 @@ Result<void> drawPegAndBox(const PartMeshes& meshes, PictureMoment moment,
       {meshes.mesh("peg"), Pose(Vector3(0.0, 0.0, 0.022)), kGhost, kGhostOpacity},
       {meshes.mesh("cube"), Pose(Vector3(0.14, -0.03, 0.16)), std::nullopt, 1.0},
       {meshes.mesh("pointer"), Pose(Vector3(-0.10, -0.10, 0.14)), std::nullopt, 1.0}};
-  PictureCamera camera;
+  PictureCamera camera = cameraOfWidth(width);
   camera.p_WE = {0.42, -0.75, 0.55};
   camera.p_WT = {0.0, 0.0, 0.10};
   camera.half_angle_tangent = 0.26;
   return renderScene(scene, camera, file);
 }
 
+/// The blocks as they start, or stacked.
+Result<void> drawStacking(const PartMeshes& meshes, PictureMoment moment, int width,
+                          const std::filesystem::path& file) {
+  constexpr Color kRed = 0xC0392B, kGreen = 0x27AE60, kBlue = 0x2980B9;
+  const PartMesh* block = meshes.mesh("block");
+  std::vector<PictureObject> scene{
+      {meshes.mesh("table"), Pose(), std::nullopt, 1.0},
+      {meshes.mesh("cube"), Pose(Vector3(-0.30, 0.15, 0.25)), std::nullopt, 1.0}};
+  if (moment == PictureMoment::kStart) {
+    scene.push_back({block, Pose(Vector3(0.17, -0.09, 0.032)), kRed, 1.0});
+    scene.push_back({block, Pose(Vector3(0.17, 0.09, 0.032)), kGreen, 1.0});
+    scene.push_back({block, Pose(Vector3(0.0, 0.12, 0.032)), kBlue, 1.0});
+    scene.push_back({meshes.mesh("pointer"), Pose(Vector3(0.0, -0.20, 0.15)), std::nullopt, 1.0});
+  } else {
+    scene.push_back({block, Pose(Vector3(-0.13, 0.0, 0.031)), kRed, 1.0});
+    scene.push_back(
+        {block, Pose(Vector3(-0.126, -0.003, 0.092), expRotation(Vector3(0.0, 0.0, 0.10))), kGreen, 1.0});
+    scene.push_back(
+        {block, Pose(Vector3(-0.13, 0.002, 0.20), expRotation(Vector3(0.05, 0.08, -0.1))), kBlue, 1.0});
+    scene.push_back({meshes.mesh("pointer"), Pose(Vector3(-0.13, 0.002, 0.242)), std::nullopt, 1.0});
+  }
+  PictureCamera camera = cameraOfWidth(width);
+  camera.p_WE = {0.62, -1.05, 0.75};
+  camera.p_WT = {-0.02, 0.0, 0.08};
+  camera.half_angle_tangent = 0.30;
+  return renderScene(scene, camera, file);
+}
+
 }  // namespace
 
 Result<void> drawScenario(const PartSet& set, double detail, PictureMoment moment,
-                          const std::filesystem::path& file) {
+                          const std::filesystem::path& file, int width) {
   const PartMeshes meshes(set, detail);
-  if (set.name == "peg_and_box") return drawPegAndBox(meshes, moment, file);
+  if (set.name == "peg_and_box") return drawPegAndBox(meshes, moment, width, file);
+  if (set.name == "stacking") return drawStacking(meshes, moment, width, file);
   const std::vector<PictureObject> scene =
       moment == PictureMoment::kStart ? engineBayAtStart(meshes) : engineBayInAssembly(meshes);
-  PictureCamera camera;
+  PictureCamera camera = cameraOfWidth(width);
   if (moment == PictureMoment::kStart) {
     camera.p_WE = {2.3, -3.3, 2.6};
     camera.p_WT = {0.05, 0.60, 0.62};

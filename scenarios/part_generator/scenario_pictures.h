@@ -12,9 +12,9 @@ enum class PictureMoment {
 };
 
 /// Renders a scenario with its parts, at `detail` [-], to a PNG from the point of view of a person in front
-/// of it. Supports peg_and_box; any other set is drawn as the engine bay. Fails when the file cannot be
+/// of it. `set` is one of partSets(). `width` [pixels] is 8/5 of the height. Fails when the file cannot be
 /// written.
 [[nodiscard]] Result<void> drawScenario(const PartSet& set, double detail, PictureMoment moment,
-                                        const std::filesystem::path& file);
+                                        const std::filesystem::path& file, int width = 1600);
 
 }  // namespace tenon::part_generator

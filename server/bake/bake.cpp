@@ -12,10 +12,6 @@
 
 namespace tenon::bake {
 
-namespace {
-
-constexpr double kMaxPoints = 1e6;
-
 Result<void> checkOptions(const BakeOptions& options) {
   if (!(options.voxel > 0.0) || !std::isfinite(options.voxel))
     return fail("the voxel size must be greater than 0");
@@ -24,6 +20,7 @@ Result<void> checkOptions(const BakeOptions& options) {
   if (!std::isfinite(options.point_spacing) || options.point_spacing < 0.0) {
     return fail("the spacing of shell points must be 0 or more");
   }
+  constexpr double kMaxPoints = 1e6;
   if (options.points == 0 || options.points > kMaxPoints)
     return fail("the number of shell points must be 1 to 1,000,000");
   for (const RefineBox& region : options.refine) {
@@ -33,6 +30,8 @@ Result<void> checkOptions(const BakeOptions& options) {
   }
   return {};
 }
+
+namespace {
 
 Result<void> checkMesh(const TriangleMesh& mesh) {
   for (const Vector3f& p : mesh.vertices) {

@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
-#include <set>
 
 #include <xxhash.h>
 
 #include "server/bake/bake.h"
+#include "server/bake/mesh_references.h"
 #include "server/bake/octree_file.h"
 
 namespace tenon::bake {
@@ -49,20 +49,6 @@ class ContentHash {
   XXH3_state_t* state_;
 };
 
-/// The files that a mesh consists of: a glTF may have buffers (.bin) in its folder.
-std::vector<std::filesystem::path> filesOf(const std::filesystem::path& mesh) {
-  std::vector<std::filesystem::path> files{mesh};
-  if (mesh.extension() != ".gltf") return files;
-  std::error_code error;
-  const auto folder = mesh.parent_path().empty() ? std::filesystem::path(".") : mesh.parent_path();
-  std::set<std::filesystem::path> buffers;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    if (entry.path().extension() == ".bin") buffers.insert(entry.path());
-  }
-  files.insert(files.end(), buffers.begin(), buffers.end());
-  return files;
-}
-
 Result<std::string> contentHash(const std::vector<std::filesystem::path>& meshes, double unit,
                                 const BakeOptions& options) {
   ContentHash hash;
@@ -78,8 +64,12 @@ Result<std::string> contentHash(const std::vector<std::filesystem::path>& meshes
     }
   }
   for (const auto& mesh : meshes) {
-    for (const auto& file : filesOf(mesh)) {
-      if (!hash.addFile(file)) return fail(file.string() + ": cannot be read");
+    if (!hash.addFile(mesh)) return fail(mesh.string() + ": cannot be read");
+    // the names are in the mesh; a file that is missing is left to the import
+    for (const auto& [named, file] : referencesOf(mesh)) {
+      std::error_code error;
+      hash.add(file.empty() ? std::uint64_t{0} : std::uint64_t{std::filesystem::file_size(file, error)});
+      if (!file.empty() && !hash.addFile(file)) return fail(file.string() + ": cannot be read");
     }
     hash.add(std::uint64_t{0});
   }

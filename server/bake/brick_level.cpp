@@ -13,8 +13,6 @@ namespace tenon::bake {
 namespace {
 
 using Cell = BrickLevel::Cell;
-// Bricks of 1,458 bytes and working memory fit into 3 GB.
-constexpr std::size_t kMaxSlots = 1'000'000;
 
 std::size_t linearIndex(const Cell& cell, const Cell& size) {
   return (static_cast<std::size_t>(cell.z()) * static_cast<std::size_t>(size.y()) +
@@ -129,7 +127,7 @@ void BrickLevel::setSample(const Cell& lattice, std::int16_t value, std::span<st
   });
 }
 
-bool BrickLevel::sampleDistances(const TriangleTree& tree, ParallelWork& work) {
+std::size_t BrickLevel::sampleDistances(const TriangleTree& tree, std::size_t most, ParallelWork& work) {
   // bricks whose centre is too far away have no sample in the band
   std::vector<std::uint8_t> candidate(nodes(), 0);
   const double band_reach = (structures::DistanceField::kBandVoxels + kBrickRadius) * voxel;
@@ -141,7 +139,7 @@ bool BrickLevel::sampleDistances(const TriangleTree& tree, ParallelWork& work) {
     slot[node] = static_cast<std::int32_t>(of_slot.size());
     of_slot.push_back(static_cast<std::uint32_t>(node));
   }
-  if (of_slot.size() > kMaxSlots) return false;
+  if (of_slot.size() > most) return of_slot.size();
   samples.resize(of_slot.size() * kSamples);
   work.run(of_slot.size(), 64, [&](std::size_t s) {
     const std::uint32_t node = of_slot[s];
@@ -154,7 +152,7 @@ bool BrickLevel::sampleDistances(const TriangleTree& tree, ParallelWork& work) {
                                                 structures::DistanceField::kQuantaPerVoxel);
     if (*std::min_element(own, own + kSamples) >= band) slot[of_slot[s]] = -1;
   }
-  return true;
+  return of_slot.size();
 }
 
 BrickLevel::SampleBits BrickLevel::ownSamples(std::size_t node) const {

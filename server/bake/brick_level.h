@@ -25,7 +25,7 @@ class TriangleTree;
 class BrickLevel {
  public:
   static constexpr int kVoxels = structures::DistanceField::kBrickVoxels;
-  static constexpr double kBrickRadius = 6.9283;  ///< [voxels] from a brick's centre to its corner
+  static constexpr double kBrickRadius = structures::DistanceField::kBrickRadius;  ///< [voxels]
   static constexpr int kSide = structures::DistanceField::kBrickSide;
   static constexpr int kSamples = structures::DistanceField::kBrickSamples;
   using Cell = Eigen::Vector3i;
@@ -37,7 +37,7 @@ class BrickLevel {
     bool known = false;     ///< the point is in this level
     bool free = false;      ///< outside: connected to the grid's border
     bool reached = false;   ///< by the flood fill itself, not by its extension to the surface
-    double distance = 0.0;  ///< [voxel] unsigned
+    double distance = 0.0;  ///< [voxels] unsigned
   };
 
   /// The whole grid, with edge `voxel` [m].
@@ -81,13 +81,10 @@ class BrickLevel {
   [[nodiscard]] const std::int16_t* findSample(const Cell& lattice) const;
   /// Sets the sample in every brick that contains it, and sets `marks` of their nodes to 1.
   void setSample(const Cell& lattice, std::int16_t value, std::span<std::uint8_t> marks);
-  [[nodiscard]] bool anyOutside(std::size_t node) const {
-    return slot[node] < 0 ? free[node] != 0 : outside[static_cast<std::size_t>(slot[node])].any();
-  }
 
-  /// Gives a slot to the bricks near triangles and samples their unsigned distances. False when there
-  /// are more than fit into 3 GB.
-  bool sampleDistances(const TriangleTree& tree, ParallelWork& work);
+  /// Gives a slot to the bricks near triangles and samples their unsigned distances. Returns the number of
+  /// these bricks; when it is more than `most`, nothing was sampled.
+  std::size_t sampleDistances(const TriangleTree& tree, std::size_t most, ParallelWork& work);
   /// Sets the samples `which` of a node to the unsigned distance to the nearest triangle.
   void sampleBrick(std::size_t node, const TriangleTree& tree, const SampleBits& which);
   /// Copies the apron samples (on the upper faces) from the neighbours that own them.
@@ -100,10 +97,10 @@ class BrickLevel {
   Cell bricks;
   int refinement = 1;
   std::vector<std::int32_t> slot;     ///< per node; < 0: no surface near
-  std::vector<std::uint8_t> free;     ///< per node without slot
+  std::vector<std::uint8_t> free;     ///< per node: 1 when it has no slot and is outside
   std::vector<std::int16_t> samples;  ///< kSamples per slot [voxels / kQuantaPerVoxel]
   std::vector<Mask> reached;          ///< per slot: reached by the flood fill from outside
-  std::vector<SampleBits> outside;    ///< per slot, apron included
+  std::vector<SampleBits> outside;    ///< per slot: the samples that are outside, apron included
 
  private:
   /// Calls visit(node, sample) for each brick with a slot that contains this lattice point, until it returns

@@ -153,8 +153,8 @@ class ExposureSplitter {
 
   /// With kSome, `pieces` contains the exposed parts of the triangle.
   Exposed exposedPart(const structures::Triangle& t, std::vector<structures::Triangle>& pieces) {
-    std::size_t a = 0;
-    const double length = structures::longestEdge(t, a);
+    std::size_t from = 0;
+    const double length = structures::longestEdge(t, from);
     const Vector3 centre = (t[0] + t[1] + t[2]) / 3.0;
     const CellMap& map = mapAt(centre);
     const BrickLevel& level = map.level();
@@ -162,12 +162,7 @@ class ExposureSplitter {
     if (length <= kMaxEdgeForBall * level.voxel && inEmptyBall(level, t, centre)) return Exposed::kAll;
     if (length <= kMaxEdgeForBox * level.voxel && map.hides(structures::boxOf(t))) return Exposed::kNone;
 
-    const std::size_t b = (a + 1) % 3;
-    const Vector3 middle = (t[a] + t[b]) / 2;
-    structures::Triangle first = t;
-    structures::Triangle second = t;
-    first[b] = middle;
-    second[a] = middle;
+    const auto [first, second] = structures::bisected(t, from);
     const Exposed of_first = exposedPart(first, pieces);
     const Exposed of_second = exposedPart(second, pieces);
     if (of_first == of_second && of_first != Exposed::kSome) return of_first;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <utility>
 #include <vector>
 
@@ -238,11 +237,11 @@ structures::FeatureShell bakeFeatures(const WeldedMesh& mesh, const structures::
   samples.reserve(features.size());
   for (const Feature& feature : features) samples.push_back(feature.sample);
   std::vector<std::uint32_t> order;
-  structures::Pointshell points = structures::buildFlatShell(samples, sizes.piece, order);
-  auto edges = std::make_shared<std::vector<FeatureEdge>>();
-  edges->reserve(order.size());
-  for (const std::uint32_t i : order) edges->push_back(features[i].edge);
-  return {std::move(points), *edges, edges};
+  structures::FeatureStorage storage;
+  storage.points = structures::buildFlatShell(samples, sizes.piece, order);
+  storage.edges.reserve(order.size());
+  for (const std::uint32_t i : order) storage.edges.push_back(features[i].edge);
+  return structures::makeFeatureShell(std::move(storage));
 }
 
 }  // namespace tenon::bake

@@ -14,6 +14,7 @@
 #include "server/bake/slope_limit.h"
 #include "server/bake/triangle_tree.h"
 #include "server/structures/field_builder.h"
+#include "server/structures/structure_checks.h"
 
 namespace tenon::bake {
 
@@ -21,13 +22,7 @@ namespace {
 
 using Cell = BrickLevel::Cell;
 using Entry = structures::DistanceField::Entry;
-constexpr double kMaxBricks = 40e6;  // 250 MB of index, bounds and lists
 constexpr int kCentreSample = (4 * BrickLevel::kSide + 4) * BrickLevel::kSide + 4;
-
-tl::unexpected<Error> needsTooMuchMemory(double voxel) {
-  return fail("voxels of " + std::to_string(voxel * 1e3) +
-              " mm need more than 3 GB for this mesh; choose larger voxels");
-}
 
 std::vector<std::uint32_t> bricksToRefine(const BrickLevel& coarse, const BakeOptions& options) {
   std::vector<std::uint32_t> refined;
@@ -193,20 +188,24 @@ structures::DistanceField assemble(structures::FieldStorage storage, const Brick
 }  // namespace
 
 Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, const BakeOptions& options,
-                             ParallelWork& work) {
+                             ParallelWork& work, const FieldLimits& limits) {
+  if (const std::string why = whyTooLarge(triangles, options, limits); !why.empty()) return fail(why);
+  const auto tooMany = [&options](std::size_t bricks, std::size_t limit, bool refined) {
+    return fail(tooManyBricks(static_cast<double>(bricks), limit, refined, options));
+  };
   Eigen::AlignedBox3d box;
   for (const structures::Triangle& t : triangles) box.extend(structures::boxOf(t));
-  const Vector3 bricks = (box.sizes() / (options.voxel * BrickLevel::kVoxels)).array().ceil() + 3.0;
-  if (!(bricks.prod() <= kMaxBricks)) return needsTooMuchMemory(options.voxel);
-
   structures::FieldStorage storage = structures::makeGrid(box, options.voxel);
   const auto& counts = storage.layout.bricks;
+  if (*std::max_element(counts.begin(), counts.end()) > structures::DistanceField::kMaxBricksPerAxis)
+    return fail("the mesh is longer than 8,000,000 voxels; choose larger ones");
   BrickLevel coarse(storage.layout.p_MoFo_M, options.voxel, {counts[0], counts[1], counts[2]});
   work.stage("building the triangle tree", 0.05, 0.15);
   const double longest = 2.0 * BrickLevel::kVoxels * options.voxel;
   const TriangleTree tree(triangles, longest);
   work.stage("measuring distances", 0.15, 0.45);
-  if (!coarse.sampleDistances(tree, work)) return needsTooMuchMemory(options.voxel);
+  const std::size_t sampled = coarse.sampleDistances(tree, limits.level_bricks, work);
+  if (sampled > limits.level_bricks) return tooMany(sampled, limits.level_bricks, false);
   work.stage("flood fill from outside", 0.45, 0.55);
   if (!work.cancelled()) findOutside(coarse, nullptr, tree, work);
 
@@ -215,7 +214,8 @@ Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, co
   if (!refined.empty() && !work.cancelled()) {
     work.stage("refining", 0.55, 0.65);
     fine = std::make_unique<BrickLevel>(coarse, options.refinement, refined);
-    if (!fine->sampleDistances(tree, work)) return needsTooMuchMemory(options.voxel / options.refinement);
+    const std::size_t sampled_fine = fine->sampleDistances(tree, limits.level_bricks, work);
+    if (sampled_fine > limits.level_bricks) return tooMany(sampled_fine, limits.level_bricks, true);
     if (!work.cancelled()) findOutside(*fine, &coarse, tree, work);
     if (!work.cancelled()) adoptFineSigns(coarse, *fine, work);
   }
@@ -249,6 +249,10 @@ Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, co
   storage.layout.refinement = fine ? options.refinement : 1;
   work.stage("assembling the field", 0.85, 0.88);
   baked.field = assemble(std::move(storage), coarse, fine.get(), refined, work);
+  const std::size_t stored = baked.field.layout().samples.size() / BrickLevel::kSamples;
+  if (stored > limits.field_bricks) return tooMany(stored, limits.field_bricks, fine != nullptr);
+  if (const auto problem = structures::problemOf(baked.field.layout()))
+    return fail("the field " + *problem + "; choose larger voxels");
   return baked;
 }
 

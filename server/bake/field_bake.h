@@ -5,6 +5,7 @@
 
 #include "idl/types/result.h"
 #include "server/bake/bake.h"
+#include "server/bake/field_size.h"
 #include "server/structures/triangle.h"
 
 namespace tenon::bake {
@@ -18,8 +19,11 @@ struct BakedField {
 };
 
 /// The signed distance field of a triangle soup: magnitudes are exact in the band, signs come from a flood
-/// fill from outside. An error when it needs more than 3 GB.
+/// fill from outside. An error when it exceeds the limits (with its size) or is cancelled.
+///
+/// Threads: one caller; uses several threads inside.
 [[nodiscard]] Result<BakedField> bakeField(std::span<const structures::Triangle> triangles,
-                                           const BakeOptions& options, ParallelWork& work);
+                                           const BakeOptions& options, ParallelWork& work,
+                                           const FieldLimits& limits = {});
 
 }  // namespace tenon::bake

@@ -1,6 +1,8 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -14,6 +16,7 @@
 
 #include "idl/types/spatial.h"
 #include "server/bake/import_pipe.h"
+#include "server/bake/mesh_references.h"
 #include "server/bake/octree_file.h"
 
 namespace tenon::bake {
@@ -22,27 +25,28 @@ namespace {
 
 constexpr std::size_t kMaxTriangles = 60'000'000;
 
-/// Opens only files in the mesh's own folder: a mesh may refer to others (materials, buffers) there.
-class FolderOnly : public Assimp::DefaultIOSystem {
+/// Opens only the mesh and what it refers to, which are all that the cache of baked structures knows of.
+class OwnFilesOnly : public Assimp::DefaultIOSystem {
  public:
-  explicit FolderOnly(const std::filesystem::path& folder)
-      : folder_(std::filesystem::weakly_canonical(std::filesystem::absolute(folder))) {}
+  explicit OwnFilesOnly(const std::filesystem::path& mesh) {
+    files_[named(mesh)] = mesh;
+    for (const MeshReference& reference : referencesOf(mesh)) {
+      if (!reference.file.empty()) files_[reference.named] = reference.file;
+    }
+  }
 
-  bool Exists(const char* file) const override { return allowed(file) && DefaultIOSystem::Exists(file); }
+  bool Exists(const char* file) const override { return files_.contains(named(file)); }
   Assimp::IOStream* Open(const char* file, const char* mode) override {
+    const auto found = files_.find(named(file));
     const bool reads = mode != nullptr && mode[0] == 'r';
-    return reads && allowed(file) ? DefaultIOSystem::Open(file, mode) : nullptr;
+    return reads && found != files_.end() ? DefaultIOSystem::Open(found->second.c_str(), mode) : nullptr;
   }
 
  private:
-  [[nodiscard]] bool allowed(const char* file) const {
-    std::error_code error;
-    const auto path = std::filesystem::weakly_canonical(std::filesystem::absolute(file, error), error);
-    if (error) return false;
-    const auto relative = path.lexically_relative(folder_);
-    return !relative.empty() && *relative.begin() != "..";
+  [[nodiscard]] static std::filesystem::path named(const std::filesystem::path& file) {
+    return std::filesystem::absolute(file).lexically_normal();
   }
-  std::filesystem::path folder_;
+  std::map<std::filesystem::path, std::filesystem::path> files_;
 };
 
 void limit(int resource, std::uint64_t value) {
@@ -82,6 +86,7 @@ void collectMesh(const aiMesh& mesh, const aiMatrix4x4& X_MN, double unit, Impor
   }
 }
 
+/// Frames: M of the whole mesh, P of the parent node, N of this node. A transform may also scale.
 void collectNode(const aiScene& scene, const aiNode& node, const aiMatrix4x4& X_MP, double unit,
                  ImportedMesh& out) {
   const aiMatrix4x4 X_MN = X_MP * node.mTransformation;
@@ -111,9 +116,7 @@ ImportedMesh importFile(const std::string& file, double unit) {
   if (isOctree(file)) return importOctree(file);
   ImportedMesh out;
   Assimp::Importer importer;
-  importer.SetIOHandler(new FolderOnly(std::filesystem::path(file).parent_path().empty()
-                                           ? std::filesystem::path(".")
-                                           : std::filesystem::path(file).parent_path()));
+  importer.SetIOHandler(new OwnFilesOnly(file));
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   const aiScene* scene = importer.ReadFile(file, aiProcess_Triangulate | aiProcess_SortByPType);
   if (scene == nullptr) {

@@ -16,7 +16,8 @@ struct ImportHeader {
   std::uint64_t text_bytes = 0;
 };
 
-/// Limits that the child sets for itself (setrlimit) before it opens the file.
+/// Limits that the child sets for itself (setrlimit) before it opens the file; beyond them it is killed, or
+/// reports that memory ran out.
 struct ImportLimits {
   double cpu_seconds = 0.0;  ///< [s]
   std::uint64_t memory_bytes = 0;

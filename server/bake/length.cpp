@@ -14,7 +14,7 @@ Result<double> parseUnit(std::string_view text) {
   for (const auto& [name, metres] : kUnits) {
     if (text == name) return metres;
   }
-  return fail("'" + std::string(text) + "' is not a unit of length (mm, cm, m, in)");
+  return fail("'" + std::string(text) + "' is not a unit of length (um, mm, cm, m, in)");
 }
 
 Result<double> parseLength(std::string_view text) {

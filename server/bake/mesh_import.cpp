@@ -17,6 +17,7 @@
 #include "server/bake/bake.h"
 #include "server/bake/import_pipe.h"
 #include "server/bake/mesh_file_checks.h"
+#include "server/bake/mesh_references.h"
 #include "server/bake/octree_file.h"
 
 extern char** environ;
@@ -219,8 +220,12 @@ Result<TriangleMesh> importMesh(const std::filesystem::path& file, double unit) 
   const std::string name = file.string();
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) return fail(name + ": no such file");
-  const auto bytes = std::filesystem::file_size(file, error);
+  auto bytes = std::filesystem::file_size(file, error);
   if (error || bytes == 0) return fail(name + ": is empty");
+  for (const MeshReference& reference : referencesOf(file)) {
+    const auto more = reference.file.empty() ? 0 : std::filesystem::file_size(reference.file, error);
+    if (!error) bytes += more;
+  }
   if (!(unit > 0.0) || !std::isfinite(unit)) return fail(name + ": the unit must be a length greater than 0");
   if (const auto problem = problemInMeshFile(file)) return fail(name + ": " + *problem);
 

@@ -30,7 +30,8 @@ struct GapRegion {
   bool outside = false;
 };
 
-/// Directions spread over the sphere, unlikely to be parallel to a face or an edge of a manufactured part.
+/// Directions spread over the sphere by a golden-angle spiral, of any length; unlikely to be parallel to a
+/// face or an edge of a manufactured part.
 std::vector<Vector3> directions() {
   std::vector<Vector3> all;
   Eigen::Vector2d around(0.6391, 0.7691);

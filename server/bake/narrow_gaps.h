@@ -17,6 +17,8 @@ class TriangleTree;
 /// into bricks without samples (a chamber larger than the band) remains closed.
 ///
 /// Returns 1 for each node where samples became outside; these are also marked in `level.reached`.
+///
+/// Threads: one caller; uses several threads inside.
 [[nodiscard]] std::vector<std::uint8_t> openNarrowGaps(BrickLevel& level, const TriangleTree& tree,
                                                        ParallelWork& work);
 

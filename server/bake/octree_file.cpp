@@ -9,6 +9,7 @@
 #include <octomap/OcTree.h>
 #include <unistd.h>
 
+#include "idl/types/output_files.h"
 #include "server/bake/voxel_set.h"
 
 namespace tenon::bake {
@@ -147,7 +148,9 @@ Result<void> writeOctree(const std::filesystem::path& file, const VoxelSet& cell
                 ": an octree has at most 32768 cells on each side of the origin; choose larger ones");
   tree.updateInnerOccupancy();
   tree.prune();
-  const std::filesystem::path part = file.string() + ".part" + std::to_string(::getpid());
+  const bool in_place = isWrittenInPlace(file);
+  const std::filesystem::path part =
+      in_place ? file : std::filesystem::path(file.string() + ".part" + std::to_string(::getpid()));
   std::ofstream out(part, std::ios::binary | std::ios::trunc);
   // not OctoMap's write(), which prints on stderr
   const bool binary = file.extension() == ".bt";
@@ -162,10 +165,10 @@ Result<void> writeOctree(const std::filesystem::path& file, const VoxelSet& cell
   }
   out.close();
   std::error_code error;
-  if (out) std::filesystem::rename(part, file, error);
+  if (out && !in_place) std::filesystem::rename(part, file, error);
   if (!out || error) {
     std::error_code ignored;
-    std::filesystem::remove(part, ignored);
+    if (!in_place) std::filesystem::remove(part, ignored);
     return fail(file.string() + ": cannot be written" + (error ? ": " + error.message() : std::string{}));
   }
   return {};

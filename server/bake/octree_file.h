@@ -17,6 +17,8 @@ class VoxelSet;
 /// OctoMap is always in metres. Errors do not name the file.
 ///
 /// OctoMap's reader does not validate its input: call this in a process that may crash.
+///
+/// Threads: any. Real-time: no.
 [[nodiscard]] Result<std::vector<Vector3f>> readOctreeSurface(const std::filesystem::path& file);
 
 /// Writes cells as occupied leaves, under a temporary name that is then renamed; the extension selects the

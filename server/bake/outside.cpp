@@ -32,8 +32,8 @@ std::vector<Flood::Links> wideLinks(const BrickLevel& level, ParallelWork& work)
   return links;
 }
 
-/// [m] A lower bound of the distance at a point from the nearest coarse sample; negative if that is not
-/// outside.
+/// [m] A lower bound of the distance at a point, from the value of the nearest coarse sample; negative if
+/// that sample is not outside.
 double distanceBoundFromCoarse(const BrickLevel& coarse, const Vector3& p_M) {
   const Cell lattice = ((p_M - coarse.p_MoFo_M) / coarse.voxel).array().round().matrix().cast<int>();
   const BrickLevel::Point point = coarse.at(lattice);
@@ -105,8 +105,7 @@ BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* 
   // [voxels] so that a sample exactly on the surface counts as outside in spite of rounding
   constexpr float kRounding = 0.002F;
   for (int sample = 0; sample < BrickLevel::kSamples; ++sample) {
-    const Cell in_brick(sample % BrickLevel::kSide, sample / BrickLevel::kSide % BrickLevel::kSide,
-                        sample / (BrickLevel::kSide * BrickLevel::kSide));
+    const Cell in_brick = BrickLevel::cellOfSample(sample);
     const Cell in_patch = in_brick + Cell::Constant(kReach);
     const int position = (in_patch.z() * kPatch + in_patch.y()) * kPatch + in_patch.x();
     bool is_outside = patch[static_cast<std::size_t>(position)] > 0.0F;
@@ -167,8 +166,7 @@ void adoptFineSigns(BrickLevel& coarse, const BrickLevel& fine, ParallelWork& wo
     if (slot < 0) return;
     const Cell corner = coarse.brickOf(node) * kOutsideVoxels;
     for (int sample = 0; sample < BrickLevel::kSamples; ++sample) {
-      const Cell in_brick(sample % BrickLevel::kSide, sample / BrickLevel::kSide % BrickLevel::kSide,
-                          sample / (BrickLevel::kSide * BrickLevel::kSide));
+      const Cell in_brick = BrickLevel::cellOfSample(sample);
       const BrickLevel::Point point = fine.at((corner + in_brick) * fine.refinement);
       if (point.known) {
         coarse.outside[static_cast<std::size_t>(slot)][static_cast<std::size_t>(sample)] = point.free;

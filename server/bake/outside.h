@@ -17,6 +17,8 @@ class TriangleTree;
 /// are outside.
 ///
 /// With `coarse`, `level` has finer voxels and its flood starts from the coarse level's reached samples.
+///
+/// Threads: one caller; it and adoptFineSigns use several threads inside.
 void findOutside(BrickLevel& level, const BrickLevel* coarse, const TriangleTree& tree, ParallelWork& work);
 
 /// Copies the signs of the fine level to the coarse samples in refined bricks: a slot too narrow for coarse

@@ -15,6 +15,8 @@ namespace tenon::bake {
 ///
 /// Each iteration writes only its own data, so the result is the same for any number of threads. `progress`
 /// is called on the thread that called run(); once it returns false no further iteration is started.
+///
+/// Threads: one caller; cancelled() also from the iterations.
 class ParallelWork {
  public:
   explicit ParallelWork(const BakeProgress& progress)

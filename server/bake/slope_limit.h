@@ -15,6 +15,8 @@ class ParallelWork;
 /// where outside samples are correct, none rises above the true distance.
 ///
 /// With `coarse`, whose samples are limited already, its balls give bounds too.
+///
+/// Threads: one caller; uses several threads inside.
 void limitSlope(BrickLevel& level, const BrickLevel* coarse, ParallelWork& work);
 
 }  // namespace tenon::bake

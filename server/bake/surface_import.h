@@ -12,6 +12,8 @@ namespace tenon::bake {
 /// Imports again the meshes that structures were baked from, in the unit they were baked in, and returns
 /// their outer surface. With `meshes` empty the paths of baking time are used. An error when a file cannot be
 /// imported or the bounding box is not that of the structures.
+///
+/// Threads: any. Real-time: no.
 [[nodiscard]] Result<structures::SurfaceTree> importSurface(const structures::HapticStructures& structures,
                                                             std::vector<std::filesystem::path> meshes = {});
 

@@ -9,37 +9,42 @@ namespace {
 
 constexpr double kMaxSteps = 2e6;
 
-double steps(const Pose& X_WA, const Pose& X_WB, double radius, double step) {
-  return std::max(1.0, std::ceil(maxPointMotion(displacement(X_WA, X_WB), radius) / step));
+/// The box of a body's field as a ball.
+struct Extent {
+  explicit Extent(const structures::DistanceField& field)
+      : p_MQ(field.box().center()), radius(0.5 * field.box().diagonal().norm()) {}
+  Vector3 p_MQ;
+  double radius;  // [m]
+};
+
+/// Steps between two poses of a body of `extent`: no point of it moves by more than `step` [m].
+double steps(const Pose& X_WM, const Pose& X_WM_next, const Extent& extent, double step) {
+  const double length = maxPointMotion(displacement(X_WM, X_WM_next, extent.p_MQ), extent.radius);
+  return std::max(1.0, std::ceil(length / step));
 }
 
 /// Calls visit(pose number, X_WM) along a path until visit returns false.
 template <typename Visit>
-Result<void> visitPath(std::span<const Pose> poses, double radius, double step, const BakeProgress& progress,
-                       Visit&& visit) {
+Result<void> visitPath(std::span<const Pose> poses, const Extent& extent, double step,
+                       const BakeProgress& progress, Visit&& visit) {
   if (poses.empty()) return fail("there is no pose");
   double total = 1.0;
-  for (std::size_t i = 0; i + 1 < poses.size(); ++i) total += steps(poses[i], poses[i + 1], radius, step);
+  for (std::size_t i = 0; i + 1 < poses.size(); ++i) total += steps(poses[i], poses[i + 1], extent, step);
   if (!(total < kMaxSteps)) return fail("the path is too long for so small a cell; choose a larger one");
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (progress && !progress(static_cast<double>(i) / static_cast<double>(poses.size()), "sweeping")) {
       return fail("cancelled");
     }
     const bool last = i + 1 == poses.size();
-    const double count = last ? 1.0 : steps(poses[i], poses[i + 1], radius, step);
-    const Displacement motion = last ? Displacement{} : displacement(poses[i], poses[i + 1]);
+    const double count = last ? 1.0 : steps(poses[i], poses[i + 1], extent, step);
+    const Displacement motion = last ? Displacement{} : displacement(poses[i], poses[i + 1], extent.p_MQ);
     for (double k = 0.0; k < count; k += 1.0) {
       const double fraction = k / count;
       const Displacement part{motion.translation * fraction, motion.rotation * fraction};
-      if (!visit(i, displaced(poses[i], part))) return {};
+      if (!visit(i, displaced(poses[i], part, extent.p_MQ))) return {};
     }
   }
   return {};
-}
-
-/// [m] Distance of the field's furthest box corner from the origin: no point of the body is further away.
-double radiusOf(const structures::DistanceField& field) {
-  return field.box().min().cwiseAbs().cwiseMax(field.box().max().cwiseAbs()).norm();
 }
 
 /// Whether a clearance is more than a lower bound of a positive distance.
@@ -67,7 +72,7 @@ Result<VoxelSet> sweep(const structures::HapticStructures& moved, std::span<cons
   }
   VoxelSet cells(options.cell);
   bool fits = true;
-  const auto visited = visitPath(poses_WM, radiusOf(moved.field), options.cell / 2, progress,
+  const auto visited = visitPath(poses_WM, Extent(moved.field), options.cell / 2, progress,
                                  [&](std::size_t, const Pose& X_WM) {
                                    fits = cells.add(moved.field, X_WM, options.dilation);
                                    return fits;
@@ -93,7 +98,7 @@ Result<Clearance> clearance(const structures::HapticStructures& moved, std::span
     return scene_W.lowerBound(X_WM * sphere.p_MC.cast<double>(), sphere.radius) > limit;
   };
   const auto visited =
-      visitPath(poses_WM, radiusOf(moved.field), step, progress, [&](std::size_t pose, const Pose& X_WM) {
+      visitPath(poses_WM, Extent(moved.field), step, progress, [&](std::size_t pose, const Pose& X_WM) {
         for (const structures::ShellSphere& cluster : shell.clusters()) {
           if (beyond(cluster, X_WM)) continue;
           for (const structures::ShellSphere& leaf : shell.leaves().subspan(cluster.first, cluster.count)) {

@@ -7,15 +7,17 @@
 
 namespace tenon::bake {
 
-/// Swept volumes and clearances along a path: a list of poses X_WM with linear translation and rotation at
-/// constant angular velocity between them.
+// A path is a list of poses X_WM of a body, with linear translation of the body's centre and rotation at
+// constant angular velocity between them. Threads: any; `progress` is called on the caller's. Real-time: no.
+
 struct SweepOptions {
   double cell = 0.005;    ///< [m] edge of the cells
   double dilation = 0.0;  ///< [m] offset of the body's surface, at most the band of its field
 };
 
 /// The swept volume: the cells that the body fills at some pose of the path, sampled so that no point moves
-/// more than half a cell per step. An error for bad options, too many steps or too many cells.
+/// more than half a cell per step. An error when a number is out of range, the body has no field, the path
+/// has no pose or more than 2 million steps, the cells do not fit into memory, or `progress` cancels.
 [[nodiscard]] Result<VoxelSet> sweep(const structures::HapticStructures& moved,
                                      std::span<const Pose> poses_WM, const SweepOptions& options,
                                      const BakeProgress& progress = {});
@@ -29,7 +31,8 @@ struct Clearance {
 };
 
 /// The smallest distance of the body's shell points to a scene at rest in W, along a path in which no point
-/// moves more than `step` [m] per sample.
+/// moves more than `step` [m] per sample. An error when `step` is not above 0, the body has no shell, the
+/// scene no field, the path no pose or more than 2 million steps, or `progress` cancels.
 [[nodiscard]] Result<Clearance> clearance(const structures::HapticStructures& moved,
                                           std::span<const Pose> poses_WM,
                                           const structures::DistanceField& scene_W, double step,

@@ -32,13 +32,7 @@ struct TriangleTree::Builder {
   void add(std::uint32_t triangle, const structures::Triangle& t, double longest) {
     std::size_t from = 0;
     if (structures::longestEdge(t, from) > longest) {
-      const std::size_t to = (from + 1) % 3;
-      structures::Triangle half = t;
-      half[to] = (t[from] + t[to]) / 2;
-      add(triangle, half, longest);
-      half = t;
-      half[from] = (t[from] + t[to]) / 2;
-      add(triangle, half, longest);
+      for (const structures::Triangle& half : structures::bisected(t, from)) add(triangle, half, longest);
       return;
     }
     Eigen::AlignedBox3f box;

@@ -16,6 +16,8 @@ namespace tenon::bake {
 /// without area and duplicates are skipped. A hole of one triangle, bounded by three open edges and without a
 /// sharp angle to at least one neighbour, is closed: such a triangle is missing in the file, and the flood
 /// fill would enter the solid through a large one.
+///
+/// Threads: constant after construction. Real-time: no.
 struct WeldedMesh {
   using Corners = std::array<std::uint32_t, 3>;
 

@@ -25,9 +25,9 @@ struct RowNormal {
   bool operator==(const RowNormal&) const = default;
   [[nodiscard]] double norm2() const { return part[0].squaredNorm() + part[1].squaredNorm(); }
   [[nodiscard]] double dot(const RowNormal& other) const;
-  /// `all`: a vector of all bodies.
+  /// `all` [sqrt Nm, or sqrt m/N]: coordinates of all bodies, or a normal in them.
   [[nodiscard]] double dot(std::span<const double> all) const;
-  /// all += `factor` [N, or -] * this
+  /// `all` [sqrt Nm, or sqrt m/N] += `factor` [N, or -] * this
   void addTo(std::span<double> all, double factor) const;
 };
 
@@ -57,12 +57,13 @@ class ActiveSet {
   void project(const RowNormal& normal);
   /// The projected row is linearly dependent on the active rows.
   [[nodiscard]] bool dependent() const;
-  /// [m/N] Squared norm of the projected row's free part: what its gap grows by per newton along it.
+  /// [m/N] Squared norm of the projected row's free part: by how much its gap grows per newton of its
+  /// multiplier, while the active rows hold with equality.
   [[nodiscard]] double freeNorm2() const { return free_norm2_; }
-  /// Free part of the projected row: the direction of its steepest increase that leaves the active rows
-  /// unchanged.
+  /// [sqrt m/N] Free part of the projected row: the direction of its steepest increase that leaves the active
+  /// rows unchanged.
   [[nodiscard]] std::span<const double> direction() const { return {free_.data(), n_}; }
-  /// Coefficients of the projected row in the active normals.
+  /// [-] Coefficients of the projected row in the active normals.
   [[nodiscard]] std::span<const double> coordinates() const { return {r_.data(), size()}; }
 
   /// Appends the projected row to the active ones.
@@ -72,15 +73,15 @@ class ActiveSet {
   bool append(std::uint32_t row, const RowNormal& normal);
   void drop(std::size_t position);
 
-  /// b becomes (Nᵀ N)⁻¹ b.
+  /// `b` [m] becomes (Nᵀ N)⁻¹ b [N]: of violations of the active rows, changes of their multipliers.
   void solve(std::span<double> b) const;
 
  private:
   [[nodiscard]] double* line(std::size_t i) { return &L_[i * (i + 1) / 2]; }
   [[nodiscard]] const double* line(std::size_t i) const { return &L_[i * (i + 1) / 2]; }
-  /// `b` [-] becomes L⁻¹ b; its entries before `first` are zero.
+  /// `b` [any unit] becomes L⁻¹ b; its entries before `first` are zero.
   void solveForward(double* b, std::size_t first) const;
-  /// `b` [-] becomes L⁻ᵀ b.
+  /// `b` [any unit] becomes L⁻ᵀ b.
   void solveBackward(double* b) const;
   /// Sets projected_ and l_ = L⁻¹ Nᵀ normal.
   void projectForward(const RowNormal& normal);
@@ -93,9 +94,13 @@ class ActiveSet {
   std::vector<RowNormal> normals_;  ///< of the active rows
   std::vector<std::uint32_t> rows_;
   RowNormal projected_;
-  std::size_t first_coupled_ = 0;  ///< first active row that shares a body with the projected one
-  double free_norm2_ = 0.0;        ///< [m/N]
-  std::vector<double> l_, r_, free_, residual_, cosine_, sine_;
+  std::size_t first_coupled_ = 0;      ///< first active row that shares a body with the projected one
+  double free_norm2_ = 0.0;            ///< [m/N]
+  std::vector<double> l_;              ///< [sqrt m/N]
+  std::vector<double> r_;              ///< [-]
+  std::vector<double> free_;           ///< [sqrt m/N]
+  std::vector<double> residual_;       ///< [m/N], [-] once solved
+  std::vector<double> cosine_, sine_;  ///< [-] of the Givens rotations
 };
 
 }  // namespace tenon::collision

@@ -70,8 +70,8 @@ class ContactReducer {
 
  private:
   static constexpr std::size_t kBins = 256;
-  /// While leaves can be reduced the list is kept this short: every contact is a row of the QP in every
-  /// sub-step.
+  /// Reduction by leaf keeps the list to at most this many contacts, as long as leaves can be reduced
+  /// further: every contact is a row of the QP in every SQP step.
   static constexpr std::size_t kReducedSize = 256;
 
   /// Histogram bin of `gap` [m].
@@ -86,8 +86,8 @@ class ContactReducer {
   double lowest_;          ///< [m]
   double bins_per_metre_;  ///< [1/m]
   // state of the reduction by leaf
-  std::size_t per_leaf_ =
-      structures::Pointshell::kLeafPoints;  ///< contacts kept of each leaf and normal direction
+  /// contacts kept of each leaf and normal direction
+  std::size_t per_leaf_ = structures::Pointshell::kLeafPoints;
   std::array<std::uint32_t, kMaxPairContacts> leaf_starts_;  ///< index of the first contact of each leaf
   std::size_t leaf_count_ = 0;
 };

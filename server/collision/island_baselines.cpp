@@ -58,12 +58,12 @@ void IslandSolver::blockOpposedMotion(const Job& job) {
     const double stiffness = job.limits.penalty_stiffness;
     if (pair.body_a != ContactConstraint::kStatic) {
       const auto a = static_cast<std::size_t>(pair.body_a);
-      wrenches_[a] += penaltyWrench(query, job.poseA(pair).translation(), stiffness);
+      wrenches_[a] += penaltyWrench(query, job.bodies[a].p_WQ(), stiffness);
       depths_[a] = std::max(depths_[a], depth);
     }
     if (pair.body_b != ContactConstraint::kStatic) {
       const auto b = static_cast<std::size_t>(pair.body_b);
-      wrenches_[b] += -penaltyWrench(query, job.poseB(pair).translation(), stiffness);
+      wrenches_[b] += -penaltyWrench(query, job.bodies[b].p_WQ(), stiffness);
       depths_[b] = std::max(depths_[b], depth);
     }
   }

@@ -79,7 +79,7 @@ FixedVector<ConcaveDirection, 2> concaveDirections(const ContactSurface& surface
 bool IslandSolver::evaluateCurvature(const Job& job) {
   for (MovableBody& body : job.bodies) {
     body.curvatures.clear();
-    body.friction_Bo_W = Wrench{};
+    body.friction_Bq_W = Wrench{};
   }
   rows_.resize(contact_row_count_);
   curvature_rows_.clear();
@@ -105,7 +105,7 @@ bool IslandSolver::evaluateCurvature(const Job& job) {
       for (const std::int32_t index : {pair.body_a, pair.body_b}) {
         if (index == ContactConstraint::kStatic) continue;
         MovableBody& body = job.bodies[static_cast<std::size_t>(index)];
-        const Vector3 arm = contact.p_WP - body.X_WB.translation();
+        const Vector3 arm = contact.p_WP - body.p_WQ();
         any |= body.curvatures.push_back({{direction.direction_W, arm.cross(direction.direction_W)},
                                           multipliers_[row] * direction.curvature});
       }

@@ -81,7 +81,7 @@ bool IslandSolver::collectPatches(const Job& job) {
 void IslandSolver::applyFriction(const Job& job) {
   rows_.resize(first_patch_row_);
   active_.erase(std::lower_bound(active_.begin(), active_.end(), first_patch_row_), active_.end());
-  for (MovableBody& body : job.bodies) body.friction_Bo_W = Wrench{};
+  for (MovableBody& body : job.bodies) body.friction_Bq_W = Wrench{};
   for (FrictionPatch& patch : patches_) {
     patch.first_row = 0;
     if (patch.load <= 0.0) continue;
@@ -99,7 +99,7 @@ void IslandSolver::applyFriction(const Job& job) {
       if (index == ContactConstraint::kStatic) continue;
       MovableBody& body = job.bodies[static_cast<std::size_t>(index)];
       const Vector3 f_W = sign * f_A_W;
-      body.friction_Bo_W += {f_W, (patch.p_WP - body.X_WB.translation()).cross(f_W)};
+      body.friction_Bq_W += {f_W, (patch.p_WP - body.p_WQ()).cross(f_W)};
     }
   }
 }

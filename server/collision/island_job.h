@@ -16,9 +16,9 @@ inline constexpr double kUnconverged = 1e-6;
 /// [m] Overlap that the field's discretisation, and the rotation of contacts in a step, may leave.
 inline constexpr double kFieldNoise = 5e-6;
 
-/// [m] Displacement of point P of a body, in W, to first order.
-inline Vector3 pointDisplacement(const Displacement& u_W, const Vector3& p_BoP_W) {
-  return u_W.translation + u_W.rotation.cross(p_BoP_W);
+/// [m] Displacement of point P of a body, in W, to first order, for that of its centre Q.
+inline Vector3 pointDisplacement(const Displacement& u_W, const Vector3& p_QP_W) {
+  return u_W.translation + u_W.rotation.cross(p_QP_W);
 }
 
 /// Two unit vectors orthogonal to a unit normal and to each other.
@@ -68,8 +68,8 @@ struct IslandSolver::Job {
   }
   /// The query of a pair at the current poses of its bodies, up to a gap of `margin` [m].
   [[nodiscard]] PairQuery queryOf(const IslandPair& pair, double margin) const {
-    return {pair.shell_A, pair.field_B, poseA(pair), poseB(pair), pair.dilation,
-            margin,       pair.levels,  pair.budget, pair.first};
+    return {pair.shell_A, pair.field_B, poseA(pair), poseB(pair),         pair.dilation,
+            margin,       pair.levels,  pair.budget, pair.priority_points};
   }
 };
 

@@ -15,8 +15,8 @@ constexpr double kReducedListError = 1e-5;
 /// [m] Largest distance between those points.
 constexpr double kReducedListSpacing = 0.03;
 
-/// [-] Full lists shorten a step to this fraction of its largest length at most: a plate on a floor, which
-/// fills its list, still has to slide.
+/// [-] A full list shortens a step no further than to this fraction of max_step_length: a plate on a floor,
+/// which fills its list, still has to slide.
 constexpr double kMinValidity = 0.25;
 
 int movableBodies(const IslandPair& pair) {
@@ -126,7 +126,7 @@ double IslandSolver::approachSinceTraversal(const Job& job, std::size_t i) {
   const auto add = [&](std::int32_t body, const Pose& X_WB_traversal) {
     if (body == ContactConstraint::kStatic) return;
     const MovableBody& now = job.bodies[static_cast<std::size_t>(body)];
-    const Displacement moved = displacement(X_WB_traversal, now.X_WB);
+    const Displacement moved = displacement(X_WB_traversal, now.X_WB, now.p_BQ);
     sum += maxPointMotion(moved, now.radius);
   };
   add(pair.body_a, job.results[i].traversal.X_WA);

@@ -97,7 +97,7 @@ Vector3 IslandSolver::relativeDisplacement(const Job& job, std::span<const Displ
   for (const auto& [index, sign] : {std::pair{pair.body_a, 1.0}, std::pair{pair.body_b, -1.0}}) {
     if (index == ContactConstraint::kStatic) continue;
     const auto i = static_cast<std::size_t>(index);
-    u_W += sign * pointDisplacement(step[i], p_WP - job.bodies[i].X_WB.translation());
+    u_W += sign * pointDisplacement(step[i], p_WP - job.bodies[i].p_WQ());
   }
   return u_W;
 }

@@ -129,7 +129,7 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
   for (MovableBody& body : job.bodies) {
     body.stiffenings.clear();
     body.curvatures.clear();
-    body.friction_Bo_W = Wrench{};
+    body.friction_Bq_W = Wrench{};
   }
 }
 
@@ -219,7 +219,7 @@ double IslandSolver::fractionWithinLimits(const Job& job) const {
     const MovableBody& body = job.bodies[i];
     const double length = maxPointMotion(step_[i], body.radius);
     if (body.pinned || length < kStepTolerance) continue;
-    const double moved = maxPointMotion(displacement(initial_poses_[i], body.X_WB), body.radius);
+    const double moved = maxPointMotion(displacement(initial_poses_[i], body.X_WB, body.p_BQ), body.radius);
     fraction = std::min(fraction, (body.max_displacement - moved) / length);
   }
   return std::max(fraction, 0.0);
@@ -229,7 +229,7 @@ void IslandSolver::pinBodiesAtLimit(const Job& job) const {
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
     MovableBody& body = job.bodies[i];
     if (!std::isfinite(body.max_displacement)) continue;
-    const double moved = maxPointMotion(displacement(initial_poses_[i], body.X_WB), body.radius);
+    const double moved = maxPointMotion(displacement(initial_poses_[i], body.X_WB, body.p_BQ), body.radius);
     body.pinned = body.max_displacement - moved < kStepTolerance;
   }
 }
@@ -241,7 +241,7 @@ void IslandSolver::takeStep(const Job& job, double fraction) {
     // without contact the goal is reached exactly, not only to second order
     const bool at_goal = fraction == 1.0 && constrained_[i] == 0 && body.springs.size() == 1 &&
                          job.limits.method != ContactMethod::kBlocking;
-    body.X_WB = at_goal ? body.springs[0].X_WG : displaced(body.X_WB, last_step_[i]);
+    body.X_WB = at_goal ? body.springs[0].X_WG : displaced(body.X_WB, last_step_[i], body.p_BQ);
   }
 }
 

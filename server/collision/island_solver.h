@@ -64,7 +64,7 @@ struct IslandPair {
   // for every traversal, as in PairQuery
   std::uint32_t levels = 0xFFFFFFFFU;
   std::uint32_t budget = 0xFFFFFFFFU;  ///< [points]
-  std::span<const std::uint32_t> first = {};
+  std::span<const std::uint32_t> priority_points = {};
   /// Result of the last solve, for the warm start: its list serves again while the bodies are near the poses
   /// of its traversal. Null after a jump of a pose. May be the result that is to be filled.
   const IslandPairResult* last = nullptr;
@@ -132,7 +132,8 @@ class IslandSolver {
  public:
   IslandSolver(std::size_t max_bodies, std::size_t max_pairs);
 
-  /// Updates bodies[i].X_WB, and fills results[i] for pairs[i].
+  /// Updates bodies[i].X_WB, and fills results[i] for pairs[i]. At most as many bodies and pairs as given at
+  /// construction (assert).
   SolveReport solve(std::span<MovableBody> bodies, std::span<const IslandPair> pairs,
                     const SolveLimits& limits, std::span<IslandPairResult> results) noexcept;
 
@@ -173,8 +174,8 @@ class IslandSolver {
   /// [m] Upper bound of how much any point of one body came nearer to the other since the last traversal.
   [[nodiscard]] static double approachSinceTraversal(const Job& job, std::size_t pair);
   void buildConstraints(const Job& job);
-  /// [m] Validity radius of the linearised problem: a step of this length meets no contact that had no room
-  /// in the lists.
+  /// [m] Validity radius of the linearised problem: a step of this length reaches no contact that was dropped
+  /// from a full list.
   [[nodiscard]] static double validityRadius(const Job& job);
   [[nodiscard]] static std::size_t pairOfRow(const Job& job, std::size_t row);
 
@@ -208,12 +209,15 @@ class IslandSolver {
   /// Gives the bodies the curvatures at their active contacts, and adds rows for secondary planes. False when
   /// there are none.
   bool evaluateCurvature(const Job& job);
+  /// Whether the active contact rows are still those that evaluateCurvature used.
   [[nodiscard]] bool curvatureIsOfActiveRows() const;
 
   // cell borders (island_seams.cpp)
   /// Gives active contacts at seams the normal of the side that restricts the step least, and solves again.
   /// False when no normal changed.
   bool relaxSeamNormals(const Job& job, SolveReport& report);
+  /// Adds a seam for an active contact if a cell border beside it is convex. False when none is, or when
+  /// there is no capacity.
   bool findSeam(const Job& job, std::size_t pair, std::size_t contact, std::size_t row);
   /// [m] Displacement of A's point at p_WP relative to B's.
   [[nodiscard]] static Vector3 relativeDisplacement(const Job& job, std::span<const Displacement> step,
@@ -278,7 +282,7 @@ class IslandSolver {
   std::vector<Displacement> last_step_;           ///< the step that led to the iterate
   std::vector<Pose> best_iterate_;                ///< by the merit function, in this solve
   std::vector<Pose> initial_poses_;               ///< of this solve
-  std::vector<Wrench> wrenches_;                  ///< for kBlocking: penalty on a body, about its origin
+  std::vector<Wrench> wrenches_;                  ///< for kBlocking: penalty on a body, about its centre Q
   std::vector<double> depths_;                    ///< [m] for kBlocking: largest overlap of a body
   std::vector<std::uint8_t> constrained_;         ///< body has an active row
 };

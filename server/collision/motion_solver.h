@@ -53,14 +53,20 @@ struct MovableBody {
   Pose X_WB;
   /// at least one with a stiffness above 0, so that the QP is strictly convex
   FixedVector<Spring, kMaxSprings> springs;
-  double radius = 0.1;                  ///< [m] bound on the distance of its points from its origin
+  /// [m] its centre Q, in B: that of its bounding sphere. Displacements, and so the solver's steps, caps and
+  /// tolerances, are those of Q and do not depend on where the origin is.
+  Vector3 p_BQ = Vector3::Zero();
+  double radius = 0.1;                  ///< [m] bound on the distance of its points from Q
   double tolerance = kSettleTolerance;  ///< [m] in contact and with a smaller step, it has converged
   /// [m] no point is displaced by more in one IslandSolver::solve
   double max_displacement = std::numeric_limits<double>::infinity();
   bool pinned = false;  ///< has used up `max_displacement`; set by IslandSolver
   FixedVector<DirectionalStiffening, kMaxStiffenings> stiffenings;  ///< set and cleared by IslandSolver
   FixedVector<ContactCurvature, kMaxCurvatures> curvatures;         ///< set and cleared by IslandSolver
-  Wrench friction_Bo_W;  ///< [N, Nm] of its sliding friction patches; set and cleared by IslandSolver
+  Wrench
+      friction_Bq_W;  ///< [N, Nm] about Q, of its sliding friction patches; set and cleared by IslandSolver
+
+  [[nodiscard]] Vector3 p_WQ() const { return X_WB * p_BQ; }  ///< [m]
 };
 
 /// One row of the QP: gap + n_W · (u_A - u_B) >= 0, with u_A, u_B [m] the displacements of the two bodies'
@@ -76,7 +82,7 @@ struct ContactConstraint {
 
 struct MotionResult {
   std::uint32_t iterations = 0;  ///< of the active-set method
-  /// The constraints contradict each other, or the iterations ran out (64, and 30 a body). Negative gaps were
+  /// The constraints contradict each other, or the iterations ran out (64 + 30 per body). Negative gaps were
   /// then raised to 0 (bodies are not pushed apart, and sink no deeper) and the QP was solved again. If that
   /// failed too, all displacements and multipliers are 0.
   bool infeasible = false;
@@ -99,9 +105,9 @@ class MotionSolver {
   MotionSolver(MotionSolver&&) noexcept;
   MotionSolver& operator=(MotionSolver&&) noexcept;
 
-  /// `displacements`[i] [m, rad]: of bodies[i]'s origin and orientation, in W. `multipliers`[r] [N], >= 0:
-  /// force along rows[r].n_W on its body A, and the opposite on B. Both spans are as long as bodies and rows;
-  /// `multipliers` may be empty.
+  /// `displacements`[i] [m, rad]: of bodies[i]'s centre Q and its orientation, in W. `multipliers` [N], >= 0,
+  /// by row: force along rows[r].n_W on its body A, and the opposite on B. Both spans are as long as bodies
+  /// and rows; `multipliers` may be empty.
   ///
   /// `warm_start`: rows to activate first, with the forces that stand in `multipliers` at the call as initial
   /// multipliers. The solution does not depend on it, only the number of iterations. `unchanged`: so many

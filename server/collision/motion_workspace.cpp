@@ -17,15 +17,16 @@ constexpr double kRotationRegularisation = 1e-6;
 /// [-] Factor on the Hessian of a pinned body.
 constexpr double kPinnedScale = 1e9;
 
-/// Adds a spring, linearised at the body's pose: its energy is ½ xᵀ H x - bᵀ x, x = (translation, rotation).
-void addSpring(const Spring& spring, const Pose& X_WB, Matrix6& H, Vector6& b) {
+/// Adds a spring, linearised at the body's pose: its energy is ½ xᵀ H x - bᵀ x, x = (translation of the
+/// centre Q, rotation).
+void addSpring(const Spring& spring, const MovableBody& body, Matrix6& H, Vector6& b) {
+  const Pose& X_WB = body.X_WB;
   const Displacement to_goal = displacement(X_WB, spring.X_WG);
-  const Vector3 p_BoC_W = X_WB.rotation() * spring.p_BC;
+  const Vector3 p_QC_W = X_WB.rotation() * (spring.p_BC - body.p_BQ);
   const Vector3 p_CoGc_W = spring.X_WG * spring.p_BC - X_WB * spring.p_BC;
   Eigen::Matrix<double, 3, 6> J;  // displacement of C per x
-  J << Matrix3::Identity(), Matrix3{{0.0, p_BoC_W.z(), -p_BoC_W.y()},
-                                    {-p_BoC_W.z(), 0.0, p_BoC_W.x()},
-                                    {p_BoC_W.y(), -p_BoC_W.x(), 0.0}};
+  J << Matrix3::Identity(),
+      Matrix3{{0.0, p_QC_W.z(), -p_QC_W.y()}, {-p_QC_W.z(), 0.0, p_QC_W.x()}, {p_QC_W.y(), -p_QC_W.x(), 0.0}};
   H += spring.stiffness * (J.transpose() * J);
   H.bottomRightCorner<3, 3>() +=
       spring.rotational_stiffness * Matrix3::Identity() + spring.rotational_tensor_W;
@@ -40,11 +41,11 @@ void MotionSolver::Workspace::setBody(std::size_t i, const MovableBody& body) {
   Vector6 b = Vector6::Zero();
   double stiffness = 0.0;
   for (const Spring& spring : body.springs) {
-    addSpring(spring, body.X_WB, H, b);
+    addSpring(spring, body, H, b);
     stiffness += spring.stiffness;
   }
-  b.head<3>() += body.friction_Bo_W.force;
-  b.tail<3>() += body.friction_Bo_W.torque;
+  b.head<3>() += body.friction_Bq_W.force;
+  b.tail<3>() += body.friction_Bq_W.torque;
   H.bottomRightCorner<3, 3>() +=
       (kRotationRegularisation * stiffness * body.radius * body.radius) * Matrix3::Identity();
   for (const ContactCurvature& curvature : body.curvatures) {
@@ -73,7 +74,7 @@ void MotionSolver::Workspace::setRows(std::span<const ContactConstraint> rows,
   if (!runs.empty()) runs.back().count = std::min(runs.back().count, unchanged - runs.back().first);
   gaps_clamped = false;
   bool new_run = true;
-  std::array<const Pose*, 2> origin{};
+  std::array<Vector3, 2> p_WQ{Vector3::Zero(), Vector3::Zero()};
   for (std::size_t i = unchanged; i < rows.size(); ++i) {
     const ContactConstraint& row = rows[i];
     body_of[i] = {row.body_a, row.body_b};
@@ -83,8 +84,7 @@ void MotionSolver::Workspace::setRows(std::span<const ContactConstraint> rows,
       for (std::size_t side = 0; side < 2; ++side) {
         const std::int32_t body = body_of[i][side];
         assert(body < static_cast<std::int32_t>(island.size()));
-        origin[side] =
-            body == ContactConstraint::kStatic ? nullptr : &island[static_cast<std::size_t>(body)].X_WB;
+        if (body != ContactConstraint::kStatic) p_WQ[side] = island[static_cast<std::size_t>(body)].p_WQ();
       }
     }
     ++runs.back().count;
@@ -95,8 +95,8 @@ void MotionSolver::Workspace::setRows(std::span<const ContactConstraint> rows,
     columns[2][i] = row.n_W.y();
     columns[3][i] = row.n_W.z();
     for (std::size_t side = 0; side < 2; ++side) {
-      if (origin[side] == nullptr) continue;
-      const Vector3 moment = (row.p_WP - origin[side]->translation()).cross(row.n_W);
+      if (body_of[i][side] == ContactConstraint::kStatic) continue;
+      const Vector3 moment = (row.p_WP - p_WQ[side]).cross(row.n_W);
       columns[4 + 3 * side][i] = moment.x();
       columns[5 + 3 * side][i] = moment.y();
       columns[6 + 3 * side][i] = moment.z();

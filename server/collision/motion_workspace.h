@@ -11,7 +11,7 @@
 
 namespace tenon::collision {
 
-/// The six coordinates of one body in a vector of all bodies.
+/// The six coordinates of one body in `all` [any unit], a vector of all bodies.
 inline Eigen::Map<Vector6> segment(std::vector<double>& all, std::size_t body) {
   return Eigen::Map<Vector6>(&all[6 * body]);
 }
@@ -57,7 +57,7 @@ struct MotionSolver::Workspace {
   void setRows(std::span<const ContactConstraint> rows, std::span<const MovableBody> island,
                std::size_t unchanged);
   /// Solves the QP. False: the rows are infeasible, or the iterations ran out. `reuse`: the active set of the
-  /// last call may be kept, as most rows are the same.
+  /// last call may be kept, as most rows are the same. `forces` [N]: initial multipliers by row, or empty.
   bool solve(std::span<const std::uint32_t> warm_start, std::span<const double> forces,
              std::span<const std::uint32_t> excluded, bool reuse);
   /// x from y.
@@ -66,11 +66,11 @@ struct MotionSolver::Workspace {
   [[nodiscard]] double slackOf(std::size_t row) const;
   /// Sets `candidates`: the most violated inactive row of each block that has one.
   void findCandidates();
-  /// The most violated inactive row of [first, end), a block of a run whose displacements are `m`: A's
-  /// translation less B's, A's rotation, minus B's. row_count when none is violated.
+  /// The most violated inactive row of [first, end), a block of a run whose displacements are `m` [m, rad]:
+  /// A's translation less B's, A's rotation, minus B's. row_count when none is violated.
   [[nodiscard]] std::uint32_t worstOfBlock(std::size_t first, std::size_t end, const Run& run,
                                            const std::array<double, 9>& m) const;
-  /// row_count when none is violated.
+  /// The most violated of the inactive candidates; row_count when none is violated.
   [[nodiscard]] std::size_t mostViolatedCandidate() const;
   /// A row's normal in the coordinates y.
   [[nodiscard]] RowNormal normalOf(std::size_t row) const;
@@ -92,14 +92,16 @@ struct MotionSolver::Workspace {
   void dropActive(std::size_t position);
 
   ActiveSet active;
-  std::vector<Matrix6> L;                       ///< Cholesky factor of the Hessian, by body
-  std::array<std::vector<double>, 10> columns;  ///< gap, normal, its moment about A's origin, about B's; in W
+  std::vector<Matrix6> L;  ///< Cholesky factor of the Hessian, by body
+  /// [m] gap; [-] normal; [m] its moment about A's centre, about B's; in W
+  std::array<std::vector<double>, 10> columns;
   std::vector<RowState> state;
   std::vector<std::uint8_t> requested;  ///< row is in the warm start; all zero between uses
   std::vector<std::array<std::int32_t, 2>> body_of;
   std::vector<Run> runs;
   std::vector<std::uint32_t> candidates;
-  std::vector<double> y0, y, x;  ///< unconstrained minimum, iterate, iterate as displacements [m, rad]
+  std::vector<double> y0, y;               ///< [sqrt Nm] unconstrained minimum, iterate
+  std::vector<double> x;                   ///< [m, rad] iterate as displacements
   std::vector<double> u, multiplier_step;  ///< [N] in the order of `active`
   std::size_t bodies = 0;
   std::size_t row_count = 0;

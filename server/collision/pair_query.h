@@ -38,10 +38,11 @@ struct QueryCounts {
   std::uint32_t spheres_visited = 0;
   std::uint32_t spheres_total = 0;  ///< of all levels
   std::uint32_t points_visited = 0;
-  std::uint32_t points_colliding = 0;
+  std::uint32_t points_colliding = 0;  ///< with a negative gap
   std::uint32_t contacts_dropped = 0;  ///< contacts beyond the list's capacity: those with the largest gaps
 
-  /// [%] Load eta of the paper (eq. 2) with weights 0.5 and 0.5.
+  /// [%] Load eta (paper eq. 2): the mean of two ratios, spheres visited to all spheres and points colliding
+  /// to points visited.
   [[nodiscard]] double loadPercent() const;
 };
 
@@ -85,14 +86,19 @@ struct PairQueryResult {
   Wrench penalty_Ao_W;
   std::uint32_t penalty_points = 0;  ///< points in that sum; points deeper than the field's band are not
   double deepest = 0.0;              ///< [m] depth of the deepest point in the undilated field, 0 when apart
-  std::uint32_t levels_used = 0;
+  std::uint32_t levels_used = 0;     ///< levels 0 to levels_used - 1 were tested
   std::uint32_t traversal_points = 0;  ///< points tested by queryPair; resampling does not change it
   double skipped_gap_error = 0.0;      ///< [m] points of skipped levels may be nearer by at most this
 };
 
 /// Lists all points of A's pointshell whose gap to B is at most `margin`. Spheres that the field proves to be
 /// farther away are pruned; the result is the same as that of testing every point. Beyond kMaxPairContacts
-/// the smallest gaps are kept (`complete_to`, `contacts_dropped`). Empty structures give an empty result.
+/// the smallest gaps are kept (`complete_to`, `contacts_dropped`). Empty structures give an empty list and
+/// gaps of 1e6 m.
+///
+/// A point beyond the field's band (|distance| > DistanceField::band) has no gradient and is not listed; so a
+/// margin plus dilation above the band has no effect. A point deeper than the band counts in
+/// `points_colliding`, and with a bound of its depth in `smallest_gap` and `deepest`.
 ///
 /// Threads: pure. Real-time.
 void queryPair(const PairQuery& query, PairQueryResult& result) noexcept;
@@ -100,7 +106,8 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept;
 /// Evaluates the listed contacts at the query's poses without a traversal, as long as no point of A has come
 /// nearer to B than by `displacement` [m] since queryPair listed them. Gaps and normals are those of
 /// queryPair without ridge correction; points that are not listed have at least a gap of unlisted_gap -
-/// displacement. Contacts that left the field's band are removed from the list.
+/// displacement. Contacts that left the field's band are removed from the list
+/// (`unlisted_gap` then covers them).
 ///
 /// Threads: pure. Real-time.
 void resampleContacts(const PairQuery& query, double displacement, PairQueryResult& result) noexcept;

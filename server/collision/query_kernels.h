@@ -69,12 +69,13 @@ struct PointLanes {
   std::size_t count;
 };
 
-/// [m] Gap of a pair without points to test: far, but finite, so that it can be divided.
+/// [m] Gap of a pair without points to test: far, but finite, so that arithmetic with it is valid.
 inline constexpr double kFarGap = 1e6;
 
 /// Field samples of sixteen points, frame B.
 struct alignas(64) SampleLanes {
-  std::array<double, structures::ShellBlock::kLanes> distance, gradient_x, gradient_y, gradient_z;
+  std::array<double, structures::ShellBlock::kLanes> distance;                            ///< [m]
+  std::array<double, structures::ShellBlock::kLanes> gradient_x, gradient_y, gradient_z;  ///< [-]
   std::uint32_t exact;  ///< bit per lane: inside the field's band (FieldSample::exact)
   std::uint32_t near;   ///< bit per lane: exact, and the gap is within the margin
 };
@@ -90,30 +91,33 @@ struct SampleSums {
 /// Position and normal of sixteen contacts, in W. Lanes without the `has_normal` bit have no valid normal,
 /// lanes that are not exact no valid values.
 struct alignas(64) ContactLanes {
-  std::array<double, structures::ShellBlock::kLanes> x, y, z, n_x, n_y, n_z;
+  std::array<double, structures::ShellBlock::kLanes> x, y, z;        ///< [m]
+  std::array<double, structures::ShellBlock::kLanes> n_x, n_y, n_z;  ///< [-]
   std::uint32_t has_normal;  ///< bit per lane: the gradient is at least kMinGradient long
 };
 
 /// Penalty force and torque of sixteen contacts on A about its origin, in W, for a stiffness of 1 N/m; zero
 /// for lanes that are not inside.
 struct alignas(64) PenaltyLanes {
-  std::array<double, structures::ShellBlock::kLanes> f_x, f_y, f_z, t_x, t_y, t_z;
+  std::array<double, structures::ShellBlock::kLanes> f_x, f_y, f_z;  ///< [m] force
+  std::array<double, structures::ShellBlock::kLanes> t_x, t_y, t_z;  ///< [m^2] torque
   std::uint32_t inside;  ///< bit per lane: the point is near with a negative gap
 };
 
-/// Vectors from a point to the probes around it [m], in B.
+/// Vectors from a point to the probes around it, in B.
 struct alignas(64) ProbeOffsets {
   static constexpr std::size_t kProbes = 8;
-  std::array<double, kProbes> x, y, z;
+  std::array<double, kProbes> x, y, z;  ///< [m]
 };
 
 /// [m] Distance that stands for no plane: the gradient at the probe is not of unit length.
 inline constexpr double kNoPlane = -std::numeric_limits<double>::infinity();
 
-/// Tangent planes of the field at the probes: distance of the point from each plane [m] or kNoPlane, and the
+/// Tangent planes of the field at the probes: distance of the point from each plane or kNoPlane, and the
 /// plane's gradient.
 struct alignas(64) TangentPlanes {
-  std::array<double, ProbeOffsets::kProbes> distance, gradient_x, gradient_y, gradient_z;
+  std::array<double, ProbeOffsets::kProbes> distance;                            ///< [m]
+  std::array<double, ProbeOffsets::kProbes> gradient_x, gradient_y, gradient_z;  ///< [-]
 };
 
 /// Points that may be contacts, as structure of arrays in the order of the pointshell.

@@ -334,8 +334,8 @@ struct LocatedLanes {
 
   alignas(64) std::array<double, kCapacity> x, y, z;
   alignas(64) std::array<std::int32_t, kCapacity> brick_index, entry;
-  std::array<std::uint32_t, kCapacity>
-      in_grid;  ///< at the first lane of each vector: bit mask of its lanes in the grid
+  /// At the first lane of each vector: bit mask of its lanes in the grid.
+  std::array<std::uint32_t, kCapacity> in_grid;
 
   HWY_INLINE void locateFrom(const FieldLanes& field, const PointLanes& points, std::size_t first) {
     const std::size_t count = std::min(kCapacity, points.count - first);

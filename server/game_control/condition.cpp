@@ -20,17 +20,20 @@ double angleBetween(const Quaternion& q_WA, const Quaternion& q_WB) noexcept {
   return logRotation(q_WB * q_WA.conjugate()).norm();
 }
 
+double positionError(const SceneView& scene, ObjectId object, const Pose& X_WG) noexcept {
+  const Vector3 p_OQ_O = scene.centre(object);
+  return (scene.pose(object) * p_OQ_O - X_WG * p_OQ_O).norm();
+}
+
 bool ConditionProgress::isMetNow(const Condition& condition, Node& node, const SceneView& scene,
                                  std::span<const GameCommand> commands) noexcept {
   ConditionReading& reading = node.reading;
   switch (condition.kind) {
-    case ConditionKind::kPose: {
-      const Pose X_WO = scene.pose(condition.object);
-      reading.value = (X_WO.translation() - condition.X_WG.translation()).norm();
+    case ConditionKind::kPose:
+      reading.value = positionError(scene, condition.object, condition.X_WG);
       reading.limit = condition.within;
-      return reading.value <= condition.within &&
-             angleBetween(X_WO.rotation(), condition.X_WG.rotation()) <= condition.angle;
-    }
+      return reading.value <= condition.within && angleBetween(scene.pose(condition.object).rotation(),
+                                                               condition.X_WG.rotation()) <= condition.angle;
     case ConditionKind::kForce:
       reading.value = scene.force(condition.object).norm();
       reading.limit = condition.above > 0.0 ? condition.above : condition.below;

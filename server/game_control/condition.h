@@ -18,10 +18,10 @@ inline constexpr std::size_t kMaxConditions = 32;  ///< nodes of one state's con
 enum class ConditionKind : std::uint8_t {
   kAll,          ///< group: every child is met
   kAny,          ///< group: at least one child is met
-  kPose,         ///< `object` is at X_WG within the tolerances `within` and `angle`
+  kPose,         ///< `object` is at X_WG: its centre within `within`, its orientation within `angle`
   kForce,        ///< the magnitude of the force on `object` is between `above` and `below`
   kForceTarget,  ///< the force on `object` differs from F_W by at most `within`
-  kContact,      ///< `object` and `other` were in contact for `limit_ticks`; gaps up to `lapse` are tolerated
+  kContact,      ///< `object` and `other` were in contact for `limit_ticks`, interrupted for `lapse` at most
   kContactTime,  ///< the accumulated time of `object` in contact with anything reaches `limit_ticks`
   kFulfilled,    ///< a person sends the command kFulfilled in this tick
   kSignal,       ///< an external program sends the signal number `signal` in this tick
@@ -31,8 +31,8 @@ enum class ConditionKind : std::uint8_t {
 struct Condition {
   ConditionKind kind = ConditionKind::kAll;
   std::uint32_t parent = 0;  ///< index in the tree; the root is its own parent
-  bool latched =
-      false;  ///< group: a child that was met once stays met; else all must be met in the same tick
+  /// group: a child that was met once stays met; else all must be met in the same tick
+  bool latched = false;
   std::uint32_t dwell = 0;  ///< [ticks] it must hold without interruption before it is met
   ObjectId object;
   ObjectId other;                                          ///< kContact
@@ -41,10 +41,10 @@ struct Condition {
   double angle = 0.0;                                      ///< [rad] kPose
   double above = 0.0;                                      ///< [N] kForce
   double below = std::numeric_limits<double>::infinity();  ///< [N] kForce
-  Vector3 F_W = Vector3::Zero();                           ///< kForceTarget
+  Vector3 F_W = Vector3::Zero();                           ///< [N] kForceTarget
   std::uint32_t limit_ticks = 0;                           ///< [ticks] kContact, kContactTime
-  std::uint32_t lapse = 0;                                 ///< [ticks] kContact
-  std::uint32_t signal = 0;                                ///< kSignal: index into ScenarioFile::signals
+  std::uint32_t lapse = 0;   ///< [ticks] kContact: a longer interruption resets the time
+  std::uint32_t signal = 0;  ///< kSignal: index into ScenarioFile::signals
 };
 
 [[nodiscard]] constexpr bool isGroup(ConditionKind kind) {
@@ -57,38 +57,41 @@ struct Condition {
 class SceneView {
  public:
   virtual ~SceneView() = default;
-  [[nodiscard]] virtual Pose pose(ObjectId object) const noexcept = 0;      ///< X_WO
-  [[nodiscard]] virtual Vector3 force(ObjectId object) const noexcept = 0;  ///< [N] contact force on it, in W
+  [[nodiscard]] virtual Pose pose(ObjectId object) const noexcept = 0;  ///< X_WO
+  /// [m] p_OQ_O: of its bounding sphere; an object's position is that of its centre.
+  [[nodiscard]] virtual Vector3 centre(ObjectId object) const noexcept = 0;
+  /// [N] in W, as Environment::forceOn
+  [[nodiscard]] virtual Vector3 force(ObjectId object) const noexcept = 0;
   [[nodiscard]] virtual bool inContact(ObjectId a, ObjectId b) const noexcept = 0;
   [[nodiscard]] virtual bool inAnyContact(ObjectId object) const noexcept = 0;
 };
 
 /// Progress of one condition, for displays.
 struct ConditionReading {
-  double value =
-      0.0;  ///< pose: position error [m]; force: [N]; contact: [s]; group, command, signal: count [-]
+  /// pose: position error [m]; force: [N]; contact: [s]; group, command, signal: count [-]
+  double value = 0.0;
   double limit = 0.0;  ///< [unit of `value`] at which it is met, other parts of the condition aside
   bool met = false;
 };
 
-/// Measures how long two objects have been in contact. Gaps up to a limit (tremor of the hand) do not reset
-/// the time, but are not counted either.
+/// Measures how long two objects have been in contact. Interruptions up to a limit (tremor of the hand) do
+/// not reset the time, but are not counted either.
 struct ContactTimer {
   std::uint32_t contact_ticks = 0;  ///< [ticks] in contact
-  std::uint32_t gap_ticks = 0;      ///< [ticks] since the last contact
+  std::uint32_t apart_ticks = 0;    ///< [ticks] since the last contact
 
-  void step(bool in_contact, std::uint32_t tolerated_gap) noexcept {
+  void step(bool in_contact, std::uint32_t lapse) noexcept {
     if (in_contact) {
       ++contact_ticks;
-      gap_ticks = 0;
-    } else if (++gap_ticks > tolerated_gap) {
+      apart_ticks = 0;
+    } else if (++apart_ticks > lapse) {
       contact_ticks = 0;
     }
   }
 };
 
 /// Evaluates one condition tree tick by tick. Its whole state is tick counters and the last readings, so a
-/// replay decides the same.
+/// re-simulation decides the same.
 ///
 /// Threads: one caller. Real-time: all.
 class ConditionProgress {
@@ -109,7 +112,7 @@ class ConditionProgress {
     for (Node& node : nodes_) {
       visit(node.held_ticks);
       visit(node.contact.contact_ticks);
-      visit(node.contact.gap_ticks);
+      visit(node.contact.apart_ticks);
       visit(node.latched);
       visit(node.reading.value);
       visit(node.reading.limit);
@@ -132,5 +135,8 @@ class ConditionProgress {
 
 /// The angle [rad], 0 to pi, of the rotation between two orientations; q and -q are the same orientation.
 [[nodiscard]] double angleBetween(const Quaternion& q_WA, const Quaternion& q_WB) noexcept;
+
+/// [m] Distance of an object's centre from where it is with the object at X_WG.
+[[nodiscard]] double positionError(const SceneView& scene, ObjectId object, const Pose& X_WG) noexcept;
 
 }  // namespace tenon::game_control

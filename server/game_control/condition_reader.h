@@ -50,7 +50,7 @@ class ConditionReader {
 
 inline constexpr double kLongestTime = 86'400.0;    ///< [s] largest time a scenario may give: a day
 inline constexpr double kSmallestTolerance = 1e-6;  ///< [m], [rad], [N] smaller ones could never be met
-inline constexpr double kContactLapse = 0.05;       ///< [s] default tolerated gap in a contact: hand tremor
+inline constexpr double kContactLapse = 0.05;       ///< [s] tolerated interruption of a contact: hand tremor
 inline constexpr double kPoseDwell = 0.2;  ///< [s] default dwell at a target before a part counts as mounted
 
 }  // namespace tenon::game_control

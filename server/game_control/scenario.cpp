@@ -39,7 +39,7 @@ int ScenarioFile::signalNamed(std::string_view signal) const {
   return found == signals.end() ? -1 : static_cast<int>(found - signals.begin());
 }
 
-Result<ScenarioFile> readScenario(const std::filesystem::path& path) {
+Result<ScenarioFile> readScenario(const std::filesystem::path& path, const ReadOptions& options) {
   std::error_code problem;
   const std::filesystem::path file =
       std::filesystem::is_directory(path, problem) ? path / "scenario.yaml" : path;
@@ -51,11 +51,12 @@ Result<ScenarioFile> readScenario(const std::filesystem::path& path) {
   std::ifstream stream(file, std::ios::binary);
   const std::string text((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
   if (stream.bad() || text.size() != size) return fail(file.string() + ": cannot be read");
-  return parseScenario(text, file);
+  return parseScenario(text, file, options);
 }
 
-Result<ScenarioFile> parseScenario(std::string_view text, const std::filesystem::path& path) {
-  return ScenarioReader(path).read(text);
+Result<ScenarioFile> parseScenario(std::string_view text, const std::filesystem::path& path,
+                                   const ReadOptions& options) {
+  return ScenarioReader(path, options).read(text);
 }
 
 }  // namespace tenon::game_control

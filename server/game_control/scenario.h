@@ -85,8 +85,8 @@ struct ScenarioHand {
   std::string name;
   Role role = Role::kTrainee;
   simulation::HandKind kind = simulation::HandKind::kCoupled;
-  ObjectId object;                     ///< its own object, which it moves unless it has grabbed another
-  double stiffness = 1000.0;           ///< [N/m] of its coupling
+  ObjectId object;            ///< default object: moved while the hand holds no other (pointer, forearm)
+  double stiffness = 1000.0;  ///< [N/m] of its coupling
   double rotational_stiffness = 20.0;  ///< [Nm/rad] of its coupling
   int line = 0;
 };
@@ -157,16 +157,17 @@ struct ScenarioState {
   HandId hand;
   ObjectId touch;                        ///< the object to touch; invalid: none
   std::optional<Pose> X_WG;              ///< target pose of `object`
-  double tolerance = 0.002;              ///< [m] of the target position
+  double tolerance = 0.002;              ///< [m] of the centre's position at the target
   double angle_tolerance = 0.0349066;    ///< [rad] of the target orientation: 2 degrees
   Vector3 approach_W = Vector3::Zero();  ///< unit vector of the motion towards the target; zero: any
   double approach_distance = 0.0;        ///< [m] before the target, from which on the direction matters
   std::vector<Condition> conditions;     ///< tree; the state ends when its root is met
   // at its end
-  bool snap = false;  ///< `object` is fixed at its target, and hands that held it move their own again
+  /// `object` is fixed at its target, and hands that held it move their default objects again
+  bool snap = false;
   std::uint32_t timeout = 0;  ///< [ticks] 0: none
   TimeoutAction on_timeout = TimeoutAction::kFail;
-  int line = 0;
+  int line = 0;  ///< 0: not in the file, see ReadOptions::needs_states
 };
 
 /// A training scenario, read from YAML and checked: all ids and indices in it are valid.
@@ -180,8 +181,8 @@ struct ScenarioFile {
   int part_set_line = 0;
   std::string language = "en";  ///< main language
   Texts title;
-  Vector3 gravity_W{0.0, 0.0, -9.81};   ///< [m/s^2]
-  double reach = 10.0;                  ///< [m] largest distance of any given pose from the world's origin
+  Vector3 gravity_W{0.0, 0.0, -9.81};  ///< [m/s^2]
+  double reach = 10.0;                 ///< [m] largest distance of an object's centre from the world's origin
   std::vector<ScenarioObject> objects;  ///< index = ObjectId
   std::vector<ScenarioHand> hands;      ///< index = HandId
   std::vector<ScenarioPair> pairs;      ///< index as in Scene::pairs
@@ -197,12 +198,24 @@ struct ScenarioFile {
   [[nodiscard]] int signalNamed(std::string_view signal) const;
 };
 
+/// How a scenario is read where its hands follow files instead of people.
+struct ReadOptions {
+  /// Hands that hold an object from the start on: it counts as moved by that hand, so it has pairs. Ids that
+  /// the scenario does not have are ignored.
+  std::vector<HandAssignment> taken;
+  /// False: a file without states gets one, with line 0, that lasts until somebody sends kFulfilled.
+  bool needs_states = true;
+  bool only_names = false;  ///< stop after objects and hands: to look up their ids for `taken`
+};
+
 /// Reads a scenario file, or `scenario.yaml` in a folder. Fails with `file:line: what was wrong, what was
 /// expected`.
-[[nodiscard]] Result<ScenarioFile> readScenario(const std::filesystem::path& path);
+[[nodiscard]] Result<ScenarioFile> readScenario(const std::filesystem::path& path,
+                                                const ReadOptions& options = {});
 
 /// As readScenario(), from a text. `path` names it in errors; mesh files are relative to its folder.
-[[nodiscard]] Result<ScenarioFile> parseScenario(std::string_view text, const std::filesystem::path& path);
+[[nodiscard]] Result<ScenarioFile> parseScenario(std::string_view text, const std::filesystem::path& path,
+                                                 const ReadOptions& options = {});
 
 /// All objects in an order in which the parts that are mounted into an object are baked before it, as
 /// refineBoxes() needs. Parts that are mounted into each other come in the order of their ids.
@@ -232,8 +245,8 @@ struct ScenarioFile {
 
 /// The read-only scene. `structures` by ObjectId; null for an object that is not collidable. SDF side of a
 /// pair: by sdfSideByTarget(), else never a pointer or an assistant, else the larger object. Fails, with file
-/// and line, when structures are missing, a target is far from all objects, a clearance is too small for the
-/// voxels, or a body has no mass properties.
+/// and line, when structures are missing, an object is out of reach, a target is far from all objects, a
+/// clearance is too small for the voxels, or a body has no mass properties.
 [[nodiscard]] Result<std::shared_ptr<const simulation::Scene>> makeScene(
     const ScenarioFile& scenario,
     std::vector<std::shared_ptr<const structures::HapticStructures>> structures);

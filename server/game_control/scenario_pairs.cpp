@@ -1,6 +1,4 @@
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
 
 #include "server/game_control/scenario_reader.h"
 
@@ -14,6 +12,7 @@ std::vector<bool> ScenarioReader::movableObjects(const YAML::Node& states) const
         scenario_.objects[i].body || status == ObjectStatus::kHeld || status == ObjectStatus::kTracked;
   }
   for (const ScenarioHand& hand : scenario_.hands) movable[hand.object.value] = true;
+  for (const HandAssignment& take : options_.taken) movable[take.object.value] = true;
   // objects that states give to hands or that have a target; errors are reported when the states are read
   const auto add = [&](const YAML::Node& name) {
     if (!name.IsDefined() || !name.IsScalar()) return;

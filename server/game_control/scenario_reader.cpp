@@ -7,14 +7,13 @@
 #include "idl/types/hash.h"
 #include "server/game_control/named_values.h"
 #include "server/game_control/scenario_state_reader.h"
+#include "server/structures/voxel_limits.h"
 
 namespace tenon::game_control {
 namespace {
 
 constexpr std::size_t kMaxScenarioObjects = 64;
 constexpr std::size_t kMaxScenarioHands = 16;
-constexpr double kSmallestVoxel = 2e-5;  // [m]
-constexpr double kLargestVoxel = 0.1;    // [m]
 
 constexpr NamedValues<ObjectStatus, 6> kStatuses{{{"hidden", ObjectStatus::kHidden},
                                                   {"parked", ObjectStatus::kParked},
@@ -35,8 +34,8 @@ bool isColor(const std::string& word) {
 
 }  // namespace
 
-ScenarioReader::ScenarioReader(const std::filesystem::path& path)
-    : yaml_(path.string()), names_(yaml_, scenario_) {
+ScenarioReader::ScenarioReader(const std::filesystem::path& path, const ReadOptions& options)
+    : yaml_(path.string()), options_(options), names_(yaml_, scenario_) {
   scenario_.path = path;
   std::error_code unknown;
   scenario_.name = std::filesystem::absolute(path, unknown).parent_path().filename().string();
@@ -81,8 +80,11 @@ void ScenarioReader::readScenario(const YAML::Node& root) {
   if (yaml_.failed() || !yaml_.checkList(root["hands"], "'hands'", kMaxScenarioHands)) return;
   for (const auto& hand : root["hands"]) readHand(hand);
   if (scenario_.hands.empty()) yaml_.fail(root["hands"], "'hands' is empty, expected at least one hand");
-  if (yaml_.failed()) return;
+  if (yaml_.failed() || options_.only_names) return;
 
+  std::erase_if(options_.taken, [this](const HandAssignment& take) {
+    return take.hand.value >= scenario_.hands.size() || take.object.value >= scenario_.objects.size();
+  });
   listPairs(root["states"]);
   if (root["pairs"].IsDefined() && yaml_.checkList(root["pairs"], "'pairs'")) {
     for (const auto& pair : root["pairs"]) readPair(pair);
@@ -91,7 +93,12 @@ void ScenarioReader::readScenario(const YAML::Node& root) {
     for (const auto& pair : root["pairs_off"]) readDisabledPair(pair);
   }
   if (yaml_.failed()) return;
-  ScenarioStateReader(yaml_, scenario_).read(root["states"]);
+  ScenarioStateReader states(yaml_, scenario_, options_.taken);
+  if (options_.needs_states || root["states"].IsDefined()) {
+    states.read(root["states"]);
+  } else {
+    states.addEndlessState();
+  }
   if (!yaml_.failed()) checkClearances();
 }
 
@@ -130,9 +137,6 @@ void ScenarioReader::readObject(const YAML::Node& node) {
                "object '" + object.name + "' is free but has no 'body', expected one with its mass");
   if (node["start"].IsDefined() && yaml_.openMapping(node["start"], "pose", "'start'" + of)) {
     object.X_WO = yaml_.pose(node["start"], "'start'" + of);
-    if (object.X_WO.translation().norm() > scenario_.reach) {
-      yaml_.fail(node["start"], "'start'" + of + " is farther from the world's origin than 'reach'");
-    }
   }
   readMeshes(node["meshes"], object);
   if (node["structures"].IsDefined()) readStructures(node["structures"], object);
@@ -143,8 +147,8 @@ void ScenarioReader::readStructures(const YAML::Node& node, ScenarioObject& obje
   const std::string of = "of 'structures' of object '" + object.name + "'";
   if (!yaml_.openMapping(node, "structures", "'structures' of object '" + object.name + "'")) return;
   StructureSettings& settings = object.structures;
-  settings.voxel = yaml_.numberOr(node["voxel"], Quantity::kLength, "'voxel' " + of, kSmallestVoxel,
-                                  kLargestVoxel, settings.voxel);
+  settings.voxel = yaml_.numberOr(node["voxel"], Quantity::kLength, "'voxel' " + of,
+                                  structures::kSmallestVoxel, structures::kLargestVoxel, settings.voxel);
   settings.refinement = static_cast<std::int32_t>(
       yaml_.integer(node["refinement"], "'refinement' " + of, 1, 8, settings.refinement));
   if ((settings.refinement & (settings.refinement - 1)) != 0) {

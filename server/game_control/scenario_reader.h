@@ -18,7 +18,7 @@ namespace tenon::game_control {
 class ScenarioReader {
  public:
   /// `path` names the file in errors; mesh files are relative to its folder. It is not opened.
-  explicit ScenarioReader(const std::filesystem::path& path);
+  ScenarioReader(const std::filesystem::path& path, const ReadOptions& options);
 
   /// Fails with the first error, `file:line: what was wrong, what was expected`. May be called once.
   [[nodiscard]] Result<ScenarioFile> read(std::string_view text);
@@ -36,13 +36,14 @@ class ScenarioReader {
   void listPairs(const YAML::Node& states);
   void readPair(const YAML::Node& node);
   void readDisabledPair(const YAML::Node& node);
-  /// By object: it is dynamic, tracked or held, or a state lets a hand move it.
+  /// By object: it is dynamic, tracked or held, or a hand moves it at the start or in a state.
   [[nodiscard]] std::vector<bool> movableObjects(const YAML::Node& states) const;
   /// By object: a state puts it into another group.
   [[nodiscard]] std::vector<bool> regroupedObjects(const YAML::Node& states) const;
   void checkClearances();
 
   YamlReader yaml_;
+  ReadOptions options_;
   ScenarioFile scenario_;
   ScenarioNames names_;
 };

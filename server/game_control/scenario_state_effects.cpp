@@ -98,8 +98,6 @@ void ScenarioStateReader::readPlacements(const YAML::Node& node, const std::stri
   const auto place = [&](const YAML::Node& name, std::optional<Pose> X_WO) {
     const ObjectId object = names_.object(name, what);
     if (!object.valid()) return;
-    if (X_WO && X_WO->translation().norm() > scenario_.reach)
-      yaml_.fail(name, what + " is farther from the world's origin than 'reach'");
     const auto same = std::find_if(state.placements.begin(), state.placements.end(),
                                    [&](const Placement& other) { return other.object == object; });
     if (same != state.placements.end()) {
@@ -136,7 +134,8 @@ void ScenarioStateReader::readHands(const YAML::Node& node, ScenarioState& state
   }
 }
 
-/// A hand that grabs an object must be coupled, and the object must not be the own object of another hand.
+/// A hand that grabs an object must be coupled, and the object must not be the default object of another
+/// hand.
 bool ScenarioStateReader::checkGrab(const YAML::detail::iterator_value& entry, HandId hand, ObjectId object,
                                     const std::string& what) {
   if (scenario_.hands[hand.value].kind == simulation::HandKind::kTracked) {
@@ -146,7 +145,7 @@ bool ScenarioStateReader::checkGrab(const YAML::detail::iterator_value& entry, H
   }
   for (std::size_t other = 0; other < scenario_.hands.size(); ++other) {
     if (other != hand.value && scenario_.hands[other].object == object) {
-      yaml_.fail(entry.second, what + ": '" + names_.nameOf(object) + "' is the own object of hand '" +
+      yaml_.fail(entry.second, what + ": '" + names_.nameOf(object) + "' is the default object of hand '" +
                                    scenario_.hands[other].name + "'");
       return false;
     }

@@ -15,13 +15,15 @@ constexpr std::size_t kMaxStates = 1000;
 
 }  // namespace
 
-ScenarioStateReader::ScenarioStateReader(YamlReader& yaml, ScenarioFile& scenario)
-    : yaml_(yaml), scenario_(scenario), names_(yaml, scenario) {
+ScenarioStateReader::ScenarioStateReader(YamlReader& yaml, ScenarioFile& scenario,
+                                         const std::vector<HandAssignment>& taken)
+    : yaml_(yaml), scenario_(scenario), names_(yaml, scenario), taken_(taken) {
   for (const ScenarioHand& hand : scenario.hands) object_of_hand_.push_back(hand.object);
   for (const ScenarioObject& object : scenario.objects) {
     hidden_.push_back(object.status == ObjectStatus::kHidden);
     group_.push_back(object.group);
   }
+  for (const HandAssignment& take : taken) hidden_[take.object.value] = false;
 }
 
 std::string ScenarioStateReader::describeKey(const ScenarioState& state, const std::string& key) const {
@@ -49,6 +51,16 @@ void ScenarioStateReader::read(const YAML::Node& states) {
   }
   if (scenario_.states.empty()) yaml_.fail(states, "'states' is empty, expected at least one state");
   checkGroups();
+}
+
+void ScenarioStateReader::addEndlessState() {
+  ScenarioState state;
+  state.name = "no states";
+  state.title.push_back({scenario_.language, state.name});
+  state.hand = firstCoupledHand();
+  state.conditions.resize(2);
+  state.conditions[1].kind = ConditionKind::kFulfilled;
+  scenario_.states.push_back(std::move(state));
 }
 
 ScenarioState ScenarioStateReader::readState(const YAML::Node& node) {
@@ -100,12 +112,6 @@ void ScenarioStateReader::readTarget(const YAML::Node& node, ScenarioState& stat
                                    kSmallestTolerance, 1.0, state.tolerance);
   state.angle_tolerance = yaml_.numberOr(node["angle"], Quantity::kAngle, "'angle' of " + what,
                                          kSmallestTolerance, std::numbers::pi, state.angle_tolerance);
-  const double distance = state.X_WG->translation().norm();
-  if (distance > scenario_.reach) {
-    yaml_.fail(node, "the target of state '" + state.name + "' is " + std::to_string(distance) +
-                         " m from the world's origin, expected at most 'reach', " +
-                         std::to_string(scenario_.reach) + " m");
-  }
 }
 
 void ScenarioStateReader::readApproach(const YAML::Node& node, ScenarioState& state) {
@@ -228,6 +234,8 @@ HandId ScenarioStateReader::handMoving(ObjectId object) const {
     for (std::uint32_t hand = 0; hand < object_of_hand_.size(); ++hand) {
       if (object_of_hand_[hand] == object) return HandId{hand};
     }
+    for (const HandAssignment& take : taken_)
+      if (take.object == object) return take.hand;
   }
   return {};
 }

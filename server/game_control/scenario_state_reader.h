@@ -16,11 +16,13 @@ namespace tenon::game_control {
 /// Threads: one. Real-time: no.
 class ScenarioStateReader {
  public:
-  /// Objects, hands and pairs of `scenario` have been read.
-  ScenarioStateReader(YamlReader& yaml, ScenarioFile& scenario);
+  /// Objects, hands and pairs of `scenario` have been read; `taken` by hands at the start, with valid ids.
+  ScenarioStateReader(YamlReader& yaml, ScenarioFile& scenario, const std::vector<HandAssignment>& taken);
 
   /// Appends the states to the scenario; errors go to the YamlReader.
   void read(const YAML::Node& states);
+  /// Appends a state without effects and task that lasts until somebody sends kFulfilled.
+  void addEndlessState();
 
  private:
   [[nodiscard]] ScenarioState readState(const YAML::Node& node);
@@ -51,6 +53,7 @@ class ScenarioStateReader {
   YamlReader& yaml_;
   ScenarioFile& scenario_;
   ScenarioNames names_;
+  std::vector<HandAssignment> taken_;
   std::vector<ObjectId> object_of_hand_;  ///< by hand: the object it moves in the state being read
   std::vector<bool> hidden_;              ///< by object
   std::vector<std::uint32_t> group_;      ///< by object

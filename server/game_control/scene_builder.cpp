@@ -14,7 +14,8 @@ using StructuresByObject = std::vector<std::shared_ptr<const structures::HapticS
 constexpr double kDilationPerVoxel = 0.87;      // [-] sqrt(3)/2 rounded up: half the diagonal of a voxel
 constexpr double kDilationPerClearance = 0.25;  // [-]
 constexpr double kRounding = 1e-9;              // [-] relative: a typed number equal to a limit is within it
-constexpr double kTargetMargin = 1.0;  // [m] a target farther outside the scene is taken for a mistake
+constexpr double kTargetMargin = 1.0;    // [m] a target farther outside the scene is taken for a mistake
+constexpr double kFarthestOrigin = 1e3;  // [m] of a frame: coordinates in it keep their micrometres
 
 /// "2.6 mm", three significant digits.
 std::string inMillimetres(double metres) {
@@ -102,6 +103,42 @@ Result<void> checkStructures(const ScenarioFile& scenario, const StructuresByObj
   return {};
 }
 
+/// All given poses put their objects' centres within reach. Where the frames' origins are does not matter.
+Result<void> checkReach(const ScenarioFile& scenario, const StructuresByObject& structures) {
+  const auto check = [&](ObjectId object, const Pose& X_WO, int line,
+                         const std::string& what) -> Result<void> {
+    const Vector3 p_OQ_O = simulation::boundingSphereOf(structures[object.value].get()).p_OQ_O;
+    const double distance = (X_WO * p_OQ_O).norm();
+    if (X_WO.translation().norm() > kFarthestOrigin)
+      return fail(fileAndLine(scenario, line) + what +
+                  " has its 'at' more than 1 km from the world's origin, " +
+                  "expected a mesh with its origin nearer to the part");
+    if (distance <= scenario.reach) return {};
+    return fail(fileAndLine(scenario, line) + what + " is " + inMillimetres(distance) +
+                " from the world's origin, expected at most 'reach', " + inMillimetres(scenario.reach));
+  };
+  for (std::uint32_t i = 0; i < scenario.objects.size(); ++i) {
+    const ScenarioObject& object = scenario.objects[i];
+    const auto checked =
+        check(ObjectId{i}, object.X_WO, object.line, "the start of object '" + object.name + "'");
+    if (!checked) return checked;
+  }
+  for (const ScenarioState& state : scenario.states) {
+    const std::string of = " of state '" + state.name + "'";
+    for (const Placement& placement : state.placements) {
+      if (!placement.X_WO) continue;
+      const std::string what =
+          "the place of '" + scenario.objects[placement.object.value].name + "' at the begin" + of;
+      if (const auto checked = check(placement.object, *placement.X_WO, state.line, what); !checked)
+        return checked;
+    }
+    if (!state.X_WG) continue;
+    if (const auto checked = check(state.object, *state.X_WG, state.line, "the target" + of); !checked)
+      return checked;
+  }
+  return {};
+}
+
 Result<void> checkTargets(const ScenarioFile& scenario, const StructuresByObject& structures) {
   Eigen::AlignedBox3d scene_W;
   for (std::size_t i = 0; i < structures.size(); ++i) {
@@ -110,7 +147,8 @@ Result<void> checkTargets(const ScenarioFile& scenario, const StructuresByObject
   if (scene_W.isEmpty()) return {};
   for (const ScenarioState& state : scenario.states) {
     if (!state.X_WG) continue;
-    const double outside = scene_W.exteriorDistance(state.X_WG->translation());
+    const Vector3 p_OQ_O = simulation::boundingSphereOf(structures[state.object.value].get()).p_OQ_O;
+    const double outside = scene_W.exteriorDistance(Vector3(*state.X_WG * p_OQ_O));
     if (outside <= kTargetMargin) continue;
     return fail(fileAndLine(scenario, state.line) + "the target of state '" + state.name + "' is " +
                 inMillimetres(outside) + " outside the box of all objects, expected it within " +
@@ -204,6 +242,7 @@ Result<std::shared_ptr<const simulation::Scene>> makeScene(const ScenarioFile& s
                                                            StructuresByObject structures) {
   if (const auto checked = checkStructures(scenario, structures); !checked)
     return tl::unexpected(checked.error());
+  if (const auto checked = checkReach(scenario, structures); !checked) return tl::unexpected(checked.error());
   if (const auto checked = checkTargets(scenario, structures); !checked)
     return tl::unexpected(checked.error());
   auto scene = std::make_shared<simulation::Scene>();

@@ -10,7 +10,7 @@ namespace tenon::game_control {
 namespace {
 
 constexpr std::uint32_t kRegrabTicks = 1000;  // [ticks] paper §5: 1 s of contact grabs a part
-constexpr std::uint32_t kRegrabLapse = 50;    // [ticks] tolerated gap in that contact
+constexpr std::uint32_t kRegrabLapse = 50;    // [ticks] tolerated interruption of that contact
 
 /// The Environment as a SceneView.
 class EnvironmentView final : public SceneView {
@@ -19,6 +19,9 @@ class EnvironmentView final : public SceneView {
 
   [[nodiscard]] Pose pose(ObjectId object) const noexcept override {
     return environment_.objects()[object.value].X_WO;
+  }
+  [[nodiscard]] Vector3 centre(ObjectId object) const noexcept override {
+    return environment_.centreOf(object);
   }
   [[nodiscard]] Vector3 force(ObjectId object) const noexcept override {
     return environment_.forceOn(object).force;
@@ -35,7 +38,7 @@ class EnvironmentView final : public SceneView {
 };
 
 /// The hand that currently has the role of a hand of the scenario: after hands were swapped, the one whose
-/// own object is that of the scenario's hand.
+/// default object is that of the scenario's hand.
 HandId handInRole(const ScenarioFile& scenario, const simulation::Environment& environment,
                   HandId role) noexcept {
   for (std::uint32_t i = 0; i < scenario.hands.size(); ++i) {
@@ -246,9 +249,8 @@ void StateMachine::updateMeasurements(const SceneView& scene) noexcept {
   if (current.object.valid()) {
     if (memory_.elapsed > 0 && scene.inAnyContact(current.object)) ++memory_.contact_ticks;
     if (current.X_WG) {
-      const Pose X_WO = scene.pose(current.object);
-      status.position_error = (X_WO.translation() - current.X_WG->translation()).norm();
-      status.angle_error = angleBetween(X_WO.rotation(), current.X_WG->rotation());
+      status.position_error = positionError(scene, current.object, *current.X_WG);
+      status.angle_error = angleBetween(scene.pose(current.object).rotation(), current.X_WG->rotation());
     }
   }
   status.contact_seconds = static_cast<double>(memory_.contact_ticks) * kTickSeconds;

@@ -25,13 +25,13 @@ struct StepStatus {
   std::uint32_t revision = 0;  ///< incremented whenever `step`, `phase` or `hand` changes: publish then
   std::uint32_t step = 0;      ///< index of the current state
   StepPhase phase = StepPhase::kWaiting;
-  HandId hand;                   ///< that shall do it; differs from the scenario's after hands were swapped
+  HandId hand;                   ///< that has to do it; differs from the scenario's after hands were swapped
   Tick started = 0;              ///< tick of the Environment at which the state began
   Tick changed = 0;              ///< tick of the last revision
   Tick tick = 0;                 ///< tick of the Environment of the values below
   bool finished = false;         ///< the last state has ended
   bool failed = false;           ///< a state timed out whose timeout fails the training
-  double position_error = 0.0;   ///< [m] of the state's object to its target; 0 without a target
+  double position_error = 0.0;   ///< [m] of its object's centre to the target; 0 without a target
   double angle_error = 0.0;      ///< [rad] likewise
   double contact_seconds = 0.0;  ///< [s] that the object has been in contact in this state
   FixedVector<ConditionReading, kMaxConditions> conditions;  ///< of the leaves, in file order
@@ -66,7 +66,10 @@ class StateMachine {
   [[nodiscard]] std::vector<std::uint8_t> save() const;
   /// Appends what save() returns; does not allocate when `bytes` has the capacity.
   void append(std::vector<std::uint8_t>& bytes) const;
-  /// Fails, and changes nothing, when the size is wrong or the saved step does not exist.
+  /// [bytes] Positions in save() of all its floating-point numbers: none of them may be infinite or NaN.
+  [[nodiscard]] std::vector<std::size_t> savedDoubles() const;
+  /// Fails, and changes nothing, when the size is wrong, a number is not finite or the saved step does not
+  /// exist.
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
 
  private:
@@ -76,8 +79,8 @@ class StateMachine {
     ConditionProgress progress;
     std::uint64_t elapsed = 0;        ///< [ticks] in this state
     std::uint64_t contact_ticks = 0;  ///< [ticks] of the state's object in contact
-    ContactTimer regrab;  ///< between a released part and the own object of the hand that shall move it
-    std::array<ContactTimer, kMaxHelpers> helpers;  ///< between a helping hand's own object and the part
+    ContactTimer regrab;  ///< between a released part and the default object of the hand that has to move it
+    std::array<ContactTimer, kMaxHelpers> helpers;  ///< between a helping hand's default object and the part
   };
   template <typename Visitor>
   static void visitMemory(Memory& memory, Visitor&& visit);

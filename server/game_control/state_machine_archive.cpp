@@ -1,4 +1,5 @@
 #include <bit>
+#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <string>
@@ -50,10 +51,10 @@ void StateMachine::visitMemory(Memory& memory, Visitor&& visit) {
   visit(memory.elapsed);
   visit(memory.contact_ticks);
   visit(memory.regrab.contact_ticks);
-  visit(memory.regrab.gap_ticks);
+  visit(memory.regrab.apart_ticks);
   for (ContactTimer& timer : memory.helpers) {
     visit(timer.contact_ticks);
-    visit(timer.gap_ticks);
+    visit(timer.apart_ticks);
   }
 }
 
@@ -77,6 +78,17 @@ void StateMachine::append(std::vector<std::uint8_t>& bytes) const {
   });
 }
 
+std::vector<std::size_t> StateMachine::savedDoubles() const {
+  Memory copy = memory_;
+  std::vector<std::size_t> positions;
+  std::size_t words = 0;
+  visitMemory(copy, [&]<typename Number>(const Number&) {
+    if constexpr (std::same_as<Number, double>) positions.push_back(words * sizeof(std::uint64_t));
+    ++words;
+  });
+  return positions;
+}
+
 Result<void> StateMachine::restore(std::span<const std::uint8_t> bytes) {
   Memory memory;
   std::size_t words = 0;
@@ -86,11 +98,14 @@ Result<void> StateMachine::restore(std::span<const std::uint8_t> bytes) {
                 " bytes, this one has " + std::to_string(bytes.size()));
   }
   std::size_t at = 0;
-  visitMemory(memory, [&](auto& number) {
+  bool finite = true;
+  visitMemory(memory, [&]<typename Number>(Number& number) {
     std::uint64_t word = 0;
     for (unsigned shift = 0; shift < 64; shift += 8) word |= std::uint64_t{bytes[at++]} << shift;
     fromWord(word, number);
+    if constexpr (std::same_as<Number, double>) finite = finite && std::isfinite(number);
   });
+  if (!finite) return fail("state machine: a saved state contains a number that is not finite");
   if (memory.status.step >= scenario_->states.size() || memory.status.phase > StepPhase::kSkipped) {
     return fail("state machine: a saved state is at step " + std::to_string(memory.status.step) +
                 ", but the scenario has " + std::to_string(scenario_->states.size()));

@@ -158,8 +158,8 @@ Result<fs::path> generatedParts(const game_control::ScenarioFile& scenario, cons
   fs::create_directories(temporary, error);
   if (error)
     return fail(fmt::format("{}: cannot make this folder ({})", temporary.string(), error.message()));
-  const auto done =
-      outputOf({program.string(), *set, temporary.string(), "--detail", fmt::format("{}", detail)});
+  const auto done = outputOf(
+      {program.string(), *set, temporary.string(), "--detail", fmt::format("{}", detail), "--overwrite"});
   if (!done) return fail(done.error().what);
   fs::remove_all(folder, error);
   fs::rename(temporary, folder, error);

@@ -27,7 +27,10 @@ struct GeneratedSet {
 
 /// The folder of the generated parts of a scenario, at `detail` [-] 0..1, below the folder `cache`; runs the
 /// generator unless it is up to date. Empty when the scenario names no part. The generator is $TENON_PARTS,
-/// or tenon-parts beside this program.
+/// or tenon-parts beside this program. Fails when the generator does, or as
+/// generatedSetOf.
+///
+/// Threads: one. Real-time: no.
 [[nodiscard]] Result<std::filesystem::path> generatedParts(const game_control::ScenarioFile& scenario,
                                                            const std::filesystem::path& cache, double detail);
 

@@ -9,7 +9,8 @@
 
 namespace tenon::session {
 
-/// Hands inputs from the wire thread to the tick: the newest reading of each hand and every change, in order.
+/// Passes inputs from the wire thread to the tick: the newest reading of each hand and every change, in
+/// order.
 ///
 /// Threads: one writer (wire: put, freeChanges), one reader (tick: collect). Real-time: all but construction.
 class InputBuffer {

@@ -95,6 +95,10 @@ class Resimulator {
   bool synchronized_ = false;  ///< the simulation is in the state after the last recorded tick
 };
 
+std::string nameTheScenario(const std::filesystem::path& file) {
+  return fmt::format("name it as well, as in: tenon resimulate {} scenarios/engine_bay", file.string());
+}
+
 }  // namespace
 
 Result<Journal> Journal::open(const std::filesystem::path& file, const JournalOrigin& origin) {
@@ -186,7 +190,19 @@ Result<JournalOrigin> readJournalOrigin(const std::filesystem::path& file) {
   for (const auto& [name, values] : reader->metadata())
     if (name == kMetadata && values.contains("scenario") && values.contains("detail"))
       return JournalOrigin{values.at("scenario"), std::strtod(values.at("detail").c_str(), nullptr), {}};
-  return fail(fmt::format("{}: does not name its scenario; give it before --resimulate", file.string()));
+  return fail(fmt::format("{}: does not name its scenario; {}", file.string(), nameTheScenario(file)));
+}
+
+Result<std::filesystem::path> findScenario(const std::filesystem::path& journal,
+                                           const JournalOrigin& origin) {
+  std::error_code ignored;
+  for (const std::filesystem::path& path :
+       {std::filesystem::path(origin.scenario), journal.parent_path() / origin.scenario})
+    if (std::filesystem::exists(path, ignored)) return path;
+  return fail(
+      fmt::format("{}: was recorded with the scenario '{}', which is neither below this folder nor below the "
+                  "journal's; {}",
+                  journal.string(), origin.scenario, nameTheScenario(journal)));
 }
 
 }  // namespace tenon::session

@@ -16,7 +16,10 @@ namespace tenon::session {
 
 inline constexpr Tick kCheckpointEvery = 1000;  // [ticks]
 
-/// What the tick thread hands to the journal thread.
+/// Whether the journal entry of this tick has a checkpoint.
+[[nodiscard]] constexpr bool hasCheckpoint(Tick tick) { return tick % kCheckpointEvery == 1; }
+
+/// What the tick thread passes to the journal thread.
 struct JournalEntry {
   TickInput input;
   std::uint64_t hash = 0;                ///< SessionSimulation::hash after the tick
@@ -92,5 +95,10 @@ struct ResimulationReport {
 
 /// Scenario and detail of a journal. Fails for other recordings, which do not name them.
 [[nodiscard]] Result<JournalOrigin> readJournalOrigin(const std::filesystem::path& file);
+
+/// The scenario of a journal: its recorded path, from the working directory or else from the journal's
+/// folder. Fails when neither exists.
+[[nodiscard]] Result<std::filesystem::path> findScenario(const std::filesystem::path& journal,
+                                                         const JournalOrigin& origin);
 
 }  // namespace tenon::session

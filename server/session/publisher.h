@@ -16,14 +16,13 @@ namespace tenon::session {
 
 /// The messages of one tick, by rate tier. Valid until the next call of Publisher::prepare.
 struct OutgoingMessages {
-  std::vector<WorldFrame> frames;  ///< WorldFrame_1k
-  std::vector<WorldFrame>
-      frames_100;                     ///< WorldFrame_100; this and all below: empty in ticks without a sample
-  std::vector<WorldFrame> frames_30;  ///< WorldFrame_30
-  std::vector<const HandManifold*> manifolds;
-  std::vector<ContactPairs> pairs;
-  std::optional<TickStats> stats;
-  std::optional<StepProgress> progress;
+  std::vector<WorldFrame> frames;              ///< WorldFrame_1k
+  std::vector<WorldFrame> frames_100;          ///< WorldFrame_100; empty in ticks between its samples
+  std::vector<WorldFrame> frames_30;           ///< WorldFrame_30; likewise
+  std::vector<const HandManifold*> manifolds;  ///< every tick; of tracked hands at 100 Hz
+  std::vector<ContactPairs> pairs;             ///< at 100 Hz
+  std::optional<TickStats> stats;              ///< at 100 Hz
+  std::optional<StepProgress> progress;        ///< at 30 Hz
   TickEvents events;
 };
 

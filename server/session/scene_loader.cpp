@@ -119,7 +119,7 @@ Result<std::shared_ptr<const structures::HapticStructures>> structuresOf(
 
 Result<LoadedScene> loadScene(const fs::path& path, const LoadOptions& options,
                               const LoadProgress& progress) {
-  auto file = game_control::readScenario(path);
+  auto file = game_control::readScenario(path, options.read);
   if (!file) return fail(file.error().what);
   const auto scenario = std::make_shared<const game_control::ScenarioFile>(std::move(*file));
 

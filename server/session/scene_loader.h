@@ -17,6 +17,7 @@ namespace tenon::session {
 struct LoadOptions {
   std::filesystem::path cache;  ///< folder of baked structures and generated parts
   double detail = 0.12;         ///< [-] mesh resolution of generated parts, 0..1; 1 is the scene of the paper
+  game_control::ReadOptions read;  ///< of the scenario file
 };
 
 /// Called with the current activity, as in "engine bay: signs", and its finished `fraction` [-], 0..1.
@@ -42,6 +43,8 @@ struct Fingerprint {
 
 /// Reads a scenario (its YAML file or the folder of it), generates its parts and bakes its meshes unless the
 /// cache has them, and builds the scene. Fails with the first problem, named with file and line where known.
+///
+/// Threads: one; baking uses several inside. Real-time: no.
 [[nodiscard]] Result<LoadedScene> loadScene(const std::filesystem::path& scenario, const LoadOptions& options,
                                             const LoadProgress& progress = {});
 

@@ -18,7 +18,13 @@ template <class M>
 struct ServerWire::TopicWriter {
   const wire::Topic<M>& topic;
   std::optional<wire::Writer<M>> writer;
+  std::uint64_t samples = 0;  ///< of ticks, since the last PublishedSamples
 
+  /// Writes a sample of a tick.
+  void write(const M& message) {
+    ++samples;
+    (void)writer->write(message);
+  }
   Result<void> open(wire::Partition& partition) {
     auto opened = wire::Writer<M>::open(partition, topic);
     if (!opened) return fail(opened.error().what);
@@ -48,13 +54,18 @@ struct ServerWire::Writers {
   TopicWriter<EventLog> event{wire::kEventLog, {}};
   TopicWriter<ClockSync> clock{wire::kClockSync, {}};
   TopicWriter<EmergencyStop> stop{wire::kEmergencyStop, {}};
+  TopicWriter<PublishedSamples> published{wire::kPublishedSamples, {}};
   TopicWriter<TickInputPart> input{wire::kTickInput, {}};
   TopicWriter<CheckpointPart> checkpoint{wire::kCheckpoint, {}};
 
   auto inLobby() { return std::tie(announce, welcome); }
   auto inSession() {
     return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, object, step, progress,
-                    run, grab, ack, guidance, event, clock, stop, input, checkpoint);
+                    run, grab, ack, guidance, event, clock, stop, published, input, checkpoint);
+  }
+  /// Written in ticks by send(OutgoingMessages), with the tick in each sample.
+  auto ofTicks() {
+    return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, progress, grab);
   }
 };
 
@@ -166,8 +177,8 @@ void ServerWire::dispatch(std::chrono::nanoseconds timeout) {
 }
 
 void ServerWire::forwardChanges() {
-  if (input_buffer_.freeChanges() < kMaxChanges)
-    return;  // they stay in the registry until the tick has caught up
+  // while the queue is nearly full they stay in the registry, until the tick has caught up
+  if (input_buffer_.freeChanges() < kMaxChanges) return;
   FixedVector<Change, kMaxChanges> changes;
   registry_.takeChanges(changes);
   for (const Change& change : changes) input_buffer_.put(change);
@@ -192,9 +203,10 @@ void ServerWire::refuse(const std::string& why) {
 
 /// Whether a sample that names `client` was written by the participant with its seat; if not, refuses it.
 bool ServerWire::isGenuine(ClientId client, const wire::Origin& from, const std::string& what) {
-  if (registry_.findClient(client) == nullptr || registry_.ownsSeat(client, from))
-    return true;     // unknown clients are refused by the registry
-  if (from.known())  // unknown: its writer ended in the meantime
+  // unknown clients are refused by the registry
+  if (registry_.findClient(client) == nullptr || registry_.ownsSeat(client, from)) return true;
+  // an unknown origin: the writer of the sample ended in the meantime
+  if (from.known())
     refuse(
         fmt::format("a {} under the id of client {} came from another program than the one that joined: "
                     "ignored",
@@ -326,29 +338,53 @@ void ServerWire::send(const RunState& run) { (void)writers_->run.writer->write(r
 
 void ServerWire::resendLast() {
   if (last_ == nullptr) return;
-  for (const WorldFrame& frame : last_->frames) (void)writers_->frame_1k.writer->write(frame);
-  for (const HandManifold* manifold : last_->manifolds) (void)writers_->manifold.writer->write(*manifold);
+  for (const WorldFrame& frame : last_->frames) writers_->frame_1k.write(frame);
+  for (const HandManifold* manifold : last_->manifolds) writers_->manifold.write(*manifold);
 }
 
 void ServerWire::send(const OutgoingMessages& outgoing) {
   last_ = &outgoing;
+  const Tick period_begin = (now_ - 1) / kPublishedSamplesPeriod * kPublishedSamplesPeriod + 1;
+  if (period_begin != published_.first_tick) statePublished();
+  published_.first_tick = period_begin;
   Writers& to = *writers_;
   // the step before the frames, which refer to its revision
   if (outgoing.events.step) (void)to.step.writer->write(*outgoing.events.step);
-  for (const GrabState& grab : outgoing.events.grabs) (void)to.grab.writer->write(grab);
-  for (const ObjectSnapshot& snapshot : outgoing.events.snapshots) (void)to.snapshot.writer->write(snapshot);
-  for (const WorldFrame& frame : outgoing.frames) (void)to.frame_1k.writer->write(frame);
-  for (const HandManifold* manifold : outgoing.manifolds) (void)to.manifold.writer->write(*manifold);
-  for (const WorldFrame& frame : outgoing.frames_100) (void)to.frame_100.writer->write(frame);
-  for (const WorldFrame& frame : outgoing.frames_30) (void)to.frame_30.writer->write(frame);
-  for (const ContactPairs& pairs : outgoing.pairs) (void)to.pairs.writer->write(pairs);
-  if (outgoing.stats) (void)to.stats.writer->write(*outgoing.stats);
-  if (outgoing.progress) (void)to.progress.writer->write(*outgoing.progress);
+  for (const GrabState& grab : outgoing.events.grabs) to.grab.write(grab);
+  for (const ObjectSnapshot& snapshot : outgoing.events.snapshots) to.snapshot.write(snapshot);
+  for (const WorldFrame& frame : outgoing.frames) to.frame_1k.write(frame);
+  for (const HandManifold* manifold : outgoing.manifolds) to.manifold.write(*manifold);
+  for (const WorldFrame& frame : outgoing.frames_100) to.frame_100.write(frame);
+  for (const WorldFrame& frame : outgoing.frames_30) to.frame_30.write(frame);
+  for (const ContactPairs& pairs : outgoing.pairs) to.pairs.write(pairs);
+  if (outgoing.stats) to.stats.write(*outgoing.stats);
+  if (outgoing.progress) to.progress.write(*outgoing.progress);
   for (const EventLog& event : outgoing.events.log) {
     (void)to.event.writer->write(event);
     if (print) print(fmt::format("{}: {}", event.kind, event.text));
   }
   if (outgoing.events.run) (void)to.run.writer->write(*outgoing.events.run);
+  published_.last_tick = now_;
+}
+
+void ServerWire::statePublished() {
+  if (published_.last_tick < published_.first_tick) return;
+  published_.topics.clear();
+  const auto take = [&](auto& out) {
+    published_.topics.push_back({std::string(out.topic.name), std::exchange(out.samples, 0)});
+  };
+  std::apply([&](auto&... out) { (take(out), ...); }, writers_->ofTicks());
+  (void)writers_->published.writer->write(published_);
+  published_.last_tick = 0;
+}
+
+void ServerWire::waitForReaders(std::chrono::nanoseconds timeout) {
+  const auto until = std::chrono::steady_clock::now() + timeout;
+  const auto wait = [&](auto& out) {
+    const auto rest = until - std::chrono::steady_clock::now();
+    (void)out.writer->waitForReaders(std::max(rest, std::chrono::nanoseconds(0)));
+  };
+  std::apply([&](auto&... out) { (wait(out), ...); }, writers_->inSession());
 }
 
 void ServerWire::send(const JournalEntry& entry) {

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "idl/types/messages/log.h"
 #include "idl/wire/endpoint.h"
 #include "server/game_control/scenario.h"
 #include "server/session/input_buffer.h"
@@ -56,10 +57,15 @@ class ServerWire {
   void resendLast();
   void send(const EventLog& event);
   void send(const RunState& run);
+  /// States how many samples were written since the last statement (PublishedSamples); without a new tick
+  /// nothing.
+  void statePublished();
+  /// Waits until all readers have what was written to them reliably, for up to `timeout`.
+  void waitForReaders(std::chrono::nanoseconds timeout);
   /// Only to matched readers, and only with `publish_journal`.
   void send(const JournalEntry& entry);
 
-  /// Removes a client from the session, tells it so and logs `why`, which continues "Ada (trainee) ...".
+  /// Removes a client from the session, notifies it, and logs "Ada (trainee) <why>".
   void dismiss(ClientId client, const std::string& why);
   /// The newest DeviceSample::seq received for a hand; 0: none yet.
   [[nodiscard]] std::uint32_t newestSeq(HandId hand) const { return newest_seq_[hand.value]; }
@@ -115,6 +121,7 @@ class ServerWire {
   bool emergency_stop_ = false;  ///< engaged
   Tick now_ = 0;
   const OutgoingMessages* last_ = nullptr;  ///< of the last send
+  PublishedSamples published_;              ///< since the last statement
 };
 
 }  // namespace tenon::session

@@ -12,8 +12,6 @@ namespace {
 
 constexpr double kMaxPosition = 1000.0;  // [m] of a hand or object from the world's origin, each axis
 constexpr double kMaxSpeed = 50.0;       // [m/s], [rad/s] of a hand
-constexpr double kMaxForce = 200.0;      // [N], [Nm] of an external contribution
-constexpr std::uint32_t kMaxLifetimeTicks = 100;  // [ticks] of an external contribution
 
 bool isPlausible(const Pose& X) {
   return X.isFinite() && X.translation().cwiseAbs().maxCoeff() < kMaxPosition &&
@@ -178,13 +176,12 @@ Result<Change> SessionRegistry::validateForceContribution(const ForceContributio
     return fail(fmt::format("client {} may not contribute forces", force.client.value));
   if (force.object.value >= scenario_.objects.size())
     return fail(fmt::format("client {} sent a force for an unknown object", force.client.value));
-  if (!isPlausible(force.F_Oo_W.force, kMaxForce) || !isPlausible(force.F_Oo_W.torque, kMaxForce))
-    return fail(fmt::format("client {} sent a force that is not finite or above {} N", force.client.value,
-                            kMaxForce));
+  if (!force.F_Oo_W.force.allFinite() || !force.F_Oo_W.torque.allFinite())
+    return fail(fmt::format("client {} sent a force that is not finite", force.client.value));
   return Change{.kind = ChangeKind::kContributeForce,
                 .object = force.object,
                 .index = force.source,
-                .lifetime_ticks = std::min(force.lifetime_ticks, kMaxLifetimeTicks),
+                .lifetime_ticks = force.lifetime_ticks,
                 .F_Oo_W = force.F_Oo_W};
 }
 
@@ -226,8 +223,8 @@ CommandAck SessionRegistry::decide(const Command& command, Role role) {
   ack.reason = change ? refusalByPhase(command.kind) : change.error().what;
   ack.accepted = ack.reason.empty();
   if (!ack.accepted) return ack;
-  const bool held = expectedPhase() == RunPhase::kPaused || emergency_stop_;
-  if (change->kind == ChangeKind::kGameCommand && held) ++deferred_commands_;
+  const bool suspended = expectedPhase() == RunPhase::kPaused || emergency_stop_;
+  if (change->kind == ChangeKind::kGameCommand && suspended) ++deferred_commands_;
   if (change->kind == ChangeKind::kPause) pending_phase_ = RunPhase::kPaused;
   if (change->kind == ChangeKind::kResume) pending_phase_ = RunPhase::kRunning;
   if (change->kind == ChangeKind::kSetEmergencyStop) emergency_stop_ = false;
@@ -285,6 +282,7 @@ Result<Change> SessionRegistry::changeFromCommand(const Command& command, Role r
     return fail(fmt::format("not permitted for the {}: ask the instructor", roleName(role)));
   };
   if (role == Role::kObserver || role == Role::kRecorder) return not_permitted();
+  if (!std::isfinite(command.value)) return fail("its value is not a finite number");
   switch (command.kind) {
     case CommandKind::kFulfilled:
       return gameChange(command);

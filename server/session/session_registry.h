@@ -51,7 +51,8 @@ class SessionRegistry {
   /// does not control this hand, the server epoch is another one, or the numbers are implausible (not finite,
   /// beyond 1 km, 50 m/s or 50 rad/s, no unit quaternion).
   [[nodiscard]] Result<HandReading> validateDeviceInput(const DeviceInput& input) const;
-  /// Fails for observers and recorders, unknown objects, and wrenches above 200 N or 200 Nm.
+  /// Fails for observers and recorders, unknown objects, and wrenches that are not finite. Those that are too
+  /// large or last too long are passed on as they are: ForceBuffer::contribute clamps them.
   [[nodiscard]] Result<Change> validateForceContribution(const ForceContribution& force) const;
   /// Fails without instructor rights, for unknown objects and implausible poses.
   [[nodiscard]] Result<Change> validateExternalPose(const ExternalPose& pose) const;

@@ -18,6 +18,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
+constexpr auto kFarewell = std::chrono::seconds(10);  // at most, for the last samples to reach all clients
 constexpr auto kInputTimeout = std::chrono::seconds(30);  // in lockstep, for the input of a client
 
 std::optional<Role> roleNamed(std::string_view name) {
@@ -152,8 +153,7 @@ class Server final : public SessionServer {
     entry.input = input;
     entry.hash = hash;
     entry.checkpoint.clear();
-    if (input.tick % kCheckpointEvery == 1 && acquireCheckpointBuffer(entry))
-      simulation_.save(entry.checkpoint);
+    if (hasCheckpoint(input.tick) && acquireCheckpointBuffer(entry)) simulation_.save(entry.checkpoint);
   }
 
   void fillCheckpointPool() {
@@ -193,8 +193,8 @@ class Server final : public SessionServer {
   // real time
   threads::SpscQueue<TickOutput> outputs_{64};
   threads::SpscQueue<JournalEntry> entries_{1024};
-  threads::SpscQueue<std::vector<std::uint8_t>> checkpoint_pool_{
-      2};  ///< checkpoint buffers, from the journal thread to the tick
+  /// empty checkpoint buffers, from the journal thread to the tick
+  threads::SpscQueue<std::vector<std::uint8_t>> checkpoint_pool_{2};
   TickInput input_;
   TickOutput overflow_output_;  ///< of a tick for which outputs_ is full: not sent
 };
@@ -260,12 +260,14 @@ void Server::runRealTime(const std::atomic<bool>& stop) {
   while (outputs_.front() != nullptr) outputs_.pop();
   overflow_output_ = simulation_.makeOutput();
   std::atomic<bool> over = false;
-  threads::CyclicThread ticker(std::make_shared<threads::SteadyClock>(),
-                               {.name = "tick", .fifo_priority = 70}, [&](std::uint64_t) {
-                                 if (over) return;  // no tick after the one that ended the run
-                                 realTimeTick();
-                                 if (simulation_.over()) over = true;
-                               });
+  threads::CyclicThread ticker(
+      std::make_shared<threads::SteadyClock>(),
+      {.name = "tick", .fifo_priority = 70, .prepare = [this] { return simulation_.shareScheduling(); }},
+      [&](std::uint64_t) {
+        if (over) return;  // no tick after the one that ended the run
+        realTimeTick();
+        if (simulation_.over()) over = true;
+      });
   std::thread journal_thread([&] {
     while (true) {
       const bool last_pass = over;  // no further entries will come
@@ -295,6 +297,7 @@ void Server::runRealTime(const std::atomic<bool>& stop) {
   over = true;
   journal_thread.join();
   for (TickOutput* output = outputs_.front(); output != nullptr; output = outputs_.front()) {
+    wire_->update(*output);
     wire_->send(publisher_.prepare(*output));
     outputs_.pop();
   }
@@ -325,7 +328,10 @@ Result<SessionReport> Server::finish() {
   if (journal_)
     if (auto closed = journal_->close(report.run); !closed) return fail(closed.error().what);
 
-  // let reliable samples arrive before the writers are deleted
+  wire_->statePublished();
+  // let reliable samples arrive before the writers are deleted: a client that has not received the end of the
+  // run takes the end of the server for a failure
+  wire_->waitForReaders(kFarewell);
   const auto until = std::chrono::steady_clock::now() + milliseconds(500);
   while (std::chrono::steady_clock::now() < until) wire_->dispatch(milliseconds(50));
   return report;
@@ -338,6 +344,11 @@ std::vector<HandId> traineeHands(const game_control::ScenarioFile& scenario) {
   for (std::uint32_t i = 0; i < scenario.hands.size(); ++i)
     if (scenario.hands[i].role == Role::kTrainee) hands.push_back(HandId{i});
   return hands;
+}
+
+Result<void> checkWaitFor(const game_control::ScenarioFile& scenario, const std::vector<std::string>& names) {
+  const auto condition = makeStartCondition(scenario, names);
+  return condition ? Result<void>() : fail(condition.error().what);
 }
 
 Result<std::unique_ptr<SessionServer>> SessionServer::open(const LoadedScene& loaded,

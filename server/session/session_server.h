@@ -38,16 +38,16 @@ struct SessionReport {
   RunState run;
   std::uint64_t late_ticks = 0;  ///< started a period or more after they were due
   std::uint64_t refused_inputs = 0;
-  std::uint64_t dropped_outputs =
-      0;  ///< ticks whose output was not sent: the queue to the wire thread was full
+  /// ticks whose output was not sent: the queue to the wire thread was full
+  std::uint64_t dropped_outputs = 0;
 };
 
 /// The server of one training session: announces it over DDS, accepts clients, runs ticks in real time or in
 /// lockstep, and publishes the results.
 ///
 /// Threads: open, run and the destructor from one thread. run() uses it as the wire thread; in real time it
-/// starts a tick thread (SCHED_FIFO where granted) and a journal thread, which share SpscQueues with it.
-/// `stop` may be set from any thread. Real-time: no (its tick thread is).
+/// starts a tick thread (SCHED_FIFO where granted; its workers likewise) and a journal thread, which share
+/// SpscQueues with it. `stop` may be set from any thread. Real-time: no (its tick thread is).
 class SessionServer {
  public:
   /// Opens all DDS endpoints and the journal. Fails when one cannot be opened, or when `wait_for` names what
@@ -61,6 +61,10 @@ class SessionServer {
   /// it.
   [[nodiscard]] virtual Result<SessionReport> run(const std::atomic<bool>& stop) = 0;
 };
+
+/// Fails when one of `names` (SessionOptions::wait_for) is neither a hand of the scenario nor a role.
+[[nodiscard]] Result<void> checkWaitFor(const game_control::ScenarioFile& scenario,
+                                        const std::vector<std::string>& names);
 
 /// All hands of the role trainee, coupled and tracked.
 [[nodiscard]] std::vector<HandId> traineeHands(const game_control::ScenarioFile& scenario);

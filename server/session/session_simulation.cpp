@@ -1,6 +1,7 @@
 #include "server/session/session_simulation.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "idl/types/bytes.h"
@@ -36,9 +37,9 @@ void SessionSimulation::tick(const TickInput& input) noexcept {
     if (machine_.status().failed) phase_ = RunPhase::kFailed;
   }
   // commands received during a pause or emergency stop are deferred to its end
-  if (!isHeld()) commands_.clear();
+  if (!isSuspended()) commands_.clear();
   startWhenHandsPresent();
-  environment_.setFreeBodiesPaused(isHeld());
+  environment_.setFreeBodiesPaused(isSuspended());
   environment_.step();
 }
 
@@ -75,7 +76,16 @@ void SessionSimulation::apply(const Change& change) noexcept {
       return;
     case ChangeKind::kBudget:
       return environment_.setBudget(budgetPoints(change.value));
+    case ChangeKind::kTake:
+      return take(change.hand, change.object);
   }
+}
+
+/// A hidden object appears at the pose of the hand that grabs it, or at the first one of a hand without.
+void SessionSimulation::take(HandId hand, ObjectId object) noexcept {
+  if (hand.value >= ages_.size() || object.value >= environment_.objects().size()) return;
+  environment_.place(object, environment_.objects()[object.value].X_WO, ObjectStatus::kHidden);
+  environment_.grab(hand, object);
 }
 
 void SessionSimulation::attach(HandId hand) noexcept {
@@ -108,7 +118,7 @@ void SessionSimulation::applyAgeLimits() noexcept {
     const HandAge& age = ages_[i];
     if (!age.attached) continue;
     if (age.age == limits_.park) environment_.setHandPresent(HandId{i}, false);
-    environment_.setHandFrozen(HandId{i}, isHeld() || !age.active || age.age > limits_.freeze);
+    environment_.setHandFrozen(HandId{i}, isSuspended() || !age.active || age.age > limits_.freeze);
   }
 }
 
@@ -235,7 +245,7 @@ std::size_t SessionSimulation::maxSavedBytes() const {
   constexpr std::size_t kMaxCommandBytes = 2 * kMaxChanges * sizeof(game_control::GameCommand);
   std::vector<std::uint8_t> bytes;
   save(bytes);
-  return environment_.mostSavedBytes() + bytes.size() + kMaxCommandBytes;
+  return environment_.maxSavedBytes() + bytes.size() + kMaxCommandBytes;
 }
 
 Result<void> SessionSimulation::restore(std::span<const std::uint8_t> bytes) {
@@ -256,6 +266,9 @@ Result<void> SessionSimulation::restore(std::span<const std::uint8_t> bytes) {
   commands_.resize(commands);
   for (game_control::GameCommand& command : commands_)
     in.get(command.kind), in.get(command.hand), in.get(command.signal), in.get(command.value);
+  const auto finite = [](const game_control::GameCommand& command) { return std::isfinite(command.value); };
+  if (phase_ > RunPhase::kStopped || !std::all_of(commands_.begin(), commands_.end(), finite))
+    return fail("a checkpoint in the journal is damaged");
   const auto section = [&](auto&& restoreFrom) -> Result<void> {
     std::uint32_t size = 0;
     in.get(size);
@@ -266,7 +279,9 @@ Result<void> SessionSimulation::restore(std::span<const std::uint8_t> bytes) {
     return {};
   };
   if (auto done = section([&](auto span) { return environment_.restore(span); }); !done) return done;
-  return section([&](auto span) { return machine_.restore(span); });
+  if (auto done = section([&](auto span) { return machine_.restore(span); }); !done) return done;
+  if (!in.atEnd()) return fail("a checkpoint in the journal is followed by other bytes");
+  return {};
 }
 
 }  // namespace tenon::session

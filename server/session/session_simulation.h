@@ -51,20 +51,25 @@ class SessionSimulation {
   [[nodiscard]] const game_control::StepStatus& step() const { return machine_.status(); }
   [[nodiscard]] const game_control::ScenarioFile& scenario() const { return *scenario_; }
 
+  /// Environment::shareScheduling.
+  [[nodiscard]] std::string shareScheduling() { return environment_.shareScheduling(); }
+
   /// Appends a checkpoint, the whole changing state, to `bytes`.
   void save(std::vector<std::uint8_t>& bytes) const;
   /// Takes a checkpoint of the same scenario back; ticks from then on are bit-equal to those after save().
-  /// When it fails (truncated, of another scenario) the state is undefined until a later restore succeeds.
+  /// When it fails (truncated, of another scenario, a number not finite) the state is undefined until a later
+  /// restore succeeds.
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
   /// Upper bound of the size of any checkpoint of this session [bytes].
   [[nodiscard]] std::size_t maxSavedBytes() const;
 
  private:
+  /// The input of a hand.
   struct HandAge {
-    bool attached = false;
-    bool active = false;
-    Tick age = 0;  ///< [ticks] since the last device sample
-    std::uint32_t seq = 0;
+    bool attached = false;  ///< a client controls the hand
+    bool active = false;    ///< HandReading::active of the newest sample
+    Tick age = 0;           ///< [ticks] since the newest sample
+    std::uint32_t seq = 0;  ///< HandReading::seq of the newest sample
   };
 
   void apply(const Change& change) noexcept;
@@ -73,7 +78,8 @@ class SessionSimulation {
   void applyAgeLimits() noexcept;
   void startWhenHandsPresent() noexcept;
   /// No hand moves an object: emergency stop or pause.
-  [[nodiscard]] bool isHeld() const { return emergency_stop_ || phase_ == RunPhase::kPaused; }
+  [[nodiscard]] bool isSuspended() const { return emergency_stop_ || phase_ == RunPhase::kPaused; }
+  void take(HandId hand, ObjectId object) noexcept;
   void attach(HandId hand) noexcept;
   void detach(HandId hand) noexcept;
 

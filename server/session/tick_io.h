@@ -38,6 +38,7 @@ enum class ChangeKind : std::uint8_t {
   kPlaceObject,       ///< `object` is set to the externally tracked pose `X_WO`
   kStop,              ///< the run ends
   kBudget,            ///< from now on a tick may test `value` [points]; 0 or NaN: no limit
+  kTake,  ///< `hand` holds `object` with the hand's frame at the object's, which is moved to the hand's pose
 };
 
 /// An input of a tick other than device samples: decided outside the tick, applied at its start.
@@ -61,10 +62,12 @@ inline constexpr std::size_t kMaxChanges = 16;
 
 /// All inputs of one tick. Together with the state before the tick it determines the state after it, bit for
 /// bit.
+///
+/// Threads: a value. Real-time: filling it; appendBytes while the capacity suffices.
 struct TickInput {
   Tick tick = 0;
-  FixedVector<HandReading, kMaxHands>
-      readings;                              ///< at most one per hand; none for a hand without a new sample
+  /// at most one per hand; none for a hand without a new sample
+  FixedVector<HandReading, kMaxHands> readings;
   FixedVector<Change, kMaxChanges> changes;  ///< in the order of their application
 };
 

@@ -58,9 +58,9 @@ void CollPair::reset() noexcept {
 }
 
 void CollPair::query(const Pose& X_WA, const Pose& X_WB, double margin, collision::FeatureScratch& scratch,
-                     std::uint32_t budget, std::span<const std::uint32_t> first) noexcept {
-  const collision::PairQuery query{shell_A_, field_B_, X_WA,   X_WB, spec_->dilation,
-                                   margin,   levels_,  budget, first};
+                     std::uint32_t budget, std::span<const std::uint32_t> priority_points) noexcept {
+  const collision::PairQuery query{shell_A_, field_B_, X_WA,   X_WB,           spec_->dilation,
+                                   margin,   levels_,  budget, priority_points};
   collision::queryPair(query, list_->query);
   collision::queryFeatures(query, features_, scratch, list_->query);
   std::fill_n(list_->multipliers.begin(), list_->query.contacts.size(), 0.0);
@@ -162,14 +162,9 @@ bool CollPair::isIndexValid(const collision::Contact& contact) const noexcept {
 
 bool CollPair::isValid(const collision::IslandPairResult& list) const noexcept {
   const collision::ContactList& contacts = list.query.contacts;
-  return possible_ && list.secondary_planes <= contacts.size() && list.traversal.X_WA.isFinite() &&
-         list.traversal.X_WB.isFinite() &&
-         std::all_of(list.multipliers.begin(),
-                     list.multipliers.begin() + static_cast<std::ptrdiff_t>(contacts.size()),
-                     [](double force) { return std::isfinite(force); }) &&
-         std::all_of(contacts.begin(), contacts.end(), [this](const collision::Contact& c) {
-           return isIndexValid(c) && c.p_WP.allFinite() && c.n_W.allFinite() && std::isfinite(c.gap);
-         });
+  return possible_ && list.secondary_planes <= contacts.size() &&
+         std::all_of(contacts.begin(), contacts.end(),
+                     [this](const collision::Contact& c) { return isIndexValid(c); });
 }
 
 Tick CollPair::ticksToClose(double distance, double closing_speed) noexcept {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -85,9 +84,9 @@ class CollPair {
 
   // the following functions need a contact list
   /// Queries a pair that is in no island: lists contacts with gaps up to `margin` [m], testing at most
-  /// `budget` points. The points `first` are tested even when their level is skipped.
+  /// `budget` points. The `priority_points` are tested even when their level is skipped.
   void query(const Pose& X_WA, const Pose& X_WB, double margin, collision::FeatureScratch& scratch,
-             std::uint32_t budget = 0xFFFFFFFFU, std::span<const std::uint32_t> first = {}) noexcept;
+             std::uint32_t budget = 0xFFFFFFFFU, std::span<const std::uint32_t> priority_points = {}) noexcept;
   /// Sets the contact wrench to the penalty force at `stiffness` [N/m] of the contacts of query().
   void computePenaltyForce(double stiffness, const Pose& X_WA) noexcept;
   /// Copies the result of the island solver of tick `now`.
@@ -130,10 +129,6 @@ class CollPair {
     archive(self.traversal_points_);
     archive(self.queries_with_headroom_);
     archive(self.restore_delay_);
-    if constexpr (Archive::kReads) {
-      if (!std::isfinite(self.path_length_ + self.gap_ + self.depth_ + self.skipped_spacing_))
-        return archive.reject();
-    }
     bool has_contacts = self.hasContacts();
     archive(has_contacts);
     if (!has_contacts) return;
@@ -163,7 +158,7 @@ class CollPair {
   [[nodiscard]] double pointsOf(std::uint32_t levels) const noexcept;
   [[nodiscard]] bool nextLevelFits(const WorkLimits& limits, std::uint32_t budget) const noexcept;
   void store(const collision::PairQueryResult& query) noexcept;
-  /// Validates a list read from a checkpoint: indices in range, numbers finite.
+  /// Validates a list read from a checkpoint: indices in range.
   [[nodiscard]] bool isIndexValid(const collision::Contact& contact) const noexcept;
   [[nodiscard]] bool isValid(const collision::IslandPairResult& list) const noexcept;
   /// Whole ticks in which `distance` [m] cannot be closed at `closing_speed` [m/s].

@@ -6,8 +6,9 @@
 namespace tenon::simulation {
 namespace {
 
-/// Sub-steps of a held body per tick: enough to reach a surface, slide along it and reach a second one.
-constexpr std::uint32_t kTravelSubsteps = 4;
+/// SQP steps per tick of an island without free bodies, at most: enough to reach a surface, slide along it
+/// and reach a second one.
+constexpr std::uint32_t kMaxHeldSteps = 4;
 
 std::size_t listCount(const Scene& scene, const EnvironmentOptions& options) {
   return std::min(scene.pairs.size(), options.contact_lists);
@@ -16,9 +17,10 @@ std::size_t listCount(const Scene& scene, const EnvironmentOptions& options) {
 /// [m] Lower bound of the radius that scales rotations: objects without structures have a radius of 0.
 constexpr double kMinRadius = 0.01;
 
+/// The limits with SQP steps so short that all of a tick together keep to `max_speed` [m/s].
 collision::SolveLimits cappedLimits(collision::SolveLimits limits, double max_speed) {
   const double travel = max_speed * kTickSeconds;
-  limits.max_steps = std::clamp(limits.max_steps, 1U, kTravelSubsteps);
+  limits.max_steps = std::clamp(limits.max_steps, 1U, kMaxHeldSteps);
   limits.max_step_length = std::min(limits.max_step_length, travel / limits.max_steps);
   return limits;
 }
@@ -33,24 +35,8 @@ std::size_t maxMovable(const Scene& scene) {
 }
 
 ObjectSize sizeOf(const ObjectSpec& spec) {
-  ObjectSize size;
-  size.radius = kMinRadius;
-  if (!spec.structures) return size;
-  const structures::Pointshell& shell = spec.structures->shell;
-  if (!shell.empty()) {
-    size.p_OC_O = shell.boundingCentre();
-    size.ball_radius = shell.boundingRadius();
-    size.radius = std::max({size.radius, shell.radius(), spec.structures->features.points().radius()});
-    for (const structures::ShellPoint& point : spec.structures->features.points().points()) {
-      size.ball_radius = std::max(size.ball_radius, (point.p_MP.cast<double>() - size.p_OC_O).norm());
-    }
-  } else if (!spec.structures->field.empty()) {
-    const Eigen::AlignedBox3d box = spec.structures->field.box();
-    size.p_OC_O = box.center();
-    size.ball_radius = 0.5 * box.diagonal().norm();
-    size.radius = std::max(size.radius, size.p_OC_O.norm() + size.ball_radius);
-  }
-  return size;
+  const BoundingSphere sphere = boundingSphereOf(spec.structures.get());
+  return {sphere.p_OQ_O, sphere.radius, std::max(kMinRadius, sphere.radius)};
 }
 
 }  // namespace

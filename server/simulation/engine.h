@@ -21,14 +21,15 @@ namespace tenon::simulation {
 
 /// Bounds of an object's surface.
 struct ObjectSize {
-  Vector3 p_OC_O = Vector3::Zero();  ///< [m] centre of the bounding sphere
+  Vector3 p_OQ_O = Vector3::Zero();  ///< [m] centre of the bounding sphere
   double ball_radius = 0.0;          ///< [m] of the bounding sphere
-  double radius = 0.0;               ///< [m] largest distance of the surface from the origin O
+  double radius = 0.0;               ///< [m] that, but not 0, as it scales rotations
 };
 
-/// [m/s] upper bound of the speed of any point of a body whose points are within `radius` [m] of its origin.
-[[nodiscard]] inline double maxPointSpeed(const Twist& V_WB, double radius) {
-  return V_WB.linear.norm() + V_WB.angular.norm() * radius;
+/// [m/s] upper bound of the speed of any point of a body whose points are within `radius` [m] of its centre
+/// Q.
+[[nodiscard]] inline double maxPointSpeed(const Twist& V_WQ, double radius) {
+  return V_WQ.linear.norm() + V_WQ.angular.norm() * radius;
 }
 
 /// The parts of an Environment that its header does not show, sized at the start: state of pairs and force
@@ -51,6 +52,7 @@ struct Environment::Engine {
   [[nodiscard]] double pathLengthOf(const PairSpec& pair) const {
     return path_lengths[pair.a.value] + path_lengths[pair.b.value];
   }
+  /// `motion`: of the object's centre.
   void addPathLength(ObjectId object, const Displacement& motion) {
     path_lengths[object.value] += maxPointMotion(motion, sizes[object.value].radius);
   }
@@ -105,7 +107,7 @@ struct Environment::Engine {
   std::vector<std::size_t> incident_begin;  ///< by object: first entry in incident_pairs; one more at the end
   std::vector<std::optional<FreeBody>> bodies;  ///< by object; none without a mass
   std::size_t hand_count = 0;
-  collision::SolveLimits limits;  ///< of an island; sub-steps limited so that a tick keeps the speed cap
+  collision::SolveLimits limits;  ///< of an island; its SQP steps in a tick keep to the speed cap
   double max_margin = 0.0;        ///< [m] largest contact margin of any query in a tick
 
   // work space

@@ -10,8 +10,8 @@ namespace {
 /// [m] Bounding spheres contain the shell points; the surface between them may bulge out by this, per pair.
 constexpr double kSphereSlack = 5e-3;
 
-/// A traversal may use the pair's budget over this: in one tick the solver may traverse again when a body
-/// moves far, resamples the listed points after each sub-step, and may reject a step.
+/// [-] A traversal may test the pair's budget divided by this: in one tick the solver may traverse again when
+/// a body moves far, resamples the listed points after each SQP step, and may reject a step.
 constexpr std::uint32_t kTraversalsPerTick = 3;
 
 }  // namespace
@@ -42,6 +42,8 @@ Environment::Environment(std::shared_ptr<const Scene> scene, const EnvironmentOp
 
 Environment::~Environment() = default;
 
+std::string Environment::shareScheduling() { return engine_->pool.shareScheduling(); }
+
 void Environment::setPairEnabled(std::size_t pair, bool enabled) noexcept {
   if (pair >= pairs_.size()) return;
   engine_->active_pairs -= engine_->countsAsActive(pair) ? 1U : 0U;
@@ -71,7 +73,8 @@ std::uint32_t Environment::groupOf(ObjectId object) const noexcept {
 void Environment::contribute(ObjectId object, std::uint32_t source, const Wrench& F_Oo_W,
                              std::uint32_t lifetime_ticks) noexcept {
   if (!isObject(object)) return;
-  if (engine_->forces[object.value].contribute(source, F_Oo_W, lifetime_ticks, tick_)) wake(object);
+  const Wrench F_Oq_W = shifted(F_Oo_W, toCentre(object));
+  if (engine_->forces[object.value].contribute(source, F_Oq_W, lifetime_ticks, tick_)) wake(object);
 }
 
 void Environment::step() noexcept {
@@ -99,9 +102,9 @@ void Environment::followTrackers() noexcept {
     if (!isObject(hand.object)) continue;
     ObjectMotion& object = objects_[hand.object.value];
     const Pose X_WO = hand.X_WH * hand.X_HO;
-    const Displacement motion = displacement(object.X_WO, X_WO);
+    const Displacement motion = displacement(object.X_WO, X_WO, centreOf(hand.object));
     object.X_WO = X_WO;
-    object.V_WO = {motion.translation / kTickSeconds, motion.rotation / kTickSeconds};
+    object.V_WO = twistOver(motion, hand.object);
     engine_->addPathLength(hand.object, motion);
     // trackers are not speed-limited: due ticks were computed with max_speed and are invalid now
     if (speedOf(hand.object) > options_.max_speed) markDirty(hand.object);
@@ -121,8 +124,24 @@ double Environment::speedCap(ObjectId object) const noexcept {
 }
 
 double Environment::speedOf(ObjectId object) const noexcept {
-  const Twist& V_WO = objects_[object.value].V_WO;
-  return maxPointSpeed(V_WO, engine_->sizes[object.value].radius);
+  const ObjectMotion& motion = objects_[object.value];
+  return maxPointSpeed(atCentre(motion.V_WO, motion.X_WO, centreOf(object)),
+                       engine_->sizes[object.value].radius);
+}
+
+const Vector3& Environment::centreOf(ObjectId object) const noexcept {
+  return engine_->sizes[object.value].p_OQ_O;
+}
+
+/// [m] p_OQ_W, from the object's origin to its centre.
+Vector3 Environment::toCentre(ObjectId object) const noexcept {
+  return objects_[object.value].X_WO.rotation() * centreOf(object);
+}
+
+/// V_WO at the end of a tick in which the object's centre moved by `motion`.
+Twist Environment::twistOver(const Displacement& motion, ObjectId object) const noexcept {
+  return atOrigin({motion.translation / kTickSeconds, motion.rotation / kTickSeconds},
+                  objects_[object.value].X_WO, centreOf(object));
 }
 
 collision::Spring Environment::springOf(HandId hand) const noexcept {
@@ -139,6 +158,7 @@ collision::MovableBody Environment::movableBody(ObjectId object) noexcept {
 collision::MovableBody Environment::heldBody(ObjectId object) const noexcept {
   collision::MovableBody body;
   body.X_WB = objects_[object.value].X_WO;
+  body.p_BQ = centreOf(object);
   body.radius = engine_->sizes[object.value].radius;
   for (std::size_t i = 0; i < hands_.size(); ++i) {
     const HandId hand{static_cast<std::uint32_t>(i)};
@@ -148,8 +168,8 @@ collision::MovableBody Environment::heldBody(ObjectId object) const noexcept {
   collision::Spring& first = body.springs[0];
   if (first.stiffness <= 0.0) return body;
   // a constant wrench on the body is equivalent to shifting the goal of a spring by wrench over stiffness
-  const Wrench F_Bo_W = engine_->forces[object.value].contributed(tick_);
-  const Wrench F_Bc_W = shifted(F_Bo_W, body.X_WB.rotation() * first.p_BC);
+  const Wrench F_Bq_W = engine_->forces[object.value].contributed(tick_);
+  const Wrench F_Bc_W = shifted(F_Bq_W, body.X_WB.rotation() * (first.p_BC - body.p_BQ));
   const Vector3 p_WC = first.X_WG * first.p_BC + F_Bc_W.force / first.stiffness;
   if (first.rotational_stiffness > 0.0) {
     const Vector3 rotation = F_Bc_W.torque / first.rotational_stiffness;
@@ -186,7 +206,7 @@ void Environment::findNearPairs() noexcept {
     } else {
       const double extra_speed = isDynamic(object) ? options_.max_free_speed - options_.max_speed : 0.0;
       engine.broad_phase.setSphere(
-          object, objects_[i].X_WO * size.p_OC_O,
+          object, objects_[i].X_WO * size.p_OQ_O,
           size.ball_radius + 0.5 * kSphereSlack + std::max(extra_speed, 0.0) * kTickSeconds);
     }
   }
@@ -292,13 +312,13 @@ void Environment::addIsland(std::int32_t island) noexcept {
     if (work_limits_.any()) {
       one.levels = pair.levels();
       one.budget = engine.budget.pointsFor(slot) / kTraversalsPerTick;
-      one.first = {engine.touching[slot].begin(), engine.touching[slot].end()};
+      one.priority_points = {engine.touching[slot].begin(), engine.touching[slot].end()};
       engine.islands.addPointBudget(engine.budget.pointsFor(slot));
     }
     engine.islands.addPair(i, one);
     engine.queried[i] = 1;
   }
-  limitTravel(static_cast<std::size_t>(island));
+  setStepLimits(static_cast<std::size_t>(island));
 }
 
 void Environment::applyIslandResults() noexcept {
@@ -306,12 +326,11 @@ void Environment::applyIslandResults() noexcept {
   for (std::size_t island = 0; island < islands.islands().size(); ++island) updateVelocities(island);
   for (std::size_t body = 0; body < islands.bodies(); ++body) {
     ObjectMotion& object = objects_[islands.objectOf(body).value];
-    const Displacement motion = displacement(object.X_WO, islands.poseOf(body));
-    engine_->addPathLength(islands.objectOf(body), motion);
+    const ObjectId id = islands.objectOf(body);
+    const Displacement motion = displacement(object.X_WO, islands.poseOf(body), centreOf(id));
+    engine_->addPathLength(id, motion);
     object.X_WO = islands.poseOf(body);
-    if (!isDynamic(islands.objectOf(body))) {
-      object.V_WO = {motion.translation / kTickSeconds, motion.rotation / kTickSeconds};
-    }
+    if (!isDynamic(id)) object.V_WO = twistOver(motion, id);
   }
   for (std::size_t slot = 0; slot < islands.pairs(); ++slot) {
     engine_->pairs[islands.pairOf(slot)].storeSolved(islands.resultOf(slot), tick_);
@@ -337,10 +356,10 @@ void Environment::queryNonIslandPairs() noexcept {
     const std::uint32_t slot = engine_->non_island[item];
     CollPair& pair = engine_->pairs[engine_->due[slot]];
     const std::uint32_t budget = engine_->budget.pointsFor(slot);
-    std::span<const std::uint32_t> first;
-    if (limited) first = {engine_->touching[slot].begin(), engine_->touching[slot].end()};
+    std::span<const std::uint32_t> priority_points;
+    if (limited) priority_points = {engine_->touching[slot].begin(), engine_->touching[slot].end()};
     pair.query(objects_[pair.spec().a.value].X_WO, objects_[pair.spec().b.value].X_WO,
-               engine_->limits.contact_margin, engine_->feature_scratch[worker], budget, first);
+               engine_->limits.contact_margin, engine_->feature_scratch[worker], budget, priority_points);
     pair.adaptLevels(work_limits_, budget);
     // sensing pairs exert no force; neither do overlapping objects of which none is tracked
     const bool exerts_force = objects_[pair.spec().a.value].status == ObjectStatus::kTracked ||

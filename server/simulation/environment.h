@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "idl/types/hash.h"
@@ -37,9 +38,10 @@ struct HandMotion {
   Pose X_HO;                ///< of the object in the hand, constant while held
   Wrench F_Ho_W;            ///< of the coupling on the hand, about the hand's origin
   ObjectId default_object;  ///< moved while the hand holds no other: pointer, drill, cube, forearm
-  Pose X_OR;                ///< pose of the default object in the held one, from when that was grabbed
-  bool has_pose = false;    ///< a pose has been received since the hand is present
-  bool attached = false;    ///< `object` follows the hand; false: from the hand's first pose on
+  /// R: where the default object returns to, fixed to the held object O since that was grabbed.
+  Pose X_OR;
+  bool has_pose = false;             ///< a pose has been received since the hand is present
+  bool attached = false;             ///< `object` follows the hand; false: from the hand's first pose on
   std::uint32_t rejected_poses = 0;  ///< invalid poses (not finite, not unit, out of range), ignored
 };
 
@@ -61,13 +63,13 @@ struct EnvironmentOptions {
   /// work.
   bool coherence = true;
   WorkLimits work;  ///< at the start; setBudget changes it
-  /// Most pairs that may be queried in a tick or have contacts; about 120 kB each.
+  /// Most pairs that may be queried in a tick or have contacts; about 80 kB each, and 100 kB per worker.
   std::size_t contact_lists = 256;
 };
 
-/// The simulation state and its step (paper §3.2). One tick: set tracked objects, find near (broad phase) and
-/// due (coherence) pairs, solve the contact islands for the poses of held objects and free bodies, query the
-/// due pairs in no island, sum forces.
+/// The simulation state and its step (paper §3.2). One tick: move tracked objects to their trackers, find
+/// near (broad phase) and due (coherence) pairs, solve the contact islands for the poses of held objects and
+/// free bodies, query the due pairs in no island, sum forces.
 ///
 /// A free body enters its island's problem as a spring: inertia over the tick squared, towards the pose it
 /// would have without contacts. Hands, held objects and free bodies are thus one problem, and contact forces
@@ -84,11 +86,15 @@ struct EnvironmentOptions {
 /// states for any number of workers.
 ///
 /// Threads: one caller; its own workers inside step(). Real-time: everything but constructor, save, restore,
-/// mostSavedBytes; append when the capacity suffices.
+/// maxSavedBytes; append when the capacity suffices.
 class Environment {
  public:
   Environment(std::shared_ptr<const Scene> scene, const EnvironmentOptions& options);
   ~Environment();
+
+  /// Gives the workers the scheduling class, priority and permitted CPUs of the calling thread, which is to
+  /// call step(). Returns what the operating system did not grant, or an empty string. Not real-time.
+  [[nodiscard]] std::string shareScheduling();
 
   // inputs, between ticks; unknown ids are ignored
   /// A hand that is no longer present leaves its object kParked, and resumes holding it when it is back.
@@ -120,7 +126,8 @@ class Environment {
   /// Point budget from the next tick on; 0: unlimited.
   void setBudget(std::uint64_t points) noexcept { work_limits_.points = points; }
   /// A wrench of a source other than contacts and couplings, about the object's origin; see
-  /// ForceBuffer::contribute for validation, clamping and expiry.
+  /// ForceBuffer::contribute for validation, clamping (about the object's centre) and expiry. A rejected one
+  /// is ignored.
   void contribute(ObjectId object, std::uint32_t source, const Wrench& F_Oo_W,
                   std::uint32_t lifetime_ticks) noexcept;
 
@@ -137,24 +144,32 @@ class Environment {
   [[nodiscard]] std::span<const std::uint32_t> nearPairs() const noexcept;
   /// Most pairs that can have contacts.
   [[nodiscard]] std::size_t contactListCapacity() const noexcept;
-  /// The wrench about the object's origin that displays, conditions and reports call its force: of a held
+  /// [m] p_OQ_O: the object's centre, that of its bounding sphere; the origin without structures. What is
+  /// judged or limited of an object's place and motion is that of Q, wherever its mesh has the origin.
+  [[nodiscard]] const Vector3& centreOf(ObjectId object) const noexcept;
+  /// The wrench about the object's centre that displays, conditions and reports call its force: of a held
   /// object the sum of its couplings, else the total of its ForceBuffer.
   [[nodiscard]] Wrench forceOn(ObjectId object) const noexcept;
   [[nodiscard]] bool inContact(ObjectId a, ObjectId b) const noexcept;
   /// The manifold of a hand's object for the local model of its client; server_epoch, answers_seq and
-  /// step_revision are left to the caller.
+  /// step_revision are left to the caller. It has at most kManifoldContacts contacts; validity_radius is at
+  /// most the gap of any contact that none of them represents. It has at most kOtherPulls couplings of other
+  /// hands. An unknown hand leaves `out` as it is.
   void manifold(HandId hand, HandManifold& out) const noexcept;
-  /// Contact summary of a pair for publication.
+  /// Contact summary of a pair for publication; `pair` must be an index of Scene::pairs.
   void pairContact(std::size_t pair, PairContact& out) const noexcept;
   /// Work of the last tick, counted.
   struct Work {
-    std::uint32_t active_pairs = 0, queried_pairs = 0, substeps = 0, iterations = 0;
+    std::uint32_t active_pairs = 0;   ///< may collide, near or not
+    std::uint32_t queried_pairs = 0;  ///< near and due, with a contact list
+    std::uint32_t steps = 0;          ///< SQP steps of all islands
+    std::uint32_t iterations = 0;     ///< of the active-set method, in all islands
     std::uint64_t points_visited = 0;
     std::uint32_t near_pairs = 0;      ///< found by the broad phase
     std::uint32_t deferred_pairs = 0;  ///< due, but without a contact list: their movable objects stood still
     std::uint32_t limited_pairs = 0;   ///< queried with skipped levels
     double load_percent = 0.0;         ///< [%] largest load of a pair
-    bool conflicting = false;          ///< constraints of an island could not all be satisfied
+    bool infeasible = false;           ///< of any island: collision::SolveReport::infeasible
   };
   [[nodiscard]] const Work& work() const { return work_; }
 
@@ -163,10 +178,12 @@ class Environment {
   [[nodiscard]] std::vector<std::uint8_t> save() const;
   /// Appends what save() returns; allocates only when the capacity of `bytes` is too small.
   void append(std::vector<std::uint8_t>& bytes) const;
+  /// [bytes] Positions in save() of all its floating-point numbers: none of them may be infinite or NaN.
+  [[nodiscard]] std::vector<std::size_t> savedDoubles() const;
   /// Fails and changes nothing when `bytes` are no valid checkpoint of this scene and build.
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
   /// [bytes] upper bound of what append() adds, for any state of this scene.
-  [[nodiscard]] std::size_t mostSavedBytes() const;
+  [[nodiscard]] std::size_t maxSavedBytes() const;
 
  private:
   struct Engine;
@@ -187,8 +204,9 @@ class Environment {
   void wakeTouchedBodies() noexcept;
   [[nodiscard]] bool mayTouch(std::size_t pair) const noexcept;
   void integrateFreeMotion() noexcept;
+  [[nodiscard]] Twist twistOfCentre(ObjectId object) const noexcept;
   [[nodiscard]] collision::MovableBody freeBody(ObjectId object) noexcept;
-  void limitTravel(std::size_t island) noexcept;
+  void setStepLimits(std::size_t island) noexcept;
   void updateVelocities(std::size_t island) noexcept;
   void updateSleep(std::size_t island) noexcept;
   // friction of free bodies (environment_friction.cpp)
@@ -215,7 +233,7 @@ class Environment {
   void applyIslandResults() noexcept;
   void queryNonIslandPairs() noexcept;
   void sumForces() noexcept;
-  void writeWeights() noexcept;
+  void writeGravity() noexcept;
   void updateContactFlags() noexcept;
   void countWork() noexcept;
   void updatePairMotion(std::uint32_t pair) noexcept;
@@ -227,12 +245,17 @@ class Environment {
   [[nodiscard]] collision::Spring springOf(HandId hand) const noexcept;
   [[nodiscard]] double speedCap(ObjectId object) const noexcept;
   [[nodiscard]] double speedOf(ObjectId object) const noexcept;
+  [[nodiscard]] Vector3 toCentre(ObjectId object) const noexcept;
+  [[nodiscard]] Twist twistOver(const Displacement& motion, ObjectId object) const noexcept;
 
+  /// Of a state whose numbers are finite.
   [[nodiscard]] bool isValid() const noexcept;
 
   /// Writes, reads or hashes the whole state.
   template <typename Archive, typename Self>
   static void archive(Archive& archive, Self& self);
+  template <typename Archive>
+  void archiveWithHeader(Archive& to) const;
 
   std::shared_ptr<const Scene> scene_;
   EnvironmentOptions options_;

@@ -15,14 +15,14 @@ constexpr std::uint32_t kSleepTicks = 30;
 /// [m] Convergence tolerance of a free body: smaller than for held ones, so that the smallest force moves it.
 constexpr double kFreeBodyTolerance = 1e-9;
 
-/// Sub-steps of an island with free bodies, at least: an unconverged step would lose momentum.
-constexpr std::uint32_t kImpactSubsteps = 10;
+/// SQP steps that an island with free bodies may make, at least: an unconverged tick would lose momentum.
+constexpr std::uint32_t kMinImpactSteps = 10;
 
-/// [-] Total sub-step travel of a fast body over its displacement: reserve for a deflection at a contact.
+/// [-] Length of all SQP steps of a fast body over its displacement: reserve for a deflection at a contact.
 constexpr double kSpareTravel = 1.25;
 
-/// [m] Travel limit of a sub-step for islands without near pairs: the whole displacement in one step.
-constexpr double kFreeSubstepTravel = 1.0;
+/// [m] Largest SQP step of islands without near pairs: the whole displacement in one step.
+constexpr double kFreeStepLength = 1.0;
 
 }  // namespace
 
@@ -83,7 +83,7 @@ void Environment::wakeTouchedBodies() noexcept {
            {std::pair(pair.spec().a, pair.spec().b), std::pair(pair.spec().b, pair.spec().a)}) {
         if (!objects_[other.value].asleep || !moves(one)) continue;
         wake(other);
-        engine_->movable[other.value] = 1;
+        if (isDynamic(other)) engine_->movable[other.value] = 1;  // not while free bodies are paused
         more = true;
       }
     }
@@ -96,13 +96,19 @@ void Environment::integrateFreeMotion() noexcept {
     if (!isDynamic(ObjectId{i})) continue;
     Engine::FreeBody& body = *engine_->bodies[i];
     const Pose& X_WO = objects_[i].X_WO;
-    const Wrench F_Oo_W = engine_->forces[i].contributed(tick_);
-    body.V_WC =
-        body.rigid.integrateVelocity(X_WO.rotation(), atCentre(objects_[i].V_WO, X_WO, body.rigid.centre()),
-                                     shifted(F_Oo_W, X_WO.rotation() * body.rigid.centre()));
+    const Wrench F_Oq_W = engine_->forces[i].contributed(tick_);
+    body.V_WC = body.rigid.integrateVelocity(
+        X_WO.rotation(), atCentre(objects_[i].V_WO, X_WO, body.rigid.centre()),
+        shifted(F_Oq_W, X_WO.rotation() * (body.rigid.centre() - centreOf(ObjectId{i}))));
     body.inverse_inertia_W = body.rigid.inertia(X_WO.rotation()).inverse();
   }
   applyFreeBodyFriction();
+}
+
+/// Predicted twist of a free body's centre Q: its centre of mass is elsewhere.
+Twist Environment::twistOfCentre(ObjectId object) const noexcept {
+  const Engine::FreeBody& body = *engine_->bodies[object.value];
+  return atCentre(body.V_WC, objects_[object.value].X_WO, centreOf(object) - body.rigid.centre());
 }
 
 /// The free body as the island solver needs it: a spring of stiffness M / dt^2 towards its predicted pose.
@@ -111,10 +117,7 @@ collision::MovableBody Environment::freeBody(ObjectId object) noexcept {
   const RigidBody& rigid = engine_->bodies[object.value]->rigid;
   Twist& V_WC = engine_->bodies[object.value]->V_WC;
   const double radius = engine_->sizes[object.value].radius;
-  const Vector3 p_OC_W = motion.X_WO.rotation() * rigid.centre();
-  const Vector3 v_WOo = V_WC.linear - V_WC.angular.cross(p_OC_W);
-  const double speed =
-      std::max(maxPointSpeed(Twist{v_WOo, V_WC.angular}, radius), maxPointSpeed(V_WC, radius));
+  const double speed = maxPointSpeed(twistOfCentre(object), radius);
   if (speed > options_.max_free_speed) {
     V_WC.linear *= options_.max_free_speed / speed;
     V_WC.angular *= options_.max_free_speed / speed;
@@ -131,15 +134,16 @@ collision::MovableBody Environment::freeBody(ObjectId object) noexcept {
 
   collision::MovableBody body;
   body.X_WB = motion.X_WO;
+  body.p_BQ = centreOf(object);
   body.radius = radius;
   body.tolerance = kFreeBodyTolerance;
   body.springs.push_back(inertia);
   return body;
 }
 
-/// Sets the number of sub-steps of an island with free bodies for its fastest one, and limits the travel of
+/// Sets the number of SQP steps of an island with free bodies for its fastest one, and limits the travel of
 /// each of its bodies by its speed cap.
-void Environment::limitTravel(std::size_t island) noexcept {
+void Environment::setStepLimits(std::size_t island) noexcept {
   IslandWork& islands = engine_->islands;
   const IslandWork::Island& one = islands.islands()[island];
   double speed = 0.0;
@@ -149,8 +153,7 @@ void Environment::limitTravel(std::size_t island) noexcept {
     const ObjectId object = islands.objectOf(i);
     near = near || engine_->has_near_pair[object.value] != 0;
     if (!isDynamic(object)) continue;
-    const Twist& V_WC = engine_->bodies[object.value]->V_WC;
-    speed = std::max(speed, maxPointSpeed(V_WC, engine_->sizes[object.value].radius));
+    speed = std::max(speed, maxPointSpeed(twistOfCentre(object), engine_->sizes[object.value].radius));
     any_free = true;
   }
   if (!any_free) return;
@@ -158,10 +161,10 @@ void Environment::limitTravel(std::size_t island) noexcept {
     islands.body(i).max_displacement = speedCap(islands.objectOf(i)) * kTickSeconds;
   }
   collision::SolveLimits& limits = islands.limits(island);
-  if (!near) limits.max_step_length = kFreeSubstepTravel;
+  if (!near) limits.max_step_length = kFreeStepLength;
   const double travel = kSpareTravel * std::min(speed, options_.max_free_speed) * kTickSeconds;
   limits.max_steps =
-      std::max(kImpactSubsteps, static_cast<std::uint32_t>(std::ceil(travel / limits.max_step_length)));
+      std::max(kMinImpactSteps, static_cast<std::uint32_t>(std::ceil(travel / limits.max_step_length)));
 }
 
 /// The velocity of a free body is its displacement per tick. Bodies pushed out of an overlap must not gain

@@ -16,10 +16,10 @@ void Environment::sumForces() noexcept {
       engine.forces[a.value].clear(engine.cell_in_a[i]);
       engine.forces[b.value].clear(engine.cell_in_b[i]);
     } else if (engine.queried[i] != 0) {
-      const Wrench F_Ao_W = pair.result()->F_Ao_W;
-      const Vector3 p_AB_W = objects_[b.value].X_WO.translation() - objects_[a.value].X_WO.translation();
-      engine.forces[a.value].write(engine.cell_in_a[i], F_Ao_W, tick_);
-      engine.forces[b.value].write(engine.cell_in_b[i], -shifted(F_Ao_W, p_AB_W), tick_);
+      const Wrench F_Aq_W = shifted(pair.result()->F_Ao_W, toCentre(a));
+      const Vector3 p_QaQb_W = objects_[b.value].X_WO * centreOf(b) - objects_[a.value].X_WO * centreOf(a);
+      engine.forces[a.value].write(engine.cell_in_a[i], F_Aq_W, tick_);
+      engine.forces[b.value].write(engine.cell_in_b[i], -shifted(F_Aq_W, p_QaQb_W), tick_);
     }
   }
   for (std::size_t i = 0; i < hands_.size(); ++i) {
@@ -29,22 +29,22 @@ void Environment::sumForces() noexcept {
     if (!isObject(hand.object) || !engaged(hand)) continue;
     const std::size_t object = hand.object.value;
     const Pose& X_WO = objects_[object].X_WO;
-    const Vector3 p_OH_W = hand.X_WH.translation() - X_WO.translation();
+    const Vector3 p_QH_W = hand.X_WH.translation() - X_WO * centreOf(hand.object);
     if (engine.movable[object] != 0) {
-      const Wrench F_Oo_W = collision::springWrench(springOf(id), X_WO);
-      engine.forces[object].write(engine.couplingCell(hand.object, id), F_Oo_W, tick_);
-      hand.F_Ho_W = -shifted(F_Oo_W, p_OH_W);
+      const Wrench F_Oq_W = shifted(collision::springWrench(springOf(id), X_WO), toCentre(hand.object));
+      engine.forces[object].write(engine.couplingCell(hand.object, id), F_Oq_W, tick_);
+      hand.F_Ho_W = -shifted(F_Oq_W, p_QH_W);
     } else if (scene_->hands[i].kind == HandKind::kTracked) {
-      hand.F_Ho_W = shifted(engine.forces[object].total(tick_), p_OH_W);
+      hand.F_Ho_W = shifted(engine.forces[object].total(tick_), p_QH_W);
     } else {
       engine.forces[object].clear(engine.couplingCell(hand.object, id));
     }
   }
-  writeWeights();
+  writeGravity();
   for (ForceBuffer& buffer : engine.forces) buffer.expire(tick_);
 }
 
-void Environment::writeWeights() noexcept {
+void Environment::writeGravity() noexcept {
   Engine& engine = *engine_;
   for (std::uint32_t i = 0; i < objects_.size(); ++i) {
     if (!engine.bodies[i]) continue;
@@ -54,8 +54,8 @@ void Environment::writeWeights() noexcept {
       engine.forces[i].clear(engine.gravityCell(object));
       continue;
     }
-    const Vector3 p_OC_W = objects_[i].X_WO.rotation() * rigid.centre();
-    engine.forces[i].write(engine.gravityCell(object), {rigid.weight(), p_OC_W.cross(rigid.weight())}, tick_);
+    const Vector3 p_QC_W = objects_[i].X_WO.rotation() * (rigid.centre() - centreOf(object));
+    engine.forces[i].write(engine.gravityCell(object), {rigid.weight(), p_QC_W.cross(rigid.weight())}, tick_);
   }
 }
 
@@ -119,10 +119,10 @@ void Environment::countWork() noexcept {
     work_.points_visited += engine.pairs[engine.due[slot]].counts().points_visited;
   }
   for (const IslandWork::Island& island : engine.islands.islands()) {
-    work_.substeps += island.report.steps;
+    work_.steps += island.report.steps;
     work_.iterations += island.report.iterations;
     work_.points_visited += island.report.points_visited;
-    work_.conflicting |= island.report.infeasible;
+    work_.infeasible |= island.report.infeasible;
   }
 }
 

@@ -142,8 +142,10 @@ void Environment::attachHand(HandId hand) noexcept {
   const bool starts_at_hand =
       motion.object == motion.default_object || object.status == ObjectStatus::kHidden;
   if (starts_at_hand && !object.holder.valid()) {
-    motion.X_HO = Pose::Identity();
-    object.X_WO = motion.X_WH;
+    // the frame of a hand's own object is its grip; another one, which was nowhere, is held at its centre
+    const bool own = motion.object == motion.default_object;
+    motion.X_HO = own ? Pose::Identity() : Pose(Vector3(-centreOf(motion.object)));
+    object.X_WO = motion.X_WH * motion.X_HO;
   } else {
     motion.X_HO = motion.X_WH.inverse() * object.X_WO;
   }

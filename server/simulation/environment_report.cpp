@@ -57,11 +57,11 @@ Wrench Environment::forceOn(ObjectId object) const noexcept {
   if (!isObject(object)) return {};
   const ForceBuffer& forces = engine_->forces[object.value];
   if (objects_[object.value].status != ObjectStatus::kHeld) return forces.total(tick_);
-  Wrench F_Oo_W;
+  Wrench F_Oq_W;
   for (std::uint32_t hand = 0; hand < hands_.size(); ++hand) {
-    F_Oo_W += forces.cell(engine_->couplingCell(object, HandId{hand}));
+    F_Oq_W += forces.cell(engine_->couplingCell(object, HandId{hand}));
   }
-  return F_Oo_W;
+  return F_Oq_W;
 }
 
 bool Environment::inContact(ObjectId a, ObjectId b) const noexcept {

@@ -95,7 +95,7 @@ std::uint64_t Environment::hash() const noexcept {
   return hasher.value();
 }
 
-std::size_t Environment::mostSavedBytes() const {
+std::size_t Environment::maxSavedBytes() const {
   // [bytes] a near pair with its two force cells, a full contact list with multipliers, an object
   constexpr std::size_t kPair = 512;
   constexpr std::size_t kList =
@@ -113,11 +113,22 @@ std::vector<std::uint8_t> Environment::save() const {
 
 void Environment::append(std::vector<std::uint8_t>& bytes) const {
   ArchiveWriter writer(bytes);
-  writer.number(kStateVersion);
-  writer.number(static_cast<std::uint32_t>(objects_.size()));
-  writer.number(static_cast<std::uint32_t>(hands_.size()));
-  writer.number(static_cast<std::uint32_t>(pairs_.size()));
-  archive(writer, *this);
+  archiveWithHeader(writer);
+}
+
+std::vector<std::size_t> Environment::savedDoubles() const {
+  ArchiveDoubles doubles;
+  archiveWithHeader(doubles);
+  return doubles.positions();
+}
+
+template <typename Archive>
+void Environment::archiveWithHeader(Archive& to) const {
+  to.number(kStateVersion);
+  to.number(static_cast<std::uint32_t>(objects_.size()));
+  to.number(static_cast<std::uint32_t>(hands_.size()));
+  to.number(static_cast<std::uint32_t>(pairs_.size()));
+  archive(to, *this);
 }
 
 Result<void> Environment::restore(std::span<const std::uint8_t> bytes) {
@@ -141,6 +152,7 @@ Result<void> Environment::restore(std::span<const std::uint8_t> bytes) {
   options.workers = 1;
   Environment copy(scene_, options);
   archive(reader, copy);
+  if (!reader.finite()) return fail("checkpoint: contains a number that is not finite");
   if (!reader.atEnd()) return fail("checkpoint: truncated or followed by other bytes");
   if (!copy.isValid()) return fail("checkpoint: contains an invalid pose, id or status");
   objects_ = copy.objects_;
@@ -168,20 +180,17 @@ Result<void> Environment::restore(std::span<const std::uint8_t> bytes) {
 bool Environment::isValid() const noexcept {
   const auto validPose = [](const Pose& X) {
     constexpr double kUnitTolerance = 1e-6;
-    return X.isFinite() && std::abs(X.rotation().squaredNorm() - 1.0) < kUnitTolerance;
+    return std::abs(X.rotation().squaredNorm() - 1.0) < kUnitTolerance;
   };
   const auto hasBody = [this](const ObjectMotion& object) {
     return scene_->objects[static_cast<std::size_t>(&object - objects_.data())].body.has_value();
   };
   const bool valid_objects = std::all_of(objects_.begin(), objects_.end(), [&](const ObjectMotion& object) {
     return validPose(object.X_WO) && object.status <= ObjectStatus::kFree &&
-           (object.status != ObjectStatus::kFree || hasBody(object)) && object.V_WO.linear.allFinite() &&
-           object.V_WO.angular.allFinite() && (!object.holder.valid() || isHand(object.holder));
+           (object.status == ObjectStatus::kFree ? hasBody(object) : !object.asleep) &&
+           (!object.holder.valid() || isHand(object.holder));
   });
-  const bool valid_limits = work_limits_.critical_load > 0.0 && std::isfinite(work_limits_.critical_load);
-  const bool finite_path_lengths = std::all_of(engine_->path_lengths.begin(), engine_->path_lengths.end(),
-                                               [](double length) { return std::isfinite(length); });
-  return valid_limits && valid_objects && finite_path_lengths &&
+  return work_limits_.critical_load > 0.0 && valid_objects &&
          std::all_of(hands_.begin(), hands_.end(), [&](const HandMotion& hand) {
            return validPose(hand.X_WH) && validPose(hand.X_HO) && validPose(hand.X_OR) &&
                   (!hand.object.valid() || isObject(hand.object)) &&

@@ -25,11 +25,11 @@ ForceBuffer::ForceBuffer(std::size_t own_cells) : cells_(own_cells + kContributi
   used_.reserve(own_cells);
 }
 
-void ForceBuffer::write(std::size_t cell, const Wrench& F_Bo_W, Tick now) noexcept {
+void ForceBuffer::write(std::size_t cell, const Wrench& F_Bq_W, Tick now) noexcept {
   assert(cell < own_cells_);
   const auto index = static_cast<std::uint32_t>(cell);
   if (!cells_[cell].used) used_.insert(std::lower_bound(used_.begin(), used_.end(), index), index);
-  cells_[cell] = {F_Bo_W, now, 0, 0, true};
+  cells_[cell] = {F_Bq_W, now, 0, 0, true};
 }
 
 void ForceBuffer::clear(std::size_t cell) noexcept {
@@ -39,7 +39,7 @@ void ForceBuffer::clear(std::size_t cell) noexcept {
   cells_[cell] = ForceCell{};
 }
 
-bool ForceBuffer::contribute(std::uint32_t source, const Wrench& F_Bo_W, std::uint32_t lifetime_ticks,
+bool ForceBuffer::contribute(std::uint32_t source, const Wrench& F_Bq_W, std::uint32_t lifetime_ticks,
                              Tick now) noexcept {
   // [N], [Nm] the squared norm of larger values overflows
   constexpr double kMaxComponent = 1e100;
@@ -53,11 +53,11 @@ bool ForceBuffer::contribute(std::uint32_t source, const Wrench& F_Bo_W, std::ui
     slot = std::find_if(contributions.begin(), contributions.end(),
                         [&](const ForceCell& cell) { return !alive(cell, now); });
   }
-  if (slot == contributions.end() || lifetime_ticks == 0 || !valid(F_Bo_W.force) || !valid(F_Bo_W.torque)) {
+  if (slot == contributions.end() || lifetime_ticks == 0 || !valid(F_Bq_W.force) || !valid(F_Bq_W.torque)) {
     ++rejected_;
     return false;
   }
-  *slot = {{clamped(F_Bo_W.force, kMaxContributedForce), clamped(F_Bo_W.torque, kMaxContributedTorque)},
+  *slot = {{clamped(F_Bq_W.force, kMaxContributedForce), clamped(F_Bq_W.torque, kMaxContributedTorque)},
            now,
            source,
            std::min(lifetime_ticks, kMaxLifetimeTicks),
@@ -78,16 +78,16 @@ void ForceBuffer::expire(Tick now) noexcept {
 
 Wrench ForceBuffer::total(Tick now) const noexcept {
   Wrench sum;
-  for (const std::uint32_t cell : used_) sum += cells_[cell].F_Bo_W;
+  for (const std::uint32_t cell : used_) sum += cells_[cell].F_Bq_W;
   if (contributing_ == 0) return sum;
-  for (const ForceCell& cell : std::span(cells_).subspan(own_cells_)) sum += cell.F_Bo_W * weight(cell, now);
+  for (const ForceCell& cell : std::span(cells_).subspan(own_cells_)) sum += cell.F_Bq_W * weight(cell, now);
   return sum;
 }
 
 Wrench ForceBuffer::contributed(Tick now) const noexcept {
   Wrench sum;
   if (contributing_ == 0) return sum;
-  for (const ForceCell& cell : std::span(cells_).subspan(own_cells_)) sum += cell.F_Bo_W * weight(cell, now);
+  for (const ForceCell& cell : std::span(cells_).subspan(own_cells_)) sum += cell.F_Bq_W * weight(cell, now);
   return sum;
 }
 

@@ -10,45 +10,49 @@
 
 namespace tenon::simulation {
 
-/// The wrench of one source.
+/// The wrench of one source, about the body's centre Q.
 struct ForceCell {
-  Wrench F_Bo_W;
+  Wrench F_Bq_W;
   Tick stamp = 0;                    ///< tick of the last write
   std::uint32_t source = 0;          ///< contributions only: id chosen by the sender
   std::uint32_t lifetime_ticks = 0;  ///< [ticks] 0: valid until overwritten
   bool used = false;
 };
 
-/// Accumulates the wrenches of several sources on one object (paper §3.2, iii).
+/// Accumulates the wrenches of several sources on one object (paper §3.2, iii). All are about its centre Q,
+/// that of its bounding sphere: a torque about the origin would grow with the distance from there to the
+/// object.
 ///
 /// Every source has one cell and overwrites it. The own cells (pairs, couplings of hands, gravity) come
 /// first; they stay valid until overwritten, so a pair skipped by coherence keeps its wrench. Then come cells
 /// for contributions of clients, which are validated, clamped, fade linearly with age and expire. Cells are
 /// summed in cell order, not in order of arrival: the total is bit-equal for any number of workers. The own
 /// cells in use are listed, so a sum costs only those. There is one total per tick, after all sources are
-/// written: the paper's sending policies (§3.2, iv) have no place here (DECISIONS.md).
+/// written: the paper's sending policies (§3.2, iv) have no place here (D-041).
 ///
 /// Threads: one writer per own cell, contributions from one thread; total() after the tick's barrier.
 /// Real-time: everything but the constructor.
 class ForceBuffer {
  public:
   static constexpr std::size_t kContributions = 8;
-  /// Limits of a contribution: about the peak output of a haptic device.
+  /// Limits of a contribution, the only ones that there are: about the peak output of a haptic device. What
+  /// is above is clamped, not refused.
   static constexpr double kMaxContributedForce = 50.0;  ///< [N]
   static constexpr double kMaxContributedTorque = 5.0;  ///< [Nm]
-  /// [ticks] a contribution ends at most this long after its last update.
-  static constexpr std::uint32_t kMaxLifetimeTicks = 200;
+  /// [ticks] a contribution ends at most this long after its last update, so that of a source that has ended
+  /// nothing stays.
+  static constexpr std::uint32_t kMaxLifetimeTicks = 100;
 
   explicit ForceBuffer(std::size_t own_cells);
 
   /// Overwrites an own cell.
-  void write(std::size_t cell, const Wrench& F_Bo_W, Tick now) noexcept;
+  void write(std::size_t cell, const Wrench& F_Bq_W, Tick now) noexcept;
   /// Marks an own cell as unused.
   void clear(std::size_t cell) noexcept;
 
   /// Overwrites the cell of `source` or uses a free one; lifetime and wrench are clamped to the limits above.
   /// False, and counted in rejected(), when the wrench is not finite, its lifetime is 0 or no cell is free.
-  bool contribute(std::uint32_t source, const Wrench& F_Bo_W, std::uint32_t lifetime_ticks,
+  bool contribute(std::uint32_t source, const Wrench& F_Bq_W, std::uint32_t lifetime_ticks,
                   Tick now) noexcept;
   /// Frees the cells of contributions whose lifetime is over.
   void expire(Tick now) noexcept;
@@ -57,7 +61,7 @@ class ForceBuffer {
   [[nodiscard]] Wrench total(Tick now) const noexcept;
   /// Sum of the contributions alone.
   [[nodiscard]] Wrench contributed(Tick now) const noexcept;
-  [[nodiscard]] Wrench cell(std::size_t index) const noexcept { return cells_[index].F_Bo_W; }
+  [[nodiscard]] Wrench cell(std::size_t index) const noexcept { return cells_[index].F_Bq_W; }
   /// Ticks since the cell was written.
   [[nodiscard]] Tick age(std::size_t index, Tick now) const noexcept { return now - cells_[index].stamp; }
   [[nodiscard]] std::uint64_t rejected() const noexcept { return rejected_; }

@@ -9,7 +9,7 @@ namespace tenon::simulation {
 
 /// Adapts the point budget to the measured compute time, between ticks only: inside a tick nothing depends on
 /// measured time. A new budget is part of the next TickInput and thus of the journal, so a re-simulation
-/// needs no clock (DECISIONS.md, "The governor is outside the tick").
+/// needs no clock (D-020).
 ///
 /// kSlowTicks slow ticks within kWindow reduce the budget to what the machine can do at its measured rate; a
 /// single slow tick may be due to the operating system. kFastTicks ticks without a slow one raise it by a

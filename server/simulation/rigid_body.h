@@ -43,7 +43,7 @@ class RigidBody {
   std::unique_ptr<Bullet> bullet_;
 };
 
-/// Twist of the centre of mass C from the twist of the body's origin O; and back. All in W.
+/// Twist of a point C of the body from the twist of the body's origin O; and back. All in W.
 [[nodiscard]] Twist atCentre(const Twist& V_WO, const Pose& X_WO, const Vector3& p_OC_O);
 [[nodiscard]] Twist atOrigin(const Twist& V_WC, const Pose& X_WO, const Vector3& p_OC_O);
 

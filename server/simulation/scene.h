@@ -15,6 +15,16 @@
 
 namespace tenon::simulation {
 
+/// The bounding sphere of an object's surface, constant in its structures. Its centre Q is the object's
+/// place: the frame's origin O is wherever CAD put it.
+struct BoundingSphere {
+  Vector3 p_OQ_O = Vector3::Zero();  ///< [m]
+  double radius = 0.0;               ///< [m]
+};
+
+/// Of radius 0 about the origin for null, an object without structures.
+[[nodiscard]] BoundingSphere boundingSphereOf(const structures::HapticStructures* structures);
+
 /// Mass properties of a free rigid body: while no hand holds it, it falls and moves under contact forces.
 struct BodySpec {
   double mass = 1.0;                          ///< [kg]

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -18,6 +19,8 @@ namespace tenon::simulation {
 /// Traversal of the simulation state for serialisation and hashing. This base splits the types of the
 /// simulation into numbers; `Derived` writes, reads or hashes a number. One list of fields serves all three,
 /// so what is saved is also hashed and restored.
+///
+/// Threads: one. Real-time: hashing; writing while the capacity suffices.
 template <typename Derived>
 class StateArchive {
  public:
@@ -61,7 +64,7 @@ class StateArchive {
   void visit(C& cell) {
     visit(cell.used);
     if (!cell.used) return;
-    visit(cell.F_Bo_W);
+    visit(cell.F_Bq_W);
     visit(cell.stamp);
     visit(cell.source);
     visit(cell.lifetime_ticks);
@@ -123,7 +126,7 @@ class ArchiveWriter : public StateArchive<ArchiveWriter> {
 };
 
 /// Reads what ArchiveWriter wrote. After the end of the bytes or an invalid value ok() is false and nothing
-/// more is assigned.
+/// more is assigned. No number of a state is infinite or NaN, so such a number is invalid wherever it is.
 class ArchiveReader : public StateArchive<ArchiveReader> {
  public:
   static constexpr bool kReads = true;
@@ -137,7 +140,10 @@ class ArchiveReader : public StateArchive<ArchiveReader> {
       ok_ = bytes_[0] <= 1;
       value = ok_ && bytes_[0] == 1;
     } else {
-      std::memcpy(&value, bytes_.data(), sizeof(T));
+      T read;
+      std::memcpy(&read, bytes_.data(), sizeof(T));
+      if constexpr (std::is_floating_point_v<T>) finite_ = ok_ = std::isfinite(read);
+      if (ok_) value = read;
     }
     bytes_ = bytes_.subspan(sizeof(T));
   }
@@ -150,11 +156,32 @@ class ArchiveReader : public StateArchive<ArchiveReader> {
   /// The caller found an invalid value.
   void reject() { ok_ = false; }
   [[nodiscard]] bool ok() const { return ok_; }
+  /// False after a number that is infinite or NaN.
+  [[nodiscard]] bool finite() const { return finite_; }
   [[nodiscard]] bool atEnd() const { return ok_ && bytes_.empty(); }
 
  private:
   std::span<const std::uint8_t> bytes_;
   bool ok_ = true;
+  bool finite_ = true;
+};
+
+/// Lists where ArchiveWriter writes floating-point numbers.
+class ArchiveDoubles : public StateArchive<ArchiveDoubles> {
+ public:
+  static constexpr bool kReads = false;
+  template <typename T>
+  void number(const T&) {
+    if constexpr (std::is_floating_point_v<T>) positions_.push_back(next_);
+    next_ += sizeof(T);
+  }
+  void count(const collision::ContactList&) { next_ += sizeof(std::uint32_t); }
+  /// [bytes] from the first number on.
+  [[nodiscard]] std::vector<std::size_t> positions() const { return positions_; }
+
+ private:
+  std::vector<std::size_t> positions_;
+  std::size_t next_ = 0;
 };
 
 /// Computes the state hash. Real-time.

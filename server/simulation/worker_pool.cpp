@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cassert>
 
+#include "idl/threads/scheduling.h"
+
 namespace tenon::simulation {
 namespace {
 
@@ -32,7 +34,10 @@ void waitWhile(std::atomic<std::uint32_t>& value, std::uint32_t old) noexcept {
 
 WorkerPool::WorkerPool(unsigned workers) {
   for (unsigned worker = 1; worker < std::max(workers, 1U); ++worker) {
-    threads_.emplace_back([this, worker] { work(worker); });
+    threads_.emplace_back([this, worker] {
+      threads::nameThisThread("tick worker " + std::to_string(worker));
+      work(worker);
+    });
   }
   // a thread allocates and locks while it starts: that is over before the first run
   for (std::uint32_t running = done_.load(std::memory_order_acquire); running < threads_.size();
@@ -47,6 +52,8 @@ WorkerPool::~WorkerPool() {
   wake_.notify_all();
   for (std::thread& thread : threads_) thread.join();
 }
+
+std::string WorkerPool::shareScheduling() { return threads::shareScheduling(threads_); }
 
 void WorkerPool::runErased(std::size_t items, Call call, void* context) noexcept {
   assert(items <= kMaxItems);

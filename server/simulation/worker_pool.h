@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -22,6 +23,11 @@ class WorkerPool {
   WorkerPool& operator=(const WorkerPool&) = delete;
 
   [[nodiscard]] unsigned workers() const { return static_cast<unsigned>(threads_.size()) + 1; }
+
+  /// Gives the threads the scheduling of the calling thread, which is to call run()
+  /// (idl/threads/scheduling.h). Returns what the operating system did not grant, or an empty string. Not
+  /// real-time.
+  [[nodiscard]] std::string shareScheduling();
 
   static constexpr std::size_t kMaxItems = 0xFFFF;
 

@@ -37,7 +37,9 @@ class DistanceField {
   static constexpr int kBrickSide = 9;                                        // samples along one edge
   static constexpr int kBrickSamples = kBrickSide * kBrickSide * kBrickSide;  // 729
   static constexpr int kQuantaPerVoxel = 2048;  // int16 +-16 voxels, steps of 1.5 um at 3 mm
-  static constexpr int kFarPerVoxel = 16;       // quanta of `Layout::far`
+  static constexpr int kFarPerVoxel = 16;       // resolution of `Layout::far`
+  /// [voxels] From a brick's centre to its corner, rounded up.
+  static constexpr double kBrickRadius = 6.9283;
   /// [voxels] |distance| up to which samples are exact.
   static constexpr double kBandVoxels = 4.0;
   /// [voxels] Samples are clamped here. A cell's corners are at most sqrt(3) voxels from any of its points:
@@ -54,6 +56,11 @@ class DistanceField {
   static constexpr Entry kFarOutside = -1;
   static constexpr Entry kFarInside = -2;
   static constexpr Entry kRefined = 1 << 30;
+  /// Most bricks with samples: queries gather samples at byte offsets of 31 bits.
+  static constexpr std::int32_t kMaxBricks = 0x7FFFFFFF / (2 * kBrickSamples);  // 1,472,896
+  /// Most index entries: positions in the index are below kRefined, bounds are gathered as samples are.
+  static constexpr std::int32_t kMaxIndexEntries = 0x7FFFFFFF / 4;
+  static constexpr std::int32_t kMaxBricksPerAxis = 1'000'000;
 
   struct Layout {
     Vector3 p_MoFo_M = Vector3::Zero();    ///< the grid's lowest corner

@@ -12,20 +12,18 @@ namespace {
 
 using Entry = DistanceField::Entry;
 constexpr int kSide = DistanceField::kBrickSide;
-// [voxels] From a brick's centre to its corner.
-constexpr double kBrickRadius = 6.9283;
 
 /// Samples one brick and appends it when any of its samples is within the band.
 class BrickSampler {
  public:
-  BrickSampler(const AnalyticDistance& distance, std::vector<std::int16_t>& samples)
+  BrickSampler(const AnalyticDistance& distance, HugeVector<std::int16_t>& samples)
       : distance_(distance), samples_(samples) {}
 
   Entry sample(const Vector3& p_MBo, double voxel) {
     const double edge = voxel * DistanceField::kBrickVoxels;
     const double at_centre = distance_(p_MBo + Vector3::Constant(edge / 2));
     const Entry far = at_centre < 0.0 ? DistanceField::kFarInside : DistanceField::kFarOutside;
-    if (std::abs(at_centre) >= (DistanceField::kBandVoxels + kBrickRadius) * voxel) return far;
+    if (std::abs(at_centre) >= (DistanceField::kBandVoxels + DistanceField::kBrickRadius) * voxel) return far;
 
     std::array<std::int16_t, DistanceField::kBrickSamples> brick{};
     double nearest = std::numeric_limits<double>::infinity();
@@ -46,7 +44,7 @@ class BrickSampler {
 
  private:
   const AnalyticDistance& distance_;
-  std::vector<std::int16_t>& samples_;
+  HugeVector<std::int16_t>& samples_;
 };
 
 }  // namespace
@@ -109,7 +107,7 @@ DistanceField buildField(const AnalyticDistance& distance, const Eigen::AlignedB
         storage.far[number] = quantizedFar(at_centre, voxel, coarse == DistanceField::kFarInside);
         const Eigen::AlignedBox3d box(p_MBo, p_MBo + Vector3::Constant(edge));
         const bool refined = layout.refinement > 1 && coarse >= 0 &&
-                             std::abs(at_centre) < kBrickRadius * voxel &&
+                             std::abs(at_centre) < DistanceField::kBrickRadius * voxel &&
                              std::any_of(refine_M.begin(), refine_M.end(),
                                          [&box](const auto& region) { return region.intersects(box); });
         if (!refined) continue;

@@ -2,18 +2,20 @@
 
 #include <functional>
 #include <span>
-#include <vector>
 
 #include "server/structures/distance_field.h"
+#include "server/structures/huge_pages.h"
 
 namespace tenon::structures {
 
 /// The arrays of a field under construction.
+///
+/// Threads: one; the functions below are pure. Real-time: no.
 struct FieldStorage {
   DistanceField::Layout layout;  ///< makeField sets its spans
-  std::vector<DistanceField::Entry> index;
-  std::vector<std::int16_t> samples;
-  std::vector<std::int16_t> far;
+  HugeVector<DistanceField::Entry> index;
+  HugeVector<std::int16_t> samples;
+  HugeVector<std::int16_t> far;
 };
 
 /// A field that owns the given arrays.

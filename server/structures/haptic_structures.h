@@ -19,7 +19,7 @@ struct StructureInfo {
   std::string content_hash;                   ///< of meshes and options: the file's name in a cache
   std::uint64_t triangles = 0;                ///< of the meshes
   double bake_seconds = 0.0;                  ///< [s]
-  Eigen::AlignedBox3d box_M;                  ///< [m] of the mesh
+  Eigen::AlignedBox3d box_M;                  ///< [m] bounding box of the mesh
   double surface_area = 0.0;                  ///< [m^2] of the sampled outer surface
   std::uint64_t bricks = 0;                   ///< with samples
   std::vector<std::filesystem::path> meshes;  ///< when baked; stored relative to the structure file's folder
@@ -36,13 +36,19 @@ struct HapticStructures {
   FeatureShell features;
 };
 
-/// Writes a structure file, versioned and with a checksum. It is written under a temporary name and renamed,
-/// so that a reader never sees an incomplete file.
+/// Writes a structure file, versioned, with a checksum. A regular file is written under a temporary name and
+/// renamed: a reader never sees an incomplete one. An error when the file cannot be written, or the
+/// structures could not be read again (structure_checks.h).
+///
+/// Threads: any. Real-time: no.
 [[nodiscard]] Result<void> writeStructures(const std::filesystem::path& file,
                                            const HapticStructures& structures);
 
-/// Maps a structure file into memory. A wrong version, size or checksum, or an index out of range, is an
-/// error of one sentence that names the file.
+/// Reads a structure file into memory of its own, in huge pages where the kernel has them. A wrong version,
+/// size or checksum, and structures that are not sound (structure_checks.h), are an error of one sentence
+/// that names the file.
+///
+/// Threads: any. Real-time: no.
 [[nodiscard]] Result<std::shared_ptr<const HapticStructures>> openStructures(
     const std::filesystem::path& file);
 

@@ -46,15 +46,16 @@ void addToNearest(std::span<const ShellPoint> points, std::size_t coarse, double
 std::vector<std::vector<float>> levelAreas(std::span<const ShellPoint> points,
                                            std::span<const ShellLevel> levels) {
   std::vector<std::vector<float>> result(levels.size());
-  Eigen::AlignedBox3d box;
-  for (const ShellPoint& point : points) box.extend(point.p_MP.cast<double>());
+  double furthest = 0.0;  // [m] of any coordinate from 0
+  for (const ShellPoint& point : points)
+    furthest = std::max<double>(furthest, point.p_MP.cwiseAbs().maxCoeff());
   std::vector<double> areas(points.size());
   std::transform(points.begin(), points.end(), areas.begin(), [](const ShellPoint& p) { return p.area; });
   for (std::size_t k = levels.size(); k-- > 0;) {
     const std::size_t end = std::min(endOf(levels[k]), areas.size());
     // bounded below so that cell coordinates fit into an int
     constexpr double kMinCell = 1e-6;
-    const double cell = std::max<double>(levels[k].spacing, kMinCell * box.diagonal().norm());
+    const double cell = std::max<double>(levels[k].spacing, kMinCell * furthest);
     if (end < areas.size() && cell > 0.0) addToNearest(points, end, cell, areas);
     areas.resize(end);
     result[k].assign(areas.begin(), areas.end());

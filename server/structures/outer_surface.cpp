@@ -24,11 +24,10 @@ class OuterSurfaceSplitter {
       : field_(field), outer_(outer) {}
 
   void split(const Triangle& t) {
-    const Halves halves(t);
-    if (halves.length > kMaxEdge * field_.voxelAt(centreOf(t))) {
-      split(halves.first);
-      split(halves.second);
-    } else if (exposedPart(t, halves) == Exposed::kAll) {
+    std::size_t from = 0;
+    if (longestEdge(t, from) > kMaxEdge * field_.voxelAt(centreOf(t))) {
+      for (const Triangle& half : bisected(t, from)) split(half);
+    } else if (exposedPart(t) == Exposed::kAll) {
       keep(t);
     }
   }
@@ -36,28 +35,18 @@ class OuterSurfaceSplitter {
  private:
   enum class Exposed { kAll, kNone, kSome };
 
-  /// The triangle bisected at the middle of its longest edge.
-  struct Halves {
-    explicit Halves(const Triangle& t) : first(t), second(t) {
-      std::size_t a = 0;
-      length = longestEdge(t, a);
-      const std::size_t b = (a + 1) % 3;
-      first[b] = second[a] = 0.5 * (t[a] + t[b]);
-    }
-    Triangle first, second;
-    double length = 0.0;
-  };
-
   static Vector3 centreOf(const Triangle& t) { return (t[0] + t[1] + t[2]) / 3.0; }
 
   /// How much of a triangle is exposed. With kSome the exposed pieces have been added to `outer_`.
-  Exposed exposedPart(const Triangle& t, const Halves& halves) {
+  Exposed exposedPart(const Triangle& t) {
+    std::size_t from = 0;
+    const double length = longestEdge(t, from);
     const Vector3 centre = centreOf(t);
     const double voxel = field_.voxelAt(centre);
     const Vector3 normal = (t[1] - t[0]).cross(t[2] - t[0]).normalized();
     const bool at_centre = isExposed(centre, normal, voxel);
     bool all_agree = true;
-    for (std::size_t i = 0; i < 3 && all_agree && halves.length > kMinEdge * voxel; ++i) {
+    for (std::size_t i = 0; i < 3 && all_agree && length > kMinEdge * voxel; ++i) {
       // 5 % inside the corners, so that triangles beyond an edge have no influence
       const Vector3 corner = centre + 0.95 * (t[i] - centre);
       const Vector3 next = centre + 0.95 * (t[(i + 1) % 3] - centre);
@@ -66,11 +55,12 @@ class OuterSurfaceSplitter {
     }
     if (all_agree) return at_centre ? Exposed::kAll : Exposed::kNone;
 
-    const Exposed of_first = exposedPart(halves.first, Halves(halves.first));
-    const Exposed of_second = exposedPart(halves.second, Halves(halves.second));
+    const auto [first, second] = bisected(t, from);
+    const Exposed of_first = exposedPart(first);
+    const Exposed of_second = exposedPart(second);
     if (of_first == of_second && of_first != Exposed::kSome) return of_first;
-    if (of_first == Exposed::kAll) keep(halves.first);
-    if (of_second == Exposed::kAll) keep(halves.second);
+    if (of_first == Exposed::kAll) keep(first);
+    if (of_second == Exposed::kAll) keep(second);
     return Exposed::kSome;
   }
 

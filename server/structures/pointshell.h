@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "idl/types/spatial.h"
+#include "server/structures/huge_pages.h"
 
 namespace tenon::structures {
 
@@ -31,8 +32,9 @@ struct ShellLevel {
   std::uint32_t first_point = 0, point_count = 0;
   std::uint32_t first_leaf = 0, leaf_count = 0;
   std::uint32_t first_cluster = 0, cluster_count = 0;
-  float spacing = 0.0F;     ///< [m] between neighbours when levels 0..this are used
-  float area_scale = 1.0F;  ///< [-] the whole surface area over the sum of `area` in levels 0..this
+  float spacing = 0.0F;  ///< [m] between neighbours when levels 0..this are used
+  float area_scale =
+      1.0F;  ///< [-] whole surface area over the sum of `area` in levels 0..this; see areasOfLevel
 };
 
 /// Up to sixteen points or spheres in structure-of-arrays form for SIMD; unused lanes repeat the first.
@@ -69,6 +71,7 @@ class Pointshell {
   /// `owner` keeps the memory of the spans alive.
   Pointshell(const Layout& layout, std::shared_ptr<const void> owner);
 
+  [[nodiscard]] const Layout& layout() const { return layout_; }
   [[nodiscard]] std::span<const ShellPoint> points() const { return layout_.points; }
   [[nodiscard]] std::span<const ShellSphere> leaves() const { return layout_.leaves; }
   [[nodiscard]] std::span<const ShellSphere> clusters() const { return layout_.clusters; }
@@ -101,9 +104,9 @@ class Pointshell {
 
  private:
   struct Blocks {
-    std::vector<ShellBlock> leaves, clusters, levels;
-    std::vector<std::uint32_t> leaf_of_point;
-    std::vector<std::vector<float>> areas;
+    HugeVector<ShellBlock> leaves, clusters, levels;
+    HugeVector<std::uint32_t> leaf_of_point;
+    std::vector<std::vector<float>> areas;  ///< [m^2] by level
   };
 
   Layout layout_;

@@ -14,13 +14,6 @@ namespace {
 // About how many points the coarsest level has.
 constexpr double kCoarsestPoints = 32.0;
 
-struct ShellStorage {
-  std::vector<ShellPoint> points;
-  std::vector<ShellSphere> leaves;
-  std::vector<ShellSphere> clusters;
-  std::vector<ShellLevel> levels;
-};
-
 /// The numbers of the samples that each level adds, in their order.
 std::vector<std::vector<std::uint32_t>> sortIntoLevels(std::span<const SurfaceSample> samples,
                                                        double spacing) {
@@ -138,6 +131,16 @@ ShellLevel appendLevel(ShellStorage& storage, std::span<const SurfaceSample> sam
 
 }  // namespace
 
+Pointshell makeShell(ShellStorage storage) {
+  const auto owner = std::make_shared<const ShellStorage>(std::move(storage));
+  return {owner->layout(), owner};
+}
+
+FeatureShell makeFeatureShell(FeatureStorage storage) {
+  auto edges = std::make_shared<const HugeVector<FeatureEdge>>(std::move(storage.edges));
+  return {makeShell(std::move(storage.points)), *edges, edges};
+}
+
 Pointshell buildShell(std::span<const SurfaceSample> samples, double spacing) {
   if (samples.empty()) return {};
   const double area =
@@ -146,31 +149,31 @@ Pointshell buildShell(std::span<const SurfaceSample> samples, double spacing) {
   if (spacing <= 0.0) spacing = std::sqrt(area / static_cast<double>(samples.size()));
   if (spacing <= 0.0) spacing = 1e-3;
 
-  auto storage = std::make_shared<ShellStorage>();
+  ShellStorage storage;
   auto added = sortIntoLevels(samples, spacing);
   double used_area = 0.0;
   for (std::size_t k = 0; k < added.size(); ++k) {
     sortIntoRuns(samples, added[k]);
     for (const std::uint32_t i : added[k]) used_area += samples[i].area;
-    ShellLevel level = appendLevel(*storage, samples, added[k]);
+    ShellLevel level = appendLevel(storage, samples, added[k]);
     level.spacing = static_cast<float>(spacing * std::exp2(added.size() - 1 - k));
     level.area_scale = used_area > 0.0 ? static_cast<float>(area / used_area) : 1.0F;
-    storage->levels.push_back(level);
+    storage.levels.push_back(level);
   }
-  return {{storage->points, storage->leaves, storage->clusters, storage->levels}, storage};
+  return makeShell(std::move(storage));
 }
 
-Pointshell buildFlatShell(std::span<const SurfaceSample> samples, double spacing,
-                          std::vector<std::uint32_t>& order) {
+ShellStorage buildFlatShell(std::span<const SurfaceSample> samples, double spacing,
+                            std::vector<std::uint32_t>& order) {
   order.resize(samples.size());
   std::iota(order.begin(), order.end(), 0U);
-  if (samples.empty()) return {};
+  ShellStorage storage;
+  if (samples.empty()) return storage;
   sortIntoRuns(samples, order);
-  auto storage = std::make_shared<ShellStorage>();
-  ShellLevel level = appendLevel(*storage, samples, order);
+  ShellLevel level = appendLevel(storage, samples, order);
   level.spacing = static_cast<float>(spacing);
-  storage->levels.push_back(level);
-  return {{storage->points, storage->leaves, storage->clusters, storage->levels}, storage};
+  storage.levels.push_back(level);
+  return storage;
 }
 
 }  // namespace tenon::structures

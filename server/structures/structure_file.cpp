@@ -2,8 +2,6 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <limits>
-#include <optional>
 #include <type_traits>
 #include <vector>
 
@@ -13,14 +11,18 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include "idl/types/output_files.h"
+#include "server/structures/field_builder.h"
 #include "server/structures/haptic_structures.h"
+#include "server/structures/shell_builder.h"
+#include "server/structures/structure_checks.h"
 
 namespace tenon::structures {
 
 namespace {
 
 constexpr std::array<char, 8> kMagic{'T', 'E', 'N', 'O', 'N', 'H', 'S', '\n'};
-constexpr std::uint32_t kVersion = 4;
+constexpr std::uint32_t kVersion = 5;
 constexpr std::uint32_t kByteOrder = 0x01020304U;
 constexpr std::size_t kAlignment = 64;
 
@@ -88,7 +90,9 @@ std::string meshesFrom(const std::filesystem::path& file, const StructureInfo& i
   const auto folder = std::filesystem::weakly_canonical(std::filesystem::absolute(file), error).parent_path();
   std::string lines;
   for (const std::filesystem::path& mesh : info.meshes) {
-    const auto whole = std::filesystem::weakly_canonical(std::filesystem::absolute(mesh), error);
+    // a mesh that is a link keeps its own name: files that it refers to may be beside the link
+    const auto named = std::filesystem::absolute(mesh).lexically_normal();
+    const auto whole = std::filesystem::weakly_canonical(named.parent_path(), error) / named.filename();
     lines += whole.lexically_relative(folder).generic_string() + "\n";
   }
   return lines;
@@ -195,6 +199,14 @@ std::span<const T> section(std::span<const std::byte> file, const FileHeader& he
   return {reinterpret_cast<const T*>(file.data() + header.first[which]), header.count[which]};
 }
 
+/// Copies a section: an array of its own, in huge pages, that no other process can change or cut off.
+template <typename T>
+void copySection(std::span<const std::byte> file, const FileHeader& header, FileSection which,
+                 HugeVector<T>& to) {
+  const auto elements = section<T>(file, header, which);
+  to.assign(elements.begin(), elements.end());
+}
+
 std::string text(std::span<const std::byte> file, const FileHeader& header, FileSection which) {
   const auto letters = section<char>(file, header, which);
   return {letters.begin(), letters.end()};
@@ -208,91 +220,10 @@ bool sectionsFit(const FileHeader& header) {
   return true;
 }
 
-/// Whether all sizes are sensible and every index of the field is within its array.
-bool fieldIsValid(const DistanceField::Layout& field) {
-  if (!(field.voxel > 0.0) || !std::isfinite(field.voxel) || !field.p_MoFo_M.allFinite()) return false;
-  if (!(field.band > 0.0) || !(field.margin >= 0.0) || field.refinement < 1 || field.refinement > 64)
-    return false;
-  std::uint64_t coarse = 1;
-  for (const std::int32_t count : field.bricks) {
-    if (count < 1 || count > 1'000'000) return false;
-    coarse *= static_cast<std::uint64_t>(count);
-  }
-  if (coarse > field.index.size() || field.far.size() != coarse) return false;
-  if (field.samples.size() % DistanceField::kBrickSamples != 0) return false;
-  // queries gather pairs of numbers at byte offsets of 31 bits
-  constexpr std::size_t kMaxBytes = std::numeric_limits<std::int32_t>::max();
-  if (field.samples.size_bytes() > kMaxBytes || field.far.size_bytes() > kMaxBytes / 2) return false;
-  if (field.far.size() < 2 || field.index.size() > kMaxBytes / 2) return false;
-  const std::size_t bricks = field.samples.size() / DistanceField::kBrickSamples;
-  const auto cubed = static_cast<std::size_t>(field.refinement * field.refinement * field.refinement);
-  for (std::size_t i = 0; i < field.index.size(); ++i) {
-    const DistanceField::Entry entry = field.index[i];
-    if (entry < DistanceField::kFarInside) return false;
-    if (entry < 0) continue;
-    if (entry < DistanceField::kRefined) {
-      if (static_cast<std::size_t>(entry) >= bricks) return false;
-      continue;
-    }
-    const auto children = static_cast<std::size_t>(entry - DistanceField::kRefined);
-    if (i >= coarse || children < coarse || children + cubed >= field.index.size()) return false;
-    const DistanceField::Entry own = field.index[children + cubed];
-    if (own < 0 || own >= DistanceField::kRefined) return false;
-  }
-  return true;
-}
-
-/// Whether `spheres` hold the elements `first` to `first` + `count` - 1 of the next finer list in order and
-/// without gaps, at most `most` each.
-bool tile(std::span<const ShellSphere> spheres, std::uint64_t first, std::uint64_t count,
-          std::uint32_t most) {
-  std::uint64_t next = first;
-  for (const ShellSphere& sphere : spheres) {
-    if (sphere.first != next || sphere.count > most) return false;
-    next += sphere.count;
-  }
-  return next == first + count;
-}
-
-/// What is wrong with a shell, or nothing. Levels, clusters and leaves must tile their points in order: a
-/// query takes a point's leaf and its area of a level by position.
-std::optional<std::string> problemOf(const Pointshell::Layout& shell) {
-  std::uint64_t points = 0;
-  std::uint64_t leaves = 0;
-  std::uint64_t clusters = 0;
-  for (const ShellLevel& level : shell.levels) {
-    if (level.first_point != points || level.first_leaf != leaves || level.first_cluster != clusters)
-      return "its levels do not follow one another";
-    points += level.point_count;
-    leaves += level.leaf_count;
-    clusters += level.cluster_count;
-    if (points > shell.points.size() || leaves > shell.leaves.size() || clusters > shell.clusters.size())
-      return "its levels have an index out of range";
-    if (!tile(shell.leaves.subspan(level.first_leaf, level.leaf_count), level.first_point, level.point_count,
-              Pointshell::kLeafPoints))
-      return "the leaves of a level do not hold each of its points once";
-    if (!tile(shell.clusters.subspan(level.first_cluster, level.cluster_count), level.first_leaf,
-              level.leaf_count, Pointshell::kClusterLeaves))
-      return "the clusters of a level do not hold each of its leaves once";
-  }
-  if (points != shell.points.size() || leaves != shell.leaves.size() || clusters != shell.clusters.size())
-    return "its levels do not hold each point once";
-  const auto finite = [](const ShellPoint& point) {
-    return point.p_MP.allFinite() && point.inward_M.allFinite() && std::isfinite(point.area);
-  };
-  if (!std::all_of(shell.points.begin(), shell.points.end(), finite)) return "a point is not finite";
-  return {};
-}
-
-/// What is wrong with features, or nothing: their points are those of a shell, each has an edge.
-std::optional<std::string> problemOf(const Pointshell::Layout& points, std::span<const FeatureEdge> edges) {
-  if (const auto problem = problemOf(points)) return problem;
-  if (edges.size() != points.points.size()) return "there is not an edge for each point";
-  const auto finite = [](const FeatureEdge& edge) {
-    return edge.half_M.allFinite() && edge.into_M[0].allFinite() && edge.into_M[1].allFinite();
-  };
-  if (!std::all_of(edges.begin(), edges.end(), finite)) return "an edge is not finite";
-  return {};
+bool infoIsFinite(const FileHeader& header) {
+  const auto finite = [](double number) { return std::isfinite(number); };
+  return finite(header.bake_seconds) && finite(header.surface_area) && finite(header.unit) &&
+         std::all_of(header.box_M.begin(), header.box_M.end(), finite);
 }
 
 Result<FileHeader> readHeader(const std::string& name, std::span<const std::byte> bytes) {
@@ -321,6 +252,15 @@ Result<FileHeader> readHeader(const std::string& name, std::span<const std::byte
 }  // namespace
 
 Result<void> writeStructures(const std::filesystem::path& file, const HapticStructures& structures) {
+  const Pointshell& shell = structures.shell;
+  const auto refused = [&file](const std::string& what) {
+    return fail(file.string() + ": not written, since it could not be read again: its " + what);
+  };
+  if (const auto problem = problemOf(structures.field.layout())) return refused("field " + *problem);
+  if (const auto problem = problemOf(shell.layout())) return refused("pointshell " + *problem);
+  const FeatureShell& features = structures.features;
+  if (const auto problem = problemOf(features.points().layout(), features.edges()))
+    return refused("feature shell " + *problem);
   FileHeader header = headerOf(structures);
   const std::string meshes = meshesFrom(file, structures.info);
   const auto sections = sectionsOf(structures, meshes);
@@ -338,16 +278,18 @@ Result<void> writeStructures(const std::filesystem::path& file, const HapticStru
   }
   header.checksum = checksumOf(header, rest);
 
-  const std::filesystem::path part = file.string() + ".part" + std::to_string(::getpid());
+  const bool in_place = isWrittenInPlace(file);
+  const std::filesystem::path part =
+      in_place ? file : std::filesystem::path(file.string() + ".part" + std::to_string(::getpid()));
   std::ofstream out(part, std::ios::binary | std::ios::trunc);
   out.write(reinterpret_cast<const char*>(&header), sizeof header);
   out.write(reinterpret_cast<const char*>(rest.data()), static_cast<std::streamsize>(rest.size()));
   out.close();
   std::error_code error;
-  if (out) std::filesystem::rename(part, file, error);
+  if (out && !in_place) std::filesystem::rename(part, file, error);
   if (!out || error) {
     std::error_code ignored;
-    std::filesystem::remove(part, ignored);
+    if (!in_place) std::filesystem::remove(part, ignored);
     return fail(file.string() + ": cannot be written" + (error ? ": " + error.message() : std::string{}));
   }
   return {};
@@ -361,35 +303,40 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
   const auto header = readHeader(name, bytes);
   if (!header) return tl::unexpected(header.error());
 
-  DistanceField::Layout field;
-  field.p_MoFo_M = Vector3::Map(header->p_MoFo_M.data());
-  field.voxel = header->voxel;
-  field.band = header->band;
-  field.margin = header->margin;
-  field.bricks = header->bricks;
-  field.refinement = header->refinement;
-  field.index = section<DistanceField::Entry>(bytes, *header, kIndex);
-  field.samples = section<std::int16_t>(bytes, *header, kSamples);
-  field.far = section<std::int16_t>(bytes, *header, kFar);
-  const Pointshell::Layout shell{
-      section<ShellPoint>(bytes, *header, kPoints), section<ShellSphere>(bytes, *header, kLeaves),
-      section<ShellSphere>(bytes, *header, kClusters), section<ShellLevel>(bytes, *header, kLevels)};
-  if (!field.index.empty() && !fieldIsValid(field))
-    return fail(name + ": its field has an index out of range; bake it again");
-  if (const auto problem = problemOf(shell))
-    return fail(name + ": its pointshell is damaged, " + *problem + "; bake it again");
-  const Pointshell::Layout features{section<ShellPoint>(bytes, *header, kFeaturePoints),
-                                    section<ShellSphere>(bytes, *header, kFeatureLeaves),
-                                    section<ShellSphere>(bytes, *header, kFeatureClusters),
-                                    section<ShellLevel>(bytes, *header, kFeatureLevels)};
-  const auto edges = section<FeatureEdge>(bytes, *header, kFeatureEdges);
-  if (const auto problem = problemOf(features, edges))
-    return fail(name + ": its features are damaged, " + *problem + "; bake it again");
-
+  FieldStorage field;
+  field.layout.p_MoFo_M = Vector3::Map(header->p_MoFo_M.data());
+  field.layout.voxel = header->voxel;
+  field.layout.band = header->band;
+  field.layout.margin = header->margin;
+  field.layout.bricks = header->bricks;
+  field.layout.refinement = header->refinement;
+  copySection(bytes, *header, kIndex, field.index);
+  copySection(bytes, *header, kSamples, field.samples);
+  copySection(bytes, *header, kFar, field.far);
+  ShellStorage shell;
+  copySection(bytes, *header, kPoints, shell.points);
+  copySection(bytes, *header, kLeaves, shell.leaves);
+  copySection(bytes, *header, kClusters, shell.clusters);
+  copySection(bytes, *header, kLevels, shell.levels);
+  FeatureStorage features;
+  copySection(bytes, *header, kFeaturePoints, features.points.points);
+  copySection(bytes, *header, kFeatureLeaves, features.points.leaves);
+  copySection(bytes, *header, kFeatureClusters, features.points.clusters);
+  copySection(bytes, *header, kFeatureLevels, features.points.levels);
+  copySection(bytes, *header, kFeatureEdges, features.edges);
+  const auto damaged = [&name](const std::string& what) {
+    return fail(name + ": its " + what + "; bake it again");
+  };
+  if (const auto problem = problemOf(shell.layout())) return damaged("pointshell " + *problem);
+  if (const auto problem = problemOf(features.points.layout(), features.edges))
+    return damaged("feature shell " + *problem);
+  if (!infoIsFinite(*header)) return damaged("header has a number that is not finite");
   auto structures = std::make_shared<HapticStructures>();
-  if (!field.index.empty()) structures->field = DistanceField(field, mapping);
-  structures->shell = Pointshell(shell, mapping);
-  structures->features = FeatureShell(Pointshell(features, mapping), edges, mapping);
+  const bool has_field = !field.index.empty() || !field.samples.empty() || !field.far.empty();
+  if (has_field) structures->field = makeField(std::move(field));
+  if (const auto problem = problemOf(structures->field.layout())) return damaged("field " + *problem);
+  structures->shell = makeShell(std::move(shell));
+  structures->features = makeFeatureShell(std::move(features));
   StructureInfo& info = structures->info;
   info.source = text(bytes, *header, kSource);
   info.content_hash = text(bytes, *header, kContentHash);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -49,7 +48,8 @@ using Triangle = std::array<Vector3, 3>;
   return above * above / normal.squaredNorm();
 }
 
-/// Whether the ray from p intersects a triangle (Moeller and Trumbore 1997). A ray in its plane does not.
+/// Whether the ray from p along `direction` (of any length) intersects a triangle (Moeller and Trumbore
+/// 1997). A ray in its plane does not.
 [[nodiscard]] inline bool rayIntersects(const Vector3& p, const Vector3& direction, const Triangle& t) {
   const Vector3 ab = t[1] - t[0];
   const Vector3 ac = t[2] - t[0];
@@ -85,12 +85,13 @@ using Triangle = std::array<Vector3, 3>;
   return std::sqrt(squared);
 }
 
-/// The corners in lexicographic order, so that results do not depend on the winding.
-[[nodiscard]] inline Triangle sortedCorners(Triangle t) {
-  std::sort(t.begin(), t.end(), [](const Vector3& a, const Vector3& b) {
-    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
-  });
-  return t;
+/// Both halves of a triangle, split at the middle of the edge from corner `from` to the next; the first one
+/// has that corner.
+[[nodiscard]] inline std::array<Triangle, 2> bisected(const Triangle& t, std::size_t from) {
+  const std::size_t to = (from + 1) % 3;
+  std::array<Triangle, 2> halves{t, t};
+  halves[0][to] = halves[1][from] = (t[from] + t[to]) / 2;
+  return halves;
 }
 
 }  // namespace tenon::structures

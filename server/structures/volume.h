@@ -9,8 +9,8 @@ namespace tenon::structures {
 struct Volume {
   double volume = 0.0;               ///< [m^3]; 0 when the field has no inside
   Vector3 p_MC_M = Vector3::Zero();  ///< centroid
-  Matrix3 inertia_C_M =
-      Matrix3::Zero();  ///< [m^5] about the centroid, for unit density; times kg/m^3: kg m^2
+  /// [m^5] about the centroid, for unit density; times kg/m^3: kg m^2
+  Matrix3 inertia_C_M = Matrix3::Zero();
 };
 
 /// Integrates over the field's inside voxel by voxel. The filled fraction of a voxel at the surface is

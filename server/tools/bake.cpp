@@ -11,11 +11,15 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "idl/types/output_files.h"
 #include "server/bake/import_pipe.h"
 #include "server/bake/length.h"
+#include "server/structures/voxel_limits.h"
 
 namespace tenon::tools {
 namespace {
+
+constexpr int kWrongUsage = 2;
 
 volatile std::sig_atomic_t interrupted = 0;
 
@@ -31,6 +35,7 @@ struct BakeArguments {
   std::string spacing;
   std::vector<std::string> refine;
   std::int32_t refinement = 4;
+  bool overwrite = false;
   bool quiet = false;
 };
 
@@ -67,11 +72,16 @@ Result<bake::BakeOptions> optionsFrom(const BakeArguments& arguments) {
   const auto voxel = bake::parseLength(arguments.voxel);
   if (!voxel) return fail("--voxel: " + voxel.error().what);
   options.voxel = *voxel;
+  if (options.voxel < structures::kSmallestVoxel || options.voxel > structures::kLargestVoxel)
+    return fail(fmt::format("--voxel {}: is {}, expected between {} and {}", arguments.voxel,
+                            readable(options.voxel), readable(structures::kSmallestVoxel),
+                            readable(structures::kLargestVoxel)));
   options.points = arguments.points;
   options.refinement = arguments.refinement;
   if (!arguments.spacing.empty()) {
     const auto spacing = bake::parseLength(arguments.spacing);
     if (!spacing) return fail("--spacing: " + spacing.error().what);
+    if (*spacing <= 0.0) return fail("--spacing " + arguments.spacing + ": must be greater than 0");
     options.point_spacing = *spacing;
   }
   for (const std::string& text : arguments.refine) {
@@ -79,6 +89,7 @@ Result<bake::BakeOptions> optionsFrom(const BakeArguments& arguments) {
     if (!box) return tl::unexpected(box.error());
     options.refine.push_back(*box);
   }
+  if (const auto valid = bake::checkOptions(options); !valid) return tl::unexpected(valid.error());
   return options;
 }
 
@@ -170,12 +181,27 @@ Result<void> writeShell(const std::string& file, const structures::Pointshell& s
   return {};
 }
 
-int printError(const Error& error) {
+int printError(const Error& error, int exit_code = 1) {
   fmt::print(stderr, "tenon-bake: {}\n", error.what);
-  return interrupted != 0 ? 130 : 1;
+  return interrupted != 0 ? 130 : exit_code;
+}
+
+/// The files of the command line; a cache's are no outputs.
+ProgramFiles filesOf(const BakeArguments& arguments) {
+  ProgramFiles files{.overwrite = arguments.overwrite};
+  if (!arguments.info.empty()) {
+    files.inputs = {arguments.info};
+    files.outputs = {arguments.shell};
+  } else if (arguments.cache.empty()) {
+    files.inputs.assign(arguments.meshes.begin(), arguments.meshes.end());
+    files.outputs = {arguments.output};
+  }
+  return files;
 }
 
 int run(const BakeArguments& arguments) {
+  if (const auto refusal = refuseOutputs(filesOf(arguments)))
+    return printError({refusal->what}, refusal->exit_code);
   if (!arguments.info.empty()) {
     const auto structures = structures::openStructures(arguments.info);
     if (!structures) return printError(structures.error());
@@ -185,9 +211,9 @@ int run(const BakeArguments& arguments) {
     return ok ? 0 : printError(ok.error());
   }
   const auto unit = bake::parseUnit(arguments.unit);
-  if (!unit) return printError({"--unit: " + unit.error().what});
+  if (!unit) return printError({"--unit: " + unit.error().what}, kWrongUsage);
   const auto options = optionsFrom(arguments);
-  if (!options) return printError(options.error());
+  if (!options) return printError(options.error(), kWrongUsage);
   const std::vector<std::filesystem::path> meshes(arguments.meshes.begin(), arguments.meshes.end());
   const bake::BakeProgress progress = progressFor(arguments);
   if (!arguments.cache.empty()) {
@@ -214,7 +240,7 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Computes the haptic structures of CAD meshes: a signed distance field and a pointshell. Meshes need\n"
       "no normals and need not be closed; several meshes become one object. Lengths are written 3mm,\n"
-      "0.5 mm or 0.003m.",
+      "0.5 mm or 0.003m; a bare number is in metres.",
       "tenon bake"};
   app.add_option(
       "MESH", arguments.meshes,
@@ -231,8 +257,10 @@ int main(int argc, char** argv) {
   app.add_option("--voxel", arguments.voxel, "edge of the field's voxels")->capture_default_str();
   app.add_option("--unit", arguments.unit, "length of one unit of the files: mm, cm, m, in")
       ->capture_default_str();
-  app.add_option("--points", arguments.points, "approximate number of shell points")->capture_default_str();
-  app.add_option("--spacing", arguments.spacing, "distance between shell points (instead of --points)");
+  auto* points = app.add_option("--points", arguments.points, "approximate number of shell points")
+                     ->capture_default_str();
+  app.add_option("--spacing", arguments.spacing, "distance between shell points (instead of --points)")
+      ->excludes(points);
   app.add_option("--refine", arguments.refine,
                  "x0,y0,z0,x1,y1,z1 of a box in which the surface gets finer voxels (repeatable; bare "
                  "numbers are metres)")
@@ -240,6 +268,7 @@ int main(int argc, char** argv) {
   app.add_option("--refinement", arguments.refinement,
                  "voxel size divided by that in --refine boxes: 1, 2, 4 or 8")
       ->capture_default_str();
+  app.add_flag("--overwrite", arguments.overwrite, kOverwriteHelp);
   app.add_flag("-q,--quiet", arguments.quiet, "no progress and no summary");
   app.footer("Exit codes: 0 success, 1 error (the reason is on stderr), 2 wrong usage, 130 interrupted.");
   try {

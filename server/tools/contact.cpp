@@ -1,5 +1,8 @@
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <memory>
 #include <vector>
@@ -7,6 +10,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "idl/types/output_files.h"
 #include "server/bake/surface_import.h"
 #include "server/collision/contact_refinement.h"
 #include "server/collision/pair_query.h"
@@ -28,6 +32,7 @@ struct ContactArguments {
   bool no_prune = false;
   bool interpolated = false;
   bool refine = false;
+  bool overwrite = false;
 };
 
 /// The contact at one pose; A is the body with the pointshell, B the body with the field.
@@ -39,9 +44,19 @@ struct PoseContact {
   double load_percent = 0.0;
 };
 
-int printError(const Error& error) {
+int printError(const Error& error, int exit_code = 1) {
   fmt::print(stderr, "tenon-contact: {}\n", error.what);
-  return 1;
+  return exit_code;
+}
+
+/// `--isa` names what this processor lacks (exit code 1), or nothing at all (2).
+int refuseIsa(const std::string& isa) {
+  constexpr std::array<std::string_view, 4> kIsas{"scalar", "sse4", "avx2", "avx512"};
+  std::string known;
+  for (const collision::QueryKernels& kernels : collision::supportedKernels())
+    known += " " + std::string(kernels.isa);
+  const bool exists = std::find(kIsas.begin(), kIsas.end(), isa) != kIsas.end();
+  return printError({"--isa " + isa + ": this processor has" + known}, exists ? 1 : 2);
 }
 
 std::vector<PoseContact> queryPoses(const structures::HapticStructures& field,
@@ -112,12 +127,11 @@ void printSummary(const std::vector<PoseContact>& rows, const structures::Haptic
 }
 
 int run(const ContactArguments& arguments) {
-  if (!arguments.isa.empty() && !collision::chooseKernels(arguments.isa)) {
-    std::string known;
-    for (const collision::QueryKernels& kernels : collision::supportedKernels())
-      known += " " + std::string(kernels.isa);
-    return printError({"--isa " + arguments.isa + ": this processor has" + known});
-  }
+  if (!arguments.isa.empty() && !collision::chooseKernels(arguments.isa)) return refuseIsa(arguments.isa);
+  ProgramFiles files{
+      {arguments.csv}, {arguments.field, arguments.shell, arguments.poses}, arguments.overwrite};
+  files.inputs.insert(files.inputs.end(), arguments.meshes.begin(), arguments.meshes.end());
+  if (const auto refusal = refuseOutputs(files)) return printError({refusal->what}, refusal->exit_code);
   const auto field = structures::openStructures(arguments.field);
   if (!field) return printError(field.error());
   if ((*field)->field.empty()) return printError({arguments.field + ": has no distance field"});
@@ -156,7 +170,10 @@ int main(int argc, char** argv) {
                  "instruction set: scalar, sse4, avx2 or avx512 (default: the best of this processor)");
   app.add_option("--stiffness", arguments.stiffness, "K [N/m], for each cm^2 of contact area")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check([](const std::string& text) {
+        const double number = std::strtod(text.c_str(), nullptr);
+        return std::isfinite(number) && number > 0.0 ? "" : "must be a number greater than 0";
+      });
   app.add_flag(
       "--refine", arguments.refine,
       "near ridges of the field, measure the deepest contacts against the mesh that FIELD was baked from");
@@ -164,6 +181,7 @@ int main(int argc, char** argv) {
       ->option_text("MESH...");
   app.add_flag("--interpolated", arguments.interpolated,
                "interpolated distances only, without ridge correction in thin walls and at edges");
+  app.add_flag("--overwrite", arguments.overwrite, kOverwriteHelp);
   app.add_flag("--no-prune", arguments.no_prune, "test every point, for comparison");
   app.footer(
       "`contacts` is the number of points inside; points deeper than the field's band exert no force.\n"

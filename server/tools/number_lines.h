@@ -66,7 +66,7 @@ class NumberLines {
   std::istream& in_;
   std::string source_;
   std::size_t line_ = 0;
-  std::vector<double> numbers_;
+  std::vector<double> numbers_;  ///< [any unit] of the last line
 };
 
 }  // namespace tenon::tools

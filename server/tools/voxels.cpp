@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "idl/types/output_files.h"
 #include "server/bake/length.h"
 #include "server/bake/octree_file.h"
 #include "server/bake/sweep.h"
@@ -10,6 +11,8 @@
 
 namespace tenon::tools {
 namespace {
+
+constexpr int kWrongUsage = 2;
 
 volatile std::sig_atomic_t interrupted = 0;
 
@@ -20,11 +23,12 @@ struct VoxelsArguments {
   std::string output;
   std::string cell = "5mm";
   std::string dilation = "0mm";
+  bool overwrite = false;
 };
 
-int printError(const Error& error) {
+int printError(const Error& error, int exit_code = 1) {
   fmt::print(stderr, "tenon-voxels: {}\n", error.what);
-  return interrupted != 0 ? 130 : 1;
+  return interrupted != 0 ? 130 : exit_code;
 }
 
 void printCells(const bake::VoxelSet& cells, std::size_t poses) {
@@ -50,17 +54,27 @@ void printClearance(const bake::Clearance& found) {
              found.exact ? found.distance : std::abs(found.distance), found.pose, p.x(), p.y(), p.z());
 }
 
-int run(const VoxelsArguments& arguments) {
+Result<bake::SweepOptions> optionsFrom(const VoxelsArguments& arguments) {
   bake::SweepOptions options;
   const auto cell = bake::parseLength(arguments.cell);
-  if (!cell) return printError({"--cell: " + cell.error().what});
+  if (!cell) return fail("--cell: " + cell.error().what);
+  if (*cell <= 0.0) return fail("--cell " + arguments.cell + ": must be greater than 0");
   options.cell = *cell;
   const auto dilation = bake::parseLength(arguments.dilation);
-  if (!dilation) return printError({"--grow: " + dilation.error().what});
+  if (!dilation) return fail("--grow: " + dilation.error().what);
+  if (*dilation < 0.0) return fail("--grow " + arguments.dilation + ": must be 0 or more");
   options.dilation = *dilation;
-  if (!arguments.output.empty() && !bake::isOctree(arguments.output)) {
-    return printError({arguments.output + ": must end in .bt or .ot"});
-  }
+  if (!arguments.output.empty() && !bake::isOctree(arguments.output))
+    return fail(arguments.output + ": must end in .bt or .ot");
+  return options;
+}
+
+int run(const VoxelsArguments& arguments) {
+  const auto options = optionsFrom(arguments);
+  if (!options) return printError(options.error(), kWrongUsage);
+  const ProgramFiles files{
+      {arguments.output}, {arguments.body, arguments.poses, arguments.scene}, arguments.overwrite};
+  if (const auto refusal = refuseOutputs(files)) return printError({refusal->what}, refusal->exit_code);
   const auto body = structures::openStructures(arguments.body);
   if (!body) return printError(body.error());
   std::vector<Pose> poses{Pose::Identity()};
@@ -70,7 +84,7 @@ int run(const VoxelsArguments& arguments) {
     poses = std::move(*read);
   }
   const bake::BakeProgress progress = [](double, std::string_view) { return interrupted == 0; };
-  const auto cells = bake::sweep(**body, poses, options, progress);
+  const auto cells = bake::sweep(**body, poses, *options, progress);
   if (!cells) return printError({arguments.body + ": " + cells.error().what});
   if (cells->count() == 0) {
     return printError(
@@ -80,7 +94,7 @@ int run(const VoxelsArguments& arguments) {
   if (!arguments.scene.empty()) {
     const auto scene = structures::openStructures(arguments.scene);
     if (!scene) return printError(scene.error());
-    const auto found = bake::clearance(**body, poses, (*scene)->field, options.cell / 2, progress);
+    const auto found = bake::clearance(**body, poses, (*scene)->field, options->cell / 2, progress);
     if (!found) return printError({arguments.scene + ": " + found.error().what});
     printClearance(*found);
   }
@@ -94,7 +108,7 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Voxelises a baked body at rest or along a path (the swept volume of a part or an arm), prints the\n"
       "volume and the clearance to a scene, and writes the filled cells as an OctoMap. Between two poses\n"
-      "the body translates linearly and rotates at constant angular velocity.",
+      "the body's centre translates linearly and it rotates at constant angular velocity.",
       "tenon voxels"};
   app.add_option("BODY", arguments.body, "structure file of the body (from tenon bake)")->required();
   app.add_option("--poses", arguments.poses,
@@ -107,6 +121,7 @@ int main(int argc, char** argv) {
   app.add_option("--cell", arguments.cell, "edge of a cell")->capture_default_str();
   app.add_option("--grow", arguments.dilation, "dilation of the body, at most the band of its field")
       ->capture_default_str();
+  app.add_flag("--overwrite", arguments.overwrite, kOverwriteHelp);
   app.footer(
       "A cell is filled when its middle is inside. Lengths are written 5mm, 0.5 cm or 0.005m. `tenon bake`\n"
       "accepts the octree as a mesh.\n"

@@ -67,10 +67,11 @@ class Commands(unittest.TestCase):
             server.wait_for("run: stopped", 30)
 
     def test_a_wrong_command_line_is_refused_with_the_usage(self):
-        for arguments, reason in ((["fly"], "unknown command 'fly'"), (["signal"], "usage: signal NAME"), ([], "no command given")):
+        for arguments, reason in ((["fly"], "unknown command 'fly'"), (["signal"], "usage: signal NAME"), ([], "no command given"),
+                                  (["pause", "--loudly"], "--loudly")):
             with self.subTest(arguments=arguments):
                 done = tenon("command", *arguments)
-                self.assertEqual(done.returncode, 1)
+                self.assertEqual(done.returncode, 2)
                 self.assertIn(reason, done.stderr)
 
 

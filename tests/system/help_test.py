@@ -1,6 +1,8 @@
-"""Every verb of `tenon` has help, and unknown ones are refused."""
+"""Every verb of `tenon` has help, and what cannot be understood or done is refused with one line and its exit code."""
 import re
+import tempfile
 import unittest
+from pathlib import Path
 
 from stage import SOURCE, tenon
 
@@ -24,9 +26,8 @@ class Help(unittest.TestCase):
             with self.subTest(verb=verb):
                 done = tenon(verb, "--help")
                 self.assertEqual(done.returncode, 0, done.stderr)
-                if verb != "version":  # takes nothing, and prints its one line whatever follows
-                    self.assertRegex(done.stdout, r"(?im)^usage: ")
-                    self.assertGreater(len(done.stdout.splitlines()), 2)
+                self.assertRegex(done.stdout, r"(?im)^usage: ")
+                self.assertGreater(len(done.stdout.splitlines()), 1)
 
     def test_every_role_has_help(self):
         for role in ("trainee", "instructor", "observer"):
@@ -34,6 +35,14 @@ class Help(unittest.TestCase):
                 done = tenon("join", "--role", role, "--help")
                 self.assertEqual(done.returncode, 0, done.stderr)
                 self.assertIn("--session", done.stdout)
+
+    def test_an_unknown_option_is_wrong_usage(self):
+        for verb in ("serve", "record", "report", "rehearse", "parts", "command", "bake", "probe", "contact", "voxels"):
+            with self.subTest(verb=verb):
+                self.assertEqual(tenon(verb, "--fly").returncode, 2)
+        for role in ("trainee", "instructor", "observer"):
+            with self.subTest(role=role):
+                self.assertEqual(tenon("join", "--role", role, "--fly").returncode, 2)
 
     def test_an_unknown_verb_is_one_clear_error(self):
         done = tenon("fly")
@@ -44,6 +53,67 @@ class Help(unittest.TestCase):
         done = tenon("join", "--role", "pilot")
         self.assertEqual(done.returncode, 2)
         self.assertIn("there is no role 'pilot'", done.stderr)
+
+
+SCENARIO = SOURCE / "scenarios" / "peg_and_box"
+# exit code, command line, what its answer says
+TABLE = (
+    (2, ["version", "--foo"], "version takes no options: '--foo'"),
+    (2, ["serve"], "name a scenario, as in: tenon serve scenarios/engine_bay"),
+    (2, ["serve", SCENARIO, "--wait-for", "nobody"], "--wait-for: cannot wait for 'nobody'"),
+    (2, ["serve", SCENARIO, "--workers", 0], "--workers"),
+    (2, ["serve", SCENARIO, "--domain", 500], "--domain"),
+    (1, ["serve", "nosuch"], "nosuch"),
+    (2, ["command"], "no command given"),
+    (2, ["command", "foo"], "unknown command 'foo'"),
+    (2, ["command", "signal"], "usage: signal NAME"),
+    (2, ["join", "--role", "trainee", "--device", "nosuch"], "--device: unknown bimanual device 'nosuch'; known: hug-sim"),
+    (2, ["join", "--role", "trainee", "--device", "sigma7-sim"], "--device: unknown bimanual device 'sigma7-sim'; known: hug-sim"),
+    (2, ["join", "--role", "trainee", "--tactors", "nosuch"], "--tactors: unknown device 'nosuch'; known devices: sigma7-sim"),
+    (2, ["join", "--role", "instructor", "--device", "nosuch"], "--device: unknown device 'nosuch'; known devices: sigma7-sim"),
+    (2, ["join", "--role", "instructor", "--device", "hug-sim"], "--device: device 'hug-sim' is bimanual"),
+    (2, ["join", "--role", "observer", "--domain", 999], "--domain"),
+    (2, ["demo", "--workers", 0], "'0' is not a number from 1 to 64"),
+    (2, ["demo", "--detail", 7], "'7' is not a number from 0 to 1"),
+    (2, ["demo", "--domain", 500], "'500' is not a number from 0 to 230"),
+    (2, ["demo", "--seed", "one"], "'one' is not a number"),
+    (2, ["bake", "a.stl", "-o", "a.tenon", "--voxel", "-1mm"], "--voxel -1mm: is -1 mm, expected between 20 um and 100 mm"),
+    (2, ["bake", "a.stl", "-o", "a.tenon", "--voxel", "2"], "--voxel 2: is 2 m, expected between 20 um and 100 mm"),
+    (2, ["bake", "a.stl", "-o", "a.tenon", "--voxel", "2 foot"], "--voxel: '2 foot' is not a length"),
+    (2, ["bake", "a.stl", "-o", "a.tenon", "--unit", "km"], "--unit: 'km' is not a unit of length"),
+    (2, ["bake", "a.stl", "-o", "a.tenon", "--refine", "1,2,3"], "--refine 1,2,3: expected x0,y0,z0,x1,y1,z1"),
+    (2, ["bake", "a.stl", "-o", "a.tenon", "--refinement", 3], "the refinement must be 1, 2, 4 or 8"),
+    (2, ["bake", "a.stl", "-o", "a.tenon", "--points", 0], "the number of shell points must be 1 to 1,000,000"),
+    (2, ["bake", "a.stl", "-o", "a.tenon", "--spacing", "0mm"], "--spacing 0mm: must be greater than 0"),
+    (2, ["bake", "a.stl", "-o", "a.tenon", "--spacing", "1mm", "--points", 100], "--points excludes --spacing"),
+    (1, ["bake", "nosuch.stl", "-o", "a.tenon"], "nosuch.stl"),
+    (2, ["contact", "a", "b", "--poses", "c", "--isa", "foo"], "--isa foo: this processor has scalar"),
+    (2, ["contact", "a", "b", "--poses", "c", "--stiffness", "-3"], "--stiffness: must be a number greater than 0"),
+    (1, ["contact", "a", "b", "--poses", "c"], "a: cannot be read"),
+    (2, ["voxels", "a", "--cell", "0mm"], "--cell 0mm: must be greater than 0"),
+    (1, ["probe", "nosuch"], "nosuch: cannot be read"),
+    (2, ["parts", "nosuch", "a"], "no scenario 'nosuch'"),
+    (2, ["rehearse", SCENARIO, "--seconds", "-1"], "--seconds -1: expected 0.001 to 1000000"),
+    (2, ["rehearse", SCENARIO, "--device", "nosuch"], "--device: unknown device 'nosuch'"),
+    (1, ["report", "nosuch.mcap"], "nosuch.mcap"),
+    (1, ["resimulate", "nosuch.mcap"], "tenon resimulate: nosuch.mcap"),
+    (2, ["resimulate", "nosuch.mcap", "--fly"], "--fly"),
+)
+
+
+class ExitCodes(unittest.TestCase):
+    def test_wrong_usage_is_2_and_could_not_is_1_each_with_one_line(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for code, words, said in TABLE:
+                with self.subTest(command=" ".join(map(str, words))):
+                    done = tenon(*words, cwd=folder)
+                    self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+                    self.assertEqual(done.stdout, "")
+                    answer = [line for line in done.stderr.splitlines() if not line.startswith(("usage: ", " ", "Run with --help"))]
+                    self.assertEqual(len(answer), 1, done.stderr)
+                    self.assertIn(said, answer[0])
+                    self.assertLess(len(answer[0]), 250)
+            self.assertEqual(list(Path(folder).iterdir()), [], "nothing was begun")
 
 
 if __name__ == "__main__":

@@ -101,7 +101,7 @@ class Queries(unittest.TestCase):
         poses.write_text("\n".join(lines) + "\n", encoding="utf-8")
         for arguments in ((), ("--no-prune",)):
             table = Path(folder) / "table.csv"
-            done = tenon("contact", field, shell, "--poses", poses, "--csv", table, *arguments)
+            done = tenon("contact", field, shell, "--poses", poses, "--csv", table, "--overwrite", *arguments)
             self.assertEqual(done.returncode, 0, done.stderr)
             rows = [line.split(",") for line in table.read_text(encoding="utf-8").splitlines()[1:]]
             # all columns but time and load

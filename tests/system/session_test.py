@@ -1,5 +1,8 @@
 """Sessions between processes: lockstep over DDS and re-simulation give the same state hash as one process."""
+import os
+import time
 import unittest
+from pathlib import Path
 
 from stage import SOURCE, Stage, final_hash, tenon
 
@@ -8,6 +11,17 @@ SCENARIO = "peg_and_box"
 
 def rehearse(*arguments):
     return tenon("rehearse", SOURCE / "scenarios" / SCENARIO, "--seed", 1, "--no-instructor", *arguments)
+
+
+def scheduling(pid, names):
+    """Class, priority and permitted CPUs of the threads of a process that have one of these names, by name."""
+    found = {}
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        name = (task / "comm").read_text(encoding="utf-8").strip()
+        if name in names:
+            thread = int(task.name)
+            found[name] = (os.sched_getscheduler(thread), os.sched_getparam(thread).sched_priority, sorted(os.sched_getaffinity(thread)))
+    return found
 
 
 class Session(unittest.TestCase):
@@ -54,6 +68,11 @@ class Session(unittest.TestCase):
                 self.assertEqual(again.returncode, 0, again.stdout + again.stderr)
                 self.assertEqual(final_hash(again.stdout), over_dds)
 
+            beside = tenon("resimulate", "session.mcap", cwd=stage.out)
+            self.assertEqual(beside.returncode, 1)
+            self.assertEqual(beside.stderr, "tenon resimulate: session.mcap: does not name its scenario; name it as well, as in: "
+                                            "tenon resimulate session.mcap scenarios/engine_bay\n")
+
             edited = stage.out / SCENARIO / "scenario.yaml"
             edited.parent.mkdir()
             text = (SOURCE / "scenarios" / SCENARIO / "scenario.yaml").read_text(encoding="utf-8")
@@ -70,6 +89,28 @@ class Session(unittest.TestCase):
             report = tenon("report", recording, "-o", stage.out)
             self.assertEqual(report.returncode, 0, report.stdout + report.stderr)
             self.assertTrue((stage.out / "report.html").exists())
+            twice = tenon("report", recording, "-o", stage.out)
+            self.assertEqual(twice.returncode, 1)
+            self.assertEqual(twice.stderr, f"tenon-report: {stage.out / 'report.html'}: exists; --overwrite replaces it\n")
+            self.assertEqual(tenon("report", recording, "-o", stage.out, "--overwrite").returncode, 0)
+
+    def test_the_workers_of_a_tick_are_scheduled_as_its_thread(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve(SCENARIO, "--workers", 3)
+            stage.start("trainee", "--seed", 1)
+            names = {"tick", "tick worker 1", "tick worker 2"}
+            deadline = time.monotonic() + 120
+            threads = {}
+            # until the tick's thread is there and has its class, or the server has said that it was not granted
+            while set(threads) != names or (threads["tick"][0] != os.SCHED_FIFO and "without real-time priority" not in server.text()):
+                self.assertLess(time.monotonic(), deadline, f"{threads}\n{server.text()}")
+                time.sleep(0.02)
+                threads = scheduling(server.popen.pid, names)
+            # its workers follow before the first tick
+            while len({str(threads[name]) for name in names}) > 1 and time.monotonic() < deadline:
+                time.sleep(0.02)
+                threads = scheduling(server.popen.pid, names)
+            self.assertEqual(threads, {name: threads["tick"] for name in names})
 
 
 if __name__ == "__main__":

@@ -36,9 +36,9 @@ def free_domain():
     raise AssertionError("all DDS domains of the tests are in use")
 
 
-def tenon(*arguments, timeout=600, env=None, input=None):
+def tenon(*arguments, timeout=600, env=None, input=None, cwd=None):
     """Runs `tenon` with the programs of this build and waits for its end."""
-    return subprocess.run([TENON, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, input=input,
+    return subprocess.run([TENON, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, input=input, cwd=cwd,
                           env={**os.environ, "TENON_PROGRAMS": str(PROGRAMS), **(env or {})})
 
 

@@ -1,5 +1,6 @@
 """Output and files of the verbs that need no running session."""
 import json
+import os
 import re
 import signal
 import subprocess
@@ -30,6 +31,8 @@ class Verbs(unittest.TestCase):
     def test_doctor_checks_every_item(self):
         done = tenon("doctor")
         self.assertEqual(done.returncode, 0, done.stdout)
+        programs = [file for file in PROGRAMS.glob("tenon-*") if file.name != "tenon-bench"]
+        self.assertIn(f" {len(programs)} programs are there", done.stdout)
         for point in ("system", "processor", "programs", "real time", "memory", "bus", "disk"):
             self.assertRegex(done.stdout, rf"(?m)^(good|note) +{point}")
 
@@ -122,7 +125,8 @@ class Verbs(unittest.TestCase):
             tables = {}
             for arguments in ((), ("--isa", "scalar"), ("--no-prune",)):
                 table = Path(folder) / "table.csv"
-                done = tenon("contact", baked, baked, "--poses", poses, "--csv", table, "--stiffness", "500", *arguments)
+                done = tenon("contact", baked, baked, "--poses", poses, "--csv", table, "--overwrite", "--stiffness", "500",
+                             *arguments)
                 self.assertEqual(done.returncode, 0, done.stderr)
                 self.assertIn("2, 1 in contact", done.stdout)
                 rows = [line.split(",") for line in table.read_text(encoding="utf-8").splitlines()]
@@ -143,7 +147,7 @@ class Verbs(unittest.TestCase):
             poses.write_text("0.0195 0.0195 0.003 1 0 0 0\n", encoding="utf-8")
             depths = []
             for arguments in (("--interpolated",), (), ("--refine",), ("--refine", "--mesh", Path(folder) / "cube.off")):
-                done = tenon("contact", baked, baked, "--poses", poses, "--csv", table, *arguments)
+                done = tenon("contact", baked, baked, "--poses", poses, "--csv", table, "--overwrite", *arguments)
                 self.assertEqual(done.returncode, 0, done.stderr)
                 depths.append(float(table.read_text(encoding="utf-8").splitlines()[1].split(",")[3]))
             self.assertLess(depths[0], 0.0004)
@@ -191,8 +195,9 @@ class Verbs(unittest.TestCase):
                 self.assertEqual(done.returncode, 1)
                 self.assertIn(complaint, done.stderr)
             poses.write_text("0 0 0 1 0 0 0\n", encoding="utf-8")
-            self.assertIn("--isa abacus: this processor has scalar",
-                          tenon("contact", baked, baked, "--poses", poses, "--isa", "abacus").stderr)
+            abacus = tenon("contact", baked, baked, "--poses", poses, "--isa", "abacus")
+            self.assertEqual(abacus.returncode, 2)
+            self.assertIn("--isa abacus: this processor has scalar", abacus.stderr)
             self.assertEqual(tenon("contact", baked, "missing.tenon", "--poses", poses).returncode, 1)
 
     def test_voxels_of_a_path_are_measured_written_and_baked_again(self):
@@ -213,13 +218,15 @@ class Verbs(unittest.TestCase):
     def test_voxels_with_wrong_arguments_are_refused(self):
         with tempfile.TemporaryDirectory() as folder:
             baked = cube(folder)
-            for arguments, complaint in ((("-o", Path(folder) / "cube.stl"), "must end in .bt or .ot"),
-                                     (("--cell", "0.1um"), "choose larger ones"),
-                                     (("--cell", "50mm"), "no cell's middle is inside"),
-                                     (("--poses", "missing"), "missing: cannot be read"),
-                                     (("--scene", "missing"), "missing")):
+            for code, arguments, complaint in ((2, ("-o", Path(folder) / "cube.stl"), "must end in .bt or .ot"),
+                                               (2, ("--cell", "0mm"), "--cell 0mm: must be greater than 0"),
+                                               (2, ("--grow", "-1mm"), "--grow -1mm: must be 0 or more"),
+                                               (1, ("--cell", "0.1um"), "choose larger ones"),
+                                               (1, ("--cell", "50mm"), "no cell's middle is inside"),
+                                               (1, ("--poses", "missing"), "missing: cannot be read"),
+                                               (1, ("--scene", "missing"), "missing")):
                 done = tenon("voxels", baked, *arguments)
-                self.assertEqual(done.returncode, 1, arguments)
+                self.assertEqual(done.returncode, code, arguments)
                 self.assertIn(complaint, done.stderr)
                 self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
 
@@ -234,12 +241,94 @@ class Verbs(unittest.TestCase):
 
     def test_the_demo_leaves_report_recording_and_journal(self):
         with tempfile.TemporaryDirectory() as folder:
+            report = Path(folder) / "report.html"
+            report.write_text("of an earlier demo", encoding="utf-8")
             done = tenon("demo", "--scenario", "peg_and_box", "--no-instructor", "--lockstep", "--headless", "--domain", free_domain(),
-                         "--out", folder, timeout=800)
+                         "--out", folder, "--overwrite", timeout=800)
             self.assertEqual(done.returncode, 0, done.stdout[-3000:] + done.stderr[-1000:])
             self.assertTrue(re.fullmatch(r"final state hash: [0-9a-f]{16}", done.stdout.strip().splitlines()[-1]))
             for file in ("report.html", "session.mcap", "journal.mcap", "scene.png"):
                 self.assertTrue((Path(folder) / file).exists(), file)
+            self.assertIn("<html", report.read_text(encoding="utf-8"))
+
+
+class Overwriting(unittest.TestCase):
+    """A file that exists is replaced with `--overwrite` only, an input never."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+        self.baked = cube(self.folder)
+        (self.folder / "poses").write_text("0.0195 0 0 1 0 0 0\n", encoding="utf-8")
+
+    def file(self, name):
+        file = self.folder / name
+        file.write_text("mine", encoding="utf-8")
+        return file
+
+    def assert_refused(self, code, file, why, *words):
+        before = file.read_bytes()
+        done = tenon(*words)
+        self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+        self.assertIn(f"{file}: {why}", done.stderr)
+        self.assertEqual(file.read_bytes(), before)
+
+    def test_what_exists_is_kept_and_replaced_with_overwrite(self):
+        mesh, poses = self.folder / "cube.off", self.folder / "poses"
+        for name, words in (("a.tenon", ["bake", mesh, "--voxel", "2mm", "--points", 100, "--quiet", "-o"]),
+                            ("shell.csv", ["bake", "--info", self.baked, "--shell"]),
+                            ("a.bt", ["voxels", self.baked, "-o"]),
+                            ("a.csv", ["contact", self.baked, self.baked, "--poses", poses, "--csv"]),
+                            ("a.png", ["parts", "peg_and_box", "--picture"])):
+            with self.subTest(command=" ".join(map(str, words))):
+                file = self.file(name)
+                self.assert_refused(1, file, "exists; --overwrite replaces it", *words, file)
+                done = tenon(*words, file, "--overwrite")
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertNotEqual(file.read_bytes(), b"mine")
+
+    def test_one_file_of_a_folder_that_exists_is_enough(self):
+        self.file("peg.stl")
+        self.assert_refused(1, self.folder / "peg.stl", "exists; --overwrite", "parts", "peg_and_box", self.folder)
+        self.assertFalse((self.folder / "box_with_hole.stl").exists())
+        self.assertEqual(tenon("parts", "peg_and_box", self.folder, "--overwrite").returncode, 0)
+        self.assertTrue((self.folder / "box_with_hole.stl").exists())
+        for words in (["report", "session.mcap", "-o", self.folder], ["demo", "--headless", "--out", self.folder]):
+            self.assert_refused(1, self.file("summary.json"), "exists; --overwrite", *words)
+
+    def test_a_session_does_not_begin(self):
+        journal, scenario = self.file("journal.mcap"), SOURCE / "scenarios" / "peg_and_box"
+        self.assert_refused(1, journal, "exists; --overwrite", "serve", scenario, "--journal", journal)
+        self.assert_refused(1, journal, "exists; --overwrite", "record", "-o", journal, "--domain", free_domain())
+        self.assert_refused(1, self.folder / "cube.off", "is not the file of a seat", "join", "--role", "trainee", "--seat",
+                            self.folder / "cube.off")
+
+    def test_an_input_is_never_an_output(self):
+        mesh, poses = self.folder / "cube.off", self.folder / "poses"
+        link = self.folder / "link.tenon"
+        link.symlink_to(mesh)
+        scenario = self.folder / "scenario.yaml"
+        scenario.write_text((SOURCE / "scenarios" / "peg_and_box" / "scenario.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+        for file, words in ((mesh, ["bake", mesh, "-o", mesh]), (link, ["bake", mesh, "-o", link]),
+                            (self.baked, ["bake", "--info", self.baked, "--shell", self.baked]),
+                            (poses, ["contact", self.baked, self.baked, "--poses", poses, "--csv", poses]),
+                            (scenario, ["serve", self.folder, "--journal", scenario])):
+            with self.subTest(command=" ".join(map(str, words))):
+                self.assert_refused(2, file, "is an input of this command", *words, "--overwrite")
+
+    def test_a_pipe_is_written_and_stays_a_pipe(self):
+        pipe, copy = self.folder / "pipe", self.folder / "copy.tenon"
+        os.mkfifo(pipe)
+        with copy.open("wb") as out:
+            reader = subprocess.Popen(["cat", pipe], stdout=out)
+        self.addCleanup(reader.kill)
+        done = tenon("bake", self.folder / "cube.off", "-o", pipe, "--voxel", "2mm", "--points", 100, "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(reader.wait(60), 0)
+        self.assertTrue(pipe.is_fifo())
+        self.assertEqual(tenon("bake", "--info", copy).returncode, 0)
 
 
 class BenchNightly(unittest.TestCase):

@@ -5,10 +5,12 @@
 #include "idl/types/ids.h"
 #include "idl/types/spatial.h"
 
-/// Inputs to the simulation from programs that are no stations.
+/// Inputs to the simulation from programs other than stations.
 namespace tenon {
 
-/// External wrench on an object.
+/// External wrench on an object. The server ignores one that is not finite, clamps it to 50 N and 5 Nm (about
+/// what a haptic device exerts) and its lifetime to 100 ticks, and fades it linearly over that lifetime
+/// (ForceBuffer in server/simulation/force_buffer.h).
 struct ForceContribution {
   std::uint32_t source = 0;  ///< its cell of the force accumulator
   ClientId client;

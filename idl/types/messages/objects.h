@@ -12,7 +12,8 @@ namespace tenon {
 
 struct ObjectState {
   ObjectId object;
-  std::uint32_t epoch = 0;  ///< increased with every jump of the pose, which displays must not interpolate
+  std::uint32_t epoch =
+      0;  ///< increased with every jump of the pose: displays must not interpolate across it
   Pose X_WO;
   Eigen::Matrix<float, 6, 1> V_WO =
       Eigen::Matrix<float, 6, 1>::Zero();  ///< linear [m/s], angular [rad/s], in W
@@ -32,7 +33,8 @@ enum class ObjectStatus : std::uint8_t {
 
 inline constexpr int kStatesPerFrame = 12;
 
-/// Object states at one tick, in numbered parts; in lockstep all objects, else moved and some other ones.
+/// Object states at one tick, in numbered parts: in lockstep of all objects, in real time of those that moved
+/// and, round robin, of some at rest.
 struct WorldFrame {
   std::uint32_t part = 0;
   std::uint32_t parts = 1;

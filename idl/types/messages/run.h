@@ -10,6 +10,9 @@ namespace tenon {
 
 enum class RunPhase : std::uint32_t { kWaitingForPeople, kRunning, kPaused, kSucceeded, kFailed, kStopped };
 
+/// Succeeded, failed or stopped.
+[[nodiscard]] constexpr bool isOver(RunPhase phase) { return phase >= RunPhase::kSucceeded; }
+
 /// Phase of the session.
 struct RunState {
   RunPhase phase = RunPhase::kWaitingForPeople;
@@ -23,7 +26,7 @@ struct RecorderStatus {
   std::string file;
   bool recording = false;
   std::uint64_t messages = 0;  ///< written
-  std::uint64_t lost = 0;      ///< ticks whose TickInput is missing in the recording
+  std::uint64_t lost = 0;      ///< samples that the server published and that are missing in the recording
   std::string problem;         ///< why it does not record; or empty
 };
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "idl/types/ids.h"
@@ -14,6 +15,14 @@ struct LocalizedText {
   std::string language;  ///< `en`, `de`, ...
   std::string text;
 };
+
+/// The text in `language`, else the first one; empty when there is none.
+[[nodiscard]] inline std::string localized(const std::vector<LocalizedText>& texts,
+                                           std::string_view language) {
+  for (const LocalizedText& text : texts)
+    if (text.language == language) return text.text;
+  return texts.empty() ? std::string() : texts.front().text;
+}
 
 enum class StepPhase : std::uint32_t { kWaiting, kActive, kDone, kTimedOut, kSkipped };
 

@@ -22,7 +22,8 @@ struct TickStats {
   std::uint64_t state_hash = 0;      ///< after this tick
 };
 
-/// Time stamps of a request to the server and of its answer, each of the sender's own monotonic clock.
+/// Time stamps of a request to the server and of its answer, each by the monotonic clock of the program that
+/// set it.
 struct ClockSync {
   ClientId client;
   std::int64_t sent_ns = 0;             ///< [ns] by the client

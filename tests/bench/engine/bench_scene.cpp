@@ -33,7 +33,7 @@ Result<BakedMesh> bakePart(const BenchSceneOptions& options, const BakedPart& pa
   const std::string mesh = (options.folder / "parts" / (std::string(part.name) + ".stl")).string();
   const std::string file = (options.folder / (std::string(part.name) + ".tenon")).string();
   const auto usage = runMeasured("tenon-bake", {mesh, "-o", file, "--voxel", part.voxel, "--points",
-                                                part.points, "--unit", "mm", "--quiet"});
+                                                part.points, "--unit", "mm", "--quiet", "--overwrite"});
   if (!usage) return fail(usage.error().what);
   const auto structures = structures::openStructures(file);
   if (!structures) return fail(structures.error().what);
@@ -53,8 +53,9 @@ Result<BenchScene> makeScene(const BenchSceneOptions& options, const ProgressCal
   progress("generating the parts");
   std::error_code error;
   std::filesystem::create_directories(options.folder / "parts", error);
-  const auto parts = runMeasured("tenon-parts", {"engine_bay", (options.folder / "parts").string(),
-                                                 "--detail", fmt::format("{}", options.detail)});
+  const auto parts =
+      runMeasured("tenon-parts", {"engine_bay", (options.folder / "parts").string(), "--detail",
+                                  fmt::format("{}", options.detail), "--overwrite"});
   if (!parts) return fail(parts.error().what);
   BenchScene scene;
   scene.bake = {

@@ -75,21 +75,17 @@ std::vector<TableCell> row(const char* name, int count, const FreeBoxes& boxes) 
   simulation::Environment environment(boxes.scene(), {});
   std::vector<double> times;
   double queries = 0.0;
-  double substeps = 0.0;
+  double steps = 0.0;
   double iterations = 0.0;
   for (int i = 0; i < kTicks; ++i) {
     times.push_back(microsecondsOf([&] { environment.step(); }));
     queries += environment.work().queried_pairs;
-    substeps += environment.work().substeps;
+    steps += environment.work().steps;
     iterations += environment.work().iterations;
   }
   const Percentiles times_us = percentilesOf(std::move(times));
-  return {name,
-          static_cast<double>(count),
-          queries / kTicks,
-          substeps / kTicks,
-          iterations / kTicks,
-          times_us.median,
+  return {name,           static_cast<double>(count), queries / kTicks,
+          steps / kTicks, iterations / kTicks,        times_us.median,
           times_us.p99};
 }
 
@@ -99,10 +95,10 @@ Table heapsTable(const ProgressCallback& progress) {
   Table table;
   table.name = "heaps";
   table.title = "Whole ticks while free boxes settle on each other (item 9)";
-  table.columns = {"arrangement", "boxes", "queried pairs", "sub-steps", "iterations", "median us", "p99 us"};
+  table.columns = {"arrangement", "boxes", "queried pairs", "SQP steps", "iterations", "median us", "p99 us"};
   table.notes = {
       fmt::format("boxes of {:.0f} mm, the first {} ticks after release, one worker; "
-                  "queried pairs, sub-steps, iterations: per tick",
+                  "queried pairs, SQP steps, iterations: per tick",
                   1000.0 * kEdge, kTicks)};
   for (const int count : {10, 20, 40}) {
     progress(fmt::format("heaps of {} boxes", count));

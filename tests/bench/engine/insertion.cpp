@@ -117,7 +117,7 @@ void summarize(report::SessionAnalysis& analysis, const Percentiles& compute) {
 Result<InsertionResult> rehearseInsertion(const std::filesystem::path& scenario,
                                           const std::filesystem::path& cache, double detail,
                                           const ProgressCallback& progress) {
-  game_control::progress("loading the engine bay");
+  progress("loading the engine bay");
   const auto loaded = session::loadScene(scenario, {.cache = cache, .detail = detail});
   if (!loaded) return fail(loaded.error().what);
   auto trainee = trainee::TraineeStation::open({});
@@ -127,11 +127,10 @@ Result<InsertionResult> rehearseInsertion(const std::filesystem::path& scenario,
   InsertionResult insertion;
   InsertionMonitor monitor(*loaded, insertion.analysis);
   rehearse::RehearsalOptions options;
-  options.on_tick = [&](const session::TickInput& input, const session::TickOutput& output) {
-    monitor.record(input, output);
-  };
+  options.on_tick = [&](const session::SessionSimulation&, const session::TickInput& input,
+                        const session::TickOutput& output) { monitor.record(input, output); };
   options.stop_when = [&] { return monitor.done(); };
-  game_control::progress("mounting the control box");
+  progress("mounting the control box");
   const auto report = rehearse::runRehearsal(*loaded, std::move(stations), options);
   if (!report) return fail(report.error().what);
   if (!monitor.done()) return fail("the control box was not mounted: " + report->reason);

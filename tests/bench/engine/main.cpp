@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "clients/report/page.h"
+#include "idl/types/output_files.h"
 #include "server/session/scene_loader.h"
 #include "tests/bench/engine/bench_scene.h"
 #include "tests/bench/engine/corner_path.h"
@@ -32,6 +33,7 @@ struct BenchArguments {
   std::vector<std::string> only;
   std::string json;
   std::string figures;
+  bool overwrite = false;
   std::filesystem::path cache = session::defaultCache();
   std::string scenario;
 };
@@ -154,12 +156,22 @@ int run(int argc, char** argv) {
   app.add_option("--json", arguments.json, "write the tables to this file as JSON");
   app.add_option("--figures", arguments.figures,
                  "write a report page with force, penetration, load and computation time of the insertion");
+  app.add_flag("--overwrite", arguments.overwrite, kOverwriteHelp);
   app.add_option("--cache", arguments.cache, "folder for generated parts and haptic structures")
       ->option_text("DIR");
   app.footer(
       "Times are comparable only within one run, on an otherwise idle machine.\n"
-      "Exit code: 0 when all tables were produced, 1 otherwise.");
-  CLI11_PARSE(app, argc, argv);
+      "Exit codes: 0 all tables were produced, 1 error (the reason is on stderr), 2 wrong usage.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (const auto refusal =
+          refuseOutputs({.outputs = {arguments.json, arguments.figures}, .overwrite = arguments.overwrite})) {
+    reportError(refusal->what);
+    return refusal->exit_code;
+  }
   if (arguments.benchmark == "corner") {
     fmt::print("{}", cornerPath());
     return 0;

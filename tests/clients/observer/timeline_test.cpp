@@ -156,9 +156,32 @@ TEST_F(TimelineTest, PrintsWhatWaitedAndAllThatHappenedBeforeIt) {
   timeline_.printReceivedBefore(Timeline::Clock::time_point::min());
   EXPECT_EQ(output_.text(), "");
   timeline_.printReceivedBefore(limit);
-  const std::string first = "   1.00 s  Ben (observer) is here\n   2.00 s  hand 'right' is held still\n";
+  const std::string first =
+      "   1.00 s  Ben (observer) is here\n"
+      "   2.00 s  ! hand 'right' is held still: no movement arrives from the station in time\n";
   EXPECT_EQ(output_.text(), first);
   EXPECT_EQ(printed(), first + "   3.00 s  hand 'right' moves again\n");
+}
+
+// Five hands stall every 100 ms for 50 ms, as on a busy machine, and then for two seconds.
+TEST_F(TimelineTest, TellsThatHandsStallOnceASecondAndOfAllTogether) {
+  timeline_.receive(sceneObject(ObjectId{3}, "Trainee", "head"));
+  const std::vector<std::string> hands{"'right'", "'left'", "'forearm'", "'head'", "'instructor'"};
+  const auto tellOfAll = [&](Tick tick, const std::string& kind, const std::string& what) {
+    for (const std::string& hand : hands) timeline_.receive(event(tick, kind, "hand " + hand + what));
+  };
+  for (Tick tick = 1000; tick < 3000; tick += 100) {
+    tellOfAll(tick, "hand frozen", " is held still (last input 60 ms ago)");
+    tellOfAll(tick + 50, "hand free", " moves again");
+    timeline_.receive(event(tick + 50, "taken", "Trainee (head hand)"));
+  }
+  tellOfAll(3000, "hand frozen", " is held still (last input 60 ms ago)");
+  tellOfAll(5000, "hand free", " moves again");
+  tellOfAll(6000, "hand gone", " is absent: the object it held is parked");
+  const std::string all = "hands 'right', 'left', 'forearm', 'head', 'instructor'";
+  const std::string still = "  ! " + all + " are held still: no movement arrives from the station in time\n";
+  EXPECT_EQ(printed(), "   1.00 s" + still + "   2.00 s" + still + "   3.00 s" + still + "   5.00 s  " + all +
+                           " move again\n   6.00 s  ! " + all + " are absent: what they held is parked\n");
 }
 
 TEST_F(TimelineTest, TellsProgressEveryTwoSecondsFromTheBeginOfTheStep) {

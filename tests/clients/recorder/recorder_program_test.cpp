@@ -76,7 +76,7 @@ class RecorderProgramTest : public ::testing::Test {
       .session = "class",
       .domain = test::ownDomain()};
   std::atomic<bool> stop_{false};
-  Result<RecorderStatus> result_;
+  Result<RecordingReport> result_;
   std::thread thread_;
 };
 

@@ -9,6 +9,7 @@
 
 #include "idl/record/instance_state.h"
 #include "idl/record/mcap_reader.h"
+#include "idl/types/messages/contacts.h"
 #include "idl/types/messages/journal.h"
 #include "idl/types/messages/log.h"
 #include "idl/types/messages/objects.h"
@@ -120,9 +121,58 @@ TEST_F(RecordingTest, SessionAndOutcomeAreMetadata) {
 
 TEST_F(RecordingTest, MissingTickInputsAreCounted) {
   Recording recording = open(true);
+  recording.joined(4);
   for (const Tick tick : {5, 6, 6, 9, 10})
     add(recording, wire::kTickInput, TickInputPart{.tick = tick}, kStart);
   EXPECT_EQ(recording.status().lost, 2U);
+}
+
+TEST_F(RecordingTest, InputsBeforeTheFirstAndAfterTheLastOneReceivedAreMissingToo) {
+  Recording recording = open(true);
+  for (const Tick tick : {2, 3}) add(recording, wire::kTickInput, TickInputPart{.tick = tick}, kStart);
+  EXPECT_EQ(recording.status().lost, 1U);
+  add(recording, wire::kRunState, RunState{.phase = RunPhase::kSucceeded, .tick = 5}, kStart);
+  EXPECT_EQ(recording.status().lost, 3U);
+}
+
+// In period 1 the server published 3 frames and 2 manifolds a tick, in period 2 nothing is missing.
+TEST_F(RecordingTest, WhatTheServerPublishedAndDidNotArriveIsCountedByTopic) {
+  Recording recording = open(true);
+  const auto addTick = [&](Tick tick, int frames, int manifolds) {
+    for (int i = 0; i < frames; ++i) add(recording, wire::kWorldFrame1k, WorldFrame{.tick = tick}, kStart);
+    for (int i = 0; i < manifolds; ++i)
+      add(recording, wire::kHandManifold, HandManifold{.tick = tick}, kStart);
+  };
+  addTick(1, 3, 2);
+  addTick(1000, 3, 1);
+  const PublishedSamples first{1, 1000, {{"WorldFrame_1k", 6}, {"HandManifold", 4}, {"TickStats_100", 2}}};
+  add(recording, wire::kPublishedSamples, first, kStart);
+  EXPECT_EQ(recording.status().lost, 0U) << "samples of the period may be on their way";
+  addTick(1001, 3, 2);
+  EXPECT_EQ(recording.status().lost, 1U) << "those of the next period have come";
+  const PublishedSamples second{1001, 1001, {{"WorldFrame_1k", 3}, {"HandManifold", 2}}};
+  add(recording, wire::kPublishedSamples, second, kStart);
+  EXPECT_FALSE(recording.hasStatement());
+  add(recording, wire::kRunState, RunState{.phase = RunPhase::kSucceeded, .tick = 1001}, kStart);
+  EXPECT_TRUE(recording.hasStatement());
+  EXPECT_EQ(recording.status().lost, 3U) << "no statistics came at all";
+  ASSERT_TRUE(recording.close());
+  auto reader = record::McapReader::open(file_);
+  ASSERT_TRUE(reader && reader->complete());
+  const auto samples = reader->metadata().find("tenon samples");
+  ASSERT_NE(samples, reader->metadata().end());
+  EXPECT_EQ(samples->second.at("WorldFrame_1k"), "9 of 9");
+  EXPECT_EQ(samples->second.at("HandManifold"), "5 of 6");
+  EXPECT_EQ(samples->second.at("TickStats_100"), "0 of 2");
+}
+
+TEST_F(RecordingTest, OfThePeriodInWhichItJoinedNothingIsExpected) {
+  Recording recording = open(false);
+  recording.joined(500);
+  add(recording, wire::kPublishedSamples, PublishedSamples{1, 1000, {{"WorldFrame_1k", 1000}}}, kStart);
+  add(recording, wire::kPublishedSamples, PublishedSamples{1001, 2000, {{"WorldFrame_1k", 7}}}, kStart);
+  add(recording, wire::kRunState, RunState{.phase = RunPhase::kStopped, .tick = 2000}, kStart);
+  EXPECT_EQ(recording.status().lost, 7U);
 }
 
 TEST_F(RecordingTest, FailsWithASentenceWhenTheFileCannotBeWritten) {

@@ -65,6 +65,14 @@ TEST_F(ReportTest, MeanForceIsTakenOverTheTimeInContact) {
   EXPECT_NEAR(analysis.visits[0].metrics.mean_force, 12.0 * 2.0 / 3.14159, 0.4);
 }
 
+TEST_F(ReportTest, FiguresDoNotDependOnTheOrderInWhichTopicsArrive) {
+  nlohmann::json by_tick = summaryJson(analyze());
+  nlohmann::json by_topic = summaryJson(analyze({.arrives_by_topic = true}));
+  for (nlohmann::json* summary : {&by_tick, &by_topic}) summary->erase("began_ns");
+  EXPECT_GT(by_tick["whole"]["mean_force"], 1.0);
+  EXPECT_EQ(by_tick.dump(1), by_topic.dump(1));
+}
+
 TEST_F(ReportTest, HasTheRealTimePerformance) {
   const SessionAnalysis analysis = analyze();
   EXPECT_EQ(analysis.late_ticks, 2U);

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
 #include <random>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "idl/record/mcap_writer.h"
 #include "idl/types/messages/contacts.h"
@@ -26,7 +29,8 @@ struct SyntheticSession {
   bool skips_a_step = false;
   std::uint32_t steps = 4;
   Tick ticks_per_step = 2000;
-  double peak_force = 18.0;  ///< [N] in the last step, for one tick
+  double peak_force = 18.0;       ///< [N] in the last step, for one tick
+  bool arrives_by_topic = false;  ///< topics reach the recorder one after the other, not tick by tick
 };
 
 /// Writes the recording of a synthetic session: a trainee takes and inserts parts with contact in each step,
@@ -51,17 +55,31 @@ class SyntheticRecording {
                  .tick = end,
                  .reason = parameters_.succeeds ? "all steps done" : "a step was not done in time",
                  .final_hash = 0xFEED});
+    if (parameters_.arrives_by_topic)
+      std::stable_sort(sent_.begin(), sent_.end(),
+                       [](const Sent& a, const Sent& b) { return a.topic > b.topic; });
+    for (const Sent& sent : sent_) write(sent);
     static_cast<void>(writer_.close());
   }
 
  private:
+  struct Sent {
+    std::string_view topic;
+    std::string_view type;
+    Tick tick = 0;
+    std::vector<std::uint8_t> bytes;
+  };
+
   template <class M>
   void put(const wire::Topic<M>& topic, const M& message) {
-    auto [channel, is_new] = channels_.try_emplace(topic.name, 0);
-    if (is_new) channel->second = writer_.addChannel(topic.name, wire::typeName<M>(), wire::idlText());
+    sent_.push_back({topic.name, wire::typeName<M>(), tick_, *wire::encode(message)});
+  }
+  void write(const Sent& sent) {
+    auto [channel, is_new] = channels_.try_emplace(sent.topic, 0);
+    if (is_new) channel->second = writer_.addChannel(sent.topic, sent.type, wire::idlText());
     constexpr std::int64_t kStart = 1'790'000'000'000'000'000;
-    static_cast<void>(writer_.write(channel->second, kStart + static_cast<std::int64_t>(tick_) * 1'000'000, 0,
-                                    *wire::encode(message)));
+    static_cast<void>(writer_.write(
+        channel->second, kStart + static_cast<std::int64_t>(sent.tick) * 1'000'000, 0, sent.bytes));
   }
 
   void tick() {
@@ -142,6 +160,7 @@ class SyntheticRecording {
   SyntheticSession parameters_;
   record::McapWriter writer_;
   std::map<std::string_view, std::uint16_t> channels_;
+  std::vector<Sent> sent_;
   Tick tick_ = 0;
   std::mt19937_64 random_{5};
 };

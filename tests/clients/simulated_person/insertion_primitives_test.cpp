@@ -26,7 +26,7 @@ TEST(InsertionPrimitives, PushAdvancesBelowTheTargetForceAndYieldsAboveIt) {
 TEST(InsertionPrimitives, LateralComplianceKeepsTheDepth) {
   const Pose X_WAim(Vector3(0.1, 0.2, 0.3));
   const Pose X_WO(Vector3(0.104, 0.2, 0.25));
-  const Vector3 p_WHalf = compliedLaterally(X_WO, X_WAim, kDown, 0.5).translation();
+  const Vector3 p_WHalf = compliedLaterally(X_WO, X_WAim, Vector3::Zero(), kDown, 0.5).translation();
   EXPECT_TRUE(p_WHalf.isApprox(Vector3(0.102, 0.2, 0.3), 1e-12)) << p_WHalf;
 }
 
@@ -36,9 +36,9 @@ TEST(InsertionPrimitives, SmallTiltsAreCompliedWithVisibleTiltsAreCorrected) {
   const Vector3 large(0.1, 0.0, 0.0);
   const Pose X_WSmall(Vector3::Zero(), expRotation(small));
   const Pose X_WLarge(Vector3::Zero(), expRotation(large));
-  EXPECT_TRUE(
-      logRotation(compliedInRotation(X_WSmall, X_WG, X_WG, 0.5).rotation()).isApprox(0.5 * small, 1e-6));
-  EXPECT_EQ(compliedInRotation(X_WLarge, X_WG, X_WG, 0.5), X_WG);
+  EXPECT_TRUE(logRotation(compliedInRotation(X_WSmall, X_WG, X_WG, Vector3::Zero(), 0.5).rotation())
+                  .isApprox(0.5 * small, 1e-6));
+  EXPECT_EQ(compliedInRotation(X_WLarge, X_WG, X_WG, Vector3::Zero(), 0.5), X_WG);
   EXPECT_EQ(tiltCorrection(Vector3::Zero(), X_WSmall, X_WG, kDt), Vector3::Zero());
   EXPECT_LT(tiltCorrection(Vector3::Zero(), X_WLarge, X_WG, kDt).x(), 0.0) << "against the tilt";
   EXPECT_NEAR(tiltCorrection({-10.0, 0.0, 0.0}, X_WLarge, X_WG, kDt).norm(), 0.3, 1e-12)

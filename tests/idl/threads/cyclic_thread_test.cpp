@@ -1,6 +1,8 @@
 #include "idl/threads/cyclic_thread.h"
 
 #include <memory>
+#include <string>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -29,6 +31,28 @@ TEST_F(CyclicThreadTest, TicksOncePerPeriod) {
   thread.stop();
   EXPECT_EQ(ticks, (std::vector<std::uint64_t>{0, 1, 2, 3, 4}));
   EXPECT_EQ(thread.lateTicks(), 0U);
+}
+
+TEST_F(CyclicThreadTest, PreparesOnItsThreadBeforeTheFirstTickAndReportsWhatWasNotGranted) {
+  std::thread::id prepared;
+  std::thread::id ticked;
+  bool ticks_before = false;
+  CyclicThread thread(clock_,
+                      {.prepare =
+                           [&] {
+                             prepared = std::this_thread::get_id();
+                             ticks_before = ticked != std::thread::id();
+                             return std::string("no cake");
+                           }},
+                      [&](std::uint64_t) { ticked = std::this_thread::get_id(); });
+  thread.start();
+  EXPECT_EQ(thread.notGranted(), "no cake");
+  clock_->waitUntilAsleep();
+  advance(milliseconds(1));
+  thread.stop();
+  EXPECT_EQ(prepared, ticked);
+  EXPECT_NE(prepared, std::this_thread::get_id());
+  EXPECT_FALSE(ticks_before);
 }
 
 TEST_F(CyclicThreadTest, DoesNotTickBeforeTheEndOfThePeriod) {

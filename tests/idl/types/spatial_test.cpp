@@ -24,6 +24,13 @@ class Spatial : public ::testing::Test {
   std::mt19937_64 random_{1};
 };
 
+TEST_F(Spatial, ClampNormKeepsTheDirectionAndBoundsTheNorm) {
+  EXPECT_EQ(clampNorm({3.0, 0.0, 4.0}, 5.0), Vector3(3.0, 0.0, 4.0));
+  EXPECT_TRUE(clampNorm({3.0, 0.0, -4.0}, 2.5).isApprox(Vector3(1.5, 0.0, -2.0)));
+  EXPECT_EQ(clampNorm({3.0, 0.0, 4.0}, 0.0), Vector3::Zero());
+  EXPECT_EQ(clampNorm(Vector3::Zero(), 0.0), Vector3::Zero());
+}
+
 TEST_F(Spatial, AngleOfIsTheArcTangent) {
   for (int i = 0; i < 10'000; ++i) {
     const double y = std::abs(number(10.0));
@@ -72,6 +79,22 @@ TEST_F(Spatial, DisplacedIsTheInverseOfDisplacement) {
     EXPECT_LT((X_WB_again.translation() - X_WB.translation()).norm(), 1e-12);
     EXPECT_LT(X_WB_again.rotation().angularDistance(X_WB.rotation()), 1e-7);
   }
+}
+
+TEST_F(Spatial, TheDisplacementOfAnotherPointIsOfThatPoint) {
+  for (int i = 0; i < 500; ++i) {
+    const Pose X_WA(vector(2.0), expRotation(rotationVector()));
+    const Pose X_WB(vector(2.0), expRotation(rotationVector()));
+    const Vector3 p_OQ_O = vector(2.0);
+    const Displacement motion = displacement(X_WA, X_WB, p_OQ_O);
+    EXPECT_LT((motion.translation - (X_WB * p_OQ_O - X_WA * p_OQ_O)).norm(), 1e-12);
+    const Pose X_WB_again = displaced(X_WA, motion, p_OQ_O);
+    EXPECT_LT((X_WB_again.translation() - X_WB.translation()).norm(), 1e-12);
+    EXPECT_LT(X_WB_again.rotation().angularDistance(X_WB.rotation()), 1e-7);
+  }
+  const Pose turned = displaced(Pose(), {Vector3::Zero(), Vector3(0, 0, std::numbers::pi)}, Vector3(1, 0, 0));
+  EXPECT_LT((turned.translation() - Vector3(2, 0, 0)).norm(), 1e-12)
+      << "about that point, not about the origin";
 }
 
 //   A --X_AB--> B --X_BC--> C

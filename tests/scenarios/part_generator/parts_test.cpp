@@ -9,6 +9,7 @@
 #include "scenarios/part_generator/mesh_builder.h"
 #include "scenarios/part_generator/picture.h"
 #include "scenarios/part_generator/scenario_parts.h"
+#include "scenarios/part_generator/scenario_pictures.h"
 
 namespace tenon::part_generator {
 namespace {
@@ -172,6 +173,19 @@ TEST(RenderScene, WritesAPngOrFailsWhenItCannot) {
   ASSERT_TRUE(renderScene(scene, camera, temporaryFile("cube.png")));
   EXPECT_EQ(bytesOf(temporaryFile("cube.png")).substr(1, 3), "PNG");
   EXPECT_FALSE(renderScene(scene, camera, "/no/such/folder/cube.png"));
+}
+
+TEST(DrawScenario, DrawsEverySetBeforeAndInTheAssembly) {
+  for (const PartSet& set : partSets()) {
+    std::string pictures[2];
+    for (const PictureMoment moment : {PictureMoment::kStart, PictureMoment::kAssembly}) {
+      const std::filesystem::path file = temporaryFile("scenario.png");
+      ASSERT_TRUE(drawScenario(set, 0.0, moment, file, 64)) << set.name;
+      pictures[static_cast<int>(moment)] = bytesOf(file);
+    }
+    EXPECT_EQ(pictures[0].substr(1, 3), "PNG") << set.name;
+    EXPECT_NE(pictures[0], pictures[1]) << set.name;
+  }
 }
 
 }  // namespace

@@ -18,7 +18,8 @@ class IslandRig {
                       double rotational_stiffness = 20.0) {
     collision::MovableBody body;
     body.X_WB = X_WB;
-    body.radius = structures->shell.radius();
+    body.p_BQ = structures->shell.boundingCentre();
+    body.radius = structures->shell.boundingRadius();
     body.springs.push_back({X_WB, Vector3::Zero(), stiffness, rotational_stiffness});
     bodies_.push_back(body);
     structures_.push_back(structures);

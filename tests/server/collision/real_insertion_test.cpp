@@ -94,7 +94,7 @@ struct Effort {
   bool sheet = false;    ///< first against a sheet of zero thickness beside the block
 };
 
-//        |  |  tilted by 2 degrees, a third of a millimetre beside the axis
+//         |  |      tilted by 2 degrees, a third of a millimetre beside the axis
 //  ----  ~|  |~~    a sheet of zero thickness beside the block with the hole
 void insertAndRetract(const PegCase& one, const Effort& effort) {
   constexpr double kHoleTop = 0.009;
@@ -230,10 +230,9 @@ TEST(RealThreadNightly, ANutThatStartsTiltedIsScrewedOnAndOff) {
   insertion.expectSmallForcesAndNoOverlap();
 }
 
-//      |#|   the small gear is put on its shaft tilted, its teeth between those of the medium one, which
-//      turns
-//  ##|##|#|  freely on its own shaft; the small one turns the other half as far, and is taken off again
-//  ________
+//       |#|   the small gear is put on its shaft tilted, its teeth between those of the medium one, which
+//  ##|##|#|   turns freely on its own shaft; the small one turns the other half as far, and is taken off
+//  ________   again
 TEST(RealGearsNightly, AGearIsPutOnItsShaftDrivesItsNeighbourAndIsTakenOff) {
   const std::string folder = "nv_factory_gears/";
   constexpr double kBoreClearance = 0.000027;

@@ -11,10 +11,12 @@ namespace {
 /// A SceneView with one pose, force and contact flag for all objects, set by the test.
 struct SceneStub final : SceneView {
   Pose X_WO;
+  Vector3 p_OQ_O = Vector3::Zero();
   Vector3 F_W = Vector3::Zero();
   bool contact = false;
 
   [[nodiscard]] Pose pose(ObjectId) const noexcept override { return X_WO; }
+  [[nodiscard]] Vector3 centre(ObjectId) const noexcept override { return p_OQ_O; }
   [[nodiscard]] Vector3 force(ObjectId) const noexcept override { return F_W; }
   [[nodiscard]] bool inContact(ObjectId, ObjectId) const noexcept override { return contact; }
   [[nodiscard]] bool inAnyContact(ObjectId) const noexcept override { return contact; }
@@ -68,6 +70,21 @@ TEST_F(Conditions, APoseIsMetWithinBothTolerances) {
   EXPECT_TRUE(step());
   scene_.X_WO.rotation().coeffs() *= -1.0;
   EXPECT_TRUE(step()) << "q and -q are one orientation";
+}
+
+// a peg 0.94 degrees from its target about its own centre, with the frame's origin 0.94 m away: that is 15 mm
+// off
+TEST_F(Conditions, APoseIsThatOfTheObjectsCentre) {
+  tree_ = {leaf(ConditionKind::kPose)};
+  scene_.p_OQ_O = Vector3(0.94, 0, 0);
+  tree_[0].X_WG = Pose(-scene_.p_OQ_O);
+  const Vector3 off(0.00049, 0, 0);
+  const Quaternion q_WO = expRotation(Vector3(0, 0, 0.0164));
+  scene_.X_WO = Pose(off - q_WO * scene_.p_OQ_O, q_WO);
+  EXPECT_TRUE(step());
+  EXPECT_NEAR(progress_.reading(0).value, 0.00049, 1e-12);
+  scene_.X_WO.translation() += Vector3(0.002, 0, 0);
+  EXPECT_FALSE(step());
 }
 
 TEST_F(Conditions, DwellRestartsAfterAnInterruption) {

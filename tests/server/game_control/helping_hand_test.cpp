@@ -84,7 +84,7 @@ TEST(MayTake, ErrorsNameFileLineAndReason) {
   EXPECT_THAT(error("[instructor]"), HasSubstr("'may_take' of state 'mount' must be a mapping"));
   EXPECT_THAT(error("{right: part}"), HasSubstr("'right' moves 'part' already"));
   EXPECT_THAT(error("{left: part}"), HasSubstr("small/scenario.yaml:"));
-  EXPECT_THAT(error("{instructor: pointer}"), HasSubstr("'pointer' is the own object of hand 'right'"));
+  EXPECT_THAT(error("{instructor: pointer}"), HasSubstr("'pointer' is the default object of hand 'right'"));
   EXPECT_THAT(error("{instructor: prat}"), HasSubstr("did you mean 'part'?"));
 }
 

@@ -7,6 +7,7 @@
 
 #include "server/game_control/scenario.h"
 #include "tests/server/game_control/scenario_fixture.h"
+#include "tests/support/distant_origin.h"
 
 namespace tenon::game_control {
 namespace {
@@ -79,6 +80,34 @@ TEST(SceneBuilder, RefusesATargetFarFromAllObjects) {
                 test::smallStructures());
   ASSERT_FALSE(scene);
   EXPECT_THAT(scene.error().what, HasSubstr("the target of state 'mount'"));
+}
+
+TEST(SceneBuilder, RefusesPosesOutOfReach) {
+  const auto refusal = [](const std::string& from, const std::string& to) {
+    const auto scene =
+        makeScene(parsed(test::with(test::smallScenario(), from, to)), test::smallStructures());
+    return scene ? std::string() : scene.error().what;
+  };
+  EXPECT_THAT(refusal("at: [0, 0, -20 mm]", "at: [0, 0, -20 m]"),
+              HasSubstr("scenario.yaml:16: the target of state 'mount' is 2e+04 mm from the world's origin, "
+                        "expected at most 'reach', 1e+04 mm"));
+  EXPECT_THAT(refusal("at: [0.2, 0, 0.1]", "at: [200, 0, 0.1]"),
+              HasSubstr("scenario.yaml:4: the start of object 'part' is 2e+05 mm from the world's origin"));
+  EXPECT_THAT(
+      refusal("    hands: {right: part}", "    place: {cube: {at: [0, 30 m, 0]}}\n    hands: {right: part}"),
+      HasSubstr("scenario.yaml:16: the place of 'cube' at the begin of state 'mount' is 3e+04 mm"));
+}
+
+TEST(SceneBuilder, APoseIsOutOfReachByTheObjectsCentre) {
+  const Vector3 p_OC_O(15.0, 0.0, 0.0);
+  std::vector<test::StructuresPtr> structures = smallStructures();
+  structures[1] = test::boxStructuresAt(p_OC_O, Vector3::Constant(0.04), 0.002, 0.005);
+  std::string text = test::with(smallScenario(), "at: [0.2, 0, 0.1]", "at: [-14.8, 0, 0.1]");
+  text = test::with(text, "at: [0, 0, -20 mm]", "at: [-15 m, 0, -20 mm]");
+  const auto scene = makeScene(parsed(text), structures);
+  EXPECT_TRUE(scene) << scene.error().what;
+  EXPECT_FALSE(makeScene(parsed(smallScenario()), structures))
+      << "here the origin is in reach, the part is not";
 }
 
 //   part's box, swept back up along its approach

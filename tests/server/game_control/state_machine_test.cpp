@@ -1,6 +1,9 @@
 #include "server/game_control/state_machine.h"
 
+#include <cmath>
 #include <cstdint>
+#include <cstring>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -184,7 +187,7 @@ TEST(StateMachine, RolesFollowTheOwnObjectsOfSwappedHands) {
   fixture.environment().setHandPose(HandId{1}, Pose(Vector3(0.2, 0.3, 0.3)), Twist{});
   const std::uint32_t before = fixture.status().revision;
   fixture.step({command(CommandKind::kSwapHands)});
-  EXPECT_EQ(fixture.status().hand, HandId{1}) << "the hand whose own object is the pointer";
+  EXPECT_EQ(fixture.status().hand, HandId{1}) << "the hand whose default object is the pointer";
   EXPECT_GT(fixture.status().revision, before);
   fixture.step({command(CommandKind::kSkipStep)});
   fixture.step(2);
@@ -243,6 +246,23 @@ TEST(StateMachine, RefusesAnInvalidSavedState) {
   const auto restored = fixture.machine().restore(bytes);
   ASSERT_FALSE(restored);
   EXPECT_NE(restored.error().what.find("step 77"), std::string::npos) << restored.error().what;
+}
+
+TEST(StateMachine, RefusesASavedStateWithANumberThatIsNotFinite) {
+  test::ScenarioFixture fixture(test::smallScenario());
+  fixture.step(10);
+  const std::vector<std::uint8_t> good = fixture.machine().save();
+  const std::vector<std::size_t> doubles = fixture.machine().savedDoubles();
+  ASSERT_EQ(doubles.size(), 3 + 2 * kMaxConditions)
+      << "errors and time of the step, a reading for each condition";
+  for (const std::size_t at : doubles) {
+    for (const double number : {std::nan(""), -std::numeric_limits<double>::infinity()}) {
+      std::vector<std::uint8_t> bad = good;
+      std::memcpy(bad.data() + at, &number, sizeof number);
+      ASSERT_FALSE(fixture.machine().restore(bad)) << number << " at byte " << at;
+    }
+  }
+  EXPECT_TRUE(fixture.machine().restore(good));
 }
 
 TEST(StateMachine, StepAllocatesNothingAndLocksNothing) {

@@ -116,6 +116,21 @@ TEST_F(JournalTest, HasScenarioDetailAndFingerprint) {
   EXPECT_EQ(fingerprint->structures, fingerprintOf(loaded_).structures);
 }
 
+TEST_F(JournalTest, ItsScenarioIsFoundFromItsOwnFolderTooAndOtherwiseTheErrorSaysWhatToName) {
+  const JournalOrigin origin{"beside/scenario.yaml", 1.0, {}};
+  const auto missing = findScenario(file_, origin);
+  ASSERT_FALSE(missing);
+  for (const char* text : {"session.mcap: was recorded with the scenario 'beside/scenario.yaml'",
+                           "tenon resimulate", "scenarios/engine_bay"})
+    EXPECT_THAT(missing.error().what, HasSubstr(text));
+
+  const auto beside = file_.parent_path() / "beside" / "scenario.yaml";
+  std::filesystem::create_directory(beside.parent_path());
+  std::ofstream(beside) << "title: any\n";
+  EXPECT_EQ(findScenario(file_, origin).value(), beside);
+  EXPECT_EQ(findScenario("elsewhere.mcap", {beside.string(), 1.0, {}}).value(), beside);
+}
+
 TEST_F(JournalTest, AChangedInputIsADifferenceAtItsTick) {
   write([](JournalEntry& entry) {
     if (entry.input.tick == 321) entry.input.readings[0].X_WH.translation().x() += 1e-12;

@@ -1,5 +1,6 @@
 #include "server/session/session_registry.h"
 
+#include <cmath>
 #include <limits>
 #include <string>
 
@@ -245,6 +246,18 @@ TEST_F(SessionRegistryTest, CommandsArePermittedByRole) {
   EXPECT_EQ(ack.id, commands_) << "the ack carries the id of its command";
 }
 
+// it would be in the next checkpoint, which no reader takes
+TEST_F(SessionRegistryTest, ACommandWithAValueThatIsNotFiniteIsRefused) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId instructor = join("a", Role::kInstructor).client;
+  (void)changes();
+  const CommandAck ack = registry_.handleCommand(
+      {.client = instructor, .id = 1, .kind = CommandKind::kSkipStep, .value = std::nan("")});
+  EXPECT_FALSE(ack.accepted);
+  EXPECT_THAT(ack.reason, HasSubstr("not a finite number"));
+  EXPECT_TRUE(changes().empty());
+}
+
 TEST_F(SessionRegistryTest, NamesInCommandsAreResolvedToIndices) {
   registry_.updatePhase(RunPhase::kRunning, false);
   const ClientId instructor = join("a", Role::kInstructor).client;
@@ -283,7 +296,7 @@ TEST_F(SessionRegistryTest, AClientReleasesAndSwapsOnlyHandsItControls) {
   EXPECT_TRUE(command(both, CommandKind::kSwapHands).accepted);
 }
 
-TEST_F(SessionRegistryTest, ExternalForcesAreLimited) {
+TEST_F(SessionRegistryTest, OfExternalForcesThoseOfStrangersOnNothingAndNotFiniteAreRefused) {
   const ClientId trainee = join("a", Role::kTrainee).client;
   const ClientId observer = join("b", Role::kObserver).client;
   const ForceContribution push{.source = 4,
@@ -296,7 +309,7 @@ TEST_F(SessionRegistryTest, ExternalForcesAreLimited) {
   EXPECT_EQ(change->kind, ChangeKind::kContributeForce);
   EXPECT_EQ(change->object, ObjectId{1});
   EXPECT_EQ(change->index, 4U);
-  EXPECT_EQ(change->lifetime_ticks, 100U) << "the force of a source that has ended expires";
+  EXPECT_EQ(change->lifetime_ticks, 1'000'000U) << "limits are those of the ForceBuffer";
   EXPECT_EQ(change->F_Oo_W.force, Vector3(0, 0, 5));
 
   const auto refuses = [&](auto&& corrupt) {
@@ -308,7 +321,8 @@ TEST_F(SessionRegistryTest, ExternalForcesAreLimited) {
   EXPECT_TRUE(refuses([&](ForceContribution& f) { f.client = ClientId{9}; }));
   EXPECT_TRUE(refuses([&](ForceContribution& f) { f.object = ObjectId{99}; }));
   EXPECT_TRUE(refuses([&](ForceContribution& f) { f.object = {}; }));
-  EXPECT_TRUE(refuses([&](ForceContribution& f) { f.F_Oo_W.force = Vector3(0, 0, 201); }));
+  EXPECT_FALSE(refuses([&](ForceContribution& f) { f.F_Oo_W.force = Vector3(0, 0, 201); }));
+  EXPECT_TRUE(refuses([&](ForceContribution& f) { f.F_Oo_W.force = Vector3(0, kNan, 0); }));
   EXPECT_TRUE(refuses([&](ForceContribution& f) { f.F_Oo_W.torque = Vector3(0, kNan, 0); }));
 }
 

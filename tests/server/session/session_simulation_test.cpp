@@ -1,6 +1,8 @@
 #include "server/session/session_simulation.h"
 
+#include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <vector>
 
@@ -263,6 +265,86 @@ TEST(SessionSimulation, RefusesACheckpointThatIsTruncatedOrOfAnotherScenario) {
   ASSERT_FALSE(restored);
   EXPECT_FALSE(restored.error().what.empty());
   ASSERT_TRUE(again.restore(saved)) << "a failed restore does not affect the next one";
+  EXPECT_EQ(again.hash(), rig.simulation().hash());
+}
+
+TEST(SessionSimulation, AHandTakesAnObjectAtItsOwnPoseAndLetsItGoAsAnyOther) {
+  const Pose X_WH(Vector3(0.3, 0.1, 0.25), Quaternion(0.6, 0.0, 0.8, 0.0));
+  for (const bool attached_before : {false, true}) {
+    test::SessionRig rig(1, {kRightHand, kLeftHand});  // no state begins without the left hand
+    const ObjectId part = rig.loaded().scenario->objectNamed("part");
+    rig.attach(kRightHand, Vector3::Zero());
+    rig.reading(kRightHand).X_WH = X_WH;
+    if (attached_before) rig.tick(3);
+    rig.change({.kind = ChangeKind::kTake, .hand = kRightHand, .object = part});
+    rig.tick();
+    EXPECT_EQ(rig.hand(kRightHand).object, part);
+    EXPECT_EQ(rig.hand(kRightHand).X_HO, Pose::Identity()) << "the hand's frame is the object's";
+    EXPECT_EQ(rig.object("part").status, ObjectStatus::kHeld);
+    EXPECT_NEAR((rig.object("part").X_WO.translation() - X_WH.translation()).norm(), 0.0, 1e-12);
+    EXPECT_NEAR(game_control::angleBetween(rig.object("part").X_WO.rotation(), X_WH.rotation()), 0.0, 1e-7);
+    EXPECT_EQ(rig.object("pointer").status, ObjectStatus::kHidden) << "as while any other part is held";
+    EXPECT_LT(rig.hand(kRightHand).F_Ho_W.force.norm(), 1e-9);
+    rig.change({.kind = ChangeKind::kRelease, .hand = kRightHand});
+    rig.tick();
+    EXPECT_EQ(rig.object("part").status, ObjectStatus::kParked);
+    EXPECT_EQ(rig.object("pointer").status, ObjectStatus::kHeld);
+  }
+}
+
+TEST(SessionSimulation, TakingWithUnknownIdsChangesNothing) {
+  test::SessionRig rig;
+  test::SessionRig other;
+  rig.change({.kind = ChangeKind::kTake, .hand = HandId{9}, .object = ObjectId{1}});
+  rig.change({.kind = ChangeKind::kTake, .hand = kRightHand, .object = ObjectId{}});
+  EXPECT_EQ(rig.tick().hash, other.tick().hash);
+}
+
+/// Where `part` begins in `whole`.
+std::size_t positionOf(const std::vector<std::uint8_t>& part, const std::vector<std::uint8_t>& whole) {
+  const auto found = std::search(whole.begin(), whole.end(), part.begin(), part.end());
+  EXPECT_NE(found, whole.end());
+  return static_cast<std::size_t>(found - whole.begin());
+}
+
+TEST(SessionSimulation, RefusesACheckpointWithANumberThatIsNotFinite) {
+  test::SessionRig rig(1, {});
+  rig.attach(test::kRightHand, kFreeSpace);
+  rig.tick(5);
+  rig.change({.kind = ChangeKind::kPause});
+  rig.tick();
+  Change deferred = game(CommandKind::kSkipStep);
+  deferred.game.value = 1234.5;
+  rig.change(deferred);
+  rig.tick();
+  std::vector<std::uint8_t> saved;
+  rig.simulation().save(saved);
+
+  // the value of the deferred command, all numbers of the environment, then (it ends the checkpoint) of the
+  // state machine
+  const auto* value = reinterpret_cast<const std::uint8_t*>(&deferred.game.value);
+  std::vector<std::size_t> doubles{positionOf({value, value + sizeof(double)}, saved)};
+  const simulation::Environment& environment = rig.simulation().environment();
+  const std::size_t environment_at = positionOf(environment.save(), saved);
+  for (const std::size_t at : environment.savedDoubles()) doubles.push_back(environment_at + at);
+  const game_control::StateMachine machine(rig.loaded().scenario);
+  const std::size_t machine_at = saved.size() - machine.save().size();
+  ASSERT_EQ(machine_at, environment_at + environment.save().size() + sizeof(std::uint32_t));
+  for (const std::size_t at : machine.savedDoubles()) doubles.push_back(machine_at + at);
+
+  SessionSimulation again = test::SessionRig::makeSimulation(rig.loaded());
+  for (const std::size_t at : doubles) {
+    for (const double number :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+      std::vector<std::uint8_t> bad = saved;
+      std::memcpy(bad.data() + at, &number, sizeof number);
+      ASSERT_FALSE(again.restore(bad)) << number << " at byte " << at;
+    }
+  }
+  std::vector<std::uint8_t> longer = saved;
+  longer.push_back(0);
+  EXPECT_FALSE(again.restore(longer));
+  ASSERT_TRUE(again.restore(saved));
   EXPECT_EQ(again.hash(), rig.simulation().hash());
 }
 

@@ -6,6 +6,7 @@
 
 #include "server/simulation/environment.h"
 #include "tests/server/simulation/small_scene.h"
+#include "tests/support/distant_origin.h"
 
 namespace tenon::simulation {
 namespace {
@@ -209,6 +210,65 @@ TEST(Environment, NoPointOfAHeldObjectExceedsTheSpeedCap) {
   EXPECT_LT(ticks, 200) << "the rest of the motion is made in the next ticks";
 }
 
+/// A cube whose mesh has its origin 2.5 m away, held in its middle.
+struct DistantOrigin {
+  DistantOrigin() {
+    part = small.object(
+        "part", test::boxStructuresAt(p_OC_O, Vector3::Constant(test::kCubeEdge), 0.002, 0.005), -p_OC_O);
+    pointer = small.object("pointer", test::pointerShape(), Vector3(0.0, 0.0, 1.0));
+    hand = small.hand("right", pointer);
+  }
+  const Vector3 p_OC_O{2.5, -1.3, 0.8};
+  test::SmallScene small;
+  ObjectId part, pointer;
+  HandId hand;
+};
+
+TEST(Environment, ASlowTurnHasNoLagWhereverTheMeshHasItsOrigin) {
+  DistantOrigin distant;
+  Environment environment(distant.small.build(), {});
+  test::activateHand(environment, distant.hand, Vector3::Zero());
+  environment.grab(distant.hand, distant.part);
+  const Vector3 axis = Vector3(0.0, 0.6, 0.8);
+  for (int tick = 1; tick <= 1000; ++tick) {
+    const Quaternion q_WH = expRotation(1e-3 * tick * axis);
+    environment.setHandPose(distant.hand, Pose(Vector3::Zero(), q_WH), {});
+    environment.step();
+    const Pose& X_WO = environment.objects()[distant.part.value].X_WO;
+    ASSERT_LT((X_WO * distant.p_OC_O).norm(), 1e-6) << tick;
+    ASSERT_LT(logRotation(q_WH * X_WO.rotation().conjugate()).norm(), 1e-6) << tick;
+    ASSERT_LT(environment.hands()[distant.hand.value].F_Ho_W.torque.norm(), 1e-4) << tick;
+  }
+}
+
+TEST(Environment, AContributedTorqueIsLimitedAboutTheObjectsCentre) {
+  DistantOrigin distant;
+  Environment environment(distant.small.build(), {});
+  test::activateHand(environment, distant.hand, Vector3::Zero());
+  environment.grab(distant.hand, distant.part);
+  // 20 N through the centre: 56 Nm about the origin
+  const Vector3 f_W(0.0, 0.0, 20.0);
+  for (int tick = 0; tick < 100; ++tick) {
+    const Vector3 p_OC_W = environment.objects()[distant.part.value].X_WO.rotation() * distant.p_OC_O;
+    environment.contribute(distant.part, 1, {f_W, p_OC_W.cross(f_W)}, 200);
+    environment.step();
+  }
+  const Pose& X_WO = environment.objects()[distant.part.value].X_WO;
+  EXPECT_NEAR((X_WO * distant.p_OC_O).z(), 20.0 / kStiffness, 0.2e-3);
+  EXPECT_LT(logRotation(X_WO.rotation()).norm(), 1e-6) << "a force through the centre turns nothing";
+}
+
+TEST(Environment, AHiddenObjectIsTakenAtItsCentre) {
+  DistantOrigin distant;
+  distant.small.spec(distant.part).status = ObjectStatus::kHidden;
+  Environment environment(distant.small.build(), {});
+  test::activateHand(environment, distant.hand, Vector3(0.1, 0.2, 0.3));
+  environment.grab(distant.hand, distant.part);
+  environment.step();
+  const Pose& X_WO = environment.objects()[distant.part.value].X_WO;
+  EXPECT_LT((X_WO * distant.p_OC_O - Vector3(0.1, 0.2, 0.3)).norm(), 1e-6);
+}
+
 TEST(Environment, AContributionPushesAHeldObjectAgainstItsCoupling) {
   test::SmallScene small;
   const ObjectId part = small.object("part", test::cubeShape(), Vector3::Zero());
@@ -216,7 +276,7 @@ TEST(Environment, AContributionPushesAHeldObjectAgainstItsCoupling) {
   Environment environment(small.build(), {});
   test::activateHand(environment, hand, Vector3::Zero());
   for (int tick = 0; tick < 50; ++tick) {
-    environment.contribute(part, 1, {Vector3(5.0, 0.0, 0.0), Vector3::Zero()}, 200);
+    environment.contribute(part, 1, {Vector3(5.0, 0.0, 0.0), Vector3::Zero()}, 100);
     environment.step();
   }
   EXPECT_NEAR(environment.objects()[part.value].X_WO.translation().x(), 5.0 / kStiffness, 0.05e-3);

@@ -1,3 +1,8 @@
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
 #include <gtest/gtest.h>
 
 #include "server/simulation/environment.h"
@@ -146,6 +151,50 @@ TEST(EnvironmentDeterminism, RestoreSurvivesCorruptedBytes) {
   EXPECT_LT(restored, 200) << "no damage was noticed";
   ASSERT_TRUE(environment.restore(good));
   EXPECT_EQ(environment.hash(), hash);
+}
+
+TEST(EnvironmentDeterminism, ACheckpointWithANumberThatIsNotFiniteIsRejected) {
+  const test::BusyScene busy;
+  Environment environment(busy.scene, withWorkers(1));
+  busy.play(environment, 320);
+  // a tick with contacts and with all kinds of force cells
+  while (environment.nearPairs().empty() || !environment.objects()[busy.parts[0].value].in_contact) {
+    ASSERT_LT(environment.tick(), kTicks);
+    busy.play(environment, environment.tick() + 1);
+  }
+  environment.contribute(busy.parts[0], 1, {Vector3(1, 2, 3), Vector3::Zero()}, 100);
+  const std::vector<std::uint8_t> good = environment.save();
+  const std::uint64_t hash = environment.hash();
+  const std::vector<std::size_t> doubles = environment.savedDoubles();
+  ASSERT_GT(doubles.size(), 300U);
+  ASSERT_LE(doubles.back() + sizeof(double), good.size());
+  for (const double number : {std::nan(""), -std::numeric_limits<double>::infinity()}) {
+    for (const std::size_t at : doubles) {
+      std::vector<std::uint8_t> bad = good;
+      std::memcpy(bad.data() + at, &number, sizeof number);
+      const Result<void> restored = environment.restore(bad);
+      ASSERT_FALSE(restored) << number << " at byte " << at;
+      ASSERT_EQ(restored.error().what, "checkpoint: contains a number that is not finite") << at;
+    }
+  }
+  EXPECT_EQ(environment.hash(), hash);
+  ASSERT_TRUE(environment.restore(good));
+}
+
+TEST(EnvironmentDeterminism, SavedDoublesAreWhereTheNumbersAre) {
+  test::SmallScene small;
+  const ObjectId object = small.object("alone", nullptr, Vector3(0.25, -3.0, 1e-9));
+  Environment environment(small.build(), {});
+  const std::vector<std::uint8_t> bytes = environment.save();
+  std::vector<double> numbers;
+  for (const std::size_t at : environment.savedDoubles()) {
+    double number = 0.0;
+    std::memcpy(&number, bytes.data() + at, sizeof number);
+    numbers.push_back(number);
+  }
+  const Vector3& p_WO = environment.objects()[object.value].X_WO.translation();
+  const auto found = std::search(numbers.begin(), numbers.end(), p_WO.data(), p_WO.data() + 3);
+  EXPECT_NE(found, numbers.end());
 }
 
 TEST(EnvironmentDeterminism, StepAllocatesNothingAndLocksNothing) {

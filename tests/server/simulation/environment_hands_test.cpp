@@ -103,8 +103,7 @@ TEST_F(HandsTest, AFixedPartStaysFixedAndTheHandMovesItsPointerAgain) {
 }
 
 //   hand ->  o[part]     the pointer is in contact with the part, the hand 10 mm inside it; after the grab
-//   the
-//                        other part stops the held one, and there the hand releases it
+//                        the other part stops the held one, and there the hand releases it
 TEST_F(HandsTest, AfterAReleaseThePointerStartsOutsideThePartAndMovesToTheHand) {
   test::activateHand(*environment_, right_, {0.0, 0.0, 0.0});
   test::moveHandTo(*environment_, right_,
@@ -197,7 +196,7 @@ class TwoHandsTest : public HandsTest {
 };
 
 TEST_F(TwoHandsTest, APartHeldByTwoHandsIsTwiceAsStiff) {
-  constexpr std::uint32_t kLifetime = 200;
+  constexpr std::uint32_t kLifetime = 100;
   for (int tick = 0; tick < 200; ++tick) {
     environment_->contribute(part_, 1, {Vector3(10.0, 0.0, 0.0), Vector3::Zero()}, kLifetime);
     environment_->step();
@@ -210,7 +209,7 @@ TEST_F(TwoHandsTest, APartHeldByTwoHandsIsTwiceAsStiff) {
 
 // two springs of 1000 N/m with lever arms of 50 mm, and two of 20 Nm/rad: 45 Nm/rad about z
 TEST_F(TwoHandsTest, TorquesOfTwoHandsAddWithTheirLeverArms) {
-  constexpr std::uint32_t kLifetime = 200;
+  constexpr std::uint32_t kLifetime = 100;
   constexpr double kLever = 0.05;
   for (int tick = 0; tick < 200; ++tick) {
     environment_->contribute(part_, 1, {Vector3::Zero(), Vector3(0.0, 0.0, 0.2)}, kLifetime);

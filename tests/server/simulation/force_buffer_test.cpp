@@ -47,9 +47,10 @@ TEST(ForceBuffer, ASecondContributionOfASourceOverwritesItsCell) {
 TEST(ForceBuffer, ClampsForceTorqueAndLifetimeOfAContribution) {
   ForceBuffer buffer(1);
   buffer.contribute(1, {Vector3(0.0, 0.0, 1e6), Vector3(1e6, 0.0, 0.0)}, 1000000, 0);
-  EXPECT_NEAR(buffer.total(0).force.norm(), ForceBuffer::kMaxContributedForce, 1e-9);
-  EXPECT_NEAR(buffer.total(0).torque.norm(), ForceBuffer::kMaxContributedTorque, 1e-9);
-  EXPECT_EQ(buffer.total(ForceBuffer::kMaxLifetimeTicks).force.norm(), 0.0);
+  EXPECT_NEAR(buffer.total(0).force.norm(), 50.0, 1e-9);
+  EXPECT_NEAR(buffer.total(0).torque.norm(), 5.0, 1e-9);
+  EXPECT_NEAR(buffer.total(99).force.norm(), 0.5, 1e-9);
+  EXPECT_EQ(buffer.total(100).force.norm(), 0.0);
 }
 
 TEST(ForceBuffer, RejectsAndCountsInvalidContributions) {

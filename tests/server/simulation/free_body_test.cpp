@@ -16,7 +16,7 @@ using test::stepTicks;
 constexpr double kG = 9.81;
 constexpr double kMass = 0.4;
 const Vector3 kSize(0.06, 0.05, 0.04);
-constexpr std::uint32_t kLifetime = 200;
+constexpr std::uint32_t kLifetime = 100;
 /// [-] Weight of a contribution when applied: it is one tick old.
 constexpr double kWeight = 1.0 - 1.0 / kLifetime;
 

@@ -55,7 +55,7 @@ TEST(FreeBodyAndHand, ABoxPushedAlongTheFloorAcceleratesByForceMinusCoulombFrict
     const double force = 2.0;  // [N] through its centre; half of its weight
     constexpr int kTicks = 300;
     for (int tick = 0; tick < kTicks; ++tick) {
-      environment.contribute(box, 1, {Vector3(force, 0.0, 0.0), Vector3::Zero()}, 200);
+      environment.contribute(box, 1, {Vector3(force, 0.0, 0.0), Vector3::Zero()}, 100);
       environment.step();
     }
     const double applied = force * (1.0 - 1.0 / 200.0);
@@ -96,7 +96,7 @@ double creepOf(double friction, double slope, double push) {
   const auto x = [&] { return environment.objects()[box.value].X_WO.translation().x(); };
   const auto step = [&](int ticks) {
     for (int tick = 0; tick < ticks; ++tick) {
-      if (push > 0.0) environment.contribute(box, 1, {Vector3(push, 0.0, 0.0), Vector3::Zero()}, 200);
+      if (push > 0.0) environment.contribute(box, 1, {Vector3(push, 0.0, 0.0), Vector3::Zero()}, 100);
       environment.step();
     }
   };
@@ -211,6 +211,29 @@ TEST(FreeBodyAndHand, AfterAPauseAFreeBodyFallsFromRest) {
   EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.z(), -kG * 0.1, 1e-6);
   test::stepTicks(environment, 1000);
   EXPECT_NEAR(environment.objects()[box.value].X_WO.translation().z(), 0.5 * kSize.z(), 5e-5);
+}
+
+TEST(FreeBodyAndHand, ASleepingBodyStaysWhenAHandPushesAtItDuringAPause) {
+  test::SmallScene small;
+  const double height = 0.5 * kSize.z();
+  const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, height + 1e-4});
+  const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
+  const ObjectId pointer = small.object("pointer", test::pointerShape(), {-0.2, 0.0, height});
+  const HandId hand = small.hand("hand", pointer);
+  small.pair(box, ground);
+  small.pair(pointer, box);
+  Environment environment(small.build(), {});
+  test::activateHand(environment, hand, {-0.2, 0.0, height});
+  test::stepTicks(environment, 300);
+  ASSERT_TRUE(environment.objects()[box.value].asleep);
+  const Pose X_WB = environment.objects()[box.value].X_WO;
+  environment.setFreeBodiesPaused(true);
+  test::moveHandTo(environment, hand, {0.0, 0.0, height}, 400);
+  EXPECT_EQ(environment.objects()[box.value].X_WO, X_WB);
+  EXPECT_FALSE(environment.objects()[box.value].asleep) << "the hand has woken it";
+  environment.setFreeBodiesPaused(false);
+  test::stepTicks(environment, 100);
+  EXPECT_GT(environment.objects()[box.value].X_WO.translation().x(), 0.01) << "and pushes it now";
 }
 
 TEST(FreeBodyAndHand, ABodyFallsWhenItJoinsTheGroupOfItsSupport) {

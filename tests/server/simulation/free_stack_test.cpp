@@ -175,7 +175,7 @@ TEST_F(StackTest, ContinuesBitEqualAfterARestore) {
 }
 
 TEST_F(StackTest, NoCheckpointExceedsTheBoundOnItsSize) {
-  const std::size_t most = environment_->mostSavedBytes();
+  const std::size_t most = environment_->maxSavedBytes();
   test::activateHand(*environment_, hand_, {0.2, 0.0, 1.5 * kEdge});
   test::moveHandTo(*environment_, hand_, {0.03, 0.0, 1.5 * kEdge}, 300);
   EXPECT_GT(environment_->save().size(), 20'000U) << "full lists";

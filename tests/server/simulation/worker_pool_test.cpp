@@ -6,6 +6,7 @@
 #include <thread>
 
 #include <gtest/gtest.h>
+#include <sched.h>
 
 #include "tests/support/realtime_guard.h"
 
@@ -80,6 +81,82 @@ TEST_P(WorkerPoolWithWorkers, WakesSleepingWorkers) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Workers, WorkerPoolWithWorkers, testing::Values(1U, 2U, 4U));
+
+/// Scheduling of a thread as the operating system sees it.
+struct SeenScheduling {
+  int policy = -1;
+  int priority = -1;
+  cpu_set_t cpus{};
+
+  static SeenScheduling ofThisThread() {
+    SeenScheduling seen;
+    sched_param parameter{};
+    seen.policy = sched_getscheduler(0);
+    sched_getparam(0, &parameter);
+    seen.priority = parameter.sched_priority;
+    sched_getaffinity(0, sizeof(seen.cpus), &seen.cpus);
+    return seen;
+  }
+  friend bool operator==(const SeenScheduling& a, const SeenScheduling& b) {
+    return a.policy == b.policy && a.priority == b.priority && CPU_EQUAL(&a.cpus, &b.cpus);
+  }
+};
+
+/// The scheduling of all three workers of a pool; the first is the caller.
+std::array<SeenScheduling, 3> schedulingOfWorkers(WorkerPool& pool) {
+  std::array<SeenScheduling, 3> seen;
+  Meeting meeting(3);
+  auto work = [&](unsigned worker, std::size_t item) {
+    seen[worker] = SeenScheduling::ofThisThread();
+    meeting(worker, item);  // so that each worker has one item
+  };
+  pool.run(3, work);
+  EXPECT_TRUE(meeting.met());
+  return seen;
+}
+
+/// In a thread of its own: `policy` with `priority`, and the first permitted CPU alone. Calls `then` when
+/// that was granted; returns whether.
+template <typename Then>
+bool runScheduledAs(int policy, int priority, Then&& then) {
+  bool granted = false;
+  std::thread([&] {
+    const sched_param parameter{priority};
+    cpu_set_t cpus = SeenScheduling::ofThisThread().cpus;
+    bool first = true;
+    for (std::size_t cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
+      if (!CPU_ISSET(cpu, &cpus)) continue;
+      if (!first) CPU_CLR(cpu, &cpus);
+      first = false;
+    }
+    granted =
+        sched_setscheduler(0, policy, &parameter) == 0 && sched_setaffinity(0, sizeof(cpus), &cpus) == 0;
+    if (granted) then();
+  }).join();
+  return granted;
+}
+
+void expectWorkersScheduledAsCaller(WorkerPool& pool, int policy, int priority) {
+  EXPECT_NE(schedulingOfWorkers(pool)[1].policy, policy) << "else this test shows nothing";
+  EXPECT_EQ(pool.shareScheduling(), "");
+  for (const SeenScheduling& worker : schedulingOfWorkers(pool)) {
+    EXPECT_EQ(worker.policy, policy);
+    EXPECT_EQ(worker.priority, priority);
+    EXPECT_TRUE(worker == SeenScheduling::ofThisThread());
+  }
+}
+
+// SCHED_BATCH is a class that everybody may choose
+TEST(WorkerPool, ItsThreadsTakeTheSchedulingOfTheCaller) {
+  WorkerPool pool(3);
+  EXPECT_TRUE(runScheduledAs(SCHED_BATCH, 0, [&] { expectWorkersScheduledAsCaller(pool, SCHED_BATCH, 0); }));
+}
+
+TEST(WorkerPool, ItsThreadsTakeARealTimePriority) {
+  WorkerPool pool(3);
+  if (!runScheduledAs(SCHED_RR, 2, [&] { expectWorkersScheduledAsCaller(pool, SCHED_RR, 2); }))
+    GTEST_SKIP() << "this user may not have a real-time priority";
+}
 
 TEST(WorkerPool, APoolOfOneWorkerRunsInTheCallingThread) {
   WorkerPool pool(1);

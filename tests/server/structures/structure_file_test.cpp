@@ -1,17 +1,12 @@
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <random>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include "server/structures/field_builder.h"
-#include "server/structures/haptic_structures.h"
-#include "server/structures/shell_builder.h"
+#include "tests/server/structures/structure_file_fixture.h"
 #include "tests/support/damaged_structures.h"
 
 namespace tenon::structures {
@@ -19,45 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
-
-/// Each test has its own folder, removed afterwards.
-class StructureFile : public ::testing::Test {
- protected:
-  StructureFile() {
-    fs::create_directories(folder_);
-    const Vector3 corner = Vector3::Constant(0.02);
-    const std::array refine{Eigen::AlignedBox3d(Vector3::Zero(), corner)};
-    structures_.field =
-        buildField([](const Vector3& p) { return p.norm() - 0.02; }, {-corner, corner}, 0.002, refine, 2);
-    std::vector<SurfaceSample> samples;
-    for (int i = 0; i < 100; ++i) samples.push_back({Vector3(0.001 * i, 0.0, 0.02), -Vector3::UnitZ(), 1e-6});
-    structures_.shell = buildShell(samples);
-    structures_.info.source = "ball.stl";
-    structures_.info.content_hash = "0123";
-    structures_.info.meshes = {folder_.parent_path() / "parts" / "ball.stl"};
-    structures_.info.unit = 0.0254;
-    structures_.info.notes = "A note.\n";
-    structures_.info.triangles = 12;
-    structures_.info.box_M = {-corner, corner};
-  }
-  ~StructureFile() override { fs::remove_all(folder_); }
-
-  [[nodiscard]] std::string written() {
-    const auto ok = writeStructures(file(), structures_);
-    EXPECT_TRUE(ok);
-    std::ifstream in(file(), std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
-  void overwrite(const std::string& bytes) const {
-    std::ofstream(file(), std::ios::binary | std::ios::trunc) << bytes;
-  }
-  [[nodiscard]] fs::path file() const { return folder_ / "ball.tenon"; }
-
-  fs::path folder_ =
-      fs::temp_directory_path() / ("tenon-structure-file-" + std::to_string(::getpid()) +
-                                   ::testing::UnitTest::GetInstance()->current_test_info()->name());
-  HapticStructures structures_;
-};
 
 TEST_F(StructureFile, IsReadAsItWasWritten) {
   (void)written();
@@ -130,41 +86,6 @@ TEST_F(StructureFile, AThousandRandomlyDamagedFilesAreRefused) {
   }
 }
 
-/// Reads everything that a field and a shell can be asked for; returns how much that was.
-std::size_t useEverything(const HapticStructures& structures) {
-  std::size_t used = 0;
-  const DistanceField& field = structures.field;
-  if (!field.empty()) {
-    const Eigen::AlignedBox3d box = field.box();
-    const auto ask = [&](const Vector3& p_MP) {
-      used += field.sample(p_MP).exact ? 1 : 0;
-      used += std::isnan(field.lowerBound(p_MP, 0.001)) ? 0 : 1;
-      used += field.voxelAt(p_MP) > 0.0 ? 1 : 0;
-    };
-    constexpr int kSteps = 12;
-    for (int i = 0; i < kSteps * kSteps * kSteps; ++i) {
-      const Vector3 fraction(i % kSteps, i / kSteps % kSteps, i / (kSteps * kSteps));
-      ask(box.min() + box.sizes().cwiseProduct(fraction + Vector3::Constant(0.37)) / kSteps);
-    }
-    for (const double limit : {0.0, 1e300, -1e300, std::nan("")}) ask(Vector3::Constant(limit));
-    ask(box.min());
-    ask(box.max());
-  }
-  const Pointshell& shell = structures.shell;
-  if (shell.empty()) return used;
-  for (std::size_t leaf = 0; leaf < shell.leaves().size(); ++leaf) used += shell.pointsOfLeaf(leaf).count;
-  for (std::size_t i = 0; i < shell.clusters().size(); ++i) used += shell.leavesOfCluster(i).count;
-  for (std::size_t point = 0; point < shell.points().size(); ++point) {
-    EXPECT_LT(shell.leafOf(point), shell.leaves().size());
-  }
-  for (std::size_t k = 0; k < shell.levels().size(); ++k) {
-    const ShellLevel& level = shell.levels()[k];
-    EXPECT_EQ(shell.areasOfLevel(k).size(), level.first_point + level.point_count);
-    for (const float area : shell.areasOfLevel(k)) used += area > 0.0F ? 1 : 0;
-  }
-  return used;
-}
-
 /// Opens `count` damaged files whose checksums are right.
 void openDamaged(const fs::path& file, const std::vector<std::uint8_t>& whole, std::uint64_t count) {
   std::uint64_t refused = 0;
@@ -201,33 +122,30 @@ TEST_F(StructureFileNightly, DamageBehindARightChecksumIsRefusedOrHarmless) {
   openDamaged(file(), test::bytesOf(file()), 100'000);
 }
 
-TEST_F(StructureFile, AShellWhoseListsDoNotTileIsRefused) {
+TEST_F(StructureFile, AFileThatChangesAfterItWasReadChangesNothing) {
   (void)written();
-  const std::vector<std::uint8_t> whole = test::bytesOf(file());
-  ASSERT_GT(structures_.shell.levels().size(), 0U);
-  const auto refusedWith = [&](std::size_t at, std::uint32_t number) {
-    std::vector<std::uint8_t> bytes = whole;
-    std::memcpy(bytes.data() + at, &number, sizeof number);
-    test::correctStructureChecksum(bytes);
-    test::writeBytes(file(), bytes);
-    const auto opened = openStructures(file());
-    return opened ? std::string("accepted") : opened.error().what;
-  };
-  const auto first = [&whole](std::size_t section) {
-    std::uint64_t at = 0;
-    std::memcpy(&at, whole.data() + test::kSectionsAt + 8 * section, sizeof at);
-    return static_cast<std::size_t>(at);
-  };
-  // sections 3..6: points, leaves, clusters, levels; a sphere's `first` and `count` follow four floats
-  const std::uint32_t leaf_count = structures_.shell.leaves()[0].count;
-  EXPECT_THAT(refusedWith(first(4) + 20, leaf_count - 1), HasSubstr("leaves"));
-  EXPECT_THAT(refusedWith(first(4) + 16, 1), HasSubstr("leaves"));
-  EXPECT_THAT(refusedWith(first(5) + 20, 0), HasSubstr("clusters"));
-  // fewer points in a level: the areas of the levels would have fewer entries than there are points
-  EXPECT_THAT(refusedWith(first(6) + 4, structures_.shell.levels()[0].point_count - 1),
-              HasSubstr("the leaves of a level"));
-  EXPECT_THAT(refusedWith(first(3), 0x7FC00000U), HasSubstr("not finite"));
-  EXPECT_EQ(refusedWith(first(4) + 20, leaf_count), "accepted");
+  const auto opened = openStructures(file());
+  ASSERT_TRUE(opened);
+  const Vector3 p(0.011, 0.012, 0.013);
+  const double distance = (*opened)->field.sample(p).distance;
+  {
+    std::fstream out(file(), std::ios::binary | std::ios::in | std::ios::out);
+    out << std::string(fs::file_size(file()), '\x7F');
+  }
+  fs::resize_file(file(), 10);
+  EXPECT_EQ((*opened)->field.sample(p).distance, distance);
+  EXPECT_GT(useEverything(**opened), 0U);
+}
+
+TEST_F(StructureFile, AMeshThatIsALinkKeepsItsName) {
+  fs::create_directories(folder_ / "store");
+  std::ofstream(folder_ / "store" / "7f3a") << "solid";
+  fs::create_symlink("store/7f3a", folder_ / "ball.stl");
+  structures_.info.meshes = {folder_ / "ball.stl"};
+  (void)written();
+  const auto opened = openStructures(file());
+  ASSERT_TRUE(opened);
+  EXPECT_EQ((*opened)->info.meshes, structures_.info.meshes);
 }
 
 TEST_F(StructureFile, AnotherVersionIsRefusedWithAdviceToBakeAgain) {

@@ -2,10 +2,11 @@
 
 #include <cstdint>
 
-namespace tenon::simulated_person {
+namespace tenon {
 
-/// Seeded pseudo-random generator of simulated people (SplitMix64, Steele et al. 2014). Its numbers are the
-/// same on every machine; the distributions of the standard library are implementation-defined.
+/// Seeded pseudo-random generator of simulated people and devices (SplitMix64, Steele et al. 2014). Its
+/// numbers are the same on every machine; the distributions of the standard library are
+/// implementation-defined.
 ///
 /// Threads: one. Real-time: everything.
 class Random {
@@ -29,4 +30,4 @@ class Random {
   std::uint64_t state_;
 };
 
-}  // namespace tenon::simulated_person
+}  // namespace tenon

@@ -1,0 +1,321 @@
+#include "idl/wire/profiles.h"
+
+#include <chrono>
+#include <memory>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "idl/types/messages.h"
+#include "idl/wire/codec.h"
+#include "idl/wire/convert.h"
+#include "idl/wire/dds_endpoint.h"
+#include "idl/wire/raw_subscriber.h"
+#include "tests/idl/wire/peer.h"
+
+namespace tenon::wire {
+namespace {
+
+// ---- which policies each topic has: the promises of idl/wire/topics.h, written out in words
+
+const std::string kStream = "best effort, last 1, volatile";
+const std::string kLockstepStream = "reliable, last 32, volatile";
+const std::string kState = "reliable, last 1, transient local";
+const std::string kEvent = "reliable, all, volatile";
+const std::string kLateEvent = "reliable, all, transient local";
+const std::string kLease1 = ", lease 1000 ms";
+const std::string kLease2 = ", lease 2000 ms";
+const std::string kLockstepLease = ", lease 5000 ms";
+const std::string kLatest = ", by source time";
+
+/// What a reader requests, in real time and in lockstep, and what a writer offers beyond it.
+struct Row {
+  std::string topic;
+  std::string reader, lockstep_reader;
+  std::string offered, lockstep_offered;
+};
+
+const std::vector<Row> kRows{
+    {"SessionAnnounce", kState, kState, kLease2 + ", joiners 1", kLockstepLease + ", joiners 1"},
+    {"Join", kEvent, kEvent, ", lifespan 5000 ms", ""},
+    {"Welcome", kEvent, kEvent, ", lifespan 5000 ms", ""},
+    {"Presence", kState, kState, kLease2 + ", joiners 1", kLockstepLease + ", joiners 1"},
+    {"DeviceInput", kStream, kLockstepStream, ", lease 50 ms by topic, deadline 10 ms", kLockstepLease},
+    {"WorldFrame_1k", kStream, kLockstepStream, kLease1, kLockstepLease},
+    {"WorldFrame_100", kStream, kLockstepStream, kLease1, kLockstepLease},
+    {"WorldFrame_30", kStream, kLockstepStream, kLease1, kLockstepLease},
+    {"HandManifold", kStream, kLockstepStream, kLease1 + ", deadline 100 ms", kLockstepLease},
+    {"HandState_100", kStream, kLockstepStream, kLease1, kLockstepLease},
+    {"ContactPairs_100", kStream, kLockstepStream, kLease1, kLockstepLease},
+    {"TickStats_100", kStream, kLockstepStream, kLease1, kLockstepLease},
+    {"Guidance", kStream, kLockstepStream, kLease1, kLockstepLease},
+    {"ForceContribution", kStream, kLockstepStream, "", ""},
+    {"ExternalPose", kStream, kLockstepStream, "", ""},
+    {"ClockSync", kStream, kLockstepStream, "", ""},
+    {"Telemetry", kStream, kLockstepStream, "", ""},
+    {"SceneObject", kState, kState, ", joiners 1", ", joiners 1"},
+    {"ObjectSnapshot", kState, kState, ", joiners 1", ", joiners 1"},
+    {"StepState", kState, kState, ", joiners 1", ", joiners 1"},
+    {"StepProgress", kState, kState, ", joiners 1", ", joiners 1"},
+    {"RunState", kState, kState, ", joiners 1", ", joiners 1"},
+    {"GrabState", kState, kState, ", joiners 1", ", joiners 1"},
+    {"RecorderStatus", kState, kState, ", joiners 1", ", joiners 1"},
+    {"EmergencyStop", kState + kLatest, kState + kLatest, ", joiners 1, outlives its writer",
+     ", joiners 1, outlives its writer"},
+    {"Command", kEvent, kEvent, ", lifespan 5000 ms", ""},
+    {"CommandAck", kEvent, kEvent, ", lifespan 5000 ms", ""},
+    {"EventLog", kLateEvent, kLateEvent, ", joiners 1000", ", joiners 1000"},
+    {"ClientEvent", kLateEvent, kLateEvent, ", joiners 1000", ", joiners 1000"},
+    {"PublishedSamples", kEvent, kEvent, "", ""},
+    {"TickInput", kEvent, kEvent, "", ""},
+    {"Checkpoint", kEvent, kEvent, "", ""},
+};
+
+/// A lockstep writer keeps every sample until all its readers have it.
+std::string keepingAll(std::string delivery) {
+  const std::size_t at = delivery.find("last ");
+  return at == std::string::npos ? delivery : delivery.replace(at, delivery.find(',', at) - at, "all");
+}
+
+// ---- what DDS says that an entity has
+
+using Qos = std::unique_ptr<dds_qos_t, void (*)(dds_qos_t*)>;
+
+Qos effectiveQos(dds_entity_t entity) {
+  Qos qos(dds_create_qos(), &dds_delete_qos);
+  EXPECT_EQ(dds_get_qos(entity, qos.get()), DDS_RETCODE_OK);
+  return qos;
+}
+
+std::string inMilliseconds(dds_duration_t time) { return std::to_string(time / DDS_NSECS_IN_MSEC) + " ms"; }
+
+std::string delivery(const dds_qos_t* qos) {
+  dds_reliability_kind_t reliability{};
+  dds_history_kind_t history{};
+  dds_durability_kind_t durability{};
+  dds_destination_order_kind_t order{};
+  dds_duration_t blocking = 0;
+  std::int32_t depth = 0;
+  dds_qget_reliability(qos, &reliability, &blocking);
+  dds_qget_history(qos, &history, &depth);
+  dds_qget_durability(qos, &durability);
+  dds_qget_destination_order(qos, &order);
+  std::string said = reliability == DDS_RELIABILITY_RELIABLE ? "reliable" : "best effort";
+  said += history == DDS_HISTORY_KEEP_ALL ? ", all" : ", last " + std::to_string(depth);
+  said += durability == DDS_DURABILITY_VOLATILE          ? ", volatile"
+          : durability == DDS_DURABILITY_TRANSIENT_LOCAL ? ", transient local"
+                                                         : ", another durability";
+  if (order == DDS_DESTINATIONORDER_BY_SOURCE_TIMESTAMP) said += kLatest;
+  return said;
+}
+
+std::string timing(const dds_qos_t* qos) {
+  std::string said;
+  dds_liveliness_kind_t liveliness{};
+  dds_duration_t lease = 0;
+  dds_duration_t deadline = 0;
+  dds_qget_liveliness(qos, &liveliness, &lease);
+  if (lease != DDS_INFINITY) said += ", lease " + inMilliseconds(lease);
+  if (liveliness != DDS_LIVELINESS_AUTOMATIC) said += " by topic";
+  dds_qget_deadline(qos, &deadline);
+  if (deadline != DDS_INFINITY) said += ", deadline " + inMilliseconds(deadline);
+  return said;
+}
+
+/// Of policies that writers alone have.
+std::string ofWriter(const dds_qos_t* qos, bool for_late_joiners) {
+  std::string said;
+  dds_duration_t lifespan = 0;
+  dds_qget_lifespan(qos, &lifespan);
+  if (lifespan != DDS_INFINITY) said += ", lifespan " + inMilliseconds(lifespan);
+  if (for_late_joiners) {
+    std::int32_t joiners = 0;
+    dds_qget_durability_service(qos, nullptr, nullptr, &joiners, nullptr, nullptr, nullptr);
+    said += ", joiners " + std::to_string(joiners);
+  }
+  bool disposes = true;
+  dds_qget_writer_data_lifecycle(qos, &disposes);
+  if (!disposes) said += ", outlives its writer";
+  return said;
+}
+
+dds_duration_t blockingTime(const dds_qos_t* qos) {
+  dds_reliability_kind_t reliability{};
+  dds_duration_t blocking = 0;
+  dds_qget_reliability(qos, &reliability, &blocking);
+  return blocking;
+}
+
+class ProfilesTest : public ::testing::Test {
+ protected:
+  Partition partition(const char* name, LinkProfile profile) { return {participant_, name, profile}; }
+
+  std::shared_ptr<Participant> participant_ = test::participant(test::ownDomain());
+  Partition lan_ = partition("s/lan", LinkProfile::kLan);
+  Partition lockstep_ = partition("s/lockstep", LinkProfile::kLockstep);
+
+  std::string writerOn(const Partition& partition, const TopicSpec& topic) {
+    const auto writer = openWriter(partition, topic);
+    if (!writer) return writer.error().what;
+    const Qos qos = effectiveQos((*writer)->entity());
+    return delivery(qos.get()) + timing(qos.get()) +
+           ofWriter(qos.get(), topic.parameters.late_joiner_depth > 0);
+  }
+  std::string readerOn(const Partition& partition, const TopicSpec& topic, bool keep_all) {
+    const auto reader = openReader(partition, topic, keep_all, nullptr);
+    if (!reader) return reader.error().what;
+    const Qos qos = effectiveQos((*reader)->entity());
+    return delivery(qos.get()) + timing(qos.get());
+  }
+  static std::vector<TopicSpec> topics() {
+    std::vector<TopicSpec> list;
+    forEachTopic([&list]<class M>(const Topic<M>& topic) {
+      list.push_back({topic.name, &TypeOf<M>::descriptor(), topic.qos_class, topic.parameters});
+    });
+    return list;
+  }
+};
+
+TEST_F(ProfilesTest, EntitiesOfEveryTopicHaveThePoliciesOfItsClassOnBothLinks) {
+  std::set<std::string> listed;
+  for (const Row& row : kRows) listed.insert(row.topic);
+  std::set<std::string> there;
+  for (const TopicSpec& topic : topics()) {
+    there.emplace(topic.name);
+    for (const Row& row : kRows) {
+      if (row.topic != topic.name) continue;
+      EXPECT_EQ(writerOn(lan_, topic), row.reader + row.offered) << topic.name;
+      EXPECT_EQ(readerOn(lan_, topic, false), row.reader) << topic.name;
+      EXPECT_EQ(writerOn(lockstep_, topic), keepingAll(row.lockstep_reader) + row.lockstep_offered)
+          << topic.name;
+      EXPECT_EQ(readerOn(lockstep_, topic, false), row.lockstep_reader) << topic.name;
+    }
+  }
+  EXPECT_EQ(there, listed);
+}
+
+TEST_F(ProfilesTest, ARecorderKeepsAllSamplesOfEveryTopic) {
+  for (const TopicSpec& topic : topics()) {
+    for (const Partition* partition : {&lan_, &lockstep_})
+      EXPECT_NE(readerOn(*partition, topic, true).find(", all, "), std::string::npos) << topic.name;
+  }
+}
+
+TEST_F(ProfilesTest, WritersUseXcdr1AndWaitLongerForASlowReaderInLockstep) {
+  for (const TopicSpec& topic : topics()) {
+    const auto on_lan = openWriter(lan_, topic);
+    const auto in_lockstep = openWriter(lockstep_, topic);
+    ASSERT_TRUE(on_lan && in_lockstep) << topic.name;
+    const Qos lan = effectiveQos((*on_lan)->entity());
+    const Qos lockstep = effectiveQos((*in_lockstep)->entity());
+    EXPECT_LT(blockingTime(lan.get()), blockingTime(lockstep.get())) << topic.name;
+    for (const Qos* qos : {&lan, &lockstep}) {
+      std::uint32_t count = 0;
+      dds_data_representation_id_t* values = nullptr;
+      ASSERT_TRUE(dds_qget_data_representation(qos->get(), &count, &values));
+      ASSERT_EQ(count, 1U) << topic.name;
+      EXPECT_EQ(values[0], DDS_DATA_REPRESENTATION_XCDR1) << topic.name;
+      dds_free(values);
+    }
+  }
+}
+
+// ---- what follows from some of them
+
+/// Writers and readers of one topic in a partition of their own, matched.
+template <class M>
+struct Matched {
+  Matched(Partition& partition, const Topic<M>& topic)
+      : reader(*Reader<M>::open(partition, topic)), writer(*Writer<M>::open(partition, topic)) {
+    while (reader.matchedWriters() == 0 || writer.matchedReaders() == 0) std::this_thread::yield();
+  }
+  Reader<M> reader;
+  Writer<M> writer;
+};
+
+TEST_F(ProfilesTest, AnExpiredCommandIsNotDeliveredInRealTimeAndIsInLockstep) {
+  Topic<Command> topic = wire::kCommand;
+  topic.parameters.lifespan = Milliseconds(10);
+  Matched<Command> on_lan(lan_, topic);
+  Matched<Command> in_lockstep(lockstep_, topic);
+  ASSERT_TRUE(on_lan.writer.write({.id = 1}));
+  ASSERT_TRUE(in_lockstep.writer.write({.id = 1}));
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  Command command;
+  EXPECT_FALSE(on_lan.reader.take(command));
+  EXPECT_TRUE(in_lockstep.reader.take(command));
+}
+
+TEST_F(ProfilesTest, AReaderWhoTakesLateGetsTheNewestFrameInRealTimeAndTheLast32InLockstep) {
+  Matched<DeviceInput> on_lan(lan_, wire::kDeviceInput);
+  Matched<DeviceInput> in_lockstep(lockstep_, wire::kDeviceInput);
+  DeviceInput input;
+  for (input.heard_tick = 1; input.heard_tick <= 40; ++input.heard_tick) {
+    ASSERT_TRUE(on_lan.writer.write(input));
+    ASSERT_TRUE(in_lockstep.writer.write(input));
+  }
+  ASSERT_TRUE(on_lan.reader.take(input));
+  EXPECT_EQ(input.heard_tick, 40U);
+  EXPECT_FALSE(on_lan.reader.take(input));
+  for (Tick expected = 9; expected <= 40; ++expected) {
+    ASSERT_TRUE(in_lockstep.reader.take(input));
+    EXPECT_EQ(input.heard_tick, expected);
+  }
+  EXPECT_FALSE(in_lockstep.reader.take(input));
+}
+
+TEST_F(ProfilesTest, AStationWhoseLoopHangsIsGoneInRealTimeAndStaysInLockstep) {
+  Inbox inbox;
+  int gone_on_lan = 0;
+  int gone_in_lockstep = 0;
+  ASSERT_TRUE(inbox.onGone<DeviceInput>(lan_, wire::kDeviceInput, [&](const auto&) { ++gone_on_lan; }));
+  ASSERT_TRUE(
+      inbox.onGone<DeviceInput>(lockstep_, wire::kDeviceInput, [&](const auto&) { ++gone_in_lockstep; }));
+  auto on_lan = Writer<DeviceInput>::open(lan_, wire::kDeviceInput);
+  auto in_lockstep = Writer<DeviceInput>::open(lockstep_, wire::kDeviceInput);
+  ASSERT_TRUE(on_lan->write({}));
+  ASSERT_TRUE(in_lockstep->write({}));
+  // both writers and their process live on, but write nothing
+  EXPECT_TRUE(test::dispatchUntil(inbox, [&] { return gone_on_lan > 0; }));
+  EXPECT_EQ(gone_in_lockstep, 0);
+}
+
+TEST_F(ProfilesTest, ALateInputMissesItsDeadlineInRealTimeAlone) {
+  const auto topic = TopicSpec{wire::kDeviceInput.name, &TypeOf<DeviceInput>::descriptor(),
+                               wire::kDeviceInput.qos_class, wire::kDeviceInput.parameters};
+  const auto missed = [](dds_entity_t writer) {
+    dds_offered_deadline_missed_status_t status{};
+    EXPECT_EQ(dds_get_offered_deadline_missed_status(writer, &status), DDS_RETCODE_OK);
+    return status.total_count;
+  };
+  const auto on_lan = openWriter(lan_, topic);
+  const auto in_lockstep = openWriter(lockstep_, topic);
+  const auto sample = std::make_unique<Wire<DeviceInput>>();
+  ASSERT_TRUE(toWire(DeviceInput{}, *sample));
+  ASSERT_EQ(dds_write((*on_lan)->entity(), &sample->sample), DDS_RETCODE_OK);
+  ASSERT_EQ(dds_write((*in_lockstep)->entity(), &sample->sample), DDS_RETCODE_OK);
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  EXPECT_GT(missed((*on_lan)->entity()), 0U);
+  EXPECT_EQ(missed((*in_lockstep)->entity()), 0U);
+}
+
+TEST_F(ProfilesTest, OfTwoEmergencyStopsTheLaterOneCountsAlsoWhenItArrivesFirst) {
+  auto reader = Reader<EmergencyStop>::open(lan_, wire::kEmergencyStop);
+  auto first = RawWriter::open(lan_, wire::kEmergencyStop.name);
+  auto second = RawWriter::open(lan_, wire::kEmergencyStop.name);
+  while (reader->matchedWriters() < 2 || first->matchedReaders() == 0 || second->matchedReaders() == 0)
+    std::this_thread::yield();
+  ASSERT_TRUE(second->write({.source_ns = 2'000'000'000, .bytes = *encode(EmergencyStop{.engaged = true})}));
+  ASSERT_TRUE(first->write({.source_ns = 1'000'000'000, .bytes = *encode(EmergencyStop{.engaged = false})}));
+  EmergencyStop stop;
+  int taken = 0;
+  while (reader->take(stop)) ++taken;
+  EXPECT_GT(taken, 0);
+  EXPECT_TRUE(stop.engaged);
+}
+
+}  // namespace
+}  // namespace tenon::wire

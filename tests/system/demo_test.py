@@ -1,0 +1,240 @@
+"""`tenon demo`: its lockstep recordings are complete, its reports repeatable, and it leaves no program running."""
+import argparse
+import contextlib
+import json
+import os
+import re
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+from stage import PROGRAMS, SOURCE, TENON, final_hash, free_domain, tenon
+
+sys.path.insert(0, str(SOURCE / "deploy"))
+from demo import output_folder  # noqa: E402
+from demo_scene import hands_of  # noqa: E402
+
+PEG_AND_BOX = SOURCE / "scenarios" / "peg_and_box"
+
+
+def samples_by_topic(recording):
+    """Number of messages of each topic, from the channels and statistics at the end of an MCAP file."""
+    data = Path(recording).read_bytes()
+    at = struct.unpack("<Q", data[-28:-20])[0]  # the footer's first field: where the summary starts
+    names, counts = {}, {}
+    while at < len(data) - 8:
+        kind, length = struct.unpack_from("<BQ", data, at)
+        body = data[at + 9:at + 9 + length]
+        if kind == 4:  # Channel: id, schema, topic
+            size = struct.unpack_from("<I", body, 4)[0]
+            names[struct.unpack_from("<H", body)[0]] = body[8:8 + size].decode()
+        if kind == 11:  # Statistics: after 42 bytes the messages of each channel
+            for entry in range(struct.unpack_from("<I", body, 42)[0] // 10):
+                channel, count = struct.unpack_from("<HQ", body, 46 + 10 * entry)
+                counts[channel] = count
+        at += 9 + length
+    return {names[channel]: count for channel, count in counts.items()}
+
+
+def figures(summary):
+    """What a report says of the session itself: without date, computation times, and who came first."""
+    measured = ("began_ns", "compute_seconds", "messages", "people", "recording", "late_ticks")
+    # when a program joined depends on the machine
+    events = [event for event in summary["events"] if event["kind"] not in ("join", "leave")]
+    return {**{key: value for key, value in summary.items() if key not in measured}, "events": events}
+
+
+class DemoCase(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="tenon-demo-")
+        self.addCleanup(folder.cleanup)
+        self.folder, self.domain = Path(folder.name), free_domain()
+
+    def words(self, *more):
+        return ["demo", "--headless", "--domain", self.domain, "--out", self.folder / "out", *more]
+
+    def left_running(self):
+        """The programs of this demo: process id -> command line."""
+        found = {}
+        for file in Path("/proc").glob("[0-9]*/cmdline"):
+            try:
+                words = file.read_bytes().decode(errors="replace").split("\0")
+            except OSError:
+                continue  # it has ended
+            if words[0].startswith(str(PROGRAMS)) and "--domain" in words and words[words.index("--domain") + 1] == str(self.domain):
+                found[int(file.parent.name)] = words
+        return found
+
+    def process_of(self, program):
+        return next(process for process, words in self.left_running().items() if words[0].endswith(f"tenon-{program}"))
+
+    def start(self, *more, lockstep=True):
+        words = self.words("--scenario", PEG_AND_BOX, "--overwrite", *(["--lockstep"] if lockstep else []), *more)
+        demo = subprocess.Popen([TENON, *map(str, words)], stdout=subprocess.PIPE,
+                                stderr=subprocess.STDOUT, text=True, env={**os.environ, "TENON_PROGRAMS": str(PROGRAMS)})
+        self.addCleanup(demo.stdout.close)
+        self.addCleanup(demo.wait)
+        self.addCleanup(lambda: demo.poll() is None and demo.kill())
+        return demo
+
+    def wait_for_first_step(self, demo):
+        said = ""
+        for line in demo.stdout:
+            said += line
+            if "step 1 of 2" in line:
+                return said
+        self.fail("the demo ended before its first step")
+
+    def assert_nothing_runs(self):
+        deadline = time.monotonic() + 30
+        while self.left_running() and time.monotonic() < deadline:
+            time.sleep(0.1)
+        self.assertEqual(self.left_running(), {})
+
+    def assert_recorded_as_published(self, scenario, out, manifolds_a_tick):
+        """Every sample that the server published in the ticks of a lockstep session is in its recording."""
+        again = tenon("resimulate", out / "session.mcap", scenario)
+        # from the first checkpoint on
+        compared = re.search(r"ticks (\d+) to (\d+): (\d+) compared, 0 gaps", again.stdout)
+        self.assertTrue(compared, again.stdout + again.stderr)
+        first, ticks = int(compared[1]), int(compared[2])
+        self.assertEqual(int(compared[3]), ticks - first + 1)
+        said = (out / "record.log").read_text(encoding="utf-8")
+        self.assertIn(", 0 published samples missing\n", said)
+        rows = {topic: (int(recorded), int(published))
+                for topic, recorded, published in re.findall(r"(?m)^  (\w+): (\d+) of (\d+) samples$", said)}
+        self.assertEqual(rows["TickInput"], (ticks, ticks))
+        contained = samples_by_topic(out / "session.mcap")
+        for topic, a_tick in (("WorldFrame_1k", 1), ("HandManifold", manifolds_a_tick)):
+            recorded, published = rows[topic]
+            self.assertEqual((recorded, contained[topic]), (published, published), topic)
+            # more when a station on a busy machine asked for a tick again
+            self.assertGreaterEqual(published, a_tick * ticks, topic)
+        for topic in ("WorldFrame_100", "WorldFrame_30", "TickStats_100", "StepProgress", "ObjectSnapshot", "GrabState"):
+            self.assertEqual(contained[topic], rows[topic][1], topic)
+            self.assertEqual(*rows[topic], topic)
+        self.assertGreaterEqual(rows["TickStats_100"][1], ticks // 10)
+
+
+class Lockstep(DemoCase):
+    def run_demo(self, name, recorder_stalls):
+        demo = self.start("--no-instructor", "--out", self.folder / name)
+        self.wait_for_first_step(demo)
+        if recorder_stalls:  # for long enough that the system drops what it is sent
+            os.kill(self.process_of("record"), signal.SIGSTOP)
+            time.sleep(2)
+            os.kill(self.process_of("record"), signal.SIGCONT)
+        said, _ = demo.communicate(timeout=900)
+        self.assertEqual(demo.returncode, 0, said[-3000:])
+        self.assert_recorded_as_published(PEG_AND_BOX, self.folder / name, manifolds_a_tick=1)
+        return final_hash(said), json.loads((self.folder / name / "summary.json").read_text(encoding="utf-8"))
+
+    def test_recordings_are_complete_and_reports_have_equal_figures_even_when_the_recorder_stalls(self):
+        first_hash, first = self.run_demo("first", recorder_stalls=False)
+        second_hash, second = self.run_demo("second", recorder_stalls=True)
+        self.assertEqual(first_hash, second_hash)
+        self.assertGreater(first["steps"][1]["contact_seconds"], 0.5)
+        self.assertEqual(figures(first), figures(second))
+
+
+class LockstepNightly(DemoCase):
+    def test_the_recording_of_the_engine_bay_is_complete(self):
+        engine_bay = SOURCE / "scenarios" / "engine_bay"
+        done = tenon(*self.words("--scenario", engine_bay, "--lockstep"), timeout=1700)
+        self.assertEqual(done.returncode, 0, done.stdout[-3000:] + done.stderr)
+        self.assert_recorded_as_published(engine_bay, self.folder / "out", manifolds_a_tick=5)
+
+
+class Endings(DemoCase):
+    def test_whatever_signal_ends_it_nothing_is_left_running(self):
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGKILL):
+            with self.subTest(signal=number.name):
+                demo = self.start()
+                self.wait_for_first_step(demo)
+                self.assertEqual(len(self.left_running()), 5)
+                demo.send_signal(number)
+                demo.communicate(timeout=120)
+                self.assertEqual(demo.returncode, -number if number == signal.SIGKILL else 128 + number)
+                self.assert_nothing_runs()
+
+    def test_a_program_that_cannot_start_ends_it_with_its_reason(self):
+        done = tenon(*self.words("--scenario", PEG_AND_BOX, "--lockstep", "--device", "nosuch"), timeout=300)
+        self.assertEqual(done.returncode, 1, done.stdout)
+        said = (self.folder / "out" / "instructor.log").read_text(encoding="utf-8").splitlines()
+        reason = next(line for line in said if "nosuch" in line)
+        self.assertIn(f"instructor has ended, so the session is stopped: {reason}", done.stdout)
+        self.assert_nothing_runs()
+
+    def test_a_trainee_that_ends_in_the_session_ends_it(self):
+        demo = self.start()
+        self.wait_for_first_step(demo)
+        os.kill(self.process_of("trainee"), signal.SIGKILL)
+        said, _ = demo.communicate(timeout=120)
+        self.assertEqual(demo.returncode, 1, said)
+        self.assertIn("trainee has ended, so the session is stopped", said)
+        self.assert_nothing_runs()
+
+
+class Folder(unittest.TestCase):
+    def test_a_second_demo_goes_into_a_folder_of_its_own(self):
+        with tempfile.TemporaryDirectory(prefix="tenon-demo-") as folder, contextlib.chdir(folder):
+            for expected in ("out/demo", "out/demo-2", "out/demo-3"):
+                args = argparse.Namespace(out=None, overwrite=False)
+                self.assertEqual(output_folder(args), Path(expected))
+                Path(expected).mkdir(parents=True)
+                (Path(expected) / "report.html").touch()
+            self.assertEqual(output_folder(argparse.Namespace(out=None, overwrite=True)), Path("out/demo"))
+            self.assertEqual(output_folder(argparse.Namespace(out=Path("mine"), overwrite=False)), Path("mine"))
+
+
+class RealTime(DemoCase):
+    def test_its_end_is_what_the_server_says_and_a_normal_end_is_no_failure(self):
+        scenario = self.folder / "hasty" / "scenario.yaml"
+        scenario.parent.mkdir()
+        text = (PEG_AND_BOX / "scenario.yaml").read_text(encoding="utf-8")
+        scenario.write_text(text.replace("timeout: 60 s", "timeout: 4 s"), encoding="utf-8")
+        demo = self.start("--scenario", scenario.parent, lockstep=False)
+        said = self.wait_for_first_step(demo)
+        for _ in range(10):  # a station that stalls, as on a busy machine
+            os.kill(self.process_of("trainee"), signal.SIGSTOP)
+            time.sleep(0.15)
+            os.kill(self.process_of("trainee"), signal.SIGCONT)
+            time.sleep(0.05)
+        said += demo.communicate(timeout=120)[0]
+        self.assertEqual(demo.returncode, 1, said)
+        server = (self.folder / "out" / "serve.log").read_text(encoding="utf-8")
+        ended = re.search(r"(?m)^a step was not done in time after .*$", server)
+        self.assertTrue(ended, server)
+        self.assertIn(ended[0], said.splitlines())
+        self.assertIn(": failed after ", said)
+        self.assertNotRegex(said, "(record|trainee|instructor|observer) failed")
+        told = [float(second) for second in re.findall(r"(?m)^ *([0-9.]+) s  ! hands? .* held still: ", said)]
+        self.assertTrue(told, said)
+        for earlier, later in zip(told, told[1:]):
+            self.assertGreaterEqual(later - earlier, 0.99, said)
+
+
+class Instructor(DemoCase):
+    def test_a_scenario_without_a_hand_for_one_starts_none(self):
+        scenario = self.folder / "alone" / "scenario.yaml"
+        scenario.parent.mkdir()
+        text = (PEG_AND_BOX / "scenario.yaml").read_text(encoding="utf-8")
+        scenario.write_text("".join(line for line in text.splitlines(True) if "role: instructor" not in line), encoding="utf-8")
+        self.assertEqual(hands_of(PEG_AND_BOX), {"right": "trainee", "instructor": "instructor"})
+        self.assertEqual(hands_of(scenario.parent), {"right": "trainee"})
+        done = tenon(*self.words("--scenario", scenario.parent, "--lockstep"), timeout=900)
+        self.assertEqual(done.returncode, 0, done.stdout[-3000:] + done.stderr)
+        self.assertFalse((self.folder / "out" / "instructor.log").exists())
+        self.assertRegex(done.stdout, r"everything is mounted after [0-9.]+ s; late ticks: 0")
+        again = tenon(*self.words("--scenario", scenario.parent, "--lockstep", "--overwrite"), timeout=900)
+        self.assertEqual(again.returncode, 0, again.stdout[-3000:] + again.stderr)
+        self.assertNotIn("preparing the scene", again.stdout, "everything is baked")
+
+
+if __name__ == "__main__":
+    unittest.main()
