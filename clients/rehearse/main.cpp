@@ -191,6 +191,9 @@ void printOutcome(const tenon::rehearse::RehearsalReport& report) {
   std::printf("%s after %.3f s\nfinal state hash: %016llx\n", report.reason.c_str(),
               static_cast<double>(report.ticks) * tenon::kTickSeconds,
               static_cast<unsigned long long>(report.final_hash));
+  if (report.crowded_ticks > 0)
+    std::printf("in %llu ticks a pair had more contacts than its list takes; the farthest were left out\n",
+                static_cast<unsigned long long>(report.crowded_ticks));
 }
 
 int rehearsePeople(RehearseArguments& arguments) {

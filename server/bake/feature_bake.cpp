@@ -18,7 +18,8 @@ using structures::FeatureEdge;
 using structures::SurfaceSample;
 
 constexpr double kCos3 = -0.99863;    // [-] -cos of the turn between faces from which an edge counts
-constexpr double kTanHalf20 = 0.176;  // [-] tan of half the turn from which an edge is sharp at any radius
+constexpr double kTanHalf60 = 0.577;  // [-] of a facet of a round surface at most
+constexpr double kTanHalf40 = 0.364;  // [-] tan of half the turn from which an edge is sharp at any radius
 constexpr double kCos6 = 0.995;       // [-] a polyline that turns less at a vertex is straight there
 constexpr double kCos20 = 0.94;       // [-] faces of edges that are merged turn by less
 
@@ -37,11 +38,13 @@ struct ConvexEdge {
 /// Lengths that follow from the spacing of the points, all [m].
 struct Sizes {
   explicit Sizes(double spacing)
-      : piece(std::clamp(spacing, kSmallestSpacing, kLargestSpacing)),
-        depth(piece / 40.0),
-        sharp_radius(piece / 8.0),
-        largest_radius(piece * piece / (8.0 * depth)) {}
+      : apart(std::clamp(spacing, kSmallestSpacing, kLargestSpacing)),
+        piece(1.5 * apart),
+        depth(apart / 16.0),
+        sharp_radius(apart / 8.0),
+        largest_radius(apart * apart / (8.0 * depth)) {}
 
+  double apart;           ///< of the other part's points, about
   double piece;           ///< longest piece of an edge
   double depth;           ///< what a flat face may enter between two points of a round feature
   double sharp_radius;    ///< rounder edges are sampled as surfaces, without their edges
@@ -49,7 +52,7 @@ struct Sizes {
 
   /// Spacing of points on a surface of this radius.
   [[nodiscard]] double spacingAt(double radius) const {
-    return std::clamp(std::sqrt(8.0 * radius * depth), piece / 16.0, piece);
+    return std::clamp(std::sqrt(8.0 * radius * depth), apart / 16.0, apart);
   }
 };
 
@@ -62,7 +65,7 @@ struct Feature {
 class FeatureFinder {
  public:
   FeatureFinder(const WeldedMesh& mesh, const structures::DistanceField& field, const Sizes& sizes)
-      : mesh_(mesh), normals_(field), sizes_(sizes), grid_(sizes.piece) {
+      : mesh_(mesh), normals_(field), sizes_(sizes), grid_(sizes.apart) {
     const std::vector<Edge> edges = mesh.sharpEdges(-2.0);
     const FaceSides sides(mesh, edges, field);
     for (const Edge& edge : edges) addIfConvex(edge, sides);
@@ -100,7 +103,12 @@ class FeatureFinder {
       convex.tan_half_turn = std::sqrt((1.0 + flat) / std::max(1.0 - flat, 1e-12));
       convex.radius = 0.5 * width / convex.tan_half_turn;
     }
-    const bool sharp = convex.tan_half_turn >= kTanHalf20 || convex.radius <= sizes_.sharp_radius;
+    // points of the other part see a long ridge that is wider than half their distance
+    const bool is_ridge = convex.radius > 0.5 * sizes_.apart && convex.radius <= sizes_.largest_radius &&
+                          convex.tan_half_turn < kTanHalf60 &&
+                          (at(edge.to) - at(edge.from)).norm() > 3.0 * sizes_.apart;
+    if (is_ridge) return;
+    const bool sharp = convex.tan_half_turn >= kTanHalf40 || convex.radius <= sizes_.sharp_radius;
     if (!sharp && convex.radius > sizes_.largest_radius) return;
     (sharp ? sharp_ : round_).push_back(convex);
   }
@@ -155,7 +163,7 @@ class FeatureFinder {
                                 const std::vector<std::uint32_t>& edges, std::size_t i, std::size_t j) const {
     const Vector3 a = at(chain[i]);
     const Vector3 along = (at(chain[j]) - a).normalized();
-    const double tolerance = sizes_.piece / 200.0;
+    const double tolerance = sizes_.apart / 80.0;
     double reached = 0.0;
     for (std::size_t k = i + 1; k < j; ++k) {
       const Vector3 to = at(chain[k]) - a;
@@ -238,7 +246,7 @@ structures::FeatureShell bakeFeatures(const WeldedMesh& mesh, const structures::
   for (const Feature& feature : features) samples.push_back(feature.sample);
   std::vector<std::uint32_t> order;
   structures::FeatureStorage storage;
-  storage.points = structures::buildFlatShell(samples, sizes.piece, order);
+  storage.points = structures::buildFlatShell(samples, sizes.apart, order);
   storage.edges.reserve(order.size());
   for (const std::uint32_t i : order) storage.edges.push_back(features[i].edge);
   return structures::makeFeatureShell(std::move(storage));

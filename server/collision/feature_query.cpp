@@ -25,60 +25,78 @@ constexpr double kMaxCrossingDepth = 5e-4;
 /// [-] Relative to half a piece: a crossing at the border of two pieces is in one of them.
 constexpr double kEndTolerance = 1e-3;
 
-/// A piece of an edge in W, or in any other frame.
-struct Piece {
-  Piece(const structures::FeatureShell& features, std::uint32_t point, const Pose& X_WM)
-      : p_W(X_WM * Vector3(features.points().points()[point].p_MP.cast<double>())) {
-    const FeatureEdge& edge = features.edges()[point];
-    half_W = X_WM.rotation() * Vector3(edge.half_M.cast<double>());
-    for (std::size_t face : {0U, 1U})
-      into_W[face] = X_WM.rotation() * Vector3(edge.into_M[face].cast<double>());
-  }
-  /// Whether its body lies on the far side of a plane with normal n_W through the edge.
-  [[nodiscard]] bool separatedBy(const Vector3& n_W, double tolerance) const {
-    return n_W.dot(into_W[0]) <= tolerance && n_W.dot(into_W[1]) <= tolerance;
-  }
-
-  Vector3 p_W, half_W;
-  std::array<Vector3, 2> into_W;
+/// A frame's rotation as matrix: many vectors are turned by it.
+struct Transform {
+  explicit Transform(const Pose& X) : R(X.matrix()), p(X.translation()) {}
+  [[nodiscard]] Vector3 operator*(const Vector3f& p_BP) const { return p + R * p_BP.cast<double>(); }
+  [[nodiscard]] Vector3 turned(const Vector3f& v_B) const { return R * v_B.cast<double>(); }
+  Matrix3 R;
+  Vector3 p;
 };
 
-/// Two pieces as a contact of A against B. `slack` [m] beyond their ends, `tolerance` [-] of the normal.
-/// False when they do not cross there.
-bool cross(const Piece& a, const Piece& b, double slack, double tolerance, Contact& contact) {
-  const Vector3 c = a.half_W.cross(b.half_W);
+EdgePiece pieceOf(const structures::FeatureShell& features, std::uint32_t point) {
+  const FeatureEdge& edge = features.edges()[point];
+  return {features.points().points()[point].p_MP.cast<double>(),
+          edge.half_M.cast<double>(),
+          {edge.into_M[0].cast<double>(), edge.into_M[1].cast<double>()}};
+}
+
+EdgePiece pieceOf(const structures::FeatureShell& features, std::uint32_t point, const Transform& X_AB) {
+  const FeatureEdge& edge = features.edges()[point];
+  return {X_AB * features.points().points()[point].p_MP,
+          X_AB.turned(edge.half_M),
+          {X_AB.turned(edge.into_M[0]), X_AB.turned(edge.into_M[1])}};
+}
+
+/// [-] The direction of +-c in which the body of a piece lies on the far side of a plane through the edge; 0:
+/// neither. `slack` [-]: c . into may exceed 0 by this, times the length of c.
+double separatingSign(const EdgePiece& piece, const Vector3& c, double slack) {
+  const double first = c.dot(piece.into[0]);
+  const double second = c.dot(piece.into[1]);
+  if (std::max(first, second) <= slack) return 1.0;
+  return std::min(first, second) >= -slack ? -1.0 : 0.0;
+}
+
+/// Two pieces as a contact of A against B, in their frame. `slack` [m] beyond their ends, `tolerance` [-] of
+/// the normal. False when they do not cross there.
+bool cross(const EdgePiece& a, const EdgePiece& b, double slack, double tolerance, Contact& contact) {
+  const Vector3 c = a.half.cross(b.half);
   const double c2 = c.squaredNorm();
-  const double a2 = a.half_W.squaredNorm();
-  const double b2 = b.half_W.squaredNorm();
+  const double a2 = a.half.squaredNorm();
+  const double b2 = b.half.squaredNorm();
   if (c2 < kMinSine2 * a2 * b2) return false;
-  // closest points a + along_a * half_a, b + along_b * half_b of the two lines
-  const Vector3 r = a.p_W - b.p_W;
-  const double along_a = -r.dot(b.half_W.cross(c)) / c2;
-  const double along_b = -r.dot(a.half_W.cross(c)) / c2;
+  const double length = std::sqrt(c2);
+  const double sign = separatingSign(b, c, tolerance * length);
+  if (sign == 0.0 || (-sign * c.dot(a.into[0]) > tolerance * length) ||
+      (-sign * c.dot(a.into[1]) > tolerance * length))
+    return false;
+  const Vector3 r = a.p - b.p;
+  contact.gap = sign / length * c.dot(r);
+  if (contact.gap < -kMaxCrossingDepth - slack) return false;
+  // closest points a.p + along_a * a.half, b.p + along_b * b.half of the two lines
+  const double along_a = -r.dot(b.half.cross(c)) / c2;
+  const double along_b = -r.dot(a.half.cross(c)) / c2;
   if (std::abs(along_a) > 1.0 + kEndTolerance + slack / std::sqrt(a2) ||
       std::abs(along_b) > 1.0 + kEndTolerance + slack / std::sqrt(b2))
     return false;
-  const Vector3 unit = c / std::sqrt(c2);
-  for (const double sign : {1.0, -1.0}) {
-    const Vector3 n_W = sign * unit;
-    if (!b.separatedBy(n_W, tolerance) || !a.separatedBy(-n_W, tolerance)) continue;
-    contact.n_W = n_W;
-    contact.p_WP = a.p_W + along_a * a.half_W;
-    contact.gap = n_W.dot(r);
-    if (contact.gap < -kMaxCrossingDepth - slack) continue;
-    return true;
-  }
-  return false;
+  contact.n_W = sign / length * c;
+  contact.p_WP = a.p + along_a * a.half;
+  return true;
 }
 
-/// Sets the contact of two pieces from their poses.
-void evaluateCrossing(const Piece& a, const Piece& b, double dilation, Contact& contact) {
+/// The contact of two pieces in W, from A's frame.
+void evaluateCrossing(const EdgePiece& a, const EdgePiece& b, double dilation, const Transform& X_WA,
+                      Contact& contact) {
+  Vector3 p_A = a.p;
   if (cross(a, b, 0.0, kConeTolerance, contact)) {
     contact.gap -= dilation;
-    return;
+    contact.n_W = X_WA.R * contact.n_W;
+    p_A = contact.p_WP;
+  } else {
+    contact.gap = kDormantGap;
+    contact.n_W = Vector3::UnitZ();
   }
-  contact.p_WP = a.p_W;
-  contact.gap = kDormantGap;
+  contact.p_WP = X_WA.p + X_WA.R * p_A;
 }
 
 /// B's features in A's field.
@@ -111,10 +129,9 @@ void drop(double gap, PairQueryResult& result) {
   result.unlisted_gap = std::min(result.unlisted_gap, gap);
 }
 
-/// Drops shell points with the largest gaps until `wanted` contacts fit, at most kFeatureRoom.
-void makeRoom(std::size_t wanted, PairQueryResult& result) {
-  ContactList& contacts = result.contacts;
-  const std::size_t most = ContactList::capacity() - std::min(wanted, kFeatureRoom);
+/// Keeps the `most` contacts with the smallest gaps, in their order, and drops the others. Their gaps count
+/// up to the margin: dormant crossings are beyond it.
+void keepNearest(std::size_t most, double margin, ContactList& contacts, PairQueryResult& result) {
   if (contacts.size() <= most) return;
   std::array<std::pair<double, std::uint32_t>, ContactList::capacity()> rank;
   for (std::uint32_t i = 0; i < contacts.size(); ++i) rank[i] = {contacts[i].gap, i};
@@ -127,37 +144,49 @@ void makeRoom(std::size_t wanted, PairQueryResult& result) {
     if (std::pair(contacts[i].gap, i) < limit) {
       contacts[kept++] = contacts[i];
     } else {
-      drop(contacts[i].gap, result);
+      drop(std::min(contacts[i].gap, margin), result);
     }
   }
   contacts.resize(kept);
 }
 
-/// Finds the crossings of B's pieces near A with pieces of A, by A's bounding spheres. In A's frame: A's
+/// Lists the crossings of B's pieces near A with pieces of A, by A's bounding spheres. In A's frame: A's
 /// pieces are many, those of B few.
 class CrossingSearch {
  public:
-  CrossingSearch(const PairQuery& query, const PairFeatures& features, PairQueryResult& result)
-      : query_(query), features_(features), result_(result), X_AB_(query.X_WA.inverse() * query.X_WB) {}
+  CrossingSearch(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
+                 PairQueryResult& result)
+      : query_(query),
+        features_(features),
+        near_(scratch.near),
+        crossings_(scratch.crossings),
+        result_(result),
+        X_WA_(query.X_WA) {}
 
   /// `near_A`: B's features near A.
   void run(const ContactList& near_A) {
+    near_.count = 0;
+    crossings_.clear();
+    const Transform X_AB(query_.X_WA.inverse() * query_.X_WB);
     const double reach_A = features_.features_A->longestHalf() + query_.dilation + query_.margin;
     for (const Contact& contact : near_A) {
-      const FeatureEdge& edge = features_.features_B->edges()[contact.point];
-      if (edge.half_M.isZero()) continue;
-      const Vector3f p_A = (X_AB_ * Vector3(pointOf(*features_.features_B, contact.point))).cast<float>();
-      centres_[count_] = p_A;
-      reach_[count_] = static_cast<float>(reach_A) + edge.half_M.norm();
-      all_[count_] = static_cast<std::uint16_t>(count_);
-      point_[count_++] = contact.point;
+      if (features_.features_B->edges()[contact.point].half_M.isZero()) continue;
+      EdgePiece& piece = near_.pieces[near_.count];
+      piece = pieceOf(*features_.features_B, contact.point, X_AB);
+      const Vector3f p_A = piece.p.cast<float>();
+      const float reach = static_cast<float>(reach_A + piece.half.norm());
+      near_.all[near_.count] = {p_A, reach, near_.count};
+      near_.point[near_.count++] = contact.point;
+      box_A_.extend(p_A - Vector3f::Constant(reach));
+      box_A_.extend(p_A + Vector3f::Constant(reach));
     }
+    if (near_.count == 0) return;
     const structures::Pointshell& shell = features_.features_A->points();
     for (const structures::ShellSphere& cluster : shell.clusters()) {
-      const auto by_cluster = narrowed(cluster.p_MC, cluster.radius, {all_.data(), count_}, by_cluster_);
+      const auto by_cluster = narrowed(cluster, {near_.all.data(), near_.count}, near_.by_cluster);
       if (by_cluster.empty()) continue;
       for (const structures::ShellSphere& leaf : shell.leaves().subspan(cluster.first, cluster.count)) {
-        const auto by_leaf = narrowed(leaf.p_MC, leaf.radius, by_cluster, by_leaf_);
+        const auto by_leaf = narrowed(leaf, by_cluster, near_.by_leaf);
         if (by_leaf.empty()) continue;
         for (std::uint32_t i = leaf.first; i < leaf.first + leaf.count; ++i) crossPiece(i, by_leaf);
       }
@@ -165,64 +194,51 @@ class CrossingSearch {
   }
 
  private:
-  using Indices = std::array<std::uint16_t, kMaxPairContacts>;
+  using Ball = NearPieces::Ball;
 
-  static Vector3 pointOf(const structures::FeatureShell& features, std::uint32_t point) {
-    return features.points().points()[point].p_MP.cast<double>();
-  }
-
-  /// Those of B's pieces that may cross a piece of A within a sphere about `p_AC` of `radius` [m].
-  std::span<const std::uint16_t> narrowed(const Vector3f& p_AC, float radius,
-                                          std::span<const std::uint16_t> from, Indices& to) const {
+  /// Those of B's pieces that may cross a piece of A within a sphere.
+  std::span<const Ball> narrowed(const structures::ShellSphere& sphere, std::span<const Ball> from,
+                                 NearPieces::Balls& to) const {
+    if (box_A_.squaredExteriorDistance(sphere.p_MC) > sphere.radius * sphere.radius) return {};
     std::size_t count = 0;
-    for (const std::uint16_t j : from) {
-      const float reach = reach_[j] + radius;
-      to[count] = j;
-      count += (centres_[j] - p_AC).squaredNorm() <= reach * reach ? 1U : 0U;
+    for (const Ball& ball : from) {
+      const float reach = ball.reach + sphere.radius;
+      to[count] = ball;
+      count += (ball.p_A - sphere.p_MC).squaredNorm() <= reach * reach ? 1U : 0U;
     }
     return {to.data(), count};
   }
 
-  void crossPiece(std::uint32_t i, std::span<const std::uint16_t> near) {
-    const FeatureEdge& edge = features_.features_A->edges()[i];
-    if (edge.half_M.isZero()) return;
+  void crossPiece(std::uint32_t i, std::span<const Ball> near) {
+    if (features_.features_A->edges()[i].half_M.isZero()) return;
     const Vector3f p_A = features_.features_A->points().points()[i].p_MP;
-    for (const std::uint16_t j : near) {
-      if ((centres_[j] - p_A).squaredNorm() > reach_[j] * reach_[j]) continue;
+    EdgePiece piece;
+    bool known = false;
+    for (const Ball& ball : near) {
+      if ((ball.p_A - p_A).squaredNorm() > ball.reach * ball.reach) continue;
+      if (!known) piece = pieceOf(*features_.features_A, i);
+      known = true;
+      const EdgePiece& other = near_.pieces[ball.piece];
       Contact contact;
-      if (!cross(Piece(*features_.features_A, i, Pose()), Piece(*features_.features_B, point_[j], X_AB_),
-                 query_.margin, kListedTolerance, contact) ||
+      if (!cross(piece, other, query_.margin, kListedTolerance, contact) ||
           contact.gap - query_.dilation > query_.margin)
         continue;
-      list(i, point_[j], contact);
-    }
-  }
-
-  void list(std::uint32_t point, std::uint32_t other, Contact& contact) {
-    contact.kind = ContactKind::kCrossing;
-    contact.point = point;
-    contact.other = other;
-    evaluateCrossing(Piece(*features_.features_A, point, query_.X_WA),
-                     Piece(*features_.features_B, other, query_.X_WB), query_.dilation, contact);
-    result_.smallest_gap = std::min(result_.smallest_gap, contact.gap);
-    if (listed_ < kMaxCrossings && result_.contacts.push_back(contact)) {
-      ++listed_;
-    } else {
-      drop(std::min(contact.gap, query_.margin), result_);
+      contact.kind = ContactKind::kCrossing;
+      contact.point = i;
+      contact.other = near_.point[ball.piece];
+      evaluateCrossing(piece, other, query_.dilation, X_WA_, contact);
+      result_.smallest_gap = std::min(result_.smallest_gap, contact.gap);
+      if (!crossings_.push_back(contact)) drop(std::min(contact.gap, query_.margin), result_);
     }
   }
 
   const PairQuery& query_;
   const PairFeatures& features_;
+  NearPieces& near_;
+  ContactList& crossings_;
   PairQueryResult& result_;
-  const Pose X_AB_;
-  // B's pieces near A, in A's frame
-  std::size_t count_ = 0;
-  std::array<Vector3f, kMaxPairContacts> centres_;
-  std::array<float, kMaxPairContacts> reach_;  ///< [m] centres of pieces that cross it are no farther
-  std::array<std::uint32_t, kMaxPairContacts> point_;
-  Indices all_, by_cluster_, by_leaf_;
-  std::size_t listed_ = 0;
+  const Transform X_WA_;
+  Eigen::AlignedBox3f box_A_;  ///< of the balls of all near pieces
 };
 
 }  // namespace
@@ -243,7 +259,13 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
   const auto near = static_cast<std::size_t>(
       std::count_if(of_B.contacts.begin(), of_B.contacts.end(),
                     [&](const Contact& contact) { return contact.gap <= query.margin; }));
-  makeRoom(near + (of_B.contacts.empty() ? 0 : kMaxCrossings), result);
+  const bool may_cross = half_A > 0.0 && half_B > 0.0 && !of_B.contacts.empty();
+  if (may_cross) {
+    CrossingSearch(query, features, scratch, result).run(of_B.contacts);
+    keepNearest(kMaxCrossings, query.margin, scratch.crossings, result);
+  }
+  const std::size_t room = std::min(near + (may_cross ? scratch.crossings.size() : 0), kFeatureRoom);
+  keepNearest(ContactList::capacity() - room, query.margin, result.contacts, result);
   for (const Contact& contact : of_B.contacts) {
     if (contact.gap > query.margin) {
       result.unlisted_gap = std::min(result.unlisted_gap, contact.gap);
@@ -253,9 +275,14 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
   }
   if (half_A == 0.0 || half_B == 0.0) return;
 
+  for (std::size_t i = 0; may_cross && i < scratch.crossings.size(); ++i) {
+    const Contact& contact = scratch.crossings[i];
+    if (!result.contacts.push_back(contact)) drop(std::min(contact.gap, query.margin), result);
+  }
   // a crossing is nearer than the centre of B's piece by half its length at most
-  const double crossing_bound = of_B.contacts.empty() ? of_B.smallest_gap - half_B : query.margin;
-  if (!of_B.contacts.empty()) CrossingSearch(query, features, result).run(of_B.contacts);
+  double crossing_bound = of_B.unlisted_gap - half_B;
+  if (may_cross) crossing_bound = std::min(crossing_bound, query.margin);
+  if (crossing_bound < query.margin) result.complete_to = std::min(result.complete_to, crossing_bound);
   result.smallest_gap = std::min(result.smallest_gap, crossing_bound);
   result.unlisted_gap = std::min(result.unlisted_gap, crossing_bound);
 }
@@ -284,9 +311,12 @@ void resampleFeatures(const PairQuery& query, const PairFeatures& features, doub
     if (!result.reduced) result.counts.points_colliding += scratch.of_B.counts.points_colliding;
     for (const Contact& contact : points) contacts.push_back(turned(contact));
   }
+  if (crossings.empty()) return;
+  const Transform X_WA(query.X_WA);
+  const Transform X_AB(query.X_WA.inverse() * query.X_WB);
   for (Contact& contact : crossings) {
-    evaluateCrossing(Piece(*features.features_A, contact.point, query.X_WA),
-                     Piece(*features.features_B, contact.other, query.X_WB), query.dilation, contact);
+    evaluateCrossing(pieceOf(*features.features_A, contact.point),
+                     pieceOf(*features.features_B, contact.other, X_AB), query.dilation, X_WA, contact);
     result.smallest_gap = std::min(result.smallest_gap, contact.gap);
     contacts.push_back(contact);
   }

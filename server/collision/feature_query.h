@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "server/collision/pair_query.h"
 #include "server/structures/feature_shell.h"
 
@@ -22,16 +24,39 @@ struct PairFeatures {
   }
 };
 
+/// A piece of a convex edge, as structures::FeatureEdge, in any frame.
+struct EdgePiece {
+  Vector3 p = Vector3::Zero();     ///< [m] centre
+  Vector3 half = Vector3::Zero();  ///< [m] from the centre to one end
+  std::array<Vector3, 2> into{Vector3::Zero(), Vector3::Zero()};
+};
+
+/// B's pieces of edges near A, in A's frame.
+struct NearPieces {
+  struct Ball {
+    Vector3f p_A;
+    float reach = 0.0F;  ///< [m] centres of pieces that cross this one are no farther
+    std::uint32_t piece = 0;
+  };
+  using Balls = std::array<Ball, kMaxPairContacts>;
+
+  std::uint32_t count = 0;
+  std::array<EdgePiece, kMaxPairContacts> pieces;
+  std::array<std::uint32_t, kMaxPairContacts> point;  ///< index in B's features
+  Balls all, by_cluster, by_leaf;
+};
+
 /// Memory of the functions below; one for each thread.
 struct FeatureScratch {
   PairQueryResult of_B;   ///< B's features in A's field
   ContactList crossings;  ///< that are evaluated again
+  NearPieces near;
 };
 
 /// Adds to the result of queryPair the contacts of features up to `query.margin`: of kFeaturePoint, then of
 /// kCrossing, after those of shell points. Levels and budget of the query do not apply to features; their
 /// points are counted. Where the list is full, feature contacts displace shell points with the largest gaps,
-/// at most kFeatureRoom; crossings beyond kMaxCrossings are dropped, those of the first pieces are kept
+/// at most kFeatureRoom; of more than kMaxCrossings crossings those with the largest gaps are dropped
 /// (`contacts_dropped`).
 ///
 /// A crossing is listed when it may come about within `query.margin` of motion. While it is beyond the ends

@@ -19,6 +19,13 @@ constexpr double kDilationPerBand = 0.5;
 
 }  // namespace
 
+collision::PairFeatures featuresOf(const Scene& scene, const PairSpec& pair) {
+  const auto& a = scene.objects[pair.a.value].structures;
+  const auto& b = scene.objects[pair.b.value].structures;
+  if (!a || !b) return {};
+  return {&a->features, &b->features, &a->field, std::min(pair.dilation, kDilationPerBand * a->field.band())};
+}
+
 CollPair::CollPair(const Scene& scene, std::size_t pair) : spec_(&scene.pairs[pair]) {
   const ObjectSpec& a = scene.objects[spec_->a.value];
   const ObjectSpec& b = scene.objects[spec_->b.value];
@@ -27,8 +34,7 @@ CollPair::CollPair(const Scene& scene, std::size_t pair) : spec_(&scene.pairs[pa
   if (possible_) {
     shell_A_ = &a.structures->shell;
     field_B_ = &b.structures->field;
-    features_ = {&a.structures->features, &b.structures->features, &a.structures->field,
-                 std::min(spec_->dilation, kDilationPerBand * a.structures->field.band())};
+    features_ = featuresOf(scene, *spec_);
   }
   enabled_ = spec_->enabled;
 }

@@ -16,6 +16,9 @@
 
 namespace tenon::simulation {
 
+/// What the second direction of a pair asks; nothing where an object has no structures.
+[[nodiscard]] collision::PairFeatures featuresOf(const Scene& scene, const PairSpec& pair);
+
 /// The state of a collision pair (paper §3.2, ii): enabled or not, the tick of its next query, and the result
 /// of the last one.
 ///
@@ -86,7 +89,8 @@ class CollPair {
   /// Queries a pair that is in no island: lists contacts with gaps up to `margin` [m], testing at most
   /// `budget` points. The `priority_points` are tested even when their level is skipped.
   void query(const Pose& X_WA, const Pose& X_WB, double margin, collision::FeatureScratch& scratch,
-             std::uint32_t budget = 0xFFFFFFFFU, std::span<const std::uint32_t> priority_points = {}) noexcept;
+             std::uint32_t budget = 0xFFFFFFFFU,
+             std::span<const std::uint32_t> priority_points = {}) noexcept;
   /// Sets the contact wrench to the penalty force at `stiffness` [N/m] of the contacts of query().
   void computePenaltyForce(double stiffness, const Pose& X_WA) noexcept;
   /// Copies the result of the island solver of tick `now`.

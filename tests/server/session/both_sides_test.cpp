@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -10,6 +11,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "server/bake/shapes.h"
 #include "server/session/scene_loader.h"
 #include "server/simulation/environment.h"
 
@@ -26,18 +28,21 @@ class BothSides : public ::testing::Test {
  protected:
   ~BothSides() override { fs::remove_all(folder_); }
 
-  /// `fixed` and `held` are meshes of a scenario. Points are 4 mm apart, voxels `voxel_mm`.
+  /// `fixed` and `held` are meshes of a scenario. Points are 4 mm apart, voxels `voxel_mm`; `refine` are more
+  /// keys of the fixed part's structures.
   std::shared_ptr<const simulation::Scene> load(const std::string& fixed, const std::string& held,
-                                                double voxel_mm, const std::string& pair = "dilation: 0 mm") {
-    const std::string structures =
-        fmt::format("structures: {{voxel: {} mm, refinement: 1, spacing: 4 mm}}", voxel_mm);
+                                                double voxel_mm,
+                                                const std::string& refine = "refinement: 1") {
+    const auto structures = [&](const std::string& keys) {
+      return fmt::format("structures: {{voxel: {} mm, spacing: 4 mm, {}}}", voxel_mm, keys);
+    };
     fs::create_directories(folder_);
     const fs::path file = folder_ / "scenario.yaml";
     std::ofstream(file) << "objects:\n  - {name: fixed, status: fixed, meshes: [" << fixed << "], "
-                        << structures << "}\n  - {name: held, meshes: [" << held << "], " << structures
-                        << ", start: {at: [0, 0, 0.2]}}\n"
+                        << structures(refine) << "}\n  - {name: held, meshes: [" << held << "], "
+                        << structures("refinement: 1") << ", start: {at: [0, 0, 0.2]}}\n"
                         << "hands: [{name: right, object: held}]\n"
-                        << "pairs: [{between: [fixed, held], " << pair << "}]\n"
+                        << "pairs: [{between: [fixed, held], dilation: 0 mm}]\n"
                         << "states: [{name: wait, conditions: [{command: fulfilled}]}]\n";
     const auto loaded = loadScene(file, {.cache = folder_ / "cache"});
     EXPECT_TRUE(loaded) << (loaded ? "" : loaded.error().what);
@@ -172,6 +177,109 @@ INSTANTIATE_TEST_SUITE_P(Bars, Crossings,
                                            CrossingCase{"Voxel2", 2.0, 0.0, 0.0},
                                            CrossingCase{"Turned", 2.0, 0.6, 0.0},
                                            CrossingCase{"Rolled", 2.0, 0.3, 0.3}),
+                         [](const auto& one) { return std::string(one.param.name); });
+
+struct TaperCase {
+  const char* name;
+  double voxel_mm;
+  const char* refine;
+  double turn;  ///< [rad] of both meshes in their grids
+};
+void PrintTo(const TaperCase& one, std::ostream* out) { *out << one.name; }
+
+//  \\    //   a tapered tenon in a hand
+//  #\\__//#   a socket with the same walls
+class Tapers : public BothSides, public ::testing::WithParamInterface<TaperCase> {
+ protected:
+  static constexpr double kSlope = 0.0436609;  // [-] tan 2.5 degrees
+
+  /// A square prism between the heights z [m], with the taper's outline there plus `wider` [m].
+  static std::array<Vector3, 4> outline(double z, double wider) {
+    const double x = 0.012 + kSlope * z + wider;
+    const double y = 0.008 + kSlope * z + wider;
+    return {Vector3(x, y, z), Vector3(-x, y, z), Vector3(-x, -y, z), Vector3(x, -y, z)};
+  }
+
+  /// Quadrilaterals between two outlines, outwards for lower, upper; inwards for upper, lower.
+  static void addWalls(bake::TriangleMesh& mesh, const std::array<Vector3, 4>& lower,
+                       const std::array<Vector3, 4>& upper) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      const std::size_t next = (i + 1) % 4;
+      addQuad(mesh, {lower[i], lower[next], upper[next], upper[i]});
+    }
+  }
+  static void addQuad(bake::TriangleMesh& mesh, const std::array<Vector3, 4>& corners) {
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    for (const Vector3& corner : corners) mesh.vertices.push_back(corner.cast<float>());
+    mesh.triangles.push_back({first, first + 1, first + 2});
+    mesh.triangles.push_back({first, first + 2, first + 3});
+  }
+  static std::array<Vector3, 4> reversed(const std::array<Vector3, 4>& corners) {
+    return {corners[3], corners[2], corners[1], corners[0]};
+  }
+
+  std::string write(const char* name, bake::TriangleMesh mesh) const {
+    const Quaternion q = expRotation(GetParam().turn * Vector3(1.0, 2.0, 3.0).normalized());
+    for (Vector3f& p : mesh.vertices) p = (q * p.cast<double>()).cast<float>();
+    fs::create_directories(folder_);
+    EXPECT_TRUE(bake::writeStl(folder_ / name, mesh, 1e-3));
+    return fmt::format("{{file: {}, unit: mm}}", name);
+  }
+
+  std::string tenon() const {
+    const auto lower = outline(-0.016, 0.0);
+    const auto upper = outline(0.02, 0.0);
+    bake::TriangleMesh mesh;
+    addWalls(mesh, lower, upper);
+    addQuad(mesh, reversed(lower));
+    addQuad(mesh, upper);
+    return write("tenon.stl", mesh);
+  }
+
+  std::string socket() const {
+    constexpr double kFloor = -0.02, kBottom = -0.03, kWall = 0.01;
+    auto block_top = outline(0.0, kWall);
+    auto block_bottom = block_top;
+    for (Vector3& p : block_bottom) p.z() = kBottom;
+    bake::TriangleMesh mesh;
+    addWalls(mesh, block_bottom, block_top);
+    addQuad(mesh, reversed(block_bottom));
+    addWalls(mesh, block_top, outline(0.0, 0.0));
+    addWalls(mesh, outline(0.0, 0.0), outline(kFloor, 0.0));
+    addQuad(mesh, outline(kFloor, 0.0));
+    return write("socket.stl", mesh);
+  }
+};
+
+TEST_P(Tapers, SeatNearTheirExactSeat) {
+  const TaperCase& one = GetParam();
+  const auto scene = load(socket(), tenon(), one.voxel_mm, one.refine);
+  ASSERT_TRUE(scene);
+  // the socket's axis is upright
+  const Quaternion q = expRotation(one.turn * Vector3(1.0, 2.0, 3.0).normalized());
+  auto upright = std::make_shared<simulation::Scene>(*scene);
+  upright->objects[0].X_WO = Pose(Vector3::Zero(), q.conjugate());
+  double highest = -1.0;
+  double lowest = 1.0;
+  for (const double turn : {-0.02, 0.0, 0.03}) {
+    for (const Vector3& off : {Vector3(0.0, 0.0, 0.0), Vector3(2e-4, -1e-4, 0.0)}) {
+      const Pose X_WS = pressedDown(upright, Pose(off, expRotation({0.0, turn, 0.0}) * q.conjugate()), 0.006);
+      const Vector3 seat = X_WS * Vector3(q * Vector3(0.0, 0.0, -0.008));
+      highest = std::max(highest, seat.z() + 0.008);
+      lowest = std::min(lowest, seat.z() + 0.008);
+    }
+  }
+  EXPECT_LE(highest, 5e-4) << "it stands proud";
+  EXPECT_GE(lowest, -5e-4) << "it is driven in";
+  RecordProperty("highest_um", static_cast<int>(std::lround(1e6 * highest)));
+  RecordProperty("lowest_um", static_cast<int>(std::lround(1e6 * lowest)));
+}
+
+constexpr const char* kRefined =
+    "refinement: 8, refine: [{from: [-0.02, -0.02, -0.025], to: [0.02, 0.02, 0.005]}]";
+INSTANTIATE_TEST_SUITE_P(Fits, Tapers,
+                         ::testing::Values(TaperCase{"Upright", 0.6, kRefined, 0.0},
+                                           TaperCase{"Turned", 0.6, kRefined, 0.3}),
                          [](const auto& one) { return std::string(one.param.name); });
 
 }  // namespace
