@@ -192,7 +192,7 @@ void printOutcome(const tenon::rehearse::RehearsalReport& report) {
               static_cast<double>(report.ticks) * tenon::kTickSeconds,
               static_cast<unsigned long long>(report.final_hash));
   if (report.crowded_ticks > 0)
-    std::printf("in %llu ticks a pair had more contacts than its list takes; the farthest were left out\n",
+    std::printf("in %llu ticks a pair had more contacts than its list takes; the farthest were skipped\n",
                 static_cast<unsigned long long>(report.crowded_ticks));
 }
 

@@ -170,11 +170,13 @@ class CrossingSearch {
     const Transform X_AB(query_.X_WA.inverse() * query_.X_WB);
     const double reach_A = features_.features_A->longestHalf() + query_.dilation + query_.margin;
     for (const Contact& contact : near_A) {
-      if (features_.features_B->edges()[contact.point].half_M.isZero()) continue;
+      const float half = features_.features_B->edges()[contact.point].half_M.norm();
+      // a crossing is nearer than the centre of B's piece by half its length at most
+      if (half == 0.0F || contact.gap > query_.margin + half) continue;
       EdgePiece& piece = near_.pieces[near_.count];
       piece = pieceOf(*features_.features_B, contact.point, X_AB);
       const Vector3f p_A = piece.p.cast<float>();
-      const float reach = static_cast<float>(reach_A + piece.half.norm());
+      const float reach = static_cast<float>(reach_A) + half;
       near_.all[near_.count] = {p_A, reach, near_.count};
       near_.point[near_.count++] = contact.point;
       box_A_.extend(p_A - Vector3f::Constant(reach));

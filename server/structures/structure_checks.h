@@ -10,9 +10,10 @@
 
 namespace tenon::structures {
 
-/// What makes a field, a pointshell or a feature shell unsafe or wrong to query, as the rest of the sentence "its field ..."
-/// or "its pointshell ..."; nothing when it is sound. An empty one is. Queries check no index: whatever comes
-/// from a file passes here first, and what is written too, so that nothing is baked that cannot be read.
+/// What makes a field, a pointshell or a feature shell unsafe or wrong to query, as the rest of the sentence
+/// "its field ..." or "its pointshell ..."; nothing when it is sound. An empty one is. Queries check no
+/// index: whatever comes from a file passes here first, and what is written too, so that nothing is baked
+/// that cannot be read.
 ///
 /// A sound field has a finite geometry and arrays of exactly the sizes that its index asks for: the blocks of
 /// refined bricks follow one another behind the coarse bricks, and each brick of samples is named once, in
