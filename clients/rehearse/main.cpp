@@ -192,6 +192,9 @@ void printOutcome(const tenon::rehearse::RehearsalReport& report) {
   std::printf("%s after %.3f s\nfinal state hash: %016llx\n", report.reason.c_str(),
               static_cast<double>(report.ticks) * tenon::kTickSeconds,
               static_cast<unsigned long long>(report.final_hash));
+  if (report.crowded_ticks > 0)
+    std::printf("in %llu ticks a pair had more contacts than its list takes; the farthest were skipped\n",
+                static_cast<unsigned long long>(report.crowded_ticks));
 }
 
 /// Says what is wrong with the scenario, as `tenon check` does.

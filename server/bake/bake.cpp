@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "server/bake/feature_bake.h"
 #include "server/bake/field_bake.h"
 #include "server/bake/parallel.h"
 #include "server/bake/shell_bake.h"
@@ -99,6 +100,10 @@ Result<structures::HapticStructures> bake(const TriangleMesh& mesh, const BakeOp
   work.stage("sampling the shell", 0.88, 0.98);
   structures.shell = bakeShell(welded, baked->surface, baked->field, options, work);
   if (work.cancelled()) return fail("cancelled");
+  if (!structures.shell.empty()) {
+    structures.features =
+        bakeFeatures(welded, baked->field, static_cast<double>(structures.shell.levels().back().spacing));
+  }
 
   structures::StructureInfo& info = structures.info;
   info.triangles = mesh.triangles.size();

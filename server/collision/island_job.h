@@ -29,6 +29,14 @@ inline std::array<Vector3, 2> tangentsOf(const Vector3& n_W) {
   return {first, n_W.cross(first)};
 }
 
+/// The field a contact is measured in, and its body's pose; none for a crossing of edges.
+struct ContactSurface {
+  const structures::DistanceField* field = nullptr;
+  const Pose* X_WF = nullptr;
+  double dilation = 0.0;  ///< [m]
+  double sign = 1.0;      ///< [-] 1: the contact's normal points out of this surface; -1: into it
+};
+
 /// The arguments of IslandSolver::solve, shared by its files. All spans live as long as the call.
 ///
 /// Threads: one. Real-time: everything.
@@ -46,6 +54,17 @@ struct IslandSolver::Job {
   }
   [[nodiscard]] const Pose& poseB(const IslandPair& pair) const {
     return poseOf(pair.body_b, pair.X_WB_static);
+  }
+  [[nodiscard]] ContactSurface surfaceOf(const IslandPair& pair, const Contact& contact) const {
+    switch (contact.kind) {
+      case ContactKind::kShellPoint:
+        return {pair.field_B, &poseB(pair), pair.dilation, 1.0};
+      case ContactKind::kFeaturePoint:
+        return {pair.features.field_A, &poseA(pair), pair.features.dilation_A, -1.0};
+      case ContactKind::kCrossing:
+        break;
+    }
+    return {};
   }
   /// The query of a pair at the current poses of its bodies, up to a gap of `margin` [m].
   [[nodiscard]] PairQuery queryOf(const IslandPair& pair, double margin) const {

@@ -101,7 +101,7 @@ bool IslandSolver::updatePair(const Job& job, std::size_t i, SolveReport& report
   }
   PairQueryResult& result = job.results[i].query;
   const std::size_t listed = result.contacts.size();
-  resampleContacts(job.queryOf(job.pairs[i], 0.0), approach, result);
+  resampleFeatures(job.queryOf(job.pairs[i], 0.0), job.pairs[i].features, approach, feature_scratch_, result);
   ++report.resamplings;
   report.points_visited += listed;
   return result.contacts.size() == listed;
@@ -115,6 +115,7 @@ void IslandSolver::traversePair(const Job& job, std::size_t i, SolveReport& repo
   query.reduce = true;
   queryPair(query, job.results[i].query);
   const PairQueryResult& found = job.results[i].query;
+  queryFeatures(query, pair.features, feature_scratch_, job.results[i].query);
   job.results[i].traversal = {true,        query.X_WA,
                               query.X_WB,  found.smallest_gap - found.skipped_gap_error,
                               pair.levels, found.levels_used};

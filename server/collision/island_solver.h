@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/collision/feature_query.h"
 #include "server/collision/motion_solver.h"
 #include "server/collision/pair_query.h"
 
@@ -49,8 +50,8 @@ struct IslandPairResult {
   bool slid_before = false;  ///< one slid in the last solve: the dynamic coefficient applies from the start
 };
 
-/// Two bodies of an island that may touch: A's pointshell against B's SDF. body_a and body_b are indices into
-/// the island's bodies; a kStatic body is fixed at X_WA_static or X_WB_static.
+/// Two bodies of an island that may touch: A's pointshell against B's SDF, and the features of both. body_a
+/// and body_b are indices into the island's bodies; a kStatic body is fixed at X_WA_static or X_WB_static.
 struct IslandPair {
   std::int32_t body_a = ContactConstraint::kStatic;  ///< pointshell side
   std::int32_t body_b = ContactConstraint::kStatic;  ///< SDF side
@@ -59,6 +60,7 @@ struct IslandPair {
   Pose X_WA_static;
   Pose X_WB_static;
   double dilation = 0.0;  ///< [m] offset of B's zero level set
+  PairFeatures features;  ///< none: one direction is asked
   Friction friction;
   // for every traversal, as in PairQuery
   std::uint32_t levels = 0xFFFFFFFFU;
@@ -272,6 +274,7 @@ class IslandSolver {
   };
 
   MotionSolver motion_;
+  FeatureScratch feature_scratch_;
   static constexpr std::size_t kMaxSeams = 24;
   FixedVector<Seam, kMaxSeams> seams_;
   static constexpr std::size_t kMaxSecondaryPlanes = 64;

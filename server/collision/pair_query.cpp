@@ -77,11 +77,13 @@ class Traversal {
       const structures::ShellLevel& level = shell_.levels()[k];
       if (k > 0 && culled_.points + expectedPoints(k, culled_.points - before) > budget) break;
       before = culled_.points;
-      for (std::uint32_t c = 0; c < level.cluster_count; c += structures::ShellBlock::kLanes) {
-        const structures::ShellBlock& balls = shell_.clusterBlocks()[block++];
-        const std::uint32_t in_reach =
-            prune_ ? kernels_.clusters(frame_, balls, culled_) : (1U << balls.count) - 1U;
-        forEachLane(in_reach, [&](std::uint32_t i) { traverseCluster(level.first_cluster + c + i); });
+      const std::size_t first_block = block;
+      block += (level.cluster_count + structures::ShellBlock::kLanes - 1) / structures::ShellBlock::kLanes;
+      if (prune_ && !shell_.blockSpheres().empty()) {
+        traverseBlocksInReach();
+      } else {
+        for (std::size_t b = first_block; b < block; ++b)
+          traverseBlock(b, level.first_cluster + (b - first_block) * structures::ShellBlock::kLanes);
       }
       if (!clusters_.empty()) traverseClusters();
     }
@@ -131,6 +133,26 @@ class Traversal {
   void lowerGapBound(double bound) {
     result_.smallest_gap = std::min(result_.smallest_gap, bound);
     result_.unlisted_gap = std::min(result_.unlisted_gap, bound);
+  }
+
+  /// The blocks of a shell of one level whose bounding spheres may hold a contact.
+  void traverseBlocksInReach() {
+    std::size_t first = 0;
+    for (const structures::ShellBlock& spheres : shell_.blockSpheres()) {
+      forEachLane(kernels_.clusters(frame_, spheres, culled_), [&](std::uint32_t i) {
+        traverseBlock(first + i, (first + i) * structures::ShellBlock::kLanes);
+      });
+      first += structures::ShellBlock::kLanes;
+    }
+  }
+
+  /// Block `block` of clusters, the first of which is `first_cluster`.
+  void traverseBlock(std::size_t block, std::size_t first_cluster) {
+    const structures::ShellBlock& balls = shell_.clusterBlocks()[block];
+    const std::uint32_t in_reach =
+        prune_ ? kernels_.clusters(frame_, balls, culled_) : (1U << balls.count) - 1U;
+    forEachLane(in_reach,
+                [&](std::uint32_t i) { traverseCluster(static_cast<std::uint32_t>(first_cluster) + i); });
   }
 
   /// Adds a cluster to the next batch.
@@ -289,6 +311,7 @@ class Traversal {
     Contact& contact = *result_.contacts.extend();
     lanes.setContact(i, contact);
     contact.point = point;
+    contact.kind = ContactKind::kShellPoint;
     contact.area = areaOf(point);
   }
 

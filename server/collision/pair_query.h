@@ -10,13 +10,24 @@
 
 namespace tenon::collision {
 
-/// A point of body A's pointshell near body B's surface.
+/// What of the two bodies a contact is between.
+enum class ContactKind : std::uint8_t {
+  kShellPoint,    ///< a point of A's pointshell, the surface of B
+  kFeaturePoint,  ///< a feature of B, the surface of A
+  kCrossing,      ///< a piece of an edge of A, one of B
+};
+
+/// A point of body A near body B's surface, or of B near A's (feature_query.h).
 struct Contact {
   Vector3 p_WP = Vector3::Zero();
   Vector3 n_W = Vector3::Zero();  ///< unit, from B into A: the direction in which B pushes A
   double gap = 0.0;               ///< [m] signed distance minus the dilation; < 0: inside the dilated surface
   double area = 0.0;              ///< [m^2] surface of A that the point represents
-  std::uint32_t point = 0;        ///< index in the pointshell: identifies the contact from tick to tick
+  /// index in A's pointshell (kShellPoint), in B's features, or in A's (kCrossing): identifies the contact
+  /// from tick to tick
+  std::uint32_t point = 0;
+  std::uint32_t other = 0;  ///< of a kCrossing: index in B's features
+  ContactKind kind = ContactKind::kShellPoint;
 };
 
 inline constexpr std::size_t kMaxPairContacts = 512;

@@ -13,7 +13,18 @@ constexpr std::uint32_t kMaxRestoreDelay = 1600;
 /// [-] There is headroom for a level when the expected points are below this fraction of the budget.
 constexpr double kRestoreHeadroom = 0.7;
 
+/// [-] The pair's dilation, which is that of B's field, holds for A's surface as well, as far as A's field is
+/// exact: features have to be seen before they touch.
+constexpr double kDilationPerBand = 0.5;
+
 }  // namespace
+
+collision::PairFeatures featuresOf(const Scene& scene, const PairSpec& pair) {
+  const auto& a = scene.objects[pair.a.value].structures;
+  const auto& b = scene.objects[pair.b.value].structures;
+  if (!a || !b) return {};
+  return {&a->features, &b->features, &a->field, std::min(pair.dilation, kDilationPerBand * a->field.band())};
+}
 
 CollPair::CollPair(const Scene& scene, std::size_t pair) : spec_(&scene.pairs[pair]) {
   const ObjectSpec& a = scene.objects[spec_->a.value];
@@ -23,6 +34,7 @@ CollPair::CollPair(const Scene& scene, std::size_t pair) : spec_(&scene.pairs[pa
   if (possible_) {
     shell_A_ = &a.structures->shell;
     field_B_ = &b.structures->field;
+    features_ = featuresOf(scene, *spec_);
   }
   enabled_ = spec_->enabled;
 }
@@ -51,11 +63,12 @@ void CollPair::reset() noexcept {
   list_->F_Ao_W = Wrench{};
 }
 
-void CollPair::query(const Pose& X_WA, const Pose& X_WB, double margin, std::uint32_t budget,
-                     std::span<const std::uint32_t> priority_points) noexcept {
-  collision::queryPair(
-      {shell_A_, field_B_, X_WA, X_WB, spec_->dilation, margin, levels_, budget, priority_points},
-      list_->query);
+void CollPair::query(const Pose& X_WA, const Pose& X_WB, double margin, collision::FeatureScratch& scratch,
+                     std::uint32_t budget, std::span<const std::uint32_t> priority_points) noexcept {
+  const collision::PairQuery query{shell_A_, field_B_, X_WA,   X_WB,           spec_->dilation,
+                                   margin,   levels_,  budget, priority_points};
+  collision::queryPair(query, list_->query);
+  collision::queryFeatures(query, features_, scratch, list_->query);
   std::fill_n(list_->multipliers.begin(), list_->query.contacts.size(), 0.0);
   list_->F_Ao_W = Wrench{};
   list_->traversal = collision::TraversalState{};
@@ -91,6 +104,7 @@ void CollPair::listTouching(TouchingPoints& points) const noexcept {
   for (const bool with_force : {true, false}) {
     for (std::size_t i = 0; i < contacts.size(); ++i) {
       const bool has_force = list_->multipliers[i] > 0.0;
+      if (contacts[i].kind != collision::ContactKind::kShellPoint) continue;
       if (has_force != with_force || (!has_force && contacts[i].gap > collision::kTouchGap)) continue;
       if (!points.push_back(contacts[i].point)) return;
     }
@@ -139,11 +153,24 @@ bool CollPair::nextLevelFits(const WorkLimits& limits, std::uint32_t budget) con
          grown.loadPercent() < limits.critical_load;
 }
 
+bool CollPair::isIndexValid(const collision::Contact& contact) const noexcept {
+  switch (contact.kind) {
+    case collision::ContactKind::kShellPoint:
+      return contact.point < shell_A_->points().size();
+    case collision::ContactKind::kFeaturePoint:
+      return features_.any() && contact.point < features_.features_B->edges().size();
+    case collision::ContactKind::kCrossing:
+      return features_.any() && contact.point < features_.features_A->edges().size() &&
+             contact.other < features_.features_B->edges().size();
+  }
+  return false;
+}
+
 bool CollPair::isValid(const collision::IslandPairResult& list) const noexcept {
   const collision::ContactList& contacts = list.query.contacts;
   return possible_ && list.secondary_planes <= contacts.size() &&
          std::all_of(contacts.begin(), contacts.end(),
-                     [this](const collision::Contact& c) { return c.point < shell_A_->points().size(); });
+                     [this](const collision::Contact& c) { return isIndexValid(c); });
 }
 
 Tick CollPair::ticksToClose(double distance, double closing_speed) noexcept {
@@ -179,6 +206,7 @@ collision::IslandPair CollPair::islandPair(const Pose& X_WA, const Pose& X_WB, T
   pair.X_WA_static = X_WA;
   pair.X_WB_static = X_WB;
   pair.dilation = spec_->dilation;
+  pair.features = features_;
   pair.friction = spec_->friction.value_or(collision::Friction{});
   pair.last = solvedBefore(now);
   return pair;

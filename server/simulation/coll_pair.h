@@ -16,6 +16,9 @@
 
 namespace tenon::simulation {
 
+/// What the second direction of a pair asks; nothing where an object has no structures.
+[[nodiscard]] collision::PairFeatures featuresOf(const Scene& scene, const PairSpec& pair);
+
 /// The state of a collision pair (paper §3.2, ii): enabled or not, the tick of its next query, and the result
 /// of the last one.
 ///
@@ -85,7 +88,8 @@ class CollPair {
   // the following functions need a contact list
   /// Queries a pair that is in no island: lists contacts with gaps up to `margin` [m], testing at most
   /// `budget` points. The `priority_points` are tested even when their level is skipped.
-  void query(const Pose& X_WA, const Pose& X_WB, double margin, std::uint32_t budget = 0xFFFFFFFFU,
+  void query(const Pose& X_WA, const Pose& X_WB, double margin, collision::FeatureScratch& scratch,
+             std::uint32_t budget = 0xFFFFFFFFU,
              std::span<const std::uint32_t> priority_points = {}) noexcept;
   /// Sets the contact wrench to the penalty force at `stiffness` [N/m] of the contacts of query().
   void computePenaltyForce(double stiffness, const Pose& X_WA) noexcept;
@@ -167,6 +171,7 @@ class CollPair {
   [[nodiscard]] bool nextLevelFits(const WorkLimits& limits, std::uint32_t budget) const noexcept;
   void store(const collision::PairQueryResult& query) noexcept;
   /// Validates a list read from a checkpoint: indices in range.
+  [[nodiscard]] bool isIndexValid(const collision::Contact& contact) const noexcept;
   [[nodiscard]] bool isValid(const collision::IslandPairResult& list) const noexcept;
   /// Whole ticks in which `distance` [m] cannot be closed at `closing_speed` [m/s].
   [[nodiscard]] static Tick ticksToClose(double distance, double closing_speed) noexcept;
@@ -174,6 +179,7 @@ class CollPair {
   const PairSpec* spec_;
   const structures::Pointshell* shell_A_ = nullptr;
   const structures::DistanceField* field_B_ = nullptr;
+  collision::PairFeatures features_;
   bool possible_ = false;
   bool enabled_ = true;
   bool queried_ = false;

@@ -62,6 +62,7 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
       hidden(scene.objects.size(), 0),
       partition(scene.objects.size()),
       islands(maxMovable(scene), listCount(scene, options), std::max(options.workers, 1U)),
+      feature_scratch(std::max(options.workers, 1U)),
       pool(options.workers) {
   max_margin = limits.contact_margin + kMaxLookAhead + 2.0 * limits.max_step_length;
   pairs.reserve(scene.pairs.size());

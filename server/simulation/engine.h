@@ -141,6 +141,7 @@ struct Environment::Engine {
   bool recount = true;  ///< count active_pairs anew
   IslandPartition partition;
   IslandWork islands;
+  std::vector<collision::FeatureScratch> feature_scratch;  ///< by worker, for pairs in no island
   WorkerPool pool;
 };
 

@@ -427,14 +427,14 @@ void Environment::queryNonIslandPairs() noexcept {
     }
     engine.queried[i] = 1;
   }
-  auto query = [this, limited](unsigned, std::size_t item) {
+  auto query = [this, limited](unsigned worker, std::size_t item) {
     const std::uint32_t slot = engine_->non_island[item];
     CollPair& pair = engine_->pairs[engine_->due[slot]];
     const std::uint32_t budget = engine_->budget.pointsFor(slot);
     std::span<const std::uint32_t> priority_points;
     if (limited) priority_points = {engine_->touching[slot].begin(), engine_->touching[slot].end()};
     pair.query(objects_[pair.spec().a.value].X_WO, objects_[pair.spec().b.value].X_WO,
-               engine_->limits.contact_margin, budget, priority_points);
+               engine_->limits.contact_margin, engine_->feature_scratch[worker], budget, priority_points);
     pair.adaptLevels(work_limits_, budget);
     // sensing pairs exert no force; neither do overlapping objects of which none is tracked
     const bool exerts_force = objects_[pair.spec().a.value].status == ObjectStatus::kTracked ||

@@ -176,8 +176,10 @@ class Environment {
     std::uint32_t near_pairs = 0;      ///< found by the broad phase
     std::uint32_t deferred_pairs = 0;  ///< due, but without a contact list: their movable objects stood still
     std::uint32_t limited_pairs = 0;   ///< queried with skipped levels
-    double load_percent = 0.0;         ///< [%] largest load of a pair
-    bool infeasible = false;           ///< of any island: collision::SolveReport::infeasible
+    /// that the lists of queried pairs did not take: collision::QueryCounts::contacts_dropped
+    std::uint32_t contacts_dropped = 0;
+    double load_percent = 0.0;  ///< [%] largest load of a pair
+    bool infeasible = false;    ///< of any island: collision::SolveReport::infeasible
   };
   [[nodiscard]] const Work& work() const { return work_; }
 

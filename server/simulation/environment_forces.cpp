@@ -115,6 +115,7 @@ void Environment::countWork() noexcept {
     if (engine.queried[i] == 0) continue;
     work_.load_percent = std::max(work_.load_percent, pair.counts().loadPercent());
     work_.limited_pairs += pair.skippedLevels() > 0 ? 1U : 0U;
+    work_.contacts_dropped += pair.counts().contacts_dropped;
   }
   for (const std::uint32_t slot : engine.non_island) {
     work_.points_visited += engine.pairs[engine.due[slot]].counts().points_visited;

@@ -91,6 +91,8 @@ class StateArchive {
       visit(contact.gap);
       visit(contact.area);
       visit(contact.point);
+      visit(contact.other);
+      visit(contact.kind);
       visit(result.multipliers[i]);
     }
     visit(result.query.complete_to);

@@ -28,7 +28,7 @@ class ChangedFile {
     return number(test::kSectionsAt + 8 * section);
   }
   [[nodiscard]] std::size_t count(std::size_t section) const {
-    return number(test::kSectionsAt + 8 * (11 + section));
+    return number(test::kSectionsAt + 8 * (test::kSections + section));
   }
   /// What is said of the file with `value` at byte `at`; "accepted" when nothing.
   template <typename T>
@@ -57,7 +57,8 @@ class ChangedFile {
 
 class CraftedStructureFile : public StructureFile {};
 
-// sections: 0 index, 1 samples, 2 far, 3 points, 4 leaves, 5 clusters, 6 levels
+// sections: 0 index, 1 samples, 2 far, 3 points, 4 leaves, 5 clusters, 6 levels; 11 to 14 the same of
+// features, 15 edges
 TEST_F(CraftedStructureFile, AShellWhoseListsDoNotTileIsRefused) {
   (void)written();
   ChangedFile file(this->file());
@@ -88,6 +89,19 @@ TEST_F(CraftedStructureFile, AShellWithNumbersThatAreNoneIsRefused) {
       EXPECT_THAT(file.with(file.first(6) + 24 + 4 * k, bad), HasSubstr("spacing or the area"));
   }
   EXPECT_THAT(file.with(file.first(3) + 24, -1e-6F), HasSubstr("negative area"));
+}
+
+TEST_F(CraftedStructureFile, FeaturesWithNumbersThatAreNoneAreRefused) {
+  (void)written();
+  ChangedFile file(this->file());
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinite = std::numeric_limits<float>::infinity();
+  for (const float bad : {nan, infinite, -infinite, 1e30F}) {
+    EXPECT_THAT(file.with(file.first(11), bad), HasSubstr("feature shell is damaged"));
+    for (std::size_t k = 0; k < 9; ++k)
+      EXPECT_THAT(file.with(file.first(15) + 4 * k, bad), HasSubstr("an edge is not plausible"));
+  }
+  EXPECT_THAT(file.with(file.first(12) + 16, 1U), HasSubstr("feature shell is damaged"));
 }
 
 TEST_F(CraftedStructureFile, ASphereThatDoesNotContainItsPointsIsRefused) {
@@ -135,8 +149,8 @@ TEST_F(CraftedStructureFile, AnIndexThatDoesNotMatchItsBricksIsRefused) {
 TEST_F(CraftedStructureFile, CountsThatDoNotMatchAreRefused) {
   (void)written();
   ChangedFile file(this->file());
-  const auto count = [](std::size_t section) { return test::kSectionsAt + 8 * (11 + section); };
-  for (const std::size_t section : {0U, 1U, 2U, 3U, 4U, 5U, 6U}) {
+  const auto count = [](std::size_t section) { return test::kSectionsAt + 8 * (test::kSections + section); };
+  for (const std::size_t section : {0U, 1U, 2U, 3U, 4U, 5U, 6U, 11U, 12U, 13U, 14U, 15U}) {
     const std::uint64_t whole = file.count(section);
     const std::uint64_t step = section == 1 ? DistanceField::kBrickSamples : 1;
     EXPECT_NE(file.with(count(section), whole - step), "accepted") << section;
@@ -152,7 +166,8 @@ TEST_F(CraftedStructureFile, AHeaderWithNumbersThatAreNoneIsRefused) {
   // p_MoFo, voxel, band, margin; then, behind the sections and two counts, times, areas, the unit and the box
   std::vector<std::size_t> doubles;
   for (std::size_t at = 32; at < 80; at += 8) doubles.push_back(at);
-  for (std::size_t at = test::kSectionsAt + 2 * 88 + 16; at < test::kStructureFileHeader; at += 8)
+  for (std::size_t at = test::kSectionsAt + 16 * test::kSections + 16; at < test::kStructureFileHeader;
+       at += 8)
     doubles.push_back(at);
   ASSERT_EQ(file.at<double>(56), structures_.field.voxel());
   ASSERT_EQ(file.at<double>(doubles.back()), structures_.info.box_M.max().z());
