@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <span>
 
 namespace tenon::collision {
@@ -84,9 +85,25 @@ bool cross(const EdgePiece& a, const EdgePiece& b, double slack, double toleranc
   return true;
 }
 
-/// The contact of two pieces in W, from A's frame.
+/// [m] Distance of two segments (Ericson, Real-Time Collision Detection, 5.1.9).
+double segmentDistance(const EdgePiece& a, const EdgePiece& b) {
+  const Vector3 r = a.p - b.p;
+  const double aa = a.half.squaredNorm();
+  const double bb = b.half.squaredNorm();
+  const double ab = a.half.dot(b.half);
+  const double ar = a.half.dot(r);
+  const double br = b.half.dot(r);
+  const double determinant = aa * bb - ab * ab;
+  const auto onSegment = [](double along) { return std::clamp(along, -1.0, 1.0); };
+  double along_a = determinant > 0.0 ? onSegment((ab * br - ar * bb) / determinant) : 0.0;
+  const double along_b = onSegment((ab * along_a + br) / bb);
+  along_a = onSegment((ab * along_b - ar) / aa);
+  return (r + along_a * a.half - along_b * b.half).norm();
+}
+
+/// The contact of two pieces in W, from A's frame. Dormant ones lower `dormant_gap` [m].
 void evaluateCrossing(const EdgePiece& a, const EdgePiece& b, double dilation, const Transform& X_WA,
-                      Contact& contact) {
+                      Contact& contact, double& dormant_gap) {
   Vector3 p_A = a.p;
   if (cross(a, b, 0.0, kConeTolerance, contact)) {
     contact.gap -= dilation;
@@ -94,6 +111,7 @@ void evaluateCrossing(const EdgePiece& a, const EdgePiece& b, double dilation, c
     p_A = contact.p_WP;
   } else {
     contact.gap = kDormantGap;
+    dormant_gap = std::min(dormant_gap, std::max(segmentDistance(a, b) - dilation, 0.0));
     contact.n_W = Vector3::UnitZ();
   }
   contact.p_WP = X_WA.p + X_WA.R * p_A;
@@ -228,7 +246,7 @@ class CrossingSearch {
       contact.kind = ContactKind::kCrossing;
       contact.point = i;
       contact.other = near_.point[ball.piece];
-      evaluateCrossing(piece, other, query_.dilation, X_WA_, contact);
+      evaluateCrossing(piece, other, query_.dilation, X_WA_, contact, result_.dormant_gap);
       result_.smallest_gap = std::min(result_.smallest_gap, contact.gap);
       if (!crossings_.push_back(contact)) drop(std::min(contact.gap, query_.margin), result_);
     }
@@ -247,6 +265,7 @@ class CrossingSearch {
 
 void queryFeatures(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
                    PairQueryResult& result) noexcept {
+  result.dormant_gap = std::numeric_limits<double>::infinity();
   if (!features.any()) return;
   const double half_A = features.features_A->longestHalf();
   const double half_B = features.features_B->longestHalf();
@@ -289,8 +308,21 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
   result.unlisted_gap = std::min(result.unlisted_gap, crossing_bound);
 }
 
+double featureGap(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch) noexcept {
+  if (!features.any()) return std::numeric_limits<double>::infinity();
+  const double half_B = features.features_B->longestHalf();
+  const bool may_cross = half_B > 0.0 && features.features_A->longestHalf() > 0.0;
+  // a crossing is nearer than the centre of B's piece by half its length at most
+  const double nearer = may_cross ? half_B : 0.0;
+  PairQuery of_B = reversed(query, features, query.margin + nearer);
+  of_B.list = false;
+  queryPair(of_B, scratch.of_B);
+  return scratch.of_B.smallest_gap - nearer;
+}
+
 void resampleFeatures(const PairQuery& query, const PairFeatures& features, double displacement,
                       FeatureScratch& scratch, PairQueryResult& result) noexcept {
+  result.dormant_gap = std::numeric_limits<double>::infinity();
   ContactList& contacts = result.contacts;
   const auto first = std::find_if(contacts.begin(), contacts.end(), [](const Contact& contact) {
     return contact.kind != ContactKind::kShellPoint;
@@ -318,7 +350,8 @@ void resampleFeatures(const PairQuery& query, const PairFeatures& features, doub
   const Transform X_AB(query.X_WA.inverse() * query.X_WB);
   for (Contact& contact : crossings) {
     evaluateCrossing(pieceOf(*features.features_A, contact.point),
-                     pieceOf(*features.features_B, contact.other, X_AB), query.dilation, X_WA, contact);
+                     pieceOf(*features.features_B, contact.other, X_AB), query.dilation, X_WA, contact,
+                     result.dormant_gap);
     result.smallest_gap = std::min(result.smallest_gap, contact.gap);
     contacts.push_back(contact);
   }

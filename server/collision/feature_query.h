@@ -60,7 +60,8 @@ struct FeatureScratch {
 /// (`contacts_dropped`).
 ///
 /// A crossing is listed when it may come about within `query.margin` of motion. While it is beyond the ends
-/// of its pieces, or the faces beside it are nearer, it is dormant: its gap is kDormantGap.
+/// of its pieces, or the faces beside it are nearer, it is dormant: its gap is kDormantGap, and the distance
+/// of its segments counts in PairQueryResult::dormant_gap.
 ///
 /// Threads: pure, but for the scratch. Real-time.
 void queryFeatures(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
@@ -71,6 +72,13 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
 /// Threads: pure, but for the scratch. Real-time.
 void resampleFeatures(const PairQuery& query, const PairFeatures& features, double displacement,
                       FeatureScratch& scratch, PairQueryResult& result) noexcept;
+
+/// [m] Lower bound of the gap of features and crossings up to `query.margin`, beyond that a larger one. Lists
+/// nothing; `scratch` has the work that it took.
+///
+/// Threads: pure, but for the scratch. Real-time.
+[[nodiscard]] double featureGap(const PairQuery& query, const PairFeatures& features,
+                                FeatureScratch& scratch) noexcept;
 
 inline constexpr std::size_t kFeatureRoom = 128;
 inline constexpr std::size_t kMaxCrossings = 64;

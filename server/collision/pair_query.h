@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "idl/types/fixed_vector.h"
@@ -82,6 +83,8 @@ struct PairQueryResult {
   double complete_to = 0.0;
   /// [m] lower bound of the gap of points that are not listed, those dropped by `reduce` excepted
   double unlisted_gap = 0.0;
+  /// [m] lower bound of the gap of listed crossings that are dormant (feature_query.h)
+  double dormant_gap = std::numeric_limits<double>::infinity();
   bool reduced = false;  ///< points were dropped in favour of neighbours (PairQuery::reduce)
   /// Penalty wrench for a stiffness of 1 N/m, force [m] and torque [m^2], if asked for
   Wrench penalty_Ao_W;

@@ -48,7 +48,7 @@ std::string errorText(const ScenarioState& state, const game_control::StepStatus
 
 /// The first condition that is not met; empty when there is none.
 std::string unmetCondition(const ScenarioFile& scenario, const game_control::StepStatus& step) {
-  const StepProgress progress = game_control::progress(scenario, step);
+  const StepProgress progress = game_control::progress(scenario, step, step.tick);
   const auto unmet = std::find_if(progress.conditions.begin(), progress.conditions.end(),
                                   [](const ConditionValue& condition) { return !condition.met; });
   return unmet == progress.conditions.end() ? "" : "not met: " + unmet->text;

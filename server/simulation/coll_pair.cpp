@@ -212,8 +212,8 @@ collision::IslandPair CollPair::islandPair(const Pose& X_WA, const Pose& X_WB, T
   return pair;
 }
 
-double CollPair::findGap(const Pose& X_WA, const Pose& X_WB, double limit,
-                         collision::PairQueryResult& found) const noexcept {
+double CollPair::findGap(const Pose& X_WA, const Pose& X_WB, double limit, collision::PairQueryResult& found,
+                         collision::FeatureScratch& scratch) const noexcept {
   collision::PairQuery query;
   query.shell_A = shell_A_;
   query.field_B = field_B_;
@@ -224,7 +224,8 @@ double CollPair::findGap(const Pose& X_WA, const Pose& X_WB, double limit,
   query.levels = levels_;
   query.list = false;
   collision::queryPair(query, found);
-  return found.smallest_gap - found.skipped_gap_error;
+  return std::min(found.smallest_gap - found.skipped_gap_error,
+                  collision::featureGap(query, features_, scratch));
 }
 
 }  // namespace tenon::simulation

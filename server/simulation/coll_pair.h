@@ -117,10 +117,11 @@ class CollPair {
   [[nodiscard]] collision::IslandPair islandPair(const Pose& X_WA, const Pose& X_WB, Tick now) const noexcept;
 
   /// Asks for the gap alone, for poses of this tick's start: `smallest_gap` of `found` is above `limit` [m],
-  /// or the gap as near as the field knows it. Returns a lower bound of the gap [m] over all points. Changes
-  /// nothing else.
+  /// or the gap as near as the field knows it. Returns a lower bound of the gap [m] over all points and
+  /// features. Changes nothing else.
   [[nodiscard]] double findGap(const Pose& X_WA, const Pose& X_WB, double limit,
-                               collision::PairQueryResult& found) const noexcept;
+                               collision::PairQueryResult& found,
+                               collision::FeatureScratch& scratch) const noexcept;
 
   /// Writes, reads or hashes every member that changes except `enabled`. Reading contacts acquires a list.
   template <typename Archive, typename Self>

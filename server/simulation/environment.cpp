@@ -324,7 +324,7 @@ void Environment::findNeighbours() noexcept {
     double gap = pair.gap();
     if (!touches) {
       gap = pair.findGap(objects_[a.value].X_WO, objects_[b.value].X_WO, travelCap(a) + travelCap(b),
-                         engine.gap_query);
+                         engine.gap_query, engine.feature_scratch[0]);
       engine.gap_points += engine.gap_query.counts.points_visited;
     }
     engine.neighbours.push_back({a, b, gap});
