@@ -140,7 +140,7 @@ double IslandSolver::approachSinceTraversal(const Job& job, std::size_t i) {
 double IslandSolver::clearanceOf(const Job& job, std::size_t i) {
   const PairQueryResult& query = job.results[i].query;
   double clearance = std::min(query.smallest_gap - query.skipped_gap_error, query.dormant_gap);
-  // points that the list left out in favour of neighbours are not in its gaps after a motion
+  // points that the list skipped in favour of neighbours are not in its gaps after a motion
   if (query.reduced && clearance > 0.0)
     clearance = std::min(clearance, job.results[i].traversal.smallest_gap - approachSinceTraversal(job, i));
   return std::max(clearance, 0.0);

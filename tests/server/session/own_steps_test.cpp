@@ -183,7 +183,7 @@ struct Flight {
   double turn_rate;  // [rad/s]
 };
 
-//   ------- a bar of 600 mm, whose file may have its origin 2.5 m away, flies and turns
+//   ------- a bar of 600 mm, whose file may have its origin 2.5 m away, moves and turns
 //   _______ 12 mm above a wall: the ends move by 6 mm in a tick
 class FreeFlights : public OwnSteps, public ::testing::WithParamInterface<Flight> {};
 
@@ -236,7 +236,7 @@ std::vector<Vector3> directions() {
   return all;
 }
 
-struct Obstacle {
+struct WallAndPart {
   const char* name;
   const char* wall;
   const char* part;
@@ -244,10 +244,10 @@ struct Obstacle {
 };
 
 //   part --> at 3 m/s, turning at 10 rad/s, through the middle of the wall to as far behind it
-class NeverThrough : public OwnSteps, public ::testing::WithParamInterface<Obstacle> {};
+class NeverThrough : public OwnSteps, public ::testing::WithParamInterface<WallAndPart> {};
 
 TEST_P(NeverThrough, AtThreeMetresPerSecondFromAnyDirection) {
-  const Obstacle& obstacle = GetParam();
+  const WallAndPart& obstacle = GetParam();
   const auto scene = load(obstacle.wall, obstacle.part, "{box: [20 mm, 20 mm, 20 mm]}");
   ASSERT_TRUE(scene);
   for (const Vector3& way : directions()) {
@@ -269,13 +269,14 @@ TEST_P(NeverThrough, AtThreeMetresPerSecondFromAnyDirection) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Obstacles, NeverThrough,
-    ::testing::Values(Obstacle{"box", "{box: [60 mm, 60 mm, 60 mm]}", "{box: [20 mm, 20 mm, 20 mm]}", 0.12},
-                      Obstacle{"plate", "{box: [200 mm, 200 mm, 4 mm]}", "{box: [30 mm, 20 mm, 10 mm]}",
-                               0.25},
-                      Obstacle{"bar", "{box: [60 mm, 60 mm, 60 mm]}", "{box: [300 mm, 20 mm, 20 mm]}", 0.35}),
-    [](const auto& obstacle) { return std::string(obstacle.param.name); });
+INSTANTIATE_TEST_SUITE_P(Obstacles, NeverThrough,
+                         ::testing::Values(WallAndPart{"box", "{box: [60 mm, 60 mm, 60 mm]}",
+                                                       "{box: [20 mm, 20 mm, 20 mm]}", 0.12},
+                                           WallAndPart{"plate", "{box: [200 mm, 200 mm, 4 mm]}",
+                                                       "{box: [30 mm, 20 mm, 10 mm]}", 0.25},
+                                           WallAndPart{"bar", "{box: [60 mm, 60 mm, 60 mm]}",
+                                                       "{box: [300 mm, 20 mm, 20 mm]}", 0.35}),
+                         [](const auto& obstacle) { return std::string(obstacle.param.name); });
 
 }  // namespace
 }  // namespace tenon::session
