@@ -14,9 +14,9 @@ set(test_environment TENON_PROGRAMS=${CMAKE_RUNTIME_OUTPUT_DIRECTORY} TENON_CACH
 set(suites_nightly_here)
 if(TENON_SANITIZE MATCHES address)
   set(suites_nightly_here RealPegs QueryTruth QueryTruthOfRealPairs CouplingWork SheetAtEveryOffset EnvironmentDeterminism Overload
-                        FrictionOnASlope FrictionOfAPull FieldSizeTruth RealPairs SlopeLimit)
+                        FrictionOnASlope FrictionOfAPull FieldSizeTruth RealPairs SlopeLimit FreeFlights Tapers)
 elseif(TENON_SANITIZE MATCHES thread)
-  set(suites_nightly_here EnvironmentCheckpoint JournalDamage)
+  set(suites_nightly_here EnvironmentCheckpoint JournalDamage MeshOrigin OwnSteps FreeFlights NeverThrough Studs Crossings Tapers)
 endif()
 add_custom_target(test_programs)
 add_custom_target(threaded_tests)
