@@ -14,7 +14,7 @@ set(test_environment TENON_PROGRAMS=${CMAKE_RUNTIME_OUTPUT_DIRECTORY} TENON_CACH
 set(suites_nightly_here)
 if(TENON_SANITIZE MATCHES address)
   set(suites_nightly_here RealPegs QueryTruth QueryTruthOfRealPairs CouplingWork SheetAtEveryOffset EnvironmentDeterminism Overload
-                        FrictionOnASlope FrictionOfAPull FieldSizeTruth RealPairs SlopeLimit FreeFlights Tapers)
+                        FrictionOnASlope FrictionOfAPull FieldSizeTruth RealPairs SlopeLimit FreeFlights Tapers MeshOrigin OwnSteps)
 elseif(TENON_SANITIZE MATCHES thread)
   set(suites_nightly_here EnvironmentCheckpoint JournalDamage MeshOrigin OwnSteps FreeFlights NeverThrough Studs Crossings Tapers)
 endif()
