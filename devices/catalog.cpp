@@ -96,6 +96,15 @@ OpenedBimanual openBimanualDevice(std::string_view name, std::uint64_t seed) {
   return findIn(kBimanualDevices, name)->open(seed);
 }
 
+Result<DeviceCaps> capsOf(std::string_view name) {
+  if (findIn(kBimanualDevices, name)) {
+    const auto device = openBimanualDevice(name);
+    return device ? Result<DeviceCaps>((*device)->right().caps()) : fail(device.error().what);
+  }
+  const auto device = openDevice(name);
+  return device ? Result<DeviceCaps>((*device)->caps()) : fail(device.error().what);
+}
+
 std::vector<std::string_view> deviceNames() { return namesIn(kDevices); }
 std::vector<std::string_view> bimanualDeviceNames() { return namesIn(kBimanualDevices); }
 

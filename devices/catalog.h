@@ -24,6 +24,10 @@ namespace tenon::devices {
 [[nodiscard]] Result<void> checkDeviceName(std::string_view name);
 [[nodiscard]] Result<void> checkBimanualDeviceName(std::string_view name);
 
+/// Capabilities of a device, for one hand or bimanual (those of its right arm). Opens it for that, and fails
+/// as openDevice does. Threads: any. Real-time: no.
+[[nodiscard]] Result<DeviceCaps> capsOf(std::string_view name);
+
 /// All names of the catalog.
 [[nodiscard]] std::vector<std::string_view> deviceNames();
 [[nodiscard]] std::vector<std::string_view> bimanualDeviceNames();

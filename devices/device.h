@@ -21,6 +21,7 @@ struct DeviceCaps {
   std::string model;
   std::uint32_t dof_mask = 0;             ///< sensed and actuated axes: kAllDofs, kTranslationDofs
   double workspace_radius = 0.0;          ///< [m] about the device's centre
+  double rotation_range = 0.0;            ///< [rad] from the centre to the end stop, about any axis
   double indexing_radius = 0.0;           ///< [m] r_w of paper eq. 1
   double indexing_gain = 0.0;             ///< [1/s] lambda_w of paper eq. 1
   double continuous_force = 0.0;          ///< [N] without a time limit

@@ -8,7 +8,9 @@
 #include <fmt/ranges.h>
 #include <unistd.h>
 
+#include "devices/catalog.h"
 #include "idl/types/output_files.h"
+#include "server/check/check.h"
 #include "server/session/journal.h"
 #include "server/session/renamed_options.h"
 #include "server/session/session_server.h"
@@ -103,6 +105,17 @@ void showLoading(std::string_view activity, double fraction) {
   if (is_terminal && fraction >= 1.0) std::fprintf(stderr, "\r\033[K");
 }
 
+/// Says what is wrong with the scenario, as `tenon check` does for the devices that stations open by default.
+void printProblems(const tenon::session::LoadedScene& loaded) {
+  tenon::check::CheckOptions options;
+  if (const auto caps = tenon::devices::capsOf("hug-sim"))
+    options.trainee = {"hug-sim", caps->rotation_range};
+  if (const auto caps = tenon::devices::capsOf("sigma7-sim"))
+    options.instructor = {"sigma7-sim", caps->rotation_range};
+  const auto findings = tenon::check::checkScene(*loaded.scenario, *loaded.scene, options);
+  for (const std::string& line : tenon::check::problemLines(*loaded.scenario, findings)) printLine(line);
+}
+
 /// Reports what has changed since the recording; true when that forbids the re-simulation.
 bool isRefusedForChanges(const ServeArguments& arguments, const tenon::session::Fingerprint& then,
                          const tenon::session::LoadedScene& loaded) {
@@ -161,6 +174,7 @@ int serve(ServeArguments& arguments) {
   const auto loaded = tenon::session::loadScene(arguments.scenario, arguments.load, showLoading);
   if (!loaded) return reportError(loaded.error().what);
   if (!arguments.resimulate.empty()) return resimulateFile(arguments, *loaded);
+  printProblems(*loaded);
 
   for (const std::string& sentence : tenon::session::thinWallReport(*loaded->scene)) printLine(sentence);
   arguments.session.print = printLine;

@@ -36,9 +36,13 @@ ROOMS = {
     "server/simulation": ("tenon::simulation", ["idl/types", "idl/threads", "server/structures", "server/collision"],
                           ["Bullet"]),
     "server/game_control": ("tenon::game_control", ["idl/types", "server/structures", "server/simulation"], ["yaml-cpp", "fmt"]),
+    "server/check": ("tenon::check", ["idl/types", "server/structures", "server/collision", "server/simulation",
+                                      "server/game_control"], ["fmt"]),
     "server/session": ("tenon::session", IDL + DECIDES, ["fmt", "POSIX"]),
-    "server/tools": ("tenon::tools", ["idl/types"] + DECIDES, ["fmt", "CLI11", "POSIX"]),
-    "server": ("tenon::session", IDL + DECIDES + ["server/session"], ["fmt", "CLI11", "POSIX"]),
+    # the limits of devices, asked of their catalog, are what a check is made against
+    "server/tools": ("tenon::tools", ["idl/types"] + DECIDES + ["server/check", "server/session", "devices"],
+                     ["fmt", "CLI11", "JSON", "POSIX"]),
+    "server": ("tenon::session", IDL + DECIDES + ["server/check", "server/session", "devices"], ["fmt", "CLI11", "POSIX"]),
     "devices": ("tenon::devices", ["idl/types", "idl/threads", "devices/simulated", "devices/drivers"], []),
     "devices/simulated": ("tenon::devices", ["idl/types", "idl/threads", "devices"], []),
     "devices/drivers": ("tenon::devices", ["idl/types", "idl/threads", "devices"], ["POSIX"]),
@@ -99,13 +103,15 @@ version""".split())
 # Units: a header and the .cpp of its name. These are units of more files: an interface and internals that know it.
 UNITS = {
     # the stages of one bake; bake.h has their options and results
-    "server/bake/bake": "server/bake/{brick_level,exposed_surface,field_bake,field_size,flood,narrow_gaps,outside,parallel,refined_bricks,shell_bake,"
-                        "slope_limit,thin_bricks,thin_places,triangle_pieces,welded_mesh}",
+    "server/bake/bake": "server/bake/{brick_level,exposed_surface,face_sides,feature_bake,field_bake,field_size,flood,narrow_gaps,"
+                        "outside,parallel,refined_bricks,shell_bake,slope_limit,thin_bricks,thin_places,triangle_pieces,"
+                        "welded_mesh}",
     "server/collision/pair_query": "server/collision/{contact_blocks,contact_reducer,query_kernels,ridge_correction,*_lanes_inl}",
     "server/collision/island_solver": "server/collision/island_*",
     "server/collision/motion_solver": "server/collision/motion_workspace",
     "server/structures/pointshell": "server/structures/level_areas",
     "server/simulation/environment": "server/simulation/{engine,environment_*}",
+    "server/check/check": "server/check/{overlaps,scene_checks,sizes,targets,turns}",
     "server/game_control/scenario": "server/game_control/{condition_reader,named_values,scenario_*,yaml_reader}",
 }
 
@@ -384,7 +390,7 @@ PLANTED = [
     ("server/simulation/c.cpp", "#include <unistd.h>", "not the door of POSIX"),
     ("server/simulation/c.cpp", '#include "tests/support/analytic.h"', "no room may include tests"),
     ("server/tools/probe.cpp", '#include "tests/support/analytic.h"', "no room may include tests"),
-    ("server/tools/probe.cpp", '#include "server/session/session_server.h"', "may not include server/session"),
+    ("server/bake/probe.cpp", '#include "server/session/session_server.h"', "may not include server/session"),
     ("server/main.cpp", '#include "tests/support/analytic.h"', "no room may include tests"),
     ("server/session/d.cpp", '#include "server/tools/lines.h"', "no room may include server/tools"),
     ("idl/types/messages/hands.h", "#include <vector>", None),

@@ -9,11 +9,14 @@ if(BUILD_TESTING OR TENON_BUILD_BENCH)
 endif()
 
 set(test_environment TENON_PROGRAMS=${CMAKE_RUNTIME_OUTPUT_DIRECTORY} TENON_CACHE=${CMAKE_BINARY_DIR}/test_cache)
-# Long suites that compare numbers with a truth, over code that other suites reach too: with the address sanitizer they are nightly.
-set(suites_of_numbers)
+# Suites that are nightly with a sanitizer, since they are long there and find nothing of its kind that others do not: those that
+# compare numbers with a truth, over code that other suites reach too (address), those of one thread (thread).
+set(suites_nightly_here)
 if(TENON_SANITIZE MATCHES address)
-  set(suites_of_numbers RealPegs QueryTruth QueryTruthOfRealPairs CouplingWork SheetAtEveryOffset EnvironmentDeterminism Overload
-                        FrictionOnASlope FrictionOfAPull)
+  set(suites_nightly_here RealPegs QueryTruth QueryTruthOfRealPairs CouplingWork SheetAtEveryOffset EnvironmentDeterminism Overload
+                        FrictionOnASlope FrictionOfAPull FieldSizeTruth RealPairs SlopeLimit FreeFlights Tapers MeshOrigin OwnSteps)
+elseif(TENON_SANITIZE MATCHES thread)
+  set(suites_nightly_here EnvironmentCheckpoint JournalDamage MeshOrigin OwnSteps FreeFlights NeverThrough Studs Crossings Tapers)
 endif()
 add_custom_target(test_programs)
 add_custom_target(threaded_tests)
@@ -36,13 +39,13 @@ function(tenon_tests name)
   endif()
   set(list ${CMAKE_BINARY_DIR}/suites/${target}.cmake)
   add_custom_command(TARGET ${target} POST_BUILD VERBATIM COMMENT "" COMMAND ${CMAKE_COMMAND} -D "PROGRAM=$<TARGET_FILE:${target}>" -D "ROOM=${name}"
-                     -D "LIST=${list}" -D "RESULTS=${CMAKE_BINARY_DIR}/results" -D "ENVIRONMENT=${test_environment}" -D "NIGHTLY_SUITES=${suites_of_numbers}"
+                     -D "LIST=${list}" -D "RESULTS=${CMAKE_BINARY_DIR}/results" -D "ENVIRONMENT=${test_environment}" -D "NIGHTLY_SUITES=${suites_nightly_here}"
                      -P ${CMAKE_SOURCE_DIR}/tests/list_suites.cmake)
   file(WRITE ${CMAKE_BINARY_DIR}/suites/${target}_if_built.cmake "if(EXISTS \"${list}\")\n  include(\"${list}\")\nendif()\n")
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${CMAKE_BINARY_DIR}/suites/${target}_if_built.cmake)
 endfunction()
 
-foreach(room idl/types idl/record server/structures server/game_control devices devices/simulated clients/simulated_person
+foreach(room idl/types idl/record server/structures server/game_control server/check devices devices/simulated clients/simulated_person
              clients/trainee clients/instructor clients/observer clients/recorder clients/command clients/report clients/rehearse
              scenarios/part_generator)
   string(REPLACE "/" "_" target ${room})

@@ -16,6 +16,7 @@
 #include "clients/trainee/trainee_station.h"
 #include "devices/catalog.h"
 #include "idl/types/output_files.h"
+#include "server/check/check.h"
 #include "server/game_control/scenario.h"
 
 namespace {
@@ -191,6 +192,22 @@ void printOutcome(const tenon::rehearse::RehearsalReport& report) {
   std::printf("%s after %.3f s\nfinal state hash: %016llx\n", report.reason.c_str(),
               static_cast<double>(report.ticks) * tenon::kTickSeconds,
               static_cast<unsigned long long>(report.final_hash));
+  if (report.crowded_ticks > 0)
+    std::printf("in %llu ticks a pair had more contacts than its list takes; the farthest were skipped\n",
+                static_cast<unsigned long long>(report.crowded_ticks));
+}
+
+/// Says what is wrong with the scenario, as `tenon check` does.
+void printProblems(const RehearseArguments& arguments, const tenon::session::LoadedScene& loaded) {
+  if (arguments.quiet) return;
+  tenon::check::CheckOptions options;
+  if (const auto caps = tenon::devices::capsOf("hug-sim"))
+    options.trainee = {"hug-sim", caps->rotation_range};
+  if (const auto caps = tenon::devices::capsOf(arguments.device))
+    options.instructor = {arguments.device, caps->rotation_range};
+  const auto findings = tenon::check::checkScene(*loaded.scenario, *loaded.scene, options);
+  for (const std::string& line : tenon::check::problemLines(*loaded.scenario, findings))
+    std::printf("%s\n", line.c_str());
 }
 
 void printThinWalls(const RehearseArguments& arguments, const tenon::session::LoadedScene& loaded) {
@@ -203,6 +220,7 @@ int rehearsePeople(RehearseArguments& arguments) {
   const auto loaded = tenon::session::loadScene(arguments.scenario, arguments.load);
   if (!loaded) return printError(loaded.error().what);
   printThinWalls(arguments, *loaded);
+  printProblems(arguments, *loaded);
   auto stations = openStations(arguments, *loaded->scenario);
   if (!stations) return printError(stations.error().what);
   setOptions(arguments);

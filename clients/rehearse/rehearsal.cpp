@@ -48,6 +48,7 @@ class Rehearsal {
     report.ticks = simulation_.now();
     report.final_hash = simulation_.hash();
     report.reason = reason_;
+    report.crowded_ticks = crowded_ticks_;
     return report;
   }
 
@@ -84,6 +85,7 @@ class Rehearsal {
     const auto begin = std::chrono::steady_clock::now();
     simulation_.tick(input_);
     simulation_.fill(output_);
+    crowded_ticks_ += simulation_.environment().work().contacts_dropped > 0 ? 1 : 0;
     fillEntry();
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
     output_.stats.compute_seconds = took.count();
@@ -138,6 +140,7 @@ class Rehearsal {
   session::Publisher publisher_;
   std::vector<SceneObject> objects_;
   session::TickInput input_;
+  Tick crowded_ticks_ = 0;
   session::TickOutput output_;
   std::string reason_;
   session::JournalEntry entry_;

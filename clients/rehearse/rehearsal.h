@@ -47,6 +47,7 @@ struct RehearsalReport {
   Tick ticks = 0;
   std::uint64_t final_hash = 0;  ///< of the state after the last tick
   std::string reason;            ///< of the last change of phase
+  Tick crowded_ticks = 0;        ///< [ticks] in which a pair had more contacts than its list takes
 };
 
 /// Runs a session in one process on a virtual clock: the session simulation and the stations, each fed in

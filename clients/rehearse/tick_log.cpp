@@ -140,6 +140,8 @@ void TickLog::addPairs(const session::SessionSimulation& simulation, const sessi
     add(line_, pair.contact.depth);
     line_ += ",\"gap\":";
     add(line_, pair.contact.gap);
+    const auto* result = simulation.environment().pairs()[pair.pair].result;
+    line_ += fmt::format(",\"dropped\":{}", result != nullptr ? result->query.counts.contacts_dropped : 0U);
     line_ += ",\"F_Ao_W\":";
     add(line_, pair.contact.F_Ao_W);
     line_ += "},";

@@ -10,6 +10,7 @@ SimulatedModel hugArmModel() {
   caps.model = "HUG arm (simulated)";
   caps.dof_mask = kAllDofs;
   caps.workspace_radius = 0.40;             // [assumed] half the robot's reach of 0.79 m
+  caps.rotation_range = 2.6;                // [assumed]
   caps.indexing_radius = 0.2;               // [paper] section 4.3
   caps.indexing_gain = 1.5;                 // [paper] section 4.3
   caps.continuous_force = 50.0;             // [paper] "rarely exceeded"
@@ -36,7 +37,6 @@ SimulatedModel hugArmModel() {
   model.inertia = 0.01;              // [assumed]
   model.friction = 0.5;              // [assumed] residual after torque control
   model.rotational_friction = 0.02;  // [assumed]
-  model.rotation_range = 2.6;        // [assumed]
   model.position_resolution = 1e-4;  // [assumed] from 0.01 degrees at the joints
   model.angle_resolution = 1.75e-4;  // [assumed] 0.01 degrees
   model.velocity_window = 5;         // [assumed]

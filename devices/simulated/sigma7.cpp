@@ -10,6 +10,7 @@ SimulatedModel sigma7Model() {
   caps.model = "sigma.7 (simulated)";
   caps.dof_mask = kAllDofs;
   caps.workspace_radius = 0.060;  // [published] Tobergte 2011: sphere of 120 mm
+  caps.rotation_range = 1.2;      // [assumed] the narrowest of its axes is 140 degrees
   caps.indexing_radius = 0.035;   // [assumed] indexing acts in the outer 25 mm
   caps.indexing_gain = 10.0;      // [assumed] 0.25 m/s at the rim
   caps.continuous_force = 12.0;   // [published] limit of CHAI3D
@@ -31,7 +32,6 @@ SimulatedModel sigma7Model() {
   model.inertia = 5e-4;                     // [assumed]
   model.friction = 0.3;                     // [assumed]
   model.rotational_friction = 5e-3;         // [assumed]
-  model.rotation_range = 1.2;               // [assumed] the narrowest of its axes is 140 degrees
   model.position_resolution = 1.5e-6;       // [published]
   model.angle_resolution = 2.27e-4;         // [published] 0.013 degrees
   model.velocity_window = 20;               // [published] the vendor's default

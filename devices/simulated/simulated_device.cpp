@@ -229,8 +229,9 @@ Wrench SimulatedDevice::endStops() const noexcept {
     stop.force = -(kStopStiffness * beyond + kStopDamping * outward_speed) * outward;
   }
   const Vector3 turned = logRotation(X_DH_.rotation());
-  const double turned_beyond = turned.norm() - model_.rotation_range;
-  if (turned_beyond > 0.0) stop.torque = -kStopRotationalStiffness * turned_beyond * turned.normalized();
+  const double turned_beyond = turned.norm() - model_.caps.rotation_range;
+  if (rotates() && turned_beyond > 0.0)
+    stop.torque = -kStopRotationalStiffness * turned_beyond * turned.normalized();
   return stop;
 }
 

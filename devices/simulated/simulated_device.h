@@ -17,7 +17,6 @@ struct SimulatedModel {
   double inertia = 5e-4;             ///< [kgm2] apparent inertia about the grip, isotropic
   double friction = 0.0;             ///< [N] Coulomb friction while sliding
   double rotational_friction = 0.0;  ///< [Nm]
-  double rotation_range = 3.0;       ///< [rad] from the centre to the end stop, about any axis
   double position_resolution = 0.0;  ///< [m] of one encoder count; 0: not quantised
   double angle_resolution = 0.0;     ///< [rad] likewise
   unsigned velocity_window = 1;      ///< [ticks] over which velocity is averaged, 1 to kLongestWindow

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "server/bake/feature_bake.h"
 #include "server/bake/field_bake.h"
 #include "server/bake/parallel.h"
 #include "server/bake/shell_bake.h"
@@ -100,6 +101,11 @@ Result<structures::HapticStructures> bake(const TriangleMesh& mesh, const BakeOp
   const structures::DistanceField undilated = structures::viewOf(baked->storage);
   work.stage("sampling the shell", 0.88, 0.95);
   structures.shell = bakeShell(welded, baked->surface, undilated, options, work);
+  if (work.cancelled()) return fail("cancelled");
+  if (!structures.shell.empty()) {
+    structures.features =
+        bakeFeatures(welded, undilated, static_cast<double>(structures.shell.levels().back().spacing));
+  }
   const std::string sheets = noteSheets(welded, undilated);
   work.stage("thickening thin walls", 0.95, 0.99);
   const ThinPlaces thin = findThinPlaces(undilated, baked->surface, baked->thin, work);

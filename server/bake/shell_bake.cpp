@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "server/bake/parallel.h"
+#include "server/bake/surface_normals.h"
 #include "server/structures/point_grid.h"
 #include "server/structures/shell_builder.h"
 
@@ -18,8 +19,6 @@ constexpr std::size_t kCandidatesPerPoint = 12;
 constexpr std::size_t kMaxCandidates = 12'000'000;
 // Points per area r^2 of a dense random sampling with minimum distance r (maximal Poisson-disk sampling).
 constexpr double kDiscsPerArea = 0.59;
-// A smaller gradient belongs to a point near the medial axis, where it is not the surface normal.
-constexpr double kMinGradient = 0.3;
 
 /// The k-th number of a fixed random sequence in [0, 1) (splitmix64).
 double randomUnit(std::uint64_t k) {
@@ -28,39 +27,6 @@ double randomUnit(std::uint64_t k) {
   z = (z ^ z >> 27U) * 0x94D049BB133111EBULL;
   return static_cast<double>((z ^ z >> 31U) >> 11U) * 0x1p-53;
 }
-
-/// Determines inward normals and edge convexity from the field.
-class NormalEstimator {
- public:
-  explicit NormalEstimator(const structures::DistanceField& field) : field_(field) {}
-
-  /// The inward normal at a surface point. `normal_M` of the triangle, of either sign, is used where the
-  /// gradient is not reliable, and gives the side on a sheet.
-  [[nodiscard]] Vector3 inward(const Vector3& p_MP, const Vector3& normal_M) const {
-    // compare both sides at a distance: in a thin plate the gradient may be that of the other face
-    const Vector3 step = normal_M * (0.75 * field_.voxelAt(p_MP));
-    const bool outwards = field_.sample(p_MP + step).distance >= field_.sample(p_MP - step).distance;
-    const Vector3 inward_M = outwards ? Vector3(-normal_M) : normal_M;
-    const structures::FieldSample sample = field_.sample(p_MP);
-    const double slope = sample.gradient.norm();
-    if (!sample.exact || slope < kMinGradient || -sample.gradient.dot(inward_M) < 0.5 * slope)
-      return inward_M;
-    return -sample.gradient / slope;
-  }
-
-  [[nodiscard]] bool onSurface(const Vector3& p_MP) const {
-    return field_.sample(p_MP).distance > -0.5 * field_.voxelAt(p_MP);
-  }
-
-  /// Whether an edge is convex: the solid is in the direction `into_M`, the bisector of its faces.
-  [[nodiscard]] bool convex(const Vector3& p_MP, const Vector3& into_M) const {
-    const Vector3 step = into_M * (0.5 * field_.voxelAt(p_MP));
-    return field_.sample(p_MP + step).distance <= field_.sample(p_MP - step).distance;
-  }
-
- private:
-  const structures::DistanceField& field_;
-};
 
 Vector3 unitNormal(const structures::Triangle& t) { return (t[1] - t[0]).cross(t[2] - t[0]).normalized(); }
 

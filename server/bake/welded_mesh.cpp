@@ -132,7 +132,7 @@ void WeldedMesh::closeHoles() {
   }
 }
 
-std::vector<WeldedMesh::Edge> WeldedMesh::sharpEdges() const {
+std::vector<WeldedMesh::Edge> WeldedMesh::sharpEdges(double cosine) const {
   std::vector<Edge> open;
   std::vector<Edge> sharp;
   std::size_t edges = 0;
@@ -141,9 +141,8 @@ std::vector<WeldedMesh::Edge> WeldedMesh::sharpEdges() const {
     const auto& [from, to, triangle] = edge.front();
     if (edge.size() == 1) open.push_back({from, to, triangle, Edge::kNone});
     if (edge.size() != 2) return;
-    constexpr double kCos140 = -0.766;
     const std::uint32_t other = edge[1].triangle;
-    if (dihedralCosine(triangle, from, to, opposite(corners[other], from, to)) > kCos140) {
+    if (dihedralCosine(triangle, from, to, opposite(corners[other], from, to)) > cosine) {
       sharp.push_back({from, to, triangle, other});
     }
   });

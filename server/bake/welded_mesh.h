@@ -29,9 +29,11 @@ struct WeldedMesh {
     std::uint32_t first, second;  ///< triangles; second is kNone for an open edge
     static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
   };
-  /// Edges with one triangle, or with two whose dihedral angle is less than 140 degrees. Open edges are
-  /// returned only if they are less than a third of all edges.
-  [[nodiscard]] std::vector<Edge> sharpEdges() const;
+  /// [-] Cosine of 140 degrees.
+  static constexpr double kSharpCosine = -0.766;
+  /// Edges with one triangle, or with two the cosine of whose dihedral angle is above `cosine` [-] (-1:
+  /// flat). Open edges are returned only if they are less than a third of all edges.
+  [[nodiscard]] std::vector<Edge> sharpEdges(double cosine = kSharpCosine) const;
 
   /// The number of each triangle's connected component (triangles with a common vertex), and the number of
   /// components.

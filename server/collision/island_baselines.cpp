@@ -24,7 +24,8 @@ void IslandSolver::solveBlocking(const Job& job, SolveReport& report) {
       report.unconverged = length > kUnconverged;
       break;
     }
-    takeStep(job, std::min(1.0, job.limits.max_step_length / length));
+    std::fill(fractions_.begin(), fractions_.end(), std::min(1.0, job.limits.max_step_length / length));
+    takeStep(job);
     ++report.steps;
   }
   fillPenaltyForces(job);
@@ -41,7 +42,8 @@ void IslandSolver::solvePenalty(const Job& job, SolveReport& report) {
       report.unconverged = length > kUnconverged;
       break;
     }
-    takeStep(job, std::min(1.0, job.limits.max_step_length / length));
+    std::fill(fractions_.begin(), fractions_.end(), std::min(1.0, job.limits.max_step_length / length));
+    takeStep(job);
     ++report.steps;
   }
   queryPairs(job, 0.0, report);

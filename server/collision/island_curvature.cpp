@@ -27,19 +27,20 @@ struct ConcaveDirection {
 
 /// The concave principal directions at a contact. Where the normal turns abruptly, the tangent planes to both
 /// sides are appended to `secondary_planes`: in a concave place they constrain the point as well.
-FixedVector<ConcaveDirection, 2> concaveDirections(const structures::DistanceField& field, const Pose& X_WB,
-                                                   const Contact& contact,
+FixedVector<ConcaveDirection, 2> concaveDirections(const ContactSurface& surface, const Contact& contact,
                                                    FixedVector<Contact, 4>& secondary_planes) {
   FixedVector<ConcaveDirection, 2> directions;
+  if (surface.field == nullptr) return directions;
+  const Pose& X_WB = *surface.X_WF;
   const Vector3 p_BP = X_WB.inverse() * contact.p_WP;
-  const Vector3 n_B = X_WB.rotation().conjugate() * contact.n_W;
-  const double h = kSampleOffset * field.voxelAt(p_BP);
+  const Vector3 n_B = X_WB.rotation().conjugate() * (surface.sign * contact.n_W);
+  const double h = kSampleOffset * surface.field->voxelAt(p_BP);
   const std::array<Vector3, 2> t = tangentsOf(n_B);
   Eigen::Matrix2d turn;
   for (int side = 0; side < 2; ++side) {
     const Vector3& along = t[static_cast<std::size_t>(side)];
-    const structures::FieldSample ahead = field.sample(p_BP + h * along);
-    const structures::FieldSample behind = field.sample(p_BP - h * along);
+    const structures::FieldSample ahead = surface.sample(p_BP + h * along);
+    const structures::FieldSample behind = surface.sample(p_BP - h * along);
     if (!ahead.exact || !behind.exact) return directions;
     turn(0, side) = (behind.gradient - ahead.gradient).dot(t[0]);
     turn(1, side) = (behind.gradient - ahead.gradient).dot(t[1]);
@@ -50,7 +51,7 @@ FixedVector<ConcaveDirection, 2> concaveDirections(const structures::DistanceFie
       if (slope < kMinPlaneSlope) continue;
       Contact plane = contact;
       plane.gap = (sample.distance - offset * sample.gradient.dot(along)) / slope;
-      plane.n_W = X_WB.rotation() * (sample.gradient / slope);
+      plane.n_W = X_WB.rotation() * (surface.sign * (sample.gradient / slope));
       plane.area = 0.0;
       // with a smaller gap, the surface is convex between the contact and the sample
       if (plane.gap >= contact.gap - kFieldNoise) secondary_planes.push_back(plane);
@@ -93,7 +94,7 @@ bool IslandSolver::evaluateCurvature(const Job& job) {
     const IslandPair& pair = job.pairs[i];
     const Contact& contact = job.results[i].query.contacts[row - first];
     FixedVector<Contact, 4> secondary_planes;
-    const auto directions = concaveDirections(*pair.field_B, job.poseB(pair), contact, secondary_planes);
+    const auto directions = concaveDirections(job.surfaceOf(pair, contact), contact, secondary_planes);
     for (const Contact& plane : secondary_planes) {
       if (secondary_plane_count_ == secondary_planes_.size()) break;
       secondary_planes_[secondary_plane_count_++] = {i, plane};

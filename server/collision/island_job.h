@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <span>
 
 #include "server/collision/island_solver.h"
@@ -29,6 +30,21 @@ inline std::array<Vector3, 2> tangentsOf(const Vector3& n_W) {
   return {first, n_W.cross(first)};
 }
 
+/// The field a contact is measured in, and its body's pose; none for a crossing of edges.
+struct ContactSurface {
+  const structures::DistanceField* field = nullptr;
+  const Pose* X_WF = nullptr;
+  double most_dilation = std::numeric_limits<double>::infinity();  ///< [m] of the field's, so much counts
+  double sign = 1.0;  ///< [-] 1: the contact's normal points out of this surface; -1: into it
+
+  /// The field in its frame F.
+  [[nodiscard]] structures::FieldSample sample(const Vector3& p_FP) const {
+    structures::FieldSample sample = field->sample(p_FP);
+    sample.distance += field->dilationBeyond(most_dilation, p_FP);
+    return sample;
+  }
+};
+
 /// The arguments of IslandSolver::solve, shared by its files. All spans live as long as the call.
 ///
 /// Threads: one. Real-time: everything.
@@ -46,6 +62,17 @@ struct IslandSolver::Job {
   }
   [[nodiscard]] const Pose& poseB(const IslandPair& pair) const {
     return poseOf(pair.body_b, pair.X_WB_static);
+  }
+  [[nodiscard]] ContactSurface surfaceOf(const IslandPair& pair, const Contact& contact) const {
+    switch (contact.kind) {
+      case ContactKind::kShellPoint:
+        return {.field = pair.field_B, .X_WF = &poseB(pair)};
+      case ContactKind::kFeaturePoint:
+        return {pair.features.field_A, &poseA(pair), pair.features.most_dilation_A, -1.0};
+      case ContactKind::kCrossing:
+        break;
+    }
+    return {};
   }
   /// The query of a pair at the current poses of its bodies, up to a gap of `margin` [m].
   [[nodiscard]] PairQuery queryOf(const IslandPair& pair, double margin) const {

@@ -26,8 +26,7 @@ int movableBodies(const IslandPair& pair) {
 
 /// [m] Contacts up to this gap must be listed before a step: those it may reach, and contact_margin.
 double neededMargin(const IslandPair& pair, const SolveLimits& limits) {
-  const double slope = pair.field_B->slope();
-  return std::max(limits.contact_margin, slope * movableBodies(pair) * limits.max_step_length);
+  return std::max(limits.contact_margin, pair.slope() * movableBodies(pair) * limits.max_step_length);
 }
 
 }  // namespace
@@ -102,7 +101,7 @@ bool IslandSolver::updatePair(const Job& job, std::size_t i, SolveReport& report
   }
   PairQueryResult& result = job.results[i].query;
   const std::size_t listed = result.contacts.size();
-  resampleContacts(job.queryOf(job.pairs[i], 0.0), approach, result);
+  resampleFeatures(job.queryOf(job.pairs[i], 0.0), job.pairs[i].features, approach, feature_scratch_, result);
   ++report.resamplings;
   report.points_visited += listed;
   return result.contacts.size() == listed;
@@ -112,11 +111,15 @@ void IslandSolver::traversePair(const Job& job, std::size_t i, SolveReport& repo
   const IslandPair& pair = job.pairs[i];
   PairQuery query = job.queryOf(
       pair, neededMargin(pair, job.limits) +
-                kTraversalSteps * pair.field_B->slope() * movableBodies(pair) * job.limits.max_step_length);
+                kTraversalSteps * pair.slope() * movableBodies(pair) * job.limits.max_step_length);
   query.levels = std::min(pair.levels, job.results[i].traversal.levels_used);
   query.reduce = true;
   queryPair(query, job.results[i].query);
-  job.results[i].traversal = {true, query.X_WA, query.X_WB, pair.levels, job.results[i].query.levels_used};
+  const PairQueryResult& found = job.results[i].query;
+  queryFeatures(query, pair.features, feature_scratch_, job.results[i].query);
+  job.results[i].traversal = {true,        query.X_WA,
+                              query.X_WB,  found.smallest_gap - found.skipped_gap_error,
+                              pair.levels, found.levels_used};
   ++report.traversals;
   report.points_visited += job.results[i].query.counts.points_visited;
 }
@@ -132,7 +135,17 @@ double IslandSolver::approachSinceTraversal(const Job& job, std::size_t i) {
   };
   add(pair.body_a, job.results[i].traversal.X_WA);
   add(pair.body_b, job.results[i].traversal.X_WB);
-  return pair.field_B->slope() * sum;
+  return pair.slope() * sum;
+}
+
+double IslandSolver::clearanceOf(const Job& job, std::size_t i) {
+  const IslandPair& pair = job.pairs[i];
+  const PairQueryResult& query = job.results[i].query;
+  double clearance = std::min(query.smallest_gap - query.skipped_gap_error, query.dormant_gap);
+  // points that the list skipped in favour of neighbours are not in its gaps after a motion
+  if (query.reduced && clearance > 0.0)
+    clearance = std::min(clearance, job.results[i].traversal.smallest_gap - approachSinceTraversal(job, i));
+  return std::max(clearance, 0.0) / pair.slope();
 }
 
 bool IslandSolver::mustTraverse(const Job& job, std::size_t i, double approach) {

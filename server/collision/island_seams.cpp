@@ -24,20 +24,24 @@ constexpr double kSeamDepthNoise = 1e-6;
 bool IslandSolver::findSeam(const Job& job, std::size_t pair, std::size_t c, std::size_t row) {
   const IslandPair& one = job.pairs[pair];
   const Contact& contact = job.results[pair].query.contacts[c];
-  const Pose& X_WB = job.poseB(one);
+  const auto surface = job.surfaceOf(one, contact);
+  if (surface.field == nullptr) return false;
+  const Pose& X_WB = *surface.X_WF;
+  const Vector3 out_W = surface.sign * contact.n_W;
   Seam seam{pair, c, row, {}};
   for (const Vector3& t_W : tangentsOf(contact.n_W)) {
     for (const double offset : {kSeamDistance, -kSeamDistance}) {
       const structures::FieldSample sample =
-          one.field_B->sample(X_WB.inverse() * (contact.p_WP + offset * t_W));
+          surface.sample(X_WB.inverse() * (contact.p_WP + offset * t_W));
       const double slope = sample.gradient.norm();
       if (!sample.exact || slope < kMinSeamSlope) continue;
       const Vector3 gradient_W = X_WB.rotation() * sample.gradient;
       const Vector3 n_W = gradient_W / slope;
       // on a concave surface both sides hold
-      if (offset * (n_W - contact.n_W).dot(t_W) < kSeamTurn * kSeamDistance) continue;
+      if (offset * (n_W - out_W).dot(t_W) < kSeamTurn * kSeamDistance) continue;
       const double gap = sample.distance - offset * gradient_W.dot(t_W);
-      if (gap >= std::min(contact.gap, 0.0) - kSeamDepthNoise) seam.sides.push_back({n_W, gap});
+      if (gap >= std::min(contact.gap, 0.0) - kSeamDepthNoise)
+        seam.sides.push_back({surface.sign * n_W, gap});
     }
   }
   return !seam.sides.empty() && seams_.push_back(seam);

@@ -36,6 +36,9 @@ IslandSolver::IslandSolver(std::size_t max_bodies, std::size_t max_pairs)
       multipliers_(max_pairs * kMaxPairContacts + kMaxSecondaryPlanes + kPatchRows * kMaxPatches),
       step_(max_bodies),
       step_without_seams_(max_bodies),
+      lengths_(max_bodies),
+      fractions_(max_bodies),
+      leaders_(max_bodies),
       last_step_(max_bodies),
       best_iterate_(max_bodies),
       initial_poses_(max_bodies),
@@ -78,6 +81,7 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
   double at_start = best;
   double trust_radius = job.limits.max_step_length;
   int nonmonotone = 0;
+  std::uint32_t free_steps = 0;
   warmStart(job);
 
   // a further step costs one evaluation, and perhaps another one at the best iterate
@@ -105,7 +109,8 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
     if (converged(job, nonmonotone == 0 && report.steps > 0 ? kRelaxedTolerance : 1.0)) break;
     double length = stepLength(job);
     const bool spent = isBudgetSpent() && report.steps > 0;
-    const bool last = report.steps == job.limits.max_steps || spent;
+    const bool last =
+        report.steps - free_steps == job.limits.max_steps || free_steps == job.limits.max_free_steps || spent;
     // no small step from the initial poses lowers the merit function: the bodies stay there
     const bool stays = best == at_start && nonmonotone > kMaxNonmonotoneSteps && length < kSmallStep;
     // an iterate may be worse on the path to a better one, but not the last iterate
@@ -120,9 +125,8 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
       report.unconverged = length > kUnconverged;
       break;
     }
-    // one fraction for all bodies: between two feasible iterates every iterate is feasible
-    takeStep(job, std::min({1.0, std::min(trust_radius, validityRadius(job)) / length,
-                            fractionWithinLimits(job)}));
+    if (limitStep(job, std::min(trust_radius, validityRadius(job)))) ++free_steps;
+    takeStep(job);
     ++report.steps;
   }
   fillForces(job);
@@ -213,16 +217,52 @@ bool IslandSolver::converged(const Job& job, double slack) const {
   return true;
 }
 
-double IslandSolver::fractionWithinLimits(const Job& job) const {
-  double fraction = 1.0;
+bool IslandSolver::limitStep(const Job& job, double trust) {
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
-    const MovableBody& body = job.bodies[i];
-    const double length = maxPointMotion(step_[i], body.radius);
-    if (body.pinned || length < kStepTolerance) continue;
-    const double moved = maxPointMotion(displacement(initial_poses_[i], body.X_WB, body.p_BQ), body.radius);
-    fraction = std::min(fraction, (body.max_displacement - moved) / length);
+    lengths_[i] = maxPointMotion(step_[i], job.bodies[i].radius);
+    fractions_[i] = fractionWithinLimit(job.bodies[i], i);
+    leaders_[i] = i;
   }
-  return std::max(fraction, 0.0);
+  const auto lengthOf = [this](std::int32_t body) {
+    return body == ContactConstraint::kStatic ? 0.0 : lengths_[static_cast<std::size_t>(body)];
+  };
+  for (std::size_t p = 0; p < job.pairs.size(); ++p) {
+    const IslandPair& pair = job.pairs[p];
+    if (pair.body_a == ContactConstraint::kStatic || pair.body_b == ContactConstraint::kStatic) continue;
+    if (lengthOf(pair.body_a) + lengthOf(pair.body_b) <= clearanceOf(job, p)) continue;
+    const std::size_t a = leaderOf(static_cast<std::size_t>(pair.body_a));
+    const std::size_t b = leaderOf(static_cast<std::size_t>(pair.body_b));
+    leaders_[std::max(a, b)] = std::min(a, b);
+    fractions_[std::min(a, b)] = std::min(fractions_[a], fractions_[b]);
+  }
+  bool before_contact = false;
+  bool by_trust = false;
+  for (std::size_t p = 0; p < job.pairs.size(); ++p) {
+    const IslandPair& pair = job.pairs[p];
+    const double clearance = clearanceOf(job, p);
+    const double approach = lengthOf(pair.body_a) + lengthOf(pair.body_b);
+    if (approach <= clearance) continue;
+    const double free = clearance / approach;
+    const double trusted = trust / std::max(lengthOf(pair.body_a), lengthOf(pair.body_b));
+    const std::int32_t body = pair.body_a == ContactConstraint::kStatic ? pair.body_b : pair.body_a;
+    double& fraction = fractions_[leaderOf(static_cast<std::size_t>(body))];
+    fraction = std::min(fraction, std::max(free, trusted));
+    (free > trusted ? before_contact : by_trust) |= std::max(free, trusted) < 1.0;
+  }
+  // leaders come first
+  for (std::size_t i = 0; i < job.bodies.size(); ++i) fractions_[i] = fractions_[leaderOf(i)];
+  return before_contact && !by_trust;
+}
+
+std::size_t IslandSolver::leaderOf(std::size_t i) const {
+  while (leaders_[i] != i) i = leaders_[i];
+  return i;
+}
+
+double IslandSolver::fractionWithinLimit(const MovableBody& body, std::size_t i) const {
+  if (body.pinned || lengths_[i] < kStepTolerance) return 1.0;
+  const double moved = maxPointMotion(displacement(initial_poses_[i], body.X_WB, body.p_BQ), body.radius);
+  return std::clamp((body.max_displacement - moved) / lengths_[i], 0.0, 1.0);
 }
 
 void IslandSolver::pinBodiesAtLimit(const Job& job) const {
@@ -234,13 +274,14 @@ void IslandSolver::pinBodiesAtLimit(const Job& job) const {
   }
 }
 
-void IslandSolver::takeStep(const Job& job, double fraction) {
+void IslandSolver::takeStep(const Job& job) {
   for (std::size_t i = 0; i < job.bodies.size(); ++i) {
     MovableBody& body = job.bodies[i];
+    const double fraction = fractions_[i];
     last_step_[i] = {fraction * step_[i].translation, fraction * step_[i].rotation};
     // without contact the goal is reached exactly, not only to second order
-    const bool at_goal = fraction == 1.0 && constrained_[i] == 0 && body.springs.size() == 1 &&
-                         job.limits.method != ContactMethod::kBlocking;
+    const bool at_goal = fraction == 1.0 && constrained_[i] == 0 && !body.pinned &&
+                         body.springs.size() == 1 && job.limits.method != ContactMethod::kBlocking;
     body.X_WB = at_goal ? body.springs[0].X_WG : displaced(body.X_WB, last_step_[i], body.p_BQ);
   }
 }

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/collision/feature_query.h"
 #include "server/collision/motion_solver.h"
 #include "server/collision/pair_query.h"
 
@@ -30,7 +31,8 @@ struct Friction {
 struct TraversalState {
   bool valid = false;  ///< false: the pair has no list yet, and the next evaluation traverses
   Pose X_WA, X_WB;
-  std::uint32_t levels = 0;  ///< IslandPair::levels at that traversal
+  double smallest_gap = 0.0;  ///< [m] lower bound over all points there, also those that a reduced list lacks
+  std::uint32_t levels = 0;   ///< IslandPair::levels at that traversal
   /// that the budget allowed: later traversals use no more, until the pair starts without a list again
   std::uint32_t levels_used = 0xFFFFFFFFU;
 };
@@ -48,8 +50,8 @@ struct IslandPairResult {
   bool slid_before = false;  ///< one slid in the last solve: the dynamic coefficient applies from the start
 };
 
-/// Two bodies of an island that may touch: A's pointshell against B's SDF. body_a and body_b are indices into
-/// the island's bodies; a kStatic body is fixed at X_WA_static or X_WB_static.
+/// Two bodies of an island that may touch: A's pointshell against B's SDF, and the features of both. body_a
+/// and body_b are indices into the island's bodies; a kStatic body is fixed at X_WA_static or X_WB_static.
 struct IslandPair {
   std::int32_t body_a = ContactConstraint::kStatic;  ///< pointshell side
   std::int32_t body_b = ContactConstraint::kStatic;  ///< SDF side
@@ -57,6 +59,7 @@ struct IslandPair {
   const structures::DistanceField* field_B = nullptr;
   Pose X_WA_static;
   Pose X_WB_static;
+  PairFeatures features;  ///< none: one direction is asked
   Friction friction;
   // for every traversal, as in PairQuery
   std::uint32_t levels = 0xFFFFFFFFU;
@@ -65,10 +68,17 @@ struct IslandPair {
   /// Result of the last solve, for the warm start: its list serves again while the bodies are near the poses
   /// of its traversal. Null after a jump of a pose. May be the result that is to be filled.
   const IslandPairResult* last = nullptr;
+
+  /// [-] Gaps change by at most this times a motion.
+  [[nodiscard]] double slope() const {
+    return features.any() ? std::max(field_B->slope(), features.field_A->slope()) : field_B->slope();
+  }
 };
 
 struct SolveLimits {
-  std::uint32_t max_steps = 8;      ///< SQP steps in one solve
+  std::uint32_t max_steps = 8;  ///< SQP steps in one solve
+  /// Steps in free motion beside them: steps that end before a contact and are longer than the trust region.
+  std::uint32_t max_free_steps = 16;
   double max_step_length = 0.0005;  ///< [m] of any point; the trust region's initial and largest radius
   double contact_margin = 0.0005;  ///< [m] contacts are listed up to this gap, and as far as a step may reach
   ContactMethod method = ContactMethod::kIsland;
@@ -103,8 +113,13 @@ struct SolveReport {
 ///
 /// * Merit function: the energy of the springs, and a penalty on the deepest overlap. A step that does not
 ///   lower it halves the trust region; after a second one in a row the solver returns to the best iterate.
-/// * Trust region: no point of any body moves by more than its radius, at most `max_step_length`. One step
-///   fraction holds for all bodies: between two feasible iterates of the QP every iterate is feasible.
+/// * Trust region: no point of a body that may reach a contact in a step moves by more than its radius, at
+///   most `max_step_length`.
+/// * Free motion: the gap of a pair is a lower bound of what its bodies may approach each other before any
+///   point of one meets the other (conservative advancement about the centres of their bounding spheres). A
+///   step within it is not limited by the trust region: a body far from others takes its goal in one step.
+/// * Step fractions: bodies share one only as far as a pair of them may meet in the step; between two
+///   feasible iterates of the QP every iterate is feasible.
 /// * Second order: curvature of concave surfaces at active contacts, secondary planes where they are too
 ///   sharp for a curvature, overshoot damping.
 /// * Seams: the gradient of an interpolated field jumps at cell borders. Free space outside a convex surface
@@ -188,11 +203,19 @@ class IslandSolver {
   /// Every body's step is shorter than `slack` [-] times its tolerance; without any contact, than
   /// kStepTolerance.
   [[nodiscard]] bool converged(const Job& job, double slack) const;
-  /// Fraction of step_ with which no body exceeds its max_displacement.
-  [[nodiscard]] double fractionWithinLimits(const Job& job) const;
+  /// Sets fractions_ for a trust region of `trust` [m]. True for a step in free motion: bodies stop before
+  /// contacts, none because of the trust region.
+  bool limitStep(const Job& job, double trust);
+  /// [m] By so much the bodies of a pair may approach each other from the iterate before anything touches, at
+  /// least 0.
+  [[nodiscard]] static double clearanceOf(const Job& job, std::size_t pair);
+  /// Fraction of step_ with which a body does not exceed its max_displacement.
+  [[nodiscard]] double fractionWithinLimit(const MovableBody& body, std::size_t i) const;
   void pinBodiesAtLimit(const Job& job) const;
-  /// Takes `fraction` [-] of step_.
-  void takeStep(const Job& job, double fraction);
+  /// Takes step_, of every body its fraction.
+  void takeStep(const Job& job);
+  /// The body that stands for those which share a step fraction with body `i`.
+  [[nodiscard]] std::size_t leaderOf(std::size_t i) const;
   void restoreBestIterate(const Job& job);
   /// [J] Merit function at the iterate: lower is better.
   [[nodiscard]] static double merit(const Job& job);
@@ -256,6 +279,7 @@ class IslandSolver {
   };
 
   MotionSolver motion_;
+  FeatureScratch feature_scratch_;
   static constexpr std::size_t kMaxSeams = 24;
   FixedVector<Seam, kMaxSeams> seams_;
   static constexpr std::size_t kMaxSecondaryPlanes = 64;
@@ -275,6 +299,9 @@ class IslandSolver {
   std::vector<double> multipliers_;               ///< [N] by row
   std::vector<Displacement> step_;                ///< the QP's solution, by body
   std::vector<Displacement> step_without_seams_;  ///< the same if contacts at seams did not hold
+  std::vector<double> lengths_;                   ///< [m] of step_, of any point, by body
+  std::vector<double> fractions_;                 ///< [-] of step_ to take, by body
+  std::vector<std::size_t> leaders_;              ///< by body: union-find of those that share a fraction
   std::vector<Displacement> last_step_;           ///< the step that led to the iterate
   std::vector<Pose> best_iterate_;                ///< by the merit function, in this solve
   std::vector<Pose> initial_poses_;               ///< of this solve

@@ -60,6 +60,7 @@ class Traversal {
         kernels_(chosenKernels()),
         shell_(*query.shell_A),
         sum_penalty_(query.sum_penalty),
+        list_(query.list),
         prune_(query.prune),
         reduce_(query.reduce),
         correct_ridges_(query.correct_ridges),
@@ -76,11 +77,13 @@ class Traversal {
       const structures::ShellLevel& level = shell_.levels()[k];
       if (k > 0 && culled_.points + expectedPoints(k, culled_.points - before) > budget) break;
       before = culled_.points;
-      for (std::uint32_t c = 0; c < level.cluster_count; c += structures::ShellBlock::kLanes) {
-        const structures::ShellBlock& balls = shell_.clusterBlocks()[block++];
-        const std::uint32_t in_reach =
-            prune_ ? kernels_.clusters(frame_, balls, culled_) : (1U << balls.count) - 1U;
-        forEachLane(in_reach, [&](std::uint32_t i) { traverseCluster(level.first_cluster + c + i); });
+      const std::size_t first_block = block;
+      block += (level.cluster_count + structures::ShellBlock::kLanes - 1) / structures::ShellBlock::kLanes;
+      if (prune_ && !shell_.blockSpheres().empty()) {
+        traverseBlocksInReach();
+      } else {
+        for (std::size_t b = first_block; b < block; ++b)
+          traverseBlock(b, level.first_cluster + (b - first_block) * structures::ShellBlock::kLanes);
       }
       if (!clusters_.empty()) traverseClusters();
     }
@@ -132,6 +135,26 @@ class Traversal {
     result_.unlisted_gap = std::min(result_.unlisted_gap, bound);
   }
 
+  /// The blocks of a shell of one level whose bounding spheres may hold a contact.
+  void traverseBlocksInReach() {
+    std::size_t first = 0;
+    for (const structures::ShellBlock& spheres : shell_.blockSpheres()) {
+      forEachLane(kernels_.clusters(frame_, spheres, culled_), [&](std::uint32_t i) {
+        traverseBlock(first + i, (first + i) * structures::ShellBlock::kLanes);
+      });
+      first += structures::ShellBlock::kLanes;
+    }
+  }
+
+  /// Block `block` of clusters, the first of which is `first_cluster`.
+  void traverseBlock(std::size_t block, std::size_t first_cluster) {
+    const structures::ShellBlock& balls = shell_.clusterBlocks()[block];
+    const std::uint32_t in_reach =
+        prune_ ? kernels_.clusters(frame_, balls, culled_) : (1U << balls.count) - 1U;
+    forEachLane(in_reach,
+                [&](std::uint32_t i) { traverseCluster(static_cast<std::uint32_t>(first_cluster) + i); });
+  }
+
   /// Adds a cluster to the next batch.
   void traverseCluster(std::uint32_t cluster) {
     clusters_.push_back(cluster);
@@ -181,7 +204,7 @@ class Traversal {
     result_.smallest_gap = std::min(result_.smallest_gap, sums.smallest_distance);
     result_.deepest = std::max(result_.deepest, -sums.smallest_distance);
     result_.unlisted_gap = std::min(result_.unlisted_gap, sums.smallest_far_gap);
-    if (sums.near > 0) {
+    if (list_ && sums.near > 0) {
       kernels_.contacts(frame_, points, samples_.data(), contacts_.data());
       for (std::uint32_t first = 0; first < candidates_.count; first += structures::ShellBlock::kLanes)
         completeBlock(first);
@@ -288,6 +311,7 @@ class Traversal {
     Contact& contact = *result_.contacts.extend();
     lanes.setContact(i, contact);
     contact.point = point;
+    contact.kind = ContactKind::kShellPoint;
     contact.area = areaOf(point);
   }
 
@@ -313,6 +337,7 @@ class Traversal {
   const QueryKernels& kernels_;
   const structures::Pointshell& shell_;
   bool sum_penalty_;
+  bool list_;
   bool prune_;
   bool reduce_;
   std::span<const float> areas_;  ///< of the levels in use

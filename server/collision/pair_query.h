@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "idl/types/fixed_vector.h"
@@ -10,13 +11,24 @@
 
 namespace tenon::collision {
 
-/// A point of body A's pointshell near body B's surface.
+/// What of the two bodies a contact is between.
+enum class ContactKind : std::uint8_t {
+  kShellPoint,    ///< a point of A's pointshell, the surface of B
+  kFeaturePoint,  ///< a feature of B, the surface of A
+  kCrossing,      ///< a piece of an edge of A, one of B
+};
+
+/// A point of body A near body B's surface, or of B near A's (feature_query.h).
 struct Contact {
   Vector3 p_WP = Vector3::Zero();
   Vector3 n_W = Vector3::Zero();  ///< unit, from B into A: the direction in which B pushes A
   double gap = 0.0;               ///< [m] value of B's field; < 0: inside its zero level set
   double area = 0.0;              ///< [m^2] surface of A that the point represents
-  std::uint32_t point = 0;        ///< index in the pointshell: identifies the contact from tick to tick
+  /// index in A's pointshell (kShellPoint), in B's features, or in A's (kCrossing): identifies the contact
+  /// from tick to tick
+  std::uint32_t point = 0;
+  std::uint32_t other = 0;  ///< of a kCrossing: index in B's features
+  ContactKind kind = ContactKind::kShellPoint;
 };
 
 inline constexpr std::size_t kMaxPairContacts = 512;
@@ -57,6 +69,7 @@ struct PairQuery {
   bool sum_penalty = false;
   /// Correct depths and normals near gradient discontinuities of the field: see correctRidges().
   bool correct_ridges = false;
+  bool list = true;   ///< false: no contacts are listed; for PairQueryResult::smallest_gap alone
   bool prune = true;  ///< false: every point is tested, for comparison
 };
 
@@ -69,6 +82,8 @@ struct PairQueryResult {
   double complete_to = 0.0;
   /// [m] lower bound of the gap of points that are not listed, those dropped by `reduce` excepted
   double unlisted_gap = 0.0;
+  /// [m] lower bound of the gap of listed crossings that are dormant (feature_query.h)
+  double dormant_gap = std::numeric_limits<double>::infinity();
   bool reduced = false;  ///< points were dropped in favour of neighbours (PairQuery::reduce)
   /// Penalty wrench for a stiffness of 1 N/m, force [m] and torque [m^2], if asked for
   Wrench penalty_Ao_W;

@@ -217,7 +217,7 @@ struct ReadOptions {
                                                  const ReadOptions& options = {});
 
 /// All objects in an order in which the parts that are mounted into an object are baked before it, as
-/// refineBoxes() needs. Parts that are mounted into each other come in the order of their ids.
+/// refineBoxes() needs.
 [[nodiscard]] std::vector<ObjectId> bakeOrder(const ScenarioFile& scenario);
 
 /// Boxes in the frame of `object` that need the refined voxels: those given in the file, and one around each
@@ -228,7 +228,8 @@ struct ReadOptions {
     const std::vector<std::shared_ptr<const structures::HapticStructures>>& structures);
 
 /// The SDF side of a pair with a clearance: the object that the other one, which has a target, is mounted
-/// into. Invalid when both or none have a target; then kinds and sizes decide, see makeScene().
+/// into; when both have targets, the one that is mounted first. Invalid when none has a target; then kinds
+/// and sizes decide, see makeScene().
 [[nodiscard]] ObjectId sdfSideByTarget(const ScenarioFile& scenario, const ScenarioPair& pair);
 
 /// Fails, with file and line, when the pair's clearance is smaller than the field of its SDF side `field`
@@ -243,6 +244,21 @@ struct ReadOptions {
 /// encloses none, or when the given centre of mass is outside of the object.
 [[nodiscard]] Result<simulation::BodySpec> bodyOf(const ScenarioObject& object,
                                                   const structures::HapticStructures& structures);
+
+/// An object that the scenario puts where it cannot be.
+struct Misplacement {
+  ObjectId object;
+  Vector3 p_WQ = Vector3::Zero();  ///< of its centre
+  double distance = 0.0;           ///< [m] from the world's origin, or from the box of all objects
+  int line = 0;
+  std::string what;  ///< a sentence without file and line
+};
+
+/// Poses beyond `reach` of the world's origin, by the objects' centres, and targets far from all objects; in
+/// the order of the file. `structures` by ObjectId, null where there are none.
+[[nodiscard]] std::vector<Misplacement> misplacedObjects(
+    const ScenarioFile& scenario,
+    const std::vector<std::shared_ptr<const structures::HapticStructures>>& structures);
 
 /// The read-only scene. `structures` by ObjectId; null for an object that is not collidable. SDF side of a
 /// pair: by sdfSideByTarget(), else never a pointer or an assistant, else the larger object. Fails, with file

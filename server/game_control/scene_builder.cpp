@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/game_control/scenario.h"
+#include "server/game_control/scenario_moments.h"
 
 namespace tenon::game_control {
 namespace {
@@ -24,18 +25,17 @@ std::string inMillimetres(double metres) {
   return buffer.data();
 }
 
-bool hasTarget(const ScenarioFile& scenario, ObjectId object) {
-  return std::any_of(scenario.states.begin(), scenario.states.end(),
-                     [&](const ScenarioState& state) { return state.object == object && state.X_WG; });
-}
-
 ObjectId otherObject(const ScenarioPair& pair, ObjectId object) { return pair.a == object ? pair.b : pair.a; }
+
+/// Whether `field` has refined voxels where the other object of the pair is mounted.
+bool isRefined(const ScenarioFile& scenario, const ScenarioPair& pair, ObjectId field) {
+  return !scenario.objects[field.value].structures.refine.empty() || sdfSideByTarget(scenario, pair) == field;
+}
 
 /// [m] Edge of the voxels of `field` where a part with a clearance is mounted.
 double mountingVoxel(const ScenarioFile& scenario, const ScenarioPair& pair, ObjectId field) {
   const StructureSettings& settings = scenario.objects[field.value].structures;
-  const bool refined = !settings.refine.empty() || sdfSideByTarget(scenario, pair) == field;
-  return refined ? settings.voxel / settings.refinement : settings.voxel;
+  return isRefined(scenario, pair, field) ? settings.voxel / settings.refinement : settings.voxel;
 }
 
 /// `needed` [m]: the smallest clearance that the field resolves.
@@ -48,11 +48,15 @@ std::string clearanceTooSmall(const ScenarioFile& scenario, const ScenarioPair& 
   const double exact_mm = settings.voxel * fraction * 1e3;
   const double step_mm = std::pow(10.0, std::floor(std::log10(exact_mm)) - 1.0);
   const double advised = std::floor(exact_mm / step_mm + kRounding) * step_mm * 1e-3;
+  // a refinement that is not set yet, and a box for it where there is none
+  const bool refined = isRefined(scenario, pair, field);
   std::string refinement;
   for (const int factor : {2, 4, 8}) {
     const double finer = needed / voxel * settings.voxel / factor;
-    if (refinement.empty() && finer <= pair.clearance && settings.voxel / factor < voxel)
-      refinement = " or refinement " + std::to_string(factor);
+    const bool helps = finer <= pair.clearance && (!refined || factor > settings.refinement);
+    if (!refinement.empty() || !helps) continue;
+    refinement = " or " + std::string(refined ? "" : "a box in 'refine' around the place, with ") +
+                 "refinement " + std::to_string(factor);
   }
   const std::string divided = voxel < settings.voxel ? " / " + std::to_string(settings.refinement) : "";
   return "clearance of " + scenario.objects[pair.a.value].name + "-" + scenario.objects[pair.b.value].name +
@@ -107,18 +111,21 @@ Result<void> checkStructures(const ScenarioFile& scenario, const StructuresByObj
 
 /// The boxes of `field`, in its frame, in which the other object of a pair is mounted: of the given ones
 /// those at its targets, and one around each target that none of these intersects.
-std::vector<Eigen::AlignedBox3d> mountingBoxes(const ScenarioFile& scenario, const ScenarioPair& pair,
-                                               ObjectId field, const StructuresByObject& structures) {
+std::vector<Eigen::AlignedBox3d> mountingBoxes(const ScenarioFile& scenario,
+                                               const std::vector<SceneMoment>& moments,
+                                               const ScenarioPair& pair, ObjectId field,
+                                               const StructuresByObject& structures) {
   std::vector<Eigen::AlignedBox3d> boxes;
-  const ScenarioObject& spec = scenario.objects[field.value];
+  const StructureSettings& settings = scenario.objects[field.value].structures;
   const ObjectId part = otherObject(pair, field);
   if (part.value >= structures.size() || !structures[part.value]) return boxes;
-  const Pose X_OW = spec.X_WO.inverse();
-  for (const ScenarioState& state : scenario.states) {
+  for (std::size_t i = 0; i < scenario.states.size(); ++i) {
+    const ScenarioState& state = scenario.states[i];
     if (state.object != part || !state.X_WG) continue;
+    const Pose X_OW = moments[i].X_WO[field.value].inverse();
     Eigen::AlignedBox3d box_O = boxIn(X_OW * *state.X_WG, structures[part.value]->info.box_M);
     bool covered = false;
-    for (const Eigen::AlignedBox3d& given_O : spec.structures.refine) {
+    for (const Eigen::AlignedBox3d& given_O : settings.refine) {
       if (!given_O.intersects(box_O)) continue;
       boxes.push_back(given_O);
       covered = true;
@@ -127,122 +134,80 @@ std::vector<Eigen::AlignedBox3d> mountingBoxes(const ScenarioFile& scenario, con
     // from the target back along the approach
     const Vector3 back_O = X_OW.rotation() * Vector3(-state.approach_W * state.approach_distance);
     box_O.extend(box_O.translated(back_O));
-    const Vector3 margin = Vector3::Constant(pair.clearance + 2.0 * spec.structures.voxel);
+    const Vector3 margin = Vector3::Constant(pair.clearance + 2.0 * settings.voxel);
     boxes.emplace_back(box_O.min() - margin, box_O.max() + margin);
   }
   return boxes;
 }
 
-/// All given poses put their objects' centres within reach. Where the frames' origins are does not matter.
-Result<void> checkReach(const ScenarioFile& scenario, const StructuresByObject& structures) {
-  const auto check = [&](ObjectId object, const Pose& X_WO, int line,
-                         const std::string& what) -> Result<void> {
-    const Vector3 p_OQ_O = simulation::boundingSphereOf(structures[object.value].get()).p_OQ_O;
-    const double distance = (X_WO * p_OQ_O).norm();
-    if (X_WO.translation().norm() > kFarthestOrigin)
-      return fail(fileAndLine(scenario, line) + what +
-                  " has its 'at' more than 1 km from the world's origin, " +
-                  "expected a mesh with its origin nearer to the part");
-    if (distance <= scenario.reach) return {};
-    return fail(fileAndLine(scenario, line) + what + " is " + inMillimetres(distance) +
-                " from the world's origin, expected at most 'reach', " + inMillimetres(scenario.reach));
-  };
+/// A pose that the scenario gives to an object.
+struct GivenPose {
+  ObjectId object;
+  Pose X_WO;
+  int line = 0;
+  std::string what;  ///< "the target of state 'mount'"
+  bool is_target = false;
+};
+
+std::vector<GivenPose> givenPoses(const ScenarioFile& scenario) {
+  std::vector<GivenPose> poses;
   for (std::uint32_t i = 0; i < scenario.objects.size(); ++i) {
     const ScenarioObject& object = scenario.objects[i];
-    const auto checked =
-        check(ObjectId{i}, object.X_WO, object.line, "the start of object '" + object.name + "'");
-    if (!checked) return checked;
+    poses.push_back({ObjectId{i}, object.X_WO, object.line, "the start of object '" + object.name + "'"});
   }
   for (const ScenarioState& state : scenario.states) {
     const std::string of = " of state '" + state.name + "'";
     for (const Placement& placement : state.placements) {
       if (!placement.X_WO) continue;
-      const std::string what =
-          "the place of '" + scenario.objects[placement.object.value].name + "' at the begin" + of;
-      if (const auto checked = check(placement.object, *placement.X_WO, state.line, what); !checked)
-        return checked;
+      const std::string& name = scenario.objects[placement.object.value].name;
+      poses.push_back(
+          {placement.object, *placement.X_WO, state.line, "the place of '" + name + "' at the begin" + of});
     }
-    if (!state.X_WG) continue;
-    if (const auto checked = check(state.object, *state.X_WG, state.line, "the target" + of); !checked)
-      return checked;
+    if (state.X_WG) poses.push_back({state.object, *state.X_WG, state.line, "the target" + of, true});
   }
-  return {};
-}
-
-Result<void> checkTargets(const ScenarioFile& scenario, const StructuresByObject& structures) {
-  Eigen::AlignedBox3d scene_W;
-  for (std::size_t i = 0; i < structures.size(); ++i) {
-    if (structures[i]) scene_W.extend(boxIn(scenario.objects[i].X_WO, structures[i]->info.box_M));
-  }
-  if (scene_W.isEmpty()) return {};
-  for (const ScenarioState& state : scenario.states) {
-    if (!state.X_WG) continue;
-    const Vector3 p_OQ_O = simulation::boundingSphereOf(structures[state.object.value].get()).p_OQ_O;
-    const double outside = scene_W.exteriorDistance(Vector3(*state.X_WG * p_OQ_O));
-    if (outside <= kTargetMargin) continue;
-    return fail(fileAndLine(scenario, state.line) + "the target of state '" + state.name + "' is " +
-                inMillimetres(outside) + " outside the box of all objects, expected it within " +
-                inMillimetres(kTargetMargin));
-  }
-  return {};
+  return poses;
 }
 
 }  // namespace
 
 ObjectId sdfSideByTarget(const ScenarioFile& scenario, const ScenarioPair& pair) {
   if (pair.clearance <= 0.0) return {};
-  const bool a_has_target = hasTarget(scenario, pair.a);
-  const bool b_has_target = hasTarget(scenario, pair.b);
-  if (a_has_target == b_has_target) return {};
-  return a_has_target ? pair.b : pair.a;
+  const auto a = firstTarget(scenario, pair.a);
+  const auto b = firstTarget(scenario, pair.b);
+  if (!a && !b) return {};
+  // in a chain, what is mounted first is there when the other one comes
+  return !a || (b && *a < *b) ? pair.a : pair.b;
 }
 
 std::vector<ObjectId> bakeOrder(const ScenarioFile& scenario) {
-  const std::size_t count = scenario.objects.size();
   std::vector<ObjectId> order;
-  std::vector<bool> ordered(count, false);
-  const auto waitsForPart = [&](ObjectId object) {
-    return std::any_of(scenario.pairs.begin(), scenario.pairs.end(), [&](const ScenarioPair& pair) {
-      return sdfSideByTarget(scenario, pair) == object && !ordered[otherObject(pair, object).value];
-    });
-  };
-  while (order.size() < count) {
-    const std::size_t before = order.size();
-    ObjectId first_remaining;
-    for (std::uint32_t i = 0; i < count; ++i) {
-      if (ordered[i]) continue;
-      if (!first_remaining.valid()) first_remaining = ObjectId{i};
-      if (waitsForPart(ObjectId{i})) continue;
-      ordered[i] = true;
-      order.push_back(ObjectId{i});
-    }
-    // parts that are mounted into each other: the one with the smallest id first
-    if (order.size() == before) {
-      ordered[first_remaining.value] = true;
-      order.push_back(first_remaining);
-    }
-  }
+  for (std::uint32_t i = 0; i < scenario.objects.size(); ++i) order.push_back(ObjectId{i});
+  // an empty target is less than any: last
+  std::stable_sort(order.begin(), order.end(), [&](ObjectId one, ObjectId other) {
+    return firstTarget(scenario, one) > firstTarget(scenario, other);
+  });
   return order;
 }
 
 std::vector<Eigen::AlignedBox3d> refineBoxes(const ScenarioFile& scenario, ObjectId object,
                                              const StructuresByObject& structures) {
   std::vector<Eigen::AlignedBox3d> boxes = scenario.objects[object.value].structures.refine;
+  const std::vector<SceneMoment> moments = momentsOf(scenario);
   for (const ScenarioPair& pair : scenario.pairs) {
     if (sdfSideByTarget(scenario, pair) != object) continue;
-    for (const Eigen::AlignedBox3d& box : mountingBoxes(scenario, pair, object, structures)) {
+    for (const Eigen::AlignedBox3d& box_O : mountingBoxes(scenario, moments, pair, object, structures)) {
       const bool given =
-          std::any_of(boxes.begin(), boxes.end(), [&](const auto& one) { return one.isApprox(box); });
-      if (!given) boxes.push_back(box);
+          std::any_of(boxes.begin(), boxes.end(), [&](const auto& one_O) { return one_O.isApprox(box_O); });
+      if (!given) boxes.push_back(box_O);
     }
   }
   return boxes;
 }
 
-Result<void> checkClearance(const ScenarioFile& scenario, const ScenarioPair& pair, ObjectId field,
-                            const StructuresByObject& structures) {
+Result<void> checkClearance(const ScenarioFile& scenario, const std::vector<SceneMoment>& moments,
+                            const ScenarioPair& pair, ObjectId field, const StructuresByObject& structures) {
   if (pair.clearance <= 0.0) return {};
-  std::vector<Eigen::AlignedBox3d> places = mountingBoxes(scenario, pair, field, structures);
+  std::vector<Eigen::AlignedBox3d> places = mountingBoxes(scenario, moments, pair, field, structures);
   if (places.empty()) places = scenario.objects[field.value].structures.refine;
   if (places.empty()) places.push_back(structures[field.value]->field.box());
   double proud = kEdgeError * mountingVoxel(scenario, pair, field);
@@ -253,13 +218,40 @@ Result<void> checkClearance(const ScenarioFile& scenario, const ScenarioPair& pa
   return fail(fileAndLine(scenario, pair.line) + clearanceTooSmall(scenario, pair, field, needed));
 }
 
+std::vector<Misplacement> misplacedObjects(const ScenarioFile& scenario,
+                                           const StructuresByObject& structures) {
+  Eigen::AlignedBox3d scene_W;
+  for (std::size_t i = 0; i < structures.size(); ++i)
+    if (structures[i]) scene_W.extend(boxIn(scenario.objects[i].X_WO, structures[i]->info.box_M));
+  std::vector<Misplacement> misplaced;
+  for (const GivenPose& pose : givenPoses(scenario)) {
+    const Vector3 p_WQ = pose.X_WO * simulation::boundingSphereOf(structures[pose.object.value].get()).p_OQ_O;
+    const double outside = scene_W.isEmpty() ? 0.0 : scene_W.exteriorDistance(p_WQ);
+    const auto add = [&](double distance, const std::string& problem) {
+      misplaced.push_back({pose.object, p_WQ, distance, pose.line, pose.what + problem});
+    };
+    if (pose.X_WO.translation().norm() > kFarthestOrigin) {
+      add(pose.X_WO.translation().norm(),
+          " has its 'at' more than 1 km from the world's origin, expected a mesh with its origin nearer to "
+          "the part");
+    } else if (p_WQ.norm() > scenario.reach) {
+      add(p_WQ.norm(), " is " + inMillimetres(p_WQ.norm()) +
+                           " from the world's origin, expected at most 'reach', " +
+                           inMillimetres(scenario.reach));
+    } else if (pose.is_target && outside > kTargetMargin) {
+      add(outside, " is " + inMillimetres(outside) + " outside the box of all objects, expected it within " +
+                       inMillimetres(kTargetMargin));
+    }
+  }
+  return misplaced;
+}
+
 Result<std::shared_ptr<const simulation::Scene>> makeScene(const ScenarioFile& scenario,
                                                            StructuresByObject structures) {
   if (const auto checked = checkStructures(scenario, structures); !checked)
     return tl::unexpected(checked.error());
-  if (const auto checked = checkReach(scenario, structures); !checked) return tl::unexpected(checked.error());
-  if (const auto checked = checkTargets(scenario, structures); !checked)
-    return tl::unexpected(checked.error());
+  if (const auto misplaced = misplacedObjects(scenario, structures); !misplaced.empty())
+    return fail(fileAndLine(scenario, misplaced.front().line) + misplaced.front().what);
   auto scene = std::make_shared<simulation::Scene>();
   scene->gravity_W = scenario.gravity_W;
 
@@ -282,11 +274,14 @@ Result<std::shared_ptr<const simulation::Scene>> makeScene(const ScenarioFile& s
     }
     scene->objects.push_back(std::move(spec));
   }
+  const std::vector<SceneMoment> moments = momentsOf(scenario);
   for (const ScenarioPair& pair : scenario.pairs) {
     const ObjectId field = sdfSideOf(scenario, pair, structures);
-    if (const auto checked = checkClearance(scenario, pair, field, structures); !checked)
+    if (const auto checked = checkClearance(scenario, moments, pair, field, structures); !checked)
       return tl::unexpected(checked.error());
-    scene->pairs.push_back({otherObject(pair, field), field, pair.enabled, pair.sensing, pair.friction});
+    simulation::PairSpec spec{otherObject(pair, field), field, pair.enabled, pair.sensing, pair.friction};
+    if (pair.clearance > 0.0) spec.most_dilation_a = kDilationPerClearance * pair.clearance;
+    scene->pairs.push_back(spec);
   }
   for (const ScenarioHand& hand : scenario.hands) {
     scene->hands.push_back(

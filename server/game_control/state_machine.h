@@ -105,7 +105,7 @@ class StateMachine {
 /// The current state as displays and recordings show it. Not real-time: strings.
 [[nodiscard]] StepState describe(const ScenarioFile& scenario, const StepStatus& status);
 
-/// Its progress. Not real-time: strings.
-[[nodiscard]] StepProgress progress(const ScenarioFile& scenario, const StepStatus& status);
+/// Its progress, sent in tick `now`. Not real-time: strings.
+[[nodiscard]] StepProgress progress(const ScenarioFile& scenario, const StepStatus& status, Tick now);
 
 }  // namespace tenon::game_control

@@ -60,10 +60,10 @@ StepState describe(const ScenarioFile& scenario, const StepStatus& status) {
   return step;
 }
 
-StepProgress progress(const ScenarioFile& scenario, const StepStatus& status) {
+StepProgress progress(const ScenarioFile& scenario, const StepStatus& status, Tick now) {
   StepProgress report;
   report.revision = status.revision;
-  report.tick = status.tick;
+  report.tick = now;
   report.position_error = status.position_error;
   report.angle_error = status.angle_error;
   report.contact_seconds = status.contact_seconds;

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "server/game_control/state_machine.h"
+#include "server/session/step_blocker.h"
 
 namespace tenon::session {
 
@@ -64,15 +65,23 @@ void EventGenerator::addRun(const TickOutput& output, TickEvents& events) {
       break;
     case RunPhase::kFailed:
       run.reason = fmt::format("step '{}' was not done in time", scenario_->states[output.step.step].name);
+      if (const std::string blocker = blockerOf(output); !blocker.empty()) run.reason += ": " + blocker;
       break;
     case RunPhase::kStopped:
       run.reason = "stopped";
       break;
   }
   if (output.phase >= RunPhase::kSucceeded) run.final_hash = output.hash;
+  run_reason_ = run.reason;
   const bool is_error = output.phase == RunPhase::kFailed || output.emergency_stop;
   events.log.push_back(makeEvent(is_error ? Severity::kError : Severity::kInfo, "run", run.reason));
   events.run = std::move(run);
+}
+
+std::string EventGenerator::blockerOf(const TickOutput& output) const {
+  // in the tick before: where a step ends, its object may be placed
+  const bool is_known = previous_ && previous_->step.step == output.step.step;
+  return is_known ? whatBlocks(*scenario_, *previous_) : "";
 }
 
 void EventGenerator::addStep(const TickOutput& output, TickEvents& events) {
@@ -84,6 +93,9 @@ void EventGenerator::addStep(const TickOutput& output, TickEvents& events) {
                   fmt::format("{} ({:.1f} s)", scenario.states[previous_->step.step].name,
                               static_cast<double>(output.tick - previous_->step.started) * kTickSeconds)));
   events.step = describe(scenario, output.step);
+  if (output.step.phase == StepPhase::kTimedOut)
+    if (std::string blocker = blockerOf(output); !blocker.empty())
+      events.log.push_back(makeEvent(Severity::kWarning, "not in time", std::move(blocker)));
   if (output.phase != RunPhase::kWaitingForPeople && output.step.phase == StepPhase::kActive)
     events.log.push_back(makeEvent(Severity::kInfo, "step", scenario.states[output.step.step].name));
 }

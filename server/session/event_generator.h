@@ -40,8 +40,12 @@ class EventGenerator {
   /// A log entry of something outside the simulation (a join, a refused input), stamped with the last tick
   /// and the next number of the log.
   [[nodiscard]] EventLog makeEvent(Severity severity, std::string kind, std::string text);
+  /// Why the run has the phase of the last output: RunState::reason.
+  [[nodiscard]] const std::string& runReason() const { return run_reason_; }
 
  private:
+  /// Why a step that timed out was not done; empty when it is not known.
+  [[nodiscard]] std::string blockerOf(const TickOutput& output) const;
   void addStep(const TickOutput& output, TickEvents& events);
   void addObjects(const TickOutput& output, TickEvents& events);
   void addHands(const TickOutput& output, TickEvents& events);
@@ -50,6 +54,7 @@ class EventGenerator {
   std::shared_ptr<const game_control::ScenarioFile> scenario_;
   std::uint32_t server_epoch_;
   std::optional<TickOutput> previous_;
+  std::string run_reason_;
   Tick tick_ = 0;
   std::uint64_t event_count_ = 0;
 };

@@ -43,7 +43,7 @@ const OutgoingMessages& Publisher::prepare(const TickOutput& output) {
   if (output.tick % kPeriod100Hz == 0) packer_100_.pack(output, false, outgoing_.frames_100);
   if (output.tick % kPeriod30Hz == 0) {
     packer_30_.pack(output, true, outgoing_.frames_30);
-    outgoing_.progress = game_control::progress(*scenario_, output.step);
+    outgoing_.progress = game_control::progress(*scenario_, output.step, output.tick);
   }
   outgoing_.events = event_generator_.generate(output);
   return outgoing_;

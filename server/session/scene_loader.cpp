@@ -121,8 +121,16 @@ Result<LoadedScene> loadScene(const fs::path& path, const LoadOptions& options,
                               const LoadProgress& progress) {
   auto file = game_control::readScenario(path, options.read);
   if (!file) return fail(file.error().what);
-  const auto scenario = std::make_shared<const game_control::ScenarioFile>(std::move(*file));
+  auto loaded =
+      loadStructures(std::make_shared<const game_control::ScenarioFile>(std::move(*file)), options, progress);
+  if (!loaded) return fail(loaded.error().what);
+  auto scene = game_control::makeScene(*loaded->scenario, std::move(loaded->structures));
+  if (!scene) return fail(scene.error().what);
+  return LoadedScene{loaded->scenario, std::move(*scene)};
+}
 
+Result<LoadedStructures> loadStructures(std::shared_ptr<const game_control::ScenarioFile> scenario,
+                                        const LoadOptions& options, const LoadProgress& progress) {
   const auto parts = generatedParts(*scenario, options.cache, options.detail);
   if (!parts) return fail(parts.error().what);
   std::vector<std::shared_ptr<const structures::HapticStructures>> structures(scenario->objects.size());
@@ -132,9 +140,22 @@ Result<LoadedScene> loadScene(const fs::path& path, const LoadOptions& options,
     if (!baked) return fail(baked.error().what);
     structures[id.value] = std::move(*baked);
   }
-  auto scene = game_control::makeScene(*scenario, std::move(structures));
-  if (!scene) return fail(scene.error().what);
-  return LoadedScene{scenario, std::move(*scene)};
+  return LoadedStructures{std::move(scenario), std::move(structures)};
+}
+
+std::vector<Eigen::AlignedBox3d> meshBoxes(const game_control::ScenarioFile& scenario,
+                                           const LoadOptions& options) {
+  std::vector<Eigen::AlignedBox3d> boxes_O(scenario.objects.size());
+  const auto parts = generatedParts(scenario, options.cache, options.detail);
+  if (!parts) return boxes_O;
+  for (std::size_t i = 0; i < boxes_O.size(); ++i) {
+    const auto meshes = meshesOf(scenario, scenario.objects[i], *parts, options);
+    if (!meshes) continue;
+    for (const fs::path& file : meshes->files)
+      if (const auto mesh = bake::importMesh(file, meshes->unit))
+        for (const Vector3f& p : mesh->vertices) boxes_O[i].extend(p.cast<double>());
+  }
+  return boxes_O;
 }
 
 Fingerprint fingerprintOf(const LoadedScene& loaded) {

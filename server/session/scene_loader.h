@@ -51,6 +51,21 @@ struct Fingerprint {
 /// A sentence for each object with walls thinner than its voxels resolve: how much of its surface they are,
 /// by how much the bake thickens them, and the share of the surface that is open, where a part could pass.
 [[nodiscard]] std::vector<std::string> thinWallReport(const simulation::Scene& scene);
+/// A scenario and the structures of its objects, by ObjectId; null for one that is not collidable.
+struct LoadedStructures {
+  std::shared_ptr<const game_control::ScenarioFile> scenario;
+  std::vector<std::shared_ptr<const structures::HapticStructures>> structures;
+};
+
+/// The part of loadScene() before the scene is built, of a scenario that has been read.
+[[nodiscard]] Result<LoadedStructures> loadStructures(
+    std::shared_ptr<const game_control::ScenarioFile> scenario, const LoadOptions& options,
+    const LoadProgress& progress = {});
+
+/// [m] Bounding boxes of the meshes of each object, in its frame, by ObjectId; empty where they cannot be
+/// read. Reads every mesh and bakes nothing.
+[[nodiscard]] std::vector<Eigen::AlignedBox3d> meshBoxes(const game_control::ScenarioFile& scenario,
+                                                         const LoadOptions& options);
 
 /// Folder for data that can be generated again: $TENON_CACHE, $XDG_CACHE_HOME/tenon or ~/.cache/tenon.
 [[nodiscard]] std::filesystem::path defaultCache();

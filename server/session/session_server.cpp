@@ -318,9 +318,7 @@ Result<SessionReport> Server::finish() {
   report.run.tick = simulation_.now();
   report.run.final_hash = simulation_.hash();
   report.run.server_epoch = epoch_;
-  report.run.reason = report.run.phase == RunPhase::kSucceeded ? "everything is mounted"
-                      : report.run.phase == RunPhase::kFailed  ? "a step was not done in time"
-                                                               : "stopped";
+  report.run.reason = simulation_.over() ? publisher_.eventGenerator().runReason() : "stopped";
   if (!simulation_.over()) wire_->send(report.run);
   report.late_ticks = late_ticks_;
   report.refused_inputs = wire_->refusedInputs();

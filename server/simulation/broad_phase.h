@@ -27,7 +27,7 @@ class BroadPhase {
   void remove(ObjectId object) noexcept;
 
   /// Indices, in ascending order, of the pairs whose spheres are at most `margin` [m] plus the
-  /// largest dilation of the SDF side apart. Valid until the next call.
+  /// largest dilation apart. Valid until the next call.
   [[nodiscard]] std::span<const std::uint32_t> findPairs(double margin) noexcept;
 
  private:

@@ -15,6 +15,13 @@ constexpr double kRestoreHeadroom = 0.7;
 
 }  // namespace
 
+collision::PairFeatures featuresOf(const Scene& scene, const PairSpec& pair) {
+  const auto& a = scene.objects[pair.a.value].structures;
+  const auto& b = scene.objects[pair.b.value].structures;
+  if (!a || !b) return {};
+  return {&a->features, &b->features, &a->field, pair.most_dilation_a};
+}
+
 CollPair::CollPair(const Scene& scene, std::size_t pair) : spec_(&scene.pairs[pair]) {
   const ObjectSpec& a = scene.objects[spec_->a.value];
   const ObjectSpec& b = scene.objects[spec_->b.value];
@@ -23,6 +30,8 @@ CollPair::CollPair(const Scene& scene, std::size_t pair) : spec_(&scene.pairs[pa
   if (possible_) {
     shell_A_ = &a.structures->shell;
     field_B_ = &b.structures->field;
+    features_ = featuresOf(scene, *spec_);
+    slope_ = std::max(field_B_->slope(), features_.any() ? features_.field_A->slope() : 1.0);
   }
   enabled_ = spec_->enabled;
 }
@@ -51,10 +60,11 @@ void CollPair::reset() noexcept {
   list_->F_Ao_W = Wrench{};
 }
 
-void CollPair::query(const Pose& X_WA, const Pose& X_WB, double margin, std::uint32_t budget,
-                     std::span<const std::uint32_t> priority_points) noexcept {
-  collision::queryPair({shell_A_, field_B_, X_WA, X_WB, margin, levels_, budget, priority_points},
-                       list_->query);
+void CollPair::query(const Pose& X_WA, const Pose& X_WB, double margin, collision::FeatureScratch& scratch,
+                     std::uint32_t budget, std::span<const std::uint32_t> priority_points) noexcept {
+  const collision::PairQuery query{shell_A_, field_B_, X_WA, X_WB, margin, levels_, budget, priority_points};
+  collision::queryPair(query, list_->query);
+  collision::queryFeatures(query, features_, scratch, list_->query);
   std::fill_n(list_->multipliers.begin(), list_->query.contacts.size(), 0.0);
   list_->F_Ao_W = Wrench{};
   list_->traversal = collision::TraversalState{};
@@ -90,6 +100,7 @@ void CollPair::listTouching(TouchingPoints& points) const noexcept {
   for (const bool with_force : {true, false}) {
     for (std::size_t i = 0; i < contacts.size(); ++i) {
       const bool has_force = list_->multipliers[i] > 0.0;
+      if (contacts[i].kind != collision::ContactKind::kShellPoint) continue;
       if (has_force != with_force || (!has_force && contacts[i].gap > collision::kTouchGap)) continue;
       if (!points.push_back(contacts[i].point)) return;
     }
@@ -138,11 +149,24 @@ bool CollPair::nextLevelFits(const WorkLimits& limits, std::uint32_t budget) con
          grown.loadPercent() < limits.critical_load;
 }
 
+bool CollPair::isIndexValid(const collision::Contact& contact) const noexcept {
+  switch (contact.kind) {
+    case collision::ContactKind::kShellPoint:
+      return contact.point < shell_A_->points().size();
+    case collision::ContactKind::kFeaturePoint:
+      return features_.any() && contact.point < features_.features_B->edges().size();
+    case collision::ContactKind::kCrossing:
+      return features_.any() && contact.point < features_.features_A->edges().size() &&
+             contact.other < features_.features_B->edges().size();
+  }
+  return false;
+}
+
 bool CollPair::isValid(const collision::IslandPairResult& list) const noexcept {
   const collision::ContactList& contacts = list.query.contacts;
   return possible_ && list.secondary_planes <= contacts.size() &&
          std::all_of(contacts.begin(), contacts.end(),
-                     [this](const collision::Contact& c) { return c.point < shell_A_->points().size(); });
+                     [this](const collision::Contact& c) { return isIndexValid(c); });
 }
 
 Tick CollPair::ticksToClose(double distance, double closing_speed) noexcept {
@@ -155,20 +179,20 @@ void CollPair::schedule(Tick now, double closing_speed, double margin, double pa
   path_length_ = path_length;
   due_ = closing_speed <= 0.0
              ? kNever
-             : now + 1 + ticksToClose(gap_ - skipped_spacing_ - margin, field_B_->slope() * closing_speed);
+             : now + 1 + ticksToClose(gap_ - skipped_spacing_ - margin, slope_ * closing_speed);
 }
 
-bool CollPair::postpone(Tick now, double closing_speed, double margin, double path_length) noexcept {
-  const double slope = possible_ ? field_B_->slope() : 1.0;
-  const double remaining = gap_ - skipped_spacing_ - slope * (path_length - path_length_) - margin;
+bool CollPair::postpone(Tick now, double closing_speed, double margin, double path_length,
+                        double reach) noexcept {
+  const double remaining = gap_ - skipped_spacing_ - slope_ * (path_length - path_length_) - margin;
   if (!queried_ || remaining <= 0.0) return false;
   if (closing_speed <= 0.0) {
     due_ = kNever;
     return true;
   }
-  const Tick ticks = ticksToClose(remaining, slope * closing_speed);
-  if (ticks == 0) return false;
-  due_ = now + ticks;
+  const Tick ticks = ticksToClose(remaining, slope_ * closing_speed);
+  if (ticks == 0 && remaining <= reach) return false;
+  due_ = now + std::max<Tick>(ticks, 1);
   return true;
 }
 
@@ -178,9 +202,26 @@ collision::IslandPair CollPair::islandPair(const Pose& X_WA, const Pose& X_WB, T
   pair.field_B = field_B_;
   pair.X_WA_static = X_WA;
   pair.X_WB_static = X_WB;
+  pair.features = features_;
   pair.friction = spec_->friction.value_or(collision::Friction{});
   pair.last = solvedBefore(now);
   return pair;
+}
+
+double CollPair::findGap(const Pose& X_WA, const Pose& X_WB, double limit, collision::PairQueryResult& found,
+                         collision::FeatureScratch& scratch) const noexcept {
+  collision::PairQuery query;
+  query.shell_A = shell_A_;
+  query.field_B = field_B_;
+  query.X_WA = X_WA;
+  query.X_WB = X_WB;
+  query.margin = slope_ * limit;
+  query.levels = levels_;
+  query.list = false;
+  collision::queryPair(query, found);
+  return std::min(found.smallest_gap - found.skipped_gap_error,
+                  collision::featureGap(query, features_, scratch)) /
+         slope_;
 }
 
 }  // namespace tenon::simulation

@@ -16,13 +16,16 @@
 
 namespace tenon::simulation {
 
+/// What the second direction of a pair asks; nothing where an object has no structures.
+[[nodiscard]] collision::PairFeatures featuresOf(const Scene& scene, const PairSpec& pair);
+
 /// The state of a collision pair (paper §3.2, ii): enabled or not, the tick of its next query, and the result
 /// of the last one.
 ///
 /// Spatio-temporal coherence: no point of either object moves faster than its enforced speed cap, so a pair
 /// with smallest gap g cannot be in contact for g / (v_a + v_b). At the end of that time the path that the
-/// two have actually moved usually allows postponing the query again. A discontinuous pose change resets the
-/// pair.
+/// two have actually moved, and how far their hands can take them in this tick, usually allow postponing the
+/// query again. A discontinuous pose change resets the pair.
 ///
 /// When a query of all shell levels exceeds the pair's point budget, or its load is critical, the finest
 /// levels are skipped (graceful degradation). A level is restored after the budget has had headroom for it
@@ -85,7 +88,8 @@ class CollPair {
   // the following functions need a contact list
   /// Queries a pair that is in no island: lists contacts with gaps up to `margin` [m], testing at most
   /// `budget` points. The `priority_points` are tested even when their level is skipped.
-  void query(const Pose& X_WA, const Pose& X_WB, double margin, std::uint32_t budget = 0xFFFFFFFFU,
+  void query(const Pose& X_WA, const Pose& X_WB, double margin, collision::FeatureScratch& scratch,
+             std::uint32_t budget = 0xFFFFFFFFU,
              std::span<const std::uint32_t> priority_points = {}) noexcept;
   /// Sets the contact wrench to the penalty force at `stiffness` [N/m] of the contacts of query().
   void computePenaltyForce(double stiffness, const Pose& X_WA) noexcept;
@@ -103,12 +107,21 @@ class CollPair {
   /// accumulated path lengths of both objects.
   void schedule(Tick now, double closing_speed, double margin, double path_length) noexcept;
   /// Moves the due tick before the motion of tick `now` without a query, from the path moved since the last
-  /// one; `closing_speed` [m/s], `margin` [m] and `path_length` [m] as in schedule(). False, and no change,
-  /// when the pair has to be queried in this tick.
-  [[nodiscard]] bool postpone(Tick now, double closing_speed, double margin, double path_length) noexcept;
+  /// one; `closing_speed` [m/s], `margin` [m] and `path_length` [m] as in schedule(). In this tick the
+  /// objects approach each other by at most `reach` [m]. False, and no change, when the pair has to be
+  /// queried in this tick.
+  [[nodiscard]] bool postpone(Tick now, double closing_speed, double margin, double path_length,
+                              double reach = std::numeric_limits<double>::infinity()) noexcept;
 
   /// Input of the island solver of tick `now`, with both bodies static.
   [[nodiscard]] collision::IslandPair islandPair(const Pose& X_WA, const Pose& X_WB, Tick now) const noexcept;
+
+  /// Asks for the gap alone, for poses of this tick's start: by how much [m] the bodies may approach each
+  /// other before a point or feature touches; up to `limit` [m] as near as the fields know it, beyond that a
+  /// lower bound. Changes nothing else but `found`, where the work is counted.
+  [[nodiscard]] double findGap(const Pose& X_WA, const Pose& X_WB, double limit,
+                               collision::PairQueryResult& found,
+                               collision::FeatureScratch& scratch) const noexcept;
 
   /// Writes, reads or hashes every member that changes except `enabled`. Reading contacts acquires a list.
   template <typename Archive, typename Self>
@@ -159,6 +172,7 @@ class CollPair {
   [[nodiscard]] bool nextLevelFits(const WorkLimits& limits, std::uint32_t budget) const noexcept;
   void store(const collision::PairQueryResult& query) noexcept;
   /// Validates a list read from a checkpoint: indices in range.
+  [[nodiscard]] bool isIndexValid(const collision::Contact& contact) const noexcept;
   [[nodiscard]] bool isValid(const collision::IslandPairResult& list) const noexcept;
   /// Whole ticks in which `distance` [m] cannot be closed at `closing_speed` [m/s].
   [[nodiscard]] static Tick ticksToClose(double distance, double closing_speed) noexcept;
@@ -166,6 +180,8 @@ class CollPair {
   const PairSpec* spec_;
   const structures::Pointshell* shell_A_ = nullptr;
   const structures::DistanceField* field_B_ = nullptr;
+  collision::PairFeatures features_;
+  double slope_ = 1.0;  ///< [-] gaps change by at most this times a motion
   bool possible_ = false;
   bool enabled_ = true;
   bool queried_ = false;

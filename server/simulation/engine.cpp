@@ -10,6 +10,9 @@ namespace {
 /// and reach a second one.
 constexpr std::uint32_t kMaxHeldSteps = 4;
 
+/// [m/s] With that many of the longest steps a held body slides along others at this speed.
+constexpr double kSlidingSpeed = 1.0;
+
 std::size_t listCount(const Scene& scene, const EnvironmentOptions& options) {
   return std::min(scene.pairs.size(), options.contact_lists);
 }
@@ -17,9 +20,10 @@ std::size_t listCount(const Scene& scene, const EnvironmentOptions& options) {
 /// [m] Lower bound of the radius that scales rotations: objects without structures have a radius of 0.
 constexpr double kMinRadius = 0.01;
 
-/// The limits with SQP steps so short that all of a tick together keep to `max_speed` [m/s].
+/// The limits with SQP steps so short that all of a tick together keep to `max_speed` [m/s] and
+/// kSlidingSpeed.
 collision::SolveLimits cappedLimits(collision::SolveLimits limits, double max_speed) {
-  const double travel = max_speed * kTickSeconds;
+  const double travel = std::min(max_speed, kSlidingSpeed) * kTickSeconds;
   limits.max_steps = std::clamp(limits.max_steps, 1U, kMaxHeldSteps);
   limits.max_step_length = std::min(limits.max_step_length, travel / limits.max_steps);
   return limits;
@@ -54,10 +58,11 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
       movable(scene.objects.size(), 0),
       solved(scene.objects.size(), 0),
       has_contact(scene.objects.size(), 0),
-      has_near_pair(scene.objects.size(), 0),
+      reach(scene.objects.size(), 0.0),
       hidden(scene.objects.size(), 0),
       partition(scene.objects.size()),
       islands(maxMovable(scene), listCount(scene, options), std::max(options.workers, 1U)),
+      feature_scratch(std::max(options.workers, 1U)),
       pool(options.workers) {
   max_margin = limits.contact_margin + kMaxLookAhead + 2.0 * limits.max_step_length;
   pairs.reserve(scene.pairs.size());
@@ -65,6 +70,7 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
   separated.reserve(scene.pairs.size());
   due.reserve(contact_lists.size());
   non_island.reserve(contact_lists.size());
+  neighbours.reserve(scene.pairs.size());
   // a body has about as many contacts with a force as degrees of freedom; more contacts get no friction
   constexpr std::size_t kFrictionContactsPerObject = 16;
   friction_contacts.reserve(kFrictionContactsPerObject * scene.objects.size());

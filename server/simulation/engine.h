@@ -107,8 +107,14 @@ struct Environment::Engine {
   std::vector<std::size_t> incident_begin;  ///< by object: first entry in incident_pairs; one more at the end
   std::vector<std::optional<FreeBody>> bodies;  ///< by object; none without a mass
   std::size_t hand_count = 0;
-  collision::SolveLimits limits;  ///< of an island; its SQP steps in a tick keep to the speed cap
+  collision::SolveLimits limits;  ///< of an island; its SQP steps at contacts keep to 1 m/s
   double max_margin = 0.0;        ///< [m] largest contact margin of any query in a tick
+
+  /// Two movable bodies that may meet in this tick.
+  struct Neighbours {
+    ObjectId a, b;
+    double gap = 0.0;  ///< [m] lower bound at the tick's start
+  };
 
   // work space
   BroadPhase broad_phase;
@@ -119,16 +125,23 @@ struct Environment::Engine {
   WorkBudget budget;
   std::vector<std::uint8_t> queried;  ///< by pair: in this tick
   std::vector<FrictionContact> friction_contacts;
-  std::uint32_t without_list = 0;           ///< due pairs that got no contact list
-  std::vector<std::uint8_t> movable;        ///< by object: moved by couplings or as a free body
-  std::vector<std::uint8_t> solved;         ///< by object: movable, and all its due pairs can be queried
-  std::vector<std::uint8_t> has_contact;    ///< by object: in contact in this tick
-  std::vector<std::uint8_t> has_near_pair;  ///< by object: in a near pair that exerts forces
-  std::vector<std::uint8_t> hidden;         ///< by object, as counted in active_pairs
+  std::uint32_t without_list = 0;         ///< due pairs that got no contact list
+  std::vector<std::uint8_t> movable;      ///< by object: moved by couplings or as a free body
+  std::vector<std::uint8_t> solved;       ///< by object: movable, and all its due pairs can be queried
+  std::vector<std::uint8_t> has_contact;  ///< by object: in contact in this tick
+  /// [m] by object: at most how far any point of it goes in this tick when only its own hands, or its
+  /// inertia, move it; of the leader of an island the largest of all its bodies
+  std::vector<double> reach;
+  double largest_reach = 0.0;          ///< [m] of all objects
+  std::vector<Neighbours> neighbours;  ///< in ascending order of pairs
+  collision::PairQueryResult gap_query;
+  std::uint64_t gap_points = 0;      ///< points tested to find neighbours
+  std::vector<std::uint8_t> hidden;  ///< by object, as counted in active_pairs
   std::uint32_t active_pairs = 0;
   bool recount = true;  ///< count active_pairs anew
   IslandPartition partition;
   IslandWork islands;
+  std::vector<collision::FeatureScratch> feature_scratch;  ///< by worker, for pairs in no island
   WorkerPool pool;
 };
 

@@ -14,6 +14,10 @@ constexpr double kSphereSlack = 5e-3;
 /// a body moves far, resamples the listed points after each SQP step, and may reject a step.
 constexpr std::uint32_t kTraversalsPerTick = 3;
 
+/// [m] How far any point of a body may go in a tick beside the motion of its hand or its velocity: pushed, in
+/// a turn about a contact, or back to its hand. So a force falls by at most 1 N a tick at 1000 N/m.
+constexpr double kSpareReach = 1e-3;
+
 }  // namespace
 
 Environment::Environment(std::shared_ptr<const Scene> scene, const EnvironmentOptions& options)
@@ -83,6 +87,7 @@ void Environment::step() noexcept {
   findMovable();
   wakeTouchedBodies();
   integrateFreeMotion();
+  findReach();
   findNearPairs();
   findDuePairs();
   distributeBudget();
@@ -93,6 +98,7 @@ void Environment::step() noexcept {
   sumForces();
   updateContactFlags();
   countWork();
+  for (HandMotion& hand : hands_) hand.X_WH_before = hand.X_WH;
 }
 
 void Environment::followTrackers() noexcept {
@@ -106,8 +112,8 @@ void Environment::followTrackers() noexcept {
     object.X_WO = X_WO;
     object.V_WO = twistOver(motion, hand.object);
     engine_->addPathLength(hand.object, motion);
-    // trackers are not speed-limited: due ticks were computed with max_speed and are invalid now
-    if (speedOf(hand.object) > options_.max_speed) markDirty(hand.object);
+    // trackers are not speed-limited: due ticks were computed with the cap and are invalid now
+    if (speedOf(hand.object) > speedCap(hand.object)) markDirty(hand.object);
   }
 }
 
@@ -120,7 +126,13 @@ bool Environment::active(std::size_t pair) const noexcept {
 
 double Environment::speedCap(ObjectId object) const noexcept {
   if (!moves(object)) return 0.0;
-  return isDynamic(object) ? options_.max_free_speed : options_.max_speed;
+  if (isDynamic(object)) return options_.max_free_speed;
+  return options_.max_speed + options_.max_turn_rate * engine_->sizes[object.value].radius;
+}
+
+/// [m] That no point of the object exceeds in the solve of a tick; trackers have moved theirs before it.
+double Environment::travelCap(ObjectId object) const noexcept {
+  return engine_->movable[object.value] != 0 ? speedCap(object) * kTickSeconds : 0.0;
 }
 
 double Environment::speedOf(ObjectId object) const noexcept {
@@ -196,6 +208,36 @@ void Environment::findMovable() noexcept {
   }
 }
 
+/// [m] How far any point of a movable body moves in this tick by the motion of its hand, or by its inertia.
+double Environment::ownWay(ObjectId object) noexcept {
+  const double radius = engine_->sizes[object.value].radius;
+  if (isDynamic(object)) return kTickSeconds * maxPointSpeed(twistOfCentre(object), radius);
+  double way = 0.0;
+  int hands = 0;
+  for (std::size_t i = 0; i < hands_.size(); ++i) {
+    const HandMotion& hand = hands_[i];
+    if (scene_->hands[i].kind != HandKind::kCoupled || !engaged(hand) || hand.object != object) continue;
+    const Displacement motion =
+        displacement(hand.X_WH_before * hand.X_HO, hand.X_WH * hand.X_HO, centreOf(object));
+    way = std::max(way, maxPointMotion(motion, radius));
+    ++hands;
+  }
+  // hands in opposite directions turn the object by more than any of them moves
+  return hands > 1 ? travelCap(object) : way;
+}
+
+void Environment::findReach() noexcept {
+  Engine& engine = *engine_;
+  engine.largest_reach = 0.0;
+  for (std::uint32_t i = 0; i < objects_.size(); ++i) {
+    const ObjectId object{i};
+    engine.reach[i] = 0.0;
+    if (engine.movable[i] == 0) continue;
+    engine.reach[i] = std::min(ownWay(object) + kSpareReach, travelCap(object));
+    engine.largest_reach = std::max(engine.largest_reach, engine.reach[i]);
+  }
+}
+
 void Environment::findNearPairs() noexcept {
   Engine& engine = *engine_;
   for (std::size_t i = 0; i < objects_.size(); ++i) {
@@ -204,17 +246,13 @@ void Environment::findNearPairs() noexcept {
     if (objects_[i].status == ObjectStatus::kHidden || !scene_->objects[i].structures) {
       engine.broad_phase.remove(object);
     } else {
-      const double extra_speed = isDynamic(object) ? options_.max_free_speed - options_.max_speed : 0.0;
-      engine.broad_phase.setSphere(
-          object, objects_[i].X_WO * size.p_OQ_O,
-          size.ball_radius + 0.5 * kSphereSlack + std::max(extra_speed, 0.0) * kTickSeconds);
+      engine.broad_phase.setSphere(object, objects_[i].X_WO * size.p_OQ_O,
+                                   size.ball_radius + 0.5 * kSphereSlack + travelCap(object));
     }
   }
-  // a function of the poses alone: coherence cannot change which bodies form an island
-  const double margin = engine.max_margin + 2.0 * options_.max_speed * kTickSeconds;
   engine.separated.clear();
   std::swap(engine.separated, engine.near);
-  for (const std::uint32_t pair : engine.broad_phase.findPairs(margin)) {
+  for (const std::uint32_t pair : engine.broad_phase.findPairs(engine.max_margin)) {
     if (active(pair)) engine.near.push_back(pair);
   }
   const auto first_near =
@@ -245,7 +283,9 @@ void Environment::findDuePairs() noexcept {
     if (options_.coherence) {
       const double closing_speed = speedCap(spec.a) + speedCap(spec.b);
       if (!pair.due(tick_)) continue;
-      if (pair.postpone(tick_, closing_speed, engine.max_margin, engine.pathLengthOf(spec))) continue;
+      const double reach = std::min(travelCap(spec.a), engine.largest_reach) +
+                           std::min(travelCap(spec.b), engine.largest_reach);
+      if (pair.postpone(tick_, closing_speed, engine.max_margin, engine.pathLengthOf(spec), reach)) continue;
     }
     if (!pair.hasList()) pair.attachList(engine.contact_lists.acquire());
     if (pair.hasList()) {
@@ -270,15 +310,47 @@ void Environment::distributeBudget() noexcept {
   }
 }
 
+/// Lists the near pairs of two bodies that are both solved for, with their gaps. These are functions of the
+/// poses and of the last solve: coherence cannot change which bodies form an island.
+void Environment::findNeighbours() noexcept {
+  Engine& engine = *engine_;
+  engine.neighbours.clear();
+  engine.gap_points = 0;
+  for (const std::uint32_t i : engine.near) {
+    const CollPair& pair = engine.pairs[i];
+    const auto [a, b] = std::pair(pair.spec().a, pair.spec().b);
+    if (pair.spec().sensing || engine.solved[a.value] == 0 || engine.solved[b.value] == 0) continue;
+    const bool touches = pair.solvedBefore(tick_) != nullptr && pair.gap() <= kSpareReach;
+    double gap = pair.gap();
+    if (!touches) {
+      gap = pair.findGap(objects_[a.value].X_WO, objects_[b.value].X_WO, travelCap(a) + travelCap(b),
+                         engine.gap_query, engine.feature_scratch[0]);
+      engine.gap_points += engine.gap_query.counts.points_visited;
+    }
+    engine.neighbours.push_back({a, b, gap});
+  }
+}
+
+/// [m] At most how far any point of a body goes in this tick, as a member of its island.
+double Environment::reachOf(ObjectId object) noexcept {
+  return std::min(engine_->reach[engine_->partition.leaderOf(object).value], travelCap(object));
+}
+
+/// Bodies that may meet in this tick are in one island: what one of them does may push the others as far.
 void Environment::buildIslands() noexcept {
   Engine& engine = *engine_;
   engine.partition.reset(engine.solved);
-  std::fill(engine.has_near_pair.begin(), engine.has_near_pair.end(), std::uint8_t{0});
-  for (const std::uint32_t i : engine.near) {
-    const PairSpec& spec = engine.pairs[i].spec();
-    if (spec.sensing) continue;
-    engine.partition.join(spec.a, spec.b);
-    engine.has_near_pair[spec.a.value] = engine.has_near_pair[spec.b.value] = 1;
+  findNeighbours();
+  for (bool more = true; more;) {
+    more = false;
+    for (const auto& [a, b, gap] : engine.neighbours) {
+      const std::uint32_t one = engine.partition.leaderOf(a).value;
+      const std::uint32_t other = engine.partition.leaderOf(b).value;
+      if (one == other || gap > reachOf(a) + reachOf(b)) continue;
+      engine.partition.join(a, b);
+      engine.reach[std::min(one, other)] = std::max(engine.reach[one], engine.reach[other]);
+      more = true;
+    }
   }
   engine.partition.assignIslands();
   engine.islands.clear();
@@ -304,6 +376,9 @@ void Environment::addIsland(std::int32_t island) noexcept {
     const std::int32_t island_a = engine.partition.islandOf(a);
     const std::int32_t island_b = engine.partition.islandOf(b);
     if (pair.spec().sensing || (island_a != island && island_b != island)) continue;
+    // two islands that cannot meet in this tick
+    const bool apart = island_a != IslandPartition::kNone && island_b != IslandPartition::kNone;
+    if (apart && island_a != island_b) continue;
     collision::IslandPair one = pair.islandPair(objects_[a.value].X_WO, objects_[b.value].X_WO, tick_);
     // at larger gaps the tick of the last query depends on coherence, and results must not: no warm start
     if (pair.gap() > engine.max_margin) one.last = nullptr;
@@ -352,14 +427,14 @@ void Environment::queryNonIslandPairs() noexcept {
     }
     engine.queried[i] = 1;
   }
-  auto query = [this, limited](unsigned, std::size_t item) {
+  auto query = [this, limited](unsigned worker, std::size_t item) {
     const std::uint32_t slot = engine_->non_island[item];
     CollPair& pair = engine_->pairs[engine_->due[slot]];
     const std::uint32_t budget = engine_->budget.pointsFor(slot);
     std::span<const std::uint32_t> priority_points;
     if (limited) priority_points = {engine_->touching[slot].begin(), engine_->touching[slot].end()};
     pair.query(objects_[pair.spec().a.value].X_WO, objects_[pair.spec().b.value].X_WO,
-               engine_->limits.contact_margin, budget, priority_points);
+               engine_->limits.contact_margin, engine_->feature_scratch[worker], budget, priority_points);
     pair.adaptLevels(work_limits_, budget);
     // sensing pairs exert no force; neither do overlapping objects of which none is tracked
     const bool exerts_force = objects_[pair.spec().a.value].status == ObjectStatus::kTracked ||

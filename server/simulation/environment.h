@@ -35,6 +35,7 @@ struct HandMotion {
   ObjectId object;          ///< the object it moves; invalid: none
   Pose X_WH;                ///< newest device pose
   Twist V_WH;               ///< newest device twist
+  Pose X_WH_before;         ///< device pose of the last tick
   Pose X_HO;                ///< of the object in the hand, constant while held
   Wrench F_Ho_W;            ///< of the coupling on the hand, about the hand's origin
   ObjectId default_object;  ///< moved while the hand holds no other: pointer, drill, cube, forearm
@@ -57,7 +58,10 @@ struct PairMotion {
 struct EnvironmentOptions {
   unsigned workers = 1;  ///< threads that solve islands, the caller included; no influence on results
   collision::SolveLimits limits;
-  double max_speed = 1.0;       ///< [m/s] cap for any point of a held object (the paper's v_max)
+  /// Caps of a held object: no point of it is faster than max_speed plus max_turn_rate times its distance
+  /// from the centre of the bounding sphere. A faster hand is ahead of its object.
+  double max_speed = 4.0;       ///< [m/s]
+  double max_turn_rate = 12.0;  ///< [rad/s]
   double max_free_speed = 3.0;  ///< [m/s] cap for any point of a free body: reached after falling 0.46 m
   /// False: every near pair with a moving object is queried in every tick; changes results only with limited
   /// work.
@@ -70,6 +74,10 @@ struct EnvironmentOptions {
 /// The simulation state and its step (paper §3.2). One tick: move tracked objects to their trackers, find
 /// near (broad phase) and due (coherence) pairs, solve the contact islands for the poses of held objects and
 /// free bodies, query the due pairs in no island, sum forces.
+///
+/// An island is made of the bodies that may meet in this tick: each one's reach is bounded by its hands'
+/// goals or its velocity, and nothing takes it farther. So no body feels what those do that it cannot meet,
+/// and in free air an object takes the pose of its hand in full, up to the caps of EnvironmentOptions.
 ///
 /// A free body enters its island's problem as a spring: inertia over the tick squared, towards the pose it
 /// would have without contacts. Hands, held objects and free bodies are thus one problem, and contact forces
@@ -168,8 +176,10 @@ class Environment {
     std::uint32_t near_pairs = 0;      ///< found by the broad phase
     std::uint32_t deferred_pairs = 0;  ///< due, but without a contact list: their movable objects stood still
     std::uint32_t limited_pairs = 0;   ///< queried with skipped levels
-    double load_percent = 0.0;         ///< [%] largest load of a pair
-    bool infeasible = false;           ///< of any island: collision::SolveReport::infeasible
+    /// that the lists of queried pairs did not take: collision::QueryCounts::contacts_dropped
+    std::uint32_t contacts_dropped = 0;
+    double load_percent = 0.0;  ///< [%] largest load of a pair
+    bool infeasible = false;    ///< of any island: collision::SolveReport::infeasible
   };
   [[nodiscard]] const Work& work() const { return work_; }
 
@@ -207,6 +217,8 @@ class Environment {
   [[nodiscard]] Twist twistOfCentre(ObjectId object) const noexcept;
   [[nodiscard]] collision::MovableBody freeBody(ObjectId object) noexcept;
   void setStepLimits(std::size_t island) noexcept;
+  [[nodiscard]] double ownWay(ObjectId object) noexcept;
+  [[nodiscard]] double travelCap(ObjectId object) const noexcept;
   void updateVelocities(std::size_t island) noexcept;
   void updateSleep(std::size_t island) noexcept;
   // friction of free bodies (environment_friction.cpp)
@@ -224,10 +236,13 @@ class Environment {
   // the tick (environment.cpp)
   void followTrackers() noexcept;
   void findMovable() noexcept;
+  void findReach() noexcept;
   void findNearPairs() noexcept;
   void findDuePairs() noexcept;
   void countActivePairs() noexcept;
   void distributeBudget() noexcept;
+  void findNeighbours() noexcept;
+  [[nodiscard]] double reachOf(ObjectId object) noexcept;
   void buildIslands() noexcept;
   void addIsland(std::int32_t island) noexcept;
   void applyIslandResults() noexcept;

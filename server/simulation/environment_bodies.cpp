@@ -21,9 +21,6 @@ constexpr std::uint32_t kMinImpactSteps = 10;
 /// [-] Length of all SQP steps of a fast body over its displacement: reserve for a deflection at a contact.
 constexpr double kSpareTravel = 1.25;
 
-/// [m] Largest SQP step of islands without near pairs: the whole displacement in one step.
-constexpr double kFreeStepLength = 1.0;
-
 }  // namespace
 
 bool Environment::isDynamic(ObjectId object) const noexcept {
@@ -141,27 +138,22 @@ collision::MovableBody Environment::freeBody(ObjectId object) noexcept {
   return body;
 }
 
-/// Sets the number of SQP steps of an island with free bodies for its fastest one, and limits the travel of
-/// each of its bodies by its speed cap.
+/// Limits the travel of each body of an island by its reach, and sets the number of SQP steps of an island
+/// with free bodies for its fastest one.
 void Environment::setStepLimits(std::size_t island) noexcept {
   IslandWork& islands = engine_->islands;
   const IslandWork::Island& one = islands.islands()[island];
   double speed = 0.0;
   bool any_free = false;
-  bool near = false;
   for (std::size_t i = one.first_body; i < one.first_body + one.bodies; ++i) {
     const ObjectId object = islands.objectOf(i);
-    near = near || engine_->has_near_pair[object.value] != 0;
+    islands.body(i).max_displacement = reachOf(object);
     if (!isDynamic(object)) continue;
     speed = std::max(speed, maxPointSpeed(twistOfCentre(object), engine_->sizes[object.value].radius));
     any_free = true;
   }
   if (!any_free) return;
-  for (std::size_t i = one.first_body; i < one.first_body + one.bodies; ++i) {
-    islands.body(i).max_displacement = speedCap(islands.objectOf(i)) * kTickSeconds;
-  }
   collision::SolveLimits& limits = islands.limits(island);
-  if (!near) limits.max_step_length = kFreeStepLength;
   const double travel = kSpareTravel * std::min(speed, options_.max_free_speed) * kTickSeconds;
   limits.max_steps =
       std::max(kMinImpactSteps, static_cast<std::uint32_t>(std::ceil(travel / limits.max_step_length)));

@@ -106,6 +106,7 @@ void Environment::countWork() noexcept {
   work_.near_pairs = static_cast<std::uint32_t>(engine.near.size());
   work_.queried_pairs = static_cast<std::uint32_t>(engine.due.size());
   work_.deferred_pairs = engine.without_list;
+  work_.points_visited = engine.gap_points;
   for (const std::uint32_t i : engine.separated) updatePairMotion(i);
   for (const std::uint32_t i : engine.near) {
     CollPair& pair = engine.pairs[i];
@@ -114,6 +115,7 @@ void Environment::countWork() noexcept {
     if (engine.queried[i] == 0) continue;
     work_.load_percent = std::max(work_.load_percent, pair.counts().loadPercent());
     work_.limited_pairs += pair.skippedLevels() > 0 ? 1U : 0U;
+    work_.contacts_dropped += pair.counts().contacts_dropped;
   }
   for (const std::uint32_t slot : engine.non_island) {
     work_.points_visited += engine.pairs[engine.due[slot]].counts().points_visited;

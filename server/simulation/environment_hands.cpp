@@ -151,6 +151,7 @@ void Environment::attachHand(HandId hand) noexcept {
   }
   motion.X_OR = object.X_WO.inverse() * motion.X_WH;
   motion.attached = true;
+  motion.X_WH_before = motion.X_WH;
   updateHolder(motion.object);
   object.status =
       scene_->hands[hand.value].kind == HandKind::kTracked ? ObjectStatus::kTracked : ObjectStatus::kHeld;

@@ -21,6 +21,7 @@ void gather(const collision::ContactList& contacts, std::size_t pair, Gathered& 
   std::array<std::uint32_t, kManifoldContacts> chosen{};
   const std::size_t count = collision::selectRepresentatives(contacts, chosen);
   for (std::size_t i = 0; i < count; ++i) {
+    if (contacts[chosen[i]].gap >= collision::kDormantGap) continue;
     if (!all.contacts.push_back(contacts[chosen[i]])) return;
     all.pair[all.contacts.size() - 1] = static_cast<std::uint16_t>(pair);
   }
@@ -31,11 +32,13 @@ Vector3 velocityAt(const ObjectMotion& object, const Vector3& p_WP) {
 }
 
 /// The contact as a half-space fixed to the other body and a point fixed to the held one. When the held body
-/// is the SDF side, its point is the shell point projected onto its surface along the normal.
+/// is the one whose surface is touched, its point is the other's projected onto that surface along the
+/// normal.
 ManifoldContact manifoldContact(const collision::Contact& contact, ObjectId other_id,
-                                const ObjectMotion& other, const ObjectMotion& held, bool held_is_shell) {
-  const Vector3 n_W = held_is_shell ? contact.n_W : Vector3(-contact.n_W);
-  const Vector3 p_WP = held_is_shell ? contact.p_WP : Vector3(contact.p_WP - contact.gap * contact.n_W);
+                                const ObjectMotion& other, const ObjectMotion& held, bool held_is_a) {
+  const Vector3 n_W = held_is_a ? contact.n_W : Vector3(-contact.n_W);
+  const bool held_has_point = held_is_a != (contact.kind == collision::ContactKind::kFeaturePoint);
+  const Vector3 p_WP = held_has_point ? contact.p_WP : Vector3(contact.p_WP + contact.gap * n_W);
   const Vector3 n_A = other.X_WO.rotation().conjugate() * n_W;
   const Vector3 p_AP = other.X_WO.inverse() * p_WP;
   ManifoldContact result;
@@ -144,10 +147,10 @@ void Environment::listContacts(ObjectId object, HandManifold& out) const noexcep
   const std::size_t count = collision::selectRepresentatives(all.contacts, chosen);
   for (std::size_t i = 0; i < count; ++i) {
     const CollPair& pair = engine_->pairs[all.pair[chosen[i]]];
-    const bool held_is_shell = pair.spec().a == object;
-    const ObjectId other = held_is_shell ? pair.spec().b : pair.spec().a;
+    const bool held_is_a = pair.spec().a == object;
+    const ObjectId other = held_is_a ? pair.spec().b : pair.spec().a;
     out.contacts.push_back(manifoldContact(all.contacts[chosen[i]], other, objects_[other.value],
-                                           objects_[object.value], held_is_shell));
+                                           objects_[object.value], held_is_a));
   }
 
   // contacts that no listed one represents limit the validity of the manifold

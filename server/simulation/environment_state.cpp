@@ -9,7 +9,7 @@ namespace tenon::simulation {
 namespace {
 
 /// Incremented with every change of the archived fields.
-constexpr std::uint32_t kStateVersion = 7;
+constexpr std::uint32_t kStateVersion = 8;
 
 template <typename Archive, typename Motion>
 void archiveObject(Archive& archive, Motion& object) {
@@ -30,6 +30,7 @@ void archiveHand(Archive& archive, Motion& hand) {
   archive(hand.object);
   archive(hand.X_WH);
   archive(hand.V_WH);
+  archive(hand.X_WH_before);
   archive(hand.X_HO);
   archive(hand.X_OR);
   archive(hand.F_Ho_W);
@@ -192,8 +193,8 @@ bool Environment::isValid() const noexcept {
   });
   return work_limits_.critical_load > 0.0 && valid_objects &&
          std::all_of(hands_.begin(), hands_.end(), [&](const HandMotion& hand) {
-           return validPose(hand.X_WH) && validPose(hand.X_HO) && validPose(hand.X_OR) &&
-                  (!hand.object.valid() || isObject(hand.object)) &&
+           return validPose(hand.X_WH) && validPose(hand.X_WH_before) && validPose(hand.X_HO) &&
+                  validPose(hand.X_OR) && (!hand.object.valid() || isObject(hand.object)) &&
                   (!hand.default_object.valid() || isObject(hand.default_object));
          });
 }

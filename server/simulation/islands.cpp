@@ -30,6 +30,10 @@ void IslandPartition::join(ObjectId a, ObjectId b) noexcept {
   parent_[std::max(root_a, root_b)] = std::min(root_a, root_b);
 }
 
+ObjectId IslandPartition::leaderOf(ObjectId object) noexcept {
+  return {static_cast<std::uint32_t>(findRoot(static_cast<std::int32_t>(object.value)))};
+}
+
 void IslandPartition::assignIslands() noexcept {
   count_ = 0;
   for (std::size_t i = 0; i < parent_.size(); ++i) {

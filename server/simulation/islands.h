@@ -25,6 +25,8 @@ class IslandPartition {
   void reset(std::span<const std::uint8_t> movable) noexcept;
   /// Merges the islands of `a` and `b`. Ignored when one of them is not movable.
   void join(ObjectId a, ObjectId b) noexcept;
+  /// The movable object that stands for the island of `object`, as joined so far: the one with the lowest id.
+  [[nodiscard]] ObjectId leaderOf(ObjectId object) noexcept;
   /// Numbers islands and their bodies; to be called after join() and before the functions below.
   void assignIslands() noexcept;
 

@@ -19,7 +19,12 @@ IdType findNamed(const List& list, std::string_view name) {
 BoundingSphere boundingSphereOf(const structures::HapticStructures* structures) {
   if (structures == nullptr) return {};
   const structures::Pointshell& shell = structures->shell;
-  if (!shell.empty()) return {shell.boundingCentre(), shell.boundingRadius()};
+  if (!shell.empty()) {
+    BoundingSphere sphere{shell.boundingCentre(), shell.boundingRadius()};
+    for (const structures::ShellPoint& point : structures->features.points().points())
+      sphere.radius = std::max(sphere.radius, (point.p_MP.cast<double>() - sphere.p_OQ_O).norm());
+    return sphere;
+  }
   if (structures->field.empty()) return {};
   const Eigen::AlignedBox3d box = structures->field.box();
   return {box.center(), 0.5 * box.diagonal().norm()};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -60,6 +61,9 @@ struct PairSpec {
   /// Friction of patches inside the island solver (island_friction.cpp), replaces BodySpec::friction in this
   /// pair; none: BodySpec::friction applies.
   std::optional<collision::Friction> friction;
+  /// [m] Of the dilation of a's field so much counts for features of b: a share of the clearance, if there is
+  /// one. That of b's field is what the bake made of the place.
+  double most_dilation_a = std::numeric_limits<double>::infinity();
 };
 
 enum class HandKind : std::uint8_t {

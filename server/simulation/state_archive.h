@@ -91,6 +91,8 @@ class StateArchive {
       visit(contact.gap);
       visit(contact.area);
       visit(contact.point);
+      visit(contact.other);
+      visit(contact.kind);
       visit(result.multipliers[i]);
     }
     visit(result.query.complete_to);
@@ -99,6 +101,7 @@ class StateArchive {
     visit(result.traversal.valid);
     visit(result.traversal.X_WA);
     visit(result.traversal.X_WB);
+    visit(result.traversal.smallest_gap);
     visit(result.traversal.levels);
     visit(result.traversal.levels_used);
     visit(result.secondary_planes);

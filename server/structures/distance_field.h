@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -101,6 +102,10 @@ class DistanceField {
 
   /// [m] Dilation at a point; 0 outside the grid.
   [[nodiscard]] double dilationAt(const Vector3& p_MP) const noexcept;
+  /// [m] By how much the dilation at a point exceeds `most` [m].
+  [[nodiscard]] double dilationBeyond(double most, const Vector3& p_MP) const noexcept {
+    return most < layout_.dilation ? std::max(dilationAt(p_MP) - most, 0.0) : 0.0;
+  }
   /// [m] Largest dilation in a box, of the bricks that have samples.
   [[nodiscard]] double largestDilation(const Eigen::AlignedBox3d& box_M) const noexcept;
 

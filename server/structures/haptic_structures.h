@@ -8,6 +8,7 @@
 
 #include "idl/types/result.h"
 #include "server/structures/distance_field.h"
+#include "server/structures/feature_shell.h"
 #include "server/structures/pointshell.h"
 
 namespace tenon::structures {
@@ -28,12 +29,13 @@ struct StructureInfo {
   std::string notes;  ///< one sentence per line, to be printed (connected parts without an inside, ...)
 };
 
-/// Both haptic structures of one object: a collision pair uses the field of one object and the pointshell of
-/// the other.
+/// The haptic structures of one object: a collision pair uses the field of one object and the pointshell of
+/// the other, and the features of both.
 struct HapticStructures {
   DistanceField field;
   Pointshell shell;
   StructureInfo info;
+  FeatureShell features;
 };
 
 /// Writes a structure file, versioned, with a checksum. A regular file is written under a temporary name and

@@ -33,6 +33,35 @@ ShellBlock blockOf(std::span<const ShellSphere> spheres) {
   return block;
 }
 
+/// Shells with fewer blocks of clusters are tested cluster by cluster.
+constexpr std::size_t kManyBlocks = 8;
+
+/// A bounding sphere of spheres, about the centre of their box.
+ShellSphere boundingSphere(std::span<const ShellSphere> spheres) {
+  Eigen::AlignedBox3f box;
+  for (const ShellSphere& sphere : spheres) {
+    box.extend(sphere.p_MC - Vector3f::Constant(sphere.radius));
+    box.extend(sphere.p_MC + Vector3f::Constant(sphere.radius));
+  }
+  ShellSphere all;
+  all.p_MC = box.center();
+  for (const ShellSphere& sphere : spheres)
+    all.radius = std::max(all.radius, (sphere.p_MC - all.p_MC).norm() + sphere.radius);
+  all.radius = all.radius * 1.00001F + 1e-7F * all.p_MC.norm();
+  return all;
+}
+
+/// Bounding spheres of blocks of clusters, sixteen per block; returns their number.
+std::uint32_t appendBlockSpheres(std::span<const ShellSphere> clusters, HugeVector<ShellBlock>& to) {
+  std::vector<ShellSphere> spheres;
+  for (std::size_t c = 0; c < clusters.size(); c += ShellBlock::kLanes)
+    spheres.push_back(boundingSphere(clusters.subspan(c, std::min(clusters.size() - c, ShellBlock::kLanes))));
+  const std::span<const ShellSphere> all(spheres);
+  for (std::size_t i = 0; i < all.size(); i += ShellBlock::kLanes)
+    to.push_back(blockOf(all.subspan(i, std::min(all.size() - i, ShellBlock::kLanes))));
+  return static_cast<std::uint32_t>(all.size());
+}
+
 }  // namespace
 
 Pointshell::Pointshell(const Layout& layout, std::shared_ptr<const void> owner)
@@ -65,6 +94,8 @@ Pointshell::Pointshell(const Layout& layout, std::shared_ptr<const void> owner)
       blocks->levels.push_back(blockOf(layout_.clusters.subspan(level.first_cluster + c, count)));
     }
   }
+  if (layout_.levels.size() == 1 && blocks->levels.size() >= kManyBlocks)
+    spheres_ += appendBlockSpheres(layout_.clusters, blocks->block_spheres);
   blocks->areas = levelAreas(layout_.points, layout_.levels);
   blocks_ = std::move(blocks);
 }

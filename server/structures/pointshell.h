@@ -71,6 +71,7 @@ class Pointshell {
   /// `owner` keeps the memory of the spans alive.
   Pointshell(const Layout& layout, std::shared_ptr<const void> owner);
 
+  [[nodiscard]] const Layout& layout() const { return layout_; }
   [[nodiscard]] std::span<const ShellPoint> points() const { return layout_.points; }
   [[nodiscard]] std::span<const ShellSphere> leaves() const { return layout_.leaves; }
   [[nodiscard]] std::span<const ShellSphere> clusters() const { return layout_.clusters; }
@@ -87,6 +88,9 @@ class Pointshell {
   [[nodiscard]] std::uint32_t leafOf(std::size_t point) const { return blocks_->leaf_of_point[point]; }
   /// The clusters of all levels, sixteen per block; each level begins a new block.
   [[nodiscard]] std::span<const ShellBlock> clusterBlocks() const { return blocks_->levels; }
+  /// Bounding spheres of the blocks of clusterBlocks(), sixteen per block. Empty for small shells, where
+  /// testing all clusters costs no more, and for shells of several levels.
+  [[nodiscard]] std::span<const ShellBlock> blockSpheres() const { return blocks_->block_spheres; }
 
   /// [m^2] The area that each point of levels 0..k represents when finer levels are skipped (levelAreas).
   [[nodiscard]] std::span<const float> areasOfLevel(std::size_t k) const { return blocks_->areas[k]; }
@@ -103,7 +107,7 @@ class Pointshell {
 
  private:
   struct Blocks {
-    HugeVector<ShellBlock> leaves, clusters, levels;
+    HugeVector<ShellBlock> leaves, clusters, levels, block_spheres;
     HugeVector<std::uint32_t> leaf_of_point;
     std::vector<std::vector<float>> areas;  ///< [m^2] by level
   };

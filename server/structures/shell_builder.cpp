@@ -95,9 +95,9 @@ ShellSphere boundingSphere(std::span<const ShellPoint> points) {
   return sphere;
 }
 
+/// Appends a level with the samples `numbers`, which are sorted into runs.
 ShellLevel appendLevel(ShellStorage& storage, std::span<const SurfaceSample> samples,
-                       std::vector<std::uint32_t> numbers) {
-  sortIntoRuns(samples, numbers);
+                       std::span<const std::uint32_t> numbers) {
   ShellLevel level;
   level.first_point = static_cast<std::uint32_t>(storage.points.size());
   level.first_leaf = static_cast<std::uint32_t>(storage.leaves.size());
@@ -136,6 +136,11 @@ Pointshell makeShell(ShellStorage storage) {
   return {owner->layout(), owner};
 }
 
+FeatureShell makeFeatureShell(FeatureStorage storage) {
+  auto edges = std::make_shared<const HugeVector<FeatureEdge>>(std::move(storage.edges));
+  return {makeShell(std::move(storage.points)), *edges, edges};
+}
+
 Pointshell buildShell(std::span<const SurfaceSample> samples, double spacing) {
   if (samples.empty()) return {};
   const double area =
@@ -145,9 +150,10 @@ Pointshell buildShell(std::span<const SurfaceSample> samples, double spacing) {
   if (spacing <= 0.0) spacing = 1e-3;
 
   ShellStorage storage;
-  const auto added = sortIntoLevels(samples, spacing);
+  auto added = sortIntoLevels(samples, spacing);
   double used_area = 0.0;
   for (std::size_t k = 0; k < added.size(); ++k) {
+    sortIntoRuns(samples, added[k]);
     for (const std::uint32_t i : added[k]) used_area += samples[i].area;
     ShellLevel level = appendLevel(storage, samples, added[k]);
     level.spacing = static_cast<float>(spacing * std::exp2(added.size() - 1 - k));
@@ -155,6 +161,19 @@ Pointshell buildShell(std::span<const SurfaceSample> samples, double spacing) {
     storage.levels.push_back(level);
   }
   return makeShell(std::move(storage));
+}
+
+ShellStorage buildFlatShell(std::span<const SurfaceSample> samples, double spacing,
+                            std::vector<std::uint32_t>& order) {
+  order.resize(samples.size());
+  std::iota(order.begin(), order.end(), 0U);
+  ShellStorage storage;
+  if (samples.empty()) return storage;
+  sortIntoRuns(samples, order);
+  ShellLevel level = appendLevel(storage, samples, order);
+  level.spacing = static_cast<float>(spacing);
+  storage.levels.push_back(level);
+  return storage;
 }
 
 }  // namespace tenon::structures

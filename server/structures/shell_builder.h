@@ -1,7 +1,9 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
+#include "server/structures/feature_shell.h"
 #include "server/structures/huge_pages.h"
 #include "server/structures/pointshell.h"
 
@@ -20,6 +22,15 @@ struct ShellStorage {
 /// A pointshell that owns the given arrays, which are sound (structure_checks.h).
 [[nodiscard]] Pointshell makeShell(ShellStorage storage);
 
+/// The arrays of a feature shell under construction.
+struct FeatureStorage {
+  ShellStorage points;
+  HugeVector<FeatureEdge> edges;  ///< of each point
+};
+
+/// A feature shell that owns the given arrays, which are sound (structure_checks.h).
+[[nodiscard]] FeatureShell makeFeatureShell(FeatureStorage storage);
+
 /// A sample of the surface, not yet sorted into levels.
 struct SurfaceSample {
   Vector3 p_MP = Vector3::Zero();
@@ -37,5 +48,10 @@ struct SurfaceSample {
 ///
 /// Threads: pure. Real-time: no.
 [[nodiscard]] Pointshell buildShell(std::span<const SurfaceSample> samples, double spacing = 0.0);
+
+/// The arrays of a shell with all samples in one level, which a query never skips; `spacing` [m] is stored.
+/// Sample `order[i]` becomes point i.
+[[nodiscard]] ShellStorage buildFlatShell(std::span<const SurfaceSample> samples, double spacing,
+                                          std::vector<std::uint32_t>& order);
 
 }  // namespace tenon::structures

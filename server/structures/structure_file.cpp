@@ -22,7 +22,7 @@ namespace tenon::structures {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'T', 'E', 'N', 'O', 'N', 'H', 'S', '\n'};
-constexpr std::uint32_t kVersion = 4;
+constexpr std::uint32_t kVersion = 6;
 constexpr std::uint32_t kByteOrder = 0x01020304U;
 constexpr std::size_t kAlignment = 64;
 
@@ -40,6 +40,11 @@ enum FileSection : std::size_t {
   kNotes,
   kMeshes,
   kDilations,
+  kFeaturePoints,
+  kFeatureLeaves,
+  kFeatureClusters,
+  kFeatureLevels,
+  kFeatureEdges,
   kSections
 };
 constexpr std::array<std::size_t, kSections> kElementBytes{sizeof(DistanceField::Entry),
@@ -53,7 +58,12 @@ constexpr std::array<std::size_t, kSections> kElementBytes{sizeof(DistanceField:
                                                            1,
                                                            1,
                                                            1,
-                                                           sizeof(float)};
+                                                           sizeof(float),
+                                                           sizeof(ShellPoint),
+                                                           sizeof(ShellSphere),
+                                                           sizeof(ShellSphere),
+                                                           sizeof(ShellLevel),
+                                                           sizeof(FeatureEdge)};
 
 struct FileHeader {
   std::array<char, 8> magic = kMagic;
@@ -71,7 +81,8 @@ struct FileHeader {
   std::array<double, 6> box_M{};
 };
 static_assert(std::is_trivially_copyable_v<FileHeader>);
-static_assert(sizeof(ShellPoint) == 28 && sizeof(ShellSphere) == 24 && sizeof(ShellLevel) == 32);
+static_assert(sizeof(ShellPoint) == 28 && sizeof(ShellSphere) == 24 && sizeof(ShellLevel) == 32 &&
+              sizeof(FeatureEdge) == 36);
 
 std::uint64_t aligned(std::uint64_t offset) { return (offset + kAlignment - 1) / kAlignment * kAlignment; }
 
@@ -105,10 +116,25 @@ std::array<std::span<const std::byte>, kSections> sectionsOf(const HapticStructu
   const auto bytes = [](const auto& list) { return std::as_bytes(std::span(list.data(), list.size())); };
   const DistanceField::Layout& field = structures.field.layout();
   const Pointshell& shell = structures.shell;
+  const Pointshell& features = structures.features.points();
   const StructureInfo& info = structures.info;
-  return {bytes(field.index),       bytes(field.samples),    bytes(field.far),      bytes(shell.points()),
-          bytes(shell.leaves()),    bytes(shell.clusters()), bytes(shell.levels()), bytes(info.source),
-          bytes(info.content_hash), bytes(info.notes),       bytes(meshes),         bytes(field.dilations)};
+  return {bytes(field.index),
+          bytes(field.samples),
+          bytes(field.far),
+          bytes(shell.points()),
+          bytes(shell.leaves()),
+          bytes(shell.clusters()),
+          bytes(shell.levels()),
+          bytes(info.source),
+          bytes(info.content_hash),
+          bytes(info.notes),
+          bytes(meshes),
+          bytes(field.dilations),
+          bytes(features.points()),
+          bytes(features.leaves()),
+          bytes(features.clusters()),
+          bytes(features.levels()),
+          bytes(structures.features.edges())};
 }
 
 FileHeader headerOf(const HapticStructures& structures) {
@@ -239,8 +265,10 @@ Result<void> writeStructures(const std::filesystem::path& file, const HapticStru
     return fail(file.string() + ": not written, since it could not be read again: its " + what);
   };
   if (const auto problem = problemOf(structures.field.layout())) return refused("field " + *problem);
-  if (const auto problem = problemOf({shell.points(), shell.leaves(), shell.clusters(), shell.levels()}))
-    return refused("pointshell " + *problem);
+  if (const auto problem = problemOf(shell.layout())) return refused("pointshell " + *problem);
+  const FeatureShell& features = structures.features;
+  if (const auto problem = problemOf(features.points().layout(), features.edges()))
+    return refused("feature shell " + *problem);
   FileHeader header = headerOf(structures);
   const std::string meshes = meshesFrom(file, structures.info);
   const auto sections = sectionsOf(structures, meshes);
@@ -301,16 +329,25 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
   copySection(bytes, *header, kLeaves, shell.leaves);
   copySection(bytes, *header, kClusters, shell.clusters);
   copySection(bytes, *header, kLevels, shell.levels);
+  FeatureStorage features;
+  copySection(bytes, *header, kFeaturePoints, features.points.points);
+  copySection(bytes, *header, kFeatureLeaves, features.points.leaves);
+  copySection(bytes, *header, kFeatureClusters, features.points.clusters);
+  copySection(bytes, *header, kFeatureLevels, features.points.levels);
+  copySection(bytes, *header, kFeatureEdges, features.edges);
   const auto damaged = [&name](const std::string& what) {
     return fail(name + ": its " + what + "; bake it again");
   };
   if (const auto problem = problemOf(shell.layout())) return damaged("pointshell " + *problem);
+  if (const auto problem = problemOf(features.points.layout(), features.edges))
+    return damaged("feature shell " + *problem);
   if (!infoIsFinite(*header)) return damaged("header has a number that is not finite");
   auto structures = std::make_shared<HapticStructures>();
   const bool has_field = !field.index.empty() || !field.samples.empty() || !field.far.empty();
   if (has_field) structures->field = makeField(std::move(field));
   if (const auto problem = problemOf(structures->field.layout())) return damaged("field " + *problem);
   structures->shell = makeShell(std::move(shell));
+  structures->features = makeFeatureShell(std::move(features));
   StructureInfo& info = structures->info;
   info.source = text(bytes, *header, kSource);
   info.content_hash = text(bytes, *header, kContentHash);

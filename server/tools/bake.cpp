@@ -145,6 +145,11 @@ void printInfo(const structures::HapticStructures& structures) {
   fmt::print("shell         {} points on {:.4g} m^2, {} leaves, {} clusters, radius {}\n",
              structures.shell.points().size(), info.surface_area, structures.shell.leaves().size(),
              structures.shell.clusters().size(), readable(structures.shell.boundingRadius()));
+  const auto edges = structures.features.edges();
+  const auto pieces = std::count_if(
+      edges.begin(), edges.end(), [](const structures::FeatureEdge& edge) { return !edge.half_M.isZero(); });
+  fmt::print("features      {} points, {} of them on edges in pieces of up to {}\n", edges.size(), pieces,
+             readable(2.0 * structures.features.longestHalf()));
   std::size_t used = 0;
   for (std::size_t k = 0; k < structures.shell.levels().size(); ++k) {
     const structures::ShellLevel& level = structures.shell.levels()[k];

@@ -28,6 +28,13 @@ TEST(Catalog, AnUnknownNameFailsWithAListOfTheKnownNames) {
   EXPECT_THAT(pair.error().what, HasSubstr("hug-sim"));
 }
 
+TEST(Catalog, TellsTheCapabilitiesOfADevice) {
+  EXPECT_DOUBLE_EQ(capsOf("hug-sim")->rotation_range, 2.6);
+  EXPECT_DOUBLE_EQ(capsOf("sigma7-sim")->rotation_range, 1.2);
+  EXPECT_DOUBLE_EQ(capsOf("omega3-sim")->rotation_range, 0.0) << "it does not turn";
+  EXPECT_FALSE(capsOf("sigma8"));
+}
+
 TEST(Catalog, ABimanualDeviceIsNotOpenedForOneHand) {
   const auto device = openDevice("hug-sim");
   ASSERT_FALSE(device);

@@ -21,6 +21,7 @@ SimulatedModel frictionlessMass() {
   model.caps.model = "frictionless mass";
   model.caps.dof_mask = kAllDofs;
   model.caps.workspace_radius = 1.0;
+  model.caps.rotation_range = 3.0;
   model.caps.peak_force = 100.0;
   model.caps.torque = 10.0;
   model.mass = 0.45;

@@ -208,7 +208,7 @@ class RealTime(DemoCase):
         said += demo.communicate(timeout=120)[0]
         self.assertEqual(demo.returncode, 1, said)
         server = (self.folder / "out" / "serve.log").read_text(encoding="utf-8")
-        ended = re.search(r"(?m)^a step was not done in time after .*$", server)
+        ended = re.search(r"(?m)^step '[a-z_]+' was not done in time: .* after .*$", server)
         self.assertTrue(ended, server)
         self.assertIn(ended[0], said.splitlines())
         self.assertIn(": failed after ", said)

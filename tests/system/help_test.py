@@ -37,7 +37,7 @@ class Help(unittest.TestCase):
                 self.assertIn("--session", done.stdout)
 
     def test_an_unknown_option_is_wrong_usage(self):
-        for verb in ("serve", "record", "report", "rehearse", "parts", "command", "bake", "probe", "contact", "voxels"):
+        for verb in ("serve", "check", "record", "report", "rehearse", "parts", "command", "bake", "probe", "contact", "voxels"):
             with self.subTest(verb=verb):
                 self.assertEqual(tenon(verb, "--fly").returncode, 2)
         for role in ("trainee", "instructor", "observer"):
@@ -64,6 +64,8 @@ TABLE = (
     (2, ["serve", SCENARIO, "--workers", 0], "--workers"),
     (2, ["serve", SCENARIO, "--domain", 500], "--domain"),
     (1, ["serve", "nosuch"], "nosuch"),
+    (2, ["check"], "scenario is required"),
+    (2, ["check", SCENARIO, "--device", "nosuch"], "--device: unknown device 'nosuch'"),
     (2, ["command"], "no command given"),
     (2, ["command", "foo"], "unknown command 'foo'"),
     (2, ["command", "signal"], "usage: signal NAME"),

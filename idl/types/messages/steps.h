@@ -59,8 +59,8 @@ struct ConditionValue {
 
 /// How far the current step is fulfilled.
 struct StepProgress {
-  std::uint32_t revision = 0;  ///< of the StepState
-  Tick tick = 0;
+  std::uint32_t revision = 0;    ///< of the StepState
+  Tick tick = 0;                 ///< that it was sent in; the values are those at its beginning
   double position_error = 0.0;   ///< [m] of the object from its target
   double angle_error = 0.0;      ///< [rad] of the object from its target
   double contact_seconds = 0.0;  ///< [s] of contact of the object in this step

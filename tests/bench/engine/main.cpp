@@ -15,6 +15,7 @@
 #include "server/session/scene_loader.h"
 #include "tests/bench/engine/bench_scene.h"
 #include "tests/bench/engine/corner_path.h"
+#include "tests/bench/engine/feature_table.h"
 #include "tests/bench/engine/heap_table.h"
 #include "tests/bench/engine/insertion.h"
 #include "tests/bench/engine/methods.h"
@@ -94,6 +95,12 @@ class Bench {
     if (wants("many_bodies")) add(manyBodiesTable(printProgress));
     if (wants("heaps")) add(heapsTable(printProgress));
     if (wants("overload")) add(overloadTable(printProgress));
+    if (wants("both_sides")) {
+      const auto both_sides = featureTable(arguments_.scenario, arguments_.cache, arguments_.detail,
+                                           arguments_.rounds, printProgress);
+      if (!both_sides) return fail(both_sides.error().what);
+      add(*both_sides);
+    }
     if (wants("insertion")) {
       const auto insertion =
           rehearseInsertion(arguments_.scenario, arguments_.cache, arguments_.detail, printProgress);
@@ -149,10 +156,11 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   app.add_option("--only", arguments.only,
-                 "tables to produce: bake, query, truth, methods, many_bodies, heaps, overload, insertion "
+                 "tables to produce: bake, query, truth, methods, many_bodies, heaps, overload, both_sides, "
+                 "insertion "
                  "(default: all)")
-      ->check(CLI::IsMember(
-          {"bake", "query", "truth", "methods", "many_bodies", "heaps", "overload", "insertion"}));
+      ->check(CLI::IsMember({"bake", "query", "truth", "methods", "many_bodies", "heaps", "overload",
+                             "both_sides", "insertion"}));
   app.add_option("--json", arguments.json, "write the tables to this file as JSON");
   app.add_option("--figures", arguments.figures,
                  "write a report page with force, penetration, load and computation time of the insertion");

@@ -36,7 +36,7 @@ FieldSize estimated(const TriangleMesh& mesh, const BakeOptions& options) {
   return estimateSize(WeldedMesh(mesh).triangles, options);
 }
 
-TEST(FieldSize, IsThatOfTheBakedFieldWhateverTheShape) {
+TEST(FieldSizeTruth, IsThatOfTheBakedFieldWhateverTheShape) {
   const TriangleMesh ball = test::ballMesh(0.05, 4);
   const TriangleMesh box = test::boxMesh(Vector3(-0.04, -0.03, -0.02), Vector3(0.04, 0.03, 0.021));
   const TriangleMesh sheet = test::sheetMesh(0.05, 0.013, 20);
@@ -115,7 +115,7 @@ TEST(FieldSize, AMeshTooLargeForItsVoxelsIsRefusedWithoutOverflow) {
   }
 }
 
-TEST(FieldSize, TheSuggestedVoxelFits) {
+TEST(FieldSizeTruth, TheSuggestedVoxelFits) {
   const TriangleMesh ball = test::ballMesh(0.05, 4);
   FieldLimits limits;
   limits.level_bricks = 2000;
@@ -137,7 +137,7 @@ Result<BakedField> bakeWithin(const FieldLimits& limits, const BakeOptions& opti
 }
 
 // An estimate refuses what is certainly too large; what is nearly so is counted.
-TEST(FieldSize, ABakeJustTooLargeForItsReaderIsRefusedWithTheNumber) {
+TEST(FieldSizeTruth, ABakeJustTooLargeForItsReaderIsRefusedWithTheNumber) {
   BakeOptions options = withVoxel(0.002);
   options.refine = {{{Vector3::Zero(), Vector3::Constant(0.06)}}};
   const auto whole = bakeWithin({}, options);

@@ -15,6 +15,7 @@ namespace {
 using test::smallScenario;
 using test::smallStructures;
 using test::with;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 
 ScenarioFile parsed(const std::string& text) { return parseScenario(text, "small/scenario.yaml").value(); }
@@ -61,7 +62,8 @@ TEST(SceneBuilder, ASolidResolvesAClearanceOfFourFifthsOfAVoxel) {
   const auto refused = withClearance("0.7 mm");
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().what, HasSubstr("small/scenario.yaml:11: clearance of bay-pointer (0.7 mm)"));
-  EXPECT_THAT(refused.error().what, HasSubstr("needs 0.8 mm there); use voxel 0.87 mm or refinement 2"));
+  EXPECT_THAT(refused.error().what, HasSubstr("needs 0.8 mm there); use voxel 0.87 mm or a box in 'refine' around the "
+                                             "place, with refinement 2"));
   const auto accepted = withClearance("0.8 mm");
   EXPECT_TRUE(accepted) << accepted.error().what;
 }
@@ -79,6 +81,55 @@ TEST(SceneBuilder, AThinWallResolvesAClearanceOfFourTimesItsDilation) {
                         "resolve (voxel 1 mm / 4 needs 2.4 mm there)"));
   const auto accepted = withClearance("clearance: 2.41 mm");
   EXPECT_TRUE(accepted) << accepted.error().what;
+}
+
+TEST(SceneBuilder, AHintNamesARefinementOnlyWhereAFinerOneIsLeft) {
+  const auto hint = [](const std::string& refinement) {
+    auto structures = test::smallStructures();
+    structures[0] = test::dilated(structures[0], 0.0006);
+    std::string text = test::with(test::smallScenario(), "clearance: 4 mm", "clearance: 2.3 mm");
+    text = test::with(text, "voxel: 1 mm, refinement: 4", "voxel: 1 mm, refinement: " + refinement);
+    const auto scene = makeScene(parsed(text), structures);
+    return scene ? std::string() : scene.error().what;
+  };
+  EXPECT_THAT(hint("4"), EndsWith("; use voxel 0.95 mm or refinement 8"));
+  EXPECT_THAT(hint("8"), EndsWith("; use voxel 0.95 mm"));
+}
+
+//   |_lid_|   mounted second, on the part
+//   | part |  mounted first
+//   |__bay_|
+TEST(SceneBuilder, InAChainWhatIsMountedFirstIsRefinedWhereTheOtherOneComes) {
+  std::string text = test::with(test::smallScenario(), "hands:\n",
+                                "  - {name: lid, meshes: [{part: lid}], structures: {voxel: 2 mm}, start: "
+                                "{at: [0.4, 0, 0.1]}}\nhands:\n");
+  text = test::with(text, "pairs:\n", "pairs:\n  - {between: [lid, part], clearance: 4 mm}\n");
+  text += R"(  - name: cover
+    hands: {right: lid}
+    object: lid
+    target: {at: [0, 0, 20 mm]}
+    approach: {direction: [0, 0, -1], distance: 50 mm}
+)";
+  const ScenarioFile scenario = parsed(text);
+  const ObjectId lid = scenario.objectNamed("lid");
+  const ObjectId part = scenario.objectNamed("part");
+  const auto pair = static_cast<std::size_t>(scenario.pairOf(lid, part));
+  EXPECT_EQ(sdfSideByTarget(scenario, scenario.pairs[pair]), part);
+  auto structures = test::smallStructures();
+  structures.push_back(structures[1]);
+  const auto boxes_O = refineBoxes(scenario, part, structures);
+  ASSERT_EQ(boxes_O.size(), 1U);
+  EXPECT_TRUE(boxes_O[0].contains(Vector3(0, 0, 0.04))) << "where the lid is, seen from the mounted part";
+  EXPECT_FALSE(boxes_O[0].contains(Vector3(-0.2, 0, -0.08))) << "the same, seen from where the part was";
+  const auto scene = makeScene(scenario, structures);
+  ASSERT_TRUE(scene) << scene.error().what;
+  EXPECT_EQ((*scene)->pairs[pair].b, part);
+  const std::vector<ObjectId> order = bakeOrder(scenario);
+  const auto position = [&](const char* name) {
+    return std::find(order.begin(), order.end(), scenario.objectNamed(name)) - order.begin();
+  };
+  EXPECT_LT(position("lid"), position("part"));
+  EXPECT_LT(position("part"), position("bay"));
 }
 
 TEST(SceneBuilder, RequiresStructuresOfCollidableObjects) {

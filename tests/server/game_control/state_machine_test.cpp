@@ -204,7 +204,8 @@ TEST(StateMachine, DescribesTheStateAndItsProgress) {
   EXPECT_EQ(step.approach_W, Vector3(0, 0, -1));
   EXPECT_DOUBLE_EQ(step.timeout, 2.0);
   EXPECT_EQ(step.hand, HandId{0});
-  const StepProgress report = progress(fixture.scenario(), fixture.status());
+  const StepProgress report = progress(fixture.scenario(), fixture.status(), 7);
+  EXPECT_EQ(report.tick, 7U);
   ASSERT_EQ(report.conditions.size(), 1U);
   EXPECT_EQ(report.conditions[0].text, "pose of part");
   EXPECT_DOUBLE_EQ(report.conditions[0].value, report.position_error);

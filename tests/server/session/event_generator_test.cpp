@@ -1,6 +1,8 @@
 #include "server/session/event_generator.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <set>
 #include <string>
 #include <vector>
@@ -8,6 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/session/step_blocker.h"
 #include "tests/server/session/small_session.h"
 
 namespace tenon::session {
@@ -93,6 +96,62 @@ TEST(EventGenerator, EveryGrabHasThePoseOfTheObjectInTheHand) {
   });
   ASSERT_NE(part, generated.grabs.end());
   EXPECT_NEAR(part->X_HO.translation().z(), -0.029, 1e-3);
+}
+
+//     ___
+//    |   |  the part, 8 mm beside the socket, is pressed on its upper side: 40 mm above its place and 8 mm
+//    beside it
+//   _|___|___
+//    |    |
+TEST(EventGenerator, AStepThatTimesOutSaysWhatHoldsItsObjectAndWhere) {
+  test::SessionRig rig;
+  EventGenerator generator(rig.loaded().scenario, kEpoch);
+  GeneratedEvents generated;
+  Vector3 p_WH(0.2, 0, 0.2);
+  const auto moveTo = [&](const Vector3& to, int ticks) {
+    const Vector3 from = p_WH;
+    for (int tick = 1; tick <= ticks; ++tick) {
+      p_WH = from + (to - from) * (static_cast<double>(tick) / ticks);
+      rig.move(kRightHand, p_WH);
+      generated.add(generator.generate(rig.tick()));
+    }
+  };
+  rig.attach(kRightHand, p_WH);
+  moveTo({0.2, 0, 0.129}, 240);
+  moveTo({0.2, 0, 0.129}, 460);  // it is taken
+  moveTo({0.2, 0, 0.18}, 200);
+  moveTo({0.008, 0, 0.08}, 700);
+  moveTo({0.008, 0, 0.035}, 300);  // 14 mm deeper than it can go
+  moveTo({0.008, 0, 0.035}, 1500);
+  ASSERT_EQ(generated.runs.back().phase, RunPhase::kFailed);
+  const std::string& reason = generated.runs.back().reason;
+  EXPECT_EQ(generator.runReason(), reason);
+  double distance = 0.0, x = 0.0, y = 0.0, z = 0.0;
+  ASSERT_EQ(std::sscanf(reason.c_str(),
+                        "step 'mount' was not done in time: part is held %lf mm from its place by bay, at "
+                        "(%lf, %lf, %lf) mm",
+                        &distance, &x, &y, &z),
+            4)
+      << reason;
+  EXPECT_NEAR(distance, std::hypot(40.0, 8.0), 0.5);
+  EXPECT_NEAR(z, 0.0, 0.5);
+  EXPECT_THAT(generated.texts("not in time"), ElementsAre(HasSubstr("part is held ")));
+}
+
+TEST(EventGenerator, AStepThatTimesOutWithoutATouchSaysSo) {
+  test::SessionRig rig;
+  EventGenerator generator(rig.loaded().scenario, kEpoch);
+  TickOutput output = rig.tick();
+  output.step.step = 1;
+  output.step.position_error = 0.1;
+  output.step.angle_error = 0.2;
+  EXPECT_EQ(whatBlocks(*rig.loaded().scenario, output),
+            "part is 100 mm and turned by 11.5 deg from its place, and touches nothing");
+  output.step.position_error = 0.001;
+  EXPECT_EQ(whatBlocks(*rig.loaded().scenario, output),
+            "part is turned by 11.5 deg from its place, and touches nothing");
+  output.step.step = 0;
+  EXPECT_EQ(whatBlocks(*rig.loaded().scenario, output), "part was not touched");
 }
 
 TEST(EventGenerator, EveryObjectHasASnapshotWithinASecond) {

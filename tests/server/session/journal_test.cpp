@@ -207,7 +207,9 @@ TEST_F(JournalTest, AFileThatIsNoJournalIsAnErrorThatNamesIt) {
   EXPECT_FALSE(Journal::open(file_ / "in a file" / "session.mcap", {}));
 }
 
-TEST_F(JournalTest, DamagedBytesAreReportedOrSkippedAndNeverADifference) {
+class JournalDamage : public JournalTest {};
+
+TEST_F(JournalDamage, DamagedBytesAreReportedOrSkippedAndNeverADifference) {
   write();
   const auto size = static_cast<std::streamoff>(fs::file_size(file_));
   std::uint64_t compared = 0;
@@ -283,7 +285,7 @@ void restoreDamaged(const LoadedScene& loaded, std::uint64_t rounds) {
   EXPECT_GT(accepted, rounds / 10) << "damage of positions and times is not detectable";
 }
 
-TEST_F(JournalTest, ADamagedCheckpointIsRefusedOrGoesOn) { restoreDamaged(loaded_, 1000); }
+TEST_F(JournalDamage, ADamagedCheckpointIsRefusedOrGoesOn) { restoreDamaged(loaded_, 1000); }
 
 /// Writes entries as a Journal does, and damages the data of one message before the file gets its checksums.
 void writeDamaged(const fs::path& file, const std::vector<JournalEntry>& entries, std::uint64_t seed) {
@@ -344,7 +346,7 @@ void resimulateDamaged(const fs::path& file, const LoadedScene& loaded, std::uin
   EXPECT_GT(different, rounds / 10) << "a changed number of an input is a difference at its tick";
 }
 
-TEST_F(JournalTest, DamageBehindRightChecksumsIsRefusedOrADifference) {
+TEST_F(JournalDamage, DamageBehindRightChecksumsIsRefusedOrADifference) {
   resimulateDamaged(file_, loaded_, 500);
 }
 

@@ -29,6 +29,9 @@ TEST(Publisher, EachRateTierHasItsPeriod) {
     sent["30"] += !outgoing.frames_30.empty();
     sent["stats"] += outgoing.stats.has_value();
     sent["progress"] += outgoing.progress.has_value();
+    if (outgoing.progress) {
+      EXPECT_EQ(outgoing.progress->tick, outgoing.frames_30[0].tick);
+    }
     sent["manifolds"] += static_cast<int>(outgoing.manifolds.size());
   }
   EXPECT_EQ(sent,

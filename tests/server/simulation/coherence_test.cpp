@@ -1,3 +1,4 @@
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -73,8 +74,13 @@ TEST(Coherence, NoContactOfTheEndsOfATurningRodIsMissed) {
 
 TEST(Coherence, ThePointsOfARodKeepTheSpeedCapAssumedByCoherence) {
   const RodAndPosts rig;
-  Environment environment(rig.scene, {});
-  const double cap = EnvironmentOptions{}.max_speed * kTickSeconds;
+  EnvironmentOptions options;
+  options.max_speed = 0.1;
+  options.max_turn_rate = 1.0;
+  Environment environment(rig.scene, options);
+  // the rod's bounding ball reaches to its corners
+  const double cap =
+      (options.max_speed + options.max_turn_rate * 0.5 * Vector3(0.6, 0.02, 0.02).norm()) * kTickSeconds;
   double farthest = 0.0;
   for (int tick = 0; tick < 2000; ++tick) {
     const Pose before = environment.objects()[rig.rod.value].X_WO;
@@ -90,7 +96,8 @@ TEST(Coherence, ThePointsOfARodKeepTheSpeedCapAssumedByCoherence) {
   EXPECT_GT(farthest, 0.9 * cap) << "the hand moves faster than the cap";
 }
 
-// gap / (v_a + v_b): half as many ticks when both objects move.
+// gap / (v_a + v_b): half as many ticks when both objects move. A cap is that of the centre and that of the
+// rotation times the radius.
 TEST(Coherence, APairIsSkippedForItsGapOverTheSumOfSpeedCaps) {
   test::SmallScene small;
   const ObjectId left = small.object("left", test::cubeShape(), {0.0, 0.0, 0.0});
@@ -113,10 +120,13 @@ TEST(Coherence, APairIsSkippedForItsGapOverTheSumOfSpeedCaps) {
   };
   test::activateHand(environment, left_hand, {0.0, 0.0, 0.0});
   environment.step();
-  EXPECT_NEAR(static_cast<double>(environment.pairs()[pair].due - environment.tick()), expected(1.0), 1.0);
+  const EnvironmentOptions caps;
+  const double cap = caps.max_speed + caps.max_turn_rate * 0.5 * std::sqrt(3.0) * kCubeEdge;
+  EXPECT_NEAR(static_cast<double>(environment.pairs()[pair].due - environment.tick()), expected(cap), 1.0);
   test::activateHand(environment, right_hand, {test::kCubeEdge + 0.02, 0.0, 0.0});
   environment.step();
-  EXPECT_NEAR(static_cast<double>(environment.pairs()[pair].due - environment.tick()), expected(2.0), 1.0);
+  EXPECT_NEAR(static_cast<double>(environment.pairs()[pair].due - environment.tick()), expected(2.0 * cap),
+              1.0);
 }
 
 TEST(Groups, CanBeChangedBetweenTicks) {

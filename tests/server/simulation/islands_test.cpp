@@ -1,6 +1,7 @@
 #include "server/simulation/islands.h"
 
 #include <array>
+#include <memory>
 
 #include <gtest/gtest.h>
 
@@ -59,6 +60,7 @@ class CollPairTest : public testing::Test {
   }
   test::SmallScene scene_;
   ContactListPool contact_lists_{1};
+  std::unique_ptr<collision::FeatureScratch> scratch_ = std::make_unique<collision::FeatureScratch>();
 };
 
 // The gap is 88 mm and must not go below 8 mm: 80 mm at 1 m/s are 80 ticks.
@@ -67,7 +69,7 @@ TEST_F(CollPairTest, IsNotDueWhileTheGapCannotHaveClosed) {
   CollPair pair(*scene, 0);
   pair.attachList(contact_lists_.acquire());
   EXPECT_TRUE(pair.due(1));
-  pair.query(Pose(Vector3(0.0, 0.0, 0.1)), Pose(), 0.001);
+  pair.query(Pose(Vector3(0.0, 0.0, 0.1)), Pose(), 0.001, *scratch_);
   const double gap = pair.gap();
   ASSERT_GT(gap, 0.05);
   ASSERT_LT(gap, 0.0885);
@@ -82,7 +84,7 @@ TEST_F(CollPairTest, IsPostponedByThePathNotMoved) {
   CollPair pair(*scene, 0);
   pair.attachList(contact_lists_.acquire());
   EXPECT_FALSE(pair.postpone(1, 1.0, 0.008, 0.0)) << "it has not been queried";
-  pair.query(Pose(Vector3(0.0, 0.0, 0.1)), Pose(), 0.001);
+  pair.query(Pose(Vector3(0.0, 0.0, 0.1)), Pose(), 0.001, *scratch_);
   pair.schedule(10, 1.0, 0.008, 5.0);
   const Tick due = pair.dueTick();
   // a tenth of the possible path has been moved
@@ -97,7 +99,7 @@ TEST_F(CollPairTest, IsNeverDueForTwoImmovableObjects) {
   const auto scene = scene_.build();
   CollPair pair(*scene, 0);
   pair.attachList(contact_lists_.acquire());
-  pair.query(Pose(), Pose(), 0.001);
+  pair.query(Pose(), Pose(), 0.001, *scratch_);
   pair.schedule(10, 0.0, 0.008, 0.0);
   EXPECT_FALSE(pair.due(1000000000));
 }
@@ -107,7 +109,7 @@ TEST_F(CollPairTest, ResetAndSwitchingMakeItDueAndDropItsContacts) {
   CollPair pair(*scene, 0);
   pair.attachList(contact_lists_.acquire());
   const auto query = [&] {
-    pair.query(Pose(Vector3(0.0, 0.0, 0.01)), Pose(), 0.001);
+    pair.query(Pose(Vector3(0.0, 0.0, 0.01)), Pose(), 0.001, *scratch_);
     pair.schedule(10, 0.0, 0.008, 0.0);
     ASSERT_TRUE(pair.touching());
   };

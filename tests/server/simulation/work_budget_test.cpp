@@ -1,5 +1,7 @@
 #include "server/simulation/work_budget.h"
 
+#include <memory>
+
 #include <gtest/gtest.h>
 
 #include "tests/server/simulation/small_scene.h"
@@ -26,6 +28,7 @@ struct BudgetScene {
   std::shared_ptr<const Scene> scene;
   std::vector<CollPair> pairs;
   ContactListPool contact_lists{3};
+  std::unique_ptr<collision::FeatureScratch> scratch = std::make_unique<collision::FeatureScratch>();
 };
 
 TEST(WorkBudget, WorstCaseCountsPointsOnTheSurfaceThatFitsIntoTheOtherBox) {
@@ -65,7 +68,7 @@ TEST(WorkBudget, APairWithSmallLoadLeavesBudgetToTheOthers) {
   const std::uint32_t before = budget.pointsFor(1);
   // the first pair has been queried far from the floor: its load is small
   setup.pairs[0].attachList(setup.contact_lists.acquire());
-  setup.pairs[0].query(Pose(Vector3(0.0, 0.0, 1.0)), Pose(), 0.001);
+  setup.pairs[0].query(Pose(Vector3(0.0, 0.0, 1.0)), Pose(), 0.001, *setup.scratch);
   budget.distribute(limits, due, setup.pairs);
   EXPECT_GT(budget.pointsFor(1), 2 * before);
   EXPECT_GT(budget.pointsFor(0), 0U) << "enough to detect new contact";

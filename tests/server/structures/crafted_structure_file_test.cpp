@@ -58,7 +58,8 @@ class ChangedFile {
 
 class CraftedStructureFile : public StructureFile {};
 
-// sections: 0 index, 1 samples, 2 far, 3 points, 4 leaves, 5 clusters, 6 levels, 11 dilations
+// sections: 0 index, 1 samples, 2 far, 3 points, 4 leaves, 5 clusters, 6 levels, 11 dilations; 12 to 15 the
+// lists of features as 3 to 6, 16 edges
 TEST_F(CraftedStructureFile, AShellWhoseListsDoNotTileIsRefused) {
   (void)written();
   ChangedFile file(this->file());
@@ -89,6 +90,19 @@ TEST_F(CraftedStructureFile, AShellWithNumbersThatAreNoneIsRefused) {
       EXPECT_THAT(file.with(file.first(6) + 24 + 4 * k, bad), HasSubstr("spacing or the area"));
   }
   EXPECT_THAT(file.with(file.first(3) + 24, -1e-6F), HasSubstr("negative area"));
+}
+
+TEST_F(CraftedStructureFile, FeaturesWithNumbersThatAreNoneAreRefused) {
+  (void)written();
+  ChangedFile file(this->file());
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinite = std::numeric_limits<float>::infinity();
+  for (const float bad : {nan, infinite, -infinite, 1e30F}) {
+    EXPECT_THAT(file.with(file.first(11), bad), HasSubstr("feature shell is damaged"));
+    for (std::size_t k = 0; k < 9; ++k)
+      EXPECT_THAT(file.with(file.first(15) + 4 * k, bad), HasSubstr("an edge is not plausible"));
+  }
+  EXPECT_THAT(file.with(file.first(12) + 16, 1U), HasSubstr("feature shell is damaged"));
 }
 
 TEST_F(CraftedStructureFile, ASphereThatDoesNotContainItsPointsIsRefused) {
@@ -137,7 +151,7 @@ TEST_F(CraftedStructureFile, CountsThatDoNotMatchAreRefused) {
   (void)written();
   ChangedFile file(this->file());
   const auto count = [](std::size_t section) { return test::kSectionsAt + 8 * (test::kSections + section); };
-  for (const std::size_t section : {0U, 1U, 2U, 3U, 4U, 5U, 6U}) {
+  for (const std::size_t section : {0U, 1U, 2U, 3U, 4U, 5U, 6U, 12U, 13U, 14U, 15U, 16U}) {
     const std::uint64_t whole = file.count(section);
     const std::uint64_t step = section == 1 ? DistanceField::kBrickSamples : 1;
     EXPECT_NE(file.with(count(section), whole - step), "accepted") << section;

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -28,6 +29,11 @@ class StructureFile : public ::testing::Test {
     std::vector<SurfaceSample> samples;
     for (int i = 0; i < 100; ++i) samples.push_back({Vector3(0.001 * i, 0.0, 0.02), -Vector3::UnitZ(), 1e-6});
     structures_.shell = buildShell(samples);
+    FeatureStorage features;
+    std::vector<std::uint32_t> order;
+    features.points = buildFlatShell(samples, 0.001, order);
+    features.edges.resize(order.size(), {{0.0005F, 0.0F, 0.0F}, {-Vector3f::UnitY(), Vector3f::UnitY()}});
+    structures_.features = makeFeatureShell(std::move(features));
     structures_.info.source = "ball.stl";
     structures_.info.content_hash = "0123";
     structures_.info.meshes = {folder_.parent_path() / "parts" / "ball.stl"};
@@ -87,6 +93,8 @@ inline std::size_t useEverything(const HapticStructures& structures) {
     EXPECT_EQ(shell.areasOfLevel(k).size(), level.first_point + level.point_count);
     for (const float area : shell.areasOfLevel(k)) used += area > 0.0F ? 1 : 0;
   }
+  for (const FeatureEdge& edge : structures.features.edges()) used += edge.half_M.isZero() ? 0 : 1;
+  EXPECT_EQ(structures.features.edges().size(), structures.features.points().points().size());
   return used;
 }
 

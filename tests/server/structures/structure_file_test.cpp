@@ -27,6 +27,11 @@ TEST_F(StructureFile, IsReadAsItWasWritten) {
   EXPECT_TRUE(std::equal(a.far.begin(), a.far.end(), b.far.begin(), b.far.end()));
   EXPECT_EQ(read.shell.points().size(), 100U);
   EXPECT_EQ(read.shell.boundingRadius(), structures_.shell.boundingRadius());
+  ASSERT_EQ(read.features.edges().size(), 100U);
+  EXPECT_EQ(read.features.edges()[99].half_M, structures_.features.edges()[99].half_M);
+  EXPECT_EQ(read.features.edges()[99].into_M, structures_.features.edges()[99].into_M);
+  EXPECT_EQ(read.features.points().points()[99].p_MP, structures_.features.points().points()[99].p_MP);
+  EXPECT_EQ(read.features.longestHalf(), structures_.features.longestHalf());
   EXPECT_EQ(read.info.source, "ball.stl");
   EXPECT_EQ(read.info.notes, "A note.\n");
   EXPECT_EQ(read.info.meshes, structures_.info.meshes);

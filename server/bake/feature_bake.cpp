@@ -1,0 +1,255 @@
+#include "server/bake/feature_bake.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "server/bake/face_sides.h"
+#include "server/bake/surface_normals.h"
+#include "server/structures/point_grid.h"
+#include "server/structures/shell_builder.h"
+
+namespace tenon::bake {
+namespace {
+
+using Edge = WeldedMesh::Edge;
+using structures::FeatureEdge;
+using structures::SurfaceSample;
+
+constexpr double kCos3 = -0.99863;    // [-] -cos of the turn between faces from which an edge counts
+constexpr double kTanHalf60 = 0.577;  // [-] of a facet of a round surface at most
+constexpr double kTanHalf40 = 0.364;  // [-] tan of half the turn from which an edge is sharp at any radius
+constexpr double kCos6 = 0.995;       // [-] a polyline that turns less at a vertex is straight there
+constexpr double kCos20 = 0.94;       // [-] faces of edges that are merged turn by less
+
+/// [m] Features are sampled for a pointshell of the other part with about this spacing at most, and at least.
+constexpr double kLargestSpacing = 0.004;
+constexpr double kSmallestSpacing = 0.002;
+
+/// A convex edge of the mesh. `into` as in FeatureEdge.
+struct ConvexEdge {
+  std::uint32_t from = 0, to = 0;
+  std::array<Vector3, 2> into_M;
+  double tan_half_turn = 0.0;  // [-] of the angle by which the faces turn
+  double radius = 0.0;         // [m] of the round surface of which its faces are facets
+};
+
+/// Lengths that follow from the spacing of the points, all [m].
+struct Sizes {
+  explicit Sizes(double spacing)
+      : apart(std::clamp(spacing, kSmallestSpacing, kLargestSpacing)),
+        piece(1.5 * apart),
+        depth(apart / 16.0),
+        sharp_radius(apart / 8.0),
+        largest_radius(apart * apart / (8.0 * depth)) {}
+
+  double apart;           ///< of the other part's points, about
+  double piece;           ///< longest piece of an edge
+  double depth;           ///< what a flat face may enter between two points of a round feature
+  double sharp_radius;    ///< rounder edges are sampled as surfaces, without their edges
+  double largest_radius;  ///< rounder surfaces are no features
+
+  /// Spacing of points on a surface of this radius.
+  [[nodiscard]] double spacingAt(double radius) const {
+    return std::clamp(std::sqrt(8.0 * radius * depth), apart / 16.0, apart);
+  }
+};
+
+/// A feature in the making.
+struct Feature {
+  SurfaceSample sample;
+  FeatureEdge edge;
+};
+
+class FeatureFinder {
+ public:
+  FeatureFinder(const WeldedMesh& mesh, const structures::DistanceField& field, const Sizes& sizes)
+      : mesh_(mesh), normals_(field), sizes_(sizes), grid_(sizes.apart) {
+    const std::vector<Edge> edges = mesh.sharpEdges(-2.0);
+    const FaceSides sides(mesh, edges, field);
+    for (const Edge& edge : edges) addIfConvex(edge, sides);
+  }
+
+  std::vector<Feature> find() {
+    addChains();
+    addRoundPoints();
+    return std::move(features_);
+  }
+
+ private:
+  [[nodiscard]] const Vector3& at(std::uint32_t vertex) const { return mesh_.positions[vertex]; }
+
+  /// Sorts an edge into the sharp or the round ones when it is convex.
+  void addIfConvex(const Edge& edge, const FaceSides& sides) {
+    const bool open = edge.second == Edge::kNone;
+    const Vector3 along = (at(edge.to) - at(edge.from)).normalized();
+    ConvexEdge convex{edge.from, edge.to, {}, 1.0, 0.0};
+    double width = 0.0;
+    std::array<Vector3, 2> towards;
+    for (const int face : {0, 1}) {
+      const structures::Triangle& t = mesh_.triangles[face == 0 || open ? edge.first : edge.second];
+      const Vector3 to = t[0] + t[1] + t[2] - 2.0 * at(edge.from) - at(edge.to);
+      towards[static_cast<std::size_t>(face)] = to - along * along.dot(to);
+      const double height = towards[static_cast<std::size_t>(face)].norm();
+      width = face == 0 ? height : std::min(width, height);
+      convex.into_M[static_cast<std::size_t>(face)] = towards[static_cast<std::size_t>(face)] / height;
+    }
+    if (!open) {
+      const double flat = convex.into_M[0].dot(convex.into_M[1]);
+      if (flat < kCos3) return;
+      const Vector3 outward = sides.outward(edge.first);
+      if (outward.dot(convex.into_M[1]) > 0.0) return;
+      convex.tan_half_turn = std::sqrt((1.0 + flat) / std::max(1.0 - flat, 1e-12));
+      convex.radius = 0.5 * width / convex.tan_half_turn;
+    }
+    // points of the other part see a long ridge that is wider than half their distance
+    const bool is_ridge = convex.radius > 0.5 * sizes_.apart && convex.radius <= sizes_.largest_radius &&
+                          convex.tan_half_turn < kTanHalf60 &&
+                          (at(edge.to) - at(edge.from)).norm() > 3.0 * sizes_.apart;
+    if (is_ridge) return;
+    const bool sharp = convex.tan_half_turn >= kTanHalf40 || convex.radius <= sizes_.sharp_radius;
+    if (!sharp && convex.radius > sizes_.largest_radius) return;
+    (sharp ? sharp_ : round_).push_back(convex);
+  }
+
+  void add(const Vector3& p, const Vector3& into, const FeatureEdge& edge = {}) {
+    if (!normals_.onSurface(p)) return;
+    features_.push_back({{p, normals_.inward(p, into), 0.0}, edge});
+    grid_.add(p, static_cast<std::uint32_t>(features_.size() - 1));
+  }
+
+  /// Follows sharp edges from vertex to vertex, and cuts them into pieces.
+  void addChains() {
+    std::vector<std::vector<std::uint32_t>> at_vertex(mesh_.positions.size());
+    for (std::uint32_t i = 0; i < sharp_.size(); ++i) {
+      at_vertex[sharp_[i].from].push_back(i);
+      at_vertex[sharp_[i].to].push_back(i);
+    }
+    std::vector<bool> done(sharp_.size(), false);
+    const auto follow = [&](std::uint32_t vertex, std::uint32_t edge) {
+      std::vector<std::uint32_t> chain{vertex};
+      std::vector<std::uint32_t> edges;
+      while (!done[edge]) {
+        done[edge] = true;
+        edges.push_back(edge);
+        vertex = sharp_[edge].from == vertex ? sharp_[edge].to : sharp_[edge].from;
+        chain.push_back(vertex);
+        if (at_vertex[vertex].size() != 2) break;
+        edge = at_vertex[vertex][at_vertex[vertex][0] == edge ? 1 : 0];
+      }
+      addChain(chain, edges);
+    };
+    for (std::uint32_t vertex = 0; vertex < at_vertex.size(); ++vertex) {
+      if (at_vertex[vertex].empty() || at_vertex[vertex].size() == 2) continue;
+      addCorner(vertex, at_vertex[vertex]);
+      for (const std::uint32_t edge : at_vertex[vertex])
+        if (!done[edge]) follow(vertex, edge);
+    }
+    for (std::uint32_t edge = 0; edge < sharp_.size(); ++edge)
+      if (!done[edge]) follow(sharp_[edge].from, edge);
+  }
+
+  /// A vertex where sharp edges end or meet.
+  void addCorner(std::uint32_t vertex, const std::vector<std::uint32_t>& edges) {
+    Vector3 into = Vector3::Zero();
+    for (const std::uint32_t edge : edges) into += sharp_[edge].into_M[0] + sharp_[edge].into_M[1];
+    if (into.norm() > 1e-6) add(at(vertex), into.normalized());
+  }
+
+  /// Whether the vertices of the chain between i and j are on the segment of these two, and the faces of the
+  /// edges turn little.
+  [[nodiscard]] bool isStraight(const std::vector<std::uint32_t>& chain,
+                                const std::vector<std::uint32_t>& edges, std::size_t i, std::size_t j) const {
+    const Vector3 a = at(chain[i]);
+    const Vector3 along = (at(chain[j]) - a).normalized();
+    const double tolerance = sizes_.apart / 80.0;
+    double reached = 0.0;
+    for (std::size_t k = i + 1; k < j; ++k) {
+      const Vector3 to = at(chain[k]) - a;
+      if ((to - along * along.dot(to)).norm() > tolerance || along.dot(to) < reached) return false;
+      reached = along.dot(to);
+    }
+    const auto& first = sharp_[edges[i]].into_M;
+    const auto& last = sharp_[edges[j - 1]].into_M;
+    return std::max(std::min(first[0].dot(last[0]), first[1].dot(last[1])),
+                    std::min(first[0].dot(last[1]), first[1].dot(last[0]))) > kCos20;
+  }
+
+  /// Merges edges of one line, cuts them into pieces, and adds the vertices where the chain turns.
+  void addChain(const std::vector<std::uint32_t>& chain, const std::vector<std::uint32_t>& edges) {
+    Vector3 before = Vector3::Zero();
+    for (std::size_t i = 0; i + 1 < chain.size();) {
+      std::size_t j = i + 1;
+      while (j + 1 < chain.size() && isStraight(chain, edges, i, j + 1)) ++j;
+      const Vector3 a = at(chain[i]);
+      const Vector3 b = at(chain[j]);
+      const std::array<Vector3, 2> into = perpendicular(sharp_[edges[(i + j) / 2]].into_M, b - a);
+      const Vector3 bisector = (into[0] + into[1]).normalized();
+      const Vector3 along = (b - a).normalized();
+      if (i > 0 && before.dot(along) < kCos6 && (b - a).norm() > sizes_.sharp_radius) add(a, bisector);
+      before = along;
+      const int pieces = std::max(1, static_cast<int>(std::ceil((b - a).norm() / sizes_.piece)));
+      for (int k = 0; k < pieces; ++k) {
+        FeatureEdge piece;
+        piece.half_M = (0.5 / pieces * (b - a)).cast<float>();
+        piece.into_M = {into[0].cast<float>(), into[1].cast<float>()};
+        add(a + (b - a) * ((k + 0.5) / pieces), bisector, piece);
+      }
+      i = j;
+    }
+  }
+
+  [[nodiscard]] static std::array<Vector3, 2> perpendicular(const std::array<Vector3, 2>& into,
+                                                            const Vector3& along) {
+    const Vector3 unit = along.normalized();
+    const auto one = [&unit](const Vector3& v) { return Vector3((v - unit * unit.dot(v)).normalized()); };
+    return {one(into[0]), one(into[1])};
+  }
+
+  /// Points on tight round surfaces, along the edges of their facets, the tightest first.
+  void addRoundPoints() {
+    std::stable_sort(round_.begin(), round_.end(),
+                     [](const ConvexEdge& a, const ConvexEdge& b) { return a.radius < b.radius; });
+    for (const ConvexEdge& edge : round_) {
+      const double apart = sizes_.spacingAt(edge.radius);
+      const Vector3 a = at(edge.from);
+      const Vector3 b = at(edge.to);
+      const Vector3 into = (edge.into_M[0] + edge.into_M[1]).normalized();
+      const int steps = std::max(1, static_cast<int>(std::ceil((b - a).norm() / apart)));
+      for (int k = 0; k <= steps; ++k) {
+        const Vector3 p = a + (b - a) * (static_cast<double>(k) / steps);
+        const bool free = grid_.visitNear(p, [&](std::uint32_t other, double squared) {
+          return squared >= apart * apart || features_[other].sample.inward_M.dot(into) < 0.0;
+        });
+        if (free) add(p, into);
+      }
+    }
+  }
+
+  const WeldedMesh& mesh_;
+  const NormalEstimator normals_;
+  const Sizes sizes_;
+  std::vector<ConvexEdge> sharp_, round_;
+  std::vector<Feature> features_;
+  structures::PointGrid grid_;
+};
+
+}  // namespace
+
+structures::FeatureShell bakeFeatures(const WeldedMesh& mesh, const structures::DistanceField& field,
+                                      double spacing) {
+  const Sizes sizes(spacing);
+  const std::vector<Feature> features = FeatureFinder(mesh, field, sizes).find();
+  std::vector<SurfaceSample> samples;
+  samples.reserve(features.size());
+  for (const Feature& feature : features) samples.push_back(feature.sample);
+  std::vector<std::uint32_t> order;
+  structures::FeatureStorage storage;
+  storage.points = structures::buildFlatShell(samples, sizes.apart, order);
+  storage.edges.reserve(order.size());
+  for (const std::uint32_t i : order) storage.edges.push_back(features[i].edge);
+  return structures::makeFeatureShell(std::move(storage));
+}
+
+}  // namespace tenon::bake

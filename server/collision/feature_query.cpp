@@ -1,0 +1,375 @@
+#include "server/collision/feature_query.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+
+namespace tenon::collision {
+namespace {
+
+using structures::FeatureEdge;
+
+/// [-] Squared sine of 5 degrees: edges nearer to parallel do not cross, their ends and faces touch.
+constexpr double kMinSine2 = 0.0076;
+
+/// [-] n . into may exceed 0 by this where the normal of a crossing is along a face.
+constexpr double kConeTolerance = 1e-3;
+
+/// [-] The same for a crossing that is listed: bodies turn until the next traversal.
+constexpr double kListedTolerance = 0.2;
+
+/// [m] Deeper crossings do not count: the edges are those of far sides of thin parts.
+constexpr double kMaxCrossingDepth = 5e-4;
+
+/// [-] Relative to half a piece: a crossing at the border of two pieces is in one of them.
+constexpr double kEndTolerance = 1e-3;
+
+/// A frame's rotation as matrix: many vectors are turned by it.
+struct Transform {
+  explicit Transform(const Pose& X) : R(X.matrix()), p(X.translation()) {}
+  [[nodiscard]] Vector3 operator*(const Vector3f& p_BP) const { return p + R * p_BP.cast<double>(); }
+  [[nodiscard]] Vector3 turned(const Vector3f& v_B) const { return R * v_B.cast<double>(); }
+  Matrix3 R;
+  Vector3 p;
+};
+
+EdgePiece pieceOf(const structures::FeatureShell& features, std::uint32_t point) {
+  const FeatureEdge& edge = features.edges()[point];
+  return {features.points().points()[point].p_MP.cast<double>(),
+          edge.half_M.cast<double>(),
+          {edge.into_M[0].cast<double>(), edge.into_M[1].cast<double>()}};
+}
+
+EdgePiece pieceOf(const structures::FeatureShell& features, std::uint32_t point, const Transform& X_AB) {
+  const FeatureEdge& edge = features.edges()[point];
+  return {X_AB * features.points().points()[point].p_MP,
+          X_AB.turned(edge.half_M),
+          {X_AB.turned(edge.into_M[0]), X_AB.turned(edge.into_M[1])}};
+}
+
+/// [-] The direction of +-c in which the body of a piece lies on the far side of a plane through the edge; 0:
+/// neither. `slack` [-]: c . into may exceed 0 by this, times the length of c.
+double separatingSign(const EdgePiece& piece, const Vector3& c, double slack) {
+  const double first = c.dot(piece.into[0]);
+  const double second = c.dot(piece.into[1]);
+  if (std::max(first, second) <= slack) return 1.0;
+  return std::min(first, second) >= -slack ? -1.0 : 0.0;
+}
+
+/// Two pieces as a contact of A against B, in their frame. `slack` [m] beyond their ends, `tolerance` [-] of
+/// the normal. False when they do not cross there.
+bool cross(const EdgePiece& a, const EdgePiece& b, double slack, double tolerance, Contact& contact) {
+  const Vector3 c = a.half.cross(b.half);
+  const double c2 = c.squaredNorm();
+  const double a2 = a.half.squaredNorm();
+  const double b2 = b.half.squaredNorm();
+  if (c2 < kMinSine2 * a2 * b2) return false;
+  const double length = std::sqrt(c2);
+  const double sign = separatingSign(b, c, tolerance * length);
+  if (sign == 0.0 || (-sign * c.dot(a.into[0]) > tolerance * length) ||
+      (-sign * c.dot(a.into[1]) > tolerance * length))
+    return false;
+  const Vector3 r = a.p - b.p;
+  contact.gap = sign / length * c.dot(r);
+  if (contact.gap < -kMaxCrossingDepth - slack) return false;
+  // closest points a.p + along_a * a.half, b.p + along_b * b.half of the two lines
+  const double along_a = -r.dot(b.half.cross(c)) / c2;
+  const double along_b = -r.dot(a.half.cross(c)) / c2;
+  if (std::abs(along_a) > 1.0 + kEndTolerance + slack / std::sqrt(a2) ||
+      std::abs(along_b) > 1.0 + kEndTolerance + slack / std::sqrt(b2))
+    return false;
+  contact.n_W = sign / length * c;
+  contact.p_WP = a.p + along_a * a.half;
+  return true;
+}
+
+/// [m] Distance of two segments (Ericson, Real-Time Collision Detection, 5.1.9).
+double segmentDistance(const EdgePiece& a, const EdgePiece& b) {
+  const Vector3 r = a.p - b.p;
+  const double aa = a.half.squaredNorm();
+  const double bb = b.half.squaredNorm();
+  const double ab = a.half.dot(b.half);
+  const double ar = a.half.dot(r);
+  const double br = b.half.dot(r);
+  const double determinant = aa * bb - ab * ab;
+  const auto onSegment = [](double along) { return std::clamp(along, -1.0, 1.0); };
+  double along_a = determinant > 0.0 ? onSegment((ab * br - ar * bb) / determinant) : 0.0;
+  const double along_b = onSegment((ab * along_a + br) / bb);
+  along_a = onSegment((ab * along_b - ar) / aa);
+  return (r + along_a * a.half - along_b * b.half).norm();
+}
+
+/// The contact of two pieces in W, from A's frame. Dormant ones lower `dormant_gap` [m].
+void evaluateCrossing(const EdgePiece& a, const EdgePiece& b, const Transform& X_WA, Contact& contact,
+                      double& dormant_gap) {
+  Vector3 p_A = a.p;
+  if (cross(a, b, 0.0, kConeTolerance, contact)) {
+    contact.n_W = X_WA.R * contact.n_W;
+    p_A = contact.p_WP;
+  } else {
+    contact.gap = kDormantGap;
+    dormant_gap = std::min(dormant_gap, segmentDistance(a, b));
+    contact.n_W = Vector3::UnitZ();
+  }
+  contact.p_WP = X_WA.p + X_WA.R * p_A;
+}
+
+/// B's features in A's field.
+PairQuery reversed(const PairQuery& query, const PairFeatures& features, double margin) {
+  return {&features.features_B->points(), features.field_A, query.X_WB, query.X_WA, margin};
+}
+
+/// Adds to the gaps of B's features what A's field is dilated beyond `most_dilation_A`. `displacement` [m] as
+/// in resampleContacts().
+void limitDilation(const PairFeatures& features, const Pose& X_WA, double displacement, PairQueryResult& of_B) {
+  if (features.most_dilation_A >= features.field_A->dilation()) return;
+  const Pose X_AW = X_WA.inverse();
+  double smallest = of_B.unlisted_gap - displacement;
+  for (Contact& contact : of_B.contacts) {
+    contact.gap += features.field_A->dilationBeyond(features.most_dilation_A, X_AW * contact.p_WP);
+    smallest = std::min(smallest, contact.gap);
+  }
+  of_B.smallest_gap = smallest;
+  of_B.deepest = std::max(-smallest, 0.0);
+}
+
+/// A contact of B against A as one of A against B.
+Contact turned(const Contact& of_B) {
+  Contact contact = of_B;
+  contact.n_W = -of_B.n_W;
+  contact.area = 0.0;
+  contact.kind = ContactKind::kFeaturePoint;
+  return contact;
+}
+
+void addCounts(const QueryCounts& counts, QueryCounts& sum) {
+  sum.spheres_visited += counts.spheres_visited;
+  sum.spheres_total += counts.spheres_total;
+  sum.points_visited += counts.points_visited;
+  sum.points_colliding += counts.points_colliding;
+  sum.contacts_dropped += counts.contacts_dropped;
+}
+
+/// A contact of `gap` [m] is not listed.
+void drop(double gap, PairQueryResult& result) {
+  ++result.counts.contacts_dropped;
+  result.complete_to = std::min(result.complete_to, gap);
+  result.unlisted_gap = std::min(result.unlisted_gap, gap);
+}
+
+/// Keeps the `most` contacts with the smallest gaps, in their order, and drops the others. Their gaps count
+/// up to the margin: dormant crossings are beyond it.
+void keepNearest(std::size_t most, double margin, ContactList& contacts, PairQueryResult& result) {
+  if (contacts.size() <= most) return;
+  std::array<std::pair<double, std::uint32_t>, ContactList::capacity()> rank;
+  for (std::uint32_t i = 0; i < contacts.size(); ++i) rank[i] = {contacts[i].gap, i};
+  const auto end = rank.begin() + static_cast<std::ptrdiff_t>(contacts.size());
+  const auto last = rank.begin() + static_cast<std::ptrdiff_t>(most);
+  std::nth_element(rank.begin(), last, end);
+  const auto limit = *last;
+  std::size_t kept = 0;
+  for (std::uint32_t i = 0; i < contacts.size(); ++i) {
+    if (std::pair(contacts[i].gap, i) < limit) {
+      contacts[kept++] = contacts[i];
+    } else {
+      drop(std::min(contacts[i].gap, margin), result);
+    }
+  }
+  contacts.resize(kept);
+}
+
+/// Lists the crossings of B's pieces near A with pieces of A, by A's bounding spheres. In A's frame: A's
+/// pieces are many, those of B few.
+class CrossingSearch {
+ public:
+  CrossingSearch(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
+                 PairQueryResult& result)
+      : query_(query),
+        features_(features),
+        near_(scratch.near),
+        crossings_(scratch.crossings),
+        result_(result),
+        X_WA_(query.X_WA) {}
+
+  /// `near_A`: B's features near A.
+  void run(const ContactList& near_A) {
+    near_.count = 0;
+    crossings_.clear();
+    const Transform X_AB(query_.X_WA.inverse() * query_.X_WB);
+    const double reach_A = features_.features_A->longestHalf() + query_.margin;
+    for (const Contact& contact : near_A) {
+      const float half = features_.features_B->edges()[contact.point].half_M.norm();
+      // a crossing is nearer than the centre of B's piece by half its length at most
+      if (half == 0.0F || contact.gap > query_.margin + half) continue;
+      EdgePiece& piece = near_.pieces[near_.count];
+      piece = pieceOf(*features_.features_B, contact.point, X_AB);
+      const Vector3f p_A = piece.p.cast<float>();
+      const float reach = static_cast<float>(reach_A) + half;
+      near_.all[near_.count] = {p_A, reach, near_.count};
+      near_.point[near_.count++] = contact.point;
+      box_A_.extend(p_A - Vector3f::Constant(reach));
+      box_A_.extend(p_A + Vector3f::Constant(reach));
+    }
+    if (near_.count == 0) return;
+    const structures::Pointshell& shell = features_.features_A->points();
+    for (const structures::ShellSphere& cluster : shell.clusters()) {
+      const auto by_cluster = narrowed(cluster, {near_.all.data(), near_.count}, near_.by_cluster);
+      if (by_cluster.empty()) continue;
+      for (const structures::ShellSphere& leaf : shell.leaves().subspan(cluster.first, cluster.count)) {
+        const auto by_leaf = narrowed(leaf, by_cluster, near_.by_leaf);
+        if (by_leaf.empty()) continue;
+        for (std::uint32_t i = leaf.first; i < leaf.first + leaf.count; ++i) crossPiece(i, by_leaf);
+      }
+    }
+  }
+
+ private:
+  using Ball = NearPieces::Ball;
+
+  /// Those of B's pieces that may cross a piece of A within a sphere.
+  std::span<const Ball> narrowed(const structures::ShellSphere& sphere, std::span<const Ball> from,
+                                 NearPieces::Balls& to) const {
+    if (box_A_.squaredExteriorDistance(sphere.p_MC) > sphere.radius * sphere.radius) return {};
+    std::size_t count = 0;
+    for (const Ball& ball : from) {
+      const float reach = ball.reach + sphere.radius;
+      to[count] = ball;
+      count += (ball.p_A - sphere.p_MC).squaredNorm() <= reach * reach ? 1U : 0U;
+    }
+    return {to.data(), count};
+  }
+
+  void crossPiece(std::uint32_t i, std::span<const Ball> near) {
+    if (features_.features_A->edges()[i].half_M.isZero()) return;
+    const Vector3f p_A = features_.features_A->points().points()[i].p_MP;
+    EdgePiece piece;
+    bool known = false;
+    for (const Ball& ball : near) {
+      if ((ball.p_A - p_A).squaredNorm() > ball.reach * ball.reach) continue;
+      if (!known) piece = pieceOf(*features_.features_A, i);
+      known = true;
+      const EdgePiece& other = near_.pieces[ball.piece];
+      Contact contact;
+      if (!cross(piece, other, query_.margin, kListedTolerance, contact) ||
+          contact.gap > query_.margin)
+        continue;
+      contact.kind = ContactKind::kCrossing;
+      contact.point = i;
+      contact.other = near_.point[ball.piece];
+      evaluateCrossing(piece, other, X_WA_, contact, result_.dormant_gap);
+      result_.smallest_gap = std::min(result_.smallest_gap, contact.gap);
+      if (!crossings_.push_back(contact)) drop(std::min(contact.gap, query_.margin), result_);
+    }
+  }
+
+  const PairQuery& query_;
+  const PairFeatures& features_;
+  NearPieces& near_;
+  ContactList& crossings_;
+  PairQueryResult& result_;
+  const Transform X_WA_;
+  Eigen::AlignedBox3f box_A_;  ///< of the balls of all near pieces
+};
+
+}  // namespace
+
+void queryFeatures(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
+                   PairQueryResult& result) noexcept {
+  result.dormant_gap = std::numeric_limits<double>::infinity();
+  if (!features.any()) return;
+  const double half_A = features.features_A->longestHalf();
+  const double half_B = features.features_B->longestHalf();
+  PairQueryResult& of_B = scratch.of_B;
+  queryPair(reversed(query, features, query.margin + half_B), of_B);
+  limitDilation(features, query.X_WA, 0.0, of_B);
+  addCounts(of_B.counts, result.counts);
+  result.smallest_gap = std::min(result.smallest_gap, of_B.smallest_gap);
+  result.unlisted_gap = std::min(result.unlisted_gap, of_B.unlisted_gap);
+  result.deepest = std::max(result.deepest, of_B.deepest);
+  if (of_B.complete_to < query.margin) result.complete_to = std::min(result.complete_to, of_B.complete_to);
+
+  const auto near = static_cast<std::size_t>(
+      std::count_if(of_B.contacts.begin(), of_B.contacts.end(),
+                    [&](const Contact& contact) { return contact.gap <= query.margin; }));
+  const bool may_cross = half_A > 0.0 && half_B > 0.0 && !of_B.contacts.empty();
+  if (may_cross) {
+    CrossingSearch(query, features, scratch, result).run(of_B.contacts);
+    keepNearest(kMaxCrossings, query.margin, scratch.crossings, result);
+  }
+  const std::size_t room = std::min(near + (may_cross ? scratch.crossings.size() : 0), kFeatureRoom);
+  keepNearest(ContactList::capacity() - room, query.margin, result.contacts, result);
+  for (const Contact& contact : of_B.contacts) {
+    if (contact.gap > query.margin) {
+      result.unlisted_gap = std::min(result.unlisted_gap, contact.gap);
+    } else if (!result.contacts.push_back(turned(contact))) {
+      drop(contact.gap, result);
+    }
+  }
+  if (half_A == 0.0 || half_B == 0.0) return;
+
+  for (std::size_t i = 0; may_cross && i < scratch.crossings.size(); ++i) {
+    const Contact& contact = scratch.crossings[i];
+    if (!result.contacts.push_back(contact)) drop(std::min(contact.gap, query.margin), result);
+  }
+  // a crossing is nearer than the centre of B's piece by half its length at most
+  double crossing_bound = of_B.unlisted_gap - half_B;
+  if (may_cross) crossing_bound = std::min(crossing_bound, query.margin);
+  if (crossing_bound < query.margin) result.complete_to = std::min(result.complete_to, crossing_bound);
+  result.smallest_gap = std::min(result.smallest_gap, crossing_bound);
+  result.unlisted_gap = std::min(result.unlisted_gap, crossing_bound);
+}
+
+double featureGap(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch) noexcept {
+  if (!features.any()) return std::numeric_limits<double>::infinity();
+  const double half_B = features.features_B->longestHalf();
+  const bool may_cross = half_B > 0.0 && features.features_A->longestHalf() > 0.0;
+  // a crossing is nearer than the centre of B's piece by half its length at most
+  const double nearer = may_cross ? half_B : 0.0;
+  PairQuery of_B = reversed(query, features, query.margin + nearer);
+  of_B.list = false;
+  queryPair(of_B, scratch.of_B);
+  return scratch.of_B.smallest_gap - nearer;
+}
+
+void resampleFeatures(const PairQuery& query, const PairFeatures& features, double displacement,
+                      FeatureScratch& scratch, PairQueryResult& result) noexcept {
+  result.dormant_gap = std::numeric_limits<double>::infinity();
+  ContactList& contacts = result.contacts;
+  const auto first = std::find_if(contacts.begin(), contacts.end(), [](const Contact& contact) {
+    return contact.kind != ContactKind::kShellPoint;
+  });
+  ContactList& points = scratch.of_B.contacts;
+  ContactList& crossings = scratch.crossings;
+  points.clear();
+  crossings.clear();
+  for (const Contact* contact = first; contact != contacts.end(); ++contact)
+    (contact->kind == ContactKind::kFeaturePoint ? points : crossings).push_back(*contact);
+  contacts.resize(static_cast<std::size_t>(first - contacts.begin()));
+  resampleContacts(query, displacement, result);
+  if (!points.empty()) {
+    scratch.of_B.reduced = false;
+    scratch.of_B.unlisted_gap = result.unlisted_gap;
+    resampleContacts(reversed(query, features, query.margin), displacement, scratch.of_B);
+    limitDilation(features, query.X_WA, displacement, scratch.of_B);
+    result.unlisted_gap = scratch.of_B.unlisted_gap;
+    result.smallest_gap = std::min(result.smallest_gap, scratch.of_B.smallest_gap);
+    result.deepest = std::max(result.deepest, scratch.of_B.deepest);
+    if (!result.reduced) result.counts.points_colliding += scratch.of_B.counts.points_colliding;
+    for (const Contact& contact : points) contacts.push_back(turned(contact));
+  }
+  if (crossings.empty()) return;
+  const Transform X_WA(query.X_WA);
+  const Transform X_AB(query.X_WA.inverse() * query.X_WB);
+  for (Contact& contact : crossings) {
+    evaluateCrossing(pieceOf(*features.features_A, contact.point),
+                     pieceOf(*features.features_B, contact.other, X_AB), X_WA, contact,
+                     result.dormant_gap);
+    result.smallest_gap = std::min(result.smallest_gap, contact.gap);
+    contacts.push_back(contact);
+  }
+  result.deepest = std::max(result.deepest, -result.smallest_gap);
+}
+
+}  // namespace tenon::collision

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <array>
+#include <limits>
+
+#include "server/collision/pair_query.h"
+#include "server/structures/feature_shell.h"
+
+namespace tenon::collision {
+
+/// The second direction of a pair: the features of both bodies, and the field of A.
+///
+/// The points of A's pointshell miss what is thinner than their spacing on B: a stud, an edge, a corner. So
+/// B's features are also asked in A's field, with contacts as of A against B (normals from B into A). Two
+/// edges that cross touch between the points of both: the gap there is that of the closest points of their
+/// segments, the fields only find candidates. Features are where the exact surface is: thin walls of B are
+/// thickened for A's points alone.
+struct PairFeatures {
+  const structures::FeatureShell* features_A = nullptr;
+  const structures::FeatureShell* features_B = nullptr;
+  const structures::DistanceField* field_A = nullptr;
+  /// [m] Of the dilation of A's field so much counts for features of B
+  double most_dilation_A = std::numeric_limits<double>::infinity();
+
+  [[nodiscard]] bool any() const {
+    return features_B != nullptr && !features_B->empty() && !field_A->empty();
+  }
+};
+
+/// A piece of a convex edge, as structures::FeatureEdge, in any frame.
+struct EdgePiece {
+  Vector3 p = Vector3::Zero();     ///< [m] centre
+  Vector3 half = Vector3::Zero();  ///< [m] from the centre to one end
+  std::array<Vector3, 2> into{Vector3::Zero(), Vector3::Zero()};
+};
+
+/// B's pieces of edges near A, in A's frame.
+struct NearPieces {
+  struct Ball {
+    Vector3f p_A;
+    float reach = 0.0F;  ///< [m] centres of pieces that cross this one are no farther
+    std::uint32_t piece = 0;
+  };
+  using Balls = std::array<Ball, kMaxPairContacts>;
+
+  std::uint32_t count = 0;
+  std::array<EdgePiece, kMaxPairContacts> pieces;
+  std::array<std::uint32_t, kMaxPairContacts> point;  ///< index in B's features
+  Balls all, by_cluster, by_leaf;
+};
+
+/// Memory of the functions below; one for each thread.
+struct FeatureScratch {
+  PairQueryResult of_B;   ///< B's features in A's field
+  ContactList crossings;  ///< that are evaluated again
+  NearPieces near;
+};
+
+/// Adds to the result of queryPair the contacts of features up to `query.margin`: of kFeaturePoint, then of
+/// kCrossing, after those of shell points. Levels and budget of the query do not apply to features; their
+/// points are counted. Where the list is full, feature contacts displace shell points with the largest gaps,
+/// at most kFeatureRoom; of more than kMaxCrossings crossings those with the largest gaps are dropped
+/// (`contacts_dropped`).
+///
+/// A crossing is listed when it may come about within `query.margin` of motion. While it is beyond the ends
+/// of its pieces, or the faces beside it are nearer, it is dormant: its gap is kDormantGap, and the distance
+/// of its segments counts in PairQueryResult::dormant_gap.
+///
+/// Threads: pure, but for the scratch. Real-time.
+void queryFeatures(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
+                   PairQueryResult& result) noexcept;
+
+/// resampleContacts() for a list with contacts of features; `displacement` [m] as there.
+///
+/// Threads: pure, but for the scratch. Real-time.
+void resampleFeatures(const PairQuery& query, const PairFeatures& features, double displacement,
+                      FeatureScratch& scratch, PairQueryResult& result) noexcept;
+
+/// [m] Lower bound of the gap of features and crossings up to `query.margin`, beyond that a larger one. Lists
+/// nothing; `scratch` has the work that it took.
+///
+/// Threads: pure, but for the scratch. Real-time.
+[[nodiscard]] double featureGap(const PairQuery& query, const PairFeatures& features,
+                                FeatureScratch& scratch) noexcept;
+
+inline constexpr std::size_t kFeatureRoom = 128;
+inline constexpr std::size_t kMaxCrossings = 64;
+/// [m] Further apart than any margin.
+inline constexpr double kDormantGap = 1.0;
+
+}  // namespace tenon::collision

@@ -1,0 +1,217 @@
+#include "server/check/check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/server/game_control/scenario_fixture.h"
+
+namespace tenon::check {
+namespace {
+
+using game_control::ScenarioFile;
+using test::smallScenario;
+using test::smallStructures;
+using test::with;
+using ::testing::HasSubstr;
+
+ScenarioFile parsed(const std::string& text) {
+  return game_control::parseScenario(text, "small/scenario.yaml").value();
+}
+
+constexpr double kHugRange = 2.6;  // [rad]
+
+std::vector<Finding> findingsIn(const std::string& text, std::vector<test::StructuresPtr> structures) {
+  const ScenarioFile scenario = parsed(text);
+  const auto scene = game_control::makeScene(scenario, std::move(structures));
+  if (!scene) {
+    ADD_FAILURE() << scene.error().what;
+    return {};
+  }
+  CheckOptions options;
+  options.trainee = {"hug-sim", kHugRange};
+  options.instructor = {"sigma7-sim", 1.2};
+  return checkScene(scenario, **scene, options);
+}
+
+/// The only error or warning; fails when there is none, or another one.
+Finding theOnlyProblem(const std::vector<Finding>& findings) {
+  std::vector<Finding> problems;
+  std::copy_if(findings.begin(), findings.end(), std::back_inserter(problems),
+               [](const Finding& finding) { return finding.severity != Severity::kInfo; });
+  for (const Finding& problem : problems) SCOPED_TRACE(problem.text);
+  EXPECT_EQ(problems.size(), 1U) << (problems.empty() ? ""
+                                                      : problems.front().text + " | " + problems.back().text);
+  return problems.empty() ? Finding{} : problems.front();
+}
+
+/// The small scenario's structures with a socket of `hole` [m].
+std::vector<test::StructuresPtr> withSocket(const Vector3& hole) {
+  std::vector<test::StructuresPtr> structures = smallStructures();
+  structures[0] = test::socketStructures(hole, 0.02, 0.001);
+  return structures;
+}
+
+//   |  |_  _|
+//   | |    | |  part of 40 mm in a socket of 44 x 44 x 42 mm, 2 mm above its bottom: when it turns by t, its
+//   | |____| |  half width becomes 20 (sin t + cos t) = 22 mm at t = 6.06 deg
+//   |________|
+TEST(Check, APartThatFitsIsANoteWithItsPlayAndTilt) {
+  const std::vector<Finding> findings = findingsIn(smallScenario(), smallStructures());
+  ASSERT_EQ(findings.size(), 1U) << findings.back().text;
+  const Finding& fit = findings.front();
+  EXPECT_EQ(fit.kind, FindingKind::kClearance);
+  EXPECT_EQ(fit.severity, Severity::kInfo);
+  EXPECT_EQ(fit.state, "mount");
+  EXPECT_EQ(fit.line, 16);
+  EXPECT_NEAR(fit.value, 0.004, 40e-6);
+  EXPECT_THAT(fit.text, HasSubstr("part has 4"));
+  const auto tilt = fit.text.find("tilts by ");
+  ASSERT_NE(tilt, std::string::npos) << fit.text;
+  EXPECT_NEAR(std::stod(fit.text.substr(tilt + 9)), 2.0 * 6.06, 0.3) << fit.text;
+}
+
+TEST(Check, AStatedClearanceThatIsNotTrueIsAWarningWithTheTrueOne) {
+  const Finding more = theOnlyProblem(
+      findingsIn(with(smallScenario(), "clearance: 4 mm", "clearance: 6 mm"), smallStructures()));
+  EXPECT_EQ(more.kind, FindingKind::kClearance);
+  EXPECT_EQ(more.severity, Severity::kWarning);
+  EXPECT_NEAR(more.value, 0.004, 40e-6);
+  EXPECT_THAT(more.hint, HasSubstr("clearance: 4 mm in line 11"));
+  const Finding less = theOnlyProblem(
+      findingsIn(with(smallScenario(), "clearance: 4 mm", "clearance: 2 mm"), smallStructures()));
+  EXPECT_EQ(less.kind, FindingKind::kClearance);
+  EXPECT_NEAR(less.value, 0.004, 40e-6);
+}
+
+TEST(Check, AMissingClearanceIsNamedWithThePlayAndWhereToWriteIt) {
+  const std::string text = with(smallScenario(), "pairs:\n  - {between: [part, bay], clearance: 4 mm}\n", "");
+  const Finding missing = theOnlyProblem(findingsIn(text, withSocket(Vector3(0.0412, 0.0412, 0.042))));
+  EXPECT_EQ(missing.kind, FindingKind::kClearance);
+  EXPECT_NEAR(missing.value, 0.0012, 100e-6) << "a tenth of a voxel";
+  EXPECT_THAT(missing.text, HasSubstr("no clearance is stated"));
+  EXPECT_THAT(missing.hint, HasSubstr("{between: [part, bay], clearance: 1."));
+}
+
+TEST(Check, AnOverlapAtTheStartIsFoundWithItsDepthPlaceAndAWayOut) {
+  // the part's lower side is 3 mm below the upper end of the socket's wall, which is 22 to 42 mm from the
+  // middle
+  const std::string text = with(smallScenario(), "at: [0.2, 0, 0.1]", "at: [32 mm, 0, 17 mm]");
+  const Finding overlap = theOnlyProblem(findingsIn(with(text, "status: hidden, ", ""), smallStructures()));
+  EXPECT_EQ(overlap.kind, FindingKind::kOverlap);
+  EXPECT_EQ(overlap.severity, Severity::kError);
+  EXPECT_EQ(overlap.line, 4);
+  EXPECT_TRUE(overlap.state.empty());
+  EXPECT_NEAR(overlap.value, 0.003, 50e-6);
+  EXPECT_THAT(overlap.text, HasSubstr("part is 3 mm inside bay at the start, at ("));
+  ASSERT_TRUE(overlap.p_WP);
+  EXPECT_NEAR(overlap.p_WP->z(), -0.003, 1e-4);
+  EXPECT_GT(overlap.p_WP->x(), 0.022);
+  EXPECT_THAT(overlap.hint, HasSubstr("it is free at [0.032, 0, 0.020"));
+  EXPECT_EQ(countOf(findingsIn(text, smallStructures()), Severity::kError), 1U)
+      << "also when it appears later";
+}
+
+TEST(Check, ATargetInAWallIsAnErrorAndOneWithinTheToleranceAWarning) {
+  // 3 mm and 1.5 mm below the bottom of the socket, where 2 mm are tolerated
+  const Finding deep = theOnlyProblem(
+      findingsIn(with(smallScenario(), "at: [0, 0, -20 mm]", "at: [0, 0, -25 mm]"), smallStructures()));
+  EXPECT_EQ(deep.kind, FindingKind::kOverlap);
+  EXPECT_EQ(deep.severity, Severity::kError);
+  EXPECT_NEAR(deep.value, 0.003, 20e-6);
+  EXPECT_THAT(deep.text, HasSubstr("inside bay"));
+  EXPECT_THAT(deep.hint, HasSubstr("it is free at [0, 0, -0.02")) << "2.2 mm above the bottom at most";
+  ASSERT_TRUE(deep.p_WP);
+  EXPECT_NEAR(deep.p_WP->z(), -0.045, 1e-4);
+  const Finding shallow = theOnlyProblem(
+      findingsIn(with(smallScenario(), "at: [0, 0, -20 mm]", "at: [0, 0, -23.5 mm]"), smallStructures()));
+  EXPECT_EQ(shallow.severity, Severity::kWarning);
+  EXPECT_NEAR(shallow.value, 0.0015, 20e-6);
+}
+
+/// The small scenario with a plate of 40 x 40 x 10 mm at `at`.
+std::string withPlate(const std::string& at) {
+  return with(
+      smallScenario(), "hands:\n",
+      "  - {name: plate, title: Plate, status: fixed, meshes: [{part: plate}], structures: {voxel: 2 mm}, "
+      "start: {at: " +
+          at + "}}\nhands:\n");
+}
+
+TEST(Check, ABlockedApproachNamesWhatBlocksItAndWhere) {
+  std::vector<test::StructuresPtr> structures = smallStructures();
+  structures.push_back(test::boxStructures(Vector3(0.04, 0.04, 0.01), 0.002, 0.005));
+  // from 100 mm above its target down: its lower side meets the plate's upper side, z = 25 mm, 65 mm before
+  const std::string from_afar = with(withPlate("[0, 0, 20 mm]"), "distance: 50 mm", "distance: 100 mm");
+  const Finding blocked = theOnlyProblem(findingsIn(from_afar, structures));
+  EXPECT_EQ(blocked.kind, FindingKind::kApproach);
+  EXPECT_EQ(blocked.severity, Severity::kError);
+  EXPECT_NEAR(blocked.value, 0.065, 0.002);
+  EXPECT_THAT(blocked.text, HasSubstr("before its target by Plate, at ("));
+  ASSERT_TRUE(blocked.p_WP);
+  EXPECT_NEAR(blocked.p_WP->z(), 0.025, 0.001);
+  // from 50 mm above it begins inside of the plate
+  EXPECT_NEAR(theOnlyProblem(findingsIn(withPlate("[0, 0, 20 mm]"), structures)).value, 0.05, 1e-6);
+  const std::vector<Finding> beside = findingsIn(withPlate("[100 mm, 0, 20 mm]"), structures);
+  EXPECT_EQ(countOf(beside, Severity::kError) + countOf(beside, Severity::kWarning), 0U);
+}
+
+TEST(Check, ATurnThatTheDeviceDoesNotHaveIsFound) {
+  const Finding turn = theOnlyProblem(findingsIn(
+      with(smallScenario(), "at: [0, 0, -20 mm],", "at: [0, 0, -20 mm], turn: {axis: z, deg: 180},"),
+      smallStructures()));
+  // it is hidden until it is touched: shown when it is taken, and not turned
+  EXPECT_EQ(turn.kind, FindingKind::kTurning);
+  EXPECT_EQ(turn.severity, Severity::kWarning) << "the hand may be turned the other way when it takes it";
+  EXPECT_NEAR(turn.value, 3.14159, 1e-4);
+  EXPECT_THAT(turn.text, HasSubstr("turned by 180 deg to its target, and hug-sim turns by 149 deg"));
+  EXPECT_TRUE(std::ranges::none_of(
+      findingsIn(
+          with(smallScenario(), "at: [0, 0, -20 mm],", "at: [0, 0, -20 mm], turn: {axis: z, deg: 90},"),
+          smallStructures()),
+      [](const Finding& finding) { return finding.kind == FindingKind::kTurning; }));
+}
+
+TEST(Check, APartAThousandTimesSmallerThanItsHoleHasAWrongUnit) {
+  std::vector<test::StructuresPtr> structures = smallStructures();
+  structures[1] = test::boxStructures(Vector3::Constant(4e-5), 2e-5, 1e-5);
+  const Finding scale = theOnlyProblem(findingsIn(smallScenario(), structures));
+  EXPECT_EQ(scale.kind, FindingKind::kScale);
+  EXPECT_EQ(scale.severity, Severity::kError);
+  EXPECT_NEAR(1.0 / scale.value, 44.0 / 0.04, 30.0);
+  EXPECT_THAT(scale.text, HasSubstr("times smaller than its hole in bay"));
+}
+
+TEST(Check, APartAThousandTimesLargerHasAWrongUnitAndItsFileIsNamed) {
+  std::string text = with(smallScenario(), "{part: part}", "{box: [40, 40, 40]}");
+  const ScenarioFile scenario = parsed(with(text, "[40, 40, 40]", "[20 m, 20 m, 20 m]"));
+  std::vector<Eigen::AlignedBox3d> boxes(4);
+  boxes[0] = Eigen::AlignedBox3d(Vector3::Constant(-0.04), Vector3::Constant(0.04));
+  boxes[1] = Eigen::AlignedBox3d(Vector3::Constant(-20.0), Vector3::Constant(20.0));
+  const std::vector<Finding> findings = findingsOf(Error{"too large"}, scenario, boxes);
+  ASSERT_EQ(findings.size(), 2U);
+  EXPECT_EQ(findings[0].kind, FindingKind::kScale);
+  EXPECT_NEAR(findings[0].value, 500.0, 1e-9);
+  EXPECT_THAT(findings[0].hint, HasSubstr("a length without its unit"));
+  EXPECT_EQ(findings[1].text, "too large");
+}
+
+TEST(Check, AllObjectsOutOfReachAreFound) {
+  std::string text = with(smallScenario(), "at: [0.2, 0, 0.1]", "at: [200, 0, 0.1]");
+  text = with(text, "at: [0, 0, -20 mm]", "at: [0, 0, -20 m]");
+  const ScenarioFile scenario = parsed(text);
+  const auto scene = game_control::makeScene(scenario, smallStructures());
+  ASSERT_FALSE(scene);
+  const std::vector<Finding> findings = findingsOf(scene.error(), scenario, smallStructures());
+  ASSERT_EQ(findings.size(), 2U);
+  EXPECT_EQ(findings[0].kind, FindingKind::kReach);
+  EXPECT_NEAR(findings[0].value, 200.0, 0.01);
+  EXPECT_EQ(findings[1].line, 16);
+}
+
+}  // namespace
+}  // namespace tenon::check
