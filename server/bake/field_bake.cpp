@@ -188,7 +188,7 @@ Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, co
   std::unique_ptr<BrickLevel> fine;
   RefinedBricks refined;
   if (options.refinement > 1 && !options.refine.empty() && !work.cancelled())
-    refined = bricksToRefine(coarse, options, thinBricks(coarse, kSurelyThin, work));
+    refined = bricksToRefine(coarse, options, thinBricks(coarse, work));
   if (!refined.bricks.empty() && !work.cancelled()) {
     work.stage("refining", 0.55, 0.65);
     fine = std::make_unique<BrickLevel>(coarse, options.refinement, refined.bricks, refined.deep);
@@ -222,7 +222,7 @@ Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, co
     finishSamples(*fine, *exposed, *hidden_tree, work);
     limitSlope(*fine, &coarse, work);
   }
-  baked.thin = thinBricks(coarse, kMaybeThin, work);
+  baked.thin = thinBricks(coarse, work);
   if (work.cancelled()) return fail("cancelled");
 
   storage.layout.refinement = fine ? options.refinement : 1;

@@ -11,6 +11,8 @@ namespace tenon::bake {
 namespace {
 
 constexpr int kReach = 2;
+/// [voxels] kReach beyond a sample at a flat surface a solid is at least 1.13 deep.
+constexpr double kDeep = 1.05;
 constexpr int kPatch = BrickLevel::kSide + 2 * kReach;
 using Patch = std::array<std::uint8_t, static_cast<std::size_t>(kPatch) * kPatch * kPatch>;
 
@@ -31,7 +33,7 @@ void spread(Patch& patch, std::size_t stride) {
   patch = wide;
 }
 
-bool isThin(const BrickLevel& coarse, std::size_t node, double depth) {
+bool isThin(const BrickLevel& coarse, std::size_t node) {
   const std::int32_t slot = coarse.slot[node];
   if (slot < 0) return false;
   constexpr int kAtSurface =
@@ -42,7 +44,7 @@ bool isThin(const BrickLevel& coarse, std::size_t node, double depth) {
   Patch deep{};
   coarse.visitAround(node, kReach, kReach + 1, [&](const BrickLevel::Cell& offset, const auto& point) {
     deep[indexOf(offset.x() + kReach, offset.y() + kReach, offset.z() + kReach)] =
-        point.known && !point.free && point.distance >= depth;
+        point.known && !point.free && point.distance >= kDeep;
   });
   for (const std::size_t stride : {indexOf(1, 0, 0), indexOf(0, 1, 0), indexOf(0, 0, 1)})
     spread(deep, stride);
@@ -71,9 +73,9 @@ bool BrickMarks::anyIn(const Eigen::AlignedBox3d& box_M) const {
   return false;
 }
 
-BrickMarks thinBricks(const BrickLevel& coarse, double depth, ParallelWork& work) {
+BrickMarks thinBricks(const BrickLevel& coarse, ParallelWork& work) {
   std::vector<std::uint8_t> thin(coarse.nodes(), 0);
-  work.run(coarse.nodes(), 64, [&](std::size_t node) { thin[node] = isThin(coarse, node, depth) ? 1 : 0; });
+  work.run(coarse.nodes(), 64, [&](std::size_t node) { thin[node] = isThin(coarse, node) ? 1 : 0; });
   return {coarse, std::move(thin)};
 }
 

@@ -46,16 +46,11 @@ class BrickMarks {
   std::vector<std::uint8_t> marks_;
 };
 
-inline constexpr double kSurelyThin = 0.75;  ///< [voxels]
-inline constexpr double kMaybeThin =
-    1.05;  ///< [voxels] two beyond a sample at a flat surface it is 1.13 deep
-
 /// Marks the bricks where material may be thin: some sample at the surface has none within two voxels that is
-/// `depth` [voxels] inside. With kSurelyThin only walls of less than about 1.5 voxels are marked; with
-/// kMaybeThin no wall of less than two voxels is missed, but at its end, up to two voxels from where it
-/// widens.
+/// 1.05 voxels inside. No wall of less than two voxels is missed, but at its end, up to two voxels from where
+/// it widens.
 ///
 /// Threads: one caller; uses several threads inside.
-[[nodiscard]] BrickMarks thinBricks(const BrickLevel& coarse, double depth, ParallelWork& work);
+[[nodiscard]] BrickMarks thinBricks(const BrickLevel& coarse, ParallelWork& work);
 
 }  // namespace tenon::bake

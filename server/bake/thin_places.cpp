@@ -22,6 +22,9 @@ constexpr double kNoiseVoxels = 0.02;
 constexpr double kNoise = 4e-5;
 /// [voxels] Largest interpolated distance at a convex corner of three faces.
 constexpr double kAtCorner = 0.55;
+/// [-] Points in refined bricks are farther apart by this, in voxels there: a brick's share of a wall then
+/// still has hundreds of them, in all places of a voxel.
+constexpr double kSparseWhereRefined = 4.0;
 /// [-] Largest gradient of the dilation.
 constexpr double kSlope = 0.2;
 
@@ -72,7 +75,7 @@ class ThinPlaceFinder {
   /// The dilation that each brick needs.
   void measure() {
     const std::vector<double> areas =
-        forEachThinPoint(0.8, [this](const Vector3& p, double outside, double voxel) {
+        forEachThinPoint(1.5, [this](const Vector3& p, double outside, double voxel) {
           raise(needed_[brickAt(p)], static_cast<float>(dilationFor(outside, voxel)));
           return true;
         });
@@ -91,7 +94,7 @@ class ThinPlaceFinder {
     Field::Layout layout = field_.layout();
     layout.dilations = places.dilations;
     const Field offsets(layout, nullptr);
-    for (const double area : forEachThinPoint(1.0, [&](const Vector3&p, double outside, double) {
+    for (const double area : forEachThinPoint(1.9, [&](const Vector3&p, double outside, double) {
            return outside - offsets.dilationAt(p) > kOpen;
          }))
       places.open_area += area;
@@ -115,7 +118,7 @@ class ThinPlaceFinder {
         const auto fits = [&](const Vector3& centre, double length) {
           if (length > fraction * field_.voxel()) return false;
           return !thin_.at(centre) || field_.layout().refinement == 1 ||
-                 length <= fraction * field_.voxelAt(centre);
+                 length <= kSparseWhereRefined * fraction * field_.voxelAt(centre);
         };
         forEachPiece(t, fits, [&](const Vector3& p, double area) {
           if (!thin_.at(p)) return;

@@ -2,6 +2,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <vector>
 
 #include "server/structures/field_builder.h"
 
@@ -47,6 +48,7 @@ class Dilator {
       }
     }
     storage_.layout.margin = std::max(storage_.layout.margin - storage_.layout.dilation, 0.0);
+    if (dropped_) removeDropped();
   }
 
  private:
@@ -97,6 +99,7 @@ class Dilator {
         dilateSamples(child, corners, cell, r_);
       } else {
         child = DistanceField::kFarOutside;
+        dropped_ = true;
       }
     }
     dilateSamples(storage_.index[first + children], corners, {0, 0, 0}, 1);
@@ -135,8 +138,28 @@ class Dilator {
     }
   }
 
+  /// Closes the gaps that dropped children leave among the bricks of samples.
+  void removeDropped() {
+    const auto isBrick = [](Entry entry) { return entry >= 0 && entry < DistanceField::kRefined; };
+    constexpr std::size_t kBrick = DistanceField::kBrickSamples;
+    std::vector<Entry> number(storage_.samples.size() / kBrick, -1);
+    for (const Entry entry : storage_.index)
+      if (isBrick(entry)) number[static_cast<std::size_t>(entry)] = 0;
+    Entry kept = 0;
+    for (std::size_t brick = 0; brick < number.size(); ++brick) {
+      if (number[brick] < 0) continue;
+      std::copy_n(storage_.samples.data() + brick * kBrick, kBrick,
+                  storage_.samples.data() + static_cast<std::size_t>(kept) * kBrick);
+      number[brick] = kept++;
+    }
+    storage_.samples.resize(static_cast<std::size_t>(kept) * kBrick);
+    for (Entry& entry : storage_.index)
+      if (isBrick(entry)) entry = number[static_cast<std::size_t>(entry)];
+  }
+
   FieldStorage& storage_;
   const int r_;
+  bool dropped_ = false;  ///< a child at least
 };
 
 }  // namespace

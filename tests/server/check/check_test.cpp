@@ -90,11 +90,11 @@ TEST(Check, AStatedClearanceThatIsNotTrueIsAWarningWithTheTrueOne) {
 
 TEST(Check, AMissingClearanceIsNamedWithThePlayAndWhereToWriteIt) {
   const std::string text = with(smallScenario(), "pairs:\n  - {between: [part, bay], clearance: 4 mm}\n", "");
-  const Finding missing = theOnlyProblem(findingsIn(text, withSocket(Vector3(0.0412, 0.0412, 0.042))));
+  const Finding missing = theOnlyProblem(findingsIn(text, withSocket(Vector3(0.0406, 0.0406, 0.042))));
   EXPECT_EQ(missing.kind, FindingKind::kClearance);
-  EXPECT_NEAR(missing.value, 0.0012, 100e-6) << "a tenth of a voxel";
+  EXPECT_NEAR(missing.value, 0.0006, 100e-6) << "a tenth of a voxel";
   EXPECT_THAT(missing.text, HasSubstr("no clearance is stated"));
-  EXPECT_THAT(missing.hint, HasSubstr("{between: [part, bay], clearance: 1."));
+  EXPECT_THAT(missing.hint, HasSubstr("{between: [part, bay], clearance: 0."));
 }
 
 TEST(Check, AnOverlapAtTheStartIsFoundWithItsDepthPlaceAndAWayOut) {

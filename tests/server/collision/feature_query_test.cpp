@@ -33,7 +33,7 @@ class FeatureQuery : public ::testing::Test {
 
   /// A's lowest edge is `gap` [m] above B's highest.
   void query(double gap, const Vector3& off = Vector3::Zero()) {
-    query_ = {&a_->shell, &b_->field, Pose(Vector3(0.0, 0.0, 2.0 * kEdge + gap) + off), Pose(), 0.0, 0.001};
+    query_ = {&a_->shell, &b_->field, Pose(Vector3(0.0, 0.0, 2.0 * kEdge + gap) + off), Pose(), 0.001};
     queryPair(query_, *result_);
     queryFeatures(query_, features_, *scratch_, *result_);
   }
@@ -88,12 +88,9 @@ TEST_F(FeatureQuery, BoundsWhatItDoesNotList) {
 
 TEST_F(FeatureQuery, EdgesBesideFacesDoNotCross) {
   // A's bar lies with a face on B's edge: points hold it, and no edge of A crosses within the face
-  query_ = {&a_->shell,
-            &b_->field,
+  query_ = {&a_->shell, &b_->field,
             Pose(Vector3(0.0, 0.0, kEdge + 0.005 + 0.0002), expRotation({0.7853981633974483, 0.0, 0.0})),
-            Pose(),
-            0.0,
-            0.001};
+            Pose(), 0.001};
   queryPair(query_, *result_);
   queryFeatures(query_, features_, *scratch_, *result_);
   for (const Contact& one : crossings()) EXPECT_NEAR(one.gap, 0.0002, 1e-6) << "at the face's borders";
@@ -113,7 +110,7 @@ TEST(BlocksOfClusters, ListTheSameContactsAsTestingEveryPoint) {
   std::size_t contacts = 0;
   for (int trial = 0; trial < 300; ++trial) {
     const Vector3 p(0.3 * random.symmetric(), 0.25 * random.symmetric(), 0.25 + 0.02 * random.symmetric());
-    PairQuery query{&shell, &ball->field, Pose(), Pose(p), 0.0, 0.001};
+    PairQuery query{&shell, &ball->field, Pose(), Pose(p), 0.001};
     queryPair(query, *pruned);
     query.prune = false;
     queryPair(query, *unpruned);

@@ -159,14 +159,13 @@ TEST_F(OwnSteps, AHandIsFreeBesideOneThatIsBlocked) {
   const auto scene = load("{box: [800 mm, 400 mm, 20 mm], at: [0, 0, -10 mm]}",
                           "{box: [40 mm, 40 mm, 40 mm]}", "{box: [20 mm, 20 mm, 20 mm]}");
   ASSERT_TRUE(scene);
-  const double dilation = scene->pairs[0].dilation;  // of the pair with the coarsest field
   Environment environment(scene, {});
   Vector3 rest = Vector3::Zero();
   constexpr int kSettle = 200;
   for (int tick = 0; tick < 1000; ++tick) {
     place(environment, kRight, Pose(Vector3(0.0, 0.0, 0.03 - std::min(tick, kSettle) * 1e-4)));
     const double x = tick < kSettle ? -0.2 : 0.2 * swing(tick - kSettle, 268);
-    place(environment, kLeft, Pose(Vector3(x, 0.034 + dilation, 0.05)));
+    place(environment, kLeft, Pose(Vector3(x, 0.034, 0.05)));
     environment.step();
     ASSERT_EQ(lagOf(environment, kLeft, 0.02), 0.0) << "tick " << tick;
     const Vector3& p_WO = environment.objects()[kPart.value].X_WO.translation();
@@ -249,7 +248,7 @@ TEST_P(FreeFlights, HaveNoLag) {
     const auto scene = load("{box: [1600 mm, 1600 mm, 20 mm], at: [0, 0, -10 mm]}",
                             "{file: bar.stl, unit: mm}", "{box: [20 mm, 20 mm, 20 mm]}", 6);
     ASSERT_TRUE(scene);
-    const double height = 0.01 + scene->pairs[0].dilation + 0.012;
+    const double height = 0.01 + 0.012;
     const double step = GetParam().speed * kTickSeconds;
     // turning about the vertical near the wall, then about another axis high above it
     for (const bool low : {true, false}) {
@@ -314,7 +313,7 @@ TEST_P(NeverThrough, AtThreeMetresPerSecondFromAnyDirection) {
         place(environment, kRight, Pose(along * way + Vector3(0.001, 0.002, -0.001), expRotation(turn)));
         environment.step();
         nearest = std::min(nearest, gapOf(environment, kPart, kWall));
-        ASSERT_GT(nearest, -5e-5) << "tick " << tick;
+        ASSERT_GT(nearest, -1e-4) << "tick " << tick;
       }
       EXPECT_LT(nearest, 1e-3) << "it meets the wall";
     }

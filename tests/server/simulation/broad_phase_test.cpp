@@ -29,7 +29,8 @@ std::vector<std::uint32_t> bruteForce(const Scene& scene, const std::vector<Sphe
     const PairSpec& spec = scene.pairs[pair];
     const Sphere& a = spheres[spec.a.value];
     const Sphere& b = spheres[spec.b.value];
-    const double gap = (a.p_WC - b.p_WC).norm() - a.radius - b.radius - dilationOf(scene, spec.b);
+    const double dilation = std::max(dilationOf(scene, spec.a), dilationOf(scene, spec.b));
+    const double gap = (a.p_WC - b.p_WC).norm() - a.radius - b.radius - dilation;
     if (a.present && b.present && gap <= margin) result.push_back(pair);
   }
   return result;

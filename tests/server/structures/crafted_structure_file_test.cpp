@@ -98,11 +98,11 @@ TEST_F(CraftedStructureFile, FeaturesWithNumbersThatAreNoneAreRefused) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinite = std::numeric_limits<float>::infinity();
   for (const float bad : {nan, infinite, -infinite, 1e30F}) {
-    EXPECT_THAT(file.with(file.first(11), bad), HasSubstr("feature shell is damaged"));
+    EXPECT_THAT(file.with(file.first(12), bad), HasSubstr("feature shell is damaged"));
     for (std::size_t k = 0; k < 9; ++k)
-      EXPECT_THAT(file.with(file.first(15) + 4 * k, bad), HasSubstr("an edge is not plausible"));
+      EXPECT_THAT(file.with(file.first(16) + 4 * k, bad), HasSubstr("an edge is not plausible"));
   }
-  EXPECT_THAT(file.with(file.first(12) + 16, 1U), HasSubstr("feature shell is damaged"));
+  EXPECT_THAT(file.with(file.first(13) + 16, 1U), HasSubstr("feature shell is damaged"));
 }
 
 TEST_F(CraftedStructureFile, ASphereThatDoesNotContainItsPointsIsRefused) {
