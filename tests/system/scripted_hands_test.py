@@ -173,7 +173,7 @@ class States(Scripted):
         self.assertIn("running after 0.050 s", done.stdout)
 
     def test_people_need_states_and_pairs_of_what_their_states_move(self):
-        self.scene.write_text("title: Press" + SCENE, encoding="utf-8")
+        self.scene.write_text("title: Press" + SCENE + "pairs:\n  - {between: [part, plate]}\n", encoding="utf-8")
         done = self.rehearse()
         self.assertEqual(done.returncode, 1)
         self.assertIn("never collide", done.stderr)
