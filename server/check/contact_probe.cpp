@@ -18,7 +18,8 @@ double finestVoxel(const structures::DistanceField& field) {
 }
 
 /// Takes the dilation from the gaps of all contacts, and returns the smallest [m].
-double undilate(const structures::DistanceField& field, const Pose& X_WB, collision::PairQueryResult& result) {
+double undilate(const structures::DistanceField& field, const Pose& X_WB,
+                collision::PairQueryResult& result) {
   if (field.dilation() == 0.0 || result.contacts.empty()) return result.smallest_gap;
   const auto nearer = [](const collision::Contact& one, const collision::Contact& other) {
     return one.gap < other.gap;
@@ -83,9 +84,8 @@ NearestPlace ContactProbe::deepest(const PartObstacle& obstacle, const Pose& X_W
   const structures::HapticStructures& a = *scene_.objects[pair.b.value].structures;
   const structures::HapticStructures& b = *scene_.objects[pair.a.value].structures;
   if (a.shell.empty() || b.field.empty()) return place;
-  NearestPlace reversed =
-      part_is_shell ? query(a, obstacle.X_WO, b, X_WO, ProbedSurface::kMesh)
-                    : query(a, X_WO, b, obstacle.X_WO, ProbedSurface::kMesh);
+  NearestPlace reversed = part_is_shell ? query(a, obstacle.X_WO, b, X_WO, ProbedSurface::kMesh)
+                                        : query(a, X_WO, b, obstacle.X_WO, ProbedSurface::kMesh);
   if (part_is_shell) reversed.n_W = -reversed.n_W;
   return reversed.gap + tolerance.at(reversed) < place.gap ? reversed : place;
 }

@@ -9,7 +9,7 @@ namespace tenon::check {
 
 std::string_view nameOf(FindingKind kind) {
   constexpr std::array<std::string_view, 8> kNames{"load",     "overlap", "clearance", "scale",
-                                                   "approach", "reach",   "turning", "open"};
+                                                   "approach", "reach",   "turning",   "open"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 

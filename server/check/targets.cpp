@@ -197,8 +197,7 @@ class TargetCheck {
     if (play.isFit() && stated > 0.0) {
       compareClearance(obstacle, play, stated);
     } else if (play.isFit() && play.play < resolvedPlay(play)) {
-      const bool is_unreachable =
-          held_off > state_.tolerance || play.play < 2.0 * play.place.dilation;
+      const bool is_unreachable = held_off > state_.tolerance || play.play < 2.0 * play.place.dilation;
       addMissingClearance(obstacle, play, is_unreachable);
       return !is_unreachable;
     }

@@ -123,7 +123,8 @@ PairQuery reversed(const PairQuery& query, const PairFeatures& features, double 
 
 /// Adds to the gaps of B's features what A's field is dilated beyond `most_dilation_A`. `displacement` [m] as
 /// in resampleContacts().
-void limitDilation(const PairFeatures& features, const Pose& X_WA, double displacement, PairQueryResult& of_B) {
+void limitDilation(const PairFeatures& features, const Pose& X_WA, double displacement,
+                   PairQueryResult& of_B) {
   if (features.most_dilation_A >= features.field_A->dilation()) return;
   const Pose X_AW = X_WA.inverse();
   double smallest = of_B.unlisted_gap - displacement;
@@ -252,8 +253,7 @@ class CrossingSearch {
       known = true;
       const EdgePiece& other = near_.pieces[ball.piece];
       Contact contact;
-      if (!cross(piece, other, query_.margin, kListedTolerance, contact) ||
-          contact.gap > query_.margin)
+      if (!cross(piece, other, query_.margin, kListedTolerance, contact) || contact.gap > query_.margin)
         continue;
       contact.kind = ContactKind::kCrossing;
       contact.point = i;
@@ -364,8 +364,7 @@ void resampleFeatures(const PairQuery& query, const PairFeatures& features, doub
   const Transform X_AB(query.X_WA.inverse() * query.X_WB);
   for (Contact& contact : crossings) {
     evaluateCrossing(pieceOf(*features.features_A, contact.point),
-                     pieceOf(*features.features_B, contact.other, X_AB), X_WA, contact,
-                     result.dormant_gap);
+                     pieceOf(*features.features_B, contact.other, X_AB), X_WA, contact, result.dormant_gap);
     result.smallest_gap = std::min(result.smallest_gap, contact.gap);
     contacts.push_back(contact);
   }

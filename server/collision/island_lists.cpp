@@ -109,9 +109,9 @@ bool IslandSolver::updatePair(const Job& job, std::size_t i, SolveReport& report
 
 void IslandSolver::traversePair(const Job& job, std::size_t i, SolveReport& report) {
   const IslandPair& pair = job.pairs[i];
-  PairQuery query = job.queryOf(
-      pair, neededMargin(pair, job.limits) +
-                kTraversalSteps * pair.slope() * movableBodies(pair) * job.limits.max_step_length);
+  PairQuery query = job.queryOf(pair, neededMargin(pair, job.limits) + kTraversalSteps * pair.slope() *
+                                                                           movableBodies(pair) *
+                                                                           job.limits.max_step_length);
   query.levels = std::min(pair.levels, job.results[i].traversal.levels_used);
   query.reduce = true;
   queryPair(query, job.results[i].query);

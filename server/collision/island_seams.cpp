@@ -31,8 +31,7 @@ bool IslandSolver::findSeam(const Job& job, std::size_t pair, std::size_t c, std
   Seam seam{pair, c, row, {}};
   for (const Vector3& t_W : tangentsOf(contact.n_W)) {
     for (const double offset : {kSeamDistance, -kSeamDistance}) {
-      const structures::FieldSample sample =
-          surface.sample(X_WB.inverse() * (contact.p_WP + offset * t_W));
+      const structures::FieldSample sample = surface.sample(X_WB.inverse() * (contact.p_WP + offset * t_W));
       const double slope = sample.gradient.norm();
       if (!sample.exact || slope < kMinSeamSlope) continue;
       const Vector3 gradient_W = X_WB.rotation() * sample.gradient;

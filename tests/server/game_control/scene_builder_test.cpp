@@ -62,8 +62,9 @@ TEST(SceneBuilder, ASolidResolvesAClearanceOfFourFifthsOfAVoxel) {
   const auto refused = withClearance("0.7 mm");
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().what, HasSubstr("small/scenario.yaml:11: clearance of bay-pointer (0.7 mm)"));
-  EXPECT_THAT(refused.error().what, HasSubstr("needs 0.8 mm there); use voxel 0.87 mm or a box in 'refine' around the "
-                                             "place, with refinement 2"));
+  EXPECT_THAT(refused.error().what,
+              HasSubstr("needs 0.8 mm there); use voxel 0.87 mm or a box in 'refine' around the "
+                        "place, with refinement 2"));
   const auto accepted = withClearance("0.8 mm");
   EXPECT_TRUE(accepted) << accepted.error().what;
 }
