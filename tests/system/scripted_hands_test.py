@@ -85,6 +85,15 @@ class Forces(Scripted):
             self.assertAlmostEqual(math.hypot(*tick["hands"]["right"]["F_Ho_W"]), 0, delta=1e-6)
             self.assertEqual(tick["objects"]["pointer"]["status"], "hidden")
 
+    def test_the_frame_of_an_object_that_is_taken_is_the_hands_wherever_its_mesh_is(self):
+        text = SCENE.replace("name: part, meshes: [{box: [20 mm, 20 mm, 20 mm]", "name: part, meshes: [{box: [20 mm, 20 mm, 20 mm], at: [50 mm, 0, 0]")
+        self.assertNotEqual(text, SCENE)
+        self.scene.write_text("title: Press" + text, encoding="utf-8")
+        ticks, _ = self.logged("--input", f"right={self.file('still.csv', (0, 0.1, 0.2, 0.3, 1, 0, 0, 0))}", "--take", "right=part",
+                               "--seconds", 0.05)
+        self.assertEqual(ticks[0]["objects"]["part"]["X_WO"][:3], [0.1, 0.2, 0.3])
+        self.assertEqual(ticks[-1]["hands"]["right"]["F_Ho_W"], [0, 0, 0, 0, 0, 0])
+
     def test_a_hand_moves_its_own_object_and_an_absent_hand_moves_none(self):
         self.scene.write_text("title: Press" + SCENE, encoding="utf-8")  # nobody moves the part
         ticks, _ = self.logged("--input", f"left={self.file('tool.csv', (0, 0.2, 0, 0.3, 1, 0, 0, 0))}", "--seconds", 0.05)
