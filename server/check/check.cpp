@@ -10,23 +10,6 @@
 
 namespace tenon::check {
 
-std::string inMillimetres(double metres) {
-  // a check is not more exact than a hundredth of a millimetre
-  const double mm = std::abs(metres) < 50e-6 ? 1e3 * metres : std::round(1e5 * metres) / 100.0;
-  return std::abs(mm) < 9999.5 ? fmt::format("{:.3g} mm", mm) : fmt::format("{:.3g} m", metres);
-}
-
-std::string inDegrees(double radians) {
-  constexpr double kDegrees = 57.29577951308232;
-  return fmt::format("{:.3g} deg", radians * kDegrees);
-}
-
-std::string pointText(const Vector3& p_W) {
-  // -0.0 is 0
-  const auto tenth = [](double metres) { return std::round(1e4 * metres) / 10.0 + 0.0; };
-  return fmt::format("({:g}, {:g}, {:g}) mm", tenth(p_W.x()), tenth(p_W.y()), tenth(p_W.z()));
-}
-
 std::vector<PartObstacle> CheckedScene::obstaclesOf(ObjectId part, std::size_t state, bool with_hands) const {
   const game_control::SceneMoment& moment = moments[state];
   std::vector<PartObstacle> obstacles;

@@ -7,9 +7,14 @@
 
 #include "server/check/check.h"
 #include "server/check/contact_probe.h"
+#include "server/game_control/quantity_text.h"
 #include "server/game_control/scenario_moments.h"
 
 namespace tenon::check {
+
+using game_control::inDegrees;
+using game_control::inMillimetres;
+using game_control::pointText;
 
 /// What all checks of a scene share.
 struct CheckedScene {
@@ -52,13 +57,5 @@ void checkTurns(CheckedScene& checked);
 /// of `place`, where it is deepest; empty when there is none.
 [[nodiscard]] std::string wayOut(ContactProbe& probe, std::span<const PartObstacle> obstacles,
                                  const Pose& X_WO, const NearestPlace& place, double furthest);
-
-// words and numbers of sentences
-/// "2.6 mm": three significant digits, to the hundredth; `metres` [m].
-[[nodiscard]] std::string inMillimetres(double metres);
-/// "12.5 deg"; `radians` [rad].
-[[nodiscard]] std::string inDegrees(double radians);
-/// "(12, 0, -59) mm", to the tenth.
-[[nodiscard]] std::string pointText(const Vector3& p_W);
 
 }  // namespace tenon::check

@@ -308,7 +308,8 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
   result.unlisted_gap = std::min(result.unlisted_gap, crossing_bound);
 }
 
-double featureGap(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch) noexcept {
+double featureGap(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
+                  QueryCounts& counts) noexcept {
   if (!features.any()) return std::numeric_limits<double>::infinity();
   const double half_B = features.features_B->longestHalf();
   const bool may_cross = half_B > 0.0 && features.features_A->longestHalf() > 0.0;
@@ -317,6 +318,7 @@ double featureGap(const PairQuery& query, const PairFeatures& features, FeatureS
   PairQuery of_B = reversed(query, features, query.margin + nearer);
   of_B.list = false;
   queryPair(of_B, scratch.of_B);
+  addCounts(scratch.of_B.counts, counts);
   return scratch.of_B.smallest_gap - nearer;
 }
 

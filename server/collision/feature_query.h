@@ -74,11 +74,11 @@ void resampleFeatures(const PairQuery& query, const PairFeatures& features, doub
                       FeatureScratch& scratch, PairQueryResult& result) noexcept;
 
 /// [m] Lower bound of the gap of features and crossings up to `query.margin`, beyond that a larger one. Lists
-/// nothing; `scratch` has the work that it took.
+/// nothing; adds its work to `counts`.
 ///
 /// Threads: pure, but for the scratch. Real-time.
-[[nodiscard]] double featureGap(const PairQuery& query, const PairFeatures& features,
-                                FeatureScratch& scratch) noexcept;
+[[nodiscard]] double featureGap(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
+                                QueryCounts& counts) noexcept;
 
 inline constexpr std::size_t kFeatureRoom = 128;
 inline constexpr std::size_t kMaxCrossings = 64;

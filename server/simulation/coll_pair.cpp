@@ -225,7 +225,7 @@ double CollPair::findGap(const Pose& X_WA, const Pose& X_WB, double limit, colli
   query.list = false;
   collision::queryPair(query, found);
   return std::min(found.smallest_gap - found.skipped_gap_error,
-                  collision::featureGap(query, features_, scratch));
+                  collision::featureGap(query, features_, scratch, found.counts));
 }
 
 }  // namespace tenon::simulation
