@@ -160,8 +160,8 @@ bool CollPair::isIndexValid(const collision::Contact& contact) const noexcept {
     case collision::ContactKind::kFeaturePoint:
       return features_.any() && contact.point < features_.features_B->edges().size();
     case collision::ContactKind::kCrossing:
-      return features_.any() && contact.point < features_.features_A->edges().size() &&
-             contact.other < features_.features_B->edges().size();
+      return features_.any() && collision::isEdge(*features_.features_A, contact.point) &&
+             collision::isEdge(*features_.features_B, contact.other);
   }
   return false;
 }
