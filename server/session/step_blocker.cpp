@@ -58,6 +58,8 @@ std::string whatBlocks(const ScenarioFile& scenario, const TickOutput& output) {
   }
   const std::string error = state.X_WG ? errorText(state, output.step) : "";
   if (error.empty()) return unmetCondition(scenario, output.step);
+  if (!output.objects[state.object.value].holder.valid())
+    return fmt::format("{} is {}, in no hand", title(state.object), error);
   const PairContact* contact = mostLoaded(scenario, output, state.object);
   if (contact == nullptr) return fmt::format("{} is {}, and touches nothing", title(state.object), error);
   const ObjectId other = contact->a == state.object ? contact->b : contact->a;
