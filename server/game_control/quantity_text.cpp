@@ -7,15 +7,12 @@
 namespace tenon::game_control {
 
 std::string inMillimetres(double metres) {
-  // no more exact than a hundredth of a millimetre
-  const double mm = std::abs(metres) < 50e-6 ? 1e3 * metres : std::round(1e5 * metres) / 100.0;
+  // from a tenth of a millimetre on no more exact than a hundredth
+  const double mm = std::abs(metres) < 100e-6 ? 1e3 * metres : std::round(1e5 * metres) / 100.0;
   return std::abs(mm) < 9999.5 ? fmt::format("{:.3g} mm", mm) : fmt::format("{:.3g} m", metres);
 }
 
-std::string inDegrees(double radians) {
-  constexpr double kDegrees = 57.29577951308232;
-  return fmt::format("{:.3g} deg", radians * kDegrees);
-}
+std::string inDegrees(double radians) { return fmt::format("{:.3g} deg", radians / kDegree); }
 
 std::string pointText(const Vector3& p_W) {
   // 0.0 + -0.0 is 0.0
