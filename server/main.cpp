@@ -8,7 +8,6 @@
 #include <fmt/ranges.h>
 #include <unistd.h>
 
-#include "devices/catalog.h"
 #include "idl/types/output_files.h"
 #include "server/check/check.h"
 #include "server/session/journal.h"
@@ -107,13 +106,7 @@ void showLoading(std::string_view activity, double fraction) {
 
 /// Says what is wrong with the scenario, as `tenon check` does for the devices that stations open by default.
 void printProblems(const tenon::session::LoadedScene& loaded) {
-  tenon::check::CheckOptions options;
-  if (const auto caps = tenon::devices::capsOf("hug-sim"))
-    options.trainee = {"hug-sim", caps->rotation_range};
-  if (const auto caps = tenon::devices::capsOf("sigma7-sim"))
-    options.instructor = {"sigma7-sim", caps->rotation_range};
-  const auto findings = tenon::check::checkScene(*loaded.scenario, *loaded.scene, options);
-  for (const std::string& line : tenon::check::problemLines(*loaded.scenario, findings)) printLine(line);
+  for (const std::string& line : tenon::check::problems(*loaded.scenario, *loaded.scene)) printLine(line);
 }
 
 /// Reports what has changed since the recording; true when that forbids the re-simulation.

@@ -37,12 +37,12 @@ ROOMS = {
                           ["Bullet"]),
     "server/game_control": ("tenon::game_control", ["idl/types", "server/structures", "server/simulation"], ["yaml-cpp", "fmt"]),
     "server/check": ("tenon::check", ["idl/types", "server/structures", "server/collision", "server/simulation",
-                                      "server/game_control"], ["fmt"]),
+                                      "server/game_control", "devices"], ["fmt"]),  # devices: their catalog, for limits
     "server/session": ("tenon::session", IDL + DECIDES, ["fmt", "POSIX"]),
     # the limits of devices, asked of their catalog, are what a check is made against
     "server/tools": ("tenon::tools", ["idl/types"] + DECIDES + ["server/check", "server/session", "devices"],
                      ["fmt", "CLI11", "JSON", "POSIX"]),
-    "server": ("tenon::session", IDL + DECIDES + ["server/check", "server/session", "devices"], ["fmt", "CLI11", "POSIX"]),
+    "server": ("tenon::session", IDL + DECIDES + ["server/check", "server/session"], ["fmt", "CLI11", "POSIX"]),
     "devices": ("tenon::devices", ["idl/types", "idl/threads", "devices/simulated", "devices/drivers"], []),
     "devices/simulated": ("tenon::devices", ["idl/types", "idl/threads", "devices"], []),
     "devices/drivers": ("tenon::devices", ["idl/types", "idl/threads", "devices"], ["POSIX"]),
@@ -111,7 +111,6 @@ UNITS = {
     "server/collision/motion_solver": "server/collision/motion_workspace",
     "server/structures/pointshell": "server/structures/level_areas",
     "server/simulation/environment": "server/simulation/{engine,environment_*}",
-    "server/check/check": "server/check/{overlaps,scene_checks,sizes,targets,turns}",
     "server/game_control/scenario": "server/game_control/{condition_reader,named_values,scenario_*,yaml_reader}",
 }
 

@@ -55,7 +55,7 @@ tenon_tests(server/bake LINK server_bake scenarios_part_generator)  # a scene wh
 tenon_tests(server/collision LINK server_collision server_bake scenarios_part_generator)  # baked parts, beside their meshes
 tenon_tests(idl/wire LINK idl_wire)  # the bus's own threads are Cyclone's, which no sanitizer of ours can see into
 tenon_tests(idl/threads THREADS LINK idl_threads)
-tenon_tests(server/simulation THREADS LINK server_simulation)
+tenon_tests(server/simulation THREADS LINK server_simulation server_bake scenarios_part_generator)  # parts with edges
 tenon_tests(server/session THREADS LINK server_session clients_haptic)  # a session and its station
 tenon_tests(clients/haptic THREADS LINK clients_haptic server_simulation)  # two stations and their server in one process
 foreach(target server_bake_tests server_collision_tests server_session_tests)

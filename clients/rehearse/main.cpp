@@ -43,7 +43,7 @@ struct RehearseArguments {
   bool quiet = false;
   bool follow = false;
   int misplaced_mount = -1;
-  std::string device = "sigma7-sim";
+  std::string device{tenon::devices::kInstructorDevice};
 };
 
 void declareScript(CLI::App& app, RehearseArguments& arguments) {
@@ -200,13 +200,8 @@ void printOutcome(const tenon::rehearse::RehearsalReport& report) {
 /// Says what is wrong with the scenario, as `tenon check` does.
 void printProblems(const RehearseArguments& arguments, const tenon::session::LoadedScene& loaded) {
   if (arguments.quiet) return;
-  tenon::check::CheckOptions options;
-  if (const auto caps = tenon::devices::capsOf("hug-sim"))
-    options.trainee = {"hug-sim", caps->rotation_range};
-  if (const auto caps = tenon::devices::capsOf(arguments.device))
-    options.instructor = {arguments.device, caps->rotation_range};
-  const auto findings = tenon::check::checkScene(*loaded.scenario, *loaded.scene, options);
-  for (const std::string& line : tenon::check::problemLines(*loaded.scenario, findings))
+  const tenon::check::CheckOptions options{.instructor_device = arguments.device};
+  for (const std::string& line : tenon::check::problems(*loaded.scenario, *loaded.scene, options))
     std::printf("%s\n", line.c_str());
 }
 

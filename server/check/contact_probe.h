@@ -9,7 +9,7 @@
 
 #include "idl/types/ids.h"
 #include "idl/types/spatial.h"
-#include "server/collision/pair_query.h"
+#include "server/collision/feature_query.h"
 #include "server/simulation/scene.h"
 
 namespace tenon::check {
@@ -30,6 +30,7 @@ struct PartObstacle {
 /// Where a part is nearest to an obstacle, or deepest inside.
 struct NearestPlace {
   double gap = 0.0;                ///< [m] signed; a bound when it is not `exact`
+  double free_path = 0.0;          ///< [m] of any point towards the obstacle: at most `gap`
   bool exact = false;              ///< the gap is within the band of the field
   bool located = false;            ///< there is a contact: its place, of the deepest one within the band
   Vector3 p_WP = Vector3::Zero();  ///< if located
@@ -44,6 +45,7 @@ using PartMotion = std::function<Pose(double s)>;
 /// How far a part can be moved.
 struct PartTravel {
   double length = 0.0;   ///< [m] free path; the limit when nothing blocks it
+  bool complete = true;  ///< false: steps ran out, and nothing is known beyond `length`
   bool blocked = false;  ///< by `obstacle` (an index), at `place`
   std::size_t obstacle = 0;
   NearestPlace place;
@@ -56,7 +58,8 @@ struct ProbeTolerance {
   [[nodiscard]] double at(const NearestPlace& place) const { return absolute + voxels * place.voxel; }
 };
 
-/// Queries of one part against others that stand still, with the fields and pointshells of the simulation.
+/// Queries of one part against others that stand still, with the fields, pointshells and features of the
+/// simulation: what holds a part in a session is found.
 ///
 /// Threads: one. Real-time: no.
 class ContactProbe {
@@ -64,10 +67,6 @@ class ContactProbe {
   ContactProbe(const simulation::Scene& scene, ObjectId part);
 
   [[nodiscard]] NearestPlace nearest(const PartObstacle& obstacle, const Pose& X_WO, ProbedSurface surface);
-  /// Of the meshes, and with the sides exchanged too, which finds corners of the SDF side between points of
-  /// the other: that counts where it is deeper by more than `tolerance`.
-  [[nodiscard]] NearestPlace deepest(const PartObstacle& obstacle, const Pose& X_WO,
-                                     const ProbeTolerance& tolerance);
 
   /// Moves the part until it is deeper in an obstacle than `floors` [m] (by obstacle, <= 0: a gap) by more
   /// than `tolerance`, or up to `limit` [m]. Steps are as long as the gap permits, and short where the part
@@ -76,28 +75,22 @@ class ContactProbe {
                                   const PartMotion& motion, double limit, ProbedSurface surface,
                                   const ProbeTolerance& tolerance);
 
-  /// Queries so far: the measure of work.
-  [[nodiscard]] std::size_t queries() const { return queries_; }
-
  private:
   /// The least room before a floor is passed.
   struct Room {
-    double room = 0.0;  ///< [m] < 0: passed
+    double room = 0.0;       ///< [m] < 0: passed
+    double free_path = 0.0;  ///< [m] before any obstacle is met
     std::size_t obstacle = 0;
     NearestPlace place;
   };
   /// `floors` [m]: as in travel().
   [[nodiscard]] Room roomAt(std::span<const PartObstacle> obstacles, std::span<const double> floors,
                             const Pose& X_WO, ProbedSurface surface, const ProbeTolerance& tolerance);
-  /// The points of a against `surface` of b.
-  [[nodiscard]] NearestPlace query(const structures::HapticStructures& a, const Pose& X_WA,
-                                   const structures::HapticStructures& b, const Pose& X_WB,
-                                   ProbedSurface surface);
 
   const simulation::Scene& scene_;
   ObjectId part_;
   std::unique_ptr<collision::PairQueryResult> result_;
-  std::size_t queries_ = 0;
+  std::unique_ptr<collision::FeatureScratch> feature_scratch_;
 };
 
 }  // namespace tenon::check

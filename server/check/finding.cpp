@@ -23,14 +23,6 @@ std::size_t countOf(const std::vector<Finding>& findings, Severity severity) {
                     [severity](const Finding& finding) { return finding.severity == severity; }));
 }
 
-std::vector<std::string> problemLines(const game_control::ScenarioFile& scenario,
-                                      const std::vector<Finding>& findings) {
-  std::vector<std::string> lines;
-  for (const Finding& finding : findings)
-    if (finding.severity != Severity::kInfo) lines.push_back(lineOf(scenario, finding));
-  return lines;
-}
-
 std::string lineOf(const game_control::ScenarioFile& scenario, const Finding& finding) {
   const std::string at =
       finding.line > 0 ? fmt::format("{}:{}", scenario.path.string(), finding.line) : scenario.path.string();

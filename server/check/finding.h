@@ -48,10 +48,6 @@ struct Finding {
 /// Number of findings of a severity.
 [[nodiscard]] std::size_t countOf(const std::vector<Finding>& findings, Severity severity);
 
-/// The errors and warnings among `findings`, a line each: see lineOf.
-[[nodiscard]] std::vector<std::string> problemLines(const game_control::ScenarioFile& scenario,
-                                                    const std::vector<Finding>& findings);
-
 /// One line for a terminal or a log: `FILE:LINE: error: SENTENCE (HINT)`.
 [[nodiscard]] std::string lineOf(const game_control::ScenarioFile& scenario, const Finding& finding);
 

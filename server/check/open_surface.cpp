@@ -1,6 +1,6 @@
-#include <fmt/format.h>
+#include "server/check/open_surface.h"
 
-#include "server/check/scene_checks.h"
+#include <fmt/format.h>
 
 namespace tenon::check {
 

@@ -183,7 +183,7 @@ std::size_t IslandSolver::pairOfRow(const Job& job, std::size_t row) {
 double IslandSolver::validityRadius(const Job& job) {
   double radius = job.limits.max_step_length;
   for (const IslandPairResult& result : job.results) {
-    if (result.query.counts.contacts_dropped > 0) radius = std::min(radius, result.query.complete_to);
+    radius = std::min(radius, result.query.complete_to);
   }
   return std::max(radius, kMinValidity * job.limits.max_step_length);
 }

@@ -37,6 +37,7 @@ IslandSolver::IslandSolver(std::size_t max_bodies, std::size_t max_pairs)
       step_(max_bodies),
       step_without_seams_(max_bodies),
       lengths_(max_bodies),
+      clearances_(max_pairs),
       fractions_(max_bodies),
       leaders_(max_bodies),
       last_step_(max_bodies),
@@ -228,8 +229,9 @@ bool IslandSolver::limitStep(const Job& job, double trust) {
   };
   for (std::size_t p = 0; p < job.pairs.size(); ++p) {
     const IslandPair& pair = job.pairs[p];
+    clearances_[p] = clearanceOf(job, p);
     if (pair.body_a == ContactConstraint::kStatic || pair.body_b == ContactConstraint::kStatic) continue;
-    if (lengthOf(pair.body_a) + lengthOf(pair.body_b) <= clearanceOf(job, p)) continue;
+    if (lengthOf(pair.body_a) + lengthOf(pair.body_b) <= clearances_[p]) continue;
     const std::size_t a = leaderOf(static_cast<std::size_t>(pair.body_a));
     const std::size_t b = leaderOf(static_cast<std::size_t>(pair.body_b));
     leaders_[std::max(a, b)] = std::min(a, b);
@@ -239,7 +241,7 @@ bool IslandSolver::limitStep(const Job& job, double trust) {
   bool by_trust = false;
   for (std::size_t p = 0; p < job.pairs.size(); ++p) {
     const IslandPair& pair = job.pairs[p];
-    const double clearance = clearanceOf(job, p);
+    const double clearance = clearances_[p];
     const double approach = lengthOf(pair.body_a) + lengthOf(pair.body_b);
     if (approach <= clearance) continue;
     const double free = clearance / approach;

@@ -300,6 +300,7 @@ class IslandSolver {
   std::vector<Displacement> step_;                ///< the QP's solution, by body
   std::vector<Displacement> step_without_seams_;  ///< the same if contacts at seams did not hold
   std::vector<double> lengths_;                   ///< [m] of step_, of any point, by body
+  std::vector<double> clearances_;                ///< [m] clearanceOf each pair
   std::vector<double> fractions_;                 ///< [-] of step_ to take, by body
   std::vector<std::size_t> leaders_;              ///< by body: union-find of those that share a fraction
   std::vector<Displacement> last_step_;           ///< the step that led to the iterate

@@ -311,6 +311,7 @@ class Traversal {
     Contact& contact = *result_.contacts.extend();
     lanes.setContact(i, contact);
     contact.point = point;
+    contact.other = 0;
     contact.kind = ContactKind::kShellPoint;
     contact.area = areaOf(point);
   }

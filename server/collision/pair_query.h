@@ -18,6 +18,10 @@ enum class ContactKind : std::uint8_t {
   kCrossing,      ///< a piece of an edge of A, one of B
 };
 
+/// [m] Further apart than any margin. The gap of a dormant crossing (feature_query.h) is this plus the
+/// distance of its segments.
+inline constexpr double kDormantGap = 1.0;
+
 /// A point of body A near body B's surface, or of B near A's (feature_query.h).
 struct Contact {
   Vector3 p_WP = Vector3::Zero();
@@ -29,6 +33,10 @@ struct Contact {
   std::uint32_t point = 0;
   std::uint32_t other = 0;  ///< of a kCrossing: index in B's features
   ContactKind kind = ContactKind::kShellPoint;
+
+  [[nodiscard]] bool dormant() const { return gap >= kDormantGap; }
+  /// [m] Lower bound of the gap; for a dormant crossing the distance of its segments.
+  [[nodiscard]] double gapBound() const { return dormant() ? gap - kDormantGap : gap; }
 };
 
 inline constexpr std::size_t kMaxPairContacts = 512;
@@ -40,7 +48,8 @@ struct QueryCounts {
   std::uint32_t spheres_total = 0;  ///< of all levels
   std::uint32_t points_visited = 0;
   std::uint32_t points_colliding = 0;  ///< with a negative gap
-  std::uint32_t contacts_dropped = 0;  ///< contacts beyond the list's capacity: those with the largest gaps
+  /// contacts beyond the list's capacity: those with the largest gaps; dormant crossings do not count
+  std::uint32_t contacts_dropped = 0;
 
   /// [%] Load eta (paper eq. 2): the mean of two ratios, spheres visited to all spheres and points colliding
   /// to points visited.
@@ -124,8 +133,8 @@ void resampleContacts(const PairQuery& query, double displacement, PairQueryResu
                                    double stiffness) noexcept;
 
 /// Selects at most `out.size()` contacts that represent all: the smallest gap, then always the one that
-/// differs most from those selected in position and normal. Writes indices into `contacts` in order of
-/// selection and returns their number.
+/// differs most from those selected in position and normal. Dormant crossings are none. Writes indices into
+/// `contacts` in order of selection and returns their number.
 std::size_t selectRepresentatives(const ContactList& contacts, std::span<std::uint32_t> out) noexcept;
 
 }  // namespace tenon::collision

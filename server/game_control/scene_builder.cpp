@@ -1,9 +1,8 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
+#include "server/game_control/quantity_text.h"
 #include "server/game_control/scenario.h"
 #include "server/game_control/scenario_moments.h"
 
@@ -17,13 +16,6 @@ constexpr double kEdgeError = 0.2;              // [voxels] of a solid at an edg
 constexpr double kRounding = 1e-9;              // [-] relative: a typed number equal to a limit is within it
 constexpr double kTargetMargin = 1.0;    // [m] a target farther outside the scene is taken for a mistake
 constexpr double kFarthestOrigin = 1e3;  // [m] of a frame: coordinates in it keep their micrometres
-
-/// "2.6 mm", three significant digits.
-std::string inMillimetres(double metres) {
-  std::array<char, 32> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), "%.3g mm", metres * 1e3);
-  return buffer.data();
-}
 
 ObjectId otherObject(const ScenarioPair& pair, ObjectId object) { return pair.a == object ? pair.b : pair.a; }
 

@@ -4,13 +4,13 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <numbers>
 #include <set>
 #include <span>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "server/game_control/quantity_text.h"
 #include "server/game_control/scenario_keys.h"
 
 namespace tenon::game_control {
@@ -21,7 +21,6 @@ struct UnitFactor {
   double si;  ///< [SI unit] one of this unit
 };
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::array kLengths{UnitFactor{"m", 1.0}, UnitFactor{"mm", 1e-3}, UnitFactor{"cm", 1e-2},
                               UnitFactor{"in", 0.0254}};
 constexpr std::array kAngles{UnitFactor{"deg", kDegree}, UnitFactor{"rad", 1.0}};

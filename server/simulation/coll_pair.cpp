@@ -156,8 +156,8 @@ bool CollPair::isIndexValid(const collision::Contact& contact) const noexcept {
     case collision::ContactKind::kFeaturePoint:
       return features_.any() && contact.point < features_.features_B->edges().size();
     case collision::ContactKind::kCrossing:
-      return features_.any() && contact.point < features_.features_A->edges().size() &&
-             contact.other < features_.features_B->edges().size();
+      return features_.any() && collision::isEdge(*features_.features_A, contact.point) &&
+             collision::isEdge(*features_.features_B, contact.other);
   }
   return false;
 }
@@ -220,7 +220,7 @@ double CollPair::findGap(const Pose& X_WA, const Pose& X_WB, double limit, colli
   query.list = false;
   collision::queryPair(query, found);
   return std::min(found.smallest_gap - found.skipped_gap_error,
-                  collision::featureGap(query, features_, scratch)) /
+                  collision::featureGap(query, features_, scratch, found.counts)) /
          slope_;
 }
 

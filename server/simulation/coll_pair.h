@@ -171,8 +171,9 @@ class CollPair {
   [[nodiscard]] double pointsOf(std::uint32_t levels) const noexcept;
   [[nodiscard]] bool nextLevelFits(const WorkLimits& limits, std::uint32_t budget) const noexcept;
   void store(const collision::PairQueryResult& query) noexcept;
-  /// Validates a list read from a checkpoint: indices in range.
+  /// Validates a contact read from a checkpoint: indices in range, crossings at pieces of edges.
   [[nodiscard]] bool isIndexValid(const collision::Contact& contact) const noexcept;
+  /// Validates a list read from a checkpoint.
   [[nodiscard]] bool isValid(const collision::IslandPairResult& list) const noexcept;
   /// Whole ticks in which `distance` [m] cannot be closed at `closing_speed` [m/s].
   [[nodiscard]] static Tick ticksToClose(double distance, double closing_speed) noexcept;

@@ -292,6 +292,20 @@ TEST(SelectRepresentatives, SelectsAContactOfADifferentNormal) {
   EXPECT_EQ(selectRepresentatives(none, chosen), 0U);
 }
 
+TEST(SelectRepresentatives, DormantCrossingsAreNone) {
+  ContactList contacts;
+  for (std::uint32_t i = 0; i < 40; ++i) {
+    Contact contact;
+    contact.p_WP = Vector3(0.001 * i, 0.0, 0.0);
+    contact.n_W = i % 2 == 0 ? Vector3::UnitX() : Vector3::UnitZ();
+    contact.gap = i % 4 == 3 ? 1e-4 : kDormantGap + 1e-4;
+    contacts.push_back(contact);
+  }
+  std::array<std::uint32_t, 16> chosen{};
+  ASSERT_EQ(selectRepresentatives(contacts, chosen), 10U);
+  for (std::size_t i = 0; i < 10; ++i) EXPECT_EQ(chosen[i] % 4, 3U);
+}
+
 TEST(QueryCounts, LoadIsThatOfThePapersEquation2) {
   QueryCounts counts;
   EXPECT_EQ(counts.loadPercent(), 0.0);

@@ -161,13 +161,13 @@ TEST(SceneBuilder, RefusesPosesOutOfReach) {
     return scene ? std::string() : scene.error().what;
   };
   EXPECT_THAT(refusal("at: [0, 0, -20 mm]", "at: [0, 0, -20 m]"),
-              HasSubstr("scenario.yaml:16: the target of state 'mount' is 2e+04 mm from the world's origin, "
-                        "expected at most 'reach', 1e+04 mm"));
+              HasSubstr("scenario.yaml:16: the target of state 'mount' is 20 m from the world's origin, "
+                        "expected at most 'reach', 10 m"));
   EXPECT_THAT(refusal("at: [0.2, 0, 0.1]", "at: [200, 0, 0.1]"),
-              HasSubstr("scenario.yaml:4: the start of object 'part' is 2e+05 mm from the world's origin"));
+              HasSubstr("scenario.yaml:4: the start of object 'part' is 200 m from the world's origin"));
   EXPECT_THAT(
       refusal("    hands: {right: part}", "    place: {cube: {at: [0, 30 m, 0]}}\n    hands: {right: part}"),
-      HasSubstr("scenario.yaml:16: the place of 'cube' at the begin of state 'mount' is 3e+04 mm"));
+      HasSubstr("scenario.yaml:16: the place of 'cube' at the begin of state 'mount' is 30 m"));
 }
 
 TEST(SceneBuilder, APoseIsOutOfReachByTheObjectsCentre) {
