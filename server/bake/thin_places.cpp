@@ -20,42 +20,67 @@ constexpr double kOpen = 5e-5;
 /// [voxels] Measured distances up to this, or up to kNoise [m], are noise of curved and quantised surfaces.
 constexpr double kNoiseVoxels = 0.02;
 constexpr double kNoise = 4e-5;
-/// [voxels] Largest interpolated distance at a convex corner of three faces.
-constexpr double kAtCorner = 0.55;
 /// [-] Points in refined bricks are farther apart by this, in voxels there: a brick's share of a wall then
 /// still has hundreds of them, in all places of a voxel.
 constexpr double kSparseWhereRefined = 4.0;
+/// [voxels] Thin walls are seen from so far on both sides: their distance is exact there.
+constexpr double kBeyond = 2.5;
 /// [-] Largest gradient of the dilation.
 constexpr double kSlope = 0.2;
 
 double noise(double voxel) { return std::min(kNoiseVoxels * voxel, kNoise); }
 
-/// [m] The dilation for a wall at whose exact surface the interpolated distance is up to `outside` [m], with
-/// `voxel` [m]. Between samples a wall of half-thickness h shows (voxel - h)^2 / (2 voxel) at its surface;
-/// its level set is flat where cells of it do not contain the middle, from half a cell's diagonal of the
-/// middle on. A smaller offset would cover it, and leave a surface with steps of up to 0.4 voxels.
-double dilationFor(double outside, double voxel) {
-  const double covered = outside + std::min(kCover, 0.1 * voxel);
-  const double half_thickness = voxel - std::sqrt(2.0 * outside * voxel);
-  return std::max(covered,
-                  std::min(Field::kHalfDiagonal * voxel - half_thickness, Field::kHalfDiagonal * voxel));
+/// [m] Half the thickness of a thin wall at p, a point of its surface with `normal_M` of either sign, where
+/// the interpolated distance is `outside` [m]. Beyond a wall of thickness t, s from p, the distance is s - t.
+/// Another surface behind it makes that less; but where samples see a wall of half-thickness h worst, they
+/// show (voxel - h)^2 / (2 voxel) at its surface, so that a larger `outside` bounds h.
+double halfThickness(const Field& field, const Vector3& p_MP, const Vector3& normal_M, double outside,
+                     double voxel) {
+  const Vector3 beyond = kBeyond * voxel * normal_M;
+  const double across = std::abs(field.sample(p_MP + beyond).distance - field.sample(p_MP - beyond).distance);
+  const double most = voxel - std::sqrt(2.0 * std::max(outside, 0.0) * voxel);
+  return std::clamp(0.5 * across, 0.0, std::max(most, 0.0));
+}
+
+/// [m] The dilation for a thin wall at whose exact surface the interpolated distance is `outside` [m]. Its
+/// level set is flat where cells of it do not contain the middle of the wall, from half a cell's diagonal of
+/// the middle on. A smaller offset would cover it, and leave a surface with steps of up to 0.4 voxels.
+double dilationFor(double outside, double half_thickness, double voxel) {
+  const double covered = outside > 0.0 ? outside + std::min(kCover, 0.1 * voxel) : 0.0;
+  return std::max(covered, Field::kHalfDiagonal * voxel - half_thickness);
+}
+
+/// The gradient of a field about p, by differences over a voxel to each side.
+Vector3 wideGradient(const Field& field, const Vector3& p_MP, double voxel) {
+  Vector3 gradient;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vector3 step = voxel * Vector3::Unit(axis);
+    gradient[axis] =
+        (field.sample(p_MP + step).distance - field.sample(p_MP - step).distance) / (2.0 * voxel);
+  }
+  return gradient;
 }
 
 /// Whether there is an inside of 0.75 voxels near p, a point of the surface with `normal_M` of either sign:
-/// follows the gradient inwards.
+/// straight behind it, or where the gradient leads inwards. With air straight behind it there is none.
 bool isAtSolid(const Field& field, Vector3 p_MP, const Vector3& normal_M, double voxel) {
   constexpr double kInside = -0.75;
-  constexpr double kStep = 0.4;
-  constexpr int kSteps = 5;
+  constexpr double kStep = 0.25;
+  constexpr int kSteps = 9;
+  constexpr double kNoGradient = 0.1;  // [-] as in the middle of a thin wall
+  for (const double side : {-voxel, voxel})
+    if (field.sample(p_MP + side * normal_M).distance <= kInside * voxel) return true;
+  constexpr double kAir = 0.9;  // [voxels] 2.5 voxels from the surface: behind a wall of 1.6 voxels at most
+  const Vector3 beyond = kBeyond * voxel * normal_M;
+  if (std::min(field.sample(p_MP + beyond).distance, field.sample(p_MP - beyond).distance) >= kAir * voxel)
+    return false;
   for (int i = 0; i <= kSteps; ++i) {
     const structures::FieldSample here = field.sample(p_MP);
     if (here.distance <= kInside * voxel) return true;
-    Vector3 inwards = -here.gradient;
-    if (inwards.norm() < 0.3) {
-      const double ahead = field.sample(p_MP + 0.5 * voxel * normal_M).distance;
-      const double behind = field.sample(p_MP - 0.5 * voxel * normal_M).distance;
-      inwards = ahead < behind ? normal_M : Vector3(-normal_M);
-    }
+    // at an edge, a cell's own gradient may be along a face
+    Vector3 inwards = -wideGradient(field, p_MP, voxel);
+    if (inwards.norm() < kNoGradient) inwards = -here.gradient;
+    if (inwards.norm() < kNoGradient) return false;
     p_MP += kStep * voxel * inwards.normalized();
   }
   return false;
@@ -74,9 +99,12 @@ class ThinPlaceFinder {
 
   /// The dilation that each brick needs.
   void measure() {
-    const std::vector<double> areas =
-        forEachThinPoint(1.5, [this](const Vector3& p, double outside, double voxel) {
-          raise(needed_[brickAt(p)], static_cast<float>(dilationFor(outside, voxel)));
+    const std::vector<double> areas = forEachThinPoint(
+        1.5, [this](const Vector3& p, const Vector3& normal_M, double outside, double voxel) {
+          const double half_thickness = halfThickness(field_, p, normal_M, outside, voxel);
+          const double dilation = dilationFor(outside, half_thickness, voxel);
+          if (dilation <= noise(voxel)) return false;
+          raise(needed_[brickAt(p)], static_cast<float>(dilation));
           return true;
         });
     for (const double area : areas) area_ += area;
@@ -94,7 +122,8 @@ class ThinPlaceFinder {
     Field::Layout layout = field_.layout();
     layout.dilations = places.dilations;
     const Field offsets(layout, nullptr);
-    for (const double area : forEachThinPoint(1.9, [&](const Vector3&p, double outside, double) {
+    for (const double area :
+         forEachThinPoint(1.9, [&](const Vector3&p, const Vector3&, double outside, double) {
            return outside - offsets.dilationAt(p) > kOpen;
          }))
       places.open_area += area;
@@ -104,8 +133,8 @@ class ThinPlaceFinder {
  private:
   static constexpr std::size_t kChunk = 64;
 
-  /// Calls visit(point, distance outside, voxel) at points of thin walls; returns by chunk the area [m^2] of
-  /// those for which it is true.
+  /// Calls visit(point, normal of either sign, interpolated distance, voxel) at points of thin walls; returns
+  /// by chunk the area [m^2] of those for which it is true.
   template <typename Visit>
   std::vector<double> forEachThinPoint(double fraction, Visit&& visit) {
     std::vector<double> areas((surface_.size() + kChunk - 1) / kChunk, 0.0);
@@ -122,13 +151,9 @@ class ThinPlaceFinder {
         };
         forEachPiece(t, fits, [&](const Vector3& p, double area) {
           if (!thin_.at(p)) return;
-          const double outside = field_.sample(p).distance;
-          if (outside <= noise(field_.voxel())) {
-            if (field_.layout().refinement == 1 || outside <= noise(field_.voxelAt(p))) return;
-          }
           const double voxel = field_.voxelAt(p);
-          if (outside <= kAtCorner * voxel && isAtSolid(field_, p, normal_M, voxel)) return;
-          if (visit(p, outside, voxel)) areas[chunk] += area;
+          if (isAtSolid(field_, p, normal_M, voxel)) return;
+          if (visit(p, normal_M, field_.sample(p).distance, voxel)) areas[chunk] += area;
         });
       }
     });

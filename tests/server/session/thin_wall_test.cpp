@@ -81,14 +81,29 @@ TEST(WallInARefinedPlace, IsSolidAndNoThickerThanItsVoxelsNeed) {
   }
 }
 
-//   a solid is not thickened
+//   a solid is not thickened, from 2.5 voxels on
 TEST(WallOfASolid, HasNoDilation) {
-  const WallScene wall({.thickness = 0.03, .voxel = 0.005, .clearance = 0.0005, .tilt = {0.3, 0.1, 0.0}});
+  for (const double thickness : {0.013, 0.014, 0.02, 0.03}) {
+    for (const Vector3& tilt :
+         {Vector3(0.0, 0.0, 0.0), Vector3(0.3, 0.1, 0.0), Vector3(0.61548, -0.61548, 0.0),
+          Vector3(0.04, 0.07, 0.2), Vector3(-0.5, 0.2, 0.4)}) {
+      SCOPED_TRACE(testing::Message() << thickness << " m, tilt " << tilt.transpose());
+      const WallScene wall({.thickness = thickness, .voxel = 0.005, .clearance = 0.0005, .tilt = tilt});
+      ASSERT_TRUE(wall.loaded()) << wall.loaded().error().what;
+      EXPECT_EQ(wall.bay().field.dilation(), 0.0);
+      EXPECT_EQ(wall.bay().field.slope(), 1.0);
+      EXPECT_EQ(wall.bay().info.thin_area, 0.0);
+      EXPECT_LE(wall.push(1.0).behind, 0.00005);
+    }
+  }
+}
+
+//   a sheet that lies in a plane of samples: at its surface, the field is exact
+TEST(SheetOnSamples, IsThickened) {
+  const WallScene wall({.thickness = 0.0, .voxel = 0.005});
   ASSERT_TRUE(wall.loaded()) << wall.loaded().error().what;
-  EXPECT_EQ(wall.bay().field.dilation(), 0.0);
-  EXPECT_EQ(wall.bay().field.slope(), 1.0);
-  EXPECT_EQ(wall.bay().info.thin_area, 0.0);
-  EXPECT_LE(wall.push(1.0).behind, 0.00005);
+  EXPECT_NEAR(wall.bay().field.dilation(), 0.866 * 0.005, 1e-4);
+  EXPECT_LE(wall.push(0.1).behind, 0.0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Thickness, WallBesideAClearance, testing::Values(0.0, 0.0005, 0.001, 0.002, 0.003),

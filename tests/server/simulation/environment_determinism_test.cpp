@@ -78,8 +78,8 @@ TEST(EnvironmentDeterminism, TheSceneHasCrossingsOfEdgesBeforeAndAfterTheCheckpo
     busy.play(environment, environment.tick() + 1);
     const ObjectMotion& motion = environment.objects()[busy.bar.value];
     if (!motion.in_contact) continue;
-    const collision::PairQuery query{
-        &bar.shell, &beam.field, motion.X_WO, environment.objects()[busy.beam.value].X_WO, 0.0, 0.0005};
+    const collision::PairQuery query{&bar.shell, &beam.field, motion.X_WO,
+                                     environment.objects()[busy.beam.value].X_WO, 0.0005};
     collision::queryPair(query, *found);
     collision::queryFeatures(query, features, *scratch, *found);
     const std::size_t part = environment.tick() <= 1000 ? 0 : 1;
