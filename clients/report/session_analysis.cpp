@@ -20,6 +20,7 @@
 #include "idl/types/messages/objects.h"
 #include "idl/types/messages/session.h"
 #include "idl/types/messages/timing.h"
+#include "idl/types/stop_truth.h"
 #include "idl/wire/codec.h"
 #include "idl/wire/topics.h"
 
@@ -87,6 +88,7 @@ class RecordingAnalyzer {
     subscribe<EventLog>(wire::kEventLog);
     subscribe<ClientEvent>(wire::kClientEvent);
     subscribe<EmergencyStop>(wire::kEmergencyStop);
+    subscribe<EmergencyClear>(wire::kEmergencyClear);
     subscribe<Telemetry>(wire::kTelemetry);
     subscribe<Guidance>(wire::kGuidance);
     subscribe<ForceContribution>(wire::kForceContribution);
@@ -143,9 +145,14 @@ class RecordingAnalyzer {
     client_events_.push_back({seconds(event.tick), severity, event.kind, event.text});
   }
   void receive(const EmergencyStop& stop) {
+    if (stops_.raise(stop)) addStop(Severity::kError, "raised", stop.who, stop.reason);
+  }
+  void receive(const EmergencyClear& cleared) {
+    if (stops_.clear(cleared)) addStop(Severity::kInfo, "cleared", cleared.who, cleared.reason);
+  }
+  void addStop(Severity severity, std::string_view what, const std::string& who, const std::string& reason) {
     analysis_.events.push_back(
-        {seconds(now_), stop.engaged ? Severity::kError : Severity::kInfo, "emergency stop",
-         fmt::format("{} by {}: {}", stop.engaged ? "engaged" : "released", stop.who, stop.reason)});
+        {seconds(now_), severity, "emergency stop", fmt::format("{} by {}: {}", what, who, reason)});
   }
   void receive(const Telemetry& telemetry);
   void receive(const Guidance& guidance) { guided_ = guided_ || guidance.active; }
@@ -176,6 +183,7 @@ class RecordingAnalyzer {
   std::set<std::string> own_titles_;
   std::map<ObjectId, std::set<Tick>> contacts_;  ///< of each object
   std::vector<SessionEvent> client_events_;
+  StopTruth stops_;
   std::map<std::uint32_t, double> contact_seconds_;  ///< [s] by step revision
   std::map<ClientId, ForceLatency> force_latencies_;
   Series contact_;                 ///< 1 while a trainee's object is in contact, else 0
@@ -192,7 +200,7 @@ void RecordingAnalyzer::receive(const Presence& presence) {
 }
 
 void RecordingAnalyzer::receive(const DeviceInput& input) {
-  const DeviceSample& newest = input.samples.front();
+  const DeviceSample& newest = input.sample;
   auto& sent = hands_[input.hand].sent;
   const InputNumber before = sent.empty() ? InputNumber{} : sent.back().number;
   sent.push_back({before.followedBy(newest.seq), newest.X_WH.translation().cast<float>()});
