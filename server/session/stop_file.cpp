@@ -80,7 +80,8 @@ Result<StopTruth> readStopFile(const std::filesystem::path& file) {
   };
   std::ifstream in(file);
   std::string kind, hex;
-  while (in >> kind >> hex) {
+  while (in >> kind) {
+    if (!(in >> hex)) return damaged();
     EmergencyStop stop;
     EmergencyClear cleared;
     if (kind == "raise" && read(hex, stop)) {
