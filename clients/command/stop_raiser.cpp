@@ -39,7 +39,8 @@ Result<std::unique_ptr<StopRaiser>> StopRaiser::open(std::uint32_t domain, const
         *self.lobby_, wire::kSessionAnnounce,
         [&self](const SessionAnnounce&, const wire::Origin& from) { self.servers_.push_back(from); });
   if (!all) return fail(all.error().what);
-  self.own_readers_ = self.stops_->matchedReaders();
+  // DDS matches this program's own reader at once, and may know of one of another program by now
+  self.own_readers_ = std::min<std::size_t>(1, self.stops_->matchedReaders());
   return raiser;
 }
 
@@ -58,6 +59,7 @@ Result<StopHeard> StopRaiser::raise(const std::string& reason, milliseconds pati
   }
   static_cast<void>(stops_->waitForReaders(kAcknowledged));
   heard.programs = stops_->matchedReaders() - std::min(own_readers_, stops_->matchedReaders());
+  if (heard.by_server) heard.programs = std::max<std::size_t>(heard.programs, 1);
   return heard;
 }
 
