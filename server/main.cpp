@@ -9,10 +9,12 @@
 #include <unistd.h>
 
 #include "idl/types/output_files.h"
+#include "idl/wire/identity.h"
 #include "server/check/check.h"
 #include "server/session/journal.h"
 #include "server/session/renamed_options.h"
 #include "server/session/session_server.h"
+#include "server/session/stop_file.h"
 
 namespace {
 
@@ -26,6 +28,7 @@ struct ServeArguments {
   std::string scenario;
   tenon::session::SessionOptions session;
   tenon::session::LoadOptions load{.cache = tenon::session::defaultCache()};
+  std::filesystem::path key_file;
   std::string resimulate;  ///< journal or recording; empty: open a session
   bool despite_changes = false;
   bool overwrite = false;
@@ -68,6 +71,10 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
   app.add_option("--journal", arguments.session.journal,
                  "record the inputs of each tick, and a checkpoint a second, in this file");
   app.add_flag("--overwrite", arguments.overwrite, tenon::kOverwriteHelp);
+  app.add_option(
+      "--key", arguments.key_file,
+      "file of the key that admins and instructors need; made when it does not exist (default: one "
+      "in your runtime folder, which your own programs find)");
   app.add_flag("--lockstep", arguments.session.lockstep,
                "a tick waits for the inputs of all hands instead of the clock: repeatable to the last bit");
   app.add_option(
@@ -170,6 +177,15 @@ int serve(ServeArguments& arguments) {
   printProblems(*loaded);
 
   for (const std::string& sentence : tenon::session::thinWallReport(*loaded->scene)) printLine(sentence);
+  const auto runtime = tenon::wire::runtimeFolder();
+  if (!runtime && arguments.key_file.empty())
+    return reportError(runtime.error().what + "; or name a file with --key");
+  const auto key =
+      tenon::wire::readOrMakeKeyFile(arguments.key_file.empty() ? *runtime / "key" : arguments.key_file);
+  if (!key) return reportError(key.error().what);
+  arguments.session.key = *key;
+  arguments.session.stop_file =
+      tenon::session::defaultStopFile(arguments.session.domain, arguments.session.name);
   arguments.session.print = printLine;
   arguments.session.detail = arguments.load.detail;
   auto server = tenon::session::SessionServer::open(*loaded, arguments.session);

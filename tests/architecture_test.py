@@ -28,7 +28,7 @@ DECIDES = ["server/structures", "server/bake", "server/collision", "server/simul
 ROOMS = {
     "idl/types": ("tenon", [], ["expected"]),
     "idl/threads": ("tenon::threads", ["idl/types"], ["POSIX"]),
-    "idl/wire": ("tenon::wire", ["idl/types", "idl/threads"], ["DDS", "POSIX"]),
+    "idl/wire": ("tenon::wire", ["idl/types", "idl/threads"], ["DDS", "libsodium", "POSIX"]),
     "idl/record": ("tenon::record", ["idl/types"], ["zstd", "POSIX"]),
     "server/structures": ("tenon::structures", ["idl/types"], ["xxHash", "POSIX"]),
     "server/bake": ("tenon::bake", ["idl/types", "server/structures"], ["assimp", "OctoMap", "xxHash", "POSIX"]),
@@ -46,7 +46,7 @@ ROOMS = {
     "devices": ("tenon::devices", ["idl/types", "idl/threads", "devices/simulated", "devices/drivers"], []),
     "devices/simulated": ("tenon::devices", ["idl/types", "idl/threads", "devices"], []),
     "devices/drivers": ("tenon::devices", ["idl/types", "idl/threads", "devices"], ["POSIX"]),
-    "clients/haptic": ("tenon::haptic", IDL + ["devices", "server/structures", "server/collision"], ["CLI11"]),
+    "clients/haptic": ("tenon::haptic", IDL + ["devices", "server/structures", "server/collision"], ["CLI11", "POSIX"]),
     "clients/simulated_person": ("tenon::simulated_person", STATION, []),
     "clients/trainee": ("tenon::trainee", STATION + ["devices/simulated", "clients/simulated_person"], []),
     "clients/instructor": ("tenon::instructor", STATION + ["devices/simulated", "clients/simulated_person"], []),
@@ -67,13 +67,13 @@ NOT_INCLUDED = {EXCEPTION, "server", "server/tools", "tests"}
 LIBRARIES = {
     "expected": r"tl/expected\.hpp$", "DDS": r"(dds/|ddsc/|org/eclipse/cyclonedds/|tenon\.h$)", "zstd": r"(zstd|zstd_\w+|zdict)\.h$",
     "Highway": r"hwy/", "xxHash": r"xxh(ash|3)\.h$", "assimp": r"assimp/", "OctoMap": r"octomap/",
-    "yaml-cpp": r"yaml-cpp/", "fmt": r"fmt/", "CLI11": r"CLI/", "JSON": r"nlohmann/", "PNG": r"png\.h$",
+    "libsodium": r"sodium(\.h$|/)", "yaml-cpp": r"yaml-cpp/", "fmt": r"fmt/", "CLI11": r"CLI/", "JSON": r"nlohmann/", "PNG": r"png\.h$",
     "Bullet": r"(bullet/|btBullet|Bullet|LinearMath/)", "Eigen": r"Eigen/",
     "POSIX": r"((sys|arpa|netinet|net|linux)/|(unistd|fcntl|poll|termios|spawn|pthread|sched|signal|time|dirent|dlfcn|errno|semaphore)\.h$)",
 }
 # a library, or a part of a room, that one file of the room alone may include
 ONE_FILE = {"Bullet": "server/simulation/rigid_body.cpp", "OctoMap": "server/bake/octree_file.cpp",
-            "assimp": "server/bake/import_child.cpp",
+            "assimp": "server/bake/import_child.cpp", "libsodium": "idl/wire/identity.cpp",
             "devices/simulated": "devices/catalog.cpp", "devices/drivers": "devices/catalog.cpp"}
 # made at build time, so not in the tree; their room alone includes them
 GENERATED = {"tenon.h": "idl/wire", "idl/wire/topic_list.h": "idl/wire"}

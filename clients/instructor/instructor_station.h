@@ -39,7 +39,7 @@ class InstructorStation : public haptic::Station {
   void begin(std::span<const HandId> hand_ids) override;
   void manifoldReceived(const HandManifold& manifold) noexcept override;
   void stepChanged() override;
-  void stopChanged(bool engaged) override;
+  void armingChanged() noexcept override;
 
  private:
   struct Parts;

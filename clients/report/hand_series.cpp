@@ -5,7 +5,7 @@
 namespace tenon::report {
 
 void HandSeries::add(const DeviceInput& input) {
-  const DeviceSample& newest = input.samples.front();
+  const DeviceSample& newest = input.sample;
   const InputNumber before = sent.empty() ? InputNumber{} : sent.back().number;
   sent.push_back({before.followedBy(newest.seq), newest.X_WH.translation().cast<float>()});
 }

@@ -15,6 +15,7 @@
 #include "idl/types/messages/external.h"
 #include "idl/types/messages/objects.h"
 #include "idl/types/messages/timing.h"
+#include "idl/types/stop_truth.h"
 #include "idl/wire/codec.h"
 #include "idl/wire/topics.h"
 
@@ -42,6 +43,7 @@ class RecordingReader {
     subscribe<EventLog>(wire::kEventLog);
     subscribe<ClientEvent>(wire::kClientEvent);
     subscribe<EmergencyStop>(wire::kEmergencyStop);
+    subscribe<EmergencyClear>(wire::kEmergencyClear);
     subscribe<Telemetry>(wire::kTelemetry);
     subscribe<Guidance>(wire::kGuidance);
     subscribe<ForceContribution>(wire::kForceContribution);
@@ -95,9 +97,14 @@ class RecordingReader {
     session_.client_events.push_back({secondsOf(event.tick), severity, event.kind, event.text});
   }
   void receive(const EmergencyStop& stop) {
-    session_.events.push_back(
-        {secondsOf(session_.last), stop.engaged ? Severity::kError : Severity::kInfo, "emergency stop",
-         fmt::format("{} by {}: {}", stop.engaged ? "engaged" : "released", stop.who, stop.reason)});
+    if (stops_.raise(stop)) addStop(Severity::kError, "raised", stop.who, stop.reason);
+  }
+  void receive(const EmergencyClear& cleared) {
+    if (stops_.clear(cleared)) addStop(Severity::kInfo, "cleared", cleared.who, cleared.reason);
+  }
+  void addStop(Severity severity, std::string_view what, const std::string& who, const std::string& reason) {
+    session_.events.push_back({secondsOf(session_.last), severity, "emergency stop",
+                               fmt::format("{} by {}: {}", what, who, reason)});
   }
   void receive(const Telemetry& telemetry);
   void receive(const Guidance& guidance) { session_.guided = session_.guided || guidance.active; }
@@ -107,6 +114,7 @@ class RecordingReader {
   void advanceTo(Tick tick) { session_.last = std::max(session_.last, tick); }
 
   RecordedSession& session_;
+  StopTruth stops_;
   std::map<std::string_view, std::function<void(std::span<const std::uint8_t>)>> handlers_;
   std::map<ObjectId, std::string> kinds_;
 };

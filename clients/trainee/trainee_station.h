@@ -42,12 +42,13 @@ class TraineeStation : public haptic::Station {
   void begin(std::span<const HandId> hand_ids) override;
   void manifoldReceived(const HandManifold& manifold) noexcept override;
   void stepChanged() override;
-  void stopChanged(bool engaged) override;
+  void armingChanged() noexcept override;
 
  private:
   struct Parts;
   /// Poses of forearm and head, and the vibration of the bracelet; `dt` [s].
   void trackBody(std::uint32_t seq, double dt) noexcept;
+  void armBracelet() noexcept;
   explicit TraineeStation(std::unique_ptr<Parts> parts);
   std::unique_ptr<Parts> parts_;
 };

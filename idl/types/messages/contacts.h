@@ -33,6 +33,14 @@ struct HandPull {
 
 inline constexpr int kOtherPulls = 2;
 
+/// A body that a hand's object touches.
+struct ManifoldBody {
+  ObjectId object;
+  std::uint32_t epoch = 0;  ///< of that body: increased with every jump of its pose
+};
+
+inline constexpr int kManifoldBodies = 4;
+
 /// All contacts of the object that one hand holds, with what its station needs to render their force locally.
 struct HandManifold {
   HandId hand;
@@ -52,6 +60,9 @@ struct HandManifold {
   bool frozen = false;  ///< the object is held still: stale input, pause or emergency stop
   FixedVector<HandPull, kOtherPulls> others;  ///< other hands that hold the object, by HandId
   FixedVector<ManifoldContact, kManifoldContacts> contacts;
+  /// Reserved, empty: the moving bodies of `contacts`, so that a station knows of their jumps as it does by
+  /// object_epoch of the held object's
+  FixedVector<ManifoldBody, kManifoldBodies> bodies;
 };
 
 /// Contact state of a collision pair.
