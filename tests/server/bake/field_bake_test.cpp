@@ -170,8 +170,8 @@ TEST(FieldBake, BothSidesOfAnOpenBoxAreOutside) {
   TriangleMesh mesh = test::boxMesh(Vector3::Constant(-0.05), Vector3::Constant(0.05));
   mesh.triangles.erase(mesh.triangles.begin() + 2, mesh.triangles.begin() + 4);  // its lid
   const structures::HapticStructures structures = baked(mesh);
-  EXPECT_GT(structures.field.sample(Vector3(0.0, 0.0, -0.045)).distance, 0.004);
-  EXPECT_GT(structures.field.sample(Vector3(0.0, 0.0, -0.055)).distance, 0.004);
+  EXPECT_GT(structures.field.undilated(Vector3(0.0, 0.0, -0.045)).distance, 0.004);
+  EXPECT_GT(structures.field.undilated(Vector3(0.0, 0.0, -0.055)).distance, 0.004);
 }
 
 TEST(FieldBake, ACavityIsSolid) {
