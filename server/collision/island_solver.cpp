@@ -280,8 +280,8 @@ void IslandSolver::takeStep(const Job& job) {
     const double fraction = fractions_[i];
     last_step_[i] = {fraction * step_[i].translation, fraction * step_[i].rotation};
     // without contact the goal is reached exactly, not only to second order
-    const bool at_goal = fraction == 1.0 && constrained_[i] == 0 && body.springs.size() == 1 &&
-                         job.limits.method != ContactMethod::kBlocking;
+    const bool at_goal = fraction == 1.0 && constrained_[i] == 0 && !body.pinned &&
+                         body.springs.size() == 1 && job.limits.method != ContactMethod::kBlocking;
     body.X_WB = at_goal ? body.springs[0].X_WG : displaced(body.X_WB, last_step_[i], body.p_BQ);
   }
 }
