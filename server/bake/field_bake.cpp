@@ -69,12 +69,12 @@ std::vector<float> brickDistances(const BrickLevel& coarse, ParallelWork& work) 
     const std::int32_t slot = coarse.slot[node];
     if (slot < 0) return;
     // a surface in the brick is within half a voxel's diagonal of one of its samples
-    constexpr auto kTouch = static_cast<int>(structures::DistanceField::kHalfDiagonal *
-                                             structures::DistanceField::kQuantaPerVoxel) +
-                            1;
+    constexpr auto kTouchQuanta = static_cast<int>(structures::DistanceField::kHalfDiagonal *
+                                                   structures::DistanceField::kQuantaPerVoxel) +
+                                  1;
     const std::int16_t* samples = coarse.samplesOf(slot);
-    const bool surface =
-        std::any_of(samples, samples + BrickLevel::kSamples, [](int s) { return std::abs(s) <= kTouch; });
+    const bool surface = std::any_of(samples, samples + BrickLevel::kSamples,
+                                     [](int s) { return std::abs(s) <= kTouchQuanta; });
     if (surface) squared[node] = 0.0F;
   });
   const std::array<std::size_t, 3> size{static_cast<std::size_t>(coarse.bricks.x()),

@@ -10,20 +10,20 @@ namespace tenon::bake {
 
 namespace {
 
-constexpr int kReach = 2;
-/// [voxels] kReach beyond a sample at a flat surface a solid is at least 1.13 deep.
+constexpr int kMargin = 2;
+/// [voxels] kMargin beyond a sample at a flat surface a solid is at least 1.13 deep.
 constexpr double kDeep = 1.05;
-constexpr int kPatch = BrickLevel::kSide + 2 * kReach;
-using Patch = std::array<std::uint8_t, static_cast<std::size_t>(kPatch) * kPatch * kPatch>;
+constexpr int kPatchSide = BrickLevel::kSide + 2 * kMargin;
+using Patch = std::array<std::uint8_t, static_cast<std::size_t>(kPatchSide) * kPatchSide * kPatchSide>;
 
 constexpr std::size_t indexOf(int x, int y, int z) {
-  return static_cast<std::size_t>((z * kPatch + y) * kPatch + x);
+  return static_cast<std::size_t>((z * kPatchSide + y) * kPatchSide + x);
 }
 
-/// Spreads marks by kReach along an axis; `stride` is that between its neighbours.
+/// Spreads marks by kMargin along an axis; `stride` is that between its neighbours.
 void spread(Patch& patch, std::size_t stride) {
   Patch wide = patch;
-  for (std::size_t shift = stride; shift <= kReach * stride; shift += stride) {
+  for (std::size_t shift = stride; shift <= kMargin * stride; shift += stride) {
     for (std::size_t i = shift; i < patch.size(); ++i) {
       // marks that wrap around end in the margin, which is not read
       wide[i] |= patch[i - shift];
@@ -42,15 +42,15 @@ bool isThin(const BrickLevel& coarse, std::size_t node) {
   const std::int16_t* samples = coarse.samplesOf(slot);
   if (std::none_of(samples, samples + BrickLevel::kSamples, at_surface)) return false;
   Patch deep{};
-  coarse.visitAround(node, kReach, kReach + 1, [&](const BrickLevel::Cell& offset, const auto& point) {
-    deep[indexOf(offset.x() + kReach, offset.y() + kReach, offset.z() + kReach)] =
+  coarse.visitAround(node, kMargin, kMargin + 1, [&](const BrickLevel::Cell& offset, const auto& point) {
+    deep[indexOf(offset.x() + kMargin, offset.y() + kMargin, offset.z() + kMargin)] =
         point.known && !point.free && point.distance >= kDeep;
   });
   for (const std::size_t stride : {indexOf(1, 0, 0), indexOf(0, 1, 0), indexOf(0, 0, 1)})
     spread(deep, stride);
   for (int k = 0; k < BrickLevel::kSamples; ++k) {
     if (!at_surface(samples[k])) continue;
-    const BrickLevel::Cell at = BrickLevel::cellOfSample(k) + BrickLevel::Cell::Constant(kReach);
+    const BrickLevel::Cell at = BrickLevel::cellOfSample(k) + BrickLevel::Cell::Constant(kMargin);
     if (deep[indexOf(at.x(), at.y(), at.z())] == 0) return true;
   }
   return false;
