@@ -32,6 +32,7 @@ struct ServeArguments {
   std::string resimulate;  ///< journal or recording; empty: open a session
   bool despite_changes = false;
   bool overwrite = false;
+  bool allow_skips = false;
 };
 
 void declareOptions(CLI::App& app, ServeArguments& arguments) {
@@ -71,6 +72,7 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
   app.add_option("--journal", arguments.session.journal,
                  "record the inputs of each tick, and a checkpoint a second, in this file");
   app.add_flag("--overwrite", arguments.overwrite, tenon::kOverwriteHelp);
+  app.add_flag("--allow-skips", arguments.allow_skips, "exit 0 although steps were skipped");
   app.add_option(
       "--key", arguments.key_file,
       "file of the key that admins and instructors need; made when it does not exist (default: one "
@@ -84,7 +86,7 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
                "re-simulate although scenario or structures have changed since the recording, to see where "
                "it differs");
   app.footer(
-      "Exit code: 0 when everything was mounted (or all hashes of the re-simulation were equal), 1 "
+      "Exit code: 0 when every step was done (or all hashes of the re-simulation were equal), 1 "
       "otherwise; 2 for wrong usage.");
 }
 
@@ -196,7 +198,7 @@ int serve(ServeArguments& arguments) {
                         static_cast<double>(report->run.tick) * tenon::kTickSeconds, report->late_ticks,
                         report->refused_inputs));
   printLine(fmt::format("final state hash: {:016x}", report->run.final_hash));
-  return report->run.phase == tenon::RunPhase::kSucceeded ? 0 : 1;
+  return tenon::isCompleted(report->run, arguments.allow_skips) ? 0 : 1;
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/command/command_program.h"
+#include "clients/command/session_lists.h"
 
 namespace {
 
@@ -61,6 +62,17 @@ int run(int argc, char** argv) {
   const auto printError = [](const std::string& what) {
     std::fprintf(stderr, "tenon command: %s\n", what.c_str());
   };
+  if (arguments.words == std::vector<std::string>{"list"} && !arguments.keys) {
+    std::signal(SIGINT, onSignal);
+    std::signal(SIGTERM, onSignal);
+    const auto lists = tenon::command::readLists(arguments.options, stop);
+    if (!lists) {
+      printError(lists.error().what);
+      return 1;
+    }
+    std::fputs(lists->text().c_str(), stdout);
+    return 0;
+  }
   tenon::Result<tenon::command::ParsedCommand> parsed;
   if (!arguments.keys) {
     parsed = tenon::command::parseCommand(arguments.words);

@@ -17,10 +17,17 @@ constexpr std::array kCommands{
     CommandWord{"signal", "NAME", "sends an external signal that the scenario waits for", 0,
                 CommandKind::kSignal},
     CommandWord{"skip", "", "skips the current step", 'n', CommandKind::kSkipStep},
+    CommandWord{"goto", "STEP", "goes to a step, by name or number: the scene is as at its begin", 0,
+                CommandKind::kGoToStep},
+    CommandWord{"back", "", "goes back to the step before", 'k', CommandKind::kBack},
+    CommandWord{"repeat", "", "starts the current step again", 'a', CommandKind::kRepeatStep},
     CommandWord{"reset", "", "starts the exercise again", 'b', CommandKind::kReset},
     CommandWord{"swap", "", "swaps the objects that the trainee's two hands move", 'w',
                 CommandKind::kSwapHands},
     CommandWord{"release", "HAND", "releases the object that this hand holds", 0, CommandKind::kRelease},
+    CommandWord{"give", "OBJECT HAND", "lets a hand take an object where it is, from whoever holds it", 0,
+                CommandKind::kHandOver},
+    CommandWord{"note", "TEXT...", "leaves a note in the recording and the report", 0, CommandKind::kNote},
     CommandWord{"collision", "OBJECT OBJECT on|off", "enables or disables collisions of two objects", 0,
                 CommandKind::kSetCollision},
     CommandWord{"stop", "", "ends the session", 'e', CommandKind::kStop},
@@ -46,7 +53,12 @@ Result<ParsedCommand> withArguments(const CommandWord& word, const std::vector<s
     if (given != 3 || (arguments[3] != "on" && arguments[3] != "off")) return usage();
     return ParsedCommand{word.command, arguments[1] + " " + arguments[2], arguments[3] == "on" ? 1.0 : 0.0};
   }
-  if (given != (word.arguments.empty() ? 0U : 1U)) return usage();
+  if (word.arguments.ends_with("...")) {
+    if (given == 0) return usage();
+    return ParsedCommand{word.command, joined(arguments, 1)};
+  }
+  const auto spaces = static_cast<std::size_t>(std::count(word.arguments.begin(), word.arguments.end(), ' '));
+  if (given != (word.arguments.empty() ? 0U : spaces + 1)) return usage();
   return ParsedCommand{word.command, joined(arguments, 1)};
 }
 
@@ -77,11 +89,13 @@ std::optional<ParsedCommand> parseCommand(char key, const std::vector<std::strin
 
 bool needsConsent(const ParsedCommand& command) {
   return command.command == CommandKind::kStop || command.command == CommandKind::kReset ||
-         command.command == CommandKind::kSkipStep;
+         command.command == CommandKind::kSkipStep || command.command == CommandKind::kBack ||
+         command.command == CommandKind::kRepeatStep;
 }
 
 std::string commandHelp() {
-  std::string help = "Commands:\n";
+  std::string help = fmt::format("Commands:\n  {:<32}{}\n", "list",
+                                 "prints people, hands, steps and objects by the names that commands take");
   for (const CommandWord& word : kCommands)
     help += fmt::format("  {:<32}{}\n", fmt::format("{} {}", word.word, word.arguments), word.effect);
   return help +

@@ -14,7 +14,8 @@ namespace tenon::command {
 /// A command of `tenon command`: its word on the command line and its key with --keys.
 struct CommandWord {
   std::string_view word;
-  std::string_view arguments;          ///< as in a usage line; in brackets: optional, any number of words
+  /// As in a usage line; in brackets: optional, any number of words; with dots: one or more words.
+  std::string_view arguments;
   std::string_view effect;             ///< for --help
   char key = 0;                        ///< 0: no key, as it needs arguments
   std::optional<CommandKind> command;  ///< none: emergency stop, which is a topic of its own
@@ -36,8 +37,8 @@ struct ParsedCommand {
 /// Parses a key; '1' to '9' send `signals[0]` to `signals[8]`. None when the key has no command.
 [[nodiscard]] std::optional<ParsedCommand> parseCommand(char key, const std::vector<std::string>& signals);
 
-/// Whether a key alone must not give this command: it ends the run, starts it again, or may end it
-/// (skip, in the last step).
+/// Whether a key alone must not give this command: it ends the run, starts it or a step again, or
+/// may end it (skip, in the last step).
 [[nodiscard]] bool needsConsent(const ParsedCommand& command);
 
 /// For --help: every command with its effect.

@@ -104,6 +104,7 @@ class StationRunner {
   const StationProgramOptions& options_;
   bool lockstep_ = false;  // messages go directly to the station instead of to the servo's queues
   RunState run_;
+  std::map<HandId, float> peak_forces_;  ///< [N] displayed since the last HandState
   int rejoins_ = 0;
   std::chrono::steady_clock::time_point rejoined_at_{};
   std::optional<StepState> step_;
@@ -225,8 +226,15 @@ bool StationRunner::tickComplete(Tick tick) const {
 
 void StationRunner::send(const StationOutput& output) {
   for (const DeviceInput& input : output.inputs) static_cast<void>(link_.send(input));
+  for (const HandState& state : output.states) {
+    float& peak = peak_forces_[state.hand];
+    peak = std::max(peak, static_cast<float>(state.F_Ho_W.force.norm()));
+  }
   if (output.seq % kStatesEvery != 0) return;
-  for (const HandState& state : output.states) static_cast<void>(link_.send(state));
+  for (HandState state : output.states) {
+    state.peak_force = std::exchange(peak_forces_[state.hand], 0.0F);
+    static_cast<void>(link_.send(state));
+  }
 }
 
 void StationRunner::sendEvents() {

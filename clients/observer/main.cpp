@@ -18,6 +18,7 @@ int run(int argc, char** argv) {
   tenon::observer::ObserverOptions options;
   tenon::wire::MembershipOptions membership{.person = "observer"};
   unsigned wait = 10;
+  app.add_flag("--allow-skips", options.allow_skips, "exit 0 although steps were skipped");
   app.add_flag("--json", options.json, "print one JSON object per line");
   app.add_option("--session", membership.session, "name of the session; default: the first one announced");
   app.add_option("--domain", membership.domain, "DDS domain, 0 to 230")

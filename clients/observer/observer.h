@@ -14,6 +14,7 @@ namespace tenon::observer {
 struct ObserverOptions {
   bool json = false;            ///< one JSON object per line instead of sentences
   std::string language = "en";  ///< of titles and instructions
+  bool allow_skips = false;     ///< a session with skipped steps has succeeded too
   std::FILE* out = stdout;
 };
 
@@ -45,8 +46,8 @@ class Observer {
   void printAll() { timeline_.printAll(); }
 
   [[nodiscard]] bool over() const { return isOver(run_.phase); }
-  /// 0 when the session succeeded, else 1.
-  [[nodiscard]] int exitCode() const { return run_.phase == RunPhase::kSucceeded ? 0 : 1; }
+  /// 0 when the session succeeded with every step done (ObserverOptions::allow_skips: or skipped), else 1.
+  [[nodiscard]] int exitCode() const { return isCompleted(run_, options_.allow_skips) ? 0 : 1; }
 
  private:
   void printJson(const std::string& line) const;

@@ -108,7 +108,7 @@ void Timeline::receive(const ContactPairs& pairs) {
 
 void Timeline::receive(const EventLog& event) {
   // RunState and StepState say more
-  if (event.kind == "run" || event.kind == "step" || event.kind == "step done") return;
+  if (event.kind == "run" || event.kind.starts_with("step")) return;
   if (event.kind == "taken" || event.kind == "let go") {
     add(event.tick, Rank::kGrab, [this, event] { printGrab(event, event.kind == "taken"); });
   } else if (event.kind == "mounted") {
@@ -222,7 +222,8 @@ void Timeline::printRun(const RunState& run) {
   const bool is_over = isOver(run.phase);
   const bool has_timed_out = !step_ended_ && step_phases_[step_.started] == StepPhase::kTimedOut;
   if (run.phase == RunPhase::kSucceeded || has_timed_out) endStep(run.tick);
-  const std::string_view phase = runPhaseName(run.phase);
+  const bool is_incomplete = run.phase == RunPhase::kSucceeded && !isCompleted(run);
+  const std::string_view phase = is_incomplete ? std::string_view(run.reason) : runPhaseName(run.phase);
   const bool is_clear = run.phase == RunPhase::kSucceeded || has_timed_out || run.reason == phase;
   const char* const verb = run.phase == RunPhase::kStopped ? "was" : is_over ? "has" : "is";
   print(run.tick,

@@ -222,7 +222,7 @@ int rehearsePeople(RehearseArguments& arguments) {
   const auto report = tenon::rehearse::runRehearsal(*loaded, std::move(*stations), arguments.rehearsal);
   if (!report) return printError(report.error().what);
   printOutcome(*report);
-  return report->phase == tenon::RunPhase::kSucceeded ? 0 : kCouldNot;
+  return report->completed ? 0 : kCouldNot;
 }
 
 int rehearseScript(RehearseArguments& arguments) {
@@ -261,7 +261,7 @@ int rehearseScript(RehearseArguments& arguments) {
   if (!report) return printError(report.error().what);
   printOutcome(*report);
   const bool endless = loaded->scenario->states.front().line == 0;
-  return endless || report->phase == tenon::RunPhase::kSucceeded ? 0 : kCouldNot;
+  return endless || report->completed ? 0 : kCouldNot;
 }
 
 }  // namespace

@@ -45,6 +45,9 @@ class Rehearsal {
       tick();
     RehearsalReport report;
     report.phase = simulation_.phase();
+    report.completed = isCompleted({.phase = simulation_.phase(),
+                                    .steps_skipped = simulation_.step().skipped,
+                                    .steps_timed_out = simulation_.step().timed_out});
     report.ticks = simulation_.now();
     report.final_hash = simulation_.hash();
     report.reason = reason_;

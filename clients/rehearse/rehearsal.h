@@ -44,6 +44,7 @@ struct RehearsalOptions {
 /// How a rehearsal ended.
 struct RehearsalReport {
   RunPhase phase = RunPhase::kWaitingForPeople;
+  bool completed = false;  ///< isCompleted() of the run
   Tick ticks = 0;
   std::uint64_t final_hash = 0;  ///< of the state after the last tick
   std::string reason;            ///< of the last change of phase

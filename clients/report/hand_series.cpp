@@ -1,5 +1,6 @@
 #include "clients/report/hand_series.h"
 
+#include <algorithm>
 #include <limits>
 
 namespace tenon::report {
@@ -10,6 +11,13 @@ void HandSeries::add(const DeviceInput& input) {
   sent.push_back({before.followedBy(newest.seq), newest.X_WH.translation().cast<float>()});
 }
 
+void HandSeries::add(const HandState& state) {
+  const InputNumber before = displayed.empty() ? InputNumber{} : displayed.back().number;
+  const double force = state.F_Ho_W.force.norm();
+  displayed.push_back(
+      {before.followedBy(state.seq), force, std::max(static_cast<double>(state.peak_force), force)});
+}
+
 void HandSeries::add(const HandManifold& manifold) {
   // in lockstep a server repeats what a station has not answered
   if (!samples.empty() && samples.back().tick >= manifold.tick) return;
@@ -18,18 +26,23 @@ void HandSeries::add(const HandManifold& manifold) {
       manifold.stiffness > 0.0 ? force / manifold.stiffness : std::numeric_limits<double>::quiet_NaN();
   const Vector3 p_WH_proxy = (manifold.X_WO * manifold.X_HO.inverse()).translation();
   const InputNumber before = samples.empty() ? InputNumber{} : samples.back().answers;
-  samples.push_back({manifold.tick, manifold.object, before.followedBy(manifold.answers_seq), force,
+  samples.push_back({manifold.tick, manifold.object, before.followedBy(manifold.answers_seq), manifold.frozen,
                      p_WH_proxy.cast<float>(), extension});
 }
 
 HandFigures evaluate(const HandSeries& hand, const std::function<bool(ObjectId, Tick)>& touches) {
   HandFigures figures;
   auto sent = hand.sent.begin();
+  auto displayed = hand.displayed.begin();
   for (const HandSample& sample : hand.samples) {
-    addPoint(figures.force, sample.tick, sample.force);
-    const bool in_contact = touches(sample.object, sample.tick);
-    if (in_contact) addPoint(figures.contact_force, sample.tick, sample.force);
+    const bool in_contact = !sample.frozen && touches(sample.object, sample.tick);
     addPoint(figures.contact, sample.tick, in_contact ? 1.0 : 0.0);
+    for (; displayed != hand.displayed.end() && displayed->number <= sample.answers; ++displayed) {
+      if (sample.frozen) continue;
+      addPoint(figures.force, sample.tick, displayed->peak);
+      if (in_contact) addPoint(figures.contact_force, sample.tick, displayed->force);
+    }
+    if (sample.frozen) continue;
     // distance of the proxy's hand pose from the device's; without the input, the extension of the coupling
     while (sent != hand.sent.end() && sent->number < sample.answers) ++sent;
     const bool is_answer =

@@ -30,12 +30,19 @@ struct SentPose {
   Eigen::Vector3f p_WH = Eigen::Vector3f::Zero();  ///< as float: there is one a tick
 };
 
+/// The force that a device has displayed, from its station.
+struct DisplayedForce {
+  InputNumber number;  ///< of the input in whose client tick
+  double force = 0.0;  ///< [N]
+  double peak = 0.0;   ///< [N] largest since the last sample
+};
+
 /// What a manifold says of its hand.
 struct HandSample {
   Tick tick = 0;
   ObjectId object;
   InputNumber answers;
-  double force = 0.0;  ///< [N]
+  bool frozen = false;
   Eigen::Vector3f p_WH_proxy = Eigen::Vector3f::Zero();
   double extension = 0.0;  ///< [m] of the coupling; not a number without one
 };
@@ -45,14 +52,16 @@ struct HandSeries {
   Role role = Role::kTrainee;
   std::vector<SentPose> sent;
   std::vector<HandSample> samples;
+  std::vector<DisplayedForce> displayed;
 
   void add(const DeviceInput& input);
+  void add(const HandState& state);
   void add(const HandManifold& manifold);
 };
 
-/// The forces and distances of a hand, sorted by time.
+/// The forces and distances of a hand, sorted by time: none while the server held the hand's object still.
 struct HandFigures {
-  Series force;          ///< [N]
+  Series force;          ///< [N] displayed on the hand
   Series contact_force;  ///< [N] while its object is in contact
   Series contact;        ///< [-] 1 while its object is in contact, else 0
   Series gap;            ///< [m] between the device and the proxy

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <ctime>
 #include <map>
+#include <set>
 #include <vector>
 
 #include <fmt/format.h>
@@ -88,10 +89,19 @@ const char* markStyleOf(const SessionEvent& event) {
   return nullptr;
 }
 
-/// Joins repeated events: a safety layer may act many times a second, so an event that follows one of its
-/// kind within 2 s is counted there.
+/// Whether an event is about people, steps, mounts or safety.
+bool isForTrainers(const SessionEvent& event) {
+  static const std::set<std::string, std::less<>> kKinds{
+      "join",           "leave",       "run",       "step",   "step done", "step skipped",
+      "step timed out", "not in time", "taken",     "let go", "mounted",   "emergency stop",
+      "safety",         "hand frozen", "hand gone", "note",   "command"};
+  return event.severity == Severity::kError || kKinds.contains(event.kind);
+}
+
+/// The events for trainers. A safety layer may act many times a second: an event that follows one of its
+/// kind within 10 s is counted there.
 std::vector<SessionEvent> condensed(const std::vector<SessionEvent>& events) {
-  constexpr double kJoinTime = 2.0;  // [s]
+  constexpr double kJoinTime = 10.0;  // [s]
   struct Group {
     std::size_t index = 0;  // of its first event in `few`
     double last = 0.0;      // [s]
@@ -101,7 +111,8 @@ std::vector<SessionEvent> condensed(const std::vector<SessionEvent>& events) {
   std::vector<Group> groups;
   std::map<std::string, std::size_t> newest;  // group of each kind
   for (const SessionEvent& event : events) {
-    const bool repeats = event.kind == "safety" || event.kind == "refused";
+    if (!isForTrainers(event)) continue;
+    const bool repeats = event.kind == "safety" || event.kind == "hand frozen";
     const auto known = newest.find(event.kind);
     if (repeats && known != newest.end() && event.time - groups[known->second].last < kJoinTime) {
       groups[known->second].last = event.time;
@@ -116,6 +127,25 @@ std::vector<SessionEvent> condensed(const std::vector<SessionEvent>& events) {
     if (group.more > 0)
       few[group.index].text += fmt::format(" (and {} more until {:.1f} s)", group.more, group.last);
   return few;
+}
+
+/// "12 others: 10 refused, 2 hand free": the events that condensed() leaves out, by kind; empty without any.
+std::string othersOf(const std::vector<SessionEvent>& events) {
+  std::map<std::string, int> kinds;
+  int all = 0;
+  for (const SessionEvent& event : events) {
+    if (isForTrainers(event)) continue;
+    ++kinds[event.kind];
+    ++all;
+  }
+  if (all == 0) return "";
+  std::string text = fmt::format("{} other{}", all, all == 1 ? "" : "s");
+  const char* separator = ": ";
+  for (const auto& [kind, count] : kinds) {
+    text += fmt::format("{}{} {}", separator, count, kind);
+    separator = ", ";
+  }
+  return text + "; all are in summary.json";
 }
 
 std::string head(const SessionAnalysis& analysis) {
@@ -151,36 +181,56 @@ std::string tiles(const SessionAnalysis& analysis) {
                "session time [min:s]");
   html += tile(fmt::format("{:.1f} N", analysis.whole.peak_force), "largest force on a hand");
   html += tile(fmt::format("{:.1f} s", analysis.whole.contact_seconds), "in contact");
-  html += tile(fmt::format("{:.2f} mm", 1e3 * analysis.whole.gap), "largest gap between hand and part");
-  html += tile(fmt::format("{:.2f} mm", 1e3 * analysis.whole.depth), "largest overlap of two parts");
-  html += tile(fmt::format("{:.0f} %", analysis.whole.load), "largest computational load");
+  html += tile(std::to_string(analysis.collisions), "collisions");
+  html += tile(fmt::format("{:.1f} m", analysis.path), "path of the parts");
+  const auto done = std::count_if(analysis.visits.begin(), analysis.visits.end(),
+                                  [](const StepVisit& visit) { return visit.phase == StepPhase::kDone; });
+  html += tile(fmt::format("{} of {}", done, analysis.steps), "steps done");
   return html + "</div>\n";
-}
-
-std::string cells(double time, const SessionMetrics& metrics) {
-  return fmt::format(
-      "<td>{:.1f}</td><td>{:.1f}</td><td>{:.1f}</td><td>{:.1f}</td><td>{:.2f}</td><td>{:.2f}</td><td>{:.0f}</"
-      "td>",
-      time, metrics.peak_force, metrics.mean_force, metrics.contact_seconds, 1e3 * metrics.gap,
-      1e3 * metrics.depth, metrics.load);
 }
 
 std::string stepTable(const SessionAnalysis& analysis) {
   std::string html =
       "<h2>Steps</h2>\n<div class=\"card\"><table>\n<tr><th></th><th>step</th><th>time<br>[s]</th>"
+      "<th>error, of<br>allowed [mm]</th><th>path of the<br>part [m]</th><th>collisions</th>"
       "<th>peak force<br>[N]</th><th>mean force<br>in contact [N]</th><th>contact<br>[s]</th>"
-      "<th>hand–part<br>gap [mm]</th><th>overlap<br>[mm]</th><th>comp. load<br>[%]</th><th "
-      "class=\"state\"></th></tr>\n";
+      "<th class=\"state\"></th></tr>\n";
+  const auto cells = [](double time, const std::string& error, double path, int collisions,
+                        const SessionMetrics& metrics) {
+    return fmt::format(
+        "<td>{:.1f}</td><td>{}</td><td>{:.2f}</td><td>{}</td><td>{:.1f}</td><td>{:.1f}</td><td>{:.1f}</td>",
+        time, error, path, collisions, metrics.peak_force, metrics.mean_force, metrics.contact_seconds);
+  };
   for (std::size_t i = 0; i < analysis.visits.size(); ++i) {
     const StepVisit& visit = analysis.visits[i];
-    html += fmt::format("<tr><td>{}</td><td>{}", i + 1, escaped(visit.title));
+    html += fmt::format("<tr><td>{}</td><td>{}", i + 1, escaped(titleText(visit)));
     if (!visit.part.empty()) html += fmt::format(" <span class=\"part\">{}</span>", escaped(visit.part));
-    html += fmt::format("</td>{}<td class=\"state {}\">{}</td></tr>\n",
-                        cells(visit.end - visit.begin, visit.metrics), styleOf(visit.phase),
-                        phaseName(visit.phase));
+    html += fmt::format(
+        "</td>{}<td class=\"state {}\">{}</td></tr>\n",
+        cells(visit.end - visit.begin, errorText(visit), visit.path, visit.collisions, visit.metrics),
+        styleOf(visit.phase), phaseName(visit.phase));
   }
   html += fmt::format("<tr class=\"sum\"><td></td><td>whole session</td>{}<td></td></tr>\n",
-                      cells(analysis.duration, analysis.whole));
+                      cells(analysis.duration, "", analysis.path, analysis.collisions, analysis.whole));
+  return html +
+         "</table></div>\n<p class=\"soft\">Error: last distance of the part from its place, of what is "
+         "allowed. "
+         "Forces: what the device displayed on the hand. Collisions: contacts of the part that began.</p>\n";
+}
+
+/// What describes the simulation more than the trainee.
+std::string engineerTable(const SessionAnalysis& analysis) {
+  std::string html =
+      "<h2>For engineers</h2>\n<div class=\"card\"><table>\n<tr><th></th><th>step</th><th>hand–part<br>gap "
+      "[mm]</th><th>overlap<br>[mm]</th><th>comp. load<br>[%]</th></tr>\n";
+  const auto row = [&html](const std::string& number, const std::string& title,
+                           const SessionMetrics& metrics) {
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{:.2f}</td><td>{:.2f}</td><td>{:.0f}</td></tr>\n",
+                        number, escaped(title), 1e3 * metrics.gap, 1e3 * metrics.depth, metrics.load);
+  };
+  for (std::size_t i = 0; i < analysis.visits.size(); ++i)
+    row(std::to_string(i + 1), titleText(analysis.visits[i]), analysis.visits[i].metrics);
+  row("", "whole session", analysis.whole);
   return html +
          "</table></div>\n<p class=\"soft\">Gap: how far contacts hold the part back behind the hand. "
          "Overlap: how "
@@ -262,6 +312,8 @@ std::string eventTable(const SessionAnalysis& analysis) {
   if (events.size() > kMaxEvents)
     html += fmt::format("<tr><td></td><td></td><td class=\"soft\">and {} more, see summary.json</td></tr>\n",
                         events.size() - kMaxEvents);
+  if (const std::string others = othersOf(analysis.events); !others.empty())
+    html += fmt::format("<tr><td></td><td></td><td class=\"soft\">{}</td></tr>\n", escaped(others));
   return html + "</table></div>\n";
 }
 
@@ -270,7 +322,8 @@ std::string eventTable(const SessionAnalysis& analysis) {
 std::string reportPage(const SessionAnalysis& analysis, const std::string& picture) {
   std::string html = head(analysis) + tiles(analysis);
   if (!picture.empty()) html += fmt::format("<img src=\"{}\" alt=\"the scene\">\n", escaped(picture));
-  html += stepTable(analysis) + charts(analysis) + performanceTable(analysis) + eventTable(analysis);
+  html += stepTable(analysis) + charts(analysis) + eventTable(analysis) + engineerTable(analysis) +
+          performanceTable(analysis);
   html += fmt::format("<footer>{}, {} messages", escaped(analysis.file), analysis.messages);
   if (analysis.run.final_hash != 0) html += fmt::format(", final state {:016x}", analysis.run.final_hash);
   return html + "</footer>\n</main>\n</body>\n</html>\n";

@@ -73,13 +73,16 @@ class RecordingReader {
   void receive(const SessionAnnounce& announce) { session_.announce = announce; }
   void receive(const Presence& presence);
   void receive(const SceneObject& object);
-  void receive(const WorldFrame& frame) { advanceTo(frame.tick); }
+  void receive(const WorldFrame& frame);
   void receive(const DeviceInput& input) { session_.hands[input.hand].add(input); }
   void receive(const HandManifold& manifold) {
     advanceTo(manifold.tick);
     session_.hands[manifold.hand].add(manifold);
   }
-  void receive(const HandState& state) { session_.indexed = session_.indexed || state.indexing; }
+  void receive(const HandState& state) {
+    session_.indexed = session_.indexed || state.indexing;
+    session_.hands[state.hand].add(state);
+  }
   void receive(const ContactPairs& pairs);
   void receive(const TickStats& stats);
   void receive(const StepState& step) { session_.steps.push_back(step); }
@@ -111,6 +114,7 @@ class RecordingReader {
   void receive(const ForceContribution&) { session_.external_force = true; }
   void receive(const Command& command);
 
+  [[nodiscard]] bool isOfAHand(ObjectId object);
   void advanceTo(Tick tick) { session_.last = std::max(session_.last, tick); }
 
   RecordedSession& session_;
@@ -127,11 +131,22 @@ void RecordingReader::receive(const Presence& presence) {
   for (const HandId hand : presence.hands) session_.hands[hand].role = presence.role;
 }
 
+/// Whether a hand has the object by itself: it is no part of the exercise.
+bool RecordingReader::isOfAHand(ObjectId object) {
+  const std::string& kind = kinds_[object];
+  return kind == "pointer" || kind == "assistant" || kind == "forearm" || kind == "head";
+}
+
 void RecordingReader::receive(const SceneObject& object) {
   kinds_[object.object] = object.kind;
-  if (object.kind == "pointer" || object.kind == "assistant" || object.kind == "forearm" ||
-      object.kind == "head")
-    session_.own_titles.insert(object.title.empty() ? object.name : object.title);
+  if (isOfAHand(object.object)) session_.own_titles.insert(object.title.empty() ? object.name : object.title);
+}
+
+void RecordingReader::receive(const WorldFrame& frame) {
+  advanceTo(frame.tick);
+  for (const ObjectState& state : frame.states)
+    session_.positions[state.object].push_back(
+        {frame.tick, state.epoch, state.X_WO.translation().cast<float>()});
 }
 
 void RecordingReader::receive(const ContactPairs& pairs) {
@@ -144,6 +159,10 @@ void RecordingReader::receive(const ContactPairs& pairs) {
     if (!pair.colliding) continue;
     session_.contacts[pair.a].push_back(pairs.tick);
     session_.contacts[pair.b].push_back(pairs.tick);
+    if (!isOfAHand(pair.a) && !isOfAHand(pair.b)) {
+      session_.collisions[pair.a].push_back(pairs.tick);
+      session_.collisions[pair.b].push_back(pairs.tick);
+    }
     assisted = assisted || kinds_[pair.a] == "assistant" || kinds_[pair.b] == "assistant";
   }
   addPoint(session_.depth, pairs.tick, depth);
@@ -165,6 +184,7 @@ void RecordingReader::receive(const StepProgress& progress) {
   advanceTo(progress.tick);
   double& longest = session_.contact_seconds[progress.revision];
   if (std::isfinite(progress.contact_seconds)) longest = std::max(longest, progress.contact_seconds);
+  session_.errors[progress.revision] = {progress.position_error, progress.angle_error};
 }
 
 void RecordingReader::receive(const Telemetry& telemetry) {
@@ -221,6 +241,10 @@ Result<RecordedSession> readRecording(const std::filesystem::path& file) {
     return fail(file.string() + ": holds no messages" +
                 (session.problem.empty() ? "" : " (" + session.problem + ")"));
   for (auto& [object, ticks] : session.contacts) std::sort(ticks.begin(), ticks.end());
+  for (auto& [object, ticks] : session.collisions) std::sort(ticks.begin(), ticks.end());
+  for (auto& [object, path] : session.positions)
+    std::stable_sort(path.begin(), path.end(),
+                     [](const PathPoint& a, const PathPoint& b) { return a.tick < b.tick; });
   return session;
 }
 

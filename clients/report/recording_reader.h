@@ -37,6 +37,19 @@ struct ForceLatency {
   double p50 = 0.0, p99 = 0.0, max = 0.0;  ///< [s]
 };
 
+/// Where an object was.
+struct PathPoint {
+  Tick tick = 0;
+  std::uint32_t epoch = 0;  ///< differs after a discontinuous change of the pose
+  Eigen::Vector3f p_WO = Eigen::Vector3f::Zero();
+};
+
+/// Distance of an object from its target.
+struct TargetError {
+  double position = 0.0;  ///< [m]
+  double angle = 0.0;     ///< [rad]
+};
+
 /// What a recording holds that an analysis needs. Topics reach a recorder in no order among each other, and
 /// on a busy machine in long batches: each of these is of one topic, in its order, unless it says more.
 struct RecordedSession {
@@ -52,9 +65,12 @@ struct RecordedSession {
   std::vector<SessionParticipant> participants;
   std::map<ClientId, Presence> present;
   std::map<HandId, HandSeries> hands;
-  std::map<ObjectId, std::vector<Tick>> contacts;  ///< of each object; at the end sorted
+  std::map<ObjectId, std::vector<Tick>> contacts;    ///< of each object; at the end sorted
+  std::map<ObjectId, std::vector<Tick>> collisions;  ///< likewise, with what is no hand's own
   std::vector<StepState> steps;
-  std::map<std::uint32_t, double> contact_seconds;  ///< [s] by step revision
+  std::map<std::uint32_t, double> contact_seconds;       ///< [s] by step revision
+  std::map<std::uint32_t, TargetError> errors;           ///< newest, by step revision
+  std::map<ObjectId, std::vector<PathPoint>> positions;  ///< at 100 Hz; at the end sorted
   std::vector<SessionEvent> events;
   std::vector<SessionEvent> client_events;
   std::set<std::string> own_titles;  ///< of objects that hands have by themselves

@@ -38,6 +38,8 @@ class SessionAnalyzer {
   void listAids();
   void dropOwnGrabs();
   void summarize();
+  [[nodiscard]] double pathOf(const StepVisit& visit) const;
+  [[nodiscard]] int collisionsOf(const StepVisit& visit) const;
   [[nodiscard]] SessionMetrics metrics(double begin, double end) const;
 
   RecordedSession& session_;
@@ -87,6 +89,12 @@ void SessionAnalyzer::addVisit(const StepState& step) {
     visits.back().phase = step.step > visits.back().step ? StepPhase::kDone : StepPhase::kWaiting;
   StepVisit visit;
   visit.step = step.step;
+  visit.object = step.object;
+  visit.attempt =
+      1 + static_cast<std::uint32_t>(std::count_if(visits.begin(), visits.end(),
+                                                   [&](const StepVisit& v) { return v.step == step.step; }));
+  visit.has_target = step.has_target;
+  visit.tolerance = {step.tolerance, step.angle_tolerance};
   visit.revision = step.revision;
   visit.name = step.name;
   visit.title = localized(step.title, language_);
@@ -164,6 +172,35 @@ void SessionAnalyzer::dropOwnGrabs() {
   });
 }
 
+double SessionAnalyzer::pathOf(const StepVisit& visit) const {
+  const auto path = session_.positions.find(visit.object);
+  if (path == session_.positions.end()) return 0.0;
+  double length = 0.0;
+  const PathPoint* before = nullptr;
+  for (const PathPoint& point : path->second) {
+    if (secondsOf(point.tick) < visit.begin || secondsOf(point.tick) > visit.end) continue;
+    if (before != nullptr && before->epoch == point.epoch)
+      length += static_cast<double>((point.p_WO - before->p_WO).norm());
+    before = &point;
+  }
+  return length;
+}
+
+int SessionAnalyzer::collisionsOf(const StepVisit& visit) const {
+  constexpr double kApart = 0.2;  // [s] a shorter interruption does not end a contact
+  const auto contacts = session_.collisions.find(visit.object);
+  if (contacts == session_.collisions.end()) return 0;
+  int count = 0;
+  double last = visit.begin - kApart;
+  for (const Tick tick : contacts->second) {
+    const double time = secondsOf(tick);
+    if (time <= visit.begin || time > visit.end) continue;
+    if (time >= last + kApart) ++count;
+    last = time;
+  }
+  return count;
+}
+
 void SessionAnalyzer::summarize() {
   analysis_.whole = metrics(0.0, analysis_.duration);
   if (!analysis_.visits.empty()) analysis_.whole.contact_seconds = 0.0;
@@ -173,6 +210,12 @@ void SessionAnalyzer::summarize() {
     const auto counted = session_.contact_seconds.find(visit.revision);
     if (counted != session_.contact_seconds.end()) visit.metrics.contact_seconds = counted->second;
     analysis_.whole.contact_seconds += visit.metrics.contact_seconds;
+    if (const auto error = session_.errors.find(visit.revision); error != session_.errors.end())
+      visit.error = error->second;
+    visit.path = pathOf(visit);
+    visit.collisions = collisionsOf(visit);
+    analysis_.path += visit.path;
+    analysis_.collisions += visit.collisions;
   }
   std::vector<double> values;
   for (const SeriesPoint& point : analysis_.compute) values.push_back(point.value);
@@ -195,11 +238,12 @@ void SessionAnalyzer::sortEvents() {
 
 }  // namespace
 
-bool SessionAnalysis::succeeded() const {
+bool SessionAnalysis::succeeded(bool allow_skips) const {
   if (!has_run || run.phase != RunPhase::kSucceeded || steps == 0) return false;
   for (std::uint32_t step = 0; step < steps; ++step) {
     const bool done = std::any_of(visits.begin(), visits.end(), [&](const StepVisit& visit) {
-      return visit.step == step && visit.phase == StepPhase::kDone;
+      return visit.step == step &&
+             (visit.phase == StepPhase::kDone || (allow_skips && visit.phase == StepPhase::kSkipped));
     });
     if (!done) return false;
   }

@@ -12,9 +12,9 @@
 
 namespace tenon::report {
 
-/// Metrics of a part of a session. Forces are those on the trainee's hands.
+/// Metrics of a part of a session. Forces are those that the devices displayed on the trainee's hands.
 struct SessionMetrics {
-  double peak_force = 0.0;       ///< [N] of the virtual coupling on a hand
+  double peak_force = 0.0;       ///< [N]
   double mean_force = 0.0;       ///< [N] over the time in which the hand's object was in contact
   double contact_seconds = 0.0;  ///< [s]
   double gap = 0.0;              ///< [m] largest distance between device and proxy
@@ -29,10 +29,17 @@ struct StepVisit {
   std::string name;
   std::string title;
   std::string part;
+  ObjectId object;
   StepPhase phase = StepPhase::kActive;
   double begin = 0.0;  ///< [s]
   double end = 0.0;    ///< [s]
   SessionMetrics metrics;
+  std::uint32_t attempt = 1;  ///< of this step, counted from 1: a step can be repeated
+  double path = 0.0;          ///< [m] that the step's object was moved
+  int collisions = 0;         ///< contacts of the step's object that began, after 0.2 s without one
+  bool has_target = false;
+  TargetError error;      ///< last measured
+  TargetError tolerance;  ///< of the target
 };
 
 /// Analysis of a recorded session for the trainer: steps, events, forces, and real-time performance.
@@ -64,14 +71,16 @@ struct SessionAnalysis {
 
   double duration = 0.0;  ///< [s]
   SessionMetrics whole;
+  double path = 0.0;                                                    ///< [m] of all steps
+  int collisions = 0;                                                   ///< of all steps
   double compute_median = 0.0, compute_p99 = 0.0, compute_worst = 0.0;  ///< [s]
   std::uint64_t late_ticks = 0;
   double input_age = 0.0;  ///< [s] age of the oldest input that a tick used
   std::uint64_t messages = 0;
   std::uint64_t malformed = 0;  ///< messages that could not be decoded
 
-  /// The run succeeded, and every step was done in the recording.
-  [[nodiscard]] bool succeeded() const;
+  /// The run succeeded, and every step was done (`allow_skips`: or skipped) in the recording.
+  [[nodiscard]] bool succeeded(bool allow_skips = false) const;
 };
 
 /// Analyses a recording; titles in `language`, or in the first language there is. Of a truncated recording

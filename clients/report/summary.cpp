@@ -20,10 +20,9 @@ std::string padded(std::string text, std::size_t width) {
   return text;
 }
 
-std::string row(const SessionMetrics& metrics) {
-  return fmt::format("{:8.1f} {:8.1f} {:9.1f} {:8.2f} {:8.2f} {:7.0f}", metrics.peak_force,
-                     metrics.mean_force, metrics.contact_seconds, 1e3 * metrics.gap, 1e3 * metrics.depth,
-                     metrics.load);
+std::string row(const SessionMetrics& metrics, const std::string& error, double path, int collisions) {
+  return fmt::format("{:>12} {:7.2f} {:10} {:8.1f} {:8.1f} {:9.1f}", error, path, collisions,
+                     metrics.peak_force, metrics.mean_force, metrics.contact_seconds);
 }
 
 nlohmann::json jsonOf(const SessionMetrics& metrics) {
@@ -36,6 +35,15 @@ nlohmann::json jsonOf(const SessionMetrics& metrics) {
 }
 
 }  // namespace
+
+std::string errorText(const StepVisit& visit) {
+  if (!visit.has_target) return "";
+  return fmt::format("{:.2f} of {:.1f}", 1e3 * visit.error.position, 1e3 * visit.tolerance.position);
+}
+
+std::string titleText(const StepVisit& visit) {
+  return visit.attempt > 1 ? fmt::format("{} (attempt {})", visit.title, visit.attempt) : visit.title;
+}
 
 std::string_view phaseName(StepPhase phase) {
   switch (phase) {
@@ -70,24 +78,29 @@ std::string outcomeOf(const SessionAnalysis& analysis) {
 
 std::string summaryText(const SessionAnalysis& analysis) {
   std::size_t width = 10;
-  for (const StepVisit& visit : analysis.visits) width = std::max(width, columnsOf(visit.title));
+  for (const StepVisit& visit : analysis.visits) width = std::max(width, columnsOf(titleText(visit)));
   std::string text =
       fmt::format("{}: {} after {:.1f} s\n", analysis.title.empty() ? analysis.session : analysis.title,
                   outcomeOf(analysis), analysis.duration);
   if (!analysis.run.reason.empty()) text += fmt::format("{}\n", analysis.run.reason);
   if (!analysis.problem.empty()) text += fmt::format("warning: {}\n", analysis.problem);
 
-  text += fmt::format("\n    {}  {:>7} {:>8} {:>8} {:>9} {:>8} {:>8} {:>7}\n", padded("step", width), "time",
-                      "peak", "mean", "contact", "gap", "overlap", "load");
-  text += fmt::format("    {}  {:>7} {:>8} {:>8} {:>9} {:>8} {:>8} {:>7}\n", padded("", width), "[s]", "[N]",
-                      "[N]", "[s]", "[mm]", "[mm]", "[%]");
+  text += fmt::format("\n    {}  {:>7} {:>12} {:>7} {:>10} {:>8} {:>8} {:>9}\n", padded("step", width),
+                      "time", "error", "path", "collisions", "peak", "mean", "contact");
+  text += fmt::format("    {}  {:>7} {:>12} {:>7} {:>10} {:>8} {:>8} {:>9}\n", padded("", width), "[s]",
+                      "[mm]", "[m]", "", "[N]", "[N]", "[s]");
   for (std::size_t i = 0; i < analysis.visits.size(); ++i) {
     const StepVisit& visit = analysis.visits[i];
-    text += fmt::format("{:3} {}  {:7.1f} {}  {}\n", i + 1, padded(visit.title, width),
-                        visit.end - visit.begin, row(visit.metrics), phaseName(visit.phase));
+    text += fmt::format(
+        "{:3} {}  {:7.1f} {}  {}\n", i + 1, padded(titleText(visit), width), visit.end - visit.begin,
+        row(visit.metrics, errorText(visit), visit.path, visit.collisions), phaseName(visit.phase));
   }
+  text += fmt::format("    {}  {:7.1f} {}\n", padded("session", width), analysis.duration,
+                      row(analysis.whole, "", analysis.path, analysis.collisions));
   text +=
-      fmt::format("    {}  {:7.1f} {}\n\n", padded("session", width), analysis.duration, row(analysis.whole));
+      "error: last distance from the target, of what is allowed; path: how far the part was moved; peak and "
+      "mean "
+      "(in contact): force on the hand\n\n";
 
   text +=
       fmt::format("computation time  median {:.3f} ms, p99 {:.3f} ms, max {:.3f} ms\n",
@@ -97,10 +110,10 @@ std::string summaryText(const SessionAnalysis& analysis) {
   for (const ForceLatency& latency : analysis.force_latencies)
     text += fmt::format("input to force    median {:.1f} ms, p99 {:.1f} ms, max {:.1f} ms ({})\n",
                         1e3 * latency.p50, 1e3 * latency.p99, 1e3 * latency.max, latency.who);
+  text += fmt::format("hand to part      at most {:.2f} mm; parts inside each other: at most {:.2f} mm\n",
+                      1e3 * analysis.whole.gap, 1e3 * analysis.whole.depth);
+  text += fmt::format("work of a pair    at most {:.0f} % of its limit\n", analysis.whole.load);
   for (const std::string& aid : analysis.aids) text += fmt::format("aid               {}\n", aid);
-  text +=
-      "gap: hand to part; overlap: depth of two parts inside each other; mean: while in contact; load: "
-      "computational\n";
   return text;
 }
 
@@ -117,6 +130,10 @@ nlohmann::json summaryJson(const SessionAnalysis& analysis) {
       {"reason", analysis.run.reason},
       {"final_hash", fmt::format("{:016x}", analysis.run.final_hash)},
       {"seconds", analysis.duration},
+      {"steps_skipped", analysis.run.steps_skipped},
+      {"steps_timed_out", analysis.run.steps_timed_out},
+      {"path", analysis.path},
+      {"collisions", analysis.collisions},
       {"whole", jsonOf(analysis.whole)},
       {"compute_seconds",
        {{"median", analysis.compute_median}, {"p99", analysis.compute_p99}, {"max", analysis.compute_worst}}},
@@ -137,6 +154,15 @@ nlohmann::json summaryJson(const SessionAnalysis& analysis) {
     step["name"] = visit.name;
     step["title"] = visit.title;
     step["part"] = visit.part;
+    step["attempt"] = visit.attempt;
+    step["path"] = visit.path;
+    step["collisions"] = visit.collisions;
+    if (visit.has_target) {
+      step["position_error"] = visit.error.position;
+      step["position_tolerance"] = visit.tolerance.position;
+      step["angle_error"] = visit.error.angle;
+      step["angle_tolerance"] = visit.tolerance.angle;
+    }
     step["phase"] = phaseName(visit.phase);
     step["begin"] = visit.begin;
     step["seconds"] = visit.end - visit.begin;

@@ -9,6 +9,12 @@
 
 namespace tenon::report {
 
+/// "0.31 of 2.0": last error against tolerance [mm]; empty without a target.
+[[nodiscard]] std::string errorText(const StepVisit& visit);
+
+/// Title of a step, with the number of the attempt from the second on.
+[[nodiscard]] std::string titleText(const StepVisit& visit);
+
 /// Result of a step in words.
 [[nodiscard]] std::string_view phaseName(StepPhase phase);
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <string_view>
 
+#include "idl/types/messages/commands.h"
 #include "idl/types/messages/objects.h"
 #include "idl/types/messages/role.h"
 #include "idl/types/messages/run.h"
@@ -15,6 +16,15 @@ namespace tenon {
   constexpr std::array<std::string_view, 5> kNames{"admin", "instructor", "trainee", "observer", "recorder"};
   const auto index = static_cast<std::size_t>(role);
   return index < kNames.size() ? kNames[index] : "unknown role";
+}
+
+/// As typed in `tenon command`.
+[[nodiscard]] constexpr std::string_view commandName(CommandKind kind) noexcept {
+  constexpr std::array<std::string_view, 16> kNames{
+      "fulfilled", "signal", "pause", "resume", "reset", "skip",   "release", "swap",
+      "collision", "stop",   "clear", "goto",   "back",  "repeat", "give",    "note"};
+  const auto index = static_cast<std::size_t>(kind);
+  return index < kNames.size() ? kNames[index] : "unknown command";
 }
 
 [[nodiscard]] constexpr std::string_view objectStatusName(ObjectStatus status) noexcept {

@@ -189,6 +189,7 @@ void fields(auto& d, auto& c, Is<HandState> auto& m) {
   d("safety_flags", c.safety_flags, m.safety_flags);
   d("indexing", c.indexing, m.indexing);
   d("tactors", c.tactors, m.tactors);
+  d("peak_force", c.peak_force, m.peak_force);
 }
 void fields(auto& d, auto& c, Is<ContactPairs> auto& m) {
   d("part", c.part, m.part);
@@ -256,6 +257,19 @@ void fields(auto& d, auto& c, Is<SceneObject> auto& m) {
   d("size", c.size, m.size);
   d("centre", c.centre, m.centre);
 }
+void fields(auto& d, auto& c, Is<SceneHand> auto& m) {
+  d("hand", c.hand_id, m.hand);
+  d("name", c.name, m.name);
+  d("role", c.role, m.role);
+  d("object", c.object_id, m.object);
+}
+void fields(auto& d, auto& c, Is<SceneStep> auto& m) {
+  d("step", c.step, m.step);
+  d("steps", c.steps, m.steps);
+  d("name", c.name, m.name);
+  d.list("title", c.title, m.title, 3, kStructs);
+  d("part", c.part, m.part);
+}
 void fields(auto& d, auto& c, Is<ObjectSnapshot> auto& m) {
   d("tick", c.tick, m.tick);
   fields(d, c.state, m.state);
@@ -296,6 +310,8 @@ void fields(auto& d, auto& c, Is<RunState> auto& m) {
   d("reason", c.reason, m.reason);
   d("final_hash", c.final_hash, m.final_hash);
   d("server_epoch", c.server_epoch, m.server_epoch);
+  d("steps_skipped", c.steps_skipped, m.steps_skipped);
+  d("steps_timed_out", c.steps_timed_out, m.steps_timed_out);
 }
 void fields(auto& d, auto& c, Is<GrabState> auto& m) {
   d("object", c.object_id, m.object);

@@ -12,8 +12,9 @@ namespace tenon::game_control {
 /// Threads: a value. Real-time: all.
 struct GameCommand {
   CommandKind kind = CommandKind::kFulfilled;
-  HandId hand;  ///< kRelease
-  /// kSignal: index into ScenarioFile::signals; kSetCollision: index into ScenarioFile::pairs
+  HandId hand;  ///< kRelease, kHandOver
+  /// kSignal: index into ScenarioFile::signals; kSetCollision: into pairs; kGoToStep: into states; kHandOver:
+  /// into objects
   std::uint32_t signal = 0;
   double value = 0.0;  ///< [-] kSetCollision: 0 disables the pair, any other value enables it
 };

@@ -1,6 +1,7 @@
 #include "server/game_control/scenario.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <system_error>
@@ -39,13 +40,29 @@ int ScenarioFile::signalNamed(std::string_view signal) const {
   return found == signals.end() ? -1 : static_cast<int>(found - signals.begin());
 }
 
-Result<ScenarioFile> readScenario(const std::filesystem::path& path, const ReadOptions& options) {
+namespace {
+
+/// A name without a folder may also be that of a shipped scenario.
+std::filesystem::path located(const std::filesystem::path& path) {
   std::error_code problem;
+  const char* const share = std::getenv("TENON_SHARE");  // set by `tenon`
+  if (share == nullptr || path.has_parent_path() || std::filesystem::exists(path, problem)) return path;
+  const std::filesystem::path shipped = std::filesystem::path(share) / "scenarios" / path;
+  return std::filesystem::exists(shipped, problem) ? shipped : path;
+}
+
+}  // namespace
+
+Result<ScenarioFile> readScenario(const std::filesystem::path& named, const ReadOptions& options) {
+  std::error_code problem;
+  const std::filesystem::path path = located(named);
   const std::filesystem::path file =
       std::filesystem::is_directory(path, problem) ? path / "scenario.yaml" : path;
   const std::uintmax_t size = std::filesystem::file_size(file, problem);
   if (problem)
-    return fail(file.string() + ": no such scenario file, expected a folder with a scenario.yaml or a file");
+    return fail(file.string() +
+                ": no such scenario file, expected a folder with a scenario.yaml, a file, or a "
+                "shipped scenario: engine_bay, peg_and_box, stacking");
   if (size > kLargestFile)
     return fail(file.string() + ": larger than 1 MB, expected a scenario of a few pages of YAML");
   std::ifstream stream(file, std::ios::binary);

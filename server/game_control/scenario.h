@@ -134,6 +134,7 @@ struct GroupChange {
   int line = 0;
 };
 
+inline constexpr std::size_t kMaxStates = 256;
 inline constexpr std::size_t kMaxHelpers = 4;  ///< entries in `may_take` of a state
 
 enum class TimeoutAction : std::uint8_t { kFail, kSkip };
@@ -207,7 +208,8 @@ struct ReadOptions {
   bool only_names = false;  ///< stop after objects and hands: to look up their ids for `taken`
 };
 
-/// Reads a scenario file, or `scenario.yaml` in a folder. Fails with `file:line: what was wrong, what was
+/// Reads a scenario file, or `scenario.yaml` in a folder; a name without a folder may be that of a shipped
+/// scenario, in the folder that TENON_SHARE names. Fails with `file:line: what was wrong, what was
 /// expected`.
 [[nodiscard]] Result<ScenarioFile> readScenario(const std::filesystem::path& path,
                                                 const ReadOptions& options = {});

@@ -11,7 +11,6 @@ namespace tenon::game_control {
 namespace {
 
 constexpr double kTouchSeconds = 1.0;  // [s] paper §5
-constexpr std::size_t kMaxStates = 1000;
 
 }  // namespace
 

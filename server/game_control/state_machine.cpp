@@ -1,6 +1,7 @@
 #include "server/game_control/state_machine.h"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <utility>
 
@@ -36,6 +37,21 @@ class EnvironmentView final : public SceneView {
  private:
   const simulation::Environment& environment_;
 };
+
+constexpr bool contains(const auto& set, std::uint32_t state) noexcept {
+  return (set[state / 64] >> (state % 64) & 1U) != 0;
+}
+
+constexpr void assign(auto& set, std::uint32_t state, bool member) noexcept {
+  const std::uint64_t bit = std::uint64_t{1} << (state % 64);
+  set[state / 64] = member ? set[state / 64] | bit : set[state / 64] & ~bit;
+}
+
+constexpr std::uint32_t count(const auto& set) noexcept {
+  std::uint32_t members = 0;
+  for (const std::uint64_t states : set) members += static_cast<std::uint32_t>(std::popcount(states));
+  return members;
+}
 
 /// The hand that currently has the role of a hand of the scenario: after hands were swapped, the one whose
 /// default object is that of the scenario's hand.
@@ -108,14 +124,27 @@ void StateMachine::apply(simulation::Environment& environment, const GameCommand
       swapHands(environment);
       break;
     case CommandKind::kReset:
-      reset(environment);
+      goTo(environment, 0);
+      break;
+    case CommandKind::kGoToStep:
+      if (command.signal < scenario_->states.size()) goTo(environment, command.signal);
+      break;
+    case CommandKind::kBack:
+      goTo(environment, std::max(memory_.status.step, 1U) - 1);
+      break;
+    case CommandKind::kRepeatStep:
+      goTo(environment, memory_.status.step);
+      break;
+    case CommandKind::kHandOver:
+      handOver(environment, ObjectId{command.signal}, command.hand);
       break;
     default:
       break;
   }
 }
 
-void StateMachine::reset(simulation::Environment& environment) noexcept {
+/// All objects, groups and pairs as at the start.
+void StateMachine::restoreScene(simulation::Environment& environment) noexcept {
   for (std::uint32_t hand = 0; hand < scenario_->hands.size(); ++hand) environment.release(HandId{hand});
   for (std::uint32_t object = 0; object < scenario_->objects.size(); ++object) {
     const ScenarioObject& spec = scenario_->objects[object];
@@ -127,9 +156,26 @@ void StateMachine::reset(simulation::Environment& environment) noexcept {
   for (std::size_t pair = 0; pair < scenario_->pairs.size(); ++pair) {
     environment.setPairEnabled(pair, scenario_->pairs[pair].enabled);
   }
+}
+
+void StateMachine::goTo(simulation::Environment& environment, std::uint32_t step) noexcept {
+  restoreScene(environment);
+  for (std::uint32_t passed = 0; passed < step; ++passed) {
+    memory_.status.step = passed;
+    applyEffects(environment);
+    finish(environment);
+    if (!contains(memory_.visited, passed)) setOutcome(passed, StepPhase::kSkipped);
+  }
+  for (auto later = step; later < scenario_->states.size(); ++later) setOutcome(later, StepPhase::kWaiting);
   memory_.status.finished = false;
   memory_.status.failed = false;
-  enter(environment, 0);
+  enter(environment, step);
+}
+
+void StateMachine::handOver(simulation::Environment& environment, ObjectId object, HandId hand) noexcept {
+  if (object.value >= scenario_->objects.size() || hand.value >= scenario_->hands.size()) return;
+  releaseFromHands(environment, object);
+  environment.grab(hand, object);
 }
 
 void StateMachine::enter(simulation::Environment& environment, std::uint32_t step) noexcept {
@@ -145,7 +191,13 @@ void StateMachine::enter(simulation::Environment& environment, std::uint32_t ste
   memory_.contact_ticks = 0;
   memory_.regrab = {};
   memory_.helpers = {};
+  applyEffects(environment);
+  status.hand = handInRole(*scenario_, environment, state().hand);
+  updateMeasurements(EnvironmentView(environment));
+}
 
+/// What a state does to the scene when it begins.
+void StateMachine::applyEffects(simulation::Environment& environment) noexcept {
   for (const PairSwitch& change : state().pairs) environment.setPairEnabled(change.pair, change.enabled);
   for (const GroupChange& change : state().groups) environment.setGroup(change.object, change.group);
   for (const Placement& placement : state().placements) place(environment, placement);
@@ -157,8 +209,6 @@ void StateMachine::enter(simulation::Environment& environment, std::uint32_t ste
       environment.grab(hand, assignment.object);
     }
   }
-  status.hand = handInRole(*scenario_, environment, state().hand);
-  updateMeasurements(EnvironmentView(environment));
 }
 
 void StateMachine::place(simulation::Environment& environment, const Placement& placement) noexcept {
@@ -232,13 +282,32 @@ void StateMachine::leave(simulation::Environment& environment, StepPhase phase) 
   status.phase = phase;
   status.changed = environment.tick();
   ++status.revision;
+  setOutcome(status.step, phase);
   status.failed = phase == StepPhase::kTimedOut && state().on_timeout == TimeoutAction::kFail;
   if (status.failed) return;
   status.finished = status.step + 1 == scenario_->states.size();
+  finish(environment);
+}
+
+/// What a state does to the scene when it ends, unless it fails the training.
+void StateMachine::finish(simulation::Environment& environment) noexcept {
   releaseHelpers(environment);
   if (!state().snap) return;
   releaseFromHands(environment, state().object);
   environment.place(state().object, *state().X_WG, ObjectStatus::kFixed);
+}
+
+/// `phase` kWaiting: the state has not been visited.
+void StateMachine::setOutcome(std::uint32_t step, StepPhase phase) noexcept {
+  assign(memory_.visited, step, phase != StepPhase::kWaiting);
+  assign(memory_.skipped, step, phase == StepPhase::kSkipped);
+  assign(memory_.timed_out, step, phase == StepPhase::kTimedOut);
+  countOutcomes();
+}
+
+void StateMachine::countOutcomes() noexcept {
+  memory_.status.skipped = count(memory_.skipped);
+  memory_.status.timed_out = count(memory_.timed_out);
 }
 
 void StateMachine::updateMeasurements(const SceneView& scene) noexcept {

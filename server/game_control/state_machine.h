@@ -31,6 +31,8 @@ struct StepStatus {
   Tick tick = 0;                 ///< tick of the Environment of the values below
   bool finished = false;         ///< the last state has ended
   bool failed = false;           ///< a state timed out whose timeout fails the training
+  std::uint32_t skipped = 0;     ///< states whose last visit was skipped
+  std::uint32_t timed_out = 0;   ///< states whose last visit timed out
   double position_error = 0.0;   ///< [m] of its object's centre to the target; 0 without a target
   double angle_error = 0.0;      ///< [rad] likewise
   double contact_seconds = 0.0;  ///< [s] that the object has been in contact in this state
@@ -55,8 +57,13 @@ class StateMachine {
   void start(simulation::Environment& environment) noexcept;
 
   /// One tick, before Environment::step: conditions are evaluated on the result of the last tick. Handles
-  /// kFulfilled, kSignal, kSkipStep, kRelease, kSetCollision, kSwapHands and kReset (all objects, groups and
-  /// pairs as at the start, first state); other commands are the session's.
+  /// kFulfilled, kSignal, kSkipStep, kRelease, kSetCollision, kSwapHands, kReset (all objects, groups and
+  /// pairs as at the start, first state), kGoToStep, kBack, kRepeatStep and kHandOver; other commands are the
+  /// session's.
+  ///
+  /// Going to a state makes the scene what it is when all states before have been skipped: what the trainee
+  /// has moved since is undone. States that are passed over without having been visited count as skipped;
+  /// those from the target on as not visited.
   void step(simulation::Environment& environment, std::span<const GameCommand> commands) noexcept;
 
   [[nodiscard]] const StepStatus& status() const { return memory_.status; }
@@ -73,9 +80,15 @@ class StateMachine {
   [[nodiscard]] Result<void> restore(std::span<const std::uint8_t> bytes);
 
  private:
+  /// A set of states.
+  using StateSet = std::array<std::uint64_t, kMaxStates / 64>;
+
   /// The whole mutable state.
   struct Memory {
     StepStatus status;
+    StateSet skipped{};    ///< states whose last visit was skipped
+    StateSet timed_out{};  ///< states whose last visit timed out
+    StateSet visited{};    ///< states that have ended
     ConditionProgress progress;
     std::uint64_t elapsed = 0;        ///< [ticks] in this state
     std::uint64_t contact_ticks = 0;  ///< [ticks] of the state's object in contact
@@ -87,13 +100,19 @@ class StateMachine {
 
   void enter(simulation::Environment& environment, std::uint32_t step) noexcept;
   void leave(simulation::Environment& environment, StepPhase phase) noexcept;
-  void reset(simulation::Environment& environment) noexcept;
+  void finish(simulation::Environment& environment) noexcept;
+  void setOutcome(std::uint32_t step, StepPhase phase) noexcept;
+  void restoreScene(simulation::Environment& environment) noexcept;
+  void goTo(simulation::Environment& environment, std::uint32_t step) noexcept;
+  void handOver(simulation::Environment& environment, ObjectId object, HandId hand) noexcept;
+  void applyEffects(simulation::Environment& environment) noexcept;
   void apply(simulation::Environment& environment, const GameCommand& command) noexcept;
   void place(simulation::Environment& environment, const Placement& placement) noexcept;
   void regrabReleasedPart(simulation::Environment& environment, const SceneView& scene) noexcept;
   void grabByHelpers(simulation::Environment& environment, const SceneView& scene) noexcept;
   void releaseHelpers(simulation::Environment& environment) noexcept;
   void swapHands(simulation::Environment& environment) noexcept;
+  void countOutcomes() noexcept;
   void updateMeasurements(const SceneView& scene) noexcept;
   void collectReadings() noexcept;
   [[nodiscard]] const ScenarioState& state() const { return scenario_->states[memory_.status.step]; }

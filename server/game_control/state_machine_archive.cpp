@@ -47,6 +47,8 @@ void StateMachine::visitMemory(Memory& memory, Visitor&& visit) {
   visit(status.position_error);
   visit(status.angle_error);
   visit(status.contact_seconds);
+  for (StateSet* set : {&memory.skipped, &memory.timed_out, &memory.visited})
+    for (std::uint64_t& states : *set) visit(states);
   memory.progress.visitMemory(visit);
   visit(memory.elapsed);
   visit(memory.contact_ticks);
@@ -116,6 +118,7 @@ Result<void> StateMachine::restore(std::span<const std::uint8_t> bytes) {
       memory.status.step + 1 == scenario_->states.size())
     return fail("state machine: a saved state goes on after the scenario's last step");
   memory_ = memory;
+  countOutcomes();
   collectReadings();
   return {};
 }

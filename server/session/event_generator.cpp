@@ -9,6 +9,35 @@
 
 namespace tenon::session {
 
+namespace {
+
+/// Kind of the event that a state ends with; nullptr while it has not ended.
+const char* endKind(StepPhase phase) {
+  switch (phase) {
+    case StepPhase::kDone:
+      return "step done";
+    case StepPhase::kSkipped:
+      return "step skipped";
+    case StepPhase::kTimedOut:
+      return "step timed out";
+    default:
+      return nullptr;
+  }
+}
+
+std::string counted(std::uint32_t steps, std::string_view what) {
+  return fmt::format(", {} step{} {}", steps, steps == 1 ? "" : "s", what);
+}
+
+/// How a run ends after its last step.
+std::string endOf(const game_control::StepStatus& step) {
+  if (step.skipped == 0 && step.timed_out == 0) return "everything is mounted";
+  return "ended" + (step.skipped > 0 ? counted(step.skipped, "skipped") : "") +
+         (step.timed_out > 0 ? counted(step.timed_out, "not done in time") : "");
+}
+
+}  // namespace
+
 SceneObject describe(ObjectId id, const simulation::ObjectSpec& spec) {
   SceneObject object;
   object.object = id;
@@ -61,7 +90,7 @@ void EventGenerator::addRun(const TickOutput& output, TickEvents& events) {
       run.reason = "paused";
       break;
     case RunPhase::kSucceeded:
-      run.reason = "everything is mounted";
+      run.reason = endOf(output.step);
       break;
     case RunPhase::kFailed:
       run.reason = fmt::format("step '{}' was not done in time", scenario_->states[output.step.step].name);
@@ -72,6 +101,8 @@ void EventGenerator::addRun(const TickOutput& output, TickEvents& events) {
       break;
   }
   if (output.emergency_stop && !isOver(output.phase)) run.reason = "emergency stop";
+  run.steps_skipped = output.step.skipped;
+  run.steps_timed_out = output.step.timed_out;
   if (output.phase >= RunPhase::kSucceeded) run.final_hash = output.hash;
   run_reason_ = run.reason;
   const bool is_error = output.phase == RunPhase::kFailed || output.emergency_stop;
@@ -88,11 +119,11 @@ std::string EventGenerator::blockerOf(const TickOutput& output) const {
 void EventGenerator::addStep(const TickOutput& output, TickEvents& events) {
   if (previous_ && previous_->step.revision == output.step.revision) return;
   const game_control::ScenarioFile& scenario = *scenario_;
-  if (previous_ && previous_->step.step != output.step.step)
+  if (const char* const end = endKind(output.step.phase))
     events.log.push_back(
-        makeEvent(Severity::kInfo, "step done",
-                  fmt::format("{} ({:.1f} s)", scenario.states[previous_->step.step].name,
-                              static_cast<double>(output.tick - previous_->step.started) * kTickSeconds)));
+        makeEvent(Severity::kInfo, end,
+                  fmt::format("{} ({:.1f} s)", scenario.states[output.step.step].name,
+                              static_cast<double>(output.tick - output.step.started) * kTickSeconds)));
   events.step = describe(scenario, output.step);
   if (output.step.phase == StepPhase::kTimedOut)
     if (std::string blocker = blockerOf(output); !blocker.empty())

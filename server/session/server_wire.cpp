@@ -49,6 +49,8 @@ struct ServerWire::Writers {
   TopicWriter<TickStats> stats{wire::kTickStats100, {}};
   TopicWriter<ObjectSnapshot> snapshot{wire::kObjectSnapshot, {}};
   TopicWriter<SceneObject> object{wire::kSceneObject, {}};
+  TopicWriter<SceneHand> hand{wire::kSceneHand, {}};
+  TopicWriter<SceneStep> scene_step{wire::kSceneStep, {}};
   TopicWriter<StepState> step{wire::kStepState, {}};
   TopicWriter<StepProgress> progress{wire::kStepProgress, {}};
   TopicWriter<RunState> run{wire::kRunState, {}};
@@ -65,8 +67,9 @@ struct ServerWire::Writers {
 
   auto inLobby() { return std::tie(announce, welcome); }
   auto inSession() {
-    return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, object, step, progress,
-                    run, grab, ack, guidance, event, clock, stop, clear, published, input, checkpoint);
+    return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, object, hand, scene_step,
+                    step, progress, run, grab, ack, guidance, event, clock, stop, clear, published, input,
+                    checkpoint);
   }
   /// Written in ticks by send(OutgoingMessages), with the tick in each sample.
   auto ofTicks() {
@@ -238,6 +241,16 @@ void ServerWire::sendScene(const LoadedScene& loaded) {
   for (std::uint32_t i = 0; i < loaded.scene->objects.size(); ++i) {
     (void)writers_->object.writer->write(describe(ObjectId{i}, loaded.scene->objects[i]));
   }
+  const game_control::ScenarioFile& scenario = *loaded.scenario;
+  for (std::uint32_t i = 0; i < scenario.hands.size(); ++i) {
+    const game_control::ScenarioHand& hand = scenario.hands[i];
+    (void)writers_->hand.writer->write({HandId{i}, hand.name, hand.role, hand.object});
+  }
+  const auto steps = static_cast<std::uint32_t>(scenario.states.size());
+  for (std::uint32_t i = 0; i < steps; ++i) {
+    const game_control::ScenarioState& state = scenario.states[i];
+    (void)writers_->scene_step.writer->write({i, steps, state.name, state.title, state.part});
+  }
 }
 
 void ServerWire::announce() {
@@ -366,13 +379,21 @@ void ServerWire::handle(const Command& command, const wire::Origin& from) {
     (void)writers_->ack.writer->write(*again);
     return;
   }
+  const Presence* sender = registry_.findClient(command.client);
+  const std::string who = sender != nullptr ? sender->name : fmt::format("client {}", command.client.value);
   const CommandAck ack = registry_.handleCommand(command);
   (void)writers_->ack.writer->write(ack);
   if (!ack.accepted) {
     log(Severity::kWarning, "refused",
-        fmt::format("command of client {}: {}", command.client.value, ack.reason));
+        fmt::format("{}: '{}': {}", who, commandName(command.kind), ack.reason));
+  } else if (command.kind == CommandKind::kNote) {
+    log(Severity::kInfo, "note", fmt::format("{}: {}", who, command.text));
   } else if (command.kind == CommandKind::kClearEmergencyStop) {
     clearEmergencyStop(command.client, command.text);
+  } else {
+    log(Severity::kInfo, "command",
+        fmt::format("{}: {}{}{}", who, commandName(command.kind), command.text.empty() ? "" : " ",
+                    command.text));
   }
 }
 

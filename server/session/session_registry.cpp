@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <charconv>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -20,6 +21,10 @@ bool isPlausible(const Pose& X) {
 }
 
 bool isPlausible(const Vector3& v, double limit) { return v.allFinite() && v.norm() < limit; }
+
+std::string notPermitted(Role role) {
+  return fmt::format("not permitted for the {}: ask the instructor", roleName(role));
+}
 
 bool mayControlHandOf(Role role, Role hand_role) {
   return has(role, Right::kMoveAnyHand) || (role == hand_role && has(role, Right::kMoveHands));
@@ -265,6 +270,14 @@ const CommandAck* SessionRegistry::previousAck(const Command& command) const {
 
 CommandAck SessionRegistry::decide(const Command& command, Role role) {
   CommandAck ack{command.client, command.id, false, {}};
+  if (command.kind == CommandKind::kNote) {
+    if (!has(role, Right::kAnswerStep))
+      ack.reason = notPermitted(role);
+    else if (command.text.empty())
+      ack.reason = "the note is empty";
+    ack.accepted = ack.reason.empty();
+    return ack;
+  }
   const auto change = changeFromCommand(command, role);
   ack.reason = change ? refusalByPhase(command.kind) : change.error().what;
   ack.accepted = ack.reason.empty();
@@ -308,6 +321,19 @@ int SessionRegistry::findPair(std::string_view a, std::string_view b) const {
   return object_a.valid() && object_b.valid() ? scenario_.pairOf(object_a, object_b) : -1;
 }
 
+/// Index of the step with this name or number, from 1; -1 if there is none.
+int SessionRegistry::findStep(std::string_view text) const {
+  const auto& states = scenario_.states;
+  const auto named =
+      std::find_if(states.begin(), states.end(), [&](const auto& state) { return state.name == text; });
+  if (named != states.end()) return static_cast<int>(named - states.begin());
+  std::size_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const bool is_step =
+      error == std::errc() && end == text.data() + text.size() && number >= 1 && number <= states.size();
+  return is_step ? static_cast<int>(number) - 1 : -1;
+}
+
 /// Whether the client controls every force-coupled hand of the trainee.
 bool SessionRegistry::controlsBothHands(ClientId client) const {
   for (std::uint32_t i = 0; i < controllers_.size(); ++i) {
@@ -329,9 +355,7 @@ Change gameChange(const Command& command, std::uint32_t signal = 0) {
 }  // namespace
 
 Result<Change> SessionRegistry::changeFromCommand(const Command& command, Role role) const {
-  const auto not_permitted = [&] {
-    return fail(fmt::format("not permitted for the {}: ask the instructor", roleName(role)));
-  };
+  const auto not_permitted = [&] { return fail(notPermitted(role)); };
   if (!std::isfinite(command.value)) return fail("its value is not a finite number");
   switch (command.kind) {
     case CommandKind::kFulfilled:
@@ -382,6 +406,19 @@ Result<Change> SessionRegistry::releaseChange(const Command& command, Role role)
   return Change{.kind = ChangeKind::kRelease, .hand = hand};
 }
 
+/// Of "OBJECT HAND".
+Result<Change> SessionRegistry::handOverChange(const Command& command) const {
+  const std::size_t space = command.text.find(' ');
+  const ObjectId object = scenario_.objectNamed(command.text.substr(0, space));
+  const HandId hand =
+      space == std::string::npos ? HandId{} : scenario_.handNamed(command.text.substr(space + 1));
+  if (!object.valid() || !hand.valid())
+    return fail(fmt::format("'{}' does not name an object and a hand", command.text));
+  Change change = gameChange(command, object.value);
+  change.game.hand = hand;
+  return change;
+}
+
 Result<Change> SessionRegistry::leadChange(const Command& command) const {
   switch (command.kind) {
     case CommandKind::kPause:
@@ -392,7 +429,18 @@ Result<Change> SessionRegistry::leadChange(const Command& command) const {
       return Change{.kind = ChangeKind::kStop};
     case CommandKind::kReset:
     case CommandKind::kSkipStep:
+    case CommandKind::kBack:
+    case CommandKind::kRepeatStep:
       return gameChange(command);
+    case CommandKind::kGoToStep: {
+      const int step = findStep(command.text);
+      if (step < 0)
+        return fail(fmt::format("this scenario has no step '{}': it has 1 to {}, or name one", command.text,
+                                scenario_.states.size()));
+      return gameChange(command, static_cast<std::uint32_t>(step));
+    }
+    case CommandKind::kHandOver:
+      return handOverChange(command);
     case CommandKind::kSetCollision: {
       const std::size_t space = command.text.find(' ');
       const int pair = space == std::string::npos

@@ -112,7 +112,9 @@ class SessionRegistry {
   [[nodiscard]] RunPhase expectedPhase() const { return pending_phase_.value_or(phase_); }
   [[nodiscard]] Result<Change> changeFromCommand(const Command& command, Role role) const;
   [[nodiscard]] Result<Change> leadChange(const Command& command) const;
+  [[nodiscard]] Result<Change> handOverChange(const Command& command) const;
   [[nodiscard]] Result<Change> releaseChange(const Command& command, Role role) const;
+  [[nodiscard]] int findStep(std::string_view text) const;
   [[nodiscard]] int findPair(std::string_view a, std::string_view b) const;
   [[nodiscard]] bool controlsBothHands(ClientId client) const;
   [[nodiscard]] bool isController(ClientId client, HandId hand) const;

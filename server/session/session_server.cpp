@@ -319,6 +319,8 @@ Result<SessionReport> Server::finish() {
   report.run.final_hash = simulation_.hash();
   report.run.server_epoch = epoch_;
   report.run.reason = simulation_.over() ? publisher_.eventGenerator().runReason() : "stopped";
+  report.run.steps_skipped = simulation_.step().skipped;
+  report.run.steps_timed_out = simulation_.step().timed_out;
   if (!simulation_.over()) wire_->send(report.run);
   report.late_ticks = late_ticks_;
   report.refused_inputs = wire_->refusedInputs();

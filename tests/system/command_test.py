@@ -34,10 +34,41 @@ class Commands(unittest.TestCase):
             self.assert_accepted(stage, "fulfilled", "--role", "trainee")
             self.assert_accepted(stage, "resume", "--role", "admin")
             self.assert_accepted(stage, "skip")
-            server.wait_for("step done", 30)
+            server.wait_for("step skipped", 30)
             self.assert_accepted(stage, "stop")
             server.wait_for("run: stopped", 30)
             self.assertEqual(server.wait(30), 1)
+
+    def test_a_trainer_lists_goes_to_a_step_repeats_it_and_leaves_a_note(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve("peg_and_box", "--wait-for", "right")
+            stage.start("trainee", "--seed", 1)
+            server.wait_for("step: take_peg", 60)
+            listed = self.command(stage, "list")
+            self.assertEqual(listed.returncode, 0, listed.stderr)
+            for line in (r"trainee +trainee +right", r"right +trainee", r"1 take_peg +now", r"peg +part"):
+                self.assertRegex(listed.stdout, line)
+            self.assert_refused(stage, "no step '9'", "goto", "9")
+            self.assert_accepted(stage, "note", "grip", "too", "high")
+            server.wait_for("command line: grip too high", 30)
+            self.assert_accepted(stage, "goto", "2")
+            server.wait_for("step: insert_peg", 30)
+            self.assert_accepted(stage, "back")
+            server.wait_for("command line: back", 30)
+            self.assert_accepted(stage, "repeat")
+            server.wait_for("everything is mounted", 240)
+            self.assertEqual(server.wait(30), 0)
+
+    def test_a_session_with_a_skipped_step_ends_with_1_unless_that_is_allowed(self):
+        for words, code in (([], 1), (["--allow-skips"], 0)):
+            with self.subTest(words=words), Stage(lockstep=False) as stage:
+                server = stage.serve("peg_and_box", "--wait-for", "right", *words)
+                stage.start("trainee", "--seed", 1)
+                server.wait_for("run: running", 60)
+                self.assert_accepted(stage, "skip")
+                server.wait_for("step skipped: take_peg", 30)
+                server.wait_for("ended, 1 step skipped", 240)
+                self.assertEqual(server.wait(30), code)
 
     def test_an_emergency_stop_halts_all_until_the_instructor_clears_it(self):
         with Stage(lockstep=False) as stage:

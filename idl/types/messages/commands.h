@@ -21,6 +21,11 @@ enum class CommandKind : std::uint32_t {
   kStop,
   kClearEmergencyStop,  ///< clears every raise of the emergency stop that the server knows of; the run is
                         ///< paused then
+  kGoToStep,            ///< text: name or number, from 1, of a step; the scene is as at its begin
+  kBack,                ///< to the step before, likewise
+  kRepeatStep,          ///< the current step from its begin
+  kHandOver,            ///< text "OBJECT HAND": the hand takes the object from whoever holds it
+  kNote,                ///< text: a remark, for the recording and the report
 };
 
 /// A client's request to the session, acknowledged by a CommandAck with the same id.

@@ -44,6 +44,7 @@ struct HandState {
   std::uint32_t safety_flags = 0;         ///< bit per active rule of devices/safety.h
   bool indexing = false;                  ///< the centre of the workspace is moving (paper eq. 1)
   std::array<std::uint8_t, 6> tactors{};  ///< intensities of a vibrotactile bracelet, 0..255
+  float peak_force = 0.0F;                ///< [N] largest displayed since the last sample, this one included
 };
 
 /// Virtual fixture that guides a hand.

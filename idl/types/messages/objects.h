@@ -5,6 +5,7 @@
 
 #include "idl/types/fixed_vector.h"
 #include "idl/types/ids.h"
+#include "idl/types/messages/role.h"
 #include "idl/types/spatial.h"
 
 /// Objects: their constant data, their state at a tick, who holds them.
@@ -55,6 +56,14 @@ struct SceneObject {
   Pose X_WO;                         ///< initial pose
   Vector3 size = Vector3::Zero();    ///< [m] of the bounding box in the object's frame
   Vector3 centre = Vector3::Zero();  ///< [m] of the bounding box, in O
+};
+
+/// The constant data of a hand of the scenario, moved by a device.
+struct SceneHand {
+  HandId hand;
+  std::string name;
+  Role role = Role::kTrainee;  ///< whose clients may move it
+  ObjectId object;             ///< that it moves while it holds no other; may be invalid
 };
 
 /// State of an object for late joiners: after each jump, and once in 1000 ticks.

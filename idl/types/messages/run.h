@@ -20,7 +20,15 @@ struct RunState {
   std::string reason;            ///< of the phase, for people
   std::uint64_t final_hash = 0;  ///< state hash at the end of the run; 0 before
   std::uint32_t server_epoch = 0;
+  std::uint32_t steps_skipped = 0;    ///< so far, and not done since
+  std::uint32_t steps_timed_out = 0;  ///< likewise
 };
+
+/// Whether a run that has ended did what its exercise asks for; `allow_skips`: also when steps were skipped.
+[[nodiscard]] inline bool isCompleted(const RunState& run, bool allow_skips = false) {
+  return run.phase == RunPhase::kSucceeded && run.steps_timed_out == 0 &&
+         (allow_skips || run.steps_skipped == 0);
+}
 
 struct RecorderStatus {
   std::string file;

@@ -49,6 +49,15 @@ struct StepState {
   Tick started = 0;
 };
 
+/// The constant data of a step, for lists of all steps.
+struct SceneStep {
+  std::uint32_t step = 0;   ///< index
+  std::uint32_t steps = 0;  ///< of the scenario
+  std::string name;
+  std::vector<LocalizedText> title;
+  std::string part;  ///< as in StepState
+};
+
 /// One condition of a step.
 struct ConditionValue {
   std::string text;    ///< as in the scenario: "pose of control_box", "contact pointer-control_box"

@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "idl/types/names.h"
+
 namespace tenon::command {
 namespace {
 
@@ -14,8 +16,15 @@ TEST(CommandParser, EveryCommandKindHasAWord) {
   std::set<CommandKind> kinds;
   for (const CommandWord& word : commandWords())
     if (word.command) kinds.insert(*word.command);
-  for (std::uint32_t i = 0; i <= static_cast<std::uint32_t>(CommandKind::kClearEmergencyStop); ++i)
+  for (std::uint32_t i = 0; i <= static_cast<std::uint32_t>(CommandKind::kNote); ++i)
     EXPECT_TRUE(kinds.contains(static_cast<CommandKind>(i))) << "command " << i;
+}
+
+TEST(CommandParser, WordsAreThoseOfTheProtocol) {
+  for (const CommandWord& word : commandWords()) {
+    if (!word.command) continue;
+    EXPECT_EQ(word.word, commandName(*word.command));
+  }
 }
 
 TEST(CommandParser, WordsAndKeysAreUnique) {
@@ -38,6 +47,9 @@ TEST(CommandParser, ParsesACommandLine) {
   EXPECT_EQ(off->text, "grid bay");
   EXPECT_EQ(off->value, 0.0);
   EXPECT_EQ(parseCommand({"collision", "grid", "bay", "on"})->value, 1.0);
+  EXPECT_EQ(parseCommand({"goto", "3"})->text, "3");
+  EXPECT_EQ(parseCommand({"give", "box", "left"})->text, "box left");
+  EXPECT_EQ(parseCommand({"note", "grip", "too", "high"})->text, "grip too high");
   const auto emergency = parseCommand({"emergency", "hand", "caught"});
   ASSERT_TRUE(emergency);
   EXPECT_FALSE(emergency->command) << "an emergency stop is not a Command";
@@ -48,6 +60,8 @@ TEST(CommandParser, WrongArgumentsFailWithTheUsage) {
   EXPECT_THAT(parseCommand({}).error().what, HasSubstr("tenon command pause"));
   EXPECT_THAT(parseCommand({"fly"}).error().what, HasSubstr("unknown command 'fly'"));
   EXPECT_THAT(parseCommand({"signal"}).error().what, HasSubstr("signal NAME"));
+  EXPECT_THAT(parseCommand({"note"}).error().what, HasSubstr("note TEXT..."));
+  EXPECT_THAT(parseCommand({"give", "box"}).error().what, HasSubstr("give OBJECT HAND"));
   EXPECT_THAT(parseCommand({"pause", "now"}).error().what, HasSubstr("usage: pause"));
   EXPECT_THAT(parseCommand({"collision", "a", "b", "maybe"}).error().what, HasSubstr("on|off"));
 }

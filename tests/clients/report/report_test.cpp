@@ -47,9 +47,9 @@ TEST_F(ReportTest, HasEveryStepWithItsTimes) {
 
 TEST_F(ReportTest, AForceOfOneTickIsThePeakOfItsStepOnly) {
   const SessionAnalysis analysis = analyze({.peak_force = 40.0});
-  EXPECT_DOUBLE_EQ(analysis.visits[3].metrics.peak_force, 40.0);
-  EXPECT_DOUBLE_EQ(analysis.whole.peak_force, 40.0);
-  EXPECT_LT(analysis.visits[2].metrics.peak_force, 14.0);
+  EXPECT_FLOAT_EQ(analysis.visits[3].metrics.peak_force, 20.0);
+  EXPECT_FLOAT_EQ(analysis.whole.peak_force, 20.0);
+  EXPECT_LT(analysis.visits[2].metrics.peak_force, 7.0);
 }
 
 TEST_F(ReportTest, GapAndDepthAreSeparateMetrics) {
@@ -62,7 +62,25 @@ TEST_F(ReportTest, GapAndDepthAreSeparateMetrics) {
 TEST_F(ReportTest, MeanForceIsTakenOverTheTimeInContact) {
   const SessionAnalysis analysis = analyze();
   // half a sine of 12 N while touching; the idle half of the step does not count
-  EXPECT_NEAR(analysis.visits[0].metrics.mean_force, 12.0 * 2.0 / 3.14159, 0.4);
+  EXPECT_NEAR(analysis.visits[0].metrics.mean_force, 0.5 * 12.0 * 2.0 / 3.14159, 0.3);
+}
+
+TEST_F(ReportTest, WhileTheServerHoldsThePartStillThereIsNoForceAndNoGap) {
+  const SessionAnalysis analysis = analyze({.skips_a_step = true});
+  EXPECT_LT(analysis.whole.peak_force, 10.0) << "the coupling pulls with 248 N then";
+  EXPECT_LT(analysis.whole.gap, 0.02) << "it is 248 mm then";
+}
+
+TEST_F(ReportTest, EachStepHasItsErrorPathAndCollisions) {
+  const SessionAnalysis analysis = analyze();
+  for (const StepVisit& visit : analysis.visits) {
+    EXPECT_NEAR(visit.path, 1.0, 0.02);
+    EXPECT_EQ(visit.collisions, 1);
+    EXPECT_NEAR(visit.error.position, 0.001, 0.002);
+    EXPECT_DOUBLE_EQ(visit.tolerance.position, 0.002);
+  }
+  EXPECT_NEAR(analysis.path, 4.0, 0.08);
+  EXPECT_THAT(summaryText(analysis), HasSubstr(" of 2.0 "));
 }
 
 TEST_F(ReportTest, FiguresDoNotDependOnTheOrderInWhichTopicsArrive) {
@@ -144,7 +162,7 @@ TEST_F(ReportTest, TheJsonSummaryHasTheSameValues) {
   const auto summary = summaryJson(analyze());
   EXPECT_EQ(summary["succeeded"], true);
   EXPECT_EQ(summary["steps"].size(), 4U);
-  EXPECT_DOUBLE_EQ(summary["steps"][3]["peak_force"].get<double>(), 18.0);
+  EXPECT_DOUBLE_EQ(summary["steps"][3]["peak_force"].get<double>(), 9.0);
   EXPECT_EQ(summary["final_hash"], "000000000000feed");
 }
 

@@ -92,12 +92,18 @@ class SyntheticRecording {
     double force = 12.0 * std::sin(3.14159 * pressed) + (pressed > 0.0 ? noise() : 0.0);
     if (tick_ == parameters_.ticks_per_step * parameters_.steps - 1) force = parameters_.peak_force;
     if (tick_ % 10 == 0) addPairs(pressed > 0.0, step, force);
-    manifold(HandId{0}, ObjectId{1}, force);
+    // a skipped step: the server holds the part still, and the pull of its coupling is no force on a hand
+    const bool frozen = parameters_.skips_a_step && step == 0 && in_step > 100 && in_step < 1000;
+    if (frozen) force = 248.0;
+    manifold(HandId{0}, ObjectId{1}, force, frozen);
     manifold(HandId{1}, ObjectId{2}, step == 2 ? 4.0 * std::sin(3.14159 * pressed) : 0.0);
+    if (tick_ % 10 == 0) addFrame(step, in_step);
     if (tick_ % 10 == 0) addStats(pressed);
     if (tick_ % 33 == 0)
-      put(wire::kStepProgress,
-          StepProgress{.revision = step + 1, .tick = tick_, .contact_seconds = 1e-3 * pressed * 1000.0});
+      put(wire::kStepProgress, StepProgress{.revision = step + 1,
+                                            .tick = tick_,
+                                            .position_error = 0.05 - 0.049 * pressed,
+                                            .contact_seconds = 1e-3 * pressed * 1000.0});
   }
 
   void beginStep(std::uint32_t step) {
@@ -118,17 +124,41 @@ class SyntheticRecording {
         .title = {{"de", "Teil einsetzen"}, {"en", step % 2 == 0 ? "Take the control box" : "Slide it in"}},
         .phase = phase,
         .part = "Control box",
+        .object = ObjectId{1},
+        .has_target = true,
+        .tolerance = 0.002,
         .started = step * parameters_.ticks_per_step};
   }
   /// `force` [N] on the hand.
-  void manifold(HandId hand, ObjectId object, double force) {
+  void manifold(HandId hand, ObjectId object, double force, bool frozen = false) {
     HandManifold m;
+    m.answers_seq = static_cast<std::uint32_t>(tick_);
+    m.frozen = frozen;
     m.hand = hand;
     m.object = object;
     m.tick = tick_;
     m.stiffness = 1000.0;
     m.F_Ho_W.force = Vector3(0.0, 0.0, force);
     put(wire::kHandManifold, m);
+    // the device shows half of it: what the safety layer lets through
+    const double displayed = 0.5 * force;
+    peaks_[hand] = std::max(peaks_[hand], static_cast<float>(std::abs(displayed)));
+    if (tick_ % 10 != 0) return;
+    HandState state;
+    state.hand = hand;
+    state.seq = m.answers_seq;
+    state.F_Ho_W.force = Vector3(0.0, 0.0, displayed);
+    state.peak_force = std::exchange(peaks_[hand], 0.0F);
+    put(wire::kHandState100, state);
+  }
+  /// The part moves by 1 m a second in the first half of each step, and jumps back where the step begins.
+  void addFrame(std::uint32_t step, Tick in_step) {
+    WorldFrame frame{.part = 0, .parts = 1, .tick = tick_};
+    ObjectState part{.object = ObjectId{1}, .epoch = step};
+    part.X_WO.translation().x() =
+        1e-3 * static_cast<double>(std::min(in_step, parameters_.ticks_per_step / 2));
+    frame.states.push_back(part);
+    put(wire::kWorldFrame100, frame);
   }
   /// `force` [N] sets the penetration depth of the pair.
   void addPairs(bool colliding, std::uint32_t step, double force) {
@@ -161,6 +191,7 @@ class SyntheticRecording {
   record::McapWriter writer_;
   std::map<std::string_view, std::uint16_t> channels_;
   std::vector<Sent> sent_;
+  std::map<HandId, float> peaks_;  ///< [N] displayed since the last HandState
   Tick tick_ = 0;
   std::mt19937_64 random_{5};
 };

@@ -57,6 +57,8 @@ const std::vector<Row> kRows{
     {"ClockSync", kStream, kLockstepStream, "", ""},
     {"Telemetry", kStream, kLockstepStream, "", ""},
     {"SceneObject", kStateOfServer, kStateOfServer, ", joiners 1", ", joiners 1"},
+    {"SceneHand", kStateOfServer, kStateOfServer, ", joiners 1", ", joiners 1"},
+    {"SceneStep", kStateOfServer, kStateOfServer, ", joiners 1", ", joiners 1"},
     {"ObjectSnapshot", kStateOfServer, kStateOfServer, ", joiners 1", ", joiners 1"},
     {"StepState", kStateOfServer, kStateOfServer, ", joiners 1", ", joiners 1"},
     {"StepProgress", kStateOfServer, kStateOfServer, ", joiners 1", ", joiners 1"},

@@ -117,6 +117,65 @@ TEST(StateMachine, ResetRestoresTheStart) {
   EXPECT_EQ(fixture.object("pointer").status, ObjectStatus::kHeld);
 }
 
+TEST(StateMachine, GoingBackUndoesWhatWasMounted) {
+  test::ScenarioFixture fixture(test::smallScenario());
+  fixture.touchPart();
+  fixture.insertPart();
+  fixture.step(100);
+  ASSERT_TRUE(fixture.status().finished);
+  fixture.step({command(CommandKind::kBack)});
+  EXPECT_EQ(fixture.status().step, 0U);
+  EXPECT_EQ(fixture.status().phase, StepPhase::kActive);
+  EXPECT_FALSE(fixture.status().finished);
+  EXPECT_EQ(fixture.object("part").status, ObjectStatus::kParked);
+  EXPECT_EQ(fixture.object("part").X_WO.translation(), Vector3(0.2, 0, 0.1));
+}
+
+TEST(StateMachine, GoingToAStepMakesTheSceneThatSkippingMakes) {
+  test::ScenarioFixture skips(test::smallScenario());
+  skips.step({command(CommandKind::kSkipStep)});
+  skips.step(1);
+  test::ScenarioFixture goes(test::smallScenario());
+  goes.step({GameCommand{.kind = CommandKind::kGoToStep, .signal = 1}});
+  goes.step(1);
+  for (const char* name : {"part", "pointer"}) {
+    EXPECT_EQ(goes.object(name).status, skips.object(name).status) << name;
+    EXPECT_TRUE(goes.object(name).X_WO.translation().isApprox(skips.object(name).X_WO.translation(), 1e-6))
+        << name;
+  }
+  EXPECT_EQ(goes.status().step, 1U);
+  EXPECT_EQ(goes.status().skipped, 1U) << "it was passed over";
+  goes.step({GameCommand{.kind = CommandKind::kGoToStep, .signal = 1000}});
+  EXPECT_EQ(goes.status().step, 1U) << "there is no such step";
+}
+
+TEST(StateMachine, ARepeatedStepThatIsDoneIsNoLongerSkipped) {
+  test::ScenarioFixture fixture(test::smallScenario());
+  fixture.step({command(CommandKind::kSkipStep)});
+  EXPECT_EQ(fixture.status().skipped, 1U);
+  fixture.step(1);
+  fixture.step({command(CommandKind::kBack)});
+  EXPECT_EQ(fixture.status().skipped, 0U);
+  fixture.touchPart();
+  EXPECT_EQ(fixture.status().step, 1U);
+  EXPECT_EQ(fixture.status().skipped, 0U);
+  const std::uint32_t revision = fixture.status().revision;
+  fixture.step({command(CommandKind::kRepeatStep)});
+  EXPECT_EQ(fixture.status().step, 1U);
+  EXPECT_GT(fixture.status().revision, revision);
+}
+
+TEST(StateMachine, AnObjectIsHandedOver) {
+  test::ScenarioFixture fixture(test::smallScenario());
+  const ObjectId part = fixture.scenario().objectNamed("part");
+  fixture.step({GameCommand{.kind = CommandKind::kHandOver, .hand = HandId{0}, .signal = part.value}});
+  EXPECT_EQ(fixture.object("part").status, ObjectStatus::kHeld);
+  EXPECT_EQ(fixture.object("part").holder, HandId{0});
+  fixture.step({GameCommand{.kind = CommandKind::kHandOver, .hand = HandId{77}, .signal = part.value}});
+  fixture.step({GameCommand{.kind = CommandKind::kHandOver, .hand = HandId{0}, .signal = 1000}});
+  EXPECT_EQ(fixture.object("part").status, ObjectStatus::kHeld);
+}
+
 TEST(StateMachine, PairsAreSwitchedByStatesAndByCommands) {
   test::ScenarioFixture fixture(
       test::with(test::smallScenario(), "    snap: true", "    pairs_off: [[part, cube]]\n    snap: true"));

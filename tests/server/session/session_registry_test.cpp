@@ -311,6 +311,30 @@ TEST_F(SessionRegistryTest, CommandsArePermittedByRole) {
   EXPECT_EQ(ack.id, commands_) << "the ack carries the id of its command";
 }
 
+TEST_F(SessionRegistryTest, StepsAreNamedByNameOrNumber) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  (void)changes();
+  for (const std::string text : {"2", "mount"})
+    EXPECT_TRUE(command(instructor, CommandKind::kGoToStep, text).accepted) << text;
+  for (const std::string text : {"0", "3", "mounting", "", "1 ", "-1"})
+    EXPECT_THAT(command(instructor, CommandKind::kGoToStep, text).reason, HasSubstr("no step")) << text;
+  for (const Change& change : changes()) EXPECT_EQ(change.game.signal, 1U);
+  EXPECT_TRUE(command(instructor, CommandKind::kHandOver, "part right").accepted);
+  EXPECT_THAT(command(instructor, CommandKind::kHandOver, "part").reason, HasSubstr("an object and a hand"));
+}
+
+TEST_F(SessionRegistryTest, ANoteChangesNothing) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId trainee = join("a", Role::kTrainee, {"right"}).client;
+  const ClientId observer = join("c", Role::kObserver).client;
+  (void)changes();
+  EXPECT_TRUE(command(trainee, CommandKind::kNote, "slipped twice").accepted);
+  EXPECT_FALSE(command(trainee, CommandKind::kNote, "").accepted);
+  EXPECT_FALSE(command(observer, CommandKind::kNote, "hello").accepted);
+  EXPECT_TRUE(changes().empty());
+}
+
 // it would be in the next checkpoint, which no reader takes
 TEST_F(SessionRegistryTest, ACommandWithAValueThatIsNotFiniteIsRefused) {
   registry_.updatePhase(RunPhase::kRunning, false);
