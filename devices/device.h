@@ -44,6 +44,7 @@ struct DeviceCaps {
   double clutch_force = 0.0;    ///< [N] at which its magnetic clutch opens
   double clutch_warning = 0.0;  ///< [N] at which the safety layer warns of the clutch
   std::uint32_t tactors = 0;    ///< number of vibration motors
+  std::uint32_t dead_man = 0;  ///< bit i: forces need button i, or another one of these, held; 0: they do not
 };
 
 enum class DeviceFault : std::uint8_t {
@@ -80,10 +81,11 @@ struct DeviceCommand {
 /// Interface of a haptic device; independent of network and simulation.
 ///
 /// States: open (reads, no forces), armed (forces on), fault (forces off until an operator resets it). A
-/// command is held until the next one; a watchdog of the device turns the forces off when writes stop.
+/// command is held until the next one, and there is none before the first write after arm(); a watchdog of
+/// the device turns the forces off when writes stop.
 ///
-/// Threads: read and write from one servo thread, one cycle being read, then write. Real-time: read, write,
-/// disarm.
+/// Threads: read and write from one servo thread, one cycle being read, then write; arm and resetFault from
+/// any, while no other one uses the device. Real-time: read, write, disarm.
 class HapticDevice {
  public:
   virtual ~HapticDevice() = default;

@@ -1,11 +1,15 @@
 #include "devices/safety.h"
 
+#include <algorithm>
+
 #include "idl/types/messages/hands.h"
 
 namespace tenon::devices {
 namespace {
 
 constexpr double kBrakeReleaseFraction = 0.5;      ///< [-] of the speed limit: the brake is released below
+constexpr double kLongestGrowth = 0.002;           ///< [s] of growth in one step
+constexpr double kLeavingTime = 0.020;             ///< [s] in which the force before a restart falls to zero
 constexpr std::uint64_t kEndAfterTicks = 500;      ///< [ticks] without activity end an intervention
 constexpr std::uint64_t kReportInterval = 10'000;  ///< [ticks] between reports of a routine rule
 
@@ -30,14 +34,22 @@ DeviceCommand Safety::step(const SafetyRequest& request, const DeviceState& stat
 
   DeviceCommand command;
   command.brake = evaluateStops(request, state) || request.requested.brake;
-  const bool forces_on = forcesPermitted(request, state) && !command.brake;
-  if (forces_on) {
-    command.F_Ho_D =
-        limitOutput(addDampingAndWall(applySoftStartAndSlew(prepareRequest(request), dt), state, dt), dt);
-    command.tactors = request.requested.tactors;
+  forces_on_ = forcesPermitted(request, state) && !command.brake;
+  if (forces_on_) {
+    const bool late = !(request.age <= limits_.fade_from);
+    if (request.restart || (late_ && !late)) restart();
+    late_ = late;
+    const double growth = std::min(dt, kLongestGrowth);
+    const Wrench damping = injectDamping(state, dt);
+    const Wrench scene = applySoftStartAndSlew(prepareRequest(request), damping, growth);
+    command.F_Ho_D = limitOutput(addWall(scene, state, growth), dt);
+    fadeTactors(request, command);
   } else {
-    since_start_ = 0.0;
-    slewed_ = {};
+    restart();
+    settled_force_ = 0.0;
+    leaving_share_ = 0.0;
+    wall_since_ = 0.0;
+    wall_.setZero();
     heat_.update(0.0, dt, limits_);
   }
   output_ = command.F_Ho_D;
@@ -111,23 +123,58 @@ Wrench Safety::prepareRequest(const SafetyRequest& request) noexcept {
   return {wrench.force * (age_factor * stiffness_factor), wrench.torque * (age_factor * rotational_factor)};
 }
 
-Wrench Safety::applySoftStartAndSlew(const Wrench& wrench, double dt) noexcept {
-  since_start_ += dt;
-  const double start = softStartFactor(since_start_, limits_);
-  setFlag(SafetyRule::kSoftStart, start < 1.0);
-  const Wrench ramped = wrench * start;
-  slewed_ = {slewLimited(slewed_.force, ramped.force, limits_.force_slew * dt),
-             slewLimited(slewed_.torque, ramped.torque, limits_.torque_slew * dt)};
-  setFlag(SafetyRule::kSlewLimited, slewed_.force != ramped.force || slewed_.torque != ramped.torque);
-  return slewed_;
+void Safety::restart() noexcept {
+  if (!slewed_.force.isZero(0.0) || !slewed_.torque.isZero(0.0)) {
+    leaving_ = slewed_ + leaving_ * leaving_share_;
+    leaving_share_ = 1.0;
+  }
+  starting_ = true;
+  since_start_ = 0.0;
+  slewed_ = {};
+  passivity_.forgive();
 }
 
-Wrench Safety::addDampingAndWall(const Wrench& wrench, const DeviceState& state, double dt) noexcept {
+Wrench Safety::applySoftStartAndSlew(const Wrench& wrench, const Wrench& damping, double dt) noexcept {
+  if (!late_ && !starting_) settled_force_ = slewed_.force.norm();
+  const double start = softStartFactor(since_start_, limits_);
+  since_start_ += dt;
+  const bool starting = starting_;
+  Wrench ramped = wrench * start;
+  if (starting) ramped += damping;  // it grows with the force
+  if (start < 1.0) ramped.force = clampNorm(ramped.force, std::max(settled_force_, limits_.start_force));
+  const double force_slew = starting_ ? limits_.start_force_slew : limits_.force_slew;
+  const double torque_slew = starting_ ? limits_.start_torque_slew : limits_.torque_slew;
+  slewed_ = {slewLimited(slewed_.force, ramped.force, force_slew * dt),
+             slewLimited(slewed_.torque, ramped.torque, torque_slew * dt)};
+  const bool behind = slewed_.force != ramped.force || slewed_.torque != ramped.torque;
+  starting_ = starting_ && (start < 1.0 || behind);
+  setFlag(SafetyRule::kSoftStart, starting_);
+  setFlag(SafetyRule::kSlewLimited, behind && !starting_);
+  leaving_share_ = std::max(0.0, leaving_share_ - dt / kLeavingTime);
+  return slewed_ + leaving_ * leaving_share_ + (starting ? Wrench{} : damping);
+}
+
+Wrench Safety::injectDamping(const DeviceState& state, double dt) noexcept {
   const Wrench damping = passivity_.damping(state.V_DH, dt, limits_);
   setFlag(SafetyRule::kPassivity, !damping.force.isZero(0.0) || !damping.torque.isZero(0.0));
-  const Vector3 wall = wallForce(state.X_DH.translation(), limits_);
-  setFlag(SafetyRule::kWorkspaceWall, !wall.isZero(0.0));
-  return wrench + damping + Wrench{wall, Vector3::Zero()};
+  return damping;
+}
+
+/// Ramped like the scene's force, but apart: a gap of the scene leaves the wall standing.
+Wrench Safety::addWall(const Wrench& wrench, const DeviceState& state, double dt) noexcept {
+  const Vector3 wall = wallForce(state.X_DH.translation(), limits_) * softStartFactor(wall_since_, limits_);
+  const double slew = wall_since_ < limits_.soft_start ? limits_.start_force_slew : limits_.force_slew;
+  wall_since_ += dt;
+  wall_ = slewLimited(wall_, wall, slew * dt);
+  setFlag(SafetyRule::kWorkspaceWall, !wall_.isZero(0.0));
+  return wrench + Wrench{wall_, Vector3::Zero()};
+}
+
+/// Intensities fade like a force; a hand that is stopped or whose contacts are unknown feels none.
+void Safety::fadeTactors(const SafetyRequest& request, DeviceCommand& command) const noexcept {
+  const double factor = request.restart ? 0.0 : ageFactor(request.age, limits_);
+  for (std::size_t i = 0; i < command.tactors.size(); ++i)
+    command.tactors[i] = static_cast<std::uint8_t>(factor * request.requested.tactors[i]);
 }
 
 Wrench Safety::limitOutput(const Wrench& wrench, double dt) noexcept {
@@ -147,8 +194,7 @@ Wrench Safety::limitOutput(const Wrench& wrench, double dt) noexcept {
 }
 
 bool Safety::wantsDisarm() const noexcept {
-  return (flags_ &
-          (bit(SafetyRule::kStale) | bit(SafetyRule::kEmergencyStop) | bit(SafetyRule::kClutchOpen))) != 0;
+  return (flags_ & (bit(SafetyRule::kEmergencyStop) | bit(SafetyRule::kClutchOpen))) != 0;
 }
 
 void Safety::reset() noexcept {
@@ -156,8 +202,9 @@ void Safety::reset() noexcept {
   clutch_tripped_ = false;
   if (clutch_) clutch_->open = false;
   braking_ = false;
-  since_start_ = 0.0;
-  slewed_ = {};
+  restart();
+  settled_force_ = 0.0;
+  leaving_share_ = 0.0;
   passivity_.reset();
 }
 

@@ -19,7 +19,10 @@ struct ClutchLatch {
 /// Input of the safety layer for one period.
 struct SafetyRequest {
   DeviceCommand requested;
-  double age = 0.0;  ///< [s] of the data from which the force was computed; 0 where it is computed each cycle
+  double age = 0.0;  ///< [s] of the data that the command rests on, beyond what their link explains
+  /// What the force rests on was interrupted or has jumped: the last force falls within 20 ms, the requested
+  /// one does not count, and the next one starts softly from zero.
+  bool restart = false;
   double stiffness = 0.0;  ///< [N/m] of the spring that made the force; 0: the force is not a spring's
   double rotational_stiffness = 0.0;  ///< [Nm/rad] likewise
   bool dead_man_held = true;
@@ -42,7 +45,10 @@ struct Intervention {
 /// The rules run in a fixed order; those that may add force (damping, workspace wall) run before the limits.
 /// A force may fall at once and grow only at the slew rate. Clutch and emergency stop are latched until
 /// reset(), which an operator triggers after an inspection; the other rules end with their cause, and those
-/// that removed the force are followed by a soft start. Time is counted in steps of `dt`; no clock is read.
+/// that removed the force are followed by a soft start: a ramp of one second, in which the force is not above
+/// 3 N or what it was before. In the ramp, and until the force is the requested one, it grows by 20 N/s at
+/// most. Time is the sum of `dt`, which the caller measures; no clock is read. However long a step took,
+/// forces grow in it as in 2 ms at most.
 ///
 /// Threads: the device's servo thread. Real-time: everything but the constructor.
 class Safety {
@@ -57,8 +63,10 @@ class Safety {
   /// Rules that acted in the last step, as bits of SafetyRule.
   [[nodiscard]] std::uint32_t flags() const noexcept { return flags_; }
   [[nodiscard]] bool acts(SafetyRule rule) const noexcept { return (flags_ & bit(rule)) != 0; }
-  /// The request is stale or a stop is latched: the caller disarms the device.
+  /// A stop is latched: the caller writes the command, which brakes, and then disarms the device.
   [[nodiscard]] bool wantsDisarm() const noexcept;
+  /// Forces were permitted in the last step.
+  [[nodiscard]] bool forcesOn() const noexcept { return forces_on_; }
   /// Releases the latches. Called for the operator after resetFault() of all arms, because an arm still in
   /// fault latches again.
   void reset() noexcept;
@@ -85,10 +93,14 @@ class Safety {
   [[nodiscard]] bool forcesPermitted(const SafetyRequest& request, const DeviceState& state) noexcept;
   /// Non-finite values, axes the device lacks, age and stiffness.
   [[nodiscard]] Wrench prepareRequest(const SafetyRequest& request) noexcept;
+  void restart() noexcept;
   /// `dt` [s].
-  [[nodiscard]] Wrench applySoftStartAndSlew(const Wrench& wrench, double dt) noexcept;
+  [[nodiscard]] Wrench injectDamping(const DeviceState& state, double dt) noexcept;
   /// `dt` [s].
-  [[nodiscard]] Wrench addDampingAndWall(const Wrench& wrench, const DeviceState& state, double dt) noexcept;
+  [[nodiscard]] Wrench applySoftStartAndSlew(const Wrench& wrench, const Wrench& damping, double dt) noexcept;
+  /// `dt` [s].
+  [[nodiscard]] Wrench addWall(const Wrench& wrench, const DeviceState& state, double dt) noexcept;
+  void fadeTactors(const SafetyRequest& request, DeviceCommand& command) const noexcept;
   /// Command, thermal and motor limits; `dt` [s].
   [[nodiscard]] Wrench limitOutput(const Wrench& wrench, double dt) noexcept;
   /// `requested_force` [N].
@@ -103,9 +115,17 @@ class Safety {
   bool stopped_ = false;         ///< emergency stop, latched
   bool clutch_tripped_ = false;  ///< the latch when no other arm shares the clutch
   bool braking_ = false;
-  double since_start_ = 0.0;  ///< [s] since the forces came on
-  Wrench slewed_;             ///< last output of the slew limit
-  Wrench output_;             ///< last commanded wrench
+  bool forces_on_ = false;
+  bool late_ = false;               ///< the last request had begun to fade
+  bool starting_ = true;            ///< soft start, until the force is the requested one
+  double since_start_ = 0.0;        ///< [s] since the forces came on
+  Wrench slewed_;                   ///< last output of the slew limit
+  double settled_force_ = 0.0;      ///< [N] last one before the force was late or started
+  Wrench leaving_;                  ///< that was displayed when the force restarted
+  double leaving_share_ = 0.0;      ///< [-] of it that is left
+  Vector3 wall_ = Vector3::Zero();  ///< [N] last output of the workspace wall
+  double wall_since_ = 0.0;         ///< [s] since forces are permitted
+  Wrench output_;                   ///< last commanded wrench
   Pose X_DH_last_;
   bool has_last_pose_ = false;
   MotorThermalModel heat_;

@@ -82,6 +82,8 @@ SafetyLimits safetyLimits(const DeviceCaps& caps) noexcept {
   limits.force_quantum = caps.force_quantum;
   limits.energy_capacity = limits.peak_force * kStorageTravel;
   limits.active_power = limits.peak_force * kActiveSpeed;
+  if (limits.peak_force > 0.0)
+    limits.start_torque_slew = limits.start_force_slew * limits.torque / limits.peak_force;
   return limits;
 }
 

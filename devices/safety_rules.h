@@ -11,9 +11,9 @@ namespace tenon::devices {
 enum class SafetyRule : std::uint32_t {
   kNonFinite = 1U << 0U,         ///< a requested force is NaN or infinite: zero force instead
   kAgeFading = 1U << 1U,         ///< the force fades because its request is old
-  kStale = 1U << 2U,             ///< the request is too old: the device is to be disarmed
+  kStale = 1U << 2U,             ///< the request is too old: no force, then a soft start
   kStiffnessLimited = 1U << 3U,  ///< the force is scaled to the stiffness the device renders passively
-  kSoftStart = 1U << 4U,         ///< ramp after arming or after a stop
+  kSoftStart = 1U << 4U,         ///< ramp after arming, a stop, a gap or a jump
   kSlewLimited = 1U << 5U,       ///< force or torque grows at its largest rate
   kPassivity = 1U << 6U,         ///< damping is injected: the port has delivered more energy than it took
   kWorkspaceWall = 1U << 7U,     ///< a spring at the end of the workspace pushes back
@@ -57,9 +57,12 @@ struct SafetyLimits {
   double energy_capacity = 0.0;  ///< [J] bound of the energy balance: the most that may be returned later
   double active_power = 0.0;     ///< [W] that the device may deliver without having taken it before
 
-  double fade_from = 0.010;  ///< [s] age of a request at which its force begins to fade
-  double stale_at = 0.030;   ///< [s] age at which it is 0; vendors' watchdogs end at 31.9 ms [published]
-  double soft_start = 0.5;   ///< [s] duration of the ramp
+  double fade_from = 0.020;        ///< [s] age of a request at which its force begins to fade: it is a gap
+  double stale_at = 0.100;         ///< [s] age at which it is 0
+  double soft_start = 1.0;         ///< [s] duration of the ramp
+  double start_force = 3.0;        ///< [N] largest force in it, or that before it
+  double start_force_slew = 20.0;  ///< [N/s] largest growth of the force in it
+  double start_torque_slew = 0.0;  ///< [Nm/s] likewise: the largest torque takes as long as the largest force
 };
 
 [[nodiscard]] SafetyLimits safetyLimits(const DeviceCaps& caps) noexcept;
@@ -116,6 +119,8 @@ class PassivityObserver {
   [[nodiscard]] Wrench damping(const Twist& V_DH, double dt, const SafetyLimits& limits) const noexcept;
   /// [J] energy balance: taken from the hand minus delivered to it.
   [[nodiscard]] double energy() const noexcept { return energy_; }
+  /// A deficit is not to be paid back by the next force.
+  void forgive() noexcept { energy_ = energy_ < 0.0 ? 0.0 : energy_; }
   void reset() noexcept { energy_ = 0.0; }
 
  private:

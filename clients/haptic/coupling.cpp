@@ -15,11 +15,7 @@ Vector3 masked(const Vector3& v, std::uint32_t axes) {
 }  // namespace
 
 Wrench Coupling::step(const LocalProxy& proxy, const Pose& X_WH, double dt) noexcept {
-  if (proxy.discontinuous) {
-    fading_ = displayed_;
-    fade_left_ = options_.fade_ticks;
-    has_stretch_ = false;
-  }
+  if (proxy.discontinuous) has_stretch_ = false;
   const Displacement before = stretch_;
   stretch_ = proxy.active ? displacement(X_WH, proxy.X_WS) : Displacement{};
   if (has_stretch_) {
@@ -34,7 +30,6 @@ Wrench Coupling::step(const LocalProxy& proxy, const Pose& X_WH, double dt) noex
 
   stiffness_ = std::min(proxy.stiffness, options_.max_stiffness);
   rotational_stiffness_ = std::min(proxy.rotational_stiffness, options_.max_rotational_stiffness);
-  // damping fades with the stiffness of an old manifold
   const double damping_factor =
       proxy.stiffness > 0.0 ? std::min(1.0, proxy.stiffness / options_.max_stiffness) : 0.0;
   Wrench wrench;
@@ -42,23 +37,14 @@ Wrench Coupling::step(const LocalProxy& proxy, const Pose& X_WH, double dt) noex
       stiffness_ * stretch_.translation + damping_factor * options_.damping * stretch_rate_.translation;
   wrench.torque = rotational_stiffness_ * stretch_.rotation +
                   damping_factor * options_.rotational_damping * stretch_rate_.rotation;
-  if (fade_left_ > 0) {
-    const double fade_out = static_cast<double>(fade_left_) / static_cast<double>(options_.fade_ticks + 1);
-    wrench = wrench * (1.0 - fade_out) + fading_ * fade_out;
-    --fade_left_;
-  }
   wrench.force = masked(wrench.force, options_.dof_mask);
   wrench.torque = masked(wrench.torque, options_.dof_mask >> 3U);
-  displayed_ = wrench;
   return wrench;
 }
 
 void Coupling::reset() noexcept {
   stretch_ = {};
   stretch_rate_ = {};
-  displayed_ = {};
-  fading_ = {};
-  fade_left_ = 0;
   has_stretch_ = false;
 }
 

@@ -13,7 +13,6 @@ struct CouplingOptions {
   double damping = 0.0;                    ///< [Ns/m] at full stiffness
   double rotational_damping = 0.0;         ///< [Nms/rad] likewise
   std::uint32_t dof_mask = 0x3F;           ///< actuated axes of the device; the others get 0
-  std::uint32_t fade_ticks = 20;           ///< [ticks] cross-fade after a discontinuity of the proxy
 };
 
 /// Virtual coupling between device pose D (here X_WH) and proxy pose S: F = K (S - D) + B (V_S - V_D), on the
@@ -21,8 +20,7 @@ struct CouplingOptions {
 ///
 /// K is the server's, capped at max_stiffness. V_S - V_D is the filtered rate of S - D instead of a
 /// difference of velocities, so in free motion, where S equals D, the force is zero whatever the device's
-/// velocity estimate. At a discontinuity of the proxy the last wrench fades out within fade_ticks while the
-/// new one fades in.
+/// velocity estimate. What follows a discontinuity of the proxy is for HapticHand to decide.
 ///
 /// Threads: one. Real-time: everything.
 class Coupling {
@@ -39,13 +37,10 @@ class Coupling {
 
  private:
   CouplingOptions options_;
-  Displacement stretch_;       // from D to S, in W
-  Displacement stretch_rate_;  // low-pass filtered
-  Wrench displayed_;
-  Wrench fading_;                      // displayed at the last discontinuity
+  Displacement stretch_;               // from D to S, in W
+  Displacement stretch_rate_;          // low-pass filtered
   double stiffness_ = 0.0;             // [N/m]
   double rotational_stiffness_ = 0.0;  // [Nm/rad]
-  std::uint32_t fade_left_ = 0;
   bool has_stretch_ = false;
 };
 

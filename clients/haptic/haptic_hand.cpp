@@ -1,6 +1,7 @@
 #include "clients/haptic/haptic_hand.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "devices/safety_rules.h"
 
@@ -10,6 +11,8 @@ namespace {
 // Virtual damping B as a fraction of the device's physical damping b. Passivity needs b > K T / 2 + |B|
 // (Colgate and Schenkel), where the safety layer limits K.
 constexpr double kDampingFraction = 0.2;  // [-]
+// A cycle of no time, or of none that is known, counts as this.
+constexpr double kShortestCycle = 1e-6;  // [s]
 // Gap at which the server reports contact, rounding included.
 constexpr float kContactGap = 5e-5F;  // [m]
 
@@ -51,7 +54,6 @@ Result<void> HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH
   } else {
     device_.disarm();
   }
-  if (!result) return result;
   device_.read(device_state_);
   workspace_.setCentre(p_WH - device_state_.X_DH.translation());
   input_ = {};
@@ -63,55 +65,102 @@ Result<void> HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH
   state_ = {};
   state_.hand = hand;
   coupling_.reset();
-  return {};
+  return result;
 }
 
 void HapticHand::permitForces(bool permitted) noexcept {
+  const bool runs = permitted_ && device_state_.forces_on && !safety_.wantsDisarm();
   permitted_ = permitted;
-  if (!permitted) return;
+  if (!permitted || runs) return;
   safety_.reset();
   coupling_.reset();
-  // a device in fault needs resetFault() by its operator first
-  if (device_state_.fault == devices::DeviceFault::kNone) static_cast<void>(device_.arm());
+  handover_.ask();
 }
 
 void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noexcept {
-  device_.read(device_state_);
-  workspace_.step(device_state_.X_DH.translation(), in_contact_ || !permitted_, dt);
+  if (!(dt > 0.0)) dt = kShortestCycle;
+  readDevice();
+  answers_.step(seq, local_.hasManifold() ? local_.manifold().answers_seq : 0, dt);
+  const bool hold = in_contact_ || !permitted_ || rendering_ == Rendering::kAnchoring;
+  workspace_.step(device_state_.X_DH.translation(), hold, dt);
+  anchor(seq, world);
   const Pose X_WH = workspace_.toWorld(device_state_.X_DH);
   const Twist V_WH{device_state_.V_DH.linear + workspace_.velocity(), device_state_.V_DH.angular};
 
   const LocalProxy& proxy = local_.step(X_WH, world);
   in_contact_ = proxy.touching || (local_.hasManifold() && serverSeesContact(local_.manifold()));
+  const devices::DeviceCommand command = safety_.step(request(X_WH, dt), device_state_, dt);
+  writeDevice(command);
+  state_.F_Ho_W = command.F_Ho_D;
+  updateOutputs(seq, world, V_WH);
+  updateEvents();
+}
 
+void HapticHand::readDevice() noexcept {
+  if (!handover_.pending()) return device_.read(device_state_);
+  device_state_.forces_on = false;
+  device_state_.V_DH = {};
+}
+
+bool HapticHand::deadManHeld() const noexcept {
+  const std::uint32_t switches = device_.caps().dead_man;
+  return switches == 0 || (device_state_.buttons & switches) != 0;
+}
+
+void HapticHand::anchor(std::uint32_t seq, const WorldView& world) noexcept {
+  const bool usable = answers_.excess() <= safety_.limits().fade_from && permitted_ && safety_.forcesOn() &&
+                      local_.usable(world);
+  if (!usable || (local_.jumped() && rendering_ == Rendering::kOn)) rendering_ = Rendering::kInterrupted;
+  if (!usable || rendering_ == Rendering::kOn) return;
+
+  const Pose X_WH = workspace_.toWorld(device_state_.X_DH);
+  workspace_.shift(local_.serverProxy().translation() - X_WH.translation());
+  local_.restart();
+  if (rendering_ == Rendering::kInterrupted) {
+    rendering_ = Rendering::kAnchoring;
+    anchored_seq_ = seq;
+  } else if (static_cast<std::int32_t>(answers_.answered() - anchored_seq_) >= 0) {
+    rendering_ = Rendering::kOn;
+  }
+}
+
+devices::SafetyRequest HapticHand::request(const Pose& X_WH, double dt) noexcept {
+  const LocalProxy& proxy = local_.proxy();
+  const double excess = answers_.excess();
   devices::SafetyRequest request;
   request.requested.F_Ho_D = coupling_.step(proxy, X_WH, dt);
   request.stiffness = coupling_.stiffness();
   request.rotational_stiffness = coupling_.rotationalStiffness();
+  // without contacts to render there is no force that could be old
+  request.age = proxy.active ? excess : 0.0;
+  // while they only get older the force fades; once they are fresh again it is another one
+  request.restart = rendering_ != Rendering::kOn && (!proxy.active || excess <= safety_.limits().fade_from);
+  request.dead_man_held = deadManHeld();
   request.emergency_stop = !permitted_;
-  const devices::DeviceCommand command = safety_.step(request, device_state_, dt);
-  if (safety_.wantsDisarm()) {
-    device_.disarm();
-  } else {
-    device_.write(command);
-  }
-  state_.F_Ho_W = command.F_Ho_D;
-  updateOutputs(seq, world, V_WH);
-  updateEvents();
+  return request;
+}
+
+void HapticHand::writeDevice(const devices::DeviceCommand& command) noexcept {
+  if (handover_.pending()) return;
+  device_.write(command);  // a stop brakes before the forces are off
+  if (safety_.wantsDisarm()) device_.disarm();
 }
 
 void HapticHand::updateOutputs(std::uint32_t seq, const WorldView& world, const Twist& V_WH) noexcept {
   const LocalProxy& proxy = local_.proxy();
   input_.sample = {seq, workspace_.toWorld(device_state_.X_DH), V_WH, device_state_.buttons};
   input_.server_epoch = world.serverEpoch();
-  input_.active = permitted_ && !safety_.wantsDisarm() && device_state_.fault == devices::DeviceFault::kNone;
+  input_.active = permitted_ && deadManHeld() && !handover_.pending() && !safety_.wantsDisarm() &&
+                  device_state_.fault == devices::DeviceFault::kNone;
   input_.p_WC = workspace_.centre();
 
   state_.seq = seq;
   state_.X_WH = input_.sample.X_WH;
   state_.p_WC = workspace_.centre();
   state_.X_WO_local = proxy.X_WO;
-  state_.manifold_age = proxy.age;
+  const double age = answers_.age() / kTickSeconds;
+  constexpr double kUnknown = std::numeric_limits<std::uint32_t>::max();
+  state_.manifold_age = static_cast<std::uint32_t>(std::min(age, kUnknown));
   state_.safety_flags = safety_.flags();
 }
 
@@ -131,7 +180,7 @@ void HapticHand::updateEvents() noexcept {
   beyond_count_ = local_.beyondValidity();
   events_.beyond_validity_began = beyond && !beyond_validity_;
   beyond_validity_ = beyond;
-  const bool stale = local_.hasManifold() && local_.proxy().age > local_.limits().fade_start;
+  const bool stale = local_.hasManifold() && answers_.excess() > safety_.limits().fade_from;
   events_.stale_began = stale && !stale_;
   stale_ = stale;
 }

@@ -2,7 +2,9 @@
 
 #include <cstdint>
 
+#include "clients/haptic/answer_age.h"
 #include "clients/haptic/coupling.h"
+#include "clients/haptic/device_handover.h"
 #include "clients/haptic/local_model.h"
 #include "clients/haptic/workspace.h"
 #include "devices/device.h"
@@ -28,7 +30,13 @@ struct HandEvents {
 ///
 /// Every force passes the safety layer (devices/safety.h).
 ///
-/// Threads: one. Real-time: step, receive.
+/// A force that was interrupted returns from zero: after a gap (the contacts are older than the layer's fresh
+/// limit), a freeze, a refusal, a jump of a body, an arming or a stop. First the hand is re-anchored: the
+/// workspace shifts until hand and server's proxy coincide, which the server has to answer; then the soft
+/// start of the layer ramps the force. So no stretch that came about while nobody looked is displayed, and
+/// nothing in the scene jumps.
+///
+/// Threads: one; armDevice by another one, beside it. Real-time: step, receive, permitForces.
 class HapticHand {
  public:
   /// Parameters of workspace and coupling come from the device's capabilities. `device` and `clutch` outlive
@@ -39,11 +47,14 @@ class HapticHand {
   /// cannot be armed.
   Result<void> begin(HandId hand, ClientId client, const Vector3& p_WH, bool armed);
   void receive(const HandManifold& manifold) noexcept { local_.receive(manifold); }
-  /// One cycle of `dt` [s]; `seq` numbers the input.
+  /// One cycle of `dt` [s], the time since the last one by the clock of the caller; `seq` numbers the input.
   void step(std::uint32_t seq, const WorldView& world, double dt) noexcept;
-  /// False: forces off, brake on, input inactive. True: resets the safety layer and arms the device unless it
-  /// is in fault. See Arming, which decides it.
+  /// False: forces off, brake on, input inactive. True, for the person at the device, also of a device in
+  /// fault: resets the safety layer, and asks for armDevice() if the device is not armed. See Arming, which
+  /// decides it.
   void permitForces(bool permitted) noexcept;
+  /// Resets and arms the device if permitForces() asked for it; may block.
+  Result<void> armDevice() { return handover_.serve(device_); }
   /// Forces off.
   void end() noexcept { device_.disarm(); }
 
@@ -57,8 +68,23 @@ class HapticHand {
   [[nodiscard]] const LocalModel& local() const noexcept { return local_; }
   [[nodiscard]] const Pose& pose() const noexcept { return input_.sample.X_WH; }
   [[nodiscard]] bool inContact() const noexcept { return in_contact_; }
+  /// [s] age of the contacts that are rendered, on the clock of step(); infinite without any.
+  [[nodiscard]] double contactAge() const noexcept { return answers_.age(); }
 
  private:
+  /// How the hand's force stands to its contacts.
+  enum class Rendering {
+    kInterrupted,  ///< they are not to be rendered, or not yet
+    kAnchoring,    ///< the server has not yet answered the re-anchored hand
+    kOn,
+  };
+  void readDevice() noexcept;
+  /// Decides rendering_ before the local model's step, and re-anchors the hand.
+  void anchor(std::uint32_t seq, const WorldView& world) noexcept;
+  /// `dt` [s].
+  [[nodiscard]] devices::SafetyRequest request(const Pose& X_WH, double dt) noexcept;
+  void writeDevice(const devices::DeviceCommand& command) noexcept;
+  [[nodiscard]] bool deadManHeld() const noexcept;
   void updateOutputs(std::uint32_t seq, const WorldView& world, const Twist& V_WH) noexcept;
   void updateEvents() noexcept;
 
@@ -67,6 +93,10 @@ class HapticHand {
   LocalModel local_;
   Coupling coupling_;
   devices::Safety safety_;
+  AnswerAge answers_;
+  DeviceHandover handover_;
+  Rendering rendering_ = Rendering::kInterrupted;
+  std::uint32_t anchored_seq_ = 0;  // first input of the re-anchored hand
   devices::DeviceState device_state_;
   DeviceInput input_;
   HandState state_;

@@ -15,9 +15,17 @@ constexpr double kUnknownRadius = 0.1;  // [m]
 
 // Fade-out of another hand's spring after it has released the object.
 constexpr double kFadeTicks = 20.0;  // [ticks]
+
+bool anyBodyJumped(const HandManifold& before, const HandManifold& now) {
+  return std::any_of(now.bodies.begin(), now.bodies.end(), [&](const ManifoldBody& body) {
+    return std::any_of(before.bodies.begin(), before.bodies.end(), [&](const ManifoldBody& known) {
+      return known.object == body.object && known.epoch != body.epoch;
+    });
+  });
+}
 }  // namespace
 
-LocalModel::LocalModel(const StalenessLimits& limits) : limits_(limits), solver_(1, kManifoldContacts) {}
+LocalModel::LocalModel() : solver_(1, kManifoldContacts) {}
 
 void LocalModel::receive(const HandManifold& manifold) noexcept {
   if (!manifold.X_WO.isFinite() || !manifold.X_HO.isFinite()) return;
@@ -27,40 +35,40 @@ void LocalModel::receive(const HandManifold& manifold) noexcept {
   }
   const bool same = has_manifold_ && manifold.server_epoch == manifold_.server_epoch &&
                     manifold.object == manifold_.object && manifold.object_epoch == manifold_.object_epoch;
-  if (!same) new_object_ = true;
+  if (!same || anyBodyJumped(manifold_, manifold)) jumped_ = true;
   manifold_ = manifold;
   updateOtherSprings(same);
-  proxy_.age = 0;
   has_manifold_ = true;
+}
+
+bool LocalModel::usable(const WorldView& world) const noexcept {
+  return has_manifold_ && manifold_.object.valid() && !manifold_.frozen && !outdated(world);
 }
 
 const LocalProxy& LocalModel::step(const Pose& X_WH, const WorldView& world) noexcept {
   const bool was_active = proxy_.active;
   proxy_.discontinuous = false;
-  proxy_.active = has_manifold_ && manifold_.object.valid() && !manifold_.frozen && !outdated(world);
+  proxy_.active = usable(world);
   if (!proxy_.active) {
     proxy_.discontinuous = was_active;
     proxy_.touching = false;
     proxy_.stiffness = proxy_.rotational_stiffness = 0.0;
     proxy_.X_WS = X_WH;
     proxy_.X_WO = has_manifold_ ? X_WH * manifold_.X_HO : X_WH;
-    ++proxy_.age;
     return proxy_;
   }
-  if (new_object_ || !was_active) {
+  if (jumped_ || !was_active) {
     // the new planes fit the server's proxy only
     proxy_.discontinuous = was_active;
     proxy_.X_WO = manifold_.X_WO;
-    new_object_ = false;
+    jumped_ = false;
   }
-  const double age_factor = ageFactor();
-  proxy_.stiffness = manifold_.stiffness * age_factor;
-  proxy_.rotational_stiffness = manifold_.rotational_stiffness * age_factor;
+  proxy_.stiffness = manifold_.stiffness;
+  proxy_.rotational_stiffness = manifold_.rotational_stiffness;
   solve(X_WH, world);
   fadeOtherSprings();
   proxy_.X_WS = proxy_.X_WO * manifold_.X_HO.inverse();
   updateValidityCount();
-  ++proxy_.age;
   return proxy_;
 }
 
@@ -90,15 +98,13 @@ void LocalModel::fadeOtherSprings() noexcept {
 }
 
 bool LocalModel::outdated(const WorldView& world) const noexcept {
-  return world.contains(manifold_.object) && world.serverEpoch() == manifold_.server_epoch &&
-         world.object(manifold_.object).epoch > manifold_.object_epoch;
-}
-
-double LocalModel::ageFactor() const noexcept {
-  if (proxy_.age <= limits_.fade_start) return 1.0;
-  if (proxy_.age >= limits_.fade_end) return 0.0;
-  return static_cast<double>(limits_.fade_end - proxy_.age) /
-         static_cast<double>(limits_.fade_end - limits_.fade_start);
+  if (world.serverEpoch() != manifold_.server_epoch) return false;
+  if (world.contains(manifold_.object) && world.object(manifold_.object).epoch > manifold_.object_epoch)
+    return true;
+  // the planes of a body fit the poses of its own epoch alone, so a frame that is still to come is awaited
+  return std::any_of(manifold_.bodies.begin(), manifold_.bodies.end(), [&](const ManifoldBody& body) {
+    return world.contains(body.object) && world.object(body.object).epoch != body.epoch;
+  });
 }
 
 void LocalModel::solve(const Pose& X_WH, const WorldView& world) noexcept {
@@ -107,7 +113,6 @@ void LocalModel::solve(const Pose& X_WH, const WorldView& world) noexcept {
   body_.radius = known ? world.object(manifold_.object).radius : kUnknownRadius;
   body_.X_WB = proxy_.X_WO;
   body_.springs.clear();
-  // full stiffness: age reduces the displayed force, not the position of the proxy
   body_.springs.push_back({X_WH * manifold_.X_HO, manifold_.X_HO.inverse().translation(),
                            std::max(1.0, manifold_.stiffness),
                            std::max(0.1, manifold_.rotational_stiffness)});

@@ -8,23 +8,17 @@
 
 namespace tenon::haptic {
 
-/// Limits of the age of a manifold since its arrival. The defaults suit a local network.
-struct StalenessLimits {
-  std::uint32_t fade_start = 20;  ///< [ticks] full stiffness up to this age
-  std::uint32_t fade_end = 100;   ///< [ticks] zero stiffness from this age
-};
-
 /// Result of one step of the local model.
 struct LocalProxy {
   bool active = false;  ///< the manifold is usable; otherwise the force is zero
-  /// Since the last step the object or its epoch changed, or `active` ended: the force has to cross-fade.
+  /// Since the last step a body jumped, the object changed or `active` ended: the force has to start from
+  /// zero.
   bool discontinuous = false;
   bool touching = false;              ///< a contact constraint is active
   Pose X_WO;                          ///< the object, kept out of all contact half-spaces
   Pose X_WS;                          ///< proxy pose S of the hand
-  double stiffness = 0.0;             ///< [N/m] after fading by age
+  double stiffness = 0.0;             ///< [N/m]
   double rotational_stiffness = 0.0;  ///< [Nm/rad] likewise
-  std::uint32_t age = 0;              ///< [ticks] of the manifold
 };
 
 /// Local model of one hand: haptic rendering at 1 kHz between two manifolds of the server (ARCHITECTURE.md).
@@ -41,17 +35,25 @@ struct LocalProxy {
 /// Threads: one. Real-time: everything but the constructor.
 class LocalModel {
  public:
-  explicit LocalModel(const StalenessLimits& limits = {});
+  LocalModel();
 
   /// Keeps the newest manifold; older ticks, older server epochs and non-finite poses are ignored.
   void receive(const HandManifold& manifold) noexcept;
-  /// One millisecond with the device at X_WH.
+  /// Whether the manifold can be rendered: it has an object, which is not held still, and none of its bodies
+  /// has jumped since.
+  [[nodiscard]] bool usable(const WorldView& world) const noexcept;
+  /// The newest manifold is not a continuation of the one before: another object, or a jump of a body.
+  [[nodiscard]] bool jumped() const noexcept { return jumped_; }
+  /// The next step begins at the server's proxy.
+  void restart() noexcept { jumped_ = true; }
+  /// Server's proxy pose of the hand. Precondition: hasManifold().
+  [[nodiscard]] Pose serverProxy() const noexcept { return manifold_.X_WO * manifold_.X_HO.inverse(); }
+  /// One cycle with the device at X_WH.
   const LocalProxy& step(const Pose& X_WH, const WorldView& world) noexcept;
 
   [[nodiscard]] const HandManifold& manifold() const noexcept { return manifold_; }
   [[nodiscard]] bool hasManifold() const noexcept { return has_manifold_; }
   [[nodiscard]] const LocalProxy& proxy() const noexcept { return proxy_; }
-  [[nodiscard]] const StalenessLimits& limits() const noexcept { return limits_; }
   /// [ticks] so far ahead of the contact set: the object had left the region for which the manifold lists all
   /// contacts. Manifolds do not tell its size: its points are taken to be within 0.1 m of its origin.
   [[nodiscard]] std::uint64_t beyondValidity() const noexcept { return beyond_validity_; }
@@ -66,11 +68,9 @@ class LocalModel {
   void updateOtherSprings(bool same_object) noexcept;
   void fadeOtherSprings() noexcept;
   [[nodiscard]] bool outdated(const WorldView& world) const noexcept;
-  [[nodiscard]] double ageFactor() const noexcept;
   void solve(const Pose& X_WH, const WorldView& world) noexcept;
   void updateValidityCount() noexcept;
 
-  StalenessLimits limits_;
   collision::MotionSolver solver_;
   HandManifold manifold_;
   LocalProxy proxy_;
@@ -80,7 +80,7 @@ class LocalModel {
   std::array<double, kManifoldContacts> multipliers_{};  ///< [N] of each constraint
   std::uint64_t beyond_validity_ = 0;
   bool has_manifold_ = false;
-  bool new_object_ = false;
+  bool jumped_ = false;
 };
 
 }  // namespace tenon::haptic

@@ -106,6 +106,7 @@ void Station::press() noexcept {
   if (arming_.awaitsPress()) report(StationEventKind::kArmed, {}, 0, 0.0);
   arming_.press();
   updateArming(permitted);
+  if (permitted) armingChanged();
 }
 
 void Station::updateArming(bool permitted_before) noexcept {
@@ -139,7 +140,7 @@ void Station::report(const HapticHand& hand) noexcept {
   }
   if (events.indexing_began) report(StationEventKind::kIndexingBegan, hand.id(), 0, 0.0);
   if (events.indexing_ended) report(StationEventKind::kIndexingEnded, hand.id(), 0, 0.0);
-  if (events.stale_began) report(StationEventKind::kStale, hand.id(), 0, hand.local().proxy().age);
+  if (events.stale_began) report(StationEventKind::kStale, hand.id(), 0, hand.state().manifold_age);
   if (events.beyond_validity_began) {
     const auto ticks = static_cast<double>(hand.local().beyondValidity());
     report(StationEventKind::kBeyondValidity, hand.id(), 0, ticks);

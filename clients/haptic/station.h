@@ -16,6 +16,7 @@
 #include "idl/types/messages/role.h"
 #include "idl/types/messages/session.h"
 #include "idl/types/messages/steps.h"
+#include "idl/types/result.h"
 
 namespace tenon::haptic {
 
@@ -30,7 +31,7 @@ enum class StationEventKind : std::uint8_t {
   kIndexingBegan,
   kIndexingEnded,
   kBeyondValidity,  ///< the hand is ahead of the contact set; value: [ticks] in total so far
-  kStale,           ///< the manifold is too old for full stiffness; value: [ticks] its age
+  kStale,           ///< the contacts are too old for full stiffness; value: [ticks] their age
   kServerChanged,   ///< frames of a newer server epoch arrived; detail: the epoch
   kStopChanged,     ///< detail: 1 when an emergency stop was engaged, 0 when it was released
   kArmed,           ///< the person has armed the devices
@@ -80,8 +81,14 @@ class Station {
   void press() noexcept;
   [[nodiscard]] const Arming& arming() const noexcept { return arming_; }
 
-  /// One millisecond of devices, local models and simulated person; `seq` numbers the inputs.
+  /// One cycle of devices, local models and simulated person; `seq` numbers the inputs.
   virtual void step(std::uint32_t seq) noexcept = 0;
+  /// `dt` [s]: from the last step to the next one, by the clock of whoever calls step(); kTickSeconds unless
+  /// told.
+  void setCycle(double dt) noexcept { dt_ = dt; }
+  /// Resets and arms the devices, if the person has pressed for it. It may block and make texts, so it has a
+  /// thread of its own beside that of step(), or is called between two steps. Fails with what a device says.
+  [[nodiscard]] virtual Result<void> armDevices() = 0;
 
   [[nodiscard]] std::span<const DeviceInput> inputs() const { return {inputs_.begin(), inputs_.size()}; }
   [[nodiscard]] std::span<const HandState> states() const { return {states_.begin(), states_.size()}; }
@@ -103,7 +110,7 @@ class Station {
   virtual void manifoldReceived(const HandManifold& manifold) noexcept = 0;
   /// currentStep() is new.
   virtual void stepChanged() {}
-  /// arming().permitsForces() is new.
+  /// arming().permitsForces() is new, or the person has pressed again: a device in fault is to be reset.
   virtual void armingChanged() noexcept = 0;
   /// To be called once a step by a station with a simulated person: it presses half a second after it could.
   void pressLikeAPerson() noexcept;
@@ -119,6 +126,7 @@ class Station {
   WorldView world_;
   ClientId client_;
   std::uint32_t seq_ = 0;
+  double dt_ = kTickSeconds;  ///< [s] see setCycle()
   FixedVector<DeviceInput, kMaxStationHands> inputs_;
   FixedVector<HandState, kMaxStationHands> states_;
 

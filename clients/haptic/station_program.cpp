@@ -90,6 +90,7 @@ class StationRunner {
   [[nodiscard]] Result<void> subscribeToStops();
   void passStops();
   void readKeys();
+  void armDevices();
   [[nodiscard]] bool seated() const { return !link_.member().lost(); }
   /// Rejoins. `new_seat`: client, hands or server epoch differ from before, so the station has to restart.
   [[nodiscard]] Result<void> rejoin(const std::atomic<bool>& stop, bool& new_seat);
@@ -129,6 +130,7 @@ class StationRunner {
   StopTruth stops_;  // of the wire thread
   ForceAgeStatistics force_age_;
   std::uint32_t seq_ = 0;
+  std::int64_t last_cycle_ = 0;  // [ns]
   std::uint64_t event_seq_ = 0;
   std::string printed_step_;
 };
@@ -204,6 +206,11 @@ void StationRunner::readKeys() {
   presses_.push(true);
 }
 
+/// On the wire thread: devices may take their time, and say why not.
+void StationRunner::armDevices() {
+  if (auto armed = station_.armDevices(); !armed) print(armed.error().what);
+}
+
 void StationRunner::printStep(const StepState& step) {
   if (!options_.print || step.phase != StepPhase::kActive || step.instruction.empty()) return;
   const std::string line = std::to_string(step.step + 1) + "/" + std::to_string(step.steps) + " " +
@@ -245,6 +252,8 @@ void StationRunner::sendEvents() {
         event.kind == StationEventKind::kSafetyBegan || event.kind == StationEventKind::kSafetyEnded;
     const char* kind = is_safety ? "safety" : "station";
     static_cast<void>(link_.send(ClientEvent{link_.welcome().client, ++event_seq_, event.tick, kind, text}));
+    if (event.kind != StationEventKind::kDeviceFault) continue;
+    print(text + (options_.read_keys ? "; look at the device, then press return to reset it" : ""));
   }
 }
 
@@ -259,6 +268,7 @@ Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat
   auto back = member.rejoin(stop, [this] {
     link_.inbox().dispatch(milliseconds(0));
     readKeys();
+    armDevices();
   });
   if (back) back = link_.awaitMatch(stop);
   if (!back) return fail(why + "; " + back.error().what);
@@ -286,6 +296,7 @@ Result<RunState> StationRunner::runLockstep(const std::atomic<bool>& stop) {
       if (new_seat) restartStation();
       tick = link_.welcome().tick;
     }
+    armDevices();
     station_.step(static_cast<std::uint32_t>(tick + 1));
     output.fill(station_, static_cast<std::uint32_t>(tick + 1));
     send(output);
@@ -321,6 +332,8 @@ void StationRunner::servo() noexcept {
   }
   if (stop_.update()) station_.receive(stop_.value());
   for (; presses_.front() != nullptr; presses_.pop()) station_.press();
+  if (last_cycle_ != 0) station_.setCycle(static_cast<double>(now - last_cycle_) * 1e-9);
+  last_cycle_ = now;
   station_.step(++seq_);
   force_age_.inputSent(seq_, now, kPeriodNs);
   output_.back().fill(station_, seq_);
@@ -352,6 +365,7 @@ Result<RunState> StationRunner::runRealTime(const std::atomic<bool>& stop) {
   while (!stop && !over()) {
     link_.inbox().dispatch(milliseconds(20));
     readKeys();
+    armDevices();
     if (!seated() && !over()) {
       // the servo continues; forces fade with the age of the contacts
       bool new_seat = false;

@@ -9,23 +9,35 @@ namespace {
 constexpr double kMinimumJerkPeak = 1.875;  // [-]
 constexpr double kShortestMove = 0.2;       // [s]
 
+// A smaller rest of a shift stays.
+constexpr double kNoShift = 1e-4;  // [m]
+
 double minimumJerk(double s) { return s * s * s * (10.0 + s * (-15.0 + s * 6.0)); }
 }  // namespace
 
 void Workspace::setCentre(const Vector3& p_WC) noexcept {
   p_WC_ = p_WC;
   v_WC_.setZero();
+  shifted_.setZero();
   move_in_progress_ = false;
   free_ticks_ = options_.settle_ticks;
 }
 
 void Workspace::moveTo(const Vector3& p_WC) noexcept {
   move_in_progress_ = true;
+  shifted_.setZero();
   move_from_ = p_WC_;
   move_to_ = p_WC;
   move_elapsed_ = 0.0;
   const double distance = (move_to_ - move_from_).norm();
   move_duration_ = std::max(kShortestMove, kMinimumJerkPeak * distance / options_.move_speed);
+}
+
+void Workspace::shift(const Vector3& p_CC_W) noexcept {
+  p_WC_ += p_CC_W;
+  shifted_ += p_CC_W;
+  move_from_ += p_CC_W;  // the way goes on from there
+  free_ticks_ = 0;
 }
 
 void Workspace::step(const Vector3& p_DH, bool in_contact, double dt) noexcept {
@@ -41,9 +53,15 @@ void Workspace::step(const Vector3& p_DH, bool in_contact, double dt) noexcept {
       const double s = std::min(1.0, move_elapsed_ / move_duration_);
       p_WC_ = move_from_ + minimumJerk(s) * (move_to_ - move_from_);
       if (s >= 1.0) move_in_progress_ = false;
-    } else if (const double r_h = p_DH.norm(); r_h > options_.radius) {
+    } else {
       // paper eq. 1; C_h - C_w is p_DH
-      p_WC_ += options_.gain * dt * (1.0 - options_.radius / r_h) * p_DH;
+      if (const double r_h = p_DH.norm(); r_h > options_.radius)
+        p_WC_ += options_.gain * dt * (1.0 - options_.radius / r_h) * p_DH;
+      if (shifted_.norm() > kNoShift) {
+        const Vector3 back = clampNorm(options_.return_gain * shifted_, options_.return_speed) * dt;
+        p_WC_ -= back;
+        shifted_ -= back;
+      }
     }
   } else if (move_in_progress_) {
     // after a contact the path starts anew from rest

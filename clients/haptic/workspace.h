@@ -10,6 +10,8 @@ struct WorkspaceOptions {
   double gain = 1.5;           ///< [1/s] lambda_w of paper eq. 1
   double move_speed = 0.4;     ///< [m/s] peak speed of moveTo()
   unsigned settle_ticks = 50;  ///< [ticks] without contact before the workspace moves again
+  double return_gain = 1.0;    ///< [1/s] at which what shift() added decays
+  double return_speed = 0.05;  ///< [m/s] at most
 };
 
 /// Position of the device's centre in the scene: C_w of the paper (§4.3).
@@ -17,6 +19,9 @@ struct WorkspaceOptions {
 /// Indexing by eq. 1 moves it while the hand is outside the sphere of radius r_w; moveTo() moves it to a
 /// given position on a minimum-jerk path. Both pause while the hand's object is in contact, because a contact
 /// would move with the workspace. The axes of D are parallel to W; the scale is 1.
+///
+/// shift() re-anchors the hand: what it adds is part of C_w, so everybody who knows C_w or the hand's pose
+/// agrees, and decays as slowly as the workspace moves, out of contact alone.
 ///
 /// Threads: one. Real-time: everything.
 class Workspace {
@@ -28,6 +33,11 @@ class Workspace {
   /// Starts to move C_w to p_WC at up to move_speed. The hand may move relative to C_w meanwhile.
   void moveTo(const Vector3& p_WC) noexcept;
   [[nodiscard]] bool moveInProgress() const noexcept { return move_in_progress_; }
+
+  /// C_w jumps by p_CC_W; velocity() does not count it.
+  void shift(const Vector3& p_CC_W) noexcept;
+  /// What is left of all shifts.
+  [[nodiscard]] const Vector3& shifted() const noexcept { return shifted_; }
 
   /// One cycle of `dt` [s] with the hand at p_DH. Contact stops the motion at once.
   void step(const Vector3& p_DH, bool in_contact, double dt) noexcept;
@@ -48,6 +58,7 @@ class Workspace {
   WorkspaceOptions options_;
   Vector3 p_WC_ = Vector3::Zero();
   Vector3 v_WC_ = Vector3::Zero();
+  Vector3 shifted_ = Vector3::Zero();  // [m]
   Vector3 move_from_ = Vector3::Zero();
   Vector3 move_to_ = Vector3::Zero();
   double move_elapsed_ = 0.0;   // [s]

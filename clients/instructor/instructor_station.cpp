@@ -88,18 +88,21 @@ void InstructorStation::armingChanged() noexcept {
   if (parts_->hand) parts_->hand->permitForces(arming().permitsForces());
 }
 
+Result<void> InstructorStation::armDevices() {
+  return parts_->hand ? parts_->hand->armDevice() : Result<void>{};
+}
+
 void InstructorStation::step(std::uint32_t seq) noexcept {
-  constexpr double dt = kTickSeconds;
   seq_ = seq;
   inputs_.clear();
   states_.clear();
   if (parts_->options.simulated_person) pressLikeAPerson();
   if (!parts_->hand) return;
-  parts_->hand->step(seq, world_, dt);
+  parts_->hand->step(seq, world_, dt_);
   report(*parts_->hand);
   inputs_.push_back(parts_->hand->input());
   states_.push_back(parts_->hand->state());
-  if (parts_->options.simulated_person) parts_->movePerson(world_, dt);
+  if (parts_->options.simulated_person) parts_->movePerson(world_, kTickSeconds);
 }
 
 const char* InstructorStation::activity() const noexcept { return parts_->person.activity(); }

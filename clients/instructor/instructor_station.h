@@ -32,6 +32,7 @@ class InstructorStation : public haptic::Station {
   [[nodiscard]] std::vector<std::string> handNames() const override;
   [[nodiscard]] Role role() const override { return Role::kInstructor; }
   void step(std::uint32_t seq) noexcept override;
+  [[nodiscard]] Result<void> armDevices() override;
   /// What the simulated instructor does, in a word or two: for progress output and tests.
   [[nodiscard]] const char* activity() const noexcept;
 

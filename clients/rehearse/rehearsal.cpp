@@ -81,6 +81,7 @@ class Rehearsal {
     const Tick now = simulation_.now() + 1;
     input_.tick = now;
     for (const auto& station : stations_) {
+      static_cast<void>(station->armDevices());  // a fault of a simulated device is in its events
       station->step(static_cast<std::uint32_t>(now));
       for (const DeviceInput& input : station->inputs()) receive(input);
     }

@@ -21,6 +21,7 @@ class ScriptedStation final : public haptic::Station {
   [[nodiscard]] std::vector<std::string> handNames() const override { return {hand_}; }
   [[nodiscard]] Role role() const override { return role_; }
   void step(std::uint32_t seq) noexcept override;
+  [[nodiscard]] Result<void> armDevices() override { return {}; }
 
  protected:
   void begin(std::span<const HandId>) override {}

@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 
+#include "clients/haptic/bracelet.h"
 #include "clients/haptic/haptic_hand.h"
 #include "clients/simulated_person/posture.h"
 #include "clients/simulated_person/simulated_trainee.h"
@@ -38,18 +39,16 @@ void track(DeviceInput& input, std::uint32_t seq, const Pose& X_WH, const haptic
 }  // namespace
 
 struct TraineeStation::Parts {
-  explicit Parts(const TraineeOptions& station)
-      : options(station), tactile({station.tactile}), posture(1.0), person(station.person) {}
+  explicit Parts(const TraineeOptions& station) : options(station), posture(1.0), person(station.person) {}
 
   TraineeOptions options;
   std::unique_ptr<devices::BimanualDevice> arms;
-  std::unique_ptr<devices::HapticDevice> bracelet;
+  std::unique_ptr<devices::HapticDevice> tactors;
   devices::ClutchLatch clutch;
   std::array<HandId, kHandNames.size()> ids{};
   std::array<std::optional<haptic::HapticHand>, 2> hands;
   std::array<DeviceInput, kHandNames.size()> tracked{};
-  HandManifold forearm_contacts;
-  haptic::TactileMap tactile;
+  std::optional<haptic::Bracelet> bracelet;
   simulated_person::Posture posture;
   simulated_person::SimulatedTrainee person;
 
@@ -96,9 +95,9 @@ Result<std::unique_ptr<TraineeStation>> TraineeStation::open(const TraineeOption
   auto arms = devices::openBimanualDevice(options.device, options.person.seed);
   if (!arms) return fail(arms.error().what);
   parts->arms = std::move(*arms);
-  auto bracelet = devices::openDevice(options.tactors, options.person.seed);
-  if (!bracelet) return fail(bracelet.error().what);
-  parts->bracelet = std::move(*bracelet);
+  auto tactors = devices::openDevice(options.tactors, options.person.seed);
+  if (!tactors) return fail(tactors.error().what);
+  parts->tactors = std::move(*tactors);
   std::unique_ptr<TraineeStation> station(new TraineeStation(std::move(parts)));
   if (options.simulated_person) station->press();  // armed before the session begins
   return station;
@@ -126,7 +125,11 @@ void TraineeStation::begin(std::span<const HandId> hand_ids) {
     }
     starts[i] = hand.pose();
   }
-  armBracelet();
+  parts_->bracelet.reset();
+  haptic::Bracelet& bracelet =
+      parts_->bracelet.emplace(*parts_->tactors, haptic::TactileOptions{parts_->options.tactile});
+  // the session goes on without vibration when the bracelet cannot be armed
+  static_cast<void>(bracelet.begin(hand_ids[kForearm], arming().permitsForces()));
   parts_->person.begin(sceneObjects(), starts[kRight], starts[kLeft]);
 }
 
@@ -134,9 +137,7 @@ void TraineeStation::manifoldReceived(const HandManifold& manifold) noexcept {
   for (auto& hand : parts_->hands) {
     if (hand && hand->id() == manifold.hand) hand->receive(manifold);
   }
-  if (manifold.hand == parts_->ids[kForearm] && manifold.tick >= parts_->forearm_contacts.tick) {
-    parts_->forearm_contacts = manifold;
-  }
+  if (parts_->bracelet) parts_->bracelet->receive(manifold);
 }
 
 void TraineeStation::stepChanged() { parts_->person.read(currentStep()); }
@@ -145,61 +146,58 @@ void TraineeStation::armingChanged() noexcept {
   for (auto& hand : parts_->hands) {
     if (hand) hand->permitForces(arming().permitsForces());
   }
-  armBracelet();
+  if (parts_->bracelet) parts_->bracelet->permit(arming().permitsForces());
 }
 
-/// The session goes on without vibration when the bracelet cannot be armed.
-void TraineeStation::armBracelet() noexcept {
-  if (arming().permitsForces()) {
-    static_cast<void>(parts_->bracelet->arm());
-  } else {
-    parts_->bracelet->disarm();
+Result<void> TraineeStation::armDevices() {
+  Result<void> all;
+  const auto keepFirst = [&all](Result<void> one) {
+    if (all && !one) all = std::move(one);
+  };
+  for (auto& hand : parts_->hands) {
+    if (hand) keepFirst(hand->armDevice());
   }
+  if (parts_->bracelet) keepFirst(parts_->bracelet->armDevice());
+  return all;
 }
 
 void TraineeStation::step(std::uint32_t seq) noexcept {
-  constexpr double dt = kTickSeconds;
   seq_ = seq;
   inputs_.clear();
   states_.clear();
   if (parts_->options.simulated_person) pressLikeAPerson();
   for (auto& hand : parts_->hands) {
     if (!hand) continue;
-    hand->step(seq, world_, dt);
+    hand->step(seq, world_, dt_);
     report(*hand);
     inputs_.push_back(hand->input());
     states_.push_back(hand->state());
   }
   if (parts_->options.simulated_person) {
-    parts_->person.step(parts_->perceive(kRight), parts_->perceive(kLeft), world_, dt);
+    parts_->person.step(parts_->perceive(kRight), parts_->perceive(kLeft), world_, kTickSeconds);
     parts_->moveArm(kRight, parts_->person.right());
     parts_->moveArm(kLeft, parts_->person.left());
   }
-  trackBody(seq, dt);
+  trackBody(seq);
 }
 
-void TraineeStation::trackBody(std::uint32_t seq, double dt) noexcept {
+void TraineeStation::trackBody(std::uint32_t seq) noexcept {
   const auto& right = parts_->hands[kRight];
   if (!right) return;
-  parts_->posture.step(right->pose(), right->input().p_WC, dt);
-
-  devices::DeviceState bracelet_state;
-  parts_->bracelet->read(bracelet_state);
-  devices::DeviceCommand vibration;
-  vibration.tactors = parts_->tactile.step(parts_->forearm_contacts, dt);
-  parts_->bracelet->write(vibration);
+  parts_->posture.step(right->pose(), right->input().p_WC, kTickSeconds);
+  parts_->bracelet->step(seq, dt_);
   const std::array<Pose, 2> poses{parts_->posture.forearm(), parts_->posture.head()};
   for (std::size_t i = kForearm; i <= kHead; ++i) {
     if (!parts_->ids[i].valid()) continue;
     DeviceInput& input = parts_->tracked[i];
-    track(input, seq, poses[i - kForearm], world_, dt);
+    track(input, seq, poses[i - kForearm], world_, kTickSeconds);
     inputs_.push_back(input);
     HandState state;
     state.hand = parts_->ids[i];
     state.seq = seq;
     state.X_WH = state.X_WO_local = poses[i - kForearm];
     state.p_WC = right->input().p_WC;
-    if (i == kForearm) state.tactors = vibration.tactors;
+    if (i == kForearm) state.tactors = parts_->bracelet->intensities();
     states_.push_back(state);
   }
 }

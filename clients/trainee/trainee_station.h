@@ -35,6 +35,7 @@ class TraineeStation : public haptic::Station {
   [[nodiscard]] std::vector<std::string> handNames() const override;
   [[nodiscard]] Role role() const override { return Role::kTrainee; }
   void step(std::uint32_t seq) noexcept override;
+  [[nodiscard]] Result<void> armDevices() override;
   /// What the simulated trainee does, in a word or two: for progress output and tests.
   [[nodiscard]] const char* activity() const noexcept;
 
@@ -46,9 +47,8 @@ class TraineeStation : public haptic::Station {
 
  private:
   struct Parts;
-  /// Poses of forearm and head, and the vibration of the bracelet; `dt` [s].
-  void trackBody(std::uint32_t seq, double dt) noexcept;
-  void armBracelet() noexcept;
+  /// Poses of forearm and head, and the vibration of the bracelet.
+  void trackBody(std::uint32_t seq) noexcept;
   explicit TraineeStation(std::unique_ptr<Parts> parts);
   std::unique_ptr<Parts> parts_;
 };

@@ -50,6 +50,22 @@ ManifoldContact manifoldContact(const collision::Contact& contact, ObjectId othe
   return result;
 }
 
+/// The bodies of the contacts, so that a jump of one is known; where they are more than the table has places
+/// for, those with the smallest gaps.
+void listBodies(std::span<const ObjectMotion> objects, HandManifold& out) {
+  out.bodies.clear();
+  while (!out.bodies.full()) {
+    const ManifoldContact* nearest = nullptr;
+    for (const ManifoldContact& contact : out.contacts) {
+      const bool listed = std::any_of(out.bodies.begin(), out.bodies.end(),
+                                      [&](const ManifoldBody& body) { return body.object == contact.other; });
+      if (!listed && (nearest == nullptr || contact.gap < nearest->gap)) nearest = &contact;
+    }
+    if (nearest == nullptr) return;
+    out.bodies.push_back({nearest->other, objects[nearest->other.value].epoch});
+  }
+}
+
 }  // namespace
 
 Wrench Environment::forceOn(ObjectId object) const noexcept {
@@ -114,6 +130,7 @@ void Environment::manifold(HandId hand, HandManifold& out) const noexcept {
   out.validity_radius = 0.0;
   out.others.clear();
   out.contacts.clear();
+  out.bodies.clear();
   if (!isObject(motion.object)) return;
   const ObjectMotion& held = objects_[motion.object.value];
   out.object_epoch = held.epoch;
@@ -151,6 +168,7 @@ void Environment::listContacts(ObjectId object, HandManifold& out) const noexcep
     out.contacts.push_back(manifoldContact(all.contacts[chosen[i]], other, objects_[other.value],
                                            objects_[object.value], held_is_a));
   }
+  listBodies(objects_, out);
 
   // contacts that no listed one represents, and crossings that may come about, limit the manifold's validity
   for (const std::uint32_t i : engine_->near) {

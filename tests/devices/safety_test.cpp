@@ -30,9 +30,10 @@ SafetyRequest requestForce(const Vector3& force, double age = 0.0) {
   return request;
 }
 
-/// A safety layer after 1 s of `force`: soft start and slew are over.
+/// A safety layer after 1 s of no force and 1 s of `force`: soft start and slew are over.
 Safety settled(const DeviceCaps& caps, const Vector3& force, ClutchLatch* clutch = nullptr) {
   Safety safety(caps, clutch);
+  for (int tick = 0; tick < 1010; ++tick) (void)safety.step({}, armed(), kTick);
   for (int tick = 0; tick < 1000; ++tick) (void)safety.step(requestForce(force), armed(), kTick);
   return safety;
 }
@@ -65,21 +66,86 @@ TEST(Safety, OutputsNoForceForANonFiniteRequest) {
 //   1 |-------.
 //     |        '.
 //   0 |__________'.____ age
-//     0     10   30 ms
-TEST(Safety, FadesAForceOlderThanTenMillisecondsAndDisarmsAtThirty) {
+//     0     20   100 ms
+TEST(Safety, FadesAForceOlderThanTwentyMillisecondsToNothingAtAHundred) {
   Safety safety = settled(kSigma, {4.0, 0.0, 0.0});
   const auto outputAt = [&](double age) {
     return safety.step(requestForce({4.0, 0.0, 0.0}, age), armed(), kTick).F_Ho_D.force.x();
   };
-  EXPECT_DOUBLE_EQ(outputAt(0.010), 4.0);
+  EXPECT_DOUBLE_EQ(outputAt(0.020), 4.0);
   EXPECT_FALSE(safety.acts(SafetyRule::kAgeFading));
-  EXPECT_NEAR(outputAt(0.020), 2.0, 1e-12);
+  EXPECT_NEAR(outputAt(0.060), 2.0, 1e-12);
   EXPECT_TRUE(safety.acts(SafetyRule::kAgeFading));
-  EXPECT_FALSE(safety.wantsDisarm());
-  EXPECT_DOUBLE_EQ(outputAt(0.030), 0.0);
+  EXPECT_FALSE(safety.acts(SafetyRule::kStale));
+  EXPECT_DOUBLE_EQ(outputAt(0.100), 0.0);
   EXPECT_TRUE(safety.acts(SafetyRule::kStale));
-  EXPECT_TRUE(safety.wantsDisarm());
+  EXPECT_FALSE(safety.wantsDisarm()) << "the person does not have to arm after each gap";
   EXPECT_DOUBLE_EQ(outputAt(kNan), 0.0);
+}
+
+TEST(Safety, AForceThatWasLateStartsSoftly) {
+  Safety safety = settled(kSigma, {4.0, 0.0, 0.0});
+  (void)safety.step(requestForce({4.0, 0.0, 0.0}, 0.021), armed(), kTick);
+  double last = 4.0;
+  for (int tick = 0; tick < 20; ++tick) {
+    const double now = safety.step(requestForce({4.0, 0.0, 0.0}), armed(), kTick).F_Ho_D.force.x();
+    EXPECT_LT(now, last);
+    last = now;
+  }
+  EXPECT_LT(last, 0.1);
+  EXPECT_TRUE(safety.acts(SafetyRule::kSoftStart));
+}
+
+//  |F| ---.                   the old force leaves within 20 ms,
+//          `.                 the new one grows by at most 20 N/s
+//            `.___.---~~~
+TEST(Safety, ARestartedForceGrowsByTwentyNewtonASecondUntilItIsTheRequestedOne) {
+  Safety safety = settled(kHug, {40.0, 0.0, 0.0});
+  SafetyRequest request = requestForce({0.0, 40.0, 0.0});
+  request.restart = true;
+  for (int tick = 0; tick < 25; ++tick) {
+    const Vector3 force = safety.step(request, armed(), kTick).F_Ho_D.force;
+    EXPECT_NEAR(force.x(), tick < 20 ? 40.0 - 2.0 * (tick + 1) : 0.0, 1e-9) << tick;
+    EXPECT_EQ(force.y(), 0.0);
+  }
+  request.restart = false;
+  double last = 0.0;
+  for (int tick = 0; tick < 2000; ++tick) {
+    const double now = safety.step(request, armed(), kTick).F_Ho_D.force.y();
+    EXPECT_LE(now - last, 0.020 + 1e-9) << tick;
+    last = now;
+  }
+  EXPECT_NEAR(last, 40.0, 0.1);
+  (void)safety.step(request, armed(), 0.3);
+  EXPECT_LE(safety.step(request, armed(), kTick).F_Ho_D.force.y(), 40.0);
+}
+
+TEST(Safety, AForceThatStartsFromNothingIsAtMostThreeNewtonForASecond) {
+  Safety safety(kHug);
+  DeviceCommand output;
+  for (int tick = 0; tick < 999; ++tick) output = safety.step(requestForce({40.0, 0.0, 0.0}), armed(), kTick);
+  EXPECT_NEAR(output.F_Ho_D.force.norm(), 3.0, 1e-9);
+  for (int tick = 0; tick < 100; ++tick) output = safety.step(requestForce({40.0, 0.0, 0.0}), armed(), kTick);
+  EXPECT_NEAR(output.F_Ho_D.force.norm(), 5.0, 0.1) << "20 N/s until it is the requested one";
+}
+
+TEST(Safety, ALongStepLetsAForceGrowAsTwoMilliseconds) {
+  Safety safety = settled(kSigma, {2.0, 0.0, 0.0});
+  EXPECT_NEAR(safety.step(requestForce({10.0, 0.0, 0.0}), armed(), 0.3).F_Ho_D.force.x(), 3.0, 1e-9)
+      << "500 N/s";
+}
+
+TEST(Safety, TactorsFadeWithTheAgeOfTheirContacts) {
+  Safety safety(kSigma);
+  const auto intensityAt = [&](double age) {
+    SafetyRequest request;
+    request.requested.tactors.fill(200);
+    request.age = age;
+    return safety.step(request, armed(), kTick).tactors[3];
+  };
+  EXPECT_EQ(intensityAt(0.0), 200);
+  EXPECT_EQ(intensityAt(0.060), 100);
+  EXPECT_EQ(intensityAt(0.100), 0);
 }
 
 TEST(Safety, LimitsAForceWithoutChangingItsDirection) {
@@ -95,7 +161,7 @@ TEST(Safety, LimitsTorque) {
   SafetyRequest request;
   request.requested.F_Ho_D.torque = {0.0, 3.0, 0.0};
   DeviceCommand output;
-  for (int tick = 0; tick < 1000; ++tick) output = safety.step(request, armed(), kTick);
+  for (int tick = 0; tick < 1100; ++tick) output = safety.step(request, armed(), kTick);
   EXPECT_NEAR(output.F_Ho_D.torque.y(), 0.4, 1e-12);
   EXPECT_TRUE(safety.acts(SafetyRule::kForceLimited));
 }
@@ -136,17 +202,19 @@ TEST(Safety, LimitsTheIncreaseOfAForceButNotItsDecrease) {
   EXPECT_NEAR(outputFor(-10.0), -0.5, 1e-9) << "the old direction drops at once, the new one grows";
 }
 
-TEST(Safety, RampsTheForceOverHalfASecondAfterArming) {
+TEST(Safety, RampsTheForceOverASecondAfterArming) {
   Safety safety(kHug);
-  const SafetyRequest request = requestForce({10.0, 0.0, 0.0});
+  const SafetyRequest request = requestForce({2.0, 0.0, 0.0});
   (void)safety.step(request, DeviceState{}, kTick);
   EXPECT_TRUE(safety.acts(SafetyRule::kForcesOff));
   double last = 0.0;
-  for (int tick = 1; tick <= 500; ++tick) {
+  for (int tick = 0; tick <= 1001; ++tick) {
     const double now = safety.step(request, armed(), kTick).F_Ho_D.force.x();
-    EXPECT_NEAR(now, 10.0 * tick / 500.0, 1e-6);
-    EXPECT_GT(now, last);
-    EXPECT_EQ(safety.acts(SafetyRule::kSoftStart), tick < 500);
+    EXPECT_NEAR(now, std::min(2.0, 2.0 * tick / 1000.0), 1e-6);
+    EXPECT_GE(now, last);
+    EXPECT_EQ(safety.acts(SafetyRule::kSoftStart),
+              tick < 1000 || (tick == 1000 && safety.acts(SafetyRule::kSoftStart)))
+        << tick;
     last = now;
   }
 }
@@ -227,9 +295,22 @@ TEST(Safety, PushesBackAtTheEndOfTheWorkspace) {
   Safety safety = settled(kSigma, {0.0, 0.0, 0.0});
   DeviceState state = armed();
   state.X_DH.translation() = {0.0, 0.0, 0.95 * 0.060 + 1e-3};
-  const DeviceCommand output = safety.step(requestForce({0.0, 0.0, 0.0}), state, kTick);
-  EXPECT_NEAR(output.F_Ho_D.force.z(), -1000.0 * 1e-3, 1e-9);
+  EXPECT_NEAR(safety.step({}, state, kTick).F_Ho_D.force.z(), -0.5, 1e-9) << "it grows by 500 N/s too";
+  EXPECT_NEAR(safety.step({}, state, kTick).F_Ho_D.force.z(), -1000.0 * 1e-3, 1e-9);
   EXPECT_TRUE(safety.acts(SafetyRule::kWorkspaceWall));
+}
+
+TEST(Safety, TheEndOfTheWorkspaceRampsAfterArming) {
+  Safety safety(kHug);
+  DeviceState state = armed();
+  state.X_DH.translation() = {0.0, 0.0, 0.95 * 0.40 + 0.02};  // armed 20 mm beyond the edge
+  double last = 0.0;
+  for (int tick = 0; tick < 1000; ++tick) {
+    const double now = safety.step({}, state, kTick).F_Ho_D.force.norm();
+    EXPECT_LE(now - last, 0.020 + 1e-9) << tick;
+    last = now;
+  }
+  EXPECT_GT(last, 19.0);
 }
 
 TEST(Safety, WarnsAtSixtyNewtonAndStopsBothArmsAboveEightyUntilReset) {
@@ -315,7 +396,7 @@ TEST(Safety, CommandsOnlyAxesTheDeviceHas) {
   Safety safety(kFalcon);
   SafetyRequest request = requestForce({1.0, 0.0, 0.0});
   request.requested.F_Ho_D.torque = {1.0, 1.0, 1.0};
-  for (int tick = 0; tick < 600; ++tick) {
+  for (int tick = 0; tick < 1100; ++tick) {
     EXPECT_EQ(safety.step(request, armed(), kTick).F_Ho_D.torque, Vector3(Vector3::Zero()));
   }
   EXPECT_EQ(safety.flags(), 0U);

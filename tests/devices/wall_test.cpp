@@ -49,9 +49,9 @@ WallContact pushIntoWall(const SimulatedModel& model, double K, double contracti
   MinMax late;
   double energy = 0.0;
   Vector3 p_last = Vector3::Zero();
-  for (int tick = 0; tick < 5000; ++tick) {
-    // approach at 0.1 m/s, then a constant push
-    const double intended = std::min(-0.01 + 1e-4 * std::max(0, tick - 800), 0.02);
+  for (int tick = 0; tick < 5500; ++tick) {
+    // approach at 0.1 m/s once the soft start is over, then a constant push
+    const double intended = std::min(-0.01 + 1e-4 * std::max(0, tick - 1300), 0.02);
     device.humanArm().setIntent(Pose(Vector3(intended, 0.0, 0.0)));
     DeviceState state;
     device.read(state);
@@ -68,7 +68,7 @@ WallContact pushIntoWall(const SimulatedModel& model, double K, double contracti
     request.requested.F_Ho_D.force.x() = -K * std::max(0.0, state.X_DH.translation().x());
     request.stiffness = K;
     device.write(with_safety_layer ? safety.step(request, state, 1e-3) : request.requested);
-    if (tick >= 4500) late.add(p.x());
+    if (tick >= 5000) late.add(p.x());
   }
   contact.oscillation = late.width();
   contact.depth = p_last.x();

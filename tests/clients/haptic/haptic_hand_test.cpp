@@ -4,38 +4,13 @@
 
 #include <gtest/gtest.h>
 
-#include "devices/catalog.h"
-#include "devices/simulated/simulated_device.h"
-#include "tests/clients/haptic/plane_server.h"
+#include "tests/clients/haptic/hand_above_floor.h"
 #include "tests/support/realtime_guard.h"
 
 namespace tenon::haptic {
 namespace {
 
-using test::PlaneServer;
-
-/// A simulated device held by a simulated arm; it moves a ball above a floor at z = 0.
-struct HandAboveFloor {
-  explicit HandAboveFloor(const std::string& name)
-      : device(std::move(*devices::openDevice(name))), hand(*device) {
-    world.begin(server.objects(), 0, 0);
-    EXPECT_TRUE(hand.begin(test::kHand, ClientId{1}, Vector3(0.0, 0.0, 0.03), true));
-  }
-  /// One millisecond of a session with the intended hand position p_WI.
-  void step(const Vector3& p_WI) {
-    ++tick;
-    devices::simulatedHumanArm(*device)->setIntent(hand.workspace().toDevice(Pose(p_WI)));
-    world.receive(server.frame(tick));
-    hand.receive(server.manifold(tick, hand.pose()));
-    hand.step(static_cast<std::uint32_t>(tick), world, kTickSeconds);
-  }
-
-  test::PlaneServer server{1000.0};
-  std::unique_ptr<devices::HapticDevice> device;
-  HapticHand hand;
-  WorldView world;
-  Tick tick = 0;
-};
+using test::HandAboveFloor;
 
 class HapticHandWithDevice : public testing::TestWithParam<std::string> {};
 
@@ -68,6 +43,7 @@ TEST_P(HapticHandWithDevice, TurnsItsForcesOffDuringAnEmergencyStop) {
   EXPECT_EQ(setup.hand.state().F_Ho_W.force.norm(), 0.0);
   EXPECT_FALSE(setup.hand.input().active);
   setup.hand.permitForces(true);
+  ASSERT_TRUE(setup.hand.armDevice());
   for (int i = 0; i < 1500; ++i) setup.step(Vector3(0.0, 0.0, 0.0));
   EXPECT_TRUE(setup.hand.input().active);
   EXPECT_GT(setup.hand.state().F_Ho_W.force.norm(), 0.5);

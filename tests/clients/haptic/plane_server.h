@@ -25,11 +25,13 @@ class PlaneServer {
     objects_ = {floor, ball};
   }
 
-  /// Manifold of `tick`: the ball at the hand, kept above the floor.
+  /// Manifold of `tick`, which answers the input of the tick before: the ball at the hand, kept above the
+  /// floor.
   HandManifold manifold(Tick tick, const Pose& X_WH) const {
     HandManifold manifold;
     manifold.hand = kHand;
     manifold.tick = tick;
+    manifold.answers_seq = static_cast<std::uint32_t>(tick - 1);
     manifold.object = kBall;
     manifold.object_epoch = epoch;
     manifold.stiffness = stiffness_;
@@ -43,6 +45,7 @@ class PlaneServer {
     contact.normal_A = Vector3f::UnitZ();
     contact.gap = static_cast<float>(manifold.X_WO.translation().z() - radius - floor_height);
     manifold.contacts.push_back(contact);
+    if (lists_floor) manifold.bodies.push_back({kFloor, floor_epoch});
     return manifold;
   }
   WorldFrame frame(Tick tick) const {
@@ -50,7 +53,7 @@ class PlaneServer {
     frame.tick = tick;
     ObjectState floor;
     floor.object = kFloor;
-    floor.epoch = 1;
+    floor.epoch = floor_epoch;
     floor.X_WO = Pose(Vector3(0.0, 0.0, floor_height));
     ObjectState ball;
     ball.object = kBall;
@@ -65,6 +68,8 @@ class PlaneServer {
   double floor_height = 0.0;      ///< [m]
   double validity_radius = 0.05;  ///< [m]
   std::uint32_t epoch = 1;        ///< of the ball
+  std::uint32_t floor_epoch = 1;
+  bool lists_floor = false;  ///< among the bodies that may jump
 
  private:
   double stiffness_;  ///< [N/m]

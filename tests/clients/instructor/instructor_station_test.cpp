@@ -68,6 +68,7 @@ class StuckPart {
     manifold.hand = kHand;
     manifold.server_epoch = 1;
     manifold.tick = tick_;
+    manifold.answers_seq = static_cast<std::uint32_t>(tick_);
     manifold.object = kPointer;
     manifold.object_epoch = 1;
     manifold.X_WO = tick_ == 1 ? X_WH : pointer_;

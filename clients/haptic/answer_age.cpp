@@ -1,0 +1,26 @@
+#include "clients/haptic/answer_age.h"
+
+#include <algorithm>
+
+namespace tenon::haptic {
+
+void AnswerAge::step(std::uint32_t seq, std::uint32_t answered, double dt) noexcept {
+  now_ += dt;
+  reads_[seq % kRing] = {seq, now_};
+  if (now_ - window_began_ > kWindow) {
+    delays_ = {kNever, delays_[0]};
+    window_began_ = now_;
+  }
+  if (answered == answered_) return;
+  answered_ = answered;
+  const Read& read = reads_[answered % kRing];
+  answered_read_at_ = read.seq == answered ? read.at : -kNever;
+  delays_[0] = std::min(delays_[0], age());
+}
+
+double AnswerAge::excess() const noexcept {
+  const double delay = std::min({delays_[0], delays_[1], kLongestDelay});
+  return std::max(0.0, age() - 2.0 * delay);
+}
+
+}  // namespace tenon::haptic

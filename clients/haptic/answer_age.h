@@ -1,0 +1,45 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+
+namespace tenon::haptic {
+
+/// Age of the server's answers on the station's own clock: time since the station read the input from which
+/// the newest answer was computed. A source that needs the server is as old as that, however late or often
+/// its messages arrive.
+///
+/// Threads: one. Real-time: everything.
+class AnswerAge {
+ public:
+  /// One cycle, `dt` [s] after the last one: input `seq` is read now. `answered` is the input that the newest
+  /// answer names; one that this station has not read within the last kRing cycles has no known age.
+  void step(std::uint32_t seq, std::uint32_t answered, double dt) noexcept;
+
+  /// [s] infinite before the first answer.
+  [[nodiscard]] double age() const noexcept { return now_ - answered_read_at_; }
+  /// [s] age beyond what the link explains: twice its delay, which is the smallest age of an answer in the
+  /// last seconds, at most kLongestDelay.
+  [[nodiscard]] double excess() const noexcept;
+  [[nodiscard]] std::uint32_t answered() const noexcept { return answered_; }
+
+  static constexpr double kLongestDelay = 0.15;  ///< [s] a longer one is no link to render contacts by
+
+ private:
+  static constexpr std::size_t kRing = 1024;
+  static constexpr double kWindow = 2.0;  ///< [s] each of two, in which the delay of the link is the smallest
+  static constexpr double kNever = std::numeric_limits<double>::infinity();  ///< [s]
+  struct Read {
+    std::uint32_t seq = 0;
+    double at = -kNever;  ///< [s]
+  };
+  std::array<Read, kRing> reads_{};    ///< by seq modulo its size
+  double now_ = 0.0;                   ///< [s] sum of dt
+  double answered_read_at_ = -kNever;  ///< [s]
+  std::uint32_t answered_ = 0;
+  double window_began_ = 0.0;                     ///< [s]
+  std::array<double, 2> delays_{kNever, kNever};  ///< [s] of this window and of the last one
+};
+
+}  // namespace tenon::haptic

@@ -1,0 +1,223 @@
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "clients/haptic/answer_age.h"
+#include "clients/haptic/bracelet.h"
+#include "devices/safety_rules.h"
+#include "devices/simulated/hug.h"
+#include "devices/simulated/sigma7.h"
+#include "devices/simulated/vibrotac.h"
+#include "tests/clients/haptic/hand_above_floor.h"
+
+// The rules of docs/safety.md at the loop of a hand, which every force of a station comes from.
+
+namespace tenon::haptic {
+namespace {
+
+using devices::DeviceFault;
+using devices::SafetyRule;
+using test::HandAboveFloor;
+
+std::unique_ptr<devices::SimulatedDevice> opened(const devices::SimulatedModel& model) {
+  auto device = std::make_unique<devices::SimulatedDevice>(model, 1);
+  EXPECT_TRUE(device->open());
+  return device;
+}
+
+/// What is called of a device, in order.
+class RecordingDevice final : public devices::HapticDevice {
+ public:
+  explicit RecordingDevice(const devices::DeviceCaps& caps) : caps_(caps) {}
+  [[nodiscard]] const devices::DeviceCaps& caps() const override { return caps_; }
+  [[nodiscard]] Result<void> arm() override {
+    calls.emplace_back("arm");
+    state.forces_on = true;
+    return {};
+  }
+  void disarm() noexcept override {
+    calls.emplace_back("disarm");
+    state.forces_on = false;
+  }
+  [[nodiscard]] Result<void> resetFault() override {
+    calls.emplace_back("reset");
+    state.fault = DeviceFault::kNone;
+    return {};
+  }
+  void read(devices::DeviceState& out) noexcept override { out = state; }
+  void write(const devices::DeviceCommand& command) noexcept override {
+    if (!state.forces_on) return;
+    calls.emplace_back(command.brake ? "brake" : "write");
+  }
+
+  devices::DeviceState state;
+  std::vector<std::string> calls;
+
+ private:
+  devices::DeviceCaps caps_;
+};
+
+struct RecordedHand {
+  explicit RecordedHand(const devices::DeviceCaps& caps) : device(caps), hand(device) {
+    EXPECT_TRUE(hand.begin(test::kHand, ClientId{1}, Vector3::Zero(), true));
+    step();
+    device.calls.clear();
+  }
+  void step() { hand.step(++seq, world, kTickSeconds); }
+
+  RecordingDevice device;
+  HapticHand hand;
+  WorldView world;
+  std::uint32_t seq = 0;
+};
+
+TEST(HandSafety, AStopBrakesTheDeviceBeforeItSwitchesTheForcesOff) {
+  RecordedHand setup(devices::sigma7Model().caps);
+  setup.hand.permitForces(false);
+  setup.step();
+  EXPECT_THAT(setup.device.calls, testing::ElementsAre("brake", "disarm"));
+}
+
+TEST(HandSafety, AnOpenClutchBrakesTheDeviceBeforeItSwitchesTheForcesOff) {
+  RecordedHand setup(devices::hugArmModel().caps);
+  setup.device.state.F_Ho_D_measured.force = {81.0, 0.0, 0.0};
+  setup.step();
+  EXPECT_THAT(setup.device.calls, testing::ElementsAre("brake", "disarm"));
+}
+
+TEST(HandSafety, TheLoopNeitherArmsNorResetsADevice) {
+  RecordedHand setup(devices::sigma7Model().caps);
+  setup.device.state.fault = DeviceFault::kVelocity;
+  setup.device.state.forces_on = false;
+  setup.step();
+  setup.hand.permitForces(true);  // the person at the device has pressed
+  setup.step();
+  EXPECT_TRUE(setup.device.calls.empty()) << "left to whoever may block";
+  EXPECT_FALSE(setup.hand.input().active);
+  ASSERT_TRUE(setup.hand.armDevice());
+  EXPECT_THAT(setup.device.calls, testing::ElementsAre("reset", "arm"));
+  setup.step();
+  EXPECT_TRUE(setup.hand.input().active);
+  EXPECT_THAT(setup.device.calls, testing::ElementsAre("reset", "arm", "write"));
+}
+
+TEST(HandSafety, APressWithoutAFaultDoesNotInterruptTheForces) {
+  RecordedHand setup(devices::sigma7Model().caps);
+  setup.hand.permitForces(true);
+  setup.step();
+  ASSERT_TRUE(setup.hand.armDevice());
+  EXPECT_THAT(setup.device.calls, testing::ElementsAre("write"));
+}
+
+TEST(HandSafety, AReleasedDeadManSwitchTakesTheForceAndTheHandAway) {
+  devices::SimulatedModel model = devices::sigma7Model();
+  model.caps.dead_man = 1U << 2U;
+  HandAboveFloor setup(opened(model));
+  setup.arm().setButtons(1U << 2U);
+  for (int i = 0; i < 3000; ++i) setup.step(Vector3(0.0, 0.0, -0.01));
+  ASSERT_GT(setup.force(), 1.0);
+  setup.arm().setButtons(1U);  // another one does not count
+  setup.step(Vector3(0.0, 0.0, -0.01));
+  setup.step(Vector3(0.0, 0.0, -0.01));
+  EXPECT_EQ(setup.force(), 0.0);
+  EXPECT_FALSE(setup.hand.input().active);
+  EXPECT_TRUE(setup.hand.state().safety_flags & devices::bit(SafetyRule::kDeadMan));
+}
+
+//   |<- 57 mm wall, armed 2 mm beyond its edge
+TEST(HandSafety, TheEndOfTheWorkspaceRampsAfterArming) {
+  RecordedHand setup(devices::sigma7Model().caps);
+  setup.hand.permitForces(false);
+  setup.step();
+  setup.device.state.X_DH.translation() = {0.059, 0.0, 0.0};
+  setup.hand.permitForces(true);
+  ASSERT_TRUE(setup.hand.armDevice());
+  double last = 0.0;
+  for (int i = 0; i < 1000; ++i) {
+    setup.step();
+    const double now = setup.hand.state().F_Ho_W.force.norm();
+    ASSERT_LE(now - last, 0.020 + 1e-9) << i;
+    last = now;
+  }
+  EXPECT_NEAR(last, 2.0, 0.05);
+}
+
+TEST(HandSafety, TheAgeOfContactsIsThatOfTheInputTheyAnswerHoweverOftenTheyArrive) {
+  HandAboveFloor setup("sigma7-sim");
+  for (int i = 0; i < 3000; ++i) setup.step(Vector3(0.0, 0.0, -0.01));
+  ASSERT_GT(setup.force(), 1.0);
+  HandManifold repeated = setup.server.manifold(setup.tick, setup.hand.pose());
+  const double age = setup.hand.contactAge();
+  EXPECT_LT(age, 0.003);
+  for (int i = 0; i < 150; ++i) {
+    repeated.tick = setup.tick + 1;  // a server that runs and does not hear the station
+    setup.hand.receive(repeated);
+    setup.cycle();
+  }
+  EXPECT_NEAR(setup.hand.contactAge(), age + 0.150, 0.002);
+  EXPECT_EQ(setup.force(), 0.0);
+  EXPECT_TRUE(setup.hand.state().safety_flags & devices::bit(SafetyRule::kStale));
+  EXPECT_NEAR(setup.hand.state().manifold_age, 150, 4);
+}
+
+TEST(HandSafety, TheAgeOfContactsCountsTheTimeThatACycleTook) {
+  HandAboveFloor setup("sigma7-sim");
+  for (int i = 0; i < 3000; ++i) setup.step(Vector3(0.0, 0.0, -0.01));
+  ASSERT_GT(setup.force(), 1.0);
+  setup.cycle(0.200);
+  EXPECT_NEAR(setup.hand.contactAge(), 0.200, 0.003);
+  EXPECT_EQ(setup.force(), 0.0);
+}
+
+TEST(AnswerAge, ALinksOwnDelayIsNoGap) {
+  AnswerAge age;
+  for (std::uint32_t seq = 1; seq <= 3000; ++seq) age.step(seq, seq > 60 ? seq - 60 : 0, 1e-3);
+  EXPECT_NEAR(age.age(), 0.060, 1e-9);
+  EXPECT_EQ(age.excess(), 0.0);
+  for (std::uint32_t seq = 3001; seq <= 3090; ++seq) age.step(seq, 2940, 1e-3);
+  EXPECT_NEAR(age.excess(), 0.030, 1e-9) << "150 ms, of which twice the delay is the link's";
+  age.step(3091, 77777, 1e-3);
+  EXPECT_TRUE(std::isinf(age.age())) << "an answer to what this station never asked";
+}
+
+TEST(Bracelet, VibratesAsLongAsItsContactsAreFreshAndNoStopSilencesIt) {
+  devices::Vibrotac device;
+  Bracelet bracelet(device, {});
+  ASSERT_TRUE(bracelet.begin(test::kHand, true));
+  HandManifold pressed;
+  pressed.hand = test::kHand;
+  ManifoldContact contact;
+  contact.p_BoP_B = Vector3f(0.0F, 0.0F, 0.04F);
+  contact.gap = -0.004F;
+  pressed.contacts.push_back(contact);
+  std::uint32_t seq = 0;
+  const auto run = [&](int ticks, bool answered) {
+    for (int i = 0; i < ticks; ++i) {
+      pressed.tick = seq;
+      pressed.answers_seq = seq;
+      if (answered) bracelet.receive(pressed);
+      bracelet.step(++seq, kTickSeconds);
+    }
+    return bracelet.intensities()[0];
+  };
+  const int fresh = run(200, true);
+  EXPECT_GT(fresh, 100);
+  EXPECT_GT(device.amplitudes()[0], 0.3);
+  const int fading = run(60, false);
+  EXPECT_LT(fading, fresh);
+  EXPECT_GT(fading, 0);
+  EXPECT_EQ(run(60, false), 0) << "aged out";
+  EXPECT_GT(run(200, true), 100);
+  bracelet.permit(false);
+  EXPECT_EQ(run(1, true), 0);
+  run(400, true);
+  EXPECT_LT(device.amplitudes()[0], 0.01);
+  bracelet.permit(true);
+  ASSERT_TRUE(bracelet.armDevice());
+  EXPECT_GT(run(200, true), 100);
+}
+
+}  // namespace
+}  // namespace tenon::haptic

@@ -1,0 +1,93 @@
+"""Safety at the hand through real processes: what a device displays after its server stood still, from the recording of the session."""
+import ctypes
+import ctypes.util
+import signal
+import struct
+import time
+import unittest
+from pathlib import Path
+
+from stage import Stage
+
+ZSTD = ctypes.CDLL(ctypes.util.find_library("zstd") or "libzstd.so.1")
+
+
+def records(data):
+    """Kind and body of each record of an MCAP file, chunks opened."""
+    at = 0
+    while at + 9 <= len(data):
+        kind, length = struct.unpack_from("<BQ", data, at)
+        body = data[at + 9:at + 9 + length]
+        at += 9 + length
+        if kind != 6:
+            yield kind, body
+            continue
+        size, name = struct.unpack_from("<Q", body, 16)[0], struct.unpack_from("<I", body, 28)[0]
+        packed = body[32 + name + 8:]
+        if name:
+            raw = ctypes.create_string_buffer(size)
+            assert ZSTD.ZSTD_decompress(raw, ctypes.c_size_t(size), packed, ctypes.c_size_t(len(packed))) == size
+            packed = raw.raw
+        yield from records(packed)
+
+
+def hand_states(recording):
+    """Of each hand: (step of its station, displayed force [N], age of its contacts [ms]) from HandState_100, in order."""
+    channels, hands = {}, {}
+    for kind, body in records(Path(recording).read_bytes()[8:]):
+        if kind == 4:
+            size = struct.unpack_from("<I", body, 4)[0]
+            channels[struct.unpack_from("<H", body)[0]] = body[8:8 + size].decode()
+        if kind != 5 or channels[struct.unpack_from("<H", body)[0]] != "HandState_100":
+            continue
+        message = body[22 + 4:]  # a message's header, and that of CDR
+        hand, seq = struct.unpack_from("<II", message)
+        force = struct.unpack_from("<3d", message, 144)
+        hands.setdefault(hand, []).append((seq, sum(x * x for x in force) ** 0.5, struct.unpack_from("<I", message, 192)[0]))
+    return hands
+
+
+class ForceReturn(unittest.TestCase):
+    # The trainee touches, inserts and pushes for some 15 s. Whenever it does so, the server may stop.
+    def test_after_a_server_that_stood_still_the_force_is_not_above_what_it_was_and_grows_slowly(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve("peg_and_box", "--wait-for", "right")
+            recorder = stage.start("record", "-o", stage.out / "session.mcap")
+            trainee = stage.start("trainee", "--seed", 1, "--wait", 120)
+            server.wait_for("run: running", 120)
+            for _ in range(20):
+                time.sleep(1.7)
+                if server.popen.poll() is not None:
+                    break
+                server.signal(signal.SIGSTOP)
+                time.sleep(0.3)
+                server.signal(signal.SIGCONT)
+            server.wait_for("everything is mounted", 240)
+            self.assertEqual(server.wait(60), 0, server.text())
+            self.assertEqual(trainee.wait(60), 0, trainee.text())
+            recorder.wait(60)
+            returns = [judged for states in hand_states(stage.out / "session.mcap").values() for judged in self.returns(states)]
+        self.assertTrue(returns, "no stop of the server met a hand in contact")
+
+    def returns(self, states):
+        """Judges what follows each gap of a hand that felt a force; yields that force."""
+        for i in range(1, len(states)):
+            seq, _, age = states[i]
+            if not (states[i - 1][2] > 150 and age < 50):
+                continue  # not the end of a gap
+            before = [force for s, force, a in states[:i] if a < 10 and seq - 1500 < s]
+            if not before or before[-1] < 1.0:
+                continue
+            last = None
+            for s, force, a in states[i:]:
+                if s > seq + 900 or a > 20:
+                    break
+                self.assertLessEqual(force, max(before[-1], 3.0) + 0.1, f"{s - seq} ms after a gap that ended at step {seq}")
+                if last:  # steps take 1 ms, and count as 2 ms at most
+                    self.assertLessEqual(force - last[1], 20.0 * 0.002 * (s - last[0]) + 0.02, f"step {s}")
+                last = (s, force)
+            yield before[-1]
+
+
+if __name__ == "__main__":
+    unittest.main()
