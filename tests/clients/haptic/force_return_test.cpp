@@ -219,6 +219,19 @@ TEST(ForceReturnOffset, IsSentAndDecaysOutOfContactAlone) {
   EXPECT_LT(last, 1e-3);
 }
 
+TEST(ForceReturnOffset, StaysInContact) {
+  RestingHand setup("sigma7-sim");
+  for (int i = 0; i < 300; ++i) setup.hold(false);
+  for (int i = 0; i < 1500; ++i) setup.hold(true);
+  const Vector3 offset = setup.hand.workspace().shifted();
+  EXPECT_GT(offset.z(), 0.002);
+  for (int i = 0; i < 1000; ++i) {
+    setup.hold(true);
+    ASSERT_TRUE(setup.hand.inContact());
+    ASSERT_EQ(setup.hand.workspace().shifted(), offset);
+  }
+}
+
 TEST(ForceReturnOffset, IsNotFeltInFreeMotion) {
   HandAboveFloor setup("sigma7-sim");
   for (int i = 0; i < 500; ++i) setup.step(Vector3(0.0, 0.0, 0.03));
