@@ -48,24 +48,23 @@ def hand_states(recording):
 
 
 class ForceReturn(unittest.TestCase):
-    # The trainee touches, inserts and pushes for some 15 s. Whenever it does so, the server may stop.
+    # The trainee touches for a second and inserts for ten. Whenever it does so, the server may stop.
     def test_after_a_server_that_stood_still_the_force_is_not_above_what_it_was_and_grows_slowly(self):
         with Stage(lockstep=False) as stage:
             server = stage.serve("peg_and_box", "--wait-for", "right")
             recorder = stage.start("record", "-o", stage.out / "session.mcap")
             trainee = stage.start("trainee", "--seed", 1, "--wait", 120)
             server.wait_for("run: running", 120)
-            for _ in range(20):
+            for _ in range(8):
                 time.sleep(1.7)
                 if server.popen.poll() is not None:
                     break
                 server.signal(signal.SIGSTOP)
                 time.sleep(0.3)
                 server.signal(signal.SIGCONT)
-            server.wait_for("everything is mounted", 240)
-            self.assertEqual(server.wait(60), 0, server.text())
-            self.assertEqual(trainee.wait(60), 0, trainee.text())
-            recorder.wait(60)
+            for process in (trainee, server, recorder):
+                process.signal(signal.SIGTERM)
+                process.wait(60)
             returns = [judged for states in hand_states(stage.out / "session.mcap").values() for judged in self.returns(states)]
         self.assertTrue(returns, "no stop of the server met a hand in contact")
 

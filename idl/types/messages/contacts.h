@@ -60,8 +60,8 @@ struct HandManifold {
   bool frozen = false;  ///< the object is held still: stale input, pause or emergency stop
   FixedVector<HandPull, kOtherPulls> others;  ///< other hands that hold the object, by HandId
   FixedVector<ManifoldContact, kManifoldContacts> contacts;
-  /// Reserved, empty: the moving bodies of `contacts`, so that a station knows of their jumps as it does by
-  /// object_epoch of the held object's
+  /// The bodies of `contacts`, those with the smallest gaps, so that a station knows of their jumps as it
+  /// does by object_epoch of the held object's
   FixedVector<ManifoldBody, kManifoldBodies> bodies;
 };
 
@@ -74,11 +74,11 @@ struct PairContact {
   std::uint32_t contacts = 0;      ///< listed points that touch
   Wrench F_Ao_W;                   ///< wrench of b on a, about a's origin
   Vector3 p_WP = Vector3::Zero();  ///< [m] mean of the contact points
-  double depth = 0.0;         ///< [m] penetration depth of the deepest point in the field, 0 when apart
-  double gap = 0.0;           ///< [m] smallest signed gap to the dilated surface
-  double load_percent = 0.0;  ///< [%] computational load (paper eq. 2)
-  double peak_force = 0.0;    ///< [N] since the last sample of this topic
-  double peak_depth = 0.0;    ///< [m] since the last sample of this topic
+  double depth = 0.0;              ///< [m] penetration depth of the deepest point in the field, 0 when apart
+  double gap = 0.0;                ///< [m] smallest signed gap to the dilated surface
+  double load_percent = 0.0;       ///< [%] computational load (paper eq. 2)
+  double peak_force = 0.0;         ///< [N] since the last sample of this topic
+  double peak_depth = 0.0;         ///< [m] since the last sample of this topic
 };
 
 inline constexpr int kPairsPerSample = 6;

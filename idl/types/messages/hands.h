@@ -40,7 +40,7 @@ struct HandState {
   Vector3 p_WC = Vector3::Zero();         ///< [m] as in DeviceInput
   Pose X_WO_local;                        ///< proxy pose of the local model; not used by the simulation
   Wrench F_Ho_W;                          ///< wrench displayed on the hand, about its origin
-  std::uint32_t manifold_age = 0;         ///< [ticks] since its manifold was received
+  std::uint32_t manifold_age = 0;         ///< [ticks] since the input that its contacts answer
   std::uint32_t safety_flags = 0;         ///< bit per active rule of devices/safety.h
   bool indexing = false;                  ///< the centre of the workspace is moving (paper eq. 1)
   std::array<std::uint8_t, 6> tactors{};  ///< intensities of a vibrotactile bracelet, 0..255

@@ -124,6 +124,10 @@ TEST(Manifold, ContainsTheVelocityOfTheOtherBody) {
     EXPECT_NEAR(contact.velocity_W.x(), -0.2, 0.01);
     EXPECT_NEAR(contact.velocity_W.tail<2>().norm(), 0.0, 0.01);
   }
+  ASSERT_EQ(manifold.bodies.size(), 1U);
+  EXPECT_EQ(manifold.bodies[0].object, cube);
+  EXPECT_EQ(manifold.bodies[0].epoch, environment.objects()[cube.value].epoch);
+  EXPECT_GT(manifold.bodies[0].epoch, 0U);
 }
 
 //   <> <>   a bar beside the end of another one: their edges pass each other, and cross when the hand goes
