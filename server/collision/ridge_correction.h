@@ -25,4 +25,11 @@ namespace tenon::collision {
 void correctRidges(const LaneFrame& frame, const QueryKernels& kernels, const PointLanes& points,
                    std::span<SampleLanes> samples, SampleSums& sums) noexcept;
 
+/// The field at P in the frame of its mesh, with ridge correction inside: what a query that corrects ridges
+/// has for a point there.
+///
+/// Threads: pure. Real-time.
+[[nodiscard]] structures::FieldSample correctedSample(const structures::DistanceField& field,
+                                                      const Vector3& p_MP) noexcept;
+
 }  // namespace tenon::collision
