@@ -145,7 +145,7 @@ class Lockstep(DemoCase):
 class LockstepNightly(DemoCase):
     def test_the_recording_of_the_engine_bay_is_complete(self):
         engine_bay = SOURCE / "scenarios" / "engine_bay"
-        done = tenon(*self.words("--scenario", engine_bay, "--lockstep"), timeout=1700)
+        done = tenon(*self.words("--scenario", engine_bay, "--detail", 0.12, "--lockstep"), timeout=1700)
         self.assertEqual(done.returncode, 0, done.stdout[-3000:] + done.stderr)
         self.assert_recorded_as_published(engine_bay, self.folder / "out", manifolds_a_tick=5)
 
