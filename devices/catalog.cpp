@@ -38,14 +38,14 @@ struct CatalogEntry {
 };
 
 constexpr std::array kDevices{
-    CatalogEntry<OpenedDevice>{"sigma7-sim", openSimulated<sigma7Model>},
+    CatalogEntry<OpenedDevice>{kInstructorDevice, openSimulated<sigma7Model>},
     CatalogEntry<OpenedDevice>{"omega3-sim", openSimulated<omega3Model>},
     CatalogEntry<OpenedDevice>{"falcon-sim", openSimulated<falconModel>},
     CatalogEntry<OpenedDevice>{"vibrotac-sim", openVibrotac},
 };
 
 constexpr std::array kBimanualDevices{
-    CatalogEntry<OpenedBimanual>{"hug-sim", openHug},
+    CatalogEntry<OpenedBimanual>{kTraineeDevice, openHug},
 };
 
 template <typename Table>

@@ -9,6 +9,10 @@
 
 namespace tenon::devices {
 
+/// What stations open unless they are told otherwise; names of the catalog.
+inline constexpr std::string_view kTraineeDevice = "hug-sim";
+inline constexpr std::string_view kInstructorDevice = "sigma7-sim";
+
 /// Opens a device of the catalog by name; a new device is one line in catalog.cpp. An unknown name fails with
 /// a message that lists the known ones. `seed` varies the parameters of a simulated device; a real device
 /// ignores it.

@@ -13,9 +13,9 @@ from pathlib import Path
 USAGE = "//@topic NAME stream|state|event [PARAMETER...]"
 CLASSES = {"stream": "kStream", "state": "kState", "event": "kEvent"}
 TIMES = ("deadline", "lease", "lifespan")
-FLAGS = ("lease_by_topic", "latched")
-MEMBERS = ("deadline", "lease", "lease_by_topic", "lifespan", "late_joiner_depth", "latched")  # of TopicParameters
-PARAMETERS = "deadline=10ms, lease=1000ms, lifespan=5000ms, late_joiner_depth=1000, lease_by_topic or latched"
+FLAGS = ("lease_by_topic", "latched", "of_server")
+MEMBERS = ("deadline", "lease", "lease_by_topic", "lifespan", "late_joiner_depth", "latched", "of_server")  # of TopicParameters
+PARAMETERS = "deadline=10ms, lease=1000ms, lifespan=5000ms, late_joiner_depth=1000, lease_by_topic, latched or of_server"
 
 
 class Fault(Exception):

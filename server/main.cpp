@@ -7,13 +7,14 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "devices/catalog.h"
 #include "idl/types/output_files.h"
+#include "idl/wire/identity.h"
 #include "server/check/check.h"
 #include "server/session/journal.h"
 #include "server/session/loading_display.h"
 #include "server/session/renamed_options.h"
 #include "server/session/session_server.h"
+#include "server/session/stop_file.h"
 
 namespace {
 
@@ -27,6 +28,7 @@ struct ServeArguments {
   std::string scenario;
   tenon::session::SessionOptions session;
   tenon::session::LoadOptions load{.cache = tenon::session::defaultCache()};
+  std::filesystem::path key_file;
   std::string resimulate;      ///< journal or recording; empty: open a session
   bool states_detail = false;  ///< --detail is given
   bool despite_changes = false;
@@ -40,7 +42,7 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
   app.add_option("--session", arguments.session.name, "name by which clients find it")->capture_default_str();
   app.add_option("--domain", arguments.session.domain, "DDS domain, 0 to 230")->check(CLI::Range(0, 230));
   app.add_option("--detail", arguments.load.detail,
-                 "mesh resolution of generated parts, 0 to 1; 1: 1.8 million triangles")
+                 "mesh resolution of generated parts, 0 to 1; 1: that of the paper")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--cache", arguments.load.cache, "folder for generated parts and haptic structures");
@@ -70,6 +72,10 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
   app.add_option("--journal", arguments.session.journal,
                  "record the inputs of each tick, and a checkpoint a second, in this file");
   app.add_flag("--overwrite", arguments.overwrite, tenon::kOverwriteHelp);
+  app.add_option(
+      "--key", arguments.key_file,
+      "file of the key that admins and instructors need; made when it does not exist (default: one "
+      "in your runtime folder, which your own programs find)");
   app.add_flag("--lockstep", arguments.session.lockstep,
                "a tick waits for the inputs of all hands instead of the clock: repeatable to the last bit");
   app.add_option(
@@ -105,13 +111,7 @@ void showLoading(std::string_view activity, double fraction) {
 
 /// Says what is wrong with the scenario, as `tenon check` does for the devices that stations open by default.
 void printProblems(const tenon::session::LoadedScene& loaded) {
-  tenon::check::CheckOptions options;
-  if (const auto caps = tenon::devices::capsOf("hug-sim"))
-    options.trainee = {"hug-sim", caps->rotation_range};
-  if (const auto caps = tenon::devices::capsOf("sigma7-sim"))
-    options.instructor = {"sigma7-sim", caps->rotation_range};
-  const auto findings = tenon::check::checkScene(*loaded.scenario, *loaded.scene, options);
-  for (const std::string& line : tenon::check::problemLines(*loaded.scenario, findings)) printLine(line);
+  for (const std::string& line : tenon::check::problems(*loaded.scenario, *loaded.scene)) printLine(line);
 }
 
 /// Reports what has changed since the recording; true when that forbids the re-simulation.
@@ -176,6 +176,16 @@ int serve(ServeArguments& arguments) {
   if (!arguments.resimulate.empty()) return resimulateFile(arguments, *loaded);
   printProblems(*loaded);
 
+  for (const std::string& sentence : tenon::session::thinWallReport(*loaded->scene)) printLine(sentence);
+  const auto runtime = tenon::wire::runtimeFolder();
+  if (!runtime && arguments.key_file.empty())
+    return reportError(runtime.error().what + "; or name a file with --key");
+  const auto key =
+      tenon::wire::readOrMakeKeyFile(arguments.key_file.empty() ? *runtime / "key" : arguments.key_file);
+  if (!key) return reportError(key.error().what);
+  arguments.session.key = *key;
+  arguments.session.stop_file =
+      tenon::session::defaultStopFile(arguments.session.domain, arguments.session.name);
   arguments.session.print = printLine;
   arguments.session.detail = arguments.load.detail;
   auto server = tenon::session::SessionServer::open(*loaded, arguments.session);

@@ -28,7 +28,7 @@ DECIDES = ["server/structures", "server/bake", "server/collision", "server/simul
 ROOMS = {
     "idl/types": ("tenon", [], ["expected"]),
     "idl/threads": ("tenon::threads", ["idl/types"], ["POSIX"]),
-    "idl/wire": ("tenon::wire", ["idl/types", "idl/threads"], ["DDS", "POSIX"]),
+    "idl/wire": ("tenon::wire", ["idl/types", "idl/threads"], ["DDS", "libsodium", "POSIX"]),
     "idl/record": ("tenon::record", ["idl/types"], ["zstd", "POSIX"]),
     "server/structures": ("tenon::structures", ["idl/types"], ["xxHash", "POSIX"]),
     "server/bake": ("tenon::bake", ["idl/types", "server/structures"], ["assimp", "OctoMap", "xxHash", "POSIX"]),
@@ -37,16 +37,16 @@ ROOMS = {
                           ["Bullet"]),
     "server/game_control": ("tenon::game_control", ["idl/types", "server/structures", "server/simulation"], ["yaml-cpp", "fmt"]),
     "server/check": ("tenon::check", ["idl/types", "server/structures", "server/collision", "server/simulation",
-                                      "server/game_control"], ["fmt"]),
+                                      "server/game_control", "devices"], ["fmt"]),  # devices: their catalog, for limits
     "server/session": ("tenon::session", IDL + DECIDES, ["fmt", "POSIX"]),
     # the limits of devices, asked of their catalog, are what a check is made against
     "server/tools": ("tenon::tools", ["idl/types"] + DECIDES + ["server/check", "server/session", "devices"],
                      ["fmt", "CLI11", "JSON", "POSIX"]),
-    "server": ("tenon::session", IDL + DECIDES + ["server/check", "server/session", "devices"], ["fmt", "CLI11"]),
+    "server": ("tenon::session", IDL + DECIDES + ["server/check", "server/session"], ["fmt", "CLI11"]),
     "devices": ("tenon::devices", ["idl/types", "idl/threads", "devices/simulated", "devices/drivers"], []),
     "devices/simulated": ("tenon::devices", ["idl/types", "idl/threads", "devices"], []),
     "devices/drivers": ("tenon::devices", ["idl/types", "idl/threads", "devices"], ["POSIX"]),
-    "clients/haptic": ("tenon::haptic", IDL + ["devices", "server/structures", "server/collision"], ["CLI11"]),
+    "clients/haptic": ("tenon::haptic", IDL + ["devices", "server/structures", "server/collision"], ["CLI11", "POSIX"]),
     "clients/simulated_person": ("tenon::simulated_person", STATION, []),
     "clients/trainee": ("tenon::trainee", STATION + ["devices/simulated", "clients/simulated_person"], []),
     "clients/instructor": ("tenon::instructor", STATION + ["devices/simulated", "clients/simulated_person"], []),
@@ -67,13 +67,13 @@ NOT_INCLUDED = {EXCEPTION, "server", "server/tools", "tests"}
 LIBRARIES = {
     "expected": r"tl/expected\.hpp$", "DDS": r"(dds/|ddsc/|org/eclipse/cyclonedds/|tenon\.h$)", "zstd": r"(zstd|zstd_\w+|zdict)\.h$",
     "Highway": r"hwy/", "xxHash": r"xxh(ash|3)\.h$", "assimp": r"assimp/", "OctoMap": r"octomap/",
-    "yaml-cpp": r"yaml-cpp/", "fmt": r"fmt/", "CLI11": r"CLI/", "JSON": r"nlohmann/", "PNG": r"png\.h$",
+    "libsodium": r"sodium(\.h$|/)", "yaml-cpp": r"yaml-cpp/", "fmt": r"fmt/", "CLI11": r"CLI/", "JSON": r"nlohmann/", "PNG": r"png\.h$",
     "Bullet": r"(bullet/|btBullet|Bullet|LinearMath/)", "Eigen": r"Eigen/",
     "POSIX": r"((sys|arpa|netinet|net|linux)/|(unistd|fcntl|poll|termios|spawn|pthread|sched|signal|time|dirent|dlfcn|errno|semaphore)\.h$)",
 }
 # a library, or a part of a room, that one file of the room alone may include
 ONE_FILE = {"Bullet": "server/simulation/rigid_body.cpp", "OctoMap": "server/bake/octree_file.cpp",
-            "assimp": "server/bake/import_child.cpp",
+            "assimp": "server/bake/import_child.cpp", "libsodium": "idl/wire/identity.cpp",
             "devices/simulated": "devices/catalog.cpp", "devices/drivers": "devices/catalog.cpp"}
 # made at build time, so not in the tree; their room alone includes them
 GENERATED = {"tenon.h": "idl/wire", "idl/wire/topic_list.h": "idl/wire"}
@@ -104,13 +104,13 @@ version""".split())
 UNITS = {
     # the stages of one bake; bake.h has their options and results
     "server/bake/bake": "server/bake/{brick_level,exposed_surface,face_sides,feature_bake,field_bake,field_size,flood,narrow_gaps,"
-                        "outside,parallel,shell_bake,slope_limit,welded_mesh}",
+                        "outside,parallel,refined_bricks,shell_bake,slope_limit,thin_bricks,thin_places,triangle_pieces,"
+                        "welded_mesh}",
     "server/collision/pair_query": "server/collision/{contact_blocks,contact_reducer,query_kernels,ridge_correction,*_lanes_inl}",
     "server/collision/island_solver": "server/collision/island_*",
     "server/collision/motion_solver": "server/collision/motion_workspace",
     "server/structures/pointshell": "server/structures/level_areas",
     "server/simulation/environment": "server/simulation/{engine,environment_*}",
-    "server/check/check": "server/check/{overlaps,scene_checks,sizes,targets,turns}",
     "server/game_control/scenario": "server/game_control/{condition_reader,named_values,scenario_*,yaml_reader}",
 }
 

@@ -55,7 +55,7 @@ tenon_tests(server/bake LINK server_bake scenarios_part_generator)  # a scene wh
 tenon_tests(server/collision LINK server_collision server_bake scenarios_part_generator)  # baked parts, beside their meshes
 tenon_tests(idl/wire LINK idl_wire)  # the bus's own threads are Cyclone's, which no sanitizer of ours can see into
 tenon_tests(idl/threads THREADS LINK idl_threads)
-tenon_tests(server/simulation THREADS LINK server_simulation)
+tenon_tests(server/simulation THREADS LINK server_simulation server_bake scenarios_part_generator)  # parts with edges
 tenon_tests(server/session THREADS LINK server_session clients_haptic)  # a session and its station
 tenon_tests(clients/haptic THREADS LINK clients_haptic server_simulation)  # two stations and their server in one process
 foreach(target server_bake_tests server_collision_tests server_session_tests)
@@ -77,7 +77,7 @@ set_tests_properties(rehearsal.short PROPERTIES TIMEOUT 900 LABELS "gate;rehears
 add_dependencies(threaded_tests tenon-rehearse tenon-parts tenon-bake)
 
 # scripts that run the programs as people do; alone those that measure against the clock
-set(quiet_scripts session_test faults_test)
+set(quiet_scripts session_test faults_test trust_test)
 file(GLOB scripts CONFIGURE_DEPENDS tests/system/*_test.py)
 foreach(script ${scripts})
   get_filename_component(name ${script} NAME_WE)

@@ -1,5 +1,6 @@
 #include "clients/command/command_program.h"
 
+#include <cstdio>
 #include <utility>
 
 #include "idl/types/messages/steps.h"
@@ -10,6 +11,8 @@ namespace {
 
 using std::chrono::milliseconds;
 constexpr std::chrono::seconds kPatience{5};  // for an answer
+constexpr milliseconds kSoon{1000};           // for a server to repeat an emergency stop, at the keys
+constexpr milliseconds kForAServer{3000};     // likewise, discovery included
 constexpr milliseconds kResend{500};          // an answer sent before our reader was matched is lost
 
 /// Dispatches until `done`; false when that does not happen in time.
@@ -21,6 +24,15 @@ bool dispatchUntil(wire::Inbox& inbox, const std::atomic<bool>& stop,
     inbox.dispatch(milliseconds(20));
   }
   return true;
+}
+
+std::string reasonOf(const ParsedCommand& command) {
+  return command.text.empty() ? "requested" : command.text;
+}
+
+std::string withoutServer(const StopHeard& heard) {
+  return "sent to " + std::to_string(heard.programs) +
+         " programs; no server has answered: it may hang or have ended";
 }
 
 }  // namespace
@@ -41,17 +53,10 @@ Result<void> CommandClient::connect(const Stop& stop) {
   wire::Partition& session = member_->session();
   Result<void> all = member_->watch(inbox_);
   if (all) all = openInto(commands_, session, wire::kCommand);
-  if (all) all = openInto(stops_, session, wire::kEmergencyStop);
   if (all) {
     all = inbox_.on<CommandAck>(session, wire::kCommandAck, [this](const CommandAck& ack) {
       if (ack.client == member_->welcome().client) ack_ = ack;
     });
-  }
-  if (all) {
-    all = inbox_.onFrom<EmergencyStop>(session, wire::kEmergencyStop,
-                                       [this](const EmergencyStop& state, const wire::Origin& from) {
-                                         if (member_->isServer(from)) stopped_ = state.engaged;
-                                       });
   }
   if (all) {
     all = inbox_.on<StepState>(session, wire::kStepState, [this](const StepState& step) {
@@ -63,8 +68,11 @@ Result<void> CommandClient::connect(const Stop& stop) {
   }
   if (all) all = inbox_.on<RunState>(session, wire::kRunState, [this](const RunState& run) { receive(run); });
   if (!all) return all;
+  auto raiser = StopRaiser::open(options_.domain, member_->sessionName(), options_.person);
+  if (!raiser) return fail(raiser.error().what);
+  raiser_ = std::move(*raiser);
   const bool matched = dispatchUntil(inbox_, stop, kPatience, [this] {
-    return commands_->matchedReaders() > 0 && stops_->matchedReaders() > 0 && inbox_.matchedWriters() > 1;
+    return commands_->matchedReaders() > 0 && inbox_.matchedWriters() > 1;
   });
   if (!matched) return fail("the server of session '" + member_->sessionName() + "' does not read commands");
   return {};
@@ -75,13 +83,13 @@ void CommandClient::receive(const RunState& run) {
   run_ = run;
 }
 
-bool CommandClient::dispatch(milliseconds timeout) {
-  inbox_.dispatch(timeout);
-  return !member_->lost() && !isOver(run_.phase);
-}
-
 Result<void> CommandClient::send(const ParsedCommand& command, const Stop& stop) {
-  if (!command.command) return sendEmergencyStop(command, stop);
+  if (!command.command) {
+    const auto heard = raiser_->raise(reasonOf(command), kSoon, stop);
+    if (!heard) return fail(heard.error().what);
+    return heard->by_server ? Result<void>() : fail(withoutServer(*heard));
+  }
+  if (lost()) return fail(*lost());
   ack_.reset();
   const Command message{
       member_->welcome().client, ++sent_, *command.command, {}, command.text, command.value};
@@ -96,14 +104,24 @@ Result<void> CommandClient::send(const ParsedCommand& command, const Stop& stop)
   return {};
 }
 
-/// Received by every device and by the server; the server confirms it by publishing the same state.
-Result<void> CommandClient::sendEmergencyStop(const ParsedCommand& command, const Stop& stop) {
-  const std::string reason = command.text.empty() ? "requested" : command.text;
-  if (auto sent = stops_->write({true, options_.person, reason}); !sent) return sent;
-  if (!dispatchUntil(inbox_, stop, kPatience, [this] { return stopped_; }))
-    return fail(
-        "no answer from the server: the stop was sent to the devices, but the simulation may still run");
-  return {};
+int emergencyOnce(const wire::MembershipOptions& options, const ParsedCommand& command,
+                  const std::atomic<bool>& stop) {
+  auto raiser = StopRaiser::open(options.domain, options.session, options.person);
+  const auto heard =
+      raiser ? (*raiser)->raise(reasonOf(command), kForAServer, stop) : fail(raiser.error().what);
+  if (!heard) {
+    std::fprintf(stderr, "tenon command: %s\n", heard.error().what.c_str());
+    return 1;
+  }
+  if (heard->programs == 0) {
+    std::fprintf(stderr,
+                 "tenon command: nobody has heard the emergency stop: no program of %s runs on domain %u\n",
+                 options.session.empty() ? "any session" : ("session '" + options.session + "'").c_str(),
+                 options.domain);
+    return 1;
+  }
+  std::printf("emergency: %s\n", heard->by_server ? "accepted" : withoutServer(*heard).c_str());
+  return 0;
 }
 
 }  // namespace tenon::command

@@ -9,13 +9,15 @@
 #include <vector>
 
 #include "clients/command/parser.h"
+#include "clients/command/stop_raiser.h"
 #include "idl/types/messages/run.h"
 #include "idl/types/result.h"
 #include "idl/wire/membership.h"
 
 namespace tenon::command {
 
-/// Joins a session and sends commands to its server.
+/// Joins a session and sends commands to its server; the emergency stop it sends to every device
+/// (StopRaiser), also when the server does not answer any more.
 ///
 /// Threads: one. Real-time: no.
 class CommandClient {
@@ -30,8 +32,11 @@ class CommandClient {
   /// Sends a command and waits for the answer, at most 5 s. Fails with the server's reason, or when there is
   /// no answer.
   [[nodiscard]] Result<void> send(const ParsedCommand& command, const Stop& stop);
-  /// Takes messages for `timeout`; false when the session is over or the server is lost.
-  bool dispatch(std::chrono::milliseconds timeout);
+  /// Takes messages for `timeout`.
+  void dispatch(std::chrono::milliseconds timeout) { inbox_.dispatch(timeout); }
+  [[nodiscard]] bool isOver() const { return tenon::isOver(run_.phase); }
+  /// Why the server takes no more commands; none while it does.
+  [[nodiscard]] const std::optional<std::string>& lost() const { return member_->lost(); }
 
   /// Called with one line per change of step or run; may be empty.
   std::function<void(const std::string&)> report;
@@ -39,27 +44,29 @@ class CommandClient {
  private:
   explicit CommandClient(wire::MembershipOptions options) : options_(std::move(options)) {}
   Result<void> connect(const Stop& stop);
-  Result<void> sendEmergencyStop(const ParsedCommand& command, const Stop& stop);
   void receive(const RunState& run);
 
   wire::MembershipOptions options_;
   std::unique_ptr<wire::Membership> member_;
   std::unique_ptr<wire::Writer<Command>> commands_;
-  std::unique_ptr<wire::Writer<EmergencyStop>> stops_;
+  std::unique_ptr<StopRaiser> raiser_;
   std::uint32_t sent_ = 0;  ///< commands, also the id of the newest
   std::optional<CommandAck> ack_;
-  bool stopped_ = false;  ///< an emergency stop is engaged, confirmed by the server
-  std::string step_;      ///< name of the active one
+  std::string step_;  ///< name of the active one
   RunState run_;
   wire::Inbox inbox_;
 };
 
+/// Raises the emergency stop and prints who has heard it. Returns the exit code: 0 when somebody has, else 1.
+[[nodiscard]] int emergencyOnce(const wire::MembershipOptions& options, const ParsedCommand& command,
+                                const std::atomic<bool>& stop);
 /// Sends the command of a command line and prints the answer. Returns the exit code: 0 when it was accepted,
 /// else 1.
 [[nodiscard]] int commandOnce(CommandClient& client, const std::vector<std::string>& arguments,
                               const std::atomic<bool>& stop);
-/// Sends the command of each key pressed, until `q`, the end of the input or of the session. Returns the exit
-/// code: 0.
+/// Sends the command of each key pressed, until `q`, the end of the input or of the session. What ends or
+/// restarts a run is sent when the next key is `y`. After a loss of the server the emergency stop alone is
+/// left. Returns the exit code: 0.
 [[nodiscard]] int commandByKeys(CommandClient& client, const std::vector<std::string>& signals,
                                 const std::atomic<bool>& stop);
 

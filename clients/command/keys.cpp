@@ -1,4 +1,6 @@
 #include <cstdio>
+#include <optional>
+#include <utility>
 
 #include <poll.h>
 #include <termios.h>
@@ -71,15 +73,22 @@ int commandByKeys(CommandClient& client, const std::vector<std::string>& signals
   const KeyTerminal terminal;
   show(keyLegend(signals));
   client.report = show;
-  while (!stop) {
-    if (!client.dispatch(std::chrono::milliseconds(20))) return 0;
+  std::optional<ParsedCommand> asked;
+  bool said_lost = false;
+  while (!stop && !client.isOver()) {
+    client.dispatch(std::chrono::milliseconds(20));
+    if (client.lost() && !std::exchange(said_lost, true))
+      show(*client.lost() + "; space still stops every device, q leaves");
     char key = 0;
     const KeyInput input = readKey(key);
     if (input == KeyInput::kNone) continue;
     if (input == KeyInput::kEnd || key == 'q') return 0;
     if (key == '?') show(keyLegend(signals));
-    const auto command = parseCommand(key, signals);
-    if (!command) continue;
+    auto command = key == 'y' ? std::exchange(asked, std::nullopt) : parseCommand(key, signals);
+    const bool asks = key != 'y' && command && needsConsent(*command);
+    asked = asks ? command : std::nullopt;
+    if (asks) show(nameOf(*command) + ": press y to do it, any other key not to");
+    if (!command || asks) continue;
     const auto sent = client.send(*command, stop);
     show(nameOf(*command) + ": " + (sent ? "accepted" : sent.error().what));
   }

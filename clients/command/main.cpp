@@ -31,7 +31,10 @@ void declare(CLI::App& app, CommandArguments& arguments) {
       ->transform(CLI::CheckedTransformer(roles))
       ->option_text("ROLE");
   app.add_option("--session", arguments.options.session,
-                 "name of the session; default: the first one announced");
+                 "name of the session; default: the first one announced, of the emergency stop all sessions");
+  app.add_option("--key", arguments.options.key_file,
+                 "file of the session's key, which instructors and admins need (default: the one of your own "
+                 "servers)");
   app.add_option("--domain", arguments.options.domain, "DDS domain, 0 to 230")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
@@ -58,14 +61,18 @@ int run(int argc, char** argv) {
   const auto printError = [](const std::string& what) {
     std::fprintf(stderr, "tenon command: %s\n", what.c_str());
   };
+  tenon::Result<tenon::command::ParsedCommand> parsed;
   if (!arguments.keys) {
-    if (const auto parsed = tenon::command::parseCommand(arguments.words); !parsed) {
+    parsed = tenon::command::parseCommand(arguments.words);
+    if (!parsed) {
       printError(parsed.error().what);
       return 2;
     }
   }
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
+  if (!arguments.keys && !parsed->command)
+    return tenon::command::emergencyOnce(arguments.options, *parsed, stop);
   auto client = tenon::command::CommandClient::open(arguments.options, stop);
   if (!client) {
     printError(client.error().what);

@@ -24,9 +24,10 @@ constexpr std::array kCommands{
     CommandWord{"collision", "OBJECT OBJECT on|off", "enables or disables collisions of two objects", 0,
                 CommandKind::kSetCollision},
     CommandWord{"stop", "", "ends the session", 'e', CommandKind::kStop},
-    CommandWord{"emergency", "[REASON]", "emergency stop: all devices display no force, at once", ' ',
-                std::nullopt},
-    CommandWord{"clear", "[REASON]", "clears an emergency stop", 'c', CommandKind::kClearEmergencyStop},
+    CommandWord{"emergency", "[REASON]",
+                "emergency stop: all devices display no force, at once; needs no server", ' ', std::nullopt},
+    CommandWord{"clear", "[REASON]", "clears the emergency stop; the run stays paused until `resume`", 'c',
+                CommandKind::kClearEmergencyStop},
 };
 
 std::string joined(const std::vector<std::string>& words, std::size_t from) {
@@ -72,6 +73,11 @@ std::optional<ParsedCommand> parseCommand(char key, const std::vector<std::strin
   for (const CommandWord& word : kCommands)
     if (word.key != 0 && word.key == key) return ParsedCommand{word.command, {}};
   return std::nullopt;
+}
+
+bool needsConsent(const ParsedCommand& command) {
+  return command.command == CommandKind::kStop || command.command == CommandKind::kReset ||
+         command.command == CommandKind::kSkipStep;
 }
 
 std::string commandHelp() {

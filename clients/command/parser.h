@@ -36,6 +36,10 @@ struct ParsedCommand {
 /// Parses a key; '1' to '9' send `signals[0]` to `signals[8]`. None when the key has no command.
 [[nodiscard]] std::optional<ParsedCommand> parseCommand(char key, const std::vector<std::string>& signals);
 
+/// Whether a key alone must not give this command: it ends the run, starts it again, or may end it
+/// (skip, in the last step).
+[[nodiscard]] bool needsConsent(const ParsedCommand& command);
+
 /// For --help: every command with its effect.
 [[nodiscard]] std::string commandHelp();
 /// For a terminal: every key with its effect.

@@ -43,16 +43,22 @@ HapticHand::HapticHand(devices::HapticDevice& device, devices::ClutchLatch* clut
       coupling_(couplingOf(device.caps())),
       safety_(device.caps(), clutch) {}
 
-Result<void> HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH) {
-  if (auto armed = device_.arm(); !armed) return armed;
+Result<void> HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH, bool armed) {
+  permitted_ = armed;
+  Result<void> result;
+  if (armed) {
+    result = device_.arm();
+  } else {
+    device_.disarm();
+  }
+  if (!result) return result;
   device_.read(device_state_);
   workspace_.setCentre(p_WH - device_state_.X_DH.translation());
   input_ = {};
   input_.hand = hand;
   input_.client = client;
-  input_.dof_mask = device_.caps().dof_mask;
   const Pose X_WH = workspace_.toWorld(device_state_.X_DH);
-  for (DeviceSample& sample : input_.samples) sample.X_WH = X_WH;
+  input_.sample.X_WH = X_WH;
   input_.p_WC = workspace_.centre();
   state_ = {};
   state_.hand = hand;
@@ -60,9 +66,9 @@ Result<void> HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH
   return {};
 }
 
-void HapticHand::setEmergencyStop(bool engaged) noexcept {
-  stopped_ = engaged;
-  if (engaged) return;
+void HapticHand::permitForces(bool permitted) noexcept {
+  permitted_ = permitted;
+  if (!permitted) return;
   safety_.reset();
   coupling_.reset();
   // a device in fault needs resetFault() by its operator first
@@ -71,7 +77,7 @@ void HapticHand::setEmergencyStop(bool engaged) noexcept {
 
 void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noexcept {
   device_.read(device_state_);
-  workspace_.step(device_state_.X_DH.translation(), in_contact_ || stopped_, dt);
+  workspace_.step(device_state_.X_DH.translation(), in_contact_ || !permitted_, dt);
   const Pose X_WH = workspace_.toWorld(device_state_.X_DH);
   const Twist V_WH{device_state_.V_DH.linear + workspace_.velocity(), device_state_.V_DH.angular};
 
@@ -82,7 +88,7 @@ void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noex
   request.requested.F_Ho_D = coupling_.step(proxy, X_WH, dt);
   request.stiffness = coupling_.stiffness();
   request.rotational_stiffness = coupling_.rotationalStiffness();
-  request.emergency_stop = stopped_;
+  request.emergency_stop = !permitted_;
   const devices::DeviceCommand command = safety_.step(request, device_state_, dt);
   if (safety_.wantsDisarm()) {
     device_.disarm();
@@ -95,16 +101,14 @@ void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noex
 }
 
 void HapticHand::updateOutputs(std::uint32_t seq, const WorldView& world, const Twist& V_WH) noexcept {
-  for (std::size_t i = input_.samples.size() - 1; i > 0; --i) input_.samples[i] = input_.samples[i - 1];
   const LocalProxy& proxy = local_.proxy();
-  input_.samples[0] = {seq, workspace_.toWorld(device_state_.X_DH), V_WH, device_state_.buttons};
+  input_.sample = {seq, workspace_.toWorld(device_state_.X_DH), V_WH, device_state_.buttons};
   input_.server_epoch = world.serverEpoch();
-  input_.heard_tick = world.tick();
-  input_.active = !stopped_ && !safety_.wantsDisarm() && device_state_.fault == devices::DeviceFault::kNone;
+  input_.active = permitted_ && !safety_.wantsDisarm() && device_state_.fault == devices::DeviceFault::kNone;
   input_.p_WC = workspace_.centre();
 
   state_.seq = seq;
-  state_.X_WH = input_.samples[0].X_WH;
+  state_.X_WH = input_.sample.X_WH;
   state_.p_WC = workspace_.centre();
   state_.X_WO_local = proxy.X_WO;
   state_.manifold_age = proxy.age;

@@ -35,15 +35,15 @@ class HapticHand {
   /// the hand; `clutch` is shared by the arms of a bimanual device, null for a single device.
   explicit HapticHand(devices::HapticDevice& device, devices::ClutchLatch* clutch = nullptr);
 
-  /// Arms the device and places the workspace so that the hand is at p_WH now. Fails when the device cannot
-  /// be armed.
-  Result<void> begin(HandId hand, ClientId client, const Vector3& p_WH);
+  /// Places the workspace so that the hand is at p_WH now, and arms the device if `armed`. Fails when it
+  /// cannot be armed.
+  Result<void> begin(HandId hand, ClientId client, const Vector3& p_WH, bool armed);
   void receive(const HandManifold& manifold) noexcept { local_.receive(manifold); }
   /// One cycle of `dt` [s]; `seq` numbers the input.
   void step(std::uint32_t seq, const WorldView& world, double dt) noexcept;
-  /// Engaged: forces off, brake on, input inactive. Released: resets the safety layer and arms the device
-  /// unless it is in fault.
-  void setEmergencyStop(bool engaged) noexcept;
+  /// False: forces off, brake on, input inactive. True: resets the safety layer and arms the device unless it
+  /// is in fault. See Arming, which decides it.
+  void permitForces(bool permitted) noexcept;
   /// Forces off.
   void end() noexcept { device_.disarm(); }
 
@@ -55,7 +55,7 @@ class HapticHand {
   [[nodiscard]] const devices::DeviceCaps& caps() const noexcept { return device_.caps(); }
   [[nodiscard]] Workspace& workspace() noexcept { return workspace_; }
   [[nodiscard]] const LocalModel& local() const noexcept { return local_; }
-  [[nodiscard]] const Pose& pose() const noexcept { return input_.samples[0].X_WH; }
+  [[nodiscard]] const Pose& pose() const noexcept { return input_.sample.X_WH; }
   [[nodiscard]] bool inContact() const noexcept { return in_contact_; }
 
  private:
@@ -76,7 +76,7 @@ class HapticHand {
   bool beyond_validity_ = false;
   bool stale_ = false;
   bool in_contact_ = false;
-  bool stopped_ = false;
+  bool permitted_ = true;
 };
 
 }  // namespace tenon::haptic

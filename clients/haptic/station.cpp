@@ -49,6 +49,8 @@ std::string describe(const StationEvent& event, const std::string& hand_name) {
       return "server restarted, epoch " + std::to_string(event.detail) + when;
     case StationEventKind::kStopChanged:
       return (event.detail != 0 ? "emergency stop engaged" : "emergency stop released") + when;
+    case StationEventKind::kArmed:
+      return "armed by the person at the station" + when;
   }
   return "unknown event" + when;
 }
@@ -91,9 +93,30 @@ void Station::receive(const StepState& step) {
   stepChanged();
 }
 
-void Station::receive(const EmergencyStop& stop) {
-  report(StationEventKind::kStopChanged, {}, stop.engaged ? 1U : 0U, 0.0);
-  stopChanged(stop.engaged);
+void Station::receive(const StopSignal& stop) noexcept {
+  const bool stopped = arming_.stopped();
+  const bool permitted = arming_.permitsForces();
+  arming_.receive(stop);
+  if (arming_.stopped() && !stopped) report(StationEventKind::kStopChanged, {}, 1, 0.0);
+  updateArming(permitted);
+}
+
+void Station::press() noexcept {
+  const bool permitted = arming_.permitsForces();
+  if (arming_.awaitsPress()) report(StationEventKind::kArmed, {}, 0, 0.0);
+  arming_.press();
+  updateArming(permitted);
+}
+
+void Station::updateArming(bool permitted_before) noexcept {
+  if (arming_.release()) report(StationEventKind::kStopChanged, {}, 0, 0.0);
+  if (arming_.permitsForces() != permitted_before) armingChanged();
+}
+
+void Station::pressLikeAPerson() noexcept {
+  constexpr std::uint32_t kReaction = 500;  // [steps]
+  unpressed_ = arming_.awaitsPress() ? unpressed_ + 1 : 0;
+  if (unpressed_ >= kReaction) press();
 }
 
 bool Station::takeEvent(StationEvent& event) noexcept {

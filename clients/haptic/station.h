@@ -7,13 +7,13 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/haptic/arming.h"
 #include "clients/haptic/world_view.h"
 #include "idl/types/fixed_vector.h"
 #include "idl/types/messages/contacts.h"
 #include "idl/types/messages/hands.h"
 #include "idl/types/messages/objects.h"
 #include "idl/types/messages/role.h"
-#include "idl/types/messages/run.h"
 #include "idl/types/messages/session.h"
 #include "idl/types/messages/steps.h"
 
@@ -33,6 +33,7 @@ enum class StationEventKind : std::uint8_t {
   kStale,           ///< the manifold is too old for full stiffness; value: [ticks] its age
   kServerChanged,   ///< frames of a newer server epoch arrived; detail: the epoch
   kStopChanged,     ///< detail: 1 when an emergency stop was engaged, 0 when it was released
+  kArmed,           ///< the person has armed the devices
 };
 
 /// Event for the log. Plain data, so that the 1 kHz loop can write it.
@@ -74,7 +75,10 @@ class Station {
   void receive(const WorldFrame& frame) noexcept;
   void receive(const HandManifold& manifold) noexcept;
   void receive(const StepState& step);
-  void receive(const EmergencyStop& stop);
+  void receive(const StopSignal& stop) noexcept;
+  /// The person at this station arms it, or agrees that an emergency stop ends (Arming).
+  void press() noexcept;
+  [[nodiscard]] const Arming& arming() const noexcept { return arming_; }
 
   /// One millisecond of devices, local models and simulated person; `seq` numbers the inputs.
   virtual void step(std::uint32_t seq) noexcept = 0;
@@ -99,8 +103,10 @@ class Station {
   virtual void manifoldReceived(const HandManifold& manifold) noexcept = 0;
   /// currentStep() is new.
   virtual void stepChanged() {}
-  /// Emergency stop engaged or released.
-  virtual void stopChanged(bool engaged) = 0;
+  /// arming().permitsForces() is new.
+  virtual void armingChanged() noexcept = 0;
+  /// To be called once a step by a station with a simulated person: it presses half a second after it could.
+  void pressLikeAPerson() noexcept;
 
   /// Queues the events of a hand's last step.
   void report(const HapticHand& hand) noexcept;
@@ -117,7 +123,11 @@ class Station {
   FixedVector<HandState, kMaxStationHands> states_;
 
  private:
+  void updateArming(bool permitted_before) noexcept;
+
   static constexpr std::size_t kEventCapacity = 256;
+  Arming arming_;
+  std::uint32_t unpressed_ = 0;  ///< [steps] since a press is awaited
   std::vector<SceneObject> objects_;
   StepState step_;
   FixedVector<HandId, kMaxStationHands> own_hands_;

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <exception>
 
+#include <unistd.h>
+
 #include "clients/haptic/seat_file.h"
 
 namespace tenon::haptic {
@@ -27,8 +29,14 @@ void addCommonOptions(CLI::App& app, StationProgramOptions& program, std::uint64
          "--wait", [&membership](unsigned seconds) { membership.timeout = std::chrono::seconds(seconds); },
          "seconds to search for a server, at start and after a loss of the connection")
       ->default_str("10");
-  app.add_option("--seat", program.seat_file,
-                 "file that keeps the token of the seat, so that a restarted station gets its hands back");
+  app.add_option(
+      "--seat", program.seat_file,
+      "file that keeps the secret key of the seat, so that a restarted station gets its hands back");
+  app.add_option("--key", membership.key_file,
+                 "file of the session's key, which instructors and admins need (default: the one of your own "
+                 "servers)");
+  app.add_flag("--arm", program.armed,
+               "the devices may display forces at once: the person is at the station");
 }
 
 int run(int argc, char** argv, const StationMainOptions& main) {
@@ -42,6 +50,7 @@ int run(int argc, char** argv, const StationMainOptions& main) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
+  program.read_keys = isatty(STDIN_FILENO) != 0;
   program.print = [&main](const std::string& text) {
     std::fprintf(stderr, "%s: %s\n", main.name.c_str(), text.c_str());
   };

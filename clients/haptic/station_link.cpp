@@ -31,6 +31,7 @@ Result<void> StationLink::openWriters() {
   if (opened) opened = openInto(states_, session, wire::kHandState100);
   if (opened) opened = openInto(events_, session, wire::kClientEvent);
   if (opened) opened = openInto(telemetry_, session, wire::kTelemetry);
+  if (opened) opened = openInto(stops_, session, wire::kEmergencyStop);
   return opened;
 }
 

@@ -6,6 +6,7 @@
 #include "idl/types/messages/hands.h"
 #include "idl/types/messages/log.h"
 #include "idl/types/messages/objects.h"
+#include "idl/types/messages/run.h"
 #include "idl/types/messages/session.h"
 #include "idl/types/messages/timing.h"
 #include "idl/wire/endpoint.h"
@@ -35,6 +36,11 @@ class StationLink {
   [[nodiscard]] Result<void> send(const HandState& state) { return states_->write(state); }
   [[nodiscard]] Result<void> send(const ClientEvent& event) { return events_->write(event); }
   [[nodiscard]] Result<void> send(const Telemetry& telemetry) { return telemetry_->write(telemetry); }
+  /// A raise of the emergency stop that this station obeys: repeated for servers and stations that come
+  /// later.
+  [[nodiscard]] Result<void> send(const EmergencyStop& stop) { return stops_->write(stop); }
+  /// It is cleared: not repeated any more.
+  [[nodiscard]] Result<void> withdraw(const EmergencyStop& stop) { return stops_->dispose(stop); }
 
  private:
   StationLink() = default;
@@ -47,6 +53,7 @@ class StationLink {
   std::unique_ptr<wire::Writer<HandState>> states_;
   std::unique_ptr<wire::Writer<ClientEvent>> events_;
   std::unique_ptr<wire::Writer<Telemetry>> telemetry_;
+  std::unique_ptr<wire::Writer<EmergencyStop>> stops_;
   wire::Inbox inbox_;
 };
 

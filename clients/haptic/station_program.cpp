@@ -6,12 +6,16 @@
 #include <map>
 #include <optional>
 
+#include <poll.h>
+#include <unistd.h>
+
 #include "clients/haptic/force_age_statistics.h"
 #include "clients/haptic/seat_file.h"
 #include "clients/haptic/station_link.h"
 #include "idl/threads/cyclic_thread.h"
 #include "idl/threads/latest.h"
 #include "idl/threads/spsc_queue.h"
+#include "idl/types/stop_truth.h"
 
 namespace tenon::haptic {
 
@@ -54,6 +58,14 @@ StepState withoutTexts(StepState step) {
   return step;
 }
 
+/// Whether a line waits on the terminal: the person has pressed return. Takes it.
+bool returnPressed() {
+  pollfd entry{STDIN_FILENO, POLLIN, 0};
+  if (poll(&entry, 1, 0) <= 0 || (entry.revents & POLLIN) == 0) return false;
+  char line[256];
+  return read(STDIN_FILENO, line, sizeof line) > 0;
+}
+
 class StationRunner {
  public:
   StationRunner(Station& station, StationLink& link, const StationProgramOptions& options)
@@ -75,6 +87,9 @@ class StationRunner {
   void send(const StationOutput& output);
   void sendEvents();
   void printStep(const StepState& step);
+  [[nodiscard]] Result<void> subscribeToStops();
+  void passStops();
+  void readKeys();
   [[nodiscard]] bool seated() const { return !link_.member().lost(); }
   /// Rejoins. `new_seat`: client, hands or server epoch differ from before, so the station has to restart.
   [[nodiscard]] Result<void> rejoin(const std::atomic<bool>& stop, bool& new_seat);
@@ -105,10 +120,12 @@ class StationRunner {
   threads::SpscQueue<WorldFrame> frames_{128};
   threads::SpscQueue<HandManifold> manifolds_{128};
   threads::SpscQueue<StepState> steps_{16};
-  threads::SpscQueue<EmergencyStop> stops_{16};
+  threads::Latest<StopSignal> stop_;
+  threads::SpscQueue<bool> presses_{16};
   threads::SpscQueue<StationEvent> events_{256};
   threads::Latest<StationOutput> output_;
   threads::Latest<Telemetry> telemetry_;
+  StopTruth stops_;  // of the wire thread
   ForceAgeStatistics force_age_;
   std::uint32_t seq_ = 0;
   std::uint64_t event_seq_ = 0;
@@ -146,19 +163,44 @@ Result<void> StationRunner::subscribe() {
       steps_.push(*step_);
     });
   }
-  if (all) {
-    all = inbox.onFrom<EmergencyStop>(
-        session, wire::kEmergencyStop, [this](const EmergencyStop& stop, const wire::Origin& from) {
-          // anyone may engage the stop; only the server may release it
-          if (!stop.engaged && !link_.member().isServer(from)) return;
-          print((stop.engaged ? "emergency stop by " : "emergency stop cleared by ") + stop.who + ": " +
-                stop.reason);
-          if (lockstep_) return station_.receive(stop);
-          stops_.push({stop.engaged, {}, {}});
-        });
-  }
+  if (all) all = subscribeToStops();
   if (all) all = inbox.on<RunState>(session, wire::kRunState, [this](const RunState& run) { run_ = run; });
   return all;
+}
+
+/// Raises are heard from anybody, without a server too; clears from the server of this station alone.
+Result<void> StationRunner::subscribeToStops() {
+  wire::Partition& session = link_.member().session();
+  wire::Inbox& inbox = link_.inbox();
+  auto heard = inbox.on<EmergencyStop>(session, wire::kEmergencyStop, [this](const EmergencyStop& stop) {
+    if (!stops_.raise(stop)) return;
+    passStops();
+    print("emergency stop by " + stop.who + ": " + stop.reason);
+    static_cast<void>(link_.send(stop));
+  });
+  if (!heard) return heard;
+  return inbox.on<EmergencyClear>(session, wire::kEmergencyClear, [this](const EmergencyClear& cleared) {
+    const auto raise = stops_.standing().find({cleared.client_guid, cleared.counter});
+    const bool stood = raise != stops_.standing().end();
+    if (stood) static_cast<void>(link_.withdraw(raise->second));
+    stops_.clear(cleared);
+    if (!stood) return;
+    passStops();
+    print("emergency stop cleared by " + cleared.who + ": " + cleared.reason);
+    if (!stops_.engaged() && options_.read_keys) print("press return to go on at this station");
+  });
+}
+
+void StationRunner::passStops() {
+  const StopSignal stop{stops_.raised(), stops_.engaged()};
+  if (lockstep_) return station_.receive(stop);
+  stop_.write(stop);
+}
+
+void StationRunner::readKeys() {
+  if (!options_.read_keys || !returnPressed()) return;
+  if (lockstep_) return station_.press();
+  presses_.push(true);
 }
 
 void StationRunner::printStep(const StepState& step) {
@@ -206,14 +248,17 @@ Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat
   if (rejoins_ > kMaxRejoins) return fail(why);
   print(why + "; rejoining the session");
   const Welcome before = member.welcome();
-  auto back = member.rejoin(stop, [this] { link_.inbox().dispatch(milliseconds(0)); });
+  auto back = member.rejoin(stop, [this] {
+    link_.inbox().dispatch(milliseconds(0));
+    readKeys();
+  });
   if (back) back = link_.awaitMatch(stop);
   if (!back) return fail(why + "; " + back.error().what);
   rejoined_at_ = std::chrono::steady_clock::now();
   new_seat = member.welcome().client != before.client || member.welcome().hands != before.hands ||
              member.welcome().server_epoch != before.server_epoch;
   print("rejoined as client " + std::to_string(member.welcome().client.value));
-  if (auto kept = writeSeatToken(options_.seat_file, member.welcome().token); !kept) print(kept.error().what);
+  if (auto kept = writeSeatKey(options_.seat_file, member.seat()); !kept) print(kept.error().what);
   return {};
 }
 
@@ -242,6 +287,7 @@ Result<RunState> StationRunner::runLockstep(const std::atomic<bool>& stop) {
     auto repeat_at = std::chrono::steady_clock::now() + kRepeatAfter;
     while (!tickComplete(tick) && !stop && !over() && seated()) {
       link_.inbox().dispatch(milliseconds(50));
+      readKeys();
       if (std::chrono::steady_clock::now() < repeat_at) continue;
       for (const DeviceInput& input : output.inputs) static_cast<void>(link_.send(input));
       repeat_at = std::chrono::steady_clock::now() + kRepeatAfter;
@@ -265,10 +311,8 @@ void StationRunner::servo() noexcept {
     station_.receive(*step);
     steps_.pop();
   }
-  while (const EmergencyStop* stop = stops_.front()) {
-    station_.receive(*stop);
-    stops_.pop();
-  }
+  if (stop_.update()) station_.receive(stop_.value());
+  for (; presses_.front() != nullptr; presses_.pop()) station_.press();
   station_.step(++seq_);
   force_age_.inputSent(seq_, now, kPeriodNs);
   output_.back().fill(station_, seq_);
@@ -299,6 +343,7 @@ Result<RunState> StationRunner::runRealTime(const std::atomic<bool>& stop) {
   print(thread->notGranted());
   while (!stop && !over()) {
     link_.inbox().dispatch(milliseconds(20));
+    readKeys();
     if (!seated() && !over()) {
       // the servo continues; forces fade with the age of the contacts
       bool new_seat = false;
@@ -345,12 +390,16 @@ Result<RunState> runStation(Station& station, const StationProgramOptions& optio
   wire::MembershipOptions membership = options.membership;
   membership.role = station.role();
   membership.hands = station.handNames();
-  if (!options.seat_file.empty()) membership.token = readSeatToken(options.seat_file);
+  if (!options.seat_file.empty()) membership.seat = readSeatKey(options.seat_file);
   auto link = StationLink::open(membership, stop);
   if (!link) return fail(link.error().what);
   if (options.print) options.print("joined as client " + std::to_string((*link)->welcome().client.value));
-  if (auto kept = writeSeatToken(options.seat_file, (*link)->welcome().token); !kept && options.print)
+  if (auto kept = writeSeatKey(options.seat_file, (*link)->member().seat()); !kept && options.print)
     options.print(kept.error().what);
+  if (options.armed) station.press();
+  if (options.print && station.arming().awaitsPress())
+    options.print(options.read_keys ? "not armed: press return to switch the forces on"
+                                    : "not armed: start it with --arm to switch the forces on");
   auto runner = std::make_unique<StationRunner>(station, **link, options);
   return runner->run(stop);
 }

@@ -53,7 +53,9 @@ Result<std::unique_ptr<InstructorStation>> InstructorStation::open(const Instruc
   auto device = devices::openDevice(options.device, options.person.seed);
   if (!device) return fail(device.error().what);
   parts->device = std::move(*device);
-  return std::unique_ptr<InstructorStation>(new InstructorStation(std::move(parts)));
+  std::unique_ptr<InstructorStation> station(new InstructorStation(std::move(parts)));
+  if (options.simulated_person) station->press();  // as the simulated trainee does
+  return station;
 }
 
 std::vector<std::string> InstructorStation::handNames() const { return {"instructor"}; }
@@ -67,7 +69,7 @@ void InstructorStation::begin(std::span<const HandId> hand_ids) {
   Pose X_WStart(start);
   if (hand_ids[0].valid()) {
     haptic::HapticHand& hand = parts_->hand.emplace(*parts_->device);
-    if (!hand.begin(hand_ids[0], client_, start)) {
+    if (!hand.begin(hand_ids[0], client_, start, arming().permitsForces())) {
       report(haptic::StationEventKind::kDeviceFault, hand_ids[0],
              static_cast<std::uint32_t>(hand.device().fault), 0.0);
     }
@@ -82,8 +84,8 @@ void InstructorStation::manifoldReceived(const HandManifold& manifold) noexcept 
 
 void InstructorStation::stepChanged() { parts_->person.read(currentStep()); }
 
-void InstructorStation::stopChanged(bool engaged) {
-  if (parts_->hand) parts_->hand->setEmergencyStop(engaged);
+void InstructorStation::armingChanged() noexcept {
+  if (parts_->hand) parts_->hand->permitForces(arming().permitsForces());
 }
 
 void InstructorStation::step(std::uint32_t seq) noexcept {
@@ -91,6 +93,7 @@ void InstructorStation::step(std::uint32_t seq) noexcept {
   seq_ = seq;
   inputs_.clear();
   states_.clear();
+  if (parts_->options.simulated_person) pressLikeAPerson();
   if (!parts_->hand) return;
   parts_->hand->step(seq, world_, dt);
   report(*parts_->hand);

@@ -7,12 +7,13 @@
 
 #include "clients/haptic/station.h"
 #include "clients/simulated_person/person.h"
+#include "devices/catalog.h"
 #include "idl/types/result.h"
 
 namespace tenon::instructor {
 
 struct InstructorOptions {
-  std::string device = "sigma7-sim";  ///< or falcon-sim, omega3-sim
+  std::string device{devices::kInstructorDevice};  ///< or falcon-sim, omega3-sim
   simulated_person::PersonOptions person;
   bool simulated_person =
       true;  ///< a simulated instructor moves the simulated device; false: it moves otherwise
@@ -38,7 +39,7 @@ class InstructorStation : public haptic::Station {
   void begin(std::span<const HandId> hand_ids) override;
   void manifoldReceived(const HandManifold& manifold) noexcept override;
   void stepChanged() override;
-  void stopChanged(bool engaged) override;
+  void armingChanged() noexcept override;
 
  private:
   struct Parts;

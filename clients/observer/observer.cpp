@@ -117,11 +117,21 @@ void Observer::receive(const Presence& presence) {
   printJson(Json{{"kind", "person"}, {"name", presence.name}, {"here", presence.alive}}.dump());
 }
 
+// without --json the event log reports the stop
+
 void Observer::receive(const EmergencyStop& stop) {
-  if (!options_.json) return;  // the event log reports it
+  if (!stops_.raise(stop) || !options_.json) return;
   printJson(
-      Json{{"kind", "emergency stop"}, {"engaged", stop.engaged}, {"who", stop.who}, {"reason", stop.reason}}
-          .dump());
+      Json{{"kind", "emergency stop"}, {"engaged", true}, {"who", stop.who}, {"reason", stop.reason}}.dump());
+}
+
+void Observer::receive(const EmergencyClear& cleared) {
+  if (!stops_.clear(cleared) || !options_.json) return;
+  printJson(Json{{"kind", "emergency stop"},
+                 {"engaged", stops_.engaged()},
+                 {"who", cleared.who},
+                 {"reason", cleared.reason}}
+                .dump());
 }
 
 void Observer::receive(const RunState& run) {

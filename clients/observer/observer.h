@@ -7,6 +7,7 @@
 
 #include "clients/observer/timeline.h"
 #include "idl/types/messages.h"
+#include "idl/types/stop_truth.h"
 
 namespace tenon::observer {
 
@@ -36,6 +37,7 @@ class Observer {
   void receive(const EventLog& event);
   void receive(const Presence& presence);
   void receive(const EmergencyStop& stop);
+  void receive(const EmergencyClear& cleared);
   void receive(const RunState& run);
 
   /// Prints the sentences that waited long enough: those received before `limit` and all earlier ones.
@@ -55,6 +57,7 @@ class Observer {
   std::map<ClientId, bool> participants_;  ///< present
   StepState step_;
   RunState run_;
+  StopTruth stops_;
   Tick last_progress_ = 0;  ///< printed
 };
 

@@ -36,6 +36,7 @@ Result<void> observeSession(Observer& observer, wire::MembershipOptions options,
   subscribe(wire::kContactPairs100);
   subscribe(wire::kEventLog);
   subscribe(wire::kEmergencyStop);
+  subscribe(wire::kEmergencyClear);
   subscribe(wire::kRunState);
   if (!all) return all;
   while (!stop && !observer.over() && !member.serverIsGone()) {

@@ -44,7 +44,7 @@ struct RehearseArguments {
   bool quiet = false;
   bool follow = false;
   int misplaced_mount = -1;
-  std::string device = "sigma7-sim";
+  std::string device{tenon::devices::kInstructorDevice};
 };
 
 void declareScript(CLI::App& app, RehearseArguments& arguments) {
@@ -202,13 +202,8 @@ void printOutcome(const tenon::rehearse::RehearsalReport& report) {
 /// Says what is wrong with the scenario, as `tenon check` does.
 void printProblems(const RehearseArguments& arguments, const tenon::session::LoadedScene& loaded) {
   if (arguments.quiet) return;
-  tenon::check::CheckOptions options;
-  if (const auto caps = tenon::devices::capsOf("hug-sim"))
-    options.trainee = {"hug-sim", caps->rotation_range};
-  if (const auto caps = tenon::devices::capsOf(arguments.device))
-    options.instructor = {arguments.device, caps->rotation_range};
-  const auto findings = tenon::check::checkScene(*loaded.scenario, *loaded.scene, options);
-  for (const std::string& line : tenon::check::problemLines(*loaded.scenario, findings))
+  const tenon::check::CheckOptions options{.instructor_device = arguments.device};
+  for (const std::string& line : tenon::check::problems(*loaded.scenario, *loaded.scene, options))
     std::printf("%s\n", line.c_str());
 }
 
@@ -217,9 +212,16 @@ tenon::Result<tenon::session::LoadedScene> load(const RehearseArguments& argumen
   return tenon::session::loadScene(arguments.scenario, arguments.load, tenon::session::showOnTerminal);
 }
 
+void printThinWalls(const RehearseArguments& arguments, const tenon::session::LoadedScene& loaded) {
+  if (arguments.quiet) return;
+  for (const std::string& sentence : tenon::session::thinWallReport(*loaded.scene))
+    std::printf("%s\n", sentence.c_str());
+}
+
 int rehearsePeople(RehearseArguments& arguments) {
   const auto loaded = load(arguments);
   if (!loaded) return printError(loaded.error().what);
+  printThinWalls(arguments, *loaded);
   printProblems(arguments, *loaded);
   auto stations = openStations(arguments, *loaded->scenario);
   if (!stations) return printError(stations.error().what);
@@ -258,6 +260,7 @@ int rehearseScript(RehearseArguments& arguments) {
   arguments.load.read = script->readOptions();
   const auto loaded = load(arguments);
   if (!loaded) return printError(loaded.error().what);
+  printThinWalls(arguments, *loaded);
   setOptions(arguments);
   const auto report = tenon::rehearse::runScript(*script, *loaded, arguments.rehearsal);
   if (log)

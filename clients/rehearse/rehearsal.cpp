@@ -27,7 +27,7 @@ class Rehearsal {
             const RehearsalOptions& options)
       : options_(options),
         stations_(std::move(stations)),
-        registry_(*loaded.scenario, kServerEpoch, true, options.seed),
+        registry_(*loaded.scenario, kServerEpoch, true),
         simulation_(loaded.scenario, loaded.scene, simulationOptions(loaded, options)),
         publisher_(loaded.scenario, kServerEpoch, true),
         objects_(sceneObjects(*loaded.scene)),
@@ -68,7 +68,7 @@ class Rehearsal {
     request.name = std::string(roleName(station.role()));
     request.role = station.role();
     request.hands = station.handNames();
-    const Welcome welcome = registry_.join(request, 0);
+    const Welcome welcome = registry_.join(request, {.key = true}, 0);
     if (!welcome.accepted) return fail(welcome.reason);
     station.welcome(welcome, objects_);
     return {};

@@ -120,7 +120,7 @@ Result<RehearsalReport> runScript(const Script& script, const session::LoadedSce
   std::string refusal;
   options.on_refused = [&](const DeviceInput& input, const std::string& why) {
     const ScriptedHand& hand = *find(script, input.hand);
-    const double t = secondsAt(input.samples[0].seq);
+    const double t = secondsAt(input.sample.seq);
     if (refusal.empty())
       refusal = fmt::format("{}:{}: at {} s the server refuses the input: {}", hand.file.string(),
                             hand.trajectory->lineAt(t), t, why);

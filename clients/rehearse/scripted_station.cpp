@@ -13,9 +13,8 @@ void ScriptedStation::step(std::uint32_t seq) noexcept {
   input.hand = hands().front();
   input.client = client_;
   input.server_epoch = world_.serverEpoch();
-  input.heard_tick = world_.tick();
   input.active = true;
-  input.samples.fill({seq, X_WH, {moved.translation / kTickSeconds, moved.rotation / kTickSeconds}, 0});
+  input.sample = {seq, X_WH, {moved.translation / kTickSeconds, moved.rotation / kTickSeconds}, 0};
   inputs_.push_back(input);
 }
 

@@ -25,7 +25,7 @@ class ScriptedStation final : public haptic::Station {
  protected:
   void begin(std::span<const HandId>) override {}
   void manifoldReceived(const HandManifold&) noexcept override {}
-  void stopChanged(bool) override {}
+  void armingChanged() noexcept override {}
 
  private:
   std::string hand_;

@@ -5,20 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "idl/types/messages/log.h"
-#include "idl/types/messages/role.h"
+#include "clients/report/recording_reader.h"
 #include "idl/types/messages/run.h"
 #include "idl/types/messages/steps.h"
 #include "idl/types/result.h"
 
 namespace tenon::report {
-
-/// A value over session time.
-struct SeriesPoint {
-  double time = 0.0;   ///< [s] since tick 0
-  double value = 0.0;  ///< [unit of the series]
-};
-using Series = std::vector<SeriesPoint>;
 
 /// Metrics of a part of a session. Forces are those on the trainee's hands.
 struct SessionMetrics {
@@ -41,26 +33,6 @@ struct StepVisit {
   double begin = 0.0;  ///< [s]
   double end = 0.0;    ///< [s]
   SessionMetrics metrics;
-};
-
-/// An entry of the event log, or an event at a station.
-struct SessionEvent {
-  double time = 0.0;  ///< [s]
-  Severity severity = Severity::kInfo;
-  std::string kind;
-  std::string text;
-};
-
-/// A person or program that joined the session.
-struct SessionParticipant {
-  std::string name;
-  Role role = Role::kObserver;
-};
-
-/// Latency from an input to the force displayed in answer to it, as measured by one station.
-struct ForceLatency {
-  std::string who;                         ///< name of the participant
-  double p50 = 0.0, p99 = 0.0, max = 0.0;  ///< [s]
 };
 
 /// Analysis of a recorded session for the trainer: steps, events, forces, and real-time performance.

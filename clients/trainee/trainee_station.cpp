@@ -29,14 +29,11 @@ Vector3 startOf(std::span<const SceneObject> objects, std::string_view kind, con
 /// Fills the input of a tracked body part at X_WH; its velocity is a difference quotient over `dt` [s].
 void track(DeviceInput& input, std::uint32_t seq, const Pose& X_WH, const haptic::WorldView& world,
            double dt) {
-  for (std::size_t i = input.samples.size() - 1; i > 0; --i) input.samples[i] = input.samples[i - 1];
-  const Displacement moved = displacement(input.samples[1].X_WH, X_WH);
+  const Displacement moved = displacement(input.sample.X_WH, X_WH);
   const bool first = !input.active;
-  input.samples[0] = {seq, X_WH, first ? Twist{} : Twist{moved.translation / dt, moved.rotation / dt}, 0};
-  if (first) input.samples.fill(input.samples[0]);
+  input.sample = {seq, X_WH, first ? Twist{} : Twist{moved.translation / dt, moved.rotation / dt}, 0};
   input.active = true;
   input.server_epoch = world.serverEpoch();
-  input.heard_tick = world.tick();
 }
 }  // namespace
 
@@ -102,7 +99,9 @@ Result<std::unique_ptr<TraineeStation>> TraineeStation::open(const TraineeOption
   auto bracelet = devices::openDevice(options.tactors, options.person.seed);
   if (!bracelet) return fail(bracelet.error().what);
   parts->bracelet = std::move(*bracelet);
-  return std::unique_ptr<TraineeStation>(new TraineeStation(std::move(parts)));
+  std::unique_ptr<TraineeStation> station(new TraineeStation(std::move(parts)));
+  if (options.simulated_person) station->press();  // armed before the session begins
+  return station;
 }
 
 std::vector<std::string> TraineeStation::handNames() const { return {kHandNames.begin(), kHandNames.end()}; }
@@ -121,14 +120,13 @@ void TraineeStation::begin(std::span<const HandId> hand_ids) {
     starts[i] = Pose(startOf(sceneObjects(), kinds[i], fallback[i]));
     if (!hand_ids[i].valid()) continue;
     haptic::HapticHand& hand = parts_->hands[i].emplace(parts_->arm(i), &parts_->clutch);
-    if (!hand.begin(hand_ids[i], client_, starts[i].translation())) {
+    if (!hand.begin(hand_ids[i], client_, starts[i].translation(), arming().permitsForces())) {
       report(haptic::StationEventKind::kDeviceFault, hand_ids[i],
              static_cast<std::uint32_t>(hand.device().fault), 0.0);
     }
     starts[i] = hand.pose();
   }
-  // the session goes on without vibration when the bracelet cannot be armed
-  static_cast<void>(parts_->bracelet->arm());
+  armBracelet();
   parts_->person.begin(sceneObjects(), starts[kRight], starts[kLeft]);
 }
 
@@ -143,9 +141,19 @@ void TraineeStation::manifoldReceived(const HandManifold& manifold) noexcept {
 
 void TraineeStation::stepChanged() { parts_->person.read(currentStep()); }
 
-void TraineeStation::stopChanged(bool engaged) {
+void TraineeStation::armingChanged() noexcept {
   for (auto& hand : parts_->hands) {
-    if (hand) hand->setEmergencyStop(engaged);
+    if (hand) hand->permitForces(arming().permitsForces());
+  }
+  armBracelet();
+}
+
+/// The session goes on without vibration when the bracelet cannot be armed.
+void TraineeStation::armBracelet() noexcept {
+  if (arming().permitsForces()) {
+    static_cast<void>(parts_->bracelet->arm());
+  } else {
+    parts_->bracelet->disarm();
   }
 }
 
@@ -154,6 +162,7 @@ void TraineeStation::step(std::uint32_t seq) noexcept {
   seq_ = seq;
   inputs_.clear();
   states_.clear();
+  if (parts_->options.simulated_person) pressLikeAPerson();
   for (auto& hand : parts_->hands) {
     if (!hand) continue;
     hand->step(seq, world_, dt);

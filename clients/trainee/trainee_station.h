@@ -8,14 +8,15 @@
 #include "clients/haptic/station.h"
 #include "clients/haptic/tactile_map.h"
 #include "clients/simulated_person/person.h"
+#include "devices/catalog.h"
 #include "idl/types/result.h"
 
 namespace tenon::trainee {
 
 struct TraineeOptions {
-  std::string device = "hug-sim";        ///< bimanual haptic device
-  std::string tactors = "vibrotac-sim";  ///< vibrotactile bracelet
-  bool swap_hands = false;               ///< the right arm moves hand `left` and the left arm hand `right`
+  std::string device{devices::kTraineeDevice};  ///< bimanual haptic device
+  std::string tactors = "vibrotac-sim";         ///< vibrotactile bracelet
+  bool swap_hands = false;  ///< the right arm moves hand `left` and the left arm hand `right`
   haptic::TactileMode tactile = haptic::TactileMode::kIntensity;
   simulated_person::PersonOptions person;
   bool simulated_person = true;  ///< a simulated trainee moves the simulated arms; false: they move otherwise
@@ -41,12 +42,13 @@ class TraineeStation : public haptic::Station {
   void begin(std::span<const HandId> hand_ids) override;
   void manifoldReceived(const HandManifold& manifold) noexcept override;
   void stepChanged() override;
-  void stopChanged(bool engaged) override;
+  void armingChanged() noexcept override;
 
  private:
   struct Parts;
   /// Poses of forearm and head, and the vibration of the bracelet; `dt` [s].
   void trackBody(std::uint32_t seq, double dt) noexcept;
+  void armBracelet() noexcept;
   explicit TraineeStation(std::unique_ptr<Parts> parts);
   std::unique_ptr<Parts> parts_;
 };

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 #include <zstd.h>
 
@@ -105,8 +106,13 @@ Result<McapWriter> McapWriter::open(const std::filesystem::path& file, const Mca
   impl->compress = options.compress;
   std::error_code ignored;
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), ignored);
-  impl->descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  impl->descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
   if (impl->descriptor < 0) return fail(file.string() + ": cannot be written (" + std::strerror(errno) + ")");
+  // locked before it is emptied: it may be the file of a session that runs. Devices and pipes have no lock
+  if (flock(impl->descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+    return fail(file.string() + ": another program is writing it; name another file");
+  if (ftruncate(impl->descriptor, 0) != 0 && errno != EINVAL)
+    return fail(file.string() + ": cannot be emptied (" + std::strerror(errno) + ")");
   if (auto done = impl->put(mcap::kMagic); !done) return fail(done.error().what);
   record::mcap::FieldWriter header;
   header.put(std::string_view("tenon"));

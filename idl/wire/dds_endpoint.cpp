@@ -73,6 +73,10 @@ const Origin& OriginCache::find(dds_entity_t reader, dds_instance_handle_t write
   return origin;
 }
 
+bool isHeard(const PartitionEntities& partition, const TopicParameters& topic, const Origin& from) {
+  return !topic.of_server || !partition.server || *partition.server == from;
+}
+
 bool isGone(const dds_sample_info_t& info, bool latched) {
   if (info.sample_rank != 0) return false;
   return info.instance_state == DDS_NOT_ALIVE_DISPOSED_INSTANCE_STATE ||

@@ -54,6 +54,10 @@ class OriginCache {
   std::unordered_map<dds_instance_handle_t, Origin> known_;
 };
 
+/// Whether samples of `topic` by `from` are delivered to a reader of `partition`: see Partition::hearOnly.
+[[nodiscard]] bool isHeard(const PartitionEntities& partition, const TopicParameters& topic,
+                           const Origin& from);
+
 /// "WorldFrame_1k in 's/demo': <text of the DDS return code>"
 [[nodiscard]] std::string ddsError(std::string_view what, const PartitionEntities& partition,
                                    dds_return_t code);

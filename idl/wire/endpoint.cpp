@@ -1,5 +1,7 @@
 #include "idl/wire/endpoint.h"
 
+#include <deque>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -98,6 +100,7 @@ bool Writer<M>::waitForReaders(std::chrono::nanoseconds timeout) {
 template <class M>
 struct Reader<M>::Impl {
   std::unique_ptr<DdsEndpoint> endpoint;
+  TopicParameters parameters;
   OriginCache origins;
 };
 
@@ -116,6 +119,7 @@ Result<Reader<M>> Reader<M>::open(Partition& partition, const Topic<M>& topic) {
   if (!endpoint) return tl::unexpected(endpoint.error());
   auto impl = std::make_unique<Impl>();
   impl->endpoint = std::move(*endpoint);
+  impl->parameters = topic.parameters;
   return Reader(std::move(impl));
 }
 template <class M>
@@ -125,7 +129,9 @@ bool Reader<M>::take(M& out, Origin* from) {
     const Loan<M> loan(reader, 1);
     if (loan.size() == 0) return false;
     if (!loan.info(0).valid_data || !fromWire(loan.sample(0), out)) continue;
-    if (from != nullptr) *from = impl_->origins.find(reader, loan.info(0).publication_handle);
+    const Origin& origin = impl_->origins.find(reader, loan.info(0).publication_handle);
+    if (!isHeard(*impl_->endpoint->partition(), impl_->parameters, origin)) continue;
+    if (from != nullptr) *from = origin;
     return true;
   }
 }
@@ -139,9 +145,15 @@ namespace {
 template <class M>
 class TypedSubscription : public Subscription {
  public:
-  TypedSubscription(bool latched, std::uint64_t& malformed) : latched_(latched), malformed_(malformed) {}
+  TypedSubscription(const Topic<M>& described, std::uint64_t& malformed)
+      : parameters_(described.parameters),
+        keeps_unheard_(described.qos_class == QosClass::kState && described.parameters.of_server),
+        malformed_(malformed) {}
+
+  [[nodiscard]] bool isRebound() const override { return reader->partition()->server != server_; }
 
   std::size_t takeBatch() override {
+    if (isRebound()) deliverUnheard();
     const Loan<M> loan(reader->entity(), kTakeBatch);
     for (int i = 0; i < loan.size(); ++i) deliver(loan.info(i), loan.sample(i));
     return static_cast<std::size_t>(loan.size());
@@ -158,16 +170,36 @@ class TypedSubscription : public Subscription {
     }
     if (info.valid_data) {
       const Origin& origin = origins_.find(reader->entity(), info.publication_handle);
+      if (!isHeard(*reader->partition(), parameters_, origin)) return keepUnheard(origin);
       for (const auto& handler : handlers) handler(message_, origin);
     }
-    if (isGone(info, latched_)) {
+    if (isGone(info, parameters_.latched)) {
       const bool disposed = info.instance_state == DDS_NOT_ALIVE_DISPOSED_INSTANCE_STATE;
       const Origin who = disposed ? origins_.find(reader->entity(), info.publication_handle) : Origin{};
+      if (who.known() && !isHeard(*reader->partition(), parameters_, who)) return;
       for (const auto& handler : gone_handlers) handler(message_, who);
     }
   }
 
-  bool latched_;
+  /// The states of another server come once, maybe before it is known that this client will belong to it.
+  void keepUnheard(const Origin& origin) {
+    constexpr std::size_t kMany = 2000;
+    if (!keeps_unheard_ || !origin.known()) return;
+    if (unheard_.size() >= kMany) unheard_.pop_front();
+    unheard_.emplace_back(origin, message_);
+  }
+  void deliverUnheard() {
+    server_ = reader->partition()->server;
+    for (const auto& [origin, message] : std::exchange(unheard_, {})) {
+      if (server_ != origin) continue;
+      for (const auto& handler : handlers) handler(message, origin);
+    }
+  }
+
+  TopicParameters parameters_;
+  bool keeps_unheard_;
+  std::optional<Origin> server_;  ///< that the partition was bound to at the last samples
+  std::deque<std::pair<Origin, M>> unheard_;
   std::uint64_t& malformed_;
   OriginCache origins_;
   M message_;
@@ -186,7 +218,7 @@ struct Inbox::Impl {
         return static_cast<TypedSubscription<M>*>(known.get());
       }
     }
-    auto created = std::make_unique<TypedSubscription<M>>(topic.parameters.latched, malformed);
+    auto created = std::make_unique<TypedSubscription<M>>(topic, malformed);
     auto* const typed = created.get();
     if (auto added = wait_set.add(std::move(created), partition, specOf(topic), false); !added) {
       return tl::unexpected(added.error());

@@ -4,10 +4,12 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include <dds/dds.h>
 
+#include "idl/wire/origin.h"
 #include "idl/wire/topics.h"
 
 /// The DDS entities behind participant.h, deleted with their owners. Internal to idl/wire.
@@ -37,6 +39,7 @@ struct PartitionEntities {
   LinkProfile profile = LinkProfile::kLan;
   dds_entity_t publisher = 0;
   dds_entity_t subscriber = 0;
+  std::optional<Origin> server;  ///< see Partition::hearOnly
 
   PartitionEntities() = default;
   PartitionEntities(const PartitionEntities&) = delete;

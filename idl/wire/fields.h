@@ -64,6 +64,10 @@ void fields(auto& d, auto& c, Is<HandPull> auto& m) {
   d("stiffness", c.stiffness, m.stiffness);
   d("rotational_stiffness", c.rotational_stiffness, m.rotational_stiffness);
 }
+void fields(auto& d, auto& c, Is<ManifoldBody> auto& m) {
+  d("object", c.object_id, m.object);
+  d("epoch", c.epoch, m.epoch);
+}
 void fields(auto& d, auto& c, Is<PairContact> auto& m) {
   d("a", c.a, m.a);
   d("b", c.b, m.b);
@@ -99,30 +103,36 @@ inline constexpr auto kNames = [](auto& d, auto& c, auto& m) { d("hand name", c.
 
 void fields(auto& d, auto& c, Is<SessionAnnounce> auto& m) {
   d("session", c.session, m.session);
+  d("server_epoch", c.server_epoch, m.server_epoch);
   d("title", c.title, m.title);
   d("protocol_version", c.protocol_version, m.protocol_version);
-  d("server_epoch", c.server_epoch, m.server_epoch);
   d("lockstep", c.lockstep, m.lockstep);
-  d("asset_port", c.asset_port, m.asset_port);
   d("scenario_hash", c.scenario_hash, m.scenario_hash);
-  d.list("free_hands", c.free_hands, m.free_hands, 16, kNames);
+  d("host", c.host, m.host);
+  d("pid", c.pid, m.pid);
+  d("scene_hash", c.scene_hash, m.scene_hash);
 }
 void fields(auto& d, auto& c, Is<Join> auto& m) {
   d("client_guid", c.client_guid, m.client_guid);
+  d("session", c.session, m.session);
+  d("server_epoch", c.server_epoch, m.server_epoch);
   d("name", c.name, m.name);
   d("role", c.role, m.role);
   d.list("hands", c.hands, m.hands, 16, kNames);
-  d("token", c.token, m.token);
+  d("seat_key", c.seat_key, m.seat_key);
+  d("seat_proof", c.seat_proof, m.seat_proof);
+  d("key_proof", c.key_proof, m.key_proof);
   d("protocol_version", c.protocol_version, m.protocol_version);
 }
 void fields(auto& d, auto& c, Is<Welcome> auto& m) {
   d("client_guid", c.client_guid, m.client_guid);
+  d("session", c.session, m.session);
+  d("server_epoch", c.server_epoch, m.server_epoch);
   d("accepted", c.accepted, m.accepted);
   d("reason", c.reason, m.reason);
+  d("challenge", c.challenge, m.challenge);
   d("client", c.client_id, m.client);
   d.list("hands", c.hands, m.hands, 16, kNumbers);
-  d("token", c.token, m.token);
-  d("server_epoch", c.server_epoch, m.server_epoch);
   d("tick", c.tick, m.tick);
   d("lockstep", c.lockstep, m.lockstep);
 }
@@ -137,11 +147,9 @@ void fields(auto& d, auto& c, Is<DeviceInput> auto& m) {
   d("hand", c.hand_id, m.hand);
   d("client", c.client_id, m.client);
   d("server_epoch", c.server_epoch, m.server_epoch);
-  d("heard_tick", c.heard_tick, m.heard_tick);
-  d("dof_mask", c.dof_mask, m.dof_mask);
   d("active", c.active, m.active);
+  fields(d, c.sample, m.sample);
   d("p_WC", c.p_WC, m.p_WC);
-  for (std::size_t i = 0; i < m.samples.size(); ++i) fields(d, c.samples[i], m.samples[i]);
 }
 void fields(auto& d, auto& c, Is<WorldFrame> auto& m) {
   d("part", c.part, m.part);
@@ -168,6 +176,7 @@ void fields(auto& d, auto& c, Is<HandManifold> auto& m) {
   d("frozen", c.frozen, m.frozen);
   d.list("others", c.others, m.others, kOtherPulls, kStructs);
   d.list("contacts", c.contacts, m.contacts, kManifoldContacts, kStructs);
+  d.list("bodies", c.bodies, m.bodies, kManifoldBodies, kStructs);
 }
 void fields(auto& d, auto& c, Is<HandState> auto& m) {
   d("hand", c.hand_id, m.hand);
@@ -241,7 +250,6 @@ void fields(auto& d, auto& c, Is<SceneObject> auto& m) {
   d("name", c.name, m.name);
   d("title", c.title, m.title);
   d("kind", c.kind, m.kind);
-  d("mesh_hash", c.mesh_hash, m.mesh_hash);
   d("structure_hash", c.structure_hash, m.structure_hash);
   d("color", c.color, m.color);
   fields(d, c.X_WO, m.X_WO);
@@ -303,8 +311,11 @@ void fields(auto& d, auto& c, Is<RecorderStatus> auto& m) {
   d("lost", c.lost, m.lost);
   d("problem", c.problem, m.problem);
 }
-void fields(auto& d, auto& c, Is<EmergencyStop> auto& m) {
-  d("engaged", c.engaged, m.engaged);
+template <class M>
+concept StopMessage = Is<M, EmergencyStop> || Is<M, EmergencyClear>;
+void fields(auto& d, auto& c, StopMessage auto& m) {
+  d("client_guid", c.client_guid, m.client_guid);
+  d("counter", c.counter, m.counter);
   d("who", c.who, m.who);
   d("reason", c.reason, m.reason);
 }

@@ -1,6 +1,7 @@
 #include "idl/wire/membership.h"
 
 #include <cstdio>
+#include <optional>
 #include <random>
 #include <thread>
 #include <utility>
@@ -11,6 +12,7 @@ namespace {
 using std::chrono::milliseconds;
 constexpr milliseconds kRepeatInterval{500};
 constexpr milliseconds kPollInterval{5};
+constexpr milliseconds kOthersWait{100};  // after the first announcement, for an earlier server of that name
 
 std::string randomGuid() {
   std::random_device source;
@@ -44,6 +46,8 @@ Result<std::unique_ptr<Membership>> Membership::find(const MembershipOptions& op
   if (!participant) return fail(participant.error().what);
   std::unique_ptr<Membership> member(new Membership(options));
   member->guid_ = randomGuid();
+  member->participant_ = *participant;
+  if (!member->options_.seat) member->options_.seat = SeatKey::random();
   member->lobby_ = std::make_unique<Partition>(*participant, kLobby);
   auto announce = member->awaitAnnounce(stop, {});
   if (!announce) return fail(announce.error().what);
@@ -52,6 +56,7 @@ Result<std::unique_ptr<Membership>> Membership::find(const MembershipOptions& op
   const bool lockstep = member->announce_.lockstep && !options.passive;
   member->session_ = std::make_unique<Partition>(*participant, sessionPartition(member->announce_.session),
                                                  lockstep ? LinkProfile::kLockstep : LinkProfile::kLan);
+  member->session_->hearOnly(member->server_);
   return member;
 }
 
@@ -63,12 +68,22 @@ Membership::~Membership() {
 Result<SessionAnnounce> Membership::awaitAnnounce(const Stop& stop, const std::function<void()>& meanwhile) {
   auto reader = Reader<SessionAnnounce>::open(*lobby_, kSessionAnnounce);
   if (!reader) return fail(reader.error().what);
-  SessionAnnounce announce;
-  const bool found = waitFor(options_.timeout, stop, meanwhile, [&] {
-    while (reader->take(announce))
-      if (options_.session.empty() || announce.session == options_.session) return true;
-    return false;
+  SessionAnnounce announce, next;
+  Origin from;
+  std::optional<std::chrono::steady_clock::time_point> found_at;
+  (void)waitFor(options_.timeout, stop, meanwhile, [&] {
+    while (reader->take(next, &from)) {
+      const std::string& wanted = found_at ? announce.session : options_.session;
+      if (!from.known() || (!wanted.empty() && next.session != wanted)) continue;
+      if (found_at && next.server_epoch >= announce.server_epoch) continue;
+      announce = next;
+      server_ = from;
+      if (!found_at) found_at = std::chrono::steady_clock::now();
+    }
+    return found_at && std::chrono::steady_clock::now() - *found_at >= kOthersWait;
   });
+  const bool found = found_at.has_value();
+  if (found) lobby_->hearOnly(server_);
   if (!found && stop) return fail("stopped while looking for " + sessionText(options_.session));
   if (!found) {
     return fail("no server announced " + sessionText(options_.session) + " on domain " +
@@ -91,7 +106,14 @@ Result<void> Membership::join(const Stop& stop, const std::function<void()>& mea
   if (!joins) return fail(joins.error().what);
   auto welcomes = Reader<Welcome>::open(*lobby_, kWelcome);
   if (!welcomes) return fail(welcomes.error().what);
-  const Join join{guid_, options_.person, options_.role, options_.hands, options_.token, kProtocolVersion};
+  Join join{.client_guid = guid_,
+            .session = announce_.session,
+            .server_epoch = announce_.server_epoch,
+            .name = options_.person,
+            .role = options_.role,
+            .hands = options_.hands,
+            .seat_key = options_.seat->publicKey()};
+  std::string key_problem;
   Result<void> sent;
   auto send_at = std::chrono::steady_clock::now();
   const bool answered = waitFor(options_.timeout, stop, meanwhile, [&] {
@@ -100,9 +122,17 @@ Result<void> Membership::join(const Stop& stop, const std::function<void()>& mea
       sent = joins->write(join);
       send_at = std::chrono::steady_clock::now() + kRepeatInterval;
     }
-    // a refusal with a valid client id is the notice of a lost seat, not the answer to this request
-    while (sent && welcomes->take(welcome_, &server_))
-      if (welcome_.client_guid == guid_ && (welcome_.accepted || !welcome_.client.valid())) return true;
+    while (sent && welcomes->take(welcome_)) {
+      if (welcome_.client_guid != guid_ || welcome_.server_epoch != announce_.server_epoch) continue;
+      if (!welcome_.challenge.empty()) {
+        if (!join.seat_proof.empty()) continue;  // challenged again by a request on its way
+        prove(welcome_.challenge, join, key_problem);
+        sent = joins->write(join);
+        continue;
+      }
+      // a refusal with a valid client id is the notice of a lost seat, not the answer to this request
+      if (welcome_.accepted || !welcome_.client.valid()) return true;
+    }
     return !sent;
   });
   if (!sent) return sent;
@@ -111,12 +141,26 @@ Result<void> Membership::join(const Stop& stop, const std::function<void()>& mea
     return fail("the server of " + sessionText(announce_.session) +
                 " does not answer: it may hang or have ended");
   if (!welcome_.accepted)
-    return fail("the server of " + sessionText(announce_.session) + " refuses: " + welcome_.reason);
+    return fail("the server of " + sessionText(announce_.session) + " refuses: " + welcome_.reason +
+                (key_problem.empty() ? "" : "; " + key_problem));
   return takeSeat();
 }
 
+void Membership::prove(const std::string& challenge, Join& join, std::string& problem) const {
+  const ProofSubject subject{.challenge = challenge,
+                             .session = join.session,
+                             .server_epoch = join.server_epoch,
+                             .client_guid = join.client_guid,
+                             .role = join.role,
+                             .client = participant_->origin()};
+  join.seat_proof = options_.seat->proofOf(subject);
+  const auto file = options_.key_file.empty() ? defaultKeyFile() : options_.key_file;
+  const auto key = readKeyFile(file);
+  if (key) join.key_proof = key->proofOf(subject);
+  if (!key) problem = key.error().what;
+}
+
 Result<void> Membership::takeSeat() {
-  options_.token = welcome_.token;
   lost_.reset();
   server_gone_ = false;
   presence_ = {welcome_.client, options_.person, options_.role, {}, true};
@@ -130,7 +174,7 @@ Result<void> Membership::takeSeat() {
 Result<void> Membership::watch(Inbox& inbox) {
   auto watched =
       inbox.onGone<SessionAnnounce>(*lobby_, kSessionAnnounce, [this](const SessionAnnounce& gone) {
-        if (gone.session != announce_.session) return;
+        if (gone.session != announce_.session || gone.server_epoch != announce_.server_epoch) return;
         server_gone_ = true;
         lost_ = "the server of " + sessionText(announce_.session) + " is gone";
       });
@@ -147,6 +191,7 @@ Result<void> Membership::rejoin(const Stop& stop, const std::function<void()>& m
   auto announce = awaitAnnounce(stop, meanwhile);
   if (!announce) return fail(announce.error().what);
   announce_ = std::move(*announce);
+  session_->hearOnly(server_);
   if (announce_.lockstep != was_lockstep)
     return fail(sessionText(announce_.session) +
                 " changed between lockstep and real time: start this program again");

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -12,6 +13,7 @@
 #include "idl/types/messages/session.h"
 #include "idl/types/result.h"
 #include "idl/wire/endpoint.h"
+#include "idl/wire/identity.h"
 
 namespace tenon::wire {
 
@@ -22,7 +24,8 @@ struct MembershipOptions {
   std::string person = "somebody";  ///< name of the participant, for display
   Role role = Role::kObserver;
   std::vector<std::string> hands;  ///< to control
-  std::string token;               ///< of an earlier seat, to rejoin it with its hands; or empty
+  std::optional<SeatKey> seat;     ///< of an earlier seat, to rejoin it with its hands; none: a new one
+  std::filesystem::path key_file;  ///< of the session's key, for roles that need it; empty: defaultKeyFile()
   bool lockstep = false;           ///< refuse a session in real time
   bool passive = false;  ///< best-effort streams also in lockstep, so that it never blocks the session
   std::chrono::seconds timeout{10};  ///< [s] for finding a server, and for its answer
@@ -30,6 +33,10 @@ struct MembershipOptions {
 
 /// A client's seat in a session: finds the server in the lobby, joins, publishes Presence and disposes it at
 /// the end. When the connection was lost on either side, it can rejoin the same seat.
+///
+/// From find() on it belongs to one server: what others write in its name is not delivered by readers of
+/// lobby() and session() (Partition::hearOnly). Of several servers of one name it is the one that started
+/// first.
 ///
 /// Finding and joining are separate steps, because a recorder subscribes to the session before it joins.
 ///
@@ -64,6 +71,9 @@ class Membership {
   [[nodiscard]] const Welcome& welcome() const { return welcome_; }
   /// Whether a message was written by the server whose Welcome was received.
   [[nodiscard]] bool isServer(const Origin& origin) const { return origin.known() && origin == server_; }
+  /// The secret of the seat: whoever has it may take the seat again.
+  [[nodiscard]] const SeatKey& seat() const { return *options_.seat; }
+  [[nodiscard]] const std::string& clientGuid() const { return guid_; }
   [[nodiscard]] Partition& lobby() { return *lobby_; }
   [[nodiscard]] Partition& session() { return *session_; }
 
@@ -71,9 +81,12 @@ class Membership {
   explicit Membership(const MembershipOptions& options) : options_(options) {}
   Result<SessionAnnounce> awaitAnnounce(const Stop& stop, const std::function<void()>& meanwhile);
   Result<void> takeSeat();
+  /// Answers the challenge of a Welcome; `problem`: why there is no proof of the session's key.
+  void prove(const std::string& challenge, Join& join, std::string& problem) const;
 
   MembershipOptions options_;
   std::string guid_;  ///< Join::client_guid
+  std::shared_ptr<Participant> participant_;
   std::unique_ptr<Partition> lobby_;
   std::unique_ptr<Partition> session_;
   std::unique_ptr<Writer<Presence>> presence_writer_;

@@ -122,6 +122,7 @@ Partition::~Partition() = default;
 Partition::Partition(Partition&&) noexcept = default;
 Partition& Partition::operator=(Partition&&) noexcept = default;
 const std::string& Partition::name() const { return entities_->name; }
+void Partition::hearOnly(const Origin& server) { entities_->server = server; }
 LinkProfile Partition::profile() const { return entities_->profile; }
 
 }  // namespace tenon::wire

@@ -1,12 +1,12 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "idl/types/result.h"
+#include "idl/wire/origin.h"
 #include "idl/wire/topics.h"
 
 namespace tenon::wire {
@@ -20,15 +20,6 @@ struct LinkOptions {
   /// Cyclone DDS configuration: XML text or path of a file. Empty: CYCLONEDDS_URI if set, else loopback as in
   /// deploy/dds/loopback.xml.
   std::string config;
-};
-
-/// The program that wrote a sample: the GUID of its DDS participant, which DDS assigns and a message cannot
-/// claim. All zero: unknown, as of a writer that has ended since.
-struct Origin {
-  std::array<std::uint8_t, 16> guid{};
-
-  [[nodiscard]] bool known() const { return *this != Origin{}; }
-  bool operator==(const Origin&) const = default;
 };
 
 /// A DDS domain participant.
@@ -73,6 +64,10 @@ class Partition {
 
   [[nodiscard]] const std::string& name() const;
   [[nodiscard]] LinkProfile profile() const;
+  /// From now on this partition's readers, open ones too, deliver the topics that a server alone writes
+  /// (TopicParameters::of_server) from the participant `server` only, whoever else writes them. Topics that
+  /// anybody writes are not affected. To be called by the thread that takes the samples.
+  void hearOnly(const Origin& server);
   /// Shared with the endpoints, which may outlive the Partition.
   [[nodiscard]] const std::shared_ptr<PartitionEntities>& entities() const { return entities_; }
 

@@ -24,7 +24,9 @@ void setReliability(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile)
 }
 
 void setReaderHistory(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile) {
-  if (topic.qos_class == QosClass::kEvent) {
+  // of a server's state, the one of another server must not replace it before it is taken
+  const bool state_of_server = topic.qos_class == QosClass::kState && topic.parameters.of_server;
+  if (topic.qos_class == QosClass::kEvent || state_of_server) {
     dds_qset_history(qos, DDS_HISTORY_KEEP_ALL, 0);
   } else if (topic.qos_class == QosClass::kStream && profile == LinkProfile::kLockstep) {
     dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, kLockstepDepth);
@@ -48,9 +50,6 @@ dds_qos_t* commonQos(const TopicSpec& topic, LinkProfile profile) {
   setReliability(qos, topic, profile);
   dds_qset_durability(
       qos, topic.parameters.late_joiner_depth > 0 ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
-  if (topic.parameters.latched) {
-    dds_qset_destination_order(qos, DDS_DESTINATIONORDER_BY_SOURCE_TIMESTAMP);
-  }
   return qos;
 }
 
@@ -94,7 +93,7 @@ dds_qos_t* readerQos(const TopicSpec& topic, LinkProfile profile, bool keep_all)
 std::string_view loopbackConfig() {
   return R"xml(<?xml version="1.0" encoding="UTF-8"?>
 <!-- Programs on one machine, and nothing leaves it: the default when neither an option nor CYCLONEDDS_URI says
-     otherwise. Unicast to up to 61 participants, so it also works where multicast does not. One receive thread
+     otherwise. Unicast to up to 120 participants, so it also works where multicast does not. One receive thread
      a process; fast heartbeats and acknowledgements, because a lost sample of a lockstep session stops all
      its programs until it has been sent again. -->
 <CycloneDDS xmlns="https://cdds.io/config">
@@ -107,7 +106,7 @@ std::string_view loopbackConfig() {
     </General>
     <Discovery>
       <ParticipantIndex>auto</ParticipantIndex>
-      <MaxAutoParticipantIndex>60</MaxAutoParticipantIndex>
+      <MaxAutoParticipantIndex>119</MaxAutoParticipantIndex>
       <Peers>
         <Peer Address="127.0.0.1"/>
       </Peers>

@@ -40,6 +40,9 @@ class RawSubscription : public Subscription {
     const dds_return_t count = dds_take(reader->entity(), samples, infos, kTakeBatch, kTakeBatch);
     if (count <= 0) return 0;
     for (int i = 0; i < count; ++i) {
+      const Origin& from = origins_.find(reader->entity(), infos[i].publication_handle);
+      const bool ended = !infos[i].valid_data && !from.known();  // by a writer that is no more
+      if (!ended && !isHeard(*reader->partition(), spec_.parameters, from)) continue;
       if (infos[i].valid_data) deliver(infos[i], samples[i], false);
       if (isGone(infos[i], spec_.parameters.latched)) deliver(infos[i], samples[i], true);
     }
@@ -55,6 +58,7 @@ class RawSubscription : public Subscription {
 
   TopicSpec spec_;
   const std::function<void(const RawSample&)>* const& handler_;  ///< of the current dispatch()
+  OriginCache origins_;
   std::uint64_t sequence_ = 0;
   std::vector<std::uint8_t> bytes_;
 };

@@ -65,7 +65,8 @@ std::size_t ReaderWaitSet::takeAll() {
   constexpr int kMaxBatches = 64;  // per reader: a fast writer must not occupy the thread
   std::size_t handled = 0;
   for (const auto& subscription : subscriptions_) {
-    if (!subscription->pending.exchange(false, std::memory_order_acq_rel)) continue;
+    const bool is_pending = subscription->pending.exchange(false, std::memory_order_acq_rel);
+    if (!is_pending && !subscription->isRebound()) continue;
     int batches = 0;
     std::size_t taken = kTakeBatch;
     while (taken == kTakeBatch && batches < kMaxBatches) {

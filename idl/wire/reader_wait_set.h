@@ -23,6 +23,8 @@ class Subscription {
   virtual ~Subscription() = default;
   /// Takes and handles up to kTakeBatch samples; returns their number.
   virtual std::size_t takeBatch() = 0;
+  /// Whether there is something to handle without a new sample: Partition::hearOnly has named another server.
+  [[nodiscard]] virtual bool isRebound() const { return false; }
 
   std::string topic;
   std::atomic<bool> pending{false};  ///< set by DDS: there may be samples to take

@@ -22,7 +22,7 @@ namespace tenon::part_generator::engine_bay {
 inline constexpr double kGap = 0.0013;
 /// [m] The pair's clearance as scenarios define it: sum of both sides.
 inline constexpr double kClearance = 2.0 * kGap;
-/// [m] Between the tip of a tongue and the floor of its pocket at the target: about the dilation of the bay.
+/// [m] Between the tip of a tongue and the floor of its pocket at the target, within its tolerance.
 inline constexpr double kSeatGap = 0.0005;
 /// [m] Width of the funnel at a pocket's mouth on each side, equal to its depth (45 degrees).
 inline constexpr double kFunnel = 0.014;

@@ -8,6 +8,7 @@
 #include "server/bake/field_bake.h"
 #include "server/bake/parallel.h"
 #include "server/bake/shell_bake.h"
+#include "server/bake/thin_places.h"
 #include "server/bake/welded_mesh.h"
 
 namespace tenon::bake {
@@ -96,16 +97,23 @@ Result<structures::HapticStructures> bake(const TriangleMesh& mesh, const BakeOp
   if (!baked) return tl::unexpected(baked.error());
 
   structures::HapticStructures structures;
-  structures.field = baked->field;
-  work.stage("sampling the shell", 0.88, 0.98);
-  structures.shell = bakeShell(welded, baked->surface, baked->field, options, work);
+  structures::StructureInfo& info = structures.info;
+  const structures::DistanceField undilated = structures::viewOf(baked->storage);
+  work.stage("sampling the shell", 0.88, 0.95);
+  structures.shell = bakeShell(welded, baked->surface, undilated, options, work);
   if (work.cancelled()) return fail("cancelled");
   if (!structures.shell.empty()) {
     structures.features =
-        bakeFeatures(welded, baked->field, static_cast<double>(structures.shell.levels().back().spacing));
+        bakeFeatures(welded, undilated, static_cast<double>(structures.shell.levels().back().spacing));
   }
+  const std::string sheets = noteSheets(welded, undilated);
+  work.stage("thickening thin walls", 0.95, 0.99);
+  const ThinPlaces thin = findThinPlaces(undilated, baked->surface, baked->thin, work);
+  if (work.cancelled()) return fail("cancelled");
+  structures.field = structures::makeDilatedField(std::move(baked->storage), thin.dilations);
+  info.thin_area = thin.area;
+  info.open_area = thin.open_area;
 
-  structures::StructureInfo& info = structures.info;
   info.triangles = mesh.triangles.size();
   for (const structures::Triangle& t : welded.triangles) info.box_M.extend(structures::boxOf(t));
   for (const structures::Triangle& t : baked->surface) info.surface_area += structures::areaOf(t);
@@ -121,7 +129,7 @@ Result<structures::HapticStructures> bake(const TriangleMesh& mesh, const BakeOp
     info.notes += std::to_string(baked->hidden_triangles) +
                   " triangles lie inside the solid and are not part of its surface.\n";
   }
-  info.notes += noteSheets(welded, structures.field);
+  info.notes += sheets;
   info.bake_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   work.stage("done", 1.0, 1.0);
   return structures;

@@ -54,20 +54,20 @@ BrickLevel::BrickLevel(const Vector3& p_MoFo, double edge, const Cell& brick_cou
   free.assign(count, 0);
 }
 
-BrickLevel::BrickLevel(const BrickLevel& coarse, int divisions, std::span<const std::uint32_t> refined)
+BrickLevel::BrickLevel(const BrickLevel& coarse, int divisions, std::span<const std::uint32_t> refined,
+                       std::span<const std::uint8_t> deep)
     : p_MoFo_M(coarse.p_MoFo_M),
       voxel(coarse.voxel / divisions),
       bricks(coarse.bricks * divisions),
       refinement(divisions),
       coarse_bricks_(coarse.bricks),
       block_of_coarse_(coarse.nodes(), -1),
-      coarse_of_block_(refined.begin(), refined.end()) {
+      coarse_of_block_(refined.begin(), refined.end()),
+      deep_block_(deep.begin(), deep.end()) {
   for (std::size_t block = 0; block < refined.size(); ++block) {
     block_of_coarse_[refined[block]] = static_cast<std::int32_t>(block);
   }
-  const std::size_t children =
-      static_cast<std::size_t>(divisions) * static_cast<std::size_t>(divisions * divisions);
-  slot.assign(refined.size() * children, -1);
+  slot.assign(refined.size() * childrenOfBlock(), -1);
   free.assign(slot.size(), 0);
 }
 
@@ -130,9 +130,9 @@ void BrickLevel::setSample(const Cell& lattice, std::int16_t value, std::span<st
 std::size_t BrickLevel::sampleDistances(const TriangleTree& tree, std::size_t most, ParallelWork& work) {
   // bricks whose centre is too far away have no sample in the band
   std::vector<std::uint8_t> candidate(nodes(), 0);
-  const double band_reach = (structures::DistanceField::kBandVoxels + kBrickRadius) * voxel;
-  work.run(nodes(), 1024,
-           [&](std::size_t node) { candidate[node] = tree.anyWithin(centreOf(node), band_reach); });
+  work.run(nodes(), 1024, [&](std::size_t node) {
+    candidate[node] = tree.anyWithin(centreOf(node), (bandOf(node) + kBrickRadius) * voxel);
+  });
   std::vector<std::uint32_t> of_slot;
   for (std::size_t node = 0; node < nodes(); ++node) {
     if (candidate[node] == 0) continue;
@@ -148,8 +148,8 @@ std::size_t BrickLevel::sampleDistances(const TriangleTree& tree, std::size_t mo
   work.run(of_slot.size(), 1024, [&](std::size_t s) { copyApron(of_slot[s]); });
   for (std::size_t s = 0; s < of_slot.size() && !work.cancelled(); ++s) {
     const std::int16_t* own = samplesOf(static_cast<std::int32_t>(s));
-    const auto band = static_cast<std::int16_t>(structures::DistanceField::kBandVoxels *
-                                                structures::DistanceField::kQuantaPerVoxel);
+    const auto band =
+        static_cast<std::int16_t>(bandOf(of_slot[s]) * structures::DistanceField::kQuantaPerVoxel);
     if (*std::min_element(own, own + kSamples) >= band) slot[of_slot[s]] = -1;
   }
   return of_slot.size();
@@ -186,13 +186,13 @@ void BrickLevel::sampleBrick(std::size_t node, const TriangleTree& tree, const S
   if (which.none()) return;
   const Cell corner = brickOf(node) * kVoxels;
   std::int16_t* out = samplesOf(slot[node]);
-  constexpr double kClamp = structures::DistanceField::kClampVoxels;
+  const double clamp = clampOf(node);
   constexpr double kBlockRadius = 2.5981;  // [voxels] from the middle of 4^3 samples to a corner
-  TriangleTree::Search search(tree, centreOf(node), kBrickRadius * voxel, (kClamp + kBlockRadius) * voxel);
-  const std::int16_t clamped = structures::quantizedSample(kClamp * voxel, voxel);
+  TriangleTree::Search search(tree, centreOf(node), kBrickRadius * voxel, (clamp + kBlockRadius) * voxel);
+  const std::int16_t clamped = structures::quantizedSample(clamp * voxel, voxel, clamp);
   const auto fill = [&](const Cell& from, const Cell& to) {
     const Vector3 middle = (from + to - Cell::Ones()).cast<double>() / 2;
-    const double reach = (kClamp + (to - from - Cell::Ones()).cast<double>().norm() / 2 + 1e-9) * voxel;
+    const double reach = (clamp + (to - from - Cell::Ones()).cast<double>().norm() / 2 + 1e-9) * voxel;
     bool far = false;
     bool first = true;
     for (int z = from.z(); z < to.z(); ++z) {
@@ -205,9 +205,9 @@ void BrickLevel::sampleBrick(std::size_t node, const TriangleTree& tree, const S
             far = search.squaredDistance(position(corner) + middle * voxel, reach) >= reach * reach;
           }
           const Vector3 p = position(corner + Cell(x, y, z));
-          out[sample] =
-              far ? clamped
-                  : structures::quantizedSample(std::sqrt(search.squaredDistance(p, kClamp * voxel)), voxel);
+          out[sample] = far ? clamped
+                            : structures::quantizedSample(std::sqrt(search.squaredDistance(p, clamp * voxel)),
+                                                          voxel, clamp);
         }
       }
     }

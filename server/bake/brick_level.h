@@ -42,8 +42,10 @@ class BrickLevel {
 
   /// The whole grid, with edge `voxel` [m].
   BrickLevel(const Vector3& p_MoFo_M, double voxel, const Cell& bricks);
-  /// The children of the bricks `refined` of `coarse`.
-  BrickLevel(const BrickLevel& coarse, int refinement, std::span<const std::uint32_t> refined);
+  /// The children of the bricks `refined` of `coarse`; those of bricks marked in `deep` have a band that
+  /// reaches beyond the largest dilation of coarse bricks.
+  BrickLevel(const BrickLevel& coarse, int refinement, std::span<const std::uint32_t> refined,
+             std::span<const std::uint8_t> deep);
 
   /// -1 where this level has no brick.
   [[nodiscard]] std::int64_t nodeAt(const Cell& brick) const;
@@ -57,6 +59,15 @@ class BrickLevel {
   }
   [[nodiscard]] Cell cellAt(const Vector3& p_MP) const {
     return ((p_MP - p_MoFo_M) / voxel).array().floor().matrix().cast<int>();
+  }
+  /// [voxels] |distance| up to which samples of a node are exact, and where they are clamped.
+  [[nodiscard]] double bandOf(std::size_t node) const {
+    const bool deep = refinement > 1 && deep_block_[node / childrenOfBlock()] != 0;
+    return structures::DistanceField::kBandVoxels +
+           (deep ? structures::DistanceField::kHalfDiagonal * refinement : 0.0);
+  }
+  [[nodiscard]] double clampOf(std::size_t node) const {
+    return bandOf(node) + structures::DistanceField::kClampVoxels - structures::DistanceField::kBandVoxels;
   }
   [[nodiscard]] Point at(const Cell& lattice) const;
   /// The same for the point `in_brick` of the brick `node` (< 0: not in this level).
@@ -108,9 +119,15 @@ class BrickLevel {
   template <typename Visit>
   void visitCopies(const Cell& lattice, Visit&& visit) const;
 
+  [[nodiscard]] std::size_t childrenOfBlock() const {
+    const auto r = static_cast<std::size_t>(refinement);
+    return r * r * r;
+  }
+
   Cell coarse_bricks_;
   std::vector<std::int32_t> block_of_coarse_;  // fine level only: the number of the block of children, or -1
   std::vector<std::uint32_t> coarse_of_block_;
+  std::vector<std::uint8_t> deep_block_;
 };
 
 inline BrickLevel::Point BrickLevel::at(std::int64_t node, const Cell& in_brick) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -17,7 +18,7 @@ namespace tenon::bake {
 /// Threads: constant after construction. Real-time: no; used while structures are baked.
 class FaceSides {
  public:
-  /// `edges`: all edges of the mesh with one or two triangles.
+  /// `edges`: WeldedMesh::edges().
   FaceSides(const WeldedMesh& mesh, const std::vector<WeldedMesh::Edge>& edges,
             const structures::DistanceField& field);
 
@@ -25,6 +26,21 @@ class FaceSides {
   [[nodiscard]] Vector3 outward(std::uint32_t triangle) const;
 
  private:
+  /// A triangle beside another one.
+  struct Neighbour {
+    std::uint32_t triangle = WeldedMesh::Edge::kNone;
+    std::int8_t same = 0;  ///< 1: it has the other's orientation; -1: the opposite one
+  };
+  using Neighbours = std::vector<std::array<Neighbour, 3>>;  ///< of each triangle
+
+  [[nodiscard]] Neighbours neighboursOf(const std::vector<WeldedMesh::Edge>& edges) const;
+  /// Gives all triangles that are joined with `seed` one orientation, in sign_, and lists them in `patch`.
+  /// False when they have none.
+  bool orient(const Neighbours& neighbours, std::uint32_t seed, std::vector<std::uint32_t>& patch);
+  /// Decides on which side the oriented patch is outside.
+  void decide(const std::vector<std::uint32_t>& patch, bool orientable,
+              const structures::DistanceField& field);
+
   const WeldedMesh& mesh_;
   std::vector<std::int8_t> sign_;  ///< of (t[1] - t[0]) x (t[2] - t[0]); 0: no side
 };

@@ -1,12 +1,14 @@
 #include "server/bake/feature_bake.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
 #include "server/bake/face_sides.h"
-#include "server/bake/surface_normals.h"
+#include "server/bake/normal_estimator.h"
 #include "server/structures/point_grid.h"
 #include "server/structures/shell_builder.h"
 
@@ -17,7 +19,8 @@ using Edge = WeldedMesh::Edge;
 using structures::FeatureEdge;
 using structures::SurfaceSample;
 
-constexpr double kCos3 = -0.99863;    // [-] -cos of the turn between faces from which an edge counts
+constexpr double kFlatCosine =
+    -0.99863;                         // [-] of the angle between faces: flatter ones (177 deg) have no edge
 constexpr double kTanHalf60 = 0.577;  // [-] of a facet of a round surface at most
 constexpr double kTanHalf40 = 0.364;  // [-] tan of half the turn from which an edge is sharp at any radius
 constexpr double kCos6 = 0.995;       // [-] a polyline that turns less at a vertex is straight there
@@ -40,19 +43,17 @@ struct Sizes {
   explicit Sizes(double spacing)
       : apart(std::clamp(spacing, kSmallestSpacing, kLargestSpacing)),
         piece(1.5 * apart),
-        depth(apart / 16.0),
         sharp_radius(apart / 8.0),
-        largest_radius(apart * apart / (8.0 * depth)) {}
+        largest_radius(2.0 * apart) {}
 
   double apart;           ///< of the other part's points, about
   double piece;           ///< longest piece of an edge
-  double depth;           ///< what a flat face may enter between two points of a round feature
   double sharp_radius;    ///< rounder edges are sampled as surfaces, without their edges
   double largest_radius;  ///< rounder surfaces are no features
 
-  /// Spacing of points on a surface of this radius.
+  /// Spacing of points on a surface of this radius: a flat face enters between two by apart / 16 at most.
   [[nodiscard]] double spacingAt(double radius) const {
-    return std::clamp(std::sqrt(8.0 * radius * depth), apart / 16.0, apart);
+    return std::clamp(std::sqrt(0.5 * radius * apart), apart / 16.0, apart);
   }
 };
 
@@ -66,7 +67,7 @@ class FeatureFinder {
  public:
   FeatureFinder(const WeldedMesh& mesh, const structures::DistanceField& field, const Sizes& sizes)
       : mesh_(mesh), normals_(field), sizes_(sizes), grid_(sizes.apart) {
-    const std::vector<Edge> edges = mesh.sharpEdges(-2.0);
+    const std::vector<Edge> edges = mesh.edges();
     const FaceSides sides(mesh, edges, field);
     for (const Edge& edge : edges) addIfConvex(edge, sides);
   }
@@ -85,19 +86,20 @@ class FeatureFinder {
     const bool open = edge.second == Edge::kNone;
     const Vector3 along = (at(edge.to) - at(edge.from)).normalized();
     ConvexEdge convex{edge.from, edge.to, {}, 1.0, 0.0};
-    double width = 0.0;
-    std::array<Vector3, 2> towards;
-    for (const int face : {0, 1}) {
+    double width = std::numeric_limits<double>::infinity();
+    for (const std::size_t face : {0U, 1U}) {
       const structures::Triangle& t = mesh_.triangles[face == 0 || open ? edge.first : edge.second];
       const Vector3 to = t[0] + t[1] + t[2] - 2.0 * at(edge.from) - at(edge.to);
-      towards[static_cast<std::size_t>(face)] = to - along * along.dot(to);
-      const double height = towards[static_cast<std::size_t>(face)].norm();
-      width = face == 0 ? height : std::min(width, height);
-      convex.into_M[static_cast<std::size_t>(face)] = towards[static_cast<std::size_t>(face)] / height;
+      const Vector3 towards = to - along * along.dot(to);
+      const double height = towards.norm();
+      // far from the mesh's origin the height of a thin triangle may be cancelled
+      if (!(height > 0.0)) return;
+      width = std::min(width, height);
+      convex.into_M[face] = towards / height;
     }
     if (!open) {
       const double flat = convex.into_M[0].dot(convex.into_M[1]);
-      if (flat < kCos3) return;
+      if (flat < kFlatCosine) return;
       const Vector3 outward = sides.outward(edge.first);
       if (outward.dot(convex.into_M[1]) > 0.0) return;
       convex.tan_half_turn = std::sqrt((1.0 + flat) / std::max(1.0 - flat, 1e-12));

@@ -11,7 +11,9 @@
 #include "server/bake/exposed_surface.h"
 #include "server/bake/outside.h"
 #include "server/bake/parallel.h"
+#include "server/bake/refined_bricks.h"
 #include "server/bake/slope_limit.h"
+#include "server/bake/thin_bricks.h"
 #include "server/bake/triangle_tree.h"
 #include "server/structures/field_builder.h"
 #include "server/structures/structure_checks.h"
@@ -24,35 +26,10 @@ using Cell = BrickLevel::Cell;
 using Entry = structures::DistanceField::Entry;
 constexpr int kCentreSample = (4 * BrickLevel::kSide + 4) * BrickLevel::kSide + 4;
 
-std::vector<std::uint32_t> bricksToRefine(const BrickLevel& coarse, const BakeOptions& options) {
-  std::vector<std::uint32_t> refined;
-  if (options.refinement <= 1) return refined;
-  const double edge = coarse.voxel * BrickLevel::kVoxels;
-  for (std::size_t node = 0; node < coarse.nodes(); ++node) {
-    const std::int32_t slot = coarse.slot[node];
-    if (slot < 0) continue;
-    const double at_centre =
-        coarse.samplesOf(slot)[kCentreSample] / double{structures::DistanceField::kQuantaPerVoxel};
-    if (at_centre >= std::min(BrickLevel::kBrickRadius, structures::DistanceField::kClampVoxels)) {
-      // clamped at the centre: the surface is at a corner or not in the brick at all
-      const std::int16_t* s = coarse.samplesOf(slot);
-      if (*std::min_element(s, s + BrickLevel::kSamples) > structures::DistanceField::kQuantaPerVoxel)
-        continue;
-    }
-    const Vector3 p_MBo = coarse.position(coarse.brickOf(node) * BrickLevel::kVoxels);
-    const Eigen::AlignedBox3d box(p_MBo, p_MBo + Vector3::Constant(edge));
-    const bool wanted = std::any_of(options.refine.begin(), options.refine.end(),
-                                    [&box](const RefineBox& region) { return region.box_M.intersects(box); });
-    if (wanted) refined.push_back(static_cast<std::uint32_t>(node));
-  }
-  return refined;
-}
-
 /// Resamples inside samples as distances to the exposed surface only, and sets signs. `hidden` are the
 /// triangles that are not exposed, or not entirely: only a sample with one of them at its distance changes.
 void finishSamples(BrickLevel& level, const TriangleTree& exposed, const TriangleTree& hidden,
                    ParallelWork& work) {
-  constexpr double kClamp = structures::DistanceField::kClampVoxels;
   const auto forEachBrick = [&](auto&& act) {
     work.run(level.nodes(), 64, [&](std::size_t node) {
       if (level.slot[node] >= 0) act(node, ~level.outside[static_cast<std::size_t>(level.slot[node])]);
@@ -63,7 +40,7 @@ void finishSamples(BrickLevel& level, const TriangleTree& exposed, const Triangl
     const std::int16_t* samples = level.samplesOf(level.slot[node]);
     const Cell corner = level.brickOf(node) * BrickLevel::kVoxels;
     TriangleTree::Search search(hidden, level.centreOf(node), BrickLevel::kBrickRadius * level.voxel,
-                                (kClamp + 0.01) * level.voxel);
+                                (level.clampOf(node) + 0.01) * level.voxel);
     BrickLevel::SampleBits stale = inside & level.ownSamples(node);
     for (int k = 0; k < BrickLevel::kSamples; ++k) {
       if (!stale[static_cast<std::size_t>(k)]) continue;
@@ -92,12 +69,12 @@ std::vector<float> brickDistances(const BrickLevel& coarse, ParallelWork& work) 
     const std::int32_t slot = coarse.slot[node];
     if (slot < 0) return;
     // a surface in the brick is within half a voxel's diagonal of one of its samples
-    constexpr auto kTouch = static_cast<int>(structures::DistanceField::kHalfDiagonal *
-                                             structures::DistanceField::kQuantaPerVoxel) +
-                            1;
+    constexpr auto kTouchQuanta = static_cast<int>(structures::DistanceField::kHalfDiagonal *
+                                                   structures::DistanceField::kQuantaPerVoxel) +
+                                  1;
     const std::int16_t* samples = coarse.samplesOf(slot);
-    const bool surface =
-        std::any_of(samples, samples + BrickLevel::kSamples, [](int s) { return std::abs(s) <= kTouch; });
+    const bool surface = std::any_of(samples, samples + BrickLevel::kSamples,
+                                     [](int s) { return std::abs(s) <= kTouchQuanta; });
     if (surface) squared[node] = 0.0F;
   });
   const std::array<std::size_t, 3> size{static_cast<std::size_t>(coarse.bricks.x()),
@@ -138,10 +115,9 @@ class Assembler {
       return level.free[node] != 0 ? structures::DistanceField::kFarOutside
                                    : structures::DistanceField::kFarInside;
     const std::int16_t* samples = level.samplesOf(slot);
-    constexpr auto kBand =
-        static_cast<int>(structures::DistanceField::kBandVoxels * structures::DistanceField::kQuantaPerVoxel);
+    const auto band = static_cast<int>(level.bandOf(node) * structures::DistanceField::kQuantaPerVoxel);
     const bool in_band =
-        std::any_of(samples, samples + BrickLevel::kSamples, [](int s) { return std::abs(s) < kBand; });
+        std::any_of(samples, samples + BrickLevel::kSamples, [band](int s) { return std::abs(s) < band; });
     if (!in_band)
       return samples[kCentreSample] < 0 ? structures::DistanceField::kFarInside
                                         : structures::DistanceField::kFarOutside;
@@ -153,9 +129,9 @@ class Assembler {
   structures::FieldStorage& storage_;
 };
 
-structures::DistanceField assemble(structures::FieldStorage storage, const BrickLevel& coarse,
-                                   const BrickLevel* fine, std::span<const std::uint32_t> refined,
-                                   ParallelWork& work) {
+structures::FieldStorage assemble(structures::FieldStorage storage, const BrickLevel& coarse,
+                                  const BrickLevel* fine, std::span<const std::uint32_t> refined,
+                                  ParallelWork& work) {
   const std::vector<float> away = brickDistances(coarse, work);
   Assembler assembler(storage);
   std::size_t block = 0;
@@ -182,7 +158,7 @@ structures::DistanceField assemble(structures::FieldStorage storage, const Brick
     }
     ++block;
   }
-  return structures::makeField(std::move(storage));
+  return storage;
 }
 
 }  // namespace
@@ -210,10 +186,12 @@ Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, co
   if (!work.cancelled()) findOutside(coarse, nullptr, tree, work);
 
   std::unique_ptr<BrickLevel> fine;
-  const std::vector<std::uint32_t> refined = bricksToRefine(coarse, options);
-  if (!refined.empty() && !work.cancelled()) {
+  RefinedBricks refined;
+  if (options.refinement > 1 && !options.refine.empty() && !work.cancelled())
+    refined = bricksToRefine(coarse, options, thinBricks(coarse, work));
+  if (!refined.bricks.empty() && !work.cancelled()) {
     work.stage("refining", 0.55, 0.65);
-    fine = std::make_unique<BrickLevel>(coarse, options.refinement, refined);
+    fine = std::make_unique<BrickLevel>(coarse, options.refinement, refined.bricks, refined.deep);
     const std::size_t sampled_fine = fine->sampleDistances(tree, limits.level_bricks, work);
     if (sampled_fine > limits.level_bricks) return tooMany(sampled_fine, limits.level_bricks, true);
     if (!work.cancelled()) findOutside(*fine, &coarse, tree, work);
@@ -244,14 +222,15 @@ Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, co
     finishSamples(*fine, *exposed, *hidden_tree, work);
     limitSlope(*fine, &coarse, work);
   }
+  baked.thin = thinBricks(coarse, work);
   if (work.cancelled()) return fail("cancelled");
 
   storage.layout.refinement = fine ? options.refinement : 1;
   work.stage("assembling the field", 0.85, 0.88);
-  baked.field = assemble(std::move(storage), coarse, fine.get(), refined, work);
-  const std::size_t stored = baked.field.layout().samples.size() / BrickLevel::kSamples;
+  baked.storage = assemble(std::move(storage), coarse, fine.get(), refined.bricks, work);
+  const std::size_t stored = baked.storage.samples.size() / BrickLevel::kSamples;
   if (stored > limits.field_bricks) return tooMany(stored, limits.field_bricks, fine != nullptr);
-  if (const auto problem = structures::problemOf(baked.field.layout()))
+  if (const auto problem = structures::problemOf(structures::viewOf(baked.storage).layout()))
     return fail("the field " + *problem + "; choose larger voxels");
   return baked;
 }

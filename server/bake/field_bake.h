@@ -6,6 +6,8 @@
 #include "idl/types/result.h"
 #include "server/bake/bake.h"
 #include "server/bake/field_size.h"
+#include "server/bake/thin_bricks.h"
+#include "server/structures/field_builder.h"
 #include "server/structures/triangle.h"
 
 namespace tenon::bake {
@@ -13,9 +15,10 @@ namespace tenon::bake {
 class ParallelWork;
 
 struct BakedField {
-  structures::DistanceField field;
+  structures::FieldStorage storage;           ///< of the field, without dilation
   std::vector<structures::Triangle> surface;  ///< the exposed part of the triangles
   std::size_t hidden_triangles = 0;           ///< entirely inside the solid
+  BrickMarks thin;                            ///< where material may be thin
 };
 
 /// The signed distance field of a triangle soup: magnitudes are exact in the band, signs come from a flood

@@ -5,8 +5,8 @@
 #include <limits>
 #include <numeric>
 
+#include "server/bake/normal_estimator.h"
 #include "server/bake/parallel.h"
-#include "server/bake/surface_normals.h"
 #include "server/structures/point_grid.h"
 #include "server/structures/shell_builder.h"
 

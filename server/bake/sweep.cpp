@@ -105,7 +105,7 @@ Result<Clearance> clearance(const structures::HapticStructures& moved, std::span
             if (beyond(leaf, X_WM)) continue;
             for (const structures::ShellPoint& point : shell.points().subspan(leaf.first, leaf.count)) {
               const Vector3 p_WP = X_WM * point.p_MP.cast<double>();
-              updateMinimum(best, any, scene_W.sample(p_WP), pose, p_WP);
+              updateMinimum(best, any, scene_W.undilated(p_WP), pose, p_WP);
             }
           }
         }

@@ -48,7 +48,7 @@ void VoxelSet::addBlock(const Cell& block, const structures::DistanceField& fiel
   const double radius = 0.867 * edge;
   if (field.lowerBound(middle, radius) > dilation) return;
   const std::array key{block.x(), block.y(), block.z()};
-  if (field.sample(middle).distance < -radius) {
+  if (field.undilated(middle).distance < -radius) {
     blocks_[key].fill(~std::uint64_t{0});
     return;
   }
@@ -61,7 +61,7 @@ void VoxelSet::addBlock(const Cell& block, const structures::DistanceField& fiel
     const std::uint64_t bit = std::uint64_t{1} << static_cast<unsigned>(k % (kBlock * kBlock));
     if ((bits[z] & bit) != 0) continue;
     const Vector3 in_block(k % kBlock + 0.5, k / kBlock % kBlock + 0.5, static_cast<double>(z) + 0.5);
-    const double distance = field.sample(X_MW * (p_WB + in_block * cell_)).distance;
+    const double distance = field.undilated(X_MW * (p_WB + in_block * cell_)).distance;
     if (distance < 0.0 || distance < dilation) {
       bits[z] |= bit;
       any = true;

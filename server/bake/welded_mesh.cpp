@@ -132,7 +132,17 @@ void WeldedMesh::closeHoles() {
   }
 }
 
-std::vector<WeldedMesh::Edge> WeldedMesh::sharpEdges(double cosine) const {
+std::vector<WeldedMesh::Edge> WeldedMesh::edges() const {
+  constexpr double kAny = -2.0;  // [-] below all cosines
+  return edgesAbove(kAny);
+}
+
+std::vector<WeldedMesh::Edge> WeldedMesh::sharpEdges() const {
+  constexpr double kCos140 = -0.766;  // [-]
+  return edgesAbove(kCos140);
+}
+
+std::vector<WeldedMesh::Edge> WeldedMesh::edgesAbove(double cosine) const {
   std::vector<Edge> open;
   std::vector<Edge> sharp;
   std::size_t edges = 0;

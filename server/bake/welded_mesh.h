@@ -29,11 +29,10 @@ struct WeldedMesh {
     std::uint32_t first, second;  ///< triangles; second is kNone for an open edge
     static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
   };
-  /// [-] Cosine of 140 degrees.
-  static constexpr double kSharpCosine = -0.766;
-  /// Edges with one triangle, or with two the cosine of whose dihedral angle is above `cosine` [-] (-1:
-  /// flat). Open edges are returned only if they are less than a third of all edges.
-  [[nodiscard]] std::vector<Edge> sharpEdges(double cosine = kSharpCosine) const;
+  /// Edges with one triangle or two. Open edges are returned only if they are less than a third of all edges.
+  [[nodiscard]] std::vector<Edge> edges() const;
+  /// Those of edges() that are open, or whose dihedral angle is less than 140 degrees.
+  [[nodiscard]] std::vector<Edge> sharpEdges() const;
 
   /// The number of each triangle's connected component (triangles with a common vertex), and the number of
   /// components.
@@ -53,6 +52,9 @@ struct WeldedMesh {
   /// The edges of all triangles, sorted by their vertices.
   [[nodiscard]] std::vector<HalfEdge> halfEdges() const;
   void closeHoles();
+  /// Edges with one triangle, or with two the cosine of whose dihedral angle is above `cosine` [-] (-1:
+  /// flat).
+  [[nodiscard]] std::vector<Edge> edgesAbove(double cosine) const;
   /// [-] Cosine of the dihedral angle at edge a-b between a triangle and vertex `beyond`: -1 flat, 1 folded
   /// back.
   [[nodiscard]] double dihedralCosine(std::uint32_t triangle, std::uint32_t a, std::uint32_t b,

@@ -1,72 +1,26 @@
 #include "server/check/check.h"
 
-#include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "server/check/scene_checks.h"
+#include "server/check/checked_scene.h"
+#include "server/check/open_surface.h"
+#include "server/check/overlaps.h"
+#include "server/check/sizes.h"
+#include "server/check/targets.h"
+#include "server/check/turns.h"
 
 namespace tenon::check {
 
-std::string inMillimetres(double metres) {
-  // a check is not more exact than a hundredth of a millimetre
-  const double mm = std::abs(metres) < 50e-6 ? 1e3 * metres : std::round(1e5 * metres) / 100.0;
-  return std::abs(mm) < 9999.5 ? fmt::format("{:.3g} mm", mm) : fmt::format("{:.3g} m", metres);
-}
-
-std::string inDegrees(double radians) {
-  constexpr double kDegrees = 57.29577951308232;
-  return fmt::format("{:.3g} deg", radians * kDegrees);
-}
-
-std::string pointText(const Vector3& p_W) {
-  // -0.0 is 0
-  const auto tenth = [](double metres) { return std::round(1e4 * metres) / 10.0 + 0.0; };
-  return fmt::format("({:g}, {:g}, {:g}) mm", tenth(p_W.x()), tenth(p_W.y()), tenth(p_W.z()));
-}
-
-std::vector<PartObstacle> CheckedScene::obstaclesOf(ObjectId part, std::size_t state, bool with_hands) const {
-  const game_control::SceneMoment& moment = moments[state];
-  std::vector<PartObstacle> obstacles;
-  for (std::size_t i = 0; i < scenario.pairs.size(); ++i) {
-    const game_control::ScenarioPair& pair = scenario.pairs[i];
-    if (pair.sensing || (pair.a != part && pair.b != part)) continue;
-    const ObjectId other = pair.a == part ? pair.b : pair.a;
-    if (!moment.collides(scenario, i) || (!with_hands && moment.inAHand(other))) continue;
-    obstacles.push_back({other, i, moment.X_WO[other.value]});
-  }
-  return obstacles;
-}
-
-std::string wayOut(ContactProbe& probe, std::span<const PartObstacle> obstacles, const Pose& X_WO,
-                   const NearestPlace& place, double furthest) {
-  if (!place.located) return {};
-  constexpr double kMore = 1.02;  // [-] than the depth: the field is not exact
-  for (double length = -kMore * place.gap; length <= furthest; length *= 1.5) {
-    const Pose X_WM(X_WO.translation() + length * place.n_W, X_WO.rotation());
-    const bool is_free = std::all_of(obstacles.begin(), obstacles.end(), [&](const PartObstacle& obstacle) {
-      const NearestPlace after = probe.nearest(obstacle, X_WM, ProbedSurface::kMesh);
-      return after.gap >= -kFieldError.at(after);
-    });
-    if (!is_free) continue;
-    // to a hundredth of a millimetre; -0.0 is 0
-    const auto rounded = [](double metres) { return std::round(1e5 * metres) / 1e5 + 0.0; };
-    const Vector3& p_WM = X_WM.translation();
-    return fmt::format("it is free at [{:g}, {:g}, {:g}]", rounded(p_WM.x()), rounded(p_WM.y()),
-                       rounded(p_WM.z()));
-  }
-  return {};
-}
-
 std::vector<Finding> checkScene(const game_control::ScenarioFile& scenario, const simulation::Scene& scene,
                                 const CheckOptions& options) {
-  CheckedScene checked{scenario, scene, options, game_control::momentsOf(scenario), {}};
+  CheckedScene checked{scenario, scene, game_control::momentsOf(scenario), {}};
   const auto progress = [&](std::string_view activity, double fraction) {
     if (options.progress) options.progress(activity, fraction);
   };
   progress("checking the start", 0.0);
+  checkOpenSurfaces(checked);
   checkOverlaps(checked);
   for (std::size_t i = 0; i < scenario.states.size(); ++i) {
     const game_control::ScenarioState& state = scenario.states[i];
@@ -74,9 +28,17 @@ std::vector<Finding> checkScene(const game_control::ScenarioFile& scenario, cons
              static_cast<double>(i) / static_cast<double>(scenario.states.size()));
     if (state.X_WG && scene.objects[state.object.value].structures) checkTarget(checked, i);
   }
-  checkTurns(checked);
+  checkTurns(checked, options.trainee_device, options.instructor_device);
   progress("checked", 1.0);
   return std::move(checked.findings);
+}
+
+std::vector<std::string> problems(const game_control::ScenarioFile& scenario, const simulation::Scene& scene,
+                                  const CheckOptions& options) {
+  std::vector<std::string> lines;
+  for (const Finding& finding : checkScene(scenario, scene, options))
+    if (finding.severity != Severity::kInfo) lines.push_back(lineOf(scenario, finding));
+  return lines;
 }
 
 std::vector<Finding> findingsOf(
@@ -91,7 +53,9 @@ std::vector<Finding> findingsOf(
     finding.text = misplaced.what;
     findings.push_back(std::move(finding));
   }
-  if (findings.empty()) findings.push_back({.text = refusal.what});
+  // the refusal may be the first of them, or of another kind
+  if (findings.empty() || !refusal.what.ends_with(findings.front().text))
+    findings.push_back({.text = refusal.what});
   return findings;
 }
 

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "devices/catalog.h"
 #include "idl/types/result.h"
 #include "server/check/finding.h"
 #include "server/game_control/scenario.h"
@@ -13,15 +14,10 @@
 
 namespace tenon::check {
 
-/// How far a device turns the hand that holds it.
-struct TurningRange {
-  std::string device;  ///< its name in the catalog
-  double range = 0.0;  ///< [rad] from its centre, about any axis; 0: it does not turn
-};
-
 struct CheckOptions {
-  TurningRange trainee;     ///< of the device for hands of trainees
-  TurningRange instructor;  ///< of the device for hands of instructors
+  // of the catalog: how far they turn limits the hands; of an unknown one nothing is checked
+  std::string trainee_device{devices::kTraineeDevice};
+  std::string instructor_device{devices::kInstructorDevice};
   /// Called with the current activity and its finished fraction [-], 0..1; may be empty.
   std::function<void(std::string_view activity, double fraction)> progress;
 };
@@ -38,7 +34,13 @@ struct CheckOptions {
 [[nodiscard]] std::vector<Finding> checkScene(const game_control::ScenarioFile& scenario,
                                               const simulation::Scene& scene, const CheckOptions& options);
 
-/// Of a scenario that makeScene() refuses: objects out of reach, else `refusal`. `structures` by ObjectId.
+/// The errors and warnings among what checkScene() finds, a line each: see lineOf.
+[[nodiscard]] std::vector<std::string> problems(const game_control::ScenarioFile& scenario,
+                                                const simulation::Scene& scene,
+                                                const CheckOptions& options = {});
+
+/// Of a scenario that makeScene() refuses: objects out of reach, and `refusal` unless it is the first of
+/// them. `structures` by ObjectId.
 [[nodiscard]] std::vector<Finding> findingsOf(
     const Error& refusal, const game_control::ScenarioFile& scenario,
     const std::vector<std::shared_ptr<const structures::HapticStructures>>& structures);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "server/simulation/coll_pair.h"
+
 namespace tenon::check {
 namespace {
 
@@ -17,70 +19,75 @@ double finestVoxel(const structures::DistanceField& field) {
   return field.voxel() / field.layout().refinement;
 }
 
+/// Takes B's dilation from the gaps of A's points, and returns the smallest gap [m].
+double undilate(const structures::DistanceField& field, const Pose& X_WB,
+                collision::PairQueryResult& result) {
+  if (field.dilation() == 0.0 || result.contacts.empty()) return result.smallest_gap;
+  const auto nearer = [](const collision::Contact& one, const collision::Contact& other) {
+    return one.gap < other.gap;
+  };
+  const auto smallest = [&] {
+    return std::min_element(result.contacts.begin(), result.contacts.end(), nearer)->gap;
+  };
+  // a point deeper than the field's band is in no list
+  const bool is_deeper = result.smallest_gap < smallest() - kBisection;
+  const Pose X_BW = X_WB.inverse();
+  for (collision::Contact& contact : result.contacts)
+    if (contact.kind == collision::ContactKind::kShellPoint)
+      contact.gap += field.dilationAt(X_BW * contact.p_WP);
+  return is_deeper ? result.smallest_gap : smallest();
+}
+
 }  // namespace
 
-double thickeningOf(const simulation::PairSpec& pair) { return pair.dilation; }
-
 ContactProbe::ContactProbe(const simulation::Scene& scene, ObjectId part)
-    : scene_(scene), part_(part), result_(std::make_unique<collision::PairQueryResult>()) {}
+    : scene_(scene),
+      part_(part),
+      result_(std::make_unique<collision::PairQueryResult>()),
+      feature_scratch_(std::make_unique<collision::FeatureScratch>()) {}
 
-NearestPlace ContactProbe::query(const structures::HapticStructures& a, const Pose& X_WA,
-                                 const structures::HapticStructures& b, const Pose& X_WB, double dilation) {
-  ++queries_;
-  collision::PairQuery query{&a.shell, &b.field, X_WA, X_WB};
-  query.dilation = dilation;
+NearestPlace ContactProbe::nearest(const PartObstacle& obstacle, const Pose& X_WO, ProbedSurface surface) {
+  const simulation::PairSpec& pair = scene_.pairs[obstacle.pair];
+  const bool part_is_shell = pair.a == part_;
+  const structures::HapticStructures& a = *scene_.objects[pair.a.value].structures;
+  const structures::HapticStructures& b = *scene_.objects[pair.b.value].structures;
+  collision::PairFeatures features = simulation::featuresOf(scene_, pair);
+  if (surface == ProbedSurface::kMesh) features.most_dilation_A = 0.0;
+  collision::PairQuery query{&a.shell, &b.field, part_is_shell ? X_WO : obstacle.X_WO,
+                             part_is_shell ? obstacle.X_WO : X_WO};
   query.margin = kMarginVoxels * b.field.voxel();
   query.correct_ridges = true;
   collision::queryPair(query, *result_);
+  collision::queryFeatures(query, features, *feature_scratch_, *result_);
   NearestPlace place;
-  place.gap = result_->smallest_gap;
+  place.gap =
+      surface == ProbedSurface::kMesh ? undilate(b.field, query.X_WB, *result_) : result_->smallest_gap;
+  place.free_path = std::min(place.gap, result_->dormant_gap);
   place.voxel = finestVoxel(b.field);
   const auto nearest = std::min_element(
       result_->contacts.begin(), result_->contacts.end(),
       [](const collision::Contact& one, const collision::Contact& other) { return one.gap < other.gap; });
-  if (nearest == result_->contacts.end()) return place;
+  if (nearest == result_->contacts.end() || nearest->dormant()) return place;
   place.located = true;
   place.exact = nearest->gap <= place.gap + kBisection;
   place.p_WP = nearest->p_WP;
-  place.n_W = nearest->n_W;
-  place.voxel = b.field.voxelAt(X_WB.inverse() * nearest->p_WP);
+  place.n_W = part_is_shell ? nearest->n_W : Vector3(-nearest->n_W);
+  const Vector3 p_BP = query.X_WB.inverse() * nearest->p_WP;
+  place.voxel = b.field.voxelAt(p_BP);
+  place.dilation = b.field.dilationAt(p_BP);
   return place;
-}
-
-NearestPlace ContactProbe::nearest(const PartObstacle& obstacle, const Pose& X_WO, ProbedSurface surface) {
-  const simulation::PairSpec& pair = scene_.pairs[obstacle.pair];
-  const double dilation = surface == ProbedSurface::kContact ? thickeningOf(pair) : 0.0;
-  const bool part_is_shell = pair.a == part_;
-  const structures::HapticStructures& a = *scene_.objects[pair.a.value].structures;
-  const structures::HapticStructures& b = *scene_.objects[pair.b.value].structures;
-  NearestPlace place =
-      part_is_shell ? query(a, X_WO, b, obstacle.X_WO, dilation) : query(a, obstacle.X_WO, b, X_WO, dilation);
-  if (!part_is_shell) place.n_W = -place.n_W;
-  return place;
-}
-
-NearestPlace ContactProbe::deepest(const PartObstacle& obstacle, const Pose& X_WO,
-                                   const ProbeTolerance& tolerance) {
-  const NearestPlace place = nearest(obstacle, X_WO, ProbedSurface::kMesh);
-  const simulation::PairSpec& pair = scene_.pairs[obstacle.pair];
-  const bool part_is_shell = pair.a == part_;
-  const structures::HapticStructures& a = *scene_.objects[pair.b.value].structures;
-  const structures::HapticStructures& b = *scene_.objects[pair.a.value].structures;
-  if (a.shell.empty() || b.field.empty()) return place;
-  NearestPlace reversed =
-      part_is_shell ? query(a, obstacle.X_WO, b, X_WO, 0.0) : query(a, X_WO, b, obstacle.X_WO, 0.0);
-  if (part_is_shell) reversed.n_W = -reversed.n_W;
-  return reversed.gap + tolerance.at(reversed) < place.gap ? reversed : place;
 }
 
 ContactProbe::Room ContactProbe::roomAt(std::span<const PartObstacle> obstacles,
                                         std::span<const double> floors, const Pose& X_WO,
                                         ProbedSurface surface, const ProbeTolerance& tolerance) {
-  Room least{.room = kFar};
+  Room least{.room = kFar, .free_path = kFar};
   for (std::size_t i = 0; i < obstacles.size(); ++i) {
     const NearestPlace place = nearest(obstacles[i], X_WO, surface);
-    const double room = place.gap - floors[i] + tolerance.at(place);
-    if (room < least.room) least = {room, i, place};
+    const double allowed = tolerance.at(place) - floors[i];
+    const double free_path = std::min(least.free_path, place.free_path + allowed);
+    if (place.gap + allowed < least.room) least = {place.gap + allowed, free_path, i, place};
+    least.free_path = free_path;
   }
   return least;
 }
@@ -92,9 +99,9 @@ PartTravel ContactProbe::travel(std::span<const PartObstacle> obstacles, std::sp
   double free = 0.0;
   Room here = at(0.0);
   for (std::size_t step = 0; here.room >= 0.0; ++step) {
-    if (free >= limit || step == kLongestPath) return {.length = free};
+    if (free >= limit || step == kLongestPath) return {.length = free, .complete = free >= limit};
     const double shortest = std::max(kShortestStep, kStepVoxels * here.place.voxel);
-    const double next = std::min(limit, free + std::max(shortest, kSafeShare * here.room));
+    const double next = std::min(limit, free + std::max(shortest, kSafeShare * here.free_path));
     here = at(next);
     if (here.room >= 0.0) {
       free = next;

@@ -8,8 +8,8 @@
 namespace tenon::check {
 
 std::string_view nameOf(FindingKind kind) {
-  constexpr std::array<std::string_view, 7> kNames{"load",     "overlap", "clearance", "scale",
-                                                   "approach", "reach",   "turning"};
+  constexpr std::array<std::string_view, 8> kNames{"load",     "overlap", "clearance", "scale",
+                                                   "approach", "reach",   "turning",   "open"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
@@ -21,14 +21,6 @@ std::size_t countOf(const std::vector<Finding>& findings, Severity severity) {
   return static_cast<std::size_t>(
       std::count_if(findings.begin(), findings.end(),
                     [severity](const Finding& finding) { return finding.severity == severity; }));
-}
-
-std::vector<std::string> problemLines(const game_control::ScenarioFile& scenario,
-                                      const std::vector<Finding>& findings) {
-  std::vector<std::string> lines;
-  for (const Finding& finding : findings)
-    if (finding.severity != Severity::kInfo) lines.push_back(lineOf(scenario, finding));
-  return lines;
 }
 
 std::string lineOf(const game_control::ScenarioFile& scenario, const Finding& finding) {

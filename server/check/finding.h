@@ -22,6 +22,7 @@ enum class FindingKind : std::uint8_t {
   kApproach,   ///< something stands in the way of an approach
   kReach,      ///< an object is out of reach
   kTurning,    ///< more turning than the device has
+  kOpen,       ///< surface that a part may pass
 };
 
 /// What a check found. Objects may be invalid, where none is concerned.
@@ -46,10 +47,6 @@ struct Finding {
 
 /// Number of findings of a severity.
 [[nodiscard]] std::size_t countOf(const std::vector<Finding>& findings, Severity severity);
-
-/// The errors and warnings among `findings`, a line each: see lineOf.
-[[nodiscard]] std::vector<std::string> problemLines(const game_control::ScenarioFile& scenario,
-                                                    const std::vector<Finding>& findings);
 
 /// One line for a terminal or a log: `FILE:LINE: error: SENTENCE (HINT)`.
 [[nodiscard]] std::string lineOf(const game_control::ScenarioFile& scenario, const Finding& finding);

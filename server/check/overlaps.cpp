@@ -1,10 +1,10 @@
+#include "server/check/overlaps.h"
+
 #include <algorithm>
 #include <set>
 #include <utility>
 
 #include <fmt/format.h>
-
-#include "server/check/scene_checks.h"
 
 namespace tenon::check {
 namespace {
@@ -54,12 +54,12 @@ void checkOverlaps(CheckedScene& checked) {
         // where both are placed: once, of the one that is more likely to be moved
         const bool is_fixed = checked.scenario.objects[object.value].status == ObjectStatus::kFixed;
         if (is_fixed || reported.contains(obstacle.pair)) continue;
-        const NearestPlace place = probe.deepest(obstacle, X_WO, kFieldError);
+        const NearestPlace place = probe.nearest(obstacle, X_WO, ProbedSurface::kMesh);
         if (place.gap >= -kFieldError.at(place)) continue;
         reported.insert(obstacle.pair);
         Finding finding = overlapFinding(checked, state, object, obstacle, place);
         const double size = checked.scene.objects[object.value].structures->info.box_M.diagonal().norm();
-        finding.hint = wayOut(probe, obstacles, X_WO, place, size);
+        finding.hint = freePoseHint(probe, obstacles, X_WO, place, size);
         checked.findings.push_back(std::move(finding));
       }
     }

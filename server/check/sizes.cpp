@@ -1,3 +1,5 @@
+#include "server/check/sizes.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -5,8 +7,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-
-#include "server/check/scene_checks.h"
 
 namespace tenon::check {
 namespace {

@@ -1,5 +1,6 @@
+#include "server/check/targets.h"
+
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -7,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "server/check/scene_checks.h"
+#include "server/check/sizes.h"
 
 namespace tenon::check {
 namespace {
@@ -18,7 +19,7 @@ using game_control::ScenarioState;
 constexpr double kUsualFit = 0.005;     // [m] play up to which a part is taken to fit into something
 constexpr double kFitsPerStated = 4.0;  // [-] times the stated clearance, likewise
 constexpr double kLargestTilt = 0.35;   // [rad]
-constexpr double kLittle = 1.0 / 20.0;  // [-] of its hole, and smaller: its unit is wrong
+constexpr double kSmallestRatioInHole = 1.0 / 20.0;  // [-] of its hole, and smaller: its unit is wrong
 constexpr ProbeTolerance kPlayTolerance{2e-6, 0.02};
 constexpr ProbeTolerance kApproachTolerance{50e-6, 0.35};
 
@@ -68,16 +69,16 @@ class TargetCheck {
       return false;
     }
     const NearestPlace place = probe_.nearest(obstacle, X_WG_, ProbedSurface::kMesh);
-    if (ratio < kLittle * kLittle || (pairOf(obstacle).clearance > 0.0 && ratio < kLittle)) {
-      if (const auto in_hole = sizeInHole(obstacle, place); in_hole && *in_hole < kLittle) {
+    if (ratio < kSmallestRatioInHole * kSmallestRatioInHole ||
+        (pairOf(obstacle).clearance > 0.0 && ratio < kSmallestRatioInHole)) {
+      if (const auto in_hole = sizeInHole(obstacle, place); in_hole && *in_hole < kSmallestRatioInHole) {
         addScale(obstacle.object, *in_hole);
         return false;
       }
     }
-    const NearestPlace deepest = probe_.deepest(obstacle, X_WG_, kFieldError);
-    if (deepest.gap < -kFieldError.at(deepest)) {
-      addOverlap(obstacle, deepest);
-      return -deepest.gap <= state_.tolerance;
+    if (place.gap < -kFieldError.at(place)) {
+      addOverlap(obstacle, place);
+      return -place.gap <= state_.tolerance;
     }
     return checkFit(obstacle, place);
   }
@@ -108,7 +109,7 @@ class TargetCheck {
     if (finding.severity == Severity::kWarning)
       finding.text +=
           fmt::format("; it is taken for there because {} are tolerated", inMillimetres(state_.tolerance));
-    finding.hint = wayOut(probe_, obstacles_, X_WG_, place, 2.0 * sphere_.radius);
+    finding.hint = freePoseHint(probe_, obstacles_, X_WG_, place, 2.0 * sphere_.radius);
     checked_.findings.push_back(std::move(finding));
   }
 
@@ -176,7 +177,7 @@ class TargetCheck {
   /// no hole.
   [[nodiscard]] std::optional<double> sizeInHole(const PartObstacle& obstacle, const NearestPlace& place) {
     const double floor = std::min(place.gap, 0.0);
-    const double near = boxOf(part_).diagonal().norm() / kLittle;
+    const double near = boxOf(part_).diagonal().norm() / kSmallestRatioInHole;
     for (const Vector3& line : lines())
       if (shift(obstacle, floor, line, near).blocked || shift(obstacle, floor, -line, near).blocked)
         return std::nullopt;
@@ -196,9 +197,8 @@ class TargetCheck {
     const Play play = place.gap < limit ? playIn(obstacle, place, limit) : Play();
     if (play.isFit() && stated > 0.0) {
       compareClearance(obstacle, play, stated);
-    } else if (play.isFit() && play.play < resolvedPlay(obstacle, play)) {
-      const bool is_unreachable =
-          held_off > state_.tolerance || play.play < 2.0 * thickeningOf(checked_.scene.pairs[obstacle.pair]);
+    } else if (play.isFit() && play.play < resolvedPlay(play)) {
+      const bool is_unreachable = held_off > state_.tolerance || play.play < 2.0 * play.place.dilation;
       addMissingClearance(obstacle, play, is_unreachable);
       return !is_unreachable;
     }
@@ -208,8 +208,8 @@ class TargetCheck {
   }
 
   /// [m] Play below which a part does not get in, or jams, where no clearance is stated.
-  [[nodiscard]] double resolvedPlay(const PartObstacle& obstacle, const Play& play) const {
-    return 2.0 * (thickeningOf(checked_.scene.pairs[obstacle.pair]) + kFieldError.at(play.place));
+  [[nodiscard]] static double resolvedPlay(const Play& play) {
+    return 2.0 * (play.place.dilation + kFieldError.at(play.place));
   }
 
   void compareClearance(const PartObstacle& obstacle, const Play& play, double stated) {
@@ -236,7 +236,7 @@ class TargetCheck {
     finding.value = play.play;
     finding.severity = is_unreachable ? Severity::kError : Severity::kWarning;
     const bool is_resolved = play.play > 2.0 * play.place.voxel;
-    const double thicker = thickeningOf(checked_.scene.pairs[obstacle.pair]);
+    const double thicker = play.place.dilation;
     finding.text =
         fmt::format("{} has {} of play in {}, no clearance is stated, and voxels of {} {}", title(part_),
                     (is_resolved ? "" : "about ") + inMillimetres(play.play), title(obstacle.object),
@@ -274,6 +274,16 @@ class TargetCheck {
     };
     const PartTravel travel =
         probe_.travel(obstacles_, floors, motion, distance, ProbedSurface::kContact, kApproachTolerance);
+    if (!travel.complete) {
+      Finding finding{.kind = FindingKind::kApproach, .severity = Severity::kInfo, .object = part_};
+      finding.state = state_.name;
+      finding.line = state_.line;
+      finding.value = distance - travel.length;
+      finding.unit = "m";
+      finding.text = fmt::format("the approach of {} is examined up to {} before its target only: too long",
+                                 title(part_), inMillimetres(finding.value));
+      checked_.findings.push_back(std::move(finding));
+    }
     if (!travel.blocked) return;
     const PartObstacle& obstacle = obstacles_[travel.obstacle];
     const double before = distance - travel.length;

@@ -1,10 +1,11 @@
+#include "server/check/turns.h"
+
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "server/check/scene_checks.h"
+#include "devices/catalog.h"
 
 namespace tenon::check {
 namespace {
@@ -37,34 +38,40 @@ GrabPlace grabPlace(const CheckedScene& checked, std::size_t state) {
 
 }  // namespace
 
-void checkTurns(CheckedScene& checked) {
+void checkTurns(CheckedScene& checked, const std::string& trainee_device,
+                const std::string& instructor_device) {
+  const auto trainee_caps = devices::capsOf(trainee_device);
+  const auto instructor_caps = devices::capsOf(instructor_device);
   for (std::size_t i = 0; i < checked.scenario.states.size(); ++i) {
     const game_control::ScenarioState& state = checked.scenario.states[i];
     if (!state.X_WG || !state.hand.valid()) continue;
     const game_control::ScenarioHand& hand = checked.scenario.hands[state.hand.value];
     if (hand.kind != simulation::HandKind::kCoupled) continue;
-    const TurningRange& device =
-        hand.role == Role::kInstructor ? checked.options.instructor : checked.options.trainee;
+    const bool is_instructors = hand.role == Role::kInstructor;
+    const std::string& device = is_instructors ? instructor_device : trainee_device;
+    const auto& caps = is_instructors ? instructor_caps : trainee_caps;
+    if (!caps) continue;
     const GrabPlace grab = grabPlace(checked, i);
     const double turn = game_control::angleBetween(grab.q_HO, state.X_WG->rotation());
-    const double beyond = turn - state.angle_tolerance - device.range;
-    if (device.device.empty() || beyond <= 0.0) continue;
+    const double beyond = turn - state.angle_tolerance - caps->rotation_range;
+    if (beyond <= 0.0) continue;
     Finding finding{.kind = FindingKind::kTurning, .object = state.object, .state = state.name};
     finding.line = state.line;
     finding.value = turn;
     finding.unit = "rad";
-    finding.p_WP = state.X_WG->translation();
-    const std::string range = device.range > 0.0
-                                  ? fmt::format("turns by {} from its middle", inDegrees(device.range))
-                                  : "does not turn";
+    const auto* structures = checked.scene.objects[state.object.value].structures.get();
+    finding.p_WP = *state.X_WG * simulation::boundingSphereOf(structures).p_OQ_O;
+    const std::string range = caps->rotation_range > 0.0 ? fmt::format("turns by {} from its middle",
+                                                                       inDegrees(caps->rotation_range))
+                                                         : "does not turn";
     finding.text = fmt::format("{} has to be turned by {} to its target, and {} {}",
-                               checked.titleOf(state.object), inDegrees(turn), device.device, range);
+                               checked.titleOf(state.object), inDegrees(turn), device, range);
     // a part can be taken with the hand turned the other way
-    const bool possible = !grab.own && beyond <= device.range;
+    const bool possible = !grab.own && beyond <= caps->rotation_range;
     finding.severity = possible ? Severity::kWarning : Severity::kError;
     if (grab.own) {
       finding.hint = "turn the target, or the mesh of what the hand holds";
-    } else if (device.range <= 0.0) {
+    } else if (caps->rotation_range <= 0.0) {
       finding.hint = "let it start turned as at its target";
     } else {
       finding.hint = fmt::format("let it start turned by {} or more towards its target{}", inDegrees(beyond),

@@ -66,7 +66,7 @@ void penalties(const LaneFrame& frame, const SampleLanes& lanes, const ContactLa
                const std::uint32_t* points, std::span<const float> areas, PenaltyLanes& out) noexcept {
   std::uint32_t all_inside = 0;
   for (std::size_t i = 0; i < structures::ShellBlock::kLanes; i += hn::Lanes(kD)) {
-    const Double gap = hn::Sub(hn::Load(kD, lanes.distance.data() + i), splat(frame.dilation));
+    const Double gap = hn::Load(kD, lanes.distance.data() + i);
     const Mask inside = hn::And(maskOf(lanes.near >> i), hn::Lt(gap, hn::Zero(kD)));
     const Double penalty =
         hn::Mul(hn::Mul(hn::Neg(gap), areasOf(points + i, areas)), splat(1.0 / kReferenceArea));

@@ -22,23 +22,26 @@ Wrench penaltyWrench(const PairQueryResult& result, const Vector3& p_WAo, double
 }
 
 std::size_t selectRepresentatives(const ContactList& contacts, std::span<std::uint32_t> out) noexcept {
-  const std::size_t wanted = std::min(out.size(), contacts.size());
-  if (wanted == 0) return 0;
-
   // metric: a difference of 1 between unit normals counts as much as the extent of all contacts
   std::size_t chosen = 0;
-  Vector3 low = contacts[0].p_WP;
-  Vector3 high = low;
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    if (contacts[i].gap < contacts[chosen].gap) chosen = i;
-    low = low.cwiseMin(contacts[i].p_WP);
-    high = high.cwiseMax(contacts[i].p_WP);
-  }
-  const double extent2 = std::max((high - low).squaredNorm(), 1e-12);
-
+  std::size_t active = 0;
+  Eigen::AlignedBox3d box_W;
   // farthest-point selection: next is the contact with the largest distance to those selected
   std::array<double, kMaxPairContacts> apart2;
   apart2.fill(std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    if (contacts[i].dormant()) {
+      apart2[i] = -1.0;
+      continue;
+    }
+    if (contacts[i].gap < contacts[chosen].gap) chosen = i;
+    box_W.extend(contacts[i].p_WP);
+    ++active;
+  }
+  const std::size_t wanted = std::min(out.size(), active);
+  if (wanted == 0) return 0;
+  const double extent2 = std::max(box_W.diagonal().squaredNorm(), 1e-12);
+
   std::size_t count = 0;
   while (true) {
     out[count++] = static_cast<std::uint32_t>(chosen);

@@ -54,7 +54,7 @@ double signAt(const structures::DistanceField& field, const Vector3& p_BP, const
   if (std::abs(field_distance) > structures::DistanceField::kHalfDiagonal * voxel)
     return field_distance > 0.0 ? 1.0 : -1.0;
   const Vector3 away = (p_BP - p_BQ).normalized() * voxel;
-  return field.sample(p_BP + away).distance >= field.sample(p_BQ - away).distance ? 1.0 : -1.0;
+  return field.undilated(p_BP + away).distance >= field.undilated(p_BQ - away).distance ? 1.0 : -1.0;
 }
 
 /// Adds a contact to the counts and sums of the query, or subtracts it.
@@ -73,7 +73,7 @@ RefinementCounts refineContacts(const PairQuery& query, const structures::Surfac
                                 const RefinementBudget& budget, PairQueryResult& result) noexcept {
   RefinementCounts counts;
   const structures::DistanceField& field = *query.field_B;
-  const LaneFrame frame(field, query.X_WA, query.X_WB, query.dilation, query.margin, query.shell_A->radius());
+  const LaneFrame frame(field, query.X_WA, query.X_WB, query.margin, query.shell_A->radius());
   NonUnitContacts non_unit;
   findNonUnitGradients(frame, *query.shell_A, result.contacts, non_unit);
   const auto refined = static_cast<std::ptrdiff_t>(std::min<std::size_t>(budget.contacts, non_unit.size()));
@@ -82,7 +82,8 @@ RefinementCounts refineContacts(const PairQuery& query, const structures::Surfac
   std::uint32_t triangles_left = budget.triangles;
   for (const NonUnitContact* next = non_unit.begin();
        next != non_unit.begin() + refined && triangles_left > 0; ++next) {
-    const double field_distance = next->gap + query.dilation;
+    const double dilation = field.dilationAt(next->p_BP);
+    const double field_distance = next->gap + dilation;
     const double reach =
         std::abs(field_distance) + structures::DistanceField::kHalfDiagonal * field.voxelAt(next->p_BP);
     const structures::SurfaceTree::Nearest nearest = surface_B.nearest(next->p_BP, reach, triangles_left);
@@ -90,7 +91,7 @@ RefinementCounts refineContacts(const PairQuery& query, const structures::Surfac
     ++counts.contacts;
     Contact& contact = result.contacts[next->contact];
     updateSums(query, contact, false, result);
-    contact.gap = -query.dilation;
+    contact.gap = -dilation;
     constexpr double kOnSurface = 1e-9;  // [m] no direction can be computed nearer; the field's normal stays
     if (nearest.distance > kOnSurface) {
       const double sign = signAt(field, next->p_BP, nearest.p_MQ, field_distance);
@@ -105,7 +106,7 @@ RefinementCounts refineContacts(const PairQuery& query, const structures::Surfac
   result.smallest_gap = result.unlisted_gap;
   for (const Contact& contact : result.contacts)
     result.smallest_gap = std::min(result.smallest_gap, contact.gap);
-  result.deepest = std::max(-(result.smallest_gap + query.dilation), 0.0);
+  result.deepest = std::max(-result.smallest_gap, 0.0);
   return counts;
 }
 

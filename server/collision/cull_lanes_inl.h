@@ -27,17 +27,19 @@ namespace cull {
 
 /// [voxels] By how much the interpolated distance at a point may be less than that on the nearest row of
 /// samples. For offsets b and c from that row along y and z, interpolation also weighs the rows at distance 1
-/// by b + c - 2 b c and the row at distance sqrt(2) by b c; samples differ by no more than their distance.
-HWY_INLINE Float rowErrorBound(const BrickPoint& at) {
+/// by b + c - 2 b c and the row at distance sqrt(2) by b c; samples differ by no more than the field's slope
+/// times their distance.
+HWY_INLINE Float rowErrorBound(const CullField& field, const BrickPoint& at) {
   constexpr float kWeight = 0.585786F;         // 2 - sqrt(2)
   constexpr float kInverseWeight = 1.707107F;  // 1 / kWeight
   const Float rest = splat(kInverseWeight - 0.5F);
   const Float b = hn::Add(hn::Abs(at.from_centre.y), rest);
   const Float c = hn::Add(hn::Abs(at.from_centre.z), rest);
-  return hn::Sub(splat(kInverseWeight), hn::Mul(splat(kWeight), hn::Mul(b, c)));
+  const Float error = hn::Sub(splat(kInverseWeight), hn::Mul(splat(kWeight), hn::Mul(b, c)));
+  return hn::Mul(splat(field.cull.slope), error);
 }
 HWY_INLINE Float pointBound(const CullField& field, Int brick, const BrickPoint& at) {
-  return hn::Sub(interpolateRow(field, brick, nearestRow(at)), rowErrorBound(at));
+  return hn::Sub(interpolateRow(field, brick, nearestRow(at)), rowErrorBound(field, at));
 }
 
 /// Bounds of points in a field with refined bricks. Inside its band the child is sampled, beyond it the
@@ -58,9 +60,10 @@ HWY_INLINE Float refinedPointBounds(const CullField& field, const VoxelLocation&
 /// Bound over a ball of radius r from a `value` at `distance` from the ball's centre. Interpolation averages
 /// the corners around a point of the ball, and the value may be the average of two samples: that adds at most
 /// 3/4 and 1/4 to the mean squared distance between them.
-HWY_INLINE Float ballBound(Float value, Float distance, Float r) {
+HWY_INLINE Float ballBound(const CullField& field, Float value, Float distance, Float r) {
   const Float farthest = hn::Add(distance, r);
-  return hn::Sub(value, hn::Sqrt(hn::Add(hn::Mul(farthest, farthest), splat(1.0F))));
+  const Float length = hn::Sqrt(hn::Add(hn::Mul(farthest, farthest), splat(1.0F)));
+  return hn::Sub(value, hn::Mul(splat(field.cull.slope), length));
 }
 
 /// Improves the bound of balls whose centre is outside the grid by the distance to the grid.
@@ -74,7 +77,7 @@ HWY_INLINE Float boundsOutsideGrid(const CullField& field, const Vec3& p, Float 
   if (hn::AllFalse(kF, outside)) return bound;
   // the centres of the outermost voxels are up to half a diagonal from the border
   const Float to_surface = hn::Add(distance, splat(field.cull.outside_grid - kHalfDiagonal));
-  return hn::IfThenElse(outside, hn::Max(bound, ballBound(to_surface, hn::Zero(kF), r)), bound);
+  return hn::IfThenElse(outside, hn::Max(bound, ballBound(field, to_surface, hn::Zero(kF), r)), bound);
 }
 
 /// Bounds from the value at the centre of the brick that holds the ball's centre, as
@@ -86,7 +89,7 @@ HWY_INLINE Float ballBoundsByBrick(const CullField& field, const VoxelLocation& 
   const Float distance = norm({from_centre(location.at.x, location.at.from_centre.x),
                                from_centre(location.at.y, location.at.from_centre.y),
                                from_centre(location.at.z, location.at.from_centre.z)});
-  return ballBound(farBound(field, location.brick_index), distance, r);
+  return ballBound(field, farBound(field, location.brick_index), distance, r);
 }
 
 /// Bounds from the row of samples nearest to the ball's centre, for lanes whose brick has samples.
@@ -101,7 +104,8 @@ HWY_INLINE Float ballBoundsByRow(const CullField& field, const VoxelLocation& lo
   const Float b = hn::Sub(half, hn::Abs(location.at.from_centre.y));
   const Float c = hn::Sub(half, hn::Abs(location.at.from_centre.z));
   const Float distance = hn::Sqrt(hn::Add(hn::Mul(b, b), hn::Mul(c, c)));
-  return ballBound(interpolateRow(field, zeroUnless(sampled, brick), nearestRow(location.at)), distance, r);
+  return ballBound(field, interpolateRow(field, zeroUnless(sampled, brick), nearestRow(location.at)),
+                   distance, r);
 }
 
 /// `use_row`: where the bound by brick does not suffice, also the bound by row.
@@ -110,8 +114,7 @@ HWY_INLINE Float ballBounds(const CullField& field, const Vec3& p, Float r) {
   const VoxelLocation location = locateVoxel(field, p);
   const Mask sampled = hasBrick(location.entry);
   const Float by_brick = ballBoundsByBrick(field, location, r);
-  const Float beyond_band =
-      ballBound(splat(static_cast<float>(structures::DistanceField::kBandVoxels)), splat(kHalfDiagonal), r);
+  const Float beyond_band = ballBound(field, splat(field.cull.band), splat(kHalfDiagonal), r);
   Float bound = hn::IfThenElse(sampled, by_brick, hn::Max(by_brick, beyond_band));
   bound = hn::IfThenElse(isFarInside(location.entry), splat(-1e9F), bound);
   bound = boundsOutsideGrid(field, p, bound, r);
@@ -179,12 +182,12 @@ struct CandidateBounds {
   alignas(64) Lanes<std::int32_t> entry, offset;
   Lanes<float> fraction, row_error;
 
-  HWY_INLINE void store(const VoxelLocation& location, std::size_t i) {
+  HWY_INLINE void store(const CullField& field, const VoxelLocation& location, std::size_t i) {
     const SampleRow row = nearestRow(location.at);
     hn::StoreU(location.entry, kI, entry.data() + i);
     hn::StoreU(row.offset, kI, offset.data() + i);
     hn::StoreU(row.fraction, kF, fraction.data() + i);
-    hn::StoreU(rowErrorBound(location.at), kF, row_error.data() + i);
+    hn::StoreU(rowErrorBound(field, location.at), kF, row_error.data() + i);
   }
 };
 
@@ -236,7 +239,7 @@ HWY_INLINE void appendCandidates(const CullField& field, const structures::Point
   for (std::size_t leaf = 0; leaf < leaves.count; ++leaf) {
     const structures::ShellBlock& points = shell.pointsOfLeaf(leaves.index[leaf]);
     for (std::size_t i = 0; i < points.count; i += hn::Lanes(kF)) {
-      bounds.store(locateVoxel(field, inGrid(field.cull, points, i)),
+      bounds.store(field, locateVoxel(field, inGrid(field.cull, points, i)),
                    leaf * structures::ShellBlock::kLanes + i);
     }
   }

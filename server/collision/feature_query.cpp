@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <utility>
 
 namespace tenon::collision {
 namespace {
@@ -65,7 +66,7 @@ bool cross(const EdgePiece& a, const EdgePiece& b, double slack, double toleranc
   const double c2 = c.squaredNorm();
   const double a2 = a.half.squaredNorm();
   const double b2 = b.half.squaredNorm();
-  if (c2 < kMinSine2 * a2 * b2) return false;
+  if (c2 <= kMinSine2 * a2 * b2) return false;
   const double length = std::sqrt(c2);
   const double sign = separatingSign(b, c, tolerance * length);
   if (sign == 0.0 || (-sign * c.dot(a.into[0]) > tolerance * length) ||
@@ -101,17 +102,14 @@ double segmentDistance(const EdgePiece& a, const EdgePiece& b) {
   return (r + along_a * a.half - along_b * b.half).norm();
 }
 
-/// The contact of two pieces in W, from A's frame. Dormant ones lower `dormant_gap` [m].
-void evaluateCrossing(const EdgePiece& a, const EdgePiece& b, double dilation, const Transform& X_WA,
-                      Contact& contact, double& dormant_gap) {
+/// The contact of two pieces in W, from A's frame.
+void evaluateCrossing(const EdgePiece& a, const EdgePiece& b, const Transform& X_WA, Contact& contact) {
   Vector3 p_A = a.p;
   if (cross(a, b, 0.0, kConeTolerance, contact)) {
-    contact.gap -= dilation;
     contact.n_W = X_WA.R * contact.n_W;
     p_A = contact.p_WP;
   } else {
-    contact.gap = kDormantGap;
-    dormant_gap = std::min(dormant_gap, std::max(segmentDistance(a, b) - dilation, 0.0));
+    contact.gap = kDormantGap + segmentDistance(a, b);
     contact.n_W = Vector3::UnitZ();
   }
   contact.p_WP = X_WA.p + X_WA.R * p_A;
@@ -119,8 +117,22 @@ void evaluateCrossing(const EdgePiece& a, const EdgePiece& b, double dilation, c
 
 /// B's features in A's field.
 PairQuery reversed(const PairQuery& query, const PairFeatures& features, double margin) {
-  return {
-      &features.features_B->points(), features.field_A, query.X_WB, query.X_WA, features.dilation_A, margin};
+  return {&features.features_B->points(), features.field_A, query.X_WB, query.X_WA, margin};
+}
+
+/// Adds to the gaps of B's features what A's field is dilated beyond `most_dilation_A`. `displacement` [m] as
+/// in resampleContacts().
+void limitDilation(const PairFeatures& features, const Pose& X_WA, double displacement,
+                   PairQueryResult& of_B) {
+  if (features.most_dilation_A >= features.field_A->dilation()) return;
+  const Pose X_AW = X_WA.inverse();
+  double smallest = of_B.unlisted_gap - displacement;
+  for (Contact& contact : of_B.contacts) {
+    contact.gap += features.field_A->dilationBeyond(features.most_dilation_A, X_AW * contact.p_WP);
+    smallest = std::min(smallest, contact.gap);
+  }
+  of_B.smallest_gap = smallest;
+  of_B.deepest = std::max(-smallest, 0.0);
 }
 
 /// A contact of B against A as one of A against B.
@@ -140,15 +152,38 @@ void addCounts(const QueryCounts& counts, QueryCounts& sum) {
   sum.contacts_dropped += counts.contacts_dropped;
 }
 
-/// A contact of `gap` [m] is not listed.
-void drop(double gap, PairQueryResult& result) {
-  ++result.counts.contacts_dropped;
+/// A crossing counts in the gaps of all contacts.
+void include(const Contact& crossing, PairQueryResult& result) {
+  if (crossing.dormant()) {
+    result.dormant_gap = std::min(result.dormant_gap, crossing.gapBound());
+    return;
+  }
+  result.smallest_gap = std::min(result.smallest_gap, crossing.gap);
+  result.deepest = std::max(result.deepest, -crossing.gap);
+}
+
+/// The contact is not listed. Its gap counts up to `margin` [m].
+void drop(const Contact& contact, double margin, PairQueryResult& result) {
+  const double gap = std::min(contact.gapBound(), margin);
+  result.counts.contacts_dropped += contact.dormant() ? 0U : 1U;
   result.complete_to = std::min(result.complete_to, gap);
   result.unlisted_gap = std::min(result.unlisted_gap, gap);
 }
 
-/// Keeps the `most` contacts with the smallest gaps, in their order, and drops the others. Their gaps count
-/// up to the margin: dormant crossings are beyond it.
+/// Keeps the contacts up to a gap of `margin` [m].
+void keepWithin(double margin, ContactList& contacts, PairQueryResult& result) {
+  std::size_t kept = 0;
+  for (const Contact& contact : contacts) {
+    if (contact.gap <= margin) {
+      contacts[kept++] = contact;
+    } else {
+      result.unlisted_gap = std::min(result.unlisted_gap, contact.gap);
+    }
+  }
+  contacts.resize(kept);
+}
+
+/// Keeps the `most` contacts with the smallest gaps, in their order, and drops the others.
 void keepNearest(std::size_t most, double margin, ContactList& contacts, PairQueryResult& result) {
   if (contacts.size() <= most) return;
   std::array<std::pair<double, std::uint32_t>, ContactList::capacity()> rank;
@@ -162,7 +197,7 @@ void keepNearest(std::size_t most, double margin, ContactList& contacts, PairQue
     if (std::pair(contacts[i].gap, i) < limit) {
       contacts[kept++] = contacts[i];
     } else {
-      drop(std::min(contacts[i].gap, margin), result);
+      drop(contacts[i], margin, result);
     }
   }
   contacts.resize(kept);
@@ -184,9 +219,8 @@ class CrossingSearch {
   /// `near_A`: B's features near A.
   void run(const ContactList& near_A) {
     near_.count = 0;
-    crossings_.clear();
     const Transform X_AB(query_.X_WA.inverse() * query_.X_WB);
-    const double reach_A = features_.features_A->longestHalf() + query_.dilation + query_.margin;
+    const double reach_A = features_.features_A->longestHalf() + query_.margin;
     for (const Contact& contact : near_A) {
       const float half = features_.features_B->edges()[contact.point].half_M.norm();
       // a crossing is nearer than the centre of B's piece by half its length at most
@@ -230,7 +264,7 @@ class CrossingSearch {
   }
 
   void crossPiece(std::uint32_t i, std::span<const Ball> near) {
-    if (features_.features_A->edges()[i].half_M.isZero()) return;
+    if (!isEdge(*features_.features_A, i)) return;
     const Vector3f p_A = features_.features_A->points().points()[i].p_MP;
     EdgePiece piece;
     bool known = false;
@@ -240,15 +274,14 @@ class CrossingSearch {
       known = true;
       const EdgePiece& other = near_.pieces[ball.piece];
       Contact contact;
-      if (!cross(piece, other, query_.margin, kListedTolerance, contact) ||
-          contact.gap - query_.dilation > query_.margin)
+      if (!cross(piece, other, query_.margin, kListedTolerance, contact) || contact.gap > query_.margin)
         continue;
       contact.kind = ContactKind::kCrossing;
       contact.point = i;
       contact.other = near_.point[ball.piece];
-      evaluateCrossing(piece, other, query_.dilation, X_WA_, contact, result_.dormant_gap);
-      result_.smallest_gap = std::min(result_.smallest_gap, contact.gap);
-      if (!crossings_.push_back(contact)) drop(std::min(contact.gap, query_.margin), result_);
+      evaluateCrossing(piece, other, X_WA_, contact);
+      include(contact, result_);
+      if (!crossings_.push_back(contact)) drop(contact, query_.margin, result_);
     }
   }
 
@@ -271,35 +304,32 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
   const double half_B = features.features_B->longestHalf();
   PairQueryResult& of_B = scratch.of_B;
   queryPair(reversed(query, features, query.margin + half_B), of_B);
+  limitDilation(features, query.X_WA, 0.0, of_B);
+  // what it lacks beyond the margin is no contact of this list
+  if (of_B.complete_to >= query.margin) of_B.counts.contacts_dropped = 0;
   addCounts(of_B.counts, result.counts);
   result.smallest_gap = std::min(result.smallest_gap, of_B.smallest_gap);
   result.unlisted_gap = std::min(result.unlisted_gap, of_B.unlisted_gap);
   result.deepest = std::max(result.deepest, of_B.deepest);
   if (of_B.complete_to < query.margin) result.complete_to = std::min(result.complete_to, of_B.complete_to);
 
-  const auto near = static_cast<std::size_t>(
-      std::count_if(of_B.contacts.begin(), of_B.contacts.end(),
-                    [&](const Contact& contact) { return contact.gap <= query.margin; }));
-  const bool may_cross = half_A > 0.0 && half_B > 0.0 && !of_B.contacts.empty();
+  ContactList& points = of_B.contacts;
+  ContactList& crossings = scratch.crossings;
+  crossings.clear();
+  const bool may_cross = half_A > 0.0 && half_B > 0.0 && !points.empty();
   if (may_cross) {
-    CrossingSearch(query, features, scratch, result).run(of_B.contacts);
-    keepNearest(kMaxCrossings, query.margin, scratch.crossings, result);
+    CrossingSearch(query, features, scratch, result).run(points);
+    keepNearest(kMaxCrossings, query.margin, crossings, result);
   }
-  const std::size_t room = std::min(near + (may_cross ? scratch.crossings.size() : 0), kFeatureRoom);
+  keepWithin(query.margin, points, result);
+  const std::size_t room = std::min(points.size() + crossings.size(), kFeatureRoom);
   keepNearest(ContactList::capacity() - room, query.margin, result.contacts, result);
-  for (const Contact& contact : of_B.contacts) {
-    if (contact.gap > query.margin) {
-      result.unlisted_gap = std::min(result.unlisted_gap, contact.gap);
-    } else if (!result.contacts.push_back(turned(contact))) {
-      drop(contact.gap, result);
-    }
-  }
+  keepNearest(ContactList::capacity() - result.contacts.size() - crossings.size(), query.margin, points,
+              result);
+  for (const Contact& contact : points) result.contacts.push_back(turned(contact));
+  for (const Contact& contact : crossings) result.contacts.push_back(contact);
   if (half_A == 0.0 || half_B == 0.0) return;
 
-  for (std::size_t i = 0; may_cross && i < scratch.crossings.size(); ++i) {
-    const Contact& contact = scratch.crossings[i];
-    if (!result.contacts.push_back(contact)) drop(std::min(contact.gap, query.margin), result);
-  }
   // a crossing is nearer than the centre of B's piece by half its length at most
   double crossing_bound = of_B.unlisted_gap - half_B;
   if (may_cross) crossing_bound = std::min(crossing_bound, query.margin);
@@ -308,7 +338,8 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
   result.unlisted_gap = std::min(result.unlisted_gap, crossing_bound);
 }
 
-double featureGap(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch) noexcept {
+double featureGap(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
+                  QueryCounts& counts) noexcept {
   if (!features.any()) return std::numeric_limits<double>::infinity();
   const double half_B = features.features_B->longestHalf();
   const bool may_cross = half_B > 0.0 && features.features_A->longestHalf() > 0.0;
@@ -317,6 +348,7 @@ double featureGap(const PairQuery& query, const PairFeatures& features, FeatureS
   PairQuery of_B = reversed(query, features, query.margin + nearer);
   of_B.list = false;
   queryPair(of_B, scratch.of_B);
+  addCounts(scratch.of_B.counts, counts);
   return scratch.of_B.smallest_gap - nearer;
 }
 
@@ -339,6 +371,7 @@ void resampleFeatures(const PairQuery& query, const PairFeatures& features, doub
     scratch.of_B.reduced = false;
     scratch.of_B.unlisted_gap = result.unlisted_gap;
     resampleContacts(reversed(query, features, query.margin), displacement, scratch.of_B);
+    limitDilation(features, query.X_WA, displacement, scratch.of_B);
     result.unlisted_gap = scratch.of_B.unlisted_gap;
     result.smallest_gap = std::min(result.smallest_gap, scratch.of_B.smallest_gap);
     result.deepest = std::max(result.deepest, scratch.of_B.deepest);
@@ -350,12 +383,10 @@ void resampleFeatures(const PairQuery& query, const PairFeatures& features, doub
   const Transform X_AB(query.X_WA.inverse() * query.X_WB);
   for (Contact& contact : crossings) {
     evaluateCrossing(pieceOf(*features.features_A, contact.point),
-                     pieceOf(*features.features_B, contact.other, X_AB), query.dilation, X_WA, contact,
-                     result.dormant_gap);
-    result.smallest_gap = std::min(result.smallest_gap, contact.gap);
+                     pieceOf(*features.features_B, contact.other, X_AB), X_WA, contact);
+    include(contact, result);
     contacts.push_back(contact);
   }
-  result.deepest = std::max(result.deepest, -(result.smallest_gap + query.dilation));
 }
 
 }  // namespace tenon::collision

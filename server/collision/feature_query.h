@@ -1,6 +1,8 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <limits>
 
 #include "server/collision/pair_query.h"
 #include "server/structures/feature_shell.h"
@@ -12,17 +14,24 @@ namespace tenon::collision {
 /// The points of A's pointshell miss what is thinner than their spacing on B: a stud, an edge, a corner. So
 /// B's features are also asked in A's field, with contacts as of A against B (normals from B into A). Two
 /// edges that cross touch between the points of both: the gap there is that of the closest points of their
-/// segments, the fields only find candidates.
+/// segments, the fields only find candidates. Features are where the exact surface is: thin walls of B are
+/// thickened for A's points alone.
 struct PairFeatures {
   const structures::FeatureShell* features_A = nullptr;
   const structures::FeatureShell* features_B = nullptr;
   const structures::DistanceField* field_A = nullptr;
-  double dilation_A = 0.0;  ///< [m] outward offset of A's surface for the features of B
+  /// [m] Of the dilation of A's field so much counts for features of B
+  double most_dilation_A = std::numeric_limits<double>::infinity();
 
   [[nodiscard]] bool any() const {
     return features_B != nullptr && !features_B->empty() && !field_A->empty();
   }
 };
+
+/// Whether there is a feature of this index, and a piece of an edge about it.
+[[nodiscard]] inline bool isEdge(const structures::FeatureShell& features, std::size_t point) {
+  return point < features.edges().size() && features.edges()[point].half_M.squaredNorm() > 0.0F;
+}
 
 /// A piece of a convex edge, as structures::FeatureEdge, in any frame.
 struct EdgePiece {
@@ -56,12 +65,13 @@ struct FeatureScratch {
 /// Adds to the result of queryPair the contacts of features up to `query.margin`: of kFeaturePoint, then of
 /// kCrossing, after those of shell points. Levels and budget of the query do not apply to features; their
 /// points are counted. Where the list is full, feature contacts displace shell points with the largest gaps,
-/// at most kFeatureRoom; of more than kMaxCrossings crossings those with the largest gaps are dropped
-/// (`contacts_dropped`).
+/// at most kFeatureRoom; of the features' points, and of more than kMaxCrossings crossings, those with the
+/// smallest gaps are kept (`contacts_dropped`).
 ///
 /// A crossing is listed when it may come about within `query.margin` of motion. While it is beyond the ends
-/// of its pieces, or the faces beside it are nearer, it is dormant: its gap is kDormantGap, and the distance
-/// of its segments counts in PairQueryResult::dormant_gap.
+/// of its pieces, or the faces beside it are nearer, it is dormant: its gap is kDormantGap plus the distance
+/// of its segments, which counts in PairQueryResult::dormant_gap. In the solver it is a constraint that is
+/// never active: at most kMaxCrossings rows of a pair.
 ///
 /// Threads: pure, but for the scratch. Real-time.
 void queryFeatures(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
@@ -74,15 +84,13 @@ void resampleFeatures(const PairQuery& query, const PairFeatures& features, doub
                       FeatureScratch& scratch, PairQueryResult& result) noexcept;
 
 /// [m] Lower bound of the gap of features and crossings up to `query.margin`, beyond that a larger one. Lists
-/// nothing; `scratch` has the work that it took.
+/// nothing; adds its work to `counts`.
 ///
 /// Threads: pure, but for the scratch. Real-time.
-[[nodiscard]] double featureGap(const PairQuery& query, const PairFeatures& features,
-                                FeatureScratch& scratch) noexcept;
+[[nodiscard]] double featureGap(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
+                                QueryCounts& counts) noexcept;
 
 inline constexpr std::size_t kFeatureRoom = 128;
 inline constexpr std::size_t kMaxCrossings = 64;
-/// [m] Further apart than any margin.
-inline constexpr double kDormantGap = 1.0;
 
 }  // namespace tenon::collision

@@ -31,17 +31,16 @@ FixedVector<ConcaveDirection, 2> concaveDirections(const ContactSurface& surface
                                                    FixedVector<Contact, 4>& secondary_planes) {
   FixedVector<ConcaveDirection, 2> directions;
   if (surface.field == nullptr) return directions;
-  const structures::DistanceField& field = *surface.field;
   const Pose& X_WB = *surface.X_WF;
   const Vector3 p_BP = X_WB.inverse() * contact.p_WP;
   const Vector3 n_B = X_WB.rotation().conjugate() * (surface.sign * contact.n_W);
-  const double h = kSampleOffset * field.voxelAt(p_BP);
+  const double h = kSampleOffset * surface.field->voxelAt(p_BP);
   const std::array<Vector3, 2> t = tangentsOf(n_B);
   Eigen::Matrix2d turn;
   for (int side = 0; side < 2; ++side) {
     const Vector3& along = t[static_cast<std::size_t>(side)];
-    const structures::FieldSample ahead = field.sample(p_BP + h * along);
-    const structures::FieldSample behind = field.sample(p_BP - h * along);
+    const structures::FieldSample ahead = surface.sample(p_BP + h * along);
+    const structures::FieldSample behind = surface.sample(p_BP - h * along);
     if (!ahead.exact || !behind.exact) return directions;
     turn(0, side) = (behind.gradient - ahead.gradient).dot(t[0]);
     turn(1, side) = (behind.gradient - ahead.gradient).dot(t[1]);
@@ -51,7 +50,7 @@ FixedVector<ConcaveDirection, 2> concaveDirections(const ContactSurface& surface
       const double slope = sample.gradient.norm();
       if (slope < kMinPlaneSlope) continue;
       Contact plane = contact;
-      plane.gap = (sample.distance - surface.dilation - offset * sample.gradient.dot(along)) / slope;
+      plane.gap = (sample.distance - offset * sample.gradient.dot(along)) / slope;
       plane.n_W = X_WB.rotation() * (surface.sign * (sample.gradient / slope));
       plane.area = 0.0;
       // with a smaller gap, the surface is convex between the contact and the sample

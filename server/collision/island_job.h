@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <span>
 
 #include "server/collision/island_solver.h"
@@ -33,8 +34,15 @@ inline std::array<Vector3, 2> tangentsOf(const Vector3& n_W) {
 struct ContactSurface {
   const structures::DistanceField* field = nullptr;
   const Pose* X_WF = nullptr;
-  double dilation = 0.0;  ///< [m]
-  double sign = 1.0;      ///< [-] 1: the contact's normal points out of this surface; -1: into it
+  double most_dilation = std::numeric_limits<double>::infinity();  ///< [m] of the field's, so much counts
+  double sign = 1.0;  ///< [-] 1: the contact's normal points out of this surface; -1: into it
+
+  /// The field in its frame F.
+  [[nodiscard]] structures::FieldSample sample(const Vector3& p_FP) const {
+    structures::FieldSample sample = field->sample(p_FP);
+    sample.distance += field->dilationBeyond(most_dilation, p_FP);
+    return sample;
+  }
 };
 
 /// The arguments of IslandSolver::solve, shared by its files. All spans live as long as the call.
@@ -58,9 +66,9 @@ struct IslandSolver::Job {
   [[nodiscard]] ContactSurface surfaceOf(const IslandPair& pair, const Contact& contact) const {
     switch (contact.kind) {
       case ContactKind::kShellPoint:
-        return {pair.field_B, &poseB(pair), pair.dilation, 1.0};
+        return {.field = pair.field_B, .X_WF = &poseB(pair)};
       case ContactKind::kFeaturePoint:
-        return {pair.features.field_A, &poseA(pair), pair.features.dilation_A, -1.0};
+        return {pair.features.field_A, &poseA(pair), pair.features.most_dilation_A, -1.0};
       case ContactKind::kCrossing:
         break;
     }
@@ -68,7 +76,7 @@ struct IslandSolver::Job {
   }
   /// The query of a pair at the current poses of its bodies, up to a gap of `margin` [m].
   [[nodiscard]] PairQuery queryOf(const IslandPair& pair, double margin) const {
-    return {pair.shell_A, pair.field_B, poseA(pair), poseB(pair),         pair.dilation,
+    return {pair.shell_A, pair.field_B, poseA(pair), poseB(pair),
             margin,       pair.levels,  pair.budget, pair.priority_points};
   }
 };

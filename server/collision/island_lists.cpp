@@ -26,7 +26,7 @@ int movableBodies(const IslandPair& pair) {
 
 /// [m] Contacts up to this gap must be listed before a step: those it may reach, and contact_margin.
 double neededMargin(const IslandPair& pair, const SolveLimits& limits) {
-  return std::max(limits.contact_margin, movableBodies(pair) * limits.max_step_length);
+  return std::max(limits.contact_margin, pair.slope() * movableBodies(pair) * limits.max_step_length);
 }
 
 }  // namespace
@@ -109,8 +109,9 @@ bool IslandSolver::updatePair(const Job& job, std::size_t i, SolveReport& report
 
 void IslandSolver::traversePair(const Job& job, std::size_t i, SolveReport& report) {
   const IslandPair& pair = job.pairs[i];
-  PairQuery query = job.queryOf(pair, neededMargin(pair, job.limits) +
-                                          kTraversalSteps * movableBodies(pair) * job.limits.max_step_length);
+  PairQuery query = job.queryOf(pair, neededMargin(pair, job.limits) + kTraversalSteps * pair.slope() *
+                                                                           movableBodies(pair) *
+                                                                           job.limits.max_step_length);
   query.levels = std::min(pair.levels, job.results[i].traversal.levels_used);
   query.reduce = true;
   queryPair(query, job.results[i].query);
@@ -134,16 +135,17 @@ double IslandSolver::approachSinceTraversal(const Job& job, std::size_t i) {
   };
   add(pair.body_a, job.results[i].traversal.X_WA);
   add(pair.body_b, job.results[i].traversal.X_WB);
-  return sum;
+  return pair.slope() * sum;
 }
 
 double IslandSolver::clearanceOf(const Job& job, std::size_t i) {
+  const IslandPair& pair = job.pairs[i];
   const PairQueryResult& query = job.results[i].query;
   double clearance = std::min(query.smallest_gap - query.skipped_gap_error, query.dormant_gap);
   // points that the list skipped in favour of neighbours are not in its gaps after a motion
   if (query.reduced && clearance > 0.0)
     clearance = std::min(clearance, job.results[i].traversal.smallest_gap - approachSinceTraversal(job, i));
-  return std::max(clearance, 0.0);
+  return std::max(clearance, 0.0) / pair.slope();
 }
 
 bool IslandSolver::mustTraverse(const Job& job, std::size_t i, double approach) {
@@ -181,7 +183,7 @@ std::size_t IslandSolver::pairOfRow(const Job& job, std::size_t row) {
 double IslandSolver::validityRadius(const Job& job) {
   double radius = job.limits.max_step_length;
   for (const IslandPairResult& result : job.results) {
-    if (result.query.counts.contacts_dropped > 0) radius = std::min(radius, result.query.complete_to);
+    radius = std::min(radius, result.query.complete_to);
   }
   return std::max(radius, kMinValidity * job.limits.max_step_length);
 }

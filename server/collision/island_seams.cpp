@@ -31,15 +31,14 @@ bool IslandSolver::findSeam(const Job& job, std::size_t pair, std::size_t c, std
   Seam seam{pair, c, row, {}};
   for (const Vector3& t_W : tangentsOf(contact.n_W)) {
     for (const double offset : {kSeamDistance, -kSeamDistance}) {
-      const structures::FieldSample sample =
-          surface.field->sample(X_WB.inverse() * (contact.p_WP + offset * t_W));
+      const structures::FieldSample sample = surface.sample(X_WB.inverse() * (contact.p_WP + offset * t_W));
       const double slope = sample.gradient.norm();
       if (!sample.exact || slope < kMinSeamSlope) continue;
       const Vector3 gradient_W = X_WB.rotation() * sample.gradient;
       const Vector3 n_W = gradient_W / slope;
       // on a concave surface both sides hold
       if (offset * (n_W - out_W).dot(t_W) < kSeamTurn * kSeamDistance) continue;
-      const double gap = sample.distance - surface.dilation - offset * gradient_W.dot(t_W);
+      const double gap = sample.distance - offset * gradient_W.dot(t_W);
       if (gap >= std::min(contact.gap, 0.0) - kSeamDepthNoise)
         seam.sides.push_back({surface.sign * n_W, gap});
     }

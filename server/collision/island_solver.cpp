@@ -29,6 +29,17 @@ constexpr int kMaxNonmonotoneSteps = 1;
 /// [m] A step shorter than this may be blocked by the field's discretisation alone.
 constexpr double kSmallStep = 1e-4;
 
+/// Whether a step goes to the goal of the body's only spring, but for terms of second order: nothing else, as
+/// a limit or a stiffening, shortened it. Such a body is put there exactly.
+bool reachesGoal(const MovableBody& body, const Displacement& step_W) {
+  constexpr double kSecondOrder = 0.01;  // [-] of the step
+  if (body.springs.size() != 1) return false;
+  const Displacement to_goal = displacement(body.X_WB, body.springs[0].X_WG, body.p_BQ);
+  const double rest = maxPointMotion(
+      {to_goal.translation - step_W.translation, to_goal.rotation - step_W.rotation}, body.radius);
+  return rest <= kSecondOrder * maxPointMotion(step_W, body.radius) + kStepTolerance;
+}
+
 }  // namespace
 
 IslandSolver::IslandSolver(std::size_t max_bodies, std::size_t max_pairs)
@@ -37,6 +48,7 @@ IslandSolver::IslandSolver(std::size_t max_bodies, std::size_t max_pairs)
       step_(max_bodies),
       step_without_seams_(max_bodies),
       lengths_(max_bodies),
+      clearances_(max_pairs),
       fractions_(max_bodies),
       leaders_(max_bodies),
       last_step_(max_bodies),
@@ -228,8 +240,9 @@ bool IslandSolver::limitStep(const Job& job, double trust) {
   };
   for (std::size_t p = 0; p < job.pairs.size(); ++p) {
     const IslandPair& pair = job.pairs[p];
+    clearances_[p] = clearanceOf(job, p);
     if (pair.body_a == ContactConstraint::kStatic || pair.body_b == ContactConstraint::kStatic) continue;
-    if (lengthOf(pair.body_a) + lengthOf(pair.body_b) <= clearanceOf(job, p)) continue;
+    if (lengthOf(pair.body_a) + lengthOf(pair.body_b) <= clearances_[p]) continue;
     const std::size_t a = leaderOf(static_cast<std::size_t>(pair.body_a));
     const std::size_t b = leaderOf(static_cast<std::size_t>(pair.body_b));
     leaders_[std::max(a, b)] = std::min(a, b);
@@ -239,7 +252,7 @@ bool IslandSolver::limitStep(const Job& job, double trust) {
   bool by_trust = false;
   for (std::size_t p = 0; p < job.pairs.size(); ++p) {
     const IslandPair& pair = job.pairs[p];
-    const double clearance = clearanceOf(job, p);
+    const double clearance = clearances_[p];
     const double approach = lengthOf(pair.body_a) + lengthOf(pair.body_b);
     if (approach <= clearance) continue;
     const double free = clearance / approach;
@@ -279,8 +292,7 @@ void IslandSolver::takeStep(const Job& job) {
     MovableBody& body = job.bodies[i];
     const double fraction = fractions_[i];
     last_step_[i] = {fraction * step_[i].translation, fraction * step_[i].rotation};
-    // without contact the goal is reached exactly, not only to second order
-    const bool at_goal = fraction == 1.0 && constrained_[i] == 0 && body.springs.size() == 1 &&
+    const bool at_goal = fraction == 1.0 && constrained_[i] == 0 && reachesGoal(body, last_step_[i]) &&
                          job.limits.method != ContactMethod::kBlocking;
     body.X_WB = at_goal ? body.springs[0].X_WG : displaced(body.X_WB, last_step_[i], body.p_BQ);
   }

@@ -59,7 +59,6 @@ struct IslandPair {
   const structures::DistanceField* field_B = nullptr;
   Pose X_WA_static;
   Pose X_WB_static;
-  double dilation = 0.0;  ///< [m] offset of B's zero level set
   PairFeatures features;  ///< none: one direction is asked
   Friction friction;
   // for every traversal, as in PairQuery
@@ -69,6 +68,11 @@ struct IslandPair {
   /// Result of the last solve, for the warm start: its list serves again while the bodies are near the poses
   /// of its traversal. Null after a jump of a pose. May be the result that is to be filled.
   const IslandPairResult* last = nullptr;
+
+  /// [-] Gaps change by at most this times a motion.
+  [[nodiscard]] double slope() const {
+    return features.any() ? std::max(field_B->slope(), features.field_A->slope()) : field_B->slope();
+  }
 };
 
 struct SolveLimits {
@@ -179,7 +183,7 @@ class IslandSolver {
   void traversePair(const Job& job, std::size_t pair, SolveReport& report);
   /// `approach` [m]: approachSinceTraversal.
   [[nodiscard]] static bool mustTraverse(const Job& job, std::size_t pair, double approach);
-  /// [m] Upper bound of how much any point of one body came nearer to the other since the last traversal.
+  /// [m] Upper bound of how much the gap of any point became smaller since the last traversal.
   [[nodiscard]] static double approachSinceTraversal(const Job& job, std::size_t pair);
   void buildConstraints(const Job& job);
   /// [m] Validity radius of the linearised problem: a step of this length reaches no contact that was dropped
@@ -202,7 +206,8 @@ class IslandSolver {
   /// Sets fractions_ for a trust region of `trust` [m]. True for a step in free motion: bodies stop before
   /// contacts, none because of the trust region.
   bool limitStep(const Job& job, double trust);
-  /// [m] Lower bound of the gaps of all points of a pair at the iterate, at least 0.
+  /// [m] By so much the bodies of a pair may approach each other from the iterate before anything touches, at
+  /// least 0.
   [[nodiscard]] static double clearanceOf(const Job& job, std::size_t pair);
   /// Fraction of step_ with which a body does not exceed its max_displacement.
   [[nodiscard]] double fractionWithinLimit(const MovableBody& body, std::size_t i) const;
@@ -295,6 +300,7 @@ class IslandSolver {
   std::vector<Displacement> step_;                ///< the QP's solution, by body
   std::vector<Displacement> step_without_seams_;  ///< the same if contacts at seams did not hold
   std::vector<double> lengths_;                   ///< [m] of step_, of any point, by body
+  std::vector<double> clearances_;                ///< [m] clearanceOf each pair
   std::vector<double> fractions_;                 ///< [-] of step_ to take, by body
   std::vector<std::size_t> leaders_;              ///< by body: union-find of those that share a fraction
   std::vector<Displacement> last_step_;           ///< the step that led to the iterate

@@ -19,7 +19,7 @@ class ContactBlockView {
       : frame_(frame), samples_(samples), contacts_(contacts) {}
 
   [[nodiscard]] std::uint32_t near() const { return samples_.near; }
-  [[nodiscard]] double gap(std::size_t i) const { return samples_.distance[i] - frame_.dilation; }
+  [[nodiscard]] double gap(std::size_t i) const { return samples_.distance[i]; }
   [[nodiscard]] Vector3 gradient(std::size_t i) const {
     return {samples_.gradient_x[i], samples_.gradient_y[i], samples_.gradient_z[i]};
   }
@@ -56,7 +56,7 @@ static_assert(IncomingContacts::kCapacity >= Candidates::kCapacity);
 class Traversal {
  public:
   Traversal(const PairQuery& query, PairQueryResult& result)
-      : frame_(*query.field_B, query.X_WA, query.X_WB, query.dilation, query.margin, query.shell_A->radius()),
+      : frame_(*query.field_B, query.X_WA, query.X_WB, query.margin, query.shell_A->radius()),
         kernels_(chosenKernels()),
         shell_(*query.shell_A),
         sum_penalty_(query.sum_penalty),
@@ -65,7 +65,7 @@ class Traversal {
         reduce_(query.reduce),
         correct_ridges_(query.correct_ridges),
         result_(result),
-        reducer_(result, -query.field_B->band() - query.dilation, query.margin) {}
+        reducer_(result, -query.field_B->band(), query.margin) {}
 
   /// Uses at most `levels` levels and about `budget` points; returns the number of levels used.
   std::size_t run(std::size_t levels, std::size_t budget) {
@@ -123,7 +123,7 @@ class Traversal {
     ++result_.counts.spheres_visited;
     constexpr double kRounding = 1e-6;
     const Vector3 p_BC = frame_.inB(shell_.boundingCentre());
-    const double bound = frame_.field.lowerBound(p_BC, shell_.boundingRadius() + kRounding) - frame_.dilation;
+    const double bound = frame_.field.lowerBound(p_BC, shell_.boundingRadius() + kRounding);
     if (!prune_ || bound <= frame_.margin) return true;
     lowerGapBound(bound);
     return false;
@@ -201,7 +201,7 @@ class Traversal {
       correctRidges(frame_, kernels_, points, {samples_.data(), blocks}, sums);
     }
     result_.counts.points_colliding += sums.colliding;
-    result_.smallest_gap = std::min(result_.smallest_gap, sums.smallest_distance - frame_.dilation);
+    result_.smallest_gap = std::min(result_.smallest_gap, sums.smallest_distance);
     result_.deepest = std::max(result_.deepest, -sums.smallest_distance);
     result_.unlisted_gap = std::min(result_.unlisted_gap, sums.smallest_far_gap);
     if (list_ && sums.near > 0) {
@@ -311,6 +311,7 @@ class Traversal {
     Contact& contact = *result_.contacts.extend();
     lanes.setContact(i, contact);
     contact.point = point;
+    contact.other = 0;
     contact.kind = ContactKind::kShellPoint;
     contact.area = areaOf(point);
   }
@@ -390,7 +391,7 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
   if (used > 0 && used < levels.size()) {
     const std::span<const float> areas = query.shell_A->areasOfLevel(used - 1);
     for (Contact& contact : result.contacts) contact.area = areas[contact.point];
-    result.skipped_gap_error = levels[used - 1].spacing;
+    result.skipped_gap_error = levels[used - 1].spacing * query.field_B->slope();
     traversal.setAreas(areas);
     traversal.testPriorityPoints(query.priority_points);
   }
@@ -401,13 +402,12 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
 }
 
 void resampleContacts(const PairQuery& query, double displacement, PairQueryResult& result) noexcept {
-  const LaneFrame frame(*query.field_B, query.X_WA, query.X_WB, query.dilation, query.margin,
-                        query.shell_A->radius());
+  const LaneFrame frame(*query.field_B, query.X_WA, query.X_WB, query.margin, query.shell_A->radius());
   const QueryKernels& kernels = chosenKernels();
   const std::span<const structures::ShellPoint> points = query.shell_A->points();
   ContactList& contacts = result.contacts;
   result.smallest_gap = result.unlisted_gap - displacement;
-  result.deepest = std::max(-(result.smallest_gap + query.dilation), 0.0);
+  result.deepest = std::max(-result.smallest_gap, 0.0);
   SampleSums sums;
   std::size_t kept = 0;
   for (std::size_t first = 0; first < contacts.size(); first += structures::ShellBlock::kLanes) {
@@ -423,8 +423,7 @@ void resampleContacts(const PairQuery& query, double displacement, PairQueryResu
       if ((samples.exact >> i & 1U) == 0) {
         // unlisted_gap is for the poses of the traversal: the point may come nearer again when A moves back
         // there
-        result.unlisted_gap =
-            std::min(result.unlisted_gap, samples.distance[i] - frame.dilation - displacement);
+        result.unlisted_gap = std::min(result.unlisted_gap, samples.distance[i] - displacement);
         continue;
       }
       if ((contact_lanes.has_normal >> i & 1U) == 0) lanes.setNormal(i, points[point].inward_M);
@@ -434,7 +433,7 @@ void resampleContacts(const PairQuery& query, double displacement, PairQueryResu
       contact.area = area;
     }
   }
-  result.smallest_gap = std::min(result.smallest_gap, sums.smallest_distance - frame.dilation);
+  result.smallest_gap = std::min(result.smallest_gap, sums.smallest_distance);
   result.deepest = std::max(result.deepest, -sums.smallest_distance);
   if (!result.reduced) result.counts.points_colliding = sums.colliding;
   contacts.resize(kept);

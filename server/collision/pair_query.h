@@ -18,17 +18,25 @@ enum class ContactKind : std::uint8_t {
   kCrossing,      ///< a piece of an edge of A, one of B
 };
 
+/// [m] Further apart than any margin. The gap of a dormant crossing (feature_query.h) is this plus the
+/// distance of its segments.
+inline constexpr double kDormantGap = 1.0;
+
 /// A point of body A near body B's surface, or of B near A's (feature_query.h).
 struct Contact {
   Vector3 p_WP = Vector3::Zero();
   Vector3 n_W = Vector3::Zero();  ///< unit, from B into A: the direction in which B pushes A
-  double gap = 0.0;               ///< [m] signed distance minus the dilation; < 0: inside the dilated surface
+  double gap = 0.0;               ///< [m] value of B's field; < 0: inside its zero level set
   double area = 0.0;              ///< [m^2] surface of A that the point represents
   /// index in A's pointshell (kShellPoint), in B's features, or in A's (kCrossing): identifies the contact
   /// from tick to tick
   std::uint32_t point = 0;
   std::uint32_t other = 0;  ///< of a kCrossing: index in B's features
   ContactKind kind = ContactKind::kShellPoint;
+
+  [[nodiscard]] bool dormant() const { return gap >= kDormantGap; }
+  /// [m] Lower bound of the gap; for a dormant crossing the distance of its segments.
+  [[nodiscard]] double gapBound() const { return dormant() ? gap - kDormantGap : gap; }
 };
 
 inline constexpr std::size_t kMaxPairContacts = 512;
@@ -40,7 +48,8 @@ struct QueryCounts {
   std::uint32_t spheres_total = 0;  ///< of all levels
   std::uint32_t points_visited = 0;
   std::uint32_t points_colliding = 0;  ///< with a negative gap
-  std::uint32_t contacts_dropped = 0;  ///< contacts beyond the list's capacity: those with the largest gaps
+  /// contacts beyond the list's capacity: those with the largest gaps; dormant crossings do not count
+  std::uint32_t contacts_dropped = 0;
 
   /// [%] Load eta (paper eq. 2): the mean of two ratios, spheres visited to all spheres and points colliding
   /// to points visited.
@@ -53,7 +62,6 @@ struct PairQuery {
   const structures::DistanceField* field_B = nullptr;
   Pose X_WA;
   Pose X_WB;
-  double dilation = 0.0;               ///< [m] outward offset of B's contact surface
   double margin = 0.0;                 ///< [m] contacts are listed up to this gap
   std::uint32_t levels = 0xFFFFFFFFU;  ///< number of pointshell levels that may be used
   /// Maximum number of points to test. A level that is expected to exceed it is skipped, with all finer ones;
@@ -77,7 +85,7 @@ struct PairQuery {
 struct PairQueryResult {
   ContactList contacts;
   QueryCounts counts;
-  /// [m] of all points, dilation included; a lower bound when no point is within the margin
+  /// [m] of all points; a lower bound when no point is within the margin
   double smallest_gap = 0.0;
   /// [m] the list holds every contact with a smaller gap: the margin, or less when contacts were dropped
   double complete_to = 0.0;
@@ -88,9 +96,9 @@ struct PairQueryResult {
   bool reduced = false;  ///< points were dropped in favour of neighbours (PairQuery::reduce)
   /// Penalty wrench for a stiffness of 1 N/m, force [m] and torque [m^2], if asked for
   Wrench penalty_Ao_W;
-  std::uint32_t penalty_points = 0;  ///< points in that sum; points deeper than the field's band are not
-  double deepest = 0.0;              ///< [m] depth of the deepest point in the undilated field, 0 when apart
-  std::uint32_t levels_used = 0;     ///< levels 0 to levels_used - 1 were tested
+  std::uint32_t penalty_points = 0;    ///< points in that sum; points deeper than the field's band are not
+  double deepest = 0.0;                ///< [m] depth of the deepest point in B's field, 0 when apart
+  std::uint32_t levels_used = 0;       ///< levels 0 to levels_used - 1 were tested
   std::uint32_t traversal_points = 0;  ///< points tested by queryPair; resampling does not change it
   double skipped_gap_error = 0.0;      ///< [m] points of skipped levels may be nearer by at most this
 };
@@ -107,10 +115,10 @@ struct PairQueryResult {
 /// Threads: pure. Real-time.
 void queryPair(const PairQuery& query, PairQueryResult& result) noexcept;
 
-/// Evaluates the listed contacts at the query's poses without a traversal, as long as no point of A has come
-/// nearer to B than by `displacement` [m] since queryPair listed them. Gaps and normals are those of
-/// queryPair without ridge correction; points that are not listed have at least a gap of unlisted_gap -
-/// displacement. Contacts that left the field's band are removed from the list
+/// Evaluates the listed contacts at the query's poses without a traversal, as long as the gap of no point of
+/// A has become smaller by more than `displacement` [m] since queryPair listed them. Gaps and normals are
+/// those of queryPair without ridge correction; points that are not listed have at least a gap of
+/// unlisted_gap - displacement. Contacts that left the field's band are removed from the list
 /// (`unlisted_gap` then covers them).
 ///
 /// Threads: pure. Real-time.
@@ -120,13 +128,13 @@ void resampleContacts(const PairQuery& query, double displacement, PairQueryResu
 [[nodiscard]] double penaltyForce(const Contact& contact, double stiffness) noexcept;
 
 /// Penalty wrench of the paper (§3.1) on A about its origin, in W: F = K sum a_i d_i n_i / A_ref over the
-/// listed points inside the dilated surface, with A_ref = 1 cm^2 and K = `stiffness` [N/m].
+/// listed points inside B's field, with A_ref = 1 cm^2 and K = `stiffness` [N/m].
 [[nodiscard]] Wrench penaltyWrench(const PairQueryResult& result, const Vector3& p_WAo,
                                    double stiffness) noexcept;
 
 /// Selects at most `out.size()` contacts that represent all: the smallest gap, then always the one that
-/// differs most from those selected in position and normal. Writes indices into `contacts` in order of
-/// selection and returns their number.
+/// differs most from those selected in position and normal. Dormant crossings are none. Writes indices into
+/// `contacts` in order of selection and returns their number.
 std::size_t selectRepresentatives(const ContactList& contacts, std::span<std::uint32_t> out) noexcept;
 
 }  // namespace tenon::collision

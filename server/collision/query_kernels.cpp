@@ -100,8 +100,10 @@ CullFrame::CullFrame(const structures::DistanceField& field, const Matrix3& R_BA
   slack = 4e-6F * largest + 2e-3F;
   limit = static_cast<float>(limit_B * per) + slack;
   outside_grid = static_cast<float>(layout.margin * per);
-  beyond_band = std::min(outside_grid,
-                         static_cast<float>(layout.band * per - structures::DistanceField::kHalfDiagonal));
+  slope = std::nextafter(static_cast<float>(layout.slope), 2.0F);
+  band = std::nextafter(static_cast<float>((layout.band - layout.dilation) * per), 0.0F);
+  beyond_band = std::min(outside_grid, static_cast<float>((layout.band - layout.dilation) * per -
+                                                          structures::DistanceField::kHalfDiagonal));
   if (too_long) {
     limit = std::numeric_limits<float>::infinity();
     last_voxel.fill(0.0F);
@@ -109,17 +111,16 @@ CullFrame::CullFrame(const structures::DistanceField& field, const Matrix3& R_BA
 }
 
 LaneFrame::LaneFrame(const structures::DistanceField& the_field, const Pose& X_WA, const Pose& X_WB,
-                     double the_dilation, double the_margin, double reach_A)
+                     double the_margin, double reach_A)
     : field(the_field),
       box_B(the_field.box()),
-      dilation(the_dilation),
       margin(the_margin),
       R_WA(X_WA.matrix()),
       R_WB(X_WB.matrix()),
       R_BA((X_WB.rotation().conjugate() * X_WA.rotation()).normalized().toRotationMatrix()),
       p_WA(X_WA.translation()),
       p_BA_B(X_WB.inverse() * X_WA.translation()),
-      cull(the_field, R_BA, p_BA_B, reach_A, the_dilation + the_margin) {}
+      cull(the_field, R_BA, p_BA_B, reach_A, the_margin) {}
 
 std::span<const QueryKernels> supportedKernels() noexcept { return {registry.all.data(), registry.count}; }
 

@@ -37,24 +37,25 @@ struct CullFrame {
   float slack = 0.0F;                 ///< [voxels] bound of the rounding error
   float limit = 0.0F;                 ///< [voxels] a point or ball with a larger lower bound is culled
   float outside_grid = 0.0F;          ///< [voxels] lower bound of distances outside the grid
+  float slope = 1.0F;                 ///< [-] of the field, see DistanceField::Layout
+  float band = 0.0F;         ///< [voxels] lower bound of the samples that a brick outside does not store
   float beyond_band = 0.0F;  ///< [voxels] lower bound of distances outside, in bricks without samples
 };
 
-/// What all lanes of a query share: the field, both poses, dilation and margin.
+/// What all lanes of a query share: the field, both poses and the margin.
 struct LaneFrame {
-  /// `the_dilation` [m], `the_margin` [m]: as in PairQuery; `reach_A` [m]: as in CullFrame.
-  LaneFrame(const structures::DistanceField& the_field, const Pose& X_WA, const Pose& X_WB,
-            double the_dilation, double the_margin, double reach_A);
+  /// `the_margin` [m]: as in PairQuery; `reach_A` [m]: as in CullFrame.
+  LaneFrame(const structures::DistanceField& the_field, const Pose& X_WA, const Pose& X_WB, double the_margin,
+            double reach_A);
 
   [[nodiscard]] Vector3 inB(const Vector3& p_AP) const { return p_BA_B + rotated(R_BA, p_AP); }
   /// [m] The gap for a lower bound of distance `bound` [voxels] of `cull`.
   [[nodiscard]] double gapOf(float bound) const {
-    return static_cast<double>(bound - cull.slack) * field.voxel() - dilation;
+    return static_cast<double>(bound - cull.slack) * field.voxel();
   }
 
   const structures::DistanceField& field;
   Eigen::AlignedBox3d box_B;  ///< of the field
-  double dilation;            ///< [m]
   double margin;              ///< [m]
   Matrix3 R_WA, R_WB, R_BA;
   Vector3 p_WA, p_BA_B;
@@ -171,10 +172,9 @@ struct QueryKernels {
   /// beyond its end have area 0.
   void (*penalties)(const LaneFrame& frame, const SampleLanes& samples, const ContactLanes& contacts,
                     const std::uint32_t* points, std::span<const float> areas, PenaltyLanes& out) noexcept;
-  /// Per block a bit mask of the lanes that are inside the dilated surface and have a gradient shorter than
+  /// Per block a bit mask of the lanes that are inside and have a gradient shorter than
   /// 1, to `lanes`. Returns their number.
-  std::uint32_t (*non_unit_gradients)(const LaneFrame& frame, std::span<const SampleLanes> samples,
-                                      std::uint32_t* lanes) noexcept;
+  std::uint32_t (*non_unit_gradients)(std::span<const SampleLanes> samples, std::uint32_t* lanes) noexcept;
   /// Tangent planes at probes around p_BP; `scale` [-] of the offsets.
   void (*tangent_planes)(const LaneFrame& frame, const ProbeOffsets& offsets, const Vector3& p_BP,
                          double scale, TangentPlanes& out) noexcept;

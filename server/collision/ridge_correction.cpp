@@ -84,7 +84,7 @@ std::size_t highestPlane(const TangentPlanes& planes, double interpolated, doubl
 void correctRidges(const LaneFrame& frame, const QueryKernels& kernels, const PointLanes& points,
                    std::span<SampleLanes> samples, SampleSums& sums) noexcept {
   std::array<std::uint32_t, Candidates::kCapacity / structures::ShellBlock::kLanes> non_unit;
-  if (kernels.non_unit_gradients(frame, samples, non_unit.data()) == 0) return;
+  if (kernels.non_unit_gradients(samples, non_unit.data()) == 0) return;
   const structures::DistanceField& field = frame.field;
   const ProbeOffsets offsets = probeOffsets(kProbeDistance * field.voxel());
   for (std::size_t b = 0; b < samples.size(); ++b) {
@@ -116,9 +116,13 @@ void correctRidges(const LaneFrame& frame, const QueryKernels& kernels, const Po
 structures::FieldSample correctedSample(const structures::DistanceField& field,
                                         const Vector3& p_MP) noexcept {
   structures::FieldSample sample = field.sample(p_MP);
-  if (!sample.exact || !(sample.distance < 0.0)) return sample;
+  const double dilation = field.dilationAt(p_MP);
+  if (!sample.exact || !(sample.distance < 0.0)) {
+    sample.distance += dilation;
+    return sample;
+  }
   // a pointshell of one point at its origin, so that P is not rounded
-  const LaneFrame frame(field, Pose(p_MP), Pose(), 0.0, 0.0, 0.0);
+  const LaneFrame frame(field, Pose(p_MP), Pose(), 0.0, 0.0);
   alignas(64) static constexpr std::array<float, structures::ShellBlock::kLanes> kOrigins{};
   const PointLanes points{kOrigins.data(), kOrigins.data(), kOrigins.data(), 1};
   std::array<SampleLanes, 1> samples;
@@ -126,7 +130,7 @@ structures::FieldSample correctedSample(const structures::DistanceField& field,
   chosenKernels().samples(frame, points, samples.data(), sums);
   correctRidges(frame, chosenKernels(), points, samples, sums);
   const SampleLanes& lanes = samples.front();
-  sample.distance = lanes.distance[0];
+  sample.distance = lanes.distance[0] + dilation;
   sample.gradient = {lanes.gradient_x[0], lanes.gradient_y[0], lanes.gradient_z[0]};
   return sample;
 }

@@ -25,8 +25,8 @@ namespace tenon::collision {
 void correctRidges(const LaneFrame& frame, const QueryKernels& kernels, const PointLanes& points,
                    std::span<SampleLanes> samples, SampleSums& sums) noexcept;
 
-/// The field at P in the frame of its mesh, with ridge correction inside: what a query that corrects ridges
-/// has for a point there.
+/// Distance to the exact surface and gradient at P in the frame of the mesh: what a query that corrects
+/// ridges has for a point there, without the dilation.
 ///
 /// Threads: pure. Real-time.
 [[nodiscard]] structures::FieldSample correctedSample(const structures::DistanceField& field,

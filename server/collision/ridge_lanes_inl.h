@@ -26,14 +26,13 @@ HWY_INLINE Double unitDeficit(const Vec3& gradient) {
 }
 
 /// QueryKernels::non_unit_gradients
-std::uint32_t nonUnitGradients(const LaneFrame& frame, std::span<const SampleLanes> samples,
-                               std::uint32_t* lanes) noexcept {
+std::uint32_t nonUnitGradients(std::span<const SampleLanes> samples, std::uint32_t* lanes) noexcept {
   constexpr double kMinDeficit = 0.1;  // [-] smaller deficits cost as much and change depths little
   std::uint32_t count = 0;
   for (const SampleLanes& block : samples) {
     std::uint32_t found = 0;
     for (std::size_t i = 0; i < structures::ShellBlock::kLanes && block.near != 0; i += hn::Lanes(kD)) {
-      const Mask inside = hn::Lt(hn::Load(kD, block.distance.data() + i), splat(frame.dilation));
+      const Mask inside = hn::Lt(hn::Load(kD, block.distance.data() + i), hn::Zero(kD));
       found |= bitsOf(hn::And(inside, hn::Gt(unitDeficit(gradientOf(block, i)), splat(kMinDeficit)))) << i;
     }
     *lanes++ = found & block.near;

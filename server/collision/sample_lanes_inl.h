@@ -158,7 +158,8 @@ HWY_INLINE Double fromBrickCentre(const FieldLanes& field, const Vec3& p_brick) 
 
 HWY_INLINE Double farMagnitude(const FieldLanes& field, const Located& at) {
   const double voxel = field.layout.voxel;
-  const double beyond_band = field.layout.band - structures::DistanceField::kHalfDiagonal * voxel;
+  const double beyond_band =
+      field.layout.band - field.layout.dilation - structures::DistanceField::kHalfDiagonal * voxel;
   const Double at_centre = hn::Div(hn::Mul(hn::Abs(farValue(field, at.brick_index)), splat(voxel)),
                                    splat(structures::DistanceField::kFarPerVoxel));
   return hn::Max(splat(beyond_band), hn::Sub(at_centre, fromBrickCentre(field, at.p_brick)));
@@ -378,7 +379,7 @@ void samples(const LaneFrame& frame, const PointLanes& points, SampleLanes* out,
       const std::size_t lane = i - first;
       const Mask used = hn::FirstN(kD, end - i);
       const Sampled there = sample(field, points, i, located.at(here + lane));
-      const Double gap = hn::Sub(there.distance, splat(frame.dilation));
+      const Double gap = there.distance;
       const Mask exact = hn::And(used, there.exact);
       const Mask near = hn::And(exact, hn::Le(gap, splat(frame.margin)));
       hn::Store(there.distance, kD, block.distance.data() + lane);

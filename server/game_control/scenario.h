@@ -96,10 +96,9 @@ struct ScenarioHand {
 struct ScenarioPair {
   ObjectId a;
   ObjectId b;
-  double clearance = 0.0;          ///< [m] play between the two when mounted, sum of both sides; 0: not given
-  std::optional<double> dilation;  ///< [m] none: chosen by dilationOf
-  bool sensing = false;            ///< contacts are displayed as vibration only and constrain nothing
-  bool enabled = true;             ///< at the start
+  double clearance = 0.0;  ///< [m] play between the two when mounted, sum of both sides; 0: not given
+  bool sensing = false;    ///< contacts are displayed as vibration only and constrain nothing
+  bool enabled = true;     ///< at the start
   std::optional<collision::Friction> friction;  ///< none: that of the bodies
   int line = 0;                                 ///< 0: listed automatically
 };
@@ -233,11 +232,13 @@ struct ReadOptions {
 /// and sizes decide, see makeScene().
 [[nodiscard]] ObjectId sdfSideByTarget(const ScenarioFile& scenario, const ScenarioPair& pair);
 
-/// The dilation [m] of the SDF side `field` in a pair: at least 0.87 voxels (half a voxel's diagonal, so that
-/// thin sheets stay solid between samples) and at most a quarter of the clearance (so that the part still
-/// fits). Fails when both cannot hold, or when the given dilation is outside.
-[[nodiscard]] Result<double> dilationOf(const ScenarioFile& scenario, const ScenarioPair& pair,
-                                        ObjectId field);
+/// Fails, with file and line, when the pair's clearance is smaller than the field of its SDF side `field`
+/// resolves where the part is mounted: a quarter of it, on each side, must be left of what thickens thin
+/// walls there (see DistanceField::Layout::dilations), and of the error at the edges of solids. `structures`
+/// by ObjectId.
+[[nodiscard]] Result<void> checkClearance(
+    const ScenarioFile& scenario, const ScenarioPair& pair, ObjectId field,
+    const std::vector<std::shared_ptr<const structures::HapticStructures>>& structures);
 
 /// Mass properties of an object that has a body. Fails when they have to follow from its volume and its field
 /// encloses none, or when the given centre of mass is outside of the object.

@@ -24,7 +24,7 @@ constexpr std::array<Key, 2> kBox{"from", "to"};
 constexpr std::array<Key, 3> kPose{"at", "turn", "q"};
 constexpr std::array<Key, 2> kTurn{"axis", "deg"};
 constexpr std::array<Key, 6> kHand{"name", "role", "kind", "object", "stiffness", "rotational_stiffness"};
-constexpr std::array<Key, 7> kPair{"between", "clearance", "dilation",        "sensing",
+constexpr std::array<Key, 6> kPair{"between", "clearance", "sensing",
                                    "enabled", "friction",  "sliding_friction"};
 constexpr std::array<Key, 24> kState{"name",       "title",   "instruction", "part", "hands",    "show",
                                      "hide",       "place",   "fix",         "free", "pairs_on", "pairs_off",
@@ -92,6 +92,13 @@ const ScenarioMapping& scenarioMapping(std::string_view name) {
 
 std::string_view renamedKey(std::string_view mapping, std::string_view key) {
   return mapping == "object" && key == "felt" ? "collidable" : std::string_view{};
+}
+
+std::string_view removedKey(std::string_view mapping, std::string_view key) {
+  return mapping == "pair" && key == "dilation" ? "thin walls are kept solid where they are; leave it out, "
+                                                  "and give 'refine' boxes where they must be "
+                                                  "thinner"
+                                                : std::string_view{};
 }
 
 std::string suggestion(std::string_view word, std::span<const std::string_view> candidates) {

@@ -24,6 +24,9 @@ struct ScenarioMapping {
 /// refused with a message that names the new one.
 [[nodiscard]] std::string_view renamedKey(std::string_view mapping, std::string_view key);
 
+/// What to do instead of a key that was removed, empty for any other key.
+[[nodiscard]] std::string_view removedKey(std::string_view mapping, std::string_view key);
+
 /// `did you mean 'object'?` with the candidate of the smallest edit distance; empty when none is near.
 [[nodiscard]] std::string suggestion(std::string_view word, std::span<const std::string_view> candidates);
 

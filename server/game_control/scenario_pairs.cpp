@@ -84,10 +84,6 @@ void ScenarioReader::readPair(const YAML::Node& node) {
   }
   pair.line = yaml_.lineOf(node);
   pair.clearance = yaml_.numberOr(node["clearance"], Quantity::kLength, "'clearance'" + of, 1e-6, 1.0, 0.0);
-  const YAML::Node dilation = node["dilation"];
-  if (dilation.IsDefined() && !(dilation.IsScalar() && dilation.Scalar() == "automatic")) {
-    pair.dilation = yaml_.number(dilation, Quantity::kLength, "'dilation'" + of, 0.0, 0.1);
-  }
   pair.sensing = yaml_.boolean(node["sensing"], "'sensing'" + of, pair.sensing);
   pair.enabled = yaml_.boolean(node["enabled"], "'enabled'" + of, true);
   if (node["friction"].IsDefined()) {
@@ -110,17 +106,6 @@ void ScenarioReader::readDisabledPair(const YAML::Node& node) {
     }
   } else if (const auto pair = names_.pair(node, "'pairs_off'")) {
     scenario_.pairs[*pair].enabled = false;
-  }
-}
-
-void ScenarioReader::checkClearances() {
-  for (const ScenarioPair& pair : scenario_.pairs) {
-    // only pairs whose SDF side follows from a target; makeScene() checks the others, when sizes are known
-    const ObjectId field = sdfSideByTarget(scenario_, pair);
-    if (!field.valid()) continue;
-    if (const auto dilation = dilationOf(scenario_, pair, field); !dilation) {
-      yaml_.failAt(pair.line, dilation.error().what);
-    }
   }
 }
 

@@ -99,7 +99,6 @@ void ScenarioReader::readScenario(const YAML::Node& root) {
   } else {
     states.addEndlessState();
   }
-  if (!yaml_.failed()) checkClearances();
 }
 
 void ScenarioReader::readObject(const YAML::Node& node) {

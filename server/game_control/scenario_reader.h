@@ -40,7 +40,6 @@ class ScenarioReader {
   [[nodiscard]] std::vector<bool> movableObjects(const YAML::Node& states) const;
   /// By object: a state puts it into another group.
   [[nodiscard]] std::vector<bool> regroupedObjects(const YAML::Node& states) const;
-  void checkClearances();
 
   YamlReader yaml_;
   ReadOptions options_;

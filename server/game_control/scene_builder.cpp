@@ -1,9 +1,8 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
+#include "server/game_control/quantity_text.h"
 #include "server/game_control/scenario.h"
 #include "server/game_control/scenario_moments.h"
 
@@ -12,18 +11,11 @@ namespace {
 
 using StructuresByObject = std::vector<std::shared_ptr<const structures::HapticStructures>>;
 
-constexpr double kDilationPerVoxel = 0.87;      // [-] sqrt(3)/2 rounded up: half the diagonal of a voxel
-constexpr double kDilationPerClearance = 0.25;  // [-]
+constexpr double kDilationPerClearance = 0.25;  // [-] on each side of the part
+constexpr double kEdgeError = 0.2;              // [voxels] of a solid at an edge, where it has no dilation
 constexpr double kRounding = 1e-9;              // [-] relative: a typed number equal to a limit is within it
 constexpr double kTargetMargin = 1.0;    // [m] a target farther outside the scene is taken for a mistake
 constexpr double kFarthestOrigin = 1e3;  // [m] of a frame: coordinates in it keep their micrometres
-
-/// "2.6 mm", three significant digits.
-std::string inMillimetres(double metres) {
-  std::array<char, 32> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), "%.3g mm", metres * 1e3);
-  return buffer.data();
-}
 
 ObjectId otherObject(const ScenarioPair& pair, ObjectId object) { return pair.a == object ? pair.b : pair.a; }
 
@@ -38,10 +30,11 @@ double mountingVoxel(const ScenarioFile& scenario, const ScenarioPair& pair, Obj
   return isRefined(scenario, pair, field) ? settings.voxel / settings.refinement : settings.voxel;
 }
 
-std::string clearanceTooSmall(const ScenarioFile& scenario, const ScenarioPair& pair, ObjectId field) {
+/// `needed` [m]: the smallest clearance that the field resolves.
+std::string clearanceTooSmall(const ScenarioFile& scenario, const ScenarioPair& pair, ObjectId field,
+                              double needed) {
   const StructureSettings& settings = scenario.objects[field.value].structures;
   const double voxel = mountingVoxel(scenario, pair, field);
-  const double needed = kDilationPerVoxel / kDilationPerClearance * voxel;
   const double fraction = pair.clearance / needed;
   // two significant digits, rounded down: the advised voxel passes this check
   const double exact_mm = settings.voxel * fraction * 1e3;
@@ -51,7 +44,7 @@ std::string clearanceTooSmall(const ScenarioFile& scenario, const ScenarioPair& 
   const bool refined = isRefined(scenario, pair, field);
   std::string refinement;
   for (const int factor : {2, 4, 8}) {
-    const double finer = kDilationPerVoxel / kDilationPerClearance * settings.voxel / factor;
+    const double finer = needed / voxel * settings.voxel / factor;
     const bool helps = finer <= pair.clearance && (!refined || factor > settings.refinement);
     if (!refinement.empty() || !helps) continue;
     refinement = " or " + std::string(refined ? "" : "a box in 'refine' around the place, with ") +
@@ -61,7 +54,8 @@ std::string clearanceTooSmall(const ScenarioFile& scenario, const ScenarioPair& 
   return "clearance of " + scenario.objects[pair.a.value].name + "-" + scenario.objects[pair.b.value].name +
          " (" + inMillimetres(pair.clearance) + ") is smaller than the field of '" +
          scenario.objects[field.value].name + "' can resolve (voxel " + inMillimetres(settings.voxel) +
-         divided + " needs " + inMillimetres(needed) + "); use voxel " + inMillimetres(advised) + refinement;
+         divided + " needs " + inMillimetres(needed) + " there); use voxel " + inMillimetres(advised) +
+         refinement;
 }
 
 Eigen::AlignedBox3d boxIn(const Pose& X_AB, const Eigen::AlignedBox3d& box_B) {
@@ -105,6 +99,37 @@ Result<void> checkStructures(const ScenarioFile& scenario, const StructuresByObj
     }
   }
   return {};
+}
+
+/// The boxes of `field`, in its frame, in which the other object of a pair is mounted: of the given ones
+/// those at its targets, and one around each target that none of these intersects.
+std::vector<Eigen::AlignedBox3d> mountingBoxes(const ScenarioFile& scenario,
+                                               const std::vector<SceneMoment>& moments,
+                                               const ScenarioPair& pair, ObjectId field,
+                                               const StructuresByObject& structures) {
+  std::vector<Eigen::AlignedBox3d> boxes;
+  const StructureSettings& settings = scenario.objects[field.value].structures;
+  const ObjectId part = otherObject(pair, field);
+  if (part.value >= structures.size() || !structures[part.value]) return boxes;
+  for (std::size_t i = 0; i < scenario.states.size(); ++i) {
+    const ScenarioState& state = scenario.states[i];
+    if (state.object != part || !state.X_WG) continue;
+    const Pose X_OW = moments[i].X_WO[field.value].inverse();
+    Eigen::AlignedBox3d box_O = boxIn(X_OW * *state.X_WG, structures[part.value]->info.box_M);
+    bool covered = false;
+    for (const Eigen::AlignedBox3d& given_O : settings.refine) {
+      if (!given_O.intersects(box_O)) continue;
+      boxes.push_back(given_O);
+      covered = true;
+    }
+    if (covered) continue;
+    // from the target back along the approach
+    const Vector3 back_O = X_OW.rotation() * Vector3(-state.approach_W * state.approach_distance);
+    box_O.extend(box_O.translated(back_O));
+    const Vector3 margin = Vector3::Constant(pair.clearance + 2.0 * settings.voxel);
+    boxes.emplace_back(box_O.min() - margin, box_O.max() + margin);
+  }
+  return boxes;
 }
 
 /// A pose that the scenario gives to an object.
@@ -158,46 +183,31 @@ std::vector<ObjectId> bakeOrder(const ScenarioFile& scenario) {
 
 std::vector<Eigen::AlignedBox3d> refineBoxes(const ScenarioFile& scenario, ObjectId object,
                                              const StructuresByObject& structures) {
-  const ScenarioObject& spec = scenario.objects[object.value];
-  std::vector<Eigen::AlignedBox3d> boxes = spec.structures.refine;
+  std::vector<Eigen::AlignedBox3d> boxes = scenario.objects[object.value].structures.refine;
   const std::vector<SceneMoment> moments = momentsOf(scenario);
   for (const ScenarioPair& pair : scenario.pairs) {
     if (sdfSideByTarget(scenario, pair) != object) continue;
-    const ObjectId part = otherObject(pair, object);
-    if (part.value >= structures.size() || !structures[part.value]) continue;
-    for (std::size_t i = 0; i < scenario.states.size(); ++i) {
-      const ScenarioState& state = scenario.states[i];
-      if (state.object != part || !state.X_WG) continue;
-      const Pose X_OW = moments[i].X_WO[object.value].inverse();
-      Eigen::AlignedBox3d box_O = boxIn(X_OW * *state.X_WG, structures[part.value]->info.box_M);
-      const bool covered =
-          std::any_of(spec.structures.refine.begin(), spec.structures.refine.end(),
-                      [&](const Eigen::AlignedBox3d& refined_O) { return refined_O.intersects(box_O); });
-      if (covered) continue;
-      // from the target back along the approach
-      const Vector3 back_O = X_OW.rotation() * Vector3(-state.approach_W * state.approach_distance);
-      box_O.extend(box_O.translated(back_O));
-      const Vector3 margin = Vector3::Constant(pair.clearance + 2.0 * spec.structures.voxel);
-      boxes.emplace_back(box_O.min() - margin, box_O.max() + margin);
+    for (const Eigen::AlignedBox3d& box_O : mountingBoxes(scenario, moments, pair, object, structures)) {
+      const bool given =
+          std::any_of(boxes.begin(), boxes.end(), [&](const auto& one_O) { return one_O.isApprox(box_O); });
+      if (!given) boxes.push_back(box_O);
     }
   }
   return boxes;
 }
 
-Result<double> dilationOf(const ScenarioFile& scenario, const ScenarioPair& pair, ObjectId field) {
-  const double voxel = scenario.objects[field.value].structures.voxel;
-  if (pair.clearance <= 0.0) return pair.dilation.value_or(kDilationPerVoxel * voxel);
-  const double min_dilation = kDilationPerVoxel * mountingVoxel(scenario, pair, field);
-  const double max_dilation = kDilationPerClearance * pair.clearance;
-  if (min_dilation > max_dilation * (1.0 + kRounding)) return fail(clearanceTooSmall(scenario, pair, field));
-  const double dilation = pair.dilation.value_or(min_dilation);
-  if (dilation < min_dilation * (1.0 - kRounding) || dilation > max_dilation * (1.0 + kRounding)) {
-    return fail("dilation of " + scenario.objects[pair.a.value].name + "-" +
-                scenario.objects[pair.b.value].name + " (" + inMillimetres(dilation) + ") must be between " +
-                inMillimetres(min_dilation) + " (0.87 voxels) and " + inMillimetres(max_dilation) +
-                " (a quarter of the clearance)");
-  }
-  return dilation;
+Result<void> checkClearance(const ScenarioFile& scenario, const std::vector<SceneMoment>& moments,
+                            const ScenarioPair& pair, ObjectId field, const StructuresByObject& structures) {
+  if (pair.clearance <= 0.0) return {};
+  std::vector<Eigen::AlignedBox3d> places = mountingBoxes(scenario, moments, pair, field, structures);
+  if (places.empty()) places = scenario.objects[field.value].structures.refine;
+  if (places.empty()) places.push_back(structures[field.value]->field.box());
+  double proud = kEdgeError * mountingVoxel(scenario, pair, field);
+  for (const Eigen::AlignedBox3d& place : places)
+    proud = std::max(proud, structures[field.value]->field.largestDilation(place));
+  const double needed = proud / kDilationPerClearance;
+  if (needed <= pair.clearance * (1.0 + kRounding)) return {};
+  return fail(fileAndLine(scenario, pair.line) + clearanceTooSmall(scenario, pair, field, needed));
 }
 
 std::vector<Misplacement> misplacedObjects(const ScenarioFile& scenario,
@@ -256,12 +266,14 @@ Result<std::shared_ptr<const simulation::Scene>> makeScene(const ScenarioFile& s
     }
     scene->objects.push_back(std::move(spec));
   }
+  const std::vector<SceneMoment> moments = momentsOf(scenario);
   for (const ScenarioPair& pair : scenario.pairs) {
     const ObjectId field = sdfSideOf(scenario, pair, structures);
-    const auto dilation = dilationOf(scenario, pair, field);
-    if (!dilation) return fail(fileAndLine(scenario, pair.line) + dilation.error().what);
-    scene->pairs.push_back(
-        {otherObject(pair, field), field, *dilation, pair.enabled, pair.sensing, pair.friction});
+    if (const auto checked = checkClearance(scenario, moments, pair, field, structures); !checked)
+      return tl::unexpected(checked.error());
+    simulation::PairSpec spec{otherObject(pair, field), field, pair.enabled, pair.sensing, pair.friction};
+    if (pair.clearance > 0.0) spec.most_dilation_a = kDilationPerClearance * pair.clearance;
+    scene->pairs.push_back(spec);
   }
   for (const ScenarioHand& hand : scenario.hands) {
     scene->hands.push_back(

@@ -4,13 +4,13 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <numbers>
 #include <set>
 #include <span>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "server/game_control/quantity_text.h"
 #include "server/game_control/scenario_keys.h"
 
 namespace tenon::game_control {
@@ -21,7 +21,6 @@ struct UnitFactor {
   double si;  ///< [SI unit] one of this unit
 };
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::array kLengths{UnitFactor{"m", 1.0}, UnitFactor{"mm", 1e-3}, UnitFactor{"cm", 1e-2},
                               UnitFactor{"in", 0.0254}};
 constexpr std::array kAngles{UnitFactor{"deg", kDegree}, UnitFactor{"rad", 1.0}};
@@ -140,6 +139,10 @@ bool YamlReader::openMapping(const YAML::Node& node, std::string_view mapping, c
     if (const std::string_view now = renamedKey(mapping, key); !now.empty()) {
       fail(entry.first,
            what + " has a key with an old name: '" + key + "' is now '" + std::string(now) + "'");
+      return false;
+    }
+    if (const std::string_view instead = removedKey(mapping, key); !instead.empty()) {
+      fail(entry.first, what + " has the key '" + key + "', which is no more: " + std::string(instead));
       return false;
     }
     const std::string hint = suggestion(key, keys);

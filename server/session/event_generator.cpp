@@ -55,7 +55,7 @@ void EventGenerator::addRun(const TickOutput& output, TickEvents& events) {
       run.reason = "waiting for people";
       break;
     case RunPhase::kRunning:
-      run.reason = output.emergency_stop ? "emergency stop" : "running";
+      run.reason = "running";
       break;
     case RunPhase::kPaused:
       run.reason = "paused";
@@ -71,6 +71,7 @@ void EventGenerator::addRun(const TickOutput& output, TickEvents& events) {
       run.reason = "stopped";
       break;
   }
+  if (output.emergency_stop && !isOver(output.phase)) run.reason = "emergency stop";
   if (output.phase >= RunPhase::kSucceeded) run.final_hash = output.hash;
   run_reason_ = run.reason;
   const bool is_error = output.phase == RunPhase::kFailed || output.emergency_stop;

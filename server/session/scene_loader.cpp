@@ -187,6 +187,21 @@ std::vector<std::string> changesSince(const Fingerprint& then, const LoadedScene
   return changes;
 }
 
+std::vector<std::string> thinWallReport(const simulation::Scene& scene) {
+  std::vector<std::string> sentences;
+  for (const simulation::ObjectSpec& object : scene.objects) {
+    if (!object.structures || object.structures->info.thin_area <= 0.0) continue;
+    const structures::StructureInfo& info = object.structures->info;
+    sentences.push_back(
+        fmt::format("{}: {:.2g} % of the surface is of walls thinner than its voxels resolve; they are "
+                    "solid, and up to {:.3g} mm "
+                    "thicker on each side; {:.2g} % is open",
+                    object.title, 100.0 * info.thin_area / info.surface_area,
+                    1e3 * object.structures->field.dilation(), 100.0 * info.open_area / info.surface_area));
+  }
+  return sentences;
+}
+
 fs::path defaultCache() {
   if (const char* cache = std::getenv("TENON_CACHE")) return cache;
   if (const char* cache = std::getenv("XDG_CACHE_HOME")) return fs::path(cache) / "tenon";

@@ -2,14 +2,18 @@
 
 #include <algorithm>
 #include <optional>
+#include <thread>
 #include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "idl/types/messages/journal.h"
 #include "idl/types/names.h"
 #include "server/session/scene_loader.h"
+#include "server/session/session_lock.h"
+#include "server/session/stop_file.h"
 
 namespace tenon::session {
 
@@ -54,6 +58,7 @@ struct ServerWire::Writers {
   TopicWriter<EventLog> event{wire::kEventLog, {}};
   TopicWriter<ClockSync> clock{wire::kClockSync, {}};
   TopicWriter<EmergencyStop> stop{wire::kEmergencyStop, {}};
+  TopicWriter<EmergencyClear> clear{wire::kEmergencyClear, {}};
   TopicWriter<PublishedSamples> published{wire::kPublishedSamples, {}};
   TopicWriter<TickInputPart> input{wire::kTickInput, {}};
   TopicWriter<CheckpointPart> checkpoint{wire::kCheckpoint, {}};
@@ -61,7 +66,7 @@ struct ServerWire::Writers {
   auto inLobby() { return std::tie(announce, welcome); }
   auto inSession() {
     return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, object, step, progress,
-                    run, grab, ack, guidance, event, clock, stop, published, input, checkpoint);
+                    run, grab, ack, guidance, event, clock, stop, clear, published, input, checkpoint);
   }
   /// Written in ticks by send(OutgoingMessages), with the tick in each sample.
   auto ofTicks() {
@@ -81,6 +86,11 @@ Result<void> openAll(Tuple outs, wire::Partition& partition) {
   std::apply([&](auto&... out) { (open(out), ...); }, outs);
   return result;
 }
+
+constexpr auto kOtherServers = std::chrono::milliseconds(500);  // for their announcements to arrive
+// without a sign of life for so long the announcement of a server ends (its lease)
+constexpr auto kLapse = wire::kSessionAnnounce.parameters.lease;
+constexpr auto kAfterLapse = std::chrono::seconds(10);  // until those who came meanwhile are discovered
 
 std::int64_t nowNanoseconds() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
@@ -112,11 +122,69 @@ Result<std::unique_ptr<ServerWire>> ServerWire::open(const WireOptions& options,
   wire->title_ = loaded.scenario->title.front().text;
   wire->scenario_hash_ = fmt::format("{:016x}", loaded.scenario->text_hash);
   wire->newest_seq_.resize(loaded.scenario->hands.size());
+  if (auto alone = wire->refuseBesideAnother(); !alone) return fail(alone.error().what);
   if (auto opened = wire->openWriters(); !opened) return fail(opened.error().what);
   if (auto opened = wire->openReaders(); !opened) return fail(opened.error().what);
   wire->sendScene(loaded);
+  if (auto restored = wire->restoreStops(); !restored) return fail(restored.error().what);
   wire->announce();
   return wire;
+}
+
+/// On this machine the SessionLock decides; this is for servers on other machines.
+Result<void> ServerWire::refuseBesideAnother() {
+  auto reader = wire::Reader<SessionAnnounce>::open(lobby_, wire::kSessionAnnounce);
+  if (!reader) return fail(reader.error().what);
+  const auto until = std::chrono::steady_clock::now() + kOtherServers;
+  SessionAnnounce other;
+  while (std::chrono::steady_clock::now() < until) {
+    while (reader->take(other))
+      if (other.session == options_.session)
+        return fail(servedAlready(other.session, std::to_string(other.pid), other.host));
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return {};
+}
+
+/// A server that is newer than this one is of no concern while this one lives: clients ignore it. Once this
+/// one was stopped for so long that clients took it for dead, the newer one has them.
+void ServerWire::handle(const SessionAnnounce& other, const wire::Origin& from) {
+  if (other.session != options_.session || !from.known() || from == participant_->origin()) return;
+  if (!others_.emplace(other.server_epoch, other).second) return;
+  log(Severity::kWarning, "another server",
+      fmt::format(
+          "another server of session '{}' runs as process {} on host {}: clients of this one ignore it",
+          other.session, other.pid, other.host));
+}
+
+void ServerWire::noticeLapse() {
+  const auto now = std::chrono::steady_clock::now();
+  if (dispatched_ && now - *dispatched_ > kLapse) lapsed_ = now;
+  dispatched_ = now;
+  if (!lapsed_) return;
+  for (const auto& [epoch, other] : others_)
+    if (epoch > options_.server_epoch)
+      replaced_ = fmt::format(
+          "this server was stopped for a while, and process {} on host {} serves session '{}' now: this one "
+          "ends",
+          other.pid, other.host, other.session);
+  if (now - *lapsed_ > kAfterLapse) lapsed_.reset();
+}
+
+Result<void> ServerWire::restoreStops() {
+  auto kept = readStopFile(options_.stop_file);
+  if (!kept) return fail(kept.error().what);
+  stops_ = std::move(*kept);
+  for (const auto& [id, stop] : stops_.standing()) (void)writers_->stop.writer->write(stop);
+  for (const auto& [id, cleared] : stops_.cleared()) (void)writers_->clear.writer->write(cleared);
+  if (stops_.engaged()) registry_.engageEmergencyStop();
+  return {};
+}
+
+void ServerWire::keepStops() {
+  if (auto kept = writeStopFile(options_.stop_file, stops_); !kept)
+    log(Severity::kError, "emergency stop",
+        fmt::format("the emergency stop would not outlive a crash of the server: {}", kept.error().what));
 }
 
 Result<void> ServerWire::openWriters() {
@@ -134,7 +202,11 @@ Result<void> ServerWire::openReaders() {
            [this](const DeviceInput& input, const wire::Origin& from) { handle(input, from); });
   listenTo(session_, wire::kCommand,
            [this](const Command& command, const wire::Origin& from) { handle(command, from); });
-  listenTo(session_, wire::kClockSync, [this](const ClockSync& sync, const wire::Origin&) { handle(sync); });
+  listenTo(session_, wire::kClockSync, [this](const ClockSync& sync, const wire::Origin& from) {
+    if (registry_.ownsSeat(sync.client, from)) handle(sync);
+  });
+  listenTo(lobby_, wire::kSessionAnnounce,
+           [this](const SessionAnnounce& other, const wire::Origin& from) { handle(other, from); });
   listenTo(session_, wire::kEmergencyStop,
            [this](const EmergencyStop& stop, const wire::Origin& from) { handle(stop, from); });
   const auto take = [this](const Result<Change>& change) {
@@ -153,6 +225,12 @@ Result<void> ServerWire::openReaders() {
         session_, wire::kPresence,
         [this](const Presence& gone, const wire::Origin& from) { handleGone(gone, from); });
   }
+  if (result) {
+    result =
+        inbox_.onGone<SessionAnnounce>(lobby_, wire::kSessionAnnounce, [this](const SessionAnnounce& gone) {
+          if (gone.session == options_.session) others_.erase(gone.server_epoch);
+        });
+  }
   return result;
 }
 
@@ -164,15 +242,17 @@ void ServerWire::sendScene(const LoadedScene& loaded) {
 
 void ServerWire::announce() {
   (void)writers_->announce.writer->write({.session = options_.session,
-                                          .title = title_,
                                           .server_epoch = options_.server_epoch,
+                                          .title = title_,
                                           .lockstep = options_.lockstep,
                                           .scenario_hash = scenario_hash_,
-                                          .free_hands = registry_.freeHands()});
+                                          .host = hostName(),
+                                          .pid = static_cast<std::uint32_t>(getpid())});
 }
 
 void ServerWire::dispatch(std::chrono::nanoseconds timeout) {
   inbox_.dispatch(timeout);
+  noticeLapse();
   forwardChanges();
 }
 
@@ -222,30 +302,43 @@ void ServerWire::notifySeatLost(ClientId client, const std::string& why) {
   if (last != seat_lost_notified_.end() && now - last->second < kInterval) return;
   seat_lost_notified_[client] = now;
   (void)writers_->welcome.writer->write({.client_guid = registry_.guidOf(client),
+                                         .session = options_.session,
+                                         .server_epoch = options_.server_epoch,
                                          .accepted = false,
                                          .reason = why,
                                          .client = client,
-                                         .server_epoch = options_.server_epoch,
                                          .tick = now_});
 }
 
 void ServerWire::handle(const Join& join, const wire::Origin& from) {
-  const bool is_new =
-      registry_.clients().empty() || join.client_guid.empty() ||
-      std::none_of(registry_.clients().begin(), registry_.clients().end(), [&](const Presence& who) {
-        return who.alive && registry_.guidOf(who.client) == join.client_guid;
-      });
-  const std::size_t seats = registry_.clients().size();
-  const Welcome welcome = registry_.join(join, now_, from);
+  if (join.session != options_.session || join.server_epoch != options_.server_epoch) return;
+  const bool is_new = !registry_.isSeated(join.client_guid);
+  const bool is_known = registry_.knowsSeat(join.seat_key);
+  const wire::ProofSubject subject{.challenge = challenges_.challengeFor(from, join.client_guid),
+                                   .session = options_.session,
+                                   .server_epoch = options_.server_epoch,
+                                   .client_guid = join.client_guid,
+                                   .role = join.role,
+                                   .client = from};
+  if (is_new && registry_.mustProve(join) && join.seat_proof.empty()) {
+    (void)writers_->welcome.writer->write({.client_guid = join.client_guid,
+                                           .session = options_.session,
+                                           .server_epoch = options_.server_epoch,
+                                           .reason = "prove who you are",
+                                           .challenge = subject.challenge});
+    return;
+  }
+  const JoinProofs proofs{.seat = wire::SeatKey::isProof(join.seat_key, subject, join.seat_proof),
+                          .key = options_.key && options_.key->isProof(subject, join.key_proof)};
+  const Welcome welcome = registry_.join(join, proofs, now_, from);
   (void)writers_->welcome.writer->write(welcome);
   if (!is_new) return;
   for (const HandId hand : welcome.hands)
     if (hand.valid()) newest_seq_[hand.value] = 0;
-  const char* how = registry_.clients().size() == seats ? "has rejoined" : "has joined";
+  const char* how = is_known ? "has rejoined" : "has joined";
   log(welcome.accepted ? Severity::kInfo : Severity::kWarning, "join",
       welcome.accepted ? fmt::format("{} ({}) {}", join.name, roleName(join.role), how)
                        : fmt::format("{} may not join: {}", join.name, welcome.reason));
-  announce();
 }
 
 void ServerWire::handle(const DeviceInput& input, const wire::Origin& from) {
@@ -279,33 +372,34 @@ void ServerWire::handle(const Command& command, const wire::Origin& from) {
     log(Severity::kWarning, "refused",
         fmt::format("command of client {}: {}", command.client.value, ack.reason));
   } else if (command.kind == CommandKind::kClearEmergencyStop) {
-    endEmergencyStop(command.client, command.text);
+    clearEmergencyStop(command.client, command.text);
   }
 }
 
-/// The server publishes an engaged stop itself, for late joiners and in case its writer leaves, and ignores
-/// its own samples. Any participant may engage the stop; clearing it takes a command by instructor or admin,
-/// and devices accept it from the server alone.
+/// Anybody may raise the stop. The server stops the simulation, publishes the raise itself, for late joiners
+/// and in case its writer leaves, and keeps it on disk.
 void ServerWire::handle(const EmergencyStop& stop, const wire::Origin& from) {
-  if (from == participant_->origin() || (stop.engaged == emergency_stop_ && stop.engaged)) return;
-  if (!stop.engaged) {
-    if (!emergency_stop_) return;
-    refuse(
-        fmt::format("{} may not clear the emergency stop: it takes a command of the instructor", stop.who));
-    (void)writers_->stop.writer->write({true, "server", "the emergency stop stays engaged"});
-    return;
-  }
-  emergency_stop_ = true;
-  registry_.setEmergencyStop(stop);
+  if (from == participant_->origin() || !stops_.raise(stop)) return;
+  registry_.engageEmergencyStop();
+  forwardChanges();
   (void)writers_->stop.writer->write(stop);
+  keepStops();
   log(Severity::kError, "emergency stop", fmt::format("engaged by {}: {}", stop.who, stop.reason));
 }
 
-void ServerWire::endEmergencyStop(ClientId client, const std::string& reason) {
-  emergency_stop_ = false;
+/// Clears all raises that stand, and those alone: one that is on its way will stand.
+void ServerWire::clearEmergencyStop(ClientId client, const std::string& reason) {
   const std::string& who = registry_.findClient(client)->name;
-  (void)writers_->stop.writer->write({false, who, reason});
-  log(Severity::kInfo, "emergency stop", fmt::format("cleared by {}: {}", who, reason));
+  const auto standing = stops_.standing();
+  for (const auto& [id, stop] : standing) stops_.clear({stop.client_guid, stop.counter, who, reason});
+  keepStops();
+  for (const auto& [id, stop] : standing) {
+    (void)writers_->clear.writer->write(stops_.cleared().at(id));
+    (void)writers_->stop.writer->dispose(stop);
+  }
+  log(Severity::kInfo, "emergency stop",
+      fmt::format("cleared by {}: {}{}the session is paused until 'resume'", who, reason,
+                  reason.empty() ? "" : "; "));
 }
 
 void ServerWire::handle(const ClockSync& sync) {
@@ -329,7 +423,6 @@ void ServerWire::dismiss(ClientId client, const std::string& why) {
   notifySeatLost(client, why);
   log(Severity::kWarning, "leave", text);
   forwardChanges();
-  announce();
 }
 
 void ServerWire::send(const EventLog& event) { (void)writers_->event.writer->write(event); }

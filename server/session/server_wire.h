@@ -1,16 +1,20 @@
 #pragma once
 
 #include <chrono>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "idl/types/messages/log.h"
+#include "idl/types/stop_truth.h"
 #include "idl/wire/endpoint.h"
+#include "idl/wire/identity.h"
 #include "server/game_control/scenario.h"
 #include "server/session/input_buffer.h"
 #include "server/session/journal.h"
@@ -26,19 +30,23 @@ struct WireOptions {
   bool lockstep = false;
   bool publish_journal = true;  ///< TickInput and Checkpoint are published too
   std::uint32_t server_epoch = 0;
+  std::optional<wire::SharedKey> key;  ///< of the session; none: nobody can be admin or instructor
+  std::filesystem::path stop_file;     ///< keeps the raises of the emergency stop; empty: only in memory
 };
 
 /// All DDS endpoints of a session's server, bound to its registry and input buffer.
 ///
-/// Every sample that names a client is accepted only from the DDS participant that has this client's seat.
-/// Samples that cannot be written are dropped: a topic's QoS class says what its readers may rely on.
+/// Every sample that names a client is accepted only from the DDS participant that has this client's seat,
+/// and of requests to join only those that name this session and this life of the server. Samples that cannot
+/// be written are dropped: a topic's QoS class says what its readers may rely on.
 ///
 /// Threads: one (wire); send(JournalEntry) from one thread, which may be another; wake from any.
 /// Real-time: wake alone.
 class ServerWire {
  public:
-  /// Opens all endpoints, publishes the scene and announces the session. Fails when DDS does. The references
-  /// must outlive the object.
+  /// Opens all endpoints, publishes the scene and the raises of the emergency stop that stand, and announces
+  /// the session. Fails when DDS does, another server announces a session of this name, or the stop file is
+  /// damaged. The references must outlive the object.
   [[nodiscard]] static Result<std::unique_ptr<ServerWire>> open(const WireOptions& options,
                                                                 const LoadedScene& loaded,
                                                                 SessionRegistry& registry,
@@ -50,8 +58,9 @@ class ServerWire {
   void dispatch(std::chrono::nanoseconds timeout);
   /// Ends the waiting of dispatch().
   void wake() noexcept { inbox_.wake(); }
-  /// Publishes SessionAnnounce; to be repeated when the free hands change.
-  void announce();
+  /// Why this server has to end: it did nothing for so long that it was taken for dead, and another server
+  /// has taken its place meanwhile.
+  [[nodiscard]] const std::optional<std::string>& replaced() const { return replaced_; }
   void send(const OutgoingMessages& outgoing);
   /// Repeats frames and manifolds of the last tick for a client that missed them (lockstep).
   void resendLast();
@@ -86,6 +95,11 @@ class ServerWire {
   struct TopicWriter;
   struct Writers;
 
+  Result<void> refuseBesideAnother();
+  void announce();
+  void noticeLapse();
+  Result<void> restoreStops();
+  void keepStops();
   Result<void> openWriters();
   Result<void> openReaders();
   void sendScene(const LoadedScene& loaded);
@@ -93,11 +107,12 @@ class ServerWire {
   void handle(const DeviceInput& input, const wire::Origin& from);
   void handle(const Command& command, const wire::Origin& from);
   void handle(const ClockSync& sync);
+  void handle(const SessionAnnounce& other, const wire::Origin& from);
   void handle(const EmergencyStop& stop, const wire::Origin& from);
   void handleGone(const Presence& presence, const wire::Origin& from);
   [[nodiscard]] bool isGenuine(ClientId client, const wire::Origin& from, const std::string& what);
   void notifySeatLost(ClientId client, const std::string& why);
-  void endEmergencyStop(ClientId client, const std::string& reason);
+  void clearEmergencyStop(ClientId client, const std::string& reason);
   void refuse(const std::string& why);
   void forwardChanges();
   void log(Severity severity, const std::string& kind, const std::string& text);
@@ -118,7 +133,11 @@ class ServerWire {
   std::map<ClientId, std::chrono::steady_clock::time_point> seat_lost_notified_;  ///< last time
   std::uint64_t refused_inputs_ = 0;
   bool resend_requested_ = false;
-  bool emergency_stop_ = false;  ///< engaged
+  StopTruth stops_;
+  wire::SharedKey challenges_ = wire::SharedKey::random();  ///< what challenges are made of
+  std::map<std::uint32_t, SessionAnnounce> others_;         ///< servers of sessions of this name, by epoch
+  std::optional<std::chrono::steady_clock::time_point> dispatched_, lapsed_;
+  std::optional<std::string> replaced_;
   Tick now_ = 0;
   const OutgoingMessages* last_ = nullptr;  ///< of the last send
   PublishedSamples published_;              ///< since the last statement

@@ -1,6 +1,7 @@
 #include "server/session/session_registry.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -20,18 +21,17 @@ bool isPlausible(const Pose& X) {
 
 bool isPlausible(const Vector3& v, double limit) { return v.allFinite() && v.norm() < limit; }
 
-bool mayControlHandOf(Role role, Role hand_role) { return role == hand_role || role == Role::kAdmin; }
-
-bool hasInstructorRights(Role role) { return role == Role::kInstructor || role == Role::kAdmin; }
+bool mayControlHandOf(Role role, Role hand_role) {
+  return has(role, Right::kMoveAnyHand) || (role == hand_role && has(role, Right::kMoveHands));
+}
 
 }  // namespace
 
 SessionRegistry::SessionRegistry(const game_control::ScenarioFile& scenario, std::uint32_t server_epoch,
-                                 bool lockstep, std::uint64_t seed)
+                                 bool lockstep)
     : scenario_(scenario),
       server_epoch_(server_epoch),
       lockstep_(lockstep),
-      random_(seed),
       controllers_(scenario.hands.size()) {}
 
 const Presence* SessionRegistry::findClient(ClientId client) const {
@@ -39,9 +39,27 @@ const Presence* SessionRegistry::findClient(ClientId client) const {
   return known ? &clients_[client.value - 1] : nullptr;
 }
 
-bool SessionRegistry::isRolePresent(Role role) const {
-  return std::any_of(clients_.begin(), clients_.end(),
-                     [&](const Presence& person) { return person.alive && person.role == role; });
+std::size_t SessionRegistry::present(Role role) const {
+  return static_cast<std::size_t>(
+      std::count_if(clients_.begin(), clients_.end(),
+                    [&](const Presence& person) { return person.alive && person.role == role; }));
+}
+
+std::optional<std::size_t> SessionRegistry::indexOf(const std::string& seat_key) const {
+  for (std::size_t i = 0; i < seats_.size() && !seat_key.empty(); ++i)
+    if (seats_[i].key == seat_key) return i;
+  return std::nullopt;
+}
+
+bool SessionRegistry::isSeated(const std::string& client_guid) const {
+  for (std::size_t i = 0; i < seats_.size(); ++i)
+    if (clients_[i].alive && !client_guid.empty() && seats_[i].guid == client_guid) return true;
+  return false;
+}
+
+bool SessionRegistry::mustProve(const Join& join) const {
+  const RoleRights* const role = rightsOf(join.role);
+  return (role != nullptr && role->needs_key) || knowsSeat(join.seat_key);
 }
 
 bool SessionRegistry::anyHandControlled() const {
@@ -49,20 +67,36 @@ bool SessionRegistry::anyHandControlled() const {
                      [](ClientId controller) { return controller.valid(); });
 }
 
-std::vector<std::string> SessionRegistry::freeHands() const {
-  std::vector<std::string> names;
-  for (std::size_t i = 0; i < controllers_.size(); ++i)
-    if (!controllers_[i].valid()) names.push_back(scenario_.hands[i].name);
-  return names;
-}
-
-std::string SessionRegistry::joinRefusal(const Join& join) const {
+std::string SessionRegistry::joinRefusal(const Join& join, const JoinProofs& proofs) const {
   if (join.protocol_version != kProtocolVersion)
     return fmt::format("the server has protocol version {}, the client {}: update the older one",
                        kProtocolVersion, join.protocol_version);
-  if (join.role > Role::kRecorder) return "unknown role";
+  const RoleRights* const role = rightsOf(join.role);
+  if (role == nullptr) return "unknown role";
   if (join.client_guid.empty())
     return "the join request has no client_guid: the answer could not be addressed";
+  if (isSeated(join.client_guid)) return "another program has joined with this client_guid";
+  if (role->needs_key && !proofs.key)
+    return join.key_proof.empty()
+               ? fmt::format(
+                     "the {} needs the key of this session: whoever started the server can hand you a "
+                     "copy of its key file, to be named with --key",
+                     roleName(join.role))
+               : fmt::format(
+                     "the key is not the one of this session, which the {} needs: ask whoever started "
+                     "the server for a copy of its key file, and name it with --key",
+                     roleName(join.role));
+  const auto former = indexOf(join.seat_key);
+  if (former && !proofs.seat)
+    return "the seat is another program's: the proof that it is yours is missing or wrong";
+  const bool keeps_seat = former && clients_[*former].alive && clients_[*former].role == join.role;
+  if (!keeps_seat && present(join.role) >= role->seats)
+    return fmt::format("all {} seats of the role {} are taken", role->seats, roleName(join.role));
+  return handRefusal(join, former);
+}
+
+/// A hand of the `former` client of the seat is free: the request is of the same client.
+std::string SessionRegistry::handRefusal(const Join& join, std::optional<std::size_t> former) const {
   for (const std::string& name : join.hands) {
     const HandId hand = scenario_.handNamed(name);
     if (!hand.valid()) continue;  // a station may offer more hands than the scenario has
@@ -70,7 +104,8 @@ std::string SessionRegistry::joinRefusal(const Join& join) const {
     if (!mayControlHandOf(join.role, owner))
       return fmt::format("hand '{}' belongs to the {}, not to the {}", name, roleName(owner),
                          roleName(join.role));
-    if (controllers_[hand.value].valid())
+    const ClientId controller = controllers_[hand.value];
+    if (controller.valid() && !(former && controller.value == *former + 1))
       return fmt::format("hand '{}' is already moved by somebody else", name);
   }
   return {};
@@ -80,40 +115,50 @@ bool SessionRegistry::ownsSeat(ClientId client, const wire::Origin& origin) cons
   return findClient(client) != nullptr && seats_[client.value - 1].origin == origin;
 }
 
-Welcome SessionRegistry::join(const Join& join, Tick now, const wire::Origin& from) {
+Welcome SessionRegistry::join(const Join& join, const JoinProofs& proofs, Tick now,
+                              const wire::Origin& from) {
   Welcome welcome;
   welcome.client_guid = join.client_guid;
+  welcome.session = join.session;
   welcome.server_epoch = server_epoch_;
   welcome.lockstep = lockstep_;
   welcome.tick = now;
 
   // a repeated request, because its answer was lost, gets the same answer
-  for (Seat& seat : seats_) {
-    if (seat.guid.empty() || seat.guid != join.client_guid || !findClient(seat.welcome.client)->alive)
+  for (std::size_t i = 0; i < seats_.size(); ++i) {
+    Seat& seat = seats_[i];
+    if (seat.guid.empty() || seat.guid != join.client_guid || seat.origin != from || !clients_[i].alive)
       continue;
     seat.welcome.tick = now;
     return seat.welcome;
   }
-
-  // the token of a seat that is still taken: its former program ended unnoticed
-  for (std::size_t i = 0; i < seats_.size(); ++i) {
-    if (join.token.empty() || seats_[i].token != join.token) continue;
-    if (clients_[i].alive) leave(clients_[i].client);
-  }
-  welcome.reason = joinRefusal(join);
-  if (welcome.reason.empty()) assignSeat(join, welcome, from);
+  welcome.reason = joinRefusal(join, proofs);
+  if (!welcome.reason.empty()) return welcome;
+  // a seat that is still taken: its former program ended unnoticed
+  if (const auto former = indexOf(join.seat_key); former && clients_[*former].alive)
+    leave(clients_[*former].client);
+  assignSeat(join, welcome, from);
   return welcome;
 }
 
-void SessionRegistry::assignSeat(const Join& join, Welcome& welcome, const wire::Origin& from) {
-  const auto former = std::find_if(seats_.begin(), seats_.end(), [&](const Seat& seat) {
-    return !join.token.empty() && seat.token == join.token;
-  });
-  const std::size_t index = static_cast<std::size_t>(former - seats_.begin());
-  if (former == seats_.end()) {
+std::size_t SessionRegistry::newSeat() {
+  if (seats_.size() < kMaxSeats) {
     clients_.emplace_back();
-    seats_.push_back({join.client_guid, fmt::format("{:016x}", random_()), {}, {}, {}});
+    seats_.emplace_back();
+    return seats_.size() - 1;
   }
+  // the seats of all roles are fewer, so somebody has left
+  std::size_t first = seats_.size();
+  for (std::size_t i = 0; i < seats_.size(); ++i)
+    if (!clients_[i].alive && (first == seats_.size() || seats_[i].left < seats_[first].left)) first = i;
+  assert(first < seats_.size());
+  seats_[first] = {};
+  return first;
+}
+
+void SessionRegistry::assignSeat(const Join& join, Welcome& welcome, const wire::Origin& from) {
+  const auto former = indexOf(join.seat_key);
+  const std::size_t index = former ? *former : newSeat();
   welcome.accepted = true;
   welcome.client = ClientId{static_cast<std::uint32_t>(index + 1)};
   std::vector<HandId> controlled;
@@ -125,9 +170,9 @@ void SessionRegistry::assignSeat(const Join& join, Welcome& welcome, const wire:
     controlled.push_back(hand);
     changes_.push_back({.kind = ChangeKind::kAttach, .hand = hand});
   }
-  welcome.token = seats_[index].token;
   clients_[index] = {welcome.client, join.name, join.role, controlled, true};
   seats_[index].guid = join.client_guid;
+  seats_[index].key = join.seat_key;
   seats_[index].welcome = welcome;
   seats_[index].origin = from;
   seats_[index].last_ack = {};
@@ -136,6 +181,7 @@ void SessionRegistry::assignSeat(const Join& join, Welcome& welcome, const wire:
 void SessionRegistry::leave(ClientId client) {
   if (findClient(client) == nullptr) return;
   Presence& who = clients_[client.value - 1];
+  if (who.alive) seats_[client.value - 1].left = ++departures_;
   who.alive = false;
   for (std::uint32_t i = 0; i < controllers_.size(); ++i) {
     if (controllers_[i] != client) continue;
@@ -144,9 +190,9 @@ void SessionRegistry::leave(ClientId client) {
   }
 }
 
-void SessionRegistry::setEmergencyStop(const EmergencyStop& stop) {
-  emergency_stop_ = stop.engaged;
-  changes_.push_back({.kind = ChangeKind::kSetEmergencyStop, .value = stop.engaged ? 1.0 : 0.0});
+void SessionRegistry::engageEmergencyStop() {
+  emergency_stop_ = true;
+  changes_.push_back({.kind = ChangeKind::kSetEmergencyStop, .value = 1.0});
 }
 
 bool SessionRegistry::isController(ClientId client, HandId hand) const {
@@ -162,7 +208,7 @@ Result<HandReading> SessionRegistry::validateDeviceInput(const DeviceInput& inpu
   if (!isController(input.client, input.hand))
     return fail(
         fmt::format("client {} sent input for hand '{}', which is not its own", input.client.value, name));
-  const DeviceSample& newest = input.samples[0];
+  const DeviceSample& newest = input.sample;
   if (!isPlausible(newest.X_WH) || !isPlausible(newest.V_WH.linear, kMaxSpeed) ||
       !isPlausible(newest.V_WH.angular, kMaxSpeed))
     return fail(fmt::format("client {} sent an implausible pose or velocity of hand '{}': ignored",
@@ -172,7 +218,7 @@ Result<HandReading> SessionRegistry::validateDeviceInput(const DeviceInput& inpu
 
 Result<Change> SessionRegistry::validateForceContribution(const ForceContribution& force) const {
   const Presence* who = findClient(force.client);
-  if (who == nullptr || !who->alive || who->role == Role::kObserver || who->role == Role::kRecorder)
+  if (who == nullptr || !who->alive || !has(who->role, Right::kContributeForces))
     return fail(fmt::format("client {} may not contribute forces", force.client.value));
   if (force.object.value >= scenario_.objects.size())
     return fail(fmt::format("client {} sent a force for an unknown object", force.client.value));
@@ -187,7 +233,7 @@ Result<Change> SessionRegistry::validateForceContribution(const ForceContributio
 
 Result<Change> SessionRegistry::validateExternalPose(const ExternalPose& pose) const {
   const Presence* who = findClient(pose.client);
-  if (who == nullptr || !who->alive || !hasInstructorRights(who->role))
+  if (who == nullptr || !who->alive || !has(who->role, Right::kPlaceObjects))
     return fail(fmt::format("client {} may not place objects", pose.client.value));
   if (pose.object.value >= scenario_.objects.size() || !isPlausible(pose.X_WO))
     return fail(
@@ -227,7 +273,12 @@ CommandAck SessionRegistry::decide(const Command& command, Role role) {
   if (change->kind == ChangeKind::kGameCommand && suspended) ++deferred_commands_;
   if (change->kind == ChangeKind::kPause) pending_phase_ = RunPhase::kPaused;
   if (change->kind == ChangeKind::kResume) pending_phase_ = RunPhase::kRunning;
-  if (change->kind == ChangeKind::kSetEmergencyStop) emergency_stop_ = false;
+  if (change->kind == ChangeKind::kSetEmergencyStop) {
+    // nothing moves by itself when the stop is cleared: `resume` goes on
+    emergency_stop_ = false;
+    changes_.push_back({.kind = ChangeKind::kPause});
+    if (expectedPhase() == RunPhase::kRunning) pending_phase_ = RunPhase::kPaused;
+  }
   stop_requested_ = stop_requested_ || change->kind == ChangeKind::kStop;
   changes_.push_back(*change);
   return ack;
@@ -281,8 +332,22 @@ Result<Change> SessionRegistry::changeFromCommand(const Command& command, Role r
   const auto not_permitted = [&] {
     return fail(fmt::format("not permitted for the {}: ask the instructor", roleName(role)));
   };
-  if (role == Role::kObserver || role == Role::kRecorder) return not_permitted();
   if (!std::isfinite(command.value)) return fail("its value is not a finite number");
+  switch (command.kind) {
+    case CommandKind::kFulfilled:
+    case CommandKind::kSignal:
+      if (!has(role, Right::kAnswerStep)) return not_permitted();
+      break;
+    case CommandKind::kRelease:
+    case CommandKind::kSwapHands:
+      if (!has(role, Right::kActOnOwnHands)) return not_permitted();
+      break;
+    case CommandKind::kClearEmergencyStop:
+      if (!has(role, Right::kClearStop)) return not_permitted();
+      break;
+    default:
+      if (!has(role, Right::kLeadRun)) return not_permitted();
+  }
   switch (command.kind) {
     case CommandKind::kFulfilled:
       return gameChange(command);
@@ -294,18 +359,22 @@ Result<Change> SessionRegistry::changeFromCommand(const Command& command, Role r
     case CommandKind::kRelease:
       return releaseChange(command, role);
     case CommandKind::kSwapHands:
-      if (!hasInstructorRights(role) && !controlsBothHands(command.client))
+      if (!has(role, Right::kActOnAnyHand) && !controlsBothHands(command.client))
         return fail("you do not control both hands");
       return gameChange(command);
+    case CommandKind::kClearEmergencyStop:
+      if (!emergency_stop_) return fail("there is no emergency stop");
+      if (role == Role::kAdmin && isRolePresent(Role::kInstructor))
+        return fail("an instructor is present: it is for the instructor to clear the emergency stop");
+      return Change{.kind = ChangeKind::kSetEmergencyStop, .value = 0.0};
     default:
-      if (!hasInstructorRights(role)) return not_permitted();
-      return instructorChange(command);
+      return leadChange(command);
   }
 }
 
 Result<Change> SessionRegistry::releaseChange(const Command& command, Role role) const {
   const HandId hand = command.hand.valid() ? command.hand : scenario_.handNamed(command.text);
-  if (!hasInstructorRights(role) && !isController(command.client, hand))
+  if (!has(role, Right::kActOnAnyHand) && !isController(command.client, hand))
     return fail("you do not control that hand");
   if (hand.value >= controllers_.size())
     return fail(command.text.empty() ? "there is no such hand"
@@ -313,7 +382,7 @@ Result<Change> SessionRegistry::releaseChange(const Command& command, Role role)
   return Change{.kind = ChangeKind::kRelease, .hand = hand};
 }
 
-Result<Change> SessionRegistry::instructorChange(const Command& command) const {
+Result<Change> SessionRegistry::leadChange(const Command& command) const {
   switch (command.kind) {
     case CommandKind::kPause:
       return Change{.kind = ChangeKind::kPause};
@@ -321,9 +390,6 @@ Result<Change> SessionRegistry::instructorChange(const Command& command) const {
       return Change{.kind = ChangeKind::kResume};
     case CommandKind::kStop:
       return Change{.kind = ChangeKind::kStop};
-    case CommandKind::kClearEmergencyStop:
-      if (!emergency_stop_) return fail("there is no emergency stop");
-      return Change{.kind = ChangeKind::kSetEmergencyStop, .value = 0.0};
     case CommandKind::kReset:
     case CommandKind::kSkipStep:
       return gameChange(command);

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <optional>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -14,26 +13,40 @@
 #include "idl/types/messages/session.h"
 #include "idl/wire/endpoint.h"
 #include "server/game_control/scenario.h"
+#include "server/session/rights.h"
 #include "server/session/tick_io.h"
 
 namespace tenon::session {
 
-/// The clients of a session: their seats (client id, token, DDS participant), roles, the hands they control
-/// and what each of them may do.
+/// What a Join has proven (wire::SeatKey, wire::SharedKey).
+struct JoinProofs {
+  bool seat = false;  ///< that the client has the secret of its seat_key
+  bool key = false;   ///< that it has the key of the session
+};
+
+/// The clients of a session: their seats (client id, key of the seat, DDS participant), roles, the hands they
+/// control and what each of them may do, by the table of rights.h.
 ///
 /// It has neither network nor clock: received messages go in; Changes for the next tick and answers to the
-/// sender come out. "Instructor rights" are those of the roles instructor and admin.
+/// sender come out.
 ///
 /// Threads: one (wire).
 class SessionRegistry {
  public:
-  /// `seed` of the tokens: must not be guessable when clients are not trusted. `scenario` must outlive this.
-  SessionRegistry(const game_control::ScenarioFile& scenario, std::uint32_t server_epoch, bool lockstep,
-                  std::uint64_t seed);
+  /// `scenario` must outlive this.
+  SessionRegistry(const game_control::ScenarioFile& scenario, std::uint32_t server_epoch, bool lockstep);
 
-  /// Gives a seat to the client and binds it to the participant `from`, or refuses with a reason. A repeated
-  /// request (same client_guid) gets the first answer again; a known token gets its former client id.
-  [[nodiscard]] Welcome join(const Join& join, Tick now, const wire::Origin& from = {});
+  /// Gives a seat to the client and binds it to the participant `from`, or refuses with a reason; who has the
+  /// seat or a hand keeps it in that case. A repeated request (same client_guid and participant) gets the
+  /// first answer again; a known seat_key gets its former client id.
+  [[nodiscard]] Welcome join(const Join& join, const JoinProofs& proofs, Tick now,
+                             const wire::Origin& from = {});
+  /// Whether this request needs a proof: its role needs the key, or its seat was given away before.
+  [[nodiscard]] bool mustProve(const Join& join) const;
+  /// Whether this client has a seat by an earlier request of the same client_guid.
+  [[nodiscard]] bool isSeated(const std::string& client_guid) const;
+  /// Whether a seat was given to this key.
+  [[nodiscard]] bool knowsSeat(const std::string& seat_key) const { return indexOf(seat_key).has_value(); }
   /// Whether the seat of `client` was given to the participant `origin`.
   [[nodiscard]] bool ownsSeat(ClientId client, const wire::Origin& origin) const;
   /// Checks the command against role, hand and run phase. An accepted one becomes a Change and takes effect;
@@ -43,9 +56,10 @@ class SessionRegistry {
   [[nodiscard]] const CommandAck* previousAck(const Command& command) const;
   /// Phase and emergency stop after the last tick.
   void updatePhase(RunPhase phase, bool emergency_stop);
-  /// Frees the client's hands. Its seat stays and can be taken again with the token. Unknown ids are ignored.
+  /// Frees the client's hands. Its seat stays and can be taken again with its key. Unknown ids are ignored.
   void leave(ClientId client);
-  void setEmergencyStop(const EmergencyStop& stop);
+  /// A raise stands.
+  void engageEmergencyStop();
 
   /// The newest sample of `input` as tick input. Fails, with a sentence for the event log, when the client
   /// does not control this hand, the server epoch is another one, or the numbers are implausible (not finite,
@@ -54,13 +68,13 @@ class SessionRegistry {
   /// Fails for observers and recorders, unknown objects, and wrenches that are not finite. Those that are too
   /// large or last too long are passed on as they are: ForceBuffer::contribute clamps them.
   [[nodiscard]] Result<Change> validateForceContribution(const ForceContribution& force) const;
-  /// Fails without instructor rights, for unknown objects and implausible poses.
+  /// Fails without Right::kPlaceObjects, for unknown objects and implausible poses.
   [[nodiscard]] Result<Change> validateExternalPose(const ExternalPose& pose) const;
 
   /// Moves the pending changes to `out`, oldest first, as many as it has room for; the rest stays pending.
   void takeChanges(FixedVector<Change, kMaxChanges>& out);
 
-  /// Index + 1 = ClientId. Clients that left stay with alive = false.
+  /// Index + 1 = ClientId. Clients that left stay with alive = false, the last kMaxSeats of them.
   [[nodiscard]] const std::vector<Presence>& clients() const { return clients_; }
   /// Null for an unknown id.
   [[nodiscard]] const Presence* findClient(ClientId client) const;
@@ -70,27 +84,34 @@ class SessionRegistry {
   [[nodiscard]] ClientId controllerOf(HandId hand) const { return controllers_[hand.value]; }
   [[nodiscard]] bool anyHandControlled() const;
   [[nodiscard]] bool stopRequested() const { return stop_requested_; }
-  [[nodiscard]] bool isRolePresent(Role role) const;
-  /// Names of the hands that no client controls.
-  [[nodiscard]] std::vector<std::string> freeHands() const;
+  [[nodiscard]] bool isRolePresent(Role role) const { return present(role) > 0; }
 
  private:
   struct Seat {
     std::string guid;
-    std::string token;
+    std::string key;  ///< public key
     Welcome welcome;
     wire::Origin origin;
-    CommandAck last_ack;  ///< id 0: none yet
+    CommandAck last_ack;     ///< id 0: none yet
+    std::uint64_t left = 0;  ///< counts departures
   };
 
-  [[nodiscard]] std::string joinRefusal(const Join& join) const;
+  /// Seats in all, of those that are present and of those that left: then that of who left first is given
+  /// away.
+  static constexpr std::size_t kMaxSeats = 1024;
+
+  [[nodiscard]] std::size_t present(Role role) const;
+  [[nodiscard]] std::optional<std::size_t> indexOf(const std::string& seat_key) const;
+  [[nodiscard]] std::string joinRefusal(const Join& join, const JoinProofs& proofs) const;
+  [[nodiscard]] std::string handRefusal(const Join& join, std::optional<std::size_t> former) const;
+  [[nodiscard]] std::size_t newSeat();
   void assignSeat(const Join& join, Welcome& welcome, const wire::Origin& from);
   [[nodiscard]] CommandAck decide(const Command& command, Role role);
   [[nodiscard]] std::string refusalByPhase(CommandKind kind) const;
   /// The run phase after all accepted changes have been applied.
   [[nodiscard]] RunPhase expectedPhase() const { return pending_phase_.value_or(phase_); }
   [[nodiscard]] Result<Change> changeFromCommand(const Command& command, Role role) const;
-  [[nodiscard]] Result<Change> instructorChange(const Command& command) const;
+  [[nodiscard]] Result<Change> leadChange(const Command& command) const;
   [[nodiscard]] Result<Change> releaseChange(const Command& command, Role role) const;
   [[nodiscard]] int findPair(std::string_view a, std::string_view b) const;
   [[nodiscard]] bool controlsBothHands(ClientId client) const;
@@ -99,7 +120,7 @@ class SessionRegistry {
   const game_control::ScenarioFile& scenario_;
   std::uint32_t server_epoch_;
   bool lockstep_;
-  std::mt19937_64 random_;
+  std::uint64_t departures_ = 0;
   std::vector<Presence> clients_;
   std::vector<Seat> seats_;            ///< index as clients_
   std::vector<ClientId> controllers_;  ///< index = HandId

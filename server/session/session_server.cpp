@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <optional>
-#include <random>
 #include <thread>
 
 #include <fmt/format.h>
@@ -11,6 +10,7 @@
 #include "idl/threads/cyclic_thread.h"
 #include "idl/types/names.h"
 #include "server/session/server_wire.h"
+#include "server/session/session_lock.h"
 #include "server/simulation/governor.h"
 
 namespace tenon::session {
@@ -65,12 +65,6 @@ std::uint32_t newServerEpoch() {
                                     since_1970 / milliseconds(250) % 4);
 }
 
-/// Not reproducible, so that clients cannot guess each other's tokens.
-std::uint64_t newTokenSeed() {
-  std::random_device random;
-  return std::uint64_t{random()} << 32U | random();
-}
-
 class Server final : public SessionServer {
  public:
   Server(const LoadedScene& loaded, SessionOptions options, StartCondition start_condition,
@@ -78,18 +72,23 @@ class Server final : public SessionServer {
       : options_(std::move(options)),
         start_condition_(std::move(start_condition)),
         simulation_(loaded.scenario, loaded.scene, options_.simulation),
-        registry_(*loaded.scenario, epoch, options_.lockstep, newTokenSeed()),
+        registry_(*loaded.scenario, epoch, options_.lockstep),
         input_buffer_(loaded.scenario->hands.size()),
         publisher_(loaded.scenario, epoch, options_.lockstep),
         epoch_(epoch),
         governor_(options_.tick_goal) {}
 
   Result<void> start(const LoadedScene& loaded) {
+    auto lock = SessionLock::take(options_.domain, options_.name);
+    if (!lock) return fail(lock.error().what);
+    lock_.emplace(std::move(*lock));
     auto wire = ServerWire::open({.session = options_.name,
                                   .domain = options_.domain,
                                   .lockstep = options_.lockstep,
                                   .publish_journal = options_.publish_journal,
-                                  .server_epoch = epoch_},
+                                  .server_epoch = epoch_,
+                                  .key = options_.key,
+                                  .stop_file = options_.stop_file},
                                  loaded, registry_, input_buffer_, publisher_);
     if (!wire) return fail(wire.error().what);
     wire_ = std::move(*wire);
@@ -104,10 +103,10 @@ class Server final : public SessionServer {
 
   Result<SessionReport> run(const std::atomic<bool>& stop) override {
     print(fmt::format("session '{}' is open, waiting for people", options_.name));
-    while (!stop && !registry_.stopRequested() && !start_condition_.isMet(registry_))
+    while (!stop && !registry_.stopRequested() && !wire_->replaced() && !start_condition_.isMet(registry_))
       wire_->dispatch(milliseconds(100));
     if (journal_ || options_.publish_journal) fillCheckpointPool();
-    if (!stop) options_.lockstep ? runLockstep(stop) : runRealTime(stop);
+    if (!stop && !wire_->replaced()) options_.lockstep ? runLockstep(stop) : runRealTime(stop);
     return finish();
   }
 
@@ -186,6 +185,7 @@ class Server final : public SessionServer {
   std::uint32_t epoch_;
   simulation::Governor governor_;
   std::optional<double> new_budget_;  ///< [points] for the next tick's input
+  std::optional<SessionLock> lock_;
   std::unique_ptr<ServerWire> wire_;
   std::optional<Journal> journal_;
   std::optional<std::string> journal_problem_;
@@ -203,7 +203,7 @@ void Server::runLockstep(const std::atomic<bool>& stop) {
   TickInput input;
   JournalEntry entry;
   TickOutput output = simulation_.makeOutput();
-  while (!stop && !simulation_.over()) {
+  while (!stop && !wire_->replaced() && !simulation_.over()) {
     if (!awaitInputs(stop)) break;
     tick(input, output);
     wire_->update(output);
@@ -217,7 +217,7 @@ void Server::runLockstep(const std::atomic<bool>& stop) {
 /// Waits until a hand is controlled and every controlled hand has an input for the next tick; a client that
 /// is silent for 30 s is removed. Returns early when a stop is requested; false: no further tick.
 bool Server::awaitInputs(const std::atomic<bool>& stop) {
-  while (!stop && !registry_.stopRequested() && !registry_.anyHandControlled())
+  while (!stop && !registry_.stopRequested() && !wire_->replaced() && !registry_.anyHandControlled())
     wire_->dispatch(milliseconds(50));
   const auto next = static_cast<std::uint32_t>(simulation_.now() + 1);
   const auto missing = [&]() -> HandId {
@@ -228,7 +228,7 @@ bool Server::awaitInputs(const std::atomic<bool>& stop) {
   auto deadline = std::chrono::steady_clock::now() + kInputTimeout;
   for (HandId late = missing(); late.valid(); late = missing()) {
     wire_->dispatch(milliseconds(50));
-    if (stop) return false;
+    if (stop || wire_->replaced()) return false;
     if (wire_->takeResendRequest()) wire_->resendLast();
     if (std::chrono::steady_clock::now() < deadline) continue;
     wire_->dismiss(registry_.controllerOf(late), "has been silent for 30 s and is removed from the session");
@@ -283,7 +283,7 @@ void Server::runRealTime(const std::atomic<bool>& stop) {
   if (const std::string missing = threads::lockMemory(); !missing.empty()) print(missing);
   ticker.start();
   if (!ticker.notGranted().empty()) print(ticker.notGranted());
-  while (!stop && !over) {
+  while (!stop && !over && !wire_->replaced()) {
     wire_->dispatch(milliseconds(20));
     for (TickOutput* output = outputs_.front(); output != nullptr; output = outputs_.front()) {
       wire_->update(*output);
@@ -325,6 +325,7 @@ Result<SessionReport> Server::finish() {
   report.dropped_outputs = outputs_.dropped();
   if (journal_)
     if (auto closed = journal_->close(report.run); !closed) return fail(closed.error().what);
+  if (wire_->replaced()) return fail(*wire_->replaced());
 
   wire_->statePublished();
   // let reliable samples arrive before the writers are deleted: a client that has not received the end of the

@@ -5,10 +5,12 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "idl/types/result.h"
+#include "idl/wire/identity.h"
 #include "server/session/scene_loader.h"
 #include "server/session/session_simulation.h"
 
@@ -22,8 +24,11 @@ struct SessionOptions {
   /// all hands of traineeHands.
   std::vector<std::string> wait_for;
   std::filesystem::path journal;  ///< empty: no journal file
-  double detail = 1.0;            ///< [-] LoadOptions::detail, noted in the journal
-  bool publish_journal = true;    ///< publish TickInput and Checkpoint for recorders
+  /// Of the session, for admins and instructors; none: nobody can be one.
+  std::optional<wire::SharedKey> key;
+  std::filesystem::path stop_file;  ///< keeps an emergency stop over a crash; empty: nothing does
+  double detail = 1.0;              ///< [-] LoadOptions::detail, noted in the journal
+  bool publish_journal = true;      ///< publish TickInput and Checkpoint for recorders
   /// [s] In real time, the governor keeps the computing time of a tick below this by changing the work
   /// budget; 0: never. The default leaves 0.3 ms of a tick to the operating system and other threads.
   double tick_goal = 0.7e-3;
@@ -50,15 +55,15 @@ struct SessionReport {
 /// SpscQueues with it. `stop` may be set from any thread. Real-time: no (its tick thread is).
 class SessionServer {
  public:
-  /// Opens all DDS endpoints and the journal. Fails when one cannot be opened, or when `wait_for` names what
-  /// is neither a hand of the scenario nor a role.
+  /// Opens all DDS endpoints and the journal. Fails when one cannot be opened, when a session of this name is
+  /// served already, or when `wait_for` names what is neither a hand of the scenario nor a role.
   [[nodiscard]] static Result<std::unique_ptr<SessionServer>> open(const LoadedScene& loaded,
                                                                    SessionOptions options);
   virtual ~SessionServer() = default;
 
   /// Waits for `wait_for`, then runs until the run is over or `stop` is set. Once only. Fails when the
-  /// journal cannot be closed; when writing it fails, `print` reports that and the session continues without
-  /// it.
+  /// journal cannot be closed, and when another server has taken the place of this one while it was stopped;
+  /// when writing it fails, `print` reports that and the session continues without it.
   [[nodiscard]] virtual Result<SessionReport> run(const std::atomic<bool>& stop) = 0;
 };
 

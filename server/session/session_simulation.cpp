@@ -30,6 +30,8 @@ SessionSimulation::SessionSimulation(std::shared_ptr<const game_control::Scenari
 void SessionSimulation::tick(const TickInput& input) noexcept {
   for (const Change& change : input.changes) apply(change);
   applyReadings(input);
+  for (const Change& change : input.changes)
+    if (change.kind == ChangeKind::kTake) take(change.hand, change.object);
   applyAgeLimits();
   if (phase_ == RunPhase::kRunning && !emergency_stop_) {
     machine_.step(environment_, {commands_.begin(), commands_.size()});
@@ -77,14 +79,17 @@ void SessionSimulation::apply(const Change& change) noexcept {
     case ChangeKind::kBudget:
       return environment_.setBudget(budgetPoints(change.value));
     case ChangeKind::kTake:
-      return take(change.hand, change.object);
+      return;  // when the readings of the tick are applied
   }
 }
 
-/// A hidden object appears at the pose of the hand that grabs it, or at the first one of a hand without.
+/// Before the hand has a pose, the object is hidden.
 void SessionSimulation::take(HandId hand, ObjectId object) noexcept {
   if (hand.value >= ages_.size() || object.value >= environment_.objects().size()) return;
-  environment_.place(object, environment_.objects()[object.value].X_WO, ObjectStatus::kHidden);
+  const simulation::HandMotion& motion = environment_.hands()[hand.value];
+  const bool is_there = motion.present && motion.has_pose;
+  environment_.place(object, is_there ? motion.X_WH : environment_.objects()[object.value].X_WO,
+                     is_there ? ObjectStatus::kParked : ObjectStatus::kHidden);
   environment_.grab(hand, object);
 }
 

@@ -1,11 +1,11 @@
 #include "server/session/step_blocker.h"
 
 #include <algorithm>
-#include <cmath>
 #include <tuple>
 
 #include <fmt/format.h>
 
+#include "server/game_control/quantity_text.h"
 #include "server/game_control/state_machine.h"
 
 namespace tenon::session {
@@ -29,20 +29,13 @@ const PairContact* mostLoaded(const ScenarioFile& scenario, const TickOutput& ou
   return most;
 }
 
-std::string pointText(const Vector3& p_W) {
-  // 0.0 + -0.0 is 0.0
-  const auto tenth = [](double metres) { return std::round(1e4 * metres) / 10.0 + 0.0; };
-  return fmt::format("({:g}, {:g}, {:g}) mm", tenth(p_W.x()), tenth(p_W.y()), tenth(p_W.z()));
-}
-
 /// "9.8 mm from its place", "turned by 12 deg from its place", or both; empty when it is there.
 std::string errorText(const ScenarioState& state, const game_control::StepStatus& step) {
-  constexpr double kDegrees = 57.29577951308232;
   const bool is_away = step.position_error > state.tolerance;
   const bool is_turned = step.angle_error > state.angle_tolerance;
-  std::string text = is_away ? fmt::format("{:.3g} mm", 1e3 * step.position_error) : "";
+  std::string text = is_away ? game_control::inMillimetres(step.position_error) : "";
   if (is_turned)
-    text += fmt::format("{}turned by {:.3g} deg", is_away ? " and " : "", kDegrees * step.angle_error);
+    text += fmt::format("{}turned by {}", is_away ? " and " : "", game_control::inDegrees(step.angle_error));
   return text.empty() ? text : text + " from its place";
 }
 
@@ -65,11 +58,13 @@ std::string whatBlocks(const ScenarioFile& scenario, const TickOutput& output) {
   }
   const std::string error = state.X_WG ? errorText(state, output.step) : "";
   if (error.empty()) return unmetCondition(scenario, output.step);
+  if (!output.objects[state.object.value].holder.valid())
+    return fmt::format("{} is {}, in no hand", title(state.object), error);
   const PairContact* contact = mostLoaded(scenario, output, state.object);
   if (contact == nullptr) return fmt::format("{} is {}, and touches nothing", title(state.object), error);
   const ObjectId other = contact->a == state.object ? contact->b : contact->a;
   return fmt::format("{} is held {} by {}, at {}", title(state.object), error, title(other),
-                     pointText(contact->p_WP));
+                     game_control::pointText(contact->p_WP));
 }
 
 }  // namespace tenon::session

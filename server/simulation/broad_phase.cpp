@@ -19,8 +19,12 @@ BroadPhase::BroadPhase(const Scene& scene)
     std::int32_t& first = firstPair(spec.a.value, spec.b.value);
     next_pair_[pair] = first;
     first = static_cast<std::int32_t>(pair);
-    dilations_.push_back(spec.dilation);
-    largest_dilation_ = std::max(largest_dilation_, spec.dilation);
+    const auto dilationOf = [&scene](ObjectId object) {
+      const auto& structures = scene.objects[object.value].structures;
+      return structures ? structures->field.dilation() : 0.0;
+    };
+    dilations_.push_back(std::max(dilationOf(spec.b), std::min(dilationOf(spec.a), spec.most_dilation_a)));
+    largest_dilation_ = std::max(largest_dilation_, dilations_.back());
   }
 }
 

@@ -26,8 +26,8 @@ class BroadPhase {
   /// The object is in no result until its sphere is set again.
   void remove(ObjectId object) noexcept;
 
-  /// Indices, in ascending order, of the pairs whose spheres are at most `margin` [m] plus the pair's
-  /// dilation apart. Valid until the next call.
+  /// Indices, in ascending order, of the pairs whose spheres are at most `margin` [m] plus the
+  /// largest dilation apart. Valid until the next call.
   [[nodiscard]] std::span<const std::uint32_t> findPairs(double margin) noexcept;
 
  private:

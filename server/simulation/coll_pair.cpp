@@ -13,17 +13,13 @@ constexpr std::uint32_t kMaxRestoreDelay = 1600;
 /// [-] There is headroom for a level when the expected points are below this fraction of the budget.
 constexpr double kRestoreHeadroom = 0.7;
 
-/// [-] The pair's dilation, which is that of B's field, holds for A's surface as well, as far as A's field is
-/// exact: features have to be seen before they touch.
-constexpr double kDilationPerBand = 0.5;
-
 }  // namespace
 
 collision::PairFeatures featuresOf(const Scene& scene, const PairSpec& pair) {
   const auto& a = scene.objects[pair.a.value].structures;
   const auto& b = scene.objects[pair.b.value].structures;
   if (!a || !b) return {};
-  return {&a->features, &b->features, &a->field, std::min(pair.dilation, kDilationPerBand * a->field.band())};
+  return {&a->features, &b->features, &a->field, pair.most_dilation_a};
 }
 
 CollPair::CollPair(const Scene& scene, std::size_t pair) : spec_(&scene.pairs[pair]) {
@@ -35,6 +31,7 @@ CollPair::CollPair(const Scene& scene, std::size_t pair) : spec_(&scene.pairs[pa
     shell_A_ = &a.structures->shell;
     field_B_ = &b.structures->field;
     features_ = featuresOf(scene, *spec_);
+    slope_ = std::max(field_B_->slope(), features_.any() ? features_.field_A->slope() : 1.0);
   }
   enabled_ = spec_->enabled;
 }
@@ -65,8 +62,7 @@ void CollPair::reset() noexcept {
 
 void CollPair::query(const Pose& X_WA, const Pose& X_WB, double margin, collision::FeatureScratch& scratch,
                      std::uint32_t budget, std::span<const std::uint32_t> priority_points) noexcept {
-  const collision::PairQuery query{shell_A_, field_B_, X_WA,   X_WB,           spec_->dilation,
-                                   margin,   levels_,  budget, priority_points};
+  const collision::PairQuery query{shell_A_, field_B_, X_WA, X_WB, margin, levels_, budget, priority_points};
   collision::queryPair(query, list_->query);
   collision::queryFeatures(query, features_, scratch, list_->query);
   std::fill_n(list_->multipliers.begin(), list_->query.contacts.size(), 0.0);
@@ -160,8 +156,8 @@ bool CollPair::isIndexValid(const collision::Contact& contact) const noexcept {
     case collision::ContactKind::kFeaturePoint:
       return features_.any() && contact.point < features_.features_B->edges().size();
     case collision::ContactKind::kCrossing:
-      return features_.any() && contact.point < features_.features_A->edges().size() &&
-             contact.other < features_.features_B->edges().size();
+      return features_.any() && collision::isEdge(*features_.features_A, contact.point) &&
+             collision::isEdge(*features_.features_B, contact.other);
   }
   return false;
 }
@@ -181,19 +177,20 @@ Tick CollPair::ticksToClose(double distance, double closing_speed) noexcept {
 
 void CollPair::schedule(Tick now, double closing_speed, double margin, double path_length) noexcept {
   path_length_ = path_length;
-  due_ =
-      closing_speed <= 0.0 ? kNever : now + 1 + ticksToClose(gap_ - skipped_spacing_ - margin, closing_speed);
+  due_ = closing_speed <= 0.0
+             ? kNever
+             : now + 1 + ticksToClose(gap_ - skipped_spacing_ - margin, slope_ * closing_speed);
 }
 
 bool CollPair::postpone(Tick now, double closing_speed, double margin, double path_length,
                         double reach) noexcept {
-  const double remaining = gap_ - skipped_spacing_ - (path_length - path_length_) - margin;
+  const double remaining = gap_ - skipped_spacing_ - slope_ * (path_length - path_length_) - margin;
   if (!queried_ || remaining <= 0.0) return false;
   if (closing_speed <= 0.0) {
     due_ = kNever;
     return true;
   }
-  const Tick ticks = ticksToClose(remaining, closing_speed);
+  const Tick ticks = ticksToClose(remaining, slope_ * closing_speed);
   if (ticks == 0 && remaining <= reach) return false;
   due_ = now + std::max<Tick>(ticks, 1);
   return true;
@@ -205,7 +202,6 @@ collision::IslandPair CollPair::islandPair(const Pose& X_WA, const Pose& X_WB, T
   pair.field_B = field_B_;
   pair.X_WA_static = X_WA;
   pair.X_WB_static = X_WB;
-  pair.dilation = spec_->dilation;
   pair.features = features_;
   pair.friction = spec_->friction.value_or(collision::Friction{});
   pair.last = solvedBefore(now);
@@ -219,13 +215,13 @@ double CollPair::findGap(const Pose& X_WA, const Pose& X_WB, double limit, colli
   query.field_B = field_B_;
   query.X_WA = X_WA;
   query.X_WB = X_WB;
-  query.dilation = spec_->dilation;
-  query.margin = limit;
+  query.margin = slope_ * limit;
   query.levels = levels_;
   query.list = false;
   collision::queryPair(query, found);
   return std::min(found.smallest_gap - found.skipped_gap_error,
-                  collision::featureGap(query, features_, scratch));
+                  collision::featureGap(query, features_, scratch, found.counts)) /
+         slope_;
 }
 
 }  // namespace tenon::simulation

@@ -53,7 +53,7 @@ class CollPair {
   // results of the last query since the last reset
   [[nodiscard]] bool queried() const { return queried_; }
   [[nodiscard]] double gap() const { return gap_; }      ///< [m] smallest signed gap, dilation included
-  [[nodiscard]] double depth() const { return depth_; }  ///< [m] penetration depth in the undilated field
+  [[nodiscard]] double depth() const { return depth_; }  ///< [m] penetration depth in the field of b
   [[nodiscard]] const collision::QueryCounts& counts() const { return counts_; }
   /// Number of finest shell levels that the last query skipped.
   [[nodiscard]] std::uint32_t skippedLevels() const {
@@ -116,9 +116,9 @@ class CollPair {
   /// Input of the island solver of tick `now`, with both bodies static.
   [[nodiscard]] collision::IslandPair islandPair(const Pose& X_WA, const Pose& X_WB, Tick now) const noexcept;
 
-  /// Asks for the gap alone, for poses of this tick's start: `smallest_gap` of `found` is above `limit` [m],
-  /// or the gap as near as the field knows it. Returns a lower bound of the gap [m] over all points and
-  /// features. Changes nothing else.
+  /// Asks for the gap alone, for poses of this tick's start: by how much [m] the bodies may approach each
+  /// other before a point or feature touches; up to `limit` [m] as near as the fields know it, beyond that a
+  /// lower bound. Changes nothing else but `found`, where the work is counted.
   [[nodiscard]] double findGap(const Pose& X_WA, const Pose& X_WB, double limit,
                                collision::PairQueryResult& found,
                                collision::FeatureScratch& scratch) const noexcept;
@@ -171,8 +171,9 @@ class CollPair {
   [[nodiscard]] double pointsOf(std::uint32_t levels) const noexcept;
   [[nodiscard]] bool nextLevelFits(const WorkLimits& limits, std::uint32_t budget) const noexcept;
   void store(const collision::PairQueryResult& query) noexcept;
-  /// Validates a list read from a checkpoint: indices in range.
+  /// Validates a contact read from a checkpoint: indices in range, crossings at pieces of edges.
   [[nodiscard]] bool isIndexValid(const collision::Contact& contact) const noexcept;
+  /// Validates a list read from a checkpoint.
   [[nodiscard]] bool isValid(const collision::IslandPairResult& list) const noexcept;
   /// Whole ticks in which `distance` [m] cannot be closed at `closing_speed` [m/s].
   [[nodiscard]] static Tick ticksToClose(double distance, double closing_speed) noexcept;
@@ -181,6 +182,7 @@ class CollPair {
   const structures::Pointshell* shell_A_ = nullptr;
   const structures::DistanceField* field_B_ = nullptr;
   collision::PairFeatures features_;
+  double slope_ = 1.0;  ///< [-] gaps change by at most this times a motion
   bool possible_ = false;
   bool enabled_ = true;
   bool queried_ = false;

@@ -10,7 +10,8 @@ namespace {
 /// and reach a second one.
 constexpr std::uint32_t kMaxHeldSteps = 4;
 
-/// [m/s] With that many of the longest steps a held body slides along others at this speed.
+/// [m/s] kMaxHeldSteps steps of SolveLimits::max_step_length give this speed, at which a held body slides
+/// along others.
 constexpr double kSlidingSpeed = 1.0;
 
 std::size_t listCount(const Scene& scene, const EnvironmentOptions& options) {

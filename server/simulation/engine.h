@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -55,6 +56,12 @@ struct Environment::Engine {
   /// `motion`: of the object's centre.
   void addPathLength(ObjectId object, const Displacement& motion) {
     path_lengths[object.value] += maxPointMotion(motion, sizes[object.value].radius);
+  }
+
+  /// [m] What two objects approach each other in this tick at most, whose points move by `travel_a` and
+  /// `travel_b` [m] at most: in an island each moves as far as the one that moves most.
+  [[nodiscard]] double largestApproach(double travel_a, double travel_b) const {
+    return std::min(travel_a, largest_reach) + std::min(travel_b, largest_reach);
   }
 
   /// Indices of the pairs of an object.
@@ -144,6 +151,10 @@ struct Environment::Engine {
   std::vector<collision::FeatureScratch> feature_scratch;  ///< by worker, for pairs in no island
   WorkerPool pool;
 };
+
+/// [-] A traversal may test the pair's budget divided by this: in one tick the solver may traverse again when
+/// a body moves far, resamples the listed points after each SQP step, and may reject a step.
+inline constexpr std::uint32_t kTraversalsPerTick = 3;
 
 /// [ticks] Contacts are listed for clients within the distance that their object moves in this time: the
 /// round trip of a LAN and a tick.

@@ -21,7 +21,6 @@ void gather(const collision::ContactList& contacts, std::size_t pair, Gathered& 
   std::array<std::uint32_t, kManifoldContacts> chosen{};
   const std::size_t count = collision::selectRepresentatives(contacts, chosen);
   for (std::size_t i = 0; i < count; ++i) {
-    if (contacts[chosen[i]].gap >= collision::kDormantGap) continue;
     if (!all.contacts.push_back(contacts[chosen[i]])) return;
     all.pair[all.contacts.size() - 1] = static_cast<std::uint16_t>(pair);
   }
@@ -153,17 +152,19 @@ void Environment::listContacts(ObjectId object, HandManifold& out) const noexcep
                                            objects_[object.value], held_is_a));
   }
 
-  // contacts that no listed one represents limit the validity of the manifold
+  // contacts that no listed one represents, and crossings that may come about, limit the manifold's validity
   for (const std::uint32_t i : engine_->near) {
     const CollPair& pair = engine_->pairs[i];
     if (!active(i) || (pair.spec().a != object && pair.spec().b != object)) continue;
     if (!pair.hasContacts()) continue;
     for (const collision::Contact& contact : pair.result()->query.contacts) {
-      const bool represented = std::any_of(
-          chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(count), [&](std::uint32_t one) {
-            return all.pair[one] == i && all.contacts[one].n_W.dot(contact.n_W) > kSameNormal;
-          });
-      if (!represented) out.validity_radius = std::min(out.validity_radius, std::max(contact.gap, 0.0));
+      const bool represented =
+          !contact.dormant() &&
+          std::any_of(chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(count),
+                      [&](std::uint32_t one) {
+                        return all.pair[one] == i && all.contacts[one].n_W.dot(contact.n_W) > kSameNormal;
+                      });
+      if (!represented) out.validity_radius = std::clamp(contact.gapBound(), 0.0, out.validity_radius);
     }
   }
 }

@@ -9,7 +9,7 @@ namespace tenon::simulation {
 namespace {
 
 /// Incremented with every change of the archived fields.
-constexpr std::uint32_t kStateVersion = 8;
+constexpr std::uint32_t kStateVersion = 9;
 
 template <typename Archive, typename Motion>
 void archiveObject(Archive& archive, Motion& object) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -53,14 +54,16 @@ struct ObjectSpec {
 
 /// Two objects that may collide: one entry of the collision filter (the paper's configuration matrix).
 struct PairSpec {
-  ObjectId a;             ///< pointshell side
-  ObjectId b;             ///< SDF side
-  double dilation = 0.0;  ///< [m] outward offset of b's surface
-  bool enabled = true;    ///< at the start
-  bool sensing = false;   ///< contacts are reported (vibrotactile forearm) but exert no force
+  ObjectId a;            ///< pointshell side
+  ObjectId b;            ///< SDF side
+  bool enabled = true;   ///< at the start
+  bool sensing = false;  ///< contacts are reported (vibrotactile forearm) but exert no force
   /// Friction of patches inside the island solver (island_friction.cpp), replaces BodySpec::friction in this
   /// pair; none: BodySpec::friction applies.
   std::optional<collision::Friction> friction;
+  /// [m] Of the dilation of a's field so much counts for features of b: a share of the clearance, if there is
+  /// one. That of b's field is what the bake made of the place.
+  double most_dilation_a = std::numeric_limits<double>::infinity();
 };
 
 enum class HandKind : std::uint8_t {

@@ -90,9 +90,9 @@ class StateArchive {
       visit(contact.n_W);
       visit(contact.gap);
       visit(contact.area);
-      visit(contact.point);
-      visit(contact.other);
       visit(contact.kind);
+      visit(contact.point);
+      if (contact.kind == collision::ContactKind::kCrossing) visit(contact.other);
       visit(result.multipliers[i]);
     }
     visit(result.query.complete_to);

@@ -10,6 +10,16 @@ namespace {
 /// [voxels] Quantisation error of a sample (half a quantum), rounded up.
 constexpr double kRounding = 1e-3;
 
+/// The value at `t` [-] between those of the corners of a unit cube, x fastest.
+double trilinear(const std::array<double, 8>& corners, const Vector3& t) {
+  std::array<double, 4> along_x{};
+  for (std::size_t k = 0; k < 4; ++k)
+    along_x[k] = corners[2 * k] * (1.0 - t.x()) + corners[2 * k + 1] * t.x();
+  const double low = along_x[0] * (1.0 - t.y()) + along_x[1] * t.y();
+  const double high = along_x[2] * (1.0 - t.y()) + along_x[3] * t.y();
+  return low * (1.0 - t.z()) + high * t.z();
+}
+
 double distanceToBox(const Eigen::AlignedBox3d& box, const Vector3& p) {
   const Vector3 outside = (box.min() - p).cwiseMax(p - box.max()).cwiseMax(0.0);
   return outside.norm();
@@ -19,6 +29,7 @@ double distanceToBox(const Eigen::AlignedBox3d& box, const Vector3& p) {
 
 /// The coarse brick that a point lies in, its index entry, and the point in it [bricks], in [0, 1].
 struct DistanceField::BrickLocation {
+  std::array<std::size_t, 3> brick{};
   std::size_t number = 0;
   Entry entry = kFarOutside;
   Vector3 p_brick = Vector3::Zero();
@@ -37,7 +48,7 @@ Eigen::AlignedBox3d DistanceField::box() const {
 
 bool DistanceField::locate(const Vector3& p_MP, BrickLocation& location) const noexcept {
   const Vector3 p = (p_MP - layout_.p_MoFo_M) * inverse_brick_edge_;
-  std::array<std::size_t, 3> brick{};
+  std::array<std::size_t, 3>& brick = location.brick;
   for (int axis = 0; axis < 3; ++axis) {
     // the comparison is false for NaN, which counts as outside
     if (!(p[axis] >= 0.0 && p[axis] < layout_.bricks[axis])) return false;
@@ -90,7 +101,7 @@ bool DistanceField::interpolate(Entry brick, const Vector3& p_brick, double voxe
 
 double DistanceField::farMagnitude(const BrickLocation& location) const noexcept {
   // in a brick without samples all lattice points are beyond the band
-  const double beyond_band = layout_.band - kHalfDiagonal * layout_.voxel;
+  const double beyond_band = layout_.band - layout_.dilation - kHalfDiagonal * layout_.voxel;
   const Vector3 p_CP = (location.p_brick - Vector3::Constant(0.5)) * brick_edge_;
   const double at_centre = std::abs(layout_.far[location.number]) * layout_.voxel / kFarPerVoxel;
   return std::max(beyond_band, at_centre - p_CP.norm());
@@ -132,13 +143,61 @@ FieldSample DistanceField::sample(const Vector3& p_MP) const noexcept {
   return sample;
 }
 
+FieldSample DistanceField::undilated(const Vector3& p_MP) const noexcept {
+  FieldSample sample = this->sample(p_MP);
+  sample.distance += dilationAt(p_MP);
+  return sample;
+}
+
+double DistanceField::dilationIn(std::size_t x, std::size_t y, std::size_t z,
+                                 const Vector3& p_brick) const noexcept {
+  const auto row = static_cast<std::size_t>(layout_.bricks[0]) + 1;
+  const std::size_t layer = row * (static_cast<std::size_t>(layout_.bricks[1]) + 1);
+  const float* low = layout_.dilations.data() + z * layer + y * row + x;
+  return trilinear({low[0], low[1], low[row], low[row + 1], low[layer], low[layer + 1], low[layer + row],
+                    low[layer + row + 1]},
+                   p_brick);
+}
+
+double DistanceField::dilationAt(const Vector3& p_MP) const noexcept {
+  BrickLocation location;
+  if (layout_.dilations.empty() || !locate(p_MP, location)) return 0.0;
+  return dilationIn(location.brick[0], location.brick[1], location.brick[2], location.p_brick);
+}
+
+double DistanceField::largestDilation(const Eigen::AlignedBox3d& box_M) const noexcept {
+  if (layout_.dilations.empty()) return 0.0;
+  const Vector3 low = ((box_M.min() - layout_.p_MoFo_M) * inverse_brick_edge_).cwiseMax(0.0);
+  const Vector3 high = ((box_M.max() - layout_.p_MoFo_M) * inverse_brick_edge_)
+                           .cwiseMin(Vector3(layout_.bricks[0], layout_.bricks[1], layout_.bricks[2]));
+  double largest = 0.0;
+  for (double z = std::floor(low.z()); z < high.z(); ++z) {
+    for (double y = std::floor(low.y()); y < high.y(); ++y) {
+      for (double x = std::floor(low.x()); x < high.x(); ++x) {
+        const double number = (z * layout_.bricks[1] + y) * layout_.bricks[0] + x;
+        if (layout_.index[static_cast<std::size_t>(number)] < 0) continue;
+        // a trilinear function is largest at a corner of the part of the box that is in the brick
+        for (unsigned corner = 0; corner < 8; ++corner) {
+          const Vector3 p(std::clamp((corner & 1U) != 0 ? high.x() - x : low.x() - x, 0.0, 1.0),
+                          std::clamp((corner & 2U) != 0 ? high.y() - y : low.y() - y, 0.0, 1.0),
+                          std::clamp((corner & 4U) != 0 ? high.z() - z : low.z() - z, 0.0, 1.0));
+          largest = std::max(largest, dilationIn(static_cast<std::size_t>(x), static_cast<std::size_t>(y),
+                                                 static_cast<std::size_t>(z), p));
+        }
+      }
+    }
+  }
+  return largest;
+}
+
 double DistanceField::lowerBound(const Vector3& p_MP, double radius) const noexcept {
-  // The distance is 1-Lipschitz: a sample is at least the value at a reference point minus the length between
-  // them. The interpolant is a weighted mean of the 8 samples about the point; the mean of their squared
-  // lengths exceeds the point's own squared length by at most 3/4 voxel^2.
+  // A sample is at least the value at a reference point minus the slope times the length between them. The
+  // interpolant is a weighted mean of the 8 samples about the point; the mean of their squared lengths
+  // exceeds the point's own squared length by at most 3/4 voxel^2.
   const auto bound = [this, radius](double value, double away) {
     const double spread = kHalfDiagonal * layout_.voxel;
-    return value - std::sqrt((away + radius) * (away + radius) + spread * spread) - kRounding * layout_.voxel;
+    return value - layout_.slope * std::sqrt((away + radius) * (away + radius) + spread * spread) -
+           kRounding * layout_.voxel;
   };
   BrickLocation location;
   if (!locate(p_MP, location)) return bound(distanceToBox(box(), p_MP) + layout_.margin, 0.0);
@@ -149,7 +208,7 @@ double DistanceField::lowerBound(const Vector3& p_MP, double radius) const noexc
   const double from_centre = bound(at_centre, p_CP.norm());
   if (location.entry != kFarOutside) return from_centre;
   // the lattice point nearest to p is beyond the band
-  return std::max(from_centre, bound(layout_.band, kHalfDiagonal * layout_.voxel));
+  return std::max(from_centre, bound(layout_.band - layout_.dilation, kHalfDiagonal * layout_.voxel));
 }
 
 double DistanceField::voxelAt(const Vector3& p_MP) const noexcept {

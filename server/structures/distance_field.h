@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -28,6 +29,10 @@ struct FieldSample {
 /// where these have none. A brick stores 9^3 int16 samples, one apron layer more than its voxels, so that
 /// interpolation needs one brick only. Samples are clamped to +-kClampVoxels. Frame M is the mesh's own.
 ///
+/// Where material is too thin for the voxels there, the samples are distances less a *dilation*: the zero
+/// level set lies that far outside of the exact surface, so that the wall stays solid between samples. The
+/// dilation belongs to the place, trilinear between the corners of coarse bricks; it is 0 at solids.
+///
 /// A non-owning view (of a mapped file or vectors) with a shared owner: cheap to copy.
 ///
 /// Threads: constant after construction, any thread may read. Real-time: all queries.
@@ -40,7 +45,8 @@ class DistanceField {
   static constexpr int kFarPerVoxel = 16;       // resolution of `Layout::far`
   /// [voxels] From a brick's centre to its corner, rounded up.
   static constexpr double kBrickRadius = 6.9283;
-  /// [voxels] |distance| up to which samples are exact.
+  /// [voxels] |distance| up to which samples are exact; where there is a dilation, outside up to this less
+  /// it.
   static constexpr double kBandVoxels = 4.0;
   /// [voxels] Samples are clamped here. A cell's corners are at most sqrt(3) voxels from any of its points:
   /// no corner is clamped where the distance is below kBandVoxels.
@@ -69,6 +75,8 @@ class DistanceField {
     std::int32_t refinement = 1;           ///< children of a refined brick along one edge
     double band = 0.0;                     ///< [m] |distance| up to which coarse samples are exact
     double margin = 0.0;                   ///< [m] least distance of the surface to the grid's border
+    double dilation = 0.0;                 ///< [m] the largest of `dilations`
+    double slope = 1.0;  ///< [-] samples differ by at most this times the length between them
     /// One entry per coarse brick, then refinement^3 + 1 for each refined brick.
     std::span<const Entry> index;
     /// kBrickSamples per brick [voxels of its level / kQuantaPerVoxel].
@@ -76,6 +84,9 @@ class DistanceField {
     /// One bound per coarse brick, for its centre [voxels / kFarPerVoxel]: a lower bound of the signed
     /// distance; for far-inside bricks minus a lower bound of the depth.
     std::span<const std::int16_t> far;
+    /// [m] Dilation at the corners of the coarse bricks (x fastest), one more along each axis than there are
+    /// bricks. Empty: none anywhere.
+    std::span<const float> dilations;
   };
 
   DistanceField() = default;
@@ -85,6 +96,18 @@ class DistanceField {
   /// Distance and gradient at a point: trilinear in the finest brick there. A point outside the band or the
   /// grid, or not finite, gives a sample that is not `exact`.
   [[nodiscard]] FieldSample sample(const Vector3& p_MP) const noexcept;
+
+  /// The same without the dilation: distances to the exact surface, as well as the voxels resolve them.
+  [[nodiscard]] FieldSample undilated(const Vector3& p_MP) const noexcept;
+
+  /// [m] Dilation at a point; 0 outside the grid.
+  [[nodiscard]] double dilationAt(const Vector3& p_MP) const noexcept;
+  /// [m] By how much the dilation at a point exceeds `most` [m].
+  [[nodiscard]] double dilationBeyond(double most, const Vector3& p_MP) const noexcept {
+    return most < layout_.dilation ? std::max(dilationAt(p_MP) - most, 0.0) : 0.0;
+  }
+  /// [m] Largest dilation in a box, of the bricks that have samples.
+  [[nodiscard]] double largestDilation(const Eigen::AlignedBox3d& box_M) const noexcept;
 
   /// [m] A lower bound of the signed distance, and of every exact sample(), within `radius` [m] of p. For
   /// pruning: one look-up.
@@ -96,6 +119,8 @@ class DistanceField {
   [[nodiscard]] const Layout& layout() const { return layout_; }
   [[nodiscard]] double voxel() const { return layout_.voxel; }
   [[nodiscard]] double band() const { return layout_.band; }
+  [[nodiscard]] double dilation() const { return layout_.dilation; }
+  [[nodiscard]] double slope() const { return layout_.slope; }
   [[nodiscard]] bool empty() const { return layout_.index.empty(); }
   [[nodiscard]] Eigen::AlignedBox3d box() const;
 
@@ -109,6 +134,9 @@ class DistanceField {
                                  FieldSample& sample) const noexcept;
   /// [m] A lower bound of |distance| in a brick without samples.
   [[nodiscard]] double farMagnitude(const BrickLocation& location) const noexcept;
+  /// [m] Dilation at `p_brick` [bricks] in the coarse brick with coordinates x, y, z.
+  [[nodiscard]] double dilationIn(std::size_t x, std::size_t y, std::size_t z,
+                                  const Vector3& p_brick) const noexcept;
 
   Layout layout_;
   double brick_edge_ = 0.0;          ///< [m]

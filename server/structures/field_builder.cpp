@@ -49,13 +49,24 @@ class BrickSampler {
 
 }  // namespace
 
+namespace {
+
+DistanceField::Layout layoutOf(const FieldStorage& storage) {
+  DistanceField::Layout layout = storage.layout;
+  layout.index = storage.index;
+  layout.samples = storage.samples;
+  layout.far = storage.far;
+  layout.dilations = storage.dilations;
+  return layout;
+}
+
+}  // namespace
+
+DistanceField viewOf(const FieldStorage& storage) { return {layoutOf(storage), nullptr}; }
+
 DistanceField makeField(FieldStorage storage) {
   const auto owner = std::make_shared<const FieldStorage>(std::move(storage));
-  DistanceField::Layout layout = owner->layout;
-  layout.index = owner->index;
-  layout.samples = owner->samples;
-  layout.far = owner->far;
-  return {layout, owner};
+  return {layoutOf(*owner), owner};
 }
 
 FieldStorage makeGrid(const Eigen::AlignedBox3d& surface_box_M, double voxel) {
@@ -76,9 +87,8 @@ FieldStorage makeGrid(const Eigen::AlignedBox3d& surface_box_M, double voxel) {
   return storage;
 }
 
-std::int16_t quantizedSample(double distance, double voxel) {
-  constexpr double kClamp = DistanceField::kClampVoxels;
-  const double voxels = std::clamp(distance / voxel, -kClamp, kClamp);
+std::int16_t quantizedSample(double distance, double voxel, double clamp) {
+  const double voxels = std::clamp(distance / voxel, -clamp, clamp);
   return static_cast<std::int16_t>(std::lround(voxels * DistanceField::kQuantaPerVoxel));
 }
 

@@ -16,17 +16,27 @@ struct FieldStorage {
   HugeVector<DistanceField::Entry> index;
   HugeVector<std::int16_t> samples;
   HugeVector<std::int16_t> far;
+  HugeVector<float> dilations;
 };
+
+/// A field on arrays that the caller keeps as they are while it is used.
+[[nodiscard]] DistanceField viewOf(const FieldStorage& storage);
 
 /// A field that owns the given arrays.
 [[nodiscard]] DistanceField makeField(FieldStorage storage);
+
+/// A field that owns the given arrays, with `dilations` [m] (see DistanceField::Layout) taken from its
+/// samples, which have none yet. A child of a refined brick whose samples do not reach that far is dropped:
+/// its coarse samples are used.
+[[nodiscard]] DistanceField makeDilatedField(FieldStorage storage, std::span<const float> dilations);
 
 /// A grid of far-outside bricks with edge `voxel` [m] around `surface_box_M`, with one brick of margin on
 /// every side.
 [[nodiscard]] FieldStorage makeGrid(const Eigen::AlignedBox3d& surface_box_M, double voxel);
 
-/// The stored form of `distance` [m]: quanta of `voxel` [m], clamped to +-kClampVoxels.
-[[nodiscard]] std::int16_t quantizedSample(double distance, double voxel);
+/// The stored form of `distance` [m]: quanta of `voxel` [m], clamped to +-`clamp` [voxels].
+[[nodiscard]] std::int16_t quantizedSample(double distance, double voxel,
+                                           double clamp = DistanceField::kClampVoxels);
 
 /// The stored form in `Layout::far` of `bound` [m] with `voxel` [m]: rounded down, or, for a far-inside brick
 /// (`inside_brick`), towards less depth.

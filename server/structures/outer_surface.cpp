@@ -66,11 +66,11 @@ class OuterSurfaceSplitter {
 
   /// Whether an empty ball above the point, on either side, reaches within kTouch of it.
   [[nodiscard]] bool isExposed(const Vector3& p, const Vector3& normal, double voxel) const {
-    const double here = field_.sample(p).distance;
+    const double here = field_.undilated(p).distance;
     if (here < -(kTouch + DistanceField::kHalfDiagonal) * voxel) return false;
     for (const double height : kHeights) {
       for (const double side : {height, -height}) {
-        const double radius = field_.sample(p + side * voxel * normal).distance;
+        const double radius = field_.undilated(p + side * voxel * normal).distance;
         if (radius > 0.0 && radius >= (height - kTouch) * voxel) return true;
       }
     }

@@ -71,6 +71,24 @@ bool tile(std::span<const ShellSphere> spheres, std::uint64_t first, std::uint64
   return next == first + count;
 }
 
+/// The dilations are of every brick's corners, or there are none.
+Problem problemOfDilations(const DistanceField::Layout& field) {
+  std::uint64_t corners = 1;
+  for (const std::int32_t count : field.bricks) corners *= static_cast<std::uint64_t>(count) + 1;
+  if (field.dilations.empty() ? field.dilation != 0.0 || field.slope != 1.0
+                              : field.dilations.size() != corners)
+    return "does not have one dilation for each corner of a brick";
+  // the largest that a bake gives is that of a sheet, 0.87 voxels
+  if (!(field.dilation >= 0.0 && field.dilation <= field.voxel) ||
+      !(field.slope >= 1.0 && field.slope <= 1.5))
+    return "has a largest dilation or a slope out of range";
+  const bool sound = std::all_of(field.dilations.begin(), field.dilations.end(), [&field](float dilation) {
+    return dilation >= 0.0F && static_cast<double>(dilation) <= field.dilation;
+  });
+  if (!sound) return "has a dilation out of range";
+  return {};
+}
+
 bool contains(const ShellSphere& sphere, std::span<const ShellPoint> points) {
   const Vector3 p_MC = sphere.p_MC.cast<double>();
   if (!plausible(p_MC) || !(sphere.radius >= 0.0F) || !std::isfinite(sphere.radius)) return false;
@@ -111,7 +129,7 @@ Problem problemOfLevels(const Pointshell::Layout& shell) {
 
 Problem problemOf(const DistanceField::Layout& field) {
   if (field.index.empty()) {
-    if (field.samples.empty() && field.far.empty()) return {};
+    if (field.samples.empty() && field.far.empty() && field.dilations.empty()) return {};
     return "has samples but no index";
   }
   const auto positive = [](double length) { return length > 0.0 && length <= kMaxCoordinate; };
@@ -135,6 +153,7 @@ Problem problemOf(const DistanceField::Layout& field) {
       field.index.size() > DistanceField::kMaxIndexEntries)
     return "has more bricks than queries can address (" + std::to_string(DistanceField::kMaxBricks) +
            " with samples, " + std::to_string(DistanceField::kMaxIndexEntries) + " in all)";
+  if (auto problem = problemOfDilations(field)) return problem;
   return IndexCheck(field).problem(coarse);
 }
 

@@ -22,7 +22,7 @@ namespace tenon::structures {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'T', 'E', 'N', 'O', 'N', 'H', 'S', '\n'};
-constexpr std::uint32_t kVersion = 5;
+constexpr std::uint32_t kVersion = 6;
 constexpr std::uint32_t kByteOrder = 0x01020304U;
 constexpr std::size_t kAlignment = 64;
 
@@ -39,6 +39,7 @@ enum FileSection : std::size_t {
   kContentHash,
   kNotes,
   kMeshes,
+  kDilations,
   kFeaturePoints,
   kFeatureLeaves,
   kFeatureClusters,
@@ -57,6 +58,7 @@ constexpr std::array<std::size_t, kSections> kElementBytes{sizeof(DistanceField:
                                                            1,
                                                            1,
                                                            1,
+                                                           sizeof(float),
                                                            sizeof(ShellPoint),
                                                            sizeof(ShellSphere),
                                                            sizeof(ShellSphere),
@@ -70,12 +72,12 @@ struct FileHeader {
   std::uint64_t file_bytes = 0;
   std::uint64_t checksum = 0;  ///< XXH64 of the whole file with this field 0
   std::array<double, 3> p_MoFo_M{};
-  double voxel = 0.0, band = 0.0, margin = 0.0;
+  double voxel = 0.0, band = 0.0, margin = 0.0, dilation = 0.0, slope = 1.0;
   std::array<std::int32_t, 3> bricks{};
   std::int32_t refinement = 1;
   std::array<std::uint64_t, kSections> first{}, count{};
   std::uint64_t triangles = 0, info_bricks = 0;
-  double bake_seconds = 0.0, surface_area = 0.0, unit = 1.0;
+  double bake_seconds = 0.0, surface_area = 0.0, thin_area = 0.0, open_area = 0.0, unit = 1.0;
   std::array<double, 6> box_M{};
 };
 static_assert(std::is_trivially_copyable_v<FileHeader>);
@@ -127,6 +129,7 @@ std::array<std::span<const std::byte>, kSections> sectionsOf(const HapticStructu
           bytes(info.content_hash),
           bytes(info.notes),
           bytes(meshes),
+          bytes(field.dilations),
           bytes(features.points()),
           bytes(features.leaves()),
           bytes(features.clusters()),
@@ -142,12 +145,16 @@ FileHeader headerOf(const HapticStructures& structures) {
   header.voxel = field.voxel;
   header.band = field.band;
   header.margin = field.margin;
+  header.dilation = field.dilation;
+  header.slope = field.slope;
   header.bricks = field.bricks;
   header.refinement = field.refinement;
   header.triangles = info.triangles;
   header.info_bricks = info.bricks;
   header.bake_seconds = info.bake_seconds;
   header.surface_area = info.surface_area;
+  header.thin_area = info.thin_area;
+  header.open_area = info.open_area;
   header.unit = info.unit;
   Vector3::Map(header.box_M.data()) = info.box_M.min();
   Vector3::Map(header.box_M.data() + 3) = info.box_M.max();
@@ -222,7 +229,8 @@ bool sectionsFit(const FileHeader& header) {
 
 bool infoIsFinite(const FileHeader& header) {
   const auto finite = [](double number) { return std::isfinite(number); };
-  return finite(header.bake_seconds) && finite(header.surface_area) && finite(header.unit) &&
+  return finite(header.bake_seconds) && finite(header.surface_area) && finite(header.thin_area) &&
+         finite(header.open_area) && finite(header.unit) &&
          std::all_of(header.box_M.begin(), header.box_M.end(), finite);
 }
 
@@ -308,11 +316,14 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
   field.layout.voxel = header->voxel;
   field.layout.band = header->band;
   field.layout.margin = header->margin;
+  field.layout.dilation = header->dilation;
+  field.layout.slope = header->slope;
   field.layout.bricks = header->bricks;
   field.layout.refinement = header->refinement;
   copySection(bytes, *header, kIndex, field.index);
   copySection(bytes, *header, kSamples, field.samples);
   copySection(bytes, *header, kFar, field.far);
+  copySection(bytes, *header, kDilations, field.dilations);
   ShellStorage shell;
   copySection(bytes, *header, kPoints, shell.points);
   copySection(bytes, *header, kLeaves, shell.leaves);
@@ -346,6 +357,8 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
   info.bricks = header->info_bricks;
   info.bake_seconds = header->bake_seconds;
   info.surface_area = header->surface_area;
+  info.thin_area = header->thin_area;
+  info.open_area = header->open_area;
   info.unit = header->unit;
   info.box_M = {Vector3::Map(header->box_M.data()), Vector3::Map(header->box_M.data() + 3)};
   return structures;

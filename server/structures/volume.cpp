@@ -24,7 +24,7 @@ void addBrick(const DistanceField& field, const Vector3& corner, const Vector3& 
     for (int y = 0; y < DistanceField::kBrickVoxels; ++y) {
       for (int x = 0; x < DistanceField::kBrickVoxels; ++x) {
         const Vector3 p_MP = corner + h * Vector3(x + 0.5, y + 0.5, z + 0.5);
-        const double fraction = std::clamp(0.5 - field.sample(p_MP).distance / h, 0.0, 1.0);
+        const double fraction = std::clamp(0.5 - field.undilated(p_MP).distance / h, 0.0, 1.0);
         if (fraction > 0.0) sum.add(fraction, p_MP - p_MR);
       }
     }

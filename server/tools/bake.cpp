@@ -135,6 +135,13 @@ void printInfo(const structures::HapticStructures& structures) {
   if (layout.refinement > 1) {
     fmt::print("              refined bricks have {} voxels\n", readable(layout.voxel / layout.refinement));
   }
+  if (info.thin_area > 0.0) {
+    fmt::print(
+        "thin walls    {:.4g} m^2 are thinner than their voxels resolve: solid, up to {} thicker; {:.3g} % "
+        "of the\n"
+        "              surface is open\n",
+        info.thin_area, readable(layout.dilation), 100.0 * info.open_area / info.surface_area);
+  }
   fmt::print("shell         {} points on {:.4g} m^2, {} leaves, {} clusters, radius {}\n",
              structures.shell.points().size(), info.surface_area, structures.shell.leaves().size(),
              structures.shell.clusters().size(), readable(structures.shell.boundingRadius()));

@@ -27,8 +27,7 @@ constexpr int kWrongUsage = 2;
 
 struct CheckArguments {
   std::string scenario;
-  std::string device = "hug-sim";
-  std::string instructor_device = "sigma7-sim";
+  check::CheckOptions check;
   session::LoadOptions load{.cache = session::defaultCache()};
   bool json = false;
   bool quiet = false;
@@ -111,16 +110,7 @@ void printTable(const CheckArguments& arguments, const CheckReport& report) {
 }
 
 int run(const CheckArguments& arguments) {
-  check::CheckOptions options;
-  for (auto [name, range] : {std::pair(&arguments.device, &options.trainee),
-                             std::pair(&arguments.instructor_device, &options.instructor)}) {
-    const auto caps = devices::capsOf(*name);
-    if (!caps) {
-      fmt::print(stderr, "tenon check: {}\n", caps.error().what);
-      return kFound;
-    }
-    *range = {*name, caps->rotation_range};
-  }
+  check::CheckOptions options = arguments.check;
   if (!arguments.quiet) options.progress = session::showOnTerminal;
   const CheckReport report = checkScenario(arguments, options);
   arguments.json ? printJson(arguments, report) : printTable(arguments, report);
@@ -144,13 +134,15 @@ int main(int argc, char** argv) {
   app.set_help_flag("-h,--help", "print this help");
   app.add_option("scenario", arguments.scenario, "a scenario's folder or YAML file")->required();
   app.add_flag("--json", arguments.json, "one JSON object: lengths in metres, angles in radians");
-  app.add_option("--device", arguments.device, "of the trainee's hands, for its range of turning")
+  app.add_option("--device", arguments.check.trainee_device,
+                 "of the trainee's hands, for its range of turning")
       ->check(known)
       ->capture_default_str();
-  app.add_option("--instructor-device", arguments.instructor_device, "of the instructor's hand, likewise")
+  app.add_option("--instructor-device", arguments.check.instructor_device,
+                 "of the instructor's hand, likewise")
       ->check(known)
       ->capture_default_str();
-  app.add_option("--detail", arguments.load.detail, "level of detail of generated parts, 0 to 1")
+  app.add_option("--detail", arguments.load.detail, "mesh resolution of generated parts, 0 to 1; 1: that of the paper")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--cache", arguments.load.cache, "folder for generated parts and haptic structures");

@@ -27,7 +27,7 @@ int run(const std::string& file, bool interpolated) {
     if (!*more) return 0;
     const Vector3 p_MP = Vector3::Map(lines.numbers().data());
     const structures::FieldSample sample =
-        interpolated ? field.sample(p_MP) : collision::correctedSample(field, p_MP);
+        interpolated ? field.undilated(p_MP) : collision::correctedSample(field, p_MP);
     if (!sample.exact) {
       fmt::print("far\n");
       continue;

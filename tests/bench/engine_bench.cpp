@@ -25,7 +25,7 @@ const test::StructuresPtr& box() {
 }
 
 const test::StructuresPtr& corner() {
-  static const test::StructuresPtr structures = test::cornerStructures(0.6, 0.003);
+  static const test::StructuresPtr structures = test::dilated(test::cornerStructures(0.6, 0.003), 0.0027);
   return structures;
 }
 
@@ -41,7 +41,7 @@ std::vector<Pose> posePath(double height) {
 }
 
 collision::PairQuery queryAt(const Pose& X_WA) {
-  return {&box()->shell, &corner()->field, X_WA, Pose(), 0.0027, 0.001};
+  return {&box()->shell, &corner()->field, X_WA, Pose(), 0.001};
 }
 
 /// A query with the kernels of one instruction set.
@@ -141,7 +141,6 @@ void Tick(benchmark::State& state, const Pose& X_WH, double speed) {
   pairs[0].body_a = 0;
   pairs[0].shell_A = &box()->shell;
   pairs[0].field_B = &corner()->field;
-  pairs[0].dilation = 0.0027;
   std::vector<collision::IslandPairResult> results(1);
   results[0].multipliers.resize(collision::kMaxPairContacts);
   pairs[0].last = &results[0];

@@ -156,6 +156,26 @@ StructuresPtr sheetStructures(double edge, double thickness, double voxel, doubl
   return analyticStructures(boxAt(centre, size), boxAbout(centre, size), voxel);
 }
 
+structures::DistanceField dilated(const structures::DistanceField& field, double dilation) {
+  const structures::DistanceField::Layout& layout = field.layout();
+  structures::FieldStorage storage{layout,
+                                   {layout.index.begin(), layout.index.end()},
+                                   {layout.samples.begin(), layout.samples.end()},
+                                   {layout.far.begin(), layout.far.end()},
+                                   {}};
+  std::size_t corners = 1;
+  for (const std::int32_t count : layout.bricks) corners *= static_cast<std::size_t>(count) + 1;
+  return structures::makeDilatedField(std::move(storage),
+                                      std::vector<float>(corners, static_cast<float>(dilation)));
+}
+
+StructuresPtr dilated(const StructuresPtr& structures, double dilation) {
+  if (dilation == 0.0) return structures;
+  auto result = std::make_shared<structures::HapticStructures>(*structures);
+  result->field = dilated(structures->field, dilation);
+  return result;
+}
+
 StructuresPtr socketStructures(const Vector3& hole, double wall, double voxel, double rim_spacing) {
   const Vector3 size(hole.x() + 2.0 * wall, hole.y() + 2.0 * wall, hole.z() + wall);
   const Vector3 centre(0.0, 0.0, -0.5 * size.z());

@@ -51,6 +51,11 @@ using StructuresPtr = std::shared_ptr<const structures::HapticStructures>;
 /// A square sheet of `edge` [m] and `thickness` [m] across z, centred at z = `offset` [m], with `voxel` [m].
 /// Thickness 0 has no inside. Field only.
 [[nodiscard]] StructuresPtr sheetStructures(double edge, double thickness, double voxel, double offset = 0.0);
+/// The same with its surface moved outwards by `dilation` [m] everywhere, as the bake does it where walls are
+/// thin.
+[[nodiscard]] StructuresPtr dilated(const StructuresPtr& structures, double dilation);
+[[nodiscard]] structures::DistanceField dilated(const structures::DistanceField& field, double dilation);
+
 /// A block with a rectangular hole of size `hole` down from z = 0, open above, and `wall` [m] of material
 /// around and below it, with `voxel` [m]. Its pointshell is the hole's rim, with `rim_spacing` [m] of points:
 /// as pointshell side against a peg's field it keeps the rim out of the peg's sides between the peg's points.

@@ -19,14 +19,13 @@ void ContactErrors::add(const collision::PairQuery& query, const collision::Pair
   Vector3 force_B = Vector3::Zero();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vector3 p_BP = X_BA * points[i].p_MP.cast<double>();
-    if (query.field_B->lowerBound(p_BP) > kNear + query.dilation) continue;
+    if (query.field_B->lowerBound(p_BP) > kNear) continue;
     const auto nearest = truth_B.nearest(p_BP);
     const double distance = (truth_B.inside(p_BP) ? -1.0 : 1.0) * nearest.distance;
-    const double gap = distance - query.dilation;
+    const double gap = distance - query.field_B->dilationAt(p_BP);
     if (gap < 0.0) {
       ++points_inside_;
-      const double reported_gap =
-          listed[i] == kNotListed ? query.field_B->sample(p_BP).distance - query.dilation : listed[i];
+      const double reported_gap = listed[i] == kNotListed ? query.field_B->sample(p_BP).distance : listed[i];
       if (reported_gap > 0.0) ++missed_;
       // along the outward gradient of the distance
       if (distance != 0.0)

@@ -5,7 +5,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from stage import SOURCE, tenon
+from stage import COARSE, SOURCE, tenon
 
 # A block of 60 x 60 x 40 mm with a hole of 20 x 20 x 30 mm down from z = 0, a peg of 19 x 19 x 50 mm whose origin is in the
 # middle of its lower end, and a lid.
@@ -108,7 +108,7 @@ class PlantedMistakes(CheckCase):
         findings = self.check(1, voxel="2 mm", pairs="", lid="[200 mm, 0, 51 mm]",
                               turn="turn: {axis: z, deg: 180}, ")
         missing = self.only(findings, "clearance", "block")
-        self.assertEqual(missing["severity"], "error")
+        self.assertEqual(missing["severity"], "warning", "voxels of a solid leave room, but it may jam")
         self.assertAlmostEqual(missing["value"], 0.001, delta=0.1e-3)
         self.assertIn("no clearance is stated", missing["text"])
         self.assertRegex(missing["hint"], r"below pairs: \{between: \[peg, block\], clearance: (1|1\.0\d|0\.9\d+) mm\}")
@@ -158,7 +158,7 @@ class PlantedMistakes(CheckCase):
         reach = self.only(self.check(1, start="[200, 0, 0]"), "reach")
         self.assertAlmostEqual(reach["value"], 200, delta=0.1)
         self.assertEqual(reach["object"], "peg")
-        load = self.only(self.check(1, pairs="pairs:\n  - {between: [peg, block], clearance: 0.5 mm}"), "load")
+        load = self.only(self.check(1, pairs="pairs:\n  - {between: [peg, block], clearance: 0.15 mm}"), "load")
         self.assertIn("smaller than the field of 'block' can resolve", load["text"])
         self.assertIn("or refinement 8", load["text"])
 
@@ -175,7 +175,7 @@ class Shipped(unittest.TestCase):
     def test_the_shipped_scenarios_are_clean(self):
         for name in ("peg_and_box", "stacking", "engine_bay"):
             with self.subTest(scenario=name):
-                done = tenon("check", SOURCE / "scenarios" / name, "--detail", 0.12)
+                done = tenon("check", SOURCE / "scenarios" / name, *COARSE)
                 self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
                 self.assertRegex(done.stdout.splitlines()[-1], r"^0 errors, 0 warnings, \d+ notes?$")
 

@@ -50,6 +50,8 @@ class Commands(unittest.TestCase):
             self.assert_refused(stage, "ask the instructor", "clear", "--role", "trainee")
             self.assert_accepted(stage, "clear")
             trainee.wait_for("emergency stop cleared", 30)
+            server.wait_for("run: paused", 30)
+            self.assert_accepted(stage, "resume")
             server.wait_for("everything is mounted", 240)
 
     def test_keys_do_the_same_in_lockstep(self):
@@ -58,7 +60,7 @@ class Commands(unittest.TestCase):
             stage.start("trainee", "--seed", 1)
             server.wait_for("run: running", 60)
             keys = subprocess.run([PROGRAMS / "tenon-command", "--keys", "--session", stage.session, "--domain",
-                                   str(stage.domain)], input="?pprxe", capture_output=True, text=True, timeout=120)
+                                   str(stage.domain)], input="?pprxey", capture_output=True, text=True, timeout=120)
             self.assertEqual(keys.returncode, 0, keys.stderr)
             self.assertIn("emergency stop", keys.stdout, "the legend lists every key")
             for line in ("pause: accepted", "pause: refused: the session is paused already", "resume: accepted",

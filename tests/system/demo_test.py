@@ -13,7 +13,7 @@ import time
 import unittest
 from pathlib import Path
 
-from stage import PROGRAMS, SOURCE, TENON, final_hash, free_domain, tenon
+from stage import COARSE, PROGRAMS, SOURCE, TENON, final_hash, free_domain, tenon
 
 sys.path.insert(0, str(SOURCE / "deploy"))
 from demo import output_folder  # noqa: E402
@@ -56,7 +56,7 @@ class DemoCase(unittest.TestCase):
         self.folder, self.domain = Path(folder.name), free_domain()
 
     def words(self, *more):
-        return ["demo", "--headless", "--domain", self.domain, "--out", self.folder / "out", *more]
+        return ["demo", *COARSE, "--headless", "--domain", self.domain, "--out", self.folder / "out", *more]
 
     def left_running(self):
         """The programs of this demo: process id -> command line."""
@@ -145,7 +145,7 @@ class Lockstep(DemoCase):
 class LockstepNightly(DemoCase):
     def test_the_recording_of_the_engine_bay_is_complete(self):
         engine_bay = SOURCE / "scenarios" / "engine_bay"
-        done = tenon(*self.words("--scenario", engine_bay, "--detail", 0.12, "--lockstep"), timeout=1700)
+        done = tenon(*self.words("--scenario", engine_bay, "--lockstep"), timeout=1700)
         self.assertEqual(done.returncode, 0, done.stdout[-3000:] + done.stderr)
         self.assert_recorded_as_published(engine_bay, self.folder / "out", manifolds_a_tick=5)
 

@@ -9,8 +9,7 @@ from pathlib import Path
 from stage import final_hash, tenon
 
 STIFFNESS = 1000.0  # [N/m] default of a hand
-DILATION = 0.5e-3  # [m] of part and plate, below
-REST = 0.02 + DILATION  # [m] height of the part's centre when it lies on the plate
+REST = 0.02  # [m] height of the part's centre when it lies on the plate
 ABOVE = (0, 0, 0, 0.05, 1, 0, 0, 0)
 
 # the plate's top is at z = 10 mm; part and tool are cubes of 20 mm
@@ -23,12 +22,10 @@ objects:
 hands:
   - {name: right, object: pointer}
   - {name: left, object: tool}
-pairs:
-  - {between: [part, plate], dilation: 0.5 mm}
 """
 STATES = """
 states:
-  - {name: place, object: part, target: {at: [0, 0, 20.5 mm], within: 1 mm, dwell: 50 ms}}
+  - {name: place, object: part, target: {at: [0, 0, 20 mm], within: 1 mm, dwell: 50 ms}}
 """
 
 
@@ -76,7 +73,7 @@ class Forces(Scripted):
             sign = 1 if pair["a"] == "part" else -1
             self.assertAlmostEqual(pair["F_Ao_W"][2], sign * force, delta=0.01 * force)
             self.assertAlmostEqual(pair["gap"], 0, delta=2e-5)
-            self.assertAlmostEqual(pair["depth"], 0, delta=1e-9, msg="the dilation keeps the part outside of the plate")
+            self.assertAlmostEqual(pair["depth"], 0, delta=2e-5)
 
     def test_an_object_that_is_taken_starts_at_the_first_row_with_its_frame_at_the_hands(self):
         turned = (0.8, 0, 0.6, 0)
@@ -88,8 +85,17 @@ class Forces(Scripted):
             self.assertAlmostEqual(math.hypot(*tick["hands"]["right"]["F_Ho_W"]), 0, delta=1e-6)
             self.assertEqual(tick["objects"]["pointer"]["status"], "hidden")
 
+    def test_the_frame_of_an_object_that_is_taken_is_the_hands_wherever_its_mesh_is(self):
+        text = SCENE.replace("name: part, meshes: [{box: [20 mm, 20 mm, 20 mm]", "name: part, meshes: [{box: [20 mm, 20 mm, 20 mm], at: [50 mm, 0, 0]")
+        self.assertNotEqual(text, SCENE)
+        self.scene.write_text("title: Press" + text, encoding="utf-8")
+        ticks, _ = self.logged("--input", f"right={self.file('still.csv', (0, 0.1, 0.2, 0.3, 1, 0, 0, 0))}", "--take", "right=part",
+                               "--seconds", 0.05)
+        self.assertEqual(ticks[0]["objects"]["part"]["X_WO"][:3], [0.1, 0.2, 0.3])
+        self.assertEqual(ticks[-1]["hands"]["right"]["F_Ho_W"], [0, 0, 0, 0, 0, 0])
+
     def test_a_hand_moves_its_own_object_and_an_absent_hand_moves_none(self):
-        self.scene.write_text("title: Press" + SCENE[:SCENE.index("pairs:")], encoding="utf-8")  # nobody moves the part
+        self.scene.write_text("title: Press" + SCENE, encoding="utf-8")  # nobody moves the part
         ticks, _ = self.logged("--input", f"left={self.file('tool.csv', (0, 0.2, 0, 0.3, 1, 0, 0, 0))}", "--seconds", 0.05)
         self.assertEqual(list(ticks[-1]["hands"]), ["left"])
         self.assertEqual(ticks[-1]["hands"]["left"]["object"], "tool")
@@ -103,8 +109,7 @@ class Forces(Scripted):
                                "--seconds", 0.6)
         right, left = (ticks[-1]["hands"][hand] for hand in ("right", "left"))
         self.assertAlmostEqual(right["F_Ho_W"][2], STIFFNESS * (REST - 0.015), delta=0.01 * STIFFNESS * (REST - 0.015))
-        # the pair of tool and plate has the dilation of its voxels
-        force = STIFFNESS * (0.02 + 0.87 * 2e-3 - 0.012)
+        force = STIFFNESS * (REST - 0.012)
         self.assertAlmostEqual(left["F_Ho_W"][2], force, delta=0.01 * force)
 
 
@@ -177,7 +182,7 @@ class States(Scripted):
         self.assertIn("running after 0.050 s", done.stdout)
 
     def test_people_need_states_and_pairs_of_what_their_states_move(self):
-        self.scene.write_text("title: Press" + SCENE, encoding="utf-8")
+        self.scene.write_text("title: Press" + SCENE + "pairs:\n  - {between: [part, plate]}\n", encoding="utf-8")
         done = self.rehearse()
         self.assertEqual(done.returncode, 1)
         self.assertIn("never collide", done.stderr)

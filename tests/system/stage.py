@@ -19,6 +19,13 @@ TENON = SOURCE / "tenon"
 # ctest names a cache of its build folder; a script that is started by hand uses one of its user
 os.environ.setdefault("TENON_CACHE", str(Path(tempfile.gettempdir()) / f"tenon-test-cache-{os.getuid()}"))
 
+# the key of the sessions and what a server keeps of an emergency stop, apart from the user's
+state_folder = tempfile.TemporaryDirectory(prefix="tenon-state-")
+os.environ["XDG_STATE_HOME"] = os.environ["XDG_RUNTIME_DIR"] = state_folder.name
+
+# the shipped scenarios' parts, coarser than by default: they are baked in less time
+COARSE = ["--detail", "0.12"]
+
 claimed_domains = []  # locked files, until this process ends
 
 
@@ -53,10 +60,11 @@ def final_hash(text):
 class Process:
     """A running program and its output."""
 
-    def __init__(self, name, arguments, log):
+    def __init__(self, name, arguments, log, env=None):
         self.name, self.log, self.lines = name, log, []
         self.popen = subprocess.Popen([PROGRAMS / f"tenon-{name}", *map(str, arguments)], stdout=subprocess.PIPE,
-                                      stderr=subprocess.STDOUT, text=True)
+                                      stdin=subprocess.DEVNULL, stderr=subprocess.STDOUT, text=True,
+                                      env={**os.environ, **(env or {})})
         self.changed = threading.Condition()
         threading.Thread(target=self.listen, daemon=True).start()
 
@@ -122,7 +130,7 @@ class Stage:
 
     def start(self, name, *arguments):
         common = ["--session", self.session, "--domain", self.domain] + (["--lockstep"] if self.lockstep else [])
-        process = Process(name, [*arguments, *common], self.out)
+        process = Process(name, [*arguments, *common, *(COARSE if name == "serve" else [])], self.out)
         self.processes.append(process)
         return process
 

@@ -19,7 +19,8 @@ enum class CommandKind : std::uint32_t {
   kSwapHands,     ///< the trainee's two coupled hands exchange their objects
   kSetCollision,  ///< text "a b": names of the pair; value 0: off, 1: on
   kStop,
-  kClearEmergencyStop,  ///< needs instructor rights; an EmergencyStop sample does not clear it
+  kClearEmergencyStop,  ///< clears every raise of the emergency stop that the server knows of; the run is
+                        ///< paused then
 };
 
 /// A client's request to the session, acknowledged by a CommandAck with the same id.

@@ -33,6 +33,14 @@ struct HandPull {
 
 inline constexpr int kOtherPulls = 2;
 
+/// A body that a hand's object touches.
+struct ManifoldBody {
+  ObjectId object;
+  std::uint32_t epoch = 0;  ///< of that body: increased with every jump of its pose
+};
+
+inline constexpr int kManifoldBodies = 4;
+
 /// All contacts of the object that one hand holds, with what its station needs to render their force locally.
 struct HandManifold {
   HandId hand;
@@ -52,6 +60,9 @@ struct HandManifold {
   bool frozen = false;  ///< the object is held still: stale input, pause or emergency stop
   FixedVector<HandPull, kOtherPulls> others;  ///< other hands that hold the object, by HandId
   FixedVector<ManifoldContact, kManifoldContacts> contacts;
+  /// Reserved, empty: the moving bodies of `contacts`, so that a station knows of their jumps as it does by
+  /// object_epoch of the held object's
+  FixedVector<ManifoldBody, kManifoldBodies> bodies;
 };
 
 /// Contact state of a collision pair.
@@ -63,7 +74,7 @@ struct PairContact {
   std::uint32_t contacts = 0;      ///< listed points that touch
   Wrench F_Ao_W;                   ///< wrench of b on a, about a's origin
   Vector3 p_WP = Vector3::Zero();  ///< [m] mean of the contact points
-  double depth = 0.0;         ///< [m] penetration depth of the deepest point, without dilation, 0 when apart
+  double depth = 0.0;         ///< [m] penetration depth of the deepest point in the field, 0 when apart
   double gap = 0.0;           ///< [m] smallest signed gap to the dilated surface
   double load_percent = 0.0;  ///< [%] computational load (paper eq. 2)
   double peak_force = 0.0;    ///< [N] since the last sample of this topic

@@ -26,11 +26,10 @@ struct DeviceInput {
   HandId hand;
   ClientId client;
   std::uint32_t server_epoch = 0;
-  Tick heard_tick = 0;  ///< newest server tick the client had received
-  std::uint32_t dof_mask = kAllDofs;
-  bool active = false;                  ///< false: fault, stop or disarmed; the server holds the object still
-  Vector3 p_WC = Vector3::Zero();       ///< [m] C_w, centre of the client's workspace (paper eq. 1)
-  std::array<DeviceSample, 4> samples;  ///< newest first; the older three are repeated in case they were lost
+  bool active = false;  ///< false: fault, stop or disarmed; the server holds the object still
+  DeviceSample sample;
+  /// [m] C_w, centre of the client's workspace (paper eq. 1). Reserved: the server does not read it yet
+  Vector3 p_WC = Vector3::Zero();
 };
 
 /// What a station displays to one hand, for observers and recordings.

@@ -49,8 +49,7 @@ struct SceneObject {
   ObjectId object;
   std::string name;
   std::string title;
-  std::string kind;       ///< how a display draws it: part, tool, pointer, assistant, forearm, head, scene
-  std::string mesh_hash;  ///< of the display mesh, empty for none
+  std::string kind;  ///< how a display draws it: part, tool, pointer, assistant, forearm, head, scene
   std::string structure_hash;        ///< of the haptic structures, empty for none
   std::string color;                 ///< `#rrggbb` or `#rrggbbaa`
   Pose X_WO;                         ///< initial pose

@@ -30,10 +30,20 @@ struct RecorderStatus {
   std::string problem;         ///< why it does not record; or empty
 };
 
-/// Latched: stays engaged when its writer leaves.
+/// One raise of the emergency stop, by any client, directly to every device and to the server. It stands
+/// until an EmergencyClear names it (StopTruth), whoever leaves meanwhile; no two raises have equal keys.
 struct EmergencyStop {
-  bool engaged = false;
+  std::string client_guid;    ///< of the raiser: random, chosen by it at its start
+  std::uint32_t counter = 0;  ///< of its raises, from 1
   std::string who;
+  std::string reason;
+};
+
+/// The end of one raise, by the server alone.
+struct EmergencyClear {
+  std::string client_guid;    ///< of the raise
+  std::uint32_t counter = 0;  ///< of the raise
+  std::string who;            ///< cleared it
   std::string reason;
 };
 

@@ -10,40 +10,51 @@
 /// Joining a session and leaving it.
 namespace tenon {
 
-inline constexpr std::uint32_t kProtocolVersion = 2;
+inline constexpr std::uint32_t kProtocolVersion = 3;
 
 /// Published by each server in the lobby partition: the session it runs.
 struct SessionAnnounce {
-  std::string session;  ///< its name, by which clients choose it
-  std::string title;    ///< of the scenario
+  std::string session;             ///< its name, by which clients choose it
+  std::uint32_t server_epoch = 0;  ///< larger at each start of a server; one life of a server is one instance
+  std::string title;               ///< of the scenario
   std::uint32_t protocol_version = kProtocolVersion;
-  std::uint32_t server_epoch = 0;  ///< larger at each start of a server
   bool lockstep = false;
-  std::uint32_t asset_port = 0;         ///< reserved, 0
-  std::string scenario_hash;            ///< of the scenario's text, for recordings
-  std::vector<std::string> free_hands;  ///< names of hands that no client controls
+  std::string scenario_hash;  ///< of the scenario's text, for recordings
+  std::string host;           ///< name of the machine that the server runs on
+  std::uint32_t pid = 0;      ///< of the server's process there
+  std::string scene_hash;     ///< reserved: of all meshes and structures that displays and stations load
 };
 
-/// A client's request for a seat in the session, in the lobby partition; repeated until it is answered.
+/// A client's request for a seat in the session, in the lobby partition; repeated until it is answered. A
+/// server hears only what names its session and its epoch.
+///
+/// What it has to prove (idl/wire/identity.h) it proves in answer to the challenge of a Welcome, so that no
+/// secret is on the bus: that it is the owner of a seat that was given away before, and that it has the key
+/// of the session, for a role that needs it.
 struct Join {
   std::string client_guid;  ///< random, chosen by the client; identifies it until it has a ClientId
-  std::string name;         ///< of the person or station, for display
+  std::string session;
+  std::uint32_t server_epoch = 0;
+  std::string name;  ///< of the person or station, for display
   Role role = Role::kObserver;
   std::vector<std::string> hands;  ///< names of the scenario's hands it wants to control
-  std::string token;               ///< of an earlier Welcome, to get the same ClientId again; or empty
+  std::string seat_key;            ///< public key of the seat; of an earlier seat to get its ClientId again
+  std::string seat_proof;          ///< of the secret that belongs to seat_key; empty before a challenge
+  std::string key_proof;           ///< of the session's key; empty before a challenge
   std::uint32_t protocol_version = kProtocolVersion;
 };
 
 /// The server's answer to a Join, and later the notice that a client has lost its seat.
 struct Welcome {
   std::string client_guid;  ///< of the Join
+  std::string session;
+  std::uint32_t server_epoch = 0;
   bool accepted = false;
   std::string reason;         ///< of the refusal; empty when accepted
+  std::string challenge;      ///< of a refusal: what the proofs of the next Join have to answer; or empty
   ClientId client;            ///< valid though not accepted: this client has lost its seat
   std::vector<HandId> hands;  ///< in the order of Join::hands; invalid for one the scenario does not have
-  std::string token;          ///< secret: whoever has it may take the seat again
-  std::uint32_t server_epoch = 0;
-  Tick tick = 0;  ///< newest of the server; in lockstep the first input is for the next one
+  Tick tick = 0;              ///< newest of the server; in lockstep the first input is for the next one
   bool lockstep = false;
 };
 

@@ -58,10 +58,7 @@ test::SolidUnion solidsIn(const part_generator::PartMesh& part, const Eigen::Ali
 collision::PairQuery tickQuery(const simulation::Scene& scene, const simulation::PairSpec& pair,
                                const Pose& X_WA, const Pose& X_WB, double margin) {
   collision::PairQuery query{&scene.objects[pair.a.value].structures->shell,
-                             &scene.objects[pair.b.value].structures->field,
-                             X_WA,
-                             X_WB,
-                             pair.dilation,
+                             &scene.objects[pair.b.value].structures->field, X_WA, X_WB,
                              std::max(margin, kMarginAtRest)};
   query.reduce = true;
   return query;
@@ -126,7 +123,8 @@ Result<BenchPair> makePair(const session::LoadedScene& loaded, double detail,
   region.max().array() += kRegionMargin;
   pair.truth = solidsIn(*bay_part, region);
   progress("poses, by exact distances");
-  pair.poses = insertionPoses(pair.box_mesh, pair.truth, task, spec->dilation, kPoses);
+  pair.poses =
+      insertionPoses(pair.box_mesh, pair.truth, scene.objects[bay.value].structures->field, task, kPoses);
   if (pair.poses.pressed.empty()) return fail("the control box never touches the bay on its path");
   return pair;
 }

@@ -20,8 +20,9 @@ class HeldBox {
   static Vector3 size() { return {0.08, 0.06, 0.04}; }
 
   /// `dilation` [m] of the other object.
-  HeldBox(collision::ContactMethod method, test::StructuresPtr other, double dilation, const Pose& X_WB)
-      : other_(std::move(other)) {
+  HeldBox(collision::ContactMethod method, const test::StructuresPtr& other, double dilation,
+          const Pose& X_WB)
+      : other_(test::dilated(other, dilation)) {
     limits_.method = method;
     bodies_[0].X_WB = X_WB;
     bodies_[0].radius = box().shell.radius();
@@ -29,7 +30,6 @@ class HeldBox {
     pairs_[0].body_a = 0;
     pairs_[0].shell_A = &box().shell;
     pairs_[0].field_B = &other_->field;
-    pairs_[0].dilation = dilation;
     pairs_[0].last = &results_[0];
     results_[0].multipliers.resize(collision::kMaxPairContacts);
   }

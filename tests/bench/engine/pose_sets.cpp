@@ -18,10 +18,15 @@ constexpr double kOvershoot = 0.02;
 constexpr int kMaxSteps = 400;
 constexpr double kTouchDepth = 0.05e-3;  // [m] wanted depth of touching poses in the dilated surface
 
-/// The smallest exact signed distance of A's vertices.
+/// The smallest exact gap of A's vertices, to the solids or to their dilated surface.
 class ExactGap {
  public:
-  ExactGap(const bake::TriangleMesh& mesh_A, const test::SolidUnion& truth_B) : truth_B_(truth_B) {
+  /// `dilation_B`: the field whose dilation counts; null: none.
+  ExactGap(const bake::TriangleMesh& mesh_A, const test::SolidUnion& truth_B,
+           const structures::DistanceField* dilation_B = nullptr)
+      : truth_B_(truth_B),
+        dilation_B_(dilation_B),
+        slope_(dilation_B == nullptr ? 1.0 : dilation_B->slope()) {
     constexpr double kCell = 0.02;  // [m]
     std::map<std::array<std::int64_t, 3>, std::vector<Vector3>> cells;
     for (const Vector3f& vertex : mesh_A.vertices) {
@@ -42,33 +47,39 @@ class ExactGap {
 
   /// [m] Negative where a vertex is inside. Since the last call no vertex has moved by more than `moved` [m].
   [[nodiscard]] double at(const Pose& X_BA, double moved = std::numeric_limits<double>::infinity()) {
-    for (Cluster& cluster : clusters_) cluster.bound -= moved;
+    for (Cluster& cluster : clusters_) cluster.bound -= slope_ * moved;
     std::sort(clusters_.begin(), clusters_.end(),
               [](const Cluster& a, const Cluster& b) { return a.bound < b.bound; });
     double smallest = std::numeric_limits<double>::infinity();
     for (Cluster& cluster : clusters_) {
       if (cluster.bound >= smallest) break;
-      cluster.bound = signedDistance(X_BA * cluster.centre) - cluster.radius;
+      cluster.bound = gap(X_BA * cluster.centre) - slope_ * cluster.radius;
       if (cluster.bound >= smallest) continue;
-      for (const Vector3& p : cluster.vertices) smallest = std::min(smallest, signedDistance(X_BA * p));
+      for (const Vector3& p : cluster.vertices) smallest = std::min(smallest, gap(X_BA * p));
     }
     return smallest;
   }
+
+  /// [-] Gaps of points differ by at most this times the length between them.
+  [[nodiscard]] double slope() const { return slope_; }
 
  private:
   struct Cluster {
     Vector3 centre = Vector3::Zero();
     double radius = 0.0;  ///< [m]
-    double bound = 0.0;   ///< [m] lower bound of the signed distance of all vertices
+    double bound = 0.0;   ///< [m] lower bound of the gap of all vertices
     std::vector<Vector3> vertices;
   };
 
-  [[nodiscard]] double signedDistance(const Vector3& p_BP) const {
+  [[nodiscard]] double gap(const Vector3& p_BP) const {
     const double distance = truth_B_.nearest(p_BP).distance;
-    return truth_B_.inside(p_BP) ? -distance : distance;
+    const double signed_distance = truth_B_.inside(p_BP) ? -distance : distance;
+    return dilation_B_ == nullptr ? signed_distance : signed_distance - dilation_B_->dilationAt(p_BP);
   }
 
   const test::SolidUnion& truth_B_;
+  const structures::DistanceField* dilation_B_;
+  double slope_;
   std::vector<Cluster> clusters_;
 };
 
@@ -97,7 +108,7 @@ Reached pushed(ExactGap& exact, const InsertionTask& task, Reached from, double 
   const double max_distance = task.reach + kOvershoot;
   double distance = 0.0;
   for (int i = 0; i < kMaxSteps && distance < max_distance && from.gap > gap; ++i) {
-    const double step = std::max(from.gap - gap, kMinStep);
+    const double step = std::max((from.gap - gap) / exact.slope(), kMinStep);
     from.X_BA.translation() += task.direction_B * step;
     from.gap = exact.at(from.X_BA, step);
     distance += step;
@@ -122,24 +133,27 @@ Eigen::AlignedBox3d regionOf(const bake::TriangleMesh& mesh_A, const InsertionTa
 }
 
 PoseSets insertionPoses(const bake::TriangleMesh& mesh_A, const test::SolidUnion& truth_B,
-                        const InsertionTask& task, double dilation, std::size_t count) {
-  ExactGap exact(mesh_A, truth_B);
+                        const structures::DistanceField& field_B, const InsertionTask& task,
+                        std::size_t count) {
+  ExactGap contact(mesh_A, truth_B, &field_B);
+  ExactGap mesh(mesh_A, truth_B);
   PoseSets sets;
   for (std::size_t i = 0; i < count; ++i) {
     Reached at{startOf(task, static_cast<double>(i) / static_cast<double>(count), i), 0.0};
-    at.gap = exact.at(at.X_BA);
+    at.gap = contact.at(at.X_BA);
     if (at.gap >= kNear) sets.free.push_back(at.X_BA);
 
-    const double least = dilation + 1e-4;
-    at = pushed(exact, task, at, least + (kNear - least) * static_cast<double>(1 + i % 14) / 15.0);
-    if (at.gap > least && at.gap <= kNear) sets.near.push_back(at.X_BA);
+    constexpr double kLeast = 1e-4;  // [m]
+    at = pushed(contact, task, at, kLeast + (kNear - kLeast) * static_cast<double>(1 + i % 14) / 15.0);
+    if (at.gap > kLeast && at.gap <= kNear) sets.near.push_back(at.X_BA);
 
-    at = pushed(exact, task, at, dilation - kTouchDepth);
-    if (at.gap <= dilation && at.gap >= dilation - 2.0 * kTouchDepth) sets.touching.push_back(at.X_BA);
+    at = pushed(contact, task, at, -kTouchDepth);
+    if (at.gap <= 0.0 && at.gap >= -2.0 * kTouchDepth) sets.touching.push_back(at.X_BA);
 
     // 0.5 to 5 mm, with a period of 31 poses
     const double depth = 0.5e-3 + 4.5e-3 * static_cast<double>(i * 7 % 31) / 30.0;
-    at = pushed(exact, task, at, -depth);
+    at.gap = mesh.at(at.X_BA);
+    at = pushed(mesh, task, at, -depth);
     if (at.gap <= -0.5e-3) sets.pressed.push_back(at.X_BA);
   }
   return sets;

@@ -6,8 +6,7 @@
 namespace tenon::bench {
 
 /// Errors of gaps and net forces with respect to the exact distances of the bay's solids: as ticks ask, and
-/// with the ridge correction that they do without; without a dilation, as `tenon contact` asks. Times are the
-/// smallest of `rounds`.
+/// with the ridge correction that they do without. Times are the smallest of `rounds`.
 [[nodiscard]] Table truthTable(const BenchPair& pair, int rounds, const ProgressCallback& progress);
 
 }  // namespace tenon::bench

@@ -25,7 +25,7 @@ TEST(StationEvent, DescribesASafetyIntervention) {
 }
 
 TEST(StationEvent, EveryKindHasAText) {
-  for (int kind = 0; kind <= static_cast<int>(StationEventKind::kStopChanged); ++kind)
+  for (int kind = 0; kind <= static_cast<int>(StationEventKind::kArmed); ++kind)
     EXPECT_THAT(describe({.kind = static_cast<StationEventKind>(kind), .detail = 1}, "left"),
                 testing::Not(HasSubstr("unknown event")))
         << kind;

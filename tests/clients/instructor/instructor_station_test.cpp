@@ -63,7 +63,7 @@ class StuckPart {
   void step() {
     ++tick_;
     station->step(static_cast<std::uint32_t>(tick_));
-    const Pose& X_WH = station->inputs()[0].samples[0].X_WH;
+    const Pose& X_WH = station->inputs()[0].sample.X_WH;
     HandManifold manifold;
     manifold.hand = kHand;
     manifold.server_epoch = 1;

@@ -55,7 +55,7 @@ class FunnelServer {
     ++tick_;
     station.step(static_cast<std::uint32_t>(tick_));
     const DeviceInput& input = station.inputs()[0];
-    const Pose& X_WH = input.samples[0].X_WH;
+    const Pose& X_WH = input.sample.X_WH;
     const HandManifold manifold = contacts(X_WH);
     model_.receive(manifold);
     const Pose X_WO = model_.step(X_WH, world_).X_WO;

@@ -69,9 +69,9 @@ TEST(TraineeStation, EqualSeedsGiveBitEqualMotion) {
     one.step(*first);
     two.step(*second);
     three.step(*other);
-    const Pose& X_WH = first->inputs()[0].samples[0].X_WH;
-    ASSERT_EQ(X_WH, second->inputs()[0].samples[0].X_WH) << i;
-    differs = differs || !(X_WH == other->inputs()[0].samples[0].X_WH);
+    const Pose& X_WH = first->inputs()[0].sample.X_WH;
+    ASSERT_EQ(X_WH, second->inputs()[0].sample.X_WH) << i;
+    differs = differs || !(X_WH == other->inputs()[0].sample.X_WH);
   }
   EXPECT_TRUE(differs) << "another seed moves otherwise";
 }

@@ -2,6 +2,8 @@
 
 #include <chrono>
 #include <optional>
+#include <string>
+#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -9,6 +11,7 @@
 
 #include "idl/types/messages/commands.h"
 #include "idl/types/messages/log.h"
+#include "idl/types/messages/run.h"
 #include "tests/idl/wire/peer.h"
 
 namespace tenon::wire {
@@ -32,20 +35,23 @@ void runServer(std::uint32_t domain) {
   std::string guid;
   auto heard = inbox.on<Join>(lobby, kJoin, [&](const Join& join) {
     guid = join.client_guid;
-    Welcome answer{.client_guid = guid, .server_epoch = 7};
+    Welcome answer{.client_guid = guid, .session = join.session, .server_epoch = 7};
     if (!join.hands.empty() && join.hands.front() == "taken") {
       answer.reason = "that hand is taken";
     } else {
       answer.accepted = true;
       answer.client = ClientId{1};
-      answer.token = join.token.empty() ? "token of the first" : join.token + ", again";
       answer.tick = ++asked;
     }
     if (!welcomes->write(answer)) _exit(1);
   });
   if (heard) {
     heard = inbox.on<ClientEvent>(session, kClientEvent, [&](const ClientEvent&) {
-      (void)welcomes->write({.client_guid = guid, .reason = "too loud", .client = ClientId{1}});
+      (void)welcomes->write({.client_guid = guid,
+                             .session = "test",
+                             .server_epoch = 7,
+                             .reason = "too loud",
+                             .client = ClientId{1}});
     });
   }
   if (!heard) _exit(1);
@@ -86,7 +92,7 @@ TEST(Membership, ARefusalHasTheServersReason) {
   EXPECT_THAT(joined.error().what, HasSubstr("refuses: that hand is taken"));
 }
 
-TEST(Membership, ARemovedClientRejoinsWithItsToken) {
+TEST(Membership, ARemovedClientRejoins) {
   const std::uint32_t domain = test::ownDomain();
   const test::Peer peer([domain] { runServer(domain); });
   const std::atomic<bool> stop = false;
@@ -106,7 +112,7 @@ TEST(Membership, ARemovedClientRejoinsWithItsToken) {
 
   const auto back = (*member)->rejoin(stop, [&] { inbox.dispatch(milliseconds(0)); });
   ASSERT_TRUE(back) << back.error().what;
-  EXPECT_EQ((*member)->welcome().token, "token of the first, again");
+  EXPECT_EQ((*member)->welcome().tick, 2U) << "the answer to the second request";
   inbox.dispatch(milliseconds(50));
   EXPECT_FALSE((*member)->lost());
 }
@@ -135,6 +141,79 @@ TEST(Membership, AKilledServerIsReportedAsGoneAndAMissingOneAsNotAnnounced) {
   ASSERT_FALSE(found);
   EXPECT_THAT(found.error().what, HasSubstr("no server announced session 'nowhere'"));
   EXPECT_THAT(found.error().what, HasSubstr("tenon serve"));
+}
+
+// The server of a name, and another one that calls itself the same and started later.
+TEST(Membership, BelongsToTheServerOfItsNameThatStartedFirst) {
+  const std::uint32_t domain = test::ownDomain();
+  auto foreign = test::participant(domain);
+  Partition foreign_lobby(foreign, kLobby);
+  Partition foreign_session(foreign, sessionPartition("test"));
+  auto foreign_announces = Writer<SessionAnnounce>::open(foreign_lobby, kSessionAnnounce);
+  auto foreign_runs = Writer<RunState>::open(foreign_session, kRunState);
+  ASSERT_TRUE(foreign_announces->write({.session = "test", .server_epoch = 9}));
+
+  auto genuine = test::participant(domain);
+  Partition lobby(genuine, kLobby);
+  Partition session(genuine, sessionPartition("test"));
+  auto announces = Writer<SessionAnnounce>::open(lobby, kSessionAnnounce);
+  auto runs = Writer<RunState>::open(session, kRunState);
+  ASSERT_TRUE(announces->write({.session = "test", .server_epoch = 8}));
+
+  const std::atomic<bool> stop = false;
+  auto member = Membership::find(traineeOptions(domain), stop);
+  ASSERT_TRUE(member) << member.error().what;
+  EXPECT_EQ((*member)->announce().server_epoch, 8U);
+  EXPECT_TRUE((*member)->isServer(genuine->origin()));
+  EXPECT_FALSE((*member)->isServer(foreign->origin()));
+
+  Inbox inbox;
+  std::vector<std::string> reasons;
+  ASSERT_TRUE((*member)->watch(inbox));
+  ASSERT_TRUE(inbox.on<RunState>((*member)->session(), kRunState,
+                                 [&](const RunState& run) { reasons.push_back(run.reason); }));
+  ASSERT_TRUE(test::dispatchUntil(
+      inbox, [&] { return foreign_runs->matchedReaders() == 1 && runs->matchedReaders() == 1; }));
+  // the foreign state comes after the genuine one and before anything is taken
+  ASSERT_TRUE(runs->write({.phase = RunPhase::kRunning, .reason = "genuine"}));
+  ASSERT_TRUE(foreign_runs->write({.phase = RunPhase::kStopped, .reason = "foreign"}));
+  std::this_thread::sleep_for(milliseconds(100));
+  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return !reasons.empty(); }));
+  EXPECT_THAT(reasons, ::testing::ElementsAre("genuine"));
+  // the foreign server ends: that is not the end of this one's
+  ASSERT_TRUE(foreign_announces->dispose({.session = "test", .server_epoch = 9}));
+  for (int i = 0; i < 10; ++i) inbox.dispatch(milliseconds(20));
+  EXPECT_FALSE((*member)->serverIsGone());
+  ASSERT_TRUE(announces->dispose({.session = "test", .server_epoch = 8}));
+  EXPECT_TRUE(test::dispatchUntil(inbox, [&] { return (*member)->serverIsGone(); }));
+}
+
+// What a new server publishes once reaches a client that notices only later that its own is gone.
+TEST(Membership, TheStatesOfTheNextServerAreThereWhenAClientBelongsToIt) {
+  const std::uint32_t domain = test::ownDomain();
+  auto first = test::participant(domain);
+  auto second = test::participant(domain);
+  auto client = test::participant(domain);
+  Partition first_session(first, "s/test"), second_session(second, "s/test"), session(client, "s/test");
+  auto first_runs = Writer<RunState>::open(first_session, kRunState);
+  auto second_runs = Writer<RunState>::open(second_session, kRunState);
+  session.hearOnly(first->origin());
+  Inbox inbox;
+  std::vector<std::string> reasons;
+  ASSERT_TRUE(
+      inbox.on<RunState>(session, kRunState, [&](const RunState& run) { reasons.push_back(run.reason); }));
+  ASSERT_TRUE(test::dispatchUntil(
+      inbox, [&] { return first_runs->matchedReaders() == 1 && second_runs->matchedReaders() == 1; }));
+  ASSERT_TRUE(second_runs->write({.reason = "second"}));
+  ASSERT_TRUE(first_runs->write({.reason = "first"}));
+  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return !reasons.empty(); }));
+  for (int i = 0; i < 5; ++i) inbox.dispatch(milliseconds(20));
+  EXPECT_THAT(reasons, ::testing::ElementsAre("first"));
+  session.hearOnly(second->origin());
+  inbox.dispatch(milliseconds(0));
+  EXPECT_THAT(reasons, ::testing::ElementsAre("first", "second"));
+  inbox.dispatch(milliseconds(0));
+  EXPECT_EQ(reasons.size(), 2U) << "once";
 }
 
 // two participants write equal samples to one topic: their origins differ

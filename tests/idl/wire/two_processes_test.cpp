@@ -22,7 +22,7 @@ void echoManifolds(std::uint32_t domain) {
   const auto added = inbox.on<DeviceInput>(session, kDeviceInput, [&](const DeviceInput& input) {
     HandManifold answer;
     answer.hand = input.hand;
-    answer.answers_seq = input.samples[0].seq;
+    answer.answers_seq = input.sample.seq;
     answer.contacts.resize(kManifoldContacts);
     if (!manifolds->write(answer)) _exit(1);
   });
@@ -62,7 +62,7 @@ void exchangeLockstepTicks(std::uint32_t ticks) {
   for (std::uint32_t tick = 1; tick <= ticks; ++tick) {
     DeviceInput input;
     input.hand = HandId{0};
-    input.samples[0].seq = tick;
+    input.sample.seq = tick;
     const auto sent = std::chrono::steady_clock::now();
     ASSERT_TRUE(inputs->write(input));
     ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return answered >= tick; })) << "tick " << tick;

@@ -160,7 +160,7 @@ TEST(FieldBake, OutsideOfAUnionIsExact) {
 TEST(FieldBake, BothSidesOfASheetAreOutside) {
   const structures::HapticStructures structures = baked(test::sheetMesh(0.05, 0.0011, 10));
   for (const Vector3& p : randomPointsIn({Vector3(-0.06, -0.06, -0.01), Vector3(0.06, 0.06, 0.01)}, 5'000)) {
-    EXPECT_GE(structures.field.sample(p).distance, 0.0);
+    EXPECT_GE(structures.field.undilated(p).distance, -2e-6) << "but for rounding";
   }
   EXPECT_NE(structures.info.notes.find("1 of 1 connected parts have no inside"), std::string::npos)
       << structures.info.notes;
@@ -170,8 +170,8 @@ TEST(FieldBake, BothSidesOfAnOpenBoxAreOutside) {
   TriangleMesh mesh = test::boxMesh(Vector3::Constant(-0.05), Vector3::Constant(0.05));
   mesh.triangles.erase(mesh.triangles.begin() + 2, mesh.triangles.begin() + 4);  // its lid
   const structures::HapticStructures structures = baked(mesh);
-  EXPECT_GT(structures.field.sample(Vector3(0.0, 0.0, -0.045)).distance, 0.004);
-  EXPECT_GT(structures.field.sample(Vector3(0.0, 0.0, -0.055)).distance, 0.004);
+  EXPECT_GT(structures.field.undilated(Vector3(0.0, 0.0, -0.045)).distance, 0.004);
+  EXPECT_GT(structures.field.undilated(Vector3(0.0, 0.0, -0.055)).distance, 0.004);
 }
 
 TEST(FieldBake, ACavityIsSolid) {
@@ -242,7 +242,9 @@ TEST(FieldBake, EverySampleIsTheDistanceToTheNearestTriangle) {
           const Vector3 p = layout.p_MoFo_M + (Vector3(x, y, z) * 8.0 + in_brick) * layout.voxel;
           const double exact =
               std::min(truth.nearest(p).distance, structures::DistanceField::kClampVoxels * layout.voxel);
-          ASSERT_NEAR(std::abs(samples[k]) * quantum, exact, 0.51 * quantum) << p.transpose();
+          // the sliver is thin: its dilation is in the samples, rounded with them
+          const double distance = samples[k] * quantum + structures.field.dilationAt(p);
+          ASSERT_NEAR(std::abs(distance), exact, 1.02 * quantum) << p.transpose();
           ++compared;
         }
       }

@@ -142,7 +142,7 @@ TEST(FieldSizeTruth, ABakeJustTooLargeForItsReaderIsRefusedWithTheNumber) {
   options.refine = {{{Vector3::Zero(), Vector3::Constant(0.06)}}};
   const auto whole = bakeWithin({}, options);
   ASSERT_TRUE(whole) << whole.error().what;
-  const std::size_t bricks = whole->field.layout().samples.size() / structures::DistanceField::kBrickSamples;
+  const std::size_t bricks = whole->storage.samples.size() / structures::DistanceField::kBrickSamples;
   FieldLimits limits;
   limits.field_bricks = bricks;
   EXPECT_TRUE(bakeWithin(limits, options));

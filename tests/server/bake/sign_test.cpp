@@ -109,11 +109,12 @@ SignErrors countSignErrors(const EngineBay& bay, const structures::DistanceField
       if (++next % every != 0) continue;
       const auto sample = static_cast<std::size_t>(entry) * structures::DistanceField::kBrickSamples +
                           static_cast<std::size_t>(k);
-      const double voxels = layout.samples[sample] / double{structures::DistanceField::kQuantaPerVoxel};
-      if (std::abs(voxels) > structures::DistanceField::kBandVoxels) continue;
-      ++errors.band;
       const Vector3 in_brick(k % 9, k / 9 % 9, k / 81);
       const Vector3 p = layout.p_MoFo_M + (brick.matrix() * 8.0 + in_brick) * layout.voxel;
+      const double voxels = layout.samples[sample] / double{structures::DistanceField::kQuantaPerVoxel} +
+                            field.dilationAt(p) / layout.voxel;
+      if (std::abs(voxels) > structures::DistanceField::kBandVoxels) continue;
+      ++errors.band;
       if ((voxels < 0.0) == bay.inside(p)) continue;
       if (bay.distance(p) > 0.501 * layout.voxel) ++errors.wrong;
     }

@@ -12,6 +12,7 @@
 #include "scenarios/part_generator/scenario_parts.h"
 #include "server/bake/bake.h"
 #include "server/collision/pair_query.h"
+#include "tests/support/test_meshes.h"
 
 namespace tenon::test {
 
@@ -50,6 +51,17 @@ inline std::shared_ptr<const structures::HapticStructures> baked(const bake::Tri
   EXPECT_TRUE(structures) << (structures ? "" : structures.error().what);
   return std::make_shared<const structures::HapticStructures>(structures ? std::move(*structures)
                                                                          : structures::HapticStructures());
+}
+
+inline constexpr double kBarEdge = 0.0070710678118654752;  ///< [m] of a barShape, from its axis
+
+/// A bar of 60 mm along `along`, 10 mm square, turned by 45 deg about it: an edge is up and one down.
+inline std::shared_ptr<const structures::HapticStructures> barShape(const Vector3& along) {
+  const Vector3 half = Vector3::Constant(0.005) + 0.025 * along;
+  bake::TriangleMesh mesh = boxMesh(-half, half);
+  const Quaternion q = expRotation(along * (std::numbers::pi / 4.0));
+  for (Vector3f& p : mesh.vertices) p = (q * p.cast<double>()).cast<float>();
+  return baked(mesh, 0.001, 2000);
 }
 
 /// Pseudo-random numbers that are the same on every machine.

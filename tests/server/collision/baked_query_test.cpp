@@ -43,7 +43,7 @@ TEST(BakedQuery, ListsTheSameContactsAsTestingEveryPoint) {
     std::size_t found = 0;
     for (int trial = 0; trial < 1000; ++trial) {
       const Pose X_BA = test::randomContactPose(*pair.a, *pair.b, 0.002 * random.symmetric(), 1.0, random);
-      PairQuery query{&pair.a->shell, &pair.b->field, X_BA, Pose(), 0.0004, 0.0006};
+      PairQuery query{&pair.a->shell, &pair.b->field, X_BA, Pose(), 0.001};
       query.sum_penalty = true;
       query.correct_ridges = trial % 2 == 0;
       queryPair(query, *pruned);

@@ -27,7 +27,6 @@ void queryAll(const structures::HapticStructures& a, const structures::HapticStr
     for (const std::uint32_t budget : {0xFFFFFFFFU, 60U}) {
       PairQuery query{&a.shell, &b.field, Pose(Vector3(0.003, -0.002, z), expRotation({0.1, 0.2, 0.3})),
                       Pose()};
-      query.dilation = 0.0005;
       query.margin = 0.003;
       query.reduce = budget == 60U;
       query.correct_ridges = true;

@@ -1,6 +1,7 @@
 #include "server/collision/feature_query.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -10,7 +11,6 @@
 #include "server/structures/shell_builder.h"
 #include "tests/server/collision/baked_pair.h"
 #include "tests/support/analytic_structures.h"
-#include "tests/support/test_meshes.h"
 
 namespace tenon::collision {
 namespace {
@@ -19,33 +19,24 @@ namespace {
 class FeatureQuery : public ::testing::Test {
  protected:
   FeatureQuery() {
-    a_ = bar(Vector3::UnitX());
-    b_ = bar(Vector3::UnitY());
-  }
-
-  static std::shared_ptr<const structures::HapticStructures> bar(const Vector3& along) {
-    const Vector3 half = Vector3::Constant(0.005) + 0.025 * along;
-    bake::TriangleMesh mesh = test::boxMesh(-half, half);
-    const Quaternion q = expRotation(along * 0.7853981633974483);
-    for (Vector3f& p : mesh.vertices) p = (q * p.cast<double>()).cast<float>();
-    return test::baked(mesh, 0.001, 2000);
+    a_ = test::barShape(Vector3::UnitX());
+    b_ = test::barShape(Vector3::UnitY());
   }
 
   /// A's lowest edge is `gap` [m] above B's highest.
   void query(double gap, const Vector3& off = Vector3::Zero()) {
-    query_ = {&a_->shell, &b_->field, Pose(Vector3(0.0, 0.0, 2.0 * kEdge + gap) + off), Pose(), 0.0, 0.001};
+    query_ = {&a_->shell, &b_->field, Pose(Vector3(0.0, 0.0, 2.0 * kEdge + gap) + off), Pose(), 0.001};
     queryPair(query_, *result_);
     queryFeatures(query_, features_, *scratch_, *result_);
   }
   [[nodiscard]] std::vector<Contact> crossings() const {
     std::vector<Contact> list;
-    std::copy_if(
-        result_->contacts.begin(), result_->contacts.end(), std::back_inserter(list),
-        [](const Contact& one) { return one.kind == ContactKind::kCrossing && one.gap < kDormantGap; });
+    std::copy_if(result_->contacts.begin(), result_->contacts.end(), std::back_inserter(list),
+                 [](const Contact& one) { return one.kind == ContactKind::kCrossing && !one.dormant(); });
     return list;
   }
 
-  static constexpr double kEdge = 0.0070710678118654752;  // [m] from a bar's axis
+  static constexpr double kEdge = test::kBarEdge;
   std::shared_ptr<const structures::HapticStructures> a_, b_;
   PairFeatures features_;
   PairQuery query_;
@@ -88,15 +79,171 @@ TEST_F(FeatureQuery, BoundsWhatItDoesNotList) {
 
 TEST_F(FeatureQuery, EdgesBesideFacesDoNotCross) {
   // A's bar lies with a face on B's edge: points hold it, and no edge of A crosses within the face
-  query_ = {&a_->shell,
-            &b_->field,
-            Pose(Vector3(0.0, 0.0, kEdge + 0.005 + 0.0002), expRotation({0.7853981633974483, 0.0, 0.0})),
-            Pose(),
-            0.0,
-            0.001};
+  query_ = {
+      &a_->shell, &b_->field,
+      Pose(Vector3(0.0011, -0.0007, kEdge + 0.005 + 0.0002), expRotation({0.7853981633974483, 0.0, 0.0})),
+      Pose(), 0.001};
   queryPair(query_, *result_);
   queryFeatures(query_, features_, *scratch_, *result_);
-  for (const Contact& one : crossings()) EXPECT_NEAR(one.gap, 0.0002, 1e-6) << "at the face's borders";
+  // A's two lower edges lie across B's edge, each of them in one piece
+  const auto found = crossings();
+  EXPECT_EQ(found.size(), 2U);
+  for (const Contact& one : found) {
+    EXPECT_NEAR(one.gap, 0.0002, 1e-6) << "at the face's borders";
+    EXPECT_NEAR(std::abs(one.p_WP.y() + 0.0007), 0.005, 1e-6);
+  }
+}
+
+TEST_F(FeatureQuery, OnlyCrossingsHaveASecondIndex) {
+  // the memory of the list may have held crossings
+  for (ContactList* list : {&result_->contacts, &scratch_->of_B.contacts}) {
+    list->resize(ContactList::capacity());
+    for (Contact& contact : *list) contact.other = 7;
+  }
+  query(0.0002, {0.0011, 0.0024, 0.0});  // over the middle of a piece of B's edge
+  const auto count = [this](ContactKind kind) {
+    return std::ranges::count_if(result_->contacts, [kind](const Contact& one) { return one.kind == kind; });
+  };
+  ASSERT_GT(count(ContactKind::kShellPoint), 0);
+  ASSERT_GT(count(ContactKind::kFeaturePoint), 0);
+  ASSERT_GT(count(ContactKind::kCrossing), 0);
+  for (const Contact& contact : result_->contacts)
+    EXPECT_TRUE(contact.kind == ContactKind::kCrossing || contact.other == 0U);
+}
+
+TEST_F(FeatureQuery, ResamplingAtTheSamePoseFindsTheSame) {
+  // edges meet between two features, faces hold A off, and A's edge is beside the end of B's
+  int dormant = 0;
+  for (const Vector3& off : {Vector3(0.0011, -0.0007, 0.0), Vector3(0.0002, 0.0302, 0.0)}) {
+    query(-0.0002, off);
+    const auto before = std::make_unique<PairQueryResult>(*result_);
+    resampleFeatures(query_, features_, 0.0, *scratch_, *result_);
+    ASSERT_EQ(result_->contacts.size(), before->contacts.size());
+    for (std::size_t i = 0; i < before->contacts.size(); ++i) {
+      EXPECT_NEAR(result_->contacts[i].gap, before->contacts[i].gap, 1e-9);
+      dormant += before->contacts[i].dormant() ? 1 : 0;
+    }
+    EXPECT_NEAR(result_->deepest, before->deepest, 1e-9);
+    EXPECT_EQ(result_->dormant_gap, before->dormant_gap);
+  }
+  EXPECT_GT(dormant, 0);
+  query(-0.0002, {0.0011, -0.0007, 0.0});
+  EXPECT_NEAR(result_->deepest, 0.0002, 1e-7);
+}
+
+TEST_F(FeatureQuery, TheGapAloneIsABoundOfTheTrueOne) {
+  for (const double gap : {0.0004, 0.002, 0.006, 0.02}) {
+    for (const double limit : {0.0005, 0.001}) {
+      const PairQuery query{&a_->shell, &b_->field, Pose(Vector3(0.0011, -0.0007, 2.0 * kEdge + gap)), Pose(),
+                            limit};
+      QueryCounts counts;
+      const double bound = featureGap(query, features_, *scratch_, counts);
+      EXPECT_LE(bound, gap + 1e-6) << "edges cross at this gap";
+      EXPECT_GE(bound, std::min(limit, gap) - b_->features.longestHalf() - 2e-5)
+          << "lower by half a piece of an edge at most";
+      EXPECT_GT(counts.spheres_visited, 0U);
+    }
+  }
+}
+
+/// A cube of 40 mm, 1 mm voxels (A), and features of another body B that a test chooses, in A's frame. They
+/// are as listed: features have no order of their own.
+class ChosenFeatures : public ::testing::Test {
+ protected:
+  ChosenFeatures() : cube_(test::boxStructures(Vector3::Constant(0.04), 0.001, 0.001)) {}
+
+  void add(const Vector3& p, const Vector3& half = Vector3::Zero(), const Vector3& into_0 = Vector3::Zero(),
+           const Vector3& into_1 = Vector3::Zero()) {
+    samples_.push_back({p, Vector3(0.0, 0.0, -1.0), 0.0});
+    edges_.push_back({half.cast<float>(), {into_0.cast<float>(), into_1.cast<float>()}});
+  }
+  structures::FeatureShell taken() {
+    std::vector<std::uint32_t> order;
+    structures::FeatureStorage storage{structures::buildFlatShell(samples_, 0.001, order), {}};
+    for (const std::uint32_t i : order) storage.edges.push_back(edges_[i]);
+    samples_.clear();
+    edges_.clear();
+    return structures::makeFeatureShell(std::move(storage));
+  }
+  void query(const structures::FeatureShell& of_A, const structures::FeatureShell& of_B,
+             const structures::Pointshell& shell_A, const structures::DistanceField& field_B) {
+    const PairQuery query{&shell_A, &field_B, Pose(), Pose(), 0.001};
+    queryPair(query, *result_);
+    queryFeatures(query, {&of_A, &of_B, &cube_->field}, *scratch_, *result_);
+  }
+
+  test::StructuresPtr cube_;
+  std::vector<structures::SurfaceSample> samples_;
+  std::vector<structures::FeatureEdge> edges_;
+  std::unique_ptr<PairQueryResult> result_ = std::make_unique<PairQueryResult>();
+  std::unique_ptr<FeatureScratch> scratch_ = std::make_unique<FeatureScratch>();
+};
+
+//   |____|   the cube's lower side has more points within the margin than the list holds, and as many
+//   .:.':.   features of B are below it
+TEST_F(ChosenFeatures, AFullListHasTheSmallestGapsOfBothSides) {
+  const test::StructuresPtr below = test::boxStructures({0.1, 0.1, 0.02}, 0.001, 0.01);
+  const Pose X_WB(Vector3(0.0, 0.0, -0.0302));  // its upper side is 0.2 mm below the cube
+  test::SeededRandom random(11);
+  std::vector<double> gaps;
+  for (int i = 0; i < 400; ++i) {
+    const double gap = 0.0005 + 0.0004 * random.symmetric();
+    add(X_WB.inverse() * Vector3(0.0015 * (i % 20) - 0.014, 0.0015 * (i / 20) - 0.014, -0.02 - gap));
+    gaps.push_back(gap);
+  }
+  std::ranges::sort(gaps);
+  const structures::FeatureShell of_B = taken();
+  const PairQuery query{&cube_->shell, &below->field, Pose(), X_WB, 0.001};
+  queryPair(query, *result_);
+  ASSERT_EQ(result_->contacts.size(), ContactList::capacity());
+  const std::uint32_t dropped = result_->counts.contacts_dropped;
+  const structures::FeatureShell none;
+  queryFeatures(query, {&none, &of_B, &cube_->field}, *scratch_, *result_);
+  ASSERT_EQ(result_->contacts.size(), ContactList::capacity());
+  EXPECT_EQ(result_->counts.contacts_dropped, dropped + 400U) << "128 shell points, 272 features";
+  std::vector<double> listed;
+  for (const Contact& contact : result_->contacts)
+    if (contact.kind == ContactKind::kFeaturePoint) listed.push_back(contact.gap);
+  ASSERT_EQ(listed.size(), kFeatureRoom);
+  std::ranges::sort(listed);
+  for (std::size_t i = 0; i < listed.size(); ++i) ASSERT_NEAR(listed[i], gaps[i], 1e-6) << i;
+  EXPECT_LE(result_->complete_to, gaps[kFeatureRoom] + 1e-6);
+}
+
+TEST_F(ChosenFeatures, WhatIsBeyondTheMarginIsNotDropped) {
+  // 600 features 2 mm below the cube, and an edge far away, for which contacts are searched up to 3 mm
+  for (int i = 0; i < 600; ++i) add({0.0012 * (i % 25) - 0.015, 0.0012 * (i / 25) - 0.015, -0.022});
+  add({0.1, 0.0, 0.0}, {0.002, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0});
+  query(structures::FeatureShell(), taken(), structures::Pointshell(), structures::DistanceField());
+  EXPECT_NEAR(scratch_->of_B.complete_to, 0.002, 1e-6) << "the list of candidates is full, beyond the margin";
+  EXPECT_TRUE(result_->contacts.empty());
+  EXPECT_EQ(result_->counts.contacts_dropped, 0U);
+}
+
+//       ___________ A's edge, of which B's edges pass the end
+//   | | |           they are dormant: 100 of them, 0.1 to 0.3 mm beside the end, 0.1 mm below
+TEST_F(ChosenFeatures, DormantCrossingsThatAreNotListedCountWithTheirDistance) {
+  const double s = std::sqrt(0.5);
+  add({0.018, 0.0, -0.02}, {0.002, 0.0, 0.0}, {0.0, s, s}, {0.0, -s, s});
+  const structures::FeatureShell of_A = taken();
+  std::vector<double> distances;
+  for (int i = 0; i < 100; ++i) {
+    const double beside = 0.0001 + 2e-6 * i;
+    add({0.02 + beside, 0.0, -0.0201}, {0.0, 0.002, 0.0}, {s, 0.0, -s}, {-s, 0.0, -s});
+    distances.push_back(std::hypot(beside, 0.0001));
+  }
+  query(of_A, taken(), structures::Pointshell(), structures::DistanceField());
+  std::vector<double> listed;
+  for (const Contact& contact : result_->contacts)
+    if (contact.kind == ContactKind::kCrossing) listed.push_back(contact.gapBound());
+  ASSERT_EQ(listed.size(), kMaxCrossings);
+  std::ranges::sort(listed);
+  for (std::size_t i = 0; i < listed.size(); ++i) ASSERT_NEAR(listed[i], distances[i], 1e-7) << i;
+  EXPECT_NEAR(result_->dormant_gap, distances[0], 1e-7);
+  EXPECT_LE(result_->unlisted_gap, distances[kMaxCrossings] + 1e-7);
+  EXPECT_GT(result_->unlisted_gap, distances[kMaxCrossings - 1] - 1e-7);
+  EXPECT_LE(result_->complete_to, distances[kMaxCrossings] + 1e-7);
+  EXPECT_EQ(result_->counts.contacts_dropped, 0U) << "they hold nothing";
 }
 
 // A shell of one level with many clusters is descended by blocks of them.
@@ -113,7 +260,7 @@ TEST(BlocksOfClusters, ListTheSameContactsAsTestingEveryPoint) {
   std::size_t contacts = 0;
   for (int trial = 0; trial < 300; ++trial) {
     const Vector3 p(0.3 * random.symmetric(), 0.25 * random.symmetric(), 0.25 + 0.02 * random.symmetric());
-    PairQuery query{&shell, &ball->field, Pose(), Pose(p), 0.0, 0.001};
+    PairQuery query{&shell, &ball->field, Pose(), Pose(p), 0.001};
     queryPair(query, *pruned);
     query.prune = false;
     queryPair(query, *unpruned);

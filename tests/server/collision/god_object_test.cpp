@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <ostream>
 
 #include <gtest/gtest.h>
 
@@ -13,72 +12,8 @@ namespace {
 using test::boxStructures;
 using test::cornerStructures;
 using test::IslandRig;
-using test::sheetStructures;
 using test::sphereStructures;
 using test::StructuresPtr;
-
-constexpr double kVoxel = 0.003;
-constexpr double kDilation = 0.87 * kVoxel;  // [m] the smallest that keeps a sheet of zero thickness solid
-constexpr int kOffsets = 12;                 // positions of the sheet between two layers of samples
-
-struct PushResult {
-  double overlap_in_field = 0.0;  ///< [m] largest in the dilated field, of all ticks
-  double final_height = 0.0;      ///< [m] of the box's lowest point above the middle of the real sheet
-};
-
-/// A hand pushes a box at `speed` [m/s] and `turn_speed` [rad/s] against a sheet of `thickness` [m] whose
-/// middle is at z = `offset` [m].
-PushResult push(double thickness, double offset, double speed, double turn_speed) {
-  test::IslandRig rig;
-  const Pose start(Vector3(0.003, 0.002, 0.04), expRotation({0.17, 0.05, 0.0}));
-  const auto box = rig.addBody(test::boxStructures({0.04, 0.04, 0.02}, 0.002, 0.003), start);
-  rig.addStatic(box, test::sheetStructures(0.3, thickness, kVoxel, offset), Pose(), kDilation);
-  for (int tick = 0; tick < 200; ++tick) {
-    const double z = std::max(0.04 - speed * 1e-3 * tick, -0.05);
-    const double turn = std::min(turn_speed * 1e-3 * tick, 1.5);
-    rig.setHand(box, Pose(Vector3(0.003, 0.002, z), start.rotation() * expRotation({0.0, turn, 0.0})));
-    rig.step();
-  }
-  double lowest = 1.0;
-  for (const structures::ShellPoint& point : rig.shell(box).points()) {
-    lowest = std::min(lowest, (rig.pose(box) * point.p_MP.cast<double>()).z() - offset);
-  }
-  return {-rig.smallest_gap, lowest};
-}
-
-struct PushCase {
-  const char* name;
-  double thickness;   ///< [m]
-  double speed;       ///< [m/s]
-  double turn_speed;  ///< [rad/s]
-};
-void PrintTo(const PushCase& one, std::ostream* out) { *out << one.name; }
-
-class SheetAtEveryOffset : public testing::TestWithParam<PushCase> {};
-
-//   |  v  the hand goes 50 mm behind the sheet, with or without a rotation
-//   v
-//  -----  the sheet at every offset between two layers of samples
-TEST_P(SheetAtEveryOffset, BlocksTheBox) {
-  const PushCase& one = GetParam();
-  double overlap = 0.0;
-  for (int i = 0; i < kOffsets; ++i) {
-    const PushResult result = push(one.thickness, kVoxel * i / kOffsets, one.speed, one.turn_speed);
-    EXPECT_GE(result.final_height, 0.0) << "through the sheet at offset " << i;
-    overlap = std::max(overlap, result.overlap_in_field);
-  }
-  EXPECT_LE(overlap, 5e-5);
-  RecordProperty("overlap_in_field_um", static_cast<int>(std::lround(overlap * 1e6)));
-}
-
-INSTANTIATE_TEST_SUITE_P(GodObject, SheetAtEveryOffset,
-                         testing::Values(PushCase{"OneMillimetreAt1", 0.001, 1.0, 0.0},
-                                         PushCase{"OneMillimetreAt3", 0.001, 3.0, 0.0},
-                                         PushCase{"OneMillimetreTurning", 0.001, 1.0, 10.0},
-                                         PushCase{"ZeroThicknessAt1", 0.0, 1.0, 0.0},
-                                         PushCase{"ZeroThicknessAt3", 0.0, 3.0, 0.0},
-                                         PushCase{"ZeroThicknessTurning", 0.0, 1.0, 10.0}),
-                         [](const auto& one) { return one.param.name; });
 
 /// A hand presses a box's face on an edge along x, and moves along it.
 struct EdgeSlide {

@@ -27,25 +27,24 @@ class IslandRig {
   }
   /// The body's pointshell against the SDF of a static object; `dilation` [m].
   void addStatic(std::size_t body, const StructuresPtr& other, const Pose& X_WB, double dilation) {
-    statics_.push_back(other);
+    statics_.push_back(dilated(other, dilation));
     collision::IslandPair pair;
     pair.body_a = static_cast<std::int32_t>(body);
     pair.shell_A = &structures_[body]->shell;
-    pair.field_B = &other->field;
+    pair.field_B = &statics_.back()->field;
     pair.X_WB_static = X_WB;
-    pair.dilation = dilation;
     push(pair);
   }
   /// The pointshell of a static object against the body's SDF: finds edges and vertices between the body's
   /// points. `dilation` [m].
   void addStaticShell(std::size_t body, const StructuresPtr& other, const Pose& X_WA, double dilation) {
     statics_.push_back(other);
+    statics_.push_back(dilated(structures_[body], dilation));
     collision::IslandPair pair;
     pair.body_b = static_cast<std::int32_t>(body);
     pair.shell_A = &other->shell;
-    pair.field_B = &structures_[body]->field;
+    pair.field_B = &statics_.back()->field;
     pair.X_WA_static = X_WA;
-    pair.dilation = dilation;
     push(pair);
   }
   /// Pointshell of body a against the SDF of body b; `dilation` [m].
@@ -53,9 +52,9 @@ class IslandRig {
     collision::IslandPair pair;
     pair.body_a = static_cast<std::int32_t>(a);
     pair.body_b = static_cast<std::int32_t>(b);
+    statics_.push_back(dilated(structures_[b], dilation));
     pair.shell_A = &structures_[a]->shell;
-    pair.field_B = &structures_[b]->field;
-    pair.dilation = dilation;
+    pair.field_B = &statics_.back()->field;
     push(pair);
   }
 
@@ -109,7 +108,7 @@ class IslandRig {
 
   std::vector<collision::MovableBody> bodies_;
   std::vector<StructuresPtr> structures_;
-  std::vector<StructuresPtr> statics_;
+  std::vector<StructuresPtr> statics_;  // and dilated structures of bodies
   std::vector<collision::IslandPair> pairs_;
   collision::IslandSolver solver_{4, 8};
 };

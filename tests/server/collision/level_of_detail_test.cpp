@@ -24,7 +24,7 @@ struct Penalty {
 
 Penalty penaltyAt(const test::StructuresPtr& a, const test::StructuresPtr& b, const Pose& X_WA,
                   std::uint32_t levels) {
-  PairQuery query{&a->shell, &b->field, X_WA, Pose(), 0.0, 0.0, levels};
+  PairQuery query{&a->shell, &b->field, X_WA, Pose(), 0.0, levels};
   query.sum_penalty = true;
   static const auto result = std::make_unique<PairQueryResult>();
   queryPair(query, *result);
@@ -78,7 +78,7 @@ bool moveToDepth(const test::StructuresPtr& shell, const test::StructuresPtr& fi
                  double depth, Pose& X_WA) {
   const auto result = std::make_unique<PairQueryResult>();
   for (int step = 0; step < 60; ++step) {
-    queryPair({&shell->shell, &field->field, X_WA, Pose(), 0.0, 0.001}, *result);
+    queryPair({&shell->shell, &field->field, X_WA, Pose(), 0.001}, *result);
     const double remaining = result->smallest_gap + depth;
     if (remaining < 1e-5) return true;
     X_WA.translation() += remaining * down;
@@ -145,7 +145,7 @@ std::unique_ptr<PairQueryResult> resultOf(const PairQuery& query) {
 }
 
 TEST(LevelOfDetail, AQueryStaysWithinItsBudgetAndReportsSkippedLevels) {
-  PairQuery query{&box()->shell, &floor()->field, kHalfMillimetreDeep, Pose(), 0.0, 0.0005};
+  PairQuery query{&box()->shell, &floor()->field, kHalfMillimetreDeep, Pose(), 0.0005};
   query.reduce = true;
   const auto unlimited = resultOf(query);
   const auto levels = static_cast<std::uint32_t>(box()->shell.levels().size());
@@ -168,7 +168,7 @@ TEST(LevelOfDetail, AQueryStaysWithinItsBudgetAndReportsSkippedLevels) {
 }
 
 TEST(LevelOfDetail, PriorityPointsOfSkippedLevelsAreListedWithAreaZero) {
-  PairQuery query{&box()->shell, &floor()->field, kHalfMillimetreDeep, Pose(), 0.0, 0.0005, 2};
+  PairQuery query{&box()->shell, &floor()->field, kHalfMillimetreDeep, Pose(), 0.0005, 2};
   const auto coarse = resultOf(query);
   const structures::ShellLevel& level = box()->shell.levels()[1];
   const std::uint32_t end = level.first_point + level.point_count;

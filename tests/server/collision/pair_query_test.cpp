@@ -24,6 +24,7 @@ using test::sphereStructures;
 using test::StructuresPtr;
 
 struct QueryOutcome {
+  test::StructuresPtr other;
   PairQuery query;
   std::unique_ptr<PairQueryResult> result = std::make_unique<PairQueryResult>();
 
@@ -34,21 +35,21 @@ struct QueryOutcome {
 QueryOutcome run(const test::StructuresPtr& a, const test::StructuresPtr& b, const Pose& X_WA,
                  const Pose& X_WB, double dilation, double margin, std::uint32_t levels = 0xFFFFFFFFU) {
   QueryOutcome outcome;
-  outcome.query = {&a->shell, &b->field, X_WA, X_WB, dilation, margin, levels};
+  outcome.other = test::dilated(b, dilation);
+  outcome.query = {&a->shell, &outcome.other->field, X_WA, X_WB, margin, levels};
   queryPair(outcome.query, *outcome.result);
   return outcome;
 }
 
 /// Contacts by testing every point, without the hierarchy: the reference for the traversal.
 std::vector<Contact> contactsOfAllPoints(const PairQuery& query) {
-  const LaneFrame frame(*query.field_B, query.X_WA, query.X_WB, query.dilation, query.margin,
-                        query.shell_A->radius());
+  const LaneFrame frame(*query.field_B, query.X_WA, query.X_WB, query.margin, query.shell_A->radius());
   std::vector<Contact> contacts;
   const auto points = query.shell_A->points();
   for (std::uint32_t i = 0; i < points.size(); ++i) {
     const structures::FieldSample sample = query.field_B->sample(frame.inB(points[i].p_MP.cast<double>()));
     Contact contact;
-    contact.gap = sample.distance - query.dilation;
+    contact.gap = sample.distance;
     contact.point = i;
     if (sample.exact && contact.gap <= query.margin) contacts.push_back(contact);
   }
@@ -289,6 +290,20 @@ TEST(SelectRepresentatives, SelectsAContactOfADifferentNormal) {
   EXPECT_TRUE(std::find(chosen.begin(), chosen.end(), 50U) != chosen.end());
   ContactList none;
   EXPECT_EQ(selectRepresentatives(none, chosen), 0U);
+}
+
+TEST(SelectRepresentatives, DormantCrossingsAreNone) {
+  ContactList contacts;
+  for (std::uint32_t i = 0; i < 40; ++i) {
+    Contact contact;
+    contact.p_WP = Vector3(0.001 * i, 0.0, 0.0);
+    contact.n_W = i % 2 == 0 ? Vector3::UnitX() : Vector3::UnitZ();
+    contact.gap = i % 4 == 3 ? 1e-4 : kDormantGap + 1e-4;
+    contacts.push_back(contact);
+  }
+  std::array<std::uint32_t, 16> chosen{};
+  ASSERT_EQ(selectRepresentatives(contacts, chosen), 10U);
+  for (std::size_t i = 0; i < 10; ++i) EXPECT_EQ(chosen[i] % 4, 3U);
 }
 
 TEST(QueryCounts, LoadIsThatOfThePapersEquation2) {

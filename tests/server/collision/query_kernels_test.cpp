@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "server/collision/pair_query.h"
+#include "server/structures/field_builder.h"
 #include "tests/support/analytic_structures.h"
 
 namespace tenon::collision {
@@ -25,9 +26,32 @@ test::StructuresPtr refinedBox() {
   return structures;
 }
 
+/// With a dilation of 0 to `largest` [m] that changes from brick to brick.
+test::StructuresPtr unevenlyDilated(const test::StructuresPtr& structures, float largest) {
+  const structures::DistanceField::Layout& layout = structures->field.layout();
+  structures::FieldStorage storage{layout,
+                                   {layout.index.begin(), layout.index.end()},
+                                   {layout.samples.begin(), layout.samples.end()},
+                                   {layout.far.begin(), layout.far.end()},
+                                   {}};
+  std::size_t corners = 1;
+  for (const std::int32_t count : layout.bricks) corners *= static_cast<std::size_t>(count) + 1;
+  std::vector<float> dilations(corners);
+  for (std::size_t i = 0; i < corners; ++i) dilations[i] = largest * static_cast<float>(i * 7 % 5) / 4.0F;
+  auto result = std::make_shared<structures::HapticStructures>(*structures);
+  result->field = structures::makeDilatedField(std::move(storage), dilations);
+  EXPECT_GT(result->field.slope(), 1.05);
+  return result;
+}
+
 std::vector<test::StructuresPtr> fields() {
-  return {test::boxStructures({0.06, 0.06, 0.06}, 0.002, 0.004), test::sphereStructures(0.04, 0.002, 0.004),
-          test::cornerStructures(0.1, 0.003), test::sheetStructures(0.1, 0.0, 0.002, 0.0007), refinedBox()};
+  return {test::boxStructures({0.06, 0.06, 0.06}, 0.002, 0.004),
+          test::sphereStructures(0.04, 0.002, 0.004),
+          test::cornerStructures(0.1, 0.003),
+          test::sheetStructures(0.1, 0.0, 0.002, 0.0007),
+          refinedBox(),
+          unevenlyDilated(refinedBox(), 0.0015F),
+          unevenlyDilated(test::sheetStructures(0.1, 0.001, 0.002, 0.0007), 0.0017F)};
 }
 
 Pose randomPose(std::mt19937_64& engine, double reach) {
@@ -88,7 +112,7 @@ TEST_F(QueryKernelsTest, EveryInstructionSetGivesTheSameBits) {
   for (int trial = 0; trial < 2000; ++trial) {
     const test::StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
     const Pose X_WA = randomPose(engine, trial % 7 == 0 ? 0.3 : 0.07);
-    PairQuery query{&box->shell, &other->field, X_WA, randomPose(engine, 0.02), 0.0004, 0.001};
+    PairQuery query{&box->shell, &other->field, X_WA, randomPose(engine, 0.02), 0.001};
     query.reduce = trial % 2 == 0;
     query.correct_ridges = trial % 4 < 2;
     PairQuery later = query;
@@ -116,8 +140,7 @@ TEST_F(QueryKernelsTest, SampledLanesEqualTheSamplesOfTheField) {
   SampleLanes lanes;
   for (const test::StructuresPtr& other : fields()) {
     for (int trial = 0; trial < 50; ++trial) {
-      const LaneFrame frame(other->field, randomPose(engine, 0.07), Pose(), 0.0004, 0.001,
-                            box->shell.radius());
+      const LaneFrame frame(other->field, randomPose(engine, 0.07), Pose(), 0.001, box->shell.radius());
       for (const QueryKernels& kernels : supportedKernels()) {
         for (std::size_t leaf = 0; leaf < box->shell.leaves().size(); ++leaf) {
           const structures::ShellBlock& block = box->shell.pointsOfLeaf(leaf);
@@ -149,7 +172,7 @@ TEST_F(QueryKernelsTest, PruningChangesNoContact) {
   const auto unpruned = std::make_unique<PairQueryResult>();
   for (int trial = 0; trial < 3000; ++trial) {
     const test::StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
-    PairQuery query{&box->shell, &other->field, randomPose(engine, 0.07), Pose(), 0.0004, 0.001};
+    PairQuery query{&box->shell, &other->field, randomPose(engine, 0.07), Pose(), 0.001};
     queryPair(query, *pruned);
     query.prune = false;
     queryPair(query, *unpruned);
@@ -175,11 +198,11 @@ TEST_F(QueryKernelsTest, NoPointIsNearerThanTheBoundOfCulledPoints) {
   for (int trial = 0; trial < 500; ++trial) {
     const test::StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
     const Pose X_WA = randomPose(engine, trial % 4 == 0 ? 0.2 : 0.07);
-    queryPair({&box->shell, &other->field, X_WA, Pose(), 0.0004, 0.0}, *result);
+    queryPair({&box->shell, &other->field, X_WA, Pose(), 0.0}, *result);
     for (const structures::ShellPoint& point : box->shell.points()) {
       const structures::FieldSample sample = other->field.sample(X_WA * point.p_MP.cast<double>());
       if (!sample.exact) continue;
-      ASSERT_LE(result->smallest_gap, sample.distance - 0.0004 + 1e-12) << "trial " << trial;
+      ASSERT_LE(result->smallest_gap, sample.distance + 1e-12) << "trial " << trial;
       ++compared;
     }
   }
@@ -200,15 +223,20 @@ TEST_F(QueryKernelsTest, NothingIsCulledInAGridTooLongForFloats) {
     const int z = i / (structures::DistanceField::kBrickSide * structures::DistanceField::kBrickSide);
     samples.push_back(static_cast<std::int16_t>((z - 4) * structures::DistanceField::kQuantaPerVoxel));
   }
-  const structures::DistanceField::Layout layout{Vector3::Zero(), kVoxel, {kBricks, 1, 1}, 1,  4.0 * kVoxel,
-                                                 kVoxel,          index,  samples,         far};
+  const structures::DistanceField::Layout layout{.voxel = kVoxel,
+                                                 .bricks = {kBricks, 1, 1},
+                                                 .band = 4.0 * kVoxel,
+                                                 .margin = kVoxel,
+                                                 .index = index,
+                                                 .samples = samples,
+                                                 .far = far};
   const structures::DistanceField floor(layout, nullptr);
   const test::StructuresPtr box = test::boxStructures({0.006, 0.006, 0.004}, 0.0005, 0.001);
   const Pose X_WA(Vector3((kFloor + 0.5) * 8.0 * kVoxel, 0.004, 0.005), Eigen::Quaterniond::Identity());
   const auto result = std::make_unique<PairQueryResult>();
   for (const QueryKernels& kernels : supportedKernels()) {
     ASSERT_TRUE(chooseKernels(kernels.isa));
-    queryPair({&box->shell, &floor, X_WA, Pose(), 0.0, 0.0}, *result);
+    queryPair({&box->shell, &floor, X_WA, Pose(), 0.0}, *result);
     EXPECT_GT(result->contacts.size(), 20U) << kernels.isa;
     for (const Contact& contact : result->contacts) EXPECT_NEAR(contact.gap, contact.p_WP.z() - 0.004, 1e-9);
   }

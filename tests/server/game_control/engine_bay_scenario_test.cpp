@@ -59,7 +59,7 @@ TEST(EngineBayScenario, HasThePosesOfTheGenerator) {
   }
 }
 
-TEST(EngineBayScenario, RefinesThePocketsEnoughForTheirClearance) {
+TEST(EngineBayScenario, RefinesThePockets) {
   const ScenarioFile scenario = engineBay();
   const ObjectId bay = scenario.objectNamed("engine_bay");
   for (std::size_t i = 0; i < part_generator::engine_bay::parts().size(); ++i) {
@@ -68,8 +68,6 @@ TEST(EngineBayScenario, RefinesThePocketsEnoughForTheirClearance) {
     ASSERT_GE(index, 0);
     const ScenarioPair& pair = scenario.pairs[static_cast<std::size_t>(index)];
     EXPECT_DOUBLE_EQ(pair.clearance, part_generator::engine_bay::kClearance) << part.name;
-    const auto dilation = dilationOf(scenario, pair, bay);
-    ASSERT_TRUE(dilation) << dilation.error().what;
     const Eigen::AlignedBox3d needed = part_generator::engine_bay::refineBox(part);
     const Eigen::AlignedBox3d& given = scenario.objects[bay.value].structures.refine[i];
     EXPECT_LT((given.min() - needed.min()).cwiseAbs().maxCoeff(), 1e-3) << part.name;

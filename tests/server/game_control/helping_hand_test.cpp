@@ -42,7 +42,7 @@ class HelpingHandTest : public testing::Test {
 TEST_F(HelpingHandTest, AHelperGrabsAHeldPartByTouchingItForOneSecond) {
   fixture_.step(50);
   ASSERT_EQ(fixture_.environment().hands()[0].object, part_);
-  moveInstructorTo(0.001);
+  moveInstructorTo(-0.001);
   fixture_.step(900);
   EXPECT_NE(instructor().object, part_);
   fixture_.step(400);
@@ -52,7 +52,7 @@ TEST_F(HelpingHandTest, AHelperGrabsAHeldPartByTouchingItForOneSecond) {
 }
 
 TEST_F(HelpingHandTest, HelpersReleaseAtTheEndOfTheState) {
-  moveInstructorTo(0.001);
+  moveInstructorTo(-0.001);
   fixture_.step(1500);
   ASSERT_EQ(instructor().object, part_);
   fixture_.step({GameCommand{.kind = CommandKind::kSkipStep}});
@@ -62,7 +62,7 @@ TEST_F(HelpingHandTest, HelpersReleaseAtTheEndOfTheState) {
 }
 
 TEST_F(HelpingHandTest, TheContactTimeOfAHelperIsSavedAndRestored) {
-  moveInstructorTo(0.001);
+  moveInstructorTo(-0.001);
   fixture_.step(600);
   const auto environment = fixture_.environment().save();
   const auto machine = fixture_.machine().save();

@@ -145,6 +145,12 @@ TEST(EventGenerator, AStepThatTimesOutWithoutATouchSaysSo) {
   output.step.step = 1;
   output.step.position_error = 0.1;
   output.step.angle_error = 0.2;
+  // also when it lies on something
+  output.pairs.push_back({0, {.a = ObjectId{1}, .b = ObjectId{0}, .colliding = true}});
+  EXPECT_EQ(whatBlocks(*rig.loaded().scenario, output),
+            "part is 100 mm and turned by 11.5 deg from its place, in no hand");
+  output.pairs.clear();
+  output.objects[1].holder = kRightHand;
   EXPECT_EQ(whatBlocks(*rig.loaded().scenario, output),
             "part is 100 mm and turned by 11.5 deg from its place, and touches nothing");
   output.step.position_error = 0.001;

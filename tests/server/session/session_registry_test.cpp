@@ -25,8 +25,13 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 class SessionRegistryTest : public ::testing::Test {
  protected:
   Welcome join(const std::string& guid, Role role, std::vector<std::string> hands = {},
-               const std::string& token = {}) {
-    return registry_.join({guid, guid + "'s station", role, std::move(hands), token}, 5);
+               const std::string& seat_key = {}, JoinProofs proofs = {.seat = true, .key = true}) {
+    return registry_.join({.client_guid = guid,
+                           .name = guid + "'s station",
+                           .role = role,
+                           .hands = std::move(hands),
+                           .seat_key = seat_key.empty() ? "seat of " + guid : seat_key},
+                          proofs, 5);
   }
   FixedVector<Change, kMaxChanges> changes() {
     FixedVector<Change, kMaxChanges> taken;
@@ -39,17 +44,16 @@ class SessionRegistryTest : public ::testing::Test {
   }
   static DeviceInput input(ClientId client, HandId hand) {
     DeviceInput all{.hand = hand, .client = client, .server_epoch = kEpoch, .active = true};
-    all.samples[0] = {.seq = 9, .X_WH = Pose(Vector3(0.1, 0.2, 0.3)), .buttons = 1};
+    all.sample = {.seq = 9, .X_WH = Pose(Vector3(0.1, 0.2, 0.3)), .buttons = 1};
     return all;
   }
 
   LoadedScene loaded_ = test::smallSession();
-  SessionRegistry registry_{*loaded_.scenario, kEpoch, false, 1};
+  SessionRegistry registry_{*loaded_.scenario, kEpoch, false};
   std::uint32_t commands_ = 0;
 };
 
 TEST_F(SessionRegistryTest, AcceptsATraineeAndAttachesItsHands) {
-  EXPECT_THAT(registry_.freeHands(), ElementsAre("right", "instructor", "left"));
   const Welcome welcome = join("a", Role::kTrainee, {"left", "right"});
   ASSERT_TRUE(welcome.accepted) << welcome.reason;
   EXPECT_EQ(welcome.client, ClientId{1});
@@ -59,7 +63,7 @@ TEST_F(SessionRegistryTest, AcceptsATraineeAndAttachesItsHands) {
   EXPECT_EQ(welcome.tick, 5U);
   EXPECT_EQ(registry_.controllerOf(test::kRightHand), welcome.client);
   EXPECT_TRUE(registry_.isRolePresent(Role::kTrainee));
-  EXPECT_THAT(registry_.freeHands(), ElementsAre("instructor"));
+  EXPECT_FALSE(registry_.controllerOf(test::kInstructorHand).valid());
 
   const auto taken = changes();
   ASSERT_EQ(taken.size(), 2U);
@@ -71,7 +75,7 @@ TEST_F(SessionRegistryTest, AcceptsATraineeAndAttachesItsHands) {
 
 TEST_F(SessionRegistryTest, RefusesWithAReason) {
   Join old{.client_guid = "old", .role = Role::kObserver, .protocol_version = kProtocolVersion + 1};
-  EXPECT_THAT(registry_.join(old, 0).reason, HasSubstr("protocol version"));
+  EXPECT_THAT(registry_.join(old, {}, 0).reason, HasSubstr("protocol version"));
   EXPECT_THAT(join("b", Role::kTrainee, {"instructor"}).reason, HasSubstr("belongs to the instructor"));
   EXPECT_THAT(join("c", Role::kObserver, {"right"}).reason, HasSubstr("belongs to the trainee"));
   EXPECT_THAT(join("d", static_cast<Role>(99)).reason, HasSubstr("role"));
@@ -97,23 +101,22 @@ TEST_F(SessionRegistryTest, ARepeatedJoinGetsTheSameAnswer) {
   const Welcome again = join("a", Role::kTrainee, {"right"});
   EXPECT_TRUE(again.accepted);
   EXPECT_EQ(again.client, first.client);
-  EXPECT_EQ(again.token, first.token);
   EXPECT_EQ(again.hands, first.hands);
   EXPECT_EQ(registry_.clients().size(), 1U);
   EXPECT_EQ(changes().size(), 1U) << "the hand is attached once";
 }
 
-TEST_F(SessionRegistryTest, ATokenRejoinsAsTheSameClient) {
+TEST_F(SessionRegistryTest, TheKeyOfASeatRejoinsAsTheSameClient) {
   const Welcome first = join("a", Role::kTrainee, {"right"});
-  const Welcome other = join("b", Role::kObserver);
-  ASSERT_NE(first.token, other.token);
+  const std::string key = "seat of a";
+  (void)join("b", Role::kObserver);
   registry_.leave(first.client);
-  EXPECT_EQ(join("c", Role::kTrainee, {"right"}, first.token).client, first.client);
+  EXPECT_EQ(join("c", Role::kTrainee, {"right"}, key).client, first.client);
   EXPECT_EQ(registry_.guidOf(first.client), "c");
 
   // a station that was restarted before its former process was noticed to be gone
   (void)changes();
-  const Welcome again = join("d", Role::kTrainee, {"right"}, first.token);
+  const Welcome again = join("d", Role::kTrainee, {"right"}, key);
   EXPECT_TRUE(again.accepted) << again.reason;
   EXPECT_EQ(again.client, first.client);
   const auto taken = changes();
@@ -122,7 +125,69 @@ TEST_F(SessionRegistryTest, ATokenRejoinsAsTheSameClient) {
   EXPECT_EQ(taken[1].kind, ChangeKind::kAttach);
   EXPECT_EQ(registry_.clients().size(), 2U);
 
-  EXPECT_EQ(join("e", Role::kObserver, {}, "no such token").client, ClientId{3});
+  EXPECT_EQ(join("e", Role::kObserver, {}, "no such seat").client, ClientId{3});
+}
+
+TEST_F(SessionRegistryTest, NobodyIsEvictedByARequestThatIsRefused) {
+  const Welcome first = join("a", Role::kTrainee, {"right"});
+  (void)changes();
+  EXPECT_TRUE(registry_.mustProve({.role = Role::kObserver, .seat_key = "seat of a"}));
+  EXPECT_FALSE(registry_.mustProve({.role = Role::kObserver, .seat_key = "a new one"}));
+  const std::string key = "seat of a";
+  EXPECT_THAT(join("b", Role::kTrainee, {"right"}, key, {.seat = false}).reason,
+              HasSubstr("another program's"));
+  EXPECT_THAT(join("c", Role::kTrainee, {"instructor"}, key).reason, HasSubstr("belongs to the instructor"));
+  EXPECT_THAT(join("d", Role::kInstructor, {}, key, {.seat = true, .key = false}).reason,
+              HasSubstr("needs the key"));
+  EXPECT_TRUE(registry_.findClient(first.client)->alive);
+  EXPECT_EQ(registry_.controllerOf(test::kRightHand), first.client);
+  EXPECT_TRUE(changes().empty());
+}
+
+TEST_F(SessionRegistryTest, TheKeyIsNeededByInstructorsAndAdminsAlone) {
+  for (const Role role : {Role::kAdmin, Role::kInstructor}) {
+    EXPECT_TRUE(registry_.mustProve({.role = role}));
+    EXPECT_THAT(join("a", role, {}, {}, {.seat = true}).reason, HasSubstr("needs the key of this session"));
+  }
+  for (const Role role : {Role::kTrainee, Role::kObserver, Role::kRecorder}) {
+    EXPECT_FALSE(registry_.mustProve({.role = role}));
+    EXPECT_TRUE(join("b" + std::to_string(static_cast<int>(role)), role, {}, {}, {}).accepted);
+  }
+}
+
+TEST_F(SessionRegistryTest, SeatsAreBounded) {
+  for (const RoleRights& row : kRoles) {
+    const std::string name = std::to_string(static_cast<int>(row.role));
+    for (std::size_t i = 0; i < row.seats; ++i)
+      ASSERT_TRUE(join(name + "/" + std::to_string(i), row.role).accepted) << name << " " << i;
+    EXPECT_THAT(join(name + "/more", row.role).reason, HasSubstr("seats of the role")) << name;
+    EXPECT_TRUE(join(name + "/again", row.role, {}, "seat of " + name + "/0").accepted)
+        << "who has a seat may come back to it";
+  }
+  // those who come and go for days: the memory of who left is bounded too
+  const ClientId first{1};
+  registry_.leave(ClientId{17});  // a trainee: the seats of admins and instructors were given first
+  for (int i = 0; i < 3000; ++i) {
+    registry_.leave(join("visitor " + std::to_string(i), Role::kTrainee).client);
+    registry_.leave(first);
+    ASSERT_TRUE(join("admin " + std::to_string(i), Role::kAdmin, {}, "seat of 0/0").accepted);
+  }
+  EXPECT_LE(registry_.clients().size(), 1024U);
+  EXPECT_EQ(registry_.findClient(first)->name, "admin 2999's station");
+}
+
+TEST_F(SessionRegistryTest, AClearedEmergencyStopLeavesTheRunPaused) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  EXPECT_THAT(command(instructor, CommandKind::kClearEmergencyStop).reason, HasSubstr("no emergency stop"));
+  registry_.engageEmergencyStop();
+  EXPECT_TRUE(command(instructor, CommandKind::kClearEmergencyStop).accepted);
+  const auto taken = changes();
+  ASSERT_EQ(taken.size(), 3U);
+  EXPECT_EQ(taken[1].kind, ChangeKind::kPause) << "before the stop ends";
+  EXPECT_EQ(taken[2].kind, ChangeKind::kSetEmergencyStop);
+  EXPECT_EQ(taken[2].value, 0.0);
+  EXPECT_TRUE(command(instructor, CommandKind::kResume).accepted);
 }
 
 TEST_F(SessionRegistryTest, AClientThatLeavesFreesItsHands) {
@@ -166,7 +231,7 @@ TEST_F(SessionRegistryTest, ARepeatedCommandGetsTheFormerAckAndIsNotAppliedAgain
   EXPECT_EQ(registry_.previousAck({instructor, 8, CommandKind::kPause}), nullptr);
   EXPECT_EQ(registry_.previousAck({ClientId{9}, 7, CommandKind::kPause}), nullptr);
   registry_.leave(instructor);
-  ASSERT_EQ(join("c", Role::kInstructor, {}, welcome.token).client, instructor);
+  ASSERT_EQ(join("c", Role::kInstructor, {}, "seat of b").client, instructor);
   EXPECT_EQ(registry_.previousAck(pause), nullptr) << "a rejoined client numbers its commands anew";
 }
 
@@ -208,7 +273,7 @@ TEST_F(SessionRegistryTest, RefusesImplausiblePosesAndVelocities) {
   const ClientId client = join("a", Role::kTrainee, {"right"}).client;
   const auto refuses = [&](auto&& corrupt) {
     DeviceInput bad = input(client, test::kRightHand);
-    corrupt(bad.samples[0]);
+    corrupt(bad.sample);
     return !registry_.validateDeviceInput(bad);
   };
   EXPECT_TRUE(refuses([](DeviceSample& s) { s.X_WH = Pose(Vector3(kNan, 0, 0)); }));
@@ -344,23 +409,25 @@ TEST_F(SessionRegistryTest, OnlyWithInstructorRightsObjectsArePlaced) {
 }
 
 TEST_F(SessionRegistryTest, ChangesBeyondTheCapacityOfATickWaitForTheNext) {
-  for (int i = 0; i < 40; ++i) registry_.setEmergencyStop({.engaged = i % 2 == 0});
+  const ClientId instructor = join("a", Role::kInstructor).client;
+  for (int i = 0; i < 40; ++i) (void)command(instructor, CommandKind::kSetCollision, "bay part", i);
   EXPECT_EQ(changes().size(), kMaxChanges);
   EXPECT_EQ(changes().size(), kMaxChanges);
   const auto rest = changes();
   ASSERT_EQ(rest.size(), 40 - 2 * kMaxChanges);
-  EXPECT_EQ(rest[0].kind, ChangeKind::kSetEmergencyStop);
-  EXPECT_EQ(rest[0].value, 1.0) << "number 32, in order";
+  EXPECT_EQ(rest[0].kind, ChangeKind::kEnablePair);
+  EXPECT_EQ(rest[0].value, 32.0) << "in order";
 }
 
 TEST_F(SessionRegistryTest, ASeatBelongsToTheParticipantThatJoined) {
   const wire::Origin owner{{1, 2, 3}};
   const wire::Origin intruder{{9, 9, 9}};
-  const Join join{"a", "Ada", Role::kTrainee, {"right"}};
-  const Welcome welcome = registry_.join(join, 0, owner);
+  const Join join{
+      .client_guid = "a", .name = "Ada", .role = Role::kTrainee, .hands = {"right"}, .seat_key = "a"};
+  const Welcome welcome = registry_.join(join, {}, 0, owner);
   EXPECT_TRUE(registry_.ownsSeat(welcome.client, owner));
   EXPECT_FALSE(registry_.ownsSeat(welcome.client, intruder));
-  (void)registry_.join(join, 0, intruder);
+  (void)registry_.join(join, {}, 0, intruder);
   EXPECT_TRUE(registry_.ownsSeat(welcome.client, owner))
       << "a repeated join from elsewhere does not move the seat";
   EXPECT_FALSE(registry_.ownsSeat(ClientId{9}, owner));

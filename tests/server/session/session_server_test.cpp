@@ -37,6 +37,7 @@ class RunningServer {
  public:
   explicit RunningServer(SessionOptions options) : session_(options.name) {
     options.domain = test::ownDomain();
+    if (!options.key) options.key = test::kTestKey;
     auto opened = SessionServer::open(loaded_, std::move(options));
     if (!opened) throw std::runtime_error(opened.error().what);
     server_ = std::move(*opened);
@@ -87,8 +88,8 @@ TEST(SessionServer, InLockstepEveryInputIsOneTick) {
   EXPECT_TRUE(client.welcome.lockstep);
   EXPECT_EQ(client.welcome.server_epoch, client.announce.server_epoch);
   EXPECT_EQ(client.welcome.tick, 0U);
-  EXPECT_TRUE(client.receivesUntil([&] { return client.announce.free_hands.size() == 2; }));
-  EXPECT_THAT(client.announce.free_hands, ElementsAre("instructor", "left"));
+  EXPECT_EQ(client.announce.pid, static_cast<std::uint32_t>(getpid()));
+  EXPECT_NE(client.announce.host, "");
 
   runInLockstep(client, 1, 200);
   const SessionReport report = server.end();
@@ -230,15 +231,16 @@ TEST(SessionServer, InLockstepAClientWithInputAheadOfTheNextTickIsDismissed) {
   EXPECT_TRUE(client.receivesUntil([&] { return client.received("leave", "input of tick 9"); }));
 }
 
-TEST(SessionServer, ADismissedClientRejoinsWithItsToken) {
+TEST(SessionServer, ADismissedClientRejoinsWithTheKeyOfItsSeat) {
   RunningServer server({.name = "back", .lockstep = true, .wait_for = {"right"}});
   test::ScriptedClient client("back", wire::LinkProfile::kLockstep);
-  ASSERT_TRUE(client.join("right", Role::kTrainee, {"right"}));
+  const wire::SeatKey key = wire::SeatKey::random();
+  ASSERT_TRUE(client.join("right", Role::kTrainee, {"right"}, key));
   const Welcome seat = client.welcome;
   runInLockstep(client, 1, 5);
   client.sendPose(9, rightHandAt(9));
   ASSERT_TRUE(client.receivesUntil([&] { return !client.welcome.accepted; }));
-  ASSERT_TRUE(client.join("right, rejoined", Role::kTrainee, {"right"}, seat.token));
+  ASSERT_TRUE(client.join("right, rejoined", Role::kTrainee, {"right"}, key));
   ASSERT_TRUE(client.welcome.accepted) << client.welcome.reason;
   EXPECT_EQ(client.welcome.client, seat.client);
   EXPECT_THAT(client.welcome.hands, ElementsAre(test::kRightHand));
@@ -250,26 +252,131 @@ TEST(SessionServer, AnyClientEngagesAnEmergencyStopAndOnlyTheInstructorClearsIt)
   RunningServer server({.name = "emergency", .wait_for = {"right"}});
   test::ScriptedClient trainee("emergency", wire::LinkProfile::kLan);
   test::ScriptedClient instructor("emergency", wire::LinkProfile::kLan);
+  test::ScriptedClient admin("emergency", wire::LinkProfile::kLan);
   ASSERT_TRUE(trainee.join("trainee", Role::kTrainee, {"right"}));
   ASSERT_TRUE(instructor.join("instructor", Role::kInstructor, {}));
-  trainee.emergencyStop(true);
-  ASSERT_TRUE(
+  ASSERT_TRUE(admin.join("admin", Role::kAdmin, {}));
+  trainee.emergencyStop();
+  trainee.emergencyStop();
+  ASSERT_TRUE(trainee.receivesUntil([&] { return trainee.stops.standing().size() == 2; }));
+  EXPECT_TRUE(
       trainee.receivesUntil([&] { return trainee.received("emergency stop", "engaged by trainee"); }));
 
-  trainee.emergencyStop(false);
-  EXPECT_TRUE(trainee.receivesUntil([&] { return trainee.received("refused", "may not clear"); }));
   trainee.command(CommandKind::kClearEmergencyStop);
   ASSERT_TRUE(trainee.receivesUntil([&] { return trainee.ack.id == 1; }));
   EXPECT_FALSE(trainee.ack.accepted);
+  admin.command(CommandKind::kClearEmergencyStop);
+  ASSERT_TRUE(admin.receivesUntil([&] { return admin.ack.id == 1; }));
+  EXPECT_THAT(admin.ack.reason, HasSubstr("an instructor is present"));
 
   instructor.command(CommandKind::kClearEmergencyStop);
   ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 1; }));
   EXPECT_TRUE(instructor.ack.accepted) << instructor.ack.reason;
-  EXPECT_TRUE(instructor.receivesUntil(
-      [&] { return instructor.received("emergency stop", "cleared by instructor"); }));
+  EXPECT_TRUE(trainee.receivesUntil([&] { return trainee.stops.cleared().size() == 2; }));
+  EXPECT_FALSE(trainee.stops.engaged());
   instructor.command(CommandKind::kClearEmergencyStop);
   ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 2; }));
   EXPECT_EQ(instructor.ack.reason, "there is no emergency stop");
+
+  trainee.emergencyStop();
+  EXPECT_TRUE(trainee.receivesUntil([&] { return trainee.stops.engaged(); })) << "a new raise is not cleared";
+}
+
+TEST(SessionServer, WithoutAnInstructorAnAdminClearsTheEmergencyStopAndTheRunStaysPaused) {
+  RunningServer server({.name = "alone", .lockstep = true, .wait_for = {"right"}});
+  test::ScriptedClient trainee("alone", wire::LinkProfile::kLockstep);
+  test::ScriptedClient admin("alone", wire::LinkProfile::kLockstep);
+  ASSERT_TRUE(trainee.join("trainee", Role::kTrainee, {"right"}));
+  ASSERT_TRUE(admin.join("admin", Role::kAdmin, {}));
+  runInLockstep(trainee, 1, 3);
+  trainee.emergencyStop();
+  ASSERT_TRUE(
+      trainee.receivesUntil([&] { return trainee.received("emergency stop", "engaged by trainee"); }));
+  runInLockstep(trainee, 4, 6);
+  EXPECT_TRUE(trainee.newest.frozen);
+  admin.command(CommandKind::kClearEmergencyStop);
+  ASSERT_TRUE(admin.receivesUntil([&] { return admin.ack.id == 1; }));
+  EXPECT_TRUE(admin.ack.accepted) << admin.ack.reason;
+  runInLockstep(trainee, 7, 9);
+  EXPECT_TRUE(trainee.newest.frozen) << "the stop is cleared, the run is paused";
+  admin.command(CommandKind::kResume);
+  ASSERT_TRUE(admin.receivesUntil([&] { return admin.ack.id == 2; }));
+  EXPECT_TRUE(admin.ack.accepted) << admin.ack.reason;
+  runInLockstep(trainee, 10, 12);
+  EXPECT_FALSE(trainee.newest.frozen);
+}
+
+TEST(SessionServer, AnEmergencyStopStandsAfterARestartUntilItIsCleared) {
+  const auto file = std::filesystem::temp_directory_path() / ("tenon-stop-test-" + std::to_string(getpid()));
+  std::filesystem::remove(file);
+  const auto options = [&] {
+    return SessionOptions{.name = "restart", .wait_for = {"right"}, .stop_file = file};
+  };
+  EmergencyStop raised;
+  {
+    RunningServer server(options());
+    test::ScriptedClient trainee("restart", wire::LinkProfile::kLan);
+    ASSERT_TRUE(trainee.join("trainee", Role::kTrainee, {"right"}));
+    trainee.emergencyStop();
+    ASSERT_TRUE(
+        trainee.receivesUntil([&] { return trainee.received("emergency stop", "engaged by trainee"); }));
+    raised = trainee.stops.standing().begin()->second;
+  }
+  {
+    RunningServer server(options());
+    test::ScriptedClient late("restart", wire::LinkProfile::kLan);
+    ASSERT_TRUE(late.join("late", Role::kInstructor, {}));
+    ASSERT_TRUE(late.receivesUntil([&] { return late.stops.engaged(); }));
+    EXPECT_EQ(late.stops.standing().begin()->first.client_guid, raised.client_guid);
+    late.command(CommandKind::kClearEmergencyStop);
+    ASSERT_TRUE(late.receivesUntil([&] { return late.ack.id == 1; }));
+    EXPECT_TRUE(late.ack.accepted) << late.ack.reason;
+  }
+  RunningServer server(options());
+  test::ScriptedClient last("restart", wire::LinkProfile::kLan);
+  ASSERT_TRUE(last.join("last", Role::kInstructor, {}));
+  ASSERT_TRUE(last.receivesUntil([&] { return last.stops.cleared().size() == 1; }));
+  EXPECT_FALSE(last.stops.engaged());
+  std::filesystem::remove(file);
+}
+
+TEST(SessionServer, ASecondServerOfALiveSessionIsRefusedAndNamesHostAndProcess) {
+  RunningServer server({.name = "twice", .wait_for = {"right"}});
+  const auto second =
+      SessionServer::open(test::smallSession(), {.name = "twice", .domain = test::ownDomain()});
+  ASSERT_FALSE(second);
+  EXPECT_THAT(second.error().what, HasSubstr("session 'twice' is served already"));
+  EXPECT_THAT(second.error().what, HasSubstr("process " + std::to_string(getpid()) + " on host "));
+}
+
+TEST(SessionServer, AnInstructorWithoutTheKeyOrWithAnotherOneIsRefusedWithTheReason) {
+  RunningServer server({.name = "locked", .wait_for = {"right"}});
+  test::ScriptedClient client("locked", wire::LinkProfile::kLan);
+  ASSERT_TRUE(client.join("wrong", Role::kInstructor, {}, wire::SeatKey::random(), {{9}}));
+  EXPECT_FALSE(client.welcome.accepted);
+  EXPECT_THAT(client.welcome.reason, HasSubstr("the key is not the one of this session"));
+  ASSERT_TRUE(client.join("right", Role::kInstructor, {}));
+  EXPECT_TRUE(client.welcome.accepted) << client.welcome.reason;
+}
+
+TEST(SessionServer, AClientThatKnowsThePublicKeyOfASeatAloneEvictsNobody) {
+  RunningServer server({.name = "thief", .wait_for = {"right"}});
+  test::ScriptedClient owner("thief", wire::LinkProfile::kLan);
+  test::ScriptedClient thief("thief", wire::LinkProfile::kLan);
+  const wire::SeatKey seat = wire::SeatKey::random();
+  ASSERT_TRUE(owner.join("owner", Role::kTrainee, {"right"}, seat));
+  ASSERT_TRUE(owner.welcome.accepted) << owner.welcome.reason;
+  ASSERT_TRUE(thief.joinWithSeatOf("thief", seat.publicKey(), {"right"}));
+  EXPECT_FALSE(thief.welcome.accepted);
+  EXPECT_THAT(thief.welcome.reason, HasSubstr("the seat is another program's"));
+  EXPECT_TRUE(owner.welcome.accepted) << "nobody was told to have lost a seat";
+  // a request for another session or another life of the server is not heard at all
+  thief.ask(
+      {.client_guid = "elsewhere", .session = "elsewhere", .server_epoch = thief.announce.server_epoch});
+  thief.ask(
+      {.client_guid = "elsewhere", .session = "thief", .server_epoch = thief.announce.server_epoch + 1});
+  ASSERT_TRUE(thief.join("observer", Role::kObserver, {}));
+  EXPECT_EQ(thief.answers_to_others, 0);
 }
 
 TEST(SessionServer, AStopCommandEndsASessionThatStillWaitsForPeople) {

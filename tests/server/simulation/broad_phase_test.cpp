@@ -17,6 +17,11 @@ struct Sphere {
   bool present = true;
 };
 
+double dilationOf(const Scene& scene, ObjectId object) {
+  const auto& structures = scene.objects[object.value].structures;
+  return structures ? structures->field.dilation() : 0.0;
+}
+
 /// Brute force over all pairs.
 std::vector<std::uint32_t> bruteForce(const Scene& scene, const std::vector<Sphere>& spheres, double margin) {
   std::vector<std::uint32_t> result;
@@ -24,7 +29,8 @@ std::vector<std::uint32_t> bruteForce(const Scene& scene, const std::vector<Sphe
     const PairSpec& spec = scene.pairs[pair];
     const Sphere& a = spheres[spec.a.value];
     const Sphere& b = spheres[spec.b.value];
-    const double gap = (a.p_WC - b.p_WC).norm() - a.radius - b.radius - spec.dilation;
+    const double dilation = std::max(dilationOf(scene, spec.a), dilationOf(scene, spec.b));
+    const double gap = (a.p_WC - b.p_WC).norm() - a.radius - b.radius - dilation;
     if (a.present && b.present && gap <= margin) result.push_back(pair);
   }
   return result;
@@ -47,10 +53,12 @@ class BroadPhaseTest : public testing::Test {
   static constexpr std::uint32_t kSpheres = 60;
 
   BroadPhaseTest() {
-    for (std::uint32_t i = 0; i < kSpheres; ++i) small_.object("sphere", nullptr, Vector3::Zero());
+    const test::StructuresPtr thick = test::dilated(test::pointerShape(), 0.003);
+    for (std::uint32_t i = 0; i < kSpheres; ++i)
+      small_.object("sphere", i % 3 == 0 ? thick : nullptr, Vector3::Zero());
     for (std::uint32_t i = 0; i < kSpheres; ++i) {
       for (std::uint32_t j = 0; j < i; ++j) {
-        if ((i + j) % 5 != 0) small_.pair(ObjectId{i}, ObjectId{j}, false, 0.001 * (i % 4));
+        if ((i + j) % 5 != 0) small_.pair(ObjectId{i}, ObjectId{j});
       }
     }
     // a second pair of the same two objects, in the other order

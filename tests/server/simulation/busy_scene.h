@@ -3,15 +3,16 @@
 #include <cmath>
 #include <limits>
 
+#include "tests/server/collision/baked_pair.h"
 #include "tests/server/simulation/small_scene.h"
 
 namespace tenon::test {
 
-/// Ten objects, four hands and every kind of input within 3,000 ticks, for the determinism tests.
+/// Twelve objects, five hands and every kind of input within 3,000 ticks, for the determinism tests.
 ///
 ///        cube             forearm
-///    o       o  pointers
-///  [p0][p1][p2][p3]  parts in a row     | wall
+///    o       o  pointers                       ------- bar, held edge down
+///  [p0][p1][p2][p3]  parts in a row     | wall    <>   beam across it, edge up: their edges cross
 ///  ===================== floor ==========
 struct BusyScene {
   BusyScene() {
@@ -29,6 +30,9 @@ struct BusyScene {
     left = small.hand("left", left_pointer);
     instructor = small.hand("instructor", cube);
     arm = small.hand("forearm", forearm, simulation::HandKind::kTracked);
+    beam = small.object("beam", beamShape(), kBeam);
+    bar = small.object("bar", heldBarShape(), kBeam + Vector3(0.0, 0.0, 0.05));
+    crossing = small.hand("crossing", bar);
     for (const ObjectId moving :
          {right_pointer, left_pointer, cube, parts[0], parts[1], parts[2], parts[3]}) {
       small.pair(moving, floor);
@@ -41,11 +45,21 @@ struct BusyScene {
     }
     small.pair(right_pointer, left_pointer);
     small.pair(forearm, floor, true);
+    small.pair(bar, beam);
     scene = small.build();
   }
 
   static StructuresPtr cornerShape() {
     static const StructuresPtr shape = cornerStructures(0.15, 0.005);
+    return shape;
+  }
+
+  static StructuresPtr heldBarShape() {
+    static const StructuresPtr shape = barShape(Vector3::UnitX());
+    return shape;
+  }
+  static StructuresPtr beamShape() {
+    static const StructuresPtr shape = barShape(Vector3::UnitY());
     return shape;
   }
 
@@ -61,12 +75,18 @@ struct BusyScene {
                   expRotation({0.3 * wave(0.5, phase), 0.2 * wave(0.8, phase), 0.4 * wave(0.3, phase)}));
     };
     if (tick == 1) {
-      for (const HandId hand : {right, left, instructor, arm}) environment.setHandPresent(hand, true);
+      for (const HandId hand : {right, left, instructor, arm, crossing})
+        environment.setHandPresent(hand, true);
     }
     environment.setHandPose(right, pose(-0.04, 0.0, 0.05, 0.0), {});
     environment.setHandPose(left, pose(0.04, 0.0, 0.05, 1.0), {});
     environment.setHandPose(instructor, pose(0.0, 0.02, 0.05, 2.0), {});
     environment.setHandPose(arm, pose(0.02, -0.02, 0.04, 3.0), {});
+    // presses into the beam and leaves it, slides to its end and beyond
+    const Vector3 p_BeamH(0.01 * wave(0.6, 0.0), 0.02 + 0.012 * wave(0.4, 1.0),
+                          2.0 * kBarEdge + 0.003 * wave(1.7, 0.0));
+    environment.setHandPose(
+        crossing, Pose(kBeam + p_BeamH, expRotation({0.05 * wave(0.5, 1.0), 0.0, 0.2 * wave(0.3, 0.0)})), {});
     const double nan = std::numeric_limits<double>::quiet_NaN();
     switch (tick) {
       case 300:
@@ -127,11 +147,13 @@ struct BusyScene {
     }
   }
 
+  inline static const Vector3 kBeam{0.25, -0.25, 0.15};  ///< [m] p_WO of the beam
+
   SmallScene small;
   std::shared_ptr<const simulation::Scene> scene;
-  ObjectId floor, wall, right_pointer, left_pointer, cube, forearm;
+  ObjectId floor, wall, right_pointer, left_pointer, cube, forearm, bar, beam;
   ObjectId parts[4];
-  HandId right, left, instructor, arm;
+  HandId right, left, instructor, arm, crossing;
 };
 
 }  // namespace tenon::test

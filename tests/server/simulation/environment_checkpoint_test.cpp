@@ -65,6 +65,8 @@ TEST(EnvironmentCheckpoint, RestoreSurvivesCorruptedBytes) {
 TEST(EnvironmentCheckpoint, ACheckpointWithANumberThatIsNotFiniteIsRejected) {
   const test::BusyScene busy;
   Environment environment(busy.scene, {});
+  // the bars have many contacts, and every number costs a restore
+  environment.place(busy.bar, Pose(), ObjectStatus::kHidden);
   busy.play(environment, 320);
   // a tick with contacts and with all kinds of force cells
   while (environment.nearPairs().empty() || !environment.objects()[busy.parts[0].value].in_contact) {
@@ -88,6 +90,39 @@ TEST(EnvironmentCheckpoint, ACheckpointWithANumberThatIsNotFiniteIsRejected) {
   }
   EXPECT_EQ(environment.hash(), hash);
   ASSERT_TRUE(environment.restore(good));
+}
+
+TEST(EnvironmentCheckpoint, ACrossingAtAFeatureWithoutAnEdgeIsRejected) {
+  const test::BusyScene busy;
+  Environment environment(busy.scene, {});
+  while (!environment.objects()[busy.bar.value].in_contact) {
+    ASSERT_LT(environment.tick(), 3000U);
+    busy.play(environment, environment.tick() + 1);
+  }
+  busy.play(environment, environment.tick() + 20);
+  const structures::FeatureShell& of_A = busy.heldBarShape()->features;
+  const structures::FeatureShell& of_B = busy.beamShape()->features;
+  std::uint32_t corner = 0;
+  while (collision::isEdge(of_B, corner)) ++corner;
+  ASSERT_LT(corner, of_B.edges().size()) << "a bar has corners";
+  // a crossing: its kind, and a piece of an edge of each bar
+  constexpr std::size_t kSize = 1 + 2 * sizeof(std::uint32_t);
+  const std::vector<std::uint8_t> good = environment.save();
+  int crossings = 0;
+  for (std::size_t at = 0; at + kSize <= good.size(); ++at) {
+    std::array<std::uint32_t, 2> index{};
+    std::memcpy(index.data(), good.data() + at + 1, sizeof index);
+    const bool is_crossing = good[at] == static_cast<std::uint8_t>(collision::ContactKind::kCrossing);
+    if (!is_crossing || !collision::isEdge(of_A, index[0]) || !collision::isEdge(of_B, index[1]) ||
+        index[0] < 2 || index[1] < 2)
+      continue;
+    std::vector<std::uint8_t> bad = good;
+    std::memcpy(bad.data() + at + 1 + sizeof corner, &corner, sizeof corner);
+    EXPECT_FALSE(environment.restore(bad)) << "byte " << at;
+    ++crossings;
+  }
+  EXPECT_GT(crossings, 0);
+  EXPECT_TRUE(environment.restore(good));
 }
 
 TEST(EnvironmentCheckpoint, SavedDoublesAreWhereTheNumbersAre) {

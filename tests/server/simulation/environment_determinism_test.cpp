@@ -1,3 +1,7 @@
+#include <algorithm>
+#include <array>
+#include <memory>
+
 #include <gtest/gtest.h>
 
 #include "server/simulation/environment.h"
@@ -60,6 +64,38 @@ TEST(EnvironmentDeterminism, TheSceneHasContactsAndSkippedPairs) {
   EXPECT_TRUE(capped_load);
 }
 
+// So that restores and numbers of workers are tried with contacts of features, those that hold nothing too.
+TEST(EnvironmentDeterminism, TheSceneHasCrossingsOfEdgesBeforeAndAfterTheCheckpoint) {
+  const test::BusyScene busy;
+  Environment environment(busy.scene, withWorkers(1));
+  const auto& bar = *busy.heldBarShape();
+  const auto& beam = *busy.beamShape();
+  const collision::PairFeatures features{&bar.features, &beam.features, &bar.field, 0.0};
+  const auto scratch = std::make_unique<collision::FeatureScratch>();
+  const auto found = std::make_unique<collision::PairQueryResult>();
+  std::array<int, 2> active{}, dormant{};  // ticks: before and after the checkpoint
+  while (environment.tick() < kTicks) {
+    busy.play(environment, environment.tick() + 1);
+    const ObjectMotion& motion = environment.objects()[busy.bar.value];
+    if (!motion.in_contact) continue;
+    const collision::PairQuery query{&bar.shell, &beam.field, motion.X_WO,
+                                     environment.objects()[busy.beam.value].X_WO, 0.0005};
+    collision::queryPair(query, *found);
+    collision::queryFeatures(query, features, *scratch, *found);
+    const std::size_t part = environment.tick() <= 1000 ? 0 : 1;
+    const auto isTouching = [](const collision::Contact& one) {
+      return one.kind == collision::ContactKind::kCrossing && one.gap <= collision::kTouchGap;
+    };
+    const auto isDormant = [](const collision::Contact& one) { return one.dormant(); };
+    active[part] += std::ranges::any_of(found->contacts, isTouching) ? 1 : 0;
+    dormant[part] += std::ranges::any_of(found->contacts, isDormant) ? 1 : 0;
+  }
+  for (const std::size_t part : {0U, 1U}) {
+    EXPECT_GT(active[part], 50);
+    EXPECT_GT(dormant[part], 10);
+  }
+}
+
 TEST(EnvironmentDeterminism, CoherenceNeverMissesAContact) {
   const test::BusyScene busy;
   EnvironmentOptions every_pair;
@@ -105,15 +141,19 @@ TEST(EnvironmentDeterminism, StepAllocatesNothingAndLocksNothing) {
     busy.play(environment, 10);
     HandManifold manifold;
     PairContact contact;
+    bool crossed = false;
     const test::RealtimeGuard guard(test::CountedThreads::kAll);
     std::uint64_t hash = 0;
     while (environment.tick() < 1300) {
       busy.play(environment, environment.tick() + 1);
       hash ^= environment.hash();
       environment.manifold(busy.right, manifold);
+      environment.manifold(busy.crossing, manifold);
+      crossed = crossed || environment.objects()[busy.bar.value].in_contact;
       environment.pairContact(0, contact);
     }
     EXPECT_NE(hash, 0U);
+    EXPECT_TRUE(crossed);
     EXPECT_EQ(guard.allocations(), 0);
     EXPECT_EQ(guard.locks(), 0);
   }

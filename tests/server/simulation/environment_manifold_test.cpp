@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/simulation/environment.h"
+#include "tests/server/collision/baked_pair.h"
 #include "tests/server/simulation/small_scene.h"
 
 namespace tenon::simulation {
@@ -123,6 +124,26 @@ TEST(Manifold, ContainsTheVelocityOfTheOtherBody) {
     EXPECT_NEAR(contact.velocity_W.x(), -0.2, 0.01);
     EXPECT_NEAR(contact.velocity_W.tail<2>().norm(), 0.0, 0.01);
   }
+}
+
+//   <> <>   a bar beside the end of another one: their edges pass each other, and cross when the hand goes
+//   ----    back by the 0.4 mm between them
+TEST(Manifold, IsValidAsFarAsACrossingThatMayComeAbout) {
+  const Vector3 beside(0.0, 0.0304, 2.0 * test::kBarEdge - 0.0001);
+  test::SmallScene small;
+  const ObjectId held = small.object("held", test::barShape(Vector3::UnitX()), beside);
+  const ObjectId still = small.object("still", test::barShape(Vector3::UnitY()), Vector3::Zero());
+  const HandId hand = small.hand("right", held);
+  small.pair(held, still);
+  Environment environment(small.build(), {});
+  test::activateHand(environment, hand, beside);
+  test::stepTicks(environment, 20);
+  HandManifold manifold;
+  environment.manifold(hand, manifold);
+  ASSERT_FALSE(environment.objects()[held.value].in_contact);
+  EXPECT_LE(manifold.validity_radius, std::hypot(0.0004, 0.0001) + 1e-6);
+  EXPECT_GT(manifold.validity_radius, 0.00005);
+  for (const ManifoldContact& contact : manifold.contacts) EXPECT_LT(contact.gap, 0.001);
 }
 
 TEST(Manifold, IsEmptyButWellFormedForAHandWithoutObject) {

@@ -60,9 +60,11 @@ class SmallScene {
     scene_.hands.push_back(spec);
     return {static_cast<std::uint32_t>(scene_.hands.size() - 1)};
   }
-  /// `dilation` [m].
+  /// `dilation` [m] of the object `field` from now on.
   std::size_t pair(ObjectId shell, ObjectId field, bool sensing = false, double dilation = 0.0) {
-    scene_.pairs.push_back({shell, field, dilation, true, sensing});
+    StructuresPtr& other = scene_.objects[field.value].structures;
+    if (other) other = dilated(other, dilation);
+    scene_.pairs.push_back({shell, field, true, sensing});
     return scene_.pairs.size() - 1;
   }
   void gravity(const Vector3& gravity_W) { scene_.gravity_W = gravity_W; }

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/server/structures/structure_file_fixture.h"
+#include "tests/support/analytic_structures.h"
 #include "tests/support/damaged_structures.h"
 
 namespace tenon::structures {
@@ -57,8 +58,8 @@ class ChangedFile {
 
 class CraftedStructureFile : public StructureFile {};
 
-// sections: 0 index, 1 samples, 2 far, 3 points, 4 leaves, 5 clusters, 6 levels; 11 to 14 the same of
-// features, 15 edges
+// sections: 0 index, 1 samples, 2 far, 3 points, 4 leaves, 5 clusters, 6 levels, 11 dilations; 12 to 15 the
+// lists of features as 3 to 6, 16 edges
 TEST_F(CraftedStructureFile, AShellWhoseListsDoNotTileIsRefused) {
   (void)written();
   ChangedFile file(this->file());
@@ -97,11 +98,11 @@ TEST_F(CraftedStructureFile, FeaturesWithNumbersThatAreNoneAreRefused) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinite = std::numeric_limits<float>::infinity();
   for (const float bad : {nan, infinite, -infinite, 1e30F}) {
-    EXPECT_THAT(file.with(file.first(11), bad), HasSubstr("feature shell is damaged"));
+    EXPECT_THAT(file.with(file.first(12), bad), HasSubstr("feature shell is damaged"));
     for (std::size_t k = 0; k < 9; ++k)
-      EXPECT_THAT(file.with(file.first(15) + 4 * k, bad), HasSubstr("an edge is not plausible"));
+      EXPECT_THAT(file.with(file.first(16) + 4 * k, bad), HasSubstr("an edge is not plausible"));
   }
-  EXPECT_THAT(file.with(file.first(12) + 16, 1U), HasSubstr("feature shell is damaged"));
+  EXPECT_THAT(file.with(file.first(13) + 16, 1U), HasSubstr("feature shell is damaged"));
 }
 
 TEST_F(CraftedStructureFile, ASphereThatDoesNotContainItsPointsIsRefused) {
@@ -150,7 +151,7 @@ TEST_F(CraftedStructureFile, CountsThatDoNotMatchAreRefused) {
   (void)written();
   ChangedFile file(this->file());
   const auto count = [](std::size_t section) { return test::kSectionsAt + 8 * (test::kSections + section); };
-  for (const std::size_t section : {0U, 1U, 2U, 3U, 4U, 5U, 6U, 11U, 12U, 13U, 14U, 15U}) {
+  for (const std::size_t section : {0U, 1U, 2U, 3U, 4U, 5U, 6U, 12U, 13U, 14U, 15U, 16U}) {
     const std::uint64_t whole = file.count(section);
     const std::uint64_t step = section == 1 ? DistanceField::kBrickSamples : 1;
     EXPECT_NE(file.with(count(section), whole - step), "accepted") << section;
@@ -163,9 +164,10 @@ TEST_F(CraftedStructureFile, CountsThatDoNotMatchAreRefused) {
 TEST_F(CraftedStructureFile, AHeaderWithNumbersThatAreNoneIsRefused) {
   (void)written();
   ChangedFile file(this->file());
-  // p_MoFo, voxel, band, margin; then, behind the sections and two counts, times, areas, the unit and the box
+  // p_MoFo, voxel, band, margin, dilation, slope; then, behind the sections and two counts, times, areas, the
+  // unit and the box
   std::vector<std::size_t> doubles;
-  for (std::size_t at = 32; at < 80; at += 8) doubles.push_back(at);
+  for (std::size_t at = 32; at < 96; at += 8) doubles.push_back(at);
   for (std::size_t at = test::kSectionsAt + 16 * test::kSections + 16; at < test::kStructureFileHeader;
        at += 8)
     doubles.push_back(at);
@@ -179,9 +181,24 @@ TEST_F(CraftedStructureFile, AHeaderWithNumbersThatAreNoneIsRefused) {
   }
   for (const double bad : {0.0, -0.002, 1e300})
     EXPECT_THAT(file.with(56, bad), HasSubstr("not a plausible length")) << "voxel";
-  for (const std::int32_t bad : {0, -1, 65, 3}) EXPECT_NE(file.with(92, bad), "accepted") << "refinement";
+  for (const std::int32_t bad : {0, -1, 65, 3}) EXPECT_NE(file.with(108, bad), "accepted") << "refinement";
   for (const std::int32_t bad : {0, -1, 2'000'000, 0x7FFFFFFF})
-    EXPECT_NE(file.with(80, bad), "accepted") << "bricks";
+    EXPECT_NE(file.with(96, bad), "accepted") << "bricks";
+}
+
+TEST_F(CraftedStructureFile, DilationsThatNoBakeGivesAreRefused) {
+  structures_.field = test::dilated(structures_.field, 0.001);
+  (void)written();
+  ChangedFile file(this->file());
+  const std::size_t corners = file.count(11);
+  ASSERT_EQ(corners, structures_.field.layout().dilations.size());
+  for (const float bad : {std::nanf(""), -1e-6F, 0.0011F, std::numeric_limits<float>::infinity()})
+    EXPECT_THAT(file.with(file.first(11) + 4 * (corners / 2), bad), HasSubstr("a dilation out of range"));
+  EXPECT_EQ(file.with(file.first(11) + 4 * (corners / 2), 0.0F), "accepted");
+  EXPECT_THAT(file.with(test::kSectionsAt + 8 * (test::kSections + 11), std::uint64_t{corners - 1}),
+              HasSubstr("one dilation for each corner"));
+  EXPECT_THAT(file.with(80, 0.0021), HasSubstr("a largest dilation")) << "more than a voxel";
+  EXPECT_THAT(file.with(88, 0.9), HasSubstr("a slope out of range"));
 }
 
 TEST_F(CraftedStructureFile, WhatCouldNotBeReadIsNotWritten) {

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "idl/types/messages/run.h"
+#include "idl/types/result.h"
+#include "idl/wire/endpoint.h"
+
+namespace tenon::command {
+
+/// Who has heard a raise of the emergency stop.
+struct StopHeard {
+  std::size_t programs = 0;  ///< that listen: stations, the server, observers, recorders
+  bool by_server = false;    ///< a server has repeated it, and stops its simulation
+};
+
+/// Raises the emergency stop, directly to every device of a session or of all sessions. It needs no seat, no
+/// key and no server.
+///
+/// Threads: one. Real-time: no.
+class StopRaiser {
+ public:
+  /// `session` empty: all sessions of the DDS domain. Fails when DDS does.
+  [[nodiscard]] static Result<std::unique_ptr<StopRaiser>> open(std::uint32_t domain,
+                                                                const std::string& session,
+                                                                std::string person);
+
+  /// Writes a raise, then waits for a server to repeat it, at most for `patience`.
+  [[nodiscard]] Result<StopHeard> raise(const std::string& reason, std::chrono::milliseconds patience,
+                                        const std::atomic<bool>& stop);
+
+ private:
+  StopRaiser() = default;
+
+  std::string guid_;
+  std::string person_;
+  std::uint32_t counter_ = 0;
+  std::unique_ptr<wire::Partition> lobby_;
+  std::unique_ptr<wire::Partition> session_;
+  std::unique_ptr<wire::Writer<EmergencyStop>> stops_;
+  std::size_t own_readers_ = 0;
+  std::vector<wire::Origin> servers_;    ///< by their announcements
+  std::vector<wire::Origin> repeaters_;  ///< of the newest raise
+  wire::Inbox inbox_;
+};
+
+}  // namespace tenon::command

@@ -1,0 +1,227 @@
+#include "clients/report/recording_reader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "idl/record/mcap_reader.h"
+#include "idl/types/messages/commands.h"
+#include "idl/types/messages/contacts.h"
+#include "idl/types/messages/external.h"
+#include "idl/types/messages/objects.h"
+#include "idl/types/messages/timing.h"
+#include "idl/types/stop_truth.h"
+#include "idl/wire/codec.h"
+#include "idl/wire/topics.h"
+
+namespace tenon::report {
+namespace {
+
+// A contact is assumed to go on for so long; a pair in contact is published every 10 ticks.
+constexpr Tick kContactHold = 20;  // [ticks]
+
+class RecordingReader {
+ public:
+  explicit RecordingReader(RecordedSession& session) : session_(session) {
+    subscribe<SessionAnnounce>(wire::kSessionAnnounce);
+    subscribe<Presence>(wire::kPresence);
+    subscribe<SceneObject>(wire::kSceneObject);
+    subscribe<WorldFrame>(wire::kWorldFrame100);
+    subscribe<DeviceInput>(wire::kDeviceInput);
+    subscribe<HandManifold>(wire::kHandManifold);
+    subscribe<HandState>(wire::kHandState100);
+    subscribe<ContactPairs>(wire::kContactPairs100);
+    subscribe<TickStats>(wire::kTickStats100);
+    subscribe<StepState>(wire::kStepState);
+    subscribe<StepProgress>(wire::kStepProgress);
+    subscribe<RunState>(wire::kRunState);
+    subscribe<EventLog>(wire::kEventLog);
+    subscribe<ClientEvent>(wire::kClientEvent);
+    subscribe<EmergencyStop>(wire::kEmergencyStop);
+    subscribe<EmergencyClear>(wire::kEmergencyClear);
+    subscribe<Telemetry>(wire::kTelemetry);
+    subscribe<Guidance>(wire::kGuidance);
+    subscribe<ForceContribution>(wire::kForceContribution);
+    subscribe<Command>(wire::kCommand);
+  }
+
+  void read(const record::McapMessage& message) {
+    ++session_.messages;
+    if (session_.began_ns == 0) session_.began_ns = message.log_time_ns;
+    const auto handler = handlers_.find(message.topic);
+    if (handler != handlers_.end()) handler->second(message.data);
+  }
+
+ private:
+  template <class M>
+  void subscribe(const wire::Topic<M>& topic) {
+    handlers_[topic.name] = [this](std::span<const std::uint8_t> bytes) {
+      const auto message = wire::decode<M>(bytes);
+      if (!message) {
+        ++session_.malformed;
+        return;
+      }
+      receive(*message);
+    };
+  }
+
+  void receive(const SessionAnnounce& announce) { session_.announce = announce; }
+  void receive(const Presence& presence);
+  void receive(const SceneObject& object);
+  void receive(const WorldFrame& frame) { advanceTo(frame.tick); }
+  void receive(const DeviceInput& input) { session_.hands[input.hand].add(input); }
+  void receive(const HandManifold& manifold) {
+    advanceTo(manifold.tick);
+    session_.hands[manifold.hand].add(manifold);
+  }
+  void receive(const HandState& state) { session_.indexed = session_.indexed || state.indexing; }
+  void receive(const ContactPairs& pairs);
+  void receive(const TickStats& stats);
+  void receive(const StepState& step) { session_.steps.push_back(step); }
+  void receive(const StepProgress& progress);
+  void receive(const RunState& run) {
+    advanceTo(run.tick);
+    session_.run = run;
+    session_.has_run = true;
+  }
+  void receive(const EventLog& event) {
+    session_.events.push_back({secondsOf(event.tick), event.severity, event.kind, event.text});
+  }
+  void receive(const ClientEvent& event) {
+    const Severity severity = event.kind == "safety" ? Severity::kWarning : Severity::kInfo;
+    session_.client_events.push_back({secondsOf(event.tick), severity, event.kind, event.text});
+  }
+  void receive(const EmergencyStop& stop) {
+    if (stops_.raise(stop)) addStop(Severity::kError, "raised", stop.who, stop.reason);
+  }
+  void receive(const EmergencyClear& cleared) {
+    if (stops_.clear(cleared)) addStop(Severity::kInfo, "cleared", cleared.who, cleared.reason);
+  }
+  void addStop(Severity severity, std::string_view what, const std::string& who, const std::string& reason) {
+    session_.events.push_back({secondsOf(session_.last), severity, "emergency stop",
+                               fmt::format("{} by {}: {}", what, who, reason)});
+  }
+  void receive(const Telemetry& telemetry);
+  void receive(const Guidance& guidance) { session_.guided = session_.guided || guidance.active; }
+  void receive(const ForceContribution&) { session_.external_force = true; }
+  void receive(const Command& command);
+
+  void advanceTo(Tick tick) { session_.last = std::max(session_.last, tick); }
+
+  RecordedSession& session_;
+  StopTruth stops_;
+  std::map<std::string_view, std::function<void(std::span<const std::uint8_t>)>> handlers_;
+  std::map<ObjectId, std::string> kinds_;
+};
+
+void RecordingReader::receive(const Presence& presence) {
+  if (!presence.client.valid()) return;
+  if (!session_.present.contains(presence.client))
+    session_.participants.push_back({presence.name, presence.role});
+  session_.present[presence.client] = presence;
+  for (const HandId hand : presence.hands) session_.hands[hand].role = presence.role;
+}
+
+void RecordingReader::receive(const SceneObject& object) {
+  kinds_[object.object] = object.kind;
+  if (object.kind == "pointer" || object.kind == "assistant" || object.kind == "forearm" ||
+      object.kind == "head")
+    session_.own_titles.insert(object.title.empty() ? object.name : object.title);
+}
+
+void RecordingReader::receive(const ContactPairs& pairs) {
+  constexpr double kSampleSeconds = 0.01;
+  advanceTo(pairs.tick);
+  double depth = 0.0;
+  bool assisted = false;
+  for (const PairContact& pair : pairs.pairs) {
+    depth = std::max({depth, pair.depth, pair.peak_depth});
+    if (!pair.colliding) continue;
+    session_.contacts[pair.a].push_back(pairs.tick);
+    session_.contacts[pair.b].push_back(pairs.tick);
+    assisted = assisted || kinds_[pair.a] == "assistant" || kinds_[pair.b] == "assistant";
+  }
+  addPoint(session_.depth, pairs.tick, depth);
+  if (assisted) session_.assisted_seconds += kSampleSeconds;
+}
+
+void RecordingReader::receive(const TickStats& stats) {
+  advanceTo(stats.tick);
+  addPoint(session_.load, stats.tick, stats.load_percent);
+  addPoint(session_.depth, stats.tick, 0.0);  // pairs apart are not published
+  addPoint(session_.compute, stats.tick, stats.compute_seconds);
+  addPoint(session_.compute_max, stats.tick, std::max(stats.compute_seconds, stats.compute_seconds_max));
+  session_.late_ticks = std::max(session_.late_ticks, stats.late_ticks);
+  if (std::isfinite(stats.input_age_seconds))
+    session_.input_age = std::max(session_.input_age, stats.input_age_seconds);
+}
+
+void RecordingReader::receive(const StepProgress& progress) {
+  advanceTo(progress.tick);
+  double& longest = session_.contact_seconds[progress.revision];
+  if (std::isfinite(progress.contact_seconds)) longest = std::max(longest, progress.contact_seconds);
+}
+
+void RecordingReader::receive(const Telemetry& telemetry) {
+  if (telemetry.samples == 0) return;
+  ForceLatency& latency = session_.force_latencies[telemetry.client];
+  latency.p50 = telemetry.input_to_force_p50;
+  latency.p99 = telemetry.input_to_force_p99;
+  latency.max = std::max(latency.max, telemetry.input_to_force_max);
+}
+
+void RecordingReader::receive(const Command& command) {
+  switch (command.kind) {
+    case CommandKind::kFulfilled:
+      ++session_.commands["condition confirmed by a person"];
+      return;
+    case CommandKind::kSkipStep:
+      ++session_.commands["step skipped"];
+      return;
+    case CommandKind::kPause:
+      ++session_.commands["paused"];
+      return;
+    case CommandKind::kReset:
+      ++session_.commands["exercise reset"];
+      return;
+    case CommandKind::kSwapHands:
+      ++session_.commands["hands swapped"];
+      return;
+    case CommandKind::kSetCollision:
+      ++session_.commands["collisions of two objects changed"];
+      return;
+    default:
+      return;
+  }
+}
+
+}  // namespace
+
+bool RecordedSession::touches(ObjectId object, Tick tick) const {
+  const auto of_object = contacts.find(object);
+  if (of_object == contacts.end()) return false;
+  const std::vector<Tick>& ticks = of_object->second;
+  const auto after = std::upper_bound(ticks.begin(), ticks.end(), tick);
+  return after != ticks.begin() && *std::prev(after) + kContactHold >= tick;
+}
+
+Result<RecordedSession> readRecording(const std::filesystem::path& file) {
+  auto recording = record::McapReader::open(file);
+  if (!recording) return fail(recording.error().what);
+  RecordedSession session;
+  RecordingReader reader(session);
+  for (record::McapMessage message; recording->next(message);) reader.read(message);
+  session.problem = recording->problem();
+  if (session.messages == 0)
+    return fail(file.string() + ": holds no messages" +
+                (session.problem.empty() ? "" : " (" + session.problem + ")"));
+  for (auto& [object, ticks] : session.contacts) std::sort(ticks.begin(), ticks.end());
+  return session;
+}
+
+}  // namespace tenon::report

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "clients/report/hand_series.h"
+#include "clients/report/series.h"
+#include "idl/types/messages/log.h"
+#include "idl/types/messages/run.h"
+#include "idl/types/messages/session.h"
+#include "idl/types/messages/steps.h"
+#include "idl/types/result.h"
+
+namespace tenon::report {
+
+/// An entry of the event log, or an event at a station.
+struct SessionEvent {
+  double time = 0.0;  ///< [s]
+  Severity severity = Severity::kInfo;
+  std::string kind;
+  std::string text;
+};
+
+/// A person or program that joined the session.
+struct SessionParticipant {
+  std::string name;
+  Role role = Role::kObserver;
+};
+
+/// Latency from an input to the force displayed in answer to it, as measured by one station.
+struct ForceLatency {
+  std::string who;                         ///< name of the participant
+  double p50 = 0.0, p99 = 0.0, max = 0.0;  ///< [s]
+};
+
+/// What a recording holds that an analysis needs. Topics reach a recorder in no order among each other, and
+/// on a busy machine in long batches: each of these is of one topic, in its order, unless it says more.
+struct RecordedSession {
+  std::string problem;  ///< why the file is incomplete; empty: it is complete
+  std::uint64_t messages = 0;
+  std::uint64_t malformed = 0;  ///< messages that could not be decoded
+  std::int64_t began_ns = 0;    ///< [ns] since 1970
+  Tick last = 0;                ///< of all messages
+
+  SessionAnnounce announce;
+  RunState run;
+  bool has_run = false;
+  std::vector<SessionParticipant> participants;
+  std::map<ClientId, Presence> present;
+  std::map<HandId, HandSeries> hands;
+  std::map<ObjectId, std::vector<Tick>> contacts;  ///< of each object; at the end sorted
+  std::vector<StepState> steps;
+  std::map<std::uint32_t, double> contact_seconds;  ///< [s] by step revision
+  std::vector<SessionEvent> events;
+  std::vector<SessionEvent> client_events;
+  std::set<std::string> own_titles;  ///< of objects that hands have by themselves
+  std::map<ClientId, ForceLatency> force_latencies;
+
+  Series depth;        ///< [m]
+  Series load;         ///< [%]
+  Series compute;      ///< [s]
+  Series compute_max;  ///< [s]
+  std::uint64_t late_ticks = 0;
+  double input_age = 0.0;  ///< [s]
+
+  double assisted_seconds = 0.0;  ///< [s] in which the instructor's pointer was in contact
+  bool indexed = false, guided = false, external_force = false;
+  std::map<std::string, int> commands;  ///< number by what was done
+
+  /// Whether the object is in contact. Not before the reading is finished.
+  [[nodiscard]] bool touches(ObjectId object, Tick tick) const;
+};
+
+/// Reads a recording. Of a truncated one, what can be read, and `problem` says so; fails with a sentence when
+/// the file holds no message.
+///
+/// Threads: any. Real-time: no.
+[[nodiscard]] Result<RecordedSession> readRecording(const std::filesystem::path& file);
+
+}  // namespace tenon::report

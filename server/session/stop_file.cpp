@@ -1,0 +1,116 @@
+#include "server/session/stop_file.h"
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <utility>
+#include <vector>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "idl/wire/codec.h"
+#include "server/session/session_lock.h"
+
+namespace tenon::session {
+namespace {
+
+/// A message in one line: its kind and its bytes as on the bus.
+template <class M>
+std::string lineOf(std::string_view kind, const M& message) {
+  std::string line(kind);
+  line += ' ';
+  if (const auto bytes = wire::encode(message))
+    for (const std::uint8_t byte : *bytes) line += fmt::format("{:02x}", byte);
+  return line + "\n";
+}
+
+std::vector<std::uint8_t> bytesOf(const std::string& hex) {
+  std::vector<std::uint8_t> bytes;
+  for (std::size_t i = 0; i + 1 < hex.size(); i += 2)
+    bytes.push_back(static_cast<std::uint8_t>(std::strtoul(hex.substr(i, 2).c_str(), nullptr, 16)));
+  return bytes;
+}
+
+template <class M>
+bool read(const std::string& hex, M& message) {
+  auto decoded = wire::decode<M>(bytesOf(hex));
+  if (decoded) message = std::move(*decoded);
+  return decoded.has_value();
+}
+
+Result<void> writeAll(const std::filesystem::path& file, const std::string& text) {
+  const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  const bool written = descriptor >= 0 &&
+                       ::write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
+                       fsync(descriptor) == 0;
+  const int why = errno;
+  if (descriptor >= 0) close(descriptor);
+  if (!written) return fail(fmt::format("{}: cannot be written ({})", file.string(), std::strerror(why)));
+  return {};
+}
+
+}  // namespace
+
+std::filesystem::path defaultStopFile(std::uint32_t domain, const std::string& session) {
+  const char* const state = std::getenv("XDG_STATE_HOME");
+  const char* const home = std::getenv("HOME");
+  std::filesystem::path folder;
+  if (state != nullptr && *state != '\0') {
+    folder = state;
+  } else if (home != nullptr && *home != '\0') {
+    folder = std::filesystem::path(home) / ".local/state";
+  } else {
+    return {};
+  }
+  return folder / "tenon" / fmt::format("stop-{}-{}", domain, fileNamePart(session));
+}
+
+Result<StopTruth> readStopFile(const std::filesystem::path& file) {
+  StopTruth truth;
+  std::error_code ignored;
+  if (file.empty() || !std::filesystem::exists(file, ignored)) return truth;
+  const auto damaged = [&] {
+    return fail(
+        fmt::format("{}: is damaged, so it is not known whether an emergency stop stands: see that everybody "
+                    "is safe, delete it and start again",
+                    file.string()));
+  };
+  std::ifstream in(file);
+  std::string kind, hex;
+  while (in >> kind) {
+    if (!(in >> hex)) return damaged();
+    EmergencyStop stop;
+    EmergencyClear cleared;
+    if (kind == "raise" && read(hex, stop)) {
+      truth.raise(stop);
+    } else if (kind == "clear" && read(hex, cleared)) {
+      truth.clear(cleared);
+    } else {
+      return damaged();
+    }
+  }
+  return in.eof() ? Result<StopTruth>(truth) : damaged();
+}
+
+Result<void> writeStopFile(const std::filesystem::path& file, const StopTruth& truth) {
+  if (file.empty()) return {};
+  std::string text;
+  for (const auto& [id, stop] : truth.standing()) text += lineOf("raise", stop);
+  for (const auto& [id, cleared] : truth.cleared()) text += lineOf("clear", cleared);
+  std::error_code ignored;
+  std::filesystem::create_directories(file.parent_path(), ignored);
+  const std::filesystem::path next = file.string() + ".next";
+  if (auto written = writeAll(next, text); !written) return written;
+  if (rename(next.c_str(), file.c_str()) != 0)
+    return fail(fmt::format("{}: cannot be replaced ({})", file.string(), std::strerror(errno)));
+  const int folder = open(file.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const bool synced = folder >= 0 && fsync(folder) == 0;
+  if (folder >= 0) close(folder);
+  if (!synced) return fail(fmt::format("{}: cannot be synchronised", file.parent_path().string()));
+  return {};
+}
+
+}  // namespace tenon::session

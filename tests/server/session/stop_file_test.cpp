@@ -1,0 +1,58 @@
+#include "server/session/stop_file.h"
+
+#include <fstream>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+namespace tenon::session {
+namespace {
+
+namespace fs = std::filesystem;
+
+class StopFile : public ::testing::Test {
+ protected:
+  ~StopFile() override { fs::remove_all(folder_); }
+  fs::path folder_ = fs::temp_directory_path() / ("tenon-stops-" + std::to_string(getpid()));
+  fs::path file_ = folder_ / "below" / "stops";
+};
+
+TEST_F(StopFile, HasWhatStandsAndWhatWasCleared) {
+  ASSERT_TRUE(readStopFile(file_));
+  EXPECT_FALSE(readStopFile(file_)->engaged()) << "no file";
+  StopTruth truth;
+  truth.raise({"a b\n", 1, "Ada", "hand caught:\ttwo lines\n"});
+  truth.raise({"c", 7, "", ""});
+  truth.clear({"c", 7, "Ben", "safe"});
+  ASSERT_TRUE(writeStopFile(file_, truth));
+  const auto back = readStopFile(file_);
+  ASSERT_TRUE(back) << back.error().what;
+  ASSERT_EQ(back->standing().size(), 1U);
+  EXPECT_EQ(back->standing().begin()->first, (RaiseId{"a b\n", 1}));
+  EXPECT_EQ(back->standing().begin()->second.reason, "hand caught:\ttwo lines\n");
+  StopTruth again = *back;
+  EXPECT_FALSE(again.raise({"c", 7, "", ""})) << "still cleared";
+}
+
+TEST_F(StopFile, ThatIsDamagedIsAnErrorAndNotASessionWithoutItsStop) {
+  StopTruth truth;
+  truth.raise({"a", 1, "Ada", "hand caught"});
+  ASSERT_TRUE(writeStopFile(file_, truth));
+  const auto size = fs::file_size(file_);
+  for (const std::string& wrong : {std::string("raise"), std::string("raise 00"), std::string("lift 00")}) {
+    std::ofstream(file_) << wrong << "\n";
+    EXPECT_FALSE(readStopFile(file_)) << wrong;
+  }
+  ASSERT_TRUE(writeStopFile(file_, truth));
+  fs::resize_file(file_, size - 5);
+  const auto cut = readStopFile(file_);
+  ASSERT_FALSE(cut);
+  EXPECT_THAT(cut.error().what, ::testing::HasSubstr("it is not known whether an emergency stop stands"));
+}
+
+TEST_F(StopFile, AnEmptyPathKeepsNothing) { EXPECT_TRUE(writeStopFile({}, {})); }
+
+}  // namespace
+}  // namespace tenon::session
