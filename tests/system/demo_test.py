@@ -98,7 +98,7 @@ class DemoCase(unittest.TestCase):
 
     def assert_recorded_as_published(self, scenario, out, manifolds_a_tick):
         """Every sample that the server published in the ticks of a lockstep session is in its recording."""
-        again = tenon("resimulate", out / "session.mcap", scenario)
+        again = tenon("resimulate", out / "session.mcap", scenario, *COARSE)
         # from the first checkpoint on
         compared = re.search(r"ticks (\d+) to (\d+): (\d+) compared, 0 gaps", again.stdout)
         self.assertTrue(compared, again.stdout + again.stderr)
