@@ -142,7 +142,8 @@ int main(int argc, char** argv) {
                  "of the instructor's hand, likewise")
       ->check(known)
       ->capture_default_str();
-  app.add_option("--detail", arguments.load.detail, "mesh resolution of generated parts, 0 to 1; 1: that of the paper")
+  app.add_option("--detail", arguments.load.detail,
+                 "mesh resolution of generated parts, 0 to 1; 1: that of the paper")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--cache", arguments.load.cache, "folder for generated parts and haptic structures");
