@@ -6,12 +6,12 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include "idl/types/output_files.h"
 #include "idl/wire/identity.h"
 #include "server/check/check.h"
 #include "server/session/journal.h"
+#include "server/session/loading_display.h"
 #include "server/session/renamed_options.h"
 #include "server/session/session_server.h"
 #include "server/session/stop_file.h"
@@ -29,7 +29,8 @@ struct ServeArguments {
   tenon::session::SessionOptions session;
   tenon::session::LoadOptions load{.cache = tenon::session::defaultCache()};
   std::filesystem::path key_file;
-  std::string resimulate;  ///< journal or recording; empty: open a session
+  std::string resimulate;      ///< journal or recording; empty: open a session
+  bool states_detail = false;  ///< --detail is given
   bool despite_changes = false;
   bool overwrite = false;
   bool allow_skips = false;
@@ -42,7 +43,7 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
   app.add_option("--session", arguments.session.name, "name by which clients find it")->capture_default_str();
   app.add_option("--domain", arguments.session.domain, "DDS domain, 0 to 230")->check(CLI::Range(0, 230));
   app.add_option("--detail", arguments.load.detail,
-                 "mesh resolution of generated parts, 0 to 1; 1: 1.8 million triangles")
+                 "mesh resolution of generated parts, 0 to 1; 1: that of the paper")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--cache", arguments.load.cache, "folder for generated parts and haptic structures");
@@ -107,10 +108,7 @@ void showLoading(std::string_view activity, double fraction) {
   static bool is_said = false;
   if (!is_said) printLine("preparing the scene: what is not baked yet is baked, which can take a minute");
   is_said = true;
-  static const bool is_terminal = isatty(STDERR_FILENO) != 0;
-  if (is_terminal)
-    std::fprintf(stderr, "\r\033[K%3.0f %%  %s", 100.0 * fraction, std::string(activity).c_str());
-  if (is_terminal && fraction >= 1.0) std::fprintf(stderr, "\r\033[K");
+  tenon::session::showOnTerminal(activity, fraction);
 }
 
 /// Says what is wrong with the scenario, as `tenon check` does for the devices that stations open by default.
@@ -161,13 +159,15 @@ int checkArguments(const ServeArguments& arguments) {
 }
 
 int serve(ServeArguments& arguments) {
-  if (arguments.scenario.empty() && !arguments.resimulate.empty()) {
+  if (!arguments.resimulate.empty()) {
     const auto origin = tenon::session::readJournalOrigin(arguments.resimulate);
-    if (!origin) return reportError(origin.error().what);
-    const auto scenario = tenon::session::findScenario(arguments.resimulate, *origin);
-    if (!scenario) return reportError(scenario.error().what);
-    arguments.scenario = scenario->string();
-    arguments.load.detail = origin->detail;
+    if (!origin && arguments.scenario.empty()) return reportError(origin.error().what);
+    if (origin && !arguments.states_detail) arguments.load.detail = origin->detail;
+    if (arguments.scenario.empty()) {
+      const auto scenario = tenon::session::findScenario(arguments.resimulate, *origin);
+      if (!scenario) return reportError(scenario.error().what);
+      arguments.scenario = scenario->string();
+    }
   }
   if (arguments.scenario.empty())
     return reportError("name a scenario, as in: tenon serve scenarios/engine_bay", kWrongUsage);
@@ -217,6 +217,7 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : kWrongUsage;
   }
   if (!arguments.resimulate.empty()) verb = "resimulate";
+  arguments.states_detail = app.count("--detail") > 0;
   std::signal(SIGINT, onStopSignal);
   std::signal(SIGTERM, onStopSignal);
   return serve(arguments);

@@ -42,7 +42,7 @@ ROOMS = {
     # the limits of devices, asked of their catalog, are what a check is made against
     "server/tools": ("tenon::tools", ["idl/types"] + DECIDES + ["server/check", "server/session", "devices"],
                      ["fmt", "CLI11", "JSON", "POSIX"]),
-    "server": ("tenon::session", IDL + DECIDES + ["server/check", "server/session"], ["fmt", "CLI11", "POSIX"]),
+    "server": ("tenon::session", IDL + DECIDES + ["server/check", "server/session"], ["fmt", "CLI11"]),
     "devices": ("tenon::devices", ["idl/types", "idl/threads", "devices/simulated", "devices/drivers"], []),
     "devices/simulated": ("tenon::devices", ["idl/types", "idl/threads", "devices"], []),
     "devices/drivers": ("tenon::devices", ["idl/types", "idl/threads", "devices"], ["POSIX"]),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 scenario = Path(__file__).resolve().parents[1] / "scenarios" / "peg_and_box"
 program = Path(os.environ["TENON_PROGRAMS"]) / "tenon-rehearse"
-done = subprocess.run([program, scenario, "--seconds", "12", "--workers", "2", "--quiet"], capture_output=True, text=True, check=False)
+done = subprocess.run([program, scenario, "--detail", "0.12", "--seconds", "12", "--workers", "2", "--quiet"], capture_output=True, text=True, check=False)
 print(done.stdout, done.stderr)
 faults = [fault for fault, there in (
     (f"exit code {done.returncode} instead of 1 (not everything was mounted)", done.returncode != 1),

@@ -101,6 +101,7 @@ if(TENON_BUILD_BENCH)
   tenon_room(tests/bench/engine LINK server_bake server_simulation clients_rehearse clients_report tests_support
              scenarios_part_generator fcl PkgConfig::bullet nlohmann_json::nlohmann_json)
   tenon_program(tenon-bench tests/bench/engine/main.cpp tests_bench_engine)
+  add_dependencies(tenon-bench tenon-parts tenon-bake tenon-check)  # that it runs
   file(GLOB benchmarks CONFIGURE_DEPENDS tests/bench/*_bench.cpp)
   foreach(source ${benchmarks})
     get_filename_component(name ${source} NAME_WE)

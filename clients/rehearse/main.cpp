@@ -18,6 +18,7 @@
 #include "idl/types/output_files.h"
 #include "server/check/check.h"
 #include "server/game_control/scenario.h"
+#include "server/session/loading_display.h"
 
 namespace {
 
@@ -83,7 +84,8 @@ void declare(CLI::App& app, RehearseArguments& arguments) {
       ->capture_default_str();
   app.add_option("--seconds", arguments.seconds,
                  "limit of the session time [s]; default: 600, or the last row's time with --input");
-  app.add_option("--detail", arguments.load.detail, "level of detail of generated parts, 0 to 1")
+  app.add_option("--detail", arguments.load.detail,
+                 "mesh resolution of generated parts, 0 to 1; 1: that of the paper")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--cache", arguments.load.cache, "folder for generated parts and haptic structures");
@@ -205,6 +207,11 @@ void printProblems(const RehearseArguments& arguments, const tenon::session::Loa
     std::printf("%s\n", line.c_str());
 }
 
+/// Loads the scenario; says on a terminal what is generated and baked.
+tenon::Result<tenon::session::LoadedScene> load(const RehearseArguments& arguments) {
+  return tenon::session::loadScene(arguments.scenario, arguments.load, tenon::session::showOnTerminal);
+}
+
 void printThinWalls(const RehearseArguments& arguments, const tenon::session::LoadedScene& loaded) {
   if (arguments.quiet) return;
   for (const std::string& sentence : tenon::session::thinWallReport(*loaded.scene))
@@ -212,7 +219,7 @@ void printThinWalls(const RehearseArguments& arguments, const tenon::session::Lo
 }
 
 int rehearsePeople(RehearseArguments& arguments) {
-  const auto loaded = tenon::session::loadScene(arguments.scenario, arguments.load);
+  const auto loaded = load(arguments);
   if (!loaded) return printError(loaded.error().what);
   printThinWalls(arguments, *loaded);
   printProblems(arguments, *loaded);
@@ -251,7 +258,7 @@ int rehearseScript(RehearseArguments& arguments) {
     };
   }
   arguments.load.read = script->readOptions();
-  const auto loaded = tenon::session::loadScene(arguments.scenario, arguments.load);
+  const auto loaded = load(arguments);
   if (!loaded) return printError(loaded.error().what);
   printThinWalls(arguments, *loaded);
   setOptions(arguments);

@@ -24,6 +24,24 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 namespace exact {
 
+/// Position and normal of the points at `lane` of `block`; returns the lanes that have a normal.
+HWY_INLINE std::uint32_t storeContacts(const LaneFrame& frame, const Vec3& p_A, const Vec3& gradient,
+                                       std::size_t lane, ContactLanes& block) {
+  const Vec3 p_W = transformed(frame.p_WA.data(), frame.R_WA.data(), p_A);
+  const Double length = norm(gradient);
+  const Double per_length = hn::Div(splat(1.0), length);
+  const Vec3 n_W = rotated(
+      frame.R_WB.data(),
+      {hn::Mul(gradient.x, per_length), hn::Mul(gradient.y, per_length), hn::Mul(gradient.z, per_length)});
+  hn::Store(p_W.x, kD, block.x.data() + lane);
+  hn::Store(p_W.y, kD, block.y.data() + lane);
+  hn::Store(p_W.z, kD, block.z.data() + lane);
+  hn::Store(n_W.x, kD, block.n_x.data() + lane);
+  hn::Store(n_W.y, kD, block.n_y.data() + lane);
+  hn::Store(n_W.z, kD, block.n_z.data() + lane);
+  return bitsOf(hn::Ge(length, splat(kMinGradient))) << lane;
+}
+
 /// QueryKernels::contacts
 void contacts(const LaneFrame& frame, const PointLanes& points, const SampleLanes* samples,
               ContactLanes* out) noexcept {
@@ -35,21 +53,21 @@ void contacts(const LaneFrame& frame, const PointLanes& points, const SampleLane
     const std::size_t end = std::min(first + structures::ShellBlock::kLanes, points.count);
     for (std::size_t i = first; i < end; i += hn::Lanes(kD)) {
       const std::size_t lane = i - first;
-      const Vec3 p_W = transformed(frame.p_WA.data(), frame.R_WA.data(), loadPoints(points, i));
-      const Vec3 gradient = gradientOf(lanes, lane);
-      const Double length = norm(gradient);
-      const Double per_length = hn::Div(splat(1.0), length);
-      const Vec3 n_W =
-          rotated(frame.R_WB.data(), {hn::Mul(gradient.x, per_length), hn::Mul(gradient.y, per_length),
-                                      hn::Mul(gradient.z, per_length)});
-      block.has_normal |= bitsOf(hn::Ge(length, splat(kMinGradient))) << lane;
-      hn::Store(p_W.x, kD, block.x.data() + lane);
-      hn::Store(p_W.y, kD, block.y.data() + lane);
-      hn::Store(p_W.z, kD, block.z.data() + lane);
-      hn::Store(n_W.x, kD, block.n_x.data() + lane);
-      hn::Store(n_W.y, kD, block.n_y.data() + lane);
-      hn::Store(n_W.z, kD, block.n_z.data() + lane);
+      block.has_normal |= storeContacts(frame, loadPoints(points, i), gradientOf(lanes, lane), lane, block);
     }
+  }
+}
+
+/// QueryKernels::near_contacts
+void nearContacts(const LaneFrame& frame, const NearPoints& near, std::size_t first,
+                  ContactLanes& out) noexcept {
+  out.has_normal = 0;
+  const PointLanes points{near.x.data(), near.y.data(), near.z.data(), near.count};
+  const std::size_t end = std::min(first + structures::ShellBlock::kLanes, near.count);
+  for (std::size_t i = first; i < end; i += hn::Lanes(kD)) {
+    const Vec3 gradient{hn::LoadU(kD, near.gradient_x.data() + i), hn::LoadU(kD, near.gradient_y.data() + i),
+                        hn::LoadU(kD, near.gradient_z.data() + i)};
+    out.has_normal |= storeContacts(frame, loadPoints(points, i), gradient, i - first, out);
   }
 }
 

@@ -1,21 +1,12 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 
 #include "server/collision/pair_query.h"
+#include "server/collision/query_kernels.h"
 
 namespace tenon::collision {
-
-/// Contacts of one leaf, as the reduction reads them.
-struct LeafContacts {
-  static constexpr std::size_t kCapacity = structures::Pointshell::kLeafPoints;
-
-  std::array<double, kCapacity> gap;         ///< [m]
-  std::array<Vector3, kCapacity> direction;  ///< of the normal, of any length
-  std::size_t count = 0;
-};
 
 /// Order of contacts: by gap, then by point index.
 struct GapRank {
@@ -27,29 +18,12 @@ struct GapRank {
   }
 };
 
-/// A batch of contacts to be listed, in the order of the pointshell.
-struct IncomingContacts {
-  static constexpr std::size_t kCapacity = 2048;
-
-  std::array<double, kCapacity> gap;  ///< [m]
-  std::array<std::uint32_t, kCapacity> point;
-  std::array<std::uint32_t, kCapacity> tag;  ///< the caller's own identification
-  std::size_t count = 0;
-
-  /// `the_gap` [m]. There must be capacity left.
-  void push_back(double the_gap, std::uint32_t the_point, std::uint32_t the_tag) {
-    gap[count] = the_gap;
-    point[count] = the_point;
-    tag[count++] = the_tag;
-  }
-};
-
-/// Contact reduction: decides which contacts stay in the bounded list of a query. Contacts come in the order
-/// of the pointshell, batch by batch.
+/// Contact reduction: decides which near points become the bounded list of a query, before anything else is
+/// computed of them. They come in the order of the pointshell and keep it.
 ///
-/// By gap (evictFor): the smallest gaps stay, of equal ones those with the lower point indices. The decision
-/// is made before any contact of the batch is written. By leaf (reduceLeaf): contacts are dropped first that
-/// have a neighbour of the same leaf with about the same normal and a smaller gap.
+/// By leaf (reduceLeaves): points are dropped first that have a neighbour of the same leaf with about the
+/// same normal and a smaller gap. By gap (keepSmallestGaps): the smallest gaps stay, of equal ones those with
+/// the lower point indices.
 ///
 /// Threads: belongs to one query. Real-time: all.
 class ContactReducer {
@@ -57,21 +31,17 @@ class ContactReducer {
   /// `lowest` [m] and `highest` [m] bound the gaps that will come.
   ContactReducer(PairQueryResult& result, double lowest, double highest);
 
-  [[nodiscard]] bool fits(std::size_t count) const {
-    return result_.contacts.size() + count <= kMaxPairContacts;
-  }
-  /// For a batch that does not fit: removes listed contacts with larger ranks than those that stay, and
-  /// returns the last rank that stays. The caller then lists the contacts of the batch up to that rank.
-  GapRank evictFor(const IncomingContacts& batch);
+  /// Reduces to kMaxPairContacts; the rest is counted as dropped.
+  void keepSmallestGaps(NearPoints& near);
 
-  /// Bit mask of the leaf's contacts to be listed; frees capacity for them by reducing earlier leaves, if
-  /// possible. The caller lists them next.
-  std::uint32_t reduceLeaf(const LeafContacts& leaf);
+  /// Reduces the points from number `first` on, whole leaves, and the earlier ones as far as necessary.
+  void reduceLeaves(const LaneFrame& frame, const structures::Pointshell& shell, std::size_t first,
+                    NearPoints& near);
 
  private:
   static constexpr std::size_t kBins = 256;
-  /// Reduction by leaf keeps the list to at most this many contacts, as long as leaves can be reduced
-  /// further: every contact is a row of the QP in every SQP step.
+  /// Reduction by leaf keeps at most this many points, as long as leaves can be reduced further: every
+  /// contact is a row of the QP in every SQP step.
   static constexpr std::size_t kReducedSize = 256;
 
   /// Histogram bin of `gap` [m].
@@ -80,16 +50,20 @@ class ContactReducer {
     return static_cast<std::uint16_t>(
         static_cast<std::int32_t>(std::clamp(in_bins, 0.0, static_cast<double>(kBins - 1))));
   }
-  void reduceList();
+  /// The last rank that stays.
+  [[nodiscard]] GapRank lastRank(const NearPoints& near) const;
+  /// Reduces the leaves among the first `kept` points to per_leaf_ of each direction; returns the new number.
+  std::size_t reduceEarlier(const LaneFrame& frame, const structures::Pointshell& shell, NearPoints& near,
+                            std::size_t kept);
 
   PairQueryResult& result_;
   double lowest_;          ///< [m]
   double bins_per_metre_;  ///< [1/m]
   // state of the reduction by leaf
-  /// contacts kept of each leaf and normal direction
+  /// points kept of each leaf and normal direction
   std::size_t per_leaf_ = structures::Pointshell::kLeafPoints;
-  std::array<std::uint32_t, kMaxPairContacts> leaf_starts_;  ///< index of the first contact of each leaf
-  std::size_t leaf_count_ = 0;
+  /// index of the first point of each leaf, as long as they can be reduced further
+  FixedVector<std::uint32_t, kReducedSize> leaf_starts_;
 };
 
 }  // namespace tenon::collision

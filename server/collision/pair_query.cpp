@@ -12,36 +12,20 @@
 namespace tenon::collision {
 namespace {
 
-/// Access to the samples and contacts of a block of sixteen points.
-class ContactBlockView {
- public:
-  ContactBlockView(const LaneFrame& frame, const SampleLanes& samples, ContactLanes& contacts)
-      : frame_(frame), samples_(samples), contacts_(contacts) {}
+/// For a lane without a usable gradient of B's field: B pushes along the inward normal of A's own surface.
+void setNormal(const LaneFrame& frame, const Vector3f& inward_A, std::size_t lane, ContactLanes& lanes) {
+  const Vector3 n_W = (frame.R_WA * inward_A.cast<double>()).normalized();
+  lanes.n_x[lane] = n_W.x();
+  lanes.n_y[lane] = n_W.y();
+  lanes.n_z[lane] = n_W.z();
+}
 
-  [[nodiscard]] std::uint32_t near() const { return samples_.near; }
-  [[nodiscard]] double gap(std::size_t i) const { return samples_.distance[i]; }
-  [[nodiscard]] Vector3 gradient(std::size_t i) const {
-    return {samples_.gradient_x[i], samples_.gradient_y[i], samples_.gradient_z[i]};
-  }
-  /// For a lane without a usable gradient of B's field: B pushes along the inward normal of A's own surface.
-  void setNormal(std::size_t i, const Vector3f& inward_A) {
-    const Vector3 n_W = (frame_.R_WA * inward_A.cast<double>()).normalized();
-    contacts_.n_x[i] = n_W.x();
-    contacts_.n_y[i] = n_W.y();
-    contacts_.n_z[i] = n_W.z();
-  }
-  /// Sets position, gap and normal.
-  void setContact(std::size_t i, Contact& contact) const {
-    contact.p_WP = Vector3(contacts_.x[i], contacts_.y[i], contacts_.z[i]);
-    contact.gap = gap(i);
-    contact.n_W = Vector3(contacts_.n_x[i], contacts_.n_y[i], contacts_.n_z[i]);
-  }
-
- private:
-  const LaneFrame& frame_;
-  const SampleLanes& samples_;
-  ContactLanes& contacts_;
-};
+/// Sets position, normal and gap [m].
+void setContact(const ContactLanes& lanes, std::size_t lane, double gap, Contact& contact) {
+  contact.p_WP = Vector3(lanes.x[lane], lanes.y[lane], lanes.z[lane]);
+  contact.n_W = Vector3(lanes.n_x[lane], lanes.n_y[lane], lanes.n_z[lane]);
+  contact.gap = gap;
+}
 
 /// Calls `visit(lane)` for every set bit, lowest first.
 template <typename Visit>
@@ -49,10 +33,11 @@ void forEachLane(std::uint32_t bits, Visit&& visit) {
   for (; bits != 0; bits &= bits - 1) visit(static_cast<std::uint32_t>(std::countr_zero(bits)));
 }
 
-static_assert(IncomingContacts::kCapacity >= Candidates::kCapacity);
+static_assert(NearPoints::kCapacity >= Candidates::kCapacity + kMaxPairContacts);
 
-/// One traversal of a pointshell, level by level: culls clusters, leaves and points, then samples the
-/// remaining candidates and gathers the contacts among them.
+/// One traversal of a pointshell, level by level: culls clusters, leaves and points, samples the remaining
+/// candidates and takes the near ones among them. What is listed is decided first; positions and normals are
+/// computed of these alone.
 class Traversal {
  public:
   Traversal(const PairQuery& query, PairQueryResult& result)
@@ -107,6 +92,26 @@ class Traversal {
       ++result_.counts.points_visited;
     }
     evaluateCandidates();
+  }
+
+  /// Lists what was taken.
+  void listContacts() {
+    reducer_.keepSmallestGaps(near_);
+    for (std::size_t first = 0; first < near_.count; first += structures::ShellBlock::kLanes) {
+      ContactLanes lanes;
+      kernels_.near_contacts(frame_, near_, first, lanes);
+      const std::size_t count = std::min(near_.count - first, structures::ShellBlock::kLanes);
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::uint32_t point = near_.point[first + i];
+        if ((lanes.has_normal >> i & 1U) == 0) setNormal(frame_, shell_.points()[point].inward_M, i, lanes);
+        Contact& contact = *result_.contacts.extend();
+        setContact(lanes, i, near_.gap[first + i], contact);
+        contact.area = areaOf(point);
+        contact.point = point;
+        contact.other = 0;
+        contact.kind = ContactKind::kShellPoint;
+      }
+    }
   }
 
  private:
@@ -188,7 +193,7 @@ class Traversal {
     }
   }
 
-  /// Samples the field at the candidates, then gathers the contacts among them, leaf by leaf.
+  /// Samples the field at the candidates, and takes the near ones.
   void evaluateCandidates() {
     padCandidates();
     const PointLanes points{candidates_.x.data(), candidates_.y.data(), candidates_.z.data(),
@@ -204,13 +209,35 @@ class Traversal {
     result_.smallest_gap = std::min(result_.smallest_gap, sums.smallest_distance);
     result_.deepest = std::max(result_.deepest, -sums.smallest_distance);
     result_.unlisted_gap = std::min(result_.unlisted_gap, sums.smallest_far_gap);
-    if (list_ && sums.near > 0) {
-      kernels_.contacts(frame_, points, samples_.data(), contacts_.data());
-      for (std::uint32_t first = 0; first < candidates_.count; first += structures::ShellBlock::kLanes)
-        completeBlock(first);
-      reduce_ ? gatherReduced() : gatherAll(sums.near);
-    }
+    if (list_ && sums.near > 0) takeNear(points, sums.near);
     candidates_.count = 0;
+  }
+
+  void takeNear(const PointLanes& points, std::size_t count) {
+    if (sum_penalty_) sumPenalties(points);
+    if (!near_.fits(count)) reducer_.keepSmallestGaps(near_);
+    const std::size_t first = near_.count;
+    for (std::uint32_t from = 0; from < candidates_.count; from += structures::ShellBlock::kLanes)
+      takeBlock(from);
+    if (reduce_) reducer_.reduceLeaves(frame_, shell_, first, near_);
+  }
+
+  /// Takes the near ones of the sixteen candidates from number `first` on.
+  void takeBlock(std::uint32_t first) {
+    const SampleLanes& samples = samples_[first / structures::ShellBlock::kLanes];
+    std::size_t n = near_.count;
+    forEachLane(samples.near, [&](std::uint32_t i) {
+      near_.gap[n] = samples.distance[i];
+      near_.gradient_x[n] = samples.gradient_x[i];
+      near_.gradient_y[n] = samples.gradient_y[i];
+      near_.gradient_z[n] = samples.gradient_z[i];
+      near_.x[n] = candidates_.x[first + i];
+      near_.y[n] = candidates_.y[first + i];
+      near_.z[n] = candidates_.z[first + i];
+      near_.point[n] = candidates_.point[first + i];
+      ++n;
+    });
+    near_.count = n;
   }
 
   /// Fills the last block up: kernels read whole blocks.
@@ -221,117 +248,33 @@ class Traversal {
     }
   }
 
-  /// Sets missing normals of the block that starts at `first`, and sums its penalties.
-  void completeBlock(std::uint32_t first) {
-    ContactBlockView lanes = blockAt(first);
-    const ContactLanes& contacts = contacts_[first / structures::ShellBlock::kLanes];
-    forEachLane(lanes.near() & ~contacts.has_normal, [&](std::uint32_t i) {
-      lanes.setNormal(i, shell_.points()[candidates_.point[first + i]].inward_M);
-    });
-    if (sum_penalty_ && lanes.near() != 0) sumPenalties(first);
-  }
-
-  [[nodiscard]] ContactBlockView blockAt(std::uint32_t candidate) {
-    const std::size_t block = candidate / structures::ShellBlock::kLanes;
-    return {frame_, samples_[block], contacts_[block]};
-  }
-
-  /// Calls `visit(lanes, i, candidate)` for the candidates that are contacts.
-  template <typename Visit>
-  void forEachNear(Visit&& visit) {
-    for (std::uint32_t first = 0; first < candidates_.count; first += structures::ShellBlock::kLanes) {
-      const ContactBlockView lanes = blockAt(first);
-      forEachLane(lanes.near(), [&](std::uint32_t i) { visit(lanes, i, first + i); });
-    }
-  }
-
-  void gatherAll(std::size_t near) {
-    if (reducer_.fits(near)) {
-      forEachNear([this](const ContactBlockView& lanes, std::uint32_t i, std::uint32_t candidate) {
-        gather(lanes, i, candidates_.point[candidate]);
-      });
-      return;
-    }
-    forEachNear([this](const ContactBlockView& lanes, std::uint32_t i, std::uint32_t candidate) {
-      incoming_.push_back(lanes.gap(i), candidates_.point[candidate], candidate);
-    });
-    gatherSmallestGaps();
-  }
-
-  /// Gathers those incoming contacts that stay.
-  void gatherSmallestGaps() {
-    const GapRank last = reducer_.evictFor(incoming_);
-    for (std::size_t k = 0; k < incoming_.count; ++k) {
-      if (!(last < GapRank{incoming_.gap[k], incoming_.point[k]})) gatherCandidate(incoming_.tag[k]);
-    }
-    incoming_.count = 0;
-  }
-
-  void gatherReduced() {
-    std::array<std::uint32_t, LeafContacts::kCapacity> candidate;  // index of each contact of the leaf
-    LeafContacts near;
-    std::uint32_t leaf = 0;
-    const auto close = [&] {
-      if (near.count > 0) gatherLeaf(near, candidate);
-      near.count = 0;
-    };
-    for (std::uint32_t first = 0; first < candidates_.count; first += structures::ShellBlock::kLanes) {
-      const ContactBlockView lanes = blockAt(first);
-      forEachLane(lanes.near(), [&](std::uint32_t i) {
-        const std::uint32_t own = shell_.leafOf(candidates_.point[first + i]);
-        if (own != leaf) close();
-        leaf = own;
-        candidate[near.count] = first + i;
-        near.gap[near.count] = lanes.gap(i);
-        near.direction[near.count++] = lanes.gradient(i);
-      });
-    }
-    close();
-    if (incoming_.count > 0) gatherSmallestGaps();
-  }
-
-  void gatherLeaf(const LeafContacts& near,
-                  const std::array<std::uint32_t, LeafContacts::kCapacity>& candidate) {
-    const std::uint32_t chosen = reducer_.reduceLeaf(near);
-    const bool fits = incoming_.count == 0 && reducer_.fits(static_cast<std::size_t>(std::popcount(chosen)));
-    forEachLane(chosen, [&](std::uint32_t k) {
-      if (fits) {
-        gatherCandidate(candidate[k]);
-      } else {
-        incoming_.push_back(near.gap[k], candidates_.point[candidate[k]], candidate[k]);
-      }
-    });
-  }
-
-  void gatherCandidate(std::uint32_t candidate) {
-    gather(blockAt(candidate), candidate % structures::ShellBlock::kLanes, candidates_.point[candidate]);
-  }
-
-  void gather(const ContactBlockView& lanes, std::uint32_t i, std::uint32_t point) {
-    Contact& contact = *result_.contacts.extend();
-    lanes.setContact(i, contact);
-    contact.point = point;
-    contact.other = 0;
-    contact.kind = ContactKind::kShellPoint;
-    contact.area = areaOf(point);
-  }
-
   [[nodiscard]] double areaOf(std::uint32_t point) const {
     return point < areas_.size() ? static_cast<double>(areas_[point]) : 0.0;
   }
 
-  void sumPenalties(std::uint32_t first) {
-    const SampleLanes& samples = samples_[first / structures::ShellBlock::kLanes];
-    PenaltyLanes penalty;
-    kernels_.penalties(frame_, samples, contacts_[first / structures::ShellBlock::kLanes],
-                       &candidates_.point[first], areas_, penalty);
-    Wrench sum = result_.penalty_Ao_W;
-    for (std::size_t i = 0; i < structures::ShellBlock::kLanes; ++i) {
-      sum.force += Vector3(penalty.f_x[i], penalty.f_y[i], penalty.f_z[i]);
-      sum.torque += Vector3(penalty.t_x[i], penalty.t_y[i], penalty.t_z[i]);
+  /// Sums the penalties of sampled candidates.
+  void sumPenalties(const PointLanes& points) {
+    constexpr std::size_t kLanes = structures::ShellBlock::kLanes;
+    for (std::size_t first = 0; first < points.count; first += kLanes) {
+      const SampleLanes& samples = samples_[first / kLanes];
+      if (samples.near == 0) continue;
+      const PointLanes block{points.x + first, points.y + first, points.z + first,
+                             std::min(kLanes, points.count - first)};
+      ContactLanes contacts;
+      kernels_.contacts(frame_, block, &samples, &contacts);
+      forEachLane(samples.near & ~contacts.has_normal, [&](std::uint32_t i) {
+        setNormal(frame_, shell_.points()[candidates_.point[first + i]].inward_M, i, contacts);
+      });
+      PenaltyLanes penalty;
+      kernels_.penalties(frame_, samples, contacts, &candidates_.point[first], areas_, penalty);
+      Wrench sum = result_.penalty_Ao_W;
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        sum.force += Vector3(penalty.f_x[i], penalty.f_y[i], penalty.f_z[i]);
+        sum.torque += Vector3(penalty.t_x[i], penalty.t_y[i], penalty.t_z[i]);
+      }
+      result_.penalty_Ao_W = sum;
+      result_.penalty_points += static_cast<std::uint32_t>(std::popcount(penalty.inside));
     }
-    result_.penalty_Ao_W = sum;
-    result_.penalty_points += static_cast<std::uint32_t>(std::popcount(penalty.inside));
   }
 
   const LaneFrame frame_;
@@ -345,13 +288,12 @@ class Traversal {
   CullResult culled_;
   FixedVector<std::uint32_t, Candidates::kBatchClusters> clusters_;  ///< of the next batch
   Candidates candidates_;
-  // by block of candidates
-  std::array<SampleLanes, Candidates::kCapacity / structures::ShellBlock::kLanes> samples_;
-  std::array<ContactLanes, Candidates::kCapacity / structures::ShellBlock::kLanes> contacts_;
+  std::array<SampleLanes, Candidates::kCapacity / structures::ShellBlock::kLanes>
+      samples_;  ///< of candidates
+  NearPoints near_;
   bool correct_ridges_;
   PairQueryResult& result_;
   ContactReducer reducer_;
-  IncomingContacts incoming_;  ///< used when the list cannot take all
 };
 
 }  // namespace
@@ -389,12 +331,11 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
   const std::size_t used = traversal.run(allowed, budget);
   result.levels_used = static_cast<std::uint32_t>(used);
   if (used > 0 && used < levels.size()) {
-    const std::span<const float> areas = query.shell_A->areasOfLevel(used - 1);
-    for (Contact& contact : result.contacts) contact.area = areas[contact.point];
     result.skipped_gap_error = levels[used - 1].spacing * query.field_B->slope();
-    traversal.setAreas(areas);
+    traversal.setAreas(query.shell_A->areasOfLevel(used - 1));
     traversal.testPriorityPoints(query.priority_points);
   }
+  traversal.listContacts();
   result.traversal_points = result.counts.points_visited;
 
   if (result.counts.contacts_dropped > 0)
@@ -417,7 +358,6 @@ void resampleContacts(const PairQuery& query, double displacement, PairQueryResu
     const PointLanes points_A{block.x.data(), block.y.data(), block.z.data(), block.count};
     kernels.samples(frame, points_A, &samples, sums);
     kernels.contacts(frame, points_A, &samples, &contact_lanes);
-    ContactBlockView lanes(frame, samples, contact_lanes);
     for (std::uint32_t i = 0; i < block.count; ++i) {
       const auto [point, area] = std::pair(contacts[first + i].point, contacts[first + i].area);
       if ((samples.exact >> i & 1U) == 0) {
@@ -426,9 +366,10 @@ void resampleContacts(const PairQuery& query, double displacement, PairQueryResu
         result.unlisted_gap = std::min(result.unlisted_gap, samples.distance[i] - displacement);
         continue;
       }
-      if ((contact_lanes.has_normal >> i & 1U) == 0) lanes.setNormal(i, points[point].inward_M);
+      if ((contact_lanes.has_normal >> i & 1U) == 0)
+        setNormal(frame, points[point].inward_M, i, contact_lanes);
       Contact& contact = contacts[kept++];
-      lanes.setContact(i, contact);
+      setContact(contact_lanes, i, samples.distance[i], contact);
       contact.point = point;
       contact.area = area;
     }

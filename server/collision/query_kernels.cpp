@@ -37,8 +37,9 @@ const char* nameOfIsa() {
 }
 
 QueryKernels kernels() {
-  return {nameOfIsa(),     cull::clusters,   cull::candidates,        exact::samples,
-          exact::contacts, exact::penalties, exact::nonUnitGradients, exact::tangentPlanes};
+  return {nameOfIsa(),      cull::clusters,          cull::candidates,
+          exact::samples,   exact::nearContacts,     exact::contacts,
+          exact::penalties, exact::nonUnitGradients, exact::tangentPlanes};
 }
 
 }  // namespace HWY_NAMESPACE

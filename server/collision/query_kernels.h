@@ -137,6 +137,34 @@ struct Candidates {
   [[nodiscard]] bool fitsBatch() const { return count + kBatchPoints <= kCapacity; }
 };
 
+/// Near points of a traversal and their samples, as structure of arrays in the order of the pointshell.
+struct NearPoints {
+  static constexpr std::size_t kCapacity = Candidates::kCapacity + 1536;
+  template <typename T>
+  using Lanes = std::array<T, kCapacity + structures::ShellBlock::kLanes>;  ///< kernels write whole vectors
+
+  alignas(64) Lanes<double> gap;                     ///< [m]
+  Lanes<double> gradient_x, gradient_y, gradient_z;  ///< [-] in B
+  Lanes<float> x, y, z;                              ///< [m] in A
+  Lanes<std::uint32_t> point;                        ///< index in the pointshell
+  std::size_t count = 0;
+
+  [[nodiscard]] bool fits(std::size_t more) const { return count + more <= kCapacity; }
+  [[nodiscard]] Vector3 gradient(std::size_t i) const {
+    return {gradient_x[i], gradient_y[i], gradient_z[i]};
+  }
+  void move(std::size_t from, std::size_t to) {
+    gap[to] = gap[from];
+    gradient_x[to] = gradient_x[from];
+    gradient_y[to] = gradient_y[from];
+    gradient_z[to] = gradient_z[from];
+    x[to] = x[from];
+    y[to] = y[from];
+    z[to] = z[from];
+    point[to] = point[from];
+  }
+};
+
 /// What culling skipped, and its work.
 struct CullResult {
   /// [voxels] smallest lower bound of distance of everything culled
@@ -165,6 +193,9 @@ struct QueryKernels {
   /// Samples the field. `out` has one block for each sixteen points, the last one incomplete.
   void (*samples)(const LaneFrame& frame, const PointLanes& points, SampleLanes* out,
                   SampleSums& sums) noexcept;
+  /// Positions and normals of the sixteen near points from number `first`, and of fewer at the end.
+  void (*near_contacts)(const LaneFrame& frame, const NearPoints& near, std::size_t first,
+                        ContactLanes& out) noexcept;
   /// Positions and normals of sampled points; blocks as in `samples`.
   void (*contacts)(const LaneFrame& frame, const PointLanes& points, const SampleLanes* samples,
                    ContactLanes* out) noexcept;

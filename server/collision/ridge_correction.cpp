@@ -113,4 +113,26 @@ void correctRidges(const LaneFrame& frame, const QueryKernels& kernels, const Po
   }
 }
 
+structures::FieldSample correctedSample(const structures::DistanceField& field,
+                                        const Vector3& p_MP) noexcept {
+  structures::FieldSample sample = field.sample(p_MP);
+  const double dilation = field.dilationAt(p_MP);
+  if (!sample.exact || !(sample.distance < 0.0)) {
+    sample.distance += dilation;
+    return sample;
+  }
+  // a pointshell of one point at its origin, so that P is not rounded
+  const LaneFrame frame(field, Pose(p_MP), Pose(), 0.0, 0.0);
+  alignas(64) static constexpr std::array<float, structures::ShellBlock::kLanes> kOrigins{};
+  const PointLanes points{kOrigins.data(), kOrigins.data(), kOrigins.data(), 1};
+  std::array<SampleLanes, 1> samples;
+  SampleSums sums;
+  chosenKernels().samples(frame, points, samples.data(), sums);
+  correctRidges(frame, chosenKernels(), points, samples, sums);
+  const SampleLanes& lanes = samples.front();
+  sample.distance = lanes.distance[0] + dilation;
+  sample.gradient = {lanes.gradient_x[0], lanes.gradient_y[0], lanes.gradient_z[0]};
+  return sample;
+}
+
 }  // namespace tenon::collision

@@ -25,4 +25,11 @@ namespace tenon::collision {
 void correctRidges(const LaneFrame& frame, const QueryKernels& kernels, const PointLanes& points,
                    std::span<SampleLanes> samples, SampleSums& sums) noexcept;
 
+/// Distance to the exact surface and gradient at P in the frame of the mesh: what a query that corrects
+/// ridges has for a point there, without the dilation.
+///
+/// Threads: pure. Real-time.
+[[nodiscard]] structures::FieldSample correctedSample(const structures::DistanceField& field,
+                                                      const Vector3& p_MP) noexcept;
+
 }  // namespace tenon::collision

@@ -139,7 +139,7 @@ Result<std::string> generatedSetOf(const game_control::ScenarioFile& scenario,
 }
 
 Result<fs::path> generatedParts(const game_control::ScenarioFile& scenario, const fs::path& cache,
-                                double detail) {
+                                double detail, const std::function<void()>& on_generation) {
   if (partMeshes(scenario).empty()) return fs::path{};
   const fs::path program = generator();
   const auto list = outputOf({program.string(), "--list"});
@@ -153,6 +153,7 @@ Result<fs::path> generatedParts(const game_control::ScenarioFile& scenario, cons
   const bool up_to_date = fs::exists(folder, error) &&
                           fs::last_write_time(folder, error) > fs::last_write_time(program, error) && !error;
   if (up_to_date) return folder;
+  if (on_generation) on_generation();
 
   const fs::path temporary = folder.string() + fmt::format(".{}", getpid());
   fs::create_directories(temporary, error);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -26,12 +27,13 @@ struct GeneratedSet {
                                                  const std::vector<GeneratedSet>& sets);
 
 /// The folder of the generated parts of a scenario, at `detail` [-] 0..1, below the folder `cache`; runs the
-/// generator unless it is up to date. Empty when the scenario names no part. The generator is $TENON_PARTS,
-/// or tenon-parts beside this program. Fails when the generator does, or as
-/// generatedSetOf.
+/// generator unless it is up to date, after a call of `on_generation`, which may be empty. Empty when the
+/// scenario names no part. The generator is $TENON_PARTS, or tenon-parts beside this program. Fails when the
+/// generator does, or as generatedSetOf.
 ///
 /// Threads: one. Real-time: no.
 [[nodiscard]] Result<std::filesystem::path> generatedParts(const game_control::ScenarioFile& scenario,
-                                                           const std::filesystem::path& cache, double detail);
+                                                           const std::filesystem::path& cache, double detail,
+                                                           const std::function<void()>& on_generation = {});
 
 }  // namespace tenon::session

@@ -131,7 +131,9 @@ Result<LoadedScene> loadScene(const fs::path& path, const LoadOptions& options,
 
 Result<LoadedStructures> loadStructures(std::shared_ptr<const game_control::ScenarioFile> scenario,
                                         const LoadOptions& options, const LoadProgress& progress) {
-  const auto parts = generatedParts(*scenario, options.cache, options.detail);
+  const auto parts = generatedParts(*scenario, options.cache, options.detail, [&] {
+    if (progress) progress("generating the parts", 0.0);
+  });
   if (!parts) return fail(parts.error().what);
   std::vector<std::shared_ptr<const structures::HapticStructures>> structures(scenario->objects.size());
   for (const ObjectId id : game_control::bakeOrder(*scenario)) {

@@ -16,7 +16,7 @@ namespace tenon::session {
 
 struct LoadOptions {
   std::filesystem::path cache;  ///< folder of baked structures and generated parts
-  double detail = 0.12;         ///< [-] mesh resolution of generated parts, 0..1; 1 is the scene of the paper
+  double detail = 1.0;          ///< [-] mesh resolution of generated parts, 0..1; 1 is the scene of the paper
   game_control::ReadOptions read;  ///< of the scenario file
 };
 

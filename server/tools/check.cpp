@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "devices/catalog.h"
+#include "server/session/loading_display.h"
 #include "server/session/scene_loader.h"
 
 namespace tenon::tools {
@@ -38,20 +39,12 @@ struct CheckReport {
   std::vector<Finding> findings;
 };
 
-/// Shows what is being done on one line of a terminal.
-void showProgress(std::string_view activity, double fraction) {
-  static const bool is_terminal = isatty(STDERR_FILENO) != 0;
-  if (!is_terminal) return;
-  fmt::print(stderr, "\r\033[K{:3.0f} %  {}", 100.0 * fraction, activity);
-  if (fraction >= 1.0) fmt::print(stderr, "\r\033[K");
-  std::fflush(stderr);
-}
-
 CheckReport checkScenario(const CheckArguments& arguments, const check::CheckOptions& options) {
   auto file = game_control::readScenario(arguments.scenario);
   if (!file) return {std::make_shared<ScenarioFile>(), {{.text = file.error().what}}};
   const auto scenario = std::make_shared<const ScenarioFile>(std::move(*file));
-  const auto progress = arguments.quiet ? session::LoadProgress() : session::LoadProgress(showProgress);
+  const auto progress =
+      arguments.quiet ? session::LoadProgress() : session::LoadProgress(session::showOnTerminal);
   const auto loaded = session::loadStructures(scenario, arguments.load, progress);
   if (!loaded)
     return {scenario,
@@ -118,7 +111,7 @@ void printTable(const CheckArguments& arguments, const CheckReport& report) {
 
 int run(const CheckArguments& arguments) {
   check::CheckOptions options = arguments.check;
-  if (!arguments.quiet) options.progress = showProgress;
+  if (!arguments.quiet) options.progress = session::showOnTerminal;
   const CheckReport report = checkScenario(arguments, options);
   arguments.json ? printJson(arguments, report) : printTable(arguments, report);
   const std::size_t notes = check::countOf(report.findings, Severity::kInfo);
@@ -149,7 +142,8 @@ int main(int argc, char** argv) {
                  "of the instructor's hand, likewise")
       ->check(known)
       ->capture_default_str();
-  app.add_option("--detail", arguments.load.detail, "level of detail of generated parts, 0 to 1")
+  app.add_option("--detail", arguments.load.detail,
+                 "mesh resolution of generated parts, 0 to 1; 1: that of the paper")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--cache", arguments.load.cache, "folder for generated parts and haptic structures");

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "server/collision/ridge_correction.h"
 #include "server/structures/haptic_structures.h"
 #include "server/tools/number_lines.h"
 
@@ -14,7 +15,7 @@ int printError(const Error& error) {
   return 1;
 }
 
-int run(const std::string& file) {
+int run(const std::string& file, bool interpolated) {
   const auto structures = structures::openStructures(file);
   if (!structures) return printError(structures.error());
   const structures::DistanceField& field = (*structures)->field;
@@ -24,7 +25,9 @@ int run(const std::string& file) {
     const auto more = lines.next();
     if (!more) return printError(more.error());
     if (!*more) return 0;
-    const structures::FieldSample sample = field.undilated(Vector3::Map(lines.numbers().data()));
+    const Vector3 p_MP = Vector3::Map(lines.numbers().data());
+    const structures::FieldSample sample =
+        interpolated ? field.undilated(p_MP) : collision::correctedSample(field, p_MP);
     if (!sample.exact) {
       fmt::print("far\n");
       continue;
@@ -37,19 +40,23 @@ int run(const std::string& file) {
 
 int main(int argc, char** argv) {
   std::string file;
+  bool interpolated = false;
   CLI::App app{
       "Samples the distance field of a structure file: reads points `x y z` from standard input, one per\n"
       "line, in metres and in the frame of the mesh, and prints for each `distance nx ny nz` (negative\n"
-      "inside; outward normal, 0 0 0 where the gradient is zero) or `far` outside the band.",
+      "inside; outward normal, 0 0 0 where the gradient is zero) or `far` outside the band. Inside, in thin "
+      "walls\n"
+      "and under edges, distances have the ridge correction of `tenon contact` and `tenon check`.",
       "tenon probe"};
   app.add_option("FILE", file, "the structure file, as `tenon bake` writes it")->required();
+  app.add_flag("--interpolated", interpolated, "the field as it is, without ridge correction");
   app.footer("Exit codes: 0 success, 1 error (the reason is on stderr), 2 wrong usage.");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
-  return run(file);
+  return run(file, interpolated);
 }
 
 }  // namespace

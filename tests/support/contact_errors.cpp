@@ -14,21 +14,25 @@ void ContactErrors::add(const collision::PairQuery& query, const collision::Pair
   const auto points = query.shell_A->points();
   const Pose X_BA = query.X_WB.inverse() * query.X_WA;
   std::vector<double> listed(points.size(), kNotListed);
-  for (const collision::Contact& contact : result.contacts) listed[contact.point] = contact.gap;
+  for (const collision::Contact& contact : result.contacts)
+    if (contact.kind == collision::ContactKind::kShellPoint) listed[contact.point] = contact.gap;
   Vector3 force_B = Vector3::Zero();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vector3 p_BP = X_BA * points[i].p_MP.cast<double>();
     if (query.field_B->lowerBound(p_BP) > kNear) continue;
     const auto nearest = truth_B.nearest(p_BP);
-    const bool inside = truth_B.inside(p_BP);
-    if (inside) {
+    const double distance = (truth_B.inside(p_BP) ? -1.0 : 1.0) * nearest.distance;
+    const double gap = distance - query.field_B->dilationAt(p_BP);
+    if (gap < 0.0) {
       ++points_inside_;
-      const double reported_distance =
-          listed[i] == kNotListed ? query.field_B->sample(p_BP).distance : listed[i];
-      if (reported_distance > 0.0) ++missed_;
-      force_B += static_cast<double>(points[i].area) / kReferenceArea * (nearest.p_MQ - p_BP);
+      const double reported_gap = listed[i] == kNotListed ? query.field_B->sample(p_BP).distance : listed[i];
+      if (reported_gap > 0.0) ++missed_;
+      // along the outward gradient of the distance
+      if (distance != 0.0)
+        force_B +=
+            static_cast<double>(points[i].area) / kReferenceArea * (gap / distance) * (nearest.p_MQ - p_BP);
     }
-    if (listed[i] <= 0.0) depth_.push_back(std::abs(listed[i] - (inside ? -1.0 : 1.0) * nearest.distance));
+    if (listed[i] <= listed_to_) depth_.push_back(std::abs(listed[i] - gap));
   }
   const Vector3 reported_force_B = query.X_WB.rotation().conjugate() * result.penalty_Ao_W.force;
   if (force_B.norm() > 0.0) force_.push_back((reported_force_B - force_B).norm() / force_B.norm());

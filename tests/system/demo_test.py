@@ -13,7 +13,7 @@ import time
 import unittest
 from pathlib import Path
 
-from stage import PROGRAMS, SOURCE, TENON, final_hash, free_domain, tenon
+from stage import COARSE, PROGRAMS, SOURCE, TENON, final_hash, free_domain, tenon
 
 sys.path.insert(0, str(SOURCE / "deploy"))
 from demo import output_folder  # noqa: E402
@@ -56,7 +56,7 @@ class DemoCase(unittest.TestCase):
         self.folder, self.domain = Path(folder.name), free_domain()
 
     def words(self, *more):
-        return ["demo", "--headless", "--domain", self.domain, "--out", self.folder / "out", *more]
+        return ["demo", *COARSE, "--headless", "--domain", self.domain, "--out", self.folder / "out", *more]
 
     def left_running(self):
         """The programs of this demo: process id -> command line."""
@@ -98,7 +98,7 @@ class DemoCase(unittest.TestCase):
 
     def assert_recorded_as_published(self, scenario, out, manifolds_a_tick):
         """Every sample that the server published in the ticks of a lockstep session is in its recording."""
-        again = tenon("resimulate", out / "session.mcap", scenario)
+        again = tenon("resimulate", out / "session.mcap", scenario, *COARSE)
         # from the first checkpoint on
         compared = re.search(r"ticks (\d+) to (\d+): (\d+) compared, 0 gaps", again.stdout)
         self.assertTrue(compared, again.stdout + again.stderr)

@@ -12,7 +12,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from stage import PROGRAMS, SOURCE, TENON
+from stage import COARSE, PROGRAMS, SOURCE, TENON
 
 BLOCK = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -103,7 +103,7 @@ class CopiedScenario(unittest.TestCase):
             shutil.copytree(SOURCE / "scenarios" / "peg_and_box", copy)
             results = []
             for scenario in (SOURCE / "scenarios" / "peg_and_box", copy):
-                done = subprocess.run([TENON, "rehearse", scenario, "--quiet"], capture_output=True, text=True, timeout=900, check=False,
+                done = subprocess.run([TENON, "rehearse", scenario, *COARSE, "--quiet"], capture_output=True, text=True, timeout=900, check=False,
                                       env={**os.environ, "TENON_PROGRAMS": str(PROGRAMS)})
                 self.assertEqual(done.returncode, 0, done.stderr)
                 self.assertIn("everything is mounted", done.stdout)
@@ -114,7 +114,7 @@ class CopiedScenario(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             copy = Path(folder) / "mine"
             shutil.copytree(SOURCE / "scenarios" / "peg_and_box", copy)
-            done = subprocess.run([TENON, "demo", "--scenario", copy, "--headless", "--lockstep", "--out", Path(folder) / "out"],
+            done = subprocess.run([TENON, "demo", *COARSE, "--scenario", copy, "--headless", "--lockstep", "--out", Path(folder) / "out"],
                                   capture_output=True, text=True, timeout=900, check=False,
                                   env={**os.environ, "TENON_PROGRAMS": str(PROGRAMS)})
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr)

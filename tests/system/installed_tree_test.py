@@ -7,7 +7,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from stage import PROGRAMS, SOURCE, free_domain
+from stage import COARSE, PROGRAMS, SOURCE, free_domain
 
 BUILD = PROGRAMS.parent
 
@@ -45,7 +45,7 @@ class InstalledTree(unittest.TestCase):
         if start is None:
             print("this system permits no mount namespace: the source tree stayed where it was")
         out = self.root / "out"
-        done = self.run_installed("demo", "--scenario", "peg_and_box", "--headless", "--lockstep", "--domain", free_domain(),
+        done = self.run_installed("demo", *COARSE, "--scenario", "peg_and_box", "--headless", "--lockstep", "--domain", free_domain(),
                                   "--out", out, start=start or ())
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         told = re.findall(r"(?m)^ *(\d+\.\d\d) s  (.*)$", done.stdout)

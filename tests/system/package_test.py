@@ -10,7 +10,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from stage import PROGRAMS, free_domain
+from stage import COARSE, PROGRAMS, free_domain
 
 BUILD = PROGRAMS.parent
 CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
@@ -102,7 +102,7 @@ class PackagesNightly(unittest.TestCase):
             self.assertNotIn(f"\n{package} ", listed, "nobody needs it to run Tenon")
 
     def test_an_ordinary_user_sees_a_whole_demo(self):
-        done = self.inside("tenon", "demo", "--scenario", "peg_and_box", "--headless", "--lockstep", "--domain", free_domain(), user="trainer")
+        done = self.inside("tenon", "demo", *COARSE, "--scenario", "peg_and_box", "--headless", "--lockstep", "--domain", free_domain(), user="trainer")
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertIn("Peg is mounted, with an error of", done.stdout)
         for file in ("report.html", "session.mcap", "journal.mcap"):

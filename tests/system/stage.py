@@ -23,6 +23,9 @@ os.environ.setdefault("TENON_CACHE", str(Path(tempfile.gettempdir()) / f"tenon-t
 state_folder = tempfile.TemporaryDirectory(prefix="tenon-state-")
 os.environ["XDG_STATE_HOME"] = os.environ["XDG_RUNTIME_DIR"] = state_folder.name
 
+# the shipped scenarios' parts, coarser than by default: they are baked in less time
+COARSE = ["--detail", "0.12"]
+
 claimed_domains = []  # locked files, until this process ends
 
 
@@ -127,7 +130,7 @@ class Stage:
 
     def start(self, name, *arguments):
         common = ["--session", self.session, "--domain", self.domain] + (["--lockstep"] if self.lockstep else [])
-        process = Process(name, [*arguments, *common], self.out)
+        process = Process(name, [*arguments, *common, *(COARSE if name == "serve" else [])], self.out)
         self.processes.append(process)
         return process
 

@@ -6,7 +6,7 @@ import subprocess
 import tempfile
 import unittest
 
-from stage import PROGRAMS, SOURCE, Process, Stage, tenon
+from stage import COARSE, PROGRAMS, SOURCE, Process, Stage, tenon
 
 
 def peg_session(stage, name, *arguments):
@@ -55,7 +55,7 @@ class Identity(unittest.TestCase):
     def test_a_server_elsewhere_refuses_a_name_that_is_announced(self):
         with Stage(lockstep=False) as stage, tempfile.TemporaryDirectory() as elsewhere:
             server = stage.serve("peg_and_box")
-            second = tenon("serve", SOURCE / "scenarios" / "peg_and_box", "--session", stage.session, "--domain", stage.domain,
+            second = tenon("serve", SOURCE / "scenarios" / "peg_and_box", *COARSE, "--session", stage.session, "--domain", stage.domain,
                            env={"TMPDIR": elsewhere})
             self.assertEqual(second.returncode, 1, second.stdout)
             self.assertIn(f"is served already, by process {server.popen.pid} on host", second.stderr)
@@ -66,7 +66,7 @@ class Identity(unittest.TestCase):
             old.wait_for("run: running", 120)
             old.signal(signal.SIGSTOP)
             trainee.wait_for("rejoining the session", 60)
-            new = Process("serve", [SOURCE / "scenarios" / "peg_and_box", "--wait-for", "right", "--session", "test", "--domain",
+            new = Process("serve", [SOURCE / "scenarios" / "peg_and_box", *COARSE, "--wait-for", "right", "--session", "test", "--domain",
                                     stage.domain], stage.out, {"TMPDIR": elsewhere})
             stage.processes.append(new)
             new.wait_for("is open", 120)

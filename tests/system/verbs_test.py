@@ -10,7 +10,7 @@ import unittest
 from pathlib import Path
 from xml.etree import ElementTree
 
-from stage import PROGRAMS, SOURCE, Stage, free_domain, tenon
+from stage import COARSE, PROGRAMS, SOURCE, Stage, free_domain, tenon
 
 
 def cube(folder, half=10, unit="mm"):
@@ -243,7 +243,7 @@ class Verbs(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             report = Path(folder) / "report.html"
             report.write_text("of an earlier demo", encoding="utf-8")
-            done = tenon("demo", "--scenario", "peg_and_box", "--no-instructor", "--lockstep", "--headless", "--domain", free_domain(),
+            done = tenon("demo", *COARSE, "--scenario", "peg_and_box", "--no-instructor", "--lockstep", "--headless", "--domain", free_domain(),
                          "--out", folder, "--overwrite", timeout=800)
             self.assertEqual(done.returncode, 0, done.stdout[-3000:] + done.stderr[-1000:])
             self.assertTrue(re.fullmatch(r"final state hash: [0-9a-f]{16}", done.stdout.strip().splitlines()[-1]))

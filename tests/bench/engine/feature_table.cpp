@@ -10,27 +10,23 @@
 
 #include <fmt/format.h>
 
-#include "clients/instructor/instructor_station.h"
-#include "clients/rehearse/rehearsal.h"
-#include "clients/trainee/trainee_station.h"
 #include "server/collision/feature_query.h"
-#include "server/session/scene_loader.h"
 #include "server/simulation/coll_pair.h"
+#include "tests/bench/engine/sessions.h"
 #include "tests/bench/engine/timing.h"
 
 namespace tenon::bench {
 
 namespace {
 
-constexpr Tick kEvery = 10;        // [ticks] between sampled ones
-constexpr double kMargin = 0.001;  // [m] that island solvers ask for at rest
+constexpr Tick kEvery = 10;  // [ticks] between sampled ones
 
 /// The poses of a pair at which it is traversed, and one at which the list is evaluated again.
 struct Sample {
   std::uint32_t pair = 0;
-  bool traversed = false;   ///< since the sample before
-  double margin = kMargin;  ///< [m]
-  Pose X_WA, X_WB;          ///< of the traversal
+  bool traversed = false;  ///< since the sample before
+  double margin = 0.0;     ///< [m]
+  Pose X_WA, X_WB;         ///< of the traversal
   Pose X_WA_now, X_WB_now;
 };
 
@@ -46,7 +42,7 @@ class Sampler {
       const collision::TraversalState& at = pair.result->traversal;
       Sample sample{i,
                     true,
-                    std::max(pair.result->query.complete_to, kMargin),
+                    pair.result->query.complete_to,
                     at.X_WA,
                     at.X_WB,
                     environment.objects()[spec.a.value].X_WO,
@@ -80,11 +76,7 @@ class Queries {
         const Sample& sample = samples_[i];
         const simulation::PairSpec& spec = scene_.pairs[sample.pair];
         const collision::PairFeatures features = simulation::featuresOf(scene_, spec);
-        const auto& a = *scene_.objects[spec.a.value].structures;
-        const auto& b = *scene_.objects[spec.b.value].structures;
-        collision::PairQuery query{&a.shell,    &b.field,      sample.X_WA,
-                                   sample.X_WB, spec.dilation, sample.margin};
-        query.reduce = true;
+        collision::PairQuery query = tickQuery(scene_, spec, sample.X_WA, sample.X_WB, sample.margin);
         traversal[i] = std::min(traversal[i], microsecondsOf([&] {
                                   collision::queryPair(query, *result_);
                                   if (both) collision::queryFeatures(query, features, *scratch_, *result_);
@@ -124,25 +116,17 @@ Percentiles percentilesOfChosen(const std::vector<double>& times, const std::vec
 
 }  // namespace
 
-Result<Table> featureTable(const std::filesystem::path& scenario, const std::filesystem::path& cache,
-                           double detail, int rounds, const ProgressCallback& progress) {
-  progress("loading the scenario");
-  const auto loaded = session::loadScene(scenario, {.cache = cache, .detail = detail});
-  if (!loaded) return fail(loaded.error().what);
-  auto trainee = trainee::TraineeStation::open({});
-  if (!trainee) return fail(trainee.error().what);
-  std::vector<std::unique_ptr<haptic::Station>> stations;
-  stations.push_back(std::move(*trainee));
+Result<Table> featureTable(const session::LoadedScene& loaded, int rounds, const ProgressCallback& progress) {
   Sampler sampler;
   rehearse::RehearsalOptions options;
   options.on_tick = [&](const session::SessionSimulation& simulation, const session::TickInput&,
                         const session::TickOutput&) { sampler.record(simulation.environment()); };
   progress("working through the scenario");
-  const auto report = rehearse::runRehearsal(*loaded, std::move(stations), options);
+  const auto report = rehearsePeople(loaded, options);
   if (!report) return fail(report.error().what);
 
   progress("queries in one direction and in both");
-  const simulation::Scene& scene = *loaded->scene;
+  const simulation::Scene& scene = *loaded.scene;
   const std::vector<Sample>& samples = sampler.samples();
   Queries queries(scene, samples, rounds);
   std::vector<double> one, both, one_again, both_again;

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "clients/rehearse/rehearsal.h"
-#include "clients/trainee/trainee_station.h"
-#include "server/session/scene_loader.h"
+#include <fmt/format.h>
+
+#include "tests/bench/engine/sessions.h"
 #include "tests/bench/engine/timing.h"
 
 namespace tenon::bench {
@@ -34,6 +34,10 @@ class InsertionMonitor {
     if (done_ || output.step.step != step_) return;
     if (first_ == 0) first_ = output.tick;
     const double time = static_cast<double>(output.tick - first_) * kTickSeconds;
+    if (preempted_.sinceLastCall())
+      ++preempted_ticks_;
+    else
+      undisturbed_.push_back(1e6 * output.stats.compute_seconds);
     const HandManifold& manifold = output.manifolds[hand_.value];
     double depth = 0.0;
     for (const session::PairState& state : output.pairs) {
@@ -51,6 +55,9 @@ class InsertionMonitor {
   }
 
   [[nodiscard]] bool done() const { return done_; }
+  /// [us] Of ticks during which the thread was not preempted.
+  [[nodiscard]] Percentiles times() const { return percentilesOf(undisturbed_); }
+  [[nodiscard]] std::size_t preemptedTicks() const { return preempted_ticks_; }
 
  private:
   static void add(report::Series& series, double time, double value) { series.push_back({time, value}); }
@@ -61,6 +68,9 @@ class InsertionMonitor {
   Tick first_ = 0;
   bool done_ = false;
   Pose X_WH_;
+  Preemption preempted_;
+  std::vector<double> undisturbed_;  ///< [us]
+  std::size_t preempted_ticks_ = 0;
 };
 
 double largest(const report::Series& series) {
@@ -78,12 +88,6 @@ double mean(const report::Series& series) {
     count += point.value > 0.0 ? 1.0 : 0.0;
   }
   return count > 0.0 ? sum / count : 0.0;
-}
-
-Percentiles computeTimes(const report::Series& series) {
-  std::vector<double> microseconds;
-  for (const report::SeriesPoint& point : series) microseconds.push_back(1e6 * point.value);
-  return percentilesOf(std::move(microseconds));
 }
 
 void summarize(report::SessionAnalysis& analysis, const Percentiles& compute) {
@@ -114,36 +118,32 @@ void summarize(report::SessionAnalysis& analysis, const Percentiles& compute) {
 
 }  // namespace
 
-Result<InsertionResult> rehearseInsertion(const std::filesystem::path& scenario,
-                                          const std::filesystem::path& cache, double detail,
+Result<InsertionResult> rehearseInsertion(const session::LoadedScene& loaded,
                                           const ProgressCallback& progress) {
-  progress("loading the engine bay");
-  const auto loaded = session::loadScene(scenario, {.cache = cache, .detail = detail});
-  if (!loaded) return fail(loaded.error().what);
-  auto trainee = trainee::TraineeStation::open({});
-  if (!trainee) return fail(trainee.error().what);
-  std::vector<std::unique_ptr<haptic::Station>> stations;
-  stations.push_back(std::move(*trainee));
   InsertionResult insertion;
-  InsertionMonitor monitor(*loaded, insertion.analysis);
+  InsertionMonitor monitor(loaded, insertion.analysis);
   rehearse::RehearsalOptions options;
   options.on_tick = [&](const session::SessionSimulation&, const session::TickInput& input,
                         const session::TickOutput& output) { monitor.record(input, output); };
   options.stop_when = [&] { return monitor.done(); };
   progress("mounting the control box");
-  const auto report = rehearse::runRehearsal(*loaded, std::move(stations), options);
+  const auto report = rehearsePeople(loaded, options);
   if (!report) return fail(report.error().what);
   if (!monitor.done()) return fail("the control box was not mounted: " + report->reason);
-  const Percentiles compute = computeTimes(insertion.analysis.compute);
+  const Percentiles compute = monitor.times();
   summarize(insertion.analysis, compute);
   const report::SessionMetrics& whole = insertion.analysis.whole;
-  insertion.table = {"insertion",
-                     "A simulated trainee mounts the control box (Fig. 9; the paper: peak 0.75 ms)",
-                     {"seconds", "in contact s", "peak force N", "gap mm", "field depth mm", "load %",
-                      "tick median us", "tick p99 us", "tick max us"},
-                     {{insertion.analysis.duration, whole.contact_seconds, whole.peak_force, 1e3 * whole.gap,
-                       1e3 * whole.depth, whole.load, compute.median, compute.p99, compute.max}},
-                     {"whole ticks with all ten objects of the exercise, one worker; gap: device to proxy"}};
+  insertion.table = {
+      "insertion",
+      "A simulated trainee mounts the control box (Fig. 9; the paper: peak 0.75 ms)",
+      {"seconds", "in contact s", "peak force N", "gap mm", "field depth mm", "load %", "tick median us",
+       "tick p99 us", "tick max us"},
+      {{insertion.analysis.duration, whole.contact_seconds, whole.peak_force, 1e3 * whole.gap,
+        1e3 * whole.depth, whole.load, compute.median, compute.p99, compute.max}},
+      {fmt::format(
+          "complete server ticks with all ten objects of the exercise, one worker; {} ticks in which the "
+          "thread was preempted are skipped; gap: device to proxy",
+          monitor.preemptedTicks())}};
   return insertion;
 }
 

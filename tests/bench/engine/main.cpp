@@ -1,7 +1,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <functional>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -21,6 +21,7 @@
 #include "tests/bench/engine/methods.h"
 #include "tests/bench/engine/overload_table.h"
 #include "tests/bench/engine/query_table.h"
+#include "tests/bench/engine/server_tick_table.h"
 #include "tests/bench/engine/tick_table.h"
 #include "tests/bench/engine/truth_table.h"
 
@@ -31,6 +32,7 @@ struct BenchArguments {
   std::string benchmark;
   double detail = 1.0;
   int rounds = 5;
+  std::size_t ticks = 100'000;
   std::vector<std::string> only;
   std::string json;
   std::string figures;
@@ -80,42 +82,54 @@ class Bench {
     machine_ = fmt::format("{}, {} threads, load {:.1f} at the start", processor(),
                            sysconf(_SC_NPROCESSORS_ONLN), loadAverage());
     fmt::print("{}; parts at detail {}\n\n", machine_, arguments_.detail);
-    if (wants("bake") || wants("query") || wants("truth")) {
-      const auto scene = makeScene({arguments_.cache / "bench", arguments_.detail}, printProgress);
-      if (!scene) return fail(scene.error().what);
-      add(scene->bake);
-      if (wants("query")) add(queryTable(*scene, arguments_.rounds, printProgress));
-      if (wants("truth")) {
-        const auto truth = truthTable(*scene, arguments_.detail, arguments_.rounds, printProgress);
-        if (!truth) return fail(truth.error().what);
-        add(*truth);
-      }
-    }
+    if (auto done = sceneTables(); !done) return fail(done.error().what);
     if (wants("methods")) add(methodsTable(printProgress));
     if (wants("many_bodies")) add(manyBodiesTable(printProgress));
     if (wants("heaps")) add(heapsTable(printProgress));
     if (wants("overload")) add(overloadTable(printProgress));
-    if (wants("both_sides")) {
-      const auto both_sides = featureTable(arguments_.scenario, arguments_.cache, arguments_.detail,
-                                           arguments_.rounds, printProgress);
-      if (!both_sides) return fail(both_sides.error().what);
-      add(*both_sides);
-    }
-    if (wants("insertion")) {
-      const auto insertion =
-          rehearseInsertion(arguments_.scenario, arguments_.cache, arguments_.detail, printProgress);
-      if (!insertion) return fail(insertion.error().what);
-      add(insertion->table);
-      if (!arguments_.figures.empty() &&
-          !save(arguments_.figures, report::reportPage(insertion->analysis, "")))
-        return fail(arguments_.figures + ": cannot be written");
-    }
     if (!arguments_.json.empty() && !save(arguments_.json, json().dump(2) + "\n"))
       return fail(arguments_.json + ": cannot be written");
     return {};
   }
 
  private:
+  /// The tables of the shipped engine bay, with the structures and options of a session.
+  Result<void> sceneTables() {
+    const auto wantsAny = [this](auto... tables) { return (wants(tables) || ...); };
+    if (!wantsAny("bake", "query", "truth", "server_ticks", "insertion", "both_sides")) return {};
+    std::filesystem::path cache = arguments_.cache;
+    if (wants("bake")) {
+      cache /= "bench";
+      if (const auto error = add(bakeTable(arguments_.scenario, cache, arguments_.detail, printProgress)))
+        return fail(*error);
+    }
+    printProgress("loading the engine bay");
+    const auto loaded =
+        session::loadScene(arguments_.scenario, {.cache = cache, .detail = arguments_.detail});
+    if (!loaded) return fail(loaded.error().what);
+    if (wants("query") || wants("truth")) {
+      const auto pair = makePair(*loaded, arguments_.detail, printProgress);
+      if (!pair) return fail(pair.error().what);
+      if (wants("query")) add(queryTable(*pair, arguments_.rounds, printProgress));
+      if (wants("truth")) add(truthTable(*pair, arguments_.rounds, printProgress));
+    }
+    if (wants("server_ticks"))
+      if (const auto error = add(serverTickTable(*loaded, arguments_.ticks, printProgress)))
+        return fail(*error);
+    if (wants("both_sides"))
+      if (const auto error = add(featureTable(*loaded, arguments_.rounds, printProgress)))
+        return fail(*error);
+    if (wants("insertion")) {
+      const auto insertion = rehearseInsertion(*loaded, printProgress);
+      if (!insertion) return fail(insertion.error().what);
+      add(insertion->table);
+      if (!arguments_.figures.empty() &&
+          !save(arguments_.figures, report::reportPage(insertion->analysis, "")))
+        return fail(arguments_.figures + ": cannot be written");
+    }
+    return {};
+  }
+
   [[nodiscard]] bool wants(const std::string& table) const { return only_.empty() || only_.contains(table); }
 
   void add(const Table& table) {
@@ -123,6 +137,13 @@ class Bench {
     fmt::print("{}\n", toText(table));
     std::fflush(stdout);
     tables_.push_back(toJson(table));
+  }
+
+  /// Adds a table that could be made; else why it could not.
+  std::optional<std::string> add(const Result<Table>& table) {
+    if (!table) return table.error().what;
+    add(*table);
+    return std::nullopt;
   }
 
   [[nodiscard]] nlohmann::json json() const {
@@ -156,11 +177,13 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   app.add_option("--only", arguments.only,
-                 "tables to produce: bake, query, truth, methods, many_bodies, heaps, overload, both_sides, "
-                 "insertion "
-                 "(default: all)")
-      ->check(CLI::IsMember({"bake", "query", "truth", "methods", "many_bodies", "heaps", "overload",
-                             "both_sides", "insertion"}));
+                 "tables to produce: bake, query, truth, server_ticks, both_sides, insertion, methods, "
+                 "many_bodies, heaps, overload (default: all)")
+      ->check(CLI::IsMember({"bake", "query", "truth", "server_ticks", "both_sides", "insertion", "methods",
+                             "many_bodies", "heaps", "overload"}));
+  app.add_option("--ticks", arguments.ticks, "number of server ticks to measure at least")
+      ->check(CLI::Range(1, 10'000'000))
+      ->capture_default_str();
   app.add_option("--json", arguments.json, "write the tables to this file as JSON");
   app.add_option("--figures", arguments.figures,
                  "write a report page with force, penetration, load and computation time of the insertion");

@@ -5,8 +5,8 @@
 
 namespace tenon::bench {
 
-/// Item 3: time of a query for every instruction set and kind of pose, compared with testing every point and
-/// with other engines on the same meshes and poses. Times are the smallest of `rounds`.
-[[nodiscard]] Table queryTable(const BenchScene& scene, int rounds, const ProgressCallback& progress);
+/// Time of a tick's query by kind of pose, beside other engines on the same meshes, poses and rounds. Times
+/// are the smallest of `rounds`.
+[[nodiscard]] Table queryTable(const BenchPair& pair, int rounds, const ProgressCallback& progress);
 
 }  // namespace tenon::bench

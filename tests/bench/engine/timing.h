@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include <sys/resource.h>
+
 namespace tenon::bench {
 
 /// Percentiles of a list of times.
@@ -15,6 +17,7 @@ struct Percentiles {
   double median = 0.0;  ///< [us]
   double p90 = 0.0;     ///< [us]
   double p99 = 0.0;     ///< [us]
+  double p999 = 0.0;    ///< [us] 99.9 %
   double max = 0.0;     ///< [us]
 };
 
@@ -22,10 +25,10 @@ struct Percentiles {
 [[nodiscard]] inline Percentiles percentilesOf(std::vector<double> microseconds) {
   if (microseconds.empty()) return {};
   std::sort(microseconds.begin(), microseconds.end());
-  const auto at = [&microseconds](std::size_t percent) {
-    return microseconds[percent * (microseconds.size() - 1) / 100];
+  const auto at = [&microseconds](std::size_t per_mille) {
+    return microseconds[per_mille * (microseconds.size() - 1) / 1000];
   };
-  return {at(50), at(90), at(99), microseconds.back()};
+  return {at(500), at(900), at(990), at(999), microseconds.back()};
 }
 
 /// [us] Duration of one call.
@@ -55,6 +58,19 @@ template <typename Work>
 [[nodiscard]] Percentiles timed(std::size_t count, int rounds, Work&& work) {
   return timed(count, rounds, std::forward<Work>(work), [] {});
 }
+
+/// Whether this thread had to give the processor away.
+class Preemption {
+ public:
+  [[nodiscard]] bool sinceLastCall() {
+    rusage usage{};
+    getrusage(RUSAGE_THREAD, &usage);
+    return std::exchange(switches_, usage.ru_nivcsw) != usage.ru_nivcsw;
+  }
+
+ private:
+  long switches_ = 0;
+};
 
 /// Writes 100 MB to evict the processor caches.
 class ColdCaches {

@@ -12,29 +12,22 @@ namespace {
 
 constexpr double kLowest = -0.012;  // [m]
 constexpr double kHighest = 0.002;  // [m]
-constexpr std::uint32_t kLastPoint = 0xFFFFFFFFU;
 
-/// Lists contacts of these gaps as a query does, in batches.
-void listAll(const std::vector<double>& gaps, std::size_t at_a_time, PairQueryResult& result) {
+/// The points of these gaps that stay, when they come in batches as in a query.
+std::unique_ptr<NearPoints> reduced(const std::vector<double>& gaps, std::size_t at_a_time,
+                                    PairQueryResult& result) {
   ContactReducer reducer(result, kLowest, kHighest);
-  const auto batch = std::make_unique<IncomingContacts>();
+  auto near = std::make_unique<NearPoints>();
   for (std::size_t first = 0; first < gaps.size(); first += at_a_time) {
     const std::size_t end = std::min(gaps.size(), first + at_a_time);
-    const bool fits = reducer.fits(end - first);
-    batch->count = 0;
+    if (!near->fits(end - first)) reducer.keepSmallestGaps(*near);
     for (std::size_t i = first; i < end; ++i) {
-      const auto point = static_cast<std::uint32_t>(i);
-      batch->push_back(gaps[i], point, point);
-    }
-    const GapRank last = fits ? GapRank{kHighest, kLastPoint} : reducer.evictFor(*batch);
-    for (std::size_t i = 0; i < batch->count; ++i) {
-      if (last < GapRank{batch->gap[i], batch->point[i]}) continue;
-      Contact contact;
-      contact.gap = batch->gap[i];
-      contact.point = batch->point[i];
-      ASSERT_TRUE(result.contacts.push_back(contact));
+      near->gap[near->count] = gaps[i];
+      near->point[near->count++] = static_cast<std::uint32_t>(i);
     }
   }
+  reducer.keepSmallestGaps(*near);
+  return near;
 }
 
 /// Indices of the points with the smallest gaps, in ascending order.
@@ -54,17 +47,17 @@ TEST(ContactReducer, KeepsTheSmallestGapsInPointshellOrder) {
   for (int trial = 0; trial < 300; ++trial) {
     // gaps in all bins, in a few, in less than one, or all equal
     const double width = std::array{1.0, 0.05, 0.001, 0.0}[static_cast<std::size_t>(trial) % 4];
-    std::vector<double> gaps(engine() % 3000);
+    std::vector<double> gaps(engine() % 9000);
     for (double& gap : gaps) {
       const double fraction = static_cast<double>(engine() >> 11U) / 9007199254740992.0;
       gap = kLowest + (kHighest - kLowest) * (0.4 + 0.6 * width * fraction);
     }
     *result = {};
-    listAll(gaps, 1 + engine() % 700, *result);
+    const auto near = reduced(gaps, 1 + engine() % 700, *result);
     const std::vector<std::uint32_t> expected = smallest(gaps);
-    ASSERT_EQ(result->contacts.size(), expected.size()) << "trial " << trial;
+    ASSERT_EQ(near->count, expected.size()) << "trial " << trial;
     for (std::size_t i = 0; i < expected.size(); ++i) {
-      ASSERT_EQ(result->contacts[i].point, expected[i]) << "trial " << trial;
+      ASSERT_EQ(near->point[i], expected[i]) << "trial " << trial;
     }
     EXPECT_EQ(result->counts.contacts_dropped, gaps.size() - expected.size());
     if (gaps.size() == expected.size()) continue;

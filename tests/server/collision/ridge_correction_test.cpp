@@ -111,6 +111,33 @@ TEST(RidgeCorrection, OnASphereItIsNoWorseThanInterpolation) {
   }
 }
 
+TEST(CorrectedSample, HasTheDepthsOfAThinWallAndLeavesOutsideAsItIs) {
+  const TestShape wall(test::boxDistance({0.08, 0.08, 2.0 * kVoxel}));
+  test::SeededRandom random(9);
+  CorrectionErrors interpolated;
+  CorrectionErrors corrected;
+  int outside = 0;
+  while (corrected.depth.size() < 2000) {
+    const Vector3 p_MP = wall.X_MS * (Vector3(0.03, 0.03, 1.5 * kVoxel).cwiseProduct(random.vector()));
+    const structures::FieldSample field = wall.structures->field.sample(p_MP);
+    const structures::FieldSample sample = correctedSample(wall.structures->field, p_MP);
+    if (field.distance >= 0.0) {
+      ++outside;
+      ASSERT_EQ(sample.distance, field.distance);
+      ASSERT_EQ(sample.gradient, field.gradient);
+      continue;
+    }
+    const double truth = wall.truth(p_MP);
+    interpolated.depth.push_back(std::abs(field.distance - truth));
+    corrected.depth.push_back(std::abs(sample.distance - truth));
+  }
+  interpolated.sort();
+  corrected.sort();
+  EXPECT_GT(outside, 300);
+  EXPECT_GT(CorrectionErrors::at(interpolated.depth, 0.95), 0.1 * kVoxel);
+  EXPECT_LE(CorrectionErrors::at(corrected.depth, 0.95), 0.01 * kVoxel);
+}
+
 TEST(RidgeCorrection, LeavesAFloorUnchangedAndAConcaveCornerNearly) {
   const test::StructuresPtr box = test::boxStructures({0.04, 0.03, 0.02}, 0.002, 0.004);
   const test::StructuresPtr floor = test::floorStructures(0.2, kVoxel);

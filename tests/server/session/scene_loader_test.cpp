@@ -136,7 +136,7 @@ TEST_F(SceneLoaderTest, AShippedScenarioWorksUnderAnyName) {
     text = test::with(text, fine, "voxel: 4 mm, refinement: 1");
   text = test::with(text, "clearance: 0.5 mm", "sensing: true");
   std::ofstream(copy / "scenario.yaml") << text;
-  const auto loaded = loadScene(copy, {.cache = folder_ / "cache"});
+  const auto loaded = loadScene(copy, {.cache = folder_ / "cache", .detail = 0.12});
   ASSERT_TRUE(loaded) << loaded.error().what;
   EXPECT_TRUE(fs::exists(folder_ / "cache" / "parts" / "peg_and_box-0.12" / "peg.stl"));
   EXPECT_EQ(loaded->scenario->name, "exercise 7");
