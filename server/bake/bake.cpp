@@ -10,6 +10,7 @@
 #include "server/bake/shell_bake.h"
 #include "server/bake/thin_places.h"
 #include "server/bake/welded_mesh.h"
+#include "server/structures/gap_note.h"
 
 namespace tenon::bake {
 
@@ -81,6 +82,19 @@ std::string noteSheets(const WeldedMesh& mesh, const structures::DistanceField& 
   return text;
 }
 
+/// A note about slots and fins narrower than two voxels, where no box asked for refinement.
+std::string noteGaps(const BakedField& baked) {
+  if (baked.refined_gaps.empty() && baked.coarse_gaps.empty()) return {};
+  std::string note = std::string(structures::kGapNote) + std::to_string(baked.refined_gaps.size()) +
+                     " places with gaps below two voxels are refined, ";
+  if (baked.coarse_gaps.empty()) return note + "all that there are\n";
+  const AirGap& first = baked.coarse_gaps.front();
+  char text[256];
+  std::snprintf(text, sizeof text, "%zu are not resolved, the narrowest %.3g mm at (%.4g, %.4g, %.4g) m\n",
+                baked.coarse_gaps.size(), 1e3 * first.width, first.p_MP.x(), first.p_MP.y(), first.p_MP.z());
+  return note + text;
+}
+
 }  // namespace
 
 Result<structures::HapticStructures> bake(const TriangleMesh& mesh, const BakeOptions& options,
@@ -129,6 +143,7 @@ Result<structures::HapticStructures> bake(const TriangleMesh& mesh, const BakeOp
     info.notes += std::to_string(baked->hidden_triangles) +
                   " triangles lie inside the solid and are not part of its surface.\n";
   }
+  info.notes += noteGaps(*baked);
   info.notes += sheets;
   info.bake_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   work.stage("done", 1.0, 1.0);

@@ -13,7 +13,7 @@ namespace tenon::bake {
 namespace {
 
 // Raised when a new release of this program computes other structures from the same meshes and options.
-constexpr std::uint32_t kBakeVersion = 11;
+constexpr std::uint32_t kBakeVersion = 12;
 
 /// Incremental hash of all inputs of a bake.
 class ContentHash {

@@ -40,6 +40,24 @@ void visitFace(const Cell& brick_offset, Visit&& visit) {
   }
 }
 
+/// The largest of the trilinear values at the corners of a brick's child `cell`.
+double mostIn(const BrickLevel::CornerDilations& corners, const Cell& cell, int divisions) {
+  double most = 0.0;
+  for (int child_corner = 0; child_corner < 8; ++child_corner) {
+    const Vector3 at =
+        (cell + Cell(child_corner & 1, child_corner >> 1 & 1, child_corner >> 2 & 1)).cast<double>() /
+        divisions;
+    double value = 0.0;
+    for (int k = 0; k < 8; ++k) {
+      double weight = static_cast<double>(corners[static_cast<std::size_t>(k)]);
+      for (int axis = 0; axis < 3; ++axis) weight *= (k >> axis & 1) != 0 ? at[axis] : 1.0 - at[axis];
+      value += weight;
+    }
+    most = std::max(most, value);
+  }
+  return most;
+}
+
 bool inside(const Cell& cell, const Cell& size) {
   return (cell.array() >= 0).all() && (cell.array() < size.array()).all();
 }
@@ -55,20 +73,27 @@ BrickLevel::BrickLevel(const Vector3& p_MoFo, double edge, const Cell& brick_cou
 }
 
 BrickLevel::BrickLevel(const BrickLevel& coarse, int divisions, std::span<const std::uint32_t> refined,
-                       std::span<const std::uint8_t> deep)
+                       std::span<const CornerDilations> dilations)
     : p_MoFo_M(coarse.p_MoFo_M),
       voxel(coarse.voxel / divisions),
       bricks(coarse.bricks * divisions),
       refinement(divisions),
       coarse_bricks_(coarse.bricks),
       block_of_coarse_(coarse.nodes(), -1),
-      coarse_of_block_(refined.begin(), refined.end()),
-      deep_block_(deep.begin(), deep.end()) {
+      coarse_of_block_(refined.begin(), refined.end()) {
   for (std::size_t block = 0; block < refined.size(); ++block) {
     block_of_coarse_[refined[block]] = static_cast<std::int32_t>(block);
   }
   slot.assign(refined.size() * childrenOfBlock(), -1);
   free.assign(slot.size(), 0);
+  beyond_.reserve(slot.size());
+  for (const CornerDilations& corners : dilations) {
+    for (std::size_t child = 0; child < childrenOfBlock(); ++child) {
+      const double most =
+          divisions * mostIn(corners, cellOfIndex(child, Cell::Constant(divisions)), divisions);
+      beyond_.push_back(static_cast<float>(std::max(most - structures::DistanceField::kHalfDiagonal, 0.0)));
+    }
+  }
 }
 
 std::int64_t BrickLevel::nodeAt(const Cell& brick) const {
@@ -93,6 +118,20 @@ Cell BrickLevel::brickOf(std::size_t node) const {
 BrickLevel::Point BrickLevel::at(const Cell& lattice) const {
   const Cell brick(lattice.x() >> 3, lattice.y() >> 3, lattice.z() >> 3);
   return at(nodeAt(brick), lattice - brick * kVoxels);
+}
+
+double BrickLevel::interpolated(std::size_t node, const Vector3& p) const {
+  const Cell cell = p.array().floor().cwiseMin(kVoxels - 1).matrix().cast<int>();
+  const Vector3 upper = p - cell.cast<double>();
+  const std::int16_t* s = samplesOf(slot[node]);
+  double distance = 0.0;
+  for (int k = 0; k < 8; ++k) {
+    const Cell offset(k & 1, k >> 1 & 1, k >> 2 & 1);
+    double weight = 1.0;
+    for (int axis = 0; axis < 3; ++axis) weight *= offset[axis] != 0 ? upper[axis] : 1.0 - upper[axis];
+    distance += weight * s[sampleIndex(cell + offset)];
+  }
+  return distance / structures::DistanceField::kQuantaPerVoxel;
 }
 
 template <typename Visit>

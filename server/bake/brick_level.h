@@ -42,10 +42,11 @@ class BrickLevel {
 
   /// The whole grid, with edge `voxel` [m].
   BrickLevel(const Vector3& p_MoFo_M, double voxel, const Cell& bricks);
-  /// The children of the bricks `refined` of `coarse`; those of bricks marked in `deep` have a band that
-  /// reaches beyond the largest dilation of coarse bricks.
+  /// By corner of a brick (x fastest), an upper bound of the dilation there [coarse voxels].
+  using CornerDilations = std::array<float, 8>;
+  /// The children of the bricks `refined` of `coarse`, with bands that reach beyond the dilation.
   BrickLevel(const BrickLevel& coarse, int refinement, std::span<const std::uint32_t> refined,
-             std::span<const std::uint8_t> deep);
+             std::span<const CornerDilations> dilations);
 
   /// -1 where this level has no brick.
   [[nodiscard]] std::int64_t nodeAt(const Cell& brick) const;
@@ -62,9 +63,8 @@ class BrickLevel {
   }
   /// [voxels] |distance| up to which samples of a node are exact, and where they are clamped.
   [[nodiscard]] double bandOf(std::size_t node) const {
-    const bool deep = refinement > 1 && deep_block_[node / childrenOfBlock()] != 0;
     return structures::DistanceField::kBandVoxels +
-           (deep ? structures::DistanceField::kHalfDiagonal * refinement : 0.0);
+           (beyond_.empty() ? 0.0 : static_cast<double>(beyond_[node]));
   }
   [[nodiscard]] double clampOf(std::size_t node) const {
     return bandOf(node) + structures::DistanceField::kClampVoxels - structures::DistanceField::kBandVoxels;
@@ -88,6 +88,8 @@ class BrickLevel {
   [[nodiscard]] static Cell cellOfSample(int sample) {
     return {sample % kSide, sample / kSide % kSide, sample / (kSide * kSide)};
   }
+  /// [voxels] The trilinear distance at a point in a brick with a slot, `p` [voxels] from its corner.
+  [[nodiscard]] double interpolated(std::size_t node, const Vector3& p) const;
   /// The sample at a lattice point, from any brick that contains it; null where none does.
   [[nodiscard]] const std::int16_t* findSample(const Cell& lattice) const;
   /// Sets the sample in every brick that contains it, and sets `marks` of their nodes to 1.
@@ -127,7 +129,7 @@ class BrickLevel {
   Cell coarse_bricks_;
   std::vector<std::int32_t> block_of_coarse_;  // fine level only: the number of the block of children, or -1
   std::vector<std::uint32_t> coarse_of_block_;
-  std::vector<std::uint8_t> deep_block_;
+  std::vector<float> beyond_;  // fine level only: per node, how much its band is deeper [voxels]
 };
 
 inline BrickLevel::Point BrickLevel::at(std::int64_t node, const Cell& in_brick) const {

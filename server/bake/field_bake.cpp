@@ -6,7 +6,9 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <utility>
 
+#include "server/bake/air_gaps.h"
 #include "server/bake/brick_level.h"
 #include "server/bake/exposed_surface.h"
 #include "server/bake/outside.h"
@@ -38,6 +40,12 @@ void finishSamples(BrickLevel& level, const TriangleTree& exposed, const Triangl
   forEachBrick([&](std::size_t node, const BrickLevel::SampleBits& inside) {
     if (inside.none()) return;
     const std::int16_t* samples = level.samplesOf(level.slot[node]);
+    int deepest = 0;
+    for (int k = 0; k < BrickLevel::kSamples; ++k)
+      if (inside[static_cast<std::size_t>(k)]) deepest = std::max<int>(deepest, samples[k]);
+    const double around =
+        BrickLevel::kBrickRadius + 0.01 + deepest / double{structures::DistanceField::kQuantaPerVoxel};
+    if (!hidden.anyWithin(level.centreOf(node), around * level.voxel)) return;
     const Cell corner = level.brickOf(node) * BrickLevel::kVoxels;
     TriangleTree::Search search(hidden, level.centreOf(node), BrickLevel::kBrickRadius * level.voxel,
                                 (level.clampOf(node) + 0.01) * level.voxel);
@@ -187,11 +195,18 @@ Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, co
 
   std::unique_ptr<BrickLevel> fine;
   RefinedBricks refined;
-  if (options.refinement > 1 && !options.refine.empty() && !work.cancelled())
-    refined = bricksToRefine(coarse, options, thinBricks(coarse, work));
+  BrickMarks thin;
+  if (options.refinement > 1 && !work.cancelled()) {
+    // two fine voxels are needed to resolve a gap
+    const double narrowest = 2.0 * options.voxel / options.refinement;
+    work.stage("looking for narrow gaps", 0.55, 0.58);
+    const std::vector<AirGap> gaps = findAirGaps(coarse, triangles, tree, narrowest, work);
+    thin = thinBricks(coarse, work);
+    refined = bricksToRefine(coarse, options, gaps, thin, limits);
+  }
   if (!refined.bricks.empty() && !work.cancelled()) {
-    work.stage("refining", 0.55, 0.65);
-    fine = std::make_unique<BrickLevel>(coarse, options.refinement, refined.bricks, refined.deep);
+    work.stage("refining", 0.58, 0.65);
+    fine = std::make_unique<BrickLevel>(coarse, options.refinement, refined.bricks, refined.dilations);
     const std::size_t sampled_fine = fine->sampleDistances(tree, limits.level_bricks, work);
     if (sampled_fine > limits.level_bricks) return tooMany(sampled_fine, limits.level_bricks, true);
     if (!work.cancelled()) findOutside(*fine, &coarse, tree, work);
@@ -223,6 +238,9 @@ Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, co
     limitSlope(*fine, &coarse, work);
   }
   baked.thin = thinBricks(coarse, work);
+  if (fine) baked.thin.keepThoseOf(thin);
+  baked.refined_gaps = std::move(refined.refined_gaps);
+  baked.coarse_gaps = std::move(refined.coarse_gaps);
   if (work.cancelled()) return fail("cancelled");
 
   storage.layout.refinement = fine ? options.refinement : 1;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "idl/types/result.h"
+#include "server/bake/air_gaps.h"
 #include "server/bake/bake.h"
 #include "server/bake/field_size.h"
 #include "server/bake/thin_bricks.h"
@@ -19,6 +20,8 @@ struct BakedField {
   std::vector<structures::Triangle> surface;  ///< the exposed part of the triangles
   std::size_t hidden_triangles = 0;           ///< entirely inside the solid
   BrickMarks thin;                            ///< where material may be thin
+  std::vector<AirGap> refined_gaps;           ///< as in RefinedBricks
+  std::vector<AirGap> coarse_gaps;
 };
 
 /// The signed distance field of a triangle soup: magnitudes are exact in the band, signs come from a flood

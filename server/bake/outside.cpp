@@ -95,8 +95,12 @@ BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* 
                                      const std::vector<LatticeOffset>& offsets) {
   const std::int32_t slot = level.slot[node];
   const Cell corner = level.brickOf(node) * kOutsideVoxels;
+  const std::int16_t* samples = level.samplesOf(slot);
+  // where all samples are further away than sigma, none is outside but by the flood itself
+  const bool near = *std::min_element(samples, samples + BrickLevel::kSamples) <= kSigmaQuanta;
+  const int around = near ? kReach : 0;
   std::vector<float> patch(static_cast<std::size_t>(kPatch) * kPatch * kPatch);
-  level.visitAround(node, kReach, kReach + 1, [&](const Cell& offset, const BrickLevel::Point& point) {
+  level.visitAround(node, around, around + 1, [&](const Cell& offset, const BrickLevel::Point& point) {
     const Cell in_patch = offset + Cell::Constant(kReach);
     patch[static_cast<std::size_t>((in_patch.z() * kPatch + in_patch.y()) * kPatch + in_patch.x())] =
         reachedRadius(level, coarse, corner + offset, point);
@@ -109,7 +113,7 @@ BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* 
     const Cell in_patch = in_brick + Cell::Constant(kReach);
     const int position = (in_patch.z() * kPatch + in_patch.y()) * kPatch + in_patch.x();
     bool is_outside = patch[static_cast<std::size_t>(position)] > 0.0F;
-    if (!is_outside && level.samplesOf(slot)[sample] <= kSigmaQuanta) {
+    if (!is_outside && samples[sample] <= kSigmaQuanta) {
       is_outside = std::any_of(offsets.begin(), offsets.end(), [&](const LatticeOffset& neighbour) {
         return patch[static_cast<std::size_t>(position + neighbour.patch_offset)] + kRounding >=
                neighbour.length;

@@ -151,10 +151,16 @@ class SlopeLimiter {
       bound(middle, at);
       if (samples[sample] >= 0) continue;
       bound(at, middle);
-      visitNeighbours([&](const Cell& step) {
-        const Cell centre = at + step;
-        if ((centre.array() >= 0).all() && (centre.array() < kSide).all()) bound(at, centre);
-      });
+      const Cell low = (at - Cell::Ones()).cwiseMax(0);
+      const Cell high = (at + Cell::Ones()).cwiseMin(kLast);
+      for (int z = low.z(); z <= high.z(); ++z) {
+        for (int y = low.y(); y <= high.y(); ++y) {
+          for (int x = low.x(); x <= high.x(); ++x) {
+            // samples inside are right among each other
+            if (samples[BrickLevel::sampleIndex({x, y, z})] >= 0) bound(at, {x, y, z});
+          }
+        }
+      }
     }
   }
 
@@ -162,7 +168,10 @@ class SlopeLimiter {
     const std::int16_t* samples = level_.samplesOf(level_.slot[node]);
     if (!hasBothSigns(samples)) return;
     const Cell corner = level_.brickOf(node) * BrickLevel::kVoxels;
+    const BrickLevel::SampleBits& outside = level_.outside[static_cast<std::size_t>(level_.slot[node])];
     for (int sample = 0; sample < BrickLevel::kSamples; ++sample) {
+      // a distance outside is exact: no bound exceeds it
+      if (outside[static_cast<std::size_t>(sample)]) continue;
       const Cell at = BrickLevel::cellOfSample(sample);
       int best = samples[sample];
       int best_centre = sample;

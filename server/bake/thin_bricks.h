@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -22,6 +23,11 @@ class BrickMarks {
         bricks_(coarse.bricks),
         marks_(std::move(marks)) {}
 
+  /// Takes the marks away that `other` has not.
+  void keepThoseOf(const BrickMarks& other) {
+    std::transform(marks_.begin(), marks_.end(), other.marks_.begin(), marks_.begin(),
+                   [](std::uint8_t a, std::uint8_t b) { return std::min(a, b); });
+  }
   [[nodiscard]] bool operator[](std::size_t node) const { return marks_[node] != 0; }
   /// Of the brick that a point lies in.
   [[nodiscard]] bool at(const Vector3& p_MP) const { return marks_[nodeOf(brickAt(p_MP))] != 0; }

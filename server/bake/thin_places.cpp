@@ -1,9 +1,11 @@
 #include "server/bake/thin_places.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "server/bake/parallel.h"
 #include "server/bake/triangle_pieces.h"
@@ -30,16 +32,16 @@ constexpr double kSlope = 0.2;
 
 double noise(double voxel) { return std::min(kNoiseVoxels * voxel, kNoise); }
 
-/// [m] Half the thickness of a thin wall at p, a point of its surface with `normal_M` of either sign, where
-/// the interpolated distance is `outside` [m]. Beyond a wall of thickness t, s from p, the distance is s - t.
-/// Another surface behind it makes that less; but where samples see a wall of half-thickness h worst, they
-/// show (voxel - h)^2 / (2 voxel) at its surface, so that a larger `outside` bounds h.
-double halfThickness(const Field& field, const Vector3& p_MP, const Vector3& normal_M, double outside,
-                     double voxel) {
-  const Vector3 beyond = kBeyond * voxel * normal_M;
-  const double across = std::abs(field.sample(p_MP + beyond).distance - field.sample(p_MP - beyond).distance);
+/// [m] The interpolated distances kBeyond away from a point of the surface, on both sides.
+using Beyond = std::array<double, 2>;
+
+/// [m] Half the thickness of a thin wall at a point of its surface, where the interpolated distance is
+/// `outside` [m]. Beyond a wall of thickness t, s from the point, the distance is s - t. Another surface
+/// behind it makes that less; but where samples see a wall of half-thickness h worst, they show
+/// (voxel - h)^2 / (2 voxel) at its surface, so that a larger `outside` bounds h.
+double halfThickness(const Beyond& beyond, double outside, double voxel) {
   const double most = voxel - std::sqrt(2.0 * std::max(outside, 0.0) * voxel);
-  return std::clamp(0.5 * across, 0.0, std::max(most, 0.0));
+  return std::clamp(0.5 * std::abs(beyond[1] - beyond[0]), 0.0, std::max(most, 0.0));
 }
 
 /// [m] The dilation for a thin wall at whose exact surface the interpolated distance is `outside` [m]. Its
@@ -61,29 +63,35 @@ Vector3 wideGradient(const Field& field, const Vector3& p_MP, double voxel) {
   return gradient;
 }
 
-/// Whether there is an inside of 0.75 voxels near p, a point of the surface with `normal_M` of either sign:
-/// straight behind it, or where the gradient leads inwards. With air straight behind it there is none.
-bool isAtSolid(const Field& field, Vector3 p_MP, const Vector3& normal_M, double voxel) {
+/// The distances beyond a thin wall at p, a point of its surface with `normal_M` of either sign. None at a
+/// solid: there an inside of 0.75 voxels is near, straight behind p or where the gradient leads inwards. With
+/// air straight behind it there is none.
+std::optional<Beyond> beyondThinWall(const Field& field, Vector3 p_MP, const Vector3& normal_M,
+                                     double voxel) {
   constexpr double kInside = -0.75;
   constexpr double kStep = 0.25;
   constexpr int kSteps = 9;
   constexpr double kNoGradient = 0.1;  // [-] as in the middle of a thin wall
+  constexpr double kBack = -0.5;       // [-] cosine of consecutive steps
   for (const double side : {-voxel, voxel})
-    if (field.sample(p_MP + side * normal_M).distance <= kInside * voxel) return true;
+    if (field.sample(p_MP + side * normal_M).distance <= kInside * voxel) return std::nullopt;
   constexpr double kAir = 0.9;  // [voxels] 2.5 voxels from the surface: behind a wall of 1.6 voxels at most
-  const Vector3 beyond = kBeyond * voxel * normal_M;
-  if (std::min(field.sample(p_MP + beyond).distance, field.sample(p_MP - beyond).distance) >= kAir * voxel)
-    return false;
+  const Vector3 away = kBeyond * voxel * normal_M;
+  const Beyond beyond{field.sample(p_MP - away).distance, field.sample(p_MP + away).distance};
+  if (std::min(beyond[0], beyond[1]) >= kAir * voxel) return beyond;
+  Vector3 before = Vector3::Zero();
   for (int i = 0; i <= kSteps; ++i) {
     const structures::FieldSample here = field.sample(p_MP);
-    if (here.distance <= kInside * voxel) return true;
+    if (here.distance <= kInside * voxel) return std::nullopt;
     // at an edge, a cell's own gradient may be along a face
     Vector3 inwards = -wideGradient(field, p_MP, voxel);
     if (inwards.norm() < kNoGradient) inwards = -here.gradient;
-    if (inwards.norm() < kNoGradient) return false;
-    p_MP += kStep * voxel * inwards.normalized();
+    // where it leads back, the middle of the wall has been passed
+    if (inwards.norm() < kNoGradient || inwards.normalized().dot(before) < kBack) return beyond;
+    before = inwards.normalized();
+    p_MP += kStep * voxel * before;
   }
-  return false;
+  return beyond;
 }
 
 class ThinPlaceFinder {
@@ -99,10 +107,12 @@ class ThinPlaceFinder {
 
   /// The dilation that each brick needs.
   void measure() {
-    const std::vector<double> areas = forEachThinPoint(
-        1.5, [this](const Vector3& p, const Vector3& normal_M, double outside, double voxel) {
-          const double half_thickness = halfThickness(field_, p, normal_M, outside, voxel);
-          const double dilation = dilationFor(outside, half_thickness, voxel);
+    const std::vector<double> areas =
+        forEachThinPoint(2.0, [this](const Vector3& p, const Vector3& normal_M, double voxel) {
+          const auto beyond = beyondThinWall(field_, p, normal_M, voxel);
+          if (!beyond) return false;
+          const double outside = field_.sample(p).distance;
+          const double dilation = dilationFor(outside, halfThickness(*beyond, outside, voxel), voxel);
           if (dilation <= noise(voxel)) return false;
           raise(needed_[brickAt(p)], static_cast<float>(dilation));
           return true;
@@ -123,8 +133,9 @@ class ThinPlaceFinder {
     layout.dilations = places.dilations;
     const Field offsets(layout, nullptr);
     for (const double area :
-         forEachThinPoint(1.9, [&](const Vector3&p, const Vector3&, double outside, double) {
-           return outside - offsets.dilationAt(p) > kOpen;
+         forEachThinPoint(2.5, [&](const Vector3&p, const Vector3&normal_M, double voxel) {
+           return field_.sample(p).distance - offsets.dilationAt(p) > kOpen &&
+                  beyondThinWall(field_, p, normal_M, voxel).has_value();
          }))
       places.open_area += area;
     return places;
@@ -133,8 +144,8 @@ class ThinPlaceFinder {
  private:
   static constexpr std::size_t kChunk = 64;
 
-  /// Calls visit(point, normal of either sign, interpolated distance, voxel) at points of thin walls; returns
-  /// by chunk the area [m^2] of those for which it is true.
+  /// Calls visit(point, normal of either sign, voxel) at points of the surface in thin bricks; returns by
+  /// chunk the area [m^2] of those for which it is true.
   template <typename Visit>
   std::vector<double> forEachThinPoint(double fraction, Visit&& visit) {
     std::vector<double> areas((surface_.size() + kChunk - 1) / kChunk, 0.0);
@@ -151,9 +162,7 @@ class ThinPlaceFinder {
         };
         forEachPiece(t, fits, [&](const Vector3& p, double area) {
           if (!thin_.at(p)) return;
-          const double voxel = field_.voxelAt(p);
-          if (isAtSolid(field_, p, normal_M, voxel)) return;
-          if (visit(p, normal_M, field_.sample(p).distance, voxel)) areas[chunk] += area;
+          if (visit(p, normal_M, field_.voxelAt(p))) areas[chunk] += area;
         });
       }
     });

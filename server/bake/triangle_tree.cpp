@@ -149,10 +149,10 @@ bool TriangleTree::anyWithin(const Vector3& p, double radius) const {
   return false;
 }
 
-std::array<bool, 4> TriangleTree::Node::intersectedBy(const Vector3f& p,
-                                                      const Vector3f& inverse_direction) const {
+std::array<bool, 4> TriangleTree::Node::intersectedBy(const Vector3f& p, const Vector3f& inverse_direction,
+                                                      float end) const {
   Lanes enter = Lanes::Zero();
-  Lanes leave = Lanes::Constant(std::numeric_limits<float>::max());
+  Lanes leave = Lanes::Constant(end);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const float c = p[static_cast<Eigen::Index>(axis)];
     const float inverse = inverse_direction[static_cast<Eigen::Index>(axis)];
@@ -178,7 +178,7 @@ bool TriangleTree::oddCrossings(const Vector3& p, const Vector3& direction) cons
   while (!stack.empty()) {
     const Node& node = nodes_[stack.back()];
     stack.pop_back();
-    const std::array<bool, 4> met = node.intersectedBy(p_local, inverse);
+    const std::array<bool, 4> met = node.intersectedBy(p_local, inverse, std::numeric_limits<float>::max());
     for (std::size_t lane = 0; lane < 4; ++lane) {
       const std::uint32_t child = node.child[lane];
       if (!met[lane] || child == kNothing) continue;
@@ -192,6 +192,38 @@ bool TriangleTree::oddCrossings(const Vector3& p, const Vector3& direction) cons
   // a long triangle is found in several boxes
   std::sort(crossed.begin(), crossed.end());
   return (std::unique(crossed.begin(), crossed.end()) - crossed.begin()) % 2 == 1;
+}
+
+TriangleTree::Intersection TriangleTree::firstIntersection(const Vector3& p, const Vector3& along) const {
+  Intersection first;
+  if (nodes_.empty()) return first;
+  const Vector3f p_local = local(p);
+  const double smallest = 1e-9 * along.cwiseAbs().maxCoeff();
+  const Vector3f inverse =
+      along.unaryExpr([smallest](double c) { return std::abs(c) < smallest ? smallest : c; })
+          .cwiseInverse()
+          .cast<float>();
+  std::array<std::uint32_t, 128> stack;  // as in anyWithin
+  std::size_t count = 0;
+  stack[count++] = 0;
+  while (count > 0) {
+    const Node& node = nodes_[stack[--count]];
+    const std::array<bool, 4> met = node.intersectedBy(p_local, inverse, static_cast<float>(first.fraction));
+    for (std::size_t lane = 0; lane < 4; ++lane) {
+      const std::uint32_t child = node.child[lane];
+      if (!met[lane] || child == kNothing) continue;
+      if ((child & kTriangle) == 0) {
+        stack[count++] = child;
+        continue;
+      }
+      const structures::Triangle& t = triangles_[child - kTriangle];
+      if (!structures::rayIntersects(p, along, t)) continue;
+      const Vector3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+      const double fraction = normal.dot(t[0] - p) / normal.dot(along);
+      if (fraction < first.fraction) first = {fraction, &t};
+    }
+  }
+  return first;
 }
 
 TriangleTree::Search::Search(const TriangleTree& tree, const Vector3& centre, double radius, double reach)

@@ -29,6 +29,14 @@ class TriangleTree {
   /// Whether a ray from p intersects an odd number of triangles. No component of `direction` may be 0.
   [[nodiscard]] bool oddCrossings(const Vector3& p, const Vector3& direction) const;
 
+  /// Where a segment meets the soup first.
+  struct Intersection {
+    double fraction = 1.0;                           ///< [-] of the segment
+    const structures::Triangle* triangle = nullptr;  ///< null: nowhere
+  };
+  /// Of the segment from p to p + along.
+  [[nodiscard]] Intersection firstIntersection(const Vector3& p, const Vector3& along) const;
+
  private:
   using Lanes = Eigen::Array<float, 4, 1>;
   struct Node {
@@ -40,9 +48,9 @@ class TriangleTree {
       const Lanes z = (low[2] - p.z()).max(p.z() - high[2]).max(0.0F);
       return x * x + y * y + z * z;
     }
-    /// For each lane whether a ray intersects its box.
-    [[nodiscard]] std::array<bool, 4> intersectedBy(const Vector3f& p,
-                                                    const Vector3f& inverse_direction) const;
+    /// For each lane whether a ray intersects its box, up to the multiple `end` [-] of its direction.
+    [[nodiscard]] std::array<bool, 4> intersectedBy(const Vector3f& p, const Vector3f& inverse_direction,
+                                                    float end) const;
   };
   static constexpr std::uint32_t kTriangle = 0x80000000U;
   static constexpr std::uint32_t kNothing = 0xFFFFFFFFU;

@@ -95,10 +95,11 @@ std::string_view renamedKey(std::string_view mapping, std::string_view key) {
 }
 
 std::string_view removedKey(std::string_view mapping, std::string_view key) {
-  return mapping == "pair" && key == "dilation" ? "thin walls are kept solid where they are; leave it out, "
-                                                  "and give 'refine' boxes where they must be "
-                                                  "thinner"
-                                                : std::string_view{};
+  const bool dilation = key == "dilation" && (mapping == "pair" || mapping == "structures");
+  return dilation
+             ? "thin walls are kept solid where they are; leave it out, and give 'refine' boxes where they "
+               "must be thinner"
+             : std::string_view{};
 }
 
 std::string suggestion(std::string_view word, std::span<const std::string_view> candidates) {

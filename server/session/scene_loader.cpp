@@ -13,6 +13,7 @@
 #include "server/bake/bake.h"
 #include "server/bake/shapes.h"
 #include "server/session/generated_parts.h"
+#include "server/structures/gap_note.h"
 
 namespace tenon::session {
 namespace {
@@ -190,8 +191,13 @@ std::vector<std::string> changesSince(const Fingerprint& then, const LoadedScene
 std::vector<std::string> thinWallReport(const simulation::Scene& scene) {
   std::vector<std::string> sentences;
   for (const simulation::ObjectSpec& object : scene.objects) {
-    if (!object.structures || object.structures->info.thin_area <= 0.0) continue;
+    if (!object.structures) continue;
     const structures::StructureInfo& info = object.structures->info;
+    const std::size_t gaps = info.notes.find(structures::kGapNote);
+    if (gaps != std::string::npos)
+      sentences.push_back(
+          fmt::format("{}: {}", object.title, info.notes.substr(gaps, info.notes.find('\n', gaps) - gaps)));
+    if (info.thin_area <= 0.0) continue;
     sentences.push_back(
         fmt::format("{}: {:.2g} % of the surface is of walls thinner than its voxels resolve; they are "
                     "solid, and up to {:.3g} mm "

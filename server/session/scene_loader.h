@@ -48,8 +48,8 @@ struct Fingerprint {
 [[nodiscard]] Result<LoadedScene> loadScene(const std::filesystem::path& scenario, const LoadOptions& options,
                                             const LoadProgress& progress = {});
 
-/// A sentence for each object with walls thinner than its voxels resolve: how much of its surface they are,
-/// by how much the bake thickens them, and the share of the surface that is open, where a part could pass.
+/// A sentence for each object with walls thinner than its voxels resolve (their share of the surface, by how
+/// much the bake thickens them, the share that is open, where a part could pass), and one for narrow gaps.
 [[nodiscard]] std::vector<std::string> thinWallReport(const simulation::Scene& scene);
 /// A scenario and the structures of its objects, by ObjectId; null for one that is not collidable.
 struct LoadedStructures {

@@ -51,7 +51,11 @@ CheckReport checkScenario(const CheckArguments& arguments, const check::CheckOpt
             check::findingsOf(loaded.error(), *scenario, session::meshBoxes(*scenario, arguments.load))};
   const auto scene = game_control::makeScene(*scenario, loaded->structures);
   if (!scene) return {scenario, check::findingsOf(scene.error(), *scenario, loaded->structures)};
-  return {scenario, check::checkScene(*scenario, **scene, options)};
+  CheckReport report{scenario, check::checkScene(*scenario, **scene, options)};
+  for (std::string& sentence : session::thinWallReport(**scene))
+    report.findings.push_back(
+        {.kind = check::FindingKind::kOpen, .severity = Severity::kInfo, .text = std::move(sentence)});
+  return report;
 }
 
 OrderedJson nameOrNull(const ScenarioFile& scenario, ObjectId object) {

@@ -33,6 +33,7 @@ structures::DistanceField baked(const TriangleMesh& mesh, std::vector<RefineBox>
   BakeOptions options;
   options.voxel = kVoxel;
   options.points = 500;
+  options.refinement = refine.empty() ? 1 : 4;
   options.refine = std::move(refine);
   const auto structures = bake(mesh, options);
   EXPECT_TRUE(structures) << structures.error().what;

@@ -290,6 +290,8 @@ const BadInput kBadInputs[] = {
      "11", "expected between 0 and 0.3"},
     {"dilation", "clearance: 4 mm", "clearance: 4 mm, dilation: 2 mm", "11",
      "a pair has the key 'dilation', which is no more: thin walls are kept solid where they are"},
+    {"dilation_of_structures", "refinement: 4", "refinement: 4, dilation: 2 mm", "3",
+     "has the key 'dilation', which is no more: thin walls are kept solid where they are"},
     {"target_missing",
      "    target: {at: [0, 0, -20 mm], within: 2 mm, angle: 2 deg, dwell: 50 ms}\n    approach: {direction: "
      "[0, 0, -1], distance: 50 mm}\n",
