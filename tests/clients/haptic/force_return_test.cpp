@@ -76,12 +76,12 @@ struct RestingHand : HandAboveFloor {
   double before = 0.0;
 };
 
-struct Gap {
+struct GapCase {
   double seconds;
 };
-void PrintTo(const Gap& gap, std::ostream* out) { *out << gap.seconds << " s"; }
+void PrintTo(const GapCase& gap, std::ostream* out) { *out << gap.seconds << " s"; }
 
-class ForceReturn : public testing::TestWithParam<std::tuple<std::string, Gap, Target>> {};
+class ForceReturn : public testing::TestWithParam<std::tuple<std::string, GapCase, Target>> {};
 
 TEST_P(ForceReturn, AfterAGapIsSoft) {
   const auto& [name, gap, target] = GetParam();
@@ -106,7 +106,7 @@ TEST_P(ForceReturn, AfterAGapIsSoft) {
 INSTANTIATE_TEST_SUITE_P(Gaps, ForceReturn,
                          testing::Combine(testing::Values("hug-sim", "sigma7-sim", "omega3-sim",
                                                           "falcon-sim"),
-                                          testing::Values(Gap{0.05}, Gap{0.15}, Gap{0.3}, Gap{0.8}, Gap{4.0}),
+                                          testing::Values(GapCase{0.05}, GapCase{0.15}, GapCase{0.3}, GapCase{0.8}, GapCase{4.0}),
                                           testing::Values(Target::kInScene, Target::kAtDevice)),
                          [](const auto& one) {
                            const std::string& name = std::get<0>(one.param);
