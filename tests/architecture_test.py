@@ -31,7 +31,7 @@ ROOMS = {
     "idl/wire": ("tenon::wire", ["idl/types", "idl/threads"], ["DDS", "libsodium", "POSIX"]),
     "idl/record": ("tenon::record", ["idl/types"], ["zstd", "POSIX"]),
     "server/structures": ("tenon::structures", ["idl/types"], ["xxHash", "POSIX"]),
-    "server/bake": ("tenon::bake", ["idl/types", "server/structures"], ["assimp", "OctoMap", "xxHash", "POSIX"]),
+    "server/bake": ("tenon::bake", ["idl/types", "server/structures"], ["assimp", "OctoMap", "meshoptimizer", "xxHash", "POSIX"]),
     "server/collision": ("tenon::collision", ["idl/types", "server/structures"], ["Highway"]),
     "server/simulation": ("tenon::simulation", ["idl/types", "idl/threads", "server/structures", "server/collision"],
                           ["Bullet"]),
@@ -67,6 +67,7 @@ NOT_INCLUDED = {EXCEPTION, "server", "server/tools", "tests"}
 LIBRARIES = {
     "expected": r"tl/expected\.hpp$", "DDS": r"(dds/|ddsc/|org/eclipse/cyclonedds/|tenon\.h$)", "zstd": r"(zstd|zstd_\w+|zdict)\.h$",
     "Highway": r"hwy/", "xxHash": r"xxh(ash|3)\.h$", "assimp": r"assimp/", "OctoMap": r"octomap/",
+    "meshoptimizer": r"meshoptimizer\.h$",
     "libsodium": r"sodium(\.h$|/)", "yaml-cpp": r"yaml-cpp/", "fmt": r"fmt/", "CLI11": r"CLI/", "JSON": r"nlohmann/", "PNG": r"png\.h$",
     "Bullet": r"(bullet/|btBullet|Bullet|LinearMath/)", "Eigen": r"Eigen/",
     "POSIX": r"((sys|arpa|netinet|net|linux)/|(unistd|fcntl|poll|termios|spawn|pthread|sched|signal|time|dirent|dlfcn|errno|semaphore)\.h$)",
