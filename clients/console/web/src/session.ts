@@ -38,6 +38,7 @@ export class Session {
   heard = 0;
   private raises = new Map<string, EmergencyStop>();
   private clears = new Set<string>();
+  private names = new Map<number, string>(); // of hands
   private known = new Map<string, StepState>();
   private visits: { name: string; started: number }[] = [];
 
@@ -89,6 +90,7 @@ export class Session {
       case "GrabState": {
         const grab = message as GrabState;
         this.grabs.set(grab.object_id, grab);
+        if (grab.hand_id !== NONE && this.isOwn(grab.object_id)) this.names.set(grab.hand_id, this.titleOf(grab.object_id));
         break;
       }
       case "Presence": {
@@ -193,8 +195,10 @@ export class Session {
     return this.objects.get(id)?.title ?? "";
   }
 
-  /** Title of what a hand holds first: its own pointer or tool names it. */
+  /** Title of a hand's own pointer, else of what it holds. */
   nameOfHand(id: number): string {
+    const name = this.names.get(id);
+    if (name !== undefined && name !== "") return name;
     const own = [...this.grabs.values()].find(
       (grab) => grab.hand_id === id && ["pointer", "assistant", "tool", "forearm", "head"].includes(this.objects.get(grab.object_id)?.kind ?? ""),
     );
