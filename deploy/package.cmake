@@ -3,7 +3,7 @@
 
 # ---- programs, beside each other: they start each other; the benchmark stays in the source tree
 get_target_property(installed_programs programs MANUALLY_ADDED_DEPENDENCIES)
-list(REMOVE_ITEM installed_programs tenon-bench)
+list(REMOVE_ITEM installed_programs tenon-bench console_page)
 install(TARGETS ${installed_programs} RUNTIME DESTINATION lib/tenon COMPONENT tenon)
 install(PROGRAMS tenon DESTINATION bin COMPONENT tenon)
 
@@ -11,6 +11,7 @@ install(PROGRAMS tenon DESTINATION bin COMPONENT tenon)
 install(DIRECTORY scenarios DESTINATION share/tenon COMPONENT tenon
         PATTERN part_generator EXCLUDE PATTERN picture.png EXCLUDE)
 install(FILES deploy/demo.py deploy/demo_scene.py deploy/doctor.py DESTINATION share/tenon/deploy COMPONENT tenon)
+install(DIRECTORY ${CMAKE_BINARY_DIR}/console_page DESTINATION share/tenon COMPONENT tenon OPTIONAL PATTERN built EXCLUDE)
 install(DIRECTORY deploy/dds DESTINATION share/tenon/deploy COMPONENT tenon)
 file(WRITE ${CMAKE_BINARY_DIR}/VERSION "${PROJECT_VERSION}\n")
 install(FILES ${CMAKE_BINARY_DIR}/VERSION DESTINATION share/tenon COMPONENT tenon)

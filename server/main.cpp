@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "idl/types/cache_folder.h"
 #include "idl/types/output_files.h"
 #include "idl/wire/identity.h"
 #include "server/check/check.h"
@@ -27,7 +28,7 @@ constexpr int kWrongUsage = 2;
 struct ServeArguments {
   std::string scenario;
   tenon::session::SessionOptions session;
-  tenon::session::LoadOptions load{.cache = tenon::session::defaultCache()};
+  tenon::session::LoadOptions load{.cache = tenon::defaultCache()};
   std::filesystem::path key_file;
   std::string resimulate;      ///< journal or recording; empty: open a session
   bool states_detail = false;  ///< --detail is given
@@ -190,6 +191,10 @@ int serve(ServeArguments& arguments) {
       tenon::session::defaultStopFile(arguments.session.domain, arguments.session.name);
   arguments.session.print = printLine;
   arguments.session.detail = arguments.load.detail;
+  // a session without pictures is a session
+  const auto models = tenon::session::storeDisplayModels(*loaded->scenario, arguments.load);
+  if (models) arguments.session.scene_hash = *models;
+  if (!models) printLine("the console will show boxes instead of parts: " + models.error().what);
   auto server = tenon::session::SessionServer::open(*loaded, arguments.session);
   if (!server) return reportError(server.error().what);
   const auto report = (*server)->run(stop_requested);

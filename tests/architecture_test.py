@@ -31,7 +31,7 @@ ROOMS = {
     "idl/wire": ("tenon::wire", ["idl/types", "idl/threads"], ["DDS", "libsodium", "POSIX"]),
     "idl/record": ("tenon::record", ["idl/types"], ["zstd", "POSIX"]),
     "server/structures": ("tenon::structures", ["idl/types"], ["xxHash", "POSIX"]),
-    "server/bake": ("tenon::bake", ["idl/types", "server/structures"], ["assimp", "OctoMap", "xxHash", "POSIX"]),
+    "server/bake": ("tenon::bake", ["idl/types", "server/structures"], ["assimp", "OctoMap", "meshoptimizer", "xxHash", "POSIX"]),
     "server/collision": ("tenon::collision", ["idl/types", "server/structures"], ["Highway"]),
     "server/simulation": ("tenon::simulation", ["idl/types", "idl/threads", "server/structures", "server/collision"],
                           ["Bullet"]),
@@ -54,6 +54,7 @@ ROOMS = {
     "clients/recorder": ("tenon::recorder", IDL, ["fmt", "CLI11"]),
     "clients/command": ("tenon::command", IDL, ["fmt", "CLI11", "POSIX"]),
     "clients/report": ("tenon::report", IDL, ["fmt", "CLI11", "JSON"]),
+    "clients/console": ("tenon::console", IDL, ["fmt", "CLI11", "JSON", "Boost"]),
     "clients/rehearse": ("tenon::rehearse", [], ["fmt", "CLI11"]),  # the rooms: see EXCEPTION
     "scenarios/part_generator": ("tenon::part_generator", ["idl/types"], ["fmt", "CLI11", "PNG"]),
 }
@@ -67,13 +68,15 @@ NOT_INCLUDED = {EXCEPTION, "server", "server/tools", "tests"}
 LIBRARIES = {
     "expected": r"tl/expected\.hpp$", "DDS": r"(dds/|ddsc/|org/eclipse/cyclonedds/|tenon\.h$)", "zstd": r"(zstd|zstd_\w+|zdict)\.h$",
     "Highway": r"hwy/", "xxHash": r"xxh(ash|3)\.h$", "assimp": r"assimp/", "OctoMap": r"octomap/",
+    "meshoptimizer": r"meshoptimizer\.h$",
     "libsodium": r"sodium(\.h$|/)", "yaml-cpp": r"yaml-cpp/", "fmt": r"fmt/", "CLI11": r"CLI/", "JSON": r"nlohmann/", "PNG": r"png\.h$",
+    "Boost": r"boost/",
     "Bullet": r"(bullet/|btBullet|Bullet|LinearMath/)", "Eigen": r"Eigen/",
     "POSIX": r"((sys|arpa|netinet|net|linux)/|(unistd|fcntl|poll|termios|spawn|pthread|sched|signal|time|dirent|dlfcn|errno|semaphore)\.h$)",
 }
 # a library, or a part of a room, that one file of the room alone may include
 ONE_FILE = {"Bullet": "server/simulation/rigid_body.cpp", "OctoMap": "server/bake/octree_file.cpp",
-            "assimp": "server/bake/import_child.cpp", "libsodium": "idl/wire/identity.cpp",
+            "assimp": "server/bake/import_child.cpp", "libsodium": "idl/wire/identity.cpp", "Boost": "clients/console/web_server.cpp",
             "devices/simulated": "devices/catalog.cpp", "devices/drivers": "devices/catalog.cpp"}
 # made at build time, so not in the tree; their room alone includes them
 GENERATED = {"tenon.h": "idl/wire", "idl/wire/topic_list.h": "idl/wire"}

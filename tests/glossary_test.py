@@ -10,6 +10,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from source_text import SKIPPED_FOLDERS
+
 ROOMS = ("idl", "server", "devices", "clients", "scenarios", "tenon")
 SUFFIXES = {".h", ".cpp", ".idl", ".json", ""}
 COMMENT = re.compile(r"//.*|^\s*#(?!include|define).*", re.MULTILINE)
@@ -21,7 +24,7 @@ def words_of_code(root):
     words = set()
     for room in ROOMS:
         for file in [root / room, *(root / room).rglob("*")]:
-            if file.is_file() and file.suffix in SUFFIXES:
+            if file.is_file() and file.suffix in SUFFIXES and not SKIPPED_FOLDERS.intersection(file.relative_to(root).parts):
                 words.update(WORD.findall(COMMENT.sub("", file.read_text(encoding="utf-8"))))
     return words
 

@@ -15,6 +15,7 @@
 #include "clients/rehearse/tick_log.h"
 #include "clients/trainee/trainee_station.h"
 #include "devices/catalog.h"
+#include "idl/types/cache_folder.h"
 #include "idl/types/output_files.h"
 #include "server/check/check.h"
 #include "server/game_control/scenario.h"
@@ -31,7 +32,7 @@ constexpr std::array kPeopleOptions{"--seed", "--device", "--misplace-mount", "-
 
 struct RehearseArguments {
   std::string scenario;
-  tenon::session::LoadOptions load{.cache = tenon::session::defaultCache()};
+  tenon::session::LoadOptions load{.cache = tenon::defaultCache()};
   tenon::rehearse::RehearsalOptions rehearsal;
   std::optional<double> seconds;
   std::vector<std::string> inputs;

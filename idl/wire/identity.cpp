@@ -120,6 +120,13 @@ bool SeatKey::isProof(std::string_view public_key, const ProofSubject& subject, 
          crypto_sign_verify_detached(signature.data(), data(message), message.size(), key.data()) == 0;
 }
 
+std::string contentHash(std::span<const std::uint8_t> bytes) {
+  ready();
+  Bytes32 hash;
+  crypto_generichash(hash.data(), hash.size(), bytes.data(), bytes.size(), nullptr, 0);
+  return hex(hash.data(), hash.size());
+}
+
 std::string hexText(const Bytes32& bytes) { return hex(bytes.data(), bytes.size()); }
 Result<Bytes32> readHexText(std::string_view text) {
   Bytes32 bytes;

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -52,6 +53,9 @@ struct SeatKey {
   [[nodiscard]] static bool isProof(std::string_view public_key, const ProofSubject& subject,
                                     std::string_view proof);
 };
+
+/// BLAKE2b of `bytes`, 256 bits: as hard to forge as a key.
+[[nodiscard]] std::string contentHash(std::span<const std::uint8_t> bytes);
 
 /// As text in a file, and back; fails for a text that is none.
 [[nodiscard]] std::string hexText(const std::array<std::uint8_t, 32>& bytes);

@@ -53,7 +53,8 @@ class RawSubscription : public Subscription {
  private:
   void deliver(const dds_sample_info_t& info, const void* sample, bool gone) {
     encodeSample(*spec_.type, sample, bytes_);
-    (*handler_)({spec_.name, spec_.type->m_typename, info.source_timestamp, sequence_++, gone, bytes_});
+    (*handler_)({spec_.name, spec_.type->m_typename, info.source_timestamp, sequence_++, gone, bytes_,
+                 info.instance_handle});
   }
 
   TopicSpec spec_;

@@ -24,6 +24,7 @@ struct RawSample {
   std::uint64_t sequence = 0;  ///< counts the samples of this topic received here, from 0
   bool gone = false;           ///< the instance ended (DDS NOT_ALIVE): `bytes` has only the key fields set
   std::span<const std::uint8_t> bytes;  ///< as by encode(): encapsulation header and CDR
+  std::uint64_t instance = 0;           ///< equal for samples of one topic here that have equal keys
 };
 
 /// Names of a topic and of its type.

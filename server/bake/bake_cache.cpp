@@ -5,6 +5,7 @@
 #include <xxhash.h>
 
 #include "server/bake/bake.h"
+#include "server/bake/display_model.h"
 #include "server/bake/mesh_references.h"
 #include "server/bake/octree_file.h"
 
@@ -14,6 +15,8 @@ namespace {
 
 // Raised when a new release of this program computes other structures from the same meshes and options.
 constexpr std::uint32_t kBakeVersion = 12;
+// The same for display models.
+constexpr std::uint32_t kDisplayVersion = 1;
 
 /// Incremental hash of all inputs of a bake.
 class ContentHash {
@@ -49,6 +52,20 @@ class ContentHash {
   XXH3_state_t* state_;
 };
 
+Result<void> addMeshes(ContentHash& hash, const std::vector<std::filesystem::path>& meshes) {
+  for (const auto& mesh : meshes) {
+    if (!hash.addFile(mesh)) return fail(mesh.string() + ": cannot be read");
+    // the names are in the mesh; a file that is missing is left to the import
+    for (const auto& [named, file] : referencesOf(mesh)) {
+      std::error_code error;
+      hash.add(file.empty() ? std::uint64_t{0} : std::uint64_t{std::filesystem::file_size(file, error)});
+      if (!file.empty() && !hash.addFile(file)) return fail(file.string() + ": cannot be read");
+    }
+    hash.add(std::uint64_t{0});
+  }
+  return {};
+}
+
 Result<std::string> contentHash(const std::vector<std::filesystem::path>& meshes, double unit,
                                 const BakeOptions& options) {
   ContentHash hash;
@@ -63,16 +80,7 @@ Result<std::string> contentHash(const std::vector<std::filesystem::path>& meshes
       for (const double c : corner) hash.add(c);
     }
   }
-  for (const auto& mesh : meshes) {
-    if (!hash.addFile(mesh)) return fail(mesh.string() + ": cannot be read");
-    // the names are in the mesh; a file that is missing is left to the import
-    for (const auto& [named, file] : referencesOf(mesh)) {
-      std::error_code error;
-      hash.add(file.empty() ? std::uint64_t{0} : std::uint64_t{std::filesystem::file_size(file, error)});
-      if (!file.empty() && !hash.addFile(file)) return fail(file.string() + ": cannot be read");
-    }
-    hash.add(std::uint64_t{0});
-  }
+  if (const auto added = addMeshes(hash, meshes); !added) return tl::unexpected(added.error());
   return hash.text();
 }
 
@@ -83,23 +91,45 @@ void append(TriangleMesh& whole, TriangleMesh part) {
   whole.notes.insert(whole.notes.end(), part.notes.begin(), part.notes.end());
 }
 
+Result<TriangleMesh> importAll(const std::vector<std::filesystem::path>& meshes, double unit,
+                               const BakeProgress& progress = {}) {
+  TriangleMesh whole;
+  for (const auto& file : meshes) {
+    if (progress && !progress(0.0, "reading meshes")) return fail("cancelled");
+    auto part = importMesh(file, unit);
+    if (!part) return part;
+    append(whole, std::move(*part));
+  }
+  return whole;
+}
+
 }  // namespace
+
+Result<std::string> displayKey(const std::vector<std::filesystem::path>& meshes, double unit) {
+  ContentHash hash;
+  hash.add(kDisplayVersion);
+  hash.add(unit);
+  if (const auto added = addMeshes(hash, meshes); !added) return tl::unexpected(added.error());
+  return hash.text();
+}
+
+Result<std::vector<DisplayModel>> displayModelsOf(const std::vector<std::filesystem::path>& meshes,
+                                                  double unit) {
+  const auto whole = importAll(meshes, unit);
+  if (!whole) return tl::unexpected(whole.error());
+  return displayModels(*whole);
+}
 
 Result<structures::HapticStructures> bakeFiles(const std::vector<std::filesystem::path>& meshes, double unit,
                                                const BakeOptions& options, const BakeProgress& progress) {
   if (meshes.empty()) return fail("no mesh to bake");
   const auto hash = contentHash(meshes, unit, options);
   if (!hash) return tl::unexpected(hash.error());
-  TriangleMesh whole;
+  const auto whole = importAll(meshes, unit, progress);
+  if (!whole) return tl::unexpected(whole.error());
   std::string source;
-  for (const auto& file : meshes) {
-    if (progress && !progress(0.0, "reading meshes")) return fail("cancelled");
-    auto part = importMesh(file, unit);
-    if (!part) return tl::unexpected(part.error());
-    append(whole, std::move(*part));
-    source += (source.empty() ? "" : ", ") + file.filename().string();
-  }
-  auto structures = bake(whole, options, progress);
+  for (const auto& file : meshes) source += (source.empty() ? "" : ", ") + file.filename().string();
+  auto structures = bake(*whole, options, progress);
   if (!structures) return fail(source + ": " + structures.error().what);
   structures->info.source = source;
   structures->info.meshes = meshes;

@@ -2,15 +2,18 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
+#include <fstream>
 #include <optional>
+#include <sstream>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "idl/types/hash.h"
+#include "idl/wire/assets.h"
 #include "server/bake/bake.h"
+#include "server/bake/display_model.h"
 #include "server/bake/shapes.h"
 #include "server/session/generated_parts.h"
 #include "server/structures/gap_note.h"
@@ -19,6 +22,9 @@ namespace tenon::session {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::string_view kModelKey = R"("model":")";
+constexpr std::size_t kAssetNameLength = 30;
 
 /// Mesh files of an object, all in one unit.
 struct ObjectMeshes {
@@ -116,6 +122,36 @@ Result<std::shared_ptr<const structures::HapticStructures>> structuresOf(
   return structures::openStructures(*file);
 }
 
+/// The levels of one object as JSON; an empty list when its meshes cannot be read. What was made is noted in
+/// a file named by displayKey.
+Result<std::string> displayLevels(const ObjectMeshes& meshes, const wire::AssetStore& store,
+                                  const fs::path& notes) {
+  const auto key = bake::displayKey(meshes.files, meshes.unit);
+  if (!key) return std::string("[]");
+  std::ifstream noted(notes / *key);
+  std::string text;
+  bool is_whole = static_cast<bool>(std::getline(noted, text));
+  // every asset that the note names is there
+  for (std::size_t at = text.find(kModelKey); at != std::string::npos; at = text.find(kModelKey, at + 1))
+    is_whole = is_whole && store.has(text.substr(at + kModelKey.size(), kAssetNameLength));
+  if (is_whole) return text;
+
+  const auto models = bake::displayModelsOf(meshes.files, meshes.unit);
+  if (!models) return std::string("[]");
+  text.clear();
+  for (const bake::DisplayModel& model : *models) {
+    const auto asset = store.put(model.glb);
+    if (!asset) return asset;
+    text += fmt::format(R"({}{{{}{}","triangles":{},"error":{:.3g}}})", text.empty() ? "" : ",", kModelKey,
+                        *asset, model.triangles, model.error);
+  }
+  text = "[" + text + "]";
+  std::error_code error;
+  fs::create_directories(notes, error);
+  std::ofstream(notes / *key) << text << "\n";
+  return text;
+}
+
 }  // namespace
 
 Result<LoadedScene> loadScene(const fs::path& path, const LoadOptions& options,
@@ -208,11 +244,21 @@ std::vector<std::string> thinWallReport(const simulation::Scene& scene) {
   return sentences;
 }
 
-fs::path defaultCache() {
-  if (const char* cache = std::getenv("TENON_CACHE")) return cache;
-  if (const char* cache = std::getenv("XDG_CACHE_HOME")) return fs::path(cache) / "tenon";
-  if (const char* home = std::getenv("HOME")) return fs::path(home) / ".cache" / "tenon";
-  return fs::temp_directory_path() / "tenon";
+Result<std::string> storeDisplayModels(const game_control::ScenarioFile& scenario,
+                                       const LoadOptions& options) {
+  const auto parts = generatedParts(scenario, options.cache, options.detail);
+  if (!parts) return fail(parts.error().what);
+  const wire::AssetStore store(options.cache / "assets");
+  std::string objects;
+  for (const game_control::ScenarioObject& object : scenario.objects) {
+    const auto meshes = meshesOf(scenario, object, *parts, options);
+    if (!meshes) return fail(meshes.error().what);
+    const auto levels = displayLevels(*meshes, store, options.cache / "display");
+    if (!levels) return levels;
+    objects += (objects.empty() ? "" : ",") + *levels;
+  }
+  const std::string list = R"({"version":1,"objects":[)" + objects + "]}";
+  return store.put({reinterpret_cast<const std::uint8_t*>(list.data()), list.size()});
 }
 
 }  // namespace tenon::session

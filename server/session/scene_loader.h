@@ -67,7 +67,14 @@ struct LoadedStructures {
 [[nodiscard]] std::vector<Eigen::AlignedBox3d> meshBoxes(const game_control::ScenarioFile& scenario,
                                                          const LoadOptions& options);
 
-/// Folder for data that can be generated again: $TENON_CACHE, $XDG_CACHE_HOME/tenon or ~/.cache/tenon.
-[[nodiscard]] std::filesystem::path defaultCache();
+/// Makes the display models of all objects unless the cache has them, keeps them in the asset store
+/// `cache`/assets, and returns the name of the list of them: SessionAnnounce::scene_hash. The list is JSON,
+/// {"version": 1, "objects": [levels by ObjectId]}, a level {"model": asset, "triangles": number, "error":
+/// [m]}, the finest first; an object whose meshes cannot be read has none. Fails when the store cannot be
+/// written.
+///
+/// Threads: one. Real-time: no.
+[[nodiscard]] Result<std::string> storeDisplayModels(const game_control::ScenarioFile& scenario,
+                                                     const LoadOptions& options);
 
 }  // namespace tenon::session

@@ -260,7 +260,8 @@ void ServerWire::announce() {
                                           .lockstep = options_.lockstep,
                                           .scenario_hash = scenario_hash_,
                                           .host = hostName(),
-                                          .pid = static_cast<std::uint32_t>(getpid())});
+                                          .pid = static_cast<std::uint32_t>(getpid()),
+                                          .scene_hash = options_.scene_hash});
 }
 
 void ServerWire::dispatch(std::chrono::nanoseconds timeout) {

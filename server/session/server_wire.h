@@ -31,6 +31,7 @@ struct WireOptions {
   bool publish_journal = true;  ///< TickInput and Checkpoint are published too
   std::uint32_t server_epoch = 0;
   std::optional<wire::SharedKey> key;  ///< of the session; none: nobody can be admin or instructor
+  std::string scene_hash;              ///< asset that lists the display models; empty: none
   std::filesystem::path stop_file;     ///< keeps the raises of the emergency stop; empty: only in memory
 };
 

@@ -88,6 +88,7 @@ class Server final : public SessionServer {
                                   .publish_journal = options_.publish_journal,
                                   .server_epoch = epoch_,
                                   .key = options_.key,
+                                  .scene_hash = options_.scene_hash,
                                   .stop_file = options_.stop_file},
                                  loaded, registry_, input_buffer_, publisher_);
     if (!wire) return fail(wire.error().what);

@@ -27,6 +27,7 @@ struct SessionOptions {
   /// Of the session, for admins and instructors; none: nobody can be one.
   std::optional<wire::SharedKey> key;
   std::filesystem::path stop_file;  ///< keeps an emergency stop over a crash; empty: nothing does
+  std::string scene_hash;           ///< of storeDisplayModels; empty: displays have no models
   double detail = 1.0;              ///< [-] LoadOptions::detail, noted in the journal
   bool publish_journal = true;      ///< publish TickInput and Checkpoint for recorders
   /// [s] In real time, the governor keeps the computing time of a tick below this by changing the work

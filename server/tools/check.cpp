@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "devices/catalog.h"
+#include "idl/types/cache_folder.h"
 #include "server/session/loading_display.h"
 #include "server/session/scene_loader.h"
 
@@ -28,7 +29,7 @@ constexpr int kWrongUsage = 2;
 struct CheckArguments {
   std::string scenario;
   check::CheckOptions check;
-  session::LoadOptions load{.cache = session::defaultCache()};
+  session::LoadOptions load{.cache = defaultCache()};
   bool json = false;
   bool quiet = false;
 };

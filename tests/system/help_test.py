@@ -37,7 +37,7 @@ class Help(unittest.TestCase):
                 self.assertIn("--session", done.stdout)
 
     def test_an_unknown_option_is_wrong_usage(self):
-        for verb in ("serve", "check", "record", "report", "rehearse", "parts", "command", "bake", "probe", "contact", "voxels"):
+        for verb in ("serve", "check", "record", "report", "rehearse", "parts", "command", "bake", "probe", "contact", "voxels", "console"):
             with self.subTest(verb=verb):
                 self.assertEqual(tenon(verb, "--fly").returncode, 2)
         for role in ("trainee", "instructor", "observer"):

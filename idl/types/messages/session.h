@@ -22,7 +22,7 @@ struct SessionAnnounce {
   std::string scenario_hash;  ///< of the scenario's text, for recordings
   std::string host;           ///< name of the machine that the server runs on
   std::uint32_t pid = 0;      ///< of the server's process there
-  std::string scene_hash;     ///< reserved: of all meshes and structures that displays and stations load
+  std::string scene_hash;     ///< asset that lists the display models of all objects (idl/wire/assets.h)
 };
 
 /// A client's request for a seat in the session, in the lobby partition; repeated until it is answered. A

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "clients/report/page.h"
+#include "idl/types/cache_folder.h"
 #include "idl/types/output_files.h"
 #include "server/session/scene_loader.h"
 #include "tests/bench/engine/bench_scene.h"
@@ -37,7 +38,7 @@ struct BenchArguments {
   std::string json;
   std::string figures;
   bool overwrite = false;
-  std::filesystem::path cache = session::defaultCache();
+  std::filesystem::path cache = defaultCache();
   std::string scenario;
 };
 

@@ -1,6 +1,5 @@
 #include "server/session/scene_loader.h"
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -11,6 +10,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "idl/wire/assets.h"
 #include "server/bake/shapes.h"
 #include "tests/server/session/small_session.h"
 #include "tests/support/source_folder.h"
@@ -148,14 +148,24 @@ TEST_F(SceneLoaderTest, AnUnknownPartIsAnErrorWithItsLine) {
   EXPECT_THAT(none.error().what, HasSubstr("scenario.yaml:2: there is no generated part 'gadget'"));
 }
 
-TEST(DefaultCache, IsTakenFromTheEnvironment) {
-  const char* const before = std::getenv("TENON_CACHE");
-  const std::string kept = before != nullptr ? before : "";
-  setenv("TENON_CACHE", "/somewhere/else", 1);
-  EXPECT_EQ(defaultCache(), "/somewhere/else");
-  unsetenv("TENON_CACHE");
-  EXPECT_NE(defaultCache(), "/somewhere/else");
-  if (before != nullptr) setenv("TENON_CACHE", kept.c_str(), 1);
+TEST_F(SceneLoaderTest, DisplayModelsAreAssetsThatTheListOfTheSceneNames) {
+  const auto loaded = load(shapeScenario("{box: [20 mm, 20 mm, 20 mm]}"));
+  ASSERT_TRUE(loaded) << loaded.error().what;
+  const LoadOptions options{.cache = folder_ / "cache"};
+  const auto name = storeDisplayModels(*loaded->scenario, options);
+  ASSERT_TRUE(name) << name.error().what;
+  const wire::AssetStore store(folder_ / "cache" / "assets");
+  const auto list = store.get(*name).value();
+  const std::string text(list.begin(), list.end());
+  EXPECT_THAT(text, testing::StartsWith(R"({"version":1,"objects":[[{"model":")"));
+  EXPECT_THAT(text, HasSubstr(R"("triangles":12,)"));
+  const std::string model = text.substr(text.find("model") + 8, 30);
+  EXPECT_TRUE(store.has(model)) << text;
+
+  // made again where it is missing, and the same
+  fs::remove(folder_ / "cache" / "assets" / model);
+  EXPECT_EQ(storeDisplayModels(*loaded->scenario, options).value(), *name);
+  EXPECT_TRUE(store.has(model));
 }
 
 }  // namespace

@@ -1,0 +1,101 @@
+#include "clients/console/foxglove_protocol.h"
+
+#include <algorithm>
+
+#include <nlohmann/json.hpp>
+
+namespace tenon::console {
+
+namespace {
+
+/// Of texts that people or other programs made, so maybe not UTF-8.
+std::string dump(const nlohmann::json& json) {
+  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::optional<std::uint32_t> number(const nlohmann::json& object, const char* key) {
+  const auto found = object.find(key);
+  if (found == object.end() || !found->is_number_unsigned()) return std::nullopt;
+  const auto value = found->get<std::uint64_t>();
+  return value <= 0xFFFFFFFFU ? std::optional(static_cast<std::uint32_t>(value)) : std::nullopt;
+}
+
+}  // namespace
+
+std::optional<std::string_view> chooseSubprotocol(std::string_view offered) {
+  while (!offered.empty()) {
+    std::string_view name = offered.substr(0, offered.find(','));
+    offered.remove_prefix(std::min(offered.size(), name.size() + 1));
+    name.remove_prefix(std::min(name.size(), name.find_first_not_of(" \t")));
+    name = name.substr(0, name.find_last_not_of(" \t") + 1);
+    const auto* known = std::find(kSubprotocols.begin(), kSubprotocols.end(), name);
+    if (known != kSubprotocols.end()) return *known;
+  }
+  return std::nullopt;
+}
+
+std::string serverInfoText(std::string_view name, std::string_view session_id) {
+  return dump({{"op", "serverInfo"},
+               {"name", name},
+               {"capabilities", nlohmann::json::array()},
+               {"metadata", nlohmann::json::object()},
+               {"sessionId", session_id}});
+}
+
+std::string advertiseText(const std::vector<Channel>& channels) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const Channel& channel : channels) {
+    list.push_back({{"id", channel.id},
+                    {"topic", channel.topic},
+                    {"encoding", channel.encoding},
+                    {"schemaName", channel.schema_name},
+                    {"schema", channel.schema},
+                    {"schemaEncoding", channel.schema_encoding}});
+  }
+  return dump({{"op", "advertise"}, {"channels", list}});
+}
+
+std::string statusText(StatusLevel level, std::string_view message) {
+  return dump({{"op", "status"}, {"level", static_cast<int>(level)}, {"message", message}});
+}
+
+Result<ViewerRequest> parseViewerText(std::string_view text) {
+  const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
+  if (!json.is_object()) return fail("a text that is no JSON object");
+  const auto op = json.find("op");
+  if (op == json.end() || !op->is_string()) return fail("a request without 'op'");
+  ViewerRequest request;
+  if (*op == "subscribe") {
+    const auto list = json.find("subscriptions");
+    if (list == json.end() || !list->is_array()) return fail("'subscribe' without a list 'subscriptions'");
+    for (const nlohmann::json& entry : *list) {
+      const auto id = number(entry, "id");
+      const auto channel = number(entry, "channelId");
+      if (!id || !channel) return fail("a subscription without numbers 'id' and 'channelId'");
+      request.subscribe.emplace_back(*id, *channel);
+    }
+    return request;
+  }
+  if (*op == "unsubscribe") {
+    const auto list = json.find("subscriptionIds");
+    if (list == json.end() || !list->is_array())
+      return fail("'unsubscribe' without a list 'subscriptionIds'");
+    for (const nlohmann::json& entry : *list) {
+      const auto id = number({{"id", entry}}, "id");
+      if (!id) return fail("a subscription id that is no number");
+      request.unsubscribe.push_back(*id);
+    }
+    return request;
+  }
+  return fail("'" + op->get<std::string>().substr(0, 80) + "' is not offered here");
+}
+
+MessageHeader messageHeader(SubscriptionId subscription, std::int64_t time_ns) {
+  MessageHeader header{1};
+  for (std::size_t i = 0; i < 4; ++i) header[1 + i] = static_cast<std::uint8_t>(subscription >> (8 * i));
+  for (std::size_t i = 0; i < 8; ++i)
+    header[5 + i] = static_cast<std::uint8_t>(static_cast<std::uint64_t>(time_ns) >> (8 * i));
+  return header;
+}
+
+}  // namespace tenon::console

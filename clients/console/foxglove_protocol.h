@@ -1,0 +1,47 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "clients/console/channel.h"
+#include "idl/types/result.h"
+
+/// The Foxglove WebSocket protocol, version 1, server side: texts are JSON, messages binary and
+/// little-endian. Of its optional capabilities there are none.
+///
+/// Threads: pure. Real-time: no.
+namespace tenon::console {
+
+/// Both names of one protocol: today's viewers offer one or the other.
+inline constexpr std::array<std::string_view, 2> kSubprotocols{"foxglove.sdk.v1", "foxglove.websocket.v1"};
+
+/// The first of kSubprotocols that a list as in Sec-WebSocket-Protocol offers.
+[[nodiscard]] std::optional<std::string_view> chooseSubprotocol(std::string_view offered);
+
+[[nodiscard]] std::string serverInfoText(std::string_view name, std::string_view session_id);
+[[nodiscard]] std::string advertiseText(const std::vector<Channel>& channels);
+enum class StatusLevel { kInfo, kWarning, kError };
+[[nodiscard]] std::string statusText(StatusLevel level, std::string_view message);
+
+using SubscriptionId = std::uint32_t;  ///< chosen by the viewer
+
+/// What a viewer asks for.
+struct ViewerRequest {
+  std::vector<std::pair<SubscriptionId, ChannelId>> subscribe;
+  std::vector<SubscriptionId> unsubscribe;
+};
+
+/// Fails with a sentence for the viewer when `text` is no request of this protocol or one that is not
+/// offered.
+[[nodiscard]] Result<ViewerRequest> parseViewerText(std::string_view text);
+
+/// What precedes the payload in a binary message: opcode 1, subscription, time [ns].
+using MessageHeader = std::array<std::uint8_t, 13>;
+[[nodiscard]] MessageHeader messageHeader(SubscriptionId subscription, std::int64_t time_ns);
+
+}  // namespace tenon::console

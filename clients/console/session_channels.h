@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/console/channel.h"
+#include "clients/console/foxglove_messages.h"
+#include "idl/types/messages.h"
+#include "idl/wire/assets.h"
+#include "idl/wire/raw_subscriber.h"
+
+namespace tenon::console {
+
+/// How the gateway stands to its session, for the page.
+enum class LinkState { kSearching, kJoined, kRefused, kLost, kEnded };
+
+/// Turns what a session publishes into messages of channels: its topics as they are, and beside them what
+/// public viewers display by themselves (frames at /tf, models at /scene, events at /log). The channel
+/// /console says how the gateway stands to its session.
+///
+/// Threads: one. Real-time: no.
+class SessionChannels {
+ public:
+  explicit SessionChannels(wire::AssetStore assets);
+
+  [[nodiscard]] const std::vector<Channel>& channels() const { return channels_; }
+  /// The topics that are forwarded: the tiers _30 and _100, states and events; nothing that clients prove
+  /// themselves with, nothing at 1 kHz.
+  [[nodiscard]] static std::vector<std::string> topics();
+
+  /// A session begins: what was known of the one before is forgotten.
+  void begin(const SessionAnnounce& announce, std::int64_t now_ns);
+  void setState(LinkState state, const std::string& reason, std::int64_t now_ns);
+  void receive(const wire::RawSample& sample);
+  /// What is to be published since the last call.
+  [[nodiscard]] std::vector<Publication> take();
+  /// The run of the session has ended: it is not lost when its server goes.
+  [[nodiscard]] bool isOver() const { return is_over_; }
+
+ private:
+  struct Part {
+    SceneObject object;
+    ObjectState state;
+    bool is_placed = false;  ///< a state has arrived
+    bool is_shown = false;   ///< its entity is published
+  };
+
+  void publish(std::string_view topic, std::uint64_t instance, std::int64_t time_ns,
+               std::vector<std::uint8_t> bytes);
+  void receiveState(const ObjectState& state, std::int64_t time_ns);
+  void receiveStep(const StepState& step, std::int64_t time_ns);
+  void showOrHide(std::uint32_t id, std::int64_t time_ns);
+  [[nodiscard]] std::vector<std::uint8_t> modelOf(ObjectId id) const;
+
+  wire::AssetStore assets_;
+  std::vector<Channel> channels_;
+  std::map<std::string, ChannelId, std::less<>> ids_;  ///< by topic
+  std::vector<Publication> published_;
+
+  SessionAnnounce announce_;
+  std::vector<std::string> models_;  ///< assets by ObjectId; empty: none
+  std::map<std::uint32_t, Part> parts_;
+  std::map<std::uint32_t, Pose> X_WH_;  ///< devices by HandId
+  std::int64_t moved_ns_ = 0;           ///< [ns] of the newest pose that is not yet in /tf; 0: none
+  std::uint32_t lives_ = 0;             ///< sessions begun
+  bool is_over_ = false;
+};
+
+}  // namespace tenon::console

@@ -1,0 +1,33 @@
+// Elements in one line: h("p", "muted", text, child, ...)
+export function h<K extends keyof HTMLElementTagNameMap>(tag: K, className = "", ...children: (Node | string)[]): HTMLElementTagNameMap[K] {
+  const element = document.createElement(tag);
+  if (className !== "") element.className = className;
+  element.append(...children);
+  return element;
+}
+
+const SVG = "http://www.w3.org/2000/svg";
+const PATHS = {
+  live: "M8 3a5 5 0 1 0 0 10A5 5 0 0 0 8 3z",
+  wait: "M8 1.5a6.5 6.5 0 1 0 6.5 6.5h-2A4.5 4.5 0 1 1 8 3.5z",
+  warn: "M8 1l7 13H1zM7 6h2v4H7zM7 11h2v2H7z",
+  stop: "M5 1h6l4 4v6l-4 4H5l-4-4V5z",
+  done: "M2 8l2-2 3 3 5-6 2 2-7 8z",
+  now: "M4 2l9 6-9 6z",
+  skip: "M2 3l6 5-6 5zM8 3l6 5-6 5z",
+  over: "M4 3h8v10H4z",
+  person: "M8 2a3 3 0 1 1 0 6 3 3 0 0 1 0-6zM2 14c0-3 3-5 6-5s6 2 6 5z",
+} as const;
+export type Icon = keyof typeof PATHS;
+
+export function icon(name: Icon): SVGSVGElement {
+  const svg = document.createElementNS(SVG, "svg");
+  svg.setAttribute("viewBox", "0 0 16 16");
+  svg.setAttribute("aria-hidden", "true");
+  svg.classList.add("icon");
+  const path = document.createElementNS(SVG, "path");
+  path.setAttribute("d", PATHS[name]);
+  path.setAttribute("fill-rule", "evenodd");
+  svg.append(path);
+  return svg;
+}

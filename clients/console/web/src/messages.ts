@@ -1,0 +1,52 @@
+// The messages of idl/tenon.idl that the page reads, as the decoder gives them: 64-bit numbers are bigint, enumerations numbers.
+
+export type Vector = ArrayLike<number>;
+export interface Pose { p: Vector; q: Vector }
+export interface Wrench { force: Vector; torque: Vector }
+
+export const NONE = 0xffffffff;
+
+export interface SceneObject {
+  object_id: number; name: string; title: string; kind: string; structure_hash: string; color: string; X_WO: Pose; size: Vector; centre: Vector;
+}
+export enum Status { Hidden, Parked, Held, Tracked, Fixed, Free }
+export interface ObjectState {
+  object_id: number; epoch: number; X_WO: Pose; V_WO: Vector; holder: number; status: Status; in_contact: boolean;
+}
+export interface WorldFrame { part: number; parts: number; tick: bigint; step_revision: number; states: ObjectState[] }
+export interface ObjectSnapshot { object_id: number; tick: bigint; state: ObjectState }
+export interface HandState { hand_id: number; seq: number; X_WH: Pose; F_Ho_W: Wrench; safety_flags: number; indexing: boolean }
+export interface PairContact {
+  a: number; b: number; enabled: boolean; colliding: boolean; contacts: number; F_Ao_W: Wrench; p_WP: Vector; depth: number; gap: number;
+  load_percent: number; peak_force: number; peak_depth: number;
+}
+export interface ContactPairs { part: number; parts: number; tick: bigint; pairs: PairContact[] }
+export interface TickStats {
+  tick: bigint; load_percent: number; compute_seconds: number; compute_seconds_max: number; late_ticks: bigint; input_age_seconds: number;
+}
+export interface Localized { language: string; text: string }
+export enum StepPhase { Waiting, Active, Done, TimedOut, Skipped }
+export interface StepState {
+  revision: number; step: number; steps: number; name: string; title: Localized[]; instruction: Localized[]; phase: StepPhase; part: string;
+  object_id: number; hand_id: number; touch_id: number; has_target: boolean; X_WG: Pose; approach_W: Vector; approach_distance: number;
+  tolerance: number; angle_tolerance: number; timeout: number; started: bigint;
+}
+export interface StepProgress {
+  revision: number; tick: bigint; position_error: number; angle_error: number; contact_seconds: number;
+  conditions: { text: string; value: number; limit: number; met: boolean }[];
+}
+export enum RunPhase { Waiting, Running, Paused, Succeeded, Failed, Stopped }
+export interface RunState { phase: RunPhase; tick: bigint; reason: string }
+export interface GrabState { object_id: number; hand_id: number; epoch: number; X_HO: Pose; tick: bigint }
+export interface Presence { client_id: number; name: string; role: number; hands: ArrayLike<number>; alive: boolean }
+export interface EmergencyStop { client_guid: string; counter: number; who: string; reason: string }
+export interface EventLog { seq: bigint; tick: bigint; severity: number; kind: string; text: string }
+export interface InstanceGone { topic: string; key_sample: Uint8Array }
+/** Of the channel /console: how the gateway stands to its session. */
+export interface ConsoleState {
+  state: "searching" | "joined" | "refused" | "lost" | "ended";
+  reason: string; life: number; session: string; title: string; lockstep: boolean; scene: string; protocol: number;
+}
+/** A level of an object's display model; the list of a scene's assets. */
+export interface ModelLevel { model: string; triangles: number; error: number }
+export interface SceneModels { version: number; objects: ModelLevel[][] }

@@ -1,0 +1,98 @@
+#include "clients/console/site.h"
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+namespace tenon::console {
+namespace {
+
+namespace fs = std::filesystem;
+
+class SiteTest : public testing::Test {
+ protected:
+  SiteTest() {
+    fs::create_directories(folder_ / "page" / "page");
+    write(folder_ / "page" / "index.html", "<html>");
+    write(folder_ / "page" / "page" / "index-1a2b.js", "code");
+    write(folder_ / "secret", "secret");
+  }
+  ~SiteTest() override { fs::remove_all(folder_); }
+
+  static void write(const fs::path& file, const std::string& text) { std::ofstream(file) << text; }
+  static std::string bodyOf(const Answer& answer) { return {answer.body.begin(), answer.body.end()}; }
+
+  const fs::path folder_ = fs::temp_directory_path() / ("tenon_site_test_" + std::to_string(getpid()));
+  const wire::AssetStore assets_{folder_ / "assets"};
+};
+
+TEST_F(SiteTest, ServesThePage) {
+  const Site site(folder_ / "page", assets_);
+  EXPECT_TRUE(site.hasPage());
+  EXPECT_EQ(bodyOf(site.answer("/")), "<html>");
+  EXPECT_EQ(bodyOf(site.answer("/?session=demo")), "<html>");
+  EXPECT_FALSE(site.answer("/").is_immutable);
+  const Answer code = site.answer("/page/index-1a2b.js");
+  EXPECT_EQ(bodyOf(code), "code");
+  EXPECT_EQ(code.type, "text/javascript; charset=utf-8");
+  EXPECT_TRUE(code.is_immutable);
+}
+
+TEST_F(SiteTest, NoPathLeadsOutOfIt) {
+  const Site site(folder_ / "page", assets_);
+  for (const char* target :
+       {"/../secret", "/page/../../secret", "/..%2fsecret", "/%2e%2e/secret", "//secret", "/./index.html",
+        "/assets/../secret", "/assets/", "/assets/0123", "/assets/../../../../../../etc/passwd", "/page/",
+        "secret", "", "/index.html/", "/\\..\\secret", "http://localhost/index.html"}) {
+    const Answer answer = site.answer(target);
+    EXPECT_EQ(answer.status, 404U) << target;
+    EXPECT_EQ(bodyOf(answer).find("secret"), std::string::npos) << target;
+  }
+}
+
+TEST_F(SiteTest, WithoutThePageItSaysHowToBuildIt) {
+  const Site site(folder_ / "missing", assets_);
+  EXPECT_FALSE(site.hasPage());
+  const Answer answer = site.answer("/");
+  EXPECT_EQ(answer.status, 503U);
+  EXPECT_NE(bodyOf(answer).find("deploy/setup build"), std::string::npos);
+}
+
+TEST_F(SiteTest, ServesAssetsByTheirContent) {
+  const Site site(folder_ / "page", assets_);
+  const std::string model = "glTF and more";
+  const auto name = assets_.put({reinterpret_cast<const std::uint8_t*>(model.data()), model.size()});
+  ASSERT_TRUE(name) << name.error().what;
+  const Answer answer = site.answer("/assets/" + *name);
+  EXPECT_EQ(bodyOf(answer), model);
+  EXPECT_EQ(answer.type, "model/gltf-binary");
+  EXPECT_TRUE(answer.is_immutable);
+
+  write(folder_ / "assets" / *name, "glTF and other");  // damaged
+  EXPECT_EQ(site.answer("/assets/" + *name).status, 404U);
+}
+
+TEST(Origin, PagesOfThisServerAndPermittedOnesMayConnect) {
+  const std::vector<std::string> others{"https://viewer.example"};
+  EXPECT_TRUE(isPermittedOrigin("", "localhost:8080", {}));
+  EXPECT_TRUE(isPermittedOrigin("http://localhost:8080", "localhost:8080", {}));
+  EXPECT_TRUE(isPermittedOrigin("https://viewer.example", "localhost:8080", others));
+  for (const char* origin :
+       {"http://localhost:8081", "https://localhost:8080", "http://localhost", "null", "http://evil.example",
+        "http://localhost:8080.evil.example", "https://viewer.example.evil"})
+    EXPECT_FALSE(isPermittedOrigin(origin, "localhost:8080", others)) << origin;
+}
+
+TEST(Host, NamesThisMachineOnly) {
+  for (const char* host : {"localhost", "localhost:8080", "127.0.0.1:1", "[::1]", "[::1]:8080"})
+    EXPECT_TRUE(isLoopbackHost(host)) << host;
+  for (const char* host : {"", "evil.example", "evil.example:8080", "localhost.evil.example",
+                           "localhost:", "localhost:80a", "127.0.0.1.evil", "::1", "localhost:80:80"})
+    EXPECT_FALSE(isLoopbackHost(host)) << host;
+}
+
+}  // namespace
+}  // namespace tenon::console

@@ -1,0 +1,22 @@
+#include "idl/types/cache_folder.h"
+
+#include <cstdlib>
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace tenon {
+namespace {
+
+TEST(DefaultCache, IsTakenFromTheEnvironment) {
+  const char* const before = std::getenv("TENON_CACHE");
+  const std::string kept = before != nullptr ? before : "";
+  setenv("TENON_CACHE", "/somewhere/else", 1);
+  EXPECT_EQ(defaultCache(), "/somewhere/else");
+  unsetenv("TENON_CACHE");
+  EXPECT_NE(defaultCache(), "/somewhere/else");
+  if (before != nullptr) setenv("TENON_CACHE", kept.c_str(), 1);
+}
+
+}  // namespace
+}  // namespace tenon
