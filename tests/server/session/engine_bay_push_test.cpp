@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "idl/types/cache_folder.h"
 #include "server/bake/bake.h"
 #include "server/session/scene_loader.h"
 #include "server/simulation/environment.h"
@@ -63,7 +64,8 @@ struct ExactSheet {
 class BayOfSheets {
  public:
   BayOfSheets()
-      : loaded_(loadScene(test::sourceFolder() / "scenarios" / "engine_bay", {.cache = defaultCache()})) {
+      : loaded_(loadScene(test::sourceFolder() / "scenarios" / "engine_bay",
+                          {.cache = defaultCache(), .detail = 0.12})) {
     if (!loaded_) return;
     const structures::StructureInfo& info = object("engine_bay").structures->info;
     auto mesh = bake::importMesh(info.meshes.front(), info.unit);
