@@ -38,7 +38,7 @@ class Gateway {
     if (!has_page)
       options_.print(
           "the console's page is not built, so this address serves public viewers only: "
-          "`deploy/setup build` installs what builds it");
+          "`deploy/setup console` installs what builds it");
     auto participant = wire::Participant::open({.domain = options_.domain, .config = {}});
     if (!participant) return fail(participant.error().what);
     setState(LinkState::kSearching, {});

@@ -39,7 +39,8 @@ constexpr std::string_view kNoPage =
     "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Tenon: no page</title>"
     "<h1>The console's page is not built</h1><p>The gateway runs, and viewers of the Foxglove WebSocket "
     "protocol can connect to it. The page is built with Node 18 or newer; install it and build again:</p>"
-    "<pre>deploy/setup build\ncmake --build --preset release --target console_page</pre></html>";
+    "<pre>deploy/setup console\ncmake --preset release\ncmake --build --preset release --target "
+    "console_page</pre></html>";
 
 /// What is read first of the bytes of an asset: a binary glTF file, or a list.
 std::string_view typeOfAsset(const std::vector<std::uint8_t>& bytes) {

@@ -58,7 +58,7 @@ TEST_F(SiteTest, WithoutThePageItSaysHowToBuildIt) {
   EXPECT_FALSE(site.hasPage());
   const Answer answer = site.answer("/");
   EXPECT_EQ(answer.status, 503U);
-  EXPECT_NE(bodyOf(answer).find("deploy/setup build"), std::string::npos);
+  EXPECT_NE(bodyOf(answer).find("deploy/setup console"), std::string::npos);
 }
 
 TEST_F(SiteTest, ServesAssetsByTheirContent) {
