@@ -81,7 +81,9 @@ void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noex
   if (!(dt > 0.0)) dt = kShortestCycle;
   readDevice();
   answers_.step(seq, local_.hasManifold() ? local_.manifold().answers_seq : 0, dt);
-  const bool hold = in_contact_ || !permitted_ || rendering_ == Rendering::kAnchoring;
+  // a device without forces may rest at the end of its workspace, where indexing would not end
+  const bool hold =
+      in_contact_ || !permitted_ || !device_state_.forces_on || rendering_ == Rendering::kAnchoring;
   workspace_.step(device_state_.X_DH.translation(), hold, dt);
   anchor(seq, world);
   const Pose X_WH = workspace_.toWorld(device_state_.X_DH);

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "clients/haptic/haptic_hand.h"
+#include "clients/simulated_person/motor_intent.h"
 #include "clients/simulated_person/simulated_instructor.h"
 #include "devices/catalog.h"
 #include "devices/simulated/simulated_device.h"
@@ -21,6 +22,7 @@ struct InstructorStation::Parts {
   std::unique_ptr<devices::HapticDevice> device;
   std::optional<haptic::HapticHand> hand;
   simulated_person::SimulatedInstructor person;
+  simulated_person::MotorIntent intent;
 
   void movePerson(const haptic::WorldView& world, double dt) {
     devices::HumanArm* const human_arm = devices::simulatedHumanArm(*device);
@@ -37,7 +39,7 @@ struct InstructorStation::Parts {
     perception.p_WC = workspace.centre();
     perception.reach = kWorkspaceFraction * hand->caps().workspace_radius;
     person.step(perception, workspace, world, dt);
-    human_arm->setIntent(workspace.toDevice(person.intendedPose()));
+    human_arm->setIntent(intent.towards(workspace.toDevice(person.intendedPose())));
     human_arm->setContraction(person.contraction());
   }
 };
@@ -62,6 +64,7 @@ std::vector<std::string> InstructorStation::handNames() const { return {"instruc
 
 void InstructorStation::begin(std::span<const HandId> hand_ids) {
   parts_->hand.reset();
+  parts_->intent.reset();
   Vector3 start(-0.1, -0.3, 1.25);
   for (const SceneObject& object : sceneObjects()) {
     if (object.kind == "assistant") start = object.X_WO.translation();

@@ -5,6 +5,7 @@
 
 #include "clients/haptic/bracelet.h"
 #include "clients/haptic/haptic_hand.h"
+#include "clients/simulated_person/motor_intent.h"
 #include "clients/simulated_person/posture.h"
 #include "clients/simulated_person/simulated_trainee.h"
 #include "devices/catalog.h"
@@ -51,6 +52,7 @@ struct TraineeStation::Parts {
   std::optional<haptic::Bracelet> bracelet;
   simulated_person::Posture posture;
   simulated_person::SimulatedTrainee person;
+  std::array<simulated_person::MotorIntent, 2> intents;
 
   devices::HapticDevice& arm(std::size_t hand) {
     const bool right = (hand == kRight) != options.swap_hands;
@@ -76,7 +78,7 @@ struct TraineeStation::Parts {
     if (human_arm == nullptr) return;
     const haptic::Workspace& workspace = hands[hand]->workspace();
     const Twist& velocity = behavior.intendedVelocity();
-    human_arm->setIntent(workspace.toDevice(behavior.intendedPose()),
+    human_arm->setIntent(intents[hand].towards(workspace.toDevice(behavior.intendedPose())),
                          {velocity.linear - workspace.velocity(), velocity.angular});
     human_arm->setContraction(behavior.contraction());
   }
@@ -116,6 +118,7 @@ void TraineeStation::begin(std::span<const HandId> hand_ids) {
     parts_->tracked[i].client = client_;
     if (i > kLeft) continue;
     parts_->hands[i].reset();
+    parts_->intents[i].reset();
     starts[i] = Pose(startOf(sceneObjects(), kinds[i], fallback[i]));
     if (!hand_ids[i].valid()) continue;
     haptic::HapticHand& hand = parts_->hands[i].emplace(parts_->arm(i), &parts_->clutch);

@@ -127,6 +127,18 @@ TEST(HandSafety, AReleasedDeadManSwitchTakesTheForceAndTheHandAway) {
 }
 
 //   |<- 57 mm wall, armed 2 mm beyond its edge
+// an arm whose clutch has opened hangs at the end of its workspace
+TEST(HandSafety, WithoutForcesTheWorkspaceStays) {
+  RecordedHand recorded(devices::hugArmModel().caps);
+  recorded.device.state.X_DH = Pose(Vector3(0.0, 0.0, -0.4));
+  recorded.device.state.forces_on = false;
+  recorded.device.state.fault = DeviceFault::kClutchOpen;
+  recorded.step();
+  const Vector3 before = recorded.hand.workspace().centre();
+  for (int tick = 0; tick < 5000; ++tick) recorded.step();
+  EXPECT_EQ(recorded.hand.workspace().centre(), before);
+}
+
 TEST(HandSafety, TheEndOfTheWorkspaceRampsAfterArming) {
   RecordedHand setup(devices::sigma7Model().caps);
   setup.hand.permitForces(false);

@@ -1,0 +1,34 @@
+#pragma once
+
+#include "idl/types/ids.h"
+#include "idl/types/spatial.h"
+
+namespace tenon::simulated_person {
+
+/// Intended hand pose in the device's frame D, as an arm gets it: a person aims in the scene, but the arm
+/// cannot follow when the scene jumps before the hand (HapticHand re-anchors it). The position goes to the
+/// wanted one at kSpeed at most.
+///
+/// Threads: one. Real-time: everything.
+class MotorIntent {
+ public:
+  /// Forgets where it is: the next pose is taken at once.
+  void reset() noexcept { begun_ = false; }
+  /// One millisecond: the pose that the arm intends when the person wants X_DI.
+  [[nodiscard]] const Pose& towards(const Pose& X_DI) noexcept {
+    if (!begun_) p_DI_ = X_DI.translation();
+    begun_ = true;
+    p_DI_ += clampNorm(Vector3(X_DI.translation() - p_DI_), kSpeed * kTickSeconds);
+    X_DI_ = Pose(p_DI_, X_DI.rotation());
+    return X_DI_;
+  }
+
+  static constexpr double kSpeed = 0.8;  ///< [m/s] below the speed at which a device brakes
+
+ private:
+  Vector3 p_DI_ = Vector3::Zero();
+  Pose X_DI_;
+  bool begun_ = false;
+};
+
+}  // namespace tenon::simulated_person
