@@ -55,6 +55,9 @@ Result<ParsedCommand> withArguments(const CommandWord& word, const std::vector<s
   }
   if (word.arguments.ends_with("...")) {
     if (given == 0) return usage();
+    constexpr std::size_t kMaxText = 255;  // [bytes] of tenon::Command
+    if (const std::size_t bytes = joined(arguments, 1).size(); bytes > kMaxText)
+      return fail(fmt::format("a {} has at most {} bytes, this one has {}", word.word, kMaxText, bytes));
     return ParsedCommand{word.command, joined(arguments, 1)};
   }
   const auto spaces = static_cast<std::size_t>(std::count(word.arguments.begin(), word.arguments.end(), ' '));

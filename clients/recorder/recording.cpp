@@ -114,7 +114,9 @@ void Recording::follow(const TickInputPart& input) {
 /// publishes no inputs publishes 0 of them.
 TopicCount Recording::inputCount() const {
   const Tick end = std::max(newest_input_, runIsOver() ? run_->tick : 0);
-  TopicCount count{std::string(wire::kTickInput.name), input_ticks_, first_input_ == 0 ? 0 : end - joined_};
+  // inputs may arrive before the answer that says when this recorder joined
+  const Tick before = first_input_ == 0 ? end : std::min(joined_, first_input_ - 1);
+  TopicCount count{std::string(wire::kTickInput.name), input_ticks_, end - before};
   const std::uint64_t parts = std::min(input_parts_, input_parts_expected_);
   count.recorded -= std::min(count.recorded, input_parts_expected_ - parts);
   return count;

@@ -15,6 +15,7 @@
 #include "idl/types/messages/external.h"
 #include "idl/types/messages/objects.h"
 #include "idl/types/messages/timing.h"
+#include "idl/types/names.h"
 #include "idl/types/stop_truth.h"
 #include "idl/wire/codec.h"
 #include "idl/wire/topics.h"
@@ -47,7 +48,6 @@ class RecordingReader {
     subscribe<Telemetry>(wire::kTelemetry);
     subscribe<Guidance>(wire::kGuidance);
     subscribe<ForceContribution>(wire::kForceContribution);
-    subscribe<Command>(wire::kCommand);
   }
 
   void read(const record::McapMessage& message) {
@@ -94,6 +94,7 @@ class RecordingReader {
   }
   void receive(const EventLog& event) {
     session_.events.push_back({secondsOf(event.tick), event.severity, event.kind, event.text});
+    if (event.kind == "command") countCommand(event.text);
   }
   void receive(const ClientEvent& event) {
     const Severity severity = event.kind == "safety" ? Severity::kWarning : Severity::kInfo;
@@ -112,7 +113,7 @@ class RecordingReader {
   void receive(const Telemetry& telemetry);
   void receive(const Guidance& guidance) { session_.guided = session_.guided || guidance.active; }
   void receive(const ForceContribution&) { session_.external_force = true; }
-  void receive(const Command& command);
+  void countCommand(const std::string& text);
 
   [[nodiscard]] bool isOfAHand(ObjectId object);
   void advanceTo(Tick tick) { session_.last = std::max(session_.last, tick); }
@@ -195,28 +196,22 @@ void RecordingReader::receive(const Telemetry& telemetry) {
   latency.max = std::max(latency.max, telemetry.input_to_force_max);
 }
 
-void RecordingReader::receive(const Command& command) {
-  switch (command.kind) {
-    case CommandKind::kFulfilled:
-      ++session_.commands["condition confirmed by a person"];
-      return;
-    case CommandKind::kSkipStep:
-      ++session_.commands["step skipped"];
-      return;
-    case CommandKind::kPause:
-      ++session_.commands["paused"];
-      return;
-    case CommandKind::kReset:
-      ++session_.commands["exercise reset"];
-      return;
-    case CommandKind::kSwapHands:
-      ++session_.commands["hands swapped"];
-      return;
-    case CommandKind::kSetCollision:
-      ++session_.commands["collisions of two objects changed"];
-      return;
-    default:
-      return;
+/// "NAME: WORD ...": a command that the server has accepted.
+void RecordingReader::countCommand(const std::string& text) {
+  static const std::map<CommandKind, std::string> kAids{
+      {CommandKind::kFulfilled, "condition confirmed by a person"},
+      {CommandKind::kSkipStep, "step skipped"},
+      {CommandKind::kGoToStep, "led to a step"},
+      {CommandKind::kBack, "led back a step"},
+      {CommandKind::kRepeatStep, "step repeated"},
+      {CommandKind::kHandOver, "object handed over"},
+      {CommandKind::kPause, "paused"},
+      {CommandKind::kReset, "exercise reset"},
+      {CommandKind::kSwapHands, "hands swapped"},
+      {CommandKind::kSetCollision, "collisions of two objects changed"}};
+  for (const auto& [kind, aid] : kAids) {
+    const std::string word = ": " + std::string(commandName(kind));
+    if (text.ends_with(word) || text.find(word + " ") != std::string::npos) ++session_.commands[aid];
   }
 }
 

@@ -32,6 +32,7 @@ class SessionAnalyzer {
  private:
   void copyFacts();
   void addVisit(const StepState& step);
+  [[nodiscard]] bool wasDone(const StepVisit& visit) const;
   void endVisits();
   void mergeHands();
   void sortEvents();
@@ -86,7 +87,8 @@ void SessionAnalyzer::addVisit(const StepState& step) {
   // else abandoned
   if (!visits.empty()) visits.back().end = secondsOf(step.started);
   if (!visits.empty() && visits.back().phase == StepPhase::kActive)
-    visits.back().phase = step.step > visits.back().step ? StepPhase::kDone : StepPhase::kWaiting;
+    visits.back().phase =
+        step.step > visits.back().step && wasDone(visits.back()) ? StepPhase::kDone : StepPhase::kWaiting;
   StepVisit visit;
   visit.step = step.step;
   visit.object = step.object;
@@ -103,6 +105,20 @@ void SessionAnalyzer::addVisit(const StepState& step) {
   visit.phase = step.phase;
   visit.begin = visit.end = secondsOf(step.started);
   visits.push_back(std::move(visit));
+}
+
+/// By the event log: a step that was left by a command has no such event. A log without any is not asked.
+bool SessionAnalyzer::wasDone(const StepVisit& visit) const {
+  constexpr double kSlack = 0.01;  // [s] some ticks between end and begin
+  bool any = false;
+  for (const SessionEvent& event : session_.events) {
+    if (event.kind != "step done") continue;
+    any = true;
+    if (event.text.starts_with(visit.name + " (") && event.time >= visit.begin &&
+        event.time <= visit.end + kSlack)
+      return true;
+  }
+  return !any;
 }
 
 void SessionAnalyzer::endVisits() {
@@ -239,11 +255,11 @@ void SessionAnalyzer::sortEvents() {
 }  // namespace
 
 bool SessionAnalysis::succeeded(bool allow_skips) const {
-  if (!has_run || run.phase != RunPhase::kSucceeded || steps == 0) return false;
+  if (!has_run || !isCompleted(run, allow_skips) || steps == 0) return false;
+  if (allow_skips) return true;
   for (std::uint32_t step = 0; step < steps; ++step) {
     const bool done = std::any_of(visits.begin(), visits.end(), [&](const StepVisit& visit) {
-      return visit.step == step &&
-             (visit.phase == StepPhase::kDone || (allow_skips && visit.phase == StepPhase::kSkipped));
+      return visit.step == step && visit.phase == StepPhase::kDone;
     });
     if (!done) return false;
   }

@@ -11,6 +11,7 @@
 
 #include "idl/types/messages/journal.h"
 #include "idl/types/names.h"
+#include "idl/types/printable_text.h"
 #include "server/session/scene_loader.h"
 #include "server/session/session_lock.h"
 #include "server/session/stop_file.h"
@@ -284,8 +285,9 @@ void ServerWire::update(const TickOutput& output) {
 }
 
 void ServerWire::log(Severity severity, const std::string& kind, const std::string& text) {
-  send(publisher_.eventGenerator().makeEvent(severity, kind, text));
-  if (print) print(text);
+  const std::string clean = printable(text);
+  send(publisher_.eventGenerator().makeEvent(severity, kind, clean));
+  if (print) print(clean);
 }
 
 void ServerWire::refuse(const std::string& why) {

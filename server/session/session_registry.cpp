@@ -413,7 +413,17 @@ Result<Change> SessionRegistry::handOverChange(const Command& command) const {
   const HandId hand =
       space == std::string::npos ? HandId{} : scenario_.handNamed(command.text.substr(space + 1));
   if (!object.valid() || !hand.valid())
-    return fail(fmt::format("'{}' does not name an object and a hand", command.text));
+    return fail(
+        fmt::format("'{}' does not name {}", command.text,
+                    object.valid() ? "a hand" : (hand.valid() ? "an object" : "an object and a hand")));
+  const auto& hands = scenario_.hands;
+  const bool is_own =
+      std::any_of(hands.begin(), hands.end(), [&](const auto& h) { return h.object == object; });
+  const game_control::ScenarioObject& spec = scenario_.objects[object.value];
+  if (is_own || spec.status == ObjectStatus::kFixed)
+    return fail(fmt::format("'{}' is nothing that a hand takes", spec.name));
+  if (!controllers_[hand.value].valid())
+    return fail(fmt::format("nobody moves hand '{}'", hands[hand.value].name));
   Change change = gameChange(command, object.value);
   change.game.hand = hand;
   return change;

@@ -120,6 +120,16 @@ TEST_F(ReportTest, AFailedRunDidNotSucceed) {
   EXPECT_EQ(outcomeOf(analysis), "failed");
 }
 
+// left by `goto`: no message says how it ended, and the log has no "step done" of it
+TEST_F(ReportTest, AStepThatWasLeftByACommandIsNotDone) {
+  const SessionAnalysis analysis = analyze({.leaves_a_step = true});
+  EXPECT_EQ(analysis.visits[1].phase, StepPhase::kWaiting);
+  EXPECT_EQ(analysis.visits[2].phase, StepPhase::kDone);
+  EXPECT_FALSE(analysis.succeeded());
+  EXPECT_THAT(analysis.aids, ::testing::Contains("led to a step"));
+  EXPECT_THAT(analysis.aids, Not(::testing::Contains("step skipped"))) << "that was refused";
+}
+
 TEST_F(ReportTest, ARunWithASkippedStepDidNotSucceed) {
   const SessionAnalysis analysis = analyze({.skips_a_step = true});
   EXPECT_FALSE(analysis.succeeded());

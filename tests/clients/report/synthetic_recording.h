@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "idl/record/mcap_writer.h"
+#include "idl/types/messages/commands.h"
 #include "idl/types/messages/contacts.h"
 #include "idl/types/messages/log.h"
 #include "idl/types/messages/objects.h"
@@ -27,6 +28,7 @@ namespace tenon::test {
 struct SyntheticSession {
   bool succeeds = true;
   bool skips_a_step = false;
+  bool leaves_a_step = false;  ///< the second one, by `goto`
   std::uint32_t steps = 4;
   Tick ticks_per_step = 2000;
   double peak_force = 18.0;       ///< [N] in the last step, for one tick
@@ -109,6 +111,13 @@ class SyntheticRecording {
   void beginStep(std::uint32_t step) {
     if (parameters_.skips_a_step && step == 1) put(wire::kStepState, stepState(0, StepPhase::kSkipped));
     put(wire::kStepState, stepState(step, StepPhase::kActive));
+    if (parameters_.leaves_a_step && step > 0 && step != 2)
+      put(wire::kEventLog, EventLog{20 + step, tick_, Severity::kInfo, "step done",
+                                    "step_" + std::to_string(step - 1) + " (2.0 s)"});
+    if (parameters_.leaves_a_step && step == 2) {
+      put(wire::kEventLog, EventLog{30, tick_, Severity::kInfo, "command", "Mikel: goto 3"});
+      put(wire::kCommand, Command{.client = ClientId{1}, .id = 1, .kind = CommandKind::kSkipStep});
+    }
     if (step > 0)
       put(wire::kEventLog, EventLog{step, tick_, Severity::kInfo, "mounted", "Part " + std::to_string(step)});
     if (step == 2)

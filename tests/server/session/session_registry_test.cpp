@@ -320,8 +320,21 @@ TEST_F(SessionRegistryTest, StepsAreNamedByNameOrNumber) {
   for (const std::string text : {"0", "3", "mounting", "", "1 ", "-1"})
     EXPECT_THAT(command(instructor, CommandKind::kGoToStep, text).reason, HasSubstr("no step")) << text;
   for (const Change& change : changes()) EXPECT_EQ(change.game.signal, 1U);
-  EXPECT_TRUE(command(instructor, CommandKind::kHandOver, "part right").accepted);
-  EXPECT_THAT(command(instructor, CommandKind::kHandOver, "part").reason, HasSubstr("an object and a hand"));
+}
+
+TEST_F(SessionRegistryTest, AnObjectIsHandedToAHandThatSomebodyMoves) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  const auto reason = [&](const std::string& text) {
+    return command(instructor, CommandKind::kHandOver, text).reason;
+  };
+  EXPECT_THAT(reason("part right"), HasSubstr("nobody moves hand 'right'"));
+  (void)join("a", Role::kTrainee, {"right"});
+  EXPECT_EQ(reason("part right"), "");
+  EXPECT_THAT(reason("part"), HasSubstr("does not name a hand"));
+  EXPECT_THAT(reason("party right"), HasSubstr("does not name an object"));
+  EXPECT_THAT(reason("bay right"), HasSubstr("nothing that a hand takes"));
+  EXPECT_THAT(reason("pointer right"), HasSubstr("nothing that a hand takes"));
 }
 
 TEST_F(SessionRegistryTest, ANoteChangesNothing) {

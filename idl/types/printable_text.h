@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace tenon {
+
+/// The text as it may stand in a line of a log, a terminal or a page: control characters (line breaks,
+/// terminal escapes) are spaces, and bytes that are not UTF-8 are question marks. For texts that people and
+/// other programs send.
+[[nodiscard]] std::string printable(std::string_view text);
+
+}  // namespace tenon

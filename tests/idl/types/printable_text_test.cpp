@@ -1,0 +1,24 @@
+#include "idl/types/printable_text.h"
+
+#include <gtest/gtest.h>
+
+namespace tenon {
+namespace {
+
+TEST(PrintableText, KeepsWhatCanBeReadAndReplacesTheRest) {
+  EXPECT_EQ(printable("grip too high"), "grip too high");
+  EXPECT_EQ(printable("G\xC3\xA4nge \xE2\x82\xAC \xF0\x9F\x94\xA7"),
+            "G\xC3\xA4nge \xE2\x82\xAC \xF0\x9F\x94\xA7");
+  EXPECT_EQ(printable("a\nb\r\n\tc\x1B[31mred"), "a b   c [31mred");
+  EXPECT_EQ(printable("ab\xFF\xFE\x80"), "ab???");
+  EXPECT_EQ(printable("\xC0\xAF \xED\xA0\x80 \xF4\x90\x80\x80 \xE2\x82"), "?? ??? ???? ??")
+      << "overlong, surrogate, beyond, cut";
+  EXPECT_EQ(printable("\xC2\x9B"
+                      "31m"),
+            " 31m")
+      << "a control sequence in one character";
+  EXPECT_EQ(printable(std::string("a\0b", 3)), "a b");
+}
+
+}  // namespace
+}  // namespace tenon
