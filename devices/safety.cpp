@@ -113,7 +113,10 @@ Wrench Safety::prepareRequest(const SafetyRequest& request) noexcept {
       if ((limits_.dof_mask >> (axis + 3) & 1U) == 0) wrench.torque[axis] = 0.0;
     }
   }
-  const double age_factor = ageFactor(request.age, limits_);
+  // answers of a burst get younger one by one: a force that fades does not come back before it starts again
+  const double age_factor =
+      request.age <= limits_.fade_from ? 1.0 : std::min(fade_, ageFactor(request.age, limits_));
+  fade_ = age_factor;
   setFlag(SafetyRule::kAgeFading, age_factor < 1.0);
   const double stiffness_factor = stiffnessFactor(request.stiffness, limits_.stiffness);
   const double rotational_factor =

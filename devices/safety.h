@@ -117,6 +117,7 @@ class Safety {
   bool braking_ = false;
   bool forces_on_ = false;
   bool late_ = false;               ///< the last request had begun to fade
+  double fade_ = 1.0;               ///< [-] of its force that the age of the last request left
   bool starting_ = true;            ///< soft start, until the force is the requested one
   double since_start_ = 0.0;        ///< [s] since the forces came on
   Wrench slewed_;                   ///< last output of the slew limit

@@ -96,6 +96,25 @@ TEST(Safety, AForceThatWasLateStartsSoftly) {
   EXPECT_TRUE(safety.acts(SafetyRule::kSoftStart));
 }
 
+// after a server that stood still, answers to older and older inputs arrive within milliseconds
+TEST(Safety, ABurstOfAnswersAfterAGapDoesNotBringTheForceBack) {
+  Safety safety = settled(kSigma, {4.0, 0.0, 0.0});
+  double last = 4.0;
+  for (const double age : {0.03, 0.06, 0.2, 0.5, 0.09, 0.06, 0.04, 0.025, 0.021}) {
+    for (int tick = 0; tick < 5; ++tick) {
+      const double now = safety.step(requestForce({4.0, 0.0, 0.0}, age), armed(), kTick).F_Ho_D.force.x();
+      EXPECT_LE(now, last) << age;
+      last = now;
+    }
+  }
+  EXPECT_EQ(last, 0.0);
+  for (int tick = 0; tick < 100; ++tick) {
+    const double now = safety.step(requestForce({4.0, 0.0, 0.0}), armed(), kTick).F_Ho_D.force.x();
+    EXPECT_LE(now - last, 0.020 + 1e-9) << tick;
+    last = now;
+  }
+}
+
 //  |F| ---.                   the old force leaves within 20 ms,
 //          `.                 the new one grows by at most 20 N/s
 //            `.___.---~~~

@@ -32,7 +32,8 @@ def records(data):
 
 
 def hand_states(recording):
-    """Of each hand: (step of its station, displayed force [N], age of its contacts [ms]) from HandState_100, in order."""
+    """Of each hand: (step of its station, largest force [N] displayed since the last one, force [N] displayed, age of its
+    contacts [ms]) from HandState_100, in order."""
     channels, hands = {}, {}
     for kind, body in records(Path(recording).read_bytes()[8:]):
         if kind == 4:
@@ -43,7 +44,8 @@ def hand_states(recording):
         message = body[22 + 4:]  # a message's header, and that of CDR
         hand, seq = struct.unpack_from("<II", message)
         force = struct.unpack_from("<3d", message, 144)
-        hands.setdefault(hand, []).append((seq, sum(x * x for x in force) ** 0.5, struct.unpack_from("<I", message, 192)[0]))
+        hands.setdefault(hand, []).append((seq, struct.unpack_from("<f", message, 208)[0], sum(x * x for x in force) ** 0.5,
+                                           struct.unpack_from("<I", message, 192)[0]))
     return hands
 
 
@@ -71,20 +73,21 @@ class ForceReturn(unittest.TestCase):
     def returns(self, states):
         """Judges what follows each gap of a hand that felt a force; yields that force."""
         for i in range(1, len(states)):
-            seq, _, age = states[i]
-            if not (states[i - 1][2] > 150 and age < 50):
+            seq, _, _, age = states[i]
+            if not (states[i - 1][3] > 150 and age < 50):
                 continue  # not the end of a gap
-            before = [force for s, force, a in states[:i] if a < 10 and seq - 1500 < s]
+            before = [peak for s, peak, _, a in states[:i] if a < 10 and seq - 1500 < s]
             if not before or before[-1] < 1.0:
                 continue
-            last = None
-            for s, force, a in states[i:]:
+            limit = max(*before[-10:], 3.0) + 0.1
+            last_seq, _, last, _ = states[i - 1]
+            for s, peak, force, a in states[i:]:
                 if s > seq + 900 or a > 20:
                     break
-                self.assertLessEqual(force, max(before[-1], 3.0) + 0.1, f"{s - seq} ms after a gap that ended at step {seq}")
-                if last:  # steps take 1 ms, and count as 2 ms at most
-                    self.assertLessEqual(force - last[1], 20.0 * 0.002 * (s - last[0]) + 0.02, f"step {s}")
-                last = (s, force)
+                self.assertLessEqual(peak, limit, f"{s - seq} ms after a gap that ended at step {seq}")
+                # steps take 1 ms, and count as 2 ms at most
+                self.assertLessEqual(peak - last, 20.0 * 0.002 * (s - last_seq) + 0.02, f"step {s}")
+                last_seq, last = s, force
             yield before[-1]
 
 
