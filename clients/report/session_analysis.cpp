@@ -243,6 +243,10 @@ void SessionAnalyzer::summarize() {
 /// By time; of equal times those of the server first, in their order.
 void SessionAnalyzer::sortEvents() {
   auto& client_events = session_.client_events;
+  // how many steps a station makes after the end of the run is chance
+  if (isOver(session_.run.phase))
+    std::erase_if(client_events,
+                  [&](const SessionEvent& event) { return event.time >= secondsOf(session_.run.tick); });
   std::sort(client_events.begin(), client_events.end(), [](const SessionEvent& a, const SessionEvent& b) {
     return std::tie(a.time, a.text) < std::tie(b.time, b.text);
   });

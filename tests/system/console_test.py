@@ -9,7 +9,7 @@ import subprocess
 import unittest
 from pathlib import Path
 
-from stage import Process, SOURCE, Stage, final_hash, tenon
+from stage import COARSE, Process, SOURCE, Stage, final_hash, tenon
 from viewer import Closed, Refused, Viewer, frame_transforms, get, request
 
 TOOLS = SOURCE / "tests" / "system" / "public_tools"
@@ -54,7 +54,7 @@ class Gateway(unittest.TestCase):
                 self.assertLess(memory(console) - before, 20, "MB, while a viewer did not read")
                 # of each instance the newest alone has waited for it, and the buffers of its connection
                 self.assertLess(deaf.drain(), 2_000_000)
-            alone = tenon("rehearse", SOURCE / "scenarios" / SCENARIO, "--seed", 1, "--no-instructor")
+            alone = tenon("rehearse", SOURCE / "scenarios" / SCENARIO, *COARSE, "--seed", 1, "--no-instructor")
             self.assertEqual(final_hash(server.text()), final_hash(alone.stdout), "viewers change nothing")
 
     def follow(self, viewer):
