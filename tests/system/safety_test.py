@@ -79,7 +79,7 @@ class ForceReturn(unittest.TestCase):
             before = [peak for s, peak, _, a in states[:i] if a < 10 and seq - 1500 < s]
             if not before or before[-1] < 1.0:
                 continue
-            limit = max(*before[-10:], 3.0) + 0.1
+            limit = max(*before[-10:], 3.0) + 0.3  # the sample before the gap is up to 10 ms older than the gap
             last_seq, _, last, _ = states[i - 1]
             for s, peak, force, a in states[i:]:
                 if s > seq + 900 or a > 20:
