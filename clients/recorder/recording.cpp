@@ -101,7 +101,6 @@ void Recording::keep(const PublishedSamples& published) {
 }
 
 void Recording::follow(const TickInputPart& input) {
-  if (input.tick <= joined_) return;
   ++input_parts_;
   if (input.part != 0 || input.tick <= newest_input_) return;
   if (first_input_ == 0) first_input_ = input.tick;
