@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What names the tree may use: one namespace a room, no type name twice, no word that the glossary replaced, nor as a part of a
-compound name.
+"""What names the tree may use: one namespace a room, no type name twice, no name of two anonymous namespaces that a unity build joins,
+no word that the glossary replaced, nor as a part of a compound name.
 
 Run by tests/architecture_test.py, which holds the rooms and their namespaces; alone, `tests/names_test.py WORD...` prints the
 lines of the tree that retired words match in the given files or folders.
@@ -31,13 +31,19 @@ ALIAS = re.compile(r"(?:^|[>\s])using\s+([A-Za-z_]\w*)\s*(?:\[\[[^\]]*\]\]\s*)?=
 TYPEDEF = re.compile(r"^\s*typedef\b.*?([A-Za-z_]\w*)\s*(?:\[[^\]]*\])?$", re.S)
 # nothing but forward declarations, of another room's classes
 FORWARD = re.compile(r"\s*(?:(?:class|struct)\s+\w+;\s*)+\}")
+FUNCTION = re.compile(r"([A-Za-z_]\w*)\s*\((.*)\)", re.S)
+VARIABLE = re.compile(r"\s([A-Za-z_]\w*)\s*(?:\[[^\]]*\]\s*)*$")
+NO_OBJECT = re.compile(r"(?:using|typedef|static_assert|extern|namespace|class|struct|union|enum)\b")
+# rooms that the sanitizers compile as unity builds, so that the anonymous namespaces of their .cpp files are one
+UNITY = re.compile(r"(?:idl|server(?!/tools/)|devices|clients/(?:haptic|rehearse))/")
 USING_ALL = re.compile(r"^\s*using\s+namespace\s+([\w:]+)")
 
 
 def outline(code):
-    """Of code without comments: namespaces (line, their names from the outside in), types (line, name) and `using namespace`s
-    (line, name) at namespace scope. An anonymous namespace is "", `extern "C"` is None."""
-    scopes, spaces, types, usings = [], [], [], []
+    """Of code without comments: namespaces (line, their names from the outside in), types (line, name), `using namespace`s
+    (line, name) at namespace scope, and what anonymous namespaces define (line, name). An anonymous namespace is "", `extern "C"`
+    is None."""
+    scopes, spaces, types, usings, anonymous = [], [], [], [], []
     head, start, parens = [], 0, 0
     for found in re.finditer(r"[{};()]|[^{};()]+", code):
         token = found.group()
@@ -49,6 +55,9 @@ def outline(code):
             continue
         text = "".join(head)
         outside = all(kind == "namespace" for kind, _ in scopes)
+        if outside and scopes and scopes[-1][1] == "" and token != "}":
+            name = anonymous_name(text, token == "{")
+            anonymous += [(line_at(code, start), name)] if name else []
         if token == "{":
             space, type_ = NAMESPACE.search(text), TYPE.search(text)
             if outside and space:
@@ -76,7 +85,32 @@ def outline(code):
             if whole:
                 usings.append((line_at(code, start), whole.group(1)))
         head = []
-    return spaces, types, usings
+    return spaces, types, usings, anonymous
+
+
+def parameter_types(text):
+    """"const A& a, int b = 1" -> "const A&, int"."""
+    kept, depth = [""], 0
+    for sign in text:
+        depth += (sign in "<([{") - (sign in ">)]}")
+        if sign == "," and not depth:
+            kept.append("")
+        else:
+            kept[-1] += sign
+    return ", ".join(re.sub(r"(?<=[\s&*>])\w+$", "", " ".join(one.split("=")[0].split())).strip() for one in kept)
+
+
+def anonymous_name(text, is_body):
+    """The name, a function's with the types of its parameters, that a definition in an anonymous namespace adds; None: none."""
+    text = re.sub(r"^\s*template\s*<[^{}]*?>\s*(?=[\w\[])", "", text.strip())
+    if NO_OBJECT.match(text):
+        return None
+    before = text.split("=")[0].rstrip()
+    function = FUNCTION.search(text) if "(" in before else None
+    if function:
+        return f"{function.group(1)}({parameter_types(function.group(2))})" if is_body else None
+    variable = VARIABLE.search(before)
+    return variable.group(1) if variable else None
 
 
 def allowed_namespaces(path, namespaces):
@@ -121,6 +155,12 @@ def type_faults(types):
     """types: name -> places. A name stands for one type in the whole tree."""
     return [f"{places[-1]}: type {name} is there {len(places)} times, also {', '.join(places[:-1])}: one name, one type"
             for name, places in sorted(types.items()) if len(places) > 1]
+
+
+def anonymous_faults(names):
+    """names: (folder, name) -> files and lines."""
+    return [f"{places[-1]}: {name} is in another anonymous namespace of {folder} too, {places[0]}: unity builds join them"
+            for (folder, name), places in sorted(names.items()) if len({place.split(":")[0] for place in places}) > 1]
 
 
 # ---- retired words
@@ -186,14 +226,16 @@ def word_faults(root, tops=TEXT_TOPS):
 
 
 def faults_in(root, namespaces):
-    faults, types = [], {}
+    faults, types, anonymous = [], {}, {}
     for path, file in files_below(root, TOPS, {".h", ".cpp"}):
         code = code_of(read(file))
-        spaces, named, usings = outline(code)
+        spaces, named, usings, hidden = outline(code)
         faults += namespace_faults(path, code, spaces, usings, namespaces)
         for line, name in named:
             types.setdefault(name, []).append(f"{path}:{line}")
-    return faults + type_faults(types) + word_faults(root)
+        for line, name in hidden if path.endswith(".cpp") and UNITY.match(path) else ():
+            anonymous.setdefault((str(Path(path).parent), name), []).append(f"{path}:{line}")
+    return faults + type_faults(types) + anonymous_faults(anonymous) + word_faults(root)
 
 
 def self_test():
@@ -212,6 +254,12 @@ def self_test():
         ("server/collision/j.h", "namespace tenon::trainee {\nclass Ball;\n}\nnamespace tenon::collision { using Cell = Ball::Cell; }\n", []),
         ("idl/record/mcap.h", "namespace tenon::record::mcap { enum class Cell : char { kOne }; }\n",
          ["type Cell is there 2 times"]),
+        ("server/collision/k.cpp", "namespace tenon::collision { namespace {\nconstexpr int kA = 1;\nint f(int a, const B& b) { return 1; }\n"
+         "template <class T> void g(T a) {} } }\n", []),
+        ("server/collision/l.cpp", "namespace tenon::collision { namespace {\nconstexpr std::array<int, 2> kA{1, 2};\n"
+         "int f(double a, const B& b) { return 1; }\nbool g(T other) {} } }\n", ["l.cpp:2: kA is in another", "l.cpp:4: g(T) is in another"]),
+        ("server/collision/m.cpp", "namespace tenon::collision { namespace { int f(int c,\n const B& d = {}) { int kA = 1; } } }\n",
+         ["m.cpp:1: f(int, const B&) is in another"]),
         ("clients/trainee/main.cpp", "namespace { int x; }\nint main() {}\n", []),
         ("clients/trainee/other_main.cpp", "using namespace tenon;\nint main() {}\n", ["using namespace tenon"]),
         ("clients/trainee/j.cpp", "namespace tenon::trainee { using Ball = int; using std::vector; template <class T> using Box = T; }\n",

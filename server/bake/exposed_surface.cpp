@@ -22,7 +22,7 @@ constexpr std::size_t kChunk = 4096;
 enum class Exposure { kUnknown, kHidden, kExposed };
 
 constexpr int kVoxels = BrickLevel::kVoxels;
-constexpr int kPatch = kVoxels + 3;  // a brick's cells reach one lattice point below and two above
+constexpr int kCellSide = kVoxels + 3;  // a brick's cells reach one lattice point below and two above
 
 /// The 4^3 lattice points around a cell, its own corners first: these usually decide.
 const std::array<Cell, 64> kAround = [] {
@@ -94,10 +94,10 @@ class CellMap {
  private:
   [[nodiscard]] BrickLevel::Mask nearOutside(std::size_t node) const {
     // one word per row of lattice points along x; a point outside this level counts as free
-    std::array<std::uint32_t, static_cast<std::size_t>(kPatch) * kPatch> rows{};
+    std::array<std::uint32_t, static_cast<std::size_t>(kCellSide) * kCellSide> rows{};
     level_.visitAround(node, 1, 2, [&](const Cell& offset, const BrickLevel::Point& point) {
       const bool free = point.free || !point.known;
-      rows[static_cast<std::size_t>((offset.z() + 1) * kPatch + offset.y() + 1)] |=
+      rows[static_cast<std::size_t>((offset.z() + 1) * kCellSide + offset.y() + 1)] |=
           static_cast<std::uint32_t>(free) << static_cast<unsigned>(offset.x() + 1);
     });
     BrickLevel::Mask near{};
@@ -105,7 +105,7 @@ class CellMap {
       for (int y = 0; y < kVoxels; ++y) {
         std::uint32_t row = 0;
         for (int k = 0; k < 16; ++k) {
-          row |= rows[static_cast<std::size_t>((z + k / 4) * kPatch + y + k % 4)];
+          row |= rows[static_cast<std::size_t>((z + k / 4) * kCellSide + y + k % 4)];
         }
         const std::uint64_t cells = (row | row >> 1U | row >> 2U | row >> 3U) & 0xFFU;
         near[static_cast<std::size_t>(z)] |= cells << static_cast<unsigned>(y * kVoxels);

@@ -19,7 +19,7 @@ constexpr double kEstimateError = 1.25;
 /// [-] A suggested voxel is larger by this than the one that just fits.
 constexpr double kReserve = 1.05;
 /// Blocks of a level that are descended into; the others are represented by them.
-constexpr std::size_t kMaxBlocks = 4096;
+constexpr std::size_t kSampleBlocks = 4096;
 constexpr double kBytesPerBrick = 2.0 * DistanceField::kBrickSamples;
 constexpr double kBytesPerGridBrick = sizeof(DistanceField::Entry) + sizeof(std::int16_t);
 
@@ -34,11 +34,11 @@ struct Block {
 
 /// Keeps every n-th block and returns n.
 double thinOut(std::vector<Block>& blocks) {
-  if (blocks.size() <= kMaxBlocks) return 1.0;
-  const double step = static_cast<double>(blocks.size()) / static_cast<double>(kMaxBlocks);
-  for (std::size_t i = 0; i < kMaxBlocks; ++i)
+  if (blocks.size() <= kSampleBlocks) return 1.0;
+  const double step = static_cast<double>(blocks.size()) / static_cast<double>(kSampleBlocks);
+  for (std::size_t i = 0; i < kSampleBlocks; ++i)
     blocks[i] = blocks[static_cast<std::size_t>((static_cast<double>(i) + 0.5) * step)];
-  blocks.resize(kMaxBlocks);
+  blocks.resize(kSampleBlocks);
   return step;
 }
 
