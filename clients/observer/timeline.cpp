@@ -111,7 +111,7 @@ void Timeline::receive(const EventLog& event) {
   if (event.kind == "run" || event.kind.starts_with("step")) return;
   if (event.kind == "taken" || event.kind == "let go") {
     add(event.tick, Rank::kGrab, [this, event] { printGrab(event, event.kind == "taken"); });
-  } else if (event.kind == "mounted") {
+  } else if (event.kind == "mounted" || event.kind == "put in place") {
     add(event.tick, Rank::kGrab, [this, event] { printMounted(event); });
   } else if (event.kind == "hand frozen" || event.kind == "hand free" || event.kind == "hand gone") {
     receiveHand(event);
@@ -193,6 +193,7 @@ void Timeline::printGrab(const EventLog& event, bool is_taken) {
 
 void Timeline::printMounted(const EventLog& event) {
   mounted_ = {event.text, event.tick};
+  if (event.kind != "mounted") return print(event.tick, fmt::format("  {} is put in place", event.text));
   const bool is_measured = progress_.tick > 0 && step_.has_target && titleOf(step_.object) == event.text;
   print(event.tick, fmt::format("  {} is mounted{}{}", event.text, is_measured ? ", with an error of " : "",
                                 is_measured ? errorText(progress_) : ""));

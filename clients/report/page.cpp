@@ -92,9 +92,9 @@ const char* markStyleOf(const SessionEvent& event) {
 /// Whether an event is about people, steps, mounts or safety.
 bool isForTrainers(const SessionEvent& event) {
   static const std::set<std::string, std::less<>> kKinds{
-      "join",           "leave",       "run",       "step",   "step done", "step skipped",
-      "step timed out", "not in time", "taken",     "let go", "mounted",   "emergency stop",
-      "safety",         "hand frozen", "hand gone", "note",   "command"};
+      "join",           "leave",       "run",         "step",      "step done", "step skipped",
+      "step timed out", "not in time", "taken",       "let go",    "mounted",   "put in place",
+      "emergency stop", "safety",      "hand frozen", "hand gone", "note",      "command"};
   return event.severity == Severity::kError || kKinds.contains(event.kind);
 }
 

@@ -147,8 +147,12 @@ void EventGenerator::addObjects(const TickOutput& output, TickEvents& events) {
     if (then == nullptr) continue;
 
     const std::string& title = scenario_->objects[i].title.front().text;
-    if (then->status != now.status && now.status == static_cast<std::uint8_t>(ObjectStatus::kFixed))
-      events.log.push_back(makeEvent(Severity::kInfo, "mounted", title));
+    if (then->status != now.status && now.status == static_cast<std::uint8_t>(ObjectStatus::kFixed)) {
+      // a step that is skipped, passed by 'goto' or out of time puts its part in place too
+      const bool by_people =
+          output.step.phase == StepPhase::kDone && scenario_->states[output.step.step].object.value == i;
+      events.log.push_back(makeEvent(Severity::kInfo, by_people ? "mounted" : "put in place", title));
+    }
     if (then->holder != now.holder) {
       const HandId hand = now.holder.valid() ? now.holder : then->holder;
       events.log.push_back(makeEvent(Severity::kInfo, now.holder.valid() ? "taken" : "let go",

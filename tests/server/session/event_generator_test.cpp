@@ -22,6 +22,7 @@ using test::playInput;
 using test::SessionRig;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::UnorderedElementsAre;
 
 constexpr std::uint32_t kEpoch = 77;
@@ -82,6 +83,20 @@ TEST(EventGenerator, ReportsEachChangeOnce) {
   EXPECT_NE(generated.runs[1].final_hash, 0U);
   for (std::size_t i = 0; i < generated.events.size(); ++i)
     EXPECT_EQ(generated.events[i].seq, i + 1) << "no gap";
+}
+
+TEST(EventGenerator, WhatASkipPutsInPlaceIsNotMounted) {
+  test::SessionRig rig;
+  EventGenerator generator(rig.loaded().scenario, kEpoch);
+  GeneratedEvents generated;
+  generated.add(generator.generate(rig.tick()));
+  for (int tick = 0; tick < 6; ++tick) {
+    rig.change({.kind = ChangeKind::kGameCommand, .game = {.kind = CommandKind::kSkipStep}});
+    generated.add(generator.generate(rig.tick()));
+  }
+  EXPECT_THAT(generated.texts("step skipped"), ElementsAre(HasSubstr("take"), HasSubstr("mount")));
+  EXPECT_THAT(generated.texts("put in place"), ElementsAre("part"));
+  EXPECT_THAT(generated.texts("mounted"), IsEmpty());
 }
 
 TEST(EventGenerator, EveryGrabHasThePoseOfTheObjectInTheHand) {
