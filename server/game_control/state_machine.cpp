@@ -163,7 +163,7 @@ void StateMachine::goTo(simulation::Environment& environment, std::uint32_t step
   for (std::uint32_t passed = 0; passed < step; ++passed) {
     memory_.status.step = passed;
     applyEffects(environment);
-    finish(environment);
+    finish(environment, /*by_people=*/false);
     if (!contains(memory_.visited, passed)) setOutcome(passed, StepPhase::kSkipped);
   }
   for (auto later = step; later < scenario_->states.size(); ++later) setOutcome(later, StepPhase::kWaiting);
@@ -286,15 +286,19 @@ void StateMachine::leave(simulation::Environment& environment, StepPhase phase) 
   status.failed = phase == StepPhase::kTimedOut && state().on_timeout == TimeoutAction::kFail;
   if (status.failed) return;
   status.finished = status.step + 1 == scenario_->states.size();
-  finish(environment);
+  finish(environment, phase == StepPhase::kDone);
 }
 
-/// What a state does to the scene when it ends, unless it fails the training.
-void StateMachine::finish(simulation::Environment& environment) noexcept {
+/// What a state does to the scene when it ends, unless it fails the training. A free body that people have not
+/// brought to its target is put there too: the next state begins as if they had. A tool stays where it is.
+void StateMachine::finish(simulation::Environment& environment, bool by_people) noexcept {
   releaseHelpers(environment);
-  if (!state().snap) return;
-  releaseFromHands(environment, state().object);
-  environment.place(state().object, *state().X_WG, ObjectStatus::kFixed);
+  const ObjectId object = state().object;
+  if (!object.valid() || !state().X_WG) return;
+  const bool is_body = scenario_->objects[object.value].body.has_value();
+  if (!state().snap && (by_people || !is_body)) return;
+  releaseFromHands(environment, object);
+  environment.place(object, *state().X_WG, state().snap ? ObjectStatus::kFixed : ObjectStatus::kFree);
 }
 
 /// `phase` kWaiting: the state has not been visited.

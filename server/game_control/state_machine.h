@@ -43,9 +43,9 @@ struct StepStatus {
 /// Environment.
 ///
 /// A state that ends stays current for one tick as kDone, kSkipped or kTimedOut before the next begins, so
-/// each has a revision that tells how it ended. Skipping a state that snaps fixes its object at its target,
-/// because the next states build on it. Time is counted in calls of step(): while the session is paused
-/// nothing times out.
+/// each has a revision that tells how it ended. Skipping a state puts its object to its target (fixed where
+/// the state snaps, else if it is a free body), because the next states build on it. Time is counted in calls
+/// of step(): while the session is paused nothing times out.
 ///
 /// Threads: one caller, the tick. Real-time: start, step, status, addTo.
 class StateMachine {
@@ -100,7 +100,7 @@ class StateMachine {
 
   void enter(simulation::Environment& environment, std::uint32_t step) noexcept;
   void leave(simulation::Environment& environment, StepPhase phase) noexcept;
-  void finish(simulation::Environment& environment) noexcept;
+  void finish(simulation::Environment& environment, bool by_people) noexcept;
   void setOutcome(std::uint32_t step, StepPhase phase) noexcept;
   void restoreScene(simulation::Environment& environment) noexcept;
   void goTo(simulation::Environment& environment, std::uint32_t step) noexcept;

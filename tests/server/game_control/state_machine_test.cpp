@@ -149,6 +149,30 @@ TEST(StateMachine, GoingToAStepMakesTheSceneThatSkippingMakes) {
   EXPECT_EQ(goes.status().step, 1U) << "there is no such step";
 }
 
+TEST(StateMachine, AFreeBodyIsPutToItsTargetByASkipAndByGoingPast) {
+  std::string text = test::with(test::smallScenario(), "status: hidden,", "body: {mass: 250 g},");
+  text = test::with(
+      text, "    snap: true\n    timeout: 2 s\n",
+      "    timeout: 2 s\n  - name: stands\n    hands: {right: pointer}\n    for: 1 s\n    touch: part\n");
+  for (const CommandKind kind : {CommandKind::kSkipStep, CommandKind::kGoToStep}) {
+    test::ScenarioFixture fixture(text);
+    if (kind == CommandKind::kSkipStep) {
+      fixture.step({command(kind)});
+      fixture.step(10);
+      ASSERT_EQ(fixture.object("part").status, ObjectStatus::kHeld);
+      fixture.step({command(kind)});
+    } else {
+      fixture.step({GameCommand{.kind = kind, .signal = 2}});
+    }
+    fixture.step(1);
+    EXPECT_EQ(fixture.status().step, 2U);
+    EXPECT_EQ(fixture.object("part").status, ObjectStatus::kFree);
+    EXPECT_LT((fixture.object("part").X_WO.translation() - Vector3(0, 0, -0.02)).norm(),
+              1e-4)  // it falls from there
+        << fixture.object("part").X_WO.translation().transpose();
+  }
+}
+
 TEST(StateMachine, ARepeatedStepThatIsDoneIsNoLongerSkipped) {
   test::ScenarioFixture fixture(test::smallScenario());
   fixture.step({command(CommandKind::kSkipStep)});
