@@ -37,17 +37,15 @@ DeviceCommand Safety::step(const SafetyRequest& request, const DeviceState& stat
   forces_on_ = forcesPermitted(request, state) && !command.brake;
   if (forces_on_) {
     const bool late = !(request.age <= limits_.fade_from);
-    if (request.restart || (late_ && !late)) restart();
+    // a force that is late while it starts may be of any stretch: it starts again once it is fresh
+    if (request.restart || (late_ && !late) || (late && starting_)) restart();
     late_ = late;
-    const double growth = std::min(dt, kLongestGrowth);
     const Wrench damping = injectDamping(state, dt);
-    const Wrench scene = applySoftStartAndSlew(prepareRequest(request), damping, growth);
-    command.F_Ho_D = limitOutput(addWall(scene, state, growth), dt);
+    const Wrench scene = applySoftStartAndSlew(prepareRequest(request), damping, dt);
+    command.F_Ho_D = limitOutput(addWall(scene, state, dt), dt);
     fadeTactors(request, command);
   } else {
-    restart();
-    settled_force_ = 0.0;
-    leaving_share_ = 0.0;
+    startFromZero();
     wall_since_ = 0.0;
     wall_.setZero();
     heat_.update(0.0, dt, limits_);
@@ -137,18 +135,25 @@ void Safety::restart() noexcept {
   passivity_.forgive();
 }
 
+void Safety::startFromZero() noexcept {
+  restart();
+  settled_force_ = 0.0;
+  leaving_share_ = 0.0;
+}
+
 Wrench Safety::applySoftStartAndSlew(const Wrench& wrench, const Wrench& damping, double dt) noexcept {
   if (!late_ && !starting_) settled_force_ = slewed_.force.norm();
   const double start = softStartFactor(since_start_, limits_);
-  since_start_ += dt;
+  const double growth = std::min(dt, kLongestGrowth);
+  since_start_ += growth;
   const bool starting = starting_;
   Wrench ramped = wrench * start;
   if (starting) ramped += damping;  // it grows with the force
   if (start < 1.0) ramped.force = clampNorm(ramped.force, std::max(settled_force_, limits_.start_force));
   const double force_slew = starting_ ? limits_.start_force_slew : limits_.force_slew;
   const double torque_slew = starting_ ? limits_.start_torque_slew : limits_.torque_slew;
-  slewed_ = {slewLimited(slewed_.force, ramped.force, force_slew * dt),
-             slewLimited(slewed_.torque, ramped.torque, torque_slew * dt)};
+  slewed_ = {slewLimited(slewed_.force, ramped.force, force_slew * growth),
+             slewLimited(slewed_.torque, ramped.torque, torque_slew * growth)};
   const bool behind = slewed_.force != ramped.force || slewed_.torque != ramped.torque;
   starting_ = starting_ && (start < 1.0 || behind);
   setFlag(SafetyRule::kSoftStart, starting_);
@@ -167,8 +172,9 @@ Wrench Safety::injectDamping(const DeviceState& state, double dt) noexcept {
 Wrench Safety::addWall(const Wrench& wrench, const DeviceState& state, double dt) noexcept {
   const Vector3 wall = wallForce(state.X_DH.translation(), limits_) * softStartFactor(wall_since_, limits_);
   const double slew = wall_since_ < limits_.soft_start ? limits_.start_force_slew : limits_.force_slew;
-  wall_since_ += dt;
-  wall_ = slewLimited(wall_, wall, slew * dt);
+  const double growth = std::min(dt, kLongestGrowth);
+  wall_since_ += growth;
+  wall_ = slewLimited(wall_, wall, slew * growth);
   setFlag(SafetyRule::kWorkspaceWall, !wall_.isZero(0.0));
   return wrench + Wrench{wall_, Vector3::Zero()};
 }
@@ -205,9 +211,7 @@ void Safety::reset() noexcept {
   clutch_tripped_ = false;
   if (clutch_) clutch_->open = false;
   braking_ = false;
-  restart();
-  settled_force_ = 0.0;
-  leaving_share_ = 0.0;
+  startFromZero();
   passivity_.reset();
 }
 

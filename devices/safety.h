@@ -93,7 +93,10 @@ class Safety {
   [[nodiscard]] bool forcesPermitted(const SafetyRequest& request, const DeviceState& state) noexcept;
   /// Non-finite values, axes the device lacks, age and stiffness.
   [[nodiscard]] Wrench prepareRequest(const SafetyRequest& request) noexcept;
+  /// Soft start; what was displayed falls to zero meanwhile, within 20 ms.
   void restart() noexcept;
+  /// Soft start, where no force is displayed.
+  void startFromZero() noexcept;
   /// `dt` [s].
   [[nodiscard]] Wrench injectDamping(const DeviceState& state, double dt) noexcept;
   /// `dt` [s].

@@ -7,7 +7,8 @@ namespace tenon::haptic {
 void AnswerAge::step(std::uint32_t seq, std::uint32_t answered, double dt) noexcept {
   now_ += dt;
   reads_[seq % kRing] = {seq, now_};
-  if (now_ - window_began_ > kWindow) {
+  if (now_ - window_began_ > kWindow &&
+      delays_[0] < kNever) {  // without answers the delay of the link stays known
     delays_ = {kNever, delays_[0]};
     window_began_ = now_;
   }

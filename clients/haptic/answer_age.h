@@ -19,8 +19,9 @@ class AnswerAge {
 
   /// [s] infinite before the first answer.
   [[nodiscard]] double age() const noexcept { return now_ - answered_read_at_; }
-  /// [s] age beyond what the link explains: twice its delay, which is the smallest age of an answer in the
-  /// last seconds, at most kLongestDelay.
+  /// [s] age beyond what the link explains: twice its delay, since jitter of up to the delay itself is usual
+  /// there. The delay is the smallest age of an answer in the last seconds with answers, at most
+  /// kLongestDelay.
   [[nodiscard]] double excess() const noexcept;
   [[nodiscard]] std::uint32_t answered() const noexcept { return answered_; }
 
@@ -28,7 +29,8 @@ class AnswerAge {
 
  private:
   static constexpr std::size_t kRing = 1024;
-  static constexpr double kWindow = 2.0;  ///< [s] each of two, in which the delay of the link is the smallest
+  static constexpr double kWindow =
+      2.0;  ///< [s] each of two, with answers, in which the delay of the link is the smallest age
   static constexpr double kNever = std::numeric_limits<double>::infinity();  ///< [s]
   struct Read {
     std::uint32_t seq = 0;

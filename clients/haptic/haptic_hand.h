@@ -33,8 +33,8 @@ struct HandEvents {
 /// A force that was interrupted returns from zero: after a gap (the contacts are older than the layer's fresh
 /// limit), a freeze, a refusal, a jump of a body, an arming or a stop. First the hand is re-anchored: the
 /// workspace shifts until hand and server's proxy coincide, which the server has to answer; then the soft
-/// start of the layer ramps the force. So no stretch that came about while nobody looked is displayed, and
-/// nothing in the scene jumps.
+/// start of the layer ramps the force. So no stretch of position that came about while nobody looked is
+/// displayed, and nothing in the scene jumps; one of rotation stays, and its torque ramps.
 ///
 /// Threads: one; armDevice by another one, beside it. Real-time: step, receive, permitForces.
 class HapticHand {

@@ -9,6 +9,10 @@ namespace {
 constexpr double kMinimumJerkPeak = 1.875;  // [-]
 constexpr double kShortestMove = 0.2;       // [s]
 
+// A longer time between two steps counts as this: eq. 1 is integrated by explicit Euler, and gain * dt stays
+// far below 1.
+constexpr double kLongestStep = 0.01;  // [s]
+
 // A smaller rest of a shift stays.
 constexpr double kNoShift = 1e-4;  // [m]
 
@@ -36,11 +40,12 @@ void Workspace::moveTo(const Vector3& p_WC) noexcept {
 void Workspace::shift(const Vector3& p_CC_W) noexcept {
   p_WC_ += p_CC_W;
   shifted_ += p_CC_W;
-  move_from_ += p_CC_W;  // the way goes on from there
+  move_from_ += p_CC_W;  // the rest of the path is as long as before
   free_ticks_ = 0;
 }
 
 void Workspace::step(const Vector3& p_DH, bool in_contact, double dt) noexcept {
+  dt = std::min(dt, kLongestStep);
   const Vector3 before = p_WC_;
   if (in_contact) {
     free_ticks_ = 0;

@@ -115,6 +115,19 @@ TEST(Safety, ABurstOfAnswersAfterAGapDoesNotBringTheForceBack) {
   }
 }
 
+TEST(Safety, ForcesThatComeOnWhileContactsAreLateWaitUntilTheyAreFresh) {
+  Safety safety(kSigma);
+  double last = 0.0;
+  for (int tick = 0; tick < 2000; ++tick) {
+    const double age = tick < 1500 ? 0.05 : 0.0;
+    last = safety.step(requestForce({4.0, 0.0, 0.0}, age), armed(), kTick).F_Ho_D.force.x();
+    if (tick < 1500) {
+      ASSERT_EQ(last, 0.0) << tick;
+    }
+  }
+  EXPECT_GT(last, 1.0);
+}
+
 //  |F| ---.                   the old force leaves within 20 ms,
 //          `.                 the new one grows by at most 20 N/s
 //            `.___.---~~~
@@ -152,6 +165,14 @@ TEST(Safety, ALongStepLetsAForceGrowAsTwoMilliseconds) {
   Safety safety = settled(kSigma, {2.0, 0.0, 0.0});
   EXPECT_NEAR(safety.step(requestForce({10.0, 0.0, 0.0}), armed(), 0.3).F_Ho_D.force.x(), 3.0, 1e-9)
       << "500 N/s";
+}
+
+TEST(Safety, AForceThatLeavesIsGoneAfterALongStep) {
+  Safety safety = settled(kSigma, {4.0, 0.0, 0.0});
+  SafetyRequest request = requestForce({4.0, 0.0, 0.0});
+  request.restart = true;
+  (void)safety.step(request, armed(), 0.1);
+  EXPECT_EQ(safety.step(request, armed(), kTick).F_Ho_D.force.norm(), 0.0);
 }
 
 TEST(Safety, TactorsFadeWithTheAgeOfTheirContacts) {

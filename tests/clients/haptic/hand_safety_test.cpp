@@ -103,6 +103,20 @@ TEST(HandSafety, TheLoopNeitherArmsNorResetsADevice) {
   EXPECT_THAT(setup.device.calls, testing::ElementsAre("reset", "arm", "write"));
 }
 
+TEST(HandSafety, OnePressAfterAnOpenClutchIsEnough) {
+  RecordedHand setup(devices::hugArmModel().caps);
+  setup.device.state.fault = DeviceFault::kClutchOpen;
+  setup.device.state.F_Ho_D_measured.force = {81.0, 0.0, 0.0};
+  setup.step();
+  setup.device.calls.clear();
+  setup.hand.permitForces(true);
+  setup.step();  // the device, not read meanwhile, was in fault
+  setup.device.state.F_Ho_D_measured = {};
+  ASSERT_TRUE(setup.hand.armDevice());
+  setup.step();
+  EXPECT_THAT(setup.device.calls, testing::ElementsAre("reset", "arm", "write"));
+}
+
 TEST(HandSafety, APressWithoutAFaultDoesNotInterruptTheForces) {
   RecordedHand setup(devices::sigma7Model().caps);
   setup.hand.permitForces(true);
@@ -192,6 +206,16 @@ TEST(AnswerAge, ALinksOwnDelayIsNoGap) {
   EXPECT_NEAR(age.excess(), 0.030, 1e-9) << "150 ms, of which twice the delay is the link's";
   age.step(3091, 77777, 1e-3);
   EXPECT_TRUE(std::isinf(age.age())) << "an answer to what this station never asked";
+}
+
+// the delay of the link is that of the last answers, also when they are long ago
+TEST(AnswerAge, AfterALongGapOldAnswersAreNotFresh) {
+  AnswerAge age;
+  std::uint32_t seq = 0;
+  while (++seq <= 3000) age.step(seq, seq > 2 ? seq - 2 : 0, 1e-3);
+  for (; seq <= 8800; ++seq) age.step(seq, 2998, 1e-3);
+  age.step(seq, seq - 300, 1e-3);
+  EXPECT_NEAR(age.excess(), 0.296, 1e-9);
 }
 
 TEST(Bracelet, VibratesAsLongAsItsContactsAreFreshAndNoStopSilencesIt) {

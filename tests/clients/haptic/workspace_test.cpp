@@ -22,6 +22,18 @@ TEST(Workspace, FollowsAHandOutsideItsSphereByEquationOne) {
   EXPECT_LT((workspace.velocity() - (expected - p_WC) / kStep).norm(), 1e-9);
 }
 
+// a servo that stood still: explicit Euler over the whole time would carry the centre far beyond the hand
+TEST(Workspace, ALongStepCountsAsTenMilliseconds) {
+  Workspace workspace({.radius = 0.03, .gain = 14.0});
+  workspace.setCentre(Vector3::Zero());
+  workspace.step(Vector3(0.05, 0.0, 0.0), false, 0.5);
+  EXPECT_NEAR(workspace.centre().x(), 14.0 * 0.01 * 0.02, 1e-12);
+  workspace.setCentre(Vector3::Zero());
+  workspace.shift(Vector3(0.0, 0.05, 0.0));
+  for (int i = 0; i < 300; ++i) workspace.step(Vector3::Zero(), false, 2.0);
+  EXPECT_GE(workspace.centre().y(), 0.0) << "the shift returns to where it began, not beyond";
+}
+
 TEST(Workspace, RestsWhileTheHandIsInsideTheSphere) {
   Workspace workspace({.radius = 0.2, .gain = 1.5});
   workspace.setCentre(Vector3(1.0, 0.0, 0.0));
