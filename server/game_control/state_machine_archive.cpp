@@ -117,6 +117,11 @@ Result<void> StateMachine::restore(std::span<const std::uint8_t> bytes) {
   if (ended && !memory.status.finished && !memory.status.failed &&
       memory.status.step + 1 == scenario_->states.size())
     return fail("state machine: a saved state goes on after the scenario's last step");
+  for (std::size_t state = scenario_->states.size(); state < kMaxStates; ++state)
+    for (const StateSet* set : {&memory.skipped, &memory.timed_out, &memory.visited})
+      if (((*set)[state / 64] >> (state % 64) & 1U) != 0)
+        return fail("state machine: a saved state has an outcome of step " + std::to_string(state) +
+                    ", but the scenario has " + std::to_string(scenario_->states.size()));
   memory_ = memory;
   countOutcomes();
   collectReadings();

@@ -130,7 +130,7 @@ Result<std::string> displayLevels(const ObjectMeshes& meshes, const wire::AssetS
   if (!key) return std::string("[]");
   std::ifstream noted(notes / *key);
   std::string text;
-  bool is_whole = static_cast<bool>(std::getline(noted, text));
+  bool is_whole = std::getline(noted, text) && !noted.eof();  // a whole note ends with a newline
   // every asset that the note names is there
   for (std::size_t at = text.find(kModelKey); at != std::string::npos; at = text.find(kModelKey, at + 1))
     is_whole = is_whole && store.has(text.substr(at + kModelKey.size(), kAssetNameLength));

@@ -422,6 +422,8 @@ Result<Change> SessionRegistry::handOverChange(const Command& command) const {
   const game_control::ScenarioObject& spec = scenario_.objects[object.value];
   if (is_own || spec.status == ObjectStatus::kFixed)
     return fail(fmt::format("'{}' is nothing that a hand takes", spec.name));
+  if (hands[hand.value].kind == simulation::HandKind::kTracked)
+    return fail(fmt::format("hand '{}' is tracked, it cannot hold a part", hands[hand.value].name));
   if (!controllers_[hand.value].valid())
     return fail(fmt::format("nobody moves hand '{}'", hands[hand.value].name));
   Change change = gameChange(command, object.value);

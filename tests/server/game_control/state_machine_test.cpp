@@ -325,11 +325,18 @@ TEST(StateMachine, ContinuesFromASavedState) {
 TEST(StateMachine, RefusesAnInvalidSavedState) {
   test::ScenarioFixture fixture(test::smallScenario());
   EXPECT_FALSE(fixture.machine().restore(std::vector<std::uint8_t>(7)));
-  std::vector<std::uint8_t> bytes = fixture.machine().save();
+  const std::vector<std::uint8_t> good = fixture.machine().save();
+  std::vector<std::uint8_t> bytes = good;
   bytes[8] = 77;
   const auto restored = fixture.machine().restore(bytes);
   ASSERT_FALSE(restored);
   EXPECT_NE(restored.error().what.find("step 77"), std::string::npos) << restored.error().what;
+  bytes = good;
+  bytes[12 * sizeof(std::uint64_t)] = 1U << 5U;
+  const auto skipped = fixture.machine().restore(bytes);
+  ASSERT_FALSE(skipped);
+  EXPECT_NE(skipped.error().what.find("outcome of step 5, but the scenario has 2"), std::string::npos)
+      << skipped.error().what;
 }
 
 TEST(StateMachine, RefusesASavedStateWithANumberThatIsNotFinite) {

@@ -337,6 +337,19 @@ TEST_F(SessionRegistryTest, AnObjectIsHandedToAHandThatSomebodyMoves) {
   EXPECT_THAT(reason("pointer right"), HasSubstr("nothing that a hand takes"));
 }
 
+TEST_F(SessionRegistryTest, ATrackedHandIsHandedNothing) {
+  game_control::ScenarioFile scenario = *loaded_.scenario;
+  scenario.hands[kLeftHand.value].kind = simulation::HandKind::kTracked;
+  SessionRegistry registry(scenario, kEpoch, false);
+  const ClientId instructor = registry
+                                  .join({.client_guid = "b", .role = Role::kInstructor, .seat_key = "seat"},
+                                        {.seat = true, .key = true}, 5)
+                                  .client;
+  registry.updatePhase(RunPhase::kRunning, false);
+  EXPECT_THAT(registry.handleCommand({instructor, 1, CommandKind::kHandOver, {}, "part left"}).reason,
+              HasSubstr("hand 'left' is tracked"));
+}
+
 TEST_F(SessionRegistryTest, ANoteChangesNothing) {
   registry_.updatePhase(RunPhase::kRunning, false);
   const ClientId trainee = join("a", Role::kTrainee, {"right"}).client;
