@@ -121,7 +121,7 @@ BrickLevel::Point BrickLevel::at(const Cell& lattice) const {
 }
 
 double BrickLevel::interpolated(std::size_t node, const Vector3& p) const {
-  const Cell cell = p.array().floor().cwiseMin(kVoxels - 1).matrix().cast<int>();
+  const Cell cell = p.array().floor().cwiseMax(0).cwiseMin(kVoxels - 1).matrix().cast<int>();
   const Vector3 upper = p - cell.cast<double>();
   const std::int16_t* s = samplesOf(slot[node]);
   double distance = 0.0;
