@@ -41,8 +41,9 @@ DeviceCommand Safety::step(const SafetyRequest& request, const DeviceState& stat
     if (request.restart || (late_ && !late) || (late && starting_)) restart();
     late_ = late;
     const Wrench damping = injectDamping(state, dt);
-    const Wrench scene = applySoftStartAndSlew(prepareRequest(request), damping, dt);
-    command.F_Ho_D = limitOutput(addWall(scene, state, dt), dt);
+    const double wall_growth = rampWall(state, dt);
+    const Wrench scene = applySoftStartAndSlew(prepareRequest(request), damping, wall_growth, dt);
+    command.F_Ho_D = limitOutput(scene + Wrench{wall_, Vector3::Zero()}, dt);
     fadeTactors(request, command);
   } else {
     startFromZero();
@@ -141,18 +142,22 @@ void Safety::startFromZero() noexcept {
   leaving_share_ = 0.0;
 }
 
-Wrench Safety::applySoftStartAndSlew(const Wrench& wrench, const Wrench& damping, double dt) noexcept {
-  if (!late_ && !starting_) settled_force_ = slewed_.force.norm();
+double Safety::startLimit() const noexcept { return std::max(settled_force_, limits_.start_force); }
+
+Wrench Safety::applySoftStartAndSlew(const Wrench& wrench, const Wrench& damping, double wall_growth,
+                                     double dt) noexcept {
+  if (!late_ && !starting_) settled_force_ = (slewed_.force + wall_).norm();
   const double start = softStartFactor(since_start_, limits_);
   const double growth = std::min(dt, kLongestGrowth);
   since_start_ += growth;
   const bool starting = starting_;
   Wrench ramped = wrench * start;
   if (starting) ramped += damping;  // it grows with the force
-  if (start < 1.0) ramped.force = clampNorm(ramped.force, std::max(settled_force_, limits_.start_force));
-  const double force_slew = starting_ ? limits_.start_force_slew : limits_.force_slew;
+  if (start < 1.0) ramped.force = clampNorm(ramped.force, std::max(0.0, startLimit() - wall_.norm()));
+  const double force_step = starting_ ? std::max(0.0, limits_.start_force_slew * growth - wall_growth)
+                                      : limits_.force_slew * growth;
   const double torque_slew = starting_ ? limits_.start_torque_slew : limits_.torque_slew;
-  slewed_ = {slewLimited(slewed_.force, ramped.force, force_slew * growth),
+  slewed_ = {slewLimited(slewed_.force, ramped.force, force_step),
              slewLimited(slewed_.torque, ramped.torque, torque_slew * growth)};
   const bool behind = slewed_.force != ramped.force || slewed_.torque != ramped.torque;
   starting_ = starting_ && (start < 1.0 || behind);
@@ -168,15 +173,18 @@ Wrench Safety::injectDamping(const DeviceState& state, double dt) noexcept {
   return damping;
 }
 
-/// Ramped like the scene's force, but apart: a gap of the scene leaves the wall standing.
-Wrench Safety::addWall(const Wrench& wrench, const DeviceState& state, double dt) noexcept {
-  const Vector3 wall = wallForce(state.X_DH.translation(), limits_) * softStartFactor(wall_since_, limits_);
-  const double slew = wall_since_ < limits_.soft_start ? limits_.start_force_slew : limits_.force_slew;
+/// A gap of the scene leaves a wall that stands standing; one that is met in the gap or in the soft start
+/// grows as slowly as the scene's force, since the hand fell into it.
+double Safety::rampWall(const DeviceState& state, double dt) noexcept {
   const double growth = std::min(dt, kLongestGrowth);
+  const double before = wall_.norm();
+  Vector3 wall = wallForce(state.X_DH.translation(), limits_) * softStartFactor(wall_since_, limits_);
+  if (starting_) wall = clampNorm(wall, std::max(before, startLimit()));
+  const bool slow = starting_ || late_ || wall_since_ < limits_.soft_start;
+  wall_ = slewLimited(wall_, wall, (slow ? limits_.start_force_slew : limits_.force_slew) * growth);
   wall_since_ += growth;
-  wall_ = slewLimited(wall_, wall, slew * growth);
   setFlag(SafetyRule::kWorkspaceWall, !wall_.isZero(0.0));
-  return wrench + Wrench{wall_, Vector3::Zero()};
+  return std::max(0.0, wall_.norm() - before);
 }
 
 /// Intensities fade like a force; a hand that is stopped or whose contacts are unknown feels none.

@@ -99,10 +99,13 @@ class Safety {
   void startFromZero() noexcept;
   /// `dt` [s].
   [[nodiscard]] Wrench injectDamping(const DeviceState& state, double dt) noexcept;
-  /// `dt` [s].
-  [[nodiscard]] Wrench applySoftStartAndSlew(const Wrench& wrench, const Wrench& damping, double dt) noexcept;
-  /// `dt` [s].
-  [[nodiscard]] Wrench addWall(const Wrench& wrench, const DeviceState& state, double dt) noexcept;
+  /// [N] what scene and wall together may be in a soft start: 3 N, or what was displayed before.
+  [[nodiscard]] double startLimit() const noexcept;
+  /// `wall_growth` [N] in this step, which together with the scene's is limited; `dt` [s].
+  [[nodiscard]] Wrench applySoftStartAndSlew(const Wrench& wrench, const Wrench& damping, double wall_growth,
+                                             double dt) noexcept;
+  /// Advances wall_ by `dt` [s] and returns its growth [N].
+  [[nodiscard]] double rampWall(const DeviceState& state, double dt) noexcept;
   void fadeTactors(const SafetyRequest& request, DeviceCommand& command) const noexcept;
   /// Command, thermal and motor limits; `dt` [s].
   [[nodiscard]] Wrench limitOutput(const Wrench& wrench, double dt) noexcept;
