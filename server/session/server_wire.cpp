@@ -94,6 +94,9 @@ Result<void> openAll(Tuple outs, wire::Partition& partition) {
 constexpr auto kOtherServers = std::chrono::milliseconds(500);  // for their announcements to arrive
 // without a sign of life for so long the announcement of a server ends (its lease)
 constexpr auto kLapse = wire::kSessionAnnounce.parameters.lease;
+// A reader that took this server for dead knows its announcement again, and so its next end, by another
+// sample alone.
+constexpr auto kAnnounceInterval = std::chrono::seconds(1);
 constexpr auto kAfterLapse = std::chrono::seconds(10);  // until those who came meanwhile are discovered
 
 std::int64_t nowNanoseconds() {
@@ -163,6 +166,7 @@ void ServerWire::handle(const SessionAnnounce& other, const wire::Origin& from) 
 
 void ServerWire::noticeLapse() {
   const auto now = std::chrono::steady_clock::now();
+  if (now - announced_at_ > kAnnounceInterval) announce();
   if (dispatched_ && now - *dispatched_ > kLapse) lapsed_ = now;
   dispatched_ = now;
   if (!lapsed_) return;
@@ -255,6 +259,7 @@ void ServerWire::sendScene(const LoadedScene& loaded) {
 }
 
 void ServerWire::announce() {
+  announced_at_ = std::chrono::steady_clock::now();
   (void)writers_->announce.writer->write({.session = options_.session,
                                           .server_epoch = options_.server_epoch,
                                           .title = title_,

@@ -137,6 +137,7 @@ class ServerWire {
   StopTruth stops_;
   wire::SharedKey challenges_ = wire::SharedKey::random();  ///< what challenges are made of
   std::map<std::uint32_t, SessionAnnounce> others_;         ///< servers of sessions of this name, by epoch
+  std::chrono::steady_clock::time_point announced_at_;
   std::optional<std::chrono::steady_clock::time_point> dispatched_, lapsed_;
   std::optional<std::string> replaced_;
   Tick now_ = 0;
