@@ -1,5 +1,7 @@
 #include "clients/haptic/station_program.h"
 
+#include <array>
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -26,7 +28,8 @@ constexpr std::uint32_t kTelemetryEvery = 1000;  // [ticks]
 constexpr milliseconds kRepeatAfter{500};
 constexpr int kServoPriority = 75;
 constexpr std::int64_t kPeriodNs = 1'000'000;
-// Give up after kMaxRejoins rejoins with less than kMinSeatTime between a rejoin and the next loss.
+// After kMaxRejoins rejoins with less than kMinSeatTime between a rejoin and the next loss, wait that long
+// before another one: two programs that take each other's seat are not to do so many times a second.
 constexpr std::chrono::seconds kMinSeatTime{10};
 constexpr int kMaxRejoins = 3;
 
@@ -84,6 +87,7 @@ class StationRunner {
   Result<RunState> runRealTime(const std::atomic<bool>& stop);
   void servo() noexcept;
   [[nodiscard]] bool tickComplete(Tick tick) const;
+  void notePeaks(const StationOutput& output) noexcept;
   void send(const StationOutput& output);
   void sendEvents();
   void printStep(const StepState& step);
@@ -105,7 +109,9 @@ class StationRunner {
   const StationProgramOptions& options_;
   bool lockstep_ = false;  // messages go directly to the station instead of to the servo's queues
   RunState run_;
-  std::map<HandId, float> peak_forces_;  ///< [N] displayed since the last HandState
+  std::array<std::atomic<float>, kMaxStationHands>
+      peak_forces_{};             ///< [N] displayed since the last HandState, by state
+  std::uint32_t stated_seq_ = 0;  ///< of the last HandState
   int rejoins_ = 0;
   std::chrono::steady_clock::time_point rejoined_at_{};
   std::optional<StepState> step_;
@@ -231,15 +237,24 @@ bool StationRunner::tickComplete(Tick tick) const {
   return true;
 }
 
+/// In each cycle of the loop, since the wire thread does not see all outputs.
+void StationRunner::notePeaks(const StationOutput& output) noexcept {
+  for (std::size_t i = 0; i < output.states.size(); ++i) {
+    const auto force = static_cast<float>(output.states[i].F_Ho_W.force.norm());
+    float peak = peak_forces_[i].load(std::memory_order_relaxed);
+    // the wire thread alone competes, once in a HandState: two tries suffice
+    for (int tries = 0; tries < 2 && force > peak; ++tries)
+      if (peak_forces_[i].compare_exchange_strong(peak, force, std::memory_order_relaxed)) break;
+  }
+}
+
 void StationRunner::send(const StationOutput& output) {
   for (const DeviceInput& input : output.inputs) static_cast<void>(link_.send(input));
-  for (const HandState& state : output.states) {
-    float& peak = peak_forces_[state.hand];
-    peak = std::max(peak, static_cast<float>(state.F_Ho_W.force.norm()));
-  }
-  if (output.seq % kStatesEvery != 0) return;
-  for (HandState state : output.states) {
-    state.peak_force = std::exchange(peak_forces_[state.hand], 0.0F);
+  if (output.seq - stated_seq_ < kStatesEvery) return;
+  stated_seq_ = output.seq;
+  for (std::size_t i = 0; i < output.states.size(); ++i) {
+    HandState state = output.states[i];
+    state.peak_force = peak_forces_[i].exchange(0.0F, std::memory_order_relaxed);
     static_cast<void>(link_.send(state));
   }
 }
@@ -262,8 +277,14 @@ Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat
   const std::string why = *member.lost();
   const auto now = std::chrono::steady_clock::now();
   rejoins_ = now - rejoined_at_ < kMinSeatTime ? rejoins_ + 1 : 1;
-  if (rejoins_ > kMaxRejoins) return fail(why);
-  print(why + "; rejoining the session");
+  print(why + "; rejoining the session" +
+        (rejoins_ > kMaxRejoins ? " in 10 s, since it was lost repeatedly" : ""));
+  const auto rejoin_at = now + (rejoins_ > kMaxRejoins ? kMinSeatTime : std::chrono::seconds(0));
+  while (!stop && std::chrono::steady_clock::now() < rejoin_at) {
+    link_.inbox().dispatch(milliseconds(20));
+    readKeys();
+    armDevices();
+  }
   const Welcome before = member.welcome();
   auto back = member.rejoin(stop, [this] {
     link_.inbox().dispatch(milliseconds(0));
@@ -299,6 +320,7 @@ Result<RunState> StationRunner::runLockstep(const std::atomic<bool>& stop) {
     armDevices();
     station_.step(static_cast<std::uint32_t>(tick + 1));
     output.fill(station_, static_cast<std::uint32_t>(tick + 1));
+    notePeaks(output);
     send(output);
     while (station_.takeEvent(event)) events_.push(event);
     sendEvents();
@@ -337,6 +359,7 @@ void StationRunner::servo() noexcept {
   station_.step(++seq_);
   force_age_.inputSent(seq_, now, kPeriodNs);
   output_.back().fill(station_, seq_);
+  notePeaks(output_.back());
   output_.publish();
   StationEvent event;
   while (station_.takeEvent(event)) events_.push(event);
