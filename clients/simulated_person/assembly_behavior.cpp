@@ -1,6 +1,7 @@
 #include "clients/simulated_person/assembly_behavior.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace tenon::simulated_person {
 
@@ -28,8 +29,9 @@ constexpr double kAssistRange = 0.1;       // [m] between the part's bounding bo
 constexpr double kRetractDistance = 0.03;  // [m]
 constexpr double kLightForce = 0.1;        // [N]
 constexpr double kPressTimeout = 5.0;      // [s] of pressing at the seat after which insertion is tried again
-constexpr double kWaitTimeout = 8.0;       // [s] likewise, with less than 1 N
-constexpr double kVisualGain = 2.2;        // [1/s] of the alignment by sight
+constexpr double kIdleTimeout = 3.0;  // [s] of pushing without resistance or progress: the arm is at its end
+constexpr double kWaitTimeout = 8.0;  // [s] likewise, with less than 1 N
+constexpr double kVisualGain = 2.2;   // [1/s] of the alignment by sight
 }  // namespace
 
 void AssemblyBehavior::begin(const Pose& X_WH) noexcept {
@@ -83,6 +85,8 @@ void AssemblyBehavior::enter(Phase phase) noexcept {
   phase_time_ = 0.0;
   aligned_time_ = 0.0;
   obstructed_time_ = 0.0;
+  idle_time_ = 0.0;
+  deepest_ = -std::numeric_limits<double>::infinity();
 }
 
 void AssemblyBehavior::goHome(const HandPerception& hand, const PathPlanner& planner) noexcept {
@@ -328,6 +332,15 @@ void AssemblyBehavior::insert(const HandPerception& hand, const DelayedPerceptio
   const bool in_place = -perceived < std::max(0.003, 1.5 * task_.tolerance);
   if (in_place && (stall_detector_.stalled(perceivedDepth(perception), 0.0005) || depth_ >= 0.0)) {
     enter(Phase::kSeated);
+    return;
+  }
+  // lifted, the part is out of contact, and the workspace can follow the hand
+  const bool idle = perceived < deepest_ + 0.001 && reaction_ < 0.5 && !task_.misplaced;
+  deepest_ = std::max(deepest_, perceived);
+  idle_time_ = idle ? idle_time_ + dt : 0.0;
+  if (idle_time_ > kIdleTimeout) {
+    search_depth_ = perceived;
+    enter(Phase::kRetract);
     return;
   }
   if (reaction_ < 0.6 * force || task_.misplaced ||

@@ -145,6 +145,8 @@ class AssemblyBehavior {
   double phase_time_ = 0.0;       // [s] since the phase began
   double aligned_time_ = 0.0;     // [s] without interruption
   double obstructed_time_ = 0.0;  // [s] without interruption
+  double idle_time_ = 0.0;        // [s] of pushing without resistance or progress
+  double deepest_ = 0.0;          // [m] perceived in this phase
   double search_depth_ = 0.0;     // [m] where the search began
   StallDetector stall_detector_;
   SpiralSearch spiral_search_;
