@@ -62,6 +62,20 @@ class Faults(unittest.TestCase):
             again.wait_for("everything is mounted", 180)
             self.assertEqual(again.wait(30), 0)
 
+    def test_a_trainee_that_took_its_server_for_dead_notices_when_it_dies(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve("peg_and_box", "--wait-for", "right")
+            trainee = stage.start("trainee", "--seed", 1, "--wait", 60)
+            server.wait_for("run: running", 60)
+            server.signal(signal.SIGSTOP)
+            trainee.wait_for("rejoining the session", 30)
+            server.signal(signal.SIGCONT)
+            trainee.wait_for("rejoined as client", 60)
+            server.signal(signal.SIGKILL)
+            again = stage.serve("peg_and_box", "--wait-for", "right")
+            again.wait_for("everything is mounted", 180)
+            self.assertEqual(again.wait(30), 0)
+
     def test_the_hand_of_a_trainee_that_hangs_briefly_is_frozen(self):
         with Stage(lockstep=False) as stage:
             server = stage.serve("peg_and_box", "--wait-for", "right")
