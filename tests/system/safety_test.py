@@ -62,10 +62,10 @@ class ForceReturn(unittest.TestCase):
                 if server.popen.poll() is not None:
                     break
                 server.signal(signal.SIGSTOP)
-                time.sleep(0.3)
+                time.sleep(0.5)
                 server.signal(signal.SIGCONT)
+            server.wait_for("everything is mounted", 120)  # the offset of each gap is worked off
             for process in (trainee, server, recorder):
-                process.signal(signal.SIGTERM)
                 process.wait(60)
             returns = [judged for states in hand_states(stage.out / "session.mcap").values() for judged in self.returns(states)]
         self.assertTrue(returns, "no stop of the server met a hand in contact")
