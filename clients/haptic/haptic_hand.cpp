@@ -102,6 +102,9 @@ void HapticHand::readDevice() noexcept {
   if (!handover_.pending()) return device_.read(device_state_);
   device_state_.forces_on = false;
   device_state_.V_DH = {};
+  // the person has looked at it: what it said before does not latch the clutch again
+  device_state_.fault = devices::DeviceFault::kNone;
+  device_state_.F_Ho_D_measured = {};
 }
 
 bool HapticHand::deadManHeld() const noexcept {
