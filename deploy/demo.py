@@ -135,8 +135,9 @@ class Programs:
         self.started = {}
 
     def start(self, name, *words):
-        """Starts tenon-<name>; its output goes to its log."""
-        words = [self.folder / f"tenon-{name}", *map(str, words), "--session", "demo", "--domain", str(self.args.domain)]
+        """Starts tenon-<name>, or a station of the role; its output goes to its log."""
+        program = ["join", "--role", name] if name in ("trainee", "instructor") else [name]
+        words = [self.folder / f"tenon-{program[0]}", *program[1:], *map(str, words), "--session", "demo", "--domain", str(self.args.domain)]
         if self.args.lockstep and name != "observer":
             words.append("--lockstep")
         self.started[name] = Program(name, words, self.out / f"{name}.log")

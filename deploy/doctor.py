@@ -49,7 +49,7 @@ def check_memory_lock(_):
 
 
 def check_programs(args):
-    wanted = ("serve", "trainee", "instructor", "observer", "command", "record", "report", "rehearse", "parts", "check", "bake", "probe",
+    wanted = ("serve", "join", "observer", "command", "record", "report", "rehearse", "parts", "check", "bake", "probe",
               "contact", "voxels", "console")
     missing = [f"tenon-{name}" for name in wanted if not os.access(Path(args.programs) / f"tenon-{name}", os.X_OK)]
     if not missing:

@@ -2,7 +2,10 @@
 
 #include <array>
 #include <string>
+#include <utility>
 
+#include "devices/mounted_device.h"
+#include "devices/simulated/body_tracker.h"
 #include "devices/simulated/falcon.h"
 #include "devices/simulated/hug.h"
 #include "devices/simulated/omega3.h"
@@ -15,37 +18,54 @@ namespace {
 
 using OpenedDevice = Result<std::unique_ptr<HapticDevice>>;
 using OpenedBimanual = Result<std::unique_ptr<BimanualDevice>>;
+using OpenedTracker = Result<std::unique_ptr<Tracker>>;
 
 template <SimulatedModel (*kModel)()>
-OpenedDevice openSimulated(std::uint64_t seed) {
-  auto device = std::make_unique<SimulatedDevice>(kModel(), seed);
+OpenedDevice openSimulated(const DeviceConfiguration& configuration) {
+  auto device = std::make_unique<SimulatedDevice>(kModel(), configuration.seed);
+  if (configuration.dead_man) device->addDeadManSwitch();
   if (auto opened = device->open(); !opened) return fail(opened.error().what);
   return device;
 }
 
-OpenedDevice openVibrotac(std::uint64_t /*seed*/) { return std::make_unique<Vibrotac>(); }
+OpenedDevice openVibrotac(const DeviceConfiguration& /*configuration*/) {
+  return std::make_unique<Vibrotac>();
+}
 
-OpenedBimanual openHug(std::uint64_t seed) {
-  auto hug = std::make_unique<Hug>(seed);
+OpenedBimanual openHug(const DeviceConfiguration& configuration) {
+  auto hug = std::make_unique<Hug>(configuration.seed);
+  if (configuration.dead_man) {
+    hug->right().addDeadManSwitch();
+    hug->left().addDeadManSwitch();
+  }
   if (auto opened = hug->open(); !opened) return fail(opened.error().what);
   return hug;
+}
+
+OpenedTracker openBodyTracker(const DeviceConfiguration& /*configuration*/) {
+  return std::make_unique<BodyTracker>();
 }
 
 template <typename Opened>
 struct CatalogEntry {
   std::string_view name;
-  Opened (*open)(std::uint64_t seed);
+  Opened (*open)(const DeviceConfiguration& configuration);
+  CatalogFacts facts{};
 };
 
 constexpr std::array kDevices{
     CatalogEntry<OpenedDevice>{kInstructorDevice, openSimulated<sigma7Model>},
     CatalogEntry<OpenedDevice>{"omega3-sim", openSimulated<omega3Model>},
     CatalogEntry<OpenedDevice>{"falcon-sim", openSimulated<falconModel>},
-    CatalogEntry<OpenedDevice>{"vibrotac-sim", openVibrotac},
+    CatalogEntry<OpenedDevice>{kBracelet, openVibrotac, {.arms = 0}},
 };
 
 constexpr std::array kBimanualDevices{
-    CatalogEntry<OpenedBimanual>{kTraineeDevice, openHug},
+    CatalogEntry<OpenedBimanual>{kTraineeDevice, openHug, {.arms = 2}},
+};
+
+constexpr std::array kTrackers{
+    CatalogEntry<OpenedTracker>{kBodyTracker, openBodyTracker},
 };
 
 template <typename Table>
@@ -69,31 +89,52 @@ std::string listOf(const Table& table) {
   return list;
 }
 
+std::string unknown(std::string_view name) {
+  return "unknown device '" + std::string(name) + "'; known devices: " + listOf(kDevices) +
+         "; bimanual: " + listOf(kBimanualDevices);
+}
+
+bool isTurned(const DeviceConfiguration& configuration) {
+  return !configuration.q_DM.isApprox(Quaternion::Identity());
+}
+
 }  // namespace
 
-Result<void> checkDeviceName(std::string_view name) {
-  if (findIn(kDevices, name)) return {};
-  if (findIn(kBimanualDevices, name))
+Result<CatalogFacts> findDevice(std::string_view name) {
+  if (const auto* const one = findIn(kDevices, name)) return one->facts;
+  if (const auto* const pair = findIn(kBimanualDevices, name)) return pair->facts;
+  return fail(unknown(name));
+}
+
+Result<void> checkTrackerName(std::string_view name) {
+  if (findIn(kTrackers, name)) return {};
+  return fail("unknown tracker '" + std::string(name) + "'; known trackers: " + listOf(kTrackers));
+}
+
+OpenedDevice openDevice(std::string_view name, const DeviceConfiguration& configuration) {
+  const auto* const entry = findIn(kDevices, name);
+  if (entry == nullptr && findIn(kBimanualDevices, name))
     return fail(
         "device '" + std::string(name) +
         "' is bimanual and needs a station with two hands; devices for one hand: " + listOf(kDevices));
-  return fail("unknown device '" + std::string(name) + "'; known devices: " + listOf(kDevices) +
-              "; bimanual: " + listOf(kBimanualDevices));
+  if (entry == nullptr) return fail(unknown(name));
+  auto device = entry->open(configuration);
+  if (!device || !isTurned(configuration)) return device;
+  return std::make_unique<MountedDevice>(std::move(*device), configuration.q_DM);
 }
 
-Result<void> checkBimanualDeviceName(std::string_view name) {
-  if (findIn(kBimanualDevices, name)) return {};
-  return fail("unknown bimanual device '" + std::string(name) + "'; known: " + listOf(kBimanualDevices));
+OpenedBimanual openBimanualDevice(std::string_view name, const DeviceConfiguration& configuration) {
+  const auto* const entry = findIn(kBimanualDevices, name);
+  if (entry == nullptr)
+    return fail("unknown bimanual device '" + std::string(name) + "'; known: " + listOf(kBimanualDevices));
+  auto device = entry->open(configuration);
+  if (!device || !isTurned(configuration)) return device;
+  return std::make_unique<MountedBimanualDevice>(std::move(*device), configuration.q_DM);
 }
 
-OpenedDevice openDevice(std::string_view name, std::uint64_t seed) {
-  if (const auto known = checkDeviceName(name); !known) return fail(known.error().what);
-  return findIn(kDevices, name)->open(seed);
-}
-
-OpenedBimanual openBimanualDevice(std::string_view name, std::uint64_t seed) {
-  if (const auto known = checkBimanualDeviceName(name); !known) return fail(known.error().what);
-  return findIn(kBimanualDevices, name)->open(seed);
+OpenedTracker openTracker(std::string_view name, const DeviceConfiguration& configuration) {
+  if (const auto known = checkTrackerName(name); !known) return fail(known.error().what);
+  return findIn(kTrackers, name)->open(configuration);
 }
 
 Result<DeviceCaps> capsOf(std::string_view name) {

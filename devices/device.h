@@ -11,6 +11,17 @@
 
 namespace tenon::devices {
 
+/// What a device is opened with. What a make has no use for it ignores.
+struct DeviceConfiguration {
+  std::uint64_t seed = 1;  ///< varies the parameters of a simulated device
+  std::string address;     ///< where it is: a port, host or socket; empty: the first one found
+  std::string serial;      ///< which one of several it has to be; empty: any
+  /// How it is mounted: from its own frame M to the frame D that stations see. A turn about any axis; its
+  /// place does not matter, since the workspace moves.
+  Quaternion q_DM = Quaternion::Identity();
+  bool dead_man = false;  ///< a simulated device has a dead man's switch, which who holds it presses
+};
+
 inline constexpr double kMaxMotorCounts =
     4096.0;  ///< [-] motor counts at which a command saturates, either sign
 
@@ -45,6 +56,9 @@ struct DeviceCaps {
   double clutch_warning = 0.0;  ///< [N] at which the safety layer warns of the clutch
   std::uint32_t tactors = 0;    ///< number of vibration motors
   std::uint32_t dead_man = 0;  ///< bit i: forces need button i, or another one of these, held; 0: they do not
+  std::uint32_t arming = 0;    ///< bit i: who presses button i arms the station, as by its return key
+  double grip_range = 0.0;     ///< [m] from closed to open; 0: no gripper
+  bool paces = false;          ///< it sets the pace of the servo loop, see HapticDevice::await
 };
 
 enum class DeviceFault : std::uint8_t {
@@ -66,6 +80,8 @@ struct DeviceState {
   Pose X_DH;
   Twist V_DH;
   std::uint32_t buttons = 0;  ///< bit i: button i is pressed
+  double grip = 0.0;          ///< [m] opening of the gripper; 0 without one
+  std::int64_t stamp = 0;     ///< [ns] when it was measured, by std::chrono::steady_clock; 0: not known
   Wrench F_Ho_D_measured;     ///< on the hand, by a force sensor at the grip; zero without one
   bool forces_on = false;
   DeviceFault fault = DeviceFault::kNone;
@@ -100,6 +116,11 @@ class HapticDevice {
   virtual void read(DeviceState& state) noexcept = 0;
   /// The command to display until the next write. Ignored unless armed; one that is not finite is a fault.
   virtual void write(const DeviceCommand& command) noexcept = 0;
+  /// Blocks until a reading is there that read() has not given, for 5 ms at most. Of a device whose
+  /// DeviceCaps::paces is set: the servo loop waits by it instead of by a clock.
+  virtual void await() noexcept {}
+  /// The device behind one that only converts; otherwise itself.
+  [[nodiscard]] virtual HapticDevice& inner() noexcept { return *this; }
 };
 
 /// Bimanual haptic device: one arm for each hand. A fault of one arm may stop both.

@@ -46,10 +46,9 @@ ROOMS = {
     "devices": ("tenon::devices", ["idl/types", "idl/threads", "devices/simulated", "devices/drivers"], []),
     "devices/simulated": ("tenon::devices", ["idl/types", "idl/threads", "devices"], []),
     "devices/drivers": ("tenon::devices", ["idl/types", "idl/threads", "devices"], ["POSIX"]),
-    "clients/haptic": ("tenon::haptic", IDL + ["devices", "server/structures", "server/collision"], ["CLI11", "POSIX"]),
+    "clients/haptic": ("tenon::haptic", IDL + ["devices", "server/structures", "server/collision"], ["POSIX"]),
     "clients/simulated_person": ("tenon::simulated_person", STATION, []),
-    "clients/trainee": ("tenon::trainee", STATION + ["devices/simulated", "clients/simulated_person"], []),
-    "clients/instructor": ("tenon::instructor", STATION + ["devices/simulated", "clients/simulated_person"], []),
+    "clients/station": ("tenon::station", STATION + ["devices/simulated", "clients/simulated_person"], ["fmt", "CLI11", "POSIX"]),
     "clients/observer": ("tenon::observer", IDL, ["fmt", "CLI11", "JSON"]),
     "clients/recorder": ("tenon::recorder", IDL, ["fmt", "CLI11"]),
     "clients/command": ("tenon::command", IDL, ["fmt", "CLI11", "POSIX"]),
@@ -90,6 +89,7 @@ BLOCKING = ["condition_variable", "fstream", "future", "iostream", "mutex", "reg
 # files of those rooms that run outside of the loop: why each may
 OUTSIDE_THE_LOOP = {
     "server/structures/structure_file.cpp": "reads and writes structure files at start and in `tenon bake`",
+    "clients/haptic/paced_clock.h": "waits for the device that paces the loop",
     "clients/haptic/seat_file.cpp": "reads and writes the file of a station's seat, on the wire thread",
     "clients/haptic/station_program.cpp": "reads a station's options and runs its threads; no loop of its own",
 }
@@ -420,12 +420,12 @@ PLANTED = [
     ("devices/drivers/mouse.h", "#include <libvendor.h>", "belongs into the .cpp"),
     ("clients/haptic/hand.cpp", "#include <shared_mutex>", "can block"),
     ("clients/haptic/station_program.cpp", "#include <mutex>", None),
-    ("clients/simulated_person/g.cpp", '#include "clients/trainee/station.h"', "may not include clients/trainee"),
+    ("clients/simulated_person/g.cpp", '#include "clients/station/station.h"', "may not include clients/station"),
     ("clients/command/h.cpp", '#include "clients/haptic/coupling.h"', "may not include clients/haptic"),
     ("clients/command/h.cpp", "#include <tenon.h>", "only idl/wire includes tenon.h"),
-    ("clients/trainee/i.cpp", '#include "clients/rehearse/rehearsal.h"', "no room may include clients/rehearse"),
+    ("clients/station/i.cpp", '#include "clients/rehearse/rehearsal.h"', "no room may include clients/rehearse"),
     ("clients/rehearse/rehearsal.h", '#include "server/session/session_server.h"', None),
-    ("clients/rehearse/rehearsal.h", '#include "clients/trainee/station.h"', None),
+    ("clients/rehearse/rehearsal.h", '#include "clients/station/station.h"', None),
     ("clients/rehearse/rehearsal.h", '#include "tests/support/analytic.h"', "no room may include tests"),
     ("scenarios/part_generator/j.cpp", '#include "server/structures/field.h"', "may not include server/structures"),
     ("scenarios/part_generator/j.cpp", "#include <png.h>", None),
@@ -446,7 +446,7 @@ PLANTED = [
     ("server/tools/lines.h", "#include <vector>", None),
     ("devices/simulated/hug.h", "#include <vector>", None),
     ("clients/haptic/coupling.h", "#include <vector>", None),
-    ("clients/trainee/station.h", "#include <vector>", None),
+    ("clients/station/station.h", "#include <vector>", None),
     ("tests/support/analytic.h", "#include <vector>", None),
 ]
 

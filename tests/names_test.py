@@ -239,19 +239,19 @@ def faults_in(root, namespaces):
 
 
 def self_test():
-    rooms = {"server/collision": "tenon::collision", "idl/record": "tenon::record", "clients/trainee": "tenon::trainee"}
+    rooms = {"server/collision": "tenon::collision", "idl/record": "tenon::record", "clients/station": "tenon::station"}
     planted = [  # path, text, a part of each fault that must be found
         ("server/collision/a.h", "namespace tenon {\nclass A;\n}\n", ["a.h:1: opens namespace tenon,"]),
         ("server/collision/b.h", "namespace tenon::collision { struct B { struct Cell {}; }; }\n", []),
         ("server/collision/c.h", "namespace tenon::collision { namespace { int x; } }\n", ["anonymous namespace in a header"]),
         ("server/collision/c.cpp", "namespace tenon::collision { namespace { struct Cell final : B { int x = f({1}); }; } }\n", []),
         ("server/collision/d.cpp", "namespace tenon::collision { namespace detail { } }\n", ["opens namespace detail inside"]),
-        ("server/collision/e.cpp", "namespace tenon::collision {}\nnamespace tenon::trainee {}\n", ["e.cpp:2: opens namespace tenon::trainee"]),
+        ("server/collision/e.cpp", "namespace tenon::collision {}\nnamespace tenon::station {}\n", ["e.cpp:2: opens namespace tenon::station"]),
         ("server/collision/f.cpp", "namespace { int x; }\n", ["f.cpp:1: opens namespace (anonymous)"]),
         ("server/collision/g.cpp", "int x;\n", ["opens no namespace"]),
         ("server/collision/h.cpp", "namespace tenon::collision { using namespace std; }\n", ["using namespace std"]),
         ("server/collision/i_inl.h", "namespace tenon::collision { namespace HWY_NAMESPACE { struct Ball {}; namespace cull { struct Box {}; } } }\n", []),
-        ("server/collision/j.h", "namespace tenon::trainee {\nclass Ball;\n}\nnamespace tenon::collision { using Cell = Ball::Cell; }\n", []),
+        ("server/collision/j.h", "namespace tenon::station {\nclass Ball;\n}\nnamespace tenon::collision { using Cell = Ball::Cell; }\n", []),
         ("idl/record/mcap.h", "namespace tenon::record::mcap { enum class Cell : char { kOne }; }\n",
          ["type Cell is there 2 times"]),
         ("server/collision/k.cpp", "namespace tenon::collision { namespace {\nconstexpr int kA = 1;\nint f(int a, const B& b) { return 1; }\n"
@@ -261,13 +261,14 @@ def self_test():
         ("server/collision/m.cpp", "namespace tenon::collision { namespace { int f(int c,\n const B& d = {}) { int kA = 1; } } }\n",
          ["m.cpp:1: f(int, const B&) is in another"]),
         ("clients/trainee/main.cpp", "namespace { int x; }\nint main() {}\n", []),
-        ("clients/trainee/other_main.cpp", "using namespace tenon;\nint main() {}\n", ["using namespace tenon"]),
-        ("clients/trainee/j.cpp", "namespace tenon::trainee { using Ball = int; using std::vector; template <class T> using Box = T; }\n",
+        ("clients/station/main.cpp", "namespace { int x; }\nint main() {}\n", []),
+        ("clients/station/other_main.cpp", "using namespace tenon;\nint main() {}\n", ["using namespace tenon"]),
+        ("clients/station/j.cpp", "namespace tenon::station { using Ball = int; using std::vector; template <class T> using Box = T; }\n",
          ["type Ball is there 2 times"]),
-        ("tests/clients/trainee/k_test.cpp", "namespace tenon::trainee { struct alignas(64) Box { int a; }; struct Box2; void f(struct Box3* b); }\n",
+        ("tests/clients/station/k_test.cpp", "namespace tenon::station { struct alignas(64) Box { int a; }; struct Box2; void f(struct Box3* b); }\n",
          ["type Box is there 2 times"]),
-        ("tests/clients/trainee/helper.h", "namespace tenon::test { class [[nodiscard]] Helper {}; template <> struct Helper2<int> {}; }\n", []),
-        ("tests/support/l.h", "namespace tenon::trainee { }\n", ["its room's is tenon::test"]),
+        ("tests/clients/station/helper.h", "namespace tenon::test { class [[nodiscard]] Helper {}; template <> struct Helper2<int> {}; }\n", []),
+        ("tests/support/l.h", "namespace tenon::station { }\n", ["its room's is tenon::test"]),
         ("tests/support/m.h", "namespace tenon::test { constexpr auto kText = R\"(struct Box {)\"; // struct Box {\n typedef int Helper; }\n",
          ["type Helper is there 2 times"]),
     ]

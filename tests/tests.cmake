@@ -46,7 +46,7 @@ function(tenon_tests name)
 endfunction()
 
 foreach(room idl/types idl/record server/structures server/game_control server/check devices devices/simulated clients/simulated_person
-             clients/trainee clients/instructor clients/observer clients/recorder clients/command clients/report clients/console clients/rehearse
+             clients/station clients/observer clients/recorder clients/command clients/report clients/console clients/rehearse
              scenarios/part_generator)
   string(REPLACE "/" "_" target ${room})
   tenon_tests(${room} LINK ${target})

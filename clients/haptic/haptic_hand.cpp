@@ -102,8 +102,8 @@ void HapticHand::readDevice() noexcept {
   if (!handover_.pending()) return device_.read(device_state_);
   device_state_.forces_on = false;
   device_state_.V_DH = {};
-  device_state_.fault =
-      devices::DeviceFault::kNone;  // the reset that was asked for; a fault that stays is read again
+  // the person has looked at it: what it said before does not latch the clutch again
+  device_state_.fault = devices::DeviceFault::kNone;
   device_state_.F_Ho_D_measured = {};
 }
 

@@ -68,6 +68,12 @@ class HapticHand {
   [[nodiscard]] const LocalModel& local() const noexcept { return local_; }
   [[nodiscard]] const Pose& pose() const noexcept { return input_.sample.X_WH; }
   [[nodiscard]] bool inContact() const noexcept { return in_contact_; }
+  /// Forces are permitted, but a fault of the device or an open clutch keeps them off until the person
+  /// presses.
+  [[nodiscard]] bool faulty() const noexcept {
+    const bool off = device_state_.fault != devices::DeviceFault::kNone || safety_.wantsDisarm();
+    return permitted_ && off && !handover_.pending();
+  }
   /// [s] age of the contacts that are rendered, on the clock of step(); infinite without any.
   [[nodiscard]] double contactAge() const noexcept { return answers_.age(); }
 

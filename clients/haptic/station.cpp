@@ -114,10 +114,14 @@ void Station::updateArming(bool permitted_before) noexcept {
   if (arming_.permitsForces() != permitted_before) armingChanged();
 }
 
-void Station::pressLikeAPerson() noexcept {
-  constexpr std::uint32_t kReaction = 500;  // [steps]
+void Station::pressLikeAPerson(bool fault) noexcept {
+  constexpr std::uint32_t kReaction = 500;     // [steps]
+  constexpr std::uint32_t kInspection = 2000;  // [steps]
   unpressed_ = arming_.awaitsPress() ? unpressed_ + 1 : 0;
-  if (unpressed_ >= kReaction) press();
+  faulty_ = fault ? faulty_ + 1 : 0;
+  if (unpressed_ < kReaction && faulty_ < kInspection) return;
+  faulty_ = 0;
+  press();
 }
 
 bool Station::takeEvent(StationEvent& event) noexcept {

@@ -9,6 +9,7 @@
 
 #include "clients/haptic/arming.h"
 #include "clients/haptic/world_view.h"
+#include "devices/device.h"
 #include "idl/types/fixed_vector.h"
 #include "idl/types/messages/contacts.h"
 #include "idl/types/messages/hands.h"
@@ -89,6 +90,8 @@ class Station {
   /// Resets and arms the devices, if the person has pressed for it. It may block and make texts, so it has a
   /// thread of its own beside that of step(), or is called between two steps. Fails with what a device says.
   [[nodiscard]] virtual Result<void> armDevices() = 0;
+  /// The device by whose readings step() is to be called; null: each millisecond of a clock.
+  [[nodiscard]] virtual devices::HapticDevice* pacingDevice() { return nullptr; }
 
   [[nodiscard]] std::span<const DeviceInput> inputs() const { return {inputs_.begin(), inputs_.size()}; }
   [[nodiscard]] std::span<const HandState> states() const { return {states_.begin(), states_.size()}; }
@@ -112,8 +115,9 @@ class Station {
   virtual void stepChanged() {}
   /// arming().permitsForces() is new, or the person has pressed again: a device in fault is to be reset.
   virtual void armingChanged() noexcept = 0;
-  /// To be called once a step by a station with a simulated person: it presses half a second after it could.
-  void pressLikeAPerson() noexcept;
+  /// To be called once a step by a station with a simulated person: it presses half a second after it could,
+  /// and two seconds after a device went into a fault, which it has looked at by then.
+  void pressLikeAPerson(bool fault) noexcept;
 
   /// Queues the events of a hand's last step.
   void report(const HapticHand& hand) noexcept;
@@ -136,6 +140,7 @@ class Station {
   static constexpr std::size_t kEventCapacity = 256;
   Arming arming_;
   std::uint32_t unpressed_ = 0;  ///< [steps] since a press is awaited
+  std::uint32_t faulty_ = 0;     ///< [steps] since a device is in fault
   std::vector<SceneObject> objects_;
   StepState step_;
   FixedVector<HandId, kMaxStationHands> own_hands_;

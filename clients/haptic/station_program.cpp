@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "clients/haptic/force_age_statistics.h"
+#include "clients/haptic/paced_clock.h"
 #include "clients/haptic/seat_file.h"
 #include "clients/haptic/station_link.h"
 #include "idl/threads/cyclic_thread.h"
@@ -51,6 +52,11 @@ struct StationOutput {
     for (const HandState& state : station.states()) states.push_back(state);
   }
 };
+
+std::shared_ptr<threads::Clock> makeClock(devices::HapticDevice* pacing, threads::Nanoseconds period) {
+  if (pacing == nullptr) return std::make_shared<threads::SteadyClock>();
+  return std::make_shared<PacedClock>(*pacing, period);
+}
 
 /// A step without its texts, so that copying it does not allocate.
 StepState withoutTexts(StepState step) {
@@ -379,7 +385,7 @@ Result<RunState> StationRunner::runRealTime(const std::atomic<bool>& stop) {
   }
   std::optional<threads::CyclicThread> thread;
   const auto startServo = [&] {
-    thread.emplace(std::make_shared<threads::SteadyClock>(), cyclic,
+    thread.emplace(makeClock(station_.pacingDevice(), cyclic.period), cyclic,
                    [this](std::uint64_t) noexcept { servo(); });
     thread->start();
   };

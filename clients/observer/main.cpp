@@ -24,8 +24,7 @@ int run(int argc, char** argv) {
   app.add_option("--domain", membership.domain, "DDS domain, 0 to 230")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
-  app.add_option("--person", membership.person, "name shown to the other participants")
-      ->capture_default_str();
+  app.add_option("--name", membership.person, "name shown to the other participants")->capture_default_str();
   app.add_option("--language", options.language, "language of titles and instructions")
       ->capture_default_str();
   app.add_option("--wait", wait, "seconds to search for a server")->capture_default_str();

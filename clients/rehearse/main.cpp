@@ -9,11 +9,10 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "clients/instructor/instructor_station.h"
 #include "clients/rehearse/rehearsal.h"
 #include "clients/rehearse/script.h"
 #include "clients/rehearse/tick_log.h"
-#include "clients/trainee/trainee_station.h"
+#include "clients/station/device_station.h"
 #include "devices/catalog.h"
 #include "idl/types/cache_folder.h"
 #include "idl/types/output_files.h"
@@ -92,7 +91,7 @@ void declare(CLI::App& app, RehearseArguments& arguments) {
   app.add_option("--cache", arguments.load.cache, "folder for generated parts and haptic structures");
   app.add_option("--device", arguments.device, "the instructor's device")
       ->check([](const std::string& name) {
-        const auto known = tenon::devices::checkDeviceName(name);
+        const auto known = tenon::devices::findDevice(name);
         return known ? std::string() : known.error().what;
       })
       ->capture_default_str();
@@ -142,7 +141,7 @@ std::string wrongUsage(const CLI::App& app, const RehearseArguments& arguments) 
 }
 
 /// Prints a line on the trainee twice per second of session time.
-void followTrainee(RehearseArguments& arguments, const tenon::trainee::TraineeStation& trainee) {
+void followTrainee(RehearseArguments& arguments, const tenon::station::DeviceStation& trainee) {
   arguments.rehearsal.on_tick = [&trainee](const tenon::session::SessionSimulation&,
                                            const tenon::session::TickInput&,
                                            const tenon::session::TickOutput& output) {
@@ -163,19 +162,19 @@ void followTrainee(RehearseArguments& arguments, const tenon::trainee::TraineeSt
 tenon::Result<std::vector<std::unique_ptr<tenon::haptic::Station>>> openStations(
     RehearseArguments& arguments, const tenon::game_control::ScenarioFile& scenario) {
   std::vector<std::unique_ptr<tenon::haptic::Station>> stations;
-  tenon::trainee::TraineeOptions trainee;
-  trainee.person.seed = arguments.rehearsal.seed;
-  trainee.person.misplaced_mount = arguments.misplaced_mount;
-  auto opened = tenon::trainee::TraineeStation::open(trainee);
+  using tenon::station::DeviceStation;
+  tenon::simulated_person::PersonOptions person;
+  person.seed = arguments.rehearsal.seed;
+  person.misplaced_mount = arguments.misplaced_mount;
+  auto opened = DeviceStation::open(tenon::station::defaultStation(tenon::Role::kTrainee, person));
   if (!opened) return tenon::fail(opened.error().what);
   if (arguments.follow) followTrainee(arguments, **opened);
   stations.push_back(std::move(*opened));
   if (arguments.alone || !scenario.handNamed("instructor").valid()) return stations;
 
-  tenon::instructor::InstructorOptions instructor;
-  instructor.device = arguments.device;
-  instructor.person.seed = arguments.rehearsal.seed;
-  auto opened_instructor = tenon::instructor::InstructorStation::open(instructor);
+  auto instructor = tenon::station::defaultStation(tenon::Role::kInstructor, person);
+  instructor.devices.front().name = arguments.device;
+  auto opened_instructor = DeviceStation::open(instructor);
   if (!opened_instructor) return tenon::fail(opened_instructor.error().what);
   stations.push_back(std::move(*opened_instructor));
   return stations;

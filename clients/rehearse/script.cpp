@@ -94,7 +94,7 @@ Result<Script> makeScript(const std::vector<std::string>& inputs, const std::vec
 
 Result<void> readTrajectories(Script& script) {
   for (ScriptedHand& hand : script.hands) {
-    auto trajectory = HandTrajectory::read(hand.file);
+    auto trajectory = station::HandTrajectory::read(hand.file);
     if (!trajectory) return fail(trajectory.error().what);
     hand.trajectory = std::move(*trajectory);
   }

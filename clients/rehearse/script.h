@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "clients/rehearse/hand_trajectory.h"
 #include "clients/rehearse/rehearsal.h"
+#include "clients/station/hand_trajectory.h"
 #include "idl/types/ids.h"
 #include "idl/types/result.h"
 #include "server/game_control/scenario.h"
@@ -17,7 +17,7 @@ namespace tenon::rehearse {
 struct ScriptedHand {
   HandId hand;
   std::filesystem::path file;
-  std::optional<HandTrajectory> trajectory;  ///< none before readTrajectories()
+  std::optional<station::HandTrajectory> trajectory;  ///< none before readTrajectories()
 };
 
 /// Hands that follow files, and what some of them hold from the start on. All other hands are absent.
@@ -38,7 +38,7 @@ struct Script {
                                         const std::vector<std::string>& takes,
                                         const game_control::ScenarioFile& scenario);
 
-/// Reads the hands' files. Fails with the first error, see HandTrajectory::read.
+/// Reads the hands' files. Fails with the first error, see station::HandTrajectory::read.
 [[nodiscard]] Result<void> readTrajectories(Script& script);
 
 /// [s] Time of the last row of all files; they have been read.

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "clients/haptic/station.h"
-#include "clients/rehearse/hand_trajectory.h"
+#include "clients/station/hand_trajectory.h"
 
 namespace tenon::rehearse {
 
@@ -15,7 +15,7 @@ namespace tenon::rehearse {
 /// Threads, Real-time: as Station.
 class ScriptedStation final : public haptic::Station {
  public:
-  ScriptedStation(std::string hand, Role role, HandTrajectory trajectory)
+  ScriptedStation(std::string hand, Role role, station::HandTrajectory trajectory)
       : hand_(std::move(hand)), role_(role), trajectory_(std::move(trajectory)) {}
 
   [[nodiscard]] std::vector<std::string> handNames() const override { return {hand_}; }
@@ -31,7 +31,7 @@ class ScriptedStation final : public haptic::Station {
  private:
   std::string hand_;
   Role role_;
-  HandTrajectory trajectory_;
+  station::HandTrajectory trajectory_;
 };
 
 }  // namespace tenon::rehearse

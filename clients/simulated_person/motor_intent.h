@@ -22,6 +22,13 @@ class MotorIntent {
     X_DI_ = Pose(p_DI_, X_DI.rotation());
     return X_DI_;
   }
+  /// The hand takes the handle at X_DH again, which it has let go: it sets off from there.
+  [[nodiscard]] const Pose& rest(const Pose& X_DH) noexcept {
+    begun_ = true;
+    p_DI_ = X_DH.translation();
+    X_DI_ = X_DH;
+    return X_DI_;
+  }
 
   static constexpr double kSpeed = 0.8;  ///< [m/s] below the speed at which a device brakes
 

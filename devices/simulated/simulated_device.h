@@ -55,8 +55,13 @@ class SimulatedDevice : public HapticDevice {
   explicit SimulatedDevice(SimulatedModel model, std::uint64_t seed = 1,
                            std::shared_ptr<MagneticClutch> clutch = nullptr);
 
+  /// Button of the simulated dead man's switch, see addDeadManSwitch().
+  static constexpr std::uint32_t kDeadManButton = 1U << 7U;
+
   [[nodiscard]] Result<void> open();
   void close() noexcept;
+  /// Gives it a dead man's switch, which the arm presses by HumanArm::setButtons.
+  void addDeadManSwitch() noexcept { model_.caps.dead_man = kDeadManButton; }
 
   [[nodiscard]] const DeviceCaps& caps() const override { return model_.caps; }
   [[nodiscard]] Result<void> arm() override;
@@ -108,7 +113,7 @@ class SimulatedDevice : public HapticDevice {
 
 /// The simulated arm that holds `device`; null if there is none.
 [[nodiscard]] inline HumanArm* simulatedHumanArm(HapticDevice& device) noexcept {
-  auto* const simulated = dynamic_cast<SimulatedDevice*>(&device);
+  auto* const simulated = dynamic_cast<SimulatedDevice*>(&device.inner());
   return simulated ? &simulated->humanArm() : nullptr;
 }
 

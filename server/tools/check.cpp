@@ -133,8 +133,8 @@ int main(int argc, char** argv) {
       "blocked, objects out of reach, turns that a device does not have. What is not baked yet is baked.",
       "tenon check"};
   const auto known = [](const std::string& name) {
-    const bool is_known = devices::checkDeviceName(name) || devices::checkBimanualDeviceName(name);
-    return is_known ? std::string() : devices::checkDeviceName(name).error().what;
+    const auto found = devices::findDevice(name);
+    return found ? std::string() : found.error().what;
   };
   app.set_help_flag("-h,--help", "print this help");
   app.add_option("scenario", arguments.scenario, "a scenario's folder or YAML file")->required();

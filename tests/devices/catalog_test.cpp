@@ -28,6 +28,13 @@ TEST(Catalog, AnUnknownNameFailsWithAListOfTheKnownNames) {
   EXPECT_THAT(pair.error().what, HasSubstr("hug-sim"));
 }
 
+TEST(Catalog, TellsWhatADeviceIsWithoutOpeningIt) {
+  EXPECT_EQ(findDevice("hug-sim")->arms, 2U);
+  EXPECT_EQ(findDevice("omega3-sim")->arms, 1U);
+  EXPECT_EQ(findDevice("vibrotac-sim")->arms, 0U);
+  EXPECT_FALSE(findDevice("sigma8"));
+}
+
 TEST(Catalog, TellsTheCapabilitiesOfADevice) {
   EXPECT_DOUBLE_EQ(capsOf("hug-sim")->rotation_range, 2.6);
   EXPECT_DOUBLE_EQ(capsOf("sigma7-sim")->rotation_range, 1.2);

@@ -32,7 +32,7 @@ class Verbs(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.programs = Path(folder.name)
-        for name in ("serve", "command", "trainee", "instructor", "observer", "bench"):
+        for name in ("serve", "command", "join", "observer", "bench"):
             write_program(self.programs / f"tenon-{name}", f'echo "{name}:$*"')
 
     def tenon(self, *words):
@@ -54,7 +54,7 @@ class Verbs(unittest.TestCase):
     def test_a_verb_starts_its_program_with_all_its_arguments(self):
         self.assert_started(["command", "signal", "help"], "command:signal help")
         self.assert_started(["resimulate", "a.mcap", "--despite-changes"], "serve:--resimulate a.mcap --despite-changes")
-        self.assert_started(["join", "--seed", "3", "--role", "trainee"], "trainee:--seed 3")
+        self.assert_started(["join", "--seed", "3", "--role", "trainee"], "join:--role trainee --seed 3")
         self.assert_started(["join", "--role=observer", "--json"], "observer:--json")
         self.assert_started(["bench", "engine"], "bench:engine")
 

@@ -49,7 +49,9 @@ class Session(unittest.TestCase):
         done = rehearse("--stubborn", 0)
         self.assertEqual((done.returncode, done.stderr), (2, "tenon rehearse: --stubborn is now --misplace-mount\n"))
         done = tenon("join", "--role", "trainee", "--stubborn", 0)
-        self.assertEqual((done.returncode, done.stderr), (2, "tenon-trainee: --stubborn is now --misplace-mount\n"))
+        self.assertEqual((done.returncode, done.stderr), (2, "tenon-join: --stubborn is now --misplace-mount\n"))
+        done = tenon("join", "--role", "trainee", "--swap-hands")
+        self.assertEqual((done.returncode, done.stderr), (2, "tenon-join: --swap-hands is now --hands left,right\n"))
 
     def test_lockstep_between_processes_equals_one_process_and_its_recordings_resimulate(self):
         with Stage() as stage:

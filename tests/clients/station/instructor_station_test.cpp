@@ -1,11 +1,10 @@
-#include "clients/instructor/instructor_station.h"
-
 #include <gtest/gtest.h>
 
 #include "clients/haptic/local_model.h"
+#include "clients/station/device_station.h"
 #include "tests/support/realtime_guard.h"
 
-namespace tenon::instructor {
+namespace tenon::station {
 namespace {
 
 constexpr HandId kHand{0};
@@ -18,9 +17,9 @@ constexpr ObjectId kPointer{0}, kPart{1};
 class StuckPart {
  public:
   explicit StuckPart(const char* device) {
-    InstructorOptions options;
-    options.device = device;
-    station = std::move(*InstructorStation::open(options));
+    StationOptions options = defaultStation(Role::kInstructor);
+    options.devices.front().name = device;
+    station = std::move(*DeviceStation::open(options));
     SceneObject pointer, part;
     pointer.object = kPointer;
     pointer.kind = "assistant";
@@ -54,7 +53,7 @@ class StuckPart {
     for (int i = 0; i < static_cast<int>(seconds * 1000.0); ++i) step();
   }
 
-  std::unique_ptr<InstructorStation> station;
+  std::unique_ptr<DeviceStation> station;
   double highest_force = 0.0;  // [N]
   bool helped = false;
   [[nodiscard]] const Pose& pointer() const { return pointer_; }
@@ -147,12 +146,12 @@ TEST(InstructorStation, StepAllocatesNothingAndLocksNothing) {
 }
 
 TEST(InstructorStation, AnUnknownDeviceIsRefusedWithAListOfAllDevices) {
-  InstructorOptions options;
-  options.device = "joystick";
-  const auto opened = InstructorStation::open(options);
+  StationOptions options = defaultStation(Role::kInstructor);
+  options.devices.front().name = "joystick";
+  const auto opened = DeviceStation::open(options);
   ASSERT_FALSE(opened);
   EXPECT_NE(opened.error().what.find("sigma7-sim"), std::string::npos);
 }
 
 }  // namespace
-}  // namespace tenon::instructor
+}  // namespace tenon::station

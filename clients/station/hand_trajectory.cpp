@@ -1,4 +1,4 @@
-#include "clients/rehearse/hand_trajectory.h"
+#include "clients/station/hand_trajectory.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-namespace tenon::rehearse {
+namespace tenon::station {
 namespace {
 
 constexpr std::array<std::string_view, 8> kColumns{"t", "x", "y", "z", "qw", "qx", "qy", "qz"};
@@ -142,4 +142,4 @@ Pose HandTrajectory::poseAt(double t) const noexcept {
   return displaced(from.X_WH, {motion.translation * fraction, motion.rotation * fraction});
 }
 
-}  // namespace tenon::rehearse
+}  // namespace tenon::station

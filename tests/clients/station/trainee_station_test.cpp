@@ -1,20 +1,19 @@
-#include "clients/trainee/trainee_station.h"
-
 #include <gtest/gtest.h>
 
-#include "tests/clients/trainee/funnel_server.h"
+#include "clients/station/device_station.h"
+#include "tests/clients/station/funnel_server.h"
 #include "tests/support/realtime_guard.h"
 
-namespace tenon::trainee {
+namespace tenon::station {
 namespace {
 
 using test::FunnelServer;
 
-std::unique_ptr<TraineeStation> station(std::uint64_t seed, int misplaced_mount = -1) {
-  TraineeOptions options;
-  options.person.seed = seed;
-  options.person.misplaced_mount = misplaced_mount;
-  return std::move(*TraineeStation::open(options));
+std::unique_ptr<DeviceStation> station(std::uint64_t seed, int misplaced_mount = -1) {
+  simulated_person::PersonOptions person;
+  person.seed = seed;
+  person.misplaced_mount = misplaced_mount;
+  return std::move(*DeviceStation::open(defaultStation(Role::kTrainee, person)));
 }
 
 TEST(TraineeStation, ReachesTouchesAndInsertsAPartGuidedByContact) {
@@ -98,4 +97,4 @@ TEST(TraineeStation, StepAllocatesNothingAndLocksNothing) {
 }
 
 }  // namespace
-}  // namespace tenon::trainee
+}  // namespace tenon::station

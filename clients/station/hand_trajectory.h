@@ -9,7 +9,7 @@
 #include "idl/types/result.h"
 #include "idl/types/spatial.h"
 
-namespace tenon::rehearse {
+namespace tenon::station {
 
 /// Device poses of one hand over time, from a CSV file with the header `t,x,y,z,qw,qx,qy,qz`: seconds, metres
 /// and the quaternion q_WH, in the world.
@@ -50,4 +50,4 @@ class HandTrajectory {
   std::vector<Row> rows_;  // at least one, by rising time
 };
 
-}  // namespace tenon::rehearse
+}  // namespace tenon::station

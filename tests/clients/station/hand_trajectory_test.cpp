@@ -1,4 +1,4 @@
-#include "clients/rehearse/hand_trajectory.h"
+#include "clients/station/hand_trajectory.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace tenon::rehearse {
+namespace tenon::station {
 namespace {
 
 using ::testing::HasSubstr;
@@ -180,4 +180,4 @@ TEST(HandTrajectoryFuzz, RandomBytesAreRefusedWithTheirLine) {
 }
 
 }  // namespace
-}  // namespace tenon::rehearse
+}  // namespace tenon::station

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/haptic/mover.h"
+#include "clients/haptic/station.h"
+#include "clients/haptic/tactile_map.h"
+#include "clients/simulated_person/person.h"
+#include "clients/station/script_mover.h"
+#include "devices/catalog.h"
+#include "idl/types/result.h"
+
+namespace tenon::station {
+
+/// Who moves the devices of a station.
+enum class PersonKind {
+  kSimulated,
+  kScript,  ///< arms follow files
+  kNone,    ///< who holds the devices
+};
+
+struct StationDevice {
+  std::string name;  ///< in the catalog, with one arm or two
+  devices::DeviceConfiguration configuration;
+};
+
+/// A station: hands x devices x trackers, and who moves it.
+struct StationOptions {
+  Role role = Role::kTrainee;
+  std::vector<StationDevice> devices;  ///< in the order of their hands
+  /// Names in the scenario, one for each arm of the devices (of two arms the right one first); empty: the
+  /// role's, see defaultHands().
+  std::vector<std::string> hands;
+  std::string tracker;  ///< of the person's forearm and head; empty: none
+  std::string tactors;  ///< bracelet on the tracked forearm; empty: none
+  haptic::TactileMode tactile = haptic::TactileMode::kIntensity;
+  PersonKind kind = PersonKind::kSimulated;
+  simulated_person::PersonOptions person;  ///< of a simulated one
+  std::vector<HandScript> scripts;         ///< of kScript
+};
+
+/// What a role has unless told otherwise: a trainee HUG's two arms, a bracelet and a tracker; an instructor
+/// one arm of a sigma.7. A simulated person moves it.
+[[nodiscard]] StationOptions defaultStation(Role role, const simulated_person::PersonOptions& person = {});
+/// `right` and `left` of a trainee, `instructor` and `instructor_left` of an instructor.
+[[nodiscard]] std::vector<std::string> defaultHands(Role role, std::size_t arms);
+
+/// The station of one person: each arm of its devices moves a hand, a tracker its forearm and head.
+///
+/// Threads, Real-time: as Station.
+class DeviceStation : public haptic::Station {
+ public:
+  /// Fails with a sentence when a device is unknown or cannot be opened, or when hands and arms do not fit.
+  static Result<std::unique_ptr<DeviceStation>> open(const StationOptions& options);
+  ~DeviceStation() override;
+
+  [[nodiscard]] std::vector<std::string> handNames() const override;
+  [[nodiscard]] Role role() const override;
+  void step(std::uint32_t seq) noexcept override;
+  [[nodiscard]] Result<void> armDevices() override;
+  [[nodiscard]] devices::HapticDevice* pacingDevice() override;
+  /// What the mover does, in a word or two: for progress output and tests.
+  [[nodiscard]] const char* activity() const noexcept;
+
+ protected:
+  void begin(std::span<const HandId> hand_ids) override;
+  void manifoldReceived(const HandManifold& manifold) noexcept override;
+  void stepChanged() override;
+  void armingChanged() noexcept override;
+
+ private:
+  struct Parts;
+  explicit DeviceStation(std::unique_ptr<Parts> parts);
+  [[nodiscard]] Result<void> openDevices();
+  void makeMover();
+  /// The hand of arm `index`, at its place in the scene.
+  void beginHand(std::size_t index, HandId id);
+  /// Presses when a simulated person would, or a device's own button says so.
+  void pressButtons() noexcept;
+  void moveArms() noexcept;
+  /// Poses of forearm and head, and the vibration of the bracelet.
+  void trackBody(std::uint32_t seq) noexcept;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace tenon::station

@@ -1,0 +1,40 @@
+#include <cstdio>
+#include <exception>
+#include <string>
+
+#include <unistd.h>
+
+#include "clients/haptic/station_program.h"
+#include "clients/station/command_line.h"
+#include "clients/station/device_station.h"
+
+namespace {
+
+void print(const std::string& text) { std::fprintf(stderr, "tenon-join: %s\n", text.c_str()); }
+
+int run(int argc, char** argv) {
+  tenon::station::CommandLine line = tenon::station::readCommandLine(argc, argv);
+  if (!line.arguments) return line.exit_code;
+  auto station = tenon::station::DeviceStation::open(line.arguments->station);
+  if (!station) {
+    print(station.error().what);
+    return 1;
+  }
+  tenon::haptic::StationProgramOptions& program = line.arguments->program;
+  program.read_keys = isatty(STDIN_FILENO) != 0;
+  program.print = print;
+  const auto ended = tenon::haptic::runStation(**station, program, tenon::haptic::stopSignal());
+  if (!ended) print(ended.error().what);
+  return ended ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& problem) {
+    print(problem.what());
+    return 1;
+  }
+}
