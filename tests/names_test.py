@@ -260,7 +260,6 @@ def self_test():
          "int f(double a, const B& b) { return 1; }\nbool g(T other) {} } }\n", ["l.cpp:2: kA is in another", "l.cpp:4: g(T) is in another"]),
         ("server/collision/m.cpp", "namespace tenon::collision { namespace { int f(int c,\n const B& d = {}) { int kA = 1; } } }\n",
          ["m.cpp:1: f(int, const B&) is in another"]),
-        ("clients/trainee/main.cpp", "namespace { int x; }\nint main() {}\n", []),
         ("clients/station/main.cpp", "namespace { int x; }\nint main() {}\n", []),
         ("clients/station/other_main.cpp", "using namespace tenon;\nint main() {}\n", ["using namespace tenon"]),
         ("clients/station/j.cpp", "namespace tenon::station { using Ball = int; using std::vector; template <class T> using Box = T; }\n",
