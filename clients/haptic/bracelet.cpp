@@ -22,6 +22,7 @@ void Bracelet::receive(const HandManifold& manifold) noexcept {
 void Bracelet::permit(bool permitted) noexcept {
   const bool runs = permitted_ && forces_on_ && !safety_.wantsDisarm();
   permitted_ = permitted;
+  if (!permitted) handover_.withdraw();
   if (!permitted || runs) return;
   safety_.reset();
   handover_.ask();

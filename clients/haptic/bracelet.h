@@ -24,9 +24,11 @@ class Bracelet {
   /// Forgets all contacts of `forearm`. Not armed, it is silent; fails when it cannot be armed.
   Result<void> begin(HandId forearm, bool armed);
   void receive(const HandManifold& manifold) noexcept;
-  /// As HapticHand::permitForces and armDevice.
+  /// As HapticHand's.
   void permit(bool permitted) noexcept;
+  [[nodiscard]] bool wantsArming() const noexcept { return handover_.pending(); }
   Result<void> armDevice() { return handover_.serve(device_); }
+  void handBack() noexcept { handover_.handBack(); }
   /// One cycle, `dt` [s] after the last one; `seq` numbers the forearm's input.
   void step(std::uint32_t seq, double dt) noexcept;
   /// Intensities that were displayed in the last cycle, 0 to 255.

@@ -71,6 +71,7 @@ Result<void> HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH
 void HapticHand::permitForces(bool permitted) noexcept {
   const bool runs = permitted_ && device_state_.forces_on && !safety_.wantsDisarm();
   permitted_ = permitted;
+  if (!permitted) handover_.withdraw();
   if (!permitted || runs) return;
   safety_.reset();
   coupling_.reset();

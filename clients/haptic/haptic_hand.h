@@ -53,8 +53,12 @@ class HapticHand {
   /// fault: resets the safety layer, and asks for armDevice() if the device is not armed. See Arming, which
   /// decides it.
   void permitForces(bool permitted) noexcept;
-  /// Resets and arms the device if permitForces() asked for it; may block.
+  /// Whether permitForces() asked for armDevice().
+  [[nodiscard]] bool wantsArming() const noexcept { return handover_.pending(); }
+  /// Resets and arms the device if permitForces() asked for it; may block. The loop has the device again
+  /// after handBack(), which follows armDevice() of all hands that share its clutch.
   Result<void> armDevice() { return handover_.serve(device_); }
+  void handBack() noexcept { handover_.handBack(); }
   /// Forces off.
   void end() noexcept { device_.disarm(); }
 

@@ -87,6 +87,8 @@ class Station {
   /// `dt` [s]: from the last step to the next one, by the clock of whoever calls step(); kTickSeconds unless
   /// told.
   void setCycle(double dt) noexcept { dt_ = dt; }
+  /// Whether there is something for armDevices() to do.
+  [[nodiscard]] virtual bool wantsArming() const noexcept { return false; }
   /// Resets and arms the devices, if the person has pressed for it. It may block and make texts, so it has a
   /// thread of its own beside that of step(), or is called between two steps. Fails with what a device says.
   [[nodiscard]] virtual Result<void> armDevices() = 0;

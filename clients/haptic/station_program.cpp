@@ -5,6 +5,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <future>
 #include <map>
 #include <optional>
 
@@ -118,6 +119,7 @@ class StationRunner {
   std::array<std::atomic<float>, kMaxStationHands>
       peak_forces_{};             ///< [N] displayed since the last HandState, by state
   std::uint32_t stated_seq_ = 0;  ///< of the last HandState
+  std::future<void> arming_;
   int rejoins_ = 0;
   std::chrono::steady_clock::time_point rejoined_at_{};
   std::optional<StepState> step_;
@@ -218,9 +220,16 @@ void StationRunner::readKeys() {
   presses_.push(true);
 }
 
-/// On the wire thread: devices may take their time, and say why not.
+/// Devices may take their time, and say why not. In real time they do so on a thread of their own, since this
+/// one hears the emergency stop; in lockstep between two steps.
 void StationRunner::armDevices() {
-  if (auto armed = station_.armDevices(); !armed) print(armed.error().what);
+  const auto arm = [this] {
+    auto armed = station_.armDevices();
+    if (!armed) print(armed.error().what);
+  };
+  if (lockstep_) return arm();
+  if (arming_.valid() && arming_.wait_for(milliseconds(0)) != std::future_status::ready) return;
+  if (station_.wantsArming()) arming_ = std::async(std::launch::async, arm);
 }
 
 void StationRunner::printStep(const StepState& step) {
@@ -308,6 +317,7 @@ Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat
 }
 
 void StationRunner::restartStation() {
+  if (arming_.valid()) arming_.wait();
   station_.welcome(link_.welcome(), link_.objects());
   if (step_) station_.receive(*step_);
 }

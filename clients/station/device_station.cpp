@@ -269,7 +269,17 @@ Result<void> DeviceStation::armDevices() {
     if (arm.hand) keepFirst(arm.hand->armDevice());
   }
   if (parts_->bracelet) keepFirst(parts_->bracelet->armDevice());
+  for (Arm& arm : parts_->arms) {
+    if (arm.hand) arm.hand->handBack();
+  }
+  if (parts_->bracelet) parts_->bracelet->handBack();
   return all;
+}
+
+bool DeviceStation::wantsArming() const noexcept {
+  const auto wants = [](const Arm& arm) { return arm.hand && arm.hand->wantsArming(); };
+  return std::any_of(parts_->arms.begin(), parts_->arms.end(), wants) ||
+         (parts_->bracelet && parts_->bracelet->wantsArming());
 }
 
 void DeviceStation::step(std::uint32_t seq) noexcept {

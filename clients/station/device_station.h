@@ -60,6 +60,7 @@ class DeviceStation : public haptic::Station {
   [[nodiscard]] std::vector<std::string> handNames() const override;
   [[nodiscard]] Role role() const override;
   void step(std::uint32_t seq) noexcept override;
+  [[nodiscard]] bool wantsArming() const noexcept override;
   [[nodiscard]] Result<void> armDevices() override;
   [[nodiscard]] devices::HapticDevice* pacingDevice() override;
   /// What the mover does, in a word or two: for progress output and tests.

@@ -103,17 +103,17 @@ TEST_P(ForceReturn, AfterAGapIsSoft) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Gaps, ForceReturn,
-                         testing::Combine(testing::Values("hug-sim", "sigma7-sim", "omega3-sim",
-                                                          "falcon-sim"),
-                                          testing::Values(GapCase{0.05}, GapCase{0.15}, GapCase{0.3}, GapCase{0.8}, GapCase{4.0}),
-                                          testing::Values(Target::kInScene, Target::kAtDevice)),
-                         [](const auto& one) {
-                           const std::string& name = std::get<0>(one.param);
-                           return name.substr(0, name.find('-')) +
-                                  std::to_string(static_cast<int>(std::get<1>(one.param).seconds * 1e3)) +
-                                  (std::get<2>(one.param) == Target::kInScene ? "msScene" : "msDevice");
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Gaps, ForceReturn,
+    testing::Combine(testing::Values("hug-sim", "sigma7-sim", "omega3-sim", "falcon-sim"),
+                     testing::Values(GapCase{0.05}, GapCase{0.15}, GapCase{0.3}, GapCase{0.8}, GapCase{4.0}),
+                     testing::Values(Target::kInScene, Target::kAtDevice)),
+    [](const auto& one) {
+      const std::string& name = std::get<0>(one.param);
+      return name.substr(0, name.find('-')) +
+             std::to_string(static_cast<int>(std::get<1>(one.param).seconds * 1e3)) +
+             (std::get<2>(one.param) == Target::kInScene ? "msScene" : "msDevice");
+    });
 
 class ForceReturnOf : public testing::TestWithParam<std::string> {};
 
@@ -168,6 +168,7 @@ TEST_P(ForceReturnOf, AStopIsSoftOnceThePersonHasPressed) {
     ASSERT_FALSE(setup.hand.input().active) << "the device is not armed by the servo thread";
   }
   ASSERT_TRUE(setup.hand.armDevice());
+  setup.hand.handBack();
   setup.expectSoftReturn([&] { setup.hold(true); });
   EXPECT_GT(setup.force(), 1.0);
 }

@@ -97,6 +97,7 @@ TEST(HandSafety, TheLoopNeitherArmsNorResetsADevice) {
   EXPECT_TRUE(setup.device.calls.empty()) << "left to whoever may block";
   EXPECT_FALSE(setup.hand.input().active);
   ASSERT_TRUE(setup.hand.armDevice());
+  setup.hand.handBack();
   EXPECT_THAT(setup.device.calls, testing::ElementsAre("reset", "arm"));
   setup.step();
   EXPECT_TRUE(setup.hand.input().active);
@@ -113,8 +114,23 @@ TEST(HandSafety, OnePressAfterAnOpenClutchIsEnough) {
   setup.step();  // the device, not read meanwhile, was in fault
   setup.device.state.F_Ho_D_measured = {};
   ASSERT_TRUE(setup.hand.armDevice());
+  setup.hand.handBack();
   setup.step();
   EXPECT_THAT(setup.device.calls, testing::ElementsAre("reset", "arm", "write"));
+}
+
+TEST(HandSafety, AStopBetweenPressAndArmingLeavesTheDeviceUnarmed) {
+  RecordedHand setup(devices::sigma7Model().caps);
+  setup.device.state.fault = DeviceFault::kVelocity;
+  setup.device.state.forces_on = false;
+  setup.step();
+  setup.hand.permitForces(true);
+  setup.hand.permitForces(false);
+  ASSERT_TRUE(setup.hand.armDevice());
+  EXPECT_TRUE(setup.hand.wantsArming()) << "the loop may not touch it before it is handed back";
+  setup.hand.handBack();
+  setup.step();
+  EXPECT_THAT(setup.device.calls, testing::ElementsAre("reset", "disarm"));
 }
 
 TEST(HandSafety, APressWithoutAFaultDoesNotInterruptTheForces) {
@@ -122,6 +138,7 @@ TEST(HandSafety, APressWithoutAFaultDoesNotInterruptTheForces) {
   setup.hand.permitForces(true);
   setup.step();
   ASSERT_TRUE(setup.hand.armDevice());
+  setup.hand.handBack();
   EXPECT_THAT(setup.device.calls, testing::ElementsAre("write"));
 }
 
@@ -160,6 +177,7 @@ TEST(HandSafety, TheEndOfTheWorkspaceRampsAfterArming) {
   setup.device.state.X_DH.translation() = {0.059, 0.0, 0.0};
   setup.hand.permitForces(true);
   ASSERT_TRUE(setup.hand.armDevice());
+  setup.hand.handBack();
   double last = 0.0;
   for (int i = 0; i < 1000; ++i) {
     setup.step();
@@ -252,6 +270,7 @@ TEST(Bracelet, VibratesAsLongAsItsContactsAreFreshAndNoStopSilencesIt) {
   EXPECT_LT(device.amplitudes()[0], 0.01);
   bracelet.permit(true);
   ASSERT_TRUE(bracelet.armDevice());
+  bracelet.handBack();
   EXPECT_GT(run(200, true), 100);
 }
 

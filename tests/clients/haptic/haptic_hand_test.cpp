@@ -44,6 +44,7 @@ TEST_P(HapticHandWithDevice, TurnsItsForcesOffDuringAnEmergencyStop) {
   EXPECT_FALSE(setup.hand.input().active);
   setup.hand.permitForces(true);
   ASSERT_TRUE(setup.hand.armDevice());
+  setup.hand.handBack();
   for (int i = 0; i < 1500; ++i) setup.step(Vector3(0.0, 0.0, 0.0));
   EXPECT_TRUE(setup.hand.input().active);
   EXPECT_GT(setup.hand.state().F_Ho_W.force.norm(), 0.5);
