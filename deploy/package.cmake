@@ -13,6 +13,8 @@ install(DIRECTORY scenarios DESTINATION share/tenon COMPONENT tenon
 install(FILES deploy/demo.py deploy/demo_scene.py deploy/doctor.py DESTINATION share/tenon/deploy COMPONENT tenon)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/console_page DESTINATION share/tenon COMPONENT tenon OPTIONAL PATTERN built EXCLUDE)
 install(DIRECTORY deploy/dds DESTINATION share/tenon/deploy COMPONENT tenon)
+install(PROGRAMS deploy/systemd/serve_or_resume DESTINATION share/tenon/deploy/systemd COMPONENT tenon)
+install(FILES deploy/systemd/tenon@.service DESTINATION share/tenon/deploy/systemd COMPONENT tenon)
 file(WRITE ${CMAKE_BINARY_DIR}/VERSION "${PROJECT_VERSION}\n")
 install(FILES ${CMAKE_BINARY_DIR}/VERSION DESTINATION share/tenon COMPONENT tenon)
 install(FILES deploy/copyright DESTINATION share/doc/tenon COMPONENT tenon)

@@ -30,6 +30,7 @@ struct ServeArguments {
   tenon::session::SessionOptions session;
   tenon::session::LoadOptions load{.cache = tenon::defaultCache()};
   std::filesystem::path key_file;
+  std::string resume;          ///< journal of a killed server; empty: begin a session
   std::string resimulate;      ///< journal or recording; empty: open a session
   bool states_detail = false;  ///< --detail is given
   bool despite_changes = false;
@@ -73,6 +74,12 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
       ->default_str("0.7");
   app.add_option("--journal", arguments.session.journal,
                  "record the inputs of each tick, and a checkpoint a second, in this file");
+  CLI::Option* const journal = app.get_option("--journal");
+  app.add_option(
+         "--resume", arguments.resume,
+         "take up the session of a killed server where its journal ends, and continue that file: same step, "
+         "same seats, what hands held is parked until they are back; --detail is that of the journal")
+      ->excludes(journal);
   app.add_flag("--overwrite", arguments.overwrite, tenon::kOverwriteHelp);
   app.add_flag("--allow-skips", arguments.allow_skips, "exit 0 although steps were skipped");
   app.add_option(
@@ -82,8 +89,10 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
   app.add_flag("--lockstep", arguments.session.lockstep,
                "a tick waits for the inputs of all hands instead of the clock: repeatable to the last bit");
   app.add_option(
-      "--resimulate", arguments.resimulate,
-      "simulate a journal or recording again and compare the state hash after every tick; opens no session");
+         "--resimulate", arguments.resimulate,
+         "simulate a journal or recording again and compare the state hash after every tick; opens no "
+         "session")
+      ->excludes("--resume");
   app.add_flag("--despite-changes", arguments.despite_changes,
                "re-simulate although scenario or structures have changed since the recording, to see where "
                "it differs");
@@ -128,6 +137,13 @@ bool isRefusedForChanges(const ServeArguments& arguments, const tenon::session::
   return !arguments.despite_changes;
 }
 
+std::string describe(const tenon::session::JournalGap& gap) {
+  const std::string missing = fmt::format("ticks {} to {} are missing", gap.first, gap.last);
+  return gap.compared_after == 0
+             ? missing + ", and no checkpoint follows: the rest is not compared"
+             : fmt::format("{}: compared again after the checkpoint of tick {}", missing, gap.compared_after);
+}
+
 int resimulateFile(const ServeArguments& arguments, const tenon::session::LoadedScene& loaded) {
   const auto fingerprint = tenon::session::readFingerprint(arguments.resimulate);
   if (!fingerprint) return reportError(fingerprint.error().what);
@@ -136,14 +152,15 @@ int resimulateFile(const ServeArguments& arguments, const tenon::session::Loaded
   const auto report = tenon::session::resimulate(arguments.resimulate, simulation);
   if (!report) return reportError(report.error().what);
   printLine(fmt::format("ticks {} to {}: {} compared, {} gaps", report->first, report->last, report->compared,
-                        report->gaps));
+                        report->gaps.size()));
+  for (const tenon::session::JournalGap& gap : report->gaps) printLine(describe(gap));
   if (!report->problem.empty()) printLine(report->problem);
   if (report->first_difference) {
     printLine(fmt::format("first difference: tick {}", *report->first_difference));
     return 1;
   }
   printLine(fmt::format("final state hash: {:016x}", report->final_hash));
-  return 0;
+  return report->gaps.empty() ? 0 : 1;
 }
 
 /// Checks before anything is baked what the scenario's text suffices for; the exit code, 0 for none.
@@ -152,6 +169,7 @@ int checkArguments(const ServeArguments& arguments) {
   if (!scenario) return reportError(scenario.error().what);
   if (const auto known = tenon::session::checkWaitFor(*scenario, arguments.session.wait_for); !known)
     return reportError("--wait-for: " + known.error().what, kWrongUsage);
+  if (!arguments.resume.empty()) return 0;  // its journal is continued
   tenon::ProgramFiles files{{arguments.session.journal}, {scenario->path}, arguments.overwrite};
   for (const tenon::game_control::ScenarioObject& object : scenario->objects)
     for (const tenon::game_control::MeshSource& mesh : object.meshes) files.inputs.push_back(mesh.file);
@@ -160,12 +178,14 @@ int checkArguments(const ServeArguments& arguments) {
 }
 
 int serve(ServeArguments& arguments) {
-  if (!arguments.resimulate.empty()) {
-    const auto origin = tenon::session::readJournalOrigin(arguments.resimulate);
-    if (!origin && arguments.scenario.empty()) return reportError(origin.error().what);
-    if (origin && !arguments.states_detail) arguments.load.detail = origin->detail;
+  const bool resumes = !arguments.resume.empty();
+  if (const std::string& file = resumes ? arguments.resume : arguments.resimulate; !file.empty()) {
+    const auto origin = tenon::session::readJournalOrigin(file);
+    if (!origin && (resumes || arguments.scenario.empty())) return reportError(origin.error().what);
+    if (origin) arguments.session.simulation.limits = origin->limits;
+    if (origin && (resumes || !arguments.states_detail)) arguments.load.detail = origin->detail;
     if (arguments.scenario.empty()) {
-      const auto scenario = tenon::session::findScenario(arguments.resimulate, *origin);
+      const auto scenario = tenon::session::findScenario(file, *origin);
       if (!scenario) return reportError(scenario.error().what);
       arguments.scenario = scenario->string();
     }
@@ -195,6 +215,8 @@ int serve(ServeArguments& arguments) {
   const auto models = tenon::session::storeDisplayModels(*loaded->scenario, arguments.load);
   if (models) arguments.session.scene_hash = *models;
   if (!models) printLine("the console will show boxes instead of parts: " + models.error().what);
+  arguments.session.resume = resumes;
+  if (resumes) arguments.session.journal = arguments.resume;
   auto server = tenon::session::SessionServer::open(*loaded, arguments.session);
   if (!server) return reportError(server.error().what);
   const auto report = (*server)->run(stop_requested);
@@ -202,6 +224,10 @@ int serve(ServeArguments& arguments) {
   printLine(fmt::format("{} after {:.1f} s; late ticks: {}; refused inputs: {}", report->run.reason,
                         static_cast<double>(report->run.tick) * tenon::kTickSeconds, report->late_ticks,
                         report->refused_inputs));
+  if (report->lost_journal_ticks > 0)
+    printLine(fmt::format("{} ticks are missing in the journal", report->lost_journal_ticks));
+  if (!report->journal_problem.empty())
+    printLine(fmt::format("the journal ended before the session: {}", report->journal_problem));
   printLine(fmt::format("final state hash: {:016x}", report->run.final_hash));
   return tenon::isCompleted(report->run, arguments.allow_skips) ? 0 : 1;
 }

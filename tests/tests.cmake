@@ -77,7 +77,7 @@ set_tests_properties(rehearsal.short PROPERTIES TIMEOUT 900 LABELS "gate;rehears
 add_dependencies(threaded_tests tenon-rehearse tenon-parts tenon-bake)
 
 # scripts that run the programs as people do; alone those that measure against the clock
-set(quiet_scripts session_test faults_test trust_test)
+set(quiet_scripts session_test faults_test trust_test resume_test)
 file(GLOB scripts CONFIGURE_DEPENDS tests/system/*_test.py)
 foreach(script ${scripts})
   get_filename_component(name ${script} NAME_WE)

@@ -42,13 +42,17 @@ Result<void> observeSession(Observer& observer, wire::MembershipOptions options,
   while (!stop && !observer.over() && !member.serverIsGone()) {
     inbox.dispatch(std::chrono::milliseconds(100));
     observer.printReceivedBefore(Clock::now() - kDelay);
+    if (!member.serverIsGone() || observer.over()) continue;
+    // another one may resume the session
+    const std::string why = *member.lost();
+    if (auto back = member.rejoin(stop, [&] { inbox.dispatch(std::chrono::milliseconds(0)); }); !back)
+      return fail(why + "; " + back.error().what);
   }
   // the last messages of other topics may arrive after the end of the run
   const auto until = Clock::now() + kLongestEnd;
   while (!stop && Clock::now() < until && inbox.dispatch(kDelay) > 0) {
   }
   observer.printAll();
-  if (member.serverIsGone() && !observer.over()) return fail(*member.lost());
   return {};
 }
 

@@ -56,6 +56,7 @@ class Recorder {
  private:
   Result<void> subscribe();
   Result<void> writeUntilOver();
+  Result<void> comeBack();
   /// All that the server published and that can still be expected is recorded.
   [[nodiscard]] bool isComplete() const {
     return recording_->hasStatement() && (!member_->announce().lockstep || recording_->status().lost == 0);
@@ -114,6 +115,11 @@ Result<void> Recorder::writeUntilOver() {
     lobby.dispatch(milliseconds(0));
     const auto now = std::chrono::steady_clock::now();
     if (received) last_sample = now;
+    if (member_->serverIsGone() && !recording_->runIsOver()) {
+      if (auto back = comeBack(); !back) return back;
+      last_sample = std::chrono::steady_clock::now();
+      continue;
+    }
     const bool over = recording_->runIsOver() || member_->serverIsGone();
     if (over && over_since == std::chrono::steady_clock::time_point{}) over_since = now;
     const bool quiet = now - last_sample >= kQuiet;
@@ -129,8 +135,21 @@ Result<void> Recorder::writeUntilOver() {
     static_cast<void>(status_writer_->write(recording_->status()));
     return fail(recording_->problem());
   }
-  if (member_->serverIsGone() && !recording_->runIsOver())
-    return fail(*member_->lost() + "; the recording up to then is in " + options_.file.string());
+  return {};
+}
+
+/// The server is gone: goes on in the same file when another one resumes the session.
+Result<void> Recorder::comeBack() {
+  const std::string why = *member_->lost();
+  if (options_.report) options_.report(why + "; waiting for one that resumes the session");
+  const auto until_then = "; the recording up to then is in " + options_.file.string();
+  if (auto back = member_->rejoin(stop_, [this] { take(milliseconds(1)); }); !back)
+    return fail(why + "; " + back.error().what + until_then);
+  if (!recording_->continues(member_->announce(), member_->welcome().tick))
+    return fail(why + ", and the next one has begun another session" + until_then);
+  recording_->resumed(member_->announce(), member_->welcome().tick);
+  if (options_.report)
+    options_.report("recording the resumed session after tick " + std::to_string(member_->welcome().tick));
   return {};
 }
 

@@ -46,12 +46,30 @@ Result<Recording> Recording::open(const std::filesystem::path& file, const Sessi
   recording.status_.file = file.string();
   recording.status_.recording = true;
 
-  // the announcement belongs to the lobby's partition; it is kept because it names session and title
-  const auto bytes = wire::encode(session);
-  if (!bytes) return fail(bytes.error().what);
-  const std::int64_t now = std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
-  recording.add({wire::kSessionAnnounce.name, wire::typeName<SessionAnnounce>(), now, 0, false, *bytes});
+  recording.writeAnnounce(session);
   return recording;
+}
+
+/// The announcement belongs to the lobby's partition; it is kept because it names session and title.
+void Recording::writeAnnounce(const SessionAnnounce& session) {
+  const auto bytes = wire::encode(session);
+  if (!bytes) return keepProblem(fail(bytes.error().what));
+  const std::int64_t now = std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+  add({wire::kSessionAnnounce.name, wire::typeName<SessionAnnounce>(), now, 0, false, *bytes});
+}
+
+bool Recording::continues(const SessionAnnounce& session, Tick tick) const {
+  constexpr Tick kMostLost = 1000;  // [ticks] more than a kill loses
+  return session.scenario_hash == session_.scenario_hash && session.lockstep == session_.lockstep &&
+         tick > 0 && tick + kMostLost >= std::max(newest_tick_, newest_input_);
+}
+
+void Recording::resumed(const SessionAnnounce& session, Tick tick) {
+  session_ = session;
+  resumed_after_ = tick;
+  keepProblem(writer_.addMetadata("tenon resumed", {{"after tick", std::to_string(tick)},
+                                                    {"server epoch", std::to_string(session.server_epoch)}}));
+  writeAnnounce(session);
 }
 
 Recording::Recording(record::McapWriter writer, const SessionAnnounce& session)
@@ -96,8 +114,9 @@ Tick Recording::follow(const wire::RawSample& sample) {
 
 void Recording::keep(const PublishedSamples& published) {
   stated_until_ = std::max(stated_until_, published.last_tick);
-  // of the period in which this recorder joined a part is not expected
-  if (published.first_tick > joined_) published_[periodOf(published.first_tick)] = published;
+  // of a period in which this recorder joined, or came back, a part is not expected
+  if (published.first_tick > std::max(joined_, resumed_after_))
+    published_[periodOf(published.first_tick)] = published;
 }
 
 void Recording::follow(const TickInputPart& input) {

@@ -41,6 +41,10 @@ class Recording {
 
   /// From the tick after `tick` on, every sample of the server is expected.
   void joined(Tick tick) { joined_ = tick; }
+  /// Whether a server that announces `session` goes on, after `tick`, with what is recorded here.
+  [[nodiscard]] bool continues(const SessionAnnounce& session, Tick tick) const;
+  /// It does: notes in the file that a new life of the server begins, and expects its samples from now on.
+  void resumed(const SessionAnnounce& session, Tick tick);
   /// Writes one sample, or the end of its instance; a failure shows in status().
   void add(const wire::RawSample& sample);
   /// Writes outcome and summary; the recording is complete after that. Fails with the first problem there
@@ -63,6 +67,7 @@ class Recording {
   Recording(record::McapWriter writer, const SessionAnnounce& session);
   [[nodiscard]] std::uint16_t channelOf(std::string_view topic, std::string_view type,
                                         std::string_view schema);
+  void writeAnnounce(const SessionAnnounce& session);
   void write(std::uint16_t channel, std::int64_t log_time_ns, std::uint64_t sequence,
              std::span<const std::uint8_t> bytes);
   /// Keeps the newest tick, the run state and the counts; the tick of the sample, 0 when it has none.
@@ -81,6 +86,7 @@ class Recording {
   std::optional<RunState> run_;
   Tick newest_tick_ = 0;  ///< of WorldFrame_1k
   Tick joined_ = 0;
+  Tick resumed_after_ = 0;  ///< of the newest life of the server
   std::map<std::string, std::map<Tick, std::uint64_t>, std::less<>> recorded_;  ///< samples by topic, period
   std::map<Tick, PublishedSamples> published_;                                  ///< by period
   Tick stated_until_ = 0;

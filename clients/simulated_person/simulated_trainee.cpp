@@ -20,6 +20,7 @@ void SimulatedTrainee::begin(std::span<const SceneObject> objects, const Pose& X
   perception_.begin(count, person_.reaction_ticks);
   right_.begin(X_WRight);
   left_.begin(X_WLeft);
+  instruction_ = {};  // reads the step anew, also one that is under way
   acted_ = true;
 }
 

@@ -1,72 +1,27 @@
 #include "idl/record/mcap_reader.h"
 
-#include <cerrno>
+#include <algorithm>
 #include <cstring>
 #include <limits>
+#include <set>
 
-#include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
-#include <zstd.h>
-
+#include "idl/record/mcap_chunk.h"
 #include "idl/record/mcap_format.h"
 
 namespace tenon::record {
 namespace {
 
-using mcap::FieldReader;
-
-constexpr std::uint64_t kMaxChunkBytes = 256U << 20U;  // uncompressed; a larger size is damage or an attack
-
-/// A file mapped read-only into memory.
-class MappedFile {
- public:
-  ~MappedFile() {
-    if (data_ != nullptr) ::munmap(data_, size_);
-  }
-  Result<std::span<const std::uint8_t>> map(const std::filesystem::path& file) {
-    const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
-    if (descriptor < 0) return fail(file.string() + ": cannot be opened (" + std::strerror(errno) + ")");
-    struct stat status {};
-    const bool known = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode) && status.st_size > 0;
-    if (known) {
-      size_ = static_cast<std::size_t>(status.st_size);
-      void* data = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, descriptor, 0);
-      if (data != MAP_FAILED) data_ = data;
-    }
-    ::close(descriptor);
-    if (data_ == nullptr) return fail(file.string() + ": is empty or not a file");
-    return std::span(static_cast<const std::uint8_t*>(data_), size_);
-  }
-
- private:
-  void* data_ = nullptr;
-  std::size_t size_ = 0;
-};
+using mcap::takeRecord;
 
 struct ChunkLocation {
   std::int64_t first_time = 0, last_time = 0;
   std::span<const std::uint8_t> fields;
 };
 
-/// Takes the next record from `rest`; false at the end or when the record is incomplete.
-bool takeRecord(std::span<const std::uint8_t>& rest, std::uint8_t& opcode,
-                std::span<const std::uint8_t>& fields) {
-  if (rest.size() < mcap::kRecordHeaderBytes) return false;
-  std::uint64_t length = 0;
-  opcode = rest[0];
-  std::memcpy(&length, rest.data() + 1, sizeof(length));
-  if (rest.size() - mcap::kRecordHeaderBytes < length) return false;
-  fields = rest.subspan(mcap::kRecordHeaderBytes, length);
-  rest = rest.subspan(mcap::kRecordHeaderBytes + length);
-  return true;
-}
-
 }  // namespace
 
 struct McapReader::Impl {
-  MappedFile mapped;
+  mcap::MappedFile mapped;
   std::string name;
   bool complete = false;
   bool summary_valid = true;
@@ -77,6 +32,7 @@ struct McapReader::Impl {
   std::vector<McapChannel> channels;
   std::multimap<std::string, std::map<std::string, std::string>> metadata;
   std::vector<McapAttachment> attachments;
+  std::set<std::uint16_t> indexed;  ///< channels with an index of messages
 
   std::size_t next_chunk = 0;
   std::int64_t not_before = std::numeric_limits<std::int64_t>::min();
@@ -89,6 +45,10 @@ struct McapReader::Impl {
   void readTopLevel(std::uint8_t opcode, std::span<const std::uint8_t> fields);
   void readStatistics(std::span<const std::uint8_t> fields);
   bool decompress(const ChunkLocation& location);
+  [[nodiscard]] bool allDefined() const {
+    return std::all_of(indexed.begin(), indexed.end(),
+                       [this](std::uint16_t channel) { return channel_indices.contains(channel); });
+  }
   void reportProblem(const std::string& what) {
     if (problem.empty()) problem = name + ": " + what;
   }
@@ -99,6 +59,12 @@ McapReader::McapReader(McapReader&&) noexcept = default;
 McapReader& McapReader::operator=(McapReader&&) noexcept = default;
 McapReader::~McapReader() = default;
 
+std::int64_t McapReader::lastTime() const {
+  const auto& chunks = impl_->chunks;
+  const auto last = std::find_if(chunks.rbegin(), chunks.rend(),
+                                 [](const ChunkLocation& chunk) { return chunk.last_time != 0; });
+  return last == chunks.rend() ? 0 : last->last_time;
+}
 bool McapReader::complete() const { return impl_->complete; }
 const std::string& McapReader::problem() const { return impl_->problem; }
 const std::vector<McapChannel>& McapReader::channels() const { return impl_->channels; }
@@ -112,15 +78,15 @@ Result<McapReader> McapReader::open(const std::filesystem::path& file) {
   impl->name = file.string();
   const auto bytes = impl->mapped.map(file);
   if (!bytes) return fail(bytes.error().what);
-  if (bytes->size() < sizeof(mcap::kMagic) ||
-      std::memcmp(bytes->data(), mcap::kMagic, sizeof(mcap::kMagic)) != 0)
-    return fail(file.string() + ": is not a recording (no MCAP file)");
+  if (!mcap::beginsWithMagic(*bytes)) return fail(file.string() + ": is not a recording (no MCAP file)");
   impl->scan(bytes->subspan(sizeof(mcap::kMagic)));
 
   // without a summary the channels are those that the chunks define
   if (!impl->complete || !impl->summary_valid) {
     if (!impl->complete) impl->reportProblem("is truncated: read up to its last complete chunk");
     for (const ChunkLocation& location : impl->chunks) {
+      // as many as it takes to define what the indices of the messages name; all of a file without indices
+      if (!impl->indexed.empty() && impl->allDefined()) break;
       if (!impl->decompress(location)) continue;
       std::uint8_t opcode = 0;
       std::span<const std::uint8_t> fields;
@@ -165,7 +131,7 @@ void McapReader::Impl::readTopLevel(std::uint8_t opcode, std::span<const std::ui
       ChunkLocation location;
       location.first_time = in.get<std::int64_t>();
       location.last_time = in.get<std::int64_t>();
-      location.fields = in.rest;
+      location.fields = fields;
       if (in.ok) chunks.push_back(location);
       return;
     }
@@ -185,6 +151,11 @@ void McapReader::Impl::readTopLevel(std::uint8_t opcode, std::span<const std::ui
       if (!in.ok || crc != mcap::crc32(fields.first(fields.size() - sizeof(crc))))
         return reportProblem("an attachment is damaged and skipped");
       attachments.push_back(std::move(attachment));
+      return;
+    }
+    case mcap::kMessageIndex: {
+      const auto channel = in.get<std::uint16_t>();
+      if (in.ok) indexed.insert(channel);
       return;
     }
     case mcap::kStatistics:
@@ -225,33 +196,8 @@ void McapReader::Impl::readStatistics(std::span<const std::uint8_t> fields) {
 }
 
 bool McapReader::Impl::decompress(const ChunkLocation& location) {
-  record::mcap::FieldReader in(location.fields);
-  const auto size = in.get<std::uint64_t>();
-  const auto crc = in.get<std::uint32_t>();
-  const std::string_view compression = in.text();
-  const auto compressed = in.take(in.get<std::uint64_t>());
-  const bool known = compression.empty() || compression == "zstd";
-  if (!in.ok || !known || size > kMaxChunkBytes) {
-    reportProblem("a chunk cannot be read and is skipped");
-    return false;
-  }
-  if (compression.empty()) {
-    decompressed.assign(compressed.begin(), compressed.end());
-  } else {
-    // the size must be that of the zstd frame: one damaged number must not cause a huge allocation
-    if (ZSTD_getFrameContentSize(compressed.data(), compressed.size()) != size) {
-      reportProblem("a chunk is damaged and skipped");
-      return false;
-    }
-    decompressed.resize(size);
-    const std::size_t got = ZSTD_decompress(decompressed.data(), size, compressed.data(), compressed.size());
-    if (ZSTD_isError(got) != 0 || got != size) {
-      reportProblem("a chunk is damaged and skipped");
-      return false;
-    }
-  }
-  if (crc != 0 && mcap::crc32(decompressed) != crc) {
-    reportProblem("a chunk has a wrong checksum and is skipped");
+  if (const std::string wrong = mcap::openChunk(location.fields, decompressed); !wrong.empty()) {
+    reportProblem("a chunk " + wrong + (wrong == "is damaged" ? " and skipped" : " and is skipped"));
     return false;
   }
   rest = decompressed;

@@ -53,6 +53,8 @@ class McapReader {
   /// messages after it are skipped.
   void seek(std::int64_t log_time_ns);
 
+  /// [ns] Log time of the newest message in the last chunk that has messages; 0: there is none.
+  [[nodiscard]] std::int64_t lastTime() const;
   [[nodiscard]] bool complete() const;               ///< false: the file is truncated
   [[nodiscard]] const std::string& problem() const;  ///< first damage found so far, or empty
   [[nodiscard]] const std::vector<McapChannel>& channels() const;

@@ -13,7 +13,8 @@
 #include <unistd.h>
 #include <zstd.h>
 
-#include "idl/record/mcap_format.h"
+#include "idl/record/mcap_summary.h"
+#include "idl/record/mcap_unfinished.h"
 
 namespace tenon::record {
 namespace {
@@ -25,13 +26,6 @@ constexpr auto kChunkAge = std::chrono::milliseconds(250);
 constexpr auto kSyncAge = std::chrono::seconds(1);
 constexpr int kCompressionLevel = 1;
 
-struct ChunkIndex {
-  std::int64_t first_time = 0, last_time = 0;
-  std::uint64_t offset = 0, length = 0;
-  std::map<std::uint16_t, std::uint64_t> message_indices;
-  std::uint64_t indices_length = 0, compressed = 0, plain = 0;
-};
-
 }  // namespace
 
 struct McapWriter::Impl {
@@ -40,6 +34,7 @@ struct McapWriter::Impl {
   bool compress = true;
   std::uint64_t offset = 0;
   std::uint32_t data_crc = 0;
+  bool has_data_crc = true;  // not of a continued file, which would have to be read as a whole
   std::chrono::steady_clock::time_point synced = std::chrono::steady_clock::now();
 
   // the current chunk
@@ -49,20 +44,18 @@ struct McapWriter::Impl {
   std::int64_t last_time = 0;
   std::map<std::uint16_t, std::vector<std::pair<std::uint64_t, std::uint64_t>>> index;
 
-  // for the summary
-  std::map<std::string, std::uint16_t> schema_ids;
-  record::mcap::FieldWriter schemas, channels, attachment_index, metadata_index;
-  std::map<std::uint16_t, std::uint64_t> counts;
-  std::vector<ChunkIndex> chunks;
-  std::uint64_t messages = 0;
-  std::uint32_t attachments = 0, metadata = 0;
-  std::int64_t start = std::numeric_limits<std::int64_t>::max();
-  std::int64_t end = 0;
+  mcap::Summary summary;
 
   ~Impl() {
     if (descriptor >= 0) ::close(descriptor);
   }
 
+  /// Before anything is changed: it may be the file of a session that runs. Devices and pipes have no lock.
+  Result<void> lock(const std::string& what_to_do) const {
+    if (flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+      return fail(file.string() + ": another program is writing it; " + what_to_do);
+    return {};
+  }
   Result<void> put(std::span<const std::uint8_t> bytes) {
     data_crc = mcap::crc32(bytes, data_crc);
     offset += bytes.size();
@@ -76,21 +69,12 @@ struct McapWriter::Impl {
   }
   Result<void> record(mcap::Opcode opcode, const record::mcap::FieldWriter& fields) {
     record::mcap::FieldWriter whole;
-    append(whole, opcode, fields);
+    mcap::append(whole, opcode, fields);
     return put(whole.bytes);
   }
-  static void append(record::mcap::FieldWriter& to, mcap::Opcode opcode,
-                     const record::mcap::FieldWriter& fields) {
-    to.put(opcode);
-    to.put(static_cast<std::uint64_t>(fields.bytes.size()));
-    to.putBytes(fields.bytes);
-  }
-
   Result<void> endChunk();
-  Result<void> writeIndices(ChunkIndex& chunk_index);
+  Result<void> writeIndices(mcap::ChunkIndex& chunk_index);
   Result<void> writeSummary();
-  void addStatistics(record::mcap::FieldWriter& summary) const;
-  void addChunkIndices(record::mcap::FieldWriter& summary) const;
 };
 
 McapWriter::McapWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -108,9 +92,7 @@ Result<McapWriter> McapWriter::open(const std::filesystem::path& file, const Mca
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), ignored);
   impl->descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
   if (impl->descriptor < 0) return fail(file.string() + ": cannot be written (" + std::strerror(errno) + ")");
-  // locked before it is emptied: it may be the file of a session that runs. Devices and pipes have no lock
-  if (flock(impl->descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-    return fail(file.string() + ": another program is writing it; name another file");
+  if (auto locked = impl->lock("name another file"); !locked) return fail(locked.error().what);
   if (ftruncate(impl->descriptor, 0) != 0 && errno != EINVAL)
     return fail(file.string() + ": cannot be emptied (" + std::strerror(errno) + ")");
   if (auto done = impl->put(mcap::kMagic); !done) return fail(done.error().what);
@@ -121,10 +103,42 @@ Result<McapWriter> McapWriter::open(const std::filesystem::path& file, const Mca
   return McapWriter(std::move(impl));
 }
 
+Result<McapWriter> McapWriter::reopen(const std::filesystem::path& file, const McapOptions& options) {
+  auto impl = std::make_unique<Impl>();
+  impl->file = file;
+  impl->compress = options.compress;
+  impl->descriptor = ::open(file.c_str(), O_RDWR | O_CLOEXEC);
+  if (impl->descriptor < 0)
+    return fail(file.string() + ": cannot be continued (" + std::strerror(errno) + ")");
+  if (auto locked = impl->lock("end that one first"); !locked) return fail(locked.error().what);
+  auto unfinished = mcap::readUnfinished(file);
+  if (!unfinished) return fail(unfinished.error().what);
+  impl->summary = std::move(unfinished->summary);
+  impl->offset = unfinished->end;
+  impl->has_data_crc = false;
+  if (ftruncate(impl->descriptor, static_cast<off_t>(impl->offset)) != 0 ||
+      lseek(impl->descriptor, 0, SEEK_END) < 0)
+    return fail(file.string() + ": cannot be cut to its last complete chunk (" + std::strerror(errno) + ")");
+  // the last chunk is written anew, with its indices
+  impl->chunk.bytes = std::move(unfinished->last_chunk);
+  impl->index = std::move(unfinished->last_index);
+  for (const auto& [channel, records] : impl->index)
+    for (const auto& [time, at] : records) {
+      impl->first_time = std::min(impl->first_time, static_cast<std::int64_t>(time));
+      impl->last_time = std::max(impl->last_time, static_cast<std::int64_t>(time));
+    }
+  if (auto done = impl->endChunk(); !done) return fail(done.error().what);
+  return McapWriter(std::move(impl));
+}
+
 std::uint16_t McapWriter::addChannel(std::string_view topic, std::string_view type_name,
                                      std::string_view schema_text) {
   Impl& to = *impl_;
-  auto [schema, is_new] = to.schema_ids.try_emplace(std::string(type_name), to.schema_ids.size() + 1);
+  if (const auto known = to.summary.channel_ids.find(std::string(topic));
+      known != to.summary.channel_ids.end())
+    return known->second;
+  auto [schema, is_new] =
+      to.summary.schema_ids.try_emplace(std::string(type_name), to.summary.schema_ids.size() + 1);
   record::mcap::FieldWriter both;
   if (is_new) {
     record::mcap::FieldWriter fields;
@@ -132,11 +146,12 @@ std::uint16_t McapWriter::addChannel(std::string_view topic, std::string_view ty
     fields.put(type_name);
     fields.put(std::string_view("omgidl"));
     fields.put(schema_text);
-    Impl::append(both, mcap::kSchema, fields);
-    to.schemas.putBytes(both.bytes);
+    mcap::append(both, mcap::kSchema, fields);
+    to.summary.schemas.putBytes(both.bytes);
   }
-  const auto id = static_cast<std::uint16_t>(to.counts.size());
-  to.counts[id] = 0;
+  const auto id = static_cast<std::uint16_t>(to.summary.counts.size());
+  to.summary.counts[id] = 0;
+  to.summary.channel_ids[std::string(topic)] = id;
   record::mcap::FieldWriter channel;
   channel.put(id);
   channel.put(schema->second);
@@ -144,8 +159,8 @@ std::uint16_t McapWriter::addChannel(std::string_view topic, std::string_view ty
   channel.put(std::string_view("cdr"));
   channel.put(std::map<std::string, std::string>{});
   record::mcap::FieldWriter record;
-  Impl::append(record, mcap::kChannel, channel);
-  to.channels.putBytes(record.bytes);
+  mcap::append(record, mcap::kChannel, channel);
+  to.summary.channels.putBytes(record.bytes);
   // schema and channel precede the channel's first message in its chunk
   if (to.chunk.bytes.empty()) to.chunk_start = std::chrono::steady_clock::now();
   to.chunk.putBytes(both.bytes);
@@ -169,8 +184,8 @@ Result<void> McapWriter::write(std::uint16_t channel, std::int64_t log_time_ns, 
   to.chunk.putBytes(data);
   to.first_time = std::min(to.first_time, log_time_ns);
   to.last_time = std::max(to.last_time, log_time_ns);
-  ++to.counts[channel];
-  ++to.messages;
+  ++to.summary.counts[channel];
+  ++to.summary.messages;
 
   const auto now = std::chrono::steady_clock::now();
   if (to.chunk.bytes.size() >= kChunkBytes || now - to.chunk_start > kChunkAge)
@@ -193,11 +208,12 @@ Result<void> McapWriter::Impl::endChunk() {
     if (ZSTD_isError(size) != 0) return fail(file.string() + ": " + ZSTD_getErrorName(size));
     compressed_bytes.resize(size);
   }
-  ChunkIndex entry;
+  mcap::ChunkIndex entry;
   entry.first_time = has_messages ? first_time : 0;
   entry.last_time = has_messages ? last_time : 0;
   entry.offset = offset;
   entry.plain = chunk.bytes.size();
+  entry.compression = compress ? "zstd" : "";
   entry.compressed = compress ? compressed_bytes.size() : chunk.bytes.size();
 
   record::mcap::FieldWriter fields;
@@ -211,12 +227,7 @@ Result<void> McapWriter::Impl::endChunk() {
   if (auto done = record(mcap::kChunk, fields); !done) return done;
   entry.length = offset - entry.offset;
   if (auto done = writeIndices(entry); !done) return done;
-  chunks.push_back(std::move(entry));
-
-  if (has_messages) {
-    start = std::min(start, first_time);
-    end = std::max(end, last_time);
-  }
+  summary.add(std::move(entry), has_messages);
   chunk.bytes.clear();
   index.clear();
   first_time = std::numeric_limits<std::int64_t>::max();
@@ -224,7 +235,7 @@ Result<void> McapWriter::Impl::endChunk() {
   return {};
 }
 
-Result<void> McapWriter::Impl::writeIndices(ChunkIndex& entry) {
+Result<void> McapWriter::Impl::writeIndices(mcap::ChunkIndex& entry) {
   const std::uint64_t begin = offset;
   for (auto& [channel, records] : index) {
     std::stable_sort(records.begin(), records.end(), [](const auto& a, const auto& b) {
@@ -250,12 +261,7 @@ Result<void> McapWriter::addMetadata(std::string_view name,
   fields.put(values);
   const std::uint64_t at = to.offset;
   if (auto done = to.record(mcap::kMetadata, fields); !done) return done;
-  record::mcap::FieldWriter entry;
-  entry.put(at);
-  entry.put(to.offset - at);
-  entry.put(name);
-  Impl::append(to.metadata_index, mcap::kMetadataIndex, entry);
-  ++to.metadata;
+  to.summary.addMetadata(name, at, to.offset - at);
   return {};
 }
 
@@ -264,7 +270,7 @@ Result<void> McapWriter::addAttachment(std::string_view name, std::string_view m
   Impl& to = *impl_;
   if (auto done = to.endChunk(); !done) return done;
   record::mcap::FieldWriter fields;
-  const std::int64_t time = to.end;
+  const std::int64_t time = to.summary.end;
   fields.put(time);
   fields.put(time);
   fields.put(name);
@@ -282,9 +288,14 @@ Result<void> McapWriter::addAttachment(std::string_view name, std::string_view m
   entry.put(static_cast<std::uint64_t>(data.size()));
   entry.put(name);
   entry.put(media_type);
-  Impl::append(to.attachment_index, mcap::kAttachmentIndex, entry);
-  ++to.attachments;
+  mcap::append(to.summary.attachment_index, mcap::kAttachmentIndex, entry);
+  ++to.summary.attachments;
   return {};
+}
+
+Result<void> McapWriter::endChunk() {
+  if (impl_->descriptor < 0) return fail(impl_->file.string() + ": is already closed");
+  return impl_->endChunk();
 }
 
 Result<void> McapWriter::flush() {
@@ -294,76 +305,11 @@ Result<void> McapWriter::flush() {
   return done;
 }
 
-void McapWriter::Impl::addStatistics(record::mcap::FieldWriter& summary) const {
-  record::mcap::FieldWriter fields;
-  fields.put(messages);
-  fields.put(static_cast<std::uint16_t>(schema_ids.size()));
-  fields.put(static_cast<std::uint32_t>(counts.size()));
-  fields.put(attachments);
-  fields.put(metadata);
-  fields.put(static_cast<std::uint32_t>(chunks.size()));
-  fields.put(messages > 0 ? start : std::int64_t{0});
-  fields.put(end);
-  fields.put(static_cast<std::uint32_t>(counts.size() * 10));
-  for (const auto& [channel, count] : counts) fields.put(channel), fields.put(count);
-  append(summary, mcap::kStatistics, fields);
-}
-
-void McapWriter::Impl::addChunkIndices(record::mcap::FieldWriter& summary) const {
-  for (const ChunkIndex& entry : chunks) {
-    record::mcap::FieldWriter fields;
-    fields.put(entry.first_time);
-    fields.put(entry.last_time);
-    fields.put(entry.offset);
-    fields.put(entry.length);
-    fields.put(static_cast<std::uint32_t>(entry.message_indices.size() * 10));
-    for (const auto& [channel, at] : entry.message_indices) fields.put(channel), fields.put(at);
-    fields.put(entry.indices_length);
-    fields.put(std::string_view(compress ? "zstd" : ""));
-    fields.put(entry.compressed);
-    fields.put(entry.plain);
-    append(summary, mcap::kChunkIndex, fields);
-  }
-}
-
 Result<void> McapWriter::Impl::writeSummary() {
   record::mcap::FieldWriter data_end;
-  data_end.put(data_crc);
+  data_end.put(has_data_crc ? data_crc : 0U);
   if (auto done = record(mcap::kDataEnd, data_end); !done) return done;
-
-  // groups of the summary and their offsets
-  const std::uint64_t summary_start = offset;
-  record::mcap::FieldWriter summary, offsets;
-  const auto group = [&](mcap::Opcode opcode, auto&& add) {
-    const std::uint64_t at = summary_start + summary.bytes.size();
-    add();
-    const std::uint64_t length = summary_start + summary.bytes.size() - at;
-    if (length == 0) return;
-    record::mcap::FieldWriter fields;
-    fields.put(opcode);
-    fields.put(at);
-    fields.put(length);
-    append(offsets, mcap::kSummaryOffset, fields);
-  };
-  group(mcap::kSchema, [&] { summary.putBytes(schemas.bytes); });
-  group(mcap::kChannel, [&] { summary.putBytes(channels.bytes); });
-  group(mcap::kStatistics, [&] { addStatistics(summary); });
-  group(mcap::kChunkIndex, [&] { addChunkIndices(summary); });
-  group(mcap::kAttachmentIndex, [&] { summary.putBytes(attachment_index.bytes); });
-  group(mcap::kMetadataIndex, [&] { summary.putBytes(metadata_index.bytes); });
-  const std::uint64_t offsets_start = summary_start + summary.bytes.size();
-  summary.putBytes(offsets.bytes);
-
-  // the checksum covers the summary and the footer up to the checksum
-  record::mcap::FieldWriter footer;
-  footer.put(summary_start);
-  footer.put(offsets_start);
-  summary.put(mcap::kFooter);
-  summary.put(std::uint64_t{20});
-  summary.putBytes(footer.bytes);
-  summary.put(mcap::crc32(summary.bytes));
-  summary.putBytes(mcap::kMagic);
-  return put(summary.bytes);
+  return put(summary.bytes(offset));
 }
 
 Result<void> McapWriter::close() {
@@ -378,6 +324,6 @@ Result<void> McapWriter::close() {
   return done;
 }
 
-std::uint64_t McapWriter::messages() const { return impl_->messages; }
+std::uint64_t McapWriter::messages() const { return impl_->summary.messages; }
 
 }  // namespace tenon::record

@@ -20,7 +20,8 @@ struct McapOptions {
 ///
 /// Messages are collected in chunks of about 1 MiB. A chunk is closed when it is 250 ms old at the next
 /// write, and the file is synchronised to disk (fdatasync) every second, so that after a crash all but the
-/// last second is readable. It has checksums of chunks, data and summary, and indices for seeking.
+/// last second is readable.
+/// It has checksums of chunks, data and summary, and indices for seeking.
 ///
 /// Threads: one at a time. Real-time: no.
 class McapWriter {
@@ -28,11 +29,17 @@ class McapWriter {
   /// Overwrites `file` and creates its folder. Fails when it cannot be written.
   [[nodiscard]] static Result<McapWriter> open(const std::filesystem::path& file,
                                                const McapOptions& options = {});
+  /// Continues a file whose program was killed, after its last complete chunk; what follows that is cut.
+  /// Its channels are found again by addChannel. Fails when it is no MCAP file, was closed, is being written
+  /// by another program, or has no complete chunk.
+  [[nodiscard]] static Result<McapWriter> reopen(const std::filesystem::path& file,
+                                                 const McapOptions& options = {});
   ~McapWriter();  ///< closes the file and ignores errors
   McapWriter(McapWriter&&) noexcept;
   McapWriter& operator=(McapWriter&&) noexcept;
 
-  /// Adds a channel and returns its id. Channels of one type name share the schema of the first.
+  /// Adds a channel and returns its id; of a topic that has one, that. Channels of one type name share the
+  /// schema of the first.
   std::uint16_t addChannel(std::string_view topic, std::string_view type_name, std::string_view schema_text);
   /// `log_time_ns` in [ns], by convention since 1970. Fails when the disk is full or the file closed; so do
   /// all functions below.
@@ -42,6 +49,8 @@ class McapWriter {
                                          const std::map<std::string, std::string>& values);
   [[nodiscard]] Result<void> addAttachment(std::string_view name, std::string_view media_type,
                                            std::span<const std::uint8_t> data);
+  /// Closes the current chunk: what was written survives the end of this process, not yet that of the machine.
+  [[nodiscard]] Result<void> endChunk();
   /// Writes all messages so far to the disk.
   [[nodiscard]] Result<void> flush();
   /// Writes the summary and closes the file; without effect when it is closed.

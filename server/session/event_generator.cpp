@@ -57,6 +57,12 @@ EventGenerator::EventGenerator(std::shared_ptr<const game_control::ScenarioFile>
                                std::uint32_t server_epoch)
     : scenario_(std::move(scenario)), server_epoch_(server_epoch) {}
 
+void EventGenerator::resume(Tick tick) {
+  constexpr std::uint64_t kMostEventsPerTick = 64;
+  tick_ = tick;
+  event_count_ = tick * kMostEventsPerTick;
+}
+
 EventLog EventGenerator::makeEvent(Severity severity, std::string kind, std::string text) {
   return {++event_count_, tick_, severity, std::move(kind), std::move(text)};
 }

@@ -35,6 +35,9 @@ class EventGenerator {
  public:
   EventGenerator(std::shared_ptr<const game_control::ScenarioFile> scenario, std::uint32_t server_epoch);
 
+  /// The first output is that of a tick after `tick`, of a session that another server began: the numbers of
+  /// its log entries are greater than those before.
+  void resume(Tick tick);
   /// The changes since the output of the last call; for the first call, the whole state.
   [[nodiscard]] TickEvents generate(const TickOutput& output);
   /// A log entry of something outside the simulation (a join, a refused input), stamped with the last tick

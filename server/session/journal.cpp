@@ -6,6 +6,7 @@
 #include "idl/types/messages/journal.h"
 #include "idl/wire/codec.h"
 #include "idl/wire/topics.h"
+#include "server/session/part_joiner.h"
 
 namespace tenon::session {
 namespace {
@@ -14,31 +15,8 @@ constexpr std::string_view kMetadata = "tenon journal";
 constexpr std::string_view kRecordingMetadata = "tenon recording";  // of `tenon record`
 constexpr std::string_view kScenarioHash = "scenario hash";
 constexpr std::string_view kStructuresOf = "structures of ";
-constexpr std::int64_t kNanosecondsPerTick = 1'000'000;
-
-/// Joins the parts of one tick; parts out of order are dropped.
-template <typename Part>
-class PartJoiner {
- public:
-  /// True when `part` was the last one: bytes() are complete.
-  bool add(const Part& part) {
-    if (part.tick != tick_ || part.part == 0) {
-      bytes_.clear();
-      next_ = 0;
-      tick_ = part.tick;
-    }
-    if (part.part != next_) return false;
-    ++next_;
-    bytes_.insert(bytes_.end(), part.bytes.begin(), part.bytes.end());
-    return next_ == part.parts;
-  }
-  [[nodiscard]] std::span<const std::uint8_t> bytes() const { return bytes_; }
-
- private:
-  Tick tick_ = 0;
-  std::uint32_t next_ = 0;
-  std::vector<std::uint8_t> bytes_;
-};
+constexpr std::string_view kFreeze = "freeze after ticks";
+constexpr std::string_view kPark = "park after ticks";
 
 /// A re-simulation in progress: restores checkpoints, applies inputs and compares hashes, message by message.
 class Resimulator {
@@ -61,10 +39,8 @@ class Resimulator {
     if (!input) return fail(input.error().what);
     const Tick expected = simulation_.now() + 1;
     if (input->tick < expected) return {};
-    if (input->tick > expected) {
-      synchronized_ = false;
-      return {};
-    }
+    if (input->tick > expected && synchronized_) report_.gaps.push_back({expected, input->tick - 1, 0});
+    synchronized_ = synchronized_ && input->tick == expected;
     if (!synchronized_) return {};
     simulation_.tick(*input);
     compare(input->tick, part->state_hash);
@@ -76,7 +52,8 @@ class Resimulator {
     if (!part) return fail(part.error().what);
     if (!checkpoints_.add(*part) || synchronized_) return {};
     if (auto restored = simulation_.restore(checkpoints_.bytes()); !restored) return restored;
-    if (report_.compared > 0) ++report_.gaps;
+    if (!report_.gaps.empty() && report_.gaps.back().compared_after == 0)
+      report_.gaps.back().compared_after = simulation_.now();
     synchronized_ = true;
     return {};
   }
@@ -101,16 +78,21 @@ std::string nameTheScenario(const std::filesystem::path& file) {
 
 }  // namespace
 
+Journal::Journal(record::McapWriter writer) : writer_(std::move(writer)) {
+  input_channel_ =
+      writer_.addChannel(wire::kTickInput.name, wire::typeName<TickInputPart>(), wire::idlText());
+  checkpoint_channel_ =
+      writer_.addChannel(wire::kCheckpoint.name, wire::typeName<CheckpointPart>(), wire::idlText());
+}
+
 Result<Journal> Journal::open(const std::filesystem::path& file, const JournalOrigin& origin) {
   auto writer = record::McapWriter::open(file);
   if (!writer) return fail(writer.error().what);
   Journal journal(std::move(*writer));
-  journal.input_channel_ =
-      journal.writer_.addChannel(wire::kTickInput.name, wire::typeName<TickInputPart>(), wire::idlText());
-  journal.checkpoint_channel_ =
-      journal.writer_.addChannel(wire::kCheckpoint.name, wire::typeName<CheckpointPart>(), wire::idlText());
   std::map<std::string, std::string> metadata{{"scenario", origin.scenario},
                                               {"detail", fmt::format("{}", origin.detail)},
+                                              {std::string(kFreeze), std::to_string(origin.limits.freeze)},
+                                              {std::string(kPark), std::to_string(origin.limits.park)},
                                               {std::string(kScenarioHash), origin.fingerprint.scenario}};
   for (const auto& [object, hash] : origin.fingerprint.structures)
     metadata[std::string(kStructuresOf) + object] = hash;
@@ -119,9 +101,20 @@ Result<Journal> Journal::open(const std::filesystem::path& file, const JournalOr
   return journal;
 }
 
+Result<Journal> Journal::reopen(const std::filesystem::path& file, Tick tick, std::uint32_t server_epoch) {
+  auto writer = record::McapWriter::reopen(file);
+  if (!writer) return fail(writer.error().what);
+  Journal journal(std::move(*writer));
+  const auto noted = journal.writer_.addMetadata(
+      "tenon resumed",
+      {{"after tick", std::to_string(tick)}, {"server epoch", std::to_string(server_epoch)}});
+  if (!noted) return fail(noted.error().what);
+  return journal;
+}
+
 Result<void> Journal::write(const JournalEntry& entry) {
   Result<void> result;
-  const auto log_time = static_cast<std::int64_t>(entry.input.tick) * kNanosecondsPerTick;
+  const auto log_time = static_cast<std::int64_t>(entry.input.tick) * kJournalTick;
   const auto put = [&](std::uint16_t channel, const auto& part) {
     const auto data = wire::encode(part);
     const auto done = data ? writer_.write(channel, log_time, part.part, *data) : fail(data.error().what);
@@ -188,8 +181,16 @@ Result<JournalOrigin> readJournalOrigin(const std::filesystem::path& file) {
   auto reader = record::McapReader::open(file);
   if (!reader) return fail(reader.error().what);
   for (const auto& [name, values] : reader->metadata())
-    if (name == kMetadata && values.contains("scenario") && values.contains("detail"))
-      return JournalOrigin{values.at("scenario"), std::strtod(values.at("detail").c_str(), nullptr), {}};
+    if (name == kMetadata && values.contains("scenario") && values.contains("detail")) {
+      JournalOrigin origin{values.at("scenario"), std::strtod(values.at("detail").c_str(), nullptr), {}, {}};
+      const auto limit = [&values](std::string_view key, Tick& ticks) {
+        if (const auto found = values.find(std::string(key)); found != values.end())
+          ticks = std::strtoull(found->second.c_str(), nullptr, 10);
+      };
+      limit(kFreeze, origin.limits.freeze);
+      limit(kPark, origin.limits.park);
+      return origin;
+    }
   return fail(fmt::format("{}: does not name its scenario; {}", file.string(), nameTheScenario(file)));
 }
 

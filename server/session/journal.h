@@ -14,7 +14,8 @@
 
 namespace tenon::session {
 
-inline constexpr Tick kCheckpointEvery = 1000;  // [ticks]
+inline constexpr Tick kCheckpointEvery = 1000;           // [ticks]
+inline constexpr std::int64_t kJournalTick = 1'000'000;  // [ns] of log time
 
 /// Whether the journal entry of this tick has a checkpoint.
 [[nodiscard]] constexpr bool hasCheckpoint(Tick tick) { return tick % kCheckpointEvery == 1; }
@@ -50,22 +51,30 @@ struct JournalOrigin {
   std::string scenario;     ///< path
   double detail = 1.0;      ///< [-] LoadOptions::detail
   Fingerprint fingerprint;  ///< empty when readJournalOrigin made it: see readFingerprint
+  LinkLimits limits;
 };
 
 /// The server's own recording on its local disk, an MCAP file: every TickInput with the state hash after it,
-/// and a checkpoint every kCheckpointEvery ticks.
+/// and a checkpoint every kCheckpointEvery ticks. Log time is tick times kJournalTick. A journal without an
+/// outcome is that of a server that was killed, which readResumePoint takes up.
 ///
 /// Threads: one (journal). Real-time: no.
 class Journal {
  public:
   /// Overwrites `file`. Fails when it cannot be written.
   [[nodiscard]] static Result<Journal> open(const std::filesystem::path& file, const JournalOrigin& origin);
+  /// Continues the journal of a killed server after its last complete chunk, from where on the life
+  /// `server_epoch` of the server follows with the tick after `tick`. Fails as McapWriter::reopen.
+  [[nodiscard]] static Result<Journal> reopen(const std::filesystem::path& file, Tick tick,
+                                              std::uint32_t server_epoch);
   [[nodiscard]] Result<void> write(const JournalEntry& entry);
+  /// What was written survives the end of this process.
+  [[nodiscard]] Result<void> keep() { return writer_.endChunk(); }
   /// Writes the outcome and the file's summary.
   [[nodiscard]] Result<void> close(const RunState& run);
 
  private:
-  explicit Journal(record::McapWriter writer) : writer_(std::move(writer)) {}
+  explicit Journal(record::McapWriter writer);
 
   record::McapWriter writer_;
   std::uint16_t input_channel_ = 0;
@@ -73,11 +82,17 @@ class Journal {
   std::vector<std::uint8_t> bytes_;
 };
 
+/// Ticks that a journal or recording does not have.
+struct JournalGap {
+  Tick first = 0, last = 0;
+  Tick compared_after = 0;  ///< of the checkpoint from which on ticks are compared again; 0: there is none
+};
+
 /// Result of a re-simulation.
 struct ResimulationReport {
   Tick first = 0, last = 0;  ///< ticks compared
   std::uint64_t compared = 0;
-  std::uint64_t gaps = 0;  ///< ranges of missing ticks, after each of which the next checkpoint was restored
+  std::vector<JournalGap> gaps;  ///< after the first tick that was compared
   std::uint64_t final_hash = 0;
   std::optional<Tick> first_difference;  ///< first tick whose hash differs
   std::string problem;                   ///< damage found in the file, or empty

@@ -195,6 +195,11 @@ void ServerWire::keepStops() {
         fmt::format("the emergency stop would not outlive a crash of the server: {}", kept.error().what));
 }
 
+void ServerWire::keepSeats() {
+  if (options_.seat_file.empty()) return;
+  if (auto kept = writeSeats(options_.seat_file, registry_.seatsToKeep()); !kept) refuse(kept.error().what);
+}
+
 Result<void> ServerWire::openWriters() {
   if (auto opened = openAll(writers_->inLobby(), lobby_); !opened) return opened;
   return openAll(writers_->inSession(), session_);
@@ -356,6 +361,7 @@ void ServerWire::handle(const Join& join, const wire::Origin& from) {
   if (!is_new) return;
   for (const HandId hand : welcome.hands)
     if (hand.valid()) newest_seq_[hand.value] = 0;
+  if (welcome.accepted) keepSeats();
   const char* how = is_known ? "has rejoined" : "has joined";
   log(welcome.accepted ? Severity::kInfo : Severity::kWarning, "join",
       welcome.accepted ? fmt::format("{} ({}) {}", join.name, roleName(join.role), how)
@@ -363,6 +369,8 @@ void ServerWire::handle(const Join& join, const wire::Origin& from) {
 }
 
 void ServerWire::handle(const DeviceInput& input, const wire::Origin& from) {
+  // of a station that is on its way back from an earlier life of the server
+  if (input.server_epoch != options_.server_epoch && !registry_.ownsSeat(input.client, from)) return;
   if (!isGenuine(input.client, from, "device input")) return;
   const Presence* sender = registry_.findClient(input.client);
   if (sender != nullptr && !sender->alive && input.server_epoch == options_.server_epoch)

@@ -33,6 +33,7 @@ struct WireOptions {
   std::optional<wire::SharedKey> key;  ///< of the session; none: nobody can be admin or instructor
   std::string scene_hash;              ///< asset that lists the display models; empty: none
   std::filesystem::path stop_file;     ///< keeps the raises of the emergency stop; empty: only in memory
+  std::filesystem::path seat_file;     ///< keeps the seats for a resume; empty: nothing does
 };
 
 /// All DDS endpoints of a session's server, bound to its registry and input buffer.
@@ -75,6 +76,8 @@ class ServerWire {
   /// Only to matched readers, and only with `publish_journal`.
   void send(const JournalEntry& entry);
 
+  /// Publishes an entry of the log.
+  void log(Severity severity, const std::string& kind, const std::string& text);
   /// Removes a client from the session, notifies it, and logs "Ada (trainee) <why>".
   void dismiss(ClientId client, const std::string& why);
   /// The newest DeviceSample::seq received for a hand; 0: none yet.
@@ -101,6 +104,7 @@ class ServerWire {
   void noticeLapse();
   Result<void> restoreStops();
   void keepStops();
+  void keepSeats();
   Result<void> openWriters();
   Result<void> openReaders();
   void sendScene(const LoadedScene& loaded);
@@ -116,7 +120,6 @@ class ServerWire {
   void clearEmergencyStop(ClientId client, const std::string& reason);
   void refuse(const std::string& why);
   void forwardChanges();
-  void log(Severity severity, const std::string& kind, const std::string& text);
 
   WireOptions options_;
   std::shared_ptr<wire::Participant> participant_;

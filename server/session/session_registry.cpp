@@ -39,6 +39,23 @@ SessionRegistry::SessionRegistry(const game_control::ScenarioFile& scenario, std
       lockstep_(lockstep),
       controllers_(scenario.hands.size()) {}
 
+void SessionRegistry::resume(const std::vector<KeptSeat>& seats, std::size_t deferred) {
+  changes_.push_back({.kind = ChangeKind::kContinue});
+  deferred_commands_ = deferred;
+  for (const KeptSeat& kept : seats) {
+    clients_.push_back({kept.client, kept.name, kept.role, {}, false});
+    Seat& seat = seats_.emplace_back();
+    seat.key = kept.key;
+  }
+}
+
+std::vector<KeptSeat> SessionRegistry::seatsToKeep() const {
+  std::vector<KeptSeat> kept;
+  for (std::size_t i = 0; i < seats_.size(); ++i)
+    kept.push_back({clients_[i].client, clients_[i].role, seats_[i].key, clients_[i].name});
+  return kept;
+}
+
 const Presence* SessionRegistry::findClient(ClientId client) const {
   const bool known = client.value >= 1 && client.value <= clients_.size();
   return known ? &clients_[client.value - 1] : nullptr;
@@ -200,6 +217,14 @@ void SessionRegistry::engageEmergencyStop() {
   changes_.push_back({.kind = ChangeKind::kSetEmergencyStop, .value = 1.0});
 }
 
+void SessionRegistry::clearEmergencyStop() {
+  // nothing moves by itself when the stop is cleared: `resume` goes on
+  emergency_stop_ = false;
+  changes_.push_back({.kind = ChangeKind::kPause});
+  if (expectedPhase() == RunPhase::kRunning) pending_phase_ = RunPhase::kPaused;
+  changes_.push_back({.kind = ChangeKind::kSetEmergencyStop, .value = 0.0});
+}
+
 bool SessionRegistry::isController(ClientId client, HandId hand) const {
   return hand.value < controllers_.size() && client.valid() && controllers_[hand.value] == client;
 }
@@ -287,10 +312,8 @@ CommandAck SessionRegistry::decide(const Command& command, Role role) {
   if (change->kind == ChangeKind::kPause) pending_phase_ = RunPhase::kPaused;
   if (change->kind == ChangeKind::kResume) pending_phase_ = RunPhase::kRunning;
   if (change->kind == ChangeKind::kSetEmergencyStop) {
-    // nothing moves by itself when the stop is cleared: `resume` goes on
-    emergency_stop_ = false;
-    changes_.push_back({.kind = ChangeKind::kPause});
-    if (expectedPhase() == RunPhase::kRunning) pending_phase_ = RunPhase::kPaused;
+    clearEmergencyStop();
+    return ack;
   }
   stop_requested_ = stop_requested_ || change->kind == ChangeKind::kStop;
   changes_.push_back(*change);

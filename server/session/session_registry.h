@@ -14,6 +14,7 @@
 #include "idl/wire/endpoint.h"
 #include "server/game_control/scenario.h"
 #include "server/session/rights.h"
+#include "server/session/seat_list.h"
 #include "server/session/tick_io.h"
 
 namespace tenon::session {
@@ -35,6 +36,11 @@ class SessionRegistry {
  public:
   /// `scenario` must outlive this.
   SessionRegistry(const game_control::ScenarioFile& scenario, std::uint32_t server_epoch, bool lockstep);
+
+  /// Takes the place of the registry of a killed server, before anybody joins: seats are as they were, with
+  /// nobody on them, and no client controls a hand. `deferred`: SessionSimulation::deferredCommands.
+  void resume(const std::vector<KeptSeat>& seats, std::size_t deferred);
+  [[nodiscard]] std::vector<KeptSeat> seatsToKeep() const;
 
   /// Gives a seat to the client and binds it to the participant `from`, or refuses with a reason; who has the
   /// seat or a hand keeps it in that case. A repeated request (same client_guid and participant) gets the
@@ -60,6 +66,9 @@ class SessionRegistry {
   void leave(ClientId client);
   /// A raise stands.
   void engageEmergencyStop();
+  [[nodiscard]] bool isStopEngaged() const { return emergency_stop_; }
+  /// The last raise that stood was cleared: the simulation leaves the stop, paused.
+  void clearEmergencyStop();
 
   /// The newest sample of `input` as tick input. Fails, with a sentence for the event log, when the client
   /// does not control this hand, the server epoch is another one, or the numbers are implausible (not finite,

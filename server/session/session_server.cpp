@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <chrono>
 #include <optional>
-#include <thread>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "idl/threads/cyclic_thread.h"
 #include "idl/types/names.h"
+#include "server/session/journal_writer.h"
+#include "server/session/resume.h"
+#include "server/session/seat_list.h"
 #include "server/session/server_wire.h"
 #include "server/session/session_lock.h"
 #include "server/simulation/governor.h"
@@ -19,6 +22,8 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr auto kFarewell = std::chrono::seconds(10);  // at most, for the last samples to reach all clients
+// for the hands of a resumed session, at most; those who come later get theirs then
+constexpr auto kReturn = milliseconds(1500);
 constexpr auto kInputTimeout = std::chrono::seconds(30);  // in lockstep, for the input of a client
 
 std::optional<Role> roleNamed(std::string_view name) {
@@ -82,6 +87,8 @@ class Server final : public SessionServer {
     auto lock = SessionLock::take(options_.domain, options_.name);
     if (!lock) return fail(lock.error().what);
     lock_.emplace(std::move(*lock));
+    if (options_.resume)
+      if (auto resumed = resume(loaded); !resumed) return resumed;
     auto wire = ServerWire::open({.session = options_.name,
                                   .domain = options_.domain,
                                   .lockstep = options_.lockstep,
@@ -89,35 +96,50 @@ class Server final : public SessionServer {
                                   .server_epoch = epoch_,
                                   .key = options_.key,
                                   .scene_hash = options_.scene_hash,
-                                  .stop_file = options_.stop_file},
+                                  .stop_file = options_.stop_file,
+                                  .seat_file = options_.journal.empty() ? "" : seatFileOf(options_.journal)},
                                  loaded, registry_, input_buffer_, publisher_);
     if (!wire) return fail(wire.error().what);
     wire_ = std::move(*wire);
     wire_->print = options_.print;
-    if (options_.journal.empty()) return {};
-    auto journal = Journal::open(options_.journal,
-                                 {loaded.scenario->path.string(), options_.detail, fingerprintOf(loaded)});
+    if (options_.journal.empty()) {
+      if (options_.publish_journal) makeJournalWriter(std::nullopt);
+      return {};
+    }
+    // as the last step: what fails before it leaves the journal of a killed server as it was
+    auto journal = options_.resume
+                       ? Journal::reopen(options_.journal, simulation_.now(), epoch_)
+                       : Journal::open(options_.journal, {loaded.scenario->path.string(), options_.detail,
+                                                          fingerprintOf(loaded), options_.simulation.limits});
     if (!journal) return fail(journal.error().what);
-    journal_.emplace(std::move(*journal));
+    makeJournalWriter(std::move(*journal));
     return {};
   }
 
   Result<SessionReport> run(const std::atomic<bool>& stop) override {
-    print(fmt::format("session '{}' is open, waiting for people", options_.name));
-    while (!stop && !registry_.stopRequested() && !wire_->replaced() && !start_condition_.isMet(registry_))
-      wire_->dispatch(milliseconds(100));
-    if (journal_ || options_.publish_journal) fillCheckpointPool();
-    if (!stop && !wire_->replaced()) options_.lockstep ? runLockstep(stop) : runRealTime(stop);
+    if (journal_) journal_->reserve(simulation_.maxSavedBytes());
+    if (options_.resume) {
+      awaitReturn(stop);
+    } else {
+      print(fmt::format("session '{}' is open, waiting for people", options_.name));
+      while (!stop && !registry_.stopRequested() && !wire_->replaced() && !start_condition_.isMet(registry_))
+        wire_->dispatch(milliseconds(100));
+    }
+    const bool runs = !stop && !wire_->replaced() && !simulation_.over();
+    if (runs) options_.lockstep ? runLockstep(stop) : runRealTime(stop);
     return finish();
   }
 
  private:
+  Result<void> resume(const LoadedScene& loaded);
+  void awaitReturn(const std::atomic<bool>& stop);
   void runLockstep(const std::atomic<bool>& stop);
   void runRealTime(const std::atomic<bool>& stop);
   bool awaitInputs(const std::atomic<bool>& stop);
   void realTimeTick() noexcept;
   Result<SessionReport> finish();
-  void writeJournal(const JournalEntry& entry);
+  void makeJournalWriter(std::optional<Journal> journal);
+  void noticeJournal();
   void print(const std::string& text) const {
     if (options_.print) options_.print(text);
   }
@@ -149,34 +171,6 @@ class Server final : public SessionServer {
     if (budget) new_budget_ = static_cast<double>(*budget);
   }
 
-  void fillEntry(const TickInput& input, std::uint64_t hash, JournalEntry& entry) {
-    entry.input = input;
-    entry.hash = hash;
-    entry.checkpoint.clear();
-    if (hasCheckpoint(input.tick) && acquireCheckpointBuffer(entry)) simulation_.save(entry.checkpoint);
-  }
-
-  void fillCheckpointPool() {
-    while (std::vector<std::uint8_t>* buffer = checkpoint_pool_.beginPush()) {
-      buffer->reserve(simulation_.maxSavedBytes());
-      checkpoint_pool_.commitPush();
-    }
-  }
-  /// Swaps a preallocated buffer into `entry`; false when the journal thread is seconds behind and has all.
-  bool acquireCheckpointBuffer(JournalEntry& entry) {
-    std::vector<std::uint8_t>* buffer = checkpoint_pool_.front();
-    if (buffer == nullptr) return false;
-    entry.checkpoint.swap(*buffer);
-    entry.checkpoint.clear();
-    checkpoint_pool_.pop();
-    return true;
-  }
-  void releaseCheckpointBuffer(JournalEntry& entry) {
-    if (entry.checkpoint.empty()) return;
-    checkpoint_pool_.beginPush()->swap(entry.checkpoint);
-    checkpoint_pool_.commitPush();
-  }
-
   SessionOptions options_;
   StartCondition start_condition_;
   SessionSimulation simulation_;
@@ -188,30 +182,67 @@ class Server final : public SessionServer {
   std::optional<double> new_budget_;  ///< [points] for the next tick's input
   std::optional<SessionLock> lock_;
   std::unique_ptr<ServerWire> wire_;
-  std::optional<Journal> journal_;
-  std::optional<std::string> journal_problem_;
+  std::vector<HandId> returning_;  ///< controlled when the server was killed that this one resumes
+  std::optional<JournalWriter> journal_;
+  bool journal_ended_ = false;      ///< before the session, as was said
+  std::uint64_t lost_entries_ = 0;  ///< of the journal, as was said
+  std::uint64_t lost_copies_ = 0;   ///< likewise, of recorders
   std::uint64_t late_ticks_ = 0;
   // real time
   threads::SpscQueue<TickOutput> outputs_{64};
-  threads::SpscQueue<JournalEntry> entries_{1024};
-  /// empty checkpoint buffers, from the journal thread to the tick
-  threads::SpscQueue<std::vector<std::uint8_t>> checkpoint_pool_{2};
   TickInput input_;
   TickOutput overflow_output_;  ///< of a tick for which outputs_ is full: not sent
 };
 
+/// Takes up the session of a killed server, before the wire is open.
+Result<void> Server::resume(const LoadedScene& loaded) {
+  const auto point = readResumePoint(options_.journal, loaded, simulation_);
+  if (!point) return fail(point.error().what);
+  if (!point->problem.empty()) print(point->problem);
+  auto seats = readSeats(seatFileOf(options_.journal));
+  if (!seats) print(seats.error().what);
+  for (std::uint32_t i = 0; i < loaded.scenario->hands.size(); ++i)
+    if (simulation_.isAttached(HandId{i})) returning_.push_back(HandId{i});
+  registry_.resume(seats ? *seats : std::vector<KeptSeat>{}, simulation_.deferredCommands());
+  publisher_.eventGenerator().resume(point->tick);
+  return {};
+}
+
+/// Waits for the clients that controlled hands when the server was killed.
+void Server::awaitReturn(const std::atomic<bool>& stop) {
+  TickOutput output = simulation_.makeOutput();
+  simulation_.fill(output);
+  wire_->update(output);
+  // raised or cleared, it is as the stop file has it, which is written before the simulation hears of it
+  if (simulation_.emergencyStop() && !registry_.isStopEngaged()) registry_.clearEmergencyStop();
+  print(fmt::format("session '{}' is open again after tick {}", options_.name, simulation_.now()));
+  wire_->log(Severity::kWarning, "resumed",
+             fmt::format("a new server goes on with the session after {:.3f} s",
+                         static_cast<double>(simulation_.now()) * kTickSeconds));
+  const auto isBack = [this](HandId hand) { return registry_.controllerOf(hand).valid(); };
+  const auto until = std::chrono::steady_clock::now() + kReturn;
+  while (!stop && !wire_->replaced() && std::chrono::steady_clock::now() < until &&
+         !std::all_of(returning_.begin(), returning_.end(), isBack))
+    wire_->dispatch(milliseconds(20));
+  for (const HandId hand : returning_)
+    if (!isBack(hand))
+      wire_->log(Severity::kWarning, "hand gone",
+                 fmt::format("hand '{}' is not back yet: what it held is parked",
+                             simulation_.scenario().hands[hand.value].name));
+}
+
 void Server::runLockstep(const std::atomic<bool>& stop) {
   TickInput input;
-  JournalEntry entry;
   TickOutput output = simulation_.makeOutput();
   while (!stop && !wire_->replaced() && !simulation_.over()) {
     if (!awaitInputs(stop)) break;
     tick(input, output);
     wire_->update(output);
     wire_->send(publisher_.prepare(output));
-    fillEntry(input, output.hash, entry);
-    writeJournal(entry);
-    releaseCheckpointBuffer(entry);
+    if (!journal_) continue;
+    journal_->add(input, output.hash, simulation_);
+    journal_->writeNow();
+    noticeJournal();
   }
 }
 
@@ -243,12 +274,7 @@ void Server::realTimeTick() noexcept {
   tick(input_, output != nullptr ? *output : overflow_output_);
   const std::uint64_t hash = output != nullptr ? output->hash : overflow_output_.hash;
   if (output != nullptr) outputs_.commitPush();
-  if (journal_ || options_.publish_journal) {
-    if (JournalEntry* entry = entries_.beginPush()) {
-      fillEntry(input_, hash, *entry);
-      entries_.commitPush();
-    }
-  }
+  if (journal_) journal_->add(input_, hash, simulation_);
   wire_->wake();
 }
 
@@ -269,18 +295,7 @@ void Server::runRealTime(const std::atomic<bool>& stop) {
         realTimeTick();
         if (simulation_.over()) over = true;
       });
-  std::thread journal_thread([&] {
-    while (true) {
-      const bool last_pass = over;  // no further entries will come
-      for (JournalEntry* entry = entries_.front(); entry != nullptr; entry = entries_.front()) {
-        writeJournal(*entry);
-        releaseCheckpointBuffer(*entry);
-        entries_.pop();
-      }
-      if (last_pass) return;
-      std::this_thread::sleep_for(milliseconds(20));
-    }
-  });
+  if (journal_) journal_->start();
   if (const std::string missing = threads::lockMemory(); !missing.empty()) print(missing);
   ticker.start();
   if (!ticker.notGranted().empty()) print(ticker.notGranted());
@@ -292,11 +307,12 @@ void Server::runRealTime(const std::atomic<bool>& stop) {
       wire_->send(publisher_.prepare(*output));
       outputs_.pop();
     }
+    noticeJournal();
   }
   ticker.stop();
   late_ticks_ = ticker.lateTicks();
   over = true;
-  journal_thread.join();
+  if (journal_) journal_->stop();
   for (TickOutput* output = outputs_.front(); output != nullptr; output = outputs_.front()) {
     wire_->update(*output);
     wire_->send(publisher_.prepare(*output));
@@ -304,13 +320,27 @@ void Server::runRealTime(const std::atomic<bool>& stop) {
   }
 }
 
-void Server::writeJournal(const JournalEntry& entry) {
-  wire_->send(entry);
-  if (!journal_ || journal_problem_) return;
-  if (auto written = journal_->write(entry); !written) {
-    journal_problem_ = written.error().what;
-    print(fmt::format("the journal stops here, the session goes on: {}", *journal_problem_));
-  }
+void Server::makeJournalWriter(std::optional<Journal> journal) {
+  JournalWriter::Publish publish;
+  if (options_.publish_journal)
+    publish = [wire = wire_.get()](const JournalEntry& entry) { wire->send(entry); };
+  journal_.emplace(std::move(journal), std::move(publish));
+}
+
+/// Says what the journal or recorders miss.
+void Server::noticeJournal() {
+  if (!journal_) return;
+  if (const auto why = journal_->problem(); why && !std::exchange(journal_ended_, true))
+    wire_->log(Severity::kError, "journal",
+               fmt::format("the journal ends here, the session goes on without it: {}", *why));
+  if (const std::uint64_t lost = journal_->lostEntries(); lost > lost_entries_)
+    wire_->log(Severity::kError, "journal",
+               fmt::format("{} ticks are missing in the journal: the disk is too slow",
+                           lost - std::exchange(lost_entries_, lost)));
+  if (const std::uint64_t lost = journal_->lostCopies(); lost > lost_copies_)
+    wire_->log(Severity::kWarning, "journal",
+               fmt::format("{} ticks are missing in recordings: a recorder is too slow",
+                           lost - std::exchange(lost_copies_, lost)));
 }
 
 Result<SessionReport> Server::finish() {
@@ -319,15 +349,22 @@ Result<SessionReport> Server::finish() {
   report.run.tick = simulation_.now();
   report.run.final_hash = simulation_.hash();
   report.run.server_epoch = epoch_;
-  report.run.reason = simulation_.over() ? publisher_.eventGenerator().runReason() : "stopped";
+  const std::string& reason = publisher_.eventGenerator().runReason();
+  // empty: no tick of this life has said the end of a session that had ended when its server was killed
+  report.run.reason = !simulation_.over() ? "stopped"
+                      : reason.empty()    ? "had ended before the resume"
+                                          : reason;
   report.run.steps_skipped = simulation_.step().skipped;
   report.run.steps_timed_out = simulation_.step().timed_out;
-  if (!simulation_.over()) wire_->send(report.run);
+  if (!simulation_.over() || reason.empty()) wire_->send(report.run);
   report.late_ticks = late_ticks_;
   report.refused_inputs = wire_->refusedInputs();
   report.dropped_outputs = outputs_.dropped();
-  if (journal_)
-    if (auto closed = journal_->close(report.run); !closed) return fail(closed.error().what);
+  if (journal_) {
+    // a session that is over is over, whatever became of its journal
+    if (auto closed = journal_->close(report.run); !closed) report.journal_problem = closed.error().what;
+    report.lost_journal_ticks = journal_->lostEntries();
+  }
   if (wire_->replaced()) return fail(*wire_->replaced());
 
   wire_->statePublished();

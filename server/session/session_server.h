@@ -24,6 +24,7 @@ struct SessionOptions {
   /// all hands of traineeHands.
   std::vector<std::string> wait_for;
   std::filesystem::path journal;  ///< empty: no journal file
+  bool resume = false;            ///< take up the session of `journal`, whose server was killed
   /// Of the session, for admins and instructors; none: nobody can be one.
   std::optional<wire::SharedKey> key;
   std::filesystem::path stop_file;  ///< keeps an emergency stop over a crash; empty: nothing does
@@ -46,6 +47,8 @@ struct SessionReport {
   std::uint64_t refused_inputs = 0;
   /// ticks whose output was not sent: the queue to the wire thread was full
   std::uint64_t dropped_outputs = 0;
+  std::uint64_t lost_journal_ticks = 0;  ///< missing in the journal: its disk was too slow
+  std::string journal_problem;           ///< why the journal ended before the session; or empty
 };
 
 /// The server of one training session: announces it over DDS, accepts clients, runs ticks in real time or in
@@ -57,14 +60,16 @@ struct SessionReport {
 class SessionServer {
  public:
   /// Opens all DDS endpoints and the journal. Fails when one cannot be opened, when a session of this name is
-  /// served already, or when `wait_for` names what is neither a hand of the scenario nor a role.
+  /// served already, when `wait_for` names what is neither a hand of the scenario nor a role, or when the
+  /// journal that is to be resumed cannot (readResumePoint); then nothing in it is changed.
   [[nodiscard]] static Result<std::unique_ptr<SessionServer>> open(const LoadedScene& loaded,
                                                                    SessionOptions options);
   virtual ~SessionServer() = default;
 
-  /// Waits for `wait_for`, then runs until the run is over or `stop` is set. Once only. Fails when the
-  /// journal cannot be closed, and when another server has taken the place of this one while it was stopped;
-  /// when writing it fails, `print` reports that and the session continues without it.
+  /// Waits for `wait_for`, then runs until the run is over or `stop` is set. Once only. A resumed session
+  /// waits for the clients that controlled hands, for 1.5 s at most; the object of a hand that is not back is
+  /// parked. Fails when another server has taken the place of this one while it was stopped; when the journal
+  /// cannot be written, the log says that and the session continues without it.
   [[nodiscard]] virtual Result<SessionReport> run(const std::atomic<bool>& stop) = 0;
 };
 

@@ -80,6 +80,9 @@ void SessionSimulation::apply(const Change& change) noexcept {
       return environment_.setBudget(budgetPoints(change.value));
     case ChangeKind::kTake:
       return;  // when the readings of the tick are applied
+    case ChangeKind::kContinue:
+      for (std::uint32_t i = 0; i < ages_.size(); ++i) detach(HandId{i});
+      return;
   }
 }
 

@@ -43,6 +43,11 @@ class SessionSimulation {
 
   [[nodiscard]] Tick now() const { return environment_.tick(); }
   [[nodiscard]] RunPhase phase() const { return phase_; }
+  [[nodiscard]] bool emergencyStop() const { return emergency_stop_; }
+  /// Whether a client controls the hand.
+  [[nodiscard]] bool isAttached(HandId hand) const { return ages_[hand.value].attached; }
+  /// Game commands that wait for the end of a pause or an emergency stop.
+  [[nodiscard]] std::size_t deferredCommands() const { return isSuspended() ? commands_.size() : 0; }
   /// Succeeded, failed or stopped.
   [[nodiscard]] bool over() const { return phase_ >= RunPhase::kSucceeded; }
   /// Of environment, state machine, input ages, phase, emergency stop and deferred commands.

@@ -39,6 +39,7 @@ enum class ChangeKind : std::uint8_t {
   kStop,              ///< the run ends
   kBudget,            ///< from now on a tick may test `value` [points]; 0 or NaN: no limit
   kTake,  ///< `hand` holds `object` with the hand's frame at the object's, which is moved to the hand's pose
+  kContinue,  ///< the first of a new life of the server (readResumePoint): no client controls a hand
 };
 
 /// An input of a tick other than device samples: decided outside the tick, applied at its start.

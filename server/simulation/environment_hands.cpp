@@ -13,6 +13,9 @@ bool isPose(const Pose& X) {
   return std::abs(X.rotation().squaredNorm() - 1.0) < kUnitTolerance;
 }
 
+/// [m] Between a hand that comes back and the place where it held its object.
+constexpr double kGraspReach = 5e-3;
+
 Pose normalized(const Pose& X) { return {X.translation(), X.rotation().normalized()}; }
 
 bool isFinite(const Twist& V) { return V.linear.allFinite() && V.angular.allFinite(); }
@@ -46,7 +49,13 @@ void Environment::setHandPose(HandId hand, const Pose& X_WH, const Twist& V_WH) 
   motion.V_WH = V_WH;
   if (!motion.present) return;
   motion.has_pose = true;
-  if (!motion.attached && isObject(motion.object)) attachHand(hand);
+  if (motion.attached || !isObject(motion.object)) return;
+  // what was taken away from its hand is held again where it was held, not from wherever the hand comes back
+  const bool was_held = motion.object != motion.default_object && !(motion.X_HO.translation().isZero(0.0)) &&
+                        objects_[motion.object.value].status == ObjectStatus::kParked;
+  const Vector3 p_WG = (objects_[motion.object.value].X_WO * motion.X_HO.inverse()).translation();
+  if (was_held && (motion.X_WH.translation() - p_WG).norm() > kGraspReach) return;
+  attachHand(hand);
 }
 
 void Environment::setHandFrozen(HandId hand, bool frozen) noexcept {

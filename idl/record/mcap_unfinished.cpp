@@ -1,0 +1,174 @@
+#include "idl/record/mcap_unfinished.h"
+
+#include <set>
+#include <span>
+#include <string>
+
+#include "idl/record/mcap_chunk.h"
+
+namespace tenon::record::mcap {
+namespace {
+
+using Records = std::span<const std::uint8_t>;
+
+/// A chunk, and what of the summary comes before it.
+struct Found {
+  ChunkIndex index;
+  Records fields;
+  std::uint32_t metadata = 0, attachments = 0;           ///< before it
+  std::size_t metadata_index = 0, attachment_index = 0;  ///< [bytes] likewise
+  std::map<std::uint16_t, std::uint64_t> counts;         ///< its messages by channel
+};
+
+/// Follows the records of a file in their order.
+class Scan {
+ public:
+  explicit Scan(Records bytes) : bytes_(bytes) {}
+
+  void run() {
+    Records rest = bytes_.subspan(sizeof(kMagic)), fields;
+    std::uint8_t opcode = 0;
+    while (offset_ = bytes_.size() - rest.size(), takeRecord(rest, opcode, fields)) {
+      length_ = bytes_.size() - rest.size() - offset_;
+      read(opcode, fields);
+    }
+  }
+
+  std::vector<Found> chunks;
+  Summary summary;  ///< metadata and attachments
+  bool closed = false;
+
+ private:
+  void read(std::uint8_t opcode, Records fields) {
+    FieldReader in(fields);
+    if (opcode == kChunk) return readChunk(in);
+    if (opcode == kMessageIndex && !chunks.empty()) return readIndex(in);
+    if (opcode == kMetadata) return summary.addMetadata(in.text(), offset_, length_);
+    if (opcode == kAttachment) return readAttachment(in);
+    if (opcode == kDataEnd) closed = true;
+  }
+  void readChunk(FieldReader in) {
+    Found& chunk = chunks.emplace_back();
+    chunk.fields = in.rest;
+    chunk.index.first_time = in.get<std::int64_t>();
+    chunk.index.last_time = in.get<std::int64_t>();
+    chunk.index.plain = in.get<std::uint64_t>();
+    in.get<std::uint32_t>();
+    chunk.index.compression = in.text();
+    chunk.index.compressed = in.get<std::uint64_t>();
+    chunk.index.offset = offset_;
+    chunk.index.length = length_;
+    chunk.metadata = summary.metadata;
+    chunk.metadata_index = summary.metadata_index.bytes.size();
+    chunk.attachments = summary.attachments;
+    chunk.attachment_index = summary.attachment_index.bytes.size();
+  }
+  void readIndex(FieldReader in) {
+    Found& chunk = chunks.back();
+    const auto channel = in.get<std::uint16_t>();
+    constexpr std::uint32_t kEntry = 16;  // [bytes]
+    chunk.counts[channel] += in.get<std::uint32_t>() / kEntry;
+    chunk.index.message_indices[channel] = offset_;
+    chunk.index.indices_length += length_;
+  }
+  void readAttachment(FieldReader in) {
+    FieldWriter entry;
+    entry.put(offset_);
+    entry.put(length_);
+    entry.put(in.get<std::int64_t>());
+    entry.put(in.get<std::int64_t>());
+    const std::string_view name = in.text(), media_type = in.text();
+    entry.put(in.get<std::uint64_t>());
+    entry.put(name);
+    entry.put(media_type);
+    append(summary.attachment_index, kAttachmentIndex, entry);
+    ++summary.attachments;
+  }
+
+  Records bytes_;
+  std::uint64_t offset_ = 0, length_ = 0;  ///< [bytes] of the record that is read
+};
+
+/// Schemas and channels that a chunk defines.
+void define(Records chunk, Summary& summary, std::set<std::uint16_t>& missing) {
+  Records fields;
+  std::uint8_t opcode = 0;
+  while (takeRecord(chunk, opcode, fields)) {
+    if (opcode != kSchema && opcode != kChannel) continue;
+    FieldReader in(fields);
+    const auto id = in.get<std::uint16_t>();
+    FieldWriter record;
+    record.putBytes(fields);
+    if (opcode == kSchema && summary.schema_ids.try_emplace(std::string(in.text()), id).second)
+      append(summary.schemas, kSchema, record);
+    if (opcode != kChannel || summary.counts.contains(id)) continue;
+    in.get<std::uint16_t>();
+    summary.channel_ids[std::string(in.text())] = id;
+    summary.counts[id] = 0;
+    append(summary.channels, kChannel, record);
+    missing.erase(id);
+  }
+}
+
+void indexMessages(Unfinished& file) {
+  const Records all(file.last_chunk);
+  Records rest = all, fields;
+  std::uint8_t opcode = 0;
+  while (true) {
+    const std::size_t at = all.size() - rest.size();
+    if (!takeRecord(rest, opcode, fields)) return;
+    if (opcode != kMessage) continue;
+    FieldReader in(fields);
+    const auto channel = in.get<std::uint16_t>();
+    in.get<std::uint32_t>();
+    file.last_index[channel].emplace_back(in.get<std::uint64_t>(), at);
+    ++file.summary.counts[channel];
+    ++file.summary.messages;
+  }
+}
+
+}  // namespace
+
+Result<Unfinished> readUnfinished(const std::filesystem::path& file) {
+  MappedFile mapped;
+  const auto bytes = mapped.map(file);
+  if (!bytes) return fail(bytes.error().what);
+  if (!beginsWithMagic(*bytes)) return fail(file.string() + ": is not a recording (no MCAP file)");
+  Scan scan(*bytes);
+  scan.run();
+  if (scan.closed) return fail(file.string() + ": is complete, there is nothing to continue");
+
+  Unfinished result;
+  std::vector<Found>& chunks = scan.chunks;
+  while (!chunks.empty() && !openChunk(chunks.back().fields, result.last_chunk).empty()) chunks.pop_back();
+  if (chunks.empty()) return fail(file.string() + ": has no complete chunk, there is nothing to continue");
+  const Found last = std::move(chunks.back());
+  chunks.pop_back();
+  result.end = last.index.offset;
+
+  Summary& summary = result.summary;
+  summary.metadata_index.putBytes(Records(scan.summary.metadata_index.bytes).first(last.metadata_index));
+  summary.metadata = last.metadata;
+  summary.attachment_index.putBytes(Records(scan.summary.attachment_index.bytes).first(last.attachment_index));
+  summary.attachments = last.attachments;
+  std::set<std::uint16_t> missing;
+  for (const Found& chunk : chunks)
+    for (const auto& [channel, count] : chunk.counts) missing.insert(channel);
+  std::vector<std::uint8_t> plain;
+  for (auto chunk = chunks.begin(); chunk != chunks.end() && !missing.empty(); ++chunk)
+    if (openChunk(chunk->fields, plain).empty()) define(plain, summary, missing);
+  define(result.last_chunk, summary, missing);
+  if (!missing.empty())
+    return fail(file.string() + ": is damaged, the chunk that defines its channels cannot be read");
+  for (Found& chunk : chunks) {
+    for (const auto& [channel, count] : chunk.counts) {
+      summary.counts[channel] += count;
+      summary.messages += count;
+    }
+    summary.add(std::move(chunk.index), !chunk.counts.empty());
+  }
+  indexMessages(result);
+  return result;
+}
+
+}  // namespace tenon::record::mcap

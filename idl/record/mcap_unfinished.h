@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "idl/record/mcap_summary.h"
+#include "idl/types/result.h"
+
+namespace tenon::record::mcap {
+
+/// The content of a file whose program was killed while it wrote it.
+struct Unfinished {
+  Summary summary;                       ///< of what is before `end`
+  std::uint64_t end = 0;                 ///< [bytes] where the last complete chunk begins
+  std::vector<std::uint8_t> last_chunk;  ///< its records
+  /// Its messages by channel: log time [ns] and place in last_chunk [bytes].
+  std::map<std::uint16_t, std::vector<std::pair<std::uint64_t, std::uint64_t>>> last_index;
+};
+
+/// Reads the heads of its records; of its chunks the last one alone, and as many from the first as define the
+/// channels. Fails when it is no MCAP file, was closed, or has no complete chunk.
+[[nodiscard]] Result<Unfinished> readUnfinished(const std::filesystem::path& file);
+
+}  // namespace tenon::record::mcap

@@ -1,0 +1,126 @@
+#include "server/session/journal_writer.h"
+
+#include <chrono>
+#include <utility>
+
+namespace tenon::session {
+namespace {
+
+// what a server that is killed loses at most
+constexpr auto kPass = std::chrono::milliseconds(20);
+constexpr auto kLastCopies = std::chrono::seconds(5);  // after the last tick, for a slow recorder
+
+}  // namespace
+
+JournalWriter::JournalWriter(std::optional<Journal> journal, Publish publish)
+    : journal_(std::move(journal)), publish_(std::move(publish)) {}
+
+void JournalWriter::reserve(std::size_t checkpoint_bytes) {
+  while (std::vector<std::uint8_t>* buffer = buffers_.beginPush()) {
+    buffer->reserve(checkpoint_bytes);
+    buffers_.commitPush();
+  }
+}
+
+/// Swaps a reserved buffer into `entry`; false when the file is seconds behind and has all.
+bool JournalWriter::acquireBuffer(JournalEntry& entry) noexcept {
+  std::vector<std::uint8_t>* const buffer = buffers_.front();
+  if (buffer == nullptr) return false;
+  entry.checkpoint.swap(*buffer);
+  buffers_.pop();
+  return true;
+}
+
+void JournalWriter::add(const TickInput& input, std::uint64_t hash,
+                        const SessionSimulation& simulation) noexcept {
+  JournalEntry* const entry = entries_.beginPush();
+  if (entry == nullptr) return;
+  entry->input = input;
+  entry->hash = hash;
+  // the first tick of a life too, so that none depends on what was lost before
+  if ((hasCheckpoint(input.tick) || !has_checkpoint_) && acquireBuffer(*entry)) {
+    entry->checkpoint.clear();
+    simulation.save(entry->checkpoint);
+    has_checkpoint_ = true;
+  }
+  entries_.commitPush();
+}
+
+void JournalWriter::keepProblem(const Result<void>& done) {
+  if (done) return;
+  const std::lock_guard lock(mutex_);
+  if (!problem_) problem_ = done.error().what;
+}
+
+std::optional<std::string> JournalWriter::problem() const {
+  const std::lock_guard lock(mutex_);
+  return problem_;
+}
+
+void JournalWriter::writePending(bool inline_copies) {
+  const bool writes = journal_ && !problem();
+  std::vector<JournalEntry> done;
+  for (JournalEntry* entry = entries_.front(); entry != nullptr; entry = entries_.front()) {
+    if (writes) keepProblem(journal_->write(*entry));
+    if (publish_) done.push_back(*entry);
+    if (!entry->checkpoint.empty()) {
+      buffers_.beginPush()->swap(entry->checkpoint);
+      buffers_.commitPush();
+      entry->checkpoint.clear();
+    }
+    entries_.pop();
+  }
+  if (writes) keepProblem(journal_->keep());
+  for (JournalEntry& entry : done) {
+    if (inline_copies) {
+      publish_(entry);
+    } else {
+      static_cast<void>(copies_.push(std::move(entry)));
+    }
+  }
+}
+
+void JournalWriter::writeNow() { writePending(true); }
+
+void JournalWriter::start() {
+  file_thread_ = std::thread([this] {
+    while (true) {
+      const bool last_pass = ending_;  // no further entries will come
+      writePending(false);
+      if (last_pass) break;
+      std::this_thread::sleep_for(kPass);
+    }
+    written_ = true;
+  });
+  if (!publish_) return;
+  copy_thread_ = std::thread([this] {
+    std::optional<std::chrono::steady_clock::time_point> until;
+    while (true) {
+      const bool last_pass = written_;
+      for (JournalEntry* entry = copies_.front(); entry != nullptr; entry = copies_.front()) {
+        publish_(*entry);
+        copies_.pop();
+        if (!written_) continue;
+        if (!until) until = std::chrono::steady_clock::now() + kLastCopies;
+        if (std::chrono::steady_clock::now() > *until) return;
+      }
+      if (last_pass) return;
+      std::this_thread::sleep_for(kPass);
+    }
+  });
+}
+
+void JournalWriter::stop() {
+  ending_ = true;
+  if (file_thread_.joinable()) file_thread_.join();
+  written_ = true;
+  if (copy_thread_.joinable()) copy_thread_.join();
+}
+
+Result<void> JournalWriter::close(const RunState& run) {
+  if (!journal_) return {};
+  if (const auto why = problem()) return fail(*why);
+  return journal_->close(run);
+}
+
+}  // namespace tenon::session

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "idl/threads/spsc_queue.h"
+#include "server/session/journal.h"
+
+namespace tenon::session {
+
+/// Takes what each tick consumed from the tick to the journal's file, and then copies of it to recorders.
+///
+/// The file comes first: an entry is with the operating system before its copy is given away, and no reader
+/// of the copies delays it. What does not fit into a queue is dropped and counted: an entry, when the disk is
+/// seconds behind, so that the file has a gap; a copy, when a recorder is, so that its recording has one.
+/// When the file cannot be written any more it ends there, and copies go on.
+///
+/// Threads: add from one (tick); start, stop and close from another; writes and copies have threads of their
+/// own between start and stop. The numbers from any. Real-time: add.
+class JournalWriter {
+ public:
+  using Publish = std::function<void(const JournalEntry&)>;
+
+  /// `journal`: none, where only copies are wanted. `publish` gives a copy to recorders, may be empty.
+  JournalWriter(std::optional<Journal> journal, Publish publish);
+  ~JournalWriter() { stop(); }
+  JournalWriter(const JournalWriter&) = delete;
+  JournalWriter& operator=(const JournalWriter&) = delete;
+
+  /// Before the first add: checkpoints have up to so many bytes.
+  void reserve(std::size_t checkpoint_bytes);
+  /// The state after `input` is that of `simulation`, with this hash.
+  void add(const TickInput& input, std::uint64_t hash, const SessionSimulation& simulation) noexcept;
+  void start();
+  /// Returns when all entries are written and their copies given away, or the reader is hopelessly behind.
+  void stop();
+  /// Without start (lockstep): writes what was added and gives the copies away, here.
+  void writeNow();
+  /// Writes the outcome of the run. Fails when the file has ended before.
+  [[nodiscard]] Result<void> close(const RunState& run);
+
+  /// Why the file has ended before the session; none while it is written.
+  [[nodiscard]] std::optional<std::string> problem() const;
+  [[nodiscard]] std::uint64_t lostEntries() const { return entries_.dropped(); }
+  [[nodiscard]] std::uint64_t lostCopies() const { return copies_.dropped(); }
+
+ private:
+  bool acquireBuffer(JournalEntry& entry) noexcept;
+  void writePending(bool inline_copies);
+  void keepProblem(const Result<void>& done);
+
+  std::optional<Journal> journal_;
+  Publish publish_;
+  threads::SpscQueue<JournalEntry> entries_{1024};
+  threads::SpscQueue<JournalEntry> copies_{1024};
+  /// empty checkpoint buffers, back to the tick
+  threads::SpscQueue<std::vector<std::uint8_t>> buffers_{2};
+  bool has_checkpoint_ = false;  ///< one was added
+  std::atomic<bool> ending_ = false, written_ = false;
+  std::thread file_thread_, copy_thread_;
+  mutable std::mutex mutex_;  ///< of problem_
+  std::optional<std::string> problem_;
+};
+
+}  // namespace tenon::session

@@ -1,0 +1,194 @@
+"""A server that is killed and resumed, through real processes: the session ends as if nothing had happened, and its journal re-simulates."""
+import os
+import re
+import signal
+import subprocess
+import time
+import types
+import unittest
+
+from safety_test import hand_states
+from stage import COARSE, PROGRAMS, SOURCE, TENON, Stage, tenon
+
+PEG = SOURCE / "scenarios" / "peg_and_box"
+
+
+def begin(stage, *arguments):
+    """A server with a journal."""
+    server = stage.serve("peg_and_box", "--journal", stage.out / "journal.mcap", *arguments)
+    return server
+
+
+def kill(server):
+    server.signal(signal.SIGKILL)
+    server.popen.wait()
+
+
+def resume(stage):
+    """Resumes the session; the server, and the seconds [s] until its hands had their chance to be back."""
+    began = time.monotonic()
+    server = stage.start("serve", PEG, "--resume", stage.out / "journal.mcap")
+    server.wait_for("is open again after tick", 30)
+    return server, time.monotonic() - began
+
+
+def resimulated(stage, file="journal.mcap"):
+    return tenon("resimulate", stage.out / file, PEG, *COARSE, timeout=300)
+
+
+class KilledServer(unittest.TestCase):
+    def assertResimulates(self, stage, server):
+        again = resimulated(stage)
+        self.assertEqual(again.returncode, 0, again.stdout + again.stderr)
+        self.assertIn(" 0 gaps", again.stdout)
+        final = re.search("final state hash: .*", server.text()).group()
+        self.assertIn(final, again.stdout)
+
+    def test_a_session_that_is_killed_twice_in_contact_ends_with_everything_mounted(self):
+        with Stage(lockstep=False) as stage:
+            server = begin(stage, "--wait-for", "right")
+            recorder = stage.start("record", "-o", stage.out / "session.mcap", "--wait", 20)
+            observer = stage.start("observer", "--json", "--wait", 20)
+            trainee = stage.start("trainee", "--seed", 1, "--wait", 60)
+            instructor = stage.start("instructor", "--wait", 60)
+            server.wait_for("step done: take_peg", 120)
+            for _ in range(2):
+                self.wait_for_contact(observer)
+                kill(server)
+                server, _ = resume(stage)
+                trainee.wait_for("rejoined as client", 30)
+                server.wait_for("taken: .*right hand", 30)
+                time.sleep(2)
+            self.assertEqual(server.wait(120), 0, server.text())
+            self.assertIn("everything is mounted", server.text())
+            for process in (trainee, instructor, observer, recorder):
+                self.assertEqual(process.wait(60), 0, f"{process.name}: {process.text()}")
+            self.assertEqual(len(re.findall("recording the resumed session after tick", recorder.text())), 2)
+            clients = re.findall(r"joined as client (\d+)", trainee.text())
+            self.assertEqual(set(clients), {clients[0]}, "the same seat in each life")
+            self.assertResimulates(stage, server)
+            self.judge(stage)
+
+    def wait_for_contact(self, observer):
+        """Until the part in the hand touches something, from now on."""
+        seen = len(observer.lines)
+        for _ in range(600):
+            if any('"contact"' in line and '"colliding":true' in line for line in observer.lines[seen:]):
+                return
+            time.sleep(0.1)
+        self.fail("no contact came about")
+
+    def judge(self, stage):
+        """When the contacts are back, the force of a hand grows from zero by at most 20 N/s for 0.9 s."""
+        returns = 0
+        for states in hand_states(stage.out / "session.mcap").values():
+            for (_, _, before, age), (seq, _, force, age_now), k in zip(states, states[1:], range(2, len(states))):
+                if not (age > 500 and age_now < 50):
+                    continue
+                returns += 1
+                self.assertEqual(before, 0.0, f"step {seq}: the contacts were old")
+                last_seq, last = seq - 10, 0.0
+                for s, peak, force, _ in states[k - 1:]:
+                    if s > seq + 900:
+                        break
+                    self.assertLessEqual(peak - last, 20.0 * 0.002 * (s - last_seq) + 0.02, f"step {s}")
+                    last_seq, last = s, force
+        self.assertGreater(returns, 0, "no hand came back")
+
+    def test_an_emergency_stop_stands_after_the_resume_until_it_is_cleared(self):
+        with Stage(lockstep=False) as stage:
+            server = begin(stage, "--wait-for", "right")
+            trainee = stage.start("trainee", "--seed", 1, "--wait", 60)
+            server.wait_for("run: running", 120)
+            time.sleep(1)
+            command = stage.start("command", "emergency", "hand in the way")
+            self.assertEqual(command.wait(60), 0, command.text())
+            server.wait_for("run: emergency stop", 30)
+            kill(server)
+            server, _ = resume(stage)
+            trainee.wait_for("rejoined as client", 30)
+            server.wait_for("run: emergency stop", 30)
+            for words in (["clear", "all well"], ["resume"]):
+                command = stage.start("command", *words)
+                self.assertEqual(command.wait(60), 0, command.text())
+            server.wait_for("run: running", 30)
+            self.assertEqual(server.wait(120), 0, server.text())
+            self.assertEqual(trainee.wait(60), 0, trainee.text())
+            self.assertResimulates(stage, server)
+
+    def test_who_is_not_back_is_parked_and_gets_the_seat_later(self):
+        with Stage(lockstep=False) as stage:
+            server = begin(stage, "--wait-for", "right")
+            seat = ["--seat", stage.out / "seat"]
+            trainee = stage.start("trainee", "--seed", 1, "--wait", 60, *seat)
+            server.wait_for("taken: Peg|taken: .*right", 120)
+            time.sleep(2)
+            kill(server)
+            kill(trainee)
+            server, _ = resume(stage)
+            server.wait_for("hand 'right' is not back yet", 30)
+            back = stage.start("trainee", "--seed", 2, "--wait", 60, *seat)
+            back.wait_for("joined as client 1", 60)
+            self.assertEqual(server.wait(120), 0, server.text())
+            self.assertEqual(back.wait(60), 0, back.text())
+            self.assertResimulates(stage, server)
+
+
+class Service(unittest.TestCase):
+    def test_the_unit_s_program_goes_on_with_a_killed_session_and_begins_a_new_one_after_its_end(self):
+        with Stage(lockstep=False) as stage:
+            def start():
+                """The server, once people can join it, and the number of journals."""
+                server = subprocess.Popen([SOURCE / "deploy" / "systemd" / "serve_or_resume", PEG, "--domain", str(stage.domain), *coarse],
+                                          stdout=subprocess.PIPE, text=True, env=environment)
+                stage.processes.append(types.SimpleNamespace(popen=server, signal=server.send_signal))
+                lines = iter(server.stdout.readline, "")
+                said = next(line for line in lines if "is open" in line)
+                return server, said, sorted(file.name for file in stage.out.glob("*.mcap"))
+
+            environment = {**os.environ, "STATE_DIRECTORY": str(stage.out), "TENON": str(TENON), "TENON_PROGRAMS": str(PROGRAMS)}
+            coarse = COARSE
+            server, said, first = start()
+            self.assertIn("waiting for people", said)
+            server.kill()
+            server.wait()
+            coarse = []  # the journal's
+            server, said, second = start()
+            self.assertIn("is open again", said)
+            self.assertEqual(second, first, "the same file is continued")
+            server.terminate()
+            server.wait(60)
+            time.sleep(1)  # the names are times
+            coarse = COARSE
+            _, said, third = start()
+            self.assertIn("waiting for people", said)
+            self.assertEqual(len(third), 2)
+
+
+class Refusals(unittest.TestCase):
+    def test_what_cannot_be_resumed_is_refused_with_the_file_and_what_to_do(self):
+        with Stage() as stage:
+            file = stage.out / "journal.mcap"
+            server = begin(stage, "--wait-for", "right")
+            trainee = stage.start("trainee", "--seed", 1, "--wait", 60)
+            self.assertEqual(server.wait(300), 0, server.text())
+            trainee.wait(60)
+
+            def refused(*arguments, code=1):
+                answer = tenon("serve", *arguments, "--domain", stage.domain, *COARSE, timeout=120)
+                self.assertEqual(answer.returncode, code, answer.stdout + answer.stderr)
+                return answer.stderr
+
+            self.assertRegex(refused(PEG, "--resume", file), "journal.mcap: the session has ended.*--journal")
+            self.assertRegex(refused(PEG, "--journal", file), "journal.mcap.*--overwrite")
+            self.assertRegex(refused(PEG, "--resume", stage.out / "no.mcap"), "no.mcap")
+            self.assertIn("--resume", refused(PEG, "--resume", file, "--journal", file, code=2))
+            whole = file.read_bytes()
+            file.write_bytes(whole[:len(whole) * 2 // 3])
+            self.assertRegex(refused(SOURCE / "scenarios" / "stacking", "--resume", file), "another scenario.*peg_and_box")
+            file.write_bytes(whole[:900])
+            self.assertRegex(refused(PEG, "--resume", file), "journal.mcap: ")
+
+
+if __name__ == "__main__":
+    unittest.main()
