@@ -35,11 +35,17 @@ export interface StepProgress {
   revision: number; tick: bigint; position_error: number; angle_error: number; contact_seconds: number;
   conditions: { text: string; value: number; limit: number; met: boolean }[];
 }
+export interface SceneStep { step: number; steps: number; name: string; title: Localized[]; part: string }
+export interface SceneHand { hand_id: number; name: string; role: number; object_id: number }
 export enum RunPhase { Waiting, Running, Paused, Succeeded, Failed, Stopped }
 export interface RunState { phase: RunPhase; tick: bigint; reason: string }
 export interface GrabState { object_id: number; hand_id: number; epoch: number; X_HO: Pose; tick: bigint }
 export interface Presence { client_id: number; name: string; role: number; hands: ArrayLike<number>; alive: boolean }
 export interface EmergencyStop { client_guid: string; counter: number; who: string; reason: string }
+export interface EmergencyClear { client_guid: string; counter: number; who: string; reason: string }
+export interface RecorderStatus { file: string; recording: boolean; messages: bigint; lost: bigint; problem: string }
+export interface Telemetry { client_id: number; input_to_force_p50: number; input_to_force_p99: number; loop_overruns: bigint; samples: bigint }
+export interface SessionAnnounce { session: string; title: string; host: string; lockstep: boolean; protocol_version: number; scene_hash: string }
 export interface EventLog { seq: bigint; tick: bigint; severity: number; kind: string; text: string }
 export interface InstanceGone { topic: string; key_sample: Uint8Array }
 /** Of the channel /console: how the gateway stands to its session. */
