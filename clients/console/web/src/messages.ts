@@ -15,7 +15,7 @@ export interface ObjectState {
 }
 export interface WorldFrame { part: number; parts: number; tick: bigint; step_revision: number; states: ObjectState[] }
 export interface ObjectSnapshot { object_id: number; tick: bigint; state: ObjectState }
-export interface HandState { hand_id: number; seq: number; X_WH: Pose; F_Ho_W: Wrench; safety_flags: number; indexing: boolean }
+export interface HandState { hand_id: number; seq: number; X_WH: Pose; F_Ho_W: Wrench; manifold_age: number; safety_flags: number; indexing: boolean }
 export interface PairContact {
   a: number; b: number; enabled: boolean; colliding: boolean; contacts: number; F_Ao_W: Wrench; p_WP: Vector; depth: number; gap: number;
   load_percent: number; peak_force: number; peak_depth: number;
@@ -50,9 +50,13 @@ export interface EventLog { seq: bigint; tick: bigint; severity: number; kind: s
 export interface InstanceGone { topic: string; key_sample: Uint8Array }
 /** Of the channel /console: how the gateway stands to its session. */
 export interface ConsoleState {
-  state: "searching" | "joined" | "refused" | "lost" | "ended";
+  state: "searching" | "joined" | "refused" | "lost" | "ended" | "recorded";
   reason: string; life: number; session: string; title: string; lockstep: boolean; scene: string; protocol: number;
 }
 /** A level of an object's display model; the list of a scene's assets. */
 export interface ModelLevel { model: string; triangles: number; error: number }
 export interface SceneModels { version: number; objects: ModelLevel[][] }
+/** Of the channel /lobby: the sessions of the bus. */
+export interface LobbyState { sessions: { session: string; title: string; host: string; lockstep: boolean; protocol: number }[] }
+/** What this gateway shows: a session, a recording, or, with neither, all sessions. */
+export interface Gateway { session: string; recording: string; role: string; protocol: number }

@@ -1,4 +1,5 @@
 // What stands around the scene: instruction, steps, people, events, status. Each part is made anew from the session when it changed.
+import { devicesOf } from "./desk";
 import { h, icon, type Icon } from "./dom";
 import { NONE, RunPhase, StepPhase, type EventLog } from "./messages";
 import type { Session, StepEntry } from "./session";
@@ -34,6 +35,10 @@ function badge([key, name, tone]: [Key, Icon, string]): HTMLElement {
 /** A name as people read it. */
 export function titleOfStep(step: { name: string; title: StepEntry["title"] }): string {
   return localized(step.title) || step.name.replace(/_/g, " ");
+}
+
+export function phase(session: Session): HTMLElement | undefined {
+  return session.run === undefined ? undefined : badge(RUN[session.run.phase]);
 }
 
 export function instruction(session: Session): Node[] {
@@ -105,7 +110,9 @@ export function people(session: Session): Node[] {
     const hands = Array.from(person.hands);
     const held = [...session.grabs.values()].filter((grab) => grab.hand_id !== NONE && hands.includes(grab.hand_id) && !session.isOwn(grab.object_id));
     const what = held.map((grab) => session.titleOf(grab.object_id)).join(", ");
-    return h("li", "", icon("person"), h("span", "name", person.name), h("span", "muted", t(`role.${person.role}` as Key)), h("span", "holds", what === "" ? "" : t("holds", { what })));
+    const devices = devicesOf(session, hands);
+    const head = h("div", "", h("span", "name", person.name), h("span", "muted", t(`role.${person.role}` as Key)), h("span", "holds", what === "" ? "" : t("holds", { what })));
+    return h("li", "", icon("person"), head, ...(devices === "" ? [] : [h("small", "muted", devices)]));
   });
   return [h("ul", "people", ...rows)];
 }
@@ -145,6 +152,11 @@ export function status(session: Session, age: number): Node[] {
     items.push(item("status.compute", `${ms.toFixed(2)} ms`, ms > 1 && session.link?.lockstep !== true ? "warn" : ""), item("status.load", `${stats.load_percent.toFixed(0)} %`), item("status.late", String(stats.late_ticks)));
   }
   items.push(item("status.contacts", String(touching)));
+  const { recorder } = session;
+  if (recorder !== undefined) {
+    const text = recorder.recording ? t("recorder.on", { count: String(recorder.messages) }) : recorder.problem || t("recorder.off");
+    items.push(h("span", `stat ${recorder.problem === "" ? "" : "bad"}`, icon(recorder.recording ? "live" : "over"), text));
+  }
   if (age > 0.5 && session.link?.state === "joined" && !session.isOver) items.push(h("span", "stat warn", icon("warn"), t("status.stale", { seconds: age.toFixed(1) })));
   return items;
 }

@@ -49,9 +49,14 @@ export class Session {
 
   /** Another session begins. */
   reset(): void {
-    const link = this.link;
-    Object.assign(this, new Session());
-    this.link = link;
+    const { link, moved, changed } = this;
+    Object.assign(this, new Session(), { link, moved: moved + 1, changed: changed + 1 });
+  }
+
+  /** As at the beginning: what comes is of another source. */
+  forget(): void {
+    this.link = undefined;
+    this.reset();
   }
 
   receive(topic: string, message: unknown, isGone: boolean): void {
@@ -170,6 +175,17 @@ export class Session {
     if (history.times.length > HISTORY) {
       history.times.shift();
       history.forces.shift();
+    }
+    ++this.moved;
+  }
+
+  /** Puts forces of before what is known of each hand. */
+  recall(hands: Map<number, { times: number[]; forces: number[] }>): void {
+    for (const [id, before] of hands) {
+      const known = this.history.get(id) ?? { times: [], forces: [], peak: 0 };
+      const count = before.times.filter((time) => time < (known.times[0] ?? Infinity)).length;
+      const forces = [...before.forces.slice(0, count), ...known.forces];
+      this.history.set(id, { times: [...before.times.slice(0, count), ...known.times], forces, peak: Math.max(...forces, known.peak) });
     }
     ++this.moved;
   }
