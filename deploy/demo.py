@@ -7,6 +7,7 @@ import itertools
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -18,7 +19,8 @@ from demo_scene import hands_of, shipped_as
 
 # what it writes into its folder
 OUTPUTS = ("session.mcap", "journal.mcap", "report.html", "summary.json", "scene.png", "serve.log", "record.log", "observer.log",
-           "trainee.log", "instructor.log")
+           "trainee.log", "instructor.log", "console.log")
+CONSOLE_PORT = 8080
 
 
 def between(kind, low, high):
@@ -47,7 +49,8 @@ def arguments():
     parser.add_argument("--seed", type=between(int, 0, 2**64 - 1), default=1, help="of the simulated people's skills and errors (default: %(default)s)")
     parser.add_argument("--detail", type=between(float, 0, 1), default=1.0, help="mesh resolution of the scene, 0 to 1; 1: that of the paper, 1.8 million triangles (default: %(default)s)")
     parser.add_argument("--lockstep", action="store_true", help="ticks wait for each other instead of the clock: repeatable to the last bit")
-    parser.add_argument("--headless", action="store_true", help="do not open the report in a browser at the end")
+    parser.add_argument("--headless", action="store_true", help="open nothing in a browser: neither the console at the start nor the report at the end")
+    parser.add_argument("--no-console", action="store_true", help="do not serve the session to browsers")
     parser.add_argument("--workers", type=between(int, 1, 64), default=1, help="threads of the server that compute contacts (default: %(default)s)")
     parser.add_argument("--no-instructor", action="store_true", help="nobody corrects the misplaced mount: its step runs out of time")
     parser.add_argument("--device", default="sigma7-sim", help="the instructor's device (default: %(default)s)")
@@ -138,7 +141,7 @@ class Programs:
         """Starts tenon-<name>, or a station of the role; its output goes to its log."""
         program = ["join", "--role", name] if name in ("trainee", "instructor") else [name]
         words = [self.folder / f"tenon-{program[0]}", *program[1:], *map(str, words), "--session", "demo", "--domain", str(self.args.domain)]
-        if self.args.lockstep and name != "observer":
+        if self.args.lockstep and name not in ("observer", "console"):
             words.append("--lockstep")
         self.started[name] = Program(name, words, self.out / f"{name}.log")
         return self.started[name]
@@ -156,7 +159,8 @@ class Programs:
                     pass
 
     def failed(self):
-        return [program for program in self.started.values() if program.name != "serve" and program.has_failed()]
+        """Programs without which the session cannot go on, and that have failed."""
+        return [program for program in self.started.values() if program.name not in ("serve", "console") and program.has_failed()]
 
 
 def say(text):
@@ -188,6 +192,49 @@ def is_open(server):
     return False
 
 
+def port_for_console():
+    """The console's usual port; 0, any, when another program has it."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", CONSOLE_PORT))
+            return CONSOLE_PORT
+        except OSError:
+            return 0
+
+
+def open_in_browser(address):
+    try:
+        run("xdg-open", address, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    except FileNotFoundError:
+        pass  # a machine without a desktop: the address was said
+
+
+def has_desktop():
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def start_console(args, programs):
+    """Serves the session to browsers, says where, and opens it where there is a desktop. The demo goes on without it."""
+    if not (programs.folder / "tenon-console").exists():
+        return
+    console = programs.start("console", "--port", port_for_console(), "--role", "instructor")
+    said = []
+
+    def has_said_where():
+        said.extend(console.new_lines())
+        return any(line.startswith("console:") for line in said) or not console.is_running()
+
+    wait_until(has_said_where, 20)
+    for line in said:
+        say(line)
+    address = next((re.search(r"http\S+", line)[0] for line in reversed(said) if "http" in line), None)
+    if address is None:
+        say(f"the session cannot be seen in a browser: {console.last_line()}")
+    elif not args.headless and has_desktop():
+        open_in_browser(address)
+
+
 def session_result(server):
     """How the session ended, in the server's words; None when the server ended without saying it."""
     return next((line for line in server.lines() if re.search(r" after [0-9.]+ s; late ticks: ", line)), None)
@@ -202,6 +249,8 @@ def run_session(args, out, programs):
     has_instructor = not args.no_instructor and "instructor" in hands.values()
     awaited = [*(name for name, role in hands.items() if role == "trainee"), "recorder", "observer"]
 
+    if not args.no_console:
+        start_console(args, programs)
     server = programs.start("serve", scenario, "--detail", args.detail, "--workers", args.workers, "--journal", out / "journal.mcap",
                             "--wait-for", ",".join(awaited + (["instructor"] if has_instructor else [])))
     opened = False
@@ -227,7 +276,7 @@ def run_session(args, out, programs):
             say(f"{program.name} has ended, so the session is stopped: {program.last_line()}")
         return 1
     outcome = server.process.returncode
-    others = [program for program in programs.started.values() if program is not server]
+    others = [program for program in programs.started.values() if program.name not in ("serve", "console")]
     wait_until(lambda: not any(program.is_running() for program in others), 20, show)
     show()
     for program in others:
@@ -247,10 +296,7 @@ def run_session(args, out, programs):
     report = run(programs.folder / "tenon-report", recording, "-o", out)
     say(f"\nrecording: {recording}\nreport:    {out / 'report.html'}")
     if not args.headless:
-        try:
-            run("xdg-open", out / "report.html", stderr=subprocess.DEVNULL)
-        except FileNotFoundError:
-            pass  # a machine without a desktop: the report's path was said
+        open_in_browser(out / "report.html")
     if args.lockstep:
         hashes = [line for line in server.lines() if "final state hash" in line]
         say(hashes[-1] if hashes else "final state hash: unknown")

@@ -30,11 +30,6 @@ std::string reasonOf(const ParsedCommand& command) {
   return command.text.empty() ? "requested" : command.text;
 }
 
-std::string withoutServer(const StopHeard& heard) {
-  return "sent to " + std::to_string(heard.programs) +
-         " programs; no server has answered: it may hang or have ended";
-}
-
 }  // namespace
 
 Result<std::unique_ptr<CommandClient>> CommandClient::open(wire::MembershipOptions options,
@@ -87,7 +82,9 @@ Result<void> CommandClient::send(const ParsedCommand& command, const Stop& stop)
   if (!command.command) {
     const auto heard = raiser_->raise(reasonOf(command), kSoon, stop);
     if (!heard) return fail(heard.error().what);
-    return heard->by_server ? Result<void>() : fail(withoutServer(*heard));
+    if (heard->by_server) return {};
+    const auto outcome = outcomeOf(*heard, options_.domain, member_->sessionName());
+    return fail(outcome ? *outcome : outcome.error().what);
   }
   if (lost()) return fail(*lost());
   ack_.reset();
@@ -109,18 +106,12 @@ int emergencyOnce(const wire::MembershipOptions& options, const ParsedCommand& c
   auto raiser = StopRaiser::open(options.domain, options.session, options.person);
   const auto heard =
       raiser ? (*raiser)->raise(reasonOf(command), kForAServer, stop) : fail(raiser.error().what);
-  if (!heard) {
-    std::fprintf(stderr, "tenon command: %s\n", heard.error().what.c_str());
+  const auto outcome = heard ? outcomeOf(*heard, options.domain, options.session) : fail(heard.error().what);
+  if (!outcome) {
+    std::fprintf(stderr, "tenon command: %s\n", outcome.error().what.c_str());
     return 1;
   }
-  if (heard->programs == 0) {
-    std::fprintf(stderr,
-                 "tenon command: nobody has heard the emergency stop: no program of %s runs on domain %u\n",
-                 options.session.empty() ? "any session" : ("session '" + options.session + "'").c_str(),
-                 options.domain);
-    return 1;
-  }
-  std::printf("emergency: %s\n", heard->by_server ? "accepted" : withoutServer(*heard).c_str());
+  std::printf("emergency: %s\n", outcome->c_str());
   return 0;
 }
 

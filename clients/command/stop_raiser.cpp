@@ -14,6 +14,16 @@ constexpr milliseconds kLateReaders{300};  // although a server has answered, ot
 constexpr milliseconds kAcknowledged{500};
 }  // namespace
 
+Result<std::string> outcomeOf(const StopHeard& heard, std::uint32_t domain, const std::string& session) {
+  if (heard.by_server) return "accepted";
+  if (heard.programs == 0)
+    return fail("nobody has heard the emergency stop: no program of " +
+                (session.empty() ? "any session" : "session '" + session + "'") + " runs on domain " +
+                std::to_string(domain));
+  return "sent to " + std::to_string(heard.programs) +
+         " programs; no server has answered: it may hang or have ended";
+}
+
 Result<std::unique_ptr<StopRaiser>> StopRaiser::open(std::uint32_t domain, const std::string& session,
                                                      std::string person) {
   auto participant =

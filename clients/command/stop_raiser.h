@@ -19,6 +19,10 @@ struct StopHeard {
   bool by_server = false;    ///< a server has repeated it, and stops its simulation
 };
 
+/// What people are told of it: "accepted", or that no server has answered. Fails when nobody has heard it.
+[[nodiscard]] Result<std::string> outcomeOf(const StopHeard& heard, std::uint32_t domain,
+                                            const std::string& session);
+
 /// Raises the emergency stop, directly to every device of a session or of all sessions. It needs no seat, no
 /// key and no server.
 ///

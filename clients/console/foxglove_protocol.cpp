@@ -20,7 +20,50 @@ std::optional<std::uint32_t> number(const nlohmann::json& object, const char* ke
   return value <= 0xFFFFFFFFU ? std::optional(static_cast<std::uint32_t>(value)) : std::nullopt;
 }
 
+constexpr std::size_t kMaxWords = 8;
+
+/// Its text; empty when there is none.
+std::string text(const nlohmann::json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
+}
+
+Result<DeskRequest> parseDesk(const nlohmann::json& json, std::string_view op) {
+  DeskRequest request;
+  const auto id = number(json, "id");
+  if (!id || *id == 0) return fail("a request to the desk without a number 'id' from 1");
+  request.id = *id;
+  if (op == "deskSit") {
+    request.kind = DeskRequest::Kind::kSit;
+    request.role = text(json, "role");
+    request.name = text(json, "name");
+    request.key = text(json, "key");
+    return request;
+  }
+  if (op == "deskLeave") {
+    request.kind = DeskRequest::Kind::kLeave;
+    return request;
+  }
+  if (op != "deskCommand") return fail("'" + std::string(op.substr(0, 80)) + "' is not offered here");
+  const auto words = json.find("words");
+  if (words == json.end() || !words->is_array() || words->empty() || words->size() > kMaxWords)
+    return fail("'deskCommand' without a list 'words' of 1 to 8 texts");
+  for (const nlohmann::json& word : *words) {
+    if (!word.is_string()) return fail("a word of a command that is no text");
+    request.words.push_back(word.get<std::string>());
+  }
+  return request;
+}
+
 }  // namespace
+
+std::string deskAnswerText(const DeskAnswer& answer) {
+  return dump({{"op", "deskAnswer"},
+               {"id", answer.id},
+               {"accepted", answer.accepted},
+               {"text", answer.text},
+               {"role", answer.role}});
+}
 
 std::optional<std::string_view> chooseSubprotocol(std::string_view offered) {
   while (!offered.empty()) {
@@ -87,7 +130,12 @@ Result<ViewerRequest> parseViewerText(std::string_view text) {
     }
     return request;
   }
-  return fail("'" + op->get<std::string>().substr(0, 80) + "' is not offered here");
+  const std::string name = op->get<std::string>();
+  if (!name.starts_with("desk")) return fail("'" + name.substr(0, 80) + "' is not offered here");
+  auto desk = parseDesk(json, name);
+  if (!desk) return fail(desk.error().what);
+  request.desk = std::move(*desk);
+  return request;
 }
 
 MessageHeader messageHeader(SubscriptionId subscription, std::int64_t time_ns) {

@@ -12,7 +12,8 @@
 #include "idl/types/result.h"
 
 /// The Foxglove WebSocket protocol, version 1, server side: texts are JSON, messages binary and
-/// little-endian. Of its optional capabilities there are none.
+/// little-endian. Of its optional capabilities there are none. The operations that begin with `desk` are
+/// ours: public viewers neither send nor get them.
 ///
 /// Threads: pure. Real-time: no.
 namespace tenon::console {
@@ -30,8 +31,28 @@ enum class StatusLevel { kInfo, kWarning, kError };
 
 using SubscriptionId = std::uint32_t;  ///< chosen by the viewer
 
+/// What a viewer asks of the instructor's desk.
+struct DeskRequest {
+  enum class Kind { kSit, kLeave, kCommand };
+  Kind kind = Kind::kCommand;
+  std::uint32_t id = 0;            ///< chosen by the viewer, for the answer
+  std::string role;                ///< of kSit: a name of roleName()
+  std::string name;                ///< of kSit: for display
+  std::string key;                 ///< of kSit: the session's, or the pass of this gateway; may be empty
+  std::vector<std::string> words;  ///< of kCommand: as `tenon command` takes them
+};
+
+struct DeskAnswer {
+  std::uint32_t id = 0;  ///< of the request; 0: nobody asked
+  bool accepted = false;
+  std::string text;  ///< reason, or what came of it; may be empty when accepted
+  std::string role;  ///< that the viewer has now; empty: none
+};
+[[nodiscard]] std::string deskAnswerText(const DeskAnswer& answer);
+
 /// What a viewer asks for.
 struct ViewerRequest {
+  std::optional<DeskRequest> desk;
   std::vector<std::pair<SubscriptionId, ChannelId>> subscribe;
   std::vector<SubscriptionId> unsubscribe;
 };

@@ -1,22 +1,29 @@
 #include "clients/console/gateway.h"
 
 #include <chrono>
+#include <map>
+#include <mutex>
+#include <set>
 #include <thread>
+#include <utility>
 
-#include "clients/console/session_channels.h"
-#include "idl/wire/membership.h"
-#include "idl/wire/raw_subscriber.h"
+#include <nlohmann/json.hpp>
+
+#include "clients/console/desk.h"
+#include "clients/console/lobby.h"
+#include "clients/console/session_feed.h"
+#include "idl/types/names.h"
+#include "idl/wire/endpoint.h"
+#include "idl/wire/participant.h"
 
 namespace tenon::console {
 
 namespace fs = std::filesystem;
-using std::chrono::milliseconds;
 
 namespace {
 
-constexpr milliseconds kCollect{10};  // messages of this time go to viewers together
-constexpr milliseconds kPause{1000};  // before a session is looked for again
-constexpr std::chrono::seconds kSearch{5};
+constexpr std::chrono::milliseconds kPeriod{20};
+constexpr std::size_t kMaxSessions = 64;  // that are offered
 
 std::int64_t nowNanoseconds() {
   return std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
@@ -25,92 +32,134 @@ std::int64_t nowNanoseconds() {
 class Gateway {
  public:
   Gateway(const GatewayOptions& options, const std::atomic<bool>& stop)
-      : options_(options), stop_(stop), channels_(wire::AssetStore(options.cache / "assets")) {}
+      : options_(options),
+        stop_(stop),
+        pass_(options.role && options.recording.empty() ? makePass() : ""),
+        desk_({.domain = options.domain, .role = options.role, .pass = pass_, .key_file = options.key_file},
+              [this](ViewerId viewer, const DeskAnswer& answer) {
+                server_->answer(viewer, deskAnswerText(answer));
+              }) {}
+
+  ~Gateway() {
+    if (server_ != nullptr) server_->stop();
+  }
+  Gateway(const Gateway&) = delete;
+  Gateway& operator=(const Gateway&) = delete;
 
   Result<void> run() {
-    Site site(options_.page, wire::AssetStore(options_.cache / "assets"));
-    const bool has_page = site.hasPage();
-    auto opened = WebServer::open(options_.web, std::move(site), channels_.channels());
-    if (!opened) return fail(opened.error().what);
-    server_ = std::move(*opened);
-    server_->start();
-    options_.print("console: http://localhost:" + std::to_string(server_->port()) + "/");
-    if (!has_page)
-      options_.print(
-          "the console's page is not built, so this address serves public viewers only: "
-          "`deploy/setup console` installs what builds it");
-    auto participant = wire::Participant::open({.domain = options_.domain, .config = {}});
-    if (!participant) return fail(participant.error().what);
-    setState(LinkState::kSearching, {});
-    while (!stop_) {
-      serveOneSession();
-      for (auto waited = milliseconds(0); waited < kPause && !stop_; waited += kCollect)
-        std::this_thread::sleep_for(kCollect);
-    }
+    if (auto opened = openServer(); !opened) return opened;
+    if (options_.recording.empty()) return followSessions();
+    while (!stop_) std::this_thread::sleep_for(kPeriod);
     return {};
   }
 
  private:
-  void setState(LinkState state, const std::string& reason) {
-    const bool is_new = state != state_ || reason != reason_;
-    state_ = state;
-    reason_ = reason;
-    channels_.setState(state, reason, nowNanoseconds());
-    server_->publish(channels_.take());
-    if (is_new && !reason.empty()) options_.print(reason);
-  }
-  void serveOneSession();
-  void forward(wire::Membership& member, wire::RawSubscriber& subscriber, wire::Inbox& inbox);
+  Result<void> openServer();
+  Result<void> followSessions();
+  void enter(const std::string& room);
+  void offerFeed(const std::string& room, const std::string& session);
+  void startFeeds();
+  [[nodiscard]] std::string sessionOf(const std::string& room);
 
   const GatewayOptions& options_;
   const std::atomic<bool>& stop_;
-  SessionChannels channels_;
-  std::unique_ptr<WebServer> server_;
-  LinkState state_ = LinkState::kSearching;
-  std::string reason_;
+  std::string pass_;
+  std::mutex mutex_;
+  std::set<std::string> entered_;      ///< rooms with viewers whose feeds are to be started
+  std::unique_ptr<WebServer> server_;  // after feeds and desk, which publish and answer through it
+  std::map<std::string, std::unique_ptr<SessionFeed>> feeds_;  ///< by room
+  Desk desk_;
 };
 
-void Gateway::serveOneSession() {
-  auto found = wire::Membership::find({.session = options_.session,
-                                       .domain = options_.domain,
-                                       .person = "console",
-                                       .role = Role::kObserver,
-                                       .passive = true,
-                                       .timeout = kSearch},
-                                      stop_);
-  if (!found) {
-    // what was seen last stays on the screen, with what happened to it
-    if (state_ == LinkState::kSearching && !stop_) setState(LinkState::kSearching, found.error().what);
-    return;
-  }
-  wire::Membership& member = **found;
-  wire::Inbox inbox;
-  if (auto watched = member.watch(inbox); !watched)
-    return setState(LinkState::kRefused, watched.error().what);
-  auto subscriber = wire::RawSubscriber::open(member.session(), SessionChannels::topics());
-  if (!subscriber) return setState(LinkState::kRefused, subscriber.error().what);
-  if (auto joined = member.join(stop_); !joined) {
-    if (!stop_) setState(LinkState::kRefused, joined.error().what);
-    return;
-  }
-  channels_.begin(member.announce(), nowNanoseconds());
-  setState(LinkState::kJoined, "joined session '" + member.sessionName() + "'");
-  forward(member, *subscriber, inbox);
+Result<void> Gateway::openServer() {
+  const wire::AssetStore assets(options_.cache / "assets");
+  Site site(options_.page, assets);
+  const bool has_page = site.hasPage();
+  const nlohmann::json described{{"session", options_.session},
+                                 {"recording", options_.recording.filename().string()},
+                                 {"role", options_.role ? roleName(*options_.role) : ""},
+                                 {"protocol", kProtocolVersion}};
+  site.describe(described.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  if (!options_.recording.empty())
+    if (auto served = site.serveRecording(options_.recording); !served) return served;
+  const auto handle = [this](ViewerId viewer, const std::string& room, const DeskRequest& request) {
+    desk_.handle(viewer, sessionOf(room), request);
+  };
+  auto opened = WebServer::open(options_.web, std::move(site),
+                                {[this](const std::string& room) { enter(room); },
+                                 [this](ViewerId viewer) { desk_.left(viewer); }, handle});
+  if (!opened) return fail(opened.error().what);
+  server_ = std::move(*opened);
+  server_->addRoom(std::string(kLobbyRoom), Lobby::channels());
+  if (options_.recording.empty()) offerFeed(std::string(kFirstRoom), options_.session);
+  server_->start();
+  const std::string address = "http://localhost:" + std::to_string(server_->port()) + "/";
+  options_.print("console: " + address);
+  if (!pass_.empty())
+    options_.print("the same as " + std::string(roleName(*options_.role)) + ", for you alone: " + address +
+                   "#pass=" + pass_);
+  if (!has_page)
+    options_.print(
+        "the console's page is not built, so this address serves public viewers only: "
+        "`deploy/setup console` installs what builds it");
+  return {};
 }
 
-void Gateway::forward(wire::Membership& member, wire::RawSubscriber& subscriber, wire::Inbox& inbox) {
-  const auto receive = [this](const wire::RawSample& sample) { channels_.receive(sample); };
-  while (!stop_ && !member.serverIsGone() && !member.lost()) {
-    subscriber.dispatch(kCollect, receive);
-    inbox.dispatch(milliseconds(0));
-    server_->publish(channels_.take());
+Result<void> Gateway::followSessions() {
+  auto participant = wire::Participant::open({.domain = options_.domain, .config = {}});
+  if (!participant) return fail(participant.error().what);
+  if (!options_.session.empty()) {
+    desk_.expect(options_.session);
+    enter(std::string(kFirstRoom));
   }
-  if (stop_) return;
-  subscriber.dispatch(milliseconds(0), receive);  // its last words
-  server_->publish(channels_.take());
-  if (channels_.isOver())
-    return setState(LinkState::kEnded, "session '" + member.sessionName() + "' has ended");
-  setState(LinkState::kLost, member.lost().value_or("session '" + member.sessionName() + "' is gone"));
+  wire::Partition partition(*participant, wire::kLobby);
+  Lobby lobby;
+  wire::Inbox inbox;
+  auto watched = inbox.on<SessionAnnounce>(partition, wire::kSessionAnnounce,
+                                           [&](const SessionAnnounce& announce) { lobby.add(announce); });
+  if (watched)
+    watched = inbox.onGone<SessionAnnounce>(partition, wire::kSessionAnnounce,
+                                            [&](const SessionAnnounce& gone) { lobby.remove(gone); });
+  if (!watched) return watched;
+  while (!stop_) {
+    inbox.dispatch(kPeriod);
+    for (const std::string& name : lobby.names())
+      if (options_.session.empty()) offerFeed(std::string(kFirstRoom) + "/" + name, name);
+    server_->publish(std::string(kLobbyRoom), lobby.take(nowNanoseconds()));
+    startFeeds();
+  }
+  return {};
+}
+
+void Gateway::offerFeed(const std::string& room, const std::string& session) {
+  const std::scoped_lock lock(mutex_);
+  if (feeds_.contains(room) || feeds_.size() >= kMaxSessions) return;
+  feeds_.emplace(room, std::make_unique<SessionFeed>(FeedOptions{.room = room,
+                                                                 .session = session,
+                                                                 .domain = options_.domain,
+                                                                 .assets = options_.cache / "assets",
+                                                                 .print = options_.print},
+                                                     *server_));
+}
+
+void Gateway::enter(const std::string& room) {
+  const std::scoped_lock lock(mutex_);
+  entered_.insert(room);
+}
+
+/// Those of rooms that somebody has entered.
+void Gateway::startFeeds() {
+  const std::scoped_lock lock(mutex_);
+  for (const std::string& room : std::exchange(entered_, {})) {
+    const auto feed = feeds_.find(room);
+    if (feed != feeds_.end()) feed->second->start();
+  }
+}
+
+std::string Gateway::sessionOf(const std::string& room) {
+  const std::scoped_lock lock(mutex_);
+  const auto feed = feeds_.find(room);
+  return feed == feeds_.end() ? "" : feed->second->sessionName();
 }
 
 }  // namespace

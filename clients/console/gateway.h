@@ -4,28 +4,33 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
-#include <vector>
 
 #include "clients/console/web_server.h"
+#include "idl/types/messages/role.h"
 #include "idl/types/result.h"
 
 namespace tenon::console {
 
 struct GatewayOptions {
-  std::string session;       ///< its name; empty: the first one announced
-  std::uint32_t domain = 0;  ///< DDS domain
+  std::string session;              ///< its name; empty: all that are announced
+  std::filesystem::path recording;  ///< to be played instead; empty: none
+  std::uint32_t domain = 0;         ///< DDS domain
   WebOptions web;
+  std::optional<Role> role;                       ///< that whoever has the printed address may take
+  std::filesystem::path key_file;                 ///< of the session's key; empty: the user's
   std::filesystem::path page;                     ///< folder of the built page; may be missing
   std::filesystem::path cache;                    ///< of baked structures and display models, as the server's
-  std::function<void(const std::string&)> print;  ///< gets lines for the terminal
+  std::function<void(const std::string&)> print;  ///< gets lines for the terminal; any thread
 };
 
-/// Serves a session to browsers until `stop` is set: joins it as an observer, once for all viewers, and joins
-/// the next one when it ends. Fails when the port cannot be had or DDS cannot be used; a session that is not
-/// there yet, refuses or is lost is told to viewers.
+/// Serves one session, all sessions of a DDS domain, or a recording, to browsers until `stop` is set. Of all
+/// sessions it joins those that somebody looks at. Fails when the port cannot be had, DDS cannot be used, or
+/// there is no such recording.
 ///
-/// Threads: one, which is the only one that uses DDS; the WebServer has another. Real-time: no.
+/// Threads: one, with one more for each session that is followed, each person who has a seat, and the
+/// WebServer. Real-time: no.
 [[nodiscard]] Result<void> runGateway(const GatewayOptions& options, const std::atomic<bool>& stop);
 
 /// Where the built page lies beside the program that runs: in a build folder, or in an installation.

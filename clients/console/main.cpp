@@ -15,14 +15,21 @@ void onSignal(int /*signal*/) { stop = true; }
 
 int run(int argc, char** argv) {
   CLI::App app{
-      "tenon-console: shows a session in the browser, and to viewers of the Foxglove WebSocket protocol, "
-      "until it is "
-      "stopped"};
+      "tenon-console: shows sessions or a recording in the browser, and to viewers of the Foxglove WebSocket "
+      "protocol, until it is stopped"};
   tenon::console::GatewayOptions options;
   options.page = tenon::console::defaultPage();
   options.cache = tenon::defaultCache();
-  app.add_option("session", options.session, "name of the session; default: the first one announced");
-  app.add_option("--session", options.session, "the same");
+  std::string shown, role;
+  app.add_option("shown", shown,
+                 "name of a session, or a recording, FILE.mcap; default: all sessions there are")
+      ->option_text("SESSION|FILE.mcap");
+  app.add_option("--session", options.session, "name of a session");
+  app.add_option("--role", role,
+                 "instructor or trainee: prints an address that gives this role to whoever has it, with the "
+                 "key of your sessions")
+      ->check(CLI::IsMember({"instructor", "trainee"}));
+  app.add_option("--key", options.key_file, "the key of the sessions; default: yours");
   app.add_option("--domain", options.domain, "DDS domain, 0 to 230")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
@@ -38,6 +45,11 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
+  if (shown.ends_with(".mcap"))
+    options.recording = shown;
+  else if (!shown.empty())
+    options.session = shown;
+  if (!role.empty()) options.role = role == "trainee" ? tenon::Role::kTrainee : tenon::Role::kInstructor;
   options.print = [](const std::string& text) {
     std::printf("%s\n", text.c_str());
     std::fflush(stdout);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <fstream>
 #include <iterator>
 #include <utility>
@@ -13,6 +14,9 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view kAssets = "/assets/";
+constexpr std::string_view kGateway = "/gateway.json";
+constexpr std::string_view kRecording = "/recording.mcap";
+constexpr std::uint64_t kMaxRange = 64U << 20U;     // [bytes]
 constexpr std::string_view kBuiltFiles = "/page/";  ///< have a hash of their content in their names
 
 std::string_view typeOf(const fs::path& file) {
@@ -32,7 +36,7 @@ std::string_view typeOf(const fs::path& file) {
 }
 
 Answer text(unsigned status, std::string_view type, std::string_view body) {
-  return {status, std::string(type), false, {body.begin(), body.end()}};
+  return {status, std::string(type), false, {body.begin(), body.end()}, {}};
 }
 
 constexpr std::string_view kNoPage =
@@ -50,7 +54,62 @@ std::string_view typeOfAsset(const std::vector<std::uint8_t>& bytes) {
   return is_model ? "model/gltf-binary" : "application/json";
 }
 
+/// A range of a file; without one, its size alone.
+Answer partOf(const fs::path& file, std::string_view range) {
+  std::error_code error;
+  const std::uint64_t size = fs::file_size(file, error);
+  if (error) return text(404, "text/plain; charset=utf-8", "the recording is gone\n");
+  Answer answer{206, "application/octet-stream", false, {}, {{"Accept-Ranges", "bytes"}}};
+  const auto part = parseRange(range, size);
+  if (!part || part->second - part->first >= kMaxRange) {
+    answer.status = 416;
+    answer.headers.emplace_back("Content-Range", "bytes */" + std::to_string(size));
+    return answer;
+  }
+  answer.body.resize(part->second - part->first + 1);
+  std::ifstream in(file, std::ios::binary);
+  in.seekg(static_cast<std::streamoff>(part->first));
+  in.read(reinterpret_cast<char*>(answer.body.data()), static_cast<std::streamsize>(answer.body.size()));
+  if (!in) return text(404, "text/plain; charset=utf-8", "the recording cannot be read there\n");
+  answer.headers.emplace_back("Content-Range", "bytes " + std::to_string(part->first) + "-" +
+                                                   std::to_string(part->second) + "/" + std::to_string(size));
+  return answer;
+}
+
 }  // namespace
+
+std::optional<std::pair<std::uint64_t, std::uint64_t>> parseRange(std::string_view range,
+                                                                  std::uint64_t size) {
+  constexpr std::string_view kUnit = "bytes=";
+  if (!range.starts_with(kUnit)) return std::nullopt;
+  range.remove_prefix(kUnit.size());
+  const std::size_t dash = range.find('-');
+  if (dash == std::string_view::npos) return std::nullopt;
+  std::uint64_t first = 0, last = 0;
+  const auto isNumber = [](std::string_view digits, std::uint64_t& number) {
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+    return error == std::errc() && end == digits.data() + digits.size() && !digits.empty();
+  };
+  if (!isNumber(range.substr(0, dash), first) || !isNumber(range.substr(dash + 1), last)) return std::nullopt;
+  if (first > last || last >= size) return std::nullopt;
+  return std::pair(first, last);
+}
+
+std::string roomOf(std::string_view target) {
+  const std::string_view path = target.substr(0, target.find_first_of("?#"));
+  if (path == kLobbyRoom) return std::string(kLobbyRoom);
+  const std::string prefix = std::string(kFirstRoom) + "/";
+  if (!path.starts_with(prefix)) return std::string(kFirstRoom);
+  std::string room;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    unsigned code = 0;
+    const bool is_code = path[i] == '%' && i + 2 < path.size() &&
+                         std::from_chars(&path[i + 1], &path[i + 1] + 2, code, 16).ptr == &path[i + 1] + 2;
+    room += is_code ? static_cast<char>(code) : path[i];
+    if (is_code) i += 2;
+  }
+  return room;
+}
 
 Site::Site(const fs::path& page, wire::AssetStore assets) : assets_(std::move(assets)) {
   std::error_code error;
@@ -58,7 +117,7 @@ Site::Site(const fs::path& page, wire::AssetStore assets) : assets_(std::move(as
        entry.increment(error)) {
     if (!entry->is_regular_file()) continue;
     std::ifstream in(entry->path(), std::ios::binary);
-    Answer file{200, std::string(typeOf(entry->path())), false, {}};
+    Answer file{200, std::string(typeOf(entry->path())), false, {}, {}};
     file.body.assign(std::istreambuf_iterator<char>(in), {});
     const std::string path = "/" + entry->path().lexically_relative(page).generic_string();
     file.is_immutable = path.starts_with(kBuiltFiles);
@@ -66,13 +125,26 @@ Site::Site(const fs::path& page, wire::AssetStore assets) : assets_(std::move(as
   }
 }
 
-Answer Site::answer(std::string_view target) const {
+void Site::describe(const std::string& json) {
+  files_.insert_or_assign(std::string(kGateway), text(200, "application/json", json));
+}
+
+Result<void> Site::serveRecording(const fs::path& file) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error) || !std::ifstream(file, std::ios::binary))
+    return fail(file.string() + ": " + (error ? error.message() : "is no file that can be read"));
+  recording_ = file;
+  return {};
+}
+
+Answer Site::answer(std::string_view target, std::string_view range) const {
   const std::string_view path = target.substr(0, target.find_first_of("?#"));
+  if (path == kRecording && !recording_.empty()) return partOf(recording_, range);
   if (path.starts_with(kAssets)) {
     auto bytes = assets_.get(path.substr(kAssets.size()));
     if (!bytes) return text(404, "text/plain; charset=utf-8", "there is no such asset\n");
     const std::string_view type = typeOfAsset(*bytes);
-    return {200, std::string(type), true, std::move(*bytes)};
+    return {200, std::string(type), true, std::move(*bytes), {}};
   }
   const auto found = files_.find(path == "/" ? std::string_view("/index.html") : path);
   if (found != files_.end()) return found->second;

@@ -3,10 +3,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "idl/types/result.h"
 #include "idl/wire/assets.h"
 
 namespace tenon::console {
@@ -17,10 +20,12 @@ struct Answer {
   std::string type;  ///< Content-Type
   bool is_immutable = false;
   std::vector<std::uint8_t> body;
+  std::vector<std::pair<std::string, std::string>> headers;  ///< others
 };
 
-/// What the gateway serves over HTTP: the files of the page, which are read once at the start, and assets by
-/// their names. A path of a request is looked up among them and never becomes a path of the file system.
+/// What the gateway serves over HTTP: the files of the page, which are read once at the start, assets by
+/// their names, /gateway.json, which says what this gateway shows, and a recording, by ranges. A path of a
+/// request is looked up among them and never becomes a path of the file system.
 ///
 /// Threads: any. Real-time: no.
 class Site {
@@ -28,14 +33,31 @@ class Site {
   /// Reads all files below `page`, which may be missing: then `/` says how to build it.
   Site(const std::filesystem::path& page, wire::AssetStore assets);
 
-  /// `target`: as in the request line, with its query.
-  [[nodiscard]] Answer answer(std::string_view target) const;
+  /// For /gateway.json.
+  void describe(const std::string& json);
+  /// Serves this file as /recording.mcap. Fails when it cannot be read.
+  [[nodiscard]] Result<void> serveRecording(const std::filesystem::path& file);
+
+  /// `target`: as in the request line, with its query; `range`: the header Range.
+  [[nodiscard]] Answer answer(std::string_view target, std::string_view range = {}) const;
   [[nodiscard]] bool hasPage() const { return files_.contains("/index.html"); }
 
  private:
   std::map<std::string, Answer, std::less<>> files_;
   wire::AssetStore assets_;
+  std::filesystem::path recording_;  ///< empty: none
 };
+
+/// A range of bytes as in "bytes=0-99"; both ends are inside. None for other forms, and for one that does not
+/// lie in a file of `size` [bytes].
+[[nodiscard]] std::optional<std::pair<std::uint64_t, std::uint64_t>> parseRange(std::string_view range,
+                                                                                std::uint64_t size);
+
+inline constexpr std::string_view kLobbyRoom = "/lobby";
+inline constexpr std::string_view kFirstRoom = "/live";
+/// The room that a WebSocket request asks for: "/live/NAME" for the session of that name, "/lobby" for the
+/// list of all; any other path is that of public viewers: "/live", what this gateway shows first.
+[[nodiscard]] std::string roomOf(std::string_view target);
 
 /// The header Content-Security-Policy of all answers: nothing is loaded from elsewhere.
 [[nodiscard]] std::string_view contentSecurityPolicy();

@@ -155,7 +155,7 @@ void Membership::prove(const std::string& challenge, Join& join, std::string& pr
                              .client = participant_->origin()};
   join.seat_proof = options_.seat->proofOf(subject);
   const auto file = options_.key_file.empty() ? defaultKeyFile() : options_.key_file;
-  const auto key = readKeyFile(file);
+  const auto key = options_.key ? Result<SharedKey>(*options_.key) : readKeyFile(file);
   if (key) join.key_proof = key->proofOf(subject);
   if (!key) problem = key.error().what;
 }

@@ -26,6 +26,7 @@ struct MembershipOptions {
   std::vector<std::string> hands;  ///< to control
   std::optional<SeatKey> seat;     ///< of an earlier seat, to rejoin it with its hands; none: a new one
   std::filesystem::path key_file;  ///< of the session's key, for roles that need it; empty: defaultKeyFile()
+  std::optional<SharedKey> key;    ///< the session's key itself, instead of that of a file
   bool lockstep = false;           ///< refuse a session in real time
   bool passive = false;  ///< best-effort streams also in lockstep, so that it never blocks the session
   std::chrono::seconds timeout{10};  ///< [s] for finding a server, and for its answer

@@ -16,6 +16,13 @@ const PATHS = {
   now: "M4 2l9 6-9 6z",
   skip: "M2 3l6 5-6 5zM8 3l6 5-6 5z",
   over: "M4 3h8v10H4z",
+  half: "M8 1a7 7 0 1 1 0 14A7 7 0 0 1 8 1zM8 3v10A5 5 0 0 0 8 3z",
+  pause: "M4 2h3v12H4zM9 2h3v12H9z",
+  back: "M14 3v10L8 8zM8 3v10L2 8z",
+  on: "M2 3l6 5-6 5zM8 3l6 5-6 5z",
+  repeat: "M8 2a6 6 0 1 0 6 6h-2a4 4 0 1 1-4-4v3l5-4-5-4z",
+  swap: "M1 5h9V2l5 4.500-5 4V8H1zM15 12H6v3l-5-4 5-4v3h9z",
+  bell: "M8 1a5 5 0 0 1 5 5v4l2 2v1H1v-1l2-2V6a5 5 0 0 1 5-5zM6 14h4l-2 2z",
   person: "M8 2a3 3 0 1 1 0 6 3 3 0 0 1 0-6zM2 14c0-3 3-5 6-5s6 2 6 5z",
 } as const;
 export type Icon = keyof typeof PATHS;

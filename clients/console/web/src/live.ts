@@ -1,4 +1,4 @@
-// The gateway's WebSocket: subscribes to topics by name and connects again when the connection is lost.
+// The gateway's WebSocket: subscribes to topics by name, connects again when the connection is lost, and carries requests to the desk.
 import { decoderOf, type Channel, type Decoder } from "./decode";
 import type { InstanceGone } from "./messages";
 
@@ -8,18 +8,44 @@ const LONGEST_RETRY = 8; // s
 
 export type LiveState = { kind: "connecting" } | { kind: "open" } | { kind: "reconnecting"; seconds: number };
 /** `isGone`: of the instance, of which the message has the key. */
-type Handler = (topic: string, message: unknown, isGone: boolean) => void;
+export type Handler = (topic: string, message: unknown, isGone: boolean) => void;
+/** What the gateway answers to a request to the desk; of id 0: what nobody asked for, as the loss of a seat. */
+export interface DeskAnswer { id: number; accepted: boolean; text: string; role: string }
 
 export const INSTANCE_STATE = "__instance_state";
 
+export function addressOf(room: string): string {
+  return `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}${room}`;
+}
+
 export class LiveSource {
+  /** Called with an answer of id 0. */
+  onNotice?: (answer: DeskAnswer) => void;
   private socket?: WebSocket;
   private readers = new Map<number, { topic: string; decode: Decoder }>();
   private retry = FIRST_RETRY;
+  private timer = 0;
+  private asked = new Map<number, (answer: DeskAnswer | undefined) => void>();
+  private lastId = 0;
+  private isClosed = false;
 
   constructor(private url: string, private topics: readonly string[], private handler: Handler, private onState: (state: LiveState) => void) {
     onState({ kind: "connecting" });
     this.connect();
+  }
+
+  close(): void {
+    this.isClosed = true;
+    clearTimeout(this.timer);
+    this.socket?.close();
+  }
+
+  /** Asks the desk; undefined when it cannot be asked, or the connection was lost before it answered. */
+  ask(op: string, values: object = {}): Promise<DeskAnswer | undefined> {
+    if (this.socket?.readyState !== WebSocket.OPEN) return Promise.resolve(undefined);
+    const id = ++this.lastId;
+    this.socket.send(JSON.stringify({ op, id, ...values }));
+    return new Promise((answer) => this.asked.set(id, answer));
   }
 
   private connect(): void {
@@ -31,8 +57,11 @@ export class LiveSource {
       this.onState({ kind: "open" });
     };
     socket.onclose = () => {
+      for (const answer of this.asked.values()) answer(undefined);
+      this.asked.clear();
+      if (this.isClosed) return;
       this.onState({ kind: "reconnecting", seconds: this.retry });
-      setTimeout(() => this.connect(), this.retry * 1000);
+      this.timer = window.setTimeout(() => this.connect(), this.retry * 1000);
       this.retry = Math.min(LONGEST_RETRY, 2 * this.retry);
     };
     socket.onmessage = ({ data }) => {
@@ -44,6 +73,7 @@ export class LiveSource {
   private receiveText(data: string): void {
     const message = JSON.parse(data) as { op: string; channels?: Channel[]; level?: number; message?: string };
     if (message.op === "status") console.warn("gateway:", message.message);
+    if (message.op === "deskAnswer") this.receiveAnswer(message as unknown as DeskAnswer);
     if (message.op !== "advertise") return;
     const subscriptions: { id: number; channelId: number }[] = [];
     for (const channel of message.channels ?? []) {
@@ -52,6 +82,12 @@ export class LiveSource {
       subscriptions.push({ id: channel.id, channelId: channel.id });
     }
     this.socket?.send(JSON.stringify({ op: "subscribe", subscriptions }));
+  }
+
+  private receiveAnswer(answer: DeskAnswer): void {
+    if (answer.id === 0) return this.onNotice?.(answer);
+    this.asked.get(answer.id)?.(answer);
+    this.asked.delete(answer.id);
   }
 
   private receiveBytes(view: DataView): void {

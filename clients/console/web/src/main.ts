@@ -1,9 +1,14 @@
 import "./style.css";
 
+import { Desk } from "./desk";
 import { h, icon, type Icon } from "./dom";
-import { LiveSource, type LiveState } from "./live";
+import { addressOf, LiveSource, type LiveState } from "./live";
+import { Lobby } from "./lobby";
+import type { Gateway, LobbyState } from "./messages";
 import * as panels from "./panels";
 import { ForcePlot } from "./plot";
+import { Player } from "./player";
+import { fromAddress, fromFile, Recording } from "./recording";
 import { SceneView } from "./scene";
 import { Session, TOPICS } from "./session";
 import { language, languageNames, nameOfLanguage, setLanguage, t, type Key } from "./strings";
@@ -14,6 +19,14 @@ const COMMAND = "./tenon demo";
 
 const session = new Session();
 let live: LiveState = { kind: "connecting" };
+// one of them shows where the session comes from
+let source: LiveSource | undefined;
+let desk: Desk | undefined;
+let lobby: Lobby | undefined;
+let player: Player | undefined;
+/** Of a recording that is opened: how much is read, or why it cannot be. */
+let opening: { fraction: number; problem?: string } | undefined;
+let isDropping = false;
 
 // ---- what the page consists of
 setLanguage(language);
@@ -26,7 +39,6 @@ const time = h("time", "clock");
 const languages = h("select", "");
 const themeButton = h("button", "");
 const strip = h("div", "strip");
-strip.setAttribute("role", "status");
 const stage = h("main", "stage");
 const card = h("section", "card");
 const cover = h("div", "cover");
@@ -57,7 +69,12 @@ const tabButtons = (["steps", "plots", "people"] as const).map((name) => {
 tools.append(frameButton);
 stage.append(card, legend, tools, note, cover);
 const brand = h("span", "brand", "Tenon");
-document.getElementById("app")?.append(h("header", "top", brand, title, h("span", "grow"), time, link, languages, themeButton), strip, stage, tabs, side, status);
+const all = Object.assign(h("a", "all"), { href: "/", hidden: true });
+const stripText = h("span", "strip-text");
+const top_ = h("header", "top", brand, all, title, h("span", "grow"), time, link, languages, themeButton);
+const app = document.getElementById("app") as HTMLElement;
+app.append(top_, strip, stage, tabs, side, status);
+strip.append(stripText);
 
 // ---- the scene and the plot
 let view: SceneView | undefined;
@@ -78,14 +95,20 @@ function showTab(name: string): void {
 function setWords(): void {
   const heads: [HTMLElement, Key][] = [
     [sections.steps.head, "steps"], [sections.plots.head, "force"], [sections.people.head, "people"], [sections.events.head, "events"],
-    [frameButton, "view.reset"], [themeButton, "theme"], [noForce, "force.none"],
+    [frameButton, "view.reset"], [noForce, "force.none"], [all, "lobby.all"],
   ];
+  desk?.setWords();
+  player?.setWords();
+  lobby?.setWords();
   for (const [element, key] of heads) element.textContent = t(key);
   for (const { name, button } of tabButtons) button.textContent = t(`tab.${name}`);
   legend.replaceChildren(
     ...(["target", "within", "device", "contact"] as const).map((name) => h("span", `key-${name}`, h("i"), t(`legend.${name}`))),
   );
   languages.replaceChildren(...languageNames.map((name) => Object.assign(h("option", "", nameOfLanguage(name)), { value: name, selected: name === language })));
+  themeButton.replaceChildren(icon("half"));
+  themeButton.setAttribute("aria-label", t("theme"));
+  themeButton.title = t("theme");
   languages.setAttribute("aria-label", t("language"));
   note.textContent = view?.simple === true ? t("view.simple") : "";
   view?.setLabel(t("view.label"));
@@ -109,20 +132,51 @@ frameButton.addEventListener("click", () => view?.frame());
 addEventListener("keydown", (event) => {
   const isTyping = event.target instanceof HTMLInputElement || event.target instanceof HTMLTextAreaElement || event.target instanceof HTMLSelectElement;
   if (isTyping || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (event.key === " ") {
+    // the stop comes before whatever has the focus
+    event.preventDefault();
+    if (event.repeat) return;
+    if (player !== undefined) player.toggle();
+    else void desk?.raise();
+  }
   if (event.key === "r") view?.frame();
   if (event.key === "l") themeButton.click();
+  if (event.key === ",") player?.step(-1);
+  if (event.key === ".") player?.step(1);
+});
+addEventListener("keyup", (event) => {
+  if (event.key === " " && event.target instanceof HTMLButtonElement) event.preventDefault(); // else it is pressed as well
+});
+// who leads may go to a step of the list
+sections.steps.body.addEventListener("click", (event) => {
+  const row = (event.target as HTMLElement).closest<HTMLElement>("li[data-step]");
+  if (row === null) return;
+  const name = row.dataset["step"] ?? "";
+  if (player !== undefined) {
+    const visit = session.steps.find((step) => step.name === name)?.started;
+    if (visit !== undefined) player.seekTick(visit * 1000);
+  } else if (desk?.role === "instructor" && !session.isOver) desk.goTo(name, row.querySelector(".name")?.textContent ?? name);
+});
+sections.events.body.addEventListener("click", (event) => {
+  const row = (event.target as HTMLElement).closest<HTMLElement>("li[data-tick]");
+  if (row !== null) player?.seekTick(Number(row.dataset["tick"]));
 });
 
 // ---- how the connection stands
 interface Cover { state: string; icon: Icon; head: string; more: string; command?: string; covers: boolean }
 
 function coverOf(): Cover | undefined {
+  if (isDropping) return { state: "drop", icon: "over", head: t("cover.drop"), more: t("cover.drop.more"), covers: true };
+  if (opening?.problem !== undefined) return { state: "file", icon: "warn", head: t("cover.file"), more: t("cover.file.more", { reason: opening.problem }), covers: true };
+  if (opening !== undefined) return { state: "reading", icon: "wait", head: t("cover.reading"), more: t("cover.reading.more", { percent: Math.round(100 * opening.fraction) }), covers: true };
+  if (lobby !== undefined && live.kind === "open") return undefined;
   const make = (state: string, name: Icon, covers: boolean, values = {}): Cover => {
     const more = `cover.${state}.more` as Key;
     return { state, icon: name, head: t(`cover.${state}` as Key), more: t(more, values), covers };
   };
   if (live.kind === "reconnecting") return make("reconnecting", "warn", session.link === undefined, { seconds: live.seconds });
   const { link: gateway } = session;
+  if (player !== undefined) return view === undefined ? { state: "webgl", icon: "warn", head: t("cover.webgl"), more: t("cover.webgl.more"), covers: true } : undefined;
   if (live.kind === "connecting" || gateway === undefined) return make("connecting", "wait", true);
   if (gateway.protocol !== PROTOCOL) return make("protocol", "warn", true);
   if (gateway.state === "refused") return { state: "refused", icon: "warn", head: t("cover.refused"), more: gateway.reason, covers: true };
@@ -132,7 +186,9 @@ function coverOf(): Cover | undefined {
 }
 
 function linkBadge(): [Key, Icon, string] {
+  if (player !== undefined) return ["link.recorded", "over", "info"];
   if (live.kind === "reconnecting") return ["link.reconnecting", "warn", "warn"];
+  if (lobby !== undefined && live.kind === "open") return ["link.joined", "live", "good"];
   switch (live.kind === "connecting" ? undefined : session.link?.state) {
     case "joined": return ["link.joined", "live", "good"];
     case "searching": return ["link.searching", "wait", "info"];
@@ -160,12 +216,16 @@ function showPanels(age: number): void {
   const [key, name, tone] = linkBadge();
   link.className = `badge ${tone}`;
   show(link, [icon(name), document.createTextNode(t(key))]);
-  title.textContent = session.link?.title || t("title.none");
+  title.textContent = lobby !== undefined ? "" : session.link?.title || t("title.none");
+  time.hidden = lobby !== undefined;
   document.title = session.link?.title ? `${session.link.title} – Tenon` : "Tenon";
   time.textContent = panels.clock(session.tick / 1000);
   const { text, isRaised } = panels.strip(session);
   strip.className = isRaised ? "strip raised" : "strip";
-  show(strip, [icon(isRaised ? "stop" : "done"), document.createTextNode(text)]);
+  strip.hidden = player !== undefined && !isRaised;
+  show(stripText, lobby !== undefined ? [] : [icon(isRaised ? "stop" : "done"), document.createTextNode(text)]);
+  desk?.show();
+  app.classList.toggle("leads", player !== undefined || (desk?.role === "instructor" && !session.isOver));
   show(card, panels.instruction(session));
   show(sections.steps.body, panels.steps(session));
   show(sections.people.body, panels.people(session));
@@ -178,14 +238,16 @@ function showPanels(age: number): void {
   show(cover, over === undefined ? [] : [h("div", "", icon(over.icon), h("h2", "", over.head), h("p", "", over.more), ...(over.command ? [h("code", "", over.command)] : []))]);
   const hasSession = session.link !== undefined && session.objects.size > 0;
   card.hidden = legend.hidden = !hasSession;
-  document.body.classList.toggle("stale", live.kind !== "open" || session.link?.state === "lost");
+  document.body.classList.toggle("stale", player === undefined && (live.kind !== "open" || session.link?.state === "lost"));
 }
 
 function frame(now: number): void {
-  const age = session.heard === 0 ? 0 : (now - session.heard) / 1000;
-  view?.update(session, now);
+  const age = session.heard === 0 || player !== undefined ? 0 : (now - session.heard) / 1000;
+  player?.update(now);
+  lobby?.update(now);
+  if (lobby === undefined) view?.update(session, now);
   plot.update(session, now);
-  const state = `${session.changed} ${session.moved} ${live.kind} ${age > 0.5 ? age.toFixed(1) : ""}`;
+  const state = `${session.changed} ${session.moved} ${live.kind} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${age > 0.5 ? age.toFixed(1) : ""}`;
   if (now - shownAt >= PANEL_PERIOD && state !== shown) {
     shownAt = now;
     shown = state;
@@ -194,12 +256,79 @@ function frame(now: number): void {
   requestAnimationFrame(frame);
 }
 
+// ---- where the session comes from
+function follow(room: string, role: string): void {
+  let joined = false;
+  source = new LiveSource(addressOf(room), TOPICS, (topic, message, isGone) => {
+    session.receive(topic, message, isGone);
+    const isJoined = session.link?.state === "joined";
+    if (isJoined && !joined) void desk?.takeSeatAgain();
+    joined = isJoined;
+  }, (state) => {
+    live = state;
+    if (state.kind !== "reconnecting") return;
+    joined = false;
+    desk?.loseSeat();
+  });
+  desk = new Desk(source, session, role);
+  strip.append(desk.stop, desk.sit);
+  strip.after(desk.bar);
+  stage.append(desk.notices);
+}
+
+function showLobby(role: string): void {
+  lobby = new Lobby();
+  lobby.setWords();
+  app.classList.add("shows-lobby");
+  stage.append(lobby.element);
+  source = new LiveSource(addressOf("/lobby"), ["/lobby"], (_, message) => lobby?.receive(message as LobbyState), (state) => (live = state));
+  desk = new Desk(source, session, role, true);
+  strip.append(desk.stop);
+  stage.append(desk.notices);
+}
+
+async function play(open: () => Promise<Awaited<ReturnType<typeof fromAddress>>>): Promise<void> {
+  source?.close();
+  for (const element of [desk?.stop, desk?.sit, desk?.bar, desk?.notices, lobby?.element, player?.element]) element?.remove();
+  [source, desk, lobby, player] = [undefined, undefined, undefined, undefined];
+  app.classList.remove("shows-lobby");
+  opening = { fraction: 0 };
+  session.forget();
+  try {
+    const recording = await Recording.open(await open(), (topic, message, isGone) => session.receive(topic, message, isGone), (fraction) => (opening = { fraction }));
+    player = new Player(recording, session, (name) => panels.titleOfStep([...session.sceneSteps.values()].find((step) => step.name === name) ?? { name, title: [] }));
+    status.before(player.element);
+    opening = undefined;
+    const start = Number(new URLSearchParams(location.search).get("t") ?? 0);
+    if (start > 0) player.seek(start);
+  } catch (problem) {
+    opening = { fraction: 0, problem: problem instanceof Error ? problem.message : String(problem) };
+  }
+  Object.assign(window, { tenon: { session, view, player } });
+}
+
+async function begin(): Promise<void> {
+  const answer = await fetch("/gateway.json").catch(() => undefined);
+  const gateway: Gateway = answer?.ok ? ((await answer.json()) as Gateway) : { session: "", recording: "", role: "", protocol: PROTOCOL };
+  const chosen = new URLSearchParams(location.search).get("session");
+  all.hidden = chosen === null || gateway.session !== "";
+  if (gateway.recording !== "") await play(() => fromAddress("/recording.mcap"));
+  else if (gateway.session === "" && chosen === null) showLobby(gateway.role);
+  else follow(gateway.session === "" ? `/live/${encodeURIComponent(chosen ?? "")}` : "/live", gateway.role);
+}
+
+for (const name of ["dragover", "dragleave", "drop"] as const)
+  addEventListener(name, (event) => {
+    event.preventDefault();
+    isDropping = name === "dragover" && event.dataTransfer?.types.includes("Files") === true;
+    const file = name === "drop" ? event.dataTransfer?.files[0] : undefined;
+    if (file !== undefined) void play(() => Promise.resolve(fromFile(file)));
+  });
+
 setWords();
 showTab("steps");
 showPanels(0);
-const address = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`;
-new LiveSource(address, TOPICS, (topic, message, isGone) => session.receive(topic, message, isGone), (state) => (live = state));
-requestAnimationFrame(frame);
-
 // for tests, and for whoever wants to look
-Object.assign(window, { tenon: { session, view } });
+Object.assign(window, { tenon: { session, view, player } });
+void begin();
+requestAnimationFrame(frame);

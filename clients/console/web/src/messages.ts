@@ -15,7 +15,7 @@ export interface ObjectState {
 }
 export interface WorldFrame { part: number; parts: number; tick: bigint; step_revision: number; states: ObjectState[] }
 export interface ObjectSnapshot { object_id: number; tick: bigint; state: ObjectState }
-export interface HandState { hand_id: number; seq: number; X_WH: Pose; F_Ho_W: Wrench; safety_flags: number; indexing: boolean }
+export interface HandState { hand_id: number; seq: number; X_WH: Pose; F_Ho_W: Wrench; manifold_age: number; safety_flags: number; indexing: boolean }
 export interface PairContact {
   a: number; b: number; enabled: boolean; colliding: boolean; contacts: number; F_Ao_W: Wrench; p_WP: Vector; depth: number; gap: number;
   load_percent: number; peak_force: number; peak_depth: number;
@@ -35,18 +35,28 @@ export interface StepProgress {
   revision: number; tick: bigint; position_error: number; angle_error: number; contact_seconds: number;
   conditions: { text: string; value: number; limit: number; met: boolean }[];
 }
+export interface SceneStep { step: number; steps: number; name: string; title: Localized[]; part: string }
+export interface SceneHand { hand_id: number; name: string; role: number; object_id: number }
 export enum RunPhase { Waiting, Running, Paused, Succeeded, Failed, Stopped }
 export interface RunState { phase: RunPhase; tick: bigint; reason: string }
 export interface GrabState { object_id: number; hand_id: number; epoch: number; X_HO: Pose; tick: bigint }
 export interface Presence { client_id: number; name: string; role: number; hands: ArrayLike<number>; alive: boolean }
 export interface EmergencyStop { client_guid: string; counter: number; who: string; reason: string }
+export interface EmergencyClear { client_guid: string; counter: number; who: string; reason: string }
+export interface RecorderStatus { file: string; recording: boolean; messages: bigint; lost: bigint; problem: string }
+export interface Telemetry { client_id: number; input_to_force_p50: number; input_to_force_p99: number; loop_overruns: bigint; samples: bigint }
+export interface SessionAnnounce { session: string; title: string; host: string; lockstep: boolean; protocol_version: number; scene_hash: string }
 export interface EventLog { seq: bigint; tick: bigint; severity: number; kind: string; text: string }
 export interface InstanceGone { topic: string; key_sample: Uint8Array }
 /** Of the channel /console: how the gateway stands to its session. */
 export interface ConsoleState {
-  state: "searching" | "joined" | "refused" | "lost" | "ended";
+  state: "searching" | "joined" | "refused" | "lost" | "ended" | "recorded";
   reason: string; life: number; session: string; title: string; lockstep: boolean; scene: string; protocol: number;
 }
 /** A level of an object's display model; the list of a scene's assets. */
 export interface ModelLevel { model: string; triangles: number; error: number }
 export interface SceneModels { version: number; objects: ModelLevel[][] }
+/** Of the channel /lobby: the sessions of the bus. */
+export interface LobbyState { sessions: { session: string; title: string; host: string; lockstep: boolean; protocol: number }[] }
+/** What this gateway shows: a session, a recording, or, with neither, all sessions. */
+export interface Gateway { session: string; recording: string; role: string; protocol: number }

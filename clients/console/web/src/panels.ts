@@ -1,6 +1,7 @@
 // What stands around the scene: instruction, steps, people, events, status. Each part is made anew from the session when it changed.
+import { devicesOf } from "./desk";
 import { h, icon, type Icon } from "./dom";
-import { NONE, RunPhase, StepPhase } from "./messages";
+import { NONE, RunPhase, StepPhase, type EventLog } from "./messages";
 import type { Session, StepEntry } from "./session";
 import { localized, t, type Key } from "./strings";
 
@@ -31,8 +32,13 @@ function badge([key, name, tone]: [Key, Icon, string]): HTMLElement {
   return h("span", `badge ${tone}`, icon(name), t(key));
 }
 
-function titleOf(step: StepEntry): string {
+/** A name as people read it. */
+export function titleOfStep(step: { name: string; title: StepEntry["title"] }): string {
   return localized(step.title) || step.name.replace(/_/g, " ");
+}
+
+export function phase(session: Session): HTMLElement | undefined {
+  return session.run === undefined ? undefined : badge(RUN[session.run.phase]);
 }
 
 export function instruction(session: Session): Node[] {
@@ -51,9 +57,10 @@ function meter(label: string, text: string, fraction: number, isMet: boolean): H
   return h("li", isMet ? "met" : "", icon(isMet ? "done" : "wait"), h("span", "", label), h("output", "", text), h("div", "bar", bar));
 }
 
-/** A condition's text, with the titles of objects instead of their names. */
+/** A text of the server with the titles of objects and steps instead of their names. */
 function readable(session: Session, text: string): string {
   const titles = new Map([...session.objects.values()].map((object) => [object.name, object.title]));
+  for (const step of session.sceneSteps.values()) titles.set(step.name, titleOfStep(step));
   return text.replace(/\w+/g, (word) => titles.get(word) ?? word);
 }
 
@@ -82,17 +89,17 @@ export function steps(session: Session): Node[] {
   if (list.length === 0) return [h("p", "muted", t("step.none"))];
   let part = "";
   const rows: HTMLElement[] = [];
-  for (const [i, entry] of list.entries()) {
+  for (const entry of list) {
     if (entry.part !== part && entry.part !== "") rows.push(h("li", "group", entry.part));
     part = entry.part;
-    const seconds = (entry.ended ?? session.tick / 1000) - entry.started;
-    const isNow = i === list.length - 1 && !session.isOver;
-    const row = h("li", isNow ? "now" : "", badge(STEP[entry.phase]), h("span", "name", titleOf(entry)), h("time", "", `${seconds.toFixed(1)} s`));
-    if (isNow) row.setAttribute("aria-current", "step");
+    const seconds = entry.started === undefined ? undefined : (entry.ended ?? (entry.isNow ? session.tick / 1000 : undefined));
+    const time = entry.started === undefined || seconds === undefined ? "" : `${Math.max(0, seconds - entry.started).toFixed(1)} s`;
+    const state = entry.phase === undefined ? h("span", "badge muted", t("step.ahead")) : badge(STEP[entry.phase]);
+    const row = h("li", entry.isNow ? "now" : entry.phase === undefined ? "ahead" : "", state, h("span", "name", titleOfStep(entry)), h("time", "", time));
+    row.dataset["step"] = entry.name;
+    if (entry.isNow) row.setAttribute("aria-current", "step");
     rows.push(row);
   }
-  const left = (session.step?.steps ?? 0) - (session.step?.step ?? 0) - 1;
-  if (left > 0 && !session.isOver) rows.push(h("li", "muted", `+ ${left}`));
   return [h("ol", "steps", ...rows)];
 }
 
@@ -103,15 +110,29 @@ export function people(session: Session): Node[] {
     const hands = Array.from(person.hands);
     const held = [...session.grabs.values()].filter((grab) => grab.hand_id !== NONE && hands.includes(grab.hand_id) && !session.isOwn(grab.object_id));
     const what = held.map((grab) => session.titleOf(grab.object_id)).join(", ");
-    return h("li", "", icon("person"), h("span", "name", person.name), h("span", "muted", t(`role.${person.role}` as Key)), h("span", "holds", what === "" ? "" : t("holds", { what })));
+    const devices = devicesOf(session, hands);
+    const head = h("div", "", h("span", "name", person.name), h("span", "muted", t(`role.${person.role}` as Key)), h("span", "holds", what === "" ? "" : t("holds", { what })));
+    return h("li", "", icon("person"), head, ...(devices === "" ? [] : [h("small", "muted", devices)]));
   });
   return [h("ul", "people", ...rows)];
 }
 
+/** Without "hand free", which only ends what "hand frozen" says, and with repetitions in one row. */
 export function events(session: Session): Node[] {
-  const rows = session.events.slice(-EVENTS_SHOWN).reverse().map((event) =>
-    h("li", ["", "warn", "bad"][event.severity] ?? "", h("time", "", clock(Number(event.tick) / 1000)), h("span", "kind", event.kind), h("span", "", event.text)),
-  );
+  const told: { event: EventLog; times: number }[] = [];
+  for (const event of session.events) {
+    const before = told[told.length - 1];
+    if (event.kind === "hand free") continue;
+    if (before?.event.kind === event.kind && event.kind === "hand frozen") told[told.length - 1] = { event, times: before.times + 1 };
+    else told.push({ event, times: 1 });
+  }
+  const rows = told.slice(-EVENTS_SHOWN).reverse().map(({ event, times }) => {
+    const text = event.kind.startsWith("step") || event.kind === "command" ? readable(session, event.text) : event.text;
+    const kind = h("span", "kind", event.kind);
+    const row = h("li", ["", "warn", "bad"][event.severity] ?? "", h("time", "", clock(Number(event.tick) / 1000)), kind, h("span", "", times > 1 ? `${text} (×${times})` : text));
+    row.dataset["tick"] = String(event.tick);
+    return row;
+  });
   return [h("ol", "events", ...rows)];
 }
 
@@ -131,6 +152,11 @@ export function status(session: Session, age: number): Node[] {
     items.push(item("status.compute", `${ms.toFixed(2)} ms`, ms > 1 && session.link?.lockstep !== true ? "warn" : ""), item("status.load", `${stats.load_percent.toFixed(0)} %`), item("status.late", String(stats.late_ticks)));
   }
   items.push(item("status.contacts", String(touching)));
+  const { recorder } = session;
+  if (recorder !== undefined) {
+    const text = recorder.recording ? t("recorder.on", { count: String(recorder.messages) }) : recorder.problem || t("recorder.off");
+    items.push(h("span", `stat ${recorder.problem === "" ? "" : "bad"}`, icon(recorder.recording ? "live" : "over"), text));
+  }
   if (age > 0.5 && session.link?.state === "joined" && !session.isOver) items.push(h("span", "stat warn", icon("warn"), t("status.stale", { seconds: age.toFixed(1) })));
   return items;
 }

@@ -1,25 +1,30 @@
 // What is known of a session, from its messages alone.
 import {
   NONE, RunPhase, StepPhase, type ConsoleState, type ContactPairs, type EmergencyStop, type EventLog, type GrabState, type HandState,
-  type ObjectSnapshot, type ObjectState, type PairContact, type Presence, type RunState, type SceneObject, type StepProgress, type StepState,
-  type TickStats, type WorldFrame,
+  type ObjectSnapshot, type ObjectState, type PairContact, type Presence, type RecorderStatus, type RunState, type SceneHand, type SceneObject,
+  type SceneStep, type StepProgress, type StepState, type Telemetry, type TickStats, type WorldFrame,
 } from "./messages";
 
 export const TOPICS = [
-  "/console", "SceneObject", "ObjectSnapshot", "WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepState", "StepProgress",
-  "RunState", "GrabState", "Presence", "EmergencyStop", "EmergencyClear", "EventLog", "__instance_state",
+  "/console", "SceneObject", "SceneHand", "SceneStep", "ObjectSnapshot", "WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepState", "StepProgress",
+  "RunState", "GrabState", "Presence", "EmergencyStop", "EmergencyClear", "EventLog", "Telemetry", "RecorderStatus", "__instance_state",
 ] as const;
 
 const HISTORY = 3000; // samples of a hand: 30 s
 const EVENTS = 200;
 
-export interface StepEntry { name: string; title: StepState["title"]; part: string; phase: StepPhase; started: number; ended?: number }
+/** Times in s of the session. */
+interface Visit { started: number; ended?: number; phase?: StepPhase; visits: number }
+export interface StepEntry extends SceneStep, Partial<Visit> { isNow: boolean; visits: number }
+const STEP_ENDS: Record<string, StepPhase> = { "step done": StepPhase.Done, "step skipped": StepPhase.Skipped, "step timed out": StepPhase.TimedOut };
 export interface HandHistory { times: number[]; forces: number[]; peak: number }
 
 export class Session {
   link?: ConsoleState;
   objects = new Map<number, SceneObject>();
   states = new Map<number, ObjectState>();
+  sceneHands = new Map<number, SceneHand>();
+  sceneSteps = new Map<number, SceneStep>();
   hands = new Map<number, HandState>();
   grabs = new Map<number, GrabState>();
   people = new Map<number, Presence>();
@@ -29,6 +34,8 @@ export class Session {
   progress?: StepProgress;
   run?: RunState;
   stats?: TickStats;
+  telemetry = new Map<number, Telemetry>(); // by client
+  recorder?: RecorderStatus;
   events: EventLog[] = [];
   tick = 0;
   /** Increased when poses, and when anything else has changed. */
@@ -38,20 +45,24 @@ export class Session {
   heard = 0;
   private raises = new Map<string, EmergencyStop>();
   private clears = new Set<string>();
-  private names = new Map<number, string>(); // of hands
-  private known = new Map<string, StepState>();
-  private visits: { name: string; started: number }[] = [];
+  private visits = new Map<string, Visit>(); // of steps by name
 
   /** Another session begins. */
-  private reset(): void {
-    const link = this.link;
-    Object.assign(this, new Session());
-    this.link = link;
+  reset(): void {
+    const { link, moved, changed } = this;
+    Object.assign(this, new Session(), { link, moved: moved + 1, changed: changed + 1 });
+  }
+
+  /** As at the beginning: what comes is of another source. */
+  forget(): void {
+    this.link = undefined;
+    this.reset();
   }
 
   receive(topic: string, message: unknown, isGone: boolean): void {
     if (isGone) {
       if (topic === "Presence") this.people.delete((message as Presence).client_id);
+      if (topic === "RecorderStatus") this.recorder = undefined;
       ++this.changed;
       return;
     }
@@ -67,6 +78,24 @@ export class Session {
         this.objects.set(object.object_id, object);
         break;
       }
+      case "SceneHand": {
+        const hand = message as SceneHand;
+        this.sceneHands.set(hand.hand_id, hand);
+        break;
+      }
+      case "SceneStep": {
+        const step = message as SceneStep;
+        this.sceneSteps.set(step.step, step);
+        break;
+      }
+      case "Telemetry": {
+        const telemetry = message as Telemetry;
+        this.telemetry.set(telemetry.client_id, telemetry);
+        break;
+      }
+      case "RecorderStatus":
+        this.recorder = message as RecorderStatus;
+        break;
       case "ObjectSnapshot":
         return this.place(message as ObjectSnapshot);
       case "WorldFrame_100":
@@ -90,7 +119,6 @@ export class Session {
       case "GrabState": {
         const grab = message as GrabState;
         this.grabs.set(grab.object_id, grab);
-        if (grab.hand_id !== NONE && this.isOwn(grab.object_id)) this.names.set(grab.hand_id, this.titleOf(grab.object_id));
         break;
       }
       case "Presence": {
@@ -151,6 +179,17 @@ export class Session {
     ++this.moved;
   }
 
+  /** Puts forces of before what is known of each hand. */
+  recall(hands: Map<number, { times: number[]; forces: number[] }>): void {
+    for (const [id, before] of hands) {
+      const known = this.history.get(id) ?? { times: [], forces: [], peak: 0 };
+      const count = before.times.filter((time) => time < (known.times[0] ?? Infinity)).length;
+      const forces = [...before.forces.slice(0, count), ...known.forces];
+      this.history.set(id, { times: [...before.times.slice(0, count), ...known.times], forces, peak: Math.max(...forces, known.peak) });
+    }
+    ++this.moved;
+  }
+
   private touch(sample: ContactPairs): void {
     for (const pair of sample.pairs) this.pairs.set(`${pair.a} ${pair.b}`, { ...pair, tick: Number(sample.tick) });
     ++this.moved;
@@ -158,27 +197,27 @@ export class Session {
 
   private follow(step: StepState): void {
     this.step = step;
-    this.known.set(step.name, step);
   }
 
   private log(event: EventLog): void {
     if (this.events.some((known) => known.seq === event.seq)) return;
     this.events.push(event);
     if (this.events.length > EVENTS) this.events.shift();
-    if (event.kind === "step") this.visits.push({ name: event.text, started: Number(event.tick) / 1000 });
+    const seconds = Number(event.tick) / 1000;
+    if (event.kind === "step") this.visits.set(event.text, { started: seconds, visits: (this.visits.get(event.text)?.visits ?? 0) + 1 });
+    const phase = STEP_ENDS[event.kind];
+    const visit = this.visits.get(event.text.replace(/ \(.*$/, ""));
+    if (phase !== undefined && visit !== undefined) Object.assign(visit, { phase, ended: seconds });
   }
 
-  /** The steps so far, in order: of those before this page came only the names are known, from the log. */
+  /** All steps of the scenario in their order, each with its last visit. */
   get steps(): StepEntry[] {
-    const visits = [...this.visits];
-    const now = this.step;
-    if (now !== undefined && visits[visits.length - 1]?.name !== now.name) visits.push({ name: now.name, started: Number(now.started) / 1000 });
-    return visits.map(({ name, started }, i) => {
-      const state = this.known.get(name);
-      const isLast = i === visits.length - 1;
-      const phase = state === undefined || (!isLast && state.phase < StepPhase.Done) ? StepPhase.Done : state.phase;
-      const end = isLast ? (phase >= StepPhase.Done || this.isOver ? Number(this.run?.tick ?? this.tick) / 1000 : undefined) : visits[i + 1].started;
-      return { name, title: state?.title ?? [], part: state?.part ?? "", phase, started, ended: end };
+    const now = this.isOver || this.step === undefined ? undefined : this.step;
+    return [...this.sceneSteps.values()].sort((a, b) => a.step - b.step).map((scene): StepEntry => {
+      const visit = this.visits.get(scene.name);
+      const isNow = now?.name === scene.name && now.phase <= StepPhase.Active;
+      const started = isNow ? Number(now.started) / 1000 : visit?.started;
+      return { ...scene, isNow, phase: isNow ? StepPhase.Active : visit?.phase, started, ended: isNow ? undefined : visit?.ended, visits: visit?.visits ?? 0 };
     });
   }
 
@@ -195,15 +234,10 @@ export class Session {
     return this.objects.get(id)?.title ?? "";
   }
 
-  /** Title of a hand's own pointer, else of what it holds. */
+  /** Title of a hand's own object, else the hand's name. */
   nameOfHand(id: number): string {
-    const name = this.names.get(id);
-    if (name !== undefined && name !== "") return name;
-    const own = [...this.grabs.values()].find(
-      (grab) => grab.hand_id === id && ["pointer", "assistant", "tool", "forearm", "head"].includes(this.objects.get(grab.object_id)?.kind ?? ""),
-    );
-    const held = own ?? [...this.grabs.values()].find((grab) => grab.hand_id === id);
-    return held === undefined ? `${id}` : this.titleOf(held.object_id);
+    const hand = this.sceneHands.get(id);
+    return this.titleOf(hand?.object_id ?? NONE) || (hand?.name ?? `${id}`);
   }
 
   /** Whether a hand holds this for good: its pointer, or what tracks it. */
@@ -212,7 +246,7 @@ export class Session {
   }
 
   isTracked(hand: number): boolean {
-    return [...this.grabs.values()].some((grab) => grab.hand_id === hand && ["forearm", "head"].includes(this.objects.get(grab.object_id)?.kind ?? ""));
+    return ["forearm", "head"].includes(this.objects.get(this.sceneHands.get(hand)?.object_id ?? NONE)?.kind ?? "");
   }
 
   /** Pose errors of the step within its tolerances. */

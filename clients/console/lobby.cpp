@@ -1,0 +1,43 @@
+#include "clients/console/lobby.h"
+
+#include <memory>
+
+#include <nlohmann/json.hpp>
+
+namespace tenon::console {
+
+std::vector<Channel> Lobby::channels() {
+  return {{1, "/lobby", "json", "tenon.Lobby", R"({"type":"object"})", "jsonschema", Delivery::kNewest}};
+}
+
+void Lobby::add(const SessionAnnounce& announce) {
+  has_changed_ = true;
+  sessions_.insert_or_assign({announce.session, announce.server_epoch}, announce);
+}
+
+void Lobby::remove(const SessionAnnounce& gone) {
+  has_changed_ = sessions_.erase({gone.session, gone.server_epoch}) > 0 || has_changed_;
+}
+
+std::vector<std::string> Lobby::names() const {
+  std::vector<std::string> names;
+  for (const auto& [key, session] : sessions_)
+    if (names.empty() || names.back() != key.first) names.push_back(key.first);
+  return names;
+}
+
+std::vector<Publication> Lobby::take(std::int64_t now_ns) {
+  if (!std::exchange(has_changed_, false)) return {};
+  nlohmann::json list = nlohmann::json::array();
+  for (const auto& [key, session] : sessions_)
+    list.push_back({{"session", session.session},
+                    {"title", session.title},
+                    {"host", session.host},
+                    {"lockstep", session.lockstep},
+                    {"protocol", session.protocol_version}});
+  const nlohmann::json json{{"sessions", list}};
+  const std::string text = json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return {{1, 0, now_ns, std::make_shared<const std::vector<std::uint8_t>>(text.begin(), text.end())}};
+}
+
+}  // namespace tenon::console

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clients/console/channel.h"
+#include "idl/types/messages/session.h"
+
+namespace tenon::console {
+
+/// The sessions of the bus, as the channel /lobby of a room of its own: JSON, newest wins.
+///
+/// Threads: one. Real-time: no.
+class Lobby {
+ public:
+  [[nodiscard]] static std::vector<Channel> channels();
+
+  void add(const SessionAnnounce& announce);
+  void remove(const SessionAnnounce& gone);
+  /// Names, each once.
+  [[nodiscard]] std::vector<std::string> names() const;
+  /// What has changed since the last call; empty when nothing has.
+  [[nodiscard]] std::vector<Publication> take(std::int64_t now_ns);
+
+ private:
+  std::map<std::pair<std::string, std::uint32_t>, SessionAnnounce> sessions_;  ///< by name and epoch
+  bool has_changed_ = true;
+};
+
+}  // namespace tenon::console

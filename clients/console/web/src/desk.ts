@@ -1,0 +1,256 @@
+// The instructor's desk: a seat in the session, commands, and what the server answers to each. The emergency stop needs no seat.
+import { h, icon, type Icon } from "./dom";
+import type { DeskAnswer, LiveSource } from "./live";
+import { NONE, RunPhase, Status } from "./messages";
+import type { Session } from "./session";
+import { t, type Key } from "./strings";
+
+const NOTICE = 8000; // [ms] that an answer is shown
+const NOTICES = 3;
+const PASS = "pass"; // in the address, and in this tab's memory
+
+export class Desk {
+  readonly stop = h("button", "stop");
+  readonly sit = h("button", "sit");
+  readonly bar = h("section", "desk");
+  readonly notices = h("div", "notices");
+  /** That the server has granted; empty: looks on. */
+  role = "";
+  private dialog = h("dialog", "");
+  private buttons: { button: HTMLButtonElement; key: Key; icon?: Icon; shows?: () => boolean }[] = [];
+  private signals = h("span", "signals");
+  private note = h("input", "");
+  private more = h("details", "more");
+  private objects = [h("select"), h("select"), h("select")]; // of a collision, and to be given
+  private hands = [h("select"), h("select")]; // that gets, that releases
+  private isOn = h("select");
+  private listed = "";
+
+  /** `isOfAll`: the stop is for all sessions. */
+  constructor(private source: LiveSource, private session: Session, gatewayRole: string, private isOfAll = false) {
+    const pass = new URLSearchParams(location.hash.slice(1)).get(PASS);
+    if (pass !== null) {
+      sessionStorage.setItem(PASS, pass);
+      history.replaceState(null, "", location.pathname + location.search);
+    }
+    if (sessionStorage.getItem(PASS) !== null && sessionStorage.getItem("role") === null && gatewayRole !== "") sessionStorage.setItem("role", gatewayRole);
+    this.notices.setAttribute("role", "status");
+    this.stop.addEventListener("click", () => void this.pressStop());
+    this.sit.addEventListener("click", () => (this.role === "" ? this.askForSeat() : void this.leave()));
+    source.onNotice = (answer) => {
+      this.role = answer.role;
+      this.notify(false, answer.text);
+      this.show();
+    };
+    this.build();
+    document.body.append(this.dialog);
+    this.setWords();
+  }
+
+  private build(): void {
+    const add = (host: HTMLElement, key: Key, words: string[], name?: Icon, shows?: () => boolean, confirm = false): void => {
+      const button = h("button", "");
+      button.dataset["command"] = words[0];
+      button.addEventListener("click", () => void (confirm ? this.confirm(key, words) : this.command(...words)));
+      this.buttons.push({ button, key, icon: name, shows });
+      host.append(button);
+    };
+    const isPaused = (): boolean => this.session.run?.phase === RunPhase.Paused;
+    add(this.bar, "desk.pause", ["pause"], "pause", () => !isPaused());
+    add(this.bar, "desk.resume", ["resume"], "now", isPaused);
+    add(this.bar, "desk.back", ["back"], "back");
+    add(this.bar, "desk.repeat", ["repeat"], "repeat");
+    add(this.bar, "desk.skip", ["skip"], "skip");
+    this.bar.append(this.signals);
+    this.note.maxLength = 200;
+    this.note.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter" || this.note.value.trim() === "") return;
+      const text = this.note.value;
+      void this.command("note", text).then((accepted) => accepted && this.note.value === text && (this.note.value = ""));
+    });
+    this.bar.append(this.note, this.more);
+    const rows = h("div", "rows");
+    const row = (...nodes: Node[]): HTMLElement => h("div", "row", ...nodes);
+    const give = row(this.objects[0], this.hands[0]);
+    const release = row(this.hands[1]);
+    const pair = row(this.objects[1], this.objects[2], this.isOn);
+    const addRow = (host: HTMLElement, key: Key, words: () => string[]): void => {
+      const button = h("button", "");
+      button.dataset["command"] = words()[0];
+      button.addEventListener("click", () => void this.command(...words()));
+      this.buttons.push({ button, key });
+      host.append(button);
+    };
+    addRow(give, "desk.give", () => ["give", this.objects[0].value, this.hands[0].value]);
+    addRow(release, "desk.release", () => ["release", this.hands[1].value]);
+    addRow(pair, "desk.collision", () => ["collision", this.objects[1].value, this.objects[2].value, this.isOn.value]);
+    const whole = row();
+    add(whole, "desk.swap", ["swap"], "swap");
+    add(whole, "desk.reset", ["reset"], "repeat", undefined, true);
+    add(whole, "desk.end", ["stop"], "over", undefined, true);
+    rows.append(give, release, pair, whole);
+    this.more.append(h("summary", ""), rows);
+  }
+
+  setWords(): void {
+    for (const { button, key, icon: name } of this.buttons) button.replaceChildren(...(name === undefined ? [] : [icon(name)]), t(key));
+    this.note.placeholder = t("desk.note");
+    this.note.setAttribute("aria-label", t("desk.note"));
+    this.more.firstElementChild?.replaceChildren(t("desk.more"));
+    this.isOn.replaceChildren(...(["off", "on"] as const).map((value) => Object.assign(h("option", "", t(`desk.${value}`)), { value })));
+    const labels: [HTMLElement, Key][] = [
+      [this.objects[0], "desk.object"], [this.objects[1], "desk.object"], [this.objects[2], "desk.object"], [this.hands[0], "desk.hand"], [this.hands[1], "desk.hand"],
+      [this.isOn, "desk.collision"],
+    ];
+    for (const [element, key] of labels) element.setAttribute("aria-label", t(key));
+    this.listed = "";
+    this.show();
+  }
+
+  /** Called when the session has changed. */
+  show(): void {
+    const { session } = this;
+    const isRaised = session.standing.length > 0;
+    const canClear = isRaised && this.role === "instructor";
+    const words: Key = canClear ? "stop.clear" : isRaised ? "stop.again" : this.isOfAll ? "stop.all" : "stop.press";
+    this.stop.className = canClear ? "stop clear" : "stop";
+    if (this.stop.dataset["words"] !== `${words}${t(words)}`) {
+      this.stop.dataset["words"] = `${words}${t(words)}`;
+      this.stop.replaceChildren(icon(canClear ? "done" : "stop"), h("span", "", t(words)), ...(canClear ? [] : [h("kbd", "", t("stop.key"))]));
+    }
+    const label = this.role === "" ? t("desk.sit") : t("desk.leave");
+    if (this.sit.textContent !== label) this.sit.replaceChildren(icon("person"), label);
+    this.bar.hidden = this.role === "" || session.isOver;
+    for (const { button, shows } of this.buttons) button.hidden = shows !== undefined && !shows();
+    this.list();
+  }
+
+  /** Signals that the step waits for, objects and hands, by the names that people read. */
+  private list(): void {
+    const { session } = this;
+    const waited = (session.progress?.conditions ?? []).map(({ text }) => text).filter((text) => text.startsWith("signal ") || text === "command fulfilled" || text === "fulfilled");
+    const listed = `${waited.join()} ${session.objects.size} ${session.states.size} ${session.sceneHands.size}`;
+    if (listed === this.listed) return;
+    this.listed = listed;
+    this.signals.replaceChildren(
+      ...waited.map((text) => {
+        const name = text.replace(/^signal /, "");
+        const isSignal = text.startsWith("signal ");
+        const button = h("button", "", icon("bell"), isSignal ? name.replace(/_/g, " ") : t("desk.fulfilled"));
+        button.addEventListener("click", () => void (isSignal ? this.command("signal", name) : this.command("fulfilled")));
+        return button;
+      }),
+    );
+    const objects = [...session.objects.values()].filter((object) => !session.isOwn(object.object_id));
+    const options = (list: { name: string; title: string }[]): HTMLElement[] => list.map(({ name, title }) => Object.assign(h("option", "", title || name), { value: name }));
+    for (const select of this.objects) select.replaceChildren(...options(objects));
+    this.objects[0].replaceChildren(...options(objects.filter((object) => session.states.get(object.object_id)?.status !== Status.Fixed)));
+    const hands = [...session.sceneHands.values()].filter((hand) => !session.isTracked(hand.hand_id)).map((hand) => ({ name: hand.name, title: session.nameOfHand(hand.hand_id) }));
+    for (const select of this.hands) select.replaceChildren(...options(hands));
+    const second = this.objects[2].options[1];
+    if (second !== undefined) second.selected = true;
+  }
+
+  /** Who sits at this page takes the seat again after a loss of the connection, and of the session. */
+  async takeSeatAgain(): Promise<void> {
+    const role = sessionStorage.getItem("role");
+    const key = sessionStorage.getItem(PASS);
+    if (role === null || key === null || this.role !== "") return;
+    await this.takeSeat(role, localStorage.getItem("name") ?? "", key);
+  }
+
+  loseSeat(): void {
+    this.role = "";
+    this.show();
+  }
+
+  private async takeSeat(role: string, name: string, key: string): Promise<boolean> {
+    const answer = await this.source.ask("deskSit", { role, name: name || t("desk.somebody"), key });
+    this.role = answer?.role ?? "";
+    if (answer?.accepted === true) {
+      sessionStorage.setItem(PASS, key);
+      sessionStorage.setItem("role", role);
+    }
+    this.tell(t(`role.name.${role}` as Key), answer);
+    this.show();
+    return answer?.accepted === true;
+  }
+
+  private async leave(): Promise<void> {
+    sessionStorage.removeItem("role");
+    const answer = await this.source.ask("deskLeave");
+    this.role = "";
+    this.tell(t("desk.leave"), answer);
+    this.show();
+  }
+
+  private askForSeat(): void {
+    const role = h("select", "");
+    role.append(...(["instructor", "trainee"] as const).map((name) => Object.assign(h("option", "", t(`role.name.${name}`)), { value: name })));
+    const name = Object.assign(h("input", ""), { maxLength: 40, value: localStorage.getItem("name") ?? "", autocomplete: "off" });
+    const key = Object.assign(h("input", ""), { type: "password", autocomplete: "off", value: sessionStorage.getItem(PASS) ?? "" });
+    const field = (label: Key, input: HTMLElement, hint?: Key): HTMLElement => h("label", "field", h("span", "", t(label)), input, ...(hint === undefined ? [] : [h("small", "muted", t(hint))]));
+    this.openDialog(t("desk.sit.title"), [field("desk.sit.role", role), field("desk.sit.name", name), field("desk.sit.key", key, "desk.sit.hint")], t("desk.sit.do"), async () => {
+      localStorage.setItem("name", name.value);
+      return this.takeSeat(role.value, name.value, key.value.trim());
+    });
+  }
+
+  private confirm(key: Key, words: string[], text = t("desk.sure")): void {
+    this.openDialog(t(key), [h("p", "muted", text)], t(key), () => this.command(...words));
+  }
+
+  goTo(step: string, title: string): void {
+    this.confirm("desk.goto", ["goto", step], t("desk.goto.more", { step: title }));
+  }
+
+  private openDialog(title: string, nodes: Node[], action: string, done: () => Promise<boolean>): void {
+    const cancel = Object.assign(h("button", "", t("desk.cancel")), { type: "button" });
+    const go = h("button", "primary", action);
+    const form = h("form", "", h("h2", "", title), ...nodes, h("div", "row end", cancel, go));
+    cancel.addEventListener("click", () => this.dialog.close());
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      void done().then((accepted) => accepted && this.dialog.close());
+    });
+    this.dialog.replaceChildren(form);
+    this.dialog.showModal();
+  }
+
+  async pressStop(): Promise<void> {
+    if (this.stop.classList.contains("clear")) return void this.command("clear");
+    await this.raise();
+  }
+
+  /** The emergency stop; also when one stands. */
+  async raise(): Promise<void> {
+    const answer = await this.source.ask("deskCommand", { words: ["emergency", t("stop.reason")] });
+    this.tell(t("stop.press"), answer, t("stop.unreachable"));
+  }
+
+  async command(...words: string[]): Promise<boolean> {
+    const label = this.buttons.find(({ button }) => button.dataset["command"] === words[0])?.key ?? (words[0] === "note" ? "desk.note.said" : words[0] === "clear" ? "stop.clear" : "desk.command");
+    const answer = await this.source.ask("deskCommand", { words });
+    this.tell(t(label), answer);
+    return answer?.accepted === true;
+  }
+
+  private tell(what: string, answer: DeskAnswer | undefined, offline = t("desk.offline")): void {
+    if (answer === undefined) this.notify(false, `${what}: ${offline}`);
+    else this.notify(answer.accepted, `${what}: ${answer.text || t(answer.accepted ? "desk.accepted" : "desk.refused")}`);
+  }
+
+  private notify(isGood: boolean, text: string): void {
+    const notice = h("p", isGood ? "notice good" : "notice bad", icon(isGood ? "done" : "warn"), h("span", "", text));
+    this.notices.append(notice);
+    while (this.notices.childElementCount > NOTICES) this.notices.firstElementChild?.remove();
+    setTimeout(() => notice.remove(), NOTICE);
+  }
+}
+
+/** Names of the hands that somebody moves, and the age of their contacts [ms]. */
+export function devicesOf(session: Session, hands: number[]): string {
+  const names = hands.filter((hand) => hand !== NONE && !session.isTracked(hand)).map((hand) => session.nameOfHand(hand));
+  const ages = hands.flatMap((hand) => session.hands.get(hand)?.manifold_age ?? []).filter((age) => age !== NONE);
+  return [...names, ...(ages.length === 0 ? [] : [`${Math.max(...ages)} ms`])].join(", ");
+}

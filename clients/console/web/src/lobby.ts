@@ -1,0 +1,85 @@
+// All sessions of the bus, each a card that follows it.
+import { h, icon } from "./dom";
+import { addressOf, LiveSource } from "./live";
+import type { LobbyState } from "./messages";
+import * as panels from "./panels";
+import { Session } from "./session";
+import { t } from "./strings";
+
+const TOPICS = ["/console", "SceneStep", "StepState", "RunState", "Presence", "EmergencyStop", "EmergencyClear", "EventLog", "__instance_state"];
+const TRAINEE = 2; // whose role is larger looks on
+const PERIOD = 500; // [ms] between looks
+
+interface Card { element: HTMLAnchorElement; session: Session; source: LiveSource; info: LobbyState["sessions"][number]; shown: string }
+
+export class Lobby {
+  readonly element = h("section", "lobby");
+  private cards = new Map<string, Card>();
+  private list = h("div", "cards");
+  private head = h("h1", "");
+  private none = h("div", "none");
+  private shown = 0;
+
+  constructor() {
+    this.element.append(this.head, this.list, this.none);
+  }
+
+  receive(state: LobbyState): void {
+    const names = new Set(state.sessions.map(({ session }) => session));
+    for (const [name, card] of this.cards) {
+      if (names.has(name)) continue;
+      card.source.close();
+      card.element.remove();
+      this.cards.delete(name);
+    }
+    for (const info of state.sessions) {
+      const known = this.cards.get(info.session);
+      if (known !== undefined) {
+        known.info = info;
+        continue;
+      }
+      const session = new Session();
+      const element = Object.assign(h("a", "session"), { href: `/?session=${encodeURIComponent(info.session)}` });
+      const source = new LiveSource(addressOf(`/live/${encodeURIComponent(info.session)}`), TOPICS, (topic, message, isGone) => session.receive(topic, message, isGone), () => undefined);
+      this.cards.set(info.session, { element, session, source, info, shown: "" });
+      this.list.append(element);
+    }
+    this.shown = 0;
+  }
+
+  setWords(): void {
+    this.head.textContent = t("lobby");
+    this.none.replaceChildren(icon("wait"), h("h2", "", t("lobby.none")), h("p", "muted", t("cover.searching.more")), h("code", "", "./tenon demo"));
+    for (const card of this.cards.values()) card.shown = "";
+    this.shown = 0;
+  }
+
+  update(now: number): void {
+    if (now - this.shown < PERIOD) return;
+    this.shown = now;
+    this.none.hidden = this.cards.size > 0;
+    this.list.hidden = this.cards.size === 0;
+    for (const card of this.cards.values()) {
+      const content = h("div", "", ...this.contentOf(card));
+      if (content.innerHTML === card.shown) continue;
+      card.shown = content.innerHTML;
+      card.element.replaceChildren(...content.childNodes);
+    }
+  }
+
+  private contentOf({ session, info }: Card): Node[] {
+    const people = [...session.people.values()].filter((person) => person.alive && person.role <= TRAINEE);
+    const steps = session.steps;
+    const done = steps.filter((step) => step.ended !== undefined).length;
+    const bar = h("i", "good");
+    bar.style.width = `${steps.length === 0 ? 0 : Math.round((100 * done) / steps.length)}%`;
+    const isRaised = session.standing.length > 0;
+    return [
+      h("div", "card-head", h("span", "part", info.session), isRaised ? h("span", "badge bad", icon("stop"), t("lobby.stopped")) : (panels.phase(session) ?? "")),
+      h("h2", "", info.title),
+      h("p", "", session.step === undefined || session.isOver ? (session.run?.reason ?? "") : panels.titleOfStep(session.step)),
+      h("div", "bar", bar),
+      h("p", "muted", [t("lobby.steps", { done, steps: steps.length }), t("lobby.people", { people: people.length }), info.host].join(" · ")),
+    ];
+  }
+}

@@ -1,0 +1,192 @@
+// The controls of a recording: play, step, speed, and a time line with steps, events and notes on which one seeks.
+import { h, icon, type Icon } from "./dom";
+import { clock } from "./panels";
+import type { Mark, Recording } from "./recording";
+import type { Session } from "./session";
+import { t } from "./strings";
+
+const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16];
+const WINDOW = 30; // s of forces before the place that was sought
+const FRAME = 1 / 30; // s of a single step
+const SHAPES: [(mark: Mark) => boolean, string][] = [
+  [(mark) => mark.kind === "note", "note"],
+  [(mark) => mark.severity >= 2 || mark.kind.includes("emergency"), "bad"],
+  [(mark) => mark.severity === 1, "warn"],
+  [(mark) => mark.kind === "mounted", "good"],
+];
+
+export class Player {
+  readonly element = h("section", "player");
+  time = 0; // s since the beginning
+  isPlaying = false;
+  /** The longest of the last seeks [ms]; for tests and the curious. */
+  seekMilliseconds = 0;
+  private speed = 1;
+  private isBusy = false;
+  private wanted?: number; // where to seek next
+  private seeks = 0;
+  private last = 0;
+  private play = h("button", "play");
+  private clockText = h("time", "clock");
+  private speeds = h("select");
+  private line = h("div", "timeline");
+  private fill = h("i", "fill");
+  private knob = h("i", "knob");
+  private hint = h("output", "hint");
+
+  constructor(private recording: Recording, private session: Session, private titleOf: (step: string) => string) {
+    const back = this.button("back", () => this.seek(this.time - FRAME), "player.back");
+    const on = this.button("on", () => this.seek(this.time + FRAME), "player.on");
+    this.play.addEventListener("click", () => this.toggle());
+    this.speeds.append(...SPEEDS.map((speed) => Object.assign(h("option", "", `${speed < 1 ? `1/${1 / speed}` : speed} ×`), { value: String(speed), selected: speed === 1 })));
+    this.speeds.addEventListener("change", () => (this.speed = Number(this.speeds.value)));
+    this.line.tabIndex = 0;
+    this.line.setAttribute("role", "slider");
+    this.line.setAttribute("aria-valuemin", "0");
+    this.line.setAttribute("aria-valuemax", this.recording.seconds.toFixed(1));
+    this.line.addEventListener("pointerdown", (event) => {
+      this.line.setPointerCapture(event.pointerId);
+      this.seek(this.secondsAt(event));
+    });
+    this.line.addEventListener("pointermove", (event) => {
+      this.showHint(event);
+      if (event.buttons === 1 && this.line.hasPointerCapture(event.pointerId)) this.seek(this.secondsAt(event));
+    });
+    this.line.addEventListener("pointerleave", () => (this.hint.hidden = true));
+    this.line.addEventListener("keydown", (event) => this.onKey(event));
+    this.hint.hidden = true;
+    this.element.append(back, this.play, on, this.clockText, this.line, this.speeds);
+    this.setWords();
+    this.seek(0);
+  }
+
+  private button(name: Icon, action: () => void, key: "player.back" | "player.on"): HTMLButtonElement {
+    const button = h("button", `square ${name}`, icon(name));
+    button.addEventListener("click", action);
+    button.setAttribute("aria-label", t(key));
+    return button;
+  }
+
+  setWords(): void {
+    this.line.setAttribute("aria-label", t("player.time"));
+    this.speeds.setAttribute("aria-label", t("player.speed"));
+    this.drawMarks();
+    this.show();
+  }
+
+  private drawMarks(): void {
+    const percent = (seconds: number): string => `${(100 * seconds) / Math.max(this.recording.seconds, 1e-9)}%`;
+    const steps = this.recording.marks.filter((mark) => mark.kind === "step");
+    const parts = steps.map((mark, i) => {
+      const part = h("span", `part part-${i % 2}`);
+      part.style.left = percent(mark.seconds);
+      part.style.width = percent((steps[i + 1]?.seconds ?? this.recording.seconds) - mark.seconds);
+      return part;
+    });
+    const marks = this.recording.marks.flatMap((mark) => {
+      const shape = SHAPES.find(([fits]) => fits(mark))?.[1];
+      if (shape === undefined || mark.kind === "hand free") return [];
+      const element = h("i", `mark ${shape}`);
+      element.style.left = percent(mark.seconds);
+      return [element];
+    });
+    this.line.replaceChildren(...parts, this.fill, ...marks, this.knob, this.hint);
+  }
+
+  private secondsAt(event: PointerEvent): number {
+    const box = this.line.getBoundingClientRect();
+    return ((event.clientX - box.left) / Math.max(1, box.width)) * this.recording.seconds;
+  }
+
+  /** What is there: the step, and the nearest mark within a few pixels. */
+  private showHint(event: PointerEvent): void {
+    const seconds = this.secondsAt(event);
+    const width = Math.max(1, this.line.clientWidth);
+    const near = (4 / width) * this.recording.seconds;
+    const step = this.recording.marks.filter((mark) => mark.kind === "step" && mark.seconds <= seconds).pop();
+    const mark = this.recording.marks.find((other) => SHAPES.some(([fits]) => fits(other)) && Math.abs(other.seconds - seconds) <= near);
+    const texts = [clock(seconds), step === undefined ? "" : this.titleOf(step.text), mark === undefined ? "" : `${mark.kind}: ${mark.text}`];
+    this.hint.textContent = texts.filter((text) => text !== "").join(" · ");
+    this.hint.hidden = false;
+    this.hint.style.left = `${Math.min(width - 120, Math.max(120, event.clientX - this.line.getBoundingClientRect().left))}px`;
+  }
+
+  private onKey(event: KeyboardEvent): void {
+    const leaps: Record<string, number> = { ArrowLeft: -1, ArrowRight: 1, PageDown: -10, PageUp: 10, Home: -Infinity, End: Infinity };
+    if (!(event.key in leaps)) return;
+    event.preventDefault();
+    this.seek(Math.min(this.recording.seconds, Math.max(0, this.time + leaps[event.key])));
+  }
+
+  toggle(): void {
+    if (!this.isPlaying && this.time >= this.recording.seconds) this.seek(0);
+    this.isPlaying = !this.isPlaying;
+    this.show();
+  }
+
+  step(direction: number): void {
+    this.seek(this.time + direction * FRAME);
+  }
+
+  /** To where the session was at a tick. */
+  seekTick(tick: number): void {
+    this.seek(tick / 1000 + this.recording.secondsOfTickZero);
+  }
+
+  /** The last place asked for counts. */
+  seek(seconds: number): void {
+    this.wanted = Math.min(this.recording.seconds, Math.max(0, seconds));
+    void this.work();
+  }
+
+  private async work(): Promise<void> {
+    if (this.isBusy) return;
+    this.isBusy = true;
+    while (this.wanted !== undefined) {
+      this.time = this.wanted;
+      this.wanted = undefined;
+      ++this.seeks;
+      const began = performance.now();
+      this.session.reset();
+      await this.recording.seek(this.time);
+      this.seekMilliseconds = performance.now() - began;
+    }
+    this.isBusy = false;
+    this.show();
+    const { seeks } = this;
+    const before = await this.recording.forcesBefore(this.time, WINDOW);
+    if (seeks === this.seeks) this.session.recall(before);
+  }
+
+  /** Called for each frame of the display. */
+  update(now: number): void {
+    const elapsed = Math.min(0.1, (now - this.last) / 1000);
+    this.last = now;
+    if (!this.isPlaying || this.isBusy) return;
+    this.isBusy = true;
+    const time = Math.min(this.recording.seconds, this.time + elapsed * this.speed);
+    void this.recording.advance(time).then(() => {
+      this.isBusy = false;
+      this.time = time;
+      if (time >= this.recording.seconds) this.isPlaying = false;
+      this.show();
+      if (this.wanted !== undefined) void this.work();
+    });
+  }
+
+  private show(): void {
+    const text = `${clock(this.time)} / ${clock(this.recording.seconds)}`;
+    if (this.clockText.textContent !== text) this.clockText.textContent = text;
+    const state = this.isPlaying ? "pause" : "now";
+    if (this.play.dataset["state"] !== state) {
+      this.play.dataset["state"] = state;
+      this.play.replaceChildren(icon(state));
+    }
+    this.play.setAttribute("aria-label", t(this.isPlaying ? "player.pause" : "player.play"));
+    const percent = `${(100 * this.time) / Math.max(this.recording.seconds, 1e-9)}%`;
+    this.fill.style.width = percent;
+    this.knob.style.left = percent;
+    this.line.setAttribute("aria-valuenow", this.time.toFixed(1));
+    this.line.setAttribute("aria-valuetext", text);
+  }
+}

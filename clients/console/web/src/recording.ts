@@ -1,0 +1,205 @@
+// A recording, read where it is needed: by its index, in ranges of a file or of what the gateway serves. What it says goes the same way as what
+// a live session says.
+import { McapIndexedReader } from "@mcap/core";
+import { decompress } from "fzstd";
+
+import { decoderOf, type Decoder } from "./decode";
+import { INSTANCE_STATE, type Handler } from "./live";
+import type { ConsoleState, EventLog, HandState, InstanceGone, SessionAnnounce } from "./messages";
+
+// states and events: all of them before a moment tell how it stands then
+const KEPT = [
+  "SessionAnnounce", "SceneObject", "SceneHand", "SceneStep", "StepState", "RunState", "GrabState", "Presence", "EmergencyStop", "EmergencyClear", "EventLog",
+  INSTANCE_STATE,
+];
+// streams: the newest of each instance before a moment
+const STREAMS = ["WorldFrame_30", "WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepProgress"];
+const BEFORE = 150_000_000n; // [ns] in which each stream has a message
+const BLOCK = 1 << 19; // bytes that are read at a time
+const BLOCKS = 48; // that are kept
+const LARGEST = 1 << 26; // bytes of a chunk
+
+interface Readable { size(): Promise<bigint>; read(offset: bigint, size: bigint): Promise<Uint8Array> }
+
+/** Reads in blocks and keeps the last ones. */
+class Blocks implements Readable {
+  private blocks = new Map<number, Promise<Uint8Array>>();
+
+  constructor(private bytes: number, private load: (begin: number, end: number) => Promise<Uint8Array>) {}
+
+  size(): Promise<bigint> {
+    return Promise.resolve(BigInt(this.bytes));
+  }
+
+  async read(offset: bigint, size: bigint): Promise<Uint8Array> {
+    const begin = Number(offset);
+    const end = begin + Number(size);
+    if (end > this.bytes || Number(size) > LARGEST) throw new Error("its index points behind its end");
+    const result = new Uint8Array(end - begin);
+    for (let block = Math.floor(begin / BLOCK); block * BLOCK < end; ++block) {
+      const from = Math.max(begin, block * BLOCK);
+      const part = (await this.block(block)).subarray(from - block * BLOCK, Math.min(end, (block + 1) * BLOCK) - block * BLOCK);
+      result.set(part, from - begin);
+    }
+    return result;
+  }
+
+  private block(index: number): Promise<Uint8Array> {
+    let block = this.blocks.get(index);
+    if (block === undefined) block = this.load(index * BLOCK, Math.min(this.bytes, (index + 1) * BLOCK));
+    this.blocks.delete(index); // the newest at the end
+    this.blocks.set(index, block);
+    block.catch(() => this.blocks.delete(index));
+    if (this.blocks.size > BLOCKS) this.blocks.delete(this.blocks.keys().next().value as number);
+    return block;
+  }
+}
+
+export function fromFile(file: File): Readable {
+  return new Blocks(file.size, async (begin, end) => new Uint8Array(await file.slice(begin, end).arrayBuffer()));
+}
+
+export async function fromAddress(url: string): Promise<Readable> {
+  const load = async (begin: number, end: number): Promise<Response> => {
+    const answer = await fetch(url, { headers: { Range: `bytes=${begin}-${end - 1}` } });
+    if (answer.status !== 206) throw new Error(`${url}: ${answer.status} ${await answer.text()}`);
+    return answer;
+  };
+  const size = Number((await load(0, 1)).headers.get("Content-Range")?.split("/")[1]);
+  return new Blocks(size, async (begin, end) => new Uint8Array(await (await load(begin, end)).arrayBuffer()));
+}
+
+interface Message { time: bigint; channel: number; data: Uint8Array }
+type Reading = AsyncGenerator<{ logTime: bigint; channelId: number; data: Uint8Array }, void, void>;
+export interface Mark { seconds: number; kind: string; text: string; severity: number }
+
+export class Recording {
+  /** What happened, by the server's log, in s since the beginning of the recording. */
+  marks: Mark[] = [];
+  /** Where tick 0 of the session lies, in s since the beginning. */
+  secondsOfTickZero = 0;
+  private kept: Message[] = [];
+  private decoders = new Map<number, { topic: string; decode: Decoder }>();
+  private reading?: Reading;
+  private next?: Message;
+
+  private constructor(private reader: McapIndexedReader, private handler: Handler, readonly begin: bigint, readonly seconds: number) {}
+
+  /** Fails with the reason when it is no recording, or was cut before its index. */
+  static async open(readable: Readable, handler: Handler, onProgress: (fraction: number) => void): Promise<Recording> {
+    const decompressHandlers = { zstd: (bytes: Uint8Array, size: bigint) => decompress(bytes, new Uint8Array(Number(size))) };
+    const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers });
+    const { statistics } = reader;
+    if (statistics === undefined || statistics.messageCount === 0n) throw new Error("it has no messages");
+    const begin = statistics.messageStartTime;
+    const recording = new Recording(reader, handler, begin, Number(statistics.messageEndTime - begin) / 1e9);
+    for (const channel of reader.channelsById.values()) recording.addChannel(channel.id);
+    await recording.readKept(onProgress);
+    return recording;
+  }
+
+  private addChannel(id: number): void {
+    const channel = this.reader.channelsById.get(id);
+    const schema = this.reader.schemasById.get(channel?.schemaId ?? 0);
+    if (channel === undefined || schema === undefined || ![...KEPT, ...STREAMS].includes(channel.topic)) return;
+    const text = new TextDecoder().decode(schema.data);
+    const decode = decoderOf({ id, topic: channel.topic, encoding: channel.messageEncoding, schemaName: schema.name, schema: text, schemaEncoding: schema.encoding });
+    this.decoders.set(id, { topic: channel.topic, decode });
+  }
+
+  private async readKept(onProgress: (fraction: number) => void): Promise<void> {
+    for await (const { logTime, channelId, data } of this.reader.readMessages({ topics: KEPT })) {
+      this.kept.push({ time: logTime, channel: channelId, data: data.slice() });
+      if (this.kept.length % 50 === 0) onProgress(Number(logTime - this.begin) / 1e9 / Math.max(this.seconds, 1e-9));
+      const channel = this.decoders.get(channelId);
+      if (channel?.topic !== "EventLog") continue;
+      const { kind, text, severity, tick } = channel.decode(data) as EventLog;
+      const seconds = Number(logTime - this.begin) / 1e9;
+      this.secondsOfTickZero = seconds - Number(tick) / 1000;
+      this.marks.push({ seconds, kind, text, severity });
+    }
+  }
+
+  private timeOf(seconds: number): bigint {
+    return this.begin + BigInt(Math.round(1e9 * Math.min(this.seconds, Math.max(0, seconds))));
+  }
+
+  private tell({ channel, data }: Message): void {
+    const known = this.decoders.get(channel);
+    if (known === undefined) return;
+    const message = known.decode(data);
+    if (known.topic === "SessionAnnounce") return this.tellLink(message as SessionAnnounce);
+    if (known.topic !== INSTANCE_STATE) return this.handler(known.topic, message, false);
+    const { topic, key_sample } = message as InstanceGone;
+    const ended = [...this.decoders.values()].find((other) => other.topic === topic);
+    if (ended !== undefined) this.handler(topic, ended.decode(Uint8Array.from(key_sample)), true);
+  }
+
+  private tellLink(announce: SessionAnnounce): void {
+    const link: ConsoleState = {
+      state: "recorded", reason: "", life: 1, session: announce.session, title: announce.title, lockstep: announce.lockstep, scene: announce.scene_hash,
+      protocol: announce.protocol_version,
+    };
+    this.handler("/console", link, false);
+  }
+
+  /** Tells how it stood at a time. What was told before is to be forgotten, and the announcement comes first. */
+  async seek(seconds: number): Promise<void> {
+    const time = this.timeOf(seconds);
+    this.reading = undefined;
+    this.next = undefined;
+    for (const message of this.kept)
+      if (message.time <= time || this.isScene(message)) this.tell(message);
+    const newest = new Map<string, Message>();
+    for await (const { logTime, channelId, data } of this.reader.readMessages({ topics: STREAMS, startTime: time - BEFORE, endTime: time }))
+      newest.set(this.instanceOf(channelId, data), { time: logTime, channel: channelId, data: data.slice() });
+    for (const message of newest.values()) this.tell(message);
+    this.reading = this.reader.readMessages({ topics: [...KEPT, ...STREAMS], startTime: time + 1n }) as unknown as Reading;
+  }
+
+  /** What never changes is known from the first moment. */
+  private isScene({ channel }: Message): boolean {
+    return ["SessionAnnounce", "SceneObject", "SceneHand", "SceneStep"].includes(this.decoders.get(channel)?.topic ?? "");
+  }
+
+  /** Of a stream: the channel and the key, which is the first number after the encapsulation's four bytes. */
+  private instanceOf(channel: number, data: Uint8Array): string {
+    const hasKey = !["TickStats_100", "StepProgress"].includes(this.decoders.get(channel)?.topic ?? "");
+    return `${channel} ${hasKey && data.length >= 8 ? new DataView(data.buffer, data.byteOffset).getUint32(4, true) : 0}`;
+  }
+
+  /** What each hand was given before a time [N], over some seconds. */
+  async forcesBefore(seconds: number, window: number): Promise<Map<number, { times: number[]; forces: number[] }>> {
+    const hands = new Map<number, { times: number[]; forces: number[] }>();
+    for await (const { logTime, channelId, data } of this.reader.readMessages({ topics: ["HandState_100"], startTime: this.timeOf(seconds - window), endTime: this.timeOf(seconds) })) {
+      const hand = this.decoders.get(channelId)?.decode(data) as HandState;
+      const { force } = hand.F_Ho_W;
+      let known = hands.get(hand.hand_id);
+      if (known === undefined) hands.set(hand.hand_id, (known = { times: [], forces: [] }));
+      known.times.push(Number(logTime - this.begin) / 1e9 - this.secondsOfTickZero);
+      known.forces.push(Math.hypot(force[0], force[1], force[2]));
+    }
+    return hands;
+  }
+
+  /** Tells what happened since the last call, up to a time; of streams the newest. */
+  async advance(seconds: number): Promise<void> {
+    const time = this.timeOf(seconds);
+    const reading = this.reading;
+    if (reading === undefined) return;
+    const newest = new Map<string, Message>();
+    while (true) {
+      if (this.next === undefined) {
+        const { value } = await reading.next();
+        if (value === undefined || reading !== this.reading) break;
+        this.next = { time: value.logTime, channel: value.channelId, data: value.data.slice() };
+      }
+      if (this.next.time > time) break;
+      const message = this.next;
+      this.next = undefined;
+      if (STREAMS.includes(this.decoders.get(message.channel)?.topic ?? "")) newest.set(this.instanceOf(message.channel, message.data), message);
+      else this.tell(message);
+    }
+    for (const message of newest.values()) this.tell(message);
+  }
+}

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "clients/console/foxglove_protocol.h"
+
+namespace tenon::console {
+
+struct WebOptions {
+  std::uint16_t port = 8080;  ///< on 127.0.0.1; 0: any that is free
+  std::vector<std::string>
+      origins;                 ///< pages from elsewhere that may connect, as in "https://viewer.example"
+  std::string name = "tenon";  ///< of the server, for viewers
+};
+
+using ViewerId = std::uint64_t;  ///< of one connection; never used again
+
+/// What the server tells its owner, in the server's thread; none may wait.
+struct WebHandlers {
+  std::function<void(const std::string& path)> entered;  ///< a viewer of this room
+  std::function<void(ViewerId)> left;
+  /// A request to the desk, from a page of this server or a program, never from a page from elsewhere.
+  std::function<void(ViewerId, const std::string& path, const DeskRequest&)> desk;
+};
+
+}  // namespace tenon::console

@@ -1,0 +1,141 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <utility>  // before Asio 1.18, which uses std::exchange without it
+#include <vector>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+
+#include "clients/console/channel_store.h"
+#include "clients/console/site.h"
+#include "clients/console/viewer_queue.h"
+#include "clients/console/web_options.h"
+
+/// The parts of the WebServer; nobody else includes this. All runs in the server's one thread.
+namespace tenon::console {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using tcp = asio::ip::tcp;
+
+inline constexpr std::chrono::seconds kSendTimeout{20};
+
+struct WebService;
+
+/// One WebSocket connection. It lives as long as an operation of it is pending.
+class WebViewer : public std::enable_shared_from_this<WebViewer> {
+ public:
+  /// `is_own_page`: it is no page from elsewhere.
+  WebViewer(WebService& server, tcp::socket socket, std::string room, bool is_own_page);
+  ~WebViewer();
+  WebViewer(const WebViewer&) = delete;
+  WebViewer& operator=(const WebViewer&) = delete;
+
+  void run(const http::request<http::empty_body>& request, std::string_view subprotocol);
+  void offer(const Publication& publication, Delivery delivery);
+  void offer(std::string text) { queue_.addText(std::move(text)); }
+  void send();
+  [[nodiscard]] ViewerId id() const { return id_; }
+  [[nodiscard]] const std::string& room() const { return room_; }
+
+ private:
+  void begin();
+  void read();
+  void receive();
+  void apply(const ViewerRequest& request);
+  void close(const std::string& reason);
+  void finish();
+  /// Ends the connection without waiting for the other side.
+  void abort();
+
+  WebService& server_;
+  ViewerId id_;
+  std::string room_;
+  bool is_own_page_;
+  websocket::stream<tcp::socket> socket_;
+  asio::steady_timer send_timer_;
+  beast::flat_buffer incoming_;
+  std::map<SubscriptionId, ChannelId> subscriptions_;
+  ViewerQueue queue_;
+  ViewerQueue::Item sent_;
+  std::string close_reason_;
+  std::chrono::steady_clock::time_point second_;
+  int received_ = 0;  ///< messages, since second_
+  bool is_sending_ = false;
+  bool is_closing_ = false;
+  bool is_closed_ = false;
+};
+
+/// One HTTP connection, which may become a viewer's.
+class WebConnection : public std::enable_shared_from_this<WebConnection> {
+ public:
+  WebConnection(WebService& server, tcp::socket socket);
+  ~WebConnection();
+  WebConnection(const WebConnection&) = delete;
+  WebConnection& operator=(const WebConnection&) = delete;
+
+  void read();
+
+ private:
+  using Request = http::request<http::empty_body>;
+  void handle();
+  void handleUpgrade(const Request& request, std::string_view origin, std::string_view host);
+  void respond(const Request& request, Answer answer);
+
+  WebService& server_;
+  beast::tcp_stream stream_;
+  beast::flat_buffer incoming_;
+  std::optional<http::request_parser<http::empty_body>> parser_;
+};
+
+/// The channels of one session.
+struct Room {
+  explicit Room(std::vector<Channel> channels);
+
+  ChannelStore store;
+  std::string advertisement;
+};
+
+/// What all connections share.
+struct WebService {
+  WebService(const WebOptions& web_options, Site web_site, WebHandlers web_handlers);
+
+  void accept();
+  void deliver(const std::string& path, const std::vector<Publication>& publications);
+  void answer(ViewerId viewer, const std::string& text);
+
+  WebOptions options;
+  Site site;
+  WebHandlers handlers;
+  std::map<std::string, Room, std::less<>> rooms;  ///< by path
+  std::string session_id;                          ///< of this server's life
+
+  std::uint16_t port = 0;
+  std::size_t connections = 0;
+  std::set<WebViewer*> viewers;
+  ViewerId next_viewer = 1;
+  std::atomic<std::size_t> viewer_count{0};
+  std::atomic<int> waiting_calls{0};
+  // after what connections refer to: they end with it
+  asio::io_context io{1};
+  tcp::acceptor acceptor{io};
+  std::thread thread;
+};
+
+}  // namespace tenon::console

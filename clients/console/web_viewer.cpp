@@ -1,0 +1,178 @@
+#include "clients/console/foxglove_protocol.h"
+#include "clients/console/web_service.h"
+
+namespace tenon::console {
+
+namespace {
+
+using std::chrono::seconds;
+constexpr std::size_t kMaxMessageBytes = 64U << 10U;
+constexpr std::size_t kMaxSubscriptions = 256;
+constexpr int kMaxMessagesASecond = 200;
+
+}  // namespace
+
+WebViewer::WebViewer(WebService& server, tcp::socket socket, std::string room, bool is_own_page)
+    : server_(server),
+      id_(server.next_viewer++),
+      room_(std::move(room)),
+      is_own_page_(is_own_page),
+      socket_(std::move(socket)),
+      send_timer_(server.io) {
+  ++server_.connections;
+}
+
+WebViewer::~WebViewer() {
+  server_.viewers.erase(this);
+  server_.viewer_count = server_.viewers.size();
+  --server_.connections;
+  if (server_.handlers.left) server_.handlers.left(id_);
+}
+
+void WebViewer::run(const http::request<http::empty_body>& request, std::string_view subprotocol) {
+  auto timeout = websocket::stream_base::timeout::suggested(beast::role_type::server);
+  timeout.idle_timeout = seconds(60);
+  timeout.keep_alive_pings = true;
+  socket_.set_option(timeout);
+  socket_.set_option(
+      websocket::stream_base::decorator([name = std::string(subprotocol)](websocket::response_type& answer) {
+        answer.set(http::field::sec_websocket_protocol, name);
+        answer.set(http::field::server, "tenon");
+      }));
+  socket_.read_message_max(kMaxMessageBytes);
+  socket_.async_accept(request, [self = shared_from_this()](beast::error_code error) {
+    if (!error) self->begin();
+  });
+}
+
+void WebViewer::offer(const Publication& publication, Delivery delivery) {
+  for (const auto& [subscription, channel] : subscriptions_)
+    if (channel == publication.channel) queue_.add(subscription, delivery, publication);
+}
+
+void WebViewer::send() {
+  if (is_sending_ || is_closing_) return;
+  if (queue_.hasOverflowed()) {
+    close("more was asked for than was read");
+    return;
+  }
+  auto item = queue_.take();
+  if (!item) return;
+  sent_ = std::move(*item);
+  is_sending_ = true;
+  send_timer_.expires_after(kSendTimeout);
+  send_timer_.async_wait([self = weak_from_this()](beast::error_code error) {
+    const auto viewer = self.lock();
+    if (!error && viewer) viewer->abort();
+  });
+  const bool is_text = sent_.payload == nullptr;
+  socket_.text(is_text);
+  const std::array<asio::const_buffer, 2> buffers{
+      is_text ? asio::buffer(sent_.text) : asio::const_buffer(asio::buffer(sent_.header)),
+      is_text ? asio::const_buffer() : asio::buffer(*sent_.payload)};
+  socket_.async_write(buffers, [self = shared_from_this()](beast::error_code error, std::size_t) {
+    self->is_sending_ = false;
+    self->send_timer_.cancel();
+    self->sent_ = {};
+    if (error) return;
+    self->send();
+    if (self->is_closing_) self->finish();
+  });
+}
+
+void WebViewer::begin() {
+  server_.viewers.insert(this);
+  server_.viewer_count = server_.viewers.size();
+  if (server_.handlers.entered) server_.handlers.entered(room_);
+  queue_.addText(serverInfoText(server_.options.name, server_.session_id));
+  queue_.addText(server_.rooms.find(room_)->second.advertisement);
+  send();
+  read();
+}
+
+void WebViewer::read() {
+  socket_.async_read(incoming_, [self = shared_from_this()](beast::error_code error, std::size_t) {
+    if (error) {
+      self->abort();
+      return;
+    }
+    self->receive();
+    if (!self->is_closing_) self->read();
+  });
+}
+
+void WebViewer::receive() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now - second_ > seconds(1)) {
+    second_ = now;
+    received_ = 0;
+  }
+  if (++received_ > kMaxMessagesASecond) {
+    close("more than 200 messages a second");
+    return;
+  }
+  const std::string text = beast::buffers_to_string(incoming_.data());
+  incoming_.consume(incoming_.size());
+  if (!socket_.got_text()) {
+    queue_.addText(statusText(StatusLevel::kWarning, "binary messages are not expected here"));
+  } else if (const auto request = parseViewerText(text)) {
+    apply(*request);
+  } else {
+    queue_.addText(statusText(StatusLevel::kWarning, "not understood: " + request.error().what));
+  }
+  send();
+}
+
+void WebViewer::apply(const ViewerRequest& request) {
+  if (request.desk && is_own_page_ && server_.handlers.desk) {
+    server_.handlers.desk(id_, room_, *request.desk);
+  } else if (request.desk) {
+    queue_.addText(deskAnswerText({.id = request.desk->id, .text = "pages from elsewhere may look on only"}));
+  }
+  ChannelStore& store = server_.rooms.find(room_)->second.store;
+  for (const SubscriptionId id : request.unsubscribe) {
+    subscriptions_.erase(id);
+    queue_.remove(id);
+  }
+  for (const auto& [id, channel] : request.subscribe) {
+    const Channel* found = store.find(channel);
+    std::string problem;
+    if (found == nullptr) problem = "there is no channel " + std::to_string(channel);
+    if (subscriptions_.contains(id)) problem = "subscription " + std::to_string(id) + " exists";
+    if (subscriptions_.size() >= kMaxSubscriptions) problem = "there are too many subscriptions";
+    if (!problem.empty()) {
+      queue_.addText(statusText(StatusLevel::kWarning, problem));
+      continue;
+    }
+    subscriptions_.emplace(id, channel);
+    store.forEachKept(channel,
+                      [&, name = id](const Publication& kept) { queue_.add(name, found->delivery, kept); });
+  }
+}
+
+void WebViewer::close(const std::string& reason) {
+  is_closing_ = true;
+  close_reason_ = reason;
+  if (!is_sending_) finish();
+}
+
+void WebViewer::finish() {
+  if (is_closed_) return;
+  is_closed_ = true;
+  send_timer_.expires_after(kSendTimeout);
+  send_timer_.async_wait([self = weak_from_this()](beast::error_code error) {
+    const auto viewer = self.lock();
+    if (!error && viewer) viewer->abort();
+  });
+  socket_.async_close({websocket::close_code::policy_error, close_reason_},
+                      [self = shared_from_this()](beast::error_code) { self->send_timer_.cancel(); });
+}
+
+void WebViewer::abort() {
+  is_closing_ = is_closed_ = true;
+  send_timer_.cancel();
+  beast::error_code ignored;
+  socket_.next_layer().close(ignored);
+}
+
+}  // namespace tenon::console
