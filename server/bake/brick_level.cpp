@@ -117,7 +117,7 @@ Cell BrickLevel::brickOf(std::size_t node) const {
 
 BrickLevel::Point BrickLevel::at(const Cell& lattice) const {
   const Cell brick(lattice.x() >> 3, lattice.y() >> 3, lattice.z() >> 3);
-  return at(nodeAt(brick), lattice - brick * kVoxels);
+  return brickAt(nodeAt(brick)).at(lattice - brick * kVoxels);
 }
 
 double BrickLevel::interpolated(std::size_t node, const Vector3& p) const {
@@ -229,32 +229,19 @@ void BrickLevel::sampleBrick(std::size_t node, const TriangleTree& tree, const S
   constexpr double kBlockRadius = 2.5981;  // [voxels] from the middle of 4^3 samples to a corner
   TriangleTree::Search search(tree, centreOf(node), kBrickRadius * voxel, (clamp + kBlockRadius) * voxel);
   const std::int16_t clamped = structures::quantizedSample(clamp * voxel, voxel, clamp);
-  const auto fill = [&](const Cell& from, const Cell& to) {
-    const Vector3 middle = (from + to - Cell::Ones()).cast<double>() / 2;
-    const double reach = (clamp + (to - from - Cell::Ones()).cast<double>().norm() / 2 + 1e-9) * voxel;
-    bool far = false;
+  forEachBlock([&](const Cell& from, const Cell& to) {
+    bool near = false;
     bool first = true;
-    for (int z = from.z(); z < to.z(); ++z) {
-      for (int y = from.y(); y < to.y(); ++y) {
-        for (int x = from.x(); x < to.x(); ++x) {
-          const int sample = sampleIndex({x, y, z});
-          if (!which[static_cast<std::size_t>(sample)]) continue;
-          // a block whose middle is so far away that all its samples are clamped needs no further search
-          if (std::exchange(first, false)) {
-            far = search.squaredDistance(position(corner) + middle * voxel, reach) >= reach * reach;
-          }
-          const Vector3 p = position(corner + Cell(x, y, z));
-          out[sample] = far ? clamped
-                            : structures::quantizedSample(std::sqrt(search.squaredDistance(p, clamp * voxel)),
-                                                          voxel, clamp);
-        }
-      }
-    }
-  };
-  for (int block = 0; block < 27; ++block) {
-    const Cell from = Cell(block % 3, block / 3 % 3, block / 9) * 4;
-    fill(from, (from + Cell::Constant(4)).cwiseMin(kSide));
-  }
+    forEachSample(from, to, [&](int sample, const Cell& in_brick) {
+      if (!which[static_cast<std::size_t>(sample)]) return;
+      if (std::exchange(first, false))
+        near = search.focus(middleOf(corner + from, corner + to), radiusOf(from, to), clamp * voxel);
+      const Vector3 p = position(corner + in_brick);
+      out[sample] = near ? structures::quantizedSample(std::sqrt(search.squaredDistance(p, clamp * voxel)),
+                                                       voxel, clamp)
+                         : clamped;
+    });
+  });
 }
 
 }  // namespace tenon::bake

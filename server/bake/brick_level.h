@@ -70,8 +70,17 @@ class BrickLevel {
     return bandOf(node) + structures::DistanceField::kClampVoxels - structures::DistanceField::kBandVoxels;
   }
   [[nodiscard]] Point at(const Cell& lattice) const;
-  /// The same for the point `in_brick` of the brick `node` (< 0: not in this level).
-  [[nodiscard]] Point at(std::int64_t node, const Cell& in_brick) const;
+  /// What Point states follow from, of one brick.
+  struct BrickState {
+    bool known = false;
+    bool free = false;                      ///< without samples: entirely outside
+    const std::int16_t* samples = nullptr;  ///< null: no surface near
+    const SampleBits* outside = nullptr;
+    const Mask* reached = nullptr;
+    [[nodiscard]] Point at(const Cell& in_brick) const;
+  };
+  /// `node` < 0: not in this level.
+  [[nodiscard]] BrickState brickAt(std::int64_t node) const;
   /// Calls visit(offset from the brick's corner, point) for the lattice points of a brick, `below` layers
   /// under it and `above` layers over it. Looks up each neighbouring brick once.
   template <typename Visit>
@@ -87,6 +96,30 @@ class BrickLevel {
   }
   [[nodiscard]] static Cell cellOfSample(int sample) {
     return {sample % kSide, sample / kSide % kSide, sample / (kSide * kSide)};
+  }
+  /// Calls visit(from, to) for blocks of up to 4^3 samples of a brick, `to` beyond the last.
+  template <typename Visit>
+  static void forEachBlock(Visit&& visit) {
+    for (int block = 0; block < 27; ++block) {
+      const Cell from = Cell(block % 3, block / 3 % 3, block / 9) * 4;
+      visit(from, Cell((from + Cell::Constant(4)).cwiseMin(kSide)));
+    }
+  }
+  /// Calls visit(sample, its cell) for the samples of a block.
+  template <typename Visit>
+  static void forEachSample(const Cell& from, const Cell& to, Visit&& visit) {
+    for (int z = from.z(); z < to.z(); ++z) {
+      for (int y = from.y(); y < to.y(); ++y) {
+        for (int x = from.x(); x < to.x(); ++x) visit(sampleIndex({x, y, z}), Cell(x, y, z));
+      }
+    }
+  }
+  /// The middle of a block, and how far its samples are from there [m].
+  [[nodiscard]] Vector3 middleOf(const Cell& from, const Cell& to) const {
+    return p_MoFo_M + (from + to - Cell::Ones()).cast<double>() / 2 * voxel;
+  }
+  [[nodiscard]] double radiusOf(const Cell& from, const Cell& to) const {
+    return (to - from - Cell::Ones()).cast<double>().norm() / 2 * voxel;
   }
   /// [voxels] The trilinear distance at a point in a brick with a slot, `p` [voxels] from its corner.
   [[nodiscard]] double interpolated(std::size_t node, const Vector3& p) const;
@@ -132,23 +165,36 @@ class BrickLevel {
   std::vector<float> beyond_;  // fine level only: per node, how much its band is deeper [voxels]
 };
 
-inline BrickLevel::Point BrickLevel::at(std::int64_t node, const Cell& in_brick) const {
-  if (node < 0) return {};
-  Point point;
-  point.known = true;
+inline BrickLevel::BrickState BrickLevel::brickAt(std::int64_t node) const {
+  BrickState brick;
+  if (node < 0) return brick;
+  brick.known = true;
   const std::int32_t of_slot = slot[static_cast<std::size_t>(node)];
   if (of_slot < 0) {
-    point.free = point.reached = free[static_cast<std::size_t>(node)] != 0;
-    point.distance = structures::DistanceField::kBandVoxels;
+    brick.free = free[static_cast<std::size_t>(node)] != 0;
+    return brick;
+  }
+  const auto s = static_cast<std::size_t>(of_slot);
+  brick.samples = samplesOf(of_slot);
+  if (!outside.empty()) brick.outside = &outside[s];
+  if (!reached.empty()) brick.reached = &reached[s];
+  return brick;
+}
+
+inline BrickLevel::Point BrickLevel::BrickState::at(const Cell& in_brick) const {
+  Point point;
+  point.known = known;
+  if (samples == nullptr) {
+    point.free = point.reached = free;
+    point.distance = known ? structures::DistanceField::kBandVoxels : 0.0;
     return point;
   }
   const int sample = sampleIndex(in_brick);
   point.distance =
-      std::abs(static_cast<double>(samplesOf(of_slot)[sample])) / structures::DistanceField::kQuantaPerVoxel;
-  const auto s = static_cast<std::size_t>(of_slot);
-  if (!outside.empty()) point.free = outside[s][static_cast<std::size_t>(sample)];
-  if (!reached.empty()) {
-    const std::uint64_t word = reached[s][static_cast<std::size_t>(in_brick.z())];
+      std::abs(static_cast<double>(samples[sample])) / structures::DistanceField::kQuantaPerVoxel;
+  if (outside != nullptr) point.free = (*outside)[static_cast<std::size_t>(sample)];
+  if (reached != nullptr) {
+    const std::uint64_t word = (*reached)[static_cast<std::size_t>(in_brick.z())];
     point.reached = (word >> static_cast<unsigned>(in_brick.y() * kVoxels + in_brick.x()) & 1U) != 0;
   }
   return point;
@@ -161,13 +207,13 @@ void BrickLevel::visitAround(std::size_t node, int below, int above, Visit&& vis
     const Cell brick_offset = Cell(neighbour % 3, neighbour / 3 % 3, neighbour / 9) - Cell::Ones();
     const auto first = [&](int axis) { return brick_offset[axis] < 0 ? kVoxels - below : 0; };
     const auto end = [&](int axis) { return brick_offset[axis] > 0 ? above : kVoxels; };
-    const std::int64_t neighbour_node =
-        brick_offset.isZero() ? static_cast<std::int64_t>(node) : nodeAt(brick + brick_offset);
+    const BrickState from =
+        brickAt(brick_offset.isZero() ? static_cast<std::int64_t>(node) : nodeAt(brick + brick_offset));
     for (int z = first(2); z < end(2); ++z) {
       for (int y = first(1); y < end(1); ++y) {
         for (int x = first(0); x < end(0); ++x) {
           const Cell in_brick(x, y, z);
-          visit(Cell(in_brick + brick_offset * kVoxels), at(neighbour_node, in_brick));
+          visit(Cell(in_brick + brick_offset * kVoxels), from.at(in_brick));
         }
       }
     }

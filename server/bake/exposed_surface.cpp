@@ -121,6 +121,8 @@ class CellMap {
     const std::int32_t slot = level_.slot[static_cast<std::size_t>(node)];
     const std::int16_t* samples = slot < 0 ? nullptr : level_.samplesOf(slot);
     bool all_known = true;
+    Cell looked_up = brick;
+    BrickLevel::BrickState state = level_.brickAt(node);
     for (const Cell& offset : kAround) {
       const Cell in_samples = in_brick + offset;
       double distance = 0.0;
@@ -129,7 +131,13 @@ class CellMap {
         if (!level_.outside[static_cast<std::size_t>(slot)][static_cast<std::size_t>(sample)]) continue;
         distance = samples[sample] / double{structures::DistanceField::kQuantaPerVoxel};
       } else {
-        const BrickLevel::Point point = level_.at(cell + offset);
+        const Cell lattice = cell + offset;
+        const Cell neighbour(lattice.x() >> 3, lattice.y() >> 3, lattice.z() >> 3);
+        if (neighbour != looked_up) {
+          looked_up = neighbour;
+          state = level_.brickAt(level_.nodeAt(neighbour));
+        }
+        const BrickLevel::Point point = state.at(lattice - neighbour * kVoxels);
         all_known = all_known && point.known;
         if (!point.free || !point.known) continue;
         distance = point.distance;

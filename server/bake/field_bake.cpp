@@ -50,13 +50,24 @@ void finishSamples(BrickLevel& level, const TriangleTree& exposed, const Triangl
     TriangleTree::Search search(hidden, level.centreOf(node), BrickLevel::kBrickRadius * level.voxel,
                                 (level.clampOf(node) + 0.01) * level.voxel);
     BrickLevel::SampleBits stale = inside & level.ownSamples(node);
-    for (int k = 0; k < BrickLevel::kSamples; ++k) {
-      if (!stale[static_cast<std::size_t>(k)]) continue;
-      // the stored distance, one quantum larger because of rounding
-      const double reach = (samples[k] + 1) * level.voxel / structures::DistanceField::kQuantaPerVoxel;
-      const Vector3 p = level.position(corner + BrickLevel::cellOfSample(k));
-      if (search.squaredDistance(p, reach) >= reach * reach) stale.reset(static_cast<std::size_t>(k));
-    }
+    level.forEachBlock([&](const Cell& from, const Cell& to) {
+      // of the stored distances, one quantum larger because of rounding
+      const auto reachOf = [&](int k) {
+        return (samples[k] + 1) * level.voxel / structures::DistanceField::kQuantaPerVoxel;
+      };
+      double farthest = 0.0;
+      BrickLevel::forEachSample(from, to, [&](int k, const Cell&) {
+        if (stale[static_cast<std::size_t>(k)]) farthest = std::max(farthest, reachOf(k));
+      });
+      const bool none = farthest == 0.0 || !search.focus(level.middleOf(corner + from, corner + to),
+                                                         level.radiusOf(from, to), farthest);
+      BrickLevel::forEachSample(from, to, [&](int k, const Cell& in_brick) {
+        if (!stale[static_cast<std::size_t>(k)]) return;
+        const double reach = reachOf(k);
+        if (none || search.squaredDistance(level.position(corner + in_brick), reach) >= reach * reach)
+          stale.reset(static_cast<std::size_t>(k));
+      });
+    });
     level.sampleBrick(node, exposed, stale);
   });
   forEachBrick([&](std::size_t node, const BrickLevel::SampleBits&) { level.copyApron(node); });

@@ -41,18 +41,51 @@ double distanceBoundFromCoarse(const BrickLevel& coarse, const Vector3& p_M) {
   return point.distance * coarse.voxel - (coarse.position(lattice) - p_M).norm();
 }
 
+/// Along one axis, the coarse lattice coordinates nearest to the samples of a fine brick, and how far they
+/// are.
+struct NearestCoarse {
+  std::array<int, kOutsideVoxels> lattice{};
+  std::array<double, kOutsideVoxels> away{};  // [m]
+
+  NearestCoarse(const BrickLevel& level, const BrickLevel& coarse, const Cell& corner, Eigen::Index axis) {
+    for (int i = 0; i < kOutsideVoxels; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const double p = level.position(corner + Cell::Constant(i))[axis];
+      lattice[k] = static_cast<int>(std::round((p - coarse.p_MoFo_M[axis]) / coarse.voxel));
+      away[k] = coarse.position(Cell::Constant(lattice[k]))[axis] - p;
+    }
+  }
+};
+
+/// Seeds what coarse samples' empty balls show to be outside by sigma: distanceBoundFromCoarse() at each
+/// sample.
 void seedFromCoarse(Flood& flood, const BrickLevel& level, const BrickLevel& coarse) {
   for (std::size_t node = 0; node < level.nodes(); ++node) {
     const Cell corner = level.brickOf(node) * kOutsideVoxels;
+    const NearestCoarse x(level, coarse, corner, 0);
+    const NearestCoarse y(level, coarse, corner, 1);
+    const NearestCoarse z(level, coarse, corner, 2);
     Mask mask{};
     bool any = false;
-    for (int k = 0; k < kOutsideVoxels * kOutsideVoxels * kOutsideVoxels; ++k) {
-      const Cell in_brick(k % kOutsideVoxels, k / kOutsideVoxels % kOutsideVoxels,
-                          k / (kOutsideVoxels * kOutsideVoxels));
-      if (distanceBoundFromCoarse(coarse, level.position(corner + in_brick)) <= kSigma * level.voxel)
-        continue;
-      mask[static_cast<std::size_t>(in_brick.z())] |= std::uint64_t{1} << static_cast<unsigned>(k % 64);
+    // neighbouring samples mostly have the same nearest one
+    Cell last = Cell::Constant(-1);
+    double radius = -1.0;  // [m]
+    for (std::size_t k = 0; k < kOutsideVoxels * kOutsideVoxels * kOutsideVoxels; ++k) {
+      const std::size_t in_x = k % kOutsideVoxels;
+      const std::size_t in_y = k / kOutsideVoxels % kOutsideVoxels;
+      const std::size_t in_z = k / (kOutsideVoxels * kOutsideVoxels);
+      const Cell nearest(x.lattice[in_x], y.lattice[in_y], z.lattice[in_z]);
+      if (nearest != last) {
+        last = nearest;
+        const BrickLevel::Point point = coarse.at(nearest);
+        radius = point.free ? point.distance * coarse.voxel : -1.0;
+      }
+      if (radius < 0.0) continue;
+      const double away = Vector3(x.away[in_x], y.away[in_y], z.away[in_z]).norm();
+      if (radius - away <= kSigma * level.voxel) continue;
+      mask[in_z] |= std::uint64_t{1} << static_cast<unsigned>(k % 64);
       any = true;
+      if (level.slot[node] < 0) break;
     }
     if (any) flood.seed(node, mask);
   }

@@ -168,6 +168,10 @@ class SlopeLimiter {
     const std::int16_t* samples = level_.samplesOf(level_.slot[node]);
     if (!hasBothSigns(samples)) return;
     const Cell corner = level_.brickOf(node) * BrickLevel::kVoxels;
+    std::array<int, kSide * kSide> highest;
+    for (int row = 0; row < kSide * kSide; ++row)
+      highest[static_cast<std::size_t>(row)] =
+          *std::max_element(samples + row * kSide, samples + (row + 1) * kSide);
     const BrickLevel::SampleBits& outside = level_.outside[static_cast<std::size_t>(level_.slot[node])];
     for (int sample = 0; sample < BrickLevel::kSamples; ++sample) {
       // a distance outside is exact: no bound exceeds it
@@ -176,7 +180,9 @@ class SlopeLimiter {
       int best = samples[sample];
       int best_centre = sample;
       for (int row = 0; row < kSide * kSide; ++row) {
-        const int* decrease = decreasesAlong(at, row) + (kLast - at.x());
+        const int* of_row = decreasesAlong(at, row);
+        if (highest[static_cast<std::size_t>(row)] - of_row[kLast] <= best) continue;
+        const int* decrease = of_row + (kLast - at.x());
         const std::int16_t* from = samples + row * kSide;
         int best_of_row = best;
         for (int x = 0; x < kSide; ++x) best_of_row = std::max(best_of_row, from[x] - decrease[x]);

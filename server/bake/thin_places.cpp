@@ -27,6 +27,8 @@ constexpr double kNoise = 4e-5;
 constexpr double kSparseWhereRefined = 4.0;
 /// [voxels] Thin walls are seen from so far on both sides: their distance is exact there.
 constexpr double kBeyond = 2.5;
+/// [voxels] A point with such a distance is inside of a solid.
+constexpr double kInside = -0.75;
 /// [-] Largest gradient of the dilation.
 constexpr double kSlope = 0.2;
 
@@ -63,35 +65,38 @@ Vector3 wideGradient(const Field& field, const Vector3& p_MP, double voxel) {
   return gradient;
 }
 
-/// The distances beyond a thin wall at p, a point of its surface with `normal_M` of either sign. None at a
-/// solid: there an inside of 0.75 voxels is near, straight behind p or where the gradient leads inwards. With
-/// air straight behind it there is none.
-std::optional<Beyond> beyondThinWall(const Field& field, Vector3 p_MP, const Vector3& normal_M,
-                                     double voxel) {
-  constexpr double kInside = -0.75;
+/// The distances beyond a wall at p, a point of its surface with `normal_M` of either sign. None where an
+/// inside of 0.75 voxels is straight behind p.
+std::optional<Beyond> beyondWall(const Field& field, const Vector3& p_MP, const Vector3& normal_M,
+                                 double voxel) {
+  for (const double side : {-voxel, voxel})
+    if (field.sample(p_MP + side * normal_M).distance <= kInside * voxel) return std::nullopt;
+  const Vector3 away = kBeyond * voxel * normal_M;
+  return Beyond{field.sample(p_MP - away).distance, field.sample(p_MP + away).distance};
+}
+
+/// Whether the wall of beyondWall() is thin: it is where air is straight behind it, and where no inside of
+/// 0.75 voxels is where the gradient leads inwards.
+bool isThinWall(const Field& field, Vector3 p_MP, const Beyond& beyond, double voxel) {
+  constexpr double kAir = 0.9;  // [voxels] 2.5 voxels from the surface: behind a wall of 1.6 voxels at most
   constexpr double kStep = 0.25;
   constexpr int kSteps = 9;
   constexpr double kNoGradient = 0.1;  // [-] as in the middle of a thin wall
   constexpr double kBack = -0.5;       // [-] cosine of consecutive steps
-  for (const double side : {-voxel, voxel})
-    if (field.sample(p_MP + side * normal_M).distance <= kInside * voxel) return std::nullopt;
-  constexpr double kAir = 0.9;  // [voxels] 2.5 voxels from the surface: behind a wall of 1.6 voxels at most
-  const Vector3 away = kBeyond * voxel * normal_M;
-  const Beyond beyond{field.sample(p_MP - away).distance, field.sample(p_MP + away).distance};
-  if (std::min(beyond[0], beyond[1]) >= kAir * voxel) return beyond;
+  if (std::min(beyond[0], beyond[1]) >= kAir * voxel) return true;
   Vector3 before = Vector3::Zero();
   for (int i = 0; i <= kSteps; ++i) {
     const structures::FieldSample here = field.sample(p_MP);
-    if (here.distance <= kInside * voxel) return std::nullopt;
+    if (here.distance <= kInside * voxel) return false;
     // at an edge, a cell's own gradient may be along a face
     Vector3 inwards = -wideGradient(field, p_MP, voxel);
     if (inwards.norm() < kNoGradient) inwards = -here.gradient;
     // where it leads back, the middle of the wall has been passed
-    if (inwards.norm() < kNoGradient || inwards.normalized().dot(before) < kBack) return beyond;
+    if (inwards.norm() < kNoGradient || inwards.normalized().dot(before) < kBack) return true;
     before = inwards.normalized();
     p_MP += kStep * voxel * before;
   }
-  return beyond;
+  return true;
 }
 
 class ThinPlaceFinder {
@@ -109,11 +114,11 @@ class ThinPlaceFinder {
   void measure() {
     const std::vector<double> areas =
         forEachThinPoint(2.0, [this](const Vector3& p, const Vector3& normal_M, double voxel) {
-          const auto beyond = beyondThinWall(field_, p, normal_M, voxel);
+          const auto beyond = beyondWall(field_, p, normal_M, voxel);
           if (!beyond) return false;
           const double outside = field_.sample(p).distance;
           const double dilation = dilationFor(outside, halfThickness(*beyond, outside, voxel), voxel);
-          if (dilation <= noise(voxel)) return false;
+          if (dilation <= noise(voxel) || !isThinWall(field_, p, *beyond, voxel)) return false;
           raise(needed_[brickAt(p)], static_cast<float>(dilation));
           return true;
         });
@@ -134,8 +139,9 @@ class ThinPlaceFinder {
     const Field offsets(layout, nullptr);
     for (const double area :
          forEachThinPoint(2.5, [&](const Vector3&p, const Vector3&normal_M, double voxel) {
-           return field_.sample(p).distance - offsets.dilationAt(p) > kOpen &&
-                  beyondThinWall(field_, p, normal_M, voxel).has_value();
+           if (field_.sample(p).distance - offsets.dilationAt(p) <= kOpen) return false;
+           const auto beyond = beyondWall(field_, p, normal_M, voxel);
+           return beyond && isThinWall(field_, p, *beyond, voxel);
          }))
       places.open_area += area;
     return places;

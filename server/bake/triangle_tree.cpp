@@ -11,8 +11,12 @@ namespace {
 
 // A search starts from about this many boxes instead of the root.
 constexpr std::size_t kRoots = 24;
-// Relative rounding error of the float arithmetic in squaredDistances, with a margin.
-constexpr float kRounding = 1e-5F;
+// [-] That of distances from the centre of a focus, with a margin.
+constexpr double kFocusRounding = 1e-6;
+// More triangles are not listed one by one.
+constexpr std::size_t kMostCandidates = 512;
+// [rounding errors of a point] That of its distance from a plane, with a margin.
+constexpr float kPlaneSlack = 8.0F;
 
 }  // namespace
 
@@ -149,24 +153,20 @@ bool TriangleTree::anyWithin(const Vector3& p, double radius) const {
   return false;
 }
 
-std::array<bool, 4> TriangleTree::Node::intersectedBy(const Vector3f& p, const Vector3f& inverse_direction,
-                                                      float end) const {
-  Lanes enter = Lanes::Zero();
-  Lanes leave = Lanes::Constant(end);
+TriangleTree::Node TriangleTree::emptyNode() {
+  Node empty;
+  empty.low.fill(Lanes::Constant(std::numeric_limits<float>::max()));
+  empty.high = empty.low;
+  empty.child.fill(kNothing);
+  return empty;
+}
+
+void TriangleTree::Node::take(std::size_t lane, const Node& from, std::size_t source) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const float c = p[static_cast<Eigen::Index>(axis)];
-    const float inverse = inverse_direction[static_cast<Eigen::Index>(axis)];
-    const Lanes a = (low[axis] - c) * inverse;
-    const Lanes b = (high[axis] - c) * inverse;
-    enter = enter.max(a.min(b));
-    leave = leave.min(a.max(b));
+    low[axis][static_cast<Eigen::Index>(lane)] = from.low[axis][static_cast<Eigen::Index>(source)];
+    high[axis][static_cast<Eigen::Index>(lane)] = from.high[axis][static_cast<Eigen::Index>(source)];
   }
-  std::array<bool, 4> met{};
-  for (std::size_t lane = 0; lane < 4; ++lane) {
-    const auto i = static_cast<Eigen::Index>(lane);
-    met[lane] = leave[i] * (1.0F + kRounding) >= enter[i];
-  }
-  return met;
+  child[lane] = from.child[source];
 }
 
 bool TriangleTree::oddCrossings(const Vector3& p, const Vector3& direction) const {
@@ -251,21 +251,8 @@ TriangleTree::Search::Search(const TriangleTree& tree, const Vector3& centre, do
     }
   }
   for (std::size_t i = 0; i < found.size(); ++i) {
-    if (i % 4 == 0) {
-      Node empty;
-      empty.low.fill(Lanes::Constant(std::numeric_limits<float>::max()));
-      empty.high = empty.low;
-      empty.child.fill(kNothing);
-      roots_.push_back(empty);
-    }
-    const Node& from = tree.nodes_[found[i].node];
-    const auto source = static_cast<Eigen::Index>(found[i].lane);
-    const auto lane = static_cast<Eigen::Index>(i % 4);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      roots_.back().low[axis][lane] = from.low[axis][source];
-      roots_.back().high[axis][lane] = from.high[axis][source];
-    }
-    roots_.back().child[i % 4] = from.child[found[i].lane];
+    if (i % 4 == 0) roots_.push_back(emptyNode());
+    roots_.back().take(i % 4, tree.nodes_[found[i].node], found[i].lane);
   }
 }
 
@@ -298,13 +285,113 @@ void TriangleTree::Search::visit(const Node& node, const Vector3& p, const Vecto
   }
 }
 
+void TriangleTree::Search::visitLeaves(const Leaves& leaves, const Vector3& p, const Vector3f& p_local,
+                                       double& squared) {
+  const Lanes above = leaves.normals[0] * p_local.x() + leaves.normals[1] * p_local.y() +
+                      leaves.normals[2] * p_local.z() - leaves.offsets;
+  const Lanes from_plane = (above.abs() - kPlaneSlack * tree_.slack_).max(0.0F);
+  std::array<float, 4> away;
+  Lanes::Map(away.data()) =
+      leaves.boxes.squaredDistances(p_local).max(from_plane * from_plane) * (1.0F - kRounding);
+  for (unsigned lane = 0; lane < 4; ++lane) {
+    const std::uint32_t triangle = leaves.boxes.child[lane] - kTriangle;
+    if (!(away[lane] < squared) || leaves.boxes.child[lane] == kNothing || triangle == last_) continue;
+    const double candidate = tenon::structures::squaredDistance(p, tree_.triangles_[triangle]);
+    if (candidate >= squared) continue;
+    squared = candidate;
+    last_ = triangle;
+  }
+}
+
+void TriangleTree::Search::collect(const Node& node, const Vector3& p, const Vector3f& p_local, double spread,
+                                   double& far) {
+  std::array<float, 4> away;
+  Lanes::Map(away.data()) = node.squaredDistances(p_local) * (1.0F - kRounding);
+  unsigned remaining = 0xF;
+  while (remaining != 0 && candidates_.size() <= kMostCandidates) {
+    // the nearest box first, as the limit decreases
+    auto lane = static_cast<unsigned>(std::countr_zero(remaining));
+    for (unsigned other = lane + 1; other < 4; ++other) {
+      if ((remaining >> other & 1U) != 0 && away[other] < away[lane]) lane = other;
+    }
+    if (!(away[lane] < far * far)) return;
+    remaining &= ~(1U << lane);
+    const std::uint32_t child = node.child[lane];
+    if (child == kNothing) continue;
+    if ((child & kTriangle) == 0) {
+      collect(tree_.nodes_[child], p, p_local, spread, far);
+      continue;
+    }
+    const double distance =
+        std::sqrt(tenon::structures::squaredDistance(p, tree_.triangles_[child - kTriangle]));
+    if (distance >= far) continue;
+    candidates_.push_back({distance, &node, lane});
+    far = std::min(far, distance + spread);
+  }
+}
+
+void TriangleTree::Search::listCandidates(double far) {
+  std::erase_if(candidates_, [far](const Candidate& candidate) { return candidate.distance > far; });
+  std::sort(candidates_.begin(), candidates_.end(),
+            [](const Candidate& a, const Candidate& b) { return a.distance < b.distance; });
+  leaves_.resize((candidates_.size() + 3) / 4);
+  for (std::size_t i = 0; i < candidates_.size(); ++i) {
+    const Candidate& candidate = candidates_[i];
+    Leaves& leaves = leaves_[i / 4];
+    if (i % 4 == 0) {
+      leaves.boxes = emptyNode();
+      leaves.normals.fill(Lanes::Zero());
+      leaves.offsets = Lanes::Zero();
+      leaves.nearest = candidate.distance;
+    }
+    const auto lane = static_cast<Eigen::Index>(i % 4);
+    leaves.boxes.take(i % 4, *candidate.node, candidate.lane);
+    const structures::Triangle& t = tree_.triangles_[candidate.node->child[candidate.lane] - kTriangle];
+    const Vector3 normal = (t[1] - t[0]).cross(t[2] - t[0]).normalized();
+    if (!normal.allFinite()) continue;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      leaves.normals[axis][lane] = static_cast<float>(normal[static_cast<Eigen::Index>(axis)]);
+    // with the rounded normal, so that the plane still contains the triangle to within rounding
+    leaves.offsets[lane] = static_cast<float>(normal.dot(t[0] - tree_.centre_));
+  }
+}
+
+bool TriangleTree::Search::focus(const Vector3& centre, double radius, double reach) {
+  focused_ = false;
+  candidates_.clear();
+  slack_ = kFocusRounding * (radius + reach);
+  const double wide = radius + slack_;
+  double far = reach + wide;
+  if (last_ != kNothing) {
+    const double found = std::sqrt(tenon::structures::squaredDistance(centre, tree_.triangles_[last_]));
+    far = std::min(far, found + slack_ + 2.0 * wide);
+  }
+  const Vector3f p_local = tree_.local(centre);
+  for (const Node& root : roots_) collect(root, centre, p_local, 2.0 * wide, far);
+  if (candidates_.empty()) return false;
+  if (candidates_.size() > kMostCandidates) return true;
+  listCandidates(far);
+  focus_ = centre;
+  focused_ = true;
+  return true;
+}
+
 double TriangleTree::Search::squaredDistance(const Vector3& p, double reach) {
   double squared = reach * reach;
   if (last_ != kNothing) {
     squared = std::min(squared, tenon::structures::squaredDistance(p, tree_.triangles_[last_]));
   }
   const Vector3f p_local = tree_.local(p);
-  for (const Node& root : roots_) visit(root, p, p_local, squared);
+  if (!focused_) {
+    for (const Node& root : roots_) visit(root, p, p_local, squared);
+    return squared;
+  }
+  const double away = (p - focus_).norm() + slack_;
+  for (const Leaves& leaves : leaves_) {
+    const double nearest = leaves.nearest - away;
+    if (nearest > 0.0 && nearest * nearest >= squared) break;
+    visitLeaves(leaves, p, p_local, squared);
+  }
   return squared;
 }
 

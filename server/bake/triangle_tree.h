@@ -39,6 +39,8 @@ class TriangleTree {
 
  private:
   using Lanes = Eigen::Array<float, 4, 1>;
+  /// [-] Relative rounding error of the float arithmetic with boxes, with a margin.
+  static constexpr float kRounding = 1e-5F;
   struct Node {
     std::array<Lanes, 3> low, high;      // of unused lanes: the largest float
     std::array<std::uint32_t, 4> child;  // a node, kTriangle + a triangle, or kNothing
@@ -49,9 +51,30 @@ class TriangleTree {
       return x * x + y * y + z * z;
     }
     /// For each lane whether a ray intersects its box, up to the multiple `end` [-] of its direction.
-    [[nodiscard]] std::array<bool, 4> intersectedBy(const Vector3f& p, const Vector3f& inverse_direction,
-                                                    float end) const;
+    [[nodiscard]] EIGEN_ALWAYS_INLINE std::array<bool, 4> intersectedBy(const Vector3f& p,
+                                                                        const Vector3f& inverse_direction,
+                                                                        float end) const {
+      Lanes enter = Lanes::Zero();
+      Lanes leave = Lanes::Constant(end);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const float c = p[static_cast<Eigen::Index>(axis)];
+        const float inverse = inverse_direction[static_cast<Eigen::Index>(axis)];
+        const Lanes a = (low[axis] - c) * inverse;
+        const Lanes b = (high[axis] - c) * inverse;
+        enter = enter.max(a.min(b));
+        leave = leave.min(a.max(b));
+      }
+      std::array<bool, 4> met;
+      for (std::size_t lane = 0; lane < 4; ++lane) {
+        const auto i = static_cast<Eigen::Index>(lane);
+        met[lane] = leave[i] * (1.0F + kRounding) >= enter[i];
+      }
+      return met;
+    }
+    /// Copies a lane of another node.
+    void take(std::size_t lane, const Node& from, std::size_t source);
   };
+  [[nodiscard]] static Node emptyNode();
   static constexpr std::uint32_t kTriangle = 0x80000000U;
   static constexpr std::uint32_t kNothing = 0xFFFFFFFFU;
 
@@ -71,17 +94,45 @@ class TriangleTree::Search {
   /// For points within `radius` [m] of `centre`, and triangles within `reach` [m] of them.
   Search(const TriangleTree& tree, const Vector3& centre, double radius, double reach);
 
+  /// From now on points are within `radius` [m] of `centre` and ask up to `reach` [m], both within what the
+  /// constructor was given: the few triangles that can be nearest to one of them are listed. False: none.
+  bool focus(const Vector3& centre, double radius, double reach);
+
   /// [m^2] Squared distance from p to the nearest triangle, or the square of `reach` [m] when none is nearer;
   /// `reach` may be smaller than that of the constructor.
   [[nodiscard]] double squaredDistance(const Vector3& p, double reach);
 
  private:
+  struct Candidate {
+    double distance;  // [m] from the centre of the focus to the whole triangle
+    const Node* node;
+    std::uint32_t lane;
+  };
+  /// Four candidates: their boxes and their planes.
+  struct Leaves {
+    Node boxes;
+    std::array<Lanes, 3> normals;  // [-]
+    Lanes offsets;                 // [m] normal times point
+    double nearest;                // [m] from the centre of the focus
+  };
   /// Lowers `squared` [m^2] to the squared distance of the nearest triangle in the subtree.
   void visit(const Node& node, const Vector3& p, const Vector3f& p_local, double& squared);
+  /// The same `squared` [m^2] for four candidates.
+  void visitLeaves(const Leaves& leaves, const Vector3& p, const Vector3f& p_local, double& squared);
+  /// Lists the triangles of the subtree nearer than `far` [m], which is lowered to the least distance
+  /// plus `spread` [m].
+  void collect(const Node& node, const Vector3& p, const Vector3f& p_local, double spread, double& far);
+  /// Makes leaves of the candidates up to `far` [m].
+  void listCandidates(double far);
 
   const TriangleTree& tree_;
   std::vector<Node> roots_;
   std::uint32_t last_ = kNothing;
+  bool focused_ = false;
+  Vector3 focus_ = Vector3::Zero();
+  double slack_ = 0.0;  // [m]
+  std::vector<Candidate> candidates_;
+  std::vector<Leaves> leaves_;
 };
 
 }  // namespace tenon::bake

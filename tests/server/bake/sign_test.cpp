@@ -93,13 +93,18 @@ struct SignErrors {
   }
 };
 
-/// Compares the sign of every `every`-th sample with the ground truth.
+/// Compares the sign of every `every`-th coarse sample with the ground truth.
 SignErrors countSignErrors(const EngineBay& bay, const structures::DistanceField& field, std::size_t every) {
   const structures::DistanceField::Layout& layout = field.layout();
   SignErrors errors;
   std::size_t number = 0;
   std::size_t next = 0;
-  for (const structures::DistanceField::Entry entry : layout.index) {
+  const auto children = static_cast<std::size_t>(layout.refinement * layout.refinement * layout.refinement);
+  while (number < layout.far.size()) {
+    structures::DistanceField::Entry entry = layout.index[number];
+    // a narrow gap is refined by itself; its coarse brick follows its children
+    if (entry >= structures::DistanceField::kRefined)
+      entry = layout.index[static_cast<std::size_t>(entry - structures::DistanceField::kRefined) + children];
     const auto linear_index = static_cast<int>(number++);
     if (entry < 0) continue;
     const Eigen::Array3d brick(linear_index % layout.bricks[0],
