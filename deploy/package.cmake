@@ -12,6 +12,7 @@ install(DIRECTORY scenarios DESTINATION share/tenon COMPONENT tenon
         PATTERN part_generator EXCLUDE PATTERN picture.png EXCLUDE)
 install(FILES deploy/demo.py deploy/demo_scene.py deploy/doctor.py DESTINATION share/tenon/deploy COMPONENT tenon)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/console_page DESTINATION share/tenon COMPONENT tenon OPTIONAL PATTERN built EXCLUDE)
+install(PROGRAMS clients/remote_hand/remote_hand.py DESTINATION share/tenon/clients/remote_hand COMPONENT tenon)
 install(DIRECTORY deploy/dds DESTINATION share/tenon/deploy COMPONENT tenon)
 install(PROGRAMS deploy/systemd/serve_or_resume DESTINATION share/tenon/deploy/systemd COMPONENT tenon)
 install(FILES deploy/systemd/tenon@.service DESTINATION share/tenon/deploy/systemd COMPONENT tenon)

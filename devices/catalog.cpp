@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "devices/drivers/remote_device.h"
 #include "devices/mounted_device.h"
 #include "devices/simulated/body_tracker.h"
 #include "devices/simulated/falcon.h"
@@ -42,6 +43,12 @@ OpenedBimanual openHug(const DeviceConfiguration& configuration) {
   return hug;
 }
 
+OpenedDevice openRemote(const DeviceConfiguration& configuration) {
+  auto device = RemoteDevice::open(configuration.address);
+  if (!device) return fail(device.error().what);
+  return std::move(*device);
+}
+
 OpenedTracker openBodyTracker(const DeviceConfiguration& /*configuration*/) {
   return std::make_unique<BodyTracker>();
 }
@@ -58,6 +65,7 @@ constexpr std::array kDevices{
     CatalogEntry<OpenedDevice>{"omega3-sim", openSimulated<omega3Model>},
     CatalogEntry<OpenedDevice>{"falcon-sim", openSimulated<falconModel>},
     CatalogEntry<OpenedDevice>{kBracelet, openVibrotac, {.arms = 0}},
+    CatalogEntry<OpenedDevice>{kRemoteHand, openRemote, {.simulated = false}},
 };
 
 constexpr std::array kBimanualDevices{

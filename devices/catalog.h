@@ -14,6 +14,7 @@ namespace tenon::devices {
 inline constexpr std::string_view kTraineeDevice = "hug-sim";
 inline constexpr std::string_view kInstructorDevice = "sigma7-sim";
 inline constexpr std::string_view kBracelet = "vibrotac-sim";
+inline constexpr std::string_view kRemoteHand = "remote";
 inline constexpr std::string_view kBodyTracker = "body-sim";
 
 /// Opens a device of the catalog by name; a new device is one line in catalog.cpp. An unknown name fails with

@@ -94,6 +94,16 @@ struct DeviceCommand {
   std::array<std::uint8_t, 6> tactors{};  ///< vibration intensities, 0 to 255
 };
 
+/// What a hand is shown beside its force: for a device whose owner sees the scene through it.
+struct HandView {
+  bool active = false;             ///< contacts are rendered; otherwise there is no proxy
+  bool in_contact = false;         ///< of its object
+  Pose X_DS;                       ///< proxy of the hand
+  Pose X_DO;                       ///< the object that it moves, at the proxy
+  Vector3 p_WC = Vector3::Zero();  ///< [m] centre of the device in the scene: p_WH = p_WC + p_DH
+  ObjectId object;                 ///< that it moves; invalid before the first contacts have arrived
+};
+
 /// Interface of a haptic device; independent of network and simulation.
 ///
 /// States: open (reads, no forces), armed (forces on), fault (forces off until an operator resets it). A
@@ -116,6 +126,8 @@ class HapticDevice {
   virtual void read(DeviceState& state) noexcept = 0;
   /// The command to display until the next write. Ignored unless armed; one that is not finite is a fault.
   virtual void write(const DeviceCommand& command) noexcept = 0;
+  /// What a hand is shown from the next write on. Most devices show nothing.
+  virtual void show(const HandView& /*view*/) noexcept {}
   /// Blocks until a reading is there that read() has not given, for 5 ms at most. Of a device whose
   /// DeviceCaps::paces is set: the servo loop waits by it instead of by a clock.
   virtual void await() noexcept {}

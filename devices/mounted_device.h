@@ -34,6 +34,13 @@ class MountedDevice final : public HapticDevice {
     turned.F_Ho_D = {q_DM_.conjugate() * command.F_Ho_D.force, q_DM_.conjugate() * command.F_Ho_D.torque};
     device_.write(turned);
   }
+  void show(const HandView& view) noexcept override {
+    HandView turned = view;
+    const Pose X_MD(Vector3::Zero(), q_DM_.conjugate());
+    turned.X_DS = X_MD * view.X_DS * X_MD.inverse();
+    turned.X_DO = X_MD * view.X_DO * X_MD.inverse();
+    device_.show(turned);
+  }
   void await() noexcept override { device_.await(); }
   [[nodiscard]] HapticDevice& inner() noexcept override { return device_.inner(); }
 

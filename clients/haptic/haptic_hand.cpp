@@ -148,6 +148,9 @@ devices::SafetyRequest HapticHand::request(const Pose& X_WH, double dt) noexcept
 
 void HapticHand::writeDevice(const devices::DeviceCommand& command) noexcept {
   if (handover_.pending()) return;
+  const LocalProxy& proxy = local_.proxy();
+  device_.show({proxy.active, in_contact_, workspace_.toDevice(proxy.X_WS), workspace_.toDevice(proxy.X_WO),
+                workspace_.centre(), local_.hasManifold() ? local_.manifold().object : ObjectId{}});
   device_.write(command);  // a stop brakes before the forces are off
   if (safety_.wantsDisarm()) device_.disarm();
 }

@@ -168,6 +168,24 @@ Result<Quaternion> parseMounting(const std::string& text) {
   return q_DM.normalized();
 }
 
+/// A remote hand without an address waits in the user's runtime folder, at a socket of its hand's name.
+Result<void> setRemoteAddresses(StationOptions& station) {
+  std::size_t arm = 0;
+  for (StationDevice& device : station.devices) {
+    const std::vector<std::string> hands =
+        station.hands.empty() ? defaultHands(station.role, arm + 1) : station.hands;
+    const bool named = device.name != devices::kRemoteHand || !device.configuration.address.empty();
+    if (!named && arm < hands.size()) {
+      const auto folder = wire::runtimeFolder();
+      if (!folder) return fail(folder.error().what);
+      device.configuration.address = *folder / ("remote-" + hands[arm] + ".sock");
+    }
+    const auto facts = devices::findDevice(device.name);
+    arm += facts ? facts->arms : 1;
+  }
+  return {};
+}
+
 /// The devices with what each is opened with.
 Result<void> setDevices(const Typed& typed, StationOptions& station) {
   const auto tooMany = [&](const auto& list) { return list.size() > typed.devices.size(); };
@@ -188,7 +206,7 @@ Result<void> setDevices(const Typed& typed, StationOptions& station) {
   }
   for (StationDevice& device : station.devices) device.configuration.dead_man = typed.dead_man;
   station.hands = typed.hands;
-  return {};
+  return setRemoteAddresses(station);
 }
 
 bool allSimulated(const StationOptions& station) {

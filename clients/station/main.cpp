@@ -20,6 +20,10 @@ int run(int argc, char** argv) {
     print(station.error().what);
     return 1;
   }
+  for (const tenon::station::StationDevice& device : line.arguments->station.devices) {
+    if (device.name == tenon::devices::kRemoteHand)
+      print("a remote hand may connect to " + device.configuration.address);
+  }
   tenon::haptic::StationProgramOptions& program = line.arguments->program;
   program.read_keys = isatty(STDIN_FILENO) != 0;
   program.print = print;
