@@ -17,9 +17,10 @@ NAMES = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 SCENARIO = "peg_and_box"
 
 
-def start_console(stage, port=0, **env):
+def start_console(stage, port=0, *arguments, shown=None, **env):
     """The gateway of this session, and its port."""
-    console = Process("console", [stage.session, "--domain", stage.domain, "--port", port], stage.out, env)
+    shown = [stage.session] if shown is None else shown
+    console = Process("console", [*shown, "--domain", stage.domain, "--port", port, *arguments], stage.out, env)
     stage.processes.append(console)
     line = console.wait_for(r"^console: http://localhost:\d+/$")
     return console, int(re.search(r":(\d+)/$", line)[1])
@@ -153,6 +154,92 @@ class Gateway(unittest.TestCase):
             self.assertRegex(done.stderr, rf"^tenon-console: port {port} of 127\.0\.0\.1: .*; name another one with --port")
 
 
+def pass_of(console):
+    """What the gateway printed for its user alone."""
+    return re.search(r"#pass=(\w+)$", console.wait_for("#pass="))[1]
+
+
+class Desk(unittest.TestCase):
+    """What a page asks of the desk, asked by a program."""
+
+    def test_rights_come_from_the_key_and_the_server_answers(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve("stacking", "--wait-for", "right")
+            console, port = start_console(stage, 0, "--role", "instructor")
+            console.wait_for("joined session 'test'")
+            stage.start("trainee", "--seed", 1)
+            server.wait_for("run: running")
+            own = f"http://localhost:{port}"
+            with Viewer(port, origin=own) as observer:
+                observer.begin("/console")
+                refused = observer.ask("deskCommand", words=["skip"])
+                self.assertFalse(refused["accepted"])
+                self.assertIn("an observer gives no commands", refused["text"])
+                for key in ("", "1234", 64 * "a"):
+                    refused = observer.ask("deskSit", role="instructor", name="Eve", key=key)
+                    self.assertEqual((refused["accepted"], refused["role"]), (False, ""), key)
+                self.assertIn("key", refused["text"])
+                self.assertFalse(observer.ask("deskSit", role="admin", name="Eve", key=pass_of(console))["accepted"], "the pass is for one role")
+            with Viewer(port, origin=own) as desk:
+                desk.begin("/console")
+                seated = desk.ask("deskSit", role="instructor", name="Ada", key=pass_of(console))
+                self.assertEqual((seated["accepted"], seated["role"]), (True, "instructor"), seated)
+                server.wait_for(r"Ada \(instructor\) has joined")
+                self.assertTrue(desk.ask("deskCommand", words=["note", "mind the edge"])["accepted"])
+                server.wait_for("Ada: mind the edge")
+                refused = desk.ask("deskCommand", words=["goto", "nowhere"])
+                self.assertIn("this scenario has no step 'nowhere'", refused["text"])
+                self.assertIn("unknown command", desk.ask("deskCommand", words=["conquer"])["text"])
+                self.assertTrue(desk.ask("deskCommand", words=["pause"])["accepted"])
+                self.assertTrue(desk.ask("deskCommand", words=["resume"])["accepted"])
+            server.wait_for(r"Ada \(instructor\) has left")
+            key = (Path(os.environ["XDG_RUNTIME_DIR"]) / "tenon" / "key").read_text(encoding="utf-8").strip()
+            with Viewer(port, origin=own) as desk:
+                desk.begin("/console")
+                self.assertTrue(desk.ask("deskSit", role="instructor", name="Bob", key=key)["accepted"], "the session's key, typed")
+
+    def test_a_page_from_elsewhere_looks_on_and_no_more(self):
+        with Stage() as stage:
+            console, port = start_console(stage, 0, "--role", "instructor", "--allow-origin", "https://viewer.example")
+            with Viewer(port, origin="https://viewer.example") as viewer:
+                viewer.begin("/console")
+                for operation, values in (("deskSit", {"role": "instructor", "name": "Eve", "key": pass_of(console)}), ("deskCommand", {"words": ["emergency"]})):
+                    refused = viewer.ask(operation, **values)
+                    self.assertEqual((refused["accepted"], refused["text"]), (False, "pages from elsewhere may look on only"))
+
+    def test_the_stop_is_raised_when_no_server_answers(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve("stacking", "--wait-for", "right")
+            console, port = start_console(stage)
+            console.wait_for("joined session 'test'")
+            stage.start("trainee", "--seed", 1)
+            server.wait_for("run: running")
+            with Viewer(port, origin=f"http://localhost:{port}") as viewer:
+                viewer.begin("/console")
+                server.signal(signal.SIGSTOP)
+                answer = viewer.ask("deskCommand", words=["emergency", "for a test"])
+                server.signal(signal.SIGCONT)
+                self.assertTrue(answer["accepted"], answer)
+                self.assertIn("no server has answered", answer["text"])
+                server.wait_for("emergency stop|engaged by console: for a test")
+
+    def test_the_lobby_lists_the_sessions_that_there_are(self):
+        with Stage() as stage:
+            stage.serve(SCENARIO, "--wait-for", "right")
+            _, port = start_console(stage, shown=[])
+            with Viewer(port, path="/lobby") as lobby:
+                lobby.begin("/lobby")
+                listed = next(state for _, payload in lobby.messages() if (state := json.loads(payload)["sessions"]))
+                self.assertEqual([(session["session"], session["title"]) for session in listed], [("test", "Peg and box")])
+            with Viewer(port, path="/live/test") as viewer:
+                viewer.begin("/console")
+                states = (json.loads(payload)["state"] for _, payload in viewer.messages())
+                self.assertIn("joined", states)
+            with self.assertRaises(Refused) as refused:
+                Viewer(port, path="/live/other")
+            self.assertEqual(refused.exception.status, 404)
+
+
 class Browser:
     """Chromium with the page."""
 
@@ -214,6 +301,88 @@ class Page(unittest.TestCase):
             browser("await", expression=f"tenon.session.isOver || {is_searching}")
             if pictures:
                 browser("picture", file=f"{pictures}/{SCENARIO}.png")
+            self.assertEqual(browser.problems, [])
+
+    def test_an_instructor_skips_a_step_and_stops_the_forces(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            server = stage.serve("stacking", "--wait-for", "right")
+            console, port = start_console(stage, 0, "--role", "instructor")
+            console.wait_for("joined session 'test'")
+            stage.start("trainee", "--seed", 1)
+            server.wait_for("run: running")
+            # who has the plain address looks on
+            browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="light")
+            browser("await", expression="document.querySelector('.top .badge').textContent === 'Live'")
+            self.assertTrue(browser("value", expression="document.querySelector('.desk').hidden"))
+
+            browser("open", url=f"http://localhost:{port}/#pass={pass_of(console)}", width=1280, height=800, theme="light")
+            browser("await", expression="document.querySelector('.desk')?.hidden === false")
+            self.assertEqual(browser("value", expression="location.hash"), "", "the pass does not stay in the address")
+            browser("value", expression="document.querySelector('[data-command=pause]').click()")
+            browser("await", expression="tenon.session.run.phase === 2")
+            # a space in a text is a space
+            browser("type", selector=".desk input", text="mind the edge")
+            browser("key", key="Enter")
+            server.wait_for("mind the edge")
+            self.assertEqual(browser("value", expression="tenon.session.standing.length"), 0)
+            browser("value", expression="document.activeElement.blur()")
+            browser("key", key="Space")
+            browser("await", expression="document.querySelector('.strip').classList.contains('raised')")
+            server.wait_for("pressed in the browser")
+            browser("value", expression="document.querySelector('.clear').click()")
+            browser("await", expression="!document.querySelector('.strip').classList.contains('raised')")
+            browser("value", expression="document.querySelector('[data-command=resume]').click()")
+            browser("await", expression="tenon.session.run.phase === 1")
+            browser("value", expression="document.querySelector('[data-command=skip]').click()")
+            browser("await", expression="[...document.querySelectorAll('.notice')].some(n => n.textContent === 'Skip: accepted')")
+            server.wait_for("step skipped")
+            self.assertEqual(browser.problems, [])
+
+    def test_a_recording_is_played_without_a_server(self):
+        with Stage() as stage, Browser() as browser:
+            recording = stage.out / "session.mcap"
+            server = stage.serve(SCENARIO, "--wait-for", "right,recorder")
+            recorder = stage.start("record", "-o", recording)
+            stage.start("trainee", "--seed", 1)
+            self.assertEqual((server.wait(), recorder.wait()), (0, 0), server.text())
+            _, port = start_console(stage, shown=[recording])
+            browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
+            browser("await", expression="tenon.player !== undefined && tenon.session.steps.length === 2")
+            browser("await", expression="tenon.view.models >= 3")
+            end = browser("value", expression="Number(document.querySelector('.timeline').ariaValueMax ?? document.querySelector('.timeline').getAttribute('aria-valuemax'))")
+            self.assertGreater(end, 5)
+            places = {}
+            for time in (0.2 * end, 0.95 * end, 0.2 * end):
+                browser("value", expression=f"tenon.player.seek({time})")
+                browser("await", expression=f"Math.abs(tenon.player.time - {time}) < 0.01 && Math.abs(tenon.session.tick / 1000 + tenon.player.recording.secondsOfTickZero - {time}) < 0.2")
+                # what is drawn is where the recording has it
+                state = "[...tenon.session.states.values()].find(s => tenon.session.objects.get(s.object_id).name === 'peg')"
+                browser("await", expression=f"JSON.stringify(tenon.view.positionOf('peg')) === JSON.stringify(Array.from({state}?.X_WO.p ?? []))")
+                places.setdefault(round(time, 3), []).append(browser("value", expression="tenon.view.positionOf('peg')"))
+            first, again = places[round(0.2 * end, 3)]
+            self.assertEqual(first, again, "a place is the same from both sides")
+            self.assertNotEqual(first, places[round(0.95 * end, 3)][0])
+            browser("key", key="Space")
+            browser("await", expression=f"tenon.player.time > {0.2 * end + 0.5}")
+            browser("value", expression="tenon.player.seek(1e9)")
+            browser("await", expression="tenon.session.isOver")
+            self.assertEqual(browser.problems, [])
+
+            # a file that is none
+            cut = stage.out / "cut.mcap"
+            cut.write_bytes(recording.read_bytes()[:100_000])
+            _, port = start_console(stage, shown=[cut])
+            browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
+            browser("await", expression="document.querySelector('.cover').dataset.state === 'file'")
+
+    def test_the_lobby_leads_to_a_session(self):
+        with Stage() as stage, Browser() as browser:
+            stage.serve(SCENARIO, "--wait-for", "right")
+            _, port = start_console(stage, shown=[])
+            browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
+            browser("await", expression="document.querySelector('.session h2')?.textContent === 'Peg and box'")
+            browser("value", expression="document.querySelector('.session').click()")
+            browser("await", expression="location.search === '?session=test' && window.tenon !== undefined && document.title === 'Peg and box – Tenon'")
             self.assertEqual(browser.problems, [])
 
 

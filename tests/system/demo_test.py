@@ -155,8 +155,8 @@ class Endings(DemoCase):
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGKILL):
             with self.subTest(signal=number.name):
                 demo = self.start()
-                self.wait_for_first_step(demo)
-                self.assertEqual(len(self.left_running()), 5)
+                self.assertRegex(self.wait_for_first_step(demo), r"\Aconsole: http://localhost:\d+/\n", "where to look is said first")
+                self.assertEqual(len(self.left_running()), 6)
                 demo.send_signal(number)
                 demo.communicate(timeout=120)
                 self.assertEqual(demo.returncode, -number if number == signal.SIGKILL else 128 + number)

@@ -37,13 +37,13 @@ def get(port, path, host=None, method="GET"):
 
 
 class Viewer:
-    def __init__(self, port, subprotocol="foxglove.sdk.v1", origin=None, host=None, receive_buffer=None):
+    def __init__(self, port, subprotocol="foxglove.sdk.v1", origin=None, host=None, receive_buffer=None, path="/"):
         self.socket = socket.socket()
         if receive_buffer:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
         self.socket.settimeout(30)
         self.socket.connect(("127.0.0.1", port))
-        lines = ["GET / HTTP/1.1", f"Host: {host or f'localhost:{port}'}", "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
+        lines = [f"GET {path} HTTP/1.1", f"Host: {host or f'localhost:{port}'}", "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
                  f"Sec-WebSocket-Key: {base64.b64encode(os.urandom(16)).decode()}"]
         lines += [f"Sec-WebSocket-Protocol: {subprotocol}"] if subprotocol else []
         lines += [f"Origin: {origin}"] if origin else []
@@ -131,6 +131,17 @@ class Viewer:
         self.subscriptions = {100 + channel["id"]: channel["topic"] for channel in chosen}
         self.send(json.dumps({"op": "subscribe", "subscriptions": [{"id": 100 + channel["id"], "channelId": channel["id"]} for channel in chosen]}))
         return self
+
+    def ask(self, operation, seconds=60, **values):
+        """The answer to a request to the desk; what else comes meanwhile is dropped."""
+        self.asked = getattr(self, "asked", 0) + 1
+        self.send(json.dumps({"op": operation, "id": self.asked, **values}))
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            message = self.receive()
+            if isinstance(message, dict) and message["op"] == "deskAnswer" and message["id"] == self.asked:
+                return message
+        raise AssertionError(f"no answer to {operation}")
 
     def messages(self, seconds=120):
         """(topic, payload) as they come, for so long."""

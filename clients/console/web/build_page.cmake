@@ -32,6 +32,7 @@ endif()
 if(NOT page_failed)
   # what the page contains of others comes with their licences
   file(GLOB licences ${WORK}/node_modules/three/LICENSE* ${WORK}/node_modules/uplot/LICENSE* ${WORK}/node_modules/@foxglove/*/LICENSE*
+       ${WORK}/node_modules/@mcap/*/LICENSE* ${WORK}/node_modules/fzstd/LICENSE* ${WORK}/node_modules/heap-js/LICENSE*
        ${WORK}/node_modules/tslib/LICENSE*)
   file(WRITE ${PAGE}/licences.txt "")
   foreach(licence ${licences})

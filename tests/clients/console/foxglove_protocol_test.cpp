@@ -45,6 +45,25 @@ TEST(FoxgloveProtocol, UnderstandsSubscriptions) {
   EXPECT_THAT(unsubscribe->unsubscribe, ElementsAre(7U, 8U));
 }
 
+TEST(FoxgloveProtocol, UnderstandsRequestsToTheDesk) {
+  const auto sit = parseViewerText(
+      R"({"op":"deskSit","id":3,"role":"instructor","name":"Ada","key":"00ff","words":["skip"]})");
+  ASSERT_TRUE(sit && sit->desk) << sit.error().what;
+  EXPECT_EQ(sit->desk->kind, DeskRequest::Kind::kSit);
+  EXPECT_EQ(sit->desk->id, 3U);
+  EXPECT_EQ(sit->desk->role, "instructor");
+  EXPECT_EQ(sit->desk->name, "Ada");
+  EXPECT_EQ(sit->desk->key, "00ff");
+  const auto command = parseViewerText(R"({"op":"deskCommand","id":4,"words":["note","mind the edge"]})");
+  ASSERT_TRUE(command && command->desk) << command.error().what;
+  EXPECT_EQ(command->desk->kind, DeskRequest::Kind::kCommand);
+  EXPECT_THAT(command->desk->words, ElementsAre("note", "mind the edge"));
+  const auto answer = nlohmann::json::parse(deskAnswerText({4, false, "\xFF", "instructor"}));
+  EXPECT_EQ(answer["id"], 4);
+  EXPECT_EQ(answer["accepted"], false);
+  EXPECT_EQ(answer["role"], "instructor");
+}
+
 TEST(FoxgloveProtocol, SaysWhatIsWrongWithARequest) {
   const std::vector<std::pair<std::string, std::string>> cases{
       {"", "no JSON object"},
@@ -61,6 +80,14 @@ TEST(FoxgloveProtocol, SaysWhatIsWrongWithARequest) {
       {R"({"op":"subscribe","subscriptions":[{"id":4294967296,"channelId":1}]})", "without numbers"},
       {R"({"op":"subscribe","subscriptions":[{"id":1.5,"channelId":1}]})", "without numbers"},
       {R"({"op":"unsubscribe","subscriptionIds":["a"]})", "no number"},
+      {R"({"op":"deskCommand","words":["skip"]})", "without a number 'id'"},
+      {R"({"op":"deskCommand","id":0,"words":["skip"]})", "without a number 'id'"},
+      {R"({"op":"deskCommand","id":1})", "without a list 'words'"},
+      {R"({"op":"deskCommand","id":1,"words":[]})", "without a list 'words'"},
+      {R"({"op":"deskCommand","id":1,"words":["a","b","c","d","e","f","g","h","i"]})",
+       "without a list 'words'"},
+      {R"({"op":"deskCommand","id":1,"words":[7]})", "no text"},
+      {R"({"op":"deskRule","id":1})", "'deskRule' is not offered"},
   };
   for (const auto& [text, reason] : cases) {
     const auto request = parseViewerText(text);

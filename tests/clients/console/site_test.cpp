@@ -1,5 +1,6 @@
 #include "clients/console/site.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -92,6 +93,40 @@ TEST(Host, NamesThisMachineOnly) {
   for (const char* host : {"", "evil.example", "evil.example:8080", "localhost.evil.example",
                            "localhost:", "localhost:80a", "127.0.0.1.evil", "::1", "localhost:80:80"})
     EXPECT_FALSE(isLoopbackHost(host)) << host;
+}
+
+TEST_F(SiteTest, ServesARecordingByRangesAlone) {
+  const fs::path file = folder_ / "a.mcap";
+  std::ofstream(file) << "0123456789";
+  Site site(folder_ / "none", wire::AssetStore(folder_));
+  EXPECT_EQ(site.answer("/recording.mcap", "bytes=0-3").status, 404U) << "there is none yet";
+  EXPECT_FALSE(site.serveRecording(folder_ / "other.mcap"));
+  EXPECT_FALSE(site.serveRecording(folder_));
+  ASSERT_TRUE(site.serveRecording(file));
+  const Answer part = site.answer("/recording.mcap?x", "bytes=2-4");
+  EXPECT_EQ(part.status, 206U);
+  EXPECT_EQ(std::string(part.body.begin(), part.body.end()), "234");
+  const std::pair<std::string, std::string> range{"Content-Range", "bytes 2-4/10"};
+  EXPECT_NE(std::find(part.headers.begin(), part.headers.end(), range), part.headers.end());
+  const Answer whole = site.answer("/recording.mcap");
+  EXPECT_EQ(whole.status, 416U);
+  EXPECT_TRUE(whole.body.empty());
+}
+
+TEST(Range, IsOneWithBothEndsInTheFile) {
+  EXPECT_EQ(parseRange("bytes=0-9", 10), (std::pair<std::uint64_t, std::uint64_t>(0, 9)));
+  for (const char* none : {"", "bytes=", "bytes=0-10", "bytes=5-4", "bytes=-3", "bytes=3-", "bytes=0-1,3-4",
+                           "lines=0-1", "bytes=0x1-2", "bytes=99999999999999999999-1"})
+    EXPECT_FALSE(parseRange(none, 10)) << none;
+}
+
+TEST(Room, IsTheSessionThatThePathNames) {
+  EXPECT_EQ(roomOf("/"), "/live");
+  EXPECT_EQ(roomOf("/live?x=1"), "/live");
+  EXPECT_EQ(roomOf("/lobby"), "/lobby");
+  EXPECT_EQ(roomOf("/live/demo"), "/live/demo");
+  EXPECT_EQ(roomOf("/live/a%20b%2Fc"), "/live/a b/c");
+  for (const char* odd : {"/live/%", "/live/%2", "/live/%zz"}) EXPECT_EQ(roomOf(odd), odd);
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 //   {"do": "open", "url": U, "width": W, "height": H, "theme": "dark" | "light"}
 //   {"do": "await", "expression": JS}   until it is true in the page
 //   {"do": "value", "expression": JS}
+//   {"do": "type", "selector": CSS, "text": T}
+//   {"do": "key", "key": K}   as Playwright names it
 //   {"do": "picture", "file": F}
 // Usage: node console_page.mjs PATH_OF_CHROMIUM
 import { createInterface } from "node:readline";
@@ -24,12 +26,21 @@ const commands = {
   },
   // asked from here again and again: in the page its content security policy forbids to evaluate texts
   async await({ expression }) {
-    for (const end = Date.now() + 120000; !(await page.evaluate(expression)); await new Promise((done) => setTimeout(done, 200))) {
+    const isTrue = () => page.evaluate(expression).catch((problem) => {
+      if (!String(problem).includes("context was destroyed")) throw problem; // another page is loaded meanwhile
+    });
+    for (const end = Date.now() + 120000; !(await isTrue()); await new Promise((done) => setTimeout(done, 200))) {
       if (Date.now() > end) throw new Error("it did not become true in time");
     }
   },
   async value({ expression }) {
     return page.evaluate(expression);
+  },
+  async type({ selector, text }) {
+    await page.locator(selector).first().pressSequentially(text);
+  },
+  async key({ key }) {
+    await page.keyboard.press(key);
   },
   async picture({ file }) {
     await page.screenshot({ path: file, timeout: 120000 });

@@ -11,6 +11,7 @@ const PASS = "pass"; // in the address, and in this tab's memory
 
 export class Desk {
   readonly stop = h("button", "stop");
+  readonly clear = h("button", "clear"); // apart from the stop, so that a double click never clears it
   readonly sit = h("button", "sit");
   readonly bar = h("section", "desk");
   readonly notices = h("div", "notices");
@@ -35,7 +36,8 @@ export class Desk {
     }
     if (sessionStorage.getItem(PASS) !== null && sessionStorage.getItem("role") === null && gatewayRole !== "") sessionStorage.setItem("role", gatewayRole);
     this.notices.setAttribute("role", "status");
-    this.stop.addEventListener("click", () => void this.pressStop());
+    this.stop.addEventListener("click", () => void this.raise());
+    this.clear.addEventListener("click", () => void this.command("clear"));
     this.sit.addEventListener("click", () => (this.role === "" ? this.askForSeat() : void this.leave()));
     source.onNotice = (answer) => {
       this.role = answer.role;
@@ -111,12 +113,12 @@ export class Desk {
   show(): void {
     const { session } = this;
     const isRaised = session.standing.length > 0;
-    const canClear = isRaised && this.role === "instructor";
-    const words: Key = canClear ? "stop.clear" : isRaised ? "stop.again" : this.isOfAll ? "stop.all" : "stop.press";
-    this.stop.className = canClear ? "stop clear" : "stop";
-    if (this.stop.dataset["words"] !== `${words}${t(words)}`) {
-      this.stop.dataset["words"] = `${words}${t(words)}`;
-      this.stop.replaceChildren(icon(canClear ? "done" : "stop"), h("span", "", t(words)), ...(canClear ? [] : [h("kbd", "", t("stop.key"))]));
+    const words: Key = isRaised ? "stop.again" : this.isOfAll ? "stop.all" : "stop.press";
+    this.clear.hidden = !isRaised || this.role !== "instructor";
+    if (this.stop.dataset["words"] !== t(words)) {
+      this.stop.dataset["words"] = t(words);
+      this.stop.replaceChildren(icon("stop"), h("span", "", t(words)), h("kbd", "", t("stop.key")));
+      this.clear.replaceChildren(icon("done"), t("stop.clear"));
     }
     const label = this.role === "" ? t("desk.sit") : t("desk.leave");
     if (this.sit.textContent !== label) this.sit.replaceChildren(icon("person"), label);
@@ -215,11 +217,6 @@ export class Desk {
     });
     this.dialog.replaceChildren(form);
     this.dialog.showModal();
-  }
-
-  async pressStop(): Promise<void> {
-    if (this.stop.classList.contains("clear")) return void this.command("clear");
-    await this.raise();
   }
 
   /** The emergency stop; also when one stands. */

@@ -75,6 +75,7 @@ const top_ = h("header", "top", brand, all, title, h("span", "grow"), time, link
 const app = document.getElementById("app") as HTMLElement;
 app.append(top_, strip, stage, tabs, side, status);
 strip.append(stripText);
+stripText.setAttribute("role", "status");
 
 // ---- the scene and the plot
 let view: SceneView | undefined;
@@ -271,7 +272,7 @@ function follow(room: string, role: string): void {
     desk?.loseSeat();
   });
   desk = new Desk(source, session, role);
-  strip.append(desk.stop, desk.sit);
+  strip.append(desk.sit, desk.clear, desk.stop);
   strip.after(desk.bar);
   stage.append(desk.notices);
 }
@@ -289,7 +290,7 @@ function showLobby(role: string): void {
 
 async function play(open: () => Promise<Awaited<ReturnType<typeof fromAddress>>>): Promise<void> {
   source?.close();
-  for (const element of [desk?.stop, desk?.sit, desk?.bar, desk?.notices, lobby?.element, player?.element]) element?.remove();
+  for (const element of [desk?.stop, desk?.clear, desk?.sit, desk?.bar, desk?.notices, lobby?.element, player?.element]) element?.remove();
   [source, desk, lobby, player] = [undefined, undefined, undefined, undefined];
   app.classList.remove("shows-lobby");
   opening = { fraction: 0 };

@@ -34,7 +34,7 @@ export class Player {
   private knob = h("i", "knob");
   private hint = h("output", "hint");
 
-  constructor(private recording: Recording, private session: Session, private titleOf: (step: string) => string) {
+  constructor(readonly recording: Recording, private session: Session, private titleOf: (step: string) => string) {
     const back = this.button("back", () => this.seek(this.time - FRAME), "player.back");
     const on = this.button("on", () => this.seek(this.time + FRAME), "player.on");
     this.play.addEventListener("click", () => this.toggle());

@@ -9,12 +9,12 @@ import type { ConsoleState, EventLog, HandState, InstanceGone, SessionAnnounce }
 
 // states and events: all of them before a moment tell how it stands then
 const KEPT = [
-  "SessionAnnounce", "SceneObject", "SceneHand", "SceneStep", "StepState", "RunState", "GrabState", "Presence", "EmergencyStop", "EmergencyClear", "EventLog",
+  "SessionAnnounce", "SceneObject", "SceneHand", "SceneStep", "ObjectSnapshot", "StepState", "RunState", "GrabState", "Presence", "EmergencyStop", "EmergencyClear", "EventLog",
   INSTANCE_STATE,
 ];
 // streams: the newest of each instance before a moment
 const STREAMS = ["WorldFrame_30", "WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepProgress"];
-const BEFORE = 150_000_000n; // [ns] in which each stream has a message
+const BEFORE = [150_000_000n, 1_000_000_000n, 8_000_000_000n]; // [ns] in which a frame of all objects is looked for: in real time some are lost
 const BLOCK = 1 << 19; // bytes that are read at a time
 const BLOCKS = 48; // that are kept
 const LARGEST = 1 << 26; // bytes of a chunk
@@ -150,11 +150,22 @@ export class Recording {
     this.next = undefined;
     for (const message of this.kept)
       if (message.time <= time || this.isScene(message)) this.tell(message);
-    const newest = new Map<string, Message>();
-    for await (const { logTime, channelId, data } of this.reader.readMessages({ topics: STREAMS, startTime: time - BEFORE, endTime: time }))
-      newest.set(this.instanceOf(channelId, data), { time: logTime, channel: channelId, data: data.slice() });
-    for (const message of newest.values()) this.tell(message);
+    for (const window of BEFORE) {
+      const newest = await this.newestOf(time - window, time);
+      const hasAll = newest.some(({ channel }) => this.decoders.get(channel)?.topic === "WorldFrame_30");
+      if (!hasAll && window !== BEFORE[BEFORE.length - 1]) continue;
+      for (const message of newest) this.tell(message);
+      break;
+    }
     this.reading = this.reader.readMessages({ topics: [...KEPT, ...STREAMS], startTime: time + 1n }) as unknown as Reading;
+  }
+
+  /** The newest of each instance of the streams, in order. */
+  private async newestOf(startTime: bigint, endTime: bigint): Promise<Message[]> {
+    const newest = new Map<string, Message>();
+    for await (const { logTime, channelId, data } of this.reader.readMessages({ topics: STREAMS, startTime, endTime }))
+      newest.set(this.instanceOf(channelId, data), { time: logTime, channel: channelId, data: data.slice() });
+    return [...newest.values()].sort((a, b) => Number(a.time - b.time));
   }
 
   /** What never changes is known from the first moment. */

@@ -1,0 +1,34 @@
+#include "clients/console/lobby.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+namespace tenon::console {
+namespace {
+
+TEST(Lobby, ListsTheSessionsThatAreThere) {
+  Lobby lobby;
+  auto listed = [&lobby] {
+    const auto published = lobby.take(1);
+    return published.empty() ? nlohmann::json() : nlohmann::json::parse(*published[0].payload)["sessions"];
+  };
+  EXPECT_EQ(listed(), nlohmann::json::array()) << "at first that there is none";
+  EXPECT_TRUE(listed().is_null()) << "nothing has changed";
+  lobby.add({.session = "b", .server_epoch = 1, .title = "Peg and box", .host = "lab"});
+  lobby.add({.session = "a", .server_epoch = 1});
+  const auto two = listed();
+  ASSERT_EQ(two.size(), 2U);
+  EXPECT_EQ(two[1]["title"], "Peg and box");
+  EXPECT_EQ(two[1]["host"], "lab");
+  EXPECT_THAT(lobby.names(), testing::ElementsAre("a", "b"));
+  lobby.add({.session = "a", .server_epoch = 2});
+  EXPECT_THAT(lobby.names(), testing::ElementsAre("a", "b")) << "a server that started again";
+  lobby.remove({.session = "a", .server_epoch = 1});
+  EXPECT_THAT(lobby.names(), testing::ElementsAre("a", "b")) << "it is the one before that is gone";
+  lobby.remove({.session = "a", .server_epoch = 2});
+  EXPECT_EQ(listed().size(), 1U);
+}
+
+}  // namespace
+}  // namespace tenon::console
