@@ -27,6 +27,8 @@ constexpr double kEntryDepth = 0.0005;       // [m] of progress during the searc
 constexpr double kComplianceRate = 1.0;      // [1/s] of the rotation during the search
 constexpr double kAssistRange = 0.1;       // [m] between the part's bounding box and the instructor's pointer
 constexpr double kRetractDistance = 0.03;  // [m]
+constexpr double kRetractTime = 1.0;       // [s] at least
+constexpr double kRecentreTime = 4.0;      // [s] likewise, from where the arm could not go on
 constexpr double kLightForce = 0.1;        // [N]
 constexpr double kPressTimeout = 5.0;      // [s] of pressing at the seat after which insertion is tried again
 constexpr double kIdleTimeout = 3.0;  // [s] of pushing without resistance or progress: the arm is at its end
@@ -86,6 +88,7 @@ void AssemblyBehavior::enter(Phase phase) noexcept {
   aligned_time_ = 0.0;
   obstructed_time_ = 0.0;
   idle_time_ = 0.0;
+  retract_time_ = kRetractTime;
   deepest_ = -std::numeric_limits<double>::infinity();
 }
 
@@ -334,13 +337,14 @@ void AssemblyBehavior::insert(const HandPerception& hand, const DelayedPerceptio
     enter(Phase::kSeated);
     return;
   }
-  // lifted, the part is out of contact, and the workspace can follow the hand
+  // back at the begin of the approach the part is out of contact, so that the workspace can follow the hand
   const bool idle = perceived < deepest_ + 0.001 && reaction_ < 0.5 && !task_.misplaced;
   deepest_ = std::max(deepest_, perceived);
   idle_time_ = idle ? idle_time_ + dt : 0.0;
   if (idle_time_ > kIdleTimeout) {
-    search_depth_ = perceived;
+    search_depth_ = kRetractDistance - task_.approach_distance;
     enter(Phase::kRetract);
+    retract_time_ = kRecentreTime;
     return;
   }
   if (reaction_ < 0.6 * force || task_.misplaced ||
@@ -381,7 +385,7 @@ void AssemblyBehavior::retract(const HandPerception& hand, const DelayedPercepti
   const double retracted = search_depth_ - kRetractDistance;
   depth_ = std::max(retracted, depth_ - kInsertSpeed * dt);
   intendObjectPose(hand, Vector3::Zero(), Quaternion::Identity(), dt);
-  if (depth_ > retracted || phase_time_ < 1.0) return;
+  if (depth_ > retracted || phase_time_ < retract_time_) return;
   aim();
   stall_detector_.start(perceivedDepth(perception));
   enter(Phase::kInsert);

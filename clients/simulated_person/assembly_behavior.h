@@ -146,6 +146,7 @@ class AssemblyBehavior {
   double aligned_time_ = 0.0;     // [s] without interruption
   double obstructed_time_ = 0.0;  // [s] without interruption
   double idle_time_ = 0.0;        // [s] of pushing without resistance or progress
+  double retract_time_ = 0.0;     // [s] at least, of a retraction
   double deepest_ = 0.0;          // [m] perceived in this phase
   double search_depth_ = 0.0;     // [m] where the search began
   StallDetector stall_detector_;
