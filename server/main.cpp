@@ -224,6 +224,12 @@ int serve(ServeArguments& arguments) {
   printLine(fmt::format("{} after {:.1f} s; late ticks: {}; refused inputs: {}", report->run.reason,
                         static_cast<double>(report->run.tick) * tenon::kTickSeconds, report->late_ticks,
                         report->refused_inputs));
+  if (report->slow_writes > 0 || report->failed_writes > 0)
+    printLine(
+        fmt::format("writes to the bus that took longer than 5 ms: {}, the longest {:.1f} ms; failed: {}",
+                    report->slow_writes, 1e3 * report->longest_write, report->failed_writes));
+  if (report->dropped_outputs > 0)
+    printLine(fmt::format("ticks that were not published: {}", report->dropped_outputs));
   if (report->lost_journal_ticks > 0)
     printLine(fmt::format("{} ticks are missing in the journal", report->lost_journal_ticks));
   if (!report->journal_problem.empty())

@@ -12,15 +12,23 @@ constexpr Milliseconds kLockstepLease{
 
 // longest time a reliable write blocks for a slow reader before it fails
 constexpr Milliseconds kLanBlocking{500};
+constexpr Milliseconds kServerBlocking{5};  // in the thread that receives from all clients
 constexpr Milliseconds kLockstepBlocking{10000};
 
 dds_duration_t duration(Milliseconds time) { return DDS_MSECS(time.count()); }
+
+Milliseconds blockingTime(const TopicSpec& topic, LinkProfile profile) {
+  if (profile == LinkProfile::kLockstep) return kLockstepBlocking;
+  // copies of the journal are written by a thread of their own
+  const bool of_journal = topic.name == "TickInput" || topic.name == "Checkpoint";
+  return topic.parameters.of_server && !of_journal ? kServerBlocking : kLanBlocking;
+}
 
 void setReliability(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile) {
   const bool lockstep = profile == LinkProfile::kLockstep;
   const bool reliable = topic.qos_class != QosClass::kStream || lockstep;
   dds_qset_reliability(qos, reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
-                       duration(lockstep ? kLockstepBlocking : kLanBlocking));
+                       duration(blockingTime(topic, profile)));
 }
 
 void setReaderHistory(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile) {

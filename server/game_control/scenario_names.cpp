@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "server/game_control/scenario_keys.h"
+#include "server/game_control/text_limits.h"
 
 namespace tenon::game_control {
 namespace {
@@ -77,15 +78,21 @@ std::uint32_t ScenarioNames::group(const YAML::Node& node, const std::string& wh
   return number;
 }
 
-Texts ScenarioNames::texts(const YAML::Node& node, const std::string& what) const {
+Texts ScenarioNames::texts(const YAML::Node& node, const std::string& what, std::size_t most) const {
   Texts texts;
   if (!node.IsDefined()) return texts;
   if (!node.IsMap()) {
-    texts.push_back({scenario_.language, yaml_.text(node, what)});
+    texts.push_back({scenario_.language, yaml_.text(node, what, most)});
     return texts;
   }
   for (const auto& entry : node) {
-    texts.push_back({yaml_.text(entry.first, "a language of " + what), yaml_.text(entry.second, what)});
+    texts.push_back({yaml_.text(entry.first, "a language of " + what, kMaxLanguage),
+                     yaml_.text(entry.second, what, most)});
+  }
+  if (texts.size() > kMaxLanguages) {
+    yaml_.fail(node, what + " has " + std::to_string(texts.size()) + " languages, at most " +
+                         std::to_string(kMaxLanguages) + " can be sent");
+    return texts;
   }
   const auto main_text = std::find_if(texts.begin(), texts.end(), [&](const LocalizedText& text) {
     return text.language == scenario_.language;

@@ -29,8 +29,9 @@ class ScenarioNames {
   [[nodiscard]] std::optional<std::uint32_t> pair(const YAML::Node& node, const std::string& what) const;
   /// Number of a group; a new name adds a group. 0: `none`.
   [[nodiscard]] std::uint32_t group(const YAML::Node& node, const std::string& what) const;
-  /// A text, or a mapping from language to text that includes the scenario's main language.
-  [[nodiscard]] Texts texts(const YAML::Node& node, const std::string& what) const;
+  /// A text, or a mapping from language to text that includes the scenario's main language; each has at most
+  /// `most` bytes.
+  [[nodiscard]] Texts texts(const YAML::Node& node, const std::string& what, std::size_t most) const;
 
   [[nodiscard]] const std::string& nameOf(ObjectId object) const {
     return scenario_.objects[object.value].name;

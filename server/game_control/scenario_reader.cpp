@@ -7,6 +7,7 @@
 #include "idl/types/hash.h"
 #include "server/game_control/named_values.h"
 #include "server/game_control/scenario_state_reader.h"
+#include "server/game_control/text_limits.h"
 #include "server/structures/voxel_limits.h"
 
 namespace tenon::game_control {
@@ -58,7 +59,7 @@ Result<ScenarioFile> ScenarioReader::read(std::string_view text) {
 void ScenarioReader::readScenario(const YAML::Node& root) {
   if (!yaml_.openMapping(root, "scenario", "a scenario")) return;
   if (root["language"].IsDefined()) scenario_.language = yaml_.text(root["language"], "'language'");
-  scenario_.title = names_.texts(root["title"], "'title'");
+  scenario_.title = names_.texts(root["title"], "'title'", kMaxTitle);
   if (root["parts"].IsDefined()) {
     scenario_.part_set = yaml_.text(root["parts"], "'parts'");
     scenario_.part_set_line = yaml_.lineOf(root["parts"]);
@@ -105,16 +106,16 @@ void ScenarioReader::readObject(const YAML::Node& node) {
   if (yaml_.failed() || !yaml_.openMapping(node, "object", "an object")) return;
   ScenarioObject object;
   object.line = yaml_.lineOf(node);
-  object.name = yaml_.text(node["name"], "'name' of an object");
+  object.name = yaml_.text(node["name"], "'name' of an object", kMaxObjectName);
   const std::string of = " of object '" + object.name + "'";
   if (const ObjectId other = scenario_.objectNamed(object.name); other.valid()) {
     yaml_.fail(node["name"], "two objects are named '" + object.name + "', the first in line " +
                                  std::to_string(scenario_.objects[other.value].line));
     return;
   }
-  object.title = names_.texts(node["title"], "'title'" + of);
+  object.title = names_.texts(node["title"], "'title'" + of, kMaxTitle);
   if (object.title.empty()) object.title.push_back({scenario_.language, object.name});
-  if (node["kind"].IsDefined()) object.kind = yaml_.text(node["kind"], "'kind'" + of);
+  if (node["kind"].IsDefined()) object.kind = yaml_.text(node["kind"], "'kind'" + of, kMaxKind);
   if (std::find(kObjectKinds.begin(), kObjectKinds.end(), object.kind) == kObjectKinds.end()) {
     yaml_.fail(node["kind"], "'kind'" + of + " is '" + object.kind +
                                  "', expected one of: part, tool, pointer, assistant, forearm, head, scene");
@@ -173,7 +174,7 @@ void ScenarioReader::readHand(const YAML::Node& node) {
   if (yaml_.failed() || !yaml_.openMapping(node, "hand", "a hand")) return;
   ScenarioHand hand;
   hand.line = yaml_.lineOf(node);
-  hand.name = yaml_.text(node["name"], "'name' of a hand");
+  hand.name = yaml_.text(node["name"], "'name' of a hand", kMaxHandName);
   const std::string of = " of hand '" + hand.name + "'";
   if (const HandId other = scenario_.handNamed(hand.name); other.valid()) {
     yaml_.fail(node["name"], "two hands are named '" + hand.name + "', the first in line " +

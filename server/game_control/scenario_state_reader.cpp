@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/game_control/condition_reader.h"
+#include "server/game_control/text_limits.h"
 
 namespace tenon::game_control {
 namespace {
@@ -66,11 +67,12 @@ ScenarioState ScenarioStateReader::readState(const YAML::Node& node) {
   ScenarioState state;
   if (!yaml_.openMapping(node, "state", "a state")) return state;
   state.line = yaml_.lineOf(node);
-  state.name = yaml_.text(node["name"], "'name' of a state");
-  state.title = names_.texts(node["title"], describeKey(state, "title"));
+  state.name = yaml_.text(node["name"], "'name' of a state", kMaxStateName);
+  state.title = names_.texts(node["title"], describeKey(state, "title"), kMaxStateTitle);
   if (state.title.empty()) state.title.push_back({scenario_.language, state.name});
-  state.instruction = names_.texts(node["instruction"], describeKey(state, "instruction"));
-  if (node["part"].IsDefined()) state.part = yaml_.text(node["part"], describeKey(state, "part"));
+  state.instruction = names_.texts(node["instruction"], describeKey(state, "instruction"), kMaxInstruction);
+  if (node["part"].IsDefined())
+    state.part = yaml_.text(node["part"], describeKey(state, "part"), kMaxStateName);
   readEffects(node, state);
   readTask(node, state);
   readEnd(node, state);

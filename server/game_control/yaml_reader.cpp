@@ -180,6 +180,14 @@ std::string YamlReader::text(const YAML::Node& node, const std::string& what) {
   return node.Scalar();
 }
 
+std::string YamlReader::text(const YAML::Node& node, const std::string& what, std::size_t most) {
+  std::string read = text(node, what);
+  if (read.size() <= most) return read;
+  fail(node, what + " has " + std::to_string(read.size()) + " bytes, at most " + std::to_string(most) +
+                 " can be sent: shorten it (letters beyond ASCII take two or more)");
+  return {};
+}
+
 bool YamlReader::boolean(const YAML::Node& node, const std::string& what, bool default_value) {
   if (!node.IsDefined()) return default_value;
   bool value = default_value;

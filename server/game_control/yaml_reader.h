@@ -53,6 +53,8 @@ class YamlReader {
   bool checkList(const YAML::Node& node, const std::string& what, std::size_t max_size = 1000);
 
   [[nodiscard]] std::string text(const YAML::Node& node, const std::string& what);
+  /// Of at most `most` bytes.
+  [[nodiscard]] std::string text(const YAML::Node& node, const std::string& what, std::size_t most);
   [[nodiscard]] bool boolean(const YAML::Node& node, const std::string& what, bool default_value);
   [[nodiscard]] std::int64_t integer(const YAML::Node& node, const std::string& what, std::int64_t min,
                                      std::int64_t max, std::int64_t default_value);

@@ -15,6 +15,8 @@ namespace tenon::session {
 /// Threads: one writer (wire: put, freeChanges), one reader (tick: collect). Real-time: all but construction.
 class InputBuffer {
  public:
+  static constexpr std::size_t kChanges = 256;  ///< that wait for ticks, at most
+
   /// `hands`: number of hands of the scenario.
   explicit InputBuffer(std::size_t hands)
       : readings_(std::make_unique<threads::Latest<HandReading>[]>(hands)), hands_(hands) {}
@@ -43,7 +45,7 @@ class InputBuffer {
  private:
   std::unique_ptr<threads::Latest<HandReading>[]> readings_;
   std::size_t hands_;
-  threads::SpscQueue<Change> changes_{256};
+  threads::SpscQueue<Change> changes_{kChanges};
 };
 
 }  // namespace tenon::session

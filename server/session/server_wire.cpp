@@ -17,6 +17,11 @@
 #include "server/session/stop_file.h"
 
 namespace tenon::session {
+namespace {
+
+constexpr double kSlowWrite = 5e-3;  // [s]
+
+}  // namespace
 
 /// A writer and its topic, opened together.
 template <class M>
@@ -24,11 +29,21 @@ struct ServerWire::TopicWriter {
   const wire::Topic<M>& topic;
   std::optional<wire::Writer<M>> writer;
   std::uint64_t samples = 0;  ///< of ticks, since the last PublishedSamples
+  WriteCounts* counts = nullptr;
 
+  /// Of the wire thread.
+  void send(const M& message) {
+    const auto begin = std::chrono::steady_clock::now();
+    const bool written = writer->write(message).has_value();
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    counts->longest_seconds = std::max(counts->longest_seconds, seconds);
+    counts->slow += seconds > kSlowWrite ? 1 : 0;
+    counts->failed += written ? 0 : 1;
+  }
   /// Writes a sample of a tick.
   void write(const M& message) {
     ++samples;
-    (void)writer->write(message);
+    send(message);
   }
   Result<void> open(wire::Partition& partition) {
     auto opened = wire::Writer<M>::open(partition, topic);
@@ -97,6 +112,9 @@ constexpr auto kLapse = wire::kSessionAnnounce.parameters.lease;
 // A reader that took this server for dead knows its announcement again, and so its next end, by another
 // sample alone.
 constexpr auto kAnnounceInterval = std::chrono::seconds(1);
+// joins and leaves of clients without hands: one after each
+constexpr auto kBetweenSeats = std::chrono::milliseconds(5);
+constexpr std::size_t kMostWaiting = 512;
 constexpr auto kAfterLapse = std::chrono::seconds(10);  // until those who came meanwhile are discovered
 
 std::int64_t nowNanoseconds() {
@@ -128,6 +146,9 @@ Result<std::unique_ptr<ServerWire>> ServerWire::open(const WireOptions& options,
       new ServerWire(options, std::move(*participant), registry, input_buffer, publisher));
   wire->title_ = loaded.scenario->title.front().text;
   wire->scenario_hash_ = fmt::format("{:016x}", loaded.scenario->text_hash);
+  const auto count = [&counts = wire->writes_](auto&... out) { ((out.counts = &counts), ...); };
+  std::apply(count, wire->writers_->inLobby());
+  std::apply(count, wire->writers_->inSession());
   wire->newest_seq_.resize(loaded.scenario->hands.size());
   if (auto alone = wire->refuseBesideAnother(); !alone) return fail(alone.error().what);
   if (auto opened = wire->openWriters(); !opened) return fail(opened.error().what);
@@ -183,8 +204,8 @@ Result<void> ServerWire::restoreStops() {
   auto kept = readStopFile(options_.stop_file);
   if (!kept) return fail(kept.error().what);
   stops_ = std::move(*kept);
-  for (const auto& [id, stop] : stops_.standing()) (void)writers_->stop.writer->write(stop);
-  for (const auto& [id, cleared] : stops_.cleared()) (void)writers_->clear.writer->write(cleared);
+  for (const auto& [id, stop] : stops_.standing()) writers_->stop.send(stop);
+  for (const auto& [id, cleared] : stops_.cleared()) writers_->clear.send(cleared);
   if (stops_.engaged()) registry_.engageEmergencyStop();
   return {};
 }
@@ -210,7 +231,7 @@ Result<void> ServerWire::openReaders() {
   const auto listenTo = [&]<class M>(wire::Partition& partition, const wire::Topic<M>& topic, auto handler) {
     if (result) result = inbox_.onFrom<M>(partition, topic, handler);
   };
-  listenTo(lobby_, wire::kJoin, [this](const Join& join, const wire::Origin& from) { handle(join, from); });
+  listenTo(lobby_, wire::kJoin, [this](const Join& join, const wire::Origin& from) { receive(join, from); });
   listenTo(session_, wire::kDeviceInput,
            [this](const DeviceInput& input, const wire::Origin& from) { handle(input, from); });
   listenTo(session_, wire::kCommand,
@@ -222,16 +243,19 @@ Result<void> ServerWire::openReaders() {
            [this](const SessionAnnounce& other, const wire::Origin& from) { handle(other, from); });
   listenTo(session_, wire::kEmergencyStop,
            [this](const EmergencyStop& stop, const wire::Origin& from) { handle(stop, from); });
-  const auto take = [this](const Result<Change>& change) {
+  const auto take = [this](ClientId client, const Result<Change>& change) {
     if (!change) return refuse(change.error().what);
-    input_buffer_.put(*change);
+    if (!contributions_.put(client, *change))
+      refuse(fmt::format("client {} sends more than {} forces and poses at a time: the others are ignored",
+                         client.value, Contributions::kMostOfClient));
   };
   listenTo(session_, wire::kForceContribution,
            [this, take](const ForceContribution& force, const wire::Origin& from) {
-             if (isGenuine(force.client, from, "force")) take(registry_.validateForceContribution(force));
+             if (isGenuine(force.client, from, "force"))
+               take(force.client, registry_.validateForceContribution(force));
            });
   listenTo(session_, wire::kExternalPose, [this, take](const ExternalPose& pose, const wire::Origin& from) {
-    if (isGenuine(pose.client, from, "pose")) take(registry_.validateExternalPose(pose));
+    if (isGenuine(pose.client, from, "pose")) take(pose.client, registry_.validateExternalPose(pose));
   });
   if (result) {
     result = inbox_.onGoneFrom<Presence>(
@@ -249,34 +273,36 @@ Result<void> ServerWire::openReaders() {
 
 void ServerWire::sendScene(const LoadedScene& loaded) {
   for (std::uint32_t i = 0; i < loaded.scene->objects.size(); ++i) {
-    (void)writers_->object.writer->write(describe(ObjectId{i}, loaded.scene->objects[i]));
+    writers_->object.send(describe(ObjectId{i}, loaded.scene->objects[i]));
   }
   const game_control::ScenarioFile& scenario = *loaded.scenario;
   for (std::uint32_t i = 0; i < scenario.hands.size(); ++i) {
     const game_control::ScenarioHand& hand = scenario.hands[i];
-    (void)writers_->hand.writer->write({HandId{i}, hand.name, hand.role, hand.object});
+    writers_->hand.send({HandId{i}, hand.name, hand.role, hand.object});
   }
   const auto steps = static_cast<std::uint32_t>(scenario.states.size());
   for (std::uint32_t i = 0; i < steps; ++i) {
     const game_control::ScenarioState& state = scenario.states[i];
-    (void)writers_->scene_step.writer->write({i, steps, state.name, state.title, state.part});
+    writers_->scene_step.send({i, steps, state.name, state.title, state.part});
   }
 }
 
 void ServerWire::announce() {
   announced_at_ = std::chrono::steady_clock::now();
-  (void)writers_->announce.writer->write({.session = options_.session,
-                                          .server_epoch = options_.server_epoch,
-                                          .title = title_,
-                                          .lockstep = options_.lockstep,
-                                          .scenario_hash = scenario_hash_,
-                                          .host = hostName(),
-                                          .pid = static_cast<std::uint32_t>(getpid()),
-                                          .scene_hash = options_.scene_hash});
+  writers_->announce.send({.session = options_.session,
+                           .server_epoch = options_.server_epoch,
+                           .title = title_,
+                           .lockstep = options_.lockstep,
+                           .scenario_hash = scenario_hash_,
+                           .host = hostName(),
+                           .pid = static_cast<std::uint32_t>(getpid()),
+                           .scene_hash = options_.scene_hash});
 }
 
 void ServerWire::dispatch(std::chrono::nanoseconds timeout) {
-  inbox_.dispatch(timeout);
+  const bool waits = !joins_.empty() || !leaves_.empty();
+  inbox_.dispatch(waits ? std::min<std::chrono::nanoseconds>(timeout, kBetweenSeats) : timeout);
+  handleJoinsAndLeaves();
   noticeLapse();
   forwardChanges();
 }
@@ -287,6 +313,7 @@ void ServerWire::forwardChanges() {
   FixedVector<Change, kMaxChanges> changes;
   registry_.takeChanges(changes);
   for (const Change& change : changes) input_buffer_.put(change);
+  contributions_.forward(input_buffer_);
 }
 
 void ServerWire::update(const TickOutput& output) {
@@ -327,17 +354,42 @@ void ServerWire::notifySeatLost(ClientId client, const std::string& why) {
   const auto last = seat_lost_notified_.find(client);
   if (last != seat_lost_notified_.end() && now - last->second < kInterval) return;
   seat_lost_notified_[client] = now;
-  (void)writers_->welcome.writer->write({.client_guid = registry_.guidOf(client),
-                                         .session = options_.session,
-                                         .server_epoch = options_.server_epoch,
-                                         .accepted = false,
-                                         .reason = why,
-                                         .client = client,
-                                         .tick = now_});
+  writers_->welcome.send({.client_guid = registry_.guidOf(client),
+                          .session = options_.session,
+                          .server_epoch = options_.server_epoch,
+                          .accepted = false,
+                          .reason = why,
+                          .client = client,
+                          .tick = now_});
+}
+
+/// Queues a request; the program repeats one that finds no room.
+void ServerWire::receive(const Join& join, const wire::Origin& from) {
+  if (join.session != options_.session || join.server_epoch != options_.server_epoch) return;
+  const auto same = [&](const auto& waiting) { return waiting.first.client_guid == join.client_guid; };
+  if (const auto found = std::find_if(joins_.begin(), joins_.end(), same); found != joins_.end()) {
+    *found = {join, from};
+  } else if (joins_.size() < kMostWaiting) {
+    joins_.emplace_back(join, from);
+  }
+}
+
+/// One after the other, so that a crowd that comes or goes does not delay frames.
+void ServerWire::handleJoinsAndLeaves() {
+  const auto now = std::chrono::steady_clock::now();
+  if ((joins_.empty() && leaves_.empty()) || now < next_change_of_seats_) return;
+  next_change_of_seats_ = now + kBetweenSeats;
+  if (!leaves_.empty()) {
+    dismiss(leaves_.front(), "has left");
+    leaves_.pop_front();
+  } else {
+    const auto [join, from] = std::move(joins_.front());
+    joins_.pop_front();
+    handle(join, from);
+  }
 }
 
 void ServerWire::handle(const Join& join, const wire::Origin& from) {
-  if (join.session != options_.session || join.server_epoch != options_.server_epoch) return;
   const bool is_new = !registry_.isSeated(join.client_guid);
   const bool is_known = registry_.knowsSeat(join.seat_key);
   const wire::ProofSubject subject{.challenge = challenges_.challengeFor(from, join.client_guid),
@@ -347,17 +399,17 @@ void ServerWire::handle(const Join& join, const wire::Origin& from) {
                                    .role = join.role,
                                    .client = from};
   if (is_new && registry_.mustProve(join) && join.seat_proof.empty()) {
-    (void)writers_->welcome.writer->write({.client_guid = join.client_guid,
-                                           .session = options_.session,
-                                           .server_epoch = options_.server_epoch,
-                                           .reason = "prove who you are",
-                                           .challenge = subject.challenge});
+    writers_->welcome.send({.client_guid = join.client_guid,
+                            .session = options_.session,
+                            .server_epoch = options_.server_epoch,
+                            .reason = "prove who you are",
+                            .challenge = subject.challenge});
     return;
   }
   const JoinProofs proofs{.seat = wire::SeatKey::isProof(join.seat_key, subject, join.seat_proof),
                           .key = options_.key && options_.key->isProof(subject, join.key_proof)};
   const Welcome welcome = registry_.join(join, proofs, now_, from);
-  (void)writers_->welcome.writer->write(welcome);
+  writers_->welcome.send(welcome);
   if (!is_new) return;
   for (const HandId hand : welcome.hands)
     if (hand.valid()) newest_seq_[hand.value] = 0;
@@ -392,13 +444,13 @@ void ServerWire::handle(const DeviceInput& input, const wire::Origin& from) {
 void ServerWire::handle(const Command& command, const wire::Origin& from) {
   if (!isGenuine(command.client, from, "command")) return;
   if (const CommandAck* again = registry_.previousAck(command)) {
-    (void)writers_->ack.writer->write(*again);
+    writers_->ack.send(*again);
     return;
   }
   const Presence* sender = registry_.findClient(command.client);
   const std::string who = sender != nullptr ? sender->name : fmt::format("client {}", command.client.value);
   const CommandAck ack = registry_.handleCommand(command);
-  (void)writers_->ack.writer->write(ack);
+  writers_->ack.send(ack);
   if (!ack.accepted) {
     log(Severity::kWarning, "refused",
         fmt::format("{}: '{}': {}", who, commandName(command.kind), ack.reason));
@@ -419,7 +471,7 @@ void ServerWire::handle(const EmergencyStop& stop, const wire::Origin& from) {
   if (from == participant_->origin() || !stops_.raise(stop)) return;
   registry_.engageEmergencyStop();
   forwardChanges();
-  (void)writers_->stop.writer->write(stop);
+  writers_->stop.send(stop);
   keepStops();
   log(Severity::kError, "emergency stop", fmt::format("engaged by {}: {}", stop.who, stop.reason));
 }
@@ -431,7 +483,7 @@ void ServerWire::clearEmergencyStop(ClientId client, const std::string& reason) 
   for (const auto& [id, stop] : standing) stops_.clear({stop.client_guid, stop.counter, who, reason});
   keepStops();
   for (const auto& [id, stop] : standing) {
-    (void)writers_->clear.writer->write(stops_.cleared().at(id));
+    writers_->clear.send(stops_.cleared().at(id));
     (void)writers_->stop.writer->dispose(stop);
   }
   log(Severity::kInfo, "emergency stop",
@@ -444,12 +496,16 @@ void ServerWire::handle(const ClockSync& sync) {
   ClockSync answer = sync;
   answer.server_received_ns = nowNanoseconds();
   answer.server_sent_ns = nowNanoseconds();
-  (void)writers_->clock.writer->write(answer);
+  writers_->clock.send(answer);
 }
 
 void ServerWire::handleGone(const Presence& presence, const wire::Origin& from) {
   if (from.known() && !isGenuine(presence.client, from, "departure notice")) return;
-  dismiss(presence.client, "has left");
+  const Presence* leaver = registry_.findClient(presence.client);
+  if (leaver == nullptr || !leaver->alive) return;
+  // hands are freed at once
+  if (!leaver->hands.empty() || leaves_.size() >= kMostWaiting) return dismiss(presence.client, "has left");
+  leaves_.push_back(presence.client);
 }
 
 void ServerWire::dismiss(ClientId client, const std::string& why) {
@@ -462,9 +518,9 @@ void ServerWire::dismiss(ClientId client, const std::string& why) {
   forwardChanges();
 }
 
-void ServerWire::send(const EventLog& event) { (void)writers_->event.writer->write(event); }
+void ServerWire::send(const EventLog& event) { writers_->event.send(event); }
 
-void ServerWire::send(const RunState& run) { (void)writers_->run.writer->write(run); }
+void ServerWire::send(const RunState& run) { writers_->run.send(run); }
 
 void ServerWire::resendLast() {
   if (last_ == nullptr) return;
@@ -472,28 +528,31 @@ void ServerWire::resendLast() {
   for (const HandManifold* manifold : last_->manifolds) writers_->manifold.write(*manifold);
 }
 
-void ServerWire::send(const OutgoingMessages& outgoing) {
+void ServerWire::send(const OutgoingMessages& outgoing, bool is_newest) {
   last_ = &outgoing;
   const Tick period_begin = (now_ - 1) / kPublishedSamplesPeriod * kPublishedSamplesPeriod + 1;
   if (period_begin != published_.first_tick) statePublished();
   published_.first_tick = period_begin;
   Writers& to = *writers_;
   // the step before the frames, which refer to its revision
-  if (outgoing.events.step) (void)to.step.writer->write(*outgoing.events.step);
+  if (outgoing.events.step) to.step.send(*outgoing.events.step);
   for (const GrabState& grab : outgoing.events.grabs) to.grab.write(grab);
   for (const ObjectSnapshot& snapshot : outgoing.events.snapshots) to.snapshot.write(snapshot);
-  for (const WorldFrame& frame : outgoing.frames) to.frame_1k.write(frame);
-  for (const HandManifold* manifold : outgoing.manifolds) to.manifold.write(*manifold);
+  // of what a newer one replaces, an old one would only delay that
+  if (is_newest) {
+    for (const WorldFrame& frame : outgoing.frames) to.frame_1k.write(frame);
+    for (const HandManifold* manifold : outgoing.manifolds) to.manifold.write(*manifold);
+  }
   for (const WorldFrame& frame : outgoing.frames_100) to.frame_100.write(frame);
   for (const WorldFrame& frame : outgoing.frames_30) to.frame_30.write(frame);
   for (const ContactPairs& pairs : outgoing.pairs) to.pairs.write(pairs);
   if (outgoing.stats) to.stats.write(*outgoing.stats);
   if (outgoing.progress) to.progress.write(*outgoing.progress);
   for (const EventLog& event : outgoing.events.log) {
-    (void)to.event.writer->write(event);
+    to.event.send(event);
     if (print) print(fmt::format("{}: {}", event.kind, event.text));
   }
-  if (outgoing.events.run) (void)to.run.writer->write(*outgoing.events.run);
+  if (outgoing.events.run) to.run.send(*outgoing.events.run);
   published_.last_tick = now_;
 }
 
@@ -504,7 +563,7 @@ void ServerWire::statePublished() {
     published_.topics.push_back({std::string(out.topic.name), std::exchange(out.samples, 0)});
   };
   std::apply([&](auto&... out) { (take(out), ...); }, writers_->ofTicks());
-  (void)writers_->published.writer->write(published_);
+  writers_->published.send(published_);
   published_.last_tick = 0;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -16,6 +17,7 @@
 #include "idl/wire/endpoint.h"
 #include "idl/wire/identity.h"
 #include "server/game_control/scenario.h"
+#include "server/session/contributions.h"
 #include "server/session/input_buffer.h"
 #include "server/session/journal.h"
 #include "server/session/publisher.h"
@@ -34,6 +36,13 @@ struct WireOptions {
   std::string scene_hash;              ///< asset that lists the display models; empty: none
   std::filesystem::path stop_file;     ///< keeps the raises of the emergency stop; empty: only in memory
   std::filesystem::path seat_file;     ///< keeps the seats for a resume; empty: nothing does
+};
+
+/// What the wire thread has written.
+struct WriteCounts {
+  std::uint64_t slow = 0;        ///< took longer than 5 ms: a reader was behind
+  std::uint64_t failed = 0;      ///< samples that were not sent
+  double longest_seconds = 0.0;  ///< [s]
 };
 
 /// All DDS endpoints of a session's server, bound to its registry and input buffer.
@@ -63,7 +72,9 @@ class ServerWire {
   /// Why this server has to end: it did nothing for so long that it was taken for dead, and another server
   /// has taken its place meanwhile.
   [[nodiscard]] const std::optional<std::string>& replaced() const { return replaced_; }
-  void send(const OutgoingMessages& outgoing);
+  /// `is_newest`: false for a tick that a newer one follows at once: its frames and manifolds of 1 kHz are
+  /// not sent.
+  void send(const OutgoingMessages& outgoing, bool is_newest = true);
   /// Repeats frames and manifolds of the last tick for a client that missed them (lockstep).
   void resendLast();
   void send(const EventLog& event);
@@ -85,6 +96,7 @@ class ServerWire {
   /// True once after a client repeated the input of the last tick, so its answer was lost (lockstep).
   [[nodiscard]] bool takeResendRequest() { return std::exchange(resend_requested_, false); }
   [[nodiscard]] std::uint64_t refusedInputs() const { return refused_inputs_; }
+  [[nodiscard]] const WriteCounts& writes() const { return writes_; }
   /// Tick and phase of `output` decide about what is received from now on.
   void update(const TickOutput& output);
 
@@ -108,6 +120,8 @@ class ServerWire {
   Result<void> openWriters();
   Result<void> openReaders();
   void sendScene(const LoadedScene& loaded);
+  void receive(const Join& join, const wire::Origin& from);
+  void handleJoinsAndLeaves();
   void handle(const Join& join, const wire::Origin& from);
   void handle(const DeviceInput& input, const wire::Origin& from);
   void handle(const Command& command, const wire::Origin& from);
@@ -136,6 +150,11 @@ class ServerWire {
   std::set<std::string> logged_refusals_;  ///< each text is logged once, although inputs come at 1 kHz
   std::map<ClientId, std::chrono::steady_clock::time_point> seat_lost_notified_;  ///< last time
   std::uint64_t refused_inputs_ = 0;
+  WriteCounts writes_;
+  Contributions contributions_;
+  std::deque<std::pair<Join, wire::Origin>> joins_;  ///< waiting
+  std::deque<ClientId> leaves_;                      ///< waiting
+  std::chrono::steady_clock::time_point next_change_of_seats_;
   bool resend_requested_ = false;
   StopTruth stops_;
   wire::SharedKey challenges_ = wire::SharedKey::random();  ///< what challenges are made of

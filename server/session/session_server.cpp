@@ -304,7 +304,8 @@ void Server::runRealTime(const std::atomic<bool>& stop) {
     for (TickOutput* output = outputs_.front(); output != nullptr; output = outputs_.front()) {
       wire_->update(*output);
       output->stats.late_ticks = ticker.lateTicks();
-      wire_->send(publisher_.prepare(*output));
+      // every tick is looked at for its events, the newest one is sent
+      wire_->send(publisher_.prepare(*output), outputs_.size() == 1);
       outputs_.pop();
     }
     noticeJournal();
@@ -360,6 +361,9 @@ Result<SessionReport> Server::finish() {
   report.late_ticks = late_ticks_;
   report.refused_inputs = wire_->refusedInputs();
   report.dropped_outputs = outputs_.dropped();
+  report.slow_writes = wire_->writes().slow;
+  report.failed_writes = wire_->writes().failed;
+  report.longest_write = wire_->writes().longest_seconds;
   if (journal_) {
     // a session that is over is over, whatever became of its journal
     if (auto closed = journal_->close(report.run); !closed) report.journal_problem = closed.error().what;

@@ -47,6 +47,9 @@ struct SessionReport {
   std::uint64_t refused_inputs = 0;
   /// ticks whose output was not sent: the queue to the wire thread was full
   std::uint64_t dropped_outputs = 0;
+  std::uint64_t slow_writes = 0;         ///< to the bus, that took longer than 5 ms: a reader was behind
+  std::uint64_t failed_writes = 0;       ///< samples that were not sent
+  double longest_write = 0.0;            ///< [s]
   std::uint64_t lost_journal_ticks = 0;  ///< missing in the journal: its disk was too slow
   std::string journal_problem;           ///< why the journal ended before the session; or empty
 };

@@ -1,6 +1,7 @@
 """A server that is killed and resumed, through real processes: the session ends as if nothing had happened, and its journal re-simulates."""
 import os
 import re
+import resource
 import signal
 import subprocess
 import time
@@ -163,6 +164,29 @@ class Service(unittest.TestCase):
             _, said, third = start()
             self.assertIn("waiting for people", said)
             self.assertEqual(len(third), 2)
+
+
+class FullDisk(unittest.TestCase):
+    # a limit of the file's size stands for the disk
+    def test_ends_the_journal_and_says_so_and_the_session_ends_well(self):
+        def limit():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+
+        with Stage(lockstep=False) as stage:
+            server = subprocess.Popen([PROGRAMS / "tenon-serve", PEG, "--journal", stage.out / "journal.mcap", "--wait-for", "right",
+                                       "--session", "test", "--domain", str(stage.domain), *COARSE],
+                                      stdout=subprocess.PIPE, text=True, preexec_fn=limit)
+            stage.processes.append(types.SimpleNamespace(popen=server, signal=server.send_signal))
+            observer = stage.start("observer", "--wait", 60)
+            trainee = stage.start("trainee", "--seed", 1, "--wait", 60)
+            said = server.communicate(timeout=200)[0]
+            self.assertEqual(server.returncode, 0, said)
+            self.assertIn("everything is mounted", said)
+            self.assertRegex(said, "the journal ends here, the session goes on without it: .*journal.mcap")
+            self.assertEqual(trainee.wait(60), 0, trainee.text())
+            self.assertEqual(observer.wait(60), 0)
+            self.assertIn("the journal ends here", observer.text(), "people on the bus are told")
 
 
 class Refusals(unittest.TestCase):

@@ -1,0 +1,149 @@
+#include "server/session/journal_writer.h"
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <future>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "server/session/contributions.h"
+#include "tests/server/session/small_session.h"
+
+namespace tenon::session {
+namespace {
+
+namespace fs = std::filesystem;
+using test::kRightHand;
+
+class JournalWriterTest : public ::testing::Test {
+ protected:
+  void SetUp() override { fs::create_directories(folder_); }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  Journal openJournal() {
+    auto journal = Journal::open(file_, {"small/scenario.yaml", 0.25, fingerprintOf(loaded_), {}});
+    EXPECT_TRUE(journal);
+    return std::move(*journal);
+  }
+  /// Plays `ticks`, no faster than the file is written.
+  void play(JournalWriter& writer, Tick ticks) {
+    writer.reserve(simulation_.maxSavedBytes());
+    for (Tick i = 0; i < ticks; ++i) {
+      const TickInput input = test::playInput(simulation_.now() + 1);
+      simulation_.tick(input);
+      writer.add(input, simulation_.hash(), simulation_);
+      if (i % 100 == 99) std::this_thread::sleep_for(std::chrono::milliseconds(30));
+    }
+  }
+
+  LoadedScene loaded_ = test::smallSession();
+  SessionSimulation simulation_ = test::SessionRig::makeSimulation(loaded_, 1, {kRightHand});
+  fs::path folder_ = fs::temp_directory_path() / ("tenon-journal-writer-test-" + std::to_string(getpid()));
+  fs::path file_ = folder_ / "session.mcap";
+};
+
+TEST_F(JournalWriterTest, AReaderThatHangsLeavesNoGapInTheFile) {
+  std::promise<void> continues;
+  const std::shared_future<void> until = continues.get_future();
+  std::atomic<std::uint64_t> copies = 0;
+  JournalWriter writer(openJournal(), [&](const JournalEntry&) {
+    until.wait();
+    ++copies;
+  });
+  writer.start();
+  play(writer, 2100);
+  // the file is complete up to the last pass while the reader still hangs
+  for (int i = 0; i < 600 && writer.lostCopies() < 1000; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  continues.set_value();
+  writer.stop();
+  EXPECT_EQ(writer.lostEntries(), 0U);
+  EXPECT_GT(writer.lostCopies(), 0U) << "the queue of copies is bounded";
+  EXPECT_EQ(writer.lostCopies() + copies, 2100U);
+  ASSERT_TRUE(writer.close({.phase = simulation_.phase(), .tick = 2100, .reason = "done"}));
+  SessionSimulation again = test::SessionRig::makeSimulation(loaded_);
+  const auto report = resimulate(file_, again);
+  ASSERT_TRUE(report) << report.error().what;
+  EXPECT_EQ(report->compared, 2099U);
+  EXPECT_TRUE(report->gaps.empty());
+}
+
+TEST_F(JournalWriterTest, ACopyIsGivenAwayOnlyOnceItsEntryOutlivesTheProcess) {
+  Tick newest = 0;
+  bool is_behind = false;
+  JournalWriter writer(openJournal(), [&](const JournalEntry& entry) {
+    newest = entry.input.tick;
+    // what another process reads now
+    SessionSimulation again = test::SessionRig::makeSimulation(loaded_);
+    const auto report = resimulate(file_, again);
+    is_behind = is_behind || (newest > 1 && (!report || report->last < newest));
+  });
+  writer.reserve(simulation_.maxSavedBytes());
+  for (Tick tick = 1; tick <= 5; ++tick) {
+    simulation_.tick(test::playInput(tick));
+    writer.add(test::playInput(tick), simulation_.hash(), simulation_);
+    writer.writeNow();
+  }
+  EXPECT_EQ(newest, 5U);
+  EXPECT_FALSE(is_behind);
+}
+
+TEST_F(JournalWriterTest, AFullDiskEndsTheFileAndNotTheCopies) {
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  std::uint64_t copies = 0;
+  JournalWriter writer(openJournal(), [&](const JournalEntry&) { ++copies; });
+  const rlimit small{20'000, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &small);
+  writer.start();
+  play(writer, 1000);
+  writer.stop();
+  const auto closed = writer.close({.phase = simulation_.phase(), .tick = 1000, .reason = "done"});
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  ASSERT_TRUE(writer.problem());
+  EXPECT_THAT(*writer.problem(), testing::HasSubstr("session.mcap: cannot write"));
+  EXPECT_FALSE(closed);
+  EXPECT_EQ(copies, 1000U);
+}
+
+TEST(Contributions, OfEachClientAFewWaitAndTheNewestOfEachSource) {
+  Contributions contributions;
+  InputBuffer buffer(1);
+  const auto force = [](std::uint32_t source, double newton) {
+    return Change{.kind = ChangeKind::kContributeForce,
+                  .object = ObjectId{0},
+                  .index = source,
+                  .F_Oo_W = {{newton, 0.0, 0.0}, Vector3::Zero()}};
+  };
+  EXPECT_TRUE(contributions.put(ClientId{1}, force(1, 1.0)));
+  EXPECT_TRUE(contributions.put(ClientId{1}, force(1, 2.0)));
+  for (std::uint32_t source = 2; source < 1000; ++source)
+    EXPECT_EQ(contributions.put(ClientId{1}, force(source, 0.0)), source <= Contributions::kMostOfClient);
+  EXPECT_TRUE(contributions.put(ClientId{2}, force(1, 5.0))) << "another client has places of its own";
+  contributions.forward(buffer);
+  TickInput input;
+  buffer.collect(1, input);
+  ASSERT_EQ(input.changes.size(), Contributions::kMostOfClient + 1);
+  EXPECT_EQ(input.changes.begin()[0].F_Oo_W.force.x(), 2.0);
+  EXPECT_EQ(input.changes.begin()[1].F_Oo_W.force.x(), 5.0) << "clients take turns";
+}
+
+TEST(Contributions, LeaveHalfOfTheQueueToCommands) {
+  Contributions contributions;
+  InputBuffer buffer(1);
+  for (std::uint32_t client = 1; client < 1000; ++client)
+    contributions.put(ClientId{client}, {.kind = ChangeKind::kPlaceObject, .object = ObjectId{0}});
+  contributions.forward(buffer);
+  EXPECT_GE(buffer.freeChanges(), InputBuffer::kChanges / 2 - 1);
+}
+
+}  // namespace
+}  // namespace tenon::session
