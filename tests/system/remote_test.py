@@ -11,7 +11,7 @@ SCENARIO = SOURCE / "scenarios" / "peg_and_box"
 
 class Remote(unittest.TestCase):
     def test_the_example_client_mounts_the_first_part_and_the_session_resimulates(self):
-        with Stage(lockstep=False) as stage:
+        with Stage() as stage:  # in lockstep no tick is missing in a recording
             journal, recording, path = stage.out / "journal.mcap", stage.out / "session.mcap", stage.out / "hand.sock"
             server = stage.serve("peg_and_box", "--wait-for", "right,recorder", "--journal", journal)
             recorder = stage.start("record", "-o", recording)

@@ -1,9 +1,12 @@
 #include "clients/haptic/haptic_hand.h"
 
+#include <memory>
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 
+#include "devices/simulated/sigma7.h"
 #include "tests/clients/haptic/hand_above_floor.h"
 #include "tests/support/realtime_guard.h"
 
@@ -32,6 +35,32 @@ TEST_P(HapticHandWithDevice, SendsItsNewestReading) {
   EXPECT_TRUE(input.active);
   EXPECT_EQ(input.sample.seq, 10U);
   EXPECT_EQ(input.p_WC, setup.hand.workspace().centre());
+}
+
+/// Keeps what its owner would see.
+class ShowingDevice final : public devices::SimulatedDevice {
+ public:
+  ShowingDevice() : SimulatedDevice(devices::sigma7Model()) { EXPECT_TRUE(open()); }
+  void show(const devices::HandView& view) noexcept override { shown = view; }
+  devices::HandView shown;
+};
+
+//   ( )   proxy and object stay on the floor while the hand is in it, in the device's frame
+//   ~o~
+TEST(HapticHandView, ShowsItsDeviceProxyObjectAndContact) {
+  auto owned = std::make_unique<ShowingDevice>();
+  const ShowingDevice& device = *owned;
+  HandAboveFloor setup(std::move(owned));
+  for (int i = 0; i < 100; ++i) setup.step(Vector3(0.0, 0.0, 0.03));
+  EXPECT_FALSE(device.shown.in_contact);
+  for (int i = 0; i < 3000; ++i) setup.step(Vector3(0.0, 0.0, 0.0));
+  EXPECT_TRUE(device.shown.active);
+  EXPECT_TRUE(device.shown.in_contact);
+  EXPECT_EQ(device.shown.object, test::kBall);
+  EXPECT_EQ(device.shown.p_WC, setup.hand.workspace().centre());
+  EXPECT_NEAR((device.shown.p_WC + device.shown.X_DO.translation()).z(), 0.012, 1e-6);
+  EXPECT_NEAR((device.shown.p_WC + device.shown.X_DS.translation()).z(), 0.012, 1e-6);
+  EXPECT_LT(setup.hand.pose().translation().z(), 0.0115) << "the hand is deeper";
 }
 
 TEST_P(HapticHandWithDevice, TurnsItsForcesOffDuringAnEmergencyStop) {
