@@ -108,10 +108,7 @@ Result<void> Gateway::openServer() {
 Result<void> Gateway::followSessions() {
   auto participant = wire::Participant::open({.domain = options_.domain, .config = {}});
   if (!participant) return fail(participant.error().what);
-  if (!options_.session.empty()) {
-    desk_.expect(options_.session);
-    enter(std::string(kFirstRoom));
-  }
+  if (!options_.session.empty()) enter(std::string(kFirstRoom));
   wire::Partition partition(*participant, wire::kLobby);
   Lobby lobby;
   wire::Inbox inbox;
@@ -152,7 +149,9 @@ void Gateway::startFeeds() {
   const std::scoped_lock lock(mutex_);
   for (const std::string& room : std::exchange(entered_, {})) {
     const auto feed = feeds_.find(room);
-    if (feed != feeds_.end()) feed->second->start();
+    if (feed == feeds_.end()) continue;
+    feed->second->start();
+    if (const std::string session = feed->second->sessionName(); !session.empty()) desk_.expect(session);
   }
 }
 

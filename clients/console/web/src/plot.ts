@@ -34,7 +34,7 @@ export class ForcePlot {
   }
 
   private size(): { width: number; height: number } {
-    return { width: Math.max(200, this.host.clientWidth), height: 168 };
+    return { width: Math.max(200, this.host.clientWidth), height: innerHeight < 900 ? 128 : 168 };
   }
 
   /** Theme or language have changed. */

@@ -183,9 +183,11 @@ export class Session {
   recall(hands: Map<number, { times: number[]; forces: number[] }>): void {
     for (const [id, before] of hands) {
       const known = this.history.get(id) ?? { times: [], forces: [], peak: 0 };
-      const count = before.times.filter((time) => time < (known.times[0] ?? Infinity)).length;
-      const forces = [...before.forces.slice(0, count), ...known.forces];
-      this.history.set(id, { times: [...before.times.slice(0, count), ...known.times], forces, peak: Math.max(...forces, known.peak) });
+      const last = before.times[before.times.length - 1] ?? -Infinity;
+      const later = known.times.findIndex((time) => time > last);
+      const from = later < 0 ? known.times.length : later;
+      const forces = [...before.forces, ...known.forces.slice(from)];
+      this.history.set(id, { times: [...before.times, ...known.times.slice(from)], forces, peak: forces.reduce((a, b) => Math.max(a, b), 0) });
     }
     ++this.moved;
   }
