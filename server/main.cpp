@@ -1,6 +1,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -79,7 +80,8 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
          "--resume", arguments.resume,
          "take up the session of a killed server where its journal ends, and continue that file: same step, "
          "same seats, what hands held is parked until they are back; --detail is that of the journal")
-      ->excludes(journal);
+      ->excludes(journal)
+      ->check([](const std::string& file) { return std::string(file.empty() ? "names no file" : ""); });
   app.add_flag("--overwrite", arguments.overwrite, tenon::kOverwriteHelp);
   app.add_flag("--allow-skips", arguments.allow_skips, "exit 0 although steps were skipped");
   app.add_option(
@@ -180,8 +182,15 @@ int checkArguments(const ServeArguments& arguments) {
 int serve(ServeArguments& arguments) {
   const bool resumes = !arguments.resume.empty();
   if (const std::string& file = resumes ? arguments.resume : arguments.resimulate; !file.empty()) {
+    if (std::error_code error;
+        std::filesystem::exists(file, error) && !std::filesystem::is_regular_file(file, error))
+      return reportError(file + ": is no file");
     const auto origin = tenon::session::readJournalOrigin(file);
-    if (!origin && (resumes || arguments.scenario.empty())) return reportError(origin.error().what);
+    if (!origin && resumes)
+      return reportError(origin.error().what + "; begin a new session with --journal and another file");
+    if (!origin && arguments.scenario.empty())
+      return reportError(origin.error().what + "; name it as well, as in: tenon resimulate " + file +
+                         " scenarios/engine_bay");
     if (origin) arguments.session.simulation.limits = origin->limits;
     if (origin && (resumes || !arguments.states_detail)) arguments.load.detail = origin->detail;
     if (arguments.scenario.empty()) {

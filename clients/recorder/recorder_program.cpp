@@ -146,7 +146,8 @@ Result<void> Recorder::comeBack() {
   if (auto back = member_->rejoin(stop_, [this] { take(milliseconds(1)); }); !back)
     return fail(why + "; " + back.error().what + until_then);
   if (!recording_->continues(member_->announce(), member_->welcome().tick))
-    return fail(why + ", and the next one has begun another session" + until_then);
+    return fail(why + ", and the next one begins after tick " + std::to_string(member_->welcome().tick) +
+                ", not where the recording ends" + until_then);
   recording_->resumed(member_->announce(), member_->welcome().tick);
   if (options_.report)
     options_.report("recording the resumed session after tick " + std::to_string(member_->welcome().tick));

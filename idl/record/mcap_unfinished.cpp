@@ -34,7 +34,13 @@ class Scan {
     }
   }
 
+  struct Metadata {
+    std::size_t chunks = 0;  ///< before it
+    std::string name;
+    std::vector<std::uint8_t> fields;
+  };
   std::vector<Found> chunks;
+  std::vector<Metadata> metadata;
   Summary summary;  ///< metadata and attachments
   bool closed = false;
 
@@ -43,7 +49,7 @@ class Scan {
     FieldReader in(fields);
     if (opcode == kChunk) return readChunk(in);
     if (opcode == kMessageIndex && !chunks.empty()) return readIndex(in);
-    if (opcode == kMetadata) return summary.addMetadata(in.text(), offset_, length_);
+    if (opcode == kMetadata) return readMetadata(in);
     if (opcode == kAttachment) return readAttachment(in);
     if (opcode == kDataEnd) closed = true;
   }
@@ -70,6 +76,11 @@ class Scan {
     chunk.counts[channel] += in.get<std::uint32_t>() / kEntry;
     chunk.index.message_indices[channel] = offset_;
     chunk.index.indices_length += length_;
+  }
+  void readMetadata(FieldReader in) {
+    const Records whole = in.rest;
+    metadata.push_back({chunks.size(), std::string(in.text()), {whole.begin(), whole.end()}});
+    summary.addMetadata(metadata.back().name, offset_, length_);
   }
   void readAttachment(FieldReader in) {
     FieldWriter entry;
@@ -142,6 +153,9 @@ Result<Unfinished> readUnfinished(const std::filesystem::path& file) {
   std::vector<Found>& chunks = scan.chunks;
   while (!chunks.empty() && !openChunk(chunks.back().fields, result.last_chunk).empty()) chunks.pop_back();
   if (chunks.empty()) return fail(file.string() + ": has no complete chunk, there is nothing to continue");
+  for (Scan::Metadata& metadata : scan.metadata)
+    if (metadata.chunks >= chunks.size())
+      result.later_metadata.emplace_back(std::move(metadata.name), std::move(metadata.fields));
   const Found last = std::move(chunks.back());
   chunks.pop_back();
   result.end = last.index.offset;
@@ -149,7 +163,8 @@ Result<Unfinished> readUnfinished(const std::filesystem::path& file) {
   Summary& summary = result.summary;
   summary.metadata_index.putBytes(Records(scan.summary.metadata_index.bytes).first(last.metadata_index));
   summary.metadata = last.metadata;
-  summary.attachment_index.putBytes(Records(scan.summary.attachment_index.bytes).first(last.attachment_index));
+  summary.attachment_index.putBytes(
+      Records(scan.summary.attachment_index.bytes).first(last.attachment_index));
   summary.attachments = last.attachments;
   std::set<std::uint16_t> missing;
   for (const Found& chunk : chunks)

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -18,6 +19,8 @@ struct Unfinished {
   std::vector<std::uint8_t> last_chunk;  ///< its records
   /// Its messages by channel: log time [ns] and place in last_chunk [bytes].
   std::map<std::uint16_t, std::vector<std::pair<std::uint64_t, std::uint64_t>>> last_index;
+  /// Metadata after that chunk: name and fields of each record.
+  std::vector<std::pair<std::string, std::vector<std::uint8_t>>> later_metadata;
 };
 
 /// Reads the heads of its records; of its chunks the last one alone, and as many from the first as define the

@@ -128,6 +128,13 @@ Result<McapWriter> McapWriter::reopen(const std::filesystem::path& file, const M
       impl->last_time = std::max(impl->last_time, static_cast<std::int64_t>(time));
     }
   if (auto done = impl->endChunk(); !done) return fail(done.error().what);
+  for (const auto& [name, bytes] : unfinished->later_metadata) {
+    mcap::FieldWriter fields;
+    fields.putBytes(bytes);
+    const std::uint64_t at = impl->offset;
+    if (auto done = impl->record(mcap::kMetadata, fields); !done) return fail(done.error().what);
+    impl->summary.addMetadata(name, at, impl->offset - at);
+  }
   return McapWriter(std::move(impl));
 }
 

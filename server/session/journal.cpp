@@ -191,7 +191,7 @@ Result<JournalOrigin> readJournalOrigin(const std::filesystem::path& file) {
       limit(kPark, origin.limits.park);
       return origin;
     }
-  return fail(fmt::format("{}: does not name its scenario; {}", file.string(), nameTheScenario(file)));
+  return fail(file.string() + ": does not name its scenario");
 }
 
 Result<std::filesystem::path> findScenario(const std::filesystem::path& journal,

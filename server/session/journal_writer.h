@@ -57,7 +57,9 @@ class JournalWriter {
 
   std::optional<Journal> journal_;
   Publish publish_;
-  threads::SpscQueue<JournalEntry> entries_{1024};
+  /// [ticks] for which the disk or a busy machine may be behind
+  static constexpr std::size_t kBacklog = 4096;
+  threads::SpscQueue<JournalEntry> entries_{kBacklog};
   threads::SpscQueue<JournalEntry> copies_{1024};
   /// empty checkpoint buffers, back to the tick
   threads::SpscQueue<std::vector<std::uint8_t>> buffers_{2};

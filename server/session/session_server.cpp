@@ -334,9 +334,9 @@ void Server::noticeJournal() {
   if (const auto why = journal_->problem(); why && !std::exchange(journal_ended_, true))
     wire_->log(Severity::kError, "journal",
                fmt::format("the journal ends here, the session goes on without it: {}", *why));
-  if (const std::uint64_t lost = journal_->lostEntries(); lost > lost_entries_)
+  if (const std::uint64_t lost = journal_->lostEntries(); !journal_ended_ && lost > lost_entries_)
     wire_->log(Severity::kError, "journal",
-               fmt::format("{} ticks are missing in the journal: the disk is too slow",
+               fmt::format("{} ticks are missing in the journal: the disk or the machine is too slow",
                            lost - std::exchange(lost_entries_, lost)));
   if (const std::uint64_t lost = journal_->lostCopies(); lost > lost_copies_)
     wire_->log(Severity::kWarning, "journal",

@@ -170,6 +170,7 @@ TEST_F(ResumeTest, AServerThatWasKilledBeforeItsFirstTickBeginsInTheSameFile) {
   const auto report = resimulate(left, simulation);
   ASSERT_TRUE(report) << report.error().what;
   EXPECT_EQ(report->compared, 99U);
+  EXPECT_EQ(readJournalOrigin(left)->scenario, "small/scenario.yaml") << "it can be resumed again";
   EXPECT_FALSE(report->first_difference);
 }
 
