@@ -115,8 +115,13 @@ Tick Recording::follow(const wire::RawSample& sample) {
 void Recording::keep(const PublishedSamples& published) {
   stated_until_ = std::max(stated_until_, published.last_tick);
   // of a period in which this recorder joined, or came back, a part is not expected
-  if (published.first_tick > std::max(joined_, resumed_after_))
+  if (published.first_tick > std::max(heardAfter(), resumed_after_))
     published_[periodOf(published.first_tick)] = published;
+}
+
+/// Inputs may arrive before the answer that says when this recorder joined.
+Tick Recording::heardAfter() const {
+  return first_input_ == 0 ? joined_ : std::min(joined_, first_input_ - 1);
 }
 
 void Recording::follow(const TickInputPart& input) {
@@ -132,8 +137,7 @@ void Recording::follow(const TickInputPart& input) {
 /// publishes no inputs publishes 0 of them.
 TopicCount Recording::inputCount() const {
   const Tick end = std::max(newest_input_, runIsOver() ? run_->tick : 0);
-  // inputs may arrive before the answer that says when this recorder joined
-  const Tick before = first_input_ == 0 ? end : std::min(joined_, first_input_ - 1);
+  const Tick before = first_input_ == 0 ? end : heardAfter();
   TopicCount count{std::string(wire::kTickInput.name), input_ticks_, end - before};
   const std::uint64_t parts = std::min(input_parts_, input_parts_expected_);
   count.recorded -= std::min(count.recorded, input_parts_expected_ - parts);

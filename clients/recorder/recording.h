@@ -76,6 +76,8 @@ class Recording {
   void keep(const PublishedSamples& published);
   /// [ns] since 1970, of a sample of `tick`; 0: it has none.
   [[nodiscard]] std::int64_t logTime(std::int64_t source_ns, Tick tick) const;
+  /// The tick after which samples of the server are expected.
+  [[nodiscard]] Tick heardAfter() const;
   [[nodiscard]] TopicCount inputCount() const;
   void keepProblem(const Result<void>& done);
 

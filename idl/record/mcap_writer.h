@@ -49,7 +49,8 @@ class McapWriter {
                                          const std::map<std::string, std::string>& values);
   [[nodiscard]] Result<void> addAttachment(std::string_view name, std::string_view media_type,
                                            std::span<const std::uint8_t> data);
-  /// Closes the current chunk: what was written survives the end of this process, not yet that of the machine.
+  /// Closes the current chunk: what was written survives the end of this process, not yet that of the
+  /// machine.
   [[nodiscard]] Result<void> endChunk();
   /// Writes all messages so far to the disk.
   [[nodiscard]] Result<void> flush();

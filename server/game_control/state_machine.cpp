@@ -289,8 +289,9 @@ void StateMachine::leave(simulation::Environment& environment, StepPhase phase) 
   finish(environment, phase == StepPhase::kDone);
 }
 
-/// What a state does to the scene when it ends, unless it fails the training. A free body that people have not
-/// brought to its target is put there too: the next state begins as if they had. A tool stays where it is.
+/// What a state does to the scene when it ends, unless it fails the training. A free body that people have
+/// not brought to its target is put there too: the next state begins as if they had. A tool stays where it
+/// is.
 void StateMachine::finish(simulation::Environment& environment, bool by_people) noexcept {
   releaseHelpers(environment);
   const ObjectId object = state().object;

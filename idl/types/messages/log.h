@@ -16,7 +16,8 @@ struct EventLog {
   std::uint64_t seq = 0;  ///< counts from 1 without gaps
   Tick tick = 0;
   Severity severity = Severity::kInfo;
-  std::string kind;  ///< "step", "mounted", "put in place", "taken", "join", "refused", "hand frozen", "emergency stop", ...
+  std::string kind;  ///< "step", "mounted", "put in place", "taken", "join", "refused", "hand frozen",
+                     ///< "emergency stop", ...
   std::string text;
 };
 

@@ -175,6 +175,17 @@ TEST_F(RecordingTest, OfThePeriodInWhichItJoinedNothingIsExpected) {
   EXPECT_EQ(recording.status().lost, 7U);
 }
 
+// a recorder that stood still hears of its seat late, and everything else from the first tick on
+TEST_F(RecordingTest, OfAPeriodWhoseInputsCameBeforeTheWelcomeAllIsExpected) {
+  Recording recording = open(true);
+  for (Tick tick = 1; tick <= 1000; ++tick)
+    add(recording, wire::kTickInput, TickInputPart{.tick = tick}, kStart);
+  recording.joined(900);
+  add(recording, wire::kPublishedSamples, PublishedSamples{1, 1000, {{"WorldFrame_1k", 3}}}, kStart);
+  add(recording, wire::kRunState, RunState{.phase = RunPhase::kStopped, .tick = 1000}, kStart);
+  EXPECT_EQ(recording.status().lost, 3U);
+}
+
 TEST_F(RecordingTest, FailsWithASentenceWhenTheFileCannotBeWritten) {
   const auto recording = Recording::open("/proc/no/such/place.mcap", {});
   ASSERT_FALSE(recording);
