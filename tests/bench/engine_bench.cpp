@@ -178,7 +178,7 @@ BENCHMARK_CAPTURE(Tick, Tilted, kTilted, 0.5)->Unit(benchmark::kMicrosecond);
 }  // namespace tenon::bench
 
 int main(int argc, char** argv) {
-  tenon::registerQueries();
+  tenon::bench::registerQueries();
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
   benchmark::RunSpecifiedBenchmarks();
