@@ -138,15 +138,17 @@ Result<void> Recorder::writeUntilOver() {
   return {};
 }
 
-/// The server is gone: goes on in the same file when another one resumes the session, or when it was taken
+/// The server is gone: continues in the same file when another one resumes the session, or when it was taken
 /// for dead while one of the two programs stood still.
 Result<void> Recorder::comeBack() {
   const std::uint32_t epoch = member_->announce().server_epoch;
   const std::string why = *member_->lost();
   if (options_.report) options_.report(why + "; waiting for one that resumes the session");
   const auto until_then = "; the recording up to then is in " + options_.file.string();
-  if (auto back = member_->rejoin(stop_, [this] { take(milliseconds(1)); }); !back)
-    return fail(why + "; " + back.error().what + until_then);
+  // what the next server sends is delivered by the first dispatch after resumed()
+  while (take(milliseconds(0)) > 0) {
+  }
+  if (auto back = member_->rejoin(stop_); !back) return fail(why + "; " + back.error().what + until_then);
   if (member_->announce().server_epoch == epoch)
     return {};  // what was missed meanwhile is counted as missing
   if (!recording_->continues(member_->announce(), member_->welcome().tick))

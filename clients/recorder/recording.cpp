@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <concepts>
+#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -61,12 +62,17 @@ void Recording::writeAnnounce(const SessionAnnounce& session) {
 bool Recording::continues(const SessionAnnounce& session, Tick tick) const {
   constexpr Tick kMostLost = 1000;  // [ticks] more than a kill loses
   return session.scenario_hash == session_.scenario_hash && session.lockstep == session_.lockstep &&
-         tick > 0 && tick + kMostLost >= std::max(newest_tick_, newest_input_);
+         tick > 0 && tick + kMostLost >= std::max(newest_tick_, newest_input_.tick);
 }
 
 void Recording::resumed(const SessionAnnounce& session, Tick tick) {
   session_ = session;
   resumed_after_ = tick;
+  newest_event_ = 0;
+  // ticks of the former life that are not in its journal are computed once more
+  const PartNumber last{tick, std::numeric_limits<std::uint32_t>::max()};
+  newest_input_ = std::min(newest_input_, last);
+  newest_checkpoint_ = std::min(newest_checkpoint_, last);
   keepProblem(writer_.addMetadata("tenon resumed", {{"after tick", std::to_string(tick)},
                                                     {"server epoch", std::to_string(session.server_epoch)}}));
   writeAnnounce(session);
@@ -84,13 +90,13 @@ void Recording::add(const wire::RawSample& sample) {
           logTime(sample.source_ns, 0), ended_++, bytes);
     return;
   }
-  const Tick tick = follow(sample);
-  write(channelOf(sample.topic, sample.type, wire::idlText()), logTime(sample.source_ns, tick),
-        sample.sequence, sample.bytes);
+  if (const std::optional<Tick> tick = follow(sample))
+    write(channelOf(sample.topic, sample.type, wire::idlText()), logTime(sample.source_ns, *tick),
+          sample.sequence, sample.bytes);
 }
 
-Tick Recording::follow(const wire::RawSample& sample) {
-  Tick tick = 0;
+std::optional<Tick> Recording::follow(const wire::RawSample& sample) {
+  std::optional<Tick> tick = 0;
   wire::forEachTopic([&]<class M>(const wire::Topic<M>& topic) {
     if (sample.topic != topic.name) return;
     if constexpr (HasTick<M> || std::same_as<M, PublishedSamples>) {
@@ -98,13 +104,18 @@ Tick Recording::follow(const wire::RawSample& sample) {
       if (!message) return;
       if constexpr (HasEpoch<M>)
         if (message->server_epoch != session_.server_epoch) return;
+      if constexpr (requires { isNew(*message); })
+        if (!isNew(*message)) return tick.reset();
       if constexpr (HasTick<M>) {
         tick = message->tick;
-        ++recorded_[std::string(topic.name)][periodOf(tick)];
+        ++recorded_[std::string(topic.name)][periodOf(*tick)];
       }
       if constexpr (std::same_as<M, WorldFrame>)
-        if (topic.name == wire::kWorldFrame1k.name) newest_tick_ = std::max(newest_tick_, tick);
-      if constexpr (std::same_as<M, TickInputPart>) follow(*message);
+        if (topic.name == wire::kWorldFrame1k.name) {
+          if (first_tick_ == 0) first_tick_ = *tick;
+          newest_tick_ = std::max(newest_tick_, *tick);
+        }
+      if constexpr (std::same_as<M, TickInputPart>) count(*message);
       if constexpr (std::same_as<M, RunState>) run_ = std::move(*message);
       if constexpr (std::same_as<M, PublishedSamples>) keep(*message);
     }
@@ -119,16 +130,19 @@ void Recording::keep(const PublishedSamples& published) {
     published_[periodOf(published.first_tick)] = published;
 }
 
-/// Inputs may arrive before the answer that says when this recorder joined.
-Tick Recording::heardAfter() const {
-  return first_input_ == 0 ? joined_ : std::min(joined_, first_input_ - 1);
+/// Frames may arrive before the answer that says when this recorder joined.
+Tick Recording::heardAfter() const { return first_tick_ == 0 ? joined_ : std::min(joined_, first_tick_ - 1); }
+
+bool Recording::isNew(const TickInputPart& part) { return advance(newest_input_, part); }
+bool Recording::isNew(const CheckpointPart& part) { return advance(newest_checkpoint_, part); }
+bool Recording::isNew(const EventLog& event) {
+  return event.seq > std::exchange(newest_event_, std::max(newest_event_, event.seq));
 }
 
-void Recording::follow(const TickInputPart& input) {
+void Recording::count(const TickInputPart& input) {
   ++input_parts_;
-  if (input.part != 0 || input.tick <= newest_input_) return;
+  if (input.part != 0) return;
   if (first_input_ == 0) first_input_ = input.tick;
-  newest_input_ = input.tick;
   ++input_ticks_;
   input_parts_expected_ += input.parts;
 }
@@ -136,9 +150,9 @@ void Recording::follow(const TickInputPart& input) {
 /// In ticks. Without a run state that says where the run ended, up to the newest one received; a server that
 /// publishes no inputs publishes 0 of them.
 TopicCount Recording::inputCount() const {
-  const Tick end = std::max(newest_input_, runIsOver() ? run_->tick : 0);
-  const Tick before = first_input_ == 0 ? end : heardAfter();
-  TopicCount count{std::string(wire::kTickInput.name), input_ticks_, end - before};
+  const Tick end = std::max(newest_input_.tick, runIsOver() ? run_->tick : 0);
+  const Tick before = first_input_ == 0 ? end : std::min(heardAfter(), first_input_ - 1);
+  TopicCount count{std::string(wire::kTickInput.name), std::min(input_ticks_, end - before), end - before};
   const std::uint64_t parts = std::min(input_parts_, input_parts_expected_);
   count.recorded -= std::min(count.recorded, input_parts_expected_ - parts);
   return count;

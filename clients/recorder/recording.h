@@ -1,5 +1,6 @@
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -41,11 +42,13 @@ class Recording {
 
   /// From the tick after `tick` on, every sample of the server is expected.
   void joined(Tick tick) { joined_ = tick; }
-  /// Whether a server that announces `session` goes on, after `tick`, with what is recorded here.
+  /// Whether a server that announces `session` continues, after `tick`, with what is recorded here.
   [[nodiscard]] bool continues(const SessionAnnounce& session, Tick tick) const;
   /// It does: notes in the file that a new life of the server begins, and expects its samples from now on.
+  /// To be called before samples of that life are added.
   void resumed(const SessionAnnounce& session, Tick tick);
-  /// Writes one sample, or the end of its instance; a failure shows in status().
+  /// Writes one sample, or the end of its instance; a failure shows in status(). Omits what of the journal
+  /// and of the server's events is there already: a late joiner gets the last ones again.
   void add(const wire::RawSample& sample);
   /// Writes outcome and summary; the recording is complete after that. Fails with the first problem there
   /// was.
@@ -70,9 +73,13 @@ class Recording {
   void writeAnnounce(const SessionAnnounce& session);
   void write(std::uint16_t channel, std::int64_t log_time_ns, std::uint64_t sequence,
              std::span<const std::uint8_t> bytes);
-  /// Keeps the newest tick, the run state and the counts; the tick of the sample, 0 when it has none.
-  Tick follow(const wire::RawSample& sample);
-  void follow(const TickInputPart& input);
+  /// Keeps the newest tick, the run state and the counts. The tick of the sample, 0 when it has none; none:
+  /// it is recorded already.
+  std::optional<Tick> follow(const wire::RawSample& sample);
+  void count(const TickInputPart& input);
+  [[nodiscard]] bool isNew(const TickInputPart& part);
+  [[nodiscard]] bool isNew(const CheckpointPart& part);
+  [[nodiscard]] bool isNew(const EventLog& event);
   void keep(const PublishedSamples& published);
   /// [ns] since 1970, of a sample of `tick`; 0: it has none.
   [[nodiscard]] std::int64_t logTime(std::int64_t source_ns, Tick tick) const;
@@ -81,19 +88,35 @@ class Recording {
   [[nodiscard]] TopicCount inputCount() const;
   void keepProblem(const Result<void>& done);
 
+  /// Parts of the journal come in this order.
+  struct PartNumber {
+    Tick tick = 0;
+    std::uint32_t part = 0;
+    auto operator<=>(const PartNumber&) const = default;
+  };
+  template <class Part>
+  static bool advance(PartNumber& newest, const Part& part) {
+    const PartNumber number{part.tick, part.part};
+    if (number <= newest) return false;
+    newest = number;
+    return true;
+  }
+
   record::McapWriter writer_;
   SessionAnnounce session_;
   std::map<std::string, std::uint16_t, std::less<>> channels_;
   RecorderStatus status_;
   std::optional<RunState> run_;
-  Tick newest_tick_ = 0;  ///< of WorldFrame_1k
+  Tick first_tick_ = 0, newest_tick_ = 0;  ///< of WorldFrame_1k
   Tick joined_ = 0;
   Tick resumed_after_ = 0;  ///< of the newest life of the server
   std::map<std::string, std::map<Tick, std::uint64_t>, std::less<>> recorded_;  ///< samples by topic, period
   std::map<Tick, PublishedSamples> published_;                                  ///< by period
   Tick stated_until_ = 0;
   // TickInput: a gap in its ticks prevents re-simulation
-  Tick first_input_ = 0, newest_input_ = 0;
+  Tick first_input_ = 0;
+  PartNumber newest_input_, newest_checkpoint_;
+  std::uint64_t newest_event_ = 0;  ///< EventLog::seq of this life of the server
   std::uint64_t input_ticks_ = 0, input_parts_ = 0, input_parts_expected_ = 0;
   std::int64_t start_ns_ = 0;  ///< source time of the first sample
   std::uint64_t ended_ = 0;    ///< ended instances written

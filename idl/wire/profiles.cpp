@@ -53,11 +53,20 @@ void setWriterHistory(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profil
   }
 }
 
+/// Samples per key that a late joiner gets; 0: volatile. Streams of a lockstep server have one, because in
+/// Cyclone DDS a volatile reader lacks what was written before the writer's first heartbeat has reached it,
+/// although the writer knows it by then; a transient-local one gets all from its match on.
+std::uint32_t lateJoinerDepth(const TopicSpec& topic, LinkProfile profile) {
+  const bool lockstep_frames =
+      profile == LinkProfile::kLockstep && topic.parameters.of_server && topic.qos_class == QosClass::kStream;
+  return lockstep_frames ? 1 : topic.parameters.late_joiner_depth;
+}
+
 dds_qos_t* commonQos(const TopicSpec& topic, LinkProfile profile) {
   dds_qos_t* qos = dds_create_qos();
   setReliability(qos, topic, profile);
   dds_qset_durability(
-      qos, topic.parameters.late_joiner_depth > 0 ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
+      qos, lateJoinerDepth(topic, profile) > 0 ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   return qos;
 }
 
@@ -70,11 +79,10 @@ dds_qos_t* writerQos(const TopicSpec& topic, LinkProfile profile) {
   setWriterHistory(qos, topic, profile);
   dds_data_representation_id_t xcdr1[] = {DDS_DATA_REPRESENTATION_XCDR1};
   dds_qset_data_representation(qos, 1, xcdr1);
-  if (parameters.late_joiner_depth > 0) {
+  if (const std::uint32_t depth = lateJoinerDepth(topic, profile); depth > 0) {
     // Cyclone serves late joiners by DURABILITY_SERVICE alone; HISTORY does not matter for them
-    dds_qset_durability_service(qos, 0, DDS_HISTORY_KEEP_LAST,
-                                static_cast<std::int32_t>(parameters.late_joiner_depth), DDS_LENGTH_UNLIMITED,
-                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+    dds_qset_durability_service(qos, 0, DDS_HISTORY_KEEP_LAST, static_cast<std::int32_t>(depth),
+                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   }
   if (parameters.lease != kNever) {
     const bool by_topic = parameters.lease_by_topic && !lockstep;

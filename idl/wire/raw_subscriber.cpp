@@ -1,6 +1,9 @@
 #include "idl/wire/raw_subscriber.h"
 
 #include <algorithm>
+#include <deque>
+#include <optional>
+#include <span>
 #include <utility>
 
 #include "idl/wire/convert.h"
@@ -32,9 +35,15 @@ Result<TopicSpec> specOf(std::string_view name) {
 class RawSubscription : public Subscription {
  public:
   RawSubscription(const TopicSpec& spec, const std::function<void(const RawSample&)>* const& handler)
-      : spec_(spec), handler_(handler) {}
+      : spec_(spec),
+        keeps_unheard_(spec.parameters.of_server &&
+                       (spec.qos_class == QosClass::kState || spec.parameters.late_joiner_depth > 0)),
+        handler_(handler) {}
+
+  [[nodiscard]] bool isRebound() const override { return reader->partition()->server != server_; }
 
   std::size_t takeBatch() override {
+    if (isRebound()) deliverUnheard();
     void* samples[kTakeBatch] = {nullptr};
     dds_sample_info_t infos[kTakeBatch];
     const dds_return_t count = dds_take(reader->entity(), samples, infos, kTakeBatch, kTakeBatch);
@@ -42,23 +51,50 @@ class RawSubscription : public Subscription {
     for (int i = 0; i < count; ++i) {
       const Origin& from = origins_.find(reader->entity(), infos[i].publication_handle);
       const bool ended = !infos[i].valid_data && !from.known();  // by a writer that is no more
-      if (!ended && !isHeard(*reader->partition(), spec_.parameters, from)) continue;
-      if (infos[i].valid_data) deliver(infos[i], samples[i], false);
-      if (isGone(infos[i], spec_.parameters.latched)) deliver(infos[i], samples[i], true);
+      const bool heard = ended || isHeard(*reader->partition(), spec_.parameters, from);
+      if (!heard && !(keeps_unheard_ && from.known() && infos[i].valid_data)) continue;
+      encodeSample(*spec_.type, samples[i], bytes_);
+      if (!heard) {
+        keepUnheard({from, infos[i].source_timestamp, infos[i].instance_handle, bytes_});
+        continue;
+      }
+      if (infos[i].valid_data) deliver(infos[i].source_timestamp, false, infos[i].instance_handle, bytes_);
+      if (isGone(infos[i], spec_.parameters.latched))
+        deliver(infos[i].source_timestamp, true, infos[i].instance_handle, bytes_);
     }
     dds_return_loan(reader->entity(), samples, count);
     return static_cast<std::size_t>(count);
   }
 
  private:
-  void deliver(const dds_sample_info_t& info, const void* sample, bool gone) {
-    encodeSample(*spec_.type, sample, bytes_);
-    (*handler_)({spec_.name, spec_.type->m_typename, info.source_timestamp, sequence_++, gone, bytes_,
-                 info.instance_handle});
+  struct Unheard {
+    Origin from;
+    std::int64_t source_ns;
+    std::uint64_t instance;
+    std::vector<std::uint8_t> bytes;
+  };
+
+  /// What late joiners get comes once, maybe before it is known that this client will belong to its server.
+  void keepUnheard(Unheard sample) {
+    const std::size_t most = std::max<std::size_t>(2000, 2 * spec_.parameters.late_joiner_depth);
+    if (unheard_.size() >= most) unheard_.pop_front();
+    unheard_.push_back(std::move(sample));
+  }
+  void deliverUnheard() {
+    server_ = reader->partition()->server;
+    for (const Unheard& sample : std::exchange(unheard_, {}))
+      if (server_ == sample.from) deliver(sample.source_ns, false, sample.instance, sample.bytes);
+  }
+  void deliver(std::int64_t source_ns, bool gone, std::uint64_t instance,
+               std::span<const std::uint8_t> bytes) {
+    (*handler_)({spec_.name, spec_.type->m_typename, source_ns, sequence_++, gone, bytes, instance});
   }
 
   TopicSpec spec_;
+  bool keeps_unheard_;
   const std::function<void(const RawSample&)>* const& handler_;  ///< of the current dispatch()
+  std::optional<Origin> server_;  ///< that the partition was bound to at the last samples
+  std::deque<Unheard> unheard_;
   OriginCache origins_;
   std::uint64_t sequence_ = 0;
   std::vector<std::uint8_t> bytes_;

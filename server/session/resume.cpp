@@ -18,12 +18,8 @@ namespace {
 
 /// The last checkpoint of a journal and the inputs after it.
 struct Tail {
-  struct Entry {
-    TickInput input;
-    std::uint64_t hash = 0;  ///< of the state after it
-  };
   std::vector<std::uint8_t> checkpoint;  ///< empty: none
-  std::vector<Entry> entries;
+  std::vector<JournalEntry> entries;
 };
 
 /// Follows the messages of a journal in their order.
@@ -43,7 +39,7 @@ class TailReader {
     if (!inputs_.add(*part) || tail.checkpoint.empty()) return {};
     auto input = readTickInput(inputs_.bytes());
     if (!input) return fail(input.error().what);
-    tail.entries.push_back({*input, part->state_hash});
+    tail.entries.push_back({.input = *input, .hash = part->state_hash, .checkpoint = {}});
     return {};
   }
   Result<void> readCheckpoint(const record::McapMessage& message) {
@@ -109,7 +105,7 @@ Result<ResumePoint> readResumePoint(const std::filesystem::path& journal, const 
   auto reader = record::McapReader::open(journal);
   if (!reader) return fail(reader.error().what);
   if (const std::string why = refusal(journal, *reader, loaded); !why.empty()) return failed(why);
-  const auto tail = readTail(*reader);
+  auto tail = readTail(*reader);
   if (!tail) return failed(fmt::format("{}; {}", tail.error().what, instead(journal)));
   // killed while it still waited for people
   if (reader->lastTime() == 0 && reader->channels().size() >= 2) return ResumePoint{};
@@ -117,11 +113,11 @@ Result<ResumePoint> readResumePoint(const std::filesystem::path& journal, const 
     return failed("holds no checkpoint to resume from, so the file is damaged or cut; " + instead(journal));
   if (auto restored = simulation.restore(tail->checkpoint); !restored)
     return failed(fmt::format("{}; {}", restored.error().what, instead(journal)));
-  ResumePoint point{.tick = simulation.now(), .checkpoint = simulation.now(), .problem = {}};
-  for (const Tail::Entry& entry : tail->entries) {
+  ResumePoint point{.tick = simulation.now(), .checkpoint = simulation.now(), .problem = {}, .entries = {}};
+  for (JournalEntry& entry : tail->entries) {
     if (entry.input.tick != simulation.now() + 1) {
       point.problem = fmt::format(
-          "{}: has no tick {}, so the session goes on from there, {} ticks before its end", journal.string(),
+          "{}: has no tick {}, so the session continues from there, {} ticks before its end", journal.string(),
           simulation.now() + 1, tail->entries.back().input.tick - simulation.now());
       break;
     }
@@ -131,6 +127,7 @@ Result<ResumePoint> readResumePoint(const std::filesystem::path& journal, const 
           "tick {} has another result here than the server had that wrote it: resume with the same build of "
           "tenon, or {}",
           simulation.now(), instead(journal)));
+    point.entries.push_back(std::move(entry));
   }
   point.tick = simulation.now();
   return point;

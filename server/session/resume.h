@@ -2,9 +2,11 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "idl/types/ids.h"
 #include "idl/types/result.h"
+#include "server/session/journal.h"
 #include "server/session/scene_loader.h"
 #include "server/session/session_simulation.h"
 
@@ -12,9 +14,10 @@ namespace tenon::session {
 
 /// What a journal holds of a session whose server was killed.
 struct ResumePoint {
-  Tick tick = 0;        ///< the last one that can be computed again
-  Tick checkpoint = 0;  ///< of the state from which it was
-  std::string problem;  ///< damage of the file before its end, or empty
+  Tick tick = 0;                      ///< the last one that can be computed again
+  Tick checkpoint = 0;                ///< of the state from which it was
+  std::string problem;                ///< damage of the file before its end, or empty
+  std::vector<JournalEntry> entries;  ///< of the ticks after the checkpoint
 };
 
 /// Brings `simulation` into the state after the last tick of a killed server's journal: restores the last

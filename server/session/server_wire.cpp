@@ -13,98 +13,12 @@
 #include "idl/types/names.h"
 #include "idl/types/printable_text.h"
 #include "server/session/scene_loader.h"
+#include "server/session/server_writers.h"
 #include "server/session/session_lock.h"
 #include "server/session/stop_file.h"
 
 namespace tenon::session {
 namespace {
-
-constexpr double kSlowWrite = 5e-3;  // [s]
-
-}  // namespace
-
-/// A writer and its topic, opened together.
-template <class M>
-struct ServerWire::TopicWriter {
-  const wire::Topic<M>& topic;
-  std::optional<wire::Writer<M>> writer;
-  std::uint64_t samples = 0;  ///< of ticks, since the last PublishedSamples
-  WriteCounts* counts = nullptr;
-
-  /// Of the wire thread.
-  void send(const M& message) {
-    const auto begin = std::chrono::steady_clock::now();
-    const bool written = writer->write(message).has_value();
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    counts->longest_seconds = std::max(counts->longest_seconds, seconds);
-    counts->slow += seconds > kSlowWrite ? 1 : 0;
-    counts->failed += written ? 0 : 1;
-  }
-  /// Writes a sample of a tick.
-  void write(const M& message) {
-    ++samples;
-    send(message);
-  }
-  Result<void> open(wire::Partition& partition) {
-    auto opened = wire::Writer<M>::open(partition, topic);
-    if (!opened) return fail(opened.error().what);
-    writer.emplace(std::move(*opened));
-    return {};
-  }
-};
-
-struct ServerWire::Writers {
-  TopicWriter<SessionAnnounce> announce{wire::kSessionAnnounce, {}};
-  TopicWriter<Welcome> welcome{wire::kWelcome, {}};
-
-  TopicWriter<WorldFrame> frame_1k{wire::kWorldFrame1k, {}};
-  TopicWriter<WorldFrame> frame_100{wire::kWorldFrame100, {}};
-  TopicWriter<WorldFrame> frame_30{wire::kWorldFrame30, {}};
-  TopicWriter<HandManifold> manifold{wire::kHandManifold, {}};
-  TopicWriter<ContactPairs> pairs{wire::kContactPairs100, {}};
-  TopicWriter<TickStats> stats{wire::kTickStats100, {}};
-  TopicWriter<ObjectSnapshot> snapshot{wire::kObjectSnapshot, {}};
-  TopicWriter<SceneObject> object{wire::kSceneObject, {}};
-  TopicWriter<SceneHand> hand{wire::kSceneHand, {}};
-  TopicWriter<SceneStep> scene_step{wire::kSceneStep, {}};
-  TopicWriter<StepState> step{wire::kStepState, {}};
-  TopicWriter<StepProgress> progress{wire::kStepProgress, {}};
-  TopicWriter<RunState> run{wire::kRunState, {}};
-  TopicWriter<GrabState> grab{wire::kGrabState, {}};
-  TopicWriter<CommandAck> ack{wire::kCommandAck, {}};
-  TopicWriter<Guidance> guidance{wire::kGuidance, {}};
-  TopicWriter<EventLog> event{wire::kEventLog, {}};
-  TopicWriter<ClockSync> clock{wire::kClockSync, {}};
-  TopicWriter<EmergencyStop> stop{wire::kEmergencyStop, {}};
-  TopicWriter<EmergencyClear> clear{wire::kEmergencyClear, {}};
-  TopicWriter<PublishedSamples> published{wire::kPublishedSamples, {}};
-  TopicWriter<TickInputPart> input{wire::kTickInput, {}};
-  TopicWriter<CheckpointPart> checkpoint{wire::kCheckpoint, {}};
-
-  auto inLobby() { return std::tie(announce, welcome); }
-  auto inSession() {
-    return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, object, hand, scene_step,
-                    step, progress, run, grab, ack, guidance, event, clock, stop, clear, published, input,
-                    checkpoint);
-  }
-  /// Written in ticks by send(OutgoingMessages), with the tick in each sample.
-  auto ofTicks() {
-    return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, progress, grab);
-  }
-};
-
-namespace {
-
-template <class Tuple>
-Result<void> openAll(Tuple outs, wire::Partition& partition) {
-  Result<void> result;
-  const auto open = [&](auto& out) {
-    if (!result) return;
-    result = out.open(partition);
-  };
-  std::apply([&](auto&... out) { (open(out), ...); }, outs);
-  return result;
-}
 
 constexpr auto kOtherServers = std::chrono::milliseconds(500);  // for their announcements to arrive
 // without a sign of life for so long the announcement of a server ends (its lease)
@@ -129,7 +43,7 @@ ServerWire::ServerWire(const WireOptions& options, std::shared_ptr<wire::Partici
       participant_(std::move(participant)),
       lobby_(participant_, wire::kLobby, wire::LinkProfile::kLan),
       session_(participant_, wire::sessionPartition(options.session)),
-      writers_(std::make_shared<Writers>()),
+      writers_(std::make_unique<ServerWriters>()),
       registry_(registry),
       input_buffer_(input_buffer),
       publisher_(publisher) {}
@@ -146,12 +60,10 @@ Result<std::unique_ptr<ServerWire>> ServerWire::open(const WireOptions& options,
       new ServerWire(options, std::move(*participant), registry, input_buffer, publisher));
   wire->title_ = loaded.scenario->title.front().text;
   wire->scenario_hash_ = fmt::format("{:016x}", loaded.scenario->text_hash);
-  const auto count = [&counts = wire->writes_](auto&... out) { ((out.counts = &counts), ...); };
-  std::apply(count, wire->writers_->inLobby());
-  std::apply(count, wire->writers_->inSession());
   wire->newest_seq_.resize(loaded.scenario->hands.size());
   if (auto alone = wire->refuseBesideAnother(); !alone) return fail(alone.error().what);
-  if (auto opened = wire->openWriters(); !opened) return fail(opened.error().what);
+  if (auto opened = wire->writers_->open(wire->lobby_, wire->session_, wire->writes_); !opened)
+    return fail(opened.error().what);
   if (auto opened = wire->openReaders(); !opened) return fail(opened.error().what);
   wire->sendScene(loaded);
   if (auto restored = wire->restoreStops(); !restored) return fail(restored.error().what);
@@ -218,12 +130,8 @@ void ServerWire::keepStops() {
 
 void ServerWire::keepSeats() {
   if (options_.seat_file.empty()) return;
-  if (auto kept = writeSeats(options_.seat_file, registry_.seatsToKeep()); !kept) refuse(kept.error().what);
-}
-
-Result<void> ServerWire::openWriters() {
-  if (auto opened = openAll(writers_->inLobby(), lobby_); !opened) return opened;
-  return openAll(writers_->inSession(), session_);
+  if (auto kept = writeSeats(options_.seat_file, registry_.seatsToKeep()); !kept)
+    log(Severity::kError, "seats", kept.error().what);
 }
 
 Result<void> ServerWire::openReaders() {
@@ -533,7 +441,7 @@ void ServerWire::send(const OutgoingMessages& outgoing, bool is_newest) {
   const Tick period_begin = (now_ - 1) / kPublishedSamplesPeriod * kPublishedSamplesPeriod + 1;
   if (period_begin != published_.first_tick) statePublished();
   published_.first_tick = period_begin;
-  Writers& to = *writers_;
+  ServerWriters& to = *writers_;
   // the step before the frames, which refer to its revision
   if (outgoing.events.step) to.step.send(*outgoing.events.step);
   for (const GrabState& grab : outgoing.events.grabs) to.grab.write(grab);
@@ -578,13 +486,11 @@ void ServerWire::waitForReaders(std::chrono::nanoseconds timeout) {
 
 void ServerWire::send(const JournalEntry& entry) {
   if (!options_.publish_journal) return;
-  if (writers_->input.writer->matchedReaders() > 0) {
-    std::vector<std::uint8_t> bytes;
-    appendBytes(entry.input, bytes);
-    forEachPart<TickInputPart>(entry.input.tick, entry.hash, bytes,
-                               [&](const auto& part) { (void)writers_->input.writer->write(part); });
-  }
-  if (!entry.checkpoint.empty() && writers_->checkpoint.writer->matchedReaders() > 0)
+  std::vector<std::uint8_t> bytes;
+  appendBytes(entry.input, bytes);
+  forEachPart<TickInputPart>(entry.input.tick, entry.hash, bytes,
+                             [&](const auto& part) { (void)writers_->input.writer->write(part); });
+  if (!entry.checkpoint.empty())
     forEachPart<CheckpointPart>(entry.input.tick, entry.hash, entry.checkpoint,
                                 [&](const auto& part) { (void)writers_->checkpoint.writer->write(part); });
 }

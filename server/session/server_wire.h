@@ -22,6 +22,7 @@
 #include "server/session/journal.h"
 #include "server/session/publisher.h"
 #include "server/session/scene_loader.h"
+#include "server/session/server_writers.h"
 #include "server/session/session_registry.h"
 
 namespace tenon::session {
@@ -36,13 +37,6 @@ struct WireOptions {
   std::string scene_hash;              ///< asset that lists the display models; empty: none
   std::filesystem::path stop_file;     ///< keeps the raises of the emergency stop; empty: only in memory
   std::filesystem::path seat_file;     ///< keeps the seats for a resume; empty: nothing does
-};
-
-/// What the wire thread has written.
-struct WriteCounts {
-  std::uint64_t slow = 0;        ///< took longer than 5 ms: a reader was behind
-  std::uint64_t failed = 0;      ///< samples that were not sent
-  double longest_seconds = 0.0;  ///< [s]
 };
 
 /// All DDS endpoints of a session's server, bound to its registry and input buffer.
@@ -84,7 +78,7 @@ class ServerWire {
   void statePublished();
   /// Waits until all readers have what was written to them reliably, for up to `timeout`.
   void waitForReaders(std::chrono::nanoseconds timeout);
-  /// Only to matched readers, and only with `publish_journal`.
+  /// To recorders, also to those that join up to 4 s later; only with `publish_journal`.
   void send(const JournalEntry& entry);
 
   /// Publishes an entry of the log.
@@ -107,17 +101,12 @@ class ServerWire {
   ServerWire(const WireOptions& options, std::shared_ptr<wire::Participant> participant,
              SessionRegistry& registry, InputBuffer& input_buffer, Publisher& publisher);
 
-  template <class M>
-  struct TopicWriter;
-  struct Writers;
-
   Result<void> refuseBesideAnother();
   void announce();
   void noticeLapse();
   Result<void> restoreStops();
   void keepStops();
   void keepSeats();
-  Result<void> openWriters();
   Result<void> openReaders();
   void sendScene(const LoadedScene& loaded);
   void receive(const Join& join, const wire::Origin& from);
@@ -140,7 +129,7 @@ class ServerWire {
   wire::Partition lobby_;
   wire::Partition session_;
   wire::Inbox inbox_;
-  std::shared_ptr<Writers> writers_;
+  std::unique_ptr<ServerWriters> writers_;
   SessionRegistry& registry_;
   InputBuffer& input_buffer_;
   Publisher& publisher_;

@@ -113,15 +113,20 @@ class Server final : public SessionServer {
                                                           fingerprintOf(loaded), options_.simulation.limits});
     if (!journal) return fail(journal.error().what);
     makeJournalWriter(std::move(*journal));
+    // a recorder that is back fills with them what it lacks of the former life
+    for (const JournalEntry& entry : resumed_entries_) wire_->send(entry);
+    resumed_entries_.clear();
     return {};
   }
 
   Result<SessionReport> run(const std::atomic<bool>& stop) override {
     if (journal_) journal_->reserve(simulation_.maxSavedBytes());
-    if (options_.resume) {
+    // killed before the first tick: the session begins when all are there, as it would have
+    if (options_.resume && simulation_.now() > 0) {
       awaitReturn(stop);
     } else {
-      print(fmt::format("session '{}' is open, waiting for people", options_.name));
+      print(fmt::format("session '{}' is open{}, waiting for people", options_.name,
+                        options_.resume ? " again" : ""));
       while (!stop && !registry_.stopRequested() && !wire_->replaced() && !start_condition_.isMet(registry_))
         wire_->dispatch(milliseconds(100));
     }
@@ -182,6 +187,7 @@ class Server final : public SessionServer {
   std::optional<double> new_budget_;  ///< [points] for the next tick's input
   std::optional<SessionLock> lock_;
   std::unique_ptr<ServerWire> wire_;
+  std::vector<JournalEntry> resumed_entries_;  ///< the last ones of the journal that is resumed
   std::vector<HandId> returning_;  ///< controlled when the server was killed that this one resumes
   std::optional<JournalWriter> journal_;
   bool journal_ended_ = false;      ///< before the session, as was said
@@ -196,8 +202,9 @@ class Server final : public SessionServer {
 
 /// Takes up the session of a killed server, before the wire is open.
 Result<void> Server::resume(const LoadedScene& loaded) {
-  const auto point = readResumePoint(options_.journal, loaded, simulation_);
+  auto point = readResumePoint(options_.journal, loaded, simulation_);
   if (!point) return fail(point.error().what);
+  resumed_entries_ = std::move(point->entries);
   if (!point->problem.empty()) print(point->problem);
   auto seats = readSeats(seatFileOf(options_.journal));
   if (!seats) print(seats.error().what);
@@ -213,11 +220,11 @@ void Server::awaitReturn(const std::atomic<bool>& stop) {
   TickOutput output = simulation_.makeOutput();
   simulation_.fill(output);
   wire_->update(output);
-  // raised or cleared, it is as the stop file has it, which is written before the simulation hears of it
-  if (simulation_.emergencyStop() && !registry_.isStopEngaged()) registry_.clearEmergencyStop();
+  // One that the stop file lacks, because it could not be written in time, stands until a person clears it.
+  if (simulation_.emergencyStop() && !registry_.isStopEngaged()) registry_.engageEmergencyStop();
   print(fmt::format("session '{}' is open again after tick {}", options_.name, simulation_.now()));
   wire_->log(Severity::kWarning, "resumed",
-             fmt::format("a new server goes on with the session after {:.3f} s",
+             fmt::format("a new server continues the session after {:.3f} s",
                          static_cast<double>(simulation_.now()) * kTickSeconds));
   const auto isBack = [this](HandId hand) { return registry_.controllerOf(hand).valid(); };
   const auto until = std::chrono::steady_clock::now() + kReturn;
@@ -333,7 +340,7 @@ void Server::noticeJournal() {
   if (!journal_) return;
   if (const auto why = journal_->problem(); why && !std::exchange(journal_ended_, true))
     wire_->log(Severity::kError, "journal",
-               fmt::format("the journal ends here, the session goes on without it: {}", *why));
+               fmt::format("the journal ends here, the session continues without it: {}", *why));
   if (const std::uint64_t lost = journal_->lostEntries(); !journal_ended_ && lost > lost_entries_)
     wire_->log(Severity::kError, "journal",
                fmt::format("{} ticks are missing in the journal: the disk or the machine is too slow",

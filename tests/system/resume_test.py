@@ -7,6 +7,7 @@ import subprocess
 import time
 import types
 import unittest
+from pathlib import Path
 
 from safety_test import hand_states
 from stage import COARSE, PROGRAMS, SOURCE, TENON, Stage, tenon
@@ -38,8 +39,8 @@ def resimulated(stage, file="journal.mcap"):
 
 
 class KilledServer(unittest.TestCase):
-    def assertResimulates(self, stage, server):
-        again = resimulated(stage)
+    def assertResimulates(self, stage, server, file="journal.mcap"):
+        again = resimulated(stage, file)
         self.assertEqual(again.returncode, 0, again.stdout + again.stderr)
         self.assertIn(" 0 gaps", again.stdout)
         final = re.search("final state hash: .*", server.text()).group()
@@ -68,6 +69,7 @@ class KilledServer(unittest.TestCase):
             clients = re.findall(r"joined as client (\d+)", trainee.text())
             self.assertEqual(set(clients), {clients[0]}, "the same seat in each life")
             self.assertResimulates(stage, server)
+            self.assertResimulates(stage, server, "session.mcap")
             self.judge(stage)
 
     def wait_for_contact(self, observer):
@@ -116,6 +118,21 @@ class KilledServer(unittest.TestCase):
             self.assertEqual(server.wait(120), 0, server.text())
             self.assertEqual(trainee.wait(60), 0, trainee.text())
             self.assertResimulates(stage, server)
+
+    def test_a_stop_that_only_the_journal_has_stands_too(self):
+        with Stage(lockstep=False) as stage:
+            server = begin(stage, "--wait-for", "right")
+            trainee = stage.start("trainee", "--seed", 1, "--wait", 60)
+            server.wait_for("run: running", 120)
+            command = stage.start("command", "emergency", "hand in the way")
+            self.assertEqual(command.wait(60), 0, command.text())
+            server.wait_for("run: emergency stop", 30)
+            time.sleep(0.2)
+            kill(server)
+            kill(trainee)
+            (Path(os.environ["XDG_STATE_HOME"]) / "tenon" / f"stop-{stage.domain}-test").unlink()
+            server, _ = resume(stage)
+            server.wait_for("run: emergency stop", 30)
 
     def test_who_is_not_back_is_parked_and_gets_the_seat_later(self):
         with Stage(lockstep=False) as stage:
@@ -183,7 +200,7 @@ class FullDisk(unittest.TestCase):
             said = server.communicate(timeout=200)[0]
             self.assertEqual(server.returncode, 0, said)
             self.assertIn("everything is mounted", said)
-            self.assertRegex(said, "the journal ends here, the session goes on without it: .*journal.mcap")
+            self.assertRegex(said, "the journal ends here, the session continues without it: .*journal.mcap")
             self.assertEqual(trainee.wait(60), 0, trainee.text())
             self.assertEqual(observer.wait(60), 0)
             self.assertIn("the journal ends here", observer.text(), "people on the bus are told")

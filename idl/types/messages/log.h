@@ -13,7 +13,7 @@ enum class Severity : std::uint32_t { kInfo, kWarning, kError };
 
 /// Log entry of the server.
 struct EventLog {
-  std::uint64_t seq = 0;  ///< counts from 1 without gaps
+  std::uint64_t seq = 0;  ///< rises; jumps when a killed server is resumed
   Tick tick = 0;
   Severity severity = Severity::kInfo;
   std::string kind;  ///< "step", "mounted", "put in place", "taken", "join", "refused", "hand frozen",

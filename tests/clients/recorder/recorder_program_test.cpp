@@ -84,7 +84,7 @@ TEST_F(RecorderProgramTest, RecordsUntilTheRunIsOverAndClosesItsFile) {
   start();
   ASSERT_TRUE(test::dispatchUntil(server_.inbox_, [&] { return server_.status_.recording; }));
   EXPECT_EQ(server_.role_, Role::kRecorder);
-  for (std::uint64_t seq = 0; seq < 50; ++seq) ASSERT_TRUE(server_.events_.write({.seq = seq}));
+  for (std::uint64_t seq = 1; seq <= 50; ++seq) ASSERT_TRUE(server_.events_.write({.seq = seq}));
   ASSERT_TRUE(server_.run_.write({.phase = RunPhase::kSucceeded, .reason = "done"}));
   thread_.join();
   ASSERT_TRUE(result_) << result_.error().what;

@@ -49,7 +49,7 @@ class RecordingTest : public ::testing::Test {
 TEST_F(RecordingTest, InRealTimeTheLogTimeIsTheSourceTime) {
   Recording recording = open(false);
   add(recording, wire::kWorldFrame1k, WorldFrame{.tick = 500}, kStart + 7);
-  add(recording, wire::kEventLog, EventLog{.tick = 500}, kStart + 9);
+  add(recording, wire::kEventLog, EventLog{.seq = 1, .tick = 500}, kStart + 9);
   ASSERT_TRUE(recording.close());
   EXPECT_THAT(times("EventLog"), testing::ElementsAre(kStart + 9));
 }
@@ -58,7 +58,7 @@ TEST_F(RecordingTest, InLockstepTheLogTimeAdvancesOneMillisecondPerTick) {
   Recording recording = open(true);
   for (Tick tick = 1; tick <= 3; ++tick) {
     add(recording, wire::kWorldFrame1k, WorldFrame{.tick = 100 * tick}, kStart);
-    add(recording, wire::kEventLog, EventLog{.tick = 100 * tick}, kStart + 5);
+    add(recording, wire::kEventLog, EventLog{.seq = tick, .tick = 100 * tick}, kStart + 5);
   }
   ASSERT_TRUE(recording.close());
   const auto found = times("EventLog");
@@ -70,9 +70,9 @@ TEST_F(RecordingTest, InLockstepTheLogTimeAdvancesOneMillisecondPerTick) {
 TEST_F(RecordingTest, FramesOfAnotherServerEpochDoNotAdvanceTheLogTime) {
   Recording recording = open(true);
   add(recording, wire::kWorldFrame1k, WorldFrame{.server_epoch = 0, .tick = 10}, kStart);
-  add(recording, wire::kEventLog, EventLog{}, kStart);
+  add(recording, wire::kEventLog, EventLog{.seq = 1}, kStart);
   add(recording, wire::kWorldFrame1k, WorldFrame{.server_epoch = 99, .tick = 9999}, kStart);
-  add(recording, wire::kEventLog, EventLog{}, kStart);
+  add(recording, wire::kEventLog, EventLog{.seq = 2}, kStart);
   ASSERT_TRUE(recording.close());
   const auto found = times("EventLog");
   EXPECT_EQ(found[0], found[1]);
@@ -176,14 +176,73 @@ TEST_F(RecordingTest, OfThePeriodInWhichItJoinedNothingIsExpected) {
 }
 
 // a recorder that stood still hears of its seat late, and everything else from the first tick on
-TEST_F(RecordingTest, OfAPeriodWhoseInputsCameBeforeTheWelcomeAllIsExpected) {
+TEST_F(RecordingTest, OfAPeriodWhoseFramesCameBeforeTheWelcomeAllIsExpected) {
   Recording recording = open(true);
   for (Tick tick = 1; tick <= 1000; ++tick)
-    add(recording, wire::kTickInput, TickInputPart{.tick = tick}, kStart);
+    add(recording, wire::kWorldFrame1k, WorldFrame{.tick = tick}, kStart);
   recording.joined(900);
-  add(recording, wire::kPublishedSamples, PublishedSamples{1, 1000, {{"WorldFrame_1k", 3}}}, kStart);
+  add(recording, wire::kPublishedSamples, PublishedSamples{1, 1000, {{"HandManifold", 3}}}, kStart);
   add(recording, wire::kRunState, RunState{.phase = RunPhase::kStopped, .tick = 1000}, kStart);
   EXPECT_EQ(recording.status().lost, 3U);
+}
+
+TEST_F(RecordingTest, InputsOfBeforeTheWelcomeAreRecordedAndExpectedFromTheFirstOne) {
+  Recording recording = open(false);
+  for (const Tick tick : {501, 502, 504})
+    add(recording, wire::kTickInput, TickInputPart{.tick = tick}, kStart);
+  recording.joined(503);
+  add(recording, wire::kPublishedSamples, PublishedSamples{1, 1000, {{"WorldFrame_1k", 9}}}, kStart);
+  add(recording, wire::kRunState, RunState{.phase = RunPhase::kStopped, .tick = 504}, kStart);
+  EXPECT_EQ(recording.status().lost, 1U) << "input 503 alone";
+}
+
+// DDS delivers the last samples once more to a reader that took their writer for dead
+TEST_F(RecordingTest, WhatIsDeliveredOnceMoreIsNotRecordedOnceMore) {
+  Recording recording = open(false);
+  for (int times = 0; times < 2; ++times) {
+    for (const std::uint32_t part : {0U, 1U}) {
+      add(recording, wire::kTickInput, TickInputPart{.tick = 1, .part = part, .parts = 2}, kStart);
+      add(recording, wire::kCheckpoint, CheckpointPart{.tick = 1, .part = part, .parts = 2}, kStart);
+    }
+    for (const std::uint64_t seq : {1U, 2U}) add(recording, wire::kEventLog, EventLog{.seq = seq}, kStart);
+  }
+  add(recording, wire::kTickInput, TickInputPart{.tick = 2}, kStart);
+  EXPECT_EQ(recording.status().lost, 0U);
+  ASSERT_TRUE(recording.close());
+  EXPECT_EQ(times("TickInput").size(), 3U);
+  EXPECT_EQ(times("Checkpoint").size(), 2U);
+  EXPECT_EQ(times("EventLog").size(), 2U);
+}
+
+// its journal ended at tick 12: of 11 and 12 no copy was sent before the server was killed
+TEST_F(RecordingTest, AResumedServerFillsWhatTheFormerOneDidNotSend) {
+  Recording recording = open(false);
+  const auto addInputs = [&](Tick first, Tick last) {
+    for (Tick tick = first; tick <= last; ++tick)
+      add(recording, wire::kTickInput, TickInputPart{.tick = tick}, kStart);
+  };
+  addInputs(1, 10);
+  add(recording, wire::kEventLog, EventLog{.seq = 7}, kStart);
+  const SessionAnnounce next{.session = "s", .server_epoch = 2};
+  ASSERT_TRUE(recording.continues(next, 12));
+  recording.resumed(next, 12);
+  addInputs(5, 15);
+  add(recording, wire::kEventLog, EventLog{.seq = 1}, kStart);
+  EXPECT_EQ(recording.status().lost, 0U);
+  ASSERT_TRUE(recording.close());
+  EXPECT_EQ(times("TickInput").size(), 15U);
+  EXPECT_EQ(times("EventLog").size(), 2U) << "a resumed server numbers its events anew";
+}
+
+TEST_F(RecordingTest, TicksThatTheJournalDidNotKeepAreThoseOfTheResumedServer) {
+  Recording recording = open(false);
+  for (Tick tick = 1; tick <= 10; ++tick)
+    add(recording, wire::kTickInput, TickInputPart{.tick = tick}, kStart);
+  recording.resumed({.session = "s", .server_epoch = 2}, 8);
+  for (Tick tick = 7; tick <= 12; ++tick)
+    add(recording, wire::kTickInput, TickInputPart{.tick = tick}, kStart);
+  ASSERT_TRUE(recording.close());
+  EXPECT_EQ(times("TickInput").size(), 14U);
 }
 
 TEST_F(RecordingTest, FailsWithASentenceWhenTheFileCannotBeWritten) {

@@ -10,8 +10,11 @@
 #include <gtest/gtest.h>
 
 #include "idl/types/messages/commands.h"
+#include "idl/types/messages/journal.h"
 #include "idl/types/messages/log.h"
 #include "idl/types/messages/run.h"
+#include "idl/wire/codec.h"
+#include "idl/wire/raw_subscriber.h"
 #include "tests/idl/wire/peer.h"
 
 namespace tenon::wire {
@@ -214,6 +217,35 @@ TEST(Membership, TheStatesOfTheNextServerAreThereWhenAClientBelongsToIt) {
   EXPECT_THAT(reasons, ::testing::ElementsAre("first", "second"));
   inbox.dispatch(milliseconds(0));
   EXPECT_EQ(reasons.size(), 2U) << "once";
+}
+
+// A recorder gets what the next server published of its journal before the recorder knew of it.
+TEST(Membership, WhatTheNextServerKeepsForLateJoinersIsThereWhenARecorderBelongsToIt) {
+  const std::uint32_t domain = test::ownDomain();
+  auto first = test::participant(domain);
+  auto second = test::participant(domain);
+  auto client = test::participant(domain);
+  Partition first_session(first, "s/test"), second_session(second, "s/test"), session(client, "s/test");
+  auto first_inputs = Writer<TickInputPart>::open(first_session, kTickInput);
+  auto second_inputs = Writer<TickInputPart>::open(second_session, kTickInput);
+  session.hearOnly(first->origin());
+  auto subscriber = RawSubscriber::open(session, {std::string(kTickInput.name)});
+  std::vector<Tick> ticks;
+  const auto dispatch = [&] {
+    subscriber->dispatch(milliseconds(20), [&](const RawSample& sample) {
+      ticks.push_back(decode<TickInputPart>(sample.bytes)->tick);
+    });
+  };
+  for (Tick tick = 1; tick <= 3; ++tick) ASSERT_TRUE(second_inputs->write({.tick = 10 + tick}));
+  ASSERT_TRUE(first_inputs->write({.tick = 5}));
+  for (int i = 0; i < 500 && ticks.empty(); ++i) dispatch();
+  for (int i = 0; i < 10; ++i) dispatch();
+  EXPECT_THAT(ticks, ::testing::ElementsAre(5));
+  session.hearOnly(second->origin());
+  dispatch();
+  ASSERT_TRUE(second_inputs->write({.tick = 14}));
+  for (int i = 0; i < 500 && ticks.size() < 5; ++i) dispatch();
+  EXPECT_THAT(ticks, ::testing::ElementsAre(5, 11, 12, 13, 14));
 }
 
 // two participants write equal samples to one topic: their origins differ

@@ -23,6 +23,7 @@ namespace {
 
 const std::string kStream = "best effort, last 1, volatile";
 const std::string kLockstepStream = "reliable, last 32, volatile";
+const std::string kLockstepFrames = "reliable, last 32, transient local";  // streams of a server
 const std::string kState = "reliable, last 1, transient local";
 const std::string kStateOfServer = "reliable, all, transient local";  // what the reader keeps
 const std::string kEvent = "reliable, all, volatile";
@@ -44,14 +45,14 @@ const std::vector<Row> kRows{
     {"Welcome", kEvent, kEvent, ", lifespan 5000 ms", ""},
     {"Presence", kState, kState, kLease2 + ", joiners 1", kLockstepLease + ", joiners 1"},
     {"DeviceInput", kStream, kLockstepStream, ", lease 50 ms by topic, deadline 10 ms", kLockstepLease},
-    {"WorldFrame_1k", kStream, kLockstepStream, kLease1, kLockstepLease},
-    {"WorldFrame_100", kStream, kLockstepStream, kLease1, kLockstepLease},
-    {"WorldFrame_30", kStream, kLockstepStream, kLease1, kLockstepLease},
-    {"HandManifold", kStream, kLockstepStream, kLease1 + ", deadline 100 ms", kLockstepLease},
+    {"WorldFrame_1k", kStream, kLockstepFrames, kLease1, kLockstepLease + ", joiners 1"},
+    {"WorldFrame_100", kStream, kLockstepFrames, kLease1, kLockstepLease + ", joiners 1"},
+    {"WorldFrame_30", kStream, kLockstepFrames, kLease1, kLockstepLease + ", joiners 1"},
+    {"HandManifold", kStream, kLockstepFrames, kLease1 + ", deadline 100 ms", kLockstepLease + ", joiners 1"},
     {"HandState_100", kStream, kLockstepStream, kLease1, kLockstepLease},
-    {"ContactPairs_100", kStream, kLockstepStream, kLease1, kLockstepLease},
-    {"TickStats_100", kStream, kLockstepStream, kLease1, kLockstepLease},
-    {"Guidance", kStream, kLockstepStream, kLease1, kLockstepLease},
+    {"ContactPairs_100", kStream, kLockstepFrames, kLease1, kLockstepLease + ", joiners 1"},
+    {"TickStats_100", kStream, kLockstepFrames, kLease1, kLockstepLease + ", joiners 1"},
+    {"Guidance", kStream, kLockstepFrames, kLease1, kLockstepLease + ", joiners 1"},
     {"ForceContribution", kStream, kLockstepStream, "", ""},
     {"ExternalPose", kStream, kLockstepStream, "", ""},
     {"ClockSync", kStream, kLockstepStream, "", ""},
@@ -72,8 +73,8 @@ const std::vector<Row> kRows{
     {"EventLog", kLateEvent, kLateEvent, ", joiners 1000", ", joiners 1000"},
     {"ClientEvent", kLateEvent, kLateEvent, ", joiners 1000", ", joiners 1000"},
     {"PublishedSamples", kEvent, kEvent, "", ""},
-    {"TickInput", kEvent, kEvent, "", ""},
-    {"Checkpoint", kEvent, kEvent, "", ""},
+    {"TickInput", kLateEvent, kLateEvent, ", joiners 4096", ", joiners 4096"},
+    {"Checkpoint", kLateEvent, kLateEvent, ", joiners 1", ", joiners 1"},
 };
 
 /// A lockstep writer keeps every sample until all its readers have it.
@@ -128,12 +129,14 @@ std::string timing(const dds_qos_t* qos) {
 }
 
 /// Of policies that writers alone have.
-std::string ofWriter(const dds_qos_t* qos, bool for_late_joiners) {
+std::string ofWriter(const dds_qos_t* qos) {
   std::string said;
   dds_duration_t lifespan = 0;
   dds_qget_lifespan(qos, &lifespan);
   if (lifespan != DDS_INFINITY) said += ", lifespan " + inMilliseconds(lifespan);
-  if (for_late_joiners) {
+  dds_durability_kind_t durability{};
+  dds_qget_durability(qos, &durability);
+  if (durability == DDS_DURABILITY_TRANSIENT_LOCAL) {
     std::int32_t joiners = 0;
     dds_qget_durability_service(qos, nullptr, nullptr, &joiners, nullptr, nullptr, nullptr);
     said += ", joiners " + std::to_string(joiners);
@@ -163,8 +166,7 @@ class ProfilesTest : public ::testing::Test {
     const auto writer = openWriter(partition, topic);
     if (!writer) return writer.error().what;
     const Qos qos = effectiveQos((*writer)->entity());
-    return delivery(qos.get()) + timing(qos.get()) +
-           ofWriter(qos.get(), topic.parameters.late_joiner_depth > 0);
+    return delivery(qos.get()) + timing(qos.get()) + ofWriter(qos.get());
   }
   std::string readerOn(const Partition& partition, const TopicSpec& topic, bool keep_all) {
     const auto reader = openReader(partition, topic, keep_all, nullptr);

@@ -1,0 +1,112 @@
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include "idl/types/messages.h"
+#include "idl/types/result.h"
+#include "idl/wire/endpoint.h"
+#include "idl/wire/topics.h"
+
+namespace tenon::session {
+
+/// What the wire thread has written.
+struct WriteCounts {
+  std::uint64_t slow = 0;        ///< took longer than 5 ms: a reader was behind
+  std::uint64_t failed = 0;      ///< samples that were not sent
+  double longest_seconds = 0.0;  ///< [s]
+};
+
+/// A writer and its topic, opened together.
+template <class M>
+struct TopicWriter {
+  const wire::Topic<M>& topic;
+  std::optional<wire::Writer<M>> writer;
+  std::uint64_t samples = 0;  ///< of ticks, since the last PublishedSamples
+  WriteCounts* counts = nullptr;
+
+  /// Of the wire thread.
+  void send(const M& message) {
+    const auto begin = std::chrono::steady_clock::now();
+    const bool written = writer->write(message).has_value();
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    counts->longest_seconds = std::max(counts->longest_seconds, seconds);
+    counts->slow += seconds > 5e-3 ? 1 : 0;
+    counts->failed += written ? 0 : 1;
+  }
+  /// Writes a sample of a tick.
+  void write(const M& message) {
+    ++samples;
+    send(message);
+  }
+  Result<void> open(wire::Partition& partition) {
+    auto opened = wire::Writer<M>::open(partition, topic);
+    if (!opened) return fail(opened.error().what);
+    writer.emplace(std::move(*opened));
+    return {};
+  }
+};
+
+/// All writers of a session's server.
+///
+/// Threads: one (wire); input and checkpoint: that of ServerWire::send(JournalEntry). Real-time: no.
+struct ServerWriters {
+  TopicWriter<SessionAnnounce> announce{wire::kSessionAnnounce, {}};
+  TopicWriter<Welcome> welcome{wire::kWelcome, {}};
+
+  TopicWriter<WorldFrame> frame_1k{wire::kWorldFrame1k, {}};
+  TopicWriter<WorldFrame> frame_100{wire::kWorldFrame100, {}};
+  TopicWriter<WorldFrame> frame_30{wire::kWorldFrame30, {}};
+  TopicWriter<HandManifold> manifold{wire::kHandManifold, {}};
+  TopicWriter<ContactPairs> pairs{wire::kContactPairs100, {}};
+  TopicWriter<TickStats> stats{wire::kTickStats100, {}};
+  TopicWriter<ObjectSnapshot> snapshot{wire::kObjectSnapshot, {}};
+  TopicWriter<SceneObject> object{wire::kSceneObject, {}};
+  TopicWriter<SceneHand> hand{wire::kSceneHand, {}};
+  TopicWriter<SceneStep> scene_step{wire::kSceneStep, {}};
+  TopicWriter<StepState> step{wire::kStepState, {}};
+  TopicWriter<StepProgress> progress{wire::kStepProgress, {}};
+  TopicWriter<RunState> run{wire::kRunState, {}};
+  TopicWriter<GrabState> grab{wire::kGrabState, {}};
+  TopicWriter<CommandAck> ack{wire::kCommandAck, {}};
+  TopicWriter<Guidance> guidance{wire::kGuidance, {}};
+  TopicWriter<EventLog> event{wire::kEventLog, {}};
+  TopicWriter<ClockSync> clock{wire::kClockSync, {}};
+  TopicWriter<EmergencyStop> stop{wire::kEmergencyStop, {}};
+  TopicWriter<EmergencyClear> clear{wire::kEmergencyClear, {}};
+  TopicWriter<PublishedSamples> published{wire::kPublishedSamples, {}};
+  TopicWriter<TickInputPart> input{wire::kTickInput, {}};
+  TopicWriter<CheckpointPart> checkpoint{wire::kCheckpoint, {}};
+
+  auto inLobby() { return std::tie(announce, welcome); }
+  auto inSession() {
+    return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, object, hand, scene_step,
+                    step, progress, run, grab, ack, guidance, event, clock, stop, clear, published, input,
+                    checkpoint);
+  }
+  /// Written in ticks by send(OutgoingMessages), with the tick in each sample.
+  auto ofTicks() {
+    return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, progress, grab);
+  }
+
+  /// Opens all; what they write is counted in `counts`, which must outlive this.
+  Result<void> open(wire::Partition& lobby, wire::Partition& session, WriteCounts& counts) {
+    Result<void> result;
+    wire::Partition* partition = &lobby;
+    const auto open_one = [&](auto& out) {
+      out.counts = &counts;
+      if (result) result = out.open(*partition);
+    };
+    const auto open_each = [&](auto&... out) { (open_one(out), ...); };
+    std::apply(open_each, inLobby());
+    partition = &session;
+    std::apply(open_each, inSession());
+    return result;
+  }
+};
+
+}  // namespace tenon::session
