@@ -32,7 +32,8 @@ struct McapWriter::Impl {
   std::filesystem::path file;
   int descriptor = -1;
   bool compress = true;
-  std::uint64_t offset = 0;
+  std::string problem;       // of the first write that failed; empty: none did
+  std::uint64_t offset = 0;  // of the next record
   std::uint32_t data_crc = 0;
   bool has_data_crc = true;  // not of a continued file, which would have to be read as a whole
   std::chrono::steady_clock::time_point synced = std::chrono::steady_clock::now();
@@ -56,15 +57,21 @@ struct McapWriter::Impl {
       return fail(file.string() + ": another program is writing it; " + what_to_do);
     return {};
   }
+  /// After a failure the file ends before the record that could not be written, and stays so.
   Result<void> put(std::span<const std::uint8_t> bytes) {
+    if (!problem.empty()) return fail(problem);
+    for (auto rest = bytes; !rest.empty();) {
+      const ssize_t written = ::write(descriptor, rest.data(), rest.size());
+      if (written < 0 && errno == EINTR) continue;
+      if (written < 0) {
+        problem = file.string() + ": cannot write (" + std::strerror(errno) + ")";
+        static_cast<void>(ftruncate(descriptor, static_cast<off_t>(offset)) == 0);
+        return fail(problem);
+      }
+      rest = rest.subspan(static_cast<std::size_t>(written));
+    }
     data_crc = mcap::crc32(bytes, data_crc);
     offset += bytes.size();
-    while (!bytes.empty()) {
-      const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) return fail(file.string() + ": cannot write (" + std::strerror(errno) + ")");
-      bytes = bytes.subspan(static_cast<std::size_t>(written));
-    }
     return {};
   }
   Result<void> record(mcap::Opcode opcode, const record::mcap::FieldWriter& fields) {
@@ -179,6 +186,7 @@ Result<void> McapWriter::write(std::uint16_t channel, std::int64_t log_time_ns, 
                                std::span<const std::uint8_t> data) {
   Impl& to = *impl_;
   if (to.descriptor < 0) return fail(to.file.string() + ": is already closed");
+  if (!to.problem.empty()) return fail(to.problem);
   if (to.chunk.bytes.empty()) to.chunk_start = std::chrono::steady_clock::now();
   to.index[channel].emplace_back(log_time_ns, to.chunk.bytes.size());
   constexpr std::size_t kMessageFields = 2 + 4 + 8 + 8;

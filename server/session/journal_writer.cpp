@@ -22,7 +22,7 @@ void JournalWriter::reserve(std::size_t checkpoint_bytes) {
   }
 }
 
-/// Swaps a reserved buffer into `entry`; false when the file is seconds behind and has all.
+/// Swaps a reserved buffer into `entry`; false when the file is seconds behind and holds all buffers.
 bool JournalWriter::acquireBuffer(JournalEntry& entry) noexcept {
   std::vector<std::uint8_t>* const buffer = buffers_.front();
   if (buffer == nullptr) return false;
@@ -58,10 +58,10 @@ std::optional<std::string> JournalWriter::problem() const {
 }
 
 void JournalWriter::writePending(bool inline_copies) {
-  const bool writes = journal_ && !problem();
+  const auto writes = [this] { return journal_ && !problem(); };
   std::vector<JournalEntry> done;
   for (JournalEntry* entry = entries_.front(); entry != nullptr; entry = entries_.front()) {
-    if (writes) keepProblem(journal_->write(*entry));
+    if (writes()) keepProblem(journal_->write(*entry));
     if (publish_) done.push_back(*entry);
     if (!entry->checkpoint.empty()) {
       buffers_.beginPush()->swap(entry->checkpoint);
@@ -70,7 +70,7 @@ void JournalWriter::writePending(bool inline_copies) {
     }
     entries_.pop();
   }
-  if (writes) keepProblem(journal_->keep());
+  if (writes()) keepProblem(journal_->keep());
   for (JournalEntry& entry : done) {
     if (inline_copies) {
       publish_(entry);

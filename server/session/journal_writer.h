@@ -19,7 +19,7 @@ namespace tenon::session {
 /// The file comes first: an entry is with the operating system before its copy is given away, and no reader
 /// of the copies delays it. What does not fit into a queue is dropped and counted: an entry, when the disk is
 /// seconds behind, so that the file has a gap; a copy, when a recorder is, so that its recording has one.
-/// When the file cannot be written any more it ends there, and copies go on.
+/// When the file cannot be written any more it ends there, and copies continue.
 ///
 /// Threads: add from one (tick); start, stop and close from another; writes and copies have threads of their
 /// own between start and stop. The numbers from any. Real-time: add.
@@ -60,7 +60,7 @@ class JournalWriter {
   /// [ticks] for which the disk or a busy machine may be behind
   static constexpr std::size_t kBacklog = 4096;
   threads::SpscQueue<JournalEntry> entries_{kBacklog};
-  threads::SpscQueue<JournalEntry> copies_{1024};
+  threads::SpscQueue<JournalEntry> copies_{kBacklog};
   /// empty checkpoint buffers, back to the tick
   threads::SpscQueue<std::vector<std::uint8_t>> buffers_{2};
   bool has_checkpoint_ = false;  ///< one was added

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -8,6 +9,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include "idl/record/instance_state.h"
@@ -140,6 +142,37 @@ TEST_F(McapTest, AFullDiskIsAnErrorThatNamesTheFile) {
   auto writer = McapWriter::open("/dev/full");
   ASSERT_FALSE(writer);
   EXPECT_THAT(writer.error().what, HasSubstr("/dev/full: cannot write"));
+}
+
+// a limit of the file's size stands for a disk that becomes full, and has room again later
+TEST_F(McapTest, AfterAWriteThatFailedTheFileEndsBeforeItAndStaysSo) {
+  struct rlimit before {};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  {
+    auto writer = McapWriter::open(file_, {.compress = false});
+    const auto channel = writer->addChannel("A", "t::A", "");
+    ASSERT_TRUE(writer->write(channel, 1, 0, Bytes(100)));
+    ASSERT_TRUE(writer->flush());
+    const std::size_t good = fileBytes().size();
+    const rlimit full{.rlim_cur = good + 50, .rlim_max = before.rlim_max};
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &full), 0);
+    ASSERT_TRUE(writer->write(channel, 2, 1, Bytes(100)));
+    const auto failed = writer->flush();
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+    ASSERT_FALSE(failed);
+    EXPECT_THAT(failed.error().what, HasSubstr(file_.string() + ": cannot write"));
+    EXPECT_EQ(fileBytes().size(), good) << "no part of the record that did not fit";
+    EXPECT_FALSE(writer->write(channel, 3, 2, Bytes(100)));
+    EXPECT_FALSE(writer->addMetadata("about", {}));
+    EXPECT_FALSE(writer->close());
+    EXPECT_EQ(fileBytes().size(), good);
+  }
+  std::signal(SIGXFSZ, handler);
+  auto reader = McapReader::open(file_);
+  ASSERT_TRUE(reader);
+  EXPECT_FALSE(reader->complete());
+  EXPECT_EQ(readAll(*reader).size(), 1U);
 }
 
 TEST_F(McapTest, TruncatedAtAnyByteItHasAllCompleteChunksAndReportsTheTruncation) {

@@ -57,7 +57,7 @@ TEST_F(JournalWriterTest, AReaderThatHangsLeavesNoGapInTheFile) {
     ++copies;
   });
   writer.start();
-  play(writer, 2100);
+  play(writer, 5200);
   // the file is complete up to the last pass while the reader still hangs
   for (int i = 0; i < 600 && writer.lostCopies() < 1000; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -65,12 +65,12 @@ TEST_F(JournalWriterTest, AReaderThatHangsLeavesNoGapInTheFile) {
   writer.stop();
   EXPECT_EQ(writer.lostEntries(), 0U);
   EXPECT_GT(writer.lostCopies(), 0U) << "the queue of copies is bounded";
-  EXPECT_EQ(writer.lostCopies() + copies, 2100U);
-  ASSERT_TRUE(writer.close({.phase = simulation_.phase(), .tick = 2100, .reason = "done"}));
+  EXPECT_EQ(writer.lostCopies() + copies, 5200U);
+  ASSERT_TRUE(writer.close({.phase = simulation_.phase(), .tick = 5200, .reason = "done"}));
   SessionSimulation again = test::SessionRig::makeSimulation(loaded_);
   const auto report = resimulate(file_, again);
   ASSERT_TRUE(report) << report.error().what;
-  EXPECT_EQ(report->compared, 2099U);
+  EXPECT_EQ(report->compared, 5199U);
   EXPECT_TRUE(report->gaps.empty());
 }
 
