@@ -198,6 +198,8 @@ Result<void> setDevices(const Typed& typed, StationOptions& station) {
     if (i < typed.addresses.size()) device.configuration.address = typed.addresses[i];
     if (i < typed.serials.size()) device.configuration.serial = typed.serials[i];
     if (i < typed.mountings.size()) {
+      if (device.name == devices::kRemoteHand)
+        return fail("--mounting: a remote hand's program turns its poses itself");
       const auto q_DM = parseMounting(typed.mountings[i]);
       if (!q_DM) return fail(q_DM.error().what);
       device.configuration.q_DM = *q_DM;

@@ -209,6 +209,8 @@ devices::HapticDevice* DeviceStation::pacingDevice() {
 void DeviceStation::beginHand(std::size_t index, HandId id) {
   Arm& arm = parts_->arms[index];
   haptic::MovedHand& moved = parts_->moved[index];
+  // of an earlier seat, in case this one is without that hand
+  if (arm.hand && !id.valid()) arm.hand->end();
   arm.hand.reset();
   arm.pressed = false;
   moved.hand = nullptr;
@@ -236,7 +238,7 @@ void DeviceStation::begin(std::span<const HandId> hand_ids) {
   if (parts_->tracker && parts_->tactors) {
     haptic::Bracelet& bracelet =
         parts_->bracelet.emplace(*parts_->tactors, haptic::TactileOptions{parts_->options.tactile});
-    // the session goes on without vibration when the bracelet cannot be armed
+    // the session continues without vibration when the bracelet cannot be armed
     static_cast<void>(bracelet.begin(hand_ids[arms], arming().permitsForces()));
   }
   if (parts_->mover) parts_->mover->begin(sceneObjects(), parts_->moved);
@@ -324,9 +326,12 @@ void DeviceStation::moveArms() noexcept {
 }
 
 void DeviceStation::trackBody(std::uint32_t seq) noexcept {
-  const auto& wearer = parts_->arms.front().hand;
-  if (!wearer) return;
-  if (devices::BodyTracker* const simulated = devices::simulatedBodyTracker(*parts_->tracker)) {
+  const auto& arms = parts_->arms;
+  const auto wears = [](const Arm& arm) { return arm.hand != nullptr; };
+  const auto wearing_arm = std::find_if(arms.begin(), arms.end(), wears);
+  const haptic::HapticHand* const wearer = wearing_arm == arms.end() ? nullptr : wearing_arm->hand.get();
+  devices::BodyTracker* const simulated = devices::simulatedBodyTracker(*parts_->tracker);
+  if (simulated != nullptr && wearer != nullptr) {
     parts_->posture.step(wearer->pose(), wearer->input().p_WC, kTickSeconds);
     simulated->place(TrackedBody::kForearm, parts_->posture.forearm());
     simulated->place(TrackedBody::kHead, parts_->posture.head());
@@ -349,7 +354,7 @@ void DeviceStation::trackBody(std::uint32_t seq) noexcept {
     state.hand = input.hand;
     state.seq = seq;
     state.X_WH = state.X_WO_local = input.sample.X_WH;
-    state.p_WC = wearer->input().p_WC;
+    if (wearer != nullptr) state.p_WC = wearer->input().p_WC;
     if (kTracked[i].body == TrackedBody::kForearm && parts_->bracelet)
       state.tactors = parts_->bracelet->intensities();
     states_.push_back(state);

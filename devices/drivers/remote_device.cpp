@@ -54,9 +54,9 @@ std::string reason(const std::string& address, const char* what) {
   return address + ": " + what + " (" + std::strerror(errno) + ")";
 }
 
-/// Whether somebody listens at the socket.
+/// Whether somebody listens at the socket; also one whose queue is full, because it stands still.
 bool isServed(const sockaddr_un& name) {
-  const int probe = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
+  const int probe = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (probe < 0) return true;
   const bool served = connect(probe, reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0 ||
                       (errno != ECONNREFUSED && errno != ENOENT);

@@ -29,11 +29,16 @@ HandTrajectory trajectory(const std::string& rows) {
 class EmptyScene {
  public:
   explicit EmptyScene(const StationOptions& options) : station(std::move(*DeviceStation::open(options))) {
+    std::vector<HandId> all;
+    for (std::uint32_t i = 0; i < station->handNames().size(); ++i) all.push_back(HandId{i});
+    rejoin(std::move(all));
+  }
+  void rejoin(std::vector<HandId> hands) {
     Welcome welcome;
     welcome.accepted = true;
     welcome.client = ClientId{1};
     welcome.server_epoch = 1;
-    for (std::uint32_t i = 0; i < station->handNames().size(); ++i) welcome.hands.push_back(HandId{i});
+    welcome.hands = std::move(hands);
     station->welcome(welcome, {});
   }
   void run(double seconds) {
@@ -95,6 +100,13 @@ TEST(DeviceStation, AScriptMovesTheArmOfItsHand) {
   EXPECT_LT((scene.place(0) - right).norm(), 1e-3) << "no file moves it";
   EXPECT_LT((scene.place(1) - Vector3(0.32, -0.35, 1.01)).norm(), 2e-3);
   EXPECT_TRUE(scene.hand(1).active) << "its person has armed it";
+}
+
+TEST(DeviceStation, WithoutAHandForItsFirstArmTheWearerIsTheSecond) {
+  EmptyScene scene(withDevices({"sigma7-sim"}, PersonKind::kSimulated));
+  scene.rejoin({HandId{}, HandId{1}, HandId{2}});
+  scene.run(0.01);
+  ASSERT_THAT(scene.station->inputs(), testing::SizeIs(2)) << "forearm and head are sent in each step";
 }
 
 TEST(DeviceStation, AMountedDeviceGoesWhereItsPersonWants) {
