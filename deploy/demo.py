@@ -159,7 +159,7 @@ class Programs:
                     pass
 
     def failed(self):
-        """Programs without which the session cannot go on, and that have failed."""
+        """Programs without which the session cannot continue, and that have failed."""
         return [program for program in self.started.values() if program.name not in ("serve", "console") and program.has_failed()]
 
 
@@ -215,7 +215,7 @@ def has_desktop():
 
 
 def start_console(args, programs):
-    """Serves the session to browsers, says where, and opens it where there is a desktop. The demo goes on without it."""
+    """Serves the session to browsers, says where, and opens it where there is a desktop. The demo continues without it."""
     if not (programs.folder / "tenon-console").exists():
         return
     console = programs.start("console", "--port", port_for_console(), "--role", "instructor")

@@ -109,7 +109,7 @@ def declarations(text):
                 now.add(character, number)
                 if re.fullmatch(r"\s*(public|private|protected)\s*:", now.code):
                     now, above = None, []
-        if comment:  # of the declaration that goes on, or else of the last one that this line holds a part of
+        if comment:  # of the declaration that continues, or else of the last one that this line holds a part of
             last = now
             if last is None and done and number in (done[-1].lines[-1], ended):
                 last = done[-1]

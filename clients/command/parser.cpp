@@ -115,7 +115,7 @@ std::string keyLegend(const std::vector<std::string>& signals) {
   }
   for (std::size_t i = 0; i < signals.size() && i < 9; ++i)
     legend += fmt::format("  {:<6} {:<10} {}\n", i + 1, "signal", signals[i]);
-  return legend + "  ?      shows these keys\n  q      leaves; the session goes on\n";
+  return legend + "  ?      shows these keys\n  q      leaves; the session continues\n";
 }
 
 }  // namespace tenon::command

@@ -204,7 +204,7 @@ Result<void> StationRunner::subscribeToStops() {
     if (!stood) return;
     passStops();
     print("emergency stop cleared by " + cleared.who + ": " + cleared.reason);
-    if (!stops_.engaged() && options_.read_keys) print("press return to go on at this station");
+    if (!stops_.engaged() && options_.read_keys) print("press return to continue at this station");
   });
 }
 

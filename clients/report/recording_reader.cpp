@@ -23,7 +23,7 @@
 namespace tenon::report {
 namespace {
 
-// A contact is assumed to go on for so long; a pair in contact is published every 10 ticks.
+// A contact is assumed to continue for so long; a pair in contact is published every 10 ticks.
 constexpr Tick kContactHold = 20;  // [ticks]
 
 class RecordingReader {

@@ -116,7 +116,7 @@ Result<void> StateMachine::restore(std::span<const std::uint8_t> bytes) {
   const bool ended = memory.status.phase != StepPhase::kWaiting && memory.status.phase != StepPhase::kActive;
   if (ended && !memory.status.finished && !memory.status.failed &&
       memory.status.step + 1 == scenario_->states.size())
-    return fail("state machine: a saved state goes on after the scenario's last step");
+    return fail("state machine: a saved state continues after the scenario's last step");
   for (std::size_t state = scenario_->states.size(); state < kMaxStates; ++state)
     for (const StateSet* set : {&memory.skipped, &memory.timed_out, &memory.visited})
       if (((*set)[state / 64] >> (state % 64) & 1U) != 0)

@@ -218,7 +218,7 @@ void SessionRegistry::engageEmergencyStop() {
 }
 
 void SessionRegistry::clearEmergencyStop() {
-  // nothing moves by itself when the stop is cleared: `resume` goes on
+  // nothing moves by itself when the stop is cleared: `resume` continues
   emergency_stop_ = false;
   changes_.push_back({.kind = ChangeKind::kPause});
   if (expectedPhase() == RunPhase::kRunning) pending_phase_ = RunPhase::kPaused;

@@ -17,7 +17,7 @@ class Faults(unittest.TestCase):
             trainee.signal(signal.SIGKILL)
             server.wait_for("is parked", 30)
             server.wait_for(r"\(trainee\) has left", 30)
-            self.assertIsNone(server.popen.poll(), "the session must go on")
+            self.assertIsNone(server.popen.poll(), "the session must continue")
             stage.start("trainee", "--seed", 2)
             server.wait_for("everything is mounted", 180)
             self.assertEqual(server.wait(30), 0)

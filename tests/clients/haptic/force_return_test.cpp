@@ -9,7 +9,7 @@
 #include "devices/simulated/hug.h"
 #include "tests/clients/haptic/hand_above_floor.h"
 
-// A hand rests on a floor with 5 N. Then its contacts are interrupted, while its person goes on to push:
+// A hand rests on a floor with 5 N. Then its contacts are interrupted, while its person continues to push:
 //
 //   force  5 N ----.
 //                   `.___________.--~~~    never above max(5 N, 3 N), never growing by more than 20 N/s

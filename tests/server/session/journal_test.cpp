@@ -247,7 +247,7 @@ std::vector<JournalEntry> playedEntries(const LoadedScene& loaded, Tick first, T
 /// Ticks of the play at which hands touch nothing, the part, and the wall of the socket.
 constexpr Tick kPlayedTicks[] = {100, 750, 1680};
 
-/// Restores `rounds` damaged checkpoints of each kind. What is accepted must be fit to go on from.
+/// Restores `rounds` damaged checkpoints of each kind. What is accepted must be fit to continue from.
 void restoreDamaged(const LoadedScene& loaded, std::uint64_t rounds) {
   std::uint64_t refused = 0;
   std::uint64_t accepted = 0;
