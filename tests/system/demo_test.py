@@ -129,9 +129,9 @@ class Lockstep(DemoCase):
     def run_demo(self, name, recorder_stalls):
         demo = self.start("--no-instructor", "--out", self.folder / name)
         self.wait_for_first_step(demo)
-        if recorder_stalls:  # for long enough that the system drops what it is sent, and shorter than the server's lease
+        if recorder_stalls:  # for long enough that the system drops what it is sent, and no longer than the server waits for it
             os.kill(self.process_of("record"), signal.SIGSTOP)
-            time.sleep(1.3)
+            time.sleep(2)
             os.kill(self.process_of("record"), signal.SIGCONT)
         said, _ = demo.communicate(timeout=900)
         self.assertEqual(demo.returncode, 0, said[-3000:])
