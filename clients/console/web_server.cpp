@@ -66,12 +66,10 @@ void WebService::deliver(const std::string& path, const std::vector<Publication>
     if (viewers.contains(viewer)) viewer->send();
 }
 
-void WebService::answer(ViewerId id, const std::string& text) {
+WebViewer* WebService::find(ViewerId id) {
   const auto found = std::find_if(viewers.begin(), viewers.end(),
                                   [id](const WebViewer* viewer) { return viewer->id() == id; });
-  if (found == viewers.end()) return;
-  (*found)->offer(text);
-  (*found)->send();
+  return found == viewers.end() ? nullptr : *found;
 }
 
 Result<std::unique_ptr<WebServer>> WebServer::open(const WebOptions& options, Site site,
@@ -119,7 +117,21 @@ void WebServer::publish(const std::string& path, std::vector<Publication> public
 }
 
 void WebServer::answer(ViewerId viewer, std::string text) {
-  asio::post(impl_->io, [impl = impl_.get(), viewer, text = std::move(text)] { impl->answer(viewer, text); });
+  asio::post(impl_->io, [impl = impl_.get(), viewer, text = std::move(text)] {
+    WebViewer* const found = impl->find(viewer);
+    if (found == nullptr) return;
+    found->offer(text);
+    found->send();
+  });
+}
+
+void WebServer::show(ViewerId viewer, Payload views) {
+  asio::post(impl_->io, [impl = impl_.get(), viewer, views = std::move(views)] {
+    WebViewer* const found = impl->find(viewer);
+    if (found == nullptr) return;
+    found->offerHands(views);
+    found->send();
+  });
 }
 
 void WebServer::stop() {

@@ -40,6 +40,8 @@ class WebServer {
   void publish(const std::string& path, std::vector<Publication> publications);
   /// Sends a text to one viewer, if it is still there.
   void answer(ViewerId viewer, std::string text);
+  /// Sends what its hands are shown to one viewer, if it is still there; the newest one wins.
+  void show(ViewerId viewer, Payload views);
   /// Serves no more and calls no handler any more; also by the destructor.
   void stop();
   /// Connected viewers.

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -50,6 +51,9 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
   void run(const http::request<http::empty_body>& request, std::string_view subprotocol);
   void offer(const Publication& publication, Delivery delivery);
   void offer(std::string text) { queue_.addText(std::move(text)); }
+  void offerHands(const Payload& views) {
+    queue_.add(kHandSubscription, Delivery::kNewest, {.payload = views});
+  }
   void send();
   [[nodiscard]] ViewerId id() const { return id_; }
   [[nodiscard]] const std::string& room() const { return room_; }
@@ -58,6 +62,8 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
   void begin();
   void read();
   void receive();
+  /// A binary message.
+  void moveHands(std::span<const std::uint8_t> targets);
   void apply(const ViewerRequest& request);
   void close(const std::string& reason);
   void finish();
@@ -118,7 +124,8 @@ struct WebService {
 
   void accept();
   void deliver(const std::string& path, const std::vector<Publication>& publications);
-  void answer(ViewerId viewer, const std::string& text);
+  /// Null when it is not there any more.
+  [[nodiscard]] WebViewer* find(ViewerId viewer);
 
   WebOptions options;
   Site site;

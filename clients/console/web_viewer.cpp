@@ -114,7 +114,7 @@ void WebViewer::receive() {
   const std::string text = beast::buffers_to_string(incoming_.data());
   incoming_.consume(incoming_.size());
   if (!socket_.got_text()) {
-    queue_.addText(statusText(StatusLevel::kWarning, "binary messages are not expected here"));
+    moveHands({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
   } else if (const auto request = parseViewerText(text)) {
     apply(*request);
   } else {
@@ -123,11 +123,20 @@ void WebViewer::receive() {
   send();
 }
 
+void WebViewer::moveHands(std::span<const std::uint8_t> targets) {
+  const bool may = is_own_page_ && server_.handlers.hands;
+  if (!may || !server_.handlers.hands(id_, targets))
+    queue_.addText(
+        statusText(StatusLevel::kWarning, "a binary message that is no target of this viewer's hands"));
+}
+
 void WebViewer::apply(const ViewerRequest& request) {
   if (request.desk && is_own_page_ && server_.handlers.desk) {
     server_.handlers.desk(id_, room_, *request.desk);
   } else if (request.desk) {
-    queue_.addText(deskAnswerText({.id = request.desk->id, .text = "pages from elsewhere may look on only"}));
+    queue_.addText(deskAnswerText({.id = request.desk->id,
+                                   .text = "pages from elsewhere may look on only",
+                                   .is_of_hands = request.desk->isOfHands()}));
   }
   ChannelStore& store = server_.rooms.find(room_)->second.store;
   for (const SubscriptionId id : request.unsubscribe) {
@@ -139,6 +148,7 @@ void WebViewer::apply(const ViewerRequest& request) {
     std::string problem;
     if (found == nullptr) problem = "there is no channel " + std::to_string(channel);
     if (subscriptions_.contains(id)) problem = "subscription " + std::to_string(id) + " exists";
+    if (id == kHandSubscription) problem = "subscription " + std::to_string(id) + " is not to be chosen";
     if (subscriptions_.size() >= kMaxSubscriptions) problem = "there are too many subscriptions";
     if (!problem.empty()) {
       queue_.addText(statusText(StatusLevel::kWarning, problem));
