@@ -30,6 +30,7 @@ export class Part {
   private audio?: AudioContext;
   private isAsking = false;
   private step = -1;
+  private invited = new URLSearchParams(location.search).get("you") ?? ""; // to this role's place, by the address
   private isNew = false; // of the step nothing was shown yet
 
   /** `tell` says what came of a request. */
@@ -96,6 +97,7 @@ export class Part {
     if (this.take.textContent !== label) this.take.replaceChildren(icon("hand"), label);
     this.take.disabled = this.isAsking;
     this.take.hidden = session.isOver || session.sceneHands.size === 0;
+    if (!this.take.hidden && this.invited !== "" && session.link?.state === "joined") this.ask();
     this.bar.hidden = hand === undefined;
     document.body.classList.toggle("takes-part", hand !== undefined);
     if (hand === undefined) return;
@@ -152,6 +154,8 @@ export class Part {
     const role = h("select", "");
     const roles = (Object.keys(ROLES) as RoleName[]).filter((name) => this.handsOf(name).ids.length > 0);
     role.append(...roles.map((name) => Object.assign(h("option", "", t(`role.name.${name}`)), { value: name })));
+    if (roles.some((name) => name === this.invited)) role.value = this.invited;
+    this.invited = "";
     const name = Object.assign(h("input", ""), { maxLength: 40, value: localStorage.getItem("name") ?? "", autocomplete: "off" });
     const key = Object.assign(h("input", ""), { type: "password", autocomplete: "off" });
     const field = (label: Key, input: HTMLElement, hint?: Key): HTMLElement => h("label", "field", h("span", "", t(label)), input, ...(hint === undefined ? [] : [h("small", "muted", t(hint))]));
