@@ -34,8 +34,10 @@ WebService::WebService(const WebOptions& web_options, Site web_site, WebHandlers
 void WebService::accept() {
   acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
-    // beyond the limit it is closed at once
-    if (!error && connections < kMaxConnections) {
+    // beyond the limit the one that has asked for nothing for longest makes room, else it is closed at once
+    const bool is_full = connections >= kMaxConnections;
+    if (!error && (!is_full || !waiting.empty())) {
+      if (is_full) waiting.front()->abort();
       beast::error_code ignored;
       socket.set_option(tcp::no_delay(true), ignored);
       socket.set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);

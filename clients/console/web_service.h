@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <list>
 #include <map>
 #include <memory>
 #include <optional>
@@ -36,6 +37,10 @@ namespace websocket = beast::websocket;
 using tcp = asio::ip::tcp;
 
 inline constexpr std::chrono::seconds kSendTimeout{20};
+
+/// What a viewer sends is read at a bounded rate: frames that carry nothing are no messages, and cost as
+/// much.
+using ViewerStream = beast::basic_stream<tcp, asio::any_io_executor, beast::simple_rate_policy>;
 
 struct WebService;
 
@@ -74,7 +79,7 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
   ViewerId id_;
   std::string room_;
   bool is_own_page_;
-  websocket::stream<tcp::socket> socket_;
+  websocket::stream<ViewerStream> socket_;
   asio::steady_timer send_timer_;
   beast::flat_buffer incoming_;
   std::map<SubscriptionId, ChannelId> subscriptions_;
@@ -97,9 +102,12 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   WebConnection& operator=(const WebConnection&) = delete;
 
   void read();
+  /// Ends it without an answer.
+  void abort();
 
  private:
   using Request = http::request<http::empty_body>;
+  void stopWaiting();
   void handle();
   void handleUpgrade(const Request& request, std::string_view origin, std::string_view host);
   void respond(const Request& request, Answer answer);
@@ -108,6 +116,7 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   beast::tcp_stream stream_;
   beast::flat_buffer incoming_;
   std::optional<http::request_parser<http::empty_body>> parser_;
+  std::list<WebConnection*>::iterator waiting_;  ///< in WebService::waiting, or its end
 };
 
 /// The channels of one session.
@@ -135,6 +144,7 @@ struct WebService {
 
   std::uint16_t port = 0;
   std::size_t connections = 0;
+  std::list<WebConnection*> waiting;  ///< for a request, the longest first
   std::set<WebViewer*> viewers;
   ViewerId next_viewer = 1;
   std::atomic<std::size_t> viewer_count{0};

@@ -9,6 +9,7 @@ using std::chrono::seconds;
 constexpr std::size_t kMaxMessageBytes = 64U << 10U;
 constexpr std::size_t kMaxSubscriptions = 256;
 constexpr int kMaxMessagesASecond = 200;
+constexpr std::size_t kMaxBytesASecond = 256U << 10U;
 
 }  // namespace
 
@@ -40,6 +41,7 @@ void WebViewer::run(const http::request<http::empty_body>& request, std::string_
         answer.set(http::field::server, "tenon");
       }));
   socket_.read_message_max(kMaxMessageBytes);
+  socket_.next_layer().rate_policy().read_limit(kMaxBytesASecond);
   socket_.async_accept(request, [self = shared_from_this()](beast::error_code error) {
     if (!error) self->begin();
   });
@@ -181,8 +183,7 @@ void WebViewer::finish() {
 void WebViewer::abort() {
   is_closing_ = is_closed_ = true;
   send_timer_.cancel();
-  beast::error_code ignored;
-  socket_.next_layer().close(ignored);
+  beast::get_lowest_layer(socket_).close();
 }
 
 }  // namespace tenon::console

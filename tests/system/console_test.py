@@ -1,13 +1,16 @@
 """The console: what viewers of its WebSocket get of a session, what it refuses, and its page in a browser."""
+import contextlib
 import json
 import math
 import os
 import re
 import shutil
 import signal
+import socket
 import struct
 import subprocess
 import sys
+import time
 import unittest
 from pathlib import Path
 
@@ -35,6 +38,18 @@ def memory(process):
     """Resident memory of a process, in MB."""
     status = Path(f"/proc/{process.popen.pid}/status").read_text(encoding="utf-8")
     return int(re.search(r"VmRSS:\s+(\d+)", status)[1]) / 1024
+
+
+def taken_of(connection, frame, seconds):
+    """Bytes that the other side takes of a frame that is sent again and again for so long."""
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 16)
+    connection.settimeout(0.2)
+    taken, end = 0, time.monotonic() + seconds
+    with contextlib.suppress(ConnectionError):
+        while time.monotonic() < end:
+            with contextlib.suppress(TimeoutError):
+                taken += connection.send(frame * 4000)
+    return taken
 
 
 class Gateway(unittest.TestCase):
@@ -144,6 +159,18 @@ class Gateway(unittest.TestCase):
                     flood.send('{"op":"unsubscribe","subscriptionIds":[1]}')
                 while True:
                     flood.receive()
+            # frames that are no messages: pings, and fragments without content
+            for first in (b"\x89", b"\x00"):
+                with Viewer(port) as flood:
+                    flood.begin("/console")
+                    if first == b"\x00":
+                        flood.socket.sendall(b"\x01\x80" + bytes(4))
+                    self.assertLess(taken_of(flood.socket, first + b"\x80" + bytes(4), 4), 3_000_000, "bytes, of which most wait in buffers")
+            # connections that ask for nothing keep nobody out
+            idle = [socket.create_connection(("127.0.0.1", port)) for _ in range(300)]
+            self.assertIn(get(port, "/")[0], (200, 503))
+            for connection in idle:
+                connection.close()
             with Viewer(port) as viewer:  # nobody else was disturbed
                 viewer.begin("/console")
                 self.assertEqual(json.loads(next(viewer.messages())[1])["state"], "searching")
@@ -398,6 +425,32 @@ class Page(unittest.TestCase):
 
     def test_a_mouse_mounts_the_first_part_and_the_session_resimulates(self):
         mouse_mounts(self, 1)
+
+    def test_keys_and_a_gamepad_move_a_hand_and_a_stop_switches_it_off(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            server = stage.serve(SCENARIO, "--wait-for", "right")
+            console, port = start_console(stage)
+            console.wait_for("joined session 'test'")
+            browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="light")
+            browser("await", expression="tenon.view.models >= 3 && !document.querySelector('.take').hidden")
+            browser("sit down")
+            browser("await", expression="tenon.part.hand.isOn")
+            height = "[...tenon.session.hands.values()][0].X_WH.p[2]"
+            browser("value", expression=f"window.first = {height}")
+            browser("value", expression="document.activeElement.blur()")
+            browser("key down", key="ArrowUp")
+            browser("await", expression=f"{height} > window.first + 0.02")
+            browser("key up", key="ArrowUp")
+            browser("value", expression=f"window.first = {height}")
+            browser("value", expression="navigator.getGamepads = () => [{axes: [0, 1, 0, 0], buttons: []}]")
+            browser("await", expression=f"{height} < window.first - 0.02")
+            browser("value", expression="navigator.getGamepads = () => []")
+            browser("key", key="Space")
+            browser("await", expression="!tenon.part.hand.isOn && document.querySelector('.arm').hidden")
+            server.wait_for("pressed in the browser")
+            browser("value", expression="document.querySelector('.take').click()")
+            server.wait_for(r"\(trainee\) has left")
+            self.assertEqual(browser.problems, [])
 
     def test_a_recording_is_played_without_a_server(self):
         with Stage() as stage, Browser() as browser:

@@ -4,6 +4,7 @@
 //   {"do": "value", "expression": JS}
 //   {"do": "type", "selector": CSS, "text": T}
 //   {"do": "key", "key": K}   as Playwright names it
+//   {"do": "key down", "key": K}, {"do": "key up", "key": K}
 //   {"do": "sit down"}   takes part, as a person at the page would
 //   {"do": "mount", "seed": S, "seconds": T, "steps": [..]}   with the mouse, until the step is none of these
 //   {"do": "picture", "file": F}
@@ -45,6 +46,12 @@ const commands = {
   },
   async key({ key }) {
     await page.keyboard.press(key);
+  },
+  async "key down"({ key }) {
+    await page.keyboard.down(key);
+  },
+  async "key up"({ key }) {
+    await page.keyboard.up(key);
   },
   async "sit down"() {
     await sitDown(page);

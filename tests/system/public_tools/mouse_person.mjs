@@ -92,7 +92,7 @@ export async function mount(page, { seed, seconds, steps }) {
     if (stuck > 3 && stuck % 6 === 5) await drag(seen, 0, aim(-0.004 / guide.pixel), "Control");
     else if (stuck > 3 && stuck % 2 === 0) await drag(seen, 0, aim((guide.distance + 0.005) / guide.pixel), "Control");
     else await drag(seen, aim(dx), aim(dy));
-    const notches = Math.round((guide.farther + (AIM / Math.SQRT2 / scale) * gauss()) / (isNear ? 0.001 : 0.01));
+    const notches = Math.round((guide.farther + (AIM / Math.SQRT2 / scale) * gauss()) / ((16 / scale) * guide.pixel)); // of 16 pixels each
     for (let i = 0; i < Math.min(20, Math.abs(notches)); ++i) await page.mouse.wheel(0, -100 * Math.sign(notches));
   }
   return { log };

@@ -9,14 +9,17 @@ import type { Session } from "./session";
 const PERIOD = 16; // [ms] between targets
 const PRESS = 300; // [ms] that a press of the arming button lasts
 const NEAR = 0.02; // [m] of the proxy: nothing pushes back, so a target that is let go stays near
-const NOTCH = 0.01; // [m] a notch of the wheel
+const NOTCH = 16; // [pixels] of depth, as large as pixels are where the hand is: a notch of the wheel
 const TURN_NOTCH = 0.1; // [rad] likewise
 const TURN_PIXEL = 0.008; // [rad]
-const KEY_SPEED = 0.12; // [m/s]
+const KEY_SPEED = 160; // [pixels/s] likewise
 const KEY_TURN = 0.8; // [rad/s]
 const ALIGN_TURN = 1.2; // [rad/s]
 const ALIGNED = 0.002; // [rad]
 const FINE = 0.1;
+const DEAD_ZONE = 0.12; // of a stick that is let go
+/** Buttons of the standard layout: the lower face button, the shoulders. */
+const PAD = { press: 0, turn: 4, fine: 5 } as const;
 const GATE = 0.006; // [m] beside the line of the approach; farther off, the way leads to its begin
 
 const toVector = (v: ArrayLike<number>): Vector3 => new Vector3(v[0], v[1], v[2]);
@@ -50,6 +53,7 @@ export class Hand {
   private touched: boolean[] = [];
   private timer: number;
   private moved = 0;
+  private wasPadPressed = false;
 
   constructor(private session: Session, private view: SceneView, private ids: number[], private send: (bytes: Uint8Array<ArrayBuffer>) => void) {
     this.timer = window.setInterval(() => this.tick(), PERIOD);
@@ -129,11 +133,17 @@ export class Hand {
   }
 
   /** Along right, up and away of the view [m]. */
-  shift(right: number, up: number, away: number): void {
+  private shift(right: number, up: number, away: number): void {
     const target = this.targets[this.current];
     if (target === undefined) return;
     const axes = this.view.axes();
     target.p.addScaledVector(axes.right, right).addScaledVector(axes.up, up).addScaledVector(axes.away, away);
+  }
+  /** Likewise, as far as a key that is held for so long [s]. */
+  go(right: number, up: number, away: number): void {
+    const target = this.targets[this.current];
+    const step = target === undefined ? 0 : KEY_SPEED * this.view.metresPerPixel(target.p);
+    this.shift(right * step, up * step, away * step);
   }
   /** About right, up and away of the view [rad], and the centre of what it holds. */
   turn(right: number, up: number, away: number): void {
@@ -191,6 +201,7 @@ export class Hand {
     const seconds = Math.min(0.1, (now - this.moved) / 1000);
     this.moved = now;
     this.applyKeys(seconds);
+    this.applyGamepad(seconds);
     this.applyAlignment(seconds);
     this.targets.forEach((target, i) => {
       const view = this.views[i];
@@ -210,7 +221,27 @@ export class Hand {
     const [right, up, away] = sum.map((direction) => direction * scale);
     if (right === 0 && up === 0 && away === 0) return;
     if (this.isShift) this.turn(-up * KEY_TURN, right * KEY_TURN, away * KEY_TURN);
-    else this.shift(right * KEY_SPEED, up * KEY_SPEED, away * KEY_SPEED);
+    else this.go(right, up, away);
+  }
+
+  /** The sticks of the first gamepad: left right and up, away; with the left shoulder they turn. */
+  private applyGamepad(seconds: number): void {
+    const pad = navigator.getGamepads().find((known) => known !== null);
+    if (pad === undefined || pad === null) return;
+    const isDown = (button: number): boolean => pad.buttons[button]?.pressed === true;
+    if (isDown(PAD.press) && !this.wasPadPressed) {
+      if (this.isOn) this.align();
+      else this.press();
+    }
+    this.wasPadPressed = isDown(PAD.press);
+    const [x, y, , depth] = [0, 1, 2, 3].map((axis) => {
+      const value = pad.axes[axis] ?? 0;
+      return Math.abs(value) < DEAD_ZONE ? 0 : value;
+    });
+    if (x === 0 && y === 0 && depth === 0) return;
+    const scale = seconds * (this.isFine || isDown(PAD.fine) ? FINE : 1);
+    if (isDown(PAD.turn) || this.isTurning) this.turn(y * KEY_TURN * scale, x * KEY_TURN * scale, -depth * KEY_TURN * scale);
+    else this.go(x * scale, -y * scale, -depth * scale);
   }
 
   /** Eases the orientation of the part to the ghost's. */
@@ -273,6 +304,6 @@ export class Hand {
     event.preventDefault();
     const notches = -Math.sign(event.deltaY || event.deltaX) * (this.isFine ? FINE : 1);
     if (event.shiftKey) this.turn(0, 0, notches * TURN_NOTCH);
-    else this.shift(0, 0, notches * NOTCH);
+    else this.go(0, 0, (notches * NOTCH) / KEY_SPEED);
   };
 }

@@ -12,8 +12,7 @@ const ROLES = { trainee: 2, instructor: 1 } as const; // as in the messages
 type RoleName = keyof typeof ROLES;
 const TAUGHT = "taught"; // in this browser's memory
 const LOUDEST = 10; // [N]
-const HOLD_SPEED = 0.12; // [m/s] of the buttons nearer and farther
-const HOLD_PERIOD = 30; // [ms]
+const HOLD_PERIOD = 30; // [ms] in which a button that is held moves the hand
 const GESTURES = ["drag", "wheel", "turn", "vertical", "align", "fine", "view"] as const;
 
 export class Part {
@@ -39,7 +38,7 @@ export class Part {
     this.arm.addEventListener("click", () => this.hand?.press());
     source.onHandNotice = (answer) => {
       this.end();
-      tell(false, answer.text === "" ? t("part.over") : answer.text);
+      tell(session.isOver, answer.text === "" ? t("part.over") : answer.text);
     };
     source.onHands = (views) => this.hand?.receive(views);
     const add = (key: Key, name: Icon | undefined, act: () => void, options: { isPressed?: () => boolean; shows?: () => boolean } = {}): HTMLButtonElement => {
@@ -70,7 +69,7 @@ export class Part {
     const stop = (): void => clearInterval(timer);
     button.addEventListener("pointerdown", () => {
       stop();
-      timer = window.setInterval(() => this.hand?.shift(0, 0, (direction * HOLD_SPEED * HOLD_PERIOD * (this.hand.isFine ? 0.1 : 1)) / 1000), HOLD_PERIOD);
+      timer = window.setInterval(() => this.hand?.go(0, 0, (direction * HOLD_PERIOD * (this.hand.isFine ? 0.1 : 1)) / 1000), HOLD_PERIOD);
     });
     for (const name of ["pointerup", "pointerleave", "pointercancel"] as const) button.addEventListener(name, stop);
   }
@@ -240,6 +239,7 @@ export class Part {
   private feel(force: number): void {
     const strength = Math.min(1, 0.3 + force / LOUDEST);
     if ("vibrate" in navigator) navigator.vibrate(Math.round(30 * strength));
+    void navigator.getGamepads().find((pad) => pad !== null)?.vibrationActuator?.playEffect("dual-rumble", { duration: 60, weakMagnitude: strength, strongMagnitude: strength });
     if (this.audio === undefined) return;
     const { audio } = this;
     const tone = new OscillatorNode(audio, { type: "triangle", frequency: 320 });
