@@ -6,6 +6,7 @@ import functools
 import itertools
 import os
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -55,9 +56,13 @@ def arguments():
     parser.add_argument("--no-instructor", action="store_true", help="nobody corrects the misplaced mount: its step runs out of time")
     parser.add_argument("--device", default="sigma7-sim", help="the instructor's device (default: %(default)s)")
     parser.add_argument("--domain", type=between(int, 0, 230), default=100 + os.getpid() % 100, help="DDS domain (default: one that is likely free)")
+    parser.add_argument("--you", choices=("trainee", "instructor"), help="take the place of the simulated one, with the mouse in the browser; no step runs out of time")
     parser.add_argument("--programs", required=True, help=argparse.SUPPRESS)
     parser.add_argument("--scenarios", required=True, help=argparse.SUPPRESS)
-    return parser.parse_args()
+    args = parser.parse_args()
+    if args.you and (args.no_console or args.lockstep):
+        parser.error("--you needs the console, and the pace of the clock: without --no-console and --lockstep")
+    return args
 
 
 class Stopped(Exception):
@@ -228,11 +233,40 @@ def start_console(args, programs):
     wait_until(has_said_where, 20)
     for line in said:
         say(line)
-    address = next((re.search(r"http\S+", line)[0] for line in reversed(said) if "http" in line), None)
-    if address is None:
+    addresses = [re.search(r"http\S+", line)[0] for line in said if "http" in line]
+    if not addresses:
         say(f"the session cannot be seen in a browser: {console.last_line()}")
-    elif not args.headless and has_desktop():
+        return
+    address = addresses[-1]  # with the pass, if there is one
+    if args.you:
+        plain, _, secret = (addresses[0] if args.you == "trainee" else address).partition("#")
+        address = f"{plain}?you={args.you}" + ("#" + secret if secret else "")
+        say(f"your place as {args.you}: {address}\nthe session begins when you have taken it")
+    if not args.headless and has_desktop():
         open_in_browser(address)
+
+
+def without_timeouts(scenario, folder):
+    """A copy of a scenario below `folder` in which no step runs out of time."""
+    source = scenario if scenario.is_dir() else scenario.parent
+    copy = folder / "scenario_without_timeouts" / source.name
+    shutil.rmtree(copy.parent, ignore_errors=True)
+    shutil.copytree(source, copy)
+    file = copy / ("scenario.yaml" if scenario.is_dir() else scenario.name)
+    text = file.read_text(encoding="utf-8")
+    file.write_text(re.sub(r"(?m)^\s*(timeout|on_timeout):.*\n", "", text), encoding="utf-8")
+    return copy if scenario.is_dir() else file
+
+
+def make_room(programs, roles):
+    """A simulated person leaves when somebody at the console asks for a hand of it; `roles` of the hands by name."""
+    console = programs.started.get("console")
+    for line in console.new_lines() if console else []:
+        asked = re.match(r"hand '(\S+)' is asked for by a browser", line)
+        person = programs.started.get(roles.get(asked[1])) if asked else None
+        if person and person.is_running():
+            say(f"the simulated {person.name} makes room for you")
+            person.process.send_signal(signal.SIGINT)
 
 
 def session_result(server):
@@ -247,10 +281,21 @@ def run_session(args, out, programs):
     shipped = shipped_as(scenario, args.scenarios)
     hands = hands_of(scenario)
     has_instructor = not args.no_instructor and "instructor" in hands.values()
-    awaited = [*(name for name, role in hands.items() if role == "trainee"), "recorder", "observer"]
+    trainees = [name for name, role in hands.items() if role == "trainee"]
+    if args.you == "trainee":
+        trainees = [name for name in trainees if name in ("right", "left")]  # nobody tracks who sits at a browser
+    if args.you == "instructor" and not has_instructor:
+        say(f"{scenario}: has no hand of an instructor: take part with --you trainee")
+        return 1
+    awaited = [*trainees, "recorder", "observer"]
 
     if not args.no_console:
         start_console(args, programs)
+    if args.you:
+        if "console" not in programs.started:
+            say("the console is not built, so --you has no place for you")
+            return 1
+        scenario = without_timeouts(scenario, out)
     server = programs.start("serve", scenario, "--detail", args.detail, "--workers", args.workers, "--journal", out / "journal.mcap",
                             "--wait-for", ",".join(awaited + (["instructor"] if has_instructor else [])))
     opened = False
@@ -264,12 +309,18 @@ def run_session(args, out, programs):
     programs.start("record", "-o", recording)
     observer = programs.start("observer")
     misplaced = ["--misplace-mount", 2] if shipped == "engine_bay" else []
-    programs.start("trainee", "--device", "hug-sim", "--seed", args.seed, *misplaced)
-    if has_instructor:
+    if args.you != "trainee":
+        programs.start("trainee", "--device", "hug-sim", "--seed", args.seed, *misplaced)
+    if has_instructor and args.you != "instructor":
         programs.start("instructor", "--device", args.device, "--seed", args.seed)
 
     show = functools.partial(say_new_lines, observer)
-    wait_until(lambda: not server.is_running() or programs.failed(), meanwhile=show)
+
+    def show_and_make_room():
+        show()
+        make_room(programs, hands)
+
+    wait_until(lambda: not server.is_running() or programs.failed(), meanwhile=show_and_make_room)
     # a server that fails takes the others with it
     if not wait_until(lambda: not server.is_running(), 3, show):
         for program in programs.failed():

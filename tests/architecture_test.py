@@ -53,7 +53,8 @@ ROOMS = {
     "clients/recorder": ("tenon::recorder", IDL, ["fmt", "CLI11"]),
     "clients/command": ("tenon::command", IDL, ["fmt", "CLI11", "POSIX"]),
     "clients/report": ("tenon::report", IDL, ["fmt", "CLI11", "JSON"]),
-    "clients/console": ("tenon::console", IDL + ["clients/command"], ["fmt", "CLI11", "JSON", "Boost"]),
+    # who takes part in a browser is a station of its own
+    "clients/console": ("tenon::console", STATION + ["devices/drivers", "clients/command", "clients/station"], ["fmt", "CLI11", "JSON", "Boost"]),
     "clients/rehearse": ("tenon::rehearse", [], ["fmt", "CLI11"]),  # the rooms: see EXCEPTION
     "scenarios/part_generator": ("tenon::part_generator", ["idl/types"], ["fmt", "CLI11", "PNG"]),
 }

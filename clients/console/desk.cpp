@@ -1,7 +1,6 @@
 #include "clients/console/desk.h"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
@@ -12,8 +11,6 @@
 #include "clients/command/parser.h"
 #include "clients/command/stop_raiser.h"
 #include "idl/types/names.h"
-#include "idl/types/printable_text.h"
-#include "idl/wire/identity.h"
 
 namespace tenon::console {
 
@@ -22,30 +19,8 @@ namespace {
 using std::chrono::milliseconds;
 constexpr std::size_t kMaxSeats = 16;
 constexpr std::size_t kMaxWaiting = 32;  // requests of a seat
-constexpr std::size_t kMaxName = 63;     // [bytes] of tenon::Join
 constexpr milliseconds kCollect{10};
 constexpr milliseconds kForAServer{1500};  // to repeat an emergency stop
-
-std::optional<Role> roleNamed(std::string_view name) {
-  for (const Role role : {Role::kAdmin, Role::kInstructor, Role::kTrainee})
-    if (roleName(role) == name) return role;
-  return std::nullopt;
-}
-
-/// At most kMaxName bytes of a text in UTF-8.
-std::string shortened(const std::string& text) {
-  std::size_t end = std::min(text.size(), kMaxName);
-  while (end < text.size() && end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
-  return text.substr(0, end);
-}
-
-/// Takes equally long wherever they differ.
-bool isEqual(std::string_view a, std::string_view b) {
-  if (a.size() != b.size()) return false;
-  unsigned difference = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) difference |= static_cast<unsigned>(a[i] ^ b[i]);
-  return difference == 0;
-}
 
 }  // namespace
 
@@ -203,10 +178,10 @@ class Desk::Stopper {
   std::thread thread_;
 };
 
-Desk::Desk(DeskOptions options, Answer answer)
-    : options_(std::move(options)),
+Desk::Desk(SeatRights rights, Answer answer)
+    : rights_(std::move(rights)),
       answer_(std::move(answer)),
-      stopper_(std::make_unique<Stopper>(options_.domain, answer_)) {}
+      stopper_(std::make_unique<Stopper>(rights_.domain, answer_)) {}
 
 Desk::~Desk() = default;
 
@@ -251,30 +226,13 @@ std::optional<DeskAnswer> Desk::sit(ViewerId viewer, const std::string& session,
     refusal.text = std::move(why);
     return refusal;
   };
-  const auto role = roleNamed(request.role);
-  if (!role) return refuse("there is no seat for '" + request.role.substr(0, 40) + "' here");
-  if (session.empty()) return refuse("there is no session yet");
-  const bool has_pass = !options_.pass.empty() && isEqual(request.key, options_.pass);
-  if (has_pass && role != options_.role && role != Role::kTrainee)
-    return refuse("this gateway was not started with --role " + request.role);
-  wire::MembershipOptions options{.session = session, .domain = options_.domain, .role = *role};
-  options.key_file = options_.key_file;
-  options.person = request.name.empty() ? "console" : shortened(printable(request.name));
-  if (!has_pass && role != Role::kTrainee) {
-    const auto bytes = wire::readHexText(request.key);
-    if (!bytes)
-      return refuse("the role " + request.role + " needs the key of the session: 64 digits, in the file " +
-                    wire::defaultKeyFile().string() +
-                    " of the server's user; or "
-                    "the address that `tenon console --role " +
-                    request.role + "` prints");
-    options.key = wire::SharedKey{*bytes};
-  }
+  auto options = membershipOf(rights_, session, request);
+  if (!options) return refuse(std::move(options.error().what));
   leave(viewer);
   const std::scoped_lock lock(mutex_);
   std::erase_if(seats_, [](const auto& seat) { return seat.second->hasEnded(); });
   if (seats_.size() >= kMaxSeats) return refuse("all seats of this gateway are taken");
-  seats_.emplace(viewer, std::make_unique<Seat>(viewer, std::move(options), request.id, answer_));
+  seats_.emplace(viewer, std::make_unique<Seat>(viewer, std::move(*options), request.id, answer_));
   return std::nullopt;
 }
 
@@ -289,7 +247,5 @@ void Desk::leave(ViewerId viewer) {
   left_.push_back(std::move(seat->second));
   seats_.erase(seat);
 }
-
-std::string makePass() { return wire::hexText(wire::SharedKey::random().bytes).substr(0, 32); }
 
 }  // namespace tenon::console

@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -11,24 +10,16 @@
 #include <string>
 #include <vector>
 
+#include "clients/console/seat_rights.h"
 #include "clients/console/web_options.h"
-#include "idl/types/messages/role.h"
 
 namespace tenon::console {
-
-struct DeskOptions {
-  std::uint32_t domain = 0;        ///< DDS domain
-  std::optional<Role> role;        ///< that `pass` gives, with the key of this gateway's user
-  std::string pass;                ///< secret of this gateway's life; empty: none
-  std::filesystem::path key_file;  ///< of the session's key; empty: wire::defaultKeyFile()
-};
 
 /// The seats of people at browsers. Each has a client of the session of its own, so that the server grants
 /// its rights by what the browser has proven and knows each person; and a thread of its own, so that one who
 /// waits for an answer delays nobody. The emergency stop needs no seat.
 ///
-/// A role that needs the key of the session is given for that key, or for the pass of this gateway: then the
-/// gateway proves it with its user's key. Other users of this machine, who can connect as well, have neither.
+/// Roles are given by membershipOf().
 ///
 /// Threads: any; no function waits but the destructor. `answer` is called by threads of the desk.
 /// Real-time: no.
@@ -36,7 +27,7 @@ class Desk {
  public:
   using Answer = std::function<void(ViewerId, const DeskAnswer&)>;
 
-  Desk(DeskOptions options, Answer answer);
+  Desk(SeatRights rights, Answer answer);
   ~Desk();
   Desk(const Desk&) = delete;
   Desk& operator=(const Desk&) = delete;
@@ -57,15 +48,12 @@ class Desk {
                                               const DeskRequest& request);
   void leave(ViewerId viewer);
 
-  DeskOptions options_;
+  SeatRights rights_;
   Answer answer_;
   std::mutex mutex_;
   std::map<ViewerId, std::unique_ptr<Seat>> seats_;
   std::vector<std::unique_ptr<Seat>> left_;  ///< their threads end
   std::unique_ptr<Stopper> stopper_;
 };
-
-/// Random, of 128 bits, as text.
-[[nodiscard]] std::string makePass();
 
 }  // namespace tenon::console

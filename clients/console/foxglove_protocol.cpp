@@ -21,6 +21,7 @@ std::optional<std::uint32_t> number(const nlohmann::json& object, const char* ke
 }
 
 constexpr std::size_t kMaxWords = 8;
+constexpr std::size_t kMostHands = 2;
 
 /// Its text; empty when there is none.
 std::string text(const nlohmann::json& object, const char* key) {
@@ -28,29 +29,45 @@ std::string text(const nlohmann::json& object, const char* key) {
   return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
 }
 
+/// A list of texts; fails when there is none, or not of 1 to `most`.
+Result<std::vector<std::string>> texts(const nlohmann::json& object, const char* key, std::size_t most) {
+  const auto list = object.find(key);
+  if (list == object.end() || !list->is_array() || list->empty() || list->size() > most)
+    return fail("a request without a list '" + std::string(key) + "' of 1 to " + std::to_string(most) +
+                " texts");
+  std::vector<std::string> all;
+  for (const nlohmann::json& entry : *list) {
+    if (!entry.is_string()) return fail("an entry of '" + std::string(key) + "' that is no text");
+    all.push_back(entry.get<std::string>());
+  }
+  return all;
+}
+
 Result<DeskRequest> parseDesk(const nlohmann::json& json, std::string_view op) {
-  DeskRequest request;
+  using Kind = DeskRequest::Kind;
+  constexpr std::array<std::pair<std::string_view, Kind>, 5> kKinds{{{"deskSit", Kind::kSit},
+                                                                     {"deskLeave", Kind::kLeave},
+                                                                     {"deskCommand", Kind::kCommand},
+                                                                     {"handTake", Kind::kTakePart},
+                                                                     {"handLeave", Kind::kLeaveHands}}};
+  const auto* const kind =
+      std::find_if(kKinds.begin(), kKinds.end(), [op](const auto& known) { return known.first == op; });
+  if (kind == kKinds.end()) return fail("'" + std::string(op.substr(0, 80)) + "' is not offered here");
   const auto id = number(json, "id");
   if (!id || *id == 0) return fail("a request to the desk without a number 'id' from 1");
-  request.id = *id;
-  if (op == "deskSit") {
-    request.kind = DeskRequest::Kind::kSit;
-    request.role = text(json, "role");
-    request.name = text(json, "name");
-    request.key = text(json, "key");
-    return request;
+  DeskRequest request{.kind = kind->second, .id = *id};
+  request.role = text(json, "role");
+  request.name = text(json, "name");
+  request.key = text(json, "key");
+  if (request.kind == Kind::kCommand) {
+    auto words = texts(json, "words", kMaxWords);
+    if (!words) return fail(words.error().what);
+    request.words = std::move(*words);
   }
-  if (op == "deskLeave") {
-    request.kind = DeskRequest::Kind::kLeave;
-    return request;
-  }
-  if (op != "deskCommand") return fail("'" + std::string(op.substr(0, 80)) + "' is not offered here");
-  const auto words = json.find("words");
-  if (words == json.end() || !words->is_array() || words->empty() || words->size() > kMaxWords)
-    return fail("'deskCommand' without a list 'words' of 1 to 8 texts");
-  for (const nlohmann::json& word : *words) {
-    if (!word.is_string()) return fail("a word of a command that is no text");
-    request.words.push_back(word.get<std::string>());
+  if (request.kind == Kind::kTakePart) {
+    auto hands = texts(json, "hands", kMostHands);
+    if (!hands) return fail(hands.error().what);
+    request.hands = std::move(*hands);
   }
   return request;
 }
@@ -58,7 +75,7 @@ Result<DeskRequest> parseDesk(const nlohmann::json& json, std::string_view op) {
 }  // namespace
 
 std::string deskAnswerText(const DeskAnswer& answer) {
-  return dump({{"op", "deskAnswer"},
+  return dump({{"op", answer.is_of_hands ? "handAnswer" : "deskAnswer"},
                {"id", answer.id},
                {"accepted", answer.accepted},
                {"text", answer.text},
@@ -131,7 +148,8 @@ Result<ViewerRequest> parseViewerText(std::string_view text) {
     return request;
   }
   const std::string name = op->get<std::string>();
-  if (!name.starts_with("desk")) return fail("'" + name.substr(0, 80) + "' is not offered here");
+  if (!name.starts_with("desk") && !name.starts_with("hand"))
+    return fail("'" + name.substr(0, 80) + "' is not offered here");
   auto desk = parseDesk(json, name);
   if (!desk) return fail(desk.error().what);
   request.desk = std::move(*desk);

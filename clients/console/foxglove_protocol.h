@@ -12,8 +12,9 @@
 #include "idl/types/result.h"
 
 /// The Foxglove WebSocket protocol, version 1, server side: texts are JSON, messages binary and
-/// little-endian. Of its optional capabilities there are none. The operations that begin with `desk` are
-/// ours: public viewers neither send nor get them.
+/// little-endian. Of its optional capabilities there are none. The operations that begin with `desk` or
+/// `hand` are ours, and so are binary messages of viewers, which are targets of hands, and those of
+/// kHandSubscription, which are what hands are shown: public viewers neither send nor get them.
 ///
 /// Threads: pure. Real-time: no.
 namespace tenon::console {
@@ -30,16 +31,21 @@ enum class StatusLevel { kInfo, kWarning, kError };
 [[nodiscard]] std::string statusText(StatusLevel level, std::string_view message);
 
 using SubscriptionId = std::uint32_t;  ///< chosen by the viewer
+/// Of what the viewer's own hands are shown; not to be chosen.
+inline constexpr SubscriptionId kHandSubscription = 0xFFFFFFFF;
 
-/// What a viewer asks of the instructor's desk.
+/// What a viewer asks of the instructor's desk, or of the place of somebody who takes part.
 struct DeskRequest {
-  enum class Kind { kSit, kLeave, kCommand };
+  enum class Kind { kSit, kLeave, kCommand, kTakePart, kLeaveHands };
   Kind kind = Kind::kCommand;
   std::uint32_t id = 0;            ///< chosen by the viewer, for the answer
-  std::string role;                ///< of kSit: a name of roleName()
-  std::string name;                ///< of kSit: for display
-  std::string key;                 ///< of kSit: the session's, or the pass of this gateway; may be empty
+  std::string role;                ///< of kSit, kTakePart: a name of roleName()
+  std::string name;                ///< likewise: for display
+  std::string key;                 ///< likewise: the session's, or the pass of this gateway; may be empty
   std::vector<std::string> words;  ///< of kCommand: as `tenon command` takes them
+  std::vector<std::string> hands;  ///< of kTakePart: names in the scenario
+
+  [[nodiscard]] bool isOfHands() const { return kind == Kind::kTakePart || kind == Kind::kLeaveHands; }
 };
 
 struct DeskAnswer {
@@ -47,6 +53,7 @@ struct DeskAnswer {
   bool accepted = false;
   std::string text;  ///< reason, or what came of it; may be empty when accepted
   std::string role;  ///< that the viewer has now; empty: none
+  bool is_of_hands = false;
 };
 [[nodiscard]] std::string deskAnswerText(const DeskAnswer& answer);
 

@@ -9,6 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "clients/console/browser_hands.h"
 #include "clients/console/desk.h"
 #include "clients/console/lobby.h"
 #include "clients/console/session_feed.h"
@@ -35,10 +36,12 @@ class Gateway {
       : options_(options),
         stop_(stop),
         pass_(options.role && options.recording.empty() ? makePass() : ""),
-        desk_({.domain = options.domain, .role = options.role, .pass = pass_, .key_file = options.key_file},
-              [this](ViewerId viewer, const DeskAnswer& answer) {
-                server_->answer(viewer, deskAnswerText(answer));
-              }) {}
+        rights_{.domain = options.domain, .role = options.role, .pass = pass_, .key_file = options.key_file},
+        desk_(rights_, [this](ViewerId viewer, const DeskAnswer& answer) { say(viewer, answer); }),
+        hands_(
+            rights_, [this](ViewerId viewer, const DeskAnswer& answer) { say(viewer, answer); },
+            [this](ViewerId viewer, Payload views) { server_->show(viewer, std::move(views)); },
+            options.print) {}
 
   ~Gateway() {
     if (server_ != nullptr) server_->stop();
@@ -60,15 +63,18 @@ class Gateway {
   void offerFeed(const std::string& room, const std::string& session);
   void startFeeds();
   [[nodiscard]] std::string sessionOf(const std::string& room);
+  void say(ViewerId viewer, const DeskAnswer& answer) { server_->answer(viewer, deskAnswerText(answer)); }
 
   const GatewayOptions& options_;
   const std::atomic<bool>& stop_;
   std::string pass_;
   std::mutex mutex_;
   std::set<std::string> entered_;      ///< rooms with viewers whose feeds are to be started
-  std::unique_ptr<WebServer> server_;  // after feeds and desk, which publish and answer through it
+  std::unique_ptr<WebServer> server_;  // after feeds, desk and hands, which publish and answer through it
   std::map<std::string, std::unique_ptr<SessionFeed>> feeds_;  ///< by room
+  SeatRights rights_;
   Desk desk_;
+  BrowserHands hands_;
 };
 
 Result<void> Gateway::openServer() {
@@ -83,11 +89,18 @@ Result<void> Gateway::openServer() {
   if (!options_.recording.empty())
     if (auto served = site.serveRecording(options_.recording); !served) return served;
   const auto handle = [this](ViewerId viewer, const std::string& room, const DeskRequest& request) {
+    if (request.isOfHands()) return hands_.handle(viewer, sessionOf(room), request);
     desk_.handle(viewer, sessionOf(room), request);
   };
+  const auto leave = [this](ViewerId viewer) {
+    desk_.left(viewer);
+    hands_.left(viewer);
+  };
   auto opened = WebServer::open(options_.web, std::move(site),
-                                {[this](const std::string& room) { enter(room); },
-                                 [this](ViewerId viewer) { desk_.left(viewer); }, handle});
+                                {[this](const std::string& room) { enter(room); }, leave, handle,
+                                 [this](ViewerId viewer, std::span<const std::uint8_t> targets) {
+                                   return hands_.move(viewer, targets);
+                                 }});
   if (!opened) return fail(opened.error().what);
   server_ = std::move(*opened);
   server_->addRoom(std::string(kLobbyRoom), Lobby::channels());

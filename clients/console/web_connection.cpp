@@ -17,19 +17,35 @@ Answer plain(unsigned status, std::string_view text) {
 }  // namespace
 
 WebConnection::WebConnection(WebService& server, tcp::socket socket)
-    : server_(server), stream_(std::move(socket)) {
+    : server_(server), stream_(std::move(socket)), waiting_(server.waiting.end()) {
   ++server_.connections;
 }
 
-WebConnection::~WebConnection() { --server_.connections; }
+WebConnection::~WebConnection() {
+  stopWaiting();
+  --server_.connections;
+}
+
+void WebConnection::stopWaiting() {
+  if (waiting_ != server_.waiting.end()) server_.waiting.erase(waiting_);
+  waiting_ = server_.waiting.end();
+}
+
+void WebConnection::abort() {
+  stopWaiting();
+  beast::error_code ignored;
+  stream_.socket().close(ignored);
+}
 
 void WebConnection::read() {
   parser_.emplace();
   parser_->header_limit(kMaxHeaderBytes);
   parser_->body_limit(std::uint64_t{0});
   stream_.expires_after(kRequestTimeout);
+  waiting_ = server_.waiting.insert(server_.waiting.end(), this);
   http::async_read(stream_, incoming_, *parser_,
                    [self = shared_from_this()](beast::error_code error, std::size_t) {
+                     self->stopWaiting();
                      if (!error) self->handle();
                    });
 }

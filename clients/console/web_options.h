@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,8 @@ struct WebHandlers {
   std::function<void(ViewerId)> left;
   /// A request to the desk, from a page of this server or a program, never from a page from elsewhere.
   std::function<void(ViewerId, const std::string& path, const DeskRequest&)> desk;
+  /// Targets of the viewer's hands, likewise; false when they are none.
+  std::function<bool(ViewerId, std::span<const std::uint8_t>)> hands;
 };
 
 }  // namespace tenon::console

@@ -34,8 +34,10 @@ WebService::WebService(const WebOptions& web_options, Site web_site, WebHandlers
 void WebService::accept() {
   acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
-    // beyond the limit it is closed at once
-    if (!error && connections < kMaxConnections) {
+    // beyond the limit the one that has asked for nothing for longest makes room, else it is closed at once
+    const bool is_full = connections >= kMaxConnections;
+    if (!error && (!is_full || !waiting.empty())) {
+      if (is_full) waiting.front()->abort();
       beast::error_code ignored;
       socket.set_option(tcp::no_delay(true), ignored);
       socket.set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
@@ -66,12 +68,10 @@ void WebService::deliver(const std::string& path, const std::vector<Publication>
     if (viewers.contains(viewer)) viewer->send();
 }
 
-void WebService::answer(ViewerId id, const std::string& text) {
+WebViewer* WebService::find(ViewerId id) {
   const auto found = std::find_if(viewers.begin(), viewers.end(),
                                   [id](const WebViewer* viewer) { return viewer->id() == id; });
-  if (found == viewers.end()) return;
-  (*found)->offer(text);
-  (*found)->send();
+  return found == viewers.end() ? nullptr : *found;
 }
 
 Result<std::unique_ptr<WebServer>> WebServer::open(const WebOptions& options, Site site,
@@ -119,7 +119,21 @@ void WebServer::publish(const std::string& path, std::vector<Publication> public
 }
 
 void WebServer::answer(ViewerId viewer, std::string text) {
-  asio::post(impl_->io, [impl = impl_.get(), viewer, text = std::move(text)] { impl->answer(viewer, text); });
+  asio::post(impl_->io, [impl = impl_.get(), viewer, text = std::move(text)] {
+    WebViewer* const found = impl->find(viewer);
+    if (found == nullptr) return;
+    found->offer(text);
+    found->send();
+  });
+}
+
+void WebServer::show(ViewerId viewer, Payload views) {
+  asio::post(impl_->io, [impl = impl_.get(), viewer, views = std::move(views)] {
+    WebViewer* const found = impl->find(viewer);
+    if (found == nullptr) return;
+    found->offerHands(views);
+    found->send();
+  });
 }
 
 void WebServer::stop() {

@@ -18,7 +18,8 @@ struct WebService;  ///< in web_service.h
 ///
 /// HTTP: a Site. WebSocket: the Foxglove protocol, in rooms, which are paths; each has the channels of one
 /// session. A viewer has a ViewerQueue; one that takes nothing for 20 s, sends more than 200 messages a
-/// second, or messages longer than 64 kB, is disconnected. At most 256 connections are served. A request must
+/// second, or messages longer than 64 kB, is disconnected; 256 kB a second are read of it. At most 256
+/// connections are served; when more come, those end that have asked for nothing for longest. A request must
 /// name a loopback host, and a WebSocket one a permitted origin.
 ///
 /// Threads: open, start and stop from one thread; it has a thread of its own, which alone serves. The others
@@ -40,6 +41,8 @@ class WebServer {
   void publish(const std::string& path, std::vector<Publication> publications);
   /// Sends a text to one viewer, if it is still there.
   void answer(ViewerId viewer, std::string text);
+  /// Sends what its hands are shown to one viewer, if it is still there; the newest one wins.
+  void show(ViewerId viewer, Payload views);
   /// Serves no more and calls no handler any more; also by the destructor.
   void stop();
   /// Connected viewers.

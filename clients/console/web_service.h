@@ -2,10 +2,12 @@
 
 #include <atomic>
 #include <chrono>
+#include <list>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -36,6 +38,10 @@ using tcp = asio::ip::tcp;
 
 inline constexpr std::chrono::seconds kSendTimeout{20};
 
+/// What a viewer sends is read at a bounded rate: frames that carry nothing are no messages, and cost as
+/// much.
+using ViewerStream = beast::basic_stream<tcp, asio::any_io_executor, beast::simple_rate_policy>;
+
 struct WebService;
 
 /// One WebSocket connection. It lives as long as an operation of it is pending.
@@ -50,6 +56,9 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
   void run(const http::request<http::empty_body>& request, std::string_view subprotocol);
   void offer(const Publication& publication, Delivery delivery);
   void offer(std::string text) { queue_.addText(std::move(text)); }
+  void offerHands(const Payload& views) {
+    queue_.add(kHandSubscription, Delivery::kNewest, {.payload = views});
+  }
   void send();
   [[nodiscard]] ViewerId id() const { return id_; }
   [[nodiscard]] const std::string& room() const { return room_; }
@@ -58,6 +67,8 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
   void begin();
   void read();
   void receive();
+  /// A binary message.
+  void moveHands(std::span<const std::uint8_t> targets);
   void apply(const ViewerRequest& request);
   void close(const std::string& reason);
   void finish();
@@ -68,7 +79,7 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
   ViewerId id_;
   std::string room_;
   bool is_own_page_;
-  websocket::stream<tcp::socket> socket_;
+  websocket::stream<ViewerStream> socket_;
   asio::steady_timer send_timer_;
   beast::flat_buffer incoming_;
   std::map<SubscriptionId, ChannelId> subscriptions_;
@@ -91,9 +102,12 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   WebConnection& operator=(const WebConnection&) = delete;
 
   void read();
+  /// Ends it without an answer.
+  void abort();
 
  private:
   using Request = http::request<http::empty_body>;
+  void stopWaiting();
   void handle();
   void handleUpgrade(const Request& request, std::string_view origin, std::string_view host);
   void respond(const Request& request, Answer answer);
@@ -102,6 +116,7 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   beast::tcp_stream stream_;
   beast::flat_buffer incoming_;
   std::optional<http::request_parser<http::empty_body>> parser_;
+  std::list<WebConnection*>::iterator waiting_;  ///< in WebService::waiting, or its end
 };
 
 /// The channels of one session.
@@ -118,7 +133,8 @@ struct WebService {
 
   void accept();
   void deliver(const std::string& path, const std::vector<Publication>& publications);
-  void answer(ViewerId viewer, const std::string& text);
+  /// Null when it is not there any more.
+  [[nodiscard]] WebViewer* find(ViewerId viewer);
 
   WebOptions options;
   Site site;
@@ -128,6 +144,7 @@ struct WebService {
 
   std::uint16_t port = 0;
   std::size_t connections = 0;
+  std::list<WebConnection*> waiting;  ///< for a request, the longest first
   std::set<WebViewer*> viewers;
   ViewerId next_viewer = 1;
   std::atomic<std::size_t> viewer_count{0};

@@ -9,6 +9,7 @@ using std::chrono::seconds;
 constexpr std::size_t kMaxMessageBytes = 64U << 10U;
 constexpr std::size_t kMaxSubscriptions = 256;
 constexpr int kMaxMessagesASecond = 200;
+constexpr std::size_t kMaxBytesASecond = 256U << 10U;
 
 }  // namespace
 
@@ -40,6 +41,7 @@ void WebViewer::run(const http::request<http::empty_body>& request, std::string_
         answer.set(http::field::server, "tenon");
       }));
   socket_.read_message_max(kMaxMessageBytes);
+  socket_.next_layer().rate_policy().read_limit(kMaxBytesASecond);
   socket_.async_accept(request, [self = shared_from_this()](beast::error_code error) {
     if (!error) self->begin();
   });
@@ -114,7 +116,7 @@ void WebViewer::receive() {
   const std::string text = beast::buffers_to_string(incoming_.data());
   incoming_.consume(incoming_.size());
   if (!socket_.got_text()) {
-    queue_.addText(statusText(StatusLevel::kWarning, "binary messages are not expected here"));
+    moveHands({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
   } else if (const auto request = parseViewerText(text)) {
     apply(*request);
   } else {
@@ -123,11 +125,20 @@ void WebViewer::receive() {
   send();
 }
 
+void WebViewer::moveHands(std::span<const std::uint8_t> targets) {
+  const bool may = is_own_page_ && server_.handlers.hands;
+  if (!may || !server_.handlers.hands(id_, targets))
+    queue_.addText(
+        statusText(StatusLevel::kWarning, "a binary message that is no target of this viewer's hands"));
+}
+
 void WebViewer::apply(const ViewerRequest& request) {
   if (request.desk && is_own_page_ && server_.handlers.desk) {
     server_.handlers.desk(id_, room_, *request.desk);
   } else if (request.desk) {
-    queue_.addText(deskAnswerText({.id = request.desk->id, .text = "pages from elsewhere may look on only"}));
+    queue_.addText(deskAnswerText({.id = request.desk->id,
+                                   .text = "pages from elsewhere may look on only",
+                                   .is_of_hands = request.desk->isOfHands()}));
   }
   ChannelStore& store = server_.rooms.find(room_)->second.store;
   for (const SubscriptionId id : request.unsubscribe) {
@@ -139,6 +150,7 @@ void WebViewer::apply(const ViewerRequest& request) {
     std::string problem;
     if (found == nullptr) problem = "there is no channel " + std::to_string(channel);
     if (subscriptions_.contains(id)) problem = "subscription " + std::to_string(id) + " exists";
+    if (id == kHandSubscription) problem = "subscription " + std::to_string(id) + " is not to be chosen";
     if (subscriptions_.size() >= kMaxSubscriptions) problem = "there are too many subscriptions";
     if (!problem.empty()) {
       queue_.addText(statusText(StatusLevel::kWarning, problem));
@@ -171,8 +183,7 @@ void WebViewer::finish() {
 void WebViewer::abort() {
   is_closing_ = is_closed_ = true;
   send_timer_.cancel();
-  beast::error_code ignored;
-  socket_.next_layer().close(ignored);
+  beast::get_lowest_layer(socket_).close();
 }
 
 }  // namespace tenon::console

@@ -9,6 +9,7 @@
 #include "clients/haptic/haptic_hand.h"
 #include "clients/simulated_person/people.h"
 #include "clients/simulated_person/posture.h"
+#include "devices/mounted_device.h"
 #include "devices/simulated/body_tracker.h"
 #include "devices/simulated/simulated_device.h"
 
@@ -142,6 +143,12 @@ Result<std::unique_ptr<DeviceStation>> DeviceStation::open(const StationOptions&
 Result<void> DeviceStation::openDevices() {
   StationOptions& options = parts_->options;
   for (const StationDevice& device : options.devices) {
+    if (device.opened) {
+      OpenDevice open;
+      open.one = std::make_unique<devices::MountedDevice>(*device.opened, device.configuration.q_DM);
+      parts_->addDevice(std::move(open), device.configuration.q_DM);
+      continue;
+    }
     const auto facts = devices::findDevice(device.name);
     if (!facts) return fail(facts.error().what);
     if (facts->arms == 0) return fail("device '" + device.name + "' moves no hand");

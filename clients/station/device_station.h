@@ -25,6 +25,8 @@ enum class PersonKind {
 struct StationDevice {
   std::string name;  ///< in the catalog, with one arm or two
   devices::DeviceConfiguration configuration;
+  /// One arm that is not of the catalog, moved by its owner; null: it is.
+  std::shared_ptr<devices::HapticDevice> opened;
 };
 
 /// A station: hands x devices x trackers, and who moves it.

@@ -1,16 +1,24 @@
 """The console: what viewers of its WebSocket get of a session, what it refuses, and its page in a browser."""
+import contextlib
 import json
 import math
 import os
 import re
 import shutil
 import signal
+import socket
+import struct
 import subprocess
+import sys
+import time
 import unittest
 from pathlib import Path
 
 from stage import COARSE, Process, SOURCE, Stage, final_hash, tenon
 from viewer import Closed, Refused, Viewer, frame_transforms, get, request
+
+sys.path.insert(0, str(SOURCE / "clients" / "remote_hand"))
+from remote_hand import ACTIVE, FORCES_ON, View
 
 TOOLS = SOURCE / "tests" / "system" / "public_tools"
 NAMES = ("foxglove.sdk.v1", "foxglove.websocket.v1")
@@ -30,6 +38,18 @@ def memory(process):
     """Resident memory of a process, in MB."""
     status = Path(f"/proc/{process.popen.pid}/status").read_text(encoding="utf-8")
     return int(re.search(r"VmRSS:\s+(\d+)", status)[1]) / 1024
+
+
+def taken_of(connection, frame, seconds):
+    """Bytes that the other side takes of a frame that is sent again and again for so long."""
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 16)
+    connection.settimeout(0.2)
+    taken, end = 0, time.monotonic() + seconds
+    with contextlib.suppress(ConnectionError):
+        while time.monotonic() < end:
+            with contextlib.suppress(TimeoutError):
+                taken += connection.send(frame * 4000)
+    return taken
 
 
 class Gateway(unittest.TestCase):
@@ -139,6 +159,18 @@ class Gateway(unittest.TestCase):
                     flood.send('{"op":"unsubscribe","subscriptionIds":[1]}')
                 while True:
                     flood.receive()
+            # frames that are no messages: pings, and fragments without content
+            for first in (b"\x89", b"\x00"):
+                with Viewer(port) as flood:
+                    flood.begin("/console")
+                    if first == b"\x00":
+                        flood.socket.sendall(b"\x01\x80" + bytes(4))
+                    self.assertLess(taken_of(flood.socket, first + b"\x80" + bytes(4), 4), 3_000_000, "bytes, of which most wait in buffers")
+            # connections that ask for nothing keep nobody out
+            idle = [socket.create_connection(("127.0.0.1", port)) for _ in range(300)]
+            self.assertIn(get(port, "/")[0], (200, 503))
+            for connection in idle:
+                connection.close()
             with Viewer(port) as viewer:  # nobody else was disturbed
                 viewer.begin("/console")
                 self.assertEqual(json.loads(next(viewer.messages())[1])["state"], "searching")
@@ -240,6 +272,59 @@ class Desk(unittest.TestCase):
             self.assertEqual(refused.exception.status, 404)
 
 
+def targets(*places, buttons=4, seq=1):
+    """Targets of hands, as docs/devices.md has them; a place is in the frame of its device."""
+    return b"".join(struct.pack("<IHHII3d4dd", 0x444E4854, 1, 1, seq, buttons, *place, 1, 0, 0, 0, 0) for place in places)
+
+
+class Hands(unittest.TestCase):
+    """Who takes part at a browser, played by a program."""
+
+    def test_a_hand_is_a_station_that_moves_is_armed_and_leaves_with_its_browser(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve(SCENARIO, "--wait-for", "right")
+            console, port = start_console(stage)
+            console.wait_for("joined session 'test'")
+            own = f"http://localhost:{port}"
+            with Viewer(port, origin=own) as page, Viewer(port, origin=own) as other:
+                page.begin("/console"), other.begin("/console")
+                taken = page.ask("handTake", role="trainee", name="Ada", hands=["right"])
+                self.assertEqual((taken["op"], taken["accepted"], taken["role"]), ("handAnswer", True, "trainee"), taken)
+                server.wait_for(r"Ada \(trainee\) has joined")
+                view = View(page.hands())
+                self.assertFalse(view.has(FORCES_ON), "nothing on the bus arms a hand")
+                start, goal = view.hand, tuple(x + 0.05 for x in view.hand)
+                for seq in range(1000):
+                    # the arming button, then the way
+                    place = tuple(a - b for a, b in zip(goal if view.has(ACTIVE) else view.hand, view.centre))
+                    page.send(targets(place, buttons=4 | (2 if not view.has(FORCES_ON) and seq % 30 < 15 else 0), seq=seq), opcode=2)
+                    view = View(page.hands())
+                    if math.dist(view.hand, goal) < 1e-3:
+                        break
+                self.assertLess(math.dist(view.hand, goal), 1e-3, f"from {start}")
+
+                # bad messages are refused with a reason, and the hand stays
+                for bad in (b"", b"x", targets(goal)[:-1], targets(goal) * 2, targets((math.nan, 0, 0)), targets((1e9, 0, 0)), b"\0" * 80):
+                    page.send(bad, opcode=2)
+                    self.assertIn("no target of this viewer's hands", page.status())
+                for request, reason in (({"role": "trainee", "hands": []}, "list 'hands'"), ({"role": "trainee", "hands": [7]}, "no text"),
+                                        ({"role": "trainee", "hands": ["right"] * 3}, "list 'hands'")):
+                    other.send(json.dumps({"op": "handTake", "id": 9, **request}))
+                    self.assertIn(reason, other.status())
+                for request, reason in (({"role": "observer", "hands": ["right"]}, "no seat for"), ({"role": "instructor", "hands": ["instructor"]}, "needs the key"),
+                                        ({"role": "trainee", "hands": ["instructor"]}, "belongs to the instructor"),
+                                        ({"role": "trainee", "hands": ["right"]}, "already moved by"), ({"role": "trainee", "hands": ["nowhere"]}, "no such hand")):
+                    page.send(targets(place), opcode=2)  # it is still there
+                    refused = other.ask("handTake", name="Eve", **request)
+                    self.assertFalse(refused["accepted"], request)
+                    self.assertIn(reason, refused["text"], request)
+                console.wait_for("hand 'right' is asked for by a browser")
+                other.send(targets((1.0, 0.0, 0.0)), opcode=2)  # who has no hand moves none
+                page.send(targets(place), opcode=2)
+                self.assertLess(math.dist(View(page.hands()).hand, goal), 2e-3)
+            server.wait_for(r"Ada \(trainee\) has left")
+
+
 class Browser:
     """Chromium with the page."""
 
@@ -338,6 +423,35 @@ class Page(unittest.TestCase):
             server.wait_for("step skipped")
             self.assertEqual(browser.problems, [])
 
+    def test_a_mouse_mounts_the_first_part_and_the_session_resimulates(self):
+        mouse_mounts(self, 1)
+
+    def test_keys_and_a_gamepad_move_a_hand_and_a_stop_switches_it_off(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            server = stage.serve(SCENARIO, "--wait-for", "right")
+            console, port = start_console(stage)
+            console.wait_for("joined session 'test'")
+            browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="light")
+            browser("await", expression="tenon.view.models >= 3 && !document.querySelector('.take').hidden")
+            browser("sit down")
+            browser("await", expression="tenon.part.hand.isOn")
+            height = "[...tenon.session.hands.values()][0].X_WH.p[2]"
+            browser("value", expression=f"window.first = {height}")
+            browser("value", expression="document.activeElement.blur()")
+            browser("key down", key="ArrowUp")
+            browser("await", expression=f"{height} > window.first + 0.02")
+            browser("key up", key="ArrowUp")
+            browser("value", expression=f"window.first = {height}")
+            browser("value", expression="navigator.getGamepads = () => [{axes: [0, 1, 0, 0], buttons: []}]")
+            browser("await", expression=f"{height} < window.first - 0.02")
+            browser("value", expression="navigator.getGamepads = () => []")
+            browser("key", key="Space")
+            browser("await", expression="!tenon.part.hand.isOn && document.querySelector('.arm').hidden")
+            server.wait_for("pressed in the browser")
+            browser("value", expression="document.querySelector('.take').click()")
+            server.wait_for(r"\(trainee\) has left")
+            self.assertEqual(browser.problems, [])
+
     def test_a_recording_is_played_without_a_server(self):
         with Stage() as stage, Browser() as browser:
             recording = stage.out / "session.mcap"
@@ -384,6 +498,34 @@ class Page(unittest.TestCase):
             browser("value", expression="document.querySelector('.session').click()")
             browser("await", expression="location.search === '?session=test' && window.tenon !== undefined && document.title === 'Peg and box – Tenon'")
             self.assertEqual(browser.problems, [])
+
+
+def mouse_mounts(test, seed):
+    """A scripted mouse mounts the peg within two minutes; journal and recording of it re-simulate."""
+    with Stage(lockstep=False) as stage, Browser() as browser:
+        journal = stage.out / "journal.mcap"
+        server = stage.serve(SCENARIO, "--wait-for", "right", "--journal", journal)
+        console, port = start_console(stage)
+        console.wait_for("joined session 'test'")
+        browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
+        browser("await", expression="tenon.view.models >= 3 && !document.querySelector('.take').hidden")
+        browser("sit down")
+        server.wait_for("armed by the person at the station|run: running")
+        done = browser("mount", seed=seed, seconds=120, steps=["take_peg", "insert_peg"])
+        test.assertIsNotNone(done.get("seconds"), "\n".join(done["log"][-40:]))
+        test.assertEqual(server.wait(60), 0, server.text())
+        again = tenon("resimulate", journal, SOURCE / "scenarios" / SCENARIO)
+        test.assertEqual(again.returncode, 0, again.stdout + again.stderr)
+        test.assertEqual(final_hash(again.stdout), final_hash(server.text()))
+        test.assertEqual(browser.problems, [])
+
+
+@unittest.skipUnless(shutil.which("chromium") and (TOOLS / "node_modules").exists(), "no chromium or no playwright-core: deploy/setup test, and npm ci in tests/system/public_tools")
+class MouseNightly(unittest.TestCase):
+    def test_a_mouse_mounts_the_first_part(self):
+        for seed in range(2, 6):
+            with self.subTest(seed=seed):
+                mouse_mounts(self, seed)
 
 
 if __name__ == "__main__":

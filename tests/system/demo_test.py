@@ -17,6 +17,7 @@ from stage import COARSE, PROGRAMS, SOURCE, TENON, final_hash, free_domain, teno
 
 sys.path.insert(0, str(SOURCE / "deploy"))
 from demo import output_folder  # noqa: E402
+from viewer import Viewer  # noqa: E402
 from demo_scene import hands_of  # noqa: E402
 
 PEG_AND_BOX = SOURCE / "scenarios" / "peg_and_box"
@@ -123,6 +124,66 @@ class DemoCase(unittest.TestCase):
             self.assertEqual(contained[topic], rows[topic][1], topic)
             self.assertEqual(*rows[topic], topic)
         self.assertGreaterEqual(rows["TickStats_100"][1], ticks // 10)
+
+
+class You(DemoCase):
+    """A person at the console in the place of a simulated one."""
+
+    def await_line(self, demo, pattern):
+        said = ""
+        for line in demo.stdout:
+            said += line
+            if found := re.search(pattern, line):
+                return found
+        self.fail(f"the demo never said {pattern}:\n{said}")
+
+    def page(self, port, secret=None, **values):
+        page = Viewer(int(port), origin=f"http://localhost:{port}")
+        self.addCleanup(page.close)
+        page.begin("/console")
+        taken = page.ask("handTake", name="Ada", key=secret or "", **values)
+        self.assertTrue(taken["accepted"], taken)
+        return page
+
+    def process_when_it_runs(self, program):
+        deadline = time.monotonic() + 120
+        while time.monotonic() < deadline:
+            try:
+                return self.process_of(program)
+            except StopIteration:
+                time.sleep(0.2)
+        self.fail(f"{program} never ran")
+
+    def test_the_trainee_is_you_and_no_step_runs_out_of_time(self):
+        demo = self.start("--you", "trainee", lockstep=False)
+        port = self.await_line(demo, r"^your place as trainee: http://localhost:(\d+)/\?you=trainee$")[1]
+        self.process_when_it_runs("observer")
+        self.page(port, role="trainee", hands=["right"])
+        self.await_line(demo, "step 1 of 2")
+        self.assertEqual([words for words in self.left_running().values() if words[0].endswith("tenon-join") and "trainee" in words], [])
+        served = (self.folder / "out" / "scenario_without_timeouts" / "peg_and_box" / "scenario.yaml").read_text(encoding="utf-8")
+        self.assertNotIn("timeout:", served)
+        self.assertIn("name: insert_peg", served)
+
+    def test_the_instructor_is_you(self):
+        demo = self.start("--you", "instructor", lockstep=False)
+        found = self.await_line(demo, r"^your place as instructor: http://localhost:(\d+)/\?you=instructor#pass=(\w+)$")
+        self.process_when_it_runs("trainee")
+        self.page(found[1], found[2], role="instructor", hands=["instructor"])
+        self.await_line(demo, "step 1 of 2")
+
+    def test_a_simulated_person_makes_room(self):
+        demo = self.start(lockstep=False)
+        port = self.await_line(demo, r"^console: http://localhost:(\d+)/$")[1]
+        self.await_line(demo, "step 1 of 2")
+        self.page(port, role="trainee", hands=["right"])
+        self.await_line(demo, "the simulated trainee makes room for you")
+
+    def test_wrong_usage_is_said(self):
+        for more in ("--no-console", "--lockstep"):
+            done = tenon(*self.words("--you", "trainee", more))
+            self.assertEqual(done.returncode, 2, done.stdout + done.stderr)
+            self.assertIn("--you needs the console", done.stderr)
 
 
 class Lockstep(DemoCase):

@@ -7,6 +7,9 @@ import struct
 import time
 
 
+HANDS = 0xFFFFFFFF  # subscription of what the viewer's own hands are shown
+
+
 class Refused(Exception):
     """The server answered the handshake otherwise; `status` is the HTTP status."""
 
@@ -139,16 +142,34 @@ class Viewer:
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             message = self.receive()
-            if isinstance(message, dict) and message["op"] == "deskAnswer" and message["id"] == self.asked:
+            if isinstance(message, dict) and message["op"] in ("deskAnswer", "handAnswer") and message["id"] == self.asked:
                 return message
         raise AssertionError(f"no answer to {operation}")
+
+    def status(self, seconds=60):
+        """The next thing that the gateway says about what was sent."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            message = self.receive()
+            if isinstance(message, dict) and message["op"] == "status":
+                return message["message"]
+        raise AssertionError("no status")
+
+    def hands(self, seconds=60):
+        """What this viewer's hands are shown next, as bytes."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            message = self.receive()
+            if isinstance(message, tuple) and message[0] == HANDS:
+                return message[2]
+        raise AssertionError("the hands are shown nothing")
 
     def messages(self, seconds=120):
         """(topic, payload) as they come, for so long."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             message = self.receive()
-            if isinstance(message, tuple):
+            if isinstance(message, tuple) and message[0] != HANDS:
                 yield self.subscriptions[message[0]], message[2]
 
 

@@ -58,6 +58,12 @@ TEST(FoxgloveProtocol, UnderstandsRequestsToTheDesk) {
   ASSERT_TRUE(command && command->desk) << command.error().what;
   EXPECT_EQ(command->desk->kind, DeskRequest::Kind::kCommand);
   EXPECT_THAT(command->desk->words, ElementsAre("note", "mind the edge"));
+  const auto take = parseViewerText(R"({"op":"handTake","id":5,"role":"trainee","hands":["right","left"]})");
+  ASSERT_TRUE(take && take->desk) << take.error().what;
+  EXPECT_EQ(take->desk->kind, DeskRequest::Kind::kTakePart);
+  EXPECT_TRUE(take->desk->isOfHands());
+  EXPECT_THAT(take->desk->hands, ElementsAre("right", "left"));
+  EXPECT_EQ(nlohmann::json::parse(deskAnswerText({.id = 5, .is_of_hands = true})).at("op"), "handAnswer");
   const auto answer = nlohmann::json::parse(deskAnswerText({4, false, "\xFF", "instructor"}));
   EXPECT_EQ(answer["id"], 4);
   EXPECT_EQ(answer["accepted"], false);
@@ -88,6 +94,10 @@ TEST(FoxgloveProtocol, SaysWhatIsWrongWithARequest) {
        "without a list 'words'"},
       {R"({"op":"deskCommand","id":1,"words":[7]})", "no text"},
       {R"({"op":"deskRule","id":1})", "'deskRule' is not offered"},
+      {R"({"op":"handTake","id":1})", "without a list 'hands'"},
+      {R"({"op":"handTake","id":1,"hands":["a","b","c"]})", "of 1 to 2 texts"},
+      {R"({"op":"handTake","hands":["a"]})", "without a number 'id'"},
+      {R"({"op":"handWave","id":1})", "'handWave' is not offered"},
   };
   for (const auto& [text, reason] : cases) {
     const auto request = parseViewerText(text);

@@ -4,11 +4,16 @@
 //   {"do": "value", "expression": JS}
 //   {"do": "type", "selector": CSS, "text": T}
 //   {"do": "key", "key": K}   as Playwright names it
+//   {"do": "key down", "key": K}, {"do": "key up", "key": K}
+//   {"do": "sit down"}   takes part, as a person at the page would
+//   {"do": "mount", "seed": S, "seconds": T, "steps": [..]}   with the mouse, until the step is none of these
 //   {"do": "picture", "file": F}
 // Usage: node console_page.mjs PATH_OF_CHROMIUM
 import { createInterface } from "node:readline";
 
 import { chromium } from "playwright-core";
+
+import { mount, sitDown } from "./mouse_person.mjs";
 
 const browser = await chromium.launch({ executablePath: process.argv[2], args: ["--no-sandbox", "--disable-dev-shm-usage"] });
 const problems = [];
@@ -41,6 +46,18 @@ const commands = {
   },
   async key({ key }) {
     await page.keyboard.press(key);
+  },
+  async "key down"({ key }) {
+    await page.keyboard.down(key);
+  },
+  async "key up"({ key }) {
+    await page.keyboard.up(key);
+  },
+  async "sit down"() {
+    await sitDown(page);
+  },
+  async mount(task) {
+    return mount(page, task);
   },
   async picture({ file }) {
     await page.screenshot({ path: file, timeout: 120000 });

@@ -7,7 +7,7 @@ import { t, type Key } from "./strings";
 
 const NOTICE = 8000; // [ms] that an answer is shown
 const NOTICES = 3;
-const PASS = "pass"; // in the address, and in this tab's memory
+export const PASS = "pass"; // in the address, and in this tab's memory
 
 export class Desk {
   readonly stop = h("button", "stop");
@@ -237,7 +237,7 @@ export class Desk {
     else this.notify(answer.accepted, `${what}: ${answer.text || t(answer.accepted ? "desk.accepted" : "desk.refused")}`);
   }
 
-  private notify(isGood: boolean, text: string): void {
+  notify(isGood: boolean, text: string): void {
     const notice = h("p", isGood ? "notice good" : "notice bad", icon(isGood ? "done" : "warn"), h("span", "", text));
     this.notices.append(notice);
     while (this.notices.childElementCount > NOTICES) this.notices.firstElementChild?.remove();

@@ -23,6 +23,10 @@ const PATHS = {
   repeat: "M8 2a6 6 0 1 0 6 6h-2a4 4 0 1 1-4-4v3l5-4-5-4z",
   swap: "M1 5h9V2l5 4.500-5 4V8H1zM15 12H6v3l-5-4 5-4v3h9z",
   bell: "M8 1a5 5 0 0 1 5 5v4l2 2v1H1v-1l2-2V6a5 5 0 0 1 5-5zM6 14h4l-2 2z",
+  hand: "M6 1.500a1 1 0 0 1 2 0V7h.500V2.500a1 1 0 0 1 2 0V7.500h.500V4a1 1 0 0 1 2 0v6c0 3-2 5-5 5-2 0-3.500-1-4.500-3L1.500 9a1 1 0 0 1 1.700-1L4 9V3.500a1 1 0 0 1 2 0z",
+  up: "M8 2l6 7h-4v5H6V9H2z",
+  down: "M8 14L2 7h4V2h4v5h4z",
+  help: "M8 1a7 7 0 1 1 0 14A7 7 0 0 1 8 1zM5 6h2c0-2 2-2 2-.500 0 1-2 1.500-2 3.500h2c0-1.500 2-1.800 2-3.500C11 2 5 2 5 6zM7 10.500v2h2v-2z",
   person: "M8 2a3 3 0 1 1 0 6 3 3 0 0 1 0-6zM2 14c0-3 3-5 6-5s6 2 6 5z",
 } as const;
 export type Icon = keyof typeof PATHS;

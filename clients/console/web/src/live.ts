@@ -1,6 +1,7 @@
 // The gateway's WebSocket: subscribes to topics by name, connects again when the connection is lost, and carries requests to the desk.
 import { decoderOf, type Channel, type Decoder } from "./decode";
 import type { InstanceGone } from "./messages";
+import { decodeViews, HAND_SUBSCRIPTION, type HandView } from "./remote";
 
 const SUBPROTOCOLS = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 const FIRST_RETRY = 0.5; // s
@@ -21,6 +22,9 @@ export function addressOf(room: string): string {
 export class LiveSource {
   /** Called with an answer of id 0. */
   onNotice?: (answer: DeskAnswer) => void;
+  /** Likewise, of what the gateway says of this page's hands; and what they are shown. */
+  onHandNotice?: (answer: DeskAnswer) => void;
+  onHands?: (views: HandView[]) => void;
   private socket?: WebSocket;
   private readers = new Map<number, { topic: string; decode: Decoder }>();
   private retry = FIRST_RETRY;
@@ -48,6 +52,11 @@ export class LiveSource {
     return new Promise((answer) => this.asked.set(id, answer));
   }
 
+  /** Targets of this page's hands. Not while others wait to be sent: old ones are of no use. */
+  sendTargets(bytes: Uint8Array<ArrayBuffer>): void {
+    if (this.socket?.readyState === WebSocket.OPEN && this.socket.bufferedAmount < 4096) this.socket.send(bytes);
+  }
+
   private connect(): void {
     const socket = (this.socket = new WebSocket(this.url, SUBPROTOCOLS));
     socket.binaryType = "arraybuffer";
@@ -73,7 +82,7 @@ export class LiveSource {
   private receiveText(data: string): void {
     const message = JSON.parse(data) as { op: string; channels?: Channel[]; level?: number; message?: string };
     if (message.op === "status") console.warn("gateway:", message.message);
-    if (message.op === "deskAnswer") this.receiveAnswer(message as unknown as DeskAnswer);
+    if (message.op === "deskAnswer" || message.op === "handAnswer") this.receiveAnswer(message as unknown as DeskAnswer, message.op === "handAnswer");
     if (message.op !== "advertise") return;
     const subscriptions: { id: number; channelId: number }[] = [];
     for (const channel of message.channels ?? []) {
@@ -84,14 +93,15 @@ export class LiveSource {
     this.socket?.send(JSON.stringify({ op: "subscribe", subscriptions }));
   }
 
-  private receiveAnswer(answer: DeskAnswer): void {
-    if (answer.id === 0) return this.onNotice?.(answer);
+  private receiveAnswer(answer: DeskAnswer, isOfHands: boolean): void {
+    if (answer.id === 0) return isOfHands ? this.onHandNotice?.(answer) : this.onNotice?.(answer);
     this.asked.get(answer.id)?.(answer);
     this.asked.delete(answer.id);
   }
 
   private receiveBytes(view: DataView): void {
     if (view.byteLength < 13 || view.getUint8(0) !== 1) return;
+    if (view.getUint32(1, true) === HAND_SUBSCRIPTION) return this.onHands?.(decodeViews(new DataView(view.buffer, 13)));
     const reader = this.readers.get(view.getUint32(1, true));
     if (reader === undefined) return;
     const message = reader.decode(new Uint8Array(view.buffer, 13));

@@ -1,11 +1,12 @@
 import "./style.css";
 
-import { Desk } from "./desk";
+import { Desk, PASS } from "./desk";
 import { h, icon, type Icon } from "./dom";
 import { addressOf, LiveSource, type LiveState } from "./live";
 import { Lobby } from "./lobby";
 import type { Gateway, LobbyState } from "./messages";
 import * as panels from "./panels";
+import { Part } from "./part";
 import { ForcePlot } from "./plot";
 import { Player } from "./player";
 import { fromAddress, fromFile, Recording } from "./recording";
@@ -22,6 +23,7 @@ let live: LiveState = { kind: "connecting" };
 // one of them shows where the session comes from
 let source: LiveSource | undefined;
 let desk: Desk | undefined;
+let part: Part | undefined;
 let lobby: Lobby | undefined;
 let player: Player | undefined;
 /** Of a recording that is opened: how much is read, or why it cannot be. */
@@ -99,6 +101,7 @@ function setWords(): void {
     [frameButton, "view.reset"], [noForce, "force.none"], [all, "lobby.all"],
   ];
   desk?.setWords();
+  part?.setWords();
   player?.setWords();
   lobby?.setWords();
   for (const [element, key] of heads) element.textContent = t(key);
@@ -132,7 +135,7 @@ themeButton.addEventListener("click", () => setTheme(document.documentElement.da
 frameButton.addEventListener("click", () => view?.frame());
 addEventListener("keydown", (event) => {
   const isTyping = event.target instanceof HTMLInputElement || event.target instanceof HTMLTextAreaElement || event.target instanceof HTMLSelectElement;
-  if (isTyping || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (isTyping || event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]") !== null) return;
   if (event.key === " ") {
     // the stop comes before whatever has the focus
     event.preventDefault();
@@ -140,6 +143,7 @@ addEventListener("keydown", (event) => {
     if (player !== undefined) player.toggle();
     else void desk?.raise();
   }
+  if (part?.onKeyDown(event) === true) return;
   if (event.key === "r") view?.frame();
   if (event.key === "l") themeButton.click();
   if (event.key === ",") player?.step(-1);
@@ -226,6 +230,7 @@ function showPanels(age: number): void {
   strip.hidden = player !== undefined && !isRaised;
   show(stripText, lobby !== undefined ? [] : [icon(isRaised ? "stop" : "done"), document.createTextNode(text)]);
   desk?.show();
+  part?.show();
   app.classList.toggle("leads", player !== undefined || (desk?.role === "instructor" && !session.isOver));
   show(card, panels.instruction(session));
   show(sections.steps.body, panels.steps(session));
@@ -248,7 +253,8 @@ function frame(now: number): void {
   lobby?.update(now);
   if (lobby === undefined) view?.update(session, now);
   plot.update(session, now);
-  const state = `${session.changed} ${session.moved} ${live.kind} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${age > 0.5 ? age.toFixed(1) : ""}`;
+  const hand = part?.hand;
+  const state = `${hand?.views.length} ${hand?.isOn} ${hand?.current} ${hand?.isAligning} ${hand?.isFine} ${hand?.isTurning} ${session.changed} ${session.moved} ${live.kind} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${age > 0.5 ? age.toFixed(1) : ""}`;
   if (now - shownAt >= PANEL_PERIOD && state !== shown) {
     shownAt = now;
     shown = state;
@@ -270,8 +276,16 @@ function follow(room: string, role: string): void {
     if (state.kind !== "reconnecting") return;
     joined = false;
     desk?.loseSeat();
+    part?.end();
   });
   desk = new Desk(source, session, role);
+  const { notify } = desk;
+  if (view !== undefined) {
+    part = new Part(source, session, view, () => sessionStorage.getItem(PASS) ?? "", (isGood, text) => notify.call(desk, isGood, text));
+    strip.append(part.take);
+    stage.append(part.bar, part.lesson);
+    Object.assign(window, { tenon: { session, view, player, part } });
+  }
   strip.append(desk.sit, desk.clear, desk.stop);
   strip.after(desk.bar);
   stage.append(desk.notices);
@@ -290,8 +304,9 @@ function showLobby(role: string): void {
 
 async function play(open: () => Promise<Awaited<ReturnType<typeof fromAddress>>>): Promise<void> {
   source?.close();
-  for (const element of [desk?.stop, desk?.clear, desk?.sit, desk?.bar, desk?.notices, lobby?.element, player?.element]) element?.remove();
-  [source, desk, lobby, player] = [undefined, undefined, undefined, undefined];
+  part?.end();
+  for (const element of [part?.take, part?.bar, part?.lesson, desk?.stop, desk?.clear, desk?.sit, desk?.bar, desk?.notices, lobby?.element, player?.element]) element?.remove();
+  [source, desk, part, lobby, player] = [undefined, undefined, undefined, undefined, undefined];
   app.classList.remove("shows-lobby");
   opening = { fraction: 0 };
   session.forget();

@@ -7,7 +7,7 @@ import { MeshoptDecoder } from "three/examples/jsm/libs/meshopt_decoder.module.j
 import { NONE, Status, StepPhase, type Pose, type SceneModels, type SceneObject } from "./messages";
 import type { Session } from "./session";
 
-const COLORS = { target: 0x0072b2, within: 0x009e73, device: 0xe69f00, force: 0xcc79a7, shallow: 0xf0e442, deep: 0xd55e00 };
+const COLORS = { target: 0x0072b2, within: 0x009e73, device: 0xe69f00, force: 0xcc79a7, shallow: 0xf0e442, deep: 0xd55e00, guide: 0x56b4e9 };
 const DEEP = 0.002; // [m] depth at which a contact has the colour `deep`
 const METRES_PER_NEWTON = 0.006;
 const LONGEST_ARROW = 0.35; // [m]
@@ -58,6 +58,11 @@ export class SceneView {
   private dirty = true;
   private drawn = 0;
   private isFramed = false;
+  private isHandMode = false;
+  private guide = new THREE.Line(
+    new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3()]),
+    new THREE.LineDashedMaterial({ color: COLORS.guide, dashSize: 0.015, gapSize: 0.01, depthTest: false, transparent: true }),
+  );
   private markers = 1; // size of what is drawn beside the parts, by the size of the scene
 
   constructor(private host: HTMLElement, label: string, drawing: string | null) {
@@ -93,9 +98,67 @@ export class SceneView {
     this.contacts.renderOrder = 2;
     this.contacts.frustumCulled = false;
     this.scene.add(this.contacts);
+    this.guide.visible = this.guide.frustumCulled = false;
+    this.guide.renderOrder = 3;
+    this.scene.add(this.guide);
+    // before the controls hear of it
+    this.canvas.addEventListener("wheel", ({ ctrlKey }) => (this.controls.enableZoom = !this.isHandMode || ctrlKey), { capture: true });
     new ResizeObserver(() => this.resize()).observe(host);
     this.resize();
     this.setTheme();
+  }
+
+  /** Left drags and the wheel are the hand's; the right button turns the view, the middle one moves it, Ctrl and the wheel zoom. */
+  setHandMode(isOn: boolean): void {
+    this.isHandMode = isOn;
+    const { MOUSE, TOUCH } = THREE;
+    this.controls.mouseButtons = isOn ? { LEFT: null, MIDDLE: MOUSE.PAN, RIGHT: MOUSE.ROTATE } : { LEFT: MOUSE.ROTATE, MIDDLE: MOUSE.DOLLY, RIGHT: MOUSE.PAN };
+    this.controls.touches = isOn ? { ONE: null, TWO: TOUCH.DOLLY_ROTATE } : { ONE: TOUCH.ROTATE, TWO: TOUCH.DOLLY_PAN };
+    this.controls.enableZoom = !isOn;
+    if (isOn) this.controls.stopListenToKeyEvents();
+    else this.controls.listenToKeyEvents(this.canvas);
+  }
+
+  /** Directions of the view in the world. */
+  axes(): { right: THREE.Vector3; up: THREE.Vector3; away: THREE.Vector3 } {
+    const [right, up, back] = [new THREE.Vector3(), new THREE.Vector3(), new THREE.Vector3()];
+    this.camera.updateMatrixWorld();
+    this.camera.matrixWorld.extractBasis(right, up, back);
+    return { right, up, away: back.negate() };
+  }
+
+  /** Size of a pixel of the page at the depth of a place [m]. */
+  metresPerPixel(place: THREE.Vector3): number {
+    const depth = place.clone().sub(this.camera.position).dot(this.axes().away);
+    return (2 * Math.max(0.05, depth) * Math.tan((this.camera.fov * Math.PI) / 360)) / Math.max(1, this.host.clientHeight);
+  }
+
+  /** Where a place is drawn, in pixels of the page. */
+  project(place: THREE.Vector3): { x: number; y: number } {
+    const { left, top, width, height } = this.canvas.getBoundingClientRect();
+    this.camera.updateMatrixWorld();
+    const { x, y } = place.clone().project(this.camera);
+    return { x: left + ((1 + x) * width) / 2, y: top + ((1 - y) * height) / 2 };
+  }
+
+  /** Whether a place is in the picture, not at its border, and not behind the instruction. */
+  isInSight(place: THREE.Vector3): boolean {
+    const { x, y } = this.project(place);
+    const box = this.canvas.getBoundingClientRect();
+    const isInside = x > box.left + 0.08 * box.width && x < box.right - 0.08 * box.width && y > box.top + 0.08 * box.height && y < box.bottom - 0.22 * box.height;
+    return isInside && document.elementFromPoint(x, y) === this.canvas;
+  }
+
+  /** The line that leads what the hand moves to where the step wants it. */
+  setGuide(guide: { from: THREE.Vector3; to: THREE.Vector3 } | undefined): void {
+    this.guide.visible = guide !== undefined;
+    this.dirty = true;
+    if (guide === undefined) return;
+    const ends = this.guide.geometry.getAttribute("position") as THREE.BufferAttribute;
+    guide.from.toArray(ends.array, 0);
+    guide.to.toArray(ends.array, 3);
+    ends.needsUpdate = true;
+    this.guide.computeLineDistances();
   }
 
   setLabel(label: string): void {
@@ -118,9 +181,9 @@ export class SceneView {
     this.dirty = true;
   }
 
-  /** Shows all of the scene, from the trainee's side. */
-  frame(): void {
-    const box = new THREE.Box3();
+  /** Shows all of the scene and these places, from the trainee's side. */
+  frame(places: THREE.Vector3[] = []): void {
+    const box = new THREE.Box3().setFromPoints(places);
     for (const { group, object } of this.parts.values())
       if (group.visible && object.kind !== "head" && object.kind !== "forearm") box.expandByObject(group);
     if (box.isEmpty()) return;
@@ -129,7 +192,7 @@ export class SceneView {
     const half = Math.min(this.camera.fov, this.camera.fov * this.camera.aspect) * (Math.PI / 360);
     const direction = new THREE.Vector3(0.35, -0.8, 0.62).normalize();
     this.controls.target.copy(sphere.center);
-    this.camera.position.copy(sphere.center).addScaledVector(direction, (0.7 * radius) / Math.sin(half));
+    this.camera.position.copy(sphere.center).addScaledVector(direction, ((this.isHandMode ? 0.95 : 0.7) * radius) / Math.sin(half));
     this.controls.update();
     const reach = 1.3 * radius;
     this.sun.position.copy(sphere.center).add(new THREE.Vector3(-0.5, -0.7, 1.4).multiplyScalar(2 * radius));

@@ -1,0 +1,309 @@
+// A hand without hardware: where the person at this page wants it, by mouse, touch and keys, and what it feels. The gateway keeps it near its proxy.
+import { Quaternion, Vector3 } from "three";
+
+import { NONE, StepPhase, type Pose } from "./messages";
+import { Button, encodeTargets, type HandView, type Place } from "./remote";
+import type { SceneView } from "./scene";
+import type { Session } from "./session";
+
+const PERIOD = 16; // [ms] between targets
+const PRESS = 300; // [ms] that a press of the arming button lasts
+const NEAR = 0.02; // [m] of the proxy: nothing pushes back, so a target that is let go stays near
+const NOTCH = 16; // [pixels] of depth, as large as pixels are where the hand is: a notch of the wheel
+const TURN_NOTCH = 0.1; // [rad] likewise
+const TURN_PIXEL = 0.008; // [rad]
+const KEY_SPEED = 160; // [pixels/s] likewise
+const KEY_TURN = 0.8; // [rad/s]
+const ALIGN_TURN = 1.2; // [rad/s]
+const ALIGNED = 0.002; // [rad]
+const FINE = 0.1;
+const DEAD_ZONE = 0.12; // of a stick that is let go
+/** Buttons of the standard layout: the lower face button, the shoulders. */
+const PAD = { press: 0, turn: 4, fine: 5 } as const;
+const GATE = 0.006; // [m] beside the line of the approach; farther off, the way leads to its begin
+
+const toVector = (v: ArrayLike<number>): Vector3 => new Vector3(v[0], v[1], v[2]);
+const toQuaternion = ({ q }: Pose): Quaternion => new Quaternion(q[0], q[1], q[2], q[3]);
+const copy = ({ p, q }: Place): Place => ({ p: p.clone(), q: q.clone() });
+
+/** Where the step wants what the hand moves; `farther`: [m] away from the viewer. */
+export interface Guide { from: Vector3; to: Vector3; distance: number; farther: number; angle?: number }
+/** Keys that move: along right, up and away of the view. */
+const KEYS: Record<string, [number, number, number]> = {
+  ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0], ArrowDown: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1],
+};
+
+export class Hand {
+  views: HandView[] = [];
+  /** The one that mouse and keys move. */
+  current = 0;
+  /** A tenth of each motion; and drags turn instead of moving. */
+  isFine = false;
+  isTurning = false;
+  guide?: Guide;
+  /** Called when a hand has come to touch something. */
+  onContact?: (force: number) => void;
+  private targets: Place[] = [];
+  private seq = 0;
+  private armUntil = 0;
+  private aligning = false;
+  private pressed = new Set<string>();
+  private isShift = false;
+  private drag?: { pointer: number; x: number; y: number };
+  private touched: boolean[] = [];
+  private timer: number;
+  private moved = 0;
+  private wasPadPressed = false;
+
+  constructor(private session: Session, private view: SceneView, private ids: number[], private send: (bytes: Uint8Array<ArrayBuffer>) => void) {
+    this.timer = window.setInterval(() => this.tick(), PERIOD);
+    const { canvas } = view;
+    canvas.addEventListener("pointerdown", this.onDown);
+    canvas.addEventListener("pointermove", this.onMove);
+    for (const name of ["pointerup", "pointercancel"] as const) canvas.addEventListener(name, this.onUp);
+    canvas.addEventListener("wheel", this.onWheel, { passive: false });
+    addEventListener("keyup", this.onKeyUp);
+    addEventListener("blur", this.forgetKeys);
+    view.setHandMode(true);
+  }
+
+  end(): void {
+    clearInterval(this.timer);
+    const { canvas } = this.view;
+    canvas.removeEventListener("pointerdown", this.onDown);
+    canvas.removeEventListener("pointermove", this.onMove);
+    for (const name of ["pointerup", "pointercancel"] as const) canvas.removeEventListener(name, this.onUp);
+    canvas.removeEventListener("wheel", this.onWheel);
+    removeEventListener("keyup", this.onKeyUp);
+    removeEventListener("blur", this.forgetKeys);
+    this.view.setHandMode(false);
+    this.view.setGuide(undefined);
+  }
+
+  receive(views: HandView[]): void {
+    this.views = views;
+    views.forEach((view, i) => {
+      // without a proxy the hand stays where its device is
+      if (!view.isActive || this.targets[i] === undefined) this.targets[i] = copy(view.hand);
+      if (view.isActive && view.inContact && this.touched[i] === false) this.onContact?.(view.force);
+      this.touched[i] = view.inContact;
+    });
+    this.guide = this.findGuide();
+    this.view.setGuide(this.guide);
+  }
+
+  get now(): HandView | undefined {
+    return this.views[this.current];
+  }
+  get isOn(): boolean {
+    return this.views.length > 0 && this.views.every((view) => view.isOn);
+  }
+  get isAligning(): boolean {
+    return this.aligning;
+  }
+  get canAlign(): boolean {
+    return this.goal() !== undefined;
+  }
+
+  /** The person at this page arms the station, or agrees that a stop ends. */
+  press(): void {
+    this.armUntil = performance.now() + PRESS;
+  }
+  align(): void {
+    this.aligning = !this.aligning && this.canAlign;
+  }
+  /** No push any more. */
+  relax(): void {
+    if (this.now !== undefined) this.targets[this.current] = copy(this.now.proxy);
+    this.aligning = false;
+    this.drag = undefined;
+    this.pressed.clear();
+  }
+  choose(index: number): void {
+    if (index === this.current || index >= this.ids.length) return;
+    this.relax();
+    this.current = index;
+  }
+  /** Chooses the hand that the step is about. */
+  follow(): void {
+    const { step } = this.session;
+    if (step === undefined) return;
+    const wanted = [step.hand_id, this.session.holderOf(step.object_id)].map((id) => this.ids.indexOf(id)).find((index) => index >= 0);
+    this.choose(wanted ?? 0);
+  }
+
+  /** Along right, up and away of the view [m]. */
+  private shift(right: number, up: number, away: number): void {
+    const target = this.targets[this.current];
+    if (target === undefined) return;
+    const axes = this.view.axes();
+    target.p.addScaledVector(axes.right, right).addScaledVector(axes.up, up).addScaledVector(axes.away, away);
+  }
+  /** Likewise, as far as a key that is held for so long [s]. */
+  go(right: number, up: number, away: number): void {
+    const target = this.targets[this.current];
+    const step = target === undefined ? 0 : KEY_SPEED * this.view.metresPerPixel(target.p);
+    this.shift(right * step, up * step, away * step);
+  }
+  /** About right, up and away of the view [rad], and the centre of what it holds. */
+  turn(right: number, up: number, away: number): void {
+    const axes = this.view.axes();
+    for (const [axis, angle] of [[axes.right, right], [axes.up, up], [axes.away, away]] as const) this.turnBy(new Quaternion().setFromAxisAngle(axis, angle));
+  }
+
+  private turnBy(turn: Quaternion): void {
+    const target = this.targets[this.current];
+    const centre = this.centreAt(target);
+    if (target === undefined || centre === undefined) return;
+    target.p.sub(centre).applyQuaternion(turn).add(centre);
+    target.q.premultiply(turn).normalize();
+  }
+  /** Of what the hand holds, with the hand at `place`. */
+  private centreAt(place: Place | undefined): Vector3 | undefined {
+    const { now } = this;
+    if (now === undefined || place === undefined) return undefined;
+    const centre = toVector(this.session.objects.get(now.objectId)?.centre ?? [0, 0, 0]).applyQuaternion(now.object.q).add(now.object.p);
+    return centre.sub(now.proxy.p).applyQuaternion(now.proxy.q.clone().invert()).applyQuaternion(place.q).add(place.p);
+  }
+  /** Of the step, if it is about what this hand holds. */
+  private goal(): Pose | undefined {
+    const { step } = this.session;
+    const is = step !== undefined && step.has_target && step.phase <= StepPhase.Active && step.object_id === this.now?.objectId;
+    return is ? step.X_WG : undefined;
+  }
+
+  private findGuide(): Guide | undefined {
+    const { session, now } = this;
+    const { step } = session;
+    const from = now?.isActive === true ? this.centreAt(now.proxy) : undefined;
+    if (step === undefined || now === undefined || from === undefined || session.isOver) return undefined;
+    const goal = this.goal();
+    const guide = (to: Vector3, angle?: number): Guide => {
+      const off = to.clone().sub(from);
+      return { from, to, distance: off.length(), farther: off.dot(this.view.axes().away), angle };
+    };
+    if (goal !== undefined) {
+      const q_WG = toQuaternion(goal);
+      const to = toVector(session.objects.get(step.object_id)?.centre ?? [0, 0, 0]).applyQuaternion(q_WG).add(toVector(goal.p));
+      const way = toVector(step.approach_W);
+      const off = from.clone().sub(to);
+      const beside = off.clone().addScaledVector(way, -off.dot(way)).length();
+      const isOnWay = step.approach_distance === 0 || beside < GATE || off.length() < GATE;
+      return guide(isOnWay ? to : to.addScaledVector(way, -step.approach_distance), now.object.q.angleTo(q_WG));
+    }
+    const touch = session.states.get(step.touch_id);
+    if (step.touch_id === NONE || touch === undefined || session.isOwn(step.touch_id)) return undefined;
+    return guide(toVector(session.objects.get(step.touch_id)?.centre ?? [0, 0, 0]).applyQuaternion(toQuaternion(touch.X_WO)).add(toVector(touch.X_WO.p)));
+  }
+
+  private tick(): void {
+    const now = performance.now();
+    const seconds = Math.min(0.1, (now - this.moved) / 1000);
+    this.moved = now;
+    this.applyKeys(seconds);
+    this.applyGamepad(seconds);
+    this.applyAlignment(seconds);
+    this.targets.forEach((target, i) => {
+      const view = this.views[i];
+      if (view === undefined || (this.drag !== undefined && i === this.current)) return;
+      const off = target.p.clone().sub(view.proxy.p);
+      if (view.isActive && off.length() > NEAR && view.inContact) target.p.copy(view.proxy.p).add(off.setLength(NEAR));
+    });
+    if (this.views.length === 0) return;
+    const buttons = (document.visibilityState === "visible" ? Button.Held : 0) | (now < this.armUntil ? Button.Arm : 0);
+    this.send(encodeTargets(++this.seq, buttons, this.targets, this.views.map((view) => view.centre)));
+  }
+
+  private applyKeys(seconds: number): void {
+    const sum = [0, 0, 0];
+    for (const key of this.pressed) KEYS[key].forEach((direction, i) => (sum[i] += direction));
+    const scale = seconds * (this.isFine ? FINE : 1);
+    const [right, up, away] = sum.map((direction) => direction * scale);
+    if (right === 0 && up === 0 && away === 0) return;
+    if (this.isShift) this.turn(-up * KEY_TURN, right * KEY_TURN, away * KEY_TURN);
+    else this.go(right, up, away);
+  }
+
+  /** The sticks of the first gamepad: left right and up, away; with the left shoulder they turn. */
+  private applyGamepad(seconds: number): void {
+    const pad = navigator.getGamepads().find((known) => known !== null);
+    if (pad === undefined || pad === null) return;
+    const isDown = (button: number): boolean => pad.buttons[button]?.pressed === true;
+    if (isDown(PAD.press) && !this.wasPadPressed) {
+      if (this.isOn) this.align();
+      else this.press();
+    }
+    this.wasPadPressed = isDown(PAD.press);
+    const [x, y, , depth] = [0, 1, 2, 3].map((axis) => {
+      const value = pad.axes[axis] ?? 0;
+      return Math.abs(value) < DEAD_ZONE ? 0 : value;
+    });
+    if (x === 0 && y === 0 && depth === 0) return;
+    const scale = seconds * (this.isFine || isDown(PAD.fine) ? FINE : 1);
+    if (isDown(PAD.turn) || this.isTurning) this.turn(y * KEY_TURN * scale, x * KEY_TURN * scale, -depth * KEY_TURN * scale);
+    else this.go(x * scale, -y * scale, -depth * scale);
+  }
+
+  /** Eases the orientation of the part to the ghost's. */
+  private applyAlignment(seconds: number): void {
+    const goal = this.aligning ? this.goal() : undefined;
+    const target = this.targets[this.current];
+    if (goal === undefined || target === undefined || this.now === undefined) {
+      this.aligning = false;
+      return;
+    }
+    const q_HO = this.now.proxy.q.clone().invert().multiply(this.now.object.q);
+    const off = toQuaternion(goal).multiply(target.q.clone().multiply(q_HO).invert());
+    const angle = 2 * Math.acos(Math.min(1, Math.abs(off.w)));
+    if (angle > ALIGNED) this.turnBy(new Quaternion().slerp(off, Math.min(1, (ALIGN_TURN * seconds) / angle)));
+    else if (this.now.object.q.angleTo(toQuaternion(goal)) < 2 * ALIGNED) this.aligning = false;
+  }
+
+  /** True when it was one of the hand's keys. */
+  onKeyDown(event: KeyboardEvent): boolean {
+    this.isShift = event.shiftKey;
+    if (event.key in KEYS) {
+      this.pressed.add(event.key);
+      event.preventDefault();
+      return true;
+    }
+    if (event.repeat) return false;
+    const action = { g: () => this.align(), f: () => (this.isFine = !this.isFine), t: () => (this.isTurning = !this.isTurning), x: () => this.choose((this.current + 1) % this.ids.length), Escape: () => this.relax() }[event.key];
+    action?.();
+    return action !== undefined;
+  }
+  private onKeyUp = (event: KeyboardEvent): void => {
+    this.isShift = event.shiftKey;
+    this.pressed.delete(event.key);
+  };
+  private forgetKeys = (): void => this.pressed.clear();
+
+  private onDown = (event: PointerEvent): void => {
+    if (event.button !== 0 || this.drag !== undefined || !event.isPrimary) return;
+    this.drag = { pointer: event.pointerId, x: event.clientX, y: event.clientY };
+    this.aligning = false;
+  };
+  private onMove = (event: PointerEvent): void => {
+    const { drag } = this;
+    const target = this.targets[this.current];
+    if (drag === undefined || drag.pointer !== event.pointerId || target === undefined) return;
+    const fine = this.isFine ? FINE : 1;
+    const dx = (event.clientX - drag.x) * fine;
+    const dy = (event.clientY - drag.y) * fine;
+    this.drag = { ...drag, x: event.clientX, y: event.clientY };
+    const metres = this.view.metresPerPixel(target.p);
+    if (event.shiftKey || this.isTurning) this.turn(dy * TURN_PIXEL, dx * TURN_PIXEL, 0);
+    else if (event.ctrlKey) target.p.z -= dy * metres;
+    else this.shift(dx * metres, -dy * metres, 0);
+  };
+  private onUp = (event: PointerEvent): void => {
+    if (this.drag?.pointer === event.pointerId) this.drag = undefined;
+  };
+  private onWheel = (event: WheelEvent): void => {
+    if (event.ctrlKey) return; // zooms
+    event.preventDefault();
+    const notches = -Math.sign(event.deltaY || event.deltaX) * (this.isFine ? FINE : 1);
+    if (event.shiftKey) this.turn(0, 0, notches * TURN_NOTCH);
+    else this.go(0, 0, (notches * NOTCH) / KEY_SPEED);
+  };
+}

@@ -1,0 +1,252 @@
+// Taking part: a place in the session for who sits at this page, and what stands around the hand while it is taken.
+import { h, icon, type Icon } from "./dom";
+import { Hand } from "./hand";
+import type { DeskAnswer, LiveSource } from "./live";
+import { NONE } from "./messages";
+import type { SceneView } from "./scene";
+import type { Session } from "./session";
+import { t, type Key } from "./strings";
+
+const MOST_HANDS = 2;
+const ROLES = { trainee: 2, instructor: 1 } as const; // as in the messages
+type RoleName = keyof typeof ROLES;
+const TAUGHT = "taught"; // in this browser's memory
+const LOUDEST = 10; // [N]
+const HOLD_PERIOD = 30; // [ms] in which a button that is held moves the hand
+const GESTURES = ["drag", "wheel", "turn", "vertical", "align", "fine", "view"] as const;
+
+export class Part {
+  readonly take = h("button", "take");
+  /** What to do with the hand now, and what it feels. */
+  readonly bar = h("section", "handbar");
+  readonly lesson = h("section", "lesson");
+  hand?: Hand;
+  private dialog = h("dialog", "");
+  private state = h("div", "hand-state");
+  private arm = h("button", "primary arm");
+  private tools = h("div", "hand-tools");
+  private buttons: { button: HTMLButtonElement; key: Key; icon?: Icon; isPressed?: () => boolean; shows?: () => boolean }[] = [];
+  private audio?: AudioContext;
+  private isAsking = false;
+  private step = -1;
+  private invited = new URLSearchParams(location.search).get("you") ?? ""; // to this role's place, by the address
+  private isNew = false; // of the step nothing was shown yet
+
+  /** `tell` says what came of a request. */
+  constructor(private source: LiveSource, private session: Session, private view: SceneView, private pass: () => string, private tell: (isGood: boolean, text: string) => void) {
+    this.take.addEventListener("click", () => (this.hand === undefined ? this.ask() : void this.leave()));
+    this.arm.addEventListener("click", () => this.hand?.press());
+    source.onHandNotice = (answer) => {
+      this.end();
+      tell(session.isOver, answer.text === "" ? t("part.over") : answer.text);
+    };
+    source.onHands = (views) => this.hand?.receive(views);
+    const add = (key: Key, name: Icon | undefined, act: () => void, options: { isPressed?: () => boolean; shows?: () => boolean } = {}): HTMLButtonElement => {
+      const button = h("button", "");
+      button.addEventListener("click", act);
+      this.buttons.push({ button, key, icon: name, ...options });
+      this.tools.append(button);
+      return button;
+    };
+    const { isFine, isTurning, isAligning } = { isFine: () => this.hand?.isFine === true, isTurning: () => this.hand?.isTurning === true, isAligning: () => this.hand?.isAligning === true };
+    this.holdable(add("part.nearer", "down", () => {}), -1);
+    this.holdable(add("part.farther", "up", () => {}), 1);
+    add("part.turn", "repeat", () => this.hand !== undefined && (this.hand.isTurning = !this.hand.isTurning), { isPressed: isTurning });
+    add("part.fine", "half", () => this.hand !== undefined && (this.hand.isFine = !this.hand.isFine), { isPressed: isFine });
+    add("part.align", "done", () => this.hand?.align(), { isPressed: isAligning, shows: () => this.hand?.canAlign === true });
+    add("part.other", "swap", () => this.hand?.choose((this.hand.current + 1) % this.hand.views.length), { shows: () => (this.hand?.views.length ?? 0) > 1 });
+    add("part.sound", "bell", () => this.toggleSound(), { isPressed: () => this.audio !== undefined });
+    add("part.help", "help", () => this.teach(this.lesson.hidden));
+    this.bar.append(this.state, this.arm, this.tools);
+    this.bar.hidden = this.lesson.hidden = true;
+    document.body.append(this.dialog);
+    this.setWords();
+  }
+
+  /** A button that moves the hand as long as it is held. */
+  private holdable(button: HTMLButtonElement, direction: number): void {
+    let timer = 0;
+    const stop = (): void => clearInterval(timer);
+    button.addEventListener("pointerdown", () => {
+      stop();
+      timer = window.setInterval(() => this.hand?.go(0, 0, (direction * HOLD_PERIOD * (this.hand.isFine ? 0.1 : 1)) / 1000), HOLD_PERIOD);
+    });
+    for (const name of ["pointerup", "pointerleave", "pointercancel"] as const) button.addEventListener(name, stop);
+  }
+
+  setWords(): void {
+    for (const { button, key, icon: name } of this.buttons) button.replaceChildren(...(name === undefined ? [] : [icon(name)]), h("span", "", t(key)));
+    this.arm.replaceChildren(icon("on"), t("part.arm"), h("kbd", "", t("part.arm.key")));
+    const rows = GESTURES.map((name) => h("li", "", h("kbd", "", t(`part.do.${name}` as Key)), h("span", "", t(`part.does.${name}` as Key))));
+    const close = h("button", "primary", t("part.understood"));
+    close.addEventListener("click", () => this.teach(false));
+    this.lesson.replaceChildren(h("h2", "", t("part.lesson")), h("ul", "gestures", ...rows), h("div", "row end", close));
+    this.show();
+  }
+
+  private teach(shows: boolean): void {
+    this.lesson.hidden = !shows;
+    if (!shows) localStorage.setItem(TAUGHT, "yes");
+  }
+
+  /** Called when the session or the hand has changed. */
+  show(): void {
+    const { hand, session } = this;
+    const label = t(this.isAsking ? "part.asking" : hand === undefined ? "part.take" : "part.leave");
+    if (this.take.textContent !== label) this.take.replaceChildren(icon("hand"), label);
+    this.take.disabled = this.isAsking;
+    this.take.hidden = session.isOver || session.sceneHands.size === 0;
+    if (!this.take.hidden && this.invited !== "" && session.link?.state === "joined") this.ask();
+    this.bar.hidden = hand === undefined;
+    document.body.classList.toggle("takes-part", hand !== undefined);
+    if (hand === undefined) return;
+    if (session.step !== undefined && session.step.revision !== this.step) {
+      this.step = session.step.revision;
+      hand.follow();
+      this.isNew = true;
+    }
+    if (this.isNew && hand.guide !== undefined) {
+      this.isNew = false;
+      const ends = [hand.guide.from, hand.guide.to];
+      if (!ends.every((place) => this.view.isInSight(place))) this.view.frame(ends);
+    }
+    const stopped = session.standing.length > 0;
+    this.arm.hidden = hand.isOn || stopped || hand.now === undefined;
+    const texts = this.describe(hand, stopped);
+    const node = h("div", "", ...texts);
+    if (node.innerHTML !== this.state.innerHTML) this.state.replaceChildren(...node.childNodes);
+    this.tools.hidden = !hand.isOn;
+    for (const { button, isPressed, shows } of this.buttons) {
+      button.hidden = shows !== undefined && !shows();
+      if (isPressed !== undefined) button.setAttribute("aria-pressed", String(isPressed()));
+    }
+  }
+
+  private describe(hand: Hand, stopped: boolean): Node[] {
+    const { now, guide, session } = { now: hand.now, guide: hand.guide, session: this.session };
+    if (now === undefined) return [h("span", "", t("part.wait"))];
+    const name = session.titleOf(now.objectId) || session.nameOfHand(this.ids[hand.current]);
+    if (stopped) return [icon("stop"), h("b", "", name), h("span", "bad", t("part.stopped"))];
+    if (!hand.isOn) return [icon("hand"), h("b", "", name), h("span", "", t("part.off"))];
+    const force = h("span", now.inContact ? "force touching" : "force", now.inContact ? t("part.force", { force: now.force.toFixed(1) }) : t("part.free"));
+    const way: Node[] = [];
+    if (guide !== undefined) {
+      const mm = (metres: number): string => (Math.abs(metres) < 0.1 ? `${(1000 * metres).toFixed(0)} mm` : `${(100 * metres).toFixed(0)} cm`);
+      way.push(h("span", "way", t("part.way", { distance: mm(guide.distance) })));
+      const depth: Key = Math.abs(guide.farther) < 0.005 ? "part.way.level" : guide.farther > 0 ? "part.way.farther" : "part.way.nearer";
+      way.push(h("span", "depth", t(depth, { distance: mm(Math.abs(guide.farther)) })));
+      if (guide.angle !== undefined && guide.angle > 0.035) way.push(h("span", "angle", t("part.way.angle", { angle: ((guide.angle * 180) / Math.PI).toFixed(0) })));
+    }
+    return [icon("hand"), h("b", "", name), force, ...way];
+  }
+
+  private ids: number[] = [];
+
+  /** The hands of a role. */
+  private handsOf(role: RoleName): { ids: number[]; names: string[] } {
+    const all = [...this.session.sceneHands.values()].filter((hand) => hand.role === ROLES[role] && !this.session.isTracked(hand.hand_id) && hand.object_id !== NONE);
+    const some = all.sort((a, b) => a.hand_id - b.hand_id).slice(0, MOST_HANDS);
+    return { ids: some.map((hand) => hand.hand_id), names: some.map((hand) => hand.name) };
+  }
+
+  private ask(): void {
+    const role = h("select", "");
+    const roles = (Object.keys(ROLES) as RoleName[]).filter((name) => this.handsOf(name).ids.length > 0);
+    role.append(...roles.map((name) => Object.assign(h("option", "", t(`role.name.${name}`)), { value: name })));
+    if (roles.some((name) => name === this.invited)) role.value = this.invited;
+    this.invited = "";
+    const name = Object.assign(h("input", ""), { maxLength: 40, value: localStorage.getItem("name") ?? "", autocomplete: "off" });
+    const key = Object.assign(h("input", ""), { type: "password", autocomplete: "off" });
+    const field = (label: Key, input: HTMLElement, hint?: Key): HTMLElement => h("label", "field", h("span", "", t(label)), input, ...(hint === undefined ? [] : [h("small", "muted", t(hint))]));
+    const keyField = field("desk.sit.key", key, "desk.sit.hint");
+    const note = h("p", "muted");
+    const update = (): void => {
+      const wanted = this.handsOf(role.value as RoleName).ids;
+      const others = [...this.session.people.values()].filter((person) => person.alive && Array.from(person.hands).some((hand) => wanted.includes(hand)));
+      note.textContent = others.length === 0 ? t("part.free.place") : t("part.taken.place", { who: others.map((person) => person.name).join(", ") });
+      keyField.hidden = role.value === "trainee" || this.pass() !== "";
+    };
+    role.addEventListener("change", update);
+    update();
+    const cancel = Object.assign(h("button", "", t("desk.cancel")), { type: "button" });
+    cancel.addEventListener("click", () => this.dialog.close());
+    const form = h("form", "", h("h2", "", t("part.take")), h("p", "", t("part.what")), field("desk.sit.role", role), field("desk.sit.name", name), keyField, note,
+      h("div", "row end", cancel, h("button", "primary", t("part.take"))));
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.dialog.close();
+      localStorage.setItem("name", name.value);
+      void this.sit(role.value as RoleName, name.value, this.pass() || key.value.trim());
+    });
+    this.dialog.replaceChildren(form);
+    this.dialog.showModal();
+  }
+
+  private async sit(role: RoleName, name: string, key: string): Promise<void> {
+    const { ids, names } = this.handsOf(role);
+    this.isAsking = true;
+    this.show();
+    // it hears of its hands before the answer comes
+    this.ids = ids;
+    const hand = new Hand(this.session, this.view, ids, (bytes) => this.source.sendTargets(bytes));
+    this.hand = hand;
+    const answer = await this.source.ask("handTake", { role, name: name || t("desk.somebody"), key, hands: names });
+    this.isAsking = false;
+    if (answer?.accepted !== true) this.end();
+    this.said(t("part.take"), answer);
+    if (answer?.accepted === true) {
+      hand.onContact = (force) => this.feel(force);
+      this.step = -1;
+      this.teach(localStorage.getItem(TAUGHT) === null);
+      this.arm.focus();
+    }
+    this.show();
+  }
+
+  private async leave(): Promise<void> {
+    this.end();
+    this.said(t("part.leave"), await this.source.ask("handLeave"));
+  }
+
+  private said(what: string, answer: DeskAnswer | undefined): void {
+    this.tell(answer?.accepted === true, `${what}: ${answer === undefined ? t("desk.offline") : answer.text || t(answer.accepted ? "desk.accepted" : "desk.refused")}`);
+  }
+
+  /** The place is given up or lost. */
+  end(): void {
+    this.hand?.end();
+    this.hand = undefined;
+    this.lesson.hidden = true;
+    this.show();
+  }
+
+  /** True when it was one of the hand's keys. */
+  onKeyDown(event: KeyboardEvent): boolean {
+    if (this.hand === undefined) return false;
+    if (event.key === "Enter" && !this.hand.isOn && !(event.target instanceof HTMLButtonElement)) this.hand.press();
+    else if (event.key === "m") this.toggleSound();
+    else if (event.key === "h") this.teach(this.lesson.hidden);
+    else return this.hand.onKeyDown(event);
+    return true;
+  }
+
+  private toggleSound(): void {
+    void this.audio?.close();
+    this.audio = this.audio === undefined ? new AudioContext() : undefined;
+  }
+
+  /** A tick and a short vibration, stronger with more force. */
+  private feel(force: number): void {
+    const strength = Math.min(1, 0.3 + force / LOUDEST);
+    if ("vibrate" in navigator) navigator.vibrate(Math.round(30 * strength));
+    void navigator.getGamepads().find((pad) => pad !== null)?.vibrationActuator?.playEffect("dual-rumble", { duration: 60, weakMagnitude: strength, strongMagnitude: strength });
+    if (this.audio === undefined) return;
+    const { audio } = this;
+    const tone = new OscillatorNode(audio, { type: "triangle", frequency: 320 });
+    const gain = new GainNode(audio, { gain: 0.25 * strength });
+    gain.gain.exponentialRampToValueAtTime(0.001, audio.currentTime + 0.08);
+    tone.connect(gain).connect(audio.destination);
+    tone.start();
+    tone.stop(audio.currentTime + 0.09);
+  }
+}

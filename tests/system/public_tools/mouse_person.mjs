@@ -1,0 +1,99 @@
+// A person at the console's page with a mouse: takes part and mounts a part. It knows what the page shows: where the line of the way begins and
+// ends on the screen, the numbers beside the hand, and which step it is. It sees with a delay, and its aim is off.
+const REACTION = 250; // [ms] from what it sees to what it does
+const AIM = 0.008; // [m] of aiming, root mean square, at the hand unless the hand moves finely
+const NEAR = 0.03; // [m] it changes to fine motion
+const HALF_SWEEP = 220; // [pixels] of the mouse in one drag, to either side
+
+const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
+
+/** Uniform in 0 to 1 (mulberry32). */
+function generator(seed) {
+  let state = (seed * 2654435761) >>> 0;
+  return () => {
+    state = (state + 0x6d2b79f5) >>> 0;
+    let x = Math.imul(state ^ (state >>> 15), state | 1);
+    x ^= x + Math.imul(x ^ (x >>> 7), x | 61);
+    return ((x ^ (x >>> 14)) >>> 0) / 4294967296;
+  };
+}
+
+function see() {
+  const { part, session, view } = window.tenon;
+  const { hand } = part;
+  const box = view.canvas.getBoundingClientRect();
+  const guide = hand?.guide;
+  return {
+    step: session.step?.name ?? "", isOver: session.isOver, isOn: hand?.isOn === true, isFine: hand?.isFine === true, isAligning: hand?.isAligning === true,
+    text: document.querySelector(".hand-state")?.textContent ?? "",
+    middle: { x: box.left + 0.55 * box.width, y: box.top + 0.5 * box.height },
+    guide: guide && { from: view.project(guide.from), to: view.project(guide.to), distance: guide.distance, farther: guide.farther, angle: guide.angle ?? 0, pixel: view.metresPerPixel(guide.from) },
+  };
+}
+
+export async function sitDown(page) {
+  await page.locator(".take").click();
+  await page.locator("dialog[open] .primary").click();
+  await page.locator(".arm").waitFor({ timeout: 60000 });
+  await page.locator(".lesson").waitFor({ timeout: 5000 }).catch(() => {}); // the first time
+  const understood = page.locator(".lesson .primary");
+  if (await understood.isVisible()) await understood.click();
+  await page.locator(".arm").click();
+}
+
+/** Mounts until the step is another one than `steps`; the time that it took [s], or what stood in the way. */
+export async function mount(page, { seed, seconds, steps }) {
+  const random = generator(seed);
+  const gauss = () => Math.sqrt(-2 * Math.log(1 - random())) * Math.cos(2 * Math.PI * random());
+  const begun = Date.now();
+  const log = [];
+  let best = Infinity;
+  let stuck = 0;
+  let last = "";
+
+  const fine = async (seen, wanted) => {
+    if (seen.isFine !== wanted) await page.keyboard.press("f");
+  };
+  // a drag by pixels of the mouse, as often as the hand has to reach around for it
+  const drag = async (seen, dx, dy, key) => {
+    const parts = Math.max(1, Math.ceil(Math.max(Math.abs(dx), Math.abs(dy)) / (2 * HALF_SWEEP)));
+    for (let i = 0; i < parts; ++i) {
+      const [x, y] = [dx / parts, dy / parts];
+      await page.mouse.move(seen.middle.x - x / 2, seen.middle.y - y / 2);
+      if (key !== undefined) await page.keyboard.down(key);
+      await page.mouse.down();
+      await page.mouse.move(seen.middle.x + x / 2, seen.middle.y + y / 2, { steps: 6 });
+      await page.mouse.up();
+      if (key !== undefined) await page.keyboard.up(key);
+    }
+  };
+
+  while (Date.now() - begun < 1000 * seconds) {
+    const seen = await page.evaluate(see);
+    if (seen.isOver || (seen.step !== "" && !steps.includes(seen.step))) return { seconds: (Date.now() - begun) / 1000, log };
+    await sleep(REACTION);
+    if (seen.step !== last) [last, best, stuck] = [seen.step, Infinity, 0];
+    const { guide } = seen;
+    if (!seen.isOn || guide === undefined) continue;
+    log.push(`${((Date.now() - begun) / 1000).toFixed(1)} ${seen.step} ${(1000 * guide.distance).toFixed(1)} mm, ${(1000 * guide.farther).toFixed(1)} farther, ${guide.angle.toFixed(3)} rad: ${seen.text}`);
+    if (seen.isAligning) continue;
+    if (guide.angle > 0.02) {
+      await page.keyboard.press("g");
+      continue;
+    }
+    const isNear = guide.distance < NEAR;
+    await fine(seen, isNear);
+    const scale = isNear ? 10 : 1; // of the mouse to the hand
+    const aim = (pixels) => scale * pixels + (AIM / Math.SQRT2 / guide.pixel) * gauss();
+    const [dx, dy] = [guide.to.x - guide.from.x, guide.to.y - guide.from.y];
+    if (guide.distance < 0.9 * best) [best, stuck] = [guide.distance, 0];
+    else ++stuck;
+    // a straight push when it does not get nearer otherwise, as the instruction says; then it lifts a little
+    if (stuck > 3 && stuck % 6 === 5) await drag(seen, 0, aim(-0.004 / guide.pixel), "Control");
+    else if (stuck > 3 && stuck % 2 === 0) await drag(seen, 0, aim((guide.distance + 0.005) / guide.pixel), "Control");
+    else await drag(seen, aim(dx), aim(dy));
+    const notches = Math.round((guide.farther + (AIM / Math.SQRT2 / scale) * gauss()) / ((16 / scale) * guide.pixel)); // of 16 pixels each
+    for (let i = 0; i < Math.min(20, Math.abs(notches)); ++i) await page.mouse.wheel(0, -100 * Math.sign(notches));
+  }
+  return { log };
+}
