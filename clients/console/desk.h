@@ -3,14 +3,15 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "clients/console/stopper.h"
 #include "clients/console/web_options.h"
 #include "idl/types/messages/role.h"
 
@@ -25,16 +26,16 @@ struct DeskOptions {
 
 /// The seats of people at browsers. Each has a client of the session of its own, so that the server grants
 /// its rights by what the browser has proven and knows each person; and a thread of its own, so that one who
-/// waits for an answer delays nobody. The emergency stop needs no seat.
+/// waits for an answer delays nobody. The emergency stop needs no seat, and has a thread for each session.
 ///
 /// A role that needs the key of the session is given for that key, or for the pass of this gateway: then the
 /// gateway proves it with its user's key. Other users of this machine, who can connect as well, have neither.
 ///
-/// Threads: any; no function waits but the destructor. `answer` is called by threads of the desk.
-/// Real-time: no.
+/// Threads: any; no function waits but expect() and the destructor. `answer` is called by threads of the
+/// desk. Real-time: no.
 class Desk {
  public:
-  using Answer = std::function<void(ViewerId, const DeskAnswer&)>;
+  using Answer = Stopper::Answer;
 
   Desk(DeskOptions options, Answer answer);
   ~Desk();
@@ -46,26 +47,24 @@ class Desk {
   void handle(ViewerId viewer, const std::string& session, const DeskRequest& request);
   /// The viewer's seat is given up.
   void left(ViewerId viewer);
-  /// Prepares an emergency stop for this session, so that it takes effect at once.
-  void expect(const std::string& session);
+  /// Prepares emergency stops for these sessions, so that they take effect at once; empty: for all. What was
+  /// prepared for others ends when a server has heard what was raised there.
+  void expect(const std::set<std::string>& sessions);
 
  private:
   class Seat;
-  class Stopper;
 
   [[nodiscard]] std::optional<DeskAnswer> sit(ViewerId viewer, const std::string& session,
                                               const DeskRequest& request);
   void leave(ViewerId viewer);
+  [[nodiscard]] Stopper& stopperOf(const std::string& session);
 
   DeskOptions options_;
   Answer answer_;
   std::mutex mutex_;
   std::map<ViewerId, std::unique_ptr<Seat>> seats_;
-  std::vector<std::unique_ptr<Seat>> left_;  ///< their threads end
-  std::unique_ptr<Stopper> stopper_;
+  std::vector<std::unique_ptr<Seat>> left_;                   ///< their threads end
+  std::map<std::string, std::unique_ptr<Stopper>> stoppers_;  ///< by session
 };
-
-/// Random, of 128 bits, as text.
-[[nodiscard]] std::string makePass();
 
 }  // namespace tenon::console

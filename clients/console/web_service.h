@@ -51,6 +51,8 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
   void offer(const Publication& publication, Delivery delivery);
   void offer(std::string text) { queue_.addText(std::move(text)); }
   void send();
+  /// The connection is closed: its room is no more.
+  void leaveRoom();
   [[nodiscard]] ViewerId id() const { return id_; }
   [[nodiscard]] const std::string& room() const { return room_; }
 
@@ -118,6 +120,7 @@ struct WebService {
 
   void accept();
   void deliver(const std::string& path, const std::vector<Publication>& publications);
+  void removeRoom(const std::string& path);
   void answer(ViewerId viewer, const std::string& text);
 
   WebOptions options;
