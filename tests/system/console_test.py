@@ -373,14 +373,14 @@ class Page(unittest.TestCase):
             browser("key", key="Space")
             browser("await", expression=f"tenon.player.time > {0.2 * end + 0.5}")
             # what cannot be read is said, and the next place can be
-            fail_once = "((r, name) => { r[name] = () => { delete r[name]; return Promise.reject(new Error('the disk is gone')); }; })(tenon.player.recording, '{}')"
+            fail_once = "((r, name) => { r[name] = () => { delete r[name]; return Promise.reject(new Error('the disk is gone')); }; })(tenon.player.recording, 'NAME')"
             is_said = "!document.querySelector('.cover').hidden && document.querySelector('.cover').textContent.includes('the disk is gone')"
-            browser("value", expression=fail_once.format("advance"))
+            browser("value", expression=fail_once.replace("NAME", "advance"))
             browser("await", expression=is_said)
             self.assertFalse(browser("value", expression="tenon.player.isPlaying"))
             browser("key", key="Space")
             browser("await", expression="tenon.player.isPlaying && tenon.player.problem === undefined && document.querySelector('.cover').hidden")
-            browser("value", expression=fail_once.format("seek") + "; tenon.player.seek(1)")
+            browser("value", expression=fail_once.replace("NAME", "seek") + "; tenon.player.seek(1)")
             browser("await", expression=is_said)
             browser("value", expression="tenon.player.seek(1e9)")
             browser("await", expression="tenon.session.isOver && document.querySelector('.cover').hidden")
