@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "idl/types/printable_text.h"
+
 namespace tenon::command {
 
 namespace {
@@ -48,6 +50,9 @@ Result<ParsedCommand> withArguments(const CommandWord& word, const std::vector<s
   const auto usage = [&] {
     return fail(fmt::format("usage: {}{}{}", word.word, word.arguments.empty() ? "" : " ", word.arguments));
   };
+  constexpr std::size_t kMaxText = 255;  // [bytes] of tenon::Command; an emergency stop is never too long
+  if (const std::size_t bytes = joined(arguments, 1).size(); bytes > kMaxText && word.command)
+    return fail(fmt::format("a {} has at most {} bytes, this one has {}", word.word, kMaxText, bytes));
   if (word.arguments.starts_with('[')) return ParsedCommand{word.command, joined(arguments, 1)};
   if (word.command == CommandKind::kSetCollision) {
     if (given != 3 || (arguments[3] != "on" && arguments[3] != "off")) return usage();
@@ -55,9 +60,6 @@ Result<ParsedCommand> withArguments(const CommandWord& word, const std::vector<s
   }
   if (word.arguments.ends_with("...")) {
     if (given == 0) return usage();
-    constexpr std::size_t kMaxText = 255;  // [bytes] of tenon::Command
-    if (const std::size_t bytes = joined(arguments, 1).size(); bytes > kMaxText)
-      return fail(fmt::format("a {} has at most {} bytes, this one has {}", word.word, kMaxText, bytes));
     return ParsedCommand{word.command, joined(arguments, 1)};
   }
   const auto spaces = static_cast<std::size_t>(std::count(word.arguments.begin(), word.arguments.end(), ' '));
@@ -75,7 +77,8 @@ Result<ParsedCommand> parseCommand(const std::vector<std::string>& arguments) {
       std::find_if(kCommands.begin(), kCommands.end(),
                    [&](const CommandWord& candidate) { return candidate.word == arguments[0]; });
   if (word == kCommands.end())
-    return fail(fmt::format("unknown command '{}'; tenon command --help lists all", arguments[0]));
+    return fail(
+        fmt::format("unknown command '{}'; tenon command --help lists all", shortened(arguments[0], 40)));
   return withArguments(*word, arguments);
 }
 

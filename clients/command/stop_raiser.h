@@ -3,7 +3,9 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,11 +36,24 @@ class StopRaiser {
                                                                 const std::string& session,
                                                                 std::string person);
 
-  /// Writes a raise, then waits for a server to repeat it, at most for `patience`.
+  /// Writes a raise, then waits for a server to repeat it, at most for `patience`, and until readers have it.
   [[nodiscard]] Result<StopHeard> raise(const std::string& reason, std::chrono::milliseconds patience,
                                         const std::atomic<bool>& stop);
 
+  /// Writes a raise without waiting; returns its number for heard().
+  [[nodiscard]] Result<std::uint32_t> write(const std::string& reason);
+  /// Takes messages for `timeout`.
+  void dispatch(std::chrono::milliseconds timeout) { inbox_.dispatch(timeout); }
+  /// Who has heard a raise; none as long as waiting can tell more: until a server has repeated it and other
+  /// programs had time to be discovered, at most for `patience` from its writing.
+  [[nodiscard]] std::optional<StopHeard> heard(std::uint32_t raise, std::chrono::milliseconds patience) const;
+
  private:
+  struct Raise {
+    std::chrono::steady_clock::time_point written;
+    std::vector<wire::Origin> repeaters;
+  };
+
   StopRaiser() = default;
 
   std::string guid_;
@@ -48,8 +63,8 @@ class StopRaiser {
   std::unique_ptr<wire::Partition> session_;
   std::unique_ptr<wire::Writer<EmergencyStop>> stops_;
   std::size_t own_readers_ = 0;
-  std::vector<wire::Origin> servers_;    ///< by their announcements
-  std::vector<wire::Origin> repeaters_;  ///< of the newest raise
+  std::vector<wire::Origin> servers_;      ///< by their announcements
+  std::map<std::uint32_t, Raise> raises_;  ///< the newest ones, by number
   wire::Inbox inbox_;
 };
 

@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <chrono>
-#include <condition_variable>
 #include <deque>
 #include <thread>
 #include <utility>
 
 #include "clients/command/command_program.h"
 #include "clients/command/parser.h"
-#include "clients/command/stop_raiser.h"
 #include "idl/types/names.h"
+#include "idl/types/printable_text.h"
 
 namespace tenon::console {
 
@@ -20,7 +19,9 @@ using std::chrono::milliseconds;
 constexpr std::size_t kMaxSeats = 16;
 constexpr std::size_t kMaxWaiting = 32;  // requests of a seat
 constexpr milliseconds kCollect{10};
-constexpr milliseconds kForAServer{1500};  // to repeat an emergency stop
+
+constexpr std::string_view kNoSeat = "an observer gives no commands: sit down as instructor first";
+constexpr std::string_view kLeft = "the seat was left before the server answered";
 
 }  // namespace
 
@@ -30,7 +31,7 @@ class Desk::Seat {
   Seat(ViewerId viewer, wire::MembershipOptions options, std::uint32_t request, const Answer& answer)
       : viewer_(viewer), options_(std::move(options)), answer_(answer) {
     thread_ = std::thread([this, request] {
-      run(request);
+      refuseWaiting(run(request));
       has_ended_ = true;
     });
   }
@@ -41,12 +42,13 @@ class Desk::Seat {
   Seat(const Seat&) = delete;
   Seat& operator=(const Seat&) = delete;
 
-  /// False when too many wait.
-  bool add(std::uint32_t id, command::ParsedCommand command) {
+  /// Fails with a sentence when too many wait, or the seat is no more.
+  Result<void> add(std::uint32_t id, command::ParsedCommand command) {
     const std::scoped_lock lock(mutex_);
-    if (waiting_.size() >= kMaxWaiting) return false;
+    if (stop_ || takes_no_more_) return fail(std::string(kNoSeat));
+    if (waiting_.size() >= kMaxWaiting) return fail("too many commands wait for the server");
     waiting_.emplace_back(id, std::move(command));
-    return true;
+    return {};
   }
   void stop() { stop_ = true; }
   [[nodiscard]] bool hasEnded() const { return has_ended_; }
@@ -54,20 +56,33 @@ class Desk::Seat {
  private:
   using Waiting = std::pair<std::uint32_t, command::ParsedCommand>;
 
-  void run(std::uint32_t request) {
+  /// Why the seat is no more.
+  std::string run(std::uint32_t request) {
     const std::string role(roleName(options_.role));
     auto client = command::CommandClient::open(options_, stop_);
-    if (!client) return answer_(viewer_, {request, false, client.error().what, {}});
+    if (!client) {
+      answer_(viewer_, {request, false, client.error().what, {}});
+      return client.error().what;
+    }
     answer_(viewer_, {request, true, {}, role});
     while (!stop_) {
       (*client)->dispatch(kCollect);
       while (auto waiting = take()) {
         const auto done = (*client)->send(waiting->second, stop_);
-        if (stop_) return;
-        answer_(viewer_, {waiting->first, done.has_value(), done ? "" : done.error().what, role});
+        const std::string why = done ? "" : stop_ ? std::string(kLeft) : done.error().what;
+        answer_(viewer_, {waiting->first, done.has_value(), why, stop_ ? "" : role});
       }
-      if (const auto& lost = (*client)->lost()) return answer_(viewer_, {0, false, *lost, {}});
+      if (const auto& lost = (*client)->lost(); lost && !stop_) {
+        answer_(viewer_, {0, false, *lost, {}});
+        return *lost;
+      }
     }
+    return std::string(kLeft);
+  }
+  void refuseWaiting(const std::string& why) {
+    const std::scoped_lock lock(mutex_);
+    takes_no_more_ = true;
+    for (const auto& [id, command] : std::exchange(waiting_, {})) answer_(viewer_, {id, false, why, {}});
   }
   std::optional<Waiting> take() {
     const std::scoped_lock lock(mutex_);
@@ -82,110 +97,37 @@ class Desk::Seat {
   const Answer& answer_;
   std::mutex mutex_;
   std::deque<Waiting> waiting_;
+  bool takes_no_more_ = false;
   std::atomic<bool> stop_{false};
   std::atomic<bool> has_ended_{false};
   std::thread thread_;
 };
 
-/// Raises the emergency stop; needs neither seat nor server. Those that arrive while one is raised are
-/// answered with it.
-class Desk::Stopper {
- public:
-  Stopper(std::uint32_t domain, const Answer& answer) : domain_(domain), answer_(answer) {
-    thread_ = std::thread([this] { run(); });
-  }
-  ~Stopper() {
-    {
-      const std::scoped_lock lock(mutex_);
-      stop_ = true;
-    }
-    changed_.notify_one();
-    thread_.join();
-  }
-  Stopper(const Stopper&) = delete;
-  Stopper& operator=(const Stopper&) = delete;
+Desk::Desk(SeatRights rights, Answer answer) : rights_(std::move(rights)), answer_(std::move(answer)) {}
 
-  struct Raise {
-    ViewerId viewer = 0;  ///< 0: nothing is raised, all is made ready
-    std::uint32_t id = 0;
-    std::string session;
-    std::string reason;
-  };
-  void add(Raise raise) {
-    {
-      const std::scoped_lock lock(mutex_);
-      const auto same = std::count_if(raises_.begin(), raises_.end(),
-                                      [&](const Raise& other) { return other.viewer == raise.viewer; });
-      if (same >= static_cast<std::ptrdiff_t>(kMaxWaiting)) return;
-      raises_.push_back(std::move(raise));
-    }
-    changed_.notify_one();
+/// All end together, instead of one after the other.
+Desk::~Desk() {
+  for (const auto& [viewer, seat] : seats_) seat->stop();
+  for (const auto& [session, stopper] : stoppers_) stopper->stop();
+}
+
+void Desk::expect(const std::set<std::string>& sessions) {
+  std::vector<std::unique_ptr<Stopper>> ended;  // their threads end without the lock
+  const std::scoped_lock lock(mutex_);
+  for (const std::string& session : sessions) static_cast<void>(stopperOf(session));
+  for (auto known = stoppers_.begin(); known != stoppers_.end();) {
+    const auto current = known++;
+    if (sessions.contains(current->first) || !current->second->isIdle()) continue;
+    ended.push_back(std::move(current->second));
+    stoppers_.erase(current);
   }
+}
 
- private:
-  void run() {
-    std::unique_lock lock(mutex_);
-    while (true) {
-      changed_.wait(lock, [this] { return stop_ || !raises_.empty(); });
-      if (stop_) return;
-      const Raise first = std::move(raises_.front());
-      raises_.pop_front();
-      lock.unlock();
-      const DeskAnswer outcome = raise(first);
-      lock.lock();
-      if (first.viewer == 0) continue;
-      answerAll(first, outcome);
-    }
-  }
-  /// With the mutex held.
-  void answerAll(const Raise& first, DeskAnswer outcome) {
-    answer_(first.viewer, outcome);
-    std::erase_if(raises_, [&](const Raise& raise) {
-      if (raise.viewer == 0 || raise.session != first.session) return false;
-      outcome.id = raise.id;
-      answer_(raise.viewer, outcome);
-      return true;
-    });
-  }
-  DeskAnswer raise(const Raise& raise) {
-    DeskAnswer answer{.id = raise.id};
-    auto& raiser = raisers_[raise.session];
-    if (raiser == nullptr) {
-      auto opened = command::StopRaiser::open(domain_, raise.session, "console");
-      if (!opened) {
-        raisers_.erase(raise.session);
-        answer.text = opened.error().what;
-        return answer;
-      }
-      raiser = std::move(*opened);
-    }
-    if (raise.viewer == 0) return answer;
-    const auto heard = raiser->raise(raise.reason, kForAServer, stop_);
-    const auto outcome =
-        heard ? command::outcomeOf(*heard, domain_, raise.session) : fail(heard.error().what);
-    answer.accepted = outcome.has_value();
-    answer.text = outcome ? (heard->by_server ? "" : *outcome) : outcome.error().what;
-    return answer;
-  }
-
-  std::uint32_t domain_;
-  const Answer& answer_;
-  std::map<std::string, std::unique_ptr<command::StopRaiser>> raisers_;  ///< by session
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<Raise> raises_;
-  std::atomic<bool> stop_{false};
-  std::thread thread_;
-};
-
-Desk::Desk(SeatRights rights, Answer answer)
-    : rights_(std::move(rights)),
-      answer_(std::move(answer)),
-      stopper_(std::make_unique<Stopper>(rights_.domain, answer_)) {}
-
-Desk::~Desk() = default;
-
-void Desk::expect(const std::string& session) { stopper_->add({.session = session}); }
+Stopper& Desk::stopperOf(const std::string& session) {
+  auto& stopper = stoppers_[session];
+  if (stopper == nullptr) stopper = std::make_unique<Stopper>(rights_.domain, session, answer_);
+  return *stopper;
+}
 
 void Desk::handle(ViewerId viewer, const std::string& session, const DeskRequest& request) {
   DeskAnswer answer{.id = request.id};
@@ -198,25 +140,26 @@ void Desk::handle(ViewerId viewer, const std::string& session, const DeskRequest
     answer.accepted = true;
     return answer_(viewer, answer);
   }
-  auto parsed = command::parseCommand(request.words);
+  std::vector<std::string> words;
+  for (const std::string& word : request.words) words.push_back(printable(word));
+  auto parsed = command::parseCommand(words);
   if (!parsed) {
     answer.text = parsed.error().what;
     return answer_(viewer, answer);
   }
-  if (!parsed->command) {
-    const std::string reason = parsed->text.empty() ? "requested" : parsed->text.substr(0, 255);
-    return stopper_->add({viewer, request.id, session, reason});
-  }
   const std::scoped_lock lock(mutex_);
-  const auto seat = seats_.find(viewer);
-  if (seat == seats_.end() || seat->second->hasEnded()) {
-    answer.text = "an observer gives no commands: sit down as instructor first";
+  if (!parsed->command) {
+    const std::string reason = parsed->text.empty() ? "requested" : parsed->text;
+    if (stopperOf(session).add(viewer, request.id, reason)) return;
+    answer.text = "too many emergency stops of this page wait for an answer";
     return answer_(viewer, answer);
   }
-  if (!seat->second->add(request.id, std::move(*parsed))) {
-    answer.text = "too many commands wait for the server";
-    answer_(viewer, answer);
-  }
+  const auto seat = seats_.find(viewer);
+  const auto added =
+      seat == seats_.end() ? fail(std::string(kNoSeat)) : seat->second->add(request.id, std::move(*parsed));
+  if (added) return;
+  answer.text = added.error().what;
+  answer_(viewer, answer);
 }
 
 /// The reason of a refusal; a seat that is granted answers by itself.
@@ -231,7 +174,7 @@ std::optional<DeskAnswer> Desk::sit(ViewerId viewer, const std::string& session,
   leave(viewer);
   const std::scoped_lock lock(mutex_);
   std::erase_if(seats_, [](const auto& seat) { return seat.second->hasEnded(); });
-  if (seats_.size() >= kMaxSeats) return refuse("all seats of this gateway are taken");
+  if (seats_.size() + left_.size() >= kMaxSeats) return refuse("all seats of this gateway are taken");
   seats_.emplace(viewer, std::make_unique<Seat>(viewer, std::move(*options), request.id, answer_));
   return std::nullopt;
 }

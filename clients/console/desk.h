@@ -2,30 +2,31 @@
 
 #include <atomic>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "clients/console/seat_rights.h"
+#include "clients/console/stopper.h"
 #include "clients/console/web_options.h"
 
 namespace tenon::console {
 
 /// The seats of people at browsers. Each has a client of the session of its own, so that the server grants
 /// its rights by what the browser has proven and knows each person; and a thread of its own, so that one who
-/// waits for an answer delays nobody. The emergency stop needs no seat.
+/// waits for an answer delays nobody. The emergency stop needs no seat, and has a thread for each session.
 ///
 /// Roles are given by membershipOf().
 ///
-/// Threads: any; no function waits but the destructor. `answer` is called by threads of the desk.
-/// Real-time: no.
+/// Threads: any; no function waits but expect() and the destructor. `answer` is called by threads of the
+/// desk. Real-time: no.
 class Desk {
  public:
-  using Answer = std::function<void(ViewerId, const DeskAnswer&)>;
+  using Answer = Stopper::Answer;
 
   Desk(SeatRights rights, Answer answer);
   ~Desk();
@@ -37,23 +38,24 @@ class Desk {
   void handle(ViewerId viewer, const std::string& session, const DeskRequest& request);
   /// The viewer's seat is given up.
   void left(ViewerId viewer);
-  /// Prepares an emergency stop for this session, so that it takes effect at once.
-  void expect(const std::string& session);
+  /// Prepares emergency stops for these sessions, so that they take effect at once; empty: for all. What was
+  /// prepared for others ends when a server has heard what was raised there.
+  void expect(const std::set<std::string>& sessions);
 
  private:
   class Seat;
-  class Stopper;
 
   [[nodiscard]] std::optional<DeskAnswer> sit(ViewerId viewer, const std::string& session,
                                               const DeskRequest& request);
   void leave(ViewerId viewer);
+  [[nodiscard]] Stopper& stopperOf(const std::string& session);
 
   SeatRights rights_;
   Answer answer_;
   std::mutex mutex_;
   std::map<ViewerId, std::unique_ptr<Seat>> seats_;
-  std::vector<std::unique_ptr<Seat>> left_;  ///< their threads end
-  std::unique_ptr<Stopper> stopper_;
+  std::vector<std::unique_ptr<Seat>> left_;                   ///< their threads end
+  std::map<std::string, std::unique_ptr<Stopper>> stoppers_;  ///< by session
 };
 
 }  // namespace tenon::console

@@ -14,7 +14,9 @@
 #include "clients/console/lobby.h"
 #include "clients/console/session_feed.h"
 #include "idl/types/names.h"
+#include "idl/types/printable_text.h"
 #include "idl/wire/endpoint.h"
+#include "idl/wire/identity.h"
 #include "idl/wire/participant.h"
 
 namespace tenon::console {
@@ -24,18 +26,20 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::chrono::milliseconds kPeriod{20};
-constexpr std::size_t kMaxSessions = 64;  // that are offered
+constexpr std::size_t kMaxSessions = 64;  // that are shown
 
 std::int64_t nowNanoseconds() {
   return std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
 }
+
+std::string roomOfSession(const std::string& name) { return std::string(kFirstRoom) + "/" + name; }
 
 class Gateway {
  public:
   Gateway(const GatewayOptions& options, const std::atomic<bool>& stop)
       : options_(options),
         stop_(stop),
-        pass_(options.role && options.recording.empty() ? makePass() : ""),
+        pass_(options.role && options.recording.empty() ? wire::randomHex() : ""),
         rights_{.domain = options.domain, .role = options.role, .pass = pass_, .key_file = options.key_file},
         desk_(rights_, [this](ViewerId viewer, const DeskAnswer& answer) { say(viewer, answer); }),
         hands_(
@@ -60,8 +64,12 @@ class Gateway {
   Result<void> openServer();
   Result<void> followSessions();
   void enter(const std::string& room);
-  void offerFeed(const std::string& room, const std::string& session);
+  void leave(const std::string& room);
+  void offerFeeds(Lobby& lobby);
+  void endFeeds(const std::set<std::string>& rooms);
+  bool offerFeed(const std::string& room, const std::string& session);
   void startFeeds();
+  [[nodiscard]] std::set<std::string> expectedSessions();
   [[nodiscard]] std::string sessionOf(const std::string& room);
   void say(ViewerId viewer, const DeskAnswer& answer) { server_->answer(viewer, deskAnswerText(answer)); }
 
@@ -69,7 +77,9 @@ class Gateway {
   const std::atomic<bool>& stop_;
   std::string pass_;
   std::mutex mutex_;
-  std::set<std::string> entered_;      ///< rooms with viewers whose feeds are to be started
+  std::set<std::string> entered_;               ///< rooms with viewers whose feeds are to be started
+  std::set<std::string> started_;               ///< rooms that somebody has entered
+  std::map<std::string, std::size_t> viewers_;  ///< by room; those of rooms that have any
   std::unique_ptr<WebServer> server_;  // after feeds, desk and hands, which publish and answer through it
   std::map<std::string, std::unique_ptr<SessionFeed>> feeds_;  ///< by room
   SeatRights rights_;
@@ -92,19 +102,21 @@ Result<void> Gateway::openServer() {
     if (request.isOfHands()) return hands_.handle(viewer, sessionOf(room), request);
     desk_.handle(viewer, sessionOf(room), request);
   };
-  const auto leave = [this](ViewerId viewer) {
-    desk_.left(viewer);
-    hands_.left(viewer);
-  };
   auto opened = WebServer::open(options_.web, std::move(site),
-                                {[this](const std::string& room) { enter(room); }, leave, handle,
+                                {[this](const std::string& room) { enter(room); },
+                                 [this](ViewerId viewer, const std::string& room) {
+                                   desk_.left(viewer);
+                                   hands_.left(viewer);
+                                   leave(room);
+                                 },
+                                 handle,
                                  [this](ViewerId viewer, std::span<const std::uint8_t> targets) {
                                    return hands_.move(viewer, targets);
                                  }});
   if (!opened) return fail(opened.error().what);
   server_ = std::move(*opened);
   server_->addRoom(std::string(kLobbyRoom), Lobby::channels());
-  if (options_.recording.empty()) offerFeed(std::string(kFirstRoom), options_.session);
+  if (options_.recording.empty()) static_cast<void>(offerFeed(std::string(kFirstRoom), options_.session));
   server_->start();
   const std::string address = "http://localhost:" + std::to_string(server_->port()) + "/";
   options_.print("console: " + address);
@@ -121,7 +133,7 @@ Result<void> Gateway::openServer() {
 Result<void> Gateway::followSessions() {
   auto participant = wire::Participant::open({.domain = options_.domain, .config = {}});
   if (!participant) return fail(participant.error().what);
-  if (!options_.session.empty()) enter(std::string(kFirstRoom));
+  if (!options_.session.empty()) entered_.insert(std::string(kFirstRoom));
   wire::Partition partition(*participant, wire::kLobby);
   Lobby lobby;
   wire::Inbox inbox;
@@ -133,28 +145,64 @@ Result<void> Gateway::followSessions() {
   if (!watched) return watched;
   while (!stop_) {
     inbox.dispatch(kPeriod);
-    for (const std::string& name : lobby.names())
-      if (options_.session.empty()) offerFeed(std::string(kFirstRoom) + "/" + name, name);
+    if (options_.session.empty()) offerFeeds(lobby);
     server_->publish(std::string(kLobbyRoom), lobby.take(nowNanoseconds()));
     startFeeds();
+    desk_.expect(expectedSessions());
   }
   return {};
 }
 
-void Gateway::offerFeed(const std::string& room, const std::string& session) {
+/// Of the sessions of the lobby, as many as are permitted. Those that are no more, and that nobody looks at,
+/// make place.
+void Gateway::offerFeeds(Lobby& lobby) {
+  std::set<std::string> rooms{std::string(kFirstRoom)}, unserved;
+  for (const std::string& name : lobby.names()) rooms.insert(roomOfSession(name));
+  endFeeds(rooms);
+  for (const std::string& name : lobby.names())
+    if (!offerFeed(roomOfSession(name), name)) unserved.insert(name);
+  for (const std::string& name : lobby.setUnserved(unserved))
+    options_.print("session '" + printable(name) + "' is not shown: this gateway shows " +
+                   std::to_string(kMaxSessions) + " sessions at most");
+}
+
+void Gateway::endFeeds(const std::set<std::string>& rooms) {
+  std::vector<std::unique_ptr<SessionFeed>> ended;  // their threads end without the lock
   const std::scoped_lock lock(mutex_);
-  if (feeds_.contains(room) || feeds_.size() >= kMaxSessions) return;
+  for (auto known = feeds_.begin(); known != feeds_.end();) {
+    const auto current = known++;
+    const std::string& room = current->first;
+    if (rooms.contains(room) || viewers_.contains(room)) continue;
+    server_->removeRoom(room);
+    started_.erase(room);
+    ended.push_back(std::move(current->second));
+    feeds_.erase(current);
+  }
+}
+
+/// False when there are too many.
+bool Gateway::offerFeed(const std::string& room, const std::string& session) {
+  const std::scoped_lock lock(mutex_);
+  if (feeds_.contains(room)) return true;
+  if (feeds_.size() > kMaxSessions) return false;  // with that of kFirstRoom
   feeds_.emplace(room, std::make_unique<SessionFeed>(FeedOptions{.room = room,
                                                                  .session = session,
                                                                  .domain = options_.domain,
                                                                  .assets = options_.cache / "assets",
                                                                  .print = options_.print},
                                                      *server_));
+  return true;
 }
 
 void Gateway::enter(const std::string& room) {
   const std::scoped_lock lock(mutex_);
+  ++viewers_[room];
   entered_.insert(room);
+}
+
+void Gateway::leave(const std::string& room) {
+  const std::scoped_lock lock(mutex_);
+  if (--viewers_[room] == 0) viewers_.erase(room);
 }
 
 /// Those of rooms that somebody has entered.
@@ -162,16 +210,28 @@ void Gateway::startFeeds() {
   const std::scoped_lock lock(mutex_);
   for (const std::string& room : std::exchange(entered_, {})) {
     const auto feed = feeds_.find(room);
-    if (feed == feeds_.end()) continue;
-    feed->second->start();
-    if (const std::string session = feed->second->sessionName(); !session.empty()) desk_.expect(session);
+    if (feed != feeds_.end()) feed->second->start();
+    if (feed != feeds_.end() || room == kLobbyRoom) started_.insert(room);
   }
+}
+
+/// Whose emergency stop somebody may press.
+std::set<std::string> Gateway::expectedSessions() {
+  const std::scoped_lock lock(mutex_);
+  std::set<std::string> sessions;
+  for (const std::string& room : started_) {
+    const auto feed = feeds_.find(room);
+    sessions.insert(feed == feeds_.end() ? "" : feed->second->sessionName());  // of the lobby: all
+  }
+  return sessions;
 }
 
 std::string Gateway::sessionOf(const std::string& room) {
   const std::scoped_lock lock(mutex_);
   const auto feed = feeds_.find(room);
-  return feed == feeds_.end() ? "" : feed->second->sessionName();
+  if (feed != feeds_.end()) return feed->second->sessionName();
+  const std::string prefix = roomOfSession("");
+  return room.starts_with(prefix) ? room.substr(prefix.size()) : "";  // of one that has just ended
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "clients/console/lobby.h"
 
+#include <algorithm>
+#include <iterator>
 #include <memory>
 
 #include <nlohmann/json.hpp>
@@ -26,6 +28,15 @@ std::vector<std::string> Lobby::names() const {
   return names;
 }
 
+std::vector<std::string> Lobby::setUnserved(std::set<std::string> names) {
+  std::vector<std::string> added;
+  std::set_difference(names.begin(), names.end(), unserved_.begin(), unserved_.end(),
+                      std::back_inserter(added));
+  has_changed_ = has_changed_ || names != unserved_;
+  unserved_ = std::move(names);
+  return added;
+}
+
 std::vector<Publication> Lobby::take(std::int64_t now_ns) {
   if (!std::exchange(has_changed_, false)) return {};
   nlohmann::json list = nlohmann::json::array();
@@ -33,6 +44,7 @@ std::vector<Publication> Lobby::take(std::int64_t now_ns) {
     list.push_back({{"session", session.session},
                     {"title", session.title},
                     {"host", session.host},
+                    {"served", !unserved_.contains(session.session)},
                     {"lockstep", session.lockstep},
                     {"protocol", session.protocol_version}});
   const nlohmann::json json{{"sessions", list}};

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,11 +23,14 @@ class Lobby {
   void remove(const SessionAnnounce& gone);
   /// Names, each once.
   [[nodiscard]] std::vector<std::string> names() const;
+  /// Sets which of them have no room of their own; returns those that had one until now, or are new.
+  std::vector<std::string> setUnserved(std::set<std::string> names);
   /// What has changed since the last call; empty when nothing has.
   [[nodiscard]] std::vector<Publication> take(std::int64_t now_ns);
 
  private:
   std::map<std::pair<std::string, std::uint32_t>, SessionAnnounce> sessions_;  ///< by name and epoch
+  std::set<std::string> unserved_;                                             ///< names
   bool has_changed_ = true;
 };
 

@@ -1,7 +1,5 @@
 #include "clients/console/seat_rights.h"
 
-#include <algorithm>
-
 #include "idl/types/names.h"
 #include "idl/types/printable_text.h"
 #include "idl/wire/identity.h"
@@ -18,34 +16,19 @@ std::optional<Role> roleNamed(std::string_view name) {
   return std::nullopt;
 }
 
-/// At most kMaxPersonName bytes of a text in UTF-8.
-std::string shortened(const std::string& text) {
-  std::size_t end = std::min(text.size(), kMaxPersonName);
-  while (end < text.size() && end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
-  return text.substr(0, end);
-}
-
-/// Takes equally long wherever they differ.
-bool isEqual(std::string_view a, std::string_view b) {
-  if (a.size() != b.size()) return false;
-  unsigned difference = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) difference |= static_cast<unsigned>(a[i] ^ b[i]);
-  return difference == 0;
-}
-
 }  // namespace
 
 Result<wire::MembershipOptions> membershipOf(const SeatRights& rights, const std::string& session,
                                              const DeskRequest& request) {
   const auto role = roleNamed(request.role);
-  if (!role) return fail("there is no seat for '" + request.role.substr(0, 40) + "' here");
+  if (!role) return fail("there is no seat for '" + shortened(printable(request.role), 40) + "' here");
   if (session.empty()) return fail("there is no session yet");
-  const bool has_pass = !rights.pass.empty() && isEqual(request.key, rights.pass);
+  const bool has_pass = !rights.pass.empty() && wire::isSameSecret(request.key, rights.pass);
   if (has_pass && role != rights.role && role != Role::kTrainee)
     return fail("this gateway was not started with --role " + request.role);
   wire::MembershipOptions options{.session = session, .domain = rights.domain, .role = *role};
   options.key_file = rights.key_file;
-  options.person = request.name.empty() ? "console" : shortened(printable(request.name));
+  options.person = request.name.empty() ? "console" : shortened(printable(request.name), kMaxPersonName);
   if (has_pass || role == Role::kTrainee) return options;
   const auto bytes = wire::readHexText(request.key);
   if (!bytes)
@@ -56,7 +39,5 @@ Result<wire::MembershipOptions> membershipOf(const SeatRights& rights, const std
   options.key = wire::SharedKey{*bytes};
   return options;
 }
-
-std::string makePass() { return wire::hexText(wire::SharedKey::random().bytes).substr(0, 32); }
 
 }  // namespace tenon::console

@@ -30,7 +30,4 @@ struct SeatRights {
                                                            const std::string& session,
                                                            const DeskRequest& request);
 
-/// Random, of 128 bits, as text.
-[[nodiscard]] std::string makePass();
-
 }  // namespace tenon::console

@@ -98,7 +98,7 @@ void SessionFeed::forward(wire::Membership& member, wire::RawSubscriber& subscri
     server_.publish(options_.room, channels_.take());
   }
   if (stop_) return;
-  subscriber.dispatch(milliseconds(0), receive);  // its last words
+  subscriber.dispatch(milliseconds(0), receive);  // samples that arrived before the end
   server_.publish(options_.room, channels_.take());
   if (channels_.isOver())
     return setState(LinkState::kEnded, "session '" + member.sessionName() + "' has ended");

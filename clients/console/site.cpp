@@ -54,13 +54,18 @@ std::string_view typeOfAsset(const std::vector<std::uint8_t>& bytes) {
   return is_model ? "model/gltf-binary" : "application/json";
 }
 
-/// A range of a file; without one, its size alone.
+/// A range of a file, or all of one that is small.
 Answer partOf(const fs::path& file, std::string_view range) {
   std::error_code error;
   const std::uint64_t size = fs::file_size(file, error);
   if (error) return text(404, "text/plain; charset=utf-8", "the recording is gone\n");
   Answer answer{206, "application/octet-stream", false, {}, {{"Accept-Ranges", "bytes"}}};
-  const auto part = parseRange(range, size);
+  const bool is_whole = range.empty() && size > 0;
+  if (is_whole && size > kMaxRange)
+    return text(400, "text/plain; charset=utf-8",
+                "the recording is large: ask for ranges of at most 64 MiB, as `curl -r 0-67108863`\n");
+  const auto part = is_whole ? std::optional(std::pair<std::uint64_t, std::uint64_t>(0, size - 1))
+                             : parseRange(range, size);
   if (!part || part->second - part->first >= kMaxRange) {
     answer.status = 416;
     answer.headers.emplace_back("Content-Range", "bytes */" + std::to_string(size));
@@ -71,6 +76,10 @@ Answer partOf(const fs::path& file, std::string_view range) {
   in.seekg(static_cast<std::streamoff>(part->first));
   in.read(reinterpret_cast<char*>(answer.body.data()), static_cast<std::streamsize>(answer.body.size()));
   if (!in) return text(404, "text/plain; charset=utf-8", "the recording cannot be read there\n");
+  if (is_whole) {
+    answer.status = 200;
+    return answer;
+  }
   answer.headers.emplace_back("Content-Range", "bytes " + std::to_string(part->first) + "-" +
                                                    std::to_string(part->second) + "/" + std::to_string(size));
   return answer;

@@ -72,7 +72,8 @@ void WebConnection::handleUpgrade(const Request& request, std::string_view origi
   } else if (!subprotocol) {
     respond(request, plain(400, "offer the subprotocol foxglove.sdk.v1 or foxglove.websocket.v1"));
   } else if (!server_.rooms.contains(path)) {
-    respond(request, plain(404, "there is no session of this name"));
+    respond(request,
+            plain(404, "there is no session of this name, or more sessions than this gateway shows"));
   } else {
     stream_.expires_never();
     const bool is_own_page = isPermittedOrigin(origin, host, {});

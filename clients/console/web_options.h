@@ -21,8 +21,8 @@ using ViewerId = std::uint64_t;  ///< of one connection; never used again
 
 /// What the server tells its owner, in the server's thread; none may wait.
 struct WebHandlers {
-  std::function<void(const std::string& path)> entered;  ///< a viewer of this room
-  std::function<void(ViewerId)> left;
+  std::function<void(const std::string& path)> entered;         ///< a viewer of this room
+  std::function<void(ViewerId, const std::string& path)> left;  ///< of one that has entered
   /// A request to the desk, from a page of this server or a program, never from a page from elsewhere.
   std::function<void(ViewerId, const std::string& path, const DeskRequest&)> desk;
   /// Targets of the viewer's hands, likewise; false when they are none.

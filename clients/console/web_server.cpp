@@ -1,10 +1,10 @@
 #include "clients/console/web_server.h"
 
 #include <algorithm>
-#include <random>
 
 #include "clients/console/foxglove_protocol.h"
 #include "clients/console/web_service.h"
+#include "idl/wire/identity.h"
 
 namespace tenon::console {
 
@@ -15,11 +15,6 @@ constexpr int kSendBuffer =
     256 << 10;  // [bytes] of a socket: what the system keeps for a viewer that does not read
 constexpr int kMaxWaitingCalls = 64;
 
-std::string randomText() {
-  std::random_device source;
-  return std::to_string(source()) + std::to_string(source());
-}
-
 }  // namespace
 
 Room::Room(std::vector<Channel> channels)
@@ -29,7 +24,7 @@ WebService::WebService(const WebOptions& web_options, Site web_site, WebHandlers
     : options(web_options),
       site(std::move(web_site)),
       handlers(std::move(web_handlers)),
-      session_id(randomText()) {}
+      session_id(wire::randomHex()) {}
 
 void WebService::accept() {
   acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
@@ -66,6 +61,12 @@ void WebService::deliver(const std::string& path, const std::vector<Publication>
   const std::vector<WebViewer*> all(viewers.begin(), viewers.end());
   for (WebViewer* viewer : all)
     if (viewers.contains(viewer)) viewer->send();
+}
+
+void WebService::removeRoom(const std::string& path) {
+  if (rooms.erase(path) == 0) return;
+  for (WebViewer* viewer : viewers)
+    if (viewer->room() == path) viewer->leaveRoom();
 }
 
 WebViewer* WebService::find(ViewerId id) {
@@ -105,6 +106,10 @@ void WebServer::addRoom(const std::string& path, std::vector<Channel> channels) 
   asio::post(impl_->io, [impl = impl_.get(), path, channels = std::move(channels)]() mutable {
     impl->rooms.try_emplace(path, std::move(channels));
   });
+}
+
+void WebServer::removeRoom(const std::string& path) {
+  asio::post(impl_->io, [impl = impl_.get(), path] { impl->removeRoom(path); });
 }
 
 void WebServer::publish(const std::string& path, std::vector<Publication> publications) {

@@ -36,6 +36,8 @@ class WebServer {
   void start();
   /// Serves these channels at `path`, as roomOf() gives it; without effect when there is such a room.
   void addRoom(const std::string& path, std::vector<Channel> channels);
+  /// Viewers that are there are disconnected.
+  void removeRoom(const std::string& path);
   /// Hands messages to all viewers of the room that subscribe to their channels. One of channel 0: what late
   /// subscribers would get is forgotten. Waits while the server has not yet taken the last 64 calls.
   void publish(const std::string& path, std::vector<Publication> publications);

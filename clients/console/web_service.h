@@ -60,6 +60,8 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
     queue_.add(kHandSubscription, Delivery::kNewest, {.payload = views});
   }
   void send();
+  /// The connection is closed: its room is no more.
+  void leaveRoom();
   [[nodiscard]] ViewerId id() const { return id_; }
   [[nodiscard]] const std::string& room() const { return room_; }
 
@@ -133,6 +135,7 @@ struct WebService {
 
   void accept();
   void deliver(const std::string& path, const std::vector<Publication>& publications);
+  void removeRoom(const std::string& path);
   /// Null when it is not there any more.
   [[nodiscard]] WebViewer* find(ViewerId viewer);
 

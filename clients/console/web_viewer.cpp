@@ -24,10 +24,10 @@ WebViewer::WebViewer(WebService& server, tcp::socket socket, std::string room, b
 }
 
 WebViewer::~WebViewer() {
-  server_.viewers.erase(this);
+  const bool has_entered = server_.viewers.erase(this) > 0;
   server_.viewer_count = server_.viewers.size();
   --server_.connections;
-  if (server_.handlers.left) server_.handlers.left(id_);
+  if (has_entered && server_.handlers.left) server_.handlers.left(id_, room_);
 }
 
 void WebViewer::run(const http::request<http::empty_body>& request, std::string_view subprotocol) {
@@ -83,6 +83,7 @@ void WebViewer::send() {
 }
 
 void WebViewer::begin() {
+  if (!server_.rooms.contains(room_)) return leaveRoom();  // removed meanwhile
   server_.viewers.insert(this);
   server_.viewer_count = server_.viewers.size();
   if (server_.handlers.entered) server_.handlers.entered(room_);
@@ -92,13 +93,15 @@ void WebViewer::begin() {
   read();
 }
 
+void WebViewer::leaveRoom() { close("the session is over"); }
+
 void WebViewer::read() {
   socket_.async_read(incoming_, [self = shared_from_this()](beast::error_code error, std::size_t) {
     if (error) {
       self->abort();
       return;
     }
-    self->receive();
+    if (!self->is_closing_) self->receive();
     if (!self->is_closing_) self->read();
   });
 }

@@ -51,7 +51,7 @@ std::string handsText(const std::string& kind, const std::vector<std::string>& n
                      one ? "is held" : "are held");
 }
 
-/// A step of which only the begin was heard was done: otherwise no next one would have begun.
+/// A step of which only the begin was heard was done, unless the next one began without its end.
 const char* endText(StepPhase phase) {
   switch (phase) {
     case StepPhase::kSkipped:
@@ -145,7 +145,10 @@ void Timeline::beginStep(const StepState& step) {
   if (step_.revision > 0 && step.step <= step_.step) {
     print(begin, fmt::format("the session is set back to step {}", step.step + 1));
   } else {
-    endStep(begin);
+    // the end of a step has a revision of its own
+    const bool is_left =
+        step_phases_[step_.started] == StepPhase::kActive && step.revision == step_.revision + 1;
+    endStep(begin, is_left ? "left after" : endText(step_phases_[step_.started]));
   }
   step_ = step;
   step_ended_ = false;
@@ -158,11 +161,10 @@ void Timeline::beginStep(const StepState& step) {
     print(begin, fmt::format("  the trainee is told: {}", instruction));
 }
 
-void Timeline::endStep(Tick tick) {
+void Timeline::endStep(Tick tick, const char* how) {
   if (step_ended_) return;
   step_ended_ = true;
-  print(tick, fmt::format("{}: {} {:.1f} s", stepNumber(), endText(step_phases_[step_.started]),
-                          seconds(tick - step_.started)));
+  print(tick, fmt::format("{}: {} {:.1f} s", stepNumber(), how, seconds(tick - step_.started)));
 }
 
 void Timeline::printProgress(const StepProgress& progress) {
@@ -222,7 +224,8 @@ void Timeline::printHands(const EventLog& event, const std::vector<std::string>&
 void Timeline::printRun(const RunState& run) {
   const bool is_over = isOver(run.phase);
   const bool has_timed_out = !step_ended_ && step_phases_[step_.started] == StepPhase::kTimedOut;
-  if (run.phase == RunPhase::kSucceeded || has_timed_out) endStep(run.tick);
+  if (run.phase == RunPhase::kSucceeded || has_timed_out)
+    endStep(run.tick, endText(step_phases_[step_.started]));
   const bool is_incomplete = run.phase == RunPhase::kSucceeded && !isCompleted(run);
   const std::string_view phase = is_incomplete ? std::string_view(run.reason) : runPhaseName(run.phase);
   const bool is_clear = run.phase == RunPhase::kSucceeded || has_timed_out || run.reason == phase;

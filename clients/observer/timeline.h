@@ -60,7 +60,7 @@ class Timeline {
   void add(Tick tick, Rank rank, std::function<void()> print);
   void print(Tick tick, const std::string& text) const;
   void beginStep(const StepState& step);
-  void endStep(Tick tick);
+  void endStep(Tick tick, const char* how);
   void printProgress(const StepProgress& progress);
   void printContact(Tick tick, ObjectId a, ObjectId b);
   void printGrab(const EventLog& event, bool is_taken);

@@ -50,4 +50,10 @@ std::string printable(std::string_view text) {
   return clean;
 }
 
+std::string shortened(std::string_view text, std::size_t most) {
+  std::size_t end = text.size() < most ? text.size() : most;
+  while (end < text.size() && end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;
+  return std::string(text.substr(0, end));
+}
+
 }  // namespace tenon

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 
@@ -9,5 +10,8 @@ namespace tenon {
 /// terminal escapes) are spaces, and bytes that are not UTF-8 are question marks. For texts that people and
 /// other programs send.
 [[nodiscard]] std::string printable(std::string_view text);
+
+/// The longest begin of a text in UTF-8 that has at most `most` bytes and no cut character.
+[[nodiscard]] std::string shortened(std::string_view text, std::size_t most);
 
 }  // namespace tenon

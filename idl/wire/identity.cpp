@@ -127,6 +127,15 @@ std::string contentHash(std::span<const std::uint8_t> bytes) {
   return hex(hash.data(), hash.size());
 }
 
+std::string randomHex() {
+  const Bytes32 bytes = randomBytes();
+  return hex(bytes.data(), bytes.size() / 2);
+}
+
+bool isSameSecret(std::string_view a, std::string_view b) {
+  return a.size() == b.size() && sodium_memcmp(a.data(), b.data(), a.size()) == 0;
+}
+
 std::string hexText(const Bytes32& bytes) { return hex(bytes.data(), bytes.size()); }
 Result<Bytes32> readHexText(std::string_view text) {
   Bytes32 bytes;

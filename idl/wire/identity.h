@@ -57,6 +57,11 @@ struct SeatKey {
 /// BLAKE2b of `bytes`, 256 bits: as hard to forge as a key.
 [[nodiscard]] std::string contentHash(std::span<const std::uint8_t> bytes);
 
+/// Random, of 128 bits, as 32 digits.
+[[nodiscard]] std::string randomHex();
+/// Takes equally long wherever two secrets of one length differ.
+[[nodiscard]] bool isSameSecret(std::string_view a, std::string_view b);
+
 /// As text in a file, and back; fails for a text that is none.
 [[nodiscard]] std::string hexText(const std::array<std::uint8_t, 32>& bytes);
 [[nodiscard]] Result<std::array<std::uint8_t, 32>> readHexText(std::string_view text);

@@ -14,7 +14,7 @@ import time
 import unittest
 from pathlib import Path
 
-from stage import COARSE, Process, SOURCE, Stage, final_hash, tenon
+from stage import COARSE, PROGRAMS, Process, SOURCE, Stage, final_hash, tenon
 from viewer import Closed, Refused, Viewer, frame_transforms, get, request
 
 sys.path.insert(0, str(SOURCE / "clients" / "remote_hand"))
@@ -22,6 +22,7 @@ from remote_hand import ACTIVE, FORCES_ON, View
 
 TOOLS = SOURCE / "tests" / "system" / "public_tools"
 NAMES = ("foxglove.sdk.v1", "foxglove.websocket.v1")
+PAGE = PROGRAMS.parent / "console_page_build"
 SCENARIO = "peg_and_box"
 
 
@@ -325,6 +326,13 @@ class Hands(unittest.TestCase):
             server.wait_for(r"Ada \(trainee\) has left")
 
 
+@unittest.skipUnless((PAGE / "node_modules").exists(), "the console's page is not built: deploy/setup console")
+class Player(unittest.TestCase):
+    def test_a_place_of_a_recording_is_shown_as_it_was(self):
+        played = subprocess.run(["node", TOOLS / "play_recordings.mjs", SOURCE / "clients" / "console" / "web" / "src", PAGE], capture_output=True, text=True)
+        self.assertEqual(played.returncode, 0, played.stdout + played.stderr)
+
+
 class Browser:
     """Chromium with the page."""
 
@@ -468,7 +476,7 @@ class Page(unittest.TestCase):
             places = {}
             for time in (0.2 * end, 0.95 * end, 0.2 * end):
                 browser("value", expression=f"tenon.player.seek({time})")
-                browser("await", expression=f"Math.abs(tenon.player.time - {time}) < 0.01 && Math.abs(tenon.session.tick / 1000 + tenon.player.recording.secondsOfTickZero - {time}) < 0.2")
+                browser("await", expression=f"Math.abs(tenon.player.time - {time}) < 0.01 && Math.abs(tenon.player.recording.secondsOf(tenon.session.tick) - {time}) < 0.2")
                 # what is drawn is where the recording has it
                 state = "[...tenon.session.states.values()].find(s => tenon.session.objects.get(s.object_id).name === 'peg')"
                 browser("await", expression=f"JSON.stringify(tenon.view.positionOf('peg')) === JSON.stringify(Array.from({state}?.X_WO.p ?? []))")
@@ -478,8 +486,18 @@ class Page(unittest.TestCase):
             self.assertNotEqual(first, places[round(0.95 * end, 3)][0])
             browser("key", key="Space")
             browser("await", expression=f"tenon.player.time > {0.2 * end + 0.5}")
+            # what cannot be read is said, and the next place can be
+            fail_once = "((r, name) => { r[name] = () => { delete r[name]; return Promise.reject(new Error('the disk is gone')); }; })(tenon.player.recording, 'NAME')"
+            is_said = "!document.querySelector('.cover').hidden && document.querySelector('.cover').textContent.includes('the disk is gone')"
+            browser("value", expression=fail_once.replace("NAME", "advance"))
+            browser("await", expression=is_said)
+            self.assertFalse(browser("value", expression="tenon.player.isPlaying"))
+            browser("key", key="Space")
+            browser("await", expression="tenon.player.isPlaying && tenon.player.problem === undefined && document.querySelector('.cover').hidden")
+            browser("value", expression=fail_once.replace("NAME", "seek") + "; tenon.player.seek(1)")
+            browser("await", expression=is_said)
             browser("value", expression="tenon.player.seek(1e9)")
-            browser("await", expression="tenon.session.isOver")
+            browser("await", expression="tenon.session.isOver && document.querySelector('.cover').hidden")
             self.assertEqual(browser.problems, [])
 
             # a file that is none

@@ -83,5 +83,12 @@ TEST(CommandParser, HelpAndLegendListAllCommands) {
   EXPECT_THAT(keyLegend({"bell"}), HasSubstr("bell"));
 }
 
+TEST(CommandParser, TextsThatAreTooLongAreRefusedButAnEmergencyStopIsNever) {
+  const std::string much(300, 'x');
+  for (const char* word : {"signal", "goto", "clear", "note"})
+    EXPECT_FALSE(parseCommand({word, much})) << word;
+  EXPECT_TRUE(parseCommand({"emergency", much}));
+}
+
 }  // namespace
 }  // namespace tenon::command

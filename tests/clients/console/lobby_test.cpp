@@ -30,5 +30,15 @@ TEST(Lobby, ListsTheSessionsThatAreThere) {
   EXPECT_EQ(listed().size(), 1U);
 }
 
+TEST(Lobby, SaysWhichSessionsAreNotShown) {
+  Lobby lobby;
+  lobby.add({.session = "a", .server_epoch = 1});
+  EXPECT_THAT(lobby.setUnserved({"a"}), testing::ElementsAre("a"));
+  EXPECT_THAT(lobby.setUnserved({"a"}), testing::IsEmpty()) << "it is said once";
+  EXPECT_EQ(nlohmann::json::parse(*lobby.take(1)[0].payload)["sessions"][0]["served"], false);
+  lobby.setUnserved({});
+  EXPECT_EQ(nlohmann::json::parse(*lobby.take(2)[0].payload)["sessions"][0]["served"], true);
+}
+
 }  // namespace
 }  // namespace tenon::console

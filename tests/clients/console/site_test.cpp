@@ -109,8 +109,13 @@ TEST_F(SiteTest, ServesARecordingByRangesAlone) {
   const std::pair<std::string, std::string> range{"Content-Range", "bytes 2-4/10"};
   EXPECT_NE(std::find(part.headers.begin(), part.headers.end(), range), part.headers.end());
   const Answer whole = site.answer("/recording.mcap");
-  EXPECT_EQ(whole.status, 416U);
-  EXPECT_TRUE(whole.body.empty());
+  EXPECT_EQ(whole.status, 200U);
+  EXPECT_EQ(std::string(whole.body.begin(), whole.body.end()), "0123456789");
+  EXPECT_EQ(site.answer("/recording.mcap", "bytes=5-20").status, 416U);
+  fs::resize_file(file, (64U << 20U) + 1);
+  const Answer large = site.answer("/recording.mcap");
+  EXPECT_EQ(large.status, 400U);
+  EXPECT_LT(large.body.size(), 200U);
 }
 
 TEST(Range, IsOneWithBothEndsInTheFile) {

@@ -230,6 +230,19 @@ TEST_F(TimelineTest, AStepOfASessionThatIsStoppedOrSetBackIsNotDone) {
 )");
 }
 
+TEST_F(TimelineTest, AStepThatTheInstructorLeftIsNotDone) {
+  timeline_.receive(stepState(0, StepPhase::kActive, 0));
+  StepState gone_to = stepState(1, StepPhase::kActive, 3000);
+  gone_to.revision = 2;  // without the end of the first
+  timeline_.receive(gone_to);
+  EXPECT_EQ(printed(), R"(   0.00 s  step 1 of 2: Take the peg
+   0.00 s    the trainee is told: Touch it.
+   3.00 s  step 1 of 2: left after 3.0 s
+   3.00 s  step 2 of 2: Push the peg in
+   3.00 s    the trainee is told: Push it straight down.
+)");
+}
+
 TEST_F(TimelineTest, MarksWarningsAndErrorsAndSaysWhatTheyAreAbout) {
   EventLog warning = event(1000, "leave", "trainee (trainee) is gone");
   warning.severity = Severity::kWarning;

@@ -20,5 +20,13 @@ TEST(PrintableText, KeepsWhatCanBeReadAndReplacesTheRest) {
   EXPECT_EQ(printable(std::string("a\0b", 3)), "a b");
 }
 
+TEST(PrintableText, IsShortenedBetweenCharacters) {
+  EXPECT_EQ(shortened("grip", 4), "grip");
+  EXPECT_EQ(shortened("grip", 3), "gri");
+  EXPECT_EQ(shortened("G\xC3\xA4nge", 2), "G");
+  EXPECT_EQ(shortened("G\xC3\xA4nge", 3), "G\xC3\xA4");
+  EXPECT_EQ(shortened("\xF0\x9F\x94\xA7", 3), "");
+}
+
 }  // namespace
 }  // namespace tenon

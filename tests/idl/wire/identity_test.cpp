@@ -78,6 +78,16 @@ TEST(Identity, ASecretIsTheSameOneAfterItsText) {
   EXPECT_FALSE(readHexText(std::string(64, 'g')));
 }
 
+TEST(Identity, RandomTextsDifferAndSecretsAreTheSameOnlyAsAWhole) {
+  const std::string one = randomHex(), other = randomHex();
+  EXPECT_EQ(one.size(), 32U);
+  EXPECT_NE(one, other);
+  EXPECT_TRUE(isSameSecret(one, std::string(one)));
+  EXPECT_FALSE(isSameSecret(one, other));
+  EXPECT_FALSE(isSameSecret(one, one.substr(1)));
+  EXPECT_FALSE(isSameSecret("", one));
+}
+
 TEST(Identity, ChallengesDifferByClient) {
   const SharedKey secret = SharedKey::random();
   Origin other;

@@ -10,7 +10,7 @@ const TOPICS = ["/console", "SceneStep", "StepState", "RunState", "Presence", "E
 const TRAINEE = 2; // whose role is larger looks on
 const PERIOD = 500; // [ms] between looks
 
-interface Card { element: HTMLAnchorElement; session: Session; source: LiveSource; info: LobbyState["sessions"][number]; shown: string }
+interface Card { element: HTMLAnchorElement; session: Session; source?: LiveSource; info: LobbyState["sessions"][number]; shown: string }
 
 export class Lobby {
   readonly element = h("section", "lobby");
@@ -28,21 +28,19 @@ export class Lobby {
     const names = new Set(state.sessions.map(({ session }) => session));
     for (const [name, card] of this.cards) {
       if (names.has(name)) continue;
-      card.source.close();
+      card.source?.close();
       card.element.remove();
       this.cards.delete(name);
     }
     for (const info of state.sessions) {
-      const known = this.cards.get(info.session);
-      if (known !== undefined) {
-        known.info = info;
-        continue;
-      }
-      const session = new Session();
-      const element = Object.assign(h("a", "session"), { href: `/?session=${encodeURIComponent(info.session)}` });
-      const source = new LiveSource(addressOf(`/live/${encodeURIComponent(info.session)}`), TOPICS, (topic, message, isGone) => session.receive(topic, message, isGone), () => undefined);
-      this.cards.set(info.session, { element, session, source, info, shown: "" });
-      this.list.append(element);
+      const card: Card = this.cards.get(info.session) ?? { element: h("a", "session"), session: new Session(), info, shown: "" };
+      card.info = info;
+      this.cards.set(info.session, card);
+      this.list.append(card.element);
+      if (!info.served || card.source !== undefined) continue;
+      card.element.href = `/?session=${encodeURIComponent(info.session)}`;
+      const follow = (topic: string, message: unknown, isGone: boolean): void => card.session.receive(topic, message, isGone);
+      card.source = new LiveSource(addressOf(`/live/${encodeURIComponent(info.session)}`), TOPICS, follow, () => undefined);
     }
     this.shown = 0;
   }
@@ -74,6 +72,7 @@ export class Lobby {
     const bar = h("i", "good");
     bar.style.width = `${steps.length === 0 ? 0 : Math.round((100 * done) / steps.length)}%`;
     const isRaised = session.standing.length > 0;
+    if (!info.served) return [h("div", "card-head", h("span", "part", info.session)), h("h2", "", info.title), h("p", "muted", t("lobby.unserved"))];
     return [
       h("div", "card-head", h("span", "part", info.session), isRaised ? h("span", "badge bad", icon("stop"), t("lobby.stopped")) : (panels.phase(session) ?? "")),
       h("h2", "", info.title),

@@ -172,7 +172,8 @@ interface Cover { state: string; icon: Icon; head: string; more: string; command
 
 function coverOf(): Cover | undefined {
   if (isDropping) return { state: "drop", icon: "over", head: t("cover.drop"), more: t("cover.drop.more"), covers: true };
-  if (opening?.problem !== undefined) return { state: "file", icon: "warn", head: t("cover.file"), more: t("cover.file.more", { reason: opening.problem }), covers: true };
+  const problem = opening?.problem ?? player?.problem;
+  if (problem !== undefined) return { state: "file", icon: "warn", head: t("cover.file"), more: t("cover.file.more", { reason: problem }), covers: true };
   if (opening !== undefined) return { state: "reading", icon: "wait", head: t("cover.reading"), more: t("cover.reading.more", { percent: Math.round(100 * opening.fraction) }), covers: true };
   if (lobby !== undefined && live.kind === "open") return undefined;
   const make = (state: string, name: Icon, covers: boolean, values = {}): Cover => {
@@ -254,7 +255,7 @@ function frame(now: number): void {
   if (lobby === undefined) view?.update(session, now);
   plot.update(session, now);
   const hand = part?.hand;
-  const state = `${hand?.views.length} ${hand?.isOn} ${hand?.current} ${hand?.isAligning} ${hand?.isFine} ${hand?.isTurning} ${session.changed} ${session.moved} ${live.kind} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${age > 0.5 ? age.toFixed(1) : ""}`;
+  const state = `${hand?.views.length} ${hand?.isOn} ${hand?.current} ${hand?.isAligning} ${hand?.isFine} ${hand?.isTurning} ${session.changed} ${session.moved} ${live.kind} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${player?.problem} ${age > 0.5 ? age.toFixed(1) : ""}`;
   if (now - shownAt >= PANEL_PERIOD && state !== shown) {
     shownAt = now;
     shown = state;

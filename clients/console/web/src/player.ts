@@ -19,7 +19,9 @@ export class Player {
   readonly element = h("section", "player");
   time = 0; // s since the beginning
   isPlaying = false;
-  /** The longest of the last seeks [ms]; for tests and the curious. */
+  /** Why the recording could not be read last; the next place may be. */
+  problem?: string;
+  /** The longest of the last seeks [ms]; for tests. */
   seekMilliseconds = 0;
   private speed = 1;
   private isBusy = false;
@@ -120,6 +122,7 @@ export class Player {
 
   toggle(): void {
     if (!this.isPlaying && this.time >= this.recording.seconds) this.seek(0);
+    else if (this.problem !== undefined) this.seek(this.time); // what is to come is read anew
     this.isPlaying = !this.isPlaying;
     this.show();
   }
@@ -130,7 +133,7 @@ export class Player {
 
   /** To where the session was at a tick. */
   seekTick(tick: number): void {
-    this.seek(tick / 1000 + this.recording.secondsOfTickZero);
+    this.seek(this.recording.secondsOf(tick));
   }
 
   /** The last place asked for counts. */
@@ -148,14 +151,28 @@ export class Player {
       ++this.seeks;
       const began = performance.now();
       this.session.reset();
-      await this.recording.seek(this.time);
+      this.problem = undefined;
+      await this.attempt(() => this.recording.seek(this.time));
       this.seekMilliseconds = performance.now() - began;
     }
     this.isBusy = false;
     this.show();
+    if (this.problem !== undefined) return;
     const { seeks } = this;
-    const before = await this.recording.forcesBefore(this.time, WINDOW);
-    if (seeks === this.seeks) this.session.recall(before);
+    await this.attempt(async () => {
+      const before = await this.recording.forcesBefore(this.time, WINDOW);
+      if (seeks === this.seeks) this.session.recall(before);
+    });
+  }
+
+  /** What cannot be read stops the playing, and no more. */
+  private async attempt(read: () => Promise<void>): Promise<void> {
+    try {
+      await read();
+    } catch (problem) {
+      this.isPlaying = false;
+      this.problem = problem instanceof Error ? problem.message : String(problem);
+    }
   }
 
   /** Called for each frame of the display. */
@@ -165,10 +182,12 @@ export class Player {
     if (!this.isPlaying || this.isBusy) return;
     this.isBusy = true;
     const time = Math.min(this.recording.seconds, this.time + elapsed * this.speed);
-    void this.recording.advance(time).then(() => {
-      this.isBusy = false;
+    void this.attempt(async () => {
+      await this.recording.advance(time);
       this.time = time;
       if (time >= this.recording.seconds) this.isPlaying = false;
+    }).then(() => {
+      this.isBusy = false;
       this.show();
       if (this.wanted !== undefined) void this.work();
     });

@@ -5,7 +5,7 @@ import { decompress } from "fzstd";
 
 import { decoderOf, type Decoder } from "./decode";
 import { INSTANCE_STATE, type Handler } from "./live";
-import type { ConsoleState, EventLog, HandState, InstanceGone, SessionAnnounce } from "./messages";
+import type { ConsoleState, EventLog, HandState, InstanceGone, SessionAnnounce, TickStats } from "./messages";
 
 // states and events: all of them before a moment tell how it stands then
 const KEPT = [
@@ -13,7 +13,8 @@ const KEPT = [
   INSTANCE_STATE,
 ];
 // streams: the newest of each instance before a moment
-const STREAMS = ["WorldFrame_30", "WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepProgress"];
+const STREAMS = ["WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepProgress"];
+const ALL_OBJECTS = "WorldFrame_30"; // has those that rest, too; a seek alone reads it
 const BEFORE = [150_000_000n, 1_000_000_000n, 8_000_000_000n]; // [ns] in which a frame of all objects is looked for: in real time some are lost
 const BLOCK = 1 << 19; // bytes that are read at a time
 const BLOCKS = 48; // that are kept
@@ -71,13 +72,11 @@ export async function fromAddress(url: string): Promise<Readable> {
 
 interface Message { time: bigint; channel: number; data: Uint8Array }
 type Reading = AsyncGenerator<{ logTime: bigint; channelId: number; data: Uint8Array }, void, void>;
-export interface Mark { seconds: number; kind: string; text: string; severity: number }
+export interface Mark { seconds: number; tick: number; kind: string; text: string; severity: number }
 
 export class Recording {
   /** What happened, by the server's log, in s since the beginning of the recording. */
   marks: Mark[] = [];
-  /** Where tick 0 of the session lies, in s since the beginning. */
-  secondsOfTickZero = 0;
   private kept: Message[] = [];
   private decoders = new Map<number, { topic: string; decode: Decoder }>();
   private reading?: Reading;
@@ -101,7 +100,7 @@ export class Recording {
   private addChannel(id: number): void {
     const channel = this.reader.channelsById.get(id);
     const schema = this.reader.schemasById.get(channel?.schemaId ?? 0);
-    if (channel === undefined || schema === undefined || ![...KEPT, ...STREAMS].includes(channel.topic)) return;
+    if (channel === undefined || schema === undefined || ![...KEPT, ...STREAMS, ALL_OBJECTS].includes(channel.topic)) return;
     const text = new TextDecoder().decode(schema.data);
     const decode = decoderOf({ id, topic: channel.topic, encoding: channel.messageEncoding, schemaName: schema.name, schema: text, schemaEncoding: schema.encoding });
     this.decoders.set(id, { topic: channel.topic, decode });
@@ -114,10 +113,15 @@ export class Recording {
       const channel = this.decoders.get(channelId);
       if (channel?.topic !== "EventLog") continue;
       const { kind, text, severity, tick } = channel.decode(data) as EventLog;
-      const seconds = Number(logTime - this.begin) / 1e9;
-      this.secondsOfTickZero = seconds - Number(tick) / 1000;
-      this.marks.push({ seconds, kind, text, severity });
+      this.marks.push({ seconds: Number(logTime - this.begin) / 1e9, tick: Number(tick), kind, text, severity });
     }
+  }
+
+  /** When a tick was, in s since the beginning: counted from the last mark before it, since ticks are no clock in lockstep, at a pause, and while no server ran. */
+  secondsOf(tick: number): number {
+    let from = this.marks[0] ?? { seconds: 0, tick: 0 };
+    for (const mark of this.marks) if (mark.tick <= tick && mark.tick >= from.tick) from = mark;
+    return from.seconds + (tick - from.tick) / 1000;
   }
 
   private timeOf(seconds: number): bigint {
@@ -129,7 +133,7 @@ export class Recording {
     if (known === undefined) return;
     const message = known.decode(data);
     if (known.topic === "SessionAnnounce") return this.tellLink(message as SessionAnnounce);
-    if (known.topic !== INSTANCE_STATE) return this.handler(known.topic, message, false);
+    if (known.topic !== INSTANCE_STATE) return this.handler(known.topic === ALL_OBJECTS ? "WorldFrame_100" : known.topic, message, false);
     const { topic, key_sample } = message as InstanceGone;
     const ended = [...this.decoders.values()].find((other) => other.topic === topic);
     if (ended !== undefined) this.handler(topic, ended.decode(Uint8Array.from(key_sample)), true);
@@ -152,7 +156,7 @@ export class Recording {
       if (message.time <= time || this.isScene(message)) this.tell(message);
     for (const window of BEFORE) {
       const newest = await this.newestOf(time - window, time);
-      const hasAll = newest.some(({ channel }) => this.decoders.get(channel)?.topic === "WorldFrame_30");
+      const hasAll = newest.some(({ channel }) => this.decoders.get(channel)?.topic === ALL_OBJECTS);
       if (!hasAll && window !== BEFORE[BEFORE.length - 1]) continue;
       for (const message of newest) this.tell(message);
       break;
@@ -163,7 +167,7 @@ export class Recording {
   /** The newest of each instance of the streams, in order. */
   private async newestOf(startTime: bigint, endTime: bigint): Promise<Message[]> {
     const newest = new Map<string, Message>();
-    for await (const { logTime, channelId, data } of this.reader.readMessages({ topics: STREAMS, startTime, endTime }))
+    for await (const { logTime, channelId, data } of this.reader.readMessages({ topics: [...STREAMS, ALL_OBJECTS], startTime, endTime }))
       newest.set(this.instanceOf(channelId, data), { time: logTime, channel: channelId, data: data.slice() });
     return [...newest.values()].sort((a, b) => Number(a.time - b.time));
   }
@@ -179,15 +183,19 @@ export class Recording {
     return `${channel} ${hasKey && data.length >= 8 ? new DataView(data.buffer, data.byteOffset).getUint32(4, true) : 0}`;
   }
 
-  /** What each hand was given before a time [N], over some seconds. */
+  /** What each hand was given before a time [N], over some seconds; times are those of the session. */
   async forcesBefore(seconds: number, window: number): Promise<Map<number, { times: number[]; forces: number[] }>> {
     const hands = new Map<number, { times: number[]; forces: number[] }>();
-    for await (const { logTime, channelId, data } of this.reader.readMessages({ topics: ["HandState_100"], startTime: this.timeOf(seconds - window), endTime: this.timeOf(seconds) })) {
-      const hand = this.decoders.get(channelId)?.decode(data) as HandState;
-      const { force } = hand.F_Ho_W;
+    let time: number | undefined;
+    for await (const { channelId, data } of this.reader.readMessages({ topics: ["HandState_100", "TickStats_100"], startTime: this.timeOf(seconds - window), endTime: this.timeOf(seconds) })) {
+      const channel = this.decoders.get(channelId);
+      if (channel?.topic === "TickStats_100") time = Number((channel.decode(data) as TickStats).tick) / 1000;
+      if (channel?.topic !== "HandState_100" || time === undefined) continue;
+      const hand = channel.decode(data) as HandState;
       let known = hands.get(hand.hand_id);
       if (known === undefined) hands.set(hand.hand_id, (known = { times: [], forces: [] }));
-      known.times.push(Number(logTime - this.begin) / 1e9 - this.secondsOfTickZero);
+      const { force } = hand.F_Ho_W;
+      known.times.push(time);
       known.forces.push(Math.hypot(force[0], force[1], force[2]));
     }
     return hands;

@@ -19,6 +19,11 @@ export interface StepEntry extends SceneStep, Partial<Visit> { isNow: boolean; v
 const STEP_ENDS: Record<string, StepPhase> = { "step done": StepPhase.Done, "step skipped": StepPhase.Skipped, "step timed out": StepPhase.TimedOut };
 export interface HandHistory { times: number[]; forces: number[]; peak: number }
 
+/** Keeps the newest message of each key. */
+function put<K extends string, M extends Record<K, number>>(known: Map<number, M>, key: K, message: M): void {
+  known.set(message[key], message);
+}
+
 export class Session {
   link?: ConsoleState;
   objects = new Map<number, SceneObject>();
@@ -73,26 +78,18 @@ export class Session {
         this.link = link;
         break;
       }
-      case "SceneObject": {
-        const object = message as SceneObject;
-        this.objects.set(object.object_id, object);
+      case "SceneObject":
+        put(this.objects, "object_id", message as SceneObject);
         break;
-      }
-      case "SceneHand": {
-        const hand = message as SceneHand;
-        this.sceneHands.set(hand.hand_id, hand);
+      case "SceneHand":
+        put(this.sceneHands, "hand_id", message as SceneHand);
         break;
-      }
-      case "SceneStep": {
-        const step = message as SceneStep;
-        this.sceneSteps.set(step.step, step);
+      case "SceneStep":
+        put(this.sceneSteps, "step", message as SceneStep);
         break;
-      }
-      case "Telemetry": {
-        const telemetry = message as Telemetry;
-        this.telemetry.set(telemetry.client_id, telemetry);
+      case "Telemetry":
+        put(this.telemetry, "client_id", message as Telemetry);
         break;
-      }
       case "RecorderStatus":
         this.recorder = message as RecorderStatus;
         break;
@@ -116,16 +113,12 @@ export class Session {
       case "RunState":
         this.run = message as RunState;
         break;
-      case "GrabState": {
-        const grab = message as GrabState;
-        this.grabs.set(grab.object_id, grab);
+      case "GrabState":
+        put(this.grabs, "object_id", message as GrabState);
         break;
-      }
-      case "Presence": {
-        const presence = message as Presence;
-        this.people.set(presence.client_id, presence);
+      case "Presence":
+        put(this.people, "client_id", message as Presence);
         break;
-      }
       case "EmergencyStop": {
         const raise = message as EmergencyStop;
         this.raises.set(`${raise.client_guid}/${raise.counter}`, raise);

@@ -1,0 +1,120 @@
+#include "clients/console/gateway.h"
+
+#include <map>
+#include <regex>
+#include <thread>
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "idl/types/messages/run.h"
+#include "idl/types/messages/session.h"
+#include "idl/wire/endpoint.h"
+#include "tests/idl/wire/peer.h"
+
+namespace tenon::console {
+namespace {
+
+/// A viewer that enters a room and reads nothing.
+class ViewerMock {
+ public:
+  ViewerMock(std::uint16_t port, const std::string& path) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    if (connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return;
+    const std::string request =
+        "GET " + path +
+        " HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+        "Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n";
+    if (write(socket_, request.data(), request.size()) < 0) return;
+    std::string head(sizeof "HTTP/1.1 101" - 1, '\0');
+    if (recv(socket_, head.data(), head.size(), MSG_WAITALL) > 0) status_ = std::stoi(head.substr(9));
+  }
+  ~ViewerMock() { close(socket_); }
+  ViewerMock(const ViewerMock&) = delete;
+  ViewerMock& operator=(const ViewerMock&) = delete;
+
+  /// HTTP's; 101: it is in the room.
+  [[nodiscard]] int status() const { return status_; }
+
+ private:
+  int socket_ = socket(AF_INET, SOCK_STREAM, 0);
+  int status_ = 0;
+};
+
+/// A gateway for all sessions of a domain, and what announces sessions there.
+class GatewayTest : public ::testing::Test {
+ protected:
+  GatewayTest() {
+    options_.domain = test::ownDomain();
+    options_.web.port = 0;
+    options_.print = [this](const std::string& line) {
+      std::smatch found;
+      if (std::regex_match(line, found, std::regex("console: http://localhost:(\\d+)/")))
+        port_ = static_cast<std::uint16_t>(std::stoi(found[1]));
+      if (line.find("is not shown") != std::string::npos) ++not_shown_;
+    };
+    thread_ = std::thread([this] { result_ = runGateway(options_, stop_); });
+    EXPECT_TRUE(until([this] { return port_ != 0; }));
+    EXPECT_TRUE(inbox_.on<EmergencyStop>(any_, wire::kEmergencyStop, [](const EmergencyStop&) {}));
+  }
+  ~GatewayTest() override {
+    stop_ = true;
+    thread_.join();
+    EXPECT_TRUE(result_) << result_.error().what;
+  }
+  bool until(const std::function<bool()>& done) { return test::dispatchUntil(inbox_, done); }
+  int statusOf(const std::string& room) const { return ViewerMock(port_, room).status(); }
+  void announce(const std::string& name) { EXPECT_TRUE(announce_.write({.session = name})); }
+
+  std::shared_ptr<wire::Participant> bus_ = test::participant(test::ownDomain());
+  wire::Partition lobby_{bus_, wire::kLobby};
+  wire::Partition any_{bus_, wire::sessionPartition("a")};
+  wire::Writer<SessionAnnounce> announce_ =
+      std::move(*wire::Writer<SessionAnnounce>::open(lobby_, wire::kSessionAnnounce));
+  wire::Inbox inbox_;
+  GatewayOptions options_;
+  std::atomic<std::uint16_t> port_{0};
+  std::atomic<int> not_shown_{0};
+  std::atomic<bool> stop_{false};
+  Result<void> result_;
+  std::thread thread_;
+};
+
+TEST_F(GatewayTest, WhoIsInTheLobbyFindsItsStopReady) {
+  ASSERT_EQ(inbox_.matchedWriters(), 0U);
+  const ViewerMock viewer(port_, "/lobby");
+  ASSERT_EQ(viewer.status(), 101);
+  EXPECT_TRUE(until([this] { return inbox_.matchedWriters() > 0; }));
+}
+
+TEST_F(GatewayTest, ASessionThatHasEndedMakesPlaceWhenNobodyLooksAtIt) {
+  constexpr int kMost = 64;
+  for (int i = 0; i < kMost; ++i) announce(i == 0 ? "a" : "s" + std::to_string(i));
+  ASSERT_TRUE(until([this] { return statusOf("/live/s63") == 101; }));
+  announce("z");
+  ASSERT_TRUE(until([this] { return not_shown_ > 0; })) << "the limit is said";
+  EXPECT_EQ(statusOf("/live/z"), 404);
+  auto viewer = std::make_unique<ViewerMock>(port_, "/live/a");
+  ASSERT_EQ(viewer->status(), 101);
+  ASSERT_TRUE(until([this] { return inbox_.matchedWriters() > 0; })) << "its stop is ready";
+
+  // of one that somebody looks at the room stays
+  ASSERT_TRUE(announce_.dispose({.session = "a"}));
+  ASSERT_TRUE(announce_.dispose({.session = "s1"}));
+  EXPECT_TRUE(until([this] { return statusOf("/live/z") == 101; }));
+  EXPECT_EQ(statusOf("/live/s1"), 404);
+  EXPECT_EQ(statusOf("/live/a"), 101);
+  EXPECT_GT(inbox_.matchedWriters(), 0U);
+  viewer.reset();
+  EXPECT_TRUE(until([this] { return statusOf("/live/a") == 404; }));
+  EXPECT_TRUE(until([this] { return inbox_.matchedWriters() == 0; })) << "what raises its stop has ended";
+}
+
+}  // namespace
+}  // namespace tenon::console

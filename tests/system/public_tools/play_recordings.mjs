@@ -1,0 +1,115 @@
+// Plays small recordings with the page's own modules: what they tell a session at a place, and when a tick was.
+// Usage: node play_recordings.mjs CONSOLE_SOURCES FOLDER_WITH_NODE_MODULES
+import assert from "node:assert/strict";
+import { writeFile, mkdtemp, rm } from "node:fs/promises";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { pathToFileURL } from "node:url";
+
+const [sources, libraries] = process.argv.slice(2);
+const require = createRequire(join(libraries, "package.json"));
+const folder = await mkdtemp(join(tmpdir(), "play_recordings_"));
+
+async function load() {
+  const contents = `export { Recording } from "${sources}/recording.ts"; export { Session } from "${sources}/session.ts"; export { McapWriter } from "@mcap/core";`;
+  const built = await require("esbuild").build({
+    stdin: { contents, resolveDir: sources, loader: "ts" }, bundle: true, write: false, format: "esm", platform: "node", logLevel: "error",
+    nodePaths: [join(libraries, "node_modules")], banner: { js: 'import { createRequire } from "node:module"; const require = createRequire(import.meta.url);' },
+  });
+  const file = join(folder, "page.mjs");
+  await writeFile(file, built.outputFiles[0].text);
+  return import(pathToFileURL(file).href);
+}
+
+const { Recording, Session, McapWriter } = await load();
+const ZERO = { p: [0, 0, 0], q: [1, 0, 0, 0] };
+const at = (id, x) => ({ object_id: id, epoch: 1, X_WO: { ...ZERO, p: [x, 0, 0] } });
+
+/** A recording of [time in s, topic, message]. */
+async function recorded(messages) {
+  const parts = [];
+  let size = 0n;
+  const writable = { position: () => size, write: async (bytes) => void (parts.push(bytes.slice()), (size += BigInt(bytes.length))) };
+  const writer = new McapWriter({ writable });
+  await writer.start({ profile: "", library: "" });
+  const channels = new Map();
+  for (const [seconds, topic, message] of messages) {
+    if (!channels.has(topic)) {
+      const schemaId = await writer.registerSchema({ name: topic, encoding: "jsonschema", data: new Uint8Array() });
+      channels.set(topic, await writer.registerChannel({ topic, schemaId, messageEncoding: "json", metadata: new Map() }));
+    }
+    const time = BigInt(Math.round(seconds * 1e9));
+    await writer.addMessage({ channelId: channels.get(topic), sequence: 0, logTime: time, publishTime: time, data: new TextEncoder().encode(JSON.stringify(message)) });
+  }
+  await writer.end();
+  const file = Buffer.concat(parts);
+  return { size: async () => BigInt(file.length), read: async (offset, length) => new Uint8Array(file.subarray(Number(offset), Number(offset + length))) };
+}
+
+async function opened(messages) {
+  const session = new Session();
+  const recording = await Recording.open(await recorded(messages), (topic, message, isGone) => session.receive(topic, message, isGone), () => undefined);
+  return { session, recording };
+}
+
+const tests = {
+  // object 1 moves until 1.5 s and rests then, object 2 always moves: frames of 100 Hz have what moves, those of 30 Hz all
+  async "a seek shows a part that has come to rest where it rests"() {
+    const messages = [];
+    for (let tick = 0; tick < 3000; tick += 10) {
+      const place = (id) => at(id, Math.min(tick, id === 1 ? 1500 : 3000) / 1000);
+      const states = tick <= 1500 ? [place(1), place(2)] : [place(2)];
+      if (tick % 1000 === 0) for (const id of [1, 2]) messages.push([tick / 1000, "ObjectSnapshot", { object_id: id, tick, state: place(id) }]);
+      messages.push([tick / 1000, "WorldFrame_100", { part: 0, parts: 1, tick, states }]);
+      if (tick % 30 === 0) messages.push([tick / 1000, "WorldFrame_30", { part: 0, parts: 1, tick, states: [place(1), place(2)] }]);
+    }
+    const { session, recording } = await opened(messages);
+    await recording.seek(1.995);
+    assert.equal(session.states.get(1).X_WO.p[0], 1.5);
+    assert.equal(session.states.get(2).X_WO.p[0], 1.99);
+    // and nothing moves back while it is played
+    let last = 0;
+    for (let time = 2; time < 2.9; time += 0.005) {
+      await recording.advance(time);
+      const x = session.states.get(2).X_WO.p[0];
+      assert.ok(x >= last, `${x} m after ${last} m`);
+      last = x;
+      assert.equal(session.states.get(1).X_WO.p[0], 1.5);
+    }
+    assert.ok(last > 2.88);
+  },
+
+  // lockstep: the first 1,000 ticks take 4 s. Then the server is killed, and resumed after 3 s at tick 900
+  async "a tick is where its event was recorded, in lockstep and after a resume"() {
+    const event = (seconds, tick, text) => [seconds, "EventLog", { seq: Math.round(seconds), tick, severity: 0, kind: "step", text }];
+    const { recording } = await opened([event(0, 0, "a"), event(4, 1000, "b"), event(7, 900, "resumed"), event(8, 1900, "c"), [9, "TickStats_100", { tick: 2900 }]]);
+    for (const mark of recording.marks) assert.equal(recording.secondsOf(mark.tick), mark.seconds, mark.text);
+    assert.equal(recording.secondsOf(1950), 8.05);
+    assert.equal(recording.secondsOf(500), 0.5);
+  },
+
+  async "forces before a place have the session's times"() {
+    const messages = [[0, "EventLog", { seq: 1, tick: 0, severity: 0, kind: "step", text: "a" }]];
+    for (let i = 1; i <= 100; ++i) {
+      messages.push([i / 25, "TickStats_100", { tick: 10 * i }]);
+      messages.push([i / 25, "HandState_100", { hand_id: 0, F_Ho_W: { force: [i, 0, 0], torque: [0, 0, 0] } }]);
+    }
+    const { recording } = await opened(messages);
+    const { times, forces } = (await recording.forcesBefore(2, 1)).get(0);
+    assert.deepEqual([times.at(-1), forces.at(-1)], [0.5, 50]);
+  },
+};
+
+let failed = 0;
+for (const [name, test] of Object.entries(tests)) {
+  try {
+    await test();
+    console.log(`passed: ${name}`);
+  } catch (problem) {
+    ++failed;
+    console.log(`failed: ${name}: ${problem.stack}`);
+  }
+}
+await rm(folder, { recursive: true });
+process.exit(failed > 0 ? 1 : 0);
