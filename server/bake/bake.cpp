@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "server/bake/feature_bake.h"
 #include "server/bake/field_bake.h"
@@ -107,7 +108,7 @@ Result<structures::HapticStructures> bake(const TriangleMesh& mesh, const BakeOp
   work.stage("welding", 0.0, 0.05);
   const WeldedMesh welded(mesh);
   if (welded.triangles.empty()) return fail("the mesh has no triangle with an area");
-  auto baked = bakeField(welded.triangles, options, work);
+  auto baked = bakeField(welded, options, work);
   if (!baked) return tl::unexpected(baked.error());
 
   structures::HapticStructures structures;
@@ -127,6 +128,7 @@ Result<structures::HapticStructures> bake(const TriangleMesh& mesh, const BakeOp
   structures.field = structures::makeDilatedField(std::move(baked->storage), thin.dilations);
   info.thin_area = thin.area;
   info.open_area = thin.open_area;
+  info.filled = std::move(baked->filled);
 
   info.triangles = mesh.triangles.size();
   for (const structures::Triangle& t : welded.triangles) info.box_M.extend(structures::boxOf(t));

@@ -159,8 +159,9 @@ class ExposureSplitter {
 
   enum class Exposed { kAll, kNone, kSome };
 
-  /// With kSome, `pieces` contains the exposed parts of the triangle.
-  Exposed exposedPart(const structures::Triangle& t, std::vector<structures::Triangle>& pieces) {
+  /// With kSome, `pieces` contains the exposed parts of the triangle, and `hidden` the others.
+  Exposed exposedPart(const structures::Triangle& t, std::vector<structures::Triangle>& pieces,
+                      std::vector<structures::Triangle>& hidden) {
     std::size_t from = 0;
     const double length = structures::longestEdge(t, from);
     const Vector3 centre = (t[0] + t[1] + t[2]) / 3.0;
@@ -171,11 +172,11 @@ class ExposureSplitter {
     if (length <= kMaxEdgeForBox * level.voxel && map.hides(structures::boxOf(t))) return Exposed::kNone;
 
     const auto [first, second] = structures::bisected(t, from);
-    const Exposed of_first = exposedPart(first, pieces);
-    const Exposed of_second = exposedPart(second, pieces);
+    const Exposed of_first = exposedPart(first, pieces, hidden);
+    const Exposed of_second = exposedPart(second, pieces, hidden);
     if (of_first == of_second && of_first != Exposed::kSome) return of_first;
-    if (of_first == Exposed::kAll) pieces.push_back(first);
-    if (of_second == Exposed::kAll) pieces.push_back(second);
+    if (of_first != Exposed::kSome) (of_first == Exposed::kAll ? pieces : hidden).push_back(first);
+    if (of_second != Exposed::kSome) (of_second == Exposed::kAll ? pieces : hidden).push_back(second);
     return Exposed::kSome;
   }
 
@@ -240,6 +241,7 @@ ExposedSurface::ExposedSurface(std::span<const structures::Triangle> triangles, 
     std::vector<structures::Triangle> pieces;
   };
   std::vector<std::vector<SplitTriangle>> splits((triangles.size() + kChunk - 1) / kChunk);
+  std::vector<std::vector<HiddenPart>> hidden(splits.size());
   const CellMap coarse_map(coarse, work);
   std::optional<CellMap> fine_map;
   if (fine != nullptr) fine_map.emplace(*fine, work);
@@ -248,12 +250,19 @@ ExposedSurface::ExposedSurface(std::span<const structures::Triangle> triangles, 
     const std::size_t end = std::min(triangles.size(), (chunk + 1) * kChunk);
     for (std::size_t i = chunk * kChunk; i < end; ++i) {
       std::vector<structures::Triangle> pieces;
-      const ExposureSplitter::Exposed part = splitter.exposedPart(triangles[i], pieces);
-      if (part == ExposureSplitter::Exposed::kNone) state_[i] = kHidden;
+      std::vector<structures::Triangle> others;
+      const ExposureSplitter::Exposed part = splitter.exposedPart(triangles[i], pieces, others);
+      if (part == ExposureSplitter::Exposed::kNone) {
+        state_[i] = kHidden;
+        others = {triangles[i]};
+      }
+      for (const structures::Triangle& other : others)
+        hidden[chunk].push_back({other, static_cast<std::uint32_t>(i)});
       if (part == ExposureSplitter::Exposed::kSome)
         splits[chunk].push_back({static_cast<std::uint32_t>(i), std::move(pieces)});
     }
   });
+  for (const auto& chunk : hidden) hidden_.insert(hidden_.end(), chunk.begin(), chunk.end());
   for (auto& chunk : splits) {
     for (SplitTriangle& split : chunk) {
       state_[split.triangle] = static_cast<std::uint32_t>(pieces_.size());

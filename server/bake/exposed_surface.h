@@ -30,6 +30,13 @@ class ExposedSurface {
 
   /// All exposed parts, in the order of the triangles.
   [[nodiscard]] std::vector<structures::Triangle> all() const;
+  /// A triangle that is not exposed, or a part of it.
+  struct HiddenPart {
+    structures::Triangle part;
+    std::uint32_t triangle;
+  };
+  /// All that is not exposed, in the same order.
+  [[nodiscard]] const std::vector<HiddenPart>& hidden() const { return hidden_; }
 
  private:
   static constexpr std::uint32_t kWhole = 0xFFFFFFFFU;
@@ -38,6 +45,7 @@ class ExposedSurface {
   std::span<const structures::Triangle> triangles_;
   std::vector<std::uint32_t> state_;  // kWhole, kHidden, or an index into pieces_
   std::vector<std::vector<structures::Triangle>> pieces_;
+  std::vector<HiddenPart> hidden_;
 };
 
 }  // namespace tenon::bake

@@ -11,6 +11,7 @@
 #include "server/bake/air_gaps.h"
 #include "server/bake/brick_level.h"
 #include "server/bake/exposed_surface.h"
+#include "server/bake/filled_spaces.h"
 #include "server/bake/outside.h"
 #include "server/bake/parallel.h"
 #include "server/bake/refined_bricks.h"
@@ -182,8 +183,9 @@ structures::FieldStorage assemble(structures::FieldStorage storage, const BrickL
 
 }  // namespace
 
-Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, const BakeOptions& options,
-                             ParallelWork& work, const FieldLimits& limits) {
+Result<BakedField> bakeField(const WeldedMesh& mesh, const BakeOptions& options, ParallelWork& work,
+                             const FieldLimits& limits) {
+  const std::span<const structures::Triangle> triangles = mesh.triangles;
   if (const std::string why = whyTooLarge(triangles, options, limits); !why.empty()) return fail(why);
   const auto tooMany = [&options](std::size_t bricks, std::size_t limit, bool refined) {
     return fail(tooManyBricks(static_cast<double>(bricks), limit, refined, options));
@@ -230,6 +232,7 @@ Result<BakedField> bakeField(std::span<const structures::Triangle> triangles, co
   work.stage("measuring interior distances", 0.75, 0.85);
   BakedField baked;
   baked.surface = surface.all();
+  baked.filled = findFilledSpaces(surface.hidden(), tree, mesh.winding, coarse, work);
   std::vector<structures::Triangle> hidden;
   for (std::uint32_t i = 0; i < triangles.size(); ++i) {
     if (surface.of(i).empty()) ++baked.hidden_triangles;

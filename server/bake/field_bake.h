@@ -8,7 +8,9 @@
 #include "server/bake/bake.h"
 #include "server/bake/field_size.h"
 #include "server/bake/thin_bricks.h"
+#include "server/bake/welded_mesh.h"
 #include "server/structures/field_builder.h"
+#include "server/structures/filled_space.h"
 #include "server/structures/triangle.h"
 
 namespace tenon::bake {
@@ -19,17 +21,17 @@ struct BakedField {
   structures::FieldStorage storage;           ///< of the field, without dilation
   std::vector<structures::Triangle> surface;  ///< the exposed part of the triangles
   std::size_t hidden_triangles = 0;           ///< entirely inside the solid
-  BrickMarks thin;                            ///< where material may be thin
-  std::vector<AirGap> refined_gaps;           ///< as in RefinedBricks
+  std::vector<structures::FilledSpace> filled;
+  BrickMarks thin;                   ///< where material may be thin
+  std::vector<AirGap> refined_gaps;  ///< as in RefinedBricks
   std::vector<AirGap> coarse_gaps;
 };
 
-/// The signed distance field of a triangle soup: magnitudes are exact in the band, signs come from a flood
-/// fill from outside. An error when it exceeds the limits (with its size) or is cancelled.
+/// The signed distance field of a mesh, taken as a soup of triangles: magnitudes are exact in the band, signs
+/// come from a flood fill from outside. An error when it exceeds the limits (with its size) or is cancelled.
 ///
 /// Threads: one caller; uses several threads inside.
-[[nodiscard]] Result<BakedField> bakeField(std::span<const structures::Triangle> triangles,
-                                           const BakeOptions& options, ParallelWork& work,
-                                           const FieldLimits& limits = {});
+[[nodiscard]] Result<BakedField> bakeField(const WeldedMesh& mesh, const BakeOptions& options,
+                                           ParallelWork& work, const FieldLimits& limits = {});
 
 }  // namespace tenon::bake

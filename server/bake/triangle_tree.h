@@ -29,6 +29,16 @@ class TriangleTree {
   /// Whether a ray from p intersects an odd number of triangles. No component of `direction` may be 0.
   [[nodiscard]] bool oddCrossings(const Vector3& p, const Vector3& direction) const;
 
+  /// The triangles that a ray from p intersects, in the order of the soup. No component of `direction` may
+  /// be 0.
+  [[nodiscard]] std::vector<std::uint32_t> crossed(const Vector3& p, const Vector3& direction) const;
+
+  /// The normal of a triangle, of any length.
+  [[nodiscard]] Vector3 normalOf(std::uint32_t triangle) const {
+    const structures::Triangle& t = triangles_[triangle];
+    return (t[1] - t[0]).cross(t[2] - t[0]);
+  }
+
   /// Where a segment meets the soup first.
   struct Intersection {
     double fraction = 1.0;                           ///< [-] of the segment

@@ -53,24 +53,35 @@ WeldedMesh::WeldedMesh(const TriangleMesh& mesh) {
     number[order[i]] = static_cast<std::uint32_t>(positions.size() - 1);
   }
 
-  std::vector<Corners> all;
+  struct WoundCorners {
+    Corners corners;
+    std::int8_t winding;  // of the mesh's triangle, beside ascending order
+    auto operator<=>(const WoundCorners&) const = default;
+  };
+  std::vector<WoundCorners> all;
   all.reserve(mesh.triangles.size());
   for (const auto& [a, b, c] : mesh.triangles) {
     Corners t{number[a], number[b], number[c]};
+    const bool same = ((t[0] < t[1]) + (t[1] < t[2]) + (t[2] < t[0])) == 2;
     std::sort(t.begin(), t.end());
-    if (t[0] != t[1] && t[1] != t[2]) all.push_back(t);
+    if (t[0] != t[1] && t[1] != t[2]) all.push_back({t, static_cast<std::int8_t>(same ? 1 : -1)});
   }
   // ranks follow positions, so neighbours in space are near in memory
   std::sort(all.begin(), all.end());
-  all.erase(std::unique(all.begin(), all.end()), all.end());
-  for (const Corners& t : all) {
+  for (const auto& [t, wound] : all) {
+    if (!corners.empty() && corners.back() == t) {
+      winding.back() = static_cast<std::int8_t>(std::clamp(winding.back() + wound, -100, 100));
+      continue;
+    }
     const structures::Triangle triangle{positions[t[0]], positions[t[1]], positions[t[2]]};
     if (!(structures::areaOf(triangle) > 0.0)) continue;
     corners.push_back(t);
     triangles.push_back(triangle);
+    winding.push_back(wound);
   }
   skipped = mesh.triangles.size() - triangles.size();
   closeHoles();
+  winding.resize(triangles.size(), 0);
 }
 
 std::vector<WeldedMesh::HalfEdge> WeldedMesh::halfEdges() const {

@@ -43,6 +43,9 @@ struct WeldedMesh {
   std::vector<Vector3> positions;
   std::vector<Corners> corners;
   std::vector<structures::Triangle> triangles;
+  /// Of each triangle how many of the mesh have its corners in this order, less those in the other one [-]; 0
+  /// of closed holes. Only what is said about a mesh may depend on it.
+  std::vector<std::int8_t> winding;
 
  private:
   struct HalfEdge {

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "server/check/checked_scene.h"
+#include "server/check/filled_spaces.h"
 #include "server/check/open_surface.h"
 #include "server/check/overlaps.h"
 #include "server/check/sizes.h"
@@ -21,6 +22,7 @@ std::vector<Finding> checkScene(const game_control::ScenarioFile& scenario, cons
   };
   progress("checking the start", 0.0);
   checkOpenSurfaces(checked);
+  checkFilledSpaces(checked);
   checkOverlaps(checked);
   for (std::size_t i = 0; i < scenario.states.size(); ++i) {
     const game_control::ScenarioState& state = scenario.states[i];

@@ -8,8 +8,8 @@
 namespace tenon::check {
 
 std::string_view nameOf(FindingKind kind) {
-  constexpr std::array<std::string_view, 8> kNames{"load",     "overlap", "clearance", "scale",
-                                                   "approach", "reach",   "turning",   "open"};
+  constexpr std::array<std::string_view, 9> kNames{"load",  "overlap", "clearance", "scale", "approach",
+                                                   "reach", "turning", "open",      "filled"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 

@@ -23,6 +23,7 @@ enum class FindingKind : std::uint8_t {
   kReach,      ///< an object is out of reach
   kTurning,    ///< more turning than the device has
   kOpen,       ///< surface that a part may pass
+  kFilled,     ///< empty space that is solid in the field
 };
 
 /// What a check found. Objects may be invalid, where none is concerned.
@@ -36,8 +37,9 @@ struct Finding {
   std::optional<Vector3> p_WP;  ///< where
   double value = 0.0;           ///< [m] or [rad] or [-], see `unit`
   std::string_view unit;        ///< of `value`: m, rad; empty: a ratio
-  std::string text;             ///< one sentence, with the titles of the objects
-  std::string hint;             ///< what helps; may be empty
+  double error = 0.0;  ///< [m] or [rad] or [-] of `value`, at most; 0: it is as exact as it is written
+  std::string text;    ///< one sentence, with the titles of the objects
+  std::string hint;    ///< what helps; may be empty
 };
 
 /// "overlap"

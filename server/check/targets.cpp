@@ -21,6 +21,11 @@ constexpr double kFitsPerStated = 4.0;  // [-] times the stated clearance, likew
 constexpr double kLargestTilt = 0.35;   // [rad]
 constexpr double kSmallestRatioInHole = 1.0 / 20.0;  // [-] of its hole, and smaller: its unit is wrong
 constexpr ProbeTolerance kPlayTolerance{2e-6, 0.02};
+// Near an edge where walls meet the interpolated distance is too small, by up to this; so walls are looked
+// for at this depth.
+constexpr ProbeTolerance kPlayDepth{2e-6, 0.4};
+// [voxels] Error of the play nevertheless, of a part that is less than a voxel from a wall at its target.
+constexpr double kPlayError = 0.6;
 constexpr ProbeTolerance kApproachTolerance{50e-6, 0.35};
 
 /// Play of a part in what it fits into.
@@ -29,6 +34,7 @@ struct Play {
   double tilt = std::numeric_limits<double>::infinity();  ///< [rad] least of two axes, likewise
   Vector3 line_W = Vector3::Zero();                       ///< unit, of the least play
   NearestPlace place;
+  double error = 0.0;  ///< [m] of `play`, at most
   [[nodiscard]] bool isFit() const { return std::isfinite(play); }
 };
 
@@ -77,8 +83,9 @@ class TargetCheck {
       }
     }
     if (place.gap < -kFieldError.at(place)) {
-      addOverlap(obstacle, place);
-      return -place.gap <= state_.tolerance;
+      const bool is_reachable = -place.gap <= state_.tolerance && isFreeNearby();
+      addOverlap(obstacle, place, is_reachable);
+      return is_reachable;
     }
     return checkFit(obstacle, place);
   }
@@ -99,16 +106,47 @@ class TargetCheck {
     return finding;
   }
 
-  void addOverlap(const PartObstacle& obstacle, const NearestPlace& place) {
+  /// Whether the part can be free of all obstacles at a pose that is taken for its target: it is pushed out
+  /// of what it is deepest in, again and again, by the least motion. Between walls that are too near to each
+  /// other it only goes to and fro.
+  [[nodiscard]] bool isFreeNearby() {
+    constexpr int kMostPushes = 200;
+    constexpr double kMore = 1.02;  // [-] than the depth: the field is not exact
+    Pose X_WO = X_WG_;
+    for (int push = 0; push < kMostPushes; ++push) {
+      NearestPlace deepest{.gap = 0.0};
+      for (const PartObstacle& obstacle : obstacles_) {
+        const NearestPlace place = probe_.nearest(obstacle, X_WO, ProbedSurface::kMesh);
+        if (place.gap < -kFieldError.at(place) && place.gap < deepest.gap) deepest = place;
+      }
+      if (deepest.gap == 0.0) {
+        const Displacement moved = displacement(X_WG_, X_WO, sphere_.p_OQ_O);
+        return moved.translation.norm() <= state_.tolerance &&
+               moved.rotation.norm() <= state_.angle_tolerance;
+      }
+      if (!deepest.located) return false;
+      // a turn costs as much as the way of the bounding sphere's surface
+      const Vector3 arm_W = (deepest.p_WP - X_WO * sphere_.p_OQ_O).cross(deepest.n_W) / sphere_.radius;
+      const double least = -kMore * deepest.gap / (1.0 + arm_W.squaredNorm());
+      X_WO = displaced(X_WO, {least * deepest.n_W, least / sphere_.radius * arm_W}, sphere_.p_OQ_O);
+    }
+    return false;
+  }
+
+  void addOverlap(const PartObstacle& obstacle, const NearestPlace& place, bool is_reachable) {
     Finding finding = findingAt(FindingKind::kOverlap, obstacle, place);
     finding.value = -place.gap;
-    finding.severity = -place.gap > state_.tolerance ? Severity::kError : Severity::kWarning;
+    finding.severity = is_reachable ? Severity::kWarning : Severity::kError;
     finding.text = fmt::format("at its target {} is {}{} inside {}{}", title(part_),
                                place.exact ? "" : "more than ", inMillimetres(-place.gap),
                                title(obstacle.object), place.located ? ", at " + pointText(place.p_WP) : "");
-    if (finding.severity == Severity::kWarning)
+    if (is_reachable) {
       finding.text +=
           fmt::format("; it is taken for there because {} are tolerated", inMillimetres(state_.tolerance));
+    } else if (-place.gap <= state_.tolerance) {
+      finding.text += fmt::format("; it can never be there: it is free nowhere within {} and {} of it",
+                                  inMillimetres(state_.tolerance), inDegrees(state_.angle_tolerance));
+    }
     finding.hint = freePoseHint(probe_, obstacles_, X_WG_, place, 2.0 * sphere_.radius);
     checked_.findings.push_back(std::move(finding));
   }
@@ -132,14 +170,23 @@ class TargetCheck {
     const auto motion = [&](double s) {
       return Pose(X_WG_.translation() + s * direction_W, X_WG_.rotation());
     };
-    PartTravel travel =
-        probe_.travel({&obstacle, 1}, {&floor, 1}, motion, limit, ProbedSurface::kMesh, kPlayTolerance);
-    if (!travel.blocked || !travel.place.located) return travel;
     // it is found where it is deeper by the tolerance
-    constexpr double kLeastSlope = 0.1;  // [-]
-    const double slope = std::max(kLeastSlope, -travel.place.n_W.dot(direction_W));
-    travel.length = std::max(0.0, travel.length - kPlayTolerance.at(travel.place) / slope);
-    return travel;
+    const auto upTo = [&](const ProbeTolerance& depth) {
+      constexpr double kLeastSlope = 0.1;  // [-]
+      PartTravel travel =
+          probe_.travel({&obstacle, 1}, {&floor, 1}, motion, limit, ProbedSurface::kMesh, depth);
+      if (!travel.blocked || !travel.place.located) return travel;
+      const double slope = std::max(kLeastSlope, -travel.place.n_W.dot(direction_W));
+      travel.length = std::max(0.0, travel.length - depth.at(travel.place) / slope);
+      return travel;
+    };
+    const PartTravel shallow = upTo(kPlayTolerance);
+    if (!shallow.blocked) return shallow;
+    // a thin wall is nowhere that deep
+    constexpr double kMostVoxels = 1.5;
+    const PartTravel deep = upTo(kPlayDepth);
+    const double more = deep.length - shallow.length;
+    return deep.blocked && more > 0.0 && more < kMostVoxels * shallow.place.voxel ? deep : shallow;
   }
 
   [[nodiscard]] PartTravel turn(const PartObstacle& obstacle, double floor, const Vector3& axis_W) {
@@ -162,7 +209,10 @@ class TargetCheck {
       play.line_W = line;
       play.place = forth.place;
     }
-    if (!play.isFit() || state_.approach_W.norm() == 0.0) return play;
+    if (!play.isFit()) return play;
+    const double voxel = play.place.voxel;
+    play.error = place.gap < voxel ? kPlayError * voxel : kPlayTolerance.at(play.place);
+    if (state_.approach_W.norm() == 0.0) return play;
     const std::vector<Vector3> axes = lines();
     for (std::size_t i = 0; i < 2; ++i) {
       const PartTravel forth = turn(obstacle, floor, axes[i]);
@@ -215,12 +265,14 @@ class TargetCheck {
   void compareClearance(const PartObstacle& obstacle, const Play& play, double stated) {
     Finding finding = findingAt(FindingKind::kClearance, obstacle, play.place);
     finding.value = play.play;
-    const double error = std::max(0.1 * stated, 0.25 * play.place.voxel);
-    const bool is_less = play.play < stated - error;
-    const bool is_more = play.play > stated + std::max(0.5 * stated, error);
+    finding.error = play.error;
+    const bool is_less = play.play < stated - std::max(0.1 * stated, play.error);
+    const bool is_more = play.play > stated + std::max(0.5 * stated, play.error);
     finding.severity = is_less || is_more ? Severity::kWarning : Severity::kInfo;
     finding.text = fmt::format("{} has {} of play in {}", title(part_), inMillimetres(play.play),
                                title(obstacle.object));
+    if (play.error > 0.05 * play.play)
+      finding.text += fmt::format(", give or take {}", inMillimetres(play.error));
     if (std::isfinite(play.tilt)) finding.text += fmt::format(", and tilts by {}", inDegrees(play.tilt));
     finding.text += fmt::format("; {} are stated", inMillimetres(stated));
     if (play.play < play.place.voxel)
@@ -234,6 +286,7 @@ class TargetCheck {
     const auto& objects = checked_.scenario.objects;
     Finding finding = findingAt(FindingKind::kClearance, obstacle, play.place);
     finding.value = play.play;
+    finding.error = play.error;
     finding.severity = is_unreachable ? Severity::kError : Severity::kWarning;
     const bool is_resolved = play.play > 2.0 * play.place.voxel;
     const double thicker = play.place.dilation;

@@ -9,21 +9,23 @@
 #include "idl/types/result.h"
 #include "server/structures/distance_field.h"
 #include "server/structures/feature_shell.h"
+#include "server/structures/filled_space.h"
 #include "server/structures/pointshell.h"
 
 namespace tenon::structures {
 
 /// Source and size of haptic structures.
 struct StructureInfo {
-  std::string source;           ///< file names of the meshes
-  std::string content_hash;     ///< of meshes and options: the file's name in a cache
-  std::uint64_t triangles = 0;  ///< of the meshes
-  double bake_seconds = 0.0;    ///< [s]
-  Eigen::AlignedBox3d box_M;    ///< [m] bounding box of the mesh
-  double surface_area = 0.0;    ///< [m^2] of the sampled outer surface
-  double thin_area = 0.0;       ///< [m^2] of it where material is too thin for the voxels there
-  double open_area = 0.0;       ///< [m^2] of that where a point could pass in spite of the dilation
-  std::uint64_t bricks = 0;     ///< with samples
+  std::string source;               ///< file names of the meshes
+  std::string content_hash;         ///< of meshes and options: the file's name in a cache
+  std::uint64_t triangles = 0;      ///< of the meshes
+  double bake_seconds = 0.0;        ///< [s]
+  Eigen::AlignedBox3d box_M;        ///< [m] bounding box of the mesh
+  double surface_area = 0.0;        ///< [m^2] of the sampled outer surface
+  double thin_area = 0.0;           ///< [m^2] of it where material is too thin for the voxels there
+  double open_area = 0.0;           ///< [m^2] of that where a point could pass in spite of the dilation
+  std::vector<FilledSpace> filled;  ///< empty space that the field has no room for, the largest walls first
+  std::uint64_t bricks = 0;         ///< with samples
   std::vector<std::filesystem::path> meshes;  ///< when baked; stored relative to the structure file's folder
   double unit = 1.0;                          ///< [m] length of one unit of these files
   std::string notes;  ///< one sentence per line, to be printed (connected parts without an inside, ...)

@@ -3,6 +3,7 @@
 #include <cstring>
 #include <fstream>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <fcntl.h>
@@ -22,7 +23,7 @@ namespace tenon::structures {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'T', 'E', 'N', 'O', 'N', 'H', 'S', '\n'};
-constexpr std::uint32_t kVersion = 6;
+constexpr std::uint32_t kVersion = 7;
 constexpr std::uint32_t kByteOrder = 0x01020304U;
 constexpr std::size_t kAlignment = 64;
 
@@ -45,6 +46,7 @@ enum FileSection : std::size_t {
   kFeatureClusters,
   kFeatureLevels,
   kFeatureEdges,
+  kFilled,
   kSections
 };
 constexpr std::array<std::size_t, kSections> kElementBytes{sizeof(DistanceField::Entry),
@@ -63,7 +65,8 @@ constexpr std::array<std::size_t, kSections> kElementBytes{sizeof(DistanceField:
                                                            sizeof(ShellSphere),
                                                            sizeof(ShellSphere),
                                                            sizeof(ShellLevel),
-                                                           sizeof(FeatureEdge)};
+                                                           sizeof(FeatureEdge),
+                                                           sizeof(FilledSpace)};
 
 struct FileHeader {
   std::array<char, 8> magic = kMagic;
@@ -82,7 +85,7 @@ struct FileHeader {
 };
 static_assert(std::is_trivially_copyable_v<FileHeader>);
 static_assert(sizeof(ShellPoint) == 28 && sizeof(ShellSphere) == 24 && sizeof(ShellLevel) == 32 &&
-              sizeof(FeatureEdge) == 36);
+              sizeof(FeatureEdge) == 36 && sizeof(FilledSpace) == 28);
 
 std::uint64_t aligned(std::uint64_t offset) { return (offset + kAlignment - 1) / kAlignment * kAlignment; }
 
@@ -134,7 +137,8 @@ std::array<std::span<const std::byte>, kSections> sectionsOf(const HapticStructu
           bytes(features.leaves()),
           bytes(features.clusters()),
           bytes(features.levels()),
-          bytes(structures.features.edges())};
+          bytes(structures.features.edges()),
+          bytes(info.filled)};
 }
 
 FileHeader headerOf(const HapticStructures& structures) {
@@ -227,8 +231,12 @@ bool sectionsFit(const FileHeader& header) {
   return true;
 }
 
-bool infoIsFinite(const FileHeader& header) {
+bool infoIsFinite(const FileHeader& header, const std::vector<FilledSpace>& filled) {
   const auto finite = [](double number) { return std::isfinite(number); };
+  for (const FilledSpace& space : filled)
+    if (!finite(space.wall_area) || !std::all_of(space.low.begin(), space.low.end(), finite) ||
+        !std::all_of(space.high.begin(), space.high.end(), finite))
+      return false;
   return finite(header.bake_seconds) && finite(header.surface_area) && finite(header.thin_area) &&
          finite(header.open_area) && finite(header.unit) &&
          std::all_of(header.box_M.begin(), header.box_M.end(), finite);
@@ -341,7 +349,9 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
   if (const auto problem = problemOf(shell.layout())) return damaged("pointshell " + *problem);
   if (const auto problem = problemOf(features.points.layout(), features.edges))
     return damaged("feature shell " + *problem);
-  if (!infoIsFinite(*header)) return damaged("header has a number that is not finite");
+  const auto spaces = section<FilledSpace>(bytes, *header, kFilled);
+  std::vector<FilledSpace> filled(spaces.begin(), spaces.end());
+  if (!infoIsFinite(*header, filled)) return damaged("header has a number that is not finite");
   auto structures = std::make_shared<HapticStructures>();
   const bool has_field = !field.index.empty() || !field.samples.empty() || !field.far.empty();
   if (has_field) structures->field = makeField(std::move(field));
@@ -360,6 +370,7 @@ Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesy
   info.thin_area = header->thin_area;
   info.open_area = header->open_area;
   info.unit = header->unit;
+  info.filled = std::move(filled);
   info.box_M = {Vector3::Map(header->box_M.data()), Vector3::Map(header->box_M.data() + 3)};
   return structures;
 }

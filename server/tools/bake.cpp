@@ -142,6 +142,14 @@ void printInfo(const structures::HapticStructures& structures) {
         "              surface is open\n",
         info.thin_area, readable(layout.dilation), 100.0 * info.open_area / info.surface_area);
   }
+  if (!info.filled.empty()) {
+    const structures::FilledSpace& largest = info.filled.front();
+    fmt::print(
+        "filled        {} voids or slots, closed or too narrow for the voxels, are solid; the largest\n"
+        "              from {} to {}\n",
+        info.filled.size(), readable(Vector3f::Map(largest.low.data()).cast<double>()),
+        readable(Vector3f::Map(largest.high.data()).cast<double>()));
+  }
   fmt::print("shell         {} points on {:.4g} m^2, {} leaves, {} clusters, radius {}\n",
              structures.shell.points().size(), info.surface_area, structures.shell.leaves().size(),
              structures.shell.clusters().size(), readable(structures.shell.boundingRadius()));

@@ -74,6 +74,7 @@ OrderedJson jsonOf(const ScenarioFile& scenario, const Finding& finding) {
   json["place"] =
       finding.p_WP ? OrderedJson{finding.p_WP->x(), finding.p_WP->y(), finding.p_WP->z()} : OrderedJson();
   json["value"] = finding.kind == check::FindingKind::kLoad ? OrderedJson() : OrderedJson(finding.value);
+  json["error"] = finding.error > 0.0 ? OrderedJson(finding.error) : OrderedJson();
   json["unit"] = finding.unit;
   json["text"] = finding.text;
   json["hint"] = finding.hint;

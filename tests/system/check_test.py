@@ -145,6 +145,25 @@ class PlantedMistakes(CheckCase):
         self.assertAlmostEqual(stated["value"], 0.001, delta=20e-6)
         self.assertIn("clearance: 1 mm in line", stated["hint"])
 
+    def test_a_peg_wider_than_its_hole_is_an_error_although_its_depth_is_tolerated(self):
+        wide = self.only(self.check(1, peg="{box: [21 mm, 21 mm, 50 mm], at: [0, 0, 25 mm]}"), "overlap")
+        self.assertEqual((wide["severity"], wide["object"], wide["other"]), ("error", "peg", "block"))
+        self.assertIn("it can never be there: it is free nowhere within 1 mm and 2 deg of it", wide["text"])
+
+    def test_a_void_is_told_with_its_size_and_place(self):
+        shell = "{box: [19 mm, 19 mm, 50 mm], at: [0, 0, 25 mm]}, {file: void.off, unit: mm}"
+        # the walls of 6 x 8 x 10 mm around (0, 0, 20 mm), which face inwards
+        corners = [(x, y, z) for z in (15, 25) for y in (-4, 4) for x in (-3, 3)]
+        faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+        (self.folder / "void.off").write_text("OFF\n8 6 0\n" + "".join("%g %g %g\n" % c for c in corners) +
+                                              "".join("4 %d %d %d %d\n" % f for f in faces), encoding="utf-8")
+        filled, = (one for one in self.check(0, peg=shell) if one["kind"] == "filled")
+        self.assertEqual((filled["severity"], filled["object"], filled["unit"]), ("note", "peg", "m"))
+        self.assertAlmostEqual(filled["value"], 0.01, delta=1e-5)
+        self.assertIn("6 mm x 8 mm x 10 mm", filled["text"])
+        for place, expected in zip(filled["place"], (0.2, 0, 0.02)):
+            self.assertAlmostEqual(place, expected, delta=1e-5)
+
     def test_a_wrong_unit_in_either_direction(self):
         thousandth = "{box: [0.1 mm, 0.1 mm, 0.1 mm]}"
         small = self.only(self.check(1, peg=thousandth), "scale")

@@ -133,7 +133,7 @@ TEST(FieldSizeTruth, TheSuggestedVoxelFits) {
 Result<BakedField> bakeWithin(const FieldLimits& limits, const BakeOptions& options) {
   const BakeProgress progress;
   ParallelWork work(progress);
-  return bakeField(WeldedMesh(test::ballMesh(0.05, 4)).triangles, options, work, limits);
+  return bakeField(WeldedMesh(test::ballMesh(0.05, 4)), options, work, limits);
 }
 
 // An estimate refuses what is certainly too large; what is nearly so is counted.

@@ -22,6 +22,7 @@ using test::smallScenario;
 using test::smallStructures;
 using test::with;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 ScenarioFile parsed(const std::string& text) {
   return game_control::parseScenario(text, "small/scenario.yaml").value();
@@ -74,6 +75,41 @@ TEST(Check, APartThatFitsIsANoteWithItsPlayAndTilt) {
   EXPECT_NEAR(std::stod(fit.text.substr(tilt + 9)), 2.0 * 6.06, 0.3) << fit.text;
 }
 
+TEST(Check, TheErrorOfAPlayIsStatedAndHolds) {
+  constexpr double kVoxel = 0.001;
+  for (const double play : {0.0004, 0.0007, 0.001, 0.0013, 0.0017, 0.0023, 0.0031}) {
+    for (const double above_bottom : {0.0001, 0.0004, 0.0008, 0.0021}) {
+      const double hole = 0.04 + play;
+      const std::vector<Finding> findings =
+          findingsIn(with(smallScenario(), "at: [0, 0, -20 mm]", "at: [0, 0, -21 mm]"),
+                     withSocket(Vector3(hole, hole, 0.041 + above_bottom), kVoxel));
+      ASSERT_EQ(findings.size(), 1U) << play << " " << above_bottom;
+      EXPECT_EQ(findings[0].kind, FindingKind::kClearance);
+      EXPECT_NEAR(findings[0].value, play, findings[0].error) << above_bottom;
+      EXPECT_LE(findings[0].error, 0.6 * kVoxel);
+    }
+  }
+}
+
+TEST(Check, FilledSpacesAreNotesWithTheirSizeAndPlaceInTheWorld) {
+  std::vector<test::StructuresPtr> structures = smallStructures();
+  auto part = std::make_shared<structures::HapticStructures>(*structures[1]);
+  for (const float size : {0.008F, 0.006F, 0.004F, 0.002F})
+    part->info.filled.push_back({{0.0F, 0.0F, 0.0F}, {0.01F, 0.002F, size}, size});
+  structures[1] = part;
+  std::vector<Finding> filled = findingsIn(smallScenario(), structures);
+  std::erase_if(filled, [](const Finding& finding) { return finding.kind != FindingKind::kFilled; });
+  ASSERT_EQ(filled.size(), 3U) << "one by one";
+  EXPECT_EQ(filled[0].severity, Severity::kInfo);
+  EXPECT_EQ(filled[0].object, ObjectId{1});
+  EXPECT_NEAR(filled[0].value, 0.01, 1e-6);
+  EXPECT_THAT(filled[0].text, HasSubstr("a void or slot of 10 mm x 2 mm x 8 mm at ("));
+  ASSERT_TRUE(filled[0].p_WP);
+  EXPECT_NEAR((*filled[0].p_WP - Vector3(0.205, 0.001, 0.104)).norm(), 0.0, 1e-6) << "of the start";
+  EXPECT_THAT(filled[0].text, Not(HasSubstr("more")));
+  EXPECT_THAT(filled[2].text, HasSubstr("1 more have smaller walls"));
+}
+
 TEST(Check, AStatedClearanceThatIsNotTrueIsAWarningWithTheTrueOne) {
   const Finding more = theOnlyProblem(
       findingsIn(with(smallScenario(), "clearance: 4 mm", "clearance: 6 mm"), smallStructures()));
@@ -91,9 +127,8 @@ TEST(Check, AMissingClearanceIsNamedWithThePlayAndWhereToWriteIt) {
   const std::string text = with(smallScenario(), "pairs:\n  - {between: [part, bay], clearance: 4 mm}\n", "");
   const Finding missing = theOnlyProblem(findingsIn(text, withSocket(Vector3(0.0412, 0.0412, 0.042), 0.002)));
   EXPECT_EQ(missing.kind, FindingKind::kClearance);
-  // less than a voxel of play is found too small: by up to all of it
-  EXPECT_GT(missing.value, 0.0);
-  EXPECT_LT(missing.value, 0.0014);
+  EXPECT_NEAR(missing.value, 0.0012, missing.error);
+  EXPECT_NEAR(missing.error, 0.0012, 1e-9) << "0.6 voxels";
   EXPECT_THAT(missing.text, HasSubstr("no clearance is stated"));
   EXPECT_THAT(missing.hint, HasSubstr("{between: [part, bay], clearance: "));
 }
@@ -132,6 +167,35 @@ TEST(Check, ATargetInAWallIsAnErrorAndOneWithinTheToleranceAWarning) {
       findingsIn(with(smallScenario(), "at: [0, 0, -20 mm]", "at: [0, 0, -23.5 mm]"), smallStructures()));
   EXPECT_EQ(shallow.severity, Severity::kWarning);
   EXPECT_NEAR(shallow.value, 0.0015, 20e-6);
+}
+
+//   |  |____|  |   a part of 42 mm above and in a hole of 40 mm: 1 mm in each wall, and 2 mm are tolerated
+//   |__________|
+TEST(Check, APartThatIsTooWideForItsHoleIsAnErrorThoughItsDepthIsTolerated) {
+  const std::string text = with(smallScenario(), "clearance: 4 mm", "clearance: 1 mm");
+  std::vector<test::StructuresPtr> structures = withSocket(Vector3(0.040, 0.040, 0.042), 0.0005);
+  structures[1] = test::boxStructures(Vector3(0.042, 0.042, 0.040), 0.002, 0.003);
+  const Finding wide = theOnlyProblem(findingsIn(text, structures));
+  EXPECT_EQ(wide.kind, FindingKind::kOverlap);
+  EXPECT_EQ(wide.severity, Severity::kError);
+  EXPECT_NEAR(wide.value, 0.001414, 20e-6) << "at its edges";
+  EXPECT_THAT(wide.text, HasSubstr("inside bay"));
+  EXPECT_THAT(wide.text, HasSubstr("can never be there: it is free nowhere within 2 mm and 2 deg of it"));
+  // in one direction alone
+  structures[1] = test::boxStructures(Vector3(0.039, 0.042, 0.040), 0.002, 0.003);
+  EXPECT_EQ(theOnlyProblem(findingsIn(text, structures)).severity, Severity::kError);
+}
+
+TEST(Check, ATargetThatIsTurnedInAWallIsReachableWhereTheTurnIsTolerated) {
+  // 40 mm in 40.8 mm: free up to 1.15 deg
+  std::vector<test::StructuresPtr> structures = withSocket(Vector3(0.0408, 0.0408, 0.042), 0.0005);
+  structures[1] = test::boxStructures(Vector3::Constant(0.04), 0.002, 0.003);
+  std::string text = with(smallScenario(), "clearance: 4 mm", "clearance: 0.8 mm");
+  text = with(text, "at: [0, 0, -20 mm],", "at: [0, 0, -20 mm], turn: {axis: z, deg: 2.6},");
+  const Finding turned = theOnlyProblem(findingsIn(text, structures));
+  EXPECT_EQ(turned.kind, FindingKind::kOverlap);
+  EXPECT_EQ(turned.severity, Severity::kWarning);
+  EXPECT_THAT(turned.text, HasSubstr("2 mm are tolerated"));
 }
 
 /// The small scenario with a plate of 40 x 40 x 10 mm at `at`.

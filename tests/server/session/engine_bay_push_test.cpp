@@ -25,18 +25,22 @@ constexpr double kBeyond = 0.1;      ///< [m] behind the sheet where the hand en
 constexpr double kNear = 0.02;       ///< [m] A part that is kept further away was not pressed at the sheet.
 constexpr double kLeastForce = 5.0;  ///< [N] of the coupling
 constexpr double kFrom = 0.1;        ///< [m] before the sheet where it begins
+/// [m] along a sheet, places that are tried until one is pressed
+constexpr std::array kPlaces{0.0, -0.1, 0.1, -0.2, 0.2, -0.3, 0.3, -0.4, 0.4};
 
 /// A sheet of the engine bay, and the side from which parts are pushed against it.
 struct Sheet {
   std::string name;
   Vector3 p_WP;         ///< a point of it, or near
   Vector3 direction_W;  ///< of the push
+  Vector3 along_W;      ///< along the sheet, where other places of it are free
 };
 
 const std::array<Sheet, 3>& sheets() {
-  static const std::array<Sheet, 3> kSheets{{{"fender", {0.946, 0.75, 0.80}, {-1.0, 0.0, 0.0}},
-                                             {"flange", {0.87, 1.00, 0.93}, {0.0, 0.0, -1.0}},
-                                             {"bumper", {0.0, 0.042, 0.195}, {0.0, 1.0, 0.0}}}};
+  static const std::array<Sheet, 3> kSheets{
+      {{"fender", {0.946, 0.75, 0.80}, {-1.0, 0.0, 0.0}, Vector3::UnitY()},
+       {"flange", {0.87, 1.00, 0.93}, {0.0, 0.0, -1.0}, Vector3::UnitY()},
+       {"bumper", {0.0, 0.042, 0.195}, {0.0, 1.0, 0.0}, Vector3::UnitX()}}};
   return kSheets;
 }
 
@@ -156,7 +160,6 @@ TEST_P(EngineBayPushNightly, NoPointOfThePartIsBehindTheSheet) {
   const ObjectId part = bay.idOf(GetParam());
   const structures::HapticStructures& structures = *bay.object(GetParam()).structures;
   const Vector3 middle = structures.info.box_M.center();
-  int pressed = 0;
   for (const Sheet& at : sheets()) {
     const ExactSheet sheet = bay.sheetAt(at.p_WP);
     for (const bool corner_first : {false, true}) {
@@ -165,35 +168,40 @@ TEST_P(EngineBayPushNightly, NoPointOfThePartIsBehindTheSheet) {
       double reach = 0.0;
       for (const structures::ShellPoint& point : structures.shell.points())
         reach = std::max(reach, (turn * (point.p_MP.cast<double>() - middle)).dot(at.direction_W));
-      const auto poseAt = [&](double ahead) {
-        return Pose(at.p_WP + (ahead - reach) * at.direction_W - turn * middle, turn);
-      };
-      simulation::Environment environment(bay.scene(), {});
-      const HandId hand{0};
-      environment.setHandPresent(hand, true);
-      environment.setHandPose(hand, poseAt(-kFrom), {});
-      environment.step();
-      environment.place(part, poseAt(-kFrom), ObjectStatus::kParked);
-      environment.grab(hand, part);
-      double behind = -1.0;
-      constexpr double kSpeed = 0.5;  // [m/s]
-      const int moving = static_cast<int>((kFrom + kBeyond) / kSpeed * 1e3);
-      for (int tick = 0; tick < moving + 300; ++tick) {
-        environment.setHandPose(hand, poseAt(std::min(kSpeed * 1e-3 * tick - kFrom, kBeyond)), {});
+      // what else is in the bay may keep the part away from one place of the sheet
+      bool near = false;
+      for (const double shift : kPlaces) {
+        if (near) break;
+        const auto poseAt = [&](double ahead) {
+          return Pose(at.p_WP + shift * at.along_W + (ahead - reach) * at.direction_W - turn * middle, turn);
+        };
+        simulation::Environment environment(bay.scene(), {});
+        const HandId hand{0};
+        environment.setHandPresent(hand, true);
+        environment.setHandPose(hand, poseAt(-kFrom), {});
         environment.step();
-        if (tick % 50 == 0 || tick + 1 == moving + 300)
-          behind = std::max(behind, depthBehind(sheet, at.direction_W, structures.shell,
-                                                environment.objects()[part.value].X_WO));
+        environment.place(part, poseAt(-kFrom), ObjectStatus::kParked);
+        environment.grab(hand, part);
+        double behind = -1.0;
+        constexpr double kSpeed = 0.5;  // [m/s]
+        const int moving = static_cast<int>((kFrom + kBeyond) / kSpeed * 1e3);
+        for (int tick = 0; tick < moving + 300; ++tick) {
+          environment.setHandPose(hand, poseAt(std::min(kSpeed * 1e-3 * tick - kFrom, kBeyond)), {});
+          environment.step();
+          if (tick % 50 == 0 || tick + 1 == moving + 300)
+            behind = std::max(behind, depthBehind(sheet, at.direction_W, structures.shell,
+                                                  environment.objects()[part.value].X_WO));
+        }
+        const double force = environment.forceOn(part).force.norm();
+        EXPECT_LE(behind, kBehind) << at.name << (corner_first ? ", corner first" : ", flat");
+        // other things of the bay, or the part's own shape, may keep it away from the sheet
+        near = behind > -kNear && force > kLeastForce;
+        std::printf("%s at %s, %s, %+.0f mm along it: %.3f mm behind, %.0f N\n", GetParam(), at.name.c_str(),
+                    corner_first ? "corner first" : "flat", 1e3 * shift, 1e3 * behind, force);
       }
-      const double force = environment.forceOn(part).force.norm();
-      EXPECT_LE(behind, kBehind) << at.name << (corner_first ? ", corner first" : ", flat");
-      // other things of the bay, or the part's own shape, may keep it away from the sheet
-      if (behind > -kNear && force > kLeastForce) ++pressed;
-      std::printf("%s at %s, %s: %.3f mm behind, %.0f N\n", GetParam(), at.name.c_str(),
-                  corner_first ? "corner first" : "flat", 1e3 * behind, force);
+      EXPECT_TRUE(near) << at.name << (corner_first ? ", corner first" : ", flat") << ": was not pressed";
     }
   }
-  EXPECT_GE(pressed, 4) << "of six pushes";
 }
 
 INSTANTIATE_TEST_SUITE_P(Parts, EngineBayPushNightly, testing::ValuesIn(kParts),
