@@ -17,10 +17,10 @@ constexpr double kShortestCycle = 1e-6;  // [s]
 constexpr float kContactGap = 5e-5F;  // [m]
 
 CouplingOptions couplingOf(const devices::DeviceCaps& caps) {
-  const devices::SafetyLimits limits = devices::safetyLimits(caps);
+  const HandStiffness stiffness = stiffnessOf(caps);
   CouplingOptions options;
-  options.max_stiffness = std::min(caps.max_stiffness, limits.stiffness);
-  options.max_rotational_stiffness = std::min(caps.max_rotational_stiffness, limits.rotational_stiffness);
+  options.max_stiffness = stiffness.translational;
+  options.max_rotational_stiffness = stiffness.rotational;
   options.damping = kDampingFraction * caps.physical_damping;
   options.rotational_damping = kDampingFraction * caps.physical_rotational_damping;
   options.dof_mask = caps.dof_mask;
@@ -39,6 +39,11 @@ bool serverSeesContact(const HandManifold& manifold) {
                      [](const ManifoldContact& contact) { return contact.gap <= kContactGap; });
 }
 }  // namespace
+
+HandStiffness stiffnessOf(const devices::DeviceCaps& caps) noexcept {
+  const devices::SafetyLimits limits = devices::safetyLimits(caps);
+  return {limits.stiffness, limits.rotational_stiffness};
+}
 
 HapticHand::HapticHand(devices::HapticDevice& device, devices::ClutchLatch* clutch)
     : device_(device),

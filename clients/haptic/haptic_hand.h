@@ -15,6 +15,9 @@
 
 namespace tenon::haptic {
 
+/// Stiffness that a device renders passively at its rate, delay and damping: Join::stiffness.
+[[nodiscard]] HandStiffness stiffnessOf(const devices::DeviceCaps& caps) noexcept;
+
 /// State changes of a hand within one millisecond, for the event log.
 struct HandEvents {
   FixedVector<devices::Intervention, 8> interventions;  ///< begins and ends of safety rules

@@ -68,6 +68,8 @@ class Station {
 
   /// Hands requested at join.
   [[nodiscard]] virtual std::vector<std::string> handNames() const = 0;
+  /// Join::stiffness, in the order of handNames().
+  [[nodiscard]] virtual std::vector<HandStiffness> stiffness() const { return {}; }
   [[nodiscard]] virtual Role role() const = 0;
 
   /// Called before the first step and after a rejoin with a new seat. `welcome.hands` are in the order of

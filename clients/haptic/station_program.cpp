@@ -451,6 +451,7 @@ Result<RunState> runStation(Station& station, const StationProgramOptions& optio
   wire::MembershipOptions membership = options.membership;
   membership.role = station.role();
   membership.hands = station.handNames();
+  membership.stiffness = station.stiffness();
   if (!options.seat_file.empty()) membership.seat = readSeatKey(options.seat_file);
   auto link = StationLink::open(membership, stop);
   if (!link) return fail(link.error().what);

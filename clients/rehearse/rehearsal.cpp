@@ -71,6 +71,7 @@ class Rehearsal {
     request.name = std::string(roleName(station.role()));
     request.role = station.role();
     request.hands = station.handNames();
+    request.stiffness = station.stiffness();
     const Welcome welcome = registry_.join(request, {.key = true}, 0);
     if (!welcome.accepted) return fail(welcome.reason);
     station.welcome(welcome, objects_);

@@ -204,6 +204,12 @@ std::vector<std::string> DeviceStation::handNames() const {
   return names;
 }
 
+std::vector<HandStiffness> DeviceStation::stiffness() const {
+  std::vector<HandStiffness> all;
+  for (const Arm& arm : parts_->arms) all.push_back(haptic::stiffnessOf(arm.device->caps()));
+  return all;
+}
+
 Role DeviceStation::role() const { return parts_->options.role; }
 
 devices::HapticDevice* DeviceStation::pacingDevice() {

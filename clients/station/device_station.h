@@ -60,6 +60,7 @@ class DeviceStation : public haptic::Station {
   ~DeviceStation() override;
 
   [[nodiscard]] std::vector<std::string> handNames() const override;
+  [[nodiscard]] std::vector<HandStiffness> stiffness() const override;
   [[nodiscard]] Role role() const override;
   void step(std::uint32_t seq) noexcept override;
   [[nodiscard]] bool wantsArming() const noexcept override;

@@ -8,7 +8,8 @@
 namespace tenon::devices {
 
 /// A RemoteModel whose peer is a browser, behind a gateway that lives in the same process. A person at a
-/// mouse is not pushed back, so the hand stays within 20 mm and 0.15 rad of its proxy wherever the target is.
+/// mouse is not pushed back, so the hand stays within 20 mm and 0.15 rad of its proxy wherever the target is:
+/// it pushes with 20 N at most.
 ///
 /// A browser draws while it does nothing else, so it counts as silent after 500 cycles, and as gone after
 /// 10,000.
@@ -17,7 +18,8 @@ namespace tenon::devices {
 /// and as HapticDevice.
 class BrowserDevice final : public RemoteModel {
  public:
-  static constexpr RemoteLimits kLimits{.silent = 500, .gone = 10'000, .reach = 0.020, .turn = 0.15};
+  static constexpr RemoteLimits kLimits{
+      .silent = 500, .gone = 10'000, .reach = 0.020, .turn = 0.15, .stiffness = 1000.0};
 
   BrowserDevice() : RemoteModel(kLimits) { meetPeer(); }
 

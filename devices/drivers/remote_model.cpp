@@ -41,7 +41,9 @@ DeviceCaps remoteCaps() {
 
 }  // namespace
 
-RemoteModel::RemoteModel(const RemoteLimits& limits) : caps_(remoteCaps()), limits_(limits) {}
+RemoteModel::RemoteModel(const RemoteLimits& limits) : caps_(remoteCaps()), limits_(limits) {
+  caps_.max_stiffness = limits.stiffness;
+}
 
 Result<void> RemoteModel::arm() {
   if (state_.fault != DeviceFault::kNone)

@@ -13,6 +13,7 @@ struct RemoteLimits {
   /// How far the hand goes from its proxy: of a peer that does not keep its target near the proxy itself.
   double reach = std::numeric_limits<double>::infinity();  ///< [m]
   double turn = std::numeric_limits<double>::infinity();   ///< [rad]
+  double stiffness = 2000.0;                               ///< [N/m] of the coupling, at most
 };
 
 /// What devices have in common that a program moves (the peer), whatever carries the messages.

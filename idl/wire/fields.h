@@ -68,6 +68,10 @@ void fields(auto& d, auto& c, Is<ManifoldBody> auto& m) {
   d("object", c.object_id, m.object);
   d("epoch", c.epoch, m.epoch);
 }
+void fields(auto& d, auto& c, Is<HandStiffness> auto& m) {
+  d("translational", c.translational, m.translational);
+  d("rotational", c.rotational, m.rotational);
+}
 void fields(auto& d, auto& c, Is<PairContact> auto& m) {
   d("a", c.a, m.a);
   d("b", c.b, m.b);
@@ -123,6 +127,7 @@ void fields(auto& d, auto& c, Is<Join> auto& m) {
   d("seat_proof", c.seat_proof, m.seat_proof);
   d("key_proof", c.key_proof, m.key_proof);
   d("protocol_version", c.protocol_version, m.protocol_version);
+  d.list("stiffness", c.stiffness, m.stiffness, 8, kStructs);
 }
 void fields(auto& d, auto& c, Is<Welcome> auto& m) {
   d("client_guid", c.client_guid, m.client_guid);

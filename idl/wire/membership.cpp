@@ -112,7 +112,8 @@ Result<void> Membership::join(const Stop& stop, const std::function<void()>& mea
             .name = options_.person,
             .role = options_.role,
             .hands = options_.hands,
-            .seat_key = options_.seat->publicKey()};
+            .seat_key = options_.seat->publicKey(),
+            .stiffness = options_.stiffness};
   std::string key_problem;
   Result<void> sent;
   auto send_at = std::chrono::steady_clock::now();

@@ -23,8 +23,9 @@ struct MembershipOptions {
   std::uint32_t domain = 0;         ///< DDS domain
   std::string person = "somebody";  ///< name of the participant, for display
   Role role = Role::kObserver;
-  std::vector<std::string> hands;  ///< to control
-  std::optional<SeatKey> seat;     ///< of an earlier seat, to rejoin it with its hands; none: a new one
+  std::vector<std::string> hands;        ///< to control
+  std::vector<HandStiffness> stiffness;  ///< Join::stiffness
+  std::optional<SeatKey> seat;           ///< of an earlier seat, to rejoin it with its hands; none: a new one
   std::filesystem::path key_file;  ///< of the session's key, for roles that need it; empty: defaultKeyFile()
   std::optional<SharedKey> key;    ///< the session's key itself, instead of that of a file
   bool lockstep = false;           ///< refuse a session in real time

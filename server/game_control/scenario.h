@@ -85,9 +85,9 @@ struct ScenarioHand {
   std::string name;
   Role role = Role::kTrainee;
   simulation::HandKind kind = simulation::HandKind::kCoupled;
-  ObjectId object;            ///< default object: moved while the hand holds no other (pointer, forearm)
-  double stiffness = 1000.0;  ///< [N/m] of its coupling
-  double rotational_stiffness = 20.0;  ///< [Nm/rad] of its coupling
+  ObjectId object;         ///< default object: moved while the hand holds no other (pointer, forearm)
+  double stiffness = 0.0;  ///< [N/m] of its coupling at most; 0: as its device and link allow
+  double rotational_stiffness = 0.0;  ///< [Nm/rad] likewise
   int line = 0;
 };
 

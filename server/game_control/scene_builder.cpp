@@ -276,8 +276,13 @@ Result<std::shared_ptr<const simulation::Scene>> makeScene(const ScenarioFile& s
     scene->pairs.push_back(spec);
   }
   for (const ScenarioHand& hand : scenario.hands) {
-    scene->hands.push_back(
-        {hand.name, hand.role, hand.kind, hand.object, hand.stiffness, hand.rotational_stiffness});
+    simulation::HandSpec& spec = scene->hands.emplace_back();
+    spec.name = hand.name;
+    spec.role = hand.role;
+    spec.kind = hand.kind;
+    spec.object = hand.object;
+    if (hand.stiffness > 0.0) spec.stiffness = hand.stiffness;
+    if (hand.rotational_stiffness > 0.0) spec.rotational_stiffness = hand.rotational_stiffness;
   }
   return std::shared_ptr<const simulation::Scene>(std::move(scene));
 }

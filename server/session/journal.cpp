@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "idl/record/mcap_reader.h"
 #include "idl/types/messages/journal.h"
+#include "idl/types/messages/session.h"
 #include "idl/wire/codec.h"
 #include "idl/wire/topics.h"
 #include "server/session/part_joiner.h"
@@ -15,6 +15,7 @@ constexpr std::string_view kMetadata = "tenon journal";
 constexpr std::string_view kRecordingMetadata = "tenon recording";  // of `tenon record`
 constexpr std::string_view kScenarioHash = "scenario hash";
 constexpr std::string_view kStructuresOf = "structures of ";
+constexpr std::string_view kProtocol = "protocol";
 constexpr std::string_view kFreeze = "freeze after ticks";
 constexpr std::string_view kPark = "park after ticks";
 
@@ -91,6 +92,7 @@ Result<Journal> Journal::open(const std::filesystem::path& file, const JournalOr
   Journal journal(std::move(*writer));
   std::map<std::string, std::string> metadata{{"scenario", origin.scenario},
                                               {"detail", fmt::format("{}", origin.detail)},
+                                              {std::string(kProtocol), std::to_string(kProtocolVersion)},
                                               {std::string(kFreeze), std::to_string(origin.limits.freeze)},
                                               {std::string(kPark), std::to_string(origin.limits.park)},
                                               {std::string(kScenarioHash), origin.fingerprint.scenario}};
@@ -142,6 +144,8 @@ Result<void> Journal::close(const RunState& run) {
 Result<ResimulationReport> resimulate(const std::filesystem::path& file, SessionSimulation& simulation) {
   auto reader = record::McapReader::open(file);
   if (!reader) return fail(reader.error().what);
+  if (const std::string why = refusalByProtocol(*reader); !why.empty())
+    return fail(file.string() + ": " + why);
   Resimulator resimulator(simulation);
   record::McapMessage message;
   while (reader->next(message))
@@ -153,6 +157,18 @@ Result<ResimulationReport> resimulate(const std::filesystem::path& file, Session
   return fail(fmt::format("{}: holds no ticks to re-simulate{}", file.string(),
                           report.problem.empty() ? " (was it recorded by 'tenon record' or 'tenon serve'?)"
                                                  : ": " + report.problem));
+}
+
+std::string refusalByProtocol(const record::McapReader& reader) {
+  for (const auto& [name, values] : reader.metadata()) {
+    if (name != kMetadata && name != kRecordingMetadata) continue;
+    const auto found = values.find(std::string(kProtocol));
+    const std::string version = found == values.end() ? "3 or older" : found->second;
+    if (version != std::to_string(kProtocolVersion))
+      return fmt::format("was written with version {} of the protocol, this program reads version {}",
+                         version, kProtocolVersion);
+  }
+  return {};
 }
 
 Result<Fingerprint> readFingerprint(const std::filesystem::path& file) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "idl/record/mcap_reader.h"
 #include "idl/record/mcap_writer.h"
 #include "idl/types/result.h"
 #include "server/session/scene_loader.h"
@@ -104,6 +105,10 @@ struct ResimulationReport {
 /// cannot be read, is of another scenario, or has no tick after a checkpoint.
 [[nodiscard]] Result<ResimulationReport> resimulate(const std::filesystem::path& file,
                                                     SessionSimulation& simulation);
+
+/// Why inputs of this journal or recording cannot be read: it was written by another version of the protocol;
+/// empty: they can.
+[[nodiscard]] std::string refusalByProtocol(const record::McapReader& reader);
 
 /// The fingerprint of the scene that a journal or a recording was made with; empty where it was not recorded.
 [[nodiscard]] Result<Fingerprint> readFingerprint(const std::filesystem::path& file);

@@ -84,6 +84,7 @@ std::string refusal(const std::filesystem::path& file, const record::McapReader&
                        outcome->second.contains("reason") ? outcome->second.at("reason") : "",
                        outcome->second.contains("tick") ? outcome->second.at("tick") : "?", instead(file));
   if (reader.complete()) return "was closed, there is nothing to resume; " + instead(file);
+  if (const std::string why = refusalByProtocol(reader); !why.empty()) return why + "; " + instead(file);
   const auto then = readFingerprint(file);
   if (!then) return then.error().what;
   if (const auto changes = changesSince(*then, loaded); !changes.empty())

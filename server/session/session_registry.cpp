@@ -12,13 +12,17 @@
 namespace tenon::session {
 namespace {
 
-constexpr double kMaxPosition = 1000.0;  // [m] of a hand or object from the world's origin, each axis
-constexpr double kMaxSpeed = 50.0;       // [m/s], [rad/s] of a hand
+constexpr double kMaxPosition = 1000.0;          // [m] of a hand or object from the world's origin, each axis
+constexpr double kMaxSpeed = 50.0;               // [m/s], [rad/s] of a hand
+constexpr double kMaxStiffness = 1e5;            // [N/m] of a hand's coupling, as in scenarios
+constexpr double kMaxRotationalStiffness = 1e4;  // [Nm/rad] likewise
 
 bool isPlausible(const Pose& X) {
   return X.isFinite() && X.translation().cwiseAbs().maxCoeff() < kMaxPosition &&
          std::abs(X.rotation().squaredNorm() - 1.0) < 1e-3;
 }
+
+bool isPlausible(double stiffness, double limit) { return stiffness >= 0.0 && stiffness <= limit; }
 
 bool isPlausible(const Vector3& v, double limit) { return v.allFinite() && v.norm() < limit; }
 
@@ -114,6 +118,12 @@ std::string SessionRegistry::joinRefusal(const Join& join, const JoinProofs& pro
   const bool keeps_seat = former && clients_[*former].alive && clients_[*former].role == join.role;
   if (!keeps_seat && present(join.role) >= role->seats)
     return fmt::format("all {} seats of the role {} are taken", role->seats, roleName(join.role));
+  if (std::any_of(join.stiffness.begin(), join.stiffness.end(), [](const HandStiffness& hand) {
+        return !isPlausible(hand.translational, kMaxStiffness) ||
+               !isPlausible(hand.rotational, kMaxRotationalStiffness);
+      }))
+    return fmt::format("the stiffness of a hand is out of range: expected 0 to {} N/m and 0 to {} Nm/rad",
+                       kMaxStiffness, kMaxRotationalStiffness);
   return handRefusal(join, former);
 }
 
@@ -178,19 +188,30 @@ std::size_t SessionRegistry::newSeat() {
   return first;
 }
 
+/// Of the coupling of the hand `join.hands[index]`, which the scenario has: as stiff as device and link
+/// allow, and no stiffer than the scenario says. 0: nobody says.
+HandStiffness SessionRegistry::stiffnessOf(const Join& join, std::size_t index) const {
+  const HandStiffness offered = index < join.stiffness.size() ? join.stiffness[index] : HandStiffness{};
+  const game_control::ScenarioHand& hand = scenario_.hands[scenario_.handNamed(join.hands[index]).value];
+  const auto least = [](double one, double other) {
+    return one > 0.0 && other > 0.0 ? std::min(one, other) : std::max(one, other);
+  };
+  return {least(offered.translational, hand.stiffness), least(offered.rotational, hand.rotational_stiffness)};
+}
+
 void SessionRegistry::assignSeat(const Join& join, Welcome& welcome, const wire::Origin& from) {
   const auto former = indexOf(join.seat_key);
   const std::size_t index = former ? *former : newSeat();
   welcome.accepted = true;
   welcome.client = ClientId{static_cast<std::uint32_t>(index + 1)};
   std::vector<HandId> controlled;
-  for (const std::string& name : join.hands) {
-    const HandId hand = scenario_.handNamed(name);
+  for (std::size_t i = 0; i < join.hands.size(); ++i) {
+    const HandId hand = scenario_.handNamed(join.hands[i]);
     welcome.hands.push_back(hand);
     if (!hand.valid()) continue;
     controllers_[hand.value] = welcome.client;
     controlled.push_back(hand);
-    changes_.push_back({.kind = ChangeKind::kAttach, .hand = hand});
+    changes_.push_back({.kind = ChangeKind::kAttach, .hand = hand, .stiffness = stiffnessOf(join, i)});
   }
   clients_[index] = {welcome.client, join.name, join.role, controlled, true};
   seats_[index].guid = join.client_guid;

@@ -113,6 +113,7 @@ class SessionRegistry {
   [[nodiscard]] std::optional<std::size_t> indexOf(const std::string& seat_key) const;
   [[nodiscard]] std::string joinRefusal(const Join& join, const JoinProofs& proofs) const;
   [[nodiscard]] std::string handRefusal(const Join& join, std::optional<std::size_t> former) const;
+  [[nodiscard]] HandStiffness stiffnessOf(const Join& join, std::size_t index) const;
   [[nodiscard]] std::size_t newSeat();
   void assignSeat(const Join& join, Welcome& welcome, const wire::Origin& from);
   [[nodiscard]] CommandAck decide(const Command& command, Role role);

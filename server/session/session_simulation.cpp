@@ -48,7 +48,7 @@ void SessionSimulation::tick(const TickInput& input) noexcept {
 void SessionSimulation::apply(const Change& change) noexcept {
   switch (change.kind) {
     case ChangeKind::kAttach:
-      return attach(change.hand);
+      return attach(change.hand, change.stiffness);
     case ChangeKind::kDetach:
       return detach(change.hand);
     case ChangeKind::kGameCommand:
@@ -96,8 +96,9 @@ void SessionSimulation::take(HandId hand, ObjectId object) noexcept {
   environment_.grab(hand, object);
 }
 
-void SessionSimulation::attach(HandId hand) noexcept {
+void SessionSimulation::attach(HandId hand, const HandStiffness& stiffness) noexcept {
   if (hand.value >= ages_.size()) return;
+  environment_.setHandStiffness(hand, stiffness);
   ages_[hand.value] = {.attached = true, .active = true, .age = 0, .seq = 0};
 }
 

@@ -85,7 +85,7 @@ class SessionSimulation {
   /// No hand moves an object: emergency stop or pause.
   [[nodiscard]] bool isSuspended() const { return emergency_stop_ || phase_ == RunPhase::kPaused; }
   void take(HandId hand, ObjectId object) noexcept;
-  void attach(HandId hand) noexcept;
+  void attach(HandId hand, const HandStiffness& stiffness) noexcept;
   void detach(HandId hand) noexcept;
 
   std::shared_ptr<const game_control::ScenarioFile> scenario_;

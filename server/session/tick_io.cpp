@@ -18,6 +18,7 @@ void get(ByteReader& in, HandReading& reading) {
 void put(ByteWriter& out, const Change& change) {
   out.put(change.kind), out.put(change.hand), out.put(change.object), out.put(change.index);
   out.put(change.lifetime_ticks), out.put(change.value);
+  out.put(change.stiffness.translational), out.put(change.stiffness.rotational);
   out.put(change.game.kind), out.put(change.game.hand), out.put(change.game.signal),
       out.put(change.game.value);
   out.put(change.F_Oo_W), out.put(change.X_WO);
@@ -26,6 +27,7 @@ void put(ByteWriter& out, const Change& change) {
 void get(ByteReader& in, Change& change) {
   in.get(change.kind), in.get(change.hand), in.get(change.object), in.get(change.index);
   in.get(change.lifetime_ticks), in.get(change.value);
+  in.get(change.stiffness.translational), in.get(change.stiffness.rotational);
   in.get(change.game.kind), in.get(change.game.hand), in.get(change.game.signal), in.get(change.game.value);
   in.get(change.F_Oo_W), in.get(change.X_WO);
 }

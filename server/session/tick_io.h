@@ -6,6 +6,7 @@
 
 #include "idl/types/fixed_vector.h"
 #include "idl/types/messages/contacts.h"
+#include "idl/types/messages/hands.h"
 #include "idl/types/messages/objects.h"
 #include "idl/types/messages/run.h"
 #include "idl/types/messages/timing.h"
@@ -26,7 +27,7 @@ struct HandReading {
 
 /// Which members of a Change are used is said at each kind. The numbers are part of the journal.
 enum class ChangeKind : std::uint8_t {
-  kAttach,            ///< a client starts to control `hand`
+  kAttach,            ///< a client starts to control `hand`, whose coupling has `stiffness`
   kDetach,            ///< no client controls `hand` any more: the object it holds is parked
   kGameCommand,       ///< `game` for the state machine
   kRelease,           ///< `hand` releases the object it holds
@@ -50,6 +51,7 @@ struct Change {
   std::uint32_t index = 0;           ///< of a collision pair or force source, by kind
   std::uint32_t lifetime_ticks = 0;  ///< [ticks]
   double value = 0.0;                ///< [-] or [points], by kind
+  HandStiffness stiffness;
   game_control::GameCommand game;
   Wrench F_Oo_W;
   Pose X_WO;

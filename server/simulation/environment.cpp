@@ -32,6 +32,7 @@ Environment::Environment(std::shared_ptr<const Scene> scene, const EnvironmentOp
   for (std::size_t i = 0; i < hands_.size(); ++i) {
     hands_[i].default_object = scene_->hands[i].object;
     hands_[i].object = hands_[i].default_object;
+    setHandStiffness(HandId{static_cast<std::uint32_t>(i)}, {});
   }
   for (std::size_t i = 0; i < pairs_.size(); ++i) pairs_[i].enabled = engine_->pairs[i].enabled();
 }
@@ -150,9 +151,8 @@ Twist Environment::twistOver(const Displacement& motion, ObjectId object) const 
 
 collision::Spring Environment::springOf(HandId hand) const noexcept {
   const HandMotion& motion = hands_[hand.value];
-  const HandSpec& spec = scene_->hands[hand.value];
-  return {motion.X_WH * motion.X_HO, motion.X_HO.inverse().translation(), spec.stiffness,
-          spec.rotational_stiffness};
+  return {motion.X_WH * motion.X_HO, motion.X_HO.inverse().translation(), motion.stiffness.translational,
+          motion.stiffness.rotational};
 }
 
 collision::MovableBody Environment::movableBody(ObjectId object) noexcept {

@@ -7,6 +7,7 @@
 
 #include "idl/types/hash.h"
 #include "idl/types/messages/contacts.h"
+#include "idl/types/messages/hands.h"
 #include "idl/types/messages/objects.h"
 #include "idl/types/result.h"
 #include "server/collision/island_solver.h"
@@ -38,6 +39,7 @@ struct HandMotion {
   Pose X_WH_before;         ///< device pose of the last tick
   Pose X_HO;                ///< of the object in the hand, constant while held
   Wrench F_Ho_W;            ///< of the coupling on the hand, about the hand's origin
+  HandStiffness stiffness;  ///< of the coupling
   ObjectId default_object;  ///< moved while the hand holds no other: pointer, drill, cube, forearm
   /// R: where the default object returns to, fixed to the held object O since that was grabbed.
   Pose X_OR;
@@ -109,6 +111,8 @@ class Environment {
   void setHandPresent(HandId hand, bool present) noexcept;
   /// Invalid poses are ignored and counted in HandMotion::rejected_poses.
   void setHandPose(HandId hand, const Pose& X_WH, const Twist& V_WH) noexcept;
+  /// Of the hand's coupling from now on. Numbers that are 0 or not finite: that of HandSpec.
+  void setHandStiffness(HandId hand, const HandStiffness& stiffness) noexcept;
   /// While frozen, the hand's object keeps its pose and the coupling exerts no force.
   void setHandFrozen(HandId hand, bool frozen) noexcept;
   /// While paused, free bodies keep their poses; they continue from rest.

@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include "server/simulation/engine.h"
 #include "server/simulation/environment.h"
 
@@ -56,6 +58,16 @@ void Environment::setHandPose(HandId hand, const Pose& X_WH, const Twist& V_WH) 
   const Vector3 p_WG = (objects_[motion.object.value].X_WO * motion.X_HO.inverse()).translation();
   if (was_held && (motion.X_WH.translation() - p_WG).norm() > kGraspReach) return;
   attachHand(hand);
+}
+
+void Environment::setHandStiffness(HandId hand, const HandStiffness& stiffness) noexcept {
+  if (!isHand(hand)) return;
+  const HandSpec& spec = scene_->hands[hand.value];
+  const auto known = [](double said, double otherwise) {
+    return said > 0.0 && std::isfinite(said) ? said : otherwise;
+  };
+  hands_[hand.value].stiffness = {known(stiffness.translational, spec.stiffness),
+                                  known(stiffness.rotational, spec.rotational_stiffness)};
 }
 
 void Environment::setHandFrozen(HandId hand, bool frozen) noexcept {

@@ -118,14 +118,13 @@ void Environment::pairContact(std::size_t pair, PairContact& out) const noexcept
 void Environment::manifold(HandId hand, HandManifold& out) const noexcept {
   if (!isHand(hand)) return;
   const HandMotion& motion = hands_[hand.value];
-  const HandSpec& spec = scene_->hands[hand.value];
   out.hand = hand;
   out.tick = tick_;
   out.object = motion.object;
   out.X_HO = motion.X_HO;
   out.F_Ho_W = motion.F_Ho_W;
-  out.stiffness = spec.stiffness;
-  out.rotational_stiffness = spec.rotational_stiffness;
+  out.stiffness = motion.stiffness.translational;
+  out.rotational_stiffness = motion.stiffness.rotational;
   out.frozen = motion.frozen;
   out.validity_radius = 0.0;
   out.others.clear();

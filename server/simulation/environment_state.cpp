@@ -9,7 +9,7 @@ namespace tenon::simulation {
 namespace {
 
 /// Incremented with every change of the archived fields.
-constexpr std::uint32_t kStateVersion = 9;
+constexpr std::uint32_t kStateVersion = 10;
 
 template <typename Archive, typename Motion>
 void archiveObject(Archive& archive, Motion& object) {
@@ -34,6 +34,8 @@ void archiveHand(Archive& archive, Motion& hand) {
   archive(hand.X_HO);
   archive(hand.X_OR);
   archive(hand.F_Ho_W);
+  archive(hand.stiffness.translational);
+  archive(hand.stiffness.rotational);
   archive(hand.default_object);
   archive(hand.has_pose);
   archive(hand.attached);
@@ -194,7 +196,8 @@ bool Environment::isValid() const noexcept {
   return work_limits_.critical_load > 0.0 && valid_objects &&
          std::all_of(hands_.begin(), hands_.end(), [&](const HandMotion& hand) {
            return validPose(hand.X_WH) && validPose(hand.X_WH_before) && validPose(hand.X_HO) &&
-                  validPose(hand.X_OR) && (!hand.object.valid() || isObject(hand.object)) &&
+                  validPose(hand.X_OR) && hand.stiffness.translational > 0.0 &&
+                  hand.stiffness.rotational > 0.0 && (!hand.object.valid() || isObject(hand.object)) &&
                   (!hand.default_object.valid() || isObject(hand.default_object));
          });
 }

@@ -77,8 +77,8 @@ struct HandSpec {
   Role role = Role::kTrainee;
   HandKind kind = HandKind::kCoupled;
   ObjectId object;            ///< default object: moved while the hand holds no other (pointer, forearm)
-  double stiffness = 1000.0;  ///< [N/m] of the virtual coupling
-  double rotational_stiffness = 20.0;  ///< [Nm/rad] of the virtual coupling
+  double stiffness = 1000.0;  ///< [N/m] of the virtual coupling, unless Environment::setHandStiffness says it
+  double rotational_stiffness = 20.0;  ///< [Nm/rad] likewise
 };
 
 /// The constant part of the simulation: objects, pairs and hands, with ids as indices.

@@ -21,6 +21,12 @@ struct DeviceSample {
 inline constexpr std::uint32_t kAllDofs = 0x3F;
 inline constexpr std::uint32_t kTranslationDofs = 0x07;
 
+/// Stiffness of the coupling between a hand and the object that it moves.
+struct HandStiffness {
+  double translational = 0.0;  ///< [N/m] 0: not known, or no force
+  double rotational = 0.0;     ///< [Nm/rad] 0: not known, or no torque
+};
+
 /// Pose of one hand's device, from its station to the server in every client tick.
 struct DeviceInput {
   HandId hand;

@@ -5,12 +5,13 @@
 #include <vector>
 
 #include "idl/types/ids.h"
+#include "idl/types/messages/hands.h"
 #include "idl/types/messages/role.h"
 
 /// Joining a session and leaving it.
 namespace tenon {
 
-inline constexpr std::uint32_t kProtocolVersion = 3;
+inline constexpr std::uint32_t kProtocolVersion = 4;
 
 /// Published by each server in the lobby partition: the session it runs.
 struct SessionAnnounce {
@@ -42,6 +43,10 @@ struct Join {
   std::string seat_proof;          ///< of the secret that belongs to seat_key; empty before a challenge
   std::string key_proof;           ///< of the session's key; empty before a challenge
   std::uint32_t protocol_version = kProtocolVersion;
+  /// What the devices of `hands` and their links allow, in the order of `hands`; 8 at most, a shorter
+  /// list says nothing of the rest. The server takes no stiffer coupling, and the scenario may ask for a
+  /// softer one.
+  std::vector<HandStiffness> stiffness;
 };
 
 /// The server's answer to a Join, and later the notice that a client has lost its seat.

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "devices/safety_rules.h"
 #include "devices/simulated/hug.h"
 #include "tests/clients/haptic/hand_above_floor.h"
 
@@ -34,9 +35,11 @@ std::unique_ptr<devices::HapticDevice> openHand(const std::string& name) {
   return arm;
 }
 
+/// As stiff as its device allows.
 struct RestingHand : HandAboveFloor {
   explicit RestingHand(const std::string& name, Target where = Target::kInScene)
-      : HandAboveFloor(openHand(name), 0.014), target(where) {
+      : HandAboveFloor(openHand(name), 0.014, devices::safetyLimits(openHand(name)->caps()).stiffness),
+        target(where) {
     arm().setContraction(1.0);
     for (int i = 0; i < 1500; ++i) push(Vector3(0.0, 0.0, 0.015));  // the soft start is over
     for (double depth = 0.0; depth < 0.1 && force() < 5.0; depth += 2e-5)

@@ -16,9 +16,10 @@ namespace tenon::test {
 /// input one tick later.
 struct HandAboveFloor {
   explicit HandAboveFloor(const std::string& name) : HandAboveFloor(std::move(*devices::openDevice(name))) {}
-  /// `height` [m] of the hand, at the centre of its device.
-  explicit HandAboveFloor(std::unique_ptr<devices::HapticDevice> held, double height = 0.03)
-      : device(std::move(held)), hand(*device) {
+  /// `height` [m] of the hand, at the centre of its device; `stiffness` [N/m] of the coupling.
+  explicit HandAboveFloor(std::unique_ptr<devices::HapticDevice> held, double height = 0.03,
+                          double stiffness = 1000.0)
+      : server(stiffness), device(std::move(held)), hand(*device) {
     world.begin(server.objects(), 0, 0);
     EXPECT_TRUE(hand.begin(kHand, ClientId{1}, Vector3(0.0, 0.0, height), true));
   }
@@ -45,7 +46,7 @@ struct HandAboveFloor {
     hand.step(static_cast<std::uint32_t>(tick), world, kTickSeconds);
   }
 
-  PlaneServer server{1000.0};
+  PlaneServer server;
   std::unique_ptr<devices::HapticDevice> device;
   haptic::HapticHand hand;
   haptic::WorldView world;

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "idl/types/messages/journal.h"
+#include "idl/types/messages/session.h"
 #include "idl/wire/codec.h"
 #include "idl/wire/topics.h"
 #include "tests/server/session/small_session.h"
@@ -185,6 +186,17 @@ TEST_F(JournalTest, AJournalOfAnotherScenarioIsAnError) {
   const auto report = resimulate(file_, other);
   ASSERT_FALSE(report);
   EXPECT_THAT(report.error().what, HasSubstr("session.mcap"));
+}
+
+TEST_F(JournalTest, AJournalOfAnotherProtocolIsRefusedWithBothVersions) {
+  auto writer = record::McapWriter::open(file_);
+  ASSERT_TRUE(writer);
+  ASSERT_TRUE(writer->addMetadata("tenon journal", {{"scenario", "small/scenario.yaml"}, {"detail", "1"}}));
+  ASSERT_TRUE(writer->close());
+  const auto report = resimulateJournal();
+  ASSERT_FALSE(report);
+  EXPECT_THAT(report.error().what, HasSubstr("version 3 or older of the protocol"));
+  EXPECT_THAT(report.error().what, HasSubstr("version " + std::to_string(kProtocolVersion)));
 }
 
 TEST_F(JournalTest, AFileThatIsNoJournalIsAnErrorThatNamesIt) {

@@ -89,6 +89,34 @@ TEST_F(SessionRegistryTest, RefusesWithAReason) {
   EXPECT_EQ(registry_.clients().size(), 1U);
 }
 
+TEST_F(SessionRegistryTest, ACouplingIsAsStiffAsItsDeviceAllowsUnlessTheScenarioWantsLess) {
+  const auto coupling = [](const HandStiffness& asked, const HandStiffness& offered) {
+    game_control::ScenarioFile scenario = *test::smallSession().scenario;
+    scenario.hands[kRightHand.value].stiffness = asked.translational;
+    scenario.hands[kRightHand.value].rotational_stiffness = asked.rotational;
+    SessionRegistry registry(scenario, kEpoch, false);
+    Join join{.client_guid = "a", .role = Role::kTrainee, .hands = {"head", "right"}};
+    join.stiffness = {{7.0, 7.0}, offered};
+    EXPECT_TRUE(registry.join(join, {.seat = true, .key = true}, 5).accepted);
+    FixedVector<Change, kMaxChanges> taken;
+    registry.takeChanges(taken);
+    return std::pair(taken[0].stiffness.translational, taken[0].stiffness.rotational);
+  };
+  EXPECT_EQ(coupling({}, {5000.0, 100.0}), std::pair(5000.0, 100.0));
+  EXPECT_EQ(coupling({1000.0, 20.0}, {5000.0, 100.0}), std::pair(1000.0, 20.0));
+  EXPECT_EQ(coupling({3000.0, 20.0}, {2000.0, 0.0}), std::pair(2000.0, 20.0)) << "a device without torque";
+  EXPECT_EQ(coupling({}, {}), std::pair(0.0, 0.0)) << "nobody says: the simulation's own";
+}
+
+TEST_F(SessionRegistryTest, AStiffnessThatNoDeviceHasIsRefused) {
+  for (const double bad : {-1.0, 2e5, kNan, std::numeric_limits<double>::infinity()}) {
+    Join join{.client_guid = "a", .role = Role::kTrainee, .hands = {"right"}};
+    join.stiffness = {{bad, 1.0}};
+    EXPECT_THAT(registry_.join(join, {.seat = true, .key = true}, 5).reason, HasSubstr("stiffness")) << bad;
+  }
+  EXPECT_TRUE(changes().empty());
+}
+
 TEST_F(SessionRegistryTest, AHandTheScenarioDoesNotHaveHasAnInvalidIdInItsPlace) {
   const Welcome welcome = join("a", Role::kTrainee, {"head", "right", "arm"});
   ASSERT_TRUE(welcome.accepted) << welcome.reason;

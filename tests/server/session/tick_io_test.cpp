@@ -24,6 +24,7 @@ TickInput fullInput() {
     change.index = i;
     change.lifetime_ticks = 100 + i;
     change.value = -0.25 * i;
+    change.stiffness = {100.0 * i, 2.0 * i};
     change.game = {CommandKind::kSignal, HandId{i}, i, 3.5};
     change.F_Oo_W = {Vector3(i, 0, 1), Vector3(0, i, 0)};
     change.X_WO = Pose(Vector3(0, 0, i));
@@ -50,6 +51,7 @@ TEST(TickIo, TickInputIsReadBackBitEqual) {
   EXPECT_FALSE(read->readings[3].active);
   EXPECT_TRUE(read->readings[3].X_WH == input.readings[3].X_WH);
   EXPECT_EQ(read->readings[3].V_WH.linear, Vector3(1, 2, 3));
+  EXPECT_EQ(read->changes[5].stiffness.rotational, 10.0);
   EXPECT_EQ(read->changes[5].game.signal, 5U);
   EXPECT_EQ(read->changes[5].F_Oo_W.torque, Vector3(0, 5, 0));
   EXPECT_EQ(bytesOf(*read), bytesOf(input)) << "every field is written";

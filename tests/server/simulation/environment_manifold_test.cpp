@@ -76,6 +76,12 @@ TEST_F(ManifoldTest, ContainsTheCouplingWrenchAboutTheHand) {
   EXPECT_NEAR(manifold_.F_Ho_W.force.z(), 1000.0 * 0.005, 0.1);
   EXPECT_NEAR(manifold_.F_Ho_W.torque.norm(), 0.0, 0.01);
   EXPECT_EQ(manifold_.stiffness, 1000.0);
+  environment_->setHandStiffness(hand_, {4000.0, 7.0});
+  test::stepTicks(*environment_, 20);
+  environment_->manifold(hand_, manifold_);
+  EXPECT_NEAR(manifold_.F_Ho_W.force.z(), 4000.0 * 0.005, 0.4);
+  EXPECT_EQ(manifold_.stiffness, 4000.0);
+  EXPECT_EQ(manifold_.rotational_stiffness, 7.0);
   EXPECT_LE(manifold_.validity_radius, 1.1e-3);
 }
 
