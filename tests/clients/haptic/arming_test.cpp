@@ -7,6 +7,9 @@ namespace {
 
 TEST(Arming, NothingButThePersonArms) {
   Arming arming;
+  EXPECT_FALSE(arming.permitsForces()) << "at the start";
+  arming.receive({.raised = 0, .engaged = false});
+  EXPECT_FALSE(arming.permitsForces()) << "nobody has pressed";
   arming.receive({.raised = 1, .engaged = true});
   arming.receive({.raised = 1, .engaged = false});
   EXPECT_FALSE(arming.release());
