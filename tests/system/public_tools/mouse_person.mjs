@@ -26,6 +26,7 @@ function see() {
   return {
     step: session.step?.name ?? "", isOver: session.isOver, isOn: hand?.isOn === true, isFine: hand?.isFine === true, isAligning: hand?.isAligning === true,
     text: document.querySelector(".hand-state")?.textContent ?? "",
+    height: box.height,
     middle: { x: box.left + 0.55 * box.width, y: box.top + 0.5 * box.height },
     guide: guide && { from: view.project(guide.from), to: view.project(guide.to), distance: guide.distance, farther: guide.farther, angle: guide.angle ?? 0, pixel: view.metresPerPixel(guide.from) },
   };
@@ -79,6 +80,11 @@ export async function mount(page, { seed, seconds, steps }) {
     if (seen.isAligning) continue;
     if (guide.angle > 0.02) {
       await page.keyboard.press("g");
+      continue;
+    }
+    // a closer look where the way is small in the picture
+    if (guide.pixel * seen.height > 5 * (guide.distance + 0.15)) {
+      await page.keyboard.press("c");
       continue;
     }
     const isNear = guide.distance < NEAR;
