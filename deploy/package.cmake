@@ -22,7 +22,7 @@ install(FILES deploy/copyright DESTINATION share/doc/tenon COMPONENT tenon)
 
 # ---- what people read: the pages of the source tree, and the pictures and tables they refer to
 install(FILES deploy/copyright DESTINATION share/doc/tenon-doc COMPONENT doc)
-file(GLOB pages CONFIGURE_DEPENDS RELATIVE ${CMAKE_SOURCE_DIR} *.md LICENSE docs/*.md deploy/packages/*.txt scenarios/scenario.schema.json scenarios/*/picture.png
+file(GLOB pages CONFIGURE_DEPENDS RELATIVE ${CMAKE_SOURCE_DIR} *.md LICENSE docs/*.md docs/*.png deploy/packages/*.txt scenarios/scenario.schema.json scenarios/*/picture.png
      server/*/pictures/*.svg tests/bench/engine/result/*)
 foreach(page ${pages})
   get_filename_component(folder ${page} DIRECTORY)

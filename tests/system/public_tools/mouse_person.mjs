@@ -26,6 +26,7 @@ function see() {
   return {
     step: session.step?.name ?? "", isOver: session.isOver, isOn: hand?.isOn === true, isFine: hand?.isFine === true, isAligning: hand?.isAligning === true,
     text: document.querySelector(".hand-state")?.textContent ?? "",
+    height: box.height,
     middle: { x: box.left + 0.55 * box.width, y: box.top + 0.5 * box.height },
     guide: guide && { from: view.project(guide.from), to: view.project(guide.to), distance: guide.distance, farther: guide.farther, angle: guide.angle ?? 0, pixel: view.metresPerPixel(guide.from) },
   };
@@ -49,6 +50,7 @@ export async function mount(page, { seed, seconds, steps }) {
   const log = [];
   let best = Infinity;
   let stuck = 0;
+  let turns = 0;
   let last = "";
 
   const fine = async (seen, wanted) => {
@@ -76,9 +78,15 @@ export async function mount(page, { seed, seconds, steps }) {
     const { guide } = seen;
     if (!seen.isOn || guide === undefined) continue;
     log.push(`${((Date.now() - begun) / 1000).toFixed(1)} ${seen.step} ${(1000 * guide.distance).toFixed(1)} mm, ${(1000 * guide.farther).toFixed(1)} farther, ${guide.angle.toFixed(3)} rad: ${seen.text}`);
-    if (seen.isAligning) continue;
-    if (guide.angle > 0.02) {
-      await page.keyboard.press("g");
+    if (seen.isAligning || guide.angle > 0.02) {
+      // a part that jams cannot be turned: it lifts it a little, as the instruction says
+      if (++turns % 8 === 0) await drag(seen, 0, ((seen.isFine ? 10 : 1) * -0.01) / guide.pixel, "Control");
+      else if (!seen.isAligning) await page.keyboard.press("g");
+      continue;
+    }
+    // a closer look where the way is small in the picture
+    if (guide.pixel * seen.height > 5 * (guide.distance + 0.15)) {
+      await page.keyboard.press("c");
       continue;
     }
     const isNear = guide.distance < NEAR;

@@ -13,7 +13,8 @@ type RoleName = keyof typeof ROLES;
 const TAUGHT = "taught"; // in this browser's memory
 const LOUDEST = 10; // [N]
 const HOLD_PERIOD = 30; // [ms] in which a button that is held moves the hand
-const GESTURES = ["drag", "wheel", "turn", "vertical", "align", "fine", "view"] as const;
+const ICONS_ONLY: Key[] = ["part.sound", "part.help"];
+const GESTURES = ["drag", "wheel", "turn", "vertical", "align", "fine", "look", "view"] as const;
 
 export class Part {
   readonly take = h("button", "take");
@@ -53,6 +54,7 @@ export class Part {
     this.holdable(add("part.farther", "up", () => {}), 1);
     add("part.turn", "repeat", () => this.hand !== undefined && (this.hand.isTurning = !this.hand.isTurning), { isPressed: isTurning });
     add("part.fine", "half", () => this.hand !== undefined && (this.hand.isFine = !this.hand.isFine), { isPressed: isFine });
+    add("part.look", "live", () => this.look());
     add("part.align", "done", () => this.hand?.align(), { isPressed: isAligning, shows: () => this.hand?.canAlign === true });
     add("part.other", "swap", () => this.hand?.choose((this.hand.current + 1) % this.hand.views.length), { shows: () => (this.hand?.views.length ?? 0) > 1 });
     add("part.sound", "bell", () => this.toggleSound(), { isPressed: () => this.audio !== undefined });
@@ -75,13 +77,24 @@ export class Part {
   }
 
   setWords(): void {
-    for (const { button, key, icon: name } of this.buttons) button.replaceChildren(...(name === undefined ? [] : [icon(name)]), h("span", "", t(key)));
+    for (const { button, key, icon: name } of this.buttons) {
+      button.replaceChildren(...(name === undefined ? [] : [icon(name)]), ...(ICONS_ONLY.includes(key) ? [] : [t(key)]));
+      button.setAttribute("aria-label", t(key));
+      button.title = t(key);
+    }
     this.arm.replaceChildren(icon("on"), t("part.arm"), h("kbd", "", t("part.arm.key")));
     const rows = GESTURES.map((name) => h("li", "", h("kbd", "", t(`part.do.${name}` as Key)), h("span", "", t(`part.does.${name}` as Key))));
     const close = h("button", "primary", t("part.understood"));
     close.addEventListener("click", () => this.teach(false));
     this.lesson.replaceChildren(h("h2", "", t("part.lesson")), h("ul", "gestures", ...rows), h("div", "row end", close));
     this.show();
+  }
+
+  /** At the hand and where it is to go. */
+  private look(): void {
+    const { guide, now } = this.hand ?? {};
+    if (guide !== undefined) this.view.frame([guide.from, guide.to]);
+    else if (now !== undefined) this.view.frame([now.hand.p]);
   }
 
   private teach(shows: boolean): void {
@@ -107,8 +120,7 @@ export class Part {
     }
     if (this.isNew && hand.guide !== undefined) {
       this.isNew = false;
-      const ends = [hand.guide.from, hand.guide.to];
-      if (!ends.every((place) => this.view.isInSight(place))) this.view.frame(ends);
+      if (![hand.guide.from, hand.guide.to].every((place) => this.view.isInSight(place))) this.look();
     }
     const stopped = session.standing.length > 0;
     this.arm.hidden = hand.isOn || stopped || hand.now === undefined;
@@ -225,6 +237,7 @@ export class Part {
     if (this.hand === undefined) return false;
     if (event.key === "Enter" && !this.hand.isOn && !(event.target instanceof HTMLButtonElement)) this.hand.press();
     else if (event.key === "m") this.toggleSound();
+    else if (event.key === "c") this.look();
     else if (event.key === "h") this.teach(this.lesson.hidden);
     else return this.hand.onKeyDown(event);
     return true;

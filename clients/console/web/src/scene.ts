@@ -14,6 +14,7 @@ const LONGEST_ARROW = 0.35; // [m]
 const CONTACTS = 64;
 const SIMPLE_PERIOD = 66; // [ms] between pictures without graphics hardware
 const CREASE = 35; // [deg]
+const LOOK = 0.15; // [m] shown around a hand and where it is to go
 
 interface Part { group: THREE.Group; object: SceneObject; material: THREE.MeshStandardMaterial | THREE.MeshLambertMaterial; model?: THREE.Object3D }
 
@@ -181,22 +182,24 @@ export class SceneView {
     this.dirty = true;
   }
 
-  /** Shows all of the scene and these places, from the trainee's side. */
+  /** Shows all of the scene, or these places and what is around them, from the trainee's side. */
   frame(places: THREE.Vector3[] = []): void {
-    const box = new THREE.Box3().setFromPoints(places);
+    const box = new THREE.Box3();
     for (const { group, object } of this.parts.values())
       if (group.visible && object.kind !== "head" && object.kind !== "forearm") box.expandByObject(group);
     if (box.isEmpty()) return;
-    const sphere = box.getBoundingSphere(new THREE.Sphere());
-    const radius = Math.max(0.05, sphere.radius);
+    const scene = box.getBoundingSphere(new THREE.Sphere());
+    const radius = Math.max(0.05, scene.radius);
+    const sphere = places.length === 0 ? scene : new THREE.Box3().setFromPoints(places).getBoundingSphere(new THREE.Sphere());
+    const shown = places.length === 0 ? radius : Math.min(1.2 * radius, sphere.radius + LOOK);
     const half = Math.min(this.camera.fov, this.camera.fov * this.camera.aspect) * (Math.PI / 360);
     const direction = new THREE.Vector3(0.35, -0.8, 0.62).normalize();
     this.controls.target.copy(sphere.center);
-    this.camera.position.copy(sphere.center).addScaledVector(direction, ((this.isHandMode ? 0.95 : 0.7) * radius) / Math.sin(half));
+    this.camera.position.copy(sphere.center).addScaledVector(direction, ((places.length > 0 ? 1 : 0.7) * shown) / Math.sin(half));
     this.controls.update();
     const reach = 1.3 * radius;
-    this.sun.position.copy(sphere.center).add(new THREE.Vector3(-0.5, -0.7, 1.4).multiplyScalar(2 * radius));
-    this.sun.target.position.copy(sphere.center);
+    this.sun.position.copy(scene.center).add(new THREE.Vector3(-0.5, -0.7, 1.4).multiplyScalar(2 * radius));
+    this.sun.target.position.copy(scene.center);
     const light = this.sun.shadow.camera;
     Object.assign(light, { left: -reach, right: reach, top: reach, bottom: -reach, near: 0.1, far: 8 * radius });
     light.updateProjectionMatrix();
