@@ -75,7 +75,7 @@ class BrowserHands::Seat {
       if (devices_[i]->isGone()) giveUp("nothing was heard of this page for 10 s");
     }
     if (!is_shown_ && steady_clock::now() - begun_ > kNoView) giveUp("the session has no such hand");
-    if (!is_new || !is_whole || stop_) return nullptr;
+    if (!is_new || !is_whole || stop_ || has_ended_) return nullptr;
     if (!is_shown_.exchange(true))
       answer_(viewer_, {request_.id, true, {}, std::string(roleName(membership_.role)), true});
     auto bytes = std::make_shared<std::vector<std::uint8_t>>();
@@ -107,7 +107,7 @@ class BrowserHands::Seat {
     const char* const why = why_;
     if (stop_ && why == nullptr) return;
     const std::string text = why != nullptr ? why : ended ? ended->reason : ended.error().what;
-    answer_(viewer_, {is_shown_ ? 0 : request_.id, false, text, {}, true});
+    answer_(viewer_, {is_shown_.exchange(true) ? 0 : request_.id, false, text, {}, true});
   }
 
   Result<RunState> play() {

@@ -146,7 +146,7 @@ Result<void> Recorder::comeBack() {
   if (options_.report) options_.report(why + "; waiting for one that resumes the session");
   const auto until_then = "; the recording up to then is in " + options_.file.string();
   // what the next server sends is delivered by the first dispatch after resumed()
-  while (take(milliseconds(0)) > 0) {
+  while (!stop_ && take(milliseconds(0)) > 0) {
   }
   if (auto back = member_->rejoin(stop_); !back) return fail(why + "; " + back.error().what + until_then);
   if (member_->announce().server_epoch == epoch)

@@ -72,7 +72,7 @@ void Recording::resumed(const SessionAnnounce& session, Tick tick) {
   // ticks of the former life that are not in its journal are computed once more
   const PartNumber last{tick, std::numeric_limits<std::uint32_t>::max()};
   newest_input_ = std::min(newest_input_, last);
-  newest_checkpoint_ = std::min(newest_checkpoint_, last);
+  for (auto& [part, newest] : newest_checkpoint_) newest = std::min(newest, tick);
   keepProblem(writer_.addMetadata("tenon resumed", {{"after tick", std::to_string(tick)},
                                                     {"server epoch", std::to_string(session.server_epoch)}}));
   writeAnnounce(session);
@@ -133,8 +133,14 @@ void Recording::keep(const PublishedSamples& published) {
 /// Frames may arrive before the answer that says when this recorder joined.
 Tick Recording::heardAfter() const { return first_tick_ == 0 ? joined_ : std::min(joined_, first_tick_ - 1); }
 
-bool Recording::isNew(const TickInputPart& part) { return advance(newest_input_, part); }
-bool Recording::isNew(const CheckpointPart& part) { return advance(newest_checkpoint_, part); }
+bool Recording::isNew(const TickInputPart& part) {
+  const PartNumber number{part.tick, part.part};
+  return number > std::exchange(newest_input_, std::max(newest_input_, number));
+}
+bool Recording::isNew(const CheckpointPart& part) {
+  Tick& newest = newest_checkpoint_[part.part];
+  return part.tick > std::exchange(newest, std::max(newest, part.tick));
+}
 bool Recording::isNew(const EventLog& event) {
   return event.seq > std::exchange(newest_event_, std::max(newest_event_, event.seq));
 }

@@ -94,14 +94,6 @@ class Recording {
     std::uint32_t part = 0;
     auto operator<=>(const PartNumber&) const = default;
   };
-  template <class Part>
-  static bool advance(PartNumber& newest, const Part& part) {
-    const PartNumber number{part.tick, part.part};
-    if (number <= newest) return false;
-    newest = number;
-    return true;
-  }
-
   record::McapWriter writer_;
   SessionAnnounce session_;
   std::map<std::string, std::uint16_t, std::less<>> channels_;
@@ -115,8 +107,9 @@ class Recording {
   Tick stated_until_ = 0;
   // TickInput: a gap in its ticks prevents re-simulation
   Tick first_input_ = 0;
-  PartNumber newest_input_, newest_checkpoint_;
-  std::uint64_t newest_event_ = 0;  ///< EventLog::seq of this life of the server
+  PartNumber newest_input_;
+  std::map<std::uint32_t, Tick> newest_checkpoint_;  ///< by part, the order in which DDS delivers them
+  std::uint64_t newest_event_ = 0;                   ///< EventLog::seq of this life of the server
   std::uint64_t input_ticks_ = 0, input_parts_ = 0, input_parts_expected_ = 0;
   std::int64_t start_ns_ = 0;  ///< source time of the first sample
   std::uint64_t ended_ = 0;    ///< ended instances written

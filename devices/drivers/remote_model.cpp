@@ -110,7 +110,7 @@ void RemoteModel::read(DeviceState& state) noexcept {
   }
   receive();
   if (has_peer_ && ++silence_ > limits_.gone) giveUp();
-  if (silence_ >= limits_.silent) target_.buttons = 0;
+  if (!has_peer_ || silence_ >= limits_.silent) target_.buttons = 0;
   follow();
   state_.buttons = target_.buttons;
   state_.grip = target_.grip;

@@ -376,7 +376,16 @@ void ServerWire::handle(const Command& command, const wire::Origin& from) {
 /// Anybody may raise the stop. The server stops the simulation, publishes the raise itself, for late joiners
 /// and in case its writer leaves, and keeps it on disk.
 void ServerWire::handle(const EmergencyStop& stop, const wire::Origin& from) {
-  if (from == participant_->origin() || !stops_.raise(stop)) return;
+  if (from != participant_->origin() && stops_.raise(stop)) engage(stop);
+}
+
+void ServerWire::raiseStop(const std::string& reason) {
+  const EmergencyStop stop{
+      .client_guid = "server", .counter = options_.server_epoch, .who = "server", .reason = reason};
+  if (!registry_.isStopEngaged() && stops_.raise(stop)) engage(stop);
+}
+
+void ServerWire::engage(const EmergencyStop& stop) {
   registry_.engageEmergencyStop();
   forwardChanges();
   writers_->stop.send(stop);

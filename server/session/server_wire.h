@@ -81,6 +81,8 @@ class ServerWire {
   /// To recorders, also to those that join up to 4 s later; only with `publish_journal`.
   void send(const JournalEntry& entry);
 
+  /// Raises the emergency stop in the server's own name, unless it is engaged.
+  void raiseStop(const std::string& reason);
   /// Publishes an entry of the log.
   void log(Severity severity, const std::string& kind, const std::string& text);
   /// Removes a client from the session, notifies it, and logs "Ada (trainee) <why>".
@@ -120,6 +122,7 @@ class ServerWire {
   void handleGone(const Presence& presence, const wire::Origin& from);
   [[nodiscard]] bool isGenuine(ClientId client, const wire::Origin& from, const std::string& what);
   void notifySeatLost(ClientId client, const std::string& why);
+  void engage(const EmergencyStop& stop);
   void clearEmergencyStop(ClientId client, const std::string& reason);
   void refuse(const std::string& why);
   void forwardChanges();

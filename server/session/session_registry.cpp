@@ -12,17 +12,20 @@
 namespace tenon::session {
 namespace {
 
-constexpr double kMaxPosition = 1000.0;          // [m] of a hand or object from the world's origin, each axis
-constexpr double kMaxSpeed = 50.0;               // [m/s], [rad/s] of a hand
-constexpr double kMaxStiffness = 1e5;            // [N/m] of a hand's coupling, as in scenarios
-constexpr double kMaxRotationalStiffness = 1e4;  // [Nm/rad] likewise
+constexpr double kMaxPosition = 1000.0;  // [m] of a hand or object from the world's origin, each axis
+constexpr double kMaxSpeed = 50.0;       // [m/s], [rad/s] of a hand
+constexpr double kMinStiffness = 1.0, kMaxStiffness = 1e4;  // [N/m] of what a device may ask for
+constexpr double kMinRotationalStiffness = 0.1, kMaxRotationalStiffness = 1e3;  // [Nm/rad] likewise
 
 bool isPlausible(const Pose& X) {
   return X.isFinite() && X.translation().cwiseAbs().maxCoeff() < kMaxPosition &&
          std::abs(X.rotation().squaredNorm() - 1.0) < 1e-3;
 }
 
-bool isPlausible(double stiffness, double limit) { return stiffness >= 0.0 && stiffness <= limit; }
+/// 0: not stated. What is stated is bounded as in a scenario, since it conditions the solver.
+bool isPlausible(double stiffness, double least, double most) {
+  return stiffness == 0.0 || (stiffness >= least && stiffness <= most);
+}
 
 bool isPlausible(const Vector3& v, double limit) { return v.allFinite() && v.norm() < limit; }
 
@@ -119,11 +122,11 @@ std::string SessionRegistry::joinRefusal(const Join& join, const JoinProofs& pro
   if (!keeps_seat && present(join.role) >= role->seats)
     return fmt::format("all {} seats of the role {} are taken", role->seats, roleName(join.role));
   if (std::any_of(join.stiffness.begin(), join.stiffness.end(), [](const HandStiffness& hand) {
-        return !isPlausible(hand.translational, kMaxStiffness) ||
-               !isPlausible(hand.rotational, kMaxRotationalStiffness);
+        return !isPlausible(hand.translational, kMinStiffness, kMaxStiffness) ||
+               !isPlausible(hand.rotational, kMinRotationalStiffness, kMaxRotationalStiffness);
       }))
-    return fmt::format("the stiffness of a hand is out of range: expected 0 to {} N/m and 0 to {} Nm/rad",
-                       kMaxStiffness, kMaxRotationalStiffness);
+    return fmt::format("the stiffness of a hand is out of range: expected {} to {} N/m and {} to {} Nm/rad",
+                       kMinStiffness, kMaxStiffness, kMinRotationalStiffness, kMaxRotationalStiffness);
   return handRefusal(join, former);
 }
 
@@ -189,7 +192,7 @@ std::size_t SessionRegistry::newSeat() {
 }
 
 /// Of the coupling of the hand `join.hands[index]`, which the scenario has: as stiff as device and link
-/// allow, and no stiffer than the scenario says. 0: nobody says.
+/// allow, and no stiffer than the scenario says. 0: not stated.
 HandStiffness SessionRegistry::stiffnessOf(const Join& join, std::size_t index) const {
   const HandStiffness offered = index < join.stiffness.size() ? join.stiffness[index] : HandStiffness{};
   const game_control::ScenarioHand& hand = scenario_.hands[scenario_.handNamed(join.hands[index]).value];

@@ -221,7 +221,7 @@ void Server::awaitReturn(const std::atomic<bool>& stop) {
   simulation_.fill(output);
   wire_->update(output);
   // One that the stop file lacks, because it could not be written in time, stands until a person clears it.
-  if (simulation_.emergencyStop() && !registry_.isStopEngaged()) registry_.engageEmergencyStop();
+  if (simulation_.emergencyStop()) wire_->raiseStop("it stood when the former server was killed");
   print(fmt::format("session '{}' is open again after tick {}", options_.name, simulation_.now()));
   wire_->log(Severity::kWarning, "resumed",
              fmt::format("a new server continues the session after {:.3f} s",

@@ -132,7 +132,11 @@ class KilledServer(unittest.TestCase):
             kill(trainee)
             (Path(os.environ["XDG_STATE_HOME"]) / "tenon" / f"stop-{stage.domain}-test").unlink()
             server, _ = resume(stage)
-            server.wait_for("run: emergency stop", 30)
+            server.wait_for("engaged by server: it stood when the former server was killed", 30)
+            for words in (["clear", "all well"], ["resume"]):
+                command = stage.start("command", *words)
+                self.assertEqual(command.wait(60), 0, command.text())
+            server.wait_for("run: running", 30)
 
     def test_who_is_not_back_is_parked_and_gets_the_seat_later(self):
         with Stage(lockstep=False) as stage:

@@ -214,6 +214,16 @@ TEST_F(RecordingTest, WhatIsDeliveredOnceMoreIsNotRecordedOnceMore) {
   EXPECT_EQ(times("EventLog").size(), 2U);
 }
 
+// DDS delivers by instance, and the part is the key: parts of two checkpoints come interleaved
+TEST_F(RecordingTest, AllPartsOfCheckpointsAreRecordedWhateverTheirOrder) {
+  Recording recording = open(false);
+  for (const std::uint32_t part : {0U, 1U})
+    for (const Tick tick : {1, 1001})
+      add(recording, wire::kCheckpoint, CheckpointPart{.tick = tick, .part = part, .parts = 2}, kStart);
+  ASSERT_TRUE(recording.close());
+  EXPECT_EQ(times("Checkpoint").size(), 4U);
+}
+
 // its journal ended at tick 12: of 11 and 12 no copy was sent before the server was killed
 TEST_F(RecordingTest, AResumedServerFillsWhatTheFormerOneDidNotSend) {
   Recording recording = open(false);

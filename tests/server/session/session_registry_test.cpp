@@ -105,11 +105,11 @@ TEST_F(SessionRegistryTest, ACouplingIsAsStiffAsItsDeviceAllowsUnlessTheScenario
   EXPECT_EQ(coupling({}, {5000.0, 100.0}), std::pair(5000.0, 100.0));
   EXPECT_EQ(coupling({1000.0, 20.0}, {5000.0, 100.0}), std::pair(1000.0, 20.0));
   EXPECT_EQ(coupling({3000.0, 20.0}, {2000.0, 0.0}), std::pair(2000.0, 20.0)) << "a device without torque";
-  EXPECT_EQ(coupling({}, {}), std::pair(0.0, 0.0)) << "nobody says: the simulation's own";
+  EXPECT_EQ(coupling({}, {}), std::pair(0.0, 0.0)) << "not stated: the simulation's own";
 }
 
 TEST_F(SessionRegistryTest, AStiffnessThatNoDeviceHasIsRefused) {
-  for (const double bad : {-1.0, 2e5, kNan, std::numeric_limits<double>::infinity()}) {
+  for (const double bad : {-1.0, 5e-324, 0.5, 2e4, kNan, std::numeric_limits<double>::infinity()}) {
     Join join{.client_guid = "a", .role = Role::kTrainee, .hands = {"right"}};
     join.stiffness = {{bad, 1.0}};
     EXPECT_THAT(registry_.join(join, {.seat = true, .key = true}, 5).reason, HasSubstr("stiffness")) << bad;

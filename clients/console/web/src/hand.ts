@@ -8,6 +8,7 @@ import type { Session } from "./session";
 
 const PERIOD = 16; // [ms] between targets
 const PRESS = 300; // [ms] that a press of the arming button lasts
+const SHIFT = 0.005; // [m] of a workspace between two views: it is not the slow return of an offset
 const NEAR = 0.02; // [m] of the proxy: nothing pushes back, so a target that is let go stays near
 const NOTCH = 16; // [pixels] of depth, as large as pixels are where the hand is: a notch of the wheel
 const TURN_NOTCH = 0.1; // [rad] likewise
@@ -81,10 +82,13 @@ export class Hand {
   }
 
   receive(views: HandView[]): void {
+    const before = this.views;
     this.views = views;
     views.forEach((view, i) => {
-      // without a proxy the hand stays where its device is
-      if (!view.isActive || this.targets[i] === undefined) this.targets[i] = copy(view.hand);
+      // Without a proxy the hand stays where its device is, and also when its workspace was shifted to the proxy.
+      const last = before[i];
+      const isShifted = last?.isActive !== true || last.centre.distanceTo(view.centre) > SHIFT;
+      if (!view.isActive || isShifted || this.targets[i] === undefined) this.targets[i] = copy(view.hand);
       if (view.isActive && view.inContact && this.touched[i] === false) this.onContact?.(view.force);
       this.touched[i] = view.inContact;
     });

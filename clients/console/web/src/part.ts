@@ -69,11 +69,17 @@ export class Part {
   private holdable(button: HTMLButtonElement, direction: number): void {
     let timer = 0;
     const stop = (): void => clearInterval(timer);
+    const go = (): void => {
+      // hidden by a stop it hears of no release
+      if (this.hand?.isOn !== true || button.offsetParent === null) return stop();
+      this.hand.go(0, 0, (direction * HOLD_PERIOD * (this.hand.isFine ? 0.1 : 1)) / 1000);
+    };
     button.addEventListener("pointerdown", () => {
       stop();
-      timer = window.setInterval(() => this.hand?.go(0, 0, (direction * HOLD_PERIOD * (this.hand.isFine ? 0.1 : 1)) / 1000), HOLD_PERIOD);
+      timer = window.setInterval(go, HOLD_PERIOD);
     });
     for (const name of ["pointerup", "pointerleave", "pointercancel"] as const) button.addEventListener(name, stop);
+    addEventListener("blur", stop);
   }
 
   setWords(): void {
