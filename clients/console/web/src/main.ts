@@ -14,7 +14,7 @@ import { SceneView } from "./scene";
 import { Session, TOPICS } from "./session";
 import { language, languageNames, nameOfLanguage, setLanguage, t, type Key } from "./strings";
 
-const PROTOCOL = 3;
+const PROTOCOL = 4; // kProtocolVersion of idl/types/messages/session.h
 const PANEL_PERIOD = 100; // ms
 const COMMAND = "./tenon demo";
 
