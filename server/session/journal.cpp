@@ -1,5 +1,8 @@
 #include "server/session/journal.h"
 
+#include <deque>
+#include <utility>
+
 #include <fmt/format.h>
 
 #include "idl/types/messages/journal.h"
@@ -36,16 +39,25 @@ class Resimulator {
     const auto part = wire::decode<TickInputPart>(message.data);
     if (!part) return fail(part.error().what);
     if (!inputs_.add(*part)) return {};
-    const auto input = readTickInput(inputs_.bytes());
+    auto input = readTickInput(inputs_.bytes());
     if (!input) return fail(input.error().what);
-    const Tick expected = simulation_.now() + 1;
-    if (input->tick < expected) return {};
-    if (input->tick > expected && synchronized_) report_.gaps.push_back({expected, input->tick - 1, 0});
-    synchronized_ = synchronized_ && input->tick == expected;
-    if (!synchronized_) return {};
-    simulation_.tick(*input);
-    compare(input->tick, part->state_hash);
+    apply({.input = std::move(*input), .hash = part->state_hash, .checkpoint = {}});
     return {};
+  }
+
+  void apply(JournalEntry entry) {
+    const Tick expected = simulation_.now() + 1;
+    if (synchronized_ && entry.input.tick < expected) return;
+    if (synchronized_ && entry.input.tick > expected) {
+      report_.gaps.push_back({expected, entry.input.tick - 1, 0});
+      synchronized_ = false;
+    }
+    if (!synchronized_) {
+      if (waiting_.size() >= kCheckpointEvery) waiting_.pop_front();
+      return waiting_.push_back(std::move(entry));
+    }
+    simulation_.tick(entry.input);
+    compare(entry.input.tick, entry.hash);
   }
 
   Result<void> readCheckpoint(const record::McapMessage& message) {
@@ -56,6 +68,8 @@ class Resimulator {
     if (!report_.gaps.empty() && report_.gaps.back().compared_after == 0)
       report_.gaps.back().compared_after = simulation_.now();
     synchronized_ = true;
+    for (JournalEntry& entry : std::exchange(waiting_, {}))
+      if (entry.input.tick > simulation_.now()) apply(std::move(entry));
     return {};
   }
 
@@ -71,6 +85,9 @@ class Resimulator {
   PartJoiner<CheckpointPart> checkpoints_;
   ResimulationReport report_;
   bool synchronized_ = false;  ///< the simulation is in the state after the last recorded tick
+  /// The last inputs while it is not: DDS keeps the order within a topic, so that in a recording a checkpoint
+  /// may follow inputs of later ticks.
+  std::deque<JournalEntry> waiting_;
 };
 
 std::string nameTheScenario(const std::filesystem::path& file) {

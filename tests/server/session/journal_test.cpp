@@ -165,6 +165,42 @@ TEST_F(JournalTest, AfterAGapItContinuesFromTheNextCheckpoint) {
   EXPECT_FALSE(report->first_difference);
 }
 
+// in a recording: DDS keeps the order within a topic alone
+TEST_F(JournalTest, ACheckpointThatFollowsInputsOfLaterTicksLeavesNoGap) {
+  SessionSimulation simulation = test::SessionRig::makeSimulation(loaded_, 1, {test::kRightHand});
+  auto writer = record::McapWriter::open(file_);
+  ASSERT_TRUE(writer) << writer.error().what;
+  const auto inputs =
+      writer->addChannel(wire::kTickInput.name, wire::typeName<TickInputPart>(), wire::idlText());
+  const auto checkpoints =
+      writer->addChannel(wire::kCheckpoint.name, wire::typeName<CheckpointPart>(), wire::idlText());
+  std::vector<std::uint8_t> checkpoint;
+  std::uint64_t hash = 0;
+  for (Tick tick = 1; tick <= 10; ++tick) {
+    const TickInput input = test::playInput(tick);
+    simulation.tick(input);
+    hash = simulation.hash();
+    std::vector<std::uint8_t> bytes;
+    appendBytes(input, bytes);
+    forEachPart<TickInputPart>(tick, hash, bytes, [&](const TickInputPart& part) {
+      EXPECT_TRUE(writer->write(inputs, 0, 0, *wire::encode(part)));
+    });
+    if (tick == 1) simulation.save(checkpoint);
+    if (tick != 4) continue;
+    forEachPart<CheckpointPart>(1, 0, checkpoint, [&](const CheckpointPart& part) {
+      EXPECT_TRUE(writer->write(checkpoints, 0, 0, *wire::encode(part)));
+    });
+  }
+  ASSERT_TRUE(writer->close());
+  const auto report = resimulateJournal();
+  ASSERT_TRUE(report) << report.error().what;
+  EXPECT_TRUE(report->gaps.empty());
+  EXPECT_EQ(report->first, 2U);
+  EXPECT_EQ(report->compared, 9U);
+  EXPECT_EQ(report->final_hash, hash);
+  EXPECT_FALSE(report->first_difference);
+}
+
 TEST_F(JournalTest, ATruncatedJournalIsResimulatedUpToItsEnd) {
   write();
   fs::resize_file(file_, fs::file_size(file_) - 100);
