@@ -16,8 +16,8 @@ constexpr std::chrono::seconds kPatience{5};
 constexpr std::chrono::milliseconds kQuiet{300};  // without a message the lists are complete
 
 std::string_view markOf(const SessionLists& lists, std::uint32_t step) {
-  if (lists.current.revision == 0 || step != lists.current.step) return "";
-  return lists.current.phase == StepPhase::kActive ? "now" : "";
+  const bool is_current = lists.current && lists.current->step == step;
+  return is_current && lists.current->phase == StepPhase::kActive ? "now" : "";
 }
 }  // namespace
 
@@ -72,8 +72,8 @@ Result<SessionLists> readLists(wire::MembershipOptions options, const std::atomi
 
   const auto until = std::chrono::steady_clock::now() + kPatience;
   const auto complete = [&] {
-    return !lists.steps.empty() && lists.steps.size() == lists.steps.begin()->second.steps &&
-           !lists.objects.empty() && !lists.hands.empty();
+    return lists.current && lists.steps.size() == lists.current->steps && !lists.objects.empty() &&
+           !lists.hands.empty() && !lists.people.empty();
   };
   while (!stop && (inbox.dispatch(kQuiet) > 0 || !complete()))
     if (std::chrono::steady_clock::now() > until) break;

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "idl/types/messages/objects.h"
@@ -18,7 +19,7 @@ struct SessionLists {
   std::map<HandId, SceneHand> hands;
   std::map<ObjectId, SceneObject> objects;
   std::map<std::uint32_t, SceneStep> steps;
-  StepState current;  ///< step
+  std::optional<StepState> current;  ///< step; the server sends it once the session is there
 
   /// People, hands, steps and objects, as aligned text; titles in `language`.
   [[nodiscard]] std::string text(const std::string& language = "en") const;
