@@ -53,6 +53,8 @@ class Resimulator {
       synchronized_ = false;
     }
     if (!synchronized_) {
+      // ticks go back where a resumed server began again: what waits is of its former life
+      if (!waiting_.empty() && entry.input.tick <= waiting_.back().input.tick) waiting_.clear();
       if (waiting_.size() >= kCheckpointEvery) waiting_.pop_front();
       return waiting_.push_back(std::move(entry));
     }

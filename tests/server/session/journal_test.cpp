@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -26,6 +27,12 @@ using test::SessionRig;
 using ::testing::HasSubstr;
 
 constexpr Tick kTicks = 2100;
+
+/// The channels of inputs and checkpoints, as a Journal has them.
+std::pair<std::uint16_t, std::uint16_t> addChannels(record::McapWriter& writer) {
+  return {writer.addChannel(wire::kTickInput.name, wire::typeName<TickInputPart>(), wire::idlText()),
+          writer.addChannel(wire::kCheckpoint.name, wire::typeName<CheckpointPart>(), wire::idlText())};
+}
 
 class JournalTest : public ::testing::Test {
  protected:
@@ -165,15 +172,41 @@ TEST_F(JournalTest, AfterAGapItContinuesFromTheNextCheckpoint) {
   EXPECT_FALSE(report->first_difference);
 }
 
+// 401 is lost, 402 to 600 are written; after a kill the server goes on after 400, without input
+TEST_F(JournalTest, WhatFollowsAGapIsForgottenWhereAResumedServerBeginsAgain) {
+  SessionSimulation simulation = test::SessionRig::makeSimulation(loaded_, 1, {test::kRightHand});
+  auto journal = Journal::open(file_, {"small/scenario.yaml", 0.25, fingerprintOf(loaded_)});
+  ASSERT_TRUE(journal);
+  std::vector<std::uint8_t> at_400;
+  const auto tick = [&](TickInput input, bool has_checkpoint) {
+    JournalEntry entry{.input = std::move(input), .hash = 0, .checkpoint = {}};
+    simulation.tick(entry.input);
+    entry.hash = simulation.hash();
+    if (has_checkpoint) simulation.save(entry.checkpoint);
+    if (entry.input.tick == 400 && at_400.empty()) simulation.save(at_400);
+    const bool is_lost = entry.input.tick == 401 && !has_checkpoint;
+    if (!is_lost) {
+      EXPECT_TRUE(journal->write(entry));
+    }
+  };
+  for (Tick t = 1; t <= 600; ++t) tick(test::playInput(t), t == 1);
+  ASSERT_TRUE(simulation.restore(at_400));
+  for (Tick t = 401; t <= 700; ++t) tick({.tick = t}, t == 401);
+  ASSERT_TRUE(journal->close({.phase = simulation.phase(), .tick = 700, .reason = "done"}));
+  const auto report = resimulateJournal();
+  ASSERT_TRUE(report) << report.error().what;
+  EXPECT_FALSE(report->first_difference);
+  EXPECT_EQ(report->last, 700U);
+  EXPECT_EQ(report->compared, (400 - 1) + (700 - 401));
+  EXPECT_EQ(report->final_hash, simulation.hash());
+}
+
 // in a recording: DDS keeps the order within a topic alone
 TEST_F(JournalTest, ACheckpointThatFollowsInputsOfLaterTicksLeavesNoGap) {
   SessionSimulation simulation = test::SessionRig::makeSimulation(loaded_, 1, {test::kRightHand});
   auto writer = record::McapWriter::open(file_);
   ASSERT_TRUE(writer) << writer.error().what;
-  const auto inputs =
-      writer->addChannel(wire::kTickInput.name, wire::typeName<TickInputPart>(), wire::idlText());
-  const auto checkpoints =
-      writer->addChannel(wire::kCheckpoint.name, wire::typeName<CheckpointPart>(), wire::idlText());
+  const auto [inputs, checkpoints] = addChannels(*writer);
   std::vector<std::uint8_t> checkpoint;
   std::uint64_t hash = 0;
   for (Tick tick = 1; tick <= 10; ++tick) {
@@ -340,10 +373,7 @@ void writeDamaged(const fs::path& file, const std::vector<JournalEntry>& entries
   test::FileDamage damage(seed);
   auto writer = record::McapWriter::open(file);
   ASSERT_TRUE(writer) << writer.error().what;
-  const auto inputs =
-      writer->addChannel(wire::kTickInput.name, wire::typeName<TickInputPart>(), wire::idlText());
-  const auto checkpoints =
-      writer->addChannel(wire::kCheckpoint.name, wire::typeName<CheckpointPart>(), wire::idlText());
+  const auto [inputs, checkpoints] = addChannels(*writer);
   std::vector<std::pair<std::uint16_t, std::vector<std::uint8_t>>> messages;
   const auto add = [&](std::uint16_t channel, const auto& part) {
     const auto data = wire::encode(part);
