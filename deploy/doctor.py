@@ -8,6 +8,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.dont_write_bytecode = True
+import doctor_link
+
 
 def read(path):
     try:
@@ -66,17 +70,19 @@ def check_bus(args):
     except subprocess.TimeoutExpired:
         return "bad", "DDS hangs on this machine's network", "unset CYCLONEDDS_URI and try again"
     if "session" in (done.stdout + done.stderr).lower():
-        return "good", "DDS works on loopback", ""
+        return "good", "DDS works", ""
     lines = (done.stderr or done.stdout).strip().splitlines()
     return "bad", lines[-1] if lines else "DDS did not start", \
-        "is the loopback interface up (ip link show lo)? is CYCLONEDDS_URI set to something else?"
+        "is the loopback interface up (ip link show lo)? are TENON_NETWORK or CYCLONEDDS_URI set to something else?"
 
 
 def check_configuration(_):
-    uri = os.environ.get("CYCLONEDDS_URI")
-    if not uri:
+    uri, network = os.environ.get("CYCLONEDDS_URI"), os.environ.get("TENON_NETWORK")
+    if not uri and not network:
         return "good", "DDS uses Tenon's own loopback profile", ""
-    return "note", f"CYCLONEDDS_URI is set ({uri})", "Tenon follows it; unset it to use the loopback profile"
+    if not uri:
+        return "good", f"DDS uses the network '{network}' (TENON_NETWORK)", ""
+    return "note", f"CYCLONEDDS_URI is set ({uri})", "Tenon follows it; unset it, or choose with --network or TENON_NETWORK what it is added to"
 
 
 def check_disk(_):
@@ -102,15 +108,27 @@ CHECKS = {
 }
 
 
+def say(name, verdict, finding, advice):
+    print(f"{verdict:5} {name:12} {finding}" + (f"\n{'':19}{advice}" if advice else ""), flush=True)
+    return ("good", "note", "bad").index(verdict)
+
+
 def main():
     parser = argparse.ArgumentParser(prog="tenon doctor", description=__doc__)
     parser.add_argument("--programs", required=True, help=argparse.SUPPRESS)
+    way = parser.add_mutually_exclusive_group()
+    way.add_argument("--peer", metavar="HOST", help="check the link to another machine, on which `tenon doctor --listen` runs")
+    way.add_argument("--listen", action="store_true", help="answer the check of another machine, until Ctrl-C")
+    parser.add_argument("--domain", type=int, choices=range(231), metavar="0..230", default=0, help="with --peer, --listen: the DDS domain, by which ports are chosen [0]")
+    parser.add_argument("--seconds", type=float, default=5.0, help="with --peer: how long delay and loss are measured [5]")
     args = parser.parse_args()
+    if args.listen:
+        return doctor_link.listen(args)
+    if args.peer:
+        return doctor_link.check_link(args, say)
     worst = 0
     for name, check in CHECKS.items():
-        verdict, finding, advice = check(args)
-        worst = max(worst, ("good", "note", "bad").index(verdict))
-        print(f"{verdict:5} {name:12} {finding}" + (f"\n{'':19}{advice}" if advice else ""))
+        worst = max(worst, say(name, *check(args)))
     print(("All is well.", "Sessions run; the notes say what would make them better.", "Sessions cannot run yet: see what is 'bad'.")[worst])
     return 1 if worst == 2 else 0
 

@@ -15,7 +15,6 @@ namespace tenon::devices {
 struct DeviceConfiguration {
   std::uint64_t seed = 1;  ///< varies the parameters of a simulated device
   std::string address;     ///< where it is: a port, host or socket; empty: the first one found
-  std::string serial;      ///< which one of several it has to be; empty: any
   /// How it is mounted: from its own frame M to the frame D that stations see. A turn about any axis; its
   /// place does not matter, since the workspace moves.
   Quaternion q_DM = Quaternion::Identity();
@@ -58,7 +57,6 @@ struct DeviceCaps {
   std::uint32_t dead_man = 0;  ///< bit i: forces need button i, or another one of these, held; 0: they do not
   std::uint32_t arming = 0;    ///< bit i: who presses button i arms the station, as by its return key
   double grip_range = 0.0;     ///< [m] from closed to open; 0: no gripper
-  bool paces = false;          ///< it sets the pace of the servo loop, see HapticDevice::await
 };
 
 enum class DeviceFault : std::uint8_t {
@@ -128,9 +126,6 @@ class HapticDevice {
   virtual void write(const DeviceCommand& command) noexcept = 0;
   /// What a hand is shown from the next write on. Most devices show nothing.
   virtual void show(const HandView& /*view*/) noexcept {}
-  /// Blocks until a reading is there that read() has not given, for 5 ms at most. Of a device whose
-  /// DeviceCaps::paces is set: the servo loop waits by it instead of by a clock.
-  virtual void await() noexcept {}
   /// The device behind one that only converts; otherwise itself.
   [[nodiscard]] virtual HapticDevice& inner() noexcept { return *this; }
 };

@@ -41,7 +41,6 @@ class MountedDevice final : public HapticDevice {
     turned.X_DO = X_MD * view.X_DO * X_MD.inverse();
     device_.show(turned);
   }
-  void await() noexcept override { device_.await(); }
   [[nodiscard]] HapticDevice& inner() noexcept override { return device_.inner(); }
 
  private:

@@ -13,9 +13,10 @@ from pathlib import Path
 USAGE = "//@topic NAME stream|state|event [PARAMETER...]"
 CLASSES = {"stream": "kStream", "state": "kState", "event": "kEvent"}
 TIMES = ("deadline", "lease", "lifespan")
+DEPTHS = {"late_joiner_depth": 1000, "reader_depth": 16}  # and an example
 FLAGS = ("lease_by_topic", "latched", "of_server")
-MEMBERS = ("deadline", "lease", "lease_by_topic", "lifespan", "late_joiner_depth", "latched", "of_server")  # of TopicParameters
-PARAMETERS = "deadline=10ms, lease=1000ms, lifespan=5000ms, late_joiner_depth=1000, lease_by_topic, latched or of_server"
+MEMBERS = ("deadline", "lease", "lease_by_topic", "lifespan", "late_joiner_depth", "reader_depth", "latched", "of_server")  # of TopicParameters
+PARAMETERS = "deadline=10ms, lease=1000ms, lifespan=5000ms, late_joiner_depth=1000, reader_depth=16, lease_by_topic, latched or of_server"
 
 
 class Fault(Exception):
@@ -51,9 +52,9 @@ class Topic:
             if not re.fullmatch(r"[1-9][0-9]*ms", value):
                 raise Fault(self.line, f"'{key}' needs a time in milliseconds: write {key}=1000ms")
             self.parameters[key] = f"Milliseconds{{{value[:-2]}}}"
-        elif key == "late_joiner_depth":
+        elif key in DEPTHS:
             if not re.fullmatch(r"[1-9][0-9]*", value):
-                raise Fault(self.line, "'late_joiner_depth' needs a number of samples: write late_joiner_depth=1000")
+                raise Fault(self.line, f"'{key}' needs a number of samples: write {key}={DEPTHS[key]}")
             self.parameters[key] = value
         elif key in FLAGS:
             if equals:
@@ -66,6 +67,8 @@ class Topic:
         if "late_joiner_depth" in self.parameters and self.qos_class != "event":
             raise Fault(self.line, "'late_joiner_depth' is for events: leave it out (late joiners get the last sample "
                                    "of a state and none of a stream)")
+        if "reader_depth" in self.parameters and self.qos_class != "stream":
+            raise Fault(self.line, "'reader_depth' is for streams: leave it out (readers keep all events, and of a state the last)")
         if "latched" in self.parameters and self.qos_class != "state":
             raise Fault(self.line, f"'latched' is for states: leave it out, or write {self.name} state latched")
         if "lease_by_topic" in self.parameters and "lease" not in self.parameters:

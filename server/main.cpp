@@ -2,7 +2,9 @@
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -11,10 +13,12 @@
 #include "idl/types/cache_folder.h"
 #include "idl/types/output_files.h"
 #include "idl/wire/identity.h"
+#include "idl/wire/network.h"
 #include "server/check/check.h"
 #include "server/session/journal.h"
 #include "server/session/loading_display.h"
 #include "server/session/renamed_options.h"
+#include "server/session/scenario_copy.h"
 #include "server/session/session_server.h"
 #include "server/session/stop_file.h"
 
@@ -45,6 +49,9 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
                  "a scenario's folder or YAML file, as in scenarios/engine_bay");
   app.add_option("--session", arguments.session.name, "name by which clients find it")->capture_default_str();
   app.add_option("--domain", arguments.session.domain, "DDS domain, 0 to 230")->check(CLI::Range(0, 230));
+  tenon::wire::addNetworkOption(app);
+  app.add_flag("--open", arguments.session.open,
+               "on a network beyond loopback: trainees, observers and recorders need no key");
   app.add_option("--detail", arguments.load.detail,
                  "mesh resolution of generated parts, 0 to 1; 1: that of the paper")
       ->check(CLI::Range(0.0, 1.0))
@@ -181,6 +188,8 @@ int checkArguments(const ServeArguments& arguments) {
 
 int serve(ServeArguments& arguments) {
   const bool resumes = !arguments.resume.empty();
+  std::optional<tenon::session::UnpackedScenario> unpacked;
+  std::string missing;  ///< why the journal's own copy of its scenario cannot be used
   if (const std::string& file = resumes ? arguments.resume : arguments.resimulate; !file.empty()) {
     if (std::error_code error;
         std::filesystem::exists(file, error) && !std::filesystem::is_regular_file(file, error))
@@ -193,9 +202,14 @@ int serve(ServeArguments& arguments) {
                          " scenarios/engine_bay");
     if (origin) arguments.session.simulation.limits = origin->limits;
     if (origin && (resumes || !arguments.states_detail)) arguments.load.detail = origin->detail;
+    if (arguments.scenario.empty() && !resumes) {
+      auto copy = tenon::session::UnpackedScenario::of(file);
+      if (copy) arguments.scenario = unpacked.emplace(std::move(*copy)).path().string();
+      if (!copy) missing = copy.error().what;
+    }
     if (arguments.scenario.empty()) {
       const auto scenario = tenon::session::findScenario(file, *origin);
-      if (!scenario) return reportError(scenario.error().what);
+      if (!scenario) return reportError((missing.empty() ? "" : missing + "; ") + scenario.error().what);
       arguments.scenario = scenario->string();
     }
   }
@@ -266,5 +280,7 @@ int main(int argc, char** argv) {
   arguments.states_detail = app.count("--detail") > 0;
   std::signal(SIGINT, onStopSignal);
   std::signal(SIGTERM, onStopSignal);
+  // a limit on the size of files is an error of the write, as a full disk is
+  std::signal(SIGXFSZ, SIG_IGN);
   return serve(arguments);
 }

@@ -54,7 +54,7 @@ ROOMS = {
     "clients/command": ("tenon::command", IDL, ["fmt", "CLI11", "POSIX"]),
     "clients/report": ("tenon::report", IDL, ["fmt", "CLI11", "JSON"]),
     # who takes part in a browser is a station of its own
-    "clients/console": ("tenon::console", STATION + ["devices/drivers", "clients/command", "clients/station"], ["fmt", "CLI11", "JSON", "Boost"]),
+    "clients/console": ("tenon::console", STATION + ["devices/drivers", "clients/command", "clients/recorder", "clients/station"], ["fmt", "CLI11", "JSON", "Boost", "OpenSSL"]),
     "clients/rehearse": ("tenon::rehearse", [], ["fmt", "CLI11"]),  # the rooms: see EXCEPTION
     "scenarios/part_generator": ("tenon::part_generator", ["idl/types"], ["fmt", "CLI11", "PNG"]),
 }
@@ -70,13 +70,13 @@ LIBRARIES = {
     "Highway": r"hwy/", "xxHash": r"xxh(ash|3)\.h$", "assimp": r"assimp/", "OctoMap": r"octomap/",
     "meshoptimizer": r"meshoptimizer\.h$",
     "libsodium": r"sodium(\.h$|/)", "yaml-cpp": r"yaml-cpp/", "fmt": r"fmt/", "CLI11": r"CLI/", "JSON": r"nlohmann/", "PNG": r"png\.h$",
-    "Boost": r"boost/",
+    "Boost": r"boost/", "OpenSSL": r"openssl/",
     "Bullet": r"(bullet/|btBullet|Bullet|LinearMath/)", "Eigen": r"Eigen/",
-    "POSIX": r"((sys|arpa|netinet|net|linux)/|(unistd|fcntl|poll|termios|spawn|pthread|sched|signal|time|dirent|dlfcn|errno|semaphore)\.h$)",
+    "POSIX": r"((sys|arpa|netinet|net|linux)/|(ifaddrs|netdb|unistd|fcntl|poll|termios|spawn|pthread|sched|signal|time|dirent|dlfcn|errno|semaphore)\.h$)",
 }
 # a library, or a part of a room, that one file of the room alone may include
 ONE_FILE = {"Bullet": "server/simulation/rigid_body.cpp", "OctoMap": "server/bake/octree_file.cpp",
-            "assimp": "server/bake/import_child.cpp", "libsodium": "idl/wire/identity.cpp", "Boost": "clients/console/web_service.h",
+            "assimp": "server/bake/import_child.cpp", "libsodium": "idl/wire/identity.cpp", "Boost": "clients/console/web_stream.h", "OpenSSL": "clients/console/certificate.cpp",
             "devices/simulated": "devices/catalog.cpp", "devices/drivers": "devices/catalog.cpp"}
 # made at build time, so not in the tree; their room alone includes them
 GENERATED = {"tenon.h": "idl/wire", "idl/wire/topic_list.h": "idl/wire"}
@@ -90,7 +90,6 @@ BLOCKING = ["condition_variable", "fstream", "future", "iostream", "mutex", "reg
 # files of those rooms that run outside of the loop: why each may
 OUTSIDE_THE_LOOP = {
     "server/structures/structure_file.cpp": "reads and writes structure files at start and in `tenon bake`",
-    "clients/haptic/paced_clock.h": "waits for the device that paces the loop",
     "clients/haptic/seat_file.cpp": "reads and writes the file of a station's seat, on the wire thread",
     "clients/haptic/station_program.cpp": "reads a station's options and runs its threads; no loop of its own",
 }

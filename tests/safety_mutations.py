@@ -4,10 +4,12 @@
     python3 tests/safety_mutations.py [--list] [HAZARD ...]
 
 HAZARD is a part of a row's first column. It edits the sources of the tree that it stands in, one rule at a time, and puts them back; the
-build folder is that of the preset dev. Not in the gate: an hour of building. Rows whose tests are scripts of tests/system are listed only.
+build folders are those of the presets dev, and release for rows whose tests are scripts of tests/system. In the gate with --list alone: the
+rest is an hour of building.
 Exit code 1: a rule can be taken out unnoticed, or is not where this file looks for it.
 """
 import argparse
+import os
 import re
 import subprocess
 import sys
@@ -16,12 +18,15 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 HAND, SAFETY, MODEL = "clients/haptic/haptic_hand.cpp", "devices/safety.cpp", "clients/haptic/local_model.cpp"
 AGE, BRACELET, WORKSPACE = "clients/haptic/answer_age.cpp", "clients/haptic/bracelet.cpp", "clients/haptic/workspace.cpp"
-REMOTE, REGISTRY, WRITER = "devices/drivers/remote_device.cpp", "server/session/session_registry.cpp", "server/session/journal_writer.cpp"
+REMOTE, REMOTE_MODEL, REGISTRY, WRITER = "devices/drivers/remote_device.cpp", "devices/drivers/remote_model.cpp", "server/session/session_registry.cpp", "server/session/journal_writer.cpp"
 ARMING = "clients/haptic/arming.h"
+WIRE, SIMULATION = "server/session/server_wire.cpp", "server/session/session_simulation.cpp"
+SCRIPTS = "programs"  # of the release preset; tests are then those of tests/system
+FIXTURE, MENTORING = "clients/haptic/virtual_fixture.cpp", "server/session/mentoring.cpp"
 
 # hazard (begin of its row), edits (file, pattern, replacement), program, tests
 RULES = [
-    ("a trainee's hand obeys another", [("idl/wire/membership.cpp", r"member->session_->hearOnly\(member->server_\);", ""),
+    ("a trainee's hand obeys another", [("idl/wire/membership.cpp", r"member->hearServer\(\);", ""),
                                         ("idl/wire/membership.cpp", r"next\.server_epoch >= announce\.server_epoch", "next.server_epoch <= announce.server_epoch")],
      "idl_wire_tests", "Membership.BelongsToTheServerOfItsNameThatStartedFirst"),
     ("somebody takes a person's hands", [(REGISTRY, r"  if \(former && !proofs\.seat\)\n\s*return [^;]*;\n", "")],
@@ -30,7 +35,7 @@ RULES = [
     ("a device is armed from afar", [(ARMING, r"return armed_ && !stopped_;", "return !stopped_;")], "clients_haptic_tests", "Arming.NothingButThePersonArms"),
     ("a killed server is resumed and moves", [("server/simulation/environment_hands.cpp", r"kGraspReach = 5e-3", "kGraspReach = 5e3")],
      "server_session_tests", "ReturningHand.HoldsItsObjectAgainWhereItHeldIt"),
-    ("a recorder that hangs, or a full disk", [(WRITER, r"writePending\(false\)", "writePending(true)"), (WRITER, r"const bool writes = journal_ && !problem\(\);", "const bool writes = journal_ && !problem();\n  if (problem()) return;")],
+    ("a recorder that hangs, or a full disk", [(WRITER, r"writePending\(false\)", "writePending(true)"), (WRITER, r"publish_ && i < count;", "publish_ && i < count && !problem();")],
      "server_session_tests", "JournalWriterTest.AReaderThatHangsLeavesNoGapInTheFile:JournalWriterTest.AFullDiskEndsTheFileAndNotTheCopies"),
     ("a client fills the queue", [("server/session/contributions.h", r"waiting\.size\(\) < kMostOfClient", "true"), ("server/session/contributions.h", r" \|\| to\.freeChanges\(\) < InputBuffer::kChanges / 2", "")],
      "server_session_tests", "Contributions.LeaveHalfOfTheQueueToCommands"),
@@ -44,6 +49,18 @@ RULES = [
      "Safety.AForceThatStartsFromNothingIsAtMostThreeNewtonForASecond"),
     ("an object that was held still", [(MODEL, r"!manifold_\.frozen && ", "")], "clients_haptic_tests", "*AFreezeIsSoft*"),
     ("the held object jumps", [(MODEL, r"!same \|\| anyBody", "anyBody")], "clients_haptic_tests", "*AJumpOfTheHeldObjectIsSoft*"),
+    ("two objects begin to collide", [("server/simulation/environment.cpp", r"if \(isPulled\(object\) && !has_jumped\) beginEpoch\(object\);", "static_cast<void>(has_jumped);")],
+     "clients_haptic_tests", "HandInPlate.*"),
+    ("a hand that is held still", [("server/simulation/environment.h", r"engaged\(motion\) && !motion\.frozen", "engaged(motion)")], "server_simulation_tests",
+     "TwoHandsTest.AFrozenHandLetsTheOtherMoveThePart"),
+    ("a hand that is held still", [("server/simulation/environment_hands.cpp", r"    motion\.X_HO = motion\.X_WH\.inverse\(\) \* object\.X_WO;\n  \}\n\}\n\n/// Another", "  }\n}\n\n/// Another")],
+     "server_simulation_tests", "TwoHandsTest.AHandThatWasFrozenHoldsThePartWhereTheOtherHasBroughtItWithoutAPull"),
+    ("a device keeps its last force", [(HAND, r" \|\| \(finished\(\) && finish_disarms_\)", "")], "clients_haptic_tests", "HandSafety.AtTheEndTheForceFallsToZeroAndThenTheDeviceIsDisarmed"),
+    ("a device keeps its last force", [(BRACELET, r" \|\| \(finishing_ && finish_disarms_\)", "")], "clients_haptic_tests", "Bracelet.IsSilentAndDisarmedAtTheEnd"),
+    ("a button that is held", [("clients/station/device_station.cpp", r"arm\.pressed = \(hand[^;]*;", "arm.pressed = false;")], "clients_station_tests",
+     "DeviceStation.AButtonThatIsHeldOverARejoinIsNotPressed"),
+    ("a station comes back to another scene", [("idl/wire/membership.cpp", r"if \(announce_\.scenario_hash != [^{;]*\)\n", "if (false)\n")], "idl_wire_tests",
+     "Membership.DoesNotRejoinASessionOfAnotherScenario"),
     ("a body that it touches jumps", [(MODEL, r"!same \|\| anyBodyJumped\(manifold_, manifold\)", "!same || (anyBodyJumped(manifold_, manifold) && same && !same)")],
      "clients_haptic_tests", "*AJumpOfTheBodyItTouchesIsSoft*"),
     ("a force begins while a person is not ready", [(SAFETY, r"(  \} else \{\n)    startFromZero\(\);\n", r"\1"), (SAFETY, r"(  braking_ = false;\n)  startFromZero\(\);\n", r"\1"),
@@ -59,7 +76,7 @@ RULES = [
     ("the station itself stood still", [(SAFETY, r"const double growth = std::min\(dt, kLongestGrowth\);\n  since", "const double growth = dt;\n  since")], "devices_tests",
      "Safety.ALongStepLetsAForceGrowAsTwoMilliseconds"),
     ("the person has let go", [(HAND, r"  request\.dead_man_held = deadManHeld\(\);\n", "")], "clients_haptic_tests", "HandSafety.AReleasedDeadManSwitch*"),
-    ("a stopped arm falls", [(HAND, r"  device_\.write\(command\);([^\n]*)\n  if \(safety_\.wantsDisarm\(\)\) device_\.disarm\(\);", r"  if (safety_.wantsDisarm()) return device_.disarm();\n  device_.write(command);")],
+    ("a stopped arm falls", [(HAND, r"  device_\.write\(command\);([^\n]*)\n  if \(safety_\.wantsDisarm\(\) \|\| ([^\n]*)\) device_\.disarm\(\);", r"  if (safety_.wantsDisarm()) return device_.disarm();\n  device_.write(command);")],
      "clients_haptic_tests", "HandSafety.A*Brakes*:HandSafety.An*Brakes*"),
     ("armed at the end of the workspace", [(SAFETY, r"  wall_ = slewLimited\([^;]*;", "  wall_ = wallForce(state.X_DH.translation(), limits_) + 0.0 * wall * (slow ? 1.0 : growth);")],
      "clients_haptic_tests", "HandSafety.TheEndOfTheWorkspaceRampsAfterArming"),
@@ -74,13 +91,52 @@ RULES = [
     ("a stop comes while a device is being armed", [(HAND, r"  if \(!permitted\) handover_\.withdraw\(\);\n", "")], "clients_haptic_tests", "HandSafety.AStopBetweenPressAndArmingLeavesTheDeviceUnarmed"),
     ("an opened clutch is closed", [(HAND, r"  device_state_\.fault = devices::DeviceFault::kNone;\n  device_state_\.F_Ho_D_measured = \{\};\n", "")], "clients_station_tests",
      "DeviceStation.ASimulatedPersonResetsAnOpenClutchAfterTwoSeconds"),
-    ("a program that moves a hand (`remote`) hangs", [(REMOTE, r"  if \(silence_ >= kSilent\) target_\.buttons = 0;\n", "")], "devices_tests",
+    ("a program that moves a hand (`remote`) hangs", [(REMOTE_MODEL, r"  if \(!has_peer_ \|\| silence_ >= limits_\.silent\) target_\.buttons = 0;\n", "")], "devices_tests",
      "RemoteDeviceTest.ASilentPeerHasReleasedTheDeadMansSwitchAndMakesRoomLater"),
-    ("it throws the hand across", [(REMOTE, r"clampNorm\(share \* off\.translation, [^)]*\)", "share * off.translation")], "devices_tests", "RemoteDeviceTest.FollowsItsPeerAtABoundedSpeedAndShowsIt"),
+    ("it throws the hand across", [(REMOTE_MODEL, r"clampNorm\(share \* off\.translation, [^)]*\)", "share * off.translation")], "devices_tests", "RemoteDeviceTest.FollowsItsPeerAtABoundedSpeedAndShowsIt"),
     ("it sends nonsense", [(REMOTE, r"if \(!target\) return dropPeer\(\);", "if (!target) continue;")], "devices_tests", "RemoteDeviceTest.AMessageThatCannotBeUnderstoodEndsTheConnection"),
     ("a fault resets itself", [(HAND, r"  handover_\.ask\(\);", "  handover_.ask();\n  static_cast<void>(handover_.serve(device_));")], "clients_haptic_tests", "HandSafety.TheLoopNeitherArmsNorResetsADevice"),
     ("arming blocks the loop", [(HAND, r"  handover_\.ask\(\);", "  handover_.ask();\n  static_cast<void>(handover_.serve(device_));\n  handover_.handBack();")], "clients_haptic_tests",
      "HandSafety.TheLoopNeitherArmsNorResetsADevice"),
+    ("an instructor's hand jumps", [(FIXTURE, r"clampNorm\(p_HF_W - p_HA_W, moved\)", "clampNorm(p_HF_W - p_HA_W, 1e3 + moved)"),
+                                     (FIXTURE, r"translation\(\) - p_WF_, moved\)", "translation() - p_WF_, 1e3 + moved)")], "clients_haptic_tests",
+     "VirtualFixture.GrowsByTwentyNewtonsASecondAndStaysBelowItsLimit:VirtualFixture.AJumpOfTheFixtureIsNoJumpOfTheForce"),
+    ("who holds against a fixture", [(FIXTURE, r"  p_HA_W = clampNorm\([^;]*;\n", "")], "clients_haptic_tests", "VirtualFixture.AHandThatIsLetGoOfIsNotThrown"),
+    ("a fixture adds energy", [(FIXTURE, r"wrench\.force -= damping", "wrench.force += damping")], "clients_haptic_tests", "*VirtualFixtureEnergy.ACycleOfTheHandTakesEnergyAndGivesNone*"),
+    ("contact and fixture together", [(HAND, r"coupling_\.stiffness\(\) \+ fixture_\.stiffness\(\)", "coupling_.stiffness()")], "clients_haptic_tests",
+     "*SpringsInParallelAreWithinWhatTheDeviceRendersStably*"),
+    ("the instructor's station dies", [(FIXTURE, r"age_ <= kStaleAt &&", "")], "clients_haptic_tests", "*VirtualFixtureEnd.*"),
+    ("the instructor's station dies", [(MENTORING, r" && output\.ages\[hand\.value\] <= Mentoring::kSilent", "")], "server_session_tests",
+     "MentoringTest.IsOffWhileTheInstructorsHandIsSilentOrHeldStill"),
+    ("guidance begins again", [(MENTORING, r"  if \(output\.emergency_stop\) return [^;]*;\n", "")], "server_session_tests",
+     "MentoringTest.EndsForGoodWhenTheInstructorLeavesOrAStopIsEngaged"),
+    ("a stop leaves the fixture's force", [(HAND, r"  if \(request\.restart [^;]*fixture_\.restart\(\);\n", "")], "clients_haptic_tests",
+     "*AStopTakesItsForceAtOnceAndAfterwardsItBeginsFromZero*"),
+    ("two instructors pull", [(MENTORING, r"  if \(auto free = conflict[^;]*;[^;]*;\n", "")], "server_session_tests", "MentoringTest.AHandIsGuidedByOneOther"),
+    ("two servers move one hand", [(WIRE, r"if \(epoch > options_\.server_epoch\)", "if (epoch > options_.server_epoch && epoch == 0)")], SCRIPTS,
+     "trust_test.Identity.test_an_old_server_that_was_stopped_and_continues_ends_itself"),
+    ("a stranger leads the run", [(REGISTRY, r"\(role->needs_key \|\| key_of_all_\) && !proofs\.key", "key_of_all_ && !proofs.key")], SCRIPTS,
+     "trust_test.Identity.test_instructors_and_admins_need_the_key_and_are_told_so"),
+    ("nobody can stop the devices", [("clients/haptic/station_program.cpp", r"if \(!stops_\.raise\(stop\)\) return;", "if (stop.who != \"server\" || !stops_.raise(stop)) return;")], SCRIPTS,
+     "trust_test.EmergencyStop.test_a_raise_reaches_the_devices_although_the_server_hangs_and_stands_when_it_continues"),
+    ("a restart of the server lifts", [(WIRE, r"  stops_ = std::move\(\*kept\);\n", "")], SCRIPTS,
+     "trust_test.EmergencyStop.test_a_stop_stands_over_a_killed_server_and_its_end_needs_station_instructor_and_resume"),
+    ("a resumed session has forgotten", [(WIRE, r"  stops_ = std::move\(\*kept\);\n", ""), ("server/session/session_server.cpp", r"if \(simulation_\.emergencyStop\(\)\) wire_", "if (false) wire_")],
+     SCRIPTS, "resume_test.KilledServer.test_an_emergency_stop_stands_after_the_resume_until_it_is_cleared"),
+    ("forces are to stop for a moment", [(SIMULATION, r"forces_frozen_ = change\.value != 0\.0;", "forces_frozen_ = false;")], "server_session_tests",
+     "SessionSimulation.FrozenForcesHoldHandsStillWhileStepsGoOn"),
+    ("a removed person's hands", [(REGISTRY, r"  seats_\[person->value - 1\]\.is_closed = true;\n", "")], "server_session_tests",
+     "SessionRegistryTest.WhoIsRemovedLeavesAndDoesNotGetTheSeatAgain"),
+    ("a key pressed by mistake", [("clients/command/keys.cpp", r"command && needsConsent\(\*command\)", "command && needsConsent(*command) && key == 0")], SCRIPTS,
+     "trust_test.EmergencyStop.test_space_is_emergency_and_no_other_key_ends_a_run_by_itself"),
+    ("a link asks for limits", [(SIMULATION, r"limits_\.freeze, most_freeze\)", "limits_.freeze, 1000 * most_freeze)")], "server_session_tests",
+     "SessionSimulation.NoHandGoesOnForLongerThanTheBound*"),
+    ("a link asks for limits", [("clients/haptic/limit_chooser.cpp", r"kFreezeTicks, kMostFreezeTicks\)", "kFreezeTicks, 100 * kMostFreezeTicks)")], "clients_haptic_tests",
+     "LimitChooser.NoLinkHoweverBad*"),
+    ("jitter of the link excuses", [("clients/haptic/answer_age.h", r"std::min\(jitter, kLongestJitter\)", "jitter")], "clients_haptic_tests",
+     "AnswerAge.JitterThatWasMeasuredIsNoGapUpToItsBound"),
+    ("two hands that are tied", [(MENTORING, r"std::min\(kMutualStiffness, [^;]*;", "kMutualStiffness + 0.0 * round_trip;")], "server_session_tests",
+     "MentoringTest.TiesThemTheMoreSoftlyTheLongerTheWay"),
 ]
 
 
@@ -88,6 +144,14 @@ def hazards() -> list[tuple[str, str]]:
     """Hazard and tests of each row of the tables."""
     rows = re.findall(r"(?m)^\| (.+?) \| .+? \| .+? \| (.+?) \|$", (ROOT / "docs/safety.md").read_text(encoding="utf-8"))
     return [(hazard, tests) for hazard, tests in rows if "`" in tests and hazard != "hazard"]
+
+
+def judge_script(test: str) -> str:
+    run = subprocess.run([sys.executable, "-W", "ignore", "-m", "unittest", test], cwd=ROOT / "tests/system", capture_output=True, text=True, check=False,
+                         env={**os.environ, "TENON_PROGRAMS": str(ROOT / "build/release/bin"), "TENON_CACHE": str(ROOT / "build/release/test_cache")})
+    if not re.search(r"(?m)^Ran 1 test", run.stderr) or "ModuleNotFoundError" in run.stderr:
+        return "NO SUCH TEST"
+    return "fails" if run.returncode else "SURVIVES"
 
 
 def judge(edits: list[tuple[str, str, str]], program: str, tests: str) -> str:
@@ -99,9 +163,12 @@ def judge(edits: list[tuple[str, str, str]], program: str, tests: str) -> str:
             if count != 1:
                 return f"NOT FOUND: {pattern} in {file}"
             (ROOT / file).write_text(text, encoding="utf-8")
-        built = subprocess.run(["cmake", "--build", "--preset", "dev", "-j1", "--target", program], cwd=ROOT, capture_output=True, text=True, check=False)
+        preset = "release" if program == SCRIPTS else "dev"
+        built = subprocess.run(["cmake", "--build", "--preset", preset, "-j1", "--target", program], cwd=ROOT, capture_output=True, text=True, check=False)
         if built.returncode != 0:
             return "DOES NOT BUILD\n" + built.stdout[-1500:]
+        if program == SCRIPTS:
+            return judge_script(tests)
         run = subprocess.run([ROOT / "build/dev/bin" / program, f"--gtest_filter={tests}", "--gtest_brief=1"], capture_output=True, text=True, check=False)
         ran = re.search(r"(\d+) tests? from", run.stdout)
         if ran is None or ran.group(1) == "0":
@@ -115,7 +182,7 @@ def judge(edits: list[tuple[str, str, str]], program: str, tests: str) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--list", action="store_true", help="only list the rows that no rule here is of")
+    parser.add_argument("--list", action="store_true", help="only say which rules are not where this file looks for them, and list the rows that no rule here is of")
     parser.add_argument("hazards", nargs="*", metavar="HAZARD")
     arguments = parser.parse_args()
     rows = hazards()
@@ -124,6 +191,11 @@ def main() -> int:
         if not any(hazard.startswith(begin) for hazard, _ in rows):
             print(f"no row of docs/safety.md begins with '{begin}'")
             bad += 1
+    for begin, edits, _, _ in RULES:
+        for file, pattern, _ in edits:
+            if not re.search(pattern, (ROOT / file).read_text(encoding="utf-8")):
+                print(f"{begin:48} NOT FOUND: {pattern} in {file}")
+                bad += 1
     for begin, edits, program, tests in RULES:
         if arguments.list or (arguments.hazards and not any(part in begin for part in arguments.hazards)):
             continue

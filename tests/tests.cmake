@@ -14,7 +14,8 @@ set(test_environment TENON_PROGRAMS=${CMAKE_RUNTIME_OUTPUT_DIRECTORY} TENON_CACH
 set(suites_nightly_here)
 if(TENON_SANITIZE MATCHES address)
   set(suites_nightly_here RealPegs QueryTruth QueryTruthOfRealPairs CouplingWork SheetAtEveryOffset EnvironmentDeterminism Overload
-                        FrictionOnASlope FrictionOfAPull FieldSizeTruth RealPairs SlopeLimit FreeFlights Tapers MeshOrigin OwnSteps)
+                        FrictionOnASlope FrictionOfAPull FieldSizeTruth RealPairs SlopeLimit FreeFlights Tapers MeshOrigin OwnSteps
+                        Stability AgainstWhatStandsStill)
 elseif(TENON_SANITIZE MATCHES thread)
   set(suites_nightly_here EnvironmentCheckpoint JournalDamage MeshOrigin OwnSteps FreeFlights NeverThrough Studs Crossings Tapers)
 endif()
@@ -71,13 +72,19 @@ endif()
 add_test(NAME idl.generate COMMAND ${Python3_EXECUTABLE} ${CMAKE_SOURCE_DIR}/tests/idl/generate_test.py)
 set_tests_properties(idl.generate PROPERTIES TIMEOUT 300 LABELS "gate;idl")
 
+# each rule of docs/safety.md is where the script looks that takes it out
+add_test(NAME safety.rules COMMAND ${Python3_EXECUTABLE} ${CMAKE_SOURCE_DIR}/tests/safety_mutations.py --list)
+set_tests_properties(safety.rules PROPERTIES LABELS "gate;safety")
+
 # a whole session in one process: ends as it should, and without a report of the sanitizer that this preset has
 add_test(NAME rehearsal.short COMMAND ${Python3_EXECUTABLE} ${CMAKE_SOURCE_DIR}/tests/rehearsal_test.py)
 set_tests_properties(rehearsal.short PROPERTIES TIMEOUT 900 LABELS "gate;rehearsal" ENVIRONMENT "${test_environment}" COST 300)
 add_dependencies(threaded_tests tenon-rehearse tenon-parts tenon-bake)
 
 # scripts that run the programs as people do; alone those that measure against the clock
-set(quiet_scripts session_test faults_test trust_test resume_test)
+set(quiet_scripts session_test faults_test trust_test resume_test network_test link_test mentoring_test command_test safety_test station_test
+                  console_headset_test console_test endurance_test report_test)
+add_executable(link_relay tests/system/link_relay.cpp)  # a network link of theirs
 file(GLOB scripts CONFIGURE_DEPENDS tests/system/*_test.py)
 foreach(script ${scripts})
   get_filename_component(name ${script} NAME_WE)
@@ -97,6 +104,21 @@ foreach(script ${scripts})
 endforeach()
 
 # speed is measured here and asserted nowhere
+add_executable(tenon-bench-link EXCLUDE_FROM_ALL tests/bench/link/main.cpp)
+target_link_libraries(tenon-bench-link PRIVATE idl_wire fmt::fmt CLI11::CLI11)
+tenon_room(tests/bench/stability LINK clients_rehearse nlohmann_json::nlohmann_json fmt::fmt)
+target_sources(tests_bench_stability PRIVATE tests/bench/engine/table.cpp)
+set_target_properties(tests_bench_stability PROPERTIES UNITY_BUILD OFF)
+add_executable(tenon-bench-stability tests/bench/stability/main.cpp)
+target_link_libraries(tenon-bench-stability PRIVATE tests_bench_stability CLI11::CLI11)
+add_dependencies(tenon-bench-stability tenon-bake)  # started by it
+tenon_tests(bench/stability_cells LINK tests_bench_stability)
+add_test(NAME bench.stability COMMAND tenon-bench-stability --json ${CMAKE_BINARY_DIR}/stability.json --plot ${CMAKE_BINARY_DIR}/stability.svg)
+set_tests_properties(bench.stability PROPERTIES TIMEOUT 3600 LABELS "nightly;bench" ENVIRONMENT "${test_environment}" COST 900)
+if(BUILD_TESTING)
+  add_dependencies(test_programs tenon-bench-stability)
+  add_dependencies(bench_stability_cells_tests tenon-bench-stability)
+endif()
 if(TENON_BUILD_BENCH)
   tenon_room(tests/bench/engine LINK server_bake server_simulation clients_rehearse clients_report tests_support
              scenarios_part_generator fcl PkgConfig::bullet nlohmann_json::nlohmann_json)

@@ -32,8 +32,13 @@ class CommandClient {
   /// Sends a command and waits for the answer, at most 5 s. Fails with the server's reason, or when there is
   /// no answer.
   [[nodiscard]] Result<void> send(const ParsedCommand& command, const Stop& stop);
+  /// Why the server has refused the last command; kNone when it has not.
+  [[nodiscard]] Refusal refusal() const { return ack_ ? ack_->refusal : Refusal::kNone; }
   /// Takes messages for `timeout`.
-  void dispatch(std::chrono::milliseconds timeout) { inbox_.dispatch(timeout); }
+  void dispatch(std::chrono::milliseconds timeout) {
+    inbox_.dispatch(timeout);
+    if (lost()) member_->leave();  // nobody comes back to this seat
+  }
   [[nodiscard]] bool isOver() const { return tenon::isOver(run_.phase); }
   /// Why the server takes no more commands; none while it does.
   [[nodiscard]] const std::optional<std::string>& lost() const { return member_->lost(); }

@@ -8,6 +8,7 @@
 
 #include "clients/command/command_program.h"
 #include "clients/command/session_lists.h"
+#include "idl/wire/network.h"
 
 namespace {
 
@@ -39,6 +40,7 @@ void declare(CLI::App& app, CommandArguments& arguments) {
   app.add_option("--domain", arguments.options.domain, "DDS domain, 0 to 230")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
+  tenon::wire::addNetworkOption(app);
   app.add_option("--person", arguments.options.person, "name shown to the other participants")
       ->capture_default_str();
   app.add_option_function<unsigned>(

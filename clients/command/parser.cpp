@@ -30,6 +30,15 @@ constexpr std::array kCommands{
     CommandWord{"give", "OBJECT HAND", "lets a hand take an object where it is, from whoever holds it", 0,
                 CommandKind::kHandOver},
     CommandWord{"note", "TEXT...", "leaves a note in the recording and the report", 0, CommandKind::kNote},
+    CommandWord{"guide", "HOW HAND...",
+                "an instructor's hand guides the trainee's HAND: show, resist, together, path; or off", 0,
+                CommandKind::kGuide},
+    CommandWord{"freeze", "on|off",
+                "holds all hands still without a force while the steps go on, or lets them move again", 0,
+                CommandKind::kFreezeForces},
+    CommandWord{"kick", "NAME...",
+                "removes a person from the session, by name or number; their hands are free then", 0,
+                CommandKind::kKick},
     CommandWord{"collision", "OBJECT OBJECT on|off", "enables or disables collisions of two objects", 0,
                 CommandKind::kSetCollision},
     CommandWord{"stop", "", "ends the session", 'e', CommandKind::kStop},
@@ -57,6 +66,10 @@ Result<ParsedCommand> withArguments(const CommandWord& word, const std::vector<s
   if (word.command == CommandKind::kSetCollision) {
     if (given != 3 || (arguments[3] != "on" && arguments[3] != "off")) return usage();
     return ParsedCommand{word.command, arguments[1] + " " + arguments[2], arguments[3] == "on" ? 1.0 : 0.0};
+  }
+  if (word.command == CommandKind::kFreezeForces) {
+    if (given != 1 || (arguments[1] != "on" && arguments[1] != "off")) return usage();
+    return ParsedCommand{word.command, arguments[1], arguments[1] == "on" ? 1.0 : 0.0};
   }
   if (word.arguments.ends_with("...")) {
     if (given == 0) return usage();

@@ -13,11 +13,25 @@ namespace tenon::command {
 
 namespace {
 constexpr std::chrono::seconds kPatience{5};
-constexpr std::chrono::milliseconds kQuiet{300};  // without a message the lists are complete
+constexpr std::chrono::milliseconds kWait{20};
+constexpr std::chrono::milliseconds kStepPatience{1000};
+constexpr std::chrono::milliseconds kStatsPatience{200};  // they come each 10 ms
 
 std::string_view markOf(const SessionLists& lists, std::uint32_t step) {
   const bool is_current = lists.current && lists.current->step == step;
   return is_current && lists.current->phase == StepPhase::kActive ? "now" : "";
+}
+
+/// What is not there yet; empty: nothing.
+std::string missingOf(const SessionLists& lists, const SessionAnnounce& whole) {
+  std::vector<std::string> missing;
+  const auto count = [&](const char* what, std::size_t have, std::uint32_t all) {
+    if (have < all) missing.push_back(fmt::format("{} of {} {}", all - have, all, what));
+  };
+  count("objects", lists.objects.size(), whole.objects);
+  count("hands", lists.hands.size(), whole.hands);
+  count("steps", lists.steps.size(), whole.steps);
+  return fmt::format("{}", fmt::join(missing, ", "));
 }
 }  // namespace
 
@@ -33,11 +47,13 @@ std::string SessionLists::text(const std::string& language) const {
     for (const HandId hand : person.hands) moved.push_back(handName(hand));
     text += fmt::format("  {:<24} {:<12} {}\n", person.name, roleName(person.role), fmt::join(moved, ", "));
   }
+  if (unheard > 0) text += fmt::format("  ({} more, not heard of within {} s)\n", unheard, kPatience.count());
   text += "hands\n";
   for (const auto& [id, hand] : hands) {
     const auto own = objects.find(hand.object);
-    text += fmt::format("  {:<24} {:<12} {}\n", hand.name, roleName(hand.role),
-                        own == objects.end() ? "" : own->second.name);
+    text += fmt::format("  {:<24} {:<12} {:<24} without input still after {} ms, parked after {} ms\n",
+                        hand.name, roleName(hand.role), own == objects.end() ? "" : own->second.name,
+                        hand.limits.freeze_ticks, hand.limits.park_ticks);
   }
   text += "steps\n";
   for (const auto& [index, step] : steps)
@@ -46,6 +62,10 @@ std::string SessionLists::text(const std::string& language) const {
   text += "objects\n";
   for (const auto& [id, object] : objects)
     text += fmt::format("  {:<24} {:<12} {}\n", object.name, object.kind, object.title);
+  if (stats)
+    text += fmt::format(
+        "server\n  late ticks: {}; writes to the bus of more than 5 ms: {}; samples not sent: {}\n",
+        stats->late_ticks, stats->slow_writes, stats->unsent_samples);
   return text;
 }
 
@@ -69,15 +89,37 @@ Result<SessionLists> readLists(wire::MembershipOptions options, const std::atomi
   subscribe(wire::kSceneStep, [&](const SceneStep& step) { lists.steps[step.step] = step; });
   subscribe(wire::kStepState, [&](const StepState& step) { lists.current = step; });
   if (!all) return fail(all.error().what);
+  // apart from the lists, which end when they are complete
+  auto stats = wire::Reader<TickStats>::open(session, wire::kTickStats100);
+  if (!stats) return fail(stats.error().what);
 
   const auto until = std::chrono::steady_clock::now() + kPatience;
-  const auto complete = [&] {
-    return lists.current && lists.steps.size() == lists.current->steps && !lists.objects.empty() &&
-           !lists.hands.empty() && !lists.people.empty();
+  const SessionAnnounce& whole = member.announce();
+  const auto awaitsPeople = [&] {
+    // who has left meanwhile was there
+    return lists.people.size() < member.welcome().people;
   };
-  while (!stop && (inbox.dispatch(kQuiet) > 0 || !complete()))
-    if (std::chrono::steady_clock::now() > until) break;
-  if (!complete()) return fail("session '" + member.sessionName() + "' does not send its lists");
+  while (!stop && (!missingOf(lists, whole).empty() || awaitsPeople()) &&
+         std::chrono::steady_clock::now() < until)
+    inbox.dispatch(kWait);
+  // before the run there is none
+  const auto until_step = std::min(until, std::chrono::steady_clock::now() + kStepPatience);
+  while (!stop && !lists.current && std::chrono::steady_clock::now() < until_step) inbox.dispatch(kWait);
+  if (awaitsPeople())
+    lists.unheard = member.welcome().people - static_cast<std::uint32_t>(lists.people.size());
+  if (const std::string missing = missingOf(lists, whole); !missing.empty())
+    return fail(
+        fmt::format("session '{}' has not sent all of its lists within {} s; missing: {}: try again, "
+                    "or check the link (tenon doctor --peer)",
+                    member.sessionName(), kPatience.count(), missing));
+  // a server that waits for its clients sends none
+  const auto until_stats = std::min(until, std::chrono::steady_clock::now() + kStatsPatience);
+  for (TickStats newest; !stop && !lists.stats && std::chrono::steady_clock::now() < until_stats;) {
+    if (stats->take(newest))
+      lists.stats = newest;
+    else
+      inbox.dispatch(kWait);
+  }
   return lists;
 }
 

@@ -8,6 +8,7 @@
 #include "idl/types/messages/objects.h"
 #include "idl/types/messages/session.h"
 #include "idl/types/messages/steps.h"
+#include "idl/types/messages/timing.h"
 #include "idl/types/result.h"
 #include "idl/wire/membership.h"
 
@@ -19,9 +20,11 @@ struct SessionLists {
   std::map<HandId, SceneHand> hands;
   std::map<ObjectId, SceneObject> objects;
   std::map<std::uint32_t, SceneStep> steps;
+  std::uint32_t unheard = 0;         ///< people with a seat of whom nothing has arrived
   std::optional<StepState> current;  ///< step; the server sends it once the session is there
+  std::optional<TickStats> stats;    ///< newest; none before the first tick
 
-  /// People, hands, steps and objects, as aligned text; titles in `language`.
+  /// People, hands, steps, objects and how the server does, as aligned text; titles in `language`.
   [[nodiscard]] std::string text(const std::string& language = "en") const;
 };
 

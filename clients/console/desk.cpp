@@ -52,6 +52,8 @@ class Desk::Seat {
   }
   void stop() { stop_ = true; }
   [[nodiscard]] bool hasEnded() const { return has_ended_; }
+  /// The server has given a role that leads the run.
+  [[nodiscard]] bool leads() const { return leads_ && !has_ended_; }
 
  private:
   using Waiting = std::pair<std::uint32_t, command::ParsedCommand>;
@@ -65,12 +67,17 @@ class Desk::Seat {
       return client.error().what;
     }
     answer_(viewer_, {request, true, {}, role});
+    leads_ = options_.role == Role::kInstructor || options_.role == Role::kAdmin;
     while (!stop_) {
       (*client)->dispatch(kCollect);
       while (auto waiting = take()) {
         const auto done = (*client)->send(waiting->second, stop_);
         const std::string why = done ? "" : stop_ ? std::string(kLeft) : done.error().what;
-        answer_(viewer_, {waiting->first, done.has_value(), why, stop_ ? "" : role});
+        answer_(viewer_, {.id = waiting->first,
+                          .accepted = done.has_value(),
+                          .text = why,
+                          .role = stop_ ? "" : role,
+                          .code = std::string(refusalName((*client)->refusal()))});
       }
       if (const auto& lost = (*client)->lost(); lost && !stop_) {
         answer_(viewer_, {0, false, *lost, {}});
@@ -99,11 +106,14 @@ class Desk::Seat {
   std::deque<Waiting> waiting_;
   bool takes_no_more_ = false;
   std::atomic<bool> stop_{false};
-  std::atomic<bool> has_ended_{false};
+  std::atomic<bool> has_ended_{false}, leads_{false};
   std::thread thread_;
 };
 
-Desk::Desk(SeatRights rights, Answer answer) : rights_(std::move(rights)), answer_(std::move(answer)) {}
+Desk::Desk(SeatRights rights, std::filesystem::path recordings, Answer answer)
+    : rights_(std::move(rights)),
+      answer_(std::move(answer)),
+      recordings_(std::move(recordings), rights_.domain, answer_) {}
 
 /// All end together, instead of one after the other.
 Desk::~Desk() {
@@ -140,6 +150,7 @@ void Desk::handle(ViewerId viewer, const std::string& session, const DeskRequest
     answer.accepted = true;
     return answer_(viewer, answer);
   }
+  if (!request.words.empty() && request.words.front() == "record") return record(viewer, session, request);
   std::vector<std::string> words;
   for (const std::string& word : request.words) words.push_back(printable(word));
   auto parsed = command::parseCommand(words);
@@ -155,11 +166,27 @@ void Desk::handle(ViewerId viewer, const std::string& session, const DeskRequest
     return answer_(viewer, answer);
   }
   const auto seat = seats_.find(viewer);
+  if (seat == seats_.end()) answer.code = "no_seat";
   const auto added =
       seat == seats_.end() ? fail(std::string(kNoSeat)) : seat->second->add(request.id, std::move(*parsed));
   if (added) return;
   answer.text = added.error().what;
   answer_(viewer, answer);
+}
+
+/// A seat that leads the run is needed, as for other commands that concern all.
+void Desk::record(ViewerId viewer, const std::string& session, const DeskRequest& request) {
+  const auto leads = [&] {
+    const std::scoped_lock lock(mutex_);
+    const auto seat = seats_.find(viewer);
+    return seat != seats_.end() && seat->second->leads();
+  };
+  if (!leads()) {
+    return answer_(viewer, {.id = request.id,
+                            .text = "recordings are started and stopped by who has a seat as instructor",
+                            .code = std::string(refusalName(Refusal::kNotPermitted))});
+  }
+  recordings_.handle(viewer, session, request);
 }
 
 /// The reason of a refusal; a seat that is granted answers by itself.

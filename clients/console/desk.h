@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -10,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/console/desk_recordings.h"
 #include "clients/console/seat_rights.h"
 #include "clients/console/stopper.h"
 #include "clients/console/web_options.h"
@@ -28,7 +30,8 @@ class Desk {
  public:
   using Answer = Stopper::Answer;
 
-  Desk(SeatRights rights, Answer answer);
+  /// `recordings`: folder for those that are started here; empty: none are.
+  Desk(SeatRights rights, std::filesystem::path recordings, Answer answer);
   ~Desk();
   Desk(const Desk&) = delete;
   Desk& operator=(const Desk&) = delete;
@@ -47,11 +50,13 @@ class Desk {
 
   [[nodiscard]] std::optional<DeskAnswer> sit(ViewerId viewer, const std::string& session,
                                               const DeskRequest& request);
+  void record(ViewerId viewer, const std::string& session, const DeskRequest& request);
   void leave(ViewerId viewer);
   [[nodiscard]] Stopper& stopperOf(const std::string& session);
 
   SeatRights rights_;
   Answer answer_;
+  DeskRecordings recordings_;
   std::mutex mutex_;
   std::map<ViewerId, std::unique_ptr<Seat>> seats_;
   std::vector<std::unique_ptr<Seat>> left_;                   ///< their threads end

@@ -79,7 +79,8 @@ std::string deskAnswerText(const DeskAnswer& answer) {
                {"id", answer.id},
                {"accepted", answer.accepted},
                {"text", answer.text},
-               {"role", answer.role}});
+               {"role", answer.role},
+               {"code", answer.code}});
 }
 
 std::optional<std::string_view> chooseSubprotocol(std::string_view offered) {

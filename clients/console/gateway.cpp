@@ -26,7 +26,8 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::chrono::milliseconds kPeriod{20};
-constexpr std::size_t kMaxSessions = 64;  // that are shown
+constexpr std::chrono::hours kSoon{24 * 14};  // a certificate expires
+constexpr std::size_t kMaxSessions = 64;      // that are shown
 
 std::int64_t nowNanoseconds() {
   return std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
@@ -41,7 +42,8 @@ class Gateway {
         stop_(stop),
         pass_(options.role && options.recording.empty() ? wire::randomHex() : ""),
         rights_{.domain = options.domain, .role = options.role, .pass = pass_, .key_file = options.key_file},
-        desk_(rights_, [this](ViewerId viewer, const DeskAnswer& answer) { say(viewer, answer); }),
+        desk_(rights_, options.recordings,
+              [this](ViewerId viewer, const DeskAnswer& answer) { say(viewer, answer); }),
         hands_(
             rights_, [this](ViewerId viewer, const DeskAnswer& answer) { say(viewer, answer); },
             [this](ViewerId viewer, Payload views) { server_->show(viewer, std::move(views)); },
@@ -93,6 +95,7 @@ Result<void> Gateway::openServer() {
   const bool has_page = site.hasPage();
   const nlohmann::json described{{"session", options_.session},
                                  {"recording", options_.recording.filename().string()},
+                                 {"recordings", !options_.recordings.empty()},
                                  {"role", options_.role ? roleName(*options_.role) : ""},
                                  {"protocol", kProtocolVersion}};
   site.describe(described.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
@@ -118,11 +121,14 @@ Result<void> Gateway::openServer() {
   server_->addRoom(std::string(kLobbyRoom), Lobby::channels());
   if (options_.recording.empty()) static_cast<void>(offerFeed(std::string(kFirstRoom), options_.session));
   server_->start();
-  const std::string address = "http://localhost:" + std::to_string(server_->port()) + "/";
+  const std::string address = server_->address();
   options_.print("console: " + address);
   if (!pass_.empty())
     options_.print("the same as " + std::string(roleName(*options_.role)) + ", for you alone: " + address +
                    "#pass=" + pass_);
+  if (const auto validity = server_->certificateValidity(); validity && *validity < kSoon)
+    options_.print("the certificate expires in " + std::to_string(validity->count() / 24) +
+                   " days: `tenon cert` makes a new one");
   if (!has_page)
     options_.print(
         "the console's page is not built, so this address serves public viewers only: "

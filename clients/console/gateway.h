@@ -14,9 +14,10 @@
 namespace tenon::console {
 
 struct GatewayOptions {
-  std::string session;              ///< its name; empty: all that are announced
-  std::filesystem::path recording;  ///< to be played instead; empty: none
-  std::uint32_t domain = 0;         ///< DDS domain
+  std::string session;               ///< its name; empty: all that are announced
+  std::filesystem::path recording;   ///< to be played instead; empty: none
+  std::filesystem::path recordings;  ///< folder for those that are started at the desk; empty: none are
+  std::uint32_t domain = 0;          ///< DDS domain
   WebOptions web;
   std::optional<Role> role;                       ///< that whoever has the printed address may take
   std::filesystem::path key_file;                 ///< of the session's key; empty: the user's

@@ -2,11 +2,13 @@
 #include <csignal>
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "clients/console/gateway.h"
 #include "idl/types/cache_folder.h"
+#include "idl/wire/network.h"
 
 namespace {
 
@@ -21,6 +23,7 @@ int run(int argc, char** argv) {
   options.page = tenon::console::defaultPage();
   options.cache = tenon::defaultCache();
   std::string shown, role;
+  std::vector<std::string> certificate;
   app.add_option("shown", shown,
                  "name of a session, or a recording, FILE.mcap; default: all sessions there are")
       ->option_text("SESSION|FILE.mcap");
@@ -33,12 +36,29 @@ int run(int argc, char** argv) {
   app.add_option("--domain", options.domain, "DDS domain, 0 to 230")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
-  app.add_option("--port", options.web.port, "port on this machine's loopback interface; 0: any that is free")
+  tenon::wire::addNetworkOption(app);
+  app.add_option("--port", options.web.port, "0: any that is free")->capture_default_str();
+  app.add_option(
+         "--listen", options.web.address,
+         "address of the interface on which it is reached: that of a network card, or 0.0.0.0 for all; "
+         "beyond this machine with --tls")
       ->capture_default_str();
+  auto* const tls = app.add_option("--tls", certificate,
+                                   "the certificate and its key, PEM files, for https; tenon cert makes "
+                                   "them")
+                        ->option_text("CERT,KEY")
+                        ->delimiter(',')
+                        ->expected(2);
+  app.add_flag("--without-tls", options.web.is_plain_permitted,
+               "http beyond this machine: everybody on the network can read along, keys of seats as well")
+      ->excludes(tls);
   app.add_option(
       "--allow-origin", options.web.origins,
       "a viewer's page from elsewhere that may connect, as in https://viewer.example; repeat it for more");
   app.add_option("--cache", options.cache, "folder in which the server keeps the models of parts");
+  app.add_option("--recordings", options.recordings,
+                 "folder for recordings that instructors start in the browser; default: none can be started")
+      ->option_text("FOLDER");
   app.footer("Exit code: 0 when it was stopped, 1 when it could not serve, 2 for wrong usage.");
   try {
     app.parse(argc, argv);
@@ -49,6 +69,10 @@ int run(int argc, char** argv) {
     options.recording = shown;
   else if (!shown.empty())
     options.session = shown;
+  if (!certificate.empty()) {
+    options.web.certificate = certificate[0];
+    options.web.key = certificate[1];
+  }
   if (!role.empty()) options.role = role == "trainee" ? tenon::Role::kTrainee : tenon::Role::kInstructor;
   options.print = [](const std::string& text) {
     std::printf("%s\n", text.c_str());

@@ -170,23 +170,35 @@ std::string_view contentSecurityPolicy() {
          "frame-ancestors 'none'";
 }
 
-bool isPermittedOrigin(std::string_view origin, std::string_view host,
+bool isPermittedOrigin(std::string_view origin, std::string_view host, bool is_secure,
                        const std::vector<std::string>& others) {
   if (origin.empty()) return true;
   if (std::find(others.begin(), others.end(), origin) != others.end()) return true;
-  constexpr std::string_view kScheme = "http://";
-  return origin.starts_with(kScheme) && origin.substr(kScheme.size()) == host;
+  const std::string_view scheme = is_secure ? "https://" : "http://";
+  return origin.starts_with(scheme) && origin.substr(scheme.size()) == host;
 }
 
-bool isLoopbackHost(std::string_view host) {
+std::string_view nameOfHost(std::string_view host) {
   const std::size_t colon = host.rfind(':');
   const bool has_port = colon != std::string_view::npos && host.find(']', colon) == std::string_view::npos;
   if (has_port) {
     const std::string_view port = host.substr(colon + 1);
     if (port.empty() || !std::all_of(port.begin(), port.end(), [](char c) { return c >= '0' && c <= '9'; }))
-      return false;
+      return {};
     host = host.substr(0, colon);
   }
+  return host;
+}
+
+bool isAddress(std::string_view host) {
+  const std::string_view name = nameOfHost(host);
+  if (name.starts_with('[') && name.ends_with(']')) return true;  // a name has no brackets
+  const auto isOfDigits = [](char c) { return (c >= '0' && c <= '9') || c == '.'; };
+  return !name.empty() && std::all_of(name.begin(), name.end(), isOfDigits);
+}
+
+bool isLoopbackHost(std::string_view host) {
+  host = nameOfHost(host);
   return host == "localhost" || host == "127.0.0.1" || host == "[::1]";
 }
 

@@ -63,9 +63,13 @@ inline constexpr std::string_view kFirstRoom = "/live";
 [[nodiscard]] std::string_view contentSecurityPolicy();
 
 /// Whether a request may come from a page of `origin` (the header Origin; empty: not from a browser): pages
-/// of this server at `host` (the header Host), and those of `others`.
-[[nodiscard]] bool isPermittedOrigin(std::string_view origin, std::string_view host,
+/// of this server at `host` (the header Host), by https when `is_secure`, and those of `others`.
+[[nodiscard]] bool isPermittedOrigin(std::string_view origin, std::string_view host, bool is_secure,
                                      const std::vector<std::string>& others);
+/// The header Host without its port; empty when its port is none.
+[[nodiscard]] std::string_view nameOfHost(std::string_view host);
+/// Whether the header Host is an address, which no DNS server can point here.
+[[nodiscard]] bool isAddress(std::string_view host);
 /// Whether the header Host names this machine's loopback interface: a name that somebody else's DNS server
 /// points here does not.
 [[nodiscard]] bool isLoopbackHost(std::string_view host);

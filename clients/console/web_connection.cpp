@@ -7,6 +7,7 @@ namespace {
 
 constexpr std::size_t kMaxHeaderBytes = 16U << 10U;
 constexpr std::chrono::seconds kRequestTimeout{15};
+constexpr std::size_t kMaxBytesASecond = 256U << 10U;  // that are read
 
 std::string_view toView(beast::string_view text) { return {text.data(), text.size()}; }
 
@@ -17,13 +18,19 @@ Answer plain(unsigned status, std::string_view text) {
 }  // namespace
 
 WebConnection::WebConnection(WebService& server, tcp::socket socket)
-    : server_(server), stream_(std::move(socket)), waiting_(server.waiting.end()) {
+    : server_(server), stream_(std::move(socket), kMaxBytesASecond), waiting_(server.waiting.end()) {
   ++server_.connections;
 }
 
 WebConnection::~WebConnection() {
   stopWaiting();
   --server_.connections;
+}
+
+/// For what the other side has to send; not for long.
+void WebConnection::startWaiting() {
+  stream_.next_layer().expires_after(kRequestTimeout);
+  waiting_ = server_.waiting.insert(server_.waiting.end(), this);
 }
 
 void WebConnection::stopWaiting() {
@@ -34,15 +41,36 @@ void WebConnection::stopWaiting() {
 void WebConnection::abort() {
   stopWaiting();
   beast::error_code ignored;
-  stream_.socket().close(ignored);
+  stream_.next_layer().socket().close(ignored);
+}
+
+void WebConnection::run() {
+  if (!server_.tls) return read();
+  // who speaks plain HTTP to a port with TLS is told so
+  startWaiting();
+  beast::async_detect_ssl(stream_.next_layer(), incoming_,
+                          [self = shared_from_this()](beast::error_code error, bool is_tls) {
+                            self->stopWaiting();
+                            if (error) return;
+                            is_tls ? self->handshake() : self->read();
+                          });
+}
+
+void WebConnection::handshake() {
+  startWaiting();
+  stream_.handshake(*server_.tls, incoming_.data(),
+                    [self = shared_from_this()](beast::error_code error, std::size_t taken) {
+                      self->stopWaiting();
+                      self->incoming_.consume(taken);
+                      if (!error) self->read();
+                    });
 }
 
 void WebConnection::read() {
   parser_.emplace();
   parser_->header_limit(kMaxHeaderBytes);
   parser_->body_limit(std::uint64_t{0});
-  stream_.expires_after(kRequestTimeout);
-  waiting_ = server_.waiting.insert(server_.waiting.end(), this);
+  startWaiting();
   http::async_read(stream_, incoming_, *parser_,
                    [self = shared_from_this()](beast::error_code error, std::size_t) {
                      self->stopWaiting();
@@ -50,24 +78,51 @@ void WebConnection::read() {
                    });
 }
 
+namespace {
+/// Names of hosts have no case; browsers send small letters.
+bool isSameName(std::string_view a, std::string_view b) {
+  return beast::iequals({a.data(), a.size()}, {b.data(), b.size()});
+}
+}  // namespace
+
+/// Names that somebody else's DNS server points here are not.
+bool WebConnection::isPermittedHost(std::string_view host) const {
+  if (isLoopbackHost(host)) return true;
+  if (server_.certificate) return server_.certificate->covers(host);
+  return server_.options.is_plain_permitted &&
+         (isAddress(host) || isSameName(nameOfHost(host), server_.host_name));
+}
+
 void WebConnection::handle() {
   const Request request = parser_->release();
   const std::string_view host = toView(request[http::field::host]);
-  if (!isLoopbackHost(host)) {
-    respond(request, plain(403, "this server answers to localhost only"));
+  const std::string_view target = toView(request.target());
+  if (!isPermittedHost(host)) {
+    respond(request,
+            plain(403, server_.certificate
+                           ? "this server answers to the names in its certificate and to localhost"
+                       : server_.options.is_plain_permitted
+                           ? "this server answers to addresses, to this machine's own name and to localhost"
+                           : "this server answers to localhost only"));
+  } else if (server_.tls && !stream_.isSecure()) {
+    Answer answer = plain(target.starts_with('/') && !websocket::is_upgrade(request) ? 308 : 400,
+                          "this server speaks https and wss on this port");
+    if (answer.status == 308)
+      answer.headers.emplace_back("Location", "https://" + std::string(host) + std::string(target));
+    respond(request, std::move(answer));
   } else if (websocket::is_upgrade(request)) {
     handleUpgrade(request, toView(request[http::field::origin]), host);
   } else if (request.method() != http::verb::get && request.method() != http::verb::head) {
     respond(request, plain(405, "GET and HEAD only"));
   } else {
-    respond(request, server_.site.answer(toView(request.target()), toView(request[http::field::range])));
+    respond(request, server_.site.answer(target, toView(request[http::field::range])));
   }
 }
 
 void WebConnection::handleUpgrade(const Request& request, std::string_view origin, std::string_view host) {
   const auto subprotocol = chooseSubprotocol(toView(request[http::field::sec_websocket_protocol]));
   const std::string path = roomOf(toView(request.target()));
-  if (!isPermittedOrigin(origin, host, server_.options.origins)) {
+  if (!isPermittedOrigin(origin, host, stream_.isSecure(), server_.options.origins)) {
     respond(request, plain(403, "pages of this origin may not connect; --allow-origin permits it"));
   } else if (!subprotocol) {
     respond(request, plain(400, "offer the subprotocol foxglove.sdk.v1 or foxglove.websocket.v1"));
@@ -75,10 +130,9 @@ void WebConnection::handleUpgrade(const Request& request, std::string_view origi
     respond(request,
             plain(404, "there is no session of this name, or more sessions than this gateway shows"));
   } else {
-    stream_.expires_never();
-    const bool is_own_page = isPermittedOrigin(origin, host, {});
-    std::make_shared<WebViewer>(server_, stream_.release_socket(), path, is_own_page)
-        ->run(request, *subprotocol);
+    stream_.next_layer().expires_never();
+    const bool is_own_page = isPermittedOrigin(origin, host, stream_.isSecure(), {});
+    std::make_shared<WebViewer>(server_, std::move(stream_), path, is_own_page)->run(request, *subprotocol);
   }
 }
 
@@ -86,7 +140,7 @@ void WebConnection::respond(const Request& request, Answer answer) {
   auto response = std::make_shared<http::response<http::vector_body<std::uint8_t>>>();
   response->version(request.version());
   response->result(answer.status);
-  response->keep_alive(request.keep_alive() && answer.status < 400);
+  response->keep_alive(request.keep_alive() && answer.status < 300);
   response->set(http::field::server, "tenon");
   response->set(http::field::content_type, answer.type);
   response->set(http::field::cache_control,
@@ -100,12 +154,13 @@ void WebConnection::respond(const Request& request, Answer answer) {
   const std::size_t size = answer.body.size();
   if (request.method() != http::verb::head) response->body() = std::move(answer.body);
   response->content_length(size);
-  stream_.expires_after(kSendTimeout);
+  stream_.next_layer().expires_after(kSendTimeout);
   http::async_write(stream_, *response,
                     [self = shared_from_this(), response](beast::error_code error, std::size_t) {
                       if (!error && response->keep_alive()) return self->read();
-                      beast::error_code ignored;
-                      self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+                      if (error) return;
+                      self->startWaiting();  // for the other side's end: it makes room like any that waits
+                      self->stream_.end([self](beast::error_code) { self->stopWaiting(); });
                     });
 }
 

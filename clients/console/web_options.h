@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <span>
 #include <string>
@@ -11,7 +12,11 @@
 namespace tenon::console {
 
 struct WebOptions {
-  std::uint16_t port = 8080;  ///< on 127.0.0.1; 0: any that is free
+  std::string address = "127.0.0.1";  ///< of the interface
+  std::uint16_t port = 8080;          ///< 0: any that is free
+  std::filesystem::path certificate;  ///< for TLS, as PEM, with its key; empty: without TLS
+  std::filesystem::path key;
+  bool is_plain_permitted = false;  ///< without TLS beyond the loopback interface, too
   std::vector<std::string>
       origins;                 ///< pages from elsewhere that may connect, as in "https://viewer.example"
   std::string name = "tenon";  ///< of the server, for viewers

@@ -24,7 +24,10 @@ WebService::WebService(const WebOptions& web_options, Site web_site, WebHandlers
     : options(web_options),
       site(std::move(web_site)),
       handlers(std::move(web_handlers)),
-      session_id(wire::randomHex()) {}
+      session_id(wire::randomHex()) {
+  beast::error_code ignored;
+  host_name = asio::ip::host_name(ignored);
+}
 
 void WebService::accept() {
   acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
@@ -36,7 +39,7 @@ void WebService::accept() {
       beast::error_code ignored;
       socket.set_option(tcp::no_delay(true), ignored);
       socket.set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
-      std::make_shared<WebConnection>(*this, std::move(socket))->read();
+      std::make_shared<WebConnection>(*this, std::move(socket))->run();
     }
     accept();
   });
@@ -78,14 +81,31 @@ WebViewer* WebService::find(ViewerId id) {
 Result<std::unique_ptr<WebServer>> WebServer::open(const WebOptions& options, Site site,
                                                    WebHandlers handlers) {
   auto impl = std::make_unique<WebService>(options, std::move(site), std::move(handlers));
-  const tcp::endpoint address(asio::ip::address_v4::loopback(), options.port);
+  if (!options.certificate.empty()) {
+    auto certificate = Certificate::read(options.certificate, options.key);
+    if (!certificate) return fail(certificate.error().what);
+    SSL_CTX_up_ref(certificate->context());  // which the context takes
+    impl->tls.emplace(certificate->context());
+    impl->certificate = std::move(*certificate);
+  }
   beast::error_code error;
+  const auto interface = asio::ip::make_address(options.address, error);
+  if (error)
+    return fail("--listen " + options.address +
+                ": is no address of an interface, as 192.168.1.5 or 0.0.0.0 is");
+  if (!interface.is_loopback() && !impl->tls && !options.is_plain_permitted)
+    return fail(
+        "--listen " + options.address +
+        ": other machines reach it, so it needs a certificate: `tenon cert` makes one, --tls "
+        "CERT,KEY names it. --without-tls does without: then everybody on the network can read along, "
+        "keys of seats as well");
+  const tcp::endpoint address(interface, options.port);
   impl->acceptor.open(address.protocol(), error);
   if (!error) impl->acceptor.set_option(asio::socket_base::reuse_address(true), error);
   if (!error) impl->acceptor.bind(address, error);
   if (!error) impl->acceptor.listen(asio::socket_base::max_listen_connections, error);
   if (error)
-    return fail("port " + std::to_string(options.port) + " of 127.0.0.1: " + error.message() +
+    return fail("port " + std::to_string(options.port) + " of " + options.address + ": " + error.message() +
                 "; name another one with --port, or 0 for any that is free");
   impl->port = impl->acceptor.local_endpoint().port();
   return std::unique_ptr<WebServer>(new WebServer(std::move(impl)));
@@ -95,6 +115,29 @@ WebServer::WebServer(std::unique_ptr<WebService> impl) : impl_(std::move(impl)) 
 WebServer::~WebServer() { stop(); }
 
 std::uint16_t WebServer::port() const { return impl_->port; }
+
+std::string WebServer::address() const {
+  beast::error_code ignored;
+  const auto interface = asio::ip::make_address(impl_->options.address, ignored);
+  std::string host = "localhost";
+  if (impl_->certificate && !interface.is_loopback()) {
+    const auto& names = impl_->certificate->names();
+    const auto isForOthers = [](const std::string& name) {
+      return !isLoopbackHost(name) && name.front() != '*';
+    };
+    const auto found = std::find_if(names.begin(), names.end(), isForOthers);
+    if (found != names.end()) host = *found;
+  } else if (!interface.is_loopback()) {
+    host = interface.is_unspecified() ? impl_->host_name : interface.to_string();
+    if (host.find(':') != std::string::npos) host = "[" + host + "]";
+  }
+  return (impl_->tls ? "https://" : "http://") + host + ":" + std::to_string(port()) + "/";
+}
+
+std::optional<std::chrono::hours> WebServer::certificateValidity() const {
+  return impl_->certificate ? std::optional(impl_->certificate->validity()) : std::nullopt;
+}
+
 std::size_t WebServer::viewers() const { return impl_->viewer_count; }
 
 void WebServer::start() {

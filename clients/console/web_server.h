@@ -1,7 +1,9 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,25 +16,32 @@ namespace tenon::console {
 
 struct WebService;  ///< in web_service.h
 
-/// The HTTP and WebSocket server of the gateway, on the loopback interface.
+/// The HTTP and WebSocket server of the gateway, in plain or within TLS; beyond the loopback interface only
+/// with a certificate, or when that is dispensed with. Who speaks plain HTTP to a port with TLS is sent to
+/// https.
 ///
 /// HTTP: a Site. WebSocket: the Foxglove protocol, in rooms, which are paths; each has the channels of one
 /// session. A viewer has a ViewerQueue; one that takes nothing for 20 s, sends more than 200 messages a
 /// second, or messages longer than 64 kB, is disconnected; 256 kB a second are read of it. At most 256
-/// connections are served; when more come, those end that have asked for nothing for longest. A request must
-/// name a loopback host, and a WebSocket one a permitted origin.
+/// connections are served; when more come, those end that have asked for nothing for longest; the handshake
+/// of TLS and each request have 15 s. A request must name a loopback host or one of the certificate's, and a
+/// WebSocket one a permitted origin.
 ///
 /// Threads: open, start and stop from one thread; it has a thread of its own, which alone serves. The others
 /// from any. Real-time: no.
 class WebServer {
  public:
-  /// Fails when the port cannot be had.
+  /// Fails when the port cannot be had, the certificate cannot be used, or one is missing.
   static Result<std::unique_ptr<WebServer>> open(const WebOptions& options, Site site, WebHandlers handlers);
   ~WebServer();
   WebServer(const WebServer&) = delete;
   WebServer& operator=(const WebServer&) = delete;
 
   [[nodiscard]] std::uint16_t port() const;
+  /// As people type it.
+  [[nodiscard]] std::string address() const;
+  /// How long its certificate is valid; none without TLS.
+  [[nodiscard]] std::optional<std::chrono::hours> certificateValidity() const;
   void start();
   /// Serves these channels at `path`, as roomOf() gives it; without effect when there is such a room.
   void addRoom(const std::string& path, std::vector<Channel> channels);

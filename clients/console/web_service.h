@@ -11,36 +11,19 @@
 #include <string>
 #include <string_view>
 #include <thread>
-#include <utility>  // before Asio 1.18, which uses std::exchange without it
 #include <vector>
 
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/post.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/beast/core.hpp>
-#include <boost/beast/http.hpp>
-#include <boost/beast/websocket.hpp>
-
+#include "clients/console/certificate.h"
 #include "clients/console/channel_store.h"
 #include "clients/console/site.h"
 #include "clients/console/viewer_queue.h"
 #include "clients/console/web_options.h"
+#include "clients/console/web_stream.h"
 
 /// The parts of the WebServer; nobody else includes this. All runs in the server's one thread.
 namespace tenon::console {
 
-namespace asio = boost::asio;
-namespace beast = boost::beast;
-namespace http = beast::http;
-namespace websocket = beast::websocket;
-using tcp = asio::ip::tcp;
-
 inline constexpr std::chrono::seconds kSendTimeout{20};
-
-/// What a viewer sends is read at a bounded rate: frames that carry nothing are no messages, and cost as
-/// much.
-using ViewerStream = beast::basic_stream<tcp, asio::any_io_executor, beast::simple_rate_policy>;
 
 struct WebService;
 
@@ -48,7 +31,7 @@ struct WebService;
 class WebViewer : public std::enable_shared_from_this<WebViewer> {
  public:
   /// `is_own_page`: it is no page from elsewhere.
-  WebViewer(WebService& server, tcp::socket socket, std::string room, bool is_own_page);
+  WebViewer(WebService& server, WebStream stream, std::string room, bool is_own_page);
   ~WebViewer();
   WebViewer(const WebViewer&) = delete;
   WebViewer& operator=(const WebViewer&) = delete;
@@ -81,7 +64,7 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
   ViewerId id_;
   std::string room_;
   bool is_own_page_;
-  websocket::stream<ViewerStream> socket_;
+  websocket::stream<WebStream> socket_;
   asio::steady_timer send_timer_;
   beast::flat_buffer incoming_;
   std::map<SubscriptionId, ChannelId> subscriptions_;
@@ -103,19 +86,23 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   WebConnection(const WebConnection&) = delete;
   WebConnection& operator=(const WebConnection&) = delete;
 
-  void read();
+  void run();
   /// Ends it without an answer.
   void abort();
 
  private:
   using Request = http::request<http::empty_body>;
+  void startWaiting();
   void stopWaiting();
+  void handshake();
+  void read();
   void handle();
+  [[nodiscard]] bool isPermittedHost(std::string_view host) const;
   void handleUpgrade(const Request& request, std::string_view origin, std::string_view host);
   void respond(const Request& request, Answer answer);
 
   WebService& server_;
-  beast::tcp_stream stream_;
+  WebStream stream_;
   beast::flat_buffer incoming_;
   std::optional<http::request_parser<http::empty_body>> parser_;
   std::list<WebConnection*>::iterator waiting_;  ///< in WebService::waiting, or its end
@@ -140,11 +127,14 @@ struct WebService {
   [[nodiscard]] WebViewer* find(ViewerId viewer);
 
   WebOptions options;
+  std::optional<Certificate> certificate;  ///< none: without TLS
+  std::optional<asio::ssl::context> tls;
   Site site;
   WebHandlers handlers;
   std::map<std::string, Room, std::less<>> rooms;  ///< by path
   std::string session_id;                          ///< of this server's life
 
+  std::string host_name;  ///< of this machine
   std::uint16_t port = 0;
   std::size_t connections = 0;
   std::list<WebConnection*> waiting;  ///< for a request, the longest first

@@ -9,16 +9,15 @@ using std::chrono::seconds;
 constexpr std::size_t kMaxMessageBytes = 64U << 10U;
 constexpr std::size_t kMaxSubscriptions = 256;
 constexpr int kMaxMessagesASecond = 200;
-constexpr std::size_t kMaxBytesASecond = 256U << 10U;
 
 }  // namespace
 
-WebViewer::WebViewer(WebService& server, tcp::socket socket, std::string room, bool is_own_page)
+WebViewer::WebViewer(WebService& server, WebStream stream, std::string room, bool is_own_page)
     : server_(server),
       id_(server.next_viewer++),
       room_(std::move(room)),
       is_own_page_(is_own_page),
-      socket_(std::move(socket)),
+      socket_(std::move(stream)),
       send_timer_(server.io) {
   ++server_.connections;
 }
@@ -41,7 +40,6 @@ void WebViewer::run(const http::request<http::empty_body>& request, std::string_
         answer.set(http::field::server, "tenon");
       }));
   socket_.read_message_max(kMaxMessageBytes);
-  socket_.next_layer().rate_policy().read_limit(kMaxBytesASecond);
   socket_.async_accept(request, [self = shared_from_this()](beast::error_code error) {
     if (!error) self->begin();
   });

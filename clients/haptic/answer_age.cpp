@@ -21,7 +21,7 @@ void AnswerAge::step(std::uint32_t seq, std::uint32_t answered, double dt) noexc
 
 double AnswerAge::excess() const noexcept {
   const double delay = std::min({delays_[0], delays_[1], kLongestDelay});
-  return std::max(0.0, age() - 2.0 * delay);
+  return std::max(0.0, age() - delay - std::max(delay, jitter_));
 }
 
 }  // namespace tenon::haptic

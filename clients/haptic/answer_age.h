@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -19,13 +20,18 @@ class AnswerAge {
 
   /// [s] infinite before the first answer.
   [[nodiscard]] double age() const noexcept { return now_ - answered_read_at_; }
-  /// [s] age beyond what the link explains: twice its delay, since jitter of up to the delay itself is usual
-  /// there. The delay is the smallest age of an answer in the last seconds with answers, at most
+  /// [s] age beyond what the link explains: its delay, and as much again or the jitter that was measured if
+  /// that is more. The delay is the smallest age of an answer in the last seconds with answers, at most
   /// kLongestDelay.
   [[nodiscard]] double excess() const noexcept;
+  /// `jitter` [s] of the age that was measured lately, 0 at first.
+  void setJitter(double jitter) noexcept {
+    jitter_ = jitter > 0.0 ? std::min(jitter, kLongestJitter) : 0.0;  // the order of comparisons: NaN is none
+  }
   [[nodiscard]] std::uint32_t answered() const noexcept { return answered_; }
 
-  static constexpr double kLongestDelay = 0.15;  ///< [s] a longer one is no link to render contacts by
+  static constexpr double kLongestDelay = 0.15;   ///< [s] a longer one is no link to render contacts by
+  static constexpr double kLongestJitter = 0.05;  ///< [s] a longer one is a gap
 
  private:
   static constexpr std::size_t kRing = 1024;
@@ -39,6 +45,7 @@ class AnswerAge {
   std::array<Read, kRing> reads_{};    ///< by seq modulo its size
   double now_ = 0.0;                   ///< [s] sum of dt
   double answered_read_at_ = -kNever;  ///< [s]
+  double jitter_ = 0.0;                ///< [s]
   std::uint32_t answered_ = 0;
   double window_began_ = 0.0;                     ///< [s]
   std::array<double, 2> delays_{kNever, kNever};  ///< [s] of this window and of the last one

@@ -10,6 +10,7 @@ Result<void> Bracelet::begin(HandId forearm, bool armed) {
   contacts_.hand = forearm;
   answers_ = {};
   permitted_ = armed;
+  finishing_ = false;
   if (armed) return device_.arm();
   device_.disarm();
   return {};
@@ -23,9 +24,15 @@ void Bracelet::permit(bool permitted) noexcept {
   const bool runs = permitted_ && forces_on_ && !safety_.wantsDisarm();
   permitted_ = permitted;
   if (!permitted) handover_.withdraw();
-  if (!permitted || runs) return;
+  if (!permitted || runs || finishing_) return;
   safety_.reset();
   handover_.ask();
+}
+
+void Bracelet::finish(bool disarms) noexcept {
+  finishing_ = true;
+  finish_disarms_ = disarms;
+  if (disarms) handover_.withdraw();
 }
 
 void Bracelet::step(std::uint32_t seq, double dt) noexcept {
@@ -37,10 +44,11 @@ void Bracelet::step(std::uint32_t seq, double dt) noexcept {
   devices::SafetyRequest request;
   request.requested.tactors = map_.step(contacts_, dt);
   request.age = answers_.excess();
+  request.restart = finishing_;  // silent
   request.emergency_stop = !permitted_;
   const devices::DeviceCommand command = safety_.step(request, state, dt);
   device_.write(command);
-  if (safety_.wantsDisarm()) device_.disarm();
+  if (safety_.wantsDisarm() || (finishing_ && finish_disarms_)) device_.disarm();
   intensities_ = command.tactors;
 }
 

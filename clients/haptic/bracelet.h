@@ -29,6 +29,10 @@ class Bracelet {
   [[nodiscard]] bool wantsArming() const noexcept { return handover_.pending(); }
   Result<void> armDevice() { return handover_.serve(device_); }
   void handBack() noexcept { handover_.handBack(); }
+  /// From the next step on it is silent, and with `disarms` disarmed, until a new begin().
+  void finish(bool disarms) noexcept;
+  /// Off.
+  void end() noexcept { device_.disarm(); }
   /// One cycle, `dt` [s] after the last one; `seq` numbers the forearm's input.
   void step(std::uint32_t seq, double dt) noexcept;
   /// Intensities that were displayed in the last cycle, 0 to 255.
@@ -44,6 +48,8 @@ class Bracelet {
   TactorIntensities intensities_{};
   bool permitted_ = false;
   bool forces_on_ = false;
+  bool finishing_ = false;
+  bool finish_disarms_ = false;
 };
 
 }  // namespace tenon::haptic

@@ -2,56 +2,98 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 
+#include "idl/types/ids.h"
 #include "idl/types/messages/timing.h"
 
 namespace tenon::haptic {
 
-/// Histogram of durations with bins of 50 us up to 100 ms; longer ones are counted in the last bin.
+/// Histogram of durations: bins of 50 us up to 100 ms, then of 2 % up to 10 s; longer ones are counted in the
+/// last bin.
 ///
 /// Threads: one. Real-time: everything.
 class DurationHistogram {
  public:
   /// Negative durations count as 0.
   void add(std::int64_t nanoseconds) noexcept;
-  /// [s] upper edge of the bin that contains the quantile `fraction` [-]; 0 when the histogram is empty.
+  void clear() noexcept { *this = {}; }
+  /// [s] upper edge of the bin that contains the quantile `fraction` [-], and max() at most; 0 when the
+  /// histogram is empty.
   [[nodiscard]] double quantile(double fraction) const noexcept;
   /// [s] exact maximum; 0 when the histogram is empty.
   [[nodiscard]] double max() const noexcept { return static_cast<double>(max_) * 1e-9; }
+  /// [s] exact minimum; 0 when the histogram is empty.
+  [[nodiscard]] double min() const noexcept { return count_ > 0 ? static_cast<double>(min_) * 1e-9 : 0.0; }
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
 
  private:
   static constexpr std::int64_t kBin = 50'000;  // [ns]
-  static constexpr std::size_t kBins = 2000;
-  std::array<std::uint64_t, kBins> bins_{};
+  static constexpr std::size_t kFineBins = 2000;
+  static constexpr double kGrowth = 1.02;          // [-] of a coarse bin to the next
+  static constexpr std::size_t kCoarseBins = 233;  // ln 100 / ln 1.02: 100 ms to 10 s
+  std::array<std::uint64_t, kFineBins + kCoarseBins> bins_{};
   std::uint64_t count_ = 0;
-  std::int64_t max_ = 0;  // [ns]
+  std::int64_t max_ = 0;                                         // [ns]
+  std::int64_t min_ = std::numeric_limits<std::int64_t>::max();  // [ns]
+};
+
+/// Share of the server's answers to a station that are lost on the way.
+///
+/// The answers of a hand have ticks in steps of one (of ten for a tracked limb, which the smallest step
+/// within the window tells). Answers that the server did not send, because a newer one was ready, count as
+/// lost.
+///
+/// Threads: one. Real-time: everything.
+class AnswerLoss {
+ public:
+  void received(HandId hand, Tick tick) noexcept;
+  /// [-] since clear(), of the hand that lost most; 0 when there were fewer than two answers.
+  [[nodiscard]] double share() const noexcept;
+  void clear() noexcept { hands_ = {}; }
+
+ private:
+  static constexpr std::size_t kHands = 8;
+  struct Answers {
+    HandId hand;
+    Tick first = 0, last = 0;
+    Tick step = 0;  // [ticks] smallest; 0: unknown
+    std::uint64_t count = 0;
+  };
+  std::array<Answers, kHands> hands_{};
 };
 
 /// Latency statistics of a station: time from a device reading to the server's contacts computed from it (age
-/// of the rendered force), and lateness of the servo loop.
+/// of the rendered force), its jitter, the longest time between two such answers, answers lost, and lateness
+/// of the servo loop.
 ///
 /// Threads: one. Real-time: everything.
 class ForceAgeStatistics {
  public:
   /// Input `seq` was read at `now_ns`; `period_ns` is the nominal period of the loop.
   void inputSent(std::uint32_t seq, std::int64_t now_ns, std::int64_t period_ns) noexcept;
-  /// A manifold that answers input `seq` arrived. Repeated, overtaken and unknown answers are ignored.
-  void answerReceived(std::uint32_t seq, std::int64_t now_ns) noexcept;
-  /// Sets the fields of `telemetry` that are measured here.
-  void fill(Telemetry& telemetry) const noexcept;
+  /// The manifold of a tick for a hand, which answers input `seq`, arrived. Repeated, overtaken and unknown
+  /// answers have no age.
+  void answerReceived(HandId hand, Tick tick, std::uint32_t seq, std::int64_t now_ns) noexcept;
+  /// Sets the fields of `telemetry` that are measured here, and begins a new period of those that it states
+  /// of the time since the last one.
+  void fill(Telemetry& telemetry) noexcept;
 
  private:
-  static constexpr std::size_t kRing = 1024;
+  static constexpr std::size_t kRing = 16384;  // ages of up to 16 s are known
   struct Sent {
     std::uint32_t seq = 0;
     std::int64_t time = 0;  // [ns]
   };
   std::array<Sent, kRing> sent_{};
   DurationHistogram ages_;
+  DurationHistogram recent_ages_;  // since the last fill()
   DurationHistogram lateness_;
+  AnswerLoss loss_;  // since the last fill()
   std::uint32_t newest_answer_ = 0;
-  std::int64_t last_sent_ = 0;  // [ns]
+  std::int64_t answered_at_ = 0;  // [ns] of newest_answer_; 0: none yet
+  std::int64_t silence_ = 0;      // [ns] longest between two answers
+  std::int64_t last_sent_ = 0;    // [ns]
 };
 
 }  // namespace tenon::haptic

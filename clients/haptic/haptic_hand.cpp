@@ -27,6 +27,13 @@ CouplingOptions couplingOf(const devices::DeviceCaps& caps) {
   return options;
 }
 
+FixtureLimits fixtureLimitsOf(const devices::DeviceCaps& caps) {
+  const devices::SafetyLimits limits = devices::safetyLimits(caps);
+  const bool turns = (caps.dof_mask >> 3U) == kAllDofs >> 3U;
+  return {limits.stiffness, turns ? limits.rotational_stiffness : 0.0,
+          kDampingFraction * caps.physical_damping, limits.continuous_force, turns ? limits.torque : 0.0};
+}
+
 WorkspaceOptions workspaceOf(const devices::DeviceCaps& caps) {
   WorkspaceOptions options;
   options.radius = caps.indexing_radius;
@@ -49,10 +56,13 @@ HapticHand::HapticHand(devices::HapticDevice& device, devices::ClutchLatch* clut
     : device_(device),
       workspace_(workspaceOf(device.caps())),
       coupling_(couplingOf(device.caps())),
+      fixture_(fixtureLimitsOf(device.caps())),
       safety_(device.caps(), clutch) {}
 
 Result<void> HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH, bool armed) {
   permitted_ = armed;
+  finishing_ = false;
+  finish_time_ = 0.0;
   Result<void> result;
   if (armed) {
     result = device_.arm();
@@ -70,6 +80,7 @@ Result<void> HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH
   state_ = {};
   state_.hand = hand;
   coupling_.reset();
+  fixture_.restart();
   return result;
 }
 
@@ -77,14 +88,21 @@ void HapticHand::permitForces(bool permitted) noexcept {
   const bool runs = permitted_ && device_state_.forces_on && !safety_.wantsDisarm();
   permitted_ = permitted;
   if (!permitted) handover_.withdraw();
-  if (!permitted || runs) return;
+  if (!permitted || runs || finishing_) return;
   safety_.reset();
   coupling_.reset();
   handover_.ask();
 }
 
+void HapticHand::finish(bool disarms) noexcept {
+  finishing_ = true;
+  finish_disarms_ = disarms;
+  if (disarms) handover_.withdraw();
+}
+
 void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noexcept {
   if (!(dt > 0.0)) dt = kShortestCycle;
+  if (finishing_) finish_time_ += dt;
   readDevice();
   answers_.step(seq, local_.hasManifold() ? local_.manifold().answers_seq : 0, dt);
   // a device without forces may rest at the end of its workspace, where indexing would not end
@@ -97,7 +115,8 @@ void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noex
 
   const LocalProxy& proxy = local_.step(X_WH, world);
   in_contact_ = proxy.touching || (local_.hasManifold() && serverSeesContact(local_.manifold()));
-  const devices::DeviceCommand command = safety_.step(request(X_WH, dt), device_state_, dt);
+  devices::DeviceCommand command = safety_.step(request(X_WH, dt), device_state_, dt);
+  if (finished()) command.F_Ho_D = {};  // of the workspace's wall too
   writeDevice(command);
   state_.F_Ho_W = command.F_Ho_D;
   updateOutputs(seq, world, V_WH);
@@ -139,14 +158,18 @@ devices::SafetyRequest HapticHand::request(const Pose& X_WH, double dt) noexcept
   const LocalProxy& proxy = local_.proxy();
   const double excess = answers_.excess();
   devices::SafetyRequest request;
-  request.requested.F_Ho_D = coupling_.step(proxy, X_WH, dt);
-  request.stiffness = coupling_.stiffness();
-  request.rotational_stiffness = coupling_.rotationalStiffness();
+  // springs in parallel
+  request.requested.F_Ho_D =
+      coupling_.step(proxy, X_WH, dt) + fixture_.step(X_WH, dt, rendering_ == Rendering::kOn && !finishing_);
+  request.stiffness = coupling_.stiffness() + fixture_.stiffness();
+  request.rotational_stiffness = coupling_.rotationalStiffness() + fixture_.rotationalStiffness();
   // without contacts to render there is no force that could be old
   request.age = proxy.active ? excess : 0.0;
   // while they only get older the force fades; once they are fresh again it is another one
-  request.restart = rendering_ != Rendering::kOn && (!proxy.active || excess <= safety_.limits().fade_from);
+  request.restart =
+      finishing_ || (rendering_ != Rendering::kOn && (!proxy.active || excess <= safety_.limits().fade_from));
   request.dead_man_held = deadManHeld();
+  if (request.restart || !request.dead_man_held || !safety_.forcesOn()) fixture_.restart();
   request.emergency_stop = !permitted_;
   return request;
 }
@@ -157,11 +180,21 @@ void HapticHand::writeDevice(const devices::DeviceCommand& command) noexcept {
   device_.show({proxy.active, in_contact_, workspace_.toDevice(proxy.X_WS), workspace_.toDevice(proxy.X_WO),
                 workspace_.centre(), local_.hasManifold() ? local_.manifold().object : ObjectId{}});
   device_.write(command);  // a stop brakes before the forces are off
-  if (safety_.wantsDisarm()) device_.disarm();
+  if (safety_.wantsDisarm() || (finished() && finish_disarms_)) device_.disarm();
+}
+
+/// The last sample becomes the first of the earlier ones of input `seq`.
+void HapticHand::keepSample(std::uint32_t seq) noexcept {
+  auto& earlier = input_.earlier;
+  if (input_.sample.seq == 0 || seq != input_.sample.seq + 1) return earlier.clear();
+  earlier.resize(std::min(earlier.size() + 1, earlier.capacity()));
+  for (std::size_t i = earlier.size() - 1; i > 0; --i) earlier[i] = earlier[i - 1];
+  earlier[0] = input_.sample;
 }
 
 void HapticHand::updateOutputs(std::uint32_t seq, const WorldView& world, const Twist& V_WH) noexcept {
   const LocalProxy& proxy = local_.proxy();
+  keepSample(seq);
   input_.sample = {seq, workspace_.toWorld(device_state_.X_DH), V_WH, device_state_.buttons};
   input_.server_epoch = world.serverEpoch();
   input_.active = permitted_ && deadManHeld() && !handover_.pending() && !safety_.wantsDisarm() &&
@@ -176,6 +209,7 @@ void HapticHand::updateOutputs(std::uint32_t seq, const WorldView& world, const 
   constexpr double kUnknown = std::numeric_limits<std::uint32_t>::max();
   state_.manifold_age = static_cast<std::uint32_t>(std::min(age, kUnknown));
   state_.safety_flags = safety_.flags();
+  state_.guidance_force = static_cast<float>(fixture_.force());
 }
 
 void HapticHand::updateEvents() noexcept {
@@ -197,6 +231,9 @@ void HapticHand::updateEvents() noexcept {
   const bool stale = local_.hasManifold() && answers_.excess() > safety_.limits().fade_from;
   events_.stale_began = stale && !stale_;
   stale_ = stale;
+  events_.guidance_began = fixture_.acts() && !guided_;
+  events_.guidance_ended = !fixture_.acts() && guided_;
+  guided_ = fixture_.acts();
 }
 
 }  // namespace tenon::haptic

@@ -6,6 +6,7 @@
 #include "clients/haptic/coupling.h"
 #include "clients/haptic/device_handover.h"
 #include "clients/haptic/local_model.h"
+#include "clients/haptic/virtual_fixture.h"
 #include "clients/haptic/workspace.h"
 #include "devices/device.h"
 #include "devices/safety.h"
@@ -26,12 +27,15 @@ struct HandEvents {
   bool indexing_ended = false;
   bool stale_began = false;
   bool beyond_validity_began = false;
+  bool guidance_began = false;
+  bool guidance_ended = false;
 };
 
 /// Haptic loop of one hand at 1 kHz: read device, indexing, local model, virtual coupling, safety layer,
 /// write device. Also composes the messages to the server (input) and to the other participants (state).
 ///
-/// Every force passes the safety layer (devices/safety.h).
+/// Every force passes the safety layer (devices/safety.h), that of a virtual fixture together with that of
+/// the contacts, and only while these are rendered.
 ///
 /// A force that was interrupted returns from zero: after a gap (the contacts are older than the layer's fresh
 /// limit), a freeze, a refusal, a jump of a body, an arming or a stop. First the hand is re-anchored: the
@@ -50,8 +54,11 @@ class HapticHand {
   /// cannot be armed.
   Result<void> begin(HandId hand, ClientId client, const Vector3& p_WH, bool armed);
   void receive(const HandManifold& manifold) noexcept { local_.receive(manifold); }
+  void receive(const Guidance& guidance) noexcept { fixture_.receive(guidance); }
   /// One cycle of `dt` [s], the time since the last one by the clock of the caller; `seq` numbers the input.
   void step(std::uint32_t seq, const WorldView& world, double dt) noexcept;
+  /// `jitter` [s]: AnswerAge::setJitter.
+  void setLinkJitter(double jitter) noexcept { answers_.setJitter(jitter); }
   /// False: forces off, brake on, input inactive. True, for the person at the device, also of a device in
   /// fault: resets the safety layer, and asks for armDevice() if the device is not armed. See Arming, which
   /// decides it.
@@ -62,6 +69,10 @@ class HapticHand {
   /// after handBack(), which follows armDevice() of all hands that share its clutch.
   Result<void> armDevice() { return handover_.serve(device_); }
   void handBack() noexcept { handover_.handBack(); }
+  /// With the next steps the force falls to zero, within kFinishTime; then the device displays none, and with
+  /// `disarms` it is disarmed. Nothing ends that but a new begin().
+  void finish(bool disarms) noexcept;
+  [[nodiscard]] bool finished() const noexcept { return finishing_ && finish_time_ >= kFinishTime; }
   /// Forces off.
   void end() noexcept { device_.disarm(); }
 
@@ -73,6 +84,7 @@ class HapticHand {
   [[nodiscard]] const devices::DeviceCaps& caps() const noexcept { return device_.caps(); }
   [[nodiscard]] Workspace& workspace() noexcept { return workspace_; }
   [[nodiscard]] const LocalModel& local() const noexcept { return local_; }
+  [[nodiscard]] const VirtualFixture& fixture() const noexcept { return fixture_; }
   [[nodiscard]] const Pose& pose() const noexcept { return input_.sample.X_WH; }
   [[nodiscard]] bool inContact() const noexcept { return in_contact_; }
   /// Forces are permitted, but a fault of the device or an open clutch keeps them off until the person
@@ -85,6 +97,7 @@ class HapticHand {
   [[nodiscard]] double contactAge() const noexcept { return answers_.age(); }
 
  private:
+  static constexpr double kFinishTime = 0.025;  ///< [s] the safety layer takes 20 ms
   /// How the hand's force stands to its contacts.
   enum class Rendering {
     kInterrupted,  ///< they are not to be rendered, or not yet
@@ -98,6 +111,7 @@ class HapticHand {
   [[nodiscard]] devices::SafetyRequest request(const Pose& X_WH, double dt) noexcept;
   void writeDevice(const devices::DeviceCommand& command) noexcept;
   [[nodiscard]] bool deadManHeld() const noexcept;
+  void keepSample(std::uint32_t seq) noexcept;
   void updateOutputs(std::uint32_t seq, const WorldView& world, const Twist& V_WH) noexcept;
   void updateEvents() noexcept;
 
@@ -105,6 +119,7 @@ class HapticHand {
   Workspace workspace_;
   LocalModel local_;
   Coupling coupling_;
+  VirtualFixture fixture_;
   devices::Safety safety_;
   AnswerAge answers_;
   DeviceHandover handover_;
@@ -119,7 +134,11 @@ class HapticHand {
   bool beyond_validity_ = false;
   bool stale_ = false;
   bool in_contact_ = false;
+  bool guided_ = false;
   bool permitted_ = true;
+  bool finishing_ = false;
+  bool finish_disarms_ = false;
+  double finish_time_ = 0.0;  // [s] since finish()
 };
 
 }  // namespace tenon::haptic

@@ -51,6 +51,10 @@ std::string describe(const StationEvent& event, const std::string& hand_name) {
       return (event.detail != 0 ? "emergency stop engaged" : "emergency stop released") + when;
     case StationEventKind::kArmed:
       return "armed by the person at the station" + when;
+    case StationEventKind::kGuidanceBegan:
+      return hand + ": guided by a virtual fixture" + when;
+    case StationEventKind::kGuidanceEnded:
+      return hand + ": guidance ended" + when;
   }
   return "unknown event" + when;
 }
@@ -83,9 +87,20 @@ void Station::receive(const WorldFrame& frame) noexcept {
   }
 }
 
-void Station::receive(const HandManifold& manifold) noexcept {
-  if (std::find(own_hands_.begin(), own_hands_.end(), manifold.hand) != own_hands_.end())
-    manifoldReceived(manifold);
+bool Station::isOwn(HandId hand) const noexcept {
+  return std::find(own_hands_.begin(), own_hands_.end(), hand) != own_hands_.end();
+}
+
+bool Station::receive(const HandManifold& manifold) noexcept {
+  if (!isOwn(manifold.hand)) return false;
+  manifoldReceived(manifold);
+  return true;
+}
+
+bool Station::receive(const Guidance& guidance) noexcept {
+  if (!isOwn(guidance.hand)) return false;
+  guidanceReceived(guidance);
+  return true;
 }
 
 void Station::receive(const StepState& step) {
@@ -145,6 +160,8 @@ void Station::report(const HapticHand& hand) noexcept {
   if (events.indexing_began) report(StationEventKind::kIndexingBegan, hand.id(), 0, 0.0);
   if (events.indexing_ended) report(StationEventKind::kIndexingEnded, hand.id(), 0, 0.0);
   if (events.stale_began) report(StationEventKind::kStale, hand.id(), 0, hand.state().manifold_age);
+  if (events.guidance_began) report(StationEventKind::kGuidanceBegan, hand.id(), 0, 0.0);
+  if (events.guidance_ended) report(StationEventKind::kGuidanceEnded, hand.id(), 0, 0.0);
   if (events.beyond_validity_began) {
     const auto ticks = static_cast<double>(hand.local().beyondValidity());
     report(StationEventKind::kBeyondValidity, hand.id(), 0, ticks);

@@ -36,6 +36,8 @@ enum class StationEventKind : std::uint8_t {
   kServerChanged,   ///< frames of a newer server epoch arrived; detail: the epoch
   kStopChanged,     ///< detail: 1 when an emergency stop was engaged, 0 when it was released
   kArmed,           ///< the person has armed the devices
+  kGuidanceBegan,   ///< a virtual fixture acts on the hand
+  kGuidanceEnded,
 };
 
 /// Event for the log. Plain data, so that the 1 kHz loop can write it.
@@ -58,7 +60,7 @@ struct StationEvent {
 /// millisecond and sends inputs() and states(); over DDS in real time, in lockstep, or in one process on a
 /// virtual clock. Deterministic: equal messages and seeds give bit-equal outputs.
 ///
-/// Threads: one. Real-time: receive of WorldFrame and HandManifold, step.
+/// Threads: one. Real-time: receive of WorldFrame, HandManifold and Guidance, step, finish.
 class Station {
  public:
   Station() = default;
@@ -77,7 +79,10 @@ class Station {
   void welcome(const Welcome& welcome, std::span<const SceneObject> objects);
 
   void receive(const WorldFrame& frame) noexcept;
-  void receive(const HandManifold& manifold) noexcept;
+  /// False, and nothing is done, when it is of a hand of another station.
+  bool receive(const HandManifold& manifold) noexcept;
+  /// Likewise.
+  bool receive(const Guidance& guidance) noexcept;
   void receive(const StepState& step);
   void receive(const StopSignal& stop) noexcept;
   /// The person at this station arms it, or agrees that an emergency stop ends (Arming).
@@ -89,13 +94,20 @@ class Station {
   /// `dt` [s]: from the last step to the next one, by the clock of whoever calls step(); kTickSeconds unless
   /// told.
   void setCycle(double dt) noexcept { dt_ = dt; }
+  /// `jitter` [s] of the link, as its contacts have it lately (AnswerAge::setJitter); 0 unless told.
+  void setLinkJitter(double jitter) noexcept { link_jitter_ = jitter; }
   /// Whether there is something for armDevices() to do.
   [[nodiscard]] virtual bool wantsArming() const noexcept { return false; }
   /// Resets and arms the devices, if the person has pressed for it. It may block and make texts, so it has a
   /// thread of its own beside that of step(), or is called between two steps. Fails with what a device says.
   [[nodiscard]] virtual Result<void> armDevices() = 0;
-  /// The device by whose readings step() is to be called; null: each millisecond of a clock.
-  [[nodiscard]] virtual devices::HapticDevice* pacingDevice() { return nullptr; }
+  /// With the next steps forces and vibrations fall to zero, within 25 ms; then nothing is displayed, and
+  /// with `disarms` the devices are disarmed, until welcome().
+  virtual void finish(bool /*disarms*/) noexcept {}
+  /// All of finish() is done.
+  [[nodiscard]] virtual bool finished() const noexcept { return true; }
+  /// Disarms the devices at once.
+  virtual void end() noexcept {}
 
   [[nodiscard]] std::span<const DeviceInput> inputs() const { return {inputs_.begin(), inputs_.size()}; }
   [[nodiscard]] std::span<const HandState> states() const { return {states_.begin(), states_.size()}; }
@@ -115,6 +127,8 @@ class Station {
   virtual void begin(std::span<const HandId> hand_ids) = 0;
   /// A manifold of one of this station's hands.
   virtual void manifoldReceived(const HandManifold& manifold) noexcept = 0;
+  /// Of one of this station's hands.
+  virtual void guidanceReceived(const Guidance& /*guidance*/) noexcept {}
   /// currentStep() is new.
   virtual void stepChanged() {}
   /// arming().permitsForces() is new, or the person has pressed again: a device in fault is to be reset.
@@ -135,11 +149,13 @@ class Station {
   ClientId client_;
   std::uint32_t seq_ = 0;
   double dt_ = kTickSeconds;  ///< [s] see setCycle()
+  double link_jitter_ = 0.0;  ///< [s]
   FixedVector<DeviceInput, kMaxStationHands> inputs_;
   FixedVector<HandState, kMaxStationHands> states_;
 
  private:
   void updateArming(bool permitted_before) noexcept;
+  [[nodiscard]] bool isOwn(HandId hand) const noexcept;
 
   static constexpr std::size_t kEventCapacity = 256;
   Arming arming_;

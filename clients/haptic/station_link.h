@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -21,8 +22,9 @@ class StationLink {
  public:
   using Stop = wire::Membership::Stop;
 
-  /// Joins a session and reads its scene. Fails when no server is found in time, the server refuses or sends
-  /// no scene, or `stop` is set.
+  /// Joins a session and reads its scene, which is complete with as many objects as the server announces.
+  /// Fails when no server is found in time, the server refuses, objects are missing after
+  /// `options.timeout` (which, the error says), or `stop` is set.
   static Result<std::unique_ptr<StationLink>> open(const wire::MembershipOptions& options, const Stop& stop);
 
   [[nodiscard]] wire::Membership& member() { return *member_; }
@@ -30,12 +32,13 @@ class StationLink {
   [[nodiscard]] const std::vector<SceneObject>& objects() const { return objects_; }
   [[nodiscard]] wire::Inbox& inbox() { return inbox_; }
   /// Waits until the endpoints of server and station have matched, for up to 5 s; call it after all
-  /// subscriptions.
-  [[nodiscard]] Result<void> awaitMatch(const Stop& stop);
+  /// subscriptions. Calls `meanwhile` every 5 ms.
+  [[nodiscard]] Result<void> awaitMatch(const Stop& stop, const std::function<void()>& meanwhile = {});
   [[nodiscard]] Result<void> send(const DeviceInput& input) { return inputs_->write(input); }
   [[nodiscard]] Result<void> send(const HandState& state) { return states_->write(state); }
   [[nodiscard]] Result<void> send(const ClientEvent& event) { return events_->write(event); }
   [[nodiscard]] Result<void> send(const Telemetry& telemetry) { return telemetry_->write(telemetry); }
+  [[nodiscard]] Result<void> send(const ClockSync& request) { return clock_->write(request); }
   /// A raise of the emergency stop that this station obeys: repeated for servers and stations that come
   /// later.
   [[nodiscard]] Result<void> send(const EmergencyStop& stop) { return stops_->write(stop); }
@@ -45,7 +48,7 @@ class StationLink {
  private:
   StationLink() = default;
   Result<void> openWriters();
-  Result<void> readScene(const wire::MembershipOptions& options);
+  Result<void> readScene(const wire::MembershipOptions& options, const Stop& stop);
 
   std::unique_ptr<wire::Membership> member_;
   std::vector<SceneObject> objects_;
@@ -53,6 +56,7 @@ class StationLink {
   std::unique_ptr<wire::Writer<HandState>> states_;
   std::unique_ptr<wire::Writer<ClientEvent>> events_;
   std::unique_ptr<wire::Writer<Telemetry>> telemetry_;
+  std::unique_ptr<wire::Writer<ClockSync>> clock_;
   std::unique_ptr<wire::Writer<EmergencyStop>> stops_;
   wire::Inbox inbox_;
 };

@@ -5,15 +5,18 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <functional>
 #include <future>
 #include <map>
 #include <optional>
+#include <thread>
 
 #include <poll.h>
 #include <unistd.h>
 
 #include "clients/haptic/force_age_statistics.h"
-#include "clients/haptic/paced_clock.h"
+#include "clients/haptic/limit_chooser.h"
+#include "clients/haptic/link_clock.h"
 #include "clients/haptic/seat_file.h"
 #include "clients/haptic/station_link.h"
 #include "idl/threads/cyclic_thread.h"
@@ -34,6 +37,7 @@ constexpr std::int64_t kPeriodNs = 1'000'000;
 // before another one: two programs that take each other's seat are not to do so many times a second.
 constexpr std::chrono::seconds kMinSeatTime{10};
 constexpr int kMaxRejoins = 3;
+constexpr milliseconds kFinishAtMost{200};  // for the servo loop to take the forces away
 
 std::int64_t nowNs() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
@@ -54,11 +58,6 @@ struct StationOutput {
   }
 };
 
-std::shared_ptr<threads::Clock> makeClock(devices::HapticDevice* pacing, threads::Nanoseconds period) {
-  if (pacing == nullptr) return std::make_shared<threads::SteadyClock>();
-  return std::make_shared<PacedClock>(*pacing, period);
-}
-
 /// A step without its texts, so that copying it does not allocate.
 StepState withoutTexts(StepState step) {
   step.name = {};
@@ -68,8 +67,11 @@ StepState withoutTexts(StepState step) {
   return step;
 }
 
-/// Whether a line waits on the terminal: the person has pressed return. Takes it.
+/// Whether a line waits on the terminal: the person has pressed return. Takes it. In the background of a
+/// terminal there is none, and who reads there is stopped (SIGTTIN).
 bool returnPressed() {
+  const pid_t foreground = tcgetpgrp(STDIN_FILENO);  // -1: it is not the terminal of this session
+  if (foreground != -1 && foreground != getpgrp()) return false;
   pollfd entry{STDIN_FILENO, POLLIN, 0};
   if (poll(&entry, 1, 0) <= 0 || (entry.revents & POLLIN) == 0) return false;
   char line[256];
@@ -94,11 +96,15 @@ class StationRunner {
   Result<RunState> runRealTime(const std::atomic<bool>& stop);
   void servo() noexcept;
   [[nodiscard]] bool tickComplete(Tick tick) const;
+  void resetAnswers();
   void notePeaks(const StationOutput& output) noexcept;
   void send(const StationOutput& output);
   void sendEvents();
   void printStep(const StepState& step);
   [[nodiscard]] Result<void> subscribeToStops();
+  [[nodiscard]] Result<void> subscribeToClock();
+  void sendInputs(const StationOutput& output);
+  void sendTelemetry(Telemetry telemetry);
   void passStops();
   void readKeys();
   void armDevices();
@@ -106,6 +112,12 @@ class StationRunner {
   /// Rejoins. `new_seat`: client, hands or server epoch differ from before, so the station has to restart.
   [[nodiscard]] Result<void> rejoin(const std::atomic<bool>& stop, bool& new_seat);
   void restartStation();
+  /// Stops the servo loop, of which the last cycles take the forces away; with `disarms` the devices are off.
+  void stopServo(std::optional<threads::CyclicThread>& thread, bool disarms);
+  [[nodiscard]] Result<RunState> takePart(std::optional<threads::CyclicThread>& thread,
+                                          const std::function<void()>& start_servo,
+                                          const std::atomic<bool>& stop);
+  [[nodiscard]] Result<RunState> takePartInLockstep(const std::atomic<bool>& stop);
   void print(const std::string& text) const {
     if (options_.print && !text.empty()) options_.print(text);
   }
@@ -120,6 +132,8 @@ class StationRunner {
       peak_forces_{};             ///< [N] displayed since the last HandState, by state
   std::uint32_t stated_seq_ = 0;  ///< of the last HandState
   std::future<void> arming_;
+  enum class Finish { kNot, kRest, kDisarm, kDone };
+  std::atomic<Finish> finish_{Finish::kNot};  ///< kDone: by the servo; the others: by the wire thread
   int rejoins_ = 0;
   std::chrono::steady_clock::time_point rejoined_at_{};
   std::optional<StepState> step_;
@@ -135,13 +149,18 @@ class StationRunner {
   // between servo and wire
   threads::SpscQueue<WorldFrame> frames_{128};
   threads::SpscQueue<HandManifold> manifolds_{128};
+  threads::SpscQueue<Guidance> guidances_{64};
   threads::SpscQueue<StepState> steps_{16};
   threads::Latest<StopSignal> stop_;
   threads::SpscQueue<bool> presses_{16};
   threads::SpscQueue<StationEvent> events_{256};
   threads::Latest<StationOutput> output_;
   threads::Latest<Telemetry> telemetry_;
-  StopTruth stops_;  // of the wire thread
+  StopTruth stops_;                       // of the wire thread
+  LinkClock link_clock_;                  // of the wire thread
+  LimitChooser limits_;                   // likewise
+  std::uint32_t playout_ticks_ = 0;       // likewise; LinkChoice::playout_ticks
+  std::atomic<double> link_jitter_{0.0};  // [s] for the servo
   ForceAgeStatistics force_age_;
   std::uint32_t seq_ = 0;
   std::int64_t last_cycle_ = 0;  // [ns]
@@ -172,6 +191,12 @@ Result<void> StationRunner::subscribe() {
     });
   }
   if (all) {
+    all = inbox.on<Guidance>(session, wire::kGuidance, [this](const Guidance& guidance) {
+      if (lockstep_) return static_cast<void>(station_.receive(guidance));
+      guidances_.push(guidance);
+    });
+  }
+  if (all) {
     all = inbox.on<StepState>(session, wire::kStepState, [this](const StepState& step) {
       step_revision_ = step.revision;
       printStep(step);
@@ -181,8 +206,31 @@ Result<void> StationRunner::subscribe() {
     });
   }
   if (all) all = subscribeToStops();
+  if (all && !lockstep_) all = subscribeToClock();
   if (all) all = inbox.on<RunState>(session, wire::kRunState, [this](const RunState& run) { run_ = run; });
   return all;
+}
+
+/// In real time alone: the time of a session in lockstep is that of its ticks.
+Result<void> StationRunner::subscribeToClock() {
+  return link_.inbox().onFrom<ClockSync>(
+      link_.member().session(), wire::kClockSync, [this](const ClockSync& answer, const wire::Origin& from) {
+        if (answer.client != link_.welcome().client || answer.server_sent_ns == 0) return;
+        if (link_.member().isServer(from)) link_clock_.receive(answer, nowNs());
+      });
+}
+
+void StationRunner::sendTelemetry(Telemetry telemetry) {
+  telemetry.client = link_.welcome().client;
+  link_clock_.fill(telemetry, nowNs());
+  const LinkChoice choice = limits_.step({.input_gap = telemetry.input_gap,
+                                          .trip_jitter = telemetry.trip_jitter,
+                                          .age_jitter = telemetry.jitter,
+                                          .inputs_lost = telemetry.inputs_lost});
+  telemetry.limits = choice.limits;
+  telemetry.playout_ticks = playout_ticks_ = choice.playout_ticks;
+  link_jitter_ = choice.jitter;
+  static_cast<void>(link_.send(telemetry));
 }
 
 /// Raises are heard from anybody, without a server too; clears from the server of this station alone.
@@ -252,6 +300,14 @@ bool StationRunner::tickComplete(Tick tick) const {
   return true;
 }
 
+/// Of the former life of a server, whose ticks a resumed one computes again.
+void StationRunner::resetAnswers() {
+  frame_tick_ = 0;
+  frame_parts_ = 0;
+  frame_parts_expected_ = 0;
+  manifold_ticks_.clear();
+}
+
 /// In each cycle of the loop, since the wire thread does not see all outputs.
 void StationRunner::notePeaks(const StationOutput& output) noexcept {
   for (std::size_t i = 0; i < output.states.size(); ++i) {
@@ -263,8 +319,17 @@ void StationRunner::notePeaks(const StationOutput& output) noexcept {
   }
 }
 
+/// With as many earlier samples as the link may lose.
+void StationRunner::sendInputs(const StationOutput& output) {
+  for (DeviceInput input : output.inputs) {
+    input.earlier.resize(std::min<std::size_t>(input.earlier.size(), playout_ticks_));
+    static_cast<void>(link_.send(input));
+  }
+}
+
 void StationRunner::send(const StationOutput& output) {
-  for (const DeviceInput& input : output.inputs) static_cast<void>(link_.send(input));
+  sendInputs(output);
+  link_clock_.sent(output.seq, static_cast<std::uint32_t>(output.inputs.size()));
   if (output.seq - stated_seq_ < kStatesEvery) return;
   stated_seq_ = output.seq;
   for (std::size_t i = 0; i < output.states.size(); ++i) {
@@ -282,6 +347,8 @@ void StationRunner::sendEvents() {
         event.kind == StationEventKind::kSafetyBegan || event.kind == StationEventKind::kSafetyEnded;
     const char* kind = is_safety ? "safety" : "station";
     static_cast<void>(link_.send(ClientEvent{link_.welcome().client, ++event_seq_, event.tick, kind, text}));
+    if (event.kind == StationEventKind::kGuidanceBegan || event.kind == StationEventKind::kGuidanceEnded)
+      print(text);
     if (event.kind != StationEventKind::kDeviceFault) continue;
     print(text + (options_.read_keys ? "; look at the device, then press return to reset it" : ""));
   }
@@ -301,12 +368,13 @@ Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat
     armDevices();
   }
   const Welcome before = member.welcome();
-  auto back = member.rejoin(stop, [this] {
+  const auto meanwhile = [this] {
     link_.inbox().dispatch(milliseconds(0));
     readKeys();
     armDevices();
-  });
-  if (back) back = link_.awaitMatch(stop);
+  };
+  auto back = member.rejoin(stop, meanwhile);
+  if (back) back = link_.awaitMatch(stop, meanwhile);
   if (!back) return fail(why + "; " + back.error().what);
   rejoined_at_ = std::chrono::steady_clock::now();
   new_seat = member.welcome().client != before.client || member.welcome().hands != before.hands ||
@@ -316,6 +384,19 @@ Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat
   return {};
 }
 
+/// Before anything that may block: a device holds its last command.
+void StationRunner::stopServo(std::optional<threads::CyclicThread>& thread, bool disarms) {
+  finish_ = disarms ? Finish::kDisarm : Finish::kRest;
+  const auto until = std::chrono::steady_clock::now() + kFinishAtMost;
+  while (finish_ != Finish::kDone && std::chrono::steady_clock::now() < until)
+    std::this_thread::sleep_for(milliseconds(1));
+  thread.reset();
+  finish_ = Finish::kNot;
+  if (!disarms) return;
+  if (arming_.valid()) arming_.wait();
+  station_.end();
+}
+
 void StationRunner::restartStation() {
   if (arming_.valid()) arming_.wait();
   station_.welcome(link_.welcome(), link_.objects());
@@ -323,6 +404,14 @@ void StationRunner::restartStation() {
 }
 
 Result<RunState> StationRunner::runLockstep(const std::atomic<bool>& stop) {
+  auto run = takePartInLockstep(stop);
+  station_.finish(true);
+  for (int i = 0; i < kFinishAtMost / milliseconds(1) && !station_.finished(); ++i) station_.step(++seq_);
+  station_.end();
+  return run;
+}
+
+Result<RunState> StationRunner::takePartInLockstep(const std::atomic<bool>& stop) {
   Tick tick = link_.welcome().tick;
   StationOutput output;
   StationEvent event;
@@ -332,10 +421,12 @@ Result<RunState> StationRunner::runLockstep(const std::atomic<bool>& stop) {
       if (auto back = rejoin(stop, new_seat); !back) return fail(back.error().what);
       if (new_seat) restartStation();
       tick = link_.welcome().tick;
+      resetAnswers();
     }
     armDevices();
-    station_.step(static_cast<std::uint32_t>(tick + 1));
-    output.fill(station_, static_cast<std::uint32_t>(tick + 1));
+    seq_ = static_cast<std::uint32_t>(tick + 1);
+    station_.step(seq_);
+    output.fill(station_, seq_);
     notePeaks(output);
     send(output);
     while (station_.takeEvent(event)) events_.push(event);
@@ -346,7 +437,7 @@ Result<RunState> StationRunner::runLockstep(const std::atomic<bool>& stop) {
       link_.inbox().dispatch(milliseconds(50));
       readKeys();
       if (std::chrono::steady_clock::now() < repeat_at) continue;
-      for (const DeviceInput& input : output.inputs) static_cast<void>(link_.send(input));
+      sendInputs(output);
       repeat_at = std::chrono::steady_clock::now() + kRepeatAfter;
     }
   }
@@ -360,19 +451,27 @@ void StationRunner::servo() noexcept {
     frames_.pop();
   }
   while (const HandManifold* manifold = manifolds_.front()) {
-    force_age_.answerReceived(manifold->answers_seq, now);
-    station_.receive(*manifold);
+    if (station_.receive(*manifold))
+      force_age_.answerReceived(manifold->hand, manifold->tick, manifold->answers_seq, now);
     manifolds_.pop();
   }
+  for (; guidances_.front() != nullptr; guidances_.pop()) station_.receive(*guidances_.front());
   while (const StepState* step = steps_.front()) {
     station_.receive(*step);
     steps_.pop();
   }
   if (stop_.update()) station_.receive(stop_.value());
+  const Finish finish = finish_;
+  if (finish == Finish::kRest || finish == Finish::kDisarm) station_.finish(finish == Finish::kDisarm);
   for (; presses_.front() != nullptr; presses_.pop()) station_.press();
   if (last_cycle_ != 0) station_.setCycle(static_cast<double>(now - last_cycle_) * 1e-9);
   last_cycle_ = now;
+  station_.setLinkJitter(link_jitter_);
   station_.step(++seq_);
+  if (finish == Finish::kRest || finish == Finish::kDisarm) {
+    Finish asked = finish;
+    if (station_.finished()) finish_.compare_exchange_strong(asked, Finish::kDone);
+  }
   force_age_.inputSent(seq_, now, kPeriodNs);
   output_.back().fill(station_, seq_);
   notePeaks(output_.back());
@@ -395,12 +494,27 @@ Result<RunState> StationRunner::runRealTime(const std::atomic<bool>& stop) {
   }
   std::optional<threads::CyclicThread> thread;
   const auto startServo = [&] {
-    thread.emplace(makeClock(station_.pacingDevice(), cyclic.period), cyclic,
+    thread.emplace(std::make_shared<threads::SteadyClock>(), cyclic,
                    [this](std::uint64_t) noexcept { servo(); });
     thread->start();
   };
   startServo();
   print(thread->notGranted());
+  if (options_.real_time)
+    if (const std::string missing = wire::raiseWireThreads(); thread->notGranted().empty()) print(missing);
+  auto run = takePart(thread, startServo, stop);
+  stopServo(thread, true);
+  force_age_.fill(telemetry_.back());
+  char silence[64];
+  std::snprintf(silence, sizeof silence, "longest time without contacts of the server: %.1f ms",
+                1e3 * telemetry_.back().longest_silence);
+  print(silence);
+  return run;
+}
+
+Result<RunState> StationRunner::takePart(std::optional<threads::CyclicThread>& thread,
+                                         const std::function<void()>& start_servo,
+                                         const std::atomic<bool>& stop) {
   while (!stop && !over()) {
     link_.inbox().dispatch(milliseconds(20));
     readKeys();
@@ -410,20 +524,20 @@ Result<RunState> StationRunner::runRealTime(const std::atomic<bool>& stop) {
       bool new_seat = false;
       if (auto back = rejoin(stop, new_seat); !back) return fail(back.error().what);
       if (new_seat) {
-        thread.reset();
+        stopServo(thread, false);
         restartStation();
-        startServo();
+        start_servo();
       }
     }
     if (output_.update()) send(output_.value());
     sendEvents();
+    if (ClockSync request; link_clock_.ask(link_.welcome().client, nowNs(), request))
+      static_cast<void>(link_.send(request));
     if (!telemetry_.update()) continue;
     Telemetry telemetry = telemetry_.value();
-    telemetry.client = link_.welcome().client;
     telemetry.loop_overruns = thread->lateTicks();
-    static_cast<void>(link_.send(telemetry));
+    sendTelemetry(telemetry);
   }
-  thread.reset();
   return run_;
 }
 

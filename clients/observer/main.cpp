@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/observer/observer_program.h"
+#include "idl/wire/network.h"
 
 namespace {
 
@@ -24,6 +25,9 @@ int run(int argc, char** argv) {
   app.add_option("--domain", membership.domain, "DDS domain, 0 to 230")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
+  tenon::wire::addNetworkOption(app);
+  app.add_option("--key", membership.key_file,
+                 "file of the session's key, which a server beyond loopback may ask for (default: yours)");
   app.add_option("--name", membership.person, "name shown to the other participants")->capture_default_str();
   app.add_option("--language", options.language, "language of titles and instructions")
       ->capture_default_str();

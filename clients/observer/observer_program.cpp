@@ -39,11 +39,11 @@ Result<void> observeSession(Observer& observer, wire::MembershipOptions options,
   subscribe(wire::kEmergencyClear);
   subscribe(wire::kRunState);
   if (!all) return all;
-  while (!stop && !observer.over() && !member.serverIsGone()) {
+  while (!stop && !observer.over() && !member.lost()) {
     inbox.dispatch(std::chrono::milliseconds(100));
     observer.printReceivedBefore(Clock::now() - kDelay);
-    if (!member.serverIsGone() || observer.over()) continue;
-    // another one may resume the session
+    if (!member.lost() || observer.over()) continue;
+    // another server may resume the session; one that took this program for dead has a seat for it
     const std::string why = *member.lost();
     if (auto back = member.rejoin(stop, [&] { inbox.dispatch(std::chrono::milliseconds(0)); }); !back)
       return fail(why + "; " + back.error().what);

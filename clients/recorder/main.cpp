@@ -6,6 +6,7 @@
 
 #include "clients/recorder/recorder_program.h"
 #include "idl/types/output_files.h"
+#include "idl/wire/network.h"
 
 namespace {
 
@@ -13,7 +14,7 @@ std::atomic<bool> stop{false};
 void onSignal(int /*signal*/) { stop = true; }
 
 int run(int argc, char** argv) {
-  CLI::App app{"tenon-record: records all topics of a session to an MCAP file until the session ends"};
+  CLI::App app{"tenon-record: records a session to an MCAP file until it ends"};
   tenon::recorder::RecorderOptions options;
   unsigned wait = 10;
   bool overwrite = false;
@@ -22,6 +23,11 @@ int run(int argc, char** argv) {
   app.add_option("--domain", options.domain, "DDS domain, 0 to 230")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
+  tenon::wire::addNetworkOption(app);
+  app.add_option("--key", options.key_file,
+                 "file of the session's key, which a server beyond loopback may ask for (default: yours)");
+  app.add_flag("--all", options.all,
+               "also the streams of 1 kHz, sample by sample: about three times as large a file");
   app.add_flag("--lockstep", options.lockstep, "refuse a session that does not run in lockstep");
   app.add_flag("--overwrite", overwrite, tenon::kOverwriteHelp);
   app.add_option("--wait", wait, "seconds to search for a server")->capture_default_str();
@@ -39,6 +45,8 @@ int run(int argc, char** argv) {
     std::printf("%s\n", text.c_str());
     std::fflush(stdout);
   };
+  // a limit on the size of files is an error of the write, as a full disk is
+  std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
   const auto recorded = tenon::recorder::recordSession(options, stop);

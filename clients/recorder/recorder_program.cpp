@@ -1,9 +1,13 @@
 #include "clients/recorder/recorder_program.h"
 
+#include <cstdint>
 #include <memory>
+#include <set>
 #include <utility>
 
 #include "clients/recorder/recording.h"
+#include "idl/types/messages.h"
+#include "idl/wire/codec.h"
 #include "idl/wire/endpoint.h"
 #include "idl/wire/membership.h"
 #include "idl/wire/raw_subscriber.h"
@@ -12,17 +16,25 @@ namespace tenon::recorder {
 
 namespace {
 using std::chrono::milliseconds;
-constexpr milliseconds kQuiet{300};       // without a sample: nothing more is expected
+constexpr milliseconds kQuiet{300};  // at the end of a session, without a sample: nothing more is expected
 constexpr milliseconds kMaxDrain{10000};  // after the end of a session, for samples on their way
 constexpr milliseconds kStatusPeriod{1000};
+// without a sign of life for so long the server has taken this program for dead
+constexpr milliseconds kLapse = wire::kPresence.parameters.lease;
 
-/// Checkpoints first: within a batch the state that a re-simulation starts from precedes the inputs that
-/// follow it. The objects of the scene last: every server has published them before, and DDS announces our
-/// readers in the order of their creation, so their arrival proves that the server has matched all readers.
-std::vector<std::string> topicsInOrder() {
-  std::vector<std::string> topics{std::string(wire::kCheckpoint.name)};
+/// What a recorder gets for itself. Checkpoints first: within a batch the state that a re-simulation starts
+/// from precedes the inputs that follow it.
+const std::vector<std::string> kOwnTopics{std::string(wire::kCheckpoint.name),
+                                          std::string(wire::kTickInput.name)};
+
+/// What all get. The objects of the scene last: every server has published them before, and DDS announces
+/// our readers in the order of their creation, so their arrival proves that the server has matched all
+/// readers.
+std::vector<std::string> sessionTopics(bool all) {
+  std::vector<std::string> topics;
   for (const wire::TopicName& name : wire::allTopics())
-    if (name.topic != wire::kCheckpoint.name && name.topic != wire::kSceneObject.name)
+    if (name.topic != wire::kCheckpoint.name && name.topic != wire::kTickInput.name &&
+        name.topic != wire::kSceneObject.name && (all || !StreamReduction::isOmitted(name.topic)))
       topics.emplace_back(name.topic);
   topics.emplace_back(wire::kSceneObject.name);
   return topics;
@@ -37,8 +49,13 @@ class Recorder {
                                           .domain = options_.domain,
                                           .person = "recorder",
                                           .role = Role::kRecorder,
+                                          .key_file = options_.key_file,
                                           .lockstep = options_.lockstep,
-                                          .timeout = options_.timeout},
+                                          .timeout = options_.timeout,
+                                          .recorded_until =
+                                              [this](const SessionAnnounce& server) {
+                                                return recording_ ? recording_->recordedUntil(server) : 0;
+                                              }},
                                          stop_);
     if (!member) return fail(member.error().what);
     member_ = std::move(*member);
@@ -64,9 +81,21 @@ class Recorder {
   /// Writes what has arrived within `timeout`; the number of samples.
   std::size_t take(milliseconds timeout) {
     return subscriber_->dispatch(timeout, [this](const wire::RawSample& sample) {
-      has_scene_ = has_scene_ || sample.topic == wire::kSceneObject.name;
+      const auto note = [&]<class M>(const wire::Topic<M>& topic, std::set<std::uint32_t>& known, auto id) {
+        if (sample.topic != topic.name || sample.gone) return;
+        if (const auto message = wire::decode<M>(sample.bytes)) known.insert(id(*message));
+      };
+      note(wire::kSceneObject, objects_, [](const SceneObject& object) { return object.object.value; });
+      note(wire::kSceneHand, hands_, [](const SceneHand& hand) { return hand.hand.value; });
+      note(wire::kSceneStep, steps_, [](const SceneStep& step) { return step.step; });
       recording_->add(sample);
     });
+  }
+  /// As many samples of the scene are recorded as the server announces; one at least.
+  [[nodiscard]] bool hasScene() const {
+    const SessionAnnounce& whole = member_->announce();
+    return !objects_.empty() && objects_.size() >= whole.objects && hands_.size() >= whole.hands &&
+           steps_.size() >= whole.steps;
   }
 
   const RecorderOptions& options_;
@@ -75,26 +104,26 @@ class Recorder {
   std::unique_ptr<Recording> recording_;
   std::unique_ptr<wire::RawSubscriber> subscriber_;
   std::unique_ptr<wire::Writer<RecorderStatus>> status_writer_;
-  bool has_scene_ = false;
+  std::set<std::uint32_t> objects_, hands_, steps_;  ///< of the scene, recorded
 };
 
 Result<void> Recorder::subscribe() {
-  auto recording = Recording::open(options_.file, member_->announce());
+  auto recording =
+      Recording::open(options_.file, member_->announce(), options_.all ? Streams::kAll : Streams::kReduced);
   if (!recording) return fail(recording.error().what);
   recording_ = std::make_unique<Recording>(std::move(*recording));
-  auto subscriber = wire::RawSubscriber::open(member_->session(), topicsInOrder());
+  auto subscriber = wire::RawSubscriber::open(member_->own(), kOwnTopics);
   if (!subscriber) return fail(subscriber.error().what);
+  if (auto added = subscriber->add(member_->session(), sessionTopics(options_.all)); !added) return added;
   subscriber_ = std::make_unique<wire::RawSubscriber>(std::move(*subscriber));
 
-  // the scene proves that the server has matched our readers; then wait until all transient-local states came
+  // the whole scene proves that the server has matched our readers; what else it keeps for late joiners
+  // may come later, and is recorded then
   for (const auto until = std::chrono::steady_clock::now() + options_.timeout;
-       !has_scene_ && !stop_ && std::chrono::steady_clock::now() < until;)
-    take(milliseconds(100));
-  if (!has_scene_)
-    return fail("session '" + member_->sessionName() + "' is announced but sends no objects of its scene");
-  for (const auto until = std::chrono::steady_clock::now() + kQuiet;
-       std::chrono::steady_clock::now() < until;)
+       !hasScene() && !stop_ && std::chrono::steady_clock::now() < until;)
     take(milliseconds(20));
+  if (!hasScene())
+    return fail("session '" + member_->sessionName() + "' is announced but does not send all of its scene");
   return {};
 }
 
@@ -109,15 +138,17 @@ Result<void> Recorder::writeUntilOver() {
 
   auto next_status = std::chrono::steady_clock::now();
   auto last_sample = std::chrono::steady_clock::now();
+  auto last_pass = std::chrono::steady_clock::now();
   std::chrono::steady_clock::time_point over_since{};
   while (!stop_ && recording_->problem().empty()) {
     const bool received = take(milliseconds(50)) > 0;
     lobby.dispatch(milliseconds(0));
     const auto now = std::chrono::steady_clock::now();
+    const bool lapsed = now - std::exchange(last_pass, now) > kLapse;
     if (received) last_sample = now;
-    if (member_->serverIsGone() && !recording_->runIsOver()) {
+    if ((member_->lost() || lapsed) && !recording_->runIsOver()) {
       if (auto back = comeBack(); !back) return back;
-      last_sample = std::chrono::steady_clock::now();
+      last_sample = last_pass = std::chrono::steady_clock::now();
       continue;
     }
     const bool over = recording_->runIsOver() || member_->serverIsGone();
@@ -138,12 +169,14 @@ Result<void> Recorder::writeUntilOver() {
   return {};
 }
 
-/// The server is gone: continues in the same file when another one resumes the session, or when it was taken
-/// for dead while one of the two programs stood still.
+/// The server is gone: continues in the same file when another one resumes the session, or when one of the
+/// two programs stood still and was taken for dead.
 Result<void> Recorder::comeBack() {
   const std::uint32_t epoch = member_->announce().server_epoch;
-  const std::string why = *member_->lost();
-  if (options_.report) options_.report(why + "; waiting for one that resumes the session");
+  const std::string why = member_->lost().value_or("this program stood still");
+  if (options_.report)
+    options_.report(why + (member_->serverIsGone() ? "; waiting for one that resumes the session"
+                                                   : "; joining the session again"));
   const auto until_then = "; the recording up to then is in " + options_.file.string();
   // what the next server sends is delivered by the first dispatch after resumed()
   while (!stop_ && take(milliseconds(0)) > 0) {
@@ -151,12 +184,11 @@ Result<void> Recorder::comeBack() {
   if (auto back = member_->rejoin(stop_); !back) return fail(why + "; " + back.error().what + until_then);
   if (member_->announce().server_epoch == epoch)
     return {};  // what was missed meanwhile is counted as missing
-  if (!recording_->continues(member_->announce(), member_->welcome().tick))
-    return fail(why + ", and the next one begins after tick " + std::to_string(member_->welcome().tick) +
-                ", not where the recording ends" + until_then);
-  recording_->resumed(member_->announce(), member_->welcome().tick);
-  if (options_.report)
-    options_.report("recording the resumed session after tick " + std::to_string(member_->welcome().tick));
+  const std::string after = "after tick " + std::to_string(member_->announce().resumed_after);
+  if (!recording_->continues(member_->announce()))
+    return fail(why + ", and the next one begins " + after + ", not where the recording ends" + until_then);
+  recording_->resumed(member_->announce());
+  if (options_.report) options_.report("recording the resumed session " + after);
   return {};
 }
 

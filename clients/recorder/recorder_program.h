@@ -17,6 +17,8 @@ struct RecorderOptions {
   std::filesystem::path file;
   std::string session;  ///< empty: the first one announced
   std::uint32_t domain = 0;
+  std::filesystem::path key_file;                  ///< of the session; empty: wire::defaultKeyFile()
+  bool all = false;                                ///< Streams::kAll
   bool lockstep = false;                           ///< refuse a session that runs in real time
   std::chrono::seconds timeout{10};                ///< for a server to be found and to answer
   std::function<void(const std::string&)> report;  ///< progress, one line per call; may be empty

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <concepts>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -18,6 +19,7 @@ namespace tenon::recorder {
 namespace {
 
 constexpr std::int64_t kNanosecondsPerTick = 1'000'000;
+constexpr std::chrono::seconds kChunkAge{1};
 
 // of complete types alone: this file includes all messages
 template <class M>
@@ -29,21 +31,24 @@ concept HasEpoch = requires(const M& message) {
   message.server_epoch;
 };
 
-/// Number of the period of PublishedSamples.
-Tick periodOf(Tick tick) { return tick == 0 ? 0 : (tick - 1) / kPublishedSamplesPeriod + 1; }
 }  // namespace
 
-Result<Recording> Recording::open(const std::filesystem::path& file, const SessionAnnounce& session) {
-  auto writer = record::McapWriter::open(file);
+Result<Recording> Recording::open(const std::filesystem::path& file, const SessionAnnounce& session,
+                                  Streams streams) {
+  auto writer = record::McapWriter::open(file, {.chunk_age = kChunkAge});
   if (!writer) return fail(writer.error().what);
   const auto added =
       writer->addMetadata("tenon recording", {{"session", session.session},
                                               {"title", session.title},
                                               {"protocol", std::to_string(session.protocol_version)},
+                                              {"scenario", session.scenario},
                                               {"scenario hash", session.scenario_hash},
+                                              {"detail", fmt::format("{}", session.detail)},
+                                              {"freeze after ticks", std::to_string(session.freeze_ticks)},
+                                              {"park after ticks", std::to_string(session.park_ticks)},
                                               {"lockstep", session.lockstep ? "yes" : "no"}});
   if (!added) return fail(added.error().what);
-  Recording recording(std::move(*writer), session);
+  Recording recording(std::move(*writer), session, streams);
   recording.status_.file = file.string();
   recording.status_.recording = true;
 
@@ -59,27 +64,44 @@ void Recording::writeAnnounce(const SessionAnnounce& session) {
   add({wire::kSessionAnnounce.name, wire::typeName<SessionAnnounce>(), now, 0, false, *bytes});
 }
 
-bool Recording::continues(const SessionAnnounce& session, Tick tick) const {
+bool Recording::continues(const SessionAnnounce& session) const {
   constexpr Tick kMostLost = 1000;  // [ticks] more than a kill loses
-  return session.scenario_hash == session_.scenario_hash && session.lockstep == session_.lockstep &&
-         tick > 0 && tick + kMostLost >= std::max(newest_tick_, newest_input_.tick);
+  const Tick newest = std::max(newest_tick_, newest_input_.tick);
+  // a server that begins anew continues nothing, one that was killed before its first tick begins with that
+  const Tick tick = session.resumed_after;
+  const bool follows = tick > 0 ? tick + kMostLost >= newest : newest == 0;
+  return session.scenario_hash == session_.scenario_hash && session.lockstep == session_.lockstep && follows;
 }
 
-void Recording::resumed(const SessionAnnounce& session, Tick tick) {
+Tick Recording::recordedUntil(const SessionAnnounce& session) const {
+  // of the newest one parts may be missing
+  const Tick until = newest_input_.tick == 0 ? 0 : newest_input_.tick - 1;
+  return session.server_epoch == session_.server_epoch ? until : std::min(until, session.resumed_after);
+}
+
+void Recording::resumed(const SessionAnnounce& session) {
+  const Tick tick = session.resumed_after;
+  finishReduction();
   session_ = session;
-  resumed_after_ = tick;
+  ++life_;
   newest_event_ = 0;
+  stated_until_ = std::min(stated_until_, tick);
   // ticks of the former life that are not in its journal are computed once more
   const PartNumber last{tick, std::numeric_limits<std::uint32_t>::max()};
   newest_input_ = std::min(newest_input_, last);
+  input_ranges_.erase(input_ranges_.upper_bound(tick), input_ranges_.end());
+  if (!input_ranges_.empty()) {
+    Tick& newest = std::prev(input_ranges_.end())->second;
+    newest = std::min(newest, tick);
+  }
   for (auto& [part, newest] : newest_checkpoint_) newest = std::min(newest, tick);
   keepProblem(writer_.addMetadata("tenon resumed", {{"after tick", std::to_string(tick)},
                                                     {"server epoch", std::to_string(session.server_epoch)}}));
   writeAnnounce(session);
 }
 
-Recording::Recording(record::McapWriter writer, const SessionAnnounce& session)
-    : writer_(std::move(writer)), session_(session) {}
+Recording::Recording(record::McapWriter writer, const SessionAnnounce& session, Streams streams)
+    : writer_(std::move(writer)), streams_(streams), session_(session) {}
 
 void Recording::add(const wire::RawSample& sample) {
   if (start_ns_ == 0) start_ns_ = sample.source_ns;
@@ -90,9 +112,29 @@ void Recording::add(const wire::RawSample& sample) {
           logTime(sample.source_ns, 0), ended_++, bytes);
     return;
   }
-  if (const std::optional<Tick> tick = follow(sample))
-    write(channelOf(sample.topic, sample.type, wire::idlText()), logTime(sample.source_ns, *tick),
-          sample.sequence, sample.bytes);
+  const std::optional<Tick> tick = follow(sample);
+  const bool is_omitted = streams_ == Streams::kReduced && StreamReduction::isOmitted(sample.topic);
+  if (tick && !is_omitted) writeSample(sample, *tick);
+}
+
+void Recording::writeSample(const wire::RawSample& sample, Tick tick) {
+  const bool is_packed = sample.type == record::kPackedInputsType;
+  write(channelOf(sample.topic, sample.type, is_packed ? record::kPackedInputsIdl : wire::idlText()),
+        logTime(sample.source_ns, tick), sample.sequence, sample.bytes);
+}
+
+void Recording::finishReduction() {
+  reduction_.finish([this](const wire::RawSample& sample, Tick tick) { writeSample(sample, tick); });
+}
+
+template <class M>
+bool Recording::keeps(const M& message, const wire::RawSample& sample) {
+  if (streams_ == Streams::kAll) return true;
+  if constexpr (std::same_as<M, HandManifold> || std::same_as<M, TickInputPart>)
+    return reduction_.keeps(message, sample,
+                            [this](const wire::RawSample& kept, Tick tick) { writeSample(kept, tick); });
+  if constexpr (std::same_as<M, CheckpointPart>) return reduction_.keeps(message);
+  return true;
 }
 
 std::optional<Tick> Recording::follow(const wire::RawSample& sample) {
@@ -110,12 +152,12 @@ std::optional<Tick> Recording::follow(const wire::RawSample& sample) {
         tick = message->tick;
         ++recorded_[std::string(topic.name)][periodOf(*tick)];
       }
-      if constexpr (std::same_as<M, WorldFrame>)
-        if (topic.name == wire::kWorldFrame1k.name) {
-          if (first_tick_ == 0) first_tick_ = *tick;
-          newest_tick_ = std::max(newest_tick_, *tick);
-        }
+      if constexpr (std::same_as<M, WorldFrame>) {
+        if (first_tick_ == 0) first_tick_ = *tick;
+        newest_tick_ = std::max(newest_tick_, *tick);
+      }
       if constexpr (std::same_as<M, TickInputPart>) count(*message);
+      if (!keeps(*message, sample)) tick.reset();
       if constexpr (std::same_as<M, RunState>) run_ = std::move(*message);
       if constexpr (std::same_as<M, PublishedSamples>) keep(*message);
     }
@@ -125,9 +167,13 @@ std::optional<Tick> Recording::follow(const wire::RawSample& sample) {
 
 void Recording::keep(const PublishedSamples& published) {
   stated_until_ = std::max(stated_until_, published.last_tick);
-  // of a period in which this recorder joined, or came back, a part is not expected
-  if (published.first_tick > std::max(heardAfter(), resumed_after_))
+  // of a period in which this recorder joined a part is not expected
+  if (published.last_tick > heardAfter() && (life_ > 0 || published.first_tick > heardAfter()))
     published_[periodOf(published.first_tick)] = published;
+}
+
+Recording::Period Recording::periodOf(Tick tick) const {
+  return {life_, tick == 0 ? 0 : (tick - 1) / kPublishedSamplesPeriod + 1};
 }
 
 /// Frames may arrive before the answer that says when this recorder joined.
@@ -145,12 +191,19 @@ bool Recording::isNew(const EventLog& event) {
   return event.seq > std::exchange(newest_event_, std::max(newest_event_, event.seq));
 }
 
+bool Recording::isNew(const PublishedSamples& published) { return published.last_tick > stated_until_; }
+
 void Recording::count(const TickInputPart& input) {
-  ++input_parts_;
-  if (input.part != 0) return;
   if (first_input_ == 0) first_input_ = input.tick;
-  ++input_ticks_;
-  input_parts_expected_ += input.parts;
+  input_parts_ = input.part == 0 ? 1 : input.tick == parts_of_ ? input_parts_ + 1 : 0;
+  parts_of_ = input.tick;
+  if (input_parts_ != std::max(1U, input.parts)) return;
+  const auto newest = input_ranges_.empty() ? input_ranges_.end() : std::prev(input_ranges_.end());
+  if (newest != input_ranges_.end() && newest->second + 1 == input.tick) {
+    newest->second = input.tick;
+  } else {
+    input_ranges_[input.tick] = input.tick;
+  }
 }
 
 /// In ticks. Without a run state that says where the run ended, up to the newest one received; a server that
@@ -158,9 +211,9 @@ void Recording::count(const TickInputPart& input) {
 TopicCount Recording::inputCount() const {
   const Tick end = std::max(newest_input_.tick, runIsOver() ? run_->tick : 0);
   const Tick before = first_input_ == 0 ? end : std::min(heardAfter(), first_input_ - 1);
-  TopicCount count{std::string(wire::kTickInput.name), std::min(input_ticks_, end - before), end - before};
-  const std::uint64_t parts = std::min(input_parts_, input_parts_expected_);
-  count.recorded -= std::min(count.recorded, input_parts_expected_ - parts);
+  TopicCount count{std::string(wire::kTickInput.name), 0, end - before};
+  for (const auto& [first, last] : input_ranges_)
+    if (last > before) count.recorded += last - std::max(first, before + 1) + 1;
   return count;
 }
 
@@ -169,7 +222,8 @@ std::vector<TopicCount> Recording::counts() const {
   std::map<std::string, TopicCount> by_topic;
   for (const auto& [period, published] : published_) {
     for (const TopicSamples& topic : published.topics) {
-      static const std::map<Tick, std::uint64_t> kNone;
+      if (streams_ == Streams::kReduced && StreamReduction::isOmitted(topic.topic)) continue;
+      static const std::map<Period, std::uint64_t> kNone;
       const auto found = recorded_.find(topic.topic);
       const auto& recorded = found == recorded_.end() ? kNone : found->second;
       // samples of a period come before those of a later one
@@ -226,6 +280,7 @@ void Recording::keepProblem(const Result<void>& done) {
 bool Recording::runIsOver() const { return run_ && isOver(run_->phase); }
 
 Result<void> Recording::close() {
+  finishReduction();
   const bool was_whole = status_.problem.empty();
   if (run_ && was_whole) {
     keepProblem(

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/recorder/stream_reduction.h"
 #include "idl/record/mcap_writer.h"
 #include "idl/types/messages/journal.h"
 #include "idl/types/messages/log.h"
@@ -26,27 +27,35 @@ struct TopicCount {
   std::uint64_t published = 0;
 };
 
+enum class Streams {
+  kAll,      ///< every sample that the server publishes
+  kReduced,  ///< what reports, players and a re-simulation need: StreamReduction
+};
+
 /// The recording of one session while it is written: samples in the order of arrival.
 ///
 /// Log times are session time, so that a file plays back at the pace of the session. In a real-time session
 /// that is the sample's source time. A lockstep session runs as fast as its machines allow: there it is the
 /// source time of the first sample plus one millisecond per tick of the sample; one without a tick has that
-/// of the newest WorldFrame_1k.
+/// of the newest WorldFrame.
 ///
 /// Threads: one at a time. Real-time: no.
 class Recording {
  public:
   /// Fails with a sentence when the file cannot be written.
   [[nodiscard]] static Result<Recording> open(const std::filesystem::path& file,
-                                              const SessionAnnounce& session);
+                                              const SessionAnnounce& session,
+                                              Streams streams = Streams::kAll);
 
   /// From the tick after `tick` on, every sample of the server is expected.
   void joined(Tick tick) { joined_ = tick; }
-  /// Whether a server that announces `session` continues, after `tick`, with what is recorded here.
-  [[nodiscard]] bool continues(const SessionAnnounce& session, Tick tick) const;
+  /// Whether a server that announces `session` continues with what is recorded here.
+  [[nodiscard]] bool continues(const SessionAnnounce& session) const;
   /// It does: notes in the file that a new life of the server begins, and expects its samples from now on.
   /// To be called before samples of that life are added.
-  void resumed(const SessionAnnounce& session, Tick tick);
+  void resumed(const SessionAnnounce& session);
+  /// Join::recorded_until, for the server that announces `session`.
+  [[nodiscard]] Tick recordedUntil(const SessionAnnounce& session) const;
   /// Writes one sample, or the end of its instance; a failure shows in status(). Omits what of the journal
   /// and of the server's events is there already: a late joiner gets the last ones again.
   void add(const wire::RawSample& sample);
@@ -57,8 +66,9 @@ class Recording {
   /// As published. Once the file cannot be written `recording` is false and `problem` says why.
   [[nodiscard]] RecorderStatus status() const;
   [[nodiscard]] const std::string& problem() const { return status_.problem; }
-  /// What was recorded and what was published, by topic, since joined(): in periods that the server has
-  /// stated, of which no further samples are expected.
+  /// What was recorded and what was published, by topic, since joined(): of inputs all ticks, of the rest
+  /// the periods that the server has stated and of which no further samples are expected. What a resumed
+  /// server published before this recorder was back is missing too.
   [[nodiscard]] std::vector<TopicCount> counts() const;
   /// Whether the run is over and the server has stated what it published up to its end.
   [[nodiscard]] bool hasStatement() const;
@@ -67,19 +77,25 @@ class Recording {
   [[nodiscard]] const std::optional<RunState>& run() const { return run_; }
 
  private:
-  Recording(record::McapWriter writer, const SessionAnnounce& session);
+  Recording(record::McapWriter writer, const SessionAnnounce& session, Streams streams);
   [[nodiscard]] std::uint16_t channelOf(std::string_view topic, std::string_view type,
                                         std::string_view schema);
   void writeAnnounce(const SessionAnnounce& session);
   void write(std::uint16_t channel, std::int64_t log_time_ns, std::uint64_t sequence,
              std::span<const std::uint8_t> bytes);
+  void writeSample(const wire::RawSample& sample, Tick tick);
+  void finishReduction();
+  /// Whether the sample is written as it is.
+  template <class M>
+  [[nodiscard]] bool keeps(const M& message, const wire::RawSample& sample);
   /// Keeps the newest tick, the run state and the counts. The tick of the sample, 0 when it has none; none:
-  /// it is recorded already.
+  /// it is recorded already, or by StreamReduction.
   std::optional<Tick> follow(const wire::RawSample& sample);
   void count(const TickInputPart& input);
   [[nodiscard]] bool isNew(const TickInputPart& part);
   [[nodiscard]] bool isNew(const CheckpointPart& part);
   [[nodiscard]] bool isNew(const EventLog& event);
+  [[nodiscard]] bool isNew(const PublishedSamples& published);
   void keep(const PublishedSamples& published);
   /// [ns] since 1970, of a sample of `tick`; 0: it has none.
   [[nodiscard]] std::int64_t logTime(std::int64_t source_ns, Tick tick) const;
@@ -95,24 +111,35 @@ class Recording {
     auto operator<=>(const PartNumber&) const = default;
   };
   record::McapWriter writer_;
+  Streams streams_;
+  StreamReduction reduction_;
   SessionAnnounce session_;
   std::map<std::string, std::uint16_t, std::less<>> channels_;
   RecorderStatus status_;
   std::optional<RunState> run_;
-  Tick first_tick_ = 0, newest_tick_ = 0;  ///< of WorldFrame_1k
+  Tick first_tick_ = 0, newest_tick_ = 0;  ///< of WorldFrame
   Tick joined_ = 0;
-  Tick resumed_after_ = 0;  ///< of the newest life of the server
-  std::map<std::string, std::map<Tick, std::uint64_t>, std::less<>> recorded_;  ///< samples by topic, period
-  std::map<Tick, PublishedSamples> published_;                                  ///< by period
+  /// Of PublishedSamples: a resumed server states what it published of a period that a former one began.
+  struct Period {
+    std::uint32_t life = 0;  ///< of the server
+    Tick number = 0;
+    auto operator<=>(const Period&) const = default;
+  };
+  [[nodiscard]] Period periodOf(Tick tick) const;
+  std::uint32_t life_ = 0;
+  std::map<std::string, std::map<Period, std::uint64_t>, std::less<>> recorded_;  ///< samples by topic
+  std::map<Period, PublishedSamples> published_;
   Tick stated_until_ = 0;
   // TickInput: a gap in its ticks prevents re-simulation
   Tick first_input_ = 0;
   PartNumber newest_input_;
   std::map<std::uint32_t, Tick> newest_checkpoint_;  ///< by part, the order in which DDS delivers them
   std::uint64_t newest_event_ = 0;                   ///< EventLog::seq of this life of the server
-  std::uint64_t input_ticks_ = 0, input_parts_ = 0, input_parts_expected_ = 0;
-  std::int64_t start_ns_ = 0;  ///< source time of the first sample
-  std::uint64_t ended_ = 0;    ///< ended instances written
+  std::uint32_t input_parts_ = 0;                    ///< of the newest tick
+  Tick parts_of_ = 0;                                ///< that tick
+  std::map<Tick, Tick> input_ranges_;  ///< ticks with all their parts: first and last, without a gap
+  std::int64_t start_ns_ = 0;          ///< source time of the first sample
+  std::uint64_t ended_ = 0;            ///< ended instances written
 };
 
 }  // namespace tenon::recorder

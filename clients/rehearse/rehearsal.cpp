@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "clients/rehearse/measured_link.h"
 #include "idl/types/names.h"
 #include "server/session/journal.h"
 #include "server/session/publisher.h"
@@ -33,6 +34,10 @@ class Rehearsal {
         objects_(sceneObjects(*loaded.scene)),
         output_(simulation_.makeOutput()) {
     entry_.checkpoint.reserve(simulation_.maxSavedBytes());
+    for (std::size_t i = 0; i < stations_.size(); ++i)
+      links_.push_back(i < options.links.size() && options.links[i]
+                           ? std::make_unique<MeasuredLink>(*options.links[i], loaded.scene->hands.size())
+                           : nullptr);
   }
 
   Result<RehearsalReport> run() {
@@ -75,17 +80,27 @@ class Rehearsal {
     const Welcome welcome = registry_.join(request, {.key = true}, 0);
     if (!welcome.accepted) return fail(welcome.reason);
     station.welcome(welcome, objects_);
+    clients_.push_back(welcome.client);
     return {};
   }
 
   void tick() {
     const Tick now = simulation_.now() + 1;
     input_.tick = now;
-    for (const auto& station : stations_) {
-      static_cast<void>(station->armDevices());  // a fault of a simulated device is in its events
-      station->step(static_cast<std::uint32_t>(now));
-      for (const DeviceInput& input : station->inputs()) receive(input);
+    for (std::size_t i = 0; i < stations_.size(); ++i) {
+      haptic::Station& station = *stations_[i];
+      MeasuredLink* const link = links_[i].get();
+      if (link != nullptr) link->deliver(now, station);
+      static_cast<void>(station.armDevices());  // a fault of a simulated device is in its events
+      station.step(static_cast<std::uint32_t>(now));
+      if (link == nullptr) {
+        for (const DeviceInput& input : station.inputs()) receive(input);
+        continue;
+      }
+      link->send(station.inputs(), now);
+      link->receive(now, clients_[i], registry_, input_.readings, options_.on_refused);
     }
+    registry_.takeChanges(input_.changes);
     while (!changes_.empty() && input_.changes.push_back(changes_.back())) changes_.pop_back();
     const auto begin = std::chrono::steady_clock::now();
     simulation_.tick(input_);
@@ -128,10 +143,14 @@ class Rehearsal {
   }
 
   void deliver(const session::OutgoingMessages& outgoing) {
-    for (const auto& station : stations_) {
-      if (outgoing.events.step) station->receive(*outgoing.events.step);
-      for (const WorldFrame& frame : outgoing.frames) station->receive(frame);
-      for (const HandManifold* manifold : outgoing.manifolds) station->receive(*manifold);
+    for (std::size_t i = 0; i < stations_.size(); ++i) {
+      haptic::Station& station = *stations_[i];
+      if (outgoing.events.step) station.receive(*outgoing.events.step);
+      const auto deliver = [&](const auto& message) {
+        links_[i] ? links_[i]->send(message, simulation_.now()) : static_cast<void>(station.receive(message));
+      };
+      for (const WorldFrame& frame : outgoing.frames) deliver(frame);
+      for (const HandManifold* manifold : outgoing.manifolds) deliver(*manifold);
     }
     if (outgoing.events.run) reason_ = outgoing.events.run->reason;
     if (!options_.on_event) return;
@@ -140,6 +159,8 @@ class Rehearsal {
 
   RehearsalOptions options_;
   std::vector<std::unique_ptr<haptic::Station>> stations_;
+  std::vector<std::unique_ptr<MeasuredLink>> links_;  ///< null: without
+  std::vector<ClientId> clients_;                     ///< index as stations_
   session::SessionRegistry registry_;
   session::SessionSimulation simulation_;
   session::Publisher publisher_;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "clients/haptic/station.h"
+#include "clients/rehearse/simulated_link.h"
 #include "idl/types/messages/log.h"
 #include "server/game_control/scenario.h"
 #include "server/session/scene_loader.h"
@@ -30,6 +31,9 @@ struct RehearsalOptions {
   std::optional<std::vector<HandId>> needed_hands;
   /// What hands hold from the start on, see session::ChangeKind::kTake.
   std::vector<game_control::HandAssignment> takes;
+  /// Of each station, which measures it (MeasuredLink); a station beyond the list, or without one, has all
+  /// streams in the next tick.
+  std::vector<std::optional<LinkConditions>> links;
   std::function<void(const EventLog&)> on_event;  ///< each logged event; may be empty
   /// After each tick; may be empty. TickStats::compute_seconds is the time that the tick thread of a server
   /// would have taken: simulation, output, state hash, journal entry and checkpoint.

@@ -5,9 +5,12 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "clients/report/embedded_session.h"
 #include "clients/report/page.h"
+#include "clients/report/page_data.h"
 #include "clients/report/session_analysis.h"
 #include "clients/report/summary.h"
+#include "idl/types/cache_folder.h"
 #include "idl/types/output_files.h"
 
 namespace {
@@ -23,9 +26,28 @@ bool save(const std::filesystem::path& file, const std::string& text) {
   return static_cast<bool>(out.flush());
 }
 
+/// Makes report.html; fails with a sentence when its page is not built or nothing can be written.
+tenon::Result<void> saveReport(const tenon::report::SessionAnalysis& analysis,
+                               const std::filesystem::path& recording, const std::filesystem::path& cache,
+                               const std::filesystem::path& file) {
+  const auto page = tenon::report::readReportPage(tenon::report::defaultReportPage());
+  if (!page) return tenon::fail(page.error().what);
+  nlohmann::json data = tenon::report::pageData(analysis);
+  const auto session =
+      tenon::report::embedSession(recording, cache, tenon::report::sessionBudget(*page, data));
+  if (session)
+    data["player"] = {{"rate", session->rate}, {"objects", session->objects}, {"models", session->models}};
+  else
+    data["no_player"] = session.error().what;
+  if (!save(file, tenon::report::reportPage(*page, data, session ? &*session : nullptr)))
+    return tenon::fail(file.string() + ": cannot be written");
+  return {};
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"tenon-report: makes a report of a recording: a table, report.html and summary.json"};
   std::filesystem::path recording, folder;
+  std::filesystem::path cache = tenon::defaultCache();
   std::string language = "en";
   bool json = false;
   bool overwrite = false;
@@ -33,7 +55,10 @@ int run(int argc, char** argv) {
   app.add_option("recording", recording, "an MCAP file of tenon-record")->required();
   app.add_option("-o,--output", folder, "folder for report.html and summary.json; created if missing");
   app.add_flag("--json", json, "print the summary as JSON instead of a table");
-  app.add_option("--language", language, "language of the steps' titles")->capture_default_str();
+  app.add_option("--language", language, "language of the steps' titles in table and summary")
+      ->capture_default_str();
+  app.add_option("--cache", cache, "folder in which the server keeps the models of parts")
+      ->option_text("DIR");
   app.add_flag("--overwrite", overwrite, tenon::kOverwriteHelp);
   app.add_flag("--allow-skips", allow_skips, "exit 0 although steps were skipped");
   app.footer(
@@ -63,10 +88,10 @@ int run(int argc, char** argv) {
   if (!folder.empty()) {
     std::error_code problem;
     std::filesystem::create_directories(folder, problem);
-    const bool has_picture = std::filesystem::exists(folder / "scene.png", problem);
-    if (!save(folder / "report.html", tenon::report::reportPage(*analysis, has_picture ? "scene.png" : "")) ||
-        !save(folder / "summary.json", summary))
-      return printError(folder.string() + ": the report cannot be written there");
+    if (!save(folder / "summary.json", summary))
+      return printError((folder / "summary.json").string() + ": cannot be written");
+    if (const auto saved = saveReport(*analysis, recording, cache, folder / "report.html"); !saved)
+      return printError(saved.error().what);
   }
   return analysis->succeeded(allow_skips) ? 0 : 1;
 }

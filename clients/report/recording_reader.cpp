@@ -33,6 +33,7 @@ class RecordingReader {
     subscribe<Presence>(wire::kPresence);
     subscribe<SceneObject>(wire::kSceneObject);
     subscribe<WorldFrame>(wire::kWorldFrame100);
+    subscribe<SceneHand>(wire::kSceneHand);
     subscribe<DeviceInput>(wire::kDeviceInput);
     subscribe<HandManifold>(wire::kHandManifold);
     subscribe<HandState>(wire::kHandState100);
@@ -56,6 +57,10 @@ class RecordingReader {
     const auto handler = handlers_.find(message.topic);
     if (handler != handlers_.end()) handler->second(message.data);
   }
+  /// After the last message.
+  void finish() {
+    for (auto& [client, latency] : session_.force_latencies) latency.freeze_ticks = granted_[client];
+  }
 
  private:
   template <class M>
@@ -73,6 +78,15 @@ class RecordingReader {
   void receive(const SessionAnnounce& announce) { session_.announce = announce; }
   void receive(const Presence& presence);
   void receive(const SceneObject& object);
+  void receive(const SceneHand& hand) {
+    freezes_[hand.hand] = hand.limits.freeze_ticks;
+    for (const auto& [client, presence] : session_.present) noteLimits(presence);
+  }
+  void noteLimits(const Presence& presence) {
+    if (!presence.alive) return;
+    std::uint32_t& longest = granted_[presence.client];
+    for (const HandId hand : presence.hands) longest = std::max(longest, freezes_[hand]);
+  }
   void receive(const WorldFrame& frame);
   void receive(const DeviceInput& input) { session_.hands[input.hand].add(input); }
   void receive(const HandManifold& manifold) {
@@ -111,7 +125,9 @@ class RecordingReader {
                                fmt::format("{} by {}: {}", what, who, reason)});
   }
   void receive(const Telemetry& telemetry);
-  void receive(const Guidance& guidance) { session_.guided = session_.guided || guidance.active; }
+  void receive(const Guidance& guidance) {
+    session_.guided = session_.guided || guidance.mode != GuidanceMode::kOff;
+  }
   void receive(const ForceContribution&) { session_.external_force = true; }
   void countCommand(const std::string& text);
 
@@ -122,6 +138,8 @@ class RecordingReader {
   StopTruth stops_;
   std::map<std::string_view, std::function<void(std::span<const std::uint8_t>)>> handlers_;
   std::map<ObjectId, std::string> kinds_;
+  std::map<HandId, std::uint32_t> freezes_;    ///< [ticks] in force
+  std::map<ClientId, std::uint32_t> granted_;  ///< [ticks] longest freeze of its hands
 };
 
 void RecordingReader::receive(const Presence& presence) {
@@ -130,6 +148,7 @@ void RecordingReader::receive(const Presence& presence) {
     session_.participants.push_back({presence.name, presence.role});
   session_.present[presence.client] = presence;
   for (const HandId hand : presence.hands) session_.hands[hand].role = presence.role;
+  noteLimits(presence);
 }
 
 /// Whether a hand has the object by itself: it is no part of the exercise.
@@ -177,6 +196,8 @@ void RecordingReader::receive(const TickStats& stats) {
   addPoint(session_.compute, stats.tick, stats.compute_seconds);
   addPoint(session_.compute_max, stats.tick, std::max(stats.compute_seconds, stats.compute_seconds_max));
   session_.late_ticks = std::max(session_.late_ticks, stats.late_ticks);
+  session_.slow_writes = std::max(session_.slow_writes, stats.slow_writes);
+  session_.unsent_samples = std::max(session_.unsent_samples, stats.unsent_samples);
   if (std::isfinite(stats.input_age_seconds))
     session_.input_age = std::max(session_.input_age, stats.input_age_seconds);
 }
@@ -194,6 +215,18 @@ void RecordingReader::receive(const Telemetry& telemetry) {
   latency.p50 = telemetry.input_to_force_p50;
   latency.p99 = telemetry.input_to_force_p99;
   latency.max = std::max(latency.max, telemetry.input_to_force_max);
+  latency.silence = std::max(latency.silence, telemetry.longest_silence);
+  latency.jitter = std::max(latency.jitter, telemetry.jitter);
+  const double share = 1.0 / static_cast<double>(++latency.statements);
+  latency.inputs_lost += share * (telemetry.inputs_lost - latency.inputs_lost);
+  latency.answers_lost += share * (telemetry.answers_lost - latency.answers_lost);
+  latency.inputs_replaced += share * (telemetry.inputs_replaced - latency.inputs_replaced);
+  latency.ticks_without_input += share * (telemetry.ticks_without_input - latency.ticks_without_input);
+  if (!telemetry.clock_known) return;
+  latency.clock_known = true;
+  latency.round_trip = telemetry.round_trip;
+  latency.clock_offset = telemetry.clock_offset;
+  latency.clock_error = telemetry.clock_error;
 }
 
 /// "NAME: WORD ...": a command that the server has accepted.
@@ -231,6 +264,7 @@ Result<RecordedSession> readRecording(const std::filesystem::path& file) {
   RecordedSession session;
   RecordingReader reader(session);
   for (record::McapMessage message; recording->next(message);) reader.read(message);
+  reader.finish();
   session.problem = recording->problem();
   if (session.messages == 0)
     return fail(file.string() + ": holds no messages" +

@@ -35,6 +35,16 @@ struct SessionParticipant {
 struct ForceLatency {
   std::string who;                         ///< name of the participant
   double p50 = 0.0, p99 = 0.0, max = 0.0;  ///< [s]
+  double silence = 0.0;                    ///< [s] longest without an answer of the server
+  double jitter = 0.0;                     ///< [s] largest of a second, 99th percentile less the minimum
+  double inputs_lost = 0.0, answers_lost = 0.0;             ///< [-] mean shares
+  double inputs_replaced = 0.0, ticks_without_input = 0.0;  ///< [-] likewise
+  std::uint32_t freeze_ticks = 0;  ///< [ticks] largest HandLimits::freeze_ticks of its hands
+  double round_trip = 0.0;         ///< [s] shortest
+  double clock_offset = 0.0,
+         clock_error = 0.0;  ///< [s] of the server's clock against the station's, at the end
+  bool clock_known = false;
+  std::uint64_t statements = 0;  ///< Telemetry samples
 };
 
 /// Where an object was.
@@ -81,7 +91,9 @@ struct RecordedSession {
   Series compute;      ///< [s]
   Series compute_max;  ///< [s]
   std::uint64_t late_ticks = 0;
-  double input_age = 0.0;  ///< [s]
+  std::uint64_t slow_writes = 0;     ///< TickStats::slow_writes
+  std::uint64_t unsent_samples = 0;  ///< TickStats::unsent_samples
+  double input_age = 0.0;            ///< [s]
 
   double assisted_seconds = 0.0;  ///< [s] in which the instructor's pointer was in contact
   bool indexed = false, guided = false, external_force = false;

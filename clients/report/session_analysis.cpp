@@ -63,6 +63,8 @@ void SessionAnalyzer::copyFacts() {
   analysis_.run = session_.run;
   analysis_.has_run = session_.has_run;
   analysis_.late_ticks = session_.late_ticks;
+  analysis_.slow_writes = session_.slow_writes;
+  analysis_.unsent_samples = session_.unsent_samples;
   analysis_.input_age = session_.input_age;
   analysis_.events = session_.events;
   for (auto& [client, latency] : session_.force_latencies) {

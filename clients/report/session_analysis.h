@@ -75,7 +75,9 @@ struct SessionAnalysis {
   int collisions = 0;                                                   ///< of all steps
   double compute_median = 0.0, compute_p99 = 0.0, compute_worst = 0.0;  ///< [s]
   std::uint64_t late_ticks = 0;
-  double input_age = 0.0;  ///< [s] age of the oldest input that a tick used
+  std::uint64_t slow_writes = 0;     ///< of the server to the bus, of more than 5 ms
+  std::uint64_t unsent_samples = 0;  ///< that the bus did not take
+  double input_age = 0.0;            ///< [s] age of the oldest input that a tick used
   std::uint64_t messages = 0;
   std::uint64_t malformed = 0;  ///< messages that could not be decoded
 

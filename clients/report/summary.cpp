@@ -76,6 +76,20 @@ std::string outcomeOf(const SessionAnalysis& analysis) {
   }
 }
 
+std::string linkText(const ForceLatency& latency) {
+  const std::string text = fmt::format(
+      "jitter up to {:.1f} ms; lost: {:.2f} % of inputs, {:.2f} % of contacts; {:.2f} % of inputs "
+      "replaced, {:.2f} % of ticks without one; hands held still after {} ms of silence at most",
+      1e3 * latency.jitter, 1e2 * latency.inputs_lost, 1e2 * latency.answers_lost,
+      1e2 * latency.inputs_replaced, 1e2 * latency.ticks_without_input, latency.freeze_ticks);
+  const std::string clock =
+      latency.clock_known
+          ? fmt::format("; round trip {:.1f} ms; the server's clock is {:.6f} s ahead, +-{:.1f} ms",
+                        1e3 * latency.round_trip, latency.clock_offset, 1e3 * latency.clock_error)
+          : "";
+  return fmt::format("{}{} ({})", text, clock, latency.who);
+}
+
 std::string summaryText(const SessionAnalysis& analysis) {
   std::size_t width = 10;
   for (const StepVisit& visit : analysis.visits) width = std::max(width, columnsOf(titleText(visit)));
@@ -106,10 +120,16 @@ std::string summaryText(const SessionAnalysis& analysis) {
       fmt::format("computation time  median {:.3f} ms, p99 {:.3f} ms, max {:.3f} ms\n",
                   1e3 * analysis.compute_median, 1e3 * analysis.compute_p99, 1e3 * analysis.compute_worst);
   text += fmt::format("late ticks        {}\n", analysis.late_ticks);
+  text += fmt::format("writes to the bus {} took more than 5 ms, {} samples not sent\n", analysis.slow_writes,
+                      analysis.unsent_samples);
   text += fmt::format("oldest input      {:.1f} ms\n", 1e3 * analysis.input_age);
   for (const ForceLatency& latency : analysis.force_latencies)
-    text += fmt::format("input to force    median {:.1f} ms, p99 {:.1f} ms, max {:.1f} ms ({})\n",
-                        1e3 * latency.p50, 1e3 * latency.p99, 1e3 * latency.max, latency.who);
+    text += fmt::format(
+        "input to force    median {:.1f} ms, p99 {:.1f} ms, max {:.1f} ms, longest silence "
+        "{:.1f} ms ({})\n",
+        1e3 * latency.p50, 1e3 * latency.p99, 1e3 * latency.max, 1e3 * latency.silence, latency.who);
+  for (const ForceLatency& latency : analysis.force_latencies)
+    text += fmt::format("link              {}\n", linkText(latency));
   text += fmt::format("hand to part      at most {:.2f} mm; parts inside each other: at most {:.2f} mm\n",
                       1e3 * analysis.whole.gap, 1e3 * analysis.whole.depth);
   text += fmt::format("work of a pair    at most {:.0f} % of its limit\n", analysis.whole.load);
@@ -138,6 +158,8 @@ nlohmann::json summaryJson(const SessionAnalysis& analysis) {
       {"compute_seconds",
        {{"median", analysis.compute_median}, {"p99", analysis.compute_p99}, {"max", analysis.compute_worst}}},
       {"late_ticks", analysis.late_ticks},
+      {"slow_writes", analysis.slow_writes},
+      {"unsent_samples", analysis.unsent_samples},
       {"oldest_input_seconds", analysis.input_age},
       {"messages", analysis.messages},
       {"malformed_messages", analysis.malformed},
@@ -170,7 +192,20 @@ nlohmann::json summaryJson(const SessionAnalysis& analysis) {
   }
   for (const ForceLatency& latency : analysis.force_latencies)
     all["input_to_force_seconds"].push_back(
-        {{"who", latency.who}, {"median", latency.p50}, {"p99", latency.p99}, {"max", latency.max}});
+        {{"who", latency.who},
+         {"median", latency.p50},
+         {"p99", latency.p99},
+         {"max", latency.max},
+         {"longest_silence", latency.silence},
+         {"jitter", latency.jitter},
+         {"inputs_lost", latency.inputs_lost},
+         {"answers_lost", latency.answers_lost},
+         {"inputs_replaced", latency.inputs_replaced},
+         {"ticks_without_input", latency.ticks_without_input},
+         {"freeze_ms", latency.freeze_ticks},
+         {"round_trip", latency.clock_known ? nlohmann::json(latency.round_trip) : nlohmann::json()},
+         {"clock_offset", latency.clock_known ? nlohmann::json(latency.clock_offset) : nlohmann::json()},
+         {"clock_error", latency.clock_known ? nlohmann::json(latency.clock_error) : nlohmann::json()}});
   for (const SessionEvent& event : analysis.events)
     all["events"].push_back({{"time", event.time}, {"kind", event.kind}, {"text", event.text}});
   return all;

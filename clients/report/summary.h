@@ -21,6 +21,9 @@ namespace tenon::report {
 /// "succeeded", or how the run ended instead.
 [[nodiscard]] std::string outcomeOf(const SessionAnalysis& analysis);
 
+/// What a station's link did: jitter, losses, round trip and clocks, in words.
+[[nodiscard]] std::string linkText(const ForceLatency& latency);
+
 /// Table of the session as aligned text.
 [[nodiscard]] std::string summaryText(const SessionAnalysis& analysis);
 

@@ -34,6 +34,9 @@ constexpr double kPressTimeout = 5.0;      // [s] of pressing at the seat after 
 constexpr double kIdleTimeout = 3.0;  // [s] of pushing without resistance or progress: the arm is at its end
 constexpr double kWaitTimeout = 8.0;  // [s] likewise, with less than 1 N
 constexpr double kVisualGain = 2.2;   // [1/s] of the alignment by sight
+// [m] of error beyond which the part does not follow the hand: nothing to correct
+constexpr double kVisualRange = 0.06;
+constexpr double kAstray = 0.015;  // [m] beside the axis, where no spiral search finds the opening
 }  // namespace
 
 void AssemblyBehavior::begin(const Pose& X_WH) noexcept {
@@ -289,14 +292,19 @@ void AssemblyBehavior::align(const HandPerception& hand, const DelayedPerception
 
   // integral correction by sight; its gain is low enough to be stable with the reaction delay
   const Displacement error = displacement(perception.pose(task_.object), X_WStart, task_.centre);
-  visual_correction_.translation += kVisualGain * dt * error.translation;
-  visual_correction_.rotation += kVisualGain * dt * error.rotation;
-  visual_correction_ = {clampNorm(visual_correction_.translation, 0.05),
-                        clampNorm(visual_correction_.rotation, 0.2)};
+  // a hand that is frozen or obstructed would wind the integral up
+  if (error.translation.norm() > kVisualRange) {
+    visual_correction_ = decayed(visual_correction_, dt, 0.3);
+  } else {
+    visual_correction_.translation += kVisualGain * dt * error.translation;
+    visual_correction_.rotation += kVisualGain * dt * error.rotation;
+    visual_correction_ = {clampNorm(visual_correction_.translation, 0.05),
+                          clampNorm(visual_correction_.rotation, 0.2)};
+  }
   const bool arrived =
       error.translation.norm() < std::min(0.001, 0.4 * task_.tolerance) && error.rotation.norm() < 0.008;
   aligned_time_ = arrived ? aligned_time_ + dt : 0.0;
-  if (aligned_time_ < 0.2 && phase_time_ < 6.0) return;
+  if (aligned_time_ < 0.2 && (phase_time_ < 6.0 || isAstray(perception))) return;
   if (task_.approach_distance <= 0.0) {
     // no direction of approach: nothing to insert into, keep aligning
     return;
@@ -350,6 +358,11 @@ void AssemblyBehavior::insert(const HandPerception& hand, const DelayedPerceptio
   if (reaction_ < 0.6 * force || task_.misplaced ||
       !stall_detector_.stalled(perceivedDepth(perception), 0.001))
     return;
+  if (isAstray(perception)) {
+    search_depth_ = kRetractDistance - task_.approach_distance;
+    enter(Phase::kRetract);
+    return;
+  }
   search_depth_ = perceived;
   spiral_search_ = {};
   enter(Phase::kSearch);
@@ -387,6 +400,11 @@ void AssemblyBehavior::retract(const HandPerception& hand, const DelayedPercepti
   intendObjectPose(hand, Vector3::Zero(), Quaternion::Identity(), dt);
   if (depth_ > retracted || phase_time_ < retract_time_) return;
   aim();
+  if (!task_.misplaced && isAstray(perception)) {
+    visual_correction_ = {};
+    enter(Phase::kAlign);
+    return;
+  }
   stall_detector_.start(perceivedDepth(perception));
   enter(Phase::kInsert);
 }
@@ -461,6 +479,12 @@ void AssemblyBehavior::setIntended(const Pose& X_WI, double dt) noexcept {
   if (intended_velocity_.linear.norm() > 2.0 * person_.max_speed) intended_velocity_.linear.setZero();
   if (intended_velocity_.angular.norm() > 2.0 * person_.max_turn_speed) intended_velocity_.angular.setZero();
   X_WI_ = X_WI;
+}
+
+bool AssemblyBehavior::isAstray(const DelayedPerception& perception) const noexcept {
+  if (!perception.knows(task_.object)) return false;
+  const Vector3 error = displacement(X_WAim_, perception.pose(task_.object), task_.centre).translation;
+  return (error - error.dot(axis_W_) * axis_W_).norm() > kAstray;
 }
 
 double AssemblyBehavior::perceivedDepth(const DelayedPerception& perception) const noexcept {

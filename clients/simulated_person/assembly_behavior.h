@@ -40,7 +40,8 @@ struct TouchTask {
 /// follows from the simulated arm and the device. Up to the begin of the insertion the pose is corrected by
 /// sight, from then on a visible tilt only: the aim has a seeded error, and contact guides the part
 /// laterally. Insertion controls the force (a few newtons); when it stalls it searches in a small spiral,
-/// then retracts, aims again with a smaller error and retries.
+/// then retracts, aims again with a smaller error and retries. A part that is far beside its aim, as after a
+/// hand was frozen, is brought back and aligned by sight again.
 ///
 /// Threads: one. Real-time: everything but the constructor.
 class AssemblyBehavior {
@@ -106,6 +107,9 @@ class AssemblyBehavior {
                         double dt) noexcept;
   /// X_WI and its velocity over `dt` [s].
   void setIntended(const Pose& X_WI, double dt) noexcept;
+  /// The object is perceived so far beside the axis that pushing cannot insert it: it has to be aligned
+  /// again.
+  [[nodiscard]] bool isAstray(const DelayedPerception& perception) const noexcept;
   /// [m] Of the object along the axis as perceived, 0 at the aim.
   [[nodiscard]] double perceivedDepth(const DelayedPerception& perception) const noexcept;
 

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <set>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -10,6 +11,7 @@
 
 #include "clients/haptic/seat_file.h"
 #include "idl/wire/identity.h"
+#include "idl/wire/network.h"
 
 namespace tenon::station {
 
@@ -22,7 +24,6 @@ struct Typed {
   std::string role;
   std::vector<std::string> devices;
   std::vector<std::string> addresses;
-  std::vector<std::string> serials;
   std::vector<std::string> mountings;
   std::vector<std::string> hands;
   std::optional<std::string> tracker;
@@ -82,9 +83,6 @@ void declareStation(CLI::App& app, Typed& typed) {
   app.add_option("--address", typed.addresses, "where each device is: a port, host or socket")
       ->option_text("ADDRESS[,ADDRESS]")
       ->delimiter(',');
-  app.add_option("--serial", typed.serials, "serial number that each device has to have")
-      ->option_text("NUMBER[,NUMBER]")
-      ->delimiter(',');
   app.add_option(
          "--mounting", typed.mountings,
          "how a device is turned: w:x:y:z, the quaternion from its own frame to x right, y away, z up")
@@ -129,6 +127,7 @@ void declareProgram(CLI::App& app, Typed& typed) {
   app.add_option("--domain", membership.domain, "DDS domain, 0 to 230")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
+  wire::addNetworkOption(app);
   app.add_flag("--lockstep", membership.lockstep,
                "require a lockstep session: one step for each received tick");
   app.add_option("--name", typed.name, "name shown to the other participants (default: the role)");
@@ -189,14 +188,13 @@ Result<void> setRemoteAddresses(StationOptions& station) {
 /// The devices with what each is opened with.
 Result<void> setDevices(const Typed& typed, StationOptions& station) {
   const auto tooMany = [&](const auto& list) { return list.size() > typed.devices.size(); };
-  if (tooMany(typed.addresses) || tooMany(typed.serials) || tooMany(typed.mountings))
-    return fail("--address, --serial, --mounting: expected one for each --device at most");
+  if (tooMany(typed.addresses) || tooMany(typed.mountings))
+    return fail("--address, --mounting: expected one for each --device at most");
   if (!typed.devices.empty()) station.devices.clear();
   for (std::size_t i = 0; i < typed.devices.size(); ++i) {
     StationDevice device{typed.devices[i], {}};
     device.configuration.seed = typed.simulated.seed + i;
     if (i < typed.addresses.size()) device.configuration.address = typed.addresses[i];
-    if (i < typed.serials.size()) device.configuration.serial = typed.serials[i];
     if (i < typed.mountings.size()) {
       if (device.name == devices::kRemoteHand)
         return fail("--mounting: a remote hand's program turns its poses itself");
@@ -209,6 +207,27 @@ Result<void> setDevices(const Typed& typed, StationOptions& station) {
   for (StationDevice& device : station.devices) device.configuration.dead_man = typed.dead_man;
   station.hands = typed.hands;
   return setRemoteAddresses(station);
+}
+
+/// Whether hands fit the arms of the devices; what is not of the catalog is not counted.
+Result<void> checkHands(const StationOptions& station) {
+  std::size_t arms = 0;
+  for (const StationDevice& device : station.devices) {
+    const auto facts = devices::findDevice(device.name);
+    if (!facts) return fail("--device: " + facts.error().what);
+    if (facts->arms == 0)
+      return fail("--device " + device.name + ": moves no hand; expected a device with an arm");
+    arms += facts->arms;
+  }
+  const std::set<std::string> names(station.hands.begin(), station.hands.end());
+  if (names.size() != station.hands.size()) return fail("--hands: a name is given twice");
+  if (names.contains("")) return fail("--hands: a name is empty");
+  if (!station.hands.empty() && station.hands.size() != arms)
+    return fail(fmt::format("--hands: the devices have {} arms for {} hands; expected one for each", arms,
+                            station.hands.size()));
+  if (arms > defaultHands(station.role, arms).size() && station.hands.empty())
+    return fail(fmt::format("--device: {} arms; name their hands with --hands", arms));
+  return {};
 }
 
 bool allSimulated(const StationOptions& station) {
@@ -242,7 +261,7 @@ Result<void> setPerson(const Typed& typed, StationOptions& station) {
   return {};
 }
 
-void setTracking(const Typed& typed, StationOptions& station) {
+Result<void> setTracking(const Typed& typed, StationOptions& station) {
   const bool wanted = station.role == Role::kTrainee && allSimulated(station);
   station.tracker = typed.tracker.value_or(wanted ? std::string(devices::kBodyTracker) : "none");
   if (station.tracker == "none") station.tracker.clear();
@@ -251,14 +270,22 @@ void setTracking(const Typed& typed, StationOptions& station) {
   if (station.tactors == "none") station.tactors.clear();
   station.tactile =
       typed.tactile == "pattern" ? haptic::TactileMode::kPattern : haptic::TactileMode::kIntensity;
+  if (station.tactors.empty()) return {};
+  const auto facts = devices::findDevice(station.tactors);
+  if (!facts || facts->arms > 0)
+    return fail(
+        fmt::format("--tactors {}: is no bracelet; expected {}", station.tactors, devices::kBracelet));
+  if (station.tracker.empty()) return fail("--tactors: a bracelet is on the forearm that --tracker follows");
+  return {};
 }
 
 Result<JoinArguments> join(Typed& typed) {
   const Role role = typed.role == "instructor" ? Role::kInstructor : Role::kTrainee;
   JoinArguments arguments{defaultStation(role, typed.simulated), typed.program};
   if (auto set = setDevices(typed, arguments.station); !set) return fail(set.error().what);
+  if (auto fits = checkHands(arguments.station); !fits) return fail(fits.error().what);
   if (auto set = setPerson(typed, arguments.station); !set) return fail(set.error().what);
-  setTracking(typed, arguments.station);
+  if (auto set = setTracking(typed, arguments.station); !set) return fail(set.error().what);
   if (!allSimulated(arguments.station) && arguments.station.kind != PersonKind::kNone)
     return fail("--person: only simulated devices can be moved by a simulated person or a file");
   arguments.program.membership.person = typed.name.value_or(typed.role);

@@ -126,10 +126,26 @@ std::vector<std::string> defaultHands(Role role, std::size_t arms) {
 
 DeviceStation::DeviceStation(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 
-DeviceStation::~DeviceStation() {
+DeviceStation::~DeviceStation() { end(); }
+
+void DeviceStation::end() noexcept {
   for (Arm& arm : parts_->arms) {
     if (arm.hand) arm.hand->end();
   }
+  if (parts_->bracelet) parts_->bracelet->end();
+}
+
+void DeviceStation::finish(bool disarms) noexcept {
+  for (Arm& arm : parts_->arms) {
+    if (arm.hand) arm.hand->finish(disarms);
+  }
+  if (parts_->bracelet) parts_->bracelet->finish(disarms);
+}
+
+/// The bracelet is silent after one step.
+bool DeviceStation::finished() const noexcept {
+  const auto done = [](const Arm& arm) { return !arm.hand || arm.hand->finished(); };
+  return std::all_of(parts_->arms.begin(), parts_->arms.end(), done);
 }
 
 Result<std::unique_ptr<DeviceStation>> DeviceStation::open(const StationOptions& options) {
@@ -212,20 +228,12 @@ std::vector<HandStiffness> DeviceStation::stiffness() const {
 
 Role DeviceStation::role() const { return parts_->options.role; }
 
-devices::HapticDevice* DeviceStation::pacingDevice() {
-  for (const Arm& arm : parts_->arms) {
-    if (arm.device->caps().paces) return arm.device;
-  }
-  return nullptr;
-}
-
 void DeviceStation::beginHand(std::size_t index, HandId id) {
   Arm& arm = parts_->arms[index];
   haptic::MovedHand& moved = parts_->moved[index];
   // of an earlier seat, in case this one is without that hand
   if (arm.hand && !id.valid()) arm.hand->end();
   arm.hand.reset();
-  arm.pressed = false;
   moved.hand = nullptr;
   moved.intent = {};
   moved.X_WStart = startOf(sceneObjects(), moved.name, parts_->options.role);
@@ -237,6 +245,8 @@ void DeviceStation::beginHand(std::size_t index, HandId id) {
   }
   moved.hand = &hand;
   moved.X_WStart = hand.pose();
+  // who has held the button all along does not press it
+  arm.pressed = (hand.device().buttons & arm.device->caps().arming) != 0;
 }
 
 void DeviceStation::begin(std::span<const HandId> hand_ids) {
@@ -262,6 +272,12 @@ void DeviceStation::manifoldReceived(const HandManifold& manifold) noexcept {
     if (arm.hand && arm.hand->id() == manifold.hand) arm.hand->receive(manifold);
   }
   if (parts_->bracelet) parts_->bracelet->receive(manifold);
+}
+
+void DeviceStation::guidanceReceived(const Guidance& guidance) noexcept {
+  for (Arm& arm : parts_->arms) {
+    if (arm.hand && arm.hand->id() == guidance.hand) arm.hand->receive(guidance);
+  }
 }
 
 void DeviceStation::stepChanged() {
@@ -304,6 +320,7 @@ void DeviceStation::step(std::uint32_t seq) noexcept {
   pressButtons();
   for (Arm& arm : parts_->arms) {
     if (!arm.hand) continue;
+    arm.hand->setLinkJitter(link_jitter_);
     arm.hand->step(seq, world_, dt_);
     report(*arm.hand);
     inputs_.push_back(arm.hand->input());

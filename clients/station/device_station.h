@@ -65,13 +65,16 @@ class DeviceStation : public haptic::Station {
   void step(std::uint32_t seq) noexcept override;
   [[nodiscard]] bool wantsArming() const noexcept override;
   [[nodiscard]] Result<void> armDevices() override;
-  [[nodiscard]] devices::HapticDevice* pacingDevice() override;
+  void finish(bool disarms) noexcept override;
+  [[nodiscard]] bool finished() const noexcept override;
+  void end() noexcept override;
   /// What the mover does, in a word or two: for progress output and tests.
   [[nodiscard]] const char* activity() const noexcept;
 
  protected:
   void begin(std::span<const HandId> hand_ids) override;
   void manifoldReceived(const HandManifold& manifold) noexcept override;
+  void guidanceReceived(const Guidance& guidance) noexcept override;
   void stepChanged() override;
   void armingChanged() noexcept override;
 

@@ -22,7 +22,6 @@ namespace {
 using mcap::FieldWriter;
 
 constexpr std::size_t kChunkBytes = 1U << 20U;
-constexpr auto kChunkAge = std::chrono::milliseconds(250);
 constexpr auto kSyncAge = std::chrono::seconds(1);
 constexpr int kCompressionLevel = 1;
 
@@ -32,6 +31,7 @@ struct McapWriter::Impl {
   std::filesystem::path file;
   int descriptor = -1;
   bool compress = true;
+  std::chrono::milliseconds chunk_age{0};
   std::string problem;       // of the first write that failed; empty: none did
   std::uint64_t offset = 0;  // of the next record
   std::uint32_t data_crc = 0;
@@ -95,6 +95,7 @@ Result<McapWriter> McapWriter::open(const std::filesystem::path& file, const Mca
   auto impl = std::make_unique<Impl>();
   impl->file = file;
   impl->compress = options.compress;
+  impl->chunk_age = options.chunk_age;
   std::error_code ignored;
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), ignored);
   impl->descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
@@ -114,6 +115,7 @@ Result<McapWriter> McapWriter::reopen(const std::filesystem::path& file, const M
   auto impl = std::make_unique<Impl>();
   impl->file = file;
   impl->compress = options.compress;
+  impl->chunk_age = options.chunk_age;
   impl->descriptor = ::open(file.c_str(), O_RDWR | O_CLOEXEC);
   if (impl->descriptor < 0)
     return fail(file.string() + ": cannot be continued (" + std::strerror(errno) + ")");
@@ -203,7 +205,7 @@ Result<void> McapWriter::write(std::uint16_t channel, std::int64_t log_time_ns, 
   ++to.summary.messages;
 
   const auto now = std::chrono::steady_clock::now();
-  if (to.chunk.bytes.size() >= kChunkBytes || now - to.chunk_start > kChunkAge)
+  if (to.chunk.bytes.size() >= kChunkBytes || now - to.chunk_start > to.chunk_age)
     if (auto done = to.endChunk(); !done) return done;
   if (now - to.synced > kSyncAge) {
     ::fdatasync(to.descriptor);

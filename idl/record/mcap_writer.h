@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -13,15 +14,16 @@
 namespace tenon::record {
 
 struct McapOptions {
-  bool compress = true;  ///< chunks by zstd
+  bool compress = true;                      ///< chunks by zstd
+  std::chrono::milliseconds chunk_age{250};  ///< at which a chunk is closed: longer ones are smaller
 };
 
 /// Writes a recording as an MCAP file (encoding `cdr`, schemas `omgidl`) for public tools.
 ///
-/// Messages are collected in chunks of about 1 MiB. A chunk is closed when it is 250 ms old at the next
-/// write, and the file is synchronised to disk (fdatasync) every second, so that after a crash all but the
-/// last second is readable.
-/// It has checksums of chunks, data and summary, and indices for seeking.
+/// Messages are collected in chunks of about 1 MiB. A chunk is closed when it is McapOptions::chunk_age old
+/// at the next write, and the file is synchronised to disk (fdatasync) every second, so that after a crash
+/// all but the last second is readable. It has checksums of chunks, data and summary, and indices for
+/// seeking.
 ///
 /// Threads: one at a time. Real-time: no.
 class McapWriter {

@@ -21,10 +21,16 @@ class Latest {
 
   /// The slot to be filled before publish(); it holds some older value.
   [[nodiscard]] T& back() noexcept { return slots_[back_]; }
-  void publish() noexcept { back_ = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel) & kSlot; }
-  void write(const T& value) noexcept {
+  /// True when it replaces a value that no update() has taken.
+  bool publish() noexcept {
+    const std::uint32_t old = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel);
+    back_ = old & kSlot;
+    return (old & kFresh) != 0;
+  }
+  /// As publish().
+  bool write(const T& value) noexcept {
     back() = value;
-    publish();
+    return publish();
   }
 
   /// Makes the newest value that of value(); false when nothing was published since the last update.

@@ -20,11 +20,20 @@ namespace tenon {
 
 /// As typed in `tenon command`.
 [[nodiscard]] constexpr std::string_view commandName(CommandKind kind) noexcept {
-  constexpr std::array<std::string_view, 16> kNames{
-      "fulfilled", "signal", "pause", "resume", "reset", "skip",   "release", "swap",
-      "collision", "stop",   "clear", "goto",   "back",  "repeat", "give",    "note"};
+  constexpr std::array<std::string_view, 19> kNames{
+      "fulfilled", "signal", "pause", "resume", "reset", "skip", "release", "swap",   "collision", "stop",
+      "clear",     "goto",   "back",  "repeat", "give",  "note", "guide",   "freeze", "kick"};
   const auto index = static_cast<std::size_t>(kind);
   return index < kNames.size() ? kNames[index] : "unknown command";
+}
+
+/// For displays that have their own texts for refusals.
+[[nodiscard]] constexpr std::string_view refusalName(Refusal refusal) noexcept {
+  constexpr std::array<std::string_view, 12> kNames{
+      "",        "other",        "not_joined",    "not_permitted", "over",         "waiting",
+      "already", "unknown_name", "not_your_hand", "not_holdable",  "nobody_there", "too_many"};
+  const auto index = static_cast<std::size_t>(refusal);
+  return index < kNames.size() ? kNames[index] : "other";
 }
 
 [[nodiscard]] constexpr std::string_view objectStatusName(ObjectStatus status) noexcept {

@@ -111,10 +111,18 @@ void fields(auto& d, auto& c, Is<SessionAnnounce> auto& m) {
   d("title", c.title, m.title);
   d("protocol_version", c.protocol_version, m.protocol_version);
   d("lockstep", c.lockstep, m.lockstep);
+  d("objects", c.objects, m.objects);
+  d("hands", c.hands, m.hands);
+  d("steps", c.steps, m.steps);
+  d("resumed_after", c.resumed_after, m.resumed_after);
   d("scenario_hash", c.scenario_hash, m.scenario_hash);
   d("host", c.host, m.host);
   d("pid", c.pid, m.pid);
   d("scene_hash", c.scene_hash, m.scene_hash);
+  d("scenario", c.scenario, m.scenario);
+  d("detail", c.detail, m.detail);
+  d("freeze_ticks", c.freeze_ticks, m.freeze_ticks);
+  d("park_ticks", c.park_ticks, m.park_ticks);
 }
 void fields(auto& d, auto& c, Is<Join> auto& m) {
   d("client_guid", c.client_guid, m.client_guid);
@@ -128,6 +136,7 @@ void fields(auto& d, auto& c, Is<Join> auto& m) {
   d("key_proof", c.key_proof, m.key_proof);
   d("protocol_version", c.protocol_version, m.protocol_version);
   d.list("stiffness", c.stiffness, m.stiffness, 8, kStructs);
+  d("recorded_until", c.recorded_until, m.recorded_until);
 }
 void fields(auto& d, auto& c, Is<Welcome> auto& m) {
   d("client_guid", c.client_guid, m.client_guid);
@@ -140,6 +149,7 @@ void fields(auto& d, auto& c, Is<Welcome> auto& m) {
   d.list("hands", c.hands, m.hands, 16, kNumbers);
   d("tick", c.tick, m.tick);
   d("lockstep", c.lockstep, m.lockstep);
+  d("people", c.people, m.people);
 }
 void fields(auto& d, auto& c, Is<Presence> auto& m) {
   d("client", c.client_id, m.client);
@@ -154,6 +164,7 @@ void fields(auto& d, auto& c, Is<DeviceInput> auto& m) {
   d("server_epoch", c.server_epoch, m.server_epoch);
   d("active", c.active, m.active);
   fields(d, c.sample, m.sample);
+  d.list("earlier", c.earlier, m.earlier, kEarlierSamples, kStructs);
   d("p_WC", c.p_WC, m.p_WC);
 }
 void fields(auto& d, auto& c, Is<WorldFrame> auto& m) {
@@ -195,6 +206,7 @@ void fields(auto& d, auto& c, Is<HandState> auto& m) {
   d("indexing", c.indexing, m.indexing);
   d("tactors", c.tactors, m.tactors);
   d("peak_force", c.peak_force, m.peak_force);
+  d("guidance_force", c.guidance_force, m.guidance_force);
 }
 void fields(auto& d, auto& c, Is<ContactPairs> auto& m) {
   d("part", c.part, m.part);
@@ -214,13 +226,21 @@ void fields(auto& d, auto& c, Is<TickStats> auto& m) {
   d("points_visited", c.points_visited, m.points_visited);
   d("input_age_seconds", c.input_age_seconds, m.input_age_seconds);
   d("state_hash", c.state_hash, m.state_hash);
+  d("slow_writes", c.slow_writes, m.slow_writes);
+  d("unsent_samples", c.unsent_samples, m.unsent_samples);
 }
 void fields(auto& d, auto& c, Is<Guidance> auto& m) {
   d("hand", c.hand_id, m.hand);
+  d("server_epoch", c.server_epoch, m.server_epoch);
   d("tick", c.tick, m.tick);
-  d("active", c.active, m.active);
+  d("choice", c.choice, m.choice);
+  d("mode", c.mode, m.mode);
+  d("kind", c.kind, m.kind);
+  d("guide", c.guide_hand_id, m.guide);
   fields(d, c.X_WF, m.X_WF);
+  d("radius", c.radius, m.radius);
   d("stiffness", c.stiffness, m.stiffness);
+  d("rotational_stiffness", c.rotational_stiffness, m.rotational_stiffness);
   d("damping", c.damping, m.damping);
 }
 void fields(auto& d, auto& c, Is<ForceContribution> auto& m) {
@@ -241,15 +261,36 @@ void fields(auto& d, auto& c, Is<ClockSync> auto& m) {
   d("sent_ns", c.sent_ns, m.sent_ns);
   d("server_received_ns", c.server_received_ns, m.server_received_ns);
   d("server_sent_ns", c.server_sent_ns, m.server_sent_ns);
+  d("inputs_received", c.inputs_received, m.inputs_received);
+  d("inputs_replaced", c.inputs_replaced, m.inputs_replaced);
+  d("ticks_without_input", c.ticks_without_input, m.ticks_without_input);
+  d("newest_seq", c.newest_seq, m.newest_seq);
+  d("longest_gap", c.longest_gap, m.longest_gap);
 }
 void fields(auto& d, auto& c, Is<Telemetry> auto& m) {
   d("client", c.client_id, m.client);
   d("input_to_force_p50", c.input_to_force_p50, m.input_to_force_p50);
   d("input_to_force_p99", c.input_to_force_p99, m.input_to_force_p99);
   d("input_to_force_max", c.input_to_force_max, m.input_to_force_max);
+  d("inputs_replaced", c.inputs_replaced, m.inputs_replaced);
+  d("ticks_without_input", c.ticks_without_input, m.ticks_without_input);
+  d("input_gap", c.input_gap, m.input_gap);
+  d("trip_jitter", c.trip_jitter, m.trip_jitter);
+  d("freeze_ticks", c.freeze_ticks, m.limits.freeze_ticks);
+  d("park_ticks", c.park_ticks, m.limits.park_ticks);
+  d("playout_ticks", c.playout_ticks, m.playout_ticks);
   d("loop_late_p99", c.loop_late_p99, m.loop_late_p99);
   d("loop_overruns", c.loop_overruns, m.loop_overruns);
   d("samples", c.samples, m.samples);
+  d("age", c.age, m.age);
+  d("jitter", c.jitter, m.jitter);
+  d("answers_lost", c.answers_lost, m.answers_lost);
+  d("inputs_lost", c.inputs_lost, m.inputs_lost);
+  d("clock_known", c.clock_known, m.clock_known);
+  d("clock_offset", c.clock_offset, m.clock_offset);
+  d("clock_error", c.clock_error, m.clock_error);
+  d("round_trip", c.round_trip, m.round_trip);
+  d("longest_silence", c.longest_silence, m.longest_silence);
 }
 void fields(auto& d, auto& c, Is<SceneObject> auto& m) {
   d("object", c.object_id, m.object);
@@ -261,12 +302,15 @@ void fields(auto& d, auto& c, Is<SceneObject> auto& m) {
   fields(d, c.X_WO, m.X_WO);
   d("size", c.size, m.size);
   d("centre", c.centre, m.centre);
+  d.list("titles", c.titles, m.titles, 3, kStructs);
 }
 void fields(auto& d, auto& c, Is<SceneHand> auto& m) {
   d("hand", c.hand_id, m.hand);
   d("name", c.name, m.name);
   d("role", c.role, m.role);
   d("object", c.object_id, m.object);
+  d("freeze_ticks", c.freeze_ticks, m.limits.freeze_ticks);
+  d("park_ticks", c.park_ticks, m.limits.park_ticks);
 }
 void fields(auto& d, auto& c, Is<SceneStep> auto& m) {
   d("step", c.step, m.step);
@@ -317,6 +361,7 @@ void fields(auto& d, auto& c, Is<RunState> auto& m) {
   d("server_epoch", c.server_epoch, m.server_epoch);
   d("steps_skipped", c.steps_skipped, m.steps_skipped);
   d("steps_timed_out", c.steps_timed_out, m.steps_timed_out);
+  d("forces_frozen", c.forces_frozen, m.forces_frozen);
 }
 void fields(auto& d, auto& c, Is<GrabState> auto& m) {
   d("object", c.object_id, m.object);
@@ -353,6 +398,7 @@ void fields(auto& d, auto& c, Is<CommandAck> auto& m) {
   d("id", c.id, m.id);
   d("accepted", c.accepted, m.accepted);
   d("reason", c.reason, m.reason);
+  d("refusal", c.refusal, m.refusal);
 }
 void fields(auto& d, auto& c, Is<EventLog> auto& m) {
   d("seq", c.seq, m.seq);

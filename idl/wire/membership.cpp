@@ -12,6 +12,8 @@ namespace {
 using std::chrono::milliseconds;
 constexpr milliseconds kRepeatInterval{500};
 constexpr milliseconds kPollInterval{5};
+// a server that is alive answers within the lease of its announcement
+constexpr milliseconds kLapse = kSessionAnnounce.parameters.lease;
 constexpr milliseconds kOthersWait{100};  // after the first announcement, for an earlier server of that name
 
 std::string randomGuid() {
@@ -42,13 +44,15 @@ bool waitFor(std::chrono::seconds timeout, const std::atomic<bool>& stop,
 
 Result<std::unique_ptr<Membership>> Membership::find(const MembershipOptions& options, const Stop& stop) {
   auto participant =
-      Participant::open({.domain = options.domain, .profile = LinkProfile::kLan, .config = {}});
+      Participant::open({.domain = options.domain,
+                         .profile = options.lockstep ? LinkProfile::kLockstep : LinkProfile::kLan,
+                         .config = {}});
   if (!participant) return fail(participant.error().what);
   std::unique_ptr<Membership> member(new Membership(options));
   member->guid_ = randomGuid();
   member->participant_ = *participant;
   if (!member->options_.seat) member->options_.seat = SeatKey::random();
-  member->lobby_ = std::make_unique<Partition>(*participant, kLobby);
+  member->lobby_ = std::make_unique<Partition>(*participant, kLobby, LinkProfile::kLan);
   auto announce = member->awaitAnnounce(stop, {});
   if (!announce) return fail(announce.error().what);
   member->announce_ = std::move(*announce);
@@ -56,12 +60,18 @@ Result<std::unique_ptr<Membership>> Membership::find(const MembershipOptions& op
   const bool lockstep = member->announce_.lockstep && !options.passive;
   member->session_ = std::make_unique<Partition>(*participant, sessionPartition(member->announce_.session),
                                                  lockstep ? LinkProfile::kLockstep : LinkProfile::kLan);
-  member->session_->hearOnly(member->server_);
+  member->own_ = std::make_unique<Partition>(
+      *participant, clientPartition(member->announce_.session, (*participant)->origin()),
+      member->session_->profile());
+  member->hearServer();
   return member;
 }
 
-Membership::~Membership() {
-  if (presence_writer_) static_cast<void>(presence_writer_->dispose(presence_));
+Membership::~Membership() { leave(); }
+
+void Membership::leave() {
+  if (presence_writer_ && std::exchange(presence_.alive, false))
+    static_cast<void>(presence_writer_->dispose(presence_));
 }
 
 /// Waits for the announcement of the session; fails when the server's protocol or pace does not fit.
@@ -102,6 +112,10 @@ Result<SessionAnnounce> Membership::awaitAnnounce(const Stop& stop, const std::f
 }
 
 Result<void> Membership::join(const Stop& stop, const std::function<void()>& meanwhile) {
+  return requestSeat(stop, meanwhile, nullptr);
+}
+
+Result<void> Membership::requestSeat(const Stop& stop, const std::function<void()>& meanwhile, bool* ended) {
   auto joins = Writer<Join>::open(*lobby_, kJoin);
   if (!joins) return fail(joins.error().what);
   auto welcomes = Reader<Welcome>::open(*lobby_, kWelcome);
@@ -113,7 +127,22 @@ Result<void> Membership::join(const Stop& stop, const std::function<void()>& mea
             .role = options_.role,
             .hands = options_.hands,
             .seat_key = options_.seat->publicKey(),
-            .stiffness = options_.stiffness};
+            .stiffness = options_.stiffness,
+            .recorded_until = options_.recorded_until ? options_.recorded_until(announce_) : 0};
+  // heard of every server of this session, unlike by the readers of lobby()
+  Partition everybody(participant_, kLobby, LinkProfile::kLan);
+  Inbox servers;
+  bool gone = false, has_successor = false;
+  auto watched = servers.on<SessionAnnounce>(everybody, kSessionAnnounce, [&](const SessionAnnounce& other) {
+    if (other.session == announce_.session && other.server_epoch > announce_.server_epoch)
+      has_successor = true;
+  });
+  if (watched)
+    watched = servers.onGone<SessionAnnounce>(everybody, kSessionAnnounce, [&](const SessionAnnounce& other) {
+      if (other.session == announce_.session && other.server_epoch == announce_.server_epoch) gone = true;
+    });
+  if (!watched) return watched;
+  const auto asked_at = std::chrono::steady_clock::now();
   std::string key_problem;
   Result<void> sent;
   auto send_at = std::chrono::steady_clock::now();
@@ -134,9 +163,15 @@ Result<void> Membership::join(const Stop& stop, const std::function<void()>& mea
       // a refusal with a valid client id is the notice of a lost seat, not the answer to this request
       if (welcome_.accepted || !welcome_.client.valid()) return true;
     }
-    return !sent;
+    servers.dispatch(std::chrono::nanoseconds(0));
+    // a server that is alive and was first is the session's, whoever else announces it
+    if (ended != nullptr)
+      *ended = gone || (has_successor && std::chrono::steady_clock::now() - asked_at > kLapse);
+    return !sent || (ended != nullptr && *ended);
   });
   if (!sent) return sent;
+  if (ended != nullptr && *ended)
+    return fail("the server of " + sessionText(announce_.session) + " has ended");
   if (!answered && stop) return fail("stopped while joining " + sessionText(announce_.session));
   if (!answered)
     return fail("the server of " + sessionText(announce_.session) +
@@ -159,6 +194,11 @@ void Membership::prove(const std::string& challenge, Join& join, std::string& pr
   const auto key = options_.key ? Result<SharedKey>(*options_.key) : readKeyFile(file);
   if (key) join.key_proof = key->proofOf(subject);
   if (!key) problem = key.error().what;
+}
+
+void Membership::hearServer() {
+  session_->hearOnly(server_);
+  own_->hearOnly(server_);
 }
 
 Result<void> Membership::takeSeat() {
@@ -184,19 +224,34 @@ Result<void> Membership::watch(Inbox& inbox) {
     if (notice.client_guid != guid_ || notice.client != welcome_.client) return;
     if (notice.accepted) return lost_.reset();
     lost_ = "the server of " + sessionText(announce_.session) + " removed this client: " + notice.reason;
+    leave();
   });
 }
 
 Result<void> Membership::rejoin(const Stop& stop, const std::function<void()>& meanwhile) {
-  const bool was_lockstep = announce_.lockstep;
+  const SessionAnnounce before = announce_;
+  const auto until = std::chrono::steady_clock::now() + options_.timeout;
+  while (true) {
+    bool ended = false;
+    const auto back = rejoinNext(before, stop, meanwhile, ended);
+    if (!back && !ended) leave();
+    if (back || !ended || std::chrono::steady_clock::now() >= until) return back;
+  }
+}
+
+/// As rejoin(), of the server that is announced now.
+Result<void> Membership::rejoinNext(const SessionAnnounce& before, const Stop& stop,
+                                    const std::function<void()>& meanwhile, bool& ended) {
   auto announce = awaitAnnounce(stop, meanwhile);
   if (!announce) return fail(announce.error().what);
   announce_ = std::move(*announce);
-  session_->hearOnly(server_);
-  if (announce_.lockstep != was_lockstep)
+  if (announce_.scenario_hash != before.scenario_hash || announce_.scene_hash != before.scene_hash)
+    return fail(sessionText(announce_.session) + " runs another scenario now: start this program again");
+  hearServer();
+  if (announce_.lockstep != before.lockstep)
     return fail(sessionText(announce_.session) +
                 " changed between lockstep and real time: start this program again");
-  return join(stop, meanwhile);
+  return requestSeat(stop, meanwhile, &ended);
 }
 
 }  // namespace tenon::wire

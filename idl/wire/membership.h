@@ -31,6 +31,8 @@ struct MembershipOptions {
   bool lockstep = false;           ///< refuse a session in real time
   bool passive = false;  ///< best-effort streams also in lockstep, so that it never blocks the session
   std::chrono::seconds timeout{10};  ///< [s] for finding a server, and for its answer
+  /// Of a recorder: Join::recorded_until, for the server that it is about to join. Empty: nothing.
+  std::function<Tick(const SessionAnnounce&)> recorded_until = {};
 };
 
 /// A client's seat in a session: finds the server in the lobby, joins, publishes Presence and disposes it at
@@ -59,14 +61,18 @@ class Membership {
   Result<void> join(const Stop& stop, const std::function<void()>& meanwhile = {});
 
   /// From now on dispatching `inbox` updates lost() and serverIsGone(); `inbox` must not be dispatched after
-  /// the destruction of this.
+  /// the destruction of this. Who is removed from the session does not announce a presence any more.
   Result<void> watch(Inbox& inbox);
   /// The server has ended or is unreachable.
   [[nodiscard]] bool serverIsGone() const { return server_gone_; }
   /// Why the seat is lost; none while it is held.
   [[nodiscard]] const std::optional<std::string>& lost() const { return lost_; }
-  /// Finds the session again and requests the same seat.
+  /// Finds the session again and requests the same seat, also when the server that was found is killed
+  /// meanwhile and another one continues its session.
   Result<void> rejoin(const Stop& stop, const std::function<void()>& meanwhile = {});
+
+  /// Ends the presence, of a client that stays without a seat.
+  void leave();
 
   [[nodiscard]] const SessionAnnounce& announce() const { return announce_; }
   [[nodiscard]] const std::string& sessionName() const { return announce_.session; }
@@ -78,11 +84,19 @@ class Membership {
   [[nodiscard]] const std::string& clientGuid() const { return guid_; }
   [[nodiscard]] Partition& lobby() { return *lobby_; }
   [[nodiscard]] Partition& session() { return *session_; }
+  /// For what the server sends to this client alone.
+  [[nodiscard]] Partition& own() { return *own_; }
 
  private:
   explicit Membership(const MembershipOptions& options) : options_(options) {}
   Result<SessionAnnounce> awaitAnnounce(const Stop& stop, const std::function<void()>& meanwhile);
+  /// join(). With `ended`, gives up and sets that when the server has ended, or another one has taken its
+  /// place while it did not answer.
+  Result<void> requestSeat(const Stop& stop, const std::function<void()>& meanwhile, bool* ended);
+  Result<void> rejoinNext(const SessionAnnounce& before, const Stop& stop,
+                          const std::function<void()>& meanwhile, bool& ended);
   Result<void> takeSeat();
+  void hearServer();
   /// Answers the challenge of a Welcome; `problem`: why there is no proof of the session's key.
   void prove(const std::string& challenge, Join& join, std::string& problem) const;
 
@@ -91,6 +105,7 @@ class Membership {
   std::shared_ptr<Participant> participant_;
   std::unique_ptr<Partition> lobby_;
   std::unique_ptr<Partition> session_;
+  std::unique_ptr<Partition> own_;
   std::unique_ptr<Writer<Presence>> presence_writer_;
   SessionAnnounce announce_;
   Welcome welcome_;

@@ -1,15 +1,18 @@
 #include "idl/wire/participant.h"
 
 #include <algorithm>
-#include <cstdlib>
+#include <array>
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <string_view>
 #include <utility>
 
 #include <dds/dds.h>
 
+#include "idl/threads/scheduling.h"
 #include "idl/wire/entities.h"
+#include "idl/wire/network.h"
 #include "idl/wire/profiles.h"
 
 namespace tenon::wire {
@@ -46,9 +49,9 @@ class LogCapture {
 
 Result<std::string> configText(const std::string& config) {
   if (config.empty()) {
-    const char* environment = std::getenv("CYCLONEDDS_URI");
-    if (environment != nullptr && *environment != '\0') return std::string(environment);
-    return std::string(loopbackConfig());
+    const auto network = chosenNetwork();
+    if (!network) return tl::unexpected(network.error());
+    return networkConfig(*network);
   }
   if (config.find('<') != std::string::npos || config.starts_with("file://")) return config;
   std::error_code error;
@@ -57,6 +60,12 @@ Result<std::string> configText(const std::string& config) {
     return fail(config + ": there is no such DDS configuration file");
   }
   return "file://" + path.string();
+}
+
+/// " on the network 'wan,10.0.0.5'": for what goes wrong on one that was chosen.
+std::string ofNetwork(const LinkOptions& options) {
+  const auto network = options.config.empty() ? chosenNetwork() : Result<Network>(Network{});
+  return network && !network->text.empty() ? " on the network '" + network->text + "'" : "";
 }
 
 Result<std::shared_ptr<void>> openDomain(const LinkOptions& options) {
@@ -69,8 +78,8 @@ Result<std::shared_ptr<void>> openDomain(const LinkOptions& options) {
   const LogCapture log;
   const dds_entity_t entity = dds_create_domain(options.domain, config->c_str());
   if (entity < 0) {
-    return fail("DDS domain " + std::to_string(options.domain) +
-                " could not be opened: " + ddsReason(entity) + log.message());
+    return fail("DDS domain " + std::to_string(options.domain) + " could not be opened" + ofNetwork(options) +
+                ": " + ddsReason(entity) + log.message());
   }
   auto domain = std::make_shared<Domain>(entity);
   open_domains[options.domain] = domain;
@@ -97,10 +106,12 @@ Result<std::shared_ptr<Participant>> Participant::open(const LinkOptions& option
   entities->domain = *domain;
   entities->profile = options.profile;
   const LogCapture log;
-  entities->entity = dds_create_participant(options.domain, nullptr, nullptr);
+  const std::unique_ptr<dds_qos_t, void (*)(dds_qos_t*)> qos(participantQos(options.profile),
+                                                             &dds_delete_qos);
+  entities->entity = dds_create_participant(options.domain, qos.get(), nullptr);
   if (entities->entity < 0) {
-    return fail("DDS domain " + std::to_string(options.domain) +
-                " could not be joined: " + ddsReason(entities->entity) + log.message());
+    return fail("DDS domain " + std::to_string(options.domain) + " could not be joined" + ofNetwork(options) +
+                ": " + ddsReason(entities->entity) + log.message());
   }
   return std::shared_ptr<Participant>(new Participant(std::move(entities)));
 }
@@ -124,5 +135,23 @@ Partition& Partition::operator=(Partition&&) noexcept = default;
 const std::string& Partition::name() const { return entities_->name; }
 void Partition::hearOnly(const Origin& server) { entities_->server = server; }
 LinkProfile Partition::profile() const { return entities_->profile; }
+
+std::string raiseWireThreads() {
+  constexpr int kWire = 65;
+  // by their names in Cyclone DDS; what they hand over to each other is in this order
+  constexpr std::array<threads::NamedPriority, 3> kOfDds{{{"recv", 60}, {"tev", 55}, {"dq.", 50}}};
+  const std::string refused = threads::raiseThisThread(kWire);
+  return refused.empty() ? threads::raiseThreadsNamed(kOfDds) : refused;
+}
+
+std::string clientPartition(const std::string& session, const Origin& client) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string name = sessionPartition(session) + "/";
+  for (const std::uint8_t byte : client.guid) {
+    name += kDigits[byte >> 4U];
+    name += kDigits[byte & 0xFU];
+  }
+  return name;
+}
 
 }  // namespace tenon::wire

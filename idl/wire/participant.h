@@ -17,8 +17,7 @@ struct PartitionEntities;
 struct LinkOptions {
   std::uint32_t domain = 0;  ///< DDS domain
   LinkProfile profile = LinkProfile::kLan;
-  /// Cyclone DDS configuration: XML text or path of a file. Empty: CYCLONEDDS_URI if set, else loopback as in
-  /// deploy/dds/loopback.xml.
+  /// Cyclone DDS configuration: XML text or path of a file. Empty: that of chosenNetwork().
   std::string config;
 };
 
@@ -75,7 +74,16 @@ class Partition {
   std::shared_ptr<PartitionEntities> entities_;
 };
 
+/// Real-time priorities where the operating system grants them: of a wire thread, which is to be the calling
+/// one, and of the threads of DDS in this process that receive, send on time and match. They are lower than
+/// those of a tick and of a hand's loop. Returns what was not granted, or an empty string.
+///
+/// Without them a message waits for a processor as long as any other program's work does.
+[[nodiscard]] std::string raiseWireThreads();
+
 inline constexpr const char* kLobby = "lobby";
 [[nodiscard]] inline std::string sessionPartition(const std::string& session) { return "s/" + session; }
+/// For what the server of a session sends to one client alone, by the GUID of its participant.
+[[nodiscard]] std::string clientPartition(const std::string& session, const Origin& client);
 
 }  // namespace tenon::wire

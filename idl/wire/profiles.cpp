@@ -12,16 +12,14 @@ constexpr Milliseconds kLockstepLease{
 
 // longest time a reliable write blocks for a slow reader before it fails
 constexpr Milliseconds kLanBlocking{500};
-constexpr Milliseconds kServerBlocking{5};  // in the thread that receives from all clients
+constexpr Milliseconds kServerBlocking{5};  // in the thread that receives from all clients, or writes to all
 constexpr Milliseconds kLockstepBlocking{10000};
 
 dds_duration_t duration(Milliseconds time) { return DDS_MSECS(time.count()); }
 
 Milliseconds blockingTime(const TopicSpec& topic, LinkProfile profile) {
   if (profile == LinkProfile::kLockstep) return kLockstepBlocking;
-  // copies of the journal are written by a thread of their own
-  const bool of_journal = topic.name == "TickInput" || topic.name == "Checkpoint";
-  return topic.parameters.of_server && !of_journal ? kServerBlocking : kLanBlocking;
+  return topic.parameters.of_server ? kServerBlocking : kLanBlocking;
 }
 
 void setReliability(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile) {
@@ -32,14 +30,18 @@ void setReliability(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile)
 }
 
 void setReaderHistory(dds_qos_t* qos, const TopicSpec& topic, LinkProfile profile) {
-  // of a server's state, the one of another server must not replace it before it is taken
-  const bool state_of_server = topic.qos_class == QosClass::kState && topic.parameters.of_server;
-  if (topic.qos_class == QosClass::kEvent || state_of_server) {
+  // Instances that several writers have: of a server's state, the one of another server must not replace it
+  // before it is taken, nor a station's repetition of an emergency stop that of the server.
+  const bool of_several_writers =
+      topic.qos_class == QosClass::kState && (topic.parameters.of_server || topic.parameters.latched);
+  if (topic.qos_class == QosClass::kEvent || of_several_writers) {
     dds_qset_history(qos, DDS_HISTORY_KEEP_ALL, 0);
   } else if (topic.qos_class == QosClass::kStream && profile == LinkProfile::kLockstep) {
     dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, kLockstepDepth);
   } else {
-    dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, 1);
+    const bool stream = topic.qos_class == QosClass::kStream;
+    dds_qset_history(qos, DDS_HISTORY_KEEP_LAST,
+                     stream ? static_cast<std::int32_t>(topic.parameters.reader_depth) : 1);
   }
 }
 
@@ -71,6 +73,14 @@ dds_qos_t* commonQos(const TopicSpec& topic, LinkProfile profile) {
 }
 
 }  // namespace
+
+dds_qos_t* participantQos(LinkProfile profile) {
+  // of participants Cyclone DDS takes the lease from this policy, or else from its configuration
+  dds_qos_t* qos = dds_create_qos();
+  if (profile == LinkProfile::kLockstep)
+    dds_qset_liveliness(qos, DDS_LIVELINESS_AUTOMATIC, duration(kLockstepLease));
+  return qos;
+}
 
 dds_qos_t* writerQos(const TopicSpec& topic, LinkProfile profile) {
   const TopicParameters& parameters = topic.parameters;
@@ -104,44 +114,6 @@ dds_qos_t* readerQos(const TopicSpec& topic, LinkProfile profile, bool keep_all)
     setReaderHistory(qos, topic, profile);
   }
   return qos;
-}
-
-std::string_view loopbackConfig() {
-  return R"xml(<?xml version="1.0" encoding="UTF-8"?>
-<!-- Programs on one machine, and nothing leaves it: the default when neither an option nor CYCLONEDDS_URI says
-     otherwise. Unicast to up to 120 participants, so it also works where multicast does not. One receive thread
-     a process; fast heartbeats and acknowledgements, because a lost sample of a lockstep session stops all
-     its programs until it has been sent again. -->
-<CycloneDDS xmlns="https://cdds.io/config">
-  <Domain Id="any">
-    <General>
-      <Interfaces>
-        <NetworkInterface address="127.0.0.1" multicast="false"/>
-      </Interfaces>
-      <AllowMulticast>false</AllowMulticast>
-    </General>
-    <Discovery>
-      <ParticipantIndex>auto</ParticipantIndex>
-      <MaxAutoParticipantIndex>119</MaxAutoParticipantIndex>
-      <Peers>
-        <Peer Address="127.0.0.1"/>
-      </Peers>
-      <SPDPInterval>2 s</SPDPInterval>
-    </Discovery>
-    <Internal>
-      <MultipleReceiveThreads>false</MultipleReceiveThreads>
-      <HeartbeatInterval min="2 ms" minsched="5 ms" max="1 s">10 ms</HeartbeatInterval>
-      <NackDelay>5 ms</NackDelay>
-      <AckDelay>2 ms</AckDelay>
-      <AutoReschedNackDelay>60 ms</AutoReschedNackDelay>
-      <Watermarks>
-        <WhcHighInit>2 MB</WhcHighInit>
-        <WhcHigh>8 MB</WhcHigh>
-      </Watermarks>
-    </Internal>
-  </Domain>
-</CycloneDDS>
-)xml";
 }
 
 }  // namespace tenon::wire

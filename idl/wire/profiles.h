@@ -18,12 +18,16 @@ struct TopicSpec {
 };
 
 /// The caller deletes the result with dds_delete_qos.
+[[nodiscard]] dds_qos_t* participantQos(LinkProfile profile);
+/// The caller deletes the result with dds_delete_qos.
 [[nodiscard]] dds_qos_t* writerQos(const TopicSpec& topic, LinkProfile profile);
 /// `keep_all`: all samples, streams included, are kept until they are taken; for recorders, in processes of
 /// their own. The caller deletes the result with dds_delete_qos.
 [[nodiscard]] dds_qos_t* readerQos(const TopicSpec& topic, LinkProfile profile, bool keep_all);
 
-/// The default Cyclone DDS configuration; the text of deploy/dds/loopback.xml.
+/// Cyclone DDS configurations: the texts of deploy/dds/{loopback,lan,wan}.xml, put in at build time.
 [[nodiscard]] std::string_view loopbackConfig();
+[[nodiscard]] std::string_view lanConfig();
+[[nodiscard]] std::string_view wanConfig();
 
 }  // namespace tenon::wire

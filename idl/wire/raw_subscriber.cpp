@@ -122,19 +122,27 @@ RawSubscriber& RawSubscriber::operator=(RawSubscriber&&) noexcept = default;
 RawSubscriber::~RawSubscriber() = default;
 
 Result<RawSubscriber> RawSubscriber::open(Partition& partition, const std::vector<std::string>& topics) {
+  RawSubscriber subscriber(std::make_unique<Impl>());
+  std::vector<std::string> names = topics;
+  if (topics.empty())
+    for (const TopicName& name : allTopics()) names.emplace_back(name.topic);
+  if (auto added = subscriber.add(partition, names); !added) return tl::unexpected(added.error());
+  return subscriber;
+}
+
+Result<void> RawSubscriber::add(Partition& partition, const std::vector<std::string>& topics) {
   std::vector<TopicSpec> specs;
   for (const std::string& name : topics) {
     const auto spec = specOf(name);
     if (!spec) return tl::unexpected(spec.error());
     specs.push_back(*spec);
   }
-  auto impl = std::make_unique<Impl>();
-  for (const TopicSpec& spec : topics.empty() ? allSpecs() : specs) {
-    const auto added =
-        impl->wait_set.add(std::make_unique<RawSubscription>(spec, impl->handler), partition, spec, true);
-    if (!added) return tl::unexpected(added.error());
+  for (const TopicSpec& spec : specs) {
+    auto added =
+        impl_->wait_set.add(std::make_unique<RawSubscription>(spec, impl_->handler), partition, spec, true);
+    if (!added) return added;
   }
-  return RawSubscriber(std::move(impl));
+  return {};
 }
 
 std::size_t RawSubscriber::dispatch(std::chrono::nanoseconds timeout,

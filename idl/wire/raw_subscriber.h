@@ -46,6 +46,8 @@ class RawSubscriber {
  public:
   /// Of the topics named, or of all when `topics` is empty. Fails for an unknown name and when DDS does.
   static Result<RawSubscriber> open(Partition& partition, const std::vector<std::string>& topics = {});
+  /// Further topics, of another partition; they are served after those before.
+  Result<void> add(Partition& partition, const std::vector<std::string>& topics);
   RawSubscriber(RawSubscriber&&) noexcept;
   RawSubscriber& operator=(RawSubscriber&&) noexcept;
   ~RawSubscriber();

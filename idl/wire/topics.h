@@ -38,8 +38,9 @@ struct TopicParameters {
       false;  ///< MANUAL_BY_TOPIC: only writing this topic renews the lease, so a hung thread is detected
   Milliseconds lifespan = kNever;  ///< [ms] LIFESPAN: older samples are not delivered
   std::uint32_t late_joiner_depth =
-      0;                   ///< samples per key that a late joiner gets (transient local); 0: none
-  bool latched = false;    ///< instances outlive their writer
+      0;                           ///< samples per key that a late joiner gets (transient local); 0: none
+  std::uint32_t reader_depth = 1;  ///< samples per key of a stream that a reader keeps until it takes them
+  bool latched = false;            ///< instances outlive their writer
   bool of_server = false;  ///< a server alone writes it: Partition::hearOnly binds its readers to one server
 };
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/bake/parallel.h"
+#include "server/bake/point_block.h"
 #include "server/bake/triangle_tree.h"
 #include "server/structures/field_builder.h"
 
@@ -13,6 +14,9 @@ namespace tenon::bake {
 namespace {
 
 using Cell = BrickLevel::Cell;
+
+/// [voxels] Of a sample, and more than that of the position of a lattice point.
+constexpr double kRounding = 0.001;
 
 std::size_t linearIndex(const Cell& cell, const Cell& size) {
   return (static_cast<std::size_t>(cell.z()) * static_cast<std::size_t>(size.y()) +
@@ -167,10 +171,10 @@ void BrickLevel::setSample(const Cell& lattice, std::int16_t value, std::span<st
 }
 
 std::size_t BrickLevel::sampleDistances(const TriangleTree& tree, std::size_t most, ParallelWork& work) {
-  // bricks whose centre is too far away have no sample in the band
+  // other bricks have no sample in the band
   std::vector<std::uint8_t> candidate(nodes(), 0);
   work.run(nodes(), 1024, [&](std::size_t node) {
-    candidate[node] = tree.anyWithin(centreOf(node), (bandOf(node) + kBrickRadius) * voxel);
+    candidate[node] = tree.maybeNear(centreOf(node), (kVoxels / 2 + kRounding) * voxel, bandOf(node) * voxel);
   });
   std::vector<std::uint32_t> of_slot;
   for (std::size_t node = 0; node < nodes(); ++node) {
@@ -229,18 +233,25 @@ void BrickLevel::sampleBrick(std::size_t node, const TriangleTree& tree, const S
   constexpr double kBlockRadius = 2.5981;  // [voxels] from the middle of 4^3 samples to a corner
   TriangleTree::Search search(tree, centreOf(node), kBrickRadius * voxel, (clamp + kBlockRadius) * voxel);
   const std::int16_t clamped = structures::quantizedSample(clamp * voxel, voxel, clamp);
+  const double squared_clamp = clamp * voxel * (clamp * voxel);
+  PointBlock block;
+  std::array<std::size_t, PointBlock::kMost> numbers;
   forEachBlock([&](const Cell& from, const Cell& to) {
-    bool near = false;
-    bool first = true;
+    block.clear();
     forEachSample(from, to, [&](int sample, const Cell& in_brick) {
       if (!which[static_cast<std::size_t>(sample)]) return;
-      if (std::exchange(first, false))
-        near = search.focus(middleOf(corner + from, corner + to), radiusOf(from, to), clamp * voxel);
-      const Vector3 p = position(corner + in_brick);
-      out[sample] = near ? structures::quantizedSample(std::sqrt(search.squaredDistance(p, clamp * voxel)),
-                                                       voxel, clamp)
-                         : clamped;
+      numbers[block.size()] = static_cast<std::size_t>(sample);
+      block.add(position(corner + in_brick), squared_clamp);
     });
+    if (block.size() == 0) return;
+    const bool near = search.focus(middleOf(corner + from, corner + to), radiusOf(from, to), clamp * voxel);
+    if (near) {
+      block.finish();
+      search.lower(block);
+    }
+    for (std::size_t i = 0; i < block.size(); ++i)
+      out[numbers[i]] =
+          near ? structures::quantizedSample(std::sqrt(block.squared(i)), voxel, clamp) : clamped;
   });
 }
 

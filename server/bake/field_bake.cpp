@@ -14,6 +14,7 @@
 #include "server/bake/filled_spaces.h"
 #include "server/bake/outside.h"
 #include "server/bake/parallel.h"
+#include "server/bake/point_block.h"
 #include "server/bake/refined_bricks.h"
 #include "server/bake/slope_limit.h"
 #include "server/bake/thin_bricks.h"
@@ -51,23 +52,34 @@ void finishSamples(BrickLevel& level, const TriangleTree& exposed, const Triangl
     TriangleTree::Search search(hidden, level.centreOf(node), BrickLevel::kBrickRadius * level.voxel,
                                 (level.clampOf(node) + 0.01) * level.voxel);
     BrickLevel::SampleBits stale = inside & level.ownSamples(node);
+    PointBlock block;
+    std::array<std::size_t, PointBlock::kMost> numbers;
     level.forEachBlock([&](const Cell& from, const Cell& to) {
-      // of the stored distances, one quantum larger because of rounding
-      const auto reachOf = [&](int k) {
+      // [m] of the stored distances, one quantum larger because of rounding
+      const auto reachOf = [&](std::size_t k) {
         return (samples[k] + 1) * level.voxel / structures::DistanceField::kQuantaPerVoxel;
       };
       double farthest = 0.0;
-      BrickLevel::forEachSample(from, to, [&](int k, const Cell&) {
-        if (stale[static_cast<std::size_t>(k)]) farthest = std::max(farthest, reachOf(k));
-      });
-      const bool none = farthest == 0.0 || !search.focus(level.middleOf(corner + from, corner + to),
-                                                         level.radiusOf(from, to), farthest);
-      BrickLevel::forEachSample(from, to, [&](int k, const Cell& in_brick) {
-        if (!stale[static_cast<std::size_t>(k)]) return;
+      block.clear();
+      BrickLevel::forEachSample(from, to, [&](int sample, const Cell& in_brick) {
+        const auto k = static_cast<std::size_t>(sample);
+        if (!stale[k]) return;
         const double reach = reachOf(k);
-        if (none || search.squaredDistance(level.position(corner + in_brick), reach) >= reach * reach)
-          stale.reset(static_cast<std::size_t>(k));
+        farthest = std::max(farthest, reach);
+        numbers[block.size()] = k;
+        block.add(level.position(corner + in_brick), reach * reach);
       });
+      if (block.size() == 0) return;
+      const bool near =
+          search.focus(level.middleOf(corner + from, corner + to), level.radiusOf(from, to), farthest);
+      if (near) {
+        block.finish();
+        search.lower(block);
+      }
+      for (std::size_t i = 0; i < block.size(); ++i) {
+        const double reach = reachOf(numbers[i]);
+        if (!near || block.squared(i) >= reach * reach) stale.reset(numbers[i]);
+      }
     });
     level.sampleBrick(node, exposed, stale);
   });

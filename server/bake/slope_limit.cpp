@@ -62,6 +62,27 @@ void visitNeighbours(Visit&& visit) {
   }
 }
 
+/// For each sample of a brick, bit x of row z * kSide + y, whether it or one of its 26 neighbours is not
+/// inside.
+std::array<std::uint32_t, kSide * kSide> besideOutside(const std::int16_t* samples) {
+  std::array<std::uint32_t, kSide * kSide> wide{};
+  for (std::size_t row = 0; row < wide.size(); ++row) {
+    std::uint32_t outside = 0;
+    for (std::size_t x = 0; x < kSide; ++x)
+      outside |= static_cast<std::uint32_t>(samples[row * kSide + x] >= 0) << x;
+    wide[row] = outside | outside << 1U | outside >> 1U;
+  }
+  for (const std::size_t stride : {std::size_t{1}, std::size_t{kSide}}) {
+    const auto narrow = wide;
+    for (std::size_t row = 0; row < wide.size(); ++row) {
+      const std::size_t along = row / stride % kSide;
+      if (along > 0) wide[row] |= narrow[row - stride];
+      if (along + 1 < kSide) wide[row] |= narrow[row + stride];
+    }
+  }
+  return wide;
+}
+
 bool hasBothSigns(const std::int16_t* samples) {
   const auto [lowest, highest] = std::minmax_element(samples, samples + BrickLevel::kSamples);
   return *lowest < 0 && *highest >= 0;
@@ -146,11 +167,15 @@ class SlopeLimiter {
         bounds.push_back({corner + at, corner + centre, radius, value});
       }
     };
+    const auto beside_outside = besideOutside(samples);
     for (int sample = 0; sample < BrickLevel::kSamples; ++sample) {
       const Cell at = BrickLevel::cellOfSample(sample);
       bound(middle, at);
       if (samples[sample] >= 0) continue;
       bound(at, middle);
+      if ((beside_outside[static_cast<std::size_t>(sample / kSide)] >> static_cast<unsigned>(at.x()) & 1U) ==
+          0)
+        continue;
       const Cell low = (at - Cell::Ones()).cwiseMax(0);
       const Cell high = (at + Cell::Ones()).cwiseMin(kLast);
       for (int z = low.z(); z <= high.z(); ++z) {

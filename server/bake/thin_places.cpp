@@ -27,8 +27,11 @@ constexpr double kNoise = 4e-5;
 constexpr double kSparseWhereRefined = 4.0;
 /// [voxels] Thin walls are seen from so far on both sides: their distance is exact there.
 constexpr double kBeyond = 2.5;
-/// [voxels] A point with such a distance is inside of a solid.
-constexpr double kInside = -0.75;
+/// [voxels] A point with such a distance is inside of a solid: in a wall of 2.5 voxels, each cell that
+/// contains the middle has a sample 0.75 deep, less the rounding of samples.
+constexpr double kInside = -0.749;
+/// [voxels] The middle of such a wall is at least so deep where it is interpolated, at its corners too.
+constexpr double kMiddle = -0.5;
 /// [-] Largest gradient of the dilation.
 constexpr double kSlope = 0.2;
 
@@ -75,8 +78,20 @@ std::optional<Beyond> beyondWall(const Field& field, const Vector3& p_MP, const 
   return Beyond{field.sample(p_MP - away).distance, field.sample(p_MP + away).distance};
 }
 
+/// [m] The lowest distance in the cell around p: that of one of its corners.
+double lowestInCell(const Field& field, const Vector3& p_MP, double voxel) {
+  const Vector3& p_MoFo_M = field.layout().p_MoFo_M;
+  const Vector3 low = ((p_MP - p_MoFo_M) / voxel).array().floor();
+  double lowest = 0.0;
+  for (int k = 0; k < 8; ++k) {
+    const Vector3 corner = low + Vector3(k & 1, k >> 1 & 1, k >> 2 & 1);
+    lowest = std::min(lowest, field.sample(p_MoFo_M + voxel * corner).distance);
+  }
+  return lowest;
+}
+
 /// Whether the wall of beyondWall() is thin: it is where air is straight behind it, and where no inside of
-/// 0.75 voxels is where the gradient leads inwards.
+/// 0.75 voxels is where the gradient leads inwards, or in the cell around the deepest place there.
 bool isThinWall(const Field& field, Vector3 p_MP, const Beyond& beyond, double voxel) {
   constexpr double kAir = 0.9;  // [voxels] 2.5 voxels from the surface: behind a wall of 1.6 voxels at most
   constexpr double kStep = 0.25;
@@ -85,18 +100,24 @@ bool isThinWall(const Field& field, Vector3 p_MP, const Beyond& beyond, double v
   constexpr double kBack = -0.5;       // [-] cosine of consecutive steps
   if (std::min(beyond[0], beyond[1]) >= kAir * voxel) return true;
   Vector3 before = Vector3::Zero();
+  double lowest = 0.0;
+  Vector3 p_MDeepest = p_MP;
   for (int i = 0; i <= kSteps; ++i) {
     const structures::FieldSample here = field.sample(p_MP);
     if (here.distance <= kInside * voxel) return false;
+    if (here.distance < lowest) {
+      lowest = here.distance;
+      p_MDeepest = p_MP;
+    }
     // at an edge, a cell's own gradient may be along a face
     Vector3 inwards = -wideGradient(field, p_MP, voxel);
     if (inwards.norm() < kNoGradient) inwards = -here.gradient;
     // where it leads back, the middle of the wall has been passed
-    if (inwards.norm() < kNoGradient || inwards.normalized().dot(before) < kBack) return true;
+    if (inwards.norm() < kNoGradient || inwards.normalized().dot(before) < kBack) break;
     before = inwards.normalized();
     p_MP += kStep * voxel * before;
   }
-  return true;
+  return lowest > kMiddle * voxel || lowestInCell(field, p_MDeepest, voxel) > kInside * voxel;
 }
 
 class ThinPlaceFinder {

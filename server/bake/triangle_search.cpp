@@ -74,25 +74,7 @@ void TriangleTree::Search::visit(const Node& node, const Vector3& p, const Vecto
     const double candidate = tenon::structures::squaredDistance(p, tree_.triangles_[child - kTriangle]);
     if (candidate >= squared) continue;
     squared = candidate;
-    last_ = child - kTriangle;
-  }
-}
-
-void TriangleTree::Search::visitLeaves(const Leaves& leaves, const Vector3& p, const Vector3f& p_local,
-                                       double& squared) {
-  const Lanes above = leaves.normals[0] * p_local.x() + leaves.normals[1] * p_local.y() +
-                      leaves.normals[2] * p_local.z() - leaves.offsets;
-  const Lanes from_plane = (above.abs() - kPlaneSlack * tree_.slack_).max(0.0F);
-  std::array<float, 4> away;
-  Lanes::Map(away.data()) =
-      leaves.boxes.squaredDistances(p_local).max(from_plane * from_plane) * (1.0F - kRounding);
-  for (unsigned lane = 0; lane < 4; ++lane) {
-    const std::uint32_t triangle = leaves.boxes.child[lane] - kTriangle;
-    if (!(away[lane] < squared) || leaves.boxes.child[lane] == kNothing || triangle == last_) continue;
-    const double candidate = tenon::structures::squaredDistance(p, tree_.triangles_[triangle]);
-    if (candidate >= squared) continue;
-    squared = candidate;
-    last_ = triangle;
+    nearest_ = child - kTriangle;
   }
 }
 
@@ -118,74 +100,55 @@ void TriangleTree::Search::collect(const Node& node, const Vector3& p, const Vec
     const double distance =
         std::sqrt(tenon::structures::squaredDistance(p, tree_.triangles_[child - kTriangle]));
     if (distance >= far) continue;
-    candidates_.push_back({distance, &node, lane});
+    candidates_.push_back({distance, child - kTriangle});
     far = std::min(far, distance + spread);
   }
 }
 
-void TriangleTree::Search::listCandidates(double far) {
+bool TriangleTree::Search::focus(const Vector3& centre, double radius, double reach) {
+  candidates_.clear();
+  const double slack = kFocusRounding * (radius + reach);
+  wide_ = radius + slack;
+  double far = reach + wide_;
+  if (nearest_ != kNothing) {
+    const double found = std::sqrt(tenon::structures::squaredDistance(centre, tree_.triangles_[nearest_]));
+    far = std::min(far, found + slack + 2.0 * wide_);
+  }
+  const Vector3f p_local = tree_.local(centre);
+  for (const Node& root : roots_) collect(root, centre, p_local, 2.0 * wide_, far);
+  if (candidates_.empty()) return false;
+  listed_ = candidates_.size() <= kMostCandidates;
+  if (!listed_) return true;
   std::erase_if(candidates_, [far](const Candidate& candidate) { return candidate.distance > far; });
   std::sort(candidates_.begin(), candidates_.end(),
             [](const Candidate& a, const Candidate& b) { return a.distance < b.distance; });
-  leaves_.resize((candidates_.size() + 3) / 4);
-  for (std::size_t i = 0; i < candidates_.size(); ++i) {
-    const Candidate& candidate = candidates_[i];
-    Leaves& leaves = leaves_[i / 4];
-    if (i % 4 == 0) {
-      leaves.boxes = emptyNode();
-      leaves.normals.fill(Lanes::Zero());
-      leaves.offsets = Lanes::Zero();
-      leaves.nearest = candidate.distance;
-    }
-    const auto lane = static_cast<Eigen::Index>(i % 4);
-    leaves.boxes.take(i % 4, *candidate.node, candidate.lane);
-    const structures::Triangle& t = tree_.triangles_[candidate.node->child[candidate.lane] - kTriangle];
-    const Vector3 normal = (t[1] - t[0]).cross(t[2] - t[0]).normalized();
-    if (!normal.allFinite()) continue;
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      leaves.normals[axis][lane] = static_cast<float>(normal[static_cast<Eigen::Index>(axis)]);
-    // with the rounded normal, so that the plane still contains the triangle to within rounding
-    leaves.offsets[lane] = static_cast<float>(normal.dot(t[0] - tree_.centre_));
-  }
-}
-
-bool TriangleTree::Search::focus(const Vector3& centre, double radius, double reach) {
-  focused_ = false;
-  candidates_.clear();
-  slack_ = kFocusRounding * (radius + reach);
-  const double wide = radius + slack_;
-  double far = reach + wide;
-  if (last_ != kNothing) {
-    const double found = std::sqrt(tenon::structures::squaredDistance(centre, tree_.triangles_[last_]));
-    far = std::min(far, found + slack_ + 2.0 * wide);
-  }
-  const Vector3f p_local = tree_.local(centre);
-  for (const Node& root : roots_) collect(root, centre, p_local, 2.0 * wide, far);
-  if (candidates_.empty()) return false;
-  if (candidates_.size() > kMostCandidates) return true;
-  listCandidates(far);
-  focus_ = centre;
-  focused_ = true;
+  nearest_ = candidates_.front().triangle;
   return true;
 }
 
-double TriangleTree::Search::squaredDistance(const Vector3& p, double reach) {
-  double squared = reach * reach;
-  if (last_ != kNothing) {
-    squared = std::min(squared, tenon::structures::squaredDistance(p, tree_.triangles_[last_]));
+void TriangleTree::Search::lower(PointBlock& block) {
+  if (!listed_) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const Vector3 p = block.point(i);
+      double squared = block.squared(i);
+      if (nearest_ != kNothing)
+        squared = std::min(squared, tenon::structures::squaredDistance(p, tree_.triangles_[nearest_]));
+      for (const Node& root : roots_) visit(root, p, tree_.local(p), squared);
+      block.setSquared(i, squared);
+    }
+    return;
   }
-  const Vector3f p_local = tree_.local(p);
-  if (!focused_) {
-    for (const Node& root : roots_) visit(root, p, p_local, squared);
-    return squared;
+  const double rounding = kPlaneSlack * tree_.slack_;
+  std::uint32_t last = kNothing;
+  for (const Candidate& candidate : candidates_) {
+    const double nearest = candidate.distance - wide_;
+    if (nearest > 0.0 && nearest * nearest >= block.largest()) break;
+    // a long triangle is found in several boxes
+    if (candidate.triangle == last) continue;
+    last = candidate.triangle;
+    const double slack = rounding * (rounding + 2.0 * std::sqrt(block.largest()));
+    block.lower(tree_.triangles_[candidate.triangle], slack);
   }
-  const double away = (p - focus_).norm() + slack_;
-  for (const Leaves& leaves : leaves_) {
-    const double nearest = leaves.nearest - away;
-    if (nearest > 0.0 && nearest * nearest >= squared) break;
-    visitLeaves(leaves, p, p_local, squared);
-  }
-  return squared;
 }
 
 }  // namespace tenon::bake

@@ -139,6 +139,38 @@ bool TriangleTree::anyWithin(const Vector3& p, double radius) const {
   return false;
 }
 
+bool TriangleTree::maybeNear(const Vector3& centre, double half_edge, double radius) const {
+  if (nodes_.empty()) return false;
+  const auto nearBox = [&](const structures::Triangle& t) {
+    const Eigen::AlignedBox3d box(centre - Vector3::Constant(half_edge),
+                                  centre + Vector3::Constant(half_edge));
+    if (box.squaredExteriorDistance(structures::boxOf(t)) >= radius * radius) return false;
+    // the cube's corners are this much nearer to the plane than its centre
+    const Vector3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+    const double above = std::abs(normal.dot(centre - t[0])) - half_edge * normal.lpNorm<1>();
+    return !(above > (radius + slack_) * normal.norm());
+  };
+  const Vector3f p_local = local(centre);
+  const auto half = static_cast<float>(half_edge * (1.0 + kRounding));
+  const double squared = radius * radius;
+  std::array<std::uint32_t, 128> stack;  // as in anyWithin
+  std::size_t count = 0;
+  stack[count++] = 0;
+  while (count > 0) {
+    const Node& node = nodes_[stack[--count]];
+    const Lanes away = node.squaredDistances(p_local, half) * (1.0F - kRounding);
+    for (std::size_t lane = 0; lane < 4; ++lane) {
+      if (!(away[static_cast<Eigen::Index>(lane)] < squared) || node.child[lane] == kNothing) continue;
+      if ((node.child[lane] & kTriangle) == 0) {
+        stack[count++] = node.child[lane];
+      } else if (nearBox(triangles_[node.child[lane] - kTriangle])) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
 TriangleTree::Node TriangleTree::emptyNode() {
   Node empty;
   empty.low.fill(Lanes::Constant(std::numeric_limits<float>::max()));

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "server/bake/point_block.h"
 #include "server/structures/triangle.h"
 
 namespace tenon::bake {
@@ -25,6 +26,10 @@ class TriangleTree {
 
   /// Whether a triangle is nearer to p than `radius` [m].
   [[nodiscard]] bool anyWithin(const Vector3& p, double radius) const;
+
+  /// False only if no triangle is nearer than `radius` [m] to the cube around `centre` [m] with `half_edge`
+  /// [m].
+  [[nodiscard]] bool maybeNear(const Vector3& centre, double half_edge, double radius) const;
 
   /// Whether a ray from p intersects an odd number of triangles. No component of `direction` may be 0.
   [[nodiscard]] bool oddCrossings(const Vector3& p, const Vector3& direction) const;
@@ -54,10 +59,12 @@ class TriangleTree {
   struct Node {
     std::array<Lanes, 3> low, high;      // of unused lanes: the largest float
     std::array<std::uint32_t, 4> child;  // a node, kTriangle + a triangle, or kNothing
-    [[nodiscard]] EIGEN_ALWAYS_INLINE Lanes squaredDistances(const Vector3f& p) const {
-      const Lanes x = (low[0] - p.x()).max(p.x() - high[0]).max(0.0F);
-      const Lanes y = (low[1] - p.y()).max(p.y() - high[1]).max(0.0F);
-      const Lanes z = (low[2] - p.z()).max(p.z() - high[2]).max(0.0F);
+    /// [m^2] From the boxes to the cube around p with `half_edge` [m].
+    [[nodiscard]] EIGEN_ALWAYS_INLINE Lanes squaredDistances(const Vector3f& p,
+                                                             float half_edge = 0.0F) const {
+      const Lanes x = ((low[0] - p.x()).max(p.x() - high[0]) - half_edge).max(0.0F);
+      const Lanes y = ((low[1] - p.y()).max(p.y() - high[1]) - half_edge).max(0.0F);
+      const Lanes z = ((low[2] - p.z()).max(p.z() - high[2]) - half_edge).max(0.0F);
       return x * x + y * y + z * z;
     }
     /// For each lane whether a ray intersects its box, up to the multiple `end` [-] of its direction.
@@ -97,52 +104,37 @@ class TriangleTree {
   std::vector<Node> nodes_;
 };
 
-/// Nearest distances of many points in one small ball: subtrees beyond its reach are pruned once, and the
-/// triangle found last gives the first upper bound of the next query.
+/// Nearest distances of many points in one small ball: subtrees beyond its reach are pruned once, and blocks
+/// of points share a list of the few triangles that can be nearest to one of them.
 class TriangleTree::Search {
  public:
   /// For points within `radius` [m] of `centre`, and triangles within `reach` [m] of them.
   Search(const TriangleTree& tree, const Vector3& centre, double radius, double reach);
 
-  /// From now on points are within `radius` [m] of `centre` and ask up to `reach` [m], both within what the
-  /// constructor was given: the few triangles that can be nearest to one of them are listed. False: none.
+  /// Lists the triangles for points within `radius` [m] of `centre` that ask up to `reach` [m], both within
+  /// what the constructor was given. False: none.
   bool focus(const Vector3& centre, double radius, double reach);
 
-  /// [m^2] Squared distance from p to the nearest triangle, or the square of `reach` [m] when none is nearer;
-  /// `reach` may be smaller than that of the constructor.
-  [[nodiscard]] double squaredDistance(const Vector3& p, double reach);
+  /// Lowers the squared distances of points in the focus to those of the nearest triangles.
+  void lower(PointBlock& block);
 
  private:
   struct Candidate {
     double distance;  // [m] from the centre of the focus to the whole triangle
-    const Node* node;
-    std::uint32_t lane;
-  };
-  /// Four candidates: their boxes and their planes.
-  struct Leaves {
-    Node boxes;
-    std::array<Lanes, 3> normals;  // [-]
-    Lanes offsets;                 // [m] normal times point
-    double nearest;                // [m] from the centre of the focus
+    std::uint32_t triangle;
   };
   /// Lowers `squared` [m^2] to the squared distance of the nearest triangle in the subtree.
   void visit(const Node& node, const Vector3& p, const Vector3f& p_local, double& squared);
-  /// The same `squared` [m^2] for four candidates.
-  void visitLeaves(const Leaves& leaves, const Vector3& p, const Vector3f& p_local, double& squared);
   /// Lists the triangles of the subtree nearer than `far` [m], which is lowered to the least distance
   /// plus `spread` [m].
   void collect(const Node& node, const Vector3& p, const Vector3f& p_local, double spread, double& far);
-  /// Makes leaves of the candidates up to `far` [m].
-  void listCandidates(double far);
 
   const TriangleTree& tree_;
   std::vector<Node> roots_;
-  std::uint32_t last_ = kNothing;
-  bool focused_ = false;
-  Vector3 focus_ = Vector3::Zero();
-  double slack_ = 0.0;  // [m]
+  std::uint32_t nearest_ = kNothing;  // to the centre of the last focus, or found last
+  double wide_ = 0.0;                 // [m] radius of the focus, with a margin for rounding
+  bool listed_ = false;
   std::vector<Candidate> candidates_;
-  std::vector<Leaves> leaves_;
 };
 
 }  // namespace tenon::bake

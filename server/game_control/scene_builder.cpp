@@ -252,6 +252,7 @@ Result<std::shared_ptr<const simulation::Scene>> makeScene(const ScenarioFile& s
     simulation::ObjectSpec spec;
     spec.name = object.name;
     spec.title = object.title.front().text;
+    spec.titles = object.title;
     spec.kind = object.kind;
     spec.color = object.color;
     spec.group = object.group;

@@ -63,6 +63,17 @@ HandId handInRole(const ScenarioFile& scenario, const simulation::Environment& e
   return role;
 }
 
+/// The command is about the state that is current: between two states it waits for the next one.
+constexpr bool isOfState(CommandKind kind) noexcept {
+  return kind == CommandKind::kSkipStep || kind == CommandKind::kFulfilled || kind == CommandKind::kSignal ||
+         kind == CommandKind::kBack || kind == CommandKind::kRepeatStep;
+}
+
+/// The current state may end by the command: what follows it is about the state after that.
+constexpr bool mayEndState(CommandKind kind) noexcept {
+  return kind == CommandKind::kSkipStep || kind == CommandKind::kFulfilled;
+}
+
 /// Hands that have grabbed the object release it.
 void releaseFromHands(simulation::Environment& environment, ObjectId object) noexcept {
   for (std::uint32_t i = 0; i < environment.hands().size(); ++i) {
@@ -79,17 +90,25 @@ StateMachine::StateMachine(std::shared_ptr<const ScenarioFile> scenario) : scena
 
 void StateMachine::start(simulation::Environment& environment) noexcept { enter(environment, 0); }
 
-void StateMachine::step(simulation::Environment& environment,
-                        std::span<const GameCommand> commands) noexcept {
+std::size_t StateMachine::step(simulation::Environment& environment,
+                               std::span<const GameCommand> commands) noexcept {
   StepStatus& status = memory_.status;
   status.tick = environment.tick();
-  for (const GameCommand& command : commands) apply(environment, command);
+  std::size_t taken = 0;
+  for (bool more = true; more && taken < commands.size();) {
+    const GameCommand& command = commands[taken];
+    if (betweenStates() && isOfState(command.kind)) break;
+    apply(environment, command);
+    ++taken;
+    more = !mayEndState(command.kind);
+  }
+  commands = commands.first(taken);
 
   // the state that ended in the last tick is followed by the next one
-  if (status.phase == StepPhase::kWaiting || status.finished || status.failed) return;
-  if (status.phase != StepPhase::kActive) {
+  if (status.phase == StepPhase::kWaiting || status.finished || status.failed) return taken;
+  if (betweenStates()) {
     enter(environment, status.step + 1);
-    return;
+    return taken;
   }
 
   const EnvironmentView scene(environment);
@@ -108,6 +127,13 @@ void StateMachine::step(simulation::Environment& environment,
   } else if (state().timeout > 0 && memory_.elapsed >= state().timeout) {
     leave(environment, StepPhase::kTimedOut);
   }
+  return taken;
+}
+
+bool StateMachine::betweenStates() const noexcept {
+  const StepStatus& status = memory_.status;
+  const bool active = status.phase == StepPhase::kWaiting || status.phase == StepPhase::kActive;
+  return !active && !status.finished && !status.failed;
 }
 
 void StateMachine::apply(simulation::Environment& environment, const GameCommand& command) noexcept {
@@ -189,7 +215,7 @@ void StateMachine::enter(simulation::Environment& environment, std::uint32_t ste
   memory_.progress.reset();
   memory_.elapsed = 0;
   memory_.contact_ticks = 0;
-  memory_.regrab = {};
+  memory_.regrabs = {};
   memory_.helpers = {};
   applyEffects(environment);
   status.hand = handInRole(*scenario_, environment, state().hand);
@@ -230,15 +256,17 @@ void StateMachine::place(simulation::Environment& environment, const Placement& 
 }
 
 void StateMachine::regrabReleasedPart(simulation::Environment& environment, const SceneView& scene) noexcept {
-  for (const HandAssignment& assignment : state().hands) {
+  const auto& assignments = state().hands;
+  for (std::size_t i = 0; i < std::min(assignments.size(), kMaxRegrabs); ++i) {
+    const HandAssignment& assignment = assignments[i];
     const HandId hand = handInRole(*scenario_, environment, assignment.hand);
     const ObjectId own = environment.hands()[hand.value].default_object;
     if (assignment.object == own || environment.hands()[hand.value].object != own) continue;
-    memory_.regrab.step(scene.inContact(own, assignment.object), kRegrabLapse);
-    if (memory_.regrab.contact_ticks < kRegrabTicks) return;
-    memory_.regrab = {};
+    ContactTimer& timer = memory_.regrabs[i];
+    timer.step(scene.inContact(own, assignment.object), kRegrabLapse);
+    if (timer.contact_ticks < kRegrabTicks) continue;
+    timer = {};
     environment.grab(hand, assignment.object);
-    return;
   }
 }
 

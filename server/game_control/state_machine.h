@@ -56,15 +56,16 @@ class StateMachine {
   /// Begins the first state.
   void start(simulation::Environment& environment) noexcept;
 
-  /// One tick, before Environment::step: conditions are evaluated on the result of the last tick. Handles
-  /// kFulfilled, kSignal, kSkipStep, kRelease, kSetCollision, kSwapHands, kReset (all objects, groups and
-  /// pairs as at the start, first state), kGoToStep, kBack, kRepeatStep and kHandOver; other commands are the
-  /// session's.
+  /// One tick, before Environment::step: conditions are evaluated on the result of the last tick. Returns how
+  /// many of the commands were taken, which are in order: those behind one that may end the state wait for
+  /// the next one, and are to be given again with the next tick. Handles kFulfilled, kSignal, kSkipStep,
+  /// kRelease, kSetCollision, kSwapHands, kReset (all objects, groups and pairs as at the start, first
+  /// state), kGoToStep, kBack, kRepeatStep and kHandOver; other commands are the session's.
   ///
   /// Going to a state makes the scene what it is when all states before have been skipped: what the trainee
   /// has moved since is undone. States that are passed over without having been visited count as skipped;
   /// those from the target on as not visited.
-  void step(simulation::Environment& environment, std::span<const GameCommand> commands) noexcept;
+  std::size_t step(simulation::Environment& environment, std::span<const GameCommand> commands) noexcept;
 
   [[nodiscard]] const StepStatus& status() const { return memory_.status; }
   [[nodiscard]] const ScenarioFile& scenario() const { return *scenario_; }
@@ -83,6 +84,8 @@ class StateMachine {
   /// A set of states.
   using StateSet = std::array<std::uint64_t, kMaxStates / 64>;
 
+  static constexpr std::size_t kMaxRegrabs = 16;  ///< entries of ScenarioState::hands: hands
+
   /// The whole mutable state.
   struct Memory {
     StepStatus status;
@@ -92,11 +95,17 @@ class StateMachine {
     ConditionProgress progress;
     std::uint64_t elapsed = 0;        ///< [ticks] in this state
     std::uint64_t contact_ticks = 0;  ///< [ticks] of the state's object in contact
-    ContactTimer regrab;  ///< between a released part and the default object of the hand that has to move it
+    /// between a released part and the default object of the hand that has to move it, by entry of
+    /// ScenarioState::hands
+    std::array<ContactTimer, kMaxRegrabs> regrabs;
     std::array<ContactTimer, kMaxHelpers> helpers;  ///< between a helping hand's default object and the part
   };
   template <typename Visitor>
   static void visitMemory(Memory& memory, Visitor&& visit);
+  /// The rest of it: the timers of `regrabs` after the first.
+  template <typename Visitor>
+  static void visitOtherRegrabs(Memory& memory, Visitor&& visit);
+  [[nodiscard]] bool betweenStates() const noexcept;
 
   void enter(simulation::Environment& environment, std::uint32_t step) noexcept;
   void leave(simulation::Environment& environment, StepPhase phase) noexcept;

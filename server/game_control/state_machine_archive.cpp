@@ -52,17 +52,31 @@ void StateMachine::visitMemory(Memory& memory, Visitor&& visit) {
   memory.progress.visitMemory(visit);
   visit(memory.elapsed);
   visit(memory.contact_ticks);
-  visit(memory.regrab.contact_ticks);
-  visit(memory.regrab.apart_ticks);
+  visit(memory.regrabs.front().contact_ticks);
+  visit(memory.regrabs.front().apart_ticks);
   for (ContactTimer& timer : memory.helpers) {
     visit(timer.contact_ticks);
     visit(timer.apart_ticks);
   }
 }
 
+template <typename Visitor>
+void StateMachine::visitOtherRegrabs(Memory& memory, Visitor&& visit) {
+  for (std::size_t i = 1; i < memory.regrabs.size(); ++i) {
+    visit(memory.regrabs[i].contact_ticks);
+    visit(memory.regrabs[i].apart_ticks);
+  }
+}
+
+/// Of the timers that most scenarios do not use only those that run are added.
 void StateMachine::addTo(StateHash& hash) const noexcept {
   Memory copy = memory_;
   visitMemory(copy, [&hash](const auto& number) { hash.add(toWord(number)); });
+  std::uint64_t timer = 0;
+  visitOtherRegrabs(copy, [&](const auto& number) {
+    ++timer;
+    if (number != 0) hash.add(timer), hash.add(toWord(number));
+  });
 }
 
 std::vector<std::uint8_t> StateMachine::save() const {
@@ -73,11 +87,13 @@ std::vector<std::uint8_t> StateMachine::save() const {
 
 void StateMachine::append(std::vector<std::uint8_t>& bytes) const {
   Memory copy = memory_;
-  visitMemory(copy, [&bytes](const auto& number) {
+  const auto add = [&bytes](const auto& number) {
     const std::uint64_t word = toWord(number);
     for (unsigned shift = 0; shift < 64; shift += 8)
       bytes.push_back(static_cast<std::uint8_t>(word >> shift));
-  });
+  };
+  visitMemory(copy, add);
+  visitOtherRegrabs(copy, add);
 }
 
 std::vector<std::size_t> StateMachine::savedDoubles() const {
@@ -95,18 +111,21 @@ Result<void> StateMachine::restore(std::span<const std::uint8_t> bytes) {
   Memory memory;
   std::size_t words = 0;
   visitMemory(memory, [&words](const auto&) { ++words; });
+  visitOtherRegrabs(memory, [&words](const auto&) { ++words; });
   if (bytes.size() != words * sizeof(std::uint64_t)) {
     return fail("state machine: a saved state has " + std::to_string(words * sizeof(std::uint64_t)) +
                 " bytes, this one has " + std::to_string(bytes.size()));
   }
   std::size_t at = 0;
   bool finite = true;
-  visitMemory(memory, [&]<typename Number>(Number& number) {
+  const auto take = [&]<typename Number>(Number& number) {
     std::uint64_t word = 0;
     for (unsigned shift = 0; shift < 64; shift += 8) word |= std::uint64_t{bytes[at++]} << shift;
     fromWord(word, number);
     if constexpr (std::same_as<Number, double>) finite = finite && std::isfinite(number);
-  });
+  };
+  visitMemory(memory, take);
+  visitOtherRegrabs(memory, take);
   if (!finite) return fail("state machine: a saved state contains a number that is not finite");
   if (memory.status.step >= scenario_->states.size() || memory.status.phase > StepPhase::kSkipped) {
     return fail("state machine: a saved state is at step " + std::to_string(memory.status.step) +

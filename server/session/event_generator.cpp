@@ -43,6 +43,7 @@ SceneObject describe(ObjectId id, const simulation::ObjectSpec& spec) {
   object.object = id;
   object.name = spec.name;
   object.title = spec.title;
+  object.titles = spec.titles;
   object.kind = spec.kind;
   object.color = spec.color;
   object.X_WO = spec.X_WO;
@@ -79,7 +80,8 @@ TickEvents EventGenerator::generate(const TickOutput& output) {
 }
 
 void EventGenerator::addRun(const TickOutput& output, TickEvents& events) {
-  if (previous_ && previous_->phase == output.phase && previous_->emergency_stop == output.emergency_stop)
+  if (previous_ && previous_->phase == output.phase && previous_->emergency_stop == output.emergency_stop &&
+      previous_->forces_frozen == output.forces_frozen)
     return;
   RunState run;
   run.phase = output.phase;
@@ -106,6 +108,8 @@ void EventGenerator::addRun(const TickOutput& output, TickEvents& events) {
       run.reason = "stopped";
       break;
   }
+  run.forces_frozen = output.forces_frozen;
+  if (output.forces_frozen && output.phase == RunPhase::kRunning) run.reason = "forces frozen";
   if (output.emergency_stop && !isOver(output.phase)) run.reason = "emergency stop";
   run.steps_skipped = output.step.skipped;
   run.steps_timed_out = output.step.timed_out;

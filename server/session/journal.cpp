@@ -1,15 +1,19 @@
 #include "server/session/journal.h"
 
+#include <cstdlib>
 #include <deque>
+#include <map>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "idl/record/packed_inputs.h"
 #include "idl/types/messages/journal.h"
 #include "idl/types/messages/session.h"
 #include "idl/wire/codec.h"
 #include "idl/wire/topics.h"
 #include "server/session/part_joiner.h"
+#include "server/session/scenario_copy.h"
 
 namespace tenon::session {
 namespace {
@@ -29,6 +33,7 @@ class Resimulator {
 
   Result<void> read(const record::McapMessage& message) {
     if (message.topic == wire::kTickInput.name) return readInput(message);
+    if (message.topic == record::kPackedInputsTopic) return readPacked(message);
     if (message.topic == wire::kCheckpoint.name) return readCheckpoint(message);
     return {};
   }
@@ -42,6 +47,17 @@ class Resimulator {
     auto input = readTickInput(inputs_.bytes());
     if (!input) return fail(input.error().what);
     apply({.input = std::move(*input), .hash = part->state_hash, .checkpoint = {}});
+    return {};
+  }
+
+  Result<void> readPacked(const record::McapMessage& message) {
+    const auto packed = record::decodePackedInputs(message.data);
+    if (!packed) return fail(packed.error().what);
+    for (const record::RecordedInput& one : *packed) {
+      auto input = readTickInput(one.bytes);
+      if (!input) return fail(input.error().what);
+      apply({.input = std::move(*input), .hash = one.state_hash, .checkpoint = {}});
+    }
     return {};
   }
 
@@ -133,6 +149,10 @@ Result<Journal> Journal::reopen(const std::filesystem::path& file, Tick tick, st
   return journal;
 }
 
+Result<void> Journal::copyScenario(const game_control::ScenarioFile& scenario) {
+  return addScenarioFiles(writer_, scenario);
+}
+
 Result<void> Journal::write(const JournalEntry& entry) {
   Result<void> result;
   const auto log_time = static_cast<std::int64_t>(entry.input.tick) * kJournalTick;
@@ -216,7 +236,8 @@ Result<JournalOrigin> readJournalOrigin(const std::filesystem::path& file) {
   auto reader = record::McapReader::open(file);
   if (!reader) return fail(reader.error().what);
   for (const auto& [name, values] : reader->metadata())
-    if (name == kMetadata && values.contains("scenario") && values.contains("detail")) {
+    if ((name == kMetadata || name == kRecordingMetadata) && values.contains("scenario") &&
+        values.contains("detail")) {
       JournalOrigin origin{values.at("scenario"), std::strtod(values.at("detail").c_str(), nullptr), {}, {}};
       const auto limit = [&values](std::string_view key, Tick& ticks) {
         if (const auto found = values.find(std::string(key)); found != values.end())
@@ -232,13 +253,22 @@ Result<JournalOrigin> readJournalOrigin(const std::filesystem::path& file) {
 Result<std::filesystem::path> findScenario(const std::filesystem::path& journal,
                                            const JournalOrigin& origin) {
   std::error_code ignored;
-  for (const std::filesystem::path& path :
-       {std::filesystem::path(origin.scenario), journal.parent_path() / origin.scenario})
+  std::vector<std::filesystem::path> paths{origin.scenario, journal.parent_path() / origin.scenario};
+  if (const char* const share = std::getenv("TENON_SHARE"); share != nullptr)  // set by `tenon`
+    paths.push_back(std::filesystem::path(share) / "scenarios" / scenarioName(origin.scenario));
+  for (const std::filesystem::path& path : paths)
     if (std::filesystem::exists(path, ignored)) return path;
-  return fail(
-      fmt::format("{}: was recorded with the scenario '{}', which is neither below this folder nor below the "
-                  "journal's; {}",
-                  journal.string(), origin.scenario, nameTheScenario(journal)));
+  return fail(fmt::format(
+      "{}: was recorded with the scenario '{}', which is neither below this folder nor below that "
+      "of the file, nor a shipped one; {}",
+      journal.string(), origin.scenario, nameTheScenario(journal)));
+}
+
+std::string scenarioName(const std::filesystem::path& scenario) {
+  const std::filesystem::path path = scenario.lexically_normal();
+  const bool is_of_folder = path.filename() == "scenario.yaml" || !path.has_filename();
+  const std::filesystem::path named = is_of_folder ? path.parent_path().filename() : path.filename();
+  return named.empty() ? std::filesystem::absolute(path).parent_path().filename() : named;
 }
 
 }  // namespace tenon::session

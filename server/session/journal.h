@@ -17,6 +17,7 @@ namespace tenon::session {
 
 inline constexpr Tick kCheckpointEvery = 1000;           // [ticks]
 inline constexpr std::int64_t kJournalTick = 1'000'000;  // [ns] of log time
+inline constexpr Tick kKeptForRecorders = 4096;          // [ticks] for those that join late or come back
 
 /// Whether the journal entry of this tick has a checkpoint.
 [[nodiscard]] constexpr bool hasCheckpoint(Tick tick) { return tick % kCheckpointEvery == 1; }
@@ -47,9 +48,9 @@ void forEachPart(Tick tick, std::uint64_t hash, std::span<const std::uint8_t> by
   }
 }
 
-/// The scene a journal was recorded with: enough to load it again and to detect changes since.
+/// The scene of a journal or recording: enough to load it again and to detect changes since.
 struct JournalOrigin {
-  std::string scenario;     ///< path
+  std::string scenario;     ///< path; of a recording: scenarioName
   double detail = 1.0;      ///< [-] LoadOptions::detail
   Fingerprint fingerprint;  ///< empty when readJournalOrigin made it: see readFingerprint
   LinkLimits limits;
@@ -68,6 +69,9 @@ class Journal {
   /// `server_epoch` of the server follows with the tick after `tick`. Fails as McapWriter::reopen.
   [[nodiscard]] static Result<Journal> reopen(const std::filesystem::path& file, Tick tick,
                                               std::uint32_t server_epoch);
+  /// Adds a copy of the scenario's files (scenario_copy.h), before the first entry. After a failure the
+  /// journal has none, and is of use where the scenario is.
+  [[nodiscard]] Result<void> copyScenario(const game_control::ScenarioFile& scenario);
   [[nodiscard]] Result<void> write(const JournalEntry& entry);
   /// What was written survives the end of this process.
   [[nodiscard]] Result<void> keep() { return writer_.endChunk(); }
@@ -113,11 +117,14 @@ struct ResimulationReport {
 /// The fingerprint of the scene that a journal or a recording was made with; empty where it was not recorded.
 [[nodiscard]] Result<Fingerprint> readFingerprint(const std::filesystem::path& file);
 
-/// Scenario and detail of a journal. Fails for other recordings, which do not name them.
+/// What a journal or recording was made with. Fails for a file that does not say so.
 [[nodiscard]] Result<JournalOrigin> readJournalOrigin(const std::filesystem::path& file);
 
-/// The scenario of a journal: its recorded path, from the working directory or else from the journal's
-/// folder. Fails when neither exists.
+/// What a scenario is called wherever it is: its folder, or its file when that is no scenario.yaml.
+[[nodiscard]] std::string scenarioName(const std::filesystem::path& scenario);
+
+/// The scenario of a journal or recording: its recorded path, from the working directory or else from the
+/// journal's folder, or else the shipped scenario of its name. Fails when there is none.
 [[nodiscard]] Result<std::filesystem::path> findScenario(const std::filesystem::path& journal,
                                                          const JournalOrigin& origin);
 

@@ -57,12 +57,15 @@ std::optional<std::string> JournalWriter::problem() const {
   return problem_;
 }
 
-void JournalWriter::writePending(bool inline_copies) {
+/// Writes up to kBatch entries; true: there may be more.
+bool JournalWriter::writePending(bool inline_copies) {
   const auto writes = [this] { return journal_ && !problem(); };
-  std::vector<JournalEntry> done;
-  for (JournalEntry* entry = entries_.front(); entry != nullptr; entry = entries_.front()) {
+  std::size_t count = 0;
+  for (; count < kBatch; ++count) {
+    JournalEntry* const entry = entries_.front();
+    if (entry == nullptr) break;
     if (writes()) keepProblem(journal_->write(*entry));
-    if (publish_) done.push_back(*entry);
+    if (publish_) batch_[count] = *entry;
     if (!entry->checkpoint.empty()) {
       buffers_.beginPush()->swap(entry->checkpoint);
       buffers_.commitPush();
@@ -71,22 +74,27 @@ void JournalWriter::writePending(bool inline_copies) {
     entries_.pop();
   }
   if (writes()) keepProblem(journal_->keep());
-  for (JournalEntry& entry : done) {
+  for (std::size_t i = 0; publish_ && i < count; ++i) {
     if (inline_copies) {
-      publish_(entry);
-    } else {
-      static_cast<void>(copies_.push(std::move(entry)));
+      publish_(batch_[i]);
+    } else if (JournalEntry* const copy = copies_.beginPush()) {
+      *copy = std::move(batch_[i]);
+      copies_.commitPush();
     }
   }
+  return count == kBatch;
 }
 
-void JournalWriter::writeNow() { writePending(true); }
+void JournalWriter::writeNow() {
+  while (writePending(true)) {
+  }
+}
 
 void JournalWriter::start() {
   file_thread_ = std::thread([this] {
     while (true) {
       const bool last_pass = ending_;  // no further entries will come
-      writePending(false);
+      if (writePending(false)) continue;
       if (last_pass) break;
       std::this_thread::sleep_for(kPass);
     }
@@ -99,6 +107,8 @@ void JournalWriter::start() {
       const bool last_pass = written_;
       for (JournalEntry* entry = copies_.front(); entry != nullptr; entry = copies_.front()) {
         publish_(*entry);
+        // else each slot would keep the memory of a checkpoint
+        std::vector<std::uint8_t>().swap(entry->checkpoint);
         copies_.pop();
         if (!written_) continue;
         if (!until) until = std::chrono::steady_clock::now() + kLastCopies;

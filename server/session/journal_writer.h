@@ -52,17 +52,21 @@ class JournalWriter {
 
  private:
   bool acquireBuffer(JournalEntry& entry) noexcept;
-  void writePending(bool inline_copies);
+  bool writePending(bool inline_copies);
   void keepProblem(const Result<void>& done);
 
   std::optional<Journal> journal_;
   Publish publish_;
   /// [ticks] for which the disk or a busy machine may be behind
   static constexpr std::size_t kBacklog = 4096;
+  /// [ticks] between two writes to disk, at most: memory that is touched for the first time costs more than
+  /// an entry, so a backlog is worked off in memory that is there
+  static constexpr std::size_t kBatch = 64;
   threads::SpscQueue<JournalEntry> entries_{kBacklog};
   threads::SpscQueue<JournalEntry> copies_{kBacklog};
   /// empty checkpoint buffers, back to the tick
   threads::SpscQueue<std::vector<std::uint8_t>> buffers_{2};
+  std::vector<JournalEntry> batch_{kBatch};
   bool has_checkpoint_ = false;  ///< one was added
   std::atomic<bool> ending_ = false, written_ = false;
   std::thread file_thread_, copy_thread_;

@@ -30,14 +30,18 @@ Publisher::Publisher(std::shared_ptr<const game_control::ScenarioFile> scenario,
       packer_100_(server_epoch),
       packer_30_(server_epoch) {}
 
-const OutgoingMessages& Publisher::prepare(const TickOutput& output) {
-  packer_1k_.pack(output, complete_, outgoing_.frames);
+const OutgoingMessages& Publisher::prepare(const TickOutput& output, bool is_newest) {
+  outgoing_.frames.clear();
+  outgoing_.manifolds.clear();
   outgoing_.frames_100.clear();
   outgoing_.frames_30.clear();
   outgoing_.pairs.clear();
   outgoing_.stats.reset();
   outgoing_.progress.reset();
-  addManifolds(output);
+  if (is_newest) {
+    packer_1k_.pack(output, complete_, outgoing_.frames);
+    addManifolds(output);
+  }
   addPairs(output);
   addStats(output);
   if (output.tick % kPeriod100Hz == 0) packer_100_.pack(output, false, outgoing_.frames_100);
@@ -51,7 +55,6 @@ const OutgoingMessages& Publisher::prepare(const TickOutput& output) {
 
 void Publisher::addManifolds(const TickOutput& output) {
   manifolds_ = output.manifolds;
-  outgoing_.manifolds.clear();
   for (std::size_t i = 0; i < manifolds_.size(); ++i) {
     if (!output.present[i]) continue;
     // a tracked limb gets vibration and no force: 100 Hz suffices

@@ -16,10 +16,10 @@ namespace tenon::session {
 
 /// The messages of one tick, by rate tier. Valid until the next call of Publisher::prepare.
 struct OutgoingMessages {
-  std::vector<WorldFrame> frames;              ///< WorldFrame_1k
+  std::vector<WorldFrame> frames;              ///< WorldFrame_1k; empty in ticks that a newer one replaces
   std::vector<WorldFrame> frames_100;          ///< WorldFrame_100; empty in ticks between its samples
   std::vector<WorldFrame> frames_30;           ///< WorldFrame_30; likewise
-  std::vector<const HandManifold*> manifolds;  ///< every tick; of tracked hands at 100 Hz
+  std::vector<const HandManifold*> manifolds;  ///< likewise; of tracked hands at 100 Hz
   std::vector<ContactPairs> pairs;             ///< at 100 Hz
   std::optional<TickStats> stats;              ///< at 100 Hz
   std::optional<StepProgress> progress;        ///< at 30 Hz
@@ -37,7 +37,9 @@ class Publisher {
             bool complete);
 
   /// Must be called for every tick, in order: the returned messages cover `output` and the ticks before it.
-  const OutgoingMessages& prepare(const TickOutput& output);
+  /// `is_newest`: false for a tick that a newer one follows at once; it has no frames and manifolds of 1 kHz,
+  /// and what changed in it goes into those of the next one that has.
+  const OutgoingMessages& prepare(const TickOutput& output, bool is_newest = true);
   [[nodiscard]] EventGenerator& eventGenerator() { return event_generator_; }
 
  private:

@@ -1,6 +1,9 @@
 #include "server/session/resume.h"
 
+#include <algorithm>
 #include <cstdint>
+#include <iterator>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -16,13 +19,7 @@
 namespace tenon::session {
 namespace {
 
-/// The last checkpoint of a journal and the inputs after it.
-struct Tail {
-  std::vector<std::uint8_t> checkpoint;  ///< empty: none
-  std::vector<JournalEntry> entries;
-};
-
-/// Follows the messages of a journal in their order.
+/// Reads the end of a journal, message by message.
 class TailReader {
  public:
   Result<void> read(const record::McapMessage& message) {
@@ -30,24 +27,33 @@ class TailReader {
     if (message.topic == wire::kCheckpoint.name) return readCheckpoint(message);
     return {};
   }
-  Tail tail;
+  /// Of ascending ticks, each with its checkpoint.
+  std::vector<JournalEntry> entries;
+
+  /// The newest entry that has a checkpoint; end(): none.
+  [[nodiscard]] std::vector<JournalEntry>::const_iterator newestCheckpoint() const {
+    const auto found = std::find_if(entries.rbegin(), entries.rend(),
+                                    [](const JournalEntry& entry) { return !entry.checkpoint.empty(); });
+    return found == entries.rend() ? entries.end() : std::prev(found.base());
+  }
 
  private:
   Result<void> readInput(const record::McapMessage& message) {
     const auto part = wire::decode<TickInputPart>(message.data);
     if (!part) return fail(part.error().what);
-    if (!inputs_.add(*part) || tail.checkpoint.empty()) return {};
+    if (!inputs_.add(*part)) return {};
     auto input = readTickInput(inputs_.bytes());
     if (!input) return fail(input.error().what);
-    tail.entries.push_back({.input = *input, .hash = part->state_hash, .checkpoint = {}});
+    // ticks go back where a resumed server began again: what it computed counts
+    while (!entries.empty() && entries.back().input.tick >= input->tick) entries.pop_back();
+    entries.push_back({.input = *input, .hash = part->state_hash, .checkpoint = {}});
     return {};
   }
   Result<void> readCheckpoint(const record::McapMessage& message) {
     const auto part = wire::decode<CheckpointPart>(message.data);
     if (!part) return fail(part.error().what);
-    if (!checkpoints_.add(*part)) return {};
-    tail.checkpoint.assign(checkpoints_.bytes().begin(), checkpoints_.bytes().end());
-    tail.entries.clear();
+    if (checkpoints_.add(*part) && !entries.empty() && entries.back().input.tick == part->tick)
+      entries.back().checkpoint.assign(checkpoints_.bytes().begin(), checkpoints_.bytes().end());
     return {};
   }
 
@@ -55,16 +61,17 @@ class TailReader {
   PartJoiner<CheckpointPart> checkpoints_;
 };
 
-/// From a little more than the last checkpoint period on, and from further back where that has no checkpoint.
-Result<Tail> readTail(record::McapReader& reader) {
+/// The ticks that recorders may lack, and those since the last checkpoint, which are more where the disk was
+/// too slow for checkpoints.
+Result<TailReader> readTail(record::McapReader& reader) {
   const std::int64_t end = reader.lastTime();
-  for (std::int64_t span = 2 * static_cast<std::int64_t>(kCheckpointEvery) * kJournalTick;; span *= 8) {
+  for (std::int64_t span = static_cast<std::int64_t>(kKeptForRecorders) * kJournalTick;; span *= 8) {
     reader.seek(end - span);
     TailReader tail;
     record::McapMessage message;
     while (reader.next(message))
       if (auto read = tail.read(message); !read) return fail(read.error().what);
-    if (!tail.tail.checkpoint.empty() || span > end) return std::move(tail.tail);
+    if (tail.newestCheckpoint() != tail.entries.end() || span > end) return tail;
   }
 }
 
@@ -110,26 +117,29 @@ Result<ResumePoint> readResumePoint(const std::filesystem::path& journal, const 
   if (!tail) return failed(fmt::format("{}; {}", tail.error().what, instead(journal)));
   // killed while it still waited for people
   if (reader->lastTime() == 0 && reader->channels().size() >= 2) return ResumePoint{};
-  if (tail->checkpoint.empty())
+  const auto newest = tail->newestCheckpoint();
+  if (newest == tail->entries.end())
     return failed("holds no checkpoint to resume from, so the file is damaged or cut; " + instead(journal));
-  if (auto restored = simulation.restore(tail->checkpoint); !restored)
+  if (auto restored = simulation.restore(newest->checkpoint); !restored)
     return failed(fmt::format("{}; {}", restored.error().what, instead(journal)));
   ResumePoint point{.tick = simulation.now(), .checkpoint = simulation.now(), .problem = {}, .entries = {}};
-  for (JournalEntry& entry : tail->entries) {
-    if (entry.input.tick != simulation.now() + 1) {
+  auto entry = std::next(newest);
+  for (; entry != tail->entries.end(); ++entry) {
+    if (entry->input.tick != simulation.now() + 1) {
       point.problem = fmt::format(
-          "{}: has no tick {}, so the session continues from there, {} ticks before its end", journal.string(),
-          simulation.now() + 1, tail->entries.back().input.tick - simulation.now());
+          "{}: has no tick {}, so the session continues from there, {} ticks before its end",
+          journal.string(), simulation.now() + 1, tail->entries.back().input.tick - simulation.now());
       break;
     }
-    simulation.tick(entry.input);
-    if (simulation.hash() != entry.hash)
+    simulation.tick(entry->input);
+    if (simulation.hash() != entry->hash)
       return failed(fmt::format(
           "tick {} has another result here than the server had that wrote it: resume with the same build of "
           "tenon, or {}",
           simulation.now(), instead(journal)));
-    point.entries.push_back(std::move(entry));
   }
+  tail->entries.erase(entry, tail->entries.end());
+  point.entries = std::move(tail->entries);
   point.tick = simulation.now();
   return point;
 }

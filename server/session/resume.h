@@ -14,10 +14,11 @@ namespace tenon::session {
 
 /// What a journal holds of a session whose server was killed.
 struct ResumePoint {
-  Tick tick = 0;                      ///< the last one that can be computed again
-  Tick checkpoint = 0;                ///< of the state from which it was
-  std::string problem;                ///< damage of the file before its end, or empty
-  std::vector<JournalEntry> entries;  ///< of the ticks after the checkpoint
+  Tick tick = 0;        ///< the last one that can be computed again
+  Tick checkpoint = 0;  ///< of the state from which it was
+  std::string problem;  ///< damage of the file before its end, or empty
+  /// Up to `tick`, of the last kKeptForRecorders ticks or since the checkpoint, with the checkpoints.
+  std::vector<JournalEntry> entries;
 };
 
 /// Brings `simulation` into the state after the last tick of a killed server's journal: restores the last

@@ -19,8 +19,9 @@ enum class Right : std::uint32_t {
   kActOnAnyHand = 1U << 4U,      ///< likewise of all hands
   kContributeForces = 1U << 5U,  ///< external wrenches on objects
   kPlaceObjects = 1U << 6U,      ///< poses of external trackers
-  kLeadRun = 1U << 7U,           ///< pause, resume, reset, skip a step, switch collisions, end the run
+  kLeadRun = 1U << 7U,           ///< pause, freeze, skip, switch collisions, remove people, end the run
   kClearStop = 1U << 8U,         ///< clear the emergency stop; everybody may raise it
+  kGuide = 1U << 9U,             ///< let an instructor's hand guide a trainee's
 };
 
 struct RoleRights {
@@ -39,7 +40,8 @@ struct RoleRights {
 inline constexpr std::uint32_t kTraineeRights =
     bits({Right::kMoveHands, Right::kAnswerStep, Right::kActOnOwnHands, Right::kContributeForces});
 inline constexpr std::uint32_t kInstructorRights =
-    kTraineeRights | bits({Right::kActOnAnyHand, Right::kPlaceObjects, Right::kLeadRun, Right::kClearStop});
+    kTraineeRights |
+    bits({Right::kActOnAnyHand, Right::kPlaceObjects, Right::kLeadRun, Right::kClearStop, Right::kGuide});
 
 inline constexpr std::array kRoles{
     RoleRights{Role::kAdmin, true, 8, kInstructorRights | bits({Right::kMoveAnyHand})},

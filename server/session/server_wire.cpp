@@ -29,6 +29,7 @@ constexpr auto kAnnounceInterval = std::chrono::seconds(1);
 // joins and leaves of clients without hands: one after each
 constexpr auto kBetweenSeats = std::chrono::milliseconds(5);
 constexpr std::size_t kMostWaiting = 512;
+constexpr auto kBetweenLimits = std::chrono::milliseconds(500);  // changes of a station's limits
 constexpr auto kAfterLapse = std::chrono::seconds(10);  // until those who came meanwhile are discovered
 
 std::int64_t nowNanoseconds() {
@@ -46,7 +47,10 @@ ServerWire::ServerWire(const WireOptions& options, std::shared_ptr<wire::Partici
       writers_(std::make_unique<ServerWriters>()),
       registry_(registry),
       input_buffer_(input_buffer),
-      publisher_(publisher) {}
+      publisher_(publisher) {
+  if (options_.publish_journal) copies_ = std::make_unique<JournalCopies>(participant_, options_.session);
+  if (!options_.seat_file.empty()) seats_ = std::make_unique<SeatKeeper>(options_.seat_file);
+}
 
 Result<std::unique_ptr<ServerWire>> ServerWire::open(const WireOptions& options, const LoadedScene& loaded,
                                                      SessionRegistry& registry, InputBuffer& input_buffer,
@@ -60,6 +64,7 @@ Result<std::unique_ptr<ServerWire>> ServerWire::open(const WireOptions& options,
       new ServerWire(options, std::move(*participant), registry, input_buffer, publisher));
   wire->title_ = loaded.scenario->title.front().text;
   wire->scenario_hash_ = fmt::format("{:016x}", loaded.scenario->text_hash);
+  wire->scenario_ = scenarioName(loaded.scenario->path);
   wire->newest_seq_.resize(loaded.scenario->hands.size());
   if (auto alone = wire->refuseBesideAnother(); !alone) return fail(alone.error().what);
   if (auto opened = wire->writers_->open(wire->lobby_, wire->session_, wire->writes_); !opened)
@@ -128,12 +133,6 @@ void ServerWire::keepStops() {
         fmt::format("the emergency stop would not outlive a crash of the server: {}", kept.error().what));
 }
 
-void ServerWire::keepSeats() {
-  if (options_.seat_file.empty()) return;
-  if (auto kept = writeSeats(options_.seat_file, registry_.seatsToKeep()); !kept)
-    log(Severity::kError, "seats", kept.error().what);
-}
-
 Result<void> ServerWire::openReaders() {
   Result<void> result;
   const auto listenTo = [&]<class M>(wire::Partition& partition, const wire::Topic<M>& topic, auto handler) {
@@ -146,6 +145,9 @@ Result<void> ServerWire::openReaders() {
            [this](const Command& command, const wire::Origin& from) { handle(command, from); });
   listenTo(session_, wire::kClockSync, [this](const ClockSync& sync, const wire::Origin& from) {
     if (registry_.ownsSeat(sync.client, from)) handle(sync);
+  });
+  listenTo(session_, wire::kTelemetry, [this](const Telemetry& telemetry, const wire::Origin& from) {
+    if (isGenuine(telemetry.client, from, "telemetry")) handle(telemetry);
   });
   listenTo(lobby_, wire::kSessionAnnounce,
            [this](const SessionAnnounce& other, const wire::Origin& from) { handle(other, from); });
@@ -186,9 +188,13 @@ void ServerWire::sendScene(const LoadedScene& loaded) {
   const game_control::ScenarioFile& scenario = *loaded.scenario;
   for (std::uint32_t i = 0; i < scenario.hands.size(); ++i) {
     const game_control::ScenarioHand& hand = scenario.hands[i];
-    writers_->hand.send({HandId{i}, hand.name, hand.role, hand.object});
+    scene_hands_.push_back({HandId{i}, hand.name, hand.role, hand.object, {}});
+    writers_->hand.send(scene_hands_.back());
   }
   const auto steps = static_cast<std::uint32_t>(scenario.states.size());
+  scene_ = {.objects = static_cast<std::uint32_t>(loaded.scene->objects.size()),
+            .hands = static_cast<std::uint32_t>(scenario.hands.size()),
+            .steps = steps};
   for (std::uint32_t i = 0; i < steps; ++i) {
     const game_control::ScenarioState& state = scenario.states[i];
     writers_->scene_step.send({i, steps, state.name, state.title, state.part});
@@ -201,16 +207,27 @@ void ServerWire::announce() {
                            .server_epoch = options_.server_epoch,
                            .title = title_,
                            .lockstep = options_.lockstep,
+                           .objects = scene_.objects,
+                           .hands = scene_.hands,
+                           .steps = scene_.steps,
+                           .resumed_after = options_.resumed_after,
                            .scenario_hash = scenario_hash_,
                            .host = hostName(),
                            .pid = static_cast<std::uint32_t>(getpid()),
-                           .scene_hash = options_.scene_hash});
+                           .scene_hash = options_.scene_hash,
+                           .scenario = scenario_,
+                           .detail = options_.detail,
+                           .freeze_ticks = static_cast<std::uint32_t>(options_.limits.freeze),
+                           .park_ticks = static_cast<std::uint32_t>(options_.limits.park)});
 }
 
 void ServerWire::dispatch(std::chrono::nanoseconds timeout) {
-  const bool waits = !joins_.empty() || !leaves_.empty();
+  const bool waits = !joins_.empty() || !leaves_.empty() || !kicks_.empty();
   inbox_.dispatch(waits ? std::min<std::chrono::nanoseconds>(timeout, kBetweenSeats) : timeout);
   handleJoinsAndLeaves();
+  finishKicks();
+  dismissStuckRecorders();
+  if (const auto error = seats_ ? seats_->takeError() : std::nullopt) log(Severity::kError, "seats", *error);
   noticeLapse();
   forwardChanges();
 }
@@ -221,12 +238,21 @@ void ServerWire::forwardChanges() {
   FixedVector<Change, kMaxChanges> changes;
   registry_.takeChanges(changes);
   for (const Change& change : changes) input_buffer_.put(change);
+  publishLimits();
   contributions_.forward(input_buffer_);
 }
 
 void ServerWire::update(const TickOutput& output) {
   now_ = output.tick;
   registry_.updatePhase(output.phase, output.emergency_stop);
+  sendGuidance(output);
+}
+
+/// Of each tick, so that a server that is behind sends what is due, and stations take the newest.
+void ServerWire::sendGuidance(const TickOutput& output) {
+  std::vector<std::string> ended;
+  for (const Guidance& fixture : registry_.guidance(output, ended)) writers_->guidance.send(fixture);
+  for (const std::string& why : ended) log(Severity::kInfo, "guidance", why);
 }
 
 void ServerWire::log(Severity severity, const std::string& kind, const std::string& text) {
@@ -297,6 +323,12 @@ void ServerWire::handleJoinsAndLeaves() {
   }
 }
 
+void ServerWire::dismissStuckRecorders() {
+  if (!copies_) return;
+  for (const ClientId client : copies_->takeStuck())
+    dismiss(client, "takes no inputs of the ticks, and is removed until it joins again");
+}
+
 void ServerWire::handle(const Join& join, const wire::Origin& from) {
   const bool is_new = !registry_.isSeated(join.client_guid);
   const bool is_known = registry_.knowsSeat(join.seat_key);
@@ -319,9 +351,15 @@ void ServerWire::handle(const Join& join, const wire::Origin& from) {
   const Welcome welcome = registry_.join(join, proofs, now_, from);
   writers_->welcome.send(welcome);
   if (!is_new) return;
-  for (const HandId hand : welcome.hands)
-    if (hand.valid()) newest_seq_[hand.value] = 0;
-  if (welcome.accepted) keepSeats();
+  for (const HandId hand : welcome.hands) {
+    if (!hand.valid()) continue;
+    newest_seq_[hand.value] = 0;
+    input_buffer_.setPlayout(hand, 0);
+  }
+  received_inputs_.erase(welcome.client);
+  if (welcome.accepted && seats_) seats_->keep(registry_.seatsToKeep());
+  if (welcome.accepted && copies_ && join.role == Role::kRecorder)
+    copies_->admit(welcome.client, from, join.recorded_until);
   const char* how = is_known ? "has rejoined" : "has joined";
   log(welcome.accepted ? Severity::kInfo : Severity::kWarning, "join",
       welcome.accepted ? fmt::format("{} ({}) {}", join.name, roleName(join.role), how)
@@ -337,6 +375,10 @@ void ServerWire::handle(const DeviceInput& input, const wire::Origin& from) {
     return notifySeatLost(input.client, "its process or link was lost");
   const auto reading = registry_.validateDeviceInput(input);
   if (!reading) return refuse(reading.error().what);
+  ReceivedInputs& received = received_inputs_[input.client];
+  ++received.count;
+  received.gaps.received(nowNanoseconds());
+  received.newest_seq = std::max(received.newest_seq, reading->seq);
   std::uint32_t& newest = newest_seq_[input.hand.value];
   if (options_.lockstep && reading->seq == newest && newest == now_) resend_requested_ = true;
   if (reading->seq <= newest && newest - reading->seq < 0x80000000U) return;  // out of order, or a repetition
@@ -345,19 +387,53 @@ void ServerWire::handle(const DeviceInput& input, const wire::Origin& from) {
                    fmt::format("sent the input of tick {} when tick {} was the next, and is removed: in "
                                "lockstep an input answers a received tick",
                                reading->seq, now_ + 1));
+  if (input_buffer_.playout(input.hand) > 0) handleEarlier(input, newest);
   newest = reading->seq;
   input_buffer_.put(*reading);
+}
+
+/// Those after `newest`, whose own messages are lost or late.
+void ServerWire::handleEarlier(const DeviceInput& input, std::uint32_t newest) {
+  DeviceInput one = input;
+  for (std::size_t i = input.earlier.size(); i-- > 0;) {
+    one.sample = input.earlier[i];
+    if (one.sample.seq <= newest || one.sample.seq >= input.sample.seq) continue;
+    if (const auto reading = registry_.validateDeviceInput(one)) input_buffer_.put(*reading);
+  }
 }
 
 void ServerWire::handle(const Command& command, const wire::Origin& from) {
   if (!isGenuine(command.client, from, "command")) return;
   if (const CommandAck* again = registry_.previousAck(command)) {
-    writers_->ack.send(*again);
+    const auto isAgain = [&](const Kick& kick) {
+      return kick.command.client == command.client && kick.command.id == command.id;
+    };
+    if (std::none_of(kicks_.begin(), kicks_.end(), isAgain)) writers_->ack.send(*again);
     return;
   }
   const Presence* sender = registry_.findClient(command.client);
   const std::string who = sender != nullptr ? sender->name : fmt::format("client {}", command.client.value);
   const CommandAck ack = registry_.handleCommand(command);
+  if (std::vector<ClientId> kicked = registry_.takeKicked(); !kicked.empty()) {
+    const std::uint64_t kept = seats_ ? seats_->keep(registry_.seatsToKeep()) : 0;
+    for (const ClientId client : kicked) dismiss(client, "was removed by " + who);
+    kicks_.push_back({command, ack, who, kept});
+    return finishKicks();
+  }
+  answer(command, ack, who);
+}
+
+/// Answers once the seat is closed in the file too: who was told that somebody is removed does not meet that
+/// person again when the server is killed and resumed.
+void ServerWire::finishKicks() {
+  while (!kicks_.empty() && (!seats_ || seats_->isDone(kicks_.front().seats_kept))) {
+    const Kick kick = std::move(kicks_.front());
+    kicks_.pop_front();
+    answer(kick.command, kick.ack, kick.who);
+  }
+}
+
+void ServerWire::answer(const Command& command, const CommandAck& ack, const std::string& who) {
   writers_->ack.send(ack);
   if (!ack.accepted) {
     log(Severity::kWarning, "refused",
@@ -403,17 +479,59 @@ void ServerWire::clearEmergencyStop(ClientId client, const std::string& reason) 
     writers_->clear.send(stops_.cleared().at(id));
     (void)writers_->stop.writer->dispose(stop);
   }
+  const char* const next = registry_.phase() == RunPhase::kWaitingForPeople
+                               ? "the session still waits for people"
+                               : "the session is paused until 'resume'";
   log(Severity::kInfo, "emergency stop",
-      fmt::format("cleared by {}: {}{}the session is paused until 'resume'", who, reason,
-                  reason.empty() ? "" : "; "));
+      fmt::format("cleared by {}: {}{}{}", who, reason, reason.empty() ? "" : "; ", next));
 }
 
 void ServerWire::handle(const ClockSync& sync) {
   if (sync.server_sent_ns != 0) return;  // the server's own answer
   ClockSync answer = sync;
   answer.server_received_ns = nowNanoseconds();
+  if (const auto inputs = received_inputs_.find(sync.client); inputs != received_inputs_.end()) {
+    answer.inputs_received = inputs->second.count;
+    answer.newest_seq = inputs->second.newest_seq;
+    answer.longest_gap = inputs->second.gaps.longest(nowNanoseconds());
+    for (const HandId hand : registry_.findClient(sync.client)->hands) {
+      answer.inputs_replaced += input_buffer_.replaced(hand);
+      answer.ticks_without_input += input_buffer_.missed(hand);
+    }
+  }
   answer.server_sent_ns = nowNanoseconds();
   writers_->clock.send(answer);
+}
+
+/// What a station asks for by what its link does. In lockstep the server waits for inputs: no limit applies.
+void ServerWire::handle(const Telemetry& telemetry) {
+  registry_.receive(telemetry);
+  const auto inputs = received_inputs_.find(telemetry.client);
+  if (options_.lockstep || inputs == received_inputs_.end()) return;
+  const Presence& station = *registry_.findClient(telemetry.client);
+  for (const HandId hand : station.hands)
+    if (registry_.controllerOf(hand) == telemetry.client)
+      input_buffer_.setPlayout(hand, telemetry.playout_ticks);
+  const auto now = std::chrono::steady_clock::now();
+  if (now - inputs->second.limits_set_at < kBetweenLimits) return;
+  const double round_trip = telemetry.clock_known ? telemetry.round_trip : 0.0;
+  if (!registry_.setLimits(telemetry.client, telemetry.limits, round_trip)) return;
+  inputs->second.limits_set_at = now;
+  const HandLimits& limits = registry_.limitsOf(station.hands.front());
+  log(Severity::kInfo, "link",
+      fmt::format(
+          "{}: by its link of the last 10 s, without input a hand is held still after {} ms and parked after "
+          "{} ms; now inputs are up to {:.0f} ms apart and {:.2f} % of them are lost",
+          station.name, limits.freeze_ticks, limits.park_ticks,
+          1e3 * inputs->second.gaps.longest(nowNanoseconds()), 1e2 * telemetry.inputs_lost));
+}
+
+void ServerWire::publishLimits() {
+  for (SceneHand& hand : scene_hands_) {
+    if (hand.limits == registry_.limitsOf(hand.hand)) continue;
+    hand.limits = registry_.limitsOf(hand.hand);
+    writers_->hand.send(hand);
+  }
 }
 
 void ServerWire::handleGone(const Presence& presence, const wire::Origin& from) {
@@ -430,6 +548,7 @@ void ServerWire::dismiss(ClientId client, const std::string& why) {
   if (leaver == nullptr || !leaver->alive) return;
   const std::string text = fmt::format("{} ({}) {}", leaver->name, roleName(leaver->role), why);
   registry_.leave(client);
+  if (copies_ && leaver->role == Role::kRecorder) copies_->dismiss(client);
   notifySeatLost(client, why);
   log(Severity::kWarning, "leave", text);
   forwardChanges();
@@ -445,7 +564,7 @@ void ServerWire::resendLast() {
   for (const HandManifold* manifold : last_->manifolds) writers_->manifold.write(*manifold);
 }
 
-void ServerWire::send(const OutgoingMessages& outgoing, bool is_newest) {
+void ServerWire::send(const OutgoingMessages& outgoing) {
   last_ = &outgoing;
   const Tick period_begin = (now_ - 1) / kPublishedSamplesPeriod * kPublishedSamplesPeriod + 1;
   if (period_begin != published_.first_tick) statePublished();
@@ -455,11 +574,8 @@ void ServerWire::send(const OutgoingMessages& outgoing, bool is_newest) {
   if (outgoing.events.step) to.step.send(*outgoing.events.step);
   for (const GrabState& grab : outgoing.events.grabs) to.grab.write(grab);
   for (const ObjectSnapshot& snapshot : outgoing.events.snapshots) to.snapshot.write(snapshot);
-  // of what a newer one replaces, an old one would only delay that
-  if (is_newest) {
-    for (const WorldFrame& frame : outgoing.frames) to.frame_1k.write(frame);
-    for (const HandManifold* manifold : outgoing.manifolds) to.manifold.write(*manifold);
-  }
+  for (const WorldFrame& frame : outgoing.frames) to.frame_1k.write(frame);
+  for (const HandManifold* manifold : outgoing.manifolds) to.manifold.write(*manifold);
   for (const WorldFrame& frame : outgoing.frames_100) to.frame_100.write(frame);
   for (const WorldFrame& frame : outgoing.frames_30) to.frame_30.write(frame);
   for (const ContactPairs& pairs : outgoing.pairs) to.pairs.write(pairs);
@@ -490,18 +606,12 @@ void ServerWire::waitForReaders(std::chrono::nanoseconds timeout) {
     const auto rest = until - std::chrono::steady_clock::now();
     (void)out.writer->waitForReaders(std::max(rest, std::chrono::nanoseconds(0)));
   };
+  if (copies_) copies_->finish(until);
   std::apply([&](auto&... out) { (wait(out), ...); }, writers_->inSession());
 }
 
 void ServerWire::send(const JournalEntry& entry) {
-  if (!options_.publish_journal) return;
-  std::vector<std::uint8_t> bytes;
-  appendBytes(entry.input, bytes);
-  forEachPart<TickInputPart>(entry.input.tick, entry.hash, bytes,
-                             [&](const auto& part) { (void)writers_->input.writer->write(part); });
-  if (!entry.checkpoint.empty())
-    forEachPart<CheckpointPart>(entry.input.tick, entry.hash, entry.checkpoint,
-                                [&](const auto& part) { (void)writers_->checkpoint.writer->write(part); });
+  if (copies_) copies_->add(entry);
 }
 
 }  // namespace tenon::session

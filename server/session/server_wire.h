@@ -18,10 +18,13 @@
 #include "idl/wire/identity.h"
 #include "server/game_control/scenario.h"
 #include "server/session/contributions.h"
+#include "server/session/gap_meter.h"
 #include "server/session/input_buffer.h"
 #include "server/session/journal.h"
+#include "server/session/journal_copies.h"
 #include "server/session/publisher.h"
 #include "server/session/scene_loader.h"
+#include "server/session/seat_list.h"
 #include "server/session/server_writers.h"
 #include "server/session/session_registry.h"
 
@@ -35,6 +38,9 @@ struct WireOptions {
   std::uint32_t server_epoch = 0;
   std::optional<wire::SharedKey> key;  ///< of the session; none: nobody can be admin or instructor
   std::string scene_hash;              ///< asset that lists the display models; empty: none
+  double detail = 1.0;                 ///< [-] LoadOptions::detail, for recordings
+  LinkLimits limits;                   ///< likewise
+  Tick resumed_after = 0;              ///< SessionAnnounce::resumed_after
   std::filesystem::path stop_file;     ///< keeps the raises of the emergency stop; empty: only in memory
   std::filesystem::path seat_file;     ///< keeps the seats for a resume; empty: nothing does
 };
@@ -66,9 +72,7 @@ class ServerWire {
   /// Why this server has to end: it did nothing for so long that it was taken for dead, and another server
   /// has taken its place meanwhile.
   [[nodiscard]] const std::optional<std::string>& replaced() const { return replaced_; }
-  /// `is_newest`: false for a tick that a newer one follows at once: its frames and manifolds of 1 kHz are
-  /// not sent.
-  void send(const OutgoingMessages& outgoing, bool is_newest = true);
+  void send(const OutgoingMessages& outgoing);
   /// Repeats frames and manifolds of the last tick for a client that missed them (lockstep).
   void resendLast();
   void send(const EventLog& event);
@@ -78,7 +82,7 @@ class ServerWire {
   void statePublished();
   /// Waits until all readers have what was written to them reliably, for up to `timeout`.
   void waitForReaders(std::chrono::nanoseconds timeout);
-  /// To recorders, also to those that join up to 4 s later; only with `publish_journal`.
+  /// To recorders, also to those that join up to 4096 entries later; only with `publish_journal`.
   void send(const JournalEntry& entry);
 
   /// Raises the emergency stop in the server's own name, unless it is engaged.
@@ -92,7 +96,8 @@ class ServerWire {
   /// True once after a client repeated the input of the last tick, so its answer was lost (lockstep).
   [[nodiscard]] bool takeResendRequest() { return std::exchange(resend_requested_, false); }
   [[nodiscard]] std::uint64_t refusedInputs() const { return refused_inputs_; }
-  [[nodiscard]] const WriteCounts& writes() const { return writes_; }
+  /// Of all threads.
+  [[nodiscard]] WriteCounts writes() const { return copies_ ? writes_ + copies_->counts() : writes_; }
   /// Tick and phase of `output` decide about what is received from now on.
   void update(const TickOutput& output);
 
@@ -108,15 +113,20 @@ class ServerWire {
   void noticeLapse();
   Result<void> restoreStops();
   void keepStops();
-  void keepSeats();
   Result<void> openReaders();
   void sendScene(const LoadedScene& loaded);
   void receive(const Join& join, const wire::Origin& from);
   void handleJoinsAndLeaves();
+  void dismissStuckRecorders();
   void handle(const Join& join, const wire::Origin& from);
   void handle(const DeviceInput& input, const wire::Origin& from);
   void handle(const Command& command, const wire::Origin& from);
+  void answer(const Command& command, const CommandAck& ack, const std::string& who);
+  void finishKicks();
+  void handleEarlier(const DeviceInput& input, std::uint32_t newest);
   void handle(const ClockSync& sync);
+  void handle(const Telemetry& telemetry);
+  void publishLimits();
   void handle(const SessionAnnounce& other, const wire::Origin& from);
   void handle(const EmergencyStop& stop, const wire::Origin& from);
   void handleGone(const Presence& presence, const wire::Origin& from);
@@ -125,6 +135,7 @@ class ServerWire {
   void engage(const EmergencyStop& stop);
   void clearEmergencyStop(ClientId client, const std::string& reason);
   void refuse(const std::string& why);
+  void sendGuidance(const TickOutput& output);
   void forwardChanges();
 
   WireOptions options_;
@@ -133,19 +144,40 @@ class ServerWire {
   wire::Partition session_;
   wire::Inbox inbox_;
   std::unique_ptr<ServerWriters> writers_;
+  std::unique_ptr<JournalCopies> copies_;  ///< null: the journal is not published
+  std::unique_ptr<SeatKeeper> seats_;      ///< null: nothing keeps them
   SessionRegistry& registry_;
   InputBuffer& input_buffer_;
   Publisher& publisher_;
   std::string title_;
   std::string scenario_hash_;
+  struct SceneSize {
+    std::uint32_t objects = 0, hands = 0, steps = 0;
+  };
+  SceneSize scene_;                        ///< announced
+  std::string scenario_;                   ///< scenarioName
   std::vector<std::uint32_t> newest_seq_;  ///< index = HandId
   std::set<std::string> logged_refusals_;  ///< each text is logged once, although inputs come at 1 kHz
   std::map<ClientId, std::chrono::steady_clock::time_point> seat_lost_notified_;  ///< last time
+  std::vector<SceneHand> scene_hands_;  ///< as they were published last
+  struct ReceivedInputs {
+    std::uint32_t count = 0, newest_seq = 0;
+    GapMeter gaps;
+    std::chrono::steady_clock::time_point limits_set_at;
+  };
+  std::map<ClientId, ReceivedInputs> received_inputs_;  ///< ClockSync
   std::uint64_t refused_inputs_ = 0;
   WriteCounts writes_;
   Contributions contributions_;
   std::deque<std::pair<Join, wire::Origin>> joins_;  ///< waiting
   std::deque<ClientId> leaves_;                      ///< waiting
+  struct Kick {
+    Command command;
+    CommandAck ack;
+    std::string who;
+    std::uint64_t seats_kept = 0;  ///< SeatKeeper::keep
+  };
+  std::deque<Kick> kicks_;  ///< waiting
   std::chrono::steady_clock::time_point next_change_of_seats_;
   bool resend_requested_ = false;
   StopTruth stops_;

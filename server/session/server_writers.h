@@ -14,11 +14,25 @@
 
 namespace tenon::session {
 
-/// What the wire thread has written.
+/// What a thread has written to the bus.
 struct WriteCounts {
   std::uint64_t slow = 0;        ///< took longer than 5 ms: a reader was behind
   std::uint64_t failed = 0;      ///< samples that were not sent
   double longest_seconds = 0.0;  ///< [s]
+
+  /// Counts how long `write` takes; returns what it returns.
+  template <class Write>
+  bool time(Write write) {
+    const auto begin = std::chrono::steady_clock::now();
+    const bool written = write();
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    longest_seconds = std::max(longest_seconds, seconds);
+    slow += seconds > 5e-3 ? 1 : 0;
+    return written;
+  }
+  [[nodiscard]] WriteCounts operator+(const WriteCounts& other) const {
+    return {slow + other.slow, failed + other.failed, std::max(longest_seconds, other.longest_seconds)};
+  }
 };
 
 /// A writer and its topic, opened together.
@@ -31,11 +45,7 @@ struct TopicWriter {
 
   /// Of the wire thread.
   void send(const M& message) {
-    const auto begin = std::chrono::steady_clock::now();
-    const bool written = writer->write(message).has_value();
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    counts->longest_seconds = std::max(counts->longest_seconds, seconds);
-    counts->slow += seconds > 5e-3 ? 1 : 0;
+    const bool written = counts->time([&] { return writer->write(message).has_value(); });
     counts->failed += written ? 0 : 1;
   }
   /// Writes a sample of a tick.
@@ -51,9 +61,9 @@ struct TopicWriter {
   }
 };
 
-/// All writers of a session's server.
+/// All writers of a session's server but those of JournalCopies.
 ///
-/// Threads: one (wire); input and checkpoint: that of ServerWire::send(JournalEntry). Real-time: no.
+/// Threads: one (wire). Real-time: no.
 struct ServerWriters {
   TopicWriter<SessionAnnounce> announce{wire::kSessionAnnounce, {}};
   TopicWriter<Welcome> welcome{wire::kWelcome, {}};
@@ -79,14 +89,11 @@ struct ServerWriters {
   TopicWriter<EmergencyStop> stop{wire::kEmergencyStop, {}};
   TopicWriter<EmergencyClear> clear{wire::kEmergencyClear, {}};
   TopicWriter<PublishedSamples> published{wire::kPublishedSamples, {}};
-  TopicWriter<TickInputPart> input{wire::kTickInput, {}};
-  TopicWriter<CheckpointPart> checkpoint{wire::kCheckpoint, {}};
 
   auto inLobby() { return std::tie(announce, welcome); }
   auto inSession() {
     return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, object, hand, scene_step,
-                    step, progress, run, grab, ack, guidance, event, clock, stop, clear, published, input,
-                    checkpoint);
+                    step, progress, run, grab, ack, guidance, event, clock, stop, clear, published);
   }
   /// Written in ticks by send(OutgoingMessages), with the tick in each sample.
   auto ofTicks() {

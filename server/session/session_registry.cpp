@@ -29,10 +29,6 @@ bool isPlausible(double stiffness, double least, double most) {
 
 bool isPlausible(const Vector3& v, double limit) { return v.allFinite() && v.norm() < limit; }
 
-std::string notPermitted(Role role) {
-  return fmt::format("not permitted for the {}: ask the instructor", roleName(role));
-}
-
 bool mayControlHandOf(Role role, Role hand_role) {
   return has(role, Right::kMoveAnyHand) || (role == hand_role && has(role, Right::kMoveHands));
 }
@@ -44,7 +40,10 @@ SessionRegistry::SessionRegistry(const game_control::ScenarioFile& scenario, std
     : scenario_(scenario),
       server_epoch_(server_epoch),
       lockstep_(lockstep),
-      controllers_(scenario.hands.size()) {}
+      controllers_(scenario.hands.size()),
+      limits_(scenario.hands.size()),
+      round_trips_(scenario.hands.size()),
+      mentoring_(scenario, server_epoch) {}
 
 void SessionRegistry::resume(const std::vector<KeptSeat>& seats, std::size_t deferred) {
   changes_.push_back({.kind = ChangeKind::kContinue});
@@ -53,13 +52,15 @@ void SessionRegistry::resume(const std::vector<KeptSeat>& seats, std::size_t def
     clients_.push_back({kept.client, kept.name, kept.role, {}, false});
     Seat& seat = seats_.emplace_back();
     seat.key = kept.key;
+    seat.is_closed = kept.is_closed;
   }
 }
 
 std::vector<KeptSeat> SessionRegistry::seatsToKeep() const {
   std::vector<KeptSeat> kept;
   for (std::size_t i = 0; i < seats_.size(); ++i)
-    kept.push_back({clients_[i].client, clients_[i].role, seats_[i].key, clients_[i].name});
+    kept.push_back(
+        {clients_[i].client, clients_[i].role, seats_[i].key, clients_[i].name, seats_[i].is_closed});
   return kept;
 }
 
@@ -88,7 +89,7 @@ bool SessionRegistry::isSeated(const std::string& client_guid) const {
 
 bool SessionRegistry::mustProve(const Join& join) const {
   const RoleRights* const role = rightsOf(join.role);
-  return (role != nullptr && role->needs_key) || knowsSeat(join.seat_key);
+  return (role != nullptr && (role->needs_key || key_of_all_)) || knowsSeat(join.seat_key);
 }
 
 bool SessionRegistry::anyHandControlled() const {
@@ -104,8 +105,10 @@ std::string SessionRegistry::joinRefusal(const Join& join, const JoinProofs& pro
   if (role == nullptr) return "unknown role";
   if (join.client_guid.empty())
     return "the join request has no client_guid: the answer could not be addressed";
+  if (const auto former = indexOf(join.seat_key); former && seats_[*former].is_closed)
+    return "you were removed from this session: who leads it lets you in again in another one";
   if (isSeated(join.client_guid)) return "another program has joined with this client_guid";
-  if (role->needs_key && !proofs.key)
+  if ((role->needs_key || key_of_all_) && !proofs.key)
     return join.key_proof.empty()
                ? fmt::format(
                      "the {} needs the key of this session: whoever started the server can hand you a "
@@ -213,10 +216,15 @@ void SessionRegistry::assignSeat(const Join& join, Welcome& welcome, const wire:
     welcome.hands.push_back(hand);
     if (!hand.valid()) continue;
     controllers_[hand.value] = welcome.client;
+    limits_[hand.value] = {};
+    round_trips_[hand.value] = former ? seats_[index].round_trip : 0.0;
     controlled.push_back(hand);
     changes_.push_back({.kind = ChangeKind::kAttach, .hand = hand, .stiffness = stiffnessOf(join, i)});
+    if (round_trips_[hand.value] > 0.0) pushLimits(hand);  // until the link has been measured again
   }
   clients_[index] = {welcome.client, join.name, join.role, controlled, true};
+  welcome.people = static_cast<std::uint32_t>(
+      std::count_if(clients_.begin(), clients_.end(), [](const Presence& person) { return person.alive; }));
   seats_[index].guid = join.client_guid;
   seats_[index].key = join.seat_key;
   seats_[index].welcome = welcome;
@@ -229,9 +237,12 @@ void SessionRegistry::leave(ClientId client) {
   Presence& who = clients_[client.value - 1];
   if (who.alive) seats_[client.value - 1].left = ++departures_;
   who.alive = false;
+  mentoring_.left(client);
   for (std::uint32_t i = 0; i < controllers_.size(); ++i) {
     if (controllers_[i] != client) continue;
     controllers_[i] = {};
+    limits_[i] = {};
+    round_trips_[i] = 0.0;
     changes_.push_back({.kind = ChangeKind::kDetach, .hand = HandId{i}});
   }
 }
@@ -270,6 +281,34 @@ Result<HandReading> SessionRegistry::validateDeviceInput(const DeviceInput& inpu
   return HandReading{input.hand, newest.seq, input.active, newest.X_WH, newest.V_WH, newest.buttons};
 }
 
+bool SessionRegistry::setLimits(ClientId client, const HandLimits& limits, double round_trip) {
+  const HandLimits bounded{std::clamp(limits.freeze_ticks, kFreezeTicks, kMostFreezeTicks),
+                           std::clamp(limits.park_ticks, kParkTicks, kMostParkTicks)};
+  constexpr double kMostTrip = 1.0;  // [s]
+  const double trip = round_trip > 0.0 ? std::min(round_trip, kMostTrip) : 0.0;
+  bool changed = false;
+  for (std::uint32_t i = 0; i < controllers_.size(); ++i) {
+    // a longer one counts at once, a shorter one when it is two steps shorter
+    const bool is_same_trip =
+        trip <= std::max(round_trips_[i], kTripStep) && trip > round_trips_[i] - 2.0 * kTripStep;
+    if (!isController(client, HandId{i}) || (limits_[i] == bounded && is_same_trip)) continue;
+    limits_[i] = bounded;
+    if (!is_same_trip) round_trips_[i] = trip <= kTripStep ? 0.0 : kTripStep * std::ceil(trip / kTripStep);
+    seats_[client.value - 1].round_trip = round_trips_[i];
+    changed = true;
+    pushLimits(HandId{i});
+  }
+  return changed;
+}
+
+void SessionRegistry::pushLimits(HandId hand) {
+  changes_.push_back({.kind = ChangeKind::kSetLimits,
+                      .hand = hand,
+                      .index = limits_[hand.value].freeze_ticks,
+                      .lifetime_ticks = limits_[hand.value].park_ticks,
+                      .value = round_trips_[hand.value]});
+}
+
 Result<Change> SessionRegistry::validateForceContribution(const ForceContribution& force) const {
   const Presence* who = findClient(force.client);
   if (who == nullptr || !who->alive || !has(who->role, Right::kContributeForces))
@@ -292,7 +331,10 @@ Result<Change> SessionRegistry::validateExternalPose(const ExternalPose& pose) c
   if (pose.object.value >= scenario_.objects.size() || !isPlausible(pose.X_WO))
     return fail(
         fmt::format("client {} sent an implausible pose or one of an unknown object", pose.client.value));
-  return Change{.kind = ChangeKind::kPlaceObject, .object = pose.object, .X_WO = pose.X_WO};
+  return Change{.kind = ChangeKind::kPlaceObject,
+                .object = pose.object,
+                .lifetime_ticks = pose.lifetime_ticks,
+                .X_WO = pose.X_WO};
 }
 
 void SessionRegistry::updatePhase(RunPhase phase, bool emergency_stop) {
@@ -304,7 +346,8 @@ void SessionRegistry::updatePhase(RunPhase phase, bool emergency_stop) {
 
 CommandAck SessionRegistry::handleCommand(const Command& command) {
   const Presence* who = findClient(command.client);
-  if (who == nullptr || !who->alive) return {command.client, command.id, false, "join first"};
+  if (who == nullptr || !who->alive)
+    return {command.client, command.id, false, "join first", Refusal::kNotJoined};
   CommandAck ack = decide(command, who->role);
   seats_[command.client.value - 1].last_ack = ack;
   return ack;
@@ -318,47 +361,90 @@ const CommandAck* SessionRegistry::previousAck(const Command& command) const {
 }
 
 CommandAck SessionRegistry::decide(const Command& command, Role role) {
-  CommandAck ack{command.client, command.id, false, {}};
-  if (command.kind == CommandKind::kNote) {
-    if (!has(role, Right::kAnswerStep))
-      ack.reason = notPermitted(role);
-    else if (command.text.empty())
-      ack.reason = "the note is empty";
-    ack.accepted = ack.reason.empty();
-    return ack;
+  const auto answer = [&](const tl::expected<void, Refused>& done) {
+    return done ? CommandAck{command.client, command.id, true, {}, Refusal::kNone}
+                : CommandAck{command.client, command.id, false, done.error().what, done.error().why};
+  };
+  if (command.kind == CommandKind::kNote) return answer(checkNote(command, role));
+  if (command.kind == CommandKind::kKick) return answer(kick(command, role));
+  if (command.kind == CommandKind::kGuide) {
+    if (phase_ >= RunPhase::kSucceeded) return answer(refuse(Refusal::kOver, "the run is over"));
+    return answer(mentoring_.decide(command.text, command.client, role, controllers_));
   }
   const auto change = changeFromCommand(command, role);
-  ack.reason = change ? refusalByPhase(command.kind) : change.error().what;
-  ack.accepted = ack.reason.empty();
-  if (!ack.accepted) return ack;
+  if (!change) return answer(tl::unexpected(change.error()));
+  if (const auto possible = checkPhase(command.kind); !possible) return answer(possible);
   const bool suspended = expectedPhase() == RunPhase::kPaused || emergency_stop_;
   if (change->kind == ChangeKind::kGameCommand && suspended) ++deferred_commands_;
   if (change->kind == ChangeKind::kPause) pending_phase_ = RunPhase::kPaused;
   if (change->kind == ChangeKind::kResume) pending_phase_ = RunPhase::kRunning;
   if (change->kind == ChangeKind::kSetEmergencyStop) {
     clearEmergencyStop();
-    return ack;
+    return answer({});
   }
   stop_requested_ = stop_requested_ || change->kind == ChangeKind::kStop;
   changes_.push_back(*change);
-  return ack;
+  return answer({});
 }
 
-/// Why the command cannot take effect in the current phase, for any role; empty: it can. A command is only
-/// accepted when it will take effect.
-std::string SessionRegistry::refusalByPhase(CommandKind kind) const {
+tl::expected<void, Refused> SessionRegistry::checkNote(const Command& command, Role role) {
+  if (!has(role, Right::kAnswerStep)) return notPermitted(role);
+  if (command.text.empty()) return refuse(Refusal::kOther, "the note is empty");
+  return {};
+}
+
+/// Removes a person and closes the seat, which cannot be taken again with its key.
+tl::expected<void, Refused> SessionRegistry::kick(const Command& command, Role role) {
+  if (!has(role, Right::kLeadRun)) return notPermitted(role);
+  const auto person = findPerson(command.text);
+  if (!person) return tl::unexpected(person.error());
+  const Presence& who = *findClient(*person);
+  if (*person == command.client) return refuse(Refusal::kOther, "that is yourself: leave instead");
+  if (who.role == Role::kAdmin && role != Role::kAdmin)
+    return refuse(Refusal::kNotPermitted,
+                  fmt::format("{} is an admin, whom an admin alone removes", who.name));
+  seats_[person->value - 1].is_closed = true;
+  kicked_.push_back(*person);
+  return {};
+}
+
+/// Of those who are there, by number or by name.
+tl::expected<ClientId, Refused> SessionRegistry::findPerson(const std::string& text) const {
+  ClientId found;
+  for (const Presence& person : clients_) {
+    if (!person.alive) continue;
+    if (std::to_string(person.client.value) == text) return person.client;
+    if (person.name != text) continue;
+    if (found.valid())
+      return refuse(Refusal::kUnknownName,
+                    fmt::format("several people are named '{}': give the number, {} or {}", text, found.value,
+                                person.client.value));
+    found = person.client;
+  }
+  if (!found.valid()) return refuse(Refusal::kUnknownName, fmt::format("nobody here is named '{}'", text));
+  return found;
+}
+
+std::vector<ClientId> SessionRegistry::takeKicked() { return std::exchange(kicked_, {}); }
+
+/// Why the command cannot take effect in the current phase, for any role. A command is only accepted when it
+/// will take effect.
+tl::expected<void, Refused> SessionRegistry::checkPhase(CommandKind kind) const {
   const bool in_any_phase = kind == CommandKind::kRelease || kind == CommandKind::kSetCollision ||
-                            kind == CommandKind::kStop || kind == CommandKind::kClearEmergencyStop;
-  if (phase_ >= RunPhase::kSucceeded) return "the run is over";
+                            kind == CommandKind::kStop || kind == CommandKind::kClearEmergencyStop ||
+                            kind == CommandKind::kFreezeForces;
+  if (phase_ >= RunPhase::kSucceeded) return refuse(Refusal::kOver, "the run is over");
   if (in_any_phase) return {};
   if (phase_ == RunPhase::kWaitingForPeople)
-    return "the session still waits for people: repeat the command once it runs";
-  if (kind == CommandKind::kResume)
-    return expectedPhase() == RunPhase::kPaused ? "" : "the session is not paused";
-  if (kind == CommandKind::kPause)
-    return expectedPhase() == RunPhase::kPaused ? "the session is paused already" : "";
-  if (deferred_commands_ >= kMaxChanges)
-    return fmt::format("{} commands wait already until the session continues", deferred_commands_);
+    return refuse(Refusal::kWaiting, "the session still waits for people: repeat the command once it runs");
+  const bool is_paused = expectedPhase() == RunPhase::kPaused;
+  if (kind == CommandKind::kResume && !is_paused)
+    return refuse(Refusal::kAlready, "the session is not paused");
+  if (kind == CommandKind::kPause && is_paused)
+    return refuse(Refusal::kAlready, "the session is paused already");
+  if (kind != CommandKind::kResume && kind != CommandKind::kPause && deferred_commands_ >= kMaxChanges)
+    return refuse(Refusal::kTooMany,
+                  fmt::format("{} commands wait already until the session continues", deferred_commands_));
   return {};
 }
 
@@ -401,66 +487,69 @@ Change gameChange(const Command& command, std::uint32_t signal = 0) {
 
 }  // namespace
 
-Result<Change> SessionRegistry::changeFromCommand(const Command& command, Role role) const {
-  const auto not_permitted = [&] { return fail(notPermitted(role)); };
-  if (!std::isfinite(command.value)) return fail("its value is not a finite number");
+SessionRegistry::Decision SessionRegistry::changeFromCommand(const Command& command, Role role) const {
+  if (!std::isfinite(command.value)) return refuse(Refusal::kOther, "its value is not a finite number");
   switch (command.kind) {
     case CommandKind::kFulfilled:
     case CommandKind::kSignal:
-      if (!has(role, Right::kAnswerStep)) return not_permitted();
+      if (!has(role, Right::kAnswerStep)) return notPermitted(role);
       break;
     case CommandKind::kRelease:
     case CommandKind::kSwapHands:
-      if (!has(role, Right::kActOnOwnHands)) return not_permitted();
+      if (!has(role, Right::kActOnOwnHands)) return notPermitted(role);
       break;
     case CommandKind::kClearEmergencyStop:
-      if (!has(role, Right::kClearStop)) return not_permitted();
+      if (!has(role, Right::kClearStop)) return notPermitted(role);
       break;
     default:
-      if (!has(role, Right::kLeadRun)) return not_permitted();
+      if (!has(role, Right::kLeadRun)) return notPermitted(role);
   }
   switch (command.kind) {
     case CommandKind::kFulfilled:
       return gameChange(command);
     case CommandKind::kSignal: {
       const int signal = scenario_.signalNamed(command.text);
-      if (signal < 0) return fail(fmt::format("this scenario has no signal '{}'", command.text));
+      if (signal < 0)
+        return refuse(Refusal::kUnknownName, fmt::format("this scenario has no signal '{}'", command.text));
       return gameChange(command, static_cast<std::uint32_t>(signal));
     }
     case CommandKind::kRelease:
       return releaseChange(command, role);
     case CommandKind::kSwapHands:
       if (!has(role, Right::kActOnAnyHand) && !controlsBothHands(command.client))
-        return fail("you do not control both hands");
+        return refuse(Refusal::kNotYourHand, "you do not control both hands");
       return gameChange(command);
     case CommandKind::kClearEmergencyStop:
-      if (!emergency_stop_) return fail("there is no emergency stop");
+      if (!emergency_stop_) return refuse(Refusal::kAlready, "there is no emergency stop");
       if (role == Role::kAdmin && isRolePresent(Role::kInstructor))
-        return fail("an instructor is present: it is for the instructor to clear the emergency stop");
+        return refuse(Refusal::kNotPermitted,
+                      "an instructor is present: it is for the instructor to clear the emergency stop");
       return Change{.kind = ChangeKind::kSetEmergencyStop, .value = 0.0};
     default:
       return leadChange(command);
   }
 }
 
-Result<Change> SessionRegistry::releaseChange(const Command& command, Role role) const {
+SessionRegistry::Decision SessionRegistry::releaseChange(const Command& command, Role role) const {
   const HandId hand = command.hand.valid() ? command.hand : scenario_.handNamed(command.text);
   if (!has(role, Right::kActOnAnyHand) && !isController(command.client, hand))
-    return fail("you do not control that hand");
+    return refuse(Refusal::kNotYourHand, "you do not control that hand");
   if (hand.value >= controllers_.size())
-    return fail(command.text.empty() ? "there is no such hand"
-                                     : fmt::format("this scenario has no hand '{}'", command.text));
+    return refuse(Refusal::kUnknownName, command.text.empty()
+                                             ? "there is no such hand"
+                                             : fmt::format("this scenario has no hand '{}'", command.text));
   return Change{.kind = ChangeKind::kRelease, .hand = hand};
 }
 
 /// Of "OBJECT HAND".
-Result<Change> SessionRegistry::handOverChange(const Command& command) const {
+SessionRegistry::Decision SessionRegistry::handOverChange(const Command& command) const {
   const std::size_t space = command.text.find(' ');
   const ObjectId object = scenario_.objectNamed(command.text.substr(0, space));
   const HandId hand =
       space == std::string::npos ? HandId{} : scenario_.handNamed(command.text.substr(space + 1));
   if (!object.valid() || !hand.valid())
-    return fail(
+    return refuse(
+        Refusal::kUnknownName,
         fmt::format("'{}' does not name {}", command.text,
                     object.valid() ? "a hand" : (hand.valid() ? "an object" : "an object and a hand")));
   const auto& hands = scenario_.hands;
@@ -468,17 +557,18 @@ Result<Change> SessionRegistry::handOverChange(const Command& command) const {
       std::any_of(hands.begin(), hands.end(), [&](const auto& h) { return h.object == object; });
   const game_control::ScenarioObject& spec = scenario_.objects[object.value];
   if (is_own || spec.status == ObjectStatus::kFixed)
-    return fail(fmt::format("'{}' is nothing that a hand takes", spec.name));
+    return refuse(Refusal::kNotHoldable, fmt::format("'{}' is nothing that a hand takes", spec.name));
   if (hands[hand.value].kind == simulation::HandKind::kTracked)
-    return fail(fmt::format("hand '{}' is tracked, it cannot hold a part", hands[hand.value].name));
+    return refuse(Refusal::kNotHoldable,
+                  fmt::format("hand '{}' is tracked, it cannot hold a part", hands[hand.value].name));
   if (!controllers_[hand.value].valid())
-    return fail(fmt::format("nobody moves hand '{}'", hands[hand.value].name));
+    return refuse(Refusal::kNobodyThere, fmt::format("nobody moves hand '{}'", hands[hand.value].name));
   Change change = gameChange(command, object.value);
   change.game.hand = hand;
   return change;
 }
 
-Result<Change> SessionRegistry::leadChange(const Command& command) const {
+SessionRegistry::Decision SessionRegistry::leadChange(const Command& command) const {
   switch (command.kind) {
     case CommandKind::kPause:
       return Change{.kind = ChangeKind::kPause};
@@ -486,6 +576,8 @@ Result<Change> SessionRegistry::leadChange(const Command& command) const {
       return Change{.kind = ChangeKind::kResume};
     case CommandKind::kStop:
       return Change{.kind = ChangeKind::kStop};
+    case CommandKind::kFreezeForces:
+      return Change{.kind = ChangeKind::kFreezeForces, .value = command.value};
     case CommandKind::kReset:
     case CommandKind::kSkipStep:
     case CommandKind::kBack:
@@ -494,8 +586,9 @@ Result<Change> SessionRegistry::leadChange(const Command& command) const {
     case CommandKind::kGoToStep: {
       const int step = findStep(command.text);
       if (step < 0)
-        return fail(fmt::format("this scenario has no step '{}': it has 1 to {}, or name one", command.text,
-                                scenario_.states.size()));
+        return refuse(Refusal::kUnknownName,
+                      fmt::format("this scenario has no step '{}': it has 1 to {}, or name one", command.text,
+                                  scenario_.states.size()));
       return gameChange(command, static_cast<std::uint32_t>(step));
     }
     case CommandKind::kHandOver:
@@ -506,12 +599,13 @@ Result<Change> SessionRegistry::leadChange(const Command& command) const {
                            ? -1
                            : findPair(command.text.substr(0, space), command.text.substr(space + 1));
       if (pair < 0)
-        return fail(fmt::format("'{}' does not name the two objects of a collision pair", command.text));
+        return refuse(Refusal::kUnknownName,
+                      fmt::format("'{}' does not name the two objects of a collision pair", command.text));
       return Change{
           .kind = ChangeKind::kEnablePair, .index = static_cast<std::uint32_t>(pair), .value = command.value};
     }
     default:
-      return fail("unknown command");
+      return refuse(Refusal::kOther, "unknown command");
   }
 }
 

@@ -11,8 +11,11 @@
 #include "idl/types/messages/role.h"
 #include "idl/types/messages/run.h"
 #include "idl/types/messages/session.h"
+#include "idl/types/messages/timing.h"
 #include "idl/wire/endpoint.h"
 #include "server/game_control/scenario.h"
+#include "server/session/mentoring.h"
+#include "server/session/refused.h"
 #include "server/session/rights.h"
 #include "server/session/seat_list.h"
 #include "server/session/tick_io.h"
@@ -42,6 +45,9 @@ class SessionRegistry {
   void resume(const std::vector<KeptSeat>& seats, std::size_t deferred);
   [[nodiscard]] std::vector<KeptSeat> seatsToKeep() const;
 
+  /// Whether roles that need no key by the table need it nevertheless.
+  void requireKey(bool of_all) { key_of_all_ = of_all; }
+
   /// Gives a seat to the client and binds it to the participant `from`, or refuses with a reason; who has the
   /// seat or a hand keeps it in that case. A repeated request (same client_guid and participant) gets the
   /// first answer again; a known seat_key gets its former client id.
@@ -60,6 +66,17 @@ class SessionRegistry {
   [[nodiscard]] CommandAck handleCommand(const Command& command);
   /// The acknowledgement of a command that is received again because its ack was lost; null for a new one.
   [[nodiscard]] const CommandAck* previousAck(const Command& command) const;
+  /// What a station has measured of its link.
+  void receive(const Telemetry& telemetry) {
+    if (telemetry.clock_known)
+      mentoring_.setRoundTrip(telemetry.client, telemetry.round_trip + telemetry.trip_jitter);
+  }
+  /// Mentoring::step.
+  [[nodiscard]] std::vector<Guidance> guidance(const TickOutput& output, std::vector<std::string>& ended) {
+    return mentoring_.step(output, controllers_, ended);
+  }
+  /// Who was removed by commands since the last call, and is still there.
+  [[nodiscard]] std::vector<ClientId> takeKicked();
   /// Phase and emergency stop after the last tick.
   void updatePhase(RunPhase phase, bool emergency_stop);
   /// Frees the client's hands. Its seat stays and can be taken again with its key. Unknown ids are ignored.
@@ -74,6 +91,15 @@ class SessionRegistry {
   /// does not control this hand, the server epoch is another one, or the numbers are implausible (not finite,
   /// beyond 1 km, 50 m/s or 50 rad/s, no unit quaternion).
   [[nodiscard]] Result<HandReading> validateDeviceInput(const DeviceInput& input) const;
+  /// The station of `client` asks for these limits of all its hands, within those of HandLimits, and says the
+  /// `round_trip` [s] of its link: told to the simulation rounded up to steps of kTripStep, at once when it
+  /// grows, when it falls by two steps. False: it has no hands, or they are so already.
+  bool setLimits(ClientId client, const HandLimits& limits, double round_trip = 0.0);
+  /// In force with the next tick.
+  [[nodiscard]] const HandLimits& limitsOf(HandId hand) const { return limits_[hand.value]; }
+  /// [s] likewise; 0 up to kTripStep. Who comes back to a seat has that of before, until it is measured anew.
+  [[nodiscard]] double roundTripOf(HandId hand) const { return round_trips_[hand.value]; }
+  static constexpr double kTripStep = 0.0025;  ///< [s] a shorter round trip counts as none
   /// Fails for observers and recorders, unknown objects, and wrenches that are not finite. Those that are too
   /// large or last too long are passed on as they are: ForceBuffer::contribute clamps them.
   [[nodiscard]] Result<Change> validateForceContribution(const ForceContribution& force) const;
@@ -93,6 +119,8 @@ class SessionRegistry {
   [[nodiscard]] ClientId controllerOf(HandId hand) const { return controllers_[hand.value]; }
   [[nodiscard]] bool anyHandControlled() const;
   [[nodiscard]] bool stopRequested() const { return stop_requested_; }
+  /// As updatePhase() said last.
+  [[nodiscard]] RunPhase phase() const { return phase_; }
   [[nodiscard]] bool isRolePresent(Role role) const { return present(role) > 0; }
 
  private:
@@ -101,14 +129,18 @@ class SessionRegistry {
     std::string key;  ///< public key
     Welcome welcome;
     wire::Origin origin;
-    CommandAck last_ack;     ///< id 0: none yet
-    std::uint64_t left = 0;  ///< counts departures
+    CommandAck last_ack;      ///< id 0: none yet
+    std::uint64_t left = 0;   ///< counts departures
+    bool is_closed = false;   ///< its person was removed
+    double round_trip = 0.0;  ///< [s] of its link, as told to the simulation
   };
+  using Decision = tl::expected<Change, Refused>;
 
   /// Seats in all, of those that are present and of those that left: then that of who left first is given
   /// away.
   static constexpr std::size_t kMaxSeats = 1024;
 
+  void pushLimits(HandId hand);
   [[nodiscard]] std::size_t present(Role role) const;
   [[nodiscard]] std::optional<std::size_t> indexOf(const std::string& seat_key) const;
   [[nodiscard]] std::string joinRefusal(const Join& join, const JoinProofs& proofs) const;
@@ -117,13 +149,16 @@ class SessionRegistry {
   [[nodiscard]] std::size_t newSeat();
   void assignSeat(const Join& join, Welcome& welcome, const wire::Origin& from);
   [[nodiscard]] CommandAck decide(const Command& command, Role role);
-  [[nodiscard]] std::string refusalByPhase(CommandKind kind) const;
+  [[nodiscard]] static tl::expected<void, Refused> checkNote(const Command& command, Role role);
+  [[nodiscard]] tl::expected<void, Refused> kick(const Command& command, Role role);
+  [[nodiscard]] tl::expected<ClientId, Refused> findPerson(const std::string& text) const;
+  [[nodiscard]] tl::expected<void, Refused> checkPhase(CommandKind kind) const;
   /// The run phase after all accepted changes have been applied.
   [[nodiscard]] RunPhase expectedPhase() const { return pending_phase_.value_or(phase_); }
-  [[nodiscard]] Result<Change> changeFromCommand(const Command& command, Role role) const;
-  [[nodiscard]] Result<Change> leadChange(const Command& command) const;
-  [[nodiscard]] Result<Change> handOverChange(const Command& command) const;
-  [[nodiscard]] Result<Change> releaseChange(const Command& command, Role role) const;
+  [[nodiscard]] Decision changeFromCommand(const Command& command, Role role) const;
+  [[nodiscard]] Decision leadChange(const Command& command) const;
+  [[nodiscard]] Decision handOverChange(const Command& command) const;
+  [[nodiscard]] Decision releaseChange(const Command& command, Role role) const;
   [[nodiscard]] int findStep(std::string_view text) const;
   [[nodiscard]] int findPair(std::string_view a, std::string_view b) const;
   [[nodiscard]] bool controlsBothHands(ClientId client) const;
@@ -132,15 +167,20 @@ class SessionRegistry {
   const game_control::ScenarioFile& scenario_;
   std::uint32_t server_epoch_;
   bool lockstep_;
+  bool key_of_all_ = false;
   std::uint64_t departures_ = 0;
   std::vector<Presence> clients_;
   std::vector<Seat> seats_;            ///< index as clients_
   std::vector<ClientId> controllers_;  ///< index = HandId
+  std::vector<HandLimits> limits_;     ///< likewise
+  std::vector<double> round_trips_;    ///< [s] likewise
   std::vector<Change> changes_;        ///< pending
+  Mentoring mentoring_;
   RunPhase phase_ = RunPhase::kWaitingForPeople;
   std::optional<RunPhase> pending_phase_;  ///< of an accepted pause or resume that no tick has applied yet
   bool emergency_stop_ = false;            ///< engaged
   bool stop_requested_ = false;
+  std::vector<ClientId> kicked_;
   std::size_t deferred_commands_ = 0;  ///< accepted game commands that take effect when the session continues
 };
 

@@ -9,6 +9,7 @@
 
 #include "idl/threads/cyclic_thread.h"
 #include "idl/types/names.h"
+#include "idl/wire/network.h"
 #include "server/session/journal_writer.h"
 #include "server/session/resume.h"
 #include "server/session/seat_list.h"
@@ -25,6 +26,7 @@ constexpr auto kFarewell = std::chrono::seconds(10);  // at most, for the last s
 // for the hands of a resumed session, at most; those who come later get theirs then
 constexpr auto kReturn = milliseconds(1500);
 constexpr auto kInputTimeout = std::chrono::seconds(30);  // in lockstep, for the input of a client
+constexpr auto kStopTimeout = std::chrono::seconds(1);    // likewise, once a command ends the run
 
 std::optional<Role> roleNamed(std::string_view name) {
   for (const Role role : {Role::kAdmin, Role::kInstructor, Role::kTrainee, Role::kObserver, Role::kRecorder})
@@ -84,6 +86,14 @@ class Server final : public SessionServer {
         governor_(options_.tick_goal) {}
 
   Result<void> start(const LoadedScene& loaded) {
+    const auto network = wire::chosenNetwork();
+    if (!network) return fail(network.error().what);
+    if (const std::string audience = wire::audienceOf(*network); !audience.empty()) {
+      registry_.requireKey(!options_.open);
+      print(fmt::format("session '{}' is {}; {}", options_.name, audience,
+                        options_.open ? "whoever hears it may join as trainee, observer or recorder (--open)"
+                                      : "all who join need its key (--open: trainees and observers do not)"));
+    }
     auto lock = SessionLock::take(options_.domain, options_.name);
     if (!lock) return fail(lock.error().what);
     lock_.emplace(std::move(*lock));
@@ -96,6 +106,9 @@ class Server final : public SessionServer {
                                   .server_epoch = epoch_,
                                   .key = options_.key,
                                   .scene_hash = options_.scene_hash,
+                                  .detail = options_.detail,
+                                  .limits = options_.simulation.limits,
+                                  .resumed_after = resumed_after_,
                                   .stop_file = options_.stop_file,
                                   .seat_file = options_.journal.empty() ? "" : seatFileOf(options_.journal)},
                                  loaded, registry_, input_buffer_, publisher_);
@@ -112,6 +125,9 @@ class Server final : public SessionServer {
                        : Journal::open(options_.journal, {loaded.scenario->path.string(), options_.detail,
                                                           fingerprintOf(loaded), options_.simulation.limits});
     if (!journal) return fail(journal.error().what);
+    if (!options_.resume)
+      if (const auto copied = journal->copyScenario(*loaded.scenario); !copied)
+        print(fmt::format("the journal holds no copy of its scenario: {}", copied.error().what));
     makeJournalWriter(std::move(*journal));
     // a recorder that is back fills with them what it lacks of the former life
     for (const JournalEntry& entry : resumed_entries_) wire_->send(entry);
@@ -142,6 +158,14 @@ class Server final : public SessionServer {
   void runRealTime(const std::atomic<bool>& stop);
   bool awaitInputs(const std::atomic<bool>& stop);
   void realTimeTick() noexcept;
+  /// Publisher::prepare.
+  void publish(TickOutput& output, bool is_newest) {
+    const WriteCounts writes = wire_->writes();
+    output.stats.slow_writes = writes.slow;
+    output.stats.unsent_samples = writes.failed;
+    wire_->update(output);
+    wire_->send(publisher_.prepare(output, is_newest));
+  }
   Result<SessionReport> finish();
   void makeJournalWriter(std::optional<Journal> journal);
   void noticeJournal();
@@ -188,6 +212,7 @@ class Server final : public SessionServer {
   std::optional<SessionLock> lock_;
   std::unique_ptr<ServerWire> wire_;
   std::vector<JournalEntry> resumed_entries_;  ///< the last ones of the journal that is resumed
+  Tick resumed_after_ = 0;                     ///< SessionAnnounce::resumed_after
   std::vector<HandId> returning_;  ///< controlled when the server was killed that this one resumes
   std::optional<JournalWriter> journal_;
   bool journal_ended_ = false;      ///< before the session, as was said
@@ -212,6 +237,7 @@ Result<void> Server::resume(const LoadedScene& loaded) {
     if (simulation_.isAttached(HandId{i})) returning_.push_back(HandId{i});
   registry_.resume(seats ? *seats : std::vector<KeptSeat>{}, simulation_.deferredCommands());
   publisher_.eventGenerator().resume(point->tick);
+  resumed_after_ = point->tick;
   return {};
 }
 
@@ -244,17 +270,18 @@ void Server::runLockstep(const std::atomic<bool>& stop) {
   while (!stop && !wire_->replaced() && !simulation_.over()) {
     if (!awaitInputs(stop)) break;
     tick(input, output);
-    wire_->update(output);
-    wire_->send(publisher_.prepare(output));
-    if (!journal_) continue;
-    journal_->add(input, output.hash, simulation_);
-    journal_->writeNow();
-    noticeJournal();
+    // in the file before anybody has the answer, so that no client is ahead of a server that is resumed
+    if (journal_) {
+      journal_->add(input, output.hash, simulation_);
+      journal_->writeNow();
+      noticeJournal();
+    }
+    publish(output, true);
   }
 }
 
 /// Waits until a hand is controlled and every controlled hand has an input for the next tick; a client that
-/// is silent for 30 s is removed. Returns early when a stop is requested; false: no further tick.
+/// is silent for 30 s is removed. When a command ends the run, waits for 1 s at most; false: no further tick.
 bool Server::awaitInputs(const std::atomic<bool>& stop) {
   while (!stop && !registry_.stopRequested() && !wire_->replaced() && !registry_.anyHandControlled())
     wire_->dispatch(milliseconds(50));
@@ -265,10 +292,16 @@ bool Server::awaitInputs(const std::atomic<bool>& stop) {
     return {};
   };
   auto deadline = std::chrono::steady_clock::now() + kInputTimeout;
+  std::optional<std::chrono::steady_clock::time_point> stop_until;
   for (HandId late = missing(); late.valid(); late = missing()) {
     wire_->dispatch(milliseconds(50));
     if (stop || wire_->replaced()) return false;
     if (wire_->takeResendRequest()) wire_->resendLast();
+    if (registry_.stopRequested()) {
+      // the tick in which the run ends waits for nobody who hangs
+      if (!stop_until) stop_until = std::chrono::steady_clock::now() + kStopTimeout;
+      if (std::chrono::steady_clock::now() >= *stop_until) return true;
+    }
     if (std::chrono::steady_clock::now() < deadline) continue;
     wire_->dismiss(registry_.controllerOf(late), "has been silent for 30 s and is removed from the session");
     deadline = std::chrono::steady_clock::now() + kInputTimeout;
@@ -306,13 +339,14 @@ void Server::runRealTime(const std::atomic<bool>& stop) {
   if (const std::string missing = threads::lockMemory(); !missing.empty()) print(missing);
   ticker.start();
   if (!ticker.notGranted().empty()) print(ticker.notGranted());
+  if (const std::string missing = wire::raiseWireThreads(); !missing.empty() && ticker.notGranted().empty())
+    print(missing);
   while (!stop && !over && !wire_->replaced()) {
     wire_->dispatch(milliseconds(20));
     for (TickOutput* output = outputs_.front(); output != nullptr; output = outputs_.front()) {
-      wire_->update(*output);
       output->stats.late_ticks = ticker.lateTicks();
       // every tick is looked at for its events, the newest one is sent
-      wire_->send(publisher_.prepare(*output), outputs_.size() == 1);
+      publish(*output, outputs_.size() == 1);
       outputs_.pop();
     }
     noticeJournal();
@@ -322,10 +356,11 @@ void Server::runRealTime(const std::atomic<bool>& stop) {
   over = true;
   if (journal_) journal_->stop();
   for (TickOutput* output = outputs_.front(); output != nullptr; output = outputs_.front()) {
-    wire_->update(*output);
-    wire_->send(publisher_.prepare(*output));
+    publish(*output, outputs_.size() == 1);
     outputs_.pop();
   }
+  // the queue was full in the last tick, which says how the run ended
+  if (overflow_output_.tick == simulation_.now() && simulation_.now() > 0) publish(overflow_output_, true);
 }
 
 void Server::makeJournalWriter(std::optional<Journal> journal) {

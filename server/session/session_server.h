@@ -27,6 +27,8 @@ struct SessionOptions {
   bool resume = false;            ///< take up the session of `journal`, whose server was killed
   /// Of the session, for admins and instructors; none: nobody can be one.
   std::optional<wire::SharedKey> key;
+  bool open =
+      false;  ///< on a network beyond loopback (wire::chosenNetwork) the other roles need no key either
   std::filesystem::path stop_file;  ///< keeps an emergency stop over a crash; empty: nothing does
   std::string scene_hash;           ///< of storeDisplayModels; empty: displays have no models
   double detail = 1.0;              ///< [-] LoadOptions::detail, noted in the journal

@@ -25,24 +25,33 @@ SessionSimulation::SessionSimulation(std::shared_ptr<const game_control::Scenari
       machine_(scenario_),
       limits_(options.limits),
       needed_hands_(options.needed_hands),
-      ages_(environment_.hands().size()) {}
+      ages_(environment_.hands().size()),
+      tracks_(environment_.hands().size()) {
+  for (HandAge& age : ages_) age.limits = limits_;
+}
 
 void SessionSimulation::tick(const TickInput& input) noexcept {
   for (const Change& change : input.changes) apply(change);
   applyReadings(input);
+  followExternalTracks();
   for (const Change& change : input.changes)
     if (change.kind == ChangeKind::kTake) take(change.hand, change.object);
   applyAgeLimits();
   if (phase_ == RunPhase::kRunning && !emergency_stop_) {
-    machine_.step(environment_, {commands_.begin(), commands_.size()});
+    dropFirstCommands(machine_.step(environment_, {commands_.begin(), commands_.size()}));
     if (machine_.status().finished) phase_ = RunPhase::kSucceeded;
     if (machine_.status().failed) phase_ = RunPhase::kFailed;
   }
   // commands received during a pause or emergency stop are deferred to its end
-  if (!isSuspended()) commands_.clear();
+  if (!isSuspended() && phase_ != RunPhase::kRunning) commands_.clear();
   startWhenHandsPresent();
-  environment_.setFreeBodiesPaused(isSuspended());
+  environment_.setFreeBodiesPaused(isStill());
   environment_.step();
+}
+
+void SessionSimulation::dropFirstCommands(std::size_t count) noexcept {
+  std::copy(commands_.begin() + static_cast<std::ptrdiff_t>(count), commands_.end(), commands_.begin());
+  commands_.resize(commands_.size() - count);
 }
 
 void SessionSimulation::apply(const Change& change) noexcept {
@@ -61,12 +70,13 @@ void SessionSimulation::apply(const Change& change) noexcept {
     case ChangeKind::kSetEmergencyStop:
       emergency_stop_ = change.value != 0.0;
       return;
+    case ChangeKind::kFreezeForces:
+      forces_frozen_ = change.value != 0.0;
+      return;
     case ChangeKind::kContributeForce:
       return environment_.contribute(change.object, change.index, change.F_Oo_W, change.lifetime_ticks);
     case ChangeKind::kPlaceObject:
-      if (change.object.value >= environment_.objects().size()) return;
-      return environment_.place(change.object, change.X_WO,
-                                environment_.objects()[change.object.value].status);
+      return placeObject(change);
     case ChangeKind::kPause:
       if (phase_ == RunPhase::kRunning) phase_ = RunPhase::kPaused;
       return;
@@ -83,6 +93,35 @@ void SessionSimulation::apply(const Change& change) noexcept {
     case ChangeKind::kContinue:
       for (std::uint32_t i = 0; i < ages_.size(); ++i) detach(HandId{i});
       return;
+    case ChangeKind::kSetLimits:
+      return setLimits(change);
+  }
+}
+
+/// A pose of a tracked object counts for its lifetime; then the object's own tracker moves it again.
+void SessionSimulation::placeObject(const Change& change) noexcept {
+  if (change.object.value >= environment_.objects().size()) return;
+  const HandId hand = trackedHandOf(change.object);
+  if (!hand.valid())
+    return environment_.place(change.object, change.X_WO, environment_.objects()[change.object.value].status);
+  const Tick lifetime = std::clamp<Tick>(change.lifetime_ticks, 1, kMaxExternalPoseTicks);
+  tracks_[hand.value] = {change.X_WO, now() + lifetime};
+}
+
+HandId SessionSimulation::trackedHandOf(ObjectId object) const noexcept {
+  const auto hands = environment_.hands();
+  for (std::uint32_t i = 0; i < hands.size(); ++i) {
+    const bool tracked = environment_.scene().hands[i].kind == simulation::HandKind::kTracked;
+    if (tracked && hands[i].present && hands[i].attached && hands[i].object == object) return HandId{i};
+  }
+  return {};
+}
+
+void SessionSimulation::followExternalTracks() noexcept {
+  for (std::uint32_t i = 0; i < tracks_.size(); ++i) {
+    const simulation::HandMotion& hand = environment_.hands()[i];
+    if (!isTrackedElsewhere(i) || !hand.present || !hand.attached) continue;
+    environment_.setHandPose(HandId{i}, tracks_[i].X_WO * hand.X_HO.inverse(), {});
   }
 }
 
@@ -99,13 +138,23 @@ void SessionSimulation::take(HandId hand, ObjectId object) noexcept {
 void SessionSimulation::attach(HandId hand, const HandStiffness& stiffness) noexcept {
   if (hand.value >= ages_.size()) return;
   environment_.setHandStiffness(hand, stiffness);
-  ages_[hand.value] = {.attached = true, .active = true, .age = 0, .seq = 0};
+  ages_[hand.value] = {.attached = true, .active = true, .age = 0, .seq = 0, .limits = limits_};
 }
 
 void SessionSimulation::detach(HandId hand) noexcept {
   if (hand.value >= ages_.size()) return;
-  ages_[hand.value] = {};
+  ages_[hand.value] = {.limits = limits_};
   environment_.setHandPresent(hand, false);
+}
+
+/// Whoever asks: without an input no hand stays unfrozen for longer than kMostFreezeTicks.
+void SessionSimulation::setLimits(const Change& change) noexcept {
+  if (change.hand.value >= ages_.size() || !ages_[change.hand.value].attached) return;
+  const Tick most_freeze = std::max<Tick>(limits_.freeze, kMostFreezeTicks);
+  const Tick most_park = std::max<Tick>(limits_.park, kMostParkTicks);
+  ages_[change.hand.value].limits = {std::clamp<Tick>(change.index, limits_.freeze, most_freeze),
+                                     std::clamp<Tick>(change.lifetime_ticks, limits_.park, most_park)};
+  environment_.setHandRoundTrip(change.hand, change.value);
 }
 
 void SessionSimulation::applyReadings(const TickInput& input) noexcept {
@@ -126,8 +175,9 @@ void SessionSimulation::applyAgeLimits() noexcept {
   for (std::uint32_t i = 0; i < ages_.size(); ++i) {
     const HandAge& age = ages_[i];
     if (!age.attached) continue;
-    if (age.age == limits_.park) environment_.setHandPresent(HandId{i}, false);
-    environment_.setHandFrozen(HandId{i}, isSuspended() || !age.active || age.age > limits_.freeze);
+    if (age.age >= age.limits.park) environment_.setHandPresent(HandId{i}, false);
+    const bool is_silent = !age.active || age.age > age.limits.freeze;
+    environment_.setHandFrozen(HandId{i}, isStill() || (is_silent && !isTrackedElsewhere(i)));
   }
 }
 
@@ -146,8 +196,14 @@ std::uint64_t SessionSimulation::hash() const noexcept {
   for (const HandAge& age : ages_) {
     hash.add(std::uint64_t{age.attached} | std::uint64_t{age.active} << 1U);
     hash.add(age.age);
+    if (age.limits != limits_) hash.add(age.limits.freeze), hash.add(age.limits.park);
   }
-  hash.add(std::uint64_t{static_cast<std::uint32_t>(phase_)} | std::uint64_t{emergency_stop_} << 32U);
+  // nothing where there is none, as in most sessions
+  for (std::uint32_t i = 0; i < tracks_.size(); ++i)
+    if (isTrackedElsewhere(i))
+      hash.add(std::uint64_t{i}), hash.add(tracks_[i].until), hash.add(tracks_[i].X_WO);
+  hash.add(std::uint64_t{static_cast<std::uint32_t>(phase_)} | std::uint64_t{emergency_stop_} << 32U |
+           std::uint64_t{forces_frozen_} << 33U);
   for (const game_control::GameCommand& command : commands_) {
     hash.add(std::uint64_t{static_cast<std::uint32_t>(command.kind)} | std::uint64_t{command.hand.value}
                                                                            << 32U);
@@ -172,6 +228,7 @@ void SessionSimulation::fill(TickOutput& output) const noexcept {
   output.hash = hash();
   output.phase = phase_;
   output.emergency_stop = emergency_stop_;
+  output.forces_frozen = forces_frozen_;
   output.step = machine_.status();
 
   const auto objects = environment_.objects();
@@ -238,11 +295,14 @@ void SessionSimulation::save(std::vector<std::uint8_t>& bytes) const {
     const auto size = static_cast<std::uint32_t>(bytes.size() - at - sizeof(std::uint32_t));
     std::memcpy(bytes.data() + at, &size, sizeof(size));
   };
-  out.put(phase_), out.put(emergency_stop_);
+  out.put(phase_), out.put(emergency_stop_), out.put(forces_frozen_);
   out.put(static_cast<std::uint32_t>(needed_hands_.size()));
   for (const HandId hand : needed_hands_) out.put(hand);
-  for (const HandAge& age : ages_)
+  for (const HandAge& age : ages_) {
     out.put(age.attached), out.put(age.active), out.put(age.age), out.put(age.seq);
+    out.put(age.limits.freeze), out.put(age.limits.park);
+  }
+  for (const ExternalTrack& track : tracks_) out.put(track.X_WO), out.put(track.until);
   out.put(static_cast<std::uint32_t>(commands_.size()));
   for (const game_control::GameCommand& command : commands_)
     out.put(command.kind), out.put(command.hand), out.put(command.signal), out.put(command.value);
@@ -251,15 +311,15 @@ void SessionSimulation::save(std::vector<std::uint8_t>& bytes) const {
 }
 
 std::size_t SessionSimulation::maxSavedBytes() const {
-  constexpr std::size_t kMaxCommandBytes = 2 * kMaxChanges * sizeof(game_control::GameCommand);
+  constexpr std::size_t kMostCommandBytes = kMaxCommands * sizeof(game_control::GameCommand);
   std::vector<std::uint8_t> bytes;
   save(bytes);
-  return environment_.maxSavedBytes() + bytes.size() + kMaxCommandBytes;
+  return environment_.maxSavedBytes() + bytes.size() + kMostCommandBytes;
 }
 
 Result<void> SessionSimulation::restore(std::span<const std::uint8_t> bytes) {
   ByteReader in(bytes);
-  in.get(phase_), in.get(emergency_stop_);
+  in.get(phase_), in.get(emergency_stop_), in.get(forces_frozen_);
   std::uint32_t needed = 0;
   in.get(needed);
   if (needed > ages_.size()) return fail("a checkpoint in the journal is of another scenario");
@@ -268,15 +328,21 @@ Result<void> SessionSimulation::restore(std::span<const std::uint8_t> bytes) {
     in.get(hand);
     if (hand.value >= ages_.size()) return fail("a checkpoint in the journal is of another scenario");
   }
-  for (HandAge& age : ages_) in.get(age.attached), in.get(age.active), in.get(age.age), in.get(age.seq);
+  for (HandAge& age : ages_) {
+    in.get(age.attached), in.get(age.active), in.get(age.age), in.get(age.seq);
+    in.get(age.limits.freeze), in.get(age.limits.park);
+  }
+  for (ExternalTrack& track : tracks_) in.get(track.X_WO), in.get(track.until);
   std::uint32_t commands = 0;
   in.get(commands);
-  if (commands > 2 * kMaxChanges) return fail("a checkpoint in the journal is damaged");
+  if (commands > kMaxCommands) return fail("a checkpoint in the journal is damaged");
   commands_.resize(commands);
   for (game_control::GameCommand& command : commands_)
     in.get(command.kind), in.get(command.hand), in.get(command.signal), in.get(command.value);
   const auto finite = [](const game_control::GameCommand& command) { return std::isfinite(command.value); };
-  if (phase_ > RunPhase::kStopped || !std::all_of(commands_.begin(), commands_.end(), finite))
+  const auto isPlaced = [](const ExternalTrack& track) { return track.X_WO.isFinite(); };
+  if (phase_ > RunPhase::kStopped || !std::all_of(commands_.begin(), commands_.end(), finite) ||
+      !std::all_of(tracks_.begin(), tracks_.end(), isPlaced))
     return fail("a checkpoint in the journal is damaged");
   const auto section = [&](auto&& restoreFrom) -> Result<void> {
     std::uint32_t size = 0;

@@ -12,13 +12,15 @@ namespace tenon::session {
 
 /// Reaction to the age of a hand's newest device sample.
 struct LinkLimits {
-  Tick freeze = 50;  ///< [ticks] above this age the hand's object is held still
-  Tick park = 1000;  ///< [ticks] at this age the hand counts as absent and its object is parked
+  Tick freeze = kFreezeTicks;  ///< [ticks] above this age the hand's object is held still
+  Tick park = kParkTicks;      ///< [ticks] at this age the hand counts as absent and its object is parked
+
+  bool operator==(const LinkLimits&) const = default;
 };
 
 struct SessionSimulationOptions {
   simulation::EnvironmentOptions environment;
-  LinkLimits limits;
+  LinkLimits limits;  ///< of a hand whose link asks for no others (ChangeKind::kSetLimits)
   /// Hands that must be present before the first state starts. Empty: it starts in the first tick.
   std::vector<HandId> needed_hands;
 };
@@ -75,15 +77,32 @@ class SessionSimulation {
     bool active = false;    ///< HandReading::active of the newest sample
     Tick age = 0;           ///< [ticks] since the newest sample
     std::uint32_t seq = 0;  ///< HandReading::seq of the newest sample
+    LinkLimits limits;
+  };
+
+  /// A pose from elsewhere that replaces the readings of the tracked hand that moves the object.
+  struct ExternalTrack {
+    Pose X_WO;
+    Tick until = 0;  ///< the last tick in which it counts
   };
 
   void apply(const Change& change) noexcept;
+  void placeObject(const Change& change) noexcept;
+  /// The present hand by whose tracker the object is moved; invalid: none.
+  [[nodiscard]] HandId trackedHandOf(ObjectId object) const noexcept;
+  void followExternalTracks() noexcept;
+  [[nodiscard]] bool isTrackedElsewhere(std::size_t hand) const noexcept {
+    return tracks_[hand].until >= environment_.tick() + 1;
+  }
   void fillPairs(TickOutput& output) const noexcept;
   void applyReadings(const TickInput& input) noexcept;
+  void setLimits(const Change& change) noexcept;
   void applyAgeLimits() noexcept;
   void startWhenHandsPresent() noexcept;
   /// No hand moves an object: emergency stop or pause.
   [[nodiscard]] bool isSuspended() const { return emergency_stop_ || phase_ == RunPhase::kPaused; }
+  /// Likewise, whether or not steps go on.
+  [[nodiscard]] bool isStill() const { return isSuspended() || forces_frozen_; }
   void take(HandId hand, ObjectId object) noexcept;
   void attach(HandId hand, const HandStiffness& stiffness) noexcept;
   void detach(HandId hand) noexcept;
@@ -94,11 +113,17 @@ class SessionSimulation {
   LinkLimits limits_;
   std::vector<HandId> needed_hands_;
   std::vector<HandAge> ages_;
-  /// Commands for the next step of the state machine: those deferred by pause or emergency stop, and those of
-  /// this tick.
-  FixedVector<game_control::GameCommand, 2 * kMaxChanges> commands_;
+  std::vector<ExternalTrack> tracks_;  ///< index = HandId
+  void dropFirstCommands(std::size_t count) noexcept;
+
+  static constexpr std::size_t kMaxCommands = 256;  ///< that wait; as many changes wait for ticks
+
+  /// Commands for the next steps of the state machine: those deferred by pause or emergency stop or by one
+  /// before them, and those of this tick.
+  FixedVector<game_control::GameCommand, kMaxCommands> commands_;
   RunPhase phase_ = RunPhase::kWaitingForPeople;
   bool emergency_stop_ = false;
+  bool forces_frozen_ = false;  ///< hands are held still, steps go on
 };
 
 }  // namespace tenon::session

@@ -36,11 +36,16 @@ enum class ChangeKind : std::uint8_t {
   kResume,            ///< of a paused session
   kSetEmergencyStop,  ///< `value` 0 clears, else engages
   kContributeForce,   ///< external wrench `F_Oo_W` on `object` from source `index` for `lifetime_ticks`
-  kPlaceObject,       ///< `object` is set to the externally tracked pose `X_WO`
-  kStop,              ///< the run ends
-  kBudget,            ///< from now on a tick may test `value` [points]; 0 or NaN: no limit
+  kPlaceObject,  ///< `object` is set to the externally tracked pose `X_WO`; of an object with a tracker of
+                 ///< its own, that counts again after `lifetime_ticks`
+  kStop,         ///< the run ends
+  kBudget,       ///< from now on a tick may test `value` [points]; 0 or NaN: no limit
   kTake,  ///< `hand` holds `object` with the hand's frame at the object's, which is moved to the hand's pose
-  kContinue,  ///< the first of a new life of the server (readResumePoint): no client controls a hand
+  kContinue,      ///< the first of a new life of the server (readResumePoint): no client controls a hand
+  kFreezeForces,  ///< `value` 0: hands move again, else they are held still
+  kSetLimits,     ///< of `hand`, until it is detached: it freezes above `index` [ticks], and parks at
+                  ///< `lifetime_ticks`; the session's own limits are the shortest. `value` [s]: round trip
+                  ///< of its station's link, which limits the stiffness of two hands on one object
 };
 
 /// An input of a tick other than device samples: decided outside the tick, applied at its start.
@@ -50,7 +55,7 @@ struct Change {
   ObjectId object;
   std::uint32_t index = 0;           ///< of a collision pair or force source, by kind
   std::uint32_t lifetime_ticks = 0;  ///< [ticks]
-  double value = 0.0;                ///< [-] or [points], by kind
+  double value = 0.0;                ///< [-], [points] or [s], by kind
   HandStiffness stiffness;
   game_control::GameCommand game;
   Wrench F_Oo_W;
@@ -59,6 +64,9 @@ struct Change {
 
 /// [ticks] between samples of the 100 Hz topics.
 inline constexpr Tick kPeriod100Hz = 10;
+
+/// [ticks] for which an ExternalPose replaces an object's own tracker, at most.
+inline constexpr Tick kMaxExternalPoseTicks = 1000;
 
 inline constexpr std::size_t kMaxHands = 16;
 inline constexpr std::size_t kMaxChanges = 16;
@@ -89,6 +97,7 @@ struct TickOutput {
   std::uint64_t hash = 0;  ///< SessionSimulation::hash after the tick
   RunPhase phase = RunPhase::kWaitingForPeople;
   bool emergency_stop = false;
+  bool forces_frozen = false;  ///< by ChangeKind::kFreezeForces
   game_control::StepStatus step;
   std::vector<ObjectState> objects;     ///< index = ObjectId
   std::vector<HandManifold> manifolds;  ///< index = HandId; valid where `present`

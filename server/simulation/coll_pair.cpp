@@ -208,16 +208,27 @@ collision::IslandPair CollPair::islandPair(const Pose& X_WA, const Pose& X_WB, T
   return pair;
 }
 
-double CollPair::findGap(const Pose& X_WA, const Pose& X_WB, double limit, collision::PairQueryResult& found,
-                         collision::FeatureScratch& scratch) const noexcept {
+collision::PairQuery CollPair::gapQuery(const Pose& X_WA, const Pose& X_WB, double margin) const noexcept {
   collision::PairQuery query;
   query.shell_A = shell_A_;
   query.field_B = field_B_;
   query.X_WA = X_WA;
   query.X_WB = X_WB;
-  query.margin = slope_ * limit;
+  query.margin = margin;
   query.levels = levels_;
   query.list = false;
+  return query;
+}
+
+double CollPair::findDepth(const Pose& X_WA, const Pose& X_WB,
+                           collision::PairQueryResult& found) const noexcept {
+  collision::queryPair(gapQuery(X_WA, X_WB, 0.0), found);
+  return std::max(-found.smallest_gap, 0.0);
+}
+
+double CollPair::findGap(const Pose& X_WA, const Pose& X_WB, double limit, collision::PairQueryResult& found,
+                         collision::FeatureScratch& scratch) const noexcept {
+  const collision::PairQuery query = gapQuery(X_WA, X_WB, slope_ * limit);
   collision::queryPair(query, found);
   return std::min(found.smallest_gap - found.skipped_gap_error,
                   collision::featureGap(query, features_, scratch, found.counts)) /

@@ -123,6 +123,10 @@ class CollPair {
                                collision::PairQueryResult& found,
                                collision::FeatureScratch& scratch) const noexcept;
 
+  /// How deep [m] points of a are in b at these poses; 0 when none is. Changes nothing else but `found`.
+  [[nodiscard]] double findDepth(const Pose& X_WA, const Pose& X_WB,
+                                 collision::PairQueryResult& found) const noexcept;
+
   /// Writes, reads or hashes every member that changes except `enabled`. Reading contacts acquires a list.
   template <typename Archive, typename Self>
   static void archive(Archive& archive, Self& self, ContactListPool& pool) {
@@ -171,6 +175,9 @@ class CollPair {
   [[nodiscard]] double pointsOf(std::uint32_t levels) const noexcept;
   [[nodiscard]] bool nextLevelFits(const WorkLimits& limits, std::uint32_t budget) const noexcept;
   void store(const collision::PairQueryResult& query) noexcept;
+  /// Of gaps up to `margin` [m], without a list.
+  [[nodiscard]] collision::PairQuery gapQuery(const Pose& X_WA, const Pose& X_WB,
+                                              double margin) const noexcept;
   /// Validates a contact read from a checkpoint: indices in range, crossings at pieces of edges.
   [[nodiscard]] bool isIndexValid(const collision::Contact& contact) const noexcept;
   /// Validates a list read from a checkpoint.

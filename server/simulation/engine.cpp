@@ -52,6 +52,8 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
       pair_cells(scene.objects.size(), 0),
       hand_count(scene.hands.size()),
       limits(cappedLimits(options.limits, options.max_speed)),
+      is_switched(scene.pairs.size(), 0),
+      epochs(scene.objects.size(), 0),
       broad_phase(scene),
       touching(contact_lists.size()),
       budget(scene, contact_lists.size()),
@@ -68,6 +70,7 @@ Environment::Engine::Engine(const Scene& scene, const EnvironmentOptions& option
   max_margin = limits.contact_margin + kMaxLookAhead + 2.0 * limits.max_step_length;
   pairs.reserve(scene.pairs.size());
   near.reserve(scene.pairs.size());
+  switched.reserve(scene.pairs.size());
   separated.reserve(scene.pairs.size());
   due.reserve(contact_lists.size());
   non_island.reserve(contact_lists.size());
@@ -115,6 +118,8 @@ void Environment::Engine::setEnabled(std::size_t pair, bool enabled) noexcept {
 
 void Environment::Engine::resetWorkspace() noexcept {
   std::fill(queried.begin(), queried.end(), std::uint8_t{0});
+  switched.clear();
+  std::fill(is_switched.begin(), is_switched.end(), std::uint8_t{0});
   separated.clear();
   due.clear();
   non_island.clear();

@@ -78,6 +78,11 @@ struct Environment::Engine {
   /// which is updated at the end of a tick).
   [[nodiscard]] bool countsAsActive(std::size_t pair) const noexcept;
   void setEnabled(std::size_t pair, bool enabled) noexcept;
+  /// The pair may have begun to collide since the last step.
+  void noteSwitched(std::uint32_t pair) noexcept {
+    if (is_switched[pair] == 0) switched.push_back(pair);
+    is_switched[pair] = 1;
+  }
 
   struct FreeBody {
     RigidBody rigid;
@@ -124,6 +129,9 @@ struct Environment::Engine {
   };
 
   // work space
+  std::vector<std::uint32_t> switched;    ///< pairs of noteSwitched(), each once
+  std::vector<std::uint8_t> is_switched;  ///< by pair
+  std::vector<std::uint32_t> epochs;      ///< by object: at the start of the last step
   BroadPhase broad_phase;
   std::vector<std::uint32_t> separated;            ///< pairs that were near until the tick before
   std::vector<std::uint32_t> due;                  ///< near pairs to be queried in this tick, ascending

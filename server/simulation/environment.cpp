@@ -10,6 +10,9 @@ namespace {
 /// [m] Bounding spheres contain the shell points; the surface between them may bulge out by this, per pair.
 constexpr double kSphereSlack = 5e-3;
 
+/// [m] Depth from which a pair that begins to collide makes its held objects jump: 0.5 N at 5000 N/m.
+constexpr double kOverlap = 1e-4;
+
 }  // namespace
 
 Environment::Environment(std::shared_ptr<const Scene> scene, const EnvironmentOptions& options)
@@ -35,6 +38,7 @@ Environment::Environment(std::shared_ptr<const Scene> scene, const EnvironmentOp
     setHandStiffness(HandId{static_cast<std::uint32_t>(i)}, {});
   }
   for (std::size_t i = 0; i < pairs_.size(); ++i) pairs_[i].enabled = engine_->pairs[i].enabled();
+  noteEpochs();
 }
 
 Environment::~Environment() = default;
@@ -43,6 +47,7 @@ std::string Environment::shareScheduling() { return engine_->pool.shareSchedulin
 
 void Environment::setPairEnabled(std::size_t pair, bool enabled) noexcept {
   if (pair >= pairs_.size()) return;
+  if (enabled && !engine_->pairs[pair].enabled()) engine_->noteSwitched(static_cast<std::uint32_t>(pair));
   engine_->active_pairs -= engine_->countsAsActive(pair) ? 1U : 0U;
   engine_->setEnabled(pair, enabled);
   engine_->active_pairs += engine_->countsAsActive(pair) ? 1U : 0U;
@@ -58,6 +63,7 @@ void Environment::setGroup(ObjectId object, std::uint32_t group) noexcept {
   engine_->groups[object.value] = group;
   for (const std::uint32_t pair : engine_->pairsOf(object.value)) {
     engine_->active_pairs += engine_->countsAsActive(pair) ? 1U : 0U;
+    engine_->noteSwitched(pair);
   }
   wake(object);
   wakeNeighbours(object);
@@ -76,7 +82,10 @@ void Environment::contribute(ObjectId object, std::uint32_t source, const Wrench
 
 void Environment::step() noexcept {
   ++tick_;
+  findEmerged();
+  declareOverlaps();
   followTrackers();
+  limitSharedCouplings();
   findMovable();
   wakeTouchedBodies();
   integrateFreeMotion();
@@ -92,6 +101,39 @@ void Environment::step() noexcept {
   updateContactFlags();
   countWork();
   for (HandMotion& hand : hands_) hand.X_WH_before = hand.X_WH;
+}
+
+/// A held object that lies in another one since inputs let the two collide is pushed out of it: a jump.
+void Environment::declareOverlaps() noexcept {
+  Engine& engine = *engine_;
+  for (const std::uint32_t i : engine.switched) {
+    engine.is_switched[i] = 0;
+    const CollPair& pair = engine.pairs[i];
+    const auto [a, b] = std::pair(pair.spec().a, pair.spec().b);
+    if (pair.spec().sensing || !active(i) || (!isPulled(a) && !isPulled(b))) continue;
+    const Vector3 p_QaQb_W = objects_[b.value].X_WO * centreOf(b) - objects_[a.value].X_WO * centreOf(a);
+    if (p_QaQb_W.norm() > engine.sizes[a.value].ball_radius + engine.sizes[b.value].ball_radius) continue;
+    const double gap = pair.findGap(objects_[a.value].X_WO, objects_[b.value].X_WO, kOverlap,
+                                    engine.gap_query, engine.feature_scratch[0]);
+    if (gap > -kOverlap) continue;
+    for (const ObjectId object : {a, b}) {
+      // once in a tick: those same inputs may have let it jump already
+      const bool has_jumped = objects_[object.value].epoch != engine.epochs[object.value];
+      if (isPulled(object) && !has_jumped) beginEpoch(object);
+    }
+  }
+  engine.switched.clear();
+  noteEpochs();
+}
+
+void Environment::noteEpochs() noexcept {
+  for (std::size_t i = 0; i < objects_.size(); ++i) engine_->epochs[i] = objects_[i].epoch;
+}
+
+bool Environment::isPulled(ObjectId object) const noexcept {
+  for (std::uint32_t i = 0; i < hands_.size(); ++i)
+    if (pulls(HandId{i}, object)) return true;
+  return false;
 }
 
 void Environment::followTrackers() noexcept {
@@ -112,9 +154,11 @@ void Environment::followTrackers() noexcept {
 
 bool Environment::active(std::size_t pair) const noexcept {
   const CollPair& one = engine_->pairs[pair];
-  return one.enabled() && one.possible() && !engine_->inOneGroup(pair) &&
-         objects_[one.spec().a.value].status != ObjectStatus::kHidden &&
-         objects_[one.spec().b.value].status != ObjectStatus::kHidden;
+  const auto collides = [this](ObjectId object) {
+    return objects_[object.value].status != ObjectStatus::kHidden && !objects_[object.value].emerging;
+  };
+  return one.enabled() && one.possible() && !engine_->inOneGroup(pair) && collides(one.spec().a) &&
+         collides(one.spec().b);
 }
 
 double Environment::speedCap(ObjectId object) const noexcept {
@@ -151,8 +195,9 @@ Twist Environment::twistOver(const Displacement& motion, ObjectId object) const 
 
 collision::Spring Environment::springOf(HandId hand) const noexcept {
   const HandMotion& motion = hands_[hand.value];
-  return {motion.X_WH * motion.X_HO, motion.X_HO.inverse().translation(), motion.stiffness.translational,
-          motion.stiffness.rotational};
+  const HandStiffness stiffness = couplingOf(hand);
+  return {motion.X_WH * motion.X_HO, motion.X_HO.inverse().translation(), stiffness.translational,
+          stiffness.rotational};
 }
 
 collision::MovableBody Environment::movableBody(ObjectId object) noexcept {
@@ -166,8 +211,7 @@ collision::MovableBody Environment::heldBody(ObjectId object) const noexcept {
   body.radius = engine_->sizes[object.value].radius;
   for (std::size_t i = 0; i < hands_.size(); ++i) {
     const HandId hand{static_cast<std::uint32_t>(i)};
-    const bool coupled = scene_->hands[i].kind == HandKind::kCoupled;
-    if (coupled && engaged(hands_[i]) && hands_[i].object == object) body.springs.push_back(springOf(hand));
+    if (pulls(hand, object)) body.springs.push_back(springOf(hand));
   }
   collision::Spring& first = body.springs[0];
   if (first.stiffness <= 0.0) return body;
@@ -185,18 +229,13 @@ collision::MovableBody Environment::heldBody(ObjectId object) const noexcept {
 
 void Environment::findMovable() noexcept {
   std::fill(engine_->movable.begin(), engine_->movable.end(), std::uint8_t{0});
-  for (std::size_t i = 0; i < hands_.size(); ++i) {
-    const HandMotion& hand = hands_[i];
-    if (scene_->hands[i].kind == HandKind::kCoupled && engaged(hand) && isObject(hand.object)) {
-      engine_->movable[hand.object.value] = 1;
-    }
+  // a hand that is frozen lets others move what it holds with them; alone it keeps the object at its pose
+  for (std::uint32_t i = 0; i < hands_.size(); ++i) {
+    const ObjectId object = hands_[i].object;
+    if (isObject(object) && pulls(HandId{i}, object)) engine_->movable[object.value] = 1;
   }
   for (std::uint32_t i = 0; i < objects_.size(); ++i) {
     if (isDynamic(ObjectId{i})) engine_->movable[i] = 1;
-  }
-  // a single frozen hand keeps the object at its pose, whatever other hands hold it
-  for (const HandMotion& hand : hands_) {
-    if (isObject(hand.object) && engaged(hand) && hand.frozen) engine_->movable[hand.object.value] = 0;
   }
 }
 

@@ -25,21 +25,24 @@ struct ObjectMotion {
   ObjectStatus status = ObjectStatus::kParked;
   HandId holder;  ///< the first hand that holds it; invalid when none does
   bool in_contact = false;
-  bool asleep = false;           ///< free body at rest: not integrated until it is woken
+  bool asleep = false;    ///< free body at rest: not integrated until it is woken
+  bool emerging = false;  ///< appeared at its hand inside another object: without contacts until it is out
   std::uint32_t rest_ticks = 0;  ///< [ticks] a free body has been below the sleep speed
 };
 
 /// State of a hand. Index = HandId.
 struct HandMotion {
   bool present = false;     ///< a client controls it
-  bool frozen = false;      ///< its object is kept at its pose
+  bool frozen = false;      ///< its coupling exerts no force
   ObjectId object;          ///< the object it moves; invalid: none
   Pose X_WH;                ///< newest device pose
   Twist V_WH;               ///< newest device twist
   Pose X_WH_before;         ///< device pose of the last tick
   Pose X_HO;                ///< of the object in the hand, constant while held
   Wrench F_Ho_W;            ///< of the coupling on the hand, about the hand's origin
-  HandStiffness stiffness;  ///< of the coupling
+  HandStiffness stiffness;  ///< of the coupling, while no other hand holds the object
+  double round_trip = 0.0;  ///< [s] of the link of the hand's station
+  double share = 1.0;       ///< [-] of `stiffness` that is in force, see limitSharedCouplings()
   ObjectId default_object;  ///< moved while the hand holds no other: pointer, drill, cube, forearm
   /// R: where the default object returns to, fixed to the held object O since that was grabbed.
   Pose X_OR;
@@ -111,9 +114,16 @@ class Environment {
   void setHandPresent(HandId hand, bool present) noexcept;
   /// Invalid poses are ignored and counted in HandMotion::rejected_poses.
   void setHandPose(HandId hand, const Pose& X_WH, const Twist& V_WH) noexcept;
-  /// Of the hand's coupling from now on. Numbers that are 0 or not finite: that of HandSpec.
+  /// Of the coupling of a hand whose station has just joined, with a link of its own. Numbers that are 0 or
+  /// not finite: that of HandSpec.
   void setHandStiffness(HandId hand, const HandStiffness& stiffness) noexcept;
-  /// While frozen, the hand's object keeps its pose and the coupling exerts no force.
+  /// `round_trip` [s] of the link of the hand's station: how stiff its coupling is to an object that another
+  /// hand holds, too. Clamped to 0 to 1 s; 0 if it is no number.
+  void setHandRoundTrip(HandId hand, double round_trip) noexcept;
+  /// Of the hand's coupling, in the last tick.
+  [[nodiscard]] HandStiffness couplingOf(HandId hand) const noexcept;
+  /// While frozen, the hand's coupling exerts no force, and its object keeps its pose unless another hand
+  /// moves it; then the hand holds it afterwards where it is, without a stretch of its coupling.
   void setHandFrozen(HandId hand, bool frozen) noexcept;
   /// While paused, free bodies keep their poses; they continue from rest.
   void setFreeBodiesPaused(bool paused) noexcept;
@@ -131,6 +141,8 @@ class Environment {
   /// release; with status kHeld they keep it, with X_HO for the new pose. Ignored for an invalid pose.
   /// Without a hand kHeld and kTracked become kParked, and so does kFree without a mass.
   void place(ObjectId object, const Pose& X_WO, ObjectStatus status) noexcept;
+  /// A held object that begins to collide with one in which it lies, by this, setGroup or place, has a new
+  /// epoch from the next step on. Which pairs began is not saved: checkpoints are taken after a step.
   void setPairEnabled(std::size_t pair, bool enabled) noexcept;
   /// Objects of one group never collide; 0: no group.
   void setGroup(ObjectId object, std::uint32_t group) noexcept;
@@ -208,8 +220,12 @@ class Environment {
   [[nodiscard]] Pose returnPose(const HandMotion& hand) const noexcept;
   void park(ObjectId object, ObjectStatus status) noexcept;
   void updateHolder(ObjectId object) noexcept;
+  [[nodiscard]] bool isMovedByAnother(HandId hand) const noexcept;
   void beginEpoch(ObjectId object) noexcept;
   void markDirty(ObjectId object) noexcept;
+  // two hands on one object (environment_shared.cpp)
+  void limitSharedCouplings() noexcept;
+  [[nodiscard]] double shareFor(HandId hand) const noexcept;
   // free bodies and sleeping (environment_bodies.cpp)
   [[nodiscard]] bool isDynamic(ObjectId object) const noexcept;
   [[nodiscard]] bool moves(ObjectId object) const noexcept;
@@ -234,12 +250,23 @@ class Environment {
   void applyImpulse(ObjectId object, const Vector3& p_WP, const Vector3& impulse_W) noexcept;
 
   [[nodiscard]] bool engaged(const HandMotion& hand) const noexcept { return hand.present && hand.attached; }
+  /// The hand's coupling acts on the object.
+  [[nodiscard]] bool pulls(HandId hand, ObjectId object) const noexcept {
+    const HandMotion& motion = hands_[hand.value];
+    return scene_->hands[hand.value].kind == HandKind::kCoupled && motion.object == object &&
+           engaged(motion) && !motion.frozen;
+  }
+  [[nodiscard]] bool isPulled(ObjectId object) const noexcept;
   [[nodiscard]] bool isHand(HandId hand) const noexcept { return hand.value < hands_.size(); }
   [[nodiscard]] bool isObject(ObjectId object) const noexcept { return object.value < objects_.size(); }
 
   // the tick (environment.cpp)
+  void declareOverlaps() noexcept;
+  void noteEpochs() noexcept;
   void followTrackers() noexcept;
   void findMovable() noexcept;
+  void findEmerged() noexcept;
+  [[nodiscard]] bool isInsideAnother(ObjectId object) noexcept;
   void findReach() noexcept;
   void findNearPairs() noexcept;
   void findDuePairs() noexcept;

@@ -30,7 +30,7 @@ void Environment::sumForces() noexcept {
     const std::size_t object = hand.object.value;
     const Pose& X_WO = objects_[object].X_WO;
     const Vector3 p_QH_W = hand.X_WH.translation() - X_WO * centreOf(hand.object);
-    if (engine.movable[object] != 0) {
+    if (pulls(id, hand.object)) {
       const Wrench F_Oq_W = shifted(collision::springWrench(springOf(id), X_WO), toCentre(hand.object));
       engine.forces[object].write(engine.couplingCell(hand.object, id), F_Oq_W, tick_);
       hand.F_Ho_W = -shifted(F_Oq_W, p_QH_W);

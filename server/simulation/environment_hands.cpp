@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "server/simulation/engine.h"
 #include "server/simulation/environment.h"
@@ -14,6 +16,9 @@ bool isPose(const Pose& X) {
   if (!X.isFinite() || X.translation().cwiseAbs().maxCoeff() > kMaxCoordinate) return false;
   return std::abs(X.rotation().squaredNorm() - 1.0) < kUnitTolerance;
 }
+
+/// [m] An object that appears at its hand deeper than this in another one has no contacts until it is out.
+constexpr double kEmergedDepth = 1e-3;
 
 /// [m] Between a hand that comes back and the place where it held its object.
 constexpr double kGraspReach = 5e-3;
@@ -53,9 +58,10 @@ void Environment::setHandPose(HandId hand, const Pose& X_WH, const Twist& V_WH) 
   motion.has_pose = true;
   if (motion.attached || !isObject(motion.object)) return;
   // what was taken away from its hand is held again where it was held, not from wherever the hand comes back
+  const ObjectMotion& object = objects_[motion.object.value];
   const bool was_held = motion.object != motion.default_object && !(motion.X_HO.translation().isZero(0.0)) &&
-                        objects_[motion.object.value].status == ObjectStatus::kParked;
-  const Vector3 p_WG = (objects_[motion.object.value].X_WO * motion.X_HO.inverse()).translation();
+                        (object.status == ObjectStatus::kParked || object.holder.valid());
+  const Vector3 p_WG = (object.X_WO * motion.X_HO.inverse()).translation();
   if (was_held && (motion.X_WH.translation() - p_WG).norm() > kGraspReach) return;
   attachHand(hand);
 }
@@ -68,15 +74,30 @@ void Environment::setHandStiffness(HandId hand, const HandStiffness& stiffness) 
   };
   hands_[hand.value].stiffness = {known(stiffness.translational, spec.stiffness),
                                   known(stiffness.rotational, spec.rotational_stiffness)};
+  hands_[hand.value].round_trip = 0.0;
+  hands_[hand.value].share = 1.0;
 }
 
 void Environment::setHandFrozen(HandId hand, bool frozen) noexcept {
   if (!isHand(hand) || hands_[hand.value].frozen == frozen) return;
-  hands_[hand.value].frozen = frozen;
-  const ObjectId object = hands_[hand.value].object;
-  if (!isObject(object)) return;
-  objects_[object.value].V_WO = Twist{};
-  markDirty(object);
+  HandMotion& motion = hands_[hand.value];
+  motion.frozen = frozen;
+  if (!isObject(motion.object)) return;
+  ObjectMotion& object = objects_[motion.object.value];
+  markDirty(motion.object);
+  const bool coupled = scene_->hands[hand.value].kind == HandKind::kCoupled;
+  if (!coupled || engine_->movable[motion.object.value] == 0 || !isMovedByAnother(hand)) {
+    object.V_WO = Twist{};
+  } else if (!frozen && motion.attached) {
+    motion.X_HO = motion.X_WH.inverse() * object.X_WO;
+  }
+}
+
+/// Another hand's coupling acts on the object that this hand holds.
+bool Environment::isMovedByAnother(HandId hand) const noexcept {
+  for (std::uint32_t i = 0; i < hands_.size(); ++i)
+    if (i != hand.value && pulls(HandId{i}, hands_[hand.value].object)) return true;
+  return false;
 }
 
 void Environment::grab(HandId hand, ObjectId object) noexcept {
@@ -154,6 +175,7 @@ void Environment::place(ObjectId object, const Pose& X_WO, ObjectStatus status) 
     motion.status = needs_hand || massless ? ObjectStatus::kParked : status;
   }
   beginEpoch(object);
+  for (const std::uint32_t pair : engine_->pairsOf(object.value)) engine_->noteSwitched(pair);
 }
 
 /// The hand has a pose; from now on its object follows it.
@@ -167,6 +189,7 @@ void Environment::attachHand(HandId hand) noexcept {
     const bool own = motion.object == motion.default_object;
     motion.X_HO = own ? Pose::Identity() : Pose(Vector3(-centreOf(motion.object)));
     object.X_WO = motion.X_WH * motion.X_HO;
+    object.emerging = scene_->hands[hand.value].kind == HandKind::kCoupled;
   } else {
     motion.X_HO = motion.X_WH.inverse() * object.X_WO;
   }
@@ -177,6 +200,31 @@ void Environment::attachHand(HandId hand) noexcept {
   object.status =
       scene_->hands[hand.value].kind == HandKind::kTracked ? ObjectStatus::kTracked : ObjectStatus::kHeld;
   beginEpoch(motion.object);
+}
+
+/// Objects that appeared at their hands this tick, or inside others before it: those that are out collide
+/// from now on, which is a jump where they still overlap.
+void Environment::findEmerged() noexcept {
+  for (std::uint32_t i = 0; i < objects_.size(); ++i) {
+    if (!objects_[i].emerging || isInsideAnother(ObjectId{i})) continue;
+    objects_[i].emerging = false;
+    for (const std::uint32_t pair : engine_->pairsOf(i)) engine_->noteSwitched(pair);
+  }
+}
+
+bool Environment::isInsideAnother(ObjectId object) noexcept {
+  Engine& engine = *engine_;
+  if (objects_[object.value].status == ObjectStatus::kHidden) return false;
+  const auto pairs = engine.pairsOf(object.value);
+  return std::any_of(pairs.begin(), pairs.end(), [&](std::uint32_t i) {
+    const CollPair& pair = engine.pairs[i];
+    const auto [a, b] = std::pair(pair.spec().a, pair.spec().b);
+    const ObjectId other = a == object ? b : a;
+    const bool collides = pair.enabled() && pair.possible() && !pair.spec().sensing &&
+                          !engine.inOneGroup(i) && objects_[other.value].status != ObjectStatus::kHidden;
+    if (!collides) return false;
+    return pair.findDepth(objects_[a.value].X_WO, objects_[b.value].X_WO, engine.gap_query) > kEmergedDepth;
+  });
 }
 
 /// Pose of the hand's default object; while the hand holds another one, its pose relative to that is

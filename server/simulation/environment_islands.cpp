@@ -19,7 +19,7 @@ double Environment::ownWay(ObjectId object) noexcept {
   const HandMotion* holder = nullptr;
   for (std::size_t i = 0; i < hands_.size(); ++i) {
     const HandMotion& hand = hands_[i];
-    if (scene_->hands[i].kind != HandKind::kCoupled || !engaged(hand) || hand.object != object) continue;
+    if (!pulls(HandId{static_cast<std::uint32_t>(i)}, object)) continue;
     // hands in opposite directions turn the object by more than any of them moves
     if (holder != nullptr) return travelCap(object);
     holder = &hand;

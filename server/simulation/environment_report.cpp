@@ -50,6 +50,22 @@ ManifoldContact manifoldContact(const collision::Contact& contact, ObjectId othe
   return result;
 }
 
+/// The spring that exerts F_Bq_W on a body at X_WB, and about that near it: a goal that is far away, and a
+/// coupling that is soft beside that of any hand.
+HandPull softPull(const Wrench& F_Bq_W, const Pose& X_WB, const Vector3& p_BQ) {
+  constexpr double kSoft = 1.0;            // [N/m]
+  constexpr double kSoftRotational = 1.0;  // [Nm/rad]
+  constexpr double kLargestTurn = 1.0;     // [rad] of the goal
+  const double rotational = std::max(kSoftRotational, F_Bq_W.torque.norm() / kLargestTurn);
+  HandPull pull;
+  pull.X_WG.rotation() = (expRotation(F_Bq_W.torque / rotational) * X_WB.rotation()).normalized();
+  pull.X_WG.translation() = X_WB * p_BQ + F_Bq_W.force / kSoft - pull.X_WG.rotation() * p_BQ;
+  pull.p_BoC_B = p_BQ;
+  pull.stiffness = kSoft;
+  pull.rotational_stiffness = rotational;
+  return pull;
+}
+
 /// The bodies of the contacts, so that a jump of one is known; where they are more than the table has places
 /// for, those with the smallest gaps.
 void listBodies(std::span<const ObjectMotion> objects, HandManifold& out) {
@@ -123,8 +139,9 @@ void Environment::manifold(HandId hand, HandManifold& out) const noexcept {
   out.object = motion.object;
   out.X_HO = motion.X_HO;
   out.F_Ho_W = motion.F_Ho_W;
-  out.stiffness = motion.stiffness.translational;
-  out.rotational_stiffness = motion.stiffness.rotational;
+  const HandStiffness stiffness = couplingOf(hand);
+  out.stiffness = stiffness.translational;
+  out.rotational_stiffness = stiffness.rotational;
   out.frozen = motion.frozen;
   out.validity_radius = 0.0;
   out.others.clear();
@@ -142,12 +159,14 @@ void Environment::listOtherCouplings(HandId hand, HandManifold& out) const noexc
   const ObjectId object = hands_[hand.value].object;
   if (engine_->movable[object.value] == 0) return;
   for (std::uint32_t i = 0; i < hands_.size() && !out.others.full(); ++i) {
-    const bool coupled = scene_->hands[i].kind == HandKind::kCoupled;
-    if (i == hand.value || !coupled || hands_[i].object != object || !engaged(hands_[i])) continue;
+    if (i == hand.value || !pulls(HandId{i}, object)) continue;
     const collision::Spring spring = springOf(HandId{i});
     out.others.push_back(
         {HandId{i}, spring.X_WG, spring.p_BC, spring.stiffness, spring.rotational_stiffness});
   }
+  const Wrench F_Oq_W = engine_->forces[object.value].contributed(tick_);
+  if (F_Oq_W.force.isZero(0.0) && F_Oq_W.torque.isZero(0.0)) return;
+  out.others.push_back(softPull(F_Oq_W, objects_[object.value].X_WO, centreOf(object)));
 }
 
 void Environment::listContacts(ObjectId object, HandManifold& out) const noexcept {

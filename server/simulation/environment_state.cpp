@@ -9,7 +9,7 @@ namespace tenon::simulation {
 namespace {
 
 /// Incremented with every change of the archived fields.
-constexpr std::uint32_t kStateVersion = 10;
+constexpr std::uint32_t kStateVersion = 12;
 
 template <typename Archive, typename Motion>
 void archiveObject(Archive& archive, Motion& object) {
@@ -19,7 +19,14 @@ void archiveObject(Archive& archive, Motion& object) {
   archive(object.status);
   archive(object.holder);
   archive(object.in_contact);
-  archive(object.asleep);
+  // bit 0: asleep, bit 1: emerging
+  auto flags = static_cast<std::uint8_t>((object.asleep ? 1 : 0) | (object.emerging ? 2 : 0));
+  archive(flags);
+  if constexpr (Archive::kReads) {
+    if (flags > 3) return archive.reject();
+    object.asleep = (flags & 1) != 0;
+    object.emerging = (flags & 2) != 0;
+  }
   archive(object.rest_ticks);
 }
 
@@ -39,6 +46,10 @@ void archiveHand(Archive& archive, Motion& hand) {
   archive(hand.default_object);
   archive(hand.has_pose);
   archive(hand.attached);
+  // the hash has nothing of links where there are none, as in most sessions
+  if (Archive::kHashes && hand.round_trip == 0.0 && hand.share == 1.0) return;
+  archive(hand.round_trip);
+  archive(hand.share);
 }
 
 /// One bit per pair; pairs that are not near have no other state.
@@ -174,6 +185,7 @@ Result<void> Environment::restore(std::span<const std::uint8_t> bytes) {
   free_bodies_paused_ = copy.free_bodies_paused_;
   tick_ = copy.tick_;
   engine_->resetWorkspace();
+  noteEpochs();
   findMovable();
   countWork();
   for (std::uint32_t pair = 0; pair < pairs_.size(); ++pair) updatePairMotion(pair);
@@ -197,7 +209,8 @@ bool Environment::isValid() const noexcept {
          std::all_of(hands_.begin(), hands_.end(), [&](const HandMotion& hand) {
            return validPose(hand.X_WH) && validPose(hand.X_WH_before) && validPose(hand.X_HO) &&
                   validPose(hand.X_OR) && hand.stiffness.translational > 0.0 &&
-                  hand.stiffness.rotational > 0.0 && (!hand.object.valid() || isObject(hand.object)) &&
+                  hand.stiffness.rotational > 0.0 && hand.round_trip >= 0.0 && hand.share > 0.0 &&
+                  hand.share <= 1.0 && (!hand.object.valid() || isObject(hand.object)) &&
                   (!hand.default_object.valid() || isObject(hand.default_object));
          });
 }

@@ -40,8 +40,9 @@ struct BodySpec {
 
 /// The constant properties and the initial state of an object.
 struct ObjectSpec {
-  std::string name;   ///< in files and logs
-  std::string title;  ///< on screens
+  std::string name;                   ///< in files and logs
+  std::string title;                  ///< on screens
+  std::vector<LocalizedText> titles;  ///< in each language of the scenario, first `title`
   std::string kind = "part";
   std::string color = "#b0b7bf";
   std::uint32_t group = 0;                      ///< objects of one group never collide; 0: no group

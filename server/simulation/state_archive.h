@@ -24,6 +24,7 @@ namespace tenon::simulation {
 template <typename Derived>
 class StateArchive {
  public:
+  static constexpr bool kHashes = false;
   template <typename T>
   void operator()(T& value) {
     visit(value);
@@ -189,6 +190,7 @@ class ArchiveDoubles : public StateArchive<ArchiveDoubles> {
 class ArchiveHasher : public StateArchive<ArchiveHasher> {
  public:
   static constexpr bool kReads = false;
+  static constexpr bool kHashes = true;
   template <typename T>
   void number(const T& value) {
     if constexpr (std::is_floating_point_v<T>) {

@@ -96,7 +96,7 @@ class Generate(unittest.TestCase):
             (["//@topic A stream lease=1ms lease=2ms", struct], "some.idl:2: 'lease' is there twice: write it once"),
             (["//@topic A stream lose=1ms", struct],
              "some.idl:2: 'lose' is not a parameter: write deadline=10ms, lease=1000ms, lifespan=5000ms, "
-             "late_joiner_depth=1000, lease_by_topic, latched or of_server"),
+             "late_joiner_depth=1000, reader_depth=16, lease_by_topic, latched or of_server"),
             (["//@topic A stream lease=1ms lease_by_topic=yes", struct],
              "some.idl:2: 'lease_by_topic' has no value: write lease_by_topic"),
             (["//@topic A stream lease_by_topic", struct],

@@ -46,7 +46,7 @@ class Commands(unittest.TestCase):
             server.wait_for("step: take_peg", 60)
             listed = self.command(stage, "list")
             self.assertEqual(listed.returncode, 0, listed.stderr)
-            for line in (r"trainee +trainee +right", r"right +trainee", r"1 take_peg +now", r"peg +part"):
+            for line in (r"trainee +trainee +right", r"right +trainee", r"1 take_peg +now", r"peg +part", r"late ticks: \d+; writes to the bus"):
                 self.assertRegex(listed.stdout, line)
             self.assert_refused(stage, "no step '9'", "goto", "9")
             self.assert_accepted(stage, "note", "grip", "too", "high")

@@ -31,7 +31,7 @@ def start_console(stage, port=0, *arguments, shown=None, **env):
     shown = [stage.session] if shown is None else shown
     console = Process("console", [*shown, "--domain", stage.domain, "--port", port, *arguments], stage.out, env)
     stage.processes.append(console)
-    line = console.wait_for(r"^console: http://localhost:\d+/$")
+    line = console.wait_for(r"^console: https?://\S+:\d+/$")
     return console, int(re.search(r":(\d+)/$", line)[1])
 
 
@@ -231,6 +231,37 @@ class Desk(unittest.TestCase):
                 desk.begin("/console")
                 self.assertTrue(desk.ask("deskSit", role="instructor", name="Bob", key=key)["accepted"], "the session's key, typed")
 
+    def test_forces_are_frozen_and_a_person_is_removed(self):
+        with Stage(lockstep=False) as stage:
+            journal = stage.out / "journal.mcap"
+            server = stage.serve("peg_and_box", "--wait-for", "right", "--journal", journal)
+            console, port = start_console(stage, 0, "--role", "instructor")
+            console.wait_for("joined session 'test'")
+            trainee = stage.start("trainee", "--seed", 1)
+            server.wait_for("run: running")
+            with Viewer(port, origin=f"http://localhost:{port}") as desk:
+                desk.begin("/console")
+                refused = desk.ask("deskCommand", words=["freeze", "on"])
+                self.assertEqual((refused["accepted"], refused["code"]), (False, "no_seat"))
+                self.assertTrue(desk.ask("deskSit", role="instructor", name="Ada", key=pass_of(console))["accepted"])
+                refused = desk.ask("deskCommand", words=["goto", "nowhere"])
+                self.assertEqual((refused["accepted"], refused["code"]), (False, "unknown_name"))
+                self.assertEqual(desk.ask("deskCommand", words=["resume"])["code"], "already")
+                self.assertTrue(desk.ask("deskCommand", words=["freeze", "on"])["accepted"])
+                server.wait_for("run: forces frozen")
+                self.assertTrue(desk.ask("deskCommand", words=["skip"])["accepted"], "steps go on")
+                server.wait_for("step skipped")
+                self.assertTrue(desk.ask("deskCommand", words=["freeze", "off"])["accepted"])
+                self.assertEqual(desk.ask("deskCommand", words=["kick", "nobody"])["code"], "unknown_name")
+                self.assertTrue(desk.ask("deskCommand", words=["kick", "trainee"])["accepted"])
+                server.wait_for(r"trainee \(trainee\) was removed by Ada")
+                self.assertEqual(trainee.wait(60), 1, "it does not get its seat again")
+                self.assertIn("you were removed from this session", trainee.text())
+                self.assertTrue(desk.ask("deskCommand", words=["stop"])["accepted"])
+                server.wait(30)
+            again = tenon("resimulate", journal)
+            self.assertEqual(again.returncode, 0, again.stdout + again.stderr)
+
     def test_a_page_from_elsewhere_looks_on_and_no_more(self):
         with Stage() as stage:
             console, port = start_console(stage, 0, "--role", "instructor", "--allow-origin", "https://viewer.example")
@@ -336,8 +367,9 @@ class Player(unittest.TestCase):
 class Browser:
     """Chromium with the page."""
 
-    def __init__(self):
-        self.process = subprocess.Popen(["node", TOOLS / "console_page.mjs", shutil.which("chromium")], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    def __init__(self, **env):
+        self.process = subprocess.Popen(["node", TOOLS / "console_page.mjs", shutil.which("chromium")], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                                        env={**os.environ, **env})
         self.problems = []
 
     def __enter__(self):
@@ -453,11 +485,115 @@ class Page(unittest.TestCase):
             browser("value", expression="navigator.getGamepads = () => [{axes: [0, 1, 0, 0], buttons: []}]")
             browser("await", expression=f"{height} < window.first - 0.02")
             browser("value", expression="navigator.getGamepads = () => []")
+            # help with the depth
+            browser("key", key="d")
+            browser("await", expression="Math.abs(tenon.part.hand.guide?.farther ?? 1) < 0.003 && !tenon.part.hand.isDeepening")
+            # a button that is held, and the release of which is not heard of
+            browser("value", expression="document.querySelector('.hand-tools button').dispatchEvent(new PointerEvent('pointerdown'))")
+            browser("await", expression="Math.abs(tenon.part.hand.guide?.farther ?? 0) > 0.02")
+            browser("value", expression="dispatchEvent(new Event('blur')), window.place = undefined")
+            rests = "(p => { const is = window.place === p; window.place = p; return is; })(tenon.part.hand.now?.hand.p.toArray().map(x => x.toFixed(4)).join())"
+            browser("await", expression=rests)
             browser("key", key="Space")
             browser("await", expression="!tenon.part.hand.isOn && document.querySelector('.arm').hidden")
             server.wait_for("pressed in the browser")
             browser("value", expression="document.querySelector('.take').click()")
             server.wait_for(r"\(trainee\) has left")
+            self.assertEqual(browser.problems, [])
+
+    def test_a_finger_and_a_gamepad_move_a_hand_which_vibrates_on_contact(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            stage.serve(without_timeouts(SCENARIO, stage.out), "--wait-for", "right")
+            console, port = start_console(stage)
+            console.wait_for("joined session 'test'")
+            browser("open", url=f"http://localhost:{port}/", width=390, height=844, theme="light", touch=True)
+            browser("await", expression="tenon.view.models >= 3 && !document.querySelector('.take').hidden")
+            browser("sit down")
+            browser("await", expression="tenon.part.hand.isOn && tenon.part.hand.now.isActive")
+            box = browser("value", expression="(b => [b.left + b.width / 2, b.top + b.height / 2])(tenon.view.canvas.getBoundingClientRect())")
+            height = "[...tenon.session.hands.values()][0].X_WH.p[2]"
+            browser("value", expression=f"window.first = {height}")
+            browser("touch", **{"from": [box[0], box[1] + 20], "to": [box[0], box[1] - 30]})
+            browser("await", expression=f"{height} > window.first + 0.005")
+            # sticks as somebody moves them who follows the line of the way
+            browser("value", expression="""(() => {
+              window.felt = [];
+              navigator.vibrate = (ms) => felt.push(ms);
+              const bound = (x) => Math.max(-1, Math.min(1, x));
+              const pad = (axes) => [{ axes, buttons: [], vibrationActuator: { playEffect: (kind, { strongMagnitude }) => Promise.resolve(felt.push([kind, strongMagnitude])) } }];
+              navigator.getGamepads = () => {
+                const guide = tenon.part.hand?.guide;
+                if (guide === undefined) return pad([0, 0, 0, 0]);
+                const [from, to] = [tenon.view.project(guide.from), tenon.view.project(guide.to)];
+                return pad([bound((to.x - from.x) / 40), bound((to.y - from.y) / 40), 0, bound(-guide.farther / 0.02)]);
+              };
+            })()""")
+            browser("await", expression="felt.some((ms) => ms > 0) && felt.some((effect) => effect[0] === 'dual-rumble' && effect[1] > 0)")
+            browser("await", expression="tenon.session.step.name === 'insert_peg'")
+            self.assertEqual(browser.problems, [])
+
+    def test_no_serious_fault_of_accessibility(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            server = stage.serve("stacking", "--wait-for", "right")
+            _, lobby = start_console(stage, shown=[])
+            console, port = start_console(stage, 0, "--role", "instructor")
+            console.wait_for("joined session 'test'")
+            stage.start("trainee", "--seed", 1)
+            server.wait_for("run: running")
+            with Viewer(port, origin=f"http://localhost:{port}") as desk:  # so that it lasts as long as this test
+                desk.begin("/console")
+                self.assertTrue(desk.ask("deskSit", role="instructor", name="Ada", key=pass_of(console))["accepted"])
+                self.assertTrue(desk.ask("deskCommand", words=["pause"])["accepted"])
+            for theme, width, language in (("dark", 1280, "de-DE"), ("light", 1280, "en-GB"), ("light", 390, "de-DE")):
+                with self.subTest(theme=theme, width=width):
+                    browser("open", url=f"http://localhost:{lobby}/", width=width, height=844, theme=theme, language=language)
+                    browser("await", expression="document.querySelector('.session h2')?.textContent.length > 0")
+                    self.assertEqual(browser("axe"), [], "the list of sessions")
+                    browser("open", url=f"http://localhost:{port}/#pass={pass_of(console)}", width=width, height=844, theme=theme, language=language)
+                    browser("await", expression="document.querySelector('.desk')?.hidden === false && document.querySelector('.step-title') !== null")
+                    self.assertEqual(browser("axe"), [], "the session and the desk")
+                    browser("value", expression="document.querySelector('.desk .more').open = true")
+                    browser("await", expression="document.querySelector('.pairs .switch') !== null")
+                    self.assertEqual(browser("axe"), [], "all of the desk")
+                    browser("value", expression="document.querySelector('.desk .more').open = false, document.querySelector('.sit').click()")
+                    browser("await", expression="document.querySelector('.desk').hidden")
+                    browser("value", expression="document.querySelector('.sit').click()")
+                    browser("await", expression="document.querySelector('dialog[open]') !== null")
+                    self.assertEqual(browser("axe"), [], "the request for a seat")
+            self.assertEqual(browser.problems, [])
+
+    def test_an_instructor_records_switches_a_pair_and_reads_german(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            server = stage.serve("stacking", "--wait-for", "right")
+            folder = stage.out / "recordings"
+            console, port = start_console(stage, 0, "--role", "instructor", "--recordings", folder)
+            console.wait_for("joined session 'test'")
+            stage.start("trainee", "--seed", 1)
+            server.wait_for("run: running")
+            browser("open", url=f"http://localhost:{port}/#pass={pass_of(console)}", width=1280, height=800, theme="light", language="de-DE")
+            browser("await", expression="document.querySelector('.desk')?.hidden === false")
+            browser("value", expression="document.querySelector('[data-command=\"record start\"]').click()")
+            browser("await", expression="tenon.session.recorder?.recording === true && document.querySelector('[data-command=\"record start\"]').hidden")
+            browser("value", expression="document.querySelector('.desk .more').open = true")
+            switch = "[...document.querySelectorAll('.pairs li')].find(row => row.dataset.state !== 'off').querySelector('.switch')"
+            browser("await", expression="document.querySelector('.pairs .switch') !== null")
+            browser("value", expression=f"(window.row = {switch}).click()")
+            server.wait_for("collision .* |: collision")
+            browser("await", expression="window.row.getAttribute('aria-checked') === 'false'")
+            # the server's English in this page's language
+            browser("await", expression="[...document.querySelectorAll('.events li')].some(row => row.textContent.includes('Kollisionen'))")
+            browser("value", expression="document.querySelector('[data-command=\"resume\"]').click()")
+            browser("await", expression="[...document.querySelectorAll('.notice')].some(n => n.textContent === 'Weiter: das ist schon so')")
+            browser("value", expression="document.querySelector('[data-command=\"freeze on\"]').click()")
+            browser("await", expression="[...document.querySelectorAll('.badge')].some(b => b.textContent === 'Kräfte eingefroren')")
+            browser("await", expression="document.querySelector('[data-command=\"freeze on\"]').hidden")
+            titles = "[...tenon.session.objects.keys()].map(id => tenon.session.titleOf(id))"
+            self.assertIn("Klotz", " ".join(browser("value", expression=titles)))
+            browser("value", expression="document.querySelector('[data-command=\"record stop\"]').click()")
+            browser("await", expression="[...document.querySelectorAll('.notice')].some(n => /Aufzeichnung beenden: .*\\.mcap/.test(n.textContent))")
+            [file] = folder.iterdir()
+            self.assertRegex(file.name, r"^test-\d{8}-\d{6}\.mcap$")
+            self.assertGreater(file.stat().st_size, 10_000)
             self.assertEqual(browser.problems, [])
 
     def test_a_recording_is_played_without_a_server(self):
@@ -518,21 +654,37 @@ class Page(unittest.TestCase):
             self.assertEqual(browser.problems, [])
 
 
-def mouse_mounts(test, seed):
-    """A scripted mouse mounts the peg within two minutes; journal and recording of it re-simulate."""
+def without_timeouts(scenario, folder):
+    """A copy in which no step runs out of time, as `tenon demo --you` makes it."""
+    copy = folder / scenario
+    shutil.copytree(SOURCE / "scenarios" / scenario, copy)
+    file = copy / "scenario.yaml"
+    file.write_text(re.sub(r"(?m)^\s*(timeout|on_timeout):.*\n", "", file.read_text(encoding="utf-8")), encoding="utf-8")
+    return copy
+
+
+def mouse_mounts(test, seed, scenario=SCENARIO, part="peg"):
+    """A scripted mouse mounts the first part within two minutes; the journal of it re-simulates."""
     with Stage(lockstep=False) as stage, Browser() as browser:
         journal = stage.out / "journal.mcap"
-        server = stage.serve(SCENARIO, "--wait-for", "right", "--journal", journal)
+        folder = without_timeouts(scenario, stage.out)
+        server = stage.serve(folder, "--wait-for", "right", "--journal", journal)
         console, port = start_console(stage)
         console.wait_for("joined session 'test'")
         browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
         browser("await", expression="tenon.view.models >= 3 && !document.querySelector('.take').hidden")
         browser("sit down")
         server.wait_for("armed by the person at the station|run: running")
-        done = browser("mount", seed=seed, seconds=120, steps=["take_peg", "insert_peg"])
+        done = browser("mount", seed=seed, seconds=120, steps=[f"take_{part}", f"{'insert' if part == 'peg' else 'mount'}_{part}"])
+        if os.environ.get("TENON_MOUSE_LOG"):
+            print(f"{scenario}, seed {seed}: {done.get('seconds')} s", *done["log"], sep="\n", flush=True)
         test.assertIsNotNone(done.get("seconds"), "\n".join(done["log"][-40:]))
-        test.assertEqual(server.wait(60), 0, server.text())
-        again = tenon("resimulate", journal, SOURCE / "scenarios" / SCENARIO)
+        if scenario != SCENARIO:
+            server.signal(signal.SIGTERM)  # after the first part the session would go on
+            server.wait(60)
+        else:
+            test.assertEqual(server.wait(60), 0, server.text())
+        again = tenon("resimulate", journal, folder, *COARSE)
         test.assertEqual(again.returncode, 0, again.stdout + again.stderr)
         test.assertEqual(final_hash(again.stdout), final_hash(server.text()))
         test.assertEqual(browser.problems, [])
@@ -544,6 +696,11 @@ class MouseNightly(unittest.TestCase):
         for seed in range(2, 6):
             with self.subTest(seed=seed):
                 mouse_mounts(self, seed)
+
+    def test_a_mouse_mounts_the_first_part_of_the_engine_bay(self):
+        for seed in range(1, 6):
+            with self.subTest(seed=seed):
+                mouse_mounts(self, seed, "engine_bay", "control_box")
 
 
 if __name__ == "__main__":

@@ -44,7 +44,7 @@ def samples_by_topic(recording):
 
 def figures(summary):
     """What a report says of the session itself: without date, computation times, and who came first."""
-    measured = ("began_ns", "compute_seconds", "messages", "people", "recording", "late_ticks")
+    measured = ("began_ns", "compute_seconds", "messages", "people", "recording", "late_ticks", "slow_writes", "unsent_samples")
     # when a program joined depends on the machine
     events = [event for event in summary["events"] if event["kind"] not in ("join", "leave")]
     return {**{key: value for key, value in summary.items() if key not in measured}, "events": events}
@@ -113,13 +113,15 @@ class DemoCase(unittest.TestCase):
                 for topic, recorded, published in re.findall(r"(?m)^  (\w+): (\d+) of (\d+) samples$", said)}
         self.assertEqual(rows["TickInput"], (ticks, ticks))
         contained = samples_by_topic(out / "session.mcap")
-        for topic, a_tick in (("WorldFrame_1k", 1), ("HandManifold", manifolds_a_tick)):
-            recorded, published = rows[topic]
-            self.assertEqual(recorded, published, topic)
-            # a period that had begun when the recorder's welcome came is recorded, and not counted
-            self.assertGreaterEqual(contained[topic], published, topic)
-            # more when a station on a busy machine asked for a tick again
-            self.assertGreaterEqual(contained[topic], a_tick * ticks, topic)
+        recorded, published = rows["HandManifold"]
+        self.assertEqual(recorded, published)
+        self.assertGreaterEqual(published, manifolds_a_tick * (ticks - 1000), "received and counted each")
+        # of ten ticks one is kept
+        self.assertGreaterEqual(contained["HandManifold"], manifolds_a_tick * (ticks // 10))
+        self.assertLess(contained["HandManifold"], published // 5)
+        for topic in ("WorldFrame_1k", "DeviceInput"):
+            self.assertNotIn(topic, rows)
+            self.assertEqual(contained.get(topic, 0), 0, topic)
         for topic in ("WorldFrame_100", "WorldFrame_30", "TickStats_100", "StepProgress", "ObjectSnapshot", "GrabState"):
             self.assertEqual(contained[topic], rows[topic][1], topic)
             self.assertEqual(*rows[topic], topic)
@@ -265,11 +267,13 @@ class RealTime(DemoCase):
         scenario.write_text(text.replace("timeout: 60 s", "timeout: 4 s"), encoding="utf-8")
         demo = self.start("--scenario", scenario.parent, lockstep=False)
         said = self.wait_for_first_step(demo)
-        for _ in range(10):  # a station that stalls, as on a busy machine
-            os.kill(self.process_of("trainee"), signal.SIGSTOP)
-            time.sleep(0.15)
-            os.kill(self.process_of("trainee"), signal.SIGCONT)
-            time.sleep(0.05)
+        trainee = self.process_of("trainee")
+        with contextlib.suppress(ProcessLookupError):  # it ends with the session, after four seconds
+            for _ in range(10):  # a station that stalls, as on a busy machine
+                os.kill(trainee, signal.SIGSTOP)
+                time.sleep(0.15)
+                os.kill(trainee, signal.SIGCONT)
+                time.sleep(0.05)
         said += demo.communicate(timeout=120)[0]
         self.assertEqual(demo.returncode, 1, said)
         server = (self.folder / "out" / "serve.log").read_text(encoding="utf-8")

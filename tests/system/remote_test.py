@@ -3,7 +3,7 @@ import subprocess
 import sys
 import unittest
 
-from stage import COARSE, SOURCE, Stage, final_hash, tenon
+from stage import SOURCE, Stage, final_hash, tenon
 
 CLIENT = SOURCE / "clients" / "remote_hand" / "remote_hand.py"
 SCENARIO = SOURCE / "scenarios" / "peg_and_box"
@@ -26,7 +26,7 @@ class Remote(unittest.TestCase):
             self.assertEqual(station.wait(30), 0, station.text())
             self.assertFalse(path.exists(), "the station removes its socket")
             for file in (journal, recording):
-                again = tenon("resimulate", file, SCENARIO, *(COARSE if file == recording else []))
+                again = tenon("resimulate", file)
                 self.assertEqual(again.returncode, 0, again.stdout + again.stderr)
                 self.assertEqual(final_hash(again.stdout), final_hash(server.text()))
 

@@ -2,15 +2,17 @@
 import os
 import re
 import resource
+import shutil
 import signal
+import struct
 import subprocess
 import time
 import types
 import unittest
 from pathlib import Path
 
-from safety_test import hand_states
-from stage import COARSE, PROGRAMS, SOURCE, TENON, Stage, tenon
+from safety_test import hand_states, messages
+from stage import COARSE, PROGRAMS, SOURCE, TENON, Stage, final_hash, tenon
 
 PEG = SOURCE / "scenarios" / "peg_and_box"
 
@@ -32,6 +34,21 @@ def resume(stage):
     server = stage.start("serve", PEG, "--resume", stage.out / "journal.mcap")
     server.wait_for("is open again after tick", 30)
     return server, time.monotonic() - began
+
+
+def ticks(file):
+    """The ticks whose inputs a journal or a recording has, in their order."""
+    found = []
+    for topic, message in messages(file):
+        if topic == "TickInput" and struct.unpack_from("<I", message)[0] == 0:  # the first part of a tick
+            found.append(struct.unpack_from("<Q", message, 8)[0])
+        if topic == "TickInputs":
+            count = struct.unpack_from("<I", message, 20)[0]
+            tick = 0
+            for code in struct.unpack(f"<{count}Q", bytes(message[24 + i + byte * count] for i in range(count) for byte in range(8))):
+                tick += -(code + 1 >> 1) if code & 1 else code >> 1  # steps, zigzag, byte by byte
+                found.append(tick)
+    return found
 
 
 def resimulated(stage, file="journal.mcap"):
@@ -154,6 +171,108 @@ class KilledServer(unittest.TestCase):
             self.assertEqual(server.wait(120), 0, server.text())
             self.assertEqual(back.wait(60), 0, back.text())
             self.assertResimulates(stage, server)
+
+    def test_who_was_removed_just_before_the_kill_stays_removed_and_is_listed_no_more(self):
+        def command(*words):
+            done = tenon("command", *words, "--session", stage.session, "--domain", stage.domain)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            return done.stdout
+
+        with Stage(lockstep=False) as stage:
+            server = begin(stage, "--wait-for", "right")
+            trainee = stage.start("trainee", "--person", "none", "--wait", 60)
+            observer = stage.start("observer", "--wait", 60)
+            server.wait_for("observer .* has joined", 60)
+            server.wait_for("run: running", 60)
+            self.assertRegex(command("list"), "(?m)^  observer +observer")
+            command("kick", "observer")
+            kill(server)
+            server, _ = resume(stage)
+            trainee.wait_for("rejoined as client", 30)
+            self.assertNotEqual(observer.wait(60), 0, observer.text())
+            self.assertIn("removed", observer.text())
+            self.assertNotRegex(command("list"), "(?m)^  observer +observer")
+            # of a session that goes on too
+            second = stage.start("observer", "--wait", 60)
+            server.wait_for("observer .* has joined", 60)
+            command("kick", "observer")
+            second.wait_for("removed", 60)
+            self.assertNotRegex(command("list"), "(?m)^  observer +observer")
+
+
+class LockstepServer(unittest.TestCase):
+    def test_a_killed_lockstep_session_goes_on_and_resimulates(self):
+        with Stage() as stage:
+            server = begin(stage, "--wait-for", "right")
+            trainee = stage.start("trainee", "--seed", 1, "--wait", 60)
+            server.wait_for("run: running", 300)
+            time.sleep(0.5)  # of a session that takes seconds
+            kill(server)
+            server, _ = resume(stage)
+            trainee.wait_for("rejoined as client", 60)
+            self.assertEqual(server.wait(300), 0, server.text())
+            self.assertIn("everything is mounted", server.text())
+            self.assertEqual(trainee.wait(60), 0, trainee.text())
+            again = resimulated(stage)
+            self.assertEqual(again.returncode, 0, again.stdout + again.stderr)
+            self.assertEqual(final_hash(again.stdout), final_hash(server.text()))
+
+
+class Recordings(unittest.TestCase):
+    # a server may be killed again before its recorder is back, or while it comes back
+    def test_over_kills_at_any_time_a_recording_has_each_tick_of_the_journal_once(self):
+        with Stage(lockstep=False) as stage:
+            server = begin(stage, "--wait-for", "right")
+            recorder = stage.start("record", "-o", stage.out / "session.mcap", "--wait", 20)
+            stage.start("trainee", "--person", "none", "--wait", 60)
+            server.wait_for("run: running", 120)
+            time.sleep(2)
+            for interval in (0.05, 0.6, 0.2, 1.2, 0.1, 0.9, 0.4):
+                kill(server)
+                server, _ = resume(stage)
+                server.wait_for(r"trainee \(trainee\) has rejoined|is not back yet", 30)
+                time.sleep(interval)
+            for _ in range(100):  # the recorder is back in the last life
+                if "recording the resumed session" in recorder.text().splitlines()[-1]:
+                    break
+                time.sleep(0.1)
+            time.sleep(1)
+            command = stage.start("command", "stop")
+            self.assertEqual(command.wait(60), 0, command.text())
+            server.wait(60)
+            self.assertEqual(recorder.wait(60), 0, recorder.text())
+            journal, recording = ticks(stage.out / "journal.mcap"), ticks(stage.out / "session.mcap")
+            self.assertEqual(journal, list(range(1, journal[-1] + 1)))
+            self.assertEqual(recording, journal, recorder.text())
+            self.assertRegex(recorder.text(), rf"TickInput: {journal[-1]} of {journal[-1]} samples")
+
+
+class Elsewhere(unittest.TestCase):
+    # its folder and the cache are gone: the journal alone is there
+    def test_a_journal_of_an_own_scenario_resimulates_where_nothing_else_of_it_is(self):
+        with Stage() as stage:
+            mine = stage.out / "lab" / "mine"
+            (mine.parent / "meshes").mkdir(parents=True)
+            mine.mkdir()
+            parts = Path(os.environ.get("TENON_PARTS", PROGRAMS / "tenon-parts"))
+            subprocess.run([parts, "peg_and_box", mine.parent / "meshes", "--detail", "0.12"], check=True, capture_output=True)
+            text = (PEG / "scenario.yaml").read_text(encoding="utf-8")
+            (mine / "scenario.yaml").write_text(re.sub(r"\{part: (\w+)\}", r"{file: ../meshes/\1.stl}", text), encoding="utf-8")
+            cache = stage.out / "cache"
+            server = stage.start("serve", mine, "--wait-for", "right", "--cache", cache, "--journal", stage.out / "journal.mcap")
+            trainee = stage.start("trainee", "--seed", 1, "--wait", 60)
+            self.assertEqual(server.wait(300), 0, server.text())
+            trainee.wait(60)
+            shutil.rmtree(mine.parent)
+            shutil.rmtree(cache)
+            journal = stage.out / "elsewhere" / "journal.mcap"
+            journal.parent.mkdir()
+            (stage.out / "journal.mcap").rename(journal)
+            again = tenon("resimulate", journal, "--cache", stage.out / "other cache", cwd=journal.parent, timeout=300)
+            self.assertEqual(again.returncode, 0, again.stdout + again.stderr)
+            self.assertIn(f"final state hash: {final_hash(server.text())}", again.stdout)
+            self.assertIn(" 0 gaps", again.stdout)
+            self.assertEqual([file.name for file in journal.parent.iterdir()], ["journal.mcap"])
 
 
 class Service(unittest.TestCase):

@@ -60,10 +60,11 @@ def final_hash(text):
 class Process:
     """A running program, or the station of a role, and its output."""
 
-    def __init__(self, name, arguments, log, env=None):
+    def __init__(self, name, arguments, log, env=None, inside=()):
+        """`inside`: what starts it elsewhere, as `ip netns exec NAME`."""
         self.name, self.log, self.lines = name, log, []
         program = ["join", "--role", name] if name in ("trainee", "instructor") else [name]
-        self.popen = subprocess.Popen([PROGRAMS / f"tenon-{program[0]}", *program[1:], *map(str, arguments)], stdout=subprocess.PIPE,
+        self.popen = subprocess.Popen([*inside, PROGRAMS / f"tenon-{program[0]}", *program[1:], *map(str, arguments)], stdout=subprocess.PIPE,
                                       stdin=subprocess.DEVNULL, stderr=subprocess.STDOUT, text=True,
                                       env={**os.environ, **(env or {})})
         self.changed = threading.Condition()

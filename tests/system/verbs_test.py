@@ -31,7 +31,7 @@ class Verbs(unittest.TestCase):
     def test_doctor_checks_every_item(self):
         done = tenon("doctor")
         self.assertEqual(done.returncode, 0, done.stdout)
-        programs = [file for file in PROGRAMS.glob("tenon-*") if file.name != "tenon-bench"]
+        programs = [file for file in PROGRAMS.glob("tenon-*") if not file.name.startswith("tenon-bench")]
         self.assertIn(f" {len(programs)} programs are there", done.stdout)
         for point in ("system", "processor", "programs", "real time", "memory", "bus", "disk"):
             self.assertRegex(done.stdout, rf"(?m)^(good|note) +{point}")

@@ -22,9 +22,19 @@ class Closed(Exception):
     """The server has closed the connection; `reason` is what it said."""
 
 
-def request(port, head, body=b"", timeout=20):
+def connect(port, tls=None, timeout=20, receive_buffer=None):
+    """A connection to a port of this machine; `tls`: an ssl.SSLContext."""
+    connection = socket.socket()
+    if receive_buffer:
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
+    connection.settimeout(timeout)
+    connection.connect(("127.0.0.1", port))
+    return tls.wrap_socket(connection, server_hostname="localhost") if tls else connection
+
+
+def request(port, head, body=b"", timeout=20, tls=None):
     """The status and the whole answer to an HTTP request of these bytes."""
-    with socket.create_connection(("127.0.0.1", port), timeout) as connection:
+    with connect(port, tls, timeout) as connection:
         connection.sendall(head.encode("latin-1") + body)
         answer = b""
         try:
@@ -35,17 +45,13 @@ def request(port, head, body=b"", timeout=20):
     return int(answer.split(b" ", 2)[1]) if answer else None, answer
 
 
-def get(port, path, host=None, method="GET"):
-    return request(port, f"{method} {path} HTTP/1.1\r\nHost: {host or f'localhost:{port}'}\r\nConnection: close\r\n\r\n")
+def get(port, path, host=None, method="GET", tls=None):
+    return request(port, f"{method} {path} HTTP/1.1\r\nHost: {host or f'localhost:{port}'}\r\nConnection: close\r\n\r\n", tls=tls)
 
 
 class Viewer:
-    def __init__(self, port, subprotocol="foxglove.sdk.v1", origin=None, host=None, receive_buffer=None, path="/"):
-        self.socket = socket.socket()
-        if receive_buffer:
-            self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
-        self.socket.settimeout(30)
-        self.socket.connect(("127.0.0.1", port))
+    def __init__(self, port, subprotocol="foxglove.sdk.v1", origin=None, host=None, receive_buffer=None, path="/", tls=None):
+        self.socket = connect(port, tls, 30, receive_buffer)
         lines = [f"GET {path} HTTP/1.1", f"Host: {host or f'localhost:{port}'}", "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
                  f"Sec-WebSocket-Key: {base64.b64encode(os.urandom(16)).decode()}"]
         lines += [f"Sec-WebSocket-Protocol: {subprotocol}"] if subprotocol else []

@@ -1,7 +1,7 @@
-# Builds the console's page from SOURCE into PAGE, in a copy below WORK, so that the source tree stays as it is. A page that cannot be
+# Builds the console's page from SOURCE into PAGE, and that of reports into REPORT, in a copy below WORK, so that the source tree stays as it is. A page that cannot be
 # built is a warning: the gateway serves public viewers without it, and says what is missing.
-file(REMOVE_RECURSE ${PAGE})
-file(MAKE_DIRECTORY ${WORK} ${PAGE})
+file(REMOVE_RECURSE ${PAGE} ${REPORT})
+file(MAKE_DIRECTORY ${WORK} ${PAGE} ${REPORT})
 file(REMOVE_RECURSE ${WORK}/src)
 file(COPY ${SOURCE}/ DESTINATION ${WORK} PATTERN node_modules EXCLUDE)
 # the libraries again only when their list has changed
@@ -28,6 +28,10 @@ if(NOT page_failed)
 endif()
 if(NOT page_failed)
   run_or_warn("bundling it (vite)" ${NODE} node_modules/vite/bin/vite.js build --outDir ${PAGE} --emptyOutDir false --logLevel warn)
+endif()
+if(NOT page_failed)
+  run_or_warn("bundling the report's page (vite)" ${NODE} node_modules/vite/bin/vite.js build --config report.config.ts --outDir ${REPORT}
+              --emptyOutDir false --logLevel warn)
 endif()
 if(NOT page_failed)
   # what the page contains of others comes with their licences

@@ -26,6 +26,25 @@ enum class CommandKind : std::uint32_t {
   kRepeatStep,          ///< the current step from its begin
   kHandOver,            ///< text "OBJECT HAND": the hand takes the object from whoever holds it
   kNote,                ///< text: a remark, for the recording and the report
+  kGuide,         ///< text "show|together|off|... HAND ...": guidance of a trainee's hand (docs/mentoring.md)
+  kFreezeForces,  ///< value 1: hands are held still and display no force, the steps go on; 0: no more
+  kKick,          ///< text: name, or number of the client, of who has to leave, then perhaps a reason
+};
+
+/// Why a command is refused, for displays that say it in their own language.
+enum class Refusal : std::uint32_t {
+  kNone,          ///< it was accepted
+  kOther,         ///< `reason` says it
+  kNotJoined,     ///< the server does not know the client
+  kNotPermitted,  ///< to its role
+  kOver,          ///< the run is over
+  kWaiting,       ///< for people, before the run
+  kAlready,       ///< the session is in the state that was asked for
+  kUnknownName,   ///< of a step, signal, object, hand, pair or person
+  kNotYourHand,   ///< the client does not control it
+  kNotHoldable,   ///< no hand takes the object, or this hand takes none
+  kNobodyThere,   ///< nobody moves the hand
+  kTooMany,       ///< commands wait until the session continues
 };
 
 /// A client's request to the session, acknowledged by a CommandAck with the same id.
@@ -43,6 +62,7 @@ struct CommandAck {
   std::uint32_t id = 0;
   bool accepted = false;  ///< it takes effect
   std::string reason;     ///< of a refusal
+  Refusal refusal = Refusal::kNone;
 };
 
 }  // namespace tenon

@@ -58,7 +58,9 @@ struct HandManifold {
       0.0;  ///< [m] displacement of the object's points within which no unlisted contact can occur
   std::uint32_t step_revision = 0;
   bool frozen = false;  ///< the object is held still: stale input, pause or emergency stop
-  FixedVector<HandPull, kOtherPulls> others;  ///< other hands that hold the object, by HandId
+  /// Other hands that hold the object, by HandId; after them, with an invalid one and as a soft spring whose
+  /// goal is far away, what other sources contribute (ForceContribution).
+  FixedVector<HandPull, kOtherPulls> others;
   FixedVector<ManifoldContact, kManifoldContacts> contacts;
   /// The bodies of `contacts`, those with the smallest gaps, so that a station knows of their jumps as it
   /// does by object_epoch of the held object's

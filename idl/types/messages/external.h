@@ -24,7 +24,7 @@ struct ExternalPose {
   ObjectId object;
   ClientId client;
   Pose X_WO;
-  std::uint32_t lifetime_ticks = 0;  ///< [ticks] reserved
+  std::uint32_t lifetime_ticks = 0;  ///< [ticks] for which it replaces the own tracker, if any; at most 1000
 };
 
 }  // namespace tenon

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 
+#include "idl/types/fixed_vector.h"
 #include "idl/types/ids.h"
 #include "idl/types/spatial.h"
 
@@ -27,6 +28,22 @@ struct HandStiffness {
   double rotational = 0.0;     ///< [Nm/rad] 0: not known, or no torque
 };
 
+/// [ticks] limits of a hand that sends nothing, on a link without faults, and the most that a link may ask
+/// for.
+inline constexpr std::uint32_t kFreezeTicks = 50, kMostFreezeTicks = 150;
+inline constexpr std::uint32_t kParkTicks = 1000, kMostParkTicks = 2000;
+
+/// Reaction to the age of a hand's newest device sample.
+struct HandLimits {
+  std::uint32_t freeze_ticks = kFreezeTicks;  ///< [ticks] above it the hand is held still
+  std::uint32_t park_ticks = kParkTicks;      ///< [ticks] from it on it counts as absent
+
+  bool operator==(const HandLimits&) const = default;
+};
+
+/// Samples before the newest one that an input carries.
+inline constexpr std::size_t kEarlierSamples = 2;
+
 /// Pose of one hand's device, from its station to the server in every client tick.
 struct DeviceInput {
   HandId hand;
@@ -34,6 +51,8 @@ struct DeviceInput {
   std::uint32_t server_epoch = 0;
   bool active = false;  ///< false: fault, stop or disarmed; the server holds the object still
   DeviceSample sample;
+  /// The samples before it, newest first, in case their inputs are lost; none where the link loses nothing.
+  FixedVector<DeviceSample, kEarlierSamples> earlier;
   /// [m] C_w, centre of the client's workspace (paper eq. 1). Reserved: the server does not read it yet
   Vector3 p_WC = Vector3::Zero();
 };
@@ -51,16 +70,40 @@ struct HandState {
   bool indexing = false;                  ///< the centre of the workspace is moving (paper eq. 1)
   std::array<std::uint8_t, 6> tactors{};  ///< intensities of a vibrotactile bracelet, 0..255
   float peak_force = 0.0F;                ///< [N] largest displayed since the last sample, this one included
+  float guidance_force = 0.0F;  ///< [N] of the virtual fixture, in what the safety layer was asked for
 };
 
-/// Virtual fixture that guides a hand.
+/// What a virtual fixture does with a hand.
+enum class GuidanceMode : std::uint32_t {
+  kOff,
+  kLead,    ///< pulls the hand to the fixture
+  kResist,  ///< holds back what leads away from the fixture; towards it the hand is free
+};
+
+/// Where a virtual fixture leaves the hand free. F is the fixture's frame.
+enum class FixtureKind : std::uint32_t {
+  kPose,   ///< nowhere: the hand belongs at the origin of F, and turned as F if there is a rotational
+           ///< stiffness
+  kAxis,   ///< along z of F, through its origin
+  kPlane,  ///< in the plane of x and y of F
+  kTube,   ///< within `radius` of the axis
+};
+
+/// Virtual fixture that guides a hand: a spring and a damper, which the hand's station evaluates. Sent in
+/// each tick; what is not renewed ends.
 struct Guidance {
-  HandId hand;
+  HandId hand;  ///< that is guided
+  std::uint32_t server_epoch = 0;
   Tick tick = 0;
-  bool active = false;
-  Pose X_WF;               ///< pose of the fixture
-  double stiffness = 0.0;  ///< [N/m]
-  double damping = 0.0;    ///< [Ns/m]
+  std::uint32_t choice = 0;  ///< counts what was chosen: another number is another fixture
+  GuidanceMode mode = GuidanceMode::kOff;
+  FixtureKind kind = FixtureKind::kPose;
+  HandId guide;  ///< the hand that guides
+  Pose X_WF;
+  double radius = 0.0;                ///< [m] of a tube
+  double stiffness = 0.0;             ///< [N/m]
+  double rotational_stiffness = 0.0;  ///< [Nm/rad] 0: the hand turns freely
+  double damping = 0.0;               ///< [Ns/m]
 };
 
 }  // namespace tenon

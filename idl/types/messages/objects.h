@@ -2,9 +2,12 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "idl/types/fixed_vector.h"
 #include "idl/types/ids.h"
+#include "idl/types/messages/hands.h"
+#include "idl/types/messages/localized_text.h"
 #include "idl/types/messages/role.h"
 #include "idl/types/spatial.h"
 
@@ -51,11 +54,12 @@ struct SceneObject {
   std::string name;
   std::string title;
   std::string kind;  ///< how a display draws it: part, tool, pointer, assistant, forearm, head, scene
-  std::string structure_hash;        ///< of the haptic structures, empty for none
-  std::string color;                 ///< `#rrggbb` or `#rrggbbaa`
-  Pose X_WO;                         ///< initial pose
-  Vector3 size = Vector3::Zero();    ///< [m] of the bounding box in the object's frame
-  Vector3 centre = Vector3::Zero();  ///< [m] of the bounding box, in O
+  std::string structure_hash;         ///< of the haptic structures, empty for none
+  std::string color;                  ///< `#rrggbb` or `#rrggbbaa`
+  Pose X_WO;                          ///< initial pose
+  Vector3 size = Vector3::Zero();     ///< [m] of the bounding box in the object's frame
+  Vector3 centre = Vector3::Zero();   ///< [m] of the bounding box, in O
+  std::vector<LocalizedText> titles;  ///< of which `title` is the first
 };
 
 /// The constant data of a hand of the scenario, moved by a device.
@@ -64,6 +68,7 @@ struct SceneHand {
   std::string name;
   Role role = Role::kTrainee;  ///< whose clients may move it
   ObjectId object;             ///< that it moves while it holds no other; may be invalid
+  HandLimits limits;           ///< in force now; chosen by its station's link
 };
 
 /// State of an object for late joiners: after each jump, and once in 1000 ticks.

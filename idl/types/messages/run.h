@@ -22,6 +22,7 @@ struct RunState {
   std::uint32_t server_epoch = 0;
   std::uint32_t steps_skipped = 0;    ///< so far, and not done since
   std::uint32_t steps_timed_out = 0;  ///< likewise
+  bool forces_frozen = false;         ///< by a command: hands are held still, whatever the phase
 };
 
 /// Whether a run that has ended did what its exercise asks for; `allow_skips`: also when steps were skipped.

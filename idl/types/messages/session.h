@@ -11,7 +11,7 @@
 /// Joining a session and leaving it.
 namespace tenon {
 
-inline constexpr std::uint32_t kProtocolVersion = 4;
+inline constexpr std::uint32_t kProtocolVersion = 7;
 
 /// Published by each server in the lobby partition: the session it runs.
 struct SessionAnnounce {
@@ -20,10 +20,18 @@ struct SessionAnnounce {
   std::string title;               ///< of the scenario
   std::uint32_t protocol_version = kProtocolVersion;
   bool lockstep = false;
+  /// The scene is complete with so many samples of SceneObject, SceneHand and SceneStep.
+  std::uint32_t objects = 0, hands = 0, steps = 0;
+  Tick resumed_after = 0;     ///< last tick of the killed server that this one continues; 0: it began anew
   std::string scenario_hash;  ///< of the scenario's text, for recordings
   std::string host;           ///< name of the machine that the server runs on
   std::uint32_t pid = 0;      ///< of the server's process there
   std::string scene_hash;     ///< asset that lists the display models of all objects (idl/wire/assets.h)
+  // what a recording is re-simulated with
+  std::string scenario;            ///< name of its folder, or of its file
+  double detail = 1.0;             ///< [-] of the generated parts
+  std::uint32_t freeze_ticks = 0;  ///< [ticks] age of its input at which a hand freezes
+  std::uint32_t park_ticks = 0;    ///< [ticks] and at which what it holds is parked
 };
 
 /// A client's request for a seat in the session, in the lobby partition; repeated until it is answered. A
@@ -47,6 +55,7 @@ struct Join {
   /// list says nothing of the rest. The server takes no stiffer coupling, and the scenario may ask for a
   /// softer one.
   std::vector<HandStiffness> stiffness;
+  Tick recorded_until = 0;  ///< of a recorder that comes back: it has the inputs up to this tick
 };
 
 /// The server's answer to a Join, and later the notice that a client has lost its seat.
@@ -61,6 +70,7 @@ struct Welcome {
   std::vector<HandId> hands;  ///< in the order of Join::hands; invalid for one the scenario does not have
   Tick tick = 0;              ///< newest of the server; in lockstep the first input is for the next one
   bool lockstep = false;
+  std::uint32_t people = 0;  ///< clients that have a seat, this one included: so many Presences alive
 };
 
 /// A client that has a seat. Published by the client; disposed, or lost with its writer, when it leaves.

@@ -2,27 +2,14 @@
 
 #include <cstdint>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "idl/types/ids.h"
+#include "idl/types/messages/localized_text.h"
 #include "idl/types/spatial.h"
 
 /// The steps of a scenario.
 namespace tenon {
-
-struct LocalizedText {
-  std::string language;  ///< `en`, `de`, ...
-  std::string text;
-};
-
-/// The text in `language`, else the first one; empty when there is none.
-[[nodiscard]] inline std::string localized(const std::vector<LocalizedText>& texts,
-                                           std::string_view language) {
-  for (const LocalizedText& text : texts)
-    if (text.language == language) return text.text;
-  return texts.empty() ? std::string() : texts.front().text;
-}
 
 enum class StepPhase : std::uint32_t { kWaiting, kActive, kDone, kTimedOut, kSkipped };
 

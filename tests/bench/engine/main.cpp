@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "clients/report/page.h"
+#include "clients/report/page_data.h"
 #include "idl/types/cache_folder.h"
 #include "idl/types/output_files.h"
 #include "server/session/scene_loader.h"
@@ -124,9 +125,14 @@ class Bench {
       const auto insertion = rehearseInsertion(*loaded, printProgress);
       if (!insertion) return fail(insertion.error().what);
       add(insertion->table);
-      if (!arguments_.figures.empty() &&
-          !save(arguments_.figures, report::reportPage(insertion->analysis, "")))
-        return fail(arguments_.figures + ": cannot be written");
+      if (!arguments_.figures.empty()) {
+        const auto page = report::readReportPage(report::defaultReportPage());
+        if (!page) return fail(page.error().what);
+        nlohmann::json data = report::pageData(insertion->analysis);
+        data["no_player"] = "a benchmark makes no recording";
+        if (!save(arguments_.figures, report::reportPage(*page, data, nullptr)))
+          return fail(arguments_.figures + ": cannot be written");
+      }
     }
     return {};
   }

@@ -16,7 +16,7 @@ TEST(CommandParser, EveryCommandKindHasAWord) {
   std::set<CommandKind> kinds;
   for (const CommandWord& word : commandWords())
     if (word.command) kinds.insert(*word.command);
-  for (std::uint32_t i = 0; i <= static_cast<std::uint32_t>(CommandKind::kNote); ++i)
+  for (std::uint32_t i = 0; i <= static_cast<std::uint32_t>(CommandKind::kKick); ++i)
     EXPECT_TRUE(kinds.contains(static_cast<CommandKind>(i))) << "command " << i;
 }
 
@@ -49,6 +49,10 @@ TEST(CommandParser, ParsesACommandLine) {
   EXPECT_EQ(parseCommand({"collision", "grid", "bay", "on"})->value, 1.0);
   EXPECT_EQ(parseCommand({"goto", "3"})->text, "3");
   EXPECT_EQ(parseCommand({"give", "box", "left"})->text, "box left");
+  EXPECT_EQ(parseCommand({"freeze", "on"})->value, 1.0);
+  EXPECT_EQ(parseCommand({"freeze", "off"})->value, 0.0);
+  EXPECT_THAT(parseCommand({"freeze", "maybe"}).error().what, HasSubstr("usage: freeze on|off"));
+  EXPECT_EQ(parseCommand({"kick", "Ada", "Lovelace"})->text, "Ada Lovelace");
   EXPECT_EQ(parseCommand({"note", "grip", "too", "high"})->text, "grip too high");
   const auto emergency = parseCommand({"emergency", "hand", "caught"});
   ASSERT_TRUE(emergency);

@@ -68,7 +68,7 @@ class DeskTest : public ::testing::Test {
   std::mutex mutex_;
   std::vector<Told> told_;
   std::unique_ptr<Desk> desk_ =
-      std::make_unique<Desk>(SeatRights{.domain = test::ownDomain(), .pass = "secret"},
+      std::make_unique<Desk>(SeatRights{.domain = test::ownDomain(), .pass = "secret"}, "",
                              [this](ViewerId viewer, const DeskAnswer& answer) {
                                const std::scoped_lock lock(mutex_);
                                told_.push_back({viewer, answer});

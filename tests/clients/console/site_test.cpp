@@ -78,13 +78,16 @@ TEST_F(SiteTest, ServesAssetsByTheirContent) {
 
 TEST(Origin, PagesOfThisServerAndPermittedOnesMayConnect) {
   const std::vector<std::string> others{"https://viewer.example"};
-  EXPECT_TRUE(isPermittedOrigin("", "localhost:8080", {}));
-  EXPECT_TRUE(isPermittedOrigin("http://localhost:8080", "localhost:8080", {}));
-  EXPECT_TRUE(isPermittedOrigin("https://viewer.example", "localhost:8080", others));
+  EXPECT_TRUE(isPermittedOrigin("", "localhost:8080", false, {}));
+  EXPECT_TRUE(isPermittedOrigin("http://localhost:8080", "localhost:8080", false, {}));
+  EXPECT_TRUE(isPermittedOrigin("https://viewer.example", "localhost:8080", false, others));
+  EXPECT_TRUE(isPermittedOrigin("https://localhost:8080", "localhost:8080", true, {}));
+  EXPECT_FALSE(isPermittedOrigin("http://localhost:8080", "localhost:8080", true, {}))
+      << "changed on its way";
   for (const char* origin :
        {"http://localhost:8081", "https://localhost:8080", "http://localhost", "null", "http://evil.example",
         "http://localhost:8080.evil.example", "https://viewer.example.evil"})
-    EXPECT_FALSE(isPermittedOrigin(origin, "localhost:8080", others)) << origin;
+    EXPECT_FALSE(isPermittedOrigin(origin, "localhost:8080", false, others)) << origin;
 }
 
 TEST(Host, NamesThisMachineOnly) {
@@ -93,6 +96,13 @@ TEST(Host, NamesThisMachineOnly) {
   for (const char* host : {"", "evil.example", "evil.example:8080", "localhost.evil.example",
                            "localhost:", "localhost:80a", "127.0.0.1.evil", "::1", "localhost:80:80"})
     EXPECT_FALSE(isLoopbackHost(host)) << host;
+}
+
+TEST(Host, AnAddressIsNoName) {
+  for (const char* host : {"192.168.7.5", "192.168.7.5:8080", "[fd00::5]", "[fd00::5]:8080"})
+    EXPECT_TRUE(isAddress(host)) << host;
+  for (const char* host : {"", "localhost", "5.evil.example", "192.168.7.5.evil:80", "fd00::5", "1.2.3.4:x"})
+    EXPECT_FALSE(isAddress(host)) << host;
 }
 
 TEST_F(SiteTest, ServesARecordingByRangesAlone) {

@@ -26,24 +26,63 @@ TEST(DurationHistogram, TheMaximumIsExactBeyondTheLastBin) {
   EXPECT_GE(durations.quantile(0.9), 0.1);
 }
 
+TEST(DurationHistogram, LongDurationsAreExactToTwoPercent) {
+  DurationHistogram durations;
+  for (int i = 0; i < 100; ++i) durations.add(i < 90 ? 150 * kMillisecond : 4000 * kMillisecond);
+  EXPECT_NEAR(durations.quantile(0.5), 0.15, 0.02 * 0.15);
+  EXPECT_NEAR(durations.quantile(0.99), 4.0, 0.02 * 4.0);
+  EXPECT_DOUBLE_EQ(durations.min(), 0.15);
+  durations.clear();
+  EXPECT_EQ(durations.count(), 0U);
+}
+
+TEST(AnswerLoss, IsThatOfTheHandThatLostMost) {
+  AnswerLoss loss;
+  EXPECT_EQ(loss.share(), 0.0);
+  for (Tick tick = 1; tick <= 100; ++tick) {
+    if (tick % 10 != 5) loss.received(HandId{0}, tick);
+    if (tick % 10 == 0) loss.received(HandId{7}, tick);  // a tracked limb
+    if (tick > 3) loss.received(HandId{0}, 3);           // again
+  }
+  EXPECT_NEAR(loss.share(), 0.1, 1e-9);
+  loss.clear();
+  EXPECT_EQ(loss.share(), 0.0);
+}
+
 //  input     1   2   3            each answered after 2 ms; the second answer to 2 is from the other hand
 //  answer            1   2 2 3
 TEST(ForceAgeStatistics, CountsTheTimeFromAnInputToItsFirstAnswerOnce) {
   ForceAgeStatistics age;
   for (std::uint32_t seq = 1; seq <= 10; ++seq) age.inputSent(seq, seq * kMillisecond, kMillisecond);
   for (std::uint32_t seq = 1; seq <= 10; ++seq) {
-    age.answerReceived(seq, (seq + 2) * kMillisecond);
-    age.answerReceived(seq, (seq + 7) * kMillisecond);
+    age.answerReceived(HandId{0}, seq, seq, (seq + 2) * kMillisecond);
+    age.answerReceived(HandId{1}, seq, seq, (seq + 7) * kMillisecond);
   }
-  age.answerReceived(2, 100 * kMillisecond);
-  age.answerReceived(0, 100 * kMillisecond);
-  age.answerReceived(4711, 100 * kMillisecond);
+  age.answerReceived(HandId{0}, 1, 2, 100 * kMillisecond);
+  age.answerReceived(HandId{0}, 1, 0, 100 * kMillisecond);
+  age.answerReceived(HandId{0}, 1, 4711, 100 * kMillisecond);
   Telemetry telemetry;
   age.fill(telemetry);
   EXPECT_EQ(telemetry.samples, 10U);
   EXPECT_NEAR(telemetry.input_to_force_p50, 2e-3, 2 * kBin);
   EXPECT_DOUBLE_EQ(telemetry.input_to_force_max, 2e-3);
   EXPECT_LE(telemetry.loop_late_p99, kBin) << "the loop was on time";
+  EXPECT_NEAR(telemetry.age, 2e-3, 2 * kBin);
+  EXPECT_EQ(telemetry.answers_lost, 0.0);
+  age.fill(telemetry);
+  EXPECT_EQ(telemetry.samples, 10U);
+  EXPECT_EQ(telemetry.age, 0.0) << "none since the last one";
+}
+
+//  input     1   2   3   4   5    answered at once but for 3, whose answer comes with that of 4: 2 periods
+TEST(ForceAgeStatistics, KeepsTheLongestTimeWithoutANewerAnswer) {
+  ForceAgeStatistics age;
+  for (std::uint32_t seq = 1; seq <= 5; ++seq) age.inputSent(seq, seq * kMillisecond, kMillisecond);
+  for (const std::uint32_t seq : {1, 2, 4, 3, 5})
+    age.answerReceived(HandId{0}, seq, seq, std::max(seq, 2U) * kMillisecond);
+  Telemetry telemetry;
+  age.fill(telemetry);
+  EXPECT_DOUBLE_EQ(telemetry.longest_silence, 2e-3);
 }
 
 }  // namespace

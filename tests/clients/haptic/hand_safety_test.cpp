@@ -80,6 +80,36 @@ TEST(HandSafety, AStopBrakesTheDeviceBeforeItSwitchesTheForcesOff) {
   EXPECT_THAT(setup.device.calls, testing::ElementsAre("brake", "disarm"));
 }
 
+TEST(HandSafety, AtTheEndTheForceFallsToZeroAndThenTheDeviceIsDisarmed) {
+  test::HandAboveFloor setup("sigma7-sim");
+  for (int i = 0; i < 3000; ++i) setup.step(Vector3(0.0, 0.0, 0.005));
+  double last = setup.force();
+  ASSERT_GT(last, 1.0);
+  setup.hand.finish(true);
+  for (int i = 0; !setup.hand.finished(); ++i) {
+    ASSERT_LT(i, 30) << "no more than 25 ms";
+    setup.step(Vector3(0.0, 0.0, 0.005));
+    EXPECT_LE(setup.force(), last + 1e-9);
+    EXPECT_GE(setup.force(), last - 0.5) << "not at once";
+    last = setup.force();
+  }
+  EXPECT_EQ(last, 0.0);
+  devices::DeviceState state;
+  setup.device->read(state);
+  EXPECT_FALSE(state.forces_on);
+  setup.hand.permitForces(true);
+  EXPECT_FALSE(setup.hand.wantsArming()) << "the end is the end";
+}
+
+TEST(HandSafety, BetweenTwoSeatsTheForceIsZeroAndTheDeviceStaysArmed) {
+  RecordedHand setup(devices::sigma7Model().caps);
+  setup.hand.finish(false);
+  for (int i = 0; i < 30; ++i) setup.step();
+  EXPECT_TRUE(setup.hand.finished());
+  EXPECT_TRUE(setup.device.state.forces_on);
+  EXPECT_THAT(setup.device.calls, testing::Each("write"));
+}
+
 TEST(HandSafety, AnOpenClutchBrakesTheDeviceBeforeItSwitchesTheForcesOff) {
   RecordedHand setup(devices::hugArmModel().caps);
   setup.device.state.F_Ho_D_measured.force = {81.0, 0.0, 0.0};
@@ -226,6 +256,19 @@ TEST(AnswerAge, ALinksOwnDelayIsNoGap) {
   EXPECT_TRUE(std::isinf(age.age())) << "an answer to what this station never asked";
 }
 
+TEST(AnswerAge, JitterThatWasMeasuredIsNoGapUpToItsBound) {
+  AnswerAge age;
+  for (std::uint32_t seq = 1; seq <= 3000; ++seq) age.step(seq, seq > 5 ? seq - 5 : 0, 1e-3);
+  for (std::uint32_t seq = 3001; seq <= 3070; ++seq) age.step(seq, 2995, 1e-3);
+  EXPECT_NEAR(age.excess(), 0.065, 1e-9) << "75 ms, of which twice the delay is the link's";
+  age.setJitter(0.030);
+  EXPECT_NEAR(age.excess(), 0.040, 1e-9);
+  age.setJitter(10.0);
+  EXPECT_NEAR(age.excess(), 0.020, 1e-9) << "50 ms of it";
+  age.setJitter(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_NEAR(age.excess(), 0.065, 1e-9);
+}
+
 // the delay of the link is that of the last answers, also when they are long ago
 TEST(AnswerAge, AfterALongGapOldAnswersAreNotFresh) {
   AnswerAge age;
@@ -234,6 +277,20 @@ TEST(AnswerAge, AfterALongGapOldAnswersAreNotFresh) {
   for (; seq <= 8800; ++seq) age.step(seq, 2998, 1e-3);
   age.step(seq, seq - 300, 1e-3);
   EXPECT_NEAR(age.excess(), 0.296, 1e-9);
+}
+
+TEST(Bracelet, IsSilentAndDisarmedAtTheEnd) {
+  RecordingDevice device(devices::Vibrotac().caps());
+  Bracelet bracelet(device, {});
+  ASSERT_TRUE(bracelet.begin(test::kHand, true));
+  bracelet.step(1, kTickSeconds);
+  bracelet.finish(true);
+  bracelet.step(2, kTickSeconds);
+  EXPECT_THAT(device.calls, testing::ElementsAre("arm", "write", "write", "disarm"));
+  EXPECT_THAT(bracelet.intensities(), testing::Each(0));
+  bracelet.permit(false);
+  bracelet.permit(true);
+  EXPECT_FALSE(bracelet.wantsArming());
 }
 
 TEST(Bracelet, VibratesAsLongAsItsContactsAreFreshAndNoStopSilencesIt) {

@@ -142,6 +142,21 @@ TEST_F(TwoStations, AfterAReleaseTheForceOnTheOtherHandFallsByAtMostOneNewtonPer
   EXPECT_LE(before, 1e-3);
 }
 
+TEST_F(TwoStations, AContributedForceIsFeltAtTheHandsThatHoldTheObject) {
+  constexpr std::uint32_t kLifetime = 100;
+  const Wrench F_Oo_W{Vector3(0.0, 0.0, 10.0), Vector3(0.0, 0.3, 0.0)};
+  for (int i = 0; i < 300; ++i) {
+    environment_->contribute(ObjectId{2}, 1, F_Oo_W, kLifetime);
+    tick();
+  }
+  const double share = 0.5 * 10.0 * (1.0 - 1.0 / kLifetime);
+  EXPECT_NEAR(0.5 * (stations_[0].wrench.force.z() + stations_[1].wrench.force.z()), share, 0.1);
+  EXPECT_GT(stations_[1].wrench.force.z() + 0.1, share - 0.3 / (2.0 * kLever)) << "and its torque";
+  expectRenderedAsByServer();
+  run(static_cast<int>(kLifetime) + 300);
+  for (const HandStation& station : stations_) EXPECT_LT(station.wrench.force.norm(), 1e-2) << "it has ended";
+}
+
 TEST_F(TwoStations, AManifoldListsOnlyHandsThatHoldTheObject) {
   HandManifold manifold;
   environment_->manifold(HandId{0}, manifold);

@@ -1,6 +1,8 @@
 #include "clients/recorder/recording.h"
 
 #include <filesystem>
+#include <map>
+#include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -9,6 +11,7 @@
 
 #include "idl/record/instance_state.h"
 #include "idl/record/mcap_reader.h"
+#include "idl/record/packed_inputs.h"
 #include "idl/types/messages/contacts.h"
 #include "idl/types/messages/journal.h"
 #include "idl/types/messages/log.h"
@@ -25,7 +28,13 @@ class RecordingTest : public ::testing::Test {
   ~RecordingTest() override { std::filesystem::remove(file_); }
 
   Recording open(bool lockstep) {
-    return std::move(*Recording::open(file_, {.session = "s", .title = "A peg", .lockstep = lockstep}));
+    return std::move(*Recording::open(file_, {.session = "s",
+                                              .title = "A peg",
+                                              .lockstep = lockstep,
+                                              .scenario = "peg",
+                                              .detail = 0.25,
+                                              .freeze_ticks = 50,
+                                              .park_ticks = 1000}));
   }
   template <class M>
   static void add(Recording& recording, const wire::Topic<M>& topic, const M& message, std::int64_t source_ns,
@@ -117,6 +126,11 @@ TEST_F(RecordingTest, SessionAndOutcomeAreMetadata) {
   const auto origin = reader->metadata().find("tenon recording");
   ASSERT_NE(origin, reader->metadata().end());
   EXPECT_EQ(origin->second.at("title"), "A peg");
+  for (const auto& [key, value] : std::map<std::string, std::string>{{"scenario", "peg"},
+                                                                     {"detail", "0.25"},
+                                                                     {"freeze after ticks", "50"},
+                                                                     {"park after ticks", "1000"}})
+    EXPECT_EQ(origin->second.at(key), value) << key;
 }
 
 TEST_F(RecordingTest, MissingTickInputsAreCounted) {
@@ -233,9 +247,10 @@ TEST_F(RecordingTest, AResumedServerFillsWhatTheFormerOneDidNotSend) {
   };
   addInputs(1, 10);
   add(recording, wire::kEventLog, EventLog{.seq = 7}, kStart);
-  const SessionAnnounce next{.session = "s", .server_epoch = 2};
-  ASSERT_TRUE(recording.continues(next, 12));
-  recording.resumed(next, 12);
+  const SessionAnnounce next{.session = "s", .server_epoch = 2, .resumed_after = 12};
+  ASSERT_TRUE(recording.continues(next));
+  EXPECT_EQ(recording.recordedUntil(next), 9U) << "of the newest one parts may be missing";
+  recording.resumed(next);
   addInputs(5, 15);
   add(recording, wire::kEventLog, EventLog{.seq = 1}, kStart);
   EXPECT_EQ(recording.status().lost, 0U);
@@ -244,21 +259,120 @@ TEST_F(RecordingTest, AResumedServerFillsWhatTheFormerOneDidNotSend) {
   EXPECT_EQ(times("EventLog").size(), 2U) << "a resumed server numbers its events anew";
 }
 
+TEST_F(RecordingTest, ASessionThatWasKilledBeforeItsFirstTickIsContinued) {
+  Recording recording = open(false);
+  const SessionAnnounce next{.session = "s", .server_epoch = 2};
+  EXPECT_TRUE(recording.continues(next)) << "nothing was recorded that the next server could contradict";
+  add(recording, wire::kTickInput, TickInputPart{.tick = 1}, kStart);
+  EXPECT_FALSE(recording.continues(next)) << "it begins anew";
+}
+
 TEST_F(RecordingTest, TicksThatTheJournalDidNotKeepAreThoseOfTheResumedServer) {
   Recording recording = open(false);
   for (Tick tick = 1; tick <= 10; ++tick)
     add(recording, wire::kTickInput, TickInputPart{.tick = tick}, kStart);
-  recording.resumed({.session = "s", .server_epoch = 2}, 8);
+  const SessionAnnounce next{.session = "s", .server_epoch = 2, .resumed_after = 8};
+  EXPECT_EQ(recording.recordedUntil(next), 8U);
+  recording.resumed(next);
   for (Tick tick = 7; tick <= 12; ++tick)
     add(recording, wire::kTickInput, TickInputPart{.tick = tick}, kStart);
+  EXPECT_EQ(recording.status().lost, 0U);
   ASSERT_TRUE(recording.close());
   EXPECT_EQ(times("TickInput").size(), 14U);
+}
+
+//  life 1   ticks 1 to 1200, the recorder gets the inputs up to 1190
+//  life 2   1201 to 1300, without the recorder
+//  life 3   1301 on, the recorder is back at 1400
+TEST_F(RecordingTest, WhatNoLifeOfTheServerSentIsMissingOnce) {
+  Recording recording = open(false);
+  const auto addTicks = [&](Tick first, Tick last, std::uint32_t epoch) {
+    for (Tick tick = first; tick <= last; ++tick) {
+      add(recording, wire::kTickInput, TickInputPart{.tick = tick}, kStart);
+      add(recording, wire::kWorldFrame1k, WorldFrame{.server_epoch = epoch, .tick = tick}, kStart);
+    }
+  };
+  addTicks(1, 1190, 0);
+  const PublishedSamples first{1, 1000, {{"WorldFrame_1k", 1000}}};
+  add(recording, wire::kPublishedSamples, first, kStart);
+  const SessionAnnounce third{.session = "s", .server_epoch = 3, .resumed_after = 1300};
+  ASSERT_TRUE(recording.continues(third));
+  recording.resumed(third);
+  // the third server has read the last 60 ticks of the journal
+  for (Tick tick = 1241; tick <= 1399; ++tick)
+    add(recording, wire::kTickInput, TickInputPart{.tick = tick}, kStart);
+  addTicks(1400, 2001, 3);
+  const PublishedSamples second{1001, 2000, {{"WorldFrame_1k", 700}}};
+  for (int times = 0; times < 2; ++times) add(recording, wire::kPublishedSamples, second, kStart);
+  for (const TopicCount& count : recording.counts()) {
+    EXPECT_EQ(count.recorded, count.topic == "TickInput" ? 2001U - 50U : 1601U) << count.topic;
+    EXPECT_EQ(count.published, count.topic == "TickInput" ? 2001U : 1700U) << count.topic;
+  }
+  ASSERT_TRUE(recording.close());
+  EXPECT_EQ(times("PublishedSamples").size(), 2U);
 }
 
 TEST_F(RecordingTest, FailsWithASentenceWhenTheFileCannotBeWritten) {
   const auto recording = Recording::open("/proc/no/such/place.mcap", {});
   ASSERT_FALSE(recording);
   EXPECT_THAT(recording.error().what, testing::HasSubstr("/proc/no/such/place.mcap: cannot be written"));
+}
+
+TEST_F(RecordingTest, WithoutAllStreamsItHasTheInputsPackedAndTheStrongestManifoldOfTenTicks) {
+  Recording recording = std::move(*Recording::open(file_, {.session = "s"}, Streams::kReduced));
+  for (Tick tick = 1; tick <= 620; ++tick) {
+    for (std::uint32_t part = 0; part < 2; ++part)
+      add(recording, wire::kTickInput,
+          TickInputPart{.tick = tick, .part = part, .parts = 2, .state_hash = tick, .bytes = {1, 2}}, kStart);
+    HandManifold manifold{.hand = HandId{0}, .tick = tick};
+    manifold.F_Ho_W.force.x() = tick % 10 == 4 ? 9.0 : 1.0;
+    add(recording, wire::kHandManifold, manifold, kStart);
+    add(recording, wire::kDeviceInput, DeviceInput{}, kStart);
+    add(recording, wire::kWorldFrame1k, WorldFrame{.tick = tick}, kStart);
+  }
+  const PublishedSamples published{1, 620, {{"WorldFrame_1k", 620}, {"HandManifold", 620}}};
+  add(recording, wire::kPublishedSamples, published, kStart);
+  add(recording, wire::kRunState, RunState{.phase = RunPhase::kSucceeded, .tick = 620}, kStart);
+  EXPECT_EQ(recording.status().lost, 0U) << "what is skipped is not missing";
+  ASSERT_TRUE(recording.close());
+  EXPECT_THAT(times("WorldFrame_1k"), testing::IsEmpty());
+  EXPECT_THAT(times("DeviceInput"), testing::IsEmpty());
+
+  std::vector<Tick> inputs, manifolds;
+  auto reader = record::McapReader::open(file_);
+  for (record::McapMessage message; reader->next(message);) {
+    if (message.topic == "HandManifold") manifolds.push_back(wire::decode<HandManifold>(message.data)->tick);
+    if (message.topic != record::kPackedInputsTopic) continue;
+    const auto packed = record::decodePackedInputs(message.data);
+    ASSERT_TRUE(packed) << packed.error().what;
+    for (const record::RecordedInput& input : *packed) {
+      inputs.push_back(input.tick);
+      EXPECT_EQ(input.state_hash, input.tick);
+      EXPECT_EQ(input.bytes.size(), 4U) << "both parts";
+    }
+  }
+  ASSERT_EQ(inputs.size(), 620U);
+  EXPECT_EQ(inputs.back(), 620U);
+  ASSERT_EQ(manifolds.size(), 63U) << "the last one is of a period that had begun";
+  for (std::size_t i = 0; i + 1 < manifolds.size(); ++i) EXPECT_EQ(manifolds[i] % 10, 4U);
+}
+
+TEST_F(RecordingTest, WithoutAllStreamsItHasACheckpointInTenSecondsAndOneAfterAGap) {
+  Recording recording = std::move(*Recording::open(file_, {.session = "s"}, Streams::kReduced));
+  for (Tick tick = 1; tick <= 25'000; ++tick) {
+    if (tick >= 14'500 && tick < 14'600) continue;
+    add(recording, wire::kTickInput, TickInputPart{.tick = tick, .parts = 1}, kStart);
+    if (tick % 1000 == 1)
+      for (std::uint32_t part = 0; part < 3; ++part)
+        add(recording, wire::kCheckpoint, CheckpointPart{.tick = tick, .part = part, .parts = 3}, kStart);
+  }
+  ASSERT_TRUE(recording.close());
+  std::vector<Tick> checkpoints;
+  auto reader = record::McapReader::open(file_);
+  for (record::McapMessage message; reader->next(message);)
+    if (message.topic == "Checkpoint")
+      checkpoints.push_back(wire::decode<CheckpointPart>(message.data)->tick);
+  EXPECT_THAT(checkpoints, testing::ElementsAre(1, 1, 1, 10'001, 10'001, 10'001, 15'001, 15'001, 15'001));
 }
 
 }  // namespace

@@ -5,8 +5,9 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "clients/report/chart.h"
+#include "clients/report/embedded_session.h"
 #include "clients/report/page.h"
+#include "clients/report/page_data.h"
 #include "clients/report/session_analysis.h"
 #include "clients/report/summary.h"
 #include "tests/clients/report/synthetic_recording.h"
@@ -98,7 +99,10 @@ TEST_F(ReportTest, HasTheRealTimePerformance) {
   EXPECT_LT(analysis.compute_median, 1e-3);
   ASSERT_EQ(analysis.force_latencies.size(), 1U);
   EXPECT_EQ(analysis.force_latencies[0].who, "Grace");
-  EXPECT_THAT(summaryText(analysis), HasSubstr("late ticks        2"));
+  for (const char* line :
+       {"late ticks        2", "writes to the bus 3 took more than 5 ms, 4 samples not sent",
+        "max 11.0 ms, longest silence 13.0 ms (Grace)", "held still after 80 ms of silence at most"})
+    EXPECT_THAT(summaryText(analysis), HasSubstr(line));
 }
 
 TEST_F(ReportTest, HelpOfTheInstructorIsListedAsAnAid) {
@@ -144,7 +148,8 @@ TEST_F(ReportTest, ATruncatedRecordingIsAnalysedAsFarAsItGoes) {
   ASSERT_TRUE(analysis) << analysis.error().what;
   EXPECT_FALSE(analysis->succeeded());
   EXPECT_THAT(analysis->problem, HasSubstr("is truncated"));
-  EXPECT_THAT(reportPage(*analysis, ""), HasSubstr("is truncated"));
+  EXPECT_THAT(pageData(*analysis)["summary"]["problem"].get<std::string>(), HasSubstr("is truncated"));
+  EXPECT_TRUE(embedSession(file_, "/nonexistent", kMaxReportBytes)) << "what can be read is played";
 }
 
 TEST_F(ReportTest, AFileThatIsNoRecordingFailsWithASentence) {
@@ -154,18 +159,45 @@ TEST_F(ReportTest, AFileThatIsNoRecordingFailsWithASentence) {
   EXPECT_THAT(analysis.error().what, HasSubstr("is not a recording"));
 }
 
-TEST_F(ReportTest, ThePageIsSelfContainedAndEscapesText) {
-  const std::string page = reportPage(analyze(), "");
-  EXPECT_THAT(page, HasSubstr("Engine &lt;bay&gt;"));
-  EXPECT_THAT(page, Not(HasSubstr("<script")));
-  EXPECT_THAT(page, Not(HasSubstr("http")));
-  EXPECT_THAT(page, Not(HasSubstr("<img")));
-  for (const char* chart : {"Force", "Gap and overlap", "Computational load", "Computation time"})
-    EXPECT_THAT(page, HasSubstr("aria-label=\"" + std::string(chart) + " over time\""));
+constexpr std::string_view kPage = "<title>Tenon</title><style></style><!-- data --><script>code</script>";
+
+TEST_F(ReportTest, NoTextOfASessionCanEndItsBlockInThePage) {
+  nlohmann::json data = pageData(analyze());
+  data["events"][0]["text"] = "</script><script>alert(1)</script><!--";
+  const std::string page = reportPage(kPage, data, nullptr);
+  EXPECT_THAT(page, HasSubstr("<title>Engine &lt;bay>: report</title>"));
+  EXPECT_THAT(page, HasSubstr("Engine \\u003cbay>"));
+  EXPECT_THAT(page, Not(HasSubstr("<script>alert")));
+  EXPECT_THAT(page, Not(HasSubstr("<!--")));
 }
 
-TEST_F(ReportTest, ThePageShowsAPictureOfTheSceneIfGiven) {
-  EXPECT_THAT(reportPage(analyze(), "scene.png"), HasSubstr("<img src=\"scene.png\""));
+TEST_F(ReportTest, ThePlayersSessionIsInThePageAndSmall) {
+  const nlohmann::json data = pageData(analyze());
+  const auto session = embedSession(file_, "/nonexistent", sessionBudget(kPage, data));
+  ASSERT_TRUE(session) << session.error().what;
+  EXPECT_NEAR(session->rate, 30.0, 1.0);
+  EXPECT_EQ(session->objects, 2U);
+  EXPECT_EQ(session->models, 0U) << "they are not in that cache";
+  EXPECT_LT(session->recording.size(), std::filesystem::file_size(file_) / 2);
+  EXPECT_THAT(reportPage(kPage, data, &*session), HasSubstr("data-name=\"recording\">iU1DQVA"));
+}
+
+TEST_F(ReportTest, WhatIsPlayedFitsWithFewerPosesASecond) {
+  analyze({.ticks_per_step = 20'000});
+  const auto all = embedSession(file_, "/nonexistent", kMaxReportBytes);
+  ASSERT_TRUE(all);
+  const auto few = embedSession(file_, "/nonexistent", all->recording.size() / 2);
+  ASSERT_TRUE(few) << few.error().what;
+  EXPECT_LE(few->recording.size(), all->recording.size() / 2);
+  EXPECT_LT(few->rate, all->rate);
+  EXPECT_FALSE(embedSession(file_, "/nonexistent", 10));
+}
+
+TEST_F(ReportTest, ThePageThatIsNotBuiltIsNamed) {
+  const auto page = readReportPage("/nonexistent/report.html");
+  ASSERT_FALSE(page);
+  EXPECT_THAT(page.error().what, HasSubstr("/nonexistent/report.html: the report's page is not built"));
+  EXPECT_THAT(page.error().what, HasSubstr("deploy/setup console"));
 }
 
 TEST_F(ReportTest, TheJsonSummaryHasTheSameValues) {
@@ -180,29 +212,45 @@ TEST_F(ReportTest, RepeatedSafetyEventsAreOneLineAndOneMark) {
   SessionAnalysis analysis = analyze();
   for (int i = 0; i < 50; ++i)
     analysis.events.push_back({3.0 + 0.1 * i, Severity::kWarning, "safety", "acts " + std::to_string(i)});
-  const std::string page = reportPage(analysis, "");
-  EXPECT_THAT(page, HasSubstr("acts 0 (and 49 more until 7.9 s)"));
-  EXPECT_THAT(page, Not(HasSubstr("acts 1")));
+  const nlohmann::json data = pageData(analysis);
+  int rows = 0;
+  for (const nlohmann::json& event : data["events"]) {
+    if (event["kind"] != "safety") continue;
+    ++rows;
+    EXPECT_EQ(event["text"], "acts 0");
+    EXPECT_EQ(event["more"], 49);
+    EXPECT_NEAR(event["until"].get<double>(), 7.9, 1e-9);
+  }
+  EXPECT_EQ(rows, 1);
 }
 
-// An hour at 1 kHz in a chart a thousand columns wide: 3,600 values per column, one of them a spike.
-TEST(Chart, APeakOfOneSampleIsDrawnInAnHourOfData) {
-  Series series;
-  for (int i = 0; i < 3'600'000; ++i) series.push_back({i * 1e-3, i == 1'234'567 ? 100.0 : 1.0});
-  const std::string svg = drawChart({"Force", "N", {{"f", "c1", &series}}}, 3600.0, {}, {});
-  EXPECT_THAT(svg, HasSubstr("V46.0"));  // the top of the chart
-  EXPECT_LT(svg.size(), 60'000U);
+// An hour at 1 kHz in a few thousand values, one of them a spike.
+TEST(PageData, APeakOfOneSampleIsInThePlotOfAnHour) {
+  SessionAnalysis analysis;
+  analysis.duration = 3600.0;
+  for (int i = 0; i < 3'600'000; ++i)
+    analysis.trainee_force.push_back({i * 1e-3, i == 1'234'567 ? 100.0 : 1.0});
+  const nlohmann::json plots = pageData(analysis)["plots"];
+  const nlohmann::json& force = plots["series"]["trainee_force"];
+  ASSERT_LE(force.size(), kMaxColumns);
+  EXPECT_EQ(force[static_cast<std::size_t>(1234.567 / plots["seconds"].get<double>())], 100.0);
+  EXPECT_FALSE(plots["series"].contains("instructor_force"));
 }
 
-TEST(Chart, WithoutDataItIsEmpty) {
-  const Series none;
-  EXPECT_THAT(drawChart({"Force", "N", {{"f", "c1", &none}}}, 0.0, {}, {}), HasSubstr("</svg>"));
+TEST(PageData, WithoutDataItHasNoSeries) {
+  const nlohmann::json plots = pageData({})["plots"];
+  EXPECT_TRUE(plots["series"].empty());
+  EXPECT_EQ(plots["count"], 1);
 }
 
-TEST(Chart, ValuesAboveTheCutAreCountedInTheLegend) {
-  const Series series{{0.0, 1.0}, {0.5, 9.0}, {1.0, 1.0}};
-  const std::string svg = drawChart({"T", "ms", {{"t", "c1", &series}}, 0.0, "", 1.0, 4.0}, 1.0, {}, {});
-  EXPECT_THAT(svg, HasSubstr("t (1 above, up to 9)"));
+TEST(PageData, ComputationTimesAboveThePlotAreCounted) {
+  SessionAnalysis analysis;
+  analysis.duration = 1.0;
+  analysis.compute_max = {{0.0, 1e-3}, {0.5, 9e-3}, {1.0, 1e-3}};
+  analysis.compute_worst = 9e-3;
+  const nlohmann::json cut = pageData(analysis)["plots"]["compute_cut"];
+  EXPECT_EQ(cut["above"], 1);
+  EXPECT_EQ(cut["largest"], 9e-3);
 }
 
 }  // namespace

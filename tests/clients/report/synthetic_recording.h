@@ -46,12 +46,19 @@ class SyntheticRecording {
         Presence{.client = ClientId{1}, .name = "Grace", .role = Role::kTrainee, .hands = {HandId{0}}});
     put(wire::kPresence,
         Presence{.client = ClientId{2}, .name = "Mikel", .role = Role::kInstructor, .hands = {HandId{1}}});
+    put(wire::kSceneHand, SceneHand{.hand = HandId{0}, .name = "right", .limits = {.freeze_ticks = 80}});
     put(wire::kSceneObject, SceneObject{.object = ObjectId{0}, .name = "bay", .kind = "scene"});
     put(wire::kSceneObject, SceneObject{.object = ObjectId{2}, .name = "cube", .kind = "assistant"});
     put(wire::kEventLog, EventLog{8, 0, Severity::kInfo, "taken", "cube (instructor hand)"});
     const Tick end = parameters_.ticks_per_step * parameters_.steps;
     for (tick_ = 1; tick_ <= end; ++tick_) tick();
-    put(wire::kTelemetry, Telemetry{ClientId{1}, 0.003, 0.006, 0.011, 0.0, 0, 1000});
+    put(wire::kTelemetry, Telemetry{.client = ClientId{1},
+                                    .input_to_force_p50 = 0.003,
+                                    .input_to_force_p99 = 0.006,
+                                    .input_to_force_max = 0.011,
+                                    .limits = {.freeze_ticks = 120},
+                                    .samples = 1000,
+                                    .longest_silence = 0.013});
     put(wire::kRunState,
         RunState{.phase = parameters_.succeeds ? RunPhase::kSucceeded : RunPhase::kFailed,
                  .tick = end,
@@ -99,7 +106,8 @@ class SyntheticRecording {
     if (frozen) force = 248.0;
     manifold(HandId{0}, ObjectId{1}, force, frozen);
     manifold(HandId{1}, ObjectId{2}, step == 2 ? 4.0 * std::sin(3.14159 * pressed) : 0.0);
-    if (tick_ % 10 == 0) addFrame(step, in_step);
+    if (tick_ % 10 == 0) addFrame(wire::kWorldFrame100, step, in_step);
+    if (tick_ % 33 == 0) addFrame(wire::kWorldFrame30, step, in_step);
     if (tick_ % 10 == 0) addStats(pressed);
     if (tick_ % 33 == 0)
       put(wire::kStepProgress, StepProgress{.revision = step + 1,
@@ -161,13 +169,13 @@ class SyntheticRecording {
     put(wire::kHandState100, state);
   }
   /// The part moves by 1 m a second in the first half of each step, and jumps back where the step begins.
-  void addFrame(std::uint32_t step, Tick in_step) {
+  void addFrame(const wire::Topic<WorldFrame>& topic, std::uint32_t step, Tick in_step) {
     WorldFrame frame{.part = 0, .parts = 1, .tick = tick_};
     ObjectState part{.object = ObjectId{1}, .epoch = step};
     part.X_WO.translation().x() =
         1e-3 * static_cast<double>(std::min(in_step, parameters_.ticks_per_step / 2));
     frame.states.push_back(part);
-    put(wire::kWorldFrame100, frame);
+    put(topic, frame);
   }
   /// `force` [N] sets the penetration depth of the pair.
   void addPairs(bool colliding, std::uint32_t step, double force) {
@@ -192,6 +200,8 @@ class SyntheticRecording {
     stats.compute_seconds_max = stats.compute_seconds + (tick_ == 3000 ? 7e-3 : 5e-5);
     stats.late_ticks = tick_ >= 3000 ? 2 : 0;
     stats.input_age_seconds = 0.002;
+    stats.slow_writes = tick_ >= 3000 ? 3 : 0;
+    stats.unsent_samples = tick_ >= 3000 ? 4 : 0;
     put(wire::kTickStats100, stats);
   }
   double noise() { return 2.0 * static_cast<double>(random_() % 1000) / 1000.0 - 1.0; }

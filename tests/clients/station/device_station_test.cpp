@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "clients/haptic/paced_clock.h"
-
 namespace tenon::station {
 namespace {
 
@@ -46,6 +44,12 @@ class EmptyScene {
       EXPECT_TRUE(station->armDevices());
       station->step(++seq_);
     }
+  }
+  /// Until the hand is active or not; [s] how long, 10 at most.
+  double runUntil(std::size_t hand_index, bool active) {
+    int steps = 0;
+    for (; steps < 10'000 && hand(hand_index).active != active; ++steps) run(0.001);
+    return steps * kTickSeconds;
   }
   [[nodiscard]] const DeviceInput& hand(std::size_t i = 0) const { return station->inputs()[i]; }
   [[nodiscard]] Vector3 place(std::size_t i = 0) const { return hand(i).sample.X_WH.translation(); }
@@ -89,6 +93,79 @@ TEST(DeviceStation, WithoutAPersonNothingMovesItAndNothingArmsIt) {
   scene.station->press();
   scene.run(0.01);
   EXPECT_TRUE(scene.hand().active);
+}
+
+TEST(DeviceStation, ManifoldsOfOtherStationsAreNotItsOwn) {
+  EmptyScene scene(withDevices({"sigma7-sim"}, PersonKind::kNone));
+  HandManifold manifold;
+  manifold.hand = HandId{0};
+  EXPECT_TRUE(scene.station->receive(manifold));
+  manifold.hand = HandId{7};
+  EXPECT_FALSE(scene.station->receive(manifold)) << "their age is that of another station's inputs";
+}
+
+/// A device with a button that arms, held by its owner.
+class DeviceWithButton final : public devices::HapticDevice {
+ public:
+  DeviceWithButton() { caps_.arming = 1; }
+  [[nodiscard]] const devices::DeviceCaps& caps() const override { return caps_; }
+  [[nodiscard]] Result<void> arm() override {
+    armed = true;
+    return {};
+  }
+  void disarm() noexcept override { armed = false; }
+  [[nodiscard]] Result<void> resetFault() override { return {}; }
+  void read(devices::DeviceState& state) noexcept override {
+    state = {};
+    state.buttons = pressed ? 1 : 0;
+    state.forces_on = armed;
+  }
+  void write(const devices::DeviceCommand& command) noexcept override { last = command; }
+
+  bool pressed = false;
+  bool armed = false;
+  devices::DeviceCommand last;
+
+ private:
+  devices::DeviceCaps caps_;
+};
+
+StationOptions withButton(const std::shared_ptr<DeviceWithButton>& device) {
+  StationOptions options = withDevices({"button"}, PersonKind::kNone);
+  options.devices.front().opened = device;
+  return options;
+}
+
+TEST(DeviceStation, AButtonThatIsHeldOverARejoinIsNotPressed) {
+  const auto device = std::make_shared<DeviceWithButton>();
+  EmptyScene scene(withButton(device));
+  scene.station->receive(haptic::StopSignal{1, true});
+  device->pressed = true;
+  scene.rejoin({HandId{0}, HandId{1}, HandId{2}});
+  scene.run(0.01);
+  EXPECT_TRUE(scene.station->arming().awaitsPress());
+  device->pressed = false;
+  scene.run(0.01);
+  device->pressed = true;
+  scene.run(0.01);
+  EXPECT_FALSE(scene.station->arming().awaitsPress());
+}
+
+TEST(DeviceStation, AtItsEndAllDevicesAreDisarmedWithTheBracelet) {
+  StationOptions options = defaultStation(Role::kTrainee);
+  EmptyScene scene(options);
+  scene.run(0.1);
+  ASSERT_TRUE(scene.hand(0).active);
+  scene.station->finish(true);
+  EXPECT_FALSE(scene.station->finished());
+  scene.run(0.03);
+  EXPECT_TRUE(scene.station->finished());
+  for (const HandState& state : scene.station->states()) {
+    EXPECT_EQ(state.F_Ho_W.force.norm(), 0.0);
+    EXPECT_THAT(state.tactors, testing::Each(0));
+  }
+  scene.run(1.0);
+  EXPECT_FALSE(scene.station->wantsArming()) << "its simulated person does not arm it again";
 }
 
 TEST(DeviceStation, AScriptMovesTheArmOfItsHand) {
@@ -141,47 +218,15 @@ TEST(DeviceStation, ASimulatedPersonResetsAnOpenClutchAfterTwoSeconds) {
   EmptyScene scene(options);
   scene.run(0.1);
   EXPECT_TRUE(scene.hand(0).active);
-  scene.run(1.9);
-  EXPECT_FALSE(scene.hand(0).active) << "open";
+  ASSERT_LT(scene.runUntil(0, false), 3.0) << "open";
+  scene.run(0.002);
   EXPECT_FALSE(scene.hand(1).active) << "both arms stop";
-  scene.run(3.0);
-  EXPECT_TRUE(scene.hand(0).active);
+  // by one press: what the device said before it does not latch the clutch once more, for another two seconds
+  EXPECT_NEAR(scene.runUntil(0, true), 2.0, 0.01);
   EXPECT_TRUE(scene.hand(1).active);
   const Vector3 before = scene.place();
   scene.run(0.5);
   EXPECT_LT((scene.place() - before).norm(), 0.5);
-}
-
-/// A device of which await() brings the next reading.
-class PacingDevice final : public devices::HapticDevice {
- public:
-  PacingDevice() { caps_.paces = true; }
-  [[nodiscard]] const devices::DeviceCaps& caps() const override { return caps_; }
-  [[nodiscard]] Result<void> arm() override { return {}; }
-  void disarm() noexcept override {}
-  [[nodiscard]] Result<void> resetFault() override { return {}; }
-  void read(devices::DeviceState& state) noexcept override { state.seq = readings; }
-  void write(const devices::DeviceCommand& /*command*/) noexcept override {}
-  void await() noexcept override { ++readings; }
-
-  std::uint64_t readings = 0;
-
- private:
-  devices::DeviceCaps caps_;
-};
-
-TEST(PacedClock, APeriodPassesWithEachReading) {
-  PacingDevice device;
-  haptic::PacedClock clock(device, std::chrono::milliseconds(1));
-  std::atomic<bool> stop{false};
-  clock.sleepUntil(std::chrono::milliseconds(3), stop);
-  EXPECT_EQ(device.readings, 3U);
-  EXPECT_EQ(clock.now(), std::chrono::milliseconds(3));
-  clock.sleepUntil(std::chrono::milliseconds(3), stop);
-  EXPECT_EQ(device.readings, 3U) << "it is that time already";
-  stop = true;
-  clock.sleepUntil(std::chrono::milliseconds(9), stop);
-  EXPECT_EQ(device.readings, 3U);
 }
 
 }  // namespace

@@ -23,7 +23,11 @@ std::string fileText(const std::string& path_from_root) {
   return text.str();
 }
 
-TEST(LoopbackConfig, IsTheFile) { EXPECT_EQ(wire::loopbackConfig(), fileText("deploy/dds/loopback.xml")); }
+TEST(Profiles, AreTheFiles) {
+  EXPECT_EQ(loopbackConfig(), fileText("deploy/dds/loopback.xml"));
+  EXPECT_EQ(lanConfig(), fileText("deploy/dds/lan.xml"));
+  EXPECT_EQ(wanConfig(), fileText("deploy/dds/wan.xml"));
+}
 
 template <class M>
 class Codec : public ::testing::Test {};
@@ -41,8 +45,8 @@ TEST(RandomMessages, HaveEveryStatusAndEnumerator) {
     kinds.insert(random.make<Command>().kind);
   }
   EXPECT_EQ(statuses, (std::set<std::uint8_t>{0, 1, 2, 3, 4, 5}));
-  EXPECT_EQ(kinds.size(), 16U);
-  EXPECT_EQ(*kinds.rbegin(), CommandKind::kNote);
+  EXPECT_EQ(kinds.size(), 19U);
+  EXPECT_EQ(*kinds.rbegin(), CommandKind::kKick);
 }
 
 // Messages have no operator==, so the bytes of a second encoding are compared.
@@ -171,26 +175,28 @@ TEST(CodecOf, FieldsAreDecodedToTheirMembers) {
 }
 
 TEST(CodecOf, BytesAreXcdr1OfTheStandard) {
-  // encapsulation CDR_LE with 1 byte of padding | key uint32 | id | accepted, 3 bytes of alignment | string
-  // length 3 including its zero
+  // encapsulation CDR_LE without padding at the end | key uint32 | id | accepted, 3 bytes of alignment |
+  // string length 3 including its zero, 1 byte of alignment | refusal
   CommandAck ack;
   ack.client = ClientId{0x01020304};
   ack.id = 7;
   ack.accepted = true;
   ack.reason = "no";
-  const std::vector<std::uint8_t> expected = {0, 1, 0, 1, 4, 3, 2, 1, 7,   0,   0, 0,
-                                              1, 0, 0, 0, 3, 0, 0, 0, 'n', 'o', 0, 0};
+  ack.refusal = Refusal::kNotPermitted;
+  const std::vector<std::uint8_t> expected = {0, 1, 0, 0, 4, 3, 2,   1,   7, 0, 0, 0, 1, 0,
+                                              0, 0, 3, 0, 0, 0, 'n', 'o', 0, 0, 3, 0, 0, 0};
   EXPECT_EQ(*encode(ack), expected);
 }
 
 TEST(CodecOf, ReadsTheOtherByteOrder) {
-  const std::vector<std::uint8_t> big_endian = {0, 0, 0, 1, 1, 2, 3, 4, 0,   0,   0, 7,
-                                                1, 0, 0, 0, 0, 0, 0, 3, 'n', 'o', 0, 0};
+  const std::vector<std::uint8_t> big_endian = {0, 0, 0, 0, 1, 2, 3,   4,   0, 0, 0, 7, 1, 0,
+                                                0, 0, 0, 0, 0, 3, 'n', 'o', 0, 0, 0, 0, 0, 3};
   const auto ack = decode<CommandAck>(big_endian);
   ASSERT_TRUE(ack) << ack.error().what;
   EXPECT_EQ(ack->client, ClientId{0x01020304});
   EXPECT_EQ(ack->id, 7U);
   EXPECT_EQ(ack->reason, "no");
+  EXPECT_EQ(ack->refusal, Refusal::kNotPermitted);
 }
 
 TEST(CodecOf, ATextThatIsTooLongIsAnErrorThatNamesTheField) {

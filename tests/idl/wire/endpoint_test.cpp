@@ -111,6 +111,23 @@ TEST_F(EndpointTest, AnEmergencyStopOutlivesItsWriter) {
   EXPECT_FALSE(gone);
 }
 
+// a server and a station have one raise, and who raised it looks for the server among them
+TEST_F(EndpointTest, EveryRepetitionOfAnEmergencyStopIsReadHoweverLate) {
+  std::vector<Origin> origins;
+  ASSERT_TRUE(inbox_.onFrom<EmergencyStop>(
+      there_, kEmergencyStop, [&](const EmergencyStop&, const Origin& from) { origins.push_back(from); }));
+  auto server = Writer<EmergencyStop>::open(here_, kEmergencyStop);
+  auto station = Writer<EmergencyStop>::open(there_, kEmergencyStop);
+  ASSERT_TRUE(test::dispatchUntil(inbox_, [&] { return inbox_.matchedWriters() == 2; }));
+  for (auto* writer : {&*server, &*station}) {
+    ASSERT_TRUE(writer->write({.client_guid = "a", .counter = 1, .who = "instructor", .reason = "test"}));
+    ASSERT_TRUE(writer->waitForReaders(std::chrono::seconds(10)));  // and it has not been taken
+  }
+  ASSERT_TRUE(test::dispatchUntil(inbox_, [&] { return origins.size() == 2; }));
+  EXPECT_EQ(origins[0], participant_->origin());
+  EXPECT_EQ(origins[1], other_participant_->origin());
+}
+
 TEST_F(EndpointTest, AReaderTakesSamplesOneByOne) {
   auto reader = Reader<RunState>::open(there_, kRunState);
   auto writer = Writer<RunState>::open(here_, kRunState);

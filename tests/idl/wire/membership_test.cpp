@@ -26,13 +26,14 @@ using ::testing::IsEmpty;
 
 /// A server in a process of its own with one seat. It refuses a client that wants hand "taken", and removes
 /// the client once when it receives a ClientEvent.
-void runServer(std::uint32_t domain) {
+void runServer(std::uint32_t domain, const std::string& scenario_hash = "") {
   auto participant = test::participant(domain);
   Partition lobby(participant, kLobby);
   Partition session(participant, sessionPartition("test"));
   auto announces = Writer<SessionAnnounce>::open(lobby, kSessionAnnounce);
   auto welcomes = Writer<Welcome>::open(lobby, kWelcome);
-  if (!announces || !announces->write({.session = "test", .server_epoch = 7})) _exit(1);
+  if (!announces || !announces->write({.session = "test", .server_epoch = 7, .scenario_hash = scenario_hash}))
+    _exit(1);
   Inbox inbox;
   std::uint32_t asked = 0;
   std::string guid;
@@ -144,6 +145,31 @@ TEST(Membership, AKilledServerIsReportedAsGoneAndAMissingOneAsNotAnnounced) {
   ASSERT_FALSE(found);
   EXPECT_THAT(found.error().what, HasSubstr("no server announced session 'nowhere'"));
   EXPECT_THAT(found.error().what, HasSubstr("tenon serve"));
+}
+
+TEST(Membership, DoesNotRejoinASessionOfAnotherScenario) {
+  const std::uint32_t domain = test::ownDomain();
+  test::Peer peer([domain] { runServer(domain, "one"); });
+  const std::atomic<bool> stop = false;
+  auto member = Membership::find(traineeOptions(domain), stop);
+  ASSERT_TRUE(member) << member.error().what;
+  ASSERT_TRUE((*member)->join(stop));
+  Inbox inbox;
+  ASSERT_TRUE((*member)->watch(inbox));
+  bool announced = false;
+  ASSERT_TRUE(inbox.on<SessionAnnounce>((*member)->lobby(), kSessionAnnounce,
+                                        [&](const SessionAnnounce&) { announced = true; }));
+  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return announced; }));
+  peer.kill();
+  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return (*member)->serverIsGone(); }));
+  auto next = test::participant(domain);
+  Partition lobby(next, kLobby);
+  auto announces = Writer<SessionAnnounce>::open(lobby, kSessionAnnounce);
+  ASSERT_TRUE(announces);
+  ASSERT_TRUE(announces->write({.session = "test", .server_epoch = 8, .scenario_hash = "other"}));
+  const auto back = (*member)->rejoin(stop);
+  ASSERT_FALSE(back);
+  EXPECT_THAT(back.error().what, HasSubstr("runs another scenario now"));
 }
 
 // The server of a name, and another one that calls itself the same and started later.

@@ -63,6 +63,8 @@ class Peer {
     waitpid(pid_, nullptr, 0);
     pid_ = -1;
   }
+  /// It hangs from now on.
+  void stop() { ::kill(pid_, SIGSTOP); }
 
  private:
   pid_t pid_;

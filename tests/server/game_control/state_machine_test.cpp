@@ -95,6 +95,30 @@ TEST(StateMachine, SkippingAStateThatSnapsFixesThePartAtItsTarget) {
   EXPECT_EQ(fixture.object("part").X_WO.translation(), Vector3(0, 0, -0.02));
 }
 
+TEST(StateMachine, TwoSkipsInOneTickSkipTwoStates) {
+  test::ScenarioFixture fixture(test::smallScenario());
+  std::vector<GameCommand> waiting(2, command(CommandKind::kSkipStep));
+  for (int tick = 0; tick < 10; ++tick) {
+    const std::size_t taken = fixture.machine().step(fixture.environment(), waiting);
+    waiting.erase(waiting.begin(), waiting.begin() + static_cast<std::ptrdiff_t>(taken));
+    fixture.environment().step();
+  }
+  EXPECT_TRUE(waiting.empty());
+  EXPECT_EQ(fixture.status().skipped, 2U);
+  EXPECT_TRUE(fixture.status().finished);
+}
+
+TEST(StateMachine, ACommandBetweenTwoStatesIsForTheSecond) {
+  test::ScenarioFixture fixture(test::smallScenario());
+  fixture.step({command(CommandKind::kSkipStep)});
+  ASSERT_EQ(fixture.status().phase, StepPhase::kSkipped);
+  const std::vector<GameCommand> skip{command(CommandKind::kSkipStep)};
+  EXPECT_EQ(fixture.machine().step(fixture.environment(), skip), 0U);
+  EXPECT_EQ(fixture.status().phase, StepPhase::kActive);
+  EXPECT_EQ(fixture.machine().step(fixture.environment(), skip), 1U);
+  EXPECT_EQ(fixture.status().skipped, 2U);
+}
+
 TEST(StateMachine, AReleasedPartIsGrabbedAgainByTouch) {
   test::ScenarioFixture fixture(test::smallScenario());
   fixture.touchPart();
@@ -105,6 +129,21 @@ TEST(StateMachine, AReleasedPartIsGrabbedAgainByTouch) {
   EXPECT_EQ(fixture.object("part").status, ObjectStatus::kParked);
   fixture.step(200);
   EXPECT_EQ(fixture.object("part").status, ObjectStatus::kHeld);
+}
+
+TEST(StateMachine, EachHandGrabsAReleasedPartAgainByItsOwnTouch) {
+  test::ScenarioFixture fixture(
+      test::with(test::smallScenario(), "hands: {right: part}", "hands: {right: part, instructor: part}"));
+  fixture.touchPart();
+  GameCommand of_instructor = command(CommandKind::kRelease);
+  of_instructor.hand = HandId{1};
+  fixture.step({command(CommandKind::kRelease), of_instructor});
+  ASSERT_EQ(fixture.object("part").status, ObjectStatus::kParked);
+  fixture.step(900);
+  EXPECT_EQ(fixture.object("part").status, ObjectStatus::kParked);
+  fixture.step(200);
+  EXPECT_EQ(fixture.object("part").status, ObjectStatus::kHeld)
+      << "the instructor, who does not touch it, is of no concern";
 }
 
 TEST(StateMachine, ResetRestoresTheStart) {

@@ -27,6 +27,9 @@ constexpr double kLeastForce = 5.0;  ///< [N] of the coupling
 constexpr double kFrom = 0.1;        ///< [m] before the sheet where it begins
 /// [m] along a sheet, places that are tried until one is pressed
 constexpr std::array kPlaces{0.0, -0.1, 0.1, -0.2, 0.2, -0.3, 0.3, -0.4, 0.4};
+/// [rad] How often a part is turned about the push by as much, at places where none was pressed: its corners
+/// are at other heights, and what else is in the bay is elsewhere beside it.
+constexpr int kTurns = 4;
 
 /// A sheet of the engine bay, and the side from which parts are pushed against it.
 struct Sheet {
@@ -164,14 +167,16 @@ TEST_P(EngineBayPushNightly, NoPointOfThePartIsBehindTheSheet) {
     const ExactSheet sheet = bay.sheetAt(at.p_WP);
     for (const bool corner_first : {false, true}) {
       // the diagonal of a cube along the push
-      const Quaternion turn = corner_first ? expRotation({0.61548, -0.61548, 0.3}) : Quaternion::Identity();
-      double reach = 0.0;
-      for (const structures::ShellPoint& point : structures.shell.points())
-        reach = std::max(reach, (turn * (point.p_MP.cast<double>() - middle)).dot(at.direction_W));
+      const Quaternion first = corner_first ? expRotation({0.61548, -0.61548, 0.3}) : Quaternion::Identity();
       // what else is in the bay may keep the part away from one place of the sheet
       bool near = false;
-      for (const double shift : kPlaces) {
-        if (near) break;
+      for (std::size_t tried = 0; tried < kPlaces.size() * kTurns && !near; ++tried) {
+        const double shift = kPlaces[tried % kPlaces.size()];
+        const double about = 2.0 * std::numbers::pi / kTurns * static_cast<double>(tried / kPlaces.size());
+        const Quaternion turn = Quaternion(Eigen::AngleAxisd(about, at.direction_W)) * first;
+        double reach = 0.0;
+        for (const structures::ShellPoint& point : structures.shell.points())
+          reach = std::max(reach, (turn * (point.p_MP.cast<double>() - middle)).dot(at.direction_W));
         const auto poseAt = [&](double ahead) {
           return Pose(at.p_WP + shift * at.along_W + (ahead - reach) * at.direction_W - turn * middle, turn);
         };

@@ -1,5 +1,6 @@
 #include "server/session/journal.h"
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -137,6 +138,24 @@ TEST_F(JournalTest, ItsScenarioIsFoundFromItsOwnFolderTooAndOtherwiseTheErrorSay
   std::ofstream(beside) << "title: any\n";
   EXPECT_EQ(findScenario(file_, origin).value(), beside);
   EXPECT_EQ(findScenario("elsewhere.mcap", {beside.string(), 1.0, {}}).value(), beside);
+}
+
+TEST_F(JournalTest, AShippedScenarioIsFoundByItsName) {
+  setenv("TENON_SHARE", folder_.c_str(), 1);
+  const auto shipped = folder_ / "scenarios" / "small";
+  fs::create_directories(shipped);
+  for (const char* scenario : {"small", "/elsewhere/scenarios/small/scenario.yaml"})
+    EXPECT_EQ(findScenario(file_, {scenario, 1.0, {}}).value(), shipped) << scenario;
+  EXPECT_FALSE(findScenario(file_, {"mine", 1.0, {}}));
+  unsetenv("TENON_SHARE");
+}
+
+TEST(ScenarioName, IsThatOfItsFolderOrFile) {
+  EXPECT_EQ(scenarioName("/anywhere/engine_bay/scenario.yaml"), "engine_bay");
+  EXPECT_EQ(scenarioName("/anywhere/engine_bay/"), "engine_bay");
+  EXPECT_EQ(scenarioName("engine_bay"), "engine_bay");
+  EXPECT_EQ(scenarioName("mine/other.yaml"), "other.yaml");
+  EXPECT_EQ(scenarioName("scenario.yaml"), std::filesystem::current_path().filename());
 }
 
 TEST_F(JournalTest, AChangedInputIsADifferenceAtItsTick) {

@@ -39,6 +39,24 @@ TEST(Publisher, EachRateTierHasItsPeriod) {
                 {"1k", 990}, {"100", 99}, {"30", 30}, {"stats", 99}, {"progress", 30}, {"manifolds", 990}}));
 }
 
+TEST(Publisher, WhatMovedInATickThatIsNotSentIsInTheNextFrame) {
+  test::SessionRig rig;
+  rig.attach(test::kRightHand, Vector3(0.2, 0, 0.3));
+  Publisher publisher(rig.loaded().scenario, kEpoch, false);
+  TickOutput output = rig.tick(10);
+  for (int tick = 0; tick < 10; ++tick) (void)publisher.prepare(output);
+  for (ObjectState& moved : output.objects) {
+    moved.X_WO.translation().x() += 0.01;
+    const OutgoingMessages& unsent = publisher.prepare(output, /*is_newest=*/false);
+    EXPECT_TRUE(unsent.frames.empty());
+    EXPECT_TRUE(unsent.manifolds.empty());
+    const OutgoingMessages& sent = publisher.prepare(output);
+    ASSERT_EQ(sent.frames.size(), 1U);
+    EXPECT_EQ(sent.frames[0].states[0].object, moved.object);
+    EXPECT_EQ(sent.manifolds.size(), 1U);
+  }
+}
+
 TEST(Publisher, SetsHandAndServerEpochOfEachManifold) {
   test::SessionRig rig;
   rig.attach(test::kInstructorHand, Vector3(-0.3, 0, 0.3));

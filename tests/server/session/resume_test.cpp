@@ -1,9 +1,11 @@
 #include "server/session/resume.h"
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -107,6 +109,30 @@ TEST_F(ResumeTest, AJournalOfThreeLivesResimulates) {
   EXPECT_FALSE(report->first_difference);
   EXPECT_EQ(report->final_hash, hashes_[2100]);
   EXPECT_EQ(report->problem, "") << "a continued file is complete";
+}
+
+// a recorder may have been away for all of the second life
+TEST_F(ResumeTest, ForRecordersThereAreTheLastTicksOfAllLivesWithTheirCheckpoints) {
+  fs::path file = journalUpTo(493);
+  {
+    SessionSimulation simulation = test::SessionRig::makeSimulation(loaded_);
+    ASSERT_TRUE(readResumePoint(file, loaded_, simulation));
+    auto journal = Journal::reopen(file, simulation.now(), 2);
+    ASSERT_TRUE(journal) << journal.error().what;
+    run(simulation, *journal, 1050, true);
+    file = kill(file);
+  }
+  SessionSimulation simulation = test::SessionRig::makeSimulation(loaded_);
+  const auto point = readResumePoint(file, loaded_, simulation);
+  ASSERT_TRUE(point) << point.error().what;
+  EXPECT_EQ(point->checkpoint, 1001U);
+  ASSERT_EQ(point->entries.size(), 1040U);
+  for (Tick tick = 1; tick <= 1040; ++tick) {
+    const JournalEntry& entry = point->entries[tick - 1];
+    EXPECT_EQ(entry.input.tick, tick);
+    EXPECT_EQ(entry.hash, hashes_[tick]);
+    EXPECT_EQ(!entry.checkpoint.empty(), tick == 1 || tick == 481 || tick == 1001) << tick;
+  }
 }
 
 TEST_F(ResumeTest, WhereverTheEndIsTornTheKeptTicksBeforeItAreThere) {
@@ -217,8 +243,42 @@ TEST_F(ResumeTest, WithTheKeyOfASeatComesItsFormerId) {
   after.takeChanges(changes);
   EXPECT_EQ(changes.begin()->kind, ChangeKind::kContinue) << "before all others";
 
+  std::vector<KeptSeat> closed = *seats;
+  closed[1].is_closed = true;
+  ASSERT_TRUE(writeSeats(file, closed));
+  const auto kept = readSeats(file);
+  ASSERT_TRUE(kept) << kept.error().what;
+  SessionRegistry later(scenario, 2, false);
+  later.resume(*kept, 0);
+  EXPECT_FALSE(join(later, "fifth", 'b', 2).accepted) << "a removed person's seat stays closed";
+
   std::ofstream(file, std::ios::app) << "17 x\n";
   EXPECT_THAT(readSeats(file).error().what, HasSubstr("session.mcap.seats:3"));
+}
+
+TEST_F(ResumeTest, TheSeatKeeperWritesTheNewestListAndSaysWhenItCannot) {
+  const auto first = [](std::size_t count) {
+    std::vector<KeptSeat> seats(count);
+    for (std::size_t i = 0; i < count; ++i) seats[i].client = ClientId{static_cast<std::uint32_t>(i + 1)};
+    return seats;
+  };
+  {
+    SeatKeeper keeper(folder_ / "seats");
+    for (std::size_t count = 1; count <= 50; ++count) keeper.keep(first(count));
+  }
+  const auto kept = readSeats(folder_ / "seats");
+  ASSERT_TRUE(kept) << kept.error().what;
+  EXPECT_EQ(kept->size(), 50u);
+
+  SeatKeeper nowhere(folder_ / "missing" / "seats");
+  nowhere.keep(first(1));
+  std::optional<std::string> error;
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (!(error = nowhere.takeError()) && std::chrono::steady_clock::now() < until)
+    std::this_thread::yield();
+  ASSERT_TRUE(error);
+  EXPECT_THAT(*error, HasSubstr("missing/seats: cannot be written"));
+  EXPECT_FALSE(nowhere.takeError()) << "once";
 }
 
 //   grip o   the part is parked where it was; the hand comes back 25 cm away, and nothing moves

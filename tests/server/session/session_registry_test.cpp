@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "idl/types/names.h"
 #include "tests/server/session/small_session.h"
 
 namespace tenon::session {
@@ -172,6 +173,16 @@ TEST_F(SessionRegistryTest, NobodyIsEvictedByARequestThatIsRefused) {
   EXPECT_TRUE(changes().empty());
 }
 
+TEST_F(SessionRegistryTest, BeyondLoopbackTheKeyIsNeededByAll) {
+  registry_.requireKey(true);
+  for (const Role role : {Role::kTrainee, Role::kObserver, Role::kRecorder}) {
+    EXPECT_TRUE(registry_.mustProve({.role = role}));
+    EXPECT_THAT(join("a", role, {}, {}, {.seat = true}).reason, HasSubstr("needs the key of this session"));
+    const Welcome welcome = join(std::string(roleName(role)), role, {}, {}, {.seat = true, .key = true});
+    EXPECT_TRUE(welcome.accepted) << welcome.reason;
+  }
+}
+
 TEST_F(SessionRegistryTest, TheKeyIsNeededByInstructorsAndAdminsAlone) {
   for (const Role role : {Role::kAdmin, Role::kInstructor}) {
     EXPECT_TRUE(registry_.mustProve({.role = role}));
@@ -278,6 +289,44 @@ TEST_F(SessionRegistryTest, CommandsBetweenTwoTicksAreJudgedByThePendingPhase) {
   EXPECT_THAT(command(instructor, CommandKind::kResume).reason, HasSubstr("over"));
 }
 
+TEST_F(SessionRegistryTest, ARoundTripIsToldInStepsAndNotForEachThatIsALittleDifferent) {
+  const Welcome welcome = join("a", Role::kTrainee, {"right"});
+  (void)changes();
+  EXPECT_FALSE(registry_.setLimits(welcome.client, {}, 0.0024)) << "that of a local network";
+  EXPECT_FALSE(registry_.setLimits(welcome.client, {}, std::nan("")));
+  EXPECT_TRUE(registry_.setLimits(welcome.client, {}, 0.0521));
+  const auto taken = changes();
+  ASSERT_EQ(taken.size(), 1U);
+  EXPECT_EQ(taken[0].kind, ChangeKind::kSetLimits);
+  EXPECT_NEAR(taken[0].value, 0.0525, 1e-12) << "never a shorter one than there is";
+  EXPECT_FALSE(registry_.setLimits(welcome.client, {}, 0.0479));
+  EXPECT_TRUE(registry_.setLimits(welcome.client, {}, 0.0526)) << "a longer one counts at once";
+  EXPECT_NEAR(registry_.roundTripOf(test::kRightHand), 0.055, 1e-12);
+  EXPECT_TRUE(registry_.setLimits(welcome.client, {}, 0.0499));
+  registry_.leave(welcome.client);
+  EXPECT_EQ(registry_.roundTripOf(test::kRightHand), 0.0);
+}
+
+TEST_F(SessionRegistryTest, AStationChoosesTheLimitsOfItsOwnHandsWithinTheBoundsAndUntilItLeaves) {
+  const Welcome welcome = join("a", Role::kTrainee, {"right"});
+  (void)changes();
+  EXPECT_FALSE(registry_.setLimits(welcome.client, {})) << "they are so already";
+  EXPECT_TRUE(registry_.setLimits(welcome.client, {.freeze_ticks = 80, .park_ticks = 1300}));
+  EXPECT_FALSE(registry_.setLimits(welcome.client, {.freeze_ticks = 80, .park_ticks = 1300}));
+  const auto taken = changes();
+  ASSERT_EQ(taken.size(), 1U);
+  EXPECT_EQ(taken[0].kind, ChangeKind::kSetLimits);
+  EXPECT_EQ(taken[0].hand, test::kRightHand);
+  EXPECT_EQ(taken[0].index, 80U);
+  EXPECT_EQ(taken[0].lifetime_ticks, 1300U);
+  EXPECT_EQ(registry_.limitsOf(test::kLeftHand), HandLimits{});
+  EXPECT_TRUE(registry_.setLimits(welcome.client, {.freeze_ticks = 1'000'000, .park_ticks = 0}));
+  EXPECT_EQ(registry_.limitsOf(test::kRightHand), (HandLimits{kMostFreezeTicks, kParkTicks}));
+  EXPECT_FALSE(registry_.setLimits(ClientId{9}, {.freeze_ticks = 80, .park_ticks = 1300}));
+  registry_.leave(welcome.client);
+  EXPECT_EQ(registry_.limitsOf(test::kRightHand), HandLimits{});
+}
+
 TEST_F(SessionRegistryTest, RefusesDeviceInputForHandsOfOthers) {
   const ClientId client = join("a", Role::kTrainee, {"right"}).client;
   const ClientId instructor = join("b", Role::kInstructor, {"instructor"}).client;
@@ -376,6 +425,63 @@ TEST_F(SessionRegistryTest, ATrackedHandIsHandedNothing) {
   registry.updatePhase(RunPhase::kRunning, false);
   EXPECT_THAT(registry.handleCommand({instructor, 1, CommandKind::kHandOver, {}, "part left"}).reason,
               HasSubstr("hand 'left' is tracked"));
+}
+
+TEST_F(SessionRegistryTest, WhoIsRemovedLeavesAndDoesNotGetTheSeatAgain) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  const ClientId trainee = join("a", Role::kTrainee, {"right"}).client;
+  (void)changes();
+  EXPECT_EQ(command(trainee, CommandKind::kKick, "b").refusal, Refusal::kNotPermitted);
+  EXPECT_EQ(command(instructor, CommandKind::kKick, "nobody").refusal, Refusal::kUnknownName);
+  EXPECT_THAT(command(instructor, CommandKind::kKick, std::to_string(instructor.value)).reason,
+              HasSubstr("yourself"));
+  EXPECT_TRUE(registry_.takeKicked().empty());
+
+  EXPECT_TRUE(command(instructor, CommandKind::kKick, std::to_string(trainee.value)).accepted);
+  EXPECT_THAT(registry_.takeKicked(), ElementsAre(trainee));
+  EXPECT_TRUE(registry_.takeKicked().empty()) << "once";
+  registry_.leave(trainee);
+  const auto taken = changes();
+  ASSERT_EQ(taken.size(), 1U);
+  EXPECT_EQ(taken[0].kind, ChangeKind::kDetach);
+  EXPECT_THAT(join("a", Role::kTrainee, {"right"}).reason, HasSubstr("you were removed"));
+  EXPECT_TRUE(join("z", Role::kTrainee, {"right"}).accepted) << "the hand is free for others";
+}
+
+TEST_F(SessionRegistryTest, AnAdminIsRemovedByAnAdminAlone) {
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  const ClientId admin = join("a", Role::kAdmin).client;
+  const ClientId other = join("c", Role::kAdmin).client;
+  EXPECT_EQ(command(instructor, CommandKind::kKick, std::to_string(admin.value)).refusal,
+            Refusal::kNotPermitted);
+  EXPECT_TRUE(command(other, CommandKind::kKick, std::to_string(admin.value)).accepted);
+}
+
+TEST_F(SessionRegistryTest, ARefusalHasAKindForDisplays) {
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  const ClientId trainee = join("a", Role::kTrainee).client;
+  EXPECT_EQ(command(instructor, CommandKind::kSkipStep).refusal, Refusal::kWaiting);
+  registry_.updatePhase(RunPhase::kRunning, false);
+  EXPECT_EQ(command(ClientId{}, CommandKind::kSkipStep).refusal, Refusal::kNotJoined);
+  EXPECT_EQ(command(trainee, CommandKind::kSkipStep).refusal, Refusal::kNotPermitted);
+  EXPECT_EQ(command(instructor, CommandKind::kResume).refusal, Refusal::kAlready);
+  EXPECT_EQ(command(instructor, CommandKind::kGoToStep, "nowhere").refusal, Refusal::kUnknownName);
+  EXPECT_EQ(command(instructor, CommandKind::kHandOver, "part right").refusal, Refusal::kNobodyThere);
+  EXPECT_EQ(command(instructor, CommandKind::kHandOver, "bay right").refusal, Refusal::kNotHoldable);
+  EXPECT_EQ(command(instructor, CommandKind::kSkipStep).refusal, Refusal::kNone);
+  registry_.updatePhase(RunPhase::kSucceeded, false);
+  EXPECT_EQ(command(instructor, CommandKind::kSkipStep).refusal, Refusal::kOver);
+}
+
+TEST_F(SessionRegistryTest, FrozenForcesAreAChange) {
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  (void)changes();
+  EXPECT_TRUE(command(instructor, CommandKind::kFreezeForces, {}, 1.0).accepted) << "in any phase";
+  const auto taken = changes();
+  ASSERT_EQ(taken.size(), 1U);
+  EXPECT_EQ(taken[0].kind, ChangeKind::kFreezeForces);
+  EXPECT_EQ(taken[0].value, 1.0);
 }
 
 TEST_F(SessionRegistryTest, ANoteChangesNothing) {

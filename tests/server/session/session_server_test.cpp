@@ -35,7 +35,8 @@ using ::testing::HasSubstr;
 /// A server that runs in a thread of its own.
 class RunningServer {
  public:
-  explicit RunningServer(SessionOptions options) : session_(options.name) {
+  explicit RunningServer(SessionOptions options, const std::string& scenario = test::twoHandedScenario())
+      : loaded_(test::smallSession(scenario)), session_(options.name) {
     options.domain = test::ownDomain();
     if (!options.key) options.key = test::kTestKey;
     auto opened = SessionServer::open(loaded_, std::move(options));
@@ -56,7 +57,7 @@ class RunningServer {
   [[nodiscard]] const LoadedScene& loaded() const { return loaded_; }
 
  private:
-  LoadedScene loaded_ = test::smallSession();
+  LoadedScene loaded_;
   std::string session_;
   std::unique_ptr<SessionServer> server_;
   std::atomic<bool> stop_ = false;
@@ -391,6 +392,25 @@ TEST(SessionServer, AStopCommandEndsASessionThatStillWaitsForPeople) {
   ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 2; }));
   EXPECT_TRUE(instructor.ack.accepted) << instructor.ack.reason;
   EXPECT_EQ(server.end(false).run.phase, RunPhase::kStopped);
+}
+
+// the run fails 0.1 s after it began, while the wire thread, which prints, is held up
+TEST(SessionServer, TheEndOfARunIsPublishedWhenTheWireIsBehindByMoreThanItsQueue) {
+  SessionOptions options{.name = "behind", .wait_for = {"observer"}};
+  options.print = [](const std::string& line) {
+    if (line == "run: running") std::this_thread::sleep_for(milliseconds(1500));
+  };
+  RunningServer server(
+      options, test::with(test::twoHandedScenario(), "- name: take\n", "- name: take\n    timeout: 0.1 s\n"));
+  test::ScriptedClient client("behind", wire::LinkProfile::kLan);
+  ASSERT_TRUE(client.join("somebody", Role::kObserver, {}));
+  ASSERT_TRUE(client.receivesUntil([&] { return isOver(client.run.phase); }));
+  EXPECT_EQ(client.run.phase, RunPhase::kFailed);
+  EXPECT_THAT(client.run.reason, HasSubstr("not done in time"));
+  const SessionReport report = server.end(/*by_stop=*/false);
+  EXPECT_GT(report.dropped_outputs, 0U) << "the wire was behind";
+  EXPECT_EQ(report.run.final_hash, client.run.final_hash);
+  EXPECT_EQ(report.run.reason, client.run.reason);
 }
 
 TEST(SessionServer, RefusesToWaitForAnUnknownHandOrRole) {

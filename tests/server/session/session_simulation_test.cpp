@@ -72,6 +72,105 @@ TEST(SessionSimulation, AHandWithoutInputIsFrozenThenParkedAndReturns) {
   EXPECT_NEAR(rig.object("pointer").X_WO.translation().x(), 0.3, 1e-3);
 }
 
+Change limitsOf(HandId hand, std::uint32_t freeze, std::uint32_t park) {
+  return {.kind = ChangeKind::kSetLimits, .hand = hand, .index = freeze, .lifetime_ticks = park};
+}
+
+TEST(SessionSimulation, AHandOfAWorseLinkFreezesAndParksLater) {
+  test::SessionRig rig;
+  rig.attach(test::kRightHand, kFreeSpace);
+  rig.tick(5);
+  rig.change(limitsOf(test::kRightHand, 90, 1400));
+  rig.tick();
+  rig.loseLink(test::kRightHand);
+  rig.tick(90);
+  EXPECT_FALSE(rig.hand(test::kRightHand).frozen);
+  rig.tick();
+  EXPECT_TRUE(rig.hand(test::kRightHand).frozen);
+  rig.tick(1400 - 92);
+  EXPECT_TRUE(rig.hand(test::kRightHand).present);
+  rig.tick();
+  EXPECT_FALSE(rig.hand(test::kRightHand).present);
+}
+
+TEST(SessionSimulation, NoHandGoesOnForLongerThanTheBoundAndALimitThatShrinksActsAtOnce) {
+  test::SessionRig rig;
+  rig.attach(test::kRightHand, kFreeSpace);
+  rig.tick(5);
+  rig.change(limitsOf(test::kRightHand, 1'000'000, 1'000'000));
+  rig.tick();
+  rig.loseLink(test::kRightHand);
+  rig.tick(kMostFreezeTicks + 1);
+  EXPECT_TRUE(rig.hand(test::kRightHand).frozen);
+  rig.tick(kParkTicks);
+  EXPECT_TRUE(rig.hand(test::kRightHand).present);
+  rig.change(limitsOf(test::kRightHand, 0, 0));
+  rig.tick();
+  EXPECT_FALSE(rig.hand(test::kRightHand).present) << "it is beyond the limit of a link without faults";
+}
+
+TEST(SessionSimulation, LimitsAreOfTheClientThatAskedForThem) {
+  test::SessionRig rig;
+  rig.attach(test::kRightHand, kFreeSpace);
+  rig.change(limitsOf(test::kRightHand, 90, 1400));
+  rig.tick();
+  rig.change({.kind = ChangeKind::kDetach, .hand = test::kRightHand});
+  rig.tick();
+  rig.change({.kind = ChangeKind::kAttach, .hand = test::kRightHand});
+  rig.tick();
+  rig.loseLink(test::kRightHand);
+  rig.tick(kFreezeTicks + 1);
+  EXPECT_TRUE(rig.hand(test::kRightHand).frozen);
+}
+
+TEST(SessionSimulation, LimitsAreInTheHashAndInCheckpoints) {
+  test::SessionRig rig, other;
+  for (test::SessionRig* one : {&rig, &other}) {
+    one->attach(test::kRightHand, kFreeSpace);
+    one->tick(5);
+  }
+  EXPECT_EQ(rig.simulation().hash(), other.simulation().hash());
+  rig.change(limitsOf(test::kRightHand, 90, 1400));
+  rig.tick();
+  other.tick();
+  EXPECT_NE(rig.simulation().hash(), other.simulation().hash());
+  std::vector<std::uint8_t> saved;
+  rig.simulation().save(saved);
+  ASSERT_TRUE(other.simulation().restore(saved));
+  EXPECT_EQ(rig.simulation().hash(), other.simulation().hash());
+  for (test::SessionRig* one : {&rig, &other}) {
+    one->loseLink(test::kRightHand);
+    one->tick(80);
+    EXPECT_FALSE(one->hand(test::kRightHand).frozen);
+  }
+  EXPECT_EQ(rig.simulation().hash(), other.simulation().hash());
+}
+
+TEST(SessionSimulation, ARoundTripIsInTheHashAndInCheckpointsUntilTheClientLeaves) {
+  test::SessionRig rig, other;
+  for (test::SessionRig* one : {&rig, &other}) {
+    one->attach(test::kRightHand, kFreeSpace);
+    one->tick(5);
+  }
+  Change change = limitsOf(test::kRightHand, kFreezeTicks, kParkTicks);
+  change.value = 0.05;
+  rig.change(change);
+  rig.tick();
+  other.tick();
+  EXPECT_EQ(rig.hand(test::kRightHand).round_trip, 0.05);
+  EXPECT_NE(rig.simulation().hash(), other.simulation().hash());
+  std::vector<std::uint8_t> saved;
+  rig.simulation().save(saved);
+  ASSERT_TRUE(other.simulation().restore(saved));
+  EXPECT_EQ(other.hand(test::kRightHand).round_trip, 0.05);
+  EXPECT_EQ(rig.simulation().hash(), other.simulation().hash());
+  rig.change({.kind = ChangeKind::kDetach, .hand = test::kRightHand});
+  rig.tick();
+  rig.change({.kind = ChangeKind::kAttach, .hand = test::kRightHand});
+  rig.tick();
+  EXPECT_EQ(rig.hand(test::kRightHand).round_trip, 0.0);
+}
+
 TEST(SessionSimulation, ADetachedHandIsAbsentAtOnceAndItsSamplesAreIgnored) {
   test::SessionRig rig;
   rig.attach(test::kRightHand, kFreeSpace);
@@ -123,6 +222,38 @@ TEST(SessionSimulation, AnEmergencyStopFreezesAllHandsUntilItIsCleared) {
   EXPECT_EQ(rig.output().step.step, 1U) << "a command received meanwhile takes effect now";
 }
 
+TEST(SessionSimulation, FrozenForcesHoldHandsStillWhileStepsGoOn) {
+  test::SessionRig rig;
+  rig.attach(test::kRightHand, kFreeSpace);
+  rig.attach(test::kInstructorHand, Vector3(-0.3, 0, 0.3));
+  rig.tick(5);
+  const std::uint64_t before = rig.simulation().hash();
+  rig.change({.kind = ChangeKind::kFreezeForces, .value = 1.0});
+  rig.tick();
+  EXPECT_NE(rig.simulation().hash(), before) << "it is part of the state";
+  const Vector3 p_WC = rig.object("cube").X_WO.translation();
+  rig.move(test::kInstructorHand, Vector3(-0.3, 0, 0.4));
+  rig.change(game(CommandKind::kSkipStep));
+  rig.tick(10);
+  EXPECT_EQ(rig.output().phase, RunPhase::kRunning);
+  EXPECT_TRUE(rig.output().forces_frozen);
+  for (const HandManifold& manifold : {rig.output().manifolds[0], rig.output().manifolds[1]})
+    EXPECT_TRUE(manifold.frozen) << "no station displays a force of it";
+  EXPECT_EQ(rig.object("cube").X_WO.translation(), p_WC);
+  EXPECT_EQ(rig.output().step.step, 1U);
+
+  std::vector<std::uint8_t> bytes;
+  rig.simulation().save(bytes);
+  test::SessionRig other;
+  ASSERT_TRUE(other.simulation().restore(bytes));
+  EXPECT_EQ(other.simulation().hash(), rig.simulation().hash());
+
+  rig.change({.kind = ChangeKind::kFreezeForces, .value = 0.0});
+  rig.tick(300);
+  EXPECT_FALSE(rig.hand(test::kRightHand).frozen);
+  EXPECT_NEAR(rig.object("cube").X_WO.translation().z(), 0.4, 1e-3);
+}
+
 TEST(SessionSimulation, APauseFreezesHandsAndSuspendsTimeouts) {
   test::SessionRig rig;
   rig.attach(test::kRightHand, kFreeSpace);
@@ -138,6 +269,21 @@ TEST(SessionSimulation, APauseFreezesHandsAndSuspendsTimeouts) {
   EXPECT_FALSE(rig.hand(test::kRightHand).frozen);
   EXPECT_EQ(rig.tick(200).phase, RunPhase::kFailed) << "time in a pause does not count";
   EXPECT_TRUE(rig.simulation().over());
+}
+
+TEST(SessionSimulation, CommandsOfAPauseTakeEffectInTheirOrder) {
+  test::SessionRig rig;
+  rig.tick();
+  rig.change({.kind = ChangeKind::kPause});
+  rig.tick();
+  rig.change(game(CommandKind::kSkipStep));
+  rig.tick();
+  rig.change(game(CommandKind::kSkipStep));
+  rig.tick();
+  EXPECT_EQ(rig.output().step.skipped, 0U);
+  rig.change({.kind = ChangeKind::kResume});
+  rig.tick(3);
+  EXPECT_EQ(rig.output().step.skipped, 2U) << "each skip skips a step";
 }
 
 TEST(SessionSimulation, PauseAndResumeHaveNoEffectInOtherPhases) {
@@ -290,6 +436,30 @@ TEST(SessionSimulation, AHandTakesAnObjectAtItsOwnPoseAndLetsItGoAsAnyOther) {
     EXPECT_EQ(rig.object("part").status, ObjectStatus::kParked);
     EXPECT_EQ(rig.object("pointer").status, ObjectStatus::kHeld);
   }
+}
+
+TEST(SessionSimulation, AnExternalPoseReplacesTheOwnTrackerOfAnObjectForItsLifetime) {
+  test::SessionRig rig(1, {},
+                       test::with(test::twoHandedScenario(), "{name: left, object: spare}",
+                                  "{name: left, kind: tracked, object: spare}"));
+  rig.attach(test::kLeftHand, Vector3(0.5, 0, 0.3));
+  rig.tick(5);
+  ASSERT_EQ(rig.object("spare").status, ObjectStatus::kTracked);
+  rig.change({.kind = ChangeKind::kPlaceObject,
+              .object = rig.loaded().scenario->objectNamed("spare"),
+              .lifetime_ticks = 20,
+              .X_WO = Pose(Vector3(0.4, 0.1, 0.3))});
+  rig.tick();
+  std::vector<std::uint8_t> saved;
+  rig.simulation().save(saved);
+  SessionSimulation again = test::SessionRig::makeSimulation(rig.loaded());
+  ASSERT_TRUE(again.restore(saved));
+  EXPECT_EQ(again.hash(), rig.simulation().hash());
+  rig.tick(19);
+  EXPECT_EQ(rig.object("spare").status, ObjectStatus::kTracked);
+  EXPECT_NEAR((rig.object("spare").X_WO.translation() - Vector3(0.4, 0.1, 0.3)).norm(), 0.0, 1e-9);
+  rig.tick();
+  EXPECT_NEAR((rig.object("spare").X_WO.translation() - Vector3(0.5, 0, 0.3)).norm(), 0.0, 1e-9);
 }
 
 TEST(SessionSimulation, TakingWithUnknownIdsChangesNothing) {

@@ -39,8 +39,9 @@ inline session::LoadedScene smallSession(const std::string& text = twoHandedScen
 /// A SessionSimulation of the small scenario with hands whose inputs the test sets.
 class SessionRig {
  public:
-  explicit SessionRig(unsigned workers = 1, std::vector<HandId> needed = {})
-      : loaded_(smallSession()), simulation_(makeSimulation(loaded_, workers, std::move(needed))) {
+  explicit SessionRig(unsigned workers = 1, std::vector<HandId> needed = {},
+                      const std::string& text = twoHandedScenario())
+      : loaded_(smallSession(text)), simulation_(makeSimulation(loaded_, workers, std::move(needed))) {
     output_ = simulation_.makeOutput();
   }
   static session::SessionSimulation makeSimulation(const session::LoadedScene& loaded, unsigned workers = 1,

@@ -65,6 +65,10 @@ TEST(TextLimits, AreThoseOfTheMessages) {
   EXPECT_EQ(object(&SceneObject::title), kMaxTitle);
   EXPECT_EQ(object(&SceneObject::kind), kMaxKind);
   EXPECT_EQ(mostThatFits([](const std::string& text) {
+              return wire::encode(SceneObject{.titles = {{"en", text}}}).has_value();
+            }),
+            kMaxTitle);
+  EXPECT_EQ(mostThatFits([](const std::string& text) {
               return wire::encode(SceneHand{HandId{0}, text, Role::kTrainee, ObjectId{0}}).has_value();
             }),
             kMaxHandName);

@@ -81,12 +81,13 @@ TEST(WallInARefinedPlace, IsSolidAndNoThickerThanItsVoxelsNeed) {
   }
 }
 
-//   a solid is not thickened, from 2.5 voxels on
+//   a solid is not thickened, from 2.5 voxels on, its rims and corners included
 TEST(WallOfASolid, HasNoDilation) {
-  for (const double thickness : {0.013, 0.014, 0.02, 0.03}) {
+  for (const double thickness : {0.0125, 0.013, 0.014, 0.02, 0.03}) {
     for (const Vector3& tilt :
          {Vector3(0.0, 0.0, 0.0), Vector3(0.3, 0.1, 0.0), Vector3(0.61548, -0.61548, 0.0),
-          Vector3(0.04, 0.07, 0.2), Vector3(-0.5, 0.2, 0.4)}) {
+          Vector3(0.04, 0.07, 0.2), Vector3(-0.5, 0.2, 0.4), Vector3(-0.57, 0.03, 0.52),
+          Vector3(-0.04, -0.08, 0.45)}) {
       SCOPED_TRACE(testing::Message() << thickness << " m, tilt " << tilt.transpose());
       const WallScene wall({.thickness = thickness, .voxel = 0.005, .clearance = 0.0005, .tilt = tilt});
       ASSERT_TRUE(wall.loaded()) << wall.loaded().error().what;

@@ -129,6 +129,51 @@ TEST_F(HandsTest, AfterAReleaseThePointerStartsOutsideThePartAndMovesToTheHand) 
   EXPECT_NEAR((object(pointer_).X_WO.translation() - Vector3(0.0, 0.0, 0.2)).norm(), 0.0, 1e-9);
 }
 
+// A part in a hole lies deeper than its hand can be: what the hand moves next appears inside the part's
+// surroundings.
+TEST_F(HandsTest, APointerThatAppearsInsideAPartHasNoContactsUntilItIsOut) {
+  const Vector3 inside(0.11, 0.0, 0.0);
+  activateHand(*environment_, right_, inside);
+  for (const double z : {0.0, 0.01, 0.0}) {
+    moveHandTo(*environment_, right_, inside + Vector3(0.0, 0.0, z), 50);
+    EXPECT_EQ(hand(right_).F_Ho_W.force, Vector3::Zero());
+    EXPECT_FALSE(object(pointer_).in_contact);
+    EXPECT_NEAR((object(pointer_).X_WO.translation() - hand(right_).X_WH.translation()).norm(), 0.0, 1e-4);
+  }
+  moveHandTo(*environment_, right_, {0.11, 0.0, 0.1}, 200);
+  EXPECT_EQ(object(pointer_).X_WO.translation().z(), 0.1);
+  moveHandTo(*environment_, right_, inside, 200);
+  const double top = object(pointer_).X_WO.translation().z();
+  EXPECT_NEAR(top, 0.02 + test::kPointerRadius, 2e-4) << "on the part, once it was out";
+  EXPECT_NEAR(hand(right_).F_Ho_W.force.z(), hand(right_).stiffness.translational * top, 0.5);
+}
+
+// What is left of the overlap is a jump, so that stations ramp its force.
+TEST_F(HandsTest, APointerThatComesOutSlowlyHasJumpedWhenItsContactsBegin) {
+  activateHand(*environment_, right_, {0.11, 0.0, 0.0});
+  stepTicks(*environment_, 3);
+  const std::uint32_t inside = object(pointer_).epoch;
+  for (double z = 0.0; z < 0.05 && !object(pointer_).in_contact; z += 0.0002) {
+    EXPECT_EQ(object(pointer_).epoch, inside);
+    moveHandTo(*environment_, right_, {0.11, 0.0, z}, 1);
+  }
+  ASSERT_TRUE(object(pointer_).in_contact);
+  EXPECT_EQ(object(pointer_).epoch, inside + 1);
+}
+
+TEST_F(HandsTest, ACheckpointKnowsThatAPointerIsInsideAPart) {
+  activateHand(*environment_, right_, {0.11, 0.0, 0.0});
+  stepTicks(*environment_, 3);
+  Environment restored(small_.build(), EnvironmentOptions{});
+  ASSERT_TRUE(restored.restore(environment_->save()));
+  EXPECT_EQ(restored.hash(), environment_->hash());
+  for (Environment* environment : {environment_.get(), &restored}) {
+    moveHandTo(*environment, right_, {0.11, 0.0, 0.01}, 20);
+    EXPECT_EQ(environment->hands()[right_.value].F_Ho_W.force, Vector3::Zero());
+  }
+  EXPECT_EQ(restored.hash(), environment_->hash());
+}
+
 TEST_F(HandsTest, PlacingAPartAsHeldKeepsItInTheHandAtTheNewPose) {
   test::activateHand(*environment_, right_, {0.1, 0.0, 0.032});
   environment_->grab(right_, part_);
@@ -247,6 +292,133 @@ TEST_F(TwoHandsTest, AfterOneReleasesThePartKeepsItsEpochAndTheForceOnTheOtherFa
   }
   EXPECT_EQ(object(part_).epoch, epoch);
   EXPECT_NEAR(hand(left_).F_Ho_W.force.norm(), 0.0, 1e-3);
+}
+
+// 1000 N/m over 50 ms and back between the two: 24 Ns/m leave 240 N/m
+TEST_F(TwoHandsTest, OverLongLinksTwoHandsOnAPartAreSofterAndNoForceJumps) {
+  test::moveHandTo(*environment_, right_, {0.1, 0.06, 0.0}, 100);
+  test::stepTicks(*environment_, 100);
+  ASSERT_NEAR(hand(left_).F_Ho_W.force.y(), 5.0, 1e-3);
+  environment_->setHandRoundTrip(right_, 0.02);
+  environment_->setHandRoundTrip(left_, 0.08);
+  HandManifold manifold;
+  for (int tick = 0; tick < 1000; ++tick) {
+    const double before = hand(left_).F_Ho_W.force.y();
+    environment_->step();
+    ASSERT_LT(std::abs(hand(left_).F_Ho_W.force.y() - before), 0.03) << tick;
+  }
+  environment_->manifold(right_, manifold);
+  EXPECT_NEAR(manifold.stiffness, 240.0, 1e-9);
+  EXPECT_NEAR(manifold.rotational_stiffness, 4.8, 1e-9);
+  ASSERT_EQ(manifold.others.size(), 1U);
+  EXPECT_NEAR(manifold.others[0].stiffness, 240.0, 1e-9) << "the stations compute with the same springs";
+  EXPECT_NEAR(hand(left_).F_Ho_W.force.y(), 1.2, 1e-3);
+  EXPECT_NEAR(hand(right_).F_Ho_W.force.y(), -1.2, 1e-3);
+
+  environment_->release(left_);
+  test::stepTicks(*environment_, 2000);
+  environment_->manifold(right_, manifold);
+  EXPECT_EQ(manifold.stiffness, 1000.0) << "alone it is as stiff as its device";
+}
+
+TEST_F(HandsTest, AHandThatHoldsAPartAloneIsAsStiffOverALongLink) {
+  test::activateHand(*environment_, right_, {0.1, 0.05, 0.0});
+  test::activateHand(*environment_, left_, {0.3, -0.05, 0.0});
+  environment_->setHandRoundTrip(right_, 0.2);
+  environment_->setHandRoundTrip(left_, 0.2);
+  environment_->grab(right_, part_);
+  environment_->grab(left_, other_);
+  test::stepTicks(*environment_, 100);
+  EXPECT_EQ(environment_->couplingOf(right_).translational, 1000.0);
+  EXPECT_EQ(environment_->couplingOf(left_).translational, 1000.0);
+}
+
+TEST_F(TwoHandsTest, ARoundTripThatIsNoNumberLimitsNothing) {
+  for (const double none : {std::numeric_limits<double>::quiet_NaN(), -1.0, 0.0}) {
+    environment_->setHandRoundTrip(right_, none);
+    test::stepTicks(*environment_, 100);
+    EXPECT_EQ(environment_->couplingOf(right_).translational, 1000.0) << none;
+  }
+}
+
+TEST_F(TwoHandsTest, AFrozenHandLetsTheOtherMoveThePart) {
+  test::stepTicks(*environment_, 10);
+  environment_->setHandFrozen(left_, true);
+  test::moveHandTo(*environment_, left_, {0.1, -0.25, 0.0}, 100);
+  test::moveHandTo(*environment_, right_, {0.1, 0.15, 0.0}, 200);
+  test::stepTicks(*environment_, 100);
+  EXPECT_NEAR(object(part_).X_WO.translation().y(), 0.1, 1e-6) << "the right hand alone moves it";
+  EXPECT_EQ(hand(left_).F_Ho_W.force.norm(), 0.0);
+  HandManifold manifold;
+  environment_->manifold(left_, manifold);
+  EXPECT_TRUE(manifold.frozen);
+  environment_->manifold(right_, manifold);
+  EXPECT_FALSE(manifold.frozen);
+  EXPECT_TRUE(manifold.others.empty()) << "the coupling of the frozen hand does not act";
+}
+
+TEST_F(TwoHandsTest, AHandThatWasFrozenHoldsThePartWhereTheOtherHasBroughtItWithoutAPull) {
+  environment_->setHandFrozen(left_, true);
+  test::moveHandTo(*environment_, right_, {0.1, 0.15, 0.0}, 200);
+  test::stepTicks(*environment_, 100);
+  const Pose X_WP = object(part_).X_WO;
+  environment_->setHandFrozen(left_, false);
+  for (int tick = 0; tick < 100; ++tick) {
+    environment_->step();
+    ASSERT_LT(hand(right_).F_Ho_W.force.norm(), 1e-3) << tick;
+    ASSERT_LT(hand(left_).F_Ho_W.force.norm(), 1e-3) << tick;
+  }
+  EXPECT_NEAR((object(part_).X_WO.translation() - X_WP.translation()).norm(), 0.0, 1e-6);
+  test::moveHandTo(*environment_, left_, {0.1, -0.04, 0.0}, 100);
+  test::stepTicks(*environment_, 100);
+  EXPECT_NEAR(hand(left_).F_Ho_W.force.y(), -5.0, 1e-2) << "its coupling acts again";
+}
+
+TEST_F(TwoHandsTest, AHandThatComesBackHoldsAPartOfAnotherHandWhereItHeldItAlone) {
+  environment_->setHandPresent(left_, false);
+  test::stepTicks(*environment_, 10);
+  test::activateHand(*environment_, left_, {0.1, -0.3, 0.0});
+  test::stepTicks(*environment_, 10);
+  EXPECT_FALSE(hand(left_).attached) << "it is 25 cm away";
+  test::moveHandTo(*environment_, left_, {0.1, -0.05, 0.0}, 100);
+  EXPECT_TRUE(hand(left_).attached);
+}
+
+TEST_F(HandsTest, AHeldPartThatBeginsToCollideWhereItLiesInAnotherHasJumped) {
+  environment_->setPairEnabled(parts_, false);
+  test::activateHand(*environment_, right_, {0.1, 0.0, 0.0});
+  environment_->grab(right_, part_);
+  test::moveHandTo(*environment_, right_, {0.275, 0.0, 0.0}, 200);
+  test::stepTicks(*environment_, 20);
+  const std::uint32_t epoch = object(part_).epoch;
+  environment_->setPairEnabled(parts_, true);
+  environment_->step();
+  EXPECT_EQ(object(part_).epoch, epoch + 1);
+  environment_->setPairEnabled(parts_, true);
+  environment_->step();
+  EXPECT_EQ(object(part_).epoch, epoch + 1) << "it collided already";
+}
+
+TEST_F(HandsTest, AHeldPartThatBeginsToCollideWithOneBesideItHasNotJumped) {
+  environment_->setPairEnabled(parts_, false);
+  test::activateHand(*environment_, right_, {0.1, 0.0, 0.0});
+  environment_->grab(right_, part_);
+  test::moveHandTo(*environment_, right_, {0.255, 0.0, 0.0}, 200);
+  test::stepTicks(*environment_, 20);
+  const std::uint32_t epoch = object(part_).epoch;
+  environment_->setPairEnabled(parts_, true);
+  environment_->step();
+  EXPECT_EQ(object(part_).epoch, epoch) << "5 mm are between them";
+}
+
+TEST_F(HandsTest, AHeldPartIntoWhichAnotherIsPutHasJumped) {
+  test::activateHand(*environment_, right_, {0.1, 0.0, 0.0});
+  environment_->grab(right_, part_);
+  environment_->step();
+  const std::uint32_t epoch = object(part_).epoch;
+  environment_->place(other_, Pose(Vector3(0.13, 0.0, 0.0)), ObjectStatus::kFixed);
+  environment_->step();
+  EXPECT_EQ(object(part_).epoch, epoch + 1);
 }
 
 TEST_F(HandsTest, SwappedHandsExchangeHeldAndDefaultObjects) {

@@ -1,5 +1,5 @@
 // Drives the console's page in Chromium. Reads commands from standard input, a line of JSON each, and answers each with a line:
-//   {"do": "open", "url": U, "width": W, "height": H, "theme": "dark" | "light"}
+//   {"do": "open", "url": U, "width": W, "height": H, "theme": "dark" | "light", "touch": true, "language": "de-DE", "headset": true}   with an emulated headset, `headset` in the page
 //   {"do": "await", "expression": JS}   until it is true in the page
 //   {"do": "value", "expression": JS}
 //   {"do": "type", "selector": CSS, "text": T}
@@ -8,22 +8,30 @@
 //   {"do": "sit down"}   takes part, as a person at the page would
 //   {"do": "mount", "seed": S, "seconds": T, "steps": [..]}   with the mouse, until the step is none of these
 //   {"do": "picture", "file": F}
+//   {"do": "touch", "from": [X, Y], "to": [X, Y]}   one finger, of a page that was opened with "touch": true
+//   {"do": "axe"}   faults of accessibility, WCAG 2.2 A and AA, that are serious or worse: [[rule, element], ..]
 // Usage: node console_page.mjs PATH_OF_CHROMIUM
+import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
 import { createInterface } from "node:readline";
 
 import { chromium } from "playwright-core";
 
 import { mount, sitDown } from "./mouse_person.mjs";
 
+const axeSource = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+const headsetSource = readFileSync(createRequire(import.meta.url).resolve("iwer/build/iwer.min.js"), "utf8");
 const browser = await chromium.launch({ executablePath: process.argv[2], args: ["--no-sandbox", "--disable-dev-shm-usage"] });
 const problems = [];
 let page;
 
 const commands = {
-  async open({ url, width, height, theme }) {
+  async open({ url, width, height, theme, touch, language, headset }) {
     await page?.context().close();
-    const context = await browser.newContext({ viewport: { width, height }, colorScheme: theme, locale: "en-GB" });
+    const context = await browser.newContext({ viewport: { width, height }, colorScheme: theme, locale: language ?? "en-GB", hasTouch: touch === true });
     page = await context.newPage();
+    // Chromium has a WebXR of its own, without a device; its layers would draw where the emulated one has none
+    if (headset) await page.addInitScript(`${headsetSource}; delete window.XRWebGLBinding; window.headset = new IWER.XRDevice(IWER.metaQuest3); headset.installRuntime({ forceInstall: true });`);
     page.on("pageerror", (error) => problems.push(String(error)));
     page.on("console", (line) => line.type() === "error" && problems.push(line.text()));
     page.on("request", (request) => new URL(request.url()).origin !== new URL(url).origin && !request.url().startsWith("blob:") && problems.push(`asked elsewhere: ${request.url()}`));
@@ -58,6 +66,19 @@ const commands = {
   },
   async mount(task) {
     return mount(page, task);
+  },
+  async touch({ from, to }) {
+    const touches = await page.context().newCDPSession(page);
+    const send = (type, points) => touches.send("Input.dispatchTouchEvent", { type, touchPoints: points.map(([x, y]) => ({ x, y })) });
+    await send("touchStart", [from]);
+    for (let i = 1; i <= 8; ++i) await send("touchMove", [[from[0] + ((to[0] - from[0]) * i) / 8, from[1] + ((to[1] - from[1]) * i) / 8]]);
+    await send("touchEnd", []);
+    await touches.detach();
+  },
+  async axe() {
+    await page.evaluate(axeSource);
+    const { violations } = await page.evaluate(() => window.axe.run({ runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"] }));
+    return violations.filter(({ impact }) => impact === "serious" || impact === "critical").flatMap(({ id, nodes }) => nodes.map((node) => [id, node.html.slice(0, 160)]));
   },
   async picture({ file }) {
     await page.screenshot({ path: file, timeout: 120000 });

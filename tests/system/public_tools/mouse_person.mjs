@@ -2,7 +2,10 @@
 // ends on the screen, the numbers beside the hand, and which step it is. It sees with a delay, and its aim is off.
 const REACTION = 250; // [ms] from what it sees to what it does
 const AIM = 0.008; // [m] of aiming, root mean square, at the hand unless the hand moves finely
+const PUSH = 0.05; // [m] from which on it pushes straight where it does not get nearer otherwise
 const NEAR = 0.03; // [m] it changes to fine motion
+const DEPTH_HELP = 0.004; // [m] of depth that it leaves to the help with it
+const ABOVE = 0.03; // [m] beside the line of sight to where it is to go; farther off it drags first: over what stands before it
 const HALF_SWEEP = 220; // [pixels] of the mouse in one drag, to either side
 
 const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
@@ -23,12 +26,14 @@ function see() {
   const { hand } = part;
   const box = view.canvas.getBoundingClientRect();
   const guide = hand?.guide;
+  // the arrow in the scene and the line of the way point straight down
+  const isDown = ({ from, to }) => session.step.has_target && session.step.approach_W[2] < -0.9 && Math.hypot(from.x - to.x, from.y - to.y) < Math.max(0.1 * (from.z - to.z), from.z - to.z > 0.01 ? 0.006 : 0);
   return {
-    step: session.step?.name ?? "", isOver: session.isOver, isOn: hand?.isOn === true, isFine: hand?.isFine === true, isAligning: hand?.isAligning === true,
+    step: session.step?.name ?? "", isOver: session.isOver, isOn: hand?.isOn === true, isFine: hand?.isFine === true, isAligning: hand?.isAligning === true, isDeepening: hand?.isDeepening === true,
     text: document.querySelector(".hand-state")?.textContent ?? "",
     height: box.height,
     middle: { x: box.left + 0.55 * box.width, y: box.top + 0.5 * box.height },
-    guide: guide && { from: view.project(guide.from), to: view.project(guide.to), distance: guide.distance, farther: guide.farther, angle: guide.angle ?? 0, pixel: view.metresPerPixel(guide.from) },
+    guide: guide && { from: view.project(guide.from), to: view.project(guide.to), distance: guide.distance, farther: guide.farther, angle: guide.angle ?? 0, isDown: isDown(guide), pixel: view.metresPerPixel(guide.from) },
   };
 }
 
@@ -64,7 +69,7 @@ export async function mount(page, { seed, seconds, steps }) {
       await page.mouse.move(seen.middle.x - x / 2, seen.middle.y - y / 2);
       if (key !== undefined) await page.keyboard.down(key);
       await page.mouse.down();
-      await page.mouse.move(seen.middle.x + x / 2, seen.middle.y + y / 2, { steps: 6 });
+      await page.mouse.move(seen.middle.x + x / 2, seen.middle.y + y / 2, { steps: 3 });
       await page.mouse.up();
       if (key !== undefined) await page.keyboard.up(key);
     }
@@ -76,12 +81,21 @@ export async function mount(page, { seed, seconds, steps }) {
     await sleep(REACTION);
     if (seen.step !== last) [last, best, stuck] = [seen.step, Infinity, 0];
     const { guide } = seen;
+    // a hand that the station has switched off is switched on again, as the page asks for
+    if (!seen.isOn && (await page.locator(".arm").isVisible())) await page.keyboard.press("Enter");
     if (!seen.isOn || guide === undefined) continue;
     log.push(`${((Date.now() - begun) / 1000).toFixed(1)} ${seen.step} ${(1000 * guide.distance).toFixed(1)} mm, ${(1000 * guide.farther).toFixed(1)} farther, ${guide.angle.toFixed(3)} rad: ${seen.text}`);
     if (seen.isAligning || guide.angle > 0.02) {
       // a part that jams cannot be turned: it lifts it a little, as the instruction says
       if (++turns % 8 === 0) await drag(seen, 0, ((seen.isFine ? 10 : 1) * -0.01) / guide.pixel, "Control");
       else if (!seen.isAligning) await page.keyboard.press("g");
+      continue;
+    }
+    // the help with the depth, until it has done its work
+    if (seen.isDeepening) continue;
+    const pixels = Math.hypot(guide.to.x - guide.from.x, guide.to.y - guide.from.y);
+    if (!guide.isDown && Math.abs(guide.farther) > DEPTH_HELP && (pixels * guide.pixel < ABOVE || stuck > 3)) {
+      await page.keyboard.press("d");
       continue;
     }
     // a closer look where the way is small in the picture
@@ -97,11 +111,13 @@ export async function mount(page, { seed, seconds, steps }) {
     if (guide.distance < 0.9 * best) [best, stuck] = [guide.distance, 0];
     else ++stuck;
     // a straight push when it does not get nearer otherwise, as the instruction says; then it lifts a little
-    if (stuck > 3 && stuck % 6 === 5) await drag(seen, 0, aim(-0.004 / guide.pixel), "Control");
-    else if (stuck > 3 && stuck % 2 === 0) await drag(seen, 0, aim((guide.distance + 0.005) / guide.pixel), "Control");
+    if (guide.distance < PUSH && stuck > 3 && stuck % 6 === 5) await drag(seen, 0, aim(-0.004 / guide.pixel), "Control");
+    else if (guide.distance < PUSH && stuck > 3 && stuck % 2 === 0) await drag(seen, 0, aim((guide.distance + 0.005) / guide.pixel), "Control");
+    else if (guide.isDown) await drag(seen, 0, aim(dy), "Control");
     else await drag(seen, aim(dx), aim(dy));
+    if (guide.isDown || Math.abs(guide.farther) > ABOVE) continue; // left to the straight push, and to the help
     const notches = Math.round((guide.farther + (AIM / Math.SQRT2 / scale) * gauss()) / ((16 / scale) * guide.pixel)); // of 16 pixels each
-    for (let i = 0; i < Math.min(20, Math.abs(notches)); ++i) await page.mouse.wheel(0, -100 * Math.sign(notches));
+    for (let i = 0; i < Math.min(6, Math.abs(notches)); ++i) await page.mouse.wheel(0, -100 * Math.sign(notches));
   }
   return { log };
 }

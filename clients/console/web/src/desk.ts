@@ -1,12 +1,14 @@
 // The instructor's desk: a seat in the session, commands, and what the server answers to each. The emergency stop needs no seat.
 import { h, icon, type Icon } from "./dom";
 import type { DeskAnswer, LiveSource } from "./live";
-import { NONE, RunPhase, Status } from "./messages";
+import { NONE, RunPhase, Status, type SceneObject } from "./messages";
+import { Pairs } from "./pairs";
 import type { Session } from "./session";
-import { t, type Key } from "./strings";
+import { hasText, language, t, type Key } from "./strings";
 
 const NOTICE = 8000; // [ms] that an answer is shown
 const NOTICES = 3;
+const OTHER_LABELS: Record<string, Key> = { note: "desk.note.said", clear: "stop.clear", collision: "desk.collision", kick: "desk.kick", give: "desk.give", guide: "guide" };
 export const PASS = "pass"; // in the address, and in this tab's memory
 
 export class Desk {
@@ -17,14 +19,17 @@ export class Desk {
   readonly notices = h("div", "notices");
   /** That the server has granted; empty: looks on. */
   role = "";
+  /** Whether this console has a folder for recordings, and writes one of this session. */
+  canRecord = false;
+  isRecording = false;
   private dialog = h("dialog", "");
   private buttons: { button: HTMLButtonElement; key: Key; icon?: Icon; shows?: () => boolean }[] = [];
   private signals = h("span", "signals");
   private note = h("input", "");
   private more = h("details", "more");
-  private objects = [h("select"), h("select"), h("select")]; // of a collision, and to be given
+  private given = h("select"); // object to be handed over
   private hands = [h("select"), h("select")]; // that gets, that releases
-  private isOn = h("select");
+  private pairs: Pairs;
   private listed = "";
 
   /** `isOfAll`: the stop is for all sessions. */
@@ -44,6 +49,8 @@ export class Desk {
       this.notify(false, answer.text);
       this.show();
     };
+    this.pairs = new Pairs(session, (a, b, isOn) => this.command("collision", a, b, isOn ? "on" : "off"));
+    this.more.addEventListener("toggle", () => this.pairs.show());
     this.build();
     document.body.append(this.dialog);
     this.setWords();
@@ -52,7 +59,7 @@ export class Desk {
   private build(): void {
     const add = (host: HTMLElement, key: Key, words: string[], name?: Icon, shows?: () => boolean, confirm = false): void => {
       const button = h("button", "");
-      button.dataset["command"] = words[0];
+      button.dataset["command"] = words.join(" ");
       button.addEventListener("click", () => void (confirm ? this.confirm(key, words) : this.command(...words)));
       this.buttons.push({ button, key, icon: name, shows });
       host.append(button);
@@ -60,9 +67,15 @@ export class Desk {
     const isPaused = (): boolean => this.session.run?.phase === RunPhase.Paused;
     add(this.bar, "desk.pause", ["pause"], "pause", () => !isPaused());
     add(this.bar, "desk.resume", ["resume"], "now", isPaused);
+    const isFrozen = (): boolean => this.session.run?.forces_frozen === true;
+    add(this.bar, "desk.freeze", ["freeze", "on"], "frozen", () => !isFrozen());
+    add(this.bar, "desk.thaw", ["freeze", "off"], "frozen", isFrozen);
     add(this.bar, "desk.back", ["back"], "back");
     add(this.bar, "desk.repeat", ["repeat"], "repeat");
     add(this.bar, "desk.skip", ["skip"], "skip");
+    const isRecording = (): boolean => this.isRecording;
+    add(this.bar, "desk.record", ["record", "start"], "record", () => this.canRecord && !isRecording());
+    add(this.bar, "desk.record.stop", ["record", "stop"], "over", () => this.canRecord && isRecording());
     this.bar.append(this.signals);
     this.note.maxLength = 200;
     this.note.addEventListener("keydown", (event) => {
@@ -73,9 +86,8 @@ export class Desk {
     this.bar.append(this.note, this.more);
     const rows = h("div", "rows");
     const row = (...nodes: Node[]): HTMLElement => h("div", "row", ...nodes);
-    const give = row(this.objects[0], this.hands[0]);
+    const give = row(this.given, this.hands[0]);
     const release = row(this.hands[1]);
-    const pair = row(this.objects[1], this.objects[2], this.isOn);
     const addRow = (host: HTMLElement, key: Key, words: () => string[]): void => {
       const button = h("button", "");
       button.dataset["command"] = words()[0];
@@ -83,14 +95,13 @@ export class Desk {
       this.buttons.push({ button, key });
       host.append(button);
     };
-    addRow(give, "desk.give", () => ["give", this.objects[0].value, this.hands[0].value]);
+    addRow(give, "desk.give", () => ["give", this.given.value, this.hands[0].value]);
     addRow(release, "desk.release", () => ["release", this.hands[1].value]);
-    addRow(pair, "desk.collision", () => ["collision", this.objects[1].value, this.objects[2].value, this.isOn.value]);
     const whole = row();
     add(whole, "desk.swap", ["swap"], "swap");
     add(whole, "desk.reset", ["reset"], "repeat", undefined, true);
     add(whole, "desk.end", ["stop"], "over", undefined, true);
-    rows.append(give, release, pair, whole);
+    rows.append(give, release, this.pairs.element, whole);
     this.more.append(h("summary", ""), rows);
   }
 
@@ -99,10 +110,9 @@ export class Desk {
     this.note.placeholder = t("desk.note");
     this.note.setAttribute("aria-label", t("desk.note"));
     this.more.firstElementChild?.replaceChildren(t("desk.more"));
-    this.isOn.replaceChildren(...(["off", "on"] as const).map((value) => Object.assign(h("option", "", t(`desk.${value}`)), { value })));
+    this.pairs.setWords();
     const labels: [HTMLElement, Key][] = [
-      [this.objects[0], "desk.object"], [this.objects[1], "desk.object"], [this.objects[2], "desk.object"], [this.hands[0], "desk.hand"], [this.hands[1], "desk.hand"],
-      [this.isOn, "desk.collision"],
+      [this.given, "desk.object"], [this.hands[0], "desk.hand"], [this.hands[1], "desk.hand"],
     ];
     for (const [element, key] of labels) element.setAttribute("aria-label", t(key));
     this.listed = "";
@@ -124,6 +134,7 @@ export class Desk {
     if (this.sit.textContent !== label) this.sit.replaceChildren(icon("person"), label);
     this.bar.hidden = this.role === "" || session.isOver;
     for (const { button, shows } of this.buttons) button.hidden = shows !== undefined && !shows();
+    if (this.more.open) this.pairs.show();
     this.list();
   }
 
@@ -145,12 +156,10 @@ export class Desk {
     );
     const objects = [...session.objects.values()].filter((object) => !session.isOwn(object.object_id));
     const options = (list: { name: string; title: string }[]): HTMLElement[] => list.map(({ name, title }) => Object.assign(h("option", "", title || name), { value: name }));
-    for (const select of this.objects) select.replaceChildren(...options(objects));
-    this.objects[0].replaceChildren(...options(objects.filter((object) => session.states.get(object.object_id)?.status !== Status.Fixed)));
+    const named = (list: SceneObject[]): { name: string; title: string }[] => list.map((object) => ({ name: object.name, title: session.titleOf(object.object_id) }));
+    this.given.replaceChildren(...options(named(objects.filter((object) => session.states.get(object.object_id)?.status !== Status.Fixed))));
     const hands = [...session.sceneHands.values()].filter((hand) => !session.isTracked(hand.hand_id)).map((hand) => ({ name: hand.name, title: session.nameOfHand(hand.hand_id) }));
     for (const select of this.hands) select.replaceChildren(...options(hands));
-    const second = this.objects[2].options[1];
-    if (second !== undefined) second.selected = true;
   }
 
   /** Who sits at this page takes the seat again after a loss of the connection, and of the session. */
@@ -202,6 +211,12 @@ export class Desk {
     this.openDialog(t(key), [h("p", "muted", text)], t(key), () => this.command(...words));
   }
 
+  /** Removes a person from the session, by the number of the client. */
+  remove(client: number): void {
+    const who = this.session.people.get(client)?.name ?? String(client);
+    this.confirm("desk.kick", ["kick", String(client)], t("desk.kick.more", { who }));
+  }
+
   goTo(step: string, title: string): void {
     this.confirm("desk.goto", ["goto", step], t("desk.goto.more", { step: title }));
   }
@@ -226,15 +241,17 @@ export class Desk {
   }
 
   async command(...words: string[]): Promise<boolean> {
-    const label = this.buttons.find(({ button }) => button.dataset["command"] === words[0])?.key ?? (words[0] === "note" ? "desk.note.said" : words[0] === "clear" ? "stop.clear" : "desk.command");
+    const label = this.buttons.find(({ button }) => [words[0], words.join(" ")].includes(button.dataset["command"] ?? ""))?.key ?? OTHER_LABELS[words[0]] ?? "desk.command";
     const answer = await this.source.ask("deskCommand", { words });
+    if (words[0] === "record" && answer?.accepted === true) this.isRecording = words[1] === "start";
     this.tell(t(label), answer);
+    this.show();
     return answer?.accepted === true;
   }
 
   private tell(what: string, answer: DeskAnswer | undefined, offline = t("desk.offline")): void {
     if (answer === undefined) this.notify(false, `${what}: ${offline}`);
-    else this.notify(answer.accepted, `${what}: ${answer.text || t(answer.accepted ? "desk.accepted" : "desk.refused")}`);
+    else this.notify(answer.accepted, `${what}: ${reasonOf(answer) || t(answer.accepted ? "desk.accepted" : "desk.refused")}`);
   }
 
   notify(isGood: boolean, text: string): void {
@@ -243,6 +260,13 @@ export class Desk {
     while (this.notices.childElementCount > NOTICES) this.notices.firstElementChild?.remove();
     setTimeout(() => notice.remove(), NOTICE);
   }
+}
+
+/** What the gateway or the server answers, in this page's language where it has words for it. In English the server says more: it names what is missing. */
+export function reasonOf(answer: DeskAnswer): string {
+  const key = `refusal.${answer.code}` as Key;
+  if (answer.accepted || answer.code === undefined || !hasText(key)) return answer.text;
+  return language === "en" && answer.text !== "" ? answer.text : t(key);
 }
 
 /** Names of the hands that somebody moves, and the age of their contacts [ms]. */

@@ -27,6 +27,8 @@ const PATHS = {
   up: "M8 2l6 7h-4v5H6V9H2z",
   down: "M8 14L2 7h4V2h4v5h4z",
   help: "M8 1a7 7 0 1 1 0 14A7 7 0 0 1 8 1zM5 6h2c0-2 2-2 2-.500 0 1-2 1.500-2 3.500h2c0-1.500 2-1.800 2-3.500C11 2 5 2 5 6zM7 10.500v2h2v-2z",
+  frozen: "M7 1h2v3l2-1 1 2-2 1 3 1v2l-3 1 2 1-1 2-2-1v3H7v-3l-2 1-1-2 2-1-3-1V7l3-1-2-1 1-2 2 1z",
+  record: "M8 2a6 6 0 1 0 0 12A6 6 0 0 0 8 2z",
   person: "M8 2a3 3 0 1 1 0 6 3 3 0 0 1 0-6zM2 14c0-3 3-5 6-5s6 2 6 5z",
 } as const;
 export type Icon = keyof typeof PATHS;

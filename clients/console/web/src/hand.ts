@@ -17,11 +17,14 @@ const KEY_SPEED = 160; // [pixels/s] likewise
 const KEY_TURN = 0.8; // [rad/s]
 const ALIGN_TURN = 1.2; // [rad/s]
 const ALIGNED = 0.002; // [rad]
+const DEPTH_SPEED = 0.5; // [m/s]
+const DEEP_ENOUGH = 0.0005; // [m]
 const FINE = 0.1;
 const DEAD_ZONE = 0.12; // of a stick that is let go
 /** Buttons of the standard layout: the lower face button, the shoulders. */
 const PAD = { press: 0, turn: 4, fine: 5 } as const;
-const GATE = 0.006; // [m] beside the line of the approach; farther off, the way leads to its begin
+const GATE = 0.006; // [m] beside the line of the approach from which on the way leads along it
+const LEAVE = 0.02; // [m] beside it from which on the way leads to its begin again
 
 const toVector = (v: ArrayLike<number>): Vector3 => new Vector3(v[0], v[1], v[2]);
 const toQuaternion = ({ q }: Pose): Quaternion => new Quaternion(q[0], q[1], q[2], q[3]);
@@ -43,14 +46,19 @@ export class Hand {
   isTurning = false;
   guide?: Guide;
   /** Called when a hand has come to touch something. */
-  onContact?: (force: number) => void;
+  onContact?: (force: number, index: number) => void;
+  /** Whether somebody sees what the hand does; by default while the page is shown. */
+  isWatched?: () => boolean;
   private targets: Place[] = [];
   private seq = 0;
   private armUntil = 0;
   private aligning = false;
+  private depthGoal?: Vector3; // whose depth the hand is brought to
+  private wayOf = -1; // revision of the step on whose approach the part is
   private pressed = new Set<string>();
   private isShift = false;
   private drag?: { pointer: number; x: number; y: number };
+  private grasped = new Set<number>();
   private touched: boolean[] = [];
   private timer: number;
   private moved = 0;
@@ -64,7 +72,7 @@ export class Hand {
     for (const name of ["pointerup", "pointercancel"] as const) canvas.addEventListener(name, this.onUp);
     canvas.addEventListener("wheel", this.onWheel, { passive: false });
     addEventListener("keyup", this.onKeyUp);
-    addEventListener("blur", this.forgetKeys);
+    addEventListener("blur", this.letGo);
     view.setHandMode(true);
   }
 
@@ -76,7 +84,7 @@ export class Hand {
     for (const name of ["pointerup", "pointercancel"] as const) canvas.removeEventListener(name, this.onUp);
     canvas.removeEventListener("wheel", this.onWheel);
     removeEventListener("keyup", this.onKeyUp);
-    removeEventListener("blur", this.forgetKeys);
+    removeEventListener("blur", this.letGo);
     this.view.setHandMode(false);
     this.view.setGuide(undefined);
   }
@@ -89,7 +97,7 @@ export class Hand {
       const last = before[i];
       const isShifted = last?.isActive !== true || last.centre.distanceTo(view.centre) > SHIFT;
       if (!view.isActive || isShifted || this.targets[i] === undefined) this.targets[i] = copy(view.hand);
-      if (view.isActive && view.inContact && this.touched[i] === false) this.onContact?.(view.force);
+      if (view.isActive && view.inContact && this.touched[i] === false) this.onContact?.(view.force, i);
       this.touched[i] = view.inContact;
     });
     this.guide = this.findGuide();
@@ -108,6 +116,9 @@ export class Hand {
   get canAlign(): boolean {
     return this.goal() !== undefined;
   }
+  get isDeepening(): boolean {
+    return this.depthGoal !== undefined;
+  }
 
   /** The person at this page arms the station, or agrees that a stop ends. */
   press(): void {
@@ -116,10 +127,15 @@ export class Hand {
   align(): void {
     this.aligning = !this.aligning && this.canAlign;
   }
+  /** Brings what the hand moves as far away from the viewer as where it is to go. */
+  deepen(): void {
+    this.depthGoal = this.depthGoal === undefined ? this.guide?.to.clone() : undefined;
+  }
   /** No push any more. */
   relax(): void {
     if (this.now !== undefined) this.targets[this.current] = copy(this.now.proxy);
     this.aligning = false;
+    this.depthGoal = undefined;
     this.drag = undefined;
     this.pressed.clear();
   }
@@ -134,6 +150,24 @@ export class Hand {
     if (step === undefined) return;
     const wanted = [step.hand_id, this.session.holderOf(step.object_id)].map((id) => this.ids.indexOf(id)).find((index) => index >= 0);
     this.choose(wanted ?? 0);
+  }
+
+  /** Moved directly until its release, as by a controller. */
+  grasp(index: number): void {
+    this.grasped.add(index);
+    if (index !== this.current) return;
+    this.aligning = false;
+    this.depthGoal = undefined;
+  }
+  release(index: number): void {
+    this.grasped.delete(index);
+  }
+  /** In the world: by a way [m], and by a turn about the hand's own centre. */
+  moveBy(index: number, way: Vector3, turn: Quaternion): void {
+    const target = this.targets[index];
+    if (target === undefined) return;
+    target.p.addScaledVector(way, this.isFine ? FINE : 1);
+    target.q.premultiply(this.isFine ? new Quaternion().slerp(turn, FINE) : turn).normalize();
   }
 
   /** Along right, up and away of the view [m]. */
@@ -192,7 +226,8 @@ export class Hand {
       const way = toVector(step.approach_W);
       const off = from.clone().sub(to);
       const beside = off.clone().addScaledVector(way, -off.dot(way)).length();
-      const isOnWay = step.approach_distance === 0 || beside < GATE || off.length() < GATE;
+      const isOnWay = step.approach_distance === 0 || beside < (this.wayOf === step.revision ? LEAVE : GATE) || off.length() < GATE;
+      this.wayOf = isOnWay ? step.revision : -1;
       return guide(isOnWay ? to : to.addScaledVector(way, -step.approach_distance), now.object.q.angleTo(q_WG));
     }
     const touch = session.states.get(step.touch_id);
@@ -207,14 +242,16 @@ export class Hand {
     this.applyKeys(seconds);
     this.applyGamepad(seconds);
     this.applyAlignment(seconds);
+    this.applyDepth(seconds);
     this.targets.forEach((target, i) => {
       const view = this.views[i];
-      if (view === undefined || (this.drag !== undefined && i === this.current)) return;
+      if (view === undefined || (this.drag !== undefined && i === this.current) || this.grasped.has(i)) return;
       const off = target.p.clone().sub(view.proxy.p);
       if (view.isActive && off.length() > NEAR && view.inContact) target.p.copy(view.proxy.p).add(off.setLength(NEAR));
     });
     if (this.views.length === 0) return;
-    const buttons = (document.visibilityState === "visible" ? Button.Held : 0) | (now < this.armUntil ? Button.Arm : 0);
+    const isWatched = this.isWatched?.() ?? document.visibilityState === "visible";
+    const buttons = (isWatched ? Button.Held : 0) | (now < this.armUntil ? Button.Arm : 0);
     this.send(encodeTargets(++this.seq, buttons, this.targets, this.views.map((view) => view.centre)));
   }
 
@@ -263,6 +300,17 @@ export class Hand {
     else if (this.now.object.q.angleTo(toQuaternion(goal)) < 2 * ALIGNED) this.aligning = false;
   }
 
+  private applyDepth(seconds: number): void {
+    const centre = this.depthGoal === undefined ? undefined : this.centreAt(this.targets[this.current]);
+    const off = centre === undefined ? 0 : (this.depthGoal?.clone().sub(centre).dot(this.view.axes().away) ?? 0);
+    if (Math.abs(off) < DEEP_ENOUGH) this.depthGoal = undefined;
+    if (centre === undefined || this.depthGoal === undefined) return;
+    // along the line of sight: in the picture it stays where it is
+    const ray = this.view.sightOf(centre);
+    const most = DEPTH_SPEED * seconds;
+    this.targets[this.current].p.addScaledVector(ray, Math.max(-most, Math.min(most, off)) / ray.dot(this.view.axes().away));
+  }
+
   /** True when it was one of the hand's keys. */
   onKeyDown(event: KeyboardEvent): boolean {
     this.isShift = event.shiftKey;
@@ -272,7 +320,7 @@ export class Hand {
       return true;
     }
     if (event.repeat) return false;
-    const action = { g: () => this.align(), f: () => (this.isFine = !this.isFine), t: () => (this.isTurning = !this.isTurning), x: () => this.choose((this.current + 1) % this.ids.length), Escape: () => this.relax() }[event.key];
+    const action = { g: () => this.align(), d: () => this.deepen(), f: () => (this.isFine = !this.isFine), t: () => (this.isTurning = !this.isTurning), x: () => this.choose((this.current + 1) % this.ids.length), Escape: () => this.relax() }[event.key];
     action?.();
     return action !== undefined;
   }
@@ -280,7 +328,11 @@ export class Hand {
     this.isShift = event.shiftKey;
     this.pressed.delete(event.key);
   };
-  private forgetKeys = (): void => this.pressed.clear();
+  /** What was held when the window lost the focus: its release is not heard of. */
+  private letGo = (): void => {
+    this.pressed.clear();
+    this.drag = undefined;
+  };
 
   private onDown = (event: PointerEvent): void => {
     if (event.button !== 0 || this.drag !== undefined || !event.isPrimary) return;
@@ -307,6 +359,7 @@ export class Hand {
     if (event.ctrlKey) return; // zooms
     event.preventDefault();
     const notches = -Math.sign(event.deltaY || event.deltaX) * (this.isFine ? FINE : 1);
+    this.depthGoal = undefined;
     if (event.shiftKey) this.turn(0, 0, notches * TURN_NOTCH);
     else this.go(0, 0, (notches * NOTCH) / KEY_SPEED);
   };

@@ -11,7 +11,8 @@ export type LiveState = { kind: "connecting" } | { kind: "open" } | { kind: "rec
 /** `isGone`: of the instance, of which the message has the key. */
 export type Handler = (topic: string, message: unknown, isGone: boolean) => void;
 /** What the gateway answers to a request to the desk; of id 0: what nobody asked for, as the loss of a seat. */
-export interface DeskAnswer { id: number; accepted: boolean; text: string; role: string }
+/** `code`: the kind of a refusal, as refusalName() of idl/types/names.h has it. */
+export interface DeskAnswer { id: number; accepted: boolean; text: string; role: string; code?: string }
 
 export const INSTANCE_STATE = "__instance_state";
 

@@ -12,9 +12,9 @@ import { Player } from "./player";
 import { fromAddress, fromFile, Recording } from "./recording";
 import { SceneView } from "./scene";
 import { Session, TOPICS } from "./session";
-import { language, languageNames, nameOfLanguage, setLanguage, t, type Key } from "./strings";
+import { keep, kept, language, languageNames, nameOfLanguage, setLanguage, t, type Key } from "./strings";
 
-const PROTOCOL = 4; // kProtocolVersion of idl/types/messages/session.h
+const PROTOCOL = 7; // kProtocolVersion of idl/types/messages/session.h
 const PANEL_PERIOD = 100; // ms
 const COMMAND = "./tenon demo";
 
@@ -32,7 +32,7 @@ let isDropping = false;
 
 // ---- what the page consists of
 setLanguage(language);
-const theme = localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
+const theme = kept("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
 document.documentElement.dataset["theme"] = theme;
 
 const title = h("span", "title");
@@ -60,7 +60,12 @@ const noForce = h("p", "muted");
 const plotHost = h("div");
 sections.plots.body.append(noForce, plotHost);
 const side = h("aside", "side");
-for (const [name, { head, body }] of Object.entries(sections)) side.append(h("section", `panel panel-${name}`, head, body));
+for (const [name, { head, body }] of Object.entries(sections)) {
+  // scrolled by keys, too
+  body.tabIndex = 0;
+  body.setAttribute("role", "group");
+  side.append(h("section", `panel panel-${name}`, head, body));
+}
 const tabs = h("nav", "tabs");
 const tabButtons = (["steps", "plots", "people"] as const).map((name) => {
   const button = h("button", "");
@@ -105,6 +110,7 @@ function setWords(): void {
   player?.setWords();
   lobby?.setWords();
   for (const [element, key] of heads) element.textContent = t(key);
+  for (const { head, body } of Object.values(sections)) body.setAttribute("aria-label", head.textContent);
   for (const { name, button } of tabButtons) button.textContent = t(`tab.${name}`);
   legend.replaceChildren(
     ...(["target", "within", "device", "contact"] as const).map((name) => h("span", `key-${name}`, h("i"), t(`legend.${name}`))),
@@ -122,7 +128,7 @@ function setWords(): void {
 
 function setTheme(name: string): void {
   document.documentElement.dataset["theme"] = name;
-  localStorage.setItem("theme", name);
+  keep("theme", name);
   view?.setTheme();
   plot.rebuild();
 }
@@ -161,6 +167,12 @@ sections.steps.body.addEventListener("click", (event) => {
     const visit = session.steps.find((step) => step.name === name)?.started;
     if (visit !== undefined) player.seekTick(visit * 1000);
   } else if (desk?.role === "instructor" && !session.isOver) desk.goTo(name, row.querySelector(".name")?.textContent ?? name);
+});
+sections.people.body.addEventListener("click", (event) => {
+  const { kick, takeOver, guide } = (event.target as HTMLElement).closest<HTMLElement>("button")?.dataset ?? {};
+  if (kick !== undefined) desk?.remove(Number(kick));
+  if (takeOver !== undefined && part?.handName !== undefined) void desk?.command("give", takeOver, part.handName);
+  if (guide !== undefined) void desk?.command("guide", ...guide.split(" "));
 });
 sections.events.body.addEventListener("click", (event) => {
   const row = (event.target as HTMLElement).closest<HTMLElement>("li[data-tick]");
@@ -235,7 +247,7 @@ function showPanels(age: number): void {
   app.classList.toggle("leads", player !== undefined || (desk?.role === "instructor" && !session.isOver));
   show(card, panels.instruction(session));
   show(sections.steps.body, panels.steps(session));
-  show(sections.people.body, panels.people(session));
+  show(sections.people.body, panels.people(session, { leads: desk?.role === "instructor" && !session.isOver, hand: part?.handName }));
   show(sections.events.body, panels.events(session));
   show(status, panels.status(session, age));
   const over = coverOf();
@@ -255,7 +267,7 @@ function frame(now: number): void {
   if (lobby === undefined) view?.update(session, now);
   plot.update(session, now);
   const hand = part?.hand;
-  const state = `${hand?.views.length} ${hand?.isOn} ${hand?.current} ${hand?.isAligning} ${hand?.isFine} ${hand?.isTurning} ${session.changed} ${session.moved} ${live.kind} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${player?.problem} ${age > 0.5 ? age.toFixed(1) : ""}`;
+  const state = `${hand?.views.length} ${hand?.isOn} ${hand?.current} ${hand?.isAligning} ${hand?.isDeepening} ${hand?.isFine} ${hand?.isTurning} ${session.changed} ${session.moved} ${live.kind} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${player?.problem} ${age > 0.5 ? age.toFixed(1) : ""}`;
   if (now - shownAt >= PANEL_PERIOD && state !== shown) {
     shownAt = now;
     shown = state;
@@ -265,7 +277,7 @@ function frame(now: number): void {
 }
 
 // ---- where the session comes from
-function follow(room: string, role: string): void {
+function follow(room: string, role: string, canRecord: boolean): void {
   let joined = false;
   source = new LiveSource(addressOf(room), TOPICS, (topic, message, isGone) => {
     session.receive(topic, message, isGone);
@@ -280,9 +292,10 @@ function follow(room: string, role: string): void {
     part?.end();
   });
   desk = new Desk(source, session, role);
+  desk.canRecord = canRecord;
   const { notify } = desk;
   if (view !== undefined) {
-    part = new Part(source, session, view, () => sessionStorage.getItem(PASS) ?? "", (isGood, text) => notify.call(desk, isGood, text));
+    part = new Part(source, session, view, () => sessionStorage.getItem(PASS) ?? "", (isGood, text) => notify.call(desk, isGood, text), () => void desk?.raise());
     strip.append(part.take);
     stage.append(part.bar, part.lesson);
     Object.assign(window, { tenon: { session, view, player, part } });
@@ -331,7 +344,7 @@ async function begin(): Promise<void> {
   all.hidden = chosen === null || gateway.session !== "";
   if (gateway.recording !== "") await play(() => fromAddress("/recording.mcap"));
   else if (gateway.session === "" && chosen === null) showLobby(gateway.role);
-  else follow(gateway.session === "" ? `/live/${encodeURIComponent(chosen ?? "")}` : "/live", gateway.role);
+  else follow(gateway.session === "" ? `/live/${encodeURIComponent(chosen ?? "")}` : "/live", gateway.role, gateway.recordings === true);
 }
 
 for (const name of ["dragover", "dragleave", "drop"] as const)

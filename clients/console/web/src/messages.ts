@@ -8,6 +8,8 @@ export const NONE = 0xffffffff;
 
 export interface SceneObject {
   object_id: number; name: string; title: string; kind: string; structure_hash: string; color: string; X_WO: Pose; size: Vector; centre: Vector;
+  /** Recordings of before have none. */
+  titles?: Localized[];
 }
 export enum Status { Hidden, Parked, Held, Tracked, Fixed, Free }
 export interface ObjectState {
@@ -15,7 +17,7 @@ export interface ObjectState {
 }
 export interface WorldFrame { part: number; parts: number; tick: bigint; step_revision: number; states: ObjectState[] }
 export interface ObjectSnapshot { object_id: number; tick: bigint; state: ObjectState }
-export interface HandState { hand_id: number; seq: number; X_WH: Pose; F_Ho_W: Wrench; manifold_age: number; safety_flags: number; indexing: boolean }
+export interface HandState { hand_id: number; seq: number; X_WH: Pose; F_Ho_W: Wrench; manifold_age: number; safety_flags: number; indexing: boolean; guidance_force: number }
 export interface PairContact {
   a: number; b: number; enabled: boolean; colliding: boolean; contacts: number; F_Ao_W: Wrench; p_WP: Vector; depth: number; gap: number;
   load_percent: number; peak_force: number; peak_depth: number;
@@ -23,6 +25,7 @@ export interface PairContact {
 export interface ContactPairs { part: number; parts: number; tick: bigint; pairs: PairContact[] }
 export interface TickStats {
   tick: bigint; load_percent: number; compute_seconds: number; compute_seconds_max: number; late_ticks: bigint; input_age_seconds: number;
+  slow_writes: bigint; unsent_samples: bigint;
 }
 export interface Localized { language: string; text: string }
 export enum StepPhase { Waiting, Active, Done, TimedOut, Skipped }
@@ -36,15 +39,15 @@ export interface StepProgress {
   conditions: { text: string; value: number; limit: number; met: boolean }[];
 }
 export interface SceneStep { step: number; steps: number; name: string; title: Localized[]; part: string }
-export interface SceneHand { hand_id: number; name: string; role: number; object_id: number }
+export interface SceneHand { hand_id: number; name: string; role: number; object_id: number; freeze_ticks: number; park_ticks: number }
 export enum RunPhase { Waiting, Running, Paused, Succeeded, Failed, Stopped }
-export interface RunState { phase: RunPhase; tick: bigint; reason: string }
+export interface RunState { phase: RunPhase; tick: bigint; reason: string; forces_frozen?: boolean }
 export interface GrabState { object_id: number; hand_id: number; epoch: number; X_HO: Pose; tick: bigint }
 export interface Presence { client_id: number; name: string; role: number; hands: ArrayLike<number>; alive: boolean }
 export interface EmergencyStop { client_guid: string; counter: number; who: string; reason: string }
 export interface EmergencyClear { client_guid: string; counter: number; who: string; reason: string }
 export interface RecorderStatus { file: string; recording: boolean; messages: bigint; lost: bigint; problem: string }
-export interface Telemetry { client_id: number; input_to_force_p50: number; input_to_force_p99: number; loop_overruns: bigint; samples: bigint }
+export interface Telemetry { client_id: number; input_to_force_p50: number; input_to_force_p99: number; loop_overruns: bigint; samples: bigint; age: number; jitter: number; answers_lost: number; inputs_lost: number; inputs_replaced: number; clock_known: boolean; clock_offset: number; clock_error: number; round_trip: number }
 export interface SessionAnnounce { session: string; title: string; host: string; lockstep: boolean; protocol_version: number; scene_hash: string }
 export interface EventLog { seq: bigint; tick: bigint; severity: number; kind: string; text: string }
 export interface InstanceGone { topic: string; key_sample: Uint8Array }
@@ -59,4 +62,4 @@ export interface SceneModels { version: number; objects: ModelLevel[][] }
 /** Of the channel /lobby: the sessions of the bus. */
 export interface LobbyState { sessions: { session: string; title: string; host: string; served: boolean; lockstep: boolean; protocol: number }[] }
 /** What this gateway shows: a session, a recording, or, with neither, all sessions. */
-export interface Gateway { session: string; recording: string; role: string; protocol: number }
+export interface Gateway { session: string; recording: string; role: string; protocol: number; recordings?: boolean }

@@ -1,6 +1,7 @@
 // What stands around the scene: instruction, steps, people, events, status. Each part is made anew from the session when it changed.
 import { devicesOf } from "./desk";
 import { h, icon, type Icon } from "./dom";
+import { kindOf, readable, textOf } from "./eventtext";
 import { NONE, RunPhase, StepPhase, type EventLog } from "./messages";
 import type { Session, StepEntry } from "./session";
 import { localized, t, type Key } from "./strings";
@@ -21,6 +22,7 @@ const STEP: Record<StepPhase, [Key, Icon, string]> = {
   [StepPhase.Skipped]: ["step.skipped", "skip", "warn"],
 };
 const EVENTS_SHOWN = 40;
+const TRAINEE = 2; // as in the messages
 
 export function clock(seconds: number): string {
   const whole = Math.max(0, Math.floor(seconds));
@@ -37,17 +39,18 @@ export function titleOfStep(step: { name: string; title: StepEntry["title"] }): 
   return localized(step.title) || step.name.replace(/_/g, " ");
 }
 
-export function phase(session: Session): HTMLElement | undefined {
-  return session.run === undefined ? undefined : badge(RUN[session.run.phase]);
+export function phase({ run, isOver }: Session): HTMLElement | undefined {
+  if (run?.forces_frozen === true && run.phase === RunPhase.Running && !isOver) return badge(["run.frozen", "frozen", "warn"]);
+  return run === undefined ? undefined : badge(RUN[run.phase]);
 }
 
 export function instruction(session: Session): Node[] {
   const { step, run } = session;
-  const phase = run === undefined ? [] : [badge(RUN[run.phase])];
-  if (session.isOver && run !== undefined) return [h("div", "card-head", ...phase), h("p", "instruction", run.reason)];
-  if (step === undefined) return [h("div", "card-head", ...phase), h("p", "instruction muted", t("step.none"))];
+  const badges = [phase(session)].filter((one) => one !== undefined);
+  if (session.isOver && run !== undefined) return [h("div", "card-head", ...badges), h("p", "instruction", run.reason)];
+  if (step === undefined) return [h("div", "card-head", ...badges), h("p", "instruction muted", t("step.none"))];
   const count = h("span", "muted", t("step.count", { step: step.step + 1, steps: step.steps }));
-  const head = h("div", "card-head", count, h("span", "part", step.part), ...phase);
+  const head = h("div", "card-head", count, h("span", "part", session.retitled(step.part)), ...badges);
   return [head, h("h1", "step-title", localized(step.title) || step.name), h("p", "instruction", localized(step.instruction)), ...conditions(session)];
 }
 
@@ -55,13 +58,6 @@ function meter(label: string, text: string, fraction: number, isMet: boolean): H
   const bar = h("i", isMet ? "good" : "");
   bar.style.width = `${Math.round(100 * Math.min(1, Math.max(0.02, fraction)))}%`;
   return h("li", isMet ? "met" : "", icon(isMet ? "done" : "wait"), h("span", "", label), h("output", "", text), h("div", "bar", bar));
-}
-
-/** A text of the server with the titles of objects and steps instead of their names. */
-function readable(session: Session, text: string): string {
-  const titles = new Map([...session.objects.values()].map((object) => [object.name, object.title]));
-  for (const step of session.sceneSteps.values()) titles.set(step.name, titleOfStep(step));
-  return text.replace(/\w+/g, (word) => titles.get(word) ?? word);
 }
 
 function conditions(session: Session): Node[] {
@@ -90,7 +86,7 @@ export function steps(session: Session): Node[] {
   let part = "";
   const rows: HTMLElement[] = [];
   for (const entry of list) {
-    if (entry.part !== part && entry.part !== "") rows.push(h("li", "group", entry.part));
+    if (entry.part !== part && entry.part !== "") rows.push(h("li", "group", session.retitled(entry.part)));
     part = entry.part;
     const seconds = entry.started === undefined ? undefined : (entry.ended ?? (entry.isNow ? session.tick / 1000 : undefined));
     const time = entry.started === undefined || seconds === undefined ? "" : `${Math.max(0, seconds - entry.started).toFixed(1)} s`;
@@ -103,7 +99,24 @@ export function steps(session: Session): Node[] {
   return [h("ol", "steps", ...rows)];
 }
 
-export function people(session: Session): Node[] {
+/** What the link of a station does now: age of the displayed force, its jitter, losses, and how well the clocks are known. */
+function linkOf(session: Session, client: number): string {
+  const link = session.telemetry.get(client);
+  if (link === undefined || link.samples === 0n) return "";
+  const ms = (seconds: number) => (1000 * seconds).toFixed(seconds < 0.01 ? 1 : 0);
+  const lost = (100 * Math.max(link.inputs_lost, link.answers_lost)).toFixed(1);
+  const now = t("link", { age: ms(link.age), jitter: ms(link.jitter), lost });
+  const hands = Array.from(session.people.get(client)?.hands ?? []);
+  const freeze = Math.max(0, ...hands.map((hand) => session.sceneHands.get(hand)?.freeze_ticks ?? 0));
+  const text = freeze === 0 ? now : `${now}, ${t("link.freeze", { freeze })}`;
+  return link.clock_known ? `${text}, ${t("link.trip", { trip: ms(link.round_trip), error: ms(link.clock_error) })}` : text;
+}
+
+/** What the person at this page may do with people: remove them, and take what they hold into the hand of this name. */
+export interface Lead { leads: boolean; hand?: string }
+const OBSERVER = 3; // of the roles of messages: the console's gateway is one
+
+export function people(session: Session, { leads, hand }: Lead): Node[] {
   const here = [...session.people.values()].filter((person) => person.alive).sort((a, b) => a.client_id - b.client_id);
   if (here.length === 0) return [h("p", "muted", t("people.none"))];
   const rows = here.map((person) => {
@@ -112,7 +125,28 @@ export function people(session: Session): Node[] {
     const what = held.map((grab) => session.titleOf(grab.object_id)).join(", ");
     const devices = devicesOf(session, hands);
     const head = h("div", "", h("span", "name", person.name), h("span", "muted", t(`role.${person.role}` as Key)), h("span", "holds", what === "" ? "" : t("holds", { what })));
-    return h("li", "", icon("person"), head, ...(devices === "" ? [] : [h("small", "muted", devices)]));
+    const link = linkOf(session, person.client_id);
+    const actions: HTMLElement[] = [];
+    const act = (name: string, value: string, label: string, more: string): void => {
+      const button = h("button", "", label);
+      button.dataset[name] = value;
+      button.setAttribute("aria-label", `${label}: ${more}`);
+      actions.push(button);
+    };
+    const isOwn = hand !== undefined && hands.some((id) => session.sceneHands.get(id)?.name === hand);
+    if (leads && hand !== undefined && !isOwn)
+      for (const { object_id } of held) act("takeOver", session.objects.get(object_id)?.name ?? "", t("desk.takeover"), t("desk.takeover.more", { what: session.titleOf(object_id) }));
+    const guided = hands.filter((id) => session.isGuided(id));
+    if (leads && person.role === TRAINEE)
+      for (const id of hands.filter((one) => session.sceneHands.has(one) && !session.isTracked(one))) {
+        const [name, what] = [session.sceneHands.get(id)?.name ?? "", session.nameOfHand(id)];
+        for (const kind of ["show", "together"] as const) act("guide", `${kind} ${name}`, t(`guide.${kind}`), t(`guide.${kind}.more`, { what }));
+        act("guide", `off ${name}`, t("guide.off"), t("guide.off.more", { what }));
+      }
+    const guidance = guided.length === 0 ? "" : t("guide.acts", { what: guided.map((id) => session.nameOfHand(id)).join(", ") });
+    if (leads && person.role !== OBSERVER) act("kick", String(person.client_id), t("desk.kick"), `${t("desk.kick")}: ${person.name}`);
+    const details = [devices, link, guidance].filter((text) => text !== "").map((text) => h("small", "muted", text));
+    return h("li", "", icon("person"), head, ...details, ...(actions.length === 0 ? [] : [h("div", "row", ...actions)]));
   });
   return [h("ul", "people", ...rows)];
 }
@@ -127,8 +161,8 @@ export function events(session: Session): Node[] {
     else told.push({ event, times: 1 });
   }
   const rows = told.slice(-EVENTS_SHOWN).reverse().map(({ event, times }) => {
-    const text = event.kind.startsWith("step") || event.kind === "command" ? readable(session, event.text) : event.text;
-    const kind = h("span", "kind", event.kind);
+    const text = textOf(session, event);
+    const kind = h("span", "kind", kindOf(event));
     const row = h("li", ["", "warn", "bad"][event.severity] ?? "", h("time", "", clock(Number(event.tick) / 1000)), kind, h("span", "", times > 1 ? `${text} (×${times})` : text));
     row.dataset["tick"] = String(event.tick);
     return row;
@@ -150,6 +184,7 @@ export function status(session: Session, age: number): Node[] {
   if (stats !== undefined) {
     const ms = 1000 * stats.compute_seconds_max;
     items.push(item("status.compute", `${ms.toFixed(2)} ms`, ms > 1 && session.link?.lockstep !== true ? "warn" : ""), item("status.load", `${stats.load_percent.toFixed(0)} %`), item("status.late", String(stats.late_ticks)));
+    if (stats.slow_writes + stats.unsent_samples > 0n) items.push(item("status.writes", `${stats.slow_writes} / ${stats.unsent_samples}`, "warn"));
   }
   items.push(item("status.contacts", String(touching)));
   const { recorder } = session;

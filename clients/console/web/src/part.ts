@@ -1,11 +1,12 @@
 // Taking part: a place in the session for who sits at this page, and what stands around the hand while it is taken.
 import { h, icon, type Icon } from "./dom";
 import { Hand } from "./hand";
+import { hasHeadset, Headset, type CardText } from "./headset";
 import type { DeskAnswer, LiveSource } from "./live";
 import { NONE } from "./messages";
 import type { SceneView } from "./scene";
 import type { Session } from "./session";
-import { t, type Key } from "./strings";
+import { localized, t, type Key } from "./strings";
 
 const MOST_HANDS = 2;
 const ROLES = { trainee: 2, instructor: 1 } as const; // as in the messages
@@ -14,7 +15,7 @@ const TAUGHT = "taught"; // in this browser's memory
 const LOUDEST = 10; // [N]
 const HOLD_PERIOD = 30; // [ms] in which a button that is held moves the hand
 const ICONS_ONLY: Key[] = ["part.sound", "part.help"];
-const GESTURES = ["drag", "wheel", "turn", "vertical", "align", "fine", "look", "view"] as const;
+const GESTURES = ["drag", "wheel", "depth", "turn", "vertical", "align", "fine", "look", "view"] as const;
 
 export class Part {
   readonly take = h("button", "take");
@@ -28,13 +29,21 @@ export class Part {
   private tools = h("div", "hand-tools");
   private buttons: { button: HTMLButtonElement; key: Key; icon?: Icon; isPressed?: () => boolean; shows?: () => boolean }[] = [];
   private audio?: AudioContext;
+  private headset?: Headset;
+  private hasHeadset = false;
   private isAsking = false;
   private step = -1;
   private invited = new URLSearchParams(location.search).get("you") ?? ""; // to this role's place, by the address
   private isNew = false; // of the step nothing was shown yet
 
   /** `tell` says what came of a request. */
-  constructor(private source: LiveSource, private session: Session, private view: SceneView, private pass: () => string, private tell: (isGood: boolean, text: string) => void) {
+  constructor(private source: LiveSource, private session: Session, private view: SceneView, private pass: () => string, private tell: (isGood: boolean, text: string) => void, private raise: () => void) {
+    const lookForHeadset = (): void => void hasHeadset().then((has) => {
+      this.hasHeadset = has;
+      this.setWords();
+    });
+    lookForHeadset();
+    navigator.xr?.addEventListener("devicechange", lookForHeadset);
     this.take.addEventListener("click", () => (this.hand === undefined ? this.ask() : void this.leave()));
     this.arm.addEventListener("click", () => this.hand?.press());
     source.onHandNotice = (answer) => {
@@ -55,8 +64,10 @@ export class Part {
     add("part.turn", "repeat", () => this.hand !== undefined && (this.hand.isTurning = !this.hand.isTurning), { isPressed: isTurning });
     add("part.fine", "half", () => this.hand !== undefined && (this.hand.isFine = !this.hand.isFine), { isPressed: isFine });
     add("part.look", "live", () => this.look());
+    add("part.depth", "up", () => this.hand?.deepen(), { isPressed: () => this.hand?.isDeepening === true, shows: () => this.hand?.guide !== undefined });
     add("part.align", "done", () => this.hand?.align(), { isPressed: isAligning, shows: () => this.hand?.canAlign === true });
     add("part.other", "swap", () => this.hand?.choose((this.hand.current + 1) % this.hand.views.length), { shows: () => (this.hand?.views.length ?? 0) > 1 });
+    add("part.headset", "live", () => void this.wear(), { isPressed: () => this.headset !== undefined, shows: () => this.hasHeadset });
     add("part.sound", "bell", () => this.toggleSound(), { isPressed: () => this.audio !== undefined });
     add("part.help", "help", () => this.teach(this.lesson.hidden));
     this.bar.append(this.state, this.arm, this.tools);
@@ -89,7 +100,7 @@ export class Part {
       button.title = t(key);
     }
     this.arm.replaceChildren(icon("on"), t("part.arm"), h("kbd", "", t("part.arm.key")));
-    const rows = GESTURES.map((name) => h("li", "", h("kbd", "", t(`part.do.${name}` as Key)), h("span", "", t(`part.does.${name}` as Key))));
+    const rows = [...GESTURES, ...(this.hasHeadset ? ["headset"] : [])].map((name) => h("li", "", h("kbd", "", t(`part.do.${name}` as Key)), h("span", "", t(`part.does.${name}` as Key))));
     const close = h("button", "primary", t("part.understood"));
     close.addEventListener("click", () => this.teach(false));
     this.lesson.replaceChildren(h("h2", "", t("part.lesson")), h("ul", "gestures", ...rows), h("div", "row end", close));
@@ -148,6 +159,7 @@ export class Part {
     if (!hand.isOn) return [icon("hand"), h("b", "", name), h("span", "", t("part.off"))];
     const force = h("span", now.inContact ? "force touching" : "force", now.inContact ? t("part.force", { force: now.force.toFixed(1) }) : t("part.free"));
     const way: Node[] = [];
+    if (session.isGuided(this.ids[hand.current])) way.push(h("span", "way", t("part.guided")));
     if (guide !== undefined) {
       const mm = (metres: number): string => (Math.abs(metres) < 0.1 ? `${(1000 * metres).toFixed(0)} mm` : `${(100 * metres).toFixed(0)} cm`);
       way.push(h("span", "way", t("part.way", { distance: mm(guide.distance) })));
@@ -158,7 +170,48 @@ export class Part {
     return [icon("hand"), h("b", "", name), force, ...way];
   }
 
+  /** Enters the headset, or leaves it. */
+  private async wear(): Promise<void> {
+    const { hand } = this;
+    if (this.headset !== undefined || hand === undefined) return this.headset?.end();
+    try {
+      this.headset = await Headset.enter(hand, this.view, (side) => this.handOf(side), () => this.cardText(), this.raise, () => {
+        this.headset = undefined;
+        this.show();
+      });
+      if (this.hand !== hand) this.headset.end(); // the place was lost meanwhile
+    } catch (problem) {
+      this.tell(false, t("part.headset.not", { reason: problem instanceof Error ? problem.message : String(problem) }));
+    }
+    this.show();
+  }
+
+  /** The hand that a side of the person moves: that of its name, or the only one. */
+  private handOf(side: XRHandedness): number {
+    const named = this.ids.findIndex((id) => this.session.sceneHands.get(id)?.name.includes(side) === true);
+    return named >= 0 || this.ids.length === 1 ? Math.max(0, named) : side === "left" ? 1 : 0;
+  }
+
+  private cardText(): CardText {
+    const { hand, session } = this;
+    const { step } = session;
+    const isStopped = session.standing.length > 0;
+    const state = hand === undefined ? "" : this.describe(hand, isStopped).map((node) => node.textContent ?? "").filter((text) => text !== "").join(" · ");
+    return {
+      head: step === undefined ? "" : t("step.count", { step: step.step + 1, steps: step.steps }),
+      title: session.isOver ? (session.run?.reason ?? "") : step === undefined ? t("step.none") : localized(step.title) || step.name,
+      text: session.isOver || step === undefined ? "" : localized(step.instruction),
+      state: isStopped || hand?.isOn === true ? state : t("part.headset.arm"),
+      stop: t("part.headset.stop"),
+    };
+  }
+
   private ids: number[] = [];
+
+  /** Of the scenario, the hand that is moved here; none without one that is on. */
+  get handName(): string | undefined {
+    return this.hand?.isOn === true ? this.session.sceneHands.get(this.ids[this.hand.current])?.name : undefined;
+  }
 
   /** The hands of a role. */
   private handsOf(role: RoleName): { ids: number[]; names: string[] } {
@@ -213,7 +266,7 @@ export class Part {
     if (answer?.accepted !== true) this.end();
     this.said(t("part.take"), answer);
     if (answer?.accepted === true) {
-      hand.onContact = (force) => this.feel(force);
+      hand.onContact = (force, index) => this.feel(force, index);
       this.step = -1;
       this.teach(localStorage.getItem(TAUGHT) === null);
       this.arm.focus();
@@ -232,6 +285,7 @@ export class Part {
 
   /** The place is given up or lost. */
   end(): void {
+    this.headset?.end();
     this.hand?.end();
     this.hand = undefined;
     this.lesson.hidden = true;
@@ -255,8 +309,9 @@ export class Part {
   }
 
   /** A tick and a short vibration, stronger with more force. */
-  private feel(force: number): void {
+  private feel(force: number, index: number): void {
     const strength = Math.min(1, 0.3 + force / LOUDEST);
+    this.headset?.feel(index, strength);
     if ("vibrate" in navigator) navigator.vibrate(Math.round(30 * strength));
     void navigator.getGamepads().find((pad) => pad !== null)?.vibrationActuator?.playEffect("dual-rumble", { duration: 60, weakMagnitude: strength, strongMagnitude: strength });
     if (this.audio === undefined) return;

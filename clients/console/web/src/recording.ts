@@ -60,6 +60,11 @@ export function fromFile(file: File): Readable {
   return new Blocks(file.size, async (begin, end) => new Uint8Array(await file.slice(begin, end).arrayBuffer()));
 }
 
+/** Of a recording that is inside the page. */
+export function fromBytes(bytes: Uint8Array): Readable {
+  return new Blocks(bytes.length, (begin, end) => Promise.resolve(bytes.subarray(begin, end)));
+}
+
 export async function fromAddress(url: string): Promise<Readable> {
   const load = async (begin: number, end: number): Promise<Response> => {
     const answer = await fetch(url, { headers: { Range: `bytes=${begin}-${end - 1}` } });
@@ -81,6 +86,7 @@ export class Recording {
   private decoders = new Map<number, { topic: string; decode: Decoder }>();
   private reading?: Reading;
   private next?: Message;
+  private streams = STREAMS;
 
   private constructor(private reader: McapIndexedReader, private handler: Handler, readonly begin: bigint, readonly seconds: number) {}
 
@@ -93,6 +99,8 @@ export class Recording {
     const begin = statistics.messageStartTime;
     const recording = new Recording(reader, handler, begin, Number(statistics.messageEndTime - begin) / 1e9);
     for (const channel of reader.channelsById.values()) recording.addChannel(channel.id);
+    // a recording inside a report has no faster poses
+    if (![...recording.decoders.values()].some(({ topic }) => topic === "WorldFrame_100")) recording.streams = [...STREAMS, ALL_OBJECTS];
     await recording.readKept(onProgress);
     return recording;
   }
@@ -161,7 +169,7 @@ export class Recording {
       for (const message of newest) this.tell(message);
       break;
     }
-    this.reading = this.reader.readMessages({ topics: [...KEPT, ...STREAMS], startTime: time + 1n }) as unknown as Reading;
+    this.reading = this.reader.readMessages({ topics: [...KEPT, ...this.streams], startTime: time + 1n }) as unknown as Reading;
   }
 
   /** The newest of each instance of the streams, in order. */
@@ -216,7 +224,7 @@ export class Recording {
       if (this.next.time > time) break;
       const message = this.next;
       this.next = undefined;
-      if (STREAMS.includes(this.decoders.get(message.channel)?.topic ?? "")) newest.set(this.instanceOf(message.channel, message.data), message);
+      if (this.streams.includes(this.decoders.get(message.channel)?.topic ?? "")) newest.set(this.instanceOf(message.channel, message.data), message);
       else this.tell(message);
     }
     for (const message of newest.values()) this.tell(message);

@@ -4,34 +4,16 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { MeshoptDecoder } from "three/examples/jsm/libs/meshopt_decoder.module.js";
 
-import { NONE, Status, StepPhase, type Pose, type SceneModels, type SceneObject } from "./messages";
+import { asset } from "./assets";
+import { COLORS, Markers, place } from "./markers";
+import { NONE, Status, StepPhase, type SceneModels, type SceneObject } from "./messages";
+import { isSoftware, Pace, type Quality } from "./pace";
 import type { Session } from "./session";
 
-const COLORS = { target: 0x0072b2, within: 0x009e73, device: 0xe69f00, force: 0xcc79a7, shallow: 0xf0e442, deep: 0xd55e00, guide: 0x56b4e9 };
-const DEEP = 0.002; // [m] depth at which a contact has the colour `deep`
-const METRES_PER_NEWTON = 0.006;
-const LONGEST_ARROW = 0.35; // [m]
-const CONTACTS = 64;
-const SIMPLE_PERIOD = 66; // [ms] between pictures without graphics hardware
 const CREASE = 35; // [deg]
 const LOOK = 0.15; // [m] shown around a hand and where it is to go
 
 interface Part { group: THREE.Group; object: SceneObject; material: THREE.MeshStandardMaterial | THREE.MeshLambertMaterial; model?: THREE.Object3D }
-
-/** Whether pictures are computed by the processor. */
-function isSoftware(): boolean {
-  const gl = document.createElement("canvas").getContext("webgl2");
-  if (gl === null) throw new Error("no WebGL 2");
-  const info = gl.getExtension("WEBGL_debug_renderer_info");
-  const name = String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
-  gl.getExtension("WEBGL_lose_context")?.loseContext();
-  return /swiftshader|llvmpipe|software/i.test(name);
-}
-
-function place(target: THREE.Object3D, pose: Pose): void {
-  target.position.set(pose.p[0], pose.p[1], pose.p[2]);
-  target.quaternion.set(pose.q[0], pose.q[1], pose.q[2], pose.q[3]);
-}
 
 export class SceneView {
   readonly simple: boolean;
@@ -42,13 +24,15 @@ export class SceneView {
   private renderer: THREE.WebGLRenderer;
   private scene = new THREE.Scene();
   private camera = new THREE.PerspectiveCamera(42, 1, 0.02, 60);
+  /** Of the viewer in the world: as the world but in a headset, whose y is up. */
+  readonly rig = new THREE.Group();
+  private before?: THREE.PerspectiveCamera;
   private controls: OrbitControls;
   private sun = new THREE.DirectionalLight(0xffffff, 2.2);
   private parts = new Map<number, Part>();
   private ghost?: { object: number; group: THREE.Group; material: THREE.MeshBasicMaterial };
-  private hands = new Map<number, { device: THREE.Mesh; link: THREE.Line }>();
-  private contacts: THREE.InstancedMesh;
-  private arrows: THREE.ArrowHelper[] = [];
+  private markers = new Markers(this.scene);
+  private pace: Pace;
   private loader = new GLTFLoader().setMeshoptDecoder(MeshoptDecoder);
   private loaded = new Map<string, Promise<THREE.Object3D>>();
   private list?: string;
@@ -57,19 +41,14 @@ export class SceneView {
   private moved = -1;
   private changed = -1;
   private dirty = true;
-  private drawn = 0;
   private isFramed = false;
   private isHandMode = false;
-  private guide = new THREE.Line(
-    new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3()]),
-    new THREE.LineDashedMaterial({ color: COLORS.guide, dashSize: 0.015, gapSize: 0.01, depthTest: false, transparent: true }),
-  );
-  private markers = 1; // size of what is drawn beside the parts, by the size of the scene
 
   constructor(private host: HTMLElement, label: string, drawing: string | null) {
     const isSlow = isSoftware();
     this.simple = drawing === "simple" || (drawing !== "full" && isSlow);
     this.renderer = new THREE.WebGLRenderer({ antialias: !this.simple, powerPreference: "high-performance" });
+    this.pace = new Pace(this.renderer.getContext() as WebGL2RenderingContext, this.simple, drawing === "full", (quality) => this.setQuality(quality));
     this.canvas = this.renderer.domElement;
     this.canvas.tabIndex = 0;
     this.canvas.setAttribute("role", "img");
@@ -85,6 +64,8 @@ export class SceneView {
     this.controls.listenToKeyEvents(this.canvas);
     this.controls.addEventListener("change", () => (this.dirty = true));
 
+    this.rig.add(this.camera);
+    this.scene.add(this.rig);
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8a929c, 1.5), this.sun, this.sun.target);
     if (!this.simple) {
       this.renderer.shadowMap.enabled = true;
@@ -94,14 +75,6 @@ export class SceneView {
       this.sun.shadow.bias = -0.0004;
       this.sun.shadow.normalBias = 0.004;
     }
-    this.contacts = new THREE.InstancedMesh(new THREE.SphereGeometry(0.008, 12, 8), new THREE.MeshBasicMaterial({ depthTest: false, transparent: true, opacity: 0.9 }), CONTACTS);
-    this.contacts.count = 0;
-    this.contacts.renderOrder = 2;
-    this.contacts.frustumCulled = false;
-    this.scene.add(this.contacts);
-    this.guide.visible = this.guide.frustumCulled = false;
-    this.guide.renderOrder = 3;
-    this.scene.add(this.guide);
     // before the controls hear of it
     this.canvas.addEventListener("wheel", ({ ctrlKey }) => (this.controls.enableZoom = !this.isHandMode || ctrlKey), { capture: true });
     new ResizeObserver(() => this.resize()).observe(host);
@@ -128,6 +101,11 @@ export class SceneView {
     return { right, up, away: back.negate() };
   }
 
+  /** Unit vector from the viewer to a place. */
+  sightOf(place: THREE.Vector3): THREE.Vector3 {
+    return place.clone().sub(this.camera.position).normalize();
+  }
+
   /** Size of a pixel of the page at the depth of a place [m]. */
   metresPerPixel(place: THREE.Vector3): number {
     const depth = place.clone().sub(this.camera.position).dot(this.axes().away);
@@ -152,14 +130,8 @@ export class SceneView {
 
   /** The line that leads what the hand moves to where the step wants it. */
   setGuide(guide: { from: THREE.Vector3; to: THREE.Vector3 } | undefined): void {
-    this.guide.visible = guide !== undefined;
+    this.markers.setGuide(guide);
     this.dirty = true;
-    if (guide === undefined) return;
-    const ends = this.guide.geometry.getAttribute("position") as THREE.BufferAttribute;
-    guide.from.toArray(ends.array, 0);
-    guide.to.toArray(ends.array, 3);
-    ends.needsUpdate = true;
-    this.guide.computeLineDistances();
   }
 
   setLabel(label: string): void {
@@ -174,21 +146,31 @@ export class SceneView {
 
   private resize(): void {
     const { clientWidth: width, clientHeight: height } = this.host;
-    if (width === 0 || height === 0) return;
-    this.renderer.setPixelRatio(this.simple ? 0.75 : Math.min(devicePixelRatio, 2));
+    if (width === 0 || height === 0 || this.before !== undefined) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, this.pace.quality.ratio));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
     this.dirty = true;
   }
 
-  /** Shows all of the scene, or these places and what is around them, from the trainee's side. */
-  frame(places: THREE.Vector3[] = []): void {
+  private setQuality({ hasShadows }: Quality): void {
+    this.sun.castShadow = hasShadows;
+    this.resize();
+  }
+
+  /** About all that is shown, but what people carry on themselves; empty when nothing is. */
+  private sphere(): THREE.Sphere {
     const box = new THREE.Box3();
     for (const { group, object } of this.parts.values())
       if (group.visible && object.kind !== "head" && object.kind !== "forearm") box.expandByObject(group);
-    if (box.isEmpty()) return;
-    const scene = box.getBoundingSphere(new THREE.Sphere());
+    return box.getBoundingSphere(new THREE.Sphere());
+  }
+
+  /** Shows all of the scene, or these places and what is around them, from the trainee's side. */
+  frame(places: THREE.Vector3[] = []): void {
+    const scene = this.sphere();
+    if (scene.isEmpty()) return;
     const radius = Math.max(0.05, scene.radius);
     const sphere = places.length === 0 ? scene : new THREE.Box3().setFromPoints(places).getBoundingSphere(new THREE.Sphere());
     const shown = places.length === 0 ? radius : Math.min(1.2 * radius, sphere.radius + LOOK);
@@ -203,7 +185,7 @@ export class SceneView {
     const light = this.sun.shadow.camera;
     Object.assign(light, { left: -reach, right: reach, top: reach, bottom: -reach, near: 0.1, far: 8 * radius });
     light.updateProjectionMatrix();
-    this.markers = Math.min(1.3, Math.max(0.35, radius / 0.9));
+    this.markers.size = Math.min(1.3, Math.max(0.35, radius / 0.9));
     this.isFramed = true;
     this.moved = -1;
     this.dirty = true;
@@ -222,25 +204,91 @@ export class SceneView {
       this.moved = session.moved;
       this.takePoses(session);
       this.takeGhost(session);
-      this.takeHands(session);
-      this.takeContacts(session);
+      this.markers.take(session);
       this.dirty = true;
       if (!this.isFramed && this.parts.size > 0 && session.states.size > 0) this.frame();
     }
+    if (this.before !== undefined) return; // the headset asks for its pictures
     this.controls.update();
-    if (!this.dirty || (this.simple && now - this.drawn < SIMPLE_PERIOD)) return;
+    if (!this.pace.isReady(now) || !this.dirty) return;
     this.dirty = false;
-    this.drawn = now;
     this.renderer.render(this.scene, this.camera);
+    this.pace.hasDrawn(now);
     ++this.pictures;
+  }
+
+  /** The scene is shown in a headset at its size, from the trainee's side; `follow` is called before each picture. Fails when it cannot draw there. */
+  async enterHeadset(session: XRSession, follow: (frame: XRFrame, space: XRReferenceSpace) => void): Promise<void> {
+    const { xr } = this.renderer;
+    xr.enabled = true;
+    this.before = this.camera.clone();
+    try {
+      await xr.setSession(session);
+    } catch (problem) {
+      this.leaveHeadset();
+      throw problem;
+    }
+    let isPlaced = false;
+    this.renderer.setAnimationLoop((_, frame?: XRFrame) => {
+      const space = xr.getReferenceSpace();
+      if (frame === undefined || space === null) return;
+      const head = frame.getViewerPose(space);
+      if (!isPlaced && head !== undefined) this.placeRig(head.transform);
+      isPlaced ||= head !== undefined;
+      follow(frame, space);
+      this.renderer.render(this.scene, this.camera);
+      ++this.pictures;
+    });
+  }
+
+  leaveHeadset(): void {
+    const { xr } = this.renderer;
+    this.renderer.setAnimationLoop(null);
+    xr.enabled = false;
+    this.rig.position.set(0, 0, 0);
+    this.rig.quaternion.identity();
+    this.rig.updateMatrixWorld(true);
+    if (this.before !== undefined) this.camera.copy(this.before, false);
+    this.before = undefined;
+    this.resize();
+  }
+
+  /** The viewer's head, wherever it is in the room, comes before the scene and looks at it. */
+  private placeRig({ position, orientation }: XRRigidTransform): void {
+    const scene = this.sphere();
+    const eye = scene.center.clone().add(new THREE.Vector3(0, -Math.min(1.5, 0.5 + 0.4 * scene.radius), 0.45));
+    const ahead = new THREE.Vector3(0, 0, -1).applyQuaternion(orientation as unknown as THREE.Quaternion);
+    const turn = new THREE.Quaternion().setFromAxisAngle(new THREE.Vector3(0, 1, 0), Math.atan2(ahead.x, -ahead.z));
+    // y of the room is z of the world, and ahead is along y of the world
+    this.rig.quaternion.setFromAxisAngle(new THREE.Vector3(1, 0, 0), Math.PI / 2).multiply(turn);
+    this.rig.position.copy(eye).sub(new THREE.Vector3(position.x, position.y, position.z).applyQuaternion(this.rig.quaternion));
+    this.rig.updateMatrixWorld(true);
+  }
+
+  /** Where something of the headset is in the world; none while it is lost. */
+  poseIn(frame: XRFrame, of: XRSpace): { p: THREE.Vector3; q: THREE.Quaternion } | undefined {
+    const space = this.renderer.xr.getReferenceSpace();
+    const pose = space === null ? undefined : frame.getPose(of, space);
+    if (pose === undefined) return undefined;
+    const { position, orientation } = pose.transform;
+    return {
+      p: new THREE.Vector3(position.x, position.y, position.z).applyQuaternion(this.rig.quaternion).add(this.rig.position),
+      q: this.rig.quaternion.clone().multiply(new THREE.Quaternion(orientation.x, orientation.y, orientation.z, orientation.w)),
+    };
+  }
+
+  /** Draws now, and puts the picture into another canvas, which paper takes. */
+  copyTo(target: HTMLCanvasElement): void {
+    this.renderer.render(this.scene, this.camera);
+    Object.assign(target, { width: this.canvas.width, height: this.canvas.height });
+    target.getContext("2d")?.drawImage(this.canvas, 0, 0);
   }
 
   private clear(life: number): void {
     this.life = life;
     for (const { group } of this.parts.values()) this.scene.remove(group);
     this.parts.clear();
-    for (const { device, link } of this.hands.values()) this.scene.remove(device, link);
-    this.hands.clear();
+    this.markers.clear();
     if (this.ghost !== undefined) this.scene.remove(this.ghost.group);
     this.ghost = undefined;
     this.sceneModels = undefined;
@@ -271,8 +319,8 @@ export class SceneView {
       this.list = list;
       this.sceneModels = undefined;
       const life = this.life;
-      const answer = list === "" ? undefined : await fetch(`/assets/${list}`).catch(() => undefined);
-      const models = answer?.ok ? ((await answer.json()) as SceneModels) : { version: 1, objects: [] };
+      const bytes = list === "" ? undefined : await asset(list).catch(() => undefined);
+      const models = bytes === undefined ? { version: 1, objects: [] } : (JSON.parse(new TextDecoder().decode(bytes)) as SceneModels);
       if (list !== this.list || life !== this.life) return;
       this.sceneModels = models;
     }
@@ -294,14 +342,14 @@ export class SceneView {
     return box;
   }
 
-  private async load(part: Part, asset: string): Promise<void> {
-    let loading = this.loaded.get(asset);
-    if (loading === undefined) this.loaded.set(asset, (loading = this.loader.loadAsync(`/assets/${asset}`).then((file) => file.scene)));
+  private async load(part: Part, name: string): Promise<void> {
+    let loading = this.loaded.get(name);
+    if (loading === undefined) this.loaded.set(name, (loading = asset(name).then((bytes) => this.loader.parseAsync(bytes, "")).then((file) => file.scene)));
     let model: THREE.Object3D;
     try {
       model = (await loading).clone(true);
     } catch (problem) {
-      this.loaded.delete(asset);
+      this.loaded.delete(name);
       console.warn("a model is missing:", problem);
       return;
     }
@@ -357,74 +405,6 @@ export class SceneView {
     }
     place(this.ghost.group, step.X_WG);
     this.ghost.material.color.setHex(session.isWithinTolerance ? COLORS.within : COLORS.target);
-  }
-
-  /** The device beside the object it holds: a ring of its own colour, and a line to its place at the object. */
-  private takeHands(session: Session): void {
-    for (const [id, hand] of session.hands) {
-      if (session.isTracked(id)) continue;
-      let shown = this.hands.get(id);
-      if (shown === undefined) {
-        const device = new THREE.Mesh(new THREE.TorusGeometry(0.024, 0.004, 8, 24), new THREE.MeshBasicMaterial({ color: COLORS.device, depthTest: false, transparent: true }));
-        const link = new THREE.Line(new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3()]), new THREE.LineBasicMaterial({ color: COLORS.device, depthTest: false, transparent: true }));
-        device.renderOrder = link.renderOrder = 2;
-        link.frustumCulled = false;
-        shown = { device, link };
-        this.hands.set(id, shown);
-        this.scene.add(device, link);
-      }
-      place(shown.device, hand.X_WH);
-      shown.device.scale.setScalar(this.markers);
-      const grab = [...session.grabs.values()].find((known) => known.hand_id === id && session.holderOf(known.object_id) === id);
-      const state = grab === undefined ? undefined : session.states.get(grab.object_id);
-      shown.link.visible = state !== undefined;
-      if (grab === undefined || state === undefined) continue;
-      // X_WH' = X_WO X_HO^-1: where the hand is at the object
-      const q_WO = new THREE.Quaternion(state.X_WO.q[0], state.X_WO.q[1], state.X_WO.q[2], state.X_WO.q[3]);
-      const q_OH = new THREE.Quaternion(grab.X_HO.q[0], grab.X_HO.q[1], grab.X_HO.q[2], grab.X_HO.q[3]).invert();
-      const proxy = new THREE.Vector3(grab.X_HO.p[0], grab.X_HO.p[1], grab.X_HO.p[2]).applyQuaternion(q_OH).negate().applyQuaternion(q_WO);
-      proxy.add(new THREE.Vector3(state.X_WO.p[0], state.X_WO.p[1], state.X_WO.p[2]));
-      const ends = shown.link.geometry.getAttribute("position") as THREE.BufferAttribute;
-      ends.setXYZ(0, proxy.x, proxy.y, proxy.z);
-      ends.setXYZ(1, hand.X_WH.p[0], hand.X_WH.p[1], hand.X_WH.p[2]);
-      ends.needsUpdate = true;
-    }
-  }
-
-  private takeContacts(session: Session): void {
-    const matrix = new THREE.Matrix4();
-    const color = new THREE.Color();
-    const deep = new THREE.Color(COLORS.deep);
-    let count = 0;
-    let arrows = 0;
-    for (const pair of session.pairs.values()) {
-      if (session.isOver || !pair.colliding || session.tick - pair.tick > 300 || count >= CONTACTS) continue;
-      matrix.makeScale(this.markers, this.markers, this.markers).setPosition(pair.p_WP[0], pair.p_WP[1], pair.p_WP[2]);
-      this.contacts.setMatrixAt(count, matrix);
-      this.contacts.setColorAt(count, color.setHex(COLORS.shallow).lerp(deep, Math.min(1, pair.peak_depth / DEEP)));
-      ++count;
-      const force = new THREE.Vector3(pair.F_Ao_W.force[0], pair.F_Ao_W.force[1], pair.F_Ao_W.force[2]);
-      const newtons = force.length();
-      if (newtons < 0.1) continue;
-      if (this.arrows[arrows] === undefined) {
-        const arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 0.1, COLORS.force, 0.03, 0.018);
-        arrow.traverse((child) => {
-          child.renderOrder = 3;
-          const material = (child as THREE.Mesh).material as THREE.Material | undefined;
-          if (material !== undefined) Object.assign(material, { depthTest: false, transparent: true });
-        });
-        this.arrows.push(arrow);
-        this.scene.add(arrow);
-      }
-      const arrow = this.arrows[arrows++];
-      arrow.position.set(pair.p_WP[0], pair.p_WP[1], pair.p_WP[2]);
-      arrow.setDirection(force.divideScalar(newtons));
-      arrow.setLength(this.markers * Math.min(LONGEST_ARROW, 0.04 + METRES_PER_NEWTON * newtons), this.markers * 0.03, this.markers * 0.018);
-    }
-    this.contacts.count = count;
-    this.contacts.instanceMatrix.needsUpdate = true;
-    if (this.contacts.instanceColor !== null) this.contacts.instanceColor.needsUpdate = true;
-    this.arrows.forEach((arrow, i) => (arrow.visible = i < arrows));
   }
 
   /** Where an object's frame is drawn [m]; for tests. */

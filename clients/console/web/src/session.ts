@@ -4,6 +4,7 @@ import {
   type ObjectSnapshot, type ObjectState, type PairContact, type Presence, type RecorderStatus, type RunState, type SceneHand, type SceneObject,
   type SceneStep, type StepProgress, type StepState, type Telemetry, type TickStats, type WorldFrame,
 } from "./messages";
+import { localized } from "./strings";
 
 export const TOPICS = [
   "/console", "SceneObject", "SceneHand", "SceneStep", "ObjectSnapshot", "WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepState", "StepProgress",
@@ -226,7 +227,14 @@ export class Session {
   }
 
   titleOf(id: number): string {
-    return this.objects.get(id)?.title ?? "";
+    const object = this.objects.get(id);
+    return localized(object?.titles ?? []) || (object?.title ?? "");
+  }
+
+  /** A title of one of the scenario's languages in this page's, if an object has it. */
+  retitled(title: string): string {
+    const object = [...this.objects.values()].find((known) => known.titles?.some(({ text }) => text === title));
+    return object === undefined ? title : this.titleOf(object.object_id);
   }
 
   /** Title of a hand's own object, else the hand's name. */
@@ -242,6 +250,11 @@ export class Session {
 
   isTracked(hand: number): boolean {
     return ["forearm", "head"].includes(this.objects.get(this.sceneHands.get(hand)?.object_id ?? NONE)?.kind ?? "");
+  }
+
+  /** A virtual fixture has a force on the hand. */
+  isGuided(hand: number): boolean {
+    return (this.hands.get(hand)?.guidance_force ?? 0) > 0.05;
   }
 
   /** Pose errors of the step within its tolerances. */

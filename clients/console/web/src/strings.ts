@@ -5,8 +5,27 @@ import en from "./strings/en.json";
 export type Key = keyof typeof en;
 const languages: Record<string, Record<Key, string>> = { en, de };
 
+/** What this browser keeps for the page; a page that was opened as a file may have none. */
+export function kept(name: string): string | null {
+  try {
+    return localStorage.getItem(name);
+  } catch {
+    return null;
+  }
+}
+
+export function keep(name: string, value: string): void {
+  try {
+    localStorage.setItem(name, value);
+  } catch {
+    // then it is asked for anew
+  }
+}
+
 function initial(): string {
-  const wanted = [localStorage.getItem("language"), ...navigator.languages.map((name) => name.slice(0, 2))];
+  // outside of a browser, as where a program reads a recording, there is none
+  const preferred = typeof navigator === "undefined" ? [] : (navigator.languages ?? []);
+  const wanted = [kept("language"), ...preferred.map((name) => name.slice(0, 2))];
   return wanted.find((name) => name !== null && name in languages) ?? "en";
 }
 
@@ -15,12 +34,21 @@ export const languageNames = Object.keys(languages);
 
 export function setLanguage(name: string): void {
   language = name in languages ? name : "en";
-  localStorage.setItem("language", language);
+  keep("language", language);
   document.documentElement.lang = language;
 }
 
+/** A text with its values in the places of their names. */
+export function filled(text: string, values: Record<string, string | number>): string {
+  return text.replace(/\{(\w+)\}/g, (_, name: string) => String(values[name] ?? ""));
+}
+
+export function hasText(key: string): key is Key {
+  return key in en;
+}
+
 export function t(key: Key, values: Record<string, string | number> = {}): string {
-  return languages[language][key].replace(/\{(\w+)\}/g, (_, name: string) => String(values[name] ?? ""));
+  return filled(languages[language][key], values);
 }
 
 export function nameOfLanguage(name: string): string {

@@ -1,0 +1,82 @@
+// Events of the server in the language of this page. The server writes English; what has no rule here stays as it is.
+import type { EventLog } from "./messages";
+import type { Session } from "./session";
+import { hasText, localized, t, type Key } from "./strings";
+
+const ROLES = ["admin", "instructor", "trainee", "observer", "recorder"]; // as in the messages
+/** Texts by what they match. Groups: who and reason as they are; step, title, hand, role and word are translated. */
+const RULES: [RegExp, Key][] = [
+  [/^(?<who>.+): by its link of the last 10 s, without input a hand is held still after (?<freeze>\d+) ms and parked after (?<park>\d+) ms; now inputs are up to (?<gap>\d+) ms apart and (?<lost>[\d.]+) % of them are lost$/, "event.link"],
+  [/^waiting for people$/, "event.waiting"],
+  [/^running$/, "event.running"],
+  [/^paused$/, "event.paused"],
+  [/^stopped$/, "event.stopped"],
+  [/^emergency stop$/, "event.emergency"],
+  [/^forces frozen$/, "event.frozen"],
+  [/^everything is mounted$/, "event.mounted"],
+  [/^ended, (?<count>\d+) steps? skipped(?:, (?<late>\d+) steps? not done in time)?$/, "event.ended"],
+  [/^ended, (?<late>\d+) steps? not done in time$/, "event.ended.late"],
+  [/^step '(?<step>[^']+)' was not done in time(?:: (?<reason>.+))?$/, "event.failed"],
+  [/^(?<step>\w+) \((?<seconds>[\d.]+) s\)$/, "event.step.time"],
+  [/^(?<title>.+) \((?<hand>\w+) hand\)$/, "event.by.hand"],
+  [/^hand '(?<hand>[^']+)' is absent: the object it held is parked$/, "event.hand.gone"],
+  [/^hand '(?<hand>[^']+)' is held still \(last input (?<ms>\d+) ms ago\)$/, "event.hand.frozen"],
+  [/^hand '(?<hand>[^']+)' moves again$/, "event.hand.free"],
+  [/^(?<who>.+) \((?<role>\w+)\) has joined$/, "event.joined"],
+  [/^(?<who>.+) \((?<role>\w+)\) has rejoined$/, "event.rejoined"],
+  [/^(?<who>.+) \((?<role>\w+)\) has left$/, "event.left"],
+  [/^(?<who>.+) \((?<role>\w+)\) was removed by (?<by>.+)$/, "event.removed"],
+  [/^(?<who>.+) may not join: (?<reason>.+)$/, "event.join.refused"],
+  [/^engaged by (?<who>.+?): (?<reason>.*)$/, "event.engaged"],
+  [/^cleared by (?<who>.+?): (?<reason>.*?)(?:; )?the session is paused until 'resume'$/, "event.cleared"],
+  [/^hand '(?<hand>[^']+)' is guided no more: (?<reason>.+)$/, "event.guidance.ended"],
+  [/^(?<who>.+?): '(?<word>\w+)': (?<reason>.+)$/, "event.refused"],
+];
+
+/** A text of the server with the titles of objects and steps instead of their names. */
+export function readable(session: Session, text: string): string {
+  const titles = new Map([...session.objects.values()].map((object) => [object.name, session.titleOf(object.object_id)]));
+  for (const step of session.sceneSteps.values()) titles.set(step.name, localized(step.title) || step.name.replace(/_/g, " "));
+  return text.replace(/\w+/g, (word) => titles.get(word) ?? word);
+}
+
+/** What a word of `tenon command` is called here. */
+function command(word: string): string {
+  const key = `event.command.${word}`;
+  return hasText(key) ? t(key) : word;
+}
+
+function value(session: Session, name: string, text: string): string {
+  switch (name) {
+    case "step": return readable(session, text);
+    case "title": return session.retitled(text);
+    case "hand": {
+      const hand = [...session.sceneHands.values()].find((known) => known.name === text);
+      return hand === undefined ? text : session.nameOfHand(hand.hand_id);
+    }
+    case "role": return ROLES.includes(text) ? t(`role.${ROLES.indexOf(text)}` as Key) : text;
+    case "word": return command(text);
+    default: return text;
+  }
+}
+
+export function kindOf(event: EventLog): string {
+  const key = `event.kind.${event.kind.replace(/ /g, "_")}`;
+  return hasText(key) ? t(key) : event.kind;
+}
+
+export function textOf(session: Session, event: Pick<EventLog, "kind" | "text">): string {
+  if (event.kind === "note") return event.text;
+  if (event.kind === "mounted" || event.kind === "put in place") return session.retitled(event.text);
+  if (event.kind === "command") {
+    const [, who, word, rest] = /^(.+?): (\w+) ?(.*)$/.exec(event.text) ?? [];
+    return word === undefined ? event.text : `${who}: ${command(word)} ${readable(session, rest)}`.trim();
+  }
+  for (const [pattern, key] of RULES) {
+    const groups = pattern.exec(event.text)?.groups;
+    if (groups === undefined && !pattern.test(event.text)) continue;
+    const values = Object.fromEntries(Object.entries(groups ?? {}).map(([name, text]) => [name, text === undefined ? "" : value(session, name, text)]));
+    return t(key, values).replace(/[:;,] *$/, "").trim();
+  }
+  return event.kind.startsWith("step") ? readable(session, event.text) : event.text;
+}

@@ -1,0 +1,160 @@
+// What is drawn beside the parts: devices, contacts with their forces, the way of the hand, the approach. World frame, metres.
+import * as THREE from "three";
+
+import { StepPhase, type Pose } from "./messages";
+import type { Session } from "./session";
+
+export const COLORS = { target: 0x0072b2, within: 0x009e73, device: 0xe69f00, force: 0xcc79a7, shallow: 0xf0e442, deep: 0xd55e00, guide: 0x56b4e9 };
+const DEEP = 0.002; // [m] depth at which a contact has the colour `deep`
+const METRES_PER_NEWTON = 0.006;
+const LONGEST_ARROW = 0.35; // [m]
+const CONTACTS = 64;
+const OPEN = { depthTest: false, transparent: true } as const; // seen through parts
+
+export function place(target: THREE.Object3D, pose: Pose): void {
+  target.position.set(pose.p[0], pose.p[1], pose.p[2]);
+  target.quaternion.set(pose.q[0], pose.q[1], pose.q[2], pose.q[3]);
+}
+
+export class Markers {
+  /** By the size of the scene. */
+  size = 1;
+  private hands = new Map<number, { device: THREE.Mesh; link: THREE.Line }>();
+  private contacts = new THREE.InstancedMesh(new THREE.SphereGeometry(0.008, 12, 8), new THREE.MeshBasicMaterial({ ...OPEN, opacity: 0.9 }), CONTACTS);
+  private arrows: THREE.ArrowHelper[] = [];
+  private guide = new THREE.Line(
+    new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3()]),
+    new THREE.LineDashedMaterial({ ...OPEN, color: COLORS.guide, dashSize: 0.015, gapSize: 0.01 }),
+  );
+  private approach = new THREE.Group();
+  private approachMaterial = new THREE.MeshBasicMaterial({ ...OPEN, color: COLORS.target, opacity: 0.75 });
+  private shaft = new THREE.Mesh(new THREE.CylinderGeometry(0.0025, 0.0025, 1, 8), this.approachMaterial);
+  private tip = new THREE.Mesh(new THREE.ConeGeometry(0.011, 0.03, 16), this.approachMaterial);
+  private gate = new THREE.Mesh(new THREE.TorusGeometry(0.02, 0.0025, 8, 32), this.approachMaterial);
+
+  constructor(private scene: THREE.Scene) {
+    this.contacts.count = 0;
+    this.contacts.renderOrder = 2;
+    this.contacts.frustumCulled = false;
+    this.guide.visible = this.guide.frustumCulled = false;
+    this.guide.renderOrder = 3;
+    this.gate.rotation.x = Math.PI / 2; // about the shaft
+    this.approach.add(this.shaft, this.tip, this.gate);
+    for (const child of this.approach.children) child.renderOrder = 2;
+    this.approach.visible = false;
+    scene.add(this.contacts, this.guide, this.approach);
+  }
+
+  /** Of another session nothing is left. */
+  clear(): void {
+    for (const { device, link } of this.hands.values()) this.scene.remove(device, link);
+    this.hands.clear();
+    this.approach.visible = false;
+  }
+
+  take(session: Session): void {
+    this.takeHands(session);
+    this.takeContacts(session);
+    this.takeApproach(session);
+  }
+
+  /** The line that leads what the hand moves to where the step wants it. */
+  setGuide(guide: { from: THREE.Vector3; to: THREE.Vector3 } | undefined): void {
+    this.guide.visible = guide !== undefined;
+    if (guide === undefined) return;
+    const ends = this.guide.geometry.getAttribute("position") as THREE.BufferAttribute;
+    guide.from.toArray(ends.array, 0);
+    guide.to.toArray(ends.array, 3);
+    ends.needsUpdate = true;
+    this.guide.computeLineDistances();
+  }
+
+  /** The straight way on which the step wants its part: from a ring at its begin to the tip of an arrow at the target's centre. */
+  private takeApproach(session: Session): void {
+    const { step } = session;
+    const object = step === undefined ? undefined : session.objects.get(step.object_id);
+    this.approach.visible = step !== undefined && object !== undefined && step.has_target && step.approach_distance > 0 && step.phase <= StepPhase.Active && !session.isOver;
+    if (!this.approach.visible || step === undefined || object === undefined) return;
+    const [p, q, c, way] = [step.X_WG.p, step.X_WG.q, object.centre, step.approach_W];
+    const end = new THREE.Vector3(c[0], c[1], c[2]).applyQuaternion(new THREE.Quaternion(q[0], q[1], q[2], q[3])).add(new THREE.Vector3(p[0], p[1], p[2]));
+    const length = step.approach_distance;
+    const head = 0.03 * this.size;
+    this.approach.position.copy(end);
+    this.approach.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), new THREE.Vector3(way[0], way[1], way[2]));
+    this.shaft.scale.set(this.size, Math.max(1e-3, length - head), this.size);
+    this.shaft.position.y = -(length + head) / 2;
+    this.tip.scale.setScalar(this.size);
+    this.tip.position.y = -head / 2;
+    this.gate.scale.setScalar(this.size);
+    this.gate.position.y = -length;
+    this.approachMaterial.color.setHex(session.isWithinTolerance ? COLORS.within : COLORS.target);
+  }
+
+  /** The device beside the object it holds: a ring of its own colour, and a line to its place at the object. */
+  private takeHands(session: Session): void {
+    for (const [id, hand] of session.hands) {
+      if (session.isTracked(id)) continue;
+      let shown = this.hands.get(id);
+      if (shown === undefined) {
+        const device = new THREE.Mesh(new THREE.TorusGeometry(0.024, 0.004, 8, 24), new THREE.MeshBasicMaterial({ ...OPEN, color: COLORS.device }));
+        const link = new THREE.Line(new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3()]), new THREE.LineBasicMaterial({ ...OPEN, color: COLORS.device }));
+        device.renderOrder = link.renderOrder = 2;
+        link.frustumCulled = false;
+        shown = { device, link };
+        this.hands.set(id, shown);
+        this.scene.add(device, link);
+      }
+      place(shown.device, hand.X_WH);
+      shown.device.scale.setScalar(this.size);
+      const grab = [...session.grabs.values()].find((known) => known.hand_id === id && session.holderOf(known.object_id) === id);
+      const state = grab === undefined ? undefined : session.states.get(grab.object_id);
+      shown.link.visible = state !== undefined;
+      if (grab === undefined || state === undefined) continue;
+      // X_WH' = X_WO X_HO^-1: where the hand is at the object
+      const q_WO = new THREE.Quaternion(state.X_WO.q[0], state.X_WO.q[1], state.X_WO.q[2], state.X_WO.q[3]);
+      const q_OH = new THREE.Quaternion(grab.X_HO.q[0], grab.X_HO.q[1], grab.X_HO.q[2], grab.X_HO.q[3]).invert();
+      const proxy = new THREE.Vector3(grab.X_HO.p[0], grab.X_HO.p[1], grab.X_HO.p[2]).applyQuaternion(q_OH).negate().applyQuaternion(q_WO);
+      proxy.add(new THREE.Vector3(state.X_WO.p[0], state.X_WO.p[1], state.X_WO.p[2]));
+      const ends = shown.link.geometry.getAttribute("position") as THREE.BufferAttribute;
+      ends.setXYZ(0, proxy.x, proxy.y, proxy.z);
+      ends.setXYZ(1, hand.X_WH.p[0], hand.X_WH.p[1], hand.X_WH.p[2]);
+      ends.needsUpdate = true;
+    }
+  }
+
+  private takeContacts(session: Session): void {
+    const matrix = new THREE.Matrix4();
+    const color = new THREE.Color();
+    const deep = new THREE.Color(COLORS.deep);
+    let count = 0;
+    let arrows = 0;
+    for (const pair of session.pairs.values()) {
+      if (session.isOver || !pair.colliding || session.tick - pair.tick > 300 || count >= CONTACTS) continue;
+      matrix.makeScale(this.size, this.size, this.size).setPosition(pair.p_WP[0], pair.p_WP[1], pair.p_WP[2]);
+      this.contacts.setMatrixAt(count, matrix);
+      this.contacts.setColorAt(count, color.setHex(COLORS.shallow).lerp(deep, Math.min(1, pair.peak_depth / DEEP)));
+      ++count;
+      const force = new THREE.Vector3(pair.F_Ao_W.force[0], pair.F_Ao_W.force[1], pair.F_Ao_W.force[2]);
+      const newtons = force.length();
+      if (newtons < 0.1) continue;
+      if (this.arrows[arrows] === undefined) {
+        const arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), 0.1, COLORS.force, 0.03, 0.018);
+        arrow.traverse((child) => {
+          child.renderOrder = 3;
+          const material = (child as THREE.Mesh).material as THREE.Material | undefined;
+          if (material !== undefined) Object.assign(material, OPEN);
+        });
+        this.arrows.push(arrow);
+        this.scene.add(arrow);
+      }
+      const arrow = this.arrows[arrows++];
+      arrow.position.set(pair.p_WP[0], pair.p_WP[1], pair.p_WP[2]);
+      arrow.setDirection(force.divideScalar(newtons));
+      arrow.setLength(this.size * Math.min(LONGEST_ARROW, 0.04 + METRES_PER_NEWTON * newtons), this.size * 0.03, this.size * 0.018);
+    }
+    this.contacts.count = count;
+    this.contacts.instanceMatrix.needsUpdate = true;
+    if (this.contacts.instanceColor !== null) this.contacts.instanceColor.needsUpdate = true;
+    this.arrows.forEach((arrow, i) => (arrow.visible = i < arrows));
+  }
+}

@@ -1,0 +1,45 @@
+// What a report has inside it: blocks of the page, named by `data-name`. Written by clients/report/page.cpp; SI units, loads in percent.
+
+export interface Metrics { peak_force: number; mean_force: number; contact_seconds: number; device_proxy_gap: number; field_depth: number; load_percent: number }
+export interface Visit extends Metrics {
+  step: number; name: string; title: string; part: string; attempt: number; path: number; collisions: number; phase: string; begin: number; seconds: number;
+  position_error?: number; position_tolerance?: number;
+}
+export interface Summary {
+  title: string; session: string; recording: string; problem: string; began_ns: number; lockstep: boolean; succeeded: boolean; outcome: string; reason: string;
+  final_hash: string; seconds: number; path: number; collisions: number; whole: Metrics; compute_seconds: { median: number; p99: number; max: number };
+  late_ticks: number; oldest_input_seconds: number; messages: number; aids: string[]; people: { name: string; role: string }[]; steps: Visit[];
+  input_to_force_seconds: {
+    who: string; median: number; p99: number; max: number; jitter: number; inputs_lost: number; answers_lost: number; freeze_ms: number;
+    round_trip: number | null; clock_offset: number | null; clock_error: number | null;
+  }[];
+}
+export type SeriesName = "trainee_force" | "instructor_force" | "gap" | "depth" | "load" | "compute";
+export interface ReportEvent { time: number; kind: string; text: string; tone: "good" | "warn" | "bad" | ""; more?: number; until?: number }
+export interface Report {
+  version: number; summary: Summary; steps_of_exercise: number;
+  plots: { seconds: number; count: number; series: Partial<Record<SeriesName, (number | null)[]>>; compute_cut: { limit: number; above: number; largest: number } };
+  events: ReportEvent[]; unlisted_events: number; other_events: Record<string, number>;
+  player?: { rate: number; objects: number; models: number };
+  no_player?: string;
+}
+
+function textOf(name: string): string | undefined {
+  return document.querySelector(`script[data-name="${CSS.escape(name)}"]`)?.textContent ?? undefined;
+}
+
+/** Fails when the page is not a report yet. */
+export function readReport(): Report {
+  const text = textOf("report");
+  if (text === undefined) throw new Error("this page has no report inside: `tenon report FILE.mcap -o FOLDER` makes one");
+  return JSON.parse(text) as Report;
+}
+
+export function bytesOf(name: string): Uint8Array<ArrayBuffer> | undefined {
+  const text = textOf(name);
+  if (text === undefined) return undefined;
+  const binary = atob(text);
+  const bytes = new Uint8Array(binary.length);
+  for (let i = 0; i < binary.length; ++i) bytes[i] = binary.charCodeAt(i);
+  return bytes;
+}

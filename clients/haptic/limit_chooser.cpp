@@ -1,0 +1,56 @@
+#include "clients/haptic/limit_chooser.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tenon::haptic {
+
+namespace {
+constexpr double kMachines = 0.020;  // [s] of a silence that is not the link's
+constexpr double kStep = 10.0;       // [ticks] of a limit
+constexpr double kRare = 1e-6;       // [-] share of inputs that begin an expected gap
+constexpr double kLongestGap = 0.3;  // [s] a longer one is a partition, which says nothing of the link
+constexpr double kJitterOfWholeTicks = 0.002;  // [s] above it inputs come in no order that keeping back helps
+constexpr double kMostLoss = 0.2;  // [-] above it a second had an interruption, or keeping back helps no more
+
+/// [s] of inputs lost one after the other, as rarely as kRare.
+double expectedGap(double lost) {
+  if (!(lost > 0.0)) return 0.0;
+  const double share = std::min(lost, 0.9);
+  return kTickSeconds * std::ceil(std::log(kRare) / std::log(share));
+}
+
+std::uint32_t playoutFor(double lost, double trip_jitter) {
+  if (!(lost > 0.0) || trip_jitter > kJitterOfWholeTicks) return 0;
+  std::uint32_t ticks = 0;
+  for (double left = lost; left > LimitChooser::kAllowedLoss && ticks < LimitChooser::kMostPlayout;
+       left *= lost)
+    ++ticks;
+  return ticks;
+}
+}  // namespace
+
+LinkChoice LimitChooser::step(const LinkMeasurement& now) noexcept {
+  last_[count_++ % kMemory] = now;
+  LinkMeasurement worst;
+  double steady_loss = 0.0;  // [-] without interruptions
+  for (const LinkMeasurement& one : last_) {
+    // the order of comparisons leaves out NaN
+    if (one.input_gap > worst.input_gap && one.input_gap <= kLongestGap) worst.input_gap = one.input_gap;
+    if (one.trip_jitter > worst.trip_jitter) worst.trip_jitter = one.trip_jitter;
+    if (one.age_jitter > worst.age_jitter) worst.age_jitter = one.age_jitter;
+    if (one.inputs_lost > worst.inputs_lost) worst.inputs_lost = one.inputs_lost;
+    if (one.inputs_lost > steady_loss && one.inputs_lost <= kMostLoss) steady_loss = one.inputs_lost;
+  }
+  const double gap =
+      std::min(kLongestGap, std::max(worst.input_gap, worst.trip_jitter + expectedGap(worst.inputs_lost)));
+  const double wanted = kStep * std::ceil((kMachines + 2.0 * gap) / kTickSeconds / kStep);
+  LinkChoice choice;
+  choice.limits.freeze_ticks = std::clamp(static_cast<std::uint32_t>(wanted), kFreezeTicks, kMostFreezeTicks);
+  choice.limits.park_ticks = kParkTicks + 10 * (choice.limits.freeze_ticks - kFreezeTicks);
+  choice.jitter = worst.age_jitter;
+  choice.playout_ticks = playoutFor(steady_loss, worst.trip_jitter);
+  return choice;
+}
+
+}  // namespace tenon::haptic

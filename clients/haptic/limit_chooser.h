@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "idl/types/messages/hands.h"
+
+namespace tenon::haptic {
+
+/// What a station has measured of its link in the last second or so.
+struct LinkMeasurement {
+  double input_gap = 0.0;    ///< [s] longest time between two of its inputs at the server
+  double trip_jitter = 0.0;  ///< [s] of the round trip: 90th percentile less the shortest
+  double age_jitter = 0.0;   ///< [s] of the contacts: 99th percentile less the youngest
+  double inputs_lost = 0.0;  ///< [-]
+};
+
+/// What follows from the link for a station and its hands.
+struct LinkChoice {
+  HandLimits limits;
+  /// [s] age of contacts beyond the link's delay that is usual there
+  double jitter = 0.0;
+  /// [ticks] for which the server keeps an input back, so that one that is lost comes with the next one; so
+  /// many earlier samples each input carries
+  std::uint32_t playout_ticks = 0;
+
+  bool operator==(const LinkChoice&) const = default;
+};
+
+/// Chooses the limits of a station's hands from what its link does, once a second.
+///
+/// A silence is a gap of the link if it is at most twice as long as the longest one that was measured or that
+/// loss and jitter let expect; 20 ms more are for the machines. It is never below the limits of a link
+/// without faults, and never above kMostFreezeTicks. A limit grows at once, and shrinks when a lower one
+/// would have sufficed for kMemory. A silence of more than 0.3 s is a partition, and earns no patience.
+///
+/// Threads: one. Real-time: everything.
+class LimitChooser {
+ public:
+  static constexpr std::size_t kMemory = 10;        ///< [measurements]
+  static constexpr std::uint32_t kMostPlayout = 2;  ///< [ticks]
+  static constexpr double kAllowedLoss = 1e-4;      ///< [-] of ticks without an input
+
+  /// NaN counts as no fault.
+  [[nodiscard]] LinkChoice step(const LinkMeasurement& now) noexcept;
+
+ private:
+  std::array<LinkMeasurement, kMemory> last_{};
+  std::size_t count_ = 0;
+};
+
+}  // namespace tenon::haptic

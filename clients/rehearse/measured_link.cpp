@@ -1,0 +1,74 @@
+#include "clients/rehearse/measured_link.h"
+
+#include <algorithm>
+
+namespace tenon::rehearse {
+
+void MeasuredLink::deliver(Tick now, haptic::Station& station) {
+  link_.deliver(now, station, [&](const HandManifold& manifold) {
+    ages_.answerReceived(manifold.hand, manifold.tick, manifold.answers_seq, nanoseconds(now));
+  });
+  link_.deliverAnswers(now, [&](const ClockSync& answer) { clock_.receive(answer, nanoseconds(now)); });
+  if (now % kPeriod != 0) return;
+  measure(now);
+  station.setLinkJitter(choice_.jitter);
+}
+
+void MeasuredLink::measure(Tick now) {
+  Telemetry telemetry;
+  clock_.fill(telemetry, nanoseconds(now));
+  ages_.fill(telemetry);
+  choice_ = chooser_.step({.input_gap = telemetry.input_gap,
+                           .trip_jitter = telemetry.trip_jitter,
+                           .age_jitter = telemetry.jitter,
+                           .inputs_lost = telemetry.inputs_lost});
+  round_trip_ = telemetry.clock_known ? telemetry.round_trip : 0.0;
+}
+
+void MeasuredLink::send(std::span<const DeviceInput> inputs, Tick now) {
+  for (DeviceInput input : inputs) {
+    input.earlier.resize(std::min<std::size_t>(input.earlier.size(), choice_.playout_ticks));
+    link_.send(input, now);
+  }
+  const auto seq = static_cast<std::uint32_t>(now);
+  clock_.sent(seq, static_cast<std::uint32_t>(inputs.size()));
+  ages_.inputSent(seq, nanoseconds(now), nanoseconds(1));
+  ClockSync request;
+  if (clock_.ask({}, nanoseconds(now), request)) link_.sendRequest(request, now);
+}
+
+void MeasuredLink::receive(Tick now, ClientId client, session::SessionRegistry& registry,
+                           FixedVector<session::HandReading, session::kMaxHands>& readings,
+                           const std::function<void(const DeviceInput&, const std::string&)>& refused) {
+  const auto put = [&](const DeviceInput& input) {
+    if (const auto reading = registry.validateDeviceInput(input)) {
+      buffer_.put(*reading);
+    } else if (refused) {
+      refused(input, reading.error().what);
+    }
+  };
+  received_ += link_.receive(now, [&](const DeviceInput& input, std::uint32_t newest) {
+    gaps_.received(nanoseconds(now));
+    newest_seq_ = std::max(newest_seq_, input.sample.seq);
+    buffer_.setPlayout(input.hand, choice_.playout_ticks);
+    // those before it whose own messages are lost or late
+    DeviceInput one = input;
+    for (std::size_t i = input.earlier.size(); i-- > 0 && choice_.playout_ticks > 0;) {
+      one.sample = input.earlier[i];
+      if (one.sample.seq > newest && one.sample.seq < input.sample.seq) put(one);
+    }
+    put(input);
+  });
+  link_.answerRequests(now, [&](ClockSync& sync) {
+    sync.server_received_ns = sync.server_sent_ns = nanoseconds(now);
+    sync.inputs_received = received_;
+    sync.newest_seq = newest_seq_;
+    sync.longest_gap = gaps_.longest(nanoseconds(now));
+  });
+  buffer_.collect(now, taken_);
+  for (const session::HandReading& reading : taken_.readings) readings.push_back(reading);
+  // the choice is the station's: it is here after the link's delay
+  if (now % kPeriod == kPeriod / 2) registry.setLimits(client, choice_.limits, round_trip_);
+}
+
+}  // namespace tenon::rehearse

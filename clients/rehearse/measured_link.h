@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "clients/haptic/force_age_statistics.h"
+#include "clients/haptic/limit_chooser.h"
+#include "clients/haptic/link_clock.h"
+#include "clients/rehearse/simulated_link.h"
+#include "server/session/gap_meter.h"
+#include "server/session/input_buffer.h"
+#include "server/session/session_registry.h"
+
+namespace tenon::rehearse {
+
+/// A simulated link whose station measures it and asks for limits, and whose server repeats lost samples from
+/// later inputs, as both do in real time. Clocks are that of the ticks.
+///
+/// Threads: one. Real-time: no.
+class MeasuredLink {
+ public:
+  /// `hands`: number of hands of the scenario.
+  MeasuredLink(const LinkConditions& options, std::size_t hands) : link_(options), buffer_(hands) {}
+
+  // ---- the station's side
+  /// Gives the station what has arrived by tick `now`, and once a second what it has chosen.
+  void deliver(Tick now, haptic::Station& station);
+  /// The inputs of the station's step `now`.
+  void send(std::span<const DeviceInput> inputs, Tick now);
+
+  // ---- the server's side
+  /// Adds to `readings` what tick `now` takes, and tells `registry` what `client` asks for.
+  /// `refused` gets inputs that the registry refuses, with its reason; may be empty.
+  void receive(Tick now, ClientId client, session::SessionRegistry& registry,
+               FixedVector<session::HandReading, session::kMaxHands>& readings,
+               const std::function<void(const DeviceInput&, const std::string&)>& refused);
+  template <class Message>
+  void send(const Message& message, Tick now) {
+    link_.send(message, now);
+  }
+
+ private:
+  static constexpr Tick kPeriod = 1000;  ///< [ticks] between two choices
+
+  static std::int64_t nanoseconds(Tick tick) { return static_cast<std::int64_t>(tick) * 1'000'000; }
+  void measure(Tick now);
+
+  SimulatedLink link_;
+  haptic::LinkClock clock_;
+  haptic::ForceAgeStatistics ages_;
+  haptic::LimitChooser chooser_;
+  haptic::LinkChoice choice_;
+  double round_trip_ = 0.0;  ///< [s] 0: not known
+  session::InputBuffer buffer_;
+  session::GapMeter gaps_;
+  std::uint32_t received_ = 0, newest_seq_ = 0;  ///< as ClockSync says them
+  session::TickInput taken_;
+};
+
+}  // namespace tenon::rehearse

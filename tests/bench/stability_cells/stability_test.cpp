@@ -1,0 +1,93 @@
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "idl/types/cache_folder.h"
+#include "tests/bench/stability/rig_cell.h"
+#include "tests/bench/stability/stability_result.h"
+
+// Twelve cells of `tenon bench stability`, with what must be true of each.
+
+namespace tenon::bench {
+namespace {
+
+const RigSituation& situationNamed(const std::string& name) {
+  static const auto situations = makeSituations(defaultCache());
+  if (!situations) throw std::runtime_error(situations.error().what);
+  return *std::find_if(situations->begin(), situations->end(),
+                       [&](const RigSituation& one) { return one.name == name; });
+}
+
+RigCell cellOf(const std::string& situation, RigModel model, Tick delay, const std::string& loss) {
+  const std::vector<RigLoss> losses = rigLosses();
+  const auto found =
+      std::find_if(losses.begin(), losses.end(), [&](const RigLoss& one) { return one.name == loss; });
+  StabilityRig rig(1);
+  const auto cell = rig.measure(situationNamed(situation), model, delay, *found);
+  if (!cell) throw std::runtime_error(cell.error().what);
+  return *cell;
+}
+
+struct StillCell {
+  const char* situation;
+  Tick delay;
+  const char* loss;
+  double error;  // [-] of the force that is felt, at most
+};
+void PrintTo(const StillCell& cell, std::ostream* out) {
+  *out << cell.situation << ", " << cell.delay << " ms, " << cell.loss;
+}
+
+class AgainstWhatStandsStill : public testing::TestWithParam<StillCell> {};
+
+//   whatever the link does, a contact is held as stiffly as without it; a long one is felt later
+TEST_P(AgainstWhatStandsStill, AStationIsStableAtFullStiffness) {
+  const auto [situation, delay, loss, error] = GetParam();
+  const RigCell cell = cellOf(situation, RigModel::kManifold, delay, loss);
+  EXPECT_EQ(cell.stiffness, fullStiffness());
+  EXPECT_GT(cell.mean_force, 1.0);
+  EXPECT_LT(cell.mean_error, error);
+  EXPECT_LT(cell.energy, 1e-6);
+}
+
+INSTANTIATE_TEST_SUITE_P(Stability, AgainstWhatStandsStill,
+                         testing::Values(StillCell{"wall", 0, "10%", 0.01}, StillCell{"wall", 25, "2%", 0.01},
+                                         StillCell{"wall", 100, "10%", 0.2},
+                                         StillCell{"corner", 5, "2%", 0.01},
+                                         StillCell{"corner", 100, "0", 0.1}));
+
+//   which only tells something if the rig finds what is unstable
+TEST(Stability, AStreamedForceIsStableWithoutDelayAndNotWithIt) {
+  EXPECT_EQ(cellOf("wall", RigModel::kStreamed, 0, "0").stiffness, fullStiffness());
+  const RigCell streamed = cellOf("wall", RigModel::kStreamed, 25, "0");
+  EXPECT_LT(streamed.stiffness.value_or(0.0), 0.25 * fullStiffness());
+  EXPECT_GT(streamed.energy, 0.1);
+  const RigCell passive = cellOf("wall", RigModel::kStreamedPassive, 25, "0");
+  EXPECT_LT(passive.stiffness.value_or(0.0), 0.25 * fullStiffness());
+  EXPECT_LT(passive.energy, streamed.energy);
+}
+
+TEST(Stability, APegInAHoleIsHeldAtFullStiffness) {
+  for (const Tick delay : {5, 100})
+    EXPECT_EQ(cellOf("peg", RigModel::kManifold, delay, "2%").stiffness, fullStiffness());
+}
+
+TEST(Stability, TwoPeopleFeelEachOtherAlike) {
+  const RigCell cell = cellOf("two_people", RigModel::kManifold, 1, "0");
+  EXPECT_EQ(cell.stiffness, fullStiffness());
+  EXPECT_NEAR(cell.other_share, 1.0, 0.3);
+}
+
+TEST(Stability, EqualSeedsGiveEqualNumbers) {
+  const auto numbers = [](const RigCell& cell) {
+    return std::vector<double>{cell.tip, cell.ripple, cell.energy, cell.mean_force, cell.mean_error};
+  };
+  const auto once = [&] { return numbers(cellOf("moving", RigModel::kManifold, 5, "bursts")); };
+  EXPECT_EQ(once(), once());
+}
+
+}  // namespace
+}  // namespace tenon::bench
