@@ -1,5 +1,6 @@
 # Writes LIST: a ctest test for each suite of a GoogleTest PROGRAM. Run after the program was linked. Suites are nightly by the
-# end of their name, or by NIGHTLY_SUITES, which lists them without the prefix of an instantiation.
+# end of their name, or by NIGHTLY_SUITES, and have the label `numbers` by NUMBER_SUITES; both list them without the prefix of an
+# instantiation.
 cmake_policy(SET CMP0007 NEW)
 cmake_policy(SET CMP0057 NEW)
 execute_process(COMMAND ${PROGRAM} --gtest_list_tests OUTPUT_VARIABLE output RESULT_VARIABLE failed)
@@ -21,8 +22,11 @@ foreach(line IN LISTS suites)
     set(label nightly)
     set(timeout 3600)
   endif()
+  if(suite IN_LIST NUMBER_SUITES OR class IN_LIST NUMBER_SUITES)
+    string(APPEND label ";numbers")
+  endif()
   string(REPLACE "/" "." name "${ROOM}.${suite}")
   string(APPEND text "add_test([[${name}]] [[${PROGRAM}]] [[--gtest_filter=${suite}.*]] [[--gtest_output=xml:${RESULTS}/${name}.xml]])\n"
-         "set_tests_properties([[${name}]] PROPERTIES TIMEOUT ${timeout} LABELS [[${label};${ROOM}]] ENVIRONMENT [[${ENVIRONMENT}]])\n")
+         "set_tests_properties([[${name}]] PROPERTIES TIMEOUT ${timeout} LABELS \"${label};${ROOM}\" ENVIRONMENT [[${ENVIRONMENT}]])\n")
 endforeach()
 file(WRITE ${LIST} "${text}")

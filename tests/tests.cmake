@@ -9,18 +9,28 @@ if(BUILD_TESTING OR TENON_BUILD_BENCH)
 endif()
 
 set(test_environment TENON_PROGRAMS=${CMAKE_RUNTIME_OUTPUT_DIRECTORY} TENON_CACHE=${CMAKE_BINARY_DIR}/test_cache)
-# Suites that are nightly with a sanitizer, since they are long there and find nothing of its kind that others do not: those that
-# compare numbers with a truth, over code that other suites reach too (address), those of one thread (thread).
+# Suites that compare numbers with a truth are long with a sanitizer, over code that other suites reach too. The gate runs them in
+# the release that people run (label `numbers`), and all others with the address sanitizer.
+set(suites_of_numbers RealPegs QueryTruth QueryTruthOfRealPairs CouplingWork SheetAtEveryOffset EnvironmentDeterminism Overload
+                      FrictionOnASlope FrictionOfAPull FieldSizeTruth RealPairs SlopeLimit FreeFlights Tapers MeshOrigin OwnSteps
+                      Stability AgainstWhatStandsStill)
+set(programs_of_numbers server/bake server/collision server/simulation server/session bench/stability_cells)
 set(suites_nightly_here)
 if(TENON_SANITIZE MATCHES address)
-  set(suites_nightly_here RealPegs QueryTruth QueryTruthOfRealPairs CouplingWork SheetAtEveryOffset EnvironmentDeterminism Overload
-                        FrictionOnASlope FrictionOfAPull FieldSizeTruth RealPairs SlopeLimit FreeFlights Tapers MeshOrigin OwnSteps
-                        Stability AgainstWhatStandsStill)
-elseif(TENON_SANITIZE MATCHES thread)
+  set(suites_nightly_here ${suites_of_numbers})
+elseif(TENON_SANITIZE MATCHES thread)  # of one thread
   set(suites_nightly_here EnvironmentCheckpoint JournalDamage MeshOrigin OwnSteps FreeFlights NeverThrough Studs Crossings Tapers)
+endif()
+# gmock.h is half of a test's time of compilation
+add_library(precompiled_tests OBJECT ${CMAKE_BINARY_DIR}/precompiled.cpp)
+if(BUILD_TESTING)
+  target_link_libraries(precompiled_tests PRIVATE Eigen3::Eigen GTest::gmock)
+  target_precompile_headers(precompiled_tests PRIVATE <algorithm> <array> <cstdint> <memory> <span> <string> <vector> <Eigen/Core>
+                            <Eigen/Geometry> <gmock/gmock.h> <gtest/gtest.h>)
 endif()
 add_custom_target(test_programs)
 add_custom_target(threaded_tests)
+add_custom_target(number_tests)
 
 # One program of a room's tests, one ctest test a suite.
 function(tenon_tests name)
@@ -32,15 +42,18 @@ function(tenon_tests name)
   endif()
   add_executable(${target} ${sources})
   target_link_libraries(${target} PRIVATE ${ARG_LINK} tests_support GTest::gmock GTest::gtest_main)
-  set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)
-  target_precompile_headers(${target} REUSE_FROM precompiled)
+  target_precompile_headers(${target} REUSE_FROM precompiled_tests)
   add_dependencies(test_programs ${target})
   if(ARG_THREADS)
     add_dependencies(threaded_tests ${target})
   endif()
+  if(name IN_LIST programs_of_numbers)
+    add_dependencies(number_tests ${target})
+  endif()
   set(list ${CMAKE_BINARY_DIR}/suites/${target}.cmake)
   add_custom_command(TARGET ${target} POST_BUILD VERBATIM COMMENT "" COMMAND ${CMAKE_COMMAND} -D "PROGRAM=$<TARGET_FILE:${target}>" -D "ROOM=${name}"
                      -D "LIST=${list}" -D "RESULTS=${CMAKE_BINARY_DIR}/results" -D "ENVIRONMENT=${test_environment}" -D "NIGHTLY_SUITES=${suites_nightly_here}"
+                     -D "NUMBER_SUITES=${suites_of_numbers}"
                      -P ${CMAKE_SOURCE_DIR}/tests/list_suites.cmake)
   file(WRITE ${CMAKE_BINARY_DIR}/suites/${target}_if_built.cmake "if(EXISTS \"${list}\")\n  include(\"${list}\")\nendif()\n")
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${CMAKE_BINARY_DIR}/suites/${target}_if_built.cmake)

@@ -8,7 +8,7 @@
 namespace tenon::simulated_person {
 namespace {
 
-constexpr double kDt = 1e-3;  // [s]
+constexpr double kStep = 1e-3;  // [s]
 const Vector3 kDown(0.0, 0.0, -1.0);
 
 TEST(InsertionPrimitives, UprightObjectsAreTouchedFromTheFrontAllOthersFromAbove) {
@@ -17,10 +17,10 @@ TEST(InsertionPrimitives, UprightObjectsAreTouchedFromTheFrontAllOthersFromAbove
 }
 
 TEST(InsertionPrimitives, PushAdvancesBelowTheTargetForceAndYieldsAboveIt) {
-  EXPECT_GT(pushStep(5.0, 4.0, 0.06, kDt), 0.0);
-  EXPECT_EQ(pushStep(5.0, 5.0, 0.06, kDt), 0.0);
-  EXPECT_LT(pushStep(5.0, 6.0, 0.06, kDt), 0.0);
-  EXPECT_DOUBLE_EQ(pushStep(5.0, -100.0, 0.06, kDt), 0.06 * kDt);
+  EXPECT_GT(pushStep(5.0, 4.0, 0.06, kStep), 0.0);
+  EXPECT_EQ(pushStep(5.0, 5.0, 0.06, kStep), 0.0);
+  EXPECT_LT(pushStep(5.0, 6.0, 0.06, kStep), 0.0);
+  EXPECT_DOUBLE_EQ(pushStep(5.0, -100.0, 0.06, kStep), 0.06 * kStep);
 }
 
 TEST(InsertionPrimitives, LateralComplianceKeepsTheDepth) {
@@ -39,9 +39,9 @@ TEST(InsertionPrimitives, SmallTiltsAreCompliedWithVisibleTiltsAreCorrected) {
   EXPECT_TRUE(logRotation(compliedInRotation(X_WSmall, X_WG, X_WG, Vector3::Zero(), 0.5).rotation())
                   .isApprox(0.5 * small, 1e-6));
   EXPECT_EQ(compliedInRotation(X_WLarge, X_WG, X_WG, Vector3::Zero(), 0.5), X_WG);
-  EXPECT_EQ(tiltCorrection(Vector3::Zero(), X_WSmall, X_WG, kDt), Vector3::Zero());
-  EXPECT_LT(tiltCorrection(Vector3::Zero(), X_WLarge, X_WG, kDt).x(), 0.0) << "against the tilt";
-  EXPECT_NEAR(tiltCorrection({-10.0, 0.0, 0.0}, X_WLarge, X_WG, kDt).norm(), 0.3, 1e-12)
+  EXPECT_EQ(tiltCorrection(Vector3::Zero(), X_WSmall, X_WG, kStep), Vector3::Zero());
+  EXPECT_LT(tiltCorrection(Vector3::Zero(), X_WLarge, X_WG, kStep).x(), 0.0) << "against the tilt";
+  EXPECT_NEAR(tiltCorrection({-10.0, 0.0, 0.0}, X_WLarge, X_WG, kStep).norm(), 0.3, 1e-12)
       << "bounded by the range of the wrist";
 }
 
@@ -51,7 +51,7 @@ TEST(InsertionPrimitives, SpiralSearchIsAnArchimedeanSpiralAcrossTheAxis) {
   double turned = 0.0;
   Vector3 previous = spiral.offset(kDown);
   for (int tick = 0; tick < 4000; ++tick) {
-    spiral.step(false, kDt);
+    spiral.step(false, kStep);
     const Vector3 offset = spiral.offset(kDown);
     EXPECT_NEAR(offset.z(), 0.0, 1e-12);
     EXPECT_NEAR(offset.norm(), spiral.radius(), 0.01 * spiral.radius());
@@ -63,9 +63,9 @@ TEST(InsertionPrimitives, SpiralSearchIsAnArchimedeanSpiralAcrossTheAxis) {
   EXPECT_LT(logRotation(spiral.tilt(kDown)).norm(), 0.05);
 
   SpiralSearch slower;
-  slower.step(true, kDt);
+  slower.step(true, kStep);
   SpiralSearch faster;
-  faster.step(false, kDt);
+  faster.step(false, kStep);
   EXPECT_LT(slower.radius(), faster.radius()) << "when the object begins to enter";
 }
 

@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 
 const std::string kHeader = "t,x,y,z,qw,qx,qy,qz\n";
 
-HandTrajectory trajectory(const std::string& rows) {
+HandTrajectory handTrajectory(const std::string& rows) {
   return HandTrajectory::parse(kHeader + rows, "hand.csv").value();
 }
 
@@ -31,8 +31,8 @@ std::string refusal(const std::string& text) {
 TEST(HandTrajectory, PositionsAreLinearAndOrientationsTurnAtConstantVelocityBetweenRows) {
   // a quarter turn about z from x = 0 to x = 0.4
   const double half = std::sqrt(0.5);
-  const HandTrajectory moved = trajectory("0,0,1,2,1,0,0,0\n2,0.4,1,2," + std::to_string(half) + ",0,0," +
-                                          std::to_string(half) + "\n");
+  const HandTrajectory moved = handTrajectory("0,0,1,2,1,0,0,0\n2,0.4,1,2," + std::to_string(half) + ",0,0," +
+                                              std::to_string(half) + "\n");
   for (const double fraction : {0.1, 0.25, 0.5, 0.9}) {
     const Pose X_WH = moved.poseAt(2.0 * fraction);
     EXPECT_NEAR((X_WH.translation() - Vector3(0.4 * fraction, 1.0, 2.0)).norm(), 0.0, 1e-15);
@@ -44,13 +44,14 @@ TEST(HandTrajectory, PositionsAreLinearAndOrientationsTurnAtConstantVelocityBetw
 }
 
 TEST(HandTrajectory, TheSmallerAngleIsTakenWhateverTheSignsOfTheQuaternions) {
-  const Pose X_WH = trajectory("0,0,0,0,1,0,0,0\n1,0,0,0,-0.96,0,0,-0.28\n").poseAt(0.5);
+  const Pose X_WH = handTrajectory("0,0,0,0,1,0,0,0\n1,0,0,0,-0.96,0,0,-0.28\n").poseAt(0.5);
   const Vector3 w = logRotation(X_WH.rotation());
   EXPECT_NEAR(w.z(), std::atan2(0.28, 0.96), 1e-12) << "half of 2 atan2(0.28, 0.96), not of 2 pi less that";
 }
 
 TEST(HandTrajectory, ARowsTimeHasThatRowExactlyAndTheEndsAreHeld) {
-  const HandTrajectory moved = trajectory("0.5,1,0,0,0.6,0.8,0,0\n0.75,2,0,0,1,0,0,0\n1,3,0,0,0.8,0,0.6,0\n");
+  const HandTrajectory moved =
+      handTrajectory("0.5,1,0,0,0.6,0.8,0,0\n0.75,2,0,0,1,0,0,0\n1,3,0,0,0.8,0,0.6,0\n");
   const Quaternion first = Quaternion(0.6, 0.8, 0.0, 0.0).normalized();
   for (const double t : {-1.0, 0.0, 0.5}) EXPECT_EQ(moved.poseAt(t), Pose(Vector3(1, 0, 0), first)) << t;
   EXPECT_EQ(moved.poseAt(0.75), Pose(Vector3(2, 0, 0)));
@@ -63,7 +64,7 @@ TEST(HandTrajectory, ARowsTimeHasThatRowExactlyAndTheEndsAreHeld) {
 }
 
 TEST(HandTrajectory, AQuaternionNearUnitLengthIsNormalised) {
-  const Quaternion q_WH = trajectory("0,0,0,0,1.009,0,0,0\n").poseAt(0.0).rotation();
+  const Quaternion q_WH = handTrajectory("0,0,0,0,1.009,0,0,0\n").poseAt(0.0).rotation();
   EXPECT_EQ(q_WH.coeffs(), Quaternion::Identity().coeffs());
 }
 
@@ -139,7 +140,7 @@ std::string damaged(std::string text, std::mt19937_64& random) {
   return text;
 }
 
-/// A text is read to a trajectory whose poses are finite, or refused with a line that it has.
+/// A text is read to a handTrajectory whose poses are finite, or refused with a line that it has.
 void expectReadOrRefused(const std::string& text, int& refused) {
   const auto parsed = HandTrajectory::parse(text, "hand.csv");
   if (parsed) {

@@ -12,10 +12,10 @@ using test::together;
 using testing::HasSubstr;
 using testing::Not;
 
-constexpr double kVoxel = 0.003;
+constexpr double kGapVoxel = 0.003;
 
-structures::HapticStructures baked(const TriangleMesh& mesh, int refinement) {
-  auto structures = bake(mesh, {.voxel = kVoxel, .refinement = refinement, .points = 500});
+structures::HapticStructures bakedWithGaps(const TriangleMesh& mesh, int refinement) {
+  auto structures = bake(mesh, {.voxel = kGapVoxel, .refinement = refinement, .points = 500});
   EXPECT_TRUE(structures) << structures.error().what;
   return structures.value_or(structures::HapticStructures{});
 }
@@ -40,12 +40,12 @@ TriangleMesh blocksApart(double at, double gap) {
 //   ###########
 TEST(AirGaps, AreOpenedWithinHalfOfTheBytes) {
   const TriangleMesh mesh = together(slab(), blocksApart(0.0, 0.002));
-  const structures::HapticStructures coarse = baked(mesh, 1);
-  const structures::HapticStructures fine = baked(mesh, 4);
+  const structures::HapticStructures coarse = bakedWithGaps(mesh, 1);
+  const structures::HapticStructures fine = bakedWithGaps(mesh, 4);
   const Vector3 in_gap(0.0, 0.001, 0.012);
   EXPECT_LT(coarse.field.sample(in_gap).distance, 0.0002);
   EXPECT_GT(fine.field.sample(in_gap).distance, 0.0006) << "1 mm, less what interpolation cuts off";
-  EXPECT_NEAR(fine.field.voxelAt(in_gap), kVoxel / 4, 1e-12);
+  EXPECT_NEAR(fine.field.voxelAt(in_gap), kGapVoxel / 4, 1e-12);
   EXPECT_LE(bytesOf(fine), 1.5 * bytesOf(coarse));
   EXPECT_THAT(fine.info.notes, HasSubstr("places with gaps below two voxels are refined"));
   EXPECT_THAT(fine.info.notes, Not(HasSubstr("not resolved")));
@@ -57,11 +57,11 @@ TEST(AirGaps, TheNarrowestAreRefinedAndTheOthersReported) {
   const std::array<double, 7> gaps{0.005, 0.0045, 0.004, 0.0018, 0.0042, 0.0035, 0.0048};
   for (std::size_t i = 0; i < gaps.size(); ++i)
     mesh = together(mesh, blocksApart(-0.15 + 0.05 * static_cast<double>(i), gaps[i]));
-  const structures::HapticStructures coarse = baked(mesh, 1);
-  const structures::HapticStructures fine = baked(mesh, 4);
+  const structures::HapticStructures coarse = bakedWithGaps(mesh, 1);
+  const structures::HapticStructures fine = bakedWithGaps(mesh, 4);
   EXPECT_LE(bytesOf(fine), 1.5 * bytesOf(coarse));
-  EXPECT_LT(fine.field.voxelAt({0.0, 0.001, 0.012}), kVoxel) << "1.8 mm";
-  EXPECT_EQ(fine.field.voxelAt({-0.15, 0.001, 0.012}), kVoxel) << "5 mm";
+  EXPECT_LT(fine.field.voxelAt({0.0, 0.001, 0.012}), kGapVoxel) << "1.8 mm";
+  EXPECT_EQ(fine.field.voxelAt({-0.15, 0.001, 0.012}), kGapVoxel) << "5 mm";
   EXPECT_THAT(fine.info.notes, HasSubstr("places with gaps below two voxels are refined"));
   EXPECT_THAT(fine.info.notes, HasSubstr("not resolved, the narrowest"));
 }
@@ -72,7 +72,7 @@ TEST(AirGaps, AreOfAirBetweenSurfacesThatFaceEachOther) {
        {together(slab(), boxMesh({-0.05, -0.0005, -0.01}, {0.05, 0.0005, 0.05})),
         together(slab(), boxMesh({-0.05, -0.05, -0.002}, {0.05, 0.05, 0.05})),
         together(slab(), boxMesh({-0.05, -0.05, -0.03}, {-0.03, -0.03, -0.028}))}) {
-    const structures::HapticStructures fine = baked(mesh, 4);
+    const structures::HapticStructures fine = bakedWithGaps(mesh, 4);
     EXPECT_THAT(fine.info.notes, Not(HasSubstr("gaps")));
     EXPECT_EQ(fine.field.layout().refinement, 1);
   }

@@ -12,11 +12,11 @@ using structures::FilledSpace;
 using test::boxMesh;
 using test::together;
 
-constexpr double kVoxel = 0.003;
+constexpr double kSpaceVoxel = 0.003;
 
 std::vector<FilledSpace> filledIn(const TriangleMesh& mesh, const std::vector<RefineBox>& refine = {}) {
   BakeOptions options;
-  options.voxel = kVoxel;
+  options.voxel = kSpaceVoxel;
   options.refinement = refine.empty() ? 1 : 4;
   options.refine = refine;
   options.points = 500;
@@ -71,18 +71,18 @@ TEST(FilledSpaces, AreSlotsTooNarrowForTheirVoxels) {
     const std::vector<FilledSpace> filled = filledIn(slotted(width));
     ASSERT_EQ(filled.size(), 1U) << width;
     // balls of voxels reach into the three sides that are open
-    constexpr double kOpened = 3.0 * kVoxel;
+    constexpr double kOpened = 3.0 * kSpaceVoxel;
     EXPECT_LE(filled[0].wall_area, 2 * 0.06 * 0.039);
     EXPECT_GE(filled[0].wall_area, 2 * (0.06 - 2 * kOpened) * (0.039 - kOpened));
     expectBox(filled[0], {-width / 2, -0.03, -0.019}, {width / 2, 0.03, 0.02}, kOpened);
     EXPECT_NEAR(filled[0].low[0], -width / 2, 1e-6);
     EXPECT_NEAR(filled[0].high[0], width / 2, 1e-6);
   }
-  EXPECT_TRUE(filledIn(slotted(3.0 * kVoxel)).empty());
+  EXPECT_TRUE(filledIn(slotted(3.0 * kSpaceVoxel)).empty());
 }
 
 TEST(FilledSpaces, AreNotSlotsThatRefinementOpens) {
-  const TriangleMesh mesh = slotted(0.8 * kVoxel);
+  const TriangleMesh mesh = slotted(0.8 * kSpaceVoxel);
   EXPECT_EQ(filledIn(mesh).size(), 1U);
   const Eigen::AlignedBox3d slot(Vector3(-0.003, -0.035, -0.025), Vector3(0.003, 0.035, 0.025));
   EXPECT_TRUE(filledIn(mesh, {{.box_M = slot}}).empty());

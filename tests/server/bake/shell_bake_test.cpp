@@ -9,7 +9,8 @@
 namespace tenon::bake {
 namespace {
 
-structures::HapticStructures baked(const TriangleMesh& mesh, std::uint32_t points, double voxel = 0.003) {
+structures::HapticStructures bakedShell(const TriangleMesh& mesh, std::uint32_t points,
+                                        double voxel = 0.003) {
   BakeOptions options;
   options.voxel = voxel;
   options.points = points;
@@ -25,7 +26,7 @@ double totalArea(const structures::Pointshell& shell) {
 }
 
 TEST(ShellBake, SpreadsAboutTheRequestedNumberOfPointsEvenly) {
-  const structures::HapticStructures structures = baked(test::ballMesh(0.05, 5), 3000);
+  const structures::HapticStructures structures = bakedShell(test::ballMesh(0.05, 5), 3000);
   const auto points = structures.shell.points();
   EXPECT_NEAR(static_cast<double>(points.size()), 3000.0, 450.0);
   const double mean_area = 4.0 * std::numbers::pi * 0.05 * 0.05 / static_cast<double>(points.size());
@@ -38,7 +39,7 @@ TEST(ShellBake, SpreadsAboutTheRequestedNumberOfPointsEvenly) {
 
 TEST(ShellBake, NormalsPointIntoTheSolidForAnyWinding) {
   const TriangleMesh mesh = test::randomlyFlipped(test::ballMesh(0.05, 5), 3);
-  const structures::HapticStructures structures = baked(mesh, 2000);
+  const structures::HapticStructures structures = bakedShell(mesh, 2000);
   ASSERT_GT(structures.shell.points().size(), 1000U);
   for (const structures::ShellPoint& point : structures.shell.points()) {
     EXPECT_LT((point.inward_M + point.p_MP.normalized()).norm(), 0.15F);
@@ -47,9 +48,9 @@ TEST(ShellBake, NormalsPointIntoTheSolidForAnyWinding) {
 
 TEST(ShellBake, SkipsWallsInsideAUnion) {
   const structures::HapticStructures structures =
-      baked(test::together(test::boxMesh(Vector3(0, 0, 0), Vector3(0.08, 0.08, 0.08)),
-                           test::boxMesh(Vector3(0.05, 0.02, 0.02), Vector3(0.13, 0.06, 0.06))),
-            3000);
+      bakedShell(test::together(test::boxMesh(Vector3(0, 0, 0), Vector3(0.08, 0.08, 0.08)),
+                                test::boxMesh(Vector3(0.05, 0.02, 0.02), Vector3(0.13, 0.06, 0.06))),
+                 3000);
   for (const structures::ShellPoint& point : structures.shell.points()) {
     const Vector3f& p = point.p_MP;
     const bool hidden_by_first = p.x() < 0.076F && (p.array() > 0.004F).all() && (p.array() < 0.076F).all();
@@ -61,7 +62,7 @@ TEST(ShellBake, SkipsWallsInsideAUnion) {
 
 TEST(ShellBake, PutsPointsOnCornersAndAlongConvexEdges) {
   const structures::HapticStructures structures =
-      baked(test::boxMesh(Vector3(0, 0, 0), Vector3(0.05, 0.04, 0.03)), 1500);
+      bakedShell(test::boxMesh(Vector3(0, 0, 0), Vector3(0.05, 0.04, 0.03)), 1500);
   int corners = 0;
   int on_edge = 0;
   for (const structures::ShellPoint& point : structures.shell.points()) {
@@ -80,7 +81,7 @@ TEST(ShellBake, PutsPointsOnCornersAndAlongConvexEdges) {
 
 TEST(ShellBake, BothSidesOfAThinPlateHavePoints) {
   const structures::HapticStructures structures =
-      baked(test::boxMesh(Vector3(-0.05, -0.05, 0.0), Vector3(0.05, 0.05, 0.001)), 1000);
+      bakedShell(test::boxMesh(Vector3(-0.05, -0.05, 0.0), Vector3(0.05, 0.05, 0.001)), 1000);
   int up = 0;
   int down = 0;
   for (const structures::ShellPoint& point : structures.shell.points()) {
@@ -92,7 +93,7 @@ TEST(ShellBake, BothSidesOfAThinPlateHavePoints) {
 }
 
 TEST(ShellBake, ASheetHasPointsToo) {
-  const structures::HapticStructures structures = baked(test::sheetMesh(0.05, 0.0, 5), 500);
+  const structures::HapticStructures structures = bakedShell(test::sheetMesh(0.05, 0.0, 5), 500);
   EXPECT_GT(structures.shell.points().size(), 350U);
   for (const structures::ShellPoint& point : structures.shell.points()) {
     EXPECT_NEAR(point.inward_M.norm(), 1.0F, 1e-5F);
@@ -100,7 +101,7 @@ TEST(ShellBake, ASheetHasPointsToo) {
 }
 
 TEST(ShellBake, AreasOfEachPrefixOfLevelsAddUpToTheWholeSurface) {
-  const structures::Pointshell shell = baked(test::ballMesh(0.05, 4), 3000).shell;
+  const structures::Pointshell shell = bakedShell(test::ballMesh(0.05, 4), 3000).shell;
   ASSERT_GT(shell.levels().size(), 2U);
   double sum = 0.0;
   for (const structures::ShellLevel& level : shell.levels()) {

@@ -16,7 +16,7 @@ namespace {
 using test::boxMesh;
 using test::together;
 
-constexpr double kVoxel = 0.003;
+constexpr double kSignVoxel = 0.003;
 
 /// The solids of the engine bay at full detail that lie in a region: `mesh` is the triangle soup as in its
 /// file; the separate solids give the ground truth.
@@ -59,9 +59,9 @@ TriangleMesh withHoles(TriangleMesh mesh, unsigned one_in) {
   return mesh;
 }
 
-structures::DistanceField baked(const TriangleMesh& mesh) {
+structures::DistanceField signedField(const TriangleMesh& mesh) {
   BakeOptions options;
-  options.voxel = kVoxel;
+  options.voxel = kSignVoxel;
   options.points = 500;
   const auto structures = bake(mesh, options);
   EXPECT_TRUE(structures) << structures.error().what;
@@ -69,7 +69,7 @@ structures::DistanceField baked(const TriangleMesh& mesh) {
 }
 
 struct BakedBay {
-  explicit BakedBay(const Eigen::AlignedBox3d& region) : bay(region), field(baked(bay.mesh)) {}
+  explicit BakedBay(const Eigen::AlignedBox3d& region) : bay(region), field(signedField(bay.mesh)) {}
   EngineBay bay;
   structures::DistanceField field;
 };
@@ -79,7 +79,7 @@ const BakedBay& wholeBay() {
   static const BakedBay the_bay({Vector3(-0.5, 0.33, 0.3), Vector3(0.1, 0.9, 0.75)});
   return the_bay;
 }
-/// A part of it that is baked within seconds.
+/// A part of it that is signedField within seconds.
 const BakedBay& pieceOfBay() {
   static const BakedBay the_piece({Vector3(-0.3, 0.45, 0.35), Vector3(0.0, 0.75, 0.65)});
   return the_piece;
@@ -134,14 +134,14 @@ void expectRightBeyondHalfAVoxel(const BakedBay& bay, std::size_t every, std::si
 }
 
 void expectTheSameWithHalfOfTheTrianglesFlipped(const BakedBay& bay) {
-  const structures::DistanceField flipped = baked(test::randomlyFlipped(bay.bay.mesh, 5));
+  const structures::DistanceField flipped = signedField(test::randomlyFlipped(bay.bay.mesh, 5));
   EXPECT_TRUE(std::ranges::equal(bay.field.layout().index, flipped.layout().index));
   EXPECT_TRUE(std::ranges::equal(bay.field.layout().samples, flipped.layout().samples));
   EXPECT_TRUE(std::ranges::equal(bay.field.layout().far, flipped.layout().far));
 }
 
 void expectMostlyRightWithHoles(const BakedBay& bay, std::size_t every, std::size_t samples) {
-  const SignErrors errors = countSignErrors(bay.bay, baked(withHoles(bay.bay.mesh, 100)), every);
+  const SignErrors errors = countSignErrors(bay.bay, signedField(withHoles(bay.bay.mesh, 100)), every);
   EXPECT_GT(errors.band, samples);
   EXPECT_LE(errors.percent(), 2.5);
 }
@@ -169,9 +169,9 @@ TEST(SignNightly, OfTheEngineBayIsMostlyRightWithOneTriangleInAHundredMissing) {
 TEST(Sign, OfANarrowGapIsOutside) {
   for (const double gap : {0.0061, 0.0066, 0.0071}) {
     for (const double left : {0.05, 0.0493, 0.0487, 0.0482}) {
-      const structures::DistanceField field =
-          baked(test::together(test::boxMesh(Vector3(-left, -0.05, -0.02), Vector3(-gap / 2, 0.05, 0.02)),
-                               test::boxMesh(Vector3(gap / 2, -0.05, -0.02), Vector3(0.05, 0.05, 0.02))));
+      const structures::DistanceField field = signedField(
+          test::together(test::boxMesh(Vector3(-left, -0.05, -0.02), Vector3(-gap / 2, 0.05, 0.02)),
+                         test::boxMesh(Vector3(gap / 2, -0.05, -0.02), Vector3(0.05, 0.05, 0.02))));
       EXPECT_GT(field.sample(Vector3(0.0, 0.011, 0.004)).distance, 0.0) << gap << " beside " << left;
       EXPECT_LT(field.sample(Vector3(0.011, 0.011, 0.004)).distance, -0.004) << gap << " beside " << left;
     }
@@ -190,11 +190,11 @@ TEST(Sign, OfAPlateWithHolesIsInside) {
     return block.vertices[t[1]].z() == z && block.vertices[t[2]].z() == z;
   });
   plate = test::together(plate, rim);
-  const structures::DistanceField whole = baked(plate);
+  const structures::DistanceField whole = signedField(plate);
   EXPECT_LT(whole.sample(Vector3(0.013, 0.001, 0.0)).distance, -0.002);
   plate.triangles.erase(plate.triangles.begin() + 100);
   plate.triangles.erase(plate.triangles.begin() + 900);
-  const structures::DistanceField with_holes = baked(plate);
+  const structures::DistanceField with_holes = signedField(plate);
   EXPECT_LT(with_holes.sample(Vector3(0.013, 0.001, 0.0)).distance, -0.002);
   EXPECT_LT(with_holes.sample(Vector3(-0.031, 0.021, 0.0)).distance, -0.002);
 }

@@ -14,7 +14,7 @@ using test::ballMesh;
 using test::boxMesh;
 using test::together;
 
-constexpr double kVoxel = 0.003;
+constexpr double kSlopeVoxel = 0.003;
 constexpr int kSamples = structures::DistanceField::kBrickSamples;
 
 /// Two blocks with a gap of `gap` between them, 40 mm deep.
@@ -23,15 +23,15 @@ TriangleMesh blocksApart(double gap) {
                         test::boxMesh(Vector3(gap / 2, -0.05, -0.02), Vector3(0.05, 0.05, 0.02)));
 }
 
-TriangleMesh withHoles(TriangleMesh mesh, unsigned one_in) {
+TriangleMesh withoutTriangles(TriangleMesh mesh, unsigned one_in) {
   std::mt19937_64 random(3);
   std::erase_if(mesh.triangles, [&](const auto&) { return random() % one_in == 0; });
   return mesh;
 }
 
-structures::DistanceField baked(const TriangleMesh& mesh, std::vector<RefineBox> refine = {}) {
+structures::DistanceField bakedField(const TriangleMesh& mesh, std::vector<RefineBox> refine = {}) {
   BakeOptions options;
-  options.voxel = kVoxel;
+  options.voxel = kSlopeVoxel;
   options.points = 500;
   options.refinement = refine.empty() ? 1 : 4;
   options.refine = std::move(refine);
@@ -76,13 +76,13 @@ int worstViolation(const structures::DistanceField& field) {
 //    #####| |#####
 TEST(SlopeLimit, SamplesOfABrickAreLipschitz) {
   for (const double gap : {0.001, 0.002, 0.004, 0.0065, 0.008}) {
-    EXPECT_LE(worstViolation(baked(blocksApart(gap))), 2) << gap;
+    EXPECT_LE(worstViolation(bakedField(blocksApart(gap))), 2) << gap;
   }
   const TriangleMesh ball = test::ballMesh(0.03, 4);
-  EXPECT_LE(worstViolation(baked(ball)), 2);
-  EXPECT_LE(worstViolation(baked(withHoles(ball, 100))), 2);
-  EXPECT_LE(worstViolation(baked(withHoles(ball, 20))), 2);
-  EXPECT_LE(worstViolation(baked(
+  EXPECT_LE(worstViolation(bakedField(ball)), 2);
+  EXPECT_LE(worstViolation(bakedField(withoutTriangles(ball, 100))), 2);
+  EXPECT_LE(worstViolation(bakedField(withoutTriangles(ball, 20))), 2);
+  EXPECT_LE(worstViolation(bakedField(
                 test::together(ball, test::boxMesh(Vector3(0.02, -0.01, -0.01), Vector3(0.06, 0.01, 0.01))))),
             2);
 }
@@ -90,7 +90,7 @@ TEST(SlopeLimit, SamplesOfABrickAreLipschitz) {
 TEST(SlopeLimit, CoarseAndFineSamplesOfABrickAreLipschitz) {
   const RefineBox mouth{{Vector3(-0.004, -0.06, 0.0), Vector3(0.004, 0.0, 0.03)}};
   for (const double gap : {0.001, 0.002, 0.004, 0.0065}) {
-    const structures::DistanceField field = baked(blocksApart(gap), {mouth});
+    const structures::DistanceField field = bakedField(blocksApart(gap), {mouth});
     const structures::DistanceField::Layout& layout = field.layout();
     ASSERT_EQ(layout.refinement, 4);
     EXPECT_LE(worstViolation(field), 2) << gap;
@@ -126,7 +126,7 @@ TEST(SlopeLimit, CoarseAndFineSamplesOfABrickAreLipschitz) {
 // reached samples are correct, so raising the others may only reduce their error
 TEST(SlopeLimit, RaisesNoSampleAboveTheTrueDistance) {
   for (const double gap : {0.002, 0.004, 0.0065}) {
-    const structures::DistanceField field = baked(blocksApart(gap));
+    const structures::DistanceField field = bakedField(blocksApart(gap));
     const auto truth = [&](const Vector3& p) {
       const auto block = [&](double from, double to) {
         const Vector3 low(from, -0.05, -0.02);
@@ -146,10 +146,10 @@ TEST(SlopeLimit, RaisesNoSampleAboveTheTrueDistance) {
                                  linear_index / layout.bricks[0] % layout.bricks[1],
                                  linear_index / layout.bricks[0] / layout.bricks[1]);
       for (int k = 0; k < kSamples; ++k) {
-        const double value = layout.samples[static_cast<std::size_t>(entry * kSamples + k)] * kVoxel /
+        const double value = layout.samples[static_cast<std::size_t>(entry * kSamples + k)] * kSlopeVoxel /
                              structures::DistanceField::kQuantaPerVoxel;
-        const Vector3 p = layout.p_MoFo_M + kVoxel * (8.0 * brick.matrix() + inBrick(k));
-        ASSERT_LE(value, std::max(truth(p), -structures::DistanceField::kClampVoxels * kVoxel) + 2e-6)
+        const Vector3 p = layout.p_MoFo_M + kSlopeVoxel * (8.0 * brick.matrix() + inBrick(k));
+        ASSERT_LE(value, std::max(truth(p), -structures::DistanceField::kClampVoxels * kSlopeVoxel) + 2e-6)
             << p.transpose();
         ++compared;
       }

@@ -14,17 +14,17 @@ using test::boxStructures;
 using test::floorStructures;
 using test::IslandRig;
 
-constexpr double kStiffness = 1000.0;          // [N/m]
-constexpr double kDepth = 0.01;                // [m] of the hand below the box's resting height
-constexpr double kRest = 0.0105;               // [m]
-constexpr double kLoad = kStiffness * kDepth;  // [N]
+constexpr double kCouplingStiffness = 1000.0;          // [N/m]
+constexpr double kDepth = 0.01;                        // [m] of the hand below the box's resting height
+constexpr double kRest = 0.0105;                       // [m]
+constexpr double kLoad = kCouplingStiffness * kDepth;  // [N]
 
 /// A hand presses a box on a floor tilted by `turn` [rad] about y. Coefficients `at_rest`, `sliding` [-].
 struct PressedBox {
   PressedBox(double at_rest, double sliding, double turn = 0.0)
       : X_WFloor(Vector3::Zero(), expRotation({0.0, turn, 0.0})) {
     box = rig.addBody(test::boxStructures({0.04, 0.04, 0.02}, 0.002, 0.004),
-                      X_WFloor * Pose(Vector3(0.0, 0.0, kRest + 0.001)), kStiffness);
+                      X_WFloor * Pose(Vector3(0.0, 0.0, kRest + 0.001)), kCouplingStiffness);
     rig.addStatic(box, test::floorStructures(0.4, 0.002), X_WFloor, 0.0005);
     rig.setFriction(0, at_rest, sliding);
   }
@@ -62,7 +62,7 @@ TEST_P(FrictionOfAPull, SticksUpToTheStaticCoefficientTimesTheLoad) {
   for (int tick = 1; tick <= 400 && (pressed.position() - start).norm() < 2e-5; ++tick) {
     const double stretch = 2e-5 * tick;
     pressed.press(down + stretch * direction, 1);
-    pull = kStiffness * stretch;
+    pull = kCouplingStiffness * stretch;
   }
   EXPECT_NEAR(pull, kFriction * kLoad, 0.02 * kFriction * kLoad);
 }
@@ -74,7 +74,7 @@ TEST_P(FrictionOfAPull, SlidesWithTheDynamicCoefficientTimesTheLoad) {
   pressed.press(down, 50);
   for (int tick = 1; tick <= 150; ++tick) pressed.press(down + 2e-4 * tick * direction, 1);
   const Vector3 lag = down + 0.03 * direction - pressed.position();
-  EXPECT_NEAR(kStiffness * lag.dot(direction), 0.3 * kLoad, 0.02 * 0.3 * kLoad);
+  EXPECT_NEAR(kCouplingStiffness * lag.dot(direction), 0.3 * kLoad, 0.02 * 0.3 * kLoad);
   EXPECT_LE((lag - lag.dot(direction) * direction).head<2>().norm(), 1e-5);
   EXPECT_NEAR(pressed.force().dot(direction), -0.3 * pressed.force().z(), 0.02 * kLoad);
   // when the hand stops, the box does too

@@ -22,7 +22,7 @@ using test::socketStructures;
 using test::sphereStructures;
 using test::StructuresPtr;
 
-constexpr double kStiffness = 1000.0;
+constexpr double kHandStiffness = 1000.0;
 
 //      device            A floor at z = 0 pushes up (+z). The hand dives below it
 //        |  motion       while moving along +x: the proxy slides, it does not sink.
@@ -40,7 +40,7 @@ TEST(IslandSolver, SlidesAlongAFloorInsteadOfSinking) {
     const Vector3 p = rig.pose(box).translation();
     ASSERT_NEAR(p.x(), -0.05 + 0.0005 * tick, 1e-5) << "lag";
     ASSERT_NEAR(p.z(), 0.0105, 1e-5);
-    ASSERT_NEAR(rig.force(0).force.z(), kStiffness * (p.z() + 0.04), 1e-3 * 50.0);
+    ASSERT_NEAR(rig.force(0).force.z(), kHandStiffness * (p.z() + 0.04), 1e-3 * 50.0);
     ASSERT_LE(rig.force(0).force.head<2>().norm(), 1e-3 * rig.force(0).force.z());
   }
 }
@@ -54,8 +54,8 @@ TEST(IslandSolver, ForceIsStiffnessTimesTheDistanceBetweenHandAndBody) {
     rig.settle(50);
     const double stretch = rig.pose(ball).translation().z() - (0.0205 - depth);
     EXPECT_NEAR(stretch, depth, 1e-4) << "the ball's points are 2 mm apart";
-    EXPECT_NEAR(rig.force(0).force.z(), kStiffness * stretch, 0.01);
-    EXPECT_NEAR(springWrench(rig.body(ball).springs[0], rig.pose(ball)).force.z(), -kStiffness * stretch,
+    EXPECT_NEAR(rig.force(0).force.z(), kHandStiffness * stretch, 0.01);
+    EXPECT_NEAR(springWrench(rig.body(ball).springs[0], rig.pose(ball)).force.z(), -kHandStiffness * stretch,
                 1e-6);
   }
 }

@@ -14,7 +14,7 @@ namespace {
 
 using test::StructuresPtr;
 
-constexpr double kStiffness = 1000.0;  // [N/m]
+constexpr double kPenaltyStiffness = 1000.0;  // [N/m]
 constexpr std::uint32_t kAllLevels = 0xFFFFFFFFU;
 
 struct Penalty {
@@ -28,7 +28,7 @@ Penalty penaltyAt(const test::StructuresPtr& a, const test::StructuresPtr& b, co
   query.sum_penalty = true;
   static const auto result = std::make_unique<PairQueryResult>();
   queryPair(query, *result);
-  return {result->penalty_Ao_W * kStiffness, result->penalty_points};
+  return {result->penalty_Ao_W * kPenaltyStiffness, result->penalty_points};
 }
 
 /// Uniform in [-1, 1).
@@ -188,7 +188,7 @@ TEST(LevelOfDetail, PriorityPointsOfSkippedLevelsAreListedWithAreaZero) {
     EXPECT_EQ(contact.area == 0.0, contact.point >= end);
   }
   const auto force = [](const PairQueryResult& one) {
-    return penaltyWrench(one, Vector3::Zero(), kStiffness).force.z();
+    return penaltyWrench(one, Vector3::Zero(), kPenaltyStiffness).force.z();
   };
   EXPECT_EQ(force(*result), force(*coarse));
 }

@@ -54,7 +54,7 @@ std::vector<test::StructuresPtr> fields() {
           unevenlyDilated(test::sheetStructures(0.1, 0.001, 0.002, 0.0007), 0.0017F)};
 }
 
-Pose randomPose(std::mt19937_64& engine, double reach) {
+Pose poseWithin(std::mt19937_64& engine, double reach) {
   const auto uniform = [&engine] {
     return 2.0 * (static_cast<double>(engine() >> 11U) / 9007199254740992.0) - 1.0;
   };
@@ -111,8 +111,8 @@ TEST_F(QueryKernelsTest, EveryInstructionSetGivesTheSameBits) {
   std::size_t found = 0;
   for (int trial = 0; trial < 2000; ++trial) {
     const test::StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
-    const Pose X_WA = randomPose(engine, trial % 7 == 0 ? 0.3 : 0.07);
-    PairQuery query{&box->shell, &other->field, X_WA, randomPose(engine, 0.02), 0.001};
+    const Pose X_WA = poseWithin(engine, trial % 7 == 0 ? 0.3 : 0.07);
+    PairQuery query{&box->shell, &other->field, X_WA, poseWithin(engine, 0.02), 0.001};
     query.reduce = trial % 2 == 0;
     query.correct_ridges = trial % 4 < 2;
     PairQuery later = query;
@@ -140,7 +140,7 @@ TEST_F(QueryKernelsTest, SampledLanesEqualTheSamplesOfTheField) {
   SampleLanes lanes;
   for (const test::StructuresPtr& other : fields()) {
     for (int trial = 0; trial < 50; ++trial) {
-      const LaneFrame frame(other->field, randomPose(engine, 0.07), Pose(), 0.001, box->shell.radius());
+      const LaneFrame frame(other->field, poseWithin(engine, 0.07), Pose(), 0.001, box->shell.radius());
       for (const QueryKernels& kernels : supportedKernels()) {
         for (std::size_t leaf = 0; leaf < box->shell.leaves().size(); ++leaf) {
           const structures::ShellBlock& block = box->shell.pointsOfLeaf(leaf);
@@ -172,7 +172,7 @@ TEST_F(QueryKernelsTest, PruningChangesNoContact) {
   const auto unpruned = std::make_unique<PairQueryResult>();
   for (int trial = 0; trial < 3000; ++trial) {
     const test::StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
-    PairQuery query{&box->shell, &other->field, randomPose(engine, 0.07), Pose(), 0.001};
+    PairQuery query{&box->shell, &other->field, poseWithin(engine, 0.07), Pose(), 0.001};
     queryPair(query, *pruned);
     query.prune = false;
     queryPair(query, *unpruned);
@@ -197,7 +197,7 @@ TEST_F(QueryKernelsTest, NoPointIsNearerThanTheBoundOfCulledPoints) {
   const auto result = std::make_unique<PairQueryResult>();
   for (int trial = 0; trial < 500; ++trial) {
     const test::StructuresPtr& other = others[static_cast<std::size_t>(trial) % others.size()];
-    const Pose X_WA = randomPose(engine, trial % 4 == 0 ? 0.2 : 0.07);
+    const Pose X_WA = poseWithin(engine, trial % 4 == 0 ? 0.2 : 0.07);
     queryPair({&box->shell, &other->field, X_WA, Pose(), 0.0}, *result);
     for (const structures::ShellPoint& point : box->shell.points()) {
       const structures::FieldSample sample = other->field.sample(X_WA * point.p_MP.cast<double>());

@@ -23,12 +23,12 @@ using test::RealPart;
 using test::voxelOf;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
-constexpr double kTilt = 0.035;       // 2 degrees
+constexpr double kLean = 0.035;       // 2 degrees
 constexpr double kWrist = 1.4;        // [Nm/rad] a coupling of 20 in series with a relaxed wrist of 1.5
 constexpr double kOverlap = 5e-6;     // [m] tolerance for the overlap of the meshes
 constexpr int kOverlapInterval = 20;  // ticks
 
-const Quaternion kTilted = expRotation({kTilt, 0.0, 0.0});
+const Quaternion kTilted = expRotation({kLean, 0.0, 0.0});
 
 double tiltOf(const Pose& X_WB) { return std::acos(std::min((X_WB.rotation() * Vector3::UnitZ()).z(), 1.0)); }
 
@@ -199,17 +199,17 @@ TEST(RealThreadNightly, ANutThatStartsTiltedIsScrewedOnAndOff) {
     const Quaternion q = expRotation({tilt, 0.0, 0.0}) * expRotation({0.0, 0.0, turn});
     return Pose(Vector3(0.0002, -0.0001, lift) + p_NC - q * p_NC, q);
   };
-  const auto held = insertion.hold(*nut, placed(0.0265, 0.0, kTilt), p_NC);
+  const auto held = insertion.hold(*nut, placed(0.0265, 0.0, kLean), p_NC);
   insertion.addStatic(held, *bolt, kClearance);
   insertion.measureOverlap([&] { return test::overlapOfMeshes(*nut, *bolt, rig.pose(held), kOverlap); });
   const auto lift = [&] { return (rig.pose(held) * p_NC - p_NC).z(); };
   const auto step = [&insertion](const Pose& X_WH) { insertion.step(X_WH); };
 
   constexpr double kPress = 0.002;  // [m] the hand ahead of the thread: 2 N
-  for (int tick = 1; tick <= 150; ++tick) step(placed(0.0265 - 0.0035 * tick / 150.0, 0.0, kTilt));
+  for (int tick = 1; tick <= 150; ++tick) step(placed(0.0265 - 0.0035 * tick / 150.0, 0.0, kLean));
   for (int tick = 1; tick <= kTurns * kTurnTicks; ++tick) {
     const double turns = static_cast<double>(tick) / kTurnTicks;
-    step(placed(kTop - kPress - kPitch * turns, -kTurn * turns, kTilt * std::max(1.0 - turns, 0.0)));
+    step(placed(kTop - kPress - kPitch * turns, -kTurn * turns, kLean * std::max(1.0 - turns, 0.0)));
     if (turns < kTurns - 1) continue;
     // at the pose of the files, with no turn, the threads are a whole number of pitches apart
     const double off_thread = std::remainder(lift() + kPitch * turns, kPitch);

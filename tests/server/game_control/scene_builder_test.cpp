@@ -18,10 +18,12 @@ using test::with;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 
-ScenarioFile parsed(const std::string& text) { return parseScenario(text, "small/scenario.yaml").value(); }
+ScenarioFile parsedScenario(const std::string& text) {
+  return parseScenario(text, "small/scenario.yaml").value();
+}
 
 TEST(SceneBuilder, TheSmallerObjectIsThePointshellSide) {
-  const ScenarioFile scenario = parsed(test::smallScenario());
+  const ScenarioFile scenario = parsedScenario(test::smallScenario());
   const auto scene = makeScene(scenario, test::smallStructures());
   ASSERT_TRUE(scene) << scene.error().what;
   ASSERT_EQ((*scene)->pairs.size(), scenario.pairs.size());
@@ -39,7 +41,7 @@ TEST(SceneBuilder, APairHasItsOwnFriction) {
   const std::string text =
       test::with(test::smallScenario(),
                  "pairs:", "pairs:\n  - {between: [pointer, bay], friction: 0.4, sliding_friction: 0.3}");
-  const auto scene = makeScene(parsed(text), test::smallStructures());
+  const auto scene = makeScene(parsedScenario(text), test::smallStructures());
   ASSERT_TRUE(scene) << scene.error().what;
   const auto pair = [&](const char* a, const char* b) {
     const int number = (*scene)->pairOf((*scene)->objectNamed(a), (*scene)->objectNamed(b));
@@ -54,7 +56,7 @@ TEST(SceneBuilder, APairHasItsOwnFriction) {
 //   the bay is a solid: nothing of it is thickened, but its edges are uncertain by a fifth of a voxel
 TEST(SceneBuilder, ASolidResolvesAClearanceOfFourFifthsOfAVoxel) {
   const auto withClearance = [](const char* clearance) {
-    return makeScene(parsed(test::with(
+    return makeScene(parsedScenario(test::with(
                          test::smallScenario(), "pairs:",
                          std::string("pairs:\n  - {between: [pointer, bay], clearance: ") + clearance + "}")),
                      test::smallStructures());
@@ -73,7 +75,8 @@ TEST(SceneBuilder, AThinWallResolvesAClearanceOfFourTimesItsDilation) {
   const auto withClearance = [](const char* clearance) {
     auto structures = test::smallStructures();
     structures[0] = test::dilated(structures[0], 0.0006);
-    return makeScene(parsed(test::with(test::smallScenario(), "clearance: 4 mm", clearance)), structures);
+    return makeScene(parsedScenario(test::with(test::smallScenario(), "clearance: 4 mm", clearance)),
+                     structures);
   };
   const auto refused = withClearance("clearance: 2.3 mm");
   ASSERT_FALSE(refused);
@@ -90,7 +93,7 @@ TEST(SceneBuilder, AHintNamesARefinementOnlyWhereAFinerOneIsLeft) {
     structures[0] = test::dilated(structures[0], 0.0006);
     std::string text = test::with(test::smallScenario(), "clearance: 4 mm", "clearance: 2.3 mm");
     text = test::with(text, "voxel: 1 mm, refinement: 4", "voxel: 1 mm, refinement: " + refinement);
-    const auto scene = makeScene(parsed(text), structures);
+    const auto scene = makeScene(parsedScenario(text), structures);
     return scene ? std::string() : scene.error().what;
   };
   EXPECT_THAT(hint("4"), EndsWith("; use voxel 0.95 mm or refinement 8"));
@@ -111,7 +114,7 @@ TEST(SceneBuilder, InAChainWhatIsMountedFirstIsRefinedWhereTheOtherOneComes) {
     target: {at: [0, 0, 20 mm]}
     approach: {direction: [0, 0, -1], distance: 50 mm}
 )";
-  const ScenarioFile scenario = parsed(text);
+  const ScenarioFile scenario = parsedScenario(text);
   const ObjectId lid = scenario.objectNamed("lid");
   const ObjectId part = scenario.objectNamed("part");
   const auto pair = static_cast<std::size_t>(scenario.pairOf(lid, part));
@@ -136,11 +139,11 @@ TEST(SceneBuilder, InAChainWhatIsMountedFirstIsRefinedWhereTheOtherOneComes) {
 TEST(SceneBuilder, RequiresStructuresOfCollidableObjects) {
   auto structures = test::smallStructures();
   structures[1] = nullptr;
-  const auto scene = makeScene(parsed(test::smallScenario()), structures);
+  const auto scene = makeScene(parsedScenario(test::smallScenario()), structures);
   ASSERT_FALSE(scene);
   EXPECT_THAT(scene.error().what, HasSubstr("small/scenario.yaml:4: object 'part' has no haptic structures"));
-  const ScenarioFile displayed_only =
-      parsed(test::with(test::smallScenario(), "kind: assistant", "kind: assistant, collidable: false"));
+  const ScenarioFile displayed_only = parsedScenario(
+      test::with(test::smallScenario(), "kind: assistant", "kind: assistant, collidable: false"));
   structures = test::smallStructures();
   structures[3] = nullptr;
   EXPECT_TRUE(makeScene(displayed_only, structures));
@@ -148,7 +151,7 @@ TEST(SceneBuilder, RequiresStructuresOfCollidableObjects) {
 
 TEST(SceneBuilder, RefusesATargetFarFromAllObjects) {
   const auto scene =
-      makeScene(parsed(test::with(test::smallScenario(), "at: [0, 0, -20 mm]", "at: [0, 4 m, 0]")),
+      makeScene(parsedScenario(test::with(test::smallScenario(), "at: [0, 0, -20 mm]", "at: [0, 4 m, 0]")),
                 test::smallStructures());
   ASSERT_FALSE(scene);
   EXPECT_THAT(scene.error().what, HasSubstr("the target of state 'mount'"));
@@ -157,7 +160,7 @@ TEST(SceneBuilder, RefusesATargetFarFromAllObjects) {
 TEST(SceneBuilder, RefusesPosesOutOfReach) {
   const auto refusal = [](const std::string& from, const std::string& to) {
     const auto scene =
-        makeScene(parsed(test::with(test::smallScenario(), from, to)), test::smallStructures());
+        makeScene(parsedScenario(test::with(test::smallScenario(), from, to)), test::smallStructures());
     return scene ? std::string() : scene.error().what;
   };
   EXPECT_THAT(refusal("at: [0, 0, -20 mm]", "at: [0, 0, -20 m]"),
@@ -176,9 +179,9 @@ TEST(SceneBuilder, APoseIsOutOfReachByTheObjectsCentre) {
   structures[1] = test::boxStructuresAt(p_OC_O, Vector3::Constant(0.04), 0.002, 0.005);
   std::string text = test::with(smallScenario(), "at: [0.2, 0, 0.1]", "at: [-14.8, 0, 0.1]");
   text = test::with(text, "at: [0, 0, -20 mm]", "at: [-15 m, 0, -20 mm]");
-  const auto scene = makeScene(parsed(text), structures);
+  const auto scene = makeScene(parsedScenario(text), structures);
   EXPECT_TRUE(scene) << scene.error().what;
-  EXPECT_FALSE(makeScene(parsed(smallScenario()), structures))
+  EXPECT_FALSE(makeScene(parsedScenario(smallScenario()), structures))
       << "here the origin is in reach, the part is not";
 }
 
@@ -188,7 +191,7 @@ TEST(SceneBuilder, APoseIsOutOfReachByTheObjectsCentre) {
 //   ---+ |    | +---
 //      | +----+ |     target
 TEST(SceneBuilder, RefinesAroundTheTargetAndTheApproach) {
-  const ScenarioFile scenario = parsed(test::smallScenario());
+  const ScenarioFile scenario = parsedScenario(test::smallScenario());
   const auto boxes = refineBoxes(scenario, scenario.objectNamed("bay"), test::smallStructures());
   ASSERT_EQ(boxes.size(), 1U);
   EXPECT_TRUE(boxes[0].contains(Vector3(0.022, 0, -0.04)));
@@ -196,15 +199,15 @@ TEST(SceneBuilder, RefinesAroundTheTargetAndTheApproach) {
   EXPECT_FALSE(boxes[0].contains(Vector3(0.0, 0, 0.065)));
   EXPECT_TRUE(refineBoxes(scenario, scenario.objectNamed("part"), test::smallStructures()).empty());
 
-  const ScenarioFile given =
-      parsed(test::with(test::smallScenario(), "refinement: 4",
-                        "refinement: 4, refine: [{from: [-0.03, -0.03, -0.05], to: [0.03, 0.03, 0]}]"));
+  const ScenarioFile given = parsedScenario(
+      test::with(test::smallScenario(), "refinement: 4",
+                 "refinement: 4, refine: [{from: [-0.03, -0.03, -0.05], to: [0.03, 0.03, 0]}]"));
   EXPECT_EQ(refineBoxes(given, given.objectNamed("bay"), test::smallStructures()).size(), 1U)
       << "a given box at the target replaces the automatic one";
 }
 
 TEST(SceneBuilder, BakesPartsBeforeTheObjectsTheyAreMountedInto) {
-  const ScenarioFile scenario = parsed(test::smallScenario());
+  const ScenarioFile scenario = parsedScenario(test::smallScenario());
   const std::vector<ObjectId> order = bakeOrder(scenario);
   ASSERT_EQ(order.size(), 4U);
   const auto position = [&](const std::string& name) {

@@ -14,7 +14,7 @@ using ::testing::HasSubstr;
 constexpr HandId kRight{0};
 constexpr ObjectId kBay{0}, kPart{1};
 
-Result<ScenarioFile> parsed(const std::string& text, const ReadOptions& options) {
+Result<ScenarioFile> parsedWith(const std::string& text, const ReadOptions& options) {
   return parseScenario(text, "small/scenario.yaml", options);
 }
 
@@ -25,21 +25,21 @@ std::string withoutStates() {
 }
 
 TEST(ScriptedScenario, AnObjectThatIsTakenHasPairsAlthoughNoStateMovesIt) {
-  const auto untaken = parsed(withoutStates(), {.needs_states = false});
+  const auto untaken = parsedWith(withoutStates(), {.needs_states = false});
   ASSERT_FALSE(untaken);
   EXPECT_THAT(untaken.error().what, HasSubstr("small/scenario.yaml:11: 'between' of a pair: "));
   EXPECT_THAT(untaken.error().what, HasSubstr("never collide"));
 
-  const auto taken = parsed(withoutStates(), {.taken = {{kRight, kPart}}, .needs_states = false});
+  const auto taken = parsedWith(withoutStates(), {.taken = {{kRight, kPart}}, .needs_states = false});
   ASSERT_TRUE(taken) << taken.error().what;
   ASSERT_GE(taken->pairOf(kPart, kBay), 0);
   EXPECT_EQ(taken->pairs[static_cast<std::size_t>(taken->pairOf(kPart, kBay))].clearance, 4e-3);
 }
 
 TEST(ScriptedScenario, AScenarioWithoutStatesHasOneThatOnlyACommandEnds) {
-  EXPECT_THAT(parsed(withoutStates(), {.taken = {{kRight, kPart}}}).error().what, HasSubstr("'states'"))
+  EXPECT_THAT(parsedWith(withoutStates(), {.taken = {{kRight, kPart}}}).error().what, HasSubstr("'states'"))
       << "people need states";
-  const auto scenario = parsed(withoutStates(), {.taken = {{kRight, kPart}}, .needs_states = false});
+  const auto scenario = parsedWith(withoutStates(), {.taken = {{kRight, kPart}}, .needs_states = false});
   ASSERT_TRUE(scenario) << scenario.error().what;
   ASSERT_EQ(scenario->states.size(), 1U);
   const ScenarioState& state = scenario->states[0];
@@ -54,8 +54,8 @@ TEST(ScriptedScenario, AScenarioWithoutStatesHasOneThatOnlyACommandEnds) {
 TEST(ScriptedScenario, StatesOfTheFileAreReadAndAHandThatTakesTheObjectCanReachItsTarget) {
   // neither a state nor a hand of its own gives the part to a hand
   const std::string text = test::with(test::smallScenario(), "    hands: {right: part}\n", "");
-  EXPECT_THAT(parsed(text, {.needs_states = false}).error().what, HasSubstr("no hand moves 'part'"));
-  const auto scenario = parsed(text, {.taken = {{kRight, kPart}}, .needs_states = false});
+  EXPECT_THAT(parsedWith(text, {.needs_states = false}).error().what, HasSubstr("no hand moves 'part'"));
+  const auto scenario = parsedWith(text, {.taken = {{kRight, kPart}}, .needs_states = false});
   ASSERT_TRUE(scenario) << scenario.error().what;
   ASSERT_EQ(scenario->states.size(), 2U);
   EXPECT_EQ(scenario->states[0].conditions[1].object, scenario->objectNamed("pointer"))
@@ -65,7 +65,7 @@ TEST(ScriptedScenario, StatesOfTheFileAreReadAndAHandThatTakesTheObjectCanReachI
 }
 
 TEST(ScriptedScenario, NamesAloneAreReadOfAScenarioWhosePairsDependOnWhatIsTaken) {
-  const auto names = parsed(withoutStates(), {.only_names = true});
+  const auto names = parsedWith(withoutStates(), {.only_names = true});
   ASSERT_TRUE(names) << names.error().what;
   EXPECT_EQ(names->objectNamed("part"), kPart);
   EXPECT_EQ(names->handNamed("right"), kRight);
@@ -74,9 +74,9 @@ TEST(ScriptedScenario, NamesAloneAreReadOfAScenarioWhosePairsDependOnWhatIsTaken
 
 TEST(ScriptedScenario, UnknownIdsOfTakenObjectsAreIgnored) {
   const auto scenario =
-      parsed(test::smallScenario(), {.taken = {{kRight, ObjectId{99}}, {HandId{9}, kPart}, {{}, {}}}});
+      parsedWith(test::smallScenario(), {.taken = {{kRight, ObjectId{99}}, {HandId{9}, kPart}, {{}, {}}}});
   ASSERT_TRUE(scenario) << scenario.error().what;
-  EXPECT_EQ(scenario->pairs.size(), parsed(test::smallScenario(), {})->pairs.size());
+  EXPECT_EQ(scenario->pairs.size(), parsedWith(test::smallScenario(), {})->pairs.size());
 }
 
 }  // namespace

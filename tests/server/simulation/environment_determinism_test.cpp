@@ -11,7 +11,7 @@
 namespace tenon::simulation {
 namespace {
 
-constexpr Tick kTicks = 3000;  // until all inputs of the busy scene have been made
+constexpr Tick kTicksOfScene = 3000;  // until all inputs of the busy scene have been made
 
 EnvironmentOptions withWorkers(unsigned workers) {
   EnvironmentOptions options;
@@ -40,7 +40,7 @@ void expectBitEqualForAnyNumberOfWorkers(Tick ticks) {
 }
 
 TEST(EnvironmentDeterminism, IsBitEqualForOneTwoAndFourWorkers) {
-  expectBitEqualForAnyNumberOfWorkers(kTicks);
+  expectBitEqualForAnyNumberOfWorkers(kTicksOfScene);
 }
 TEST(EnvironmentDeterminismNightly, IsBitEqualForOneTwoAndFourWorkers) {
   expectBitEqualForAnyNumberOfWorkers(10'000);
@@ -52,7 +52,7 @@ TEST(EnvironmentDeterminism, TheSceneHasContactsAndSkippedPairs) {
   int contact_ticks = 0;
   int skipped = 0;
   bool capped_load = true;
-  while (environment.tick() < kTicks) {
+  while (environment.tick() < kTicksOfScene) {
     busy.play(environment, environment.tick() + 1);
     contact_ticks += environment.objects()[busy.parts[0].value].in_contact ? 1 : 0;
     skipped += static_cast<int>(environment.work().active_pairs - environment.work().queried_pairs);
@@ -60,7 +60,7 @@ TEST(EnvironmentDeterminism, TheSceneHasContactsAndSkippedPairs) {
     for (const ObjectMotion& object : environment.objects()) ASSERT_TRUE(object.X_WO.isFinite());
   }
   EXPECT_GT(contact_ticks, 200);
-  EXPECT_GT(skipped, 20 * static_cast<int>(kTicks)) << "most pairs are far apart most of the time";
+  EXPECT_GT(skipped, 20 * static_cast<int>(kTicksOfScene)) << "most pairs are far apart most of the time";
   EXPECT_TRUE(capped_load);
 }
 
@@ -74,7 +74,7 @@ TEST(EnvironmentDeterminism, TheSceneHasCrossingsOfEdgesBeforeAndAfterTheCheckpo
   const auto scratch = std::make_unique<collision::FeatureScratch>();
   const auto found = std::make_unique<collision::PairQueryResult>();
   std::array<int, 2> active{}, dormant{};  // ticks: before and after the checkpoint
-  while (environment.tick() < kTicks) {
+  while (environment.tick() < kTicksOfScene) {
     busy.play(environment, environment.tick() + 1);
     const ObjectMotion& motion = environment.objects()[busy.bar.value];
     if (!motion.in_contact) continue;
@@ -102,7 +102,7 @@ TEST(EnvironmentDeterminism, CoherenceNeverMissesAContact) {
   every_pair.coherence = false;
   Environment skipping(busy.scene, {});
   Environment querying(busy.scene, every_pair);
-  while (skipping.tick() < kTicks) {
+  while (skipping.tick() < kTicksOfScene) {
     busy.play(skipping, skipping.tick() + 1);
     busy.play(querying, querying.tick() + 1);
     for (std::size_t i = 0; i < skipping.objects().size(); ++i) {

@@ -14,14 +14,14 @@ using test::activateHand;
 using test::moveHandTo;
 using test::stepTicks;
 
-constexpr double kG = 9.81;
-constexpr double kMass = 0.4;
-const Vector3 kSize(0.06, 0.05, 0.04);
+constexpr double kGravity = 9.81;
+constexpr double kPartMass = 0.4;
+const Vector3 kPartSize(0.06, 0.05, 0.04);
 
 //   hand o->[  box  ]   without gravity; the hand pushes it away
 TEST(FreeBodyAndHand, TheImpulseOnTheHandIsTheMomentumOfTheBody) {
   test::SmallScene small;
-  const ObjectId box = small.freeBox("box", kSize, kMass, Vector3::Zero(), true);
+  const ObjectId box = small.freeBox("box", kPartSize, kPartMass, Vector3::Zero(), true);
   const ObjectId pointer = small.object("pointer", test::pointerShape(), {-0.1, 0.0, 0.0});
   const HandId hand = small.hand("hand", pointer);
   small.pair(pointer, box);
@@ -37,7 +37,7 @@ TEST(FreeBodyAndHand, TheImpulseOnTheHandIsTheMomentumOfTheBody) {
     environment.step();
     impulse -= environment.hands()[hand.value].F_Ho_W.force * kTickSeconds;
   }
-  const Vector3 momentum = kMass * environment.objects()[box.value].V_WO.linear;
+  const Vector3 momentum = kPartMass * environment.objects()[box.value].V_WO.linear;
   EXPECT_GT(momentum.x(), 0.05);
   EXPECT_LE((impulse - momentum).norm(), 0.02 * momentum.norm());
 }
@@ -47,7 +47,7 @@ TEST(FreeBodyAndHand, ABoxPushedAlongTheFloorAcceleratesByForceMinusCoulombFrict
   for (const double friction : {0.0, 0.3}) {
     test::SmallScene small;
     const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
-    const ObjectId box = small.freeBox("box", kSize, kMass, {-0.1, 0.0, 0.5 * kSize.z()});
+    const ObjectId box = small.freeBox("box", kPartSize, kPartMass, {-0.1, 0.0, 0.5 * kPartSize.z()});
     small.spec(box).body->friction = friction;
     small.pair(box, ground);
     Environment environment(small.build(), {});
@@ -59,7 +59,7 @@ TEST(FreeBodyAndHand, ABoxPushedAlongTheFloorAcceleratesByForceMinusCoulombFrict
       environment.step();
     }
     const double applied = force * (1.0 - 1.0 / 200.0);
-    const double expected = std::max(applied / kMass - friction * kG, 0.0) * kTicks * kTickSeconds;
+    const double expected = std::max(applied / kPartMass - friction * kGravity, 0.0) * kTicks * kTickSeconds;
     EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.x(), expected, std::max(0.02 * expected, 1e-3))
         << friction;
   }
@@ -71,13 +71,13 @@ TEST(FreeBodyAndHand, ABoxOnASlopeSlidesOrSticksByCoulombFriction) {
   for (const double friction : {0.0, 0.2}) {
     test::SmallScene small;
     const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
-    const ObjectId box = small.freeBox("box", kSize, kMass, {-0.1, 0.0, 0.5 * kSize.z()});
+    const ObjectId box = small.freeBox("box", kPartSize, kPartMass, {-0.1, 0.0, 0.5 * kPartSize.z()});
     small.spec(box).body->friction = friction;
     small.pair(box, ground);
-    small.gravity({kG * std::sin(angle), 0.0, -kG * std::cos(angle)});
+    small.gravity({kGravity * std::sin(angle), 0.0, -kGravity * std::cos(angle)});
     Environment environment(small.build(), {});
     test::stepTicks(environment, 300);
-    const double expected = std::max(std::sin(angle) - friction * std::cos(angle), 0.0) * kG * 0.3;
+    const double expected = std::max(std::sin(angle) - friction * std::cos(angle), 0.0) * kGravity * 0.3;
     EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.x(), expected, std::max(0.02 * expected, 1e-3))
         << friction;
   }
@@ -88,10 +88,10 @@ TEST(FreeBodyAndHand, ABoxOnASlopeSlidesOrSticksByCoulombFriction) {
 double creepOf(double friction, double slope, double push) {
   test::SmallScene small;
   const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
-  const ObjectId box = small.freeBox("box", kSize, kMass, {-0.1, 0.0, 0.5 * kSize.z()});
+  const ObjectId box = small.freeBox("box", kPartSize, kPartMass, {-0.1, 0.0, 0.5 * kPartSize.z()});
   small.spec(box).body->friction = friction;
   small.pair(box, ground);
-  small.gravity({kG * std::sin(slope), 0.0, -kG * std::cos(slope)});
+  small.gravity({kGravity * std::sin(slope), 0.0, -kGravity * std::cos(slope)});
   Environment environment(small.build(), {});
   const auto x = [&] { return environment.objects()[box.value].X_WO.translation().x(); };
   const auto step = [&](int ticks) {
@@ -110,7 +110,7 @@ double creepOf(double friction, double slope, double push) {
 constexpr double kStill = 1e-6;  // [m/s]
 
 TEST(FreeBodyAndHand, ABoxPushedWithLessThanTheLimitOfFrictionStaysAtRest) {
-  const double limit = 0.6 * kMass * kG;  // [N]
+  const double limit = 0.6 * kPartMass * kGravity;  // [N]
   for (const double part : {0.5, 0.85})
     EXPECT_TRUE(test::knownShortfall(creepOf(0.6, 0.0, part * limit), kStill, 5e-3)) << part;
 }
@@ -128,7 +128,7 @@ TEST(FreeBodyAndHand, ABoxAtTheSpeedCapDoesNotFallThroughAThinSheet) {
     test::SmallScene small;
     const auto sheet = test::sheetStructures(0.2, 0.001, 0.003, offset);
     const ObjectId floor = small.object("sheet", sheet, Vector3::Zero());
-    const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 1.5});
+    const ObjectId box = small.freeBox("box", kPartSize, kPartMass, {0.0, 0.0, 1.5});
     small.pair(box, floor, false, 0.87 * 0.003);
     Environment environment(small.build(), {});
     double fastest = 0.0;
@@ -136,7 +136,7 @@ TEST(FreeBodyAndHand, ABoxAtTheSpeedCapDoesNotFallThroughAThinSheet) {
       environment.step();
       const ObjectMotion& motion = environment.objects()[box.value];
       fastest = std::max(fastest, motion.V_WO.linear.norm());
-      ASSERT_GT(motion.X_WO.translation().z(), 0.5 * kSize.z()) << tick;
+      ASSERT_GT(motion.X_WO.translation().z(), 0.5 * kPartSize.z()) << tick;
     }
     EXPECT_NEAR(fastest, EnvironmentOptions{}.max_free_speed, 0.01);
     EXPECT_TRUE(environment.objects()[box.value].asleep);
@@ -153,7 +153,7 @@ struct BoxInAHand {
   [[nodiscard]] const ObjectMotion& motion() const { return environment.objects()[box.value]; }
 
   test::SmallScene small;
-  ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 1.0});
+  ObjectId box = small.freeBox("box", kPartSize, kPartMass, {0.0, 0.0, 1.0});
   HandId hand = small.hand("hand", small.object("pointer", test::pointerShape(), {-0.1, 0.0, 1.0}));
   Environment environment{small.build(), {}};
 };
@@ -169,7 +169,7 @@ TEST(FreeBodyAndHand, AReleasedBodyKeepsItsVelocityAndFalls) {
   EXPECT_EQ(held.motion().status, ObjectStatus::kFree);
   test::stepTicks(held.environment, 100);
   EXPECT_NEAR(held.motion().V_WO.linear.x(), 0.5, 0.01) << "it keeps the velocity of the hand";
-  EXPECT_NEAR(held.motion().V_WO.linear.z(), -kG * 0.1, 1e-6);
+  EXPECT_NEAR(held.motion().V_WO.linear.z(), -kGravity * 0.1, 1e-6);
 }
 
 TEST(FreeBodyAndHand, AHandThatLeavesDoesNotDropItsBody) {
@@ -187,12 +187,12 @@ TEST(FreeBodyAndHand, ABodyReleasedFromAnAbsentHandFalls) {
   held.environment.release(held.hand);
   EXPECT_EQ(held.motion().status, ObjectStatus::kFree);
   test::stepTicks(held.environment, 100);
-  EXPECT_NEAR(held.motion().V_WO.linear.z(), -kG * 0.1, 1e-6);
+  EXPECT_NEAR(held.motion().V_WO.linear.z(), -kGravity * 0.1, 1e-6);
 }
 
 TEST(FreeBodyAndHand, AfterAPauseAFreeBodyFallsFromRest) {
   test::SmallScene small;
-  const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 1.0});
+  const ObjectId box = small.freeBox("box", kPartSize, kPartMass, {0.0, 0.0, 1.0});
   const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
   small.pair(box, ground);
   Environment environment(small.build(), {});
@@ -208,15 +208,15 @@ TEST(FreeBodyAndHand, AfterAPauseAFreeBodyFallsFromRest) {
   EXPECT_EQ(other.objects()[box.value].X_WO, X_WB) << "the pause is restored too";
   environment.setFreeBodiesPaused(false);
   test::stepTicks(environment, 100);
-  EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.z(), -kG * 0.1, 1e-6);
+  EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.z(), -kGravity * 0.1, 1e-6);
   test::stepTicks(environment, 1000);
-  EXPECT_NEAR(environment.objects()[box.value].X_WO.translation().z(), 0.5 * kSize.z(), 5e-5);
+  EXPECT_NEAR(environment.objects()[box.value].X_WO.translation().z(), 0.5 * kPartSize.z(), 5e-5);
 }
 
 TEST(FreeBodyAndHand, ASleepingBodyStaysWhenAHandPushesAtItDuringAPause) {
   test::SmallScene small;
-  const double height = 0.5 * kSize.z();
-  const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, height + 1e-4});
+  const double height = 0.5 * kPartSize.z();
+  const ObjectId box = small.freeBox("box", kPartSize, kPartMass, {0.0, 0.0, height + 1e-4});
   const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
   const ObjectId pointer = small.object("pointer", test::pointerShape(), {-0.2, 0.0, height});
   const HandId hand = small.hand("hand", pointer);
@@ -239,7 +239,7 @@ TEST(FreeBodyAndHand, ASleepingBodyStaysWhenAHandPushesAtItDuringAPause) {
 TEST(FreeBodyAndHand, ABodyFallsWhenItJoinsTheGroupOfItsSupport) {
   test::SmallScene small;
   const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
-  const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 0.5 * kSize.z() + 1e-4});
+  const ObjectId box = small.freeBox("box", kPartSize, kPartMass, {0.0, 0.0, 0.5 * kPartSize.z() + 1e-4});
   small.pair(box, ground);
   Environment environment(small.build(), {});
   test::stepTicks(environment, 300);
@@ -247,13 +247,13 @@ TEST(FreeBodyAndHand, ABodyFallsWhenItJoinsTheGroupOfItsSupport) {
   environment.setGroup(ground, 3);
   environment.setGroup(box, 3);
   test::stepTicks(environment, 100);
-  EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.z(), -kG * 0.1, 1e-6);
+  EXPECT_NEAR(environment.objects()[box.value].V_WO.linear.z(), -kGravity * 0.1, 1e-6);
 }
 
 TEST(FreeBodyAndHand, ABodyPlacedInsideTheFloorGainsNoEnergy) {
   test::SmallScene small;
   const ObjectId ground = small.object("ground", test::floorShape(), Vector3::Zero());
-  const ObjectId box = small.freeBox("box", kSize, kMass, {0.0, 0.0, 0.5 * kSize.z() - 0.004});
+  const ObjectId box = small.freeBox("box", kPartSize, kPartMass, {0.0, 0.0, 0.5 * kPartSize.z() - 0.004});
   small.pair(box, ground);
   Environment environment(small.build(), {});
   double highest = 0.0;
@@ -261,7 +261,7 @@ TEST(FreeBodyAndHand, ABodyPlacedInsideTheFloorGainsNoEnergy) {
     environment.step();
     highest = std::max(highest, environment.objects()[box.value].X_WO.translation().z());
   }
-  EXPECT_LE(highest, 0.5 * kSize.z() + 1e-4);
+  EXPECT_LE(highest, 0.5 * kPartSize.z() + 1e-4);
 }
 
 TEST(FreeBodyAndHand, AnObjectWithoutMassIsNeverFree) {

@@ -14,7 +14,7 @@ using test::moveHandTo;
 using test::stepTicks;
 
 constexpr double kEdge = 0.05;
-constexpr double kMass = 0.4;
+constexpr double kBoxMass = 0.4;
 
 //   [2]
 //   [1]        three boxes with gaps of 0.1 mm; a pointer that can push them
@@ -25,7 +25,7 @@ class StackTest : public testing::Test {
   StackTest() {
     const ObjectId ground = small_.object("ground", test::floorShape(), Vector3::Zero());
     for (int i = 0; i < 3; ++i) {
-      boxes_[i] = small_.freeBox("box" + std::to_string(i), Vector3::Constant(kEdge), kMass,
+      boxes_[i] = small_.freeBox("box" + std::to_string(i), Vector3::Constant(kEdge), kBoxMass,
                                  {0.002 * i, 0.001 * i, (i + 0.5) * kEdge + 1e-4 * (i + 1)});
       small_.pair(boxes_[i], ground);
       small_.spec(boxes_[i]).body->friction = 0.4;
@@ -94,7 +94,7 @@ TEST_F(StackTest, ContactForcesInAStackBalanceTheWeights) {
     PairContact contact;
     const int pair = environment_->scene().pairOf(boxes_[i], i == 0 ? ObjectId{0} : boxes_[i - 1]);
     environment_->pairContact(static_cast<std::size_t>(pair), contact);
-    EXPECT_NEAR(contact.F_Ao_W.force.z(), (3 - i) * kMass * 9.81, 0.02 * kMass * 9.81) << i;
+    EXPECT_NEAR(contact.F_Ao_W.force.z(), (3 - i) * kBoxMass * 9.81, 0.02 * kBoxMass * 9.81) << i;
     EXPECT_NEAR(environment_->forceOn(boxes_[i]).force.norm(), 0.0, 0.05) << "weight and contacts cancel";
   }
 }

@@ -7,7 +7,7 @@
 namespace tenon::simulation {
 namespace {
 
-constexpr Tick kTicks = 600;
+constexpr Tick kTicksOfBodies = 600;
 
 /// State hashes of ten cubes, three of them moved by hands. Independent of the processor, its vector
 /// instructions, the number of workers and the optimisation level.
@@ -27,7 +27,7 @@ TEST(ManyBodies, OnlyNearPairsOfTwoHundredBodiesAreQueried) {
   const test::ManyBodies bodies(200, 4);
   Environment environment(bodies.scene, {});
   std::uint32_t queries = 0;
-  while (environment.tick() < kTicks) {
+  while (environment.tick() < kTicksOfBodies) {
     bodies.step(environment);
     if (environment.tick() < 100) continue;
     queries = std::max(queries, environment.work().queried_pairs);
@@ -44,18 +44,18 @@ TEST(ManyBodies, OnlyNearPairsOfTwoHundredBodiesAreQueried) {
 TEST(ManyBodies, AreBitEqualForAnyNumberOfWorkersAndAfterARestore) {
   const test::ManyBodies bodies(50, 10, 0.06);
   Environment one(bodies.scene, {});
-  const auto start = hashes(one, bodies, kTicks / 2);
+  const auto start = hashes(one, bodies, kTicksOfBodies / 2);
   const std::vector<std::uint8_t> bytes = one.save();
-  const auto rest = hashes(one, bodies, kTicks);
+  const auto rest = hashes(one, bodies, kTicksOfBodies);
   for (const unsigned workers : {2U, 4U}) {
     EnvironmentOptions options;
     options.workers = workers;
     Environment many(bodies.scene, options);
-    EXPECT_EQ(hashes(many, bodies, kTicks / 2), start) << workers << " workers";
+    EXPECT_EQ(hashes(many, bodies, kTicksOfBodies / 2), start) << workers << " workers";
     EXPECT_EQ(many.save(), bytes);
     Environment restored(bodies.scene, options);
     ASSERT_TRUE(restored.restore(bytes));
-    EXPECT_EQ(hashes(restored, bodies, kTicks), rest) << workers << " workers";
+    EXPECT_EQ(hashes(restored, bodies, kTicksOfBodies), rest) << workers << " workers";
   }
 }
 

@@ -11,7 +11,7 @@
 namespace tenon::simulation {
 namespace {
 
-constexpr Tick kTicks = 600;
+constexpr Tick kTicksOfOverload = 600;
 constexpr int kBlocks = 6;
 constexpr std::uint64_t kBudget = 20'000;
 
@@ -24,7 +24,7 @@ EnvironmentOptions withBudget(std::uint64_t points) {
 /// [points] of each tick once all blocks lie on the floor, in ascending order.
 std::vector<std::uint64_t> workOf(const test::Overload& overload, Environment& environment) {
   std::vector<std::uint64_t> work;
-  while (environment.tick() < kTicks) {
+  while (environment.tick() < kTicksOfOverload) {
     overload.step(environment);
     if (environment.tick() > 100) work.push_back(environment.work().points_visited);
   }
@@ -49,7 +49,7 @@ TEST(Overload, BlocksWithSkippedLevelsStayOnTheFloorAndFollowTheirHands) {
   const test::Overload overload(kBlocks);
   Environment unlimited(overload.scene, {});
   Environment limited(overload.scene, withBudget(kBudget));
-  while (limited.tick() < kTicks) {
+  while (limited.tick() < kTicksOfOverload) {
     overload.step(unlimited);
     overload.step(limited);
     if (limited.tick() < 100) continue;
@@ -108,7 +108,7 @@ TEST(Overload, AGovernedRunIsReproducedFromItsBudgetsWithoutAClock) {
     Environment environment(overload.scene, {});
     Governor governor(0.7e-3);
     std::uint64_t noise = 1;
-    while (environment.tick() < kTicks) {
+    while (environment.tick() < kTicksOfOverload) {
       overload.step(environment);
       hashes.push_back(environment.hash());
       noise = noise * 6364136223846793005ULL + 1442695040888963407ULL;
@@ -126,7 +126,7 @@ TEST(Overload, AGovernedRunIsReproducedFromItsBudgetsWithoutAClock) {
   two.workers = 2;
   Environment again(overload.scene, two);
   std::vector<std::uint64_t> hashes_again;
-  while (again.tick() < kTicks) {
+  while (again.tick() < kTicksOfOverload) {
     if (const auto budget = budgets.find(again.tick() + 1); budget != budgets.end())
       again.setBudget(budget->second);
     overload.step(again);
