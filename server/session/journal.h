@@ -17,7 +17,7 @@ namespace tenon::session {
 
 inline constexpr Tick kCheckpointEvery = 1000;           // [ticks]
 inline constexpr std::int64_t kJournalTick = 1'000'000;  // [ns] of log time
-inline constexpr Tick kKeptForRecorders = 4096;          // [ticks] for those that join late or come back
+inline constexpr Tick kKeptForRecorders = 16384;         // [ticks] for those that join late or come back
 
 /// Whether the journal entry of this tick has a checkpoint.
 [[nodiscard]] constexpr bool hasCheckpoint(Tick tick) { return tick % kCheckpointEvery == 1; }

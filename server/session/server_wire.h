@@ -82,7 +82,8 @@ class ServerWire {
   void statePublished();
   /// Waits until all readers have what was written to them reliably, for up to `timeout`.
   void waitForReaders(std::chrono::nanoseconds timeout);
-  /// To recorders, also to those that join up to 4096 entries later; only with `publish_journal`.
+  /// To recorders, also to those that join up to kKeptForRecorders entries later; only with
+  /// `publish_journal`.
   void send(const JournalEntry& entry);
 
   /// Raises the emergency stop in the server's own name, unless it is engaged.
