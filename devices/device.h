@@ -56,7 +56,10 @@ struct DeviceCaps {
   std::uint32_t tactors = 0;    ///< number of vibration motors
   std::uint32_t dead_man = 0;  ///< bit i: forces need button i, or another one of these, held; 0: they do not
   std::uint32_t arming = 0;    ///< bit i: who presses button i arms the station, as by its return key
-  double grip_range = 0.0;     ///< [m] from closed to open; 0: no gripper
+  /// Bit i: while button i is held the device is decoupled from the scene (de-clutching), to be brought back
+  /// into the middle of its workspace; 0: it has no button for that.
+  std::uint32_t declutch = 0;
+  double grip_range = 0.0;  ///< [m] from closed to open; 0: no gripper
 };
 
 enum class DeviceFault : std::uint8_t {

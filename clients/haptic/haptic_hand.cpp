@@ -105,11 +105,8 @@ void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noex
   if (finishing_) finish_time_ += dt;
   readDevice();
   answers_.step(seq, local_.hasManifold() ? local_.manifold().answers_seq : 0, dt);
-  // a device without forces may rest at the end of its workspace, where indexing would not end
-  const bool hold =
-      in_contact_ || !permitted_ || !device_state_.forces_on || rendering_ == Rendering::kAnchoring;
-  workspace_.step(device_state_.X_DH.translation(), hold, dt);
-  anchor(seq, world);
+  moveWorkspace(dt);
+  if (!declutched_) anchor(seq, world);
   const Pose X_WH = workspace_.toWorld(device_state_.X_DH);
   const Twist V_WH{device_state_.V_DH.linear + workspace_.velocity(), device_state_.V_DH.angular};
 
@@ -130,6 +127,19 @@ void HapticHand::readDevice() noexcept {
   // the person has looked at it: what it said before does not latch the clutch again
   device_state_.fault = devices::DeviceFault::kNone;
   device_state_.F_Ho_D_measured = {};
+}
+
+void HapticHand::moveWorkspace(double dt) noexcept {
+  const Vector3& p_DH = device_state_.X_DH.translation();
+  declutched_ = (device_state_.buttons & device_.caps().declutch) != 0;
+  if (declutched_) {
+    rendering_ = Rendering::kInterrupted;
+    return workspace_.stepDeclutched(input_.sample.X_WH.translation(), p_DH, device_state_.V_DH.linear);
+  }
+  // a device without forces may rest at the end of its workspace, where indexing would not end
+  const bool hold =
+      in_contact_ || !permitted_ || !device_state_.forces_on || rendering_ == Rendering::kAnchoring;
+  workspace_.step(p_DH, hold, dt);
 }
 
 bool HapticHand::deadManHeld() const noexcept {

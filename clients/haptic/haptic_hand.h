@@ -43,6 +43,9 @@ struct HandEvents {
 /// start of the layer ramps the force. So no stretch of position that came about while nobody looked is
 /// displayed, and nothing in the scene jumps; one of rotation stays, and its torque ramps.
 ///
+/// While the person holds a button that de-clutches (DeviceCaps::declutch) the hand keeps its place in the
+/// scene and the device moves alone, without force; its release ends a gap.
+///
 /// Threads: one; armDevice by another one, beside it. Real-time: step, receive, permitForces.
 class HapticHand {
  public:
@@ -105,6 +108,8 @@ class HapticHand {
     kOn,
   };
   void readDevice() noexcept;
+  /// `dt` [s].
+  void moveWorkspace(double dt) noexcept;
   /// Decides rendering_ before the local model's step, and re-anchors the hand.
   void anchor(std::uint32_t seq, const WorldView& world) noexcept;
   /// `dt` [s].
@@ -135,6 +140,7 @@ class HapticHand {
   bool stale_ = false;
   bool in_contact_ = false;
   bool guided_ = false;
+  bool declutched_ = false;
   bool permitted_ = true;
   bool finishing_ = false;
   bool finish_disarms_ = false;

@@ -44,6 +44,13 @@ void Workspace::shift(const Vector3& p_CC_W) noexcept {
   free_ticks_ = 0;
 }
 
+void Workspace::stepDeclutched(const Vector3& p_WH, const Vector3& p_DH, const Vector3& v_DH) noexcept {
+  setCentre(p_WH - p_DH);
+  free_ticks_ = 0;
+  v_WC_ = -v_DH;
+  moving_ = true;
+}
+
 void Workspace::step(const Vector3& p_DH, bool in_contact, double dt) noexcept {
   dt = std::min(dt, kLongestStep);
   const Vector3 before = p_WC_;

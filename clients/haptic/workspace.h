@@ -18,7 +18,8 @@ struct WorkspaceOptions {
 ///
 /// Indexing by eq. 1 moves it while the hand is outside the sphere of radius r_w; moveTo() moves it to a
 /// given position on a minimum-jerk path. Both pause while the hand's object is in contact, because a contact
-/// would move with the workspace. The axes of D are parallel to W; the scale is 1.
+/// would move with the workspace; stepDeclutched() moves it there too, since it leaves the hand in place. The
+/// axes of D are parallel to W; the scale is 1.
 ///
 /// shift() re-anchors the hand: what it adds is part of C_w, so everybody who knows C_w or the hand's pose
 /// agrees, and decays as slowly as the workspace moves, out of contact alone.
@@ -41,6 +42,10 @@ class Workspace {
 
   /// One cycle of `dt` [s] with the hand at p_DH. Contact stops the motion at once.
   void step(const Vector3& p_DH, bool in_contact, double dt) noexcept;
+  /// One cycle while the person de-clutches: C_w moves against the device, so that the hand, which has the
+  /// velocity v_DH there, stays at p_WH. What the person places so is kept: a moveTo() and the rest of shifts
+  /// end.
+  void stepDeclutched(const Vector3& p_WH, const Vector3& p_DH, const Vector3& v_DH) noexcept;
 
   [[nodiscard]] const Vector3& centre() const noexcept { return p_WC_; }
   /// Velocity of C_w in the last cycle; the hand's velocity in W is the sum of it and the velocity in D.

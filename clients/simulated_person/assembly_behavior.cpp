@@ -178,6 +178,7 @@ void AssemblyBehavior::travelTo(const Pose& X_WH_goal, const HandPerception& han
 void AssemblyBehavior::step(const HandPerception& hand, const DelayedPerception& perception,
                             double dt) noexcept {
   phase_time_ += dt;
+  beyond_reach_ = false;
   const double against = -hand.F_Ho_W.force.dot(axis_W_);
   reaction_ += dt / (0.03 + dt) * (against - reaction_);
   transition_ = decayed(transition_, dt, 0.3);
@@ -210,6 +211,30 @@ void AssemblyBehavior::step(const HandPerception& hand, const DelayedPerception&
   }
 }
 
+void AssemblyBehavior::resume(const HandPerception& hand, const DelayedPerception& perception) noexcept {
+  reaction_ = 0.0;
+  idle_time_ = 0.0;
+  obstructed_time_ = 0.0;
+  const double perceived = perceivedDepth(perception);
+  switch (phase_) {
+    case Phase::kInsert:
+    case Phase::kSearch:
+    case Phase::kRetract:
+    case Phase::kSeated:
+      // a push starts anew from where the object is
+      depth_ = std::min(depth_, perceived);
+      stall_detector_.start(perceived);
+      break;
+    case Phase::kTouch:
+      depth_ =
+          std::min(depth_, (hand.X_WH.translation() - reach_controller_.pose().translation()).dot(axis_W_));
+      break;
+    default:
+      reach_controller_.start(hand.X_WH);
+      break;
+  }
+}
+
 /// After the server has taken a mounted object from the hand: the intended pose becomes the actual one, so
 /// that no force is left; the withdrawal is noted.
 void AssemblyBehavior::releaseMounted(const HandPerception& hand) noexcept {
@@ -226,7 +251,7 @@ void AssemblyBehavior::travel(const HandPerception& hand, double dt) noexcept {
   const bool withdrawing = withdrawing_ && next_waypoint_ == 0;
   const Pose X_WG(path_[next_waypoint_], withdrawing ? q_WDepart_ : q_WTravel_);
   reach_controller_.step(X_WG, person_.max_speed, person_.max_turn_speed, dt);
-  reach_controller_.stayWithin(hand.p_WC, hand.reach);
+  beyond_reach_ = reach_controller_.stayWithin(hand.p_WC, hand.reach);
   setIntended(reach_controller_.pose(), dt);
 
   // obstructed for 0.4 s: a new path, up first
@@ -286,7 +311,7 @@ void AssemblyBehavior::align(const HandPerception& hand, const DelayedPerception
   Pose X_WStart = X_WAim_;
   X_WStart.translation() -= axis_W_ * task_.approach_distance;
   reach_controller_.step(X_WStart * hand.X_HO.inverse(), person_.max_speed, person_.max_turn_speed, dt);
-  reach_controller_.stayWithin(hand.p_WC, hand.reach);
+  beyond_reach_ = reach_controller_.stayWithin(hand.p_WC, hand.reach);
   setIntended(displaced(reach_controller_.pose(), visual_correction_), dt);
   if (!perception.knows(task_.object)) return;
 
@@ -468,7 +493,7 @@ void AssemblyBehavior::intendObjectPose(const HandPerception& hand, const Vector
   const Pose X_WO(p_WCentre - q_WO * task_.centre, q_WO);
   const Pose X_WH = displaced(displaced(X_WO * hand.X_HO.inverse(), visual_correction_), transition_);
   reach_controller_.start(X_WH);
-  reach_controller_.stayWithin(hand.p_WC, hand.reach);
+  beyond_reach_ = reach_controller_.stayWithin(hand.p_WC, hand.reach);
   setIntended(reach_controller_.pose(), dt);
 }
 

@@ -59,9 +59,14 @@ class AssemblyBehavior {
   /// Advances by `dt` [s].
   void step(const HandPerception& hand, const DelayedPerception& perception, double dt) noexcept;
 
+  /// Goes on after an interruption in which the device was brought elsewhere and the hand was re-anchored.
+  void resume(const HandPerception& hand, const DelayedPerception& perception) noexcept;
+
   /// X_WI, the pose that the arm is to move the hand to.
   [[nodiscard]] const Pose& intendedPose() const noexcept { return X_WI_; }
   [[nodiscard]] const Twist& intendedVelocity() const noexcept { return intended_velocity_; }
+  /// The hand was wanted beyond the reach of its device in the last step.
+  [[nodiscard]] bool beyondReach() const noexcept { return beyond_reach_; }
   /// [-] Co-contraction of the arm, 0 relaxed to 1 braced.
   [[nodiscard]] double contraction() const noexcept;
   /// A word or two for progress output and tests.
@@ -122,6 +127,7 @@ class AssemblyBehavior {
   Pose X_WI_;
   Twist intended_velocity_;
   Pose X_WHome_;
+  bool beyond_reach_ = false;
   ReachController reach_controller_;
   Displacement transition_;  // keeps the intended pose continuous where phases change; decays
   Displacement

@@ -27,6 +27,8 @@ HandPerception perceive(const haptic::HapticHand* hand, double reach) {
   }
   perception.p_WC = hand->input().p_WC;
   perception.reach = reach * hand->caps().workspace_radius;
+  perception.declutches = hand->caps().declutch != 0;
+  perception.indexing = hand->state().indexing;
   return perception;
 }
 
@@ -69,13 +71,21 @@ class TraineeMover final : public haptic::Mover {
   [[nodiscard]] const char* activity() const noexcept override { return person_.activity(); }
 
  private:
-  static void move(haptic::MovedHand& moved, const AssemblyBehavior& behavior, MotorIntent& intent) noexcept {
+  static void move(haptic::MovedHand& moved, const TraineeHand& person, MotorIntent& intent) noexcept {
     if (moved.hand == nullptr) return;
     const haptic::Workspace& workspace = moved.hand->workspace();
+    const AssemblyBehavior& behavior = person.behavior;
+    const Declutching& declutching = person.declutching;
     const Twist& velocity = behavior.intendedVelocity();
+    moved.intent.contraction = behavior.contraction();
+    moved.intent.buttons = declutching.presses() ? moved.hand->caps().declutch : 0;
+    if (declutching.busy() && !moved.hand->faulty()) {
+      moved.intent.X_DI = intent.towards(declutching.intendedDevicePose());
+      moved.intent.V_DI = {};
+      return;
+    }
     moved.intent.X_DI = intended(intent, *moved.hand, behavior.intendedPose());
     moved.intent.V_DI = {velocity.linear - workspace.velocity(), velocity.angular};
-    moved.intent.contraction = behavior.contraction();
   }
 
   SimulatedTrainee person_;

@@ -17,6 +17,8 @@ struct HandPerception {
   Pose X_HO;
   Vector3 p_WC = Vector3::Zero();  ///< centre of the device's workspace
   double reach = 0.3;              ///< [m] radius about C within which the hand may be
+  bool declutches = false;         ///< the device has a button that de-clutches it
+  bool indexing = false;           ///< C moves
 };
 
 /// Visual perception with a reaction delay: object poses as they were `delay_ticks` ago.

@@ -24,11 +24,12 @@ void ReachController::step(const Pose& X_WG, double max_speed, double max_turn_s
   X_WH_ = displaced(X_WH_, {dt * velocity_.linear, dt * velocity_.angular});
 }
 
-void ReachController::stayWithin(const Vector3& p_WC, double radius) noexcept {
+bool ReachController::stayWithin(const Vector3& p_WC, double radius) noexcept {
   const Vector3 p_CH = X_WH_.translation() - p_WC;
-  if (const double distance = p_CH.norm(); distance > radius) {
-    X_WH_.translation() = p_WC + p_CH * (radius / distance);
-  }
+  const double distance = p_CH.norm();
+  if (distance <= radius) return false;
+  X_WH_.translation() = p_WC + p_CH * (radius / distance);
+  return true;
 }
 
 }  // namespace tenon::simulated_person

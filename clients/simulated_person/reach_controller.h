@@ -19,8 +19,8 @@ class ReachController {
   /// Advances by `dt` [s] towards the goal X_WG; the command is at most `max_speed` [m/s] and
   /// `max_turn_speed` [rad/s].
   void step(const Pose& X_WG, double max_speed, double max_turn_speed, double dt) noexcept;
-  /// Projects the hand onto the ball of `radius` [m] about p_WC when it is outside.
-  void stayWithin(const Vector3& p_WC, double radius) noexcept;
+  /// Projects the hand onto the ball of `radius` [m] about p_WC; returns whether it was outside.
+  bool stayWithin(const Vector3& p_WC, double radius) noexcept;
 
   [[nodiscard]] const Pose& pose() const noexcept { return X_WH_; }
   /// Of the hand, in W.

@@ -8,6 +8,18 @@ namespace {
 constexpr double kReading = 0.4;  // [s] to read a new instruction
 }  // namespace
 
+void TraineeHand::begin(const Pose& X_WH) noexcept {
+  behavior.begin(X_WH);
+  declutching.reset();
+}
+
+void TraineeHand::step(const HandPerception& hand, const DelayedPerception& perception, double dt) noexcept {
+  const bool was_busy = declutching.busy();
+  if (declutching.step(hand, behavior.beyondReach(), dt)) return;
+  if (was_busy) behavior.resume(hand, perception);
+  behavior.step(hand, perception, dt);
+}
+
 SimulatedTrainee::SimulatedTrainee(const PersonOptions& person)
     : person_(person), right_(person, person.seed * 2 + 1), left_(person, person.seed * 2 + 2) {}
 
@@ -60,8 +72,8 @@ void SimulatedTrainee::step(const HandPerception& right, const HandPerception& l
 
 void SimulatedTrainee::act(const HandPerception& right, const HandPerception& left) noexcept {
   left_works_ = instruction_.hand.valid() && instruction_.hand == left.hand;
-  AssemblyBehavior& worker = left_works_ ? left_ : right_;
-  AssemblyBehavior& other = left_works_ ? right_ : left_;
+  AssemblyBehavior& worker = (left_works_ ? left_ : right_).behavior;
+  AssemblyBehavior& other = (left_works_ ? right_ : left_).behavior;
   const HandPerception& hand = left_works_ ? left : right;
   const HandPerception& rest = left_works_ ? right : left;
   if (!instruction_.active) {
@@ -105,7 +117,8 @@ void SimulatedTrainee::act(const HandPerception& right, const HandPerception& le
 }
 
 const char* SimulatedTrainee::activity() const noexcept {
-  return left_works_ ? left_.activity() : right_.activity();
+  const TraineeHand& worker = left_works_ ? left_ : right_;
+  return worker.declutching.busy() ? "de-clutches" : worker.behavior.activity();
 }
 
 }  // namespace tenon::simulated_person

@@ -4,12 +4,27 @@
 #include <span>
 
 #include "clients/simulated_person/assembly_behavior.h"
+#include "clients/simulated_person/declutching.h"
 #include "clients/simulated_person/path_planner.h"
 #include "clients/simulated_person/perception.h"
 #include "clients/simulated_person/person.h"
 #include "idl/types/messages/steps.h"
 
 namespace tenon::simulated_person {
+
+/// A hand of the simulated trainee: what it does in the scene, and how it keeps its device in reach
+/// meanwhile.
+///
+/// Threads: one. Real-time: step.
+struct TraineeHand {
+  TraineeHand(const PersonOptions& person, std::uint64_t seed) : behavior(person, seed) {}
+  void begin(const Pose& X_WH) noexcept;
+  /// Advances by `dt` [s].
+  void step(const HandPerception& hand, const DelayedPerception& perception, double dt) noexcept;
+
+  AssemblyBehavior behavior;
+  Declutching declutching;
+};
 
 /// Simulated trainee: carries out the active step with the hand it names; the other hand returns to its home
 /// pose.
@@ -30,8 +45,8 @@ class SimulatedTrainee {
   void step(const HandPerception& right, const HandPerception& left, const haptic::WorldView& world,
             double dt) noexcept;
 
-  [[nodiscard]] const AssemblyBehavior& right() const noexcept { return right_; }
-  [[nodiscard]] const AssemblyBehavior& left() const noexcept { return left_; }
+  [[nodiscard]] const TraineeHand& right() const noexcept { return right_; }
+  [[nodiscard]] const TraineeHand& left() const noexcept { return left_; }
   /// What the working hand does, in a word or two: for progress output and tests.
   [[nodiscard]] const char* activity() const noexcept;
 
@@ -55,8 +70,8 @@ class SimulatedTrainee {
   void act(const HandPerception& right, const HandPerception& left) noexcept;
 
   PersonOptions person_;
-  AssemblyBehavior right_;
-  AssemblyBehavior left_;
+  TraineeHand right_;
+  TraineeHand left_;
   PathPlanner planner_;
   DelayedPerception perception_;
   std::span<const SceneObject> objects_;

@@ -20,12 +20,14 @@ SimulatedModel falconModel() {
   // Each of its three motors takes a command of +-4096 counts, and the public driver lets a larger one wrap
   // to the opposite sign. Modelled per Cartesian axis instead of per motor [assumed].
   caps.force_quantum = caps.peak_force / kMaxMotorCounts;
-  caps.max_stiffness = 3000.0;       // [published] CHAI3D; the passivity condition allows less
-  caps.physical_damping = 3.0;       // [assumed]
-  caps.injected_damping = 15.0;      // [assumed] below CHAI3D's maximum, 20 Ns/m
-  caps.delay = 1e-3;                 // [assumed] one frame of USB
-  caps.max_speed = 0.5;              // [assumed] for desktop devices
-  caps.rate = 1000.0;                // [published]
+  caps.max_stiffness = 3000.0;   // [published] CHAI3D; the passivity condition allows less
+  caps.physical_damping = 3.0;   // [assumed]
+  caps.injected_damping = 15.0;  // [assumed] below CHAI3D's maximum, 20 Ns/m
+  caps.delay = 1e-3;             // [assumed] one frame of USB
+  caps.max_speed = 0.5;          // [assumed] for desktop devices
+  caps.rate = 1000.0;            // [published]
+  // [published] one of the four buttons of its grip
+  caps.declutch = SimulatedDevice::kDeclutchButton;
   model.mass = 0.3;                  // [assumed]
   model.friction = 0.6;              // [assumed]
   model.position_resolution = 4e-5;  // [measured] from its kinematics: 29 to 49 um per count

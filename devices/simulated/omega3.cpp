@@ -15,12 +15,14 @@ SimulatedModel omega3Model() {
   caps.continuous_force = 12.0;   // [published]
   caps.peak_force = 12.0;         // [published]
   caps.command_limit = 12.0;
-  caps.force_slew = 500.0;           // [assumed]
-  caps.max_stiffness = 5000.0;       // [published] CHAI3D; the passivity condition allows less
-  caps.physical_damping = 1.0;       // [assumed]
-  caps.injected_damping = 20.0;      // [assumed] below CHAI3D's maximum, 30 Ns/m
-  caps.max_speed = 0.5;              // [assumed] for desktop devices
-  caps.rate = 1000.0;                // [published]
+  caps.force_slew = 500.0;       // [assumed]
+  caps.max_stiffness = 5000.0;   // [published] CHAI3D; the passivity condition allows less
+  caps.physical_damping = 1.0;   // [assumed]
+  caps.injected_damping = 20.0;  // [assumed] below CHAI3D's maximum, 30 Ns/m
+  caps.max_speed = 0.5;          // [assumed] for desktop devices
+  caps.rate = 1000.0;            // [published]
+  // [published] the button of its grip, to be assigned
+  caps.declutch = SimulatedDevice::kDeclutchButton;
   model.mass = 0.2;                  // [assumed]
   model.friction = 0.3;              // [assumed]
   model.position_resolution = 1e-5;  // [published] better than 10 um

@@ -28,13 +28,15 @@ SimulatedModel sigma7Model() {
   caps.injected_rotational_damping = 0.03;  // [assumed] below CHAI3D's maximum, 0.07 Nms/rad
   caps.max_speed = 0.5;                     // [assumed] for desktop devices
   caps.rate = 1000.0;                       // [published] up to 4 kHz
-  model.mass = 0.35;                        // [assumed]
-  model.inertia = 5e-4;                     // [assumed]
-  model.friction = 0.3;                     // [assumed]
-  model.rotational_friction = 5e-3;         // [assumed]
-  model.position_resolution = 1.5e-6;       // [published]
-  model.angle_resolution = 2.27e-4;         // [published] 0.013 degrees
-  model.velocity_window = 20;               // [published] the vendor's default
+  // [assumed] a foot switch
+  caps.declutch = SimulatedDevice::kDeclutchButton;
+  model.mass = 0.35;                   // [assumed]
+  model.inertia = 5e-4;                // [assumed]
+  model.friction = 0.3;                // [assumed]
+  model.rotational_friction = 5e-3;    // [assumed]
+  model.position_resolution = 1.5e-6;  // [published]
+  model.angle_resolution = 2.27e-4;    // [published] 0.013 degrees
+  model.velocity_window = 20;          // [published] the vendor's default
   return model;
 }
 

@@ -57,6 +57,8 @@ class SimulatedDevice : public HapticDevice {
 
   /// Button of the simulated dead man's switch, see addDeadManSwitch().
   static constexpr std::uint32_t kDeadManButton = 1U << 7U;
+  /// The button that de-clutches a desktop device.
+  static constexpr std::uint32_t kDeclutchButton = 1U << 6U;
 
   [[nodiscard]] Result<void> open();
   void close() noexcept;

@@ -92,6 +92,16 @@ class Session(unittest.TestCase):
             self.assertEqual(twice.stderr, f"tenon-report: {stage.out / 'report.html'}: exists; --overwrite replaces it\n")
             self.assertEqual(tenon("report", recording, "-o", stage.out, "--overwrite").returncode, 0)
 
+    # their workspaces have radii of 60, 75 and 40 mm; the hole is 59 mm deep, and indexing pauses in contact
+    def test_a_trainee_with_a_desktop_device_mounts_the_peg(self):
+        for device in ("sigma7-sim", "omega3-sim", "falcon-sim"):
+            with self.subTest(device=device), Stage() as stage:
+                server = stage.serve(SCENARIO, "--wait-for", "right")
+                trainee = stage.start("trainee", "--seed", 1, "--device", device, "--tracker", "none")
+                self.assertEqual(server.wait(), 0, server.text())
+                self.assertIn("everything is mounted", server.text())
+                self.assertEqual(trainee.wait(30), 0, trainee.text())
+
     def test_the_workers_of_a_tick_are_scheduled_as_its_thread(self):
         with Stage(lockstep=False) as stage:
             server = stage.serve(SCENARIO, "--workers", 3)

@@ -118,6 +118,10 @@ INSTANTIATE_TEST_SUITE_P(
              (std::get<2>(one.param) == Target::kInScene ? "msScene" : "msDevice");
     });
 
+std::string nameOf(const testing::TestParamInfo<std::string>& device) {
+  return device.param.substr(0, device.param.find('-'));
+}
+
 class ForceReturnOf : public testing::TestWithParam<std::string> {};
 
 TEST_P(ForceReturnOf, AFreezeIsSoft) {
@@ -190,11 +194,47 @@ TEST_P(ForceReturnOf, AStationThatItselfStoodStillIsSoft) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, ForceReturnOf,
-                         testing::Values("hug-sim", "sigma7-sim", "omega3-sim", "falcon-sim"),
-                         [](const auto& device) {
-                           const std::string& name = device.param;
-                           return name.substr(0, name.find('-'));
-                         });
+                         testing::Values("hug-sim", "sigma7-sim", "omega3-sim", "falcon-sim"), nameOf);
+
+// the person presses, brings the device 20 mm up and releases: the hand in the scene has not moved
+class ForceReturnOfDesktop : public testing::TestWithParam<std::string> {};
+
+TEST_P(ForceReturnOfDesktop, ADeclutchedDeviceMovesAloneAndItsReturnIsSoft) {
+  RestingHand setup(GetParam());
+  const std::uint32_t button = setup.hand.caps().declutch;
+  ASSERT_NE(button, 0U);
+  const Vector3 held = setup.hand.pose().translation();
+  const double centre = setup.hand.workspace().centre().z();
+  const double device = setup.hand.device().X_DH.translation().z();
+  setup.target = Target::kAtDevice;
+  setup.arm().setButtons(button);
+  for (int i = 0; i < 800; ++i) {
+    if (i < 400) setup.p_DI.z() += 5e-5;
+    setup.hold(true);
+    ASSERT_TRUE(setup.hand.input().active) << "the part is held where it is";
+    ASSERT_LT((setup.hand.pose().translation() - held).norm(), 1e-12) << i;
+    ASSERT_EQ(setup.hand.input().sample.V_WH.linear, Vector3::Zero());
+    ASSERT_LE(setup.force(), setup.before + 0.1) << i;
+    if (i > 20) {
+      ASSERT_LT(setup.force(), 0.05) << i << ": a little damping at most";
+    }
+  }
+  const double moved = setup.hand.device().X_DH.translation().z() - device;
+  EXPECT_GT(moved, 0.015);
+  EXPECT_NEAR(setup.hand.workspace().centre().z(), centre - moved, 1e-12);
+  setup.arm().setButtons(0);
+  setup.expectSoftReturn([&] { setup.hold(true); });
+  EXPECT_NEAR(setup.hand.workspace().centre().z(), centre - moved, 0.01)
+      << "but for the stretch of the coupling, by which it is re-anchored";
+  for (int i = 0; i < 1000; ++i) {
+    if (i < 500) setup.p_DI.z() -= 1e-5;
+    setup.hold(true);
+  }
+  EXPECT_GT(setup.force(), 0.5) << "it pushes on from there";
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, ForceReturnOfDesktop,
+                         testing::Values("sigma7-sim", "omega3-sim", "falcon-sim"), nameOf);
 
 TEST(ForceReturnOffset, IsSentAndDecaysOutOfContactAlone) {
   RestingHand setup("sigma7-sim", Target::kAtDevice);

@@ -86,6 +86,25 @@ TEST(Workspace, PausesAMoveInContactAndRestartsItFromRest) {
   EXPECT_LT((workspace.centre() - Vector3(1.0, 0.0, 0.0)).norm(), 1e-12);
 }
 
+//   C_w <--o device     o hand in the scene stays       contact or not
+TEST(Workspace, MovesAgainstADeclutchedDeviceAndKeepsThatPlace) {
+  Workspace workspace({.radius = 0.035, .gain = 10.0});
+  workspace.setCentre(Vector3::Zero());
+  workspace.shift(Vector3(0.0, 0.002, 0.0));
+  const Vector3 p_WH(0.0, 0.002, -0.056);
+  for (int i = 1; i <= 800; ++i) {
+    const Vector3 p_DH(0.0, 0.0, -0.056 + 1e-4 * i);
+    workspace.stepDeclutched(p_WH, p_DH, Vector3(0.0, 0.0, 0.1));
+    ASSERT_LT((workspace.centre() + p_DH - p_WH).norm(), 1e-15);
+    ASSERT_EQ(workspace.velocity().z(), -0.1);
+  }
+  EXPECT_NEAR(workspace.centre().z(), -0.080, 1e-12);
+  EXPECT_EQ(workspace.shifted(), Vector3::Zero()) << "nothing takes back what the person has placed";
+  const Vector3 placed = workspace.centre();
+  for (int i = 0; i < 3000; ++i) workspace.step(Vector3(0.0, 0.0, 0.024), false, kStep);
+  EXPECT_EQ(workspace.centre(), placed);
+}
+
 TEST(Workspace, MapsPosesToTheWorldAndBack) {
   Workspace workspace({});
   workspace.setCentre(Vector3(1.0, 2.0, 3.0));

@@ -1,3 +1,6 @@
+#include <string>
+#include <string_view>
+
 #include <gtest/gtest.h>
 
 #include "clients/station/device_station.h"
@@ -30,6 +33,36 @@ TEST(TraineeStation, ReachesTouchesAndInsertsAPartGuidedByContact) {
     EXPECT_FALSE(server.indexed_in_contact);
   }
 }
+
+// 55 mm between the walls of the guide, where indexing (eq. 1) pauses
+class TraineeWithEach : public testing::TestWithParam<const char*> {};
+
+TEST_P(TraineeWithEach, InsertsAPartDeeperThanTheWorkspaceOfItsDeviceByDeclutching) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    test::FunnelServer server;
+    StationOptions options = defaultStation(Role::kTrainee, {.seed = seed});
+    options.devices = {{.name = GetParam(), .configuration = {}, .opened = {}}};
+    options.tracker.clear();
+    options.tactors.clear();
+    const auto trainee = std::move(*DeviceStation::open(options));
+    server.welcome(*trainee);
+    bool declutched = false;
+    for (int i = 0; i < 120'000 && !server.over; ++i) {
+      server.step(*trainee);
+      declutched = declutched || std::string_view(trainee->activity()) == "de-clutches";
+    }
+    EXPECT_TRUE(server.over) << "seed " << seed << ": " << trainee->activity() << " off by "
+                             << server.error().translation.transpose();
+    EXPECT_TRUE(declutched);
+    EXPECT_LT(server.highest_force, 25.0);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, TraineeWithEach, testing::Values("sigma7-sim", "omega3-sim", "falcon-sim"),
+                         [](const auto& device) {
+                           const std::string name = device.param;
+                           return name.substr(0, name.find('-'));
+                         });
 
 TEST(TraineeStation, MissesTheTargetWithoutCollisions) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
