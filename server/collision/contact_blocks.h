@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <span>
 
 #include "server/collision/pair_query.h"
 #include "server/structures/pointshell.h"
@@ -9,7 +10,7 @@ namespace tenon::collision {
 
 /// The points (in A) of up to sixteen listed contacts, starting with contact `first`, in the kernels' layout.
 [[nodiscard]] inline structures::ShellBlock blockOf(const structures::Pointshell& shell,
-                                                    const ContactList& contacts, std::size_t first) {
+                                                    std::span<const Contact> contacts, std::size_t first) {
   structures::ShellBlock block;
   block.count = static_cast<std::uint32_t>(std::min(contacts.size() - first, structures::ShellBlock::kLanes));
   for (std::uint32_t i = 0; i < block.count; ++i) {

@@ -29,7 +29,7 @@ using NonUnitContacts = FixedVector<NonUnitContact, kMaxPairContacts>;
 void findNonUnitGradients(const LaneFrame& frame, const structures::Pointshell& shell,
                           const ContactList& contacts, NonUnitContacts& non_unit) {
   for (std::size_t first = 0; first < contacts.size(); first += structures::ShellBlock::kLanes) {
-    const structures::ShellBlock block = blockOf(shell, contacts, first);
+    const structures::ShellBlock block = blockOf(shell, {contacts.begin(), contacts.size()}, first);
     SampleLanes lanes;
     SampleSums sums;
     const PointLanes points{block.x.data(), block.y.data(), block.z.data(), block.count};

@@ -78,9 +78,10 @@ bool cross(const EdgePiece& a, const EdgePiece& b, double slack, double toleranc
   // closest points a.p + along_a * a.half, b.p + along_b * b.half of the two lines
   const double along_a = -r.dot(b.half.cross(c)) / c2;
   const double along_b = -r.dot(a.half.cross(c)) / c2;
-  if (std::abs(along_a) > 1.0 + kEndTolerance + slack / std::sqrt(a2) ||
-      std::abs(along_b) > 1.0 + kEndTolerance + slack / std::sqrt(b2))
-    return false;
+  const auto limit = [slack](double half2) {
+    return 1.0 + kEndTolerance + (slack > 0.0 ? slack / std::sqrt(half2) : 0.0);
+  };
+  if (std::abs(along_a) > limit(a2) || std::abs(along_b) > limit(b2)) return false;
   contact.n_W = sign / length * c;
   contact.p_WP = a.p + along_a * a.half;
   return true;
@@ -120,19 +121,21 @@ PairQuery reversed(const PairQuery& query, const PairFeatures& features, double 
   return {&features.features_B->points(), features.field_A, query.X_WB, query.X_WA, margin};
 }
 
-/// Adds to the gaps of B's features what A's field is dilated beyond `most_dilation_A`. `displacement` [m] as
-/// in resampleContacts().
-void limitDilation(const PairFeatures& features, const Pose& X_WA, double displacement,
-                   PairQueryResult& of_B) {
-  if (features.most_dilation_A >= features.field_A->dilation()) return;
+/// Adds to the gaps of B's features what A's field is dilated beyond `most_dilation_A`. Returns the smallest
+/// [m] of them and `others` [m].
+double limitDilation(const PairFeatures& features, const Pose& X_WA, std::span<Contact> contacts,
+                     double others) {
   const Pose X_AW = X_WA.inverse();
-  double smallest = of_B.unlisted_gap - displacement;
-  for (Contact& contact : of_B.contacts) {
+  double smallest = others;
+  for (Contact& contact : contacts) {
     contact.gap += features.field_A->dilationBeyond(features.most_dilation_A, X_AW * contact.p_WP);
     smallest = std::min(smallest, contact.gap);
   }
-  of_B.smallest_gap = smallest;
-  of_B.deepest = std::max(-smallest, 0.0);
+  return smallest;
+}
+
+bool isDilationLimited(const PairFeatures& features) {
+  return features.most_dilation_A < features.field_A->dilation();
 }
 
 /// A contact of B against A as one of A against B.
@@ -294,6 +297,45 @@ class CrossingSearch {
   Eigen::AlignedBox3f box_A_;  ///< of the balls of all near pieces
 };
 
+/// End of the contacts of a kind that begin at `from`.
+Contact* endOf(ContactKind kind, Contact* from, Contact* end) {
+  return std::find_if(from, end, [kind](const Contact& contact) { return contact.kind != kind; });
+}
+
+/// Evaluates feature points anew, and moves them to `to`. Returns their end.
+Contact* resamplePoints(const PairQuery& query, const PairFeatures& features, double displacement,
+                        std::span<Contact> points, Contact* to, PairQueryResult& result) {
+  ResampledPart part = resamplePart(reversed(query, features, query.margin), points);
+  points = points.first(part.kept);
+  if (isDilationLimited(features))
+    part.smallest_gap = limitDilation(features, query.X_WA, points, part.smallest_left_gap);
+  result.smallest_gap = std::min(result.smallest_gap, part.smallest_gap);
+  result.deepest = std::max(result.deepest, -part.smallest_gap);
+  result.unlisted_gap = std::min(result.unlisted_gap, part.smallest_left_gap - displacement);
+  if (!result.reduced) result.counts.points_colliding += part.points_colliding;
+  for (Contact& contact : points) {
+    contact.n_W = -contact.n_W;
+    if (to != &contact) *to = contact;
+    ++to;
+  }
+  return to;
+}
+
+/// Evaluates crossings anew, and moves them to `to`. Returns their end.
+Contact* resampleCrossings(const PairQuery& query, const PairFeatures& features,
+                           std::span<const Contact> crossings, Contact* to, PairQueryResult& result) {
+  const Transform X_WA(query.X_WA);
+  const Transform X_AB(query.X_WA.inverse() * query.X_WB);
+  for (const Contact& crossing : crossings) {
+    Contact& contact = *to++;
+    if (&contact != &crossing) contact = crossing;
+    evaluateCrossing(pieceOf(*features.features_A, contact.point),
+                     pieceOf(*features.features_B, contact.other, X_AB), X_WA, contact);
+    include(contact, result);
+  }
+  return to;
+}
+
 }  // namespace
 
 void queryFeatures(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
@@ -304,7 +346,11 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
   const double half_B = features.features_B->longestHalf();
   PairQueryResult& of_B = scratch.of_B;
   queryPair(reversed(query, features, query.margin + half_B), of_B);
-  limitDilation(features, query.X_WA, 0.0, of_B);
+  if (isDilationLimited(features)) {
+    of_B.smallest_gap =
+        limitDilation(features, query.X_WA, {of_B.contacts.begin(), of_B.contacts.size()}, of_B.unlisted_gap);
+    of_B.deepest = std::max(-of_B.smallest_gap, 0.0);
+  }
   // what it lacks beyond the margin is no contact of this list
   if (of_B.complete_to >= query.margin) of_B.counts.contacts_dropped = 0;
   addCounts(of_B.counts, result.counts);
@@ -353,40 +399,20 @@ double featureGap(const PairQuery& query, const PairFeatures& features, FeatureS
 }
 
 void resampleFeatures(const PairQuery& query, const PairFeatures& features, double displacement,
-                      FeatureScratch& scratch, PairQueryResult& result) noexcept {
-  result.dormant_gap = std::numeric_limits<double>::infinity();
+                      PairQueryResult& result) noexcept {
   ContactList& contacts = result.contacts;
-  const auto first = std::find_if(contacts.begin(), contacts.end(), [](const Contact& contact) {
-    return contact.kind != ContactKind::kShellPoint;
-  });
-  ContactList& points = scratch.of_B.contacts;
-  ContactList& crossings = scratch.crossings;
-  points.clear();
-  crossings.clear();
-  for (const Contact* contact = first; contact != contacts.end(); ++contact)
-    (contact->kind == ContactKind::kFeaturePoint ? points : crossings).push_back(*contact);
-  contacts.resize(static_cast<std::size_t>(first - contacts.begin()));
+  Contact* const points = endOf(ContactKind::kShellPoint, contacts.begin(), contacts.end());
+  Contact* const crossings = endOf(ContactKind::kFeaturePoint, points, contacts.end());
+  Contact* const end = contacts.end();
+  contacts.resize(static_cast<std::size_t>(points - contacts.begin()));
   resampleContacts(query, displacement, result);
-  if (!points.empty()) {
-    scratch.of_B.reduced = false;
-    scratch.of_B.unlisted_gap = result.unlisted_gap;
-    resampleContacts(reversed(query, features, query.margin), displacement, scratch.of_B);
-    limitDilation(features, query.X_WA, displacement, scratch.of_B);
-    result.unlisted_gap = scratch.of_B.unlisted_gap;
-    result.smallest_gap = std::min(result.smallest_gap, scratch.of_B.smallest_gap);
-    result.deepest = std::max(result.deepest, scratch.of_B.deepest);
-    if (!result.reduced) result.counts.points_colliding += scratch.of_B.counts.points_colliding;
-    for (const Contact& contact : points) contacts.push_back(turned(contact));
-  }
-  if (crossings.empty()) return;
-  const Transform X_WA(query.X_WA);
-  const Transform X_AB(query.X_WA.inverse() * query.X_WB);
-  for (Contact& contact : crossings) {
-    evaluateCrossing(pieceOf(*features.features_A, contact.point),
-                     pieceOf(*features.features_B, contact.other, X_AB), X_WA, contact);
-    include(contact, result);
-    contacts.push_back(contact);
-  }
+  // contacts that left the band make room
+  Contact* kept = contacts.end();
+  if (points != crossings)
+    kept = resamplePoints(query, features, displacement, {points, crossings}, kept, result);
+  result.dormant_gap = std::numeric_limits<double>::infinity();
+  if (crossings != end) kept = resampleCrossings(query, features, {crossings, end}, kept, result);
+  contacts.resize(static_cast<std::size_t>(kept - contacts.begin()));
 }
 
 }  // namespace tenon::collision

@@ -58,7 +58,7 @@ struct NearPieces {
 /// Memory of the functions below; one for each thread.
 struct FeatureScratch {
   PairQueryResult of_B;   ///< B's features in A's field
-  ContactList crossings;  ///< that are evaluated again
+  ContactList crossings;  ///< found, before the nearest are kept
   NearPieces near;
 };
 
@@ -77,11 +77,12 @@ struct FeatureScratch {
 void queryFeatures(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
                    PairQueryResult& result) noexcept;
 
-/// resampleContacts() for a list with contacts of features; `displacement` [m] as there.
+/// resampleContacts() for a list with contacts of features, in the order of queryFeatures(); `displacement`
+/// [m] as there.
 ///
-/// Threads: pure, but for the scratch. Real-time.
+/// Threads: pure. Real-time.
 void resampleFeatures(const PairQuery& query, const PairFeatures& features, double displacement,
-                      FeatureScratch& scratch, PairQueryResult& result) noexcept;
+                      PairQueryResult& result) noexcept;
 
 /// [m] Lower bound of the gap of features and crossings up to `query.margin`, beyond that a larger one. Lists
 /// nothing; adds its work to `counts`.

@@ -101,7 +101,7 @@ bool IslandSolver::updatePair(const Job& job, std::size_t i, SolveReport& report
   }
   PairQueryResult& result = job.results[i].query;
   const std::size_t listed = result.contacts.size();
-  resampleFeatures(job.queryOf(job.pairs[i], 0.0), job.pairs[i].features, approach, feature_scratch_, result);
+  resampleFeatures(job.queryOf(job.pairs[i], 0.0), job.pairs[i].features, approach, result);
   ++report.resamplings;
   report.points_visited += listed;
   return result.contacts.size() == listed;

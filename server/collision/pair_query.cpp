@@ -342,15 +342,12 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
     result.unlisted_gap = std::min(result.unlisted_gap, result.complete_to);
 }
 
-void resampleContacts(const PairQuery& query, double displacement, PairQueryResult& result) noexcept {
+ResampledPart resamplePart(const PairQuery& query, std::span<Contact> contacts) noexcept {
   const LaneFrame frame(*query.field_B, query.X_WA, query.X_WB, query.margin, query.shell_A->radius());
   const QueryKernels& kernels = chosenKernels();
   const std::span<const structures::ShellPoint> points = query.shell_A->points();
-  ContactList& contacts = result.contacts;
-  result.smallest_gap = result.unlisted_gap - displacement;
-  result.deepest = std::max(-result.smallest_gap, 0.0);
+  ResampledPart part;
   SampleSums sums;
-  std::size_t kept = 0;
   for (std::size_t first = 0; first < contacts.size(); first += structures::ShellBlock::kLanes) {
     const structures::ShellBlock block = blockOf(*query.shell_A, contacts, first);
     SampleLanes samples;
@@ -359,25 +356,32 @@ void resampleContacts(const PairQuery& query, double displacement, PairQueryResu
     kernels.samples(frame, points_A, &samples, sums);
     kernels.contacts(frame, points_A, &samples, &contact_lanes);
     for (std::uint32_t i = 0; i < block.count; ++i) {
-      const auto [point, area] = std::pair(contacts[first + i].point, contacts[first + i].area);
       if ((samples.exact >> i & 1U) == 0) {
-        // unlisted_gap is for the poses of the traversal: the point may come nearer again when A moves back
-        // there
-        result.unlisted_gap = std::min(result.unlisted_gap, samples.distance[i] - displacement);
+        part.smallest_left_gap = std::min(part.smallest_left_gap, samples.distance[i]);
         continue;
       }
+      const std::uint32_t point = contacts[first + i].point;
       if ((contact_lanes.has_normal >> i & 1U) == 0)
         setNormal(frame, points[point].inward_M, i, contact_lanes);
-      Contact& contact = contacts[kept++];
+      Contact& contact = contacts[part.kept++];
+      if (&contact != &contacts[first + i]) contact = contacts[first + i];
       setContact(contact_lanes, i, samples.distance[i], contact);
-      contact.point = point;
-      contact.area = area;
     }
   }
-  result.smallest_gap = std::min(result.smallest_gap, sums.smallest_distance);
-  result.deepest = std::max(result.deepest, -sums.smallest_distance);
-  if (!result.reduced) result.counts.points_colliding = sums.colliding;
-  contacts.resize(kept);
+  part.smallest_gap = sums.smallest_distance;
+  part.points_colliding = sums.colliding;
+  return part;
+}
+
+void resampleContacts(const PairQuery& query, double displacement, PairQueryResult& result) noexcept {
+  const ResampledPart part = resamplePart(query, {result.contacts.begin(), result.contacts.size()});
+  result.smallest_gap = std::min(result.unlisted_gap - displacement, part.smallest_gap);
+  result.deepest = std::max(-result.smallest_gap, 0.0);
+  // unlisted_gap is for the poses of the traversal: a point that left may come nearer again when A moves back
+  // there
+  result.unlisted_gap = std::min(result.unlisted_gap, part.smallest_left_gap - displacement);
+  if (!result.reduced) result.counts.points_colliding = part.points_colliding;
+  result.contacts.resize(part.kept);
 }
 
 }  // namespace tenon::collision

@@ -124,6 +124,21 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept;
 /// Threads: pure. Real-time.
 void resampleContacts(const PairQuery& query, double displacement, PairQueryResult& result) noexcept;
 
+/// What resampling a part of a list found.
+struct ResampledPart {
+  std::size_t kept = 0;       ///< contacts, at the start of the part
+  double smallest_gap = 0.0;  ///< [m] of all; a lower bound for those that left the band
+  /// [m] lower bound for those that left the band
+  double smallest_left_gap = std::numeric_limits<double>::infinity();
+  std::uint32_t points_colliding = 0;
+};
+
+/// resampleContacts() for some contacts of a list, all of them points of `query.shell_A`: kinds stay, and
+/// contacts that left the field's band are removed by moving the later ones up.
+///
+/// Threads: pure. Real-time.
+[[nodiscard]] ResampledPart resamplePart(const PairQuery& query, std::span<Contact> contacts) noexcept;
+
 /// [N] Penalty force of one contact along its normal for `stiffness` [N/m]; 0 when apart.
 [[nodiscard]] double penaltyForce(const Contact& contact, double stiffness) noexcept;
 

@@ -84,11 +84,10 @@ class Queries {
         contacts_ += result_->contacts.size();
         query.X_WA = sample.X_WA_now;
         query.X_WB = sample.X_WB_now;
-        resampling[i] =
-            std::min(resampling[i], microsecondsOf([&] {
-                       both ? collision::resampleFeatures(query, features, 0.0, *scratch_, *result_)
-                            : collision::resampleContacts(query, 0.0, *result_);
-                     }));
+        resampling[i] = std::min(resampling[i], microsecondsOf([&] {
+                                   both ? collision::resampleFeatures(query, features, 0.0, *result_)
+                                        : collision::resampleContacts(query, 0.0, *result_);
+                                 }));
       }
     }
   }

@@ -61,7 +61,7 @@ TEST_F(FeatureQuery, FindsTheOneCrossingOfTwoEdges) {
 TEST_F(FeatureQuery, ResamplingFollowsTheCrossing) {
   query(0.0004);
   query_.X_WA.translation() += Vector3(0.0002, 0.0003, -0.0003);
-  resampleFeatures(query_, features_, 0.0006, *scratch_, *result_);
+  resampleFeatures(query_, features_, 0.0006, *result_);
   const auto found = crossings();
   ASSERT_EQ(found.size(), 1U);
   EXPECT_NEAR(found[0].gap, 0.0001, 1e-7);
@@ -117,7 +117,7 @@ TEST_F(FeatureQuery, ResamplingAtTheSamePoseFindsTheSame) {
   for (const Vector3& off : {Vector3(0.0011, -0.0007, 0.0), Vector3(0.0002, 0.0302, 0.0)}) {
     query(-0.0002, off);
     const auto before = std::make_unique<PairQueryResult>(*result_);
-    resampleFeatures(query_, features_, 0.0, *scratch_, *result_);
+    resampleFeatures(query_, features_, 0.0, *result_);
     ASSERT_EQ(result_->contacts.size(), before->contacts.size());
     for (std::size_t i = 0; i < before->contacts.size(); ++i) {
       EXPECT_NEAR(result_->contacts[i].gap, before->contacts[i].gap, 1e-9);
