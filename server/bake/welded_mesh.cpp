@@ -1,8 +1,10 @@
 #include "server/bake/welded_mesh.h"
 
 #include <algorithm>
+#include <bit>
 #include <numeric>
 #include <span>
+#include <utility>
 
 namespace tenon::bake {
 
@@ -35,23 +37,94 @@ void visitEdges(const std::vector<HalfEdge>& half_edges, Visit&& visit) {
   }
 }
 
+/// Sorts elements whose order is first that of `firstOf(element)`, a number below `numbers` that few of them
+/// share.
+template <typename Element, typename FirstOf>
+void sortWithFirst(std::vector<Element>& elements, std::size_t numbers, FirstOf&& firstOf) {
+  // where the next element with each number goes; in the end behind the last
+  std::vector<std::size_t> next(numbers + 1, 0);
+  for (const Element& element : elements) ++next[firstOf(element) + 1];
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  std::vector<Element> sorted(elements.size());
+  for (const Element& element : elements) sorted[next[firstOf(element)]++] = element;
+  auto begin = sorted.begin();
+  for (const std::size_t behind : next) {
+    const auto end = sorted.begin() + static_cast<std::ptrdiff_t>(behind);
+    std::sort(begin, end);
+    begin = end;
+  }
+  elements = std::move(sorted);
+}
+
+/// The distinct ones of some points, found by hash.
+class DistinctPoints {
+ public:
+  explicit DistinctPoints(std::span<const Vector3f> points)
+      : points_(points), slots_(std::bit_ceil(2 * points.size() + 1), kNone), numbers_(points.size()) {
+    for (std::size_t i = 0; i < points.size(); ++i) numbers_[i] = find(static_cast<std::uint32_t>(i));
+  }
+
+  /// Of each point the number of its equals, in `firsts`.
+  [[nodiscard]] const std::vector<std::uint32_t>& numbers() const { return numbers_; }
+  /// One point of each kind.
+  [[nodiscard]] const std::vector<std::uint32_t>& firsts() const { return firsts_; }
+
+ private:
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+
+  [[nodiscard]] static std::uint64_t hashOf(const Vector3f& p) {
+    std::uint64_t hash = 0;
+    for (const float c : p) {  // 0 and -0 are equal
+      hash = (hash ^ std::bit_cast<std::uint32_t>(c + 0.0F)) * 0x9E3779B97F4A7C15ULL;
+      hash ^= hash >> 32U;
+    }
+    return hash;
+  }
+
+  std::uint32_t find(std::uint32_t i) {
+    for (std::size_t at = hashOf(points_[i]);; ++at) {
+      std::uint32_t& slot = slots_[at & (slots_.size() - 1)];
+      if (slot != kNone && points_[firsts_[slot]] != points_[i]) continue;
+      if (slot == kNone) {
+        slot = static_cast<std::uint32_t>(firsts_.size());
+        firsts_.push_back(i);
+      }
+      return slot;
+    }
+  }
+
+  const std::span<const Vector3f> points_;
+  std::vector<std::uint32_t> slots_;
+  std::vector<std::uint32_t> numbers_;
+  std::vector<std::uint32_t> firsts_;
+};
+
+/// Equal points get equal numbers: the rank of their position, which is in `positions`.
+std::vector<std::uint32_t> weld(std::span<const Vector3f> points, std::vector<Vector3>& positions) {
+  const DistinctPoints distinct(points);
+  const std::vector<std::uint32_t>& firsts = distinct.firsts();
+  std::vector<std::uint32_t> order(firsts.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    const Vector3f& pa = points[firsts[a]];
+    const Vector3f& pb = points[firsts[b]];
+    return std::lexicographical_compare(pa.data(), pa.data() + 3, pb.data(), pb.data() + 3);
+  });
+  std::vector<std::uint32_t> rank(order.size());
+  positions.reserve(order.size());
+  for (const std::uint32_t i : order) {
+    rank[i] = static_cast<std::uint32_t>(positions.size());
+    positions.push_back(points[firsts[i]].cast<double>());
+  }
+  std::vector<std::uint32_t> number = distinct.numbers();
+  for (std::uint32_t& n : number) n = rank[n];
+  return number;
+}
+
 }  // namespace
 
 WeldedMesh::WeldedMesh(const TriangleMesh& mesh) {
-  // equal positions get equal numbers: their rank
-  const auto before = [&](std::uint32_t a, std::uint32_t b) {
-    const Vector3f& pa = mesh.vertices[a];
-    const Vector3f& pb = mesh.vertices[b];
-    return std::lexicographical_compare(pa.data(), pa.data() + 3, pb.data(), pb.data() + 3);
-  };
-  std::vector<std::uint32_t> order(mesh.vertices.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::sort(order.begin(), order.end(), before);
-  std::vector<std::uint32_t> number(order.size());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    if (i == 0 || before(order[i - 1], order[i])) positions.push_back(mesh.vertices[order[i]].cast<double>());
-    number[order[i]] = static_cast<std::uint32_t>(positions.size() - 1);
-  }
+  const std::vector<std::uint32_t> number = weld(mesh.vertices, positions);
 
   struct WoundCorners {
     Corners corners;
@@ -67,7 +140,7 @@ WeldedMesh::WeldedMesh(const TriangleMesh& mesh) {
     if (t[0] != t[1] && t[1] != t[2]) all.push_back({t, static_cast<std::int8_t>(same ? 1 : -1)});
   }
   // ranks follow positions, so neighbours in space are near in memory
-  std::sort(all.begin(), all.end());
+  sortWithFirst(all, positions.size(), [](const WoundCorners& t) { return t.corners[0]; });
   for (const auto& [t, wound] : all) {
     if (!corners.empty() && corners.back() == t) {
       winding.back() = static_cast<std::int8_t>(std::clamp(winding.back() + wound, -100, 100));
@@ -90,10 +163,10 @@ std::vector<WeldedMesh::HalfEdge> WeldedMesh::halfEdges() const {
   for (std::uint32_t i = 0; i < corners.size(); ++i) {
     const auto& [a, b, c] = corners[i];
     all.push_back({a, b, i});
-    all.push_back({b, c, i});
     all.push_back({a, c, i});
+    all.push_back({b, c, i});
   }
-  std::sort(all.begin(), all.end());
+  sortWithFirst(all, positions.size(), [](const HalfEdge& edge) { return edge.from; });
   return all;
 }
 
