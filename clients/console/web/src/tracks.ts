@@ -2,6 +2,7 @@
 import type { ContactPairs, HandState, Telemetry, TickStats } from "./messages";
 
 const LENGTH = 3000; // samples of a track: 30 s at 100 Hz
+const FELT = 0.05; // [N] from which on it matters that a force is limited
 
 /** Of one time the value that `worst` prefers counts. Times in s of the session, increasing. */
 export class Track {
@@ -45,7 +46,7 @@ export class Tracks {
     const { force } = F_Ho_W;
     const newtons = Math.hypot(force[0], force[1], force[2]);
     this.of(`force ${hand_id}`).add(seconds, newtons);
-    if (safety_flags !== 0) this.of(`limited ${hand_id}`).add(seconds, newtons);
+    if (safety_flags !== 0 && newtons > FELT) this.of(`limited ${hand_id}`).add(seconds, newtons);
   }
 
   /** Gap of the nearest pair, or how deep the deepest one is in: below 0 [m]. */
