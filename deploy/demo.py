@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """`tenon demo`: a whole training session with simulated people, as separate processes over DDS on the loopback interface."""
 import argparse
-import ctypes
 import functools
 import itertools
 import json
@@ -16,6 +15,8 @@ import time
 from pathlib import Path
 
 sys.dont_write_bytecode = True  # an installation stays as it was installed
+import browser
+from child import die_with_the_script
 from demo_scene import hands_of, shipped_as
 
 
@@ -83,20 +84,8 @@ def stop_at_signals():
             signal.signal(number, stop)
 
 
-LIBC = ctypes.CDLL(None)
-DEMO = os.getpid()
-PR_SET_PDEATHSIG = 1
-
-
-def die_with_the_demo():
-    """In a child before it becomes another program: the system kills it when the demo ends, however it ends."""
-    LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != DEMO:
-        os._exit(1)
-
-
 def run(*words, **options):
-    return subprocess.run(words, preexec_fn=die_with_the_demo, check=False, **options)
+    return subprocess.run(words, preexec_fn=die_with_the_script, check=False, **options)
 
 
 class Program:
@@ -107,7 +96,7 @@ class Program:
         shows_loading = name == "serve" and sys.stderr.isatty()
         with open(log, "wb") as out:
             self.process = subprocess.Popen(words, stdout=out, stderr=None if shows_loading else out, stdin=subprocess.DEVNULL,
-                                            start_new_session=True, preexec_fn=die_with_the_demo)
+                                            start_new_session=True, preexec_fn=die_with_the_script)
 
     def new_lines(self):
         """The lines that it has written since the last call."""
@@ -340,19 +329,26 @@ def run_session(args, out, programs):
     say(session_result(server) or f"the server ended without a result: {server.last_line()}")
 
     say("")
-    if shipped is None:
-        say("no picture: those of the shipped scenarios only can be drawn")
-    elif run(programs.folder / "tenon-parts", shipped, "--picture", out / "scene.png", "--detail", str(args.detail),
-             capture_output=True).returncode != 0:
-        say("no picture of the scene could be made")
     report, page = run(programs.folder / "tenon-report", recording, "-o", out), out / "report.html"
     say(f"\nrecording: {recording}" + (f"\nreport:    {page}" if page.exists() else ""))
+    say(picture_of(recording, out / "scene.png", programs))
     if page.exists() and not args.headless:
         open_in_browser(page)
     if args.lockstep:
         hashes = [line for line in server.lines() if "final state hash" in line]
         say(hashes[-1] if hashes else "final state hash: unknown")
     return 1 if outcome or report.returncode and not has_succeeded_without_page(out) else 0
+
+
+def picture_of(recording, file, programs):
+    """Makes a picture of how the session ended; where it is, or why there is none."""
+    if browser.find_chromium() is None:
+        return f"no picture: {browser.MISSING}"
+    if not (programs.folder / "tenon-console").exists():
+        return "no picture: the console is not built, and its page draws the pictures"
+    made = run(sys.executable, Path(__file__).with_name("picture.py"), recording, "--at", "end", "-o", file, "--overwrite", "--programs", programs.folder,
+               "--scenarios", programs.args.scenarios, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    return f"picture:   {file}" if made.returncode == 0 else f"no picture: {made.stderr.strip().removeprefix('tenon picture: ')}"
 
 
 def has_succeeded_without_page(out):

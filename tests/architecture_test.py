@@ -56,7 +56,7 @@ ROOMS = {
     # who takes part in a browser is a station of its own
     "clients/console": ("tenon::console", STATION + ["devices/drivers", "clients/command", "clients/recorder", "clients/station"], ["fmt", "CLI11", "JSON", "Boost", "OpenSSL"]),
     "clients/rehearse": ("tenon::rehearse", [], ["fmt", "CLI11"]),  # the rooms: see EXCEPTION
-    "scenarios/part_generator": ("tenon::part_generator", ["idl/types"], ["fmt", "CLI11", "PNG"]),
+    "scenarios/part_generator": ("tenon::part_generator", ["idl/types"], ["fmt", "CLI11"]),
 }
 # folders inside of a room
 SUBFOLDERS = {"idl/types/messages": "idl/types"}
@@ -69,7 +69,7 @@ LIBRARIES = {
     "expected": r"tl/expected\.hpp$", "DDS": r"(dds/|ddsc/|org/eclipse/cyclonedds/|tenon\.h$)", "zstd": r"(zstd|zstd_\w+|zdict)\.h$",
     "Highway": r"hwy/", "xxHash": r"xxh(ash|3)\.h$", "assimp": r"assimp/", "OctoMap": r"octomap/",
     "meshoptimizer": r"meshoptimizer\.h$",
-    "libsodium": r"sodium(\.h$|/)", "yaml-cpp": r"yaml-cpp/", "fmt": r"fmt/", "CLI11": r"CLI/", "JSON": r"nlohmann/", "PNG": r"png\.h$",
+    "libsodium": r"sodium(\.h$|/)", "yaml-cpp": r"yaml-cpp/", "fmt": r"fmt/", "CLI11": r"CLI/", "JSON": r"nlohmann/",
     "Boost": r"boost/", "OpenSSL": r"openssl/",
     "Bullet": r"(bullet/|btBullet|Bullet|LinearMath/)", "Eigen": r"Eigen/",
     "POSIX": r"((sys|arpa|netinet|net|linux)/|(ifaddrs|netdb|unistd|fcntl|poll|termios|spawn|pthread|sched|signal|time|dirent|dlfcn|errno|semaphore)\.h$)",
@@ -428,7 +428,6 @@ PLANTED = [
     ("clients/rehearse/rehearsal.h", '#include "clients/station/station.h"', None),
     ("clients/rehearse/rehearsal.h", '#include "tests/support/analytic.h"', "no room may include tests"),
     ("scenarios/part_generator/j.cpp", '#include "server/structures/field.h"', "may not include server/structures"),
-    ("scenarios/part_generator/j.cpp", "#include <png.h>", None),
     ("tests/server/k_test.cpp", "#include <gtest/gtest.h>", None),
     ("tests/server/k_test.cpp", '#include "clients/rehearse/rehearsal.h"', None),
     ("idl/wire/first.h", '#include "idl/wire/second.h"', "run in a circle: idl/wire/first, idl/wire/second"),

@@ -162,12 +162,13 @@ Answer Site::answer(std::string_view target, std::string_view range) const {
 }
 
 std::string_view contentSecurityPolicy() {
-  // WebAssembly decodes the models; blob: is how the model loader reads what is inside of a file
+  // WebAssembly decodes the models; blob: is how the model loader reads what is inside of a file; two
+  // recordings beside each other are two frames of this page, and no other page has it in a frame
   return "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data: "
          "blob:; "
          "connect-src 'self' blob:; worker-src 'self' blob:; font-src 'self'; base-uri 'none'; form-action "
          "'none'; "
-         "frame-ancestors 'none'";
+         "frame-src 'self'; frame-ancestors 'self'";
 }
 
 bool isPermittedOrigin(std::string_view origin, std::string_view host, bool is_secure,

@@ -1,6 +1,5 @@
 #include <cstdio>
 #include <filesystem>
-#include <map>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -8,7 +7,6 @@
 #include "idl/types/output_files.h"
 #include "scenarios/part_generator/engine_bay_layout.h"
 #include "scenarios/part_generator/scenario_parts.h"
-#include "scenarios/part_generator/scenario_pictures.h"
 
 namespace tenon::part_generator {
 namespace {
@@ -99,8 +97,6 @@ int main(int argc, char** argv) {
   bool list = false;
   bool layout = false;
   ProgramFiles files;
-  std::string picture;
-  PictureMoment moment = PictureMoment::kAssembly;
   app.add_option("SCENARIO", scenario, "scenario: " + knownSets());
   app.add_option("OUTDIR", folder, "folder for the files, created if it does not exist");
   auto* detail_option =
@@ -111,14 +107,8 @@ int main(int argc, char** argv) {
       ->excludes(detail_option);
   app.add_flag("--list", list, "print the scenarios and their parts, and write nothing");
   app.add_flag("--layout", layout, "print the poses and boxes of the engine bay, and write nothing");
-  app.add_option("--picture", picture, "render the scene to this PNG file; OUTDIR is then optional");
-  app.add_option("--moment", moment, "what the picture shows: start or assembly (default)")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, PictureMoment>{
-          {"start", PictureMoment::kStart}, {"assembly", PictureMoment::kAssembly}}));
   app.add_flag("--overwrite", files.overwrite, kOverwriteHelp);
-  app.footer(
-      "Examples:\n  tenon-parts peg_and_box out/\n  tenon-parts engine_bay out/ --triangles 300000\n"
-      "  tenon-parts engine_bay --picture bay.png --detail 0.6");
+  app.footer("Examples:\n  tenon-parts peg_and_box out/\n  tenon-parts engine_bay out/ --triangles 300000");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -148,31 +138,18 @@ int main(int argc, char** argv) {
     printLayout();
     return 0;
   }
-  if (folder.empty() && picture.empty()) {
-    fmt::print(stderr,
-               "tenon-parts: nothing to do: expected a folder for the files, or --picture FILE.png\n");
+  if (folder.empty()) {
+    fmt::print(stderr, "tenon-parts: nothing to do: expected a folder for the files\n");
     return 2;
   }
-  files.outputs = {picture};
-  if (!folder.empty())
-    for (const ScenarioPart& part : set->parts) files.outputs.push_back(fileOf(part, folder));
+  for (const ScenarioPart& part : set->parts) files.outputs.push_back(fileOf(part, folder));
   if (const auto refusal = refuseOutputs(files)) {
     fmt::print(stderr, "tenon-parts: {}\n", refusal->what);
     return refusal->exit_code;
   }
   if (triangles > 0) detail = detailFor(*set, triangles);
   if (detail < 0.0) detail = set->default_detail;
-  if (!folder.empty()) {
-    if (const int failed = writeParts(*set, folder, detail); failed != 0) return failed;
-  }
-  if (!picture.empty()) {
-    if (const auto drawn = drawScenario(*set, detail, moment, picture); !drawn) {
-      fmt::print(stderr, "tenon-parts: {}\n", drawn.error().what);
-      return 1;
-    }
-    fmt::print("{}\n", picture);
-  }
-  return 0;
+  return writeParts(*set, folder, detail);
 }
 
 }  // namespace

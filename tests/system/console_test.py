@@ -622,6 +622,7 @@ class Page(unittest.TestCase):
             self.assertNotEqual(first, places[round(0.95 * end, 3)][0])
             browser("key", key="Space")
             browser("await", expression=f"tenon.player.time > {0.2 * end + 0.5}")
+            self.look(browser)
             # what cannot be read is said, and the next place can be
             fail_once = "((r, name) => { r[name] = () => { delete r[name]; return Promise.reject(new Error('the disk is gone')); }; })(tenon.player.recording, 'NAME')"
             is_said = "!document.querySelector('.cover').hidden && document.querySelector('.cover').textContent.includes('the disk is gone')"
@@ -643,12 +644,40 @@ class Page(unittest.TestCase):
             browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
             browser("await", expression="document.querySelector('.cover').dataset.state === 'file'")
 
+    def look(self, browser):
+        """Section, hiding, measuring and the choice of plots, by clicks and keys."""
+        place = browser("value", expression="(p => [p.x, p.y])(tenon.view.project(tenon.view.parts.box().getCenter(tenon.view.rig.position.clone())))")
+        browser("click", at=place)
+        browser("await", expression="document.querySelectorAll('.toolrow b').length === 1")
+        browser("key", key="i")
+        self.assertEqual(browser("value", expression="[...tenon.view.parts.all.values()].filter(p => p.group.visible).length"), 1)
+        browser("key", key="a")
+        self.assertGreater(browser("value", expression="[...tenon.view.parts.all.values()].filter(p => p.group.visible).length"), 1)
+        browser("key", key="b")
+        for x in (0, 12):
+            browser("click", at=[place[0] + x, place[1]])
+        browser("await", expression="/^[0-9.]+ mm/.test(document.querySelector('.label.measured')?.textContent ?? '')")
+        browser("key", key="b")
+        # what is cut away is not there to be clicked
+        before = browser("value", expression=f"tenon.view.pick({place[0]}, {place[1]})?.point.z")
+        browser("key", key="s")
+        browser("value", expression="document.querySelectorAll('.toolrow .word')[2].click(); (s => { s.value = 0; s.dispatchEvent(new Event('input')); })(document.querySelector('.toolrow input'))")
+        whole = browser("value", expression=f"tenon.view.pick({place[0]}, {place[1]})?.point.z")
+        self.assertEqual(whole, before, "cut below all of it")
+        browser("value", expression="(s => { s.value = 1; s.dispatchEvent(new Event('input')); })(document.querySelector('.toolrow input'))")
+        self.assertIsNone(browser("value", expression=f"tenon.view.pick({place[0]}, {place[1]}) ?? null"))
+        browser("key", key="s")
+        for plot in ("gap", "compute", "age"):
+            browser("value", expression=f"document.querySelector('[data-plot={plot}]').click()")
+        browser("await", expression="document.querySelectorAll('.chart:not(.none) canvas').length >= 3")
+
     def test_the_lobby_leads_to_a_session(self):
         with Stage() as stage, Browser() as browser:
             stage.serve(SCENARIO, "--wait-for", "right")
             _, port = start_console(stage, shown=[])
             browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
             browser("await", expression="document.querySelector('.session h2')?.textContent === 'Peg and box'")
+            browser("await", expression="document.querySelector('.session canvas')?.width > 100")
             browser("value", expression="document.querySelector('.session').click()")
             browser("await", expression="location.search === '?session=test' && window.tenon !== undefined && document.title === 'Peg and box – Tenon'")
             self.assertEqual(browser.problems, [])
@@ -701,6 +730,36 @@ class MouseNightly(unittest.TestCase):
         for seed in range(1, 6):
             with self.subTest(seed=seed):
                 mouse_mounts(self, seed, "engine_bay", "control_box")
+
+
+@unittest.skipUnless(shutil.which("chromium") and (TOOLS / "node_modules").exists(), "no chromium or no playwright-core: deploy/setup test, and npm ci in tests/system/public_tools")
+class FollowNightly(unittest.TestCase):
+    def test_the_page_follows_the_engine_bay_to_its_fifth_part(self):
+        with Stage() as stage, Browser() as browser:
+            server = stage.serve("engine_bay", "--wait-for", "right,left,instructor")
+            console, port = start_console(stage)
+            console.wait_for("joined session 'test'")
+            browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
+            browser("await", expression="tenon.view.models >= 10 && tenon.view.pictures > 0")
+            stage.start("trainee", "--seed", 1, "--device", "hug-sim", "--misplace-mount", 2)
+            stage.start("instructor", "--seed", 1, "--device", "sigma7-sim")
+            parts, end = [], time.monotonic() + 1500
+            while server.popen.poll() is None and time.monotonic() < end:
+                # what the list of steps says, beside what is drawn
+                now = browser("value", expression="""(() => {
+                    const row = document.querySelector('.panel-steps li.now');
+                    const step = tenon.session.step;
+                    const drawn = step && tenon.view.positionOf(tenon.session.objects.get(step.object_id)?.name ?? '');
+                    return row && drawn ? [step.part, row.dataset.step, step.name] : null;
+                })()""")
+                if now is not None and now[0] not in parts:
+                    parts.append(now[0])
+                time.sleep(0.2)
+            self.assertEqual(server.wait(60), 0, server.text()[-2000:])
+            self.assertEqual(len(parts), 5, parts)
+            browser("await", expression="tenon.session.isOver")
+            self.assertEqual(browser("value", expression="document.querySelectorAll('.panel-steps li .badge.good').length"), 15)
+            self.assertEqual(browser.problems, [])
 
 
 if __name__ == "__main__":

@@ -7,9 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "scenarios/part_generator/mesh_builder.h"
-#include "scenarios/part_generator/picture.h"
 #include "scenarios/part_generator/scenario_parts.h"
-#include "scenarios/part_generator/scenario_pictures.h"
 
 namespace tenon::part_generator {
 namespace {
@@ -159,33 +157,6 @@ TEST(Triangulate, CoversAnOutlineWithoutItsHoles) {
     covered += piece;
   }
   EXPECT_NEAR(covered, expected, 1e-12);
-}
-
-TEST(RenderScene, WritesAPngOrFailsWhenItCannot) {
-  const PartMesh cube = makePart(pegAndBoxParts(), "cube", 0.0);
-  PictureCamera camera;
-  camera.p_WE = {0.2, -0.3, 0.25};
-  camera.p_WT = {0.0, 0.0, 0.03};
-  camera.width = 48;
-  camera.height = 32;
-  const std::vector<PictureObject> scene{{&cube, Pose(Vector3(0.0, 0.0, 0.025)), std::nullopt, 1.0},
-                                         {&cube, Pose(Vector3(0.07, 0.0, 0.025)), 0xA0C0E0, 0.5}};
-  ASSERT_TRUE(renderScene(scene, camera, temporaryFile("cube.png")));
-  EXPECT_EQ(bytesOf(temporaryFile("cube.png")).substr(1, 3), "PNG");
-  EXPECT_FALSE(renderScene(scene, camera, "/no/such/folder/cube.png"));
-}
-
-TEST(DrawScenario, DrawsEverySetBeforeAndInTheAssembly) {
-  for (const PartSet& set : partSets()) {
-    std::string pictures[2];
-    for (const PictureMoment moment : {PictureMoment::kStart, PictureMoment::kAssembly}) {
-      const std::filesystem::path file = temporaryFile("scenario.png");
-      ASSERT_TRUE(drawScenario(set, 0.0, moment, file, 64)) << set.name;
-      pictures[static_cast<int>(moment)] = bytesOf(file);
-    }
-    EXPECT_EQ(pictures[0].substr(1, 3), "PNG") << set.name;
-    EXPECT_NE(pictures[0], pictures[1]) << set.name;
-  }
 }
 
 }  // namespace

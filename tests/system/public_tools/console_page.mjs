@@ -5,6 +5,7 @@
 //   {"do": "type", "selector": CSS, "text": T}
 //   {"do": "key", "key": K}   as Playwright names it
 //   {"do": "key down", "key": K}, {"do": "key up", "key": K}
+//   {"do": "click", "at": [X, Y]}
 //   {"do": "sit down"}   takes part, as a person at the page would
 //   {"do": "mount", "seed": S, "seconds": T, "steps": [..]}   with the mouse, until the step is none of these
 //   {"do": "picture", "file": F}
@@ -60,6 +61,9 @@ const commands = {
   },
   async "key up"({ key }) {
     await page.keyboard.up(key);
+  },
+  async click({ at }) {
+    await page.mouse.click(at[0], at[1]);
   },
   async "sit down"() {
     await sitDown(page);

@@ -89,15 +89,15 @@ const tests = {
     assert.equal(recording.secondsOf(500), 0.5);
   },
 
-  async "forces before a place have the session's times"() {
+  async "what is plotted before a place have the session's times"() {
     const messages = [[0, "EventLog", { seq: 1, tick: 0, severity: 0, kind: "step", text: "a" }]];
     for (let i = 1; i <= 100; ++i) {
       messages.push([i / 25, "TickStats_100", { tick: 10 * i }]);
       messages.push([i / 25, "HandState_100", { hand_id: 0, F_Ho_W: { force: [i, 0, 0], torque: [0, 0, 0] } }]);
     }
     const { recording } = await opened(messages);
-    const { times, forces } = (await recording.forcesBefore(2, 1)).get(0);
-    assert.deepEqual([times.at(-1), forces.at(-1)], [0.5, 50]);
+    const { times, values } = (await recording.tracksBefore(2, 1)).of("force 0");
+    assert.deepEqual([times.at(-1), values.at(-1)], [0.5, 50]);
   },
 };
 

@@ -4,6 +4,26 @@ import type { Session } from "./session";
 import { hasText, localized, t, type Key } from "./strings";
 
 const ROLES = ["admin", "instructor", "trainee", "observer", "recorder"]; // as in the messages
+/** The rules of the safety layer by their bits, as devices/safety_rules.cpp names them. */
+const SAFETY = [
+  "non-finite force request",
+  "force fading by age",
+  "force request timed out",
+  "stiffness limited",
+  "soft start",
+  "force ramp limited",
+  "passivity damping",
+  "workspace limit",
+  "force limited",
+  "thermal limit",
+  "motor command saturated",
+  "overspeed, braking",
+  "force near the clutch limit",
+  "clutch open",
+  "dead-man switch released",
+  "emergency stop",
+  "forces off",
+];
 /** Texts by what they match. Groups: who and reason as they are; step, title, hand, role and word are translated. */
 const RULES: [RegExp, Key][] = [
   [/^(?<who>.+): by its link of the last 10 s, without input a hand is held still after (?<freeze>\d+) ms and parked after (?<park>\d+) ms; now inputs are up to (?<gap>\d+) ms apart and (?<lost>[\d.]+) % of them are lost$/, "event.link"],
@@ -30,14 +50,41 @@ const RULES: [RegExp, Key][] = [
   [/^engaged by (?<who>.+?): (?<reason>.*)$/, "event.engaged"],
   [/^cleared by (?<who>.+?): (?<reason>.*?)(?:; )?the session is paused until 'resume'$/, "event.cleared"],
   [/^hand '(?<hand>[^']+)' is guided no more: (?<reason>.+)$/, "event.guidance.ended"],
+  [/^hand (?<hand>\w+): safety: (?<rule>.+) \((?<force>[\d.]+) N requested.*\), step \d+$/, "event.safety"],
+  [/^hand (?<hand>\w+): safety: (?<rule>.+) ended, active for (?<seconds>[\d.]+) s, step \d+$/, "event.safety.ended"],
   [/^(?<who>.+?): '(?<word>\w+)': (?<reason>.+)$/, "event.refused"],
 ];
+
+/** What the safety layer of a hand does now, in words. */
+export function interventions(flags: number): string {
+  return SAFETY.map((_, bit) => bit).filter((bit) => (flags & (1 << bit)) !== 0).map((bit) => t(`safety.${bit}` as Key)).join(", ");
+}
 
 /** A text of the server with the titles of objects and steps instead of their names. */
 export function readable(session: Session, text: string): string {
   const titles = new Map([...session.objects.values()].map((object) => [object.name, session.titleOf(object.object_id)]));
   for (const step of session.sceneSteps.values()) titles.set(step.name, localized(step.title) || step.name.replace(/_/g, " "));
   return text.replace(/\w+/g, (word) => titles.get(word) ?? word);
+}
+
+/** How the server names a condition of a step, as describe() of server/game_control/step_messages.cpp does. */
+const CONDITIONS: [RegExp, Key][] = [
+  [/^pose of (?<a>.+)$/, "condition.pose"],
+  [/^force on (?<a>.+)$/, "condition.force"],
+  [/^contact (?<a>\w+)-(?<b>\w+)$/, "condition.pair"],
+  [/^contact of (?<a>.+)$/, "condition.contact"],
+  [/^signal (?<a>.+)$/, "condition.signal"],
+  [/^command fulfilled(?<a>)$/, "condition.fulfilled"],
+  [/^all(?<a>)$/, "condition.all"],
+  [/^any(?<a>)$/, "condition.any"],
+];
+
+export function conditionOf(session: Session, text: string): string {
+  for (const [pattern, key] of CONDITIONS) {
+    const groups = pattern.exec(text)?.groups;
+    if (groups !== undefined) return t(key, { a: readable(session, groups["a"]), b: readable(session, groups["b"] ?? "") });
+  }
+  return readable(session, text);
 }
 
 /** What a word of `tenon command` is called here. */
@@ -56,6 +103,7 @@ function value(session: Session, name: string, text: string): string {
     }
     case "role": return ROLES.includes(text) ? t(`role.${ROLES.indexOf(text)}` as Key) : text;
     case "word": return command(text);
+    case "rule": return SAFETY.includes(text) ? t(`safety.${SAFETY.indexOf(text)}` as Key) : text;
     default: return text;
   }
 }

@@ -3,14 +3,16 @@ import { h, icon } from "./dom";
 import { addressOf, LiveSource } from "./live";
 import type { LobbyState } from "./messages";
 import * as panels from "./panels";
+import { SceneView } from "./scene";
 import { Session } from "./session";
 import { t } from "./strings";
 
-const TOPICS = ["/console", "SceneStep", "StepState", "RunState", "Presence", "EmergencyStop", "EmergencyClear", "EventLog", "__instance_state"];
+const TOPICS = ["/console", "SceneObject", "SceneHand", "ObjectSnapshot", "WorldFrame_30", "SceneStep", "StepState", "RunState", "Presence", "EmergencyStop", "EmergencyClear", "EventLog", "__instance_state"];
 const TRAINEE = 2; // whose role is larger looks on
 const PERIOD = 500; // [ms] between looks
+const PICTURES = 8; // sessions that are drawn: a browser draws in so many places only
 
-interface Card { element: HTMLAnchorElement; session: Session; source?: LiveSource; info: LobbyState["sessions"][number]; shown: string }
+interface Card { element: HTMLAnchorElement; picture: HTMLElement; text: HTMLElement; view?: SceneView; session: Session; source?: LiveSource; info: LobbyState["sessions"][number]; shown: string }
 
 export class Lobby {
   readonly element = h("section", "lobby");
@@ -19,6 +21,7 @@ export class Lobby {
   private head = h("h1", "");
   private none = h("div", "none");
   private shown = 0;
+  private isBlind = false; // without WebGL
 
   constructor() {
     this.element.append(this.head, this.list, this.none);
@@ -29,11 +32,12 @@ export class Lobby {
     for (const [name, card] of this.cards) {
       if (names.has(name)) continue;
       card.source?.close();
+      card.view?.end();
       card.element.remove();
       this.cards.delete(name);
     }
     for (const info of state.sessions) {
-      const card: Card = this.cards.get(info.session) ?? { element: h("a", "session"), session: new Session(), info, shown: "" };
+      const card: Card = this.cards.get(info.session) ?? this.card(info);
       card.info = info;
       this.cards.set(info.session, card);
       this.list.append(card.element);
@@ -43,6 +47,32 @@ export class Lobby {
       card.source = new LiveSource(addressOf(`/live/${encodeURIComponent(info.session)}`), TOPICS, follow, () => undefined);
     }
     this.shown = 0;
+  }
+
+  private card(info: Card["info"]): Card {
+    const [picture, text] = [h("div", "picture-of"), h("div", "session-text")];
+    return { element: h("a", "session", picture, text), picture, text, session: new Session(), info, shown: "" };
+  }
+
+  /** Draws it as it is now, in a canvas that takes no part in the page. */
+  private draw(card: Card, now: number): void {
+    const { session } = card;
+    const drawn = [...this.cards.values()].filter(({ view }) => view !== undefined).length;
+    if (card.view === undefined && session.objects.size > 0 && drawn < PICTURES && !this.isBlind) {
+      try {
+        card.view = new SceneView(card.picture, "", "simple");
+        card.view.canvas.removeAttribute("tabindex");
+        card.view.canvas.setAttribute("aria-hidden", "true");
+        card.view.setTheme();
+      } catch {
+        this.isBlind = true;
+      }
+    }
+    card.view?.update(session, now);
+  }
+
+  setTheme(): void {
+    for (const { view } of this.cards.values()) view?.setTheme();
   }
 
   setWords(): void {
@@ -58,10 +88,11 @@ export class Lobby {
     this.none.hidden = this.cards.size > 0;
     this.list.hidden = this.cards.size === 0;
     for (const card of this.cards.values()) {
+      this.draw(card, now);
       const content = h("div", "", ...this.contentOf(card));
       if (content.innerHTML === card.shown) continue;
       card.shown = content.innerHTML;
-      card.element.replaceChildren(...content.childNodes);
+      card.text.replaceChildren(...content.childNodes);
     }
   }
 

@@ -1,22 +1,29 @@
 import "./style.css";
 
+import { FRAME, playsBeside, showBeside, tellBeside } from "./beside";
+import { coverOf, linkBadge, PROTOCOL, type Opening, type Standing } from "./cover";
 import { Desk, PASS } from "./desk";
-import { h, icon, type Icon } from "./dom";
+import { h, icon } from "./dom";
 import { addressOf, LiveSource, type LiveState } from "./live";
 import { Lobby } from "./lobby";
 import type { Gateway, LobbyState } from "./messages";
+import { Labels } from "./labels";
 import * as panels from "./panels";
 import { Part } from "./part";
-import { ForcePlot } from "./plot";
+import { Plots } from "./plot";
 import { Player } from "./player";
 import { fromAddress, fromFile, Recording } from "./recording";
 import { SceneView } from "./scene";
 import { Session, TOPICS } from "./session";
+import { ViewTools } from "./viewtools";
 import { keep, kept, language, languageNames, nameOfLanguage, setLanguage, t, type Key } from "./strings";
 
-const PROTOCOL = 7; // kProtocolVersion of idl/types/messages/session.h
 const PANEL_PERIOD = 100; // ms
-const COMMAND = "./tenon demo";
+
+// ?picture is nothing but the scene: of it `tenon picture` makes its pictures, and waits until it is complete
+const wanted = new URLSearchParams(location.search);
+const isPicture = wanted.has("picture");
+const SETTLED = 1000; // [ms] without a change
 
 const session = new Session();
 let live: LiveState = { kind: "connecting" };
@@ -26,14 +33,14 @@ let desk: Desk | undefined;
 let part: Part | undefined;
 let lobby: Lobby | undefined;
 let player: Player | undefined;
-/** Of a recording that is opened: how much is read, or why it cannot be. */
-let opening: { fraction: number; problem?: string } | undefined;
+let opening: Opening | undefined;
 let isDropping = false;
 
 // ---- what the page consists of
 setLanguage(language);
-const theme = kept("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
+const theme = (isPicture ? null : kept("theme")) ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
 document.documentElement.dataset["theme"] = theme;
+document.documentElement.classList.toggle("picture", isPicture);
 
 const title = h("span", "title");
 const link = h("span", "badge info");
@@ -45,8 +52,6 @@ const stage = h("main", "stage");
 const card = h("section", "card");
 const cover = h("div", "cover");
 cover.setAttribute("role", "status");
-const tools = h("div", "tools");
-const frameButton = h("button", "");
 const legend = h("div", "legend");
 const note = h("p", "note");
 const status = h("footer", "status");
@@ -59,6 +64,7 @@ const sections = {
 const noForce = h("p", "muted");
 const plotHost = h("div");
 sections.plots.body.append(noForce, plotHost);
+sections.plots.body.tabIndex = 0;
 const side = h("aside", "side");
 for (const [name, { head, body }] of Object.entries(sections)) {
   // scrolled by keys, too
@@ -73,8 +79,7 @@ const tabButtons = (["steps", "plots", "people"] as const).map((name) => {
   tabs.append(button);
   return { name, button };
 });
-tools.append(frameButton);
-stage.append(card, legend, tools, note, cover);
+stage.append(card, legend, note, cover);
 const brand = h("span", "brand", "Tenon");
 const all = Object.assign(h("a", "all"), { href: "/", hidden: true });
 const stripText = h("span", "strip-text");
@@ -88,11 +93,20 @@ stripText.setAttribute("role", "status");
 let view: SceneView | undefined;
 try {
   // ?drawing=full or simple overrides what was found out about the graphics hardware
-  view = new SceneView(stage, t("view.label"), new URLSearchParams(location.search).get("drawing"));
+  view = new SceneView(stage, t("view.label"), wanted.get("drawing"));
 } catch (problem) {
   console.warn(problem);
 }
-const plot = new ForcePlot(plotHost, noForce);
+const tools = view === undefined ? undefined : new ViewTools(view, session);
+if (view !== undefined && tools !== undefined) {
+  const labels = new Labels(view);
+  labels.from(() => tools.labels());
+  labels.from(() => (isPicture ? [] : panels.holders(session)));
+  view.canvas.after(labels.element);
+  stage.append(tools.element);
+}
+const plots = new Plots(plotHost, noForce);
+sections.plots.head.after(plots.choice);
 
 // ---- words, light and dark
 function showTab(name: string): void {
@@ -102,13 +116,14 @@ function showTab(name: string): void {
 
 function setWords(): void {
   const heads: [HTMLElement, Key][] = [
-    [sections.steps.head, "steps"], [sections.plots.head, "force"], [sections.people.head, "people"], [sections.events.head, "events"],
-    [frameButton, "view.reset"], [noForce, "force.none"], [all, "lobby.all"],
+    [sections.steps.head, "steps"], [sections.plots.head, "plots"], [sections.people.head, "people"], [sections.events.head, "events"],
+    [noForce, "force.none"], [all, "lobby.all"],
   ];
   desk?.setWords();
   part?.setWords();
   player?.setWords();
   lobby?.setWords();
+  tools?.setWords();
   for (const [element, key] of heads) element.textContent = t(key);
   for (const { head, body } of Object.values(sections)) body.setAttribute("aria-label", head.textContent);
   for (const { name, button } of tabButtons) button.textContent = t(`tab.${name}`);
@@ -122,7 +137,7 @@ function setWords(): void {
   languages.setAttribute("aria-label", t("language"));
   note.textContent = view?.simple === true ? t("view.simple") : "";
   view?.setLabel(t("view.label"));
-  plot.rebuild();
+  plots.rebuild();
   shown = "";
 }
 
@@ -130,7 +145,8 @@ function setTheme(name: string): void {
   document.documentElement.dataset["theme"] = name;
   keep("theme", name);
   view?.setTheme();
-  plot.rebuild();
+  lobby?.setTheme();
+  plots.rebuild();
 }
 
 languages.addEventListener("change", () => {
@@ -138,7 +154,6 @@ languages.addEventListener("change", () => {
   setWords();
 });
 themeButton.addEventListener("click", () => setTheme(document.documentElement.dataset["theme"] === "light" ? "dark" : "light"));
-frameButton.addEventListener("click", () => view?.frame());
 addEventListener("keydown", (event) => {
   const isTyping = event.target instanceof HTMLInputElement || event.target instanceof HTMLTextAreaElement || event.target instanceof HTMLSelectElement;
   if (isTyping || event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]") !== null) return;
@@ -149,7 +164,7 @@ addEventListener("keydown", (event) => {
     if (player !== undefined) player.toggle();
     else void desk?.raise();
   }
-  if (part?.onKeyDown(event) === true) return;
+  if (part?.onKeyDown(event) === true || (lobby === undefined && tools?.onKeyDown(event) === true)) return;
   if (event.key === "r") view?.frame();
   if (event.key === "l") themeButton.click();
   if (event.key === ",") player?.step(-1);
@@ -179,45 +194,8 @@ sections.events.body.addEventListener("click", (event) => {
   if (row !== null) player?.seekTick(Number(row.dataset["tick"]));
 });
 
-// ---- how the connection stands
-interface Cover { state: string; icon: Icon; head: string; more: string; command?: string; covers: boolean }
-
-function coverOf(): Cover | undefined {
-  if (isDropping) return { state: "drop", icon: "over", head: t("cover.drop"), more: t("cover.drop.more"), covers: true };
-  const problem = opening?.problem ?? player?.problem;
-  if (problem !== undefined) return { state: "file", icon: "warn", head: t("cover.file"), more: t("cover.file.more", { reason: problem }), covers: true };
-  if (opening !== undefined) return { state: "reading", icon: "wait", head: t("cover.reading"), more: t("cover.reading.more", { percent: Math.round(100 * opening.fraction) }), covers: true };
-  if (lobby !== undefined && live.kind === "open") return undefined;
-  const make = (state: string, name: Icon, covers: boolean, values = {}): Cover => {
-    const more = `cover.${state}.more` as Key;
-    return { state, icon: name, head: t(`cover.${state}` as Key), more: t(more, values), covers };
-  };
-  if (live.kind === "reconnecting") return make("reconnecting", "warn", session.link === undefined, { seconds: live.seconds });
-  const { link: gateway } = session;
-  if (player !== undefined) return view === undefined ? { state: "webgl", icon: "warn", head: t("cover.webgl"), more: t("cover.webgl.more"), covers: true } : undefined;
-  if (live.kind === "connecting" || gateway === undefined) return make("connecting", "wait", true);
-  if (gateway.protocol !== PROTOCOL) return make("protocol", "warn", true);
-  if (gateway.state === "refused") return { state: "refused", icon: "warn", head: t("cover.refused"), more: gateway.reason, covers: true };
-  if (gateway.state === "searching") return { ...make("searching", "wait", true), command: COMMAND };
-  if (gateway.state === "lost") return make("lost", "warn", false);
-  return view === undefined ? make("webgl", "warn", true) : undefined;
-}
-
-function linkBadge(): [Key, Icon, string] {
-  if (player !== undefined) return ["link.recorded", "over", "info"];
-  if (live.kind === "reconnecting") return ["link.reconnecting", "warn", "warn"];
-  if (lobby !== undefined && live.kind === "open") return ["link.joined", "live", "good"];
-  switch (live.kind === "connecting" ? undefined : session.link?.state) {
-    case "joined": return ["link.joined", "live", "good"];
-    case "searching": return ["link.searching", "wait", "info"];
-    case "refused": return ["link.refused", "warn", "bad"];
-    case "lost": return ["link.lost", "warn", "bad"];
-    case "ended": return ["link.ended", "over", "info"];
-    default: return ["link.connecting", "wait", "info"];
-  }
-}
-
 // ---- showing it
+const standing = (): Standing => ({ isDropping, opening, player, lobby, live, session, view });
 let shown = "";
 let shownAt = 0;
 
@@ -231,7 +209,7 @@ function show(element: HTMLElement, nodes: Node[]): void {
 }
 
 function showPanels(age: number): void {
-  const [key, name, tone] = linkBadge();
+  const [key, name, tone] = linkBadge(standing());
   link.className = `badge ${tone}`;
   show(link, [icon(name), document.createTextNode(t(key))]);
   title.textContent = lobby !== undefined ? "" : session.link?.title || t("title.none");
@@ -250,7 +228,7 @@ function showPanels(age: number): void {
   show(sections.people.body, panels.people(session, { leads: desk?.role === "instructor" && !session.isOver, hand: part?.handName }));
   show(sections.events.body, panels.events(session));
   show(status, panels.status(session, age));
-  const over = coverOf();
+  const over = coverOf(standing());
   cover.hidden = over === undefined;
   cover.className = over?.covers === true ? "cover full" : "cover";
   cover.dataset["state"] = over?.state ?? "none";
@@ -264,8 +242,10 @@ function frame(now: number): void {
   const age = session.heard === 0 || player !== undefined ? 0 : (now - session.heard) / 1000;
   player?.update(now);
   lobby?.update(now);
+  tools?.update();
   if (lobby === undefined) view?.update(session, now);
-  plot.update(session, now);
+  if (isPicture) picture(now);
+  plots.update(session, now);
   const hand = part?.hand;
   const state = `${hand?.views.length} ${hand?.isOn} ${hand?.current} ${hand?.isAligning} ${hand?.isDeepening} ${hand?.isFine} ${hand?.isTurning} ${session.changed} ${session.moved} ${live.kind} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${player?.problem} ${age > 0.5 ? age.toFixed(1) : ""}`;
   if (now - shownAt >= PANEL_PERIOD && state !== shown) {
@@ -274,6 +254,25 @@ function frame(now: number): void {
     showPanels(age);
   }
   requestAnimationFrame(frame);
+}
+
+let settled = 0;
+let told = "";
+
+/** Says when the picture is complete, or why it cannot be. */
+function picture(now: number): void {
+  const over = coverOf(standing());
+  const { dataset } = document.body;
+  if (over !== undefined && ["file", "refused", "webgl", "protocol", "lost"].includes(over.state)) dataset["picture"] = `${over.head}: ${over.more}`;
+  const state = `${session.objects.size} ${session.step?.revision} ${view?.models} ${player?.isReading}`;
+  if (view?.isComplete !== true || player?.isReading === true || state !== told) settled = now;
+  told = state;
+  if (now - settled < SETTLED) return;
+  if (wanted.has("near") && session.step !== undefined && dataset["near"] === undefined) {
+    dataset["near"] = "";
+    tools?.showWork();
+    settled = now;
+  } else dataset["picture"] = "ready";
 }
 
 // ---- where the session comes from
@@ -316,7 +315,8 @@ function showLobby(role: string): void {
   stage.append(desk.notices);
 }
 
-async function play(open: () => Promise<Awaited<ReturnType<typeof fromAddress>>>): Promise<void> {
+/** `file`: undefined for the gateway's own recording. */
+async function play(file: File | undefined): Promise<void> {
   source?.close();
   part?.end();
   for (const element of [part?.take, part?.bar, part?.lesson, desk?.stop, desk?.clear, desk?.sit, desk?.bar, desk?.notices, lobby?.element, player?.element]) element?.remove();
@@ -325,11 +325,13 @@ async function play(open: () => Promise<Awaited<ReturnType<typeof fromAddress>>>
   opening = { fraction: 0 };
   session.forget();
   try {
-    const recording = await Recording.open(await open(), (topic, message, isGone) => session.receive(topic, message, isGone), (fraction) => (opening = { fraction }));
+    const recording = await Recording.open(file === undefined ? await fromAddress("/recording.mcap") : fromFile(file), (topic, message, isGone) => session.receive(topic, message, isGone), (fraction) => (opening = { fraction }));
     player = new Player(recording, session, (name) => panels.titleOfStep([...session.sceneSteps.values()].find((step) => step.name === name) ?? { name, title: [] }));
     status.before(player.element);
+    if (wanted.has(FRAME)) player.onCommand = tellBeside;
+    else player.allowCompare((other) => showBeside(app, file, other));
     opening = undefined;
-    const start = Number(new URLSearchParams(location.search).get("t") ?? 0);
+    const start = wanted.get("t") === "end" ? player.recording.seconds : Number(wanted.get("t") ?? 0);
     if (start > 0) player.seek(start);
   } catch (problem) {
     opening = { fraction: 0, problem: problem instanceof Error ? problem.message : String(problem) };
@@ -340,9 +342,10 @@ async function play(open: () => Promise<Awaited<ReturnType<typeof fromAddress>>>
 async function begin(): Promise<void> {
   const answer = await fetch("/gateway.json").catch(() => undefined);
   const gateway: Gateway = answer?.ok ? ((await answer.json()) as Gateway) : { session: "", recording: "", role: "", protocol: PROTOCOL };
-  const chosen = new URLSearchParams(location.search).get("session");
+  const chosen = wanted.get("session");
   all.hidden = chosen === null || gateway.session !== "";
-  if (gateway.recording !== "") await play(() => fromAddress("/recording.mcap"));
+  if (wanted.has(FRAME)) playsBeside((file) => void play(file), () => player);
+  else if (gateway.recording !== "") await play(undefined);
   else if (gateway.session === "" && chosen === null) showLobby(gateway.role);
   else follow(gateway.session === "" ? `/live/${encodeURIComponent(chosen ?? "")}` : "/live", gateway.role, gateway.recordings === true);
 }
@@ -352,7 +355,7 @@ for (const name of ["dragover", "dragleave", "drop"] as const)
     event.preventDefault();
     isDropping = name === "dragover" && event.dataTransfer?.types.includes("Files") === true;
     const file = name === "drop" ? event.dataTransfer?.files[0] : undefined;
-    if (file !== undefined) void play(() => Promise.resolve(fromFile(file)));
+    if (file !== undefined) void play(file);
   });
 
 setWords();

@@ -1,7 +1,7 @@
 // What is drawn beside the parts: devices, contacts with their forces, the way of the hand, the approach. World frame, metres.
 import * as THREE from "three";
 
-import { StepPhase, type Pose } from "./messages";
+import { NONE, StepPhase, type Pose } from "./messages";
 import type { Session } from "./session";
 
 export const COLORS = { target: 0x0072b2, within: 0x009e73, device: 0xe69f00, force: 0xcc79a7, shallow: 0xf0e442, deep: 0xd55e00, guide: 0x56b4e9 };
@@ -9,6 +9,9 @@ const DEEP = 0.002; // [m] depth at which a contact has the colour `deep`
 const METRES_PER_NEWTON = 0.006;
 const LONGEST_ARROW = 0.35; // [m]
 const CONTACTS = 64;
+const TACTORS = 6; // about a forearm, whose x goes from elbow to wrist: the first on top, the others every 60 degrees
+const RED = new THREE.Color(0xd55e00);
+const GREY = new THREE.Color(0x52606d);
 const OPEN = { depthTest: false, transparent: true } as const; // seen through parts
 
 export function place(target: THREE.Object3D, pose: Pose): void {
@@ -22,6 +25,7 @@ export class Markers {
   private hands = new Map<number, { device: THREE.Mesh; link: THREE.Line }>();
   private contacts = new THREE.InstancedMesh(new THREE.SphereGeometry(0.008, 12, 8), new THREE.MeshBasicMaterial({ ...OPEN, opacity: 0.9 }), CONTACTS);
   private arrows: THREE.ArrowHelper[] = [];
+  private tactors = new Map<number, THREE.Mesh<THREE.SphereGeometry, THREE.MeshBasicMaterial>[]>();
   private guide = new THREE.Line(
     new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3()]),
     new THREE.LineDashedMaterial({ ...OPEN, color: COLORS.guide, dashSize: 0.015, gapSize: 0.01 }),
@@ -48,12 +52,15 @@ export class Markers {
   /** Of another session nothing is left. */
   clear(): void {
     for (const { device, link } of this.hands.values()) this.scene.remove(device, link);
+    for (const bracelet of this.tactors.values()) this.scene.remove(...bracelet);
     this.hands.clear();
+    this.tactors.clear();
     this.approach.visible = false;
   }
 
   take(session: Session): void {
     this.takeHands(session);
+    this.takeTactors(session);
     this.takeContacts(session);
     this.takeApproach(session);
   }
@@ -119,6 +126,30 @@ export class Markers {
       ends.setXYZ(0, proxy.x, proxy.y, proxy.z);
       ends.setXYZ(1, hand.X_WH.p[0], hand.X_WH.p[1], hand.X_WH.p[2]);
       ends.needsUpdate = true;
+    }
+  }
+
+  /** The vibration motors of a forearm's bracelet: grey, and red and larger the more they vibrate. */
+  private takeTactors(session: Session): void {
+    for (const [id, hand] of session.hands) {
+      const object = session.objects.get(session.sceneHands.get(id)?.object_id ?? NONE);
+      const X = session.states.get(object?.object_id ?? NONE)?.X_WO;
+      if (object?.kind !== "forearm" || X === undefined) continue;
+      let bracelet = this.tactors.get(id);
+      if (bracelet === undefined) {
+        bracelet = Array.from({ length: TACTORS }, () => new THREE.Mesh(new THREE.SphereGeometry(0.008, 12, 8), new THREE.MeshBasicMaterial()));
+        this.tactors.set(id, bracelet);
+        this.scene.add(...bracelet);
+      }
+      const q = new THREE.Quaternion(X.q[0], X.q[1], X.q[2], X.q[3]);
+      const { size, centre } = object;
+      bracelet.forEach((motor, i) => {
+        const [angle, strength] = [(i * Math.PI) / 3, hand.tactors[i] / 255];
+        motor.position.set(centre[0] + 0.3 * size[0], centre[1] + 0.5 * size[1] * Math.sin(angle), centre[2] + 0.5 * size[2] * Math.cos(angle));
+        motor.position.applyQuaternion(q).add(new THREE.Vector3(X.p[0], X.p[1], X.p[2]));
+        motor.scale.setScalar(1 + strength);
+        motor.material.color.copy(GREY).lerp(RED, strength);
+      });
     }
   }
 

@@ -17,7 +17,7 @@ export interface ObjectState {
 }
 export interface WorldFrame { part: number; parts: number; tick: bigint; step_revision: number; states: ObjectState[] }
 export interface ObjectSnapshot { object_id: number; tick: bigint; state: ObjectState }
-export interface HandState { hand_id: number; seq: number; X_WH: Pose; F_Ho_W: Wrench; manifold_age: number; safety_flags: number; indexing: boolean; guidance_force: number }
+export interface HandState { hand_id: number; seq: number; X_WH: Pose; p_WC: Vector; tactors: ArrayLike<number>; F_Ho_W: Wrench; manifold_age: number; safety_flags: number; indexing: boolean; guidance_force: number }
 export interface PairContact {
   a: number; b: number; enabled: boolean; colliding: boolean; contacts: number; F_Ao_W: Wrench; p_WP: Vector; depth: number; gap: number;
   load_percent: number; peak_force: number; peak_depth: number;
@@ -49,7 +49,8 @@ export interface EmergencyClear { client_guid: string; counter: number; who: str
 export interface RecorderStatus { file: string; recording: boolean; messages: bigint; lost: bigint; problem: string }
 export interface Telemetry { client_id: number; input_to_force_p50: number; input_to_force_p99: number; loop_overruns: bigint; samples: bigint; age: number; jitter: number; answers_lost: number; inputs_lost: number; inputs_replaced: number; clock_known: boolean; clock_offset: number; clock_error: number; round_trip: number }
 export interface SessionAnnounce { session: string; title: string; host: string; lockstep: boolean; protocol_version: number; scene_hash: string }
-export interface EventLog { seq: bigint; tick: bigint; severity: number; kind: string; text: string }
+/** `client_id`: of a ClientEvent, which has no severity of its own. */
+export interface EventLog { seq: bigint; tick: bigint; severity: number; kind: string; text: string; client_id?: number }
 export interface InstanceGone { topic: string; key_sample: Uint8Array }
 /** Of the channel /console: how the gateway stands to its session. */
 export interface ConsoleState {

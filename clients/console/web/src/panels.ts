@@ -1,7 +1,10 @@
 // What stands around the scene: instruction, steps, people, events, status. Each part is made anew from the session when it changed.
+import { Vector3 } from "three";
+
 import { devicesOf } from "./desk";
 import { h, icon, type Icon } from "./dom";
-import { kindOf, readable, textOf } from "./eventtext";
+import { conditionOf, interventions, kindOf, textOf } from "./eventtext";
+import type { Label } from "./labels";
 import { NONE, RunPhase, StepPhase, type EventLog } from "./messages";
 import type { Session, StepEntry } from "./session";
 import { localized, t, type Key } from "./strings";
@@ -75,7 +78,7 @@ function conditions(session: Session): Node[] {
   }
   for (const { text, value, limit, met } of progress.conditions) {
     if (step.has_target && text.startsWith("pose of")) continue;
-    rows.push(meter(readable(session, text), `${Number(value.toPrecision(3))} / ${Number(limit.toPrecision(3))}`, limit === 0 ? (met ? 1 : 0) : value / limit, met));
+    rows.push(meter(conditionOf(session, text), `${Number(value.toPrecision(3))} / ${Number(limit.toPrecision(3))}`, limit === 0 ? (met ? 1 : 0) : value / limit, met));
   }
   return rows.length === 0 ? [] : [h("ul", "conditions", ...rows)];
 }
@@ -112,6 +115,16 @@ function linkOf(session: Session, client: number): string {
   return link.clock_known ? `${text}, ${t("link.trip", { trip: ms(link.round_trip), error: ms(link.clock_error) })}` : text;
 }
 
+/** Who holds what, at the places of the hands. */
+export function holders(session: Session): Label[] {
+  return [...session.hands].flatMap(([id, { X_WH }]): Label[] => {
+    const holds = [...session.grabs.values()].some(({ hand_id, object_id }) => hand_id === id && !session.isOwn(object_id) && session.holderOf(object_id) === id);
+    const person = [...session.people.values()].find(({ alive, hands }) => alive && Array.from(hands).includes(id));
+    if (!holds || person === undefined || session.isTracked(id)) return [];
+    return [{ place: new Vector3(X_WH.p[0], X_WH.p[1], X_WH.p[2]), text: `${person.name} · ${session.nameOfHand(id)}` }];
+  });
+}
+
 /** What the person at this page may do with people: remove them, and take what they hold into the hand of this name. */
 export interface Lead { leads: boolean; hand?: string }
 const OBSERVER = 3; // of the roles of messages: the console's gateway is one
@@ -143,9 +156,11 @@ export function people(session: Session, { leads, hand }: Lead): Node[] {
         for (const kind of ["show", "together"] as const) act("guide", `${kind} ${name}`, t(`guide.${kind}`), t(`guide.${kind}.more`, { what }));
         act("guide", `off ${name}`, t("guide.off"), t("guide.off.more", { what }));
       }
+    const limited = hands.map((id) => interventions(session.hands.get(id)?.safety_flags ?? 0)).find((text) => text !== "") ?? "";
     const guidance = guided.length === 0 ? "" : t("guide.acts", { what: guided.map((id) => session.nameOfHand(id)).join(", ") });
     if (leads && person.role !== OBSERVER) act("kick", String(person.client_id), t("desk.kick"), `${t("desk.kick")}: ${person.name}`);
     const details = [devices, link, guidance].filter((text) => text !== "").map((text) => h("small", "muted", text));
+    if (limited !== "") details.push(h("small", "warn", limited));
     return h("li", "", icon("person"), head, ...details, ...(actions.length === 0 ? [] : [h("div", "row", ...actions)]));
   });
   return [h("ul", "people", ...rows)];
@@ -157,7 +172,7 @@ export function events(session: Session): Node[] {
   for (const event of session.events) {
     const before = told[told.length - 1];
     if (event.kind === "hand free") continue;
-    if (before?.event.kind === event.kind && event.kind === "hand frozen") told[told.length - 1] = { event, times: before.times + 1 };
+    if (before?.event.kind === event.kind && ["hand frozen", "safety"].includes(event.kind)) told[told.length - 1] = { event, times: before.times + 1 };
     else told.push({ event, times: 1 });
   }
   const rows = told.slice(-EVENTS_SHOWN).reverse().map(({ event, times }) => {

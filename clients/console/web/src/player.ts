@@ -6,7 +6,7 @@ import type { Session } from "./session";
 import { t } from "./strings";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16];
-const WINDOW = 30; // s of forces before the place that was sought
+const WINDOW = 30; // s of what is plotted before the place that was sought
 const FRAME = 1 / 30; // s of a single step
 const SHAPES: [(mark: Mark) => boolean, string][] = [
   [(mark) => mark.kind === "note", "note"],
@@ -15,15 +15,24 @@ const SHAPES: [(mark: Mark) => boolean, string][] = [
   [(mark) => mark.kind === "mounted", "good"],
 ];
 
+/** What somebody does with a player, so that another one can do the same: `step`: and s since it began, where both have it. */
+export interface Command { isPlaying?: boolean; speed?: number; seconds?: number; step?: { name: string; after: number } }
+
 export class Player {
+  /** Called with each of them. */
+  onCommand?: (command: Command) => void;
+  /** Called with a recording that is to be shown beside this one. */
+  onCompare?: (file: File) => void;
   readonly element = h("section", "player");
   time = 0; // s since the beginning
   isPlaying = false;
+  /** A place is sought. */
   /** Why the recording could not be read last; the next place may be. */
   problem?: string;
   /** The longest of the last seeks [ms]; for tests. */
   seekMilliseconds = 0;
   private speed = 1;
+  isReading = false;
   private isBusy = false;
   private wanted?: number; // where to seek next
   private seeks = 0;
@@ -35,13 +44,24 @@ export class Player {
   private fill = h("i", "fill");
   private knob = h("i", "knob");
   private hint = h("output", "hint");
+  private compare = h("button", "compare", icon("beside"));
+  private file = Object.assign(h("input"), { type: "file", accept: ".mcap" });
 
   constructor(readonly recording: Recording, private session: Session, private titleOf: (step: string) => string) {
     const back = this.button("back", () => this.seek(this.time - FRAME), "player.back");
     const on = this.button("on", () => this.seek(this.time + FRAME), "player.on");
     this.play.addEventListener("click", () => this.toggle());
     this.speeds.append(...SPEEDS.map((speed) => Object.assign(h("option", "", `${speed < 1 ? `1/${1 / speed}` : speed} ×`), { value: String(speed), selected: speed === 1 })));
-    this.speeds.addEventListener("change", () => (this.speed = Number(this.speeds.value)));
+    this.speeds.addEventListener("change", () => {
+      this.speed = Number(this.speeds.value);
+      this.onCommand?.({ speed: this.speed });
+    });
+    this.file.addEventListener("change", () => {
+      const file = this.file.files?.[0];
+      if (file !== undefined) this.onCompare?.(file);
+    });
+    this.compare.addEventListener("click", () => this.file.click());
+    this.compare.hidden = this.file.hidden = true;
     this.line.tabIndex = 0;
     this.line.setAttribute("role", "slider");
     this.line.setAttribute("aria-valuemin", "0");
@@ -57,7 +77,7 @@ export class Player {
     this.line.addEventListener("pointerleave", () => (this.hint.hidden = true));
     this.line.addEventListener("keydown", (event) => this.onKey(event));
     this.hint.hidden = true;
-    this.element.append(back, this.play, on, this.clockText, this.line, this.speeds);
+    this.element.append(back, this.play, on, this.clockText, this.line, this.speeds, this.compare, this.file);
     this.setWords();
     this.seek(0);
   }
@@ -72,6 +92,8 @@ export class Player {
   setWords(): void {
     this.line.setAttribute("aria-label", t("player.time"));
     this.speeds.setAttribute("aria-label", t("player.speed"));
+    this.compare.setAttribute("aria-label", t("beside"));
+    this.compare.title = t("beside");
     this.drawMarks();
     this.show();
   }
@@ -124,6 +146,22 @@ export class Player {
     if (!this.isPlaying && this.time >= this.recording.seconds) this.seek(0);
     else if (this.problem !== undefined) this.seek(this.time); // what is to come is read anew
     this.isPlaying = !this.isPlaying;
+    this.onCommand?.({ isPlaying: this.isPlaying });
+    this.show();
+  }
+
+  /** There is a page to show another recording beside this one. */
+  allowCompare(onCompare: (file: File) => void): void {
+    this.onCompare = onCompare;
+    this.compare.hidden = false;
+  }
+
+  /** Does what was done to another player: of a step the same time since its beginning, else the same time. */
+  obey({ isPlaying, speed, seconds, step }: Command): void {
+    if (isPlaying !== undefined) this.isPlaying = isPlaying;
+    if (speed !== undefined) this.speeds.value = String((this.speed = speed));
+    const mark = step === undefined ? undefined : this.recording.marks.find(({ kind, text }) => kind === "step" && text === step.name);
+    if (seconds !== undefined) this.go(mark === undefined || step === undefined ? seconds : mark.seconds + step.after);
     this.show();
   }
 
@@ -136,15 +174,21 @@ export class Player {
     this.seek(this.recording.secondsOf(tick));
   }
 
-  /** The last place asked for counts. */
   seek(seconds: number): void {
+    const mark = this.recording.marks.filter(({ kind, seconds: at }) => kind === "step" && at <= seconds).pop();
+    this.onCommand?.({ seconds, step: mark === undefined ? undefined : { name: mark.text, after: seconds - mark.seconds } });
+    this.go(seconds);
+  }
+
+  /** The last place asked for counts. */
+  private go(seconds: number): void {
     this.wanted = Math.min(this.recording.seconds, Math.max(0, seconds));
     void this.work();
   }
 
   private async work(): Promise<void> {
     if (this.isBusy) return;
-    this.isBusy = true;
+    this.isBusy = this.isReading = true;
     while (this.wanted !== undefined) {
       this.time = this.wanted;
       this.wanted = undefined;
@@ -155,12 +199,12 @@ export class Player {
       await this.attempt(() => this.recording.seek(this.time));
       this.seekMilliseconds = performance.now() - began;
     }
-    this.isBusy = false;
+    this.isBusy = this.isReading = false;
     this.show();
     if (this.problem !== undefined) return;
     const { seeks } = this;
     await this.attempt(async () => {
-      const before = await this.recording.forcesBefore(this.time, WINDOW);
+      const before = await this.recording.tracksBefore(this.time, WINDOW);
       if (seeks === this.seeks) this.session.recall(before);
     });
   }

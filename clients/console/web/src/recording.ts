@@ -5,15 +5,16 @@ import { decompress } from "fzstd";
 
 import { decoderOf, type Decoder } from "./decode";
 import { INSTANCE_STATE, type Handler } from "./live";
-import type { ConsoleState, EventLog, HandState, InstanceGone, SessionAnnounce, TickStats } from "./messages";
+import type { ConsoleState, ContactPairs, EventLog, HandState, InstanceGone, SessionAnnounce, Telemetry, TickStats } from "./messages";
+import { Tracks } from "./tracks";
 
 // states and events: all of them before a moment tell how it stands then
 const KEPT = [
-  "SessionAnnounce", "SceneObject", "SceneHand", "SceneStep", "ObjectSnapshot", "StepState", "RunState", "GrabState", "Presence", "EmergencyStop", "EmergencyClear", "EventLog",
+  "SessionAnnounce", "SceneObject", "SceneHand", "SceneStep", "ObjectSnapshot", "StepState", "RunState", "GrabState", "Presence", "EmergencyStop", "EmergencyClear", "EventLog", "ClientEvent",
   INSTANCE_STATE,
 ];
 // streams: the newest of each instance before a moment
-const STREAMS = ["WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepProgress"];
+const STREAMS = ["WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepProgress", "Telemetry"];
 const ALL_OBJECTS = "WorldFrame_30"; // has those that rest, too; a seek alone reads it
 const BEFORE = [150_000_000n, 1_000_000_000n, 8_000_000_000n]; // [ns] in which a frame of all objects is looked for: in real time some are lost
 const BLOCK = 1 << 19; // bytes that are read at a time
@@ -191,22 +192,23 @@ export class Recording {
     return `${channel} ${hasKey && data.length >= 8 ? new DataView(data.buffer, data.byteOffset).getUint32(4, true) : 0}`;
   }
 
-  /** What each hand was given before a time [N], over some seconds; times are those of the session. */
-  async forcesBefore(seconds: number, window: number): Promise<Map<number, { times: number[]; forces: number[] }>> {
-    const hands = new Map<number, { times: number[]; forces: number[] }>();
+  /** What is plotted, over some seconds before a time; times are those of the session. */
+  async tracksBefore(seconds: number, window: number): Promise<Tracks> {
+    const tracks = new Tracks();
     let time: number | undefined;
-    for await (const { channelId, data } of this.reader.readMessages({ topics: ["HandState_100", "TickStats_100"], startTime: this.timeOf(seconds - window), endTime: this.timeOf(seconds) })) {
+    for await (const { channelId, data } of this.reader.readMessages({ topics: ["HandState_100", "ContactPairs_100", "TickStats_100", "Telemetry"], startTime: this.timeOf(seconds - window), endTime: this.timeOf(seconds) })) {
       const channel = this.decoders.get(channelId);
-      if (channel?.topic === "TickStats_100") time = Number((channel.decode(data) as TickStats).tick) / 1000;
-      if (channel?.topic !== "HandState_100" || time === undefined) continue;
-      const hand = channel.decode(data) as HandState;
-      let known = hands.get(hand.hand_id);
-      if (known === undefined) hands.set(hand.hand_id, (known = { times: [], forces: [] }));
-      const { force } = hand.F_Ho_W;
-      known.times.push(time);
-      known.forces.push(Math.hypot(force[0], force[1], force[2]));
+      const message = channel?.decode(data);
+      if (channel?.topic === "TickStats_100") {
+        time = Number((message as TickStats).tick) / 1000;
+        tracks.count(message as TickStats);
+      }
+      if (channel?.topic === "ContactPairs_100") tracks.touch(message as ContactPairs);
+      if (time === undefined) continue;
+      if (channel?.topic === "HandState_100") tracks.feel(time, message as HandState);
+      if (channel?.topic === "Telemetry") tracks.link(time, message as Telemetry);
     }
-    return hands;
+    return tracks;
   }
 
   /** Tells what happened since the last call, up to a time; of streams the newest. */

@@ -1,26 +1,26 @@
 // The scene in 3D. World frame: z up, metres. Redrawn when something has changed.
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
-import { MeshoptDecoder } from "three/examples/jsm/libs/meshopt_decoder.module.js";
 
-import { asset } from "./assets";
+import { Ground } from "./ground";
 import { COLORS, Markers, place } from "./markers";
-import { NONE, Status, StepPhase, type SceneModels, type SceneObject } from "./messages";
+import { NONE, StepPhase } from "./messages";
 import { isSoftware, Pace, type Quality } from "./pace";
+import { Parts, type Pick } from "./parts";
 import type { Session } from "./session";
 
-const CREASE = 35; // [deg]
+const DIRECTION = new THREE.Vector3(0.35, -0.8, 0.62).normalize(); // to the viewer, from the trainee's side
+const FILLED = 0.88; // of the picture's width or height, by what is to be seen
 const LOOK = 0.15; // [m] shown around a hand and where it is to go
-
-interface Part { group: THREE.Group; object: SceneObject; material: THREE.MeshStandardMaterial | THREE.MeshLambertMaterial; model?: THREE.Object3D }
 
 export class SceneView {
   readonly simple: boolean;
   readonly canvas: HTMLCanvasElement;
-  /** Pictures drawn, and objects with their model: for tests and the curious. */
+  /** Pictures drawn: for tests and the curious. */
   pictures = 0;
-  models = 0;
+  readonly parts: Parts;
+  /** Called after each picture. */
+  onPicture?: () => void;
   private renderer: THREE.WebGLRenderer;
   private scene = new THREE.Scene();
   private camera = new THREE.PerspectiveCamera(42, 1, 0.02, 60);
@@ -28,21 +28,16 @@ export class SceneView {
   readonly rig = new THREE.Group();
   private before?: THREE.PerspectiveCamera;
   private controls: OrbitControls;
-  private sun = new THREE.DirectionalLight(0xffffff, 2.2);
-  private parts = new Map<number, Part>();
+  private ground: Ground;
   private ghost?: { object: number; group: THREE.Group; material: THREE.MeshBasicMaterial };
   private markers = new Markers(this.scene);
   private pace: Pace;
-  private loader = new GLTFLoader().setMeshoptDecoder(MeshoptDecoder);
-  private loaded = new Map<string, Promise<THREE.Object3D>>();
-  private list?: string;
-  private sceneModels?: SceneModels;
   private life = -1;
   private moved = -1;
   private changed = -1;
   private dirty = true;
   private isFramed = false;
-  private isHandMode = false;
+  isHandMode = false;
 
   constructor(private host: HTMLElement, label: string, drawing: string | null) {
     const isSlow = isSoftware();
@@ -66,15 +61,12 @@ export class SceneView {
 
     this.rig.add(this.camera);
     this.scene.add(this.rig);
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8a929c, 1.5), this.sun, this.sun.target);
-    if (!this.simple) {
-      this.renderer.shadowMap.enabled = true;
-      this.renderer.shadowMap.type = THREE.PCFSoftShadowMap;
-      this.sun.castShadow = true;
-      this.sun.shadow.mapSize.set(2048, 2048);
-      this.sun.shadow.bias = -0.0004;
-      this.sun.shadow.normalBias = 0.004;
-    }
+    this.renderer.localClippingEnabled = true;
+    this.ground = new Ground(this.scene, this.renderer, this.simple);
+    this.parts = new Parts(this.scene, this.simple, () => {
+      this.moved = -1;
+      this.dirty = true;
+    });
     // before the controls hear of it
     this.canvas.addEventListener("wheel", ({ ctrlKey }) => (this.controls.enableZoom = !this.isHandMode || ctrlKey), { capture: true });
     new ResizeObserver(() => this.resize()).observe(host);
@@ -113,11 +105,11 @@ export class SceneView {
   }
 
   /** Where a place is drawn, in pixels of the page. */
-  project(place: THREE.Vector3): { x: number; y: number } {
+  project(place: THREE.Vector3): { x: number; y: number; isAhead: boolean } {
     const { left, top, width, height } = this.canvas.getBoundingClientRect();
     this.camera.updateMatrixWorld();
-    const { x, y } = place.clone().project(this.camera);
-    return { x: left + ((1 + x) * width) / 2, y: top + ((1 - y) * height) / 2 };
+    const { x, y, z } = place.clone().project(this.camera);
+    return { x: left + ((1 + x) * width) / 2, y: top + ((1 - y) * height) / 2, isAhead: z < 1 };
   }
 
   /** Whether a place is in the picture, not at its border, and not behind the instruction. */
@@ -141,6 +133,7 @@ export class SceneView {
   setTheme(): void {
     const style = getComputedStyle(document.documentElement);
     this.scene.background = new THREE.Color(style.getPropertyValue("--scene").trim());
+    this.ground.setColor(style.getPropertyValue("--floor").trim());
     this.dirty = true;
   }
 
@@ -155,36 +148,37 @@ export class SceneView {
   }
 
   private setQuality({ hasShadows }: Quality): void {
-    this.sun.castShadow = hasShadows;
+    this.ground.sun.castShadow = hasShadows;
     this.resize();
   }
 
-  /** About all that is shown, but what people carry on themselves; empty when nothing is. */
-  private sphere(): THREE.Sphere {
-    const box = new THREE.Box3();
-    for (const { group, object } of this.parts.values())
-      if (group.visible && object.kind !== "head" && object.kind !== "forearm") box.expandByObject(group);
-    return box.getBoundingSphere(new THREE.Sphere());
+  /** How far away from its centre a box is seen as a whole, with a margin [m]. */
+  private distanceOf(box: THREE.Box3, centre: THREE.Vector3): number {
+    const up = Math.tan((this.camera.fov * Math.PI) / 360) * FILLED;
+    const right = new THREE.Vector3().crossVectors(this.camera.up, DIRECTION).normalize();
+    const above = new THREE.Vector3().crossVectors(DIRECTION, right);
+    let distance = 0;
+    for (let corner = 0; corner < 8; ++corner) {
+      const { min, max } = box;
+      const from = new THREE.Vector3(corner & 1 ? min.x : max.x, corner & 2 ? min.y : max.y, corner & 4 ? min.z : max.z).sub(centre);
+      const wide = Math.max(Math.abs(from.dot(right)) / (up * this.camera.aspect), Math.abs(from.dot(above)) / up);
+      distance = Math.max(distance, wide + from.dot(DIRECTION));
+    }
+    return distance;
   }
 
   /** Shows all of the scene, or these places and what is around them, from the trainee's side. */
   frame(places: THREE.Vector3[] = []): void {
-    const scene = this.sphere();
-    if (scene.isEmpty()) return;
+    const box = this.parts.box();
+    if (box.isEmpty()) return;
+    const scene = box.getBoundingSphere(new THREE.Sphere());
     const radius = Math.max(0.05, scene.radius);
-    const sphere = places.length === 0 ? scene : new THREE.Box3().setFromPoints(places).getBoundingSphere(new THREE.Sphere());
-    const shown = places.length === 0 ? radius : Math.min(1.2 * radius, sphere.radius + LOOK);
-    const half = Math.min(this.camera.fov, this.camera.fov * this.camera.aspect) * (Math.PI / 360);
-    const direction = new THREE.Vector3(0.35, -0.8, 0.62).normalize();
-    this.controls.target.copy(sphere.center);
-    this.camera.position.copy(sphere.center).addScaledVector(direction, ((places.length > 0 ? 1 : 0.7) * shown) / Math.sin(half));
+    const around = places.length === 0 ? box : new THREE.Box3().setFromPoints(places).expandByScalar(Math.min(LOOK, 0.6 * radius));
+    const centre = around.getCenter(new THREE.Vector3());
+    this.controls.target.copy(centre);
+    this.camera.position.copy(centre).addScaledVector(DIRECTION, this.distanceOf(around, centre));
     this.controls.update();
-    const reach = 1.3 * radius;
-    this.sun.position.copy(scene.center).add(new THREE.Vector3(-0.5, -0.7, 1.4).multiplyScalar(2 * radius));
-    this.sun.target.position.copy(scene.center);
-    const light = this.sun.shadow.camera;
-    Object.assign(light, { left: -reach, right: reach, top: reach, bottom: -reach, near: 0.1, far: 8 * radius });
-    light.updateProjectionMatrix();
+    this.ground.fit(box);
     this.markers.size = Math.min(1.3, Math.max(0.35, radius / 0.9));
     this.isFramed = true;
     this.moved = -1;
@@ -196,17 +190,17 @@ export class SceneView {
     if (session.link !== undefined && session.link.life !== this.life) this.clear(session.link.life);
     if (session.changed !== this.changed) {
       this.changed = session.changed;
-      this.takeObjects(session);
-      void this.takeModels(session.link?.scene ?? "");
+      this.parts.takeObjects(session);
+      void this.parts.takeModels(session.link?.scene ?? "");
       this.moved = -1;
     }
     if (session.moved !== this.moved) {
       this.moved = session.moved;
-      this.takePoses(session);
+      this.parts.takePoses(session);
       this.takeGhost(session);
       this.markers.take(session);
       this.dirty = true;
-      if (!this.isFramed && this.parts.size > 0 && session.states.size > 0) this.frame();
+      if (!this.isFramed && this.parts.all.size > 0 && session.states.size > 0) this.frame();
     }
     if (this.before !== undefined) return; // the headset asks for its pictures
     this.controls.update();
@@ -215,6 +209,59 @@ export class SceneView {
     this.renderer.render(this.scene, this.camera);
     this.pace.hasDrawn(now);
     ++this.pictures;
+    this.onPicture?.();
+  }
+
+  /** It is not looked at any more. */
+  end(): void {
+    this.controls.dispose();
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
+    this.canvas.remove();
+  }
+
+  /** Objects with their model. */
+  get models(): number {
+    return this.parts.models;
+  }
+
+  /** All that there is to be seen is drawn. */
+  get isComplete(): boolean {
+    return this.parts.isComplete && this.isFramed && !this.dirty;
+  }
+
+  /** The surface below a place of the page. */
+  pick(x: number, y: number): Pick | undefined {
+    const { left, top, width, height } = this.canvas.getBoundingClientRect();
+    const ray = new THREE.Raycaster();
+    ray.params.Line = { threshold: 0 };
+    this.camera.updateMatrixWorld();
+    ray.setFromCamera(new THREE.Vector2((2 * (x - left)) / width - 1, 1 - (2 * (y - top)) / height), this.camera);
+    return this.parts.hit(ray);
+  }
+
+  /** Moves the view with what it follows. */
+  carry(by: THREE.Vector3): void {
+    this.camera.position.add(by);
+    this.controls.target.add(by);
+    this.dirty = true;
+  }
+
+  /** Looks from a place at another one. */
+  lookFrom(eye: THREE.Vector3, at: THREE.Vector3): void {
+    this.camera.position.copy(eye);
+    this.controls.target.copy(at);
+    this.dirty = true;
+  }
+
+  /** Shows something beside the objects. */
+  add(...objects: THREE.Object3D[]): void {
+    this.scene.add(...objects);
+    this.dirty = true;
+  }
+
+  redraw(): void {
+    this.dirty = true;
   }
 
   /** The scene is shown in a headset at its size, from the trainee's side; `follow` is called before each picture. Fails when it cannot draw there. */
@@ -255,7 +302,7 @@ export class SceneView {
 
   /** The viewer's head, wherever it is in the room, comes before the scene and looks at it. */
   private placeRig({ position, orientation }: XRRigidTransform): void {
-    const scene = this.sphere();
+    const scene = this.parts.box().getBoundingSphere(new THREE.Sphere());
     const eye = scene.center.clone().add(new THREE.Vector3(0, -Math.min(1.5, 0.5 + 0.4 * scene.radius), 0.45));
     const ahead = new THREE.Vector3(0, 0, -1).applyQuaternion(orientation as unknown as THREE.Quaternion);
     const turn = new THREE.Quaternion().setFromAxisAngle(new THREE.Vector3(0, 1, 0), Math.atan2(ahead.x, -ahead.z));
@@ -286,102 +333,17 @@ export class SceneView {
 
   private clear(life: number): void {
     this.life = life;
-    for (const { group } of this.parts.values()) this.scene.remove(group);
     this.parts.clear();
     this.markers.clear();
     if (this.ghost !== undefined) this.scene.remove(this.ghost.group);
     this.ghost = undefined;
-    this.sceneModels = undefined;
-    this.list = undefined;
-    this.models = 0;
     this.isFramed = false;
     this.dirty = true;
   }
 
-  private takeObjects(session: Session): void {
-    for (const [id, object] of session.objects) {
-      if (this.parts.has(id)) continue;
-      const color = new THREE.Color(object.color.slice(0, 7) || "#9aa4ad");
-      const opacity = object.color.length === 9 ? parseInt(object.color.slice(7), 16) / 255 : 1;
-      const options = { color, opacity, transparent: opacity < 1, side: THREE.DoubleSide };
-      const material = this.simple ? new THREE.MeshLambertMaterial(options) : new THREE.MeshStandardMaterial({ ...options, roughness: 0.62, metalness: 0.06 });
-      const group = new THREE.Group();
-      place(group, object.X_WO);
-      this.parts.set(id, { group, object, material });
-      this.scene.add(group);
-    }
-  }
-
-  /** The models of all objects; of one without, or before it is there, a box. */
-  private async takeModels(list: string): Promise<void> {
-    if (list === this.list && this.sceneModels === undefined) return;
-    if (list !== this.list) {
-      this.list = list;
-      this.sceneModels = undefined;
-      const life = this.life;
-      const bytes = list === "" ? undefined : await asset(list).catch(() => undefined);
-      const models = bytes === undefined ? { version: 1, objects: [] } : (JSON.parse(new TextDecoder().decode(bytes)) as SceneModels);
-      if (list !== this.list || life !== this.life) return;
-      this.sceneModels = models;
-    }
-    for (const [id, part] of this.parts) {
-      if (part.model !== undefined) continue;
-      const levels = this.sceneModels?.objects[id] ?? [];
-      const level = this.simple ? levels[levels.length - 1] : levels[0];
-      part.model = this.boxOf(part);
-      part.group.add(part.model);
-      if (level !== undefined) void this.load(part, level.model);
-    }
-    this.dirty = true;
-  }
-
-  private boxOf(part: Part): THREE.Object3D {
-    const { size, centre } = part.object;
-    const box = new THREE.LineSegments(new THREE.EdgesGeometry(new THREE.BoxGeometry(size[0], size[1], size[2])), new THREE.LineBasicMaterial({ color: part.material.color }));
-    box.position.set(centre[0], centre[1], centre[2]);
-    return box;
-  }
-
-  private async load(part: Part, name: string): Promise<void> {
-    let loading = this.loaded.get(name);
-    if (loading === undefined) this.loaded.set(name, (loading = asset(name).then((bytes) => this.loader.parseAsync(bytes, "")).then((file) => file.scene)));
-    let model: THREE.Object3D;
-    try {
-      model = (await loading).clone(true);
-    } catch (problem) {
-      this.loaded.delete(name);
-      console.warn("a model is missing:", problem);
-      return;
-    }
-    if (this.parts.get(part.object.object_id) !== part) return;
-    model.rotation.x = Math.PI / 2; // glTF has y up
-    const line = new THREE.LineBasicMaterial({ color: part.material.color.clone().multiplyScalar(0.35), transparent: true, opacity: 0.55 });
-    const meshes: THREE.Mesh[] = [];
-    model.traverse((child) => child instanceof THREE.Mesh && meshes.push(child));
-    for (const mesh of meshes) {
-      mesh.material = part.material;
-      mesh.castShadow = mesh.receiveShadow = !this.simple;
-      if (!this.simple) mesh.add(new THREE.LineSegments(new THREE.EdgesGeometry(mesh.geometry as THREE.BufferGeometry, CREASE), line));
-    }
-    if (part.model !== undefined) part.group.remove(part.model);
-    part.model = model;
-    part.group.add(model);
-    ++this.models;
-    this.moved = -1;
-    this.dirty = true;
-  }
-
-  private takePoses(session: Session): void {
-    for (const [id, part] of this.parts) {
-      const state = session.states.get(id);
-      part.group.visible = state !== undefined && state.status !== Status.Hidden;
-      if (state !== undefined) place(part.group, state.X_WO);
-    }
-  }
-
   private takeGhost(session: Session): void {
     const step = session.step;
-    const part = step === undefined ? undefined : this.parts.get(step.object_id);
+    const part = step === undefined ? undefined : this.parts.all.get(step.object_id);
     const shows = step !== undefined && part?.model !== undefined && step.has_target && step.phase <= StepPhase.Active;
     if (this.ghost !== undefined && (!shows || this.ghost.object !== step.object_id || this.ghost.group.userData["model"] !== part.model)) {
       this.scene.remove(this.ghost.group);
@@ -409,7 +371,7 @@ export class SceneView {
 
   /** Where an object's frame is drawn [m]; for tests. */
   positionOf(name: string): number[] | undefined {
-    const part = [...this.parts.values()].find((known) => known.object.name === name);
+    const part = [...this.parts.all.values()].find((known) => known.object.name === name);
     return part === undefined || part.object.object_id === NONE ? undefined : part.group.position.toArray();
   }
 }

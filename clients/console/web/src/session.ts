@@ -5,20 +5,19 @@ import {
   type SceneStep, type StepProgress, type StepState, type Telemetry, type TickStats, type WorldFrame,
 } from "./messages";
 import { localized } from "./strings";
+import { Tracks } from "./tracks";
 
 export const TOPICS = [
   "/console", "SceneObject", "SceneHand", "SceneStep", "ObjectSnapshot", "WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepState", "StepProgress",
-  "RunState", "GrabState", "Presence", "EmergencyStop", "EmergencyClear", "EventLog", "Telemetry", "RecorderStatus", "__instance_state",
+  "RunState", "GrabState", "Presence", "EmergencyStop", "EmergencyClear", "EventLog", "ClientEvent", "Telemetry", "RecorderStatus", "__instance_state",
 ] as const;
 
-const HISTORY = 3000; // samples of a hand: 30 s
 const EVENTS = 200;
 
 /** Times in s of the session. */
 interface Visit { started: number; ended?: number; phase?: StepPhase; visits: number }
 export interface StepEntry extends SceneStep, Partial<Visit> { isNow: boolean; visits: number }
 const STEP_ENDS: Record<string, StepPhase> = { "step done": StepPhase.Done, "step skipped": StepPhase.Skipped, "step timed out": StepPhase.TimedOut };
-export interface HandHistory { times: number[]; forces: number[]; peak: number }
 
 /** Keeps the newest message of each key. */
 function put<K extends string, M extends Record<K, number>>(known: Map<number, M>, key: K, message: M): void {
@@ -35,7 +34,7 @@ export class Session {
   grabs = new Map<number, GrabState>();
   people = new Map<number, Presence>();
   pairs = new Map<string, PairContact & { tick: number }>();
-  history = new Map<number, HandHistory>();
+  tracks = new Tracks();
   step?: StepState;
   progress?: StepProgress;
   run?: RunState;
@@ -90,12 +89,14 @@ export class Session {
         break;
       case "Telemetry":
         put(this.telemetry, "client_id", message as Telemetry);
+        this.tracks.link(this.tick / 1000, message as Telemetry);
         break;
       case "RecorderStatus":
         this.recorder = message as RecorderStatus;
         break;
       case "ObjectSnapshot":
         return this.place(message as ObjectSnapshot);
+      case "WorldFrame_30":
       case "WorldFrame_100":
         return this.move(message as WorldFrame);
       case "HandState_100":
@@ -104,6 +105,7 @@ export class Session {
         return this.touch(message as ContactPairs);
       case "TickStats_100":
         this.stats = message as TickStats;
+        this.tracks.count(this.stats);
         return;
       case "StepState":
         this.follow(message as StepState);
@@ -133,6 +135,10 @@ export class Session {
       case "EventLog":
         this.log(message as EventLog);
         break;
+      case "ClientEvent":
+        // stations tell more than is of use here
+        if ((message as EventLog).kind === "safety") this.log({ ...(message as EventLog), severity: 1 });
+        break;
     }
     ++this.changed;
   }
@@ -154,39 +160,18 @@ export class Session {
 
   private feel(hand: HandState): void {
     this.hands.set(hand.hand_id, hand);
-    const force = Math.hypot(hand.F_Ho_W.force[0], hand.F_Ho_W.force[1], hand.F_Ho_W.force[2]);
-    let history = this.history.get(hand.hand_id);
-    if (history === undefined) this.history.set(hand.hand_id, (history = { times: [], forces: [], peak: 0 }));
-    const seconds = this.tick / 1000;
-    if (history.times.length > 0 && seconds <= history.times[history.times.length - 1]) {
-      // of one time the largest counts
-      history.forces[history.forces.length - 1] = Math.max(force, history.forces[history.forces.length - 1]);
-    } else {
-      history.times.push(seconds);
-      history.forces.push(force);
-    }
-    history.peak = Math.max(history.peak, force);
-    if (history.times.length > HISTORY) {
-      history.times.shift();
-      history.forces.shift();
-    }
+    this.tracks.feel(this.tick / 1000, hand);
     ++this.moved;
   }
 
-  /** Puts forces of before what is known of each hand. */
-  recall(hands: Map<number, { times: number[]; forces: number[] }>): void {
-    for (const [id, before] of hands) {
-      const known = this.history.get(id) ?? { times: [], forces: [], peak: 0 };
-      const last = before.times[before.times.length - 1] ?? -Infinity;
-      const later = known.times.findIndex((time) => time > last);
-      const from = later < 0 ? known.times.length : later;
-      const forces = [...before.forces, ...known.forces.slice(from)];
-      this.history.set(id, { times: [...before.times, ...known.times.slice(from)], forces, peak: forces.reduce((a, b) => Math.max(a, b), 0) });
-    }
+  /** Puts what was before in front of what is plotted. */
+  recall(before: Tracks): void {
+    this.tracks.prepend(before);
     ++this.moved;
   }
 
   private touch(sample: ContactPairs): void {
+    this.tracks.touch(sample);
     for (const pair of sample.pairs) this.pairs.set(`${pair.a} ${pair.b}`, { ...pair, tick: Number(sample.tick) });
     ++this.moved;
   }
@@ -196,7 +181,7 @@ export class Session {
   }
 
   private log(event: EventLog): void {
-    if (this.events.some((known) => known.seq === event.seq)) return;
+    if (this.events.some((known) => known.seq === event.seq && known.client_id === event.client_id)) return;
     this.events.push(event);
     if (this.events.length > EVENTS) this.events.shift();
     const seconds = Number(event.tick) / 1000;

@@ -1,0 +1,42 @@
+// Two recordings beside each other, as of two trainees: each is this page in a frame of its own, and what is done to one player is done to the other.
+import { h } from "./dom";
+import type { Command, Player } from "./player";
+import { t } from "./strings";
+
+/** Of a page in a frame: the frame's number, in its address. */
+export const FRAME = "beside";
+
+/** Replaces this page by two, of what it plays and of another file; `first`: the file, or undefined for the gateway's own recording. */
+export function showBeside(app: HTMLElement, first: File | undefined, second: File): void {
+  const close = h("button", "close", t("beside.close"));
+  close.addEventListener("click", () => location.reload());
+  const frames = [first, second].map((file, i) => {
+    const frame = h("iframe");
+    frame.title = file?.name ?? t("beside.first");
+    frame.src = `/?${FRAME}=${i}`;
+    return frame;
+  });
+  addEventListener("message", ({ origin, source, data }) => {
+    const from = frames.findIndex((frame) => frame.contentWindow === source);
+    if (origin !== location.origin || from < 0) return;
+    const told = data as { isReady?: true; command?: Command };
+    if (told.isReady === true) frames[from].contentWindow?.postMessage({ file: [first, second][from] }, origin);
+    else frames[1 - from].contentWindow?.postMessage(told, origin);
+  });
+  app.replaceChildren(h("div", "beside", h("div", "beside-head", close, h("span", "muted", t("beside.more"))), ...frames));
+}
+
+/** In such a frame: what is to be played, as soon as it is known. */
+export function playsBeside(play: (file: File | undefined) => void, player: () => Player | undefined): void {
+  addEventListener("message", ({ origin, source, data }) => {
+    if (origin !== location.origin || source !== parent) return;
+    const told = data as { file?: File; command?: Command };
+    if (told.command !== undefined) player()?.obey(told.command);
+    else play(told.file);
+  });
+  parent.postMessage({ isReady: true }, location.origin);
+}
+
+export function tellBeside(command: Command): void {
+  parent.postMessage({ command }, location.origin);
+}
