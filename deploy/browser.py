@@ -57,7 +57,13 @@ class Browser:
             self.process.wait()
         os.close(self.to)
         os.close(self.answers)
-        self.profile.cleanup()
+        for last in (False,) * 50 + (True,):  # its children end after it, and write until then
+            try:
+                return self.profile.cleanup()
+            except OSError:
+                if last:
+                    raise
+                time.sleep(0.1)
 
     def ask(self, method, seconds=120, **parameters):
         """The result of a command of the DevTools protocol. Fails with a sentence."""

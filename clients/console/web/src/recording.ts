@@ -76,6 +76,8 @@ export async function fromAddress(url: string): Promise<Readable> {
   return new Blocks(size, async (begin, end) => new Uint8Array(await (await load(begin, end)).arrayBuffer()));
 }
 
+const FIRST_POSES = 40_000_000n; // [ns] in which the parts of a frame come
+
 interface Message { time: bigint; channel: number; data: Uint8Array }
 type Reading = AsyncGenerator<{ logTime: bigint; channelId: number; data: Uint8Array }, void, void>;
 export interface Mark { seconds: number; tick: number; kind: string; text: string; severity: number }
@@ -163,14 +165,26 @@ export class Recording {
     this.next = undefined;
     for (const message of this.kept)
       if (message.time <= time || this.isScene(message)) this.tell(message);
+    let hasAll = false;
     for (const window of BEFORE) {
       const newest = await this.newestOf(time - window, time);
-      const hasAll = newest.some(({ channel }) => this.decoders.get(channel)?.topic === ALL_OBJECTS);
+      hasAll = newest.some(({ channel }) => this.decoders.get(channel)?.topic === ALL_OBJECTS);
       if (!hasAll && window !== BEFORE[BEFORE.length - 1]) continue;
       for (const message of newest) this.tell(message);
       break;
     }
+    if (!hasAll) await this.tellFirstPoses(time);
     this.reading = this.reader.readMessages({ topics: [...KEPT, ...this.streams], startTime: time + 1n }) as unknown as Reading;
+  }
+
+  /** Before the first poses of a recording its objects are where those say. */
+  private async tellFirstPoses(startTime: bigint): Promise<void> {
+    let endTime: bigint | undefined;
+    for await (const { logTime, channelId, data } of this.reader.readMessages({ topics: [ALL_OBJECTS], startTime })) {
+      endTime ??= logTime + FIRST_POSES;
+      if (logTime > endTime) return;
+      this.tell({ time: logTime, channel: channelId, data });
+    }
   }
 
   /** The newest of each instance of the streams, in order. */
