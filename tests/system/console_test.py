@@ -562,40 +562,6 @@ class Page(unittest.TestCase):
                     self.assertEqual(browser("axe"), [], "the request for a seat")
             self.assertEqual(browser.problems, [])
 
-    def test_an_instructor_records_switches_a_pair_and_reads_german(self):
-        with Stage(lockstep=False) as stage, Browser() as browser:
-            server = stage.serve("stacking", "--wait-for", "right")
-            folder = stage.out / "recordings"
-            console, port = start_console(stage, 0, "--role", "instructor", "--recordings", folder)
-            console.wait_for("joined session 'test'")
-            stage.start("trainee", "--seed", 1)
-            server.wait_for("run: running")
-            browser("open", url=f"http://localhost:{port}/#pass={pass_of(console)}", width=1280, height=800, theme="light", language="de-DE")
-            browser("await", expression="document.querySelector('.desk')?.hidden === false")
-            browser("value", expression="document.querySelector('[data-command=\"record start\"]').click()")
-            browser("await", expression="tenon.session.recorder?.recording === true && document.querySelector('[data-command=\"record start\"]').hidden")
-            browser("value", expression="document.querySelector('.desk .more').open = true")
-            switch = "[...document.querySelectorAll('.pairs li')].find(row => row.dataset.state !== 'off').querySelector('.switch')"
-            browser("await", expression="document.querySelector('.pairs .switch') !== null")
-            browser("value", expression=f"(window.row = {switch}).click()")
-            server.wait_for("collision .* |: collision")
-            browser("await", expression="window.row.getAttribute('aria-checked') === 'false'")
-            # the server's English in this page's language
-            browser("await", expression="[...document.querySelectorAll('.events li')].some(row => row.textContent.includes('Kollisionen'))")
-            browser("value", expression="document.querySelector('[data-command=\"resume\"]').click()")
-            browser("await", expression="[...document.querySelectorAll('.notice')].some(n => n.textContent === 'Weiter: das ist schon so')")
-            browser("value", expression="document.querySelector('[data-command=\"freeze on\"]').click()")
-            browser("await", expression="[...document.querySelectorAll('.badge')].some(b => b.textContent === 'Kräfte eingefroren')")
-            browser("await", expression="document.querySelector('[data-command=\"freeze on\"]').hidden")
-            titles = "[...tenon.session.objects.keys()].map(id => tenon.session.titleOf(id))"
-            self.assertIn("Klotz", " ".join(browser("value", expression=titles)))
-            browser("value", expression="document.querySelector('[data-command=\"record stop\"]').click()")
-            browser("await", expression="[...document.querySelectorAll('.notice')].some(n => /Aufzeichnung beenden: .*\\.mcap/.test(n.textContent))")
-            [file] = folder.iterdir()
-            self.assertRegex(file.name, r"^test-\d{8}-\d{6}\.mcap$")
-            self.assertGreater(file.stat().st_size, 10_000)
-            self.assertEqual(browser.problems, [])
-
     def test_a_recording_is_played_without_a_server(self):
         with Stage() as stage, Browser() as browser:
             recording = stage.out / "session.mcap"
@@ -722,6 +688,43 @@ def mouse_mounts(test, seed, scenario=SCENARIO, part="peg"):
         test.assertEqual(again.returncode, 0, again.stdout + again.stderr)
         test.assertEqual(final_hash(again.stdout), final_hash(server.text()))
         test.assertEqual(browser.problems, [])
+
+
+@unittest.skipUnless(shutil.which("chromium") and (TOOLS / "node_modules").exists(), "no chromium or no playwright-core: deploy/setup test, and npm ci in tests/system/public_tools")
+class DeskNightly(unittest.TestCase):
+    def test_an_instructor_records_switches_a_pair_and_reads_german(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            server = stage.serve("stacking", "--wait-for", "right")
+            folder = stage.out / "recordings"
+            console, port = start_console(stage, 0, "--role", "instructor", "--recordings", folder)
+            console.wait_for("joined session 'test'")
+            stage.start("trainee", "--seed", 1)
+            server.wait_for("run: running")
+            browser("open", url=f"http://localhost:{port}/#pass={pass_of(console)}", width=1280, height=800, theme="light", language="de-DE")
+            browser("await", expression="document.querySelector('.desk')?.hidden === false")
+            browser("value", expression="document.querySelector('[data-command=\"record start\"]').click()")
+            browser("await", expression="tenon.session.recorder?.recording === true && document.querySelector('[data-command=\"record start\"]').hidden")
+            browser("value", expression="document.querySelector('.desk .more').open = true")
+            switch = "[...document.querySelectorAll('.pairs li')].find(row => row.dataset.state !== 'off').querySelector('.switch')"
+            browser("await", expression="document.querySelector('.pairs .switch') !== null")
+            browser("value", expression=f"(window.row = {switch}).click()")
+            server.wait_for("collision .* |: collision")
+            browser("await", expression="window.row.getAttribute('aria-checked') === 'false'")
+            # the server's English in this page's language
+            browser("await", expression="[...document.querySelectorAll('.events li')].some(row => row.textContent.includes('Kollisionen'))")
+            browser("value", expression="document.querySelector('[data-command=\"resume\"]').click()")
+            browser("await", expression="[...document.querySelectorAll('.notice')].some(n => n.textContent === 'Weiter: das ist schon so')")
+            browser("value", expression="document.querySelector('[data-command=\"freeze on\"]').click()")
+            browser("await", expression="[...document.querySelectorAll('.badge')].some(b => b.textContent === 'Kräfte eingefroren')")
+            browser("await", expression="document.querySelector('[data-command=\"freeze on\"]').hidden")
+            titles = "[...tenon.session.objects.keys()].map(id => tenon.session.titleOf(id))"
+            self.assertIn("Klotz", " ".join(browser("value", expression=titles)))
+            browser("value", expression="document.querySelector('[data-command=\"record stop\"]').click()")
+            browser("await", expression="[...document.querySelectorAll('.notice')].some(n => /Aufzeichnung beenden: .*\\.mcap/.test(n.textContent))")
+            [file] = folder.iterdir()
+            self.assertRegex(file.name, r"^test-\d{8}-\d{6}\.mcap$")
+            self.assertGreater(file.stat().st_size, 10_000)
+            self.assertEqual(browser.problems, [])
 
 
 @unittest.skipUnless(shutil.which("chromium") and (TOOLS / "node_modules").exists(), "no chromium or no playwright-core: deploy/setup test, and npm ci in tests/system/public_tools")
