@@ -5,13 +5,13 @@
 namespace tenon::haptic {
 namespace {
 
-constexpr std::int64_t kMillisecond = 1'000'000;  // [ns]
-constexpr double kBin = 50e-6;                    // [s]
+constexpr std::int64_t kMillisecondOfAge = 1'000'000;  // [ns]
+constexpr double kBin = 50e-6;                         // [s]
 
 TEST(DurationHistogram, QuantilesAreExactToOneBin) {
   DurationHistogram durations;
   EXPECT_EQ(durations.quantile(0.5), 0.0) << "empty";
-  for (int i = 1; i <= 100; ++i) durations.add(i * kMillisecond / 10);
+  for (int i = 1; i <= 100; ++i) durations.add(i * kMillisecondOfAge / 10);
   EXPECT_EQ(durations.count(), 100U);
   EXPECT_NEAR(durations.quantile(0.5), 5e-3, 2 * kBin + 1e-4);
   EXPECT_NEAR(durations.quantile(0.99), 9.9e-3, 2 * kBin + 1e-4);
@@ -21,14 +21,14 @@ TEST(DurationHistogram, QuantilesAreExactToOneBin) {
 TEST(DurationHistogram, TheMaximumIsExactBeyondTheLastBin) {
   DurationHistogram durations;
   durations.add(-5);
-  durations.add(3000 * kMillisecond);
+  durations.add(3000 * kMillisecondOfAge);
   EXPECT_DOUBLE_EQ(durations.max(), 3.0);
   EXPECT_GE(durations.quantile(0.9), 0.1);
 }
 
 TEST(DurationHistogram, LongDurationsAreExactToTwoPercent) {
   DurationHistogram durations;
-  for (int i = 0; i < 100; ++i) durations.add(i < 90 ? 150 * kMillisecond : 4000 * kMillisecond);
+  for (int i = 0; i < 100; ++i) durations.add(i < 90 ? 150 * kMillisecondOfAge : 4000 * kMillisecondOfAge);
   EXPECT_NEAR(durations.quantile(0.5), 0.15, 0.02 * 0.15);
   EXPECT_NEAR(durations.quantile(0.99), 4.0, 0.02 * 4.0);
   EXPECT_DOUBLE_EQ(durations.min(), 0.15);
@@ -53,14 +53,15 @@ TEST(AnswerLoss, IsThatOfTheHandThatLostMost) {
 //  answer            1   2 2 3
 TEST(ForceAgeStatistics, CountsTheTimeFromAnInputToItsFirstAnswerOnce) {
   ForceAgeStatistics age;
-  for (std::uint32_t seq = 1; seq <= 10; ++seq) age.inputSent(seq, seq * kMillisecond, kMillisecond);
+  for (std::uint32_t seq = 1; seq <= 10; ++seq)
+    age.inputSent(seq, seq * kMillisecondOfAge, kMillisecondOfAge);
   for (std::uint32_t seq = 1; seq <= 10; ++seq) {
-    age.answerReceived(HandId{0}, seq, seq, (seq + 2) * kMillisecond);
-    age.answerReceived(HandId{1}, seq, seq, (seq + 7) * kMillisecond);
+    age.answerReceived(HandId{0}, seq, seq, (seq + 2) * kMillisecondOfAge);
+    age.answerReceived(HandId{1}, seq, seq, (seq + 7) * kMillisecondOfAge);
   }
-  age.answerReceived(HandId{0}, 1, 2, 100 * kMillisecond);
-  age.answerReceived(HandId{0}, 1, 0, 100 * kMillisecond);
-  age.answerReceived(HandId{0}, 1, 4711, 100 * kMillisecond);
+  age.answerReceived(HandId{0}, 1, 2, 100 * kMillisecondOfAge);
+  age.answerReceived(HandId{0}, 1, 0, 100 * kMillisecondOfAge);
+  age.answerReceived(HandId{0}, 1, 4711, 100 * kMillisecondOfAge);
   Telemetry telemetry;
   age.fill(telemetry);
   EXPECT_EQ(telemetry.samples, 10U);
@@ -77,9 +78,9 @@ TEST(ForceAgeStatistics, CountsTheTimeFromAnInputToItsFirstAnswerOnce) {
 //  input     1   2   3   4   5    answered at once but for 3, whose answer comes with that of 4: 2 periods
 TEST(ForceAgeStatistics, KeepsTheLongestTimeWithoutANewerAnswer) {
   ForceAgeStatistics age;
-  for (std::uint32_t seq = 1; seq <= 5; ++seq) age.inputSent(seq, seq * kMillisecond, kMillisecond);
+  for (std::uint32_t seq = 1; seq <= 5; ++seq) age.inputSent(seq, seq * kMillisecondOfAge, kMillisecondOfAge);
   for (const std::uint32_t seq : {1, 2, 4, 3, 5})
-    age.answerReceived(HandId{0}, seq, seq, std::max(seq, 2U) * kMillisecond);
+    age.answerReceived(HandId{0}, seq, seq, std::max(seq, 2U) * kMillisecondOfAge);
   Telemetry telemetry;
   age.fill(telemetry);
   EXPECT_DOUBLE_EQ(telemetry.longest_silence, 2e-3);

@@ -5,23 +5,24 @@
 namespace tenon::haptic {
 namespace {
 
-constexpr std::int64_t kMillisecond = 1'000'000;  // [ns]
+constexpr std::int64_t kMillisecondOfLink = 1'000'000;  // [ns]
 
 /// A server's clock is 3 s ahead, each direction takes 5 ms; of each `one_in` inputs one is lost.
 Telemetry afterSeconds(int seconds, std::uint32_t one_in) {
   LinkClock clock;
   std::uint32_t received = 0;
-  std::int64_t now = kMillisecond;
-  for (std::uint32_t seq = 1; seq <= static_cast<std::uint32_t>(seconds) * 1000; ++seq, now += kMillisecond) {
+  std::int64_t now = kMillisecondOfLink;
+  for (std::uint32_t seq = 1; seq <= static_cast<std::uint32_t>(seconds) * 1000;
+       ++seq, now += kMillisecondOfLink) {
     clock.sent(seq, 2);
     for (int hand = 0; hand < 2; ++hand)
       if ((2 * seq + static_cast<std::uint32_t>(hand)) % one_in != 0) ++received;
     ClockSync sync;
     if (!clock.ask(ClientId{1}, now, sync)) continue;
-    sync.server_received_ns = sync.server_sent_ns = now + 3'005 * kMillisecond;
+    sync.server_received_ns = sync.server_sent_ns = now + 3'005 * kMillisecondOfLink;
     sync.inputs_received = received;
     sync.newest_seq = seq;
-    clock.receive(sync, now + 10 * kMillisecond);
+    clock.receive(sync, now + 10 * kMillisecondOfLink);
   }
   Telemetry telemetry;
   clock.fill(telemetry, now);
@@ -61,15 +62,15 @@ TEST(LinkClock, StatesTheJitterOfTheRoundTripsAndAsksOftenAtFirst) {
   LinkClock clock;
   ClockSync sync;
   int asked = 0;
-  for (std::int64_t now = kMillisecond; now < 1000 * kMillisecond; now += kMillisecond) {
+  for (std::int64_t now = kMillisecondOfLink; now < 1000 * kMillisecondOfLink; now += kMillisecondOfLink) {
     if (!clock.ask(ClientId{1}, now, sync)) continue;
-    sync.server_received_ns = sync.server_sent_ns = now + 5 * kMillisecond;
+    sync.server_received_ns = sync.server_sent_ns = now + 5 * kMillisecondOfLink;
     // every fifth takes 4 ms longer
-    clock.receive(sync, now + (++asked % 5 == 0 ? 14 : 10) * kMillisecond);
+    clock.receive(sync, now + (++asked % 5 == 0 ? 14 : 10) * kMillisecondOfLink);
   }
   EXPECT_GE(asked, 30) << "in the first second";
   Telemetry telemetry;
-  clock.fill(telemetry, 1000 * kMillisecond);
+  clock.fill(telemetry, 1000 * kMillisecondOfLink);
   EXPECT_NEAR(telemetry.trip_jitter, 0.004, 1e-9);
 }
 

@@ -17,11 +17,11 @@ namespace {
 
 constexpr HandId kHand{0};
 constexpr ObjectId kPointer{0}, kBox{1}, kPlate{2};
-constexpr double kDepth = 0.010;       // [m]
-constexpr double kStiffness = 2000.0;  // [N/m] of the coupling
-constexpr double kLeastLimit = 3.0;    // [N]
-constexpr double kGrowth = 20.0;       // [N/s]
-constexpr std::size_t kWindow = 20;    // [ticks] over which the growth is measured
+constexpr double kDepth = 0.010;             // [m]
+constexpr double kPairStiffness = 2000.0;    // [N/m] of the coupling
+constexpr double kLeastSwitchedLimit = 3.0;  // [N]
+constexpr double kSwitchedGrowth = 20.0;     // [N/s]
+constexpr std::size_t kSwitchedWindow = 20;  // [ticks] over which the growth is measured
 
 class HandInPlate : public testing::Test {
  protected:
@@ -40,7 +40,7 @@ class HandInPlate : public testing::Test {
     add(test::boxStructures({0.2, 0.2, 0.04}, 0.002, 0.005), {0.0, 0.0, -0.02}, ObjectStatus::kFixed);
     simulation::HandSpec spec;
     spec.object = kPointer;
-    spec.stiffness = kStiffness;
+    spec.stiffness = kPairStiffness;
     scene->hands.push_back(spec);
     simulation::PairSpec pair;
     pair.a = kBox;
@@ -96,10 +96,10 @@ TEST_F(HandInPlate, FeelsThatTheTwoCollideFromNowOnSoftly) {
   for (std::size_t i = 1; i <= 1000; ++i) {
     tick();
     forces.push_back(force());
-    ASSERT_LE(forces.back(), kLeastLimit + 1e-3) << i << " ms after the switch";
-    if (i < kWindow) continue;
-    const double growth = (forces[i] - forces[i - kWindow]) / (kWindow * kTickSeconds);
-    ASSERT_LE(growth, kGrowth + 0.5) << i << " ms after the switch";
+    ASSERT_LE(forces.back(), kLeastSwitchedLimit + 1e-3) << i << " ms after the switch";
+    if (i < kSwitchedWindow) continue;
+    const double growth = (forces[i] - forces[i - kSwitchedWindow]) / (kSwitchedWindow * kTickSeconds);
+    ASSERT_LE(growth, kSwitchedGrowth + 0.5) << i << " ms after the switch";
   }
   EXPECT_TRUE(environment_->inContact(kBox, kPlate));
   EXPECT_GT(environment_->objects()[kBox.value].X_WO.translation().z(), 0.02 - 1e-3)

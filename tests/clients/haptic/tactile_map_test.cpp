@@ -7,7 +7,7 @@
 namespace tenon::haptic {
 namespace {
 
-constexpr double kStep = 1e-3;
+constexpr double kMapStep = 1e-3;
 
 //          0
 //      5   z   1        view along x from the elbow, y to the right
@@ -29,7 +29,7 @@ HandManifold contactAt(double degrees, double depth) {
 TEST(TactileMap, DrivesOnlyTheTactorAtTheContact) {
   for (int tactor = 0; tactor < kTactors; ++tactor) {
     TactileMap map;
-    const TactorIntensities intensities = map.step(contactAt(60.0 * tactor, 0.004), kStep);
+    const TactorIntensities intensities = map.step(contactAt(60.0 * tactor, 0.004), kMapStep);
     for (int i = 0; i < kTactors; ++i)
       EXPECT_EQ(intensities[static_cast<std::size_t>(i)] > 0, i == tactor) << tactor;
   }
@@ -37,7 +37,7 @@ TEST(TactileMap, DrivesOnlyTheTactorAtTheContact) {
 
 TEST(TactileMap, DistributesAContactBetweenTwoTactors) {
   TactileMap map;
-  map.step(contactAt(30.0, 0.004), kStep);
+  map.step(contactAt(30.0, 0.004), kMapStep);
   EXPECT_NEAR(map.forces()[0], map.forces()[1], 1e-4);
   EXPECT_GT(map.forces()[0], 0.0);
   EXPECT_EQ(map.forces()[2], 0.0);
@@ -45,12 +45,12 @@ TEST(TactileMap, DistributesAContactBetweenTwoTactors) {
 
 TEST(TactileMap, IntensityGrowsWithDepthAndIsZeroWithoutContact) {
   TactileMap map;
-  const auto weak = map.step(contactAt(0.0, 0.001), kStep)[0];
-  const auto strong = map.step(contactAt(0.0, 0.006), kStep)[0];
+  const auto weak = map.step(contactAt(0.0, 0.001), kMapStep)[0];
+  const auto strong = map.step(contactAt(0.0, 0.006), kMapStep)[0];
   EXPECT_LT(weak, strong);
-  EXPECT_EQ(map.step(contactAt(0.0, 0.020), kStep)[0], 255);
-  EXPECT_EQ(map.step(contactAt(0.0, -0.001), kStep), TactorIntensities{});
-  EXPECT_EQ(map.step(HandManifold{}, kStep), TactorIntensities{});
+  EXPECT_EQ(map.step(contactAt(0.0, 0.020), kMapStep)[0], 255);
+  EXPECT_EQ(map.step(contactAt(0.0, -0.001), kMapStep), TactorIntensities{});
+  EXPECT_EQ(map.step(HandManifold{}, kMapStep), TactorIntensities{});
 }
 
 TEST(TactileMap, PulseRateGrowsWithContactForceInPatternMode) {
@@ -59,7 +59,7 @@ TEST(TactileMap, PulseRateGrowsWithContactForceInPatternMode) {
     int pulse_count = 0;
     bool on = false;
     for (int i = 0; i < 3000; ++i) {
-      const bool now = map.step(contactAt(120.0, depth), kStep)[2] > 0;
+      const bool now = map.step(contactAt(120.0, depth), kMapStep)[2] > 0;
       if (now && !on) ++pulse_count;
       on = now;
     }

@@ -11,9 +11,9 @@
 namespace tenon::haptic {
 namespace {
 
-constexpr double kStiffness = 1000.0;  // [N/m] of each coupling
-constexpr double kLever = 0.12;        // [m] from the centre of the bar to each hand
-constexpr std::size_t kDelay = 2;      // [ticks] of network delay
+constexpr double kHandsStiffness = 1000.0;  // [N/m] of each coupling
+constexpr double kLever = 0.12;             // [m] from the centre of the bar to each hand
+constexpr std::size_t kDelay = 2;           // [ticks] of network delay
 
 //   left o======[   bar   ]======o right      one station per hand, two ticks of delay to the server
 class TwoStations : public testing::Test {
@@ -31,7 +31,7 @@ class TwoStations : public testing::Test {
     for (std::uint32_t hand = 0; hand < 2; ++hand) {
       simulation::HandSpec spec;
       spec.object = ObjectId{hand};
-      spec.stiffness = kStiffness;
+      spec.stiffness = kHandsStiffness;
       scene->hands.push_back(spec);
     }
     environment_ = std::make_unique<simulation::Environment>(scene, simulation::EnvironmentOptions{});

@@ -13,7 +13,7 @@
 namespace tenon::haptic {
 namespace {
 
-constexpr double kStiffness = 200.0;                               // [N/m]
+constexpr double kFixtureStiffness = 200.0;                        // [N/m]
 constexpr double kDamping = 2.0;                                   // [Ns/m]
 constexpr double kSlope = VirtualFixture::kGrowth * kTickSeconds;  // [N] in a cycle
 
@@ -25,7 +25,7 @@ struct HandAtFixture {
     message.kind = kind;
     message.mode = mode;
     message.choice = 1;
-    message.stiffness = kStiffness;
+    message.stiffness = kFixtureStiffness;
     message.damping = kDamping;
     message.radius = 0.01;
   }
@@ -53,30 +53,30 @@ void expectEqual(const Vector3& a, const Vector3& b, double tolerance = 1e-6) {
 
 TEST(VirtualFixture, PullsAHandToItsPoseLikeASpring) {
   HandAtFixture hand;
-  expectEqual(hand.settle({0.01, -0.02, 0.0}), {-0.01 * kStiffness, 0.02 * kStiffness, 0.0});
+  expectEqual(hand.settle({0.01, -0.02, 0.0}), {-0.01 * kFixtureStiffness, 0.02 * kFixtureStiffness, 0.0});
 }
 
 TEST(VirtualFixture, LeavesTheHandFreeAlongAnAxis) {
   HandAtFixture hand(FixtureKind::kAxis);
-  expectEqual(hand.settle({0.01, 0.0, 0.3}), {-0.01 * kStiffness, 0.0, 0.0});
+  expectEqual(hand.settle({0.01, 0.0, 0.3}), {-0.01 * kFixtureStiffness, 0.0, 0.0});
 }
 
 TEST(VirtualFixture, LeavesTheHandFreeInAPlane) {
   HandAtFixture hand(FixtureKind::kPlane);
-  expectEqual(hand.settle({0.3, 0.2, 0.01}), {0.0, 0.0, -0.01 * kStiffness});
+  expectEqual(hand.settle({0.3, 0.2, 0.01}), {0.0, 0.0, -0.01 * kFixtureStiffness});
 }
 
 TEST(VirtualFixture, LeavesTheHandFreeInATube) {
   HandAtFixture hand(FixtureKind::kTube);
   expectEqual(hand.settle({0.009, 0.0, 0.3}), {0.0, 0.0, 0.0});
-  expectEqual(hand.settle({0.015, 0.0, 0.3}), {-0.005 * kStiffness, 0.0, 0.0});
+  expectEqual(hand.settle({0.015, 0.0, 0.3}), {-0.005 * kFixtureStiffness, 0.0, 0.0});
 }
 
 TEST(VirtualFixture, IsInItsOwnFrame) {
   HandAtFixture hand(FixtureKind::kPlane);
   hand.message.X_WF =
       Pose(Vector3(0.5, 0.0, 0.0), Quaternion(Eigen::AngleAxisd(std::numbers::pi / 2, Vector3::UnitY())));
-  expectEqual(hand.settle({0.49, 0.2, 0.1}), {0.01 * kStiffness, 0.0, 0.0});
+  expectEqual(hand.settle({0.49, 0.2, 0.1}), {0.01 * kFixtureStiffness, 0.0, 0.0});
 }
 
 TEST(VirtualFixture, TurnsAHandWithABoundedTorque) {
@@ -97,7 +97,7 @@ TEST(VirtualFixture, BrakesAHandThatMoves) {
   double x = 0.01;  // [m]
   Vector3 force;
   for (int i = 0; i < 50; ++i) force = hand.step({x += 1e-5, 0.0, 0.0}).force;
-  EXPECT_NEAR(force.x(), -kStiffness * x - kDamping * 0.01, 1e-4);
+  EXPECT_NEAR(force.x(), -kFixtureStiffness * x - kDamping * 0.01, 1e-4);
 }
 
 TEST(VirtualFixture, GrowsByTwentyNewtonsASecondAndStaysBelowItsLimit) {
@@ -144,7 +144,7 @@ TEST(VirtualFixture, HoldsBackWhatLeadsAwayAndNothingElse) {
   for (int i = 0; i < 400; ++i) expectEqual(hand.step({x -= 1e-4, 0.0, 0.0}).force, Vector3::Zero());
   Vector3 force;
   for (int i = 0; i < 100; ++i) force = hand.step({x += 1e-4, 0.0, 0.0}).force;
-  EXPECT_NEAR(force.x(), -0.01 * kStiffness - 0.1 * kDamping, 0.01);
+  EXPECT_NEAR(force.x(), -0.01 * kFixtureStiffness - 0.1 * kDamping, 0.01);
   for (int i = 0; i < 1000; ++i) force = hand.step({x += 1e-4, 0.0, 0.0}).force;
   EXPECT_NEAR(force.x(), -VirtualFixture::kForce, 1e-9);
 }
@@ -199,7 +199,7 @@ TEST(VirtualFixture, HearsTheNewestMessageAlone) {
   old.tick -= 5;
   old.mode = GuidanceMode::kOff;
   hand.fixture.receive(old);
-  expectEqual(hand.settle({0.01, 0.0, 0.0}, 1), {-0.01 * kStiffness, 0.0, 0.0});
+  expectEqual(hand.settle({0.01, 0.0, 0.0}, 1), {-0.01 * kFixtureStiffness, 0.0, 0.0});
 }
 
 /// Kind and mode.
@@ -223,7 +223,7 @@ TEST_P(VirtualFixtureEnergy, ACycleOfTheHandTakesEnergyAndGivesNone) {
     // an anchor that moves does work: bounded by its force and speed
     const double anchor =
         std::get<1>(GetParam()) == GuidanceMode::kLead && size > 0.02
-            ? VirtualFixture::kForce * VirtualFixture::kGrowth / kStiffness * kCycles * kTickSeconds
+            ? VirtualFixture::kForce * VirtualFixture::kGrowth / kFixtureStiffness * kCycles * kTickSeconds
             : 0.0;
     EXPECT_LE(delivered, anchor + 1e-9) << size;
   }
@@ -241,7 +241,7 @@ TEST_P(VirtualFixtureEnergy, NothingIsDeliveredWhileItEnds) {
     delivered += force.dot(now - before);
     before = now;
   }
-  EXPECT_LE(delivered, 0.5 * kStiffness * Vector3(0.015, 0.01, 0.012).squaredNorm() + 1e-9);
+  EXPECT_LE(delivered, 0.5 * kFixtureStiffness * Vector3(0.015, 0.01, 0.012).squaredNorm() + 1e-9);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, VirtualFixtureEnergy,

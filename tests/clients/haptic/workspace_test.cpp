@@ -5,7 +5,7 @@
 namespace tenon::haptic {
 namespace {
 
-constexpr double kStep = 1e-3;
+constexpr double kShiftStep = 1e-3;
 
 //     ( C_w )---o C_h       C_h inside the sphere: C_w rests; outside: C_w follows by eq. 1
 //       r_w
@@ -14,12 +14,12 @@ TEST(Workspace, FollowsAHandOutsideItsSphereByEquationOne) {
   const Vector3 p_WC(1.0, 2.0, 3.0);
   workspace.setCentre(p_WC);
   const Vector3 p_DH(0.3, -0.1, 0.05);
-  workspace.step(p_DH, false, kStep);
+  workspace.step(p_DH, false, kShiftStep);
   const double r_h = p_DH.norm();
   const Vector3 C_h = p_WC + p_DH;
-  const Vector3 expected = p_WC + 1.5 * kStep * (1.0 - 0.2 / r_h) * (C_h - p_WC);
+  const Vector3 expected = p_WC + 1.5 * kShiftStep * (1.0 - 0.2 / r_h) * (C_h - p_WC);
   EXPECT_LT((workspace.centre() - expected).norm(), 1e-15);
-  EXPECT_LT((workspace.velocity() - (expected - p_WC) / kStep).norm(), 1e-9);
+  EXPECT_LT((workspace.velocity() - (expected - p_WC) / kShiftStep).norm(), 1e-9);
 }
 
 // a servo that stood still: explicit Euler over the whole time would carry the centre far beyond the hand
@@ -37,7 +37,7 @@ TEST(Workspace, ALongStepCountsAsTenMilliseconds) {
 TEST(Workspace, RestsWhileTheHandIsInsideTheSphere) {
   Workspace workspace({.radius = 0.2, .gain = 1.5});
   workspace.setCentre(Vector3(1.0, 0.0, 0.0));
-  for (int i = 0; i < 1000; ++i) workspace.step(Vector3(0.0, 0.2, 0.0), false, kStep);
+  for (int i = 0; i < 1000; ++i) workspace.step(Vector3(0.0, 0.2, 0.0), false, kShiftStep);
   EXPECT_EQ(workspace.centre(), Vector3(1.0, 0.0, 0.0));
   EXPECT_FALSE(workspace.moving());
 }
@@ -45,11 +45,11 @@ TEST(Workspace, RestsWhileTheHandIsInsideTheSphere) {
 TEST(Workspace, RestsInContactAndForTheSettlingTimeAfterIt) {
   Workspace workspace({.radius = 0.2, .gain = 1.5, .settle_ticks = 50});
   workspace.setCentre(Vector3::Zero());
-  for (int i = 0; i < 1000; ++i) workspace.step(Vector3(0.4, 0.0, 0.0), true, kStep);
+  for (int i = 0; i < 1000; ++i) workspace.step(Vector3(0.4, 0.0, 0.0), true, kShiftStep);
   EXPECT_EQ(workspace.centre(), Vector3::Zero());
-  for (int i = 0; i < 49; ++i) workspace.step(Vector3(0.4, 0.0, 0.0), false, kStep);
+  for (int i = 0; i < 49; ++i) workspace.step(Vector3(0.4, 0.0, 0.0), false, kShiftStep);
   EXPECT_EQ(workspace.centre(), Vector3::Zero());
-  workspace.step(Vector3(0.4, 0.0, 0.0), false, kStep);
+  workspace.step(Vector3(0.4, 0.0, 0.0), false, kShiftStep);
   EXPECT_GT(workspace.centre().x(), 0.0);
 }
 
@@ -62,7 +62,7 @@ TEST(Workspace, MovesToAPositionSmoothlyAndReachesItExactly) {
   double max_speed_change = 0.0;
   Vector3 before = Vector3::Zero();
   for (int i = 0; i < 10000 && workspace.moveInProgress(); ++i) {
-    workspace.step(Vector3::Zero(), false, kStep);
+    workspace.step(Vector3::Zero(), false, kShiftStep);
     max_speed = std::max(max_speed, workspace.velocity().norm());
     max_speed_change = std::max(max_speed_change, (workspace.velocity() - before).norm());
     before = workspace.velocity();
@@ -76,13 +76,13 @@ TEST(Workspace, PausesAMoveInContactAndRestartsItFromRest) {
   Workspace workspace({.move_speed = 0.4});
   workspace.setCentre(Vector3::Zero());
   workspace.moveTo(Vector3(1.0, 0.0, 0.0));
-  for (int i = 0; i < 800; ++i) workspace.step(Vector3::Zero(), false, kStep);
+  for (int i = 0; i < 800; ++i) workspace.step(Vector3::Zero(), false, kShiftStep);
   const Vector3 stopped = workspace.centre();
-  for (int i = 0; i < 100; ++i) workspace.step(Vector3::Zero(), true, kStep);
+  for (int i = 0; i < 100; ++i) workspace.step(Vector3::Zero(), true, kShiftStep);
   EXPECT_EQ(workspace.centre(), stopped);
-  for (int i = 0; i < 51; ++i) workspace.step(Vector3::Zero(), false, kStep);
+  for (int i = 0; i < 51; ++i) workspace.step(Vector3::Zero(), false, kShiftStep);
   EXPECT_LT(workspace.velocity().norm(), 0.001);
-  for (int i = 0; i < 10000; ++i) workspace.step(Vector3::Zero(), false, kStep);
+  for (int i = 0; i < 10000; ++i) workspace.step(Vector3::Zero(), false, kShiftStep);
   EXPECT_LT((workspace.centre() - Vector3(1.0, 0.0, 0.0)).norm(), 1e-12);
 }
 
@@ -101,7 +101,7 @@ TEST(Workspace, MovesAgainstADeclutchedDeviceAndKeepsThatPlace) {
   EXPECT_NEAR(workspace.centre().z(), -0.080, 1e-12);
   EXPECT_EQ(workspace.shifted(), Vector3::Zero()) << "nothing takes back what the person has placed";
   const Vector3 placed = workspace.centre();
-  for (int i = 0; i < 3000; ++i) workspace.step(Vector3(0.0, 0.0, 0.024), false, kStep);
+  for (int i = 0; i < 3000; ++i) workspace.step(Vector3(0.0, 0.0, 0.024), false, kShiftStep);
   EXPECT_EQ(workspace.centre(), placed);
 }
 
