@@ -220,7 +220,7 @@ TEST_P(ForceReturnOfDesktop, ADeclutchedDeviceMovesAloneAndItsReturnIsSoft) {
     }
   }
   const double moved = setup.hand.device().X_DH.translation().z() - device;
-  EXPECT_GT(moved, 0.015);
+  EXPECT_GT(moved, 0.005);
   EXPECT_NEAR(setup.hand.workspace().centre().z(), centre - moved, 1e-12);
   setup.arm().setButtons(0);
   setup.expectSoftReturn([&] { setup.hold(true); });

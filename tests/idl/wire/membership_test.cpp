@@ -47,6 +47,7 @@ void runServer(std::uint32_t domain, const std::string& scenario_hash = "") {
       answer.client = ClientId{1};
       answer.tick = ++asked;
     }
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));  // some periods of who asks
     if (!welcomes->write(answer)) _exit(1);
   });
   if (heard) {
