@@ -9,6 +9,7 @@ from pathlib import Path
 
 from stage import Stage
 
+SOFT_START = 1 << 4  # of HandState_100's safety_flags, as devices/safety_rules.h
 ZSTD = ctypes.CDLL(ctypes.util.find_library("zstd") or "libzstd.so.1")
 
 
@@ -44,7 +45,7 @@ def messages(recording):
 
 def hand_states(recording):
     """Of each hand: (step of its station, largest force [N] displayed since the last one, force [N] displayed, age of its
-    contacts [ms]) from HandState_100, in order."""
+    contacts [ms], whether the force is starting) from HandState_100, in order."""
     hands = {}
     for topic, message in messages(recording):
         if topic != "HandState_100":
@@ -52,7 +53,8 @@ def hand_states(recording):
         hand, seq = struct.unpack_from("<II", message)
         force = struct.unpack_from("<3d", message, 144)
         hands.setdefault(hand, []).append((seq, struct.unpack_from("<f", message, 208)[0], sum(x * x for x in force) ** 0.5,
-                                           struct.unpack_from("<I", message, 192)[0]))
+                                           struct.unpack_from("<I", message, 192)[0],
+                                           bool(struct.unpack_from("<I", message, 196)[0] & SOFT_START)))
     return hands
 
 
@@ -80,23 +82,25 @@ class ForceReturn(unittest.TestCase):
     def returns(self, states):
         """Judges what follows each gap of a hand that felt a force; yields that force."""
         for i in range(1, len(states)):
-            seq, _, _, age = states[i]
+            seq, _, _, age, _ = states[i]
             if not (states[i - 1][3] > 150 and age < 50):
                 continue  # not the end of a gap
             # Until contacts are late, at 20 ms, the force follows the hand; the sample that names an age is up to 10 ms younger.
-            before = [peak for s, peak, _, a in states[:i] if a < 30 and seq - 1500 < s]
-            if not before or before[-1] < 1.0:
+            fresh = [peak for s, peak, _, a, _ in states[:i] if a < 30 and seq - 1500 < s]
+            if not fresh or fresh[-1] < 1.0:
                 continue
-            limit = max(*before[-10:], 3.0) + 0.3
-            last_seq, _, last, _ = states[i - 1]
-            for s, peak, force, a in states[i:]:
+            # What a force may come back to is what it was when it last was not starting: before an earlier gap, where gaps are close.
+            settled = [peak for _, peak, _, a, starting in states[:i] if a < 30 and not starting]
+            limit = max([*settled[-10:], 3.0]) + 0.3
+            last_seq, _, last, _, _ = states[i - 1]
+            for s, peak, force, a, _ in states[i:]:
                 if s > seq + 900 or a > 20:
                     break
                 self.assertLessEqual(peak, limit, f"{s - seq} ms after a gap that ended at step {seq}")
                 # steps take 1 ms, and count as 2 ms at most
                 self.assertLessEqual(peak - last, 20.0 * 0.002 * (s - last_seq) + 0.02, f"step {s}")
                 last_seq, last = s, force
-            yield before[-1]
+            yield fresh[-1]
 
 
 if __name__ == "__main__":
