@@ -20,6 +20,7 @@
 #include "server/session/renamed_options.h"
 #include "server/session/scenario_copy.h"
 #include "server/session/session_server.h"
+#include "server/session/start_condition.h"
 #include "server/session/stop_file.h"
 
 namespace {
@@ -176,7 +177,7 @@ int resimulateFile(const ServeArguments& arguments, const tenon::session::Loaded
 int checkArguments(const ServeArguments& arguments) {
   const auto scenario = tenon::game_control::readScenario(arguments.scenario);
   if (!scenario) return reportError(scenario.error().what);
-  if (const auto known = tenon::session::checkWaitFor(*scenario, arguments.session.wait_for); !known)
+  if (const auto known = tenon::session::StartCondition::make(*scenario, arguments.session.wait_for); !known)
     return reportError("--wait-for: " + known.error().what, kWrongUsage);
   if (!arguments.resume.empty()) return 0;  // its journal is continued
   tenon::ProgramFiles files{{arguments.session.journal}, {scenario->path}, arguments.overwrite};

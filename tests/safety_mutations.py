@@ -20,7 +20,7 @@ HAND, SAFETY, MODEL = "clients/haptic/haptic_hand.cpp", "devices/safety.cpp", "c
 AGE, BRACELET, WORKSPACE = "clients/haptic/answer_age.cpp", "clients/haptic/bracelet.cpp", "clients/haptic/workspace.cpp"
 REMOTE, REMOTE_MODEL, REGISTRY, WRITER = "devices/drivers/remote_device.cpp", "devices/drivers/remote_model.cpp", "server/session/session_registry.cpp", "server/session/journal_writer.cpp"
 ARMING = "clients/haptic/arming.h"
-WIRE, SIMULATION = "server/session/server_wire.cpp", "server/session/session_simulation.cpp"
+STOPS, SIMULATION = "server/session/stop_keeper.cpp", "server/session/session_simulation.cpp"
 SCRIPTS = "programs"  # of the release preset; tests are then those of tests/system
 FIXTURE, MENTORING = "clients/haptic/virtual_fixture.cpp", "server/session/mentoring.cpp"
 
@@ -115,15 +115,15 @@ RULES = [
     ("a stop leaves the fixture's force", [(HAND, r"  if \(request\.restart [^;]*fixture_\.restart\(\);\n", "")], "clients_haptic_tests",
      "*AStopTakesItsForceAtOnceAndAfterwardsItBeginsFromZero*"),
     ("two instructors pull", [(MENTORING, r"  if \(auto free = conflict[^;]*;[^;]*;\n", "")], "server_session_tests", "MentoringTest.AHandIsGuidedByOneOther"),
-    ("two servers move one hand", [(WIRE, r"if \(epoch > options_\.server_epoch\)", "if (epoch > options_.server_epoch && epoch == 0)")], SCRIPTS,
+    ("two servers move one hand", [("server/session/server_announcement.cpp", r"if \(epoch > content_\.server_epoch\)", "if (epoch > content_.server_epoch && epoch == 0)")], SCRIPTS,
      "trust_test.Identity.test_an_old_server_that_was_stopped_and_continues_ends_itself"),
     ("a stranger leads the run", [(REGISTRY, r"\(role->needs_key \|\| key_of_all_\) && !proofs\.key", "key_of_all_ && !proofs.key")], SCRIPTS,
      "trust_test.Identity.test_instructors_and_admins_need_the_key_and_are_told_so"),
     ("nobody can stop the devices", [("clients/haptic/station_program.cpp", r"if \(!stops_\.raise\(stop\)\) return;", "if (stop.who != \"server\" || !stops_.raise(stop)) return;")], SCRIPTS,
      "trust_test.EmergencyStop.test_a_raise_reaches_the_devices_although_the_server_hangs_and_stands_when_it_continues"),
-    ("a restart of the server lifts", [(WIRE, r"  stops_ = std::move\(\*kept\);\n", "")], SCRIPTS,
+    ("a restart of the server lifts", [(STOPS, r"  truth_ = std::move\(\*kept\);\n", "")], SCRIPTS,
      "trust_test.EmergencyStop.test_a_stop_stands_over_a_killed_server_and_its_end_needs_station_instructor_and_resume"),
-    ("a resumed session has forgotten", [(WIRE, r"  stops_ = std::move\(\*kept\);\n", ""), ("server/session/session_server.cpp", r"if \(simulation_\.emergencyStop\(\)\) wire_", "if (false) wire_")],
+    ("a resumed session has forgotten", [(STOPS, r"  truth_ = std::move\(\*kept\);\n", ""), ("server/session/session_server.cpp", r"if \(simulation_\.emergencyStop\(\)\) wire_", "if (false) wire_")],
      SCRIPTS, "resume_test.KilledServer.test_an_emergency_stop_stands_after_the_resume_until_it_is_cleared"),
     ("forces are to stop for a moment", [(SIMULATION, r"forces_frozen_ = change\.value != 0\.0;", "forces_frozen_ = false;")], "server_session_tests",
      "SessionSimulation.FrozenForcesHoldHandsStillWhileStepsGoOn"),

@@ -26,6 +26,12 @@ bool dispatchUntil(wire::Inbox& inbox, const std::atomic<bool>& stop,
   return true;
 }
 
+/// Twice is as good as once.
+bool isRepeatable(CommandKind kind) {
+  return kind == CommandKind::kKick || kind == CommandKind::kStop || kind == CommandKind::kFreezeForces ||
+         kind == CommandKind::kSetCollision;
+}
+
 std::string reasonOf(const ParsedCommand& command) {
   return command.text.empty() ? "requested" : command.text;
 }
@@ -66,6 +72,10 @@ Result<void> CommandClient::connect(const Stop& stop) {
   auto raiser = StopRaiser::open(options_.domain, member_->sessionName(), options_.person);
   if (!raiser) return fail(raiser.error().what);
   raiser_ = std::move(*raiser);
+  return awaitReader(stop);
+}
+
+Result<void> CommandClient::awaitReader(const Stop& stop) {
   const bool matched = dispatchUntil(inbox_, stop, kPatience, [this] {
     return commands_->matchedReaders() > 0 && inbox_.matchedWriters() > 1;
   });
@@ -87,6 +97,19 @@ Result<void> CommandClient::send(const ParsedCommand& command, const Stop& stop)
     return fail(outcome ? *outcome : outcome.error().what);
   }
   if (lost()) return fail(*lost());
+  auto sent = sendOnce(command, stop);
+  if (sent || !member_->serverIsGone()) return sent;
+  if (!isRepeatable(*command.command))
+    return fail(*lost() +
+                " before it has answered, so it may have obeyed or not: look at the session that is resumed "
+                "(tenon command list), and repeat the command if it has not");
+  if (auto back = member_->rejoin(stop); !back)
+    return fail("the server has not answered; " + back.error().what);
+  if (auto matched = awaitReader(stop); !matched) return matched;
+  return sendOnce(command, stop);
+}
+
+Result<void> CommandClient::sendOnce(const ParsedCommand& command, const Stop& stop) {
   ack_.reset();
   const Command message{
       member_->welcome().client, ++sent_, *command.command, {}, command.text, command.value};
@@ -96,7 +119,9 @@ Result<void> CommandClient::send(const ParsedCommand& command, const Stop& stop)
     if (stop || std::chrono::steady_clock::now() >= until)
       return fail("no answer from the server: it may hang or have ended");
     if (auto sent = commands_->write(message); !sent) return sent;
-  } while (!dispatchUntil(inbox_, stop, kResend, answered));
+    (void)dispatchUntil(inbox_, stop, kResend, [&] { return answered() || lost(); });
+    if (!answered() && lost()) return fail(*lost());
+  } while (!answered());
   if (!ack_->accepted) return fail("refused: " + ack_->reason);
   return {};
 }

@@ -30,7 +30,8 @@ class CommandClient {
                                                                    const Stop& stop);
 
   /// Sends a command and waits for the answer, at most 5 s. Fails with the server's reason, or when there is
-  /// no answer.
+  /// no answer. When the server is killed meanwhile, the one that resumes the session is asked once more if
+  /// it does no harm to do twice what is asked for.
   [[nodiscard]] Result<void> send(const ParsedCommand& command, const Stop& stop);
   /// Why the server has refused the last command; kNone when it has not.
   [[nodiscard]] Refusal refusal() const { return ack_ ? ack_->refusal : Refusal::kNone; }
@@ -49,6 +50,8 @@ class CommandClient {
  private:
   explicit CommandClient(wire::MembershipOptions options) : options_(std::move(options)) {}
   Result<void> connect(const Stop& stop);
+  Result<void> awaitReader(const Stop& stop);
+  Result<void> sendOnce(const ParsedCommand& command, const Stop& stop);
   void receive(const RunState& run);
 
   wire::MembershipOptions options_;

@@ -31,7 +31,8 @@ std::uint32_t playoutFor(double lost, double trip_jitter) {
 }  // namespace
 
 LinkChoice LimitChooser::step(const LinkMeasurement& now) noexcept {
-  last_[count_++ % kMemory] = now;
+  if (ignored_ == 0) last_[count_++ % kMemory] = now;
+  if (ignored_ > 0) --ignored_;
   LinkMeasurement worst;
   double steady_loss = 0.0;  // [-] without interruptions
   for (const LinkMeasurement& one : last_) {

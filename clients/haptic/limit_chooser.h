@@ -44,10 +44,15 @@ class LimitChooser {
 
   /// NaN counts as no fault.
   [[nodiscard]] LinkChoice step(const LinkMeasurement& now) noexcept;
+  /// The server or the seat was gone for a while, which is no fault of the link: what the next kInterrupted
+  /// measurements say, which contain that while, does not count.
+  void interrupted() noexcept { ignored_ = kInterrupted; }
 
  private:
+  static constexpr unsigned kInterrupted = 2;  ///< [measurements] one may have been made before its end
   std::array<LinkMeasurement, kMemory> last_{};
   std::size_t count_ = 0;
+  unsigned ignored_ = 0;  ///< [measurements] to come
 };
 
 }  // namespace tenon::haptic

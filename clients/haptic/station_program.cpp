@@ -377,6 +377,8 @@ Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat
   if (back) back = link_.awaitMatch(stop, meanwhile);
   if (!back) return fail(why + "; " + back.error().what);
   rejoined_at_ = std::chrono::steady_clock::now();
+  limits_.interrupted();
+  if (member.welcome().server_epoch != before.server_epoch) link_clock_ = {};  // another process, or machine
   new_seat = member.welcome().client != before.client || member.welcome().hands != before.hands ||
              member.welcome().server_epoch != before.server_epoch;
   print("rejoined as client " + std::to_string(member.welcome().client.value));

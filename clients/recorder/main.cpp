@@ -60,6 +60,13 @@ int run(int argc, char** argv) {
   for (const tenon::recorder::TopicCount& count : recorded->counts)
     options.report("  " + count.topic + ": " + std::to_string(count.recorded) + " of " +
                    std::to_string(count.published) + " samples");
+  if (const std::uint64_t missing = recorded->missingTicks(); missing > 0) {
+    std::fprintf(
+        stderr,
+        "tenon-record: %s: the inputs of %llu ticks are missing: it cannot be re-simulated beyond them\n",
+        status.file.c_str(), static_cast<unsigned long long>(missing));
+    return 1;
+  }
   return 0;
 }
 

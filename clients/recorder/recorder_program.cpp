@@ -194,6 +194,12 @@ Result<void> Recorder::comeBack() {
 
 }  // namespace
 
+std::uint64_t RecordingReport::missingTicks() const {
+  for (const TopicCount& count : counts)
+    if (count.topic == wire::kTickInput.name) return count.published - count.recorded;
+  return 0;
+}
+
 Result<RecordingReport> recordSession(const RecorderOptions& options, const std::atomic<bool>& stop) {
   return Recorder(options, stop).run();
 }

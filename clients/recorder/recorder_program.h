@@ -28,6 +28,9 @@ struct RecorderOptions {
 struct RecordingReport {
   RecorderStatus status;
   std::vector<TopicCount> counts;  ///< by topic
+
+  /// Ticks whose inputs are not in it: a re-simulation ends at the first of them.
+  [[nodiscard]] std::uint64_t missingTicks() const;
 };
 
 /// Joins a session as recorder and writes all its topics until the run is over, the server is lost or `stop`

@@ -209,7 +209,11 @@ void Recording::count(const TickInputPart& input) {
 /// In ticks. Without a run state that says where the run ended, up to the newest one received; a server that
 /// publishes no inputs publishes 0 of them.
 TopicCount Recording::inputCount() const {
-  const Tick end = std::max(newest_input_.tick, runIsOver() ? run_->tick : 0);
+  // of the newest one parts may be on their way
+  const bool is_whole =
+      !input_ranges_.empty() && std::prev(input_ranges_.end())->second == newest_input_.tick;
+  const Tick newest = newest_input_.tick == 0 || is_whole ? newest_input_.tick : newest_input_.tick - 1;
+  const Tick end = runIsOver() ? std::max(newest_input_.tick, run_->tick) : newest;
   const Tick before = first_input_ == 0 ? end : std::min(heardAfter(), first_input_ - 1);
   TopicCount count{std::string(wire::kTickInput.name), 0, end - before};
   for (const auto& [first, last] : input_ranges_)

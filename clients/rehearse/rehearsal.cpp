@@ -8,7 +8,7 @@
 #include "server/session/journal.h"
 #include "server/session/publisher.h"
 #include "server/session/session_registry.h"
-#include "server/session/session_server.h"
+#include "server/session/start_condition.h"
 
 namespace tenon::rehearse {
 namespace {

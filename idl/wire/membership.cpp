@@ -49,7 +49,6 @@ Result<std::unique_ptr<Membership>> Membership::find(const MembershipOptions& op
                          .config = {}});
   if (!participant) return fail(participant.error().what);
   std::unique_ptr<Membership> member(new Membership(options));
-  member->guid_ = randomGuid();
   member->participant_ = *participant;
   if (!member->options_.seat) member->options_.seat = SeatKey::random();
   member->lobby_ = std::make_unique<Partition>(*participant, kLobby, LinkProfile::kLan);
@@ -120,6 +119,7 @@ Result<void> Membership::requestSeat(const Stop& stop, const std::function<void(
   if (!joins) return fail(joins.error().what);
   auto welcomes = Reader<Welcome>::open(*lobby_, kWelcome);
   if (!welcomes) return fail(welcomes.error().what);
+  guid_ = randomGuid();
   Join join{.client_guid = guid_,
             .session = announce_.session,
             .server_epoch = announce_.server_epoch,

@@ -81,7 +81,6 @@ class Membership {
   [[nodiscard]] bool isServer(const Origin& origin) const { return origin.known() && origin == server_; }
   /// The secret of the seat: whoever has it may take the seat again.
   [[nodiscard]] const SeatKey& seat() const { return *options_.seat; }
-  [[nodiscard]] const std::string& clientGuid() const { return guid_; }
   [[nodiscard]] Partition& lobby() { return *lobby_; }
   [[nodiscard]] Partition& session() { return *session_; }
   /// For what the server sends to this client alone.
@@ -101,7 +100,9 @@ class Membership {
   void prove(const std::string& challenge, Join& join, std::string& problem) const;
 
   MembershipOptions options_;
-  std::string guid_;  ///< Join::client_guid
+  /// Join::client_guid. Each request for a seat has another one, so that what the server says of an earlier
+  /// presence, however late, is not taken for this one's.
+  std::string guid_;
   std::shared_ptr<Participant> participant_;
   std::unique_ptr<Partition> lobby_;
   std::unique_ptr<Partition> session_;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <optional>
-#include <thread>
 #include <tuple>
 #include <utility>
 
@@ -13,27 +12,35 @@
 #include "idl/types/names.h"
 #include "idl/types/printable_text.h"
 #include "server/session/scene_loader.h"
-#include "server/session/server_writers.h"
 #include "server/session/session_lock.h"
-#include "server/session/stop_file.h"
 
 namespace tenon::session {
 namespace {
 
-constexpr auto kOtherServers = std::chrono::milliseconds(500);  // for their announcements to arrive
-// without a sign of life for so long the announcement of a server ends (its lease)
-constexpr auto kLapse = wire::kSessionAnnounce.parameters.lease;
-// A reader that took this server for dead knows its announcement again, and so its next end, by another
-// sample alone.
-constexpr auto kAnnounceInterval = std::chrono::seconds(1);
-// joins and leaves of clients without hands: one after each
-constexpr auto kBetweenSeats = std::chrono::milliseconds(5);
-constexpr std::size_t kMostWaiting = 512;
 constexpr auto kBetweenLimits = std::chrono::milliseconds(500);  // changes of a station's limits
-constexpr auto kAfterLapse = std::chrono::seconds(10);  // until those who came meanwhile are discovered
 
 std::int64_t nowNanoseconds() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+}
+
+SessionAnnounce announcementOf(const WireOptions& options, const LoadedScene& loaded) {
+  const game_control::ScenarioFile& scenario = *loaded.scenario;
+  return {.session = options.session,
+          .server_epoch = options.server_epoch,
+          .title = scenario.title.front().text,
+          .lockstep = options.lockstep,
+          .objects = static_cast<std::uint32_t>(loaded.scene->objects.size()),
+          .hands = static_cast<std::uint32_t>(scenario.hands.size()),
+          .steps = static_cast<std::uint32_t>(scenario.states.size()),
+          .resumed_after = options.resumed_after,
+          .scenario_hash = fmt::format("{:016x}", scenario.text_hash),
+          .host = hostName(),
+          .pid = static_cast<std::uint32_t>(getpid()),
+          .scene_hash = options.scene_hash,
+          .scenario = scenarioName(scenario.path),
+          .detail = options.detail,
+          .freeze_ticks = static_cast<std::uint32_t>(options.limits.freeze),
+          .park_ticks = static_cast<std::uint32_t>(options.limits.park)};
 }
 
 }  // namespace
@@ -47,9 +54,23 @@ ServerWire::ServerWire(const WireOptions& options, std::shared_ptr<wire::Partici
       writers_(std::make_unique<ServerWriters>()),
       registry_(registry),
       input_buffer_(input_buffer),
-      publisher_(publisher) {
+      publisher_(publisher),
+      stops_(options.stop_file, *writers_) {
+  stops_.not_kept = [this](const std::string& why) {
+    log(Severity::kError, "emergency stop",
+        fmt::format("the emergency stop would not outlive a crash of the server: {}", why));
+  };
   if (options_.publish_journal) copies_ = std::make_unique<JournalCopies>(participant_, options_.session);
   if (!options_.seat_file.empty()) seats_ = std::make_unique<SeatKeeper>(options_.seat_file);
+  reception_ =
+      std::make_unique<Reception>(Reception::Session{options_.session, options_.server_epoch, options_.key},
+                                  registry_, *writers_, seats_.get(), copies_.get());
+  reception_->callbacks = {.log = [this](Severity severity, const std::string& kind,
+                                         const std::string& text) { log(severity, kind, text); },
+                           .seated = [this](const Welcome& welcome) { beginInputs(welcome); },
+                           .left = [this] { forwardChanges(); },
+                           .answer = [this](const Command& command, const CommandAck& ack,
+                                            const std::string& who) { answer(command, ack, who); }};
 }
 
 Result<std::unique_ptr<ServerWire>> ServerWire::open(const WireOptions& options, const LoadedScene& loaded,
@@ -62,75 +83,26 @@ Result<std::unique_ptr<ServerWire>> ServerWire::open(const WireOptions& options,
   if (!participant) return fail(participant.error().what);
   std::unique_ptr<ServerWire> wire(
       new ServerWire(options, std::move(*participant), registry, input_buffer, publisher));
-  wire->title_ = loaded.scenario->title.front().text;
-  wire->scenario_hash_ = fmt::format("{:016x}", loaded.scenario->text_hash);
-  wire->scenario_ = scenarioName(loaded.scenario->path);
   wire->newest_seq_.resize(loaded.scenario->hands.size());
-  if (auto alone = wire->refuseBesideAnother(); !alone) return fail(alone.error().what);
+  if (auto alone = ServerAnnouncement::refuseBesideAnother(wire->lobby_, options.session); !alone)
+    return fail(alone.error().what);
   if (auto opened = wire->writers_->open(wire->lobby_, wire->session_, wire->writes_); !opened)
     return fail(opened.error().what);
   if (auto opened = wire->openReaders(); !opened) return fail(opened.error().what);
   wire->sendScene(loaded);
-  if (auto restored = wire->restoreStops(); !restored) return fail(restored.error().what);
-  wire->announce();
+  if (auto restored = wire->stops_.restore(); !restored) return fail(restored.error().what);
+  if (wire->stops_.engaged()) registry.engageEmergencyStop();
+  wire->announcement_.emplace(announcementOf(options, loaded), *wire->writers_);
+  wire->announcement_->announce();
   return wire;
 }
 
-/// On this machine the SessionLock decides; this is for servers on other machines.
-Result<void> ServerWire::refuseBesideAnother() {
-  auto reader = wire::Reader<SessionAnnounce>::open(lobby_, wire::kSessionAnnounce);
-  if (!reader) return fail(reader.error().what);
-  const auto until = std::chrono::steady_clock::now() + kOtherServers;
-  SessionAnnounce other;
-  while (std::chrono::steady_clock::now() < until) {
-    while (reader->take(other))
-      if (other.session == options_.session)
-        return fail(servedAlready(other.session, std::to_string(other.pid), other.host));
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-  return {};
-}
-
-/// A server that is newer than this one is of no concern while this one lives: clients ignore it. Once this
-/// one was stopped for so long that clients took it for dead, the newer one has them.
 void ServerWire::handle(const SessionAnnounce& other, const wire::Origin& from) {
-  if (other.session != options_.session || !from.known() || from == participant_->origin()) return;
-  if (!others_.emplace(other.server_epoch, other).second) return;
+  if (!from.known() || from == participant_->origin() || !announcement_->isAnother(other)) return;
   log(Severity::kWarning, "another server",
       fmt::format(
           "another server of session '{}' runs as process {} on host {}: clients of this one ignore it",
           other.session, other.pid, other.host));
-}
-
-void ServerWire::noticeLapse() {
-  const auto now = std::chrono::steady_clock::now();
-  if (now - announced_at_ > kAnnounceInterval) announce();
-  if (dispatched_ && now - *dispatched_ > kLapse) lapsed_ = now;
-  dispatched_ = now;
-  if (!lapsed_) return;
-  for (const auto& [epoch, other] : others_)
-    if (epoch > options_.server_epoch)
-      replaced_ = fmt::format(
-          "this server was stopped for a while, and process {} on host {} serves session '{}' now: this one "
-          "ends",
-          other.pid, other.host, other.session);
-  if (now - *lapsed_ > kAfterLapse) lapsed_.reset();
-}
-
-Result<void> ServerWire::restoreStops() {
-  auto kept = readStopFile(options_.stop_file);
-  if (!kept) return fail(kept.error().what);
-  stops_ = std::move(*kept);
-  for (const auto& [id, stop] : stops_.standing()) writers_->stop.send(stop);
-  for (const auto& [id, cleared] : stops_.cleared()) writers_->clear.send(cleared);
-  if (stops_.engaged()) registry_.engageEmergencyStop();
-  return {};
-}
-
-void ServerWire::keepStops() {
-  if (auto kept = writeStopFile(options_.stop_file, stops_); !kept)
-    log(Severity::kError, "emergency stop",
-        fmt::format("the emergency stop would not outlive a crash of the server: {}", kept.error().what));
 }
 
 Result<void> ServerWire::openReaders() {
@@ -138,7 +110,8 @@ Result<void> ServerWire::openReaders() {
   const auto listenTo = [&]<class M>(wire::Partition& partition, const wire::Topic<M>& topic, auto handler) {
     if (result) result = inbox_.onFrom<M>(partition, topic, handler);
   };
-  listenTo(lobby_, wire::kJoin, [this](const Join& join, const wire::Origin& from) { receive(join, from); });
+  listenTo(lobby_, wire::kJoin,
+           [this](const Join& join, const wire::Origin& from) { reception_->receive(join, from); });
   listenTo(session_, wire::kDeviceInput,
            [this](const DeviceInput& input, const wire::Origin& from) { handle(input, from); });
   listenTo(session_, wire::kCommand,
@@ -173,10 +146,8 @@ Result<void> ServerWire::openReaders() {
         [this](const Presence& gone, const wire::Origin& from) { handleGone(gone, from); });
   }
   if (result) {
-    result =
-        inbox_.onGone<SessionAnnounce>(lobby_, wire::kSessionAnnounce, [this](const SessionAnnounce& gone) {
-          if (gone.session == options_.session) others_.erase(gone.server_epoch);
-        });
+    result = inbox_.onGone<SessionAnnounce>(
+        lobby_, wire::kSessionAnnounce, [this](const SessionAnnounce& gone) { announcement_->forget(gone); });
   }
   return result;
 }
@@ -192,43 +163,18 @@ void ServerWire::sendScene(const LoadedScene& loaded) {
     writers_->hand.send(scene_hands_.back());
   }
   const auto steps = static_cast<std::uint32_t>(scenario.states.size());
-  scene_ = {.objects = static_cast<std::uint32_t>(loaded.scene->objects.size()),
-            .hands = static_cast<std::uint32_t>(scenario.hands.size()),
-            .steps = steps};
   for (std::uint32_t i = 0; i < steps; ++i) {
     const game_control::ScenarioState& state = scenario.states[i];
     writers_->scene_step.send({i, steps, state.name, state.title, state.part});
   }
 }
 
-void ServerWire::announce() {
-  announced_at_ = std::chrono::steady_clock::now();
-  writers_->announce.send({.session = options_.session,
-                           .server_epoch = options_.server_epoch,
-                           .title = title_,
-                           .lockstep = options_.lockstep,
-                           .objects = scene_.objects,
-                           .hands = scene_.hands,
-                           .steps = scene_.steps,
-                           .resumed_after = options_.resumed_after,
-                           .scenario_hash = scenario_hash_,
-                           .host = hostName(),
-                           .pid = static_cast<std::uint32_t>(getpid()),
-                           .scene_hash = options_.scene_hash,
-                           .scenario = scenario_,
-                           .detail = options_.detail,
-                           .freeze_ticks = static_cast<std::uint32_t>(options_.limits.freeze),
-                           .park_ticks = static_cast<std::uint32_t>(options_.limits.park)});
-}
-
 void ServerWire::dispatch(std::chrono::nanoseconds timeout) {
-  const bool waits = !joins_.empty() || !leaves_.empty() || !kicks_.empty();
-  inbox_.dispatch(waits ? std::min<std::chrono::nanoseconds>(timeout, kBetweenSeats) : timeout);
-  handleJoinsAndLeaves();
-  finishKicks();
-  dismissStuckRecorders();
+  const bool waits = reception_->waits();
+  inbox_.dispatch(waits ? std::min<std::chrono::nanoseconds>(timeout, Reception::kBetweenTurns) : timeout);
+  reception_->step();
   if (const auto error = seats_ ? seats_->takeError() : std::nullopt) log(Severity::kError, "seats", *error);
-  noticeLapse();
+  announcement_->step();
   forwardChanges();
 }
 
@@ -244,6 +190,7 @@ void ServerWire::forwardChanges() {
 
 void ServerWire::update(const TickOutput& output) {
   now_ = output.tick;
+  reception_->setTick(now_);
   registry_.updatePhase(output.phase, output.emergency_stop);
   sendGuidance(output);
 }
@@ -281,89 +228,14 @@ bool ServerWire::isGenuine(ClientId client, const wire::Origin& from, const std:
   return false;
 }
 
-/// To a program that still sends although its seat is lost, so that it can rejoin; at most once a second.
-void ServerWire::notifySeatLost(ClientId client, const std::string& why) {
-  constexpr auto kInterval = std::chrono::seconds(1);
-  const auto now = std::chrono::steady_clock::now();
-  const auto last = seat_lost_notified_.find(client);
-  if (last != seat_lost_notified_.end() && now - last->second < kInterval) return;
-  seat_lost_notified_[client] = now;
-  writers_->welcome.send({.client_guid = registry_.guidOf(client),
-                          .session = options_.session,
-                          .server_epoch = options_.server_epoch,
-                          .accepted = false,
-                          .reason = why,
-                          .client = client,
-                          .tick = now_});
-}
-
-/// Queues a request; the program repeats one that finds no room.
-void ServerWire::receive(const Join& join, const wire::Origin& from) {
-  if (join.session != options_.session || join.server_epoch != options_.server_epoch) return;
-  const auto same = [&](const auto& waiting) { return waiting.first.client_guid == join.client_guid; };
-  if (const auto found = std::find_if(joins_.begin(), joins_.end(), same); found != joins_.end()) {
-    *found = {join, from};
-  } else if (joins_.size() < kMostWaiting) {
-    joins_.emplace_back(join, from);
-  }
-}
-
-/// One after the other, so that a crowd that comes or goes does not delay frames.
-void ServerWire::handleJoinsAndLeaves() {
-  const auto now = std::chrono::steady_clock::now();
-  if ((joins_.empty() && leaves_.empty()) || now < next_change_of_seats_) return;
-  next_change_of_seats_ = now + kBetweenSeats;
-  if (!leaves_.empty()) {
-    dismiss(leaves_.front(), "has left");
-    leaves_.pop_front();
-  } else {
-    const auto [join, from] = std::move(joins_.front());
-    joins_.pop_front();
-    handle(join, from);
-  }
-}
-
-void ServerWire::dismissStuckRecorders() {
-  if (!copies_) return;
-  for (const ClientId client : copies_->takeStuck())
-    dismiss(client, "takes no inputs of the ticks, and is removed until it joins again");
-}
-
-void ServerWire::handle(const Join& join, const wire::Origin& from) {
-  const bool is_new = !registry_.isSeated(join.client_guid);
-  const bool is_known = registry_.knowsSeat(join.seat_key);
-  const wire::ProofSubject subject{.challenge = challenges_.challengeFor(from, join.client_guid),
-                                   .session = options_.session,
-                                   .server_epoch = options_.server_epoch,
-                                   .client_guid = join.client_guid,
-                                   .role = join.role,
-                                   .client = from};
-  if (is_new && registry_.mustProve(join) && join.seat_proof.empty()) {
-    writers_->welcome.send({.client_guid = join.client_guid,
-                            .session = options_.session,
-                            .server_epoch = options_.server_epoch,
-                            .reason = "prove who you are",
-                            .challenge = subject.challenge});
-    return;
-  }
-  const JoinProofs proofs{.seat = wire::SeatKey::isProof(join.seat_key, subject, join.seat_proof),
-                          .key = options_.key && options_.key->isProof(subject, join.key_proof)};
-  const Welcome welcome = registry_.join(join, proofs, now_, from);
-  writers_->welcome.send(welcome);
-  if (!is_new) return;
+/// Of a client that has got a seat.
+void ServerWire::beginInputs(const Welcome& welcome) {
   for (const HandId hand : welcome.hands) {
     if (!hand.valid()) continue;
     newest_seq_[hand.value] = 0;
     input_buffer_.setPlayout(hand, 0);
   }
   received_inputs_.erase(welcome.client);
-  if (welcome.accepted && seats_) seats_->keep(registry_.seatsToKeep());
-  if (welcome.accepted && copies_ && join.role == Role::kRecorder)
-    copies_->admit(welcome.client, from, join.recorded_until);
-  const char* how = is_known ? "has rejoined" : "has joined";
-  log(welcome.accepted ? Severity::kInfo : Severity::kWarning, "join",
-      welcome.accepted ? fmt::format("{} ({}) {}", join.name, roleName(join.role), how)
-                       : fmt::format("{} may not join: {}", join.name, welcome.reason));
 }
 
 void ServerWire::handle(const DeviceInput& input, const wire::Origin& from) {
@@ -372,7 +244,7 @@ void ServerWire::handle(const DeviceInput& input, const wire::Origin& from) {
   if (!isGenuine(input.client, from, "device input")) return;
   const Presence* sender = registry_.findClient(input.client);
   if (sender != nullptr && !sender->alive && input.server_epoch == options_.server_epoch)
-    return notifySeatLost(input.client, "its process or link was lost");
+    return reception_->notifySeatLost(input.client, "its process or link was lost");
   const auto reading = registry_.validateDeviceInput(input);
   if (!reading) return refuse(reading.error().what);
   ReceivedInputs& received = received_inputs_[input.client];
@@ -383,10 +255,10 @@ void ServerWire::handle(const DeviceInput& input, const wire::Origin& from) {
   if (options_.lockstep && reading->seq == newest && newest == now_) resend_requested_ = true;
   if (reading->seq <= newest && newest - reading->seq < 0x80000000U) return;  // out of order, or a repetition
   if (options_.lockstep && reading->seq > now_ + 1)
-    return dismiss(input.client,
-                   fmt::format("sent the input of tick {} when tick {} was the next, and is removed: in "
-                               "lockstep an input answers a received tick",
-                               reading->seq, now_ + 1));
+    return reception_->dismiss(
+        input.client, fmt::format("sent the input of tick {} when tick {} was the next, and is removed: in "
+                                  "lockstep an input answers a received tick",
+                                  reading->seq, now_ + 1));
   if (input_buffer_.playout(input.hand) > 0) handleEarlier(input, newest);
   newest = reading->seq;
   input_buffer_.put(*reading);
@@ -405,32 +277,13 @@ void ServerWire::handleEarlier(const DeviceInput& input, std::uint32_t newest) {
 void ServerWire::handle(const Command& command, const wire::Origin& from) {
   if (!isGenuine(command.client, from, "command")) return;
   if (const CommandAck* again = registry_.previousAck(command)) {
-    const auto isAgain = [&](const Kick& kick) {
-      return kick.command.client == command.client && kick.command.id == command.id;
-    };
-    if (std::none_of(kicks_.begin(), kicks_.end(), isAgain)) writers_->ack.send(*again);
+    if (!reception_->holds(command)) writers_->ack.send(*again);
     return;
   }
   const Presence* sender = registry_.findClient(command.client);
   const std::string who = sender != nullptr ? sender->name : fmt::format("client {}", command.client.value);
   const CommandAck ack = registry_.handleCommand(command);
-  if (std::vector<ClientId> kicked = registry_.takeKicked(); !kicked.empty()) {
-    const std::uint64_t kept = seats_ ? seats_->keep(registry_.seatsToKeep()) : 0;
-    for (const ClientId client : kicked) dismiss(client, "was removed by " + who);
-    kicks_.push_back({command, ack, who, kept});
-    return finishKicks();
-  }
-  answer(command, ack, who);
-}
-
-/// Answers once the seat is closed in the file too: who was told that somebody is removed does not meet that
-/// person again when the server is killed and resumed.
-void ServerWire::finishKicks() {
-  while (!kicks_.empty() && (!seats_ || seats_->isDone(kicks_.front().seats_kept))) {
-    const Kick kick = std::move(kicks_.front());
-    kicks_.pop_front();
-    answer(kick.command, kick.ack, kick.who);
-  }
+  if (!reception_->dismissKicked(command, ack, who)) answer(command, ack, who);
 }
 
 void ServerWire::answer(const Command& command, const CommandAck& ack, const std::string& who) {
@@ -449,36 +302,27 @@ void ServerWire::answer(const Command& command, const CommandAck& ack, const std
   }
 }
 
-/// Anybody may raise the stop. The server stops the simulation, publishes the raise itself, for late joiners
-/// and in case its writer leaves, and keeps it on disk.
+/// Anybody may raise the stop.
 void ServerWire::handle(const EmergencyStop& stop, const wire::Origin& from) {
-  if (from != participant_->origin() && stops_.raise(stop)) engage(stop);
+  if (from != participant_->origin()) engage(stop);
 }
 
 void ServerWire::raiseStop(const std::string& reason) {
-  const EmergencyStop stop{
-      .client_guid = "server", .counter = options_.server_epoch, .who = "server", .reason = reason};
-  if (!registry_.isStopEngaged() && stops_.raise(stop)) engage(stop);
+  if (registry_.isStopEngaged()) return;
+  engage({.client_guid = "server", .counter = options_.server_epoch, .who = "server", .reason = reason});
 }
 
 void ServerWire::engage(const EmergencyStop& stop) {
+  if (!stops_.raise(stop)) return;
   registry_.engageEmergencyStop();
   forwardChanges();
-  writers_->stop.send(stop);
-  keepStops();
+  stops_.publish(stop);
   log(Severity::kError, "emergency stop", fmt::format("engaged by {}: {}", stop.who, stop.reason));
 }
 
-/// Clears all raises that stand, and those alone: one that is on its way will stand.
 void ServerWire::clearEmergencyStop(ClientId client, const std::string& reason) {
   const std::string& who = registry_.findClient(client)->name;
-  const auto standing = stops_.standing();
-  for (const auto& [id, stop] : standing) stops_.clear({stop.client_guid, stop.counter, who, reason});
-  keepStops();
-  for (const auto& [id, stop] : standing) {
-    writers_->clear.send(stops_.cleared().at(id));
-    (void)writers_->stop.writer->dispose(stop);
-  }
+  stops_.clear(who, reason);
   const char* const next = registry_.phase() == RunPhase::kWaitingForPeople
                                ? "the session still waits for people"
                                : "the session is paused until 'resume'";
@@ -536,22 +380,7 @@ void ServerWire::publishLimits() {
 
 void ServerWire::handleGone(const Presence& presence, const wire::Origin& from) {
   if (from.known() && !isGenuine(presence.client, from, "departure notice")) return;
-  const Presence* leaver = registry_.findClient(presence.client);
-  if (leaver == nullptr || !leaver->alive) return;
-  // hands are freed at once
-  if (!leaver->hands.empty() || leaves_.size() >= kMostWaiting) return dismiss(presence.client, "has left");
-  leaves_.push_back(presence.client);
-}
-
-void ServerWire::dismiss(ClientId client, const std::string& why) {
-  const Presence* leaver = registry_.findClient(client);
-  if (leaver == nullptr || !leaver->alive) return;
-  const std::string text = fmt::format("{} ({}) {}", leaver->name, roleName(leaver->role), why);
-  registry_.leave(client);
-  if (copies_ && leaver->role == Role::kRecorder) copies_->dismiss(client);
-  notifySeatLost(client, why);
-  log(Severity::kWarning, "leave", text);
-  forwardChanges();
+  reception_->handleGone(presence.client);
 }
 
 void ServerWire::send(const EventLog& event) { writers_->event.send(event); }

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <chrono>
-#include <deque>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -13,7 +12,6 @@
 #include <vector>
 
 #include "idl/types/messages/log.h"
-#include "idl/types/stop_truth.h"
 #include "idl/wire/endpoint.h"
 #include "idl/wire/identity.h"
 #include "server/game_control/scenario.h"
@@ -23,10 +21,13 @@
 #include "server/session/journal.h"
 #include "server/session/journal_copies.h"
 #include "server/session/publisher.h"
+#include "server/session/reception.h"
 #include "server/session/scene_loader.h"
 #include "server/session/seat_list.h"
+#include "server/session/server_announcement.h"
 #include "server/session/server_writers.h"
 #include "server/session/session_registry.h"
+#include "server/session/stop_keeper.h"
 
 namespace tenon::session {
 
@@ -71,7 +72,7 @@ class ServerWire {
   void wake() noexcept { inbox_.wake(); }
   /// Why this server has to end: it did nothing for so long that it was taken for dead, and another server
   /// has taken its place meanwhile.
-  [[nodiscard]] const std::optional<std::string>& replaced() const { return replaced_; }
+  [[nodiscard]] const std::optional<std::string>& replaced() const { return announcement_->replaced(); }
   void send(const OutgoingMessages& outgoing);
   /// Repeats frames and manifolds of the last tick for a client that missed them (lockstep).
   void resendLast();
@@ -91,7 +92,7 @@ class ServerWire {
   /// Publishes an entry of the log.
   void log(Severity severity, const std::string& kind, const std::string& text);
   /// Removes a client from the session, notifies it, and logs "Ada (trainee) <why>".
-  void dismiss(ClientId client, const std::string& why);
+  void dismiss(ClientId client, const std::string& why) { reception_->dismiss(client, why); }
   /// The newest DeviceSample::seq received for a hand; 0: none yet.
   [[nodiscard]] std::uint32_t newestSeq(HandId hand) const { return newest_seq_[hand.value]; }
   /// True once after a client repeated the input of the last tick, so its answer was lost (lockstep).
@@ -109,21 +110,12 @@ class ServerWire {
   ServerWire(const WireOptions& options, std::shared_ptr<wire::Participant> participant,
              SessionRegistry& registry, InputBuffer& input_buffer, Publisher& publisher);
 
-  Result<void> refuseBesideAnother();
-  void announce();
-  void noticeLapse();
-  Result<void> restoreStops();
-  void keepStops();
   Result<void> openReaders();
   void sendScene(const LoadedScene& loaded);
-  void receive(const Join& join, const wire::Origin& from);
-  void handleJoinsAndLeaves();
-  void dismissStuckRecorders();
-  void handle(const Join& join, const wire::Origin& from);
+  void beginInputs(const Welcome& welcome);
   void handle(const DeviceInput& input, const wire::Origin& from);
   void handle(const Command& command, const wire::Origin& from);
   void answer(const Command& command, const CommandAck& ack, const std::string& who);
-  void finishKicks();
   void handleEarlier(const DeviceInput& input, std::uint32_t newest);
   void handle(const ClockSync& sync);
   void handle(const Telemetry& telemetry);
@@ -132,7 +124,6 @@ class ServerWire {
   void handle(const EmergencyStop& stop, const wire::Origin& from);
   void handleGone(const Presence& presence, const wire::Origin& from);
   [[nodiscard]] bool isGenuine(ClientId client, const wire::Origin& from, const std::string& what);
-  void notifySeatLost(ClientId client, const std::string& why);
   void engage(const EmergencyStop& stop);
   void clearEmergencyStop(ClientId client, const std::string& reason);
   void refuse(const std::string& why);
@@ -150,17 +141,12 @@ class ServerWire {
   SessionRegistry& registry_;
   InputBuffer& input_buffer_;
   Publisher& publisher_;
-  std::string title_;
-  std::string scenario_hash_;
-  struct SceneSize {
-    std::uint32_t objects = 0, hands = 0, steps = 0;
-  };
-  SceneSize scene_;                        ///< announced
-  std::string scenario_;                   ///< scenarioName
+  StopKeeper stops_;
+  std::optional<ServerAnnouncement> announcement_;  ///< from open() on
+  std::unique_ptr<Reception> reception_;
   std::vector<std::uint32_t> newest_seq_;  ///< index = HandId
   std::set<std::string> logged_refusals_;  ///< each text is logged once, although inputs come at 1 kHz
-  std::map<ClientId, std::chrono::steady_clock::time_point> seat_lost_notified_;  ///< last time
-  std::vector<SceneHand> scene_hands_;  ///< as they were published last
+  std::vector<SceneHand> scene_hands_;     ///< as they were published last
   struct ReceivedInputs {
     std::uint32_t count = 0, newest_seq = 0;
     GapMeter gaps;
@@ -170,23 +156,7 @@ class ServerWire {
   std::uint64_t refused_inputs_ = 0;
   WriteCounts writes_;
   Contributions contributions_;
-  std::deque<std::pair<Join, wire::Origin>> joins_;  ///< waiting
-  std::deque<ClientId> leaves_;                      ///< waiting
-  struct Kick {
-    Command command;
-    CommandAck ack;
-    std::string who;
-    std::uint64_t seats_kept = 0;  ///< SeatKeeper::keep
-  };
-  std::deque<Kick> kicks_;  ///< waiting
-  std::chrono::steady_clock::time_point next_change_of_seats_;
   bool resend_requested_ = false;
-  StopTruth stops_;
-  wire::SharedKey challenges_ = wire::SharedKey::random();  ///< what challenges are made of
-  std::map<std::uint32_t, SessionAnnounce> others_;         ///< servers of sessions of this name, by epoch
-  std::chrono::steady_clock::time_point announced_at_;
-  std::optional<std::chrono::steady_clock::time_point> dispatched_, lapsed_;
-  std::optional<std::string> replaced_;
   Tick now_ = 0;
   const OutgoingMessages* last_ = nullptr;  ///< of the last send
   PublishedSamples published_;              ///< since the last statement

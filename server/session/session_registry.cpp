@@ -2,32 +2,15 @@
 
 #include <algorithm>
 #include <cassert>
-#include <charconv>
 #include <cmath>
 
 #include <fmt/format.h>
 
 #include "idl/types/names.h"
+#include "server/session/input_checks.h"
 
 namespace tenon::session {
 namespace {
-
-constexpr double kMaxPosition = 1000.0;  // [m] of a hand or object from the world's origin, each axis
-constexpr double kMaxSpeed = 50.0;       // [m/s], [rad/s] of a hand
-constexpr double kMinStiffness = 1.0, kMaxStiffness = 1e4;  // [N/m] of what a device may ask for
-constexpr double kMinRotationalStiffness = 0.1, kMaxRotationalStiffness = 1e3;  // [Nm/rad] likewise
-
-bool isPlausible(const Pose& X) {
-  return X.isFinite() && X.translation().cwiseAbs().maxCoeff() < kMaxPosition &&
-         std::abs(X.rotation().squaredNorm() - 1.0) < 1e-3;
-}
-
-/// 0: not stated. What is stated is bounded as in a scenario, since it conditions the solver.
-bool isPlausible(double stiffness, double least, double most) {
-  return stiffness == 0.0 || (stiffness >= least && stiffness <= most);
-}
-
-bool isPlausible(const Vector3& v, double limit) { return v.allFinite() && v.norm() < limit; }
 
 bool mayControlHandOf(Role role, Role hand_role) {
   return has(role, Right::kMoveAnyHand) || (role == hand_role && has(role, Right::kMoveHands));
@@ -38,6 +21,7 @@ bool mayControlHandOf(Role role, Role hand_role) {
 SessionRegistry::SessionRegistry(const game_control::ScenarioFile& scenario, std::uint32_t server_epoch,
                                  bool lockstep)
     : scenario_(scenario),
+      translator_(scenario),
       server_epoch_(server_epoch),
       lockstep_(lockstep),
       controllers_(scenario.hands.size()),
@@ -47,7 +31,7 @@ SessionRegistry::SessionRegistry(const game_control::ScenarioFile& scenario, std
 
 void SessionRegistry::resume(const std::vector<KeptSeat>& seats, std::size_t deferred) {
   changes_.push_back({.kind = ChangeKind::kContinue});
-  deferred_commands_ = deferred;
+  gate_.resume(deferred);
   for (const KeptSeat& kept : seats) {
     clients_.push_back({kept.client, kept.name, kept.role, {}, false});
     Seat& seat = seats_.emplace_back();
@@ -124,12 +108,8 @@ std::string SessionRegistry::joinRefusal(const Join& join, const JoinProofs& pro
   const bool keeps_seat = former && clients_[*former].alive && clients_[*former].role == join.role;
   if (!keeps_seat && present(join.role) >= role->seats)
     return fmt::format("all {} seats of the role {} are taken", role->seats, roleName(join.role));
-  if (std::any_of(join.stiffness.begin(), join.stiffness.end(), [](const HandStiffness& hand) {
-        return !isPlausible(hand.translational, kMinStiffness, kMaxStiffness) ||
-               !isPlausible(hand.rotational, kMinRotationalStiffness, kMaxRotationalStiffness);
-      }))
-    return fmt::format("the stiffness of a hand is out of range: expected {} to {} N/m and {} to {} Nm/rad",
-                       kMinStiffness, kMaxStiffness, kMinRotationalStiffness, kMaxRotationalStiffness);
+  if (const std::string implausible = stiffnessRefusal(join.stiffness); !implausible.empty())
+    return implausible;
   return handRefusal(join, former);
 }
 
@@ -248,15 +228,14 @@ void SessionRegistry::leave(ClientId client) {
 }
 
 void SessionRegistry::engageEmergencyStop() {
-  emergency_stop_ = true;
+  gate_.engageStop();
   changes_.push_back({.kind = ChangeKind::kSetEmergencyStop, .value = 1.0});
 }
 
 void SessionRegistry::clearEmergencyStop() {
-  // nothing moves by itself when the stop is cleared: `resume` continues
-  emergency_stop_ = false;
+  // `resume` continues
+  gate_.clearStop();
   changes_.push_back({.kind = ChangeKind::kPause});
-  if (expectedPhase() == RunPhase::kRunning) pending_phase_ = RunPhase::kPaused;
   changes_.push_back({.kind = ChangeKind::kSetEmergencyStop, .value = 0.0});
 }
 
@@ -273,12 +252,7 @@ Result<HandReading> SessionRegistry::validateDeviceInput(const DeviceInput& inpu
   if (!isController(input.client, input.hand))
     return fail(
         fmt::format("client {} sent input for hand '{}', which is not its own", input.client.value, name));
-  const DeviceSample& newest = input.sample;
-  if (!isPlausible(newest.X_WH) || !isPlausible(newest.V_WH.linear, kMaxSpeed) ||
-      !isPlausible(newest.V_WH.angular, kMaxSpeed))
-    return fail(fmt::format("client {} sent an implausible pose or velocity of hand '{}': ignored",
-                            input.client.value, name));
-  return HandReading{input.hand, newest.seq, input.active, newest.X_WH, newest.V_WH, newest.buttons};
+  return checkedReading(input, name);
 }
 
 bool SessionRegistry::setLimits(ClientId client, const HandLimits& limits, double round_trip) {
@@ -313,35 +287,14 @@ Result<Change> SessionRegistry::validateForceContribution(const ForceContributio
   const Presence* who = findClient(force.client);
   if (who == nullptr || !who->alive || !has(who->role, Right::kContributeForces))
     return fail(fmt::format("client {} may not contribute forces", force.client.value));
-  if (force.object.value >= scenario_.objects.size())
-    return fail(fmt::format("client {} sent a force for an unknown object", force.client.value));
-  if (!force.F_Oo_W.force.allFinite() || !force.F_Oo_W.torque.allFinite())
-    return fail(fmt::format("client {} sent a force that is not finite", force.client.value));
-  return Change{.kind = ChangeKind::kContributeForce,
-                .object = force.object,
-                .index = force.source,
-                .lifetime_ticks = force.lifetime_ticks,
-                .F_Oo_W = force.F_Oo_W};
+  return checkedForce(force, scenario_);
 }
 
 Result<Change> SessionRegistry::validateExternalPose(const ExternalPose& pose) const {
   const Presence* who = findClient(pose.client);
   if (who == nullptr || !who->alive || !has(who->role, Right::kPlaceObjects))
     return fail(fmt::format("client {} may not place objects", pose.client.value));
-  if (pose.object.value >= scenario_.objects.size() || !isPlausible(pose.X_WO))
-    return fail(
-        fmt::format("client {} sent an implausible pose or one of an unknown object", pose.client.value));
-  return Change{.kind = ChangeKind::kPlaceObject,
-                .object = pose.object,
-                .lifetime_ticks = pose.lifetime_ticks,
-                .X_WO = pose.X_WO};
-}
-
-void SessionRegistry::updatePhase(RunPhase phase, bool emergency_stop) {
-  phase_ = phase;
-  const bool active = phase == RunPhase::kRunning || phase == RunPhase::kPaused;
-  if (pending_phase_ == phase || !active) pending_phase_.reset();
-  if (expectedPhase() != RunPhase::kPaused && !emergency_stop) deferred_commands_ = 0;
+  return checkedPose(pose, scenario_);
 }
 
 CommandAck SessionRegistry::handleCommand(const Command& command) {
@@ -368,21 +321,18 @@ CommandAck SessionRegistry::decide(const Command& command, Role role) {
   if (command.kind == CommandKind::kNote) return answer(checkNote(command, role));
   if (command.kind == CommandKind::kKick) return answer(kick(command, role));
   if (command.kind == CommandKind::kGuide) {
-    if (phase_ >= RunPhase::kSucceeded) return answer(refuse(Refusal::kOver, "the run is over"));
+    if (isOver(phase())) return answer(refuse(Refusal::kOver, "the run is over"));
     return answer(mentoring_.decide(command.text, command.client, role, controllers_));
   }
-  const auto change = changeFromCommand(command, role);
+  const auto change =
+      translator_.changeFor(command, {role, controllers_, isStopEngaged(), isRolePresent(Role::kInstructor)});
   if (!change) return answer(tl::unexpected(change.error()));
-  if (const auto possible = checkPhase(command.kind); !possible) return answer(possible);
-  const bool suspended = expectedPhase() == RunPhase::kPaused || emergency_stop_;
-  if (change->kind == ChangeKind::kGameCommand && suspended) ++deferred_commands_;
-  if (change->kind == ChangeKind::kPause) pending_phase_ = RunPhase::kPaused;
-  if (change->kind == ChangeKind::kResume) pending_phase_ = RunPhase::kRunning;
+  if (const auto possible = gate_.check(command.kind); !possible) return answer(possible);
+  gate_.accept(change->kind);
   if (change->kind == ChangeKind::kSetEmergencyStop) {
     clearEmergencyStop();
     return answer({});
   }
-  stop_requested_ = stop_requested_ || change->kind == ChangeKind::kStop;
   changes_.push_back(*change);
   return answer({});
 }
@@ -403,211 +353,32 @@ tl::expected<void, Refused> SessionRegistry::kick(const Command& command, Role r
   if (who.role == Role::kAdmin && role != Role::kAdmin)
     return refuse(Refusal::kNotPermitted,
                   fmt::format("{} is an admin, whom an admin alone removes", who.name));
+  // who is away does not come back, and who was removed already stays so: a repeated command is no error
   seats_[person->value - 1].is_closed = true;
   kicked_.push_back(*person);
   return {};
 }
 
-/// Of those who are there, by number or by name.
+/// By number or by name: of those who are there, else of those who have gone.
 tl::expected<ClientId, Refused> SessionRegistry::findPerson(const std::string& text) const {
-  ClientId found;
-  for (const Presence& person : clients_) {
-    if (!person.alive) continue;
-    if (std::to_string(person.client.value) == text) return person.client;
-    if (person.name != text) continue;
-    if (found.valid())
-      return refuse(Refusal::kUnknownName,
-                    fmt::format("several people are named '{}': give the number, {} or {}", text, found.value,
-                                person.client.value));
-    found = person.client;
+  for (const bool is_there : {true, false}) {
+    ClientId found;
+    for (const Presence& person : clients_) {
+      if (person.alive != is_there) continue;
+      if (std::to_string(person.client.value) == text) return person.client;
+      if (person.name != text) continue;
+      if (found.valid())
+        return refuse(Refusal::kUnknownName,
+                      fmt::format("several people are named '{}': give the number, {} or {}", text,
+                                  found.value, person.client.value));
+      found = person.client;
+    }
+    if (found.valid()) return found;
   }
-  if (!found.valid()) return refuse(Refusal::kUnknownName, fmt::format("nobody here is named '{}'", text));
-  return found;
+  return refuse(Refusal::kUnknownName, fmt::format("nobody here is named '{}'", text));
 }
 
 std::vector<ClientId> SessionRegistry::takeKicked() { return std::exchange(kicked_, {}); }
-
-/// Why the command cannot take effect in the current phase, for any role. A command is only accepted when it
-/// will take effect.
-tl::expected<void, Refused> SessionRegistry::checkPhase(CommandKind kind) const {
-  const bool in_any_phase = kind == CommandKind::kRelease || kind == CommandKind::kSetCollision ||
-                            kind == CommandKind::kStop || kind == CommandKind::kClearEmergencyStop ||
-                            kind == CommandKind::kFreezeForces;
-  if (phase_ >= RunPhase::kSucceeded) return refuse(Refusal::kOver, "the run is over");
-  if (in_any_phase) return {};
-  if (phase_ == RunPhase::kWaitingForPeople)
-    return refuse(Refusal::kWaiting, "the session still waits for people: repeat the command once it runs");
-  const bool is_paused = expectedPhase() == RunPhase::kPaused;
-  if (kind == CommandKind::kResume && !is_paused)
-    return refuse(Refusal::kAlready, "the session is not paused");
-  if (kind == CommandKind::kPause && is_paused)
-    return refuse(Refusal::kAlready, "the session is paused already");
-  if (kind != CommandKind::kResume && kind != CommandKind::kPause && deferred_commands_ >= kMaxChanges)
-    return refuse(Refusal::kTooMany,
-                  fmt::format("{} commands wait already until the session continues", deferred_commands_));
-  return {};
-}
-
-int SessionRegistry::findPair(std::string_view a, std::string_view b) const {
-  const ObjectId object_a = scenario_.objectNamed(a);
-  const ObjectId object_b = scenario_.objectNamed(b);
-  return object_a.valid() && object_b.valid() ? scenario_.pairOf(object_a, object_b) : -1;
-}
-
-/// Index of the step with this name or number, from 1; -1 if there is none.
-int SessionRegistry::findStep(std::string_view text) const {
-  const auto& states = scenario_.states;
-  const auto named =
-      std::find_if(states.begin(), states.end(), [&](const auto& state) { return state.name == text; });
-  if (named != states.end()) return static_cast<int>(named - states.begin());
-  std::size_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  const bool is_step =
-      error == std::errc() && end == text.data() + text.size() && number >= 1 && number <= states.size();
-  return is_step ? static_cast<int>(number) - 1 : -1;
-}
-
-/// Whether the client controls every force-coupled hand of the trainee.
-bool SessionRegistry::controlsBothHands(ClientId client) const {
-  for (std::uint32_t i = 0; i < controllers_.size(); ++i) {
-    const game_control::ScenarioHand& hand = scenario_.hands[i];
-    const bool swappable = hand.role == Role::kTrainee && hand.kind == simulation::HandKind::kCoupled;
-    if (swappable && !isController(client, HandId{i})) return false;
-  }
-  return true;
-}
-
-namespace {
-
-Change gameChange(const Command& command, std::uint32_t signal = 0) {
-  Change change{.kind = ChangeKind::kGameCommand};
-  change.game = {command.kind, command.hand, signal, command.value};
-  return change;
-}
-
-}  // namespace
-
-SessionRegistry::Decision SessionRegistry::changeFromCommand(const Command& command, Role role) const {
-  if (!std::isfinite(command.value)) return refuse(Refusal::kOther, "its value is not a finite number");
-  switch (command.kind) {
-    case CommandKind::kFulfilled:
-    case CommandKind::kSignal:
-      if (!has(role, Right::kAnswerStep)) return notPermitted(role);
-      break;
-    case CommandKind::kRelease:
-    case CommandKind::kSwapHands:
-      if (!has(role, Right::kActOnOwnHands)) return notPermitted(role);
-      break;
-    case CommandKind::kClearEmergencyStop:
-      if (!has(role, Right::kClearStop)) return notPermitted(role);
-      break;
-    default:
-      if (!has(role, Right::kLeadRun)) return notPermitted(role);
-  }
-  switch (command.kind) {
-    case CommandKind::kFulfilled:
-      return gameChange(command);
-    case CommandKind::kSignal: {
-      const int signal = scenario_.signalNamed(command.text);
-      if (signal < 0)
-        return refuse(Refusal::kUnknownName, fmt::format("this scenario has no signal '{}'", command.text));
-      return gameChange(command, static_cast<std::uint32_t>(signal));
-    }
-    case CommandKind::kRelease:
-      return releaseChange(command, role);
-    case CommandKind::kSwapHands:
-      if (!has(role, Right::kActOnAnyHand) && !controlsBothHands(command.client))
-        return refuse(Refusal::kNotYourHand, "you do not control both hands");
-      return gameChange(command);
-    case CommandKind::kClearEmergencyStop:
-      if (!emergency_stop_) return refuse(Refusal::kAlready, "there is no emergency stop");
-      if (role == Role::kAdmin && isRolePresent(Role::kInstructor))
-        return refuse(Refusal::kNotPermitted,
-                      "an instructor is present: it is for the instructor to clear the emergency stop");
-      return Change{.kind = ChangeKind::kSetEmergencyStop, .value = 0.0};
-    default:
-      return leadChange(command);
-  }
-}
-
-SessionRegistry::Decision SessionRegistry::releaseChange(const Command& command, Role role) const {
-  const HandId hand = command.hand.valid() ? command.hand : scenario_.handNamed(command.text);
-  if (!has(role, Right::kActOnAnyHand) && !isController(command.client, hand))
-    return refuse(Refusal::kNotYourHand, "you do not control that hand");
-  if (hand.value >= controllers_.size())
-    return refuse(Refusal::kUnknownName, command.text.empty()
-                                             ? "there is no such hand"
-                                             : fmt::format("this scenario has no hand '{}'", command.text));
-  return Change{.kind = ChangeKind::kRelease, .hand = hand};
-}
-
-/// Of "OBJECT HAND".
-SessionRegistry::Decision SessionRegistry::handOverChange(const Command& command) const {
-  const std::size_t space = command.text.find(' ');
-  const ObjectId object = scenario_.objectNamed(command.text.substr(0, space));
-  const HandId hand =
-      space == std::string::npos ? HandId{} : scenario_.handNamed(command.text.substr(space + 1));
-  if (!object.valid() || !hand.valid())
-    return refuse(
-        Refusal::kUnknownName,
-        fmt::format("'{}' does not name {}", command.text,
-                    object.valid() ? "a hand" : (hand.valid() ? "an object" : "an object and a hand")));
-  const auto& hands = scenario_.hands;
-  const bool is_own =
-      std::any_of(hands.begin(), hands.end(), [&](const auto& h) { return h.object == object; });
-  const game_control::ScenarioObject& spec = scenario_.objects[object.value];
-  if (is_own || spec.status == ObjectStatus::kFixed)
-    return refuse(Refusal::kNotHoldable, fmt::format("'{}' is nothing that a hand takes", spec.name));
-  if (hands[hand.value].kind == simulation::HandKind::kTracked)
-    return refuse(Refusal::kNotHoldable,
-                  fmt::format("hand '{}' is tracked, it cannot hold a part", hands[hand.value].name));
-  if (!controllers_[hand.value].valid())
-    return refuse(Refusal::kNobodyThere, fmt::format("nobody moves hand '{}'", hands[hand.value].name));
-  Change change = gameChange(command, object.value);
-  change.game.hand = hand;
-  return change;
-}
-
-SessionRegistry::Decision SessionRegistry::leadChange(const Command& command) const {
-  switch (command.kind) {
-    case CommandKind::kPause:
-      return Change{.kind = ChangeKind::kPause};
-    case CommandKind::kResume:
-      return Change{.kind = ChangeKind::kResume};
-    case CommandKind::kStop:
-      return Change{.kind = ChangeKind::kStop};
-    case CommandKind::kFreezeForces:
-      return Change{.kind = ChangeKind::kFreezeForces, .value = command.value};
-    case CommandKind::kReset:
-    case CommandKind::kSkipStep:
-    case CommandKind::kBack:
-    case CommandKind::kRepeatStep:
-      return gameChange(command);
-    case CommandKind::kGoToStep: {
-      const int step = findStep(command.text);
-      if (step < 0)
-        return refuse(Refusal::kUnknownName,
-                      fmt::format("this scenario has no step '{}': it has 1 to {}, or name one", command.text,
-                                  scenario_.states.size()));
-      return gameChange(command, static_cast<std::uint32_t>(step));
-    }
-    case CommandKind::kHandOver:
-      return handOverChange(command);
-    case CommandKind::kSetCollision: {
-      const std::size_t space = command.text.find(' ');
-      const int pair = space == std::string::npos
-                           ? -1
-                           : findPair(command.text.substr(0, space), command.text.substr(space + 1));
-      if (pair < 0)
-        return refuse(Refusal::kUnknownName,
-                      fmt::format("'{}' does not name the two objects of a collision pair", command.text));
-      return Change{
-          .kind = ChangeKind::kEnablePair, .index = static_cast<std::uint32_t>(pair), .value = command.value};
-    }
-    default:
-      return refuse(Refusal::kOther, "unknown command");
-  }
-}
 
 void SessionRegistry::takeChanges(FixedVector<Change, kMaxChanges>& out) {
   std::size_t taken = 0;

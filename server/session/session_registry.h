@@ -14,6 +14,8 @@
 #include "idl/types/messages/timing.h"
 #include "idl/wire/endpoint.h"
 #include "server/game_control/scenario.h"
+#include "server/session/command_gate.h"
+#include "server/session/command_translator.h"
 #include "server/session/mentoring.h"
 #include "server/session/refused.h"
 #include "server/session/rights.h"
@@ -78,18 +80,18 @@ class SessionRegistry {
   /// Who was removed by commands since the last call, and is still there.
   [[nodiscard]] std::vector<ClientId> takeKicked();
   /// Phase and emergency stop after the last tick.
-  void updatePhase(RunPhase phase, bool emergency_stop);
+  void updatePhase(RunPhase phase, bool emergency_stop) { gate_.update(phase, emergency_stop); }
   /// Frees the client's hands. Its seat stays and can be taken again with its key. Unknown ids are ignored.
   void leave(ClientId client);
   /// A raise stands.
   void engageEmergencyStop();
-  [[nodiscard]] bool isStopEngaged() const { return emergency_stop_; }
+  [[nodiscard]] bool isStopEngaged() const { return gate_.isStopEngaged(); }
   /// The last raise that stood was cleared: the simulation leaves the stop, paused.
   void clearEmergencyStop();
 
   /// The newest sample of `input` as tick input. Fails, with a sentence for the event log, when the client
-  /// does not control this hand, the server epoch is another one, or the numbers are implausible (not finite,
-  /// beyond 1 km, 50 m/s or 50 rad/s, no unit quaternion).
+  /// does not control this hand, the server epoch is another one, or the numbers are implausible
+  /// (checkedReading).
   [[nodiscard]] Result<HandReading> validateDeviceInput(const DeviceInput& input) const;
   /// The station of `client` asks for these limits of all its hands, within those of HandLimits, and says the
   /// `round_trip` [s] of its link: told to the simulation rounded up to steps of kTripStep, at once when it
@@ -100,10 +102,9 @@ class SessionRegistry {
   /// [s] likewise; 0 up to kTripStep. Who comes back to a seat has that of before, until it is measured anew.
   [[nodiscard]] double roundTripOf(HandId hand) const { return round_trips_[hand.value]; }
   static constexpr double kTripStep = 0.0025;  ///< [s] a shorter round trip counts as none
-  /// Fails for observers and recorders, unknown objects, and wrenches that are not finite. Those that are too
-  /// large or last too long are passed on as they are: ForceBuffer::contribute clamps them.
+  /// Fails for observers and recorders, and as checkedForce() does.
   [[nodiscard]] Result<Change> validateForceContribution(const ForceContribution& force) const;
-  /// Fails without Right::kPlaceObjects, for unknown objects and implausible poses.
+  /// Fails without Right::kPlaceObjects, and as checkedPose() does.
   [[nodiscard]] Result<Change> validateExternalPose(const ExternalPose& pose) const;
 
   /// Moves the pending changes to `out`, oldest first, as many as it has room for; the rest stays pending.
@@ -118,9 +119,9 @@ class SessionRegistry {
   /// The client that controls this hand; invalid when no client does.
   [[nodiscard]] ClientId controllerOf(HandId hand) const { return controllers_[hand.value]; }
   [[nodiscard]] bool anyHandControlled() const;
-  [[nodiscard]] bool stopRequested() const { return stop_requested_; }
+  [[nodiscard]] bool stopRequested() const { return gate_.endRequested(); }
   /// As updatePhase() said last.
-  [[nodiscard]] RunPhase phase() const { return phase_; }
+  [[nodiscard]] RunPhase phase() const { return gate_.phase(); }
   [[nodiscard]] bool isRolePresent(Role role) const { return present(role) > 0; }
 
  private:
@@ -134,7 +135,6 @@ class SessionRegistry {
     bool is_closed = false;   ///< its person was removed
     double round_trip = 0.0;  ///< [s] of its link, as told to the simulation
   };
-  using Decision = tl::expected<Change, Refused>;
 
   /// Seats in all, of those that are present and of those that left: then that of who left first is given
   /// away.
@@ -152,19 +152,10 @@ class SessionRegistry {
   [[nodiscard]] static tl::expected<void, Refused> checkNote(const Command& command, Role role);
   [[nodiscard]] tl::expected<void, Refused> kick(const Command& command, Role role);
   [[nodiscard]] tl::expected<ClientId, Refused> findPerson(const std::string& text) const;
-  [[nodiscard]] tl::expected<void, Refused> checkPhase(CommandKind kind) const;
-  /// The run phase after all accepted changes have been applied.
-  [[nodiscard]] RunPhase expectedPhase() const { return pending_phase_.value_or(phase_); }
-  [[nodiscard]] Decision changeFromCommand(const Command& command, Role role) const;
-  [[nodiscard]] Decision leadChange(const Command& command) const;
-  [[nodiscard]] Decision handOverChange(const Command& command) const;
-  [[nodiscard]] Decision releaseChange(const Command& command, Role role) const;
-  [[nodiscard]] int findStep(std::string_view text) const;
-  [[nodiscard]] int findPair(std::string_view a, std::string_view b) const;
-  [[nodiscard]] bool controlsBothHands(ClientId client) const;
   [[nodiscard]] bool isController(ClientId client, HandId hand) const;
 
   const game_control::ScenarioFile& scenario_;
+  CommandTranslator translator_;
   std::uint32_t server_epoch_;
   bool lockstep_;
   bool key_of_all_ = false;
@@ -176,12 +167,8 @@ class SessionRegistry {
   std::vector<double> round_trips_;    ///< [s] likewise
   std::vector<Change> changes_;        ///< pending
   Mentoring mentoring_;
-  RunPhase phase_ = RunPhase::kWaitingForPeople;
-  std::optional<RunPhase> pending_phase_;  ///< of an accepted pause or resume that no tick has applied yet
-  bool emergency_stop_ = false;            ///< engaged
-  bool stop_requested_ = false;
+  CommandGate gate_;
   std::vector<ClientId> kicked_;
-  std::size_t deferred_commands_ = 0;  ///< accepted game commands that take effect when the session continues
 };
 
 }  // namespace tenon::session

@@ -8,13 +8,13 @@
 #include <fmt/format.h>
 
 #include "idl/threads/cyclic_thread.h"
-#include "idl/types/names.h"
 #include "idl/wire/network.h"
 #include "server/session/journal_writer.h"
 #include "server/session/resume.h"
 #include "server/session/seat_list.h"
 #include "server/session/server_wire.h"
 #include "server/session/session_lock.h"
+#include "server/session/start_condition.h"
 #include "server/simulation/governor.h"
 
 namespace tenon::session {
@@ -27,42 +27,6 @@ constexpr auto kFarewell = std::chrono::seconds(10);  // at most, for the last s
 constexpr auto kReturn = milliseconds(1500);
 constexpr auto kInputTimeout = std::chrono::seconds(30);  // in lockstep, for the input of a client
 constexpr auto kStopTimeout = std::chrono::seconds(1);    // likewise, once a command ends the run
-
-std::optional<Role> roleNamed(std::string_view name) {
-  for (const Role role : {Role::kAdmin, Role::kInstructor, Role::kTrainee, Role::kObserver, Role::kRecorder})
-    if (roleName(role) == name) return role;
-  return std::nullopt;
-}
-
-/// Hands and roles that must be present before the first tick.
-struct StartCondition {
-  std::vector<HandId> hands;
-  std::vector<Role> roles;
-
-  [[nodiscard]] bool isMet(const SessionRegistry& registry) const {
-    return std::all_of(hands.begin(), hands.end(),
-                       [&](HandId hand) { return registry.controllerOf(hand).valid(); }) &&
-           std::all_of(roles.begin(), roles.end(), [&](Role role) { return registry.isRolePresent(role); });
-  }
-};
-
-Result<StartCondition> makeStartCondition(const game_control::ScenarioFile& scenario,
-                                          const std::vector<std::string>& names) {
-  StartCondition all;
-  if (names.empty()) all.hands = traineeHands(scenario);
-  for (const std::string& name : names) {
-    const HandId hand = scenario.handNamed(name);
-    const auto role = roleNamed(name);
-    if (!hand.valid() && !role)
-      return fail(fmt::format("cannot wait for '{}': neither a hand of this scenario nor a role", name));
-    if (hand.valid()) {
-      all.hands.push_back(hand);
-    } else {
-      all.roles.push_back(*role);
-    }
-  }
-  return all;
-}
 
 /// [0.25 s since 2025] Larger at each start of a server, so that clients recognise frames of an earlier one.
 std::uint32_t newServerEpoch() {
@@ -424,21 +388,9 @@ Result<SessionReport> Server::finish() {
 
 }  // namespace
 
-std::vector<HandId> traineeHands(const game_control::ScenarioFile& scenario) {
-  std::vector<HandId> hands;
-  for (std::uint32_t i = 0; i < scenario.hands.size(); ++i)
-    if (scenario.hands[i].role == Role::kTrainee) hands.push_back(HandId{i});
-  return hands;
-}
-
-Result<void> checkWaitFor(const game_control::ScenarioFile& scenario, const std::vector<std::string>& names) {
-  const auto condition = makeStartCondition(scenario, names);
-  return condition ? Result<void>() : fail(condition.error().what);
-}
-
 Result<std::unique_ptr<SessionServer>> SessionServer::open(const LoadedScene& loaded,
                                                            SessionOptions options) {
-  auto start_condition = makeStartCondition(*loaded.scenario, options.wait_for);
+  auto start_condition = StartCondition::make(*loaded.scenario, options.wait_for);
   if (!start_condition) return fail(start_condition.error().what);
   options.simulation.needed_hands = start_condition->hands;
   auto server =

@@ -78,11 +78,4 @@ class SessionServer {
   [[nodiscard]] virtual Result<SessionReport> run(const std::atomic<bool>& stop) = 0;
 };
 
-/// Fails when one of `names` (SessionOptions::wait_for) is neither a hand of the scenario nor a role.
-[[nodiscard]] Result<void> checkWaitFor(const game_control::ScenarioFile& scenario,
-                                        const std::vector<std::string>& names);
-
-/// All hands of the role trainee, coupled and tracked.
-[[nodiscard]] std::vector<HandId> traineeHands(const game_control::ScenarioFile& scenario);
-
 }  // namespace tenon::session

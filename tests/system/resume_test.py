@@ -1,4 +1,5 @@
 """A server that is killed and resumed, through real processes: the session ends as if nothing had happened, and its journal re-simulates."""
+import configparser
 import os
 import re
 import resource
@@ -102,13 +103,13 @@ class KilledServer(unittest.TestCase):
         """When the contacts are back, the force of a hand grows from zero by at most 20 N/s for 0.9 s."""
         returns = 0
         for states in hand_states(stage.out / "session.mcap").values():
-            for (_, _, before, age), (seq, _, force, age_now), k in zip(states, states[1:], range(2, len(states))):
+            for (_, _, before, age, _), (seq, _, force, age_now, _), k in zip(states, states[1:], range(2, len(states))):
                 if not (age > 500 and age_now < 50):
                     continue
                 returns += 1
                 self.assertEqual(before, 0.0, f"step {seq}: the contacts were old")
                 last_seq, last = seq - 10, 0.0
-                for s, peak, force, _ in states[k - 1:]:
+                for s, peak, force, _, _ in states[k - 1:]:
                     if s > seq + 900:
                         break
                     self.assertLessEqual(peak - last, 20.0 * 0.002 * (s - last_seq) + 0.02, f"step {s}")
@@ -247,6 +248,32 @@ class Recordings(unittest.TestCase):
             self.assertRegex(recorder.text(), rf"TickInput: {journal[-1]} of {journal[-1]} samples")
 
 
+    def test_a_recorder_that_stood_still_over_a_kill_has_all_ticks_or_does_not_end_well(self):
+        for seconds in (2, 7):  # the server keeps 4,096 ticks for recorders
+            with self.subTest(seconds=seconds), Stage(lockstep=False) as stage:
+                server = begin(stage, "--wait-for", "right")
+                recorder = stage.start("record", "-o", stage.out / "session.mcap", "--wait", 20)
+                stage.start("trainee", "--person", "none", "--wait", 60)
+                server.wait_for("run: running", 120)
+                time.sleep(1)
+                recorder.signal(signal.SIGSTOP)
+                kill(server)
+                server, _ = resume(stage)
+                time.sleep(seconds)
+                recorder.signal(signal.SIGCONT)
+                time.sleep(4)
+                command = stage.start("command", "stop")
+                self.assertEqual(command.wait(60), 0, command.text())
+                server.wait(60)
+                code = recorder.wait(60)
+                missing = set(ticks(stage.out / "journal.mcap")) - set(ticks(stage.out / "session.mcap"))
+                self.assertEqual(code, 1 if missing else 0, recorder.text())
+                if missing:
+                    self.assertIn("ticks are missing", recorder.text())
+                else:
+                    self.assertEqual(ticks(stage.out / "session.mcap"), ticks(stage.out / "journal.mcap"))
+
+
 class Elsewhere(unittest.TestCase):
     # its folder and the cache are gone: the journal alone is there
     def test_a_journal_of_an_own_scenario_resimulates_where_nothing_else_of_it_is(self):
@@ -276,34 +303,94 @@ class Elsewhere(unittest.TestCase):
 
 
 class Service(unittest.TestCase):
-    def test_the_unit_s_program_goes_on_with_a_killed_session_and_begins_a_new_one_after_its_end(self):
-        with Stage(lockstep=False) as stage:
-            def start():
-                """The server, once people can join it, and the number of journals."""
-                server = subprocess.Popen([SOURCE / "deploy" / "systemd" / "serve_or_resume", PEG, "--domain", str(stage.domain), *coarse],
-                                          stdout=subprocess.PIPE, text=True, env=environment)
-                stage.processes.append(types.SimpleNamespace(popen=server, signal=server.send_signal))
-                lines = iter(server.stdout.readline, "")
-                said = next(line for line in lines if "is open" in line)
-                return server, said, sorted(file.name for file in stage.out.glob("*.mcap"))
+    """`deploy/systemd`, run as the unit says: the program that it names, ended by its signal, started again when it ended as its
+    `Restart=` says."""
+    FOLDER = SOURCE / "deploy" / "systemd"
+    # by systemd.service(5), what on-abnormal does not take for a clean end
+    UNCLEAN = {-number for number in signal.valid_signals()} - {-signal.SIGHUP, -signal.SIGINT, -signal.SIGTERM, -signal.SIGPIPE}
 
-            environment = {**os.environ, "STATE_DIRECTORY": str(stage.out), "TENON": str(TENON), "TENON_PROGRAMS": str(PROGRAMS)}
-            coarse = COARSE
-            server, said, first = start()
-            self.assertIn("waiting for people", said)
+    def setUp(self):
+        unit = configparser.ConfigParser(strict=False, interpolation=None)
+        unit.optionxform = str
+        unit.read_string((self.FOLDER / "tenon@.service").read_text(encoding="utf-8"))
+        self.unit = unit["Service"]
+        self.assertEqual(self.unit["Restart"], "on-abnormal")
+        self.stage = Stage(lockstep=False)
+        self.enterContext(self.stage)
+        self.environment = {**os.environ, "STATE_DIRECTORY": str(self.stage.out), "TENON": str(TENON), "TENON_PROGRAMS": str(PROGRAMS)}
+
+    def start(self, *more):
+        """As ExecStart does, with the name of the session in place of %i, and the domain and detail of tests."""
+        words = self.unit["ExecStart"].split()
+        self.assertEqual(Path(words[0]).name, "serve_or_resume")
+        arguments = [PEG if word == "%i" else word for word in words[1:]]
+        arguments[arguments.index("--session") + 1] = "test"
+        server = subprocess.Popen([self.FOLDER / "serve_or_resume", *arguments, "--domain", str(self.stage.domain), *more],
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=self.environment)
+        self.addCleanup(server.stdout.close)
+        self.stage.processes.append(types.SimpleNamespace(popen=server, signal=server.send_signal))
+        return server
+
+    def said(self, server, text):
+        """The next line with this text."""
+        return next(line for line in iter(server.stdout.readline, "") if text in line)
+
+    def opened(self, server):
+        """The line that says that people can join."""
+        return self.said(server, "is open")
+
+    def journals(self):
+        return sorted(self.stage.out.glob("*.mcap"))
+
+    def assertStops(self, server):
+        """As `systemctl stop` does: in time, by itself, and with a code that is no failure of the service."""
+        server.send_signal(getattr(signal, self.unit["KillSignal"]))
+        code = server.wait(float(self.unit["TimeoutStopSec"]))
+        self.assertIn(code, {0, *map(int, self.unit["SuccessExitStatus"].split())})
+
+    def test_a_session_that_is_killed_is_continued_unattended_and_one_that_was_stopped_is_not(self):
+        server = self.start(*COARSE)
+        self.assertIn("waiting for people", self.opened(server))
+        first = self.journals()
+        for _ in range(2):
             server.kill()
-            server.wait()
-            coarse = []  # the journal's
-            server, said, second = start()
-            self.assertIn("is open again", said)
-            self.assertEqual(second, first, "the same file is continued")
-            server.terminate()
-            server.wait(60)
-            time.sleep(1)  # the names are times
-            coarse = COARSE
-            _, said, third = start()
-            self.assertIn("waiting for people", said)
-            self.assertEqual(len(third), 2)
+            self.assertIn(server.wait(), self.UNCLEAN, "systemd starts it again")
+            time.sleep(0.1)  # RestartSec
+            server = self.start()  # the detail is the journal's
+            self.assertIn("is open again", self.opened(server))
+            self.assertEqual(self.journals(), first, "the same file is continued")
+        self.assertStops(server)
+        time.sleep(1)  # the names are times
+        server = self.start(*COARSE)
+        self.assertIn("waiting for people", self.opened(server))
+        self.assertEqual(len(self.journals()), 2, "a new session has a file of its own")
+        self.assertStops(server)
+
+    def test_a_running_session_that_is_killed_goes_on_where_it_was(self):
+        server = self.start("--wait-for", "right", *COARSE)
+        self.opened(server)
+        trainee = self.stage.start("trainee", "--seed", 1, "--wait", 60)
+        self.said(server, "run: running")
+        time.sleep(1)
+        server.kill()
+        self.assertIn(server.wait(), self.UNCLEAN)
+        server = self.start("--wait-for", "right")
+        self.assertRegex(self.opened(server), "is open again after tick [1-9]")
+        trainee.wait_for("rejoined as client", 60)
+        said = server.communicate(timeout=200)[0]
+        self.assertEqual(server.returncode, 0, said)
+        self.assertIn("everything is mounted", said)
+        self.assertEqual(trainee.wait(60), 0, trainee.text())
+        self.assertEqual(len(self.journals()), 1)
+
+    def test_a_journal_that_cannot_be_continued_ends_it_with_1_so_nobody_starts_it_over_and_over(self):
+        (self.stage.out / "2026-01-01-000000.mcap").write_bytes(b"no journal")
+        server = self.start(*COARSE)
+        said = server.communicate(timeout=60)[0]
+        self.assertEqual(server.returncode, 1, said)
+        self.assertNotIn(server.returncode, self.UNCLEAN)
+        self.assertIn("2026-01-01-000000.mcap", said)
+        self.assertEqual(len(self.journals()), 1, "and no new session hides it")
 
 
 class FullDisk(unittest.TestCase):

@@ -41,6 +41,19 @@ TEST(LimitChooser, NoLinkHoweverBadLeavesAHandUnfrozenForLongerThanTheBound) {
   EXPECT_EQ(of_nothing.step({kNaN, kNaN, kNaN, kNaN}).limits, HandLimits{});
 }
 
+TEST(LimitChooser, WhatWasMeasuredOverAKilledServerIsNotTheLinks) {
+  LimitChooser chooser;
+  const LinkMeasurement usual{.input_gap = 0.004, .age_jitter = 0.002, .inputs_lost = 1e-3};
+  for (int i = 0; i < 5; ++i) static_cast<void>(chooser.step(usual));
+  const LinkChoice before = chooser.step(usual);
+  chooser.interrupted();
+  const LinkMeasurement killed{.input_gap = 0.25, .trip_jitter = 0.3, .age_jitter = 1.5, .inputs_lost = 0.9};
+  EXPECT_EQ(chooser.step(killed), before);
+  EXPECT_EQ(chooser.step(killed), before);
+  EXPECT_EQ(chooser.step(usual), before);
+  EXPECT_GT(chooser.step(killed).limits.freeze_ticks, before.limits.freeze_ticks) << "and now it is";
+}
+
 TEST(LimitChooser, AnInterruptionEarnsNoPatienceAndKeepsWhatIsKeptBack) {
   LimitChooser chooser;
   LinkMeasurement lossy = kQuiet;

@@ -25,7 +25,8 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 /// A server in a process of its own with one seat. It refuses a client that wants hand "taken", and removes
-/// the client once when it receives a ClientEvent.
+/// the client when it receives a ClientEvent: the presence of its first request if the event is "late", else
+/// the newest one.
 void runServer(std::uint32_t domain, const std::string& scenario_hash = "") {
   auto participant = test::participant(domain);
   Partition lobby(participant, kLobby);
@@ -36,9 +37,10 @@ void runServer(std::uint32_t domain, const std::string& scenario_hash = "") {
     _exit(1);
   Inbox inbox;
   std::uint32_t asked = 0;
-  std::string guid;
+  std::string guid, first_guid;
   auto heard = inbox.on<Join>(lobby, kJoin, [&](const Join& join) {
     guid = join.client_guid;
+    if (first_guid.empty()) first_guid = guid;
     Welcome answer{.client_guid = guid, .session = join.session, .server_epoch = 7};
     if (!join.hands.empty() && join.hands.front() == "taken") {
       answer.reason = "that hand is taken";
@@ -51,11 +53,12 @@ void runServer(std::uint32_t domain, const std::string& scenario_hash = "") {
     if (!welcomes->write(answer)) _exit(1);
   });
   if (heard) {
-    heard = inbox.on<ClientEvent>(session, kClientEvent, [&](const ClientEvent&) {
-      (void)welcomes->write({.client_guid = guid,
+    heard = inbox.on<ClientEvent>(session, kClientEvent, [&](const ClientEvent& event) {
+      const bool is_late = event.kind == "late";
+      (void)welcomes->write({.client_guid = is_late ? first_guid : guid,
                              .session = "test",
                              .server_epoch = 7,
-                             .reason = "too loud",
+                             .reason = is_late ? "late" : "too loud",
                              .client = ClientId{1}});
     });
   }
@@ -118,6 +121,16 @@ TEST(Membership, ARemovedClientRejoins) {
   const auto back = (*member)->rejoin(stop, [&] { inbox.dispatch(milliseconds(0)); });
   ASSERT_TRUE(back) << back.error().what;
   EXPECT_EQ((*member)->welcome().tick, 2U) << "the answer to the second request";
+  inbox.dispatch(milliseconds(50));
+  EXPECT_FALSE((*member)->lost());
+
+  // what is said of the presence that it removed does not end the new one
+  bool heard = false;
+  ASSERT_TRUE(inbox.on<Welcome>((*member)->lobby(), kWelcome,
+                                [&](const Welcome& notice) { heard = heard || notice.reason == "late"; }));
+  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return inbox.matchedWriters() >= 3; }));
+  ASSERT_TRUE(events->write({.client = ClientId{1}, .seq = 2, .kind = "late", .text = "too loud"}));
+  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return heard; }));
   inbox.dispatch(milliseconds(50));
   EXPECT_FALSE((*member)->lost());
 }

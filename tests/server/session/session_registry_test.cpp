@@ -447,6 +447,16 @@ TEST_F(SessionRegistryTest, WhoIsRemovedLeavesAndDoesNotGetTheSeatAgain) {
   EXPECT_EQ(taken[0].kind, ChangeKind::kDetach);
   EXPECT_THAT(join("a", Role::kTrainee, {"right"}).reason, HasSubstr("you were removed"));
   EXPECT_TRUE(join("z", Role::kTrainee, {"right"}).accepted) << "the hand is free for others";
+  EXPECT_TRUE(command(instructor, CommandKind::kKick, std::to_string(trainee.value)).accepted) << "still so";
+}
+
+TEST_F(SessionRegistryTest, WhoIsAwayIsRemovedTooAndDoesNotComeBack) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  const ClientId away = join("a", Role::kObserver).client;
+  registry_.leave(away);
+  EXPECT_TRUE(command(instructor, CommandKind::kKick, std::to_string(away.value)).accepted);
+  EXPECT_THAT(join("a", Role::kObserver).reason, HasSubstr("you were removed"));
 }
 
 TEST_F(SessionRegistryTest, AnAdminIsRemovedByAnAdminAlone) {

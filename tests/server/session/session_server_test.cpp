@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "server/session/journal.h"
+#include "server/session/start_condition.h"
 #include "tests/server/session/scripted_client.h"
 #include "tests/server/session/small_session.h"
 

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "idl/types/messages/commands.h"
+#include "idl/types/messages/run.h"
+#include "server/session/refused.h"
+#include "server/session/tick_io.h"
+
+namespace tenon::session {
+
+/// Whether a command takes effect in the phase of the run that it will meet: the one after all commands that
+/// were accepted before it, of which the last ones wait for their tick. A command is accepted only if it will
+/// take effect.
+///
+/// Threads: one (wire). Real-time: no.
+class CommandGate {
+ public:
+  /// Of the session of a killed server: `deferred` of its commands wait until the session continues.
+  void resume(std::size_t deferred) { deferred_ = deferred; }
+  /// Phase and emergency stop after the last tick.
+  void update(RunPhase phase, bool emergency_stop);
+  /// Why the command cannot take effect, for any role.
+  [[nodiscard]] tl::expected<void, Refused> check(CommandKind kind) const;
+  /// The change of a command is on its way to the simulation.
+  void accept(ChangeKind change);
+  void engageStop() { is_stop_engaged_ = true; }
+  /// The run is paused afterwards: nothing moves by itself when the stop is cleared.
+  void clearStop();
+
+  [[nodiscard]] bool isStopEngaged() const { return is_stop_engaged_; }
+  /// A command has ended the run.
+  [[nodiscard]] bool endRequested() const { return end_requested_; }
+  /// As update() said last.
+  [[nodiscard]] RunPhase phase() const { return phase_; }
+
+ private:
+  /// After all accepted changes have been applied.
+  [[nodiscard]] RunPhase expectedPhase() const { return pending_phase_.value_or(phase_); }
+
+  RunPhase phase_ = RunPhase::kWaitingForPeople;
+  std::optional<RunPhase> pending_phase_;  ///< of an accepted pause or resume that no tick has applied yet
+  bool is_stop_engaged_ = false;           ///< emergency stop
+  bool end_requested_ = false;
+  std::size_t deferred_ = 0;  ///< accepted game commands that take effect when the session continues
+};
+
+}  // namespace tenon::session

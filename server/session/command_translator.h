@@ -1,0 +1,49 @@
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "idl/types/messages/commands.h"
+#include "idl/types/messages/role.h"
+#include "server/game_control/scenario.h"
+#include "server/session/refused.h"
+#include "server/session/tick_io.h"
+
+namespace tenon::session {
+
+/// Who gives a command, and in what session.
+struct CommandContext {
+  Role role = Role::kObserver;
+  const std::vector<ClientId>& controllers;  ///< of each hand, index = HandId
+  bool is_stop_engaged = false;              ///< emergency stop
+  bool is_instructor_present = false;
+};
+
+/// What a command asks of the simulation: by the names of the scenario and the rights of its sender. It knows
+/// nothing of the run's phase.
+///
+/// Threads: any. Real-time: no.
+class CommandTranslator {
+ public:
+  using Decision = tl::expected<Change, Refused>;
+
+  /// `scenario` must outlive this.
+  explicit CommandTranslator(const game_control::ScenarioFile& scenario) : scenario_(scenario) {}
+
+  /// The Change, or why there is none.
+  [[nodiscard]] Decision changeFor(const Command& command, const CommandContext& context) const;
+
+ private:
+  [[nodiscard]] Decision leadChange(const Command& command, const CommandContext& context) const;
+  [[nodiscard]] Decision collisionChange(const Command& command) const;
+  [[nodiscard]] Decision handOverChange(const Command& command, const CommandContext& context) const;
+  [[nodiscard]] Decision releaseChange(const Command& command, const CommandContext& context) const;
+  [[nodiscard]] Decision clearStopChange(const CommandContext& context) const;
+  [[nodiscard]] int findStep(std::string_view text) const;
+  [[nodiscard]] int findPair(std::string_view a, std::string_view b) const;
+  [[nodiscard]] bool controlsBothHands(ClientId client, const CommandContext& context) const;
+
+  const game_control::ScenarioFile& scenario_;
+};
+
+}  // namespace tenon::session

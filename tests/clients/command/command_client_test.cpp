@@ -1,0 +1,75 @@
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "clients/command/command_program.h"
+#include "idl/types/messages/run.h"
+#include "tests/idl/wire/peer.h"
+
+namespace tenon::command {
+namespace {
+
+/// A server of session "test" in a process of its own, in its life `epoch`. It gives everybody a seat. It is
+/// killed by the first command, or answers them.
+void runServer(std::uint32_t domain, std::uint32_t epoch, bool answers) {
+  auto participant = test::participant(domain);
+  wire::Partition lobby(participant, wire::kLobby);
+  wire::Partition session(participant, wire::sessionPartition("test"));
+  auto announces = wire::Writer<SessionAnnounce>::open(lobby, wire::kSessionAnnounce);
+  auto welcomes = wire::Writer<Welcome>::open(lobby, wire::kWelcome);
+  auto acks = wire::Writer<CommandAck>::open(session, wire::kCommandAck);
+  auto runs = wire::Writer<RunState>::open(session, wire::kRunState);
+  if (!announces || !welcomes || !acks || !runs) _exit(1);
+  if (!announces->write({.session = "test", .server_epoch = epoch})) _exit(1);
+  wire::Inbox inbox;
+  auto heard = inbox.on<Join>(lobby, wire::kJoin, [&](const Join& join) {
+    (void)welcomes->write({.client_guid = join.client_guid,
+                           .session = join.session,
+                           .server_epoch = epoch,
+                           .accepted = true,
+                           .client = ClientId{1}});
+  });
+  if (heard) {
+    heard = inbox.on<Command>(session, wire::kCommand, [&](const Command& command) {
+      if (!answers) _exit(0);
+      (void)acks->write({command.client, command.id, true, {}, Refusal::kNone});
+    });
+  }
+  if (!heard) _exit(1);
+  while (true) inbox.dispatch(std::chrono::seconds(1));
+}
+
+/// Sends a command to a server that is killed by it; another one resumes the session.
+Result<void> sendOverAKill(CommandKind kind) {
+  const std::uint32_t domain = test::ownDomain();
+  int begin[2];
+  EXPECT_EQ(pipe(begin), 0);
+  const test::Peer killed([domain] { runServer(domain, 7, false); });
+  const test::Peer next([domain, &begin] {
+    char byte;
+    if (read(begin[0], &byte, 1) == 1) runServer(domain, 8, true);
+  });
+  const std::atomic<bool> stop = false;
+  auto client = CommandClient::open({.domain = domain, .timeout = std::chrono::seconds(60)}, stop);
+  if (!client) return fail(client.error().what);
+  EXPECT_EQ(write(begin[1], "b", 1), 1);
+  return (*client)->send({.command = kind, .text = "Ada"}, stop);
+}
+
+TEST(CommandClient, AKickThatAKilledServerDidNotAnswerIsSentToTheOneThatResumes) {
+  const auto sent = sendOverAKill(CommandKind::kKick);
+  EXPECT_TRUE(sent) << sent.error().what;
+}
+
+TEST(CommandClient, WhatMayNotBeDoneTwiceIsNotRepeatedAndThePersonIsToldSo) {
+  const auto sent = sendOverAKill(CommandKind::kSkipStep);
+  ASSERT_FALSE(sent);
+  EXPECT_THAT(sent.error().what, ::testing::HasSubstr("may have obeyed or not"));
+}
+
+}  // namespace
+}  // namespace tenon::command
