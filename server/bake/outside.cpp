@@ -1,11 +1,13 @@
 #include "server/bake/outside.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "server/bake/flood.h"
 #include "server/bake/narrow_gaps.h"
 #include "server/bake/parallel.h"
+#include "server/bake/triangle_tree.h"
 
 namespace tenon::bake {
 
@@ -123,9 +125,27 @@ float reachedRadius(const BrickLevel& level, const BrickLevel* coarse, const Cel
   return static_cast<float>(distanceBoundFromCoarse(*coarse, level.position(lattice)) / level.voxel);
 }
 
-/// The samples of a brick that are outside: reached, or in the empty ball around a reached one.
+/// Whether rays from p say that it is in a solid. Between sheets, which have no inside, odd and even numbers
+/// of crossings are about equally likely.
+bool looksSolid(const TriangleTree& tree, const Vector3& p) {
+  // spread over the sphere, unlikely to be parallel to a face or an edge of a manufactured part
+  static const std::array<Vector3, 5> kDirections{{{0.3127, 0.4411, 0.8193},
+                                                   {-0.7703, 0.1931, 0.5573},
+                                                   {0.6421, -0.7309, 0.1879},
+                                                   {-0.2939, -0.5171, -0.7873},
+                                                   {0.5519, 0.6947, -0.4261}}};
+  constexpr std::size_t kFew = 1;  // rays through holes of missing triangles
+  std::size_t even = 0;
+  for (const Vector3& direction : kDirections)
+    if (!tree.oddCrossings(p, direction) && ++even > kFew) return false;
+  return true;
+}
+
+/// The samples of a brick that are outside: reached, in the empty ball around a reached one, or in a corner
+/// that no such ball fills: beside a reached one, with empty balls that overlap. Empty balls that overlap are
+/// on the same side of every surface, unless triangles are missing.
 BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* coarse, std::size_t node,
-                                     const std::vector<LatticeOffset>& offsets) {
+                                     const TriangleTree& tree, const std::vector<LatticeOffset>& offsets) {
   const std::int32_t slot = level.slot[node];
   const Cell corner = level.brickOf(node) * kOutsideVoxels;
   const std::int16_t* samples = level.samplesOf(slot);
@@ -141,6 +161,8 @@ BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* 
   BrickLevel::SampleBits outside;
   // [voxels] so that a sample exactly on the surface counts as outside in spite of rounding
   constexpr float kRounding = 0.002F;
+  constexpr float kLeastRadius = 0.016F;  // [voxels] of a sample whose side rounding cannot change
+  constexpr std::ptrdiff_t kBeside = 26;  // offsets to the samples of neighbouring cells
   for (int sample = 0; sample < BrickLevel::kSamples; ++sample) {
     const Cell in_brick = BrickLevel::cellOfSample(sample);
     const Cell in_patch = in_brick + Cell::Constant(kReach);
@@ -151,6 +173,14 @@ BrickLevel::SampleBits extendInBrick(const BrickLevel& level, const BrickLevel* 
         return patch[static_cast<std::size_t>(position + neighbour.patch_offset)] + kRounding >=
                neighbour.length;
       });
+      const float own = static_cast<float>(samples[sample]) / structures::DistanceField::kQuantaPerVoxel;
+      const bool in_corner =
+          !is_outside && own > kLeastRadius &&
+          std::any_of(offsets.begin(), offsets.begin() + kBeside, [&](const LatticeOffset& neighbour) {
+            const float radius = patch[static_cast<std::size_t>(position + neighbour.patch_offset)];
+            return radius > 0.0F && radius + own > neighbour.length + kRounding;
+          });
+      is_outside = is_outside || (in_corner && !looksSolid(tree, level.position(corner + in_brick)));
     }
     outside[static_cast<std::size_t>(sample)] = is_outside;
   }
@@ -186,7 +216,8 @@ void findOutside(BrickLevel& level, const BrickLevel* coarse, const TriangleTree
   std::vector<BrickLevel::SampleBits> outside(level.reached.size());
   const auto extend = [&](std::size_t node) {
     const std::int32_t slot = level.slot[node];
-    if (slot >= 0) outside[static_cast<std::size_t>(slot)] = extendInBrick(level, coarse, node, offsets);
+    if (slot >= 0)
+      outside[static_cast<std::size_t>(slot)] = extendInBrick(level, coarse, node, tree, offsets);
   };
   work.run(level.nodes(), 256, extend);
   level.outside = outside;

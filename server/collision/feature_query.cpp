@@ -118,7 +118,9 @@ void evaluateCrossing(const EdgePiece& a, const EdgePiece& b, const Transform& X
 
 /// B's features in A's field.
 PairQuery reversed(const PairQuery& query, const PairFeatures& features, double margin) {
-  return {&features.features_B->points(), features.field_A, query.X_WB, query.X_WA, margin};
+  PairQuery of_B{&features.features_B->points(), features.field_A, query.X_WB, query.X_WA, margin};
+  of_B.correct_valleys = query.correct_valleys;
+  return of_B;
 }
 
 /// Adds to the gaps of B's features what A's field is dilated beyond `most_dilation_A`. Returns the smallest

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "server/collision/island_solver.h"
+#include "server/collision/valley_correction.h"
 
 namespace tenon::collision {
 
@@ -39,7 +40,7 @@ struct ContactSurface {
 
   /// The field in its frame F.
   [[nodiscard]] structures::FieldSample sample(const Vector3& p_FP) const {
-    structures::FieldSample sample = field->sample(p_FP);
+    structures::FieldSample sample = sampleInValley(*field, p_FP);
     sample.distance += field->dilationBeyond(most_dilation, p_FP);
     return sample;
   }
@@ -76,8 +77,10 @@ struct IslandSolver::Job {
   }
   /// The query of a pair at the current poses of its bodies, up to a gap of `margin` [m].
   [[nodiscard]] PairQuery queryOf(const IslandPair& pair, double margin) const {
-    return {pair.shell_A, pair.field_B, poseA(pair), poseB(pair),
-            margin,       pair.levels,  pair.budget, pair.priority_points};
+    PairQuery query{pair.shell_A, pair.field_B, poseA(pair), poseB(pair),
+                    margin,       pair.levels,  pair.budget, pair.priority_points};
+    query.correct_valleys = true;
+    return query;
   }
 };
 

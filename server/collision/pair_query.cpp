@@ -8,6 +8,7 @@
 #include "server/collision/contact_reducer.h"
 #include "server/collision/query_kernels.h"
 #include "server/collision/ridge_correction.h"
+#include "server/collision/valley_correction.h"
 
 namespace tenon::collision {
 namespace {
@@ -49,6 +50,7 @@ class Traversal {
         prune_(query.prune),
         reduce_(query.reduce),
         correct_ridges_(query.correct_ridges),
+        correct_valleys_(query.correct_valleys),
         result_(result),
         reducer_(result, -query.field_B->band(), query.margin) {}
 
@@ -97,6 +99,7 @@ class Traversal {
   /// Lists what was taken.
   void listContacts() {
     reducer_.keepSmallestGaps(near_);
+    if (correct_valleys_) correctNearValleys();
     for (std::size_t first = 0; first < near_.count; first += structures::ShellBlock::kLanes) {
       ContactLanes lanes;
       kernels_.near_contacts(frame_, near_, first, lanes);
@@ -240,6 +243,25 @@ class Traversal {
     near_.count = n;
   }
 
+  /// Valley correction of what is listed.
+  void correctNearValleys() {
+    const double voxel = frame_.field.voxel();
+    bool corrected = false;
+    for (std::size_t i = 0; i < near_.count; ++i) {
+      if (!mayBeInValley(near_.gap[i], near_.gradient(i).squaredNorm(), voxel)) continue;
+      structures::FieldSample sample{near_.gap[i], near_.gradient(i), true};
+      if (!correctValley(frame_, kernels_, frame_.inB(Vector3(near_.x[i], near_.y[i], near_.z[i])), sample))
+        continue;
+      near_.set(i, sample);
+      corrected = true;
+    }
+    if (!corrected) return;
+    result_.smallest_gap = result_.unlisted_gap;
+    for (std::size_t i = 0; i < near_.count; ++i)
+      result_.smallest_gap = std::min(result_.smallest_gap, near_.gap[i]);
+    result_.deepest = std::max(-result_.smallest_gap, 0.0);
+  }
+
   /// Fills the last block up: kernels read whole blocks.
   void padCandidates() {
     for (std::size_t i = candidates_.count; i < candidates_.count + structures::ShellBlock::kLanes; ++i) {
@@ -292,6 +314,7 @@ class Traversal {
       samples_;  ///< of candidates
   NearPoints near_;
   bool correct_ridges_;
+  bool correct_valleys_;
   PairQueryResult& result_;
   ContactReducer reducer_;
 };
@@ -342,18 +365,51 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
     result.unlisted_gap = std::min(result.unlisted_gap, result.complete_to);
 }
 
+namespace {
+
+/// Valley correction of a block of sampled points; false when there is none.
+bool correctValleys(const LaneFrame& frame, const QueryKernels& kernels, const structures::ShellBlock& points,
+                    SampleLanes& samples) {
+  const double voxel = frame.field.voxel();
+  bool corrected = false;
+  forEachLane(samples.exact, [&](std::uint32_t i) {
+    const Vector3 gradient(samples.gradient_x[i], samples.gradient_y[i], samples.gradient_z[i]);
+    if (!mayBeInValley(samples.distance[i], gradient.squaredNorm(), voxel)) return;
+    structures::FieldSample sample{samples.distance[i], gradient, true};
+    if (!correctValley(frame, kernels, frame.inB(Vector3(points.x[i], points.y[i], points.z[i])), sample))
+      return;
+    samples.distance[i] = sample.distance;
+    samples.gradient_x[i] = sample.gradient.x();
+    samples.gradient_y[i] = sample.gradient.y();
+    samples.gradient_z[i] = sample.gradient.z();
+    corrected = true;
+  });
+  return corrected;
+}
+
+double smallestOf(const SampleLanes& samples, std::uint32_t count) {
+  return *std::min_element(samples.distance.begin(), samples.distance.begin() + count);
+}
+
+}  // namespace
+
 ResampledPart resamplePart(const PairQuery& query, std::span<Contact> contacts) noexcept {
   const LaneFrame frame(*query.field_B, query.X_WA, query.X_WB, query.margin, query.shell_A->radius());
   const QueryKernels& kernels = chosenKernels();
   const std::span<const structures::ShellPoint> points = query.shell_A->points();
   ResampledPart part;
-  SampleSums sums;
+  part.smallest_gap = kFarGap;
   for (std::size_t first = 0; first < contacts.size(); first += structures::ShellBlock::kLanes) {
     const structures::ShellBlock block = blockOf(*query.shell_A, contacts, first);
     SampleLanes samples;
+    SampleSums sums;
     ContactLanes contact_lanes;
     const PointLanes points_A{block.x.data(), block.y.data(), block.z.data(), block.count};
     kernels.samples(frame, points_A, &samples, sums);
+    const bool corrected = query.correct_valleys && correctValleys(frame, kernels, block, samples);
+    part.smallest_gap =
+        std::min(part.smallest_gap, corrected ? smallestOf(samples, block.count) : sums.smallest_distance);
+    part.points_colliding += sums.colliding;
     kernels.contacts(frame, points_A, &samples, &contact_lanes);
     for (std::uint32_t i = 0; i < block.count; ++i) {
       if ((samples.exact >> i & 1U) == 0) {
@@ -368,8 +424,6 @@ ResampledPart resamplePart(const PairQuery& query, std::span<Contact> contacts) 
       setContact(contact_lanes, i, samples.distance[i], contact);
     }
   }
-  part.smallest_gap = sums.smallest_distance;
-  part.points_colliding = sums.colliding;
   return part;
 }
 

@@ -78,6 +78,8 @@ struct PairQuery {
   bool sum_penalty = false;
   /// Correct depths and normals near gradient discontinuities of the field: see correctRidges().
   bool correct_ridges = false;
+  /// Correct gaps and normals of listed contacts at concave edges of the field: see correctValley().
+  bool correct_valleys = false;
   bool list = true;   ///< false: no contacts are listed; for PairQueryResult::smallest_gap alone
   bool prune = true;  ///< false: every point is tested, for comparison
 };

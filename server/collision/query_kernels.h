@@ -153,6 +153,12 @@ struct NearPoints {
   [[nodiscard]] Vector3 gradient(std::size_t i) const {
     return {gradient_x[i], gradient_y[i], gradient_z[i]};
   }
+  void set(std::size_t i, const structures::FieldSample& sample) {
+    gap[i] = sample.distance;
+    gradient_x[i] = sample.gradient.x();
+    gradient_y[i] = sample.gradient.y();
+    gradient_z[i] = sample.gradient.z();
+  }
   void move(std::size_t from, std::size_t to) {
     gap[to] = gap[from];
     gradient_x[to] = gradient_x[from];

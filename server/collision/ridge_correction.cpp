@@ -5,47 +5,18 @@
 #include <bit>
 #include <cmath>
 
+#include "server/collision/tangent_probes.h"
+
 namespace tenon::collision {
 
 namespace {
-
-/// [voxels] From the point to its probes: far enough to cross the middle of a wall of up to four voxels, and
-/// the surface of a thinner one.
-constexpr double kProbeDistance = 2.0;
 
 /// [voxels] Bound of the interpolation error per unit of the deficit 1 - |gradient|^2. The error is at most
 /// 0.87; a little less than in proportion was best on CAD parts.
 constexpr double kErrorPerDeficit = 0.65;
 
-/// [-] Cosine of 8 degrees.
-constexpr double kSameNormal = 0.99;
-
 /// [voxels] A plane may exceed the interpolation by this: next to a concave edge interpolation is too deep.
 constexpr double kMaxAbove = 0.1;
-
-/// Unit vectors to the corners of a cube rotated by 0.6 rad about (1, 2, 3), so that none is along an axis or
-/// a diagonal of the grid; the other four are their negatives.
-constexpr std::array<std::array<double, 3>, ProbeOffsets::kProbes / 2> kDirections{
-    {{0.43260, 0.73720, 0.51904},
-     {-0.53482, 0.18563, 0.82432},
-     {0.92654, -0.27344, 0.25835},
-     {0.04088, 0.82501, -0.56363}}};
-
-ProbeOffsets probeOffsets(double length) {
-  ProbeOffsets offsets;
-  for (std::size_t k = 0; k < ProbeOffsets::kProbes; ++k) {
-    const auto& [x, y, z] = kDirections[k / 2];
-    const double along = k % 2 == 0 ? length : -length;
-    offsets.x[k] = along * x;
-    offsets.y[k] = along * y;
-    offsets.z[k] = along * z;
-  }
-  return offsets;
-}
-
-Vector3 gradientOf(const TangentPlanes& planes, std::size_t k) {
-  return {planes.gradient_x[k], planes.gradient_y[k], planes.gradient_z[k]};
-}
 
 /// Whether another probe has a plane of about the same normal.
 bool seenBySecondProbe(const TangentPlanes& planes, std::size_t plane) {

@@ -62,7 +62,8 @@ void CollPair::reset() noexcept {
 
 void CollPair::query(const Pose& X_WA, const Pose& X_WB, double margin, collision::FeatureScratch& scratch,
                      std::uint32_t budget, std::span<const std::uint32_t> priority_points) noexcept {
-  const collision::PairQuery query{shell_A_, field_B_, X_WA, X_WB, margin, levels_, budget, priority_points};
+  collision::PairQuery query{shell_A_, field_B_, X_WA, X_WB, margin, levels_, budget, priority_points};
+  query.correct_valleys = true;
   collision::queryPair(query, list_->query);
   collision::queryFeatures(query, features_, scratch, list_->query);
   std::fill_n(list_->multipliers.begin(), list_->query.contacts.size(), 0.0);
@@ -164,7 +165,11 @@ bool CollPair::isIndexValid(const collision::Contact& contact) const noexcept {
 
 bool CollPair::isValid(const collision::IslandPairResult& list) const noexcept {
   const collision::ContactList& contacts = list.query.contacts;
-  return possible_ && list.secondary_planes <= contacts.size() &&
+  if (list.secondary_planes > contacts.size()) return false;
+  const bool in_order = std::is_sorted(
+      contacts.begin(), contacts.end() - list.secondary_planes,
+      [](const collision::Contact& a, const collision::Contact& b) { return a.kind < b.kind; });
+  return possible_ && in_order &&
          std::all_of(contacts.begin(), contacts.end(),
                      [this](const collision::Contact& c) { return isIndexValid(c); });
 }

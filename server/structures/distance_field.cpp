@@ -143,6 +143,40 @@ FieldSample DistanceField::sample(const Vector3& p_MP) const noexcept {
   return sample;
 }
 
+bool DistanceField::cellAt(const Vector3& p_MP, FieldCell& cell) const noexcept {
+  BrickLocation location;
+  if (!locate(p_MP, location) || location.entry < 0) return false;
+  FieldSample sample;
+  const auto take = [&](Entry brick, const Vector3& p_brick, double voxel, double band) {
+    if (brick < 0 || !interpolate(brick, p_brick, voxel, band, sample)) return false;
+    const Vector3 p = p_brick * kBrickVoxels;
+    const Eigen::Vector3i low = p.cast<int>().cwiseMin(kBrickVoxels - 1);
+    const std::int16_t* s = layout_.samples.data() + static_cast<std::size_t>(brick) * kBrickSamples +
+                            (low.z() * kBrickSide + low.y()) * kBrickSide + low.x();
+    for (int k = 0; k < 8; ++k) {
+      cell.samples[static_cast<std::size_t>(k)] =
+          static_cast<double>(s[((k >> 2) * kBrickSide + (k >> 1 & 1)) * kBrickSide + (k & 1)]) /
+          kQuantaPerVoxel;
+    }
+    cell.p_cell = p - low.cast<double>();
+    cell.voxel = voxel;
+    return true;
+  };
+  Entry brick = location.entry;
+  if (brick >= kRefined) {
+    const int r = layout_.refinement;
+    const Vector3 p = location.p_brick * r;
+    const Eigen::Vector3i child = p.cast<int>().cwiseMin(r - 1);
+    const Entry* children = layout_.index.data() + (brick - kRefined);
+    const double voxel = layout_.voxel / r;
+    if (take(children[(child.z() * r + child.y()) * r + child.x()], p - child.cast<double>(), voxel,
+             kBandVoxels * voxel))
+      return true;
+    brick = children[r * r * r];
+  }
+  return take(brick, location.p_brick, layout_.voxel, layout_.band);
+}
+
 FieldSample DistanceField::undilated(const Vector3& p_MP) const noexcept {
   FieldSample sample = this->sample(p_MP);
   sample.distance += dilationAt(p_MP);

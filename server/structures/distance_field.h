@@ -20,6 +20,13 @@ struct FieldSample {
   bool exact = false;
 };
 
+/// The cell that is interpolated at one point.
+struct FieldCell {
+  std::array<double, 8> samples{};   ///< [voxels] at its corners, x fastest
+  Vector3 p_cell = Vector3::Zero();  ///< [voxels] the point, from the lowest corner
+  double voxel = 0.0;                ///< [m] its edge
+};
+
 /// A signed distance field (SDF) of a surface, sampled in a narrow band of 8x8x8-voxel bricks (paper §3.1,
 /// "voxelmap").
 ///
@@ -112,6 +119,9 @@ class DistanceField {
   /// [m] A lower bound of the signed distance, and of every exact sample(), within `radius` [m] of p. For
   /// pruning: one look-up.
   [[nodiscard]] double lowerBound(const Vector3& p_MP, double radius = 0.0) const noexcept;
+
+  /// The cell that sample() interpolates at a point; false where that is not `exact`.
+  [[nodiscard]] bool cellAt(const Vector3& p_MP, FieldCell& cell) const noexcept;
 
   /// [m] Edge of the voxels that sample() interpolates at p.
   [[nodiscard]] double voxelAt(const Vector3& p_MP) const noexcept;

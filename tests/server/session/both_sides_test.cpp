@@ -189,7 +189,7 @@ struct TaperCase {
   double voxel_mm;
   const char* refine;
   double turn;   ///< [rad] of both meshes in their grids
-  double known;  ///< [m] that it stands proud today
+  double known;  ///< [m] that it stands proud today; 0: no more than promised
 };
 void PrintTo(const TaperCase& one, std::ostream* out) { *out << one.name; }
 
@@ -275,7 +275,11 @@ TEST_P(Tapers, SeatNearTheirExactSeat) {
     highest = std::max(highest, seat.z() + 0.008);
     lowest = std::min(lowest, seat.z() + 0.008);
   }
-  EXPECT_TRUE(test::knownShortfall(highest, kPromised, one.known)) << "it stands proud";
+  if (one.known > 0.0) {
+    EXPECT_TRUE(test::knownShortfall(highest, kPromised, one.known)) << "it stands proud";
+  } else {
+    EXPECT_LE(highest, kPromised) << "it stands proud";
+  }
   EXPECT_GE(lowest, -5e-4) << "it is driven in";
   RecordProperty("highest_um", static_cast<int>(std::lround(1e6 * highest)));
   RecordProperty("lowest_um", static_cast<int>(std::lround(1e6 * lowest)));
@@ -284,7 +288,7 @@ TEST_P(Tapers, SeatNearTheirExactSeat) {
 constexpr const char* kRefined =
     "refinement: 8, refine: [{from: [-0.02, -0.02, -0.025], to: [0.02, 0.02, 0.005]}]";
 INSTANTIATE_TEST_SUITE_P(Fits, Tapers,
-                         ::testing::Values(TaperCase{"Upright", 0.6, kRefined, 0.0, 5.4e-4},
+                         ::testing::Values(TaperCase{"Upright", 0.6, kRefined, 0.0, 0.0},
                                            TaperCase{"Turned", 0.6, kRefined, 0.3, 3.5e-3}),
                          [](const auto& one) { return std::string(one.param.name); });
 
