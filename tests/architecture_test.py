@@ -109,7 +109,8 @@ UNITS = {
     "server/bake/bake": "server/bake/{air_gaps,brick_level,exposed_surface,face_sides,feature_bake,field_bake,field_size,filled_spaces,flood,narrow_gaps,"
                         "outside,parallel,refined_bricks,shell_bake,slope_limit,thin_bricks,thin_places,triangle_pieces,"
                         "welded_mesh}",
-    "server/collision/pair_query": "server/collision/{contact_blocks,contact_reducer,query_kernels,ridge_correction,*_lanes_inl}",
+    "server/collision/pair_query": "server/collision/{contact_blocks,contact_reducer,query_kernels,ridge_correction,tangent_probes,valley_correction,"
+                                   "*_lanes_inl}",
     "server/collision/island_solver": "server/collision/island_*",
     "server/collision/motion_solver": "server/collision/motion_workspace",
     "server/structures/pointshell": "server/structures/level_areas",

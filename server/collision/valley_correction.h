@@ -21,8 +21,8 @@ namespace tenon::collision {
 bool correctValley(const LaneFrame& frame, const QueryKernels& kernels, const Vector3& p_BP,
                    structures::FieldSample& sample) noexcept;
 
-/// Whether a sample may be one of a valley, near the surface: what correctValley() tests first. `voxel` [m]
-/// is the field's largest.
+/// Whether a sample, of `distance` [m] and with a gradient of squared length `gradient2` [-], may be one of a
+/// valley, near the surface: what correctValley() tests first. `voxel` [m] is the field's largest.
 [[nodiscard]] inline bool mayBeInValley(double distance, double gradient2, double voxel) {
   constexpr double kUnitTolerance = 0.005;  // [-] quantised samples alone cause less
   return distance < voxel && distance > -voxel &&
