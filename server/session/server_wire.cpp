@@ -18,6 +18,7 @@ namespace tenon::session {
 namespace {
 
 constexpr auto kBetweenLimits = std::chrono::milliseconds(500);  // changes of a station's limits
+constexpr std::uint32_t kLoggedFreezeStep = 30;  // [ticks] smaller changes of a freeze limit are not logged
 
 std::int64_t nowNanoseconds() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
@@ -362,10 +363,14 @@ void ServerWire::handle(const Telemetry& telemetry) {
   if (!registry_.setLimits(telemetry.client, telemetry.limits, round_trip)) return;
   inputs->second.limits_set_at = now;
   const HandLimits& limits = registry_.limitsOf(station.hands.front());
+  std::uint32_t& logged = inputs->second.logged_freeze;
+  if (std::max(limits.freeze_ticks, logged) - std::min(limits.freeze_ticks, logged) < kLoggedFreezeStep)
+    return;
+  logged = limits.freeze_ticks;
   log(Severity::kInfo, "link",
       fmt::format(
-          "{}: by its link of the last 10 s, without input a hand is held still after {} ms and parked after "
-          "{} ms; now inputs are up to {:.0f} ms apart and {:.2f} % of them are lost",
+          "{}: a hand without input is held still after {} ms and parked after {} ms; inputs come up to "
+          "{:.0f} ms apart, {:.2f} % are lost",
           station.name, limits.freeze_ticks, limits.park_ticks,
           1e3 * inputs->second.gaps.longest(nowNanoseconds()), 1e2 * telemetry.inputs_lost));
 }

@@ -151,6 +151,7 @@ class ServerWire {
     std::uint32_t count = 0, newest_seq = 0;
     GapMeter gaps;
     std::chrono::steady_clock::time_point limits_set_at;
+    std::uint32_t logged_freeze = HandLimits{}.freeze_ticks;  ///< [ticks] the newest in the log
   };
   std::map<ClientId, ReceivedInputs> received_inputs_;  ///< ClockSync
   std::uint64_t refused_inputs_ = 0;

@@ -84,7 +84,7 @@ class LimitsOfALink(unittest.TestCase):
             server = machines.start(0, "serve", PEG, "--network", "wan", "--wait-for", "right", "--journal", journal)
             server.wait_for("is open", 600)
             machines.start(1, "trainee", "--seed", 1, "--key", machines.key, "--network", f"wan,{A}")
-            server.wait_for(r"held still after ([6-9]|1\d)\d ms .* inputs are up to", 120)
+            server.wait_for(r"held still after ([89]|1\d)\d ms .* inputs come up to", 120)
             lists = machines.start(0, "command", "list", "--network", "wan")
             self.assertEqual(lists.wait(60), 0, lists.text())
             self.assertRegex(lists.text(), r"right +trainee +\S+ +without input still after ([6-9]|1\d)\d ms, parked after 1\d\d\d ms")

@@ -26,7 +26,7 @@ const SAFETY = [
 ];
 /** Texts by what they match. Groups: who and reason as they are; step, title, hand, role and word are translated. */
 const RULES: [RegExp, Key][] = [
-  [/^(?<who>.+): by its link of the last 10 s, without input a hand is held still after (?<freeze>\d+) ms and parked after (?<park>\d+) ms; now inputs are up to (?<gap>\d+) ms apart and (?<lost>[\d.]+) % of them are lost$/, "event.link"],
+  [/^(?<who>.+): a hand without input is held still after (?<freeze>\d+) ms and parked after (?<park>\d+) ms; inputs come up to (?<gap>\d+) ms apart, (?<lost>[\d.]+) % are lost$/, "event.link"],
   [/^waiting for people$/, "event.waiting"],
   [/^running$/, "event.running"],
   [/^paused$/, "event.paused"],
@@ -67,24 +67,24 @@ export function readable(session: Session, text: string): string {
   return text.replace(/\w+/g, (word) => titles.get(word) ?? word);
 }
 
-/** How the server names a condition of a step, as describe() of server/game_control/step_messages.cpp does. */
-const CONDITIONS: [RegExp, Key][] = [
+/** How the server names a condition of a step, as describe() of server/game_control/step_messages.cpp does; its text; the unit of its value. */
+const CONDITIONS: [RegExp, Key, string?][] = [
   [/^pose of (?<a>.+)$/, "condition.pose"],
-  [/^force on (?<a>.+)$/, "condition.force"],
-  [/^contact (?<a>\w+)-(?<b>\w+)$/, "condition.pair"],
-  [/^contact of (?<a>.+)$/, "condition.contact"],
+  [/^force on (?<a>.+)$/, "condition.force", "N"],
+  [/^contact (?<a>\w+)-(?<b>\w+)$/, "condition.pair", "s"],
+  [/^contact of (?<a>.+)$/, "condition.contact", "s"],
   [/^signal (?<a>.+)$/, "condition.signal"],
   [/^command fulfilled(?<a>)$/, "condition.fulfilled"],
   [/^all(?<a>)$/, "condition.all"],
   [/^any(?<a>)$/, "condition.any"],
 ];
 
-export function conditionOf(session: Session, text: string): string {
-  for (const [pattern, key] of CONDITIONS) {
+export function conditionOf(session: Session, text: string): { label: string; unit: string } {
+  for (const [pattern, key, unit] of CONDITIONS) {
     const groups = pattern.exec(text)?.groups;
-    if (groups !== undefined) return t(key, { a: readable(session, groups["a"]), b: readable(session, groups["b"] ?? "") });
+    if (groups !== undefined) return { label: t(key, { a: readable(session, groups["a"]), b: readable(session, groups["b"] ?? "") }), unit: unit ?? "" };
   }
-  return readable(session, text);
+  return { label: readable(session, text), unit: "" };
 }
 
 /** What a word of `tenon command` is called here. */

@@ -78,7 +78,9 @@ function conditions(session: Session): Node[] {
   }
   for (const { text, value, limit, met } of progress.conditions) {
     if (step.has_target && text.startsWith("pose of")) continue;
-    rows.push(meter(conditionOf(session, text), `${Number(value.toPrecision(3))} / ${Number(limit.toPrecision(3))}`, limit === 0 ? (met ? 1 : 0) : value / limit, met));
+    const { label, unit } = conditionOf(session, text);
+    const reading = unit === "" ? `${Number(value.toPrecision(3))} / ${Number(limit.toPrecision(3))}` : `${value.toFixed(1)} / ${limit.toFixed(1)} ${unit}`;
+    rows.push(meter(label, reading, limit === 0 ? (met ? 1 : 0) : value / limit, met));
   }
   return rows.length === 0 ? [] : [h("ul", "conditions", ...rows)];
 }
@@ -102,17 +104,20 @@ export function steps(session: Session): Node[] {
   return [h("ol", "steps", ...rows)];
 }
 
-/** What the link of a station does now: age of the displayed force, its jitter, losses, and how well the clocks are known. */
-function linkOf(session: Session, client: number): string {
+const QUIET = { age: 0.02, lost: 0.1, freeze: 50 }; // [s], [%], [ms] up to which a link is not worth a line
+
+/** What the link of a station does now: age of the displayed force, its jitter, losses, and how well the clocks are known; whether it is worth a line. */
+function linkOf(session: Session, client: number): { text: string; isQuiet: boolean } {
   const link = session.telemetry.get(client);
-  if (link === undefined || link.samples === 0n) return "";
+  if (link === undefined || link.samples === 0n) return { text: "", isQuiet: true };
   const ms = (seconds: number) => (1000 * seconds).toFixed(seconds < 0.01 ? 1 : 0);
   const lost = (100 * Math.max(link.inputs_lost, link.answers_lost)).toFixed(1);
   const now = t("link", { age: ms(link.age), jitter: ms(link.jitter), lost });
   const hands = Array.from(session.people.get(client)?.hands ?? []);
   const freeze = Math.max(0, ...hands.map((hand) => session.sceneHands.get(hand)?.freeze_ticks ?? 0));
   const text = freeze === 0 ? now : `${now}, ${t("link.freeze", { freeze })}`;
-  return link.clock_known ? `${text}, ${t("link.trip", { trip: ms(link.round_trip), error: ms(link.clock_error) })}` : text;
+  const isQuiet = link.age < QUIET.age && Number(lost) < QUIET.lost && freeze <= QUIET.freeze;
+  return { text: link.clock_known ? `${text}, ${t("link.trip", { trip: ms(link.round_trip), error: ms(link.clock_error) })}` : text, isQuiet };
 }
 
 /** Who holds what, at the places of the hands. */
@@ -159,7 +164,8 @@ export function people(session: Session, { leads, hand }: Lead): Node[] {
     const limited = hands.map((id) => interventions(session.hands.get(id)?.safety_flags ?? 0)).find((text) => text !== "") ?? "";
     const guidance = guided.length === 0 ? "" : t("guide.acts", { what: guided.map((id) => session.nameOfHand(id)).join(", ") });
     if (leads && person.role !== OBSERVER) act("kick", String(person.client_id), t("desk.kick"), `${t("desk.kick")}: ${person.name}`);
-    const details = [devices, link, guidance].filter((text) => text !== "").map((text) => h("small", "muted", text));
+    head.title = link.text; // all of it, of a link that is not worth a line
+    const details = [devices, link.isQuiet ? "" : link.text, guidance].filter((text) => text !== "").map((text) => h("small", "muted", text));
     if (limited !== "") details.push(h("small", "warn", limited));
     return h("li", "", icon("person"), head, ...details, ...(actions.length === 0 ? [] : [h("div", "row", ...actions)]));
   });
