@@ -40,7 +40,7 @@ RULES = [
     ("a client fills the queue", [("server/session/contributions.h", r"waiting\.size\(\) < kMostOfClient", "true"), ("server/session/contributions.h", r" \|\| to\.freeChanges\(\) < InputBuffer::kChanges / 2", "")],
      "server_session_tests", "Contributions.LeaveHalfOfTheQueueToCommands"),
     ("motion starts when a stop is cleared", [(REGISTRY, r"  changes_\.push_back\(\{\.kind = ChangeKind::kPause\}\);\n", "")],
-     "server_session_tests", "SessionRegistryTest.AClearedEmergencyStopLeavesTheRunPaused"),
+     "server_session_tests", "RegistryCommands.AClearedEmergencyStopLeavesTheRunPaused"),
     ("after a gap the hand is thrown", [(HAND, r"workspace_\.shift\(([^;]*)\);", r"workspace_.shift(0.0 * (\1));")], "clients_haptic_tests",
      "ForceReturnOffset.IsSentAndDecaysOutOfContactAlone:*AFreezeIsSoft*:*AfterAGapIsSoft*"),
     ("a force is back at once", [(SAFETY, r"starting_ \? std::max\(0\.0, limits_\.start_force_slew \* growth - wall_growth\)", "starting_ ? limits_.force_slew * growth - 0.0 * wall_growth")],

@@ -1,7 +1,7 @@
 #pragma once
 
+#include <span>
 #include <string_view>
-#include <vector>
 
 #include "idl/types/messages/commands.h"
 #include "idl/types/messages/role.h"
@@ -14,8 +14,8 @@ namespace tenon::session {
 /// Who gives a command, and in what session.
 struct CommandContext {
   Role role = Role::kObserver;
-  const std::vector<ClientId>& controllers;  ///< of each hand, index = HandId
-  bool is_stop_engaged = false;              ///< emergency stop
+  std::span<const ClientId> controllers;  ///< of each hand, index = HandId; valid during the call
+  bool is_stop_engaged = false;           ///< emergency stop
   bool is_instructor_present = false;
 };
 

@@ -103,17 +103,17 @@ class KilledServer(unittest.TestCase):
         """When the contacts are back, the force of a hand grows from zero by at most 20 N/s for 0.9 s."""
         returns = 0
         for states in hand_states(stage.out / "session.mcap").values():
-            for (_, _, before, age, _), (seq, _, force, age_now, _), k in zip(states, states[1:], range(2, len(states))):
-                if not (age > 500 and age_now < 50):
+            for i, (before, now) in enumerate(zip(states, states[1:]), 1):
+                if not (before.age > 500 and now.age < 50):
                     continue
                 returns += 1
-                self.assertEqual(before, 0.0, f"step {seq}: the contacts were old")
-                last_seq, last = seq - 10, 0.0
-                for s, peak, force, _, _ in states[k - 1:]:
-                    if s > seq + 900:
+                self.assertEqual(before.force, 0.0, f"step {now.step}: the contacts were old")
+                last_step, last = now.step - 10, 0.0
+                for state in states[i:]:
+                    if state.step > now.step + 900:
                         break
-                    self.assertLessEqual(peak - last, 20.0 * 0.002 * (s - last_seq) + 0.02, f"step {s}")
-                    last_seq, last = s, force
+                    self.assertLessEqual(state.peak - last, 20.0 * 0.002 * (state.step - last_step) + 0.02, f"step {state.step}")
+                    last_step, last = state.step, state.force
         self.assertGreater(returns, 0, "no hand came back")
 
     def test_an_emergency_stop_stands_after_the_resume_until_it_is_cleared(self):

@@ -1,11 +1,13 @@
 """Safety at the hand through real processes: what a device displays after its server stood still, from the recording of the session."""
 import ctypes
 import ctypes.util
+import math
 import signal
 import struct
 import time
 import unittest
 from pathlib import Path
+from typing import NamedTuple
 
 from stage import Stage
 
@@ -43,18 +45,27 @@ def messages(recording):
             yield channels[struct.unpack_from("<H", body)[0]], body[22 + 4:]
 
 
+class HandSample(NamedTuple):
+    """A HandState_100."""
+
+    step: int  # of its station
+    peak: float  # [N] largest force displayed since the last one
+    force: float  # [N] displayed
+    age: int  # [ms] of its contacts
+    is_starting: bool
+
+
 def hand_states(recording):
-    """Of each hand: (step of its station, largest force [N] displayed since the last one, force [N] displayed, age of its
-    contacts [ms], whether the force is starting) from HandState_100, in order."""
+    """Of each hand its samples, in order."""
     hands = {}
     for topic, message in messages(recording):
         if topic != "HandState_100":
             continue
-        hand, seq = struct.unpack_from("<II", message)
-        force = struct.unpack_from("<3d", message, 144)
-        hands.setdefault(hand, []).append((seq, struct.unpack_from("<f", message, 208)[0], sum(x * x for x in force) ** 0.5,
-                                           struct.unpack_from("<I", message, 192)[0],
-                                           bool(struct.unpack_from("<I", message, 196)[0] & SOFT_START)))
+        hand, step = struct.unpack_from("<II", message)
+        force = math.hypot(*struct.unpack_from("<3d", message, 144))
+        peak = struct.unpack_from("<f", message, 208)[0]
+        age, flags = struct.unpack_from("<II", message, 192)
+        hands.setdefault(hand, []).append(HandSample(step, peak, force, age, bool(flags & SOFT_START)))
     return hands
 
 
@@ -82,24 +93,25 @@ class ForceReturn(unittest.TestCase):
     def returns(self, states):
         """Judges what follows each gap of a hand that felt a force; yields that force."""
         for i in range(1, len(states)):
-            seq, _, _, age, _ = states[i]
-            if not (states[i - 1][3] > 150 and age < 50):
+            now, before = states[i], states[i - 1]
+            if not (before.age > 150 and now.age < 50):
                 continue  # not the end of a gap
             # Until contacts are late, at 20 ms, the force follows the hand; the sample that names an age is up to 10 ms younger.
-            fresh = [peak for s, peak, _, a, _ in states[:i] if a < 30 and seq - 1500 < s]
+            in_time = [state for state in states[:i] if state.age < 30]
+            fresh = [state.peak for state in in_time if now.step - 1500 < state.step]
             if not fresh or fresh[-1] < 1.0:
                 continue
             # What a force may come back to is what it was when it last was not starting: before an earlier gap, where gaps are close.
-            settled = [peak for _, peak, _, a, starting in states[:i] if a < 30 and not starting]
+            settled = [state.peak for state in in_time if not state.is_starting]
             limit = max([*settled[-10:], 3.0]) + 0.3
-            last_seq, _, last, _, _ = states[i - 1]
-            for s, peak, force, a, _ in states[i:]:
-                if s > seq + 900 or a > 20:
+            last = before
+            for state in states[i:]:
+                if state.step > now.step + 900 or state.age > 20:
                     break
-                self.assertLessEqual(peak, limit, f"{s - seq} ms after a gap that ended at step {seq}")
+                self.assertLessEqual(state.peak, limit, f"{state.step - now.step} ms after a gap that ended at step {now.step}")
                 # steps take 1 ms, and count as 2 ms at most
-                self.assertLessEqual(peak - last, 20.0 * 0.002 * (s - last_seq) + 0.02, f"step {s}")
-                last_seq, last = s, force
+                self.assertLessEqual(state.peak - last.force, 20.0 * 0.002 * (state.step - last.step) + 0.02, f"step {state.step}")
+                last = state
             yield fresh[-1]
 
 

@@ -1,0 +1,252 @@
+#include "tests/server/session/registry_session.h"
+
+namespace tenon::session {
+namespace {
+
+using test::kLeftHand;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class RegistryCommands : public RegistrySession {};
+
+TEST_F(RegistryCommands, AClearedEmergencyStopLeavesTheRunPaused) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  EXPECT_THAT(command(instructor, CommandKind::kClearEmergencyStop).reason, HasSubstr("no emergency stop"));
+  registry_.engageEmergencyStop();
+  EXPECT_TRUE(command(instructor, CommandKind::kClearEmergencyStop).accepted);
+  const auto taken = changes();
+  ASSERT_EQ(taken.size(), 3U);
+  EXPECT_EQ(taken[1].kind, ChangeKind::kPause) << "before the stop ends";
+  EXPECT_EQ(taken[2].kind, ChangeKind::kSetEmergencyStop);
+  EXPECT_EQ(taken[2].value, 0.0);
+  EXPECT_TRUE(command(instructor, CommandKind::kResume).accepted);
+}
+
+TEST_F(RegistryCommands, ARepeatedCommandGetsTheFormerAckAndIsNotAppliedAgain) {
+  const Welcome welcome = join("b", Role::kInstructor);
+  const ClientId instructor = welcome.client;
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const Command pause{instructor, 7, CommandKind::kPause};
+  EXPECT_EQ(registry_.previousAck(pause), nullptr);
+  EXPECT_TRUE(registry_.handleCommand(pause).accepted);
+  registry_.updatePhase(RunPhase::kPaused, false);
+  ASSERT_NE(registry_.previousAck(pause), nullptr);
+  EXPECT_TRUE(registry_.previousAck(pause)->accepted) << "although a new command would be refused now";
+  EXPECT_EQ(registry_.previousAck({instructor, 8, CommandKind::kPause}), nullptr);
+  EXPECT_EQ(registry_.previousAck({ClientId{9}, 7, CommandKind::kPause}), nullptr);
+  registry_.leave(instructor);
+  ASSERT_EQ(join("c", Role::kInstructor, {}, "seat of b").client, instructor);
+  EXPECT_EQ(registry_.previousAck(pause), nullptr) << "a rejoined client numbers its commands anew";
+}
+
+TEST_F(RegistryCommands, CommandsBetweenTwoTicksAreJudgedByThePendingPhase) {
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  registry_.updatePhase(RunPhase::kRunning, false);
+  EXPECT_TRUE(command(instructor, CommandKind::kPause).accepted);
+  registry_.updatePhase(RunPhase::kRunning, false);  // of a tick that was computed before
+  EXPECT_THAT(command(instructor, CommandKind::kPause).reason, HasSubstr("paused already"));
+  EXPECT_TRUE(command(instructor, CommandKind::kResume).accepted);
+  EXPECT_THAT(command(instructor, CommandKind::kResume).reason, HasSubstr("not paused"));
+  registry_.updatePhase(RunPhase::kPaused, false);
+  registry_.updatePhase(RunPhase::kRunning, false);
+  EXPECT_TRUE(command(instructor, CommandKind::kPause).accepted);
+  registry_.updatePhase(RunPhase::kStopped, false);
+  EXPECT_THAT(command(instructor, CommandKind::kResume).reason, HasSubstr("over"));
+}
+
+TEST_F(RegistryCommands, CommandsArePermittedByRole) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId trainee = join("a", Role::kTrainee, {"right"}).client;
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  const ClientId observer = join("c", Role::kObserver).client;
+  const ClientId recorder = join("d", Role::kRecorder).client;
+  (void)changes();
+  EXPECT_EQ(command(ClientId{}, CommandKind::kFulfilled).reason, "join first");
+  EXPECT_THAT(command(observer, CommandKind::kFulfilled).reason, HasSubstr("not permitted for the observer"));
+  EXPECT_THAT(command(recorder, CommandKind::kStop).reason, HasSubstr("not permitted for the recorder"));
+  for (const CommandKind kind : {CommandKind::kPause, CommandKind::kResume, CommandKind::kReset,
+                                 CommandKind::kSkipStep, CommandKind::kStop, CommandKind::kSetCollision}) {
+    EXPECT_THAT(command(trainee, kind, "part bay").reason, HasSubstr("ask the instructor"));
+    registry_.updatePhase(kind == CommandKind::kResume ? RunPhase::kPaused : RunPhase::kRunning, false);
+    EXPECT_TRUE(command(instructor, kind, "part bay").accepted);
+  }
+  EXPECT_EQ(changes().size(), 6U);
+  EXPECT_TRUE(command(trainee, CommandKind::kFulfilled).accepted);
+  EXPECT_THAT(command(instructor, static_cast<CommandKind>(99)).reason, HasSubstr("unknown command"));
+
+  const CommandAck ack = command(instructor, CommandKind::kPause);
+  EXPECT_EQ(ack.client, instructor);
+  EXPECT_EQ(ack.id, commands_) << "the ack carries the id of its command";
+}
+
+TEST_F(RegistryCommands, StepsAreNamedByNameOrNumber) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  (void)changes();
+  for (const std::string text : {"2", "mount"})
+    EXPECT_TRUE(command(instructor, CommandKind::kGoToStep, text).accepted) << text;
+  for (const std::string text : {"0", "3", "mounting", "", "1 ", "-1"})
+    EXPECT_THAT(command(instructor, CommandKind::kGoToStep, text).reason, HasSubstr("no step")) << text;
+  for (const Change& change : changes()) EXPECT_EQ(change.game.signal, 1U);
+}
+
+TEST_F(RegistryCommands, AnObjectIsHandedToAHandThatSomebodyMoves) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  const auto reason = [&](const std::string& text) {
+    return command(instructor, CommandKind::kHandOver, text).reason;
+  };
+  EXPECT_THAT(reason("part right"), HasSubstr("nobody moves hand 'right'"));
+  (void)join("a", Role::kTrainee, {"right"});
+  EXPECT_EQ(reason("part right"), "");
+  EXPECT_THAT(reason("part"), HasSubstr("does not name a hand"));
+  EXPECT_THAT(reason("party right"), HasSubstr("does not name an object"));
+  EXPECT_THAT(reason("bay right"), HasSubstr("nothing that a hand takes"));
+  EXPECT_THAT(reason("pointer right"), HasSubstr("nothing that a hand takes"));
+}
+
+TEST_F(RegistryCommands, ATrackedHandIsHandedNothing) {
+  game_control::ScenarioFile scenario = *loaded_.scenario;
+  scenario.hands[kLeftHand.value].kind = simulation::HandKind::kTracked;
+  SessionRegistry registry(scenario, kEpoch, false);
+  const ClientId instructor = registry
+                                  .join({.client_guid = "b", .role = Role::kInstructor, .seat_key = "seat"},
+                                        {.seat = true, .key = true}, 5)
+                                  .client;
+  registry.updatePhase(RunPhase::kRunning, false);
+  EXPECT_THAT(registry.handleCommand({instructor, 1, CommandKind::kHandOver, {}, "part left"}).reason,
+              HasSubstr("hand 'left' is tracked"));
+}
+
+TEST_F(RegistryCommands, ARefusalHasAKindForDisplays) {
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  const ClientId trainee = join("a", Role::kTrainee).client;
+  EXPECT_EQ(command(instructor, CommandKind::kSkipStep).refusal, Refusal::kWaiting);
+  registry_.updatePhase(RunPhase::kRunning, false);
+  EXPECT_EQ(command(ClientId{}, CommandKind::kSkipStep).refusal, Refusal::kNotJoined);
+  EXPECT_EQ(command(trainee, CommandKind::kSkipStep).refusal, Refusal::kNotPermitted);
+  EXPECT_EQ(command(instructor, CommandKind::kResume).refusal, Refusal::kAlready);
+  EXPECT_EQ(command(instructor, CommandKind::kGoToStep, "nowhere").refusal, Refusal::kUnknownName);
+  EXPECT_EQ(command(instructor, CommandKind::kHandOver, "part right").refusal, Refusal::kNobodyThere);
+  EXPECT_EQ(command(instructor, CommandKind::kHandOver, "bay right").refusal, Refusal::kNotHoldable);
+  EXPECT_EQ(command(instructor, CommandKind::kSkipStep).refusal, Refusal::kNone);
+  registry_.updatePhase(RunPhase::kSucceeded, false);
+  EXPECT_EQ(command(instructor, CommandKind::kSkipStep).refusal, Refusal::kOver);
+}
+
+TEST_F(RegistryCommands, FrozenForcesAreAChange) {
+  const ClientId instructor = join("b", Role::kInstructor).client;
+  (void)changes();
+  EXPECT_TRUE(command(instructor, CommandKind::kFreezeForces, {}, 1.0).accepted) << "in any phase";
+  const auto taken = changes();
+  ASSERT_EQ(taken.size(), 1U);
+  EXPECT_EQ(taken[0].kind, ChangeKind::kFreezeForces);
+  EXPECT_EQ(taken[0].value, 1.0);
+}
+
+TEST_F(RegistryCommands, ANoteChangesNothing) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId trainee = join("a", Role::kTrainee, {"right"}).client;
+  const ClientId observer = join("c", Role::kObserver).client;
+  (void)changes();
+  EXPECT_TRUE(command(trainee, CommandKind::kNote, "slipped twice").accepted);
+  EXPECT_FALSE(command(trainee, CommandKind::kNote, "").accepted);
+  EXPECT_FALSE(command(observer, CommandKind::kNote, "hello").accepted);
+  EXPECT_TRUE(changes().empty());
+}
+
+// it would be in the next checkpoint, which no reader takes
+
+TEST_F(RegistryCommands, ACommandWithAValueThatIsNotFiniteIsRefused) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId instructor = join("a", Role::kInstructor).client;
+  (void)changes();
+  const CommandAck ack = registry_.handleCommand(
+      {.client = instructor, .id = 1, .kind = CommandKind::kSkipStep, .value = std::nan("")});
+  EXPECT_FALSE(ack.accepted);
+  EXPECT_THAT(ack.reason, HasSubstr("not a finite number"));
+  EXPECT_TRUE(changes().empty());
+}
+
+TEST_F(RegistryCommands, NamesInCommandsAreResolvedToIndices) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId instructor = join("a", Role::kInstructor).client;
+  EXPECT_THAT(command(instructor, CommandKind::kSignal, "whistle").reason, HasSubstr("'whistle'"));
+  EXPECT_TRUE(command(instructor, CommandKind::kSignal, "bell").accepted);
+  for (const std::string wrong : {"", "part", "part nothing", "part part", " ", "part  bay"})
+    EXPECT_FALSE(command(instructor, CommandKind::kSetCollision, wrong).accepted) << wrong;
+  EXPECT_TRUE(command(instructor, CommandKind::kSetCollision, "bay part", 0.0).accepted);
+
+  const auto taken = changes();
+  ASSERT_EQ(taken.size(), 2U);
+  EXPECT_EQ(taken[0].kind, ChangeKind::kGameCommand);
+  EXPECT_EQ(taken[0].game.kind, CommandKind::kSignal);
+  EXPECT_EQ(loaded_.scenario->signals[taken[0].game.signal], "bell");
+  EXPECT_EQ(taken[1].kind, ChangeKind::kEnablePair);
+  const game_control::ScenarioPair& pair = loaded_.scenario->pairs[taken[1].index];
+  EXPECT_EQ(pair.a.value + pair.b.value, 1U) << "bay is object 0, part object 1";
+  EXPECT_EQ(taken[1].value, 0.0);
+}
+
+TEST_F(RegistryCommands, AClientReleasesAndSwapsOnlyHandsItControls) {
+  registry_.updatePhase(RunPhase::kRunning, false);
+  const ClientId one = join("a", Role::kTrainee, {"right"}).client;
+  const ClientId other = join("b", Role::kTrainee, {"left"}).client;
+  const ClientId instructor = join("c", Role::kInstructor, {"instructor"}).client;
+  EXPECT_TRUE(command(one, CommandKind::kRelease, {}, 0.0, test::kRightHand).accepted);
+  EXPECT_FALSE(command(other, CommandKind::kRelease, {}, 0.0, test::kRightHand).accepted);
+  EXPECT_TRUE(command(instructor, CommandKind::kRelease, {}, 0.0, test::kRightHand).accepted);
+  EXPECT_FALSE(command(instructor, CommandKind::kRelease, {}, 0.0, HandId{17}).accepted);
+  EXPECT_FALSE(command(one, CommandKind::kSwapHands, {}, kNan).accepted)
+      << "the other hand is controlled by another client";
+  EXPECT_TRUE(command(instructor, CommandKind::kSwapHands).accepted);
+  registry_.leave(other);
+  registry_.leave(one);
+  const ClientId both = join("d", Role::kTrainee, {"right", "left"}).client;
+  EXPECT_TRUE(command(both, CommandKind::kSwapHands).accepted);
+}
+
+TEST_F(RegistryCommands, CommandsThatCannotTakeEffectNowAreRefusedWithAReason) {
+  const ClientId instructor = join("t", Role::kInstructor).client;
+  const auto answer = [&](CommandKind kind) { return command(instructor, kind).reason; };
+  (void)changes();
+  for (const CommandKind kind : {CommandKind::kFulfilled, CommandKind::kPause, CommandKind::kResume,
+                                 CommandKind::kReset, CommandKind::kSkipStep, CommandKind::kSwapHands})
+    EXPECT_THAT(answer(kind), HasSubstr("waits for people"));
+  EXPECT_THAT(command(instructor, CommandKind::kSignal, "bell").reason, HasSubstr("waits for people"));
+  EXPECT_TRUE(changes().empty());
+
+  registry_.updatePhase(RunPhase::kRunning, false);
+  EXPECT_THAT(answer(CommandKind::kResume), HasSubstr("not paused"));
+  EXPECT_THAT(answer(CommandKind::kPause), IsEmpty());
+  registry_.updatePhase(RunPhase::kPaused, false);
+  EXPECT_THAT(answer(CommandKind::kPause), HasSubstr("paused already"));
+  EXPECT_THAT(answer(CommandKind::kResume), IsEmpty());
+  registry_.updatePhase(RunPhase::kSucceeded, false);
+  EXPECT_THAT(answer(CommandKind::kReset), HasSubstr("over"));
+}
+
+TEST_F(RegistryCommands, DeferredCommandsAreLimitedToTheCapacityOfATick) {
+  const ClientId instructor = join("t", Role::kInstructor).client;
+  registry_.updatePhase(RunPhase::kPaused, false);
+  for (std::size_t i = 0; i < kMaxChanges; ++i)
+    EXPECT_TRUE(command(instructor, CommandKind::kFulfilled).accepted) << i;
+  EXPECT_THAT(command(instructor, CommandKind::kFulfilled).reason, HasSubstr("wait already"));
+  EXPECT_TRUE(command(instructor, CommandKind::kResume).accepted);
+  registry_.updatePhase(RunPhase::kRunning, false);
+  EXPECT_TRUE(command(instructor, CommandKind::kFulfilled).accepted);
+}
+
+TEST_F(RegistryCommands, AHandIsReleasedByItsName) {
+  const ClientId instructor = join("t", Role::kInstructor).client;
+  (void)changes();
+  EXPECT_TRUE(command(instructor, CommandKind::kRelease, "left").accepted);
+  const auto taken = changes();
+  ASSERT_EQ(taken.size(), 1U);
+  EXPECT_EQ(taken[0].hand, test::kLeftHand);
+  EXPECT_THAT(command(instructor, CommandKind::kRelease, "third").reason, HasSubstr("no hand 'third'"));
+}
+
+}  // namespace
+}  // namespace tenon::session
