@@ -71,6 +71,9 @@ TEST_F(SiteTest, ServesAssetsByTheirContent) {
   EXPECT_EQ(bodyOf(answer), model);
   EXPECT_EQ(answer.type, "model/gltf-binary");
   EXPECT_TRUE(answer.is_immutable);
+  const Answer part = site.answer("/assets/" + *name, "bytes=5-7");
+  EXPECT_EQ(part.status, 206U);
+  EXPECT_EQ(bodyOf(part), "and");
 
   write(folder_ / "assets" / *name, "glTF and other");  // damaged
   EXPECT_EQ(site.answer("/assets/" + *name).status, 404U);
