@@ -103,6 +103,7 @@ void HapticHand::finish(bool disarms) noexcept {
 void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noexcept {
   if (!(dt > 0.0)) dt = kShortestCycle;
   if (finishing_) finish_time_ += dt;
+  takeScene();
   readDevice();
   answers_.step(seq, local_.hasManifold() ? local_.manifold().answers_seq : 0, dt);
   // a device without forces may rest at the end of its workspace, where indexing would not end

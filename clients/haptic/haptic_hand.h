@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 
@@ -48,7 +49,7 @@ struct HandEvents {
 /// start of the layer ramps the force. So no stretch of position that came about while nobody looked is
 /// displayed, and nothing in the scene jumps; one of rotation stays, and its torque ramps.
 ///
-/// Threads: one; armDevice by another one, beside it. Real-time: step, receive, permitForces.
+/// Threads: one; armDevice and setScene by others, beside it. Real-time: step, receive, permitForces.
 class HapticHand {
  public:
   /// Parameters of workspace and coupling come from the device's capabilities. `device` and `clutch` outlive
@@ -61,14 +62,19 @@ class HapticHand {
   void receive(const HandManifold& manifold) noexcept { local_.receive(manifold); }
   void receive(const Guidance& guidance) noexcept { fixture_.receive(guidance); }
   void receive(const CollisionMatrix& matrix) noexcept {
+    takeScene();
     if (copy_) copy_->receive(matrix);
   }
   /// One cycle of `dt` [s], the time since the last one by the clock of the caller; `seq` numbers the input.
   void step(std::uint32_t seq, const WorldView& world, double dt) noexcept;
-  /// The compiled scene of the server, for the force model `scene copy`. Allocates; not beside step().
+  ~HapticHand() { delete offered_.load(); }
+  HapticHand(const HapticHand&) = delete;
+  HapticHand& operator=(const HapticHand&) = delete;
+
+  /// The compiled scene of the server, for the force model `scene copy`: once. Allocates; by any thread,
+  /// beside step().
   void setScene(const std::shared_ptr<const simulation::Scene>& scene) {
-    model_kind_ = ForceModelKind::kManifold;
-    copy_ = scene ? std::make_unique<SceneCopy>(scene) : nullptr;
+    if (scene) delete offered_.exchange(std::make_unique<SceneCopy>(scene).release());
   }
   /// From the next cycles on; `manifold` at first. A copy of the scene is used as far as there is one, and
   /// once it has contacts. Forces of the two are blended (SwitchSlew).
@@ -130,6 +136,11 @@ class HapticHand {
   /// Decides rendering_ before the models' step, and re-anchors the hand.
   void anchor(std::uint32_t seq, const WorldView& world) noexcept;
   void stepModels(const Pose& X_WH, const WorldView& world) noexcept;
+  /// What setScene() made; a first one only, since to free another would take time.
+  void takeScene() noexcept {
+    if (!copy_ && offered_.load(std::memory_order_relaxed) != nullptr)
+      copy_.reset(offered_.exchange(nullptr));
+  }
   [[nodiscard]] const ForceModel& model() const noexcept {
     if (model_kind_ == ForceModelKind::kSceneCopy) return *copy_;
     return local_;
@@ -146,6 +157,7 @@ class HapticHand {
   Workspace workspace_;
   LocalModel local_;  ///< has the server's newest manifold, whichever model the force is of
   std::unique_ptr<SceneCopy> copy_;
+  std::atomic<SceneCopy*> offered_{nullptr};  ///< owned, until the loop takes it
   Coupling coupling_;
   SwitchSlew switch_slew_;
   VirtualFixture fixture_;

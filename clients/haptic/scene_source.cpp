@@ -36,6 +36,7 @@ wire::FetchProgress reporting(const std::function<void(const std::string&)>& pri
 Result<std::shared_ptr<const simulation::Scene>> openScene(
     const SceneSource& source, std::string_view scene_hash,
     const std::function<void(const std::string&)>& print, const std::atomic<bool>& stop) {
+  if (source.cache.empty()) return fail("this station has no folder for a compiled scene");
   if (!wire::isAssetName(scene_hash)) return fail("the server announces no compiled scene");
   const wire::AssetStore store(source.cache / "assets");
   const auto list = wire::fetchAsset(store, scene_hash, source.url, {}, stop);

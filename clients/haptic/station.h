@@ -105,7 +105,7 @@ class Station {
   void setCycle(double dt) noexcept { dt_ = dt; }
   /// `jitter` [s] of the link, as its contacts have it lately (AnswerAge::setJitter); 0 unless told.
   void setLinkJitter(double jitter) noexcept { link_jitter_ = jitter; }
-  /// The server's compiled scene, for the force model `scene copy` of all hands. Allocates; not beside
+  /// The server's compiled scene, for the force model `scene copy` of all hands: once. Allocates; also beside
   /// step().
   virtual void setScene(const std::shared_ptr<const simulation::Scene>& /*scene*/) {}
   /// HapticHand::setForceModel of all hands.

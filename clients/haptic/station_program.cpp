@@ -105,6 +105,8 @@ class StationRunner {
   [[nodiscard]] Result<void> subscribeToStops();
   [[nodiscard]] Result<void> subscribeToClock();
   [[nodiscard]] Result<void> takeScene(const std::atomic<bool>& stop);
+  void loadScene();
+  void takeLoadedScene();
   void chooseForceModel(double round_trip);
   void sendInputs(const StationOutput& output);
   void sendTelemetry(Telemetry telemetry);
@@ -141,7 +143,9 @@ class StationRunner {
   std::chrono::steady_clock::time_point rejoined_at_{};
   std::optional<StepState> step_;
   std::map<std::uint32_t, CollisionMatrix> matrix_;  // by part
-  bool has_scene_ = false;
+  bool has_scene_ = false, scene_missing_ = false;
+  std::atomic<bool> loading_over_{false};
+  std::shared_future<Result<std::shared_ptr<const simulation::Scene>>> loading_;
   ForceModelChooser model_chooser_;
   std::atomic<ForceModelKind> force_model_{ForceModelKind::kManifold};  // for the servo
 
@@ -249,20 +253,38 @@ void StationRunner::sendTelemetry(Telemetry telemetry) {
   static_cast<void>(link_.send(telemetry));
 }
 
-/// Before the first step. Fails when the copy was asked for and cannot be had.
+/// Before the first step, if the copy was asked for. Fails when it cannot be had.
 Result<void> StationRunner::takeScene(const std::atomic<bool>& stop) {
-  if (options_.force_model == ForceModelWish::kManifold) return {};
+  if (options_.force_model != ForceModelWish::kSceneCopy) return {};
   auto scene = openScene(options_.scene, link_.member().announce().scene_hash, options_.print, stop);
-  if (!scene && options_.force_model == ForceModelWish::kSceneCopy)
-    return fail("--force-model scene-copy: " + scene.error().what);
-  if (!scene) return {};
+  if (!scene) return fail("--force-model scene-copy: " + scene.error().what);
   station_.setScene(*scene);
   has_scene_ = true;
   chooseForceModel(0.0);
   return {};
 }
 
+/// Once, when the link turns out to be long: reads or fetches the scene while the session goes on.
+void StationRunner::loadScene() {
+  if (options_.force_model != ForceModelWish::kAuto || loading_.valid() || has_scene_) return;
+  loading_ = std::async(std::launch::async, [this, hash = link_.member().announce().scene_hash] {
+               return openScene(options_.scene, hash, {}, loading_over_);
+             }).share();
+}
+
+void StationRunner::takeLoadedScene() {
+  if (!loading_.valid() || has_scene_ || scene_missing_) return;
+  if (loading_.wait_for(milliseconds(0)) != std::future_status::ready) return;
+  const auto& scene = loading_.get();
+  scene_missing_ = !scene;
+  if (!scene) return print("no copy of the scene for this long link: " + scene.error().what);
+  station_.setScene(*scene);
+  has_scene_ = true;
+  for (const auto& [part, matrix] : matrix_) matrices_.push(matrix);
+}
+
 void StationRunner::chooseForceModel(double round_trip) {
+  if (round_trip > ForceModelChooser::kLong) loadScene();
   const ForceModelKind kind = model_chooser_.step(round_trip, has_scene_);
   if (kind == force_model_) return;
   force_model_ = kind;
@@ -548,6 +570,7 @@ Result<RunState> StationRunner::runRealTime(const std::atomic<bool>& stop) {
   if (options_.real_time)
     if (const std::string missing = wire::raiseWireThreads(); thread->notGranted().empty()) print(missing);
   auto run = takePart(thread, startServo, stop);
+  loading_over_ = true;
   stopServo(thread, true);
   force_age_.fill(telemetry_.back());
   char silence[64];
@@ -574,6 +597,7 @@ Result<RunState> StationRunner::takePart(std::optional<threads::CyclicThread>& t
         start_servo();
       }
     }
+    takeLoadedScene();
     if (output_.update()) send(output_.value());
     sendEvents();
     if (ClockSync request; link_clock_.ask(link_.welcome().client, nowNs(), request))

@@ -24,8 +24,11 @@ constexpr std::size_t kMaxText = 255;  // [bytes]
 
 // what a scenario may have, and more than any has
 constexpr std::uint32_t kMostObjects = 100'000, kMostPairs = 1'000'000, kMostHands = 64;
-constexpr double kFarthest = 1e3;   // [m]
-constexpr double kMaxNumber = 1e9;  // [SI] of stiffness, mass, damping, gravity
+constexpr double kFarthest = 1e3;        // [m]
+constexpr double kMostGravity = 100.0;   // [m/s^2]
+constexpr double kMostDamping = 100.0;   // [1/s]
+constexpr double kLeastInertia = 1e-15;  // [kg m^2]
+constexpr double kMaxNumber = 1e9;       // [SI] of stiffness, mass
 
 std::size_t aligned(std::size_t offset) { return (offset + kAlignment - 1) / kAlignment * kAlignment; }
 
@@ -129,7 +132,8 @@ bool isPlacement(const Pose& X) {
 bool isInertia(const Matrix3& inertia) {
   if (!inertia.allFinite() || inertia != inertia.transpose()) return false;
   const Eigen::LLT<Matrix3> root(inertia);
-  return root.info() == Eigen::Success && inertia.cwiseAbs().maxCoeff() <= kMaxNumber;
+  return root.info() == Eigen::Success && inertia.diagonal().minCoeff() >= kLeastInertia &&
+         inertia.cwiseAbs().maxCoeff() <= kMaxNumber;
 }
 
 /// Reads part by part; problem() is what is wrong with the last one, or null.
@@ -142,7 +146,7 @@ class SceneReader {
     if (auto structures = readStructures(); !structures) return fail(structures.error().what);
     auto scene = std::make_shared<Scene>();
     in_.get(scene->gravity_W);
-    if (!isSmall(scene->gravity_W, kMaxNumber)) return refused("its gravity is no acceleration");
+    if (!isSmall(scene->gravity_W, kMostGravity)) return refused("its gravity is no acceleration");
     if (!readList(scene->objects, kMostObjects)) return refused("one of its objects is not valid");
     objects_ = scene->objects.size();
     if (!readList(scene->pairs, kMostPairs)) return refused("one of its pairs is not valid");
@@ -235,7 +239,7 @@ class SceneReader {
     in_.get(body.damping);
     in_.get(body.friction);
     return inRange(body.mass, 1e-9, kMaxNumber) && isSmall(body.p_OC_O, kFarthest) &&
-           isInertia(body.inertia_C_O) && inRange(body.damping, 0.0, kMaxNumber) &&
+           isInertia(body.inertia_C_O) && inRange(body.damping, 0.0, kMostDamping) &&
            inRange(body.friction, 0.0, kMaxNumber);
   }
 
