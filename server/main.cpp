@@ -236,7 +236,7 @@ int serve(ServeArguments& arguments) {
   arguments.session.print = printLine;
   arguments.session.detail = arguments.load.detail;
   // a session without pictures is a session
-  const auto models = tenon::session::storeDisplayModels(*loaded->scenario, arguments.load);
+  const auto models = tenon::session::storeAssets(*loaded, arguments.load);
   if (models) arguments.session.scene_hash = *models;
   if (!models) printLine("the console will show boxes instead of parts: " + models.error().what);
   arguments.session.resume = resumes;

@@ -46,7 +46,9 @@ ROOMS = {
     "devices": ("tenon::devices", ["idl/types", "idl/threads", "devices/simulated", "devices/drivers"], []),
     "devices/simulated": ("tenon::devices", ["idl/types", "idl/threads", "devices"], []),
     "devices/drivers": ("tenon::devices", ["idl/types", "idl/threads", "devices"], ["POSIX"]),
-    "clients/haptic": ("tenon::haptic", IDL + ["devices", "server/structures", "server/collision"], ["POSIX"]),
+    # a station's copy of the scene is the server's own simulation
+    "clients/haptic": ("tenon::haptic", IDL + ["devices", "server/structures", "server/collision", "server/simulation"],
+                       ["POSIX"]),
     "clients/simulated_person": ("tenon::simulated_person", STATION, []),
     "clients/station": ("tenon::station", STATION + ["devices/simulated", "clients/simulated_person"], ["fmt", "CLI11", "POSIX"]),
     "clients/observer": ("tenon::observer", IDL, ["fmt", "CLI11", "JSON"]),

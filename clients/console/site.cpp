@@ -58,12 +58,12 @@ std::string_view typeOfAsset(const std::vector<std::uint8_t>& bytes) {
 Answer partOf(const fs::path& file, std::string_view range) {
   std::error_code error;
   const std::uint64_t size = fs::file_size(file, error);
-  if (error) return text(404, "text/plain; charset=utf-8", "the recording is gone\n");
+  if (error) return text(404, "text/plain; charset=utf-8", "there is no such file\n");
   Answer answer{206, "application/octet-stream", false, {}, {{"Accept-Ranges", "bytes"}}};
   const bool is_whole = range.empty() && size > 0;
   if (is_whole && size > kMaxRange)
     return text(400, "text/plain; charset=utf-8",
-                "the recording is large: ask for ranges of at most 64 MiB, as `curl -r 0-67108863`\n");
+                "the file is large: ask for ranges of at most 64 MiB, as `curl -r 0-67108863`\n");
   const auto part = is_whole ? std::optional(std::pair<std::uint64_t, std::uint64_t>(0, size - 1))
                              : parseRange(range, size);
   if (!part || part->second - part->first >= kMaxRange) {
@@ -75,7 +75,7 @@ Answer partOf(const fs::path& file, std::string_view range) {
   std::ifstream in(file, std::ios::binary);
   in.seekg(static_cast<std::streamoff>(part->first));
   in.read(reinterpret_cast<char*>(answer.body.data()), static_cast<std::streamsize>(answer.body.size()));
-  if (!in) return text(404, "text/plain; charset=utf-8", "the recording cannot be read there\n");
+  if (!in) return text(404, "text/plain; charset=utf-8", "the file cannot be read there\n");
   if (is_whole) {
     answer.status = 200;
     return answer;
@@ -100,8 +100,8 @@ std::optional<std::pair<std::uint64_t, std::uint64_t>> parseRange(std::string_vi
     return error == std::errc() && end == digits.data() + digits.size() && !digits.empty();
   };
   if (!isNumber(range.substr(0, dash), first) || !isNumber(range.substr(dash + 1), last)) return std::nullopt;
-  if (first > last || last >= size) return std::nullopt;
-  return std::pair(first, last);
+  if (first > last || first >= size) return std::nullopt;
+  return std::pair(first, std::min(last, size - 1));
 }
 
 std::string roomOf(std::string_view target) {
@@ -150,7 +150,10 @@ Answer Site::answer(std::string_view target, std::string_view range) const {
   const std::string_view path = target.substr(0, target.find_first_of("?#"));
   if (path == kRecording && !recording_.empty()) return partOf(recording_, range);
   if (path.starts_with(kAssets)) {
-    auto bytes = assets_.get(path.substr(kAssets.size()));
+    const std::string_view name = path.substr(kAssets.size());
+    // who asks for parts checks the whole
+    if (!range.empty() && assets_.has(name)) return partOf(assets_.fileOf(name), range);
+    auto bytes = assets_.get(name);
     if (!bytes) return text(404, "text/plain; charset=utf-8", "there is no such asset\n");
     const std::string_view type = typeOfAsset(*bytes);
     return {200, std::string(type), true, std::move(*bytes), {}};

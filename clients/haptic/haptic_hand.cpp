@@ -103,6 +103,7 @@ void HapticHand::finish(bool disarms) noexcept {
 void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noexcept {
   if (!(dt > 0.0)) dt = kShortestCycle;
   if (finishing_) finish_time_ += dt;
+  takeScene();
   readDevice();
   answers_.step(seq, local_.hasManifold() ? local_.manifold().answers_seq : 0, dt);
   moveWorkspace(dt);
@@ -110,14 +111,30 @@ void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noex
   const Pose X_WH = workspace_.toWorld(device_state_.X_DH);
   const Twist V_WH{device_state_.V_DH.linear + workspace_.velocity(), device_state_.V_DH.angular};
 
-  const LocalProxy& proxy = local_.step(X_WH, world);
-  in_contact_ = proxy.touching || (local_.hasManifold() && serverSeesContact(local_.manifold()));
+  stepModels(X_WH, world);
+  in_contact_ = model().proxy().touching || (local_.hasManifold() && serverSeesContact(local_.manifold()));
   devices::DeviceCommand command = safety_.step(request(X_WH, dt), device_state_, dt);
   if (finished()) command.F_Ho_D = {};  // of the workspace's wall too
   writeDevice(command);
   state_.F_Ho_W = command.F_Ho_D;
   updateOutputs(seq, world, V_WH);
   updateEvents();
+  // the device has its force: what the next cycle renders may take the rest of this one
+  if (copy_ && wanted_model_ == ForceModelKind::kSceneCopy && local_.hasManifold())
+    copy_->compute(local_.manifold(), seq, X_WH, V_WH, world, rendering_ == Rendering::kOn);
+}
+
+void HapticHand::stepModels(const Pose& X_WH, const WorldView& world) noexcept {
+  local_.step(X_WH, world);
+  const bool use_copy =
+      copy_ && wanted_model_ == ForceModelKind::kSceneCopy && rendering_ == Rendering::kOn && copy_->ready();
+  if (use_copy) copy_->step(X_WH, world);
+  const ForceModelKind kind = use_copy ? ForceModelKind::kSceneCopy : ForceModelKind::kManifold;
+  if (kind == model_kind_) return;
+  model_kind_ = kind;
+  beyond_count_ = model().beyondValidity();
+  coupling_.reset();
+  switch_slew_.begin();
 }
 
 void HapticHand::readDevice() noexcept {
@@ -150,7 +167,8 @@ bool HapticHand::deadManHeld() const noexcept {
 void HapticHand::anchor(std::uint32_t seq, const WorldView& world) noexcept {
   const bool usable = answers_.excess() <= safety_.limits().fade_from && permitted_ && safety_.forcesOn() &&
                       local_.usable(world);
-  if (!usable || (local_.jumped() && rendering_ == Rendering::kOn)) rendering_ = Rendering::kInterrupted;
+  const bool jumped = local_.jumped() || model().jumped();
+  if (!usable || (jumped && rendering_ == Rendering::kOn)) rendering_ = Rendering::kInterrupted;
   if (!usable || rendering_ == Rendering::kOn) return;
 
   const Pose X_WH = workspace_.toWorld(device_state_.X_DH);
@@ -165,12 +183,12 @@ void HapticHand::anchor(std::uint32_t seq, const WorldView& world) noexcept {
 }
 
 devices::SafetyRequest HapticHand::request(const Pose& X_WH, double dt) noexcept {
-  const LocalProxy& proxy = local_.proxy();
+  const LocalProxy& proxy = model().proxy();
   const double excess = answers_.excess();
   devices::SafetyRequest request;
   // springs in parallel
-  request.requested.F_Ho_D =
-      coupling_.step(proxy, X_WH, dt) + fixture_.step(X_WH, dt, rendering_ == Rendering::kOn && !finishing_);
+  const Wrench F_Ho_W = switch_slew_.step(coupling_.step(proxy, X_WH, dt), dt);
+  request.requested.F_Ho_D = F_Ho_W + fixture_.step(X_WH, dt, rendering_ == Rendering::kOn && !finishing_);
   request.stiffness = coupling_.stiffness() + fixture_.stiffness();
   request.rotational_stiffness = coupling_.rotationalStiffness() + fixture_.rotationalStiffness();
   // without contacts to render there is no force that could be old
@@ -179,14 +197,17 @@ devices::SafetyRequest HapticHand::request(const Pose& X_WH, double dt) noexcept
   request.restart =
       finishing_ || (rendering_ != Rendering::kOn && (!proxy.active || excess <= safety_.limits().fade_from));
   request.dead_man_held = deadManHeld();
-  if (request.restart || !request.dead_man_held || !safety_.forcesOn()) fixture_.restart();
+  if (request.restart || !request.dead_man_held || !safety_.forcesOn()) {
+    fixture_.restart();
+    switch_slew_.reset();
+  }
   request.emergency_stop = !permitted_;
   return request;
 }
 
 void HapticHand::writeDevice(const devices::DeviceCommand& command) noexcept {
   if (handover_.pending()) return;
-  const LocalProxy& proxy = local_.proxy();
+  const LocalProxy& proxy = model().proxy();
   device_.show({proxy.active, in_contact_, workspace_.toDevice(proxy.X_WS), workspace_.toDevice(proxy.X_WO),
                 workspace_.centre(), local_.hasManifold() ? local_.manifold().object : ObjectId{}});
   device_.write(command);  // a stop brakes before the forces are off
@@ -203,7 +224,7 @@ void HapticHand::keepSample(std::uint32_t seq) noexcept {
 }
 
 void HapticHand::updateOutputs(std::uint32_t seq, const WorldView& world, const Twist& V_WH) noexcept {
-  const LocalProxy& proxy = local_.proxy();
+  const LocalProxy& proxy = model().proxy();
   keepSample(seq);
   input_.sample = {seq, workspace_.toWorld(device_state_.X_DH), V_WH, device_state_.buttons};
   input_.server_epoch = world.serverEpoch();
@@ -234,8 +255,8 @@ void HapticHand::updateEvents() noexcept {
   events_.indexing_began = workspace_.moving() && !state_.indexing;
   events_.indexing_ended = !workspace_.moving() && state_.indexing;
   state_.indexing = workspace_.moving();
-  const bool beyond = local_.beyondValidity() != beyond_count_;
-  beyond_count_ = local_.beyondValidity();
+  const bool beyond = model().beyondValidity() != beyond_count_;
+  beyond_count_ = model().beyondValidity();
   events_.beyond_validity_began = beyond && !beyond_validity_;
   beyond_validity_ = beyond;
   const bool stale = local_.hasManifold() && answers_.excess() > safety_.limits().fade_from;

@@ -1,11 +1,16 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
+#include <memory>
 
 #include "clients/haptic/answer_age.h"
 #include "clients/haptic/coupling.h"
 #include "clients/haptic/device_handover.h"
+#include "clients/haptic/force_model.h"
 #include "clients/haptic/local_model.h"
+#include "clients/haptic/scene_copy.h"
+#include "clients/haptic/switch_slew.h"
 #include "clients/haptic/virtual_fixture.h"
 #include "clients/haptic/workspace.h"
 #include "devices/device.h"
@@ -31,8 +36,9 @@ struct HandEvents {
   bool guidance_ended = false;
 };
 
-/// Haptic loop of one hand at 1 kHz: read device, indexing, local model, virtual coupling, safety layer,
-/// write device. Also composes the messages to the server (input) and to the other participants (state).
+/// Haptic loop of one hand at 1 kHz: read device, indexing, force model, virtual coupling, safety layer,
+/// write device; then what the force model computes for the next cycle. Also composes the messages to the
+/// server (input) and to the other participants (state).
 ///
 /// Every force passes the safety layer (devices/safety.h), that of a virtual fixture together with that of
 /// the contacts, and only while these are rendered.
@@ -46,7 +52,7 @@ struct HandEvents {
 /// While the person holds a button that de-clutches (DeviceCaps::declutch) the hand keeps its place in the
 /// scene and the device moves alone, without force; its release ends a gap.
 ///
-/// Threads: one; armDevice by another one, beside it. Real-time: step, receive, permitForces.
+/// Threads: one; armDevice and setScene by others, beside it. Real-time: step, receive, permitForces.
 class HapticHand {
  public:
   /// Parameters of workspace and coupling come from the device's capabilities. `device` and `clutch` outlive
@@ -58,10 +64,32 @@ class HapticHand {
   Result<void> begin(HandId hand, ClientId client, const Vector3& p_WH, bool armed);
   void receive(const HandManifold& manifold) noexcept { local_.receive(manifold); }
   void receive(const Guidance& guidance) noexcept { fixture_.receive(guidance); }
+  void receive(const CollisionMatrix& matrix) noexcept {
+    takeScene();
+    if (copy_) copy_->receive(matrix);
+  }
   /// One cycle of `dt` [s], the time since the last one by the clock of the caller; `seq` numbers the input.
   void step(std::uint32_t seq, const WorldView& world, double dt) noexcept;
+  ~HapticHand() { delete offered_.load(); }
+  HapticHand(const HapticHand&) = delete;
+  HapticHand& operator=(const HapticHand&) = delete;
+
+  /// The compiled scene of the server, for the force model `scene copy`: once. Allocates; by any thread,
+  /// beside step().
+  void setScene(const std::shared_ptr<const simulation::Scene>& scene) {
+    if (scene) delete offered_.exchange(std::make_unique<SceneCopy>(scene).release());
+  }
+  /// From the next cycles on; `manifold` at first. A copy of the scene is used as far as there is one, and
+  /// once it has contacts. Forces of the two are blended (SwitchSlew).
+  void setForceModel(ForceModelKind kind) noexcept { wanted_model_ = kind; }
+  /// That the force is of now.
+  [[nodiscard]] ForceModelKind forceModel() const noexcept { return model_kind_; }
   /// `jitter` [s]: AnswerAge::setJitter.
   void setLinkJitter(double jitter) noexcept { answers_.setJitter(jitter); }
+  /// SceneCopy::setPlayout of the hand's copy.
+  void setLinkPlayout(std::uint32_t ticks) noexcept {
+    if (copy_) copy_->setPlayout(ticks);
+  }
   /// False: forces off, brake on, input inactive. True, for the person at the device, also of a device in
   /// fault: resets the safety layer, and asks for armDevice() if the device is not armed. See Arming, which
   /// decides it.
@@ -110,8 +138,18 @@ class HapticHand {
   void readDevice() noexcept;
   /// `dt` [s].
   void moveWorkspace(double dt) noexcept;
-  /// Decides rendering_ before the local model's step, and re-anchors the hand.
+  /// Decides rendering_ before the models' step, and re-anchors the hand.
   void anchor(std::uint32_t seq, const WorldView& world) noexcept;
+  void stepModels(const Pose& X_WH, const WorldView& world) noexcept;
+  /// What setScene() made; a first one only, since to free another would take time.
+  void takeScene() noexcept {
+    if (!copy_ && offered_.load(std::memory_order_relaxed) != nullptr)
+      copy_.reset(offered_.exchange(nullptr));
+  }
+  [[nodiscard]] const ForceModel& model() const noexcept {
+    if (model_kind_ == ForceModelKind::kSceneCopy) return *copy_;
+    return local_;
+  }
   /// `dt` [s].
   [[nodiscard]] devices::SafetyRequest request(const Pose& X_WH, double dt) noexcept;
   void writeDevice(const devices::DeviceCommand& command) noexcept;
@@ -122,8 +160,11 @@ class HapticHand {
 
   devices::HapticDevice& device_;
   Workspace workspace_;
-  LocalModel local_;
+  LocalModel local_;  ///< has the server's newest manifold, whichever model the force is of
+  std::unique_ptr<SceneCopy> copy_;
+  std::atomic<SceneCopy*> offered_{nullptr};  ///< owned, until the loop takes it
   Coupling coupling_;
+  SwitchSlew switch_slew_;
   VirtualFixture fixture_;
   devices::Safety safety_;
   AnswerAge answers_;
@@ -134,7 +175,9 @@ class HapticHand {
   DeviceInput input_;
   HandState state_;
   HandEvents events_;
-  std::uint64_t beyond_count_ = 0;  // of LocalModel::beyondValidity() at the last step
+  ForceModelKind wanted_model_ = ForceModelKind::kManifold;
+  ForceModelKind model_kind_ = ForceModelKind::kManifold;
+  std::uint64_t beyond_count_ = 0;  // of ForceModel::beyondValidity() at the last step
   bool fault_ = false;
   bool beyond_validity_ = false;
   bool stale_ = false;

@@ -2,26 +2,15 @@
 
 #include <cstdint>
 
+#include "clients/haptic/force_model.h"
 #include "clients/haptic/world_view.h"
 #include "idl/types/messages/contacts.h"
 #include "server/collision/motion_solver.h"
 
 namespace tenon::haptic {
 
-/// Result of one step of the local model.
-struct LocalProxy {
-  bool active = false;  ///< the manifold is usable; otherwise the force is zero
-  /// Since the last step a body jumped, the object changed or `active` ended: the force has to start from
-  /// zero.
-  bool discontinuous = false;
-  bool touching = false;              ///< a contact constraint is active
-  Pose X_WO;                          ///< the object, kept out of all contact half-spaces
-  Pose X_WS;                          ///< proxy pose S of the hand
-  double stiffness = 0.0;             ///< [N/m]
-  double rotational_stiffness = 0.0;  ///< [Nm/rad] likewise
-};
-
-/// Local model of one hand: haptic rendering at 1 kHz between two manifolds of the server (ARCHITECTURE.md).
+/// The force model `manifold` of one hand: haptic rendering at 1 kHz between two manifolds of the server
+/// (ARCHITECTURE.md).
 ///
 /// The manifold lists contact half-spaces fixed in the other bodies. Each step places them at the last
 /// received poses of these bodies and moves the hand's object as near to the device pose as they permit: the
@@ -33,7 +22,7 @@ struct LocalProxy {
 /// people feel each other. The spring of a hand that has released the object fades out within 20 ticks.
 ///
 /// Threads: one. Real-time: everything but the constructor.
-class LocalModel {
+class LocalModel final : public ForceModel {
  public:
   LocalModel();
 
@@ -43,20 +32,20 @@ class LocalModel {
   /// has jumped since.
   [[nodiscard]] bool usable(const WorldView& world) const noexcept;
   /// The newest manifold is not a continuation of the one before: another object, or a jump of a body.
-  [[nodiscard]] bool jumped() const noexcept { return jumped_; }
+  [[nodiscard]] bool jumped() const noexcept override { return jumped_; }
   /// The next step begins at the server's proxy.
   void restart() noexcept { jumped_ = true; }
   /// Server's proxy pose of the hand. Precondition: hasManifold().
   [[nodiscard]] Pose serverProxy() const noexcept { return manifold_.X_WO * manifold_.X_HO.inverse(); }
   /// One cycle with the device at X_WH.
-  const LocalProxy& step(const Pose& X_WH, const WorldView& world) noexcept;
+  const LocalProxy& step(const Pose& X_WH, const WorldView& world) noexcept override;
 
   [[nodiscard]] const HandManifold& manifold() const noexcept { return manifold_; }
   [[nodiscard]] bool hasManifold() const noexcept { return has_manifold_; }
-  [[nodiscard]] const LocalProxy& proxy() const noexcept { return proxy_; }
+  [[nodiscard]] const LocalProxy& proxy() const noexcept override { return proxy_; }
   /// [ticks] so far ahead of the contact set: the object had left the region for which the manifold lists all
   /// contacts. Manifolds do not tell its size: its points are taken to be within 0.1 m of its origin.
-  [[nodiscard]] std::uint64_t beyondValidity() const noexcept { return beyond_validity_; }
+  [[nodiscard]] std::uint64_t beyondValidity() const noexcept override { return beyond_validity_; }
 
  private:
   /// Spring of another hand on the same object.

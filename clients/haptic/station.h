@@ -2,12 +2,14 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "clients/haptic/arming.h"
+#include "clients/haptic/force_model.h"
 #include "clients/haptic/world_view.h"
 #include "devices/device.h"
 #include "idl/types/fixed_vector.h"
@@ -18,6 +20,10 @@
 #include "idl/types/messages/session.h"
 #include "idl/types/messages/steps.h"
 #include "idl/types/result.h"
+
+namespace tenon::simulation {
+struct Scene;
+}
 
 namespace tenon::haptic {
 
@@ -60,7 +66,8 @@ struct StationEvent {
 /// millisecond and sends inputs() and states(); over DDS in real time, in lockstep, or in one process on a
 /// virtual clock. Deterministic: equal messages and seeds give bit-equal outputs.
 ///
-/// Threads: one. Real-time: receive of WorldFrame, HandManifold and Guidance, step, finish.
+/// Threads: one. Real-time: receive of WorldFrame, HandManifold, Guidance and CollisionMatrix,
+/// step, setForceModel, finish.
 class Station {
  public:
   Station() = default;
@@ -84,6 +91,8 @@ class Station {
   /// Likewise.
   bool receive(const Guidance& guidance) noexcept;
   void receive(const StepState& step);
+  /// For the force model `scene copy` of all hands.
+  virtual void receive(const CollisionMatrix& /*matrix*/) noexcept {}
   void receive(const StopSignal& stop) noexcept;
   /// The person at this station arms it, or agrees that an emergency stop ends (Arming).
   void press() noexcept;
@@ -96,6 +105,14 @@ class Station {
   void setCycle(double dt) noexcept { dt_ = dt; }
   /// `jitter` [s] of the link, as its contacts have it lately (AnswerAge::setJitter); 0 unless told.
   void setLinkJitter(double jitter) noexcept { link_jitter_ = jitter; }
+  /// The server's compiled scene, for the force model `scene copy` of all hands: once. Allocates; also beside
+  /// step().
+  virtual void setScene(const std::shared_ptr<const simulation::Scene>& /*scene*/) {}
+  /// HapticHand::setForceModel of all hands.
+  virtual void setForceModel(ForceModelKind /*kind*/) noexcept {}
+  /// `ticks` for which the server keeps inputs of this station back (LinkChoice::playout_ticks); 0 unless
+  /// told.
+  void setLinkPlayout(std::uint32_t ticks) noexcept { link_playout_ = ticks; }
   /// Whether there is something for armDevices() to do.
   [[nodiscard]] virtual bool wantsArming() const noexcept { return false; }
   /// Resets and arms the devices, if the person has pressed for it. It may block and make texts, so it has a
@@ -148,8 +165,9 @@ class Station {
   WorldView world_;
   ClientId client_;
   std::uint32_t seq_ = 0;
-  double dt_ = kTickSeconds;  ///< [s] see setCycle()
-  double link_jitter_ = 0.0;  ///< [s]
+  double dt_ = kTickSeconds;        ///< [s] see setCycle()
+  double link_jitter_ = 0.0;        ///< [s]
+  std::uint32_t link_playout_ = 0;  ///< [ticks]
   FixedVector<DeviceInput, kMaxStationHands> inputs_;
   FixedVector<HandState, kMaxStationHands> states_;
 

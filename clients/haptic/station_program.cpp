@@ -81,11 +81,12 @@ bool returnPressed() {
 class StationRunner {
  public:
   StationRunner(Station& station, StationLink& link, const StationProgramOptions& options)
-      : station_(station), link_(link), options_(options) {}
+      : station_(station), link_(link), options_(options), model_chooser_(options.force_model) {}
 
   Result<RunState> run(const std::atomic<bool>& stop) {
     if (auto subscribed = subscribe(); !subscribed) return fail(subscribed.error().what);
     if (auto matched = link_.awaitMatch(stop); !matched) return fail(matched.error().what);
+    if (auto taken = takeScene(stop); !taken) return fail(taken.error().what);
     station_.welcome(link_.welcome(), link_.objects());
     return lockstep_ ? runLockstep(stop) : runRealTime(stop);
   }
@@ -103,6 +104,10 @@ class StationRunner {
   void printStep(const StepState& step);
   [[nodiscard]] Result<void> subscribeToStops();
   [[nodiscard]] Result<void> subscribeToClock();
+  [[nodiscard]] Result<void> takeScene(const std::atomic<bool>& stop);
+  void loadScene();
+  void takeLoadedScene();
+  void chooseForceModel(double round_trip);
   void sendInputs(const StationOutput& output);
   void sendTelemetry(Telemetry telemetry);
   void passStops();
@@ -137,6 +142,12 @@ class StationRunner {
   int rejoins_ = 0;
   std::chrono::steady_clock::time_point rejoined_at_{};
   std::optional<StepState> step_;
+  std::map<std::uint32_t, CollisionMatrix> matrix_;  // by part
+  bool has_scene_ = false, scene_missing_ = false;
+  std::atomic<bool> loading_over_{false};
+  std::shared_future<Result<std::shared_ptr<const simulation::Scene>>> loading_;
+  ForceModelChooser model_chooser_;
+  std::atomic<ForceModelKind> force_model_{ForceModelKind::kManifold};  // for the servo
 
   // received parts of the newest tick, in lockstep
   Tick frame_tick_ = 0;
@@ -151,16 +162,17 @@ class StationRunner {
   threads::SpscQueue<HandManifold> manifolds_{128};
   threads::SpscQueue<Guidance> guidances_{64};
   threads::SpscQueue<StepState> steps_{16};
+  threads::SpscQueue<CollisionMatrix> matrices_{16};
   threads::Latest<StopSignal> stop_;
   threads::SpscQueue<bool> presses_{16};
   threads::SpscQueue<StationEvent> events_{256};
   threads::Latest<StationOutput> output_;
   threads::Latest<Telemetry> telemetry_;
-  StopTruth stops_;                       // of the wire thread
-  LinkClock link_clock_;                  // of the wire thread
-  LimitChooser limits_;                   // likewise
-  std::uint32_t playout_ticks_ = 0;       // likewise; LinkChoice::playout_ticks
-  std::atomic<double> link_jitter_{0.0};  // [s] for the servo
+  StopTruth stops_;                              // of the wire thread
+  LinkClock link_clock_;                         // of the wire thread
+  LimitChooser limits_;                          // likewise
+  std::atomic<std::uint32_t> playout_ticks_{0};  // LinkChoice::playout_ticks
+  std::atomic<double> link_jitter_{0.0};         // [s] for the servo
   ForceAgeStatistics force_age_;
   std::uint32_t seq_ = 0;
   std::int64_t last_cycle_ = 0;  // [ns]
@@ -205,6 +217,13 @@ Result<void> StationRunner::subscribe() {
       steps_.push(*step_);
     });
   }
+  if (all) {
+    all = inbox.on<CollisionMatrix>(session, wire::kCollisionMatrix, [this](const CollisionMatrix& matrix) {
+      matrix_[matrix.part] = matrix;
+      if (lockstep_) return station_.receive(matrix);
+      matrices_.push(matrix);
+    });
+  }
   if (all) all = subscribeToStops();
   if (all && !lockstep_) all = subscribeToClock();
   if (all) all = inbox.on<RunState>(session, wire::kRunState, [this](const RunState& run) { run_ = run; });
@@ -228,9 +247,53 @@ void StationRunner::sendTelemetry(Telemetry telemetry) {
                                           .age_jitter = telemetry.jitter,
                                           .inputs_lost = telemetry.inputs_lost});
   telemetry.limits = choice.limits;
-  telemetry.playout_ticks = playout_ticks_ = choice.playout_ticks;
+  playout_ticks_ = telemetry.playout_ticks = choice.playout_ticks;
   link_jitter_ = choice.jitter;
+  chooseForceModel(telemetry.clock_known ? telemetry.round_trip : 0.0);
   static_cast<void>(link_.send(telemetry));
+}
+
+/// Before the first step, if the copy was asked for. Fails when it cannot be had.
+Result<void> StationRunner::takeScene(const std::atomic<bool>& stop) {
+  if (options_.force_model != ForceModelWish::kSceneCopy) return {};
+  auto scene = openScene(options_.scene, link_.member().announce().scene_hash, options_.print, stop);
+  if (!scene) return fail("--force-model scene-copy: " + scene.error().what);
+  station_.setScene(*scene);
+  has_scene_ = true;
+  chooseForceModel(0.0);
+  return {};
+}
+
+/// Once, when the link turns out to be long: reads or fetches the scene while the session goes on.
+void StationRunner::loadScene() {
+  if (options_.force_model != ForceModelWish::kAuto || loading_.valid() || has_scene_) return;
+  loading_ = std::async(std::launch::async, [this, hash = link_.member().announce().scene_hash] {
+               return openScene(options_.scene, hash, {}, loading_over_);
+             }).share();
+}
+
+void StationRunner::takeLoadedScene() {
+  if (!loading_.valid() || has_scene_ || scene_missing_) return;
+  if (loading_.wait_for(milliseconds(0)) != std::future_status::ready) return;
+  const auto& scene = loading_.get();
+  scene_missing_ = !scene;
+  if (!scene) return print("no copy of the scene for this long link: " + scene.error().what);
+  station_.setScene(*scene);
+  has_scene_ = true;
+  for (const auto& [part, matrix] : matrix_) matrices_.push(matrix);
+}
+
+void StationRunner::chooseForceModel(double round_trip) {
+  if (round_trip > ForceModelChooser::kLong) loadScene();
+  const ForceModelKind kind = model_chooser_.step(round_trip, has_scene_);
+  if (kind == force_model_) return;
+  force_model_ = kind;
+  if (lockstep_) station_.setForceModel(kind);
+  const std::string text = kind == ForceModelKind::kSceneCopy
+                               ? "forces from this station's copy of the scene"
+                               : "forces from the contacts that the server lists";
+  print(text);
+  static_cast<void>(link_.send(ClientEvent{link_.welcome().client, ++event_seq_, 0, "station", text}));
 }
 
 /// Raises are heard from anybody, without a server too; clears from the server of this station alone.
@@ -322,7 +385,7 @@ void StationRunner::notePeaks(const StationOutput& output) noexcept {
 /// With as many earlier samples as the link may lose.
 void StationRunner::sendInputs(const StationOutput& output) {
   for (DeviceInput input : output.inputs) {
-    input.earlier.resize(std::min<std::size_t>(input.earlier.size(), playout_ticks_));
+    input.earlier.resize(std::min<std::size_t>(input.earlier.size(), playout_ticks_.load()));
     static_cast<void>(link_.send(input));
   }
 }
@@ -403,6 +466,7 @@ void StationRunner::restartStation() {
   if (arming_.valid()) arming_.wait();
   station_.welcome(link_.welcome(), link_.objects());
   if (step_) station_.receive(*step_);
+  for (const auto& [part, matrix] : matrix_) station_.receive(matrix);
 }
 
 Result<RunState> StationRunner::runLockstep(const std::atomic<bool>& stop) {
@@ -462,6 +526,8 @@ void StationRunner::servo() noexcept {
     station_.receive(*step);
     steps_.pop();
   }
+  for (; matrices_.front() != nullptr; matrices_.pop()) station_.receive(*matrices_.front());
+  station_.setForceModel(force_model_);
   if (stop_.update()) station_.receive(stop_.value());
   const Finish finish = finish_;
   if (finish == Finish::kRest || finish == Finish::kDisarm) station_.finish(finish == Finish::kDisarm);
@@ -469,6 +535,7 @@ void StationRunner::servo() noexcept {
   if (last_cycle_ != 0) station_.setCycle(static_cast<double>(now - last_cycle_) * 1e-9);
   last_cycle_ = now;
   station_.setLinkJitter(link_jitter_);
+  station_.setLinkPlayout(playout_ticks_);
   station_.step(++seq_);
   if (finish == Finish::kRest || finish == Finish::kDisarm) {
     Finish asked = finish;
@@ -505,6 +572,7 @@ Result<RunState> StationRunner::runRealTime(const std::atomic<bool>& stop) {
   if (options_.real_time)
     if (const std::string missing = wire::raiseWireThreads(); thread->notGranted().empty()) print(missing);
   auto run = takePart(thread, startServo, stop);
+  loading_over_ = true;
   stopServo(thread, true);
   force_age_.fill(telemetry_.back());
   char silence[64];
@@ -531,6 +599,7 @@ Result<RunState> StationRunner::takePart(std::optional<threads::CyclicThread>& t
         start_servo();
       }
     }
+    takeLoadedScene();
     if (output_.update()) send(output_.value());
     sendEvents();
     if (ClockSync request; link_clock_.ask(link_.welcome().client, nowNs(), request))

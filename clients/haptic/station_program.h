@@ -5,6 +5,8 @@
 #include <functional>
 #include <string>
 
+#include "clients/haptic/force_model_chooser.h"
+#include "clients/haptic/scene_source.h"
 #include "clients/haptic/station.h"
 #include "idl/types/messages/run.h"
 #include "idl/types/result.h"
@@ -19,7 +21,9 @@ struct StationProgramOptions {
   bool armed = false;                  ///< by its person from the start, as if pressed once
   bool read_keys = false;              ///< the person presses by the return key on the terminal
   bool real_time = true;               ///< request SCHED_FIFO and locked memory
-  std::string language = "en";         ///< of the printed instructions
+  ForceModelWish force_model = ForceModelWish::kAuto;
+  SceneSource scene;                              ///< for the force model `scene copy`
+  std::string language = "en";                    ///< of the printed instructions
   std::function<void(const std::string&)> print;  ///< one line for the person at the terminal; may be empty
 };
 

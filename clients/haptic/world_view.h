@@ -37,6 +37,12 @@ class WorldView {
   /// False when the frame was ignored because of an older server epoch.
   bool receive(const WorldFrame& frame) noexcept;
 
+  /// What is known from elsewhere. Precondition: contains(object).
+  void set(ObjectId object, const Pose& X_WO, std::uint32_t epoch) noexcept {
+    objects_[object.value].X_WO = X_WO;
+    objects_[object.value].epoch = epoch;
+  }
+
   [[nodiscard]] bool contains(ObjectId object) const noexcept { return object.value < objects_.size(); }
   /// Precondition: contains(object).
   [[nodiscard]] const ObservedObject& object(ObjectId object) const noexcept {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,6 +20,7 @@
 #include "server/check/check.h"
 #include "server/game_control/scenario.h"
 #include "server/session/loading_display.h"
+#include "server/simulation/compiled_scene.h"
 
 namespace {
 
@@ -27,7 +29,12 @@ constexpr int kWrongUsage = 2;
 constexpr double kLongestSession = 1e6;  // [s]
 
 /// Options of simulated people, which --input does without.
-constexpr std::array kPeopleOptions{"--seed", "--device", "--misplace-mount", "--no-instructor", "--follow"};
+constexpr std::array kPeopleOptions{"--seed",          "--device", "--misplace-mount",
+                                    "--no-instructor", "--follow", "--force-model"};
+
+const std::map<std::string, tenon::haptic::ForceModelKind> kForceModels{
+    {"manifold", tenon::haptic::ForceModelKind::kManifold},
+    {"scene-copy", tenon::haptic::ForceModelKind::kSceneCopy}};
 
 struct RehearseArguments {
   std::string scenario;
@@ -39,6 +46,7 @@ struct RehearseArguments {
   std::string log;
   bool overwrite = false;
   tenon::rehearse::TickLogOptions log_options;
+  tenon::haptic::ForceModelKind force_model = tenon::haptic::ForceModelKind::kManifold;
   bool alone = false;
   bool no_collisions = false;
   bool quiet = false;
@@ -107,6 +115,11 @@ void declare(CLI::App& app, RehearseArguments& arguments) {
                                        })
       ->expected(0, 1)
       ->group("");
+  app.add_option("--force-model", arguments.force_model,
+                 "contacts that hands render: the server's (manifold), or of a copy of the scene at their\n"
+                 "station (scene-copy)")
+      ->transform(CLI::CheckedTransformer(kForceModels))
+      ->option_text("MODEL");
   app.add_flag("--no-instructor", arguments.alone, "without the instructor");
   app.add_flag("--no-collisions", arguments.no_collisions, "disable collisions with the scene");
   app.add_flag("--follow", arguments.follow,
@@ -218,6 +231,14 @@ void printThinWalls(const RehearseArguments& arguments, const tenon::session::Lo
     std::printf("%s\n", sentence.c_str());
 }
 
+/// The scene as stations have it that fetch it from the server.
+tenon::Result<std::shared_ptr<const tenon::simulation::Scene>> compiledScene(
+    const tenon::simulation::Scene& scene) {
+  const auto bytes = tenon::simulation::sceneBytes(scene);
+  if (!bytes) return tenon::fail(bytes.error().what);
+  return tenon::simulation::readScene(*bytes);
+}
+
 int rehearsePeople(RehearseArguments& arguments) {
   const auto loaded = load(arguments);
   if (!loaded) return printError(loaded.error().what);
@@ -225,6 +246,14 @@ int rehearsePeople(RehearseArguments& arguments) {
   printProblems(arguments, *loaded);
   auto stations = openStations(arguments, *loaded->scenario);
   if (!stations) return printError(stations.error().what);
+  if (arguments.force_model == tenon::haptic::ForceModelKind::kSceneCopy) {
+    const auto compiled = compiledScene(*loaded->scene);
+    if (!compiled) return printError(compiled.error().what);
+    for (const auto& station : *stations) {
+      station->setScene(*compiled);
+      station->setForceModel(arguments.force_model);
+    }
+  }
   setOptions(arguments);
   const auto report = tenon::rehearse::runRehearsal(*loaded, std::move(*stations), arguments.rehearsal);
   if (!report) return printError(report.error().what);

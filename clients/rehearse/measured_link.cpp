@@ -12,6 +12,7 @@ void MeasuredLink::deliver(Tick now, haptic::Station& station) {
   if (now % kPeriod != 0) return;
   measure(now);
   station.setLinkJitter(choice_.jitter);
+  station.setLinkPlayout(choice_.playout_ticks);
 }
 
 void MeasuredLink::measure(Tick now) {

@@ -146,6 +146,7 @@ class Rehearsal {
     for (std::size_t i = 0; i < stations_.size(); ++i) {
       haptic::Station& station = *stations_[i];
       if (outgoing.events.step) station.receive(*outgoing.events.step);
+      for (const CollisionMatrix& matrix : outgoing.events.matrix) station.receive(matrix);
       const auto deliver = [&](const auto& message) {
         links_[i] ? links_[i]->send(message, simulation_.now()) : static_cast<void>(station.receive(message));
       };

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <set>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "clients/haptic/seat_file.h"
+#include "idl/types/cache_folder.h"
 #include "idl/wire/identity.h"
 #include "idl/wire/network.h"
 
@@ -137,6 +139,22 @@ void declareProgram(CLI::App& app, Typed& typed) {
          "--wait", [&membership](unsigned seconds) { membership.timeout = std::chrono::seconds(seconds); },
          "seconds to search for a server, at start and after a loss of the connection")
       ->default_str("10");
+  static const std::map<std::string, haptic::ForceModelWish> kWishes{
+      {"auto", haptic::ForceModelWish::kAuto},
+      {"manifold", haptic::ForceModelWish::kManifold},
+      {"scene-copy", haptic::ForceModelWish::kSceneCopy}};
+  app.add_option(
+         "--force-model", program.force_model,
+         "contacts that hands render: the server's (manifold), or those of this station's own copy of "
+         "the scene (scene-copy); auto: the copy if it is there and the round trip is above 4 ms")
+      ->transform(CLI::CheckedTransformer(kWishes))
+      ->option_text("auto|manifold|scene-copy");
+  app.add_option("--assets", program.scene.url,
+                 "where the compiled scene is fetched that the cache does not have: a console at the server")
+      ->option_text("http://HOST:PORT");
+  program.scene.cache = defaultCache();
+  app.add_option("--cache", program.scene.cache, "folder that keeps the compiled scene")
+      ->capture_default_str();
   app.add_option(
       "--seat", program.seat_file,
       "file that keeps the secret key of the seat, so that a restarted station gets its hands back");

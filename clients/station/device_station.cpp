@@ -75,6 +75,8 @@ struct DeviceStation::Parts {
   StationOptions options;
   std::vector<OpenDevice> devices;
   std::vector<Arm> arms;
+  std::shared_ptr<const simulation::Scene> scene;  // of the force model `scene copy`; null: not there
+  haptic::ForceModelKind force_model = haptic::ForceModelKind::kManifold;
   std::unique_ptr<haptic::Mover> mover;
   std::vector<haptic::MovedHand> moved;  // of each arm
 
@@ -240,6 +242,8 @@ void DeviceStation::beginHand(std::size_t index, HandId id) {
   if (!id.valid()) return;
   arm.hand = std::make_unique<haptic::HapticHand>(*arm.device, arm.clutch);
   haptic::HapticHand& hand = *arm.hand;
+  hand.setScene(parts_->scene);
+  hand.setForceModel(parts_->force_model);
   if (!hand.begin(id, client_, moved.X_WStart.translation(), arming().permitsForces())) {
     report(haptic::StationEventKind::kDeviceFault, id, static_cast<std::uint32_t>(hand.device().fault), 0.0);
   }
@@ -265,6 +269,23 @@ void DeviceStation::begin(std::span<const HandId> hand_ids) {
     static_cast<void>(bracelet.begin(hand_ids[arms], arming().permitsForces()));
   }
   if (parts_->mover) parts_->mover->begin(sceneObjects(), parts_->moved);
+}
+
+void DeviceStation::setScene(const std::shared_ptr<const simulation::Scene>& scene) {
+  parts_->scene = scene;
+  for (Arm& arm : parts_->arms)
+    if (arm.hand) arm.hand->setScene(scene);
+}
+
+void DeviceStation::setForceModel(haptic::ForceModelKind kind) noexcept {
+  parts_->force_model = kind;
+  for (Arm& arm : parts_->arms)
+    if (arm.hand) arm.hand->setForceModel(kind);
+}
+
+void DeviceStation::receive(const CollisionMatrix& matrix) noexcept {
+  for (Arm& arm : parts_->arms)
+    if (arm.hand) arm.hand->receive(matrix);
 }
 
 void DeviceStation::manifoldReceived(const HandManifold& manifold) noexcept {
@@ -321,6 +342,7 @@ void DeviceStation::step(std::uint32_t seq) noexcept {
   for (Arm& arm : parts_->arms) {
     if (!arm.hand) continue;
     arm.hand->setLinkJitter(link_jitter_);
+    arm.hand->setLinkPlayout(link_playout_);
     arm.hand->step(seq, world_, dt_);
     report(*arm.hand);
     inputs_.push_back(arm.hand->input());

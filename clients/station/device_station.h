@@ -63,6 +63,10 @@ class DeviceStation : public haptic::Station {
   [[nodiscard]] std::vector<HandStiffness> stiffness() const override;
   [[nodiscard]] Role role() const override;
   void step(std::uint32_t seq) noexcept override;
+  void setScene(const std::shared_ptr<const simulation::Scene>& scene) override;
+  void setForceModel(haptic::ForceModelKind kind) noexcept override;
+  using haptic::Station::receive;
+  void receive(const CollisionMatrix& matrix) noexcept override;
   [[nodiscard]] bool wantsArming() const noexcept override;
   [[nodiscard]] Result<void> armDevices() override;
   void finish(bool disarms) noexcept override;

@@ -12,7 +12,7 @@ namespace fs = std::filesystem;
 
 namespace {
 constexpr std::size_t kNameLength = 30;
-constexpr std::uintmax_t kMaxAssetBytes = 64U << 20U;
+constexpr std::uintmax_t kMaxAssetBytes = 1024U << 20U;
 }  // namespace
 
 std::string assetName(std::span<const std::uint8_t> bytes) {

@@ -363,6 +363,12 @@ void fields(auto& d, auto& c, Is<RunState> auto& m) {
   d("steps_timed_out", c.steps_timed_out, m.steps_timed_out);
   d("forces_frozen", c.forces_frozen, m.forces_frozen);
 }
+void fields(auto& d, auto& c, Is<CollisionMatrix> auto& m) {
+  d("part", c.part, m.part);
+  d("parts", c.parts, m.parts);
+  d("tick", c.tick, m.tick);
+  d.bytes("bits", c.bits, m.bits, kMatrixBytes);
+}
 void fields(auto& d, auto& c, Is<GrabState> auto& m) {
   d("object", c.object_id, m.object);
   d("hand", c.hand_id, m.hand);

@@ -1,6 +1,7 @@
 #include "server/session/event_generator.h"
 
 #include <algorithm>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -73,10 +74,25 @@ TickEvents EventGenerator::generate(const TickOutput& output) {
   tick_ = output.tick;
   addRun(output, events);
   addStep(output, events);
+  addMatrix(output, events);
   addObjects(output, events);
   addHands(output, events);
   previous_ = output;
   return events;
+}
+
+void EventGenerator::addMatrix(const TickOutput& output, TickEvents& events) const {
+  if (previous_ && previous_->collides == output.collides) return;
+  const std::size_t parts =
+      std::max<std::size_t>(1, (output.collides.size() + kMatrixBytes - 1) / kMatrixBytes);
+  for (std::size_t i = 0; i < parts; ++i) {
+    const auto bits = std::span(output.collides).subspan(i * kMatrixBytes);
+    const auto some = bits.first(std::min(bits.size(), kMatrixBytes));
+    events.matrix.push_back({static_cast<std::uint32_t>(i),
+                             static_cast<std::uint32_t>(parts),
+                             output.tick,
+                             {some.begin(), some.end()}});
+  }
 }
 
 void EventGenerator::addRun(const TickOutput& output, TickEvents& events) {

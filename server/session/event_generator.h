@@ -20,6 +20,7 @@ struct TickEvents {
   std::optional<StepState> step;
   std::optional<RunState> run;
   std::vector<GrabState> grabs;
+  std::vector<CollisionMatrix> matrix;    ///< all parts, or none
   std::vector<ObjectSnapshot> snapshots;  ///< of changed objects, and of every object once in 1000 ticks
   std::vector<EventLog> log;
 };
@@ -50,6 +51,7 @@ class EventGenerator {
   /// Why a step that timed out was not done; empty when it is not known.
   [[nodiscard]] std::string blockerOf(const TickOutput& output) const;
   void addStep(const TickOutput& output, TickEvents& events);
+  void addMatrix(const TickOutput& output, TickEvents& events) const;
   void addObjects(const TickOutput& output, TickEvents& events);
   void addHands(const TickOutput& output, TickEvents& events);
   void addRun(const TickOutput& output, TickEvents& events);

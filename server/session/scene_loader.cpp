@@ -10,12 +10,14 @@
 
 #include <fmt/format.h>
 
+#include "idl/record/compression.h"
 #include "idl/types/hash.h"
 #include "idl/wire/assets.h"
 #include "server/bake/bake.h"
 #include "server/bake/display_model.h"
 #include "server/bake/shapes.h"
 #include "server/session/generated_parts.h"
+#include "server/simulation/compiled_scene.h"
 #include "server/structures/gap_note.h"
 
 namespace tenon::session {
@@ -152,6 +154,15 @@ Result<std::string> displayLevels(const ObjectMeshes& meshes, const wire::AssetS
   return text;
 }
 
+/// The name of the asset.
+Result<std::string> compiledScene(const simulation::Scene& scene, const wire::AssetStore& store) {
+  const auto bytes = simulation::sceneBytes(scene);
+  if (!bytes) return fail(bytes.error().what);
+  const auto packed = record::compress(*bytes);
+  if (!packed) return fail("the compiled scene: " + packed.error().what);
+  return store.put(*packed);
+}
+
 }  // namespace
 
 Result<LoadedScene> loadScene(const fs::path& path, const LoadOptions& options,
@@ -244,8 +255,8 @@ std::vector<std::string> thinWallReport(const simulation::Scene& scene) {
   return sentences;
 }
 
-Result<std::string> storeDisplayModels(const game_control::ScenarioFile& scenario,
-                                       const LoadOptions& options) {
+Result<std::string> storeAssets(const LoadedScene& loaded, const LoadOptions& options) {
+  const game_control::ScenarioFile& scenario = *loaded.scenario;
   const auto parts = generatedParts(scenario, options.cache, options.detail);
   if (!parts) return fail(parts.error().what);
   const wire::AssetStore store(options.cache / "assets");
@@ -257,7 +268,9 @@ Result<std::string> storeDisplayModels(const game_control::ScenarioFile& scenari
     if (!levels) return levels;
     objects += (objects.empty() ? "" : ",") + *levels;
   }
-  const std::string list = R"({"version":1,"objects":[)" + objects + "]}";
+  const auto compiled = compiledScene(*loaded.scene, store);
+  if (!compiled) return compiled;
+  const std::string list = R"({"version":1,"compiled":")" + *compiled + R"(","objects":[)" + objects + "]}";
   return store.put({reinterpret_cast<const std::uint8_t*>(list.data()), list.size()});
 }
 

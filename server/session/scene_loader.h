@@ -67,14 +67,14 @@ struct LoadedStructures {
 [[nodiscard]] std::vector<Eigen::AlignedBox3d> meshBoxes(const game_control::ScenarioFile& scenario,
                                                          const LoadOptions& options);
 
-/// Makes the display models of all objects unless the cache has them, keeps them in the asset store
-/// `cache`/assets, and returns the name of the list of them: SessionAnnounce::scene_hash. The list is JSON,
-/// {"version": 1, "objects": [levels by ObjectId]}, a level {"model": asset, "triangles": number, "error":
-/// [m]}, the finest first; an object whose meshes cannot be read has none. Fails when the store cannot be
-/// written.
+/// Makes the display models of all objects unless the cache has them, and the compiled scene
+/// (server/simulation/compiled_scene.h, compressed by zstd), keeps them in the asset store `cache`/assets,
+/// and returns the name of the list of them: SessionAnnounce::scene_hash. The list is JSON, {"version": 1,
+/// "compiled": asset, "objects": [levels by ObjectId]}, a level {"model": asset, "triangles": number,
+/// "error": [m]}, the finest first; an object whose meshes cannot be read has none. Fails when the store
+/// cannot be written.
 ///
 /// Threads: one. Real-time: no.
-[[nodiscard]] Result<std::string> storeDisplayModels(const game_control::ScenarioFile& scenario,
-                                                     const LoadOptions& options);
+[[nodiscard]] Result<std::string> storeAssets(const LoadedScene& loaded, const LoadOptions& options);
 
 }  // namespace tenon::session

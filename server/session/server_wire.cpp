@@ -406,6 +406,7 @@ void ServerWire::send(const OutgoingMessages& outgoing) {
   ServerWriters& to = *writers_;
   // the step before the frames, which refer to its revision
   if (outgoing.events.step) to.step.send(*outgoing.events.step);
+  for (const CollisionMatrix& matrix : outgoing.events.matrix) to.matrix.send(matrix);
   for (const GrabState& grab : outgoing.events.grabs) to.grab.write(grab);
   for (const ObjectSnapshot& snapshot : outgoing.events.snapshots) to.snapshot.write(snapshot);
   for (const WorldFrame& frame : outgoing.frames) to.frame_1k.write(frame);

@@ -82,6 +82,7 @@ struct ServerWriters {
   TopicWriter<StepProgress> progress{wire::kStepProgress, {}};
   TopicWriter<RunState> run{wire::kRunState, {}};
   TopicWriter<GrabState> grab{wire::kGrabState, {}};
+  TopicWriter<CollisionMatrix> matrix{wire::kCollisionMatrix, {}};
   TopicWriter<CommandAck> ack{wire::kCommandAck, {}};
   TopicWriter<Guidance> guidance{wire::kGuidance, {}};
   TopicWriter<EventLog> event{wire::kEventLog, {}};
@@ -93,7 +94,7 @@ struct ServerWriters {
   auto inLobby() { return std::tie(announce, welcome); }
   auto inSession() {
     return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, object, hand, scene_step,
-                    step, progress, run, grab, ack, guidance, event, clock, stop, clear, published);
+                    step, progress, run, grab, matrix, ack, guidance, event, clock, stop, clear, published);
   }
   /// Written in ticks by send(OutgoingMessages), with the tick in each sample.
   auto ofTicks() {

@@ -30,7 +30,7 @@ struct SessionOptions {
   bool open =
       false;  ///< on a network beyond loopback (wire::chosenNetwork) the other roles need no key either
   std::filesystem::path stop_file;  ///< keeps an emergency stop over a crash; empty: nothing does
-  std::string scene_hash;           ///< of storeDisplayModels; empty: displays have no models
+  std::string scene_hash;           ///< of storeAssets; empty: displays have no models, stations no scene
   double detail = 1.0;              ///< [-] LoadOptions::detail, noted in the journal
   bool publish_journal = true;      ///< publish TickInput and Checkpoint for recorders
   /// [s] In real time, the governor keeps the computing time of a tick below this by changing the work

@@ -220,6 +220,7 @@ TickOutput SessionSimulation::makeOutput() const {
   output.present.resize(environment_.hands().size());
   output.ages.resize(environment_.hands().size());
   output.pairs.reserve(environment_.contactListCapacity());
+  output.collides.resize((environment_.pairs().size() + 7) / 8);
   return output;
 }
 
@@ -254,6 +255,7 @@ void SessionSimulation::fill(TickOutput& output) const noexcept {
     manifold.step_revision = output.step.revision;
   }
   fillPairs(output);
+  fillMatrix(output);
 
   const simulation::Environment::Work& work = environment_.work();
   output.stats.tick = output.tick;
@@ -262,6 +264,18 @@ void SessionSimulation::fill(TickOutput& output) const noexcept {
   output.stats.queried_pairs = work.queried_pairs;
   output.stats.points_visited = work.points_visited;
   output.stats.state_hash = output.hash;
+}
+
+void SessionSimulation::fillMatrix(TickOutput& output) const noexcept {
+  std::fill(output.collides.begin(), output.collides.end(), std::uint8_t{0});
+  const auto pairs = environment_.pairs();
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const simulation::PairSpec& spec = environment_.scene().pairs[i];
+    const std::uint32_t group = environment_.groupOf(spec.a);
+    const bool in_one_group = group != 0 && group == environment_.groupOf(spec.b);
+    if (pairs[i].enabled && !in_one_group)
+      output.collides[i / 8] = static_cast<std::uint8_t>(output.collides[i / 8] | 1U << (i % 8));
+  }
 }
 
 void SessionSimulation::fillPairs(TickOutput& output) const noexcept {

@@ -94,6 +94,7 @@ class SessionSimulation {
   [[nodiscard]] bool isTrackedElsewhere(std::size_t hand) const noexcept {
     return tracks_[hand].until >= environment_.tick() + 1;
   }
+  void fillMatrix(TickOutput& output) const noexcept;
   void fillPairs(TickOutput& output) const noexcept;
   void applyReadings(const TickInput& input) noexcept;
   void setLimits(const Change& change) noexcept;

@@ -107,6 +107,7 @@ struct TickOutput {
   /// Every tenth tick: the next pairs in order of their index, touching or not. All pairs of a scene of up to
   /// 100 * kRoundRobinPairs are refreshed within a second.
   FixedVector<PairState, kRoundRobinPairs> round_robin_pairs;
+  std::vector<std::uint8_t> collides;  ///< CollisionMatrix::bits of all parts
   TickStats stats;
 };
 

@@ -155,6 +155,14 @@ class Environment {
   void contribute(ObjectId object, std::uint32_t source, const Wrench& F_Oo_W,
                   std::uint32_t lifetime_ticks) noexcept;
 
+  // a copy of another Environment, after what is heard of that one (environment_copy.cpp)
+  /// Moves an object that neither a hand nor dynamics move, without a jump: others meet it where it is now.
+  /// Ignored for other objects.
+  void follow(ObjectId object, const Pose& X_WO, const Twist& V_WO) noexcept;
+  /// `hand` is present and holds `object` as it does there; the object's pose is discontinuous. Without
+  /// contacts until it is outside of all others, as in the other Environment.
+  void hold(HandId hand, ObjectId object, const Pose& X_HO, const Pose& X_WO) noexcept;
+
   /// One tick of kTickSeconds.
   void step() noexcept;
 

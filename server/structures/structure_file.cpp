@@ -16,6 +16,7 @@
 #include "server/structures/field_builder.h"
 #include "server/structures/haptic_structures.h"
 #include "server/structures/shell_builder.h"
+#include "server/structures/structure_bytes.h"
 #include "server/structures/structure_checks.h"
 
 namespace tenon::structures {
@@ -265,20 +266,16 @@ Result<FileHeader> readHeader(const std::string& name, std::span<const std::byte
   return header;
 }
 
-}  // namespace
-
-Result<void> writeStructures(const std::filesystem::path& file, const HapticStructures& structures) {
-  const Pointshell& shell = structures.shell;
-  const auto refused = [&file](const std::string& what) {
-    return fail(file.string() + ": not written, since it could not be read again: its " + what);
-  };
-  if (const auto problem = problemOf(structures.field.layout())) return refused("field " + *problem);
-  if (const auto problem = problemOf(shell.layout())) return refused("pointshell " + *problem);
+/// The bytes of a structure file. Fails with what makes the structures unsound.
+Result<std::vector<std::uint8_t>> bytesOf(const HapticStructures& structures, double bake_seconds,
+                                          const std::string& meshes) {
+  if (const auto problem = problemOf(structures.field.layout())) return fail("field " + *problem);
+  if (const auto problem = problemOf(structures.shell.layout())) return fail("pointshell " + *problem);
   const FeatureShell& features = structures.features;
   if (const auto problem = problemOf(features.points().layout(), features.edges()))
-    return refused("feature shell " + *problem);
+    return fail("feature shell " + *problem);
   FileHeader header = headerOf(structures);
-  const std::string meshes = meshesFrom(file, structures.info);
+  header.bake_seconds = bake_seconds;
   const auto sections = sectionsOf(structures, meshes);
   std::uint64_t offset = sizeof header;
   for (std::size_t i = 0; i < kSections; ++i) {
@@ -287,19 +284,28 @@ Result<void> writeStructures(const std::filesystem::path& file, const HapticStru
     offset += sections[i].size();
   }
   header.file_bytes = offset;
-  std::vector<std::byte> rest(offset - sizeof header);
+  std::vector<std::uint8_t> bytes(offset);
   for (std::size_t i = 0; i < kSections; ++i) {
     if (sections[i].empty()) continue;
-    std::memcpy(rest.data() + (header.first[i] - sizeof header), sections[i].data(), sections[i].size());
+    std::memcpy(bytes.data() + header.first[i], sections[i].data(), sections[i].size());
   }
-  header.checksum = checksumOf(header, rest);
+  header.checksum = checksumOf(header, std::as_bytes(std::span(bytes).subspan(sizeof header)));
+  std::memcpy(bytes.data(), &header, sizeof header);
+  return bytes;
+}
+
+}  // namespace
+
+Result<void> writeStructures(const std::filesystem::path& file, const HapticStructures& structures) {
+  const auto bytes = bytesOf(structures, structures.info.bake_seconds, meshesFrom(file, structures.info));
+  if (!bytes)
+    return fail(file.string() + ": not written, since it could not be read again: its " + bytes.error().what);
 
   const bool in_place = isWrittenInPlace(file);
   const std::filesystem::path part =
       in_place ? file : std::filesystem::path(file.string() + ".part" + std::to_string(::getpid()));
   std::ofstream out(part, std::ios::binary | std::ios::trunc);
-  out.write(reinterpret_cast<const char*>(&header), sizeof header);
-  out.write(reinterpret_cast<const char*>(rest.data()), static_cast<std::streamsize>(rest.size()));
+  out.write(reinterpret_cast<const char*>(bytes->data()), static_cast<std::streamsize>(bytes->size()));
   out.close();
   std::error_code error;
   if (out && !in_place) std::filesystem::rename(part, file, error);
@@ -311,11 +317,23 @@ Result<void> writeStructures(const std::filesystem::path& file, const HapticStru
   return {};
 }
 
+Result<std::vector<std::uint8_t>> structureBytes(const HapticStructures& structures) {
+  auto bytes = bytesOf(structures, 0.0, {});
+  if (!bytes)
+    return fail("the structures of " + structures.info.source + " cannot be kept: their " +
+                bytes.error().what);
+  return bytes;
+}
+
 Result<std::shared_ptr<const HapticStructures>> openStructures(const std::filesystem::path& file) {
-  const std::string name = file.string();
   const auto mapping = FileMapping::open(file);
-  if (!mapping) return fail(name + ": cannot be read, or is empty");
-  const auto bytes = mapping->bytes();
+  if (!mapping) return fail(file.string() + ": cannot be read, or is empty");
+  return readStructures(mapping->bytes(), file);
+}
+
+Result<std::shared_ptr<const HapticStructures>> readStructures(std::span<const std::byte> bytes,
+                                                               const std::filesystem::path& file) {
+  const std::string name = file.string();
   const auto header = readHeader(name, bytes);
   if (!header) return tl::unexpected(header.error());
 

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "idl/types/fixed_vector.h"
 #include "idl/types/ids.h"
@@ -81,6 +83,17 @@ struct PairContact {
   double load_percent = 0.0;       ///< [%] computational load (paper eq. 2)
   double peak_force = 0.0;         ///< [N] since the last sample of this topic
   double peak_depth = 0.0;         ///< [m] since the last sample of this topic
+};
+
+inline constexpr std::size_t kMatrixBytes = 1100;
+
+/// Which pairs of the scene may collide, sent when that changes, in numbered parts.
+struct CollisionMatrix {
+  std::uint32_t part = 0;
+  std::uint32_t parts = 1;
+  Tick tick = 0;
+  /// bit i of byte b: pair 8 * (part * kMatrixBytes + b) + i is enabled, and not of objects of one group
+  std::vector<std::uint8_t> bits;
 };
 
 inline constexpr int kPairsPerSample = 6;

@@ -123,6 +123,7 @@ class RigRun {
     options_.needed_hands->push_back(situation_.loaded.scene->handNamed(hand.name));
     auto station =
         std::make_unique<RigStation>(hand.name, hand.p_WD, model_, *device, std::move(before_step));
+    if (model_ == RigModel::kSceneCopy) station->setScene(situation_.compiled);
     RigStation* const added = station.get();
     devices_.push_back(std::move(device));
     stations_.push_back(std::move(station));

@@ -20,6 +20,7 @@ void RigStation::begin(std::span<const HandId> hands) {
   devices::DeviceState state;
   before_step_(0.0);
   device_.read(state);
+  if (model_ == RigModel::kSceneCopy) hand_.setForceModel(haptic::ForceModelKind::kSceneCopy);
   static_cast<void>(hand_.begin(hands.front(), client_, p_WD_ + state.X_DH.translation(), true));
 }
 
@@ -31,8 +32,9 @@ void RigStation::manifoldReceived(const HandManifold& manifold) noexcept {
 void RigStation::step(std::uint32_t seq) noexcept {
   before_step_(static_cast<double>(seq) * kTickSeconds);
   inputs_.clear();
-  if (model_ != RigModel::kManifold) return stepStreamed(seq);
+  if (model_ == RigModel::kStreamed || model_ == RigModel::kStreamedPassive) return stepStreamed(seq);
   hand_.setLinkJitter(link_jitter_);
+  hand_.setLinkPlayout(link_playout_);
   hand_.step(seq, world_, dt_);
   inputs_.push_back(hand_.input());
 }

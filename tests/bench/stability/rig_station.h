@@ -15,7 +15,8 @@ namespace tenon::bench {
 enum class RigModel {
   kStreamed,  ///< the server's coupling force as it arrives, into the device: a baseline of this rig alone
   kStreamedPassive,  ///< likewise, through the safety layer with its passivity observer
-  kManifold,         ///< the product's station: local model, coupling, safety layer
+  kManifold,         ///< the product's station: contacts of the server, coupling, safety layer
+  kSceneCopy,        ///< likewise, with contacts of its own copy of the scene
 };
 
 /// A station of one hand with a device. Streamed forces bypass what a station has of its own.
@@ -35,6 +36,9 @@ class RigStation final : public haptic::Station {
   [[nodiscard]] double coupling() const { return newest_.stiffness; }
   [[nodiscard]] Role role() const override { return Role::kTrainee; }
   [[nodiscard]] Result<void> armDevices() override { return {}; }
+  void setScene(const std::shared_ptr<const simulation::Scene>& scene) override { hand_.setScene(scene); }
+  using haptic::Station::receive;
+  void receive(const CollisionMatrix& matrix) noexcept override { hand_.receive(matrix); }
   void step(std::uint32_t seq) noexcept override;
 
  protected:

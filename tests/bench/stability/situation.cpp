@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "server/simulation/compiled_scene.h"
+
 namespace tenon::bench {
 namespace {
 
@@ -262,7 +264,12 @@ Result<std::vector<RigSituation>> makeSituations(const std::filesystem::path& ca
   for (Entry& entry : entries) {
     auto loaded = load(entry.situation.name, entry.objects, entry.rest, cache);
     if (!loaded) return fail(loaded.error().what);
+    const auto bytes = simulation::sceneBytes(*loaded->scene);
+    if (!bytes) return fail(bytes.error().what);
+    auto compiled = simulation::readScene(*bytes);
+    if (!compiled) return fail(compiled.error().what);
     entry.situation.loaded = std::move(*loaded);
+    entry.situation.compiled = std::move(*compiled);
     if (!entry.situation.steady) entry.situation.steady = [](double) { return true; };
     situations.push_back(std::move(entry.situation));
   }

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,6 +36,7 @@ struct RigSituation {
   std::string name;   ///< identifier
   std::string title;  ///< for display
   session::LoadedScene loaded;
+  std::shared_ptr<const simulation::Scene> compiled;  ///< as a station reads it
   std::vector<RigHand> hands;      ///< each at a station of its own, with a device and a link
   std::optional<RigHand> carrier;  ///< carries a part along `path`, as if nothing could stop it
   bool is_held = true;             ///< there is a held contact whose stability can be judged

@@ -16,7 +16,8 @@ struct ModelName {
 };
 constexpr std::array kModels{ModelName{RigModel::kStreamed, "streamed", "#c0392b"},
                              ModelName{RigModel::kStreamedPassive, "streamed_passive", "#e08e0b"},
-                             ModelName{RigModel::kManifold, "manifold", "#2f6fd0"}};
+                             ModelName{RigModel::kManifold, "manifold", "#2f6fd0"},
+                             ModelName{RigModel::kSceneCopy, "scene_copy", "#1e8449"}};
 
 // ---- the diagram: [px]
 constexpr double kWidth = 300.0, kHeight = 160.0, kLeft = 60.0, kTop = 50.0, kGapX = 90.0, kGapY = 70.0;

@@ -6,10 +6,11 @@
 #include <gtest/gtest.h>
 
 #include "idl/types/cache_folder.h"
+#include "idl/types/motion_law.h"
 #include "tests/bench/stability/rig_cell.h"
 #include "tests/bench/stability/stability_result.h"
 
-// Twelve cells of `tenon bench stability`, with what must be true of each.
+// Sixteen cells of `tenon bench stability`, with what must be true of each.
 
 namespace tenon::bench {
 namespace {
@@ -58,6 +59,31 @@ INSTANTIATE_TEST_SUITE_P(Stability, AgainstWhatStandsStill,
                                          StillCell{"wall", 100, "10%", 0.2},
                                          StillCell{"corner", 5, "2%", 0.01},
                                          StillCell{"corner", 100, "0", 0.1}));
+
+class CopyAgainstWhatStandsStill : public testing::TestWithParam<StillCell> {};
+
+//   a station with its own copy of the scene feels what stands still as if there were no link
+TEST_P(CopyAgainstWhatStandsStill, AStationIsStableAndFeelsItTruly) {
+  const auto [situation, delay, loss, error] = GetParam();
+  const RigCell cell = cellOf(situation, RigModel::kSceneCopy, delay, loss);
+  EXPECT_EQ(cell.stiffness, fullStiffness());
+  EXPECT_GT(cell.mean_force, 1.0);
+  EXPECT_LT(cell.mean_error, error);
+  EXPECT_LT(cell.energy, 1e-6);
+}
+
+INSTANTIATE_TEST_SUITE_P(Stability, CopyAgainstWhatStandsStill,
+                         testing::Values(StillCell{"wall", 100, "10%", 0.01},
+                                         StillCell{"corner", 100, "0", 0.01},
+                                         StillCell{"peg", 50, "2%", 0.01}));
+
+TEST(Stability, ACopyOfTheSceneExpectsWhereAMovingPartIs) {
+  constexpr double kAcceleration = 4.0, kDelay = 0.025;  // [m/s^2], [s]
+  const RigCell cell = cellOf("moving", RigModel::kSceneCopy, 25, "0");
+  EXPECT_EQ(cell.stiffness, fullStiffness());
+  EXPECT_LT(cell.mean_error, 0.1);
+  EXPECT_LT(cell.peak_error, fullStiffness() * extrapolationError(kAcceleration, kDelay) + 0.5);
+}
 
 //   which only tells something if the rig finds what is unstable
 TEST(Stability, AStreamedForceIsStableWithoutDelayAndNotWithIt) {

@@ -66,6 +66,7 @@ const std::vector<Row> kRows{
     {"StepProgress", kStateOfSeveral, kStateOfSeveral, ", joiners 1", ", joiners 1"},
     {"RunState", kStateOfSeveral, kStateOfSeveral, ", joiners 1", ", joiners 1"},
     {"GrabState", kStateOfSeveral, kStateOfSeveral, ", joiners 1", ", joiners 1"},
+    {"CollisionMatrix", kStateOfSeveral, kStateOfSeveral, ", joiners 1", ", joiners 1"},
     {"RecorderStatus", kState, kState, ", joiners 1", ", joiners 1"},
     {"EmergencyStop", kStateOfSeveral, kStateOfSeveral, ", joiners 1, outlives its writer",
      ", joiners 1, outlives its writer"},

@@ -10,8 +10,10 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "idl/record/compression.h"
 #include "idl/wire/assets.h"
 #include "server/bake/shapes.h"
+#include "server/simulation/compiled_scene.h"
 #include "tests/server/session/small_session.h"
 #include "tests/support/source_folder.h"
 
@@ -152,19 +154,27 @@ TEST_F(SceneLoaderTest, DisplayModelsAreAssetsThatTheListOfTheSceneNames) {
   const auto loaded = load(shapeScenario("{box: [20 mm, 20 mm, 20 mm]}"));
   ASSERT_TRUE(loaded) << loaded.error().what;
   const LoadOptions options{.cache = folder_ / "cache"};
-  const auto name = storeDisplayModels(*loaded->scenario, options);
+  const auto name = storeAssets(*loaded, options);
   ASSERT_TRUE(name) << name.error().what;
   const wire::AssetStore store(folder_ / "cache" / "assets");
   const auto list = store.get(*name).value();
   const std::string text(list.begin(), list.end());
-  EXPECT_THAT(text, testing::StartsWith(R"({"version":1,"objects":[[{"model":")"));
+  EXPECT_THAT(text, testing::StartsWith(R"({"version":1,"compiled":")"));
+  EXPECT_THAT(text, HasSubstr(R"(","objects":[[{"model":")"));
   EXPECT_THAT(text, HasSubstr(R"("triangles":12,)"));
   const std::string model = text.substr(text.find("model") + 8, 30);
   EXPECT_TRUE(store.has(model)) << text;
 
+  const std::string compiled = text.substr(text.find("compiled") + 11, 30);
+  const auto packed = store.get(compiled);
+  ASSERT_TRUE(packed) << packed.error().what;
+  const auto scene = simulation::readScene(record::decompress(*packed, 1U << 30U).value());
+  ASSERT_TRUE(scene) << scene.error().what;
+  EXPECT_EQ((*scene)->objects.size(), loaded->scene->objects.size());
+
   // made again where it is missing, and the same
   fs::remove(folder_ / "cache" / "assets" / model);
-  EXPECT_EQ(storeDisplayModels(*loaded->scenario, options).value(), *name);
+  EXPECT_EQ(storeAssets(*loaded, options).value(), *name);
   EXPECT_TRUE(store.has(model));
 }
 

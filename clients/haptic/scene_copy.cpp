@@ -1,0 +1,244 @@
+#include "clients/haptic/scene_copy.h"
+
+#include <algorithm>
+
+#include "idl/types/messages/objects.h"
+#include "idl/types/motion_law.h"
+
+namespace tenon::haptic {
+
+namespace {
+// Slower motion is not extrapolated, and that from twice as fast on is in full: what gives way under a hand's
+// push is heard late, and its velocity would be fed back with the gain of the delay.
+constexpr double kSlow = 0.01;  // [m/s] of any point
+
+// A few pairs about one object have contacts at a time; each list has 80 kB.
+constexpr std::size_t kContactLists = 48;
+
+// The server's proxy is elsewhere: beyond friction and rounding, for longer than a step of either takes.
+constexpr double kApart = 2e-3;           // [m] of any point
+constexpr std::uint32_t kApartFor = 250;  // [cycles]
+constexpr double kStands = 5e-3;          // [m/s] of any point
+
+// A contribution is repeated each cycle.
+constexpr std::uint32_t kLifetime = 2;  // [ticks]
+constexpr std::uint32_t kSource = 0;
+
+std::vector<SceneObject> sceneObjects(const simulation::Scene& scene) {
+  std::vector<SceneObject> objects(scene.objects.size());
+  for (std::uint32_t i = 0; i < objects.size(); ++i) {
+    objects[i].object = ObjectId{i};
+    objects[i].X_WO = scene.objects[i].X_WO;
+    if (scene.objects[i].structures == nullptr) continue;
+    objects[i].size = scene.objects[i].structures->info.box_M.sizes();
+    objects[i].centre = scene.objects[i].structures->info.box_M.center();
+  }
+  return objects;
+}
+
+/// What stands in the copy while something else moves it in the server's.
+ObjectStatus kinematic(ObjectStatus status) {
+  const bool stays = status == ObjectStatus::kHidden || status == ObjectStatus::kFixed;
+  return stays ? status : ObjectStatus::kParked;
+}
+
+double pointSpeed(const Twist& V, double radius) { return V.linear.norm() + V.angular.norm() * radius; }
+}  // namespace
+
+SceneCopy::SceneCopy(std::shared_ptr<const simulation::Scene> scene)
+    : environment_(scene, {.contact_lists = kContactLists}),
+      mirrored_(scene->objects.size()),
+      stiffness_(scene->hands.size()) {
+  view_.begin(sceneObjects(*scene), 0, 0);
+  // the matrix of the server has its groups in it
+  for (const simulation::PairSpec& pair : scene->pairs) {
+    const std::uint32_t group = environment_.groupOf(pair.a);
+    collides_.push_back(pair.enabled && (group == 0 || group != environment_.groupOf(pair.b)));
+  }
+  for (std::uint32_t i = 0; i < scene->objects.size(); ++i) environment_.setGroup(ObjectId{i}, 0);
+  enablePairs(0, scene->pairs.size());
+}
+
+SceneCopy::~SceneCopy() = default;
+
+void SceneCopy::receive(const CollisionMatrix& matrix) noexcept {
+  const std::size_t first = std::size_t{8} * kMatrixBytes * matrix.part;
+  const std::size_t end = std::min(collides_.size(), first + 8 * matrix.bits.size());
+  for (std::size_t i = first; i < end; ++i)
+    collides_[i] = (matrix.bits[(i - first) / 8] >> ((i - first) % 8) & 1U) != 0;
+  if (first < end) enablePairs(first, end);
+}
+
+/// Of the pairs from `first` to `end` those that collide and have the hand's object: no other is of interest.
+void SceneCopy::enablePairs(std::size_t first, std::size_t end) noexcept {
+  for (std::size_t i = first; i < end; ++i) {
+    const simulation::PairSpec& pair = environment_.scene().pairs[i];
+    const bool enabled = collides_[i] && (pair.a == object_ || pair.b == object_);
+    if (environment_.pairs()[i].enabled != enabled) environment_.setPairEnabled(i, enabled);
+  }
+}
+
+const LocalProxy& SceneCopy::step(const Pose& X_WH, const WorldView& /*world*/) noexcept {
+  return model_.step(X_WH, view_);
+}
+
+void SceneCopy::compute(const HandManifold& heard, std::uint32_t seq, const Pose& X_WH, const Twist& V_WH,
+                        const WorldView& world, bool rendered) noexcept {
+  if (heard.tick != heard_tick_ || heard.server_epoch != heard_epoch_) {
+    if (heard.server_epoch != heard_epoch_) time_ = {};
+    time_.receive(heard.tick, heard.answers_seq, seq, playout_);
+    heard_tick_ = heard.tick;
+    heard_epoch_ = heard.server_epoch;
+  }
+  const bool known = heard.object.value < mirrored_.size() && heard.hand.value < stiffness_.size() &&
+                     world.size() == mirrored_.size() && time_.known();
+  if (!rendered || heard.frozen || !known) {
+    following_ = diverged_ = false;
+    return;
+  }
+  const bool holds =
+      following_ && heard.hand == hand_ && heard.object == object_ && heard.object_epoch == object_epoch_;
+  if (!holds) takeHold(heard);
+  mirrorObjects(world, heard.object, seq);
+  mirrorOtherHands(heard);
+  setStiffness(heard.hand, {heard.stiffness, heard.rotational_stiffness});
+  environment_.setHandPose(hand_, X_WH, V_WH);
+  environment_.step();
+  listContacts(heard, seq);
+  // what the hand begins with is no jump of what it has
+  if (!holds) model_.step(X_WH, view_);
+  following_ = true;
+  compareWithServer(heard, seq);
+}
+
+void SceneCopy::takeHold(const HandManifold& heard) noexcept {
+  for (std::uint32_t i = 0; i < stiffness_.size(); ++i)
+    if (HandId{i} != heard.hand) environment_.setHandPresent(HandId{i}, false);
+  hand_ = heard.hand;
+  object_ = heard.object;
+  object_epoch_ = heard.object_epoch;
+  enablePairs(0, collides_.size());
+  environment_.hold(hand_, object_, heard.X_HO, heard.X_WO);
+  stiffness_[hand_.value] = {};
+  mirrored_[object_.value].known = false;
+  past_.fill({});
+  apart_ = 0;
+  diverged_ = false;
+}
+
+void SceneCopy::mirrorObjects(const WorldView& world, ObjectId held, std::uint32_t seq) noexcept {
+  const double now = time_.tickOf(seq);
+  for (std::uint32_t i = 0; i < mirrored_.size(); ++i)
+    if (i != held.value) mirror(ObjectId{i}, world.object(ObjectId{i}), now);
+}
+
+void SceneCopy::mirror(ObjectId object, const ObservedObject& seen, double now) noexcept {
+  Mirrored& mirrored = mirrored_[object.value];
+  const Pose& X_WO_now = environment_.objects()[object.value].X_WO;
+  const double ahead = (now - static_cast<double>(seen.updated_at)) * kTickSeconds;
+  if (!mirrored.known || mirrored.epoch != seen.epoch || mirrored.status != seen.status) {
+    const Pose X_WO = mirrored.known && mirrored.epoch == seen.epoch
+                          ? X_WO_now
+                          : extrapolated(seen.X_WO, seen.V_WO, seen.p_OQ_O, ahead);
+    environment_.place(object, X_WO, kinematic(seen.status));
+    mirrored = {true, seen.epoch, seen.status, seen.updated_at, seen.V_WO};
+  } else if (seen.updated_at != mirrored.updated_at) {
+    const double dt = static_cast<double>(seen.updated_at - mirrored.updated_at) * kTickSeconds;
+    const double blend = dt / (kTwistFilter + dt);
+    const bool stands = seen.V_WO.linear.isZero(0.0) && seen.V_WO.angular.isZero(0.0);
+    mirrored.V_WO.linear += (stands ? 1.0 : blend) * (seen.V_WO.linear - mirrored.V_WO.linear);
+    mirrored.V_WO.angular += (stands ? 1.0 : blend) * (seen.V_WO.angular - mirrored.V_WO.angular);
+    mirrored.updated_at = seen.updated_at;
+  }
+  if (seen.status == ObjectStatus::kHidden) return;
+  const double pace = pointSpeed(mirrored.V_WO, seen.radius);
+  const double weight = std::clamp(pace / kSlow - 1.0, 0.0, 1.0);
+  const Twist V_WO{weight * mirrored.V_WO.linear, weight * mirrored.V_WO.angular};
+  const Pose X_WO_target = extrapolated(seen.X_WO, V_WO, seen.p_OQ_O, ahead);
+  Displacement motion = displacement(X_WO_now, X_WO_target, seen.p_OQ_O);
+  const double way = maxPointMotion(motion, seen.radius);
+  if (way == 0.0) return;
+  const double most = kLargestCorrection + pace * kTickSeconds;
+  if (way > most) {
+    motion.translation *= most / way;
+    motion.rotation *= most / way;
+  }
+  environment_.follow(object, way > most ? displaced(X_WO_now, motion, seen.p_OQ_O) : X_WO_target,
+                      mirrored.V_WO);
+}
+
+/// Each pulls the object as in the server's last manifold; those that it lists no more have let go.
+void SceneCopy::mirrorOtherHands(const HandManifold& heard) noexcept {
+  for (std::uint32_t i = 0; i < stiffness_.size(); ++i) {
+    const HandId hand{i};
+    const bool listed = std::any_of(heard.others.begin(), heard.others.end(),
+                                    [&](const HandPull& pull) { return pull.hand == hand; });
+    if (hand != hand_ && !listed) environment_.setHandPresent(hand, false);
+  }
+  for (const HandPull& pull : heard.others) {
+    if (!pull.X_WG.isFinite() || !pull.p_BoC_B.allFinite() || pull.hand == hand_) continue;
+    const simulation::ObjectMotion& object = environment_.objects()[object_.value];
+    if (pull.hand.value >= stiffness_.size()) {
+      // a soft spring that stands for a wrench
+      const Displacement stretch = displacement(object.X_WO, pull.X_WG, pull.p_BoC_B);
+      const Vector3 force = pull.stiffness * stretch.translation;
+      const Vector3 p_OC_W = object.X_WO.rotation() * pull.p_BoC_B;
+      environment_.contribute(object_, kSource,
+                              {force, pull.rotational_stiffness * stretch.rotation + p_OC_W.cross(force)},
+                              kLifetime);
+      continue;
+    }
+    const Pose X_HO(-pull.p_BoC_B);
+    const simulation::HandMotion& hand = environment_.hands()[pull.hand.value];
+    if (!hand.present || !hand.attached || hand.object != object_) {
+      const Pose X_WO = object.X_WO;
+      environment_.hold(pull.hand, object_, X_HO, X_WO);
+      stiffness_[pull.hand.value] = {};
+    }
+    setStiffness(pull.hand, {pull.stiffness, pull.rotational_stiffness});
+    environment_.setHandPose(pull.hand, pull.X_WG * X_HO.inverse(), {});
+  }
+}
+
+void SceneCopy::setStiffness(HandId hand, const HandStiffness& stiffness) noexcept {
+  HandStiffness& known = stiffness_[hand.value];
+  if (known.translational == stiffness.translational && known.rotational == stiffness.rotational) return;
+  known = stiffness;
+  environment_.setHandStiffness(hand, stiffness);
+}
+
+void SceneCopy::listContacts(const HandManifold& heard, std::uint32_t seq) noexcept {
+  environment_.manifold(hand_, contacts_);
+  contacts_.server_epoch = heard.server_epoch;
+  contacts_.answers_seq = seq;
+  contacts_.step_revision = heard.step_revision;
+  model_.receive(contacts_);
+  const auto objects = environment_.objects();
+  for (const ManifoldContact& contact : contacts_.contacts)
+    view_.set(contact.other, objects[contact.other.value].X_WO, objects[contact.other.value].epoch);
+  for (const ManifoldBody& body : contacts_.bodies)
+    view_.set(body.object, objects[body.object.value].X_WO, objects[body.object.value].epoch);
+  view_.set(object_, objects[object_.value].X_WO, objects[object_.value].epoch);
+}
+
+void SceneCopy::compareWithServer(const HandManifold& heard, std::uint32_t seq) noexcept {
+  past_[seq % past_.size()] = {seq, environment_.objects()[object_.value].X_WO};
+  const PastProxy& then = past_[heard.answers_seq % past_.size()];
+  const auto isStill = [&](ObjectId object) {
+    return pointSpeed(mirrored_[object.value].V_WO, view_.object(object).radius) < kStands;
+  };
+  const bool comparable =
+      then.seq == heard.answers_seq && heard.others.empty() &&
+      std::all_of(contacts_.bodies.begin(), contacts_.bodies.end(),
+                  [&](const ManifoldBody& body) { return isStill(body.object); }) &&
+      std::all_of(heard.bodies.begin(), heard.bodies.end(), [&](const ManifoldBody& body) {
+        return body.object.value >= mirrored_.size() || isStill(body.object);
+      });
+  const ObservedObject& held = view_.object(object_);
+  const bool apart =
+      comparable && maxPointMotion(displacement(then.X_WO, heard.X_WO, held.p_OQ_O), held.radius) > kApart;
+  apart_ = apart ? apart_ + 1 : 0;
+  if (apart_ > kApartFor) diverged_ = true;
+}
+
+}  // namespace tenon::haptic

@@ -1,0 +1,109 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "clients/haptic/force_model.h"
+#include "clients/haptic/local_model.h"
+#include "clients/haptic/server_time.h"
+#include "clients/haptic/world_view.h"
+#include "idl/types/messages/contacts.h"
+#include "server/simulation/environment.h"
+#include "server/simulation/scene.h"
+
+namespace tenon::haptic {
+
+/// The force model `scene copy` of one hand: the server's own simulation, run at the station for this hand's
+/// object alone. So contacts are as young as on the server's machine, whatever the link does; the server
+/// stays the authority on where everything is.
+///
+/// Each cycle the copy moves the hand's object by the present pose of the device against all others, and
+/// lists its contacts as the server does; the next cycle renders them by a LocalModel, as it would render the
+/// server's.
+///
+/// * What others move is where it was last heard, extrapolated with its heard velocity to the tick that the
+///   server would compute now (idl/types/motion_law.h, ServerTime), unless it moves slowly. A newer frame
+///   shifts it by at most kLargestCorrection a cycle beside its own motion: so much of a reversal is felt a
+///   millisecond. Free bodies count as moved by others.
+/// * Couplings of other hands on the object, and contributions of other sources, act as the server's manifold
+///   tells them.
+/// * The object starts at the server's proxy, and again after each of its jumps. On a scene at rest both then
+///   solve one problem for one device pose. Where the answer to a pose nevertheless stays away from what the
+///   copy had for that pose, with all at rest, the copy has jumped(): the hand is re-anchored at the
+///   server's.
+///
+/// Threads: one. Real-time: everything but the constructor.
+class SceneCopy final : public ForceModel {
+ public:
+  explicit SceneCopy(std::shared_ptr<const simulation::Scene> scene);
+  ~SceneCopy() override;
+
+  /// The contacts of the next cycle: the device read as input `seq` at X_WH, and `heard`, the newest manifold
+  /// of the server. Not `rendered`: the hand's force is interrupted, and the copy waits.
+  void compute(const HandManifold& heard, std::uint32_t seq, const Pose& X_WH, const Twist& V_WH,
+               const WorldView& world, bool rendered) noexcept;
+  /// Whether it has contacts for the next cycle.
+  [[nodiscard]] bool ready() const noexcept { return following_; }
+  /// `ticks` for which the server keeps an input back: LinkChoice::playout_ticks.
+  void setPlayout(std::uint32_t ticks) noexcept { playout_ = ticks; }
+  /// Which pairs collide; until then those of the scene's start.
+  void receive(const CollisionMatrix& matrix) noexcept;
+
+  const LocalProxy& step(const Pose& X_WH, const WorldView& world) noexcept override;
+  [[nodiscard]] const LocalProxy& proxy() const noexcept override { return model_.proxy(); }
+  [[nodiscard]] bool jumped() const noexcept override { return model_.jumped() || diverged_; }
+  [[nodiscard]] std::uint64_t beyondValidity() const noexcept override { return model_.beyondValidity(); }
+  [[nodiscard]] const simulation::Environment& environment() const noexcept { return environment_; }
+
+  static constexpr double kLargestCorrection = 1e-3;  ///< [m] of any point of a body, in a cycle
+  /// [s] Of heard velocities, which are those of single ticks: smooths the resolution of another hand's
+  /// encoders, and adds its time to the delay where motion changes.
+  static constexpr double kTwistFilter = 0.005;
+
+ private:
+  /// What was heard of an object, as the copy has it.
+  struct Mirrored {
+    bool known = false;
+    std::uint32_t epoch = 0;
+    ObjectStatus status = ObjectStatus::kHidden;
+    Tick updated_at = 0;
+    Twist V_WO;  ///< filtered
+  };
+  struct PastProxy {
+    std::uint32_t seq = 0;
+    Pose X_WO;
+  };
+
+  void takeHold(const HandManifold& heard) noexcept;
+  void enablePairs(std::size_t first, std::size_t end) noexcept;
+  void mirrorObjects(const WorldView& world, ObjectId held, std::uint32_t seq) noexcept;
+  /// `now` [ticks] of the server.
+  void mirror(ObjectId object, const ObservedObject& seen, double now) noexcept;
+  void mirrorOtherHands(const HandManifold& heard) noexcept;
+  void setStiffness(HandId hand, const HandStiffness& stiffness) noexcept;
+  void listContacts(const HandManifold& heard, std::uint32_t seq) noexcept;
+  void compareWithServer(const HandManifold& heard, std::uint32_t seq) noexcept;
+
+  simulation::Environment environment_;
+  LocalModel model_;
+  WorldView view_;  ///< poses in the copy
+  ServerTime time_;
+  std::vector<Mirrored> mirrored_;
+  std::vector<HandStiffness> stiffness_;  ///< by hand: that the copy has
+  std::vector<bool> collides_;            ///< by pair: in the server
+  HandManifold contacts_;
+  Tick heard_tick_ = 0;
+  std::uint32_t heard_epoch_ = 0;
+  HandId hand_;
+  ObjectId object_;
+  std::uint32_t object_epoch_ = 0;
+  std::array<PastProxy, 1024> past_{};  ///< by seq modulo its size
+  std::uint32_t playout_ = 0;           ///< [ticks]
+  std::uint32_t apart_ = 0;             ///< [cycles] the server's proxy has been elsewhere
+  bool following_ = false;
+  bool diverged_ = false;
+};
+
+}  // namespace tenon::haptic

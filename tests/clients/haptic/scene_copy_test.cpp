@@ -1,0 +1,306 @@
+#include "clients/haptic/scene_copy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "clients/haptic/switch_slew.h"
+#include "idl/types/motion_law.h"
+#include "tests/server/simulation/small_scene.h"
+#include "tests/support/realtime_guard.h"
+
+namespace tenon::haptic {
+namespace {
+
+using test::SmallScene;
+
+constexpr double kEdge = 0.04;         // [m] of block and part
+constexpr double kStiffness = 2000.0;  // [N/m]
+constexpr HandId kRight{0}, kLeft{1};
+constexpr ObjectId kBlock{0}, kPart{1}, kFloor{2};
+
+//   block (right)   part (left)
+//      [  ]  <->    [  ]          the hands' origins are at the centres
+//   ============== floor, top at z = 0
+std::shared_ptr<const simulation::Scene> blocks(double left_stiffness = kStiffness) {
+  SmallScene small;
+  const auto cube = test::boxShape(Vector3::Constant(kEdge));
+  small.object("block", cube, {0.0, 0.0, 0.2});
+  small.object("part", cube, {0.1, 0.0, 0.2});
+  small.object("floor", test::boxShape({0.5, 0.3, 0.04}), {0.0, 0.0, -0.02}, ObjectStatus::kFixed);
+  small.hand("right", kBlock);
+  small.hand("left", kPart);
+  small.pair(kBlock, kFloor);
+  small.pair(kBlock, kPart);
+  small.pair(kPart, kFloor);
+  auto scene = std::make_shared<simulation::Scene>(*small.build());
+  for (simulation::HandSpec& hand : scene->hands) hand.stiffness = kStiffness;
+  scene->hands[kLeft.value].stiffness = left_stiffness;
+  return scene;
+}
+
+/// A server, and the station of the right hand `delay` ticks away. The left hand is at the server.
+class DelayedStation {
+ public:
+  explicit DelayedStation(Tick delay, std::shared_ptr<const simulation::Scene> scene = blocks())
+      : server_(scene, {}), copy(scene), delay_(delay) {
+    std::vector<SceneObject> objects(scene->objects.size());
+    for (std::uint32_t i = 0; i < objects.size(); ++i) {
+      objects[i].object = ObjectId{i};
+      if (scene->objects[i].structures) objects[i].size = scene->objects[i].structures->info.box_M.sizes();
+    }
+    world_.begin(objects, 0, 0);
+    for (const HandId hand : {kRight, kLeft}) server_.setHandPresent(hand, true);
+  }
+
+  /// One millisecond with the device of the right hand at p_WH, and the left one at p_WLeft.
+  void tick(const Vector3& p_WH, const Vector3& p_WLeft) {
+    ++now_;
+    for (; !frames_.empty() && frames_.front().tick + delay_ < now_; frames_.pop_front())
+      world_.receive(frames_.front());
+    for (; !manifolds_.empty() && manifolds_.front().tick + delay_ < now_; manifolds_.pop_front())
+      local.receive(manifolds_.front());
+    copy.step(Pose(p_WH), world_);
+    local.step(Pose(p_WH), world_);
+    const auto seq = static_cast<std::uint32_t>(now_);
+    if (local.hasManifold())
+      copy.compute(local.manifold(), seq, Pose(p_WH), {}, world_, local.usable(world_));
+
+    inputs_.push_back({seq, p_WH});
+    for (; !inputs_.empty() && inputs_.front().seq + delay_ <= now_; inputs_.pop_front()) {
+      server_.setHandPose(kRight, Pose(inputs_.front().p_WH), {});
+      answered_ = inputs_.front().seq;
+    }
+    server_.setHandPose(kLeft, Pose(p_WLeft), {});
+    server_.step();
+    send();
+  }
+
+  [[nodiscard]] simulation::Environment& server() { return server_; }
+  [[nodiscard]] const WorldView& world() const { return world_; }
+  /// [N] of the coupling without its damping.
+  [[nodiscard]] static Vector3 force(const LocalProxy& proxy, const Vector3& p_WH) {
+    return kStiffness * (proxy.X_WS.translation() - p_WH);
+  }
+
+ private:
+  struct Input {
+    std::uint32_t seq = 0;
+    Vector3 p_WH;
+  };
+  void send() {
+    WorldFrame frame;
+    frame.tick = now_;
+    for (std::uint32_t i = 0; i < server_.objects().size(); ++i) {
+      const simulation::ObjectMotion& motion = server_.objects()[i];
+      ObjectState state{ObjectId{i}, motion.epoch, motion.X_WO};
+      state.V_WO << motion.V_WO.linear.cast<float>(), motion.V_WO.angular.cast<float>();
+      state.status = static_cast<std::uint8_t>(motion.status);
+      frame.states.push_back(state);
+    }
+    frames_.push_back(frame);
+    HandManifold manifold;
+    server_.manifold(kRight, manifold);
+    manifold.tick = now_;
+    manifold.answers_seq = answered_;
+    manifolds_.push_back(manifold);
+  }
+
+  simulation::Environment server_;
+  WorldView world_;
+  std::deque<Input> inputs_;
+  std::deque<WorldFrame> frames_;
+  std::deque<HandManifold> manifolds_;
+  std::uint32_t answered_ = 0;
+  Tick now_ = 0;
+
+ public:
+  SceneCopy copy;
+  LocalModel local;
+
+ private:
+  Tick delay_;
+};
+
+const Vector3 kAway(0.2, 0.0, 0.2);  // [m] for the left hand
+
+/// Comes down to the floor, presses by about 1 mm and slides to and fro.
+Vector3 pressing(Tick tick) {
+  const double t = 1e-3 * static_cast<double>(tick);
+  const double down = std::clamp((t - 0.5) / 0.5, 0.0, 1.0);
+  return {0.02 * std::sin(4.0 * t), 0.0, 0.05 - 0.031 * down - 0.0005 * std::sin(6.0 * t) * down};
+}
+
+TEST(SceneCopy, FeelsWhatStandsStillAsWithoutADelay) {
+  DelayedStation near(0), far(100);
+  double largest = 0.0, error = 0.0, error_of_manifold = 0.0;
+  for (Tick tick = 1; tick <= 3000; ++tick) {
+    const Vector3 p_WH = pressing(tick);
+    near.tick(p_WH, kAway);
+    far.tick(p_WH, kAway);
+    if (tick < 400) continue;
+    const Vector3 felt = DelayedStation::force(near.local.proxy(), p_WH);
+    largest = std::max(largest, felt.norm());
+    ASSERT_TRUE(far.copy.ready());
+    error = std::max(error, (DelayedStation::force(far.copy.proxy(), p_WH) - felt).norm());
+    error_of_manifold =
+        std::max(error_of_manifold, (DelayedStation::force(far.local.proxy(), p_WH) - felt).norm());
+  }
+  EXPECT_GT(largest, 2.0);
+  EXPECT_LT(error, 0.01 * largest);
+  // what only tells something since a first contact is felt late by the other model
+  EXPECT_GT(error_of_manifold, 0.2 * largest);
+}
+
+/// [m] Place of the left hand: at rest, then to and fro along x at 0.1 m/s, with 4 m/s^2 at its turns.
+double moving(Tick tick) {
+  constexpr double kPeriod = 1.0, kSpeed = 0.1, kTurn = 0.05;
+  const auto triangle = [](double t) {
+    const double phase = t - std::floor(t / kPeriod) * kPeriod;
+    return kSpeed * (phase < 0.5 * kPeriod ? phase : kPeriod - phase);
+  };
+  double sum = 0.0;
+  for (int i = 0; i < 50; ++i)
+    sum += triangle(std::max(0.0, 1e-3 * (static_cast<double>(tick) - 600.0) - kTurn * (i + 0.5) / 50.0));
+  return sum / 50.0;
+}
+
+TEST(SceneCopy, FeelsWhatMovesSteadilyWithinATenthAndItsTurnsWithinTheLawsBound) {
+  constexpr Tick kDelay = 50;
+  constexpr double kAcceleration = 4.0, kAhead = 0.051;
+  // the part goes its own way, whatever touches it
+  const auto scene = blocks(100.0 * kStiffness);
+  DelayedStation near(0, scene), far(kDelay, scene);
+  double steady = 0.0, turning = 0.0;
+  for (Tick tick = 1; tick <= 4000; ++tick) {
+    // the block is 1 mm deep in the part, and moves with it
+    const Vector3 p_WLeft(0.1 + moving(tick), 0.0, 0.1);
+    const double closer = std::clamp((static_cast<double>(tick) - 300.0) / 200.0, 0.0, 1.0);
+    const Vector3 p_WH(p_WLeft.x() - kEdge - 0.01 + 0.011 * closer, 0.0, 0.1);
+    near.tick(p_WH, p_WLeft);
+    far.tick(p_WH, p_WLeft);
+    if (tick < 1300) continue;
+    const Vector3 felt = DelayedStation::force(near.local.proxy(), p_WH);
+    const double error = (DelayedStation::force(far.copy.proxy(), p_WH) - felt).norm();
+    const bool is_steady = (tick - 600) % 500 > 250;
+    (is_steady ? steady : turning) =
+        std::max(is_steady ? steady : turning, error / (is_steady ? felt.norm() : 1.0));
+  }
+  EXPECT_LT(steady, 0.1);
+  // the filtered twist is as much older as the filter is long
+  const double lag = kAcceleration * kAhead * SceneCopy::kTwistFilter;
+  EXPECT_LT(turning, kStiffness * (extrapolationError(kAcceleration, kAhead) + lag) + 0.5);
+  EXPECT_GT(turning, 0.5);  // or nothing turned
+}
+
+TEST(SceneCopy, AnotherHandsPullIsFelt) {
+  DelayedStation far(25);
+  for (Tick tick = 1; tick <= 500; ++tick) far.tick({0.0, 0.0, 0.1}, {0.0, 0.0, 0.2});
+  far.server().grab(kLeft, kBlock);
+  for (Tick tick = 1; tick <= 1000; ++tick) far.tick({0.0, 0.0, 0.1}, {0.0, 0.005, 0.2});
+  ASSERT_TRUE(far.copy.ready());
+  const Vector3 felt = DelayedStation::force(far.copy.proxy(), {0.0, 0.0, 0.1});
+  EXPECT_GT(felt.y(), 2.0);
+  EXPECT_NEAR(felt.y(), far.server().hands()[kRight.value].F_Ho_W.force.y(), 0.1 * felt.y());
+}
+
+TEST(SceneCopy, PairsThatTheServersMatrixExcludesAreNotFelt) {
+  DelayedStation far(25);
+  far.server().setPairEnabled(0, false);
+  CollisionMatrix matrix;
+  matrix.bits = {0b110};
+  far.copy.receive(matrix);
+  for (Tick tick = 1; tick <= 1500; ++tick) far.tick(pressing(tick), kAway);
+  ASSERT_TRUE(far.copy.ready());
+  EXPECT_LT(DelayedStation::force(far.copy.proxy(), pressing(1500)).norm(), 0.05);
+}
+
+TEST(SceneCopy, AProxyThatTheServerHasElsewhereIsAJump) {
+  DelayedStation far(25);
+  for (Tick tick = 1; tick <= 1500; ++tick) {
+    far.tick(pressing(tick), kAway);
+    ASSERT_FALSE(far.copy.jumped()) << tick;
+  }
+  far.server().setPairEnabled(0, false);  // of which the station is not told
+  bool jumped = false;
+  for (Tick tick = 1501; tick <= 2500 && !jumped; ++tick) {
+    far.tick(pressing(1500) - Vector3(0.0, 0.0, 0.004), kAway);
+    jumped = far.copy.jumped();
+  }
+  EXPECT_TRUE(jumped);
+}
+
+TEST(SceneCopy, ACycleAllocatesNothingAndLocksNothing) {
+  DelayedStation far(5);
+  for (Tick tick = 1; tick <= 1500; ++tick) far.tick(pressing(tick), {0.06, 0.0, 0.019});
+  HandManifold heard = far.local.manifold();
+  const test::RealtimeGuard guard;
+  for (std::uint32_t i = 1; i <= 500; ++i) {
+    const Pose X_WH(pressing(1500 + i));
+    heard.tick = 1500 + i;
+    heard.answers_seq = 1490 + i;
+    far.copy.step(X_WH, far.world());
+    far.copy.compute(heard, 1500 + i, X_WH, {}, far.world(), true);
+  }
+  EXPECT_EQ(guard.allocations(), 0);
+  EXPECT_EQ(guard.locks(), 0);
+  EXPECT_TRUE(far.copy.ready());
+}
+
+TEST(SwitchSlew, GoesFromOneForceToAnotherByTwoNewtonsAMillisecond) {
+  SwitchSlew slew;
+  const Wrench old{Vector3(6.0, 0.0, 0.0), Vector3::Zero()}, now{Vector3(0.0, 3.0, 0.0), Vector3::Zero()};
+  EXPECT_EQ(slew.step(old, 1e-3).force, old.force);
+  slew.begin();
+  Vector3 before = old.force;
+  int cycles = 0;
+  for (; cycles < 100 && before != now.force; ++cycles) {
+    const Vector3 force = slew.step(now, 1e-3).force;
+    ASSERT_LE((force - before).norm(), 2.0 + 1e-9);
+    before = force;
+  }
+  EXPECT_EQ(cycles, 4);  // 6.7 N
+}
+
+TEST(MotionLaw, KeepsTheTwistOfTheCentreAndEnds) {
+  const Vector3 p_OQ(0.1, 0.0, 0.0);
+  // turns about Q, which moves along y
+  Twist V_WO{Vector3(0.0, 0.5, 0.0), Vector3(0.0, 0.0, 2.0)};
+  V_WO.linear -= V_WO.angular.cross(p_OQ);
+  const Pose X_W1 = extrapolated(Pose(), V_WO, p_OQ, 0.1);
+  EXPECT_TRUE((X_W1 * p_OQ).isApprox(Vector3(0.1, 0.05, 0.0), 1e-12));
+  EXPECT_NEAR(logRotation(X_W1.rotation()).z(), 0.2, 1e-12);
+  EXPECT_EQ(extrapolated(Pose(), V_WO, p_OQ, 10.0), extrapolated(Pose(), V_WO, p_OQ, kLongestExtrapolation));
+  EXPECT_EQ(extrapolated(Pose(), V_WO, p_OQ, -1.0), Pose());
+}
+
+TEST(MotionLaw, ItsErrorIsWithinTheBound) {
+  constexpr double kA = 4.0, kT = 0.05;
+  // v = 0.1 m/s, then braked with kA
+  const double place = 0.1 * kT - 0.5 * kA * kT * kT;
+  const Pose law = extrapolated(Pose(), {Vector3(0.1, 0.0, 0.0), Vector3::Zero()}, Vector3::Zero(), kT);
+  EXPECT_LE(std::abs(law.translation().x() - place), extrapolationError(kA, kT) + 1e-15);
+}
+
+TEST(ServerTime, TakesHalfOfTheShortestRoundTrip) {
+  ServerTime time;
+  EXPECT_FALSE(time.known());
+  // the server is 100 ticks ahead; a message takes 5 there and 5 back, some take longer
+  for (std::uint32_t seq = 20; seq < 120; ++seq) {
+    const std::uint32_t late = seq % 7 == 0 ? 0 : seq % 5;
+    time.receive(100 + seq - 6 - late, seq - 11 - late - (seq % 3), seq, 0);
+  }
+  ASSERT_TRUE(time.known());
+  EXPECT_NEAR(time.tickOf(200), 300.0, 0.5);
+  // and what the server keeps back is no way
+  ServerTime kept;
+  kept.receive(100 + 20 - 6, 20 - 11 - 2, 20, 2);
+  EXPECT_NEAR(kept.tickOf(200), 300.0, 0.5);
+}
+
+}  // namespace
+}  // namespace tenon::haptic
