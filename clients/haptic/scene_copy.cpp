@@ -50,6 +50,12 @@ SceneCopy::SceneCopy(std::shared_ptr<const simulation::Scene> scene)
       mirrored_(scene->objects.size()),
       stiffness_(scene->hands.size()) {
   view_.begin(sceneObjects(*scene), 0, 0);
+  const auto has_mass = [](const simulation::ObjectSpec& object) { return object.body.has_value(); };
+  bodies_.resize(
+      static_cast<std::size_t>(std::count_if(scene->objects.begin(), scene->objects.end(), has_mass)));
+  std::uint32_t count = 0;
+  for (const simulation::ObjectSpec& object : scene->objects)
+    body_of_.push_back(has_mass(object) ? count++ : static_cast<std::uint32_t>(bodies_.size()));
   // the matrix of the server has its groups in it
   for (const simulation::PairSpec& pair : scene->pairs) {
     const std::uint32_t group = environment_.groupOf(pair.a);
@@ -69,11 +75,18 @@ void SceneCopy::receive(const CollisionMatrix& matrix) noexcept {
   if (first < end) enablePairs(first, end);
 }
 
-/// Of the pairs from `first` to `end` those that collide and have the hand's object: no other is of interest.
+PredictedBody* SceneCopy::bodyOf(ObjectId object) noexcept {
+  const std::uint32_t index = body_of_[object.value];
+  return index < bodies_.size() ? &bodies_[index] : nullptr;
+}
+
+/// Of the pairs from `first` to `end` those that collide and have the hand's object or a free body: no other
+/// is of interest.
 void SceneCopy::enablePairs(std::size_t first, std::size_t end) noexcept {
   for (std::size_t i = first; i < end; ++i) {
     const simulation::PairSpec& pair = environment_.scene().pairs[i];
-    const bool enabled = collides_[i] && (pair.a == object_ || pair.b == object_);
+    const bool enabled = collides_[i] && (pair.a == object_ || pair.b == object_ ||
+                                          bodyOf(pair.a) != nullptr || bodyOf(pair.b) != nullptr);
     if (environment_.pairs()[i].enabled != enabled) environment_.setPairEnabled(i, enabled);
   }
 }
@@ -87,6 +100,10 @@ void SceneCopy::compute(const HandManifold& heard, std::uint32_t seq, const Pose
   if (heard.tick != heard_tick_ || heard.server_epoch != heard_epoch_) {
     if (heard.server_epoch != heard_epoch_) time_ = {};
     time_.receive(heard.tick, heard.answers_seq, seq, playout_);
+    // a tick that lacked its input, and the one after it, had another time between inputs than the copy
+    const std::int64_t behind = static_cast<std::int64_t>(heard.tick) - heard.answers_seq;
+    is_comparable_ = heard.answers_seq != 0 && behind == behind_;
+    behind_ = behind;
     heard_tick_ = heard.tick;
     heard_epoch_ = heard.server_epoch;
   }
@@ -99,11 +116,16 @@ void SceneCopy::compute(const HandManifold& heard, std::uint32_t seq, const Pose
   const bool holds =
       following_ && heard.hand == hand_ && heard.object == object_ && heard.object_epoch == object_epoch_;
   if (!holds) takeHold(heard);
-  mirrorObjects(world, heard.object, seq);
+  mirrorObjects(world, heard, seq);
   mirrorOtherHands(heard);
   setStiffness(heard.hand, {heard.stiffness, heard.rotational_stiffness});
   environment_.setHandPose(hand_, X_WH, V_WH);
   environment_.step();
+  for (std::uint32_t i = 0; i < body_of_.size(); ++i) {
+    const simulation::ObjectMotion& motion = environment_.objects()[i];
+    if (motion.status == ObjectStatus::kFree && bodyOf(ObjectId{i}) != nullptr)
+      bodyOf(ObjectId{i})->record(seq, motion.X_WO, motion.V_WO);
+  }
   listContacts(heard, seq);
   // what the hand begins with is no jump of what it has
   if (!holds) model_.step(X_WH, view_);
@@ -121,15 +143,48 @@ void SceneCopy::takeHold(const HandManifold& heard) noexcept {
   environment_.hold(hand_, object_, heard.X_HO, heard.X_WO);
   stiffness_[hand_.value] = {};
   mirrored_[object_.value].known = false;
+  for (std::uint32_t i = 0; i < body_of_.size(); ++i)  // they stood still while no cycle was computed
+    if (bodyOf(ObjectId{i}) != nullptr) mirrored_[i].known = false;
   past_.fill({});
   apart_ = 0;
   diverged_ = false;
 }
 
-void SceneCopy::mirrorObjects(const WorldView& world, ObjectId held, std::uint32_t seq) noexcept {
+void SceneCopy::mirrorObjects(const WorldView& world, const HandManifold& heard, std::uint32_t seq) noexcept {
   const double now = time_.tickOf(seq);
-  for (std::uint32_t i = 0; i < mirrored_.size(); ++i)
-    if (i != held.value) mirror(ObjectId{i}, world.object(ObjectId{i}), now);
+  for (std::uint32_t i = 0; i < mirrored_.size(); ++i) {
+    const ObjectId object{i};
+    if (object == heard.object) continue;
+    const ObservedObject& seen = world.object(object);
+    if (seen.status == ObjectStatus::kFree && bodyOf(object) != nullptr) {
+      predict(object, seen, heard, now);
+    } else {
+      mirror(object, seen, now);
+    }
+  }
+}
+
+void SceneCopy::predict(ObjectId object, const ObservedObject& seen, const HandManifold& heard,
+                        double now) noexcept {
+  Mirrored& mirrored = mirrored_[object.value];
+  PredictedBody& body = *bodyOf(object);
+  const simulation::ObjectMotion& motion = environment_.objects()[object.value];
+  const bool is_known =
+      mirrored.known && mirrored.epoch == seen.epoch && mirrored.status == ObjectStatus::kFree;
+  if (is_known && seen.updated_at != mirrored.updated_at && is_comparable_ && seen.updated_at == heard.tick)
+    body.compare(seen, heard.answers_seq);
+  if (!is_known || body.isLost(seen.radius)) {
+    const double ahead = (now - static_cast<double>(seen.updated_at)) * kTickSeconds;
+    const Pose X_WO = extrapolated(seen.X_WO, seen.V_WO, seen.p_OQ_O, ahead);
+    environment_.place(object, X_WO, ObjectStatus::kFree);
+    environment_.correct(object, X_WO, seen.V_WO);
+    body.restart();
+  } else {
+    Pose X_WO = motion.X_WO;
+    Twist V_WO = motion.V_WO;
+    if (body.correct(seen, X_WO, V_WO)) environment_.correct(object, X_WO, V_WO);
+  }
+  mirrored = {true, seen.epoch, ObjectStatus::kFree, seen.updated_at, seen.V_WO};
 }
 
 void SceneCopy::mirror(ObjectId object, const ObservedObject& seen, double now) noexcept {

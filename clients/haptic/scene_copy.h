@@ -7,6 +7,7 @@
 
 #include "clients/haptic/force_model.h"
 #include "clients/haptic/local_model.h"
+#include "clients/haptic/predicted_body.h"
 #include "clients/haptic/server_time.h"
 #include "clients/haptic/world_view.h"
 #include "idl/types/messages/contacts.h"
@@ -23,10 +24,12 @@ namespace tenon::haptic {
 /// lists its contacts as the server does; the next cycle renders them by a LocalModel, as it would render the
 /// server's.
 ///
+/// * Free bodies are simulated here too, and kept where the server has them for the same input: see
+///   PredictedBody.
 /// * What others move is where it was last heard, extrapolated with its heard velocity to the tick that the
 ///   server would compute now (idl/types/motion_law.h, ServerTime), unless it moves slowly. A newer frame
 ///   shifts it by at most kLargestCorrection a cycle beside its own motion: so much of a reversal is felt a
-///   millisecond. Free bodies count as moved by others.
+///   millisecond.
 /// * Couplings of other hands on the object, and contributions of other sources, act as the server's manifold
 ///   tells them.
 /// * The object starts at the server's proxy, and again after each of its jumps. On a scene at rest both then
@@ -78,7 +81,11 @@ class SceneCopy final : public ForceModel {
 
   void takeHold(const HandManifold& heard) noexcept;
   void enablePairs(std::size_t first, std::size_t end) noexcept;
-  void mirrorObjects(const WorldView& world, ObjectId held, std::uint32_t seq) noexcept;
+  void mirrorObjects(const WorldView& world, const HandManifold& heard, std::uint32_t seq) noexcept;
+  /// `now` [ticks] of the server.
+  void predict(ObjectId object, const ObservedObject& seen, const HandManifold& heard, double now) noexcept;
+  /// Null: the object has no mass.
+  [[nodiscard]] PredictedBody* bodyOf(ObjectId object) noexcept;
   /// `now` [ticks] of the server.
   void mirror(ObjectId object, const ObservedObject& seen, double now) noexcept;
   void mirrorOtherHands(const HandManifold& heard) noexcept;
@@ -91,10 +98,14 @@ class SceneCopy final : public ForceModel {
   WorldView view_;  ///< poses in the copy
   ServerTime time_;
   std::vector<Mirrored> mirrored_;
+  std::vector<PredictedBody> bodies_;
+  std::vector<std::uint32_t> body_of_;    ///< by object: index into bodies_, or their number
   std::vector<HandStiffness> stiffness_;  ///< by hand: that the copy has
   std::vector<bool> collides_;            ///< by pair: in the server
   HandManifold contacts_;
   Tick heard_tick_ = 0;
+  std::int64_t behind_ = 0;  ///< [ticks] the heard tick less the input that it used
+  bool is_comparable_ = false;
   std::uint32_t heard_epoch_ = 0;
   HandId hand_;
   ObjectId object_;

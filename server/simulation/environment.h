@@ -159,6 +159,8 @@ class Environment {
   /// Moves an object that neither a hand nor dynamics move, without a jump: others meet it where it is now.
   /// Ignored for other objects.
   void follow(ObjectId object, const Pose& X_WO, const Twist& V_WO) noexcept;
+  /// Sets pose and velocity of a free body, without a jump. Ignored for other objects.
+  void correct(ObjectId object, const Pose& X_WO, const Twist& V_WO) noexcept;
   /// `hand` is present and holds `object` as it does there; the object's pose is discontinuous. Without
   /// contacts until it is outside of all others, as in the other Environment.
   void hold(HandId hand, ObjectId object, const Pose& X_HO, const Pose& X_WO) noexcept;

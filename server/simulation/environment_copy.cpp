@@ -19,6 +19,16 @@ void Environment::follow(ObjectId object, const Pose& X_WO, const Twist& V_WO) n
   markDirty(object);
 }
 
+void Environment::correct(ObjectId object, const Pose& X_WO, const Twist& V_WO) noexcept {
+  if (!isObject(object) || !X_WO.isFinite() || objects_[object.value].status != ObjectStatus::kFree) return;
+  wake(object);
+  ObjectMotion& motion = objects_[object.value];
+  engine_->addPathLength(object, displacement(motion.X_WO, X_WO, centreOf(object)));
+  motion.X_WO = X_WO;
+  motion.V_WO = V_WO;
+  markDirty(object);
+}
+
 void Environment::hold(HandId hand, ObjectId object, const Pose& X_HO, const Pose& X_WO) noexcept {
   if (!isHand(hand) || !isObject(object) || !X_HO.isFinite() || !X_WO.isFinite()) return;
   HandMotion& motion = hands_[hand.value];

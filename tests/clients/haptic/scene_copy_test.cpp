@@ -54,7 +54,7 @@ class DelayedStation {
       if (scene->objects[i].structures) objects[i].size = scene->objects[i].structures->info.box_M.sizes();
     }
     world_.begin(objects, 0, 0);
-    for (const HandId hand : {kRight, kLeft}) server_.setHandPresent(hand, true);
+    for (std::uint32_t i = 0; i < scene->hands.size(); ++i) server_.setHandPresent(HandId{i}, true);
   }
 
   /// One millisecond with the device of the right hand at p_WH, and the left one at p_WLeft.
@@ -196,6 +196,53 @@ TEST(SceneCopy, FeelsWhatMovesSteadilyWithinATenthAndItsTurnsWithinTheLawsBound)
   EXPECT_LT(turning, kStiffness * (extrapolationError(kAcceleration, kAhead) + lag) + 0.5);
   EXPECT_GT(turning, 0.5);  // or nothing turned
 }
+
+/// A block in the right hand, and before it a free part on the floor or, `floating`, in the air.
+std::shared_ptr<const simulation::Scene> freePart(bool floating) {
+  SmallScene small;
+  const double height = floating ? 0.2 : 0.5 * kEdge + 1e-5;
+  small.object("block", test::boxShape(Vector3::Constant(kEdge)), {0.0, 0.0, height});
+  small.freeBox("part", Vector3::Constant(kEdge), 1.0, {0.06, 0.0, height}, floating);
+  small.object("floor", test::boxShape({0.5, 0.3, 0.04}), {0.0, 0.0, -0.02}, ObjectStatus::kFixed);
+  small.spec(kPart).body->damping = 10.0;
+  small.spec(kPart).body->friction = 0.3;
+  small.hand("right", kBlock);
+  small.pair(kBlock, kFloor);
+  small.pair(kBlock, kPart);
+  small.pair(kPart, kFloor);
+  auto scene = std::make_shared<simulation::Scene>(*small.build());
+  scene->hands[0].stiffness = kStiffness;
+  return scene;
+}
+
+class PushedPart : public testing::TestWithParam<bool> {};
+
+TEST_P(PushedPart, IsFeltWithinATenthOfWhatItIsWithoutADelay) {
+  const auto scene = freePart(GetParam());
+  DelayedStation near(0, scene), far(50, scene);
+  const double height = scene->objects[kBlock.value].X_WO.translation().z();
+  double squares = 0.0, square_errors = 0.0, apart = 0.0;
+  for (Tick tick = 1; tick <= 3000; ++tick) {
+    const double t = 1e-3 * static_cast<double>(tick);
+    // at rest, 0.1 m/s with the part, at rest, and back without it
+    const double way = 0.1 * std::clamp(t - 0.6, 0.0, 1.0) - 0.1 * std::clamp(t - 2.2, 0.0, 0.5);
+    const Vector3 p_WH(way, 0.0, height + 1e-4);
+    near.tick(p_WH, kAway);
+    far.tick(p_WH, kAway);
+    if (tick < 500) continue;
+    const Vector3 felt = DelayedStation::force(near.local.proxy(), p_WH);
+    squares += felt.squaredNorm();
+    square_errors += (DelayedStation::force(far.copy.proxy(), p_WH) - felt).squaredNorm();
+    apart = std::max(apart, (far.copy.environment().objects()[kPart.value].X_WO.translation() -
+                             near.server().objects()[kPart.value].X_WO.translation())
+                                .norm());
+  }
+  EXPECT_GT(near.server().objects()[kPart.value].X_WO.translation().x(), 0.1) << "it was pushed";
+  EXPECT_GT(std::sqrt(squares / 2500.0), 0.3) << "[N], it resisted";
+  EXPECT_LT(std::sqrt(square_errors / squares), 0.1);
+  EXPECT_LT(apart, 1e-3);
+}
+INSTANTIATE_TEST_SUITE_P(SceneCopy, PushedPart, testing::Bool());
 
 TEST(SceneCopy, AnotherHandsPullIsFelt) {
   DelayedStation far(25);
