@@ -1,7 +1,9 @@
 """Sessions between two machines, which are network namespaces here: lan and wan, keys, and what goes wrong."""
 import os
+import re
 import subprocess
 import tempfile
+import time
 import unittest
 from pathlib import Path
 
@@ -84,10 +86,14 @@ class LimitsOfALink(unittest.TestCase):
             server = machines.start(0, "serve", PEG, "--network", "wan", "--wait-for", "right", "--journal", journal)
             server.wait_for("is open", 600)
             machines.start(1, "trainee", "--seed", 1, "--key", machines.key, "--network", f"wan,{A}")
-            server.wait_for(r"held still after ([89]|1\d)\d ms .* inputs come up to", 120)
-            lists = machines.start(0, "command", "list", "--network", "wan")
-            self.assertEqual(lists.wait(60), 0, lists.text())
-            self.assertRegex(lists.text(), r"right +trainee +\S+ +without input still after ([6-9]|1\d)\d ms, parked after 1\d\d\d ms")
+            granted = r"right +trainee +\S+ +without input still after ([6-9]|1\d)\d ms, parked after 1\d\d\d ms"
+            until = time.monotonic() + 120
+            while True:
+                lists = machines.start(0, "command", "list", "--network", "wan")
+                self.assertEqual(lists.wait(60), 0, lists.text())
+                if re.search(granted, lists.text()) or time.monotonic() > until:
+                    break
+            self.assertRegex(lists.text(), granted)
             self.assertRegex(lists.text(), r"instructor +instructor +\S+ +without input still after 50 ms, parked after 1000 ms")
             stop = machines.start(0, "command", "stop", "--network", "wan")
             self.assertEqual(stop.wait(60), 0, stop.text())
