@@ -13,7 +13,7 @@ set(test_environment TENON_PROGRAMS=${CMAKE_RUNTIME_OUTPUT_DIRECTORY} TENON_CACH
 # the release that people run (label `numbers`), and all others with the address sanitizer.
 set(suites_of_numbers RealPegs QueryTruth QueryTruthOfRealPairs CouplingWork SheetAtEveryOffset EnvironmentDeterminism Overload
                       FrictionOnASlope FrictionOfAPull FieldSizeTruth RealPairs SlopeLimit FreeFlights Tapers MeshOrigin OwnSteps
-                      Stability AgainstWhatStandsStill)
+                      Stability AgainstWhatStandsStill CopyAgainstWhatStandsStill)
 set(programs_of_numbers server/bake server/collision server/simulation server/session bench/stability_cells)
 set(suites_nightly_here)
 if(TENON_SANITIZE MATCHES address)
