@@ -390,6 +390,9 @@ def main():
     except Stopped as stopped:
         say("\nstopped")
         return 128 + stopped.number
+    except BrokenPipeError:  # nobody reads what is said any more, as in `tenon demo | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     finally:
         programs.stop()
 

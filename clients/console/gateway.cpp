@@ -82,7 +82,7 @@ class Gateway {
   std::set<std::string> entered_;               ///< rooms with viewers whose feeds are to be started
   std::set<std::string> started_;               ///< rooms that somebody has entered
   std::map<std::string, std::size_t> viewers_;  ///< by room; those of rooms that have any
-  std::unique_ptr<WebServer> server_;  // after feeds, desk and hands, which publish and answer through it
+  std::unique_ptr<WebServer> server_;           ///< destroyed after feeds, desk and hands, which use it
   std::map<std::string, std::unique_ptr<SessionFeed>> feeds_;  ///< by room
   SeatRights rights_;
   Desk desk_;

@@ -84,6 +84,8 @@ class HapticHand {
   void setForceModel(ForceModelKind kind) noexcept { wanted_model_ = kind; }
   /// That the force is of now.
   [[nodiscard]] ForceModelKind forceModel() const noexcept { return model_kind_; }
+  /// [ticks] ForceModel::beyondValidity() of that one.
+  [[nodiscard]] std::uint64_t beyondValidity() const noexcept { return beyond_count_; }
   /// `jitter` [s]: AnswerAge::setJitter.
   void setLinkJitter(double jitter) noexcept { answers_.setJitter(jitter); }
   /// SceneCopy::setPlayout of the hand's copy.

@@ -163,7 +163,7 @@ void Station::report(const HapticHand& hand) noexcept {
   if (events.guidance_began) report(StationEventKind::kGuidanceBegan, hand.id(), 0, 0.0);
   if (events.guidance_ended) report(StationEventKind::kGuidanceEnded, hand.id(), 0, 0.0);
   if (events.beyond_validity_began) {
-    const auto ticks = static_cast<double>(hand.local().beyondValidity());
+    const auto ticks = static_cast<double>(hand.beyondValidity());
     report(StationEventKind::kBeyondValidity, hand.id(), 0, ticks);
   }
 }

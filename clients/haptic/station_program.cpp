@@ -10,6 +10,7 @@
 #include <map>
 #include <optional>
 #include <thread>
+#include <utility>
 
 #include <poll.h>
 #include <unistd.h>
@@ -107,7 +108,7 @@ class StationRunner {
   [[nodiscard]] Result<void> takeScene(const std::atomic<bool>& stop);
   void loadScene();
   void takeLoadedScene();
-  void chooseForceModel(double round_trip);
+  void chooseForceModel(double round_trip, std::uint64_t late_cycles);
   void sendInputs(const StationOutput& output);
   void sendTelemetry(Telemetry telemetry);
   void passStops();
@@ -145,8 +146,9 @@ class StationRunner {
   std::map<std::uint32_t, CollisionMatrix> matrix_;  // by part
   bool has_scene_ = false, scene_missing_ = false;
   std::atomic<bool> loading_over_{false};
-  std::shared_future<Result<std::shared_ptr<const simulation::Scene>>> loading_;
+  std::future<Result<void>> loading_;
   ForceModelChooser model_chooser_;
+  std::uint64_t late_cycles_ = 0;  // of the servo, as the last Telemetry has them
   std::atomic<ForceModelKind> force_model_{ForceModelKind::kManifold};  // for the servo
 
   // received parts of the newest tick, in lockstep
@@ -249,7 +251,8 @@ void StationRunner::sendTelemetry(Telemetry telemetry) {
   telemetry.limits = choice.limits;
   playout_ticks_ = telemetry.playout_ticks = choice.playout_ticks;
   link_jitter_ = choice.jitter;
-  chooseForceModel(telemetry.clock_known ? telemetry.round_trip : 0.0);
+  const std::uint64_t late = telemetry.loop_overruns - std::exchange(late_cycles_, telemetry.loop_overruns);
+  chooseForceModel(telemetry.clock_known ? telemetry.round_trip : 0.0, late);
   static_cast<void>(link_.send(telemetry));
 }
 
@@ -260,32 +263,36 @@ Result<void> StationRunner::takeScene(const std::atomic<bool>& stop) {
   if (!scene) return fail("--force-model scene-copy: " + scene.error().what);
   station_.setScene(*scene);
   has_scene_ = true;
-  chooseForceModel(0.0);
+  chooseForceModel(0.0, 0);
   return {};
 }
 
-/// Once, when the link turns out to be long: reads or fetches the scene while the session goes on.
+/// Once, when the link turns out to be long: reads or fetches the scene and makes the hands' copies of it,
+/// while the session continues.
 void StationRunner::loadScene() {
-  if (options_.force_model != ForceModelWish::kAuto || loading_.valid() || has_scene_) return;
-  loading_ = std::async(std::launch::async, [this, hash = link_.member().announce().scene_hash] {
-               return openScene(options_.scene, hash, {}, loading_over_);
-             }).share();
+  if (options_.force_model != ForceModelWish::kAuto || loading_.valid() || has_scene_ || scene_missing_)
+    return;
+  loading_ =
+      std::async(std::launch::async, [this, hash = link_.member().announce().scene_hash]() -> Result<void> {
+        auto scene = openScene(options_.scene, hash, {}, loading_over_);
+        if (!scene) return fail(scene.error().what);
+        station_.setScene(*scene);
+        return {};
+      });
 }
 
 void StationRunner::takeLoadedScene() {
-  if (!loading_.valid() || has_scene_ || scene_missing_) return;
-  if (loading_.wait_for(milliseconds(0)) != std::future_status::ready) return;
-  const auto& scene = loading_.get();
-  scene_missing_ = !scene;
-  if (!scene) return print("no copy of the scene for this long link: " + scene.error().what);
-  station_.setScene(*scene);
+  if (!loading_.valid() || loading_.wait_for(milliseconds(0)) != std::future_status::ready) return;
+  const Result<void> loaded = loading_.get();
+  scene_missing_ = !loaded;
+  if (!loaded) return print("no copy of the scene for this long link: " + loaded.error().what);
   has_scene_ = true;
   for (const auto& [part, matrix] : matrix_) matrices_.push(matrix);
 }
 
-void StationRunner::chooseForceModel(double round_trip) {
+void StationRunner::chooseForceModel(double round_trip, std::uint64_t late_cycles) {
   if (round_trip > ForceModelChooser::kLong) loadScene();
-  const ForceModelKind kind = model_chooser_.step(round_trip, has_scene_);
+  const ForceModelKind kind = model_chooser_.step(round_trip, has_scene_, late_cycles);
   if (kind == force_model_) return;
   force_model_ = kind;
   if (lockstep_) station_.setForceModel(kind);

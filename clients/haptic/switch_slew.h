@@ -6,7 +6,7 @@
 
 namespace tenon::haptic {
 
-/// Between two force models: the wrench goes on from where it was, and what the new model says otherwise
+/// Between two force models: the wrench continues from where it was, and what the new model says otherwise
 /// comes at kForceSlew and kTorqueSlew at most. So no switch is a jolt, and none needs the force to stop.
 ///
 /// Threads: one. Real-time: everything.

@@ -17,8 +17,8 @@ using FetchProgress = std::function<void(std::uint64_t bytes, std::uint64_t of)>
 
 /// The asset `name`: from `store`, or from the console at `url` (http://HOST[:PORT]), which serves those of
 /// its machine; then it is in `store`, too. What an interrupted fetch got is kept beside it, and the next one
-/// goes on there. Fails with a sentence: when it is nowhere, when nothing comes for 10 s, when what came has
-/// another hash than its name (then all of it is fetched again the next time), when `stop` is set.
+/// continues there. Fails with a sentence: when it is nowhere, when nothing comes for 10 s, when what came
+/// has another hash than its name (then all of it is fetched again the next time), when `stop` is set.
 ///
 /// Threads: any. Real-time: no.
 [[nodiscard]] Result<std::vector<std::uint8_t>> fetchAsset(const AssetStore& store, std::string_view name,

@@ -89,22 +89,21 @@ double distanceOf(const Planes& planes, const Vector3& offset) {
   return lowest;
 }
 
-/// Whether the bake took a sample in the corner for one inside: `there` [voxels] outside, as the planes have
-/// it.
-bool isUndecided(double sample, double there) {
+/// Whether a sample in the corner has the wrong sign: by the planes it is `there` [voxels] outside.
+bool hasWrongSign(double sample, double there) {
   constexpr double kMost = 0.3;  // [voxels]
   return there > 0.0 && there < kMost && sample < there && sample > -there - kFit;
 }
 
-/// [voxels] What interpolation of the planes' field, and samples of the wrong side, give in excess of it at
-/// the cell's point, at most 0; 0 where the cell's samples are not those of the planes.
+/// [voxels] Error of the trilinear interpolation at the cell's point, at most 0, with samples of the wrong
+/// sign as they are; 0 where the cell's samples are not those of the planes.
 double interpolationError(const structures::FieldCell& cell, const Planes& planes) {
   double interpolated = 0.0;
   for (unsigned k = 0; k < 8; ++k) {
     const Vector3 corner(k & 1U, k >> 1U & 1U, k >> 2U & 1U);
     double there = distanceOf(planes, corner - cell.p_cell);
     if (std::abs(there - cell.samples[k]) > kFit) {
-      if (!isUndecided(cell.samples[k], there)) return 0.0;
+      if (!hasWrongSign(cell.samples[k], there)) return 0.0;
       there = cell.samples[k];
     }
     const Vector3 weight = (corner - (Vector3::Ones() - cell.p_cell)).cwiseAbs();

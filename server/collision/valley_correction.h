@@ -22,7 +22,7 @@ bool correctValley(const LaneFrame& frame, const QueryKernels& kernels, const Ve
                    structures::FieldSample& sample) noexcept;
 
 /// Whether a sample, of `distance` [m] and with a gradient of squared length `gradient2` [-], may be one of a
-/// valley, near the surface: what correctValley() tests first. `voxel` [m] is the field's largest.
+/// valley, near the surface; others need no correctValley(). `voxel` [m] is the field's largest.
 [[nodiscard]] inline bool mayBeInValley(double distance, double gradient2, double voxel) {
   constexpr double kUnitTolerance = 0.005;  // [-] quantised samples alone cause less
   return distance < voxel && distance > -voxel &&

@@ -1,6 +1,7 @@
 #include "server/session/journal_copies.h"
 
 #include <algorithm>
+#include <iterator>
 #include <thread>
 #include <utility>
 
@@ -89,13 +90,17 @@ void JournalCopies::add(const JournalEntry& entry) {
   const Time now = std::chrono::steady_clock::now();
   for (Recorder& recorder : recorders_) serve(recorder, now);
 
+  std::list<Recorder> given_up;  // deleted without the lock: their writers may take long to be
+  for (auto recorder = recorders_.begin(); recorder != recorders_.end();) {
+    const auto next = std::next(recorder);
+    if (isStuck(*recorder, now)) given_up.splice(given_up.end(), recorders_, recorder);
+    recorder = next;
+  }
   const std::lock_guard lock(mutex_);
-  recorders_.remove_if([&](const Recorder& recorder) {
-    if (!isStuck(recorder, now)) return false;
+  for (const Recorder& recorder : given_up) {
     counts_.failed += end() - recorder.next;
     stuck_.push_back(recorder.client);
-    return true;
-  });
+  }
   shown_counts_ = counts_;
 }
 

@@ -158,8 +158,7 @@ tl::expected<void, Refused> Mentoring::decide(std::string_view words, ClientId c
   for (std::size_t i = choices_.size(); i-- > 0;)
     if (choices_[i].hand == choice->hand) erase(i);
   if (choice->mutual) {
-    const double round_trip = roundTripOf(choice->hand_client) + roundTripOf(choice->guide_client);
-    choice->stiffness = std::min(kMutualStiffness, kMutualDamping / std::max(round_trip, 1e-3));
+    choice->stiffness = mutualStiffness(*choice);
   }
   choice->number = ++numbers_;
   choices_.push_back(*choice);
@@ -280,7 +279,18 @@ std::vector<Guidance> Mentoring::step(const TickOutput& output, std::span<const 
   return fixtures;
 }
 
+/// [N/m] As stiff as the round trips permit now.
+double Mentoring::mutualStiffness(const Choice& choice) const {
+  const double round_trip = roundTripOf(choice.hand_client) + roundTripOf(choice.guide_client);
+  return std::min(kMutualStiffness, kMutualDamping / std::max(round_trip, 1e-3));
+}
+
 Guidance Mentoring::fixtureOf(Choice& choice, const TickOutput& output) {
+  // softer at once, stiffer slowly: a fixture that stiffens under load does work
+  constexpr double kStiffening = 2.0;  // [N/m/s]
+  if (choice.mutual)
+    choice.stiffness =
+        std::min(mutualStiffness(choice), choice.stiffness + kStiffening * kTickSeconds * kPeriod);
   Guidance fixture{.hand = choice.hand,
                    .server_epoch = server_epoch_,
                    .tick = output.tick,

@@ -105,6 +105,7 @@ class Mentoring {
   [[nodiscard]] tl::expected<void, Refused> end(std::string_view words, Role role);
   [[nodiscard]] std::string whyEnded(const Choice& choice, const TickOutput& output,
                                      std::span<const ClientId> controllers) const;
+  [[nodiscard]] double mutualStiffness(const Choice& choice) const;
   [[nodiscard]] Guidance fixtureOf(Choice& choice, const TickOutput& output);
   [[nodiscard]] const std::string& nameOf(HandId hand) const { return scenario_.hands[hand.value].name; }
   void erase(std::size_t index);

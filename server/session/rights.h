@@ -14,8 +14,8 @@ namespace tenon::session {
 enum class Right : std::uint32_t {
   kMoveHands = 1U << 0U,         ///< those of its role
   kMoveAnyHand = 1U << 1U,       ///< those of other roles too
-  kAnswerStep = 1U << 2U,        ///< fulfil a condition, send a signal
-  kActOnOwnHands = 1U << 3U,     ///< release and swap what the hands that it moves hold
+  kAnswerStep = 1U << 2U,        ///< fulfil a condition, send a signal, leave a note
+  kActOnOwnHands = 1U << 3U,     ///< release and swap what the hands that it moves hold; end a guidance
   kActOnAnyHand = 1U << 4U,      ///< likewise of all hands
   kContributeForces = 1U << 5U,  ///< external wrenches on objects
   kPlaceObjects = 1U << 6U,      ///< poses of external trackers

@@ -12,8 +12,7 @@ namespace {
 constexpr auto kOtherServers = std::chrono::milliseconds(500);  // for their announcements to arrive
 // without a sign of life for so long the announcement of a server ends (its lease)
 constexpr auto kLapse = wire::kSessionAnnounce.parameters.lease;
-// A reader that took this server for dead knows its announcement again, and so its next end, by another
-// sample alone.
+// A reader for which this server's lease has expired gets its next end only after another sample.
 constexpr auto kAnnounceInterval = std::chrono::seconds(1);
 constexpr auto kAfterLapse = std::chrono::seconds(10);  // until those who came meanwhile are discovered
 

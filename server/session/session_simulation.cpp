@@ -26,7 +26,8 @@ SessionSimulation::SessionSimulation(std::shared_ptr<const game_control::Scenari
       limits_(options.limits),
       needed_hands_(options.needed_hands),
       ages_(environment_.hands().size()),
-      tracks_(environment_.hands().size()) {
+      tracks_(environment_.hands().size()),
+      collides_((environment_.pairs().size() + 7) / 8) {
   for (HandAge& age : ages_) age.limits = limits_;
 }
 
@@ -47,6 +48,7 @@ void SessionSimulation::tick(const TickInput& input) noexcept {
   startWhenHandsPresent();
   environment_.setFreeBodiesPaused(isStill());
   environment_.step();
+  if (collides_revision_ != environment_.pairRevision()) findCollisionMatrix();
 }
 
 void SessionSimulation::dropFirstCommands(std::size_t count) noexcept {
@@ -220,7 +222,7 @@ TickOutput SessionSimulation::makeOutput() const {
   output.present.resize(environment_.hands().size());
   output.ages.resize(environment_.hands().size());
   output.pairs.reserve(environment_.contactListCapacity());
-  output.collides.resize((environment_.pairs().size() + 7) / 8);
+  output.collides.resize(collides_.size());
   return output;
 }
 
@@ -255,7 +257,7 @@ void SessionSimulation::fill(TickOutput& output) const noexcept {
     manifold.step_revision = output.step.revision;
   }
   fillPairs(output);
-  fillMatrix(output);
+  std::copy(collides_.begin(), collides_.end(), output.collides.begin());
 
   const simulation::Environment::Work& work = environment_.work();
   output.stats.tick = output.tick;
@@ -266,15 +268,16 @@ void SessionSimulation::fill(TickOutput& output) const noexcept {
   output.stats.state_hash = output.hash;
 }
 
-void SessionSimulation::fillMatrix(TickOutput& output) const noexcept {
-  std::fill(output.collides.begin(), output.collides.end(), std::uint8_t{0});
+void SessionSimulation::findCollisionMatrix() noexcept {
+  collides_revision_ = environment_.pairRevision();
+  std::fill(collides_.begin(), collides_.end(), std::uint8_t{0});
   const auto pairs = environment_.pairs();
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const simulation::PairSpec& spec = environment_.scene().pairs[i];
     const std::uint32_t group = environment_.groupOf(spec.a);
     const bool in_one_group = group != 0 && group == environment_.groupOf(spec.b);
     if (pairs[i].enabled && !in_one_group)
-      output.collides[i / 8] = static_cast<std::uint8_t>(output.collides[i / 8] | 1U << (i % 8));
+      collides_[i / 8] = static_cast<std::uint8_t>(collides_[i / 8] | 1U << (i % 8));
   }
 }
 

@@ -94,7 +94,7 @@ class SessionSimulation {
   [[nodiscard]] bool isTrackedElsewhere(std::size_t hand) const noexcept {
     return tracks_[hand].until >= environment_.tick() + 1;
   }
-  void fillMatrix(TickOutput& output) const noexcept;
+  void findCollisionMatrix() noexcept;
   void fillPairs(TickOutput& output) const noexcept;
   void applyReadings(const TickInput& input) noexcept;
   void setLimits(const Change& change) noexcept;
@@ -114,7 +114,9 @@ class SessionSimulation {
   LinkLimits limits_;
   std::vector<HandId> needed_hands_;
   std::vector<HandAge> ages_;
-  std::vector<ExternalTrack> tracks_;  ///< index = HandId
+  std::vector<ExternalTrack> tracks_;    ///< index = HandId
+  std::vector<std::uint8_t> collides_;   ///< CollisionMatrix::bits of all parts
+  std::uint32_t collides_revision_ = 0;  ///< Environment::pairRevision() that they are of
   void dropFirstCommands(std::size_t count) noexcept;
 
   static constexpr std::size_t kMaxCommands = 256;  ///< that wait; as many changes wait for ticks

@@ -47,6 +47,7 @@ std::string Environment::shareScheduling() { return engine_->pool.shareSchedulin
 
 void Environment::setPairEnabled(std::size_t pair, bool enabled) noexcept {
   if (pair >= pairs_.size()) return;
+  ++pair_revision_;
   if (enabled && !engine_->pairs[pair].enabled()) engine_->noteSwitched(static_cast<std::uint32_t>(pair));
   engine_->active_pairs -= engine_->countsAsActive(pair) ? 1U : 0U;
   engine_->setEnabled(pair, enabled);
@@ -57,6 +58,7 @@ void Environment::setPairEnabled(std::size_t pair, bool enabled) noexcept {
 
 void Environment::setGroup(ObjectId object, std::uint32_t group) noexcept {
   if (!isObject(object) || engine_->groups[object.value] == group) return;
+  ++pair_revision_;
   for (const std::uint32_t pair : engine_->pairsOf(object.value)) {
     engine_->active_pairs -= engine_->countsAsActive(pair) ? 1U : 0U;
   }

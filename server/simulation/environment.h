@@ -147,6 +147,8 @@ class Environment {
   /// Objects of one group never collide; 0: no group.
   void setGroup(ObjectId object, std::uint32_t group) noexcept;
   [[nodiscard]] std::uint32_t groupOf(ObjectId object) const noexcept;
+  /// Differs after each change of which pairs may collide; no part of the state.
+  [[nodiscard]] std::uint32_t pairRevision() const noexcept { return pair_revision_; }
   /// Point budget from the next tick on; 0: unlimited.
   void setBudget(std::uint64_t points) noexcept { work_limits_.points = points; }
   /// A wrench of a source other than contacts and couplings, about the object's origin; see
@@ -321,6 +323,7 @@ class Environment {
   std::unique_ptr<Engine> engine_;
   WorkLimits work_limits_;
   bool free_bodies_paused_ = false;
+  std::uint32_t pair_revision_ = 1;
   Work work_;
   Tick tick_ = 0;
 };

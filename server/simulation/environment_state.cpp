@@ -189,6 +189,7 @@ Result<void> Environment::restore(std::span<const std::uint8_t> bytes) {
   findMovable();
   countWork();
   for (std::uint32_t pair = 0; pair < pairs_.size(); ++pair) updatePairMotion(pair);
+  ++pair_revision_;
   return {};
 }
 

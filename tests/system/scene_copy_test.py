@@ -16,7 +16,8 @@ class SceneCopy(unittest.TestCase):
         self.assertEqual(trainee.wait(60), 0, trainee.text())
         self.assertIn("everything is mounted", server.text())
         self.assertIn(COPY, trainee.text())
-        self.assertNotIn(MANIFOLD, trainee.text(), "it went back")
+        if stage.lockstep:  # else a busy machine may be too slow for it, for a while
+            self.assertNotIn(MANIFOLD, trainee.text(), "it went back")
         return trainee.text()
 
     def test_a_part_is_mounted_by_a_station_on_the_servers_machine(self):

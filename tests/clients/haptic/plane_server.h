@@ -55,9 +55,11 @@ class PlaneServer {
     floor.object = kFloor;
     floor.epoch = floor_epoch;
     floor.X_WO = Pose(Vector3(0.0, 0.0, floor_height));
+    floor.status = static_cast<std::uint8_t>(ObjectStatus::kFixed);
     ObjectState ball;
     ball.object = kBall;
     ball.epoch = epoch;
+    ball.status = static_cast<std::uint8_t>(ObjectStatus::kHeld);
     frame.states.push_back(floor);
     frame.states.push_back(ball);
     return frame;

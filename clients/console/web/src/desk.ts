@@ -224,7 +224,10 @@ export class Desk {
   private openDialog(title: string, nodes: Node[], action: string, done: () => Promise<boolean>): void {
     const cancel = Object.assign(h("button", "", t("desk.cancel")), { type: "button" });
     const go = h("button", "primary", action);
-    const form = h("form", "", h("h2", "", title), ...nodes, h("div", "row end", cancel, go));
+    // the one beside the dialog cannot be pressed while it is open
+    const stop = Object.assign(h("button", "stop", icon("stop"), t("stop.press")), { type: "button" });
+    stop.addEventListener("click", () => void this.raise());
+    const form = h("form", "", h("h2", "", title), ...nodes, h("div", "row end", stop, cancel, go));
     cancel.addEventListener("click", () => this.dialog.close());
     form.addEventListener("submit", (event) => {
       event.preventDefault();

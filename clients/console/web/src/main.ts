@@ -155,15 +155,16 @@ languages.addEventListener("change", () => {
 });
 themeButton.addEventListener("click", () => setTheme(document.documentElement.dataset["theme"] === "light" ? "dark" : "light"));
 addEventListener("keydown", (event) => {
-  const isTyping = event.target instanceof HTMLInputElement || event.target instanceof HTMLTextAreaElement || event.target instanceof HTMLSelectElement;
-  if (isTyping || event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]") !== null) return;
+  const isText = (event.target instanceof HTMLInputElement && !["range", "checkbox", "radio", "button"].includes(event.target.type)) || event.target instanceof HTMLTextAreaElement;
+  if (isText || event.ctrlKey || event.metaKey || event.altKey) return;
   if (event.key === " ") {
-    // the stop comes before whatever has the focus
+    // the stop comes before whatever has the focus: a list, a slider, a dialog
     event.preventDefault();
     if (event.repeat) return;
     if (player !== undefined) player.toggle();
     else void desk?.raise();
   }
+  if (event.target instanceof HTMLInputElement || event.target instanceof HTMLSelectElement || document.querySelector("dialog[open]") !== null) return;
   if (part?.onKeyDown(event) === true || (lobby === undefined && tools?.onKeyDown(event) === true)) return;
   if (event.key === "r") view?.frame();
   if (event.key === "l") themeButton.click();

@@ -241,8 +241,10 @@ export class Part {
     update();
     const cancel = Object.assign(h("button", "", t("desk.cancel")), { type: "button" });
     cancel.addEventListener("click", () => this.dialog.close());
+    const stop = Object.assign(h("button", "stop", icon("stop"), t("stop.press")), { type: "button" });
+    stop.addEventListener("click", () => this.raise());
     const form = h("form", "", h("h2", "", t("part.take")), h("p", "", t("part.what")), field("desk.sit.role", role), field("desk.sit.name", name), keyField, note,
-      h("div", "row end", cancel, h("button", "primary", t("part.take"))));
+      h("div", "row end", stop, cancel, h("button", "primary", t("part.take"))));
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       this.dialog.close();
