@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "idl/types/number_range.h"
 #include "idl/types/output_files.h"
 #include "scenarios/part_generator/engine_bay_layout.h"
 #include "scenarios/part_generator/scenario_parts.h"
@@ -102,8 +103,9 @@ int main(int argc, char** argv) {
   auto* detail_option =
       app.add_option("--detail", detail,
                      "tessellation of curved surfaces, from 0 (coarse) to 1 (fine); default: the scenario's")
-          ->check(CLI::Range(0.0, 1.0));
+          ->check(numberFrom(0.0, 1.0));
   app.add_option("--triangles", triangles, "approximate number of triangles of all files together")
+      ->check(CLI::Range(0, 1'000'000'000))
       ->excludes(detail_option);
   app.add_flag("--list", list, "print the scenarios and their parts, and write nothing");
   app.add_flag("--layout", layout, "print the poses and boxes of the engine bay, and write nothing");

@@ -19,8 +19,10 @@ using Edge = WeldedMesh::Edge;
 using structures::FeatureEdge;
 using structures::SurfaceSample;
 
-constexpr double kFlatCosine =
-    -0.99863;                         // [-] of the angle between faces: flatter ones (177 deg) have no edge
+// [-] of the angle between faces: flatter ones (177 deg) are facets of a round surface, not sides of an edge,
+// and the flattest (179.7 deg) those of a plane, as far as its vertices are exact
+constexpr double kFlatCosine = -0.99863;
+constexpr double kPlaneCosine = -0.999986;
 constexpr double kTanHalf60 = 0.577;  // [-] of a facet of a round surface at most
 constexpr double kTanHalf40 = 0.364;  // [-] tan of half the turn from which an edge is sharp at any radius
 constexpr double kCos6 = 0.995;       // [-] a polyline that turns less at a vertex is straight there
@@ -49,11 +51,12 @@ struct Sizes {
   double apart;           ///< of the other part's points, about
   double piece;           ///< longest piece of an edge
   double sharp_radius;    ///< rounder edges are sampled as surfaces, without their edges
-  double largest_radius;  ///< rounder surfaces are no features
+  double largest_radius;  ///< rounder surfaces are no features; of facets, on a ball of equal ones 1.5 radii
 
-  /// Spacing of points on a surface of this radius: a flat face enters between two by apart / 16 at most.
+  /// Spacing of points on a surface of this radius: a flat face enters between two by apart / 16 at most, and
+  /// no end of a thin stud is passed over.
   [[nodiscard]] double spacingAt(double radius) const {
-    return std::clamp(std::sqrt(0.5 * radius * apart), apart / 16.0, apart);
+    return std::clamp(std::min(std::sqrt(0.5 * radius * apart), 0.6 * radius), apart / 16.0, apart);
   }
 };
 
@@ -99,11 +102,15 @@ class FeatureFinder {
     }
     if (!open) {
       const double flat = convex.into_M[0].dot(convex.into_M[1]);
-      if (flat < kFlatCosine) return;
+      if (flat < kPlaneCosine) return;
       const Vector3 outward = sides.outward(edge.first);
       if (outward.dot(convex.into_M[1]) > 0.0) return;
       convex.tan_half_turn = std::sqrt((1.0 + flat) / std::max(1.0 - flat, 1e-12));
       convex.radius = 0.5 * width / convex.tan_half_turn;
+      if (flat < kFlatCosine) {
+        if (convex.radius <= sizes_.largest_radius) round_.push_back(convex);
+        return;
+      }
     }
     // points of the other part see a long ridge that is wider than half their distance
     const bool is_ridge = convex.radius > 0.5 * sizes_.apart && convex.radius <= sizes_.largest_radius &&

@@ -240,8 +240,11 @@ std::vector<WeldedMesh::Edge> WeldedMesh::edgesAbove(double cosine) const {
       sharp.push_back({from, to, triangle, other});
     }
   });
-  // in a mesh that is hardly connected, open edges are not features of the shape
-  if (open.size() * 3 < edges) sharp.insert(sharp.end(), open.begin(), open.end());
+  // In a mesh of unconnected triangles or quadrilaterals, 1 and 4/5 of the edges are open and most of them no
+  // features of the shape; of a connected strip one half is. In a small mesh they cost little.
+  constexpr std::size_t kSmall = 100;
+  const bool is_connected = open.size() * 5 < edges * 3;
+  if (is_connected || edges <= kSmall) sharp.insert(sharp.end(), open.begin(), open.end());
   return sharp;
 }
 

@@ -26,6 +26,9 @@ constexpr int kSeamRounds = 2;
 /// So many steps in a row may fail to lower the merit function; one more, and all of them are rejected.
 constexpr int kMaxNonmonotoneSteps = 1;
 
+/// So many steps in a row may leave an overlap into which a step has led; their iterates need not be better.
+constexpr int kMaxRestorations = 4;
+
 /// [m] A step shorter than this may be blocked by the field's discretisation alone.
 constexpr double kSmallStep = 1e-4;
 
@@ -54,6 +57,7 @@ IslandSolver::IslandSolver(std::size_t max_bodies, std::size_t max_pairs)
       last_step_(max_bodies),
       best_iterate_(max_bodies),
       initial_poses_(max_bodies),
+      springs_(max_bodies),
       wrenches_(max_bodies),
       depths_(max_bodies),
       constrained_(max_bodies) {
@@ -90,8 +94,10 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
   }
   std::fill(last_step_.begin(), last_step_.end(), Displacement{});
   double best = std::numeric_limits<double>::infinity();
-  double at_start = best;
+  double at_start = best, overlap_at_start = 0.0;
   double trust_radius = job.limits.max_step_length;
+  bool restores = false;  // the last step left an overlap
+  int restorations = 0;   // in a row
   int nonmonotone = 0;
   std::uint32_t free_steps = 0;
   warmStart(job);
@@ -107,13 +113,13 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
   while (true) {
     computeStep(job, report);
     const double here = merit(job);
-    if (report.steps == 0) at_start = here;
+    if (report.steps == 0) at_start = here, overlap_at_start = deepestOverlap(job);
     if (here < best) {
       best = here;
       nonmonotone = 0;
       trust_radius = std::min(2.0 * trust_radius, job.limits.max_step_length);
       for (std::size_t i = 0; i < job.bodies.size(); ++i) best_iterate_[i] = job.bodies[i].X_WB;
-    } else {
+    } else if (!restores) {
       ++nonmonotone;
       trust_radius *= 0.5;
     }
@@ -137,7 +143,12 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
       report.unconverged = length > kUnconverged;
       break;
     }
-    if (limitStep(job, std::min(trust_radius, validityRadius(job)))) ++free_steps;
+    restores = overlap_at_start <= kTouchGap && restorations < kMaxRestorations && length > trust_radius &&
+               deepestOverlap(job) > kTouchGap;
+    restorations = restores ? restorations + 1 : 0;
+    if (restores) computeRestoration(job, report);
+    const double trust = restores ? job.limits.max_step_length : trust_radius;
+    if (limitStep(job, std::min(trust, validityRadius(job)))) ++free_steps;
     takeStep(job);
     ++report.steps;
   }
@@ -168,9 +179,23 @@ double IslandSolver::merit(const Job& job) {
       force += spring.stiffness * stretch + springTorque(spring, to_goal.rotation).norm() / body.radius;
     }
   }
+  return energy + kPenetrationWeight * force * std::max(deepestOverlap(job) - kFieldNoise, 0.0);
+}
+
+double IslandSolver::deepestOverlap(const Job& job) {
   double depth = 0.0;
   for (const IslandPairResult& result : job.results) depth = std::max(depth, -result.query.smallest_gap);
-  return energy + kPenetrationWeight * force * std::max(depth - kFieldNoise, 0.0);
+  return depth;
+}
+
+void IslandSolver::computeRestoration(const Job& job, SolveReport& report) {
+  for (std::size_t i = 0; i < job.bodies.size(); ++i) {
+    MovableBody& body = job.bodies[i];
+    springs_[i] = body.springs;
+    for (Spring& spring : body.springs) spring.X_WG = body.X_WB;
+  }
+  solveQp(job, report);
+  for (std::size_t i = 0; i < job.bodies.size(); ++i) job.bodies[i].springs = springs_[i];
 }
 
 void IslandSolver::evaluateConstraints(const Job& job, SolveReport& report) {

@@ -115,6 +115,10 @@ struct SolveReport {
 ///   lower it halves the trust region; after a second one in a row the solver returns to the best iterate.
 /// * Trust region: no point of a body that may reach a contact in a step moves by more than its radius, at
 ///   most `max_step_length`.
+/// * Restoration: where a step has led into an overlap, as at a jump of the interpolated distance in a
+///   concave corner, the fraction of the next one that the trust region allows would hardly leave it. The
+///   smallest step out of it is taken first, else the bodies would be held by nothing that touches (D-083).
+///   Not in a solve that begins with an overlap, as in a tight fit.
 /// * Free motion: the gap of a pair is a lower bound of what its bodies may approach each other before any
 ///   point of one meets the other (conservative advancement about the centres of their bounding spheres). A
 ///   step within it is not limited by the trust region: a body far from others takes its goal in one step.
@@ -219,6 +223,10 @@ class IslandSolver {
   void restoreBestIterate(const Job& job);
   /// [J] Merit function at the iterate: lower is better.
   [[nodiscard]] static double merit(const Job& job);
+  /// [m] At the iterate; 0 without an overlap.
+  [[nodiscard]] static double deepestOverlap(const Job& job);
+  /// Sets step_ to the smallest one that leaves all overlaps, by the linearised gaps.
+  void computeRestoration(const Job& job, SolveReport& report);
   /// Stiffens bodies whose step goes back along the last one. False when there is none.
   [[nodiscard]] bool dampOvershoot(const Job& job);
   void fillForces(const Job& job) const;
@@ -306,9 +314,11 @@ class IslandSolver {
   std::vector<Displacement> last_step_;           ///< the step that led to the iterate
   std::vector<Pose> best_iterate_;                ///< by the merit function, in this solve
   std::vector<Pose> initial_poses_;               ///< of this solve
-  std::vector<Wrench> wrenches_;                  ///< for kBlocking: penalty on a body, about its centre Q
-  std::vector<double> depths_;                    ///< [m] for kBlocking: largest overlap of a body
-  std::vector<std::uint8_t> constrained_;         ///< body has an active row
+  /// Of each body, while computeRestoration changes them.
+  std::vector<FixedVector<Spring, kMaxSprings>> springs_;
+  std::vector<Wrench> wrenches_;           ///< for kBlocking: penalty on a body, about its centre Q
+  std::vector<double> depths_;             ///< [m] for kBlocking: largest overlap of a body
+  std::vector<std::uint8_t> constrained_;  ///< body has an active row
 };
 
 }  // namespace tenon::collision

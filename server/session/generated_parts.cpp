@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <csignal>
 #include <cstdlib>
 #include <sstream>
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -24,8 +27,23 @@ fs::path generator() {
   return fs::read_symlink("/proc/self/exe", ignored).parent_path() / "tenon-parts";
 }
 
-/// What a program prints to stdout.
-Result<std::string> outputOf(const std::vector<std::string>& arguments) {
+/// Reads until the other end is closed; false when `stop` was set before. [ms] `kPatience`.
+bool readAll(int pipe_end, const std::atomic<bool>* stop, std::string& output) {
+  constexpr int kPatience = 50;
+  std::array<char, 4096> block{};
+  while (stop == nullptr || !*stop) {
+    pollfd waiting{pipe_end, POLLIN, 0};
+    const int ready = poll(&waiting, 1, kPatience);
+    if (ready == 0 || (ready < 0 && errno == EINTR)) continue;
+    const ssize_t size = read(pipe_end, block.data(), block.size());
+    if (size <= 0) return true;
+    output.append(block.data(), static_cast<std::size_t>(size));
+  }
+  return false;
+}
+
+/// What a program prints to stdout; it is ended once `stop`, which may be null, is set.
+Result<std::string> outputOf(const std::vector<std::string>& arguments, const std::atomic<bool>* stop) {
   std::vector<char*> argv;
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
@@ -39,9 +57,7 @@ Result<std::string> outputOf(const std::vector<std::string>& arguments) {
   posix_spawn_file_actions_destroy(&actions);
   close(pipe_ends[1]);
   std::string output;
-  std::array<char, 4096> block{};
-  for (ssize_t n = 0; started == 0 && (n = read(pipe_ends[0], block.data(), block.size())) > 0;)
-    output.append(block.data(), static_cast<std::size_t>(n));
+  if (started == 0 && !readAll(pipe_ends[0], stop, output)) kill(child, SIGKILL);
   close(pipe_ends[0]);
   if (started != 0) return fail(fmt::format("cannot start {}: is the installation complete?", arguments[0]));
   int status = 0;
@@ -139,10 +155,11 @@ Result<std::string> generatedSetOf(const game_control::ScenarioFile& scenario,
 }
 
 Result<fs::path> generatedParts(const game_control::ScenarioFile& scenario, const fs::path& cache,
-                                double detail, const std::function<void()>& on_generation) {
+                                double detail, const std::function<void()>& on_generation,
+                                const std::atomic<bool>* stop) {
   if (partMeshes(scenario).empty()) return fs::path{};
   const fs::path program = generator();
-  const auto list = outputOf({program.string(), "--list"});
+  const auto list = outputOf({program.string(), "--list"}, stop);
   if (!list) return fail(list.error().what);
   const auto set = generatedSetOf(scenario, parseSetList(*list));
   if (!set) return fail(set.error().what);
@@ -160,8 +177,12 @@ Result<fs::path> generatedParts(const game_control::ScenarioFile& scenario, cons
   if (error)
     return fail(fmt::format("{}: cannot make this folder ({})", temporary.string(), error.message()));
   const auto done = outputOf(
-      {program.string(), *set, temporary.string(), "--detail", fmt::format("{}", detail), "--overwrite"});
-  if (!done) return fail(done.error().what);
+      {program.string(), *set, temporary.string(), "--detail", fmt::format("{}", detail), "--overwrite"},
+      stop);
+  if (!done) {
+    fs::remove_all(temporary, error);
+    return fail(done.error().what);
+  }
   fs::remove_all(folder, error);
   fs::rename(temporary, folder, error);
   if (error && !fs::exists(folder)) return fail(fmt::format("{}: {}", folder.string(), error.message()));

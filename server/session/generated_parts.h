@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -28,12 +29,14 @@ struct GeneratedSet {
 
 /// The folder of the generated parts of a scenario, at `detail` [-] 0..1, below the folder `cache`; runs the
 /// generator unless it is up to date, after a call of `on_generation`, which may be empty. Empty when the
-/// scenario names no part. The generator is $TENON_PARTS, or tenon-parts beside this program. Fails when the
-/// generator does, or as generatedSetOf.
+/// scenario names no part. The generator is $TENON_PARTS, or tenon-parts beside this program; it is ended
+/// once `stop`, which may be null, is set. Fails when the generator does, or as generatedSetOf; then no new
+/// folder is left.
 ///
 /// Threads: one. Real-time: no.
 [[nodiscard]] Result<std::filesystem::path> generatedParts(const game_control::ScenarioFile& scenario,
                                                            const std::filesystem::path& cache, double detail,
-                                                           const std::function<void()>& on_generation = {});
+                                                           const std::function<void()>& on_generation = {},
+                                                           const std::atomic<bool>* stop = nullptr);
 
 }  // namespace tenon::session

@@ -115,7 +115,7 @@ Result<std::shared_ptr<const structures::HapticStructures>> structuresOf(
     bake.refine.push_back({box});
   const auto report = [&](double fraction, std::string_view activity) {
     if (progress) progress(fmt::format("{}: {}", object.title.front().text, activity), fraction);
-    return true;
+    return !options.isStopped();
   };
   const auto file = bake::bakeCached(meshes->files, meshes->unit, bake, options.cache / "structures", report);
   if (!file)
@@ -179,9 +179,12 @@ Result<LoadedScene> loadScene(const fs::path& path, const LoadOptions& options,
 
 Result<LoadedStructures> loadStructures(std::shared_ptr<const game_control::ScenarioFile> scenario,
                                         const LoadOptions& options, const LoadProgress& progress) {
-  const auto parts = generatedParts(*scenario, options.cache, options.detail, [&] {
-    if (progress) progress("generating the parts", 0.0);
-  });
+  const auto parts = generatedParts(
+      *scenario, options.cache, options.detail,
+      [&] {
+        if (progress) progress("generating the parts", 0.0);
+      },
+      options.stop);
   if (!parts) return fail(parts.error().what);
   std::vector<std::shared_ptr<const structures::HapticStructures>> structures(scenario->objects.size());
   for (const ObjectId id : game_control::bakeOrder(*scenario)) {
@@ -262,6 +265,7 @@ Result<std::string> storeAssets(const LoadedScene& loaded, const LoadOptions& op
   const wire::AssetStore store(options.cache / "assets");
   std::string objects;
   for (const game_control::ScenarioObject& object : scenario.objects) {
+    if (options.isStopped()) return fail("stopped");
     const auto meshes = meshesOf(scenario, object, *parts, options);
     if (!meshes) return fail(meshes.error().what);
     const auto levels = displayLevels(*meshes, store, options.cache / "display");

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -18,6 +19,11 @@ struct LoadOptions {
   std::filesystem::path cache;  ///< folder of baked structures and generated parts
   double detail = 1.0;          ///< [-] mesh resolution of generated parts, 0..1; 1 is the scene of the paper
   game_control::ReadOptions read;  ///< of the scenario file
+  /// Once it is set, loading ends soon with an error, and leaves nothing half-written in the cache; null:
+  /// nothing stops it.
+  const std::atomic<bool>* stop = nullptr;
+
+  [[nodiscard]] bool isStopped() const { return stop != nullptr && *stop; }
 };
 
 /// Called with the current activity, as in "engine bay: signs", and its finished `fraction` [-], 0..1.

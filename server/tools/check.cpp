@@ -13,6 +13,7 @@
 
 #include "devices/catalog.h"
 #include "idl/types/cache_folder.h"
+#include "idl/types/number_range.h"
 #include "server/session/loading_display.h"
 #include "server/session/scene_loader.h"
 
@@ -150,7 +151,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--detail", arguments.load.detail,
                  "mesh resolution of generated parts, 0 to 1; 1: that of the paper")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(numberFrom(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--cache", arguments.load.cache, "folder for generated parts and haptic structures");
   app.add_flag("-q,--quiet", arguments.quiet, "errors and warnings only, no progress");

@@ -15,6 +15,7 @@
 #include "server/session/scene_loader.h"
 #include "server/simulation/environment.h"
 #include "tests/support/known_shortfall.h"
+#include "tests/support/test_meshes.h"
 
 namespace tenon::session {
 namespace {
@@ -133,6 +134,58 @@ TEST_P(Studs, DoNotEnterAFlatFaceBetweenItsPoints) {
 INSTANTIATE_TEST_SUITE_P(Diameters, Studs, ::testing::Values(0.001, 0.002, 0.003, 0.004, 0.006),
                          [](const auto& one) { return fmt::format("{}mm", std::lround(1e3 * one.param)); });
 
+struct DomeCase {
+  const char* name;
+  double diameter_mm;
+  int level;           ///< of its facets: 5 turn by 2 degrees, 2 by 18
+  double known = 0.0;  ///< [m] that it enters today; 0: no more than promised
+};
+void PrintTo(const DomeCase& one, std::ostream* out) { *out << one.name; }
+
+//  [======]   a plate in a hand
+//     ()      a stud with the end of a ball
+//  ========
+class Domes : public BothSides, public ::testing::WithParamInterface<DomeCase> {};
+
+TEST_P(Domes, DoNotEnterAFlatFaceBetweenItsPoints) {
+  constexpr double kTip = 0.015;        // [m]
+  constexpr double kHalfPlate = 0.005;  // [m]
+  const double radius = 0.5e-3 * GetParam().diameter_mm;
+  fs::create_directories(folder_);
+  ASSERT_TRUE(bake::writeStl(folder_ / "ball.stl",
+                             test::ballMesh(radius, GetParam().level, {0.0, 0.0, kTip - radius}), 1e-3));
+  const auto scene = load(fmt::format("{{box: [120 mm, 120 mm, 20 mm], at: [0, 0, -10 mm]}}, "
+                                      "{{cylinder: {{radius: {}, length: 20 mm}}, at: [0, 0, {}]}}, "
+                                      "{{file: ball.stl, unit: mm}}",
+                                      radius, kTip - radius - 0.01),
+                          "{box: [40 mm, 40 mm, 10 mm]}", 2.0);
+  ASSERT_TRUE(scene);
+  double lowest = 1.0;
+  double highest = -1.0;
+  for (int i = 0; i < kOffsets; ++i) {
+    for (int j = 0; j < kOffsets; ++j) {
+      const Pose X_WO(Vector3(kOffsetStep * i, kOffsetStep * j, kTip + kHalfPlate));
+      const Pose X_WO_pressed = pressedDown(scene, X_WO);
+      const double height =
+          (X_WO_pressed * Vector3(-kOffsetStep * i, -kOffsetStep * j, -kHalfPlate)).z() - kTip;
+      lowest = std::min(lowest, height);
+      highest = std::max(highest, height);
+    }
+  }
+  if (GetParam().known > 0.0) {
+    EXPECT_TRUE(test::knownShortfall(-lowest, 0.0003, GetParam().known));
+  } else {
+    EXPECT_GE(lowest, -0.0003);
+  }
+  EXPECT_LE(highest, 0.0003 + scene->objects[0].structures->field.dilation()) << "it does not reach the dome";
+}
+
+INSTANTIATE_TEST_SUITE_P(Diameters, Domes,
+                         ::testing::Values(DomeCase{"Fine1mm", 1.0, 5}, DomeCase{"Fine2mm", 2.0, 5},
+                                           DomeCase{"Fine4mm", 4.0, 5}, DomeCase{"Fine6mm", 6.0, 5, 0.0004},
+                                           DomeCase{"Coarse2mm", 2.0, 2}, DomeCase{"Coarse4mm", 4.0, 2}),
+                         [](const auto& one) { return std::string(one.param.name); });
+
 struct CrossingCase {
   const char* name;
   double voxel_mm;
@@ -182,6 +235,65 @@ INSTANTIATE_TEST_SUITE_P(Bars, Crossings,
                                            CrossingCase{"Voxel2", 2.0, 0.0, 0.0},
                                            CrossingCase{"Turned", 2.0, 0.6, 0.0},
                                            CrossingCase{"Rolled", 2.0, 0.3, 0.3}),
+                         [](const auto& one) { return std::string(one.param.name); });
+
+struct RimCase {
+  const char* name;
+  int cells;         ///< of the sheet along each side, two triangles each
+  const char* held;  ///< its lowest point is 10 mm below its origin
+};
+void PrintTo(const RimCase& one, std::ostream* out) { *out << one.name; }
+
+//  <=====>   a bar or a pin in a hand
+//     |      a sheet without thickness, on edge, in refined bricks
+class Rims : public BothSides, public ::testing::WithParamInterface<RimCase> {
+ protected:
+  std::string sheet() const {
+    constexpr float kSide = 0.06F;  // [m] from the origin down, and to either side of it
+    const int cells = GetParam().cells;
+    bake::TriangleMesh mesh;
+    const auto at = [&](int i) { return kSide * static_cast<float>(i) / static_cast<float>(cells); };
+    const auto corner = [&](int i, int j) { return static_cast<std::uint32_t>(i * (cells + 1) + j); };
+    for (int i = 0; i <= cells; ++i)
+      for (int j = 0; j <= cells; ++j) mesh.vertices.emplace_back(0.0F, at(i) - 0.5F * kSide, -at(j));
+    for (int i = 0; i < cells; ++i) {
+      for (int j = 0; j < cells; ++j) {
+        mesh.triangles.push_back({corner(i, j), corner(i + 1, j), corner(i + 1, j + 1)});
+        mesh.triangles.push_back({corner(i, j), corner(i + 1, j + 1), corner(i, j + 1)});
+      }
+    }
+    fs::create_directories(folder_);
+    EXPECT_TRUE(bake::writeStl(folder_ / "sheet.stl", mesh, 1e-3));
+    return "{file: sheet.stl, unit: mm}";
+  }
+};
+
+TEST_P(Rims, OfASheetHoldWhatIsPressedOnThem) {
+  const auto scene =
+      load(sheet(), GetParam().held, 3.0,
+           "refinement: 8, refine: [{from: [-0.01, -0.035, -0.065], to: [0.01, 0.035, 0.005]}]");
+  ASSERT_TRUE(scene);
+  double lowest = 1.0;
+  double highest = -1.0;
+  for (int i = 0; i < kOffsets; ++i) {
+    for (int j = 0; j < kOffsets; ++j) {
+      const Pose X_WO(Vector3(kOffsetStep * i, kOffsetStep * j - 0.002, 0.01));
+      const double height = pressedDown(scene, X_WO).translation().z() - 0.01;
+      lowest = std::min(lowest, height);
+      highest = std::max(highest, height);
+    }
+  }
+  EXPECT_GE(lowest, -0.0003);
+  EXPECT_LE(highest, 0.0005) << "it does not reach the rim";
+}
+
+constexpr const char* kBar = "{box: [60 mm, 14.142 mm, 14.142 mm], turn: {axis: x, deg: 45}}";
+constexpr const char* kPin = "{cylinder: {radius: 5 mm, length: 20 mm}}";
+INSTANTIATE_TEST_SUITE_P(Sheets, Rims,
+                         ::testing::Values(RimCase{"BarOnTwoTriangles", 1, kBar},
+                                           RimCase{"BarOnEighteen", 3, kBar}, RimCase{"BarOnMany", 12, kBar},
+                                           RimCase{"PinOnTwoTriangles", 1, kPin},
+                                           RimCase{"PinOnMany", 12, kPin}),
                          [](const auto& one) { return std::string(one.param.name); });
 
 struct TaperCase {

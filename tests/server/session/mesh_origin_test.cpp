@@ -155,7 +155,7 @@ const std::vector<Waypoint> kPath{
     {7600, {-0.09, 0.08, 0.015}, {0, 0, 0}},  // pushes it, at its middle
     {8000, {-0.09, 0.08, 0.015}, {0, 0, 0}},
 };
-constexpr Tick kTicks = 8000;
+constexpr Tick kOriginTicks = 8000;
 
 Pose handAt(Tick tick) {
   const auto now = static_cast<double>(tick);
@@ -270,7 +270,7 @@ TEST_F(MeshOrigin, DoesNotMatter) {
   SessionWithStation moved(folder_ / "moved", -kShift);
   double place = 0.0, position_error = 0.0;
   Difference server, station;
-  for (Tick tick = 1; tick <= kTicks; ++tick) {
+  for (Tick tick = 1; tick <= kOriginTicks; ++tick) {
     plain.tick();
     moved.tick();
     for (std::size_t i = 0; i < plain.objects(); ++i) {

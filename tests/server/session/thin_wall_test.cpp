@@ -14,7 +14,7 @@ using test::WallCase;
 using test::WallScene;
 
 /// [m] Furthest that a point of a held part may be behind an exact wall.
-constexpr double kBehind = 0.0003;
+constexpr double kMostBehind = 0.0003;
 
 /// Tilts of a wall against the axes of the field [rad]: none, about an axis, so that it lies across the
 /// diagonal of the voxels, and small ones; with each an offset [voxels].
@@ -45,7 +45,7 @@ class WallBesideAClearance : public testing::TestWithParam<double> {
       EXPECT_EQ(wall.bay().info.open_area, 0.0);
       const double speed = kSpeeds[turn++ % kSpeeds.size()];
       const WallScene::Push push = wall.push(speed);
-      EXPECT_LE(push.behind, kBehind) << "tilt " << placement.tilt.transpose() << ", " << speed << " m/s";
+      EXPECT_LE(push.behind, kMostBehind) << "tilt " << placement.tilt.transpose() << ", " << speed << " m/s";
       EXPECT_GT(push.final_force, 10.0) << "tilt " << placement.tilt.transpose() << ", " << speed << " m/s";
       behind = std::max(behind, push.behind);
     }
