@@ -7,8 +7,10 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/console/gateway.h"
+#include "idl/threads/line_printer.h"
 #include "idl/types/cache_folder.h"
 #include "idl/wire/network.h"
+#include "idl/wire/session_name.h"
 
 namespace {
 
@@ -27,7 +29,7 @@ int run(int argc, char** argv) {
   app.add_option("shown", shown,
                  "name of a session, or a recording, FILE.mcap; default: all sessions there are")
       ->option_text("SESSION|FILE.mcap");
-  app.add_option("--session", options.session, "name of a session");
+  tenon::wire::addSessionOption(app, options.session, "name of a session");
   app.add_option("--role", role,
                  "instructor or trainee: prints an address that gives this role to whoever has it, with the "
                  "key of your sessions")
@@ -55,6 +57,10 @@ int run(int argc, char** argv) {
   app.add_option(
       "--allow-origin", options.web.origins,
       "a viewer's page from elsewhere that may connect, as in https://viewer.example; repeat it for more");
+  app.add_option("--recordings-from", options.web.recordings_from,
+                 "a server from which the page may open recordings by their addresses, as in "
+                 "https://files.example; repeat it for more")
+      ->option_text("ORIGIN");
   app.add_option("--cache", options.cache, "folder in which the server keeps the models of parts");
   app.add_option("--recordings", options.recordings,
                  "folder for recordings that instructors start in the browser; default: none can be started")
@@ -69,15 +75,19 @@ int run(int argc, char** argv) {
     options.recording = shown;
   else if (!shown.empty())
     options.session = shown;
+  if (const auto permitted = tenon::wire::checkSessionName(options.session);
+      !options.session.empty() && !permitted) {
+    std::fprintf(stderr, "tenon-console: %s\n", permitted.error().what.c_str());
+    return 2;
+  }
   if (!certificate.empty()) {
     options.web.certificate = certificate[0];
     options.web.key = certificate[1];
   }
   if (!role.empty()) options.role = role == "trainee" ? tenon::Role::kTrainee : tenon::Role::kInstructor;
-  options.print = [](const std::string& text) {
-    std::printf("%s\n", text.c_str());
-    std::fflush(stdout);
-  };
+  // a terminal that stands still does not stop the gateway
+  tenon::threads::LinePrinter printer(tenon::threads::LinePrinter::kOutput);
+  options.print = [&printer](const std::string& text) { printer.print(text); };
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
   if (const auto served = tenon::console::runGateway(options, stop); !served) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <fstream>
 #include <iterator>
@@ -164,14 +165,28 @@ Answer Site::answer(std::string_view target, std::string_view range) const {
   return text(404, "text/plain; charset=utf-8", "there is no such page\n");
 }
 
-std::string_view contentSecurityPolicy() {
+bool isOrigin(std::string_view text) {
+  for (const std::string_view scheme : {"http://", "https://"}) {
+    if (!text.starts_with(scheme)) continue;
+    const std::string_view host = nameOfHost(text.substr(scheme.size()));
+    const auto isOfNames = [](char c) {
+      return std::isalnum(static_cast<unsigned char>(c)) || c == '.' || c == '-';
+    };
+    return !host.empty() && std::all_of(host.begin(), host.end(), isOfNames);
+  }
+  return false;
+}
+
+std::string contentSecurityPolicy(const std::vector<std::string>& recordings_from) {
+  std::string others;
+  for (const std::string& origin : recordings_from) others += " " + origin;
   // WebAssembly decodes the models; blob: is how the model loader reads what is inside of a file; two
   // recordings beside each other are two frames of this page, and no other page has it in a frame
   return "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data: "
-         "blob:; "
-         "connect-src 'self' blob:; worker-src 'self' blob:; font-src 'self'; base-uri 'none'; form-action "
-         "'none'; "
-         "frame-src 'self'; frame-ancestors 'self'";
+         "blob:; connect-src 'self' blob:" +
+         others +
+         "; worker-src 'self' blob:; font-src 'self'; base-uri 'none'; form-action 'none'; frame-src 'self'; "
+         "frame-ancestors 'self'";
 }
 
 bool isPermittedOrigin(std::string_view origin, std::string_view host, bool is_secure,

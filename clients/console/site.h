@@ -59,8 +59,13 @@ inline constexpr std::string_view kFirstRoom = "/live";
 /// list of all; any other path is that of public viewers: "/live", what this gateway shows first.
 [[nodiscard]] std::string roomOf(std::string_view target);
 
-/// The header Content-Security-Policy of all answers: nothing is loaded from elsewhere.
-[[nodiscard]] std::string_view contentSecurityPolicy();
+/// Whether this names a server as a browser does: scheme, host and perhaps a port, as in
+/// "https://files.example:8443", and no path.
+[[nodiscard]] bool isOrigin(std::string_view text);
+
+/// The header Content-Security-Policy of all answers: nothing is loaded from elsewhere, but recordings from
+/// the servers of these origins.
+[[nodiscard]] std::string contentSecurityPolicy(const std::vector<std::string>& recordings_from);
 
 /// Whether a request may come from a page of `origin` (the header Origin; empty: not from a browser): pages
 /// of this server at `host` (the header Host), by https when `is_secure`, and those of `others`.

@@ -145,8 +145,7 @@ void WebConnection::respond(const Request& request, Answer answer) {
   response->set(http::field::content_type, answer.type);
   response->set(http::field::cache_control,
                 answer.is_immutable ? "public, max-age=31536000, immutable" : "no-cache");
-  const std::string_view policy = contentSecurityPolicy();
-  response->set("Content-Security-Policy", beast::string_view(policy.data(), policy.size()));
+  response->set("Content-Security-Policy", contentSecurityPolicy(server_.options.recordings_from));
   for (const auto& [name, value] : answer.headers) response->set(name, value);
   response->set("X-Content-Type-Options", "nosniff");
   response->set("Referrer-Policy", "no-referrer");

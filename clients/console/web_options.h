@@ -18,8 +18,9 @@ struct WebOptions {
   std::filesystem::path key;
   bool is_plain_permitted = false;  ///< without TLS beyond the loopback interface, too
   std::vector<std::string>
-      origins;                 ///< pages from elsewhere that may connect, as in "https://viewer.example"
-  std::string name = "tenon";  ///< of the server, for viewers
+      origins;  ///< pages from elsewhere that may connect, as in "https://viewer.example"
+  std::vector<std::string> recordings_from;  ///< origins of servers from which the page may read recordings
+  std::string name = "tenon";                ///< of the server, for viewers
 };
 
 using ViewerId = std::uint64_t;  ///< of one connection; never used again

@@ -80,6 +80,10 @@ WebViewer* WebService::find(ViewerId id) {
 
 Result<std::unique_ptr<WebServer>> WebServer::open(const WebOptions& options, Site site,
                                                    WebHandlers handlers) {
+  for (const std::string& origin : options.recordings_from)
+    if (!isOrigin(origin))
+      return fail("--recordings-from " + origin +
+                  ": is no server's origin, as https://files.example:8443 is");
   auto impl = std::make_unique<WebService>(options, std::move(site), std::move(handlers));
   if (!options.certificate.empty()) {
     auto certificate = Certificate::read(options.certificate, options.key);

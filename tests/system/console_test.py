@@ -1,5 +1,6 @@
 """The console: what viewers of its WebSocket get of a session, what it refuses, and its page in a browser."""
 import contextlib
+import http.server
 import json
 import math
 import os
@@ -10,8 +11,10 @@ import socket
 import struct
 import subprocess
 import sys
+import threading
 import time
 import unittest
+import urllib.parse
 from pathlib import Path
 
 from stage import COARSE, PROGRAMS, Process, SOURCE, Stage, final_hash, tenon
@@ -302,6 +305,41 @@ class Desk(unittest.TestCase):
             with self.assertRaises(Refused) as refused:
                 Viewer(port, path="/live/other")
             self.assertEqual(refused.exception.status, 404)
+
+
+@contextlib.contextmanager
+def files_elsewhere(folder):
+    """Another web server with the files of a folder: below /open/ pages from elsewhere may read them, in parts; below /whole/ as wholes alone; else they may not."""
+    class Files(http.server.BaseHTTPRequestHandler):
+        def do_GET(self):
+            _, kind, name = self.path.split("/", 2)
+            file = folder / name
+            if not file.is_file():
+                return self.send_error(404)
+            data, part = file.read_bytes(), re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
+            has_parts = part is not None and kind == "open"
+            first, last = (int(part[1]), min(int(part[2]), len(data) - 1)) if has_parts else (0, len(data) - 1)
+            self.send_response(206 if has_parts else 200)
+            if has_parts:
+                self.send_header("Content-Range", f"bytes {first}-{last}/{len(data)}")
+            if kind in ("open", "whole"):
+                self.send_header("Access-Control-Allow-Origin", "*")
+            self.send_header("Content-Length", last + 1 - first)
+            self.end_headers()
+            if self.command == "GET":
+                self.wfile.write(data[first:last + 1])
+
+        do_HEAD = do_GET
+
+        def log_message(self, *_):
+            pass
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Files) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        try:
+            yield f"http://localhost:{server.server_port}"
+        finally:
+            server.shutdown()
 
 
 def targets(*places, buttons=4, seq=1):
@@ -603,12 +641,47 @@ class Page(unittest.TestCase):
             browser("await", expression="tenon.session.isOver && document.querySelector('.cover').hidden")
             self.assertEqual(browser.problems, [])
 
+            # what the device reaches is shown on request
+            self.assertEqual(browser("value", expression="tenon.session.devices.get('right').radius"), 0.4)
+            browser("value", expression="document.querySelector('.timeline').focus(), tenon.player.seek(3)")
+            browser("await", expression="!tenon.player.isReading && !tenon.session.isOver && tenon.session.hands.size > 0")
+            self.assertFalse(browser("value", expression="tenon.view.hasWorkspace"))
+            browser("key", key="w")
+            browser("await", expression="tenon.view.hasWorkspace && !document.querySelector('.key-workspace').hidden")
+            browser("key", key="w")
+            browser("await", expression="!tenon.view.hasWorkspace")
+            self.assertEqual(browser.problems, [])
+            self.elsewhere(stage, browser, recording)
+
             # a file that is none
             cut = stage.out / "cut.mcap"
             cut.write_bytes(recording.read_bytes()[:100_000])
             _, port = start_console(stage, shown=[cut])
             browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
-            browser("await", expression="document.querySelector('.cover').dataset.state === 'file'")
+            browser("await", expression="document.querySelector('.cover').textContent.includes('It has no index')")
+
+    def elsewhere(self, stage, browser, recording):
+        """A recording by its address, of another server, which both the console and that server have to permit."""
+        def open_page(port, address):
+            browser("open", url=f"http://localhost:{port}/?file={urllib.parse.quote(address, safe='')}", width=1280, height=800, theme="dark")
+
+        plays = "tenon.player !== undefined && tenon.session.steps.length === 2"
+        with files_elsewhere(recording.parent) as files:
+            _, permitted = start_console(stage, 0, "--recordings-from", files, shown=[])
+            _, strict = start_console(stage, shown=[])
+            for kind in ("open", "whole"):
+                open_page(permitted, f"{files}/{kind}/session.mcap")
+                browser("await", expression=plays)
+                browser("await", expression="document.querySelector('.title').textContent === 'Peg and box · session.mcap' && !document.querySelector('.all').hidden")
+            for port, address, reason in ((permitted, f"{files}/closed/session.mcap", f"--recordings-from {files}"), (strict, f"{files}/open/session.mcap", f"--recordings-from {files}"),
+                                          (permitted, f"{files}/open/none.mcap", "--recordings-from"), (permitted, "/none.mcap", "the server answers 404"), (permitted, "file:///etc/passwd", "is no address of a recording")):
+                open_page(port, address)
+                browser("await", expression=f"document.querySelector('.cover').dataset.state === 'file' && document.querySelector('.cover').textContent.includes('{reason}')")
+                self.assertEqual(browser("value", expression="document.querySelector('.top .badge').textContent"), "Not readable")
+        refused = tenon("console", "--recordings-from", "https://files.example/; script-src *", "--port", 0)
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("is no server's origin", refused.stderr)
+        browser.problems.clear()  # the browser reports what it was asked elsewhere, and what it refused
 
     def look(self, browser):
         """Section, hiding, measuring and the choice of plots, by clicks and keys."""
@@ -649,8 +722,12 @@ class Page(unittest.TestCase):
             browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
             browser("await", expression="document.querySelector('.session h2')?.textContent === 'Peg and box'")
             browser("await", expression="document.querySelector('.session canvas')?.width > 100")
+            # nobody is there whom it waits for: things are where they begin
+            browser("await", expression="document.querySelector('.session .badge')?.textContent === 'Waiting for people'")
             browser("value", expression="document.querySelector('.session').click()")
             browser("await", expression="location.search === '?session=test' && window.tenon !== undefined && document.title === 'Peg and box – Tenon'")
+            browser("await", expression="document.querySelector('.card .step-title')?.textContent === 'Peg and box' && tenon.view.models >= 3 && tenon.view.pictures > 0")
+            self.assertTrue(browser("value", expression="tenon.session.isWaiting && [...tenon.view.parts.all.values()].some(part => part.object.name === 'peg' && part.group.visible)"))
             self.assertEqual(browser.problems, [])
 
 

@@ -62,11 +62,6 @@ def p99(values):
     return sorted(values)[int(0.99 * (len(values) - 1))]
 
 
-def processor_seconds(process):
-    fields = open(f"/proc/{process.popen.pid}/stat", encoding="utf-8").read().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("--viewers", type=int, default=20)
@@ -86,7 +81,7 @@ def main():
             samples(counter, 3)  # the session has begun
             for _ in range(args.turns):
                 without += samples(counter, args.seconds)
-                before = processor_seconds(console)
+                before = console.processor_seconds()
                 if browser:
                     browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
                     browser("await", expression="tenon.view.models >= 3 && tenon.view.pictures > 0")
@@ -99,7 +94,7 @@ def main():
                 else:
                     crowd.close()
                     sent += crowd.bytes
-                used += processor_seconds(console) - before
+                used += console.processor_seconds() - before
     who = "a browser" if args.browser else f"{args.viewers} viewers"
     rows = [(f"median of {len(without)} and {len(beside)} ticks", statistics.median, 0), ("p99 of the longest of ten ticks", p99, 1), ("longest", max, 1)]
     print(f"| computing time of a tick, {args.scenario} {' '.join(COARSE)} | without | beside {who} | ratio |\n|---|---|---|---|")

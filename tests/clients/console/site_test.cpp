@@ -5,12 +5,14 @@
 #include <fstream>
 #include <string>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 namespace tenon::console {
 namespace {
 
+using ::testing::HasSubstr;
 namespace fs = std::filesystem;
 
 class SiteTest : public testing::Test {
@@ -91,6 +93,18 @@ TEST(Origin, PagesOfThisServerAndPermittedOnesMayConnect) {
        {"http://localhost:8081", "https://localhost:8080", "http://localhost", "null", "http://evil.example",
         "http://localhost:8080.evil.example", "https://viewer.example.evil"})
     EXPECT_FALSE(isPermittedOrigin(origin, "localhost:8080", false, others)) << origin;
+}
+
+TEST(Policy, LetsThePageReadRecordingsOfTheServersThatAreNamed) {
+  EXPECT_THAT(contentSecurityPolicy({}), HasSubstr("connect-src 'self' blob:;"));
+  EXPECT_THAT(contentSecurityPolicy({"https://files.example", "http://localhost:9000"}),
+              HasSubstr("connect-src 'self' blob: https://files.example http://localhost:9000;"));
+  for (const char* origin : {"https://files.example", "http://localhost:9000", "https://192.168.1.5:8443"})
+    EXPECT_TRUE(isOrigin(origin)) << origin;
+  for (const char* origin :
+       {"", "files.example", "https://", "https://files.example/", "https://a.b; script-src *", "https://*",
+        "https://a:b", "ftp://files.example", "https://a b"})
+    EXPECT_FALSE(isOrigin(origin)) << origin;
 }
 
 TEST(Host, NamesThisMachineOnly) {

@@ -56,6 +56,7 @@ export async function mount(page, { seed, seconds, steps }) {
   let best = Infinity;
   let stuck = 0;
   let turns = 0;
+  let unhelped = 0; // times in a row that the help with the depth was asked for
   let last = "";
 
   const fine = async (seen, wanted) => {
@@ -95,9 +96,12 @@ export async function mount(page, { seed, seconds, steps }) {
     if (seen.isDeepening) continue;
     const pixels = Math.hypot(guide.to.x - guide.from.x, guide.to.y - guide.from.y);
     if (!guide.isDown && Math.abs(guide.farther) > DEPTH_HELP && (pixels * guide.pixel < ABOVE || stuck > 3)) {
-      await page.keyboard.press("d");
+      // help that did not help: it lifts the part over what stands in the way
+      if (++unhelped % 3 === 0) await drag(seen, 0, ((seen.isFine ? 10 : 1) * -0.01) / guide.pixel, "Control");
+      else await page.keyboard.press("d");
       continue;
     }
+    unhelped = 0;
     // a closer look where the way is small in the picture
     if (guide.pixel * seen.height > 5 * (guide.distance + 0.15)) {
       await page.keyboard.press("c");

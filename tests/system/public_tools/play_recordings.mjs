@@ -54,6 +54,20 @@ async function opened(messages) {
 }
 
 const tests = {
+  // what a station tells once holds for every place after it
+  async "the device of a hand is known with its reach"() {
+    const { session, recording } = await opened([
+      [0, "SceneHand", { hand_id: 3, name: "right", role: 2, object_id: 9 }],
+      [0, "ClientEvent", { client_id: 1, seq: 1, tick: 0, kind: "device", text: "hand right: sigma.7 (simulated), workspace radius 0.060 m" }],
+      [0.1, "WorldFrame_100", { part: 0, parts: 1, tick: 100, states: [at(1, 0)] }],
+      [1, "WorldFrame_100", { part: 0, parts: 1, tick: 1000, states: [at(1, 1)] }],
+    ]);
+    await recording.seek(0.9);
+    assert.deepEqual(session.deviceOf(3), { model: "sigma.7 (simulated)", radius: 0.06 });
+    assert.equal(session.deviceOf(4), undefined);
+    assert.equal(session.events.length, 0, "it is no event for people");
+  },
+
   // object 1 moves until 1.5 s and rests then, object 2 always moves: frames of 100 Hz have what moves, those of 30 Hz all
   async "a seek shows a part that has come to rest where it rests"() {
     const messages = [];

@@ -6,13 +6,16 @@ import { t } from "./strings";
 /** Of a page in a frame: the frame's number, in its address. */
 export const FRAME = "beside";
 
-/** Replaces this page by two, of what it plays and of another file; `first`: the file, or undefined for the gateway's own recording. */
-export function showBeside(app: HTMLElement, first: File | undefined, second: File): void {
+/** A recording: a file, an address, or undefined for the gateway's own. */
+export type Played = File | string | undefined;
+
+/** Replaces this page by two, of what it plays and of another file. */
+export function showBeside(app: HTMLElement, first: Played, second: File): void {
   const close = h("button", "close", t("beside.close"));
   close.addEventListener("click", () => location.reload());
   const frames = [first, second].map((file, i) => {
     const frame = h("iframe");
-    frame.title = file?.name ?? t("beside.first");
+    frame.title = (typeof file === "string" ? file : file?.name) ?? t("beside.first");
     frame.src = `/?${FRAME}=${i}`;
     return frame;
   });
@@ -27,10 +30,10 @@ export function showBeside(app: HTMLElement, first: File | undefined, second: Fi
 }
 
 /** In such a frame: what is to be played, as soon as it is known. */
-export function playsBeside(play: (file: File | undefined) => void, player: () => Player | undefined): void {
+export function playsBeside(play: (file: Played) => void, player: () => Player | undefined): void {
   addEventListener("message", ({ origin, source, data }) => {
     if (origin !== location.origin || source !== parent) return;
-    const told = data as { file?: File; command?: Command };
+    const told = data as { file?: Played; command?: Command };
     if (told.command !== undefined) player()?.obey(told.command);
     else play(told.file);
   });

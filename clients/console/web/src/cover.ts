@@ -7,7 +7,7 @@ import type { SceneView } from "./scene";
 import type { Session } from "./session";
 import { t, type Key } from "./strings";
 
-export const PROTOCOL = 7; // kProtocolVersion of idl/types/messages/session.h
+export const PROTOCOL = 8; // kProtocolVersion of idl/types/messages/session.h
 const COMMAND = "./tenon demo";
 
 /** `opening`: of a recording that is opened: how much is read, or why it cannot be. */
@@ -15,12 +15,14 @@ export interface Opening { fraction: number; problem?: string }
 export interface Standing { isDropping: boolean; opening?: Opening; player?: Player; lobby?: Lobby; live: LiveState; session: Session; view?: SceneView }
 
 export interface Cover { state: string; icon: Icon; head: string; more: string; command?: string; covers: boolean }
+/** Nothing of a session or recording is to be seen: there is none yet, or it cannot be had. */
+export const isEmpty = (over: Cover | undefined, { session, lobby }: Standing): boolean => over?.covers === true && lobby === undefined && session.objects.size === 0;
 
 /** What covers the scene, if anything does. */
 export function coverOf({ isDropping, opening, player, lobby, live, session, view }: Standing): Cover | undefined {
   if (isDropping) return { state: "drop", icon: "over", head: t("cover.drop"), more: t("cover.drop.more"), covers: true };
   const problem = opening?.problem ?? player?.problem;
-  if (problem !== undefined) return { state: "file", icon: "warn", head: t("cover.file"), more: t("cover.file.more", { reason: problem }), covers: true };
+  if (problem !== undefined) return { state: "file", icon: "warn", head: t("cover.file"), more: problem, covers: true };
   if (opening !== undefined) return { state: "reading", icon: "wait", head: t("cover.reading"), more: t("cover.reading.more", { percent: Math.round(100 * opening.fraction) }), covers: true };
   if (lobby !== undefined && live.kind === "open") return undefined;
   const make = (state: string, name: Icon, covers: boolean, values = {}): Cover => {
@@ -38,10 +40,11 @@ export function coverOf({ isDropping, opening, player, lobby, live, session, vie
   return view === undefined ? make("webgl", "warn", true) : undefined;
 }
 
-export function linkBadge({ player, lobby, live, session }: Standing): [Key, Icon, string] {
+export function linkBadge({ opening, player, lobby, live, session }: Standing): [Key, Icon, string] {
+  if (opening !== undefined) return opening.problem === undefined ? ["link.reading", "wait", "info"] : ["link.unreadable", "warn", "bad"];
   if (player !== undefined) return ["link.recorded", "over", "info"];
   if (live.kind === "reconnecting") return ["link.reconnecting", "warn", "warn"];
-  if (lobby !== undefined && live.kind === "open") return ["link.joined", "live", "good"];
+  if (lobby !== undefined && live.kind === "open") return ["link.lobby", "live", "good"];
   switch (live.kind === "connecting" ? undefined : session.link?.state) {
     case "joined": return ["link.joined", "live", "good"];
     case "searching": return ["link.searching", "wait", "info"];

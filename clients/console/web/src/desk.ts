@@ -1,6 +1,7 @@
 // The instructor's desk: a seat in the session, commands, and what the server answers to each. The emergency stop needs no seat.
-import { h, icon, type Icon } from "./dom";
+import { h, icon, marked, type Icon } from "./dom";
 import type { DeskAnswer, LiveSource } from "./live";
+import { modelOf } from "./eventtext";
 import { NONE, RunPhase, Status, type SceneObject } from "./messages";
 import { Pairs } from "./pairs";
 import type { Session } from "./session";
@@ -51,6 +52,9 @@ export class Desk {
     };
     this.pairs = new Pairs(session, (a, b, isOn) => this.command("collision", a, b, isOn ? "on" : "off"));
     this.more.addEventListener("toggle", () => this.pairs.show());
+    // Escape and a click beside it close it
+    addEventListener("keydown", ({ key }) => key === "Escape" && (this.more.open = false));
+    addEventListener("pointerdown", ({ target }) => target instanceof Node && !this.more.contains(target) && (this.more.open = false));
     this.build();
     document.body.append(this.dialog);
     this.setWords();
@@ -132,6 +136,7 @@ export class Desk {
     }
     const label = this.role === "" ? t("desk.sit") : t("desk.leave");
     if (this.sit.textContent !== label) this.sit.replaceChildren(icon("person"), label);
+    this.sit.hidden = this.role === "" && session.link?.state !== "joined"; // in no session there is a seat
     this.bar.hidden = this.role === "" || session.isOver;
     for (const { button, shows } of this.buttons) button.hidden = shows !== undefined && !shows();
     if (this.more.open) this.pairs.show();
@@ -200,7 +205,7 @@ export class Desk {
     role.append(...(["instructor", "trainee"] as const).map((name) => Object.assign(h("option", "", t(`role.name.${name}`)), { value: name })));
     const name = Object.assign(h("input", ""), { maxLength: 40, value: localStorage.getItem("name") ?? "", autocomplete: "off" });
     const key = Object.assign(h("input", ""), { type: "password", autocomplete: "off", value: sessionStorage.getItem(PASS) ?? "" });
-    const field = (label: Key, input: HTMLElement, hint?: Key): HTMLElement => h("label", "field", h("span", "", t(label)), input, ...(hint === undefined ? [] : [h("small", "muted", t(hint))]));
+    const field = (label: Key, input: HTMLElement, hint?: Key): HTMLElement => h("label", "field", h("span", "", t(label)), input, ...(hint === undefined ? [] : [h("small", "muted", ...marked(t(hint)))]));
     this.openDialog(t("desk.sit.title"), [field("desk.sit.role", role), field("desk.sit.name", name), field("desk.sit.key", key, "desk.sit.hint")], t("desk.sit.do"), async () => {
       localStorage.setItem("name", name.value);
       return this.takeSeat(role.value, name.value, key.value.trim());
@@ -235,6 +240,8 @@ export class Desk {
     });
     this.dialog.replaceChildren(form);
     this.dialog.showModal();
+    // the stop is the first in the order, and Enter is not to press it; Escape leaves
+    if (form.querySelector("input, select") === null) cancel.focus();
   }
 
   /** The emergency stop; also when one stands. */
@@ -258,7 +265,7 @@ export class Desk {
   }
 
   notify(isGood: boolean, text: string): void {
-    const notice = h("p", isGood ? "notice good" : "notice bad", icon(isGood ? "done" : "warn"), h("span", "", text));
+    const notice = h("p", isGood ? "notice good" : "notice bad", icon(isGood ? "done" : "warn"), h("span", "", ...marked(text)));
     this.notices.append(notice);
     while (this.notices.childElementCount > NOTICES) this.notices.firstElementChild?.remove();
     setTimeout(() => notice.remove(), NOTICE);
@@ -272,9 +279,12 @@ export function reasonOf(answer: DeskAnswer): string {
   return language === "en" && answer.text !== "" ? answer.text : t(key);
 }
 
-/** Names of the hands that somebody moves, and the age of their contacts [ms]. */
+/** The hands that somebody moves, each with its device, and the age of their contacts [ms]. */
 export function devicesOf(session: Session, hands: number[]): string {
-  const names = hands.filter((hand) => hand !== NONE && !session.isTracked(hand)).map((hand) => session.nameOfHand(hand));
+  const names = hands.filter((hand) => hand !== NONE && !session.isTracked(hand)).map((hand) => {
+    const device = session.deviceOf(hand);
+    return device === undefined ? session.nameOfHand(hand) : `${session.nameOfHand(hand)}: ${modelOf(device)}`;
+  });
   const ages = hands.flatMap((hand) => session.hands.get(hand)?.manifold_age ?? []).filter((age) => age !== NONE);
   return [...names, ...(ages.length === 0 ? [] : [`${Math.max(...ages)} ms`])].join(", ");
 }

@@ -6,6 +6,16 @@ export function h<K extends keyof HTMLElementTagNameMap>(tag: K, className = "",
   return element;
 }
 
+/** Pixels of the page in one of an element, which may be zoomed. */
+export function zoomOf(element: HTMLElement): number {
+  return element.getBoundingClientRect().width / Math.max(1, element.offsetWidth) || 1;
+}
+
+/** A sentence in which what is between backticks is code, as what is to be typed. */
+export function marked(text: string): Node[] {
+  return text.split("`").map((piece, i) => (i % 2 === 1 ? h("code", "", piece) : document.createTextNode(piece)));
+}
+
 const SVG = "http://www.w3.org/2000/svg";
 const PATHS = {
   live: "M8 3a5 5 0 1 0 0 10A5 5 0 0 0 8 3z",
@@ -34,6 +44,7 @@ const PATHS = {
   eye: "M8 3c3.500 0 6 2.500 7.500 5-1.500 2.500-4 5-7.500 5S2 10.500.500 8C2 5.500 4.500 3 8 3zM8 5a3 3 0 1 0 0 6 3 3 0 0 0 0-6zM8 6.500a1.500 1.500 0 1 1 0 3 1.500 1.500 0 0 1 0-3z",
   section: "M1 3h6v10H1zM7 0h2v16H7zM10.500 3H12v2h-1.500zM13.500 3H15v2h-1.500zM13.500 6.500H15v3h-1.500zM13.500 11H15v2h-1.500zM10.500 11H12v2h-1.500z",
   measure: "M.500 5h15v6H.500zM2 6.500v3h12v-3h-1V8.500h-1v-2h-1.500V8.500h-1v-2H8V8.500H7v-2H5.500V8.500h-1v-2H3V8.500z",
+  sphere: "M8 1a7 7 0 1 1 0 14A7 7 0 0 1 8 1zM8 2.500a5.500 5.500 0 0 0-5.450 4.800C3.800 8.400 5.800 9 8 9s4.200-.600 5.450-1.700A5.500 5.500 0 0 0 8 2.500zM2.600 9.100a5.500 5.500 0 0 0 10.800 0C12 10 10.100 10.500 8 10.500S4 10 2.600 9.100z",
   beside: "M1 2h6v12H1zM2.500 3.500v9h3v-9zM9 2h6v12H9zM10.500 3.500v9h3v-9z",
   person: "M8 2a3 3 0 1 1 0 6 3 3 0 0 1 0-6zM2 14c0-3 3-5 6-5s6 2 6 5z",
 } as const;

@@ -1,7 +1,7 @@
 // Events of the server in the language of this page. The server writes English; what has no rule here stays as it is.
 import type { EventLog } from "./messages";
 import type { Session } from "./session";
-import { hasText, localized, t, type Key } from "./strings";
+import { hasText, localized, retold, t, type Key } from "./strings";
 
 const ROLES = ["admin", "instructor", "trainee", "observer", "recorder"]; // as in the messages
 /** The rules of the safety layer by their bits, as devices/safety_rules.cpp names them. */
@@ -55,6 +55,20 @@ const RULES: [RegExp, Key][] = [
   [/^(?<who>.+?): '(?<word>\w+)': (?<reason>.+)$/, "event.refused"],
 ];
 
+/** What moves a hand; `radius` [m]: what it reaches about the centre of its workspace. */
+export interface Device { model: string; radius: number }
+
+/** What a station says of a hand's device, as describe() of clients/haptic/station.cpp does. */
+export function deviceOf(text: string): { hand: string; device: Device } | undefined {
+  const { hand, model, radius } = /^hand (?<hand>\w+): (?<model>.+), workspace radius (?<radius>[\d.]+) m$/.exec(text)?.groups ?? {};
+  return hand === undefined ? undefined : { hand, device: { model, radius: Number(radius) } };
+}
+
+/** The model of a device in this page's words. */
+export function modelOf({ model }: Device): string {
+  return model === "remote hand" ? t("device.remote") : model.replace("(simulated)", t("device.simulated"));
+}
+
 /** What the safety layer of a hand does now, in words. */
 export function interventions(flags: number): string {
   return SAFETY.map((_, bit) => bit).filter((bit) => (flags & (1 << bit)) !== 0).map((bit) => t(`safety.${bit}` as Key)).join(", ");
@@ -103,6 +117,8 @@ function value(session: Session, name: string, text: string): string {
     }
     case "role": return ROLES.includes(text) ? t(`role.${ROLES.indexOf(text)}` as Key) : text;
     case "word": return command(text);
+    case "who": case "by": return retold(text, "desk.somebody");
+    case "reason": return retold(text, "stop.reason");
     case "rule": return SAFETY.includes(text) ? t(`safety.${SAFETY.indexOf(text)}` as Key) : text;
     default: return text;
   }
@@ -118,7 +134,7 @@ export function textOf(session: Session, event: Pick<EventLog, "kind" | "text">)
   if (event.kind === "mounted" || event.kind === "put in place") return session.retitled(event.text);
   if (event.kind === "command") {
     const [, who, word, rest] = /^(.+?): (\w+) ?(.*)$/.exec(event.text) ?? [];
-    return word === undefined ? event.text : `${who}: ${command(word)} ${readable(session, rest)}`.trim();
+    return word === undefined ? event.text : `${retold(who, "desk.somebody")}: ${command(word)} ${readable(session, rest)}`.trim();
   }
   for (const [pattern, key] of RULES) {
     const groups = pattern.exec(event.text)?.groups;

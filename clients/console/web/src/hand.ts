@@ -19,6 +19,8 @@ const ALIGN_TURN = 1.2; // [rad/s]
 const ALIGNED = 0.002; // [rad]
 const DEPTH_SPEED = 0.5; // [m/s]
 const DEEP_ENOUGH = 0.0005; // [m]
+const ADVANCE = 0.001; // [m] of depth at least that a held part gains
+const BLOCKED = 1000; // [ms] within these, else something stands in its way
 const FINE = 0.1;
 const DEAD_ZONE = 0.12; // of a stick that is let go
 /** Buttons of the standard layout: the lower face button, the shoulders. */
@@ -54,6 +56,8 @@ export class Hand {
   private armUntil = 0;
   private aligning = false;
   private depthGoal?: Vector3; // whose depth the hand is brought to
+  private depthLeft = Infinity; // [m] the least that was left of it, when it was last less by ADVANCE
+  private depthGainedAt = 0; // [ms]
   private wayOf = -1; // revision of the step on whose approach the part is
   private pressed = new Set<string>();
   private isShift = false;
@@ -127,8 +131,9 @@ export class Hand {
   align(): void {
     this.aligning = !this.aligning && this.canAlign;
   }
-  /** Brings what the hand moves as far away from the viewer as where it is to go. */
+  /** Brings what the hand moves as far away from the viewer as where it is to go, or until something stands in its way. */
   deepen(): void {
+    this.depthLeft = Infinity;
     this.depthGoal = this.depthGoal === undefined ? this.guide?.to.clone() : undefined;
   }
   /** No push any more. */
@@ -300,10 +305,20 @@ export class Hand {
     else if (this.now.object.q.angleTo(toQuaternion(goal)) < 2 * ALIGNED) this.aligning = false;
   }
 
+  /** What the hand holds has gained no depth for a while. */
+  private isDepthBlocked(): boolean {
+    const from = this.depthGoal === undefined ? undefined : this.centreAt(this.now?.proxy);
+    if (from === undefined || this.depthGoal === undefined) return false;
+    const left = Math.abs(this.depthGoal.clone().sub(from).dot(this.view.axes().away));
+    const now = performance.now();
+    if (left < this.depthLeft - ADVANCE) [this.depthLeft, this.depthGainedAt] = [left, now];
+    return now - this.depthGainedAt > BLOCKED;
+  }
+
   private applyDepth(seconds: number): void {
     const centre = this.depthGoal === undefined ? undefined : this.centreAt(this.targets[this.current]);
     const off = centre === undefined ? 0 : (this.depthGoal?.clone().sub(centre).dot(this.view.axes().away) ?? 0);
-    if (Math.abs(off) < DEEP_ENOUGH) this.depthGoal = undefined;
+    if (Math.abs(off) < DEEP_ENOUGH || this.isDepthBlocked()) this.depthGoal = undefined;
     if (centre === undefined || this.depthGoal === undefined) return;
     // along the line of sight: in the picture it stays where it is
     const ray = this.view.sightOf(centre);

@@ -1,7 +1,7 @@
 // Words at places of the scene: over the canvas, moved with each picture.
 import type * as THREE from "three";
 
-import { h } from "./dom";
+import { h, zoomOf } from "./dom";
 import type { SceneView } from "./scene";
 
 export interface Label { place: THREE.Vector3; text: string; tone?: string }
@@ -23,13 +23,14 @@ export class Labels {
 
   private show(): void {
     const box = this.view.canvas.getBoundingClientRect();
+    const zoom = zoomOf(this.view.canvas);
     const left = new Map(this.shown);
     for (const { place, text, tone } of this.sources.flatMap((source) => source())) {
       const { x, y, isAhead } = this.view.project(place);
       if (!isAhead || x < box.left || x > box.right || y < box.top || y > box.bottom) continue;
       let label = this.shown.get(text);
       if (label === undefined) this.element.append((label = h("span", `label ${tone ?? ""}`, text)));
-      label.style.transform = `translate(${Math.round(x - box.left)}px, ${Math.round(y - box.top)}px)`;
+      label.style.transform = `translate(${Math.round((x - box.left) / zoom)}px, ${Math.round((y - box.top) / zoom)}px)`;
       this.shown.set(text, label);
       left.delete(text);
     }

@@ -107,7 +107,7 @@ export class Lobby {
     return [
       h("div", "card-head", h("span", "part", info.session), isRaised ? h("span", "badge bad", icon("stop"), t("lobby.stopped")) : (panels.phase(session) ?? "")),
       h("h2", "", info.title),
-      h("p", "", session.step === undefined || session.isOver ? (session.run?.reason ?? "") : panels.titleOfStep(session.step)),
+      h("p", "", session.isWaiting ? t("run.waiting.more") : session.step === undefined || session.isOver ? panels.reasonOfEnd(session) : panels.titleOfStep(session.step)),
       h("div", "bar", bar),
       h("p", "muted", [t("lobby.steps", { done, steps: steps.length }), t("lobby.people", { people: people.length }), info.host].join(" · ")),
     ];

@@ -1,9 +1,9 @@
 import "./style.css";
 
-import { FRAME, playsBeside, showBeside, tellBeside } from "./beside";
-import { coverOf, linkBadge, PROTOCOL, type Opening, type Standing } from "./cover";
+import { FRAME, playsBeside, showBeside, tellBeside, type Played } from "./beside";
+import { coverOf, isEmpty, linkBadge, PROTOCOL, type Opening, type Standing } from "./cover";
 import { Desk, PASS } from "./desk";
-import { h, icon } from "./dom";
+import { h, icon, marked } from "./dom";
 import { addressOf, LiveSource, type LiveState } from "./live";
 import { Lobby } from "./lobby";
 import type { Gateway, LobbyState } from "./messages";
@@ -24,6 +24,7 @@ const PANEL_PERIOD = 100; // ms
 const wanted = new URLSearchParams(location.search);
 const isPicture = wanted.has("picture");
 const SETTLED = 1000; // [ms] without a change
+const ADDRESS = "file"; // of a recording, in the page's own address
 
 const session = new Session();
 let live: LiveState = { kind: "connecting" };
@@ -35,6 +36,8 @@ let lobby: Lobby | undefined;
 let player: Player | undefined;
 let opening: Opening | undefined;
 let isDropping = false;
+let fileName = ""; // of what is played
+let ownFile = ""; // of the gateway
 
 // ---- what the page consists of
 setLanguage(language);
@@ -117,7 +120,7 @@ function showTab(name: string): void {
 function setWords(): void {
   const heads: [HTMLElement, Key][] = [
     [sections.steps.head, "steps"], [sections.plots.head, "plots"], [sections.people.head, "people"], [sections.events.head, "events"],
-    [noForce, "force.none"], [all, "lobby.all"],
+    [noForce, "force.none"],
   ];
   desk?.setWords();
   part?.setWords();
@@ -125,10 +128,11 @@ function setWords(): void {
   lobby?.setWords();
   tools?.setWords();
   for (const [element, key] of heads) element.textContent = t(key);
+  all.textContent = t(wanted.has(ADDRESS) || opening !== undefined || player !== undefined ? "file.leave" : "lobby.all");
   for (const { head, body } of Object.values(sections)) body.setAttribute("aria-label", head.textContent);
   for (const { name, button } of tabButtons) button.textContent = t(`tab.${name}`);
   legend.replaceChildren(
-    ...(["target", "within", "device", "contact"] as const).map((name) => h("span", `key-${name}`, h("i"), t(`legend.${name}`))),
+    ...(["target", "within", "device", "contact", "workspace"] as const).map((name) => h("span", `key-${name}`, h("i"), t(`legend.${name}`))),
   );
   languages.replaceChildren(...languageNames.map((name) => Object.assign(h("option", "", nameOfLanguage(name)), { value: name, selected: name === language })));
   themeButton.replaceChildren(icon("half"));
@@ -197,6 +201,7 @@ sections.events.body.addEventListener("click", (event) => {
 
 // ---- showing it
 const standing = (): Standing => ({ isDropping, opening, player, lobby, live, session, view });
+const narrow = matchMedia("(max-width: 720px)"); // there the instruction is as wide as the scene
 let shown = "";
 let shownAt = 0;
 
@@ -205,22 +210,27 @@ function show(element: HTMLElement, nodes: Node[]): void {
   const next = h("div", "", ...nodes);
   if (next.innerHTML === element.innerHTML) return;
   element.replaceChildren(...next.childNodes);
+  toCurrent(element);
+}
+
+/** Scrolls a list to what is current in it. */
+function toCurrent(element: HTMLElement): void {
   const current = element.querySelector<HTMLElement>("[aria-current]");
   if (current !== null) element.scrollTop = current.offsetTop - element.offsetTop - element.clientHeight / 2;
 }
+new ResizeObserver(() => toCurrent(sections.steps.body)).observe(sections.steps.body);
 
 function showPanels(age: number): void {
   const [key, name, tone] = linkBadge(standing());
   link.className = `badge ${tone}`;
   show(link, [icon(name), document.createTextNode(t(key))]);
-  title.textContent = lobby !== undefined ? "" : session.link?.title || t("title.none");
-  time.hidden = lobby !== undefined;
+  title.textContent = lobby !== undefined ? "" : [session.link?.title || t("title.none"), fileName].filter((text) => text !== "").join(" · ");
   document.title = session.link?.title ? `${session.link.title} – Tenon` : "Tenon";
   time.textContent = panels.clock(session.tick / 1000);
   const { text, isRaised } = panels.strip(session);
   strip.className = isRaised ? "strip raised" : "strip";
-  strip.hidden = player !== undefined && !isRaised;
-  show(stripText, lobby !== undefined ? [] : [icon(isRaised ? "stop" : "done"), document.createTextNode(text)]);
+  strip.hidden = (player !== undefined || opening !== undefined) && !isRaised;
+  show(stripText, lobby !== undefined || session.objects.size === 0 ? [] : [icon(isRaised ? "stop" : "done"), document.createTextNode(text)]);
   desk?.show();
   part?.show();
   app.classList.toggle("leads", player !== undefined || (desk?.role === "instructor" && !session.isOver));
@@ -231,12 +241,19 @@ function showPanels(age: number): void {
   show(status, panels.status(session, age));
   const over = coverOf(standing());
   cover.hidden = over === undefined;
-  cover.className = over?.covers === true ? "cover full" : "cover";
+  cover.className = `cover${over?.covers === true ? " full" : ""}${over?.icon === "warn" ? " warns" : ""}`;
   cover.dataset["state"] = over?.state ?? "none";
-  show(cover, over === undefined ? [] : [h("div", "", icon(over.icon), h("h2", "", over.head), h("p", "", over.more), ...(over.command ? [h("code", "", over.command)] : []))]);
+  show(cover, over === undefined ? [] : [h("div", "", icon(over.icon), h("h2", "", over.head), h("p", "", ...marked(over.more)), ...(over.command ? [h("code", "", over.command)] : []))]);
+  const isBlank = isEmpty(over, standing());
+  app.classList.toggle("blank", isBlank);
+  time.hidden = isBlank || lobby !== undefined || player !== undefined; // a player has its own
+  title.hidden = isBlank;
   const hasSession = session.link !== undefined && session.objects.size > 0;
   card.hidden = legend.hidden = !hasSession;
+  const workspaceKey = legend.querySelector<HTMLElement>(".key-workspace");
+  if (workspaceKey !== null) workspaceKey.hidden = view?.hasWorkspace !== true;
   document.body.classList.toggle("stale", player === undefined && (live.kind !== "open" || session.link?.state === "lost"));
+  view?.setCovered(card.hidden || isPicture || !narrow.matches ? 0 : card.offsetTop + card.offsetHeight);
 }
 
 function frame(now: number): void {
@@ -248,7 +265,7 @@ function frame(now: number): void {
   if (isPicture) picture(now);
   plots.update(session, now);
   const hand = part?.hand;
-  const state = `${hand?.views.length} ${hand?.isOn} ${hand?.current} ${hand?.isAligning} ${hand?.isDeepening} ${hand?.isFine} ${hand?.isTurning} ${session.changed} ${session.moved} ${live.kind} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${player?.problem} ${age > 0.5 ? age.toFixed(1) : ""}`;
+  const state = `${hand?.views.length} ${hand?.isOn} ${hand?.current} ${hand?.isAligning} ${hand?.isDeepening} ${hand?.isFine} ${hand?.isTurning} ${session.changed} ${session.moved} ${live.kind} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${player?.problem} ${view?.hasWorkspace} ${age > 0.5 ? age.toFixed(1) : ""}`;
   if (now - shownAt >= PANEL_PERIOD && state !== shown) {
     shownAt = now;
     shown = state;
@@ -316,17 +333,20 @@ function showLobby(role: string): void {
   stage.append(desk.notices);
 }
 
-/** `file`: undefined for the gateway's own recording. */
-async function play(file: File | undefined): Promise<void> {
+async function play(file: Played): Promise<void> {
   source?.close();
   part?.end();
   for (const element of [part?.take, part?.bar, part?.lesson, desk?.stop, desk?.clear, desk?.sit, desk?.bar, desk?.notices, lobby?.element, player?.element]) element?.remove();
   [source, desk, part, lobby, player] = [undefined, undefined, undefined, undefined, undefined];
   app.classList.remove("shows-lobby");
   opening = { fraction: 0 };
+  fileName = file === undefined ? ownFile : file instanceof File ? file.name : (file.split(/[?#]/)[0].split("/").pop() ?? "");
+  // back to what this gateway shows else
+  all.hidden = file === undefined || wanted.has(FRAME);
+  setWords();
   session.forget();
   try {
-    const recording = await Recording.open(file === undefined ? await fromAddress("/recording.mcap") : fromFile(file), (topic, message, isGone) => session.receive(topic, message, isGone), (fraction) => (opening = { fraction }));
+    const recording = await Recording.open(file instanceof File ? fromFile(file) : await fromAddress(file ?? "/recording.mcap"), (topic, message, isGone) => session.receive(topic, message, isGone), (fraction) => (opening = { fraction }));
     player = new Player(recording, session, (name) => panels.titleOfStep([...session.sceneSteps.values()].find((step) => step.name === name) ?? { name, title: [] }));
     status.before(player.element);
     if (wanted.has(FRAME)) player.onCommand = tellBeside;
@@ -344,8 +364,11 @@ async function begin(): Promise<void> {
   const answer = await fetch("/gateway.json").catch(() => undefined);
   const gateway: Gateway = answer?.ok ? ((await answer.json()) as Gateway) : { session: "", recording: "", role: "", protocol: PROTOCOL };
   const chosen = wanted.get("session");
+  ownFile = gateway.recording;
+  app.classList.toggle("framed", wanted.has(FRAME));
   all.hidden = chosen === null || gateway.session !== "";
   if (wanted.has(FRAME)) playsBeside((file) => void play(file), () => player);
+  else if (wanted.has(ADDRESS)) await play(wanted.get(ADDRESS) ?? "");
   else if (gateway.recording !== "") await play(undefined);
   else if (gateway.session === "" && chosen === null) showLobby(gateway.role);
   else follow(gateway.session === "" ? `/live/${encodeURIComponent(chosen ?? "")}` : "/live", gateway.role, gateway.recordings === true);

@@ -19,9 +19,25 @@ export function place(target: THREE.Object3D, pose: Pose): void {
   target.quaternion.set(pose.q[0], pose.q[1], pose.q[2], pose.q[3]);
 }
 
+const FULL = 1; // [m] of a larger workspace, as that of a mouse, there is no limit to be seen
+const NEAR = 0.7; // of its radius, from which on the limit of a workspace shows
+
+/** A sphere of which what is seen at an angle shows: its rim. */
+function shell(): THREE.ShaderMaterial {
+  return new THREE.ShaderMaterial({
+    transparent: true, depthWrite: false, uniforms: { color: { value: new THREE.Color(COLORS.device) }, opacity: { value: 0 } },
+    vertexShader: "varying vec3 n, v; void main() { vec4 p = modelViewMatrix * vec4(position, 1.0); n = normalMatrix * normal; v = -p.xyz; gl_Position = projectionMatrix * p; }",
+    fragmentShader: "uniform vec3 color; uniform float opacity; varying vec3 n, v; void main() { float rim = pow(1.0 - abs(dot(normalize(n), normalize(v))), 3.0); gl_FragColor = vec4(color, opacity * (0.04 + 0.96 * rim));\n#include <colorspace_fragment>\n}",
+  });
+}
+
 export class Markers {
   /** By the size of the scene. */
   size = 1;
+  /** Of all devices, not only of those that are near the limit of theirs. */
+  showsWorkspaces = false;
+  private workspaces = new Map<number, THREE.Mesh<THREE.SphereGeometry, THREE.ShaderMaterial>>();
+  private sphere = new THREE.SphereGeometry(1, 64, 32);
   private hands = new Map<number, { device: THREE.Mesh; link: THREE.Line }>();
   private contacts = new THREE.InstancedMesh(new THREE.SphereGeometry(0.008, 12, 8), new THREE.MeshBasicMaterial({ ...OPEN, opacity: 0.9 }), CONTACTS);
   private arrows: THREE.ArrowHelper[] = [];
@@ -53,6 +69,8 @@ export class Markers {
   clear(): void {
     for (const { device, link } of this.hands.values()) this.scene.remove(device, link);
     for (const bracelet of this.tactors.values()) this.scene.remove(...bracelet);
+    this.scene.remove(...this.workspaces.values());
+    this.workspaces.clear();
     this.hands.clear();
     this.tactors.clear();
     this.approach.visible = false;
@@ -60,6 +78,7 @@ export class Markers {
 
   take(session: Session): void {
     this.takeHands(session);
+    this.takeWorkspaces(session);
     this.takeTactors(session);
     this.takeContacts(session);
     this.takeApproach(session);
@@ -127,6 +146,35 @@ export class Markers {
       ends.setXYZ(1, hand.X_WH.p[0], hand.X_WH.p[1], hand.X_WH.p[2]);
       ends.needsUpdate = true;
     }
+  }
+
+  /** What a device reaches: a sphere about C_w, the nearer the hand is to its limit the clearer. */
+  private takeWorkspaces(session: Session): void {
+    for (const [id, { X_WH, p_WC }] of session.hands) {
+      const radius = session.deviceOf(id)?.radius ?? Infinity;
+      let shown = this.workspaces.get(id);
+      if (radius > FULL || session.isOver) {
+        if (shown !== undefined) shown.visible = false;
+        continue;
+      }
+      if (shown === undefined) {
+        shown = new THREE.Mesh(this.sphere, shell());
+        shown.renderOrder = 1;
+        this.workspaces.set(id, shown);
+        this.scene.add(shown);
+      }
+      const out = Math.hypot(X_WH.p[0] - p_WC[0], X_WH.p[1] - p_WC[1], X_WH.p[2] - p_WC[2]) / radius;
+      const near = THREE.MathUtils.smoothstep(out, NEAR, 1);
+      const opacity = this.showsWorkspaces ? 0.45 + 0.5 * near : 0.95 * near;
+      shown.visible = opacity > 0.02;
+      shown.material.uniforms["opacity"].value = opacity;
+      shown.position.set(p_WC[0], p_WC[1], p_WC[2]);
+      shown.scale.setScalar(radius);
+    }
+  }
+
+  get hasWorkspace(): boolean {
+    return [...this.workspaces.values()].some(({ visible }) => visible);
   }
 
   /** The vibration motors of a forearm's bracelet: grey, and red and larger the more they vibrate. */

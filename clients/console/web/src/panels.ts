@@ -7,7 +7,7 @@ import { conditionOf, interventions, kindOf, textOf } from "./eventtext";
 import type { Label } from "./labels";
 import { NONE, RunPhase, StepPhase, type EventLog } from "./messages";
 import type { Session, StepEntry } from "./session";
-import { localized, t, type Key } from "./strings";
+import { localized, retold, t, type Key } from "./strings";
 
 const RUN: Record<RunPhase, [Key, Icon, string]> = {
   [RunPhase.Waiting]: ["run.waiting", "wait", "info"],
@@ -42,15 +42,22 @@ export function titleOfStep(step: { name: string; title: StepEntry["title"] }): 
   return localized(step.title) || step.name.replace(/_/g, " ");
 }
 
-export function phase({ run, isOver }: Session): HTMLElement | undefined {
+export function phase({ run, isOver, isWaiting }: Session): HTMLElement | undefined {
+  if (isWaiting) return badge(RUN[RunPhase.Waiting]);
   if (run?.forces_frozen === true && run.phase === RunPhase.Running && !isOver) return badge(["run.frozen", "frozen", "warn"]);
   return run === undefined ? undefined : badge(RUN[run.phase]);
+}
+
+/** Why the run is as it is, in this page's words. */
+export function reasonOfEnd(session: Session): string {
+  return session.run === undefined ? "" : textOf(session, { kind: "run", text: session.run.reason });
 }
 
 export function instruction(session: Session): Node[] {
   const { step, run } = session;
   const badges = [phase(session)].filter((one) => one !== undefined);
-  if (session.isOver && run !== undefined) return [h("div", "card-head", ...badges), h("p", "instruction", run.reason)];
+  if (session.isOver && run !== undefined) return [h("div", "card-head", ...badges), h("p", "instruction", reasonOfEnd(session))];
+  if (session.isWaiting) return [h("div", "card-head", ...badges), h("h1", "step-title", session.link?.title ?? ""), h("p", "instruction", t("run.waiting.more"))];
   if (step === undefined) return [h("div", "card-head", ...badges), h("p", "instruction muted", t("step.none"))];
   const count = h("span", "muted", t("step.count", { step: step.step + 1, steps: step.steps }));
   const head = h("div", "card-head", count, h("span", "part", session.retitled(step.part)), ...badges);
@@ -142,7 +149,7 @@ export function people(session: Session, { leads, hand }: Lead): Node[] {
     const held = [...session.grabs.values()].filter((grab) => grab.hand_id !== NONE && hands.includes(grab.hand_id) && !session.isOwn(grab.object_id));
     const what = held.map((grab) => session.titleOf(grab.object_id)).join(", ");
     const devices = devicesOf(session, hands);
-    const head = h("div", "", h("span", "name", person.name), h("span", "muted", t(`role.${person.role}` as Key)), h("span", "holds", what === "" ? "" : t("holds", { what })));
+    const head = h("div", "", h("span", "name", retold(person.name, "desk.somebody")), h("span", "muted", t(`role.${person.role}` as Key)), h("span", "holds", what === "" ? "" : t("holds", { what })));
     const link = linkOf(session, person.client_id);
     const actions: HTMLElement[] = [];
     const act = (name: string, value: string, label: string, more: string): void => {
@@ -194,7 +201,7 @@ export function events(session: Session): Node[] {
 /** The emergency strip: always there. */
 export function strip(session: Session): { text: string; isRaised: boolean } {
   const [raise] = session.standing;
-  return raise === undefined ? { text: t("stop.none"), isRaised: false } : { text: t("stop.raised", { who: raise.who, reason: raise.reason }), isRaised: true };
+  return raise === undefined ? { text: t("stop.none"), isRaised: false } : { text: t("stop.raised", { who: raise.who, reason: retold(raise.reason, "stop.reason") }), isRaised: true };
 }
 
 export function status(session: Session, age: number): Node[] {
@@ -205,7 +212,9 @@ export function status(session: Session, age: number): Node[] {
   if (stats !== undefined) {
     const ms = 1000 * stats.compute_seconds_max;
     items.push(item("status.compute", `${ms.toFixed(2)} ms`, ms > 1 && session.link?.lockstep !== true ? "warn" : ""), item("status.load", `${stats.load_percent.toFixed(0)} %`), item("status.late", String(stats.late_ticks)));
-    if (stats.slow_writes + stats.unsent_samples > 0n) items.push(item("status.writes", `${stats.slow_writes} / ${stats.unsent_samples}`, "warn"));
+    // in lockstep ticks wait, so slow writes delay nothing that is missed
+    const slow = session.link?.lockstep === true ? 0n : stats.slow_writes;
+    if (slow + stats.unsent_samples > 0n) items.push(item("status.writes", `${stats.slow_writes} / ${stats.unsent_samples}`, "warn"));
   }
   items.push(item("status.contacts", String(touching)));
   const { recorder } = session;

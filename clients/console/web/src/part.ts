@@ -1,9 +1,10 @@
 // Taking part: a place in the session for who sits at this page, and what stands around the hand while it is taken.
-import { h, icon, type Icon } from "./dom";
+import { h, icon, marked, type Icon } from "./dom";
 import { Hand } from "./hand";
 import { hasHeadset, Headset, type CardText } from "./headset";
 import type { DeskAnswer, LiveSource } from "./live";
 import { NONE } from "./messages";
+import { reasonOfEnd } from "./panels";
 import type { SceneView } from "./scene";
 import type { Session } from "./session";
 import { localized, t, type Key } from "./strings";
@@ -199,7 +200,7 @@ export class Part {
     const state = hand === undefined ? "" : this.describe(hand, isStopped).map((node) => node.textContent ?? "").filter((text) => text !== "").join(" · ");
     return {
       head: step === undefined ? "" : t("step.count", { step: step.step + 1, steps: step.steps }),
-      title: session.isOver ? (session.run?.reason ?? "") : step === undefined ? t("step.none") : localized(step.title) || step.name,
+      title: session.isOver ? reasonOfEnd(session) : step === undefined ? t("step.none") : localized(step.title) || step.name,
       text: session.isOver || step === undefined ? "" : localized(step.instruction),
       state: isStopped || hand?.isOn === true ? state : t("part.headset.arm"),
       stop: t("part.headset.stop"),
@@ -228,9 +229,9 @@ export class Part {
     this.invited = "";
     const name = Object.assign(h("input", ""), { maxLength: 40, value: localStorage.getItem("name") ?? "", autocomplete: "off" });
     const key = Object.assign(h("input", ""), { type: "password", autocomplete: "off" });
-    const field = (label: Key, input: HTMLElement, hint?: Key): HTMLElement => h("label", "field", h("span", "", t(label)), input, ...(hint === undefined ? [] : [h("small", "muted", t(hint))]));
+    const field = (label: Key, input: HTMLElement, hint?: Key): HTMLElement => h("label", "field", h("span", "", t(label)), input, ...(hint === undefined ? [] : [h("small", "muted", ...marked(t(hint)))]));
     const keyField = field("desk.sit.key", key, "desk.sit.hint");
-    const note = h("p", "muted");
+    const note = h("p", "muted place");
     const update = (): void => {
       const wanted = this.handsOf(role.value as RoleName).ids;
       const others = [...this.session.people.values()].filter((person) => person.alive && Array.from(person.hands).some((hand) => wanted.includes(hand)));

@@ -133,7 +133,8 @@ export class Parts {
   takePoses(session: Session): void {
     for (const [id, part] of this.all) {
       const state = session.states.get(id);
-      part.isShown = state !== undefined && state.status !== Status.Hidden;
+      // before the session begins what is there is where it begins; people are not there yet
+      part.isShown = state === undefined ? session.isWaiting && !session.isOwn(id) : state.status !== Status.Hidden;
       part.group.visible = part.isShown && !this.hidden.has(id);
       if (state !== undefined) place(part.group, state.X_WO);
     }

@@ -1,5 +1,5 @@
 // The controls of a recording: play, step, speed, and a time line with steps, events and notes on which one seeks.
-import { h, icon, type Icon } from "./dom";
+import { h, icon, zoomOf, type Icon } from "./dom";
 import { clock } from "./panels";
 import type { Mark, Recording } from "./recording";
 import type { Session } from "./session";
@@ -132,7 +132,7 @@ export class Player {
     const texts = [clock(seconds), step === undefined ? "" : this.titleOf(step.text), mark === undefined ? "" : `${mark.kind}: ${mark.text}`];
     this.hint.textContent = texts.filter((text) => text !== "").join(" · ");
     this.hint.hidden = false;
-    this.hint.style.left = `${Math.min(width - 120, Math.max(120, event.clientX - this.line.getBoundingClientRect().left))}px`;
+    this.hint.style.left = `${Math.min(width - 120, Math.max(120, (event.clientX - this.line.getBoundingClientRect().left) / zoomOf(this.line)))}px`;
   }
 
   private onKey(event: KeyboardEvent): void {

@@ -2,7 +2,8 @@
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 
-import { h } from "./dom";
+import { h, zoomOf } from "./dom";
+import { interventions } from "./eventtext";
 import type { Session } from "./session";
 import { keep, kept, t, type Key } from "./strings";
 
@@ -50,12 +51,14 @@ class Plot {
   readonly element = h("div", "chart");
   private head = h("h3");
   private host = h("div");
+  private marks = h("p", "marks"); // what the dots are
+  private session?: Session;
   private plot?: uPlot;
   private lines: Line[] = [];
   private names = "";
 
   constructor(private kind: Kind) {
-    this.element.append(this.head, this.host);
+    this.element.append(this.head, this.host, this.marks);
     new ResizeObserver(() => this.plot?.setSize(this.size())).observe(this.host);
   }
 
@@ -71,6 +74,7 @@ class Plot {
   }
 
   update(session: Session): void {
+    this.session = session;
     const lines = linesOf(this.kind, session);
     this.element.classList.toggle("none", lines.length === 0);
     this.head.textContent = t(`plot.${this.kind.name}` as Key);
@@ -81,6 +85,9 @@ class Plot {
     const limited = name === "force" ? this.lines.map(({ track }) => track.replace("force", "limited")) : [];
     const data = joined(session, [...this.lines.map(({ track }) => track), ...limited], scale);
     this.plot?.setData(data, false);
+    this.marks.hidden = !limited.some((track) => session.tracks.all.has(track));
+    const marks = t("plot.limited");
+    if (this.marks.textContent !== marks) this.marks.replaceChildren(h("i"), marks);
     const values = data.slice(1).flat().filter((value): value is number => value !== null);
     const [low, high] = values.reduce(([a, b], value) => [Math.min(a, value), Math.max(b, value)], [0, least]);
     const end = session.tick / 1000;
@@ -88,6 +95,13 @@ class Plot {
       this.plot?.setScale("x", { min: Math.max(0, end - WINDOW), max: Math.max(WINDOW, end) });
       this.plot?.setScale("y", { min: 1.1 * low, max: of === "scene" && unit === "%" ? Math.max(100, high) : 1.1 * high });
     });
+  }
+
+  /** Of the safety layer, as bits; of other tracks than forces none. */
+  private rulesAt(track: string, seconds: number): number {
+    const rules = this.session?.tracks.all.get(track.replace("force", "safety"));
+    if (!track.startsWith("force ") || rules === undefined) return 0;
+    return rules.values[rules.times.lastIndexOf(seconds)] ?? 0;
   }
 
   private build(lines: Line[], names: string): void {
@@ -98,7 +112,16 @@ class Plot {
     const style = getComputedStyle(document.documentElement);
     const color = (of: string): string => style.getPropertyValue(of).trim();
     const axis = { stroke: color("--muted"), grid: { stroke: color("--grid"), width: 1 }, ticks: { show: false }, font: "12px system-ui" };
-    const value = (_plot: uPlot, at: number | null): string => (at === null ? "–" : `${at.toFixed(digits)} ${unit}`);
+    // at the cursor, else the newest; and which rules of the safety layer act there
+    const value = (plot: uPlot, at: number | null, series: number, index: number | null): string => {
+      const values = plot.data[series] ?? [];
+      let i = index ?? values.length - 1;
+      if (index === null || index === undefined) while (i > 0 && values[i] === null) --i;
+      const shown = at ?? values[i];
+      if (shown === null || shown === undefined) return "–";
+      const rules = interventions(this.rulesAt(lines[series - 1].track, plot.data[0][i]));
+      return `${shown.toFixed(digits)} ${unit}${rules === "" ? "" : `, ${rules}`}`;
+    };
     const series = lines.map((line, i) => ({ label: line.name, stroke: color(`--series-${i}`), width: 1.75, dash: DASHES[i], spanGaps: true, points: { show: false }, value }));
     // where the safety layer acts
     const limited = name !== "force" ? [] : lines.map(() => ({ label: "", stroke: color("--warn"), width: 0, points: { show: true, size: 4, fill: color("--warn"), stroke: color("--warn") } }));
@@ -121,8 +144,9 @@ class Plot {
         scales: { x: { time: false, auto: false }, y: { auto: false } },
         axes: [{ ...axis, size: 24, values: (_, ticks) => ticks.map((tick) => `${tick} s`) }, { ...axis, size: 52, space: 28, values: (_, ticks) => ticks.map((tick) => `${tick} ${unit}`) }],
         series: [{ label: "s", value: (_, time: number | null) => (time === null ? "–" : time.toFixed(1)) }, ...series, ...limited],
-        cursor: { drag: { x: false, y: false }, sync: { key: "session" } },
-        legend: { live: true, isolate: false },
+        // the page may be zoomed, as on a wall; the plot counts in its own pixels
+        cursor: { drag: { x: false, y: false }, sync: { key: "session" }, move: (plot, left, top) => [left / zoomOf(plot.over), top / zoomOf(plot.over)] },
+        legend: { live: true, isolate: false, markers: { width: 2 } },
         hooks: { draw: [drawLimit] },
       },
       [[], ...series.map(() => []), ...limited.map(() => [])],

@@ -6,6 +6,7 @@ import { decompress } from "fzstd";
 import { decoderOf, type Decoder } from "./decode";
 import { INSTANCE_STATE, type Handler } from "./live";
 import type { ConsoleState, ContactPairs, EventLog, HandState, InstanceGone, SessionAnnounce, Telemetry, TickStats } from "./messages";
+import { t, type Key } from "./strings";
 import { Tracks } from "./tracks";
 
 // states and events: all of them before a moment tell how it stands then
@@ -20,6 +21,14 @@ const BEFORE = [150_000_000n, 1_000_000_000n, 8_000_000_000n]; // [ns] in which 
 const BLOCK = 1 << 19; // bytes that are read at a time
 const BLOCKS = 48; // that are kept
 const LARGEST = 1 << 26; // bytes of a chunk
+const LARGEST_WHOLE = 1 << 28; // bytes of a file that is read as a whole, where a server has no ranges
+
+/** Why a recording cannot be played, in the language of the page. */
+export class Unreadable extends Error {
+  constructor(key: Key, values: Record<string, string | number> = {}) {
+    super(t(key, values));
+  }
+}
 
 interface Readable { size(): Promise<bigint>; read(offset: bigint, size: bigint): Promise<Uint8Array> }
 
@@ -36,7 +45,7 @@ class Blocks implements Readable {
   async read(offset: bigint, size: bigint): Promise<Uint8Array> {
     const begin = Number(offset);
     const end = begin + Number(size);
-    if (end > this.bytes || Number(size) > LARGEST) throw new Error("its index points behind its end");
+    if (end > this.bytes || Number(size) > LARGEST) throw new Unreadable("file.index");
     const result = new Uint8Array(end - begin);
     for (let block = Math.floor(begin / BLOCK); block * BLOCK < end; ++block) {
       const from = Math.max(begin, block * BLOCK);
@@ -66,13 +75,27 @@ export function fromBytes(bytes: Uint8Array): Readable {
   return new Blocks(bytes.length, (begin, end) => Promise.resolve(bytes.subarray(begin, end)));
 }
 
-export async function fromAddress(url: string): Promise<Readable> {
-  const load = async (begin: number, end: number): Promise<Response> => {
-    const answer = await fetch(url, { headers: { Range: `bytes=${begin}-${end - 1}` } });
-    if (answer.status !== 206) throw new Error(`${url}: ${answer.status} ${await answer.text()}`);
+/** `address`: relative to the page. Of another server than the page's it is there when both permit it. */
+export async function fromAddress(address: string): Promise<Readable> {
+  const url = URL.canParse(address, location.href) ? new URL(address, location.href) : undefined;
+  if (url === undefined || !["http:", "https:"].includes(url.protocol)) throw new Unreadable("file.address", { url: address });
+  const { origin, href } = url;
+  const ask = async (options: RequestInit): Promise<Response> => {
+    const answer = await fetch(href, options).catch(() => undefined);
+    if (answer === undefined) throw origin === location.origin ? new Unreadable("file.unreachable", { url: href }) : new Unreadable("file.elsewhere", { url: href, origin });
+    if (!answer.ok) throw new Unreadable("file.status", { url: href, status: answer.status });
     return answer;
   };
-  const size = Number((await load(0, 1)).headers.get("Content-Range")?.split("/")[1]);
+  const load = (begin: number, end: number): Promise<Response> => ask({ headers: { Range: `bytes=${begin}-${end - 1}` } });
+  const first = await load(0, 1);
+  const lengthOf = ({ headers }: Response): number => Number(headers.get("Content-Length") ?? NaN);
+  if (first.status !== 206) {
+    if (!(lengthOf(first) <= LARGEST_WHOLE)) throw new Unreadable("file.ranges", { url: href });
+    return fromBytes(new Uint8Array(await first.arrayBuffer()));
+  }
+  // a server elsewhere may keep this header from the page
+  const size = Number(first.headers.get("Content-Range")?.split("/")[1] ?? lengthOf(await ask({ method: "HEAD" })));
+  if (!Number.isFinite(size)) throw new Unreadable("file.ranges", { url: href });
   return new Blocks(size, async (begin, end) => new Uint8Array(await (await load(begin, end)).arrayBuffer()));
 }
 
@@ -96,9 +119,12 @@ export class Recording {
   /** Fails with the reason when it is no recording, or was cut before its index. */
   static async open(readable: Readable, handler: Handler, onProgress: (fraction: number) => void): Promise<Recording> {
     const decompressHandlers = { zstd: (bytes: Uint8Array, size: bigint) => decompress(bytes, new Uint8Array(Number(size))) };
-    const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers });
+    const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers }).catch((problem: unknown) => {
+      console.warn(problem); // what the library found instead, in its words
+      throw problem instanceof Unreadable || problem instanceof DOMException ? problem : new Unreadable("file.no_index");
+    });
     const { statistics } = reader;
-    if (statistics === undefined || statistics.messageCount === 0n) throw new Error("it has no messages");
+    if (statistics === undefined || statistics.messageCount === 0n) throw new Unreadable("file.empty");
     const begin = statistics.messageStartTime;
     const recording = new Recording(reader, handler, begin, Number(statistics.messageEndTime - begin) / 1e9);
     for (const channel of reader.channelsById.values()) recording.addChannel(channel.id);

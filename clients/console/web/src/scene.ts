@@ -37,7 +37,11 @@ export class SceneView {
   private changed = -1;
   private dirty = true;
   private isFramed = false;
+  private hasBegun = false; // and everything is where the session has it
+  private isFramedWaiting = false;
+  private isTurned = false; // by the viewer, or to the work: not to be framed anew by itself
   isHandMode = false;
+  private covered = 0; // of the picture's top [pixels]
 
   constructor(private host: HTMLElement, label: string, drawing: string | null) {
     const isSlow = isSoftware();
@@ -58,6 +62,7 @@ export class SceneView {
     this.controls.minDistance = 0.1;
     this.controls.listenToKeyEvents(this.canvas);
     this.controls.addEventListener("change", () => (this.dirty = true));
+    this.controls.addEventListener("start", () => (this.isTurned = true));
 
     this.rig.add(this.camera);
     this.scene.add(this.rig);
@@ -126,6 +131,18 @@ export class SceneView {
     this.dirty = true;
   }
 
+  /** Whether the workspaces of all devices are shown, or only near their limits. */
+  showWorkspaces(isOn: boolean): void {
+    this.markers.showsWorkspaces = isOn;
+    this.moved = -1;
+    this.dirty = true;
+  }
+
+  /** The limit of a device's workspace is in the picture. */
+  get hasWorkspace(): boolean {
+    return this.markers.hasWorkspace;
+  }
+
   setLabel(label: string): void {
     this.canvas.setAttribute("aria-label", label);
   }
@@ -137,12 +154,22 @@ export class SceneView {
     this.dirty = true;
   }
 
+  /** What covers the top of the picture [pixels]: what is framed is seen below it. */
+  setCovered(height: number): void {
+    if (Math.abs(height - this.covered) < 8) return;
+    this.covered = height;
+    this.resize();
+    if (this.isFramed && !this.isTurned) this.frame();
+  }
+
   private resize(): void {
     const { clientWidth: width, clientHeight: height } = this.host;
     if (width === 0 || height === 0 || this.before !== undefined) return;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, this.pace.quality.ratio));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
+    if (this.covered > 0) this.camera.setViewOffset(width, height, 0, -this.covered / 2, width, height);
+    else this.camera.clearViewOffset();
     this.camera.updateProjectionMatrix();
     this.dirty = true;
   }
@@ -154,14 +181,15 @@ export class SceneView {
 
   /** How far away from its centre a box is seen as a whole, with a margin [m]. */
   private distanceOf(box: THREE.Box3, centre: THREE.Vector3): number {
-    const up = Math.tan((this.camera.fov * Math.PI) / 360) * FILLED;
+    const across = Math.tan((this.camera.fov * Math.PI) / 360) * FILLED * this.camera.aspect;
+    const up = (across / this.camera.aspect) * Math.max(0.3, 1 - this.covered / Math.max(1, this.host.clientHeight));
     const right = new THREE.Vector3().crossVectors(this.camera.up, DIRECTION).normalize();
     const above = new THREE.Vector3().crossVectors(DIRECTION, right);
     let distance = 0;
     for (let corner = 0; corner < 8; ++corner) {
       const { min, max } = box;
       const from = new THREE.Vector3(corner & 1 ? min.x : max.x, corner & 2 ? min.y : max.y, corner & 4 ? min.z : max.z).sub(centre);
-      const wide = Math.max(Math.abs(from.dot(right)) / (up * this.camera.aspect), Math.abs(from.dot(above)) / up);
+      const wide = Math.max(Math.abs(from.dot(right)) / across, Math.abs(from.dot(above)) / up);
       distance = Math.max(distance, wide + from.dot(DIRECTION));
     }
     return distance;
@@ -181,6 +209,7 @@ export class SceneView {
     this.ground.fit(box);
     this.markers.size = Math.min(1.3, Math.max(0.35, radius / 0.9));
     this.isFramed = true;
+    this.isTurned = places.length > 0;
     this.moved = -1;
     this.dirty = true;
   }
@@ -200,7 +229,11 @@ export class SceneView {
       this.takeGhost(session);
       this.markers.take(session);
       this.dirty = true;
-      if (!this.isFramed && this.parts.all.size > 0 && session.states.size > 0) this.frame();
+      this.hasBegun = session.states.size > 0;
+      // anew when the session begins, since more is there then than where it waited
+      const isAnew = this.hasBegun && this.isFramedWaiting && !this.isTurned;
+      if (this.parts.all.size > 0 && (isAnew || (!this.isFramed && (this.hasBegun || session.isWaiting)))) this.frame();
+      this.isFramedWaiting = !this.hasBegun && session.isWaiting;
     }
     if (this.before !== undefined) return; // the headset asks for its pictures
     this.controls.update();
@@ -227,7 +260,7 @@ export class SceneView {
 
   /** All that there is to be seen is drawn. */
   get isComplete(): boolean {
-    return this.parts.isComplete && this.isFramed && !this.dirty;
+    return this.parts.isComplete && this.isFramed && this.hasBegun && !this.dirty;
   }
 
   /** The surface below a place of the page. */
@@ -249,6 +282,7 @@ export class SceneView {
 
   /** Looks from a place at another one. */
   lookFrom(eye: THREE.Vector3, at: THREE.Vector3): void {
+    this.isTurned = true;
     this.camera.position.copy(eye);
     this.controls.target.copy(at);
     this.dirty = true;
@@ -337,7 +371,7 @@ export class SceneView {
     this.markers.clear();
     if (this.ghost !== undefined) this.scene.remove(this.ghost.group);
     this.ghost = undefined;
-    this.isFramed = false;
+    this.isFramed = this.hasBegun = this.isFramedWaiting = this.isTurned = false;
     this.dirty = true;
   }
 

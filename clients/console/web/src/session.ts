@@ -4,6 +4,7 @@ import {
   type ObjectSnapshot, type ObjectState, type PairContact, type Presence, type RecorderStatus, type RunState, type SceneHand, type SceneObject,
   type SceneStep, type StepProgress, type StepState, type Telemetry, type TickStats, type WorldFrame,
 } from "./messages";
+import { deviceOf, type Device } from "./eventtext";
 import { localized } from "./strings";
 import { Tracks } from "./tracks";
 
@@ -15,8 +16,8 @@ export const TOPICS = [
 const EVENTS = 200;
 
 /** Times in s of the session. */
-interface Visit { started: number; ended?: number; phase?: StepPhase; visits: number }
-export interface StepEntry extends SceneStep, Partial<Visit> { isNow: boolean; visits: number }
+interface Visit { started: number; ended?: number; phase?: StepPhase }
+export interface StepEntry extends SceneStep, Partial<Visit> { isNow: boolean }
 const STEP_ENDS: Record<string, StepPhase> = { "step done": StepPhase.Done, "step skipped": StepPhase.Skipped, "step timed out": StepPhase.TimedOut };
 
 /** Keeps the newest message of each key. */
@@ -40,6 +41,7 @@ export class Session {
   run?: RunState;
   stats?: TickStats;
   telemetry = new Map<number, Telemetry>(); // by client
+  devices = new Map<string, Device>(); // by the name of the hand
   recorder?: RecorderStatus;
   events: EventLog[] = [];
   tick = 0;
@@ -50,7 +52,7 @@ export class Session {
   heard = 0;
   private raises = new Map<string, EmergencyStop>();
   private clears = new Set<string>();
-  private visits = new Map<string, Visit>(); // of steps by name
+  private visits = new Map<string, Visit>(); // the last one of each step, by name
 
   /** Another session begins. */
   reset(): void {
@@ -137,6 +139,7 @@ export class Session {
         break;
       case "ClientEvent":
         // stations tell more than is of use here
+        if ((message as EventLog).kind === "device") this.know(message as EventLog);
         if ((message as EventLog).kind === "safety") this.log({ ...(message as EventLog), severity: 1 });
         break;
     }
@@ -185,10 +188,21 @@ export class Session {
     this.events.push(event);
     if (this.events.length > EVENTS) this.events.shift();
     const seconds = Number(event.tick) / 1000;
-    if (event.kind === "step") this.visits.set(event.text, { started: seconds, visits: (this.visits.get(event.text)?.visits ?? 0) + 1 });
+    if (event.kind === "step") this.visits.set(event.text, { started: seconds });
     const phase = STEP_ENDS[event.kind];
     const visit = this.visits.get(event.text.replace(/ \(.*$/, ""));
     if (phase !== undefined && visit !== undefined) Object.assign(visit, { phase, ended: seconds });
+  }
+
+  private know({ text }: EventLog): void {
+    const told = deviceOf(text);
+    if (told !== undefined) this.devices.set(told.hand, told.device);
+    ++this.moved;
+  }
+
+  /** What moves a hand, where its station has told it. */
+  deviceOf(hand: number): Device | undefined {
+    return this.devices.get(this.sceneHands.get(hand)?.name ?? "");
   }
 
   /** All steps of the scenario in their order, each with its last visit. */
@@ -198,13 +212,18 @@ export class Session {
       const visit = this.visits.get(scene.name);
       const isNow = now?.name === scene.name && now.phase <= StepPhase.Active;
       const started = isNow ? Number(now.started) / 1000 : visit?.started;
-      return { ...scene, isNow, phase: isNow ? StepPhase.Active : visit?.phase, started, ended: isNow ? undefined : visit?.ended, visits: visit?.visits ?? 0 };
+      return { ...scene, isNow, phase: isNow ? StepPhase.Active : visit?.phase, started, ended: isNow ? undefined : visit?.ended };
     });
   }
 
   /** Raises of the emergency stop that no clear has named. */
   get standing(): EmergencyStop[] {
     return [...this.raises].filter(([key]) => !this.clears.has(key)).map(([, raise]) => raise);
+  }
+
+  /** It is open, and has not begun: the server says of no object where it is, only where it is to begin. */
+  get isWaiting(): boolean {
+    return this.run === undefined ? this.link?.state === "joined" && this.objects.size > 0 && this.states.size === 0 : this.run.phase === RunPhase.Waiting;
   }
 
   get isOver(): boolean {

@@ -51,6 +51,12 @@ export function t(key: Key, values: Record<string, string | number> = {}): strin
   return filled(languages[language][key], values);
 }
 
+/** A text that a page of any language has sent, in this page's. */
+export function retold(text: string, ...keys: Key[]): string {
+  const key = keys.find((known) => Object.values(languages).some((texts) => texts[known] === text));
+  return key === undefined ? text : t(key);
+}
+
 export function nameOfLanguage(name: string): string {
   return languages[name]["language"];
 }

@@ -32,7 +32,7 @@ export class Track {
   }
 }
 
-/** Tracks by their names: `force 3` is that of hand 3, `age 7` that of client 7, `gap` that of the scene. */
+/** Tracks by their names: `force 3` is that of hand 3, `limited 3` that of it where the safety layer acts, with `safety 3` its rules as bits, `age 7` that of client 7, `gap` that of the scene. */
 export class Tracks {
   readonly all = new Map<string, Track>();
 
@@ -46,7 +46,9 @@ export class Tracks {
     const { force } = F_Ho_W;
     const newtons = Math.hypot(force[0], force[1], force[2]);
     this.of(`force ${hand_id}`).add(seconds, newtons);
-    if (safety_flags !== 0 && newtons > FELT) this.of(`limited ${hand_id}`).add(seconds, newtons);
+    if (safety_flags === 0 || newtons <= FELT) return;
+    this.of(`limited ${hand_id}`).add(seconds, newtons);
+    this.of(`safety ${hand_id}`).add(seconds, safety_flags, (a, b) => a | b);
   }
 
   /** Gap of the nearest pair, or how deep the deepest one is in: below 0 [m]. */

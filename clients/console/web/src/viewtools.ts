@@ -6,13 +6,13 @@ import { NONE, StepPhase } from "./messages";
 import type { Label } from "./labels";
 import type { SceneView } from "./scene";
 import type { Session } from "./session";
-import { t, type Key } from "./strings";
+import { keep, kept, t, type Key } from "./strings";
 
 const STILL = 4; // [pixels] that a click moves at most
 const AXES = { x: new THREE.Vector3(1, 0, 0), y: new THREE.Vector3(0, 1, 0), z: new THREE.Vector3(0, 0, 1) } as const;
 type Axis = keyof typeof AXES;
 type Look = "free" | "follow" | "trainee";
-const KEYS: Record<string, string> = { "1": "free", "2": "follow", "3": "trainee", s: "section", b: "measure", o: "hide", i: "isolate", a: "showall" };
+const KEYS: Record<string, string> = { "1": "free", "2": "follow", "3": "trainee", s: "section", b: "measure", w: "workspace", o: "hide", i: "isolate", a: "showall" };
 
 export class ViewTools {
   readonly element = h("div", "tools");
@@ -27,6 +27,7 @@ export class ViewTools {
   private isFlipped = false;
   private isCut = false;
   private isMeasuring = false;
+  private hasWorkspaces = false;
   private ends: THREE.Vector3[] = [];
   private picked?: number;
   private followed?: THREE.Vector3;
@@ -47,6 +48,8 @@ export class ViewTools {
     tool("trainee", "eye", () => this.choose(this.look === "trainee" ? "free" : "trainee"));
     tool("section", "section", () => this.section(!this.isCut));
     tool("measure", "measure", () => this.measure(!this.isMeasuring));
+    tool("workspace", "sphere", () => this.showWorkspaces(!this.hasWorkspaces));
+    this.showWorkspaces(kept("workspace") === "on");
     for (const axis of ["x", "y", "z"] as const) this.word(this.sectionRow, axis, () => this.place(axis, this.isFlipped));
     this.sectionRow.append(this.slider);
     this.word(this.sectionRow, "flip", () => this.place(this.axis, !this.isFlipped));
@@ -88,6 +91,7 @@ export class ViewTools {
     if (name === "free" || name === "follow" || name === "trainee") this.choose(name);
     if (name === "section") this.section(!this.isCut);
     if (name === "measure") this.measure(!this.isMeasuring);
+    if (name === "workspace") this.showWorkspaces(!this.hasWorkspaces);
     if (name === "hide" && this.picked !== undefined) this.hide([...this.view.parts.hidden, this.picked]);
     if (name === "isolate" && this.picked !== undefined) this.isolate(this.picked);
     if (name === "showall") this.hide([]);
@@ -105,11 +109,12 @@ export class ViewTools {
     this.show();
   }
 
-  /** Where the work is: what the step's hand holds, else the object of the step, else the first hand. */
+  /** Where the work is: the object of the step when somebody holds it, else what else somebody holds, else the object of the step, else the first hand. */
   private focus(): THREE.Vector3 | undefined {
     const { session } = this;
     const { step } = session;
-    const held = [...session.grabs.values()].find(({ object_id, hand_id }) => hand_id !== NONE && !session.isOwn(object_id) && !session.isTracked(hand_id));
+    const all = [...session.grabs.values()].filter(({ object_id, hand_id }) => hand_id !== NONE && !session.isOwn(object_id) && !session.isTracked(hand_id));
+    const held = all.find(({ object_id }) => object_id === step?.object_id) ?? all[0];
     const object = held?.object_id ?? (step !== undefined && step.phase <= StepPhase.Active ? step.object_id : NONE);
     const pose = session.states.get(object)?.X_WO ?? [...session.hands].find(([id]) => !session.isTracked(id))?.[1].X_WH;
     return pose === undefined ? undefined : new THREE.Vector3(pose.p[0], pose.p[1], pose.p[2]);
@@ -153,6 +158,14 @@ export class ViewTools {
     const at = box.min.clone().lerp(box.max, Number(this.slider.value));
     this.view.parts.cut(new THREE.Plane().setFromNormalAndCoplanarPoint(normal, at));
     this.show();
+  }
+
+  /** Is kept, as other choices of the viewer's are. */
+  private showWorkspaces(isOn: boolean): void {
+    this.hasWorkspaces = isOn;
+    keep("workspace", isOn ? "on" : "off");
+    this.buttons.get("workspace")?.setAttribute("aria-pressed", String(isOn));
+    this.view.showWorkspaces(isOn);
   }
 
   private measure(isOn: boolean): void {

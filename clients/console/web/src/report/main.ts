@@ -59,6 +59,12 @@ function titleOf(visit: Visit): string {
   return visit.attempt > 1 ? r("step.attempt", { title: text, attempt: visit.attempt }) : text;
 }
 
+/** Why the session ended. */
+function wordsOf(reason: string): string {
+  const text = eventText(session, { kind: "run", text: reason });
+  return text === reason ? said(text) : text;
+}
+
 /** What the server wrote, in the language of this page and with titles instead of names. */
 function words(event: ReportEvent): string {
   const text = eventText(session, event);
@@ -93,11 +99,11 @@ function begin(report: Report): void {
     const people = summary.people.filter(({ role }) => role !== "recorder").map((person) => `${person.name} (${said(person.role)})`);
     const facts = [r("date", { date }), ...people, ...(summary.lockstep ? [r("lockstep")] : [])];
     const outcome = h("span", `outcome ${summary.succeeded ? "good" : "bad"}`, icon(summary.succeeded ? "done" : "warn"), said(summary.outcome));
-    head.replaceChildren(h("h1", "", name), h("p", "muted", facts.join(" · ")), h("p", "", outcome, " ", h("span", "muted", said(summary.reason))),
+    head.replaceChildren(h("h1", "", name), h("p", "muted", facts.join(" · ")), h("p", "", outcome, " ", h("span", "muted", wordsOf(summary.reason))),
       ...(summary.problem === "" ? [] : [h("p", "warning", h("b", "warn", r("warning")), ` ${summary.problem}`)]), tables.tiles(report));
     legend.replaceChildren(...(["target", "within", "device", "contact"] as const).map((key) => h("span", `key-${key}`, h("i"), t(`legend.${key}`))));
     frameButton.textContent = t("view.reset");
-    stepsSection.replaceChildren(...tables.steps(report, titleOf));
+    stepsSection.replaceChildren(...tables.steps(report, titleOf, (part) => session.retitled(part)));
     plotsHead.textContent = r("plots");
     plotsNote.textContent = r("plots.marks");
     eventsSection.replaceChildren(...tables.events(report, words));

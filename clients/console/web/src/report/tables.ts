@@ -42,13 +42,14 @@ function jump(row: HTMLElement, seconds: number, cell: Element | null): HTMLElem
 
 const cells = (values: string[]): HTMLElement[] => values.map((value) => h("td", "number", value));
 
-export function steps({ summary }: Report, titleOf: TitleOf): Node[] {
+/** `partOf`: the title of a part in the page's language. */
+export function steps({ summary }: Report, titleOf: TitleOf, partOf: (title: string) => string): Node[] {
   const numbers = (seconds: number, error: string, of: { path: number; collisions: number }, metrics: Metrics): HTMLElement[] =>
     cells([n(seconds, 1), error, n(of.path, 2), String(of.collisions), n(metrics.peak_force, 1), n(metrics.mean_force, 1), n(metrics.contact_seconds, 1)]);
   const rows = summary.steps.map((visit, i) => {
     const error = visit.position_error === undefined ? "" : r("of", { done: n(1e3 * visit.position_error, 2), all: n(1e3 * (visit.position_tolerance ?? 0), 1) });
     const [name, tone] = PHASES[visit.phase] ?? ["wait", "warn"];
-    const title = h("td", "name", titleOf(visit), ...(visit.part === "" ? [] : [h("small", "muted", visit.part)]));
+    const title = h("td", "name", titleOf(visit), ...(visit.part === "" ? [] : [h("small", "muted", partOf(visit.part))]));
     const result = h("td", "", h("span", `badge ${tone}`, icon(name), said(visit.phase)));
     return jump(h("tr", "", h("td", "number", String(i + 1)), title, ...numbers(visit.seconds, error, visit, visit), result), visit.begin, title);
   });
