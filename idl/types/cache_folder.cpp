@@ -6,10 +6,20 @@ namespace tenon {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+/// Empty when the variable is not set.
+fs::path folderIn(const char* variable) {
+  const char* const folder = std::getenv(variable);
+  return folder != nullptr ? folder : "";
+}
+
+}  // namespace
+
 fs::path defaultCache() {
-  if (const char* cache = std::getenv("TENON_CACHE")) return cache;
-  if (const char* cache = std::getenv("XDG_CACHE_HOME")) return fs::path(cache) / "tenon";
-  if (const char* home = std::getenv("HOME")) return fs::path(home) / ".cache" / "tenon";
+  if (fs::path cache = folderIn("TENON_CACHE"); !cache.empty()) return cache;
+  if (const fs::path cache = folderIn("XDG_CACHE_HOME"); !cache.empty()) return cache / "tenon";
+  if (const fs::path home = folderIn("HOME"); !home.empty()) return home / ".cache" / "tenon";
   return fs::temp_directory_path() / "tenon";
 }
 

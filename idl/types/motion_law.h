@@ -20,6 +20,14 @@ inline constexpr double kLongestExtrapolation = 0.15;
   return displaced(X_WO, {v_WQ * time, clampNorm(V_WO.angular * time, std::numbers::pi)}, p_OQ_O);
 }
 
+/// [-] Share of its motion by which a body whose points move at `speed` [m/s] is extrapolated: none of slow
+/// motion. What gives way under a hand's push is heard late, and its velocity would be fed back with the gain
+/// of the delay.
+[[nodiscard]] constexpr double extrapolationWeight(double speed) {
+  constexpr double kSlow = 0.01;  // [m/s]
+  return std::clamp(speed / kSlow - 1.0, 0.0, 1.0);
+}
+
 /// [m] Most that a point is off extrapolated() that is accelerated by up to `acceleration` [m/s^2] meanwhile,
 /// for `ahead` [s].
 [[nodiscard]] constexpr double extrapolationError(double acceleration, double ahead) {

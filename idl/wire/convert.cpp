@@ -61,6 +61,10 @@ class ToWire {
     c = const_cast<char*>(m.c_str());
   }
   void status(const char*, std::uint8_t& c, const std::uint8_t& m) { c = m; }
+  template <std::size_t N>
+  void steps(const char*, std::int32_t (&c)[N], const Eigen::Matrix<double, int{N}, 1>& m, double step) {
+    for (std::size_t i = 0; i < N; ++i) c[i] = toSteps(m[static_cast<int>(i)], step);
+  }
   void bytes(const char* field, dds_sequence_octet& c, const std::vector<std::uint8_t>& m,
              std::size_t bound) {
     const std::size_t size = fit(field, m.size(), bound);
@@ -144,6 +148,10 @@ class FromWire {
   void status(const char*, const std::uint8_t& c, std::uint8_t& m) {
     m = c;
     if (m > static_cast<std::uint8_t>(ObjectStatus::kFree)) reject();
+  }
+  template <std::size_t N>
+  void steps(const char*, const std::int32_t (&c)[N], Eigen::Matrix<double, int{N}, 1>& m, double step) {
+    for (std::size_t i = 0; i < N; ++i) m[static_cast<int>(i)] = fromSteps(c[i], step);
   }
   void bytes(const char*, const dds_sequence_octet& c, std::vector<std::uint8_t>& m, std::size_t bound) {
     if (c._length > bound) return reject();

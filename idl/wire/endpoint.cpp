@@ -248,6 +248,10 @@ Result<void> Inbox::onGoneFrom(Partition& partition, const Topic<M>& topic, Hand
   return {};
 }
 
+void Inbox::end(const Partition& partition, std::string_view topic) {
+  impl_->wait_set.remove(partition, topic);
+}
+
 std::size_t Inbox::dispatch(std::chrono::nanoseconds timeout) { return impl_->wait_set.dispatch(timeout); }
 void Inbox::wake() noexcept { impl_->wait_set.wake(); }
 std::uint64_t Inbox::malformed() const { return impl_->malformed; }

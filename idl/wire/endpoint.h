@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 #include "idl/types/result.h"
@@ -108,6 +109,9 @@ class Inbox {
   Result<void> onGone(Partition& partition, const Topic<M>& topic, Handler<M> handler) {
     return onGoneFrom<M>(partition, topic, withoutOrigin<M>(std::move(handler)));
   }
+
+  /// Ends all handlers of a topic in this partition; nothing of it is received any more. Not from a handler.
+  void end(const Partition& partition, std::string_view topic);
 
   /// Waits for samples, wake() or the timeout (zero: does not wait), then calls the handlers for all samples
   /// received. Returns their number.

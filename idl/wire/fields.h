@@ -5,12 +5,14 @@
 #include <type_traits>
 
 #include "idl/types/messages.h"
+#include "idl/types/resolution.h"
 
 /// The fields of each message with their names in errors and their longest lists: one list per type serves
 /// every direction. `d` is the direction (ToWire or FromWire of convert.cpp; random values in the tests), `c`
 /// the C struct that idlc generates, `m` the message. A direction has
 ///   d(name, c, m)                     a number, id, vector, enumerator or text
 ///   d.status(name, c, m)              an ObjectStatus
+///   d.steps(name, c, m, step)         a vector as whole numbers of `step` (idl/types/resolution.h)
 ///   d.bytes(name, c, m, bound)        octets
 ///   d.list(name, c, m, bound, each)   elements, by each(d, c_element, m_element)
 /// Internal to idl/wire and its tests.
@@ -36,8 +38,10 @@ void fields(auto& d, auto& c, Is<Wrench> auto& m) {
 }
 void fields(auto& d, auto& c, Is<DeviceSample> auto& m) {
   d("seq", c.seq, m.seq);
-  fields(d, c.X_WH, m.X_WH);
-  fields(d, c.V_WH, m.V_WH);
+  d.steps("p_WH", c.p_WH, m.X_WH.translation(), kPositionStep);
+  d.steps("q_WH", c.q_WH, m.X_WH.rotation().coeffs(), kRotationStep);
+  d.steps("v_WH", c.v_WH, m.V_WH.linear, kVelocityStep);
+  d.steps("w_WH", c.w_WH, m.V_WH.angular, kVelocityStep);
   d("buttons", c.buttons, m.buttons);
 }
 void fields(auto& d, auto& c, Is<ObjectState> auto& m) {
@@ -59,7 +63,9 @@ void fields(auto& d, auto& c, Is<ManifoldContact> auto& m) {
 }
 void fields(auto& d, auto& c, Is<HandPull> auto& m) {
   d("hand", c.hand_id, m.hand);
+  d("object", c.object_id, m.object);
   fields(d, c.X_WG, m.X_WG);
+  d("V_WG", c.V_WG, m.V_WG);
   d("p_BoC_B", c.p_BoC_B, m.p_BoC_B);
   d("stiffness", c.stiffness, m.stiffness);
   d("rotational_stiffness", c.rotational_stiffness, m.rotational_stiffness);
@@ -147,6 +153,7 @@ void fields(auto& d, auto& c, Is<Welcome> auto& m) {
   d("challenge", c.challenge, m.challenge);
   d("client", c.client_id, m.client);
   d.list("hands", c.hands, m.hands, 16, kNumbers);
+  d.list("objects", c.objects, m.objects, 16, kNumbers);
   d("tick", c.tick, m.tick);
   d("lockstep", c.lockstep, m.lockstep);
   d("people", c.people, m.people);
@@ -163,9 +170,9 @@ void fields(auto& d, auto& c, Is<DeviceInput> auto& m) {
   d("client", c.client_id, m.client);
   d("server_epoch", c.server_epoch, m.server_epoch);
   d("active", c.active, m.active);
+  d("period", c.period, m.period);
   fields(d, c.sample, m.sample);
   d.list("earlier", c.earlier, m.earlier, kEarlierSamples, kStructs);
-  d("p_WC", c.p_WC, m.p_WC);
 }
 void fields(auto& d, auto& c, Is<WorldFrame> auto& m) {
   d("part", c.part, m.part);

@@ -214,11 +214,15 @@ Result<void> Membership::takeSeat() {
 
 Result<void> Membership::watch(Inbox& inbox) {
   auto watched =
-      inbox.onGone<SessionAnnounce>(*lobby_, kSessionAnnounce, [this](const SessionAnnounce& gone) {
-        if (gone.session != announce_.session || gone.server_epoch != announce_.server_epoch) return;
-        server_gone_ = true;
-        lost_ = "the server of " + sessionText(announce_.session) + " is gone";
+      inbox.on<SessionAnnounce>(*lobby_, kSessionAnnounce, [this](const SessionAnnounce& announced) {
+        if (announced.session == announce_.session) watched_epoch_ = announced.server_epoch;
       });
+  if (!watched) return watched;
+  watched = inbox.onGone<SessionAnnounce>(*lobby_, kSessionAnnounce, [this](const SessionAnnounce& gone) {
+    if (gone.session != announce_.session || gone.server_epoch != announce_.server_epoch) return;
+    server_gone_ = true;
+    lost_ = "the server of " + sessionText(announce_.session) + " is gone";
+  });
   if (!watched) return watched;
   return inbox.on<Welcome>(*lobby_, kWelcome, [this](const Welcome& notice) {
     if (notice.client_guid != guid_ || notice.client != welcome_.client) return;

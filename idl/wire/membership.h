@@ -63,6 +63,8 @@ class Membership {
   /// From now on dispatching `inbox` updates lost() and serverIsGone(); `inbox` must not be dispatched after
   /// the destruction of this. Who is removed from the session does not announce a presence any more.
   Result<void> watch(Inbox& inbox);
+  /// The watched inbox has heard the server's announcement: only then can it hear that it is gone.
+  [[nodiscard]] bool isWatching() const { return watched_epoch_ == announce_.server_epoch; }
   /// The server has ended or is unreachable.
   [[nodiscard]] bool serverIsGone() const { return server_gone_; }
   /// Why the seat is lost; none while it is held.
@@ -114,6 +116,7 @@ class Membership {
   Origin server_;
   std::optional<std::string> lost_;
   bool server_gone_ = false;
+  std::uint32_t watched_epoch_ = 0;  // of the newest announcement that the watched inbox has heard
 };
 
 }  // namespace tenon::wire

@@ -48,6 +48,12 @@ Result<void> ReaderWaitSet::add(std::unique_ptr<Subscription> subscription, cons
   return {};
 }
 
+void ReaderWaitSet::remove(const Partition& partition, std::string_view topic) {
+  std::erase_if(subscriptions_, [&](const auto& subscription) {
+    return subscription->topic == topic && subscription->reader->partition() == partition.entities();
+  });
+}
+
 void ReaderWaitSet::wake() noexcept {
   const std::uint64_t one = 1;
   [[maybe_unused]] const auto written = write(wake_fd_, &one, sizeof(one));

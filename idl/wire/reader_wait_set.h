@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "idl/types/result.h"
@@ -45,6 +46,8 @@ class ReaderWaitSet {
   /// Opens the reader of `subscription` and serves it from now on. `keep_all`: see readerQos.
   Result<void> add(std::unique_ptr<Subscription> subscription, const Partition& partition,
                    const TopicSpec& topic, bool keep_all);
+  /// Closes the reader of a topic in a partition, if there is one. Not from within dispatch().
+  void remove(const Partition& partition, std::string_view topic);
   /// Waits for samples, wake() or the timeout, then handles all samples received; returns their number.
   std::size_t dispatch(std::chrono::nanoseconds timeout);
   void wake() noexcept;

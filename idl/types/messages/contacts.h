@@ -24,16 +24,20 @@ struct ManifoldContact {
   Vector3f velocity_W = Vector3f::Zero();  ///< [m/s] of the point of A that coincides with P, in W
 };
 
-/// The coupling of another hand that holds the same object.
+/// The coupling of another hand, which holds the same object or one nearby.
 struct HandPull {
   HandId hand;
-  Pose X_WG;                          ///< goal pose of the object for that hand
-  Vector3 p_BoC_B = Vector3::Zero();  ///< [m] the point of the object that it holds
-  double stiffness = 0.0;             ///< [N/m]
-  double rotational_stiffness = 0.0;  ///< [Nm/rad]
+  ObjectId object;  ///< that it holds
+  Pose X_WG;        ///< goal pose of the object for that hand
+  Eigen::Matrix<float, 6, 1> V_WG =
+      Eigen::Matrix<float, 6, 1>::Zero();  ///< twist of the goal: linear, of its origin, then angular
+  Vector3 p_BoC_B = Vector3::Zero();       ///< [m] the point of the object that it holds
+  double stiffness = 0.0;                  ///< [N/m]
+  double rotational_stiffness = 0.0;       ///< [Nm/rad]
 };
 
 inline constexpr int kOtherPulls = 2;
+inline constexpr double kNeighbourReach = 0.1;  ///< [m] between the objects' bounding spheres
 
 /// A body that a hand's object touches.
 struct ManifoldBody {
@@ -61,7 +65,8 @@ struct HandManifold {
   std::uint32_t step_revision = 0;
   bool frozen = false;  ///< the object is held still: stale input, pause or emergency stop
   /// Other hands that hold the object, by HandId; after them, with an invalid one and as a soft spring whose
-  /// goal is far away, what other sources contribute (ForceContribution).
+  /// goal is far away, what other sources contribute (ForceContribution); then, nearest first, hands that
+  /// hold an object within kNeighbourReach of this one, for whoever simulates how that object gives way.
   FixedVector<HandPull, kOtherPulls> others;
   FixedVector<ManifoldContact, kManifoldContacts> contacts;
   /// The bodies of `contacts`, those with the smallest gaps, so that a station knows of their jumps as it

@@ -10,7 +10,7 @@
 /// What goes from and to the device of one hand.
 namespace tenon {
 
-/// A device pose, mapped to the world by the client.
+/// A device pose, mapped to the world by the client; in messages with the steps of idl/types/resolution.h.
 struct DeviceSample {
   std::uint32_t seq = 0;  ///< counts the client's ticks from 1; in lockstep the server tick it is for
   Pose X_WH;
@@ -44,17 +44,22 @@ struct HandLimits {
 /// Samples before the newest one that an input carries.
 inline constexpr std::size_t kEarlierSamples = 2;
 
-/// Pose of one hand's device, from its station to the server in every client tick.
+/// Ticks between two inputs of a hand, at most.
+inline constexpr std::uint8_t kMostInputPeriod = 20;
+
+/// Pose of one hand's device, from its station to the server every `period` client ticks.
 struct DeviceInput {
   HandId hand;
   ClientId client;
   std::uint32_t server_epoch = 0;
   bool active = false;  ///< false: fault, stop or disarmed; the server holds the object still
+  /// [ticks] 1 to kMostInputPeriod: from one input of this hand to the next; above 1 the server fills the
+  /// ticks between them
+  std::uint8_t period = 1;
   DeviceSample sample;
-  /// The samples before it, newest first, in case their inputs are lost; none where the link loses nothing.
+  /// The samples before it, newest first, in case their inputs are lost; none where the link loses nothing
+  /// or the period is above 1.
   FixedVector<DeviceSample, kEarlierSamples> earlier;
-  /// [m] C_w, centre of the client's workspace (paper eq. 1). Reserved: the server does not read it yet
-  Vector3 p_WC = Vector3::Zero();
 };
 
 /// What a station displays to one hand, for observers and recordings.
@@ -62,7 +67,7 @@ struct HandState {
   HandId hand;
   std::uint32_t seq = 0;  ///< of the client tick, as DeviceSample::seq
   Pose X_WH;
-  Vector3 p_WC = Vector3::Zero();         ///< [m] as in DeviceInput
+  Vector3 p_WC = Vector3::Zero();         ///< [m] C_w, centre of the client's workspace (paper eq. 1)
   Pose X_WO_local;                        ///< proxy pose of the local model; not used by the simulation
   Wrench F_Ho_W;                          ///< wrench displayed on the hand, about its origin
   std::uint32_t manifold_age = 0;         ///< [ticks] since the input that its contacts answer

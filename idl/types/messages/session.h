@@ -11,7 +11,7 @@
 /// Joining a session and leaving it.
 namespace tenon {
 
-inline constexpr std::uint32_t kProtocolVersion = 7;
+inline constexpr std::uint32_t kProtocolVersion = 9;
 
 /// Published by each server in the lobby partition: the session it runs.
 struct SessionAnnounce {
@@ -64,11 +64,12 @@ struct Welcome {
   std::string session;
   std::uint32_t server_epoch = 0;
   bool accepted = false;
-  std::string reason;         ///< of the refusal; empty when accepted
-  std::string challenge;      ///< of a refusal: what the proofs of the next Join have to answer; or empty
-  ClientId client;            ///< valid though not accepted: this client has lost its seat
-  std::vector<HandId> hands;  ///< in the order of Join::hands; invalid for one the scenario does not have
-  Tick tick = 0;              ///< newest of the server; in lockstep the first input is for the next one
+  std::string reason;             ///< of the refusal; empty when accepted
+  std::string challenge;          ///< of a refusal: what the proofs of the next Join have to answer; or empty
+  ClientId client;                ///< valid though not accepted: this client has lost its seat
+  std::vector<HandId> hands;      ///< in the order of Join::hands; invalid for one the scenario does not have
+  std::vector<ObjectId> objects;  ///< of `hands`: that each moves while it holds no other; may be invalid
+  Tick tick = 0;                  ///< newest of the server; in lockstep the first input is for the next one
   bool lockstep = false;
   std::uint32_t people = 0;  ///< clients that have a seat, this one included: so many Presences alive
 };

@@ -15,7 +15,10 @@ TEST(DefaultCache, IsTakenFromTheEnvironment) {
   EXPECT_EQ(defaultCache(), "/somewhere/else");
   unsetenv("TENON_CACHE");
   EXPECT_NE(defaultCache(), "/somewhere/else");
+  setenv("TENON_CACHE", "", 1);
+  EXPECT_TRUE(defaultCache().is_absolute()) << "an empty variable names no folder";
   if (before != nullptr) setenv("TENON_CACHE", kept.c_str(), 1);
+  if (before == nullptr) unsetenv("TENON_CACHE");
 }
 
 }  // namespace

@@ -74,5 +74,42 @@ TEST(StopTruth, InEveryOrderOfArrivalTheSameRaisesStand) {
   EXPECT_EQ(orders, 1956) << "sum over k of 6! / (6 - k)!, less the empty one";
 }
 
+TEST(StopTruth, OfAClientThatRaisesWithoutEndTheNewestRaisesStandUntilAllThatStandAreCleared) {
+  StopTruth truth;
+  constexpr std::uint32_t kRaises = 1000;
+  for (std::uint32_t counter = 1; counter <= kRaises; ++counter) {
+    const StopChange change = truth.raise({"a", counter, "Ada", "hand caught"});
+    ASSERT_TRUE(change);
+    ASSERT_EQ(change.superseded.has_value(), counter > StopTruth::kMostOfClient);
+    if (change.superseded) {
+      ASSERT_EQ(change.superseded->counter, counter - StopTruth::kMostOfClient);
+    }
+    ASSERT_TRUE(truth.standing().contains({"a", counter})) << "the newest one";
+    ASSERT_LE(truth.standing().size(), StopTruth::kMostOfClient);
+    ASSERT_LE(truth.cleared().size(), StopTruth::kMostOfClient);
+  }
+  EXPECT_FALSE(truth.raise({"a", kRaises - StopTruth::kMostOfClient, "Ada", "late"})) << "superseded";
+  EXPECT_TRUE(truth.raise({"a", 1, "Ada", "late"})) << "its end is forgotten: it stands rather than not";
+  truth.raise({"b", 1, "Ben", "another client"});
+  EXPECT_EQ(truth.standing().size(), StopTruth::kMostOfClient + 1);
+  const auto standing = truth.standing();
+  for (const auto& [id, stop] : standing) {
+    EXPECT_TRUE(truth.engaged());
+    truth.clear({id.client_guid, id.counter, "Ben", "safe"});
+  }
+  EXPECT_FALSE(truth.engaged());
+}
+
+TEST(StopTruth, OfRaisesUnderEverNewNamesABoundedNumberStands) {
+  StopTruth truth;
+  for (std::uint32_t client = 0; client < 3 * StopTruth::kMostInAll; ++client) {
+    const std::string guid = std::to_string(client);
+    ASSERT_TRUE(truth.raise({guid, 1, "Ada", "hand caught"}));
+    ASSERT_TRUE(truth.standing().contains({guid, 1})) << "the newest one";
+  }
+  EXPECT_EQ(truth.standing().size(), StopTruth::kMostInAll);
+  EXPECT_EQ(truth.cleared().size(), StopTruth::kMostInAll);
+}
+
 }  // namespace
 }  // namespace tenon

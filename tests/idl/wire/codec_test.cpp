@@ -71,6 +71,7 @@ class FieldCounter {
 
   void operator()(const char*, const auto& c, auto&) { fields_.insert(&c); }
   void status(const char*, const auto& c, auto&) { fields_.insert(&c); }
+  void steps(const char*, const auto& c, auto&, double) { fields_.insert(&c); }
   void bytes(const char*, const auto& c, auto&, std::size_t) { fields_.insert(&c); }
   template <class C, class List>
   void list(const char*, const C& c, List& m, std::size_t, auto each) {

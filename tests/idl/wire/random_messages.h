@@ -56,6 +56,10 @@ class RandomMessages {
   void status(const char*, const std::uint8_t&, std::uint8_t& m) {
     m = static_cast<std::uint8_t>(below(static_cast<std::uint32_t>(ObjectStatus::kFree) + 1));
   }
+  template <class C, class Vector>
+  void steps(const char*, const C&, Vector& m, double step) {
+    for (int i = 0; i < m.size(); ++i) m[i] = fromSteps(static_cast<std::int32_t>(below(0xFFFFFFFF)), step);
+  }
   template <class C>
   void bytes(const char*, const C&, std::vector<std::uint8_t>& m, std::size_t bound) {
     m.resize(upTo(bound));
