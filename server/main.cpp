@@ -10,10 +10,14 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "idl/record/mcap_reader.h"
+#include "idl/threads/line_printer.h"
 #include "idl/types/cache_folder.h"
+#include "idl/types/number_range.h"
 #include "idl/types/output_files.h"
 #include "idl/wire/identity.h"
 #include "idl/wire/network.h"
+#include "idl/wire/session_name.h"
 #include "server/check/check.h"
 #include "server/session/journal.h"
 #include "server/session/loading_display.h"
@@ -30,6 +34,7 @@ std::atomic<bool> stop_requested = false;
 void onStopSignal(int) { stop_requested = true; }
 
 constexpr int kWrongUsage = 2;
+constexpr const char* kStopped = "stopped while the scene was prepared";
 
 struct ServeArguments {
   std::string scenario;
@@ -48,14 +53,15 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
   app.set_help_flag("-h,--help", "what this program does and how to call it");
   app.add_option("scenario", arguments.scenario,
                  "a scenario's folder or YAML file, as in scenarios/engine_bay");
-  app.add_option("--session", arguments.session.name, "name by which clients find it")->capture_default_str();
+  tenon::wire::addSessionOption(app, arguments.session.name, "name by which clients find it")
+      ->capture_default_str();
   app.add_option("--domain", arguments.session.domain, "DDS domain, 0 to 230")->check(CLI::Range(0, 230));
   tenon::wire::addNetworkOption(app);
   app.add_flag("--open", arguments.session.open,
                "on a network beyond loopback: trainees, observers and recorders need no key");
   app.add_option("--detail", arguments.load.detail,
                  "mesh resolution of generated parts, 0 to 1; 1: that of the paper")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(tenon::numberFrom(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--cache", arguments.load.cache, "folder for generated parts and haptic structures");
   app.add_option("--wait-for", arguments.session.wait_for,
@@ -69,17 +75,18 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
          "--budget", arguments.session.simulation.environment.work.points,
          "initial work budget: pointshell points tested per tick at most; the finest levels that do not fit "
          "are skipped; 0: no limit")
+      ->check(CLI::Range(0, 1'000'000'000))
       ->capture_default_str();
   app.add_option("--critical-load", arguments.session.simulation.environment.work.critical_load,
                  "load of a collision pair, in percent, above which it skips a level while there is a budget")
-      ->check(CLI::Range(1.0, 1000.0))
+      ->check(tenon::numberFrom(1.0, 1000.0))
       ->capture_default_str();
   app.add_option_function<double>(
          "--tick-goal", [&arguments](double ms) { arguments.session.tick_goal = 1e-3 * ms; },
          "milliseconds that a tick should take at most in real time: the governor lowers the budget when "
          "ticks "
          "are slower and raises it again when they are not; 0: off")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(tenon::numberFrom(0.0, 1.0))
       ->default_str("0.7");
   app.add_option("--journal", arguments.session.journal,
                  "record the inputs of each tick, and a checkpoint a second, in this file");
@@ -198,6 +205,9 @@ int serve(ServeArguments& arguments) {
     const auto origin = tenon::session::readJournalOrigin(file);
     if (!origin && resumes)
       return reportError(origin.error().what + "; begin a new session with --journal and another file");
+    if (!origin && !resumes)
+      if (const auto recording = tenon::record::McapReader::open(file); !recording)
+        return reportError(recording.error().what);
     if (!origin && arguments.scenario.empty())
       return reportError(origin.error().what + "; name it as well, as in: tenon resimulate " + file +
                          " scenarios/engine_bay");
@@ -218,7 +228,9 @@ int serve(ServeArguments& arguments) {
     return reportError("name a scenario, as in: tenon serve scenarios/engine_bay", kWrongUsage);
   if (arguments.resimulate.empty())
     if (const int wrong = checkArguments(arguments); wrong != 0) return wrong;
+  arguments.load.stop = &stop_requested;
   const auto loaded = tenon::session::loadScene(arguments.scenario, arguments.load, showLoading);
+  if (stop_requested) return reportError(kStopped);
   if (!loaded) return reportError(loaded.error().what);
   if (!arguments.resimulate.empty()) return resimulateFile(arguments, *loaded);
   printProblems(*loaded);
@@ -233,32 +245,36 @@ int serve(ServeArguments& arguments) {
   arguments.session.key = *key;
   arguments.session.stop_file =
       tenon::session::defaultStopFile(arguments.session.domain, arguments.session.name);
-  arguments.session.print = printLine;
+  if (arguments.session.stop_file.empty()) reportError(tenon::session::kNoStopFile);
+  // a terminal that stands still does not stop the session
+  tenon::threads::LinePrinter printer(tenon::threads::LinePrinter::kOutput);
+  const auto say = [&printer](const std::string& text) { printer.print(text); };
+  arguments.session.print = say;
   arguments.session.detail = arguments.load.detail;
   // a session without pictures is a session
   const auto models = tenon::session::storeAssets(*loaded, arguments.load);
+  if (stop_requested) return reportError(kStopped);
   if (models) arguments.session.scene_hash = *models;
-  if (!models) printLine("the console will show boxes instead of parts: " + models.error().what);
+  if (!models) say("the console will show boxes instead of parts: " + models.error().what);
   arguments.session.resume = resumes;
   if (resumes) arguments.session.journal = arguments.resume;
   auto server = tenon::session::SessionServer::open(*loaded, arguments.session);
   if (!server) return reportError(server.error().what);
   const auto report = (*server)->run(stop_requested);
   if (!report) return reportError(report.error().what);
-  printLine(fmt::format("{} after {:.1f} s; late ticks: {}; refused inputs: {}", report->run.reason,
-                        static_cast<double>(report->run.tick) * tenon::kTickSeconds, report->late_ticks,
-                        report->refused_inputs));
+  say(fmt::format("{} after {:.1f} s; late ticks: {}; refused inputs: {}", report->run.reason,
+                  static_cast<double>(report->run.tick) * tenon::kTickSeconds, report->late_ticks,
+                  report->refused_inputs));
   if (report->slow_writes > 0 || report->failed_writes > 0)
-    printLine(
-        fmt::format("writes to the bus that took longer than 5 ms: {}, the longest {:.1f} ms; failed: {}",
+    say(fmt::format("writes to the bus that took longer than 5 ms: {}, the longest {:.1f} ms; failed: {}",
                     report->slow_writes, 1e3 * report->longest_write, report->failed_writes));
   if (report->dropped_outputs > 0)
-    printLine(fmt::format("ticks that were not published: {}", report->dropped_outputs));
+    say(fmt::format("ticks that were not published: {}", report->dropped_outputs));
   if (report->lost_journal_ticks > 0)
-    printLine(fmt::format("{} ticks are missing in the journal", report->lost_journal_ticks));
+    say(fmt::format("{} ticks are missing in the journal", report->lost_journal_ticks));
   if (!report->journal_problem.empty())
-    printLine(fmt::format("the journal ended before the session: {}", report->journal_problem));
-  printLine(fmt::format("final state hash: {:016x}", report->run.final_hash));
+    say(fmt::format("the journal ended before the session: {}", report->journal_problem));
+  say(fmt::format("final state hash: {:016x}", report->run.final_hash));
   return tenon::isCompleted(report->run, arguments.allow_skips) ? 0 : 1;
 }
 

@@ -235,11 +235,8 @@ void FramePacker::pack(const TickOutput& output, bool all, std::vector<WorldFram
   for (std::size_t i = 0; i < count; ++i)
     if (all || epochs_[i] != output.objects[i].epoch || !(poses_[i] == output.objects[i].X_WO)) add(i);
 
-  // objects at rest, round robin: at least one, and more while the last frame of moved ones has room
-  const bool none_moved = frames.empty();
   bool refreshed = false;
-  for (std::size_t k = 0; !all && k < count; ++k) {
-    if (refreshed && (none_moved || frames.back().states.full())) break;
+  for (std::size_t k = 0; !all && !refreshed && k < count; ++k) {
     refreshed_ = (refreshed_ + 1) % static_cast<std::uint32_t>(count);
     if (contains(frames, ObjectId{refreshed_})) continue;
     add(refreshed_);

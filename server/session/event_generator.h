@@ -64,8 +64,9 @@ class EventGenerator {
   std::uint64_t event_count_ = 0;
 };
 
-/// Packs objects into WorldFrames: first those that moved since they were packed last, then others round
-/// robin, so that every receiver is up to date after a while whatever was lost.
+/// Packs objects into WorldFrames: first those that moved since they were packed last, then one of the
+/// others, round robin, so that every receiver is up to date after as many frames as there are objects,
+/// whatever was lost.
 class FramePacker {
  public:
   explicit FramePacker(std::uint32_t server_epoch) : server_epoch_(server_epoch) {}

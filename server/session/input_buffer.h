@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <atomic>
 #include <memory>
-#include <optional>
+#include <utility>
 
 #include "idl/threads/latest.h"
 #include "idl/threads/spsc_queue.h"
+#include "server/session/reading_playout.h"
 #include "server/session/tick_io.h"
 
 namespace tenon::session {
@@ -14,10 +15,11 @@ namespace tenon::session {
 /// Passes inputs from the wire thread to the tick: a reading of each hand and every change, in order.
 ///
 /// A tick takes the newest reading. On a link that loses inputs it may take the one some ticks before it
-/// (playout), so that a reading that is lost and comes with the next message has its tick nevertheless.
+/// (playout), so that a reading that is lost and comes with the next message has its tick nevertheless. Of a
+/// hand that sends less than one sample a tick, it takes one between two samples (ReadingPlayout).
 ///
-/// Threads: one writer (wire: put, setPlayout, freeChanges), one reader (tick: collect); counts from any.
-/// Real-time: all but construction.
+/// Threads: one writer (wire: put, setPlayout, setPeriod, freeChanges), one reader (tick: collect); counts
+/// from any. Real-time: all but construction.
 class InputBuffer {
  public:
   static constexpr std::size_t kChanges = 256;      ///< that wait for ticks, at most
@@ -29,9 +31,11 @@ class InputBuffer {
   /// A reading newer than all before it; `reading.hand` must be below the number of hands.
   void put(const HandReading& reading) noexcept {
     Hand& hand = hands_[reading.hand.value];
-    if (hand.playout.load(std::memory_order_relaxed) > 0) hand.queue.push(reading);
-    if (hand.newest.write(reading) && hand.playout.load(std::memory_order_relaxed) == 0)
-      hand.replaced.fetch_add(1, std::memory_order_relaxed);
+    const bool waits = hand.playout.load(std::memory_order_relaxed) > 0 ||
+                       hand.period.load(std::memory_order_relaxed) > 1 ||
+                       hand.catches_up.load(std::memory_order_relaxed);
+    if (waits) hand.queue.push(reading);
+    if (hand.newest.write(reading) && !waits) hand.replaced.fetch_add(1, std::memory_order_relaxed);
   }
   /// From now on readings of `hand` wait for `ticks` [ticks], at most kMostPlayout.
   void setPlayout(HandId hand, std::uint32_t ticks) noexcept {
@@ -39,6 +43,18 @@ class InputBuffer {
   }
   [[nodiscard]] std::uint32_t playout(HandId hand) const noexcept {
     return hands_[hand.value].playout.load(std::memory_order_relaxed);
+  }
+  /// From now on samples of `hand` come each `ticks` [ticks], at most kMostInputPeriod; 1 at first.
+  void setPeriod(HandId hand, std::uint32_t ticks) noexcept {
+    hands_[hand.value].period.store(std::clamp<std::uint32_t>(ticks, 1, kMostInputPeriod),
+                                    std::memory_order_relaxed);
+  }
+  /// What has waited of `hand` is dropped: from now on another station moves it, at first with no playout and
+  /// a sample each tick.
+  void restart(HandId hand) noexcept {
+    setPlayout(hand, 0);
+    setPeriod(hand, 1);
+    hands_[hand.value].restarts.store(true, std::memory_order_relaxed);
   }
   /// False, and the change is dropped, when the queue is full because the tick has fallen behind.
   bool put(const Change& change) noexcept { return changes_.push(change); }
@@ -72,67 +88,44 @@ class InputBuffer {
   }
 
  private:
-  static constexpr std::size_t kWaiting = 8;
   struct Hand {
     threads::Latest<HandReading> newest;
-    threads::SpscQueue<HandReading> queue{64};  ///< used with a playout
-    std::atomic<std::uint32_t> playout = 0, replaced = 0, missed = 0;
+    threads::SpscQueue<HandReading> queue{64};  ///< used with a playout or a period
+    std::atomic<std::uint32_t> playout = 0, period = 1, replaced = 0, missed = 0;
+    std::atomic<bool> catches_up = false;  ///< the period is 1 again, and the ticks are still behind
+    std::atomic<bool> restarts = false;
     // of the tick
-    FixedVector<HandReading, kWaiting> waiting;  ///< by seq, ascending
-    HandReading taken;                           ///< the last one
-    std::optional<std::uint32_t> heard;          ///< seq of the newest one that has waited
+    ReadingPlayout readings;
+    std::uint32_t counted = 0;  ///< of readings.replaced()
   };
 
   /// The reading for this tick; null: none.
   static const HandReading* take(Hand& hand) noexcept {
     const std::uint32_t playout = hand.playout.load(std::memory_order_relaxed);
+    const std::uint32_t period = hand.period.load(std::memory_order_relaxed);
     const bool is_new = hand.newest.update();
-    if (playout == 0) {
+    if (hand.restarts.exchange(false, std::memory_order_relaxed)) {
+      hand.readings.clear();
+      hand.catches_up.store(false, std::memory_order_relaxed);
       while (hand.queue.front() != nullptr) hand.queue.pop();
-      hand.waiting.clear();
-      hand.heard.reset();
-      if (!is_new) return nullptr;
-      hand.taken = hand.newest.value();
-      return &hand.taken;
+    }
+    if (period > 1) hand.catches_up.store(true, std::memory_order_relaxed);
+    const bool is_between = hand.catches_up.load(std::memory_order_relaxed);
+    if (playout == 0 && !is_between) {
+      while (hand.queue.front() != nullptr) hand.queue.pop();
+      return is_new ? hand.readings.take(hand.newest.value()) : nullptr;
     }
     for (const HandReading* reading = hand.queue.front(); reading != nullptr; reading = hand.queue.front()) {
-      wait(hand, *reading);
+      hand.readings.add(*reading);
       hand.queue.pop();
     }
-    if (is_new) wait(hand, hand.newest.value());  // the queue may have been full
-    return playOut(hand, playout);
-  }
-
-  static void wait(Hand& hand, const HandReading& reading) noexcept {
-    if (hand.heard && !isBefore(*hand.heard, reading.seq)) return;
-    hand.heard = reading.seq;
-    if (hand.waiting.full()) {
-      hand.replaced.fetch_add(1, std::memory_order_relaxed);
-      dropFirst(hand, 1);
-    }
-    hand.waiting.push_back(reading);
-  }
-
-  /// The reading `playout` before the newest one. Without one that is new, the next of those that wait; a
-  /// newer one that waits alone is not kept back, so the delay begins with the first input that is lost.
-  static const HandReading* playOut(Hand& hand, std::uint32_t playout) noexcept {
-    if (hand.waiting.empty()) return nullptr;
-    const std::uint32_t due = hand.waiting[hand.waiting.size() - 1].seq - playout;
-    std::size_t next = 0;
-    while (next + 1 < hand.waiting.size() && !isBefore(due, hand.waiting[next + 1].seq)) ++next;
-    hand.taken = hand.waiting[next];
-    hand.replaced.fetch_add(static_cast<std::uint32_t>(next), std::memory_order_relaxed);
-    dropFirst(hand, next + 1);
-    return &hand.taken;
-  }
-
-  static void dropFirst(Hand& hand, std::size_t count) noexcept {
-    std::copy(hand.waiting.begin() + count, hand.waiting.end(), hand.waiting.begin());
-    hand.waiting.resize(hand.waiting.size() - count);
-  }
-  /// Of sequence numbers, which begin again at 0 after the largest.
-  static bool isBefore(std::uint32_t a, std::uint32_t b) noexcept {
-    return static_cast<std::int32_t>(a - b) < 0;
+    if (is_new) hand.readings.add(hand.newest.value());  // the queue may have been full
+    const HandReading* const taken =
+        is_between ? hand.readings.takeBetween(period) : hand.readings.takeBehind(playout);
+    if (period == 1 && hand.readings.behind() == 0) hand.catches_up.store(false, std::memory_order_relaxed);
+    const std::uint32_t replaced = hand.readings.replaced();
+    hand.replaced.fetch_add(replaced - std::exchange(hand.counted, replaced), std::memory_order_relaxed);
+    return taken;
   }
 
   std::unique_ptr<Hand[]> hands_;

@@ -5,16 +5,19 @@
 
 #include <fmt/format.h>
 
+#include "idl/types/resolution.h"
+
 namespace tenon::session {
 namespace {
 
-constexpr double kMaxPosition = 1000.0;  // [m] of a hand or object from the world's origin, each axis
-constexpr double kMaxSpeed = 50.0;       // [m/s], [rad/s] of a hand
+constexpr double kMaxPosition = 1000.0;     // [m] of an object from the world's origin, each axis
+constexpr double kMaxHandPosition = 127.0;  // [m] of a hand, likewise: what its messages reach
+constexpr double kMaxSpeed = 50.0;          // [m/s], [rad/s] of a hand
 constexpr double kMinStiffness = 1.0, kMaxStiffness = 1e4;  // [N/m] of what a device may ask for
 constexpr double kMinRotationalStiffness = 0.1, kMaxRotationalStiffness = 1e3;  // [Nm/rad] likewise
 
-bool isPlausible(const Pose& X) {
-  return X.isFinite() && X.translation().cwiseAbs().maxCoeff() < kMaxPosition &&
+bool isPlausible(const Pose& X, double most) {
+  return X.isFinite() && X.translation().cwiseAbs().maxCoeff() < most &&
          std::abs(X.rotation().squaredNorm() - 1.0) < 1e-3;
 }
 
@@ -29,11 +32,16 @@ bool isPlausible(const Vector3& v, double limit) { return v.allFinite() && v.nor
 
 Result<HandReading> checkedReading(const DeviceInput& input, const std::string& hand) {
   const DeviceSample& newest = input.sample;
-  if (!isPlausible(newest.X_WH) || !isPlausible(newest.V_WH.linear, kMaxSpeed) ||
+  if (!isPlausible(newest.X_WH, kMaxHandPosition) || !isPlausible(newest.V_WH.linear, kMaxSpeed) ||
       !isPlausible(newest.V_WH.angular, kMaxSpeed))
     return fail(fmt::format("client {} sent an implausible pose or velocity of hand '{}': ignored",
                             input.client.value, hand));
-  return HandReading{input.hand, newest.seq, input.active, newest.X_WH, newest.V_WH, newest.buttons};
+  if (input.period < 1 || input.period > kMostInputPeriod)
+    return fail(fmt::format("client {} sent an input of hand '{}' with a period of {} ms: expected 1 to {}",
+                            input.client.value, hand, input.period, kMostInputPeriod));
+  // as over the wire, so that a rehearsal without one has the same bits
+  return HandReading{input.hand,           newest.seq,           input.active,
+                     rounded(newest.X_WH), rounded(newest.V_WH), newest.buttons};
 }
 
 std::string stiffnessRefusal(const std::vector<HandStiffness>& stiffness) {
@@ -59,7 +67,7 @@ Result<Change> checkedForce(const ForceContribution& force, const game_control::
 }
 
 Result<Change> checkedPose(const ExternalPose& pose, const game_control::ScenarioFile& scenario) {
-  if (pose.object.value >= scenario.objects.size() || !isPlausible(pose.X_WO))
+  if (pose.object.value >= scenario.objects.size() || !isPlausible(pose.X_WO, kMaxPosition))
     return fail(
         fmt::format("client {} sent an implausible pose or one of an unknown object", pose.client.value));
   return Change{.kind = ChangeKind::kPlaceObject,

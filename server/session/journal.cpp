@@ -1,5 +1,6 @@
 #include "server/session/journal.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <deque>
 #include <map>
@@ -25,6 +26,7 @@ constexpr std::string_view kStructuresOf = "structures of ";
 constexpr std::string_view kProtocol = "protocol";
 constexpr std::string_view kFreeze = "freeze after ticks";
 constexpr std::string_view kPark = "park after ticks";
+constexpr std::string_view kEpoch = "server epoch";
 
 /// A re-simulation in progress: restores checkpoints, applies inputs and compares hashes, message by message.
 class Resimulator {
@@ -130,6 +132,7 @@ Result<Journal> Journal::open(const std::filesystem::path& file, const JournalOr
                                               {std::string(kProtocol), std::to_string(kProtocolVersion)},
                                               {std::string(kFreeze), std::to_string(origin.limits.freeze)},
                                               {std::string(kPark), std::to_string(origin.limits.park)},
+                                              {std::string(kEpoch), std::to_string(origin.server_epoch)},
                                               {std::string(kScenarioHash), origin.fingerprint.scenario}};
   for (const auto& [object, hash] : origin.fingerprint.structures)
     metadata[std::string(kStructuresOf) + object] = hash;
@@ -144,7 +147,7 @@ Result<Journal> Journal::reopen(const std::filesystem::path& file, Tick tick, st
   Journal journal(std::move(*writer));
   const auto noted = journal.writer_.addMetadata(
       "tenon resumed",
-      {{"after tick", std::to_string(tick)}, {"server epoch", std::to_string(server_epoch)}});
+      {{"after tick", std::to_string(tick)}, {std::string(kEpoch), std::to_string(server_epoch)}});
   if (!noted) return fail(noted.error().what);
   return journal;
 }
@@ -232,13 +235,26 @@ Result<Fingerprint> readFingerprint(const std::filesystem::path& file) {
   return fingerprint;
 }
 
+std::uint32_t lastServerEpoch(const std::filesystem::path& journal) {
+  const auto reader = record::McapReader::open(journal);
+  if (!reader) return 0;
+  std::uint32_t last = 0;
+  for (const auto& [name, values] : reader->metadata())
+    if (const auto epoch = values.find(std::string(kEpoch)); epoch != values.end())
+      last = std::max(last, static_cast<std::uint32_t>(std::strtoul(epoch->second.c_str(), nullptr, 10)));
+  return last;
+}
+
 Result<JournalOrigin> readJournalOrigin(const std::filesystem::path& file) {
   auto reader = record::McapReader::open(file);
   if (!reader) return fail(reader.error().what);
   for (const auto& [name, values] : reader->metadata())
     if ((name == kMetadata || name == kRecordingMetadata) && values.contains("scenario") &&
         values.contains("detail")) {
-      JournalOrigin origin{values.at("scenario"), std::strtod(values.at("detail").c_str(), nullptr), {}, {}};
+      JournalOrigin origin{
+          .scenario = values.at("scenario"),
+          .detail = std::strtod(values.at("detail").c_str(), nullptr),
+      };
       const auto limit = [&values](std::string_view key, Tick& ticks) {
         if (const auto found = values.find(std::string(key)); found != values.end())
           ticks = std::strtoull(found->second.c_str(), nullptr, 10);

@@ -54,6 +54,7 @@ struct JournalOrigin {
   double detail = 1.0;      ///< [-] LoadOptions::detail
   Fingerprint fingerprint;  ///< empty when readJournalOrigin made it: see readFingerprint
   LinkLimits limits;
+  std::uint32_t server_epoch = 0;  ///< of the server that began a journal; 0: not recorded
 };
 
 /// The server's own recording on its local disk, an MCAP file: every TickInput with the state hash after it,
@@ -116,6 +117,9 @@ struct ResimulationReport {
 
 /// The fingerprint of the scene that a journal or a recording was made with; empty where it was not recorded.
 [[nodiscard]] Result<Fingerprint> readFingerprint(const std::filesystem::path& file);
+
+/// The largest epoch of the servers that wrote this journal; 0 where none is recorded or it cannot be read.
+[[nodiscard]] std::uint32_t lastServerEpoch(const std::filesystem::path& journal);
 
 /// What a journal or recording was made with. Fails for a file that does not say so.
 [[nodiscard]] Result<JournalOrigin> readJournalOrigin(const std::filesystem::path& file);

@@ -5,6 +5,7 @@
 namespace tenon::session {
 namespace {
 
+constexpr Tick kPeriod50Hz = 20;  // [ticks]
 constexpr Tick kPeriod30Hz = 33;  // [ticks]
 
 /// The contact of a pair that touched since the last sample and does so no more: apart, with its peaks.
@@ -33,15 +34,14 @@ Publisher::Publisher(std::shared_ptr<const game_control::ScenarioFile> scenario,
 const OutgoingMessages& Publisher::prepare(const TickOutput& output, bool is_newest) {
   outgoing_.frames.clear();
   outgoing_.manifolds.clear();
+  outgoing_.manifolds_50.clear();
   outgoing_.frames_100.clear();
   outgoing_.frames_30.clear();
   outgoing_.pairs.clear();
   outgoing_.stats.reset();
   outgoing_.progress.reset();
-  if (is_newest) {
-    packer_1k_.pack(output, complete_, outgoing_.frames);
-    addManifolds(output);
-  }
+  if (is_newest) packer_1k_.pack(output, complete_, outgoing_.frames);
+  addManifolds(output, is_newest);
   addPairs(output);
   addStats(output);
   if (output.tick % kPeriod100Hz == 0) packer_100_.pack(output, false, outgoing_.frames_100);
@@ -53,16 +53,19 @@ const OutgoingMessages& Publisher::prepare(const TickOutput& output, bool is_new
   return outgoing_;
 }
 
-void Publisher::addManifolds(const TickOutput& output) {
+void Publisher::addManifolds(const TickOutput& output, bool is_newest) {
+  const bool is_50 = output.tick % kPeriod50Hz == 0;
+  if (!is_newest && !is_50) return;
   manifolds_ = output.manifolds;
   for (std::size_t i = 0; i < manifolds_.size(); ++i) {
     if (!output.present[i]) continue;
     // a tracked limb gets vibration and no force: 100 Hz suffices
     const bool is_coupled = scenario_->hands[i].kind == simulation::HandKind::kCoupled;
-    if (!complete_ && !is_coupled && output.tick % kPeriod100Hz != 0) continue;
+    const bool is_due = is_newest && (complete_ || is_coupled || output.tick % kPeriod100Hz == 0);
     manifolds_[i].hand = HandId{static_cast<std::uint32_t>(i)};
     manifolds_[i].server_epoch = server_epoch_;
-    outgoing_.manifolds.push_back(&manifolds_[i]);
+    if (is_due) outgoing_.manifolds.push_back(&manifolds_[i]);
+    if (is_50) outgoing_.manifolds_50.push_back(&manifolds_[i]);
   }
 }
 

@@ -16,18 +16,20 @@ namespace tenon::session {
 
 /// The messages of one tick, by rate tier. Valid until the next call of Publisher::prepare.
 struct OutgoingMessages {
-  std::vector<WorldFrame> frames;              ///< WorldFrame_1k; empty in ticks that a newer one replaces
-  std::vector<WorldFrame> frames_100;          ///< WorldFrame_100; empty in ticks between its samples
-  std::vector<WorldFrame> frames_30;           ///< WorldFrame_30; likewise
-  std::vector<const HandManifold*> manifolds;  ///< likewise; of tracked hands at 100 Hz
-  std::vector<ContactPairs> pairs;             ///< at 100 Hz
-  std::optional<TickStats> stats;              ///< at 100 Hz
-  std::optional<StepProgress> progress;        ///< at 30 Hz
+  std::vector<WorldFrame> frames;      ///< WorldFrame_1k; empty in ticks that a newer one replaces
+  std::vector<WorldFrame> frames_100;  ///< WorldFrame_100; empty in ticks between its samples
+  std::vector<WorldFrame> frames_30;   ///< WorldFrame_30; likewise
+  /// HandManifold; empty in ticks that a newer one replaces; of tracked hands at 100 Hz
+  std::vector<const HandManifold*> manifolds;
+  std::vector<const HandManifold*> manifolds_50;  ///< HandManifold_50
+  std::vector<ContactPairs> pairs;                ///< at 100 Hz
+  std::optional<TickStats> stats;                 ///< at 100 Hz
+  std::optional<StepProgress> progress;           ///< at 30 Hz
   TickEvents events;
 };
 
-/// Turns the output of each tick into messages of the rate tiers 1 kHz, 100 Hz and 30 Hz. Peaks and maxima of
-/// a slower tier cover all ticks since its last sample.
+/// Turns the output of each tick into messages of the rate tiers 1 kHz, 100 Hz, 50 Hz and 30 Hz. Peaks and
+/// maxima of a slower tier cover all ticks since its last sample.
 ///
 /// Threads: one (wire).
 class Publisher {
@@ -50,7 +52,7 @@ class Publisher {
     bool due = false;     ///< goes into the next sample: it touched, or is refreshed round robin
   };
 
-  void addManifolds(const TickOutput& output);
+  void addManifolds(const TickOutput& output, bool is_newest);
   void addPairs(const TickOutput& output);
   void addStats(const TickOutput& output);
 

@@ -90,7 +90,7 @@ void Reception::dismiss(ClientId client, const std::string& why) {
   seat_lost_notified_.erase(client);  // of an earlier presence
   notifySeatLost(client, why);
   callbacks.log(Severity::kWarning, "leave", text);
-  callbacks.left();
+  callbacks.left(client);
 }
 
 void Reception::notifySeatLost(ClientId client, const std::string& why) {

@@ -40,7 +40,7 @@ class Reception {
     /// A client has got a seat; its hands begin anew.
     std::function<void(const Welcome&)> seated;
     /// A client has left; its hands are detached.
-    std::function<void()> left;
+    std::function<void(ClientId)> left;
     /// A command that removed people may be answered.
     std::function<void(const Command&, const CommandAck&, const std::string& who)> answer;
   };

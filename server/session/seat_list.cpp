@@ -5,12 +5,11 @@
 #include <fstream>
 #include <sstream>
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "idl/types/printable_text.h"
 #include "idl/wire/identity.h"
+#include "server/session/whole_file.h"
 
 namespace tenon::session {
 
@@ -24,14 +23,11 @@ Result<void> writeSeats(const std::filesystem::path& file, const std::vector<Kep
                         seat.key.empty() ? "-" : seat.key, seat.is_closed ? "closed" : "open",
                         printable(seat.name));
   const std::filesystem::path next = file.string() + ".next";
-  const int descriptor = open(next.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-  bool written =
-      descriptor >= 0 && ::write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size());
-  if (descriptor >= 0) close(descriptor);
-  written = written && rename(next.c_str(), file.c_str()) == 0;
-  if (!written)
+  std::string problem = writeWhole(next, text, false);
+  if (problem.empty() && rename(next.c_str(), file.c_str()) != 0) problem = std::strerror(errno);
+  if (!problem.empty())
     return fail(fmt::format("{}: cannot be written ({}); after a crash of the server clients get new seats",
-                            file.string(), std::strerror(errno)));
+                            file.string(), problem));
   return {};
 }
 
@@ -58,52 +54,6 @@ Result<std::vector<KeptSeat>> readSeats(const std::filesystem::path& file) {
     seats.push_back(std::move(seat));
   }
   return seats;
-}
-
-SeatKeeper::SeatKeeper(std::filesystem::path file) : file_(std::move(file)), thread_([this] { run(); }) {}
-
-SeatKeeper::~SeatKeeper() {
-  {
-    const std::lock_guard lock(mutex_);
-    ends_ = true;
-  }
-  changed_.notify_one();
-  thread_.join();
-}
-
-std::uint64_t SeatKeeper::keep(std::vector<KeptSeat> seats) {
-  const std::uint64_t number = [&] {
-    const std::lock_guard lock(mutex_);
-    waiting_ = std::move(seats);
-    return ++kept_;
-  }();
-  changed_.notify_one();
-  return number;
-}
-
-bool SeatKeeper::isDone(std::uint64_t number) {
-  const std::lock_guard lock(mutex_);
-  return done_ >= number;
-}
-
-std::optional<std::string> SeatKeeper::takeError() {
-  const std::lock_guard lock(mutex_);
-  return std::exchange(error_, std::nullopt);
-}
-
-void SeatKeeper::run() {
-  std::unique_lock lock(mutex_);
-  while (true) {
-    changed_.wait(lock, [this] { return ends_ || waiting_; });
-    if (!waiting_) return;
-    const std::vector<KeptSeat> seats = *std::exchange(waiting_, std::nullopt);
-    const std::uint64_t number = kept_;
-    lock.unlock();
-    const Result<void> written = writeSeats(file_, seats);
-    lock.lock();
-    done_ = number;
-    if (!written) error_ = written.error().what;
-  }
 }
 
 }  // namespace tenon::session

@@ -1,18 +1,16 @@
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <filesystem>
-#include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include "idl/types/ids.h"
 #include "idl/types/messages/role.h"
 #include "idl/types/result.h"
+#include "server/session/file_keeper.h"
 
 namespace tenon::session {
 
@@ -33,38 +31,24 @@ struct KeptSeat {
 /// Fails when the file cannot be read or is damaged: then clients get new seats.
 [[nodiscard]] Result<std::vector<KeptSeat>> readSeats(const std::filesystem::path& file);
 
-/// Writes the newest list of seats to its file on a thread of its own: replacing a file waits for the disk,
-/// and the server's wire thread must not.
+/// Writes the newest list of seats to its file, on another thread. Seats that a crash of the process loses
+/// are of clients that get new ones.
 ///
-/// A crash of the process may lose the seats of the last milliseconds, whose clients get new ones; what must
-/// not be lost waits for isDone(). The destructor writes what waits.
-///
-/// Threads: one calls keep, isDone and takeError; another one, of this object, writes.
+/// Threads: as FileKeeper.
 class SeatKeeper {
  public:
-  explicit SeatKeeper(std::filesystem::path file);
-  ~SeatKeeper();
-  SeatKeeper(const SeatKeeper&) = delete;
-  SeatKeeper& operator=(const SeatKeeper&) = delete;
+  explicit SeatKeeper(std::filesystem::path file) : file_(std::move(file)) {}
 
-  /// Replaces a list that still waits. Its number, for isDone().
-  std::uint64_t keep(std::vector<KeptSeat> seats);
-  /// Whether the list of this number, or a later one, is in the file, or could not be written.
-  [[nodiscard]] bool isDone(std::uint64_t number);
-  /// Why the last list could not be written, once.
-  [[nodiscard]] std::optional<std::string> takeError();
+  /// FileKeeper::keep.
+  std::uint64_t keep(std::vector<KeptSeat> seats) {
+    return keeper_.keep([file = file_, seats = std::move(seats)] { return writeSeats(file, seats); });
+  }
+  [[nodiscard]] bool isDone(std::uint64_t number) { return keeper_.isDone(number); }
+  [[nodiscard]] std::optional<std::string> takeError() { return keeper_.takeError(); }
 
  private:
-  void run();
-
   std::filesystem::path file_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::optional<std::vector<KeptSeat>> waiting_;
-  std::optional<std::string> error_;
-  std::uint64_t kept_ = 0, done_ = 0;  ///< numbers of the newest lists
-  bool ends_ = false;
-  std::thread thread_;  // last: it uses the others
+  FileKeeper keeper_;
 };
 
 }  // namespace tenon::session

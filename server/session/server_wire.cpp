@@ -69,7 +69,11 @@ ServerWire::ServerWire(const WireOptions& options, std::shared_ptr<wire::Partici
   reception_->callbacks = {.log = [this](Severity severity, const std::string& kind,
                                          const std::string& text) { log(severity, kind, text); },
                            .seated = [this](const Welcome& welcome) { beginInputs(welcome); },
-                           .left = [this] { forwardChanges(); },
+                           .left =
+                               [this](ClientId client) {
+                                 contributions_.end(client);
+                                 forwardChanges();
+                               },
                            .answer = [this](const Command& command, const CommandAck& ack,
                                             const std::string& who) { answer(command, ack, who); }};
 }
@@ -121,7 +125,10 @@ Result<void> ServerWire::openReaders() {
     if (registry_.ownsSeat(sync.client, from)) handle(sync);
   });
   listenTo(session_, wire::kTelemetry, [this](const Telemetry& telemetry, const wire::Origin& from) {
-    if (isGenuine(telemetry.client, from, "telemetry")) handle(telemetry);
+    const Presence* const sender = registry_.findClient(telemetry.client);
+    if (sender == nullptr)
+      return refuse(fmt::format("telemetry of client {}, which nobody is", telemetry.client.value));
+    if (isGenuine(telemetry.client, from, "telemetry") && sender->alive) handle(telemetry);
   });
   listenTo(lobby_, wire::kSessionAnnounce,
            [this](const SessionAnnounce& other, const wire::Origin& from) { handle(other, from); });
@@ -171,10 +178,13 @@ void ServerWire::sendScene(const LoadedScene& loaded) {
 }
 
 void ServerWire::dispatch(std::chrono::nanoseconds timeout) {
-  const bool waits = reception_->waits();
+  const bool waits = reception_->waits() || stops_.waits();
   inbox_.dispatch(waits ? std::min<std::chrono::nanoseconds>(timeout, Reception::kBetweenTurns) : timeout);
   reception_->step();
+  stops_.step();
   if (const auto error = seats_ ? seats_->takeError() : std::nullopt) log(Severity::kError, "seats", *error);
+  if (const auto line = refusals_.step(std::chrono::steady_clock::now()))
+    log(Severity::kWarning, "refused", *line);
   announcement_->step();
   forwardChanges();
 }
@@ -211,9 +221,8 @@ void ServerWire::log(Severity severity, const std::string& kind, const std::stri
 
 void ServerWire::refuse(const std::string& why) {
   ++refused_inputs_;
-  constexpr std::size_t kMaxLogged = 100;
-  if (logged_refusals_.size() < kMaxLogged && logged_refusals_.insert(why).second)
-    log(Severity::kWarning, "refused", why);
+  if (const auto line = refusals_.add(why, std::chrono::steady_clock::now()))
+    log(Severity::kWarning, "refused", *line);
 }
 
 /// Whether a sample that names `client` was written by the participant with its seat; if not, refuses it.
@@ -234,9 +243,10 @@ void ServerWire::beginInputs(const Welcome& welcome) {
   for (const HandId hand : welcome.hands) {
     if (!hand.valid()) continue;
     newest_seq_[hand.value] = 0;
-    input_buffer_.setPlayout(hand, 0);
+    input_buffer_.restart(hand);
   }
   received_inputs_.erase(welcome.client);
+  contributions_.end(welcome.client);  // of a former presence
 }
 
 void ServerWire::handle(const DeviceInput& input, const wire::Origin& from) {
@@ -260,6 +270,7 @@ void ServerWire::handle(const DeviceInput& input, const wire::Origin& from) {
         input.client, fmt::format("sent the input of tick {} when tick {} was the next, and is removed: in "
                                   "lockstep an input answers a received tick",
                                   reading->seq, now_ + 1));
+  if (!options_.lockstep) input_buffer_.setPeriod(input.hand, input.period);
   if (input_buffer_.playout(input.hand) > 0) handleEarlier(input, newest);
   newest = reading->seq;
   input_buffer_.put(*reading);
@@ -310,15 +321,22 @@ void ServerWire::handle(const EmergencyStop& stop, const wire::Origin& from) {
 
 void ServerWire::raiseStop(const std::string& reason) {
   if (registry_.isStopEngaged()) return;
-  engage({.client_guid = "server", .counter = options_.server_epoch, .who = "server", .reason = reason});
+  EmergencyStop stop{
+      .client_guid = "server", .counter = options_.server_epoch, .who = "server", .reason = reason};
+  while (stops_.wasCleared(stop)) ++stop.counter;
+  engage(stop);
 }
 
 void ServerWire::engage(const EmergencyStop& stop) {
-  if (!stops_.raise(stop)) return;
+  const StopChange change = stops_.raise(stop);
+  if (!change) return;
   registry_.engageEmergencyStop();
   forwardChanges();
   stops_.publish(stop);
-  log(Severity::kError, "emergency stop", fmt::format("engaged by {}: {}", stop.who, stop.reason));
+  const std::string text = fmt::format("engaged by {}: {}", stop.who, stop.reason);
+  // of somebody who raises it without end, at a bounded rate
+  if (!change.superseded || refusals_.add(text, std::chrono::steady_clock::now()))
+    log(Severity::kError, "emergency stop", text);
 }
 
 void ServerWire::clearEmergencyStop(ClientId client, const std::string& reason) {
@@ -412,6 +430,7 @@ void ServerWire::send(const OutgoingMessages& outgoing) {
   for (const WorldFrame& frame : outgoing.frames) to.frame_1k.write(frame);
   for (const HandManifold* manifold : outgoing.manifolds) to.manifold.write(*manifold);
   for (const WorldFrame& frame : outgoing.frames_100) to.frame_100.write(frame);
+  for (const HandManifold* manifold : outgoing.manifolds_50) to.manifold_50.send(*manifold);
   for (const WorldFrame& frame : outgoing.frames_30) to.frame_30.write(frame);
   for (const ContactPairs& pairs : outgoing.pairs) to.pairs.write(pairs);
   if (outgoing.stats) to.stats.write(*outgoing.stats);

@@ -6,7 +6,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,6 +21,7 @@
 #include "server/session/journal_copies.h"
 #include "server/session/publisher.h"
 #include "server/session/reception.h"
+#include "server/session/refusal_log.h"
 #include "server/session/scene_loader.h"
 #include "server/session/seat_list.h"
 #include "server/session/server_announcement.h"
@@ -145,8 +145,8 @@ class ServerWire {
   std::optional<ServerAnnouncement> announcement_;  ///< from open() on
   std::unique_ptr<Reception> reception_;
   std::vector<std::uint32_t> newest_seq_;  ///< index = HandId
-  std::set<std::string> logged_refusals_;  ///< each text is logged once, although inputs come at 1 kHz
-  std::vector<SceneHand> scene_hands_;     ///< as they were published last
+  RefusalLog refusals_;
+  std::vector<SceneHand> scene_hands_;  ///< as they were published last
   struct ReceivedInputs {
     std::uint32_t count = 0, newest_seq = 0;
     GapMeter gaps;

@@ -72,6 +72,7 @@ struct ServerWriters {
   TopicWriter<WorldFrame> frame_100{wire::kWorldFrame100, {}};
   TopicWriter<WorldFrame> frame_30{wire::kWorldFrame30, {}};
   TopicWriter<HandManifold> manifold{wire::kHandManifold, {}};
+  TopicWriter<HandManifold> manifold_50{wire::kHandManifold50, {}};
   TopicWriter<ContactPairs> pairs{wire::kContactPairs100, {}};
   TopicWriter<TickStats> stats{wire::kTickStats100, {}};
   TopicWriter<ObjectSnapshot> snapshot{wire::kObjectSnapshot, {}};
@@ -93,10 +94,11 @@ struct ServerWriters {
 
   auto inLobby() { return std::tie(announce, welcome); }
   auto inSession() {
-    return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, object, hand, scene_step,
-                    step, progress, run, grab, matrix, ack, guidance, event, clock, stop, clear, published);
+    return std::tie(frame_1k, frame_100, frame_30, manifold, manifold_50, pairs, stats, snapshot, object,
+                    hand, scene_step, step, progress, run, grab, matrix, ack, guidance, event, clock, stop,
+                    clear, published);
   }
-  /// Written in ticks by send(OutgoingMessages), with the tick in each sample.
+  /// Written in ticks by send(OutgoingMessages), with the tick in each sample, and recorded.
   auto ofTicks() {
     return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, progress, grab);
   }

@@ -194,6 +194,7 @@ void SessionRegistry::assignSeat(const Join& join, Welcome& welcome, const wire:
   for (std::size_t i = 0; i < join.hands.size(); ++i) {
     const HandId hand = scenario_.handNamed(join.hands[i]);
     welcome.hands.push_back(hand);
+    welcome.objects.push_back(hand.valid() ? scenario_.hands[hand.value].object : ObjectId{});
     if (!hand.valid()) continue;
     controllers_[hand.value] = welcome.client;
     limits_[hand.value] = {};
@@ -228,6 +229,7 @@ void SessionRegistry::leave(ClientId client) {
 }
 
 void SessionRegistry::engageEmergencyStop() {
+  if (gate_.isStopEngaged()) return;
   gate_.engageStop();
   changes_.push_back({.kind = ChangeKind::kSetEmergencyStop, .value = 1.0});
 }

@@ -68,9 +68,9 @@ class SessionRegistry {
   [[nodiscard]] CommandAck handleCommand(const Command& command);
   /// The acknowledgement of a command that is received again because its ack was lost; null for a new one.
   [[nodiscard]] const CommandAck* previousAck(const Command& command) const;
-  /// What a station has measured of its link.
+  /// What a station has measured of its link. Of unknown clients it is ignored.
   void receive(const Telemetry& telemetry) {
-    if (telemetry.clock_known)
+    if (telemetry.clock_known && findClient(telemetry.client) != nullptr)
       mentoring_.setRoundTrip(telemetry.client, telemetry.round_trip + telemetry.trip_jitter);
   }
   /// Mentoring::step.
@@ -83,7 +83,7 @@ class SessionRegistry {
   void updatePhase(RunPhase phase, bool emergency_stop) { gate_.update(phase, emergency_stop); }
   /// Frees the client's hands. Its seat stays and can be taken again with its key. Unknown ids are ignored.
   void leave(ClientId client);
-  /// A raise stands.
+  /// A raise stands; of several the first one stops the simulation.
   void engageEmergencyStop();
   [[nodiscard]] bool isStopEngaged() const { return gate_.isStopEngaged(); }
   /// The last raise that stood was cleared: the simulation leaves the stop, paused.

@@ -15,6 +15,7 @@
 #include "server/session/server_wire.h"
 #include "server/session/session_lock.h"
 #include "server/session/start_condition.h"
+#include "server/session/stop_file.h"
 #include "server/simulation/governor.h"
 
 namespace tenon::session {
@@ -29,11 +30,13 @@ constexpr auto kInputTimeout = std::chrono::seconds(30);  // in lockstep, for th
 constexpr auto kStopTimeout = std::chrono::seconds(1);    // likewise, once a command ends the run
 
 /// [0.25 s since 2025] Larger at each start of a server, so that clients recognise frames of an earlier one.
-std::uint32_t newServerEpoch() {
+/// Larger than `former`, whatever the clock says.
+std::uint32_t newServerEpoch(std::uint32_t former) {
   const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
   constexpr std::int64_t kYear2025 = 1'735'689'600;  // [s] since 1970
-  return static_cast<std::uint32_t>(4 * (since_1970 / milliseconds(1) / 1000 - kYear2025) +
-                                    since_1970 / milliseconds(250) % 4);
+  const auto by_clock = static_cast<std::uint32_t>(4 * (since_1970 / milliseconds(1) / 1000 - kYear2025) +
+                                                   since_1970 / milliseconds(250) % 4);
+  return std::max(by_clock, former + 1);
 }
 
 class Server final : public SessionServer {
@@ -78,16 +81,18 @@ class Server final : public SessionServer {
                                  loaded, registry_, input_buffer_, publisher_);
     if (!wire) return fail(wire.error().what);
     wire_ = std::move(*wire);
+    if (options_.stop_file.empty()) wire_->log(Severity::kWarning, "emergency stop", kNoStopFile);
     wire_->print = options_.print;
     if (options_.journal.empty()) {
       if (options_.publish_journal) makeJournalWriter(std::nullopt);
       return {};
     }
     // as the last step: what fails before it leaves the journal of a killed server as it was
-    auto journal = options_.resume
-                       ? Journal::reopen(options_.journal, simulation_.now(), epoch_)
-                       : Journal::open(options_.journal, {loaded.scenario->path.string(), options_.detail,
-                                                          fingerprintOf(loaded), options_.simulation.limits});
+    auto journal =
+        options_.resume
+            ? Journal::reopen(options_.journal, simulation_.now(), epoch_)
+            : Journal::open(options_.journal, {loaded.scenario->path.string(), options_.detail,
+                                               fingerprintOf(loaded), options_.simulation.limits, epoch_});
     if (!journal) return fail(journal.error().what);
     if (!options_.resume)
       if (const auto copied = journal->copyScenario(*loaded.scenario); !copied)
@@ -221,6 +226,7 @@ void Server::awaitReturn(const std::atomic<bool>& stop) {
   while (!stop && !wire_->replaced() && std::chrono::steady_clock::now() < until &&
          !std::all_of(returning_.begin(), returning_.end(), isBack))
     wire_->dispatch(milliseconds(20));
+  if (stop) return;
   for (const HandId hand : returning_)
     if (!isBack(hand))
       wire_->log(Severity::kWarning, "hand gone",
@@ -393,8 +399,8 @@ Result<std::unique_ptr<SessionServer>> SessionServer::open(const LoadedScene& lo
   auto start_condition = StartCondition::make(*loaded.scenario, options.wait_for);
   if (!start_condition) return fail(start_condition.error().what);
   options.simulation.needed_hands = start_condition->hands;
-  auto server =
-      std::make_unique<Server>(loaded, std::move(options), std::move(*start_condition), newServerEpoch());
+  const std::uint32_t epoch = newServerEpoch(options.resume ? lastServerEpoch(options.journal) : 0);
+  auto server = std::make_unique<Server>(loaded, std::move(options), std::move(*start_condition), epoch);
   if (auto started = server->start(loaded); !started) return fail(started.error().what);
   return server;
 }

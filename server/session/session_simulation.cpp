@@ -169,7 +169,8 @@ void SessionSimulation::applyReadings(const TickInput& input) noexcept {
     age.seq = reading.seq;
     age.active = reading.active;
     environment_.setHandPresent(reading.hand, true);
-    environment_.setHandPose(reading.hand, reading.X_WH, reading.V_WH);
+    environment_.setHandPose(reading.hand, {reading.X_WH.translation(), reading.X_WH.rotation().normalized()},
+                             reading.V_WH);
   }
 }
 

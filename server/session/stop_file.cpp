@@ -13,6 +13,7 @@
 
 #include "idl/wire/codec.h"
 #include "server/session/session_lock.h"
+#include "server/session/whole_file.h"
 
 namespace tenon::session {
 namespace {
@@ -39,17 +40,6 @@ bool read(const std::string& hex, M& message) {
   auto decoded = wire::decode<M>(bytesOf(hex));
   if (decoded) message = std::move(*decoded);
   return decoded.has_value();
-}
-
-Result<void> writeAll(const std::filesystem::path& file, const std::string& text) {
-  const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-  const bool written = descriptor >= 0 &&
-                       ::write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
-                       fsync(descriptor) == 0;
-  const int why = errno;
-  if (descriptor >= 0) close(descriptor);
-  if (!written) return fail(fmt::format("{}: cannot be written ({})", file.string(), std::strerror(why)));
-  return {};
 }
 
 }  // namespace
@@ -103,7 +93,8 @@ Result<void> writeStopFile(const std::filesystem::path& file, const StopTruth& t
   std::error_code ignored;
   std::filesystem::create_directories(file.parent_path(), ignored);
   const std::filesystem::path next = file.string() + ".next";
-  if (auto written = writeAll(next, text); !written) return written;
+  if (const std::string problem = writeWhole(next, text, true); !problem.empty())
+    return fail(fmt::format("{}: cannot be written ({})", next.string(), problem));
   if (rename(next.c_str(), file.c_str()) != 0)
     return fail(fmt::format("{}: cannot be replaced ({})", file.string(), std::strerror(errno)));
   const int folder = open(file.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);

@@ -6,6 +6,11 @@
 
 namespace tenon::session {
 
+StopKeeper::StopKeeper(std::filesystem::path file, ServerWriters& writers)
+    : file_(std::move(file)), writers_(writers) {
+  if (!file_.empty()) keeper_ = std::make_unique<FileKeeper>();
+}
+
 Result<void> StopKeeper::restore() {
   auto kept = readStopFile(file_);
   if (!kept) return fail(kept.error().what);
@@ -15,22 +20,42 @@ Result<void> StopKeeper::restore() {
   return {};
 }
 
-void StopKeeper::keep() {
-  if (auto kept = writeStopFile(file_, truth_); !kept && not_kept) not_kept(kept.error().what);
+StopChange StopKeeper::note(StopChange change) {
+  if (change.superseded) ended_.push_back(*change.superseded);
+  if (change.forgotten)
+    (void)writers_.clear.writer->dispose({change.forgotten->client_guid, change.forgotten->counter, {}, {}});
+  has_changed_ = has_changed_ || change.changed;
+  return change;
 }
 
 void StopKeeper::publish(const EmergencyStop& stop) {
   writers_.stop.send(stop);
-  keep();
+  step();
 }
 
 void StopKeeper::clear(const std::string& who, const std::string& reason) {
   const auto standing = truth_.standing();
-  for (const auto& [id, stop] : standing) truth_.clear({stop.client_guid, stop.counter, who, reason});
-  keep();  // on the disk before anybody hears of it
   for (const auto& [id, stop] : standing) {
-    writers_.clear.send(truth_.cleared().at(id));
-    (void)writers_.stop.writer->dispose(stop);
+    ended_.push_back({stop.client_guid, stop.counter, who, reason});
+    note(truth_.clear(ended_.back()));
+  }
+  step();
+}
+
+void StopKeeper::step() {
+  // one state at a time: of those that come while the disk is busy the newest one follows
+  while (!keeper_ || keeper_->isDone(number_)) {
+    is_writing_ = false;
+    if (const auto why = keeper_ ? keeper_->takeError() : std::nullopt; why && not_kept) not_kept(*why);
+    for (const EmergencyClear& cleared : std::exchange(written_, {})) {
+      writers_.clear.send(cleared);
+      (void)writers_.stop.writer->dispose({cleared.client_guid, cleared.counter, {}, {}});
+    }
+    if (!std::exchange(has_changed_, false)) return;
+    written_ = std::exchange(ended_, {});
+    if (!keeper_) continue;
+    number_ = keeper_->keep([file = file_, truth = truth_] { return writeStopFile(file, truth); });
+    is_writing_ = true;
   }
 }
 

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "idl/types/stop_truth.h"
+#include "server/session/file_keeper.h"
 #include "server/session/server_writers.h"
 
 namespace tenon::session {
@@ -12,35 +16,54 @@ namespace tenon::session {
 /// The emergency stop at the server: which raises stand, in memory, on the bus and in the stop file.
 ///
 /// The server publishes every raise itself, for late joiners and in case its writer leaves, and it alone
-/// publishes clears.
+/// publishes clears. A raise acts and is published at once, while another thread writes it to the file. A
+/// clear is published once it is in the file, or could not be written there: so a server that is killed does
+/// not come back with a stop that clients were told is over, nor without one, unless it is killed in the
+/// milliseconds in which the raise is written (docs/safety.md).
 ///
-/// Threads: one (wire). Real-time: no.
+/// Raises that end by the bounds of StopTruth are published as cleared: the newer ones stand.
+///
+/// Threads: one (wire), which never waits for the disk; another one, of this object, writes the file.
+/// Real-time: no.
 class StopKeeper {
  public:
   /// `file`: empty: only in memory. `writers` must outlive this.
-  StopKeeper(std::filesystem::path file, ServerWriters& writers)
-      : file_(std::move(file)), writers_(writers) {}
+  StopKeeper(std::filesystem::path file, ServerWriters& writers);
 
   /// Takes what the file has, and publishes it. Fails when the file is damaged.
   [[nodiscard]] Result<void> restore();
-  /// Whether this raise now stands and did not before: then publish() follows, once the simulation is
+  /// True when this raise now stands and did not before: then publish() follows, once the simulation is
   /// stopped.
-  [[nodiscard]] bool raise(const EmergencyStop& stop) { return truth_.raise(stop); }
-  /// Of a raise that stands. It waits for the disk.
+  [[nodiscard]] StopChange raise(const EmergencyStop& stop) { return note(truth_.raise(stop)); }
+  /// Of a raise that stands.
   void publish(const EmergencyStop& stop);
   /// Clears all raises that stand, and those alone: one that is on its way will stand.
   void clear(const std::string& who, const std::string& reason);
   [[nodiscard]] bool engaged() const { return truth_.engaged(); }
+  /// Whether this raise was cleared before: it would not stand.
+  [[nodiscard]] bool wasCleared(const EmergencyStop& stop) const {
+    return truth_.cleared().contains({stop.client_guid, stop.counter});
+  }
+  /// One turn of the wire thread: publishes the clears that are in the file by now.
+  void step();
+  /// Something waits for the next turn.
+  [[nodiscard]] bool waits() const { return is_writing_; }
 
   /// Called when the stop would not outlive a crash of the server; may be empty.
   std::function<void(const std::string& why)> not_kept;
 
  private:
-  void keep();
+  StopChange note(StopChange change);
 
   std::filesystem::path file_;
   ServerWriters& writers_;
   StopTruth truth_;
+  bool has_changed_ = false;  ///< since the newest state that the file was given
+  bool is_writing_ = false;
+  std::uint64_t number_ = 0;             ///< of the newest state that the file was given
+  std::vector<EmergencyClear> ended_;    ///< since that
+  std::vector<EmergencyClear> written_;  ///< in that
+  std::unique_ptr<FileKeeper> keeper_;   ///< null: no file
 };
 
 }  // namespace tenon::session

@@ -15,7 +15,8 @@
 
 namespace tenon::session {
 
-/// A new device sample of one hand, already validated by the SessionRegistry.
+/// A new device sample of one hand, already validated by the SessionRegistry; with the steps of
+/// idl/types/resolution.h. The simulation makes its quaternion a unit one.
 struct HandReading {
   HandId hand;
   std::uint32_t seq = 0;

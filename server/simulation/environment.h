@@ -297,6 +297,8 @@ class Environment {
   void updatePairMotion(std::uint32_t pair) noexcept;
   void listContacts(ObjectId object, HandManifold& out) const noexcept;
   void listOtherCouplings(HandId hand, HandManifold& out) const noexcept;
+  void listNeighbours(HandId hand, HandManifold& out) const noexcept;
+  [[nodiscard]] HandPull pullOf(HandId hand) const noexcept;
   [[nodiscard]] bool active(std::size_t pair) const noexcept;
   [[nodiscard]] collision::MovableBody movableBody(ObjectId object) noexcept;
   [[nodiscard]] collision::MovableBody heldBody(ObjectId object) const noexcept;

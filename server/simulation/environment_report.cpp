@@ -52,12 +52,13 @@ ManifoldContact manifoldContact(const collision::Contact& contact, ObjectId othe
 
 /// The spring that exerts F_Bq_W on a body at X_WB, and about that near it: a goal that is far away, and a
 /// coupling that is soft beside that of any hand.
-HandPull softPull(const Wrench& F_Bq_W, const Pose& X_WB, const Vector3& p_BQ) {
+HandPull softPull(ObjectId body, const Wrench& F_Bq_W, const Pose& X_WB, const Vector3& p_BQ) {
   constexpr double kSoft = 1.0;            // [N/m]
   constexpr double kSoftRotational = 1.0;  // [Nm/rad]
   constexpr double kLargestTurn = 1.0;     // [rad] of the goal
   const double rotational = std::max(kSoftRotational, F_Bq_W.torque.norm() / kLargestTurn);
   HandPull pull;
+  pull.object = body;
   pull.X_WG.rotation() = (expRotation(F_Bq_W.torque / rotational) * X_WB.rotation()).normalized();
   pull.X_WG.translation() = X_WB * p_BQ + F_Bq_W.force / kSoft - pull.X_WG.rotation() * p_BQ;
   pull.p_BoC_B = p_BQ;
@@ -152,6 +153,7 @@ void Environment::manifold(HandId hand, HandManifold& out) const noexcept {
   out.object_epoch = held.epoch;
   out.X_WO = held.X_WO;
   listOtherCouplings(hand, out);
+  listNeighbours(hand, out);
   listContacts(motion.object, out);
 }
 
@@ -160,13 +162,53 @@ void Environment::listOtherCouplings(HandId hand, HandManifold& out) const noexc
   if (engine_->movable[object.value] == 0) return;
   for (std::uint32_t i = 0; i < hands_.size() && !out.others.full(); ++i) {
     if (i == hand.value || !pulls(HandId{i}, object)) continue;
-    const collision::Spring spring = springOf(HandId{i});
-    out.others.push_back(
-        {HandId{i}, spring.X_WG, spring.p_BC, spring.stiffness, spring.rotational_stiffness});
+    out.others.push_back(pullOf(HandId{i}));
   }
   const Wrench F_Oq_W = engine_->forces[object.value].contributed(tick_);
   if (F_Oq_W.force.isZero(0.0) && F_Oq_W.torque.isZero(0.0)) return;
-  out.others.push_back(softPull(F_Oq_W, objects_[object.value].X_WO, centreOf(object)));
+  out.others.push_back(softPull(object, F_Oq_W, objects_[object.value].X_WO, centreOf(object)));
+}
+
+HandPull Environment::pullOf(HandId hand) const noexcept {
+  const HandMotion& motion = hands_[hand.value];
+  const collision::Spring spring = springOf(hand);
+  HandPull pull;
+  pull.hand = hand;
+  pull.object = motion.object;
+  pull.X_WG = spring.X_WG;
+  const Vector3 p_HG_W = spring.X_WG.translation() - motion.X_WH.translation();
+  pull.V_WG.head<3>() = (motion.V_WH.linear + motion.V_WH.angular.cross(p_HG_W)).cast<float>();
+  pull.V_WG.tail<3>() = motion.V_WH.angular.cast<float>();
+  pull.p_BoC_B = spring.p_BC;
+  pull.stiffness = spring.stiffness;
+  pull.rotational_stiffness = spring.rotational_stiffness;
+  return pull;
+}
+
+void Environment::listNeighbours(HandId hand, HandManifold& out) const noexcept {
+  const ObjectId object = hands_[hand.value].object;
+  const auto centre = [this](ObjectId one) { return objects_[one.value].X_WO * centreOf(one); };
+  const auto gapTo = [&](ObjectId other) {
+    return (centre(other) - centre(object)).norm() - engine_->sizes[object.value].ball_radius -
+           engine_->sizes[other.value].ball_radius;
+  };
+  const auto isListed = [&](HandId one) {
+    return std::any_of(out.others.begin(), out.others.end(),
+                       [one](const HandPull& pull) { return pull.hand == one; });
+  };
+  while (!out.others.full()) {
+    HandId nearest;
+    double least = kNeighbourReach;
+    for (std::uint32_t i = 0; i < hands_.size(); ++i) {
+      const ObjectId other = hands_[i].object;
+      if (i == hand.value || !isObject(other) || other == object || isListed(HandId{i})) continue;
+      if (!pulls(HandId{i}, other) || gapTo(other) >= least) continue;
+      least = gapTo(other);
+      nearest = HandId{i};
+    }
+    if (!nearest.valid()) return;
+    out.others.push_back(pullOf(nearest));
+  }
 }
 
 void Environment::listContacts(ObjectId object, HandManifold& out) const noexcept {

@@ -12,7 +12,7 @@
 namespace tenon::session {
 namespace {
 
-constexpr HandId kHand{0};
+constexpr HandId kOnlyHand{0};
 
 /// What the wire thread does with messages of which a link loses some: the newest sample, and those of lost
 /// messages that the next one carries.
@@ -21,9 +21,9 @@ class LossyMessages {
   explicit LossyMessages(InputBuffer& buffer) : buffer_(buffer) {}
   void receive(std::uint32_t seq, std::uint32_t earlier) {
     for (std::uint32_t i = std::min(earlier, seq - 1); i > 0; --i)
-      if (seq - i > newest_) buffer_.put({.hand = kHand, .seq = seq - i});
+      if (seq - i > newest_) buffer_.put({.hand = kOnlyHand, .seq = seq - i});
     newest_ = seq;
-    buffer_.put({.hand = kHand, .seq = seq});
+    buffer_.put({.hand = kOnlyHand, .seq = seq});
   }
 
  private:
@@ -50,33 +50,33 @@ std::vector<std::uint32_t> taken(InputBuffer& buffer, std::uint32_t inputs, doub
 TEST(InputBuffer, OfALinkThatLosesTwoPercentNearlyNoTickLacksAnInput) {
   constexpr std::uint32_t kInputs = 100'000;
   InputBuffer newest(1), played(1);
-  played.setPlayout(kHand, 2);
+  played.setPlayout(kOnlyHand, 2);
   taken(newest, kInputs, 0.02, 0);
-  EXPECT_NEAR(newest.missed(kHand), 0.02 * kInputs, 0.002 * kInputs);
+  EXPECT_NEAR(newest.missed(kOnlyHand), 0.02 * kInputs, 0.002 * kInputs);
   const auto seqs = taken(played, kInputs, 0.02, 2);
-  EXPECT_LE(played.missed(kHand), 0.0001 * kInputs);
-  EXPECT_EQ(played.replaced(kHand), 0U);
+  EXPECT_LE(played.missed(kOnlyHand), 0.0001 * kInputs);
+  EXPECT_EQ(played.replaced(kOnlyHand), 0U);
   for (std::size_t i = 1; i < seqs.size(); ++i) ASSERT_GT(seqs[i], seqs[i - 1]);
 }
 
 TEST(InputBuffer, WithoutAPlayoutATickTakesTheNewest) {
   InputBuffer buffer(1);
   TickInput input;
-  for (std::uint32_t seq = 1; seq <= 3; ++seq) buffer.put({.hand = kHand, .seq = seq});
+  for (std::uint32_t seq = 1; seq <= 3; ++seq) buffer.put({.hand = kOnlyHand, .seq = seq});
   buffer.collect(1, input);
   ASSERT_EQ(input.readings.size(), 1U);
   EXPECT_EQ(input.readings[0].seq, 3U);
-  EXPECT_EQ(buffer.replaced(kHand), 2U);
+  EXPECT_EQ(buffer.replaced(kOnlyHand), 2U);
   buffer.collect(2, input);
   EXPECT_TRUE(input.readings.empty());
-  EXPECT_EQ(buffer.missed(kHand), 1U);
+  EXPECT_EQ(buffer.missed(kOnlyHand), 1U);
 }
 
 TEST(InputBuffer, AfterASilenceItIsNoFurtherBehindThanThePlayout) {
   InputBuffer buffer(1);
-  buffer.setPlayout(kHand, 1);
+  buffer.setPlayout(kOnlyHand, 1);
   TickInput input;
-  for (std::uint32_t seq = 1; seq <= 40; ++seq) buffer.put({.hand = kHand, .seq = seq});
+  for (std::uint32_t seq = 1; seq <= 40; ++seq) buffer.put({.hand = kOnlyHand, .seq = seq});
   buffer.collect(1, input);
   EXPECT_EQ(input.readings[0].seq, 39U);
   buffer.collect(2, input);
@@ -90,8 +90,8 @@ TEST(InputBuffer, ChangesOfThePlayoutTakeNothingTwice) {
   TickInput input;
   std::uint32_t last = 0;
   for (std::uint32_t tick = 1; tick <= 300; ++tick) {
-    if (tick % 50 == 0) buffer.setPlayout(kHand, tick / 50 % 3);
-    buffer.put({.hand = kHand, .seq = tick});
+    if (tick % 50 == 0) buffer.setPlayout(kOnlyHand, tick / 50 % 3);
+    buffer.put({.hand = kOnlyHand, .seq = tick});
     if (tick % 7 != 0) buffer.collect(tick, input);
     for (const HandReading& reading : input.readings) {
       ASSERT_GT(reading.seq, last);
@@ -104,11 +104,11 @@ TEST(InputBuffer, ChangesOfThePlayoutTakeNothingTwice) {
 
 TEST(InputBuffer, CollectsWithoutAllocatingOrLocking) {
   InputBuffer buffer(1);
-  buffer.setPlayout(kHand, 2);
+  buffer.setPlayout(kOnlyHand, 2);
   TickInput input;
   const test::RealtimeGuard guard;
   for (std::uint32_t tick = 1; tick <= 1000; ++tick) {
-    buffer.put({.hand = kHand, .seq = tick});
+    buffer.put({.hand = kOnlyHand, .seq = tick});
     if (tick % 3 != 0) buffer.collect(tick, input);
   }
   EXPECT_EQ(guard.allocations(), 0);

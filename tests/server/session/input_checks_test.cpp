@@ -1,3 +1,4 @@
+#include "idl/types/resolution.h"
 #include "tests/server/session/registry_session.h"
 
 namespace tenon::session {
@@ -15,7 +16,8 @@ TEST_F(InputChecks, AcceptsDeviceInputOfAControlledHand) {
   EXPECT_EQ(reading->seq, 9U);
   EXPECT_TRUE(reading->active);
   EXPECT_EQ(reading->buttons, 1U);
-  EXPECT_EQ(reading->X_WH.translation(), Vector3(0.1, 0.2, 0.3));
+  EXPECT_LE((reading->X_WH.translation() - Vector3(0.1, 0.2, 0.3)).norm(), kPositionStep);
+  EXPECT_EQ(reading->X_WH, rounded(reading->X_WH)) << "as over the wire";
 }
 
 TEST_F(InputChecks, RefusesDeviceInputForHandsOfOthers) {
@@ -46,12 +48,27 @@ TEST_F(InputChecks, RefusesImplausiblePosesAndVelocities) {
   };
   EXPECT_TRUE(refuses([](DeviceSample& s) { s.X_WH = Pose(Vector3(kNan, 0, 0)); }));
   EXPECT_TRUE(refuses([](DeviceSample& s) { s.X_WH = Pose(Vector3(1e9, 0, 0)); }));
+  EXPECT_TRUE(refuses([](DeviceSample& s) { s.X_WH = Pose(Vector3(0, -127.5, 0)); }));
+  EXPECT_FALSE(refuses([](DeviceSample& s) { s.X_WH = Pose(Vector3(0, -126.5, 0)); }));
   EXPECT_TRUE(refuses([](DeviceSample& s) { s.X_WH = Pose(Vector3::Zero(), Quaternion(0, 0, 0, 0)); }));
   EXPECT_TRUE(refuses([](DeviceSample& s) { s.X_WH = Pose(Vector3::Zero(), Quaternion(1, 1, 0, 0)); }));
   EXPECT_TRUE(refuses([](DeviceSample& s) { s.V_WH.linear = Vector3(0, kNan, 0); }));
   EXPECT_TRUE(refuses([](DeviceSample& s) { s.V_WH.linear = Vector3(0, 1e300, 0); }));
   EXPECT_TRUE(refuses([](DeviceSample& s) { s.V_WH.angular = Vector3(0, 0, 1e4); }));
   EXPECT_FALSE(refuses([](DeviceSample& s) { s.V_WH.angular = Vector3(0, 0, 10); }));
+}
+
+TEST_F(InputChecks, RefusesAPeriodThatNoHandHas) {
+  const ClientId client = join("a", Role::kTrainee, {"right"}).client;
+  DeviceInput sparse = input(client, test::kRightHand);
+  for (const std::uint8_t period : {std::uint8_t{1}, kMostInputPeriod}) {
+    sparse.period = period;
+    EXPECT_TRUE(registry_.validateDeviceInput(sparse)) << +period;
+  }
+  for (const std::uint8_t period : {std::uint8_t{0}, std::uint8_t{kMostInputPeriod + 1}, std::uint8_t{255}}) {
+    sparse.period = period;
+    EXPECT_THAT(registry_.validateDeviceInput(sparse).error().what, HasSubstr("expected 1 to 20")) << +period;
+  }
 }
 
 TEST_F(InputChecks, OfExternalForcesThoseOfStrangersOnNothingAndNotFiniteAreRefused) {

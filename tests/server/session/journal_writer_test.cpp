@@ -136,6 +136,45 @@ TEST(Contributions, OfEachClientAFewWaitAndTheNewestOfEachSource) {
   EXPECT_EQ(input.changes.begin()[1].F_Oo_W.force.x(), 5.0) << "clients take turns";
 }
 
+TEST(Contributions, OfAClientThatLeavesNothingWaitsAndItsForcesEnd) {
+  Contributions contributions;
+  InputBuffer buffer(1);
+  const auto force = [](std::uint32_t source, double newton) {
+    return Change{.kind = ChangeKind::kContributeForce,
+                  .object = ObjectId{0},
+                  .index = source,
+                  .lifetime_ticks = 100,
+                  .F_Oo_W = {{newton, 0.0, 0.0}, Vector3::Zero()}};
+  };
+  const auto next = [&] {
+    contributions.forward(buffer);
+    TickInput input;
+    buffer.collect(1, input);
+    return std::vector<Change>(input.changes.begin(), input.changes.end());
+  };
+  contributions.put(ClientId{1}, force(1, 1.0));
+  contributions.put(ClientId{1}, force(2, 2.0));
+  ASSERT_EQ(next().size(), 2U);
+  contributions.put(ClientId{2}, force(2, 3.0));
+  ASSERT_EQ(next().size(), 1U);
+  contributions.put(ClientId{1}, force(3, 4.0));
+  contributions.end(ClientId{1});
+  const auto ends = next();
+  ASSERT_EQ(ends.size(), 1U) << "what waited is dropped, and source 2 is client 2's by now";
+  EXPECT_EQ(ends[0].index, 1U);
+  EXPECT_EQ(ends[0].F_Oo_W.force, Vector3::Zero());
+  EXPECT_EQ(ends[0].lifetime_ticks, 1U) << "0 would not overwrite the force";
+  contributions.end(ClientId{1});
+  contributions.end(ClientId{7});
+  EXPECT_TRUE(next().empty());
+  for (std::uint32_t source = 0; source < 1000; ++source) {
+    contributions.put(ClientId{3}, force(source, 1.0));
+    (void)next();
+  }
+  contributions.end(ClientId{3});
+  EXPECT_LE(next().size(), Contributions::kMostEnded);
+}
+
 TEST(Contributions, LeaveHalfOfTheQueueToCommands) {
   Contributions contributions;
   InputBuffer buffer(1);

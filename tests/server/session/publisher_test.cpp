@@ -15,12 +15,12 @@ namespace {
 using test::playInput;
 using test::SessionRig;
 
-constexpr std::uint32_t kEpoch = 77;
+constexpr std::uint32_t kPublisherEpoch = 77;
 
 TEST(Publisher, EachRateTierHasItsPeriod) {
   test::SessionRig rig;
   rig.attach(test::kRightHand, Vector3(0.2, 0, 0.3));
-  Publisher publisher(rig.loaded().scenario, kEpoch, false);
+  Publisher publisher(rig.loaded().scenario, kPublisherEpoch, false);
   std::map<std::string, int> sent;
   for (int tick = 0; tick < 990; ++tick) {
     const OutgoingMessages& outgoing = publisher.prepare(rig.tick());
@@ -33,16 +33,26 @@ TEST(Publisher, EachRateTierHasItsPeriod) {
       EXPECT_EQ(outgoing.progress->tick, outgoing.frames_30[0].tick);
     }
     sent["manifolds"] += static_cast<int>(outgoing.manifolds.size());
+    sent["manifolds 50"] += static_cast<int>(outgoing.manifolds_50.size());
+    if (!outgoing.manifolds_50.empty()) {
+      EXPECT_EQ(outgoing.manifolds_50[0]->tick, outgoing.frames_100[0].tick) << "a copy compares both";
+      EXPECT_EQ(outgoing.manifolds_50[0]->hand, test::kRightHand);
+    }
   }
-  EXPECT_EQ(sent,
-            (std::map<std::string, int>{
-                {"1k", 990}, {"100", 99}, {"30", 30}, {"stats", 99}, {"progress", 30}, {"manifolds", 990}}));
+  EXPECT_EQ(sent, (std::map<std::string, int>{{"1k", 990},
+                                              {"100", 99},
+
+                                              {"30", 30},
+                                              {"stats", 99},
+                                              {"progress", 30},
+                                              {"manifolds", 990},
+                                              {"manifolds 50", 49}}));
 }
 
 TEST(Publisher, WhatMovedInATickThatIsNotSentIsInTheNextFrame) {
   test::SessionRig rig;
   rig.attach(test::kRightHand, Vector3(0.2, 0, 0.3));
-  Publisher publisher(rig.loaded().scenario, kEpoch, false);
+  Publisher publisher(rig.loaded().scenario, kPublisherEpoch, false);
   TickOutput output = rig.tick(10);
   for (int tick = 0; tick < 10; ++tick) (void)publisher.prepare(output);
   for (ObjectState& moved : output.objects) {
@@ -60,11 +70,11 @@ TEST(Publisher, WhatMovedInATickThatIsNotSentIsInTheNextFrame) {
 TEST(Publisher, SetsHandAndServerEpochOfEachManifold) {
   test::SessionRig rig;
   rig.attach(test::kInstructorHand, Vector3(-0.3, 0, 0.3));
-  Publisher publisher(rig.loaded().scenario, kEpoch, false);
+  Publisher publisher(rig.loaded().scenario, kPublisherEpoch, false);
   const OutgoingMessages& outgoing = publisher.prepare(rig.tick(3));
   ASSERT_EQ(outgoing.manifolds.size(), 1U) << "only of hands that are present";
   EXPECT_EQ(outgoing.manifolds[0]->hand, test::kInstructorHand);
-  EXPECT_EQ(outgoing.manifolds[0]->server_epoch, kEpoch);
+  EXPECT_EQ(outgoing.manifolds[0]->server_epoch, kPublisherEpoch);
   EXPECT_EQ(outgoing.manifolds[0]->answers_seq, 3U);
   EXPECT_EQ(outgoing.manifolds[0]->tick, 3U);
 }
@@ -75,7 +85,7 @@ TEST(Publisher, SetsHandAndServerEpochOfEachManifold) {
 //      s         s
 TEST(Publisher, ASlowerTierCarriesThePeaksSinceItsLastSample) {
   test::SessionRig rig;
-  Publisher publisher(rig.loaded().scenario, kEpoch, false);
+  Publisher publisher(rig.loaded().scenario, kPublisherEpoch, false);
   (void)publisher.prepare(rig.tick(10));
   for (int tick = 11; tick <= 30; ++tick) {
     TickOutput output = rig.tick();
@@ -100,7 +110,7 @@ TEST(Publisher, ASlowerTierCarriesThePeaksSinceItsLastSample) {
       EXPECT_EQ(outgoing.stats->compute_seconds, 0.0001);
       EXPECT_EQ(outgoing.stats->compute_seconds_max, 0.0007);
       EXPECT_EQ(outgoing.stats->input_age_seconds, 0.020);
-      EXPECT_EQ(outgoing.stats->server_epoch, kEpoch);
+      EXPECT_EQ(outgoing.stats->server_epoch, kPublisherEpoch);
     } else if (tick == 30) {
       EXPECT_TRUE(outgoing.pairs.empty());
       EXPECT_EQ(outgoing.stats->load_percent, 1.0) << "each peak is published once";
@@ -113,7 +123,7 @@ TEST(Publisher, ASlowerTierCarriesThePeaksSinceItsLastSample) {
 
 TEST(Publisher, EveryCollisionPairIsPublishedWithinASecond) {
   test::SessionRig rig;
-  Publisher publisher(rig.loaded().scenario, kEpoch, false);
+  Publisher publisher(rig.loaded().scenario, kPublisherEpoch, false);
   std::set<std::pair<std::uint32_t, std::uint32_t>> published;
   for (int tick = 0; tick < 1000; ++tick) {
     const OutgoingMessages& outgoing = publisher.prepare(rig.tick());
@@ -125,7 +135,7 @@ TEST(Publisher, EveryCollisionPairIsPublishedWithinASecond) {
 
 TEST(Publisher, ManyPairsArePublishedInNumberedParts) {
   test::SessionRig rig;
-  Publisher publisher(rig.loaded().scenario, kEpoch, false);
+  Publisher publisher(rig.loaded().scenario, kPublisherEpoch, false);
   TickOutput output = rig.tick(10);
   output.pairs.clear();
   for (std::uint32_t i = 0; i < 20; ++i) {
@@ -146,7 +156,7 @@ TEST(Publisher, InLockstepEachTickCarriesAllObjectsAndManifolds) {
   const LoadedScene loaded = test::smallSession();
   SessionSimulation simulation = test::SessionRig::makeSimulation(loaded);
   TickOutput output = simulation.makeOutput();
-  Publisher publisher(loaded.scenario, kEpoch, true);
+  Publisher publisher(loaded.scenario, kPublisherEpoch, true);
   for (Tick tick = 1; tick <= 25; ++tick) {
     simulation.tick(test::playInput(tick));
     simulation.fill(output);

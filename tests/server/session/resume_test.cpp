@@ -1,6 +1,8 @@
 #include "server/session/resume.h"
 
+#include <atomic>
 #include <chrono>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -10,11 +12,14 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include "server/session/journal.h"
 #include "server/session/seat_list.h"
 #include "server/session/session_registry.h"
+#include "server/session/session_server.h"
+#include "tests/idl/wire/peer.h"
 #include "tests/server/session/small_session.h"
 
 namespace tenon::session {
@@ -85,6 +90,37 @@ TEST_F(ResumeTest, TheStateIsThatAfterTheLastTickThatWasKept) {
   EXPECT_EQ(point->checkpoint, 1001U) << "earlier ticks are not simulated again";
   EXPECT_EQ(point->problem, "");
   EXPECT_EQ(simulation.hash(), hashes_[1480]);
+}
+
+// its clock may have been set back since
+TEST_F(ResumeTest, AServerThatResumesHasALargerEpochThanAllBeforeIt) {
+  constexpr std::uint32_t kFuture = 4'000'000'000;
+  const fs::path file = folder_ / "a.mcap";
+  fs::path left;
+  {
+    SessionSimulation simulation = test::SessionRig::makeSimulation(loaded_, 1, {kRightHand});
+    auto journal =
+        Journal::open(file, {"small/scenario.yaml", 0.25, fingerprintOf(loaded_), {}, kFuture - 5});
+    ASSERT_TRUE(journal) << journal.error().what;
+    run(simulation, *journal, 40);
+    left = kill(file);
+  }
+  EXPECT_EQ(lastServerEpoch(left), kFuture - 5);
+  {
+    auto journal = Journal::reopen(left, 40, kFuture);
+    ASSERT_TRUE(journal) << journal.error().what;
+    left = kill(left);
+  }
+  EXPECT_EQ(lastServerEpoch(left), kFuture);
+  auto server = SessionServer::open(
+      loaded_, {.name = "epoch", .domain = test::ownDomain(), .journal = left, .resume = true});
+  ASSERT_TRUE(server) << server.error().what;
+  const std::atomic<bool> stop = true;
+  const auto report = (*server)->run(stop);
+  ASSERT_TRUE(report) << report.error().what;
+  EXPECT_EQ(report->run.server_epoch, kFuture + 1);
+  EXPECT_EQ(lastServerEpoch(left), kFuture + 1);
+  EXPECT_EQ(lastServerEpoch(folder_ / "none.mcap"), 0U);
 }
 
 TEST_F(ResumeTest, AJournalOfThreeLivesResimulates) {
@@ -269,6 +305,19 @@ TEST_F(ResumeTest, TheSeatKeeperWritesTheNewestListAndSaysWhenItCannot) {
   const auto kept = readSeats(folder_ / "seats");
   ASSERT_TRUE(kept) << kept.error().what;
   EXPECT_EQ(kept->size(), 50u);
+
+  // a limit on the size of files is an error of the write, as a full disk is
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{10, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &small);
+  const auto cut = writeSeats(folder_ / "seats", first(50));
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  ASSERT_FALSE(cut);
+  EXPECT_THAT(cut.error().what, HasSubstr("seats: cannot be written (File too large)"));
+  EXPECT_EQ(readSeats(folder_ / "seats")->size(), 50U) << "the former file stays";
 
   SeatKeeper nowhere(folder_ / "missing" / "seats");
   nowhere.keep(first(1));

@@ -15,6 +15,8 @@ TEST_F(SessionRegistryTest, AcceptsATraineeAndAttachesItsHands) {
   ASSERT_TRUE(welcome.accepted) << welcome.reason;
   EXPECT_EQ(welcome.client, ClientId{1});
   EXPECT_THAT(welcome.hands, ElementsAre(test::kLeftHand, test::kRightHand)) << "in the requested order";
+  EXPECT_THAT(welcome.objects, ElementsAre(loaded_.scenario->hands[test::kLeftHand.value].object,
+                                           loaded_.scenario->hands[test::kRightHand.value].object));
   EXPECT_EQ(welcome.client_guid, "a");
   EXPECT_EQ(welcome.server_epoch, kEpoch);
   EXPECT_EQ(welcome.tick, 5U);

@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "idl/types/resolution.h"
 #include "server/session/journal.h"
 #include "server/session/start_condition.h"
 #include "tests/server/session/scripted_client.h"
@@ -106,7 +107,9 @@ TEST(SessionServer, InLockstepEveryInputIsOneTick) {
   for (Tick tick = 1; tick <= 200; ++tick) {
     TickInput input{.tick = tick};
     if (tick == 1) input.changes.push_back({.kind = ChangeKind::kAttach, .hand = test::kRightHand});
-    input.readings.push_back(test::playInput(tick).readings[0]);
+    HandReading reading = test::playInput(tick).readings[0];
+    reading.X_WH = rounded(reading.X_WH);  // as over the wire
+    input.readings.push_back(reading);
     simulation.tick(input);
   }
   EXPECT_EQ(simulation.hash(), report.run.final_hash);
@@ -220,6 +223,30 @@ TEST(SessionServer, SamplesUnderTheIdOfAnotherClientAreRefused) {
   })) << "the session continues with the seat's own participant";
   EXPECT_NEAR(client.newest.X_WO.translation().z(), 0.3, 1e-3);
   EXPECT_GE(server.end().refused_inputs, 3U);
+}
+
+TEST(SessionServer, TelemetryUnderTheIdOfAnotherClientOrOfNobodyIsRefused) {
+  RunningServer server({.name = "telemetry", .wait_for = {"right"}});
+  test::ScriptedClient client("telemetry", wire::LinkProfile::kLan);
+  ASSERT_TRUE(client.join("trainee", Role::kTrainee, {"right"}));
+  const auto bus = test::participant(test::ownDomain());
+  wire::Partition session(bus, wire::sessionPartition("telemetry"));
+  auto forger = wire::Writer<Telemetry>::open(session, wire::kTelemetry);
+  ASSERT_TRUE(forger) << forger.error().what;
+  EXPECT_TRUE(client.receivesUntil([&] {
+    (void)forger->write({.client = client.welcome.client});
+    (void)forger->write({.client = ClientId{4711}});
+    return client.received("refused", "telemetry under the id of client 1") &&
+           client.received("refused", "telemetry of client 4711, which nobody is");
+  }));
+}
+
+TEST(SessionServer, WithoutAFileForTheEmergencyStopThatIsSaid) {
+  RunningServer server({.name = "no file", .wait_for = {"right"}});
+  test::ScriptedClient client("no file", wire::LinkProfile::kLan);
+  ASSERT_TRUE(client.join("trainee", Role::kTrainee, {"right"}));
+  EXPECT_TRUE(client.receivesUntil(
+      [&] { return client.received("emergency stop", "will not stand after a restart"); }));
 }
 
 TEST(SessionServer, InLockstepAClientWithInputAheadOfTheNextTickIsDismissed) {

@@ -1,4 +1,6 @@
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -154,6 +156,42 @@ TEST(Manifold, IsValidAsFarAsACrossingThatMayComeAbout) {
   EXPECT_LE(manifold.validity_radius, std::hypot(0.0004, 0.0001) + 1e-6);
   EXPECT_GT(manifold.validity_radius, 0.00005);
   for (const ManifoldContact& contact : manifold.contacts) EXPECT_LT(contact.gap, 0.001);
+}
+
+//   [held]  [near]   [middle]        [far]      each in a hand of its own; the table has two places
+TEST(Manifold, ListsTheNearestHandsThatHoldObjectsCloseBy) {
+  test::SmallScene small;
+  const double reach = std::sqrt(3.0) * test::kCubeEdge + kNeighbourReach;  // [m] between centres
+  std::vector<HandId> hands;
+  std::vector<ObjectId> objects;
+  std::vector<Vector3> places;
+  for (const double x : {0.0, 0.9 * reach, 1.1 * reach, -0.5 * reach, 0.95 * reach}) {
+    places.emplace_back(x, 0.0, 0.0);
+    const std::string name = "cube " + std::to_string(places.size());
+    objects.push_back(small.object(name, test::cubeShape(), places.back()));
+    hands.push_back(small.hand("hand " + std::to_string(places.size()), objects.back()));
+  }
+  small.pair(objects[0], objects[1]);
+  Environment environment(small.build(), {});
+  for (std::size_t i = 0; i < hands.size(); ++i) test::activateHand(environment, hands[i], places[i]);
+  const Twist V_WH{Vector3(0.1, 0.0, 0.0), Vector3::Zero()};
+  environment.setHandPose(hands[3], Pose(places[3]), V_WH);
+  environment.step();
+  HandManifold manifold;
+  environment.manifold(hands[0], manifold);
+  ASSERT_EQ(manifold.others.size(), 2U);
+  EXPECT_EQ(manifold.others[0].hand, hands[3]);
+  EXPECT_EQ(manifold.others[0].object, objects[3]);
+  EXPECT_NEAR((manifold.others[0].X_WG.translation() - places[3]).norm(), 0.0, 1e-9);
+  EXPECT_NEAR(manifold.others[0].V_WG[0], 0.1, 1e-6);
+  EXPECT_EQ(manifold.others[1].hand, hands[1]);
+
+  environment.setHandPresent(hands[3], false);
+  environment.setHandFrozen(hands[1], true);
+  environment.step();
+  environment.manifold(hands[0], manifold);
+  ASSERT_EQ(manifold.others.size(), 1U) << "who is absent or held still does not pull";
+  EXPECT_EQ(manifold.others[0].hand, hands[4]);
 }
 
 TEST(Manifold, IsEmptyButWellFormedForAHandWithoutObject) {

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace tenon::session {
+
+/// Makes `file` one with this text, of mode 0600; `synchronised`: on the disk when this returns. Empty when
+/// that is done, else why it cannot be, as "No space left on device".
+///
+/// Threads: any. Real-time: no.
+[[nodiscard]] std::string writeWhole(const std::filesystem::path& file, const std::string& text,
+                                     bool synchronised);
+
+}  // namespace tenon::session
