@@ -77,7 +77,7 @@ Result<void> CommandClient::connect(const Stop& stop) {
 
 Result<void> CommandClient::awaitReader(const Stop& stop) {
   const bool matched = dispatchUntil(inbox_, stop, kPatience, [this] {
-    return commands_->matchedReaders() > 0 && inbox_.matchedWriters() > 1;
+    return commands_->matchedReaders() > 0 && inbox_.matchedWriters() > 1 && member_->isWatching();
   });
   if (!matched) return fail("the server of session '" + member_->sessionName() + "' does not read commands");
   return {};

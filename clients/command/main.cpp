@@ -1,6 +1,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "clients/command/command_program.h"
 #include "clients/command/session_lists.h"
 #include "idl/wire/network.h"
+#include "idl/wire/session_name.h"
 
 namespace {
 
@@ -23,17 +25,24 @@ struct CommandArguments {
 };
 
 void declare(CLI::App& app, CommandArguments& arguments) {
-  const std::vector<std::pair<std::string, tenon::Role>> roles{{"admin", tenon::Role::kAdmin},
-                                                               {"instructor", tenon::Role::kInstructor},
-                                                               {"trainee", tenon::Role::kTrainee}};
+  static const std::map<std::string, tenon::Role> kRoles{{"admin", tenon::Role::kAdmin},
+                                                         {"instructor", tenon::Role::kInstructor},
+                                                         {"trainee", tenon::Role::kTrainee}};
   app.add_option("words", arguments.words, "a command and its arguments, see below");
   app.add_flag("--keys", arguments.keys, "interactive: each key sends a command, until q");
   app.add_option("--signal", arguments.signals, "with --keys: the signals that keys 1, 2, ... send");
-  app.add_option("--role", arguments.options.role, "admin, instructor or trainee (default: instructor)")
-      ->transform(CLI::CheckedTransformer(roles))
+  app.add_option_function<std::string>(
+         "--role", [&arguments](const std::string& word) { arguments.options.role = kRoles.at(word); },
+         "admin, instructor or trainee (default: instructor)")
+      ->check(CLI::IsMember(kRoles))
       ->option_text("ROLE");
+  // an empty name is no name: an emergency stop is not refused for it
   app.add_option("--session", arguments.options.session,
-                 "name of the session; default: the first one announced, of the emergency stop all sessions");
+                 "name of the session; default: the first one announced, of the emergency stop all sessions")
+      ->check([](const std::string& text) {
+        const auto permitted = tenon::wire::checkSessionName(text);
+        return text.empty() || permitted ? std::string() : permitted.error().what;
+      });
   app.add_option("--key", arguments.options.key_file,
                  "file of the session's key, which instructors and admins need (default: the one of your own "
                  "servers)");

@@ -76,9 +76,9 @@ Result<void> HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH
   input_.client = client;
   const Pose X_WH = workspace_.toWorld(device_state_.X_DH);
   input_.sample.X_WH = X_WH;
-  input_.p_WC = workspace_.centre();
   state_ = {};
   state_.hand = hand;
+  state_.p_WC = workspace_.centre();
   coupling_.reset();
   fixture_.restart();
   return result;
@@ -111,6 +111,8 @@ void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noex
   const Pose X_WH = workspace_.toWorld(device_state_.X_DH);
   const Twist V_WH{device_state_.V_DH.linear + workspace_.velocity(), device_state_.V_DH.angular};
 
+  if (local_.hasManifold()) time_.receive(local_.manifold(), seq);
+  local_.expectAt(time_.known() ? time_.tickOf(seq) : 0.0);
   stepModels(X_WH, world);
   in_contact_ = model().proxy().touching || (local_.hasManifold() && serverSeesContact(local_.manifold()));
   devices::DeviceCommand command = safety_.step(request(X_WH, dt), device_state_, dt);
@@ -121,7 +123,7 @@ void HapticHand::step(std::uint32_t seq, const WorldView& world, double dt) noex
   updateEvents();
   // the device has its force: what the next cycle renders may take the rest of this one
   if (copy_ && wanted_model_ == ForceModelKind::kSceneCopy && local_.hasManifold())
-    copy_->compute(local_.manifold(), seq, X_WH, V_WH, world, rendering_ == Rendering::kOn);
+    copy_->compute(local_.manifold(), seq, time_, X_WH, V_WH, world, rendering_ == Rendering::kOn);
 }
 
 void HapticHand::stepModels(const Pose& X_WH, const WorldView& world) noexcept {
@@ -230,7 +232,6 @@ void HapticHand::updateOutputs(std::uint32_t seq, const WorldView& world, const 
   input_.server_epoch = world.serverEpoch();
   input_.active = permitted_ && deadManHeld() && !handover_.pending() && !safety_.wantsDisarm() &&
                   device_state_.fault == devices::DeviceFault::kNone;
-  input_.p_WC = workspace_.centre();
 
   state_.seq = seq;
   state_.X_WH = input_.sample.X_WH;

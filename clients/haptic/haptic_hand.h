@@ -88,10 +88,8 @@ class HapticHand {
   [[nodiscard]] std::uint64_t beyondValidity() const noexcept { return beyond_count_; }
   /// `jitter` [s]: AnswerAge::setJitter.
   void setLinkJitter(double jitter) noexcept { answers_.setJitter(jitter); }
-  /// SceneCopy::setPlayout of the hand's copy.
-  void setLinkPlayout(std::uint32_t ticks) noexcept {
-    if (copy_) copy_->setPlayout(ticks);
-  }
+  /// ServerTime::setRoundTrip, `round_trip` [s].
+  void setLinkRoundTrip(double round_trip) noexcept { time_.setRoundTrip(round_trip); }
   /// False: forces off, brake on, input inactive. True, for the person at the device, also of a device in
   /// fault: resets the safety layer, and asks for armDevice() if the device is not armed. See Arming, which
   /// decides it.
@@ -163,6 +161,7 @@ class HapticHand {
   devices::HapticDevice& device_;
   Workspace workspace_;
   LocalModel local_;  ///< has the server's newest manifold, whichever model the force is of
+  ServerTime time_;
   std::unique_ptr<SceneCopy> copy_;
   std::atomic<SceneCopy*> offered_{nullptr};  ///< owned, until the loop takes it
   Coupling coupling_;

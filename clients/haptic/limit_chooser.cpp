@@ -14,10 +14,10 @@ constexpr double kJitterOfWholeTicks = 0.002;  // [s] above it inputs come in no
 constexpr double kMostLoss = 0.2;  // [-] above it a second had an interruption, or keeping back helps no more
 
 /// [s] of inputs lost one after the other, as rarely as kRare.
-double expectedGap(double lost) {
+double expectedGap(double lost, std::uint32_t period) {
   if (!(lost > 0.0)) return 0.0;
   const double share = std::min(lost, 0.9);
-  return kTickSeconds * std::ceil(std::log(kRare) / std::log(share));
+  return period * kTickSeconds * std::ceil(std::log(kRare) / std::log(share));
 }
 
 std::uint32_t playoutFor(double lost, double trip_jitter) {
@@ -43,14 +43,17 @@ LinkChoice LimitChooser::step(const LinkMeasurement& now) noexcept {
     if (one.inputs_lost > worst.inputs_lost) worst.inputs_lost = one.inputs_lost;
     if (one.inputs_lost > steady_loss && one.inputs_lost <= kMostLoss) steady_loss = one.inputs_lost;
   }
-  const double gap =
-      std::min(kLongestGap, std::max(worst.input_gap, worst.trip_jitter + expectedGap(worst.inputs_lost)));
+  const double gap = std::min(
+      kLongestGap,
+      std::max(worst.input_gap, worst.trip_jitter + expectedGap(worst.inputs_lost, now.input_period)));
   const double wanted = kStep * std::ceil((kMachines + 2.0 * gap) / kTickSeconds / kStep);
   LinkChoice choice;
   choice.limits.freeze_ticks = std::clamp(static_cast<std::uint32_t>(wanted), kFreezeTicks, kMostFreezeTicks);
   choice.limits.park_ticks = kParkTicks + 10 * (choice.limits.freeze_ticks - kFreezeTicks);
+  choice.loss = steady_loss;
   choice.jitter = worst.age_jitter;
-  choice.playout_ticks = playoutFor(steady_loss, worst.trip_jitter);
+  // sparse inputs carry no earlier ones: the server fills what is between them
+  choice.playout_ticks = now.input_period > 1 ? 0 : playoutFor(steady_loss, worst.trip_jitter);
   return choice;
 }
 

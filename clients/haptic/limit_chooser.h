@@ -10,15 +10,19 @@ namespace tenon::haptic {
 
 /// What a station has measured of its link in the last second or so.
 struct LinkMeasurement {
-  double input_gap = 0.0;    ///< [s] longest time between two of its inputs at the server
-  double trip_jitter = 0.0;  ///< [s] of the round trip: 90th percentile less the shortest
-  double age_jitter = 0.0;   ///< [s] of the contacts: 99th percentile less the youngest
-  double inputs_lost = 0.0;  ///< [-]
+  double input_gap = 0.0;          ///< [s] longest time between two of its inputs at the server
+  double trip_jitter = 0.0;        ///< [s] of the round trip: 90th percentile less the shortest
+  double age_jitter = 0.0;         ///< [s] of the contacts: 99th percentile less the youngest
+  double inputs_lost = 0.0;        ///< [-]
+  std::uint32_t input_period = 1;  ///< [ticks] DeviceInput::period
 };
 
 /// What follows from the link for a station and its hands.
 struct LinkChoice {
   HandLimits limits;
+  /// [-] of inputs, in seconds without an interruption. Answers are taken to be lost alike: their own share
+  /// at 1 kHz counts those that a newer one has overtaken, of which a slower rate has none.
+  double loss = 0.0;
   /// [s] age of contacts beyond the link's delay that is usual there
   double jitter = 0.0;
   /// [ticks] for which the server keeps an input back, so that one that is lost comes with the next one; so

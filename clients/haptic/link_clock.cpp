@@ -32,10 +32,11 @@ void LinkClock::receive(const ClockSync& answer, std::int64_t now_ns) noexcept {
     return;
   }
   const std::uint32_t sent = newest.inputs - since_->inputs;
-  if (sent < kInputs) return;
+  if (sent < (loss_known_ ? kInputs : kFirstInputs)) return;
   const auto share = [sent](std::uint32_t now, std::uint32_t before) {
     return std::min(1.0, static_cast<double>(now - before) / sent);
   };
+  loss_known_ = true;
   inputs_lost_ = 1.0 - share(answer.inputs_received, answer_since_.inputs_received);
   inputs_replaced_ = share(answer.inputs_replaced, answer_since_.inputs_replaced);
   ticks_without_input_ = share(answer.ticks_without_input, answer_since_.ticks_without_input);

@@ -20,6 +20,8 @@ class LinkClock {
   void sent(std::uint32_t seq, std::uint32_t inputs) noexcept;
   /// An answer of the server, at `now_ns`.
   void receive(const ClockSync& answer, std::int64_t now_ns) noexcept;
+  /// Whether the loss of inputs has been counted once.
+  [[nodiscard]] bool lossKnown() const noexcept { return loss_known_; }
   /// Sets the fields of `telemetry` that are measured here.
   void fill(Telemetry& telemetry, std::int64_t now_ns) const noexcept;
 
@@ -29,6 +31,7 @@ class LinkClock {
   static constexpr std::uint32_t kFirst = 30;                 // so the link is known within a second
   // inputs between two statements of their loss: a thousandth shows
   static constexpr std::uint32_t kInputs = 2000;
+  static constexpr std::uint32_t kFirstInputs = 400;  // until the first one: rates follow from it
 
   static constexpr std::size_t kRing = 16384;
   struct Sent {
@@ -44,7 +47,8 @@ class LinkClock {
   std::optional<Sent> since_;  // from which on losses are counted
   ClockSync answer_since_;     // of that moment
   double inputs_lost_ = 0.0, inputs_replaced_ = 0.0, ticks_without_input_ = 0.0;  // [-]
-  double input_gap_ = 0.0;                                                        // [s]
+  bool loss_known_ = false;
+  double input_gap_ = 0.0;  // [s]
 };
 
 }  // namespace tenon::haptic

@@ -4,6 +4,8 @@
 #include <array>
 #include <span>
 
+#include "idl/types/motion_law.h"
+
 namespace tenon::haptic {
 
 namespace {
@@ -15,6 +17,14 @@ constexpr double kUnknownRadius = 0.1;  // [m]
 
 // Fade-out of another hand's spring after it has released the object.
 constexpr double kFadeTicks = 20.0;  // [ticks]
+
+/// [m] Of a contact's point of the other body, from its pose of tick `heard_at` to `now`. Slow motion is that
+/// of what gives way to this hand.
+Vector3 expectedMotion(const ManifoldContact& contact, Tick heard_at, double now) {
+  const double ahead = (now - static_cast<double>(heard_at)) * kTickSeconds;
+  const Vector3 v_W = contact.velocity_W.cast<double>();
+  return extrapolationWeight(v_W.norm()) * std::clamp(ahead, 0.0, LocalModel::kLongestExpectation) * v_W;
+}
 
 bool anyBodyJumped(const HandManifold& before, const HandManifold& now) {
   return std::any_of(now.bodies.begin(), now.bodies.end(), [&](const ManifoldBody& body) {
@@ -76,7 +86,7 @@ void LocalModel::updateOtherSprings(bool same_object) noexcept {
   if (!same_object) other_springs_.clear();
   for (OtherHandSpring& known : other_springs_) known.listed = false;
   for (const HandPull& pull : manifold_.others) {
-    if (!pull.X_WG.isFinite() || !pull.p_BoC_B.allFinite()) continue;
+    if (pull.object != manifold_.object || !pull.X_WG.isFinite() || !pull.p_BoC_B.allFinite()) continue;
     auto* const known =
         std::find_if(other_springs_.begin(), other_springs_.end(),
                      [&](const OtherHandSpring& other) { return other.pull.hand == pull.hand; });
@@ -134,7 +144,9 @@ void LocalModel::solve(const Pose& X_WH, const WorldView& world) noexcept {
     constraint.body_a = 0;
     constraint.n_W = X_WA.rotation() * n_A;
     constraint.p_WP = body_.X_WB * contact.p_BoP_B.cast<double>();
-    constraint.gap = n_A.dot(X_WA.inverse() * constraint.p_WP) - static_cast<double>(contact.offset);
+    constraint.gap =
+        n_A.dot(X_WA.inverse() * constraint.p_WP) - static_cast<double>(contact.offset) -
+        constraint.n_W.dot(expectedMotion(contact, world.object(contact.other).updated_at, now_));
     constraints_.push_back(constraint);
   }
   std::array<Displacement, 1> motion{};

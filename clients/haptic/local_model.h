@@ -12,11 +12,11 @@ namespace tenon::haptic {
 /// The force model `manifold` of one hand: haptic rendering at 1 kHz between two manifolds of the server
 /// (ARCHITECTURE.md).
 ///
-/// The manifold lists contact half-spaces fixed in the other bodies. Each step places them at the last
-/// received poses of these bodies and moves the hand's object as near to the device pose as they permit: the
-/// server's problem for one body and planes only. So the force follows the present device pose without
-/// network delay, and no force received over the network is displayed. The solution depends on planes and
-/// device pose, not on the path, so it does not drift from the server's.
+/// The manifold lists contact half-spaces fixed in the other bodies. Each step places them where these bodies
+/// are expected now, by their last received poses and velocities, and moves the hand's object as near to the
+/// device pose as they permit: the server's problem for one body and planes only. So the force follows the
+/// present device pose without network delay, and no force received over the network is displayed. The
+/// solution depends on planes and device pose, not on the path, so it does not drift from the server's.
 ///
 /// The springs of other hands on the same object act here too, at their last received poses, so that both
 /// people feel each other. The spring of a hand that has released the object fades out within 20 ticks.
@@ -33,6 +33,12 @@ class LocalModel final : public ForceModel {
   [[nodiscard]] bool usable(const WorldView& world) const noexcept;
   /// The newest manifold is not a continuation of the one before: another object, or a jump of a body.
   [[nodiscard]] bool jumped() const noexcept override { return jumped_; }
+  /// [s] A part that gives way to the hand is heard late, so on long links to expect its motion makes it
+  /// swing.
+  static constexpr double kLongestExpectation = 0.02;
+  /// The next steps are those of `tick` [ticks] of the server: other bodies are expected where their velocity
+  /// brings them by then, within kLongestExpectation (idl/types/motion_law.h). 0: where they were heard.
+  void expectAt(double tick) noexcept { now_ = tick; }
   /// The next step begins at the server's proxy.
   void restart() noexcept { jumped_ = true; }
   /// Server's proxy pose of the hand. Precondition: hasManifold().
@@ -68,6 +74,7 @@ class LocalModel final : public ForceModel {
   FixedVector<collision::ContactConstraint, kManifoldContacts> constraints_;
   std::array<double, kManifoldContacts> multipliers_{};  ///< [N] of each constraint
   std::uint64_t beyond_validity_ = 0;
+  double now_ = 0.0;  ///< [ticks] of the server
   bool has_manifold_ = false;
   bool jumped_ = false;
 };

@@ -8,10 +8,6 @@
 namespace tenon::haptic {
 
 namespace {
-// Slower motion is not extrapolated, and that from twice as fast on is in full: what gives way under a hand's
-// push is heard late, and its velocity would be fed back with the gain of the delay.
-constexpr double kSlow = 0.01;  // [m/s] of any point
-
 // A few pairs about one object have contacts at a time; each list has 80 kB.
 constexpr std::size_t kContactLists = 48;
 
@@ -43,13 +39,32 @@ ObjectStatus kinematic(ObjectStatus status) {
 }
 
 double pointSpeed(const Twist& V, double radius) { return V.linear.norm() + V.angular.norm() * radius; }
+
+/// What is extrapolated of the twist of a body whose points move at `pace` [m/s].
+Twist faded(const Twist& V, double pace) {
+  const double weight = extrapolationWeight(pace);
+  return {weight * V.linear, weight * V.angular};
+}
+
+/// The pose of `object` a cycle after X_WO, on the way to X_WO_target, which moves at `pace` [m/s].
+Pose towards(const Pose& X_WO, const Pose& X_WO_target, const ObservedObject& object, double pace) {
+  Displacement motion = displacement(X_WO, X_WO_target, object.p_OQ_O);
+  const double way = maxPointMotion(motion, object.radius);
+  const double most = SceneCopy::kLargestCorrection + pace * kTickSeconds;
+  if (way <= most) return X_WO_target;
+  motion.translation *= most / way;
+  motion.rotation *= most / way;
+  return displaced(X_WO, motion, object.p_OQ_O);
+}
 }  // namespace
 
 SceneCopy::SceneCopy(std::shared_ptr<const simulation::Scene> scene)
     : environment_(scene, {.contact_lists = kContactLists}),
       mirrored_(scene->objects.size()),
-      stiffness_(scene->hands.size()) {
+      stiffness_(scene->hands.size()),
+      neighbours_(scene->hands.size()) {
   view_.begin(sceneObjects(*scene), 0, 0);
+  model_.expectAt(1.0);  // the contacts of a cycle are rendered by the next one
   const auto has_mass = [](const simulation::ObjectSpec& object) { return object.body.has_value(); };
   bodies_.resize(
       static_cast<std::size_t>(std::count_if(scene->objects.begin(), scene->objects.end(), has_mass)));
@@ -80,13 +95,20 @@ PredictedBody* SceneCopy::bodyOf(ObjectId object) noexcept {
   return index < bodies_.size() ? &bodies_[index] : nullptr;
 }
 
-/// Of the pairs from `first` to `end` those that collide and have the hand's object or a free body: no other
-/// is of interest.
+bool SceneCopy::isNeighbours(ObjectId object) const noexcept {
+  return std::any_of(neighbours_.begin(), neighbours_.end(),
+                     [object](const Neighbour& one) { return one.object == object; });
+}
+
+/// Of the pairs from `first` to `end` those that collide and have the hand's object, a neighbour's or a free
+/// body: no other is of interest.
 void SceneCopy::enablePairs(std::size_t first, std::size_t end) noexcept {
   for (std::size_t i = first; i < end; ++i) {
     const simulation::PairSpec& pair = environment_.scene().pairs[i];
-    const bool enabled = collides_[i] && (pair.a == object_ || pair.b == object_ ||
-                                          bodyOf(pair.a) != nullptr || bodyOf(pair.b) != nullptr);
+    const auto isMoved = [this](ObjectId object) {
+      return object == object_ || bodyOf(object) != nullptr || isNeighbours(object);
+    };
+    const bool enabled = collides_[i] && (isMoved(pair.a) || isMoved(pair.b));
     if (environment_.pairs()[i].enabled != enabled) environment_.setPairEnabled(i, enabled);
   }
 }
@@ -95,11 +117,9 @@ const LocalProxy& SceneCopy::step(const Pose& X_WH, const WorldView& /*world*/) 
   return model_.step(X_WH, view_);
 }
 
-void SceneCopy::compute(const HandManifold& heard, std::uint32_t seq, const Pose& X_WH, const Twist& V_WH,
-                        const WorldView& world, bool rendered) noexcept {
+void SceneCopy::compute(const HandManifold& heard, std::uint32_t seq, const ServerTime& time,
+                        const Pose& X_WH, const Twist& V_WH, const WorldView& world, bool rendered) noexcept {
   if (heard.tick != heard_tick_ || heard.server_epoch != heard_epoch_) {
-    if (heard.server_epoch != heard_epoch_) time_ = {};
-    time_.receive(heard.tick, heard.answers_seq, seq, playout_);
     // a tick that lacked its input, and the one after it, had another time between inputs than the copy
     const std::int64_t behind = static_cast<std::int64_t>(heard.tick) - heard.answers_seq;
     is_comparable_ = heard.answers_seq != 0 && behind == behind_;
@@ -108,7 +128,7 @@ void SceneCopy::compute(const HandManifold& heard, std::uint32_t seq, const Pose
     heard_epoch_ = heard.server_epoch;
   }
   const bool known = heard.object.value < mirrored_.size() && heard.hand.value < stiffness_.size() &&
-                     world.size() == mirrored_.size() && time_.known();
+                     world.size() == mirrored_.size() && time.known();
   if (!rendered || heard.frozen || !known) {
     following_ = diverged_ = false;
     return;
@@ -116,8 +136,8 @@ void SceneCopy::compute(const HandManifold& heard, std::uint32_t seq, const Pose
   const bool holds =
       following_ && heard.hand == hand_ && heard.object == object_ && heard.object_epoch == object_epoch_;
   if (!holds) takeHold(heard);
-  mirrorObjects(world, heard, seq);
-  mirrorOtherHands(heard);
+  mirrorObjects(world, heard, time.tickOf(seq));
+  mirrorOtherHands(heard, time.tickOf(seq));
   setStiffness(heard.hand, {heard.stiffness, heard.rotational_stiffness});
   environment_.setHandPose(hand_, X_WH, V_WH);
   environment_.step();
@@ -136,6 +156,10 @@ void SceneCopy::compute(const HandManifold& heard, std::uint32_t seq, const Pose
 void SceneCopy::takeHold(const HandManifold& heard) noexcept {
   for (std::uint32_t i = 0; i < stiffness_.size(); ++i)
     if (HandId{i} != heard.hand) environment_.setHandPresent(HandId{i}, false);
+  for (Neighbour& neighbour : neighbours_) {
+    if (neighbour.object.valid()) mirrored_[neighbour.object.value].known = false;
+    neighbour = {};
+  }
   hand_ = heard.hand;
   object_ = heard.object;
   object_epoch_ = heard.object_epoch;
@@ -150,8 +174,7 @@ void SceneCopy::takeHold(const HandManifold& heard) noexcept {
   diverged_ = false;
 }
 
-void SceneCopy::mirrorObjects(const WorldView& world, const HandManifold& heard, std::uint32_t seq) noexcept {
-  const double now = time_.tickOf(seq);
+void SceneCopy::mirrorObjects(const WorldView& world, const HandManifold& heard, double now) noexcept {
   for (std::uint32_t i = 0; i < mirrored_.size(); ++i) {
     const ObjectId object{i};
     if (object == heard.object) continue;
@@ -184,7 +207,7 @@ void SceneCopy::predict(ObjectId object, const ObservedObject& seen, const HandM
     Twist V_WO = motion.V_WO;
     if (body.correct(seen, X_WO, V_WO)) environment_.correct(object, X_WO, V_WO);
   }
-  mirrored = {true, seen.epoch, ObjectStatus::kFree, seen.updated_at, seen.V_WO};
+  mirrored = {true, seen.epoch, ObjectStatus::kFree, seen.updated_at, seen.V_WO, seen.X_WO};
 }
 
 void SceneCopy::mirror(ObjectId object, const ObservedObject& seen, double now) noexcept {
@@ -196,63 +219,87 @@ void SceneCopy::mirror(ObjectId object, const ObservedObject& seen, double now) 
                           ? X_WO_now
                           : extrapolated(seen.X_WO, seen.V_WO, seen.p_OQ_O, ahead);
     environment_.place(object, X_WO, kinematic(seen.status));
-    mirrored = {true, seen.epoch, seen.status, seen.updated_at, seen.V_WO};
+    mirrored = {true, seen.epoch, seen.status, seen.updated_at, seen.V_WO, seen.X_WO};
   } else if (seen.updated_at != mirrored.updated_at) {
     const double dt = static_cast<double>(seen.updated_at - mirrored.updated_at) * kTickSeconds;
     const double blend = dt / (kTwistFilter + dt);
     const bool stands = seen.V_WO.linear.isZero(0.0) && seen.V_WO.angular.isZero(0.0);
-    mirrored.V_WO.linear += (stands ? 1.0 : blend) * (seen.V_WO.linear - mirrored.V_WO.linear);
-    mirrored.V_WO.angular += (stands ? 1.0 : blend) * (seen.V_WO.angular - mirrored.V_WO.angular);
+    Twist V_WO = seen.V_WO;
+    if (dt > kTwistFilter && !stands) {
+      const Displacement way = displacement(mirrored.X_WO, seen.X_WO);
+      V_WO = {way.translation / dt, way.rotation / dt};
+    }
+    mirrored.V_WO.linear += (stands ? 1.0 : blend) * (V_WO.linear - mirrored.V_WO.linear);
+    mirrored.V_WO.angular += (stands ? 1.0 : blend) * (V_WO.angular - mirrored.V_WO.angular);
     mirrored.updated_at = seen.updated_at;
+    mirrored.X_WO = seen.X_WO;
   }
   if (seen.status == ObjectStatus::kHidden) return;
   const double pace = pointSpeed(mirrored.V_WO, seen.radius);
-  const double weight = std::clamp(pace / kSlow - 1.0, 0.0, 1.0);
-  const Twist V_WO{weight * mirrored.V_WO.linear, weight * mirrored.V_WO.angular};
-  const Pose X_WO_target = extrapolated(seen.X_WO, V_WO, seen.p_OQ_O, ahead);
-  Displacement motion = displacement(X_WO_now, X_WO_target, seen.p_OQ_O);
-  const double way = maxPointMotion(motion, seen.radius);
-  if (way == 0.0) return;
-  const double most = kLargestCorrection + pace * kTickSeconds;
-  if (way > most) {
-    motion.translation *= most / way;
-    motion.rotation *= most / way;
-  }
-  environment_.follow(object, way > most ? displaced(X_WO_now, motion, seen.p_OQ_O) : X_WO_target,
-                      mirrored.V_WO);
+  const Pose X_WO_target = extrapolated(seen.X_WO, faded(mirrored.V_WO, pace), seen.p_OQ_O, ahead);
+  if (X_WO_target == X_WO_now) return;
+  environment_.follow(object, towards(X_WO_now, X_WO_target, seen, pace), mirrored.V_WO);
 }
 
-/// Each pulls the object as in the server's last manifold; those that it lists no more have let go.
-void SceneCopy::mirrorOtherHands(const HandManifold& heard) noexcept {
+/// Each pulls its object as in the server's last manifold; those that it lists no more have let go.
+void SceneCopy::mirrorOtherHands(const HandManifold& heard, double now) noexcept {
   for (std::uint32_t i = 0; i < stiffness_.size(); ++i) {
     const HandId hand{i};
     const bool listed = std::any_of(heard.others.begin(), heard.others.end(),
                                     [&](const HandPull& pull) { return pull.hand == hand; });
-    if (hand != hand_ && !listed) environment_.setHandPresent(hand, false);
+    if (hand != hand_ && !listed) letGo(hand);
   }
+  const double ahead = (now - static_cast<double>(heard.tick)) * kTickSeconds;
   for (const HandPull& pull : heard.others) {
-    if (!pull.X_WG.isFinite() || !pull.p_BoC_B.allFinite() || pull.hand == hand_) continue;
-    const simulation::ObjectMotion& object = environment_.objects()[object_.value];
-    if (pull.hand.value >= stiffness_.size()) {
+    if (!pull.X_WG.isFinite() || !pull.V_WG.allFinite() || !pull.p_BoC_B.allFinite()) continue;
+    if (pull.hand == hand_) continue;
+    const bool is_own = pull.object == object_;
+    if (pull.hand.value < stiffness_.size() && pull.object.value < mirrored_.size()) {
+      mirrorHold(pull, is_own ? pull.X_WG : nextGoal(pull, ahead));
+    } else if (is_own) {
       // a soft spring that stands for a wrench
-      const Displacement stretch = displacement(object.X_WO, pull.X_WG, pull.p_BoC_B);
+      const Pose& X_WO = environment_.objects()[object_.value].X_WO;
+      const Displacement stretch = displacement(X_WO, pull.X_WG, pull.p_BoC_B);
       const Vector3 force = pull.stiffness * stretch.translation;
-      const Vector3 p_OC_W = object.X_WO.rotation() * pull.p_BoC_B;
+      const Vector3 p_OC_W = X_WO.rotation() * pull.p_BoC_B;
       environment_.contribute(object_, kSource,
                               {force, pull.rotational_stiffness * stretch.rotation + p_OC_W.cross(force)},
                               kLifetime);
-      continue;
     }
-    const Pose X_HO(-pull.p_BoC_B);
-    const simulation::HandMotion& hand = environment_.hands()[pull.hand.value];
-    if (!hand.present || !hand.attached || hand.object != object_) {
-      const Pose X_WO = object.X_WO;
-      environment_.hold(pull.hand, object_, X_HO, X_WO);
-      stiffness_[pull.hand.value] = {};
-    }
-    setStiffness(pull.hand, {pull.stiffness, pull.rotational_stiffness});
-    environment_.setHandPose(pull.hand, pull.X_WG * X_HO.inverse(), {});
   }
+}
+
+void SceneCopy::letGo(HandId hand) noexcept {
+  environment_.setHandPresent(hand, false);
+  if (!neighbours_[hand.value].object.valid()) return;
+  neighbours_[hand.value] = {};
+  enablePairs(0, collides_.size());
+}
+
+void SceneCopy::mirrorHold(const HandPull& pull, const Pose& X_WG) noexcept {
+  const Pose X_HO(-pull.p_BoC_B);
+  const simulation::HandMotion& hand = environment_.hands()[pull.hand.value];
+  if (!hand.present || !hand.attached || hand.object != pull.object) {
+    const Pose X_WO = environment_.objects()[pull.object.value].X_WO;
+    environment_.hold(pull.hand, pull.object, X_HO, X_WO);
+    stiffness_[pull.hand.value] = {};
+  }
+  setStiffness(pull.hand, {pull.stiffness, pull.rotational_stiffness});
+  environment_.setHandPose(pull.hand, X_WG * X_HO.inverse(), {});
+}
+
+Pose SceneCopy::nextGoal(const HandPull& pull, double ahead) noexcept {
+  Neighbour& neighbour = neighbours_[pull.hand.value];
+  const ObservedObject& object = view_.object(pull.object);
+  const Twist V_WG{pull.V_WG.head<3>().cast<double>(), pull.V_WG.tail<3>().cast<double>()};
+  const double pace = pointSpeed(V_WG, object.radius);
+  const Pose X_WG = extrapolated(pull.X_WG, faded(V_WG, pace), object.p_OQ_O, ahead);
+  if (neighbour.object != pull.object) {
+    neighbour = {pull.object, X_WG};
+    enablePairs(0, collides_.size());
+  }
+  neighbour.X_WG = towards(neighbour.X_WG, X_WG, object, pace);
+  return neighbour.X_WG;
 }
 
 void SceneCopy::setStiffness(HandId hand, const HandStiffness& stiffness) noexcept {
@@ -282,8 +329,10 @@ void SceneCopy::compareWithServer(const HandManifold& heard, std::uint32_t seq) 
   const auto isStill = [&](ObjectId object) {
     return pointSpeed(mirrored_[object.value].V_WO, view_.object(object).radius) < kStands;
   };
+  const bool is_pulled = std::any_of(heard.others.begin(), heard.others.end(),
+                                     [this](const HandPull& pull) { return pull.object == object_; });
   const bool comparable =
-      then.seq == heard.answers_seq && heard.others.empty() &&
+      then.seq == heard.answers_seq && !is_pulled &&
       std::all_of(contacts_.bodies.begin(), contacts_.bodies.end(),
                   [&](const ManifoldBody& body) { return isStill(body.object); }) &&
       std::all_of(heard.bodies.begin(), heard.bodies.end(), [&](const ManifoldBody& body) {

@@ -32,6 +32,9 @@ namespace tenon::haptic {
 ///   millisecond.
 /// * Couplings of other hands on the object, and contributions of other sources, act as the server's manifold
 ///   tells them.
+/// * An object that another hand holds close by is simulated with that hand's coupling, whose goal is
+///   extrapolated likewise. So it gives way to a push at once: in the server it does so for the push of a
+///   delay ago, and is heard another delay later.
 /// * The object starts at the server's proxy, and again after each of its jumps. On a scene at rest both then
 ///   solve one problem for one device pose. Where the answer to a pose nevertheless stays away from what the
 ///   copy had for that pose, with all at rest, the copy has jumped(): the hand is re-anchored at the
@@ -44,13 +47,12 @@ class SceneCopy final : public ForceModel {
   ~SceneCopy() override;
 
   /// The contacts of the next cycle: the device read as input `seq` at X_WH, and `heard`, the newest manifold
-  /// of the server. Not `rendered`: the hand's force is interrupted, and the copy waits.
-  void compute(const HandManifold& heard, std::uint32_t seq, const Pose& X_WH, const Twist& V_WH,
-               const WorldView& world, bool rendered) noexcept;
+  /// of the server, as `time` has received it. Not `rendered`: the hand's force is interrupted, and the copy
+  /// waits.
+  void compute(const HandManifold& heard, std::uint32_t seq, const ServerTime& time, const Pose& X_WH,
+               const Twist& V_WH, const WorldView& world, bool rendered) noexcept;
   /// Whether it has contacts for the next cycle.
   [[nodiscard]] bool ready() const noexcept { return following_; }
-  /// `ticks` for which the server keeps an input back: LinkChoice::playout_ticks.
-  void setPlayout(std::uint32_t ticks) noexcept { playout_ = ticks; }
   /// Which pairs collide; until then those of the scene's start.
   void receive(const CollisionMatrix& matrix) noexcept;
 
@@ -62,7 +64,8 @@ class SceneCopy final : public ForceModel {
 
   static constexpr double kLargestCorrection = 1e-3;  ///< [m] of any point of a body, in a cycle
   /// [s] Of heard velocities, which are those of single ticks: smooths the resolution of another hand's
-  /// encoders, and adds its time to the delay where motion changes.
+  /// encoders, and adds its time to the delay where motion changes. Of frames that are farther apart the
+  /// velocity is that between their poses.
   static constexpr double kTwistFilter = 0.005;
 
  private:
@@ -73,6 +76,12 @@ class SceneCopy final : public ForceModel {
     ObjectStatus status = ObjectStatus::kHidden;
     Tick updated_at = 0;
     Twist V_WO;  ///< filtered
+    Pose X_WO;   ///< heard last
+  };
+  /// Another hand whose object is simulated: the goal that it has in the copy.
+  struct Neighbour {
+    ObjectId object;
+    Pose X_WG;
   };
   struct PastProxy {
     std::uint32_t seq = 0;
@@ -81,14 +90,23 @@ class SceneCopy final : public ForceModel {
 
   void takeHold(const HandManifold& heard) noexcept;
   void enablePairs(std::size_t first, std::size_t end) noexcept;
-  void mirrorObjects(const WorldView& world, const HandManifold& heard, std::uint32_t seq) noexcept;
+  /// `now` [ticks] of the server.
+  void mirrorObjects(const WorldView& world, const HandManifold& heard, double now) noexcept;
   /// `now` [ticks] of the server.
   void predict(ObjectId object, const ObservedObject& seen, const HandManifold& heard, double now) noexcept;
   /// Null: the object has no mass.
   [[nodiscard]] PredictedBody* bodyOf(ObjectId object) noexcept;
   /// `now` [ticks] of the server.
   void mirror(ObjectId object, const ObservedObject& seen, double now) noexcept;
-  void mirrorOtherHands(const HandManifold& heard) noexcept;
+  /// `now` [ticks] of the server.
+  void mirrorOtherHands(const HandManifold& heard, double now) noexcept;
+  /// The hand pulls no more.
+  void letGo(HandId hand) noexcept;
+  /// The hand pulls its object, towards X_WG.
+  void mirrorHold(const HandPull& pull, const Pose& X_WG) noexcept;
+  /// Of a neighbour's object, heard `ahead` [s] before the present tick.
+  [[nodiscard]] Pose nextGoal(const HandPull& pull, double ahead) noexcept;
+  [[nodiscard]] bool isNeighbours(ObjectId object) const noexcept;
   void setStiffness(HandId hand, const HandStiffness& stiffness) noexcept;
   void listContacts(const HandManifold& heard, std::uint32_t seq) noexcept;
   void compareWithServer(const HandManifold& heard, std::uint32_t seq) noexcept;
@@ -96,11 +114,11 @@ class SceneCopy final : public ForceModel {
   simulation::Environment environment_;
   LocalModel model_;
   WorldView view_;  ///< poses in the copy
-  ServerTime time_;
   std::vector<Mirrored> mirrored_;
   std::vector<PredictedBody> bodies_;
   std::vector<std::uint32_t> body_of_;    ///< by object: index into bodies_, or their number
   std::vector<HandStiffness> stiffness_;  ///< by hand: that the copy has
+  std::vector<Neighbour> neighbours_;     ///< by hand
   std::vector<bool> collides_;            ///< by pair: in the server
   HandManifold contacts_;
   Tick heard_tick_ = 0;
@@ -111,7 +129,6 @@ class SceneCopy final : public ForceModel {
   ObjectId object_;
   std::uint32_t object_epoch_ = 0;
   std::array<PastProxy, 1024> past_{};  ///< by seq modulo its size
-  std::uint32_t playout_ = 0;           ///< [ticks]
   std::uint32_t apart_ = 0;             ///< [cycles] the server's proxy has been elsewhere
   bool following_ = false;
   bool diverged_ = false;

@@ -1,53 +1,59 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "idl/types/ids.h"
+#include "idl/types/messages/contacts.h"
 
 namespace tenon::haptic {
 
 /// Which tick of the server belongs to an input of this station: the one that would use it if there were no
-/// delay. Half of a round trip is taken for the way there; of all answers of the last seconds the one with
-/// the shortest round trip counts, so that jitter and repeats do not shift it.
+/// delay. The answer of the last seconds that took least time, so that jitter and repeats do not shift it,
+/// was half of the round trip on its way. The input that it answers tells nothing: the server keeps inputs
+/// back, and fills ticks between sparse ones. Another epoch of the server begins anew.
 ///
 /// Threads: one. Real-time: everything.
 class ServerTime {
  public:
-  /// Tick `tick` used input `answered` (0: none yet), which the server had kept back for `playout` [ticks],
-  /// and its answer is there when input `seq` is read.
-  void receive(Tick tick, std::uint32_t answered, std::uint32_t seq, std::uint32_t playout) noexcept {
-    if (answered == 0) return;
-    answered += playout;
-    const auto trip = static_cast<std::int32_t>(seq - answered);
-    if (trip < 1 || trip > kLongestTrip) return;
+  /// `round_trip` [s]: shortest of the link, as ClockSync measures it; 0: not known, or none.
+  void setRoundTrip(double round_trip) noexcept {
+    there_ = std::isfinite(round_trip) ? 0.5 * std::clamp(round_trip, 0.0, kLongestTrip) / kTickSeconds : 0.0;
+  }
+  /// `heard` is the newest answer when input `seq` is read.
+  void receive(const HandManifold& heard, std::uint32_t seq) noexcept {
+    if (heard.server_epoch != heard_epoch_) ahead_ = {kUnknown, kUnknown};
+    if (heard.server_epoch == heard_epoch_ && heard.tick == heard_tick_) return;
+    heard_epoch_ = heard.server_epoch;
+    heard_tick_ = heard.tick;
+    if (heard.answers_seq == 0) return;
     if (seq - window_began_ > kWindow) {
-      best_ = {Answer{}, best_[0]};
+      ahead_ = {kUnknown, ahead_[0]};
       window_began_ = seq;
     }
-    // an answer without delay is of the last tick
-    const double there = 0.5 * (trip - 1);
-    if (trip <= best_[0].trip)
-      best_[0] = {trip, static_cast<double>(tick) - static_cast<double>(answered) - there};
+    ahead_[0] = std::max(ahead_[0], static_cast<double>(heard.tick) - static_cast<double>(seq));
   }
-  [[nodiscard]] bool known() const noexcept { return shortest().trip <= kLongestTrip; }
+  [[nodiscard]] bool known() const noexcept { return most() > kUnknown; }
   /// [ticks] of input `seq`; a half counts where the ways differ by a tick. Precondition: known().
   [[nodiscard]] double tickOf(std::uint32_t seq) const noexcept {
-    return static_cast<double>(seq) + shortest().offset;
+    // an answer without delay is of the last tick
+    return static_cast<double>(seq) + most() + 1.0 + there_;
   }
 
  private:
-  static constexpr std::int32_t kLongestTrip = 1000;  // [ticks]
-  static constexpr std::uint32_t kWindow = 2000;      // [ticks] each of two
-  struct Answer {
-    std::int32_t trip = kLongestTrip + 1;  // [ticks]
-    double offset = 0.0;                   // [ticks]
-  };
-  [[nodiscard]] const Answer& shortest() const noexcept {
-    return best_[1].trip < best_[0].trip ? best_[1] : best_[0];
-  }
-  std::array<Answer, 2> best_;  // of this window and of the last one
+  static constexpr double kLongestTrip = 1.0;                                // [s]
+  static constexpr std::uint32_t kWindow = 2000;                             // [ticks] each of two
+  static constexpr double kUnknown = std::numeric_limits<double>::lowest();  // [ticks]
+  [[nodiscard]] double most() const noexcept { return std::max(ahead_[0], ahead_[1]); }
+
+  std::array<double, 2> ahead_{kUnknown, kUnknown};  // [ticks] answer less input, of this window and the last
   std::uint32_t window_began_ = 0;
+  Tick heard_tick_ = 0;
+  std::uint32_t heard_epoch_ = 0;
+  double there_ = 0.0;  // [ticks] of the way to the server
 };
 
 }  // namespace tenon::haptic

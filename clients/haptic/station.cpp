@@ -59,6 +59,12 @@ std::string describe(const StationEvent& event, const std::string& hand_name) {
   return "unknown event" + when;
 }
 
+std::string describe(const HandDevice& device) {
+  char radius[32];
+  std::snprintf(radius, sizeof radius, "%.3f m", device.workspace_radius);
+  return "hand " + device.hand + ": " + device.model + ", workspace radius " + radius;
+}
+
 std::string Station::describe(const StationEvent& event) const {
   const auto found = std::find(hand_ids_.begin(), hand_ids_.end(), event.hand);
   if (!event.hand.valid() || found == hand_ids_.end())
@@ -73,6 +79,8 @@ void Station::welcome(const Welcome& welcome, std::span<const SceneObject> objec
   std::vector<HandId> ids = welcome.hands;
   ids.resize(handNames().size());
   hand_ids_ = ids;
+  hand_objects_ = welcome.objects;
+  hand_objects_.resize(ids.size());
   own_hands_.clear();
   for (const HandId id : ids) {
     if (id.valid()) own_hands_.push_back(id);

@@ -60,6 +60,16 @@ struct StationEvent {
 /// Text for the log; `hand` is the name of the event's hand.
 [[nodiscard]] std::string describe(const StationEvent& event, const std::string& hand);
 
+/// What moves a hand of a station.
+struct HandDevice {
+  std::string hand;               ///< its name
+  std::string model;              ///< DeviceCaps::model
+  double workspace_radius = 0.0;  ///< [m] what the device reaches about C_w (Workspace)
+};
+
+/// Text for the log.
+[[nodiscard]] std::string describe(const HandDevice& device);
+
 /// Haptic processing of one person's station: all devices, hands and, in simulation, the person.
 ///
 /// Independent of threads and network: a program passes received messages to receive(), calls step() each
@@ -80,6 +90,8 @@ class Station {
   /// Join::stiffness, in the order of handNames().
   [[nodiscard]] virtual std::vector<HandStiffness> stiffness() const { return {}; }
   [[nodiscard]] virtual Role role() const = 0;
+  /// Of each hand that is moved by a device with a workspace.
+  [[nodiscard]] virtual std::vector<HandDevice> handDevices() const { return {}; }
 
   /// Called before the first step and after a rejoin with a new seat. `welcome.hands` are in the order of
   /// handNames(); a hand that the scenario lacks has an invalid id and is skipped.
@@ -110,9 +122,10 @@ class Station {
   virtual void setScene(const std::shared_ptr<const simulation::Scene>& /*scene*/) {}
   /// HapticHand::setForceModel of all hands.
   virtual void setForceModel(ForceModelKind /*kind*/) noexcept {}
-  /// `ticks` for which the server keeps inputs of this station back (LinkChoice::playout_ticks); 0 unless
-  /// told.
-  void setLinkPlayout(std::uint32_t ticks) noexcept { link_playout_ = ticks; }
+  /// The one that was set; `manifold` at first.
+  [[nodiscard]] virtual ForceModelKind forceModel() const noexcept { return ForceModelKind::kManifold; }
+  /// Shortest `round_trip` [s] of the link (ServerTime::setRoundTrip); 0 unless told.
+  void setLinkRoundTrip(double round_trip) noexcept { link_round_trip_ = round_trip; }
   /// Whether there is something for armDevices() to do.
   [[nodiscard]] virtual bool wantsArming() const noexcept { return false; }
   /// Resets and arms the devices, if the person has pressed for it. It may block and make texts, so it has a
@@ -161,13 +174,16 @@ class Station {
               std::uint32_t count = 0) noexcept;
   [[nodiscard]] const SceneObject* sceneObject(ObjectId object) const;
   [[nodiscard]] const std::vector<SceneObject>& sceneObjects() const { return objects_; }
+  /// What the hand `index` of handNames() moves while it holds no part; invalid: nothing, or the hand is
+  /// none of the scenario's.
+  [[nodiscard]] ObjectId handObject(std::size_t index) const { return hand_objects_[index]; }
 
   WorldView world_;
   ClientId client_;
   std::uint32_t seq_ = 0;
-  double dt_ = kTickSeconds;        ///< [s] see setCycle()
-  double link_jitter_ = 0.0;        ///< [s]
-  std::uint32_t link_playout_ = 0;  ///< [ticks]
+  double dt_ = kTickSeconds;      ///< [s] see setCycle()
+  double link_jitter_ = 0.0;      ///< [s]
+  double link_round_trip_ = 0.0;  ///< [s]
   FixedVector<DeviceInput, kMaxStationHands> inputs_;
   FixedVector<HandState, kMaxStationHands> states_;
 
@@ -180,6 +196,7 @@ class Station {
   std::uint32_t unpressed_ = 0;  ///< [steps] since a press is awaited
   std::uint32_t faulty_ = 0;     ///< [steps] since a device is in fault
   std::vector<SceneObject> objects_;
+  std::vector<ObjectId> hand_objects_;
   StepState step_;
   FixedVector<HandId, kMaxStationHands> own_hands_;
   std::vector<HandId> hand_ids_;  ///< in the order of handNames()

@@ -7,6 +7,7 @@
 
 #include "clients/observer/observer_program.h"
 #include "idl/wire/network.h"
+#include "idl/wire/session_name.h"
 
 namespace {
 
@@ -21,7 +22,7 @@ int run(int argc, char** argv) {
   unsigned wait = 10;
   app.add_flag("--allow-skips", options.allow_skips, "exit 0 although steps were skipped");
   app.add_flag("--json", options.json, "print one JSON object per line");
-  app.add_option("--session", membership.session, "name of the session; default: the first one announced");
+  tenon::wire::addSessionOption(app, membership.session, tenon::wire::kJoinedSessionHelp);
   app.add_option("--domain", membership.domain, "DDS domain, 0 to 230")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();

@@ -38,6 +38,9 @@ const char* nameOf(Severity severity) {
   }
   return "unknown";
 }
+
+/// Texts of the bus are what people typed: bytes that are not UTF-8 become U+FFFD.
+std::string lineOf(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 }  // namespace
 
 void Observer::printJson(const std::string& line) const {
@@ -51,15 +54,14 @@ void Observer::receive(const StepState& step) {
                     step_.revision != 0;
   step_ = step;
   if (same) return;
-  printJson(Json{{"kind", "step"},
-                 {"tick", step.started},
-                 {"step", step.step},
-                 {"steps", step.steps},
-                 {"name", step.name},
-                 {"phase", nameOf(step.phase)},
-                 {"part", step.part},
-                 {"instruction", localized(step.instruction, options_.language)}}
-                .dump());
+  printJson(lineOf({{"kind", "step"},
+                    {"tick", step.started},
+                    {"step", step.step},
+                    {"steps", step.steps},
+                    {"name", step.name},
+                    {"phase", nameOf(step.phase)},
+                    {"part", step.part},
+                    {"instruction", localized(step.instruction, options_.language)}}));
 }
 
 void Observer::receive(const StepProgress& progress) {
@@ -73,13 +75,12 @@ void Observer::receive(const StepProgress& progress) {
                           {"limit", condition.limit},
                           {"met", condition.met}});
   }
-  printJson(Json{{"kind", "progress"},
-                 {"tick", progress.tick},
-                 {"position_error", progress.position_error},
-                 {"angle_error", progress.angle_error},
-                 {"contact_seconds", progress.contact_seconds},
-                 {"conditions", conditions}}
-                .dump());
+  printJson(lineOf({{"kind", "progress"},
+                    {"tick", progress.tick},
+                    {"position_error", progress.position_error},
+                    {"angle_error", progress.angle_error},
+                    {"contact_seconds", progress.contact_seconds},
+                    {"conditions", conditions}}));
 }
 
 void Observer::receive(const ContactPairs& pairs) {
@@ -88,25 +89,23 @@ void Observer::receive(const ContactPairs& pairs) {
     bool& touching = touching_[{pair.a, pair.b}];
     if (touching == pair.colliding) continue;
     touching = pair.colliding;
-    printJson(Json{{"kind", "contact"},
-                   {"tick", pairs.tick},
-                   {"a", timeline_.titleOf(pair.a)},
-                   {"b", timeline_.titleOf(pair.b)},
-                   {"colliding", pair.colliding},
-                   {"force", pair.F_Ao_W.force.norm()},
-                   {"depth", pair.depth}}
-                  .dump());
+    printJson(lineOf({{"kind", "contact"},
+                      {"tick", pairs.tick},
+                      {"a", timeline_.titleOf(pair.a)},
+                      {"b", timeline_.titleOf(pair.b)},
+                      {"colliding", pair.colliding},
+                      {"force", pair.F_Ao_W.force.norm()},
+                      {"depth", pair.depth}}));
   }
 }
 
 void Observer::receive(const EventLog& event) {
   if (!options_.json) return timeline_.receive(event);
-  printJson(Json{{"kind", "event"},
-                 {"tick", event.tick},
-                 {"severity", nameOf(event.severity)},
-                 {"what", event.kind},
-                 {"text", event.text}}
-                .dump());
+  printJson(lineOf({{"kind", "event"},
+                    {"tick", event.tick},
+                    {"severity", nameOf(event.severity)},
+                    {"what", event.kind},
+                    {"text", event.text}}));
 }
 
 void Observer::receive(const Presence& presence) {
@@ -114,7 +113,7 @@ void Observer::receive(const Presence& presence) {
   bool& alive = participants_[presence.client];
   if (alive == presence.alive) return;
   alive = presence.alive;
-  printJson(Json{{"kind", "person"}, {"name", presence.name}, {"here", presence.alive}}.dump());
+  printJson(lineOf({{"kind", "person"}, {"name", presence.name}, {"here", presence.alive}}));
 }
 
 // without --json the event log reports the stop
@@ -122,16 +121,15 @@ void Observer::receive(const Presence& presence) {
 void Observer::receive(const EmergencyStop& stop) {
   if (!stops_.raise(stop) || !options_.json) return;
   printJson(
-      Json{{"kind", "emergency stop"}, {"engaged", true}, {"who", stop.who}, {"reason", stop.reason}}.dump());
+      lineOf({{"kind", "emergency stop"}, {"engaged", true}, {"who", stop.who}, {"reason", stop.reason}}));
 }
 
 void Observer::receive(const EmergencyClear& cleared) {
   if (!stops_.clear(cleared) || !options_.json) return;
-  printJson(Json{{"kind", "emergency stop"},
-                 {"engaged", stops_.engaged()},
-                 {"who", cleared.who},
-                 {"reason", cleared.reason}}
-                .dump());
+  printJson(lineOf({{"kind", "emergency stop"},
+                    {"engaged", stops_.engaged()},
+                    {"who", cleared.who},
+                    {"reason", cleared.reason}}));
 }
 
 void Observer::receive(const RunState& run) {
@@ -139,12 +137,11 @@ void Observer::receive(const RunState& run) {
   run_ = run;
   if (!options_.json) return timeline_.receive(run);
   if (same) return;
-  printJson(Json{{"kind", "run"},
-                 {"tick", run.tick},
-                 {"phase", runPhaseName(run.phase)},
-                 {"reason", run.reason},
-                 {"final_hash", fmt::format("{:016x}", run.final_hash)}}
-                .dump());
+  printJson(lineOf({{"kind", "run"},
+                    {"tick", run.tick},
+                    {"phase", runPhaseName(run.phase)},
+                    {"reason", run.reason},
+                    {"final_hash", fmt::format("{:016x}", run.final_hash)}}));
 }
 
 }  // namespace tenon::observer

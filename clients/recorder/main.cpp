@@ -5,8 +5,10 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/recorder/recorder_program.h"
+#include "idl/threads/line_printer.h"
 #include "idl/types/output_files.h"
 #include "idl/wire/network.h"
+#include "idl/wire/session_name.h"
 
 namespace {
 
@@ -19,7 +21,7 @@ int run(int argc, char** argv) {
   unsigned wait = 10;
   bool overwrite = false;
   app.add_option("-o,--output", options.file, "file to write, e.g. session.mcap")->required();
-  app.add_option("--session", options.session, "name of the session; default: the first one announced");
+  tenon::wire::addSessionOption(app, options.session, tenon::wire::kJoinedSessionHelp);
   app.add_option("--domain", options.domain, "DDS domain, 0 to 230")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
@@ -41,10 +43,9 @@ int run(int argc, char** argv) {
     return refusal->exit_code;
   }
   options.timeout = std::chrono::seconds(wait);
-  options.report = [](const std::string& text) {
-    std::printf("%s\n", text.c_str());
-    std::fflush(stdout);
-  };
+  // a terminal that stands still does not stop the recording
+  tenon::threads::LinePrinter printer(tenon::threads::LinePrinter::kOutput);
+  options.report = [&printer](const std::string& text) { printer.print(text); };
   // a limit on the size of files is an error of the write, as a full disk is
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGINT, onSignal);

@@ -34,7 +34,8 @@ std::vector<std::string> sessionTopics(bool all) {
   std::vector<std::string> topics;
   for (const wire::TopicName& name : wire::allTopics())
     if (name.topic != wire::kCheckpoint.name && name.topic != wire::kTickInput.name &&
-        name.topic != wire::kSceneObject.name && (all || !StreamReduction::isOmitted(name.topic)))
+        name.topic != wire::kSceneObject.name && !StreamReduction::isCopy(name.topic) &&
+        (all || !StreamReduction::isOmitted(name.topic)))
       topics.emplace_back(name.topic);
   topics.emplace_back(wire::kSceneObject.name);
   return topics;

@@ -18,6 +18,8 @@ bool StreamReduction::isOmitted(std::string_view topic) {
   return topic == wire::kWorldFrame1k.name || topic == wire::kDeviceInput.name;
 }
 
+bool StreamReduction::isCopy(std::string_view topic) { return topic == wire::kHandManifold50.name; }
+
 bool StreamReduction::keeps(const HandManifold& manifold, const wire::RawSample& sample, const Write& write) {
   Candidate& strongest = strongest_[manifold.hand];
   const double force = manifold.F_Ho_W.force.norm();

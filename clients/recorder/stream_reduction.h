@@ -29,6 +29,8 @@ class StreamReduction {
   using Write = std::function<void(const wire::RawSample& sample, Tick tick)>;
 
   [[nodiscard]] static bool isOmitted(std::string_view topic);
+  /// Whether a topic has what another one has, at a lower rate: no recording has it.
+  [[nodiscard]] static bool isCopy(std::string_view topic);
   /// Whether the sample is written by the caller as it is. Others are skipped, or written later.
   [[nodiscard]] bool keeps(const HandManifold& manifold, const wire::RawSample& sample, const Write& write);
   [[nodiscard]] bool keeps(const TickInputPart& part, const wire::RawSample& sample, const Write& write);

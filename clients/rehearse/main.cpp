@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <csignal>
 #include <cstdio>
 #include <map>
 #include <memory>
@@ -16,6 +18,7 @@
 #include "clients/station/device_station.h"
 #include "devices/catalog.h"
 #include "idl/types/cache_folder.h"
+#include "idl/types/number_range.h"
 #include "idl/types/output_files.h"
 #include "server/check/check.h"
 #include "server/game_control/scenario.h"
@@ -23,6 +26,10 @@
 #include "server/simulation/compiled_scene.h"
 
 namespace {
+
+std::atomic<bool> stop_requested = false;
+
+void onStopSignal(int) { stop_requested = true; }
 
 constexpr int kCouldNot = 1;
 constexpr int kWrongUsage = 2;
@@ -38,7 +45,7 @@ const std::map<std::string, tenon::haptic::ForceModelKind> kForceModels{
 
 struct RehearseArguments {
   std::string scenario;
-  tenon::session::LoadOptions load{.cache = tenon::defaultCache()};
+  tenon::session::LoadOptions load{.cache = tenon::defaultCache(), .read = {}, .stop = &stop_requested};
   tenon::rehearse::RehearsalOptions rehearsal;
   std::optional<double> seconds;
   std::vector<std::string> inputs;
@@ -94,7 +101,7 @@ void declare(CLI::App& app, RehearseArguments& arguments) {
                  "limit of the session time [s]; default: 600, or the last row's time with --input");
   app.add_option("--detail", arguments.load.detail,
                  "mesh resolution of generated parts, 0 to 1; 1: that of the paper")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(tenon::numberFrom(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--cache", arguments.load.cache, "folder for generated parts and haptic structures");
   app.add_option("--device", arguments.device, "the instructor's device")
@@ -115,10 +122,12 @@ void declare(CLI::App& app, RehearseArguments& arguments) {
                                        })
       ->expected(0, 1)
       ->group("");
-  app.add_option("--force-model", arguments.force_model,
-                 "contacts that hands render: the server's (manifold), or of a copy of the scene at their\n"
-                 "station (scene-copy)")
-      ->transform(CLI::CheckedTransformer(kForceModels))
+  app.add_option_function<std::string>(
+         "--force-model",
+         [&arguments](const std::string& word) { arguments.force_model = kForceModels.at(word); },
+         "contacts that hands render: the server's (manifold), or of a copy of the scene at their\n"
+         "station (scene-copy)")
+      ->check(CLI::IsMember(kForceModels))
       ->option_text("MODEL");
   app.add_flag("--no-instructor", arguments.alone, "without the instructor");
   app.add_flag("--no-collisions", arguments.no_collisions, "disable collisions with the scene");
@@ -136,7 +145,7 @@ void declare(CLI::App& app, RehearseArguments& arguments) {
 }
 
 int printError(const std::string& what, int exit_code = kCouldNot) {
-  std::fprintf(stderr, "tenon rehearse: %s\n", what.c_str());
+  std::fprintf(stderr, "tenon rehearse: %s\n", stop_requested ? "stopped" : what.c_str());
   return exit_code;
 }
 
@@ -195,6 +204,7 @@ tenon::Result<std::vector<std::unique_ptr<tenon::haptic::Station>>> openStations
 
 void setOptions(RehearseArguments& arguments) {
   arguments.rehearsal.collisions = !arguments.no_collisions;
+  arguments.rehearsal.stop_when = [] { return stop_requested.load(); };
   if (arguments.seconds) arguments.rehearsal.seconds = *arguments.seconds;
   if (arguments.quiet) return;
   arguments.rehearsal.on_event = [](const tenon::EventLog& event) {
@@ -257,6 +267,7 @@ int rehearsePeople(RehearseArguments& arguments) {
   setOptions(arguments);
   const auto report = tenon::rehearse::runRehearsal(*loaded, std::move(*stations), arguments.rehearsal);
   if (!report) return printError(report.error().what);
+  if (stop_requested) return printError({});
   printOutcome(*report);
   return report->completed ? 0 : kCouldNot;
 }
@@ -295,6 +306,7 @@ int rehearseScript(RehearseArguments& arguments) {
   if (log)
     if (const auto closed = log->close(); !closed) return printError(closed.error().what);
   if (!report) return printError(report.error().what);
+  if (stop_requested) return printError({});
   printOutcome(*report);
   const bool endless = loaded->scenario->states.front().line == 0;
   return endless || report->completed ? 0 : kCouldNot;
@@ -316,5 +328,7 @@ int main(int argc, char** argv) {
   }
   if (const std::string wrong = wrongUsage(app, arguments); !wrong.empty())
     return printError(wrong, kWrongUsage);
+  std::signal(SIGINT, onStopSignal);
+  std::signal(SIGTERM, onStopSignal);
   return arguments.inputs.empty() ? rehearsePeople(arguments) : rehearseScript(arguments);
 }

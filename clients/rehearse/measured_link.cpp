@@ -11,8 +11,10 @@ void MeasuredLink::deliver(Tick now, haptic::Station& station) {
   link_.deliverAnswers(now, [&](const ClockSync& answer) { clock_.receive(answer, nanoseconds(now)); });
   if (now % kPeriod != 0) return;
   measure(now);
-  station.setLinkJitter(choice_.jitter);
-  station.setLinkPlayout(choice_.playout_ticks);
+  rates_.step(round_trip_, station.forceModel(),
+              clock_.lossKnown() ? std::optional(choice_.loss) : std::nullopt);
+  station.setLinkJitter(choice_.jitter + rates_.allowance());
+  station.setLinkRoundTrip(round_trip_);
 }
 
 void MeasuredLink::measure(Tick now) {
@@ -22,20 +24,31 @@ void MeasuredLink::measure(Tick now) {
   choice_ = chooser_.step({.input_gap = telemetry.input_gap,
                            .trip_jitter = telemetry.trip_jitter,
                            .age_jitter = telemetry.jitter,
-                           .inputs_lost = telemetry.inputs_lost});
+                           .inputs_lost = telemetry.inputs_lost,
+                           .input_period = rates_.inputPeriod(1)});
   round_trip_ = telemetry.clock_known ? telemetry.round_trip : 0.0;
 }
 
 void MeasuredLink::send(std::span<const DeviceInput> inputs, Tick now) {
-  for (DeviceInput input : inputs) {
-    input.earlier.resize(std::min<std::size_t>(input.earlier.size(), choice_.playout_ticks));
-    link_.send(input, now);
-  }
   const auto seq = static_cast<std::uint32_t>(now);
-  clock_.sent(seq, static_cast<std::uint32_t>(inputs.size()));
+  std::uint32_t sent = 0;
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    const auto input = pacer_.due(inputs[i], i, seq, rates_, choice_.playout_ticks);
+    if (!input) continue;
+    link_.send(*input, now);
+    ++sent;
+  }
+  clock_.sent(seq, sent);
   ages_.inputSent(seq, nanoseconds(now), nanoseconds(1));
   ClockSync request;
   if (clock_.ask({}, nanoseconds(now), request)) link_.sendRequest(request, now);
+}
+
+void MeasuredLink::send(const session::OutgoingMessages& outgoing, Tick now) {
+  const bool slow = rates_.slowAnswers();
+  for (const WorldFrame& frame : slow ? outgoing.frames_100 : outgoing.frames) link_.send(frame, now);
+  for (const HandManifold* manifold : slow ? outgoing.manifolds_50 : outgoing.manifolds)
+    link_.send(*manifold, now);
 }
 
 void MeasuredLink::receive(Tick now, ClientId client, session::SessionRegistry& registry,
@@ -52,6 +65,7 @@ void MeasuredLink::receive(Tick now, ClientId client, session::SessionRegistry& 
     gaps_.received(nanoseconds(now));
     newest_seq_ = std::max(newest_seq_, input.sample.seq);
     buffer_.setPlayout(input.hand, choice_.playout_ticks);
+    buffer_.setPeriod(input.hand, input.period);
     // those before it whose own messages are lost or late
     DeviceInput one = input;
     for (std::size_t i = input.earlier.size(); i-- > 0 && choice_.playout_ticks > 0;) {

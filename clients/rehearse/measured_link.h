@@ -4,17 +4,21 @@
 #include <functional>
 
 #include "clients/haptic/force_age_statistics.h"
+#include "clients/haptic/input_pacer.h"
 #include "clients/haptic/limit_chooser.h"
 #include "clients/haptic/link_clock.h"
+#include "clients/haptic/rate_chooser.h"
 #include "clients/rehearse/simulated_link.h"
 #include "server/session/gap_meter.h"
 #include "server/session/input_buffer.h"
+#include "server/session/publisher.h"
 #include "server/session/session_registry.h"
 
 namespace tenon::rehearse {
 
-/// A simulated link whose station measures it and asks for limits, and whose server repeats lost samples from
-/// later inputs, as both do in real time. Clocks are that of the ticks.
+/// A simulated link whose station measures it and chooses limits and rates, and whose server repeats lost
+/// samples from later inputs and fills what is between sparse ones, as both do in real time. Clocks are that
+/// of the ticks.
 ///
 /// Threads: one. Real-time: no.
 class MeasuredLink {
@@ -34,10 +38,8 @@ class MeasuredLink {
   void receive(Tick now, ClientId client, session::SessionRegistry& registry,
                FixedVector<session::HandReading, session::kMaxHands>& readings,
                const std::function<void(const DeviceInput&, const std::string&)>& refused);
-  template <class Message>
-  void send(const Message& message, Tick now) {
-    link_.send(message, now);
-  }
+  /// What a tick publishes, of the tier that the station has chosen.
+  void send(const session::OutgoingMessages& outgoing, Tick now);
 
  private:
   static constexpr Tick kPeriod = 1000;  ///< [ticks] between two choices
@@ -50,6 +52,8 @@ class MeasuredLink {
   haptic::ForceAgeStatistics ages_;
   haptic::LimitChooser chooser_;
   haptic::LinkChoice choice_;
+  haptic::RateChooser rates_;
+  haptic::InputPacer pacer_;
   double round_trip_ = 0.0;  ///< [s] 0: not known
   session::InputBuffer buffer_;
   session::GapMeter gaps_;

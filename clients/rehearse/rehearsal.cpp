@@ -147,11 +147,12 @@ class Rehearsal {
       haptic::Station& station = *stations_[i];
       if (outgoing.events.step) station.receive(*outgoing.events.step);
       for (const CollisionMatrix& matrix : outgoing.events.matrix) station.receive(matrix);
-      const auto deliver = [&](const auto& message) {
-        links_[i] ? links_[i]->send(message, simulation_.now()) : static_cast<void>(station.receive(message));
-      };
-      for (const WorldFrame& frame : outgoing.frames) deliver(frame);
-      for (const HandManifold* manifold : outgoing.manifolds) deliver(*manifold);
+      if (links_[i]) {
+        links_[i]->send(outgoing, simulation_.now());
+        continue;
+      }
+      for (const WorldFrame& frame : outgoing.frames) station.receive(frame);
+      for (const HandManifold* manifold : outgoing.manifolds) station.receive(*manifold);
     }
     if (outgoing.events.run) reason_ = outgoing.events.run->reason;
     if (!options_.on_event) return;

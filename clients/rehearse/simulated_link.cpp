@@ -27,12 +27,10 @@ void SimulatedLink::send(const DeviceInput& input, Tick now) {
 }
 
 void SimulatedLink::send(const WorldFrame& frame, Tick now) {
-  if (now % down_period_ != 0) return;
   if (const auto arrival = down_.arrival(now)) frames_.put(frame, *arrival + 1);
 }
 
 void SimulatedLink::send(const HandManifold& manifold, Tick now) {
-  if (now % down_period_ != 0) return;
   if (const auto arrival = down_.arrival(now)) manifolds_.put(manifold, *arrival + 1);
 }
 

@@ -23,7 +23,6 @@ struct LinkConditions {
   double loss = 0.0;  ///< [-] share of the messages that are lost, below 1
   Tick burst = 0;     ///< [ticks] mean length of a gap in which all are lost; 0: each is lost by itself
   std::uint64_t seed = 1;
-  Tick down_period = 1;  ///< [ticks] between the frames and manifolds that the server sends
 };
 
 /// One direction of a link: which messages arrive, and when.
@@ -79,8 +78,7 @@ class DelayLine {
 class SimulatedLink {
  public:
   explicit SimulatedLink(const LinkConditions& options)
-      : down_period_(options.down_period),
-        up_(options, 2 * options.seed),
+      : up_(options, 2 * options.seed),
         down_(options, 2 * options.seed + 1),
         requests_up_(options, ~(2 * options.seed)),
         answers_down_(options, ~(2 * options.seed + 1)) {}
@@ -106,7 +104,6 @@ class SimulatedLink {
   void deliverAnswers(Tick now, const std::function<void(const ClockSync&)>& take);
 
  private:
-  Tick down_period_;
   LinkDirection up_, down_;
   LinkDirection requests_up_, answers_down_;  ///< of their own: measuring loses no other message
   DelayLine<DeviceInput> inputs_;

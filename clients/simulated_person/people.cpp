@@ -25,7 +25,7 @@ HandPerception perceive(const haptic::HapticHand* hand, double reach) {
     perception.object = hand->local().manifold().object;
     perception.X_HO = hand->local().manifold().X_HO;
   }
-  perception.p_WC = hand->input().p_WC;
+  perception.p_WC = hand->state().p_WC;
   perception.reach = reach * hand->caps().workspace_radius;
   perception.declutches = hand->caps().declutch != 0;
   perception.indexing = hand->state().indexing;

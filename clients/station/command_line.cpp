@@ -3,7 +3,9 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <istream>
 #include <map>
+#include <memory>
 #include <set>
 #include <vector>
 
@@ -12,8 +14,10 @@
 
 #include "clients/haptic/seat_file.h"
 #include "idl/types/cache_folder.h"
+#include "idl/types/printable_text.h"
 #include "idl/wire/identity.h"
 #include "idl/wire/network.h"
+#include "idl/wire/session_name.h"
 
 namespace tenon::station {
 
@@ -53,6 +57,28 @@ void refuseFormerOptions(CLI::App& app) {
   refuse("--swap-hands", "--hands left,right");
 }
 
+/// Reads `--station`: a line that is no option is an error, where CLI11 does without it.
+class StationFile : public CLI::ConfigTOML {
+ public:
+  explicit StationFile(const CLI::App& app) : app_(app) {}
+
+  std::vector<CLI::ConfigItem> from_config(std::istream& input) const override {
+    auto items = CLI::ConfigTOML::from_config(input);
+    for (const CLI::ConfigItem& item : items) {
+      const bool is_known = item.parents.empty() && (app_.get_option_no_throw("--" + item.name) != nullptr ||
+                                                     app_.get_option_no_throw(item.name) != nullptr);
+      if (!is_known)
+        throw CLI::ConfigError("'" + shortened(printable(item.fullname()), 60) +
+                               "' is no option; expected a line `option = value` each, as in: device = "
+                               "falcon-sim");
+    }
+    return items;
+  }
+
+ private:
+  const CLI::App& app_;
+};
+
 /// A check of a name: what is wrong with it, or nothing.
 template <class Check>
 auto named(Check check) {
@@ -67,6 +93,7 @@ void declareStation(CLI::App& app, Typed& typed) {
   app.set_help_flag("-h,--help", "print this help");
   app.set_config("--station", "",
                  "file with these options, a line `option = value` each; options typed as well win");
+  app.config_formatter(std::make_shared<StationFile>(app));
   app.add_option("--role", typed.role, "what the person is")
       ->required()
       ->check(CLI::IsMember({"trainee", "instructor"}));
@@ -125,7 +152,7 @@ void declarePerson(CLI::App& app, Typed& typed) {
 void declareProgram(CLI::App& app, Typed& typed) {
   haptic::StationProgramOptions& program = typed.program;
   wire::MembershipOptions& membership = program.membership;
-  app.add_option("--session", membership.session, "name of the session; default: the first one announced");
+  wire::addSessionOption(app, membership.session, wire::kJoinedSessionHelp);
   app.add_option("--domain", membership.domain, "DDS domain, 0 to 230")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
@@ -143,11 +170,11 @@ void declareProgram(CLI::App& app, Typed& typed) {
       {"auto", haptic::ForceModelWish::kAuto},
       {"manifold", haptic::ForceModelWish::kManifold},
       {"scene-copy", haptic::ForceModelWish::kSceneCopy}};
-  app.add_option(
-         "--force-model", program.force_model,
+  app.add_option_function<std::string>(
+         "--force-model", [&program](const std::string& word) { program.force_model = kWishes.at(word); },
          "contacts that hands render: the server's (manifold), or those of this station's own copy of "
          "the scene (scene-copy); auto: the copy if it is there and the round trip is above 4 ms")
-      ->transform(CLI::CheckedTransformer(kWishes))
+      ->check(CLI::IsMember(kWishes))
       ->option_text("auto|manifold|scene-copy");
   app.add_option("--assets", program.scene.url,
                  "where the compiled scene is fetched that the cache does not have: a console at the server")
@@ -333,6 +360,10 @@ CommandLine readCommandLine(int argc, char** argv) {
       "2 wrong usage.");
   try {
     app.parse(argc, argv);
+  } catch (const CLI::ConfigError& error) {
+    return {std::nullopt,
+            printError("--station " + app.get_config_ptr()->as<std::string>() + ": " + error.what(),
+                       kWrongUsage)};
   } catch (const CLI::ParseError& error) {
     return {std::nullopt, app.exit(error) == 0 ? 0 : kWrongUsage};
   }

@@ -25,22 +25,16 @@ struct TrackedHand {
 constexpr std::array kTracked{TrackedHand{TrackedBody::kForearm, "forearm"},
                               TrackedHand{TrackedBody::kHead, "head"}};
 
-/// Where a hand starts: at the first object of the kind that it moves at first; else at a fixed place.
-Pose startOf(std::span<const SceneObject> objects, std::string_view hand, Role role) {
-  std::string_view kind = "pointer";
-  Vector3 place(0.3, -0.35, 1.0);
-  if (role == Role::kInstructor) {
-    kind = "assistant";
-    place = Vector3(-0.1, -0.3, 1.25);
-  } else if (hand == "left") {
-    kind = "tool";
-    place = Vector3(-0.3, -0.35, 1.0);
-  }
-  for (const SceneObject& object : objects) {
-    if (object.kind == kind) return Pose(object.X_WO.translation());
-  }
-  return Pose(place);
+/// Where the hand `index` starts: at the object that it moves at first, else at a fixed place.
+Pose startOf(std::span<const SceneObject> objects, ObjectId moved, std::size_t index) {
+  const auto found = std::find_if(objects.begin(), objects.end(),
+                                  [moved](const SceneObject& object) { return object.object == moved; });
+  return Pose(found != objects.end() ? found->X_WO.translation()
+                                     : Vector3(index == 1 ? -0.3 : 0.3, -0.35, 1.0));
 }
+
+// [ticks] of a body part's inputs: it feels vibrations, and moves nothing that a hand holds
+constexpr std::uint8_t kTrackedPeriod = 4;
 
 /// Fills the input of a tracked body part at X_WH; its velocity is a difference quotient.
 void track(DeviceInput& input, std::uint32_t seq, const Pose& X_WH, const haptic::WorldView& world) {
@@ -49,6 +43,7 @@ void track(DeviceInput& input, std::uint32_t seq, const Pose& X_WH, const haptic
   input.sample = {
       seq, X_WH, first ? Twist{} : Twist{moved.translation / kTickSeconds, moved.rotation / kTickSeconds}, 0};
   input.active = true;
+  input.period = kTrackedPeriod;
   input.server_epoch = world.serverEpoch();
 }
 
@@ -230,6 +225,15 @@ std::vector<HandStiffness> DeviceStation::stiffness() const {
 
 Role DeviceStation::role() const { return parts_->options.role; }
 
+std::vector<haptic::HandDevice> DeviceStation::handDevices() const {
+  std::vector<haptic::HandDevice> all;
+  for (std::size_t i = 0; i < parts_->arms.size(); ++i) {
+    const devices::DeviceCaps& caps = parts_->arms[i].device->caps();
+    all.push_back({parts_->options.hands[i], caps.model, caps.workspace_radius});
+  }
+  return all;
+}
+
 void DeviceStation::beginHand(std::size_t index, HandId id) {
   Arm& arm = parts_->arms[index];
   haptic::MovedHand& moved = parts_->moved[index];
@@ -238,7 +242,7 @@ void DeviceStation::beginHand(std::size_t index, HandId id) {
   arm.hand.reset();
   moved.hand = nullptr;
   moved.intent = {};
-  moved.X_WStart = startOf(sceneObjects(), moved.name, parts_->options.role);
+  moved.X_WStart = startOf(sceneObjects(), handObject(index), index);
   if (!id.valid()) return;
   arm.hand = std::make_unique<haptic::HapticHand>(*arm.device, arm.clutch);
   haptic::HapticHand& hand = *arm.hand;
@@ -276,6 +280,8 @@ void DeviceStation::setScene(const std::shared_ptr<const simulation::Scene>& sce
   for (Arm& arm : parts_->arms)
     if (arm.hand) arm.hand->setScene(scene);
 }
+
+haptic::ForceModelKind DeviceStation::forceModel() const noexcept { return parts_->force_model; }
 
 void DeviceStation::setForceModel(haptic::ForceModelKind kind) noexcept {
   parts_->force_model = kind;
@@ -342,7 +348,7 @@ void DeviceStation::step(std::uint32_t seq) noexcept {
   for (Arm& arm : parts_->arms) {
     if (!arm.hand) continue;
     arm.hand->setLinkJitter(link_jitter_);
-    arm.hand->setLinkPlayout(link_playout_);
+    arm.hand->setLinkRoundTrip(link_round_trip_);
     arm.hand->step(seq, world_, dt_);
     report(*arm.hand);
     inputs_.push_back(arm.hand->input());
@@ -384,7 +390,7 @@ void DeviceStation::trackBody(std::uint32_t seq) noexcept {
   const haptic::HapticHand* const wearer = wearing_arm == arms.end() ? nullptr : wearing_arm->hand.get();
   devices::BodyTracker* const simulated = devices::simulatedBodyTracker(*parts_->tracker);
   if (simulated != nullptr && wearer != nullptr) {
-    parts_->posture.step(wearer->pose(), wearer->input().p_WC, kTickSeconds);
+    parts_->posture.step(wearer->pose(), wearer->state().p_WC, kTickSeconds);
     simulated->place(TrackedBody::kForearm, parts_->posture.forearm());
     simulated->place(TrackedBody::kHead, parts_->posture.head());
   }
@@ -406,7 +412,7 @@ void DeviceStation::trackBody(std::uint32_t seq) noexcept {
     state.hand = input.hand;
     state.seq = seq;
     state.X_WH = state.X_WO_local = input.sample.X_WH;
-    if (wearer != nullptr) state.p_WC = wearer->input().p_WC;
+    if (wearer != nullptr) state.p_WC = wearer->state().p_WC;
     if (kTracked[i].body == TrackedBody::kForearm && parts_->bracelet)
       state.tactors = parts_->bracelet->intensities();
     states_.push_back(state);

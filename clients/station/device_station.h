@@ -62,9 +62,11 @@ class DeviceStation : public haptic::Station {
   [[nodiscard]] std::vector<std::string> handNames() const override;
   [[nodiscard]] std::vector<HandStiffness> stiffness() const override;
   [[nodiscard]] Role role() const override;
+  [[nodiscard]] std::vector<haptic::HandDevice> handDevices() const override;
   void step(std::uint32_t seq) noexcept override;
   void setScene(const std::shared_ptr<const simulation::Scene>& scene) override;
   void setForceModel(haptic::ForceModelKind kind) noexcept override;
+  [[nodiscard]] haptic::ForceModelKind forceModel() const noexcept override;
   using haptic::Station::receive;
   void receive(const CollisionMatrix& matrix) noexcept override;
   [[nodiscard]] bool wantsArming() const noexcept override;

@@ -7,8 +7,12 @@
 #include "clients/haptic/station_program.h"
 #include "clients/station/command_line.h"
 #include "clients/station/device_station.h"
+#include "idl/threads/line_printer.h"
+#include "idl/types/printable_text.h"
 
 namespace {
+
+constexpr std::size_t kLongestLine = 1000;  // [bytes]
 
 void print(const std::string& text) { std::fprintf(stderr, "tenon-join: %s\n", text.c_str()); }
 
@@ -26,9 +30,13 @@ int run(int argc, char** argv) {
   }
   tenon::haptic::StationProgramOptions& program = line.arguments->program;
   program.read_keys = isatty(STDIN_FILENO) != 0;
-  program.print = print;
+  // the thread that prints also hears the emergency stop, whose text comes from whoever is on the bus
+  tenon::threads::LinePrinter printer(tenon::threads::LinePrinter::kError);
+  program.print = [&printer](const std::string& text) {
+    printer.print("tenon-join: " + tenon::printable(tenon::shortened(text, kLongestLine)));
+  };
   const auto ended = tenon::haptic::runStation(**station, program, tenon::haptic::stopSignal());
-  if (!ended) print(ended.error().what);
+  if (!ended) program.print(ended.error().what);
   return ended ? 0 : 1;
 }
 

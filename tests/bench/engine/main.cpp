@@ -13,6 +13,7 @@
 #include "clients/report/page.h"
 #include "clients/report/page_data.h"
 #include "idl/types/cache_folder.h"
+#include "idl/types/number_range.h"
 #include "idl/types/output_files.h"
 #include "server/session/scene_loader.h"
 #include "tests/bench/engine/bench_scene.h"
@@ -178,7 +179,7 @@ int run(int argc, char** argv) {
   app.add_option("--scenario", arguments.scenario, "folder of the engine bay's scenario");
   app.add_option("--detail", arguments.detail,
                  "level of detail of the generated parts, 0 to 1; 1 is the paper's scene")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(tenon::numberFrom(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--rounds", arguments.rounds, "number of queries per pose; the smallest time counts")
       ->check(CLI::Range(1, 1000))

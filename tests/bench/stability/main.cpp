@@ -17,7 +17,6 @@ namespace {
 struct Arguments {
   std::filesystem::path cache = defaultCache();
   std::uint64_t seed = 1;
-  Tick down_period = 1;
   std::vector<Tick> delays{0, 1, 5, 25, 50, 100};
   std::vector<std::string> only, models, losses;
   std::string json, plot;
@@ -46,7 +45,7 @@ Result<void> measureAll(const Arguments& arguments) {
   std::vector<RigLoss> losses = rigLosses();
   keep(losses, arguments.losses, [](const RigLoss& one) { return one.name; });
 
-  StabilityRig rig(arguments.seed, arguments.down_period);
+  StabilityRig rig(arguments.seed);
   std::vector<RigCell> cells;
   const bool is_terminal = isatty(STDERR_FILENO) == 1;
   for (const RigSituation& situation : *situations)
@@ -92,10 +91,6 @@ int run(int argc, char** argv) {
   app.add_option("--loss", arguments.losses, "only these losses")
       ->delimiter(',')
       ->check(CLI::IsMember(losses));
-  app.add_option("--down-period", arguments.down_period,
-                 "between frames and manifolds of the server over a link [ms]")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 100));
   app.add_option("--json", arguments.json, "writes the tables as JSON to this file");
   app.add_option("--plot", arguments.plot, "writes the diagrams as SVG to this file");
   app.add_option("--cache", arguments.cache, "folder of baked structures")->capture_default_str();

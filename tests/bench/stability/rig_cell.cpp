@@ -222,11 +222,8 @@ double fullStiffness() { return haptic::stiffnessOf(devices::sigma7Model().caps)
 Result<RigCell> StabilityRig::measure(const RigSituation& situation, RigModel model, Tick delay,
                                       const RigLoss& loss) {
   RigCell cell{.situation = situation.name, .model = model, .delay = delay, .loss = loss.name};
-  const rehearse::LinkConditions link{.delay = delay,
-                                      .jitter = loss.share > 0.0 ? delay / 10 : 0,
-                                      .loss = loss.share,
-                                      .burst = loss.burst,
-                                      .down_period = down_period_};
+  const rehearse::LinkConditions link{
+      .delay = delay, .jitter = loss.share > 0.0 ? delay / 10 : 0, .loss = loss.share, .burst = loss.burst};
 
   // ---- the same path with and without the link
   std::vector<Vector3>& reference = references_[situation.name];

@@ -49,15 +49,13 @@ struct RigCell {
 /// Threads: one. Real-time: no.
 class StabilityRig {
  public:
-  /// `down_period` [ticks] between the frames and manifolds over a link.
-  explicit StabilityRig(std::uint64_t seed, Tick down_period = 1) : seed_(seed), down_period_(down_period) {}
+  explicit StabilityRig(std::uint64_t seed) : seed_(seed) {}
 
   [[nodiscard]] Result<RigCell> measure(const RigSituation& situation, RigModel model, Tick delay,
                                         const RigLoss& loss);
 
  private:
   std::uint64_t seed_;
-  Tick down_period_;
   std::map<std::string, std::vector<Vector3>> references_;  ///< [N] forces without delay, by situation
 };
 

@@ -34,7 +34,7 @@ void RigStation::step(std::uint32_t seq) noexcept {
   inputs_.clear();
   if (model_ == RigModel::kStreamed || model_ == RigModel::kStreamedPassive) return stepStreamed(seq);
   hand_.setLinkJitter(link_jitter_);
-  hand_.setLinkPlayout(link_playout_);
+  hand_.setLinkRoundTrip(link_round_trip_);
   hand_.step(seq, world_, dt_);
   inputs_.push_back(hand_.input());
 }

@@ -37,6 +37,10 @@ class RigStation final : public haptic::Station {
   [[nodiscard]] Role role() const override { return Role::kTrainee; }
   [[nodiscard]] Result<void> armDevices() override { return {}; }
   void setScene(const std::shared_ptr<const simulation::Scene>& scene) override { hand_.setScene(scene); }
+  [[nodiscard]] haptic::ForceModelKind forceModel() const noexcept override {
+    return model_ == RigModel::kSceneCopy ? haptic::ForceModelKind::kSceneCopy
+                                          : haptic::ForceModelKind::kManifold;
+  }
   using haptic::Station::receive;
   void receive(const CollisionMatrix& matrix) noexcept override { hand_.receive(matrix); }
   void step(std::uint32_t seq) noexcept override;

@@ -240,7 +240,7 @@ RigSituation freePart() {
 }
 std::string freeObjects() {
   return movedBox("block", {kBlock, kBlock, kBlock}, {-0.3, 0.0, 0.0}, kPointer) +
-         movedBox("part", {kBlock, kBlock, kBlock}, {-0.03, 0.0, 0.0},
+         movedBox("part", {kBlock, 0.1, 0.1}, {-0.03, 0.0, 0.0},
                   "    status: free\n    body: {mass: 1 kg, floating: true, damping: 10}\n");
 }
 

@@ -59,7 +59,7 @@ INSTANTIATE_TEST_SUITE_P(Stability, AgainstWhatStandsStill,
                          testing::Values(StillCell{"wall", 0, "10%", 0.01}, StillCell{"wall", 25, "2%", 0.01},
                                          StillCell{"wall", 100, "10%", 0.2},
                                          StillCell{"corner", 5, "2%", 0.01},
-                                         StillCell{"corner", 100, "0", 0.1}));
+                                         StillCell{"corner", 100, "0", 0.12}));
 
 class CopyAgainstWhatStandsStill : public testing::TestWithParam<StillCell> {};
 
@@ -82,10 +82,10 @@ TEST(Stability, ACopyOfTheSceneExpectsWhereAMovingPartIs) {
   constexpr double kAcceleration = 4.0, kDelay = 0.025;  // [m/s^2], [s]
   const RigCell cell = cellOf("moving", RigModel::kSceneCopy, 25, "0");
   EXPECT_EQ(cell.stiffness, fullStiffness());
-  // another person holds it: in the server it gives way to the hand that is late there
-  EXPECT_TRUE(test::knownShortfall(cell.mean_error, 0.1, 0.35));
+  // another person holds it, and in the server it gives way to the hand that is late there
+  EXPECT_LT(cell.mean_error, 0.1);
   const double promised = fullStiffness() * extrapolationError(kAcceleration, kDelay) + 0.5;  // [N]
-  EXPECT_TRUE(test::knownShortfall(cell.peak_error, promised, 4.6));
+  EXPECT_TRUE(test::knownShortfall(cell.peak_error, promised, 7.5)) << "goals are up to 20 ms older";
 }
 
 //   which only tells something if the rig finds what is unstable

@@ -244,11 +244,11 @@ TEST(ForceReturnOffset, IsSentAndDecaysOutOfContactAlone) {
   const Vector3 offset = setup.hand.workspace().shifted();
   EXPECT_GT(offset.z(), 0.002);
   const DeviceInput& input = setup.hand.input();
-  EXPECT_EQ(input.p_WC, setup.hand.workspace().centre());
-  EXPECT_NEAR((input.p_WC - centre - offset).norm(), 0.0, 1e-9);
-  EXPECT_NEAR((input.sample.X_WH.translation() - input.p_WC - setup.hand.device().X_DH.translation()).norm(),
-              0.0, 1e-12);
-  EXPECT_EQ(setup.hand.state().p_WC, input.p_WC);
+  const Vector3& p_WC = setup.hand.state().p_WC;
+  EXPECT_EQ(p_WC, setup.hand.workspace().centre());
+  EXPECT_NEAR((p_WC - centre - offset).norm(), 0.0, 1e-9);
+  EXPECT_NEAR((input.sample.X_WH.translation() - p_WC - setup.hand.device().X_DH.translation()).norm(), 0.0,
+              1e-12);
   EXPECT_LT(input.sample.V_WH.linear.norm(), 0.01);
 
   ASSERT_TRUE(setup.hand.inContact());

@@ -34,7 +34,7 @@ TEST_P(HapticHandWithDevice, SendsItsNewestReading) {
   const DeviceInput& input = setup.hand.input();
   EXPECT_TRUE(input.active);
   EXPECT_EQ(input.sample.seq, 10U);
-  EXPECT_EQ(input.p_WC, setup.hand.workspace().centre());
+  EXPECT_EQ(setup.hand.state().p_WC, setup.hand.workspace().centre());
 }
 
 /// Keeps what its owner would see.

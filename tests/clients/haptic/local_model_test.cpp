@@ -73,6 +73,27 @@ TEST(LocalModel, MovesContactPlanesWithTheirBodies) {
   EXPECT_NEAR(wrench.force.z(), 2.0, 0.1);
 }
 
+//   the floor was heard at rest height, rising at `speed`; the hand stays where its ball just touches
+double proxyHeight(double speed, double ticks_ahead) {
+  BallAboveFloor setup(1000.0);
+  setup.receive(BallAboveFloor::at(0.012));
+  HandManifold manifold = setup.server.manifold(++setup.tick, BallAboveFloor::at(0.012));
+  for (ManifoldContact& contact : manifold.contacts)
+    contact.velocity_W = Vector3(0.0, 0.0, speed).cast<float>();
+  setup.world.receive(setup.server.frame(setup.tick));
+  setup.model.receive(manifold);
+  setup.model.expectAt(static_cast<double>(setup.tick) + ticks_ahead);
+  return setup.model.step(BallAboveFloor::at(0.012), setup.world).X_WO.translation().z();
+}
+
+TEST(LocalModel, ExpectsPlanesWhereTheirBodiesAreByNow) {
+  EXPECT_NEAR(proxyHeight(0.1, 0.0), 0.012, 1e-8);
+  EXPECT_NEAR(proxyHeight(0.1, 10.0), 0.013, 1e-6);
+  EXPECT_NEAR(proxyHeight(0.1, -5.0), 0.012, 1e-8) << "a frame that is ahead";
+  EXPECT_NEAR(proxyHeight(0.1, 100.0), 0.012 + 0.1 * LocalModel::kLongestExpectation, 1e-6);
+  EXPECT_NEAR(proxyHeight(0.009, 10.0), 0.012, 1e-8) << "what gives way is not pushed on";
+}
+
 TEST(LocalModel, LimitsTheStiffnessToThatOfTheDevice) {
   BallAboveFloor setup(5000.0, 2000.0);
   setup.receive(BallAboveFloor::at(0.012));

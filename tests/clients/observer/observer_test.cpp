@@ -50,6 +50,33 @@ TEST(Observer, PrintsOneJsonObjectPerLine) {
   EXPECT_EQ(kinds, (std::vector<std::string>{"step", "run"}));
 }
 
+// A name in Latin-1: \xfc is u umlaut there, and no UTF-8.
+TEST(Observer, PrintsTextsThatAreNotUtf8AsJsonAllTheSame) {
+  MemoryFile output;
+  Observer observer({.json = true, .out = output.file()});
+  const std::string latin = "J\xfcrg", replaced = "J\xef\xbf\xbdrg";
+  Presence presence;
+  presence.client = ClientId(1);
+  presence.name = latin;
+  presence.alive = true;
+  observer.receive(presence);
+  observer.receive(EventLog{.kind = "note", .text = latin + ": hallo"});
+  observer.receive(EmergencyStop{.client_guid = "a", .counter = 1, .who = latin, .reason = latin});
+  observer.receive(EmergencyClear{.client_guid = "a", .counter = 1, .who = latin, .reason = latin});
+  RunState run;
+  run.phase = RunPhase::kFailed;
+  run.reason = latin;
+  observer.receive(run);
+  std::istringstream lines(output.text());
+  std::string line;
+  std::vector<std::string> texts;
+  while (std::getline(lines, line))
+    for (const char* key : {"name", "text", "who", "reason"})
+      if (const auto json = nlohmann::json::parse(line); json.contains(key)) texts.push_back(json.at(key));
+  EXPECT_EQ(texts, (std::vector<std::string>{replaced, replaced + ": hallo", replaced, replaced, replaced,
+                                             replaced, replaced}));
+}
+
 TEST(Observer, IsOverWithTheRunAndItsExitCodeIsTheOutcome) {
   MemoryFile output;
   Observer observer({.out = output.file()});

@@ -74,6 +74,37 @@ TEST(DeviceStation, HasTheHandsOfItsDevicesArmsAndOfItsTracker) {
   EXPECT_THAT(names(named), ElementsAre("tool", "lamp"));
 }
 
+TEST(DeviceStation, EachHandBeginsAtTheObjectThatItMovesWhateverItsName) {
+  StationOptions options = withDevices({"hug-sim"}, PersonKind::kNone);
+  options.hands = {"lamp", "screwdriver"};
+  const auto station = std::move(*DeviceStation::open(options));
+  std::vector<SceneObject> objects(3);
+  for (std::uint32_t i = 0; i < objects.size(); ++i) {
+    objects[i].object = ObjectId{i};
+    objects[i].kind = i == 0 ? "pointer" : "tool";
+    objects[i].X_WO = Pose(Vector3(0.1 * i, -0.3, 1.1));
+  }
+  Welcome welcome;
+  welcome.accepted = true;
+  welcome.client = ClientId{1};
+  welcome.server_epoch = 1;
+  for (std::uint32_t i = 0; i < station->handNames().size(); ++i) welcome.hands.push_back(HandId{i});
+  welcome.objects = {ObjectId{2}, ObjectId{1}};
+  station->welcome(welcome, objects);
+  station->step(1);
+  EXPECT_LT((station->inputs()[0].sample.X_WH.translation() - Vector3(0.2, -0.3, 1.1)).norm(), 1e-6);
+  EXPECT_LT((station->inputs()[1].sample.X_WH.translation() - Vector3(0.1, -0.3, 1.1)).norm(), 1e-6);
+}
+
+TEST(DeviceStation, TellsWhatMovesEachHandAndHowFarItReaches) {
+  std::vector<std::string> told;
+  for (const haptic::HandDevice& device :
+       (*DeviceStation::open(defaultStation(Role::kTrainee)))->handDevices())
+    told.push_back(describe(device));
+  EXPECT_THAT(told, ElementsAre("hand right: HUG arm (simulated), workspace radius 0.400 m",
+                                "hand left: HUG arm (simulated), workspace radius 0.400 m"));
+}
+
 TEST(DeviceStation, RefusesHandsThatDoNotFitItsArms) {
   StationOptions options = withDevices({"falcon-sim"}, PersonKind::kNone);
   options.hands = {"right", "left"};

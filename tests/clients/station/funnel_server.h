@@ -45,8 +45,10 @@ class FunnelServer {
     welcome.accepted = true;
     welcome.client = ClientId{1};
     welcome.server_epoch = 1;
-    for (const std::string& name : station.handNames())
+    for (const std::string& name : station.handNames()) {
       welcome.hands.push_back(name == "right" ? kRight : HandId{});
+      welcome.objects.push_back(name == "right" ? kPointer : ObjectId{});
+    }
     station.welcome(welcome, objects_);
   }
 
@@ -188,10 +190,9 @@ class FunnelServer {
     } else if (tick_ == 1) {
       last_ = X_WH;
     }
-    if (in_contact && contact_ticks_ > 2 && (station.inputs()[0].p_WC - centre_).norm() > 0.0)
-      indexed_in_contact = true;
+    if (in_contact && contact_ticks_ > 2 && (state.p_WC - centre_).norm() > 0.0) indexed_in_contact = true;
     contact_ticks_ = in_contact ? contact_ticks_ + 1 : 0;
-    centre_ = station.inputs()[0].p_WC;
+    centre_ = state.p_WC;
   }
 
   std::vector<SceneObject> objects_;

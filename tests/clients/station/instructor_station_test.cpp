@@ -36,6 +36,7 @@ class StuckPart {
     welcome.accepted = true;
     welcome.client = ClientId{2};
     welcome.hands = {kHand};
+    welcome.objects = {kPointer};
     welcome.server_epoch = 1;
     station->welcome(welcome, objects_);
     StepState step;
