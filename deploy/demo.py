@@ -1,5 +1,9 @@
 #!/usr/bin/env python3
 """`tenon demo`: a whole training session with simulated people, as separate processes over DDS on the loopback interface."""
+import sys
+
+sys.dont_write_bytecode = True  # an installation stays as it was installed
+import interrupt  # noqa: F401 - before all others
 import argparse
 import functools
 import itertools
@@ -10,33 +14,19 @@ import shutil
 import signal
 import socket
 import subprocess
-import sys
 import time
 from pathlib import Path
 
-sys.dont_write_bytecode = True  # an installation stays as it was installed
 import browser
 from child import die_with_the_script
 from demo_scene import hands_of, shipped_as
+from number_option import between
 
 
 # what it writes into its folder
 OUTPUTS = ("session.mcap", "journal.mcap", "report.html", "summary.json", "scene.png", "serve.log", "record.log", "observer.log",
            "trainee.log", "instructor.log", "console.log")
 CONSOLE_PORT = 8080
-
-
-def between(kind, low, high):
-    """A type of argparse: a number from `low` to `high`."""
-    def number(text):
-        try:
-            value = kind(text)
-        except ValueError:
-            value = None
-        if value is None or not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"'{text}' is not a number from {low} to {high}")
-        return value
-    return number
 
 
 def arguments():

@@ -1,16 +1,19 @@
 #!/usr/bin/env python3
 """`tenon doctor`: what this machine can and cannot do for Tenon, and what to do about it. Exit 1 if a session cannot run."""
+import sys
+
+sys.dont_write_bytecode = True  # an installation stays as it was installed
+import interrupt  # noqa: F401 - before all others
 import argparse
 import os
 import resource
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-sys.dont_write_bytecode = True
 import doctor_link
+from number_option import between
 
 
 def read(path):
@@ -120,7 +123,7 @@ def main():
     way.add_argument("--peer", metavar="HOST", help="check the link to another machine, on which `tenon doctor --listen` runs")
     way.add_argument("--listen", action="store_true", help="answer the check of another machine, until Ctrl-C")
     parser.add_argument("--domain", type=int, choices=range(231), metavar="0..230", default=0, help="with --peer, --listen: the DDS domain, by which ports are chosen [0]")
-    parser.add_argument("--seconds", type=float, default=5.0, help="with --peer: how long delay and loss are measured [5]")
+    parser.add_argument("--seconds", type=between(float, 0.1, 3600), default=5.0, help="with --peer: how long delay and loss are measured [5]")
     args = parser.parse_args()
     if args.listen:
         return doctor_link.listen(args)

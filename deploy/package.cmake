@@ -10,7 +10,7 @@ install(PROGRAMS tenon DESTINATION bin COMPONENT tenon)
 # ---- what they read; parts of scenarios are made on the machine, by tenon-parts
 install(DIRECTORY scenarios DESTINATION share/tenon COMPONENT tenon
         PATTERN part_generator EXCLUDE PATTERN *.png EXCLUDE)
-install(FILES deploy/browser.py deploy/child.py deploy/demo.py deploy/demo_scene.py deploy/doctor.py deploy/doctor_link.py deploy/picture.py DESTINATION share/tenon/deploy COMPONENT tenon)
+install(FILES deploy/browser.py deploy/child.py deploy/demo.py deploy/demo_scene.py deploy/doctor.py deploy/doctor_link.py deploy/interrupt.py deploy/number_option.py deploy/picture.py DESTINATION share/tenon/deploy COMPONENT tenon)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/console_page ${CMAKE_BINARY_DIR}/report_page DESTINATION share/tenon COMPONENT tenon OPTIONAL PATTERN built EXCLUDE)
 install(PROGRAMS clients/remote_hand/remote_hand.py DESTINATION share/tenon/clients/remote_hand COMPONENT tenon)
 install(DIRECTORY deploy/dds DESTINATION share/tenon/deploy COMPONENT tenon)
@@ -23,7 +23,7 @@ install(FILES deploy/copyright DESTINATION share/doc/tenon COMPONENT tenon)
 
 # ---- what people read: the pages of the source tree, and the pictures and tables they refer to
 install(FILES deploy/copyright DESTINATION share/doc/tenon-doc COMPONENT doc)
-file(GLOB pages CONFIGURE_DEPENDS RELATIVE ${CMAKE_SOURCE_DIR} *.md LICENSE docs/*.md docs/*.png deploy/packages/*.txt deploy/dds/*.xml deploy/wireguard.md scenarios/scenario.schema.json scenarios/*/*.png
+file(GLOB pages CONFIGURE_DEPENDS RELATIVE ${CMAKE_SOURCE_DIR} *.md LICENSE docs/*.md docs/*.png deploy/packages/*.txt deploy/dds/*.xml deploy/wireguard.md deploy/PLANNING.md scenarios/scenario.schema.json scenarios/*/*.png
      server/*/pictures/*.svg tests/bench/engine/result/* tests/bench/stability/result/*)
 foreach(page ${pages})
   get_filename_component(folder ${page} DIRECTORY)

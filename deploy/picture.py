@@ -1,19 +1,22 @@
 #!/usr/bin/env python3
 """`tenon picture`: a picture of a scenario or of a recording, drawn by the console's page in a headless browser."""
+import sys
+
+sys.dont_write_bytecode = True  # an installation stays as it was installed
+import interrupt  # noqa: F401 - before all others
 import argparse
 import os
 import re
 import signal
 import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-sys.dont_write_bytecode = True  # an installation stays as it was installed
 import browser
 from child import die_with_the_script
+from number_option import between
 
 LOADING = 1800  # [s] in which a server prepares a scene
 DRAWING = 600  # [s] in which a page draws it, where there is no graphics hardware and much else to do
@@ -44,7 +47,7 @@ def arguments():
     parser.add_argument("--near", action="store_true", help="show the step's part and where it goes, not all of the scene")
     parser.add_argument("--size", type=size, default=(1600, 1000), metavar="WxH", help="in pixels (default: 1600x1000)")
     parser.add_argument("--dark", action="store_true", help="dark as the console's dark page")
-    parser.add_argument("--detail", default="1", help="mesh resolution of a shipped scenario, 0 to 1 (default: %(default)s)")
+    parser.add_argument("--detail", type=between(float, 0, 1), default=1.0, help="mesh resolution of a shipped scenario, 0 to 1 (default: %(default)s)")
     parser.add_argument("--overwrite", action="store_true", help="replace an output file that exists")
     parser.add_argument("--programs", required=True, help=argparse.SUPPRESS)
     parser.add_argument("--scenarios", required=True, help=argparse.SUPPRESS)
@@ -120,12 +123,25 @@ def of_scenario(args):
             return drawn(args, console.wait_for(r"http://\S+", 60)[0])
 
 
+def check_output(out, may_overwrite):
+    """Fails before anything is drawn where the picture cannot be written."""
+    is_new = not out.exists()
+    if not is_new and not may_overwrite:
+        raise RuntimeError(f"{out}: exists; --overwrite replaces it, -o names another file")
+    try:
+        with open(out, "ab"):
+            pass
+        if is_new:
+            out.unlink()
+    except OSError as problem:
+        raise RuntimeError(f"{out}: cannot be written ({problem.strerror}); -o names another file, in a folder that exists and is yours") from None
+
+
 def main():
     args = arguments()
     out = args.output or Path(Path(args.what).stem or "scene").with_suffix(".png")
     try:
-        if out.exists() and not args.overwrite:
-            raise RuntimeError(f"{out}: exists; --overwrite replaces it, -o names another file")
+        check_output(out, args.overwrite)
         if browser.find_chromium() is None:
             raise RuntimeError(browser.MISSING)
         picture = of_recording(args) if args.is_recording else of_scenario(args)

@@ -57,6 +57,7 @@ ROOMS = {
     "clients/report": ("tenon::report", IDL, ["fmt", "CLI11", "JSON"]),
     # who takes part in a browser is a station of its own
     "clients/console": ("tenon::console", STATION + ["devices/drivers", "clients/command", "clients/recorder", "clients/station"], ["fmt", "CLI11", "JSON", "Boost", "OpenSSL"]),
+    "clients/other_vendor": ("tenon::other_vendor", [], ["Fast DDS"]),  # of ours it knows the IDL file alone
     "clients/rehearse": ("tenon::rehearse", [], ["fmt", "CLI11"]),  # the rooms: see EXCEPTION
     "scenarios/part_generator": ("tenon::part_generator", ["idl/types"], ["fmt", "CLI11"]),
 }
@@ -69,6 +70,7 @@ NOT_INCLUDED = {EXCEPTION, "server", "server/tools", "tests"}
 
 LIBRARIES = {
     "expected": r"tl/expected\.hpp$", "DDS": r"(dds/|ddsc/|org/eclipse/cyclonedds/|tenon\.h$)", "zstd": r"(zstd|zstd_\w+|zdict)\.h$",
+    "Fast DDS": r"(fastdds|fastrtps|fastcdr)/",
     "Highway": r"hwy/", "xxHash": r"xxh(ash|3)\.h$", "assimp": r"assimp/", "OctoMap": r"octomap/",
     "meshoptimizer": r"meshoptimizer\.h$",
     "libsodium": r"sodium(\.h$|/)", "yaml-cpp": r"yaml-cpp/", "fmt": r"fmt/", "CLI11": r"CLI/", "JSON": r"nlohmann/",
@@ -81,7 +83,7 @@ ONE_FILE = {"Bullet": "server/simulation/rigid_body.cpp", "OctoMap": "server/bak
             "assimp": "server/bake/import_child.cpp", "libsodium": "idl/wire/identity.cpp", "Boost": "clients/console/web_stream.h", "OpenSSL": "clients/console/certificate.cpp",
             "devices/simulated": "devices/catalog.cpp", "devices/drivers": "devices/catalog.cpp"}
 # made at build time, so not in the tree; their room alone includes them
-GENERATED = {"tenon.h": "idl/wire", "idl/wire/topic_list.h": "idl/wire"}
+GENERATED = {"tenon.h": "idl/wire", "idl/wire/topic_list.h": "idl/wire", "tenonPubSubTypes.h": "clients/other_vendor"}
 # a room whose .cpp files may include any <header> of no room's door: the library of the device they drive
 VENDOR_ROOM = "devices/drivers"
 
@@ -94,6 +96,8 @@ OUTSIDE_THE_LOOP = {
     "server/structures/structure_file.cpp": "reads and writes structure files at start and in `tenon bake`",
     "clients/haptic/seat_file.cpp": "reads and writes the file of a station's seat, on the wire thread",
     "clients/haptic/station_program.cpp": "reads a station's options and runs its threads; no loop of its own",
+    "clients/haptic/copy_loader.h": "loads the compiled scene on a thread of its own, beside the session",
+    "clients/haptic/copy_loader.cpp": "likewise",
 }
 
 STANDARD = set("""algorithm any array atomic barrier bit bitset cassert cctype cerrno cfenv cfloat charconv chrono cinttypes
@@ -426,6 +430,10 @@ PLANTED = [
     ("clients/simulated_person/g.cpp", '#include "clients/station/station.h"', "may not include clients/station"),
     ("clients/command/h.cpp", '#include "clients/haptic/coupling.h"', "may not include clients/haptic"),
     ("clients/command/h.cpp", "#include <tenon.h>", "only idl/wire includes tenon.h"),
+    ("clients/command/h.cpp", "#include <fastdds/dds/topic/Topic.hpp>", "not the door of Fast DDS"),
+    ("clients/other_vendor/o.cpp", "#include <fastdds/dds/topic/Topic.hpp>", None),
+    ("clients/other_vendor/o.cpp", "#include <tenonPubSubTypes.h>", None),
+    ("clients/other_vendor/o.cpp", '#include "idl/wire/second.h"', "may not include idl/wire"),
     ("clients/station/i.cpp", '#include "clients/rehearse/rehearsal.h"', "no room may include clients/rehearse"),
     ("clients/rehearse/rehearsal.h", '#include "server/session/session_server.h"', None),
     ("clients/rehearse/rehearsal.h", '#include "clients/station/station.h"', None),

@@ -95,7 +95,7 @@ set_tests_properties(rehearsal.short PROPERTIES TIMEOUT 900 LABELS "gate;rehears
 add_dependencies(threaded_tests tenon-rehearse tenon-parts tenon-bake)
 
 # scripts that run the programs as people do; alone those that measure against the clock
-set(quiet_scripts session_test faults_test trust_test resume_test network_test link_test mentoring_test command_test safety_test station_test
+set(quiet_scripts session_test faults_test trust_test resume_test network_test link_test car_link_test mentoring_test command_test safety_test station_test
                   console_headset_test console_test endurance_test report_test)
 add_executable(link_relay tests/system/link_relay.cpp)  # a network link of theirs
 file(GLOB scripts CONFIGURE_DEPENDS tests/system/*_test.py)

@@ -1,8 +1,10 @@
 """Commands to a running session are accepted and carried out, or refused with the reason."""
+import os
+import signal
 import subprocess
 import unittest
 
-from stage import PROGRAMS, Stage, tenon
+from stage import COARSE, PROGRAMS, SOURCE, Stage, tenon
 
 
 class Commands(unittest.TestCase):
@@ -107,6 +109,39 @@ class Commands(unittest.TestCase):
                 self.assertEqual(done.returncode, 2)
                 self.assertIn(reason, done.stderr)
 
+
+class OutputThatNobodyReads(unittest.TestCase):
+    """A terminal after Ctrl-S, a pager, a hung connection."""
+
+    def fill(self, pipe):
+        os.set_blocking(pipe, False)
+        try:
+            while True:
+                os.write(pipe, b"." * 4096)
+        except BlockingIOError:
+            pass
+        os.set_blocking(pipe, True)
+
+    def test_a_server_goes_on_hearing(self):
+        with Stage(lockstep=False) as stage:
+            reader, writer = os.pipe()
+            common = ["--session", stage.session, "--domain", str(stage.domain)]
+            server = subprocess.Popen([PROGRAMS / "tenon-serve", SOURCE / "scenarios" / "peg_and_box", *common, *map(str, COARSE)],
+                                      stdout=writer, stderr=subprocess.STDOUT)
+            try:
+                text = b""
+                while b"is open" not in text:
+                    text += os.read(reader, 4096)
+                self.fill(writer)
+                for word in ("one", "two"):
+                    done = tenon("command", "note", word, *common)
+                    self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+                server.send_signal(signal.SIGINT)
+                server.wait(60)
+            finally:
+                server.kill()
+                os.close(reader)
+                os.close(writer)
 
 if __name__ == "__main__":
     unittest.main()

@@ -4,7 +4,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from stage import SOURCE, tenon
+from stage import PROGRAMS, SOURCE, tenon
 
 
 def verbs():
@@ -63,7 +63,25 @@ TABLE = (
     (2, ["serve", SCENARIO, "--wait-for", "nobody"], "--wait-for: cannot wait for 'nobody'"),
     (2, ["serve", SCENARIO, "--workers", 0], "--workers"),
     (2, ["serve", SCENARIO, "--domain", 500], "--domain"),
+    (2, ["serve", SCENARIO, "--session", "a*"], "--session: 'a*' is no name of a session: expected 1 to 63 bytes of UTF-8"),
+    (2, ["serve", SCENARIO, "--session", ""], "--session: '' is no name of a session"),
+    (2, ["serve", SCENARIO, "--session", "a" * 64], "is no name of a session"),
+    (2, ["serve", SCENARIO, "--session", "a" * 5000], "is no name of a session"),
+    (2, ["join", "--role", "trainee", "--session", "?"], "--session: '?' is no name of a session"),
+    (2, ["join", "--role", "observer", "--session", "a/b"], "--session: 'a/b' is no name of a session"),
+    (2, ["record", "-o", "a.mcap", "--session", ""], "--session: '' is no name of a session"),
     (1, ["serve", "nosuch"], "nosuch"),
+    (2, ["serve", SCENARIO, "--detail", "nan"], "--detail: 'nan' is not a number from 0 to 1"),
+    (2, ["serve", SCENARIO, "--tick-goal", "nan"], "--tick-goal: 'nan' is not a number from 0 to 1"),
+    (2, ["serve", SCENARIO, "--critical-load", "nan"], "--critical-load: 'nan' is not a number from 1 to 1000"),
+    (2, ["serve", SCENARIO, "--budget", "-1"], "--budget: Value -1 not in range 0 to 1000000000"),
+    (2, ["check", SCENARIO, "--detail", "nan"], "--detail: 'nan' is not a number from 0 to 1"),
+    (2, ["parts", "peg_and_box", "a", "--detail", "nan"], "--detail: 'nan' is not a number from 0 to 1"),
+    (2, ["parts", "peg_and_box", "a", "--triangles", "-1"], "--triangles: Value -1 not in range"),
+    (2, ["rehearse", SCENARIO, "--detail", "nan"], "--detail: 'nan' is not a number from 0 to 1"),
+    (2, ["rehearse", SCENARIO, "--seconds", "nan"], "--seconds nan: expected 0.001 to 1000000"),
+    (2, ["doctor", "--peer", "localhost", "--seconds", "nan"], "'nan' is not a number from 0.1 to 3600"),
+    (2, ["picture", "peg_and_box", "--detail", "nan"], "'nan' is not a number from 0 to 1"),
     (2, ["check"], "scenario is required"),
     (2, ["check", SCENARIO, "--device", "nosuch"], "--device: unknown device 'nosuch'"),
     (2, ["command"], "no command given"),
@@ -106,7 +124,14 @@ TABLE = (
     (2, ["rehearse", SCENARIO, "--seconds", "-1"], "--seconds -1: expected 0.001 to 1000000"),
     (2, ["rehearse", SCENARIO, "--device", "nosuch"], "--device: unknown device 'nosuch'"),
     (1, ["report", "nosuch.mcap"], "nosuch.mcap"),
-    (1, ["resimulate", "nosuch.mcap"], "tenon resimulate: nosuch.mcap"),
+    (2, ["join", "--role", "trainee", "--force-model", "x"], "--force-model: x not in {auto,manifold,scene-copy}"),
+    (2, ["rehearse", SCENARIO, "--force-model", "0"], "--force-model: 0 not in {manifold,scene-copy}"),
+    (2, ["command", "--role", "boss", "pause"], "--role: boss not in {admin,instructor,trainee}"),
+    (1, ["resimulate", "nosuch.mcap"], "tenon resimulate: nosuch.mcap: cannot be opened (No such file or directory)"),
+    (1, ["resimulate", SCENARIO / "scenario.yaml"], "scenario.yaml: is not a recording (no MCAP file)"),
+    (1, ["resimulate", "nosuch.mcap", SCENARIO], "nosuch.mcap: cannot be opened (No such file or directory)"),
+    (1, ["picture", SCENARIO, "-o", "/proc/x.png"], "/proc/x.png: cannot be written (No such file or directory); -o names another file"),
+    (1, ["picture", SCENARIO, "-o", "nosuch/x.png"], "nosuch/x.png: cannot be written (No such file or directory); -o names another file"),
     (2, ["resimulate", "nosuch.mcap", "--fly"], "--fly"),
 )
 
@@ -122,8 +147,27 @@ class ExitCodes(unittest.TestCase):
                     answer = [line for line in done.stderr.splitlines() if not line.startswith(("usage: ", " ", "Run with --help"))]
                     self.assertEqual(len(answer), 1, done.stderr)
                     self.assertIn(said, answer[0])
+                    if "resimulate" in words:
+                        self.assertNotIn("name it as well", answer[0])
                     self.assertLess(len(answer[0]), 250)
             self.assertEqual(list(Path(folder).iterdir()), [], "nothing was begun")
+
+    def test_a_line_of_a_station_file_that_is_no_option_is_wrong_usage(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "desk.toml"
+            for content, key in ((b"devcie = 'falcon-sim'\n", "'devcie' is no option"), (b"# a desk\ndomain = 7\nhallo welt\n", "'hallo welt' is no option"),
+                                 (b"[desk]\ndomain = 7\n", "is no option"), ((PROGRAMS / "tenon-join").read_bytes()[:4096], "is no option"),
+                                 (b"station = other.toml\n", "station")):
+                with self.subTest(content=content[:20]):
+                    file.write_bytes(content)
+                    done = tenon("join", "--role", "trainee", "--station", file)
+                    self.assertEqual(done.returncode, 2, done.stdout + done.stderr)
+                    self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+                    self.assertIn(f"--station {file}: ", done.stderr)
+                    self.assertIn(key, done.stderr)
+            # a good one is read: its device is asked for in the catalog
+            file.write_text("# a desk\n\ndomain = 7\nhands = [\"right\", \"left\"]\ndevice = nosuch\n", encoding="utf-8")
+            self.assertIn("unknown device 'nosuch'", tenon("join", "--role", "trainee", "--station", file).stderr)
 
 
 if __name__ == "__main__":

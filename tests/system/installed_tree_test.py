@@ -71,7 +71,7 @@ class InstalledTree(unittest.TestCase):
 
     def test_it_holds_programs_scripts_scenarios_and_pages_and_nothing_else(self):
         for name in ("bin/tenon", "lib/tenon/tenon-serve", "lib/tenon/tenon-command", "share/tenon/VERSION", "share/tenon/deploy/demo.py",
-                     "share/tenon/deploy/doctor.py", "share/tenon/deploy/picture.py", "share/tenon/deploy/doctor_link.py", "share/tenon/deploy/make-cert", "share/tenon/deploy/dds/loopback.xml", "share/tenon/scenarios/scenario.schema.json",
+                     "share/tenon/deploy/doctor.py", "share/tenon/deploy/picture.py", "share/tenon/deploy/doctor_link.py", "share/tenon/deploy/number_option.py", "share/tenon/deploy/interrupt.py", "share/tenon/deploy/make-cert", "share/tenon/deploy/dds/loopback.xml", "share/tenon/scenarios/scenario.schema.json",
                      "share/tenon/scenarios/engine_bay/scenario.yaml", "share/doc/tenon/README.md", "share/doc/tenon/copyright"):
             self.assertTrue((self.prefix / name).is_file(), name)
         for file in self.prefix.rglob("*"):

@@ -1,15 +1,17 @@
 """Pictures of scenarios and recordings, drawn by the console's page."""
 import os
 import shutil
+import signal
 import struct
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 import zlib
 from pathlib import Path
 
-from stage import COARSE, PROGRAMS, SOURCE, Stage, tenon
+from stage import COARSE, PROGRAMS, SOURCE, TENON, Stage, tenon
 
 SIZE = (480, 300)
 
@@ -62,6 +64,19 @@ class Picture(Drawn):
         done = tenon("picture", "peg_and_box", "-o", file)
         self.assertEqual((done.returncode, file.read_bytes()), (1, b"mine"))
         self.assertIn("exists; --overwrite replaces it", done.stderr)
+
+    def test_who_interrupts_it_sees_no_traceback(self):
+        cache = self.folder / "cache"
+        picture = subprocess.Popen([TENON, "picture", "engine_bay", "-o", self.folder / "mine.png"], start_new_session=True, text=True,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   env={**os.environ, "TENON_PROGRAMS": str(PROGRAMS), "TENON_CACHE": str(cache)})
+        while not cache.exists() and picture.poll() is None:
+            time.sleep(0.01)
+        os.killpg(picture.pid, signal.SIGINT)  # as a terminal does
+        errors = picture.communicate(timeout=60)[1]
+        self.assertEqual(picture.returncode, 130, errors)
+        self.assertNotIn("Traceback", errors)
+        self.assertFalse((self.folder / "mine.png").exists())
 
     def test_what_cannot_be_drawn_is_said(self):
         cut = self.folder / "cut.mcap"

@@ -173,6 +173,27 @@ class KilledServer(unittest.TestCase):
             self.assertEqual(back.wait(60), 0, back.text())
             self.assertResimulates(stage, server)
 
+    def test_a_server_that_is_interrupted_while_it_waits_for_hands_ends_as_a_stopped_session_does(self):
+        ends = []
+        for interrupted in ("while it runs", "while it waits"):
+            with Stage(lockstep=False) as stage:
+                server = begin(stage, "--wait-for", "right")
+                trainee = stage.start("trainee", "--person", "none", "--wait", 60)
+                server.wait_for("run: running", 120)
+                if interrupted == "while it waits":
+                    time.sleep(1)
+                    kill(server)
+                    kill(trainee)
+                    server, _ = resume(stage)
+                server.signal(signal.SIGINT)
+                ends.append(server.wait(60))
+                self.assertRegex(server.text(), "(?m)^stopped after ", interrupted)
+                self.assertNotIn("is not back yet", server.text())
+                again = tenon("serve", "--resume", stage.out / "journal.mcap", "--domain", stage.domain)
+                self.assertEqual(again.returncode, 1)
+                self.assertIn("the session has ended ('stopped'", again.stderr)
+        self.assertEqual(ends, [1, 1], "not everything was mounted")
+
     def test_who_was_removed_just_before_the_kill_stays_removed_and_is_listed_no_more(self):
         def command(*words):
             done = tenon("command", *words, "--session", stage.session, "--domain", stage.domain)

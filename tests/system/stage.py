@@ -108,6 +108,10 @@ class Process:
     def signal(self, which):
         self.popen.send_signal(which)
 
+    def processor_seconds(self):
+        fields = Path(f"/proc/{self.popen.pid}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
 
 class Stage:
     """The processes of one session, as a context manager that kills those left at its end."""

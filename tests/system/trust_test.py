@@ -172,6 +172,16 @@ class EmergencyStop(unittest.TestCase):
             once_more = stage.serve("peg_and_box")
             self.assertNotIn("emergency", once_more.text())
 
+    def test_without_a_home_the_server_says_that_a_stop_will_not_stand_after_a_restart(self):
+        with Stage(lockstep=False) as stage:
+            server = Process("serve", [SOURCE / "scenarios" / "peg_and_box", "--session", stage.session, "--domain", stage.domain, *COARSE], stage.out,
+                             env={"HOME": "", "XDG_STATE_HOME": ""})
+            stage.processes.append(server)
+            server.wait_for("tenon serve: neither HOME nor XDG_STATE_HOME is set: an emergency stop will not stand after a restart of this server", 600)
+            server.wait_for("is open", 60)
+            observer = stage.start("observer", "--json")
+            observer.wait_for('will not stand after a restart.*"what":"emergency stop"', 60)
+
     def test_without_a_session_named_it_stops_all_sessions_and_without_anybody_it_says_so(self):
         with Stage(lockstep=False) as stage:
             nobody = tenon("command", "emergency", "--domain", stage.domain)

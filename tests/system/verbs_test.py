@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 from pathlib import Path
 from xml.etree import ElementTree
@@ -93,6 +94,56 @@ class Verbs(unittest.TestCase):
                 bake.stderr.close()
                 self.assertEqual(rest.splitlines()[-1], "tenon-bake: peg.stl: cancelled")
                 self.assertEqual(list(baked.iterdir()), [])
+
+    def test_serve_and_rehearse_that_are_interrupted_while_a_scene_is_prepared_say_so_and_leave_nothing_half_written(self):
+        scenario = SOURCE / "scenarios" / "engine_bay"
+        for verb, said in (("serve", "tenon serve: stopped while the scene was prepared"), ("rehearse", "tenon rehearse: stopped")):
+            with tempfile.TemporaryDirectory() as cache:
+                # while parts are generated, then while they are baked
+                for begun, number in (("parts", signal.SIGINT), ("structures", signal.SIGTERM)):
+                    program = subprocess.Popen([PROGRAMS / f"tenon-{verb}", scenario, "--cache", cache, "--detail", "1" if begun == "parts" else "0.12"],
+                                               stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+                    while not (Path(cache) / begun).exists() and program.poll() is None:
+                        time.sleep(0.01)
+                    program.send_signal(number)
+                    errors = program.communicate(timeout=120)[1]
+                    self.assertEqual((program.returncode, errors.strip()), (1, said), begun)
+                    self.assertEqual([str(file) for file in Path(cache).rglob("*") if re.search(r"\.(part)?\d{3,}$", file.name)], [])
+
+    def test_a_rehearsal_that_is_interrupted_ends_with_1(self):
+        rehearsal = subprocess.Popen(["stdbuf", "-oL", PROGRAMS / "tenon-rehearse", SOURCE / "scenarios" / "peg_and_box", *COARSE, "--follow"], stdout=subprocess.PIPE,
+                                     stderr=subprocess.PIPE, text=True)
+        while "depth" not in (line := rehearsal.stdout.readline()) and line:
+            pass
+        rehearsal.send_signal(signal.SIGINT)
+        errors = rehearsal.communicate(timeout=120)[1]
+        self.assertEqual((rehearsal.returncode, errors.strip()), (1, "tenon rehearse: stopped"))
+
+    # A module of the standard library that interrupts who imports it.
+    def test_scripts_that_are_interrupted_in_their_imports_end_with_130_and_without_a_traceback(self):
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "argparse.py").write_text("import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(60)\n", encoding="utf-8")
+            for verb in ("demo", "doctor", "picture"):
+                with self.subTest(verb=verb):
+                    done = tenon(verb, env={"PYTHONPATH": folder})
+                    self.assertEqual((done.returncode, done.stdout, done.stderr), (130, "", ""))
+
+    def test_a_check_of_a_link_that_is_interrupted_ends_with_130_and_without_a_traceback(self):
+        domain = str(free_domain())
+        environment = {**os.environ, "TENON_PROGRAMS": str(PROGRAMS), "PYTHONUNBUFFERED": "1"}
+
+        def start(*words):
+            doctor = subprocess.Popen([SOURCE / "tenon", "doctor", *words, "--domain", domain], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+            self.addCleanup(doctor.kill)
+            doctor.stdout.readline()
+            return doctor
+
+        listener = start("--listen")
+        asker = start("--peer", "127.0.0.1", "--seconds", "60")
+        asker.send_signal(signal.SIGINT)
+        self.assertEqual((asker.communicate(timeout=60)[1], asker.returncode), ("", 130))
+        listener.send_signal(signal.SIGINT)
+        self.assertEqual((listener.communicate(timeout=60)[1], listener.returncode), ("", 0))
 
     def test_a_damaged_structure_file_is_refused(self):
         with tempfile.TemporaryDirectory() as folder:
