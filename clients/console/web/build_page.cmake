@@ -1,5 +1,5 @@
-# Builds the console's page from SOURCE into PAGE, and that of reports into REPORT, in a copy below WORK, so that the source tree stays as it is. A page that cannot be
-# built is a warning: the gateway serves public viewers without it, and says what is missing.
+# Builds the console's page from SOURCE, for the protocol that the header PROTOCOL names, into PAGE, and that of reports into REPORT, in a copy below WORK, so that
+# the source tree stays as it is. A page that cannot be built is a warning: the gateway serves public viewers without it, and says what is missing.
 file(REMOVE_RECURSE ${PAGE} ${REPORT})
 file(MAKE_DIRECTORY ${WORK} ${PAGE} ${REPORT})
 file(REMOVE_RECURSE ${WORK}/src)
@@ -10,6 +10,9 @@ set(installed "")
 if(EXISTS ${WORK}/installed)
   file(READ ${WORK}/installed installed)
 endif()
+file(STRINGS ${PROTOCOL} protocol REGEX "kProtocolVersion = [0-9]+;")
+string(REGEX MATCH "kProtocolVersion = ([0-9]+);" protocol "${protocol}")
+set(ENV{TENON_PROTOCOL} ${CMAKE_MATCH_1})
 function(run_or_warn what)
   execute_process(COMMAND ${ARGN} WORKING_DIRECTORY ${WORK} RESULT_VARIABLE failed OUTPUT_VARIABLE output ERROR_VARIABLE output)
   if(failed)

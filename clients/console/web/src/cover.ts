@@ -7,7 +7,7 @@ import type { SceneView } from "./scene";
 import type { Session } from "./session";
 import { t, type Key } from "./strings";
 
-export const PROTOCOL = 8; // kProtocolVersion of idl/types/messages/session.h
+export const PROTOCOL = TENON_PROTOCOL;
 const COMMAND = "./tenon demo";
 
 /** `opening`: of a recording that is opened: how much is read, or why it cannot be. */
