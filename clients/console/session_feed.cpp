@@ -75,7 +75,7 @@ void SessionFeed::serveOneSession() {
   wire::Inbox inbox;
   if (auto watched = member.watch(inbox); !watched)
     return setState(LinkState::kRefused, watched.error().what);
-  auto subscriber = wire::RawSubscriber::open(member.session(), SessionChannels::topics());
+  auto subscriber = wire::RawSubscriber::open(member.everything(), SessionChannels::topics());
   if (!subscriber) return setState(LinkState::kRefused, subscriber.error().what);
   if (auto joined = member.join(stop_); !joined) {
     if (!stop_) setState(LinkState::kRefused, joined.error().what);

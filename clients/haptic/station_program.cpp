@@ -181,10 +181,14 @@ Result<void> StationRunner::subscribeToAnswers(bool slow) {
   });
   if (!subscribed) return subscribed;
   const auto& manifolds = slow ? wire::kHandManifold50 : wire::kHandManifold;
-  return inbox.on<HandManifold>(session, manifolds, [this](const HandManifold& manifold) {
-    if (lockstep_) answers_.received(manifold);
-    pass(manifold);
-  });
+  for (wire::Partition& hand : link_.member().hands()) {
+    if (subscribed)
+      subscribed = inbox.on<HandManifold>(hand, manifolds, [this](const HandManifold& manifold) {
+        if (lockstep_) answers_.received(manifold);
+        pass(manifold);
+      });
+  }
+  return subscribed;
 }
 
 /// The new readers first: the former ones are closed once these have heard their server, or a second later,
@@ -196,7 +200,8 @@ void StationRunner::chooseRates(double round_trip) {
   if (answers_changed_) {
     const bool slow = slow_answers_;
     inbox.end(session, (slow ? wire::kWorldFrame1k : wire::kWorldFrame100).name);
-    inbox.end(session, (slow ? wire::kHandManifold : wire::kHandManifold50).name);
+    for (wire::Partition& hand : link_.member().hands())
+      inbox.end(hand, (slow ? wire::kHandManifold : wire::kHandManifold50).name);
     answers_changed_ = false;
   } else if (rates_.slowAnswers() != slow_answers_) {
     auto subscribed = subscribeToAnswers(rates_.slowAnswers());

@@ -11,6 +11,18 @@ namespace {
 using Json = nlohmann::json;
 constexpr Tick kProgressPeriod = 2000;  // [ticks]
 
+const char* nameOf(ConditionGroup group) {
+  switch (group) {
+    case ConditionGroup::kSingle:
+      return "";
+    case ConditionGroup::kAll:
+      return "all";
+    case ConditionGroup::kAny:
+      return "any";
+  }
+  return "";
+}
+
 const char* nameOf(StepPhase phase) {
   switch (phase) {
     case StepPhase::kWaiting:
@@ -73,7 +85,9 @@ void Observer::receive(const StepProgress& progress) {
     conditions.push_back({{"text", condition.text},
                           {"value", condition.value},
                           {"limit", condition.limit},
-                          {"met", condition.met}});
+                          {"met", condition.met},
+                          {"group", nameOf(condition.group)},
+                          {"depth", condition.depth}});
   }
   printJson(lineOf({{"kind", "progress"},
                     {"tick", progress.tick},

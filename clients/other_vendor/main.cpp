@@ -102,6 +102,7 @@ class OtherClient {
     if (!welcome_.accepted())
       throw std::runtime_error("the server refuses: " + welcome_.reason().to_string());
     session_ = bus_.partition("s/" + announce_.session());
+    hands_ = bus_.partition("s/" + announce_.session() + "/hand/*");  // each hand has its own
     presence_.emplace(bus_, session_, "Presence", TopicClass::kState,
                       WriterLimits{.lease = milliseconds(2000)});
     present_.client_id(welcome_.client_id());
@@ -114,7 +115,7 @@ class OtherClient {
   /// Sends the command, if one is wanted, and hears the session for a while.
   void take_part() {
     BusReader<WorldFramePubSubType> frames(bus_, session_, "WorldFrame_100", TopicClass::kStream);
-    BusReader<HandManifoldPubSubType> manifolds(bus_, session_, "HandManifold", TopicClass::kStream);
+    BusReader<HandManifoldPubSubType> manifolds(bus_, hands_, "HandManifold", TopicClass::kStream);
     BusReader<CommandAckPubSubType> acks(bus_, session_, "CommandAck", TopicClass::kEvent);
     BusWriter<CommandPubSubType> commands(bus_, session_, "Command", TopicClass::kEvent,
                                           {.lifespan = milliseconds(5000)});
@@ -180,7 +181,7 @@ class OtherClient {
 
   OtherVendorOptions options_;
   Bus bus_;
-  BusPartition lobby_, session_;
+  BusPartition lobby_, session_, hands_;
   SessionAnnounce announce_;
   SampleOrigin server_;
   Welcome welcome_;

@@ -115,7 +115,7 @@ Result<void> Recorder::subscribe() {
   recording_ = std::make_unique<Recording>(std::move(*recording));
   auto subscriber = wire::RawSubscriber::open(member_->own(), kOwnTopics);
   if (!subscriber) return fail(subscriber.error().what);
-  if (auto added = subscriber->add(member_->session(), sessionTopics(options_.all)); !added) return added;
+  if (auto added = subscriber->add(member_->everything(), sessionTopics(options_.all)); !added) return added;
   subscriber_ = std::make_unique<wire::RawSubscriber>(std::move(*subscriber));
 
   // the whole scene proves that the server has matched our readers; what else it keeps for late joiners

@@ -100,7 +100,9 @@ void fields(auto& d, auto& c, Is<ConditionValue> auto& m) {
   d("conditions.text", c.text, m.text);
   d("value", c.value, m.value);
   d("limit", c.limit, m.limit);
+  d("group", c.group, m.group);
   d("met", c.met, m.met);
+  d("depth", c.depth, m.depth);
 }
 void fields(auto& d, auto& c, Is<TopicSamples> auto& m) {
   d("topics.topic", c.topic, m.topic);
@@ -358,7 +360,8 @@ void fields(auto& d, auto& c, Is<StepProgress> auto& m) {
   d("position_error", c.position_error, m.position_error);
   d("angle_error", c.angle_error, m.angle_error);
   d("contact_seconds", c.contact_seconds, m.contact_seconds);
-  d.list("conditions", c.conditions, m.conditions, 10, kStructs);
+  d("nodes", c.nodes, m.nodes);
+  d.list("conditions", c.conditions, m.conditions, kMostConditionsTold, kStructs);
 }
 void fields(auto& d, auto& c, Is<RunState> auto& m) {
   d("phase", c.phase, m.phase);

@@ -62,6 +62,9 @@ Result<std::unique_ptr<Membership>> Membership::find(const MembershipOptions& op
   member->own_ = std::make_unique<Partition>(
       *participant, clientPartition(member->announce_.session, (*participant)->origin()),
       member->session_->profile());
+  member->everything_ =
+      std::make_unique<Partition>(*participant, sessionPartition(member->announce_.session),
+                                  member->session_->profile(), handPartitions(member->announce_.session));
   member->hearServer();
   return member;
 }
@@ -199,6 +202,17 @@ void Membership::prove(const std::string& challenge, Join& join, std::string& pr
 void Membership::hearServer() {
   session_->hearOnly(server_);
   own_->hearOnly(server_);
+  everything_->hearOnly(server_);
+  for (Partition& hand : hands_) hand.hearOnly(server_);
+}
+
+/// A seat has the same hands in each life of the server, so the readers stay.
+void Membership::openHands() {
+  if (!hands_.empty()) return;
+  for (const HandId hand : presence_.hands) {
+    hands_.emplace_back(participant_, handPartition(announce_.session, hand), session_->profile());
+    hands_.back().hearOnly(server_);
+  }
 }
 
 Result<void> Membership::takeSeat() {
@@ -207,6 +221,7 @@ Result<void> Membership::takeSeat() {
   presence_ = {welcome_.client, options_.person, options_.role, {}, true};
   for (const HandId hand : welcome_.hands)
     if (hand.valid()) presence_.hands.push_back(hand);
+  openHands();
   if (!presence_writer_)
     if (auto opened = openInto(presence_writer_, *session_, kPresence); !opened) return opened;
   return presence_writer_->write(presence_);

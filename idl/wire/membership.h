@@ -87,6 +87,10 @@ class Membership {
   [[nodiscard]] Partition& session() { return *session_; }
   /// For what the server sends to this client alone.
   [[nodiscard]] Partition& own() { return *own_; }
+  /// Of the hands of the Welcome, from join() on: their contacts.
+  [[nodiscard]] std::vector<Partition>& hands() { return hands_; }
+  /// To read session() and the partitions of all hands, for recorders and gateways.
+  [[nodiscard]] Partition& everything() { return *everything_; }
 
  private:
   explicit Membership(const MembershipOptions& options) : options_(options) {}
@@ -97,6 +101,7 @@ class Membership {
   Result<void> rejoinNext(const SessionAnnounce& before, const Stop& stop,
                           const std::function<void()>& meanwhile, bool& ended);
   Result<void> takeSeat();
+  void openHands();
   void hearServer();
   /// Answers the challenge of a Welcome; `problem`: why there is no proof of the session's key.
   void prove(const std::string& challenge, Join& join, std::string& problem) const;
@@ -109,6 +114,8 @@ class Membership {
   std::unique_ptr<Partition> lobby_;
   std::unique_ptr<Partition> session_;
   std::unique_ptr<Partition> own_;
+  std::unique_ptr<Partition> everything_;
+  std::vector<Partition> hands_;
   std::unique_ptr<Writer<Presence>> presence_writer_;
   SessionAnnounce announce_;
   Welcome welcome_;

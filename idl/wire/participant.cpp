@@ -118,6 +118,10 @@ Result<std::shared_ptr<Participant>> Participant::open(const LinkOptions& option
 
 Partition::Partition(const std::shared_ptr<Participant>& participant, std::string name,
                      std::optional<LinkProfile> profile)
+    : Partition(participant, std::move(name), profile, {}) {}
+
+Partition::Partition(const std::shared_ptr<Participant>& participant, std::string name,
+                     std::optional<LinkProfile> profile, const std::string& also_heard)
     : entities_(std::make_shared<PartitionEntities>()) {
   entities_->profile = profile.value_or(participant->profile());
   entities_->participant = participant->entities();
@@ -126,6 +130,8 @@ Partition::Partition(const std::shared_ptr<Participant>& participant, std::strin
   dds_qset_partition1(qos, entities_->name.c_str());
   const dds_entity_t parent = entities_->participant->entity;
   entities_->publisher = dds_create_publisher(parent, qos, nullptr);
+  std::array<const char*, 2> heard{entities_->name.c_str(), also_heard.c_str()};
+  dds_qset_partition(qos, also_heard.empty() ? 1 : 2, heard.data());
   entities_->subscriber = dds_create_subscriber(parent, qos, nullptr);
   dds_delete_qos(qos);
 }
@@ -143,6 +149,12 @@ std::string raiseWireThreads() {
   const std::string refused = threads::raiseThisThread(kWire);
   return refused.empty() ? threads::raiseThreadsNamed(kOfDds) : refused;
 }
+
+std::string handPartition(const std::string& session, HandId hand) {
+  return sessionPartition(session) + "/hand/" + std::to_string(hand.value);
+}
+
+std::string handPartitions(const std::string& session) { return sessionPartition(session) + "/hand/*"; }
 
 std::string clientPartition(const std::string& session, const Origin& client) {
   constexpr std::string_view kDigits = "0123456789abcdef";

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "idl/types/ids.h"
 #include "idl/types/result.h"
 #include "idl/wire/origin.h"
 #include "idl/wire/topics.h"
@@ -45,8 +46,8 @@ class Participant {
   std::shared_ptr<ParticipantEntities> entities_;
 };
 
-/// A DDS publisher and subscriber of one partition: "lobby", or that of a session (sessionPartition).
-/// Failures show when endpoints are opened in it.
+/// A DDS publisher and subscriber of one partition: "lobby", that of a session (sessionPartition) or of one
+/// of its hands (handPartition). Failures show when endpoints are opened in it.
 ///
 /// A partition may have another link profile than its participant: the lobby uses kLan also for sessions in
 /// lockstep, because a client joins it before it knows whether its
@@ -57,6 +58,9 @@ class Partition {
  public:
   Partition(const std::shared_ptr<Participant>& participant, std::string name,
             std::optional<LinkProfile> profile = std::nullopt);
+  /// Its readers also hear the partitions that `also_heard` matches: a DDS pattern with `*`.
+  Partition(const std::shared_ptr<Participant>& participant, std::string name,
+            std::optional<LinkProfile> profile, const std::string& also_heard);
   ~Partition();
   Partition(Partition&&) noexcept;
   Partition& operator=(Partition&&) noexcept;
@@ -83,6 +87,11 @@ class Partition {
 
 inline constexpr const char* kLobby = "lobby";
 [[nodiscard]] inline std::string sessionPartition(const std::string& session) { return "s/" + session; }
+/// For the contacts of one hand of a session, which its station alone needs: what it does not subscribe to is
+/// not sent to it.
+[[nodiscard]] std::string handPartition(const std::string& session, HandId hand);
+/// The pattern that matches the partitions of all hands of a session, for recorders and gateways.
+[[nodiscard]] std::string handPartitions(const std::string& session);
 /// For what the server of a session sends to one client alone, by the GUID of its participant.
 [[nodiscard]] std::string clientPartition(const std::string& session, const Origin& client);
 

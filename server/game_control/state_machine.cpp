@@ -360,11 +360,9 @@ void StateMachine::updateMeasurements(const SceneView& scene) noexcept {
 }
 
 void StateMachine::collectReadings() noexcept {
-  const std::vector<Condition>& tree = state().conditions;
   memory_.status.conditions.clear();
-  for (std::size_t i = 0; i < tree.size(); ++i) {
-    if (!isGroup(tree[i].kind)) memory_.status.conditions.push_back(memory_.progress.reading(i));
-  }
+  for (std::size_t i = 0; i < state().conditions.size(); ++i)
+    memory_.status.conditions.push_back(memory_.progress.reading(i));
 }
 
 }  // namespace tenon::game_control

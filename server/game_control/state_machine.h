@@ -36,7 +36,7 @@ struct StepStatus {
   double position_error = 0.0;   ///< [m] of its object's centre to the target; 0 without a target
   double angle_error = 0.0;      ///< [rad] likewise
   double contact_seconds = 0.0;  ///< [s] that the object has been in contact in this state
-  FixedVector<ConditionReading, kMaxConditions> conditions;  ///< of the leaves, in file order
+  FixedVector<ConditionReading, kMaxConditions> conditions;  ///< of the nodes of its tree, in file order
 };
 
 /// The task state machine (paper §3.3): leads the trainee through the scenario's states by calls of the

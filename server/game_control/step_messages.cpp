@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <string>
 
 #include "server/game_control/state_machine.h"
@@ -29,6 +31,11 @@ std::string textOf(const ScenarioFile& scenario, const Condition& condition) {
       return "signal " + scenario.signals[condition.signal];
   }
   return {};
+}
+
+ConditionGroup groupOf(ConditionKind kind) {
+  if (!isGroup(kind)) return ConditionGroup::kSingle;
+  return kind == ConditionKind::kAll ? ConditionGroup::kAll : ConditionGroup::kAny;
 }
 
 }  // namespace
@@ -67,11 +74,22 @@ StepProgress progress(const ScenarioFile& scenario, const StepStatus& status, Ti
   report.position_error = status.position_error;
   report.angle_error = status.angle_error;
   report.contact_seconds = status.contact_seconds;
-  std::size_t leaf = 0;
-  for (const Condition& condition : scenario.states[status.step].conditions) {
-    if (isGroup(condition.kind) || leaf == status.conditions.size()) continue;
-    const ConditionReading& reading = status.conditions[leaf++];
-    report.conditions.push_back({textOf(scenario, condition), reading.value, reading.limit, reading.met});
+  const std::vector<Condition>& tree = scenario.states[status.step].conditions;
+  // before the first evaluation there are no readings
+  const std::size_t nodes = std::min(tree.size(), status.conditions.size());
+  std::array<std::uint8_t, kMaxConditions> depths{};  // of the children of each node
+  for (std::size_t i = 0; i < nodes; ++i) {
+    const Condition& condition = tree[i];
+    const std::uint8_t depth = i == 0 ? std::uint8_t{0} : depths[condition.parent];
+    const bool is_plain_root = i == 0 && condition.kind == ConditionKind::kAll;
+    depths[i] = static_cast<std::uint8_t>(depth + (is_plain_root ? 0 : 1));
+    if (is_plain_root) continue;
+    ++report.nodes;
+    if (report.conditions.size() == kMostConditionsTold) continue;
+    const ConditionReading& reading = status.conditions[i];
+    report.conditions.push_back({textOf(scenario, condition), static_cast<float>(reading.value),
+                                 static_cast<float>(reading.limit), groupOf(condition.kind), reading.met,
+                                 depth});
   }
   return report;
 }

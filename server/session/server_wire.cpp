@@ -91,7 +91,9 @@ Result<std::unique_ptr<ServerWire>> ServerWire::open(const WireOptions& options,
   wire->newest_seq_.resize(loaded.scenario->hands.size());
   if (auto alone = ServerAnnouncement::refuseBesideAnother(wire->lobby_, options.session); !alone)
     return fail(alone.error().what);
-  if (auto opened = wire->writers_->open(wire->lobby_, wire->session_, wire->writes_); !opened)
+  for (std::uint32_t i = 0; i < loaded.scenario->hands.size(); ++i)
+    wire->hands_.emplace_back(wire->participant_, wire::handPartition(options.session, HandId{i}));
+  if (auto opened = wire->writers_->open(wire->lobby_, wire->session_, wire->hands_, wire->writes_); !opened)
     return fail(opened.error().what);
   if (auto opened = wire->openReaders(); !opened) return fail(opened.error().what);
   wire->sendScene(loaded);
@@ -456,12 +458,16 @@ void ServerWire::statePublished() {
 
 void ServerWire::waitForReaders(std::chrono::nanoseconds timeout) {
   const auto until = std::chrono::steady_clock::now() + timeout;
-  const auto wait = [&](auto& out) {
+  const auto wait = [&](auto& writer) {
     const auto rest = until - std::chrono::steady_clock::now();
-    (void)out.writer->waitForReaders(std::max(rest, std::chrono::nanoseconds(0)));
+    (void)writer.waitForReaders(std::max(rest, std::chrono::nanoseconds(0)));
   };
   if (copies_) copies_->finish(until);
-  std::apply([&](auto&... out) { (wait(out), ...); }, writers_->inSession());
+  std::apply([&](auto&... out) { (wait(*out.writer), ...); }, writers_->inSession());
+  const auto wait_each = [&](HandWriters& out) {
+    std::for_each(out.writers.begin(), out.writers.end(), wait);
+  };
+  std::apply([&](auto&... out) { (wait_each(out), ...); }, writers_->ofHands());
 }
 
 void ServerWire::send(const JournalEntry& entry) {

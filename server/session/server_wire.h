@@ -134,6 +134,7 @@ class ServerWire {
   std::shared_ptr<wire::Participant> participant_;
   wire::Partition lobby_;
   wire::Partition session_;
+  std::vector<wire::Partition> hands_;
   wire::Inbox inbox_;
   std::unique_ptr<ServerWriters> writers_;
   std::unique_ptr<JournalCopies> copies_;  ///< null: the journal is not published

@@ -4,8 +4,10 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 #include "idl/types/messages.h"
 #include "idl/types/result.h"
@@ -61,6 +63,31 @@ struct TopicWriter {
   }
 };
 
+/// Writers of the contacts of hands, each in the partition of its hand.
+struct HandWriters {
+  const wire::Topic<HandManifold>& topic;
+  std::vector<wire::Writer<HandManifold>> writers;  ///< by hand
+  std::uint64_t samples = 0;                        ///< as TopicWriter::samples
+  WriteCounts* counts = nullptr;
+
+  void send(const HandManifold& message) {
+    const bool written = counts->time([&] { return writers[message.hand.value].write(message).has_value(); });
+    counts->failed += written ? 0 : 1;
+  }
+  void write(const HandManifold& message) {
+    ++samples;
+    send(message);
+  }
+  Result<void> open(std::span<wire::Partition> hands) {
+    for (wire::Partition& hand : hands) {
+      auto opened = wire::Writer<HandManifold>::open(hand, topic);
+      if (!opened) return fail(opened.error().what);
+      writers.push_back(std::move(*opened));
+    }
+    return {};
+  }
+};
+
 /// All writers of a session's server but those of JournalCopies.
 ///
 /// Threads: one (wire). Real-time: no.
@@ -71,8 +98,8 @@ struct ServerWriters {
   TopicWriter<WorldFrame> frame_1k{wire::kWorldFrame1k, {}};
   TopicWriter<WorldFrame> frame_100{wire::kWorldFrame100, {}};
   TopicWriter<WorldFrame> frame_30{wire::kWorldFrame30, {}};
-  TopicWriter<HandManifold> manifold{wire::kHandManifold, {}};
-  TopicWriter<HandManifold> manifold_50{wire::kHandManifold50, {}};
+  HandWriters manifold{wire::kHandManifold, {}};
+  HandWriters manifold_50{wire::kHandManifold50, {}};
   TopicWriter<ContactPairs> pairs{wire::kContactPairs100, {}};
   TopicWriter<TickStats> stats{wire::kTickStats100, {}};
   TopicWriter<ObjectSnapshot> snapshot{wire::kObjectSnapshot, {}};
@@ -94,27 +121,29 @@ struct ServerWriters {
 
   auto inLobby() { return std::tie(announce, welcome); }
   auto inSession() {
-    return std::tie(frame_1k, frame_100, frame_30, manifold, manifold_50, pairs, stats, snapshot, object,
-                    hand, scene_step, step, progress, run, grab, matrix, ack, guidance, event, clock, stop,
-                    clear, published);
+    return std::tie(frame_1k, frame_100, frame_30, pairs, stats, snapshot, object, hand, scene_step, step,
+                    progress, run, grab, matrix, ack, guidance, event, clock, stop, clear, published);
   }
+  auto ofHands() { return std::tie(manifold, manifold_50); }
   /// Written in ticks by send(OutgoingMessages), with the tick in each sample, and recorded.
   auto ofTicks() {
     return std::tie(frame_1k, frame_100, frame_30, manifold, pairs, stats, snapshot, progress, grab);
   }
 
-  /// Opens all; what they write is counted in `counts`, which must outlive this.
-  Result<void> open(wire::Partition& lobby, wire::Partition& session, WriteCounts& counts) {
+  /// Opens all, of `hands` by hand; what they write is counted in `counts`, which must outlive this.
+  Result<void> open(wire::Partition& lobby, wire::Partition& session, std::span<wire::Partition> hands,
+                    WriteCounts& counts) {
     Result<void> result;
-    wire::Partition* partition = &lobby;
-    const auto open_one = [&](auto& out) {
-      out.counts = &counts;
-      if (result) result = out.open(*partition);
+    const auto open_in = [&](auto&& where, auto writers) {
+      const auto open_one = [&](auto& out) {
+        out.counts = &counts;
+        if (result) result = out.open(where);
+      };
+      std::apply([&](auto&... out) { (open_one(out), ...); }, writers);
     };
-    const auto open_each = [&](auto&... out) { (open_one(out), ...); };
-    std::apply(open_each, inLobby());
-    partition = &session;
-    std::apply(open_each, inSession());
+    open_in(lobby, inLobby());
+    open_in(session, inSession());
+    open_in(hands, ofHands());
     return result;
   }
 };

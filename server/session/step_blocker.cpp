@@ -1,6 +1,7 @@
 #include "server/session/step_blocker.h"
 
 #include <algorithm>
+#include <optional>
 #include <tuple>
 
 #include <fmt/format.h>
@@ -39,12 +40,19 @@ std::string errorText(const ScenarioState& state, const game_control::StepStatus
   return text.empty() ? text : text + " from its place";
 }
 
-/// The first condition that is not met; empty when there is none.
+/// The first condition that is not met and in no group that is; empty when there is none.
 std::string unmetCondition(const ScenarioFile& scenario, const game_control::StepStatus& step) {
   const StepProgress progress = game_control::progress(scenario, step, step.tick);
-  const auto unmet = std::find_if(progress.conditions.begin(), progress.conditions.end(),
-                                  [](const ConditionValue& condition) { return !condition.met; });
-  return unmet == progress.conditions.end() ? "" : "not met: " + unmet->text;
+  std::optional<std::uint8_t> met_depth;  // of the group around this condition that is met
+  for (const ConditionValue& condition : progress.conditions) {
+    if (met_depth && condition.depth <= *met_depth) met_depth.reset();
+    if (met_depth) continue;
+    if (condition.met)
+      met_depth = condition.depth;
+    else if (condition.group == ConditionGroup::kSingle)
+      return "not met: " + condition.text;
+  }
+  return "";
 }
 
 }  // namespace

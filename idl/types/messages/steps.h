@@ -45,13 +45,25 @@ struct SceneStep {
   std::string part;  ///< as in StepState
 };
 
-/// One condition of a step.
-struct ConditionValue {
-  std::string text;    ///< as in the scenario: "pose of control_box", "contact pointer-control_box"
-  double value = 0.0;  ///< [m], [N], [s] or [-], by the kind of the condition
-  double limit = 0.0;  ///< [m], [N], [s] or [-] in the unit of `value`
-  bool met = false;
+/// What a node of a condition tree is.
+enum class ConditionGroup : std::uint8_t {
+  kSingle,  ///< a condition
+  kAll,     ///< met when all of its children are
+  kAny,     ///< met when one of its children is
 };
+
+/// A node of the condition tree of a step (paper Fig. 4): a condition, or a group of those that follow it at
+/// a larger depth.
+struct ConditionValue {
+  std::string text;   ///< as in the scenario: "pose of control_box", "contact pointer-control_box"
+  float value = 0.0;  ///< [m], [N], [s] or [-], by the kind of the condition; group: children that are met
+  float limit = 0.0;  ///< [m], [N], [s] or [-] in the unit of `value`
+  ConditionGroup group = ConditionGroup::kSingle;
+  bool met = false;
+  std::uint8_t depth = 0;  ///< groups around it; a root that asks for all of its children is not told
+};
+
+inline constexpr std::size_t kMostConditionsTold = 12;  ///< in a StepProgress
 
 /// How far the current step is fulfilled.
 struct StepProgress {
@@ -60,7 +72,8 @@ struct StepProgress {
   double position_error = 0.0;   ///< [m] of the object from its target
   double angle_error = 0.0;      ///< [rad] of the object from its target
   double contact_seconds = 0.0;  ///< [s] of contact of the object in this step
-  std::vector<ConditionValue> conditions;
+  std::uint32_t nodes = 0;       ///< of the condition tree: `conditions` are the first kMostConditionsTold
+  std::vector<ConditionValue> conditions;  ///< parents before their children, in the scenario's order
 };
 
 }  // namespace tenon

@@ -330,8 +330,52 @@ TEST(StateMachine, DescribesTheStateAndItsProgress) {
   EXPECT_EQ(report.tick, 7U);
   ASSERT_EQ(report.conditions.size(), 1U);
   EXPECT_EQ(report.conditions[0].text, "pose of part");
-  EXPECT_DOUBLE_EQ(report.conditions[0].value, report.position_error);
-  EXPECT_DOUBLE_EQ(report.conditions[0].limit, 0.002);
+  EXPECT_FLOAT_EQ(report.conditions[0].value, static_cast<float>(report.position_error));
+  EXPECT_FLOAT_EQ(report.conditions[0].limit, 0.002F);
+  EXPECT_EQ(report.nodes, 1U);
+  EXPECT_EQ(report.conditions[0].depth, 0U);
+}
+
+TEST(StateMachine, ProgressTellsTheConditionTree) {
+  const std::string conditions =
+      "    touch: part\n    conditions:\n      - any:\n          - {signal: bell}\n          - all:\n"
+      "              - {command: fulfilled}\n              - {signal: whistle}\n      - {command: "
+      "fulfilled}\n";
+  test::ScenarioFixture fixture(
+      test::with(test::smallScenario(), "    touch: part\n    for: 0.1 s\n", conditions));
+  EXPECT_EQ(progress(fixture.scenario(), fixture.status(), 0).nodes, 0U) << "nothing was evaluated yet";
+  fixture.step({command(CommandKind::kFulfilled)});
+  const StepProgress report = progress(fixture.scenario(), fixture.status(), 1);
+  struct Row {
+    std::string text;
+    int depth;
+    ConditionGroup group;
+    float value, limit;
+    bool met;
+    bool operator==(const Row&) const = default;
+  };
+  std::vector<Row> rows;
+  for (const ConditionValue& c : report.conditions)
+    rows.push_back({c.text, c.depth, c.group, c.value, c.limit, c.met});
+  const auto kSingle = ConditionGroup::kSingle;
+  EXPECT_EQ(report.nodes, 6U) << "a root that asks for all is not told";
+  EXPECT_EQ(rows, (std::vector<Row>{{"any", 0, ConditionGroup::kAny, 0, 1, false},
+                                    {"signal bell", 1, kSingle, 0, 1, false},
+                                    {"all", 1, ConditionGroup::kAll, 1, 2, false},
+                                    {"command fulfilled", 2, kSingle, 1, 1, true},
+                                    {"signal whistle", 2, kSingle, 0, 1, false},
+                                    {"command fulfilled", 0, kSingle, 1, 1, true}}));
+}
+
+TEST(StateMachine, ProgressCountsTheNodesThatItDoesNotTell) {
+  std::string conditions = "    touch: part\n    conditions:\n";
+  for (int i = 0; i < 20; ++i) conditions += "      - {signal: s" + std::to_string(i) + "}\n";
+  test::ScenarioFixture fixture(
+      test::with(test::smallScenario(), "    touch: part\n    for: 0.1 s\n", conditions));
+  fixture.step();
+  const StepProgress report = progress(fixture.scenario(), fixture.status(), 1);
+  EXPECT_EQ(report.nodes, 20U);
+  EXPECT_EQ(report.conditions.size(), kMostConditionsTold);
 }
 
 TEST(StateMachine, TheSameHandMotionGivesTheSameHash) {

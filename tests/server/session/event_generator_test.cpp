@@ -175,6 +175,20 @@ TEST(EventGenerator, AStepThatTimesOutWithoutATouchSaysSo) {
   EXPECT_EQ(whatBlocks(*rig.loaded().scenario, output), "part was not touched");
 }
 
+TEST(EventGenerator, AConditionOfAGroupThatIsMetBlocksNothing) {
+  const std::string conditions =
+      "    conditions:\n      - any:\n          - {signal: bell}\n          - {signal: whistle}\n"
+      "      - {signal: horn}\n";
+  test::SessionRig rig(1, {},
+                       test::with(test::smallScenario(), "    touch: part\n    for: 0.1 s\n", conditions));
+  TickOutput output = rig.tick();
+  enum : std::size_t { kRoot, kAny, kBell, kWhistle, kHorn, kNodes };
+  ASSERT_EQ(output.step.conditions.size(), std::size_t{kNodes});
+  EXPECT_EQ(whatBlocks(*rig.loaded().scenario, output), "not met: signal bell");
+  output.step.conditions[kWhistle].met = output.step.conditions[kAny].met = true;
+  EXPECT_EQ(whatBlocks(*rig.loaded().scenario, output), "not met: signal horn");
+}
+
 TEST(EventGenerator, EveryObjectHasASnapshotWithinASecond) {
   test::SessionRig rig;
   EventGenerator generator(rig.loaded().scenario, kEpoch);

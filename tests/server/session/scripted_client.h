@@ -31,10 +31,11 @@ inline const wire::SharedKey kTestKey{{1, 2, 3}};
 /// Threads: one.
 class ScriptedClient {
  public:
-  ScriptedClient(std::string session, wire::LinkProfile profile)
+  ScriptedClient(const std::string& session, wire::LinkProfile profile)
       : bus_(participant(ownDomain(), profile)),
         lobby_(bus_, wire::kLobby, wire::LinkProfile::kLan),
-        session_(bus_, wire::sessionPartition(std::move(session))),
+        session_(bus_, wire::sessionPartition(session)),
+        everything_(bus_, wire::sessionPartition(session), profile, wire::handPartitions(session)),
         joins_(wire::Writer<Join>::open(lobby_, wire::kJoin).value()),
         inputs_(wire::Writer<DeviceInput>::open(session_, wire::kDeviceInput).value()),
         commands_(wire::Writer<Command>::open(session_, wire::kCommand).value()),
@@ -51,7 +52,7 @@ class ScriptedClient {
     subscribe(session_, wire::kEmergencyStop, [this](const EmergencyStop& stop) { stops.raise(stop); });
     subscribe(session_, wire::kEmergencyClear,
               [this](const EmergencyClear& cleared) { stops.clear(cleared); });
-    subscribe(session_, wire::kHandManifold, [this](const HandManifold& manifold) {
+    subscribe(everything_, wire::kHandManifold, [this](const HandManifold& manifold) {
       if (manifold.hand == controlledHand()) newest = manifold, ++manifolds;
     });
     subscribe(session_, wire::kCommandAck, [this](const CommandAck& answer) {
@@ -153,6 +154,7 @@ class ScriptedClient {
   std::shared_ptr<wire::Participant> bus_;
   wire::Partition lobby_;
   wire::Partition session_;
+  wire::Partition everything_;  ///< to read contacts of all hands, too
   wire::Writer<Join> joins_;
   wire::Writer<DeviceInput> inputs_;
   wire::Writer<Command> commands_;

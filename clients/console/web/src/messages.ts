@@ -36,7 +36,9 @@ export interface StepState {
 }
 export interface StepProgress {
   revision: number; tick: bigint; position_error: number; angle_error: number; contact_seconds: number;
-  conditions: { text: string; value: number; limit: number; met: boolean }[];
+  nodes: number;
+  /** The condition tree, parents before their children; `group`: 0 a condition, 1 all, 2 any of the deeper ones that follow. */
+  conditions: { text: string; value: number; limit: number; group: number; met: boolean; depth: number }[];
 }
 export interface SceneStep { step: number; steps: number; name: string; title: Localized[]; part: string }
 export interface SceneHand { hand_id: number; name: string; role: number; object_id: number; freeze_ticks: number; park_ticks: number }

@@ -24,6 +24,7 @@ const STEP: Record<StepPhase, [Key, Icon, string]> = {
   [StepPhase.TimedOut]: ["step.timed_out", "warn", "warn"],
   [StepPhase.Skipped]: ["step.skipped", "skip", "warn"],
 };
+const SINGLE = 0; // ConditionGroup of the messages: no group
 const EVENTS_SHOWN = 40;
 const TRAINEE = 2; // as in the messages
 
@@ -70,6 +71,12 @@ function meter(label: string, text: string, fraction: number, isMet: boolean): H
   return h("li", isMet ? "met" : "", icon(isMet ? "done" : "wait"), h("span", "", label), h("output", "", text), h("div", "bar", bar));
 }
 
+/** A row of the condition tree below `depth` groups. */
+function nested(depth: number, row: HTMLElement): HTMLElement {
+  row.style.setProperty("--depth", String(depth));
+  return row;
+}
+
 function conditions(session: Session): Node[] {
   const { step, progress } = session;
   if (step === undefined || progress === undefined || progress.revision !== step.revision) return [];
@@ -83,12 +90,18 @@ function conditions(session: Session): Node[] {
       meter(t("condition.angle"), `${degrees.toFixed(degrees < 10 ? 1 : 0)} / ${limits[1].toFixed(0)}°`, limits[1] / Math.max(degrees, 1e-9), degrees <= limits[1]),
     );
   }
-  for (const { text, value, limit, met } of progress.conditions) {
-    if (step.has_target && text.startsWith("pose of")) continue;
+  for (const { text, value, limit, group, met, depth } of progress.conditions) {
+    if (step.has_target && depth === 0 && text.startsWith("pose of")) continue; // the two rows above
     const { label, unit } = conditionOf(session, text);
+    if (group !== SINGLE) {
+      rows.push(nested(depth, h("li", met ? "group met" : "group", icon(met ? "done" : "wait"), h("span", "", label), h("output", "", `${value} / ${limit}`))));
+      continue;
+    }
     const reading = unit === "" ? `${Number(value.toPrecision(3))} / ${Number(limit.toPrecision(3))}` : `${value.toFixed(1)} / ${limit.toFixed(1)} ${unit}`;
-    rows.push(meter(label, reading, limit === 0 ? (met ? 1 : 0) : value / limit, met));
+    rows.push(nested(depth, meter(label, reading, limit === 0 ? (met ? 1 : 0) : value / limit, met)));
   }
+  const more = progress.nodes - progress.conditions.length;
+  if (more > 0) rows.push(h("li", "", icon("wait"), h("span", "", t("condition.more", { count: more }))));
   return rows.length === 0 ? [] : [h("ul", "conditions", ...rows)];
 }
 
