@@ -1,5 +1,6 @@
 #include "clients/console/foxglove_messages.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -103,6 +104,17 @@ MessageType frameTransformsType() {
 MessageType sceneUpdateType() { return {"foxglove::SceneUpdate", joined({kTime, kGeometry, kScene, kEnd})}; }
 MessageType logType() { return {"foxglove::Log", joined({kTime, kLog, kEnd})}; }
 
+bool hasColors(std::span<const std::uint8_t> glb) {
+  // its first chunk is JSON: length at byte 12, content from byte 20 on
+  constexpr std::size_t kJson = 20;
+  if (glb.size() < kJson) return false;
+  std::uint32_t length = 0;
+  std::memcpy(&length, glb.data() + 12, sizeof length);
+  const std::size_t size = std::min<std::size_t>(length, glb.size() - kJson);
+  return std::string_view(reinterpret_cast<const char*>(glb.data()) + kJson, size).find("\"COLOR_0\"") !=
+         std::string_view::npos;
+}
+
 Rgba colorOf(std::string_view text) {
   Rgba color{0.6, 0.6, 0.6, 1.0};
   if ((text.size() != 7 && text.size() != 9) || text.front() != '#') return color;
@@ -155,7 +167,7 @@ std::vector<std::uint8_t> encodeEntity(const SceneEntity& entity, std::int64_t t
     out.put(entity.X_FE);
     out.put(Vector3(1.0, 1.0, 1.0));
     out.put(entity.color);
-    out.put(true);  // its own colour instead of the model's
+    out.put(!entity.own_colors);
     out.put(std::string_view());
     out.put(std::string_view("model/gltf-binary"));
     out.put(std::span<const std::uint8_t>(entity.glb));

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -45,9 +46,12 @@ struct SceneEntity {
   Pose X_FE;
   Rgba color{};
   std::vector<std::uint8_t> glb;     ///< y up; empty: a box
+  bool own_colors = false;           ///< the model's colours instead of `color`
   Vector3 size = Vector3::Zero();    ///< [m] of the box
   Vector3 centre = Vector3::Zero();  ///< [m] of the box, in the entity's frame
 };
+/// Whether a binary glTF file has colours of its own (COLOR_0).
+[[nodiscard]] bool hasColors(std::span<const std::uint8_t> glb);
 [[nodiscard]] std::vector<std::uint8_t> encodeEntity(const SceneEntity& entity, std::int64_t time_ns);
 /// Removes the entity; an empty `id` removes all.
 [[nodiscard]] std::vector<std::uint8_t> encodeDeletion(std::string_view id, std::int64_t time_ns);

@@ -189,12 +189,15 @@ void SessionChannels::showOrHide(std::uint32_t id, std::int64_t time_ns) {
     publish(kModels, id, time_ns, encodeDeletion(part.object.name, time_ns));
     return;
   }
+  auto model = modelOf(ObjectId{id});
+  const bool own_colors = hasColors(model);
   publish(kModels, id, time_ns,
           encodeEntity({.id = part.object.name,
                         .frame = part.object.name,
                         .X_FE = {},
                         .color = colorOf(part.object.color),
-                        .glb = modelOf(ObjectId{id}),
+                        .glb = std::move(model),
+                        .own_colors = own_colors,
                         .size = part.object.size,
                         .centre = part.object.centre},
                        time_ns));

@@ -32,6 +32,15 @@ void append(std::vector<char>& bytes, const void* data, std::size_t size) {
   bytes.insert(bytes.end(), from, from + size);
 }
 
+/// The attribute of an STL facet as most viewers and assimp read it: bit 15 says that it is a colour, of 5
+/// bits each for red, green and blue.
+std::uint16_t attributeOf(Color color) {
+  std::uint32_t bits = 1;
+  for (const std::uint32_t shift : {16U, 8U, 0U})
+    bits = bits << 5U | (((color >> shift & 0xFFU) * 31 + 127) / 255);
+  return static_cast<std::uint16_t>(bits);
+}
+
 void append(std::vector<char>& bytes, const Vector3f& v) { append(bytes, v.data(), 3 * sizeof(float)); }
 
 }  // namespace
@@ -62,12 +71,14 @@ Result<void> writeStl(const std::filesystem::path& file, const PartMesh& mesh) {
   std::memcpy(bytes.data(), "tenon part, millimetres", 23);
   const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
   append(bytes, &count, sizeof count);
-  for (const auto& triangle : mesh.triangles) {
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const std::array<Vector3, 3>& triangle = mesh.triangles[i];
     const Vector3 normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
     const double length = normal.norm();
     append(bytes, length > 0.0 ? Vector3f((normal / length).cast<float>()) : Vector3f::Zero());
     for (const Vector3& corner : triangle) append(bytes, Vector3f((corner / kMillimetre).cast<float>()));
-    bytes.insert(bytes.end(), 2, '\0');
+    const std::uint16_t attribute = i < mesh.paint.size() ? attributeOf(mesh.paint[i]) : std::uint16_t{0};
+    append(bytes, &attribute, sizeof attribute);
   }
   std::ofstream out(file, std::ios::binary);
   out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));

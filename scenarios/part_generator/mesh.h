@@ -36,8 +36,8 @@ struct PartMesh {
 /// Whether the point is inside one of the closed shells, by ray parity for each shell: tests every triangle.
 [[nodiscard]] bool insideAnyShell(const PartMesh& mesh, const Vector3& p_MP);
 
-/// Writes binary STL in millimetres. The same mesh gives the same bytes on every machine. Fails when the file
-/// cannot be written.
+/// Writes binary STL in millimetres, with the colour of each triangle in 15 bits. The same mesh gives the
+/// same bytes on every machine. Fails when the file cannot be written.
 [[nodiscard]] Result<void> writeStl(const std::filesystem::path& file, const PartMesh& mesh);
 
 }  // namespace tenon::part_generator

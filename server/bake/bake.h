@@ -13,10 +13,15 @@
 
 namespace tenon::bake {
 
+inline constexpr std::uint32_t kNoColor = 0xFFFFFFFF;
+
 /// A triangle soup as imported: not welded, without normals, not necessarily watertight. Frame M.
 struct TriangleMesh {
   std::vector<Vector3f> vertices;  ///< [m]
   std::vector<std::array<std::uint32_t, 3>> triangles;
+  /// 0xRRGGBB, sRGB: one for each triangle, kNoColor where its file has none; empty when no file has colours.
+  /// They are for displays: what is baked does not depend on them.
+  std::vector<std::uint32_t> colors;
   std::vector<std::string> notes;  ///< one sentence for each thing that the import skipped or changed
 };
 

@@ -16,7 +16,7 @@ namespace {
 // Raised when a new release of this program computes other structures from the same meshes and options.
 constexpr std::uint32_t kBakeVersion = 17;
 // The same for display models.
-constexpr std::uint32_t kDisplayVersion = 1;
+constexpr std::uint32_t kDisplayVersion = 2;
 
 /// Incremental hash of all inputs of a bake.
 class ContentHash {
@@ -52,11 +52,13 @@ class ContentHash {
   XXH3_state_t* state_;
 };
 
-Result<void> addMeshes(ContentHash& hash, const std::vector<std::filesystem::path>& meshes) {
+/// `colors`: also of files that change colours alone.
+Result<void> addMeshes(ContentHash& hash, const std::vector<std::filesystem::path>& meshes, bool colors) {
   for (const auto& mesh : meshes) {
     if (!hash.addFile(mesh)) return fail(mesh.string() + ": cannot be read");
     // the names are in the mesh; a file that is missing is left to the import
-    for (const auto& [named, file] : referencesOf(mesh)) {
+    for (const auto& [named, file, only_colors] : referencesOf(mesh)) {
+      if (only_colors && !colors) continue;
       std::error_code error;
       hash.add(file.empty() ? std::uint64_t{0} : std::uint64_t{std::filesystem::file_size(file, error)});
       if (!file.empty() && !hash.addFile(file)) return fail(file.string() + ": cannot be read");
@@ -80,13 +82,18 @@ Result<std::string> contentHash(const std::vector<std::filesystem::path>& meshes
       for (const double c : corner) hash.add(c);
     }
   }
-  if (const auto added = addMeshes(hash, meshes); !added) return tl::unexpected(added.error());
+  if (const auto added = addMeshes(hash, meshes, false); !added) return tl::unexpected(added.error());
   return hash.text();
 }
 
 void append(TriangleMesh& whole, TriangleMesh part) {
   const auto first = static_cast<std::uint32_t>(whole.vertices.size());
   whole.vertices.insert(whole.vertices.end(), part.vertices.begin(), part.vertices.end());
+  if (!whole.colors.empty() || !part.colors.empty()) {
+    whole.colors.resize(whole.triangles.size(), kNoColor);
+    part.colors.resize(part.triangles.size(), kNoColor);
+    whole.colors.insert(whole.colors.end(), part.colors.begin(), part.colors.end());
+  }
   for (const auto& [a, b, c] : part.triangles) whole.triangles.push_back({a + first, b + first, c + first});
   whole.notes.insert(whole.notes.end(), part.notes.begin(), part.notes.end());
 }
@@ -105,19 +112,21 @@ Result<TriangleMesh> importAll(const std::vector<std::filesystem::path>& meshes,
 
 }  // namespace
 
-Result<std::string> displayKey(const std::vector<std::filesystem::path>& meshes, double unit) {
+Result<std::string> displayKey(const std::vector<std::filesystem::path>& meshes, double unit,
+                               std::uint32_t uncolored) {
   ContentHash hash;
   hash.add(kDisplayVersion);
   hash.add(unit);
-  if (const auto added = addMeshes(hash, meshes); !added) return tl::unexpected(added.error());
+  hash.add(uncolored);
+  if (const auto added = addMeshes(hash, meshes, true); !added) return tl::unexpected(added.error());
   return hash.text();
 }
 
 Result<std::vector<DisplayModel>> displayModelsOf(const std::vector<std::filesystem::path>& meshes,
-                                                  double unit) {
+                                                  double unit, std::uint32_t uncolored) {
   const auto whole = importAll(meshes, unit);
   if (!whole) return tl::unexpected(whole.error());
-  return displayModels(*whole);
+  return displayModels(*whole, uncolored);
 }
 
 Result<structures::HapticStructures> bakeFiles(const std::vector<std::filesystem::path>& meshes, double unit,

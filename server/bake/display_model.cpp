@@ -15,32 +15,47 @@ namespace {
 
 constexpr double kCreaseCosine = 0.819;  // [-] of 35 degrees between the normals of two faces
 
-/// Triangles of shared vertices, y up.
+/// Triangles of shared vertices, y up. A vertex has one colour: where two meet there are two vertices.
 struct IndexedMesh {
-  std::vector<Vector3f> positions;  // [m]
+  std::vector<Vector3f> positions;    // [m]
+  std::vector<std::uint32_t> colors;  // 0xRRGGBB, sRGB, of each vertex; empty without colours
   std::vector<std::uint32_t> indices;
 };
 
-IndexedMesh indexed(const TriangleMesh& mesh) {
-  std::vector<std::uint32_t> corners;
-  corners.reserve(3 * mesh.triangles.size());
-  for (const auto& triangle : mesh.triangles) corners.insert(corners.end(), triangle.begin(), triangle.end());
-  std::vector<Vector3f> positions;
-  positions.reserve(mesh.vertices.size());
-  for (const Vector3f& p : mesh.vertices) positions.emplace_back(p.x() + 0.0F, p.z() + 0.0F, -p.y() + 0.0F);
+/// A corner of a triangle, as meshoptimizer compares them: by their bytes.
+struct Corner {
+  Vector3f position;
+  std::uint32_t color = 0;
+};
+static_assert(sizeof(Corner) == 16);
 
-  std::vector<std::uint32_t> remap(positions.size());
-  const std::size_t unique = meshopt_generateVertexRemap(
-      remap.data(), corners.data(), corners.size(), positions.data(), positions.size(), sizeof(Vector3f));
+IndexedMesh indexed(const TriangleMesh& mesh, std::uint32_t uncolored) {
+  std::vector<Corner> corners;
+  corners.reserve(3 * mesh.triangles.size());
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const std::uint32_t own = mesh.colors.empty() ? 0 : mesh.colors[i];
+    for (const std::uint32_t vertex : mesh.triangles[i]) {
+      const Vector3f& p = mesh.vertices[vertex];
+      // + 0: so that a negative zero equals a positive one
+      corners.push_back({{p.x() + 0.0F, p.z() + 0.0F, -p.y() + 0.0F}, own == kNoColor ? uncolored : own});
+    }
+  }
+  std::vector<std::uint32_t> remap(corners.size());
+  const std::size_t unique = meshopt_generateVertexRemap(remap.data(), nullptr, corners.size(),
+                                                         corners.data(), corners.size(), sizeof(Corner));
   IndexedMesh welded;
   welded.positions.resize(unique);
-  meshopt_remapVertexBuffer(welded.positions.data(), positions.data(), positions.size(), sizeof(Vector3f),
-                            remap.data());
+  if (!mesh.colors.empty()) welded.colors.resize(unique);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    welded.positions[remap[i]] = corners[i].position;
+    if (!mesh.colors.empty()) welded.colors[remap[i]] = corners[i].color;
+  }
   for (std::size_t i = 0; i + 2 < corners.size(); i += 3) {
-    const std::uint32_t a = remap[corners[i]];
-    const std::uint32_t b = remap[corners[i + 1]];
-    const std::uint32_t c = remap[corners[i + 2]];
-    if (a != b && b != c && c != a) welded.indices.insert(welded.indices.end(), {a, b, c});
+    const std::uint32_t first = remap[i];
+    const std::uint32_t second = remap[i + 1];
+    const std::uint32_t third = remap[i + 2];
+    if (first != second && second != third && third != first)
+      welded.indices.insert(welded.indices.end(), {first, second, third});
   }
   return welded;
 }
@@ -106,12 +121,24 @@ struct FaceNormals {
   std::vector<std::uint32_t> faces;
 };
 
+/// The linear parts of an sRGB colour (IEC 61966-2-1), as glTF demands them, opaque.
+std::array<std::uint16_t, 4> linear(std::uint32_t color) {
+  constexpr double kMost = std::numeric_limits<std::uint16_t>::max();
+  const auto part = [&](std::uint32_t shift) {
+    const double srgb = static_cast<double>(color >> shift & 0xFFU) / 255.0;
+    const double value = srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4);
+    return static_cast<std::uint16_t>(std::lround(kMost * value));
+  };
+  return {part(16), part(8), part(0), std::numeric_limits<std::uint16_t>::max()};
+}
+
 /// `surface`: of the mesh before it was simplified, whose vertices are a part of its; the faces of a
 /// simplified mesh are slivers here and there, whose normals mean nothing.
 GlbMesh quantised(const IndexedMesh& mesh, const FaceNormals& surface) {
   Eigen::AlignedBox3f box;
   for (const std::uint32_t vertex : mesh.indices) box.extend(mesh.positions[vertex]);
   GlbMesh glb;
+  glb.has_colors = !mesh.colors.empty();
   glb.origin = box.min().cast<double>();
   glb.step =
       std::max(1e-9, static_cast<double>(box.sizes().maxCoeff())) / std::numeric_limits<std::uint16_t>::max();
@@ -127,6 +154,7 @@ GlbMesh quantised(const IndexedMesh& mesh, const FaceNormals& surface) {
           std::lround((static_cast<double>(mesh.positions[vertex][axis]) - glb.origin[axis]) / glb.step));
       made.normal[at] = static_cast<std::int8_t>(std::lround(127.0F * normal[axis]));
     }
+    if (glb.has_colors) made.color = linear(mesh.colors[vertex]);
     const auto [entry, is_new] = known.try_emplace({vertex, made.normal[0], made.normal[1], made.normal[2]},
                                                    static_cast<std::uint32_t>(glb.vertices.size()));
     if (is_new) glb.vertices.push_back(made);
@@ -144,8 +172,8 @@ GlbMesh quantised(const IndexedMesh& mesh, const FaceNormals& surface) {
 
 }  // namespace
 
-Result<std::vector<DisplayModel>> displayModels(const TriangleMesh& mesh) {
-  const IndexedMesh whole = mesh.triangles.empty() ? IndexedMesh{} : indexed(mesh);
+Result<std::vector<DisplayModel>> displayModels(const TriangleMesh& mesh, std::uint32_t uncolored) {
+  const IndexedMesh whole = mesh.triangles.empty() ? IndexedMesh{} : indexed(mesh, uncolored);
   if (whole.indices.empty()) return fail("the mesh has no triangle with an area");
   const FaceNormals surface(whole);
   std::vector<DisplayModel> models;

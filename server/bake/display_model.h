@@ -22,18 +22,21 @@ struct DisplayModel {
 /// Triangles of the levels of a display model at most; a level that would equal the one before is not made.
 inline constexpr std::array<std::uint32_t, 2> kDisplayTriangles{150'000, 40'000};
 
-/// The levels of a mesh, the finest first; edges sharper than 35 degrees stay visible. Fails for a mesh
-/// without area.
+/// The levels of a mesh, the finest first; edges sharper than 35 degrees stay visible, and so do borders of
+/// colours. A mesh with colours has them in its model (COLOR_0), with `uncolored` (0xRRGGBB, sRGB) for
+/// triangles without one. Fails for a mesh without area.
 ///
 /// Threads: pure. Real-time: no.
-[[nodiscard]] Result<std::vector<DisplayModel>> displayModels(const TriangleMesh& mesh);
+[[nodiscard]] Result<std::vector<DisplayModel>> displayModels(const TriangleMesh& mesh,
+                                                              std::uint32_t uncolored);
 
-/// A hash of the contents of mesh files of unit `unit` [m] and of how displayModels works: equal keys, equal
-/// models. Fails when a file cannot be read.
-[[nodiscard]] Result<std::string> displayKey(const std::vector<std::filesystem::path>& meshes, double unit);
+/// A hash of the contents of mesh files of unit `unit` [m], of `uncolored` and of how displayModels works:
+/// equal keys, equal models. Fails when a file cannot be read.
+[[nodiscard]] Result<std::string> displayKey(const std::vector<std::filesystem::path>& meshes, double unit,
+                                             std::uint32_t uncolored);
 
 /// importMesh and displayModels of several files, of unit `unit` [m], as one object.
 [[nodiscard]] Result<std::vector<DisplayModel>> displayModelsOf(
-    const std::vector<std::filesystem::path>& meshes, double unit);
+    const std::vector<std::filesystem::path>& meshes, double unit, std::uint32_t uncolored);
 
 }  // namespace tenon::bake

@@ -62,8 +62,10 @@ void pad(std::vector<std::uint8_t>& bytes, std::uint8_t with) {
 }  // namespace
 
 std::vector<std::uint8_t> writeGlb(const GlbMesh& mesh) {
-  const std::array<GlbView, 3> views{encodeAttribute(mesh.vertices, &GlbVertex::position),
-                                     encodeAttribute(mesh.vertices, &GlbVertex::normal), encodeIndices(mesh)};
+  std::vector<GlbView> views{encodeAttribute(mesh.vertices, &GlbVertex::position),
+                             encodeAttribute(mesh.vertices, &GlbVertex::normal)};
+  if (mesh.has_colors) views.push_back(encodeAttribute(mesh.vertices, &GlbVertex::color));
+  views.push_back(encodeIndices(mesh));
   std::vector<std::uint8_t> binary;
   std::string view_list;
   std::size_t plain_size = 0;
@@ -98,16 +100,23 @@ std::vector<std::uint8_t> writeGlb(const GlbMesh& mesh) {
       R"("extensionsRequired":["KHR_mesh_quantization","EXT_meshopt_compression"],)"
       R"("scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,"translation":)" +
       listText(mesh.origin) + R"(,"scale":[)" + step + "," + step + "," + step +
-      R"(]}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":1},"indices":2,"material":0}]}],)"
-      R"("materials":[{"pbrMetallicRoughness":{"baseColorFactor":[0.6,0.6,0.6,1],"metallicFactor":0,)"
+      R"(]}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":1)" +
+      (mesh.has_colors ? R"(,"COLOR_0":2},"indices":3)" : R"(},"indices":2)") +
+      R"(,"material":0}]}],"materials":[{"pbrMetallicRoughness":{"baseColorFactor":)" +
+      (mesh.has_colors ? "[1,1,1,1]" : "[0.6,0.6,0.6,1]") +
+      R"(,"metallicFactor":0,)"
       R"("roughnessFactor":0.7},"doubleSided":true}],"accessors":[{"bufferView":0,"componentType":5123,)"
       R"("count":)" +
       vertices + R"(,"type":"VEC3","min":)" + listText(low) + R"(,"max":)" + listText(high) +
       R"(},{"bufferView":1,"componentType":5120,"normalized":true,"count":)" + vertices +
-      R"(,"type":"VEC3"},{"bufferView":2,"componentType":5125,"count":)" +
-      std::to_string(mesh.indices.size()) + R"(,"type":"SCALAR"}],"bufferViews":[)" + view_list +
-      R"(],"buffers":[{"byteLength":)" + std::to_string(binary.size()) + R"(},{"byteLength":)" +
-      std::to_string(plain_size) + R"(,"extensions":{"EXT_meshopt_compression":{"fallback":true}}}]})";
+      R"(,"type":"VEC3"})" +
+      (mesh.has_colors ? R"(,{"bufferView":2,"componentType":5123,"normalized":true,"count":)" + vertices +
+                             R"(,"type":"VEC4"},{"bufferView":3)"
+                       : std::string(R"(,{"bufferView":2)")) +
+      R"(,"componentType":5125,"count":)" + std::to_string(mesh.indices.size()) +
+      R"(,"type":"SCALAR"}],"bufferViews":[)" + view_list + R"(],"buffers":[{"byteLength":)" +
+      std::to_string(binary.size()) + R"(},{"byteLength":)" + std::to_string(plain_size) +
+      R"(,"extensions":{"EXT_meshopt_compression":{"fallback":true}}}]})";
   std::vector<std::uint8_t> text(json.begin(), json.end());
   pad(text, ' ');
 

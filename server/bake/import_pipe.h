@@ -6,13 +6,15 @@
 namespace tenon::bake {
 
 /// Header of the importing child's result in the memory file that its parent provides. It is followed by 3
-/// floats [m] per vertex, 3 vertex indices per triangle, and text (the reason of a failure).
+/// floats [m] per vertex, 3 vertex indices per triangle, a colour (TriangleMesh::colors) per triangle or none
+/// at all, and text (the reason of a failure).
 struct ImportHeader {
-  static constexpr std::uint64_t kMagic = 0x544E2D4D45534831ULL;
+  static constexpr std::uint64_t kMagic = 0x544E2D4D45534832ULL;
   std::uint64_t magic = kMagic;
   std::uint64_t failed = 0;
   std::uint64_t vertices = 0;
   std::uint64_t triangles = 0;
+  std::uint64_t colors = 0;  ///< `triangles`, or 0
   std::uint64_t text_bytes = 0;
 };
 

@@ -141,7 +141,9 @@ Result<TriangleMesh> readImported(const std::string& name, int memory) {
   const auto size = static_cast<std::uint64_t>(status.st_size);
   constexpr std::uint64_t kMost = 1ULL << 32U;
   if (header.vertices >= kMost || header.triangles >= kMost || header.text_bytes >= kMost ||
-      sizeof header + 12 * header.vertices + 12 * header.triangles + header.text_bytes != size) {
+      (header.colors != 0 && header.colors != header.triangles) ||
+      sizeof header + 12 * header.vertices + 12 * header.triangles + 4 * header.colors + header.text_bytes !=
+          size) {
     return fail(name + ": the importer returned an inconsistent result");
   }
   const std::uint64_t text_at = size - header.text_bytes;
@@ -149,9 +151,12 @@ Result<TriangleMesh> readImported(const std::string& name, int memory) {
   TriangleMesh mesh;
   mesh.vertices.resize(header.vertices);
   mesh.triangles.resize(header.triangles);
+  mesh.colors.resize(header.colors);
   if (!readArray(memory, sizeof header, mesh.vertices.data(), 12 * header.vertices) ||
       !readArray(memory, sizeof header + 12 * header.vertices, mesh.triangles.data(),
-                 12 * header.triangles)) {
+                 12 * header.triangles) ||
+      !readArray(memory, sizeof header + 12 * header.vertices + 12 * header.triangles, mesh.colors.data(),
+                 4 * header.colors)) {
     return fail(name + ": the importer's result cannot be read");
   }
   for (const auto& triangle : mesh.triangles) {
@@ -175,11 +180,19 @@ double signedVolume(const TriangleMesh& mesh) {
 Result<TriangleMesh> checked(const std::string& name, TriangleMesh mesh) {
   const std::size_t before = mesh.triangles.size();
   if (before == 0) return fail(name + ": has no triangles");
-  std::erase_if(mesh.triangles, [&](const auto& triangle) {
-    return !std::all_of(triangle.begin(), triangle.end(),
-                        [&](std::uint32_t corner) { return mesh.vertices[corner].allFinite(); });
-  });
-  const std::size_t invalid = before - mesh.triangles.size();
+  std::size_t valid = 0;
+  for (std::size_t i = 0; i < before; ++i) {
+    const auto& triangle = mesh.triangles[i];
+    if (!std::all_of(triangle.begin(), triangle.end(),
+                     [&](std::uint32_t corner) { return mesh.vertices[corner].allFinite(); }))
+      continue;
+    mesh.triangles[valid] = triangle;
+    if (!mesh.colors.empty()) mesh.colors[valid] = mesh.colors[i];
+    ++valid;
+  }
+  mesh.triangles.resize(valid);
+  if (!mesh.colors.empty()) mesh.colors.resize(valid);
+  const std::size_t invalid = before - valid;
   if (static_cast<double>(invalid) > kMaxInvalid * static_cast<double>(before)) {
     return fail(name + ": " + std::to_string(invalid) + " of " + std::to_string(before) +
                 " triangles have vertices that are not finite");

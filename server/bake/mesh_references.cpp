@@ -12,11 +12,28 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool isGltf(const fs::path& mesh) {
+/// In lower case.
+std::string extensionOf(const fs::path& mesh) {
   std::string extension = mesh.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(c >= 'A' && c <= 'Z' ? c + 32 : c); });
-  return extension == ".gltf" || extension == ".glb";
+  return extension;
+}
+
+/// The material libraries that an OBJ names: one a line, which may have spaces.
+std::set<std::string> librariesOf(const std::string& obj) {
+  constexpr std::string_view kKey = "mtllib";
+  std::set<std::string> names;
+  for (std::size_t at = obj.find(kKey); at != std::string::npos; at = obj.find(kKey, at + 1)) {
+    if (at > 0 && obj[at - 1] != '\n' && obj[at - 1] != '\r') continue;
+    const std::size_t first = obj.find_first_not_of(" \t", at + kKey.size());
+    if (first == std::string::npos || first == at + kKey.size()) continue;
+    const std::size_t end = std::min(obj.find_first_of("\r\n", first), obj.size());
+    const std::size_t last = obj.find_last_not_of(" \t", end - 1);
+    const std::string name = obj.substr(first, last + 1 - first);
+    if (end > first && name.find('\0') == std::string::npos) names.insert(name);
+  }
+  return names;
 }
 
 std::optional<unsigned> hexadecimal(const std::string& text, std::size_t at, std::size_t digits) {
@@ -109,7 +126,9 @@ fs::path findIn(const std::vector<fs::path>& folders, const fs::path& relative) 
 
 std::vector<MeshReference> referencesOf(const fs::path& mesh) {
   std::vector<MeshReference> references;
-  if (!isGltf(mesh)) return references;
+  const std::string extension = extensionOf(mesh);
+  const bool is_obj = extension == ".obj";
+  if (!is_obj && extension != ".gltf" && extension != ".glb") return references;
   std::ifstream in(mesh, std::ios::binary);
   std::ostringstream text;
   text << in.rdbuf();
@@ -118,10 +137,10 @@ std::vector<MeshReference> referencesOf(const fs::path& mesh) {
   std::vector<fs::path> folders{folder};
   const fs::path target = fs::canonical(mesh, error);
   if (!error) folders.push_back(target.parent_path());
-  for (const std::string& uri : urisOf(text.str())) {
+  for (const std::string& uri : is_obj ? librariesOf(text.str()) : urisOf(text.str())) {
     const fs::path relative = fs::path(uri).lexically_normal();
     if (relative.is_absolute() || relative.empty() || *relative.begin() == "..") continue;
-    references.push_back({folder / relative, findIn(folders, relative)});
+    references.push_back({folder / relative, findIn(folders, relative), is_obj});
   }
   return references;
 }

@@ -124,11 +124,16 @@ Result<std::shared_ptr<const structures::HapticStructures>> structuresOf(
   return structures::openStructures(*file);
 }
 
+/// 0xRRGGBB of an object's colour, which is `#rrggbb` or `#rrggbbaa`.
+std::uint32_t colorNumber(const std::string& color) {
+  return static_cast<std::uint32_t>(std::stoul(color.substr(1, 6), nullptr, 16));
+}
+
 /// The levels of one object as JSON; an empty list when its meshes cannot be read. What was made is noted in
 /// a file named by displayKey.
-Result<std::string> displayLevels(const ObjectMeshes& meshes, const wire::AssetStore& store,
-                                  const fs::path& notes) {
-  const auto key = bake::displayKey(meshes.files, meshes.unit);
+Result<std::string> displayLevels(const ObjectMeshes& meshes, std::uint32_t uncolored,
+                                  const wire::AssetStore& store, const fs::path& notes) {
+  const auto key = bake::displayKey(meshes.files, meshes.unit, uncolored);
   if (!key) return std::string("[]");
   std::ifstream noted(notes / *key);
   std::string text;
@@ -138,7 +143,7 @@ Result<std::string> displayLevels(const ObjectMeshes& meshes, const wire::AssetS
     is_whole = is_whole && store.has(text.substr(at + kModelKey.size(), kAssetNameLength));
   if (is_whole) return text;
 
-  const auto models = bake::displayModelsOf(meshes.files, meshes.unit);
+  const auto models = bake::displayModelsOf(meshes.files, meshes.unit, uncolored);
   if (!models) return std::string("[]");
   text.clear();
   for (const bake::DisplayModel& model : *models) {
@@ -268,7 +273,7 @@ Result<std::string> storeAssets(const LoadedScene& loaded, const LoadOptions& op
     if (options.isStopped()) return fail("stopped");
     const auto meshes = meshesOf(scenario, object, *parts, options);
     if (!meshes) return fail(meshes.error().what);
-    const auto levels = displayLevels(*meshes, store, options.cache / "display");
+    const auto levels = displayLevels(*meshes, colorNumber(object.color), store, options.cache / "display");
     if (!levels) return levels;
     objects += (objects.empty() ? "" : ",") + *levels;
   }

@@ -1,5 +1,6 @@
 #include "server/bake/display_model.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <string>
@@ -13,11 +14,14 @@
 namespace tenon::bake {
 namespace {
 
+constexpr std::uint32_t kGrey = 0x808080;
+
 /// What a viewer reads from a display model, in the frame of glTF.
 struct ReadModel {
   nlohmann::json json;
   std::vector<Vector3> positions;  // [m]
   std::vector<Vector3> normals;
+  std::vector<Vector3> colors;  // linear [0..1]; empty without COLOR_0
   std::vector<std::uint32_t> indices;
 };
 
@@ -48,8 +52,19 @@ ReadModel readGlb(const std::vector<std::uint8_t>& glb) {
   std::vector<std::array<std::int8_t, 4>> normals(count);
   EXPECT_EQ(meshopt_decodeVertexBuffer(positions.data(), count, 8, data(0), size(0)), 0);
   EXPECT_EQ(meshopt_decodeVertexBuffer(normals.data(), count, 4, data(1), size(1)), 0);
-  model.indices.resize(model.json["accessors"][2]["count"].get<std::size_t>());
-  EXPECT_EQ(meshopt_decodeIndexBuffer(model.indices.data(), model.indices.size(), data(2), size(2)), 0);
+  const auto& primitive = model.json["meshes"][0]["primitives"][0];
+  if (primitive["attributes"].contains("COLOR_0")) {
+    EXPECT_EQ(primitive["attributes"]["COLOR_0"], 2);
+    std::vector<std::array<std::uint16_t, 4>> colors(count);
+    EXPECT_EQ(meshopt_decodeVertexBuffer(colors.data(), count, 8, data(2), size(2)), 0);
+    for (const auto& [r, g, b, a] : colors) {
+      model.colors.push_back(Vector3(r, g, b) / 65535.0);
+      EXPECT_EQ(a, 65535);
+    }
+  }
+  const std::size_t last = primitive["indices"];
+  model.indices.resize(model.json["accessors"][last]["count"].get<std::size_t>());
+  EXPECT_EQ(meshopt_decodeIndexBuffer(model.indices.data(), model.indices.size(), data(last), size(last)), 0);
   const auto& node = model.json["nodes"][0];
   for (std::size_t i = 0; i < count; ++i) {
     Vector3 p, n;
@@ -67,7 +82,7 @@ ReadModel readGlb(const std::vector<std::uint8_t>& glb) {
 TEST(DisplayModel, ABoxHasSharpEdgesAndStandsUpright) {
   TriangleMesh box = makeBox({0.2, 0.4, 0.6});
   for (Vector3f& p : box.vertices) p += Vector3f(1.0F, 2.0F, 3.0F);
-  const auto models = displayModels(box);
+  const auto models = displayModels(box, kGrey);
   ASSERT_TRUE(models) << models.error().what;
   ASSERT_EQ(models->size(), 1U) << "12 triangles need no second level";
   const ReadModel read = readGlb(models->front().glb);
@@ -96,7 +111,7 @@ TEST(DisplayModel, ManyTrianglesBecomeFewerWithinTheErrorThatIsStated) {
   constexpr double kRadius = 0.5;
   const TriangleMesh sphere = makeSphere(kRadius, 1.5e-5);
   ASSERT_GT(sphere.triangles.size(), kDisplayTriangles[0]);
-  const auto models = displayModels(sphere);
+  const auto models = displayModels(sphere, kGrey);
   ASSERT_TRUE(models) << models.error().what;
   ASSERT_EQ(models->size(), kDisplayTriangles.size());
   for (std::size_t level = 0; level < models->size(); ++level) {
@@ -116,13 +131,62 @@ TEST(DisplayModel, ManyTrianglesBecomeFewerWithinTheErrorThatIsStated) {
 
 TEST(DisplayModel, TheSameMeshGivesTheSameBytes) {
   const TriangleMesh mesh = makeCylinder(0.1, 0.3, 1e-4);
-  EXPECT_EQ(displayModels(mesh)->front().glb, displayModels(mesh)->front().glb);
+  EXPECT_EQ(displayModels(mesh, kGrey)->front().glb, displayModels(mesh, kGrey)->front().glb);
+}
+
+TEST(DisplayModel, EachFaceHasItsColourAndOneWithoutTheGivenOne) {
+  // sRGB 0x80 is 0.2158 of the light of 0xFF
+  constexpr double kHalf = 0.2158;
+  TriangleMesh box = makeBox({0.2, 0.4, 0.6});
+  for (const auto& [a, b, c] : box.triangles) {
+    const Vector3f normal = (box.vertices[b] - box.vertices[a]).cross(box.vertices[c] - box.vertices[a]);
+    box.colors.push_back(normal.z() > 0.01F ? 0xFF8000 : normal.x() > 0.01F ? kNoColor : 0x0000FF);
+  }
+  const ReadModel read = readGlb(displayModels(box, kGrey)->front().glb);
+  ASSERT_EQ(read.colors.size(), read.positions.size());
+  for (std::size_t i = 0; i < read.colors.size(); ++i) {
+    // z of the object is y in glTF
+    const Vector3 color = read.normals[i].y() > 0.9   ? Vector3(1, kHalf, 0)
+                          : read.normals[i].x() > 0.9 ? Vector3(kHalf, kHalf, kHalf)
+                                                      : Vector3(0, 0, 1);
+    EXPECT_LT((read.colors[i] - color).norm(), 1e-3) << read.normals[i].transpose();
+  }
+  EXPECT_TRUE(readGlb(displayModels(makeBox({0.2, 0.4, 0.6}), kGrey)->front().glb).colors.empty());
+}
+
+//   the border of two colours stays where it is when triangles become fewer
+TEST(DisplayModel, ABorderOfColoursStays) {
+  TriangleMesh sphere = makeSphere(0.5, 1.5e-5);
+  ASSERT_GT(sphere.triangles.size(), kDisplayTriangles[0]);
+  const auto above = [&](const auto& triangle) {
+    double sum = 0.0;
+    for (const std::uint32_t vertex : triangle) sum += sphere.vertices[vertex].z();
+    return sum > 0.0;
+  };
+  double border = 0.0;  // [m] how far from z = 0 the corners of both colours go beyond it
+  for (const auto& triangle : sphere.triangles) {
+    sphere.colors.push_back(above(triangle) ? 0xFF0000 : 0x0000FF);
+    for (const std::uint32_t vertex : triangle) {
+      const double z = sphere.vertices[vertex].z();
+      border = std::max(border, above(triangle) ? -z : z);
+    }
+  }
+  const auto models = displayModels(sphere, kGrey);
+  for (const DisplayModel& model : *models) {
+    EXPECT_LE(model.triangles, kDisplayTriangles[0]);
+    const ReadModel read = readGlb(model.glb);
+    for (std::size_t i = 0; i < read.colors.size(); ++i) {
+      const double z = read.positions[i].y();
+      ASSERT_LE(read.colors[i].x() > 0.5 ? -z : z, border + model.error + 5e-5);
+    }
+  }
 }
 
 TEST(DisplayModel, AMeshWithoutAreaIsAnError) {
-  EXPECT_FALSE(displayModels({}));
+  EXPECT_FALSE(displayModels({}, kGrey));
   EXPECT_FALSE(displayModels(
-      {.vertices = {{0, 0, 0}, {1, 0, 0}, {1, 0, 0}}, .triangles = {{{0, 1, 2}}}, .notes = {}}));
+      {.vertices = {{0, 0, 0}, {1, 0, 0}, {1, 0, 0}}, .triangles = {{{0, 1, 2}}}, .colors = {}, .notes = {}},
+      kGrey));
 }
 
 }  // namespace

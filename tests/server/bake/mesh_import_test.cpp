@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -248,6 +249,76 @@ TEST(MeshImport, ImplausibleSizesAreRefused) {
   const auto metres = bakeFiles({file}, 1.0, {});
   ASSERT_FALSE(metres);
   EXPECT_THAT(metres.error().what, HasSubstr("make a field of about"));
+  fs::remove_all(folder);
+}
+
+std::vector<std::uint32_t> colorsOf(const fs::path& file) {
+  const auto mesh = importMesh(file, 1.0);
+  EXPECT_TRUE(mesh) << mesh.error().what;
+  return mesh ? mesh->colors : std::vector<std::uint32_t>{};
+}
+
+//   each format has two triangles, of which one is 0x4080C0 and the other 0xFF0000 or without a colour
+TEST(MeshImport, ColoursOfMaterialsAndVerticesAreRead) {
+  const fs::path folder = folderForThisTest();
+  std::ofstream(folder / "paint.mtl") << "newmtl blue\nKd 0.251 0.502 0.753\nnewmtl red\nKd 1 0 0\n";
+  const std::string corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+  std::ofstream(folder / "paint.obj") << "mtllib paint.mtl\n"
+                                      << corners << "usemtl blue\nf 1 2 3\nusemtl red\nf 1 2 4\n";
+  EXPECT_THAT(colorsOf(folder / "paint.obj"), testing::UnorderedElementsAre(0x4080C0U, 0xFF0000U));
+
+  std::ofstream(folder / "paint.ply")
+      << "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n"
+         "property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 2\n"
+         "property list uchar int vertex_indices\nend_header\n"
+         "0 0 0 64 128 192\n1 0 0 64 128 192\n0 1 0 64 128 192\n0 0 0 255 0 0\n1 0 0 255 0 0\n0 0 1 255 0 0\n"
+         "3 0 1 2\n3 3 4 5\n";
+  EXPECT_THAT(colorsOf(folder / "paint.ply"), testing::ElementsAre(0x4080C0U, 0xFF0000U));
+
+  // linear 0.0513, 0.2159, 0.5271 is sRGB 0x40, 0x80, 0xC0; the buffer holds three corners as floats
+  std::ofstream(folder / "paint.gltf")
+      << R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+         R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]}],)"
+         R"("materials":[{"name":"blue","pbrMetallicRoughness":{"baseColorFactor":[0.0513,0.2159,0.5271,1]}}],)"
+         R"("accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],)"
+         R"("bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36,"uri":)"
+         R"("data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]})";
+  EXPECT_THAT(colorsOf(folder / "paint.gltf"), testing::ElementsAre(0x4080C0U));
+
+  std::ofstream(folder / "plain.obj") << corners << "f 1 2 3\nf 1 2 4\n";
+  EXPECT_THAT(colorsOf(folder / "plain.obj"), testing::IsEmpty());
+  fs::remove_all(folder);
+}
+
+//   binary STL: bit 15 of a facet's attribute says that it has a colour
+TEST(MeshImport, ColoursOfAnStlStayWithTheirTriangles) {
+  const fs::path folder = folderForThisTest();
+  const auto write = [&](bool painted) {
+    std::string bytes(80, ' ');
+    const auto append = [&](const auto& value) {
+      bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+    };
+    constexpr std::uint32_t kFacets = 12;
+    append(kFacets);
+    for (std::uint32_t i = 0; i < kFacets; ++i) {
+      // the second has no place: it is skipped
+      const float z = i == 1 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(i);
+      for (const float x : {0.0F, 0.0F, 1.0F, 0.0F, 0.0F, z, 1.0F, 0.0F, z, 0.0F, 1.0F, z}) append(x);
+      append(static_cast<std::uint16_t>(painted ? 0x8000U | i << 10U : 0U));
+    }
+    std::ofstream(folder / "facets.stl", std::ios::binary) << bytes;
+  };
+  write(true);
+  const auto mesh = importMesh(folder / "facets.stl", 1.0);
+  ASSERT_TRUE(mesh) << mesh.error().what;
+  ASSERT_EQ(mesh->triangles.size(), 11U);
+  ASSERT_EQ(mesh->colors.size(), 11U);
+  for (std::size_t i = 0; i < mesh->triangles.size(); ++i) {
+    const auto facet = static_cast<std::uint32_t>(mesh->vertices[mesh->triangles[i][0]].z());
+    EXPECT_EQ(mesh->colors[i], ((facet * 255 + 15) / 31) << 16U) << "of 5 bits of red";
+  }
+  write(false);
+  EXPECT_THAT(colorsOf(folder / "facets.stl"), testing::IsEmpty());
   fs::remove_all(folder);
 }
 

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "server/bake/bake.h"
+#include "server/bake/display_model.h"
 
 namespace tenon::bake {
 namespace {
@@ -172,6 +173,29 @@ TEST_F(MeshReferences, TheMaterialsOfAnObjChangeNoTriangle) {
   ASSERT_EQ(with->vertices.size(), without->vertices.size());
   for (std::size_t i = 0; i < with->vertices.size(); ++i) EXPECT_EQ(with->vertices[i], without->vertices[i]);
   EXPECT_EQ(keyOf(obj), key);
+}
+
+TEST_F(MeshReferences, TheMaterialsOfAnObjChangeItsDisplayModel) {
+  const fs::path obj = folder_ / "parts" / "corner.obj";
+  std::ofstream(obj)
+      << "v 0 0 0\r\nmtllib the colours.mtl\r\nv 1 0 0\r\nv 0 1 0\r\nusemtl red\r\nf 1 2 3\r\n";
+  const auto key = [&] { return displayKey({obj}, 1.0, 0x808080).value(); };
+  const std::string without = key();
+  EXPECT_TRUE(importMesh(obj, 1.0)->colors.empty()) << "a library that is missing has no colours";
+  const auto write = [&](const char* color) {
+    std::ofstream(folder_ / "parts" / "the colours.mtl") << "newmtl red\nKd " << color << "\n";
+  };
+  write("1 0 0");
+  const std::string red = key();
+  EXPECT_NE(red, without);
+  EXPECT_EQ(importMesh(obj, 1.0)->colors, std::vector<std::uint32_t>{0xFF0000});
+  write("0 1 0");
+  EXPECT_NE(key(), red);
+  EXPECT_NE(displayKey({obj}, 1.0, 0).value(), key()) << "the colour of what has none";
+  // not from elsewhere
+  std::ofstream(obj) << "mtllib ../colours.mtl\nmtllib\n"
+                     << "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+  EXPECT_TRUE(referencesOf(obj).empty());
 }
 
 }  // namespace
