@@ -14,6 +14,7 @@ namespace tenon::check {
 
 using game_control::inDegrees;
 using game_control::inMillimetres;
+using game_control::inPercent;
 using game_control::pointText;
 
 /// What all checks of a scene share.

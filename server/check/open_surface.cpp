@@ -14,8 +14,8 @@ void checkOpenSurfaces(CheckedScene& checked) {
     finding.object = ObjectId{static_cast<std::uint32_t>(i)};
     finding.line = object.line;
     finding.value = structures->info.open_area / structures->info.surface_area;
-    finding.text = fmt::format("{:.2g} % of the surface of {} is open: a part could pass walls there",
-                               100.0 * finding.value, checked.titleOf(finding.object));
+    finding.text = fmt::format("{} of the surface of {} is open: a part could pass walls there",
+                               inPercent(finding.value), checked.titleOf(finding.object));
     finding.hint = fmt::format("voxels finer than {}, or a box in 'refine' around its thin walls",
                                inMillimetres(structures->field.voxel()));
     checked.findings.push_back(std::move(finding));

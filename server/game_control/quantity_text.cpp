@@ -12,6 +12,12 @@ std::string inMillimetres(double metres) {
   return std::abs(mm) < 9999.5 ? fmt::format("{:.3g} mm", mm) : fmt::format("{:.3g} m", metres);
 }
 
+std::string inPercent(double fraction) {
+  const double percent = 100.0 * fraction;
+  // 9.96 with two digits would be 1e+01
+  return percent < 9.95 ? fmt::format("{:.2g} %", percent) : fmt::format("{:.0f} %", percent);
+}
+
 std::string inDegrees(double radians) { return fmt::format("{:.3g} deg", radians / kDegree); }
 
 std::string pointText(const Vector3& p_W) {

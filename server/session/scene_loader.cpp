@@ -16,6 +16,7 @@
 #include "server/bake/bake.h"
 #include "server/bake/display_model.h"
 #include "server/bake/shapes.h"
+#include "server/game_control/quantity_text.h"
 #include "server/session/generated_parts.h"
 #include "server/simulation/compiled_scene.h"
 #include "server/structures/gap_note.h"
@@ -254,11 +255,11 @@ std::vector<std::string> thinWallReport(const simulation::Scene& scene) {
           fmt::format("{}: {}", object.title, info.notes.substr(gaps, info.notes.find('\n', gaps) - gaps)));
     if (info.thin_area <= 0.0) continue;
     sentences.push_back(
-        fmt::format("{}: {:.2g} % of the surface is of walls thinner than its voxels resolve; they are "
-                    "solid, and up to {:.3g} mm "
-                    "thicker on each side; {:.2g} % is open",
-                    object.title, 100.0 * info.thin_area / info.surface_area,
-                    1e3 * object.structures->field.dilation(), 100.0 * info.open_area / info.surface_area));
+        fmt::format("{}: {} of the surface is of walls thinner than its voxels resolve; they are solid, and "
+                    "up to {:.3g} mm thicker on each side; {} is open",
+                    object.title, game_control::inPercent(info.thin_area / info.surface_area),
+                    1e3 * object.structures->field.dilation(),
+                    game_control::inPercent(info.open_area / info.surface_area)));
   }
   return sentences;
 }

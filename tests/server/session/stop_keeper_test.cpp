@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <thread>
 
@@ -27,7 +28,7 @@ using ::testing::HasSubstr;
 class StopKeeperTest : public ::testing::Test {
  protected:
   StopKeeperTest() {
-    if (auto opened = writers_.open(lobby_, session_, counts_); !opened)
+    if (auto opened = writers_.open(lobby_, session_, std::span<wire::Partition>{}, counts_); !opened)
       throw std::runtime_error(opened.error().what);
     fs::create_directories(folder_);
     (void)inbox_.on<EmergencyStop>(heard_, wire::kEmergencyStop,
