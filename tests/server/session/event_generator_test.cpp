@@ -177,7 +177,8 @@ TEST(EventGenerator, AStepThatTimesOutWithoutATouchSaysSo) {
 
 TEST(EventGenerator, AConditionOfAGroupThatIsMetBlocksNothing) {
   const std::string conditions =
-      "    conditions:\n      - any:\n          - {signal: bell}\n          - {signal: whistle}\n"
+      "    show: [part]\n    conditions:\n      - any:\n          - {signal: bell}\n          - {signal: "
+      "whistle}\n"
       "      - {signal: horn}\n";
   test::SessionRig rig(1, {},
                        test::with(test::smallScenario(), "    touch: part\n    for: 0.1 s\n", conditions));
