@@ -6,6 +6,8 @@ const PUSH = 0.05; // [m] from which on it pushes straight where it does not get
 const NEAR = 0.03; // [m] it changes to fine motion
 const DEPTH_HELP = 0.004; // [m] of depth that it leaves to the help with it
 const ABOVE = 0.03; // [m] beside the line of sight to where it is to go; farther off it drags first: over what stands before it
+const LIFT = 0.006; // [m]
+const HIGHEST_LIFT = 0.05; // [m]
 const HALF_SWEEP = 220; // [pixels] of the mouse in one drag, to either side
 
 const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
@@ -33,7 +35,7 @@ function see() {
     text: document.querySelector(".hand-state")?.textContent ?? "",
     height: box.height,
     middle: { x: box.left + 0.55 * box.width, y: box.top + 0.5 * box.height },
-    guide: guide && { from: view.project(guide.from), to: view.project(guide.to), distance: guide.distance, farther: guide.farther, angle: guide.angle ?? 0, isDown: isDown(guide), pixel: view.metresPerPixel(guide.from) },
+    guide: guide && { from: view.project(guide.from), to: view.project(guide.to), distance: guide.distance, farther: guide.farther, angle: guide.angle ?? 0, isDown: isDown(guide), above: view.project(guide.to.clone().setZ(guide.from.z)), pixel: view.metresPerPixel(guide.from) },
   };
 }
 
@@ -96,9 +98,11 @@ export async function mount(page, { seed, seconds, steps }) {
     if (seen.isDeepening) continue;
     const pixels = Math.hypot(guide.to.x - guide.from.x, guide.to.y - guide.from.y);
     if (!guide.isDown && Math.abs(guide.farther) > DEPTH_HELP && (pixels * guide.pixel < ABOVE || stuck > 3)) {
-      // help that did not help: it lifts the part over what stands in the way
-      if (++unhelped % 3 === 0) await drag(seen, 0, ((seen.isFine ? 10 : 1) * -0.01) / guide.pixel, "Control");
-      else await page.keyboard.press("d");
+      // help that did not help: it pushes no more, and lifts the part over what stands in the way, each time higher
+      if (++unhelped % 3 === 0) {
+        await page.keyboard.press("Escape");
+        await drag(seen, 0, ((seen.isFine ? 10 : 1) * -Math.min(HIGHEST_LIFT, (0.01 * unhelped) / 3)) / guide.pixel, "Control");
+      } else await page.keyboard.press("d");
       continue;
     }
     unhelped = 0;
@@ -107,13 +111,22 @@ export async function mount(page, { seed, seconds, steps }) {
       await page.keyboard.press("c");
       continue;
     }
+    if (guide.distance < 0.9 * best) [best, stuck] = [guide.distance, 0];
+    else ++stuck;
+    if (guide.isDown && stuck > 3 && stuck % 4 === 0) {
+      // it stands on the rim: it lifts it a little, and brings it over the hole
+      await page.keyboard.press("Escape");
+      await fine(seen, true);
+      const aim = (pixels) => 10 * pixels + (AIM / Math.SQRT2 / guide.pixel) * gauss();
+      await drag(seen, 0, (10 * -LIFT) / guide.pixel, "Control");
+      await drag(seen, aim(guide.above.x - guide.from.x), aim(guide.above.y - guide.from.y));
+      continue;
+    }
     const isNear = guide.distance < NEAR;
     await fine(seen, isNear);
     const scale = isNear ? 10 : 1; // of the mouse to the hand
     const aim = (pixels) => scale * pixels + (AIM / Math.SQRT2 / guide.pixel) * gauss();
     const [dx, dy] = [guide.to.x - guide.from.x, guide.to.y - guide.from.y];
-    if (guide.distance < 0.9 * best) [best, stuck] = [guide.distance, 0];
-    else ++stuck;
     // a straight push when it does not get nearer otherwise, as the instruction says; then it lifts a little
     if (guide.distance < PUSH && stuck > 3 && stuck % 6 === 5) await drag(seen, 0, aim(-0.004 / guide.pixel), "Control");
     else if (guide.distance < PUSH && stuck > 3 && stuck % 2 === 0) await drag(seen, 0, aim((guide.distance + 0.005) / guide.pixel), "Control");
