@@ -14,6 +14,7 @@ std::string inMillimetres(double metres) {
 
 std::string inPercent(double fraction) {
   const double percent = 100.0 * fraction;
+  if (percent > 0.0 && percent < 0.001) return "less than 0.001 %";
   // 9.96 with two digits would be 1e+01
   return percent < 9.95 ? fmt::format("{:.2g} %", percent) : fmt::format("{:.0f} %", percent);
 }

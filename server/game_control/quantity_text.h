@@ -17,7 +17,8 @@ inline constexpr double kDegree = std::numbers::pi / 180.0;  ///< [rad]
 /// "12.5 deg"; `radians` [rad].
 [[nodiscard]] std::string inDegrees(double radians);
 
-/// "12 %", "0.42 %": two significant digits, from 10 % on whole ones; `fraction` [-] in 0 to 1.
+/// "12 %", "0.42 %": two significant digits, from 10 % on whole ones, below 0.001 % words; `fraction` [-] in
+/// 0 to 1.
 [[nodiscard]] std::string inPercent(double fraction);
 
 /// "(12, 0, -59) mm", to the tenth.

@@ -6,8 +6,8 @@ const PUSH = 0.05; // [m] from which on it pushes straight where it does not get
 const NEAR = 0.03; // [m] it changes to fine motion
 const DEPTH_HELP = 0.004; // [m] of depth that it leaves to the help with it
 const ABOVE = 0.03; // [m] beside the line of sight to where it is to go; farther off it drags first: over what stands before it
-const LIFT = 0.006; // [m]
-const HIGHEST_LIFT = 0.05; // [m]
+const LIFT = 0.006; // [m] off the rim of a hole
+const HIGHEST_LIFT = 0.05; // [m] over what stands in the way
 const HALF_SWEEP = 220; // [pixels] of the mouse in one drag, to either side
 
 const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
