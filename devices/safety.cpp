@@ -146,7 +146,9 @@ double Safety::startLimit() const noexcept { return std::max(settled_force_, lim
 
 Wrench Safety::applySoftStartAndSlew(const Wrench& wrench, const Wrench& damping, double wall_growth,
                                      double dt) noexcept {
-  if (!late_ && !starting_) settled_force_ = (slewed_.force + wall_).norm();
+  // what was displayed, so not what hot motors took away
+  if (!late_ && !starting_)
+    settled_force_ = std::min((slewed_.force + wall_).norm(), heat_.forceLimit(limits_));
   const double start = softStartFactor(since_start_, limits_);
   const double growth = std::min(dt, kLongestGrowth);
   since_start_ += growth;

@@ -137,10 +137,9 @@ void printInfo(const structures::HapticStructures& structures) {
   }
   if (info.thin_area > 0.0) {
     fmt::print(
-        "thin walls    {:.4g} m^2 are thinner than their voxels resolve: solid, up to {} thicker; {:.3g} % "
-        "of the\n"
-        "              surface is open\n",
-        info.thin_area, readable(layout.dilation), 100.0 * info.open_area / info.surface_area);
+        "thin walls    {:.4g} m^2 are thinner than their voxels resolve: solid, up to {} thicker;\n"
+        "              {:.4g} m^2 of surface are open\n",
+        info.thin_area, readable(layout.dilation), info.open_area);
   }
   if (!info.filled.empty()) {
     const structures::FilledSpace& largest = info.filled.front();

@@ -230,6 +230,22 @@ TEST(Safety, LimitsTheForceFromPeakToContinuousAsTheMotorsWarm) {
   EXPECT_DOUBLE_EQ(last, 20.0);
 }
 
+TEST(Safety, MotorsThatCoolInAGapLetNoMoreForceStartThanWasDisplayedBefore) {
+  Safety safety = settled(kSigma, {20.0, 0.0, 0.0});
+  const auto pushAt = [&](double age) {
+    return safety.step(requestForce({20.0, 0.0, 0.0}, age), armed(), kTick).F_Ho_D.force.norm();
+  };
+  double before = 0.0;
+  for (int tick = 0; tick < 120000; ++tick) before = pushAt(0.0);
+  for (int tick = 0; tick < 4000; ++tick) (void)pushAt(1.0);
+  double most = 0.0;
+  for (int tick = 0; tick < 999; ++tick) most = std::max(most, pushAt(0.0));
+  EXPECT_LE(most, before + 1e-9);
+  EXPECT_GT(most, 0.9 * before);
+  for (int tick = 0; tick < 500; ++tick) most = std::max(most, pushAt(0.0));
+  EXPECT_GT(most, before + 1.0) << "the motors have cooled";
+}
+
 TEST(Safety, LimitsTheIncreaseOfAForceButNotItsDecrease) {
   Safety safety = settled(kSigma, {2.0, 0.0, 0.0});
   const auto outputFor = [&](double x) {

@@ -1,7 +1,7 @@
 // A person at the console's page with a mouse: takes part and mounts a part. It knows what the page shows: where the line of the way begins and
 // ends on the screen, the numbers beside the hand, and which step it is. It sees with a delay, and its aim is off.
 const REACTION = 250; // [ms] from what it sees to what it does
-const AIM = 0.008; // [m] of aiming, root mean square, at the hand unless the hand moves finely
+const AIM = 0.008; // [m] of aiming at the hand, root mean square; a tenth of it when the hand moves finely
 const PUSH = 0.05; // [m] from which on it pushes straight where it does not get nearer otherwise
 const NEAR = 0.03; // [m] it changes to fine motion
 const DEPTH_HELP = 0.004; // [m] of depth that it leaves to the help with it
@@ -111,13 +111,15 @@ export async function mount(page, { seed, seconds, steps }) {
       await page.keyboard.press("c");
       continue;
     }
+    // pixels of the mouse for those of the hand, which is `scale` times slower
+    const aimAt = (scale) => (pixels) => scale * pixels + (AIM / Math.SQRT2 / guide.pixel) * gauss();
     if (guide.distance < 0.9 * best) [best, stuck] = [guide.distance, 0];
     else ++stuck;
     if (guide.isDown && stuck > 3 && stuck % 4 === 0) {
       // it stands on the rim: it lifts it a little, and brings it over the hole
       await page.keyboard.press("Escape");
       await fine(seen, true);
-      const aim = (pixels) => 10 * pixels + (AIM / Math.SQRT2 / guide.pixel) * gauss();
+      const aim = aimAt(10);
       await drag(seen, 0, (10 * -LIFT) / guide.pixel, "Control");
       await drag(seen, aim(guide.above.x - guide.from.x), aim(guide.above.y - guide.from.y));
       continue;
@@ -125,7 +127,7 @@ export async function mount(page, { seed, seconds, steps }) {
     const isNear = guide.distance < NEAR;
     await fine(seen, isNear);
     const scale = isNear ? 10 : 1; // of the mouse to the hand
-    const aim = (pixels) => scale * pixels + (AIM / Math.SQRT2 / guide.pixel) * gauss();
+    const aim = aimAt(scale);
     const [dx, dy] = [guide.to.x - guide.from.x, guide.to.y - guide.from.y];
     // a straight push when it does not get nearer otherwise, as the instruction says; then it lifts a little
     if (guide.distance < PUSH && stuck > 3 && stuck % 6 === 5) await drag(seen, 0, aim(-0.004 / guide.pixel), "Control");

@@ -20,6 +20,7 @@ const ALIGNED = 0.002; // [rad]
 const DEPTH_SPEED = 0.5; // [m/s]
 const DEEP_ENOUGH = 0.0005; // [m]
 const ADVANCE = 0.001; // [m] of depth at least that a held part gains
+const TURN_ADVANCE = 0.005; // [rad] of its turn to the ghost likewise
 const BLOCKED = 1000; // [ms] within these, else something stands in its way
 const FINE = 0.1;
 const DEAD_ZONE = 0.12; // of a stick that is let go
@@ -39,6 +40,23 @@ const KEYS: Record<string, [number, number, number]> = {
   ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0], ArrowDown: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1],
 };
 
+/** What is left of a way that is to shrink, by `least` within BLOCKED at least. */
+class Progress {
+  private left = Infinity; // when it was last less by `least`
+  private gainedAt = 0; // [ms]
+  constructor(private least: number) {}
+
+  begin(): void {
+    this.left = Infinity;
+  }
+  /** Whether something stands in the way, with so much of it left. */
+  isBlocked(left: number): boolean {
+    const now = performance.now();
+    if (left < this.left - this.least) [this.left, this.gainedAt] = [left, now];
+    return now - this.gainedAt > BLOCKED;
+  }
+}
+
 export class Hand {
   views: HandView[] = [];
   /** The one that mouse and keys move. */
@@ -56,8 +74,8 @@ export class Hand {
   private armUntil = 0;
   private aligning = false;
   private depthGoal?: Vector3; // whose depth the hand is brought to
-  private depthLeft = Infinity; // [m] the least that was left of it, when it was last less by ADVANCE
-  private depthGainedAt = 0; // [ms]
+  private depth = new Progress(ADVANCE);
+  private alignment = new Progress(TURN_ADVANCE);
   private wayOf = -1; // revision of the step on whose approach the part is
   private pressed = new Set<string>();
   private isShift = false;
@@ -128,12 +146,14 @@ export class Hand {
   press(): void {
     this.armUntil = performance.now() + PRESS;
   }
+  /** Turns what the hand holds as the ghost is turned, until it is, or until something stands in its way. */
   align(): void {
+    this.alignment.begin();
     this.aligning = !this.aligning && this.canAlign;
   }
   /** Brings what the hand moves as far away from the viewer as where it is to go, or until something stands in its way. */
   deepen(): void {
-    this.depthLeft = Infinity;
+    this.depth.begin();
     this.depthGoal = this.depthGoal === undefined ? this.guide?.to.clone() : undefined;
   }
   /** No push any more. */
@@ -302,17 +322,15 @@ export class Hand {
     const off = toQuaternion(goal).multiply(target.q.clone().multiply(q_HO).invert());
     const angle = 2 * Math.acos(Math.min(1, Math.abs(off.w)));
     if (angle > ALIGNED) this.turnBy(new Quaternion().slerp(off, Math.min(1, (ALIGN_TURN * seconds) / angle)));
-    else if (this.now.object.q.angleTo(toQuaternion(goal)) < 2 * ALIGNED) this.aligning = false;
+    const left = this.now.object.q.angleTo(toQuaternion(goal));
+    if ((angle <= ALIGNED && left < 2 * ALIGNED) || this.alignment.isBlocked(left)) this.aligning = false;
   }
 
   /** What the hand holds has gained no depth for a while. */
   private isDepthBlocked(): boolean {
     const from = this.depthGoal === undefined ? undefined : this.centreAt(this.now?.proxy);
     if (from === undefined || this.depthGoal === undefined) return false;
-    const left = Math.abs(this.depthGoal.clone().sub(from).dot(this.view.axes().away));
-    const now = performance.now();
-    if (left < this.depthLeft - ADVANCE) [this.depthLeft, this.depthGainedAt] = [left, now];
-    return now - this.depthGainedAt > BLOCKED;
+    return this.depth.isBlocked(Math.abs(this.depthGoal.clone().sub(from).dot(this.view.axes().away)));
   }
 
   private applyDepth(seconds: number): void {
