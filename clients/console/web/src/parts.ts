@@ -4,11 +4,12 @@ import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { MeshoptDecoder } from "three/examples/jsm/libs/meshopt_decoder.module.js";
 
 import { asset } from "./assets";
+import { creases } from "./creases";
 import { place } from "./markers";
 import { Status, type SceneModels, type SceneObject } from "./messages";
 import type { Session } from "./session";
 
-const CREASE = 35; // [deg]
+const MOST_POINTS = 20000; // of a mesh, to see where it is
 const PICKED = 0x14507a; // emitted by what is picked
 const EDGE = { transparent: true, opacity: 0.5 } as const;
 
@@ -121,7 +122,7 @@ export class Parts {
     for (const mesh of meshes) {
       mesh.material = part.material;
       mesh.castShadow = mesh.receiveShadow = !this.simple;
-      if (!this.simple) mesh.add(new THREE.LineSegments(new THREE.EdgesGeometry(mesh.geometry as THREE.BufferGeometry, CREASE), line));
+      if (!this.simple) mesh.add(new THREE.LineSegments(creases(mesh.geometry as THREE.BufferGeometry), line));
     }
     if (part.model !== undefined) part.group.remove(part.model);
     part.model = model;
@@ -180,6 +181,24 @@ export class Parts {
       if (group.visible && object.kind !== "head" && object.kind !== "forearm") box.expandByObject(group);
     return box;
   }
+
+  /** Of what box() is about: points of its surfaces, in the world. */
+  *points(): Generator<THREE.Vector3> {
+    for (const { group, object } of this.all.values()) {
+      if (!group.visible || object.kind === "head" || object.kind === "forearm") continue;
+      group.updateWorldMatrix(true, true);
+      for (const child of leavesOf(group)) {
+        const places = (child as THREE.Mesh).geometry.getAttribute("position");
+        const every = Math.max(1, Math.floor(places.count / MOST_POINTS));
+        for (let i = 0; i < places.count; i += every) yield new THREE.Vector3().fromBufferAttribute(places, i).applyMatrix4(child.matrixWorld);
+      }
+    }
+  }
+}
+
+/** Meshes and lines. */
+function leavesOf(object: THREE.Object3D): THREE.Object3D[] {
+  return [...("geometry" in object ? [object] : []), ...object.children.flatMap(leavesOf)];
 }
 
 function isBelow(object: THREE.Object3D, group: THREE.Object3D): boolean {

@@ -2,6 +2,7 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 
+import { cornersOf, framing } from "./framing";
 import { Ground } from "./ground";
 import { COLORS, Markers, place } from "./markers";
 import { NONE, StepPhase } from "./messages";
@@ -39,6 +40,7 @@ export class SceneView {
   private isFramed = false;
   private hasBegun = false; // and everything is where the session has it
   private isFramedWaiting = false;
+  private isFramedWhole = false; // with all models
   private isTurned = false; // by the viewer, or to the work: not to be framed anew by itself
   isHandMode = false;
   private covered = 0; // of the picture's top [pixels]
@@ -179,36 +181,23 @@ export class SceneView {
     this.resize();
   }
 
-  /** How far away from its centre a box is seen as a whole, with a margin [m]. */
-  private distanceOf(box: THREE.Box3, centre: THREE.Vector3): number {
-    const across = Math.tan((this.camera.fov * Math.PI) / 360) * FILLED * this.camera.aspect;
-    const up = (across / this.camera.aspect) * Math.max(0.3, 1 - this.covered / Math.max(1, this.host.clientHeight));
-    const right = new THREE.Vector3().crossVectors(this.camera.up, DIRECTION).normalize();
-    const above = new THREE.Vector3().crossVectors(DIRECTION, right);
-    let distance = 0;
-    for (let corner = 0; corner < 8; ++corner) {
-      const { min, max } = box;
-      const from = new THREE.Vector3(corner & 1 ? min.x : max.x, corner & 2 ? min.y : max.y, corner & 4 ? min.z : max.z).sub(centre);
-      const wide = Math.max(Math.abs(from.dot(right)) / across, Math.abs(from.dot(above)) / up);
-      distance = Math.max(distance, wide + from.dot(DIRECTION));
-    }
-    return distance;
-  }
-
   /** Shows all of the scene, or these places and what is around them, from the trainee's side. */
   frame(places: THREE.Vector3[] = []): void {
     const box = this.parts.box();
     if (box.isEmpty()) return;
     const scene = box.getBoundingSphere(new THREE.Sphere());
     const radius = Math.max(0.05, scene.radius);
-    const around = places.length === 0 ? box : new THREE.Box3().setFromPoints(places).expandByScalar(Math.min(LOOK, 0.6 * radius));
-    const centre = around.getCenter(new THREE.Vector3());
-    this.controls.target.copy(centre);
-    this.camera.position.copy(centre).addScaledVector(DIRECTION, this.distanceOf(around, centre));
+    const around = new THREE.Box3().setFromPoints(places).expandByScalar(Math.min(LOOK, 0.6 * radius));
+    const across = Math.tan((this.camera.fov * Math.PI) / 360) * FILLED * this.camera.aspect;
+    const high = (across / this.camera.aspect) * Math.max(0.3, 1 - this.covered / Math.max(1, this.host.clientHeight));
+    const { target, distance } = framing(places.length === 0 ? this.parts.points() : cornersOf(around), DIRECTION, this.camera.up, across, high);
+    this.controls.target.copy(target);
+    this.camera.position.copy(target).addScaledVector(DIRECTION, distance);
     this.controls.update();
     this.ground.fit(box);
     this.markers.size = Math.min(1.3, Math.max(0.35, radius / 0.9));
     this.isFramed = true;
+    this.isFramedWhole = this.parts.isComplete;
     this.isTurned = places.length > 0;
     this.moved = -1;
     this.dirty = true;
@@ -232,7 +221,8 @@ export class SceneView {
       this.hasBegun = session.states.size > 0;
       // anew when the session begins, since more is there then than where it waited
       const isAnew = this.hasBegun && this.isFramedWaiting && !this.isTurned;
-      if (this.parts.all.size > 0 && (isAnew || (!this.isFramed && (this.hasBegun || session.isWaiting)))) this.frame();
+      const isWhole = this.isFramed && !this.isFramedWhole && !this.isTurned && this.parts.isComplete;
+      if (this.parts.all.size > 0 && (isAnew || isWhole || (!this.isFramed && (this.hasBegun || session.isWaiting)))) this.frame();
       this.isFramedWaiting = !this.hasBegun && session.isWaiting;
     }
     if (this.before !== undefined) return; // the headset asks for its pictures
