@@ -12,7 +12,7 @@ import type { Session } from "./session";
 
 const DIRECTION = new THREE.Vector3(0.35, -0.8, 0.62).normalize(); // to the viewer, from the trainee's side
 const FILLED = 0.88; // of the picture's width or height, by what is to be seen
-const LOOK = 0.15; // [m] shown around a hand and where it is to go
+const LOOK = 0.1; // [m] shown around what is looked at
 
 export class SceneView {
   readonly simple: boolean;
@@ -43,7 +43,7 @@ export class SceneView {
   private isFramedWhole = false; // with all models
   private isTurned = false; // by the viewer, or to the work: not to be framed anew by itself
   isHandMode = false;
-  private covered = 0; // of the picture's top [pixels]
+  private covered = { left: 0, top: 0 }; // of the picture [pixels]
 
   constructor(private host: HTMLElement, label: string, drawing: string | null) {
     const isSlow = isSoftware();
@@ -156,10 +156,10 @@ export class SceneView {
     this.dirty = true;
   }
 
-  /** What covers the top of the picture [pixels]: what is framed is seen below it. */
-  setCovered(height: number): void {
-    if (Math.abs(height - this.covered) < 8) return;
-    this.covered = height;
+  /** What covers the left and the top of the picture [pixels]: what is framed is seen beside and below it. */
+  setCovered(left: number, top: number): void {
+    if (Math.abs(left - this.covered.left) < 8 && Math.abs(top - this.covered.top) < 8) return;
+    this.covered = { left, top };
     this.resize();
     if (this.isFramed && !this.isTurned) this.frame();
   }
@@ -170,7 +170,8 @@ export class SceneView {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, this.pace.quality.ratio));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
-    if (this.covered > 0) this.camera.setViewOffset(width, height, 0, -this.covered / 2, width, height);
+    const { left, top } = this.covered;
+    if (left > 0 || top > 0) this.camera.setViewOffset(width, height, -left / 2, -top / 2, width, height);
     else this.camera.clearViewOffset();
     this.camera.updateProjectionMatrix();
     this.dirty = true;
@@ -188,8 +189,9 @@ export class SceneView {
     const scene = box.getBoundingSphere(new THREE.Sphere());
     const radius = Math.max(0.05, scene.radius);
     const around = new THREE.Box3().setFromPoints(places).expandByScalar(Math.min(LOOK, 0.6 * radius));
-    const across = Math.tan((this.camera.fov * Math.PI) / 360) * FILLED * this.camera.aspect;
-    const high = (across / this.camera.aspect) * Math.max(0.3, 1 - this.covered / Math.max(1, this.host.clientHeight));
+    const half = Math.tan((this.camera.fov * Math.PI) / 360) * FILLED;
+    const across = half * this.camera.aspect * Math.max(0.3, 1 - this.covered.left / Math.max(1, this.host.clientWidth));
+    const high = half * Math.max(0.3, 1 - this.covered.top / Math.max(1, this.host.clientHeight));
     const { target, distance } = framing(places.length === 0 ? this.parts.points() : cornersOf(around), DIRECTION, this.camera.up, across, high);
     this.controls.target.copy(target);
     this.camera.position.copy(target).addScaledVector(DIRECTION, distance);

@@ -2,7 +2,8 @@
 import * as THREE from "three";
 
 import { h, icon, type Icon } from "./dom";
-import { NONE, StepPhase } from "./messages";
+import { cornersOf } from "./framing";
+import { NONE, StepPhase, type Pose } from "./messages";
 import type { Label } from "./labels";
 import type { SceneView } from "./scene";
 import type { Session } from "./session";
@@ -110,27 +111,37 @@ export class ViewTools {
   }
 
   /** Where the work is: the object of the step when somebody holds it, else what else somebody holds, else the object of the step, else the first hand. */
-  private focus(): THREE.Vector3 | undefined {
+  private focus(): { object: number; pose: Pose } | undefined {
     const { session } = this;
     const { step } = session;
     const all = [...session.grabs.values()].filter(({ object_id, hand_id }) => hand_id !== NONE && !session.isOwn(object_id) && !session.isTracked(hand_id));
     const held = all.find(({ object_id }) => object_id === step?.object_id) ?? all[0];
     const object = held?.object_id ?? (step !== undefined && step.phase <= StepPhase.Active ? step.object_id : NONE);
     const pose = session.states.get(object)?.X_WO ?? [...session.hands].find(([id]) => !session.isTracked(id))?.[1].X_WH;
-    return pose === undefined ? undefined : new THREE.Vector3(pose.p[0], pose.p[1], pose.p[2]);
+    return pose && { object, pose };
+  }
+
+  /** The corners of an object's box; of none the place itself. */
+  private around({ object, pose }: { object: number; pose: Pose }): THREE.Vector3[] {
+    const known = this.session.objects.get(object);
+    const [centre, size] = [known?.centre ?? [0, 0, 0], known?.size ?? [0, 0, 0]].map((v) => new THREE.Vector3().fromArray(v));
+    const box = new THREE.Box3().setFromCenterAndSize(centre, size);
+    const [turn, at] = [new THREE.Quaternion().fromArray(pose.q), new THREE.Vector3().fromArray(pose.p)];
+    return [...cornersOf(box)].map((corner) => corner.applyQuaternion(turn).add(at));
   }
 
   /** Called for each frame of the display. */
   update(): void {
     if (this.look === "free") return;
-    const focus = this.focus();
-    if (focus === undefined) return;
+    const work = this.focus();
+    if (work === undefined) return;
+    const focus = new THREE.Vector3().fromArray(work.pose.p);
     if (this.look === "trainee") {
       const head = [...this.session.objects.values()].find(({ kind }) => kind === "head");
       const pose = head === undefined ? undefined : this.session.states.get(head.object_id)?.X_WO;
       const eye = pose === undefined ? new THREE.Vector3(focus.x, focus.y - 0.7, focus.z + 0.5) : new THREE.Vector3(pose.p[0], pose.p[1], pose.p[2]);
       if (this.followed === undefined || this.followed.distanceTo(focus) > 1e-4) this.view.lookFrom(eye, focus);
-    } else if (this.followed === undefined) this.view.frame([focus]);
+    } else if (this.followed === undefined) this.view.frame(this.around(work));
     else if (this.followed.distanceTo(focus) > 1e-4) this.view.carry(focus.clone().sub(this.followed));
     this.followed = focus;
   }
@@ -138,10 +149,9 @@ export class ViewTools {
   /** The view of the step's object and where it goes. */
   showWork(): void {
     const { step } = this.session;
-    const { p } = step?.X_WG ?? { p: undefined };
-    const goal = step?.has_target === true && p !== undefined ? [new THREE.Vector3(p[0], p[1], p[2])] : [];
-    const focus = this.focus();
-    if (focus !== undefined) this.view.frame([focus, ...goal]);
+    const work = this.focus();
+    const goal = step?.has_target === true ? this.around({ object: step.object_id, pose: step.X_WG }) : [];
+    if (work !== undefined) this.view.frame([...this.around(work), ...goal]);
   }
 
   private section(isOn: boolean): void {
