@@ -89,11 +89,14 @@ export async function mount(page, { seed, seconds, steps }) {
     if (!seen.isOn || guide === undefined) continue;
     log.push(`${((Date.now() - begun) / 1000).toFixed(1)} ${seen.step} ${(1000 * guide.distance).toFixed(1)} mm, ${(1000 * guide.farther).toFixed(1)} farther, ${guide.angle.toFixed(3)} rad: ${seen.text}`);
     if (seen.isAligning || guide.angle > 0.02) {
-      // a part that jams cannot be turned: it lifts it a little, as the instruction says
-      if (++turns % 8 === 0) await drag(seen, 0, ((seen.isFine ? 10 : 1) * -0.01) / guide.pixel, "Control");
-      else if (!seen.isAligning) await page.keyboard.press("g");
+      // a part that jams cannot be turned: it pushes no more, and lifts it, each time higher
+      if (++turns % 8 === 0) {
+        await page.keyboard.press("Escape");
+        await drag(seen, 0, ((seen.isFine ? 10 : 1) * -Math.min(HIGHEST_LIFT, (0.01 * turns) / 8)) / guide.pixel, "Control");
+      } else if (!seen.isAligning) await page.keyboard.press("g");
       continue;
     }
+    turns = 0;
     // the help with the depth, until it has done its work
     if (seen.isDeepening) continue;
     const pixels = Math.hypot(guide.to.x - guide.from.x, guide.to.y - guide.from.y);
