@@ -22,6 +22,7 @@ const DEEP_ENOUGH = 0.0005; // [m]
 const ADVANCE = 0.001; // [m] of depth at least that a held part gains
 const TURN_ADVANCE = 0.005; // [rad] of its turn to the ghost likewise
 const BLOCKED = 1000; // [ms] within these, else something stands in its way
+const CLOSE = 0.05; // [m] to its place a part slides along what guides it
 const FINE = 0.1;
 const DEAD_ZONE = 0.12; // of a stick that is let go
 /** Buttons of the standard layout: the lower face button, the shoulders. */
@@ -74,6 +75,7 @@ export class Hand {
   private armUntil = 0;
   private aligning = false;
   private depthGoal?: Vector3; // whose depth the hand is brought to
+  private depthOf = -1; // revision of the step that it is of
   private depth = new Progress(ADVANCE);
   private alignment = new Progress(TURN_ADVANCE);
   private wayOf = -1; // revision of the step on whose approach the part is
@@ -151,9 +153,10 @@ export class Hand {
     this.alignment.begin();
     this.aligning = !this.aligning && this.canAlign;
   }
-  /** Brings what the hand moves as far away from the viewer as where it is to go, or until something stands in its way. */
+  /** Brings what the hand moves as far away from the viewer as where it is to go, or until something stands in its way: a held part pushes nothing before it is close to its place. */
   deepen(): void {
     this.depth.begin();
+    this.depthOf = this.session.step?.revision ?? -1;
     this.depthGoal = this.depthGoal === undefined ? this.guide?.to.clone() : undefined;
   }
   /** No push any more. */
@@ -334,6 +337,8 @@ export class Hand {
   }
 
   private applyDepth(seconds: number): void {
+    if (this.depthOf !== this.session.step?.revision) this.depthGoal = undefined;
+    if (this.depthGoal !== undefined && this.now?.inContact === true && this.goal() !== undefined && (this.guide?.distance ?? 0) > CLOSE) return this.relax();
     const centre = this.depthGoal === undefined ? undefined : this.centreAt(this.targets[this.current]);
     const off = centre === undefined ? 0 : (this.depthGoal?.clone().sub(centre).dot(this.view.axes().away) ?? 0);
     if (Math.abs(off) < DEEP_ENOUGH || this.isDepthBlocked()) this.depthGoal = undefined;
