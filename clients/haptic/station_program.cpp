@@ -12,6 +12,7 @@
 #include <thread>
 #include <utility>
 
+#include "clients/haptic/answer_readers.h"
 #include "clients/haptic/copy_loader.h"
 #include "clients/haptic/input_pacer.h"
 #include "clients/haptic/limit_chooser.h"
@@ -22,8 +23,8 @@
 #include "clients/haptic/seat_file.h"
 #include "clients/haptic/servo_loop.h"
 #include "clients/haptic/station_link.h"
+#include "clients/haptic/station_stops.h"
 #include "idl/threads/cyclic_thread.h"
-#include "idl/types/stop_truth.h"
 
 namespace tenon::haptic {
 
@@ -57,6 +58,12 @@ class StationRunner {
         link_(link),
         options_(options),
         servo_(station, [&link] { link.inbox().wake(); }),
+        readers_(link, {[this](const WorldFrame& frame) { passAnswer(frame); },
+                        [this](const HandManifold& manifold) { passAnswer(manifold); }}),
+        stops_(link,
+               {[this](const StopSignal& stop) { pass(stop); },
+                [this](const std::string& text) { print(text); }},
+               options.read_keys),
         copy_(station, options.scene, options.force_model),
         model_chooser_(options.force_model) {}
 
@@ -79,15 +86,12 @@ class StationRunner {
   void sendEvents();
   void sendDevices();
   void printStep(const StepState& step);
-  [[nodiscard]] Result<void> subscribeToStops();
   [[nodiscard]] Result<void> subscribeToClock();
   void takeLoadedScene();
   void chooseForceModel(double round_trip, std::uint64_t late_cycles);
   std::uint32_t sendInputs(const StationOutput& output);
-  [[nodiscard]] Result<void> subscribeToAnswers(bool slow);
   void chooseRates(double round_trip);
   void sendTelemetry(Telemetry telemetry);
-  void passStops();
   void readKeys();
   void armDevices();
   [[nodiscard]] bool seated() const { return !link_.member().lost(); }
@@ -103,6 +107,11 @@ class StationRunner {
   void pass(const Message& message) {
     lockstep_ ? static_cast<void>(station_.receive(message)) : servo_.receive(message);
   }
+  template <class Answer>
+  void passAnswer(const Answer& answer) {
+    if (lockstep_) answers_.received(answer);
+    pass(answer);
+  }
   [[nodiscard]] const std::string& sceneHash() const { return link_.member().announce().scene_hash; }
   [[nodiscard]] Result<RunState> takePartInLockstep(const std::atomic<bool>& stop, std::uint32_t& seq);
   void print(const std::string& text) const {
@@ -115,6 +124,8 @@ class StationRunner {
   const StationProgramOptions& options_;
   ServoLoop servo_;  // in real time
   std::optional<threads::CyclicThread> servo_thread_;
+  AnswerReaders readers_;
+  StationStops stops_;
   bool lockstep_ = false;  // no loop: the wire thread steps the station
   LockstepAnswers answers_;
   PeakForces peaks_;  // in lockstep
@@ -125,7 +136,6 @@ class StationRunner {
   std::chrono::steady_clock::time_point rejoined_at_{};
   std::optional<StepState> step_;
   std::map<std::uint32_t, CollisionMatrix> matrix_;  // by part
-  StopTruth stops_;
   // of the link
   LinkClock link_clock_;
   LimitChooser limits_;
@@ -134,8 +144,6 @@ class StationRunner {
   ForceModelChooser model_chooser_;
   ForceModelKind force_model_ = ForceModelKind::kManifold;
   RateChooser rates_;
-  bool slow_answers_ = false;     // of those that are heard
-  bool answers_changed_ = false;  // a second ago at most: the former ones are still heard, too
   InputPacer pacer_;
   std::uint64_t late_cycles_ = 0;  // as the last Telemetry has them
   std::uint64_t event_seq_ = 0;
@@ -146,7 +154,7 @@ Result<void> StationRunner::subscribe() {
   lockstep_ = link_.welcome().lockstep;
   wire::Partition& session = link_.member().session();
   wire::Inbox& inbox = link_.inbox();
-  Result<void> all = subscribeToAnswers(false);
+  Result<void> all = readers_.open();
   if (all) {
     all = inbox.on<Guidance>(session, wire::kGuidance, [this](const Guidance& guidance) { pass(guidance); });
   }
@@ -164,51 +172,15 @@ Result<void> StationRunner::subscribe() {
       pass(matrix);
     });
   }
-  if (all) all = subscribeToStops();
+  if (all) all = stops_.subscribe();
   if (all && !lockstep_) all = subscribeToClock();
   if (all) all = inbox.on<RunState>(session, wire::kRunState, [this](const RunState& run) { run_ = run; });
   return all;
 }
 
-/// Frames and manifolds of each tick, or `slow`: 100 and 50 a second.
-Result<void> StationRunner::subscribeToAnswers(bool slow) {
-  wire::Partition& session = link_.member().session();
-  wire::Inbox& inbox = link_.inbox();
-  const auto& frames = slow ? wire::kWorldFrame100 : wire::kWorldFrame1k;
-  auto subscribed = inbox.on<WorldFrame>(session, frames, [this](const WorldFrame& frame) {
-    if (lockstep_) answers_.received(frame);
-    pass(frame);
-  });
-  if (!subscribed) return subscribed;
-  const auto& manifolds = slow ? wire::kHandManifold50 : wire::kHandManifold;
-  for (wire::Partition& hand : link_.member().hands()) {
-    if (subscribed)
-      subscribed = inbox.on<HandManifold>(hand, manifolds, [this](const HandManifold& manifold) {
-        if (lockstep_) answers_.received(manifold);
-        pass(manifold);
-      });
-  }
-  return subscribed;
-}
-
-/// The new readers first: the former ones are closed once these have heard their server, or a second later,
-/// so that no answer is missing meanwhile.
 void StationRunner::chooseRates(double round_trip) {
   rates_.step(round_trip, force_model_, link_clock_.lossKnown() ? std::optional(choice_.loss) : std::nullopt);
-  wire::Partition& session = link_.member().session();
-  wire::Inbox& inbox = link_.inbox();
-  if (answers_changed_) {
-    const bool slow = slow_answers_;
-    inbox.end(session, (slow ? wire::kWorldFrame1k : wire::kWorldFrame100).name);
-    for (wire::Partition& hand : link_.member().hands())
-      inbox.end(hand, (slow ? wire::kHandManifold : wire::kHandManifold50).name);
-    answers_changed_ = false;
-  } else if (rates_.slowAnswers() != slow_answers_) {
-    auto subscribed = subscribeToAnswers(rates_.slowAnswers());
-    if (!subscribed) return print(subscribed.error().what);
-    slow_answers_ = rates_.slowAnswers();
-    answers_changed_ = true;
-  }
+  if (auto chosen = readers_.choose(rates_.slowAnswers()); !chosen) print(chosen.error().what);
 }
 
 /// In real time alone: the time of a session in lockstep is that of its ticks.
@@ -257,34 +229,6 @@ void StationRunner::chooseForceModel(double round_trip, std::uint64_t late_cycle
   print(text);
   static_cast<void>(link_.send(ClientEvent{link_.welcome().client, ++event_seq_, 0, "station", text}));
 }
-
-/// Raises are heard from anybody, without a server too; clears from the server of this station alone.
-Result<void> StationRunner::subscribeToStops() {
-  wire::Partition& session = link_.member().session();
-  wire::Inbox& inbox = link_.inbox();
-  auto heard = inbox.on<EmergencyStop>(session, wire::kEmergencyStop, [this](const EmergencyStop& stop) {
-    const StopChange change = stops_.raise(stop);
-    if (!change) return;
-    passStops();
-    if (change.superseded)
-      static_cast<void>(link_.withdraw({change.superseded->client_guid, change.superseded->counter, {}, {}}));
-    print("emergency stop by " + stop.who + ": " + stop.reason);
-    static_cast<void>(link_.send(stop));
-  });
-  if (!heard) return heard;
-  return inbox.on<EmergencyClear>(session, wire::kEmergencyClear, [this](const EmergencyClear& cleared) {
-    const auto raise = stops_.standing().find({cleared.client_guid, cleared.counter});
-    const bool stood = raise != stops_.standing().end();
-    if (stood) static_cast<void>(link_.withdraw(raise->second));
-    stops_.clear(cleared);
-    if (!stood) return;
-    passStops();
-    print("emergency stop cleared by " + cleared.who + ": " + cleared.reason);
-    if (!stops_.engaged() && options_.read_keys) print("press return to continue at this station");
-  });
-}
-
-void StationRunner::passStops() { pass(StopSignal{stops_.raised(), stops_.engaged()}); }
 
 void StationRunner::readKeys() {
   if (!options_.read_keys || !returnPressed()) return;

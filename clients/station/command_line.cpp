@@ -137,7 +137,8 @@ void declarePerson(CLI::App& app, Typed& typed) {
          "all others), or files that simulated arms follow, CSV as for `tenon rehearse --input`")
       ->option_text("simulated|none|[HAND=]FILE.csv[,HAND=FILE.csv]");
   app.add_option("--seed", typed.simulated.seed, "seed of the simulated person and devices")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
   app.add_option(
          "--misplace-mount", typed.simulated.misplaced_mount,
          "the simulated trainee inserts the N-th mount, from 0, at a wrong pose and does not correct it; "

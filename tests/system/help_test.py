@@ -44,6 +44,13 @@ class Help(unittest.TestCase):
             with self.subTest(role=role):
                 self.assertEqual(tenon("join", "--role", role, "--fly").returncode, 2)
 
+    def test_a_number_below_its_range_is_wrong_usage(self):
+        for words in (("rehearse", "peg_and_box", "--seed", "-1"), ("join", "--role", "trainee", "--seed", "-1"), ("bake", "part.stl", "--points", "-1")):
+            with self.subTest(words=words):
+                done = tenon(*words)
+                self.assertEqual(done.returncode, 2, done.stdout + done.stderr)
+                self.assertIn("-1", done.stderr)
+
     def test_an_unknown_verb_is_one_clear_error(self):
         done = tenon("fly")
         self.assertEqual(done.returncode, 2)
