@@ -39,7 +39,7 @@ def arguments():
     parser.add_argument("--out", metavar="DIR", type=Path,
                         help="where recording, report and logs go (default: out/demo; while that has an earlier demo, out/demo-2 and so on)")
     parser.add_argument("--overwrite", action="store_true", help="replace those of an earlier demo in that folder (default: out/demo)")
-    parser.add_argument("--seed", type=between(int, 0, 2**64 - 1), default=1, help="of the simulated people's skills and errors (default: %(default)s)")
+    parser.add_argument("--seed", type=between(int, 0, 10**18), default=1, help="of the simulated people's skills and errors (default: %(default)s)")
     parser.add_argument("--detail", type=between(float, 0, 1), default=1.0, help="mesh resolution of the scene, 0 to 1; 1: that of the paper, 1.8 million triangles (default: %(default)s)")
     parser.add_argument("--lockstep", action="store_true", help="ticks wait for each other instead of the clock: repeatable to the last bit")
     parser.add_argument("--headless", action="store_true", help="open nothing in a browser: neither the console at the start nor the report at the end")

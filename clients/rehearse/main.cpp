@@ -93,7 +93,7 @@ void declare(CLI::App& app, RehearseArguments& arguments) {
   app.add_option("scenario", arguments.scenario, "a scenario's folder or YAML file")->required();
   app.add_option("--seed", arguments.rehearsal.seed, "seed of the simulated people and devices")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(tenon::numberFrom(0.0, 1e18));
   app.add_option("--workers", arguments.rehearsal.workers,
                  "threads that compute contacts; the result does not depend on them")
       ->check(CLI::Range(1, 64))

@@ -14,6 +14,7 @@
 
 #include "clients/haptic/seat_file.h"
 #include "idl/types/cache_folder.h"
+#include "idl/types/number_range.h"
 #include "idl/types/printable_text.h"
 #include "idl/wire/identity.h"
 #include "idl/wire/network.h"
@@ -138,7 +139,7 @@ void declarePerson(CLI::App& app, Typed& typed) {
       ->option_text("simulated|none|[HAND=]FILE.csv[,HAND=FILE.csv]");
   app.add_option("--seed", typed.simulated.seed, "seed of the simulated person and devices")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(tenon::numberFrom(0.0, 1e18));
   app.add_option(
          "--misplace-mount", typed.simulated.misplaced_mount,
          "the simulated trainee inserts the N-th mount, from 0, at a wrong pose and does not correct it; "

@@ -272,8 +272,7 @@ int main(int argc, char** argv) {
   app.add_option("--unit", arguments.unit, "length of one unit of the files: mm, cm, m, in")
       ->capture_default_str();
   auto* points = app.add_option("--points", arguments.points, "approximate number of shell points")
-                     ->capture_default_str()
-                     ->check(CLI::PositiveNumber);
+                     ->capture_default_str();
   app.add_option("--spacing", arguments.spacing, "distance between shell points (instead of --points)")
       ->excludes(points);
   app.add_option("--refine", arguments.refine,

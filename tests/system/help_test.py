@@ -45,7 +45,7 @@ class Help(unittest.TestCase):
                 self.assertEqual(tenon("join", "--role", role, "--fly").returncode, 2)
 
     def test_a_number_below_its_range_is_wrong_usage(self):
-        for words in (("rehearse", "peg_and_box", "--seed", "-1"), ("join", "--role", "trainee", "--seed", "-1"), ("bake", "part.stl", "--points", "-1")):
+        for words in (("rehearse", "peg_and_box", "--seed", "-1"), ("join", "--role", "trainee", "--seed", "-1"), ("bake", "part.stl", "-o", "part.tenon", "--points", "-1")):
             with self.subTest(words=words):
                 done = tenon(*words)
                 self.assertEqual(done.returncode, 2, done.stdout + done.stderr)
