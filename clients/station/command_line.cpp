@@ -64,8 +64,8 @@ class StationFile : public CLI::ConfigTOML {
   explicit StationFile(const CLI::App& app) : app_(app) {}
 
   std::vector<CLI::ConfigItem> from_config(std::istream& input) const override {
-    auto items = CLI::ConfigTOML::from_config(input);
-    for (const CLI::ConfigItem& item : items) {
+    auto read = CLI::ConfigTOML::from_config(input);
+    for (const CLI::ConfigItem& item : read) {
       const bool is_known = item.parents.empty() && (app_.get_option_no_throw("--" + item.name) != nullptr ||
                                                      app_.get_option_no_throw(item.name) != nullptr);
       if (!is_known)
@@ -73,7 +73,7 @@ class StationFile : public CLI::ConfigTOML {
                                "' is no option; expected a line `option = value` each, as in: device = "
                                "falcon-sim");
     }
-    return items;
+    return read;
   }
 
  private:

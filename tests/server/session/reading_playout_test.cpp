@@ -85,8 +85,8 @@ INSTANTIATE_TEST_SUITE_P(Links, SparseInputs,
                                          SparseCase{{20, 0, 0.0}, 40, 0.002},
                                          SparseCase{{5, 5, 0.0}, 20, 0.002},
                                          SparseCase{{5, 5, 0.02}, 25, 0.01}),
-                         [](const auto& info) {
-                           const SparseLink& link = info.param.link;
+                         [](const auto& one) {
+                           const SparseLink& link = one.param.link;
                            return "Each" + std::to_string(link.period) + "Jitter" +
                                   std::to_string(link.jitter) + "Loss" +
                                   std::to_string(static_cast<int>(100 * link.loss));
