@@ -19,7 +19,6 @@ import { ViewTools } from "./viewtools";
 import { keep, kept, language, languageNames, nameOfLanguage, setLanguage, t, type Key } from "./strings";
 
 const PANEL_PERIOD = 100; // ms
-const MOST_BESIDE = 0.6; // of the scene's width that the instruction has; a wider one is above what is to be seen
 
 // ?picture is nothing but the scene: of it `tenon picture` makes its pictures, and waits until it is complete
 const wanted = new URLSearchParams(location.search);
@@ -253,9 +252,7 @@ function showPanels(age: number): void {
   const workspaceKey = legend.querySelector<HTMLElement>(".key-workspace");
   if (workspaceKey !== null) workspaceKey.hidden = view?.hasWorkspace !== true;
   document.body.classList.toggle("stale", player === undefined && (live.kind !== "open" || session.link?.state === "lost"));
-  const right = card.hidden || isPicture ? 0 : card.offsetLeft + card.offsetWidth;
-  const isWide = right > MOST_BESIDE * stage.clientWidth;
-  view?.setCovered(isWide ? 0 : right, isWide ? card.offsetTop + card.offsetHeight : 0);
+  view?.setCover(card.hidden || isPicture ? undefined : card);
 }
 
 function frame(now: number): void {

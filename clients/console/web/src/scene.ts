@@ -12,6 +12,7 @@ import type { Session } from "./session";
 
 const DIRECTION = new THREE.Vector3(0.35, -0.8, 0.62).normalize(); // to the viewer, from the trainee's side
 const FILLED = 0.88; // of the picture's width or height, by what is to be seen
+const MOST_BESIDE = 0.6; // of the picture's width that may be covered for something to be seen beside
 const LOOK = 0.1; // [m] shown around what is looked at
 
 export class SceneView {
@@ -156,8 +157,12 @@ export class SceneView {
     this.dirty = true;
   }
 
-  /** What covers the left and the top of the picture [pixels]: what is framed is seen beside and below it. */
-  setCovered(left: number, top: number): void {
+  /** What lies over the picture's corner at the top left: what is framed is seen beside it, below it where it is wide. */
+  setCover(element: HTMLElement | undefined): void {
+    const right = element === undefined ? 0 : element.offsetLeft + element.offsetWidth;
+    const isWide = right > MOST_BESIDE * this.host.clientWidth;
+    const left = isWide ? 0 : right;
+    const top = isWide && element !== undefined ? element.offsetTop + element.offsetHeight : 0;
     if (Math.abs(left - this.covered.left) < 8 && Math.abs(top - this.covered.top) < 8) return;
     this.covered = { left, top };
     this.resize();

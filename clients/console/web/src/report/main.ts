@@ -180,6 +180,7 @@ function begin(report: Report): void {
         setWords();
       }
       card.replaceChildren(...panels.instruction(session));
+      view?.setCover(card);
       plots.showTime(session.tick / 1000);
     }
     requestAnimationFrame(frame);
