@@ -10,6 +10,7 @@ import { Status, type SceneModels, type SceneObject } from "./messages";
 import type { Session } from "./session";
 
 const MOST_POINTS = 20000; // of a mesh, to see where it is
+const ON_PLANE = 1e-6; // [m] a face that lies in the section's plane is cut away
 const PICKED = 0x14507a; // emitted by what is picked
 const EDGE = { transparent: true, opacity: 0.5 } as const;
 
@@ -167,7 +168,7 @@ export class Parts {
   hit(ray: THREE.Raycaster): Pick | undefined {
     const groups = [...this.all.values()].filter(({ group, model }) => group.visible && model !== undefined).map(({ group }) => group);
     for (const { object, point } of ray.intersectObjects(groups, true)) {
-      if (!(object instanceof THREE.Mesh) || this.planes.some((plane) => plane.distanceToPoint(point) < 0)) continue;
+      if (!(object instanceof THREE.Mesh) || this.planes.some((plane) => plane.distanceToPoint(point) < ON_PLANE)) continue;
       const found = [...this.all.values()].find(({ group }) => isBelow(object, group));
       if (found !== undefined) return { object: found.object.object_id, point };
     }
