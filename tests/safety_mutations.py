@@ -126,7 +126,7 @@ RULES = [
      "trust_test.Identity.test_an_old_server_that_was_stopped_and_continues_ends_itself"),
     ("a stranger leads the run", [(REGISTRY, r"\(role->needs_key \|\| key_of_all_\) && !proofs\.key", "key_of_all_ && !proofs.key")], SCRIPTS,
      "trust_test.Identity.test_instructors_and_admins_need_the_key_and_are_told_so"),
-    ("nobody can stop the devices", [("clients/haptic/station_program.cpp", r"if \(!change\) return;", "if (stop.who != \"server\" || !change) return;")], SCRIPTS,
+    ("nobody can stop the devices", [("clients/haptic/station_stops.cpp", r"if \(!change\) return;", "if (stop.who != \"server\" || !change) return;")], SCRIPTS,
      "trust_test.EmergencyStop.test_a_raise_reaches_the_devices_although_the_server_hangs_and_stands_when_it_continues"),
     ("a restart of the server lifts", [(STOPS, r"  truth_ = std::move\(\*kept\);\n", "")], SCRIPTS,
      "trust_test.EmergencyStop.test_a_stop_stands_over_a_killed_server_and_its_end_needs_station_instructor_and_resume"),
