@@ -341,6 +341,15 @@ void ServerWire::engage(const EmergencyStop& stop) {
     log(Severity::kError, "emergency stop", text);
 }
 
+void ServerWire::logStandingStops() {
+  if (!stops_.engaged()) return;
+  const EmergencyStop& one = stops_.standing().begin()->second;
+  const std::size_t others = stops_.standing().size() - 1;
+  log(Severity::kError, "emergency stop",
+      fmt::format("the emergency stop stands since before this start: engaged by {}: {}{}", one.who,
+                  one.reason, others == 0 ? "" : fmt::format(", and {} others", others)));
+}
+
 void ServerWire::clearEmergencyStop(ClientId client, const std::string& reason) {
   const std::string& who = registry_.findClient(client)->name;
   stops_.clear(who, reason);

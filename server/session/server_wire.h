@@ -89,6 +89,8 @@ class ServerWire {
 
   /// Raises the emergency stop in the server's own name, unless it is engaged.
   void raiseStop(const std::string& reason);
+  /// Says, once `print` is set, that a stop of an earlier life of this session stands.
+  void logStandingStops();
   /// Publishes an entry of the log.
   void log(Severity severity, const std::string& kind, const std::string& text);
   /// Removes a client from the session, notifies it, and logs "Ada (trainee) <why>".

@@ -83,6 +83,7 @@ class Server final : public SessionServer {
     wire_ = std::move(*wire);
     if (options_.stop_file.empty()) wire_->log(Severity::kWarning, "emergency stop", kNoStopFile);
     wire_->print = options_.print;
+    wire_->logStandingStops();
     if (options_.journal.empty()) {
       if (options_.publish_journal) makeJournalWriter(std::nullopt);
       return {};

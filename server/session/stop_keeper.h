@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -40,6 +41,7 @@ class StopKeeper {
   /// Clears all raises that stand, and those alone: one that is on its way will stand.
   void clear(const std::string& who, const std::string& reason);
   [[nodiscard]] bool engaged() const { return truth_.engaged(); }
+  [[nodiscard]] const std::map<RaiseId, EmergencyStop>& standing() const { return truth_.standing(); }
   /// Whether this raise was cleared before: it would not stand.
   [[nodiscard]] bool wasCleared(const EmergencyStop& stop) const {
     return truth_.cleared().contains({stop.client_guid, stop.counter});

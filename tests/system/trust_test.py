@@ -4,7 +4,9 @@ import re
 import signal
 import subprocess
 import tempfile
+import time
 import unittest
+from pathlib import Path
 
 from stage import COARSE, PROGRAMS, SOURCE, Process, Stage, tenon
 
@@ -171,6 +173,21 @@ class EmergencyStop(unittest.TestCase):
             self.assertEqual(again.wait(60), 0)
             once_more = stage.serve("peg_and_box")
             self.assertNotIn("emergency", once_more.text())
+
+    def test_a_stop_stands_over_a_killed_server_although_nobody_repeats_it(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve("peg_and_box", "--wait-for", "right")
+            self.assertEqual(command(stage, "emergency", "a", "test").returncode, 0)
+            server.wait_for("engaged by .*: a test", 30)
+            kept = Path(os.environ["XDG_STATE_HOME"]) / "tenon" / f"stop-{stage.domain}-{stage.session}"
+            end = time.monotonic() + 30
+            while not (kept.exists() and "raise" in kept.read_text(encoding="utf-8")):
+                self.assertLess(time.monotonic(), end, f"{kept} has no raise")
+                time.sleep(0.05)
+            server.signal(signal.SIGKILL)
+            server.wait(30)
+            again = stage.serve("peg_and_box", "--wait-for", "right")
+            again.wait_for("the emergency stop stands since before this start: engaged by .*: a test", 60)
 
     def test_without_a_home_the_server_says_that_a_stop_will_not_stand_after_a_restart(self):
         with Stage(lockstep=False) as stage:

@@ -48,6 +48,7 @@ const RULES: [RegExp, Key][] = [
   [/^(?<who>.+) \((?<role>\w+)\) was removed by (?<by>.+)$/, "event.removed"],
   [/^(?<who>.+) may not join: (?<reason>.+)$/, "event.join.refused"],
   [/^engaged by (?<who>.+?): (?<reason>.*)$/, "event.engaged"],
+  [/^the emergency stop stands since before this start: engaged by (?<who>.+?): (?<reason>.*)$/, "event.stands"],
   [/^cleared by (?<who>.+?): (?<reason>.*?)(?:; )?the session is paused until 'resume'$/, "event.cleared"],
   [/^hand '(?<hand>[^']+)' is guided no more: (?<reason>.+)$/, "event.guidance.ended"],
   [/^hand (?<hand>\w+): safety: (?<rule>.+) \((?<force>[\d.]+) N requested.*\), step \d+$/, "event.safety"],

@@ -7,7 +7,7 @@ import { conditionOf, interventions, kindOf, textOf } from "./eventtext";
 import type { Label } from "./labels";
 import { NONE, RunPhase, StepPhase, type EventLog } from "./messages";
 import type { Session, StepEntry } from "./session";
-import { localized, retold, t, type Key } from "./strings";
+import { localized, n, retold, significant, t, type Key } from "./strings";
 
 const RUN: Record<RunPhase, [Key, Icon, string]> = {
   [RunPhase.Waiting]: ["run.waiting", "wait", "info"],
@@ -86,8 +86,8 @@ function conditions(session: Session): Node[] {
     const degrees = (180 / Math.PI) * progress.angle_error;
     const limits = [1000 * step.tolerance, (180 / Math.PI) * step.angle_tolerance];
     rows.push(
-      meter(t("condition.position"), `${mm.toFixed(mm < 10 ? 1 : 0)} / ${limits[0].toFixed(0)} mm`, limits[0] / Math.max(mm, 1e-9), mm <= limits[0]),
-      meter(t("condition.angle"), `${degrees.toFixed(degrees < 10 ? 1 : 0)} / ${limits[1].toFixed(0)}°`, limits[1] / Math.max(degrees, 1e-9), degrees <= limits[1]),
+      meter(t("condition.position"), `${n(mm, mm < 10 ? 1 : 0)} / ${n(limits[0], 0)} mm`, limits[0] / Math.max(mm, 1e-9), mm <= limits[0]),
+      meter(t("condition.angle"), `${n(degrees, degrees < 10 ? 1 : 0)} / ${n(limits[1], 0)}°`, limits[1] / Math.max(degrees, 1e-9), degrees <= limits[1]),
     );
   }
   for (const { text, value, limit, group, met, depth } of progress.conditions) {
@@ -97,7 +97,7 @@ function conditions(session: Session): Node[] {
       rows.push(nested(depth, h("li", met ? "group met" : "group", icon(met ? "done" : "wait"), h("span", "", label), h("output", "", `${value} / ${limit}`))));
       continue;
     }
-    const reading = unit === "" ? `${Number(value.toPrecision(3))} / ${Number(limit.toPrecision(3))}` : `${value.toFixed(1)} / ${limit.toFixed(1)} ${unit}`;
+    const reading = unit === "" ? `${significant(value)} / ${significant(limit)}` : `${n(value, 1)} / ${n(limit, 1)} ${unit}`;
     rows.push(nested(depth, meter(label, reading, limit === 0 ? (met ? 1 : 0) : value / limit, met)));
   }
   const more = progress.nodes - progress.conditions.length;
@@ -114,7 +114,7 @@ export function steps(session: Session): Node[] {
     if (entry.part !== part && entry.part !== "") rows.push(h("li", "group", session.retitled(entry.part)));
     part = entry.part;
     const seconds = entry.started === undefined ? undefined : (entry.ended ?? (entry.isNow ? session.tick / 1000 : undefined));
-    const time = entry.started === undefined || seconds === undefined ? "" : `${Math.max(0, seconds - entry.started).toFixed(1)} s`;
+    const time = entry.started === undefined || seconds === undefined ? "" : `${n(Math.max(0, seconds - entry.started), 1)} s`;
     const state = entry.phase === undefined ? h("span", "badge muted", t("step.ahead")) : badge(STEP[entry.phase]);
     const row = h("li", entry.isNow ? "now" : entry.phase === undefined ? "ahead" : "", state, h("span", "name", titleOfStep(entry)), h("time", "", time));
     row.dataset["step"] = entry.name;
@@ -130,8 +130,8 @@ const QUIET = { age: 0.02, lost: 0.1, freeze: 50 }; // [s], [%], [ms] up to whic
 function linkOf(session: Session, client: number): { text: string; isQuiet: boolean } {
   const link = session.telemetry.get(client);
   if (link === undefined || link.samples === 0n) return { text: "", isQuiet: true };
-  const ms = (seconds: number) => (1000 * seconds).toFixed(seconds < 0.01 ? 1 : 0);
-  const lost = (100 * Math.max(link.inputs_lost, link.answers_lost)).toFixed(1);
+  const ms = (seconds: number) => n(1000 * seconds, seconds < 0.01 ? 1 : 0);
+  const lost = n(100 * Math.max(link.inputs_lost, link.answers_lost), 1);
   const now = t("link", { age: ms(link.age), jitter: ms(link.jitter), lost });
   const hands = Array.from(session.people.get(client)?.hands ?? []);
   const freeze = Math.max(0, ...hands.map((hand) => session.sceneHands.get(hand)?.freeze_ticks ?? 0));
@@ -224,7 +224,7 @@ export function status(session: Session, age: number): Node[] {
   const items = [item("status.tick", String(session.tick))];
   if (stats !== undefined) {
     const ms = 1000 * stats.compute_seconds_max;
-    items.push(item("status.compute", `${ms.toFixed(2)} ms`, ms > 1 && session.link?.lockstep !== true ? "warn" : ""), item("status.load", `${stats.load_percent.toFixed(0)} %`), item("status.late", String(stats.late_ticks)));
+    items.push(item("status.compute", `${n(ms, 2)} ms`, ms > 1 && session.link?.lockstep !== true ? "warn" : ""), item("status.load", `${n(stats.load_percent, 0)} %`), item("status.late", String(stats.late_ticks)));
     // in lockstep ticks wait, so slow writes delay nothing that is missed
     const slow = session.link?.lockstep === true ? 0n : stats.slow_writes;
     if (slow + stats.unsent_samples > 0n) items.push(item("status.writes", `${stats.slow_writes} / ${stats.unsent_samples}`, "warn"));
@@ -235,6 +235,6 @@ export function status(session: Session, age: number): Node[] {
     const text = recorder.recording ? t("recorder.on", { count: String(recorder.messages) }) : recorder.problem || t("recorder.off");
     items.push(h("span", `stat ${recorder.problem === "" ? "" : "bad"}`, icon(recorder.recording ? "live" : "over"), text));
   }
-  if (age > 0.5 && session.link?.state === "joined" && !session.isOver) items.push(h("span", "stat warn", icon("warn"), t("status.stale", { seconds: age.toFixed(1) })));
+  if (age > 0.5 && session.link?.state === "joined" && !session.isOver) items.push(h("span", "stat warn", icon("warn"), t("status.stale", { seconds: n(age, 1) })));
   return items;
 }

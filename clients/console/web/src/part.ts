@@ -7,7 +7,7 @@ import { NONE } from "./messages";
 import { reasonOfEnd } from "./panels";
 import type { SceneView } from "./scene";
 import type { Session } from "./session";
-import { localized, t, type Key } from "./strings";
+import { localized, n, t, type Key } from "./strings";
 
 const MOST_HANDS = 2;
 const ROLES = { trainee: 2, instructor: 1 } as const; // as in the messages
@@ -158,15 +158,15 @@ export class Part {
     const name = session.titleOf(now.objectId) || session.nameOfHand(this.ids[hand.current]);
     if (stopped) return [icon("stop"), h("b", "", name), h("span", "bad", t("part.stopped"))];
     if (!hand.isOn) return [icon("hand"), h("b", "", name), h("span", "", t("part.off"))];
-    const force = h("span", now.inContact ? "force touching" : "force", now.inContact ? t("part.force", { force: now.force.toFixed(1) }) : t("part.free"));
+    const force = h("span", now.inContact ? "force touching" : "force", now.inContact ? t("part.force", { force: n(now.force, 1) }) : t("part.free"));
     const way: Node[] = [];
     if (session.isGuided(this.ids[hand.current])) way.push(h("span", "way", t("part.guided")));
     if (guide !== undefined) {
-      const mm = (metres: number): string => (Math.abs(metres) < 0.1 ? `${(1000 * metres).toFixed(0)} mm` : `${(100 * metres).toFixed(0)} cm`);
+      const mm = (metres: number): string => (Math.abs(metres) < 0.1 ? `${n(1000 * metres, 0)} mm` : `${n(100 * metres, 0)} cm`);
       way.push(h("span", "way", t("part.way", { distance: mm(guide.distance) })));
       const depth: Key = Math.abs(guide.farther) < 0.005 ? "part.way.level" : guide.farther > 0 ? "part.way.farther" : "part.way.nearer";
       way.push(h("span", "depth", t(depth, { distance: mm(Math.abs(guide.farther)) })));
-      if (guide.angle !== undefined && guide.angle > 0.035) way.push(h("span", "angle", t("part.way.angle", { angle: ((guide.angle * 180) / Math.PI).toFixed(0) })));
+      if (guide.angle !== undefined && guide.angle > 0.035) way.push(h("span", "angle", t("part.way.angle", { angle: n((guide.angle * 180) / Math.PI, 0) })));
     }
     return [icon("hand"), h("b", "", name), force, ...way];
   }

@@ -5,7 +5,7 @@ import "uplot/dist/uPlot.min.css";
 import { h, zoomOf } from "./dom";
 import { interventions } from "./eventtext";
 import type { Session } from "./session";
-import { keep, kept, t, type Key } from "./strings";
+import { keep, kept, n, t, type Key } from "./strings";
 
 const WINDOW = 30; // s
 const PERIOD = 150; // [ms] between pictures
@@ -120,7 +120,7 @@ class Plot {
       const shown = at ?? values[i];
       if (shown === null || shown === undefined) return "–";
       const rules = interventions(this.rulesAt(lines[series - 1].track, plot.data[0][i]));
-      return `${shown.toFixed(digits)} ${unit}${rules === "" ? "" : `, ${rules}`}`;
+      return `${n(shown, digits)} ${unit}${rules === "" ? "" : `, ${rules}`}`;
     };
     const series = lines.map((line, i) => ({ label: line.name, stroke: color(`--series-${i}`), width: 1.75, dash: DASHES[i], spanGaps: true, points: { show: false }, value }));
     // where the safety layer acts
@@ -143,7 +143,7 @@ class Plot {
         ...this.size(),
         scales: { x: { time: false, auto: false }, y: { auto: false } },
         axes: [{ ...axis, size: 24, values: (_, ticks) => ticks.map((tick) => `${tick} s`) }, { ...axis, size: 52, space: 28, values: (_, ticks) => ticks.map((tick) => `${tick} ${unit}`) }],
-        series: [{ label: "s", value: (_, time: number | null) => (time === null ? "–" : time.toFixed(1)) }, ...series, ...limited],
+        series: [{ label: "s", value: (_, time: number | null) => (time === null ? "–" : n(time, 1)) }, ...series, ...limited],
         // the page may be zoomed, as on a wall; the plot counts in its own pixels
         cursor: { drag: { x: false, y: false }, sync: { key: "session" }, move: (plot, left, top) => [left / zoomOf(plot.over), top / zoomOf(plot.over)] },
         legend: { live: true, isolate: false, markers: { width: 2 } },

@@ -38,6 +38,29 @@ export function setLanguage(name: string): void {
   document.documentElement.lang = language;
 }
 
+/** How people of this language write dates and numbers: day before month in English, too. */
+export function locale(): string {
+  return language === "en" ? "en-GB" : language;
+}
+
+const formats = new Map<string, Intl.NumberFormat>();
+function written(value: number, options: Intl.NumberFormatOptions): string {
+  const key = `${locale()} ${JSON.stringify(options)}`;
+  let format = formats.get(key);
+  if (format === undefined) formats.set(key, (format = new Intl.NumberFormat(locale(), options)));
+  return format.format(value);
+}
+
+/** A number as people of this language write it, with so many decimals. */
+export function n(value: number, digits: number): string {
+  return written(value, { minimumFractionDigits: digits, maximumFractionDigits: digits, useGrouping: Math.abs(value) >= 1e4 });
+}
+
+/** Likewise with three significant digits, or fewer where the others are 0. */
+export function significant(value: number): string {
+  return written(value, { maximumSignificantDigits: 3, useGrouping: false });
+}
+
 /** A text with its values in the places of their names. */
 export function filled(text: string, values: Record<string, string | number>): string {
   return text.replace(/\{(\w+)\}/g, (_, name: string) => String(values[name] ?? ""));

@@ -7,7 +7,7 @@ import { NONE, StepPhase, type Pose } from "./messages";
 import type { Label } from "./labels";
 import type { SceneView } from "./scene";
 import type { Session } from "./session";
-import { keep, kept, t, type Key } from "./strings";
+import { keep, kept, n, t, type Key } from "./strings";
 
 const STILL = 4; // [pixels] that a click moves at most
 const AXES = { x: new THREE.Vector3(1, 0, 0), y: new THREE.Vector3(0, 1, 0), z: new THREE.Vector3(0, 0, 1) } as const;
@@ -226,7 +226,7 @@ export class ViewTools {
   /** Of the measured distance. */
   labels(): Label[] {
     if (this.ends.length < 2) return [];
-    return [{ place: this.ends[0].clone().lerp(this.ends[1], 0.5), text: `${(1000 * this.ends[0].distanceTo(this.ends[1])).toFixed(1)} mm`, tone: "measured" }];
+    return [{ place: this.ends[0].clone().lerp(this.ends[1], 0.5), text: `${n(1000 * this.ends[0].distanceTo(this.ends[1]), 1)} mm`, tone: "measured" }];
   }
 
   show(): void {
@@ -239,7 +239,7 @@ export class ViewTools {
     this.sectionRow.hidden = !this.isCut;
     this.measureRow.hidden = !this.isMeasuring;
     const [a, b] = this.ends;
-    const mm = (metres: number): string => (1000 * metres).toFixed(1);
+    const mm = (metres: number): string => n(1000 * metres, 1);
     this.measureRow.textContent =
       b === undefined ? t(a === undefined ? "tool.measure.first" : "tool.measure.second") : t("tool.measured", { distance: mm(a.distanceTo(b)), x: mm(b.x - a.x), y: mm(b.y - a.y), z: mm(b.z - a.z) });
     const { hidden } = this.view.parts;

@@ -10,11 +10,11 @@ import { Player } from "../player";
 import { fromBytes, Recording } from "../recording";
 import { SceneView } from "../scene";
 import { Session } from "../session";
-import { keep, kept, language, languageNames, localized, nameOfLanguage, setLanguage, t } from "../strings";
+import { keep, kept, language, languageNames, locale, localized, n, nameOfLanguage, setLanguage, t } from "../strings";
 import { bytesOf, readReport, type Report, type ReportEvent, type Visit } from "./data";
 import { Plots } from "./plots";
 import * as tables from "./tables";
-import { locale, r, said } from "./texts";
+import { r, said } from "./texts";
 
 const PANEL_PERIOD = 100; // ms
 const PICTURE = 34; // [ticks] between two poses
@@ -116,7 +116,7 @@ function begin(report: Report): void {
     const none = report.no_player ?? "";
     const notes = [
       ...(none === "" ? [] : [r("player.none", { reason: said(none) })]), ...(problem === "" ? [] : [r("player.failed", { reason: problem })]),
-      ...(inside !== undefined && inside.rate < 29 ? [r("player.rate", { rate: inside.rate.toFixed(inside.rate < 3 ? 1 : 0) })] : []),
+      ...(inside !== undefined && inside.rate < 29 ? [r("player.rate", { rate: n(inside.rate, inside.rate < 3 ? 1 : 0) })] : []),
       ...(inside !== undefined && inside.models < inside.objects ? [r("player.models", { missing: inside.objects - inside.models, objects: inside.objects })] : []),
       ...(view?.simple === true ? [t("view.simple")] : []), ...(hasSession && view === undefined ? [t("cover.webgl"), t("cover.webgl.more")] : []),
     ];

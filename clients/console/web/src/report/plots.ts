@@ -3,9 +3,9 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 
 import { h } from "../dom";
-import { t } from "../strings";
+import { n, t } from "../strings";
 import type { Report, ReportEvent, SeriesName, Visit } from "./data";
-import { n, r, type Text } from "./texts";
+import { r, type Text } from "./texts";
 
 const KEY = "report"; // of what all plots have in common
 const HEIGHT = 150; // px

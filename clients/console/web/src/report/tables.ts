@@ -2,7 +2,8 @@
 import { h, type Icon, icon } from "../dom";
 import { clock } from "../panels";
 import type { Metrics, Report, ReportEvent, Summary, Visit } from "./data";
-import { n, r, said, type Text } from "./texts";
+import { n } from "../strings";
+import { r, said, type Text } from "./texts";
 
 const EVENTS_SHOWN = 200;
 const PHASES: Record<string, [Icon, string]> = { done: ["done", "good"], "timed out": ["warn", "bad"], skipped: ["skip", "warn"], abandoned: ["skip", "warn"], "not finished": ["wait", "warn"] };

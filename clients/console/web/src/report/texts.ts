@@ -1,5 +1,5 @@
 // The texts of a report that the console does not have: one file a language.
-import { filled, language } from "../strings";
+import { filled, language, n } from "../strings";
 import de from "./de.json";
 import en from "./en.json";
 
@@ -8,16 +8,6 @@ const TEXTS: Record<string, { texts: Record<Text, string>; said: Record<string, 
 
 export function r(key: Text, values: Record<string, string | number> = {}): string {
   return filled((TEXTS[language] ?? en).texts[key], values);
-}
-
-/** How people of this language write dates and numbers: day before month in English, too. */
-export function locale(): string {
-  return language === "en" ? "en-GB" : language;
-}
-
-/** A number as people of this language write it. */
-export function n(value: number, digits: number): string {
-  return value.toLocaleString(locale(), { minimumFractionDigits: digits, maximumFractionDigits: digits, useGrouping: Math.abs(value) >= 1e4 });
 }
 
 /** A sentence of the server or of `tenon report` in this language; as it is when it is not known. Numbers stand for `#`. */
