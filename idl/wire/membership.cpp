@@ -218,6 +218,7 @@ void Membership::openHands() {
 Result<void> Membership::takeSeat() {
   lost_.reset();
   server_gone_ = false;
+  unheard_since_.reset();
   presence_ = {welcome_.client, options_.person, options_.role, {}, true};
   for (const HandId hand : welcome_.hands)
     if (hand.valid()) presence_.hands.push_back(hand);
@@ -235,16 +236,32 @@ Result<void> Membership::watch(Inbox& inbox) {
   if (!watched) return watched;
   watched = inbox.onGone<SessionAnnounce>(*lobby_, kSessionAnnounce, [this](const SessionAnnounce& gone) {
     if (gone.session != announce_.session || gone.server_epoch != announce_.server_epoch) return;
-    server_gone_ = true;
-    lost_ = "the server of " + sessionText(announce_.session) + " is gone";
+    loseServer();
   });
   if (!watched) return watched;
+  watches_ = true;
   return inbox.on<Welcome>(*lobby_, kWelcome, [this](const Welcome& notice) {
     if (notice.client_guid != guid_ || notice.client != welcome_.client) return;
     if (notice.accepted) return lost_.reset();
     lost_ = "the server of " + sessionText(announce_.session) + " removed this client: " + notice.reason;
     leave();
   });
+}
+
+void Membership::loseServer() {
+  server_gone_ = true;
+  lost_ = "the server of " + sessionText(announce_.session) + " is gone";
+}
+
+const std::optional<std::string>& Membership::lost() {
+  if (lost_ || !watches_ || isWatching()) {
+    unheard_since_.reset();
+    return lost_;
+  }
+  const auto now = std::chrono::steady_clock::now();
+  if (!unheard_since_) unheard_since_ = now;
+  if (now - *unheard_since_ > 2 * kLapse) loseServer();
+  return lost_;
 }
 
 Result<void> Membership::rejoin(const Stop& stop, const std::function<void()>& meanwhile) {

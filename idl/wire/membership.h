@@ -65,10 +65,11 @@ class Membership {
   Result<void> watch(Inbox& inbox);
   /// The watched inbox has heard the server's announcement: only then can it hear that it is gone.
   [[nodiscard]] bool isWatching() const { return watched_epoch_ == announce_.server_epoch; }
-  /// The server has ended or is unreachable.
+  /// The server has ended or is unreachable, as lost() has found.
   [[nodiscard]] bool serverIsGone() const { return server_gone_; }
-  /// Why the seat is lost; none while it is held.
-  [[nodiscard]] const std::optional<std::string>& lost() const { return lost_; }
+  /// Why the seat is lost; none while it is held. To be called between dispatches of the watched inbox: a
+  /// server that it does not hear at all within two leases of its announcement ended before it was watched.
+  [[nodiscard]] const std::optional<std::string>& lost();
   /// Finds the session again and requests the same seat, also when the server that was found is killed
   /// meanwhile and another one continues its session.
   Result<void> rejoin(const Stop& stop, const std::function<void()>& meanwhile = {});
@@ -101,6 +102,7 @@ class Membership {
   Result<void> rejoinNext(const SessionAnnounce& before, const Stop& stop,
                           const std::function<void()>& meanwhile, bool& ended);
   Result<void> takeSeat();
+  void loseServer();
   void openHands();
   void hearServer();
   /// Answers the challenge of a Welcome; `problem`: why there is no proof of the session's key.
@@ -123,7 +125,9 @@ class Membership {
   Origin server_;
   std::optional<std::string> lost_;
   bool server_gone_ = false;
+  bool watches_ = false;
   std::uint32_t watched_epoch_ = 0;  // of the newest announcement that the watched inbox has heard
+  std::optional<std::chrono::steady_clock::time_point> unheard_since_;  // the server of announce_
 };
 
 }  // namespace tenon::wire

@@ -223,6 +223,10 @@ void ServerWire::log(Severity severity, const std::string& kind, const std::stri
 
 void ServerWire::refuse(const std::string& why) {
   ++refused_inputs_;
+  logRefusal(why);
+}
+
+void ServerWire::logRefusal(const std::string& why) {
   if (const auto line = refusals_.add(why, std::chrono::steady_clock::now()))
     log(Severity::kWarning, "refused", *line);
 }
@@ -303,8 +307,7 @@ void ServerWire::handle(const Command& command, const wire::Origin& from) {
 void ServerWire::answer(const Command& command, const CommandAck& ack, const std::string& who) {
   writers_->ack.send(ack);
   if (!ack.accepted) {
-    log(Severity::kWarning, "refused",
-        fmt::format("{}: '{}': {}", who, commandName(command.kind), ack.reason));
+    logRefusal(fmt::format("{}: '{}': {}", who, commandName(command.kind), ack.reason));
   } else if (command.kind == CommandKind::kNote) {
     log(Severity::kInfo, "note", fmt::format("{}: {}", who, command.text));
   } else if (command.kind == CommandKind::kClearEmergencyStop) {

@@ -129,6 +129,7 @@ class ServerWire {
   void engage(const EmergencyStop& stop);
   void clearEmergencyStop(ClientId client, const std::string& reason);
   void refuse(const std::string& why);
+  void logRefusal(const std::string& why);
   void sendGuidance(const TickOutput& output);
   void forwardChanges();
 

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -12,13 +15,13 @@
 
 namespace tenon::test {
 
-/// The scene's side of a server: announces a session "test" of `size`, gives everybody a seat, receives no
-/// inputs, and sends of its scene what it is told to.
+/// The scene's side of a server: announces a session "test" of `size`, gives everybody a seat with the same
+/// `hands`, receives no inputs, and sends of its scene what it is told to.
 ///
 /// Threads: one.
 class FakeSession {
  public:
-  FakeSession(std::uint32_t domain, SessionAnnounce size)
+  FakeSession(std::uint32_t domain, SessionAnnounce size, std::vector<HandId> hands = {})
       : bus_(participant(domain)),
         lobby_(bus_, wire::kLobby),
         session_(bus_, wire::sessionPartition("test")),
@@ -30,12 +33,13 @@ class FakeSession {
     size.session = "test";
     size.server_epoch = 7;
     EXPECT_TRUE(announces_.write(size));
-    EXPECT_TRUE(inbox_.on<Join>(lobby_, wire::kJoin, [this](const Join& join) {
+    EXPECT_TRUE(inbox_.on<Join>(lobby_, wire::kJoin, [this, hands = std::move(hands)](const Join& join) {
       (void)welcomes_.write({.client_guid = join.client_guid,
                              .session = join.session,
                              .server_epoch = 7,
                              .accepted = true,
                              .client = ClientId{1},
+                             .hands = hands,
                              .people = 1});
       joined_ = true;
     }));
@@ -51,7 +55,12 @@ class FakeSession {
     const auto until = std::chrono::steady_clock::now() + time;
     while (std::chrono::steady_clock::now() < until) inbox_.dispatch(std::chrono::milliseconds(5));
   }
+  /// Serves until `done`; false after a minute.
+  bool serveUntil(const std::function<bool()>& done) { return dispatchUntil(inbox_, done); }
   [[nodiscard]] bool joined() const { return joined_; }
+  /// To write in the name of the server.
+  [[nodiscard]] const std::shared_ptr<wire::Participant>& bus() const { return bus_; }
+  [[nodiscard]] wire::Partition& session() { return session_; }
 
  private:
   std::shared_ptr<wire::Participant> bus_;

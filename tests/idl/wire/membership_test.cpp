@@ -160,6 +160,30 @@ TEST(Membership, AKilledServerIsReportedAsGoneAndAMissingOneAsNotAnnounced) {
   EXPECT_THAT(found.error().what, HasSubstr("tenon serve"));
 }
 
+TEST(Membership, AServerThatEndsBeforeItIsWatchedIsGoneToo) {
+  const std::uint32_t domain = test::ownDomain();
+  test::Peer peer([domain] { runServer(domain); });
+  const std::atomic<bool> stop = false;
+  auto member = Membership::find(traineeOptions(domain), stop);
+  ASSERT_TRUE(member) << member.error().what;
+  ASSERT_TRUE((*member)->join(stop));
+  Inbox witness;
+  bool gone = false, announced = false;
+  ASSERT_TRUE(witness.on<SessionAnnounce>((*member)->lobby(), kSessionAnnounce,
+                                          [&](const SessionAnnounce&) { announced = true; }));
+  ASSERT_TRUE(witness.onGone<SessionAnnounce>((*member)->lobby(), kSessionAnnounce,
+                                              [&](const SessionAnnounce&) { gone = true; }));
+  ASSERT_TRUE(test::dispatchUntil(witness, [&] { return announced; }));
+  peer.kill();
+  ASSERT_TRUE(test::dispatchUntil(witness, [&] { return gone; }));
+  Inbox inbox;
+  ASSERT_TRUE((*member)->watch(inbox));
+  EXPECT_FALSE((*member)->lost()) << "it may be about to be heard";
+  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return (*member)->lost().has_value(); }));
+  EXPECT_THAT(*(*member)->lost(), HasSubstr("'test' is gone"));
+  EXPECT_TRUE((*member)->serverIsGone());
+}
+
 TEST(Membership, DoesNotRejoinASessionOfAnotherScenario) {
   const std::uint32_t domain = test::ownDomain();
   test::Peer peer([domain] { runServer(domain, "one"); });

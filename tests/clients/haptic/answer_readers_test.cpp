@@ -1,0 +1,92 @@
+#include "clients/haptic/answer_readers.h"
+
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/clients/haptic/joined_station.h"
+
+namespace tenon::haptic {
+namespace {
+
+/// Samples of each tick have odd ticks here, slow ones even ticks.
+class AnswerReadersTest : public JoinedStation {
+ protected:
+  AnswerReadersTest() : JoinedStation({HandId{1}}) {}
+
+  void SetUp() override {
+    JoinedStation::SetUp();
+    readers_ = std::make_unique<AnswerReaders>(
+        *link_, AnswerReaders::Callbacks{.frame = [this](const WorldFrame& frame) { count(frame.tick); },
+                                         .manifold = [this](const HandManifold& one) { count(one.tick); }});
+  }
+  void count(Tick tick) { ++(tick % 2 == 1 ? of_each_tick_ : slow_); }
+  /// Both kinds of both topics are sent, until the station has heard what it reads.
+  void send() {
+    ASSERT_TRUE(frames_.write({.tick = 1}));
+    ASSERT_TRUE(slow_frames_.write({.tick = 2}));
+    ASSERT_TRUE(manifolds_.write({.tick = 1, .hand = HandId{1}}));
+    ASSERT_TRUE(slow_manifolds_.write({.tick = 2, .hand = HandId{1}}));
+  }
+  [[nodiscard]] bool matches(std::size_t each_tick, std::size_t slow) {
+    return frames_.matchedReaders() == each_tick && manifolds_.matchedReaders() == each_tick &&
+           slow_frames_.matchedReaders() == slow && slow_manifolds_.matchedReaders() == slow;
+  }
+  /// Waits for these readers, and expects the two samples of each.
+  void expectRead(std::size_t each_tick, std::size_t slow) {
+    ASSERT_TRUE(hearUntil([&] { return matches(each_tick, slow); }));
+    hear();
+    of_each_tick_ = slow_ = 0;
+    send();
+    EXPECT_TRUE(hearUntil([&] { return of_each_tick_ == 2 * each_tick && slow_ == 2 * slow; }));
+    hear();
+    EXPECT_EQ(of_each_tick_, 2 * each_tick);
+    EXPECT_EQ(slow_, 2 * slow);
+  }
+
+  wire::Partition hand_{server_.bus(), wire::handPartition("test", HandId{1})};
+  wire::Writer<WorldFrame> frames_ =
+      wire::Writer<WorldFrame>::open(server_.session(), wire::kWorldFrame1k).value();
+  wire::Writer<WorldFrame> slow_frames_ =
+      wire::Writer<WorldFrame>::open(server_.session(), wire::kWorldFrame100).value();
+  wire::Writer<HandManifold> manifolds_ =
+      wire::Writer<HandManifold>::open(hand_, wire::kHandManifold).value();
+  wire::Writer<HandManifold> slow_manifolds_ =
+      wire::Writer<HandManifold>::open(hand_, wire::kHandManifold50).value();
+  std::unique_ptr<AnswerReaders> readers_;
+  std::size_t of_each_tick_ = 0;
+  std::size_t slow_ = 0;
+};
+
+TEST_F(AnswerReadersTest, ReadThoseOfEachTickFirst) {
+  ASSERT_TRUE(readers_->open());
+  expectRead(1, 0);
+  ASSERT_TRUE(readers_->choose(false));
+  expectRead(1, 0);
+}
+
+TEST_F(AnswerReadersTest, HaveBothKindsInBetweenSoThatNoAnswerIsMissing) {
+  ASSERT_TRUE(readers_->open());
+  expectRead(1, 0);
+  ASSERT_TRUE(readers_->choose(true));
+  expectRead(1, 1);
+  ASSERT_TRUE(readers_->choose(true));
+  expectRead(0, 1);
+  ASSERT_TRUE(readers_->choose(true));
+  expectRead(0, 1);
+}
+
+TEST_F(AnswerReadersTest, GoBackAlsoWhenTheChoiceChangesInBetween) {
+  ASSERT_TRUE(readers_->open());
+  ASSERT_TRUE(readers_->choose(true));
+  ASSERT_TRUE(readers_->choose(false)) << "ends the change that has begun first";
+  expectRead(0, 1);
+  ASSERT_TRUE(readers_->choose(false));
+  expectRead(1, 1);
+  ASSERT_TRUE(readers_->choose(false));
+  expectRead(1, 0);
+}
+
+}  // namespace
+}  // namespace tenon::haptic
