@@ -28,8 +28,12 @@ Result<std::string> outcomeOf(const StopHeard& heard, std::uint32_t domain, cons
     return fail("nobody has heard the emergency stop: no program of " +
                 (session.empty() ? "any session" : "session '" + session + "'") + " runs on domain " +
                 std::to_string(domain));
-  return "sent to " + std::to_string(heard.programs) +
-         " programs; no server has answered: it may hang or have ended";
+  const std::string sent =
+      "sent to " + std::to_string(heard.programs) + (heard.programs == 1 ? " program" : " programs");
+  if (!heard.acknowledged)
+    return fail(sent +
+                ", and not all of them have acknowledged it: do not rely on it, stop the devices by hand");
+  return sent + "; no server has answered: it may hang or have ended";
 }
 
 Result<std::unique_ptr<StopRaiser>> StopRaiser::open(std::uint32_t domain, const std::string& session,
@@ -57,6 +61,14 @@ Result<std::unique_ptr<StopRaiser>> StopRaiser::open(std::uint32_t domain, const
     all = self.inbox_.onFrom<SessionAnnounce>(
         *self.lobby_, wire::kSessionAnnounce,
         [&self](const SessionAnnounce&, const wire::Origin& from) { addOnce(self.servers_, from); });
+  // not repeated to stations that join after it was cleared
+  if (all)
+    all = self.inbox_.onFrom<EmergencyClear>(
+        *self.session_, wire::kEmergencyClear,
+        [&self](const EmergencyClear& cleared, const wire::Origin& from) {
+          if (cleared.client_guid == self.guid_ && self.isServer(from))
+            static_cast<void>(self.stops_->dispose({cleared.client_guid, cleared.counter, {}, {}}));
+        });
   if (!all) return fail(all.error().what);
   // DDS matches this program's own reader at once, and may know of one of another program by now
   self.own_readers_ = std::min<std::size_t>(1, self.stops_->matchedReaders());
@@ -68,8 +80,10 @@ Result<StopHeard> StopRaiser::raise(const std::string& reason, milliseconds pati
   const auto raised = write(reason);
   if (!raised) return fail(raised.error().what);
   while (!stop && !heard(*raised, patience)) dispatch(milliseconds(20));
-  static_cast<void>(stops_->waitForReaders(kAcknowledged));
-  return *heard(*raised, milliseconds(0));
+  const bool acknowledged = stops_->waitForReaders(kAcknowledged);
+  StopHeard outcome = *heard(*raised, milliseconds(0));
+  outcome.acknowledged = acknowledged;
+  return outcome;
 }
 
 Result<std::uint32_t> StopRaiser::write(const std::string& reason) {
@@ -81,15 +95,18 @@ Result<std::uint32_t> StopRaiser::write(const std::string& reason) {
   return counter_;
 }
 
+bool StopRaiser::isServer(const wire::Origin& origin) const {
+  return std::find(servers_.begin(), servers_.end(), origin) != servers_.end();
+}
+
 std::optional<StopHeard> StopRaiser::heard(std::uint32_t raise, milliseconds patience) const {
   const auto found = raises_.find(raise);
   if (found == raises_.end()) return StopHeard{};
   const auto& [written, repeaters] = found->second;
   const auto elapsed = std::chrono::steady_clock::now() - written;
   StopHeard heard;
-  heard.by_server = std::any_of(repeaters.begin(), repeaters.end(), [this](const wire::Origin& origin) {
-    return std::find(servers_.begin(), servers_.end(), origin) != servers_.end();
-  });
+  heard.by_server = std::any_of(repeaters.begin(), repeaters.end(),
+                                [this](const wire::Origin& origin) { return isServer(origin); });
   if (elapsed < patience && !(heard.by_server && elapsed >= kLateReaders)) return std::nullopt;
   heard.programs = stops_->matchedReaders() - std::min(own_readers_, stops_->matchedReaders());
   if (heard.by_server) heard.programs = std::max<std::size_t>(heard.programs, 1);

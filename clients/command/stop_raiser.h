@@ -19,9 +19,11 @@ namespace tenon::command {
 struct StopHeard {
   std::size_t programs = 0;  ///< that listen: stations, the server, observers, recorders
   bool by_server = false;    ///< a server has repeated it, and stops its simulation
+  bool acknowledged = true;  ///< by all that listen; false: one of them hangs, or its link does
 };
 
-/// What people are told of it: "accepted", or that no server has answered. Fails when nobody has heard it.
+/// What people are told of it: "accepted", or that no server has answered. Fails when nobody has heard it,
+/// and when neither a server has answered nor all that listen have acknowledged it.
 [[nodiscard]] Result<std::string> outcomeOf(const StopHeard& heard, std::uint32_t domain,
                                             const std::string& session);
 
@@ -55,6 +57,7 @@ class StopRaiser {
   };
 
   StopRaiser() = default;
+  [[nodiscard]] bool isServer(const wire::Origin& origin) const;
 
   std::string guid_;
   std::string person_;

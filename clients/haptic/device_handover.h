@@ -27,21 +27,27 @@ class DeviceHandover {
   /// Does what was asked for. Fails with what the device says.
   Result<void> serve(devices::HapticDevice& device) {
     if (!pending()) return {};
-    served_ = true;
     Result<void> done = device.resetFault();
-    if (done && owner_.load(std::memory_order_acquire) == Owner::kToArm) done = device.arm();
+    served_ = owner_.load(std::memory_order_acquire);
+    if (done && served_ == Owner::kToArm) done = device.arm();
     return done;
   }
-  /// After serve() of all devices that share a clutch, which serve() of each touches.
+  /// After serve() of all devices that share a clutch, which serve() of each touches. A request to arm that
+  /// came after a reset stays.
   void handBack() noexcept {
-    if (served_) owner_.store(Owner::kServo, std::memory_order_release);
-    served_ = false;
+    if (served_ == Owner::kToArm) {
+      owner_.store(Owner::kServo, std::memory_order_release);
+    } else if (served_ == Owner::kToReset) {
+      Owner reset = Owner::kToReset;
+      owner_.compare_exchange_strong(reset, Owner::kServo, std::memory_order_acq_rel);
+    }
+    served_ = Owner::kServo;
   }
 
  private:
   enum class Owner { kServo, kToArm, kToReset };
   std::atomic<Owner> owner_{Owner::kServo};
-  bool served_ = false;
+  Owner served_ = Owner::kServo;  ///< what serve() did; kServo: nothing
 };
 
 }  // namespace tenon::haptic

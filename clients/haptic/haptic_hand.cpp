@@ -8,21 +8,27 @@
 namespace tenon::haptic {
 
 namespace {
-// Virtual damping B as a fraction of the device's physical damping b. Passivity needs b > K T / 2 + |B|
-// (Colgate and Schenkel), where the safety layer limits K.
+// Most virtual damping B as a fraction of the device's physical damping b.
 constexpr double kDampingFraction = 0.2;  // [-]
 // A cycle of no time, or of none that is known, counts as this.
 constexpr double kShortestCycle = 1e-6;  // [s]
 // Gap at which the server reports contact, rounding included.
 constexpr float kContactGap = 5e-5F;  // [m]
 
+/// Virtual damping beside a spring of stiffness K: passivity needs b >= K (T / 2 + delay) + |B| (Colgate and
+/// Schenkel), so none is left where the device's stiffness is limited by its damping b.
+double dampingBeside(double K, double b, const devices::DeviceCaps& caps) {
+  const double left = b - K * (0.5 / caps.rate + caps.delay);
+  return std::clamp(left, 0.0, kDampingFraction * b);
+}
+
 CouplingOptions couplingOf(const devices::DeviceCaps& caps) {
   const HandStiffness stiffness = stiffnessOf(caps);
   CouplingOptions options;
   options.max_stiffness = stiffness.translational;
   options.max_rotational_stiffness = stiffness.rotational;
-  options.damping = kDampingFraction * caps.physical_damping;
-  options.rotational_damping = kDampingFraction * caps.physical_rotational_damping;
+  options.damping = dampingBeside(stiffness.translational, caps.physical_damping, caps);
+  options.rotational_damping = dampingBeside(stiffness.rotational, caps.physical_rotational_damping, caps);
   options.dof_mask = caps.dof_mask;
   return options;
 }
@@ -64,10 +70,14 @@ Result<void> HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH
   finishing_ = false;
   finish_time_ = 0.0;
   Result<void> result;
-  if (armed) {
-    result = device_.arm();
-  } else {
+  device_.read(device_state_);
+  if (!armed) {
     device_.disarm();
+  } else if (device_state_.fault != devices::DeviceFault::kNone) {
+    // its watchdog has acted while nothing was written
+    handover_.ask();
+  } else if (!device_state_.forces_on) {
+    result = device_.arm();
   }
   device_.read(device_state_);
   workspace_.setCentre(p_WH - device_state_.X_DH.translation());
@@ -195,9 +205,9 @@ devices::SafetyRequest HapticHand::request(const Pose& X_WH, double dt) noexcept
   request.rotational_stiffness = coupling_.rotationalStiffness() + fixture_.rotationalStiffness();
   // without contacts to render there is no force that could be old
   request.age = proxy.active ? excess : 0.0;
-  // while they only get older the force fades; once they are fresh again it is another one
-  request.restart =
-      finishing_ || (rendering_ != Rendering::kOn && (!proxy.active || excess <= safety_.limits().fade_from));
+  // while they only get older the force fades; after a jump, and once they are fresh again, it is another one
+  request.restart = finishing_ || (rendering_ != Rendering::kOn && (!proxy.active || proxy.discontinuous ||
+                                                                    excess <= safety_.limits().fade_from));
   request.dead_man_held = deadManHeld();
   if (request.restart || !request.dead_man_held || !safety_.forcesOn()) {
     fixture_.restart();

@@ -52,11 +52,12 @@ void ServoLoop::receiveAll(std::int64_t now) noexcept {
 
 void ServoLoop::cycle() noexcept {
   const std::int64_t now = cycleTimeNs();
+  // before a raise that came after them, which asks for another one
+  for (; presses_.front() != nullptr; presses_.pop()) station_.press();
   receiveAll(now);
   station_.setForceModel(force_model_);
   const Finish finish = finish_;
   if (finish == Finish::kRest || finish == Finish::kDisarm) station_.finish(finish == Finish::kDisarm);
-  for (; presses_.front() != nullptr; presses_.pop()) station_.press();
   if (last_cycle_ != 0) station_.setCycle(static_cast<double>(now - last_cycle_) * 1e-9);
   last_cycle_ = now;
   station_.setLinkJitter(link_jitter_);

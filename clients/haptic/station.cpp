@@ -44,7 +44,8 @@ std::string describe(const StationEvent& event, const std::string& hand_name) {
     case StationEventKind::kBeyondValidity:
       return hand + ": ahead of the contact set (" + milliseconds() + " in total)" + when;
     case StationEventKind::kStale:
-      return hand + ": no contacts received for " + milliseconds() + when;
+      return hand + ": contacts are " + milliseconds() +
+             " old, more than the link explains: the force fades" + when;
     case StationEventKind::kServerChanged:
       return "server restarted, epoch " + std::to_string(event.detail) + when;
     case StationEventKind::kStopChanged:

@@ -312,8 +312,9 @@ Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat
   // two programs that take one seat from each other do so ever more slowly; a server that was killed is no
   // reason
   rejoins_ = member.serverIsGone() ? 0 : now - rejoined_at_ < kMinSeatTime ? rejoins_ + 1 : 1;
-  print(why + "; rejoining the session" +
-        (rejoins_ > kMaxRejoins ? " in 10 s, since it was lost repeatedly" : ""));
+  if (!member.isDisplaced())
+    print(why + "; rejoining the session" +
+          (rejoins_ > kMaxRejoins ? " in 10 s, since it was lost repeatedly" : ""));
   const auto rejoin_at = now + (rejoins_ > kMaxRejoins ? kMinSeatTime : std::chrono::seconds(0));
   while (!stop && std::chrono::steady_clock::now() < rejoin_at) {
     link_.inbox().dispatch(milliseconds(20));

@@ -243,6 +243,7 @@ Result<void> Membership::watch(Inbox& inbox) {
   return inbox.on<Welcome>(*lobby_, kWelcome, [this](const Welcome& notice) {
     if (notice.client_guid != guid_ || notice.client != welcome_.client) return;
     if (notice.accepted) return lost_.reset();
+    is_displaced_ = notice.reason == kSeatTaken;
     lost_ = "the server of " + sessionText(announce_.session) + " removed this client: " + notice.reason;
     leave();
   });
@@ -265,6 +266,7 @@ const std::optional<std::string>& Membership::lost() {
 }
 
 Result<void> Membership::rejoin(const Stop& stop, const std::function<void()>& meanwhile) {
+  if (is_displaced_) return fail("its work goes on there");
   const SessionAnnounce before = announce_;
   const auto until = std::chrono::steady_clock::now() + options_.timeout;
   while (true) {

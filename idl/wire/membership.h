@@ -17,6 +17,9 @@
 
 namespace tenon::wire {
 
+/// Why a server ends the presence of a program whose seat another one has taken by its key.
+inline constexpr const char* kSeatTaken = "another program has taken this seat with its key";
+
 /// Which session a program joins, and how.
 struct MembershipOptions {
   std::string session;              ///< its name; empty: the first one announced
@@ -70,8 +73,10 @@ class Membership {
   /// Why the seat is lost; none while it is held. To be called between dispatches of the watched inbox: a
   /// server that it does not hear at all within two leases of its announcement ended before it was watched.
   [[nodiscard]] const std::optional<std::string>& lost();
+  /// The seat is lost to another program, which had its key.
+  [[nodiscard]] bool isDisplaced() const { return is_displaced_; }
   /// Finds the session again and requests the same seat, also when the server that was found is killed
-  /// meanwhile and another one continues its session.
+  /// meanwhile and another one continues its session. Fails at once when another program has the seat now.
   Result<void> rejoin(const Stop& stop, const std::function<void()>& meanwhile = {});
 
   /// Ends the presence, of a client that stays without a seat.
@@ -125,6 +130,7 @@ class Membership {
   Origin server_;
   std::optional<std::string> lost_;
   bool server_gone_ = false;
+  bool is_displaced_ = false;  // kSeatTaken
   bool watches_ = false;
   std::uint32_t watched_epoch_ = 0;  // of the newest announcement that the watched inbox has heard
   std::optional<std::chrono::steady_clock::time_point> unheard_since_;  // the server of announce_

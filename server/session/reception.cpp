@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "idl/types/names.h"
+#include "idl/wire/membership.h"
 
 namespace tenon::session {
 namespace {
@@ -68,9 +69,18 @@ void Reception::admit(const Join& join, const wire::Origin& from) {
   }
   const JoinProofs proofs{.seat = wire::SeatKey::isProof(join.seat_key, subject, join.seat_proof),
                           .key = session_.key && session_.key->isProof(subject, join.key_proof)};
+  const auto holder = registry_.holderOf(join.seat_key);
   const Welcome welcome = registry_.join(join, proofs, now_, from);
   writers_.welcome.send(welcome);
   if (!is_new) return;
+  if (welcome.accepted && holder)
+    writers_.welcome.send({.client_guid = *holder,
+                           .session = session_.name,
+                           .server_epoch = session_.server_epoch,
+                           .accepted = false,
+                           .reason = wire::kSeatTaken,
+                           .client = welcome.client,
+                           .tick = now_});
   callbacks.seated(welcome);
   if (welcome.accepted && seats_ != nullptr) seats_->keep(registry_.seatsToKeep());
   if (welcome.accepted && copies_ != nullptr && join.role == Role::kRecorder)

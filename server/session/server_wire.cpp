@@ -350,7 +350,7 @@ void ServerWire::logStandingStops() {
   const std::size_t others = stops_.standing().size() - 1;
   log(Severity::kError, "emergency stop",
       fmt::format("the emergency stop stands since before this start: engaged by {}: {}{}", one.who,
-                  one.reason, others == 0 ? "" : fmt::format(", and {} others", others)));
+                  one.reason, others == 0 ? "" : fmt::format(", and {} more", others)));
 }
 
 void ServerWire::clearEmergencyStop(ClientId client, const std::string& reason) {

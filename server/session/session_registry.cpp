@@ -213,6 +213,12 @@ void SessionRegistry::assignSeat(const Join& join, Welcome& welcome, const wire:
   seats_[index].last_ack = {};
 }
 
+std::optional<std::string> SessionRegistry::holderOf(const std::string& seat_key) const {
+  const auto index = indexOf(seat_key);
+  if (!index || !clients_[*index].alive) return std::nullopt;
+  return seats_[*index].guid;
+}
+
 void SessionRegistry::leave(ClientId client) {
   if (findClient(client) == nullptr) return;
   Presence& who = clients_[client.value - 1];
@@ -231,7 +237,11 @@ void SessionRegistry::leave(ClientId client) {
 void SessionRegistry::engageEmergencyStop() {
   if (gate_.isStopEngaged()) return;
   gate_.engageStop();
-  changes_.push_back({.kind = ChangeKind::kSetEmergencyStop, .value = 1.0});
+  // before what waits, but for the end of an earlier stop
+  const auto earlier = std::find_if(changes_.rbegin(), changes_.rend(), [](const Change& change) {
+    return change.kind == ChangeKind::kSetEmergencyStop;
+  });
+  changes_.insert(earlier.base(), Change{.kind = ChangeKind::kSetEmergencyStop, .value = 1.0});
 }
 
 void SessionRegistry::clearEmergencyStop() {
@@ -330,6 +340,11 @@ CommandAck SessionRegistry::decide(const Command& command, Role role) {
       translator_.changeFor(command, {role, controllers_, isStopEngaged(), isRolePresent(Role::kInstructor)});
   if (!change) return answer(tl::unexpected(change.error()));
   if (const auto possible = gate_.check(command.kind); !possible) return answer(possible);
+  const bool is_vital = command.kind == CommandKind::kStop || command.kind == CommandKind::kPause ||
+                        command.kind == CommandKind::kResume ||
+                        command.kind == CommandKind::kClearEmergencyStop;
+  if (!is_vital && changes_.size() >= kMostWaitingChanges)
+    return answer(refuse(Refusal::kTooMany, fmt::format("{} changes wait already", changes_.size())));
   gate_.accept(change->kind);
   if (change->kind == ChangeKind::kSetEmergencyStop) {
     clearEmergencyStop();

@@ -39,6 +39,10 @@ struct JoinProofs {
 /// Threads: one (wire).
 class SessionRegistry {
  public:
+  /// Commands beyond this many changes that no tick has taken are refused, but for pause, resume, stop and
+  /// the clear of an emergency stop.
+  static constexpr std::size_t kMostWaitingChanges = 16 * kMaxChanges;
+
   /// `scenario` must outlive this.
   SessionRegistry(const game_control::ScenarioFile& scenario, std::uint32_t server_epoch, bool lockstep);
 
@@ -61,6 +65,8 @@ class SessionRegistry {
   [[nodiscard]] bool isSeated(const std::string& client_guid) const;
   /// Whether a seat was given to this key.
   [[nodiscard]] bool knowsSeat(const std::string& seat_key) const { return indexOf(seat_key).has_value(); }
+  /// The client_guid of the program that has the seat of this key; none: nobody is there.
+  [[nodiscard]] std::optional<std::string> holderOf(const std::string& seat_key) const;
   /// Whether the seat of `client` was given to the participant `origin`.
   [[nodiscard]] bool ownsSeat(ClientId client, const wire::Origin& origin) const;
   /// Checks the command against role, hand and run phase. An accepted one becomes a Change and takes effect;

@@ -60,8 +60,15 @@ std::filesystem::path defaultStopFile(std::uint32_t domain, const std::string& s
 
 Result<StopTruth> readStopFile(const std::filesystem::path& file) {
   StopTruth truth;
-  std::error_code ignored;
-  if (file.empty() || !std::filesystem::exists(file, ignored)) return truth;
+  if (file.empty()) return truth;
+  if (const int opened = open(file.c_str(), O_RDONLY | O_CLOEXEC); opened >= 0) {
+    close(opened);
+  } else if (errno == ENOENT) {
+    return truth;
+  } else {
+    return fail(fmt::format("{}: cannot be read ({}), so it is not known whether an emergency stop stands",
+                            file.string(), std::strerror(errno)));
+  }
   const auto damaged = [&] {
     return fail(
         fmt::format("{}: is damaged, so it is not known whether an emergency stop stands: see that everybody "

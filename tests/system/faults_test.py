@@ -37,6 +37,20 @@ class Faults(unittest.TestCase):
             self.assertEqual(server.wait(30), 0)
             self.assertEqual(server.text().count("step done: take_peg"), 1, "the part is in the hand again without being taken")
 
+    def test_a_copy_of_a_seat_ends_the_program_that_had_it(self):
+        with Stage(lockstep=False) as stage:
+            server = stage.serve("peg_and_box", "--wait-for", "right")
+            seat = stage.out / "seat"
+            first = stage.start("trainee", "--seed", 1, "--seat", seat)
+            server.wait_for("run: running", 60)
+            stage.start("trainee", "--seed", 1, "--seat", seat)
+            server.wait_for("has rejoined", 30)
+            self.assertEqual(first.wait(30), 1, first.text())
+            self.assertRegex(first.text(), "another program has taken this seat with its key; its work goes on there")
+            self.assertNotIn("; rejoining", first.text())
+            server.wait_for("everything is mounted", 180)
+            self.assertEqual(server.wait(30), 0)
+
     def test_a_trainee_that_hangs_beyond_its_lease_rejoins(self):
         with Stage(lockstep=False) as stage:
             server = stage.serve("peg_and_box", "--wait-for", "right")

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "idl/types/messages/contacts.h"
 #include "tests/clients/haptic/joined_station.h"
 
 namespace tenon::haptic {
@@ -26,8 +27,8 @@ class AnswerReadersTest : public JoinedStation {
   void send() {
     ASSERT_TRUE(frames_.write({.tick = 1}));
     ASSERT_TRUE(slow_frames_.write({.tick = 2}));
-    ASSERT_TRUE(manifolds_.write({.tick = 1, .hand = HandId{1}}));
-    ASSERT_TRUE(slow_manifolds_.write({.tick = 2, .hand = HandId{1}}));
+    ASSERT_TRUE(manifolds_.write({.hand = HandId{1}, .tick = 1}));
+    ASSERT_TRUE(slow_manifolds_.write({.hand = HandId{1}, .tick = 2}));
   }
   [[nodiscard]] bool matches(std::size_t each_tick, std::size_t slow) {
     return frames_.matchedReaders() == each_tick && manifolds_.matchedReaders() == each_tick &&

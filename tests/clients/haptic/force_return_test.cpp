@@ -162,6 +162,25 @@ TEST_P(ForceReturnOf, AJumpOfTheBodyItTouchesIsSoft) {
   setup.expectSoftReturn([&] { setup.hold(true); });
 }
 
+TEST_P(ForceReturnOf, AJumpWhileContactsAreLateIsSoft) {
+  RestingHand setup(GetParam());
+  constexpr int kLate = 36;  // [ms]
+  for (int i = 0; i < kLate; ++i) setup.hold(false);
+  const auto hold_late = [&] {
+    HandManifold late = setup.server.manifold(setup.tick, setup.hand.pose());
+    late.answers_seq = static_cast<std::uint32_t>(setup.tick - kLate);
+    setup.world.receive(setup.server.frame(setup.tick));
+    setup.hand.receive(late);
+    setup.hold(false);
+  };
+  for (int i = 0; i < 10; ++i) hold_late();
+  ASSERT_GT(setup.force(), 2.0) << "faded, not gone";
+  ++setup.server.epoch;
+  setup.server.floor_height += 0.02;
+  setup.target = Target::kAtDevice;
+  setup.expectSoftReturn(hold_late);
+}
+
 TEST_P(ForceReturnOf, AStopIsSoftOnceThePersonHasPressed) {
   RestingHand setup(GetParam());
   setup.hand.permitForces(false);

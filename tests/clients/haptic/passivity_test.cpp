@@ -1,6 +1,8 @@
 #include <cmath>
 #include <numbers>
 #include <ostream>
+#include <string>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -30,20 +32,29 @@ struct HandLoop {
 
 void PrintTo(const HandLoop& loop, std::ostream* out) { *out << loop.name; }
 
-class PassivityOf : public testing::TestWithParam<HandLoop> {};
+/// A spring and a damper that use up the physical damping b: K T / 2 + B = b.
+struct SpringDamper {
+  const char* name;
+  double share;    ///< [-] of the damping that the spring uses
+  double damping;  ///< [Ns/m] B
+};
+
+void PrintTo(const SpringDamper& coupling, std::ostream* out) { *out << coupling.name; }
+
+class PassivityOf : public testing::TestWithParam<std::tuple<HandLoop, SpringDamper>> {};
 
 //     o   the hand moves periodically through the floor; the energy delivered to it is not more than the
 //   ~( )~ physical damping of the device dissipates
 TEST_P(PassivityOf, DeliversNoEnergyOverAClosedLoop) {
-  const HandLoop& loop = GetParam();
-  const double stiffness = 0.8 * 2.0 * kPhysicalDamping / kPeriod;
+  const auto& [loop, spring] = GetParam();
+  const double stiffness = spring.share * 2.0 * kPhysicalDamping / kPeriod;
   const test::PlaneServer server(stiffness);
   WorldView world;
   world.begin(server.objects(), 0, 0);
   LocalModel model;
-  Coupling coupling({.max_stiffness = stiffness, .damping = kVirtualDamping});
+  Coupling coupling({.max_stiffness = stiffness, .damping = spring.damping});
 
-  const auto handAt = [&](double t) {
+  const auto handAt = [&loop = loop](double t) {
     const double phase = 2.0 * std::numbers::pi * loop.frequency * t;
     return Vector3(loop.sideways * std::sin(phase), 0.0, kFloorTouch + loop.amplitude * std::cos(phase));
   };
@@ -68,11 +79,13 @@ TEST_P(PassivityOf, DeliversNoEnergyOverAClosedLoop) {
 
 INSTANTIATE_TEST_SUITE_P(
     Coupling, PassivityOf,
-    testing::Values(HandLoop{"Slow", 0.5, 0.003, 0.0}, HandLoop{"Medium", 2.0, 0.003, 0.0},
-                    HandLoop{"Fast", 10.0, 0.002, 0.0}, HandLoop{"Tremor", 25.0, 0.0005, 0.0},
-                    HandLoop{"SmallerThanAnEncoderStep", 20.0, 0.00004, 0.0},
-                    HandLoop{"Ellipse", 2.0, 0.003, 0.01}, HandLoop{"FastEllipse", 10.0, 0.002, 0.002}),
-    [](const auto& loop) { return loop.param.name; });
+    testing::Combine(
+        testing::Values(HandLoop{"Slow", 0.5, 0.003, 0.0}, HandLoop{"Medium", 2.0, 0.003, 0.0},
+                        HandLoop{"Fast", 10.0, 0.002, 0.0}, HandLoop{"Tremor", 25.0, 0.0005, 0.0},
+                        HandLoop{"SmallerThanAnEncoderStep", 20.0, 0.00004, 0.0},
+                        HandLoop{"Ellipse", 2.0, 0.003, 0.01}, HandLoop{"FastEllipse", 10.0, 0.002, 0.002}),
+        testing::Values(SpringDamper{"Damped", 0.8, kVirtualDamping}, SpringDamper{"Stiff", 1.0, 0.0})),
+    [](const auto& one) { return std::string(std::get<0>(one.param).name) + std::get<1>(one.param).name; });
 
 TEST(Coupling, RendersItsStiffnessWithinOnePercentOverItsRange) {
   for (const double stiffness : {200.0, 1000.0, 4000.0, 8000.0}) {

@@ -97,6 +97,19 @@ TEST(ServoLoop, GivesTheStationWhatWasReceivedAndHandsOverItsNewestOutput) {
   EXPECT_EQ(rig.loop.takeOutput(), nullptr);
 }
 
+TEST(ServoLoop, APressThatCameBeforeARaiseIsNoAnswerToIt) {
+  ServoLoopOf rig;
+  rig.loop.press();
+  rig.loop.receive(StopSignal{1, true});
+  rig.loop.cycle();
+  rig.loop.receive(StopSignal{1, false});
+  rig.loop.cycle();
+  EXPECT_FALSE(rig.station.arming().permitsForces());
+  rig.loop.press();
+  rig.loop.cycle();
+  EXPECT_TRUE(rig.station.arming().permitsForces());
+}
+
 TEST(ServoLoop, OfTheForcesOfAllCyclesThePeakIsTakenOnce) {
   ServoLoopOf rig;
   for (const double force : {1.0, 9.0, 2.0}) {

@@ -26,7 +26,7 @@ using ::testing::IsEmpty;
 
 /// A server in a process of its own with one seat. It refuses a client that wants hand "taken", and removes
 /// the client when it receives a ClientEvent: the presence of its first request if the event is "late", else
-/// the newest one.
+/// the newest one; as displaced if the event is "displaced".
 void runServer(std::uint32_t domain, const std::string& scenario_hash = "") {
   auto participant = test::participant(domain);
   Partition lobby(participant, kLobby);
@@ -58,7 +58,9 @@ void runServer(std::uint32_t domain, const std::string& scenario_hash = "") {
       (void)welcomes->write({.client_guid = is_late ? first_guid : guid,
                              .session = "test",
                              .server_epoch = 7,
-                             .reason = is_late ? "late" : "too loud",
+                             .reason = is_late                     ? "late"
+                                       : event.kind == "displaced" ? kSeatTaken
+                                                                   : "too loud",
                              .client = ClientId{1}});
     });
   }
@@ -132,6 +134,28 @@ TEST(Membership, ARemovedClientRejoins) {
   ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return heard; }));
   inbox.dispatch(milliseconds(50));
   EXPECT_FALSE((*member)->lost());
+}
+
+TEST(Membership, AProgramWhoseSeatIsTakenDoesNotTakeItBack) {
+  const std::uint32_t domain = test::ownDomain();
+  const test::Peer peer([domain] { runServer(domain); });
+  const std::atomic<bool> stop = false;
+  auto member = Membership::find(traineeOptions(domain), stop);
+  ASSERT_TRUE(member) << member.error().what;
+  ASSERT_TRUE((*member)->join(stop));
+  Inbox inbox;
+  ASSERT_TRUE((*member)->watch(inbox));
+  auto events = Writer<ClientEvent>::open((*member)->session(), kClientEvent);
+  ASSERT_TRUE(events);
+  ASSERT_TRUE(test::dispatchUntil(
+      inbox, [&] { return events->matchedReaders() == 1 && inbox.matchedWriters() >= 2; }));
+  ASSERT_TRUE(events->write({.client = ClientId{1}, .seq = 1, .kind = "displaced", .text = "displaced"}));
+  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return (*member)->lost().has_value(); }));
+  EXPECT_TRUE((*member)->isDisplaced());
+  const auto back = (*member)->rejoin(stop);
+  ASSERT_FALSE(back);
+  EXPECT_THAT(*(*member)->lost() + "; " + back.error().what,
+              HasSubstr("another program has taken this seat"));
 }
 
 TEST(Membership, AKilledServerIsReportedAsGoneAndAMissingOneAsNotAnnounced) {

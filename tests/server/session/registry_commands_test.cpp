@@ -238,6 +238,32 @@ TEST_F(RegistryCommands, DeferredCommandsAreLimitedToTheCapacityOfATick) {
   EXPECT_TRUE(command(instructor, CommandKind::kFulfilled).accepted);
 }
 
+// nothing takes changes while a session waits for people
+TEST_F(RegistryCommands, ChangesThatWaitAreLimitedAndDoNotDelayAStop) {
+  const ClientId instructor = join("t", Role::kInstructor).client;
+  (void)changes();
+  for (std::size_t i = 0; i < SessionRegistry::kMostWaitingChanges; ++i)
+    ASSERT_TRUE(command(instructor, CommandKind::kRelease, "left").accepted) << i;
+  EXPECT_THAT(command(instructor, CommandKind::kRelease, "left").reason, HasSubstr("wait already"));
+  registry_.engageEmergencyStop();
+  const auto first = changes();
+  ASSERT_FALSE(first.empty());
+  EXPECT_EQ(first[0].kind, ChangeKind::kSetEmergencyStop);
+  EXPECT_TRUE(command(instructor, CommandKind::kRelease, "left").accepted);
+}
+
+TEST_F(RegistryCommands, AStopIsNotLiftedByTheEndOfAnEarlierOneThatStillWaits) {
+  join("t", Role::kInstructor);
+  registry_.engageEmergencyStop();
+  (void)changes();
+  registry_.clearEmergencyStop();
+  registry_.engageEmergencyStop();
+  double engaged = 0.0;
+  for (const Change& change : changes())
+    if (change.kind == ChangeKind::kSetEmergencyStop) engaged = change.value;
+  EXPECT_EQ(engaged, 1.0);
+}
+
 TEST_F(RegistryCommands, AHandIsReleasedByItsName) {
   const ClientId instructor = join("t", Role::kInstructor).client;
   (void)changes();

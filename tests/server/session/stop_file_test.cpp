@@ -52,6 +52,16 @@ TEST_F(StopFile, ThatIsDamagedIsAnErrorAndNotASessionWithoutItsStop) {
   EXPECT_THAT(cut.error().what, ::testing::HasSubstr("it is not known whether an emergency stop stands"));
 }
 
+TEST_F(StopFile, ThatCannotBeReachedIsAnErrorAndNotASessionWithoutItsStop) {
+  fs::create_directories(folder_);
+  std::ofstream(folder_ / "below") << "a file where the folder was\n";
+  const auto unreachable = readStopFile(file_);
+  ASSERT_FALSE(unreachable);
+  EXPECT_THAT(unreachable.error().what, ::testing::HasSubstr("cannot be read"));
+  EXPECT_THAT(unreachable.error().what,
+              ::testing::HasSubstr("it is not known whether an emergency stop stands"));
+}
+
 TEST_F(StopFile, AnEmptyPathKeepsNothing) { EXPECT_TRUE(writeStopFile({}, {})); }
 
 }  // namespace
