@@ -255,6 +255,9 @@ Result<TriangleMesh> importMesh(const std::filesystem::path& file, double unit) 
       (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)) {
     return fail(name + ": reading it took too long; the file is probably damaged");
   }
+  // Ctrl-C reaches all processes of a terminal
+  if (WIFSIGNALED(status) && (WTERMSIG(status) == SIGINT || WTERMSIG(status) == SIGTERM))
+    return fail(name + ": its import was interrupted");
   if (WIFSIGNALED(status)) {
     return fail(name + ": the importer crashed on it (" + strsignal(WTERMSIG(status)) +
                 "); the file is damaged");

@@ -322,6 +322,22 @@ TEST(MeshImport, ColoursOfAnStlStayWithTheirTriangles) {
   fs::remove_all(folder);
 }
 
+// Ctrl-C in a terminal reaches the importer too
+TEST(MeshImport, AnInterruptedImportIsNoDamagedFile) {
+  const fs::path folder = fs::temp_directory_path() / ("tenon-import-" + std::to_string(getpid()));
+  fs::create_directories(folder);
+  std::ofstream(folder / "importer") << "#!/bin/sh\nkill -INT $$\n";
+  fs::permissions(folder / "importer", fs::perms::owner_all);
+  std::ofstream(folder / "one.stl") << "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+                                       "vertex 0 1 0\nendloop\nendfacet\nendsolid\n";
+  ASSERT_EQ(setenv("TENON_BAKE", (folder / "importer").c_str(), 1), 0);
+  const auto mesh = importMesh(folder / "one.stl", 1e-3);
+  unsetenv("TENON_BAKE");
+  fs::remove_all(folder);
+  ASSERT_FALSE(mesh);
+  EXPECT_THAT(mesh.error().what, ::testing::HasSubstr("its import was interrupted"));
+}
+
 TEST(MeshImport, AMissingFileIsNamed) {
   EXPECT_THAT(importMesh("/no/such.stl", 1.0).error().what, HasSubstr("/no/such.stl"));
 }
