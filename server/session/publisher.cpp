@@ -1,12 +1,33 @@
 #include "server/session/publisher.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include "idl/types/motion_law.h"
 
 namespace tenon::session {
 namespace {
 
 constexpr Tick kPeriod50Hz = 20;  // [ticks]
 constexpr Tick kPeriod30Hz = 33;  // [ticks]
+
+// A slow manifold is sent out of turn when a neighbour's goal is farther off from where the one before lets
+// it be expected: above the resolution of encoders, which are in the velocities of single ticks.
+constexpr double kGoalError = 3e-5;         // [m]
+constexpr double kTurnRadius = 0.05;        // [m] at which an error of the orientation counts
+constexpr Tick kLeastSpacing = 2;           // [ticks]
+constexpr double kMostOutOfTurn = 12.0;     // at once: a turn
+constexpr double kOutOfTurnPerTick = 0.03;  // in the long run, of each hand
+
+/// [m] How far a goal is off from where `before`, `ahead` [s] earlier, lets it be expected (motion_law.h).
+double goalError(const HandPull& before, const HandPull& now, double ahead) {
+  Twist V_WG{before.V_WG.head<3>().cast<double>(), before.V_WG.tail<3>().cast<double>()};
+  const double weight = extrapolationWeight(V_WG.linear.norm() + kTurnRadius * V_WG.angular.norm());
+  V_WG = {weight * V_WG.linear, weight * V_WG.angular};
+  const Pose X_WG = extrapolated(before.X_WG, V_WG, before.p_BoC_B, ahead);
+  const Displacement off = displacement(X_WG, now.X_WG, now.p_BoC_B);
+  return off.translation.norm() + kTurnRadius * off.rotation.norm();
+}
 
 /// The contact of a pair that touched since the last sample and does so no more: apart, with its peaks.
 PairContact separated(const PairContact& pair) {
@@ -57,6 +78,7 @@ void Publisher::addManifolds(const TickOutput& output, bool is_newest) {
   const bool is_50 = output.tick % kPeriod50Hz == 0;
   if (!is_newest && !is_50) return;
   manifolds_ = output.manifolds;
+  slow_samples_.resize(manifolds_.size());
   for (std::size_t i = 0; i < manifolds_.size(); ++i) {
     if (!output.present[i]) continue;
     // a tracked limb gets vibration and no force: 100 Hz suffices
@@ -65,8 +87,32 @@ void Publisher::addManifolds(const TickOutput& output, bool is_newest) {
     manifolds_[i].hand = HandId{static_cast<std::uint32_t>(i)};
     manifolds_[i].server_epoch = server_epoch_;
     if (is_due) outgoing_.manifolds.push_back(&manifolds_[i]);
-    if (is_50) outgoing_.manifolds_50.push_back(&manifolds_[i]);
+    if (is_50 || isOutOfTurn(manifolds_[i], slow_samples_[i])) {
+      slow_samples_[i].tick = output.tick;
+      slow_samples_[i].others = manifolds_[i].others;
+      outgoing_.manifolds_50.push_back(&manifolds_[i]);
+    }
   }
+}
+
+/// A neighbour turns, stops or starts: told within kLeastSpacing, as long as few are.
+bool Publisher::isOutOfTurn(const HandManifold& now, SlowSample& last) {
+  const Tick since = now.tick - last.tick;
+  if (last.tick == 0 || since < kLeastSpacing) return false;
+  const auto isOff = [&](const HandPull& pull) {
+    if (pull.object == now.object) return false;
+    return std::any_of(last.others.begin(), last.others.end(), [&](const HandPull& before) {
+      return before.hand == pull.hand && before.object == pull.object &&
+             goalError(before, pull, static_cast<double>(since) * kTickSeconds) > kGoalError;
+    });
+  };
+  if (std::none_of(now.others.begin(), now.others.end(), isOff)) return false;
+  const double elapsed = static_cast<double>(now.tick - last.refilled);
+  last.left = std::min(kMostOutOfTurn, last.left + kOutOfTurnPerTick * elapsed);
+  last.refilled = now.tick;
+  if (last.left < 1.0) return false;
+  last.left -= 1.0;
+  return true;
 }
 
 void Publisher::addPairs(const TickOutput& output) {

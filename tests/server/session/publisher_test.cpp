@@ -1,9 +1,12 @@
 #include "server/session/publisher.h"
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
 #include <map>
 #include <set>
 #include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -47,6 +50,47 @@ TEST(Publisher, EachRateTierHasItsPeriod) {
                                               {"progress", 30},
                                               {"manifolds", 990},
                                               {"manifolds 50", 49}}));
+}
+
+/// What is sent slowly of a neighbour's goal, by tick: it goes along x by `x` [m] of a time [s], its velocity
+/// told by each.
+std::vector<Tick> toldOfNeighbour(const std::function<double(double)>& x, Tick ticks) {
+  test::SessionRig rig;
+  rig.attach(test::kRightHand, Vector3(0.2, 0, 0.3));
+  Publisher publisher(rig.loaded().scenario, kPublisherEpoch, false);
+  TickOutput output = rig.tick();
+  const Tick begin = 1000;
+  std::vector<Tick> told;
+  for (Tick tick = 0; tick < ticks; ++tick) {
+    output.tick = begin + tick;
+    HandManifold& manifold = output.manifolds[test::kRightHand.value];
+    manifold.tick = output.tick;
+    const double now = static_cast<double>(tick) * kTickSeconds;
+    HandPull pull{.hand = test::kLeftHand, .object = ObjectId{99}};
+    pull.X_WG = Pose(Vector3(x(now), 0.0, 0.0));
+    pull.V_WG[0] = static_cast<float>((x(now) - x(now - kTickSeconds)) / kTickSeconds);
+    manifold.others.clear();
+    manifold.others.push_back(pull);
+    if (!publisher.prepare(output).manifolds_50.empty()) told.push_back(tick);
+  }
+  return told;
+}
+
+TEST(Publisher, ANeighbourThatMovesSteadilyIsToldFiftyTimesASecond) {
+  EXPECT_EQ(toldOfNeighbour([](double t) { return 0.2 * t; }, 200).size(), 10U);
+  EXPECT_EQ(toldOfNeighbour([](double) { return 0.0; }, 200).size(), 10U);
+}
+
+TEST(Publisher, ANeighbourThatTurnsIsToldAtOnce) {
+  const auto told = toldOfNeighbour([](double t) { return t < 0.105 ? 0.2 * t : 0.2 * (0.21 - t); }, 200);
+  EXPECT_NE(std::find(told.begin(), told.end(), Tick{106}), told.end()) << "it turned after tick 105";
+  EXPECT_EQ(told.size(), 11U) << "once: from then on it moves as told";
+}
+
+TEST(Publisher, ANeighbourThatTurnsAllTheTimeIsToldEightyTimesASecond) {
+  const auto told = toldOfNeighbour([](double t) { return 1e-3 * std::sin(200.0 * t); }, 10'000);
+  EXPECT_GT(told.size(), 700U);
+  EXPECT_LE(told.size(), 500U + 300U + 30U);
 }
 
 TEST(Publisher, WhatMovedInATickThatIsNotSentIsInTheNextFrame) {
