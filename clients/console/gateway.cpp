@@ -41,7 +41,11 @@ class Gateway {
       : options_(options),
         stop_(stop),
         pass_(options.role && options.recording.empty() ? wire::randomHex() : ""),
-        rights_{.domain = options.domain, .role = options.role, .pass = pass_, .key_file = options.key_file},
+        rights_{.domain = options.domain,
+                .role = options.role,
+                .pass = pass_,
+                .key_file = options.key_file,
+                .is_local = isLoopbackHost(options.web.address)},
         desk_(rights_, options.recordings,
               [this](ViewerId viewer, const DeskAnswer& answer) { say(viewer, answer); }),
         hands_(
@@ -97,6 +101,7 @@ Result<void> Gateway::openServer() {
                                  {"recording", options_.recording.filename().string()},
                                  {"recordings", !options_.recordings.empty()},
                                  {"role", options_.role ? roleName(*options_.role) : ""},
+                                 {"local", rights_.is_local},
                                  {"protocol", kProtocolVersion}};
   site.describe(described.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
   if (!options_.recording.empty())

@@ -29,7 +29,7 @@ Result<wire::MembershipOptions> membershipOf(const SeatRights& rights, const std
   wire::MembershipOptions options{.session = session, .domain = rights.domain, .role = *role};
   options.key_file = rights.key_file;
   options.person = request.name.empty() ? "console" : shortened(printable(request.name), kMaxPersonName);
-  if (has_pass || role == Role::kTrainee) return options;
+  if (has_pass || (role == Role::kTrainee && rights.is_local)) return options;
   const auto bytes = wire::readHexText(request.key);
   if (!bytes)
     return fail("the role " + request.role + " needs the key of the session: 64 digits, in the file " +

@@ -15,6 +15,7 @@ namespace tenon::console {
 namespace {
 
 constexpr std::string_view kFrames = "/tf";
+constexpr std::uint32_t kMostLives = 0x3fffffff;  // told: pages read it as a number
 constexpr std::string_view kModels = "/scene";
 constexpr std::string_view kLogLines = "/log";
 constexpr std::string_view kConsole = "/console";
@@ -119,14 +120,10 @@ void SessionChannels::begin(const SessionAnnounce& announce, std::int64_t now_ns
 }
 
 void SessionChannels::setState(LinkState state, const std::string& reason, std::int64_t now_ns) {
-  const nlohmann::json json{{"state", stateName(state)},
-                            {"reason", reason},
-                            {"life", lives_},
-                            {"session", announce_.session},
-                            {"title", announce_.title},
-                            {"lockstep", announce_.lockstep},
-                            {"scene", announce_.scene_hash},
-                            {"protocol", kProtocolVersion}};
+  const nlohmann::json json{{"state", stateName(state)},     {"reason", reason},
+                            {"life", lives_ & kMostLives},   {"session", announce_.session},
+                            {"title", announce_.title},      {"lockstep", announce_.lockstep},
+                            {"scene", announce_.scene_hash}, {"protocol", kProtocolVersion}};
   const std::string text = json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   publish(kConsole, 0, now_ns, {text.begin(), text.end()});
 }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <random>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -65,7 +66,8 @@ class SessionChannels {
   std::map<std::uint32_t, Part> parts_;
   std::map<std::uint32_t, Pose> X_WH_;  ///< devices by HandId
   std::int64_t moved_ns_ = 0;           ///< [ns] of the newest pose that is not yet in /tf; 0: none
-  std::uint32_t lives_ = 0;             ///< sessions begun
+  /// of this gateway, of the sessions that it has begun: a page that comes back to another gateway forgets
+  std::uint32_t lives_ = std::random_device{}();
   bool is_over_ = false;
 };
 

@@ -1,6 +1,7 @@
 #include "clients/console/web_server.h"
 
 #include <algorithm>
+#include <cctype>
 
 #include "clients/console/foxglove_protocol.h"
 #include "clients/console/web_service.h"
@@ -84,6 +85,14 @@ Result<std::unique_ptr<WebServer>> WebServer::open(const WebOptions& options, Si
     if (!isOrigin(origin))
       return fail("--recordings-from " + origin +
                   ": is no server's origin, as https://files.example:8443 is");
+  for (const std::string& origin : options.origins) {
+    const bool has_capitals =
+        std::any_of(origin.begin(), origin.end(), [](unsigned char c) { return std::isupper(c) != 0; });
+    if (has_capitals || (origin.ends_with('/') && !origin.ends_with("://")))
+      return fail(
+          "--allow-origin " + origin +
+          ": an origin has no capitals and no path, not even a slash, as https://viewer.example:8443");
+  }
   auto impl = std::make_unique<WebService>(options, std::move(site), std::move(handlers));
   if (!options.certificate.empty()) {
     auto certificate = Certificate::read(options.certificate, options.key);

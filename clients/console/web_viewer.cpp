@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "clients/console/foxglove_protocol.h"
 #include "clients/console/web_service.h"
 
@@ -151,6 +153,9 @@ void WebViewer::apply(const ViewerRequest& request) {
     std::string problem;
     if (found == nullptr) problem = "there is no channel " + std::to_string(channel);
     if (subscriptions_.contains(id)) problem = "subscription " + std::to_string(id) + " exists";
+    const bool has_channel = std::any_of(subscriptions_.begin(), subscriptions_.end(),
+                                         [one = channel](const auto& known) { return known.second == one; });
+    if (has_channel) problem = "channel " + std::to_string(channel) + " is subscribed already";
     if (id == kHandSubscription) problem = "subscription " + std::to_string(id) + " is not to be chosen";
     if (subscriptions_.size() >= kMaxSubscriptions) problem = "there are too many subscriptions";
     if (!problem.empty()) {

@@ -29,8 +29,8 @@ export function coverOf({ isDropping, opening, player, lobby, live, session, vie
     const more = `cover.${state}.more` as Key;
     return { state, icon: name, head: t(`cover.${state}` as Key), more: t(more, values), covers };
   };
-  if (live.kind === "reconnecting") return make("reconnecting", "warn", session.link === undefined, { seconds: live.seconds });
   const { link: gateway } = session;
+  if (player === undefined && live.kind === "reconnecting") return make("reconnecting", "warn", session.link === undefined, { seconds: live.seconds });
   if (player !== undefined) return view === undefined ? { state: "webgl", icon: "warn", head: t("cover.webgl"), more: t("cover.webgl.more"), covers: true } : undefined;
   if (live.kind === "connecting" || gateway === undefined) return make("connecting", "wait", true);
   if (gateway.protocol !== PROTOCOL) return make("protocol", "warn", true);

@@ -293,7 +293,7 @@ function picture(now: number): void {
 }
 
 // ---- where the session comes from
-function follow(room: string, role: string, canRecord: boolean): void {
+function follow(room: string, { role, recordings, local }: Gateway): void {
   let joined = false;
   source = new LiveSource(addressOf(room), TOPICS, (topic, message, isGone) => {
     session.receive(topic, message, isGone);
@@ -308,10 +308,11 @@ function follow(room: string, role: string, canRecord: boolean): void {
     part?.end();
   });
   desk = new Desk(source, session, role);
-  desk.canRecord = canRecord;
+  desk.canRecord = recordings === true;
   const { notify } = desk;
   if (view !== undefined) {
     part = new Part(source, session, view, () => sessionStorage.getItem(PASS) ?? "", (isGood, text) => notify.call(desk, isGood, text), () => void desk?.raise());
+    part.isLocal = local === true;
     strip.append(part.take);
     stage.append(part.bar, part.lesson);
     Object.assign(window, { tenon: { session, view, player, part } });
@@ -332,7 +333,10 @@ function showLobby(role: string): void {
   stage.append(desk.notices);
 }
 
+let opens = 0;
+
 async function play(file: Played): Promise<void> {
+  const mine = ++opens; // of several files that are dropped one after the other the last one counts
   source?.close();
   part?.end();
   for (const element of [part?.take, part?.bar, part?.lesson, desk?.stop, desk?.clear, desk?.sit, desk?.bar, desk?.notices, lobby?.element, player?.element]) element?.remove();
@@ -345,7 +349,8 @@ async function play(file: Played): Promise<void> {
   setWords();
   session.forget();
   try {
-    const recording = await Recording.open(file instanceof File ? fromFile(file) : await fromAddress(file ?? "/recording.mcap"), (topic, message, isGone) => session.receive(topic, message, isGone), (fraction) => (opening = { fraction }));
+    const recording = await Recording.open(file instanceof File ? fromFile(file) : await fromAddress(file ?? "/recording.mcap"), (topic, message, isGone) => session.receive(topic, message, isGone), (fraction) => mine === opens && (opening = { fraction }));
+    if (mine !== opens) return;
     player = new Player(recording, session, (name) => panels.titleOfStep([...session.sceneSteps.values()].find((step) => step.name === name) ?? { name, title: [] }));
     status.before(player.element);
     if (wanted.has(FRAME)) player.onCommand = tellBeside;
@@ -354,6 +359,7 @@ async function play(file: Played): Promise<void> {
     const start = wanted.get("t") === "end" ? player.recording.seconds : Number(wanted.get("t") ?? 0);
     if (start > 0) player.seek(start);
   } catch (problem) {
+    if (mine !== opens) return;
     opening = { fraction: 0, problem: problem instanceof Error ? problem.message : String(problem) };
   }
   Object.assign(window, { tenon: { session, view, player } });
@@ -370,7 +376,7 @@ async function begin(): Promise<void> {
   else if (wanted.has(ADDRESS)) await play(wanted.get(ADDRESS) ?? "");
   else if (gateway.recording !== "") await play(undefined);
   else if (gateway.session === "" && chosen === null) showLobby(gateway.role);
-  else follow(gateway.session === "" ? `/live/${encodeURIComponent(chosen ?? "")}` : "/live", gateway.role, gateway.recordings === true);
+  else follow(gateway.session === "" ? `/live/${encodeURIComponent(chosen ?? "")}` : "/live", gateway);
 }
 
 for (const name of ["dragover", "dragleave", "drop"] as const)

@@ -32,6 +32,7 @@ export class Part {
   private audio?: AudioContext;
   private headset?: Headset;
   private hasHeadset = false;
+  isLocal = true; // nobody elsewhere reaches the gateway: a trainee needs no key
   private isAsking = false;
   private step = -1;
   private invited = new URLSearchParams(location.search).get("you") ?? ""; // to this role's place, by the address
@@ -236,7 +237,7 @@ export class Part {
       const wanted = this.handsOf(role.value as RoleName).ids;
       const others = [...this.session.people.values()].filter((person) => person.alive && Array.from(person.hands).some((hand) => wanted.includes(hand)));
       note.textContent = others.length === 0 ? t("part.free.place") : t("part.taken.place", { who: others.map((person) => person.name).join(", ") });
-      keyField.hidden = role.value === "trainee" || this.pass() !== "";
+      keyField.hidden = (role.value === "trainee" && this.isLocal) || this.pass() !== "";
     };
     role.addEventListener("change", update);
     update();

@@ -6,6 +6,7 @@ import type { Session } from "./session";
 import { t } from "./strings";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16];
+const SETTLED = 60; // ms without another seek, after which that is read
 const WINDOW = 30; // s of what is plotted before the place that was sought
 const FRAME = 1 / 30; // s of a single step
 const SHAPES: [(mark: Mark) => boolean, string][] = [
@@ -203,9 +204,12 @@ export class Player {
     this.show();
     if (this.problem !== undefined) return;
     const { seeks } = this;
+    const isStale = (): boolean => seeks !== this.seeks;
+    await new Promise((resolve) => setTimeout(resolve, SETTLED));
+    if (isStale()) return;
     await this.attempt(async () => {
-      const before = await this.recording.tracksBefore(this.time, WINDOW);
-      if (seeks === this.seeks) this.session.recall(before);
+      const before = await this.recording.tracksBefore(this.time, WINDOW, isStale);
+      if (!isStale()) this.session.recall(before);
     });
   }
 

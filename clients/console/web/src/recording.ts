@@ -18,6 +18,10 @@ const KEPT = [
 const STREAMS = ["WorldFrame_100", "HandState_100", "ContactPairs_100", "TickStats_100", "StepProgress", "Telemetry"];
 const ALL_OBJECTS = "WorldFrame_30"; // has those that rest, too; a seek alone reads it
 const BEFORE = [150_000_000n, 1_000_000_000n, 8_000_000_000n]; // [ns] in which a frame of all objects is looked for: in real time some are lost
+const PLOTTED = ["HandState_100", "ContactPairs_100", "TickStats_100", "Telemetry"]; // each sample has the maxima since the one before
+const TOLD = ["device", "safety"]; // of a station's events; it writes many others
+const YIELD = 500; // messages that are read at a time, of many
+const CHUNKS = 6; // decompressed ones that are kept: seeking and playing read the same again
 const BLOCK = 1 << 19; // bytes that are read at a time
 const BLOCKS = 48; // that are kept
 const LARGEST = 1 << 26; // bytes of a chunk
@@ -99,27 +103,58 @@ export async function fromAddress(address: string): Promise<Readable> {
   return new Blocks(size, async (begin, end) => new Uint8Array(await (await load(begin, end)).arrayBuffer()));
 }
 
+/** Decompresses chunks and keeps the last ones. */
+class Chunks {
+  private kept = new Map<string, Uint8Array>();
+
+  readonly zstd = (bytes: Uint8Array, size: bigint): Uint8Array => {
+    if (size > BigInt(LARGEST)) throw new Unreadable("file.index");
+    let hash = 0x811c9dc5; // FNV-1a; the reader checks the sum of what it gets
+    for (const byte of bytes) hash = Math.imul(hash ^ byte, 0x01000193);
+    const name = `${bytes.length} ${size} ${hash}`;
+    const chunk = this.kept.get(name) ?? decompress(bytes, new Uint8Array(Number(size)));
+    this.kept.delete(name); // the newest at the end
+    this.kept.set(name, chunk);
+    if (this.kept.size > CHUNKS) this.kept.delete(this.kept.keys().next().value as string);
+    return chunk;
+  };
+}
+
 const FIRST_POSES = 40_000_000n; // [ns] in which the parts of a frame come
 
-interface Message { time: bigint; channel: number; data: Uint8Array }
+interface Message { time: bigint; channel: number; data: Uint8Array; message?: unknown }
 type Reading = AsyncGenerator<{ logTime: bigint; channelId: number; data: Uint8Array }, void, void>;
 export interface Mark { seconds: number; tick: number; kind: string; text: string; severity: number }
+
+/** The last message up to a time, of messages in order. */
+function lastUntil(messages: Message[], time: bigint): Message | undefined {
+  let [first, end] = [0, messages.length];
+  while (first < end) {
+    const middle = (first + end) >> 1;
+    if (messages[middle].time <= time) first = middle + 1;
+    else end = middle;
+  }
+  return messages[first - 1];
+}
+
+let opened = 0; // recordings, by this page
 
 export class Recording {
   /** What happened, by the server's log, in s since the beginning of the recording. */
   marks: Mark[] = [];
   private kept: Message[] = [];
+  private snapshots = new Map<string, Message[]>(); // of each object, in order
   private decoders = new Map<number, { topic: string; decode: Decoder }>();
   private reading?: Reading;
   private next?: Message;
   private streams = STREAMS;
+  private life = -1 - ++opened; // no live session's: the scene of another recording is another one
 
   private constructor(private reader: McapIndexedReader, private handler: Handler, readonly begin: bigint, readonly seconds: number) {}
 
   /** Fails with the reason when it is no recording, or was cut before its index. */
   static async open(readable: Readable, handler: Handler, onProgress: (fraction: number) => void): Promise<Recording> {
-    const decompressHandlers = { zstd: (bytes: Uint8Array, size: bigint) => decompress(bytes, new Uint8Array(Number(size))) };
-    const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers }).catch((problem: unknown) => {
+    const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers: { zstd: new Chunks().zstd } }).catch((problem: unknown) => {
       console.warn(problem); // what the library found instead, in its words
       throw problem instanceof Unreadable || problem instanceof DOMException ? problem : new Unreadable("file.no_index");
     });
@@ -144,12 +179,23 @@ export class Recording {
   }
 
   private async readKept(onProgress: (fraction: number) => void): Promise<void> {
+    let read = 0;
     for await (const { logTime, channelId, data } of this.reader.readMessages({ topics: KEPT })) {
-      this.kept.push({ time: logTime, channel: channelId, data: data.slice() });
-      if (this.kept.length % 50 === 0) onProgress(Number(logTime - this.begin) / 1e9 / Math.max(this.seconds, 1e-9));
+      if (++read % 50 === 0) onProgress(Number(logTime - this.begin) / 1e9 / Math.max(this.seconds, 1e-9));
       const channel = this.decoders.get(channelId);
+      if (channel?.topic === "ObjectSnapshot") {
+        const name = this.instanceOf(channelId, data);
+        const earlier = this.snapshots.get(name);
+        const snapshot = { time: logTime, channel: channelId, data: data.slice() };
+        if (earlier === undefined) this.snapshots.set(name, [snapshot]);
+        else earlier.push(snapshot);
+        continue;
+      }
+      const message = channel?.decode(data);
+      if (channel?.topic === "ClientEvent" && !TOLD.includes((message as EventLog).kind)) continue;
+      this.kept.push({ time: logTime, channel: channelId, data: data.slice(), message });
       if (channel?.topic !== "EventLog") continue;
-      const { kind, text, severity, tick } = channel.decode(data) as EventLog;
+      const { kind, text, severity, tick } = message as EventLog;
       this.marks.push({ seconds: Number(logTime - this.begin) / 1e9, tick: Number(tick), kind, text, severity });
     }
   }
@@ -165,10 +211,10 @@ export class Recording {
     return this.begin + BigInt(Math.round(1e9 * Math.min(this.seconds, Math.max(0, seconds))));
   }
 
-  private tell({ channel, data }: Message): void {
+  private tell({ channel, data, message: decoded }: Message): void {
     const known = this.decoders.get(channel);
     if (known === undefined) return;
-    const message = known.decode(data);
+    const message = decoded ?? known.decode(data);
     if (known.topic === "SessionAnnounce") return this.tellLink(message as SessionAnnounce);
     if (known.topic !== INSTANCE_STATE) return this.handler(known.topic === ALL_OBJECTS ? "WorldFrame_100" : known.topic, message, false);
     const { topic, key_sample } = message as InstanceGone;
@@ -178,7 +224,7 @@ export class Recording {
 
   private tellLink(announce: SessionAnnounce): void {
     const link: ConsoleState = {
-      state: "recorded", reason: "", life: 1, session: announce.session, title: announce.title, lockstep: announce.lockstep, scene: announce.scene_hash,
+      state: "recorded", reason: "", life: this.life, session: announce.session, title: announce.title, lockstep: announce.lockstep, scene: announce.scene_hash,
       protocol: announce.protocol_version,
     };
     this.handler("/console", link, false);
@@ -191,6 +237,10 @@ export class Recording {
     this.next = undefined;
     for (const message of this.kept)
       if (message.time <= time || this.isScene(message)) this.tell(message);
+    for (const snapshots of this.snapshots.values()) {
+      const newest = lastUntil(snapshots, time);
+      if (newest !== undefined) this.tell(newest);
+    }
     let hasAll = false;
     for (const window of BEFORE) {
       const newest = await this.newestOf(time - window, time);
@@ -232,11 +282,15 @@ export class Recording {
     return `${channel} ${hasKey && data.length >= 8 ? new DataView(data.buffer, data.byteOffset).getUint32(4, true) : 0}`;
   }
 
-  /** What is plotted, over some seconds before a time; times are those of the session. */
-  async tracksBefore(seconds: number, window: number): Promise<Tracks> {
+  /** What is plotted, over some seconds before a time; times are those of the session. Ends early once `isStale`. */
+  async tracksBefore(seconds: number, window: number, isStale: () => boolean = () => false): Promise<Tracks> {
     const tracks = new Tracks();
     let time: number | undefined;
-    for await (const { channelId, data } of this.reader.readMessages({ topics: ["HandState_100", "ContactPairs_100", "TickStats_100", "Telemetry"], startTime: this.timeOf(seconds - window), endTime: this.timeOf(seconds) })) {
+    let read = 0;
+    for await (const { channelId, data } of this.reader.readMessages({ topics: PLOTTED, startTime: this.timeOf(seconds - window), endTime: this.timeOf(seconds) })) {
+      // so that the page draws and answers meanwhile
+      if (++read % YIELD === 0) await new Promise((resolve) => setTimeout(resolve));
+      if (isStale()) break;
       const channel = this.decoders.get(channelId);
       const message = channel?.decode(data);
       if (channel?.topic === "TickStats_100") {
@@ -251,7 +305,7 @@ export class Recording {
     return tracks;
   }
 
-  /** Tells what happened since the last call, up to a time; of streams the newest. */
+  /** Tells what happened since the last call, up to a time; of poses and progress the newest. */
   async advance(seconds: number): Promise<void> {
     const time = this.timeOf(seconds);
     const reading = this.reading;
@@ -266,7 +320,8 @@ export class Recording {
       if (this.next.time > time) break;
       const message = this.next;
       this.next = undefined;
-      if (this.streams.includes(this.decoders.get(message.channel)?.topic ?? "")) newest.set(this.instanceOf(message.channel, message.data), message);
+      const topic = this.decoders.get(message.channel)?.topic ?? "";
+      if (this.streams.includes(topic) && !PLOTTED.includes(topic)) newest.set(this.instanceOf(message.channel, message.data), message);
       else this.tell(message);
     }
     for (const message of newest.values()) this.tell(message);
