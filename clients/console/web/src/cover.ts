@@ -12,7 +12,7 @@ const COMMAND = "./tenon demo";
 
 /** `opening`: of a recording that is opened: how much is read, or why it cannot be. */
 export interface Opening { fraction: number; problem?: string }
-export interface Standing { isDropping: boolean; opening?: Opening; player?: Player; lobby?: Lobby; live: LiveState; session: Session; view?: SceneView }
+export interface Standing { isDropping: boolean; opening?: Opening; player?: Player; lobby?: Lobby; live: LiveState; session: Session; view?: SceneView; age: number }
 
 export interface Cover { state: string; icon: Icon; head: string; more: string; command?: string; covers: boolean }
 /** Nothing of a session or recording is to be seen: there is none yet, or it cannot be had. */
@@ -40,10 +40,18 @@ export function coverOf({ isDropping, opening, player, lobby, live, session, vie
   return view === undefined ? make("webgl", "warn", true) : undefined;
 }
 
-export function linkBadge({ opening, player, lobby, live, session }: Standing): [Key, Icon, string] {
+const SILENT = 3; // s without a message of a session that goes on
+
+/** The gateway is connected and hangs, or the link to it has broken unnoticed: what is shown may be wrong. */
+export const isSilent = ({ player, lobby, live, session, age }: Standing): boolean =>
+  player === undefined && lobby === undefined && live.kind === "open" && session.link?.state === "joined" && !session.link.lockstep && !session.isOver && age > SILENT;
+
+export function linkBadge(standing: Standing): [Key, Icon, string] {
+  const { opening, player, lobby, live, session } = standing;
   if (opening !== undefined) return opening.problem === undefined ? ["link.reading", "wait", "info"] : ["link.unreadable", "warn", "bad"];
   if (player !== undefined) return ["link.recorded", "over", "info"];
   if (live.kind === "reconnecting") return ["link.reconnecting", "warn", "warn"];
+  if (isSilent(standing)) return ["link.silent", "warn", "bad"];
   if (lobby !== undefined && live.kind === "open") return ["link.lobby", "live", "good"];
   switch (live.kind === "connecting" ? undefined : session.link?.state) {
     case "joined": return ["link.joined", "live", "good"];

@@ -1,7 +1,7 @@
 import "./style.css";
 
 import { FRAME, playsBeside, showBeside, tellBeside, type Played } from "./beside";
-import { coverOf, isEmpty, linkBadge, PROTOCOL, type Opening, type Standing } from "./cover";
+import { coverOf, isEmpty, isSilent, linkBadge, PROTOCOL, type Opening, type Standing } from "./cover";
 import { Desk, PASS } from "./desk";
 import { h, icon, marked } from "./dom";
 import { addressOf, LiveSource, type LiveState } from "./live";
@@ -200,7 +200,8 @@ sections.events.body.addEventListener("click", (event) => {
 });
 
 // ---- showing it
-const standing = (): Standing => ({ isDropping, opening, player, lobby, live, session, view });
+let age = 0; // s since the last message
+const standing = (): Standing => ({ isDropping, opening, player, lobby, live, session, view, age });
 let shown = "";
 let shownAt = 0;
 
@@ -219,7 +220,9 @@ function toCurrent(element: HTMLElement): void {
 }
 new ResizeObserver(() => toCurrent(sections.steps.body)).observe(sections.steps.body);
 
-function showPanels(age: number): void {
+function showPanels(sinceLast: number): void {
+  age = sinceLast;
+  const silent = isSilent(standing());
   const [key, name, tone] = linkBadge(standing());
   link.className = `badge ${tone}`;
   show(link, [icon(name), document.createTextNode(t(key))]);
@@ -229,7 +232,7 @@ function showPanels(age: number): void {
   const { text, isRaised } = panels.strip(session);
   strip.className = isRaised ? "strip raised" : "strip";
   strip.hidden = (player !== undefined || opening !== undefined) && !isRaised;
-  show(stripText, lobby !== undefined || session.objects.size === 0 ? [] : [icon(isRaised ? "stop" : "done"), document.createTextNode(text)]);
+  show(stripText, lobby !== undefined || session.objects.size === 0 ? [] : silent && !isRaised ? [icon("warn"), document.createTextNode(t("stop.unknown"))] : [icon(isRaised ? "stop" : "done"), document.createTextNode(text)]);
   desk?.show();
   part?.show();
   app.classList.toggle("leads", player !== undefined || (desk?.role === "instructor" && !session.isOver));
@@ -251,12 +254,12 @@ function showPanels(age: number): void {
   card.hidden = legend.hidden = !hasSession;
   const workspaceKey = legend.querySelector<HTMLElement>(".key-workspace");
   if (workspaceKey !== null) workspaceKey.hidden = view?.hasWorkspace !== true;
-  document.body.classList.toggle("stale", player === undefined && (live.kind !== "open" || session.link?.state === "lost"));
+  document.body.classList.toggle("stale", player === undefined && (live.kind !== "open" || session.link?.state === "lost" || silent));
   view?.setCover(card.hidden || isPicture ? undefined : card);
 }
 
 function frame(now: number): void {
-  const age = session.heard === 0 || player !== undefined ? 0 : (now - session.heard) / 1000;
+  const sinceLast = session.heard === 0 || player !== undefined ? 0 : (now - session.heard) / 1000;
   player?.update(now);
   lobby?.update(now);
   tools?.update();
@@ -264,11 +267,11 @@ function frame(now: number): void {
   if (isPicture) picture(now);
   plots.update(session, now);
   const hand = part?.hand;
-  const state = `${hand?.views.length} ${hand?.isOn} ${hand?.current} ${hand?.isAligning} ${hand?.isDeepening} ${hand?.isFine} ${hand?.isTurning} ${session.changed} ${session.moved} ${live.kind} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${player?.problem} ${view?.hasWorkspace} ${age > 0.5 ? age.toFixed(1) : ""}`;
+  const state = `${hand?.views.length} ${hand?.isOn} ${hand?.current} ${hand?.isAligning} ${hand?.isDeepening} ${hand?.isFine} ${hand?.isTurning} ${session.changed} ${session.moved} ${live.kind} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${player?.problem} ${view?.hasWorkspace} ${sinceLast > 0.5 ? sinceLast.toFixed(1) : ""}`;
   if (now - shownAt >= PANEL_PERIOD && state !== shown) {
     shownAt = now;
     shown = state;
-    showPanels(age);
+    showPanels(sinceLast);
   }
   requestAnimationFrame(frame);
 }
