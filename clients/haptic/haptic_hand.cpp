@@ -70,14 +70,10 @@ Result<void> HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH
   finishing_ = false;
   finish_time_ = 0.0;
   Result<void> result;
-  device_.read(device_state_);
-  if (!armed) {
-    device_.disarm();
-  } else if (device_state_.fault != devices::DeviceFault::kNone) {
-    // its watchdog has acted while nothing was written
-    handover_.ask();
-  } else if (!device_state_.forces_on) {
+  if (armed) {
     result = device_.arm();
+  } else {
+    device_.disarm();
   }
   device_.read(device_state_);
   workspace_.setCentre(p_WH - device_state_.X_DH.translation());
