@@ -118,8 +118,8 @@ Result<structures::HapticStructures> bake(const TriangleMesh& mesh, const BakeOp
   structures.shell = bakeShell(welded, baked->surface, undilated, options, work);
   if (work.cancelled()) return fail("cancelled");
   if (!structures.shell.empty()) {
-    structures.features =
-        bakeFeatures(welded, undilated, static_cast<double>(structures.shell.levels().back().spacing));
+    structures.features = bakeFeatures(welded, *baked->surface_tree, undilated,
+                                       static_cast<double>(structures.shell.levels().back().spacing));
   }
   const std::string sheets = noteSheets(welded, undilated);
   work.stage("thickening thin walls", 0.95, 0.99);

@@ -9,6 +9,7 @@
 
 #include "server/bake/face_sides.h"
 #include "server/bake/normal_estimator.h"
+#include "server/bake/wedge_reach.h"
 #include "server/structures/point_grid.h"
 #include "server/structures/shell_builder.h"
 
@@ -28,6 +29,9 @@ constexpr double kTanHalf40 = 0.364;  // [-] tan of half the turn from which an 
 constexpr double kCos6 = 0.995;       // [-] a polyline that turns less at a vertex is straight there
 constexpr double kCos20 = 0.94;       // [-] faces of edges that are merged turn by less
 
+/// [voxels] From an edge: beyond them the interpolated distance of a wedge is exact.
+constexpr double kLargestReach = 2.0;
+
 /// [m] Features are sampled for a pointshell of the other part with about this spacing at most, and at least.
 constexpr double kLargestSpacing = 0.004;
 constexpr double kSmallestSpacing = 0.002;
@@ -45,11 +49,13 @@ struct Sizes {
   explicit Sizes(double spacing)
       : apart(std::clamp(spacing, kSmallestSpacing, kLargestSpacing)),
         piece(1.5 * apart),
+        straight(apart / 80.0),
         sharp_radius(apart / 8.0),
         largest_radius(2.0 * apart) {}
 
   double apart;           ///< of the other part's points, about
   double piece;           ///< longest piece of an edge
+  double straight;        ///< vertices nearer to a line, and faces to a plane, are on it
   double sharp_radius;    ///< rounder edges are sampled as surfaces, without their edges
   double largest_radius;  ///< rounder surfaces are no features; of facets, on a ball of equal ones 1.5 radii
 
@@ -68,8 +74,14 @@ struct Feature {
 
 class FeatureFinder {
  public:
-  FeatureFinder(const WeldedMesh& mesh, const structures::DistanceField& field, const Sizes& sizes)
-      : mesh_(mesh), normals_(field), sizes_(sizes), grid_(sizes.apart) {
+  FeatureFinder(const WeldedMesh& mesh, const TriangleTree& surface, const structures::DistanceField& field,
+                const Sizes& sizes)
+      : mesh_(mesh),
+        field_(field),
+        normals_(field),
+        sizes_(sizes),
+        reach_(surface, sizes.straight),
+        grid_(sizes.apart) {
     const std::vector<Edge> edges = mesh.edges();
     const FaceSides sides(mesh, edges, field);
     for (const Edge& edge : edges) addIfConvex(edge, sides);
@@ -172,11 +184,10 @@ class FeatureFinder {
                                 const std::vector<std::uint32_t>& edges, std::size_t i, std::size_t j) const {
     const Vector3 a = at(chain[i]);
     const Vector3 along = (at(chain[j]) - a).normalized();
-    const double tolerance = sizes_.apart / 80.0;
     double reached = 0.0;
     for (std::size_t k = i + 1; k < j; ++k) {
       const Vector3 to = at(chain[k]) - a;
-      if ((to - along * along.dot(to)).norm() > tolerance || along.dot(to) < reached) return false;
+      if ((to - along * along.dot(to)).norm() > sizes_.straight || along.dot(to) < reached) return false;
       reached = along.dot(to);
     }
     const auto& first = sharp_[edges[i]].into_M;
@@ -199,11 +210,12 @@ class FeatureFinder {
       if (i > 0 && before.dot(along) < kCos6 && (b - a).norm() > sizes_.sharp_radius) add(a, bisector);
       before = along;
       const int pieces = std::max(1, static_cast<int>(std::ceil((b - a).norm() / sizes_.piece)));
+      const Vector3 half = 0.5 / pieces * (b - a);
       for (int k = 0; k < pieces; ++k) {
-        FeatureEdge piece;
-        piece.half_M = (0.5 / pieces * (b - a)).cast<float>();
-        piece.into_M = {into[0].cast<float>(), into[1].cast<float>()};
-        add(a + (b - a) * ((k + 0.5) / pieces), bisector, piece);
+        const Vector3 centre = a + (b - a) * ((k + 0.5) / pieces);
+        const double reach = reach_.of(centre, half, into, kLargestReach * field_.voxelAt(centre));
+        add(centre, bisector,
+            {half.cast<float>(), {into[0].cast<float>(), into[1].cast<float>()}, static_cast<float>(reach)});
       }
       i = j;
     }
@@ -237,8 +249,10 @@ class FeatureFinder {
   }
 
   const WeldedMesh& mesh_;
+  const structures::DistanceField& field_;
   const NormalEstimator normals_;
   const Sizes sizes_;
+  const WedgeReach reach_;
   std::vector<ConvexEdge> sharp_, round_;
   std::vector<Feature> features_;
   structures::PointGrid grid_;
@@ -246,10 +260,10 @@ class FeatureFinder {
 
 }  // namespace
 
-structures::FeatureShell bakeFeatures(const WeldedMesh& mesh, const structures::DistanceField& field,
-                                      double spacing) {
+structures::FeatureShell bakeFeatures(const WeldedMesh& mesh, const TriangleTree& surface,
+                                      const structures::DistanceField& field, double spacing) {
   const Sizes sizes(spacing);
-  const std::vector<Feature> features = FeatureFinder(mesh, field, sizes).find();
+  const std::vector<Feature> features = FeatureFinder(mesh, surface, field, sizes).find();
   std::vector<SurfaceSample> samples;
   samples.reserve(features.size());
   for (const Feature& feature : features) samples.push_back(feature.sample);

@@ -211,7 +211,7 @@ Result<BakedField> bakeField(const WeldedMesh& mesh, const BakeOptions& options,
   BrickLevel coarse(storage.layout.p_MoFo_M, options.voxel, {counts[0], counts[1], counts[2]});
   work.stage("building the triangle tree", 0.05, 0.15);
   const double longest = 2.0 * BrickLevel::kVoxels * options.voxel;
-  const TriangleTree tree(triangles, longest);
+  TriangleTree tree(triangles, longest);
   work.stage("measuring distances", 0.15, 0.45);
   const std::size_t sampled = coarse.sampleDistances(tree, limits.level_bricks, work);
   if (sampled > limits.level_bricks) return tooMany(sampled, limits.level_bricks, false);
@@ -263,6 +263,7 @@ Result<BakedField> bakeField(const WeldedMesh& mesh, const BakeOptions& options,
     finishSamples(*fine, *exposed, *hidden_tree, work);
     limitSlope(*fine, &coarse, work);
   }
+  baked.surface_tree = hidden.empty() ? std::move(tree) : std::move(*trees[1]);
   baked.thin = thinBricks(coarse, work);
   if (fine) baked.thin.keepThoseOf(thin);
   baked.refined_gaps = std::move(refined.refined_gaps);

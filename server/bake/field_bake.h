@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "server/bake/bake.h"
 #include "server/bake/field_size.h"
 #include "server/bake/thin_bricks.h"
+#include "server/bake/triangle_tree.h"
 #include "server/bake/welded_mesh.h"
 #include "server/structures/field_builder.h"
 #include "server/structures/filled_space.h"
@@ -20,6 +22,7 @@ class ParallelWork;
 struct BakedField {
   structures::FieldStorage storage;           ///< of the field, without dilation
   std::vector<structures::Triangle> surface;  ///< the exposed part of the triangles
+  std::optional<TriangleTree> surface_tree;   ///< of these
   std::size_t hidden_triangles = 0;           ///< entirely inside the solid
   std::vector<structures::FilledSpace> filled;
   BrickMarks thin;                   ///< where material may be thin

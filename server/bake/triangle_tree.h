@@ -27,6 +27,31 @@ class TriangleTree {
   /// Whether a triangle is nearer to p than `radius` [m].
   [[nodiscard]] bool anyWithin(const Vector3& p, double radius) const;
 
+  /// Calls visit(triangle) for each triangle nearer to p than `radius` [m]; for long ones more than once.
+  template <typename Visit>
+  void visitWithin(const Vector3& p, double radius, Visit&& visit) const {
+    if (nodes_.empty()) return;
+    const Vector3f p_local = local(p);
+    const double squared = radius * radius;
+    std::array<std::uint32_t, 128> stack;  // as in anyWithin
+    std::size_t count = 0;
+    stack[count++] = 0;
+    while (count > 0) {
+      const Node& node = nodes_[stack[--count]];
+      const Lanes away = node.squaredDistances(p_local) * (1.0F - kRounding);
+      for (std::size_t lane = 0; lane < 4; ++lane) {
+        const std::uint32_t child = node.child[lane];
+        if (!(away[static_cast<Eigen::Index>(lane)] < squared) || child == kNothing) continue;
+        if ((child & kTriangle) == 0) {
+          stack[count++] = child;
+        } else if (const structures::Triangle& triangle = triangles_[child - kTriangle];
+                   structures::squaredDistance(p, triangle) < squared) {
+          visit(triangle);
+        }
+      }
+    }
+  }
+
   /// False only if no triangle is nearer than `radius` [m] to the cube around `centre` [m] with `half_edge`
   /// [m].
   [[nodiscard]] bool maybeNear(const Vector3& centre, double half_edge, double radius) const;

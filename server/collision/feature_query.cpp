@@ -40,14 +40,16 @@ EdgePiece pieceOf(const structures::FeatureShell& features, std::uint32_t point)
   const FeatureEdge& edge = features.edges()[point];
   return {features.points().points()[point].p_MP.cast<double>(),
           edge.half_M.cast<double>(),
-          {edge.into_M[0].cast<double>(), edge.into_M[1].cast<double>()}};
+          {edge.into_M[0].cast<double>(), edge.into_M[1].cast<double>()},
+          edge.reach};
 }
 
 EdgePiece pieceOf(const structures::FeatureShell& features, std::uint32_t point, const Transform& X_AB) {
   const FeatureEdge& edge = features.edges()[point];
   return {X_AB * features.points().points()[point].p_MP,
           X_AB.turned(edge.half_M),
-          {X_AB.turned(edge.into_M[0]), X_AB.turned(edge.into_M[1])}};
+          {X_AB.turned(edge.into_M[0]), X_AB.turned(edge.into_M[1])},
+          edge.reach};
 }
 
 /// [-] The direction of +-c in which the body of a piece lies on the far side of a plane through the edge; 0:
@@ -57,6 +59,11 @@ double separatingSign(const EdgePiece& piece, const Vector3& c, double slack) {
   const double second = c.dot(piece.into[1]);
   if (std::max(first, second) <= slack) return 1.0;
   return std::min(first, second) >= -slack ? -1.0 : 0.0;
+}
+
+/// [-] Relative to half a piece, how far from its centre it ends; `slack` [m] beyond.
+double endOf(double half2, double slack) {
+  return 1.0 + kEndTolerance + (slack > 0.0 ? slack / std::sqrt(half2) : 0.0);
 }
 
 /// Two pieces as a contact of A against B, in their frame. `slack` [m] beyond their ends, `tolerance` [-] of
@@ -78,17 +85,55 @@ bool cross(const EdgePiece& a, const EdgePiece& b, double slack, double toleranc
   // closest points a.p + along_a * a.half, b.p + along_b * b.half of the two lines
   const double along_a = -r.dot(b.half.cross(c)) / c2;
   const double along_b = -r.dot(a.half.cross(c)) / c2;
-  const auto limit = [slack](double half2) {
-    return 1.0 + kEndTolerance + (slack > 0.0 ? slack / std::sqrt(half2) : 0.0);
-  };
-  if (std::abs(along_a) > limit(a2) || std::abs(along_b) > limit(b2)) return false;
+  if (std::abs(along_a) > endOf(a2, slack) || std::abs(along_b) > endOf(b2, slack)) return false;
   contact.n_W = sign / length * c;
   contact.p_WP = a.p + along_a * a.half;
   return true;
 }
 
-/// [m] Distance of two segments (Ericson, Real-Time Collision Detection, 5.1.9).
+/// A point beside a piece, in their frame, as a contact of the point's body against the piece's: the gap is
+/// that of the wedge, the larger of the distances to the planes of its faces. `slack` [m] beyond the ends and
+/// the reach of the piece. False where the piece's body need not be the wedge.
+bool isBeside(const Vector3& p, const EdgePiece& piece, double slack, Contact& contact) {
+  if (piece.reach == 0.0) return false;
+  const Vector3 r = p - piece.p;
+  const double half2 = piece.half.squaredNorm();
+  const double along = r.dot(piece.half) / half2;
+  if (std::abs(along) > endOf(half2, slack)) return false;
+  const Vector3 across = r - along * piece.half;
+  const double reach = piece.reach + slack;
+  if (across.squaredNorm() >= reach * reach) return false;
+  const double cosine = piece.into[0].dot(piece.into[1]);
+  const double sine = std::sqrt(1.0 - cosine * cosine);
+  const Vector3 n_0 = (cosine * piece.into[0] - piece.into[1]) / sine;
+  const Vector3 n_1 = (cosine * piece.into[1] - piece.into[0]) / sine;
+  const double gap_0 = n_0.dot(across);
+  const double gap_1 = n_1.dot(across);
+  contact.gap = std::max(gap_0, gap_1);
+  contact.n_W = gap_0 > gap_1 ? n_0 : n_1;
+  contact.p_WP = p;
+  return true;
+}
+
+/// Two features, of which at least one is a piece of an edge, as a contact of A against B in their frame; as
+/// cross() and isBeside().
+bool meet(const EdgePiece& a, const EdgePiece& b, double slack, double tolerance, Contact& contact) {
+  if (a.isPoint()) return isBeside(a.p, b, slack, contact);
+  if (!b.isPoint()) return cross(a, b, slack, tolerance, contact);
+  if (!isBeside(b.p, a, slack, contact)) return false;
+  contact.n_W = -contact.n_W;
+  return true;
+}
+
+/// [m] Distance of a point at `r` from the middle of a segment.
+double distanceToSegment(const Vector3& r, const Vector3& half) {
+  return (r - std::clamp(r.dot(half) / half.squaredNorm(), -1.0, 1.0) * half).norm();
+}
+
+/// [m] Distance of two segments, one of which may be a point (Ericson, Real-Time Collision Detection, 5.1.9).
 double segmentDistance(const EdgePiece& a, const EdgePiece& b) {
+  if (a.isPoint()) return distanceToSegment(a.p - b.p, b.half);
+  if (b.isPoint()) return distanceToSegment(b.p - a.p, a.half);
   const Vector3 r = a.p - b.p;
   const double aa = a.half.squaredNorm();
   const double bb = b.half.squaredNorm();
@@ -103,10 +148,10 @@ double segmentDistance(const EdgePiece& a, const EdgePiece& b) {
   return (r + along_a * a.half - along_b * b.half).norm();
 }
 
-/// The contact of two pieces in W, from A's frame.
+/// The contact of two features in W, from A's frame.
 void evaluateCrossing(const EdgePiece& a, const EdgePiece& b, const Transform& X_WA, Contact& contact) {
   Vector3 p_A = a.p;
-  if (cross(a, b, 0.0, kConeTolerance, contact)) {
+  if (meet(a, b, 0.0, kConeTolerance, contact)) {
     contact.n_W = X_WA.R * contact.n_W;
     p_A = contact.p_WP;
   } else {
@@ -114,6 +159,12 @@ void evaluateCrossing(const EdgePiece& a, const EdgePiece& b, const Transform& X
     contact.n_W = Vector3::UnitZ();
   }
   contact.p_WP = X_WA.p + X_WA.R * p_A;
+}
+
+/// Whether a feature of A may meet one of B: at least one is a piece of an edge.
+bool canCross(const PairFeatures& features) {
+  return !features.features_A->empty() &&
+         (features.features_A->longestHalf() > 0.0 || features.features_B->longestHalf() > 0.0);
 }
 
 /// B's features in A's field.
@@ -208,8 +259,8 @@ void keepNearest(std::size_t most, double margin, ContactList& contacts, PairQue
   contacts.resize(kept);
 }
 
-/// Lists the crossings of B's pieces near A with pieces of A, by A's bounding spheres. In A's frame: A's
-/// pieces are many, those of B few.
+/// Lists the crossings of B's features near A with those of A, by A's bounding spheres. In A's frame: A's
+/// features are many, those of B few.
 class CrossingSearch {
  public:
   CrossingSearch(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
@@ -229,7 +280,7 @@ class CrossingSearch {
     for (const Contact& contact : near_A) {
       const float half = features_.features_B->edges()[contact.point].half_M.norm();
       // a crossing is nearer than the centre of B's piece by half its length at most
-      if (half == 0.0F || contact.gap > query_.margin + half) continue;
+      if (contact.gap > query_.margin + half) continue;
       EdgePiece& piece = near_.pieces[near_.count];
       piece = pieceOf(*features_.features_B, contact.point, X_AB);
       const Vector3f p_A = piece.p.cast<float>();
@@ -247,7 +298,7 @@ class CrossingSearch {
       for (const structures::ShellSphere& leaf : shell.leaves().subspan(cluster.first, cluster.count)) {
         const auto by_leaf = narrowed(leaf, by_cluster, near_.by_leaf);
         if (by_leaf.empty()) continue;
-        for (std::uint32_t i = leaf.first; i < leaf.first + leaf.count; ++i) crossPiece(i, by_leaf);
+        for (std::uint32_t i = leaf.first; i < leaf.first + leaf.count; ++i) crossFeature(i, by_leaf);
       }
     }
   }
@@ -255,7 +306,7 @@ class CrossingSearch {
  private:
   using Ball = NearPieces::Ball;
 
-  /// Those of B's pieces that may cross a piece of A within a sphere.
+  /// Those of B's features that may meet a feature of A within a sphere.
   std::span<const Ball> narrowed(const structures::ShellSphere& sphere, std::span<const Ball> from,
                                  NearPieces::Balls& to) const {
     if (box_A_.squaredExteriorDistance(sphere.p_MC) > sphere.radius * sphere.radius) return {};
@@ -268,8 +319,7 @@ class CrossingSearch {
     return {to.data(), count};
   }
 
-  void crossPiece(std::uint32_t i, std::span<const Ball> near) {
-    if (!isEdge(*features_.features_A, i)) return;
+  void crossFeature(std::uint32_t i, std::span<const Ball> near) {
     const Vector3f p_A = features_.features_A->points().points()[i].p_MP;
     EdgePiece piece;
     bool known = false;
@@ -279,7 +329,8 @@ class CrossingSearch {
       known = true;
       const EdgePiece& other = near_.pieces[ball.piece];
       Contact contact;
-      if (!cross(piece, other, query_.margin, kListedTolerance, contact) || contact.gap > query_.margin)
+      if (piece.isPoint() && other.isPoint()) continue;
+      if (!meet(piece, other, query_.margin, kListedTolerance, contact) || contact.gap > query_.margin)
         continue;
       contact.kind = ContactKind::kCrossing;
       contact.point = i;
@@ -344,7 +395,6 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
                    PairQueryResult& result) noexcept {
   result.dormant_gap = std::numeric_limits<double>::infinity();
   if (!features.any()) return;
-  const double half_A = features.features_A->longestHalf();
   const double half_B = features.features_B->longestHalf();
   PairQueryResult& of_B = scratch.of_B;
   queryPair(reversed(query, features, query.margin + half_B), of_B);
@@ -364,8 +414,8 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
   ContactList& points = of_B.contacts;
   ContactList& crossings = scratch.crossings;
   crossings.clear();
-  const bool may_cross = half_A > 0.0 && half_B > 0.0 && !points.empty();
-  if (may_cross) {
+  const bool searched = canCross(features) && !points.empty();
+  if (searched) {
     CrossingSearch(query, features, scratch, result).run(points);
     keepNearest(kMaxCrossings, query.margin, crossings, result);
   }
@@ -376,11 +426,11 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
               result);
   for (const Contact& contact : points) result.contacts.push_back(turned(contact));
   for (const Contact& contact : crossings) result.contacts.push_back(contact);
-  if (half_A == 0.0 || half_B == 0.0) return;
+  if (!canCross(features)) return;
 
   // a crossing is nearer than the centre of B's piece by half its length at most
   double crossing_bound = of_B.unlisted_gap - half_B;
-  if (may_cross) crossing_bound = std::min(crossing_bound, query.margin);
+  if (searched) crossing_bound = std::min(crossing_bound, query.margin);
   if (crossing_bound < query.margin) result.complete_to = std::min(result.complete_to, crossing_bound);
   result.smallest_gap = std::min(result.smallest_gap, crossing_bound);
   result.unlisted_gap = std::min(result.unlisted_gap, crossing_bound);
@@ -390,9 +440,8 @@ double featureGap(const PairQuery& query, const PairFeatures& features, FeatureS
                   QueryCounts& counts) noexcept {
   if (!features.any()) return std::numeric_limits<double>::infinity();
   const double half_B = features.features_B->longestHalf();
-  const bool may_cross = half_B > 0.0 && features.features_A->longestHalf() > 0.0;
   // a crossing is nearer than the centre of B's piece by half its length at most
-  const double nearer = may_cross ? half_B : 0.0;
+  const double nearer = canCross(features) ? half_B : 0.0;
   PairQuery of_B = reversed(query, features, query.margin + nearer);
   of_B.list = false;
   queryPair(of_B, scratch.of_B);

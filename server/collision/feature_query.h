@@ -33,18 +33,21 @@ struct PairFeatures {
   return point < features.edges().size() && features.edges()[point].half_M.squaredNorm() > 0.0F;
 }
 
-/// A piece of a convex edge, as structures::FeatureEdge, in any frame.
+/// A feature in any frame: a piece of a convex edge, as structures::FeatureEdge, or a point.
 struct EdgePiece {
   Vector3 p = Vector3::Zero();     ///< [m] centre
-  Vector3 half = Vector3::Zero();  ///< [m] from the centre to one end
+  Vector3 half = Vector3::Zero();  ///< [m] from the centre to one end; zero: a point
   std::array<Vector3, 2> into{Vector3::Zero(), Vector3::Zero()};
+  double reach = 0.0;  ///< [m]
+
+  [[nodiscard]] bool isPoint() const { return half.isZero(0.0); }
 };
 
-/// B's pieces of edges near A, in A's frame.
+/// B's features near A, in A's frame.
 struct NearPieces {
   struct Ball {
     Vector3f p_A;
-    float reach = 0.0F;  ///< [m] centres of pieces that cross this one are no farther
+    float reach = 0.0F;  ///< [m] centres of features that meet this one are no farther
     std::uint32_t piece = 0;
   };
   using Balls = std::array<Ball, kMaxPairContacts>;
@@ -68,10 +71,14 @@ struct FeatureScratch {
 /// at most kFeatureRoom; of the features' points, and of more than kMaxCrossings crossings, those with the
 /// smallest gaps are kept (`contacts_dropped`).
 ///
+/// A crossing is of two edges, or of a point of one body beside an edge of the other. There the solid is the
+/// wedge between two planes, and the gap is exact, while the interpolated field rounds the edge off.
+///
 /// A crossing is listed when it may come about within `query.margin` of motion. While it is beyond the ends
-/// of its pieces, or the faces beside it are nearer, it is dormant: its gap is kDormantGap plus the distance
-/// of its segments, which counts in PairQueryResult::dormant_gap. In the solver it is a constraint that is
-/// never active: at most kMaxCrossings rows of a pair.
+/// of its pieces, or the faces beside it are nearer, or a point is beyond the reach of the edge, it is
+/// dormant: its gap is kDormantGap plus the distance of its segments, which counts in
+/// PairQueryResult::dormant_gap. In the solver it is a constraint that is never active: at most kMaxCrossings
+/// rows of a pair.
 ///
 /// Threads: pure, but for the scratch. Real-time.
 void queryFeatures(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,

@@ -15,7 +15,7 @@ namespace tenon::collision {
 enum class ContactKind : std::uint8_t {
   kShellPoint,    ///< a point of A's pointshell, the surface of B
   kFeaturePoint,  ///< a feature of B, the surface of A
-  kCrossing,      ///< a piece of an edge of A, one of B
+  kCrossing,      ///< a feature of A, one of B: two pieces of edges, or a point and a piece
 };
 
 /// [m] Further apart than any margin. The gap of a dormant crossing (feature_query.h) is this plus the

@@ -157,8 +157,10 @@ bool CollPair::isIndexValid(const collision::Contact& contact) const noexcept {
     case collision::ContactKind::kFeaturePoint:
       return features_.any() && contact.point < features_.features_B->edges().size();
     case collision::ContactKind::kCrossing:
-      return features_.any() && collision::isEdge(*features_.features_A, contact.point) &&
-             collision::isEdge(*features_.features_B, contact.other);
+      return features_.any() && contact.point < features_.features_A->edges().size() &&
+             contact.other < features_.features_B->edges().size() &&
+             (collision::isEdge(*features_.features_A, contact.point) ||
+              collision::isEdge(*features_.features_B, contact.other));
   }
   return false;
 }

@@ -178,7 +178,7 @@ class CollPair {
   /// Of gaps up to `margin` [m], without a list.
   [[nodiscard]] collision::PairQuery gapQuery(const Pose& X_WA, const Pose& X_WB,
                                               double margin) const noexcept;
-  /// Validates a contact read from a checkpoint: indices in range, crossings at pieces of edges.
+  /// Validates a contact read from a checkpoint: indices in range, crossings with a piece of an edge.
   [[nodiscard]] bool isIndexValid(const collision::Contact& contact) const noexcept;
   /// Validates a list read from a checkpoint.
   [[nodiscard]] bool isValid(const collision::IslandPairResult& list) const noexcept;

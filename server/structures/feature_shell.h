@@ -16,12 +16,14 @@ struct FeatureEdge {
   /// Unit vectors in the two faces of the edge, perpendicular to it and away from it. A direction n with
   /// n . into <= 0 for both separates: the object is on one side of a plane through the edge.
   std::array<Vector3f, 2> into_M{Vector3f::Zero(), Vector3f::Zero()};
+  /// [m] Nearer to the piece than this, and between its ends, the surface is the two faces alone.
+  float reach = 0.0F;
 };
 
 /// The sharp features of an object's surface: corners, pieces of convex edges, tips of pins.
 ///
 /// An even pointshell misses what is thinner than its spacing on the other object. So a pair also asks for
-/// the features of the SDF side in the field of the pointshell side, and for crossings of the edges of both
+/// the features of the SDF side in the field of the pointshell side, and for crossings of features of both
 /// (server/collision/feature_query.h). Features are few, and in one level: a query never skips them.
 ///
 /// A non-owning view with a shared owner, as Pointshell. Threads: constant after construction. Real-time: all

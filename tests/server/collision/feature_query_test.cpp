@@ -246,6 +246,62 @@ TEST_F(ChosenFeatures, DormantCrossingsThatAreNotListedCountWithTheirDistance) {
   EXPECT_EQ(result_->counts.contacts_dropped, 0U) << "they hold nothing";
 }
 
+//  A's or B's corner beside the other's edge along x, whose faces are at -45 and 45 degrees below it
+class PointsBesideEdges : public ChosenFeatures {
+ protected:
+  static constexpr double kReach = 0.003;  // [m]
+
+  void addEdge() {
+    const double s = std::sqrt(0.5);
+    add({0.0, 0.0, 0.02}, {0.003, 0.0, 0.0}, {0.0, s, -s}, {0.0, -s, -s});
+    edges_.back().reach = kReach;
+  }
+  [[nodiscard]] std::vector<Contact> crossings() const {
+    std::vector<Contact> list;
+    std::ranges::copy_if(result_->contacts, std::back_inserter(list),
+                         [](const Contact& one) { return one.kind == ContactKind::kCrossing; });
+    return list;
+  }
+};
+
+TEST_F(PointsBesideEdges, HaveTheGapOfTheWedge) {
+  const double s = std::sqrt(0.5);
+  // over one face, over the edge itself, and behind the other face
+  for (const Vector3& r :
+       {Vector3(0.001, 0.0012, -0.001), Vector3(0.0, 0.0, 0.0003), Vector3(0.0, -0.0005, -0.0007)}) {
+    const double gap = std::max(s * (r.y() + r.z()), s * (r.z() - r.y()));
+    add(Vector3(0.0, 0.0, 0.02) + r);
+    const structures::FeatureShell point = taken();
+    addEdge();
+    const structures::FeatureShell edge = taken();
+    query(point, edge, structures::Pointshell(), structures::DistanceField());
+    std::vector<Contact> found = crossings();
+    ASSERT_EQ(found.size(), 1U);
+    EXPECT_NEAR(found[0].gap, gap, 1e-8);
+    EXPECT_NEAR(found[0].n_W.z(), s, 1e-6) << "out of B, into A";
+    query(edge, point, structures::Pointshell(), structures::DistanceField());
+    found = crossings();
+    ASSERT_EQ(found.size(), 1U);
+    EXPECT_NEAR(found[0].gap, gap, 1e-8);
+    EXPECT_NEAR(found[0].n_W.z(), -s, 1e-6) << "out of B, into A";
+    EXPECT_NEAR((found[0].p_WP - Vector3(0.0, 0.0, 0.02) - r).norm(), 0.0, 1e-8);
+  }
+}
+
+TEST_F(PointsBesideEdges, HoldNothingBeyondTheEndsAndTheReachOfTheEdge) {
+  for (const Vector3& r : {Vector3(0.0034, 0.0, -0.0001), Vector3(0.0, 0.0024, -0.0024)}) {
+    add(Vector3(0.0, 0.0, 0.02) + r);
+    const structures::FeatureShell point = taken();
+    addEdge();
+    query(point, taken(), structures::Pointshell(), structures::DistanceField());
+    const std::vector<Contact> found = crossings();
+    ASSERT_EQ(found.size(), 1U) << "within the margin of motion";
+    EXPECT_TRUE(found[0].dormant());
+    const double beyond = std::max(std::abs(r.x()) - 0.003, 0.0);
+    EXPECT_NEAR(found[0].gapBound(), std::hypot(beyond, r.y(), r.z()), 1e-7) << "distance of the segment";
+  }
+}
+
 // A shell of one level with many clusters is descended by blocks of them.
 TEST(BlocksOfClusters, ListTheSameContactsAsTestingEveryPoint) {
   const auto samples = test::boxSamples({0.6, 0.5, 0.4}, 0.006);

@@ -2,18 +2,16 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <ostream>
 #include <string>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "server/bake/shapes.h"
-#include "server/session/scene_loader.h"
 #include "server/simulation/environment.h"
+#include "tests/server/session/two_parts.h"
 #include "tests/support/known_shortfall.h"
 #include "tests/support/test_meshes.h"
 
@@ -25,43 +23,8 @@ using simulation::Environment;
 
 constexpr double kPush = 0.01;  // [m] of the hand beyond the contact: 10 N
 
-/// Scenarios of a fixed part and one in a hand, loaded as a server loads them.
-class BothSides : public ::testing::Test {
+class BothSides : public test::TwoParts {
  protected:
-  ~BothSides() override { fs::remove_all(folder_); }
-
-  /// `fixed` and `held` are meshes of a scenario. Points are 4 mm apart, voxels `voxel_mm`; `refine` are more
-  /// keys of the fixed part's structures.
-  std::shared_ptr<const simulation::Scene> load(const std::string& fixed, const std::string& held,
-                                                double voxel_mm,
-                                                const std::string& refine = "refinement: 1") {
-    const auto structures = [&](const std::string& keys) {
-      return fmt::format("structures: {{voxel: {} mm, spacing: 4 mm, {}}}", voxel_mm, keys);
-    };
-    fs::create_directories(folder_);
-    const fs::path file = folder_ / "scenario.yaml";
-    std::ofstream(file) << "objects:\n  - {name: fixed, status: fixed, meshes: [" << fixed << "], "
-                        << structures(refine) << "}\n  - {name: held, meshes: [" << held << "], "
-                        << structures("refinement: 1") << ", start: {at: [0, 0, 0.2]}}\n"
-                        << "hands: [{name: right, object: held}]\n"
-                        << "pairs: [{between: [fixed, held]}]\n"
-                        << "states: [{name: wait, conditions: [{command: fulfilled}]}]\n";
-    const auto loaded = loadScene(file, {.cache = folder_ / "cache"});
-    EXPECT_TRUE(loaded) << (loaded ? "" : loaded.error().what);
-    return loaded ? loaded->scene : nullptr;
-  }
-
-  /// The same scene, whose parts have no features: one direction is asked, as a comparison.
-  static std::shared_ptr<const simulation::Scene> withoutFeatures(const simulation::Scene& scene) {
-    auto bare = std::make_shared<simulation::Scene>(scene);
-    for (simulation::ObjectSpec& object : bare->objects) {
-      auto structures = std::make_shared<structures::HapticStructures>(*object.structures);
-      structures->features = {};
-      object.structures = structures;
-    }
-    return bare;
-  }
-
   /// Pose of the held part after the hand went straight down from `above` [m] over X_WO to kPush below, and
   /// stayed there.
   static Pose pressedDown(const std::shared_ptr<const simulation::Scene>& scene, const Pose& X_WO,
@@ -79,8 +42,6 @@ class BothSides : public ::testing::Test {
     }
     return environment.objects()[1].X_WO;
   }
-
-  fs::path folder_ = fs::temp_directory_path() / fmt::format("tenon_both_sides_{}", getpid());
 };
 
 constexpr int kOffsets = 8;           // along x, and along y
