@@ -28,7 +28,15 @@ double ClockOffset::error(std::int64_t now_ns) const noexcept {
 }
 
 double ClockOffset::roundTrip() const noexcept {
-  return known() ? 1e-9 * static_cast<double>(best().round_trip) : 0.0;
+  return known() ? 1e-9 * static_cast<double>(shortestTrip(kTrips)) : 0.0;
+}
+
+/// [ns] Of the last `count` exchanges.
+std::int64_t ClockOffset::shortestTrip(std::uint64_t count) const noexcept {
+  std::int64_t shortest = std::numeric_limits<std::int64_t>::max();
+  for (std::uint64_t i = 0; i < std::min(count, count_); ++i)
+    shortest = std::min(shortest, exchanges_[(count_ - 1 - i) % kExchanges].round_trip);
+  return shortest;
 }
 
 double ClockOffset::tripJitter() const noexcept {

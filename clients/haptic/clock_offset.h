@@ -26,13 +26,14 @@ class ClockOffset {
   [[nodiscard]] double offset() const noexcept;
   /// [s] what offset() is off at most, at `now_ns`; infinite while it is not known.
   [[nodiscard]] double error(std::int64_t now_ns) const noexcept;
-  /// [s] shortest of the last exchanges, without the time that the answer took in the server; 0: none.
+  /// [s] shortest of the last kTrips exchanges, without the time that the answer took in the server; 0: none.
   [[nodiscard]] double roundTrip() const noexcept;
 
   /// [s] 90th percentile of the last round trips less the shortest; 0: none.
   [[nodiscard]] double tripJitter() const noexcept;
 
-  static constexpr double kDrift = 100e-6;  ///< [s/s] of two quartz clocks against each other, at most
+  static constexpr std::uint64_t kTrips = 20;  ///< [exchanges] 4 s of 5 a second
+  static constexpr double kDrift = 100e-6;     ///< [s/s] of two quartz clocks against each other, at most
 
  private:
   struct Exchange {
@@ -41,6 +42,7 @@ class ClockOffset {
     std::int64_t at = 0;                                                 // [ns]
   };
   [[nodiscard]] const Exchange& best() const noexcept;
+  [[nodiscard]] std::int64_t shortestTrip(std::uint64_t count) const noexcept;
 
   static constexpr std::size_t kExchanges = 64;  // 13 s of 5 a second
   std::array<Exchange, kExchanges> exchanges_{};

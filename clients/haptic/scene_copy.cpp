@@ -62,7 +62,7 @@ SceneCopy::SceneCopy(std::shared_ptr<const simulation::Scene> scene)
     : environment_(scene, {.contact_lists = kContactLists}),
       mirrored_(scene->objects.size()),
       stiffness_(scene->hands.size()),
-      neighbours_(scene->hands.size()) {
+      others_(scene->hands.size()) {
   view_.begin(sceneObjects(*scene), 0, 0);
   model_.expectAt(1.0);  // the contacts of a cycle are rendered by the next one
   const auto has_mass = [](const simulation::ObjectSpec& object) { return object.body.has_value(); };
@@ -96,8 +96,8 @@ PredictedBody* SceneCopy::bodyOf(ObjectId object) noexcept {
 }
 
 bool SceneCopy::isNeighbours(ObjectId object) const noexcept {
-  return std::any_of(neighbours_.begin(), neighbours_.end(),
-                     [object](const Neighbour& one) { return one.object == object; });
+  return std::any_of(others_.begin(), others_.end(),
+                     [object](const OtherHand& one) { return one.object == object; });
 }
 
 /// Of the pairs from `first` to `end` those that collide and have the hand's object, a neighbour's or a free
@@ -119,14 +119,8 @@ const LocalProxy& SceneCopy::step(const Pose& X_WH, const WorldView& /*world*/) 
 
 void SceneCopy::compute(const HandManifold& heard, std::uint32_t seq, const ServerTime& time,
                         const Pose& X_WH, const Twist& V_WH, const WorldView& world, bool rendered) noexcept {
-  if (heard.tick != heard_tick_ || heard.server_epoch != heard_epoch_) {
-    // a tick that lacked its input, and the one after it, had another time between inputs than the copy
-    const std::int64_t behind = static_cast<std::int64_t>(heard.tick) - heard.answers_seq;
-    is_comparable_ = heard.answers_seq != 0 && behind == behind_;
-    behind_ = behind;
-    heard_tick_ = heard.tick;
-    heard_epoch_ = heard.server_epoch;
-  }
+  silence_ += kTickSeconds;
+  if (heard.tick != heard_tick_ || heard.server_epoch != heard_epoch_) hear(heard);
   const bool known = heard.object.value < mirrored_.size() && heard.hand.value < stiffness_.size() &&
                      world.size() == mirrored_.size() && time.known();
   if (!rendered || heard.frozen || !known) {
@@ -137,7 +131,7 @@ void SceneCopy::compute(const HandManifold& heard, std::uint32_t seq, const Serv
       following_ && heard.hand == hand_ && heard.object == object_ && heard.object_epoch == object_epoch_;
   if (!holds) takeHold(heard);
   mirrorObjects(world, heard, time.tickOf(seq));
-  mirrorOtherHands(heard, time.tickOf(seq));
+  mirrorOtherHands(world, heard, time.tickOf(seq));
   setStiffness(heard.hand, {heard.stiffness, heard.rotational_stiffness});
   environment_.setHandPose(hand_, X_WH, V_WH);
   environment_.step();
@@ -153,12 +147,24 @@ void SceneCopy::compute(const HandManifold& heard, std::uint32_t seq, const Serv
   compareWithServer(heard, seq);
 }
 
+void SceneCopy::hear(const HandManifold& heard) noexcept {
+  if (heard.server_epoch != heard_epoch_) answered_.fill({});
+  // a tick that lacked its input, and the one after it, had another time between inputs than the copy
+  const std::int64_t behind = static_cast<std::int64_t>(heard.tick) - heard.answers_seq;
+  answered_[answers_++ % answered_.size()] = {heard.tick, heard.answers_seq,
+                                              heard.answers_seq != 0 && behind == behind_};
+  behind_ = behind;
+  heard_tick_ = heard.tick;
+  heard_epoch_ = heard.server_epoch;
+  silence_ = 0.0;
+}
+
 void SceneCopy::takeHold(const HandManifold& heard) noexcept {
   for (std::uint32_t i = 0; i < stiffness_.size(); ++i)
     if (HandId{i} != heard.hand) environment_.setHandPresent(HandId{i}, false);
-  for (Neighbour& neighbour : neighbours_) {
-    if (neighbour.object.valid()) mirrored_[neighbour.object.value].known = false;
-    neighbour = {};
+  for (OtherHand& other : others_) {
+    if (other.object.valid()) mirrored_[other.object.value].known = false;
+    other = {};
   }
   hand_ = heard.hand;
   object_ = heard.object;
@@ -171,7 +177,7 @@ void SceneCopy::takeHold(const HandManifold& heard) noexcept {
     if (bodyOf(ObjectId{i}) != nullptr) mirrored_[i].known = false;
   past_.fill({});
   apart_ = 0;
-  diverged_ = false;
+  following_ = diverged_ = false;
 }
 
 void SceneCopy::mirrorObjects(const WorldView& world, const HandManifold& heard, double now) noexcept {
@@ -180,22 +186,20 @@ void SceneCopy::mirrorObjects(const WorldView& world, const HandManifold& heard,
     if (object == heard.object) continue;
     const ObservedObject& seen = world.object(object);
     if (seen.status == ObjectStatus::kFree && bodyOf(object) != nullptr) {
-      predict(object, seen, heard, now);
+      predict(object, seen, now);
     } else {
       mirror(object, seen, now);
     }
   }
 }
 
-void SceneCopy::predict(ObjectId object, const ObservedObject& seen, const HandManifold& heard,
-                        double now) noexcept {
+void SceneCopy::predict(ObjectId object, const ObservedObject& seen, double now) noexcept {
   Mirrored& mirrored = mirrored_[object.value];
   PredictedBody& body = *bodyOf(object);
   const simulation::ObjectMotion& motion = environment_.objects()[object.value];
   const bool is_known =
       mirrored.known && mirrored.epoch == seen.epoch && mirrored.status == ObjectStatus::kFree;
-  if (is_known && seen.updated_at != mirrored.updated_at && is_comparable_ && seen.updated_at == heard.tick)
-    body.compare(seen, heard.answers_seq);
+  if (is_known) compareBody(body, mirrored, seen);
   if (!is_known || body.isLost(seen.radius)) {
     const double ahead = (now - static_cast<double>(seen.updated_at)) * kTickSeconds;
     const Pose X_WO = extrapolated(seen.X_WO, seen.V_WO, seen.p_OQ_O, ahead);
@@ -207,7 +211,23 @@ void SceneCopy::predict(ObjectId object, const ObservedObject& seen, const HandM
     Twist V_WO = motion.V_WO;
     if (body.correct(seen, X_WO, V_WO)) environment_.correct(object, X_WO, V_WO);
   }
-  mirrored = {true, seen.epoch, ObjectStatus::kFree, seen.updated_at, seen.V_WO, seen.X_WO};
+  mirrored = {.known = true,
+              .epoch = seen.epoch,
+              .status = ObjectStatus::kFree,
+              .updated_at = seen.updated_at,
+              .V_WO = seen.V_WO,
+              .X_WO = seen.X_WO,
+              .compared_at = mirrored.compared_at};
+}
+
+/// Frame and manifold of one tick, whichever comes first.
+void SceneCopy::compareBody(PredictedBody& body, Mirrored& mirrored, const ObservedObject& seen) noexcept {
+  if (seen.updated_at == mirrored.compared_at) return;
+  for (const Answered& one : answered_) {
+    if (one.tick != seen.updated_at || !one.is_comparable) continue;
+    body.compare(seen, one.seq);
+    mirrored.compared_at = seen.updated_at;
+  }
 }
 
 void SceneCopy::mirror(ObjectId object, const ObservedObject& seen, double now) noexcept {
@@ -219,20 +239,14 @@ void SceneCopy::mirror(ObjectId object, const ObservedObject& seen, double now) 
                           ? X_WO_now
                           : extrapolated(seen.X_WO, seen.V_WO, seen.p_OQ_O, ahead);
     environment_.place(object, X_WO, kinematic(seen.status));
-    mirrored = {true, seen.epoch, seen.status, seen.updated_at, seen.V_WO, seen.X_WO};
+    mirrored = {.known = true,
+                .epoch = seen.epoch,
+                .status = seen.status,
+                .updated_at = seen.updated_at,
+                .V_WO = seen.V_WO,
+                .X_WO = seen.X_WO};
   } else if (seen.updated_at != mirrored.updated_at) {
-    const double dt = static_cast<double>(seen.updated_at - mirrored.updated_at) * kTickSeconds;
-    const double blend = dt / (kTwistFilter + dt);
-    const bool stands = seen.V_WO.linear.isZero(0.0) && seen.V_WO.angular.isZero(0.0);
-    Twist V_WO = seen.V_WO;
-    if (dt > kTwistFilter && !stands) {
-      const Displacement way = displacement(mirrored.X_WO, seen.X_WO);
-      V_WO = {way.translation / dt, way.rotation / dt};
-    }
-    mirrored.V_WO.linear += (stands ? 1.0 : blend) * (V_WO.linear - mirrored.V_WO.linear);
-    mirrored.V_WO.angular += (stands ? 1.0 : blend) * (V_WO.angular - mirrored.V_WO.angular);
-    mirrored.updated_at = seen.updated_at;
-    mirrored.X_WO = seen.X_WO;
+    hearMotion(mirrored, seen);
   }
   if (seen.status == ObjectStatus::kHidden) return;
   const double pace = pointSpeed(mirrored.V_WO, seen.radius);
@@ -241,65 +255,126 @@ void SceneCopy::mirror(ObjectId object, const ObservedObject& seen, double now) 
   environment_.follow(object, towards(X_WO_now, X_WO_target, seen, pace), mirrored.V_WO);
 }
 
-/// Each pulls its object as in the server's last manifold; those that it lists no more have let go.
-void SceneCopy::mirrorOtherHands(const HandManifold& heard, double now) noexcept {
-  for (std::uint32_t i = 0; i < stiffness_.size(); ++i) {
+void SceneCopy::hearMotion(Mirrored& mirrored, const ObservedObject& seen) noexcept {
+  const double dt = static_cast<double>(seen.updated_at - mirrored.updated_at) * kTickSeconds;
+  const Displacement way = displacement(mirrored.X_WO, seen.X_WO);
+  const Twist before = mirrored.mean_V_WO;
+  const double before_seconds = mirrored.mean_seconds;
+  mirrored.mean_V_WO = {way.translation / dt, way.rotation / dt};
+  mirrored.mean_seconds = dt > kTwistFilter && dt < kLongestFrame ? dt : 0.0;
+  mirrored.updated_at = seen.updated_at;
+  mirrored.X_WO = seen.X_WO;
+  const bool stands = seen.V_WO.linear.isZero(0.0) && seen.V_WO.angular.isZero(0.0);
+  if (stands || dt >= kLongestFrame) {
+    mirrored.V_WO = seen.V_WO;
+  } else if (dt > kTwistFilter) {
+    // each is that of the middle of its time
+    const double ahead = before_seconds > 0.0 ? dt / (dt + before_seconds) : 0.0;
+    mirrored.V_WO = mirrored.mean_V_WO;
+    mirrored.V_WO.linear += ahead * (mirrored.mean_V_WO.linear - before.linear);
+    mirrored.V_WO.angular += ahead * (mirrored.mean_V_WO.angular - before.angular);
+  } else {
+    const double blend = dt / (kTwistFilter + dt);
+    mirrored.V_WO.linear += blend * (seen.V_WO.linear - mirrored.V_WO.linear);
+    mirrored.V_WO.angular += blend * (seen.V_WO.angular - mirrored.V_WO.angular);
+  }
+}
+
+/// Each pulls its object as in the server's last manifold; those that it lists no more do not.
+void SceneCopy::mirrorOtherHands(const WorldView& world, const HandManifold& heard, double now) noexcept {
+  for (std::uint32_t i = 0; i < others_.size(); ++i) {
     const HandId hand{i};
     const bool listed = std::any_of(heard.others.begin(), heard.others.end(),
                                     [&](const HandPull& pull) { return pull.hand == hand; });
-    if (hand != hand_ && !listed) letGo(hand);
+    if (!listed && others_[i].object.valid()) loosen(hand, world);
   }
   const double ahead = (now - static_cast<double>(heard.tick)) * kTickSeconds;
   for (const HandPull& pull : heard.others) {
     if (!pull.X_WG.isFinite() || !pull.V_WG.allFinite() || !pull.p_BoC_B.allFinite()) continue;
     if (pull.hand == hand_) continue;
-    const bool is_own = pull.object == object_;
-    if (pull.hand.value < stiffness_.size() && pull.object.value < mirrored_.size()) {
-      mirrorHold(pull, is_own ? pull.X_WG : nextGoal(pull, ahead));
-    } else if (is_own) {
-      // a soft spring that stands for a wrench
-      const Pose& X_WO = environment_.objects()[object_.value].X_WO;
-      const Displacement stretch = displacement(X_WO, pull.X_WG, pull.p_BoC_B);
-      const Vector3 force = pull.stiffness * stretch.translation;
-      const Vector3 p_OC_W = X_WO.rotation() * pull.p_BoC_B;
-      environment_.contribute(object_, kSource,
-                              {force, pull.rotational_stiffness * stretch.rotation + p_OC_W.cross(force)},
-                              kLifetime);
+    if (pull.hand.value < others_.size() && pull.object.value < mirrored_.size()) {
+      mirrorPull(pull, ahead);
+    } else if (pull.object == object_) {
+      contribute(pull);
     }
+  }
+}
+
+/// By a soft spring that stands for a wrench.
+void SceneCopy::contribute(const HandPull& pull) noexcept {
+  const Pose& X_WO = environment_.objects()[object_.value].X_WO;
+  const Displacement stretch = displacement(X_WO, pull.X_WG, pull.p_BoC_B);
+  const Vector3 force = pull.stiffness * stretch.translation;
+  const Vector3 p_OC_W = X_WO.rotation() * pull.p_BoC_B;
+  environment_.contribute(object_, kSource,
+                          {force, pull.rotational_stiffness * stretch.rotation + p_OC_W.cross(force)},
+                          kLifetime);
+}
+
+void SceneCopy::loosen(HandId hand, const WorldView& world) noexcept {
+  OtherHand& other = others_[hand.value];
+  const bool is_own = other.object == object_;
+  if (!is_own && world.object(other.object).status != ObjectStatus::kHeld) return letGo(hand);
+  // another's object stands where it is, so that nothing is to fade
+  other.grip = is_own ? std::max(0.0, other.grip - kTickSeconds / kEase) : 0.0;
+  if (other.grip > 0.0) {
+    applyGrip(hand);
+  } else {
+    environment_.setHandFrozen(hand, true);
   }
 }
 
 void SceneCopy::letGo(HandId hand) noexcept {
   environment_.setHandPresent(hand, false);
-  if (!neighbours_[hand.value].object.valid()) return;
-  neighbours_[hand.value] = {};
+  others_[hand.value] = {};
   enablePairs(0, collides_.size());
 }
 
-void SceneCopy::mirrorHold(const HandPull& pull, const Pose& X_WG) noexcept {
-  const Pose X_HO(-pull.p_BoC_B);
-  const simulation::HandMotion& hand = environment_.hands()[pull.hand.value];
-  if (!hand.present || !hand.attached || hand.object != pull.object) {
-    const Pose X_WO = environment_.objects()[pull.object.value].X_WO;
-    environment_.hold(pull.hand, pull.object, X_HO, X_WO);
-    stiffness_[pull.hand.value] = {};
-  }
-  setStiffness(pull.hand, {pull.stiffness, pull.rotational_stiffness});
-  environment_.setHandPose(pull.hand, X_WG * X_HO.inverse(), {});
-}
-
-Pose SceneCopy::nextGoal(const HandPull& pull, double ahead) noexcept {
-  Neighbour& neighbour = neighbours_[pull.hand.value];
+void SceneCopy::mirrorPull(const HandPull& pull, double ahead) noexcept {
+  OtherHand& other = others_[pull.hand.value];
+  const bool is_own = pull.object == object_;
   const ObservedObject& object = view_.object(pull.object);
   const Twist V_WG{pull.V_WG.head<3>().cast<double>(), pull.V_WG.tail<3>().cast<double>()};
   const double pace = pointSpeed(V_WG, object.radius);
-  const Pose X_WG = extrapolated(pull.X_WG, faded(V_WG, pace), object.p_OQ_O, ahead);
-  if (neighbour.object != pull.object) {
-    neighbour = {pull.object, X_WG};
-    enablePairs(0, collides_.size());
+  // between two manifolds a shared object needs slow motion, too, or the goal would move in steps
+  const double since = is_own ? silence_ : 0.0;
+  Pose X_WG = extrapolated(pull.X_WG, V_WG, object.p_OQ_O, since);
+  X_WG = extrapolated(X_WG, faded(V_WG, pace), object.p_OQ_O, ahead - since);
+  const simulation::HandMotion& hand = environment_.hands()[pull.hand.value];
+  const bool is_held = hand.present && hand.attached && hand.object == pull.object;
+  if (!is_held || other.grip <= 0.0) grasp(pull, X_WG);
+  other.stiffness = {pull.stiffness, pull.rotational_stiffness};
+  other.grip = std::min(1.0, other.grip + kTickSeconds / kEase);
+  if (!is_own && other.grip < 1.0) {
+    // as much nearer as the coupling is stiffer: its force on the object is that of the listed one
+    const Displacement way = displacement(other.X_WO_begun, X_WG, object.p_OQ_O);
+    X_WG =
+        displaced(other.X_WO_begun, {other.grip * way.translation, other.grip * way.rotation}, object.p_OQ_O);
   }
-  neighbour.X_WG = towards(neighbour.X_WG, X_WG, object, pace);
-  return neighbour.X_WG;
+  other.X_WG = towards(other.X_WG, X_WG, object, pace);
+  applyGrip(pull.hand);
+  environment_.setHandPose(pull.hand, other.X_WG * hand.X_HO.inverse(), {});
+}
+
+/// A hand with which this one begins pulls at once; one that comes or goes on later, little by little.
+void SceneCopy::grasp(const HandPull& pull, const Pose& X_WG) noexcept {
+  OtherHand& other = others_[pull.hand.value];
+  const bool begins = !following_, is_own = pull.object == object_;
+  const Pose X_WO = environment_.objects()[pull.object.value].X_WO;
+  environment_.grasp(pull.hand, pull.object, Pose(-pull.p_BoC_B));
+  other = {.object = pull.object,
+           .X_WG = begins || is_own ? X_WG : X_WO,
+           .X_WO_begun = X_WO,
+           .grip = begins ? 1.0 : 0.0};
+  stiffness_[pull.hand.value] = {};
+  enablePairs(0, collides_.size());
+}
+
+void SceneCopy::applyGrip(HandId hand) noexcept {
+  const OtherHand& other = others_[hand.value];
+  // what pushes against another's object, which stood, makes it give way little by little
+  const double factor = other.object == object_ ? other.grip : 1.0 / other.grip;
+  setStiffness(hand, {factor * other.stiffness.translational, factor * other.stiffness.rotational});
 }
 
 void SceneCopy::setStiffness(HandId hand, const HandStiffness& stiffness) noexcept {

@@ -31,10 +31,14 @@ namespace tenon::haptic {
 ///   shifts it by at most kLargestCorrection a cycle beside its own motion: so much of a reversal is felt a
 ///   millisecond.
 /// * Couplings of other hands on the object, and contributions of other sources, act as the server's manifold
-///   tells them.
+///   tells them; goals of hands are extrapolated likewise, slow ones only since the manifold came: so they
+///   do not move in steps, and two people on one part do not swing.
 /// * An object that another hand holds close by is simulated with that hand's coupling, whose goal is
 ///   extrapolated likewise. So it gives way to a push at once: in the server it does so for the push of a
 ///   delay ago, and is heard another delay later.
+/// * A hand that the manifold lists no more, since it is frozen, keeps its object as in the server: without a
+///   pull, and without a jump when it goes on. A pull on the hand's own object fades out and in, within
+///   kEase; one on another object grows soft within it.
 /// * The object starts at the server's proxy, and again after each of its jumps. On a scene at rest both then
 ///   solve one problem for one device pose. Where the answer to a pose nevertheless stays away from what the
 ///   copy had for that pose, with all at rest, the copy has jumped(): the hand is re-anchored at the
@@ -65,8 +69,11 @@ class SceneCopy final : public ForceModel {
   static constexpr double kLargestCorrection = 1e-3;  ///< [m] of any point of a body, in a cycle
   /// [s] Of heard velocities, which are those of single ticks: smooths the resolution of another hand's
   /// encoders, and adds its time to the delay where motion changes. Of frames that are farther apart the
-  /// velocity is that between their poses.
+  /// mean velocities between their poses are taken, on a straight line to the time of the newest one.
   static constexpr double kTwistFilter = 0.005;
+  /// [s] Of frames that are farther apart than that the mean velocity is too old.
+  static constexpr double kLongestFrame = 0.03;
+  static constexpr double kEase = 0.02;  ///< [s] in which pulls of other hands begin and end
 
  private:
   /// What was heard of an object, as the copy has it.
@@ -75,37 +82,55 @@ class SceneCopy final : public ForceModel {
     std::uint32_t epoch = 0;
     ObjectStatus status = ObjectStatus::kHidden;
     Tick updated_at = 0;
-    Twist V_WO;  ///< filtered
-    Pose X_WO;   ///< heard last
+    Twist V_WO;                 ///< at updated_at, filtered
+    Pose X_WO;                  ///< heard last
+    Twist mean_V_WO;            ///< between the last two poses
+    double mean_seconds = 0.0;  ///< [s] between them; 0: not known
+    Tick compared_at = 0;       ///< of a free body
   };
-  /// Another hand whose object is simulated: the goal that it has in the copy.
-  struct Neighbour {
-    ObjectId object;
-    Pose X_WG;
+  /// Another hand that has an object in the copy, its own or that of this hand.
+  struct OtherHand {
+    ObjectId object;          ///< invalid: none
+    Pose X_WG;                ///< goal of the object in the copy
+    Pose X_WO_begun;          ///< where it was when the hand began to pull it
+    HandStiffness stiffness;  ///< that was listed last
+    double grip = 0.0;        ///< [-] how far its coupling is the listed one; 0: frozen
+  };
+  /// Which input the manifold of a tick answered.
+  struct Answered {
+    Tick tick = 0;
+    std::uint32_t seq = 0;
+    bool is_comparable = false;
   };
   struct PastProxy {
     std::uint32_t seq = 0;
     Pose X_WO;
   };
 
+  void hear(const HandManifold& heard) noexcept;
   void takeHold(const HandManifold& heard) noexcept;
   void enablePairs(std::size_t first, std::size_t end) noexcept;
   /// `now` [ticks] of the server.
   void mirrorObjects(const WorldView& world, const HandManifold& heard, double now) noexcept;
   /// `now` [ticks] of the server.
-  void predict(ObjectId object, const ObservedObject& seen, const HandManifold& heard, double now) noexcept;
+  void predict(ObjectId object, const ObservedObject& seen, double now) noexcept;
+  void compareBody(PredictedBody& body, Mirrored& mirrored, const ObservedObject& seen) noexcept;
   /// Null: the object has no mass.
   [[nodiscard]] PredictedBody* bodyOf(ObjectId object) noexcept;
   /// `now` [ticks] of the server.
   void mirror(ObjectId object, const ObservedObject& seen, double now) noexcept;
+  static void hearMotion(Mirrored& mirrored, const ObservedObject& seen) noexcept;
   /// `now` [ticks] of the server.
-  void mirrorOtherHands(const HandManifold& heard, double now) noexcept;
-  /// The hand pulls no more.
+  void mirrorOtherHands(const WorldView& world, const HandManifold& heard, double now) noexcept;
+  /// The hand pulls no more: it is frozen, or has let go.
+  void loosen(HandId hand, const WorldView& world) noexcept;
   void letGo(HandId hand) noexcept;
-  /// The hand pulls its object, towards X_WG.
-  void mirrorHold(const HandPull& pull, const Pose& X_WG) noexcept;
-  /// Of a neighbour's object, heard `ahead` [s] before the present tick.
-  [[nodiscard]] Pose nextGoal(const HandPull& pull, double ahead) noexcept;
+  /// The hand pulls its object, by what was heard `ahead` [s] before the present tick.
+  void mirrorPull(const HandPull& pull, double ahead) noexcept;
+  void grasp(const HandPull& pull, const Pose& X_WG) noexcept;
+  void contribute(const HandPull& pull) noexcept;
+  /// The coupling is as far as the grip says the one that was listed.
+  void applyGrip(HandId hand) noexcept;
   [[nodiscard]] bool isNeighbours(ObjectId object) const noexcept;
   void setStiffness(HandId hand, const HandStiffness& stiffness) noexcept;
   void listContacts(const HandManifold& heard, std::uint32_t seq) noexcept;
@@ -118,12 +143,14 @@ class SceneCopy final : public ForceModel {
   std::vector<PredictedBody> bodies_;
   std::vector<std::uint32_t> body_of_;    ///< by object: index into bodies_, or their number
   std::vector<HandStiffness> stiffness_;  ///< by hand: that the copy has
-  std::vector<Neighbour> neighbours_;     ///< by hand
+  std::vector<OtherHand> others_;         ///< by hand
   std::vector<bool> collides_;            ///< by pair: in the server
   HandManifold contacts_;
   Tick heard_tick_ = 0;
-  std::int64_t behind_ = 0;  ///< [ticks] the heard tick less the input that it used
-  bool is_comparable_ = false;
+  double silence_ = 0.0;                ///< [s] since then
+  std::int64_t behind_ = 0;             ///< [ticks] the heard tick less the input that it used
+  std::array<Answered, 8> answered_{};  ///< by the last manifolds
+  std::size_t answers_ = 0;             ///< so far
   std::uint32_t heard_epoch_ = 0;
   HandId hand_;
   ObjectId object_;

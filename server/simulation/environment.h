@@ -166,6 +166,9 @@ class Environment {
   /// `hand` is present and holds `object` as it does there; the object's pose is discontinuous. Without
   /// contacts until it is outside of all others, as in the other Environment.
   void hold(HandId hand, ObjectId object, const Pose& X_HO, const Pose& X_WO) noexcept;
+  /// `hand` is present and pulls `object` from where that is, alone or beside others, without a jump and at
+  /// first without a force; also one that was frozen. A hidden object appears as by hold().
+  void grasp(HandId hand, ObjectId object, const Pose& X_HO) noexcept;
 
   /// One tick of kTickSeconds.
   void step() noexcept;
@@ -233,6 +236,7 @@ class Environment {
   void park(ObjectId object, ObjectStatus status) noexcept;
   void updateHolder(ObjectId object) noexcept;
   [[nodiscard]] bool isMovedByAnother(HandId hand) const noexcept;
+  void attachAt(HandId hand, ObjectId object, const Pose& X_HO, const Pose& X_WO) noexcept;
   void beginEpoch(ObjectId object) noexcept;
   void markDirty(ObjectId object) noexcept;
   // two hands on one object (environment_shared.cpp)

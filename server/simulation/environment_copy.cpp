@@ -31,6 +31,21 @@ void Environment::correct(ObjectId object, const Pose& X_WO, const Twist& V_WO) 
 
 void Environment::hold(HandId hand, ObjectId object, const Pose& X_HO, const Pose& X_WO) noexcept {
   if (!isHand(hand) || !isObject(object) || !X_HO.isFinite() || !X_WO.isFinite()) return;
+  attachAt(hand, object, X_HO, X_WO);
+  objects_[object.value].X_WO = X_WO;
+  objects_[object.value].emerging = true;
+  beginEpoch(object);
+}
+
+void Environment::grasp(HandId hand, ObjectId object, const Pose& X_HO) noexcept {
+  if (!isHand(hand) || !isObject(object) || !X_HO.isFinite()) return;
+  const Pose X_WO = objects_[object.value].X_WO;
+  if (objects_[object.value].status == ObjectStatus::kHidden) return hold(hand, object, X_HO, X_WO);
+  attachAt(hand, object, X_HO, X_WO);
+}
+
+/// The hand holds the object with X_HO, and would have it at X_WO.
+void Environment::attachAt(HandId hand, ObjectId object, const Pose& X_HO, const Pose& X_WO) noexcept {
   HandMotion& motion = hands_[hand.value];
   if (motion.object != object) detachHand(hand);
   motion.object = object;
@@ -39,12 +54,8 @@ void Environment::hold(HandId hand, ObjectId object, const Pose& X_HO, const Pos
   motion.X_HO = X_HO;
   motion.X_WH = motion.X_WH_before = X_WO * X_HO.inverse();
   motion.V_WH = Twist{};
-  ObjectMotion& held = objects_[object.value];
-  held.X_WO = X_WO;
-  held.status = ObjectStatus::kHeld;
-  held.emerging = true;
+  objects_[object.value].status = ObjectStatus::kHeld;
   updateHolder(object);
-  beginEpoch(object);
 }
 
 }  // namespace tenon::simulation

@@ -27,6 +27,21 @@ TEST(ClockOffset, IsUnknownBeforeAnAnswer) {
   EXPECT_TRUE(std::isinf(clock.error(0)));
 }
 
+TEST(ClockOffset, ALinkThatBecomesLongerIsKnownWithinSeconds) {
+  ClockOffset clock;
+  std::int64_t now = 7'000 * kMillisecond;
+  const auto exchange = [&](std::int64_t way) {
+    Link{0, way, way}.exchange(clock, now += 200 * kMillisecond);
+  };
+  for (int i = 0; i < 100; ++i) exchange(5 * kMillisecond);
+  for (std::uint64_t i = 0; i < ClockOffset::kTrips; ++i) {
+    EXPECT_NEAR(clock.roundTrip(), 0.01, 1e-9) << "it may be jitter";
+    exchange(30 * kMillisecond);
+  }
+  EXPECT_NEAR(clock.roundTrip(), 0.06, 1e-9);
+  EXPECT_NEAR(clock.offset(), 0.0, 1e-9);
+}
+
 TEST(ClockOffset, IsExactOnALinkThatIsAlikeBothWays) {
   ClockOffset clock;
   Link{-5'000 * kMillisecond, 50 * kMillisecond, 50 * kMillisecond}.exchange(clock, 7'000 * kMillisecond);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -11,6 +10,7 @@
 
 #include "clients/haptic/switch_slew.h"
 #include "idl/types/motion_law.h"
+#include "tests/clients/haptic/delayed_station.h"
 #include "tests/server/simulation/small_scene.h"
 #include "tests/support/realtime_guard.h"
 
@@ -19,120 +19,15 @@ namespace {
 
 using test::SmallScene;
 
-constexpr double kEdge = 0.04;         // [m] of block and part
-constexpr double kStiffness = 2000.0;  // [N/m]
-constexpr HandId kRight{0}, kLeft{1};
-constexpr ObjectId kBlock{0}, kPart{1}, kFloor{2};
-
-//   block (right)   part (left)
-//      [  ]  <->    [  ]          the hands' origins are at the centres
-//   ============== floor, top at z = 0
-std::shared_ptr<const simulation::Scene> blocks(double left_stiffness = kStiffness) {
-  SmallScene small;
-  const auto cube = test::boxShape(Vector3::Constant(kEdge));
-  small.object("block", cube, {0.0, 0.0, 0.2});
-  small.object("part", cube, {0.1, 0.0, 0.2});
-  small.object("floor", test::boxShape({0.5, 0.3, 0.04}), {0.0, 0.0, -0.02}, ObjectStatus::kFixed);
-  small.hand("right", kBlock);
-  small.hand("left", kPart);
-  small.pair(kBlock, kFloor);
-  small.pair(kBlock, kPart);
-  small.pair(kPart, kFloor);
-  auto scene = std::make_shared<simulation::Scene>(*small.build());
-  for (simulation::HandSpec& hand : scene->hands) hand.stiffness = kStiffness;
-  scene->hands[kLeft.value].stiffness = left_stiffness;
-  return scene;
-}
-
-/// A server, and the station of the right hand `delay` ticks away. The left hand is at the server.
-class DelayedStation {
- public:
-  explicit DelayedStation(Tick delay, std::shared_ptr<const simulation::Scene> scene = blocks())
-      : server_(scene, {}), copy(scene), delay_(delay) {
-    time_.setRoundTrip(2.0 * kTickSeconds * static_cast<double>(delay));
-    std::vector<SceneObject> objects(scene->objects.size());
-    for (std::uint32_t i = 0; i < objects.size(); ++i) {
-      objects[i].object = ObjectId{i};
-      if (scene->objects[i].structures) objects[i].size = scene->objects[i].structures->info.box_M.sizes();
-    }
-    world_.begin(objects, 0, 0);
-    for (std::uint32_t i = 0; i < scene->hands.size(); ++i) server_.setHandPresent(HandId{i}, true);
-  }
-
-  /// One millisecond with the device of the right hand at p_WH, and the left one at p_WLeft.
-  void tick(const Vector3& p_WH, const Vector3& p_WLeft) {
-    if (now_++ == 0) p_WLeft_ = p_WLeft;
-    for (; !frames_.empty() && frames_.front().tick + delay_ < now_; frames_.pop_front())
-      world_.receive(frames_.front());
-    for (; !manifolds_.empty() && manifolds_.front().tick + delay_ < now_; manifolds_.pop_front())
-      local.receive(manifolds_.front());
-    const auto seq = static_cast<std::uint32_t>(now_);
-    if (local.hasManifold()) time_.receive(local.manifold(), seq);
-    local.expectAt(time_.known() ? time_.tickOf(seq) : 0.0);
-    copy.step(Pose(p_WH), world_);
-    local.step(Pose(p_WH), world_);
-    if (local.hasManifold()) {
-      copy.compute(local.manifold(), seq, time_, Pose(p_WH), {}, world_, local.usable(world_));
-    }
-
-    inputs_.push_back({seq, p_WH});
-    for (; !inputs_.empty() && inputs_.front().seq + delay_ <= now_; inputs_.pop_front()) {
-      server_.setHandPose(kRight, Pose(inputs_.front().p_WH), {});
-      answered_ = inputs_.front().seq;
-    }
-    server_.setHandPose(kLeft, Pose(p_WLeft), {(p_WLeft - p_WLeft_) / kTickSeconds, Vector3::Zero()});
-    p_WLeft_ = p_WLeft;
-    server_.step();
-    send();
-  }
-
-  [[nodiscard]] simulation::Environment& server() { return server_; }
-  [[nodiscard]] const WorldView& world() const { return world_; }
-  /// [N] of the coupling without its damping.
-  [[nodiscard]] static Vector3 force(const LocalProxy& proxy, const Vector3& p_WH) {
-    return kStiffness * (proxy.X_WS.translation() - p_WH);
-  }
-
- private:
-  struct Input {
-    std::uint32_t seq = 0;
-    Vector3 p_WH;
-  };
-  void send() {
-    WorldFrame frame;
-    frame.tick = now_;
-    for (std::uint32_t i = 0; i < server_.objects().size(); ++i) {
-      const simulation::ObjectMotion& motion = server_.objects()[i];
-      ObjectState state{ObjectId{i}, motion.epoch, motion.X_WO};
-      state.V_WO << motion.V_WO.linear.cast<float>(), motion.V_WO.angular.cast<float>();
-      state.status = static_cast<std::uint8_t>(motion.status);
-      frame.states.push_back(state);
-    }
-    frames_.push_back(frame);
-    HandManifold manifold;
-    server_.manifold(kRight, manifold);
-    manifold.tick = now_;
-    manifold.answers_seq = answered_;
-    manifolds_.push_back(manifold);
-  }
-
-  simulation::Environment server_;
-  WorldView world_;
-  ServerTime time_;
-  std::deque<Input> inputs_;
-  std::deque<WorldFrame> frames_;
-  std::deque<HandManifold> manifolds_;
-  std::uint32_t answered_ = 0;
-  Tick now_ = 0;
-  Vector3 p_WLeft_ = Vector3::Zero();
-
- public:
-  SceneCopy copy;
-  LocalModel local;
-
- private:
-  Tick delay_;
-};
+using test::blocks;
+using test::DelayedStation;
+using test::kBlock;
+using test::kEdge;
+using test::kGround;
+using test::kLeft;
+using test::kPart;
+using test::kRight;
+using test::kStiffness;
 
 const Vector3 kAway(0.2, 0.0, 0.2);  // [m] for the left hand
 
@@ -250,9 +145,9 @@ std::shared_ptr<const simulation::Scene> freePart(bool floating) {
   small.spec(kPart).body->damping = 10.0;
   small.spec(kPart).body->friction = 0.3;
   small.hand("right", kBlock);
-  small.pair(kBlock, kFloor);
+  small.pair(kBlock, kGround);
   small.pair(kBlock, kPart);
-  small.pair(kPart, kFloor);
+  small.pair(kPart, kGround);
   auto scene = std::make_shared<simulation::Scene>(*small.build());
   scene->hands[0].stiffness = kStiffness;
   return scene;
@@ -402,6 +297,24 @@ TEST(ServerTime, TakesTheFastestAnswerAndHalfOfTheRoundTrip) {
   EXPECT_NEAR(time.tickOf(5000), 5100.0, 0.5);
   time.setRoundTrip(std::numeric_limits<double>::quiet_NaN());
   EXPECT_NEAR(time.tickOf(5000), 5090.0, 0.5);
+}
+
+TEST(ServerTime, OfALinkThatBecomesLongerOrShorterIsWithinItsBound) {
+  constexpr double kOffset = 100.0, kNear = 5.0, kFar = 30.0;  // [ticks]
+  constexpr std::uint32_t kLonger = 10'000, kShorter = 30'000;
+  constexpr std::uint32_t kTripKnown = 5000, kTripSeen = 1200;  // [ticks] after the change
+  ServerTime time;
+  time.setRoundTrip(2.0 * kNear * kTickSeconds);
+  for (std::uint32_t seq = 200; seq < 45'000; ++seq) {
+    const double way = seq >= kLonger && seq < kShorter ? kFar : kNear;
+    if (seq == kLonger + kTripKnown) time.setRoundTrip(2.0 * kFar * kTickSeconds);
+    if (seq == kShorter + kTripSeen) time.setRoundTrip(2.0 * kNear * kTickSeconds);
+    time.receive(answer(static_cast<Tick>(kOffset + seq - 1 - way), seq - 50), seq);
+    const double error = time.tickOf(seq) - (kOffset + seq);
+    const bool is_blind = seq >= kShorter && seq < kShorter + kTripSeen;
+    ASSERT_GE(error, -0.5) << seq;
+    ASSERT_LE(error, is_blind ? kFar - kNear + 0.5 : 0.5) << seq;
+  }
 }
 
 }  // namespace
