@@ -218,6 +218,7 @@ void FramePacker::pack(const TickOutput& output, bool all, std::vector<WorldFram
   if (poses_.size() != count) {
     poses_.assign(count, Pose::Identity());
     epochs_.assign(count, 0);
+    twists_.assign(count, decltype(ObjectState::V_WO)::Zero());
   }
   frames.clear();
   const auto add = [&](std::size_t i) {
@@ -231,9 +232,14 @@ void FramePacker::pack(const TickOutput& output, bool all, std::vector<WorldFram
     frames.back().states.push_back(output.objects[i]);
     poses_[i] = output.objects[i].X_WO;
     epochs_[i] = output.objects[i].epoch;
+    twists_[i] = output.objects[i].V_WO;
+  };
+  const auto isAsPacked = [&](std::size_t i) {
+    const ObjectState& now = output.objects[i];
+    return epochs_[i] == now.epoch && poses_[i] == now.X_WO && twists_[i] == now.V_WO;
   };
   for (std::size_t i = 0; i < count; ++i)
-    if (all || epochs_[i] != output.objects[i].epoch || !(poses_[i] == output.objects[i].X_WO)) add(i);
+    if (all || !isAsPacked(i)) add(i);
 
   bool refreshed = false;
   for (std::size_t k = 0; !all && !refreshed && k < count; ++k) {

@@ -64,9 +64,9 @@ class EventGenerator {
   std::uint64_t event_count_ = 0;
 };
 
-/// Packs objects into WorldFrames: first those that moved since they were packed last, then one of the
-/// others, round robin, so that every receiver is up to date after as many frames as there are objects,
-/// whatever was lost.
+/// Packs objects into WorldFrames: first those whose pose or velocity is another than when they were packed
+/// last, so that one that stops is told to stand; then one of the others, round robin, so that every receiver
+/// is up to date after as many frames as there are objects, whatever was lost.
 class FramePacker {
  public:
   explicit FramePacker(std::uint32_t server_epoch) : server_epoch_(server_epoch) {}
@@ -77,9 +77,10 @@ class FramePacker {
   [[nodiscard]] static bool contains(const std::vector<WorldFrame>& frames, ObjectId object);
 
   std::uint32_t server_epoch_;
-  std::vector<std::uint32_t> epochs_;  ///< index = ObjectId: as packed last
-  std::vector<Pose> poses_;            ///< index = ObjectId: X_WO as packed last
-  std::uint32_t refreshed_ = 0;        ///< index of the object refreshed last
+  std::vector<std::uint32_t> epochs_;                ///< index = ObjectId: as packed last
+  std::vector<Pose> poses_;                          ///< index = ObjectId: X_WO as packed last
+  std::vector<decltype(ObjectState::V_WO)> twists_;  ///< likewise V_WO
+  std::uint32_t refreshed_ = 0;                      ///< index of the object refreshed last
 };
 
 }  // namespace tenon::session

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "idl/types/messages/hands.h"
 #include "idl/types/resolution.h"
 
 namespace tenon::session {
@@ -65,7 +66,8 @@ const HandReading* ReadingPlayout::takeBetween(std::uint32_t period) noexcept {
   const std::uint32_t usual = period > 1 ? 3 * period : 1;  // [ticks] behind
   // an eighth faster: who is pushed by the hand feels little of it
   std::uint32_t step = ahead > usual && taken_.seq % 8 == 0 ? 2 : 1;
-  if (ahead > kMostPeriodsBehind * period) step = ahead - period;
+  if (ahead > kMostPeriodsBehind * period) step = 2;
+  if (ahead > std::max(kMostPeriodsBehind * period, kMostFreezeTicks)) step = ahead - period;
   const std::uint32_t seq = taken_.seq + step;
   std::size_t passed = 0;
   while (passed < waiting_.size() && !isBefore(seq, waiting_[passed].seq)) ++passed;

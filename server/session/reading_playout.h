@@ -29,8 +29,9 @@ class ReadingPlayout {
   /// Of a hand that sends a sample each `period` [ticks]: the reading of one tick after that of the last
   /// call, on the straight line between two samples. A sample that is late holds the hand at the newest one,
   /// and from then on it is so much farther behind. More than three periods behind it goes an eighth faster,
-  /// more than kMostPeriodsBehind at once to one period behind. So a link's jitter becomes a delay. With a
-  /// period of 1 the delay is worked off. Null: none.
+  /// more than kMostPeriodsBehind twice as fast; after a silence for which it was held still, at once to one
+  /// period behind. So a link's jitter becomes a delay. With a period of 1 the delay is worked off. Null:
+  /// none.
   const HandReading* takeBetween(std::uint32_t period) noexcept;
   /// [ticks] from the reading that was taken last to the newest that has come.
   [[nodiscard]] std::uint32_t behind() const noexcept;

@@ -308,6 +308,18 @@ TEST_F(FramePackerTest, ANewEpochCountsAsMovedEvenAtTheSamePose) {
   EXPECT_EQ(next(0).front(), 17U);
 }
 
+//   its pose is that of the frame before, which said that it moves
+TEST_F(FramePackerTest, AnObjectThatStopsIsToldToStand) {
+  (void)next(0);
+  output_.objects[17].X_WO.translation().z() = 1.0;
+  output_.objects[17].V_WO[2] = 0.1F;
+  EXPECT_EQ(next(0).front(), 17U);
+  output_.objects[17].V_WO.setZero();
+  EXPECT_EQ(next(0).front(), 17U);
+  EXPECT_TRUE(frames_[0].states[0].V_WO.isZero(0.0F));
+  EXPECT_EQ(next(0).size(), 1U) << "once";
+}
+
 TEST_F(FramePackerTest, AllPacksEveryObjectInEachTick) {
   for (int tick = 0; tick < 3; ++tick) EXPECT_EQ(countDistinct(next(2, true)), 30U);
 }

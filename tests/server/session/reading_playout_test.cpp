@@ -118,6 +118,25 @@ TEST(SparseInputsOfAHand, AreFollowedByEachTicksOwnWithoutAJump) {
   EXPECT_EQ(last, 300U) << "the delay is worked off";
 }
 
+//   a link with jitter that becomes near: 19 ticks behind and more, of which no tick takes two at once
+TEST(SparseInputsOfAHand, FarBehindAreCaughtUpWithByOneMoreTickATick) {
+  for (const std::uint32_t behind : {9U, 19U, 40U, kMostFreezeTicks}) {
+    ReadingPlayout playout;
+    playout.add(swinging(100));
+    ASSERT_NE(playout.takeBetween(5), nullptr);
+    std::uint32_t heard = 100 + behind - 1, last = 100;
+    for (int tick = 0; tick < 500; ++tick) {
+      playout.add(swinging(++heard));
+      const HandReading* const reading = playout.takeBetween(1);
+      ASSERT_NE(reading, nullptr);
+      ASSERT_GE(reading->seq - last, 1U) << behind;
+      ASSERT_LE(reading->seq - last, 2U) << behind;
+      last = reading->seq;
+    }
+    EXPECT_LE(heard - last, 1U) << behind;
+  }
+}
+
 TEST(SparseInputsOfAHand, AfterASilenceAreOnePeriodBehind) {
   ReadingPlayout playout;
   for (const std::uint32_t seq : {5U, 10U}) playout.add(swinging(seq));
