@@ -4,12 +4,22 @@ namespace tenon::haptic {
 
 Result<void> AnswerReaders::subscribe(bool slow) {
   wire::Inbox& inbox = link_.inbox();
-  auto subscribed = inbox.on<WorldFrame>(link_.member().session(),
-                                         slow ? wire::kWorldFrame100 : wire::kWorldFrame1k, callbacks_.frame);
+  heard_.assign(1 + link_.member().hands().size(), false);
+  slow_ = slow;
+  auto subscribed =
+      inbox.on<WorldFrame>(link_.member().session(), slow ? wire::kWorldFrame100 : wire::kWorldFrame1k,
+                           [this, slow](const WorldFrame& frame) {
+                             if (slow == slow_) heard_[0] = true;
+                             callbacks_.frame(frame);
+                           });
+  std::size_t index = 0;
   for (wire::Partition& hand : link_.member().hands()) {
     if (!subscribed) break;
-    subscribed =
-        inbox.on<HandManifold>(hand, slow ? wire::kHandManifold50 : wire::kHandManifold, callbacks_.manifold);
+    subscribed = inbox.on<HandManifold>(hand, slow ? wire::kHandManifold50 : wire::kHandManifold,
+                                        [this, slow, at = ++index](const HandManifold& manifold) {
+                                          if (slow == slow_) heard_[at] = true;
+                                          callbacks_.manifold(manifold);
+                                        });
   }
   return subscribed;
 }
@@ -22,14 +32,21 @@ void AnswerReaders::close(bool slow) {
 }
 
 Result<void> AnswerReaders::choose(bool slow) {
-  if (has_both_) {
+  if (has_both_ && slow != slow_) {  // the former ones hear
+    close(slow_);
+    slow_ = slow;
+    has_both_ = false;
+  } else if (has_both_ && (newestHear() || ++calls_ >= kMostCalls)) {
     close(!slow_);
     has_both_ = false;
-    return {};
   }
-  if (slow == slow_) return {};
-  if (auto subscribed = subscribe(slow); !subscribed) return subscribed;
-  slow_ = slow;
+  if (has_both_ || slow == slow_) return {};
+  calls_ = 0;
+  if (auto subscribed = subscribe(slow); !subscribed) {
+    close(slow);
+    slow_ = !slow;
+    return subscribed;
+  }
   has_both_ = true;
   return {};
 }

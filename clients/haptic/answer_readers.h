@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <functional>
+#include <vector>
 
 #include "clients/haptic/station_link.h"
 
@@ -23,18 +25,26 @@ class AnswerReaders {
   /// Those of each tick.
   [[nodiscard]] Result<void> open() { return subscribe(false); }
   /// Changes to those that are wanted; called about once a second. The new readers come first: the former
-  /// ones are closed by the next call, once the new ones have heard their server, so that no answer is
-  /// missing meanwhile.
+  /// ones are closed by a call after the new ones have heard frames and a manifold of each hand, so that no
+  /// answer is missing meanwhile; and after kMostCalls in any case, since an absent hand has no manifolds.
   [[nodiscard]] Result<void> choose(bool slow);
+
+  static constexpr int kMostCalls = 10;
 
  private:
   [[nodiscard]] Result<void> subscribe(bool slow);
+  /// The newest readers have heard all that they read.
+  [[nodiscard]] bool newestHear() const {
+    return std::find(heard_.begin(), heard_.end(), false) == heard_.end();
+  }
   void close(bool slow);
 
   StationLink& link_;
   Callbacks callbacks_;
-  bool slow_ = false;      ///< the newest readers
-  bool has_both_ = false;  ///< the former ones are still open
+  bool slow_ = false;        ///< the newest readers
+  bool has_both_ = false;    ///< the former ones are still open
+  int calls_ = 0;            ///< of choose() since then
+  std::vector<bool> heard_;  ///< by the newest readers: a frame, then a manifold of each hand
 };
 
 }  // namespace tenon::haptic

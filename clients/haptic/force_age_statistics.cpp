@@ -33,29 +33,41 @@ double DurationHistogram::quantile(double fraction) const noexcept {
   return count_ > 0 ? max() : 0.0;
 }
 
+void AnswerLoss::Row::add(Tick tick) noexcept {
+  if (count == 0) {
+    first = last = tick;
+  } else {
+    if (tick <= last) return;  // repeated or overtaken
+    step = step == 0 ? tick - last : std::min(step, tick - last);
+    last = tick;
+  }
+  ++count;
+}
+
+double AnswerLoss::Row::lost() const noexcept {
+  if (step == 0) return 0.0;
+  const auto sent = static_cast<double>((last - first) / step + 1);
+  return std::max(0.0, 1.0 - static_cast<double>(count) / sent);
+}
+
 void AnswerLoss::received(HandId hand, Tick tick) noexcept {
   const auto found = std::find_if(hands_.begin(), hands_.end(), [&](const Answers& answers) {
-    return answers.count == 0 || answers.hand == hand;
+    return answers.all.count == 0 || answers.hand == hand;
   });
   if (found == hands_.end()) return;
-  if (found->count == 0) *found = {hand, tick, tick, 0, 0};
-  if (found->count > 0) {
-    if (tick <= found->last) return;  // repeated or overtaken
-    const Tick step = tick - found->last;
-    found->step = found->step == 0 ? step : std::min(found->step, step);
-    found->last = tick;
-  }
-  ++found->count;
+  found->hand = hand;
+  found->all.add(tick);
+  if (tick % kSlowTicks == 0) found->in_turn.add(tick);
 }
 
 double AnswerLoss::share() const noexcept {
   double largest = 0.0;
   for (const Answers& answers : hands_) {
-    if (answers.step == 0) continue;
-    const auto sent = static_cast<double>((answers.last - answers.first) / answers.step + 1);
-    largest = std::max(largest, 1.0 - static_cast<double>(answers.count) / sent);
+    // of slow answers more than every third is in turn
+    const bool is_slow = 3 * answers.in_turn.count > answers.all.count;
+    largest = std::max(largest, (is_slow ? answers.in_turn : answers.all).lost());
   }
-  return std::max(0.0, largest);
+  return largest;
 }
 
 void ForceAgeStatistics::inputSent(std::uint32_t seq, std::int64_t now_ns, std::int64_t period_ns) noexcept {

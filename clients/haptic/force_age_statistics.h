@@ -42,11 +42,12 @@ class DurationHistogram {
 ///
 /// The answers of a hand have ticks in steps of one (of ten for a tracked limb, which the smallest step
 /// within the window tells). Answers that the server did not send, because a newer one was ready, count as
-/// lost.
+/// lost. Of slow answers those in turn count, each kSlowTicks; others come out of turn.
 ///
 /// Threads: one. Real-time: everything.
 class AnswerLoss {
  public:
+  static constexpr Tick kSlowTicks = 20;  ///< [ticks]
   void received(HandId hand, Tick tick) noexcept;
   /// [-] since clear(), of the hand that lost most; 0 when there were fewer than two answers.
   [[nodiscard]] double share() const noexcept;
@@ -54,11 +55,17 @@ class AnswerLoss {
 
  private:
   static constexpr std::size_t kHands = 8;
-  struct Answers {
-    HandId hand;
+  struct Row {
     Tick first = 0, last = 0;
     Tick step = 0;  // [ticks] smallest; 0: unknown
     std::uint64_t count = 0;
+
+    void add(Tick tick) noexcept;
+    [[nodiscard]] double lost() const noexcept;
+  };
+  struct Answers {
+    HandId hand;
+    Row all, in_turn;
   };
   std::array<Answers, kHands> hands_{};
 };

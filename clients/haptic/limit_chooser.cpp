@@ -11,6 +11,8 @@ constexpr double kStep = 10.0;       // [ticks] of a limit
 constexpr double kRare = 1e-6;       // [-] share of inputs that begin an expected gap
 constexpr double kLongestGap = 0.3;  // [s] a longer one is a partition, which says nothing of the link
 constexpr double kJitterOfWholeTicks = 0.002;  // [s] above it inputs come in no order that keeping back helps
+constexpr double kAnswersWeight = 0.1;         // [-] of a measurement in the mean loss of answers
+constexpr double kForgotten = 0.01;            // [-] of that in a second that tells nothing of it
 constexpr double kMostLoss = 0.2;  // [-] above it a second had an interruption, or keeping back helps no more
 
 /// [s] of inputs lost one after the other, as rarely as kRare.
@@ -31,7 +33,10 @@ std::uint32_t playoutFor(double lost, double trip_jitter) {
 }  // namespace
 
 LinkChoice LimitChooser::step(const LinkMeasurement& now) noexcept {
-  if (ignored_ == 0) last_[count_++ % kMemory] = now;
+  if (ignored_ == 0) {
+    last_[count_++ % kMemory] = now;
+    averageAnswers(now.answers_lost);
+  }
   if (ignored_ > 0) --ignored_;
   LinkMeasurement worst;
   double steady_loss = 0.0;  // [-] without interruptions
@@ -50,11 +55,20 @@ LinkChoice LimitChooser::step(const LinkMeasurement& now) noexcept {
   LinkChoice choice;
   choice.limits.freeze_ticks = std::clamp(static_cast<std::uint32_t>(wanted), kFreezeTicks, kMostFreezeTicks);
   choice.limits.park_ticks = kParkTicks + 10 * (choice.limits.freeze_ticks - kFreezeTicks);
-  choice.loss = steady_loss;
+  choice.loss = std::max(steady_loss, answers_lost_);
   choice.jitter = worst.age_jitter;
   // sparse inputs carry no earlier ones: the server fills what is between them
   choice.playout_ticks = now.input_period > 1 ? 0 : playoutFor(steady_loss, worst.trip_jitter);
   return choice;
+}
+
+/// `lost` [-], NaN: not known. What made a station hear at 1 kHz, where it is not known, is forgotten slowly.
+void LimitChooser::averageAnswers(double lost) noexcept {
+  if (lost >= 0.0 && lost <= kMostLoss) {
+    answers_lost_ += kAnswersWeight * (lost - answers_lost_);
+  } else {
+    answers_lost_ -= kForgotten * answers_lost_;
+  }
 }
 
 }  // namespace tenon::haptic

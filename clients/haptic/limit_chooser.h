@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "idl/types/messages/hands.h"
 
@@ -10,18 +11,19 @@ namespace tenon::haptic {
 
 /// What a station has measured of its link in the last second or so.
 struct LinkMeasurement {
-  double input_gap = 0.0;          ///< [s] longest time between two of its inputs at the server
-  double trip_jitter = 0.0;        ///< [s] of the round trip: 90th percentile less the shortest
-  double age_jitter = 0.0;         ///< [s] of the contacts: 99th percentile less the youngest
-  double inputs_lost = 0.0;        ///< [-]
+  double input_gap = 0.0;    ///< [s] longest time between two of its inputs at the server
+  double trip_jitter = 0.0;  ///< [s] of the round trip: 90th percentile less the shortest
+  double age_jitter = 0.0;   ///< [s] of the contacts: 99th percentile less the youngest
+  double inputs_lost = 0.0;  ///< [-]
+  /// [-] where answers are slow; NaN, not known, at 1 kHz, where those count that a newer one has overtaken
+  double answers_lost = std::numeric_limits<double>::quiet_NaN();
   std::uint32_t input_period = 1;  ///< [ticks] DeviceInput::period
 };
 
 /// What follows from the link for a station and its hands.
 struct LinkChoice {
   HandLimits limits;
-  /// [-] of inputs, in seconds without an interruption. Answers are taken to be lost alike: their own share
-  /// at 1 kHz counts those that a newer one has overtaken, of which a slower rate has none.
+  /// [-] of inputs or of answers, whichever is more, in seconds without an interruption
   double loss = 0.0;
   /// [s] age of contacts beyond the link's delay that is usual there
   double jitter = 0.0;
@@ -54,7 +56,11 @@ class LimitChooser {
 
  private:
   static constexpr unsigned kInterrupted = 2;  ///< [measurements] one may have been made before its end
+  /// `lost` [-] of the answers.
+  void averageAnswers(double lost) noexcept;
+
   std::array<LinkMeasurement, kMemory> last_{};
+  double answers_lost_ = 0.0;  // [-] in the mean: a second has few slow answers
   std::size_t count_ = 0;
   unsigned ignored_ = 0;  ///< [measurements] to come
 };

@@ -26,14 +26,16 @@ class RateChooser {
   static constexpr double kSlowAnswers = 0.020;  ///< [s] between two manifolds then
 
   /// `round_trip` [s]; 0: not known. `known_loss` [-] of messages; none: not known yet, and a tenth is
-  /// assumed.
-  void step(double round_trip, ForceModelKind kind, std::optional<double> known_loss) noexcept {
+  /// assumed. `jitter` [s] of the answers' age.
+  void step(double round_trip, ForceModelKind kind, std::optional<double> known_loss,
+            double jitter) noexcept {
     const double loss = known_loss.value_or(kAssumedLoss);
     if (round_trip > kFar) is_far_ = true;
     if (round_trip > 0.0 && round_trip < kNear) is_far_ = false;
     allowance_ = kSlowAnswers * (1.0 + lostInARow(loss));
     // what is lost in a row must not look like a gap, which takes the force away (AnswerAge)
-    const bool is_safe = allowance_ <= std::max(round_trip, AnswerAge::kLongestJitter) + kSlowAnswers;
+    const bool is_safe =
+        jitter + allowance_ <= std::max(round_trip, AnswerAge::kLongestJitter) + kSlowAnswers;
     slow_answers_ = is_safe && (is_far_ || kind == ForceModelKind::kSceneCopy);
   }
   /// Inputs and states are sparse.

@@ -1,6 +1,7 @@
 #include "clients/rehearse/measured_link.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace tenon::rehearse {
 
@@ -12,7 +13,7 @@ void MeasuredLink::deliver(Tick now, haptic::Station& station) {
   if (now % kPeriod != 0) return;
   measure(now);
   rates_.step(round_trip_, station.forceModel(),
-              clock_.lossKnown() ? std::optional(choice_.loss) : std::nullopt);
+              clock_.lossKnown() ? std::optional(choice_.loss) : std::nullopt, choice_.jitter);
   station.setLinkJitter(choice_.jitter + rates_.allowance());
   station.setLinkRoundTrip(round_trip_);
 }
@@ -25,6 +26,7 @@ void MeasuredLink::measure(Tick now) {
                            .trip_jitter = telemetry.trip_jitter,
                            .age_jitter = telemetry.jitter,
                            .inputs_lost = telemetry.inputs_lost,
+                           .answers_lost = rates_.slowAnswers() ? telemetry.answers_lost : std::nan(""),
                            .input_period = rates_.inputPeriod(1)});
   round_trip_ = telemetry.clock_known ? telemetry.round_trip : 0.0;
 }

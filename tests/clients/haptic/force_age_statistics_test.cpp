@@ -49,6 +49,16 @@ TEST(AnswerLoss, IsThatOfTheHandThatLostMost) {
   EXPECT_EQ(loss.share(), 0.0);
 }
 
+TEST(AnswerLoss, OfSlowAnswersIsThatOfThoseInTurn) {
+  AnswerLoss loss;
+  for (Tick tick = 1; tick <= 10'000; ++tick) {
+    const bool is_in_turn = tick % AnswerLoss::kSlowTicks == 0, is_lost = tick % 200 == 0;
+    const bool is_out_of_turn = tick % 40 == 3 || tick % 40 == 5;
+    if ((is_in_turn && !is_lost) || is_out_of_turn) loss.received(HandId{0}, tick);
+  }
+  EXPECT_NEAR(loss.share(), 0.1, 0.005);
+}
+
 //  input     1   2   3            each answered after 2 ms; the second answer to 2 is from the other hand
 //  answer            1   2 2 3
 TEST(ForceAgeStatistics, CountsTheTimeFromAnInputToItsFirstAnswerOnce) {

@@ -30,6 +30,24 @@ TEST(LimitChooser, ALinkThatBecomesWorseRaisesThemAtOnceAndOneThatRecoversLowers
   EXPECT_EQ(chooser.step(kQuiet).limits, HandLimits{});
 }
 
+TEST(LimitChooser, TheLossIsThatOfTheWorseDirectionAndThatOfAnswersIsForgottenSlowly) {
+  LimitChooser chooser;
+  LinkMeasurement now = kQuiet;
+  now.inputs_lost = 0.01;
+  EXPECT_DOUBLE_EQ(chooser.step(now).loss, 0.01) << "that of answers is not known";
+  // single seconds say little of a rate of 50 a second
+  for (int i = 0; i < 50; ++i) {
+    now.answers_lost = i % 2 == 0 ? 0.1 : 0.0;
+    EXPECT_LT(chooser.step(now).loss, 0.07);
+  }
+  EXPECT_NEAR(chooser.step(now).loss, 0.05, 0.01);
+  EXPECT_EQ(chooser.step(now).playout_ticks, 1U) << "inputs alone are kept back";
+  now.answers_lost = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_GT(chooser.step(now).loss, 0.03);
+  for (int i = 0; i < 300; ++i) static_cast<void>(chooser.step(now));
+  EXPECT_NEAR(chooser.step(now).loss, 0.01, 1e-12);
+}
+
 TEST(LimitChooser, NoLinkHoweverBadLeavesAHandUnfrozenForLongerThanTheBound) {
   LimitChooser chooser;
   const double kInfinite = std::numeric_limits<double>::infinity();

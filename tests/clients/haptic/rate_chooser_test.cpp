@@ -27,16 +27,17 @@ TEST(RateChooser, ALongLinkHasSparseInputsAndSlowAnswersACopySlowAnswersAlone) {
                                {0.016, kCopy, true, true},
                                {0.0, kListed, true, true},
                                {0.014, kListed, false, false}}) {
-    rates.step(second.round_trip, second.kind, 0.0);
+    rates.step(second.round_trip, second.kind, 0.0, 0.0);
     EXPECT_EQ(rates.isFar(), second.far) << second.round_trip;
     EXPECT_EQ(rates.slowAnswers(), second.slow) << second.round_trip;
   }
 }
 
-TEST(RateChooser, AnswersAreSlowOnlyWhereThoseLostInARowAreNoGap) {
+TEST(RateChooser, AnswersAreSlowOnlyWhereThoseLostInARowAndJitterAreNoGap) {
   struct Link {
     double round_trip, loss;
     bool slow;
+    double jitter = 0.0;  // [s]
   };
   for (const Link& link : {Link{0.010, 0.001, true},
                            {0.010, 0.02, true},
@@ -44,9 +45,13 @@ TEST(RateChooser, AnswersAreSlowOnlyWhereThoseLostInARowAreNoGap) {
                            {0.050, 0.02, true},
                            {0.050, 0.1, false},
                            {0.100, 0.1, true},
-                           {0.100, 0.2, true}}) {
+                           {0.100, 0.2, true},
+                           {0.010, 0.001, true, 0.005},
+                           {0.010, 0.02, true, 0.005},
+                           {0.010, 0.02, false, 0.015},
+                           {0.100, 0.1, false, 0.05}}) {
     RateChooser rates;
-    rates.step(link.round_trip, kCopy, link.loss);
+    rates.step(link.round_trip, kCopy, link.loss, link.jitter);
     EXPECT_EQ(rates.slowAnswers(), link.slow) << link.round_trip << " s, " << link.loss;
     EXPECT_EQ(rates.allowance() >= RateChooser::kSlowAnswers, link.slow);
   }
@@ -54,12 +59,12 @@ TEST(RateChooser, AnswersAreSlowOnlyWhereThoseLostInARowAreNoGap) {
 
 TEST(RateChooser, ATenthIsTakenToBeLostUntilTheLossIsKnown) {
   RateChooser rates;
-  rates.step(0.0, kCopy, std::nullopt);
+  rates.step(0.0, kCopy, std::nullopt, 0.0);
   EXPECT_FALSE(rates.isFar()) << "nothing is known yet";
-  rates.step(0.05, kCopy, std::nullopt);
+  rates.step(0.05, kCopy, std::nullopt, 0.0);
   EXPECT_TRUE(rates.isFar());
   EXPECT_FALSE(rates.slowAnswers());
-  rates.step(0.1, kCopy, std::nullopt);
+  rates.step(0.1, kCopy, std::nullopt, 0.0);
   EXPECT_TRUE(rates.slowAnswers());
 }
 
@@ -67,7 +72,7 @@ TEST(RateChooser, PeriodsAreBounded) {
   RateChooser rates;
   EXPECT_EQ(rates.inputPeriod(1), 1);
   EXPECT_EQ(rates.inputPeriod(4), 4);
-  rates.step(0.1, kListed, 0.0);
+  rates.step(0.1, kListed, 0.0, 0.0);
   EXPECT_EQ(rates.inputPeriod(1), 5);
   EXPECT_EQ(rates.inputPeriod(4), kMostInputPeriod);
   EXPECT_EQ(rates.inputPeriod(20), kMostInputPeriod);
@@ -101,7 +106,7 @@ TEST(InputPacer, SendsWhatIsDueEvenIfCyclesAreMissed) {
   auto sent = sentOfAThousand(rates);
   EXPECT_EQ(sent[0], 990U);
   EXPECT_NEAR(sent[1], 250U, 8);
-  rates.step(0.1, kListed, 0.0);
+  rates.step(0.1, kListed, 0.0, 0.0);
   sent = sentOfAThousand(rates);
   EXPECT_NEAR(sent[0], 200U, 4);
   EXPECT_NEAR(sent[1], 50U, 2);
