@@ -86,17 +86,20 @@ class RigRun {
     addCarrier([](const RigHand& carrier) { return carrier.intent; });
   }
 
-  /// Devices whose hands move on their given paths.
-  void addPaths() {
+  /// Devices whose hands move on their given paths, `early` [s] ahead.
+  void addPaths(double early) {
+    const auto earlier = [early](const HandPath& path) {
+      return [&path, early](double t) { return path(t + early); };
+    };
     for (const RigHand& hand : situation_.hands) {
-      auto device = std::make_unique<test::PathDevice>(deviceModel(1.0), hand.path);
+      auto device = std::make_unique<test::PathDevice>(deviceModel(1.0), earlier(hand.path));
       test::PathDevice* const path = device.get();
       add(hand, std::move(device), [](double) {});
       samplers_.push_back([path] {
         return RigSample{.p_DH = path->trueNow().translation(), .force = path->motorWrench().force};
       });
     }
-    addCarrier([](const RigHand& carrier) { return carrier.path; });
+    addCarrier([&](const RigHand& carrier) { return earlier(carrier.path); });
   }
 
   Result<std::vector<RigTrace>> run(double seconds) {
@@ -204,9 +207,10 @@ Result<std::vector<HeldContact>> hold(const RigSituation& situation, RigModel mo
 }
 
 Result<std::vector<RigSample>> follow(const RigSituation& situation, RigModel model,
-                                      const rehearse::LinkConditions& link, std::uint64_t seed) {
+                                      const rehearse::LinkConditions& link, std::uint64_t seed,
+                                      double early) {
   RigRun run(situation, model, link, seed);
-  run.addPaths();
+  run.addPaths(early);
   auto traces = run.run(kComparedUntil);
   if (!traces) return fail(traces.error().what);
   return std::move(traces->front());
@@ -219,20 +223,18 @@ double shareOf(int level) { return std::pow(2.0, -0.5 * level); }
 
 double fullStiffness() { return haptic::stiffnessOf(devices::sigma7Model().caps).translational; }
 
-Result<RigCell> StabilityRig::measure(const RigSituation& situation, RigModel model, Tick delay,
-                                      const RigLoss& loss) {
-  RigCell cell{.situation = situation.name, .model = model, .delay = delay, .loss = loss.name};
-  const rehearse::LinkConditions link{
-      .delay = delay, .jitter = loss.share > 0.0 ? delay / 10 : 0, .loss = loss.share, .burst = loss.burst};
-
-  // ---- the same path with and without the link
-  std::vector<Vector3>& reference = references_[situation.name];
+/// The same path with and without the link, at one phase of its turns; the worst of all stays in `cell`.
+Result<void> StabilityRig::compare(const RigSituation& situation, int phase,
+                                   const rehearse::LinkConditions& link, RigCell& cell) {
+  const double step = kSlowPeriod / situation.phases;
+  const double early = situation.phases > 1 ? phase * step + std::fmod(seed_ * kTickSeconds, step) : 0.0;
+  std::vector<Vector3>& reference = references_[{situation.name, phase}];
   if (reference.empty()) {
-    const auto direct = follow(situation, RigModel::kManifold, {}, seed_);
+    const auto direct = follow(situation, RigModel::kManifold, {}, seed_, early);
     if (!direct) return fail(direct.error().what);
     for (const RigSample& sample : *direct) reference.push_back(sample.force);
   }
-  const auto followed = follow(situation, model, link, seed_);
+  const auto followed = follow(situation, cell.model, link, seed_, early);
   if (!followed) return fail(followed.error().what);
   double errors = 0.0, squares = 0.0;
   for (std::size_t i = 0; i < followed->size(); ++i) {
@@ -240,11 +242,23 @@ Result<RigCell> StabilityRig::measure(const RigSituation& situation, RigModel mo
     if (sample.t < kPressed) continue;
     const double error = (sample.force - reference[i]).norm();
     cell.peak_error = std::max(cell.peak_error, error);
-    if (!situation.steady(sample.t)) continue;
+    if (!situation.steady(sample.t + early)) continue;
     errors += error * error;
     squares += reference[i].squaredNorm();
   }
-  cell.mean_error = std::sqrt(errors / squares);
+  cell.mean_error = std::max(cell.mean_error, std::sqrt(errors / squares));
+  return {};
+}
+
+Result<RigCell> StabilityRig::measure(const RigSituation& situation, RigModel model, Tick delay,
+                                      const RigLoss& loss) {
+  RigCell cell{.situation = situation.name, .model = model, .delay = delay, .loss = loss.name};
+  const rehearse::LinkConditions link{
+      .delay = delay, .jitter = loss.share > 0.0 ? delay / 10 : 0, .loss = loss.share, .burst = loss.burst};
+
+  for (int phase = 0; phase < situation.phases; ++phase)
+    if (const auto compared = compare(situation, phase, link, cell); !compared)
+      return fail(compared.error().what);
 
   // ---- an arm that presses
   cell.judged = situation.is_held;

@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "clients/rehearse/simulated_link.h"
@@ -36,7 +37,8 @@ struct RigCell {
   std::optional<double> stiffness;  ///< [N/m] largest that is stable; none of those that were tried
   bool judged = false;              ///< the situation has a held contact
 
-  // ---- the device moves on a given path: force beside that of the manifold model without delay
+  // ---- the device moves on a given path: force beside that of the manifold model without delay, at the
+  // worst of the situation's phases
   double mean_error = 0.0;  ///< [-] RMS of the difference while all moves steadily, per RMS of the force
   double peak_error = 0.0;  ///< [N] largest difference
 };
@@ -55,8 +57,12 @@ class StabilityRig {
                                         const RigLoss& loss);
 
  private:
+  [[nodiscard]] Result<void> compare(const RigSituation& situation, int phase,
+                                     const rehearse::LinkConditions& link, RigCell& cell);
+
   std::uint64_t seed_;
-  std::map<std::string, std::vector<Vector3>> references_;  ///< [N] forces without delay, by situation
+  std::map<std::pair<std::string, int>, std::vector<Vector3>>
+      references_;  ///< [N] forces without delay, by situation and phase
 };
 
 }  // namespace tenon::bench

@@ -22,6 +22,7 @@ constexpr double kReversal = 0.05;   // [s] that its reversals take
 constexpr double kMovesFrom = 2.7;   // [s]
 constexpr double kMovesUntil = 3.7;  // [s] in the held contact: then it stands still
 constexpr double kSettling = 0.2;    // [s] after a reversal until motion counts as steady
+constexpr int kTurnPhases = 5;       // of turns in the period of slow answers
 
 /// [-] From 0 at `from` to 1 at `to`, without a jerk.
 double ease(double t, double from, double to) {
@@ -71,6 +72,9 @@ bool strokeIsSteady(double t) {
   const double since = std::fmod(t - kMovesFrom + 0.5 * half, half);
   return t > kMovesFrom + 0.5 * half && since > kSettling + kReversal;
 }
+
+/// Along y, as strokeAt().
+Vector3 carriedTo(double t, double until) { return {0.0, strokeAt(t, until), 0.0}; }
 
 std::string fixedBox(const char* name, const Vector3& size, const Vector3& at) {
   return fmt::format(
@@ -187,6 +191,7 @@ RigSituation movingPart() {
                  [=](double t) { return Pose(press(t).translation() + partAt(t)); }, path}},
       .carrier = RigHand{"left", Vector3::Zero(), [=](double t) { return Pose(partAt(t)); },
                          [=](double t) { return Pose(always(t)); }},
+      .phases = kTurnPhases,
       .steady = strokeIsSteady};
   return situation;
 }
@@ -195,13 +200,16 @@ std::string movingObjects() {
          movedBox("part", {kBlock, 0.1, 0.1}, {-0.3, 0.0, 0.0}, kPointer);
 }
 
-//    left -> |  part  | <- right       both hold it, in free air
+//    left -> |  part  | <- right       both hold it, in free air, and carry it to and fro across that
 RigSituation twoPeople() {
   const auto towards = [](double sign) {
+    const HandPath press = pressing(sign * Vector3::UnitX(), 0.0);
     return std::pair<HandPath, HandPath>{
-        pressing(sign * Vector3::UnitX(), 0.0), [=](double t) {
+        [=](double t) { return Pose(Vector3(press(t).translation() + carriedTo(t, kMovesUntil))); },
+        [=](double t) {
           const double s = ease(t, kPressAt, kPressed);
-          return Pose(Vector3(-sign * s * kDepth * (1.0 + 0.5 * wave(t, 1.0)), 0.0, 0.0));
+          const Vector3 squeeze(-sign * s * kDepth * (1.0 + 0.5 * wave(t, 1.0)), 0.0, 0.0);
+          return Pose(Vector3(squeeze + carriedTo(t, kHeldUntil)));
         }};
   };
   const auto [right, right_path] = towards(1.0);
@@ -209,7 +217,9 @@ RigSituation twoPeople() {
   return {.name = "two_people",
           .title = "two people on one part",
           .hands = {{"right", Vector3(0.05, 0.0, 0.0), right, right_path},
-                    {"left", Vector3(-0.05, 0.0, 0.0), left, left_path}}};
+                    {"left", Vector3(-0.05, 0.0, 0.0), left, left_path}},
+          .phases = kTurnPhases,
+          .steady = strokeIsSteady};
 }
 std::string sharedObjects() {
   return movedBox("part", {0.1, 0.06, 0.06}, {0.0, 0.0, 0.0}, "") +

@@ -23,6 +23,8 @@ inline constexpr double kHeldFrom = 4.3;  // [s] begin of the two seconds that j
 inline constexpr double kHeldUntil = 6.3;
 inline constexpr double kComparedUntil = 4.8;  // [s] forces are compared from kPressed to here
 
+inline constexpr double kSlowPeriod = 0.02;  ///< [s] of slow answers
+
 /// A hand of a situation. Frame D is the world's, with its origin at p_WD.
 struct RigHand {
   std::string name;
@@ -40,6 +42,9 @@ struct RigSituation {
   std::vector<RigHand> hands;      ///< each at a station of its own, with a device and a link
   std::optional<RigHand> carrier;  ///< carries a part along `path`, as if nothing could stop it
   bool is_held = true;             ///< there is a held contact whose stability can be judged
+  /// Forces are compared with the paths so often, each time later by a part of kSlowPeriod: what turns does
+  /// it between two slow answers at any time, and the worst counts.
+  int phases = 1;
   /// Whether what the hand meets has moved steadily for long enough at a time [s], for the mean error.
   std::function<bool(double)> steady;
 };

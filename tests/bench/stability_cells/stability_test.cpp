@@ -11,7 +11,7 @@
 #include "tests/bench/stability/stability_result.h"
 #include "tests/support/known_shortfall.h"
 
-// Sixteen cells of `tenon bench stability`, with what must be true of each.
+// Eighteen cells of `tenon bench stability`, with what must be true of each.
 
 namespace tenon::bench {
 namespace {
@@ -108,6 +108,16 @@ TEST(Stability, TwoPeopleFeelEachOtherAlike) {
   const RigCell cell = cellOf("two_people", RigModel::kManifold, 1, "0");
   EXPECT_EQ(cell.stiffness, fullStiffness());
   EXPECT_NEAR(cell.other_share, 1.0, 0.3);
+}
+
+//   they carry it, and what each is told of the other comes 50 times a second
+TEST(Stability, TwoPeopleWithCopiesCarryAPartAtWhatTheirLinksLeaveOfTheStiffness) {
+  for (const Tick delay : {5, 25}) {
+    const RigCell cell = cellOf("two_people", RigModel::kSceneCopy, delay, "0");
+    EXPECT_EQ(cell.stiffness, fullStiffness()) << delay;
+    EXPECT_NEAR(cell.other_share, 1.0, 0.3) << delay;
+    EXPECT_LT(cell.ripple, 0.02) << delay;
+  }
 }
 
 TEST(Stability, EqualSeedsGiveEqualNumbers) {
