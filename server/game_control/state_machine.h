@@ -45,7 +45,7 @@ struct StepStatus {
 /// A state that ends stays current for one tick as kDone, kSkipped or kTimedOut before the next begins, so
 /// each has a revision that tells how it ended. Skipping a state puts its object to its target (fixed where
 /// the state snaps, else if it is a free body), because the next states build on it. Time is counted in calls
-/// of step(): while the session is paused nothing times out.
+/// of step(), which in a pause come with commands alone: nothing times out meanwhile.
 ///
 /// Threads: one caller, the tick. Real-time: start, step, status, addTo.
 class StateMachine {
@@ -67,6 +67,8 @@ class StateMachine {
   /// those from the target on as not visited.
   std::size_t step(simulation::Environment& environment, std::span<const GameCommand> commands) noexcept;
 
+  /// A state has ended, and the next step() begins the one that follows it.
+  [[nodiscard]] bool betweenStates() const noexcept;
   [[nodiscard]] const StepStatus& status() const { return memory_.status; }
   [[nodiscard]] const ScenarioFile& scenario() const { return *scenario_; }
 
@@ -105,7 +107,6 @@ class StateMachine {
   /// The rest of it: the timers of `regrabs` after the first.
   template <typename Visitor>
   static void visitOtherRegrabs(Memory& memory, Visitor&& visit);
-  [[nodiscard]] bool betweenStates() const noexcept;
 
   void enter(simulation::Environment& environment, std::uint32_t step) noexcept;
   void leave(simulation::Environment& environment, StepPhase phase) noexcept;

@@ -1,20 +1,18 @@
 #include "server/session/command_gate.h"
 
-#include <fmt/format.h>
-
 namespace tenon::session {
 
-void CommandGate::update(RunPhase phase, bool emergency_stop) {
+void CommandGate::update(RunPhase phase) {
   phase_ = phase;
   const bool active = phase == RunPhase::kRunning || phase == RunPhase::kPaused;
   if (pending_phase_ == phase || !active) pending_phase_.reset();
-  if (expectedPhase() != RunPhase::kPaused && !emergency_stop) deferred_ = 0;
 }
 
 tl::expected<void, Refused> CommandGate::check(CommandKind kind) const {
   const bool in_any_phase = kind == CommandKind::kRelease || kind == CommandKind::kSetCollision ||
                             kind == CommandKind::kStop || kind == CommandKind::kClearEmergencyStop ||
                             kind == CommandKind::kFreezeForces;
+  const bool is_of_run = kind == CommandKind::kPause || kind == CommandKind::kResume;
   if (isOver(phase_)) return refuse(Refusal::kOver, "the run is over");
   if (in_any_phase) return {};
   if (phase_ == RunPhase::kWaitingForPeople)
@@ -24,15 +22,12 @@ tl::expected<void, Refused> CommandGate::check(CommandKind kind) const {
     return refuse(Refusal::kAlready, "the session is not paused");
   if (kind == CommandKind::kPause && is_paused)
     return refuse(Refusal::kAlready, "the session is paused already");
-  if (kind != CommandKind::kResume && kind != CommandKind::kPause && deferred_ >= kMaxChanges)
-    return refuse(Refusal::kTooMany,
-                  fmt::format("{} commands wait already until the session continues", deferred_));
+  if (is_stop_engaged_ && !is_of_run)
+    return refuse(Refusal::kOther, "the emergency stop stands: clear it first");
   return {};
 }
 
 void CommandGate::accept(ChangeKind change) {
-  const bool is_suspended = expectedPhase() == RunPhase::kPaused || is_stop_engaged_;
-  if (change == ChangeKind::kGameCommand && is_suspended) ++deferred_;
   if (change == ChangeKind::kPause) pending_phase_ = RunPhase::kPaused;
   if (change == ChangeKind::kResume) pending_phase_ = RunPhase::kRunning;
   end_requested_ = end_requested_ || change == ChangeKind::kStop;

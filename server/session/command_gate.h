@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <optional>
 
 #include "idl/types/messages/commands.h"
@@ -11,16 +10,15 @@
 namespace tenon::session {
 
 /// Whether a command takes effect in the phase of the run that it will meet: the one after all commands that
-/// were accepted before it, of which the last ones wait for their tick. A command is accepted only if it will
-/// take effect.
+/// were accepted before it, of which the last ones wait for their tick. A command is accepted only if it
+/// takes effect with the next ticks: in a pause it changes the scene at once, and during an emergency stop
+/// the scene stays as it is.
 ///
 /// Threads: one (wire). Real-time: no.
 class CommandGate {
  public:
-  /// Of the session of a killed server: `deferred` of its commands wait until the session continues.
-  void resume(std::size_t deferred) { deferred_ = deferred; }
-  /// Phase and emergency stop after the last tick.
-  void update(RunPhase phase, bool emergency_stop);
+  /// Phase after the last tick.
+  void update(RunPhase phase);
   /// Why the command cannot take effect, for any role.
   [[nodiscard]] tl::expected<void, Refused> check(CommandKind kind) const;
   /// The change of a command is on its way to the simulation.
@@ -43,7 +41,6 @@ class CommandGate {
   std::optional<RunPhase> pending_phase_;  ///< of an accepted pause or resume that no tick has applied yet
   bool is_stop_engaged_ = false;           ///< emergency stop
   bool end_requested_ = false;
-  std::size_t deferred_ = 0;  ///< accepted game commands that take effect when the session continues
 };
 
 }  // namespace tenon::session

@@ -204,7 +204,7 @@ void ServerWire::forwardChanges() {
 void ServerWire::update(const TickOutput& output) {
   now_ = output.tick;
   reception_->setTick(now_);
-  registry_.updatePhase(output.phase, output.emergency_stop);
+  registry_.updatePhase(output.phase);
   sendGuidance(output);
 }
 

@@ -29,9 +29,8 @@ SessionRegistry::SessionRegistry(const game_control::ScenarioFile& scenario, std
       round_trips_(scenario.hands.size()),
       mentoring_(scenario, server_epoch) {}
 
-void SessionRegistry::resume(const std::vector<KeptSeat>& seats, std::size_t deferred) {
+void SessionRegistry::resume(const std::vector<KeptSeat>& seats) {
   changes_.push_back({.kind = ChangeKind::kContinue});
-  gate_.resume(deferred);
   for (const KeptSeat& kept : seats) {
     clients_.push_back({kept.client, kept.name, kept.role, {}, false});
     Seat& seat = seats_.emplace_back();

@@ -47,8 +47,8 @@ class SessionRegistry {
   SessionRegistry(const game_control::ScenarioFile& scenario, std::uint32_t server_epoch, bool lockstep);
 
   /// Takes the place of the registry of a killed server, before anybody joins: seats are as they were, with
-  /// nobody on them, and no client controls a hand. `deferred`: SessionSimulation::deferredCommands.
-  void resume(const std::vector<KeptSeat>& seats, std::size_t deferred);
+  /// nobody on them, and no client controls a hand.
+  void resume(const std::vector<KeptSeat>& seats);
   [[nodiscard]] std::vector<KeptSeat> seatsToKeep() const;
 
   /// Whether roles that need no key by the table need it nevertheless.
@@ -85,8 +85,8 @@ class SessionRegistry {
   }
   /// Who was removed by commands since the last call, and is still there.
   [[nodiscard]] std::vector<ClientId> takeKicked();
-  /// Phase and emergency stop after the last tick.
-  void updatePhase(RunPhase phase, bool emergency_stop) { gate_.update(phase, emergency_stop); }
+  /// Phase after the last tick.
+  void updatePhase(RunPhase phase) { gate_.update(phase); }
   /// Frees the client's hands. Its seat stays and can be taken again with its key. Unknown ids are ignored.
   void leave(ClientId client);
   /// A raise stands; of several the first one stops the simulation.

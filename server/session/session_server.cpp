@@ -205,7 +205,7 @@ Result<void> Server::resume(const LoadedScene& loaded) {
   if (!seats) print(seats.error().what);
   for (std::uint32_t i = 0; i < loaded.scenario->hands.size(); ++i)
     if (simulation_.isAttached(HandId{i})) returning_.push_back(HandId{i});
-  registry_.resume(seats ? *seats : std::vector<KeptSeat>{}, simulation_.deferredCommands());
+  registry_.resume(seats ? *seats : std::vector<KeptSeat>{});
   publisher_.eventGenerator().resume(point->tick);
   resumed_after_ = point->tick;
   return {};

@@ -9,6 +9,9 @@
 namespace tenon::session {
 namespace {
 
+/// Without an input for longer, a hand is told to others as one that stands.
+constexpr Tick kLateTicks = 5;  // [ticks]
+
 /// [points] of ChangeKind::kBudget; 0, no limit, for NaN and numbers below 1.
 std::uint64_t budgetPoints(double value) {
   constexpr double kMaxPoints = 1e15;
@@ -38,12 +41,12 @@ void SessionSimulation::tick(const TickInput& input) noexcept {
   for (const Change& change : input.changes)
     if (change.kind == ChangeKind::kTake) take(change.hand, change.object);
   applyAgeLimits();
-  if (phase_ == RunPhase::kRunning && !emergency_stop_) {
+  if (stepsGoOn()) {
     dropFirstCommands(machine_.step(environment_, {commands_.begin(), commands_.size()}));
     if (machine_.status().finished) phase_ = RunPhase::kSucceeded;
     if (machine_.status().failed) phase_ = RunPhase::kFailed;
   }
-  // commands received during a pause or emergency stop are deferred to its end
+  // what reached the run before an emergency stop waits for its end
   if (!isSuspended() && phase_ != RunPhase::kRunning) commands_.clear();
   startWhenHandsPresent();
   environment_.setFreeBodiesPaused(isStill());
@@ -253,6 +256,9 @@ void SessionSimulation::fill(TickOutput& output) const noexcept {
     if (!output.present[i]) continue;
     HandManifold& manifold = output.manifolds[i];
     environment_.manifold(HandId{i}, manifold);
+    // the goal of a hand whose inputs do not come stands still: it is not expected to go on
+    for (HandPull& pull : manifold.others)
+      if (pull.hand.value < ages_.size() && ages_[pull.hand.value].age > kLateTicks) pull.V_WG.setZero();
     manifold.tick = output.tick;
     manifold.answers_seq = ages_[i].seq;
     manifold.step_revision = output.step.revision;

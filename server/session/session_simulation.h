@@ -35,7 +35,8 @@ class SessionSimulation {
                     std::shared_ptr<const simulation::Scene> scene, const SessionSimulationOptions& options);
 
   /// One tick (1 ms): applies changes and device samples, freezes or parks hands by the age of their input,
-  /// steps the state machine, then the environment. Ids out of range in `input` are ignored.
+  /// steps the state machine, then the environment. In a pause the state machine steps for commands alone.
+  /// Ids out of range in `input` are ignored.
   void tick(const TickInput& input) noexcept;
 
   /// An output sized for this scene.
@@ -48,11 +49,9 @@ class SessionSimulation {
   [[nodiscard]] bool emergencyStop() const { return emergency_stop_; }
   /// Whether a client controls the hand.
   [[nodiscard]] bool isAttached(HandId hand) const { return ages_[hand.value].attached; }
-  /// Game commands that wait for the end of a pause or an emergency stop.
-  [[nodiscard]] std::size_t deferredCommands() const { return isSuspended() ? commands_.size() : 0; }
   /// Succeeded, failed or stopped.
   [[nodiscard]] bool over() const { return phase_ >= RunPhase::kSucceeded; }
-  /// Of environment, state machine, input ages, phase, emergency stop and deferred commands.
+  /// Of environment, state machine, input ages, phase, emergency stop and waiting commands.
   [[nodiscard]] std::uint64_t hash() const noexcept;
   [[nodiscard]] const simulation::Environment& environment() const { return environment_; }
   [[nodiscard]] const game_control::StepStatus& step() const { return machine_.status(); }
@@ -104,6 +103,11 @@ class SessionSimulation {
   [[nodiscard]] bool isSuspended() const { return emergency_stop_ || phase_ == RunPhase::kPaused; }
   /// Likewise, whether or not steps go on.
   [[nodiscard]] bool isStill() const { return isSuspended() || forces_frozen_; }
+  /// In a pause nothing goes on by itself, and commands change the scene at once.
+  [[nodiscard]] bool stepsGoOn() const {
+    const bool is_changed = phase_ == RunPhase::kPaused && (!commands_.empty() || machine_.betweenStates());
+    return !emergency_stop_ && (phase_ == RunPhase::kRunning || is_changed);
+  }
   void take(HandId hand, ObjectId object) noexcept;
   void attach(HandId hand, const HandStiffness& stiffness) noexcept;
   void detach(HandId hand) noexcept;
@@ -121,8 +125,8 @@ class SessionSimulation {
 
   static constexpr std::size_t kMaxCommands = 256;  ///< that wait; as many changes wait for ticks
 
-  /// Commands for the next steps of the state machine: those deferred by pause or emergency stop or by one
-  /// before them, and those of this tick.
+  /// Commands for the next steps of the state machine: those that wait for the end of an emergency stop or of
+  /// one before them, and those of this tick.
   FixedVector<game_control::GameCommand, kMaxCommands> commands_;
   RunPhase phase_ = RunPhase::kWaitingForPeople;
   bool emergency_stop_ = false;

@@ -34,9 +34,10 @@ class Commands(unittest.TestCase):
             self.assert_refused(stage, "ask the instructor", "resume", "--role", "trainee")
             self.assert_refused(stage, "no signal 'trumpet'", "signal", "trumpet")
             self.assert_accepted(stage, "fulfilled", "--role", "trainee")
-            self.assert_accepted(stage, "resume", "--role", "admin")
             self.assert_accepted(stage, "skip")
-            server.wait_for("step skipped", 30)
+            server.wait_for("step skipped", 30)  # at once
+            self.assertNotIn("command line: resume", server.text())
+            self.assert_accepted(stage, "resume", "--role", "admin")
             self.assert_accepted(stage, "stop")
             server.wait_for("run: stopped", 30)
             self.assertEqual(server.wait(30), 1)
@@ -81,6 +82,8 @@ class Commands(unittest.TestCase):
             trainee.wait_for("emergency stop by .*a test", 30)
             server.wait_for("run: emergency stop", 30)
             self.assert_refused(stage, "ask the instructor", "clear", "--role", "trainee")
+            for words in (["skip"], ["goto", "2"], ["reset"], ["repeat"], ["give", "peg", "right"]):
+                self.assert_refused(stage, "the emergency stop stands: clear it first", *words)
             self.assert_accepted(stage, "clear")
             trainee.wait_for("emergency stop cleared", 30)
             server.wait_for("run: paused", 30)

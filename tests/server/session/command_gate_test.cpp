@@ -13,9 +13,9 @@ Refusal refusalOf(const CommandGate& gate, CommandKind kind) {
   return possible ? Refusal::kNone : possible.error().why;
 }
 
-CommandGate gateIn(RunPhase phase, bool emergency_stop = false) {
+CommandGate gateIn(RunPhase phase) {
   CommandGate gate;
-  gate.update(phase, emergency_stop);
+  gate.update(phase);
   return gate;
 }
 
@@ -53,12 +53,12 @@ TEST(CommandGateTest, ACommandIsJudgedByThoseThatWereAcceptedBeforeIt) {
   EXPECT_EQ(refusalOf(gate, CommandKind::kPause), Refusal::kAlready);
   EXPECT_EQ(refusalOf(gate, CommandKind::kResume), Refusal::kNone);
   EXPECT_EQ(gate.phase(), RunPhase::kRunning) << "no tick has applied it yet";
-  gate.update(RunPhase::kRunning, false);
+  gate.update(RunPhase::kRunning);
   EXPECT_EQ(refusalOf(gate, CommandKind::kPause), Refusal::kAlready) << "of a tick before it";
-  gate.update(RunPhase::kPaused, false);
+  gate.update(RunPhase::kPaused);
   gate.accept(ChangeKind::kResume);
   EXPECT_EQ(refusalOf(gate, CommandKind::kResume), Refusal::kAlready);
-  gate.update(RunPhase::kSucceeded, false);
+  gate.update(RunPhase::kSucceeded);
   EXPECT_EQ(refusalOf(gate, CommandKind::kPause), Refusal::kOver);
 }
 
@@ -79,35 +79,23 @@ TEST(CommandGateTest, AClearedStopLeavesARunPausedAndOneThatWaitsWaiting) {
   }
 }
 
-TEST(CommandGateTest, AsManyCommandsWaitForTheEndOfAPauseOrAStopAsATickTakes) {
-  const auto fill = [](CommandGate& gate) {
-    for (std::size_t i = 0; i < kMaxChanges; ++i) {
-      EXPECT_EQ(refusalOf(gate, CommandKind::kFulfilled), Refusal::kNone);
-      gate.accept(ChangeKind::kGameCommand);
+TEST(CommandGateTest, DuringAnEmergencyStopWhatChangesTheSceneIsRefused) {
+  for (const RunPhase phase : {RunPhase::kRunning, RunPhase::kPaused}) {
+    CommandGate gate = gateIn(phase);
+    gate.engageStop();
+    for (const CommandKind kind : {CommandKind::kReset, CommandKind::kSkipStep, CommandKind::kGoToStep,
+                                   CommandKind::kBack, CommandKind::kRepeatStep, CommandKind::kHandOver,
+                                   CommandKind::kSwapHands, CommandKind::kFulfilled, CommandKind::kSignal}) {
+      const auto possible = gate.check(kind);
+      ASSERT_FALSE(possible) << static_cast<int>(kind);
+      EXPECT_EQ(possible.error().what, "the emergency stop stands: clear it first");
     }
-  };
-  CommandGate running = gateIn(RunPhase::kRunning);
-  fill(running);
-  EXPECT_EQ(refusalOf(running, CommandKind::kFulfilled), Refusal::kNone) << "each tick takes them";
-
-  CommandGate paused = gateIn(RunPhase::kPaused);
-  fill(paused);
-  EXPECT_EQ(refusalOf(paused, CommandKind::kFulfilled), Refusal::kTooMany);
-  EXPECT_EQ(refusalOf(paused, CommandKind::kResume), Refusal::kNone) << "the way out is open";
-  paused.update(RunPhase::kPaused, false);
-  EXPECT_EQ(refusalOf(paused, CommandKind::kFulfilled), Refusal::kTooMany);
-  paused.update(RunPhase::kRunning, false);
-  EXPECT_EQ(refusalOf(paused, CommandKind::kFulfilled), Refusal::kNone) << "the session continues";
-
-  CommandGate stopped = gateIn(RunPhase::kRunning);
-  stopped.engageStop();
-  fill(stopped);
-  stopped.update(RunPhase::kRunning, true);
-  EXPECT_EQ(refusalOf(stopped, CommandKind::kFulfilled), Refusal::kTooMany);
-
-  CommandGate resumed = gateIn(RunPhase::kPaused);
-  resumed.resume(kMaxChanges);
-  EXPECT_EQ(refusalOf(resumed, CommandKind::kFulfilled), Refusal::kTooMany) << "of the killed server";
+    for (const CommandKind kind : {CommandKind::kClearEmergencyStop, CommandKind::kFreezeForces,
+                                   CommandKind::kRelease, CommandKind::kSetCollision, CommandKind::kStop})
+      EXPECT_EQ(refusalOf(gate, kind), Refusal::kNone) << static_cast<int>(kind);
+    gate.clearStop();
+    EXPECT_EQ(refusalOf(gate, CommandKind::kGoToStep), Refusal::kNone) << "the run is paused";
+  }
 }
 
 TEST(CommandGateTest, AnEndStaysRequested) {

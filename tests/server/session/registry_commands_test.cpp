@@ -10,7 +10,7 @@ using ::testing::IsEmpty;
 class RegistryCommands : public RegistrySession {};
 
 TEST_F(RegistryCommands, AClearedEmergencyStopLeavesTheRunPaused) {
-  registry_.updatePhase(RunPhase::kRunning, false);
+  registry_.updatePhase(RunPhase::kRunning);
   const ClientId instructor = join("b", Role::kInstructor).client;
   EXPECT_THAT(command(instructor, CommandKind::kClearEmergencyStop).reason, HasSubstr("no emergency stop"));
   registry_.engageEmergencyStop();
@@ -26,11 +26,11 @@ TEST_F(RegistryCommands, AClearedEmergencyStopLeavesTheRunPaused) {
 TEST_F(RegistryCommands, ARepeatedCommandGetsTheFormerAckAndIsNotAppliedAgain) {
   const Welcome welcome = join("b", Role::kInstructor);
   const ClientId instructor = welcome.client;
-  registry_.updatePhase(RunPhase::kRunning, false);
+  registry_.updatePhase(RunPhase::kRunning);
   const Command pause{instructor, 7, CommandKind::kPause};
   EXPECT_EQ(registry_.previousAck(pause), nullptr);
   EXPECT_TRUE(registry_.handleCommand(pause).accepted);
-  registry_.updatePhase(RunPhase::kPaused, false);
+  registry_.updatePhase(RunPhase::kPaused);
   ASSERT_NE(registry_.previousAck(pause), nullptr);
   EXPECT_TRUE(registry_.previousAck(pause)->accepted) << "although a new command would be refused now";
   EXPECT_EQ(registry_.previousAck({instructor, 8, CommandKind::kPause}), nullptr);
@@ -42,21 +42,21 @@ TEST_F(RegistryCommands, ARepeatedCommandGetsTheFormerAckAndIsNotAppliedAgain) {
 
 TEST_F(RegistryCommands, CommandsBetweenTwoTicksAreJudgedByThePendingPhase) {
   const ClientId instructor = join("b", Role::kInstructor).client;
-  registry_.updatePhase(RunPhase::kRunning, false);
+  registry_.updatePhase(RunPhase::kRunning);
   EXPECT_TRUE(command(instructor, CommandKind::kPause).accepted);
-  registry_.updatePhase(RunPhase::kRunning, false);  // of a tick that was computed before
+  registry_.updatePhase(RunPhase::kRunning);  // of a tick that was computed before
   EXPECT_THAT(command(instructor, CommandKind::kPause).reason, HasSubstr("paused already"));
   EXPECT_TRUE(command(instructor, CommandKind::kResume).accepted);
   EXPECT_THAT(command(instructor, CommandKind::kResume).reason, HasSubstr("not paused"));
-  registry_.updatePhase(RunPhase::kPaused, false);
-  registry_.updatePhase(RunPhase::kRunning, false);
+  registry_.updatePhase(RunPhase::kPaused);
+  registry_.updatePhase(RunPhase::kRunning);
   EXPECT_TRUE(command(instructor, CommandKind::kPause).accepted);
-  registry_.updatePhase(RunPhase::kStopped, false);
+  registry_.updatePhase(RunPhase::kStopped);
   EXPECT_THAT(command(instructor, CommandKind::kResume).reason, HasSubstr("over"));
 }
 
 TEST_F(RegistryCommands, CommandsArePermittedByRole) {
-  registry_.updatePhase(RunPhase::kRunning, false);
+  registry_.updatePhase(RunPhase::kRunning);
   const ClientId trainee = join("a", Role::kTrainee, {"right"}).client;
   const ClientId instructor = join("b", Role::kInstructor).client;
   const ClientId observer = join("c", Role::kObserver).client;
@@ -68,7 +68,7 @@ TEST_F(RegistryCommands, CommandsArePermittedByRole) {
   for (const CommandKind kind : {CommandKind::kPause, CommandKind::kResume, CommandKind::kReset,
                                  CommandKind::kSkipStep, CommandKind::kStop, CommandKind::kSetCollision}) {
     EXPECT_THAT(command(trainee, kind, "part bay").reason, HasSubstr("ask the instructor"));
-    registry_.updatePhase(kind == CommandKind::kResume ? RunPhase::kPaused : RunPhase::kRunning, false);
+    registry_.updatePhase(kind == CommandKind::kResume ? RunPhase::kPaused : RunPhase::kRunning);
     EXPECT_TRUE(command(instructor, kind, "part bay").accepted);
   }
   EXPECT_EQ(changes().size(), 6U);
@@ -81,7 +81,7 @@ TEST_F(RegistryCommands, CommandsArePermittedByRole) {
 }
 
 TEST_F(RegistryCommands, StepsAreNamedByNameOrNumber) {
-  registry_.updatePhase(RunPhase::kRunning, false);
+  registry_.updatePhase(RunPhase::kRunning);
   const ClientId instructor = join("b", Role::kInstructor).client;
   (void)changes();
   for (const std::string text : {"2", "mount"})
@@ -92,7 +92,7 @@ TEST_F(RegistryCommands, StepsAreNamedByNameOrNumber) {
 }
 
 TEST_F(RegistryCommands, AnObjectIsHandedToAHandThatSomebodyMoves) {
-  registry_.updatePhase(RunPhase::kRunning, false);
+  registry_.updatePhase(RunPhase::kRunning);
   const ClientId instructor = join("b", Role::kInstructor).client;
   const auto reason = [&](const std::string& text) {
     return command(instructor, CommandKind::kHandOver, text).reason;
@@ -114,7 +114,7 @@ TEST_F(RegistryCommands, ATrackedHandIsHandedNothing) {
                                   .join({.client_guid = "b", .role = Role::kInstructor, .seat_key = "seat"},
                                         {.seat = true, .key = true}, 5)
                                   .client;
-  registry.updatePhase(RunPhase::kRunning, false);
+  registry.updatePhase(RunPhase::kRunning);
   EXPECT_THAT(registry.handleCommand({instructor, 1, CommandKind::kHandOver, {}, "part left"}).reason,
               HasSubstr("hand 'left' is tracked"));
 }
@@ -123,7 +123,7 @@ TEST_F(RegistryCommands, ARefusalHasAKindForDisplays) {
   const ClientId instructor = join("b", Role::kInstructor).client;
   const ClientId trainee = join("a", Role::kTrainee).client;
   EXPECT_EQ(command(instructor, CommandKind::kSkipStep).refusal, Refusal::kWaiting);
-  registry_.updatePhase(RunPhase::kRunning, false);
+  registry_.updatePhase(RunPhase::kRunning);
   EXPECT_EQ(command(ClientId{}, CommandKind::kSkipStep).refusal, Refusal::kNotJoined);
   EXPECT_EQ(command(trainee, CommandKind::kSkipStep).refusal, Refusal::kNotPermitted);
   EXPECT_EQ(command(instructor, CommandKind::kResume).refusal, Refusal::kAlready);
@@ -131,7 +131,7 @@ TEST_F(RegistryCommands, ARefusalHasAKindForDisplays) {
   EXPECT_EQ(command(instructor, CommandKind::kHandOver, "part right").refusal, Refusal::kNobodyThere);
   EXPECT_EQ(command(instructor, CommandKind::kHandOver, "bay right").refusal, Refusal::kNotHoldable);
   EXPECT_EQ(command(instructor, CommandKind::kSkipStep).refusal, Refusal::kNone);
-  registry_.updatePhase(RunPhase::kSucceeded, false);
+  registry_.updatePhase(RunPhase::kSucceeded);
   EXPECT_EQ(command(instructor, CommandKind::kSkipStep).refusal, Refusal::kOver);
 }
 
@@ -146,7 +146,7 @@ TEST_F(RegistryCommands, FrozenForcesAreAChange) {
 }
 
 TEST_F(RegistryCommands, ANoteChangesNothing) {
-  registry_.updatePhase(RunPhase::kRunning, false);
+  registry_.updatePhase(RunPhase::kRunning);
   const ClientId trainee = join("a", Role::kTrainee, {"right"}).client;
   const ClientId observer = join("c", Role::kObserver).client;
   (void)changes();
@@ -159,7 +159,7 @@ TEST_F(RegistryCommands, ANoteChangesNothing) {
 // it would be in the next checkpoint, which no reader takes
 
 TEST_F(RegistryCommands, ACommandWithAValueThatIsNotFiniteIsRefused) {
-  registry_.updatePhase(RunPhase::kRunning, false);
+  registry_.updatePhase(RunPhase::kRunning);
   const ClientId instructor = join("a", Role::kInstructor).client;
   (void)changes();
   const CommandAck ack = registry_.handleCommand(
@@ -170,7 +170,7 @@ TEST_F(RegistryCommands, ACommandWithAValueThatIsNotFiniteIsRefused) {
 }
 
 TEST_F(RegistryCommands, NamesInCommandsAreResolvedToIndices) {
-  registry_.updatePhase(RunPhase::kRunning, false);
+  registry_.updatePhase(RunPhase::kRunning);
   const ClientId instructor = join("a", Role::kInstructor).client;
   EXPECT_THAT(command(instructor, CommandKind::kSignal, "whistle").reason, HasSubstr("'whistle'"));
   EXPECT_TRUE(command(instructor, CommandKind::kSignal, "bell").accepted);
@@ -190,7 +190,7 @@ TEST_F(RegistryCommands, NamesInCommandsAreResolvedToIndices) {
 }
 
 TEST_F(RegistryCommands, AClientReleasesAndSwapsOnlyHandsItControls) {
-  registry_.updatePhase(RunPhase::kRunning, false);
+  registry_.updatePhase(RunPhase::kRunning);
   const ClientId one = join("a", Role::kTrainee, {"right"}).client;
   const ClientId other = join("b", Role::kTrainee, {"left"}).client;
   const ClientId instructor = join("c", Role::kInstructor, {"instructor"}).client;
@@ -217,25 +217,26 @@ TEST_F(RegistryCommands, CommandsThatCannotTakeEffectNowAreRefusedWithAReason) {
   EXPECT_THAT(command(instructor, CommandKind::kSignal, "bell").reason, HasSubstr("waits for people"));
   EXPECT_TRUE(changes().empty());
 
-  registry_.updatePhase(RunPhase::kRunning, false);
+  registry_.updatePhase(RunPhase::kRunning);
   EXPECT_THAT(answer(CommandKind::kResume), HasSubstr("not paused"));
   EXPECT_THAT(answer(CommandKind::kPause), IsEmpty());
-  registry_.updatePhase(RunPhase::kPaused, false);
+  registry_.updatePhase(RunPhase::kPaused);
   EXPECT_THAT(answer(CommandKind::kPause), HasSubstr("paused already"));
   EXPECT_THAT(answer(CommandKind::kResume), IsEmpty());
-  registry_.updatePhase(RunPhase::kSucceeded, false);
+  registry_.updatePhase(RunPhase::kSucceeded);
   EXPECT_THAT(answer(CommandKind::kReset), HasSubstr("over"));
 }
 
-TEST_F(RegistryCommands, DeferredCommandsAreLimitedToTheCapacityOfATick) {
+TEST_F(RegistryCommands, WhatChangesTheSceneIsRefusedWhileAStopStandsAndTakenInThePauseAfterIt) {
   const ClientId instructor = join("t", Role::kInstructor).client;
-  registry_.updatePhase(RunPhase::kPaused, false);
-  for (std::size_t i = 0; i < kMaxChanges; ++i)
-    EXPECT_TRUE(command(instructor, CommandKind::kFulfilled).accepted) << i;
-  EXPECT_THAT(command(instructor, CommandKind::kFulfilled).reason, HasSubstr("wait already"));
-  EXPECT_TRUE(command(instructor, CommandKind::kResume).accepted);
-  registry_.updatePhase(RunPhase::kRunning, false);
-  EXPECT_TRUE(command(instructor, CommandKind::kFulfilled).accepted);
+  registry_.updatePhase(RunPhase::kRunning);
+  registry_.engageEmergencyStop();
+  EXPECT_THAT(command(instructor, CommandKind::kGoToStep, "1").reason, HasSubstr("clear it first"));
+  EXPECT_THAT(command(instructor, CommandKind::kReset).reason, HasSubstr("clear it first"));
+  EXPECT_TRUE(command(instructor, CommandKind::kNote, "a note").accepted);
+  EXPECT_TRUE(command(instructor, CommandKind::kFreezeForces, {}, 1.0).accepted);
+  EXPECT_TRUE(command(instructor, CommandKind::kClearEmergencyStop).accepted);
+  EXPECT_TRUE(command(instructor, CommandKind::kGoToStep, "1").accepted);
 }
 
 // nothing takes changes while a session waits for people

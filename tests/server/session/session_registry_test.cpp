@@ -229,7 +229,7 @@ TEST_F(SessionRegistryTest, AStationChoosesTheLimitsOfItsOwnHandsWithinTheBounds
 }
 
 TEST_F(SessionRegistryTest, WhoIsRemovedLeavesAndDoesNotGetTheSeatAgain) {
-  registry_.updatePhase(RunPhase::kRunning, false);
+  registry_.updatePhase(RunPhase::kRunning);
   const ClientId instructor = join("b", Role::kInstructor).client;
   const ClientId trainee = join("a", Role::kTrainee, {"right"}).client;
   (void)changes();
@@ -252,7 +252,7 @@ TEST_F(SessionRegistryTest, WhoIsRemovedLeavesAndDoesNotGetTheSeatAgain) {
 }
 
 TEST_F(SessionRegistryTest, WhoIsAwayIsRemovedTooAndDoesNotComeBack) {
-  registry_.updatePhase(RunPhase::kRunning, false);
+  registry_.updatePhase(RunPhase::kRunning);
   const ClientId instructor = join("b", Role::kInstructor).client;
   const ClientId away = join("a", Role::kObserver).client;
   registry_.leave(away);

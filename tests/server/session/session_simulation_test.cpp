@@ -72,6 +72,30 @@ TEST(SessionSimulation, AHandWithoutInputIsFrozenThenParkedAndReturns) {
   EXPECT_NEAR(rig.object("pointer").X_WO.translation().x(), 0.3, 1e-3);
 }
 
+TEST(SessionSimulation, AHandWhoseInputsDoNotComeIsToldToOthersToStand) {
+  test::SessionRig rig;
+  rig.attach(test::kRightHand, kFreeSpace);
+  rig.attach(test::kLeftHand, kFreeSpace + Vector3(0.06, 0.0, 0.0));
+  rig.reading(test::kLeftHand).V_WH.linear.x() = 0.1;
+  rig.tick(5);
+  const auto told = [&] {
+    const auto& others = rig.output().manifolds[test::kRightHand.value].others;
+    return others.size() == 1 && others[0].hand == test::kLeftHand ? others[0].V_WG[0] : -1.0F;
+  };
+  EXPECT_FLOAT_EQ(told(), 0.1F);
+  rig.loseLink(test::kLeftHand);
+  rig.tick(5);
+  EXPECT_FLOAT_EQ(told(), 0.1F) << "a few are lost";
+  rig.tick();
+  EXPECT_EQ(told(), 0.0F);
+  EXPECT_FALSE(rig.hand(test::kLeftHand).frozen);
+  rig.reading(test::kLeftHand) = {.hand = test::kLeftHand,
+                                  .X_WH = Pose(kFreeSpace + Vector3(0.06, 0.0, 0.0)),
+                                  .V_WH = {Vector3(0.05, 0.0, 0.0), Vector3::Zero()}};
+  rig.tick();
+  EXPECT_FLOAT_EQ(told(), 0.05F);
+}
+
 Change limitsOf(HandId hand, std::uint32_t freeze, std::uint32_t park) {
   return {.kind = ChangeKind::kSetLimits, .hand = hand, .index = freeze, .lifetime_ticks = park};
 }
@@ -271,19 +295,30 @@ TEST(SessionSimulation, APauseFreezesHandsAndSuspendsTimeouts) {
   EXPECT_TRUE(rig.simulation().over());
 }
 
-TEST(SessionSimulation, CommandsOfAPauseTakeEffectInTheirOrder) {
+TEST(SessionSimulation, CommandsOfAPauseActAtOnceAndInTheirOrder) {
   test::SessionRig rig;
+  rig.attach(test::kRightHand, kFreeSpace);
   rig.tick();
   rig.change({.kind = ChangeKind::kPause});
   rig.tick();
   rig.change(game(CommandKind::kSkipStep));
+  rig.change(game(CommandKind::kRepeatStep));
   rig.tick();
-  rig.change(game(CommandKind::kSkipStep));
+  EXPECT_EQ(rig.output().step.phase, StepPhase::kSkipped);
+  rig.tick(2);
+  EXPECT_EQ(rig.output().phase, RunPhase::kPaused);
+  EXPECT_EQ(rig.output().step.step, 1U) << "the repetition is of the step after the skipped one";
+  EXPECT_EQ(rig.output().step.phase, StepPhase::kActive);
+  EXPECT_TRUE(rig.hand(test::kRightHand).frozen);
+  rig.change(game(CommandKind::kReset));
   rig.tick();
-  EXPECT_EQ(rig.output().step.skipped, 0U);
+  EXPECT_EQ(rig.output().step.step, 0U);
+  EXPECT_EQ(rig.output().step.phase, StepPhase::kActive);
+  const std::uint32_t revision = rig.output().step.revision;
   rig.change({.kind = ChangeKind::kResume});
   rig.tick(3);
-  EXPECT_EQ(rig.output().step.skipped, 2U) << "each skip skips a step";
+  EXPECT_EQ(rig.output().phase, RunPhase::kRunning);
+  EXPECT_EQ(rig.output().step.revision, revision) << "nothing has waited for the end of the pause";
 }
 
 TEST(SessionSimulation, PauseAndResumeHaveNoEffectInOtherPhases) {
@@ -379,22 +414,23 @@ TEST(SessionSimulation, ContinuesFromACheckpointWithEqualHashes) {
   }
 }
 
-TEST(SessionSimulation, ACheckpointKeepsDeferredCommands) {
+// it reached the run before the stop, which goes before all that waits
+TEST(SessionSimulation, ACheckpointKeepsACommandThatAStopHasOvertaken) {
   test::SessionRig rig;
-  rig.change({.kind = ChangeKind::kPause});
   rig.tick();
-  rig.change({.kind = ChangeKind::kPause});
+  rig.change({.kind = ChangeKind::kSetEmergencyStop, .value = 1.0});
   rig.change(game(CommandKind::kSkipStep));
-  rig.tick();  // running since the first tick, paused since the second
-  ASSERT_EQ(rig.output().phase, RunPhase::kPaused);
+  rig.tick(2);
+  ASSERT_EQ(rig.output().step.skipped, 0U);
   std::vector<std::uint8_t> saved;
   rig.simulation().save(saved);
   SessionSimulation again = test::SessionRig::makeSimulation(rig.loaded());
   ASSERT_TRUE(again.restore(saved));
   EXPECT_EQ(again.hash(), rig.simulation().hash());
-  TickInput resume{.tick = 3};
-  resume.changes.push_back({.kind = ChangeKind::kResume});
-  again.tick(resume);
+  TickInput clear{.tick = 4};
+  clear.changes.push_back({.kind = ChangeKind::kPause});
+  clear.changes.push_back({.kind = ChangeKind::kSetEmergencyStop, .value = 0.0});
+  again.tick(clear);
   EXPECT_EQ(again.step().phase, StepPhase::kSkipped);
 }
 
@@ -481,18 +517,18 @@ TEST(SessionSimulation, RefusesACheckpointWithANumberThatIsNotFinite) {
   test::SessionRig rig(1, {});
   rig.attach(test::kRightHand, kFreeSpace);
   rig.tick(5);
-  rig.change({.kind = ChangeKind::kPause});
+  rig.change({.kind = ChangeKind::kSetEmergencyStop, .value = 1.0});
   rig.tick();
-  Change deferred = game(CommandKind::kSkipStep);
-  deferred.game.value = 1234.5;
-  rig.change(deferred);
+  Change waiting = game(CommandKind::kSkipStep);
+  waiting.game.value = 1234.5;
+  rig.change(waiting);
   rig.tick();
   std::vector<std::uint8_t> saved;
   rig.simulation().save(saved);
 
-  // the value of the deferred command, all numbers of the environment, then (it ends the checkpoint) of the
+  // the value of the command that waits, all numbers of the environment, then (it ends the checkpoint) of the
   // state machine
-  const auto* value = reinterpret_cast<const std::uint8_t*>(&deferred.game.value);
+  const auto* value = reinterpret_cast<const std::uint8_t*>(&waiting.game.value);
   std::vector<std::size_t> doubles{positionOf({value, value + sizeof(double)}, saved)};
   const simulation::Environment& environment = rig.simulation().environment();
   const std::size_t environment_at = positionOf(environment.save(), saved);
