@@ -16,6 +16,7 @@
 #include "idl/types/number_range.h"
 #include "idl/types/output_files.h"
 #include "idl/wire/identity.h"
+#include "idl/wire/key_option.h"
 #include "idl/wire/network.h"
 #include "idl/wire/session_name.h"
 #include "server/check/check.h"
@@ -89,18 +90,19 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
       ->check(tenon::numberFrom(0.0, 1.0))
       ->default_str("0.7");
   app.add_option("--journal", arguments.session.journal,
-                 "record the inputs of each tick, and a checkpoint a second, in this file");
+                 "record the inputs of each tick, and a checkpoint a second, in this file")
+      ->check(tenon::wire::namesNoFile);
   CLI::Option* const journal = app.get_option("--journal");
   app.add_option(
          "--resume", arguments.resume,
          "take up the session of a killed server where its journal ends, and continue that file: same step, "
          "same seats, what hands held is parked until they are back; --detail is that of the journal")
       ->excludes(journal)
-      ->check([](const std::string& file) { return std::string(file.empty() ? "names no file" : ""); });
+      ->check(tenon::wire::namesNoFile);
   app.add_flag("--overwrite", arguments.overwrite, tenon::kOverwriteHelp);
   app.add_flag("--allow-skips", arguments.allow_skips, "exit 0 although steps were skipped");
-  app.add_option(
-      "--key", arguments.key_file,
+  tenon::wire::addKeyOption(
+      app, arguments.key_file,
       "file of the key that admins and instructors need; made when it does not exist (default: one "
       "in your runtime folder, which your own programs find)");
   app.add_flag("--lockstep", arguments.session.lockstep,
@@ -109,13 +111,14 @@ void declareOptions(CLI::App& app, ServeArguments& arguments) {
          "--resimulate", arguments.resimulate,
          "simulate a journal or recording again and compare the state hash after every tick; opens no "
          "session")
+      ->check(tenon::wire::namesNoFile)
       ->excludes("--resume");
   app.add_flag("--despite-changes", arguments.despite_changes,
                "re-simulate although scenario or structures have changed since the recording, to see where "
                "it differs");
   app.footer(
-      "Exit code: 0 when every step was done (or all hashes of the re-simulation were equal), 1 "
-      "otherwise; 2 for wrong usage.");
+      "Exit code: 0 when every step was done (or all hashes of the re-simulation were equal and no tick is "
+      "missing), 1 otherwise; 2 for wrong usage.");
 }
 
 void printLine(const std::string& text) {
@@ -177,7 +180,7 @@ int resimulateFile(const ServeArguments& arguments, const tenon::session::Loaded
     return 1;
   }
   printLine(fmt::format("final state hash: {:016x}", report->final_hash));
-  return report->gaps.empty() ? 0 : 1;
+  return report->gaps.empty() && !report->is_damaged ? 0 : 1;
 }
 
 /// Checks before anything is baked what the scenario's text suffices for; the exit code, 0 for none.

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -29,11 +30,42 @@ class MappedFile {
 /// Whether a file begins as MCAP files do.
 [[nodiscard]] bool beginsWithMagic(std::span<const std::uint8_t> bytes);
 
-/// Takes the next record from `rest`; false at the end or when the record is incomplete.
+/// Takes the next record from `rest`; false at the end or when the record is incomplete or none.
 bool takeRecord(std::span<const std::uint8_t>& rest, std::uint8_t& opcode,
                 std::span<const std::uint8_t>& fields);
 
 /// Replaces `plain` by the records of a chunk. What is wrong with it, as in "is damaged"; empty: nothing.
 [[nodiscard]] std::string openChunk(std::span<const std::uint8_t> fields, std::vector<std::uint8_t>& plain);
+
+/// A part of a file that cannot be read, with chunks after it.
+struct UnreadablePart {
+  std::size_t begin = 0, end = 0;  ///< [bytes] of the file
+};
+
+/// Follows the records of a file in their order. Where there is none although chunks follow, it goes on with
+/// the first of them: after damage nothing is lost that can be read.
+///
+/// Threads: one at a time. Real-time: no.
+class RecordSequence {
+ public:
+  /// `file` begins with the magic, and must outlive this.
+  explicit RecordSequence(std::span<const std::uint8_t> file);
+
+  /// The next record; false at the end.
+  bool next(std::uint8_t& opcode, std::span<const std::uint8_t>& fields);
+  [[nodiscard]] std::size_t begin() const { return begin_; }  ///< [bytes] of the record
+  [[nodiscard]] std::size_t end() const { return end_; }      ///< [bytes] likewise
+  /// The first one so far; none: all was read.
+  [[nodiscard]] const std::optional<UnreadablePart>& unreadable() const { return unreadable_; }
+
+ private:
+  bool skipDamage();
+
+  std::span<const std::uint8_t> file_;
+  std::size_t begin_ = 0;  ///< [bytes]
+  std::size_t end_;        ///< [bytes]
+  std::size_t chunk_ = 0;  ///< [bytes] begin of the last chunk
+  std::optional<UnreadablePart> unreadable_;
+};
 
 }  // namespace tenon::record::mcap

@@ -24,6 +24,7 @@ struct McapReader::Impl {
   mcap::MappedFile mapped;
   std::string name;
   bool complete = false;
+  bool is_damaged = false;
   bool summary_valid = true;
   std::string problem;
   std::vector<ChunkLocation> chunks;
@@ -39,7 +40,7 @@ struct McapReader::Impl {
   std::vector<std::uint8_t> decompressed;
   std::span<const std::uint8_t> rest;
 
-  void scan(std::span<const std::uint8_t> bytes);
+  void scan(std::span<const std::uint8_t> file);
   void checkSummary(std::span<const std::uint8_t> summary);
   void readDefinition(std::uint8_t opcode, std::span<const std::uint8_t> fields);
   void readTopLevel(std::uint8_t opcode, std::span<const std::uint8_t> fields);
@@ -51,6 +52,10 @@ struct McapReader::Impl {
   }
   void reportProblem(const std::string& what) {
     if (problem.empty()) problem = name + ": " + what;
+  }
+  void reportDamage(const std::string& what) {
+    is_damaged = true;
+    reportProblem(what);
   }
 };
 
@@ -66,6 +71,7 @@ std::int64_t McapReader::lastTime() const {
   return last == chunks.rend() ? 0 : last->last_time;
 }
 bool McapReader::complete() const { return impl_->complete; }
+bool McapReader::isDamaged() const { return impl_->is_damaged; }
 const std::string& McapReader::problem() const { return impl_->problem; }
 const std::vector<McapChannel>& McapReader::channels() const { return impl_->channels; }
 const std::vector<McapAttachment>& McapReader::attachments() const { return impl_->attachments; }
@@ -79,7 +85,7 @@ Result<McapReader> McapReader::open(const std::filesystem::path& file) {
   const auto bytes = impl->mapped.map(file);
   if (!bytes) return fail(bytes.error().what);
   if (!mcap::beginsWithMagic(*bytes)) return fail(file.string() + ": is not a recording (no MCAP file)");
-  impl->scan(bytes->subspan(sizeof(mcap::kMagic)));
+  impl->scan(*bytes);
 
   // without a summary the channels are those that the chunks define
   if (!impl->complete || !impl->summary_valid) {
@@ -97,16 +103,20 @@ Result<McapReader> McapReader::open(const std::filesystem::path& file) {
   return McapReader(std::move(impl));
 }
 
-void McapReader::Impl::scan(std::span<const std::uint8_t> bytes) {
-  std::uint8_t opcode = 0;
-  std::span<const std::uint8_t> fields, summary;
-  while (takeRecord(bytes, opcode, fields)) {
+void McapReader::Impl::scan(std::span<const std::uint8_t> file) {
+  mcap::RecordSequence records(file);
+  std::span<const std::uint8_t> fields;
+  std::size_t summary = 0;  // [bytes] where it begins; 0: there is none
+  for (std::uint8_t opcode = 0; records.next(opcode, fields);) {
+    if (const auto& part = records.unreadable(); part && !is_damaged)
+      reportDamage("is damaged between bytes " + std::to_string(part->begin) + " and " +
+                   std::to_string(part->end) + ": read without them");
     readTopLevel(opcode, fields);
-    if (opcode == mcap::kDataEnd) summary = bytes;
+    if (opcode == mcap::kDataEnd) summary = records.end();
     if (opcode != mcap::kFooter) continue;
-    complete =
-        bytes.size() == sizeof(mcap::kMagic) && std::memcmp(bytes.data(), mcap::kMagic, bytes.size()) == 0;
-    checkSummary(summary.first(summary.empty() ? 0 : summary.size() - bytes.size()));
+    const auto rest = file.subspan(records.end());
+    complete = rest.size() == sizeof(mcap::kMagic) && mcap::beginsWithMagic(rest);
+    checkSummary(file.subspan(summary, summary == 0 ? 0 : records.end() - summary));
     return;
   }
 }
@@ -117,7 +127,7 @@ void McapReader::Impl::checkSummary(std::span<const std::uint8_t> summary) {
     std::memcpy(&crc, summary.data() + summary.size() - sizeof(crc), sizeof(crc));
     if (crc == 0 || crc == mcap::crc32(summary.first(summary.size() - sizeof(crc)))) return;
   }
-  reportProblem("the summary is damaged: chunks are read without it");
+  reportDamage("the summary is damaged: chunks are read without it");
   schemas.clear();
   channel_indices.clear();
   channels.clear();
@@ -149,7 +159,7 @@ void McapReader::Impl::readTopLevel(std::uint8_t opcode, std::span<const std::ui
       attachment.data = in.take(in.get<std::uint64_t>());
       const auto crc = in.get<std::uint32_t>();
       if (!in.ok || crc != mcap::crc32(fields.first(fields.size() - sizeof(crc))))
-        return reportProblem("an attachment is damaged and skipped");
+        return reportDamage("an attachment is damaged and skipped");
       attachments.push_back(std::move(attachment));
       return;
     }
@@ -177,7 +187,7 @@ void McapReader::Impl::readDefinition(std::uint8_t opcode, std::span<const std::
   if (opcode == mcap::kChannel && !channel_indices.contains(id)) {
     const auto schema = schemas.find(in.get<std::uint16_t>());
     const std::string topic(in.text());
-    if (!in.ok || schema == schemas.end()) return reportProblem("a channel without a schema is skipped");
+    if (!in.ok || schema == schemas.end()) return reportDamage("a channel without a schema is skipped");
     channel_indices[id] = channels.size();
     channels.push_back({topic, schema->second.first, schema->second.second, 0});
   }
@@ -197,7 +207,7 @@ void McapReader::Impl::readStatistics(std::span<const std::uint8_t> fields) {
 
 bool McapReader::Impl::decompress(const ChunkLocation& location) {
   if (const std::string wrong = mcap::openChunk(location.fields, decompressed); !wrong.empty()) {
-    reportProblem("a chunk " + wrong + (wrong == "is damaged" ? " and skipped" : " and is skipped"));
+    reportDamage("a chunk " + wrong + (wrong == "is damaged" ? " and skipped" : " and is skipped"));
     return false;
   }
   rest = decompressed;

@@ -36,7 +36,7 @@ struct McapAttachment {
 };
 
 /// Reads an MCAP file in file order. A truncated file (crash, full disk) is read up to its last complete
-/// chunk, and a damaged chunk is skipped; problem() reports both.
+/// chunk, and a damaged part is skipped; problem() reports both.
 ///
 /// Threads: one at a time. Real-time: no.
 class McapReader {
@@ -56,7 +56,8 @@ class McapReader {
   /// [ns] Log time of the newest message in the last chunk that has messages; 0: there is none.
   [[nodiscard]] std::int64_t lastTime() const;
   [[nodiscard]] bool complete() const;               ///< false: the file is truncated
-  [[nodiscard]] const std::string& problem() const;  ///< first damage found so far, or empty
+  [[nodiscard]] bool isDamaged() const;              ///< as found so far, beyond a truncation
+  [[nodiscard]] const std::string& problem() const;  ///< first of both found so far, or empty
   [[nodiscard]] const std::vector<McapChannel>& channels() const;
   [[nodiscard]] const std::multimap<std::string, std::map<std::string, std::string>>& metadata() const;
   [[nodiscard]] const std::vector<McapAttachment>& attachments() const;

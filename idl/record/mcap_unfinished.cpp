@@ -23,15 +23,11 @@ struct Found {
 /// Follows the records of a file in their order.
 class Scan {
  public:
-  explicit Scan(Records bytes) : bytes_(bytes) {}
+  explicit Scan(Records bytes) : records_(bytes) {}
 
   void run() {
-    Records rest = bytes_.subspan(sizeof(kMagic)), fields;
-    std::uint8_t opcode = 0;
-    while (offset_ = bytes_.size() - rest.size(), takeRecord(rest, opcode, fields)) {
-      length_ = bytes_.size() - rest.size() - offset_;
-      read(opcode, fields);
-    }
+    Records fields;
+    for (std::uint8_t opcode = 0; records_.next(opcode, fields);) read(opcode, fields);
   }
 
   struct Metadata {
@@ -62,8 +58,8 @@ class Scan {
     in.get<std::uint32_t>();
     chunk.index.compression = in.text();
     chunk.index.compressed = in.get<std::uint64_t>();
-    chunk.index.offset = offset_;
-    chunk.index.length = length_;
+    chunk.index.offset = records_.begin();
+    chunk.index.length = length();
     chunk.metadata = summary.metadata;
     chunk.metadata_index = summary.metadata_index.bytes.size();
     chunk.attachments = summary.attachments;
@@ -74,18 +70,18 @@ class Scan {
     const auto channel = in.get<std::uint16_t>();
     constexpr std::uint32_t kEntry = 16;  // [bytes]
     chunk.counts[channel] += in.get<std::uint32_t>() / kEntry;
-    chunk.index.message_indices[channel] = offset_;
-    chunk.index.indices_length += length_;
+    chunk.index.message_indices[channel] = records_.begin();
+    chunk.index.indices_length += length();
   }
   void readMetadata(FieldReader in) {
     const Records whole = in.rest;
     metadata.push_back({chunks.size(), std::string(in.text()), {whole.begin(), whole.end()}});
-    summary.addMetadata(metadata.back().name, offset_, length_);
+    summary.addMetadata(metadata.back().name, records_.begin(), length());
   }
   void readAttachment(FieldReader in) {
     FieldWriter entry;
-    entry.put(offset_);
-    entry.put(length_);
+    entry.put(static_cast<std::uint64_t>(records_.begin()));
+    entry.put(static_cast<std::uint64_t>(length()));
     entry.put(in.get<std::int64_t>());
     entry.put(in.get<std::int64_t>());
     const std::string_view name = in.text(), media_type = in.text();
@@ -96,8 +92,10 @@ class Scan {
     ++summary.attachments;
   }
 
-  Records bytes_;
-  std::uint64_t offset_ = 0, length_ = 0;  ///< [bytes] of the record that is read
+  /// [bytes] of the record that is read
+  [[nodiscard]] std::size_t length() const { return records_.end() - records_.begin(); }
+
+  RecordSequence records_;
 };
 
 /// Schemas and channels that a chunk defines.

@@ -195,6 +195,7 @@ Result<ResimulationReport> resimulate(const std::filesystem::path& file, Session
       return fail(fmt::format("{}: {}", file.string(), read.error().what));
   ResimulationReport report = resimulator.report();
   report.problem = reader->problem();
+  report.is_damaged = reader->isDamaged();
   if (report.compared > 0) return report;
   return fail(fmt::format("{}: holds no ticks to re-simulate{}", file.string(),
                           report.problem.empty() ? " (was it recorded by 'tenon record' or 'tenon serve'?)"

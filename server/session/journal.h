@@ -101,7 +101,8 @@ struct ResimulationReport {
   std::vector<JournalGap> gaps;  ///< after the first tick that was compared
   std::uint64_t final_hash = 0;
   std::optional<Tick> first_difference;  ///< first tick whose hash differs
-  std::string problem;                   ///< damage found in the file, or empty
+  std::string problem;                   ///< truncation or damage found in the file, or empty
+  bool is_damaged = false;               ///< beyond a truncation: it may lack what it had
 };
 
 /// Re-simulates the ticks of a journal or recording, from its first checkpoint on, and compares the state

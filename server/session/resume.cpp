@@ -123,6 +123,9 @@ Result<ResumePoint> readResumePoint(const std::filesystem::path& journal, const 
   if (auto restored = simulation.restore(newest->checkpoint); !restored)
     return failed(fmt::format("{}; {}", restored.error().what, instead(journal)));
   ResumePoint point{.tick = simulation.now(), .checkpoint = simulation.now(), .problem = {}, .entries = {}};
+  if (reader->isDamaged())
+    point.problem =
+        reader->problem() + "; what is damaged stays in the file, and the session goes on from its end";
   auto entry = std::next(newest);
   for (; entry != tail->entries.end(); ++entry) {
     if (entry->input.tick != simulation.now() + 1) {

@@ -238,6 +238,16 @@ class LockstepServer(unittest.TestCase):
             again = resimulated(stage)
             self.assertEqual(again.returncode, 0, again.stdout + again.stderr)
             self.assertEqual(final_hash(again.stdout), final_hash(server.text()))
+            # what was once damaged is said, although the file was closed
+            journal = stage.out / "journal.mcap"
+            content = bytearray(journal.read_bytes())
+            middle = len(content) // 2
+            content[middle:middle + 4096] = bytes(4096)
+            journal.write_bytes(content)
+            damaged = resimulated(stage)
+            self.assertEqual(damaged.returncode, 1, damaged.stdout + damaged.stderr)
+            self.assertRegex(damaged.stdout, r"journal\.mcap: is damaged between bytes \d+ and \d+: read without them")
+            self.assertRegex(damaged.stdout, r"(?m)^ticks \d+ to \d+ are missing: compared again after the checkpoint of tick \d+$")
 
 
 class Recordings(unittest.TestCase):

@@ -238,6 +238,31 @@ TEST_F(McapTest, ADamagedChunkIsSkippedAndReported) {
   EXPECT_THAT(reader->problem(), HasSubstr("checksum"));
 }
 
+TEST_F(McapTest, AfterALengthThatIsDamagedTheNextChunksAreRead) {
+  for (const std::uint8_t damage : {1, 0x7f}) {  // into the chunk, and beyond the end of the file
+    const auto written = record(40);
+    Bytes bytes = fileBytes();
+    std::size_t at = sizeof(mcap::kMagic);
+    for (int seen = 0; seen < 2;) {
+      if (bytes[at] == mcap::kChunk && ++seen == 2) break;
+      std::uint64_t length = 0;
+      std::memcpy(&length, bytes.data() + at + 1, sizeof length);
+      at += mcap::kRecordHeaderBytes + length;
+    }
+    if (damage == 1) bytes[at + 1] ^= damage;
+    if (damage != 1) bytes[at + 7] = damage;
+    writeFile(bytes);
+    auto reader = McapReader::open(file_);
+    ASSERT_TRUE(reader);
+    EXPECT_TRUE(reader->isDamaged());
+    EXPECT_TRUE(reader->complete());
+    EXPECT_THAT(reader->problem(), HasSubstr("is damaged between bytes "));
+    const auto read = readAll(*reader);
+    ASSERT_GE(read.size(), 30U);
+    EXPECT_TRUE(std::equal(read.end() - 20, read.end(), written.end() - 20));
+  }
+}
+
 TEST_F(McapTest, RandomBytesAfterTheMagicNeverCrash) {
   std::mt19937_64 random(13);
   for (int round = 0; round < 500; ++round) {

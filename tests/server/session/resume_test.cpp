@@ -203,6 +203,39 @@ TEST_F(ResumeTest, AfterDamageTheSessionGoesOnFromTheLastStateThatCanBeComputed)
   EXPECT_THAT(point->problem, HasSubstr("has no tick " + std::to_string(point->tick + 1)));
 }
 
+// as a block of the disk that was never written, in the middle of the file: the lengths of records in it are
+// lost, by which all after it would be
+TEST_F(ResumeTest, AfterALostBlockTheSessionGoesOnFromTheEndAndTheLossStaysKnown) {
+  const fs::path left = journalUpTo(3900);
+  const auto whole = fs::file_size(left);
+  std::fstream file(left, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(static_cast<std::streamoff>(whole / 2));
+  for (int byte = 0; byte < 4096; ++byte) file.put('\0');
+  file.close();
+  SessionSimulation simulation = test::SessionRig::makeSimulation(loaded_);
+  const auto point = readResumePoint(left, loaded_, simulation);
+  ASSERT_TRUE(point) << point.error().what;
+  EXPECT_EQ(point->tick, 3900U);
+  EXPECT_EQ(simulation.hash(), hashes_[3900]);
+  EXPECT_THAT(point->problem, HasSubstr("is damaged between bytes "));
+  {
+    auto journal = Journal::reopen(left, simulation.now(), 2);
+    ASSERT_TRUE(journal) << journal.error().what;
+    run(simulation, *journal, 4100, true);
+    ASSERT_TRUE(journal->close({.phase = simulation.phase(), .tick = 4100, .reason = "done"}));
+  }
+  EXPECT_GE(fs::file_size(left), whole) << "nothing is cut off";
+  SessionSimulation again = test::SessionRig::makeSimulation(loaded_);
+  const auto report = resimulate(left, again);
+  ASSERT_TRUE(report) << report.error().what;
+  EXPECT_TRUE(report->is_damaged);
+  EXPECT_THAT(report->problem, HasSubstr("is damaged between bytes "));
+  ASSERT_EQ(report->gaps.size(), 1U);
+  EXPECT_LT(report->gaps[0].last, 3900U);
+  EXPECT_FALSE(report->first_difference);
+  EXPECT_EQ(report->last, 4100U);
+}
+
 TEST_F(ResumeTest, WhatCannotBeResumedIsRefusedWithFileAndRemedy) {
   const fs::path left = journalUpTo(1100);
   EXPECT_THAT(
@@ -271,7 +304,7 @@ TEST_F(ResumeTest, WithTheKeyOfASeatComesItsFormerId) {
   ASSERT_TRUE(seats) << seats.error().what;
 
   SessionRegistry after(scenario, 2, false);
-  after.resume(*seats, 0);
+  after.resume(*seats);
   EXPECT_FALSE(after.isRolePresent(Role::kTrainee)) << "nobody is on a seat before they join";
   EXPECT_EQ(join(after, "third", 'c', 2).client, ClientId{3}) << "a new key does not get the seat of another";
   EXPECT_EQ(join(after, "fourth", 'b', 2).client, second);
@@ -285,7 +318,7 @@ TEST_F(ResumeTest, WithTheKeyOfASeatComesItsFormerId) {
   const auto kept = readSeats(file);
   ASSERT_TRUE(kept) << kept.error().what;
   SessionRegistry later(scenario, 2, false);
-  later.resume(*kept, 0);
+  later.resume(*kept);
   EXPECT_FALSE(join(later, "fifth", 'b', 2).accepted) << "a removed person's seat stays closed";
 
   std::ofstream(file, std::ios::app) << "17 x\n";
