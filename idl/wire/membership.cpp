@@ -241,7 +241,8 @@ Result<void> Membership::watch(Inbox& inbox) {
   if (!watched) return watched;
   watches_ = true;
   return inbox.on<Welcome>(*lobby_, kWelcome, [this](const Welcome& notice) {
-    if (notice.client_guid != guid_ || notice.client != welcome_.client) return;
+    // a challenge or refusal, which names no seat, is for who asks
+    if (!notice.client.valid() || notice.client_guid != guid_ || notice.client != welcome_.client) return;
     if (notice.accepted) return lost_.reset();
     is_displaced_ = notice.reason == kSeatTaken;
     lost_ = "the server of " + sessionText(announce_.session) + " removed this client: " + notice.reason;

@@ -9,6 +9,16 @@ from stage import SOURCE, Stage, tenon
 
 
 class Faults(unittest.TestCase):
+    def assert_mounted(self, server):
+        server.wait_for("everything is mounted", 180)
+        self.assertEqual(server.wait(30), 0)
+
+    @staticmethod
+    def serve_with_seat(stage):
+        """The server, and what starts its trainee, whose seat is kept in a file."""
+        server = stage.serve("peg_and_box", "--wait-for", "right")
+        return server, lambda: stage.start("trainee", "--seed", 1, "--seat", stage.out / "seat")
+
     def test_a_part_held_by_a_killed_trainee_is_parked_and_another_may_continue(self):
         with Stage(lockstep=False) as stage:
             server = stage.serve("peg_and_box", "--wait-for", "right")
@@ -19,37 +29,32 @@ class Faults(unittest.TestCase):
             server.wait_for(r"\(trainee\) has left", 30)
             self.assertIsNone(server.popen.poll(), "the session must continue")
             stage.start("trainee", "--seed", 2)
-            server.wait_for("everything is mounted", 180)
-            self.assertEqual(server.wait(30), 0)
+            self.assert_mounted(server)
 
     def test_a_killed_trainee_gets_its_part_back_with_its_seat_file(self):
         with Stage(lockstep=False) as stage:
-            server = stage.serve("peg_and_box", "--wait-for", "right")
-            seat = stage.out / "seat"
-            trainee = stage.start("trainee", "--seed", 1, "--seat", seat)
+            server, start_trainee = self.serve_with_seat(stage)
+            trainee = start_trainee()
             server.wait_for("taken: .*[Pp]eg", 120)
             trainee.signal(signal.SIGKILL)
             server.wait_for("is parked", 30)
-            again = stage.start("trainee", "--seed", 1, "--seat", seat)
+            again = start_trainee()
             again.wait_for("joined as client 1", 60)
             server.wait_for("has rejoined", 30)
-            server.wait_for("everything is mounted", 180)
-            self.assertEqual(server.wait(30), 0)
+            self.assert_mounted(server)
             self.assertEqual(server.text().count("step done: take_peg"), 1, "the part is in the hand again without being taken")
 
     def test_a_copy_of_a_seat_ends_the_program_that_had_it(self):
         with Stage(lockstep=False) as stage:
-            server = stage.serve("peg_and_box", "--wait-for", "right")
-            seat = stage.out / "seat"
-            first = stage.start("trainee", "--seed", 1, "--seat", seat)
+            server, start_trainee = self.serve_with_seat(stage)
+            first = start_trainee()
             server.wait_for("run: running", 60)
-            stage.start("trainee", "--seed", 1, "--seat", seat)
+            start_trainee()
             server.wait_for("has rejoined", 30)
             self.assertEqual(first.wait(30), 1, first.text())
             self.assertRegex(first.text(), "another program has taken this seat with its key; its work goes on there")
             self.assertNotIn("; rejoining", first.text())
-            server.wait_for("everything is mounted", 180)
-            self.assertEqual(server.wait(30), 0)
+            self.assert_mounted(server)
 
     def test_a_trainee_that_hangs_beyond_its_lease_rejoins(self):
         with Stage(lockstep=False) as stage:
@@ -60,8 +65,7 @@ class Faults(unittest.TestCase):
             server.wait_for(r"\(trainee\) has left", 30)
             trainee.signal(signal.SIGCONT)
             trainee.wait_for("rejoined as client 1", 60)
-            server.wait_for("everything is mounted", 180)
-            self.assertEqual(server.wait(30), 0)
+            self.assert_mounted(server)
             self.assertEqual(trainee.wait(30), 0, trainee.text())
 
     def test_a_trainee_rejoins_a_restarted_server(self):
@@ -73,8 +77,7 @@ class Faults(unittest.TestCase):
             trainee.wait_for("rejoining the session", 30)
             again = stage.serve("peg_and_box", "--wait-for", "right")
             trainee.wait_for("rejoined as client", 60)
-            again.wait_for("everything is mounted", 180)
-            self.assertEqual(again.wait(30), 0)
+            self.assert_mounted(again)
 
     def test_a_trainee_that_took_its_server_for_dead_notices_when_it_dies(self):
         with Stage(lockstep=False) as stage:
@@ -87,8 +90,7 @@ class Faults(unittest.TestCase):
             trainee.wait_for("rejoined as client", 60)
             server.signal(signal.SIGKILL)
             again = stage.serve("peg_and_box", "--wait-for", "right")
-            again.wait_for("everything is mounted", 180)
-            self.assertEqual(again.wait(30), 0)
+            self.assert_mounted(again)
 
     def test_the_hand_of_a_trainee_that_hangs_briefly_is_frozen(self):
         with Stage(lockstep=False) as stage:
@@ -101,8 +103,7 @@ class Faults(unittest.TestCase):
             trainee.signal(signal.SIGCONT)
             server.wait_for("hand '.*' moves again", 30)
             self.assertNotIn("is absent", server.text(), "shorter than the lease")
-            server.wait_for("everything is mounted", 180)
-            self.assertEqual(server.wait(30), 0)
+            self.assert_mounted(server)
 
     def test_a_second_trainee_is_refused_when_the_hand_is_taken(self):
         with Stage(lockstep=False) as stage:

@@ -1,6 +1,8 @@
 #include "idl/wire/membership.h"
 
+#include <atomic>
 #include <chrono>
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
@@ -24,9 +26,9 @@ using std::chrono::milliseconds;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-/// A server in a process of its own with one seat. It refuses a client that wants hand "taken", and removes
-/// the client when it receives a ClientEvent: the presence of its first request if the event is "late", else
-/// the newest one; as displaced if the event is "displaced".
+/// A server in a process of its own with one seat. It refuses a client that wants hand "taken", asks Bob for
+/// a proof, and removes the client when it receives a ClientEvent: the presence of its first request if the
+/// event is "late", else the newest one; as displaced if the event is "displaced".
 void runServer(std::uint32_t domain, const std::string& scenario_hash = "") {
   auto participant = test::participant(domain);
   Partition lobby(participant, kLobby);
@@ -44,6 +46,8 @@ void runServer(std::uint32_t domain, const std::string& scenario_hash = "") {
     Welcome answer{.client_guid = guid, .session = join.session, .server_epoch = 7};
     if (!join.hands.empty() && join.hands.front() == "taken") {
       answer.reason = "that hand is taken";
+    } else if (join.name == "Bob" && join.seat_proof.empty()) {
+      answer.challenge = "prove it";
     } else {
       answer.accepted = true;
       answer.client = ClientId{1};
@@ -71,6 +75,31 @@ void runServer(std::uint32_t domain, const std::string& scenario_hash = "") {
 MembershipOptions traineeOptions(std::uint32_t domain) {
   return {.domain = domain, .person = "Ada", .role = Role::kTrainee, .timeout = std::chrono::seconds(60)};
 }
+
+/// A client that has a seat and hears its server.
+struct Seated {
+  std::uint32_t domain = test::ownDomain();
+  test::Peer peer{[this] { runServer(domain); }};
+  std::atomic<bool> stop = false;
+  std::unique_ptr<Membership> member;
+  Inbox inbox;
+  std::optional<Writer<ClientEvent>> events;  ///< by which the server removes it
+
+  void take(const std::string& person = "Ada") {
+    MembershipOptions options = traineeOptions(domain);
+    options.person = person;
+    auto found = Membership::find(options, stop);
+    ASSERT_TRUE(found) << found.error().what;
+    member = std::move(*found);
+    ASSERT_TRUE(member->join(stop));
+    ASSERT_TRUE(member->watch(inbox));
+    auto opened = Writer<ClientEvent>::open(member->session(), kClientEvent);
+    ASSERT_TRUE(opened);
+    events.emplace(std::move(*opened));
+    ASSERT_TRUE(test::dispatchUntil(
+        inbox, [&] { return events->matchedReaders() == 1 && inbox.matchedWriters() >= 2; }));
+  }
+};
 
 //   this process: find, join        lobby        peer: announce, welcome
 TEST(Membership, FindsTheSessionOfAnotherProcessAndJoins) {
@@ -103,59 +132,63 @@ TEST(Membership, ARefusalHasTheServersReason) {
 }
 
 TEST(Membership, ARemovedClientRejoins) {
-  const std::uint32_t domain = test::ownDomain();
-  const test::Peer peer([domain] { runServer(domain); });
-  const std::atomic<bool> stop = false;
-  auto member = Membership::find(traineeOptions(domain), stop);
-  ASSERT_TRUE(member) << member.error().what;
-  ASSERT_TRUE((*member)->join(stop));
-  Inbox inbox;
-  ASSERT_TRUE((*member)->watch(inbox));
-  auto events = Writer<ClientEvent>::open((*member)->session(), kClientEvent);
-  ASSERT_TRUE(events);
-  ASSERT_TRUE(test::dispatchUntil(
-      inbox, [&] { return events->matchedReaders() == 1 && inbox.matchedWriters() >= 2; }));
-  ASSERT_TRUE(events->write({.client = ClientId{1}, .seq = 1, .kind = "hello", .text = "HELLO"}));
-  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return (*member)->lost().has_value(); }));
-  EXPECT_THAT(*(*member)->lost(), HasSubstr("too loud"));
-  EXPECT_FALSE((*member)->serverIsGone());
+  Seated seated;
+  ASSERT_NO_FATAL_FAILURE(seated.take());
+  const auto& member = seated.member;
+  Inbox& inbox = seated.inbox;
+  ASSERT_TRUE(seated.events->write({.client = ClientId{1}, .seq = 1, .kind = "hello", .text = "HELLO"}));
+  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return member->lost().has_value(); }));
+  EXPECT_THAT(*member->lost(), HasSubstr("too loud"));
+  EXPECT_FALSE(member->serverIsGone());
 
-  const auto back = (*member)->rejoin(stop, [&] { inbox.dispatch(milliseconds(0)); });
+  const auto back = member->rejoin(seated.stop, [&] { inbox.dispatch(milliseconds(0)); });
   ASSERT_TRUE(back) << back.error().what;
-  EXPECT_EQ((*member)->welcome().tick, 2U) << "the answer to the second request";
+  EXPECT_EQ(member->welcome().tick, 2U) << "the answer to the second request";
   inbox.dispatch(milliseconds(50));
-  EXPECT_FALSE((*member)->lost());
+  EXPECT_FALSE(member->lost());
 
   // what is said of the presence that it removed does not end the new one
   bool heard = false;
-  ASSERT_TRUE(inbox.on<Welcome>((*member)->lobby(), kWelcome,
+  ASSERT_TRUE(inbox.on<Welcome>(member->lobby(), kWelcome,
                                 [&](const Welcome& notice) { heard = heard || notice.reason == "late"; }));
-  ASSERT_TRUE(events->write({.client = ClientId{1}, .seq = 2, .kind = "late", .text = "too loud"}));
+  ASSERT_TRUE(seated.events->write({.client = ClientId{1}, .seq = 2, .kind = "late", .text = "too loud"}));
   ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return heard; }));
   inbox.dispatch(milliseconds(50));
-  EXPECT_FALSE((*member)->lost());
+  EXPECT_FALSE(member->lost());
 }
 
 TEST(Membership, AProgramWhoseSeatIsTakenDoesNotTakeItBack) {
-  const std::uint32_t domain = test::ownDomain();
-  const test::Peer peer([domain] { runServer(domain); });
-  const std::atomic<bool> stop = false;
-  auto member = Membership::find(traineeOptions(domain), stop);
-  ASSERT_TRUE(member) << member.error().what;
-  ASSERT_TRUE((*member)->join(stop));
-  Inbox inbox;
-  ASSERT_TRUE((*member)->watch(inbox));
-  auto events = Writer<ClientEvent>::open((*member)->session(), kClientEvent);
-  ASSERT_TRUE(events);
-  ASSERT_TRUE(test::dispatchUntil(
-      inbox, [&] { return events->matchedReaders() == 1 && inbox.matchedWriters() >= 2; }));
-  ASSERT_TRUE(events->write({.client = ClientId{1}, .seq = 1, .kind = "displaced", .text = "displaced"}));
-  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return (*member)->lost().has_value(); }));
-  EXPECT_TRUE((*member)->isDisplaced());
-  const auto back = (*member)->rejoin(stop);
+  Seated seated;
+  ASSERT_NO_FATAL_FAILURE(seated.take());
+  const auto& member = seated.member;
+  Inbox& inbox = seated.inbox;
+  ASSERT_TRUE(
+      seated.events->write({.client = ClientId{1}, .seq = 1, .kind = "displaced", .text = "displaced"}));
+  ASSERT_TRUE(test::dispatchUntil(inbox, [&] { return member->lost().has_value(); }));
+  EXPECT_TRUE(member->isDisplaced());
+  const auto back = member->rejoin(seated.stop);
   ASSERT_FALSE(back);
-  EXPECT_THAT(*(*member)->lost() + "; " + back.error().what,
-              HasSubstr("another program has taken this seat"));
+  EXPECT_THAT(*member->lost() + "; " + back.error().what, HasSubstr("another program has taken this seat"));
+}
+
+TEST(Membership, AChallengeOfARejoinEndsNoPresence) {
+  Seated seated;
+  ASSERT_NO_FATAL_FAILURE(seated.take("Bob"));
+  const auto& member = seated.member;
+  Inbox& inbox = seated.inbox;
+  Inbox others;
+  bool is_seen = false, has_left = false;
+  const auto bus = test::participant(seated.domain);
+  Partition session(bus, sessionPartition("test"));
+  ASSERT_TRUE(others.on<Presence>(session, kPresence, [&](const Presence&) { is_seen = true; }));
+  ASSERT_TRUE(others.onGone<Presence>(session, kPresence, [&](const Presence&) { has_left = true; }));
+  ASSERT_TRUE(test::dispatchUntil(others, [&] { return is_seen; }));
+  ASSERT_TRUE(member->rejoin(seated.stop, [&] {
+    inbox.dispatch(milliseconds(0));
+    EXPECT_FALSE(member->lost());
+  }));
+  for (int i = 0; i < 10; ++i) others.dispatch(milliseconds(20));
+  EXPECT_FALSE(has_left);
 }
 
 TEST(Membership, AKilledServerIsReportedAsGoneAndAMissingOneAsNotAnnounced) {
