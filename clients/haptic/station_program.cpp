@@ -2,10 +2,10 @@
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <functional>
-#include <future>
 #include <map>
 #include <memory>
 #include <optional>
@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "clients/haptic/answer_readers.h"
+#include "clients/haptic/arming_thread.h"
 #include "clients/haptic/copy_loader.h"
 #include "clients/haptic/input_pacer.h"
 #include "clients/haptic/limit_chooser.h"
@@ -64,6 +65,7 @@ class StationRunner {
                {[this](const StopSignal& stop) { pass(stop); },
                 [this](const std::string& text) { print(text); }},
                options.read_keys),
+        arming_(station, [this](const std::string& text) { print(text); }),
         copy_(station, options.scene, options.force_model),
         model_chooser_(options.force_model) {}
 
@@ -94,6 +96,11 @@ class StationRunner {
   void sendTelemetry(Telemetry telemetry);
   void readKeys();
   void armDevices();
+  /// The emergency stop, and who sits at the station.
+  void hear() {
+    link_.inbox().dispatch(milliseconds(20));
+    readKeys();
+  }
   [[nodiscard]] bool seated() const { return !link_.member().lost(); }
   /// Rejoins. `new_seat`: client, hands or server epoch differ from before, so the station has to restart.
   [[nodiscard]] Result<void> rejoin(const std::atomic<bool>& stop, bool& new_seat);
@@ -131,7 +138,7 @@ class StationRunner {
   PeakForces peaks_;  // in lockstep
   RunState run_;
   std::uint32_t stated_seq_ = 0;  // of the last HandState
-  std::future<void> arming_;
+  ArmingThread arming_;
   int rejoins_ = 0;
   std::chrono::steady_clock::time_point rejoined_at_{};
   std::optional<StepState> step_;
@@ -179,7 +186,8 @@ Result<void> StationRunner::subscribe() {
 }
 
 void StationRunner::chooseRates(double round_trip) {
-  rates_.step(round_trip, force_model_, link_clock_.lossKnown() ? std::optional(choice_.loss) : std::nullopt);
+  rates_.step(round_trip, force_model_, link_clock_.lossKnown() ? std::optional(choice_.loss) : std::nullopt,
+              choice_.jitter);
   if (auto chosen = readers_.choose(rates_.slowAnswers()); !chosen) print(chosen.error().what);
 }
 
@@ -199,6 +207,7 @@ void StationRunner::sendTelemetry(Telemetry telemetry) {
                           .trip_jitter = telemetry.trip_jitter,
                           .age_jitter = telemetry.jitter,
                           .inputs_lost = telemetry.inputs_lost,
+                          .answers_lost = rates_.slowAnswers() ? telemetry.answers_lost : std::nan(""),
                           .input_period = rates_.inputPeriod(1)});
   telemetry.limits = choice_.limits;
   telemetry.playout_ticks = choice_.playout_ticks;
@@ -235,16 +244,10 @@ void StationRunner::readKeys() {
   lockstep_ ? station_.press() : servo_.press();
 }
 
-/// Devices may take their time, and say why not. In real time they do so on a thread of their own, since this
-/// one hears the emergency stop; in lockstep between two steps.
+/// In lockstep between two steps.
 void StationRunner::armDevices() {
-  const auto arm = [this] {
-    auto armed = station_.armDevices();
-    if (!armed) print(armed.error().what);
-  };
-  if (lockstep_) return arm();
-  if (arming_.valid() && arming_.wait_for(milliseconds(0)) != std::future_status::ready) return;
-  if (station_.wantsArming()) arming_ = std::async(std::launch::async, arm);
+  arming_.start();
+  if (lockstep_) arming_.await([this] { hear(); });
 }
 
 void StationRunner::printStep(const StepState& step) {
@@ -317,8 +320,7 @@ Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat
           (rejoins_ > kMaxRejoins ? " in 10 s, since it was lost repeatedly" : ""));
   const auto rejoin_at = now + (rejoins_ > kMaxRejoins ? kMinSeatTime : std::chrono::seconds(0));
   while (!stop && std::chrono::steady_clock::now() < rejoin_at) {
-    link_.inbox().dispatch(milliseconds(20));
-    readKeys();
+    hear();
     armDevices();
   }
   const Welcome before = member.welcome();
@@ -341,7 +343,6 @@ Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat
 }
 
 void StationRunner::restartStation() {
-  if (arming_.valid()) arming_.wait();
   station_.welcome(link_.welcome(), link_.objects());
   sendDevices();
   if (step_) station_.receive(*step_);
@@ -404,7 +405,8 @@ void StationRunner::stopServo(bool disarms) {
   servo_thread_.reset();
   servo_.restart();
   if (!disarms) return;
-  if (arming_.valid()) arming_.wait();
+  if (arming_.isUnderWay()) print("a device is still being armed: this program ends when it answers");
+  arming_.await([this] { hear(); });
   station_.end();
 }
 
@@ -426,19 +428,24 @@ Result<RunState> StationRunner::runRealTime(const std::atomic<bool>& stop) {
 }
 
 Result<RunState> StationRunner::takePart(const std::atomic<bool>& stop) {
+  bool must_restart = false;  // with a new seat
   while (!stop && !over()) {
-    link_.inbox().dispatch(milliseconds(20));
-    readKeys();
-    armDevices();
+    hear();
+    if (!must_restart) armDevices();
     if (!seated() && !over()) {
       // the loop continues; forces fade with the age of the contacts
       bool new_seat = false;
       if (auto back = rejoin(stop, new_seat); !back) return fail(back.error().what);
-      if (new_seat) {
-        stopServo(false);
-        restartStation();
-        startServo();
-      }
+      if (new_seat && arming_.isUnderWay())
+        print("the session goes on once a device that is being armed answers");
+      must_restart = must_restart || new_seat;
+    }
+    // meanwhile the loop obeys stops, and no force outlives the age of its contacts
+    if (must_restart && arming_.isUnderWay()) continue;
+    if (std::exchange(must_restart, false)) {
+      stopServo(false);
+      restartStation();
+      startServo();
     }
     takeLoadedScene();
     if (const StationOutput* const output = servo_.takeOutput()) send(*output);
