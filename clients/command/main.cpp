@@ -1,6 +1,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <map>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 
 #include "clients/command/command_program.h"
 #include "clients/command/session_lists.h"
+#include "idl/wire/key_option.h"
 #include "idl/wire/network.h"
 #include "idl/wire/session_name.h"
 
@@ -43,6 +45,7 @@ void declare(CLI::App& app, CommandArguments& arguments) {
         const auto permitted = tenon::wire::checkSessionName(text);
         return text.empty() || permitted ? std::string() : permitted.error().what;
       });
+  // likewise of no file
   app.add_option("--key", arguments.options.key_file,
                  "file of the session's key, which instructors and admins need (default: the one of your own "
                  "servers)");
@@ -60,6 +63,18 @@ void declare(CLI::App& app, CommandArguments& arguments) {
   app.footer(tenon::command::commandHelp());
 }
 
+int report(const std::string& what, int exit_code = 1) {
+  std::fprintf(stderr, "tenon command: %s\n", what.c_str());
+  return exit_code;
+}
+
+int printLists(const CommandArguments& arguments) {
+  const auto lists = tenon::command::readLists(arguments.options, stop);
+  if (!lists) return report(lists.error().what);
+  std::fputs(lists->text().c_str(), stdout);
+  return 0;
+}
+
 int run(int argc, char** argv) {
   CLI::App app("Sends commands to a running session.", "tenon command");
   CommandArguments arguments;
@@ -70,37 +85,20 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
-  const auto printError = [](const std::string& what) {
-    std::fprintf(stderr, "tenon command: %s\n", what.c_str());
-  };
-  if (arguments.words == std::vector<std::string>{"list"} && !arguments.keys) {
-    std::signal(SIGINT, onSignal);
-    std::signal(SIGTERM, onSignal);
-    const auto lists = tenon::command::readLists(arguments.options, stop);
-    if (!lists) {
-      printError(lists.error().what);
-      return 1;
-    }
-    std::fputs(lists->text().c_str(), stdout);
-    return 0;
-  }
-  tenon::Result<tenon::command::ParsedCommand> parsed;
-  if (!arguments.keys) {
-    parsed = tenon::command::parseCommand(arguments.words);
-    if (!parsed) {
-      printError(parsed.error().what);
-      return 2;
-    }
-  }
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
-  if (!arguments.keys && !parsed->command)
-    return tenon::command::emergencyOnce(arguments.options, *parsed, stop);
-  auto client = tenon::command::CommandClient::open(arguments.options, stop);
-  if (!client) {
-    printError(client.error().what);
-    return 1;
+  const bool lists = arguments.words == std::vector<std::string>{"list"} && !arguments.keys;
+  if (!arguments.keys && !lists) {
+    const auto parsed = tenon::command::parseCommand(arguments.words);
+    if (!parsed) return report(parsed.error().what, 2);
+    if (!parsed->command) return tenon::command::emergencyOnce(arguments.options, *parsed, stop);
   }
+  const std::filesystem::path& key_file = arguments.options.key_file;
+  if (app.count("--key") > 0 && key_file.empty()) return report("--key: names no file", 2);
+  if (const auto key = tenon::wire::checkKeyOption(key_file); !key) return report(key.error().what);
+  if (lists) return printLists(arguments);
+  auto client = tenon::command::CommandClient::open(arguments.options, stop);
+  if (!client) return report(client.error().what);
   return arguments.keys ? tenon::command::commandByKeys(**client, arguments.signals, stop)
                         : tenon::command::commandOnce(**client, arguments.words, stop);
 }

@@ -9,6 +9,7 @@
 #include "clients/console/gateway.h"
 #include "idl/threads/line_printer.h"
 #include "idl/types/cache_folder.h"
+#include "idl/wire/key_option.h"
 #include "idl/wire/network.h"
 #include "idl/wire/session_name.h"
 
@@ -34,7 +35,7 @@ int run(int argc, char** argv) {
                  "instructor or trainee: prints an address that gives this role to whoever has it, with the "
                  "key of your sessions")
       ->check(CLI::IsMember({"instructor", "trainee"}));
-  app.add_option("--key", options.key_file, "the key of the sessions; default: yours");
+  tenon::wire::addKeyOption(app, options.key_file, "the key of the sessions; default: yours");
   app.add_option("--domain", options.domain, "DDS domain, 0 to 230")
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
@@ -83,6 +84,10 @@ int run(int argc, char** argv) {
   if (!certificate.empty()) {
     options.web.certificate = certificate[0];
     options.web.key = certificate[1];
+  }
+  if (const auto key = tenon::wire::checkKeyOption(options.key_file); !key) {
+    std::fprintf(stderr, "tenon-console: %s\n", key.error().what.c_str());
+    return 1;
   }
   if (!role.empty()) options.role = role == "trainee" ? tenon::Role::kTrainee : tenon::Role::kInstructor;
   // a terminal that stands still does not stop the gateway

@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/observer/observer_program.h"
+#include "idl/wire/key_option.h"
 #include "idl/wire/network.h"
 #include "idl/wire/session_name.h"
 
@@ -27,8 +28,9 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
   tenon::wire::addNetworkOption(app);
-  app.add_option("--key", membership.key_file,
-                 "file of the session's key, which a server beyond loopback may ask for (default: yours)");
+  tenon::wire::addKeyOption(
+      app, membership.key_file,
+      "file of the session's key, which a server beyond loopback may ask for (default: yours)");
   app.add_option("--name", membership.person, "name shown to the other participants")->capture_default_str();
   app.add_option("--language", options.language, "language of titles and instructions")
       ->capture_default_str();
@@ -37,6 +39,10 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (const auto key = tenon::wire::checkKeyOption(membership.key_file); !key) {
+    std::fprintf(stderr, "tenon-observer: %s\n", key.error().what.c_str());
+    return 1;
   }
   membership.timeout = std::chrono::seconds(wait);
   std::signal(SIGINT, onSignal);

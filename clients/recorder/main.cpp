@@ -7,6 +7,7 @@
 #include "clients/recorder/recorder_program.h"
 #include "idl/threads/line_printer.h"
 #include "idl/types/output_files.h"
+#include "idl/wire/key_option.h"
 #include "idl/wire/network.h"
 #include "idl/wire/session_name.h"
 
@@ -26,8 +27,9 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(0, 230))
       ->capture_default_str();
   tenon::wire::addNetworkOption(app);
-  app.add_option("--key", options.key_file,
-                 "file of the session's key, which a server beyond loopback may ask for (default: yours)");
+  tenon::wire::addKeyOption(
+      app, options.key_file,
+      "file of the session's key, which a server beyond loopback may ask for (default: yours)");
   app.add_flag("--all", options.all,
                "also the streams of 1 kHz, sample by sample: about three times as large a file");
   app.add_flag("--lockstep", options.lockstep, "refuse a session that does not run in lockstep");
@@ -41,6 +43,10 @@ int run(int argc, char** argv) {
   if (const auto refusal = tenon::refuseOutputs({.outputs = {options.file}, .overwrite = overwrite})) {
     std::fprintf(stderr, "tenon-record: %s\n", refusal->what.c_str());
     return refusal->exit_code;
+  }
+  if (const auto key = tenon::wire::checkKeyOption(options.key_file); !key) {
+    std::fprintf(stderr, "tenon-record: %s\n", key.error().what.c_str());
+    return 1;
   }
   options.timeout = std::chrono::seconds(wait);
   // a terminal that stands still does not stop the recording

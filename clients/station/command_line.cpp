@@ -17,6 +17,7 @@
 #include "idl/types/number_range.h"
 #include "idl/types/printable_text.h"
 #include "idl/wire/identity.h"
+#include "idl/wire/key_option.h"
 #include "idl/wire/network.h"
 #include "idl/wire/session_name.h"
 
@@ -187,9 +188,10 @@ void declareProgram(CLI::App& app, Typed& typed) {
   app.add_option(
       "--seat", program.seat_file,
       "file that keeps the secret key of the seat, so that a restarted station gets its hands back");
-  app.add_option("--key", membership.key_file,
-                 "file of the session's key, which instructors and admins need (default: the one of your own "
-                 "servers)");
+  wire::addKeyOption(
+      app, membership.key_file,
+      "file of the session's key, which instructors and admins need (default: the one of your own "
+      "servers)");
 }
 
 std::vector<std::string> split(const std::string& text, char separator) {
@@ -376,6 +378,8 @@ CommandLine readCommandLine(int argc, char** argv) {
     return {
         std::nullopt,
         printError(seat.string() + ": is not the file of a seat; name another one with --seat", kCouldNot)};
+  if (const auto key = wire::checkKeyOption(arguments->program.membership.key_file); !key)
+    return {std::nullopt, printError(key.error().what, kCouldNot)};
   return {std::move(*arguments), 0};
 }
 
