@@ -46,14 +46,18 @@ struct BakeOptions {
 /// Called with the fraction done [0..1] and the name of the stage; returning false cancels the bake.
 using BakeProgress = std::function<bool(double fraction, std::string_view stage)>;
 
+inline constexpr std::string_view kReadingMeshes = "reading meshes";  ///< the first stage
+
 /// Reads a mesh with assimp. `unit` [m] is the length of one unit of the file. A scan (`.bt`, `.ot` of
 /// OctoMap) gives the surface of its occupied cells, always in metres. No other files are read than those of
 /// referencesOf (mesh_references.h); the mesh and its folder may be symbolic links. The import runs in a
 /// child process ($TENON_BAKE, or tenon-bake beside this program) with limits on memory and time: a file that
-/// crashes the importer or exceeds a limit is an error of one sentence that names the file.
+/// crashes the importer or exceeds a limit is an error of one sentence that names the file. `progress` is
+/// called ten times a second with a fraction of 0, and ends the child when it cancels.
 ///
 /// Threads: any. Real-time: no.
-[[nodiscard]] Result<TriangleMesh> importMesh(const std::filesystem::path& file, double unit);
+[[nodiscard]] Result<TriangleMesh> importMesh(const std::filesystem::path& file, double unit,
+                                              const BakeProgress& progress = {});
 
 /// Computes field and pointshell of a triangle soup (paper §3.1) from positions alone: neither winding nor
 /// normals matter. An error when options are out of range, the mesh is invalid or has no area, its field is

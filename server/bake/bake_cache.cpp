@@ -102,8 +102,8 @@ Result<TriangleMesh> importAll(const std::vector<std::filesystem::path>& meshes,
                                const BakeProgress& progress = {}) {
   TriangleMesh whole;
   for (const auto& file : meshes) {
-    if (progress && !progress(0.0, "reading meshes")) return fail("cancelled");
-    auto part = importMesh(file, unit);
+    if (progress && !progress(0.0, kReadingMeshes)) return fail("cancelled");
+    auto part = importMesh(file, unit, progress);
     if (!part) return part;
     append(whole, std::move(*part));
   }
@@ -123,8 +123,9 @@ Result<std::string> displayKey(const std::vector<std::filesystem::path>& meshes,
 }
 
 Result<std::vector<DisplayModel>> displayModelsOf(const std::vector<std::filesystem::path>& meshes,
-                                                  double unit, std::uint32_t uncolored) {
-  const auto whole = importAll(meshes, unit);
+                                                  double unit, std::uint32_t uncolored,
+                                                  const BakeProgress& progress) {
+  const auto whole = importAll(meshes, unit, progress);
   if (!whole) return tl::unexpected(whole.error());
   return displayModels(*whole, uncolored);
 }

@@ -37,6 +37,7 @@ inline constexpr std::array<std::uint32_t, 2> kDisplayTriangles{150'000, 40'000}
 
 /// importMesh and displayModels of several files, of unit `unit` [m], as one object.
 [[nodiscard]] Result<std::vector<DisplayModel>> displayModelsOf(
-    const std::vector<std::filesystem::path>& meshes, double unit, std::uint32_t uncolored);
+    const std::vector<std::filesystem::path>& meshes, double unit, std::uint32_t uncolored,
+    const BakeProgress& progress = {});
 
 }  // namespace tenon::bake

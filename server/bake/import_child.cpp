@@ -107,7 +107,17 @@ struct ColorSource {
   const aiScene& scene;
   bool is_linear;      ///< as glTF demands
   bool has_materials;  ///< not an OBJ without its library, whose materials are the importer's grey
+  bool is_stl;
 };
+
+/// The importer's, of facets that say no colour where others do; of 5 bits a channel no facet says it.
+constexpr float kUncoloredStl = 0.6F;
+
+std::uint32_t colorOfVertex(const aiColor4D& color, const ColorSource& source) {
+  const bool is_none =
+      source.is_stl && color.r == kUncoloredStl && color.g == kUncoloredStl && color.b == kUncoloredStl;
+  return is_none ? kNoColor : colorOf(color, source.is_linear);
+}
 
 void collectMesh(const aiMesh& mesh, const ColorSource& source, const aiMatrix4x4& X_MN, double unit,
                  ImportedMesh& out) {
@@ -127,8 +137,8 @@ void collectMesh(const aiMesh& mesh, const ColorSource& source, const aiMatrix4x
   for (unsigned i = 0; i < mesh.mNumFaces; ++i) {
     const aiFace& face = mesh.mFaces[i];
     if (face.mNumIndices != 3) continue;
-    out.colors.push_back(
-        mesh.HasVertexColors(0) ? colorOf(mesh.mColors[0][face.mIndices[0]], source.is_linear) : painted);
+    out.colors.push_back(mesh.HasVertexColors(0) ? colorOfVertex(mesh.mColors[0][face.mIndices[0]], source)
+                                                 : painted);
     out.has_colors = out.has_colors || out.colors.back() != kNoColor;
     for (unsigned k = 0; k < 3; ++k) out.triangles.push_back(first + face.mIndices[k]);
   }
@@ -178,7 +188,8 @@ ImportedMesh importFile(const std::string& file, double unit) {
   const bool has_library = std::any_of(references.begin(), references.end(), [](const MeshReference& other) {
     return other.only_colors && !other.file.empty();
   });
-  const ColorSource source{*scene, ending == ".gltf" || ending == ".glb", ending != ".obj" || has_library};
+  const ColorSource source{*scene, ending == ".gltf" || ending == ".glb", ending != ".obj" || has_library,
+                           ending == ".stl"};
   if (scene->mRootNode != nullptr) collectNode(source, *scene->mRootNode, aiMatrix4x4(), unit, out);
   return out;
 }

@@ -61,19 +61,31 @@ ImportLimits limitsFor(const std::filesystem::path& file, std::uint64_t file_byt
   return {10.0 + std::ceil(megabytes), (768ULL << 20U) + growth * file_bytes};
 }
 
-/// Waits for the child and kills it after `seconds` [s]. Returns its wait status, or -1 when it was killed.
-int waitFor(pid_t child, double seconds) {
+constexpr int kTooSlow = -1;
+constexpr int kCancelled = -2;
+
+/// Waits for the child and kills it after `seconds` [s], or when `progress` cancels. Returns its wait status,
+/// or why it was killed.
+int waitFor(pid_t child, double seconds, const BakeProgress& progress) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  constexpr std::chrono::milliseconds kBetweenReports{100};
+  auto report_at = std::chrono::steady_clock::now() + kBetweenReports;
   int status = 0;
   while (true) {
     const pid_t done = ::waitpid(child, &status, WNOHANG);
     if (done == child) return status;
-    if (done < 0 && errno != EINTR) return -1;
-    if (std::chrono::steady_clock::now() > end) {
+    if (done < 0 && errno != EINTR) return kTooSlow;
+    const auto now = std::chrono::steady_clock::now();
+    bool is_cancelled = false;
+    if (progress && now > report_at) {
+      is_cancelled = !progress(0.0, kReadingMeshes);
+      report_at = now + kBetweenReports;
+    }
+    if (is_cancelled || now > end) {
       ::kill(child, SIGKILL);
       while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
       }
-      return -1;
+      return is_cancelled ? kCancelled : kTooSlow;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
@@ -229,7 +241,8 @@ Result<TriangleMesh> checked(const std::string& name, TriangleMesh mesh) {
 
 }  // namespace
 
-Result<TriangleMesh> importMesh(const std::filesystem::path& file, double unit) {
+Result<TriangleMesh> importMesh(const std::filesystem::path& file, double unit,
+                                const BakeProgress& progress) {
   const std::string name = file.string();
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) return fail(name + ": no such file");
@@ -250,8 +263,9 @@ Result<TriangleMesh> importMesh(const std::filesystem::path& file, double unit) 
   const auto child = startImporter(file, unit, limits, memory.get());
   if (!child) return fail(name + ": " + child.error().what);
   // the child limits its own processor time; other processes may delay it
-  const int status = waitFor(*child, 4.0 * limits.cpu_seconds);
-  if (status == -1 || (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) ||
+  const int status = waitFor(*child, 4.0 * limits.cpu_seconds, progress);
+  if (status == kCancelled) return fail("cancelled");
+  if (status == kTooSlow || (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) ||
       (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)) {
     return fail(name + ": reading it took too long; the file is probably damaged");
   }

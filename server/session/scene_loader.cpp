@@ -133,7 +133,8 @@ std::uint32_t colorNumber(const std::string& color) {
 /// The levels of one object as JSON; an empty list when its meshes cannot be read. What was made is noted in
 /// a file named by displayKey.
 Result<std::string> displayLevels(const ObjectMeshes& meshes, std::uint32_t uncolored,
-                                  const wire::AssetStore& store, const fs::path& notes) {
+                                  const wire::AssetStore& store, const LoadOptions& options) {
+  const fs::path notes = options.cache / "display";
   const auto key = bake::displayKey(meshes.files, meshes.unit, uncolored);
   if (!key) return std::string("[]");
   std::ifstream noted(notes / *key);
@@ -144,7 +145,9 @@ Result<std::string> displayLevels(const ObjectMeshes& meshes, std::uint32_t unco
     is_whole = is_whole && store.has(text.substr(at + kModelKey.size(), kAssetNameLength));
   if (is_whole) return text;
 
-  const auto models = bake::displayModelsOf(meshes.files, meshes.unit, uncolored);
+  const auto goOn = [&options](double, std::string_view) { return !options.isStopped(); };
+  const auto models = bake::displayModelsOf(meshes.files, meshes.unit, uncolored, goOn);
+  if (options.isStopped()) return fail("stopped");
   if (!models) return std::string("[]");
   text.clear();
   for (const bake::DisplayModel& model : *models) {
@@ -274,7 +277,7 @@ Result<std::string> storeAssets(const LoadedScene& loaded, const LoadOptions& op
     if (options.isStopped()) return fail("stopped");
     const auto meshes = meshesOf(scenario, object, *parts, options);
     if (!meshes) return fail(meshes.error().what);
-    const auto levels = displayLevels(*meshes, colorNumber(object.color), store, options.cache / "display");
+    const auto levels = displayLevels(*meshes, colorNumber(object.color), store, options);
     if (!levels) return levels;
     objects += (objects.empty() ? "" : ",") + *levels;
   }

@@ -304,7 +304,8 @@ TEST(MeshImport, ColoursOfAnStlStayWithTheirTriangles) {
       // the second has no place: it is skipped
       const float z = i == 1 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(i);
       for (const float x : {0.0F, 0.0F, 1.0F, 0.0F, 0.0F, z, 1.0F, 0.0F, z, 0.0F, 1.0F, z}) append(x);
-      append(static_cast<std::uint16_t>(painted ? 0x8000U | i << 10U : 0U));
+      const bool is_painted = painted && i + 1 < kFacets;  // the last one says none
+      append(static_cast<std::uint16_t>(is_painted ? 0x8000U | i << 10U : 0U));
     }
     std::ofstream(folder / "facets.stl", std::ios::binary) << bytes;
   };
@@ -315,25 +316,41 @@ TEST(MeshImport, ColoursOfAnStlStayWithTheirTriangles) {
   ASSERT_EQ(mesh->colors.size(), 11U);
   for (std::size_t i = 0; i < mesh->triangles.size(); ++i) {
     const auto facet = static_cast<std::uint32_t>(mesh->vertices[mesh->triangles[i][0]].z());
-    EXPECT_EQ(mesh->colors[i], ((facet * 255 + 15) / 31) << 16U) << "of 5 bits of red";
+    const std::uint32_t of_5_bits_of_red = ((facet * 255 + 15) / 31) << 16U;
+    EXPECT_EQ(mesh->colors[i], facet == 11 ? kNoColor : of_5_bits_of_red) << facet;
   }
   write(false);
   EXPECT_THAT(colorsOf(folder / "facets.stl"), testing::IsEmpty());
   fs::remove_all(folder);
 }
 
-// Ctrl-C in a terminal reaches the importer too
-TEST(MeshImport, AnInterruptedImportIsNoDamagedFile) {
+/// The import of a triangle by a program of this text.
+Result<TriangleMesh> importBy(const std::string& program, const BakeProgress& progress = {}) {
   const fs::path folder = fs::temp_directory_path() / ("tenon-import-" + std::to_string(getpid()));
   fs::create_directories(folder);
-  std::ofstream(folder / "importer") << "#!/bin/sh\nkill -INT $$\n";
+  std::ofstream(folder / "importer") << "#!/bin/sh\n" << program << "\n";
   fs::permissions(folder / "importer", fs::perms::owner_all);
   std::ofstream(folder / "one.stl") << "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
                                        "vertex 0 1 0\nendloop\nendfacet\nendsolid\n";
-  ASSERT_EQ(setenv("TENON_BAKE", (folder / "importer").c_str(), 1), 0);
-  const auto mesh = importMesh(folder / "one.stl", 1e-3);
+  EXPECT_EQ(setenv("TENON_BAKE", (folder / "importer").c_str(), 1), 0);
+  auto mesh = importMesh(folder / "one.stl", 1e-3, progress);
   unsetenv("TENON_BAKE");
   fs::remove_all(folder);
+  return mesh;
+}
+
+// a signal to this program alone: the importer would go on for ten minutes
+TEST(MeshImport, ThatIsCancelledEndsWithItsImporter) {
+  int asked = 0;
+  const auto mesh = importBy("exec sleep 600", [&](double, std::string_view) { return ++asked < 3; });
+  ASSERT_FALSE(mesh);
+  EXPECT_EQ(mesh.error().what, "cancelled");
+  EXPECT_EQ(asked, 3);
+}
+
+// Ctrl-C in a terminal reaches the importer too
+TEST(MeshImport, AnInterruptedImportIsNoDamagedFile) {
+  const auto mesh = importBy("kill -INT $$");
   ASSERT_FALSE(mesh);
   EXPECT_THAT(mesh.error().what, ::testing::HasSubstr("its import was interrupted"));
 }
