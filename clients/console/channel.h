@@ -33,9 +33,10 @@ using Payload = std::shared_ptr<const std::vector<std::uint8_t>>;
 /// A message of a channel.
 struct Publication {
   ChannelId channel = 0;
-  std::uint64_t instance = 0;  ///< of Delivery::kNewest: equal for messages of equal keys
-  std::int64_t time_ns = 0;    ///< [ns] since 1970, of its writer
-  Payload payload;             ///< null: the instance ended, late subscribers do not get it any more
+  /// of Delivery::kNewest: equal for messages of equal keys; of Delivery::kEach: for those that count alike
+  std::uint64_t instance = 0;
+  std::int64_t time_ns = 0;  ///< [ns] since 1970, of its writer
+  Payload payload;           ///< null: the instance ended, late subscribers do not get it any more
 };
 
 }  // namespace tenon::console

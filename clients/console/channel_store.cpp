@@ -1,5 +1,7 @@
 #include "clients/console/channel_store.h"
 
+#include <algorithm>
+
 namespace tenon::console {
 
 const Channel* ChannelStore::find(ChannelId id) const {
@@ -14,10 +16,21 @@ void ChannelStore::keep(const Publication& publication) {
     kept.newest.erase(publication.instance);
   } else if (channel->delivery == Delivery::kEach) {
     kept.events.push_back(publication);
-    if (kept.events.size() > kMaxEvents) kept.events.pop_front();
+    ++kept.counts[publication.instance];
+    if (kept.events.size() > kMaxEvents) dropEvent(kept);
   } else if (kept.newest.size() < kMaxInstances || kept.newest.contains(publication.instance)) {
     kept.newest.insert_or_assign(publication.instance, publication);
   }
+}
+
+/// The oldest of those that come most often.
+void ChannelStore::dropEvent(Kept& kept) {
+  const auto most = std::max_element(kept.counts.begin(), kept.counts.end(),
+                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  const auto oldest = std::find_if(kept.events.begin(), kept.events.end(),
+                                   [&](const Publication& event) { return event.instance == most->first; });
+  kept.events.erase(oldest);
+  if (--most->second == 0) kept.counts.erase(most);
 }
 
 void ChannelStore::forEachKept(ChannelId id, const std::function<void(const Publication&)>& handler) const {

@@ -11,8 +11,10 @@
 
 namespace tenon::console {
 
-/// All channels and what late subscribers get of them: the newest message of each instance, the last
-/// kMaxEvents of a Delivery::kEach channel. Instances beyond kMaxInstances of a channel are not kept.
+/// All channels and what late subscribers get of them: the newest message of each instance, kMaxEvents of a
+/// Delivery::kEach channel. Of more events those that come most often make room, the oldest first: a warning
+/// that repeats forgets no event that was told once. Instances beyond kMaxInstances of a channel are not
+/// kept.
 ///
 /// Threads: one. Real-time: no.
 class ChannelStore {
@@ -35,7 +37,9 @@ class ChannelStore {
   struct Kept {
     std::map<std::uint64_t, Publication> newest;
     std::deque<Publication> events;
+    std::map<std::uint64_t, std::size_t> counts;  ///< of events, by instance; none is 0
   };
+  static void dropEvent(Kept& kept);
   std::vector<Channel> channels_;  ///< channel `id` at id - 1
   std::vector<Kept> kept_;
 };

@@ -73,18 +73,22 @@ class Desk::Seat {
       while (auto waiting = take()) {
         const auto done = (*client)->send(waiting->second, stop_);
         const std::string why = done ? "" : stop_ ? std::string(kLeft) : done.error().what;
+        // the server has ended the seat, and its notice has not come
+        const bool has_ended = !done && (*client)->refusal() == Refusal::kNotJoined;
         answer_(viewer_, {.id = waiting->first,
                           .accepted = done.has_value(),
                           .text = why,
-                          .role = stop_ ? "" : role,
+                          .role = stop_ || has_ended ? "" : role,
                           .code = std::string(refusalName((*client)->refusal()))});
+        if (has_ended && !stop_) return endSeat(why);
       }
-      if (const auto& lost = (*client)->lost(); lost && !stop_) {
-        answer_(viewer_, {0, false, *lost, {}});
-        return *lost;
-      }
+      if (const auto& lost = (*client)->lost(); lost && !stop_) return endSeat(*lost);
     }
     return std::string(kLeft);
+  }
+  std::string endSeat(const std::string& why) {
+    answer_(viewer_, {.text = why});
+    return why;
   }
   void refuseWaiting(const std::string& why) {
     const std::scoped_lock lock(mutex_);

@@ -13,6 +13,7 @@
 #include "clients/console/desk.h"
 #include "clients/console/lobby.h"
 #include "clients/console/session_feed.h"
+#include "idl/record/recording_kind.h"
 #include "idl/types/names.h"
 #include "idl/types/printable_text.h"
 #include "idl/wire/endpoint.h"
@@ -45,7 +46,7 @@ class Gateway {
                 .role = options.role,
                 .pass = pass_,
                 .key_file = options.key_file,
-                .is_local = isLoopbackHost(options.web.address)},
+                .is_local = isLoopbackAddress(options.web.address)},
         desk_(rights_, options.recordings,
               [this](ViewerId viewer, const DeskAnswer& answer) { say(viewer, answer); }),
         hands_(
@@ -60,6 +61,8 @@ class Gateway {
   Gateway& operator=(const Gateway&) = delete;
 
   Result<void> run() {
+    if (!options_.recording.empty())
+      if (auto playable = record::checkPlayable(options_.recording); !playable) return playable;
     if (auto opened = openServer(); !opened) return opened;
     if (options_.recording.empty()) return followSessions();
     while (!stop_) std::this_thread::sleep_for(kPeriod);

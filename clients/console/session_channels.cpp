@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -62,6 +63,11 @@ bool isOfServer(std::string_view name) {
     found = found || (topic.name == name && topic.parameters.of_server);
   });
   return found;
+}
+
+/// Equal for events of one kind, and of one client where clients tell them.
+std::uint64_t kindOf(const std::string& kind, std::uint32_t client = 0) {
+  return std::hash<std::string>{}(kind) ^ (std::uint64_t{client} << 32U);
 }
 
 /// A message of type M, where the sample is one of `topic`.
@@ -139,14 +145,22 @@ void SessionChannels::receive(const wire::RawSample& sample) {
         record::encodeInstanceGone({std::string(sample.topic), {sample.bytes.begin(), sample.bytes.end()}}));
     return;
   }
-  publish(sample.topic, sample.instance, sample.source_ns, {sample.bytes.begin(), sample.bytes.end()});
+  EventLog event;
+  ClientEvent told;
+  std::uint64_t instance = sample.instance;
+  if (decodeIf(sample, wire::kEventLog, event) != nullptr) {
+    instance = kindOf(event.kind);
+    publish(kLogLines, instance, sample.source_ns, encodeLog(event, sample.source_ns));
+  } else if (decodeIf(sample, wire::kClientEvent, told) != nullptr) {
+    instance = kindOf(told.kind, told.client.value);
+  }
+  publish(sample.topic, instance, sample.source_ns, {sample.bytes.begin(), sample.bytes.end()});
 
   SceneObject object;
   ObjectSnapshot snapshot;
   WorldFrame frame;
   HandState hand;
   StepState step;
-  EventLog event;
   RunState run;
   if (decodeIf(sample, wire::kSceneObject, object) != nullptr) {
     parts_[object.object.value].object = object;
@@ -159,8 +173,6 @@ void SessionChannels::receive(const wire::RawSample& sample) {
     X_WH_[hand.hand.value] = hand.X_WH;  // goes with the next poses of objects
   } else if (decodeIf(sample, wire::kStepState, step) != nullptr) {
     receiveStep(step, sample.source_ns);
-  } else if (decodeIf(sample, wire::kEventLog, event) != nullptr) {
-    publish(kLogLines, 0, sample.source_ns, encodeLog(event, sample.source_ns));
   } else if (decodeIf(sample, wire::kRunState, run) != nullptr) {
     is_over_ = tenon::isOver(run.phase);
   }

@@ -17,7 +17,7 @@ namespace {
 constexpr std::string_view kAssets = "/assets/";
 constexpr std::string_view kGateway = "/gateway.json";
 constexpr std::string_view kRecording = "/recording.mcap";
-constexpr std::uint64_t kMaxRange = 64U << 20U;     // [bytes]
+constexpr std::string_view kModelMagic = "glTF";
 constexpr std::string_view kBuiltFiles = "/page/";  ///< have a hash of their content in their names
 
 std::string_view typeOf(const fs::path& file) {
@@ -49,34 +49,32 @@ constexpr std::string_view kNoPage =
 
 /// What is read first of the bytes of an asset: a binary glTF file, or a list.
 std::string_view typeOfAsset(const std::vector<std::uint8_t>& bytes) {
-  constexpr std::string_view kMagic = "glTF";
   const bool is_model =
-      bytes.size() >= kMagic.size() && std::equal(kMagic.begin(), kMagic.end(), bytes.begin());
+      bytes.size() >= kModelMagic.size() && std::equal(kModelMagic.begin(), kModelMagic.end(), bytes.begin());
   return is_model ? "model/gltf-binary" : "application/json";
 }
 
-/// A range of a file, or all of one that is small.
+std::vector<std::uint8_t> beginOf(const fs::path& file) {
+  std::string begin(kModelMagic.size(), '\0');
+  std::ifstream(file, std::ios::binary).read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  return {begin.begin(), begin.end()};
+}
+
+/// A range of a file, or all of it.
 Answer partOf(const fs::path& file, std::string_view range) {
   std::error_code error;
   const std::uint64_t size = fs::file_size(file, error);
   if (error) return text(404, "text/plain; charset=utf-8", "there is no such file\n");
   Answer answer{206, "application/octet-stream", false, {}, {{"Accept-Ranges", "bytes"}}};
   const bool is_whole = range.empty() && size > 0;
-  if (is_whole && size > kMaxRange)
-    return text(400, "text/plain; charset=utf-8",
-                "the file is large: ask for ranges of at most 64 MiB, as `curl -r 0-67108863`\n");
   const auto part = is_whole ? std::optional(std::pair<std::uint64_t, std::uint64_t>(0, size - 1))
                              : parseRange(range, size);
-  if (!part || part->second - part->first >= kMaxRange) {
+  if (!part) {
     answer.status = 416;
     answer.headers.emplace_back("Content-Range", "bytes */" + std::to_string(size));
     return answer;
   }
-  answer.body.resize(part->second - part->first + 1);
-  std::ifstream in(file, std::ios::binary);
-  in.seekg(static_cast<std::streamoff>(part->first));
-  in.read(reinterpret_cast<char*>(answer.body.data()), static_cast<std::streamsize>(answer.body.size()));
-  if (!in) return text(404, "text/plain; charset=utf-8", "the file cannot be read there\n");
+  answer.part = {file, part->first, part->second - part->first + 1};
   if (is_whole) {
     answer.status = 200;
     return answer;
@@ -147,13 +145,19 @@ Result<void> Site::serveRecording(const fs::path& file) {
   return {};
 }
 
-Answer Site::answer(std::string_view target, std::string_view range) const {
+Answer Site::answer(std::string_view target, std::string_view range, bool has_body) const {
   const std::string_view path = target.substr(0, target.find_first_of("?#"));
   if (path == kRecording && !recording_.empty()) return partOf(recording_, range);
   if (path.starts_with(kAssets)) {
     const std::string_view name = path.substr(kAssets.size());
     // who asks for parts checks the whole
     if (!range.empty() && assets_.has(name)) return partOf(assets_.fileOf(name), range);
+    if (!has_body && assets_.has(name)) {
+      Answer head = partOf(assets_.fileOf(name), {});
+      head.type = typeOfAsset(beginOf(assets_.fileOf(name)));
+      head.is_immutable = true;
+      return head;
+    }
     auto bytes = assets_.get(name);
     if (!bytes) return text(404, "text/plain; charset=utf-8", "there is no such asset\n");
     const std::string_view type = typeOfAsset(*bytes);

@@ -14,6 +14,13 @@
 
 namespace tenon::console {
 
+/// Bytes of a file, which are read while they are sent.
+struct FilePart {
+  std::filesystem::path file;
+  std::uint64_t offset = 0;  ///< [bytes]
+  std::uint64_t size = 0;    ///< [bytes]
+};
+
 /// An answer to a GET request.
 struct Answer {
   unsigned status = 200;
@@ -21,6 +28,7 @@ struct Answer {
   bool is_immutable = false;
   std::vector<std::uint8_t> body;
   std::vector<std::pair<std::string, std::string>> headers;  ///< others
+  std::optional<FilePart> part = std::nullopt;               ///< sent instead of `body`
 };
 
 /// What the gateway serves over HTTP: the files of the page, which are read once at the start, assets by
@@ -38,8 +46,10 @@ class Site {
   /// Serves this file as /recording.mcap. Fails when it cannot be read.
   [[nodiscard]] Result<void> serveRecording(const std::filesystem::path& file);
 
-  /// `target`: as in the request line, with its query; `range`: the header Range.
-  [[nodiscard]] Answer answer(std::string_view target, std::string_view range = {}) const;
+  /// `target`: as in the request line, with its query; `range`: the header Range; `has_body`: not for HEAD,
+  /// for which nothing of an asset but its kind is read.
+  [[nodiscard]] Answer answer(std::string_view target, std::string_view range = {},
+                              bool has_body = true) const;
   [[nodiscard]] bool hasPage() const { return files_.contains("/index.html"); }
 
  private:

@@ -25,7 +25,7 @@ namespace tenon::console {
 class ViewerQueue {
  public:
   static constexpr std::size_t kMaxTexts = 64;
-  static constexpr std::size_t kMaxEvents = 2'000;
+  static constexpr std::size_t kMaxEvents = 4'000;
   static constexpr std::size_t kMaxMessages = 8'000;
 
   /// Either a text or a message.

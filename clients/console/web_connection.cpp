@@ -1,3 +1,4 @@
+#include "clients/console/answer_body.h"
 #include "clients/console/foxglove_protocol.h"
 #include "clients/console/web_service.h"
 
@@ -136,31 +137,49 @@ void WebConnection::handleUpgrade(const Request& request, std::string_view origi
   }
 }
 
+/// An answer while it is sent.
+struct WebConnection::Response {
+  http::response<AnswerBody> message;
+  std::optional<http::response_serializer<AnswerBody>> serializer;
+};
+
 void WebConnection::respond(const Request& request, Answer answer) {
-  auto response = std::make_shared<http::response<http::vector_body<std::uint8_t>>>();
-  response->version(request.version());
-  response->result(answer.status);
-  response->keep_alive(request.keep_alive() && answer.status < 300);
-  response->set(http::field::server, "tenon");
-  response->set(http::field::content_type, answer.type);
-  response->set(http::field::cache_control,
-                answer.is_immutable ? "public, max-age=31536000, immutable" : "no-cache");
-  response->set("Content-Security-Policy", contentSecurityPolicy(server_.options.recordings_from));
-  for (const auto& [name, value] : answer.headers) response->set(name, value);
-  response->set("X-Content-Type-Options", "nosniff");
-  response->set("Referrer-Policy", "no-referrer");
-  response->set("Cross-Origin-Resource-Policy", "same-origin");
-  const std::size_t size = answer.body.size();
-  if (request.method() != http::verb::head) response->body() = std::move(answer.body);
-  response->content_length(size);
-  stream_.next_layer().expires_after(kSendTimeout);
-  http::async_write(stream_, *response,
-                    [self = shared_from_this(), response](beast::error_code error, std::size_t) {
-                      if (!error && response->keep_alive()) return self->read();
-                      if (error) return;
-                      self->startWaiting();  // for the other side's end: it makes room like any that waits
-                      self->stream_.end([self](beast::error_code) { self->stopWaiting(); });
-                    });
+  const bool has_body = request.method() != http::verb::head;
+  const auto response = std::make_shared<Response>();
+  auto& message = response->message;
+  if (has_body && answer.part && !message.body().open(*answer.part))
+    answer = plain(404, "the file cannot be read there");
+  const std::uint64_t size = answer.part ? answer.part->size : answer.body.size();
+  message.version(request.version());
+  message.result(answer.status);
+  message.keep_alive(request.keep_alive() && answer.status < 300);
+  message.set(http::field::server, "tenon");
+  message.set(http::field::content_type, answer.type);
+  message.set(http::field::cache_control,
+              answer.is_immutable ? "public, max-age=31536000, immutable" : "no-cache");
+  message.set("Content-Security-Policy", contentSecurityPolicy(server_.options.recordings_from));
+  for (const auto& [name, value] : answer.headers) message.set(name, value);
+  message.set("X-Content-Type-Options", "nosniff");
+  message.set("Referrer-Policy", "no-referrer");
+  message.set("Cross-Origin-Resource-Policy", "same-origin");
+  message.content_length(size);
+  if (has_body && !answer.part) message.body().hold(std::move(answer.body));
+  response->serializer.emplace(message);
+  send(response);
+}
+
+/// As much as is taken at once; the time that is permitted begins anew with each piece.
+void WebConnection::send(const std::shared_ptr<Response>& response) {
+  stream_.next_layer().expires_after(server_.options.send_timeout);
+  http::async_write_some(
+      stream_, *response->serializer,
+      [self = shared_from_this(), response](beast::error_code error, std::size_t) {
+        if (error) return;
+        if (!response->serializer->is_done()) return self->send(response);
+        if (response->message.keep_alive()) return self->read();
+        self->startWaiting();  // for the other side's end: it makes room like any that waits
+        self->stream_.end([self](beast::error_code) { self->stopWaiting(); });
+      });
 }
 
 }  // namespace tenon::console

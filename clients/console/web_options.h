@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -21,6 +22,7 @@ struct WebOptions {
       origins;  ///< pages from elsewhere that may connect, as in "https://viewer.example"
   std::vector<std::string> recordings_from;  ///< origins of servers from which the page may read recordings
   std::string name = "tenon";                ///< of the server, for viewers
+  std::chrono::milliseconds send_timeout{20'000};  ///< in which a connection has to take something
 };
 
 using ViewerId = std::uint64_t;  ///< of one connection; never used again

@@ -18,6 +18,12 @@ constexpr int kMaxWaitingCalls = 64;
 
 }  // namespace
 
+bool isLoopbackAddress(const std::string& address) {
+  beast::error_code error;
+  const auto interface = asio::ip::make_address(address, error);
+  return !error && interface.is_loopback();
+}
+
 Room::Room(std::vector<Channel> channels)
     : store(std::move(channels)), advertisement(advertiseText(store.channels())) {}
 

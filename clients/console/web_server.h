@@ -16,16 +16,19 @@ namespace tenon::console {
 
 struct WebService;  ///< in web_service.h
 
+/// Whether an address of an interface, as of --listen, is reached from this machine alone.
+[[nodiscard]] bool isLoopbackAddress(const std::string& address);
+
 /// The HTTP and WebSocket server of the gateway, in plain or within TLS; beyond the loopback interface only
 /// with a certificate, or when that is dispensed with. Who speaks plain HTTP to a port with TLS is sent to
 /// https.
 ///
 /// HTTP: a Site. WebSocket: the Foxglove protocol, in rooms, which are paths; each has the channels of one
-/// session. A viewer has a ViewerQueue; one that takes nothing for 20 s, sends more than 200 messages a
-/// second, or messages longer than 64 kB, is disconnected; 256 kB a second are read of it. At most 256
-/// connections are served; when more come, those end that have asked for nothing for longest; the handshake
-/// of TLS and each request have 15 s. A request must name a loopback host or one of the certificate's, and a
-/// WebSocket one a permitted origin.
+/// session. A connection that takes nothing of what is sent for 20 s ends. A viewer has a ViewerQueue; one
+/// that sends more than 200 messages a second, or messages longer than 64 kB, is disconnected; 256 kB a
+/// second are read of it. At most 256 connections are served; when more come, those end that have asked for
+/// nothing for longest; the handshake of TLS and each request have 15 s. A request must name a loopback host
+/// or one of the certificate's, and a WebSocket one a permitted origin.
 ///
 /// Threads: open, start and stop from one thread; it has a thread of its own, which alone serves. The others
 /// from any. Real-time: no.

@@ -23,8 +23,6 @@
 /// The parts of the WebServer; nobody else includes this. All runs in the server's one thread.
 namespace tenon::console {
 
-inline constexpr std::chrono::seconds kSendTimeout{20};
-
 struct WebService;
 
 /// One WebSocket connection. It lives as long as an operation of it is pending.
@@ -99,7 +97,9 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   void handle();
   [[nodiscard]] bool isPermittedHost(std::string_view host) const;
   void handleUpgrade(const Request& request, std::string_view origin, std::string_view host);
+  struct Response;
   void respond(const Request& request, Answer answer);
+  void send(const std::shared_ptr<Response>& response);
 
   WebService& server_;
   WebStream stream_;

@@ -62,7 +62,7 @@ void WebViewer::send() {
   if (!item) return;
   sent_ = std::move(*item);
   is_sending_ = true;
-  send_timer_.expires_after(kSendTimeout);
+  send_timer_.expires_after(server_.options.send_timeout);
   send_timer_.async_wait([self = weak_from_this()](beast::error_code error) {
     const auto viewer = self.lock();
     if (!error && viewer) viewer->abort();
@@ -177,7 +177,7 @@ void WebViewer::close(const std::string& reason) {
 void WebViewer::finish() {
   if (is_closed_) return;
   is_closed_ = true;
-  send_timer_.expires_after(kSendTimeout);
+  send_timer_.expires_after(server_.options.send_timeout);
   send_timer_.async_wait([self = weak_from_this()](beast::error_code error) {
     const auto viewer = self.lock();
     if (!error && viewer) viewer->abort();

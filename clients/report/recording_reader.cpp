@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "idl/record/mcap_reader.h"
+#include "idl/record/recording_kind.h"
 #include "idl/types/messages/commands.h"
 #include "idl/types/messages/contacts.h"
 #include "idl/types/messages/external.h"
@@ -261,6 +262,9 @@ bool RecordedSession::touches(ObjectId object, Tick tick) const {
 Result<RecordedSession> readRecording(const std::filesystem::path& file) {
   auto recording = record::McapReader::open(file);
   if (!recording) return fail(recording.error().what);
+  if (std::string refusal = record::refusalOfKind(*recording, file);
+      !refusal.empty() && !recording->channels().empty())
+    return fail(std::move(refusal));
   RecordedSession session;
   RecordingReader reader(session);
   for (record::McapMessage message; recording->next(message);) reader.read(message);

@@ -398,8 +398,14 @@ class Hands(unittest.TestCase):
 @unittest.skipUnless((PAGE / "node_modules").exists(), "the console's page is not built: deploy/setup console")
 class Player(unittest.TestCase):
     def test_a_place_of_a_recording_is_shown_as_it_was(self):
-        played = subprocess.run(["node", TOOLS / "play_recordings.mjs", SOURCE / "clients" / "console" / "web" / "src", PAGE], capture_output=True, text=True)
-        self.assertEqual(played.returncode, 0, played.stdout + played.stderr)
+        self.run_with_page("play_recordings.mjs")
+
+    def test_what_the_page_says_and_lists(self):
+        self.run_with_page("page_modules.mjs")
+
+    def run_with_page(self, script):
+        done = subprocess.run(["node", TOOLS / script, SOURCE / "clients" / "console" / "web" / "src", PAGE], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
 
 class Browser:
@@ -499,6 +505,50 @@ class Page(unittest.TestCase):
             browser("value", expression="document.querySelector('[data-command=skip]').click()")
             browser("await", expression="[...document.querySelectorAll('.notice')].some(n => n.textContent === 'Skip: accepted')")
             server.wait_for("step skipped")
+            self.assertEqual(browser.problems, [])
+
+    def test_a_stop_is_unconfirmed_while_the_gateway_hangs(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            server = stage.serve("stacking", "--wait-for", "right")
+            console, port = start_console(stage)
+            console.wait_for("joined session 'test'")
+            stage.start("trainee", "--seed", 1)
+            server.wait_for("run: running")
+            for language, unconfirmed, confirmed in (("en-GB", "Stop not confirmed. Use the switch at the device", "Stop forces: confirmed"),
+                                                     ("de-DE", "Halt nicht bestätigt. Nimm den Schalter am Gerät", "Kräfte stoppen: bestätigt")):
+                browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="light", language=language)
+                browser("await", expression="document.querySelector('.top .badge').textContent === 'Live' && tenon.session.run !== undefined")
+                says = f"document.querySelector('.alarm[role=alert]').textContent.startsWith({json.dumps(unconfirmed)}) && document.querySelector('.alarm').offsetHeight > 0"
+                self.assertFalse(browser("value", expression=says))
+                console.signal(signal.SIGSTOP)
+                browser("value", expression="window.pressed = performance.now(), new MutationObserver(() => (window.said ??= performance.now() - window.pressed)).observe(document.querySelector('.alarm'), { childList: true })")
+                browser("key", key="Space")
+                browser("await", expression=says)
+                self.assertLess(browser("value", expression="window.said"), 2000, "ms until it is said")
+                console.signal(signal.SIGCONT)
+                browser("await", expression=f"!document.body.classList.contains('unconfirmed') && [...document.querySelectorAll('.notice.good')].some(n => n.textContent === {json.dumps(confirmed)})")
+                browser("await", expression="document.querySelector('.strip').classList.contains('raised')")
+            server.wait_for("pressed in the browser")
+            self.assertEqual(browser.problems, [])
+
+    def test_a_seat_that_the_server_has_ended_is_shown_as_lost(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            server = stage.serve("stacking", "--wait-for", "right")
+            console, port = start_console(stage, 0, "--role", "instructor")
+            console.wait_for("joined session 'test'")
+            stage.start("trainee", "--seed", 1)
+            server.wait_for("run: running")
+            browser("open", url=f"http://localhost:{port}/#pass={pass_of(console)}", width=1280, height=800, theme="light")
+            browser("await", expression="document.querySelector('.desk')?.hidden === false")
+            client = browser("value", expression="[...tenon.session.people.values()].find(({ name, alive }) => alive && name === 'somebody at the console').client_id")
+            with Viewer(port, origin=f"http://localhost:{port}") as desk:
+                desk.begin("/console")
+                self.assertTrue(desk.ask("deskSit", role="instructor", name="Bob", key=pass_of(console))["accepted"])
+                self.assertTrue(desk.ask("deskCommand", words=["kick", str(client)])["accepted"])
+                browser("await", expression="document.querySelector('[data-offer=seat]')?.textContent.startsWith('Your seat is lost: Bob has removed you')")
+                self.assertTrue(browser("value", expression="document.querySelector('.desk').hidden && document.querySelector('.sit').textContent === 'Take a seat'"))
+                browser("value", expression="document.querySelector('[data-offer=seat] button').click()")
+                browser("await", expression="document.querySelector('dialog[open] h2')?.textContent === 'Take a seat in this session'")
             self.assertEqual(browser.problems, [])
 
     def test_a_mouse_mounts_the_first_part_and_the_session_resimulates(self):
@@ -653,12 +703,33 @@ class Page(unittest.TestCase):
             self.assertEqual(browser.problems, [])
             self.elsewhere(stage, browser, recording)
 
-            # a file that is none
+            # a file that is none, by its address
             cut = stage.out / "cut.mcap"
             cut.write_bytes(recording.read_bytes()[:100_000])
-            _, port = start_console(stage, shown=[cut])
-            browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
-            browser("await", expression="document.querySelector('.cover').textContent.includes('It has no index')")
+            with files_elsewhere(stage.out) as files:
+                _, port = start_console(stage, 0, "--recordings-from", files, shown=[])
+                browser("open", url=f"http://localhost:{port}/?file={urllib.parse.quote(f'{files}/open/cut.mcap', safe='')}", width=1280, height=800, theme="dark")
+                browser("await", expression="document.querySelector('.cover').textContent.includes('It has no index')")
+
+    def test_a_file_that_cannot_be_played_is_named_at_the_start(self):
+        with Stage() as stage:
+            journal, recording, foreign = (stage.out / name for name in ("journal.mcap", "session.mcap", "foreign.mcap"))
+            server = stage.serve(SCENARIO, "--wait-for", "right,recorder", "--journal", journal)
+            recorder = stage.start("record", "-o", recording)
+            stage.start("trainee", "--seed", 1)
+            self.assertEqual((server.wait(), recorder.wait()), (0, 0), server.text())
+            foreign.write_bytes(b"no recording")
+            cut, soon = stage.out / "cut.mcap", stage.out / "soon.mcap"
+            whole = recording.read_bytes()
+            cut.write_bytes(whole[:len(whole) * 2 // 3])
+            soon.write_bytes(whole[:1000])
+            for file, reason in ((journal, f"is the journal of a server.*`tenon resimulate {journal}`"), (cut, f"was cut off.*`tenon report {cut}`"), (soon, "was cut off so soon"), (foreign, "is not a recording"), (stage.out / "none.mcap", "")):
+                refused = tenon("console", file, "--port", 0)
+                self.assertEqual(refused.returncode, 1, refused.stderr)
+                self.assertRegex(refused.stderr, rf"^tenon-console: {file}: .*{reason}")
+            refused = tenon("report", journal)
+            self.assertEqual(refused.returncode, 1, refused.stdout)
+            self.assertRegex(refused.stderr, f"^tenon-report: {journal}: is the journal of a server")
 
     def elsewhere(self, stage, browser, recording):
         """A recording by its address, of another server, which both the console and that server have to permit."""

@@ -5,10 +5,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "idl/types/messages/commands.h"
 #include "idl/types/messages/run.h"
 #include "idl/types/messages/session.h"
 #include "idl/types/stop_truth.h"
 #include "idl/wire/endpoint.h"
+#include "tests/clients/fake_session.h"
 #include "tests/idl/wire/peer.h"
 
 namespace tenon::console {
@@ -195,6 +197,32 @@ TEST_F(DeskTest, SeatsThatAreBeingLeftCount) {
   const auto told = answers(kAttempts);
   EXPECT_THAT(told, testing::Contains(testing::Field(
                         &Told::answer, testing::Field(&DeskAnswer::text, testing::HasSubstr("all seats")))));
+}
+
+// the server forgot it while the gateway hung, and its notice of that was lost
+TEST_F(DeskTest, ASeatOfWhichTheServerKnowsNothingHasEnded) {
+  test::FakeSession session(test::ownDomain(), {});
+  auto acks = wire::Writer<CommandAck>::open(session.session(), wire::kCommandAck);
+  wire::Inbox commands;
+  ASSERT_TRUE(commands.on<Command>(session.session(), wire::kCommand, [&](const Command& command) {
+    (void)acks->write({command.client, command.id, false, "join first", Refusal::kNotJoined});
+  }));
+  const auto tellsUntil = [&](std::size_t count) {
+    return session.serveUntil([&] {
+      commands.dispatch(std::chrono::milliseconds(1));
+      return told().size() >= count;
+    });
+  };
+  desk_->handle(kAda, "test", {.kind = DeskRequest::Kind::kSit, .id = 1, .role = "trainee", .name = "Ada"});
+  ASSERT_TRUE(tellsUntil(1));
+  ASSERT_EQ(told()[0].answer.role, "trainee") << told()[0].answer.text;
+  desk_->handle(kAda, "test", {.id = 2, .words = {"fulfilled"}});
+  ASSERT_TRUE(tellsUntil(3));
+  EXPECT_EQ(told()[1].answer.code, "not_joined");
+  EXPECT_EQ(told()[1].answer.role, "");
+  EXPECT_EQ(told()[2].answer.id, 0U) << "nobody asked: the seat is no more";
+  desk_->handle(kAda, "test", {.id = 3, .words = {"fulfilled"}});
+  EXPECT_FALSE(answers(4)[3].answer.accepted);
 }
 
 TEST_F(DeskTest, WhatCannotBeSentIsSaidInWords) {

@@ -131,6 +131,18 @@ TEST_F(SessionChannelsTest, FramesOfAllObjectsAreInEachMessage) {
   EXPECT_TRUE(taken("/tf").empty());
 }
 
+// that a warning which repeats does not push it out of what late viewers get
+TEST_F(SessionChannelsTest, WhatAStationTellsIsCountedByItsKindAndClient) {
+  const auto kindOf = [&](std::uint32_t client, const char* kind, const char* text) {
+    receive(wire::kClientEvent, {.client = ClientId{client}, .kind = kind, .text = text});
+    return channels_.take().back().instance;
+  };
+  const std::uint64_t device = kindOf(1, "device", "hand right: falcon, workspace radius 0.050 m");
+  EXPECT_EQ(kindOf(1, "device", "hand left: falcon, workspace radius 0.050 m"), device);
+  EXPECT_NE(kindOf(1, "warning", "hand right: ahead of the contact set"), device);
+  EXPECT_NE(kindOf(2, "device", "hand right: falcon, workspace radius 0.050 m"), device);
+}
+
 TEST_F(SessionChannelsTest, TheEndOfAnInstanceIsToldAndForgotten) {
   receive(wire::kPresence, {.client = ClientId{3}, .name = "somebody"});
   static_cast<void>(channels_.take());

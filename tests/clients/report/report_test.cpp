@@ -159,6 +159,22 @@ TEST_F(ReportTest, AFileThatIsNoRecordingFailsWithASentence) {
   EXPECT_THAT(analysis.error().what, HasSubstr("is not a recording"));
 }
 
+TEST_F(ReportTest, AJournalAndAForeignFileAreNamedAsWhatTheyAre) {
+  const auto refusalOf = [&](const char* topic, const char* type) {
+    auto writer = record::McapWriter::open(file_);
+    const std::uint8_t byte = 0;
+    EXPECT_TRUE(writer->write(writer->addChannel(topic, type, ""), 1, 0, {&byte, 1}));
+    EXPECT_TRUE(writer->close());
+    const auto analysis = analyzeRecording(file_);
+    return analysis ? "" : analysis.error().what;
+  };
+  EXPECT_THAT(
+      refusalOf("TickInput", "tenon::TickInputPart"),
+      AllOf(HasSubstr(file_.string() + ": is the journal of a server"), HasSubstr("tenon resimulate")));
+  EXPECT_THAT(refusalOf("/scan", "sensor_msgs/msg/LaserScan"), HasSubstr("is no recording of a session"));
+  EXPECT_EQ(refusalOf("EventLog", "tenon::EventLog"), "") << "what a recorder that was killed soon has";
+}
+
 constexpr std::string_view kPage = "<title>Tenon</title><style></style><!-- data --><script>code</script>";
 
 TEST_F(ReportTest, NoTextOfASessionCanEndItsBlockInThePage) {

@@ -1,33 +1,18 @@
 // Plays small recordings with the page's own modules: what they tell a session at a place, and when a tick was.
 // Usage: node play_recordings.mjs CONSOLE_SOURCES FOLDER_WITH_NODE_MODULES
 import assert from "node:assert/strict";
-import { writeFile, mkdtemp, rm } from "node:fs/promises";
-import { createRequire } from "node:module";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
-import { pathToFileURL } from "node:url";
+
+import { loadPage, runTests } from "./page_loader.mjs";
 
 const [sources, libraries] = process.argv.slice(2);
-const require = createRequire(join(libraries, "package.json"));
-const folder = await mkdtemp(join(tmpdir(), "play_recordings_"));
-
-async function load() {
-  const contents = `export { Recording } from "${sources}/recording.ts"; export { Session } from "${sources}/session.ts"; export { McapWriter } from "@mcap/core";`;
-  const built = await require("esbuild").build({
-    stdin: { contents, resolveDir: sources, loader: "ts" }, bundle: true, write: false, format: "esm", platform: "node", logLevel: "error",
-    nodePaths: [join(libraries, "node_modules")], banner: { js: 'import { createRequire } from "node:module"; const require = createRequire(import.meta.url);' },
-  });
-  const file = join(folder, "page.mjs");
-  await writeFile(file, built.outputFiles[0].text);
-  return import(pathToFileURL(file).href);
-}
-
-const { Recording, Session, McapWriter } = await load();
+const { Recording, Session, McapWriter } = await loadPage(sources, libraries, [
+  'export { Recording } from "./recording";', 'export { Session } from "./session";', 'export { McapWriter } from "@mcap/core";',
+]);
 const ZERO = { p: [0, 0, 0], q: [1, 0, 0, 0] };
 const at = (id, x) => ({ object_id: id, epoch: 1, X_WO: { ...ZERO, p: [x, 0, 0] } });
 
 /** A recording of [time in s, topic, message]. */
-async function recorded(messages) {
+async function recorded(messages, metadata) {
   const parts = [];
   let size = 0n;
   const writable = { position: () => size, write: async (bytes) => void (parts.push(bytes.slice()), (size += BigInt(bytes.length))) };
@@ -42,14 +27,15 @@ async function recorded(messages) {
     const time = BigInt(Math.round(seconds * 1e9));
     await writer.addMessage({ channelId: channels.get(topic), sequence: 0, logTime: time, publishTime: time, data: new TextEncoder().encode(JSON.stringify(message)) });
   }
+  if (metadata !== undefined) await writer.addMetadata({ name: "tenon recording", metadata: new Map(Object.entries(metadata)) });
   await writer.end();
   const file = Buffer.concat(parts);
   return { size: async () => BigInt(file.length), read: async (offset, length) => new Uint8Array(file.subarray(Number(offset), Number(offset + length))) };
 }
 
-async function opened(messages) {
+async function opened(messages, metadata) {
   const session = new Session();
-  const recording = await Recording.open(await recorded(messages), (topic, message, isGone) => session.receive(topic, message, isGone), () => undefined);
+  const recording = await Recording.open(await recorded(messages, metadata), (topic, message, isGone) => session.receive(topic, message, isGone), () => undefined);
   return { session, recording };
 }
 
@@ -103,6 +89,36 @@ const tests = {
     assert.equal(recording.secondsOf(500), 0.5);
   },
 
+  // begun 60 s after the server: what that keeps for late joiners has its old times
+  async "a recording that was begun late begins where its streams do"() {
+    for (const announced of [60, 62]) { // the recorder's clock is right, or ahead of the server's
+      const { session, recording } = await opened([
+        [5, "SceneObject", { object_id: 1, name: "peg" }],
+        [10, "EventLog", { seq: 1, tick: 5000, severity: 0, kind: "step", text: "a" }],
+        [announced, "SessionAnnounce", { session: "late", title: "", lockstep: false, scene_hash: "", protocol_version: 1 }],
+        [60.1, "WorldFrame_100", { part: 0, parts: 1, tick: 55100, states: [at(1, 1)] }],
+        [70, "WorldFrame_100", { part: 0, parts: 1, tick: 65000, states: [at(1, 2)] }],
+      ]);
+      const begin = Math.min(announced, 60.1);
+      assert.ok(Math.abs(recording.seconds - (70 - begin)) < 1e-6, `${recording.seconds} s`);
+      await recording.seek(0.2);
+      assert.equal(session.objects.size, 1);
+      assert.equal(session.events.length, 1, "what was before is known");
+      assert.equal(session.states.get(1).X_WO.p[0], 1);
+      assert.ok(Math.abs(recording.secondsOf(65000) - (70 - begin)) < 1e-6, "a tick is counted from the event before the beginning");
+    }
+  },
+
+  // times are those of ticks since the recorder began: 60 s of them are not in it
+  async "a recording in lockstep that was begun late begins where its streams do"() {
+    const announce = [100, "SessionAnnounce", { session: "late", title: "", lockstep: true, scene_hash: "", protocol_version: 1 }];
+    const frames = [60, 65].map((seconds) => [100 + seconds, "WorldFrame_100", { part: 0, parts: 1, tick: 1000 * seconds, states: [at(1, 1)] }]);
+    const { recording } = await opened([announce, ...frames], { lockstep: "yes" });
+    assert.equal(recording.seconds, 5);
+    // in real time that is a session that waited for people
+    assert.equal((await opened([announce, ...frames], { lockstep: "no" })).recording.seconds, 65);
+  },
+
   async "what is plotted before a place have the session's times"() {
     const messages = [[0, "EventLog", { seq: 1, tick: 0, severity: 0, kind: "step", text: "a" }]];
     for (let i = 1; i <= 100; ++i) {
@@ -115,15 +131,4 @@ const tests = {
   },
 };
 
-let failed = 0;
-for (const [name, test] of Object.entries(tests)) {
-  try {
-    await test();
-    console.log(`passed: ${name}`);
-  } catch (problem) {
-    ++failed;
-    console.log(`failed: ${name}: ${problem.stack}`);
-  }
-}
-await rm(folder, { recursive: true });
-process.exit(failed > 0 ? 1 : 0);
+await runTests(tests);

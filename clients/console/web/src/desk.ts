@@ -4,8 +4,9 @@ import type { DeskAnswer, LiveSource } from "./live";
 import { modelOf } from "./eventtext";
 import { NONE, RunPhase, Status, type SceneObject } from "./messages";
 import { Pairs } from "./pairs";
+import { Presses } from "./presses";
 import type { Session } from "./session";
-import { hasText, language, t, type Key } from "./strings";
+import { hasText, language, retold, t, type Key } from "./strings";
 
 const NOTICE = 8000; // [ms] that an answer is shown
 const NOTICES = 3;
@@ -18,6 +19,8 @@ export class Desk {
   readonly sit = h("button", "sit");
   readonly bar = h("section", "desk");
   readonly notices = h("div", "notices");
+  /** Said until it is known whether the stop that was pressed has taken effect. */
+  readonly alarm = h("span", "alarm");
   /** That the server has granted; empty: looks on. */
   role = "";
   /** Whether this console has a folder for recordings, and writes one of this session. */
@@ -32,6 +35,9 @@ export class Desk {
   private hands = [h("select"), h("select")]; // that gets, that releases
   private pairs: Pairs;
   private listed = "";
+  private presses = new Presses(() => this.source.ask("deskCommand", { words: ["emergency", t("stop.reason")] }), () => this.showAlarm());
+  private isEnded = new AbortController();
+  private lastRefusal = ""; // of a seat
 
   /** `isOfAll`: the stop is for all sessions. */
   constructor(private source: LiveSource, private session: Session, gatewayRole: string, private isOfAll = false) {
@@ -47,14 +53,17 @@ export class Desk {
     this.sit.addEventListener("click", () => (this.role === "" ? this.askForSeat() : void this.leave()));
     source.onNotice = (answer) => {
       this.role = answer.role;
-      this.notify(false, answer.text);
+      if (answer.role === "") this.offerSeat(reasonOfLoss(answer.text));
+      else this.notify(false, answer.text);
       this.show();
     };
+    this.alarm.setAttribute("role", "alert");
     this.pairs = new Pairs(session, (a, b, isOn) => this.command("collision", a, b, isOn ? "on" : "off"));
     this.more.addEventListener("toggle", () => this.pairs.show());
     // Escape and a click beside it close it
-    addEventListener("keydown", ({ key }) => key === "Escape" && (this.more.open = false));
-    addEventListener("pointerdown", ({ target }) => target instanceof Node && !this.more.contains(target) && (this.more.open = false));
+    const { signal } = this.isEnded;
+    addEventListener("keydown", ({ key }) => key === "Escape" && (this.more.open = false), { signal });
+    addEventListener("pointerdown", ({ target }) => target instanceof Node && !this.more.contains(target) && (this.more.open = false), { signal });
     this.build();
     document.body.append(this.dialog);
     this.setWords();
@@ -120,7 +129,28 @@ export class Desk {
     ];
     for (const [element, key] of labels) element.setAttribute("aria-label", t(key));
     this.listed = "";
+    this.showAlarm();
     this.show();
+  }
+
+  private showAlarm(): void {
+    const { isUnconfirmed } = this.presses;
+    document.body.classList.toggle("unconfirmed", isUnconfirmed);
+    const understood = h("button", "", t("part.understood"));
+    understood.addEventListener("click", () => this.presses.forget());
+    this.alarm.replaceChildren(...(isUnconfirmed ? [icon("warn"), h("span", "", this.alarmText), understood] : []));
+    // nothing is in front of it
+    if (isUnconfirmed) for (const dialog of document.querySelectorAll("dialog")) dialog.close();
+  }
+
+  /** Empty while nothing is wrong. */
+  get alarmText(): string {
+    return this.presses.isUnconfirmed ? t("stop.unconfirmed") : "";
+  }
+
+  /** What the session says of its stop is known again. */
+  forgetPresses(): void {
+    this.presses.forget();
   }
 
   /** Called when the session has changed. */
@@ -138,6 +168,7 @@ export class Desk {
     if (this.sit.textContent !== label) this.sit.replaceChildren(icon("person"), label);
     this.sit.hidden = this.role === "" && session.link?.state !== "joined"; // in no session there is a seat
     this.bar.hidden = this.role === "" || session.isOver;
+    for (const offer of this.notices.querySelectorAll<HTMLElement>("[data-offer] button")) offer.hidden = session.isOver || session.link?.state !== "joined";
     for (const { button, shows } of this.buttons) button.hidden = shows !== undefined && !shows();
     if (this.more.open) this.pairs.show();
     this.list();
@@ -172,7 +203,7 @@ export class Desk {
     const role = sessionStorage.getItem("role");
     const key = sessionStorage.getItem(PASS);
     if (role === null || key === null || this.role !== "") return;
-    await this.takeSeat(role, localStorage.getItem("name") ?? "", key);
+    if (!(await this.takeSeat(role, localStorage.getItem("name") ?? "", key))) this.offerSeat(this.lastRefusal);
   }
 
   loseSeat(): void {
@@ -180,10 +211,23 @@ export class Desk {
     this.show();
   }
 
+  private offerSeat(reason: string): void {
+    this.offer("seat", t("desk.lost", { reason }), t("desk.sit.again"), () => this.askForSeat());
+  }
+
+  /** It is not shown any more. */
+  end(): void {
+    this.isEnded.abort();
+    this.presses.forget();
+    for (const element of [this.stop, this.clear, this.sit, this.bar, this.notices, this.alarm, this.dialog]) element.remove();
+  }
+
   private async takeSeat(role: string, name: string, key: string): Promise<boolean> {
     const answer = await this.source.ask("deskSit", { role, name: name || t("desk.somebody"), key });
     this.role = answer?.role ?? "";
+    this.lastRefusal = answer === undefined ? t("desk.offline") : reasonOf(answer);
     if (answer?.accepted === true) {
+      this.withdraw("seat");
       sessionStorage.setItem(PASS, key);
       sessionStorage.setItem("role", role);
     }
@@ -194,6 +238,7 @@ export class Desk {
 
   private async leave(): Promise<void> {
     sessionStorage.removeItem("role");
+    this.withdraw("seat");
     const answer = await this.source.ask("deskLeave");
     this.role = "";
     this.tell(t("desk.leave"), answer);
@@ -246,8 +291,8 @@ export class Desk {
 
   /** The emergency stop; also when one stands. */
   async raise(): Promise<void> {
-    const answer = await this.source.ask("deskCommand", { words: ["emergency", t("stop.reason")] });
-    this.tell(t("stop.press"), answer, t("stop.unreachable"));
+    const answer = await this.presses.press();
+    this.tell(t("stop.press"), answer, t("stop.unreachable"), t("stop.confirmed"));
   }
 
   async command(...words: string[]): Promise<boolean> {
@@ -255,21 +300,56 @@ export class Desk {
     const answer = await this.source.ask("deskCommand", { words });
     if (words[0] === "record" && answer?.accepted === true) this.isRecording = words[1] === "start";
     this.tell(t(label), answer);
+    if (answer?.code === "not_joined" && this.role !== "") {
+      this.role = "";
+      this.offerSeat(t("lost.expired"));
+    }
     this.show();
     return answer?.accepted === true;
   }
 
-  private tell(what: string, answer: DeskAnswer | undefined, offline = t("desk.offline")): void {
+  private tell(what: string, answer: DeskAnswer | undefined, offline = t("desk.offline"), accepted = t("desk.accepted")): void {
     if (answer === undefined) this.notify(false, `${what}: ${offline}`);
-    else this.notify(answer.accepted, `${what}: ${reasonOf(answer) || t(answer.accepted ? "desk.accepted" : "desk.refused")}`);
+    else this.notify(answer.accepted, `${what}: ${reasonOf(answer) || (answer.accepted ? accepted : t("desk.refused"))}`);
   }
 
   notify(isGood: boolean, text: string): void {
     const notice = h("p", isGood ? "notice good" : "notice bad", icon(isGood ? "done" : "warn"), h("span", "", ...marked(text)));
     this.notices.append(notice);
-    while (this.notices.childElementCount > NOTICES) this.notices.firstElementChild?.remove();
+    const passing = [...this.notices.querySelectorAll(".notice:not([data-offer])")];
+    for (const old of passing.slice(0, -NOTICES)) old.remove();
     setTimeout(() => notice.remove(), NOTICE);
   }
+
+  /** Says what was lost, and what can be done; stays until that is done or it is withdrawn. */
+  offer(name: string, text: string, label: string, act: () => void): void {
+    this.withdraw(name);
+    const button = h("button", "", label);
+    const notice = h("p", "notice bad", icon("warn"), h("span", "", ...marked(text)), button);
+    notice.dataset["offer"] = name;
+    button.addEventListener("click", act);
+    this.notices.append(notice);
+    this.show();
+  }
+
+  withdraw(name: string): void {
+    this.notices.querySelector(`[data-offer="${name}"]`)?.remove();
+  }
+}
+
+/** Texts of the gateway and of the server, of a seat that is no more. */
+const LOSSES: [RegExp, Key][] = [
+  [/ was removed by (?<by>.+)$/, "lost.removed"],
+  [/ is gone$/, "lost.gone"],
+  [/: has left$|has been silent for |join first$/, "lost.expired"],
+  [/^nothing was heard of this page/, "lost.page"],
+];
+
+/** Why a seat was lost, in this page's language where it has words for it. */
+export function reasonOfLoss(text: string): string {
+  const known = LOSSES.find(([pattern]) => pattern.test(text));
+  if (known === undefined) return text.replace(/\.$/, "");
+  return t(known[1], { by: retold(known[0].exec(text)?.groups?.["by"] ?? "", "desk.somebody") });
 }
 
 /** What the gateway or the server answers, in this page's language where it has words for it. In English the server says more: it names what is missing. */

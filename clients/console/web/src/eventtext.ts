@@ -141,7 +141,8 @@ export function textOf(session: Session, event: Pick<EventLog, "kind" | "text">)
     const groups = pattern.exec(event.text)?.groups;
     if (groups === undefined && !pattern.test(event.text)) continue;
     const values = Object.fromEntries(Object.entries(groups ?? {}).map(([name, text]) => [name, text === undefined ? "" : value(session, name, text)]));
-    return t(key, values).replace(/[:;,] *$/, "").trim();
+    if (key === "event.by.hand" && values["title"] === values["hand"]) return values["hand"]; // its own object
+    return t(key, values).replace(/[:;,.] *$/, "").trim();
   }
-  return event.kind.startsWith("step") ? readable(session, event.text) : event.text;
+  return (event.kind.startsWith("step") ? readable(session, event.text) : event.text).replace(/(?<!\.)\.$/, "");
 }

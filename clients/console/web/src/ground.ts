@@ -2,6 +2,8 @@
 import * as THREE from "three";
 import { RoomEnvironment } from "three/examples/jsm/environments/RoomEnvironment.js";
 
+import { release } from "./release";
+
 export class Ground {
   readonly sun: THREE.DirectionalLight;
   private floor = new THREE.Mesh(new THREE.PlaneGeometry(1, 1), new THREE.ShadowMaterial({ opacity: 0.28, depthWrite: false }));
@@ -29,6 +31,13 @@ export class Ground {
     scene.add(this.floor);
   }
 
+  /** It is not drawn any more. */
+  end(): void {
+    for (const shown of [this.floor, this.grid]) if (shown !== undefined) release(shown);
+    this.sun.shadow.map?.dispose();
+    this.scene.environment?.dispose();
+  }
+
   setColor(color: string): void {
     this.color.set(color);
     const material = this.grid?.material as THREE.LineBasicMaterial | undefined;
@@ -48,7 +57,10 @@ export class Ground {
     this.floor.position.set(center.x, center.y, z);
     // cells of 1, 10, 100 mm ... of which about five are as wide as the scene
     const cell = 10 ** Math.round(Math.log10(radius / 4));
-    if (this.grid !== undefined) this.scene.remove(this.grid);
+    if (this.grid !== undefined) {
+      this.scene.remove(this.grid);
+      release(this.grid);
+    }
     this.grid = new THREE.LineSegments(gridOf(Math.ceil((2.5 * radius) / cell), cell), new THREE.LineBasicMaterial({ color: this.color, vertexColors: true, transparent: true, depthWrite: false }));
     this.grid.position.set(Math.round(center.x / cell) * cell, Math.round(center.y / cell) * cell, z);
     this.grid.renderOrder = -2;

@@ -2,6 +2,7 @@
 import * as THREE from "three";
 
 import type { Hand } from "./hand";
+import { release } from "./release";
 import type { SceneView } from "./scene";
 
 const STILL = 500; // [ms] without a picture: nobody wears it, and the dead man's switch is released
@@ -68,6 +69,7 @@ export class Headset {
     for (const source of this.pointers.keys()) this.forget(source);
     this.hand.isWatched = undefined;
     this.view.rig.remove(this.card.group);
+    release(this.card.group);
     this.card.dispose();
     this.view.leaveHeadset();
   }
@@ -78,7 +80,10 @@ export class Headset {
     this.grasps.delete(source);
     this.pressed.delete(source);
     const pointer = this.pointers.get(source);
-    if (pointer !== undefined) this.view.rig.remove(pointer);
+    if (pointer !== undefined) {
+      this.view.rig.remove(pointer);
+      release(pointer);
+    }
     this.pointers.delete(source);
   }
 

@@ -30,11 +30,7 @@ export class Lobby {
   receive(state: LobbyState): void {
     const names = new Set(state.sessions.map(({ session }) => session));
     for (const [name, card] of this.cards) {
-      if (names.has(name)) continue;
-      card.source?.close();
-      card.view?.end();
-      card.element.remove();
-      this.cards.delete(name);
+      if (!names.has(name)) this.close(name, card);
     }
     for (const info of state.sessions) {
       const card: Card = this.cards.get(info.session) ?? this.card(info);
@@ -47,6 +43,19 @@ export class Lobby {
       card.source = new LiveSource(addressOf(`/live/${encodeURIComponent(info.session)}`), TOPICS, follow, () => undefined);
     }
     this.shown = 0;
+  }
+
+  private close(name: string, card: Card): void {
+    card.source?.close();
+    card.view?.end();
+    card.element.remove();
+    this.cards.delete(name);
+  }
+
+  /** It is not shown any more. */
+  end(): void {
+    for (const [name, card] of this.cards) this.close(name, card);
+    this.element.remove();
   }
 
   private card(info: Card["info"]): Card {

@@ -258,7 +258,10 @@ function showPanels(sinceLast: number): void {
   view?.setCover(card.hidden || isPicture ? undefined : card);
 }
 
+let isReplaced = false; // by two pages beside each other
+
 function frame(now: number): void {
+  if (isReplaced) return;
   const sinceLast = session.heard === 0 || player !== undefined ? 0 : (now - session.heard) / 1000;
   player?.update(now);
   lobby?.update(now);
@@ -301,7 +304,10 @@ function follow(room: string, { role, recordings, local }: Gateway): void {
   source = new LiveSource(addressOf(room), TOPICS, (topic, message, isGone) => {
     session.receive(topic, message, isGone);
     const isJoined = session.link?.state === "joined";
-    if (isJoined && !joined) void desk?.takeSeatAgain();
+    if (isJoined && !joined) {
+      desk?.forgetPresses();
+      void desk?.takeSeatAgain();
+    }
     joined = isJoined;
   }, (state) => {
     live = state;
@@ -316,10 +322,14 @@ function follow(room: string, { role, recordings, local }: Gateway): void {
   if (view !== undefined) {
     part = new Part(source, session, view, () => sessionStorage.getItem(PASS) ?? "", (isGood, text) => notify.call(desk, isGood, text), () => void desk?.raise());
     part.isLocal = local === true;
+    part.alarm = () => desk?.alarmText ?? "";
+    part.onLoss = (reason, again) => desk?.offer("hand", t("part.lost", { reason }), t("part.take.again"), again);
+    part.onTaken = () => desk?.withdraw("hand");
     strip.append(part.take);
     stage.append(part.bar, part.lesson);
     Object.assign(window, { tenon: { session, view, player, part } });
   }
+  strip.prepend(desk.alarm);
   strip.append(desk.sit, desk.clear, desk.stop);
   strip.after(desk.bar);
   stage.append(desk.notices);
@@ -330,8 +340,12 @@ function showLobby(role: string): void {
   lobby.setWords();
   app.classList.add("shows-lobby");
   stage.append(lobby.element);
-  source = new LiveSource(addressOf("/lobby"), ["/lobby"], (_, message) => lobby?.receive(message as LobbyState), (state) => (live = state));
+  source = new LiveSource(addressOf("/lobby"), ["/lobby"], (_, message) => lobby?.receive(message as LobbyState), (state) => {
+    if (state.kind === "open") desk?.forgetPresses();
+    live = state;
+  });
   desk = new Desk(source, session, role, true);
+  strip.prepend(desk.alarm);
   strip.append(desk.stop);
   stage.append(desk.notices);
 }
@@ -341,8 +355,10 @@ let opens = 0;
 async function play(file: Played): Promise<void> {
   const mine = ++opens; // of several files that are dropped one after the other the last one counts
   source?.close();
-  part?.end();
-  for (const element of [part?.take, part?.bar, part?.lesson, desk?.stop, desk?.clear, desk?.sit, desk?.bar, desk?.notices, lobby?.element, player?.element]) element?.remove();
+  part?.remove();
+  desk?.end();
+  lobby?.end();
+  player?.element.remove();
   [source, desk, part, lobby, player] = [undefined, undefined, undefined, undefined, undefined];
   app.classList.remove("shows-lobby");
   opening = { fraction: 0 };
@@ -357,7 +373,11 @@ async function play(file: Played): Promise<void> {
     player = new Player(recording, session, (name) => panels.titleOfStep([...session.sceneSteps.values()].find((step) => step.name === name) ?? { name, title: [] }));
     status.before(player.element);
     if (wanted.has(FRAME)) player.onCommand = tellBeside;
-    else player.allowCompare((other) => showBeside(app, file, other));
+    else player.allowCompare((other) => {
+      isReplaced = true;
+      view?.end();
+      showBeside(app, file, other);
+    });
     opening = undefined;
     const start = wanted.get("t") === "end" ? player.recording.seconds : Number(wanted.get("t") ?? 0);
     if (start > 0) player.seek(start);

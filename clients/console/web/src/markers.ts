@@ -2,6 +2,7 @@
 import * as THREE from "three";
 
 import { NONE, StepPhase, type Pose } from "./messages";
+import { release } from "./release";
 import type { Session } from "./session";
 
 export const COLORS = { target: 0x0072b2, within: 0x009e73, device: 0xe69f00, force: 0xcc79a7, shallow: 0xf0e442, deep: 0xd55e00, guide: 0x56b4e9 };
@@ -67,13 +68,28 @@ export class Markers {
 
   /** Of another session nothing is left. */
   clear(): void {
-    for (const { device, link } of this.hands.values()) this.scene.remove(device, link);
-    for (const bracelet of this.tactors.values()) this.scene.remove(...bracelet);
-    this.scene.remove(...this.workspaces.values());
+    const hands = [...this.hands.values()].flatMap(({ device, link }) => [device, link]);
+    for (const shown of [...hands, ...[...this.tactors.values()].flat(), ...this.arrows]) {
+      this.scene.remove(shown);
+      release(shown);
+    }
+    this.arrows = [];
+    for (const workspace of this.workspaces.values()) {
+      this.scene.remove(workspace);
+      workspace.material.dispose(); // all have one sphere
+    }
     this.workspaces.clear();
     this.hands.clear();
     this.tactors.clear();
     this.approach.visible = false;
+  }
+
+  /** It is not drawn any more. */
+  end(): void {
+    this.clear();
+    for (const shown of [this.contacts, this.guide, this.approach]) release(shown);
+    this.contacts.dispose();
+    this.sphere.dispose();
   }
 
   take(session: Session): void {

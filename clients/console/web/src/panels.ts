@@ -43,7 +43,8 @@ export function titleOfStep(step: { name: string; title: StepEntry["title"] }): 
   return localized(step.title) || step.name.replace(/_/g, " ");
 }
 
-export function phase({ run, isOver, isWaiting }: Session): HTMLElement | undefined {
+export function phase({ run, isOver, isWaiting, standing }: Session): HTMLElement | undefined {
+  if (standing.length > 0 && !isOver) return badge(["run.emergency", "stop", "bad"]);
   if (isWaiting) return badge(RUN[RunPhase.Waiting]);
   if (run?.forces_frozen === true && run.phase === RunPhase.Running && !isOver) return badge(["run.frozen", "frozen", "warn"]);
   return run === undefined ? undefined : badge(RUN[run.phase]);
@@ -165,8 +166,8 @@ export function people(session: Session, { leads, hand }: Lead): Node[] {
     const head = h("div", "", h("span", "name", retold(person.name, "desk.somebody")), h("span", "muted", t(`role.${person.role}` as Key)), h("span", "holds", what === "" ? "" : t("holds", { what })));
     const link = linkOf(session, person.client_id);
     const actions: HTMLElement[] = [];
-    const act = (name: string, value: string, label: string, more: string): void => {
-      const button = h("button", "", label);
+    const act = (name: string, value: string, label: string, more: string, text = label): void => {
+      const button = h("button", "", text);
       button.dataset[name] = value;
       button.setAttribute("aria-label", `${label}: ${more}`);
       actions.push(button);
@@ -175,12 +176,14 @@ export function people(session: Session, { leads, hand }: Lead): Node[] {
     if (leads && hand !== undefined && !isOwn)
       for (const { object_id } of held) act("takeOver", session.objects.get(object_id)?.name ?? "", t("desk.takeover"), t("desk.takeover.more", { what: session.titleOf(object_id) }));
     const guided = hands.filter((id) => session.isGuided(id));
-    if (leads && person.role === TRAINEE)
-      for (const id of hands.filter((one) => session.sceneHands.has(one) && !session.isTracked(one))) {
+    if (leads && person.role === TRAINEE) {
+      const own = hands.filter((one) => session.sceneHands.has(one) && !session.isTracked(one));
+      for (const id of own) {
         const [name, what] = [session.sceneHands.get(id)?.name ?? "", session.nameOfHand(id)];
-        for (const kind of ["show", "together"] as const) act("guide", `${kind} ${name}`, t(`guide.${kind}`), t(`guide.${kind}.more`, { what }));
-        act("guide", `off ${name}`, t("guide.off"), t("guide.off.more", { what }));
+        for (const kind of ["show", "together", "off"] as const)
+          act("guide", `${kind} ${name}`, t(`guide.${kind}`), t(`guide.${kind}.more`, { what }), own.length > 1 ? `${t(`guide.${kind}`)}: ${what}` : undefined);
       }
+    }
     const limited = hands.map((id) => interventions(session.hands.get(id)?.safety_flags ?? 0)).find((text) => text !== "") ?? "";
     const guidance = guided.length === 0 ? "" : t("guide.acts", { what: guided.map((id) => session.nameOfHand(id)).join(", ") });
     if (leads && person.role !== OBSERVER) act("kick", String(person.client_id), t("desk.kick"), `${t("desk.kick")}: ${person.name}`);

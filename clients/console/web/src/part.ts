@@ -1,4 +1,5 @@
 // Taking part: a place in the session for who sits at this page, and what stands around the hand while it is taken.
+import { reasonOfLoss } from "./desk";
 import { h, icon, marked, type Icon } from "./dom";
 import { Hand } from "./hand";
 import { hasHeadset, Headset, type CardText } from "./headset";
@@ -32,8 +33,13 @@ export class Part {
   private audio?: AudioContext;
   private headset?: Headset;
   private hasHeadset = false;
+  /** What is wrong with the stop, for a headset, in which nothing of the page is seen; and how the loss of a place is said. */
+  alarm: () => string = () => "";
+  onLoss?: (reason: string, again: () => void) => void;
+  onTaken?: () => void;
   isLocal = true; // nobody elsewhere reaches the gateway: a trainee needs no key
   private isAsking = false;
+  private isEnded = new AbortController();
   private step = -1;
   private invited = new URLSearchParams(location.search).get("you") ?? ""; // to this role's place, by the address
   private isNew = false; // of the step nothing was shown yet
@@ -45,12 +51,13 @@ export class Part {
       this.setWords();
     });
     lookForHeadset();
-    navigator.xr?.addEventListener("devicechange", lookForHeadset);
+    navigator.xr?.addEventListener("devicechange", lookForHeadset, { signal: this.isEnded.signal });
     this.take.addEventListener("click", () => (this.hand === undefined ? this.ask() : void this.leave()));
     this.arm.addEventListener("click", () => this.hand?.press());
     source.onHandNotice = (answer) => {
       this.end();
-      tell(session.isOver, answer.text === "" ? t("part.over") : answer.text);
+      if (session.isOver) tell(true, answer.text === "" ? t("part.over") : answer.text);
+      else this.onLoss?.(reasonOfLoss(answer.text), () => this.ask());
     };
     source.onHands = (views) => this.hand?.receive(views);
     const add = (key: Key, name: Icon | undefined, act: () => void, options: { isPressed?: () => boolean; shows?: () => boolean } = {}): HTMLButtonElement => {
@@ -92,7 +99,7 @@ export class Part {
       timer = window.setInterval(go, HOLD_PERIOD);
     });
     for (const name of ["pointerup", "pointerleave", "pointercancel"] as const) button.addEventListener(name, stop);
-    addEventListener("blur", stop);
+    addEventListener("blur", stop, { signal: this.isEnded.signal });
   }
 
   setWords(): void {
@@ -203,7 +210,7 @@ export class Part {
       head: step === undefined ? "" : t("step.count", { step: step.step + 1, steps: step.steps }),
       title: session.isOver ? reasonOfEnd(session) : step === undefined ? t("step.none") : localized(step.title) || step.name,
       text: session.isOver || step === undefined ? "" : localized(step.instruction),
-      state: isStopped || hand?.isOn === true ? state : t("part.headset.arm"),
+      state: this.alarm() !== "" ? this.alarm() : isStopped || hand?.isOn === true ? state : t("part.headset.arm"),
       stop: t("part.headset.stop"),
     };
   }
@@ -270,6 +277,7 @@ export class Part {
     if (answer?.accepted !== true) this.end();
     this.said(t("part.take"), answer);
     if (answer?.accepted === true) {
+      this.onTaken?.();
       hand.onContact = (force, index) => this.feel(force, index);
       this.step = -1;
       this.teach(localStorage.getItem(TAUGHT) === null);
@@ -294,6 +302,14 @@ export class Part {
     this.hand = undefined;
     this.lesson.hidden = true;
     this.show();
+  }
+
+  /** It is not shown any more. */
+  remove(): void {
+    this.end();
+    this.isEnded.abort();
+    void this.audio?.close();
+    for (const element of [this.take, this.bar, this.lesson, this.dialog]) element.remove();
   }
 
   /** True when it was one of the hand's keys. */

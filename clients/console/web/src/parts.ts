@@ -7,6 +7,7 @@ import { asset } from "./assets";
 import { creases } from "./creases";
 import { place } from "./markers";
 import { Status, type SceneModels, type SceneObject } from "./messages";
+import { release } from "./release";
 import type { Session } from "./session";
 
 const MOST_POINTS = 20000; // of a mesh, to see where it is
@@ -38,8 +39,15 @@ export class Parts {
   /** Of another session nothing is left. */
   clear(): void {
     ++this.life;
-    for (const { group } of this.all.values()) this.scene.remove(group);
+    for (const { group, material } of this.all.values()) {
+      this.scene.remove(group);
+      release(group);
+      material.dispose();
+    }
     this.all.clear();
+    // models are shared by the parts that look the same
+    for (const loading of this.loaded.values()) void loading.then((model) => release(model), () => undefined);
+    this.loaded.clear();
     this.hidden.clear();
     this.picked = this.list = this.sceneModels = undefined;
     this.models = 0;
@@ -109,7 +117,7 @@ export class Parts {
   }
 
   private dress(part: Part, model: THREE.Object3D): void {
-    if (this.all.get(part.object.object_id) !== part) return;
+    if (this.all.get(part.object.object_id) !== part) return; // of another session: what it has is released with the model
     model.rotation.x = Math.PI / 2; // glTF has y up
     const meshes: THREE.Mesh[] = [];
     model.traverse((child) => child instanceof THREE.Mesh && meshes.push(child));
@@ -125,7 +133,10 @@ export class Parts {
       mesh.castShadow = mesh.receiveShadow = !this.simple;
       if (!this.simple) mesh.add(new THREE.LineSegments(creases(mesh.geometry as THREE.BufferGeometry), line));
     }
-    if (part.model !== undefined) part.group.remove(part.model);
+    if (part.model !== undefined) {
+      part.group.remove(part.model);
+      release(part.model);
+    }
     part.model = model;
     part.group.add(model);
     ++this.models;

@@ -104,13 +104,14 @@ export class Player {
     const steps = this.recording.marks.filter((mark) => mark.kind === "step");
     const parts = steps.map((mark, i) => {
       const part = h("span", `part part-${i % 2}`);
-      part.style.left = percent(mark.seconds);
-      part.style.width = percent((steps[i + 1]?.seconds ?? this.recording.seconds) - mark.seconds);
+      const begin = Math.max(0, mark.seconds); // it may have begun before the recording
+      part.style.left = percent(begin);
+      part.style.width = percent(Math.max(0, (steps[i + 1]?.seconds ?? this.recording.seconds) - begin));
       return part;
     });
     const marks = this.recording.marks.flatMap((mark) => {
       const shape = SHAPES.find(([fits]) => fits(mark))?.[1];
-      if (shape === undefined || mark.kind === "hand free") return [];
+      if (shape === undefined || mark.kind === "hand free" || mark.seconds < 0) return [];
       const element = h("i", `mark ${shape}`);
       element.style.left = percent(mark.seconds);
       return [element];

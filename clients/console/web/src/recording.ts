@@ -139,6 +139,27 @@ function lastUntil(messages: Message[], time: bigint): Message | undefined {
 
 let opened = 0; // recordings, by this page
 
+/**
+ * When a recording begins. What the server keeps for those who join late has the times of before: the announcement is written at the beginning, by the clock of the
+ * recorder, and the streams begin with it, by the server's.
+ */
+async function beginOf(reader: McapIndexedReader, first: bigint): Promise<bigint> {
+  const firstOf = async (topics: string[]): Promise<bigint | undefined> => {
+    for await (const { logTime } of reader.readMessages({ topics })) return logTime;
+    return undefined;
+  };
+  const announced = await firstOf(["SessionAnnounce"]);
+  if (announced === undefined) return first;
+  const streamed = (await firstOf([...STREAMS, ALL_OBJECTS])) ?? announced;
+  // in lockstep the times of streams are their ticks
+  return streamed < announced || (await isInLockstep(reader)) ? streamed : announced;
+}
+
+async function isInLockstep(reader: McapIndexedReader): Promise<boolean> {
+  for await (const { metadata } of reader.readMetadata({ name: "tenon recording" })) return metadata.get("lockstep") === "yes";
+  return false;
+}
+
 export class Recording {
   /** What happened, by the server's log, in s since the beginning of the recording. */
   marks: Mark[] = [];
@@ -160,7 +181,7 @@ export class Recording {
     });
     const { statistics } = reader;
     if (statistics === undefined || statistics.messageCount === 0n) throw new Unreadable("file.empty");
-    const begin = statistics.messageStartTime;
+    const begin = await beginOf(reader, statistics.messageStartTime);
     const recording = new Recording(reader, handler, begin, Number(statistics.messageEndTime - begin) / 1e9);
     for (const channel of reader.channelsById.values()) recording.addChannel(channel.id);
     // a recording inside a report has no faster poses
@@ -181,7 +202,7 @@ export class Recording {
   private async readKept(onProgress: (fraction: number) => void): Promise<void> {
     let read = 0;
     for await (const { logTime, channelId, data } of this.reader.readMessages({ topics: KEPT })) {
-      if (++read % 50 === 0) onProgress(Number(logTime - this.begin) / 1e9 / Math.max(this.seconds, 1e-9));
+      if (++read % 50 === 0) onProgress(Math.max(0, Number(logTime - this.begin)) / 1e9 / Math.max(this.seconds, 1e-9));
       const channel = this.decoders.get(channelId);
       if (channel?.topic === "ObjectSnapshot") {
         const name = this.instanceOf(channelId, data);

@@ -34,6 +34,7 @@ export class SceneView {
   private ghost?: { object: number; group: THREE.Group; material: THREE.MeshBasicMaterial };
   private markers = new Markers(this.scene);
   private pace: Pace;
+  private resizes = new ResizeObserver(() => this.resize());
   private life = -1;
   private moved = -1;
   private changed = -1;
@@ -77,7 +78,7 @@ export class SceneView {
     });
     // before the controls hear of it
     this.canvas.addEventListener("wheel", ({ ctrlKey }) => (this.controls.enableZoom = !this.isHandMode || ctrlKey), { capture: true });
-    new ResizeObserver(() => this.resize()).observe(host);
+    this.resizes.observe(host);
     this.resize();
     this.setTheme();
   }
@@ -244,7 +245,11 @@ export class SceneView {
 
   /** It is not looked at any more. */
   end(): void {
+    this.resizes.disconnect();
     this.controls.dispose();
+    this.clear(this.life);
+    this.markers.end();
+    this.ground.end();
     this.renderer.dispose();
     this.renderer.forceContextLoss();
     this.canvas.remove();
@@ -366,20 +371,23 @@ export class SceneView {
     this.life = life;
     this.parts.clear();
     this.markers.clear();
-    if (this.ghost !== undefined) this.scene.remove(this.ghost.group);
-    this.ghost = undefined;
+    this.removeGhost();
     this.isFramed = this.hasBegun = this.isFramedWaiting = this.isTurned = false;
     this.dirty = true;
+  }
+
+  private removeGhost(): void {
+    if (this.ghost === undefined) return;
+    this.scene.remove(this.ghost.group);
+    this.ghost.material.dispose(); // its geometry is the part's
+    this.ghost = undefined;
   }
 
   private takeGhost(session: Session): void {
     const step = session.step;
     const part = step === undefined ? undefined : this.parts.all.get(step.object_id);
     const shows = step !== undefined && part?.model !== undefined && step.has_target && step.phase <= StepPhase.Active;
-    if (this.ghost !== undefined && (!shows || this.ghost.object !== step.object_id || this.ghost.group.userData["model"] !== part.model)) {
-      this.scene.remove(this.ghost.group);
-      this.ghost = undefined;
-    }
+    if (this.ghost !== undefined && (!shows || this.ghost.object !== step.object_id || this.ghost.group.userData["model"] !== part.model)) this.removeGhost();
     if (!shows || part?.model === undefined) return;
     if (this.ghost === undefined) {
       const material = new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.32, depthWrite: false, side: THREE.DoubleSide });

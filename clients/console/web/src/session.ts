@@ -188,10 +188,18 @@ export class Session {
     this.events.push(event);
     if (this.events.length > EVENTS) this.events.shift();
     const seconds = Number(event.tick) / 1000;
-    if (event.kind === "step") this.visits.set(event.text, { started: seconds });
+    if (event.kind === "step") this.visit(event.text, seconds);
     const phase = STEP_ENDS[event.kind];
     const visit = this.visits.get(event.text.replace(/ \(.*$/, ""));
     if (phase !== undefined && visit !== undefined) Object.assign(visit, { phase, ended: seconds });
+  }
+
+  /** A step begins. Those after it are to be done, too, also where they were done before it began again. */
+  private visit(name: string, started: number): void {
+    const steps = [...this.sceneSteps.values()];
+    const index = steps.find((step) => step.name === name)?.step ?? Infinity;
+    for (const step of steps) if (step.step > index) this.visits.delete(step.name);
+    this.visits.set(name, { started });
   }
 
   private know({ text }: EventLog): void {
@@ -241,10 +249,13 @@ export class Session {
     return object === undefined ? title : this.titleOf(object.object_id);
   }
 
-  /** Title of a hand's own object, else the hand's name. */
+  /** Title of a hand's own object, else the hand's name; both where another hand has the same title. */
   nameOfHand(id: number): string {
     const hand = this.sceneHands.get(id);
-    return this.titleOf(hand?.object_id ?? NONE) || (hand?.name ?? `${id}`);
+    const title = this.titleOf(hand?.object_id ?? NONE);
+    if (title === "" || hand === undefined) return hand?.name ?? `${id}`;
+    const isShared = [...this.sceneHands.values()].some((other) => other.hand_id !== id && this.titleOf(other.object_id) === title);
+    return isShared ? `${title} (${hand.name})` : title;
   }
 
   /** Whether a hand holds this for good: its pointer, or what tracks it. */
