@@ -27,7 +27,12 @@ constexpr double kPlaneCosine = -0.999986;
 constexpr double kTanHalf60 = 0.577;  // [-] of a facet of a round surface at most
 constexpr double kTanHalf40 = 0.364;  // [-] tan of half the turn from which an edge is sharp at any radius
 constexpr double kCos6 = 0.995;       // [-] a polyline that turns less at a vertex is straight there
+constexpr double kCos30 = 0.866;      // [-] a polyline that turns by more at a vertex has a corner there
+constexpr double kEndless = 1.0;      // [m] from any end of an edge
 constexpr double kCos20 = 0.94;       // [-] faces of edges that are merged turn by less
+
+/// [-] Of the widths of two faces, from which on they are no equal facets of one surface.
+constexpr double kChamfer = 3.0;
 
 /// [voxels] From an edge: beyond them the interpolated distance of a wedge is exact.
 constexpr double kLargestReach = 2.0;
@@ -102,6 +107,7 @@ class FeatureFinder {
     const Vector3 along = (at(edge.to) - at(edge.from)).normalized();
     ConvexEdge convex{edge.from, edge.to, {}, 1.0, 0.0};
     double width = std::numeric_limits<double>::infinity();
+    double widest = 0.0;
     for (const std::size_t face : {0U, 1U}) {
       const structures::Triangle& t = mesh_.triangles[face == 0 || open ? edge.first : edge.second];
       const Vector3 to = t[0] + t[1] + t[2] - 2.0 * at(edge.from) - at(edge.to);
@@ -110,6 +116,7 @@ class FeatureFinder {
       // far from the mesh's origin the height of a thin triangle may be cancelled
       if (!(height > 0.0)) return;
       width = std::min(width, height);
+      widest = std::max(widest, height);
       convex.into_M[face] = towards / height;
     }
     if (!open) {
@@ -124,12 +131,13 @@ class FeatureFinder {
         return;
       }
     }
-    // points of the other part see a long ridge that is wider than half their distance
-    const bool is_ridge = convex.radius > 0.5 * sizes_.apart && convex.radius <= sizes_.largest_radius &&
-                          convex.tan_half_turn < kTanHalf60 &&
+    const bool sharp = convex.tan_half_turn >= kTanHalf40 || convex.radius <= sizes_.sharp_radius;
+    // points of the other part see a long ridge of a tube that is wider than half their distance; the faces
+    // beside a chamfer are wider than it
+    const bool is_ridge = !(sharp && widest > kChamfer * width) && convex.radius > 0.5 * sizes_.apart &&
+                          convex.radius <= sizes_.largest_radius && convex.tan_half_turn < kTanHalf60 &&
                           (at(edge.to) - at(edge.from)).norm() > 3.0 * sizes_.apart;
     if (is_ridge) return;
-    const bool sharp = convex.tan_half_turn >= kTanHalf40 || convex.radius <= sizes_.sharp_radius;
     if (!sharp && convex.radius > sizes_.largest_radius) return;
     (sharp ? sharp_ : round_).push_back(convex);
   }
@@ -196,28 +204,63 @@ class FeatureFinder {
                     std::min(first[0].dot(last[1]), first[1].dot(last[0]))) > kCos20;
   }
 
-  /// Merges edges of one line, cuts them into pieces, and adds the vertices where the chain turns.
-  void addChain(const std::vector<std::uint32_t>& chain, const std::vector<std::uint32_t>& edges) {
-    Vector3 before = Vector3::Zero();
+  /// Edges of a chain on one line.
+  struct Segment {
+    Vector3 from, along;                 // [m] start, unit direction
+    double length = 0.0;                 // [m]
+    std::array<Vector3, 2> into;         // as FeatureEdge
+    double turn = -1.0;                  // [-] cosine of the angle to the segment before; -1: there is none
+    std::array<double, 2> beyond{0, 0};  // [m] to the next corner, before and behind
+  };
+
+  /// Merges edges of one line.
+  [[nodiscard]] std::vector<Segment> segmentsOf(const std::vector<std::uint32_t>& chain,
+                                                const std::vector<std::uint32_t>& edges) const {
+    std::vector<Segment> segments;
     for (std::size_t i = 0; i + 1 < chain.size();) {
       std::size_t j = i + 1;
       while (j + 1 < chain.size() && isStraight(chain, edges, i, j + 1)) ++j;
-      const Vector3 a = at(chain[i]);
-      const Vector3 b = at(chain[j]);
-      const std::array<Vector3, 2> into = perpendicular(sharp_[edges[(i + j) / 2]].into_M, b - a);
-      const Vector3 bisector = (into[0] + into[1]).normalized();
-      const Vector3 along = (b - a).normalized();
-      if (i > 0 && before.dot(along) < kCos6 && (b - a).norm() > sizes_.sharp_radius) add(a, bisector);
-      before = along;
-      const int pieces = std::max(1, static_cast<int>(std::ceil((b - a).norm() / sizes_.piece)));
-      const Vector3 half = 0.5 / pieces * (b - a);
-      for (int k = 0; k < pieces; ++k) {
-        const Vector3 centre = a + (b - a) * ((k + 0.5) / pieces);
-        const double reach = reach_.of(centre, half, into, kLargestReach * field_.voxelAt(centre));
-        add(centre, bisector,
-            {half.cast<float>(), {into[0].cast<float>(), into[1].cast<float>()}, static_cast<float>(reach)});
-      }
+      const Vector3 to = at(chain[j]) - at(chain[i]);
+      segments.push_back(
+          {at(chain[i]), to.normalized(), to.norm(), perpendicular(sharp_[edges[(i + j) / 2]].into_M, to)});
       i = j;
+    }
+    const std::size_t count = segments.size();
+    const bool closed = chain.front() == chain.back();
+    for (std::size_t i = closed ? 0 : 1; i < count; ++i)
+      segments[i].turn = segments[(i + count - 1) % count].along.dot(segments[i].along);
+    // a ring without a corner has no end
+    const bool goes_on = segments.front().turn > kCos30;
+    segments.front().beyond[0] = segments.back().beyond[1] = goes_on ? kEndless : 0.0;
+    for (std::size_t i = 1; i < count; ++i) {
+      const std::size_t k = count - 1 - i;
+      const Segment& before = segments[i - 1];
+      const Segment& behind = segments[k + 1];
+      segments[i].beyond[0] = segments[i].turn > kCos30 ? before.beyond[0] + before.length : 0.0;
+      segments[k].beyond[1] = behind.turn > kCos30 ? behind.beyond[1] + behind.length : 0.0;
+    }
+    return segments;
+  }
+
+  /// Cuts the lines of a chain into pieces, and adds the vertices where it turns.
+  void addChain(const std::vector<std::uint32_t>& chain, const std::vector<std::uint32_t>& edges) {
+    for (const Segment& segment : segmentsOf(chain, edges)) {
+      const Vector3 bisector = (segment.into[0] + segment.into[1]).normalized();
+      const bool turns = segment.turn > -1.0 && segment.turn < kCos6;
+      if (turns && segment.length > sizes_.sharp_radius) add(segment.from, bisector);
+      const int pieces = std::max(1, static_cast<int>(std::ceil(segment.length / sizes_.piece)));
+      const double half = 0.5 * segment.length / pieces;
+      for (int k = 0; k < pieces; ++k) {
+        const Vector3 centre = segment.from + segment.along * ((2 * k + 1) * half);
+        FeatureEdge piece;
+        piece.half_M = (half * segment.along).cast<float>();
+        piece.into_M = {segment.into[0].cast<float>(), segment.into[1].cast<float>()};
+        piece.beyond = {static_cast<float>(segment.beyond[0] + 2 * k * half),
+                        static_cast<float>(segment.beyond[1] + 2 * (pieces - 1 - k) * half)};
+        piece.reach = static_cast<float>(
+            reach_.of(centre, half * segment.along, segment.into, kLargestReach * field_.voxelAt(centre)));
+        add(centre, bisector, piece);
+      }
     }
   }
 

@@ -27,6 +27,13 @@ constexpr double kMaxCrossingDepth = 5e-4;
 /// [-] Relative to half a piece: a crossing at the border of two pieces is in one of them.
 constexpr double kEndTolerance = 1e-3;
 
+/// [m] Contacts are exact to less: what is nearer to the end of an edge grazes it, and a point that is nearer
+/// to an edge is at neither of its faces.
+constexpr double kGrazing = 1e-5;
+
+/// [m] By this a point may be deeper than its distance to the end of the edge: solving leaves that much.
+constexpr double kEndDepth = 1e-4;
+
 /// A frame's rotation as matrix: many vectors are turned by it.
 struct Transform {
   explicit Transform(const Pose& X) : R(X.matrix()), p(X.translation()) {}
@@ -41,7 +48,8 @@ EdgePiece pieceOf(const structures::FeatureShell& features, std::uint32_t point)
   return {features.points().points()[point].p_MP.cast<double>(),
           edge.half_M.cast<double>(),
           {edge.into_M[0].cast<double>(), edge.into_M[1].cast<double>()},
-          edge.reach};
+          edge.reach,
+          {edge.beyond[0], edge.beyond[1]}};
 }
 
 EdgePiece pieceOf(const structures::FeatureShell& features, std::uint32_t point, const Transform& X_AB) {
@@ -49,7 +57,8 @@ EdgePiece pieceOf(const structures::FeatureShell& features, std::uint32_t point,
   return {X_AB * features.points().points()[point].p_MP,
           X_AB.turned(edge.half_M),
           {X_AB.turned(edge.into_M[0]), X_AB.turned(edge.into_M[1])},
-          edge.reach};
+          edge.reach,
+          {edge.beyond[0], edge.beyond[1]}};
 }
 
 /// [-] The direction of +-c in which the body of a piece lies on the far side of a plane through the edge; 0:
@@ -61,9 +70,13 @@ double separatingSign(const EdgePiece& piece, const Vector3& c, double slack) {
   return std::min(first, second) >= -slack ? -1.0 : 0.0;
 }
 
-/// [-] Relative to half a piece, how far from its centre it ends; `slack` [m] beyond.
-double endOf(double half2, double slack) {
-  return 1.0 + kEndTolerance + (slack > 0.0 ? slack / std::sqrt(half2) : 0.0);
+/// Whether a contact at `along` [-] halves from the centre of a piece, or `slack` [m] beside it, is one of
+/// the piece, and at least `inside` [m] before the end of the edge: what grazes an end, as a corner that
+/// slides over a face, passes it.
+bool isWithin(const EdgePiece& piece, double half2, double along, double slack, double inside) {
+  const double half = std::sqrt(half2);
+  const double past = (std::abs(along) - 1.0) * half - slack;
+  return past <= kEndTolerance * half && piece.beyond[along > 0.0 ? 1 : 0] - past >= inside;
 }
 
 /// Two pieces as a contact of A against B, in their frame. `slack` [m] beyond their ends, `tolerance` [-] of
@@ -85,7 +98,7 @@ bool cross(const EdgePiece& a, const EdgePiece& b, double slack, double toleranc
   // closest points a.p + along_a * a.half, b.p + along_b * b.half of the two lines
   const double along_a = -r.dot(b.half.cross(c)) / c2;
   const double along_b = -r.dot(a.half.cross(c)) / c2;
-  if (std::abs(along_a) > endOf(a2, slack) || std::abs(along_b) > endOf(b2, slack)) return false;
+  if (!isWithin(a, a2, along_a, slack, kGrazing) || !isWithin(b, b2, along_b, slack, kGrazing)) return false;
   contact.n_W = sign / length * c;
   contact.p_WP = a.p + along_a * a.half;
   return true;
@@ -99,7 +112,6 @@ bool isBeside(const Vector3& p, const EdgePiece& piece, double slack, Contact& c
   const Vector3 r = p - piece.p;
   const double half2 = piece.half.squaredNorm();
   const double along = r.dot(piece.half) / half2;
-  if (std::abs(along) > endOf(half2, slack)) return false;
   const Vector3 across = r - along * piece.half;
   const double reach = piece.reach + slack;
   if (across.squaredNorm() >= reach * reach) return false;
@@ -109,8 +121,13 @@ bool isBeside(const Vector3& p, const EdgePiece& piece, double slack, Contact& c
   const Vector3 n_1 = (cosine * piece.into[1] - piece.into[0]) / sine;
   const double gap_0 = n_0.dot(across);
   const double gap_1 = n_1.dot(across);
-  contact.gap = std::max(gap_0, gap_1);
   contact.n_W = gap_0 > gap_1 ? n_0 : n_1;
+  // at the edge itself neither face is the nearer one, and a point may slide on from either to the other
+  if (across.squaredNorm() < kGrazing * kGrazing) contact.n_W = (n_0 + n_1).normalized();
+  contact.gap = contact.n_W.dot(across);
+  // deeper than that the face at the end of the edge is nearer
+  if (!isWithin(piece, half2, along, slack, std::max(kGrazing, -contact.gap - slack - kEndDepth)))
+    return false;
   contact.p_WP = p;
   return true;
 }

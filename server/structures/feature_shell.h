@@ -18,6 +18,8 @@ struct FeatureEdge {
   std::array<Vector3f, 2> into_M{Vector3f::Zero(), Vector3f::Zero()};
   /// [m] Nearer to the piece than this, and between its ends, the surface is the two faces alone.
   float reach = 0.0F;
+  /// [m] How far the edge goes on beyond the ends at -half and +half, up to a corner.
+  std::array<float, 2> beyond{0.0F, 0.0F};
 };
 
 /// The sharp features of an object's surface: corners, pieces of convex edges, tips of pins.

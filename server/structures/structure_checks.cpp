@@ -183,7 +183,10 @@ Problem problemOf(const Pointshell::Layout& points, std::span<const FeatureEdge>
   if (edges.size() != points.points.size()) return "is damaged: there is not an edge for each point";
   const auto sound = [](const FeatureEdge& edge) {
     return plausible(edge.half_M.cast<double>()) && edge.into_M[0].norm() < 1.01F &&
-           edge.into_M[1].norm() < 1.01F && edge.reach >= 0.0F && edge.reach <= kMaxCoordinate;
+           edge.into_M[1].norm() < 1.01F && edge.reach >= 0.0F && edge.reach <= kMaxCoordinate &&
+           edge.beyond[0] >= 0.0F && edge.beyond[1] >= 0.0F && edge.beyond[0] <= kMaxCoordinate &&
+           edge.beyond[1] <= kMaxCoordinate &&
+           (edge.reach == 0.0F || edge.into_M[0].cross(edge.into_M[1]).norm() > 0.05F);
   };
   if (!std::all_of(edges.begin(), edges.end(), sound)) return "is damaged: an edge is not plausible";
   return {};

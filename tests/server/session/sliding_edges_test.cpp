@@ -121,5 +121,37 @@ INSTANTIATE_TEST_SUITE_P(Bars, SlidingEdges,
                                            SlideCase{"OffTheFixedAt3mm", 3.0, false}),
                          [](const auto& one) { return std::string(one.param.name); });
 
+//   [==]       a block that lies flat on a table glides about the table's corner: no edge's end holds it
+//  =======
+class FlatOnATable : public test::TwoParts, public ::testing::WithParamInterface<double> {};
+
+TEST_P(FlatOnATable, ItsCornerIsFreeAboveTheEndsOfEdges) {
+  const auto scene =
+      load("{box: [60 mm, 60 mm, 20 mm], at: [0, 0, -10 mm]}", "{box: [30 mm, 20 mm, 20 mm]}", GetParam());
+  ASSERT_TRUE(scene);
+  const Vector3 corner(0.015, 0.01, 0.0);  // of the block, from its centre
+  simulation::Environment environment(scene, {});
+  environment.setHandPresent(HandId{0}, true);
+  double most = 0.0;  // [m] to the side of the hand
+  std::mt19937 random(4);
+  const auto inside = [&random] { return 0.03 - 0.0005 - 0.0025 * (random() / 4294967296.0); };
+  Vector3 at(inside(), inside(), 0.012);
+  for (int leg = 0; leg < 12; ++leg) {
+    const Vector3 to(inside(), inside(), 0.007);  // 3 N
+    const int ticks = std::max(30, static_cast<int>(1e3 * (to - at).norm() / 0.05));
+    for (int tick = 1; tick <= ticks; ++tick) {
+      const Vector3 p_WH = at + (to - at) * tick / ticks - corner;
+      environment.setHandPose(HandId{0}, Pose(p_WH), {});
+      environment.step();
+      most = std::max(most, (environment.objects()[1].X_WO.translation() - p_WH).head<2>().norm());
+    }
+    at = to;
+  }
+  EXPECT_GT(environment.objects()[1].X_WO.translation().z(), 0.0095) << "it lies on the table";
+  EXPECT_LT(most, 1e-4);
+}
+
+INSTANTIATE_TEST_SUITE_P(Voxels, FlatOnATable, ::testing::Values(1.0, 2.0, 3.0));
+
 }  // namespace
 }  // namespace tenon::session

@@ -92,7 +92,7 @@ TEST(EnvironmentCheckpoint, ACheckpointWithANumberThatIsNotFiniteIsRejected) {
   ASSERT_TRUE(environment.restore(good));
 }
 
-TEST(EnvironmentCheckpoint, ACrossingAtAFeatureWithoutAnEdgeIsRejected) {
+TEST(EnvironmentCheckpoint, ACrossingOfTwoPointsIsRejected) {
   const test::BusyScene busy;
   Environment environment(busy.scene, {});
   while (!environment.objects()[busy.bar.value].in_contact) {
@@ -102,9 +102,14 @@ TEST(EnvironmentCheckpoint, ACrossingAtAFeatureWithoutAnEdgeIsRejected) {
   busy.play(environment, environment.tick() + 20);
   const structures::FeatureShell& of_A = busy.heldBarShape()->features;
   const structures::FeatureShell& of_B = busy.beamShape()->features;
-  std::uint32_t corner = 0;
-  while (collision::isEdge(of_B, corner)) ++corner;
-  ASSERT_LT(corner, of_B.edges().size()) << "a bar has corners";
+  const auto cornerOf = [](const structures::FeatureShell& features) {
+    std::uint32_t corner = 0;
+    while (collision::isEdge(features, corner)) ++corner;
+    return corner;
+  };
+  const std::array<std::uint32_t, 2> corners{cornerOf(of_A), cornerOf(of_B)};
+  ASSERT_LT(corners[0], of_A.edges().size()) << "a bar has corners";
+  ASSERT_LT(corners[1], of_B.edges().size());
   // a crossing: its kind, and a piece of an edge of each bar
   constexpr std::size_t kSize = 1 + 2 * sizeof(std::uint32_t);
   const std::vector<std::uint8_t> good = environment.save();
@@ -117,7 +122,7 @@ TEST(EnvironmentCheckpoint, ACrossingAtAFeatureWithoutAnEdgeIsRejected) {
         index[0] < 2 || index[1] < 2)
       continue;
     std::vector<std::uint8_t> bad = good;
-    std::memcpy(bad.data() + at + 1 + sizeof corner, &corner, sizeof corner);
+    std::memcpy(bad.data() + at + 1, &corners, sizeof corners);
     EXPECT_FALSE(environment.restore(bad)) << "byte " << at;
     ++crossings;
   }
