@@ -29,6 +29,9 @@ class AnswerReaders {
   /// answer is missing meanwhile; and after kMostCalls in any case, since an absent hand has no manifolds.
   [[nodiscard]] Result<void> choose(bool slow);
 
+  /// No others read: what has come since the last call of choose() was slow.
+  [[nodiscard]] bool hasSlowAlone() const { return slow_ && !has_both_; }
+
   static constexpr int kMostCalls = 10;
 
  private:

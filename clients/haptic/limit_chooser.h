@@ -15,7 +15,8 @@ struct LinkMeasurement {
   double trip_jitter = 0.0;  ///< [s] of the round trip: 90th percentile less the shortest
   double age_jitter = 0.0;   ///< [s] of the contacts: 99th percentile less the youngest
   double inputs_lost = 0.0;  ///< [-]
-  /// [-] where answers are slow; NaN, not known, at 1 kHz, where those count that a newer one has overtaken
+  /// [-] where answers are slow; NaN, not known, at 1 kHz, where those count that a newer one has overtaken,
+  /// and where fewer than two came
   double answers_lost = std::numeric_limits<double>::quiet_NaN();
   std::uint32_t input_period = 1;  ///< [ticks] DeviceInput::period
 };
@@ -61,6 +62,7 @@ class LimitChooser {
 
   std::array<LinkMeasurement, kMemory> last_{};
   double answers_lost_ = 0.0;  // [-] in the mean: a second has few slow answers
+  unsigned above_most_ = 0;    // [measurements] in a row that lost more of them than a link does
   std::size_t count_ = 0;
   unsigned ignored_ = 0;  ///< [measurements] to come
 };

@@ -28,6 +28,7 @@ std::string describeSafety(const StationEvent& event) {
 
 std::string describe(const StationEvent& event, const std::string& hand_name) {
   const std::string hand = "hand " + hand_name;
+  const std::string times = event.count > 1 ? ", " + std::to_string(event.count) + " times" : "";
   const std::string when = ", step " + std::to_string(event.seq);
   const auto milliseconds = [&event] { return std::to_string(static_cast<int>(event.value)) + " ms"; };
   switch (event.kind) {
@@ -38,14 +39,14 @@ std::string describe(const StationEvent& event, const std::string& hand_name) {
       return hand + ": device fault: " + devices::toString(static_cast<devices::DeviceFault>(event.detail)) +
              when;
     case StationEventKind::kIndexingBegan:
-      return hand + ": indexing started" + when;
+      return hand + ": indexing started" + times + when;
     case StationEventKind::kIndexingEnded:
-      return hand + ": indexing stopped" + when;
+      return hand + ": indexing stopped" + times + when;
     case StationEventKind::kBeyondValidity:
-      return hand + ": ahead of the contact set (" + milliseconds() + " in total)" + when;
+      return hand + ": ahead of the contact set (" + milliseconds() + " in total)" + times + when;
     case StationEventKind::kStale:
       return hand + ": contacts are " + milliseconds() +
-             " old, more than the link explains: the force fades" + when;
+             " old, more than the link explains: the force fades" + times + when;
     case StationEventKind::kServerChanged:
       return "server restarted, epoch " + std::to_string(event.detail) + when;
     case StationEventKind::kStopChanged:

@@ -52,9 +52,9 @@ struct StationEvent {
   StationEventKind kind = StationEventKind::kSafetyBegan;
   HandId hand;
   std::uint32_t detail = 0;
-  double value = 0.0;  ///< [N], [s] or [ticks], see StationEventKind
-  std::uint32_t count = 0;
-  Tick tick = 0;  ///< newest one received when it happened
+  double value = 0.0;       ///< [N], [s] or [ticks], see StationEventKind
+  std::uint32_t count = 0;  ///< of safety: see above; else how many times, in one event; 0: once
+  Tick tick = 0;            ///< newest one received when it happened
 };
 
 /// Text for the log; `hand` is the name of the event's hand.

@@ -20,6 +20,7 @@
 #include "clients/haptic/link_clock.h"
 #include "clients/haptic/lockstep_answers.h"
 #include "clients/haptic/rate_chooser.h"
+#include "clients/haptic/repeated_events.h"
 #include "clients/haptic/return_key.h"
 #include "clients/haptic/seat_file.h"
 #include "clients/haptic/servo_loop.h"
@@ -41,6 +42,11 @@ constexpr int kFinishSteps = 200;  // milliseconds, or steps in lockstep, to tak
 
 std::int64_t nowNs() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+}
+
+std::atomic<bool>& stopFlag() {
+  static std::atomic<bool> flag{false};
+  return flag;
 }
 
 /// A step without its texts, so that copying it does not allocate.
@@ -77,7 +83,9 @@ class StationRunner {
     if (copy_.loaded()) chooseForceModel(0.0, 0);
     station_.welcome(link_.welcome(), link_.objects());
     sendDevices();
-    return lockstep_ ? runLockstep(stop) : runRealTime(stop);
+    auto run = lockstep_ ? runLockstep(stop) : runRealTime(stop);
+    while (const auto repeated = repeated_.takeWaiting()) send(*repeated);
+    return run;
   }
 
  private:
@@ -85,7 +93,10 @@ class StationRunner {
   Result<RunState> runLockstep(const std::atomic<bool>& stop);
   Result<RunState> runRealTime(const std::atomic<bool>& stop);
   void send(const StationOutput& output);
-  void sendEvents();
+  /// Of the station's steps up to `seq`.
+  void sendEvents(std::uint32_t seq);
+  void send(const StationEvent& event);
+  void send(Tick tick, const char* kind, const std::string& text);
   void sendDevices();
   void printStep(const StepState& step);
   [[nodiscard]] Result<void> subscribeToClock();
@@ -93,9 +104,12 @@ class StationRunner {
   void chooseForceModel(double round_trip, std::uint64_t late_cycles);
   std::uint32_t sendInputs(const StationOutput& output);
   void chooseRates(double round_trip);
+  double answersLost(const Telemetry& telemetry);
   void sendTelemetry(Telemetry telemetry);
   void readKeys();
-  void armDevices();
+  /// In lockstep between two steps, unless `stop` comes or the run is over before the device answers.
+  void armDevices(const std::atomic<bool>& stop);
+  void awaitArming(const std::atomic<bool>& stop);
   /// The emergency stop, and who sits at the station.
   void hear() {
     link_.inbox().dispatch(milliseconds(20));
@@ -152,8 +166,12 @@ class StationRunner {
   ForceModelKind force_model_ = ForceModelKind::kManifold;
   RateChooser rates_;
   InputPacer pacer_;
-  std::uint64_t late_cycles_ = 0;  // as the last Telemetry has them
+  std::uint64_t late_cycles_ = 0;      // as the last Telemetry has them
+  std::uint64_t answers_counted_ = 0;  // likewise
+  std::uint32_t output_seq_ = 0;       // of the loop's last output
+  RepeatedEvents repeated_;
   std::uint64_t event_seq_ = 0;
+  std::uint64_t devices_seq_ = 0;  // of the last event that names a device
   std::string printed_step_;
 };
 
@@ -200,6 +218,12 @@ Result<void> StationRunner::subscribeToClock() {
       });
 }
 
+/// [-] since the last Telemetry; NaN: not known.
+double StationRunner::answersLost(const Telemetry& telemetry) {
+  const std::uint64_t answers = telemetry.samples - std::exchange(answers_counted_, telemetry.samples);
+  return readers_.hasSlowAlone() && answers >= 2 ? telemetry.answers_lost : std::nan("");
+}
+
 void StationRunner::sendTelemetry(Telemetry telemetry) {
   telemetry.client = link_.welcome().client;
   link_clock_.fill(telemetry, nowNs());
@@ -207,7 +231,7 @@ void StationRunner::sendTelemetry(Telemetry telemetry) {
                           .trip_jitter = telemetry.trip_jitter,
                           .age_jitter = telemetry.jitter,
                           .inputs_lost = telemetry.inputs_lost,
-                          .answers_lost = rates_.slowAnswers() ? telemetry.answers_lost : std::nan(""),
+                          .answers_lost = answersLost(telemetry),
                           .input_period = rates_.inputPeriod(1)});
   telemetry.limits = choice_.limits;
   telemetry.playout_ticks = choice_.playout_ticks;
@@ -236,7 +260,7 @@ void StationRunner::chooseForceModel(double round_trip, std::uint64_t late_cycle
                                ? "forces from this station's copy of the scene"
                                : "forces from the contacts that the server lists";
   print(text);
-  static_cast<void>(link_.send(ClientEvent{link_.welcome().client, ++event_seq_, 0, "station", text}));
+  send(0, "station", text);
 }
 
 void StationRunner::readKeys() {
@@ -244,10 +268,19 @@ void StationRunner::readKeys() {
   lockstep_ ? station_.press() : servo_.press();
 }
 
-/// In lockstep between two steps.
-void StationRunner::armDevices() {
+void StationRunner::armDevices(const std::atomic<bool>& stop) {
   arming_.start();
-  if (lockstep_) arming_.await([this] { hear(); });
+  while (lockstep_ && arming_.isUnderWay() && !stop && !over()) hear();
+}
+
+/// The forces are off by now, so that another signal may end the program.
+void StationRunner::awaitArming(const std::atomic<bool>& stop) {
+  if (!arming_.isUnderWay()) return;
+  const bool is_by_signal = &stop == &stopFlag();
+  if (is_by_signal) endAtNextSignal();
+  print(std::string("a device is still being armed: this program ends when it answers") +
+        (is_by_signal ? ", or at once with Ctrl-C" : ""));
+  arming_.await([this] { hear(); });
 }
 
 void StationRunner::printStep(const StepState& step) {
@@ -286,26 +319,35 @@ void StationRunner::send(const StationOutput& output) {
 
 /// Others see what a hand can reach by this and HandState::p_WC.
 void StationRunner::sendDevices() {
-  for (const HandDevice& device : station_.handDevices()) {
-    const Welcome& welcome = link_.welcome();
+  const Welcome& welcome = link_.welcome();
+  for (const HandDevice& device : station_.handDevices())
     static_cast<void>(
         link_.send(ClientEvent{welcome.client, ++event_seq_, welcome.tick, "device", describe(device)}));
-  }
+  devices_seq_ = event_seq_;
 }
 
-void StationRunner::sendEvents() {
+/// Of a client's events late joiners get the last ones alone: its devices are always among them.
+void StationRunner::send(Tick tick, const char* kind, const std::string& text) {
+  if (event_seq_ - devices_seq_ >= wire::kClientEvent.parameters.late_joiner_depth / 2) sendDevices();
+  static_cast<void>(link_.send(ClientEvent{link_.welcome().client, ++event_seq_, tick, kind, text}));
+}
+
+void StationRunner::sendEvents(std::uint32_t seq) {
   StationEvent event;
-  while (lockstep_ ? station_.takeEvent(event) : servo_.takeEvent(event)) {
-    const std::string text = station_.describe(event);
-    const bool is_safety =
-        event.kind == StationEventKind::kSafetyBegan || event.kind == StationEventKind::kSafetyEnded;
-    const char* kind = is_safety ? "safety" : "station";
-    static_cast<void>(link_.send(ClientEvent{link_.welcome().client, ++event_seq_, event.tick, kind, text}));
-    if (event.kind == StationEventKind::kGuidanceBegan || event.kind == StationEventKind::kGuidanceEnded)
-      print(text);
-    if (event.kind != StationEventKind::kDeviceFault) continue;
-    print(text + (options_.read_keys ? "; look at the device, then press return to reset it" : ""));
-  }
+  while (lockstep_ ? station_.takeEvent(event) : servo_.takeEvent(event))
+    if (repeated_.passes(event)) send(event);
+  while (const auto repeated = repeated_.takeDue(seq)) send(*repeated);
+}
+
+void StationRunner::send(const StationEvent& event) {
+  const std::string text = station_.describe(event);
+  const bool is_safety =
+      event.kind == StationEventKind::kSafetyBegan || event.kind == StationEventKind::kSafetyEnded;
+  send(event.tick, is_safety ? "safety" : "station", text);
+  if (event.kind == StationEventKind::kGuidanceBegan || event.kind == StationEventKind::kGuidanceEnded)
+    print(text);
+  if (event.kind != StationEventKind::kDeviceFault) return;
+  print(text + (options_.read_keys ? "; look at the device, then press return to reset it" : ""));
 }
 
 Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat) {
@@ -321,13 +363,13 @@ Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat
   const auto rejoin_at = now + (rejoins_ > kMaxRejoins ? kMinSeatTime : std::chrono::seconds(0));
   while (!stop && std::chrono::steady_clock::now() < rejoin_at) {
     hear();
-    armDevices();
+    armDevices(stop);
   }
   const Welcome before = member.welcome();
-  const auto meanwhile = [this] {
+  const auto meanwhile = [this, &stop] {
     link_.inbox().dispatch(milliseconds(0));
     readKeys();
-    armDevices();
+    armDevices(stop);
   };
   auto back = member.rejoin(stop, meanwhile);
   if (back) back = link_.awaitMatch(stop, meanwhile);
@@ -354,6 +396,7 @@ Result<RunState> StationRunner::runLockstep(const std::atomic<bool>& stop) {
   auto run = takePartInLockstep(stop, seq);
   station_.finish(true);
   for (int i = 0; i < kFinishSteps && !station_.finished(); ++i) station_.step(++seq);
+  awaitArming(stop);
   station_.end();
   return run;
 }
@@ -369,13 +412,14 @@ Result<RunState> StationRunner::takePartInLockstep(const std::atomic<bool>& stop
       tick = link_.welcome().tick;
       answers_.reset();
     }
-    armDevices();
+    armDevices(stop);
+    if (arming_.isUnderWay()) break;
     seq = static_cast<std::uint32_t>(tick + 1);
     station_.step(seq);
     output.fill(station_, seq);
     peaks_.add(output);
     send(output);
-    sendEvents();
+    sendEvents(seq);
     ++tick;
     auto repeat_at = std::chrono::steady_clock::now() + kRepeatAfter;
     while (!answers_.complete(tick, station_.hands()) && !stop && !over() && seated()) {
@@ -404,10 +448,6 @@ void StationRunner::stopServo(bool disarms) {
   for (int i = 0; i < kFinishSteps && !servo_.finished(); ++i) std::this_thread::sleep_for(milliseconds(1));
   servo_thread_.reset();
   servo_.restart();
-  if (!disarms) return;
-  if (arming_.isUnderWay()) print("a device is still being armed: this program ends when it answers");
-  arming_.await([this] { hear(); });
-  station_.end();
 }
 
 Result<RunState> StationRunner::runRealTime(const std::atomic<bool>& stop) {
@@ -420,6 +460,8 @@ Result<RunState> StationRunner::runRealTime(const std::atomic<bool>& stop) {
   auto run = takePart(stop);
   copy_.cancel();
   stopServo(true);
+  awaitArming(stop);
+  station_.end();
   char silence[64];
   std::snprintf(silence, sizeof silence, "longest time without contacts of the server: %.1f ms",
                 1e3 * servo_.statistics().longest_silence);
@@ -431,7 +473,7 @@ Result<RunState> StationRunner::takePart(const std::atomic<bool>& stop) {
   bool must_restart = false;  // with a new seat
   while (!stop && !over()) {
     hear();
-    if (!must_restart) armDevices();
+    if (!must_restart) armDevices(stop);
     if (!seated() && !over()) {
       // the loop continues; forces fade with the age of the contacts
       bool new_seat = false;
@@ -448,8 +490,11 @@ Result<RunState> StationRunner::takePart(const std::atomic<bool>& stop) {
       startServo();
     }
     takeLoadedScene();
-    if (const StationOutput* const output = servo_.takeOutput()) send(*output);
-    sendEvents();
+    if (const StationOutput* const output = servo_.takeOutput()) {
+      send(*output);
+      output_seq_ = output->seq;
+    }
+    sendEvents(output_seq_);
     if (ClockSync request; link_clock_.ask(link_.welcome().client, nowNs(), request))
       static_cast<void>(link_.send(request));
     if (const Telemetry* const statistics = servo_.takeTelemetry()) {
@@ -461,13 +506,13 @@ Result<RunState> StationRunner::takePart(const std::atomic<bool>& stop) {
   return run_;
 }
 
-std::atomic<bool>& stopFlag() {
-  static std::atomic<bool> flag{false};
-  return flag;
-}
-
 void onSignal(int /*signal*/) { stopFlag() = true; }
 }  // namespace
+
+void endAtNextSignal() {
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+}
 
 const std::atomic<bool>& stopSignal() {
   static const bool installed = [] {

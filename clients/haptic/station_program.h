@@ -42,4 +42,8 @@ Result<RunState> runStation(Station& station, const StationProgramOptions& optio
 /// Flag set by SIGINT and SIGTERM; the first call installs the handlers.
 [[nodiscard]] const std::atomic<bool>& stopSignal();
 
+/// From now on SIGINT and SIGTERM end the program at once: for one whose forces are off, and that waits for a
+/// device.
+void endAtNextSignal();
+
 }  // namespace tenon::haptic

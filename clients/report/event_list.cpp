@@ -47,7 +47,7 @@ std::vector<ReportEvent> listedEvents(const std::vector<SessionEvent>& events) {
 std::map<std::string, int> otherEvents(const std::vector<SessionEvent>& events) {
   std::map<std::string, int> kinds;
   for (const SessionEvent& event : events)
-    if (!isForTrainers(event)) ++kinds[event.kind];
+    if (!isForTrainers(event)) kinds[event.kind] += event.times;
   return kinds;
 }
 

@@ -1,8 +1,10 @@
 #include "clients/report/recording_reader.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <functional>
+#include <set>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -26,6 +28,17 @@ namespace {
 
 // A contact is assumed to continue for so long; a pair in contact is published every 10 ticks.
 constexpr Tick kContactHold = 20;  // [ticks]
+
+/// How many events a station's entry stands for: ", 28 times, step 4000" at its end.
+int timesOf(std::string_view text) {
+  const std::size_t end = text.rfind(" times, step ");
+  if (end == std::string_view::npos) return 1;
+  const std::size_t comma = text.rfind(", ", end);
+  if (comma == std::string_view::npos) return 1;
+  int times = 1;
+  const auto read = std::from_chars(text.data() + comma + 2, text.data() + end, times);
+  return read.ec == std::errc{} && read.ptr == text.data() + end ? std::max(1, times) : 1;
+}
 
 class RecordingReader {
  public:
@@ -112,8 +125,11 @@ class RecordingReader {
     if (event.kind == "command") countCommand(event.text);
   }
   void receive(const ClientEvent& event) {
+    // a station names its devices again from time to time, for those that come late
+    if (event.kind == "device" && !devices_.emplace(event.client.value, event.text).second) return;
     const Severity severity = event.kind == "safety" ? Severity::kWarning : Severity::kInfo;
-    session_.client_events.push_back({secondsOf(event.tick), severity, event.kind, event.text});
+    session_.client_events.push_back(
+        {secondsOf(event.tick), severity, event.kind, event.text, timesOf(event.text)});
   }
   void receive(const EmergencyStop& stop) {
     if (stops_.raise(stop)) addStop(Severity::kError, "raised", stop.who, stop.reason);
@@ -137,6 +153,7 @@ class RecordingReader {
 
   RecordedSession& session_;
   StopTruth stops_;
+  std::set<std::pair<std::uint32_t, std::string>> devices_;  ///< client and text
   std::map<std::string_view, std::function<void(std::span<const std::uint8_t>)>> handlers_;
   std::map<ObjectId, std::string> kinds_;
   std::map<HandId, std::uint32_t> freezes_;    ///< [ticks] in force

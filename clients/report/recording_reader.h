@@ -23,6 +23,7 @@ struct SessionEvent {
   Severity severity = Severity::kInfo;
   std::string kind;
   std::string text;
+  int times = 1;  ///< [] that one entry of a station stands for
 };
 
 /// A person or program that joined the session.

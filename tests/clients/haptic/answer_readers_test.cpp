@@ -71,11 +71,15 @@ TEST_F(AnswerReadersTest, HaveBothKindsInBetweenSoThatNoAnswerIsMissing) {
   ASSERT_TRUE(readers_->open());
   expectRead(1, 0);
   ASSERT_TRUE(readers_->choose(true));
+  EXPECT_FALSE(readers_->hasSlowAlone()) << "a loss of slow answers cannot be counted yet";
   expectRead(1, 1);
   ASSERT_TRUE(readers_->choose(true));
+  EXPECT_TRUE(readers_->hasSlowAlone());
   expectRead(0, 1);
   ASSERT_TRUE(readers_->choose(true));
   expectRead(0, 1);
+  ASSERT_TRUE(readers_->choose(false));
+  EXPECT_FALSE(readers_->hasSlowAlone());
 }
 
 TEST_F(AnswerReadersTest, GoBackToThoseThatHearWhenTheChoiceChangesInBetween) {

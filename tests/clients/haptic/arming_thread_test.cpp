@@ -2,11 +2,14 @@
 
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "clients/haptic/station_program.h"
 
 namespace tenon::haptic {
 namespace {
@@ -56,6 +59,20 @@ TEST(ArmingThread, TheCallerHearsAStopWhileADeviceDoesNotAnswer) {
   arming.start();
   arming.await([] { std::this_thread::yield(); });
   EXPECT_EQ(station.armings, 2);
+}
+
+//   the first one ends the program in its own time, for which it may have to wait for a device
+TEST(StationProgram, ASecondSignalEndsItWhileItWaitsForADevice) {
+  const auto signalTwice = [](int first, int second) {
+    const std::atomic<bool>& stop = stopSignal();
+    std::raise(first);
+    std::raise(first);  // while forces are taken away, none ends it
+    if (!stop) return;
+    endAtNextSignal();
+    std::raise(second);
+  };
+  EXPECT_EXIT(signalTwice(SIGINT, SIGINT), testing::KilledBySignal(SIGINT), "");
+  EXPECT_EXIT(signalTwice(SIGTERM, SIGINT), testing::KilledBySignal(SIGINT), "");
 }
 
 }  // namespace

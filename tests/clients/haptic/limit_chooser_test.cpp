@@ -48,6 +48,18 @@ TEST(LimitChooser, TheLossIsThatOfTheWorseDirectionAndThatOfAnswersIsForgottenSl
   EXPECT_NEAR(chooser.step(now).loss, 0.01, 1e-12);
 }
 
+TEST(LimitChooser, ASteadyLossOfAnswersAboveTheMostCountsAsTheMostAndAnInterruptionDoesNot) {
+  LimitChooser chooser;
+  LinkMeasurement now = kQuiet;
+  now.answers_lost = 0.0;
+  static_cast<void>(chooser.step(now));
+  now.answers_lost = 0.6;
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(chooser.step(now).loss, 0.0) << "an interruption";
+  EXPECT_GT(chooser.step(now).loss, 0.0);
+  for (int i = 0; i < 50; ++i) EXPECT_LE(chooser.step(now).loss, 0.2);
+  EXPECT_GT(chooser.step(now).loss, 0.19);
+}
+
 TEST(LimitChooser, NoLinkHoweverBadLeavesAHandUnfrozenForLongerThanTheBound) {
   LimitChooser chooser;
   const double kInfinite = std::numeric_limits<double>::infinity();

@@ -1,6 +1,10 @@
+#include <algorithm>
+#include <vector>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "clients/haptic/repeated_events.h"
 #include "clients/haptic/station.h"
 #include "devices/safety_rules.h"
 
@@ -29,6 +33,57 @@ TEST(StationEvent, EveryKindHasAText) {
     EXPECT_THAT(describe({.kind = static_cast<StationEventKind>(kind), .detail = 1}, "left"),
                 testing::Not(HasSubstr("unknown event")))
         << kind;
+}
+
+TEST(StationEvent, SaysHowManyTimesAWarningCameInOneEvent) {
+  EXPECT_EQ(
+      describe({.seq = 12, .kind = StationEventKind::kBeyondValidity, .value = 40.0, .count = 28}, "left"),
+      "hand left: ahead of the contact set (40 ms in total), 28 times, step 12");
+  EXPECT_EQ(
+      describe({.seq = 12, .kind = StationEventKind::kBeyondValidity, .value = 40.0, .count = 1}, "left"),
+      "hand left: ahead of the contact set (40 ms in total), step 12");
+}
+
+//  a warning every 20 ms for 10 s: the first at once, then one a second with the number of times
+TEST(RepeatedEvents, PassOnceASecondWithTheNumberOfTimes) {
+  RepeatedEvents events;
+  std::vector<StationEvent> sent;
+  std::uint32_t told = 0;
+  for (std::uint32_t seq = 1; seq <= 10'000; ++seq) {
+    const StationEvent event{.seq = seq, .kind = StationEventKind::kBeyondValidity, .hand = HandId{0}};
+    if (seq % 20 == 0 && events.passes(event)) sent.push_back(event);
+    while (const auto waiting = events.takeDue(seq)) sent.push_back(*waiting);
+  }
+  while (const auto waiting = events.takeWaiting()) sent.push_back(*waiting);
+  for (const StationEvent& event : sent) told += std::max(1U, event.count);
+  EXPECT_EQ(sent.size(), 11U);
+  EXPECT_EQ(told, 500U) << "all are counted";
+  EXPECT_EQ(sent.front().seq, 20U) << "the first one is not kept waiting";
+}
+
+TEST(RepeatedEvents, KeepNeitherAnotherHandNorAnotherKindWaiting) {
+  RepeatedEvents events;
+  const StationEvent stale{.seq = 5, .kind = StationEventKind::kStale, .hand = HandId{0}};
+  EXPECT_TRUE(events.passes(stale));
+  EXPECT_FALSE(events.passes(stale));
+  StationEvent other = stale;
+  other.hand = HandId{1};
+  EXPECT_TRUE(events.passes(other));
+  other = stale;
+  other.kind = StationEventKind::kBeyondValidity;
+  EXPECT_TRUE(events.passes(other));
+  EXPECT_FALSE(events.takeDue(4)) << "of a step before the event";
+  EXPECT_FALSE(events.takeDue(1004));
+  EXPECT_EQ(events.takeDue(1005)->kind, StationEventKind::kStale);
+  EXPECT_FALSE(events.takeDue(1005));
+}
+
+TEST(RepeatedEvents, WhatIsNoWarningAlwaysPasses) {
+  RepeatedEvents events;
+  for (const auto kind :
+       {StationEventKind::kStopChanged, StationEventKind::kArmed, StationEventKind::kDeviceFault,
+        StationEventKind::kSafetyBegan, StationEventKind::kGuidanceEnded})
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(events.passes({.seq = 1, .kind = kind}));
 }
 
 }  // namespace

@@ -1,11 +1,14 @@
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include "clients/report/embedded_session.h"
+#include "clients/report/event_list.h"
 #include "clients/report/page.h"
 #include "clients/report/page_data.h"
 #include "clients/report/session_analysis.h"
@@ -238,6 +241,12 @@ TEST_F(ReportTest, RepeatedSafetyEventsAreOneLineAndOneMark) {
     EXPECT_NEAR(event["until"].get<double>(), 7.9, 1e-9);
   }
   EXPECT_EQ(rows, 1);
+}
+
+TEST_F(ReportTest, AnEntryOfAStationIsCountedAsOftenAsItSays) {
+  const std::map<std::string, int> others = otherEvents(analyze().events);
+  EXPECT_EQ(others.at("station"), 29);
+  EXPECT_EQ(others.at("device"), 1) << "it is told again to those that come late";
 }
 
 // An hour at 1 kHz in a few thousand values, one of them a spike.

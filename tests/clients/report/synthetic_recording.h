@@ -50,6 +50,13 @@ class SyntheticRecording {
     put(wire::kSceneObject, SceneObject{.object = ObjectId{0}, .name = "bay", .kind = "scene"});
     put(wire::kSceneObject, SceneObject{.object = ObjectId{2}, .name = "cube", .kind = "assistant"});
     put(wire::kEventLog, EventLog{8, 0, Severity::kInfo, "taken", "cube (instructor hand)"});
+    std::uint64_t seq = 0;
+    for (const auto& [kind, text] :
+         {std::pair{"device", "hand right: HUG, workspace radius 0.400 m"},
+          std::pair{"station", "hand right: ahead of the contact set (2 ms in total), step 400"},
+          std::pair{"station", "hand right: ahead of the contact set (40 ms in total), 28 times, step 1400"},
+          std::pair{"device", "hand right: HUG, workspace radius 0.400 m"}})
+      put(wire::kClientEvent, ClientEvent{ClientId{1}, ++seq, 8, kind, text});
     const Tick end = parameters_.ticks_per_step * parameters_.steps;
     for (tick_ = 1; tick_ <= end; ++tick_) tick();
     put(wire::kTelemetry, Telemetry{.client = ClientId{1},
