@@ -16,6 +16,9 @@ constexpr double kApart = 2e-3;           // [m] of any point
 constexpr std::uint32_t kApartFor = 250;  // [cycles]
 constexpr double kStands = 5e-3;          // [m/s] of any point
 
+// What a frozen hand holds has moved by more: it was frozen while a frame was on its way, or is not.
+constexpr double kStoodStill = 5e-3;  // [m] of any point
+
 // A contribution is repeated each cycle.
 constexpr std::uint32_t kLifetime = 2;  // [ticks]
 constexpr std::uint32_t kSource = 0;
@@ -314,7 +317,9 @@ void SceneCopy::contribute(const HandPull& pull) noexcept {
 void SceneCopy::loosen(HandId hand, const WorldView& world) noexcept {
   OtherHand& other = others_[hand.value];
   const bool is_own = other.object == object_;
-  if (!is_own && world.object(other.object).status != ObjectStatus::kHeld) return letGo(hand);
+  const ObservedObject& seen = world.object(other.object);
+  if (!is_own && other.grip > 0.0) other.X_WO_begun = seen.X_WO;
+  if (!is_own && hasLeft(other, seen)) return letGo(hand);
   // another's object stands where it is, so that nothing is to fade
   other.grip = is_own ? std::max(0.0, other.grip - kTickSeconds / kEase) : 0.0;
   if (other.grip > 0.0) {
@@ -322,6 +327,17 @@ void SceneCopy::loosen(HandId hand, const WorldView& world) noexcept {
   } else {
     environment_.setHandFrozen(hand, true);
   }
+}
+
+/// It has let its object go, or moves it out of reach. One that a frozen hand holds stands still.
+bool SceneCopy::hasLeft(const OtherHand& other, const ObservedObject& seen) const noexcept {
+  const ObservedObject& held = view_.object(object_);
+  const auto objects = environment_.objects();
+  const Vector3 p_WQ = objects[other.object.value].X_WO * seen.p_OQ_O;
+  const double apart = (p_WQ - objects[object_.value].X_WO * held.p_OQ_O).norm() - seen.radius - held.radius;
+  const Displacement way = displacement(other.X_WO_begun, seen.X_WO, seen.p_OQ_O);
+  return seen.status != ObjectStatus::kHeld || apart > kNeighbourReach ||
+         maxPointMotion(way, seen.radius) > kStoodStill;
 }
 
 void SceneCopy::letGo(HandId hand) noexcept {
@@ -337,9 +353,10 @@ void SceneCopy::mirrorPull(const HandPull& pull, double ahead) noexcept {
   const Twist V_WG{pull.V_WG.head<3>().cast<double>(), pull.V_WG.tail<3>().cast<double>()};
   const double pace = pointSpeed(V_WG, object.radius);
   // between two manifolds a shared object needs slow motion, too, or the goal would move in steps
-  const double since = is_own ? silence_ : 0.0;
+  const double since = is_own ? std::min(silence_, kLongestExtrapolation) : 0.0;
+  const double rest = std::min(ahead, kLongestExtrapolation) - since;
   Pose X_WG = extrapolated(pull.X_WG, V_WG, object.p_OQ_O, since);
-  X_WG = extrapolated(X_WG, faded(V_WG, pace), object.p_OQ_O, ahead - since);
+  X_WG = extrapolated(X_WG, faded(V_WG, pace), object.p_OQ_O, rest);
   const simulation::HandMotion& hand = environment_.hands()[pull.hand.value];
   const bool is_held = hand.present && hand.attached && hand.object == pull.object;
   if (!is_held || other.grip <= 0.0) grasp(pull, X_WG);

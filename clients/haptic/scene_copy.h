@@ -37,8 +37,9 @@ namespace tenon::haptic {
 ///   extrapolated likewise. So it gives way to a push at once: in the server it does so for the push of a
 ///   delay ago, and is heard another delay later.
 /// * A hand that the manifold lists no more, since it is frozen, keeps its object as in the server: without a
-///   pull, and without a jump when it goes on. A pull on the hand's own object fades out and in, within
-///   kEase; one on another object grows soft within it.
+///   pull, and without a jump when it goes on. One whose object moves nevertheless is out of reach, and let
+///   go. A pull on the hand's own object fades out and in, within kEase; one on another object grows soft
+///   within it.
 /// * The object starts at the server's proxy, and again after each of its jumps. On a scene at rest both then
 ///   solve one problem for one device pose. Where the answer to a pose nevertheless stays away from what the
 ///   copy had for that pose, with all at rest, the copy has jumped(): the hand is re-anchored at the
@@ -92,7 +93,7 @@ class SceneCopy final : public ForceModel {
   struct OtherHand {
     ObjectId object;          ///< invalid: none
     Pose X_WG;                ///< goal of the object in the copy
-    Pose X_WO_begun;          ///< where it was when the hand began to pull it
+    Pose X_WO_begun;          ///< where it was when the hand began to pull it, or heard when it ceased
     HandStiffness stiffness;  ///< that was listed last
     double grip = 0.0;        ///< [-] how far its coupling is the listed one; 0: frozen
   };
@@ -122,8 +123,9 @@ class SceneCopy final : public ForceModel {
   static void hearMotion(Mirrored& mirrored, const ObservedObject& seen) noexcept;
   /// `now` [ticks] of the server.
   void mirrorOtherHands(const WorldView& world, const HandManifold& heard, double now) noexcept;
-  /// The hand pulls no more: it is frozen, or has let go.
+  /// The hand pulls no more: it is frozen, has let go, or is out of reach.
   void loosen(HandId hand, const WorldView& world) noexcept;
+  [[nodiscard]] bool hasLeft(const OtherHand& other, const ObservedObject& seen) const noexcept;
   void letGo(HandId hand) noexcept;
   /// The hand pulls its object, by what was heard `ahead` [s] before the present tick.
   void mirrorPull(const HandPull& pull, double ahead) noexcept;

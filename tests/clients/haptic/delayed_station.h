@@ -92,12 +92,15 @@ class DelayedStation {
     return kStiffness * (proxy.X_WS.translation() - p_WH);
   }
 
+  bool is_silent = false;  ///< the server's answers are lost
+
  private:
   struct Input {
     std::uint32_t seq = 0;
     Vector3 p_WH;
   };
   void send() {
+    if (is_silent) return;
     WorldFrame frame;
     frame.tick = now_;
     for (std::uint32_t i = 0; i < server_.objects().size(); ++i) {

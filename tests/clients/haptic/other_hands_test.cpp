@@ -175,6 +175,28 @@ TEST(AnothersFreeze, FadesTheirPullOnASharedPartAndItReturnsWithoutAStep) {
   EXPECT_GT(last.y(), 2.0) << "and pulls again";
 }
 
+//   [ block ] held by both, the other one pulls sideways, lets go and takes the part beside it at once
+TEST(AnothersPull, FadesWhenTheyTakeTheirOwnPartInstead) {
+  const Vector3 p_WH(0.0, 0.0, 0.2), away(0.15, 0.0, 0.2);
+  HandBesideAnother both([=](double) { return p_WH; });
+  for (int i = 0; i < 500; ++i) both.tick(away);
+  both.server.grab(kLeft, kBlock);
+  double aside = 0.0;  // [m]
+  for (int i = 0; i < 3000; ++i) both.tick(away + Vector3(0.0, aside = std::min(0.005, aside + 1e-5), 0.0));
+  ASSERT_TRUE(both.isRendered());
+  Vector3 last = both.force();
+  ASSERT_GT(last.y(), 2.0);
+  const double step = 0.2 * last.norm();  // the pull fades within 20 ms
+  both.server.grab(kLeft, kPart);
+  for (int i = 0; i < 500; ++i) {
+    both.tick(away + Vector3(0.0, aside, 0.0));
+    ASSERT_TRUE(both.isRendered()) << i;
+    ASSERT_LE((both.force() - last).norm(), step) << i;
+    last = both.force();
+  }
+  EXPECT_LT(last.norm(), 0.1);
+}
+
 //   two people carry a part across at 0.1 m/s; what is heard of the other one comes 50 times a second
 TEST(ASharedPart, IsCarriedWithoutStepsOfTheForce) {
   for (const Tick delay : {5, 25}) {

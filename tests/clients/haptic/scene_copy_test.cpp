@@ -135,6 +135,50 @@ TEST(SceneCopy, AHandThatLeavesItsPartCloseByLeavesItWhereItIs) {
   EXPECT_LT((X_WO.translation() - p_WLeft).norm(), 1e-6);
 }
 
+//   both people are at the block; the other one goes along the floor, out of reach
+TEST(SceneCopy, AHandThatGoesOutOfReachCostsNothingAnyMore) {
+  constexpr std::size_t kPartAndFloor = 2;
+  DelayedStation far(25);
+  const Vector3 p_WH(0.0, 0.0, 0.1);
+  Vector3 p_WLeft(0.1, 0.0, 0.1);
+  const auto isSimulated = [&] { return far.copy.environment().pairs()[kPartAndFloor].enabled; };
+  for (Tick tick = 1; tick <= 500; ++tick) far.tick(p_WH, p_WLeft);
+  ASSERT_TRUE(isSimulated());
+  for (const bool frozen : {true, false}) {
+    far.server().setHandFrozen(kLeft, frozen);
+    for (Tick tick = 1; tick <= 300; ++tick) far.tick(p_WH, p_WLeft);
+    EXPECT_TRUE(isSimulated()) << "one that is frozen may go on";
+  }
+  for (Tick tick = 1; tick <= 1000; ++tick) far.tick(p_WH, p_WLeft += Vector3(1e-4, 0.0, 0.0));
+  EXPECT_FALSE(isSimulated());
+  for (Tick tick = 1; tick <= 300; ++tick) far.tick(p_WH, p_WLeft);
+  EXPECT_LT((far.copy.environment().objects()[kPart.value].X_WO.translation() - p_WLeft).norm(), 1e-4);
+  for (Tick tick = 1; tick <= 1000; ++tick) far.tick(p_WH, p_WLeft -= Vector3(1e-4, 0.0, 0.0));
+  EXPECT_TRUE(isSimulated()) << "and back";
+}
+
+//   the other one moves a shared part at 0.1 m/s when the link fails
+TEST(SceneCopy, TheGoalOfASharedPartGoesOnInASilenceAsFarAsTheLawSays) {
+  constexpr double kSpeed = 0.1;  // [m/s]
+  DelayedStation far(100);
+  const Vector3 p_WH(0.0, 0.0, 0.1);
+  Vector3 p_WLeft(0.2, 0.0, 0.1);
+  for (Tick tick = 1; tick <= 500; ++tick) far.tick(p_WH, p_WLeft);
+  far.server().grab(kLeft, kBlock);
+  const auto move = [&](int ticks) {
+    for (int i = 0; i < ticks; ++i) far.tick(p_WH, p_WLeft += Vector3(0.0, kSpeed * kTickSeconds, 0.0));
+  };
+  move(500);
+  far.is_silent = true;
+  move(600);
+  ASSERT_TRUE(far.copy.ready());
+  const auto goal = [](const simulation::HandMotion& hand) { return hand.X_WH * hand.X_HO; };
+  const double heard = far.local.manifold().others[0].X_WG.translation().y();
+  const double gone = goal(far.copy.environment().hands()[kLeft.value]).translation().y() - heard;
+  EXPECT_GT(gone, 0.9 * kSpeed * kLongestExtrapolation);
+  EXPECT_LT(gone, 1.01 * kSpeed * kLongestExtrapolation);
+}
+
 /// A block in the right hand, and before it a free part on the floor or, `floating`, in the air.
 std::shared_ptr<const simulation::Scene> freePart(bool floating) {
   SmallScene small;
