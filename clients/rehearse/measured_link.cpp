@@ -68,6 +68,7 @@ void MeasuredLink::receive(Tick now, ClientId client, session::SessionRegistry& 
     newest_seq_ = std::max(newest_seq_, input.sample.seq);
     buffer_.setPlayout(input.hand, choice_.playout_ticks);
     buffer_.setPeriod(input.hand, input.period);
+    buffer_.setFreeze(input.hand, choice_.limits.freeze_ticks);
     // those before it whose own messages are lost or late
     DeviceInput one = input;
     for (std::size_t i = input.earlier.size(); i-- > 0 && choice_.playout_ticks > 0;) {

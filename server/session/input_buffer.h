@@ -18,8 +18,8 @@ namespace tenon::session {
 /// (playout), so that a reading that is lost and comes with the next message has its tick nevertheless. Of a
 /// hand that sends less than one sample a tick, it takes one between two samples (ReadingPlayout).
 ///
-/// Threads: one writer (wire: put, setPlayout, setPeriod, freeChanges), one reader (tick: collect); counts
-/// from any. Real-time: all but construction.
+/// Threads: one writer (wire: put, setPlayout, setPeriod, setFreeze, freeChanges), one reader (tick:
+/// collect); counts from any. Real-time: all but construction.
 class InputBuffer {
  public:
   static constexpr std::size_t kChanges = 256;      ///< that wait for ticks, at most
@@ -49,11 +49,17 @@ class InputBuffer {
     hands_[hand.value].period.store(std::clamp<std::uint32_t>(ticks, 1, kMostInputPeriod),
                                     std::memory_order_relaxed);
   }
-  /// What has waited of `hand` is dropped: from now on another station moves it, at first with no playout and
-  /// a sample each tick.
+  /// From now on a silence of more than `ticks` [ticks] freezes `hand` (LinkLimits::freeze); kFreezeTicks at
+  /// first.
+  void setFreeze(HandId hand, std::uint32_t ticks) noexcept {
+    hands_[hand.value].freeze.store(ticks, std::memory_order_relaxed);
+  }
+  /// What has waited of `hand` is dropped: from now on another station moves it, at first with no playout, a
+  /// sample each tick and the freeze limit kFreezeTicks.
   void restart(HandId hand) noexcept {
     setPlayout(hand, 0);
     setPeriod(hand, 1);
+    setFreeze(hand, kFreezeTicks);
     hands_[hand.value].restarts.store(true, std::memory_order_relaxed);
   }
   /// False, and the change is dropped, when the queue is full because the tick has fallen behind.
@@ -70,6 +76,7 @@ class InputBuffer {
     for (std::size_t i = 0; i < count_; ++i) {
       const HandReading* const reading = take(hands_[i]);
       if (reading != nullptr) input.readings.push_back(*reading);
+      hands_[i].silent = reading == nullptr ? hands_[i].silent + 1 : 0;
       if (reading == nullptr) hands_[i].missed.fetch_add(1, std::memory_order_relaxed);
     }
     for (Change* change = changes_.front(); change != nullptr; change = changes_.front()) {
@@ -91,11 +98,12 @@ class InputBuffer {
   struct Hand {
     threads::Latest<HandReading> newest;
     threads::SpscQueue<HandReading> queue{64};  ///< used with a playout or a period
-    std::atomic<std::uint32_t> playout = 0, period = 1, replaced = 0, missed = 0;
+    std::atomic<std::uint32_t> playout = 0, period = 1, freeze = kFreezeTicks, replaced = 0, missed = 0;
     std::atomic<bool> catches_up = false;  ///< the period is 1 again, and the ticks are still behind
     std::atomic<bool> restarts = false;
     // of the tick
     ReadingPlayout readings;
+    std::uint32_t silent = 0;   ///< [ticks] without a reading, up to the last one
     std::uint32_t counted = 0;  ///< of readings.replaced()
   };
 
@@ -120,8 +128,9 @@ class InputBuffer {
       hand.queue.pop();
     }
     if (is_new) hand.readings.add(hand.newest.value());  // the queue may have been full
+    const bool was_frozen = hand.silent > hand.freeze.load(std::memory_order_relaxed);
     const HandReading* const taken =
-        is_between ? hand.readings.takeBetween(period) : hand.readings.takeBehind(playout);
+        is_between ? hand.readings.takeBetween(period, was_frozen) : hand.readings.takeBehind(playout);
     if (period == 1 && hand.readings.behind() == 0) hand.catches_up.store(false, std::memory_order_relaxed);
     const std::uint32_t replaced = hand.readings.replaced();
     hand.replaced.fetch_add(replaced - std::exchange(hand.counted, replaced), std::memory_order_relaxed);

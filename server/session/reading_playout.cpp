@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "idl/types/messages/hands.h"
 #include "idl/types/resolution.h"
 
 namespace tenon::session {
@@ -59,7 +58,7 @@ std::uint32_t ReadingPlayout::behind() const noexcept {
   return from_ && !waiting_.empty() ? waiting_[waiting_.size() - 1].seq - taken_.seq : 0;
 }
 
-const HandReading* ReadingPlayout::takeBetween(std::uint32_t period) noexcept {
+const HandReading* ReadingPlayout::takeBetween(std::uint32_t period, bool was_frozen) noexcept {
   if (!from_) return waiting_.empty() ? nullptr : take(HandReading(waiting_[waiting_.size() - 1]));
   const std::uint32_t ahead = behind();
   if (ahead == 0) return nullptr;
@@ -67,7 +66,8 @@ const HandReading* ReadingPlayout::takeBetween(std::uint32_t period) noexcept {
   // an eighth faster: who is pushed by the hand feels little of it
   std::uint32_t step = ahead > usual && taken_.seq % 8 == 0 ? 2 : 1;
   if (ahead > kMostPeriodsBehind * period) step = 2;
-  if (ahead > std::max(kMostPeriodsBehind * period, kMostFreezeTicks)) step = ahead - period;
+  const bool is_lost = was_frozen || ahead > std::max(kMostPeriodsBehind * period, kMostFreezeTicks);
+  if (is_lost && ahead > period) step = ahead - period;
   const std::uint32_t seq = taken_.seq + step;
   std::size_t passed = 0;
   while (passed < waiting_.size() && !isBefore(seq, waiting_[passed].seq)) ++passed;

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "idl/types/fixed_vector.h"
+#include "idl/types/messages/hands.h"
 #include "server/session/tick_io.h"
 
 namespace tenon::session {
@@ -29,10 +30,10 @@ class ReadingPlayout {
   /// Of a hand that sends a sample each `period` [ticks]: the reading of one tick after that of the last
   /// call, on the straight line between two samples. A sample that is late holds the hand at the newest one,
   /// and from then on it is so much farther behind. More than three periods behind it goes an eighth faster,
-  /// more than kMostPeriodsBehind twice as fast; after a silence for which it was held still, at once to one
-  /// period behind. So a link's jitter becomes a delay. With a period of 1 the delay is worked off. Null:
-  /// none.
-  const HandReading* takeBetween(std::uint32_t period) noexcept;
+  /// more than kMostPeriodsBehind twice as fast; after a silence for which it `was_frozen`, or as long as the
+  /// longest one for which it is not, at once to one period behind. So a link's jitter becomes a delay. With
+  /// a period of 1 the delay is worked off. Null: none.
+  const HandReading* takeBetween(std::uint32_t period, bool was_frozen = false) noexcept;
   /// [ticks] from the reading that was taken last to the newest that has come.
   [[nodiscard]] std::uint32_t behind() const noexcept;
 
@@ -42,7 +43,8 @@ class ReadingPlayout {
   static constexpr std::uint32_t kMostPeriodsBehind = 8;
 
  private:
-  static constexpr std::size_t kWaiting = 32;
+  /// From kMostFreezeTicks behind on, half of those ticks come while the others are taken two at a time.
+  static constexpr std::size_t kWaiting = kMostFreezeTicks / 2 + kMostPeriodsBehind;
 
   void dropFirst(std::size_t count) noexcept;
   /// Of sequence numbers, which begin again at 0 after the largest.

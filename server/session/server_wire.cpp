@@ -250,6 +250,7 @@ void ServerWire::beginInputs(const Welcome& welcome) {
     if (!hand.valid()) continue;
     newest_seq_[hand.value] = 0;
     input_buffer_.restart(hand);
+    passFreezeLimit(hand);
   }
   received_inputs_.erase(welcome.client);
   contributions_.end(welcome.client);  // of a former presence
@@ -393,6 +394,8 @@ void ServerWire::handle(const Telemetry& telemetry) {
   if (now - inputs->second.limits_set_at < kBetweenLimits) return;
   const double round_trip = telemetry.clock_known ? telemetry.round_trip : 0.0;
   if (!registry_.setLimits(telemetry.client, telemetry.limits, round_trip)) return;
+  for (const HandId hand : station.hands)
+    if (registry_.controllerOf(hand) == telemetry.client) passFreezeLimit(hand);
   inputs->second.limits_set_at = now;
   const HandLimits& limits = registry_.limitsOf(station.hands.front());
   std::uint32_t& logged = inputs->second.logged_freeze;
@@ -405,6 +408,11 @@ void ServerWire::handle(const Telemetry& telemetry) {
           "{:.0f} ms apart, {:.2f} % are lost",
           station.name, limits.freeze_ticks, limits.park_ticks,
           1e3 * inputs->second.gaps.longest(nowNanoseconds()), 1e2 * telemetry.inputs_lost));
+}
+
+void ServerWire::passFreezeLimit(HandId hand) {
+  input_buffer_.setFreeze(hand, std::max(static_cast<std::uint32_t>(options_.limits.freeze),
+                                         registry_.limitsOf(hand).freeze_ticks));
 }
 
 void ServerWire::publishLimits() {

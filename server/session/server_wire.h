@@ -121,6 +121,7 @@ class ServerWire {
   void handleEarlier(const DeviceInput& input, std::uint32_t newest);
   void handle(const ClockSync& sync);
   void handle(const Telemetry& telemetry);
+  void passFreezeLimit(HandId hand);
   void publishLimits();
   void handle(const SessionAnnounce& other, const wire::Origin& from);
   void handle(const EmergencyStop& stop, const wire::Origin& from);

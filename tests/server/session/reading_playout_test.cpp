@@ -1,5 +1,6 @@
 #include "server/session/reading_playout.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <random>
@@ -118,19 +119,24 @@ TEST(SparseInputsOfAHand, AreFollowedByEachTicksOwnWithoutAJump) {
   EXPECT_EQ(last, 300U) << "the delay is worked off";
 }
 
-//   a link with jitter that becomes near: 19 ticks behind and more, of which no tick takes two at once
+//   a link with jitter that becomes near: 10 ticks behind and more, of which a tick takes two, on the path
 TEST(SparseInputsOfAHand, FarBehindAreCaughtUpWithByOneMoreTickATick) {
-  for (const std::uint32_t behind : {9U, 19U, 40U, kMostFreezeTicks}) {
+  constexpr std::uint32_t kPeriod = 5;
+  constexpr double kT = kPeriod * kTickSeconds;
+  for (const std::uint32_t behind : {10U, 20U, 40U, kMostFreezeTicks - kPeriod}) {
     ReadingPlayout playout;
     playout.add(swinging(100));
-    ASSERT_NE(playout.takeBetween(5), nullptr);
-    std::uint32_t heard = 100 + behind - 1, last = 100;
+    ASSERT_NE(playout.takeBetween(kPeriod), nullptr);
+    std::uint32_t heard = 100, last = 100;
+    while (heard < 100 + behind) playout.add(swinging(heard += kPeriod));
     for (int tick = 0; tick < 500; ++tick) {
       playout.add(swinging(++heard));
       const HandReading* const reading = playout.takeBetween(1);
       ASSERT_NE(reading, nullptr);
       ASSERT_GE(reading->seq - last, 1U) << behind;
       ASSERT_LE(reading->seq - last, 2U) << behind;
+      const Vector3 off = reading->X_WH.translation() - swinging(reading->seq).X_WH.translation();
+      ASSERT_LT(off.norm(), 4.0 * kT * kT / 8.0 + kPositionStep) << behind << ", chord of one period";
       last = reading->seq;
     }
     EXPECT_LE(heard - last, 1U) << behind;
@@ -145,6 +151,36 @@ TEST(SparseInputsOfAHand, AfterASilenceAreOnePeriodBehind) {
   const HandReading* const reading = playout.takeBetween(5);
   ASSERT_NE(reading, nullptr);
   EXPECT_EQ(reading->seq, 395U);
+}
+
+//   a silence of 60 ticks: only where the hand was frozen meanwhile, what was missed is skipped
+TEST(SparseInputsOfAHand, AreCaughtUpWithAfterASilenceUnlessTheHandWasFrozen) {
+  constexpr std::uint32_t kPeriod = 5, kSilence = 60, kLast = 100;
+  for (const std::uint32_t freeze : {kFreezeTicks, kMostFreezeTicks}) {
+    InputBuffer buffer(1);
+    buffer.setPeriod(kMoved, kPeriod);
+    buffer.setFreeze(kMoved, freeze);
+    TickInput input;
+    std::uint32_t last = 0, largest_step = 0;
+    for (std::uint32_t tick = kPeriod; tick <= kLast + 2 * kSilence; ++tick) {
+      const bool is_silent = tick > kLast && tick <= kLast + kSilence;
+      if (tick % kPeriod == 0 && !is_silent) buffer.put(swinging(tick));
+      buffer.collect(tick, input);
+      for (const HandReading& reading : input.readings) {
+        if (last > 0) largest_step = std::max(largest_step, reading.seq - last);
+        last = reading.seq;
+      }
+      if (tick != kLast + kSilence + kPeriod) continue;
+      if (freeze == kFreezeTicks) {
+        EXPECT_EQ(last, tick - kPeriod);
+        const Vector3 off = input.readings.back().X_WH.translation() - swinging(tick).X_WH.translation();
+        EXPECT_LT(off.norm(), 1e-3 * kPeriod) << "the hand moves by less than 1 m/s";
+      }
+    }
+    if (freeze == kMostFreezeTicks) {
+      EXPECT_LE(largest_step, 2U);
+    }
+  }
 }
 
 TEST(SparseInputsOfAHand, OfAnotherStationBeginAnew) {
