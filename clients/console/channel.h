@@ -37,6 +37,7 @@ struct Publication {
   std::uint64_t instance = 0;
   std::int64_t time_ns = 0;  ///< [ns] since 1970, of its writer
   Payload payload;           ///< null: the instance ended, late subscribers do not get it any more
+  std::uint64_t writer = 0;  ///< equal for messages of one writer; 0: this program
 };
 
 }  // namespace tenon::console

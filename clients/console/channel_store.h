@@ -12,9 +12,10 @@
 namespace tenon::console {
 
 /// All channels and what late subscribers get of them: the newest message of each instance, kMaxEvents of a
-/// Delivery::kEach channel. Of more events those that come most often make room, the oldest first: a warning
-/// that repeats forgets no event that was told once. Instances beyond kMaxInstances of a channel are not
-/// kept.
+/// Delivery::kEach channel. Of more events those that their writer tells most often make room, the oldest
+/// first: a warning that repeats forgets no event that was told once. Of more than kMaxInstances of a channel
+/// the oldest make room. The writer that has most of a channel does so first: whoever floods the bus with
+/// names or events forgets its own.
 ///
 /// Threads: one. Real-time: no.
 class ChannelStore {
@@ -35,11 +36,25 @@ class ChannelStore {
 
  private:
   struct Kept {
-    std::map<std::uint64_t, Publication> newest;
+    struct Newest {
+      Publication publication;
+      std::uint64_t order = 0;
+    };
+    struct Counts {
+      std::size_t all = 0;
+      std::map<std::uint64_t, std::size_t> by_kind;  ///< Publication::instance; none is 0
+    };
+    std::map<std::uint64_t, Newest> newest;  ///< by instance
+    /// Of a writer, its instances in `newest` by their order; none is empty.
+    std::map<std::uint64_t, std::map<std::uint64_t, std::uint64_t>> instances;
+    std::uint64_t next_order = 0;
     std::deque<Publication> events;
-    std::map<std::uint64_t, std::size_t> counts;  ///< of events, by instance; none is 0
+    std::map<std::uint64_t, Counts> counts;  ///< of events, by writer
   };
+  static void keepEvent(Kept& kept, const Publication& publication);
   static void dropEvent(Kept& kept);
+  static void keepNewest(Kept& kept, const Publication& publication);
+  static void dropInstance(Kept& kept, std::uint64_t instance);
   std::vector<Channel> channels_;  ///< channel `id` at id - 1
   std::vector<Kept> kept_;
 };

@@ -107,9 +107,9 @@ SessionChannels::SessionChannels(wire::AssetStore assets) : assets_(std::move(as
 }
 
 void SessionChannels::publish(std::string_view topic, std::uint64_t instance, std::int64_t time_ns,
-                              std::vector<std::uint8_t> bytes) {
+                              std::vector<std::uint8_t> bytes, std::uint64_t writer) {
   published_.push_back({ids_.find(topic)->second, instance, time_ns,
-                        std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes))});
+                        std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes)), writer});
 }
 
 void SessionChannels::begin(const SessionAnnounce& announce, std::int64_t now_ns) {
@@ -139,10 +139,11 @@ void SessionChannels::receive(const wire::RawSample& sample) {
   if (channel == ids_.end()) return;
   if (sample.gone) {
     if (isOfServer(sample.topic)) return;
-    published_.push_back({channel->second, sample.instance, sample.source_ns, nullptr});
+    published_.push_back({channel->second, sample.instance, sample.source_ns, nullptr, sample.writer});
     publish(
         record::kInstanceStateTopic, 0, sample.source_ns,
-        record::encodeInstanceGone({std::string(sample.topic), {sample.bytes.begin(), sample.bytes.end()}}));
+        record::encodeInstanceGone({std::string(sample.topic), {sample.bytes.begin(), sample.bytes.end()}}),
+        sample.writer);
     return;
   }
   EventLog event;
@@ -150,11 +151,12 @@ void SessionChannels::receive(const wire::RawSample& sample) {
   std::uint64_t instance = sample.instance;
   if (decodeIf(sample, wire::kEventLog, event) != nullptr) {
     instance = kindOf(event.kind);
-    publish(kLogLines, instance, sample.source_ns, encodeLog(event, sample.source_ns));
+    publish(kLogLines, instance, sample.source_ns, encodeLog(event, sample.source_ns), sample.writer);
   } else if (decodeIf(sample, wire::kClientEvent, told) != nullptr) {
     instance = kindOf(told.kind, told.client.value);
   }
-  publish(sample.topic, instance, sample.source_ns, {sample.bytes.begin(), sample.bytes.end()});
+  publish(sample.topic, instance, sample.source_ns, {sample.bytes.begin(), sample.bytes.end()},
+          sample.writer);
 
   SceneObject object;
   ObjectSnapshot snapshot;

@@ -50,7 +50,7 @@ class SessionChannels {
   };
 
   void publish(std::string_view topic, std::uint64_t instance, std::int64_t time_ns,
-               std::vector<std::uint8_t> bytes);
+               std::vector<std::uint8_t> bytes, std::uint64_t writer = 0);
   void receiveState(const ObjectState& state, std::int64_t time_ns);
   void receiveStep(const StepState& step, std::int64_t time_ns);
   void showOrHide(std::uint32_t id, std::int64_t time_ns);

@@ -55,12 +55,16 @@ class RawSubscription : public Subscription {
       if (!heard && !(keeps_unheard_ && from.known() && infos[i].valid_data)) continue;
       encodeSample(*spec_.type, samples[i], bytes_);
       if (!heard) {
-        keepUnheard({from, infos[i].source_timestamp, infos[i].instance_handle, bytes_});
+        keepUnheard(
+            {from, infos[i].source_timestamp, infos[i].instance_handle, infos[i].publication_handle, bytes_});
         continue;
       }
-      if (infos[i].valid_data) deliver(infos[i].source_timestamp, false, infos[i].instance_handle, bytes_);
-      if (isGone(infos[i], spec_.parameters.latched))
-        deliver(infos[i].source_timestamp, true, infos[i].instance_handle, bytes_);
+      const auto give = [&](bool gone) {
+        deliver(infos[i].source_timestamp, gone, infos[i].instance_handle, infos[i].publication_handle,
+                bytes_);
+      };
+      if (infos[i].valid_data) give(false);
+      if (isGone(infos[i], spec_.parameters.latched)) give(true);
     }
     dds_return_loan(reader->entity(), samples, count);
     return static_cast<std::size_t>(count);
@@ -71,6 +75,7 @@ class RawSubscription : public Subscription {
     Origin from;
     std::int64_t source_ns;
     std::uint64_t instance;
+    std::uint64_t writer;
     std::vector<std::uint8_t> bytes;
   };
 
@@ -83,11 +88,12 @@ class RawSubscription : public Subscription {
   void deliverUnheard() {
     server_ = reader->partition()->server;
     for (const Unheard& sample : std::exchange(unheard_, {}))
-      if (server_ == sample.from) deliver(sample.source_ns, false, sample.instance, sample.bytes);
+      if (server_ == sample.from)
+        deliver(sample.source_ns, false, sample.instance, sample.writer, sample.bytes);
   }
-  void deliver(std::int64_t source_ns, bool gone, std::uint64_t instance,
+  void deliver(std::int64_t source_ns, bool gone, std::uint64_t instance, std::uint64_t writer,
                std::span<const std::uint8_t> bytes) {
-    (*handler_)({spec_.name, spec_.type->m_typename, source_ns, sequence_++, gone, bytes, instance});
+    (*handler_)({spec_.name, spec_.type->m_typename, source_ns, sequence_++, gone, bytes, instance, writer});
   }
 
   TopicSpec spec_;

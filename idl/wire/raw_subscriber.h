@@ -25,6 +25,7 @@ struct RawSample {
   bool gone = false;           ///< the instance ended (DDS NOT_ALIVE): `bytes` has only the key fields set
   std::span<const std::uint8_t> bytes;  ///< as by encode(): encapsulation header and CDR
   std::uint64_t instance = 0;           ///< equal for samples of one topic here that have equal keys
+  std::uint64_t writer = 0;             ///< equal for samples that one writer wrote
 };
 
 /// Names of a topic and of its type.
