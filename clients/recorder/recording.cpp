@@ -225,6 +225,8 @@ std::vector<TopicCount> Recording::counts() const {
   std::vector<TopicCount> all;
   std::map<std::string, TopicCount> by_topic;
   for (const auto& [period, published] : published_) {
+    // of before this recorder joined: what late joiners get came before it was known when that was
+    if (period.life == 0 && published.first_tick <= heardAfter()) continue;
     for (const TopicSamples& topic : published.topics) {
       if (streams_ == Streams::kReduced && StreamReduction::isOmitted(topic.topic)) continue;
       static const std::map<Period, std::uint64_t> kNone;

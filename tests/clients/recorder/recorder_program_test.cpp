@@ -12,6 +12,7 @@
 #include "idl/types/messages/log.h"
 #include "idl/types/messages/objects.h"
 #include "idl/types/messages/role.h"
+#include "idl/types/messages/run.h"
 #include "idl/types/messages/session.h"
 #include "idl/wire/codec.h"
 #include "tests/idl/wire/peer.h"
@@ -94,6 +95,33 @@ TEST_F(RecorderProgramTest, RecordsUntilTheRunIsOverAndClosesItsFile) {
   EXPECT_EQ(found.at("SessionAnnounce"), 1);
   EXPECT_EQ(found.at("RunState"), 1);
   EXPECT_TRUE(test::dispatchUntil(server_.inbox_, [&] { return !server_.status_.recording; }));
+}
+
+TEST_F(RecorderProgramTest, StaysWhileAClientFloodsTheBusWithStopsAndNames) {
+  constexpr int kStops = 1024, kNames = 5000;
+  start();
+  ASSERT_TRUE(test::dispatchUntil(server_.inbox_, [&] { return server_.status_.recording; }));
+  {
+    const auto bus = test::participant(test::ownDomain());
+    wire::Partition session(bus, wire::sessionPartition("class"));
+    auto stops = wire::Writer<EmergencyStop>::open(session, wire::kEmergencyStop);
+    auto names = wire::Writer<Presence>::open(session, wire::kPresence);
+    ASSERT_TRUE(stops && names);
+    ASSERT_TRUE(test::dispatchUntil(
+        server_.inbox_, [&] { return stops->matchedReaders() > 0 && names->matchedReaders() > 0; }));
+    for (std::uint32_t i = 0; i < kStops; ++i) ASSERT_TRUE(stops->write({"made up", i, "flood", "flood"}));
+    for (std::uint32_t i = 0; i < kNames; ++i)
+      ASSERT_TRUE(names->write({.client = ClientId{1000 + i}, .name = "flood"}));
+    EXPECT_TRUE(names->waitForReaders(std::chrono::seconds(20)));
+  }
+  ASSERT_TRUE(server_.events_.write({.seq = 1}));
+  ASSERT_TRUE(server_.run_.write({.phase = RunPhase::kSucceeded, .reason = "done"}));
+  thread_.join();
+  ASSERT_TRUE(result_) << result_.error().what;
+  const auto found = counts();
+  EXPECT_EQ(found.at("EmergencyStop"), kStops);
+  EXPECT_GE(found.at("Presence"), kNames);
+  EXPECT_EQ(found.at("EventLog"), 1);
 }
 
 TEST_F(RecorderProgramTest, ClosesItsFileWhenStopped) {

@@ -189,6 +189,16 @@ TEST_F(RecordingTest, OfThePeriodInWhichItJoinedNothingIsExpected) {
   EXPECT_EQ(recording.status().lost, 7U);
 }
 
+// they come before the welcome says when it joined
+TEST_F(RecordingTest, OfPeriodsThatLateJoinersAreToldOfNothingIsExpected) {
+  Recording recording = open(false);
+  add(recording, wire::kPublishedSamples, PublishedSamples{1, 1000, {{"WorldFrame_1k", 1000}}}, kStart);
+  recording.joined(1500);
+  add(recording, wire::kPublishedSamples, PublishedSamples{2001, 3000, {{"WorldFrame_1k", 7}}}, kStart);
+  add(recording, wire::kRunState, RunState{.phase = RunPhase::kStopped, .tick = 3000}, kStart);
+  EXPECT_EQ(recording.status().lost, 7U);
+}
+
 // a recorder that stood still hears of its seat late, and everything else from the first tick on
 TEST_F(RecordingTest, OfAPeriodWhoseFramesCameBeforeTheWelcomeAllIsExpected) {
   Recording recording = open(true);
