@@ -58,6 +58,14 @@ TEST(NetworkConfig, NamesInterfaceAndPeers) {
   EXPECT_THAT(networkConfig(wan), HasSubstr("<AllowMulticast>false</AllowMulticast>"));
 }
 
+// adapted, it is a few kB after some killed readers, and reliable writes to all others fail
+TEST(NetworkConfig, HasAFixedLimitOfWhatReadersHaveYetToAcknowledge) {
+  for (const Reach reach : {Reach::kLoopback, Reach::kLan, Reach::kWan}) {
+    const Network network{reach, "test", "lo", "127.0.0.1/8", {}};
+    EXPECT_THAT(networkConfig(network), HasSubstr("<WhcAdaptive>false</WhcAdaptive>"));
+  }
+}
+
 TEST(NetworkConfig, IsOneThatDdsTakes) {
   std::uint32_t domain = 210;
   for (const Reach reach : {Reach::kLan, Reach::kWan}) {
