@@ -13,6 +13,7 @@
 #include "clients/console/desk.h"
 #include "clients/console/lobby.h"
 #include "clients/console/session_feed.h"
+#include "idl/record/mcap_reader.h"
 #include "idl/record/recording_kind.h"
 #include "idl/types/names.h"
 #include "idl/types/printable_text.h"
@@ -65,6 +66,7 @@ class Gateway {
       if (auto playable = record::checkPlayable(options_.recording); !playable) return playable;
     if (auto opened = openServer(); !opened) return opened;
     if (options_.recording.empty()) return followSessions();
+    checkRecording();
     while (!stop_) std::this_thread::sleep_for(kPeriod);
     return {};
   }
@@ -72,6 +74,7 @@ class Gateway {
  private:
   Result<void> openServer();
   Result<void> followSessions();
+  void checkRecording();
   void enter(const std::string& room);
   void leave(const std::string& room);
   void offerFeeds(Lobby& lobby);
@@ -142,6 +145,14 @@ Result<void> Gateway::openServer() {
         "the console's page is not built, so this address serves public viewers only: "
         "`deploy/setup console` installs what builds it");
   return {};
+}
+
+/// Reads all of it, since only then every damage is known; it is served meanwhile.
+void Gateway::checkRecording() {
+  auto reader = record::McapReader::open(options_.recording);
+  if (!reader) return;
+  for (record::McapMessage message; !stop_ && reader->next(message);) continue;
+  if (!reader->problem().empty()) options_.print("warning: " + reader->problem());
 }
 
 Result<void> Gateway::followSessions() {

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 namespace tenon::console {
@@ -65,42 +66,49 @@ Answer partOf(const fs::path& file, std::string_view range) {
   std::error_code error;
   const std::uint64_t size = fs::file_size(file, error);
   if (error) return text(404, "text/plain; charset=utf-8", "there is no such file\n");
-  Answer answer{206, "application/octet-stream", false, {}, {{"Accept-Ranges", "bytes"}}};
-  const bool is_whole = range.empty() && size > 0;
-  const auto part = is_whole ? std::optional(std::pair<std::uint64_t, std::uint64_t>(0, size - 1))
-                             : parseRange(range, size);
-  if (!part) {
-    answer.status = 416;
-    answer.headers.emplace_back("Content-Range", "bytes */" + std::to_string(size));
+  const FileRange part = parseRange(range, size);
+  Answer answer{part.status, "application/octet-stream", false, {}, {{"Accept-Ranges", "bytes"}}};
+  const std::string of_all = "/" + std::to_string(size);
+  if (part.status == 416) {
+    answer.headers.emplace_back("Content-Range", "bytes *" + of_all);
     return answer;
   }
-  answer.part = {file, part->first, part->second - part->first + 1};
-  if (is_whole) {
-    answer.status = 200;
-    return answer;
-  }
-  answer.headers.emplace_back("Content-Range", "bytes " + std::to_string(part->first) + "-" +
-                                                   std::to_string(part->second) + "/" + std::to_string(size));
+  answer.part = {file, part.offset, part.size};
+  if (part.status == 206)
+    answer.headers.emplace_back("Content-Range", "bytes " + std::to_string(part.offset) + "-" +
+                                                     std::to_string(part.offset + part.size - 1) + of_all);
   return answer;
+}
+
+/// A number of bytes; the largest there is for a larger one, none for other texts.
+std::optional<std::uint64_t> bytesOf(std::string_view digits) {
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  if (digits.empty() || end != digits.data() + digits.size()) return std::nullopt;
+  return error == std::errc() ? number : std::numeric_limits<std::uint64_t>::max();
 }
 
 }  // namespace
 
-std::optional<std::pair<std::uint64_t, std::uint64_t>> parseRange(std::string_view range,
-                                                                  std::uint64_t size) {
+FileRange parseRange(std::string_view range, std::uint64_t size) {
   constexpr std::string_view kUnit = "bytes=";
-  if (!range.starts_with(kUnit)) return std::nullopt;
+  const FileRange whole{200, 0, size};
+  constexpr FileRange kNothing{416, 0, 0};
+  if (!range.starts_with(kUnit)) return whole;
   range.remove_prefix(kUnit.size());
   const std::size_t dash = range.find('-');
-  if (dash == std::string_view::npos) return std::nullopt;
-  std::uint64_t first = 0, last = 0;
-  const auto isNumber = [](std::string_view digits, std::uint64_t& number) {
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
-    return error == std::errc() && end == digits.data() + digits.size() && !digits.empty();
-  };
-  if (!isNumber(range.substr(0, dash), first) || !isNumber(range.substr(dash + 1), last)) return std::nullopt;
-  if (first > last || first >= size) return std::nullopt;
-  return std::pair(first, std::min(last, size - 1));
+  if (dash == std::string_view::npos) return whole;
+  const bool has_first = dash > 0, has_last = dash + 1 < range.size();
+  const auto first = bytesOf(range.substr(0, dash)), last = bytesOf(range.substr(dash + 1));
+  if ((has_first && !first) || (has_last && !last) || (!has_first && !has_last)) return whole;
+  if (!has_first) {  // so many at the end
+    const std::uint64_t count = std::min(*last, size);
+    return count == 0 ? kNothing : FileRange{206, size - count, count};
+  }
+  if (has_last && *first > *last) return whole;
+  if (*first >= size) return kNothing;
+  const std::uint64_t end = has_last ? std::min(*last, size - 1) : size - 1;
+  return {206, *first, end - *first + 1};
 }
 
 std::string roomOf(std::string_view target) {

@@ -58,10 +58,17 @@ class Site {
   std::filesystem::path recording_;  ///< empty: none
 };
 
-/// A range of bytes as in "bytes=0-99"; both ends are inside. None for other forms, and for one that does not
-/// lie in a file of `size` [bytes].
-[[nodiscard]] std::optional<std::pair<std::uint64_t, std::uint64_t>> parseRange(std::string_view range,
-                                                                                std::uint64_t size);
+/// What is sent of a file, by the status of the answer: 206 these bytes, 200 all, 416 nothing, for the range
+/// begins behind its end.
+struct FileRange {
+  unsigned status = 200;
+  std::uint64_t offset = 0;  ///< [bytes]
+  std::uint64_t size = 0;    ///< [bytes]
+};
+/// Reads the header Range for a file of `size` [bytes]: "bytes=0-99", both ends inside, "bytes=100-" from
+/// there on, and "bytes=-100" the last ones. All is sent for other units, for several ranges, and for other
+/// texts.
+[[nodiscard]] FileRange parseRange(std::string_view range, std::uint64_t size);
 
 inline constexpr std::string_view kLobbyRoom = "/lobby";
 inline constexpr std::string_view kFirstRoom = "/live";

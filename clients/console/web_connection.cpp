@@ -116,7 +116,12 @@ void WebConnection::handle() {
   } else if (request.method() != http::verb::get && request.method() != http::verb::head) {
     respond(request, plain(405, "GET and HEAD only"));
   } else {
-    respond(request, server_.site.answer(target, toView(request[http::field::range])));
+    // If-Range: a range only of the content that the other side has; nothing here says which that is
+    const bool is_get = request.method() == http::verb::get;
+    const bool has_range = is_get && request.find(http::field::if_range) == request.end();
+    respond(request,
+            server_.site.answer(target, has_range ? toView(request[http::field::range]) : std::string_view(),
+                                is_get));
   }
 }
 

@@ -104,6 +104,15 @@ class Gateway(unittest.TestCase):
                 return json.loads(payload)["state"]
         return None
 
+    def test_a_pipe_is_no_recording(self):
+        with Stage() as stage:
+            pipe = stage.out / "a.mcap"
+            os.mkfifo(pipe)
+            for program in ("console", "report"):
+                done = subprocess.run([PROGRAMS / f"tenon-{program}", pipe], capture_output=True, text=True, timeout=60)
+                self.assertEqual(done.returncode, 1, program)
+                self.assertIn(f"tenon-{program}: {pipe}: is empty or not a file", done.stderr)
+
     @unittest.skipUnless((TOOLS / "node_modules").exists(), "the public tools are not installed: npm ci in tests/system/public_tools")
     def test_foxgloves_own_client_decodes_every_channel(self):
         with Stage() as stage:
@@ -530,6 +539,47 @@ class Page(unittest.TestCase):
                 browser("await", expression="document.querySelector('.strip').classList.contains('raised')")
             server.wait_for("pressed in the browser")
             self.assertEqual(browser.problems, [])
+
+    def test_a_stop_that_was_pressed_without_a_gateway_reaches_the_session_with_the_next_one(self):
+        with Stage(lockstep=False) as stage, Browser() as browser:
+            server = stage.serve("stacking", "--wait-for", "right")
+            console, port = start_console(stage)
+            console.wait_for("joined session 'test'")
+            stage.start("trainee", "--seed", 1)
+            server.wait_for("run: running")
+            unconfirmed = "document.body.classList.contains('unconfirmed')"
+
+            def press_and_lose(console):
+                """The gateway hangs, the stop is pressed, the gateway is killed."""
+                browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="light")
+                browser("await", expression="document.querySelector('.top .badge').textContent === 'Live' && tenon.session.run !== undefined")
+                browser("value", expression="(now => { Date.now = () => now + (window.later ?? 0); })(Date.now())")  # however long a gateway takes to start
+                console.signal(signal.SIGSTOP)
+                browser("key", key="Space")
+                browser("await", expression=unconfirmed)
+                console.signal(signal.SIGKILL)
+                console.wait()
+                browser("await", expression="document.querySelector('.top .badge').textContent === 'Reconnecting'")
+                self.assertTrue(browser("value", expression=unconfirmed))
+
+            # more than 10 s later it is not sent, and that is said
+            press_and_lose(console)
+            browser("value", expression="window.later = 10000")
+            console, _ = start_console(stage, port)
+            says = "document.querySelector('.alarm[role=alert]').textContent.startsWith({})"
+            browser("await", expression=says.format("'The stop did not reach the session. Press again'"))
+            browser("await", expression="document.querySelector('.top .badge').textContent === 'Live'")
+            browser("value", expression="(s => { s.value = 'de'; s.dispatchEvent(new Event('change')); })(document.querySelector('select'))")
+            browser("await", expression=says.format("'Der Halt kam nicht in der Sitzung an. Drück noch einmal'"))
+            self.assertNotIn("engaged by", server.text())
+
+            press_and_lose(console)
+            console, _ = start_console(stage, port)
+            server.wait_for("^engaged by console: pressed in the browser")
+            server.wait_for("^run: emergency stop")
+            browser("await", expression=f"!{unconfirmed} && document.querySelector('.strip').classList.contains('raised')")
+            browser("await", expression="[...document.querySelectorAll('.notice.good')].some(n => n.textContent === 'Stop forces: confirmed')")
+            server.signal(signal.SIGTERM)
 
     def test_a_seat_that_the_server_has_ended_is_shown_as_lost(self):
         with Stage(lockstep=False) as stage, Browser() as browser:

@@ -1,14 +1,20 @@
 #include "clients/console/gateway.h"
 
+#include <filesystem>
+#include <fstream>
+#include <future>
 #include <map>
 #include <regex>
 #include <thread>
+#include <vector>
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include "idl/record/mcap_writer.h"
 #include "idl/types/messages/run.h"
 #include "idl/types/messages/session.h"
 #include "idl/wire/endpoint.h"
@@ -114,6 +120,59 @@ TEST_F(GatewayTest, ASessionThatHasEndedMakesPlaceWhenNobodyLooksAtIt) {
   viewer.reset();
   EXPECT_TRUE(until([this] { return statusOf("/live/a") == 404; }));
   EXPECT_TRUE(until([this] { return inbox_.matchedWriters() == 0; })) << "what raises its stop has ended";
+}
+
+/// A gateway for a recording.
+class RecordingGatewayTest : public ::testing::Test {
+ protected:
+  RecordingGatewayTest() {
+    options_.web.port = 0;
+    options_.recording = file_;
+  }
+  ~RecordingGatewayTest() override { std::filesystem::remove(file_); }
+
+  const std::filesystem::path file_ =
+      std::filesystem::temp_directory_path() / ("gateway_" + std::to_string(getpid()) + ".mcap");
+  GatewayOptions options_;
+  std::atomic<bool> stop_{false};
+};
+
+TEST_F(RecordingGatewayTest, RefusesAPipeInsteadOfWaitingForIt) {
+  ASSERT_EQ(mkfifo(file_.c_str(), 0600), 0);
+  const auto served = runGateway(options_, stop_);
+  ASSERT_FALSE(served);
+  EXPECT_NE(served.error().what.find(file_.string()), std::string::npos) << served.error().what;
+}
+
+TEST_F(RecordingGatewayTest, SaysThatARecordingIsDamagedAndServesIt) {
+  {
+    auto writer = record::McapWriter::open(file_, {.compress = false});
+    ASSERT_TRUE(writer);
+    const auto channel = writer->addChannel("A", "tenon::A", "module tenon { struct A {}; };");
+    ASSERT_TRUE(writer->write(channel, 1, 1, std::vector<std::uint8_t>{'m', 'a', 'r', 'k'}));
+    ASSERT_TRUE(writer->close());
+  }
+  std::fstream bytes(file_, std::ios::in | std::ios::out | std::ios::binary);
+  const std::string whole{std::istreambuf_iterator<char>(bytes), {}};
+  bytes.seekp(static_cast<std::streamoff>(whole.find("mark")));
+  bytes.put('b');
+  bytes.close();
+
+  std::promise<std::string> warned;
+  bool serves = false;
+  options_.print = [&](const std::string& line) {
+    if (line.starts_with("console: ")) serves = true;
+    if (line.starts_with("warning: ")) warned.set_value(line);
+  };
+  Result<void> served;
+  std::thread gateway([&] { served = runGateway(options_, stop_); });
+  auto warning = warned.get_future();
+  const bool is_said = warning.wait_for(std::chrono::seconds(30)) == std::future_status::ready;
+  stop_ = true;
+  gateway.join();
+  ASSERT_TRUE(is_said);
+  EXPECT_NE(warning.get().find("a chunk"), std::string::npos);
+  EXPECT_TRUE(served && serves);
 }
 
 }  // namespace

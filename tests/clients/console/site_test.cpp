@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <tuple>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -161,12 +162,47 @@ TEST_F(SiteTest, ServesARecordingWholeAndByRanges) {
   EXPECT_TRUE(large.body.empty()) << "it is read while it is sent";
 }
 
+TEST_F(SiteTest, ServesTheRestOfARecordingAndItsLastBytes) {
+  const fs::path file = folder_ / "a.mcap";
+  std::ofstream(file) << "0123456789";
+  Site site(folder_ / "none", wire::AssetStore(folder_));
+  ASSERT_TRUE(site.serveRecording(file));
+  const auto contentRange = [](const Answer& answer) {
+    for (const auto& [name, value] : answer.headers)
+      if (name == "Content-Range") return value;
+    return std::string();
+  };
+  for (const auto& [range, status, body, said] : {std::tuple{"bytes=7-", 206U, "789", "bytes 7-9/10"},
+                                                  {"bytes=-2", 206U, "89", "bytes 8-9/10"},
+                                                  {"bytes=10-", 416U, "", "bytes */10"},
+                                                  {"bytes=0-1,3-4", 200U, "0123456789", ""},
+                                                  {"lines=0-1", 200U, "0123456789", ""}}) {
+    const Answer answer = site.answer("/recording.mcap", range);
+    EXPECT_EQ(answer.status, status) << range;
+    EXPECT_EQ(bodyOf(answer), body) << range;
+    EXPECT_EQ(contentRange(answer), said) << range;
+  }
+}
+
 TEST(Range, BeginsInTheFileAndEndsWithItAtMost) {
-  EXPECT_EQ(parseRange("bytes=0-9", 10), (std::pair<std::uint64_t, std::uint64_t>(0, 9)));
-  EXPECT_EQ(parseRange("bytes=9-4000", 10), (std::pair<std::uint64_t, std::uint64_t>(9, 9)));
-  for (const char* none : {"", "bytes=", "bytes=10-11", "bytes=5-4", "bytes=-3", "bytes=3-", "bytes=0-1,3-4",
-                           "lines=0-1", "bytes=0x1-2", "bytes=99999999999999999999-1"})
-    EXPECT_FALSE(parseRange(none, 10)) << none;
+  const auto expect = [](const char* range, std::uint64_t size, FileRange expected) {
+    const FileRange part = parseRange(range, size);
+    EXPECT_EQ(std::tuple(part.status, part.offset, part.size),
+              std::tuple(expected.status, expected.offset, expected.size))
+        << range;
+  };
+  expect("bytes=0-9", 10, {206, 0, 10});
+  expect("bytes=9-4000", 10, {206, 9, 1});
+  expect("bytes=3-", 10, {206, 3, 7});
+  expect("bytes=3-99999999999999999999", 10, {206, 3, 7});
+  expect("bytes=-3", 10, {206, 7, 3});
+  expect("bytes=-30", 10, {206, 0, 10});
+  for (const char* behind : {"bytes=10-11", "bytes=10-", "bytes=-0", "bytes=99999999999999999999-"})
+    expect(behind, 10, {416, 0, 0});
+  for (const char* empty : {"bytes=0-", "bytes=0-0", "bytes=-1"}) expect(empty, 0, {416, 0, 0});
+  for (const char* other : {"", "bytes=", "bytes=-", "bytes=5-4", "bytes=0-1,3-4", "bytes=-1,0-1",
+                            "lines=0-1", "bytes=0x1-2", "bytes=a-", "bytes=--1"})
+    expect(other, 10, {200, 0, 10});
 }
 
 TEST(Room, IsTheSessionThatThePathNames) {

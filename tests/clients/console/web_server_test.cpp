@@ -37,8 +37,8 @@ class WebServerTest : public testing::Test {
     fs::remove_all(folder_);
   }
 
-  /// A connection that has asked for the file.
-  int ask(const std::string& method) const {
+  /// A connection that has asked for the file; `headers`: lines with their ends.
+  int ask(const std::string& method, const std::string& headers = {}) const {
     const int connection = socket(AF_INET, SOCK_STREAM, 0);
     const int buffer = 64 << 10;
     setsockopt(connection, SOL_SOCKET, SO_RCVBUF, &buffer, sizeof buffer);
@@ -48,7 +48,7 @@ class WebServerTest : public testing::Test {
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     EXPECT_EQ(connect(connection, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
     const std::string request =
-        method + " /recording.mcap HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+        method + " /recording.mcap HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n" + headers + "\r\n";
     EXPECT_EQ(write(connection, request.data(), request.size()), static_cast<ssize_t>(request.size()));
     return connection;
   }
@@ -88,6 +88,22 @@ TEST_F(WebServerTest, HeadSaysTheSizeAndSendsNothingOfIt) {
   const std::string answer = take(ask("HEAD"));
   EXPECT_NE(answer.find("Content-Length: " + std::to_string(kFile) + "\r\n"), std::string::npos) << answer;
   EXPECT_TRUE(answer.ends_with("\r\n\r\n"));
+}
+
+TEST_F(WebServerTest, ADownloadThatWasCutGoesOnWhereItEnded) {
+  const std::string rest = take(ask("GET", "Range: bytes=" + std::to_string(kFile - 3) + "-\r\n"));
+  EXPECT_TRUE(rest.starts_with("HTTP/1.1 206 ")) << rest;
+  EXPECT_NE(rest.find("Content-Range: bytes 8388605-8388607/8388608\r\n"), std::string::npos) << rest;
+  EXPECT_TRUE(rest.ends_with("\r\n\r\n" + std::string(3, '\0')));
+  const std::string none = take(ask("GET", "Range: bytes=" + std::to_string(kFile) + "-\r\n"));
+  EXPECT_TRUE(none.starts_with("HTTP/1.1 416 ")) << none;
+  EXPECT_NE(none.find("Content-Range: bytes */8388608\r\n"), std::string::npos) << none;
+}
+
+TEST_F(WebServerTest, SendsAllWhenARangeIsAskedForOnCondition) {
+  const std::string answer = take(ask("GET", "Range: bytes=5-\r\nIf-Range: \"a\"\r\n"));
+  EXPECT_TRUE(answer.starts_with("HTTP/1.1 200 "));
+  EXPECT_EQ(answer.size() - (answer.find("\r\n\r\n") + 4), kFile);
 }
 
 TEST(LoopbackAddress, IsOneThatThisMachineAloneReaches) {

@@ -44,7 +44,8 @@ class Clock {
   constructor() {
     this.now = 0;
     this.timers = new Map();
-    this.real = [globalThis.setTimeout, globalThis.clearTimeout];
+    this.real = [globalThis.setTimeout, globalThis.clearTimeout, Date.now];
+    Date.now = () => this.now;
     globalThis.setTimeout = (act, milliseconds) => (this.timers.set(act, this.now + milliseconds), act);
     globalThis.clearTimeout = (act) => this.timers.delete(act);
   }
@@ -53,7 +54,7 @@ class Clock {
     for (const [act, due] of this.timers) if (due <= this.now) this.timers.delete(act), act();
   }
   end() {
-    [globalThis.setTimeout, globalThis.clearTimeout] = this.real;
+    [globalThis.setTimeout, globalThis.clearTimeout, Date.now] = this.real;
   }
 }
 
@@ -62,7 +63,7 @@ async function withPresses(test) {
   const answers = [];
   const seen = [];
   try {
-    const presses = new Presses(() => new Promise((answer) => answers.push(answer)), () => seen.push(presses.isUnconfirmed));
+    const presses = new Presses(() => new Promise((answer) => answers.push(answer)), () => seen.push(presses.isMissed ? "missed" : presses.isUnconfirmed));
     await test({ presses, clock, answers, seen });
   } finally {
     clock.end();
@@ -119,7 +120,7 @@ const tests = {
   // a gateway that hangs for 5 s
   async "a stop without an answer is said to be unconfirmed within a second, until the answer comes"() {
     await withPresses(async ({ presses, clock, answers, seen }) => {
-      const pressed = presses.press();
+      const pressed = presses.press("a");
       clock.pass(900);
       assert.deepEqual(seen, []);
       clock.pass(100);
@@ -133,7 +134,7 @@ const tests = {
 
   async "a stop that is answered at once is no alarm"() {
     await withPresses(async ({ presses, clock, answers, seen }) => {
-      const pressed = presses.press();
+      const pressed = presses.press("a");
       answers[0](ACCEPTED);
       await pressed;
       clock.pass(5000);
@@ -143,19 +144,101 @@ const tests = {
 
   async "a stop that could not be sent, that was refused or whose connection broke is unconfirmed"() {
     for (const answer of [undefined, { accepted: false, text: "nobody has heard it" }])
-      await withPresses(async ({ presses, answers, seen }) => {
-        const pressed = presses.press();
+      await withPresses(async ({ presses, clock, answers, seen }) => {
+        const pressed = presses.press("a");
         answers[0](answer);
         await pressed;
         assert.deepEqual(seen, [true]);
-        presses.forget(); // connected again
+        clock.pass(60000);
+        assert.deepEqual(seen, [true], "it does not become true by itself");
+        presses.forget(); // understood
         assert.deepEqual(seen, [true, false]);
+        assert.equal(presses.rejoin("a"), undefined);
       });
+  },
+
+  async "a stop that is not confirmed is sent again when its session is there again, within 10 s of the press"() {
+    await withPresses(async ({ presses, clock, answers, seen }) => {
+      const pressed = presses.press("a");
+      answers[0](undefined);
+      await pressed;
+      clock.pass(9999);
+      const again = presses.rejoin("a");
+      assert.equal(answers.length, 2);
+      assert.deepEqual(seen, [true], "until it is answered");
+      answers[1](ACCEPTED);
+      assert.equal(await again, ACCEPTED);
+      assert.deepEqual(seen, [true, false]);
+      assert.equal(presses.rejoin("a"), undefined, "once confirmed it is not sent again");
+      assert.equal(answers.length, 2);
+    });
+  },
+
+  async "a stop of which the gateway alone has heard is sent again when the gateway is in the session again"() {
+    await withPresses(async ({ presses, clock, answers, seen }) => {
+      const pressed = presses.press("a");
+      clock.pass(500);
+      const again = presses.rejoin("a");
+      answers[0]({ accepted: false, text: "nobody has heard it" });
+      await pressed;
+      assert.deepEqual(seen, [true]);
+      answers[1](ACCEPTED);
+      await again;
+      assert.deepEqual(seen, [true, false]);
+    });
+  },
+
+  async "later, and in another session, it is said that the stop did not arrive: it is not sent again"() {
+    for (const [passed, session] of [[10000, "a"], [-1, "a"], [100, "b"], [100, ""]])
+      await withPresses(async ({ presses, clock, answers, seen }) => {
+        const pressed = presses.press("a");
+        answers[0](undefined);
+        await pressed;
+        clock.pass(passed);
+        assert.equal(presses.rejoin(session), undefined);
+        assert.equal(answers.length, 1);
+        assert.deepEqual(seen, [true, "missed"]);
+        // the person presses again
+        const second = presses.press(session);
+        answers[1](ACCEPTED);
+        await second;
+        assert.deepEqual(seen, [true, "missed", false]);
+      });
+  },
+
+  async "a stop of anybody that stands answers for one that is not confirmed"() {
+    for (const [standing, expected] of [[true, [true, false]], [false, [true]]])
+      await withPresses(async ({ presses, clock, answers, seen }) => {
+        let stands = true; // a raise comes, and its clear after it
+        presses.hear(() => stands); // before the press
+        const pressed = presses.press("a");
+        answers[0](undefined);
+        await pressed;
+        clock.pass(5000);
+        assert.deepEqual(seen, [true], "what was heard before the press is of no account");
+        presses.hear(() => stands);
+        clock.pass(900);
+        stands = standing;
+        clock.pass(100);
+        assert.deepEqual(seen, expected);
+      });
+  },
+
+  async "this page's own stop that comes back from the gateway is no answer"() {
+    await withPresses(async ({ presses, clock, answers, seen }) => {
+      const pressed = presses.press("a");
+      presses.hear(() => true);
+      clock.pass(1000);
+      answers[0]({ accepted: false, text: "nobody has heard it" });
+      await pressed;
+      clock.pass(1000);
+      assert.deepEqual(seen, [true]);
+    });
   },
 
   async "a later press that is confirmed answers for those before it"() {
     await withPresses(async ({ presses, clock, answers, seen }) => {
-      const [first, second] = [presses.press(), presses.press()];
+      const [first, second] = [presses.press("a"), presses.press("a")];
       clock.pass(1000);
       answers[1](ACCEPTED);
       await second;

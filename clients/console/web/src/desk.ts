@@ -38,6 +38,7 @@ export class Desk {
   private presses = new Presses(() => this.source.ask("deskCommand", { words: ["emergency", t("stop.reason")] }), () => this.showAlarm());
   private isEnded = new AbortController();
   private lastRefusal = ""; // of a seat
+  private place = ""; // the session that was joined last
 
   /** `isOfAll`: the stop is for all sessions. */
   constructor(private source: LiveSource, private session: Session, gatewayRole: string, private isOfAll = false) {
@@ -145,12 +146,19 @@ export class Desk {
 
   /** Empty while nothing is wrong. */
   get alarmText(): string {
-    return this.presses.isUnconfirmed ? t("stop.unconfirmed") : "";
+    return !this.presses.isUnconfirmed ? "" : t(this.presses.isMissed ? "stop.missed" : "stop.unconfirmed");
   }
 
-  /** What the session says of its stop is known again. */
-  forgetPresses(): void {
-    this.presses.forget();
+  /** The session is there again, or all of them. */
+  async repeatStop(): Promise<void> {
+    this.place = this.session.link?.session ?? "";
+    const repeated = this.presses.rejoin(this.place);
+    if (repeated !== undefined) this.tellOfStop(await repeated);
+  }
+
+  /** A raise or a clear of the stop has come from the session. */
+  hearStop(): void {
+    this.presses.hear(() => this.source.isOpen && this.session.link?.state === "joined" && this.session.standing.length > 0);
   }
 
   /** Called when the session has changed. */
@@ -291,7 +299,12 @@ export class Desk {
 
   /** The emergency stop; also when one stands. */
   async raise(): Promise<void> {
-    const answer = await this.presses.press();
+    const answer = this.presses.press(this.place);
+    this.source.hurry();
+    this.tellOfStop(await answer);
+  }
+
+  private tellOfStop(answer: DeskAnswer | undefined): void {
     this.tell(t("stop.press"), answer, t("stop.unreachable"), t("stop.confirmed"));
   }
 

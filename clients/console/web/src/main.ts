@@ -305,10 +305,11 @@ function follow(room: string, { role, recordings, local }: Gateway): void {
     session.receive(topic, message, isGone);
     const isJoined = session.link?.state === "joined";
     if (isJoined && !joined) {
-      desk?.forgetPresses();
+      void desk?.repeatStop();
       void desk?.takeSeatAgain();
     }
     joined = isJoined;
+    if (topic === "EmergencyStop" || topic === "EmergencyClear") desk?.hearStop();
   }, (state) => {
     live = state;
     if (state.kind !== "reconnecting") return;
@@ -341,7 +342,7 @@ function showLobby(role: string): void {
   app.classList.add("shows-lobby");
   stage.append(lobby.element);
   source = new LiveSource(addressOf("/lobby"), ["/lobby"], (_, message) => lobby?.receive(message as LobbyState), (state) => {
-    if (state.kind === "open") desk?.forgetPresses();
+    if (state.kind === "open") void desk?.repeatStop();
     live = state;
   });
   desk = new Desk(source, session, role, true);
