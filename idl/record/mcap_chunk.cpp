@@ -1,6 +1,5 @@
 #include "idl/record/mcap_chunk.h"
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -17,28 +16,6 @@ namespace {
 
 constexpr std::uint64_t kMaxChunkBytes = 256U << 20U;  // uncompressed; a larger size is damage or an attack
 
-/// Whether a record is a chunk: only a checksum tells it from bytes that look like one.
-bool isChunk(std::span<const std::uint8_t> fields, std::vector<std::uint8_t>& plain) {
-  FieldReader in(fields);
-  in.take(8 + 8 + 8);
-  return in.get<std::uint32_t>() != 0 && openChunk(fields, plain).empty();
-}
-
-/// Where the next chunk begins that can be read, from byte `from` on; none: nowhere.
-std::optional<std::size_t> findChunk(std::span<const std::uint8_t> file, std::size_t from) {
-  std::vector<std::uint8_t> plain;
-  std::uint8_t opcode = 0;
-  std::span<const std::uint8_t> fields;
-  for (auto rest = file.subspan(from); !rest.empty(); rest = rest.subspan(1)) {
-    const void* const found = std::memchr(rest.data(), kChunk, rest.size());
-    if (found == nullptr) return std::nullopt;
-    rest = rest.subspan(static_cast<std::size_t>(static_cast<const std::uint8_t*>(found) - rest.data()));
-    if (auto record = rest; takeRecord(record, opcode, fields) && isChunk(fields, plain))
-      return file.size() - rest.size();
-  }
-  return std::nullopt;
-}
-
 }  // namespace
 
 MappedFile::~MappedFile() {
@@ -46,7 +23,8 @@ MappedFile::~MappedFile() {
 }
 
 Result<std::span<const std::uint8_t>> MappedFile::map(const std::filesystem::path& file) {
-  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  // a pipe is not waited for
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) return fail(file.string() + ": cannot be opened (" + std::strerror(errno) + ")");
   struct stat status {};
   const bool known = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode) && status.st_size > 0;
@@ -96,26 +74,6 @@ std::string openChunk(std::span<const std::uint8_t> fields, std::vector<std::uin
     if (ZSTD_isError(got) != 0 || got != size) return "is damaged";
   }
   return crc != 0 && crc32(plain) != crc ? "has a wrong checksum" : "";
-}
-
-RecordSequence::RecordSequence(std::span<const std::uint8_t> file) : file_(file), end_(sizeof(kMagic)) {}
-
-bool RecordSequence::next(std::uint8_t& opcode, std::span<const std::uint8_t>& fields) {
-  auto rest = file_.subspan(end_);
-  if (!takeRecord(rest, opcode, fields)) return skipDamage() && next(opcode, fields);
-  begin_ = end_;
-  end_ = file_.size() - rest.size();
-  if (opcode == kChunk) chunk_ = begin_;
-  return true;
-}
-
-/// What was followed since the last chunk may have been none: a length may be damaged.
-bool RecordSequence::skipDamage() {
-  const auto chunk = findChunk(file_, std::max(chunk_ + 1, sizeof(kMagic)));
-  if (!chunk) return false;
-  if (!unreadable_) unreadable_ = {end_ < *chunk ? end_ : begin_ < *chunk ? begin_ : chunk_, *chunk};
-  end_ = *chunk;
-  return true;
 }
 
 }  // namespace tenon::record::mcap

@@ -7,11 +7,14 @@
 
 #include "idl/record/mcap_chunk.h"
 #include "idl/record/mcap_format.h"
+#include "idl/record/mcap_sequence.h"
 
 namespace tenon::record {
 namespace {
 
 using mcap::takeRecord;
+
+constexpr std::size_t kDamageNamed = 3;  // places
 
 struct ChunkLocation {
   std::int64_t first_time = 0, last_time = 0;
@@ -22,11 +25,12 @@ struct ChunkLocation {
 
 struct McapReader::Impl {
   mcap::MappedFile mapped;
+  std::span<const std::uint8_t> bytes;  ///< of the file
   std::string name;
   bool complete = false;
-  bool is_damaged = false;
   bool summary_valid = true;
-  std::string problem;
+  std::set<std::string> damage;
+  std::vector<std::string> first_damage;  ///< kDamageNamed of them at most
   std::vector<ChunkLocation> chunks;
   std::map<std::uint16_t, std::pair<std::string, std::string>> schemas;  // type name, text
   std::map<std::uint16_t, std::size_t> channel_indices;                  // id -> index into channels
@@ -40,7 +44,7 @@ struct McapReader::Impl {
   std::vector<std::uint8_t> decompressed;
   std::span<const std::uint8_t> rest;
 
-  void scan(std::span<const std::uint8_t> file);
+  void scan();
   void checkSummary(std::span<const std::uint8_t> summary);
   void readDefinition(std::uint8_t opcode, std::span<const std::uint8_t> fields);
   void readTopLevel(std::uint8_t opcode, std::span<const std::uint8_t> fields);
@@ -50,12 +54,14 @@ struct McapReader::Impl {
     return std::all_of(indexed.begin(), indexed.end(),
                        [this](std::uint16_t channel) { return channel_indices.contains(channel); });
   }
-  void reportProblem(const std::string& what) {
-    if (problem.empty()) problem = name + ": " + what;
-  }
   void reportDamage(const std::string& what) {
-    is_damaged = true;
-    reportProblem(what);
+    if (damage.insert(what).second && first_damage.size() < kDamageNamed) first_damage.push_back(what);
+  }
+  /// "a chunk (bytes 35 to 4506)"
+  [[nodiscard]] std::string place(const char* record, std::span<const std::uint8_t> fields) const {
+    const auto end = static_cast<std::size_t>(fields.data() - bytes.data()) + fields.size();
+    return std::string(record) + " (bytes " + std::to_string(end - fields.size() - mcap::kRecordHeaderBytes) +
+           " to " + std::to_string(end) + ")";
   }
 };
 
@@ -71,8 +77,16 @@ std::int64_t McapReader::lastTime() const {
   return last == chunks.rend() ? 0 : last->last_time;
 }
 bool McapReader::complete() const { return impl_->complete; }
-bool McapReader::isDamaged() const { return impl_->is_damaged; }
-const std::string& McapReader::problem() const { return impl_->problem; }
+bool McapReader::isDamaged() const { return !impl_->damage.empty(); }
+std::string McapReader::problem() const {
+  std::string problem;
+  const auto add = [&problem](const std::string& what) { problem += (problem.empty() ? "" : "; ") + what; };
+  for (const std::string& what : impl_->first_damage) add(what);
+  if (const std::size_t more = impl_->damage.size() - impl_->first_damage.size(); more > 0)
+    add(std::to_string(more) + " more places are damaged");
+  if (!impl_->complete) add("is truncated: read up to its last complete chunk");
+  return problem.empty() ? "" : impl_->name + ": " + problem;
+}
 const std::vector<McapChannel>& McapReader::channels() const { return impl_->channels; }
 const std::vector<McapAttachment>& McapReader::attachments() const { return impl_->attachments; }
 const std::multimap<std::string, std::map<std::string, std::string>>& McapReader::metadata() const {
@@ -85,11 +99,11 @@ Result<McapReader> McapReader::open(const std::filesystem::path& file) {
   const auto bytes = impl->mapped.map(file);
   if (!bytes) return fail(bytes.error().what);
   if (!mcap::beginsWithMagic(*bytes)) return fail(file.string() + ": is not a recording (no MCAP file)");
-  impl->scan(*bytes);
+  impl->bytes = *bytes;
+  impl->scan();
 
   // without a summary the channels are those that the chunks define
   if (!impl->complete || !impl->summary_valid) {
-    if (!impl->complete) impl->reportProblem("is truncated: read up to its last complete chunk");
     for (const ChunkLocation& location : impl->chunks) {
       // as many as it takes to define what the indices of the messages name; all of a file without indices
       if (!impl->indexed.empty() && impl->allDefined()) break;
@@ -103,22 +117,23 @@ Result<McapReader> McapReader::open(const std::filesystem::path& file) {
   return McapReader(std::move(impl));
 }
 
-void McapReader::Impl::scan(std::span<const std::uint8_t> file) {
-  mcap::RecordSequence records(file);
+void McapReader::Impl::scan() {
+  mcap::RecordSequence records(bytes);
   std::span<const std::uint8_t> fields;
   std::size_t summary = 0;  // [bytes] where it begins; 0: there is none
   for (std::uint8_t opcode = 0; records.next(opcode, fields);) {
-    if (const auto& part = records.unreadable(); part && !is_damaged)
+    if (const auto& part = records.unreadable())
       reportDamage("is damaged between bytes " + std::to_string(part->begin) + " and " +
                    std::to_string(part->end) + ": read without them");
     readTopLevel(opcode, fields);
     if (opcode == mcap::kDataEnd) summary = records.end();
     if (opcode != mcap::kFooter) continue;
-    const auto rest = file.subspan(records.end());
-    complete = rest.size() == sizeof(mcap::kMagic) && mcap::beginsWithMagic(rest);
-    checkSummary(file.subspan(summary, summary == 0 ? 0 : records.end() - summary));
-    return;
+    complete = true;
+    return checkSummary(bytes.subspan(summary, summary == 0 ? 0 : records.end() - summary));
   }
+  if (records.gaveUp())
+    reportDamage("is damaged from byte " + std::to_string(records.end()) +
+                 " on, and what follows is not read: too much of it looks like records and is none");
 }
 
 void McapReader::Impl::checkSummary(std::span<const std::uint8_t> summary) {
@@ -159,7 +174,7 @@ void McapReader::Impl::readTopLevel(std::uint8_t opcode, std::span<const std::ui
       attachment.data = in.take(in.get<std::uint64_t>());
       const auto crc = in.get<std::uint32_t>();
       if (!in.ok || crc != mcap::crc32(fields.first(fields.size() - sizeof(crc))))
-        return reportDamage("an attachment is damaged and skipped");
+        return reportDamage(place("an attachment", fields) + " is damaged and skipped");
       attachments.push_back(std::move(attachment));
       return;
     }
@@ -207,7 +222,8 @@ void McapReader::Impl::readStatistics(std::span<const std::uint8_t> fields) {
 
 bool McapReader::Impl::decompress(const ChunkLocation& location) {
   if (const std::string wrong = mcap::openChunk(location.fields, decompressed); !wrong.empty()) {
-    reportDamage("a chunk " + wrong + (wrong == "is damaged" ? " and skipped" : " and is skipped"));
+    reportDamage(place("a chunk", location.fields) + " " + wrong +
+                 (wrong == "is damaged" ? " and skipped" : " and is skipped"));
     return false;
   }
   rest = decompressed;

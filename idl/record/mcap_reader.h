@@ -55,9 +55,10 @@ class McapReader {
 
   /// [ns] Log time of the newest message in the last chunk that has messages; 0: there is none.
   [[nodiscard]] std::int64_t lastTime() const;
-  [[nodiscard]] bool complete() const;               ///< false: the file is truncated
-  [[nodiscard]] bool isDamaged() const;              ///< as found so far, beyond a truncation
-  [[nodiscard]] const std::string& problem() const;  ///< first of both found so far, or empty
+  [[nodiscard]] bool complete() const;   ///< false: the file is truncated
+  [[nodiscard]] bool isDamaged() const;  ///< as found so far, beyond a truncation
+  /// Both, as found so far: the first places that are damaged and how many more, or empty.
+  [[nodiscard]] std::string problem() const;
   [[nodiscard]] const std::vector<McapChannel>& channels() const;
   [[nodiscard]] const std::multimap<std::string, std::map<std::string, std::string>>& metadata() const;
   [[nodiscard]] const std::vector<McapAttachment>& attachments() const;

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "idl/record/mcap_chunk.h"
+#include "idl/record/mcap_sequence.h"
 
 namespace tenon::record::mcap {
 namespace {
@@ -29,6 +30,8 @@ class Scan {
     Records fields;
     for (std::uint8_t opcode = 0; records_.next(opcode, fields);) read(opcode, fields);
   }
+  /// Whether chunks may follow that were not found.
+  [[nodiscard]] bool gaveUp() const { return records_.gaveUp(); }
 
   struct Metadata {
     std::size_t chunks = 0;  ///< before it
@@ -146,6 +149,8 @@ Result<Unfinished> readUnfinished(const std::filesystem::path& file) {
   Scan scan(*bytes);
   scan.run();
   if (scan.closed) return fail(file.string() + ": is complete, there is nothing to continue");
+  if (scan.gaveUp())
+    return fail(file.string() + ": is damaged, and where it goes on after that cannot be found");
 
   Unfinished result;
   std::vector<Found>& chunks = scan.chunks;
@@ -171,9 +176,13 @@ Result<Unfinished> readUnfinished(const std::filesystem::path& file) {
   for (auto chunk = chunks.begin(); chunk != chunks.end() && !missing.empty(); ++chunk)
     if (openChunk(chunk->fields, plain).empty()) define(plain, summary, missing);
   define(result.last_chunk, summary, missing);
-  if (!missing.empty())
-    return fail(file.string() + ": is damaged, the chunk that defines its channels cannot be read");
+  if (summary.channel_ids.empty() && !missing.empty())
+    return fail(file.string() + ": is damaged, no chunk that defines its channels can be read");
   for (Found& chunk : chunks) {
+    // what has no channel is a damaged index
+    std::erase_if(chunk.counts, [&missing](const auto& entry) { return missing.contains(entry.first); });
+    std::erase_if(chunk.index.message_indices,
+                  [&missing](const auto& entry) { return missing.contains(entry.first); });
     for (const auto& [channel, count] : chunk.counts) {
       summary.counts[channel] += count;
       summary.messages += count;

@@ -24,7 +24,8 @@ struct Unfinished {
 };
 
 /// Reads the heads of its records; of its chunks the last one alone, and as many from the first as define the
-/// channels. Fails when it is no MCAP file, was closed, or has no complete chunk.
+/// channels. Fails when it is no MCAP file, was closed, has no complete chunk, or is damaged so that its end
+/// is not found.
 [[nodiscard]] Result<Unfinished> readUnfinished(const std::filesystem::path& file);
 
 }  // namespace tenon::record::mcap

@@ -1,6 +1,7 @@
 #include "idl/record/mcap_writer.h"
 
 #include <algorithm>
+#include <bit>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -79,6 +80,7 @@ struct McapWriter::Impl {
     mcap::append(whole, opcode, fields);
     return put(whole.bytes);
   }
+  void beginChunk();
   Result<void> endChunk();
   Result<void> writeIndices(mcap::ChunkIndex& chunk_index);
   Result<void> writeSummary();
@@ -153,6 +155,7 @@ std::uint16_t McapWriter::addChannel(std::string_view topic, std::string_view ty
   if (const auto known = to.summary.channel_ids.find(std::string(topic));
       known != to.summary.channel_ids.end())
     return known->second;
+  if (to.chunk.bytes.empty()) to.beginChunk();
   auto [schema, is_new] =
       to.summary.schema_ids.try_emplace(std::string(type_name), to.summary.schema_ids.size() + 1);
   record::mcap::FieldWriter both;
@@ -178,7 +181,6 @@ std::uint16_t McapWriter::addChannel(std::string_view topic, std::string_view ty
   mcap::append(record, mcap::kChannel, channel);
   to.summary.channels.putBytes(record.bytes);
   // schema and channel precede the channel's first message in its chunk
-  if (to.chunk.bytes.empty()) to.chunk_start = std::chrono::steady_clock::now();
   to.chunk.putBytes(both.bytes);
   to.chunk.putBytes(record.bytes);
   return id;
@@ -189,7 +191,7 @@ Result<void> McapWriter::write(std::uint16_t channel, std::int64_t log_time_ns, 
   Impl& to = *impl_;
   if (to.descriptor < 0) return fail(to.file.string() + ": is already closed");
   if (!to.problem.empty()) return fail(to.problem);
-  if (to.chunk.bytes.empty()) to.chunk_start = std::chrono::steady_clock::now();
+  if (to.chunk.bytes.empty()) to.beginChunk();
   to.index[channel].emplace_back(log_time_ns, to.chunk.bytes.size());
   constexpr std::size_t kMessageFields = 2 + 4 + 8 + 8;
   to.chunk.put(mcap::kMessage);
@@ -212,6 +214,15 @@ Result<void> McapWriter::write(std::uint16_t channel, std::int64_t log_time_ns, 
     to.synced = now;
   }
   return {};
+}
+
+/// Chunk 2, 4, 8 and so on repeat the schemas and channels of those before: they are found again unless half
+/// of the file is lost.
+void McapWriter::Impl::beginChunk() {
+  chunk_start = std::chrono::steady_clock::now();
+  if (!std::has_single_bit(summary.chunks.size() + 1)) return;
+  chunk.putBytes(summary.schemas.bytes);
+  chunk.putBytes(summary.channels.bytes);
 }
 
 Result<void> McapWriter::Impl::endChunk() {

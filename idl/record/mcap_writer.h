@@ -23,7 +23,7 @@ struct McapOptions {
 /// Messages are collected in chunks of about 1 MiB. A chunk is closed when it is McapOptions::chunk_age old
 /// at the next write, and the file is synchronised to disk (fdatasync) every second, so that after a crash
 /// all but the last second is readable. It has checksums of chunks, data and summary, and indices for
-/// seeking.
+/// seeking. Schemas and channels are repeated in some later chunks: damage of the first does not lose them.
 ///
 /// Threads: one at a time. Real-time: no.
 class McapWriter {
