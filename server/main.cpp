@@ -158,6 +158,8 @@ bool isRefusedForChanges(const ServeArguments& arguments, const tenon::session::
 }
 
 std::string describe(const tenon::session::JournalGap& gap) {
+  if (gap.first == 1)
+    return fmt::format("ticks 1 to {} are not compared: no checkpoint before them can be read", gap.last);
   const std::string missing = fmt::format("ticks {} to {} are missing", gap.first, gap.last);
   return gap.compared_after == 0
              ? missing + ", and no checkpoint follows: the rest is not compared"
@@ -244,7 +246,7 @@ int serve(ServeArguments& arguments) {
     return reportError(runtime.error().what + "; or name a file with --key");
   const auto key =
       tenon::wire::readOrMakeKeyFile(arguments.key_file.empty() ? *runtime / "key" : arguments.key_file);
-  if (!key) return reportError(key.error().what);
+  if (!key) return reportError((arguments.key_file.empty() ? "" : "--key: ") + key.error().what);
   arguments.session.key = *key;
   arguments.session.stop_file =
       tenon::session::defaultStopFile(arguments.session.domain, arguments.session.name);

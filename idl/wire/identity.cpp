@@ -193,7 +193,7 @@ Result<SharedKey> readOrMakeKeyFile(const std::filesystem::path& file) {
     // complete under its name at once: two servers that start together use one key
     const std::filesystem::path made = file.string() + "." + std::to_string(getpid());
     const int descriptor = open(made.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-    if (descriptor < 0) return fail(reasonOf(made, "cannot be made"));
+    if (descriptor < 0) return fail(reasonOf(file, "cannot be made"));
     const std::string text = hexText(SharedKey::random().bytes) + "\n";
     const bool written = write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size());
     close(descriptor);
@@ -203,7 +203,7 @@ Result<SharedKey> readOrMakeKeyFile(const std::filesystem::path& file) {
       return why;
     }
     unlink(made.c_str());
-    if (!written) return fail(reasonOf(made, "cannot be written"));
+    if (!written) return fail(reasonOf(file, "cannot be written"));
   }
   return readKeyFile(file);
 }

@@ -31,7 +31,8 @@ constexpr std::string_view kEpoch = "server epoch";
 /// A re-simulation in progress: restores checkpoints, applies inputs and compares hashes, message by message.
 class Resimulator {
  public:
-  explicit Resimulator(SessionSimulation& simulation) : simulation_(simulation) {}
+  /// `first`: the tick that the file begins with; 0: not known.
+  Resimulator(SessionSimulation& simulation, Tick first) : simulation_(simulation), first_(first) {}
 
   Result<void> read(const record::McapMessage& message) {
     if (message.topic == wire::kTickInput.name) return readInput(message);
@@ -85,6 +86,8 @@ class Resimulator {
     if (!part) return fail(part.error().what);
     if (!checkpoints_.add(*part) || synchronized_) return {};
     if (auto restored = simulation_.restore(checkpoints_.bytes()); !restored) return restored;
+    if (const Tick first = std::exchange(first_, 0); first != 0 && simulation_.now() > first)
+      report_.gaps.push_back({first, simulation_.now(), simulation_.now()});
     if (!report_.gaps.empty() && report_.gaps.back().compared_after == 0)
       report_.gaps.back().compared_after = simulation_.now();
     synchronized_ = true;
@@ -101,6 +104,7 @@ class Resimulator {
   }
 
   SessionSimulation& simulation_;
+  Tick first_;  ///< that the file should have; 0: not known, or found
   PartJoiner<TickInputPart> inputs_;
   PartJoiner<CheckpointPart> checkpoints_;
   ResimulationReport report_;
@@ -188,7 +192,9 @@ Result<ResimulationReport> resimulate(const std::filesystem::path& file, Session
   if (!reader) return fail(reader.error().what);
   if (const std::string why = refusalByProtocol(*reader); !why.empty())
     return fail(file.string() + ": " + why);
-  Resimulator resimulator(simulation);
+  // a recorder may come late, a journal begins with the session
+  const bool is_journal = reader->metadata().contains(std::string(kMetadata));
+  Resimulator resimulator(simulation, is_journal ? 1 : 0);
   record::McapMessage message;
   while (reader->next(message))
     if (auto read = resimulator.read(message); !read)

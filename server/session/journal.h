@@ -88,7 +88,7 @@ class Journal {
   std::vector<std::uint8_t> bytes_;
 };
 
-/// Ticks that a journal or recording does not have.
+/// Ticks that a journal or recording does not have, or not with the checkpoint before them.
 struct JournalGap {
   Tick first = 0, last = 0;
   Tick compared_after = 0;  ///< of the checkpoint from which on ticks are compared again; 0: there is none
@@ -98,10 +98,10 @@ struct JournalGap {
 struct ResimulationReport {
   Tick first = 0, last = 0;  ///< ticks compared
   std::uint64_t compared = 0;
-  std::vector<JournalGap> gaps;  ///< after the first tick that was compared
+  std::vector<JournalGap> gaps;  ///< in their order; of a journal also before its first checkpoint
   std::uint64_t final_hash = 0;
   std::optional<Tick> first_difference;  ///< first tick whose hash differs
-  std::string problem;                   ///< truncation or damage found in the file, or empty
+  std::string problem;                   ///< damage and truncation found in the file, or empty
   bool is_damaged = false;               ///< beyond a truncation: it may lack what it had
 };
 

@@ -129,9 +129,10 @@ Result<ResumePoint> readResumePoint(const std::filesystem::path& journal, const 
   auto entry = std::next(newest);
   for (; entry != tail->entries.end(); ++entry) {
     if (entry->input.tick != simulation.now() + 1) {
-      point.problem = fmt::format(
-          "{}: has no tick {}, so the session continues from there, {} ticks before its end",
-          journal.string(), simulation.now() + 1, tail->entries.back().input.tick - simulation.now());
+      point.problem =
+          fmt::format("{} has no tick {}, so the session continues from there, {} ticks before its end",
+                      point.problem.empty() ? journal.string() + ":" : point.problem + "; it",
+                      simulation.now() + 1, tail->entries.back().input.tick - simulation.now());
       break;
     }
     simulation.tick(entry->input);

@@ -9,8 +9,9 @@
 namespace tenon::session {
 namespace {
 
-/// Without an input for longer, a hand is told to others as one that stands.
-constexpr Tick kLateTicks = 5;  // [ticks]
+/// Without an input for longer, a hand is told to others as one that stands: also of the sparsest inputs one
+/// may be lost.
+constexpr Tick kLateTicks = 2 * kMostInputPeriod;  // [ticks]
 
 /// [points] of ChangeKind::kBudget; 0, no limit, for NaN and numbers below 1.
 std::uint64_t budgetPoints(double value) {
@@ -46,8 +47,7 @@ void SessionSimulation::tick(const TickInput& input) noexcept {
     if (machine_.status().finished) phase_ = RunPhase::kSucceeded;
     if (machine_.status().failed) phase_ = RunPhase::kFailed;
   }
-  // what reached the run before an emergency stop waits for its end
-  if (!isSuspended() && phase_ != RunPhase::kRunning) commands_.clear();
+  if (phase_ != RunPhase::kRunning && phase_ != RunPhase::kPaused) commands_.clear();
   startWhenHandsPresent();
   environment_.setFreeBodiesPaused(isStill());
   environment_.step();
@@ -66,14 +66,16 @@ void SessionSimulation::apply(const Change& change) noexcept {
     case ChangeKind::kDetach:
       return detach(change.hand);
     case ChangeKind::kGameCommand:
-      commands_.push_back(change.game);
+      if (!emergency_stop_) commands_.push_back(change.game);
       return;
     case ChangeKind::kRelease:
       return environment_.release(change.hand);
     case ChangeKind::kEnablePair:
       return environment_.setPairEnabled(change.index, change.value != 0.0);
     case ChangeKind::kSetEmergencyStop:
+      // what was accepted just before would act, unseen, when the stop is cleared
       emergency_stop_ = change.value != 0.0;
+      if (emergency_stop_) commands_.clear();
       return;
     case ChangeKind::kFreezeForces:
       forces_frozen_ = change.value != 0.0;

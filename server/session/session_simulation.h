@@ -36,7 +36,8 @@ class SessionSimulation {
 
   /// One tick (1 ms): applies changes and device samples, freezes or parks hands by the age of their input,
   /// steps the state machine, then the environment. In a pause the state machine steps for commands alone.
-  /// Ids out of range in `input` are ignored.
+  /// An emergency stop drops the commands that wait and those of its tick. Ids out of range in `input` are
+  /// ignored.
   void tick(const TickInput& input) noexcept;
 
   /// An output sized for this scene.
@@ -125,8 +126,8 @@ class SessionSimulation {
 
   static constexpr std::size_t kMaxCommands = 256;  ///< that wait; as many changes wait for ticks
 
-  /// Commands for the next steps of the state machine: those that wait for the end of an emergency stop or of
-  /// one before them, and those of this tick.
+  /// Commands for the next steps of the state machine: those that wait for one before them, and those of this
+  /// tick; none in an emergency stop.
   FixedVector<game_control::GameCommand, kMaxCommands> commands_;
   RunPhase phase_ = RunPhase::kWaitingForPeople;
   bool emergency_stop_ = false;

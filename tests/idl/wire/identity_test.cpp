@@ -122,6 +122,11 @@ TEST_F(KeyFile, IsMadeOnceAndReadableByItsOwnerAlone) {
       << "nothing beside it";
 }
 
+TEST_F(KeyFile, ThatCannotBeMadeIsAnErrorThatNamesIt) {
+  const fs::path file = folder_ / "none" / "key";
+  EXPECT_THAT(readOrMakeKeyFile(file).error().what, HasSubstr(file.string() + ": cannot be made"));
+}
+
 TEST_F(KeyFile, ThatOthersMayReadOrThatIsNoneIsRefused) {
   const fs::path file = folder_ / "key";
   ASSERT_TRUE(readOrMakeKeyFile(file));

@@ -191,6 +191,18 @@ TEST_F(JournalTest, AfterAGapItContinuesFromTheNextCheckpoint) {
   EXPECT_FALSE(report->first_difference);
 }
 
+TEST_F(JournalTest, WithoutItsFirstCheckpointTheTicksUpToTheNextAreAGap) {
+  const std::uint64_t final_hash = write([](const JournalEntry& entry) { return entry.input.tick > 20; });
+  const auto report = resimulateJournal();
+  ASSERT_TRUE(report) << report.error().what;
+  ASSERT_EQ(report->gaps.size(), 1U);
+  EXPECT_EQ(report->gaps[0].first, 1U);
+  EXPECT_EQ(report->gaps[0].last, 1001U);
+  EXPECT_EQ(report->gaps[0].compared_after, 1001U);
+  EXPECT_EQ(report->first, 1002U);
+  EXPECT_EQ(report->final_hash, final_hash);
+}
+
 // 401 is lost, 402 to 600 are written; after a kill the server goes on after 400, without input
 TEST_F(JournalTest, WhatFollowsAGapIsForgottenWhereAResumedServerBeginsAgain) {
   SessionSimulation simulation = test::SessionRig::makeSimulation(loaded_, 1, {test::kRightHand});
