@@ -230,8 +230,8 @@ class FeatureFinder {
     for (std::size_t i = closed ? 0 : 1; i < count; ++i)
       segments[i].turn = segments[(i + count - 1) % count].along.dot(segments[i].along);
     // a ring without a corner has no end
-    const bool goes_on = segments.front().turn > kCos30;
-    segments.front().beyond[0] = segments.back().beyond[1] = goes_on ? kEndless : 0.0;
+    const bool is_ring = segments.front().turn > kCos30;
+    segments.front().beyond[0] = segments.back().beyond[1] = is_ring ? kEndless : 0.0;
     for (std::size_t i = 1; i < count; ++i) {
       const std::size_t k = count - 1 - i;
       const Segment& before = segments[i - 1];

@@ -104,7 +104,7 @@ class SessionSimulation {
   [[nodiscard]] bool isSuspended() const { return emergency_stop_ || phase_ == RunPhase::kPaused; }
   /// Likewise, whether or not steps go on.
   [[nodiscard]] bool isStill() const { return isSuspended() || forces_frozen_; }
-  /// In a pause nothing goes on by itself, and commands change the scene at once.
+  /// In a pause steps do not run by themselves, and commands change the scene at once.
   [[nodiscard]] bool stepsGoOn() const {
     const bool is_changed = phase_ == RunPhase::kPaused && (!commands_.empty() || machine_.betweenStates());
     return !emergency_stop_ && (phase_ == RunPhase::kRunning || is_changed);

@@ -18,7 +18,7 @@ struct FeatureEdge {
   std::array<Vector3f, 2> into_M{Vector3f::Zero(), Vector3f::Zero()};
   /// [m] Nearer to the piece than this, and between its ends, the surface is the two faces alone.
   float reach = 0.0F;
-  /// [m] How far the edge goes on beyond the ends at -half and +half, up to a corner.
+  /// [m] Length of the edge beyond the ends of the piece at -half and +half, up to a corner.
   std::array<float, 2> beyond{0.0F, 0.0F};
 };
 

@@ -16,7 +16,7 @@ export class Presses {
   private sent = 0;
   private confirmed = 0; // the newest that was
   private unanswered = 0;
-  private pressed = 0; // [ms] of the computer's clock, which goes on while the computer sleeps
+  private pressed = 0; // [ms] of the computer's clock, which runs while the computer sleeps
   private session = ""; // in which it was pressed
   private hearing = 0;
 
