@@ -20,6 +20,7 @@ if(TENON_SANITIZE MATCHES address)
   set(suites_nightly_here ${suites_of_numbers})
 elseif(TENON_SANITIZE MATCHES thread)  # of one thread
   set(suites_nightly_here EnvironmentCheckpoint JournalDamage MeshOrigin OwnSteps FreeFlights NeverThrough Studs Crossings Tapers)
+  list(APPEND test_environment TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/tsan_suppressions.txt)
 endif()
 # gmock.h is half of a test's time of compilation
 add_library(precompiled_tests OBJECT ${CMAKE_BINARY_DIR}/precompiled.cpp)

@@ -18,12 +18,6 @@
 #include "tests/server/session/scripted_client.h"
 #include "tests/server/session/small_session.h"
 
-#if defined(__SANITIZE_THREAD__)
-// Cyclone DDS is not built for the thread sanitizer, which does not see its atomic counts of references.
-extern "C" const char* __tsan_default_suppressions();
-extern "C" const char* __tsan_default_suppressions() { return "race:libddsc.so\n"; }
-#endif
-
 namespace tenon::session {
 namespace {
 
