@@ -89,7 +89,7 @@ class Child:
                 last = line.strip() or last
         finally:
             limit.cancel()
-        raise RuntimeError(last)
+        raise RuntimeError(last.removeprefix(f"{Path(self.process.args[0]).name}: "))
 
 
 def drawn(args, address):

@@ -1,5 +1,6 @@
 """Pictures of scenarios and recordings, drawn by the console's page."""
 import os
+import re
 import shutil
 import signal
 import struct
@@ -79,12 +80,15 @@ class Picture(Drawn):
         self.assertFalse((self.folder / "mine.png").exists())
 
     def test_what_cannot_be_drawn_is_said(self):
-        cut = self.folder / "cut.mcap"
-        cut.write_bytes(b"no recording")
-        done = tenon("picture", cut, "-o", self.folder / "cut.png")
-        self.assertEqual(done.returncode, 1)
-        self.assertRegex(done.stderr, r"^tenon picture: This file cannot be played: .+\n$")
-        self.assertFalse((self.folder / "cut.png").exists())
+        none, cut = self.folder / "none.mcap", self.folder / "cut.mcap"
+        none.write_bytes(b"no recording")
+        cut.write_bytes(b"\x89MCAP0\r\n" + bytes(100))
+        for file, says in (none, f"{re.escape(str(none))}: is not a recording .+"), (cut, f"{re.escape(str(cut))}: was cut off .+"):
+            with self.subTest(file=file.name):
+                done = tenon("picture", file, "-o", file.with_suffix(".png"))
+                self.assertEqual(done.returncode, 1)
+                self.assertRegex(done.stderr, rf"^tenon picture: {says}\n$")
+                self.assertFalse(file.with_suffix(".png").exists())
 
 
 @unittest.skipUnless(shutil.which("chromium"), "no chromium: deploy/setup test")
