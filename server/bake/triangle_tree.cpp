@@ -117,28 +117,6 @@ TriangleTree::TriangleTree(std::span<const structures::Triangle> triangles, doub
   builder.build(0, builder.parts);
 }
 
-bool TriangleTree::anyWithin(const Vector3& p, double radius) const {
-  if (nodes_.empty()) return false;
-  const Vector3f p_local = local(p);
-  const double squared = radius * radius;
-  std::array<std::uint32_t, 128> stack;  // three for each level of the tree, which has at most 16
-  std::size_t count = 0;
-  stack[count++] = 0;
-  while (count > 0) {
-    const Node& node = nodes_[stack[--count]];
-    const Lanes away = node.squaredDistances(p_local) * (1.0F - kRounding);
-    for (std::size_t lane = 0; lane < 4; ++lane) {
-      if (!(away[static_cast<Eigen::Index>(lane)] < squared) || node.child[lane] == kNothing) continue;
-      if ((node.child[lane] & kTriangle) == 0) {
-        stack[count++] = node.child[lane];
-      } else if (tenon::structures::squaredDistance(p, triangles_[node.child[lane] - kTriangle]) < squared) {
-        return true;
-      }
-    }
-  }
-  return false;
-}
-
 bool TriangleTree::maybeNear(const Vector3& centre, double half_edge, double radius) const {
   if (nodes_.empty()) return false;
   const auto nearBox = [&](const structures::Triangle& t) {
@@ -153,7 +131,7 @@ bool TriangleTree::maybeNear(const Vector3& centre, double half_edge, double rad
   const Vector3f p_local = local(centre);
   const auto half = static_cast<float>(half_edge * (1.0 + kRounding));
   const double squared = radius * radius;
-  std::array<std::uint32_t, 128> stack;  // as in anyWithin
+  std::array<std::uint32_t, 128> stack;  // as in visitWithin
   std::size_t count = 0;
   stack[count++] = 0;
   while (count > 0) {
@@ -192,7 +170,7 @@ std::vector<std::uint32_t> TriangleTree::crossed(const Vector3& p, const Vector3
   if (nodes_.empty()) return crossed;
   const Vector3f p_local = local(p);
   const Vector3f inverse = direction.cwiseInverse().cast<float>();
-  std::array<std::uint32_t, 128> stack;  // as in anyWithin
+  std::array<std::uint32_t, 128> stack;  // as in visitWithin
   std::size_t count = 0;
   stack[count++] = 0;
   while (count > 0) {
@@ -227,7 +205,7 @@ TriangleTree::Intersection TriangleTree::firstIntersection(const Vector3& p, con
       along.unaryExpr([smallest](double c) { return std::abs(c) < smallest ? smallest : c; })
           .cwiseInverse()
           .cast<float>();
-  std::array<std::uint32_t, 128> stack;  // as in anyWithin
+  std::array<std::uint32_t, 128> stack;  // as in visitWithin
   std::size_t count = 0;
   stack[count++] = 0;
   while (count > 0) {

@@ -24,16 +24,14 @@ class TriangleTree {
   /// Triangles with an edge longer than `longest` [m] get several boxes.
   TriangleTree(std::span<const structures::Triangle> triangles, double longest);
 
-  /// Whether a triangle is nearer to p than `radius` [m].
-  [[nodiscard]] bool anyWithin(const Vector3& p, double radius) const;
-
-  /// Calls visit(triangle) for each triangle nearer to p than `radius` [m]; for long ones more than once.
+  /// Calls visit(triangle) for each triangle nearer to p than `radius` [m], for long ones more than once,
+  /// until it returns true. Returns whether it did.
   template <typename Visit>
-  void visitWithin(const Vector3& p, double radius, Visit&& visit) const {
-    if (nodes_.empty()) return;
+  bool visitWithin(const Vector3& p, double radius, Visit&& visit) const {
+    if (nodes_.empty()) return false;
     const Vector3f p_local = local(p);
     const double squared = radius * radius;
-    std::array<std::uint32_t, 128> stack;  // as in anyWithin
+    std::array<std::uint32_t, 128> stack;  // three for each level of the tree, which has at most 16
     std::size_t count = 0;
     stack[count++] = 0;
     while (count > 0) {
@@ -45,11 +43,17 @@ class TriangleTree {
         if ((child & kTriangle) == 0) {
           stack[count++] = child;
         } else if (const structures::Triangle& triangle = triangles_[child - kTriangle];
-                   structures::squaredDistance(p, triangle) < squared) {
-          visit(triangle);
+                   structures::squaredDistance(p, triangle) < squared && visit(triangle)) {
+          return true;
         }
       }
     }
+    return false;
+  }
+
+  /// Whether a triangle is nearer to p than `radius` [m].
+  [[nodiscard]] bool anyWithin(const Vector3& p, double radius) const {
+    return visitWithin(p, radius, [](const structures::Triangle&) { return true; });
   }
 
   /// False only if no triangle is nearer than `radius` [m] to the cube around `centre` [m] with `half_edge`

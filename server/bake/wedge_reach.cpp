@@ -66,11 +66,12 @@ double WedgeReach::of(const Vector3& centre, const Vector3& half, const std::arr
         return std::abs(normal.dot(corner - centre)) <= tolerance_;
       });
     };
-    if (std::ranges::any_of(normals, isIn)) return;
+    if (std::ranges::any_of(normals, isIn)) return false;
     Outline outline;
     for (const Vector3& corner : triangle) outline.push_back(corner - centre);
     outline = cut(cut(outline, along, kBetweenEnds * length), -along, kBetweenEnds * length);
     if (!outline.empty()) reach = std::min(reach, distanceFromLine(outline, along));
+    return false;
   });
   return reach;
 }
