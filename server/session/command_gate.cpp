@@ -12,18 +12,18 @@ tl::expected<void, Refused> CommandGate::check(CommandKind kind) const {
   const bool in_any_phase = kind == CommandKind::kRelease || kind == CommandKind::kSetCollision ||
                             kind == CommandKind::kStop || kind == CommandKind::kClearEmergencyStop ||
                             kind == CommandKind::kFreezeForces;
-  const bool is_of_run = kind == CommandKind::kPause || kind == CommandKind::kResume;
   if (isOver(phase_)) return refuse(Refusal::kOver, "the run is over");
   if (in_any_phase) return {};
   if (phase_ == RunPhase::kWaitingForPeople)
     return refuse(Refusal::kWaiting, "the session still waits for people: repeat the command once it runs");
+  // a pause is what the clear of the stop leaves
+  if (is_stop_engaged_ && kind != CommandKind::kPause)
+    return refuse(Refusal::kStopped, "the emergency stop stands: clear it first");
   const bool is_paused = expectedPhase() == RunPhase::kPaused;
   if (kind == CommandKind::kResume && !is_paused)
     return refuse(Refusal::kAlready, "the session is not paused");
   if (kind == CommandKind::kPause && is_paused)
     return refuse(Refusal::kAlready, "the session is paused already");
-  if (is_stop_engaged_ && !is_of_run)
-    return refuse(Refusal::kOther, "the emergency stop stands: clear it first");
   return {};
 }
 

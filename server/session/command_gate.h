@@ -12,7 +12,7 @@ namespace tenon::session {
 /// Whether a command takes effect in the phase of the run that it will meet: the one after all commands that
 /// were accepted before it, of which the last ones wait for their tick. A command is accepted only if it
 /// takes effect with the next ticks: in a pause it changes the scene at once, and during an emergency stop
-/// the scene stays as it is.
+/// the scene stays as it is and the run is not resumed.
 ///
 /// Threads: one (wire). Real-time: no.
 class CommandGate {

@@ -82,7 +82,7 @@ class Commands(unittest.TestCase):
             trainee.wait_for("emergency stop by .*a test", 30)
             server.wait_for("run: emergency stop", 30)
             self.assert_refused(stage, "ask the instructor", "clear", "--role", "trainee")
-            for words in (["skip"], ["goto", "2"], ["reset"], ["repeat"], ["give", "peg", "right"]):
+            for words in (["skip"], ["goto", "2"], ["reset"], ["repeat"], ["give", "peg", "right"], ["resume"]):
                 self.assert_refused(stage, "the emergency stop stands: clear it first", *words)
             self.assert_accepted(stage, "clear")
             trainee.wait_for("emergency stop cleared", 30)

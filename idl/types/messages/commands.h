@@ -44,7 +44,8 @@ enum class Refusal : std::uint32_t {
   kNotYourHand,   ///< the client does not control it
   kNotHoldable,   ///< no hand takes the object, or this hand takes none
   kNobodyThere,   ///< nobody moves the hand
-  kTooMany,       ///< commands wait until the session continues
+  kTooMany,       ///< commands wait for their tick: it can be sent again soon
+  kStopped,       ///< an emergency stop stands
 };
 
 /// A client's request to the session, acknowledged by a CommandAck with the same id.

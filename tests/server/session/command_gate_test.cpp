@@ -83,11 +83,13 @@ TEST(CommandGateTest, DuringAnEmergencyStopWhatChangesTheSceneIsRefused) {
   for (const RunPhase phase : {RunPhase::kRunning, RunPhase::kPaused}) {
     CommandGate gate = gateIn(phase);
     gate.engageStop();
-    for (const CommandKind kind : {CommandKind::kReset, CommandKind::kSkipStep, CommandKind::kGoToStep,
-                                   CommandKind::kBack, CommandKind::kRepeatStep, CommandKind::kHandOver,
-                                   CommandKind::kSwapHands, CommandKind::kFulfilled, CommandKind::kSignal}) {
+    for (const CommandKind kind :
+         {CommandKind::kReset, CommandKind::kSkipStep, CommandKind::kGoToStep, CommandKind::kBack,
+          CommandKind::kRepeatStep, CommandKind::kHandOver, CommandKind::kSwapHands, CommandKind::kFulfilled,
+          CommandKind::kSignal, CommandKind::kResume}) {
       const auto possible = gate.check(kind);
       ASSERT_FALSE(possible) << static_cast<int>(kind);
+      EXPECT_EQ(possible.error().why, Refusal::kStopped);
       EXPECT_EQ(possible.error().what, "the emergency stop stands: clear it first");
     }
     for (const CommandKind kind : {CommandKind::kClearEmergencyStop, CommandKind::kFreezeForces,
@@ -95,6 +97,7 @@ TEST(CommandGateTest, DuringAnEmergencyStopWhatChangesTheSceneIsRefused) {
       EXPECT_EQ(refusalOf(gate, kind), Refusal::kNone) << static_cast<int>(kind);
     gate.clearStop();
     EXPECT_EQ(refusalOf(gate, CommandKind::kGoToStep), Refusal::kNone) << "the run is paused";
+    EXPECT_EQ(refusalOf(gate, CommandKind::kResume), Refusal::kNone) << "likewise";
   }
 }
 
