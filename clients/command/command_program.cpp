@@ -92,7 +92,7 @@ Result<void> CommandClient::send(const ParsedCommand& command, const Stop& stop)
   if (!command.command) {
     const auto heard = raiser_->raise(reasonOf(command), kSoon, stop);
     if (!heard) return fail(heard.error().what);
-    if (heard->by_server) return {};
+    if (heard->isConfirmed()) return {};
     const auto outcome = outcomeOf(*heard, options_.domain, member_->sessionName());
     return fail(outcome ? *outcome : outcome.error().what);
   }

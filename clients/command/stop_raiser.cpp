@@ -1,6 +1,7 @@
 #include "clients/command/stop_raiser.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "idl/types/messages/session.h"
@@ -15,25 +16,36 @@ constexpr milliseconds kLateReaders{300};  // although a server has answered, ot
 constexpr milliseconds kAcknowledged{500};
 constexpr std::size_t kMaxReason = 255;  // [bytes] of tenon::EmergencyStop
 constexpr std::size_t kKept = 256;       // raises of which it is known who has heard them
+constexpr std::size_t kMost = 1024;      // servers that are known, and repeaters of a raise
 
-/// Once, however often its announcement is repeated.
-void addOnce(std::vector<wire::Origin>& origins, const wire::Origin& origin) {
-  if (std::find(origins.begin(), origins.end(), origin) == origins.end()) origins.push_back(origin);
+bool contains(const std::vector<wire::Origin>& origins, const wire::Origin& origin) {
+  return std::find(origins.begin(), origins.end(), origin) != origins.end();
+}
+
+std::string counted(std::size_t count, const std::string& what) {
+  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 }  // namespace
 
 Result<std::string> outcomeOf(const StopHeard& heard, std::uint32_t domain, const std::string& session) {
-  if (heard.by_server) return "accepted";
+  if (heard.isConfirmed()) return "accepted";
+  if (heard.by_server)
+    return "accepted, but not by all: of " + counted(heard.silent_sessions, "session") +
+           " no server has answered, it may hang or have ended";
   if (heard.programs == 0)
     return fail("nobody has heard the emergency stop: no program of " +
                 (session.empty() ? "any session" : "session '" + session + "'") + " runs on domain " +
                 std::to_string(domain));
-  const std::string sent =
-      "sent to " + std::to_string(heard.programs) + (heard.programs == 1 ? " program" : " programs");
+  const std::string silent = "no server has answered, it may hang or have ended";
+  const std::string by_hand = "do not rely on it, stop the devices by hand";
+  if (heard.stations == 0)
+    return fail("sent to " + counted(heard.programs, "program") + ", and no station has obeyed it; " +
+                silent + ": " + by_hand);
+  const std::string stopped =
+      counted(heard.stations, "station") + (heard.stations == 1 ? " has" : " have") + " stopped";
   if (!heard.acknowledged)
-    return fail(sent +
-                ", and not all of them have acknowledged it: do not rely on it, stop the devices by hand");
-  return sent + "; no server has answered: it may hang or have ended";
+    return fail(stopped + ", and not all that listen have acknowledged it; " + silent + ": " + by_hand);
+  return stopped + "; " + silent;
 }
 
 Result<std::unique_ptr<StopRaiser>> StopRaiser::open(std::uint32_t domain, const std::string& session,
@@ -45,6 +57,7 @@ Result<std::unique_ptr<StopRaiser>> StopRaiser::open(std::uint32_t domain, const
   StopRaiser& self = *raiser;
   self.guid_ = wire::randomHex();
   self.person_ = std::move(person);
+  self.own_ = (*participant)->origin();
   self.lobby_ = std::make_unique<wire::Partition>(*participant, wire::kLobby);
   // DDS matches the asterisk with every session's partition
   self.session_ = std::make_unique<wire::Partition>(*participant,
@@ -54,13 +67,25 @@ Result<std::unique_ptr<StopRaiser>> StopRaiser::open(std::uint32_t domain, const
     all = self.inbox_.onFrom<EmergencyStop>(
         *self.session_, wire::kEmergencyStop, [&self](const EmergencyStop& stop, const wire::Origin& from) {
           const auto raise = self.raises_.find(stop.counter);
-          if (stop.client_guid == self.guid_ && raise != self.raises_.end())
-            addOnce(raise->second.repeaters, from);
+          if (stop.client_guid != self.guid_ || raise == self.raises_.end() || from == self.own_) return;
+          std::vector<wire::Origin>& repeaters = raise->second.repeaters;
+          if (from.known() && repeaters.size() < kMost && !contains(repeaters, from))
+            repeaters.push_back(from);
         });
   if (all)
     all = self.inbox_.onFrom<SessionAnnounce>(
         *self.lobby_, wire::kSessionAnnounce,
-        [&self](const SessionAnnounce&, const wire::Origin& from) { addOnce(self.servers_, from); });
+        [&self, session](const SessionAnnounce& announce, const wire::Origin& from) {
+          const bool is_meant = session.empty() || announce.session == session;
+          if (is_meant && self.servers_.size() < kMost)
+            self.servers_.insert_or_assign({announce.session, announce.server_epoch}, Server{from});
+        });
+  if (all)
+    all = self.inbox_.onGone<SessionAnnounce>(
+        *self.lobby_, wire::kSessionAnnounce, [&self](const SessionAnnounce& gone) {
+          const auto server = self.servers_.find({gone.session, gone.server_epoch});
+          if (server != self.servers_.end()) server->second.is_gone = true;
+        });
   // not repeated to stations that join after it was cleared
   if (all)
     all = self.inbox_.onFrom<EmergencyClear>(
@@ -96,7 +121,21 @@ Result<std::uint32_t> StopRaiser::write(const std::string& reason) {
 }
 
 bool StopRaiser::isServer(const wire::Origin& origin) const {
-  return std::find(servers_.begin(), servers_.end(), origin) != servers_.end();
+  return std::any_of(servers_.begin(), servers_.end(),
+                     [&](const auto& server) { return server.second.origin == origin; });
+}
+
+/// One of its servers is enough: a killed one is announced for a while beside the one that resumes.
+std::size_t StopRaiser::silentSessions(const std::vector<wire::Origin>& repeaters) const {
+  std::set<std::string> silent, answered;
+  for (const auto& [name, server] : servers_) {
+    if (contains(repeaters, server.origin))
+      answered.insert(name.first);
+    else if (!server.is_gone)
+      silent.insert(name.first);
+  }
+  return static_cast<std::size_t>(std::count_if(
+      silent.begin(), silent.end(), [&](const std::string& name) { return !answered.contains(name); }));
 }
 
 std::optional<StopHeard> StopRaiser::heard(std::uint32_t raise, milliseconds patience) const {
@@ -105,11 +144,14 @@ std::optional<StopHeard> StopRaiser::heard(std::uint32_t raise, milliseconds pat
   const auto& [written, repeaters] = found->second;
   const auto elapsed = std::chrono::steady_clock::now() - written;
   StopHeard heard;
-  heard.by_server = std::any_of(repeaters.begin(), repeaters.end(),
-                                [this](const wire::Origin& origin) { return isServer(origin); });
-  if (elapsed < patience && !(heard.by_server && elapsed >= kLateReaders)) return std::nullopt;
+  const auto servers = std::count_if(repeaters.begin(), repeaters.end(),
+                                     [this](const wire::Origin& origin) { return isServer(origin); });
+  heard.by_server = servers > 0;
+  heard.stations = repeaters.size() - static_cast<std::size_t>(servers);
+  heard.silent_sessions = silentSessions(repeaters);
+  if (elapsed < patience && !(heard.isConfirmed() && elapsed >= kLateReaders)) return std::nullopt;
   heard.programs = stops_->matchedReaders() - std::min(own_readers_, stops_->matchedReaders());
-  if (heard.by_server) heard.programs = std::max<std::size_t>(heard.programs, 1);
+  heard.programs = std::max(heard.programs, repeaters.size());
   return heard;
 }
 

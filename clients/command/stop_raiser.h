@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "idl/types/messages/run.h"
@@ -17,13 +18,18 @@ namespace tenon::command {
 
 /// Who has heard a raise of the emergency stop.
 struct StopHeard {
-  std::size_t programs = 0;  ///< that listen: stations, the server, observers, recorders
-  bool by_server = false;    ///< a server has repeated it, and stops its simulation
-  bool acknowledged = true;  ///< by all that listen; false: one of them hangs, or its link does
+  std::size_t programs = 0;         ///< that listen: stations, the server, observers, recorders
+  bool by_server = false;           ///< a server has repeated it, and stops its simulation
+  std::size_t stations = 0;         ///< that have repeated it, and stop their devices
+  std::size_t silent_sessions = 0;  ///< those announced, of the ones it is for, whose servers have not
+  bool acknowledged = true;         ///< by all that listen; false: one of them hangs, or its link does
+
+  /// It stands in each session that it is for.
+  [[nodiscard]] bool isConfirmed() const { return by_server && silent_sessions == 0; }
 };
 
-/// What people are told of it: "accepted", or that no server has answered. Fails when nobody has heard it,
-/// and when neither a server has answered nor all that listen have acknowledged it.
+/// What people are told of it: "accepted", or who has not answered. Fails when no server and no station has
+/// obeyed it.
 [[nodiscard]] Result<std::string> outcomeOf(const StopHeard& heard, std::uint32_t domain,
                                             const std::string& session);
 
@@ -46,8 +52,8 @@ class StopRaiser {
   [[nodiscard]] Result<std::uint32_t> write(const std::string& reason);
   /// Takes messages for `timeout`.
   void dispatch(std::chrono::milliseconds timeout) { inbox_.dispatch(timeout); }
-  /// Who has heard a raise; none as long as waiting can tell more: until a server has repeated it and other
-  /// programs had time to be discovered, at most for `patience` from its writing.
+  /// Who has heard a raise; none as long as waiting can tell more: until it is confirmed and other programs
+  /// had time to be discovered, at most for `patience` from its writing.
   [[nodiscard]] std::optional<StopHeard> heard(std::uint32_t raise, std::chrono::milliseconds patience) const;
 
  private:
@@ -58,15 +64,23 @@ class StopRaiser {
 
   StopRaiser() = default;
   [[nodiscard]] bool isServer(const wire::Origin& origin) const;
+  [[nodiscard]] std::size_t silentSessions(const std::vector<wire::Origin>& repeaters) const;
+
+  struct Server {
+    wire::Origin origin;
+    bool is_gone = false;
+  };
 
   std::string guid_;
   std::string person_;
+  wire::Origin own_;
   std::uint32_t counter_ = 0;
   std::unique_ptr<wire::Partition> lobby_;
   std::unique_ptr<wire::Partition> session_;
   std::unique_ptr<wire::Writer<EmergencyStop>> stops_;
   std::size_t own_readers_ = 0;
-  std::vector<wire::Origin> servers_;      ///< by their announcements
+  /// Of the sessions it is for, by session and epoch.
+  std::map<std::pair<std::string, std::uint32_t>, Server> servers_;
   std::map<std::uint32_t, Raise> raises_;  ///< the newest ones, by number
   wire::Inbox inbox_;
 };

@@ -54,7 +54,8 @@ struct DeskAnswer {
   std::string text;  ///< reason, or what came of it; may be empty when accepted
   std::string role;  ///< that the viewer has now; empty: none
   bool is_of_hands = false;
-  std::string code;  ///< of a refusal, for pages that have their own text for it: refusalName(), or empty
+  /// Of a refusal, for pages that have their own text for it: refusalName(), or empty.
+  std::string code;
 };
 [[nodiscard]] std::string deskAnswerText(const DeskAnswer& answer);
 

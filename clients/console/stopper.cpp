@@ -86,15 +86,20 @@ void Stopper::tell(milliseconds patience) {
   std::erase_if(raised_, [&](const Raise& raise) {
     const auto heard = raiser_->heard(raise.number, patience);
     if (!heard) return false;
-    const auto outcome = command::outcomeOf(*heard, domain_, session_);
-    if (!outcome) {
-      refuse(raise.presses, outcome.error().what);
-    } else {
-      answered(raise.presses, {.accepted = true, .text = heard->by_server ? "" : *outcome});
-    }
+    answered(raise.presses, answerOf(*heard));
     return true;
   });
-  if (unheard_ != 0 && raiser_->heard(unheard_, milliseconds(0))->by_server) unheard_ = 0;
+  if (unheard_ != 0 && raiser_->heard(unheard_, milliseconds(0))->isConfirmed()) unheard_ = 0;
+}
+
+/// What a server has published as standing is confirmed, and nothing else.
+DeskAnswer Stopper::answerOf(const command::StopHeard& heard) const {
+  if (heard.isConfirmed()) return {.accepted = true};
+  const auto outcome = command::outcomeOf(heard, domain_, session_);
+  const char* const code = heard.by_server      ? "stop_partly"
+                           : heard.stations > 0 ? "stop_devices"
+                                                : "stop_unheard";
+  return {.text = outcome ? *outcome : outcome.error().what, .code = code};
 }
 
 void Stopper::refuse(const std::vector<Press>& presses, const std::string& why) {

@@ -39,7 +39,7 @@ class Stopper {
   [[nodiscard]] bool add(ViewerId viewer, std::uint32_t id, std::string reason);
   /// The thread ends; does not wait for it.
   void stop();
-  /// Nobody waits for an answer, and a server has heard what was raised.
+  /// Nobody waits for an answer, and what was raised is confirmed.
   [[nodiscard]] bool isIdle() const { return !is_busy_; }
 
  private:
@@ -58,6 +58,7 @@ class Stopper {
   bool awaitWork();
   void raiseWaiting();
   void tell(std::chrono::milliseconds patience);
+  [[nodiscard]] DeskAnswer answerOf(const command::StopHeard& heard) const;
   void refuse(const std::vector<Press>& presses, const std::string& why);
   void answered(const std::vector<Press>& presses, DeskAnswer answer);
 

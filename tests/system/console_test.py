@@ -38,6 +38,16 @@ def start_console(stage, port=0, *arguments, shown=None, **env):
     return console, int(re.search(r":(\d+)/$", line)[1])
 
 
+def at_work(stage, *arguments):
+    """A session in which a trainee works, with its gateway: server, console and port."""
+    server = stage.serve("stacking", "--wait-for", "right")
+    console, port = start_console(stage, 0, *arguments)
+    console.wait_for("joined session 'test'")
+    stage.start("trainee", "--seed", 1)
+    server.wait_for("run: running")
+    return server, console, port
+
+
 def memory(process):
     """Resident memory of a process, in MB."""
     status = Path(f"/proc/{process.popen.pid}/status").read_text(encoding="utf-8")
@@ -209,11 +219,7 @@ class Desk(unittest.TestCase):
 
     def test_rights_come_from_the_key_and_the_server_answers(self):
         with Stage(lockstep=False) as stage:
-            server = stage.serve("stacking", "--wait-for", "right")
-            console, port = start_console(stage, 0, "--role", "instructor")
-            console.wait_for("joined session 'test'")
-            stage.start("trainee", "--seed", 1)
-            server.wait_for("run: running")
+            server, console, port = at_work(stage, "--role", "instructor")
             own = f"http://localhost:{port}"
             with Viewer(port, origin=own) as observer:
                 observer.begin("/console")
@@ -285,19 +291,16 @@ class Desk(unittest.TestCase):
 
     def test_the_stop_is_raised_when_no_server_answers(self):
         with Stage(lockstep=False) as stage:
-            server = stage.serve("stacking", "--wait-for", "right")
-            console, port = start_console(stage)
-            console.wait_for("joined session 'test'")
-            stage.start("trainee", "--seed", 1)
-            server.wait_for("run: running")
+            server, console, port = at_work(stage)
             with Viewer(port, origin=f"http://localhost:{port}") as viewer:
                 viewer.begin("/console")
                 server.signal(signal.SIGSTOP)
                 answer = viewer.ask("deskCommand", words=["emergency", "for a test"])
                 server.signal(signal.SIGCONT)
-                self.assertTrue(answer["accepted"], answer)
-                self.assertIn("no server has answered", answer["text"])
+                self.assertEqual((answer["accepted"], answer["code"]), (False, "stop_devices"), answer)
+                self.assertRegex(answer["text"], "1 station has stopped; no server has answered")
                 server.wait_for("emergency stop|engaged by console: for a test")
+                self.assertTrue(viewer.ask("deskCommand", words=["emergency", "for a test"])["accepted"])
 
     def test_the_lobby_lists_the_sessions_that_there_are(self):
         with Stage() as stage:
@@ -483,11 +486,7 @@ class Page(unittest.TestCase):
 
     def test_an_instructor_skips_a_step_and_stops_the_forces(self):
         with Stage(lockstep=False) as stage, Browser() as browser:
-            server = stage.serve("stacking", "--wait-for", "right")
-            console, port = start_console(stage, 0, "--role", "instructor")
-            console.wait_for("joined session 'test'")
-            stage.start("trainee", "--seed", 1)
-            server.wait_for("run: running")
+            server, console, port = at_work(stage, "--role", "instructor")
             # who has the plain address looks on
             browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="light")
             browser("await", expression="document.querySelector('.top .badge').textContent === 'Live'")
@@ -503,12 +502,25 @@ class Page(unittest.TestCase):
             browser("key", key="Enter")
             server.wait_for("mind the edge")
             self.assertEqual(browser("value", expression="tenon.session.standing.length"), 0)
-            browser("value", expression="document.activeElement.blur()")
+            browser("value", expression="document.querySelector('[data-command=reset]').click()")
+            permitted = "document.querySelector('dialog[open] .primary').ariaDisabled === null"
+            self.assertTrue(browser("value", expression=permitted))
             browser("key", key="Space")
             browser("await", expression="document.querySelector('.strip').classList.contains('raised')")
             server.wait_for("pressed in the browser")
+            browser("await", expression=f"!({permitted})")
+            browser("key", key="Escape")
+            # what the server refuses now is forbidden, with the reason, and not asked of it
+            forbidden = "[...document.querySelectorAll('.desk > [aria-disabled=true]')].filter(b => !b.hidden).map(b => b.dataset.command)"
+            browser("await", expression=f"{forbidden}.join() === 'resume,back,repeat,skip'")
+            stands = "the emergency stop stands: clear it first"
+            self.assertEqual(browser("value", expression="[document.querySelector('[data-command=skip]').title, document.querySelector('.desk .why').textContent]"), [stands, stands])
+            browser("value", expression="document.querySelector('[data-command=skip]').click()")
+            browser("await", expression=f"[...document.querySelectorAll('.notice.bad')].some(n => n.textContent === 'Skip: {stands}')")
+            self.assertNotIn("'skip'", server.text())
             browser("value", expression="document.querySelector('.clear').click()")
             browser("await", expression="!document.querySelector('.strip').classList.contains('raised')")
+            browser("await", expression=f"{forbidden}.length === 0 && document.querySelector('.desk .why').offsetHeight === 0")
             browser("value", expression="document.querySelector('[data-command=resume]').click()")
             browser("await", expression="tenon.session.run.phase === 1")
             browser("value", expression="document.querySelector('[data-command=skip]').click()")
@@ -518,11 +530,7 @@ class Page(unittest.TestCase):
 
     def test_a_stop_is_unconfirmed_while_the_gateway_hangs(self):
         with Stage(lockstep=False) as stage, Browser() as browser:
-            server = stage.serve("stacking", "--wait-for", "right")
-            console, port = start_console(stage)
-            console.wait_for("joined session 'test'")
-            stage.start("trainee", "--seed", 1)
-            server.wait_for("run: running")
+            server, console, port = at_work(stage)
             for language, unconfirmed, confirmed in (("en-GB", "Stop not confirmed. Use the switch at the device", "Stop forces: confirmed"),
                                                      ("de-DE", "Halt nicht bestätigt. Nimm den Schalter am Gerät", "Kräfte stoppen: bestätigt")):
                 browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="light", language=language)
@@ -530,10 +538,8 @@ class Page(unittest.TestCase):
                 says = f"document.querySelector('.alarm[role=alert]').textContent.startsWith({json.dumps(unconfirmed)}) && document.querySelector('.alarm').offsetHeight > 0"
                 self.assertFalse(browser("value", expression=says))
                 console.signal(signal.SIGSTOP)
-                browser("value", expression="window.pressed = performance.now(), new MutationObserver(() => (window.said ??= performance.now() - window.pressed)).observe(document.querySelector('.alarm'), { childList: true })")
                 browser("key", key="Space")
                 browser("await", expression=says)
-                self.assertLess(browser("value", expression="window.said"), 2000, "ms until it is said")
                 console.signal(signal.SIGCONT)
                 browser("await", expression=f"!document.body.classList.contains('unconfirmed') && [...document.querySelectorAll('.notice.good')].some(n => n.textContent === {json.dumps(confirmed)})")
                 browser("await", expression="document.querySelector('.strip').classList.contains('raised')")
@@ -542,11 +548,7 @@ class Page(unittest.TestCase):
 
     def test_a_stop_that_was_pressed_without_a_gateway_reaches_the_session_with_the_next_one(self):
         with Stage(lockstep=False) as stage, Browser() as browser:
-            server = stage.serve("stacking", "--wait-for", "right")
-            console, port = start_console(stage)
-            console.wait_for("joined session 'test'")
-            stage.start("trainee", "--seed", 1)
-            server.wait_for("run: running")
+            server, console, port = at_work(stage)
             unconfirmed = "document.body.classList.contains('unconfirmed')"
 
             def press_and_lose(console):
@@ -583,11 +585,7 @@ class Page(unittest.TestCase):
 
     def test_a_seat_that_the_server_has_ended_is_shown_as_lost(self):
         with Stage(lockstep=False) as stage, Browser() as browser:
-            server = stage.serve("stacking", "--wait-for", "right")
-            console, port = start_console(stage, 0, "--role", "instructor")
-            console.wait_for("joined session 'test'")
-            stage.start("trainee", "--seed", 1)
-            server.wait_for("run: running")
+            server, console, port = at_work(stage, "--role", "instructor")
             browser("open", url=f"http://localhost:{port}/#pass={pass_of(console)}", width=1280, height=800, theme="light")
             browser("await", expression="document.querySelector('.desk')?.hidden === false")
             client = browser("value", expression="[...tenon.session.people.values()].find(({ name, alive }) => alive && name === 'somebody at the console').client_id")

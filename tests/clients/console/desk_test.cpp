@@ -156,6 +156,28 @@ TEST_F(DeskTest, WhatIsPreparedForASessionEndsWhenItIsNoMore) {
   EXPECT_TRUE(test::dispatchUntil(session.inbox_, [&] { return session.inbox_.matchedWriters() == own; }));
 }
 
+// the page says that it is confirmed when it is accepted
+TEST_F(DeskTest, AStopThatNoServerHasPublishedIsNotAccepted) {
+  SessionMock session("a");
+  desk_->handle(kAda, "a", emergency(1));
+  ASSERT_TRUE(session.hears(1));
+  const DeskAnswer unheard = answers(1)[0].answer;
+  EXPECT_FALSE(unheard.accepted);
+  EXPECT_EQ(unheard.code, "stop_unheard") << "it was sent to a program, of which nothing is known";
+
+  auto bus = test::participant(test::ownDomain());
+  wire::Partition of_station(bus, wire::sessionPartition("a"));
+  auto station = wire::Writer<EmergencyStop>::open(of_station, wire::kEmergencyStop);
+  ASSERT_TRUE(station);
+  desk_->handle(kAda, "a", emergency(2));
+  ASSERT_TRUE(session.hears(2));
+  ASSERT_TRUE(station->write(session.raises_[1]));
+  const DeskAnswer reached = answers(2)[1].answer;
+  EXPECT_FALSE(reached.accepted);
+  EXPECT_EQ(reached.code, "stop_devices");
+  EXPECT_THAT(reached.text, testing::HasSubstr("1 station has stopped; no server has answered"));
+}
+
 // as late as it begins to answer, it knows of the stop
 TEST_F(DeskTest, ARaiseThatNoServerHasHeardStaysForOne) {
   SessionMock session("a");

@@ -1,6 +1,8 @@
 // Tests of the page's own modules: what it says of the stop and of a silent connection, what it lists, and what it gives back to the graphics hardware.
 // Usage: node page_modules.mjs CONSOLE_SOURCES FOLDER_WITH_NODE_MODULES
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { join } from "node:path";
 
 import { loadPage, runTests } from "./page_loader.mjs";
 
@@ -17,7 +19,7 @@ class Node {
 class Element extends Node {
   constructor(tag) {
     super();
-    Object.assign(this, { tag, className: "", dataset: {}, style: { setProperty() {} }, attributes: {}, classList: { add() {} } });
+    Object.assign(this, { tag, className: "", title: "", dataset: {}, style: { setProperty() {} }, attributes: {}, classList: { add() {} } });
   }
   append(...children) {
     this.children.push(...children.map((child) => (typeof child === "string" ? new Node(child) : child)));
@@ -25,17 +27,20 @@ class Element extends Node {
   setAttribute(name, value) {
     this.attributes[name] = value;
   }
+  removeAttribute(name) {
+    delete this.attributes[name];
+  }
   addEventListener() {}
   /** All below it of this tag. */
   all(tag) {
     return this.children.flatMap((child) => [...(child.tag === tag ? [child] : []), ...(child.all?.(tag) ?? [])]);
   }
 }
-globalThis.document = { createElement: (tag) => new Element(tag), createElementNS: (_, tag) => new Element(tag), createTextNode: (text) => new Node(text) };
+globalThis.document = { documentElement: {}, createElement: (tag) => new Element(tag), createElementNS: (_, tag) => new Element(tag), createTextNode: (text) => new Node(text) };
 
-const { Presses, isSilent, Session, panels, textOf, reasonOfLoss, Parts, Markers, Scene, setAssetSource } = await loadPage(...process.argv.slice(2), [
+const { Presses, isSilent, Session, panels, textOf, reasonOfLoss, reasonOf, whyNot, forbid, setLanguage, isTooEarly, Parts, Markers, Scene, setAssetSource } = await loadPage(...process.argv.slice(2), [
   'export { Presses } from "./presses";', 'export { isSilent } from "./cover";', 'export { Session } from "./session";', 'export * as panels from "./panels";',
-  'export { textOf } from "./eventtext";', 'export { reasonOfLoss } from "./desk";', 'export { Parts } from "./parts";', 'export { Markers } from "./markers";',
+  'export { textOf } from "./eventtext";', 'export { reasonOfLoss, reasonOf } from "./desk";', 'export { whyNot } from "./permits";', 'export { forbid } from "./dom";', 'export { isTooEarly } from "./pace";', 'export { setLanguage } from "./strings";', 'export { Parts } from "./parts";', 'export { Markers } from "./markers";',
   'export { Scene } from "three";', 'export { setAssetSource } from "./assets";',
 ]);
 
@@ -64,12 +69,19 @@ async function withPresses(test) {
   const seen = [];
   try {
     const presses = new Presses(() => new Promise((answer) => answers.push(answer)), () => seen.push(presses.isMissed ? "missed" : presses.isUnconfirmed));
-    await test({ presses, clock, answers, seen });
+    /** A press that is answered at once. */
+    const press = async (session, answer) => {
+      const pressed = presses.press(session);
+      answers.at(-1)(answer);
+      await pressed;
+    };
+    await test({ presses, press, clock, answers, seen });
   } finally {
     clock.end();
   }
 }
 const ACCEPTED = { accepted: true };
+const UNHEARD = { accepted: false, text: "neither a server nor a station has answered", code: "stop_unheard" };
 
 const HAND = { role: 2, freeze_ticks: 0, park_ticks: 0 };
 function sessionOf({ hands = ["right"], steps = [] } = {}) {
@@ -133,21 +145,17 @@ const tests = {
   },
 
   async "a stop that is answered at once is no alarm"() {
-    await withPresses(async ({ presses, clock, answers, seen }) => {
-      const pressed = presses.press("a");
-      answers[0](ACCEPTED);
-      await pressed;
+    await withPresses(async ({ press, clock, seen }) => {
+      await press("a", ACCEPTED);
       clock.pass(5000);
       assert.deepEqual(seen, []);
     });
   },
 
   async "a stop that could not be sent, that was refused or whose connection broke is unconfirmed"() {
-    for (const answer of [undefined, { accepted: false, text: "nobody has heard it" }])
-      await withPresses(async ({ presses, clock, answers, seen }) => {
-        const pressed = presses.press("a");
-        answers[0](answer);
-        await pressed;
+    for (const answer of [undefined, UNHEARD])
+      await withPresses(async ({ presses, press, clock, seen }) => {
+        await press("a", answer);
         assert.deepEqual(seen, [true]);
         clock.pass(60000);
         assert.deepEqual(seen, [true], "it does not become true by itself");
@@ -158,10 +166,8 @@ const tests = {
   },
 
   async "a stop that is not confirmed is sent again when its session is there again, within 10 s of the press"() {
-    await withPresses(async ({ presses, clock, answers, seen }) => {
-      const pressed = presses.press("a");
-      answers[0](undefined);
-      await pressed;
+    await withPresses(async ({ presses, press, clock, answers, seen }) => {
+      await press("a", undefined);
       clock.pass(9999);
       const again = presses.rejoin("a");
       assert.equal(answers.length, 2);
@@ -179,7 +185,7 @@ const tests = {
       const pressed = presses.press("a");
       clock.pass(500);
       const again = presses.rejoin("a");
-      answers[0]({ accepted: false, text: "nobody has heard it" });
+      answers[0](UNHEARD);
       await pressed;
       assert.deepEqual(seen, [true]);
       answers[1](ACCEPTED);
@@ -190,30 +196,24 @@ const tests = {
 
   async "later, and in another session, it is said that the stop did not arrive: it is not sent again"() {
     for (const [passed, session] of [[10000, "a"], [-1, "a"], [100, "b"], [100, ""]])
-      await withPresses(async ({ presses, clock, answers, seen }) => {
-        const pressed = presses.press("a");
-        answers[0](undefined);
-        await pressed;
+      await withPresses(async ({ presses, press, clock, answers, seen }) => {
+        await press("a", undefined);
         clock.pass(passed);
         assert.equal(presses.rejoin(session), undefined);
         assert.equal(answers.length, 1);
         assert.deepEqual(seen, [true, "missed"]);
         // the person presses again
-        const second = presses.press(session);
-        answers[1](ACCEPTED);
-        await second;
+        await press(session, ACCEPTED);
         assert.deepEqual(seen, [true, "missed", false]);
       });
   },
 
   async "a stop of anybody that stands answers for one that is not confirmed"() {
     for (const [standing, expected] of [[true, [true, false]], [false, [true]]])
-      await withPresses(async ({ presses, clock, answers, seen }) => {
+      await withPresses(async ({ presses, press, clock, seen }) => {
         let stands = true; // a raise comes, and its clear after it
         presses.hear(() => stands); // before the press
-        const pressed = presses.press("a");
-        answers[0](undefined);
-        await pressed;
+        await press("a", undefined);
         clock.pass(5000);
         assert.deepEqual(seen, [true], "what was heard before the press is of no account");
         presses.hear(() => stands);
@@ -229,7 +229,7 @@ const tests = {
       const pressed = presses.press("a");
       presses.hear(() => true);
       clock.pass(1000);
-      answers[0]({ accepted: false, text: "nobody has heard it" });
+      answers[0](UNHEARD);
       await pressed;
       clock.pass(1000);
       assert.deepEqual(seen, [true]);
@@ -248,6 +248,74 @@ const tests = {
     });
   },
 
+  async "of a stop that reached the devices alone it is said that they were reached, until it is confirmed"() {
+    await withPresses(async ({ presses, press }) => {
+      await press("a", { accepted: false, text: "1 station has stopped", code: "stop_devices" });
+      assert.deepEqual([presses.isUnconfirmed, presses.reached], [true, "devices"]);
+      await press("a", ACCEPTED);
+      assert.deepEqual([presses.isUnconfirmed, presses.reached], [false, "nobody"]);
+    });
+  },
+
+  "a raise that others have heard is no stopped session: its server says of the run that it is stopped"() {
+    const session = sessionOf();
+    session.receive("RunState", { phase: RUNNING, tick: 1n, reason: "running" }, false);
+    session.receive("EmergencyStop", { client_guid: "a", counter: 1, who: "Ada", reason: "" }, false);
+    assert.deepEqual([session.standing.length, session.isStopped], [1, false]);
+    session.receive("RunState", { phase: RUNNING, tick: 2n, reason: "emergency stop" }, false);
+    assert.equal(session.isStopped, true);
+    session.receive("EmergencyClear", { client_guid: "a", counter: 1, who: "Ada", reason: "" }, false);
+    assert.equal(session.isStopped, false);
+  },
+
+  "what the server refuses in a stop, before the run and of a trainee is forbidden, with its reason, and nothing else"() {
+    const session = (isWaiting, stops) => ({ isWaiting, standing: Array(stops).fill({}) });
+    const [runs, stopped, waits] = [session(false, 0), session(false, 1), session(true, 0)];
+    const every = ["pause", "resume", "freeze", "back", "repeat", "skip", "goto", "give", "swap", "reset", "fulfilled", "signal", "note", "kick", "guide", "record", "release", "collision", "stop", "clear"];
+    const forbidden = (role, state) => every.filter((word) => whyNot(word, role, state) !== undefined).join(" ");
+    assert.equal(forbidden("instructor", runs), "");
+    assert.equal(forbidden("instructor", stopped), "resume back repeat skip goto give swap reset fulfilled signal");
+    assert.equal(forbidden("instructor", waits), "pause resume back repeat skip goto give swap reset fulfilled signal");
+    assert.equal(forbidden("trainee", runs), every.filter((word) => !["fulfilled", "signal", "note"].includes(word)).join(" "));
+    assert.deepEqual(["skip", "signal", "note"].map((word) => whyNot(word, "trainee", stopped)), ["refusal.not_permitted", "refusal.stopped", undefined]);
+    assert.equal(forbidden("", stopped), "", "without a seat the gateway says what is missing");
+    const button = new Element("button");
+    forbid(button, "because");
+    assert.deepEqual([button.title, button.attributes], ["because", { "aria-disabled": "true" }]);
+    forbid(button, "");
+    assert.deepEqual([button.title, button.attributes], ["", {}]);
+  },
+
+  "in a stop only what is in somebody's hands cannot be taken"() {
+    const session = sessionOf({ hands: ["right", "left"] });
+    session.receive("SceneObject", { object_id: 2, name: "peg", title: "Peg", titles: [], kind: "part", color: "#ff8000", size: [0.1, 0.1, 0.1], centre: [0, 0, 0], X_WO: { p: [0, 0, 0], q: [0, 0, 0, 1] } }, false);
+    session.receive("Presence", { client_id: 1, name: "Ada", role: 2, hands: [0], alive: true }, false);
+    session.receive("GrabState", { object_id: 2, hand_id: 0 }, false);
+    const [list] = panels.people(session, { leads: true, hand: "left", whyNoTaking: "a stop stands" });
+    const forbidden = list.all("button").filter(({ attributes }) => attributes["aria-disabled"] === "true");
+    assert.deepEqual(forbidden.map(({ textContent, title }) => [textContent, title]), [["Take over", "a stop stands"]]);
+  },
+
+  // kNone is no refusal
+  "each refusal of the server has a text in each language of the page"() {
+    const names = readFileSync(join(process.argv[2], "../../../../idl/types/names.h"), "utf8");
+    const [, list] = /refusalName[^{]*\{[^{]*\{([^}]*)\}/.exec(names);
+    const refusals = [...list.matchAll(/"(\w*)"/g)].map(([, name]) => name);
+    const idl = readFileSync(join(process.argv[2], "../../../../idl/tenon.idl"), "utf8");
+    assert.equal(refusals.length, [.../enum Refusal \{([^}]*)\}/.exec(idl)[1].matchAll(/REFUSAL_/g)].length, "each has its name");
+    assert.deepEqual([refusals[0], refusals.includes("stopped")], ["", true]);
+    const texts = new Map();
+    for (const language of ["en", "de"]) {
+      setLanguage(language);
+      const said = refusals.slice(1).map((code) => reasonOf({ accepted: false, text: "", code }));
+      for (const [i, text] of said.entries()) assert.notEqual(text, "", `${language}: ${refusals[i + 1]}`);
+      texts.set(language, said);
+    }
+    setLanguage("en");
+    assert.equal(new Set(texts.get("de")).size, refusals.length - 1);
+    for (const [i, text] of texts.get("de").entries()) assert.notEqual(text, texts.get("en")[i], refusals[i + 1]);
+  },
+
   "a session that goes on and of which nothing is heard for 3 s is silent"() {
     const session = { link: { state: "joined", lockstep: false }, isOver: false };
     const standing = { live: { kind: "open" }, session, age: 3.1 };
@@ -264,11 +332,13 @@ const tests = {
     session.receive("RunState", { phase: RUNNING, tick: 1n, reason: "running" }, false);
     assert.equal(panels.phase(session).textContent, "Running");
     session.receive("EmergencyStop", { client_guid: "a", counter: 1, who: "Ada", reason: "" }, false);
+    assert.deepEqual([panels.phase(session).textContent, panels.phase(session).className], ["Stop raised", "badge bad"], "the server has not said that it has heard it");
+    session.receive("RunState", { phase: RUNNING, tick: 2n, reason: "emergency stop" }, false);
     assert.deepEqual([panels.phase(session).textContent, panels.phase(session).className], ["Forces stopped", "badge bad"]);
     session.receive("EmergencyClear", { client_guid: "a", counter: 1, who: "Ada", reason: "" }, false);
     assert.equal(panels.phase(session).textContent, "Running");
     session.receive("EmergencyStop", { client_guid: "a", counter: 2, who: "Ada", reason: "" }, false);
-    session.receive("RunState", { phase: STOPPED, tick: 2n, reason: "stopped" }, false);
+    session.receive("RunState", { phase: STOPPED, tick: 3n, reason: "stopped" }, false);
     assert.equal(panels.phase(session).textContent, "Stopped", "it is over");
   },
 
@@ -338,6 +408,15 @@ const tests = {
       assert.equal(models.size, 0);
       assert.equal(heldBy(scene).length, 0);
     }
+  },
+
+  "where the processor draws, the first picture waits for the models, for 1.5 s, and nowhere is one of nothing"() {
+    const prospect = { objects: 3, showsObjects: false, isSimple: true, isComplete: false, awaited: 0 };
+    const rows = [
+      [{}, true], [{ awaited: 1499 }, true], [{ awaited: 1500 }, false], [{ isComplete: true }, false], [{ isSimple: false }, false],
+      [{ objects: 0 }, true], [{ objects: 0, isSimple: false }, true], [{ objects: 0, showsObjects: true }, false],
+    ];
+    for (const [other, expected] of rows) assert.equal(isTooEarly({ ...prospect, ...other }), expected, JSON.stringify(other));
   },
 
   "markers give back all that they have drawn when another session begins"() {

@@ -1,9 +1,10 @@
 // The instructor's desk: a seat in the session, commands, and what the server answers to each. The emergency stop needs no seat.
-import { h, icon, marked, type Icon } from "./dom";
+import { forbid, h, icon, marked, type Icon } from "./dom";
 import type { DeskAnswer, LiveSource } from "./live";
 import { modelOf } from "./eventtext";
 import { NONE, RunPhase, Status, type SceneObject } from "./messages";
 import { Pairs } from "./pairs";
+import { whyNot } from "./permits";
 import { Presses } from "./presses";
 import type { Session } from "./session";
 import { hasText, language, retold, t, type Key } from "./strings";
@@ -30,6 +31,8 @@ export class Desk {
   private buttons: { button: HTMLButtonElement; key: Key; icon?: Icon; shows?: () => boolean }[] = [];
   private signals = h("span", "signals");
   private note = h("input", "");
+  private why = h("p", "why");
+  private asked?: { word: string; go: HTMLButtonElement; why: HTMLElement }; // by the dialog
   private more = h("details", "more");
   private given = h("select"); // object to be handed over
   private hands = [h("select"), h("select")]; // that gets, that releases
@@ -59,7 +62,7 @@ export class Desk {
       this.show();
     };
     this.alarm.setAttribute("role", "alert");
-    this.pairs = new Pairs(session, (a, b, isOn) => this.command("collision", a, b, isOn ? "on" : "off"));
+    this.pairs = new Pairs(session, (a, b, isOn) => this.command("collision", a, b, isOn ? "on" : "off"), () => this.whyNot("collision"));
     this.more.addEventListener("toggle", () => this.pairs.show());
     // Escape and a click beside it close it
     const { signal } = this.isEnded;
@@ -97,7 +100,8 @@ export class Desk {
       const text = this.note.value;
       void this.command("note", text).then((accepted) => accepted && this.note.value === text && (this.note.value = ""));
     });
-    this.bar.append(this.note, this.more);
+    this.why.setAttribute("role", "status");
+    this.bar.append(this.note, this.more, this.why);
     const rows = h("div", "rows");
     const row = (...nodes: Node[]): HTMLElement => h("div", "row", ...nodes);
     const give = row(this.given, this.hands[0]);
@@ -146,7 +150,8 @@ export class Desk {
 
   /** Empty while nothing is wrong. */
   get alarmText(): string {
-    return !this.presses.isUnconfirmed ? "" : t(this.presses.isMissed ? "stop.missed" : "stop.unconfirmed");
+    const { isUnconfirmed, isMissed, reached } = this.presses;
+    return !isUnconfirmed ? "" : t(isMissed ? "stop.missed" : reached === "devices" ? "stop.devices" : reached === "some sessions" ? "stop.partly" : "stop.unconfirmed");
   }
 
   /** The session is there again, or all of them. */
@@ -156,9 +161,31 @@ export class Desk {
     if (repeated !== undefined) this.tellOfStop(await repeated);
   }
 
-  /** A raise or a clear of the stop has come from the session. */
+  /** A raise or a clear of the stop, or the state of the run, has come from the session. */
   hearStop(): void {
-    this.presses.hear(() => this.source.isOpen && this.session.link?.state === "joined" && this.session.standing.length > 0);
+    this.presses.hear(() => this.source.isOpen && this.session.link?.state === "joined" && this.session.isStopped);
+  }
+
+  /** Why the server would refuse a command now, by its first word. */
+  whyNot(word: string): Key | undefined {
+    return whyNot(word, this.role, this.session);
+  }
+
+  /** What does nothing now says why. */
+  private showPermitted(): void {
+    const reasons = new Set<string>();
+    for (const button of this.bar.querySelectorAll<HTMLElement>("button[data-command]")) {
+      const why = this.whyNot(button.dataset["command"]?.split(" ")[0] ?? "");
+      forbid(button, why === undefined ? "" : t(why));
+      if (why !== undefined && !button.hidden) reasons.add(t(why));
+    }
+    const text = [...reasons].join(" · ");
+    if (this.why.dataset["text"] !== text) this.why.replaceChildren(...(text === "" ? [] : [icon("warn"), h("span", "", text)]));
+    this.why.dataset["text"] = text;
+    if (this.asked === undefined) return;
+    const why = this.whyNot(this.asked.word);
+    forbid(this.asked.go, why === undefined ? "" : t(why));
+    this.asked.why.textContent = why === undefined ? "" : t(why);
   }
 
   /** Called when the session has changed. */
@@ -180,6 +207,7 @@ export class Desk {
     for (const { button, shows } of this.buttons) button.hidden = shows !== undefined && !shows();
     if (this.more.open) this.pairs.show();
     this.list();
+    this.showPermitted();
   }
 
   /** Signals that the step waits for, objects and hands, by the names that people read. */
@@ -194,6 +222,7 @@ export class Desk {
         const name = text.replace(/^signal /, "");
         const isSignal = text.startsWith("signal ");
         const button = h("button", "", icon("bell"), isSignal ? name.replace(/_/g, " ") : t("desk.fulfilled"));
+        button.dataset["command"] = isSignal ? `signal ${name}` : "fulfilled";
         button.addEventListener("click", () => void (isSignal ? this.command("signal", name) : this.command("fulfilled")));
         return button;
       }),
@@ -266,7 +295,8 @@ export class Desk {
   }
 
   private confirm(key: Key, words: string[], text = t("desk.sure")): void {
-    this.openDialog(t(key), [h("p", "muted", text)], t(key), () => this.command(...words));
+    if (this.whyNot(words[0]) !== undefined) return void this.command(...words);
+    this.openDialog(t(key), [h("p", "muted", text)], t(key), () => this.command(...words), words[0]);
   }
 
   /** Removes a person from the session, by the number of the client. */
@@ -279,13 +309,18 @@ export class Desk {
     this.confirm("desk.goto", ["goto", step], t("desk.goto.more", { step: title }));
   }
 
-  private openDialog(title: string, nodes: Node[], action: string, done: () => Promise<boolean>): void {
+  /** `word`: of the command that is asked about. */
+  private openDialog(title: string, nodes: Node[], action: string, done: () => Promise<boolean>, word?: string): void {
     const cancel = Object.assign(h("button", "", t("desk.cancel")), { type: "button" });
     const go = h("button", "primary", action);
     // the one beside the dialog cannot be pressed while it is open
     const stop = Object.assign(h("button", "stop", icon("stop"), t("stop.press")), { type: "button" });
     stop.addEventListener("click", () => void this.raise());
-    const form = h("form", "", h("h2", "", title), ...nodes, h("div", "row end", stop, cancel, go));
+    const why = h("p", "warn");
+    why.setAttribute("role", "status");
+    const form = h("form", "", h("h2", "", title), ...nodes, why, h("div", "row end", stop, cancel, go));
+    this.asked = word === undefined ? undefined : { word, go, why };
+    this.showPermitted();
     cancel.addEventListener("click", () => this.dialog.close());
     form.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -310,6 +345,11 @@ export class Desk {
 
   async command(...words: string[]): Promise<boolean> {
     const label = this.buttons.find(({ button }) => [words[0], words.join(" ")].includes(button.dataset["command"] ?? ""))?.key ?? OTHER_LABELS[words[0]] ?? "desk.command";
+    const why = this.whyNot(words[0]);
+    if (why !== undefined) {
+      this.notify(false, `${t(label)}: ${t(why)}`);
+      return false;
+    }
     const answer = await this.source.ask("deskCommand", { words });
     if (words[0] === "record" && answer?.accepted === true) this.isRecording = words[1] === "start";
     this.tell(t(label), answer);
@@ -369,6 +409,7 @@ export function reasonOfLoss(text: string): string {
 export function reasonOf(answer: DeskAnswer): string {
   const key = `refusal.${answer.code}` as Key;
   if (answer.accepted || answer.code === undefined || !hasText(key)) return answer.text;
+  if (answer.code === "other" && language !== "en") return `${t(key)}: ${answer.text}`;
   return language === "en" && answer.text !== "" ? answer.text : t(key);
 }
 

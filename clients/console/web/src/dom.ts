@@ -6,6 +6,14 @@ export function h<K extends keyof HTMLElementTagNameMap>(tag: K, className = "",
   return element;
 }
 
+/** Says of a button why it does nothing now; an empty text: it acts. It can still be reached, so that its reason is read. */
+export function forbid(button: HTMLElement, why: string): void {
+  if (button.title === why) return;
+  button.title = why;
+  if (why === "") button.removeAttribute("aria-disabled");
+  else button.setAttribute("aria-disabled", "true");
+}
+
 /** Pixels of the page in one of an element, which may be zoomed. */
 export function zoomOf(element: HTMLElement): number {
   return element.getBoundingClientRect().width / Math.max(1, element.offsetWidth) || 1;

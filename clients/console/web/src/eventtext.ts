@@ -119,7 +119,7 @@ function value(session: Session, name: string, text: string): string {
     case "role": return ROLES.includes(text) ? t(`role.${ROLES.indexOf(text)}` as Key) : text;
     case "word": return command(text);
     case "who": case "by": return retold(text, "desk.somebody");
-    case "reason": return retold(text, "stop.reason");
+    case "reason": return retold(text, "stop.reason", "refusal.stopped", "refusal.too_many");
     case "rule": return SAFETY.includes(text) ? t(`safety.${SAFETY.indexOf(text)}` as Key) : text;
     default: return text;
   }

@@ -20,11 +20,13 @@ export class Lobby {
   private list = h("div", "cards");
   private head = h("h1", "");
   private none = h("div", "none");
+  private more = h("p", "muted");
   private shown = 0;
   private isBlind = false; // without WebGL
 
   constructor() {
-    this.element.append(this.head, this.list, this.none);
+    this.more.hidden = true;
+    this.element.append(this.head, this.list, this.none, this.more);
   }
 
   receive(state: LobbyState): void {
@@ -42,6 +44,7 @@ export class Lobby {
       const follow = (topic: string, message: unknown, isGone: boolean): void => card.session.receive(topic, message, isGone);
       card.source = new LiveSource(addressOf(`/live/${encodeURIComponent(info.session)}`), TOPICS, follow, () => undefined);
     }
+    this.more.hidden = state.more !== true;
     this.shown = 0;
   }
 
@@ -87,6 +90,7 @@ export class Lobby {
   setWords(): void {
     this.head.textContent = t("lobby");
     this.none.replaceChildren(icon("wait"), h("h2", "", t("lobby.none")), h("p", "muted", t("cover.searching.more")), h("code", "", "./tenon demo"));
+    this.more.textContent = t("lobby.more");
     for (const card of this.cards.values()) card.shown = "";
     this.shown = 0;
   }
@@ -111,10 +115,9 @@ export class Lobby {
     const done = steps.filter((step) => step.ended !== undefined).length;
     const bar = h("i", "good");
     bar.style.width = `${steps.length === 0 ? 0 : Math.round((100 * done) / steps.length)}%`;
-    const isRaised = session.standing.length > 0;
     if (!info.served) return [h("div", "card-head", h("span", "part", info.session)), h("h2", "", info.title), h("p", "muted", t("lobby.unserved"))];
     return [
-      h("div", "card-head", h("span", "part", info.session), isRaised ? h("span", "badge bad", icon("stop"), t("lobby.stopped")) : (panels.phase(session) ?? "")),
+      h("div", "card-head", h("span", "part", info.session), panels.phase(session) ?? ""),
       h("h2", "", info.title),
       h("p", "", session.isWaiting ? t("run.waiting.more") : session.step === undefined || session.isOver ? panels.reasonOfEnd(session) : panels.titleOfStep(session.step)),
       h("div", "bar", bar),

@@ -26,6 +26,8 @@ const isPicture = wanted.has("picture");
 const SETTLED = 1000; // [ms] without a change
 const ADDRESS = "file"; // of a recording, in the page's own address
 
+// asked for before all that takes its time
+const described = fetch("/gateway.json").then((answer) => (answer.ok ? (answer.json() as Promise<Gateway>) : undefined)).catch(() => undefined);
 const session = new Session();
 let live: LiveState = { kind: "connecting" };
 // one of them shows where the session comes from
@@ -235,10 +237,12 @@ function showPanels(sinceLast: number): void {
   show(stripText, lobby !== undefined || session.objects.size === 0 ? [] : silent && !isRaised ? [icon("warn"), document.createTextNode(t("stop.unknown"))] : [icon(isRaised ? "stop" : "done"), document.createTextNode(text)]);
   desk?.show();
   part?.show();
-  app.classList.toggle("leads", player !== undefined || (desk?.role === "instructor" && !session.isOver));
+  const whyNoSteps = desk?.whyNot("goto");
+  const whyNoTaking = desk?.whyNot("give");
+  app.classList.toggle("leads", player !== undefined || (desk?.role === "instructor" && !session.isOver && whyNoSteps === undefined));
   show(card, panels.instruction(session));
   show(sections.steps.body, panels.steps(session));
-  show(sections.people.body, panels.people(session, { leads: desk?.role === "instructor" && !session.isOver, hand: part?.handName }));
+  show(sections.people.body, panels.people(session, { leads: desk?.role === "instructor" && !session.isOver, hand: part?.handName, whyNoTaking: whyNoTaking && t(whyNoTaking) }));
   show(sections.events.body, panels.events(session));
   show(status, panels.status(session, age));
   const over = coverOf(standing());
@@ -309,7 +313,7 @@ function follow(room: string, { role, recordings, local }: Gateway): void {
       void desk?.takeSeatAgain();
     }
     joined = isJoined;
-    if (topic === "EmergencyStop" || topic === "EmergencyClear") desk?.hearStop();
+    if (topic === "EmergencyStop" || topic === "EmergencyClear" || topic === "RunState") desk?.hearStop();
   }, (state) => {
     live = state;
     if (state.kind !== "reconnecting") return;
@@ -390,8 +394,7 @@ async function play(file: Played): Promise<void> {
 }
 
 async function begin(): Promise<void> {
-  const answer = await fetch("/gateway.json").catch(() => undefined);
-  const gateway: Gateway = answer?.ok ? ((await answer.json()) as Gateway) : { session: "", recording: "", role: "", protocol: PROTOCOL };
+  const gateway = (await described) ?? { session: "", recording: "", role: "", protocol: PROTOCOL };
   const chosen = wanted.get("session");
   ownFile = gateway.recording;
   app.classList.toggle("framed", wanted.has(FRAME));
@@ -417,4 +420,4 @@ showPanels(0);
 // for tests, and for whoever wants to look
 Object.assign(window, { tenon: { session, view, player } });
 void begin();
-requestAnimationFrame(frame);
+void described.then(() => requestAnimationFrame(frame)); // the session is asked for before anything is drawn

@@ -63,6 +63,6 @@ export interface ConsoleState {
 export interface ModelLevel { model: string; triangles: number; error: number }
 export interface SceneModels { version: number; objects: ModelLevel[][] }
 /** Of the channel /lobby: the sessions of the bus. */
-export interface LobbyState { sessions: { session: string; title: string; host: string; served: boolean; lockstep: boolean; protocol: number }[] }
+export interface LobbyState { sessions: { session: string; title: string; host: string; served: boolean; lockstep: boolean; protocol: number }[]; more?: boolean }
 /** What this gateway shows: a session, a recording, or, with neither, all sessions. */
 export interface Gateway { session: string; recording: string; role: string; protocol: number; recordings?: boolean; local?: boolean }

@@ -10,14 +10,34 @@ const FAST = 20; // [ms] that leave room for a better one
 const IN_A_ROW = 4; // slow pictures until they become simpler
 const WHILE = 120; // fast ones until they become better
 
-/** Whether pictures are computed by the processor. */
-export function isSoftware(): boolean {
-  const gl = document.createElement("canvas").getContext("webgl2");
-  if (gl === null) throw new Error("no WebGL 2");
-  const info = gl.getExtension("WEBGL_debug_renderer_info");
-  const name = String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
-  gl.getExtension("WEBGL_lose_context")?.loseContext();
-  return /swiftshader|llvmpipe|software/i.test(name);
+const LONGEST_AWAITED = 1500; // [ms] for models, until boxes are drawn in their place
+
+/** Of a picture that could be drawn now; `showsObjects`: the last one, `awaited` [ms]: since when there are objects. */
+export interface Prospect { objects: number; showsObjects: boolean; isSimple: boolean; isComplete: boolean; awaited: number }
+
+/**
+ * A picture of nothing is what is behind the canvas, where the last one was not of something. Where the processor draws, each picture delays the models that are
+ * being read: for a while they come first.
+ */
+export function isTooEarly({ objects, showsObjects, isSimple, isComplete, awaited }: Prospect): boolean {
+  return objects === 0 ? !showsObjects : isSimple && !isComplete && awaited < LONGEST_AWAITED;
+}
+
+export interface Drawing { isSoftware: boolean; context?: WebGL2RenderingContext }
+
+/**
+ * Finds out whether pictures are computed by the processor. What is drawn without smooth edges is drawn in the context that found it out: another one would take a
+ * part of the time until the first picture. `isSimple`: likewise whatever draws.
+ */
+export function openDrawing(drawing: string | null): Drawing {
+  const context = document.createElement("canvas").getContext("webgl2", { antialias: false, powerPreference: "high-performance" });
+  if (context === null) throw new Error("no WebGL 2");
+  const info = context.getExtension("WEBGL_debug_renderer_info");
+  const name = String(context.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : context.RENDERER));
+  const isSoftware = /swiftshader|llvmpipe|software/i.test(name);
+  if (drawing === "simple" || (drawing !== "full" && isSoftware)) return { isSoftware, context };
+  context.getExtension("WEBGL_lose_context")?.loseContext();
+  return { isSoftware };
 }
 
 /** Begins a picture when the one before is done and as much time as that took has passed; chooses the quality by the times. */
@@ -28,6 +48,7 @@ export class Pace {
   private step = 0;
   private fence: WebGLSync | null = null;
   private begun = -Infinity;
+  private isFirst = true; // of its time most goes into what is made once
   private next = 0; // [ms] of the page's clock
   private slow = 0;
   private fast = 0;
@@ -47,11 +68,17 @@ export class Pace {
       if (this.gl.getSyncParameter(this.fence, this.gl.SYNC_STATUS) !== this.gl.SIGNALED && !this.gl.isContextLost()) return false;
       this.gl.deleteSync(this.fence);
       this.fence = null;
-      this.judge(now - this.begun);
+      if (!this.isFirst) this.judge(now - this.begun);
       // hardware draws beside the page, the processor instead of it
-      this.next = this.isSimple ? Math.max(this.begun + SIMPLE_PERIOD, now + this.cost) : now;
+      this.next = this.isSimple && !this.isFirst ? Math.max(this.begun + SIMPLE_PERIOD, now + this.cost) : now;
+      this.isFirst = false;
     }
     return now >= this.next;
+  }
+
+  /** Nothing is being drawn. */
+  get isDone(): boolean {
+    return this.fence === null;
   }
 
   /** A picture was just handed over to be drawn, which began at `now`. */

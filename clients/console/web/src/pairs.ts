@@ -1,7 +1,7 @@
 // Pairs of objects that may collide: how each stands, and a switch for its collisions.
-import { h, icon } from "./dom";
+import { forbid, h, icon } from "./dom";
 import type { Session } from "./session";
-import { t } from "./strings";
+import { t, type Key } from "./strings";
 
 const PERIOD = 300; // [ms] between looks
 type State = "off" | "touching" | "near" | "apart";
@@ -16,8 +16,8 @@ export class Pairs {
   private rows = new Map<string, { row: HTMLElement; state: HTMLElement; button: HTMLButtonElement; shown: string }>();
   private shown = 0;
 
-  /** `set` switches the collisions of two objects, by their names. */
-  constructor(private session: Session, private set: (a: string, b: string, isOn: boolean) => Promise<boolean>) {
+  /** `set` switches the collisions of two objects, by their names; `whyNot`: why it cannot be done now. */
+  constructor(private session: Session, private set: (a: string, b: string, isOn: boolean) => Promise<boolean>, private whyNot: () => Key | undefined) {
     this.filter.type = "search";
     this.filter.addEventListener("input", () => this.order());
     this.element.append(h("div", "row", this.head, this.filter), this.list);
@@ -43,6 +43,7 @@ export class Pairs {
     const now = performance.now();
     if (now - this.shown < PERIOD) return;
     this.shown = now;
+    const why = this.whyNot();
     for (const [key, pair] of this.session.pairs) {
       const [a, b] = [this.session.objects.get(pair.a), this.session.objects.get(pair.b)];
       if (a === undefined || b === undefined) continue;
@@ -58,6 +59,7 @@ export class Pairs {
         known.row.append(known.state, button);
         this.rows.set(key, known);
       }
+      forbid(known.button, why === undefined ? "" : t(why));
       if (known.shown === state) continue;
       known.shown = state;
       known.row.dataset["state"] = state;

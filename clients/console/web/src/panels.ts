@@ -2,7 +2,7 @@
 import { Vector3 } from "three";
 
 import { devicesOf } from "./desk";
-import { h, icon, type Icon } from "./dom";
+import { forbid, h, icon, type Icon } from "./dom";
 import { conditionOf, interventions, kindOf, textOf } from "./eventtext";
 import type { Label } from "./labels";
 import { NONE, RunPhase, StepPhase, type EventLog } from "./messages";
@@ -43,8 +43,8 @@ export function titleOfStep(step: { name: string; title: StepEntry["title"] }): 
   return localized(step.title) || step.name.replace(/_/g, " ");
 }
 
-export function phase({ run, isOver, isWaiting, standing }: Session): HTMLElement | undefined {
-  if (standing.length > 0 && !isOver) return badge(["run.emergency", "stop", "bad"]);
+export function phase({ run, isOver, isWaiting, isStopped, standing }: Session): HTMLElement | undefined {
+  if (standing.length > 0 && !isOver) return badge([isStopped || isWaiting ? "run.emergency" : "run.raised", "stop", "bad"]);
   if (isWaiting) return badge(RUN[RunPhase.Waiting]);
   if (run?.forces_frozen === true && run.phase === RunPhase.Running && !isOver) return badge(["run.frozen", "frozen", "warn"]);
   return run === undefined ? undefined : badge(RUN[run.phase]);
@@ -151,11 +151,11 @@ export function holders(session: Session): Label[] {
   });
 }
 
-/** What the person at this page may do with people: remove them, and take what they hold into the hand of this name. */
-export interface Lead { leads: boolean; hand?: string }
+/** What the person at this page may do with people: remove them, and take what they hold into the hand of this name, or why not now. */
+export interface Lead { leads: boolean; hand?: string; whyNoTaking?: string }
 const OBSERVER = 3; // of the roles of messages: the console's gateway is one
 
-export function people(session: Session, { leads, hand }: Lead): Node[] {
+export function people(session: Session, { leads, hand, whyNoTaking }: Lead): Node[] {
   const here = [...session.people.values()].filter((person) => person.alive).sort((a, b) => a.client_id - b.client_id);
   if (here.length === 0) return [h("p", "muted", t("people.none"))];
   const rows = here.map((person) => {
@@ -166,15 +166,16 @@ export function people(session: Session, { leads, hand }: Lead): Node[] {
     const head = h("div", "", h("span", "name", retold(person.name, "desk.somebody")), h("span", "muted", t(`role.${person.role}` as Key)), h("span", "holds", what === "" ? "" : t("holds", { what })));
     const link = linkOf(session, person.client_id);
     const actions: HTMLElement[] = [];
-    const act = (name: string, value: string, label: string, more: string, text = label): void => {
+    const act = (name: string, value: string, label: string, more: string, text = label, why = ""): void => {
       const button = h("button", "", text);
+      if (why !== "") forbid(button, why);
       button.dataset[name] = value;
       button.setAttribute("aria-label", `${label}: ${more}`);
       actions.push(button);
     };
     const isOwn = hand !== undefined && hands.some((id) => session.sceneHands.get(id)?.name === hand);
     if (leads && hand !== undefined && !isOwn)
-      for (const { object_id } of held) act("takeOver", session.objects.get(object_id)?.name ?? "", t("desk.takeover"), t("desk.takeover.more", { what: session.titleOf(object_id) }));
+      for (const { object_id } of held) act("takeOver", session.objects.get(object_id)?.name ?? "", t("desk.takeover"), t("desk.takeover.more", { what: session.titleOf(object_id) }), undefined, whyNoTaking);
     const guided = hands.filter((id) => session.isGuided(id));
     if (leads && person.role === TRAINEE) {
       const own = hands.filter((one) => session.sceneHands.has(one) && !session.isTracked(one));

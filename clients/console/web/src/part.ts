@@ -315,7 +315,9 @@ export class Part {
   /** True when it was one of the hand's keys. */
   onKeyDown(event: KeyboardEvent): boolean {
     if (this.hand === undefined) return false;
-    if (event.key === "Enter" && !this.hand.isOn && !(event.target instanceof HTMLButtonElement)) this.hand.press();
+    if (event.key === "Enter" && !this.hand.isOn && !(event.target instanceof HTMLButtonElement)) {
+      if (this.session.standing.length === 0) this.hand.press(); // after a stop was cleared it is for the person to switch it on
+    }
     else if (event.key === "m") this.toggleSound();
     else if (event.key === "c") this.look();
     else if (event.key === "h") this.teach(this.lesson.hidden);

@@ -10,7 +10,7 @@ import { Status, type SceneModels, type SceneObject } from "./messages";
 import { release } from "./release";
 import type { Session } from "./session";
 
-const MOST_POINTS = 20000; // of a mesh, to see where it is
+const MOST_POINTS = 5000; // of a mesh, to see where it is
 const ON_PLANE = 1e-6; // [m] a face that lies in the section's plane is cut away
 const PICKED = 0x14507a; // emitted by what is picked
 const EDGE = { transparent: true, opacity: 0.5 } as const;
@@ -194,15 +194,16 @@ export class Parts {
     return box;
   }
 
-  /** Of what box() is about: points of its surfaces, in the world. */
+  /** Of what box() is about: points of its surfaces, in the world; each is valid until the next one. */
   *points(): Generator<THREE.Vector3> {
+    const point = new THREE.Vector3();
     for (const { group, object } of this.all.values()) {
       if (!group.visible || object.kind === "head" || object.kind === "forearm") continue;
       group.updateWorldMatrix(true, true);
       for (const child of leavesOf(group)) {
         const places = (child as THREE.Mesh).geometry.getAttribute("position");
         const every = Math.max(1, Math.floor(places.count / MOST_POINTS));
-        for (let i = 0; i < places.count; i += every) yield new THREE.Vector3().fromBufferAttribute(places, i).applyMatrix4(child.matrixWorld);
+        for (let i = 0; i < places.count; i += every) yield point.fromBufferAttribute(places, i).applyMatrix4(child.matrixWorld);
       }
     }
   }

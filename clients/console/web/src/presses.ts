@@ -8,11 +8,17 @@ const PATIENCE = 1000; // [ms] for an answer, and for the clear that may follow 
  */
 const REPEATED = 10000;
 
+type Reached = "nobody" | "devices" | "some sessions";
+/** By the code of the gateway's answer. */
+const REACHED: Record<string, Reached> = { stop_devices: "devices", stop_partly: "some sessions" };
+
 export class Presses {
   /** The stop was pressed, and whether it has taken effect is not known. */
   isUnconfirmed = false;
   /** Moreover the session is there again, and the stop is not sent again. */
   isMissed = false;
+  /** Who obeys it nevertheless. */
+  reached: Reached = "nobody";
   private sent = 0;
   private confirmed = 0; // the newest that was
   private unanswered = 0;
@@ -61,21 +67,22 @@ export class Presses {
     const answer = await this.send();
     clearTimeout(timer);
     --this.unanswered;
-    this.judge(mine, answer?.accepted === true);
+    this.judge(mine, answer?.accepted === true, answer?.code);
     return answer;
   }
 
   /** A raise is for all: a later one that is confirmed answers for those before it. */
-  private judge(mine: number, isConfirmed: boolean): void {
+  private judge(mine: number, isConfirmed: boolean, code = ""): void {
     if (mine <= this.confirmed) return;
     if (isConfirmed) this.confirmed = mine;
-    this.show(!isConfirmed);
+    this.show(!isConfirmed, false, REACHED[code]);
   }
 
-  private show(isUnconfirmed: boolean, isMissed = false): void {
-    if (isUnconfirmed === this.isUnconfirmed && isMissed === this.isMissed) return;
+  private show(isUnconfirmed: boolean, isMissed = false, reached: Reached = "nobody"): void {
+    if (isUnconfirmed === this.isUnconfirmed && isMissed === this.isMissed && reached === this.reached) return;
     this.isUnconfirmed = isUnconfirmed;
     this.isMissed = isMissed;
+    this.reached = reached;
     this.onChange();
   }
 }

@@ -6,7 +6,7 @@ import { cornersOf, framing } from "./framing";
 import { Ground } from "./ground";
 import { COLORS, Markers, place } from "./markers";
 import { NONE, StepPhase } from "./messages";
-import { isSoftware, Pace, type Quality } from "./pace";
+import { isTooEarly, openDrawing, Pace, type Quality } from "./pace";
 import { Parts, type Pick } from "./parts";
 import type { Session } from "./session";
 
@@ -18,8 +18,9 @@ const LOOK = 0.1; // [m] shown around what is looked at
 export class SceneView {
   readonly simple: boolean;
   readonly canvas: HTMLCanvasElement;
-  /** Pictures drawn: for tests and the curious. */
+  /** Pictures drawn, and when the first one of all that there is was done [ms of the page's clock]: for tests and the curious. */
   pictures = 0;
+  wholeAt?: number;
   readonly parts: Parts;
   /** Called after each picture. */
   onPicture?: () => void;
@@ -43,14 +44,17 @@ export class SceneView {
   private hasBegun = false; // and everything is where the session has it
   private isFramedWaiting = false;
   private isFramedWhole = false; // with all models
+  private isWhole = false; // the last picture
+  private hasObjects = false; // likewise
+  private awaited?: number; // [ms] of the page's clock: since when models are
   private isTurned = false; // by the viewer, or to the work: not to be framed anew by itself
   isHandMode = false;
   private covered = { left: 0, top: 0 }; // of the picture [pixels]
 
   constructor(private host: HTMLElement, label: string, drawing: string | null) {
-    const isSlow = isSoftware();
-    this.simple = drawing === "simple" || (drawing !== "full" && isSlow);
-    this.renderer = new THREE.WebGLRenderer({ antialias: !this.simple, powerPreference: "high-performance" });
+    const { context } = openDrawing(drawing);
+    this.simple = context !== undefined;
+    this.renderer = new THREE.WebGLRenderer(context === undefined ? { antialias: true, powerPreference: "high-performance" } : { canvas: context.canvas, context });
     this.pace = new Pace(this.renderer.getContext() as WebGL2RenderingContext, this.simple, drawing === "full", (quality) => this.setQuality(quality));
     this.canvas = this.renderer.domElement;
     this.canvas.tabIndex = 0;
@@ -214,6 +218,7 @@ export class SceneView {
   /** Takes over what the session says; draws when that, or the view, has changed. Called for each frame of the display. */
   update(session: Session, now: number): void {
     if (session.link !== undefined && session.link.life !== this.life) this.clear(session.link.life);
+    if (this.isWhole && this.wholeAt === undefined && this.pace.isReady(now) && this.pace.isDone) this.wholeAt = performance.now();
     if (session.changed !== this.changed) {
       this.changed = session.changed;
       this.parts.takeObjects(session);
@@ -235,12 +240,20 @@ export class SceneView {
     }
     if (this.before !== undefined) return; // the headset asks for its pictures
     this.controls.update();
-    if (!this.pace.isReady(now) || !this.dirty) return;
+    if (!this.pace.isReady(now) || !this.dirty || this.isTooEarly(now)) return;
     this.dirty = false;
+    this.hasObjects = this.parts.all.size > 0;
+    this.isWhole = this.parts.isComplete && this.isFramed;
     this.renderer.render(this.scene, this.camera);
     this.pace.hasDrawn(now);
     ++this.pictures;
     this.onPicture?.();
+  }
+
+  private isTooEarly(now: number): boolean {
+    const { parts, simple, hasObjects } = this;
+    if (parts.all.size > 0) this.awaited ??= now;
+    return isTooEarly({ objects: parts.all.size, showsObjects: hasObjects, isSimple: simple, isComplete: parts.isComplete, awaited: now - (this.awaited ?? now) });
   }
 
   /** It is not looked at any more. */
@@ -373,6 +386,7 @@ export class SceneView {
     this.markers.clear();
     this.removeGhost();
     this.isFramed = this.hasBegun = this.isFramedWaiting = this.isTurned = false;
+    this.awaited = undefined;
     this.dirty = true;
   }
 

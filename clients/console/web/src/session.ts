@@ -14,6 +14,7 @@ export const TOPICS = [
 ] as const;
 
 const EVENTS = 200;
+const STOPPED = "emergency stop"; // RunState::reason, as event_generator.cpp of the server has it
 
 /** Times in s of the session. */
 interface Visit { started: number; ended?: number; phase?: StepPhase }
@@ -227,6 +228,11 @@ export class Session {
   /** Raises of the emergency stop that no clear has named. */
   get standing(): EmergencyStop[] {
     return [...this.raises].filter(([key]) => !this.clears.has(key)).map(([, raise]) => raise);
+  }
+
+  /** A raise stands, and the server has said of the run that it is stopped: others may have heard of a raise, and it not. */
+  get isStopped(): boolean {
+    return this.standing.length > 0 && this.run?.reason === STOPPED;
   }
 
   /** It is open, and has not begun: the server says of no object where it is, only where it is to begin. */
