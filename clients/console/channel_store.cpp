@@ -1,6 +1,7 @@
 #include "clients/console/channel_store.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace tenon::console {
 
@@ -29,6 +30,7 @@ void ChannelStore::keepNewest(Kept& kept, const Publication& publication) {
   const auto most = std::max_element(kept.instances.begin(), kept.instances.end(),
                                      [](auto& a, auto& b) { return a.second.size() < b.second.size(); });
   dropInstance(kept, most->second.begin()->second);
+  countForgotten(kept);
 }
 
 void ChannelStore::dropInstance(Kept& kept, std::uint64_t instance) {
@@ -45,7 +47,30 @@ void ChannelStore::keepEvent(Kept& kept, const Publication& publication) {
   Kept::Counts& counts = kept.counts[publication.writer];
   ++counts.all;
   ++counts.by_kind[publication.instance];
-  if (kept.events.size() > kMaxEvents) dropEvent(kept);
+  if (kept.events.size() <= kMaxEvents) return;
+  dropEvent(kept);
+  countForgotten(kept);
+}
+
+void ChannelStore::countForgotten(Kept& kept) {
+  ++kept.forgotten;
+  has_forgotten_ = true;
+}
+
+std::vector<std::string> ChannelStore::toTell() {
+  std::vector<std::string> sentences;
+  if (!std::exchange(has_forgotten_, false)) return sentences;
+  for (const Channel& channel : channels_) {
+    Kept& kept = kept_[channel.id - 1];
+    if (kept.forgotten == 0 || kept.forgotten < 2 * kept.told) continue;
+    kept.told = kept.forgotten;
+    const bool is_of_events = channel.delivery == Delivery::kEach;
+    sentences.push_back(
+        "of " + channel.topic + " " + std::to_string(is_of_events ? kMaxEvents : kMaxInstances) +
+        (is_of_events ? " events" : " instances") +
+        " are kept for pages that are opened later; forgotten so far: " + std::to_string(kept.forgotten));
+  }
+  return sentences;
 }
 
 /// Of the writer that has most, the oldest of those that come most often.

@@ -5,6 +5,7 @@
 #include <deque>
 #include <functional>
 #include <map>
+#include <string>
 #include <vector>
 
 #include "clients/console/channel.h"
@@ -15,7 +16,7 @@ namespace tenon::console {
 /// Delivery::kEach channel. Of more events those that their writer tells most often make room, the oldest
 /// first: a warning that repeats forgets no event that was told once. Of more than kMaxInstances of a channel
 /// the oldest make room. The writer that has most of a channel does so first: whoever floods the bus with
-/// names or events forgets its own.
+/// names or events forgets its own. What is forgotten is counted.
 ///
 /// Threads: one. Real-time: no.
 class ChannelStore {
@@ -32,6 +33,8 @@ class ChannelStore {
   void keep(const Publication& publication);
   /// Forgets all messages: another session begins.
   void clear() { kept_.assign(channels_.size(), {}); }
+  /// Sentences about what was forgotten: of each channel at first, and whenever it is twice as much.
+  [[nodiscard]] std::vector<std::string> toTell();
   void forEachKept(ChannelId id, const std::function<void(const Publication&)>& handler) const;
 
  private:
@@ -50,13 +53,17 @@ class ChannelStore {
     std::uint64_t next_order = 0;
     std::deque<Publication> events;
     std::map<std::uint64_t, Counts> counts;  ///< of events, by writer
+    std::uint64_t forgotten = 0;             ///< instances or events
+    std::uint64_t told = 0;                  ///< of those
   };
-  static void keepEvent(Kept& kept, const Publication& publication);
+  void keepEvent(Kept& kept, const Publication& publication);
   static void dropEvent(Kept& kept);
-  static void keepNewest(Kept& kept, const Publication& publication);
+  void keepNewest(Kept& kept, const Publication& publication);
+  void countForgotten(Kept& kept);
   static void dropInstance(Kept& kept, std::uint64_t instance);
   std::vector<Channel> channels_;  ///< channel `id` at id - 1
   std::vector<Kept> kept_;
+  bool has_forgotten_ = false;  ///< since toTell()
 };
 
 }  // namespace tenon::console

@@ -126,6 +126,9 @@ Result<void> Gateway::openServer() {
                                  handle,
                                  [this](ViewerId viewer, std::span<const std::uint8_t> targets) {
                                    return hands_.move(viewer, targets);
+                                 },
+                                 [this](const std::string& room, const std::string& text) {
+                                   options_.print(printable(room) + ": " + text);
                                  }});
   if (!opened) return fail(opened.error().what);
   server_ = std::move(*opened);

@@ -13,8 +13,13 @@ std::vector<Channel> Lobby::channels() {
 }
 
 void Lobby::add(const SessionAnnounce& announce) {
+  const std::pair key{announce.session, announce.server_epoch};
   has_changed_ = true;
-  sessions_.insert_or_assign({announce.session, announce.server_epoch}, announce);
+  if (sessions_.size() >= kMaxSessions && !sessions_.contains(key)) {
+    has_more_ = true;
+    return;
+  }
+  sessions_.insert_or_assign(key, announce);
 }
 
 void Lobby::remove(const SessionAnnounce& gone) {
@@ -47,7 +52,7 @@ std::vector<Publication> Lobby::take(std::int64_t now_ns) {
                     {"served", !unserved_.contains(session.session)},
                     {"lockstep", session.lockstep},
                     {"protocol", session.protocol_version}});
-  const nlohmann::json json{{"sessions", list}};
+  const nlohmann::json json{{"sessions", list}, {"more", has_more_}};
   const std::string text = json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   return {{1, 0, now_ns, std::make_shared<const std::vector<std::uint8_t>>(text.begin(), text.end())}};
 }

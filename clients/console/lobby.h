@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <set>
@@ -12,11 +13,14 @@
 
 namespace tenon::console {
 
-/// The sessions of the bus, as the channel /lobby of a room of its own: JSON, newest wins.
+/// The sessions of the bus, as the channel /lobby of a room of its own: JSON, newest wins. Of more than
+/// kMaxSessions those that came last are not listed, which is said.
 ///
 /// Threads: one. Real-time: no.
 class Lobby {
  public:
+  static constexpr std::size_t kMaxSessions = 1'000;
+
   [[nodiscard]] static std::vector<Channel> channels();
 
   void add(const SessionAnnounce& announce);
@@ -31,6 +35,7 @@ class Lobby {
  private:
   std::map<std::pair<std::string, std::uint32_t>, SessionAnnounce> sessions_;  ///< by name and epoch
   std::set<std::string> unserved_;                                             ///< names
+  bool has_more_ = false;                                                      ///< than are listed
   bool has_changed_ = true;
 };
 

@@ -35,6 +35,8 @@ struct WebHandlers {
   std::function<void(ViewerId, const std::string& path, const DeskRequest&)> desk;
   /// Targets of the viewer's hands, likewise; false when they are none.
   std::function<bool(ViewerId, std::span<const std::uint8_t>)> hands;
+  /// A sentence about what is kept of this room; may be empty.
+  std::function<void(const std::string& path, const std::string& text)> told = nullptr;
 };
 
 }  // namespace tenon::console

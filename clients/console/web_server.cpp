@@ -67,6 +67,8 @@ void WebService::deliver(const std::string& path, const std::vector<Publication>
     for (WebViewer* viewer : viewers)
       if (viewer->room() == path) viewer->offer(publication, channel->delivery);
   }
+  if (handlers.told)
+    for (const std::string& text : store.toTell()) handlers.told(path, text);
   // a viewer that is sent to may end, and leaves the set then
   const std::vector<WebViewer*> all(viewers.begin(), viewers.end());
   for (WebViewer* viewer : all)

@@ -1,6 +1,8 @@
 #include "clients/console/channel_store.h"
 
 #include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -75,8 +77,23 @@ TEST(ChannelStore, AWriterThatFloodsItWithInstancesForgetsItsOwnOldestOnes) {
   std::vector<std::uint64_t> kept;
   store.forEachKept(1, [&](const Publication& newest) { kept.push_back(newest.instance); });
   EXPECT_EQ(kept.size(), ChannelStore::kMaxInstances);
+  EXPECT_THAT(store.toTell(),
+              testing::ElementsAre(testing::HasSubstr("of Presence 4000 instances are kept")));
   EXPECT_THAT(kept, testing::IsSupersetOf({kEarly, kLate, 99 + kMany}));
   EXPECT_THAT(kept, testing::Not(testing::Contains(100))) << "the oldest of the flood";
+}
+
+TEST_F(ChannelStoreTest, WhatIsForgottenIsToldAtFirstAndWheneverItIsTwiceAsMuch) {
+  for (std::size_t i = 0; i < ChannelStore::kMaxEvents; ++i) tell(kAhead, 1);
+  EXPECT_THAT(store_.toTell(), testing::IsEmpty());
+  std::vector<std::string> told;
+  for (int i = 0; i < 100; ++i) {
+    tell(kAhead, 1);
+    for (std::string& sentence : store_.toTell()) told.push_back(std::move(sentence));
+  }
+  ASSERT_EQ(told.size(), 7U) << "1, 2, 4 ... 64";
+  EXPECT_EQ(told[1],
+            "of ClientEvent 1000 events are kept for pages that are opened later; forgotten so far: 2");
 }
 
 TEST(ChannelStore, AnInstanceThatEndsIsForgottenAndMayComeBackFromAnother) {

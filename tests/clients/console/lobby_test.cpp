@@ -30,6 +30,18 @@ TEST(Lobby, ListsTheSessionsThatAreThere) {
   EXPECT_EQ(listed().size(), 1U);
 }
 
+TEST(Lobby, ListsSoManySessionsAtMostAndSaysThatThereAreMore) {
+  Lobby lobby;
+  const auto told = [&lobby] { return nlohmann::json::parse(*lobby.take(1)[0].payload); };
+  for (std::uint32_t epoch = 0; epoch < Lobby::kMaxSessions; ++epoch)
+    lobby.add({.session = "a", .server_epoch = epoch});
+  EXPECT_EQ(told()["more"], false);
+  lobby.add({.session = "one more", .server_epoch = 1});
+  const auto full = told();
+  EXPECT_EQ(full["more"], true);
+  EXPECT_EQ(full["sessions"].size(), Lobby::kMaxSessions);
+}
+
 TEST(Lobby, SaysWhichSessionsAreNotShown) {
   Lobby lobby;
   lobby.add({.session = "a", .server_epoch = 1});
