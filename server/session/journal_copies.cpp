@@ -11,6 +11,9 @@ namespace {
 constexpr std::size_t kMostAtOnce = 8;  // [entries] for one recorder at each new one
 constexpr std::chrono::seconds kStuck{1};
 constexpr std::chrono::milliseconds kRetry{20};
+// A recorder that begins does so with an entry that is still kept when its readers are found.
+constexpr Tick kBeginsWith =
+    kKeptForRecorders - 2 * kStuck / std::chrono::milliseconds(1);  // [entries] at most
 
 }  // namespace
 
@@ -56,12 +59,14 @@ void JournalCopies::open(const Request& request) {
   wire::Partition partition(participant_, wire::clientPartition(session_, *request.from));
   auto inputs = wire::Writer<TickInputPart>::open(partition, wire::kTickInput);
   auto checkpoints = wire::Writer<CheckpointPart>::open(partition, wire::kCheckpoint);
+  std::uint64_t next = firstAfter(request.recorded_until);
+  if (request.recorded_until == 0 && end() > kBeginsWith) next = std::max(next, end() - kBeginsWith);
   if (inputs && checkpoints) {
     recorders_.push_back({request.client,
                           std::move(partition),
                           std::move(*inputs),
                           std::move(*checkpoints),
-                          firstAfter(request.recorded_until),
+                          next,
                           {},
                           {},
                           {},

@@ -111,6 +111,22 @@ TEST(JournalCopies, EachRecorderGetsWhatWasKeptAndWhatFollowsInOrder) {
   EXPECT_TRUE(copies.takeStuck().empty());
 }
 
+TEST(JournalCopies, ARecorderThatBeginsLateHasNoGap) {
+  const std::uint32_t domain = test::ownDomain();
+  JournalCopies copies(test::participant(domain), kSession);
+  Tick tick = 0;
+  while (tick < kKeptForRecorders + 100) copies.add(entryOf(++tick));
+  RecorderMock recorder(domain);
+  copies.admit(ClientId{1}, recorder.origin());
+  tick = addUntil(copies, tick, 0, [&] { return recorder.take(), recorder.ticks.size() >= 50; });
+  copies.finish(std::chrono::steady_clock::now() + std::chrono::seconds(10));
+  for (int i = 0; i < 1000 && (recorder.ticks.empty() || recorder.ticks.back() < tick); ++i) recorder.take();
+  ASSERT_FALSE(recorder.ticks.empty());
+  EXPECT_LT(recorder.ticks.front(), tick - kKeptForRecorders / 2) << "most of what was kept";
+  EXPECT_EQ(recorder.ticks, ticks(recorder.ticks.front(), tick));
+  EXPECT_EQ(copies.counts().failed, 0U);
+}
+
 TEST(JournalCopies, ARecorderThatIsDismissedGetsNoMoreAndEverythingWhenItIsBack) {
   const std::uint32_t domain = test::ownDomain();
   JournalCopies copies(test::participant(domain), kSession);
