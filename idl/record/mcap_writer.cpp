@@ -11,6 +11,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <zstd.h>
 
@@ -100,8 +101,11 @@ Result<McapWriter> McapWriter::open(const std::filesystem::path& file, const Mca
   impl->chunk_age = options.chunk_age;
   std::error_code ignored;
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), ignored);
-  impl->descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+  impl->descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);  // a pipe is not waited for
   if (impl->descriptor < 0) return fail(file.string() + ": cannot be written (" + std::strerror(errno) + ")");
+  struct stat status {};
+  if (fstat(impl->descriptor, &status) != 0 || S_ISFIFO(status.st_mode))
+    return fail(file.string() + ": is a pipe; name a file");
   if (auto locked = impl->lock("name another file"); !locked) return fail(locked.error().what);
   if (ftruncate(impl->descriptor, 0) != 0 && errno != EINVAL)
     return fail(file.string() + ": cannot be emptied (" + std::strerror(errno) + ")");

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sodium.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -15,6 +16,7 @@ namespace {
 using Bytes32 = std::array<std::uint8_t, 32>;
 static_assert(crypto_auth_KEYBYTES == 32 && crypto_auth_BYTES == 32 && crypto_sign_SEEDBYTES == 32 &&
               crypto_sign_PUBLICKEYBYTES == 32 && crypto_sign_BYTES == 64);
+constexpr int kPipeWait = 2000;  // [ms]
 
 void ready() {
   static const bool is_ready = sodium_init() >= 0;
@@ -169,11 +171,13 @@ std::filesystem::path defaultKeyFile() {
 }
 
 Result<SharedKey> readKeyFile(const std::filesystem::path& file) {
-  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) return fail(reasonOf(file, "cannot be read"));
   struct stat status {};
   char text[128];
   const bool known = fstat(descriptor, &status) == 0;
+  pollfd is_written{descriptor, POLLIN, 0};  // a pipe from another program
+  (void)poll(&is_written, 1, kPipeWait);
   const ssize_t size = read(descriptor, text, sizeof text);
   close(descriptor);
   if (!known || size < 0) return fail(reasonOf(file, "cannot be read"));

@@ -2,7 +2,6 @@
 
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <sstream>
 
 #include <fmt/format.h>
@@ -22,6 +21,7 @@ Result<void> writeSeats(const std::filesystem::path& file, const std::vector<Kep
     text += fmt::format("{} {} {} {} {}\n", seat.client.value, static_cast<int>(seat.role),
                         seat.key.empty() ? "-" : seat.key, seat.is_closed ? "closed" : "open",
                         printable(seat.name));
+  text += fmt::format("end {}\n", seats.size());
   const std::filesystem::path next = file.string() + ".next";
   std::string problem = writeWhole(next, text, false);
   if (problem.empty() && rename(next.c_str(), file.c_str()) != 0) problem = std::strerror(errno);
@@ -32,10 +32,14 @@ Result<void> writeSeats(const std::filesystem::path& file, const std::vector<Kep
 }
 
 Result<std::vector<KeptSeat>> readSeats(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  if (!in) return fail(fmt::format("{}: cannot be read; clients get new seats", file.string()));
+  const auto text = readWhole(file);
+  if (!text)
+    return fail(
+        fmt::format("{}: cannot be read ({}); clients get new seats", file.string(), text.error().what));
+  std::istringstream in(*text);
   std::vector<KeptSeat> seats;
-  for (std::string line; std::getline(in, line);) {
+  std::string line;
+  while (std::getline(in, line) && line != fmt::format("end {}", seats.size())) {
     std::istringstream words(line);
     KeptSeat seat;
     int role = 0;
@@ -53,6 +57,8 @@ Result<std::vector<KeptSeat>> readSeats(const std::filesystem::path& file) {
     std::getline(words, seat.name);
     seats.push_back(std::move(seat));
   }
+  if (!in || in.peek() != EOF)
+    return fail(fmt::format("{}:{}: is damaged; clients get new seats", file.string(), seats.size() + 1));
   return seats;
 }
 

@@ -3,20 +3,24 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
+#include <sstream>
 #include <utility>
 #include <vector>
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include "idl/record/mcap_format.h"
 #include "idl/wire/codec.h"
 #include "server/session/session_lock.h"
 #include "server/session/whole_file.h"
 
 namespace tenon::session {
 namespace {
+
+constexpr const char* kEnd = "end ";
 
 /// A message in one line: its kind and its bytes as on the bus.
 template <class M>
@@ -26,6 +30,12 @@ std::string lineOf(std::string_view kind, const M& message) {
   if (const auto bytes = wire::encode(message))
     for (const std::uint8_t byte : *bytes) line += fmt::format("{:02x}", byte);
   return line + "\n";
+}
+
+/// The last line of a file with `lines`: their checksum, without which it is damaged.
+std::string endOf(const std::string& lines) {
+  const auto* const bytes = reinterpret_cast<const std::uint8_t*>(lines.data());
+  return fmt::format("{}{:08x}\n", kEnd, record::mcap::crc32({bytes, lines.size()}));
 }
 
 std::vector<std::uint8_t> bytesOf(const std::string& hex) {
@@ -61,24 +71,23 @@ std::filesystem::path defaultStopFile(std::uint32_t domain, const std::string& s
 Result<StopTruth> readStopFile(const std::filesystem::path& file) {
   StopTruth truth;
   if (file.empty()) return truth;
-  if (const int opened = open(file.c_str(), O_RDONLY | O_CLOEXEC); opened >= 0) {
-    close(opened);
-  } else if (errno == ENOENT) {
-    return truth;
-  } else {
+  struct stat status {};
+  if (lstat(file.c_str(), &status) != 0 && errno == ENOENT) return truth;
+  const auto text = readWhole(file);
+  if (!text)
     return fail(fmt::format("{}: cannot be read ({}), so it is not known whether an emergency stop stands",
-                            file.string(), std::strerror(errno)));
-  }
+                            file.string(), text.error().what));
   const auto damaged = [&] {
     return fail(
         fmt::format("{}: is damaged, so it is not known whether an emergency stop stands: see that everybody "
                     "is safe, delete it and start again",
                     file.string()));
   };
-  std::ifstream in(file);
+  const std::size_t end = text->rfind(kEnd);
+  if (end == std::string::npos || text->substr(end) != endOf(text->substr(0, end))) return damaged();
+  std::istringstream in(text->substr(0, end));
   std::string kind, hex;
-  while (in >> kind) {
-    if (!(in >> hex)) return damaged();
+  while (in >> kind >> hex) {
     EmergencyStop stop;
     EmergencyClear cleared;
     if (kind == "raise" && read(hex, stop)) {
@@ -89,7 +98,7 @@ Result<StopTruth> readStopFile(const std::filesystem::path& file) {
       return damaged();
     }
   }
-  return in.eof() ? Result<StopTruth>(truth) : damaged();
+  return truth;
 }
 
 Result<void> writeStopFile(const std::filesystem::path& file, const StopTruth& truth) {
@@ -97,6 +106,7 @@ Result<void> writeStopFile(const std::filesystem::path& file, const StopTruth& t
   std::string text;
   for (const auto& [id, stop] : truth.standing()) text += lineOf("raise", stop);
   for (const auto& [id, cleared] : truth.cleared()) text += lineOf("clear", cleared);
+  text += endOf(text);
   std::error_code ignored;
   std::filesystem::create_directories(file.parent_path(), ignored);
   const std::filesystem::path next = file.string() + ".next";

@@ -51,7 +51,7 @@ class StopKeeper {
   /// Something waits for the next turn.
   [[nodiscard]] bool waits() const { return is_writing_; }
 
-  /// Called when the stop would not outlive a crash of the server; may be empty.
+  /// Called when what stands, or its clear, would not outlive a crash of the server; may be empty.
   std::function<void(const std::string& why)> not_kept;
 
  private:

@@ -5,6 +5,7 @@
 #include <functional>
 #include <vector>
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -135,6 +136,18 @@ TEST_F(KeyFile, ThatOthersMayReadOrThatIsNoneIsRefused) {
   fs::permissions(file, fs::perms(0600));
   std::ofstream(file) << "open sesame\n";
   EXPECT_THAT(readKeyFile(file).error().what, HasSubstr("64 hexadecimal digits"));
+}
+
+TEST_F(KeyFile, MayBeAPipeWhichIsNotWaitedForWhereNobodyWrites) {
+  const fs::path pipe = folder_ / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_FALSE(readKeyFile(pipe));
+  std::ofstream holder;
+  const int reader = open(pipe.c_str(), O_RDONLY | O_NONBLOCK);  // so that the writer can open it
+  holder.open(pipe);
+  holder << std::string(64, 'a') << std::flush;
+  EXPECT_TRUE(readKeyFile(pipe));
+  close(reader);
 }
 
 TEST_F(KeyFile, TheRuntimeFolderIsTheUsersAlone) {

@@ -203,6 +203,28 @@ TEST_F(ResumeTest, AfterDamageTheSessionGoesOnFromTheLastStateThatCanBeComputed)
   EXPECT_THAT(point->problem, HasSubstr("has no tick " + std::to_string(point->tick + 1)));
 }
 
+TEST_F(ResumeTest, ADamagedEndIsSaidAndATornOneIsNone) {
+  const fs::path left = journalUpTo(1100);
+  const auto whole = fs::file_size(left);
+  const auto problemOf = [&](const fs::path& file) {
+    SessionSimulation simulation = test::SessionRig::makeSimulation(loaded_);
+    const auto point = readResumePoint(file, loaded_, simulation);
+    EXPECT_TRUE(point);
+    EXPECT_EQ(simulation.hash(), hashes_[simulation.now()]);
+    return point ? point->problem : "";
+  };
+  // in the last chunk, before its indices
+  std::fstream file(left, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekg(static_cast<std::streamoff>(whole - 700));
+  const char byte = static_cast<char>(file.get() ^ 1);
+  file.seekp(static_cast<std::streamoff>(whole - 700));
+  file.put(byte);
+  file.close();
+  EXPECT_THAT(problemOf(left), HasSubstr("; the session continues after the last chunk that can be read"));
+  fs::resize_file(left, whole - 701);
+  EXPECT_EQ(problemOf(left), "");
+}
+
 // as a block of the disk that was never written, in the middle of the file: the lengths of records in it are
 // lost, by which all after it would be
 TEST_F(ResumeTest, AfterALostBlockTheSessionGoesOnFromTheEndAndTheLossStaysKnown) {
@@ -321,8 +343,13 @@ TEST_F(ResumeTest, WithTheKeyOfASeatComesItsFormerId) {
   later.resume(*kept);
   EXPECT_FALSE(join(later, "fifth", 'b', 2).accepted) << "a removed person's seat stays closed";
 
+  fs::resize_file(file, fs::file_size(file) - 2);
+  EXPECT_THAT(readSeats(file).error().what, HasSubstr("session.mcap.seats:3")) << "cut";
+  ASSERT_TRUE(writeSeats(file, closed));
   std::ofstream(file, std::ios::app) << "17 x\n";
   EXPECT_THAT(readSeats(file).error().what, HasSubstr("session.mcap.seats:3"));
+  std::ofstream(file, std::ios::trunc).close();
+  EXPECT_THAT(readSeats(file).error().what, HasSubstr("session.mcap.seats:1")) << "empty";
 }
 
 TEST_F(ResumeTest, TheSeatKeeperWritesTheNewestListAndSaysWhenItCannot) {

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 namespace tenon::session {
@@ -45,11 +46,22 @@ TEST_F(StopFile, ThatIsDamagedIsAnErrorAndNotASessionWithoutItsStop) {
     std::ofstream(file_) << wrong << "\n";
     EXPECT_FALSE(readStopFile(file_)) << wrong;
   }
+  for (std::uintmax_t left = 0; left < size; ++left) {
+    ASSERT_TRUE(writeStopFile(file_, truth));
+    fs::resize_file(file_, left);
+    const auto cut = readStopFile(file_);
+    ASSERT_FALSE(cut) << left << " of " << size << " bytes";
+    EXPECT_THAT(cut.error().what, ::testing::HasSubstr("it is not known whether an emergency stop stands"));
+  }
   ASSERT_TRUE(writeStopFile(file_, truth));
-  fs::resize_file(file_, size - 5);
-  const auto cut = readStopFile(file_);
-  ASSERT_FALSE(cut);
-  EXPECT_THAT(cut.error().what, ::testing::HasSubstr("it is not known whether an emergency stop stands"));
+  std::ifstream in(file_, std::ios::binary);
+  const std::string whole{std::istreambuf_iterator<char>(in), {}};
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    std::string flipped = whole;
+    flipped[i] = static_cast<char>(flipped[i] ^ 1);
+    std::ofstream(file_, std::ios::binary) << flipped;
+    EXPECT_FALSE(readStopFile(file_)) << "byte " << i;
+  }
 }
 
 TEST_F(StopFile, ThatCannotBeReachedIsAnErrorAndNotASessionWithoutItsStop) {
@@ -60,6 +72,15 @@ TEST_F(StopFile, ThatCannotBeReachedIsAnErrorAndNotASessionWithoutItsStop) {
   EXPECT_THAT(unreachable.error().what, ::testing::HasSubstr("cannot be read"));
   EXPECT_THAT(unreachable.error().what,
               ::testing::HasSubstr("it is not known whether an emergency stop stands"));
+}
+
+TEST_F(StopFile, ThatIsNoFileIsAnErrorAndNotWaitedFor) {
+  fs::create_directories(file_.parent_path());
+  fs::create_symlink(folder_ / "nowhere", file_);
+  EXPECT_FALSE(readStopFile(file_)) << "a link to nowhere";
+  fs::remove(file_);
+  ASSERT_EQ(mkfifo(file_.c_str(), 0600), 0);
+  EXPECT_FALSE(readStopFile(file_)) << "a pipe";
 }
 
 TEST_F(StopFile, AnEmptyPathKeepsNothing) { EXPECT_TRUE(writeStopFile({}, {})); }
