@@ -95,6 +95,8 @@ int run(int argc, char** argv) {
   }
   const std::filesystem::path& key_file = arguments.options.key_file;
   if (app.count("--key") > 0 && key_file.empty()) return report("--key: names no file", 2);
+  if (app.count("--session") > 0 && arguments.options.session.empty())
+    return report("--session: names no session", 2);
   if (const auto key = tenon::wire::checkKeyOption(key_file); !key) return report(key.error().what);
   if (lists) return printLists(arguments);
   auto client = tenon::command::CommandClient::open(arguments.options, stop);

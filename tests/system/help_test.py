@@ -140,6 +140,7 @@ TABLE = (
     (2, ["record", "-o", "a.mcap", "--key", ""], "--key: names no file"),
     (2, ["console", "--key", ""], "--key: names no file"),
     (2, ["command", "pause", "--key", ""], "--key: names no file"),
+    (2, ["command", "stop", "--session", ""], "--session: names no session"),
     (1, ["join", "--role", "trainee", "--key", "nosuch"], "--key: nosuch: cannot be read"),
     (1, ["join", "--role", "observer", "--key", "nosuch"], "--key: nosuch: cannot be read"),
     (1, ["record", "-o", "a.mcap", "--key", "nosuch"], "--key: nosuch: cannot be read"),
