@@ -4,12 +4,12 @@ namespace tenon::haptic {
 
 Result<void> AnswerReaders::subscribe(bool slow) {
   wire::Inbox& inbox = link_.inbox();
-  heard_.assign(1 + link_.member().hands().size(), false);
+  heard_.assign(1 + link_.member().hands().size(), {});
   slow_ = slow;
   auto subscribed =
       inbox.on<WorldFrame>(link_.member().session(), slow ? wire::kWorldFrame100 : wire::kWorldFrame1k,
                            [this, slow](const WorldFrame& frame) {
-                             if (slow == slow_) heard_[0] = true;
+                             hear(0, slow);
                              callbacks_.frame(frame);
                            });
   std::size_t index = 0;
@@ -17,7 +17,7 @@ Result<void> AnswerReaders::subscribe(bool slow) {
     if (!subscribed) break;
     subscribed = inbox.on<HandManifold>(hand, slow ? wire::kHandManifold50 : wire::kHandManifold,
                                         [this, slow, at = ++index](const HandManifold& manifold) {
-                                          if (slow == slow_) heard_[at] = true;
+                                          hear(at, slow);
                                           callbacks_.manifold(manifold);
                                         });
   }

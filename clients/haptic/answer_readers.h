@@ -25,8 +25,9 @@ class AnswerReaders {
   /// Those of each tick.
   [[nodiscard]] Result<void> open() { return subscribe(false); }
   /// Changes to those that are wanted; called about once a second. The new readers come first: the former
-  /// ones are closed by a call after the new ones have heard frames and a manifold of each hand, so that no
-  /// answer is missing meanwhile; and after kMostCalls in any case, since an absent hand has no manifolds.
+  /// ones are closed by a call after the new ones have heard frames and a manifold of each hand of which the
+  /// former ones still hear, so that no answer is missing meanwhile; an absent hand has none. After
+  /// kMostCalls they are closed in any case.
   [[nodiscard]] Result<void> choose(bool slow);
 
   /// No others read: what has come since the last call of choose() was slow.
@@ -35,19 +36,28 @@ class AnswerReaders {
   static constexpr int kMostCalls = 10;
 
  private:
+  struct Heard {
+    bool by_newest = false, by_former = false;
+  };
   [[nodiscard]] Result<void> subscribe(bool slow);
-  /// The newest readers have heard all that they read.
+  /// Answer `index` of heard_ came to a reader of slow ones or of those of each tick.
+  void hear(std::size_t index, bool slow) {
+    (slow == slow_ ? heard_[index].by_newest : heard_[index].by_former) = true;
+  }
+  /// The newest readers have heard frames, and what the former ones have heard meanwhile.
   [[nodiscard]] bool newestHear() const {
-    return std::find(heard_.begin(), heard_.end(), false) == heard_.end();
+    return heard_[0].by_newest && std::none_of(heard_.begin(), heard_.end(), [](const Heard& one) {
+             return one.by_former && !one.by_newest;
+           });
   }
   void close(bool slow);
 
   StationLink& link_;
   Callbacks callbacks_;
-  bool slow_ = false;        ///< the newest readers
-  bool has_both_ = false;    ///< the former ones are still open
-  int calls_ = 0;            ///< of choose() since then
-  std::vector<bool> heard_;  ///< by the newest readers: a frame, then a manifold of each hand
+  bool slow_ = false;         ///< the newest readers
+  bool has_both_ = false;     ///< the former ones are still open
+  int calls_ = 0;             ///< of choose() since then
+  std::vector<Heard> heard_;  ///< since then: a frame, then a manifold of each hand
 };
 
 }  // namespace tenon::haptic

@@ -5,15 +5,14 @@ namespace tenon::haptic {
 Bracelet::Bracelet(devices::HapticDevice& device, const TactileOptions& options)
     : device_(device), safety_(device.caps()), map_(options) {}
 
-Result<void> Bracelet::begin(HandId forearm, bool armed) {
+void Bracelet::begin(HandId forearm, bool armed) {
   contacts_ = {};
   contacts_.hand = forearm;
   answers_ = {};
   permitted_ = armed;
   finishing_ = false;
-  if (armed) return device_.arm();
+  if (armed) return handover_.askWithoutReset();
   device_.disarm();
-  return {};
 }
 
 void Bracelet::receive(const HandManifold& manifold) noexcept {

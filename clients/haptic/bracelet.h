@@ -21,8 +21,8 @@ class Bracelet {
   /// `device` outlives it.
   Bracelet(devices::HapticDevice& device, const TactileOptions& options);
 
-  /// Forgets all contacts of `forearm`. Not armed, it is silent; fails when it cannot be armed.
-  Result<void> begin(HandId forearm, bool armed);
+  /// Forgets all contacts of `forearm`. `armed` as for HapticHand::begin; it is silent until then.
+  void begin(HandId forearm, bool armed);
   void receive(const HandManifold& manifold) noexcept;
   /// As HapticHand's.
   void permit(bool permitted) noexcept;

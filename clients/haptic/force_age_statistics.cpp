@@ -33,20 +33,20 @@ double DurationHistogram::quantile(double fraction) const noexcept {
   return count_ > 0 ? max() : 0.0;
 }
 
-void AnswerLoss::Row::add(Tick tick) noexcept {
+void AnswerLoss::ReceivedTicks::add(Tick tick) noexcept {
   if (count == 0) {
     first = last = tick;
   } else {
     if (tick <= last) return;  // repeated or overtaken
-    step = step == 0 ? tick - last : std::min(step, tick - last);
+    period = std::min(period.value_or(tick - last), tick - last);
     last = tick;
   }
   ++count;
 }
 
-double AnswerLoss::Row::lost() const noexcept {
-  if (step == 0) return 0.0;
-  const auto sent = static_cast<double>((last - first) / step + 1);
+double AnswerLoss::ReceivedTicks::lostShare() const noexcept {
+  if (!period) return 0.0;
+  const auto sent = static_cast<double>((last - first) / *period + 1);
   return std::max(0.0, 1.0 - static_cast<double>(count) / sent);
 }
 
@@ -57,22 +57,22 @@ void AnswerLoss::received(HandId hand, Tick tick) noexcept {
   if (found == hands_.end()) return;
   found->hand = hand;
   found->all.add(tick);
-  if (tick % kSlowTicks == 0) found->in_turn.add(tick);
+  if (tick % kSlowTicks == 0) found->periodic.add(tick);
 }
 
 double AnswerLoss::share() const noexcept {
   double largest = 0.0;
   for (const Answers& answers : hands_) {
-    // of slow answers more than every third is in turn
-    const bool is_slow = 3 * answers.in_turn.count > answers.all.count;
-    largest = std::max(largest, (is_slow ? answers.in_turn : answers.all).lost());
+    // of slow answers more than every third is periodic
+    const bool is_slow = 3 * answers.periodic.count > answers.all.count;
+    largest = std::max(largest, (is_slow ? answers.periodic : answers.all).lostShare());
   }
   return largest;
 }
 
 void ForceAgeStatistics::inputSent(std::uint32_t seq, std::int64_t now_ns, std::int64_t period_ns) noexcept {
   sent_[seq % kRing] = {seq, now_ns};
-  if (last_sent_ != 0) lateness_.add(now_ns - last_sent_ - period_ns);
+  if (last_sent_) lateness_.add(now_ns - *last_sent_ - period_ns);
   last_sent_ = now_ns;
 }
 
@@ -84,7 +84,7 @@ void ForceAgeStatistics::answerReceived(HandId hand, Tick tick, std::uint32_t se
   const Sent& sent = sent_[seq % kRing];
   if (sent.seq != seq) return;
   newest_answer_ = seq;
-  if (answered_at_ != 0) silence_ = std::max(silence_, now_ns - answered_at_);
+  if (answered_at_) longest_gap_ = std::max(longest_gap_, now_ns - *answered_at_);
   answered_at_ = now_ns;
   ages_.add(now_ns - sent.time);
   recent_ages_.add(now_ns - sent.time);
@@ -101,7 +101,7 @@ void ForceAgeStatistics::fill(Telemetry& telemetry) noexcept {
   telemetry.answers_lost = loss_.share();
   recent_ages_.clear();
   loss_.clear();
-  telemetry.longest_silence = static_cast<double>(silence_) * 1e-9;
+  telemetry.longest_silence = static_cast<double>(longest_gap_) * 1e-9;
 }
 
 }  // namespace tenon::haptic

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "idl/types/ids.h"
 #include "idl/types/messages/timing.h"
@@ -42,7 +43,7 @@ class DurationHistogram {
 ///
 /// The answers of a hand have ticks in steps of one (of ten for a tracked limb, which the smallest step
 /// within the window tells). Answers that the server did not send, because a newer one was ready, count as
-/// lost. Of slow answers those in turn count, each kSlowTicks; others come out of turn.
+/// lost. Of slow answers the periodic ones count, each kSlowTicks; others are event-triggered.
 ///
 /// Threads: one. Real-time: everything.
 class AnswerLoss {
@@ -55,17 +56,18 @@ class AnswerLoss {
 
  private:
   static constexpr std::size_t kHands = 8;
-  struct Row {
+  /// The ticks of answers that come at a fixed period.
+  struct ReceivedTicks {
     Tick first = 0, last = 0;
-    Tick step = 0;  // [ticks] smallest; 0: unknown
+    std::optional<Tick> period;  // [ticks] smallest step so far
     std::uint64_t count = 0;
 
     void add(Tick tick) noexcept;
-    [[nodiscard]] double lost() const noexcept;
+    [[nodiscard]] double lostShare() const noexcept;
   };
   struct Answers {
     HandId hand;
-    Row all, in_turn;
+    ReceivedTicks all, periodic;
   };
   std::array<Answers, kHands> hands_{};
 };
@@ -98,9 +100,9 @@ class ForceAgeStatistics {
   DurationHistogram lateness_;
   AnswerLoss loss_;  // since the last fill()
   std::uint32_t newest_answer_ = 0;
-  std::int64_t answered_at_ = 0;  // [ns] of newest_answer_; 0: none yet
-  std::int64_t silence_ = 0;      // [ns] longest between two answers
-  std::int64_t last_sent_ = 0;    // [ns]
+  std::optional<std::int64_t> answered_at_;  // [ns] of newest_answer_
+  std::int64_t longest_gap_ = 0;             // [ns] between two answers
+  std::optional<std::int64_t> last_sent_;    // [ns]
 };
 
 }  // namespace tenon::haptic

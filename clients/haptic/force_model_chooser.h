@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "clients/haptic/force_model.h"
 
@@ -27,9 +28,9 @@ class ForceModelChooser {
   static constexpr std::uint32_t kWithout = 60;    ///< [s] without the copy after more than that
 
   explicit ForceModelChooser(ForceModelWish wish) : wish_(wish) {}
-  /// `round_trip` [s]; 0: not known. `has_scene`: the station has the compiled scene. `late`: cycles that
+  /// `round_trip` [s]; none: not known. `has_scene`: the station has the compiled scene. `late`: cycles that
   /// were late since the last call.
-  ForceModelKind step(double round_trip, bool has_scene, std::uint64_t late) noexcept {
+  ForceModelKind step(std::optional<double> round_trip, bool has_scene, std::uint64_t late) noexcept {
     if (without_ > 0) --without_;
     if (kind_ == ForceModelKind::kSceneCopy && late > kMostLate) without_ = kWithout;
     if (!has_scene || without_ > 0) return kind_ = ForceModelKind::kManifold;
@@ -38,7 +39,7 @@ class ForceModelChooser {
                  wish_ == ForceModelWish::kSceneCopy ? ForceModelKind::kSceneCopy : ForceModelKind::kManifold;
     }
     if (round_trip > kLong) kind_ = ForceModelKind::kSceneCopy;
-    if (round_trip > 0.0 && round_trip < kShort) kind_ = ForceModelKind::kManifold;
+    if (round_trip && *round_trip < kShort) kind_ = ForceModelKind::kManifold;
     return kind_;
   }
 

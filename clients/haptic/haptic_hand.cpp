@@ -65,17 +65,13 @@ HapticHand::HapticHand(devices::HapticDevice& device, devices::ClutchLatch* clut
       fixture_(fixtureLimitsOf(device.caps())),
       safety_(device.caps(), clutch) {}
 
-Result<void> HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH, bool armed) {
+void HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH, bool armed) {
   permitted_ = armed;
   finishing_ = false;
   finish_time_ = 0.0;
-  Result<void> result;
-  if (armed) {
-    result = device_.arm();
-  } else {
-    device_.disarm();
-  }
+  if (!armed) device_.disarm();
   device_.read(device_state_);
+  if (armed && !device_state_.forces_on) handover_.askWithoutReset();
   workspace_.setCentre(p_WH - device_state_.X_DH.translation());
   input_ = {};
   input_.hand = hand;
@@ -87,7 +83,6 @@ Result<void> HapticHand::begin(HandId hand, ClientId client, const Vector3& p_WH
   state_.p_WC = workspace_.centre();
   coupling_.reset();
   fixture_.restart();
-  return result;
 }
 
 void HapticHand::permitForces(bool permitted) noexcept {

@@ -59,9 +59,9 @@ class HapticHand {
   /// the hand; `clutch` is shared by the arms of a bimanual device, null for a single device.
   explicit HapticHand(devices::HapticDevice& device, devices::ClutchLatch* clutch = nullptr);
 
-  /// Places the workspace so that the hand is at p_WH now, and arms the device if `armed`. Fails when it
-  /// cannot be armed.
-  Result<void> begin(HandId hand, ClientId client, const Vector3& p_WH, bool armed);
+  /// Places the workspace so that the hand is at p_WH now. Not `armed`, the device is disarmed; else one that
+  /// has no forces on is to be armed by armDevice(), unless it is in fault.
+  void begin(HandId hand, ClientId client, const Vector3& p_WH, bool armed);
   void receive(const HandManifold& manifold) noexcept { local_.receive(manifold); }
   void receive(const Guidance& guidance) noexcept { fixture_.receive(guidance); }
   void receive(const CollisionMatrix& matrix) noexcept {
@@ -94,9 +94,9 @@ class HapticHand {
   /// fault: resets the safety layer, and asks for armDevice() if the device is not armed. See Arming, which
   /// decides it.
   void permitForces(bool permitted) noexcept;
-  /// Whether permitForces() asked for armDevice().
+  /// Whether begin() or permitForces() asked for armDevice().
   [[nodiscard]] bool wantsArming() const noexcept { return handover_.pending(); }
-  /// Resets and arms the device if permitForces() asked for it; may block. The loop has the device again
+  /// Does what was asked for, resets and arms the device; may block. The loop has the device again
   /// after handBack(), which follows armDevice() of all hands that share its clutch.
   Result<void> armDevice() { return handover_.serve(device_); }
   void handBack() noexcept { handover_.handBack(); }

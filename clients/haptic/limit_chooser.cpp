@@ -62,12 +62,12 @@ LinkChoice LimitChooser::step(const LinkMeasurement& now) noexcept {
   return choice;
 }
 
-/// `lost` [-], NaN: not known. What made a station hear at 1 kHz, where it is not known, is forgotten slowly.
-/// Seconds above kMostLoss count once more of them follow each other than an interruption takes.
-void LimitChooser::averageAnswers(double lost) noexcept {
+/// What made a station hear at 1 kHz, where it is not known, is forgotten slowly. Seconds above kMostLoss
+/// count once more of them follow each other than an interruption takes.
+void LimitChooser::averageAnswers(std::optional<double> lost) noexcept {
   above_most_ = lost > kMostLoss ? above_most_ + 1 : 0;
-  if (lost >= 0.0 && (lost <= kMostLoss || above_most_ > kInterrupted)) {
-    answers_lost_ += kAnswersWeight * (std::min(lost, kMostLoss) - answers_lost_);
+  if (lost && (*lost <= kMostLoss || above_most_ > kInterrupted)) {
+    answers_lost_ += kAnswersWeight * (std::min(*lost, kMostLoss) - answers_lost_);
   } else {
     answers_lost_ -= kForgotten * answers_lost_;
   }

@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
+#include <optional>
 
 #include "idl/types/messages/hands.h"
 
@@ -15,9 +15,9 @@ struct LinkMeasurement {
   double trip_jitter = 0.0;  ///< [s] of the round trip: 90th percentile less the shortest
   double age_jitter = 0.0;   ///< [s] of the contacts: 99th percentile less the youngest
   double inputs_lost = 0.0;  ///< [-]
-  /// [-] where answers are slow; NaN, not known, at 1 kHz, where those count that a newer one has overtaken,
+  /// [-] where answers are slow; none, not known, at 1 kHz, where those count that a newer one has overtaken,
   /// and where fewer than two came
-  double answers_lost = std::numeric_limits<double>::quiet_NaN();
+  std::optional<double> answers_lost;
   std::uint32_t input_period = 1;  ///< [ticks] DeviceInput::period
 };
 
@@ -40,7 +40,7 @@ struct LinkChoice {
 /// A silence is a gap of the link if it is at most twice as long as the longest one that was measured or that
 /// loss and jitter let expect; 20 ms more are for the machines. It is never below the limits of a link
 /// without faults, and never above kMostFreezeTicks. A limit grows at once, and shrinks when a lower one
-/// would have sufficed for kMemory. A silence of more than 0.3 s is a partition, and earns no patience.
+/// would have sufficed for kMemory. A silence of more than 0.3 s is a partition, and changes no limit.
 ///
 /// Threads: one. Real-time: everything.
 class LimitChooser {
@@ -57,8 +57,8 @@ class LimitChooser {
 
  private:
   static constexpr unsigned kInterrupted = 2;  ///< [measurements] one may have been made before its end
-  /// `lost` [-] of the answers.
-  void averageAnswers(double lost) noexcept;
+  /// `lost` [-] of the answers; none: not known.
+  void averageAnswers(std::optional<double> lost) noexcept;
 
   std::array<LinkMeasurement, kMemory> last_{};
   double answers_lost_ = 0.0;  // [-] in the mean: a second has few slow answers

@@ -15,7 +15,7 @@ constexpr double kMinMultiplier = 1e-9;  // [N]
 // Scale of rotations of an object of unknown size.
 constexpr double kUnknownRadius = 0.1;  // [m]
 
-// Fade-out of another hand's spring after it has released the object.
+// In which another hand's spring gets its stiffness, and loses it after the hand has released the object.
 constexpr double kFadeTicks = 20.0;  // [ticks]
 
 /// [m] Of a contact's point of the other body, from its pose of tick `heard_at` to `now`. Slow motion is that
@@ -24,6 +24,12 @@ Vector3 expectedMotion(const ManifoldContact& contact, Tick heard_at, double now
   const double ahead = (now - static_cast<double>(heard_at)) * kTickSeconds;
   const Vector3 v_W = contact.velocity_W.cast<double>();
   return extrapolationWeight(v_W.norm()) * std::clamp(ahead, 0.0, LocalModel::kLongestExpectation) * v_W;
+}
+
+/// By what changes the force, or torque, of a spring by `step`.
+Vector3 shortened(const Vector3& offset, double step, double stiffness) {
+  const double length = offset.norm();
+  return length * stiffness <= step ? Vector3::Zero().eval() : offset * (1.0 - step / (length * stiffness));
 }
 
 bool anyBodyJumped(const HandManifold& before, const HandManifold& now) {
@@ -46,8 +52,10 @@ void LocalModel::receive(const HandManifold& manifold) noexcept {
   const bool same = has_manifold_ && manifold.server_epoch == manifold_.server_epoch &&
                     manifold.object == manifold_.object && manifold.object_epoch == manifold_.object_epoch;
   if (!same || anyBodyJumped(manifold_, manifold)) jumped_ = true;
+  const Tick since = has_manifold_ ? manifold.tick - manifold_.tick : 0;
+  if (!same || since > 0) manifold_age_ = 0.0;
   manifold_ = manifold;
-  updateOtherSprings(same);
+  updateOtherSprings(same, since > 1);
   has_manifold_ = true;
 }
 
@@ -57,6 +65,7 @@ bool LocalModel::usable(const WorldView& world) const noexcept {
 
 const LocalProxy& LocalModel::step(const Pose& X_WH, const WorldView& world) noexcept {
   const bool was_active = proxy_.active;
+  manifold_age_ += kTickSeconds;
   proxy_.discontinuous = false;
   proxy_.active = usable(world);
   if (!proxy_.active) {
@@ -75,14 +84,14 @@ const LocalProxy& LocalModel::step(const Pose& X_WH, const WorldView& world) noe
   }
   proxy_.stiffness = manifold_.stiffness;
   proxy_.rotational_stiffness = manifold_.rotational_stiffness;
+  moveOtherSprings();
   solve(X_WH, world);
-  fadeOtherSprings();
   proxy_.X_WS = proxy_.X_WO * manifold_.X_HO.inverse();
   updateValidityCount();
   return proxy_;
 }
 
-void LocalModel::updateOtherSprings(bool same_object) noexcept {
+void LocalModel::updateOtherSprings(bool same_object, bool after_gap) noexcept {
   if (!same_object) other_springs_.clear();
   for (OtherHandSpring& known : other_springs_) known.listed = false;
   for (const HandPull& pull : manifold_.others) {
@@ -91,18 +100,31 @@ void LocalModel::updateOtherSprings(bool same_object) noexcept {
         std::find_if(other_springs_.begin(), other_springs_.end(),
                      [&](const OtherHandSpring& other) { return other.pull.hand == pull.hand; });
     if (known != other_springs_.end()) {
-      *known = {pull, 1.0, true};
+      if (after_gap) known->offset = displacement(pull.X_WG, known->X_WG, pull.p_BoC_B);
+      known->pull = pull;
+      known->listed = true;
     } else {
-      other_springs_.push_back({pull, 1.0, true});
+      other_springs_.push_back({.pull = pull, .X_WG = pull.X_WG, .weight = same_object ? 0.0 : 1.0});
     }
   }
 }
 
-void LocalModel::fadeOtherSprings() noexcept {
+void LocalModel::moveOtherSprings() noexcept {
+  // a manifold that came in this cycle is told as it is
+  const double ahead = std::min(manifold_age_ - kTickSeconds, kLongestExpectation);
   std::size_t kept = 0;
   for (OtherHandSpring& other : other_springs_) {
-    if (!other.listed) other.weight -= 1.0 / kFadeTicks;
-    if (other.weight > 0.0) other_springs_[kept++] = other;
+    other.weight = std::min(1.0, other.weight + (other.listed ? 1.0 : -1.0) / kFadeTicks);
+    if (other.weight <= 0.0) continue;
+    const HandPull& pull = other.pull;
+    const Twist V_WG{pull.V_WG.head<3>().cast<double>(), pull.V_WG.tail<3>().cast<double>()};
+    other.X_WG = ahead > 0.0 ? extrapolated(pull.X_WG, V_WG, pull.p_BoC_B, ahead) : pull.X_WG;
+    Displacement& offset = other.offset;
+    offset.translation = shortened(offset.translation, kGoalForceStep, pull.stiffness);
+    offset.rotation = shortened(offset.rotation, kGoalTorqueStep, pull.rotational_stiffness);
+    if (!offset.translation.isZero(0.0) || !offset.rotation.isZero(0.0))
+      other.X_WG = displaced(other.X_WG, offset, pull.p_BoC_B);
+    other_springs_[kept++] = other;
   }
   other_springs_.resize(kept);
 }
@@ -131,7 +153,7 @@ void LocalModel::solve(const Pose& X_WH, const WorldView& world) noexcept {
     for (const OtherHandSpring& other : other_springs_) {
       if (other.listed != listed) continue;
       const HandPull& pull = other.pull;
-      body_.springs.push_back({pull.X_WG, pull.p_BoC_B, other.weight * std::max(0.0, pull.stiffness),
+      body_.springs.push_back({other.X_WG, pull.p_BoC_B, other.weight * std::max(0.0, pull.stiffness),
                                other.weight * std::max(0.0, pull.rotational_stiffness)});
     }
   }

@@ -18,8 +18,10 @@ namespace tenon::haptic {
 /// present device pose without network delay, and no force received over the network is displayed. The
 /// solution depends on planes and device pose, not on the path, so it does not drift from the server's.
 ///
-/// The springs of other hands on the same object act here too, at their last received poses, so that both
-/// people feel each other. The spring of a hand that has released the object fades out within 20 ticks.
+/// The springs of other hands on the same object act here too, so that both people feel each other. Between
+/// two manifolds their goals move with the velocities that were told, within kLongestExpectation; where the
+/// next one, after a gap, has a goal elsewhere, the force changes by kGoalForceStep a cycle at most. A hand
+/// that is listed anew, or no more, gets or loses its stiffness within 20 ticks.
 ///
 /// Threads: one. Real-time: everything but the constructor.
 class LocalModel final : public ForceModel {
@@ -39,6 +41,8 @@ class LocalModel final : public ForceModel {
   /// The next steps are those of `tick` [ticks] of the server: other bodies are expected where their velocity
   /// brings them by then, within kLongestExpectation (idl/types/motion_law.h). 0: where they were heard.
   void expectAt(double tick) noexcept { now_ = tick; }
+  static constexpr double kGoalForceStep = 0.2;    ///< [N] a cycle
+  static constexpr double kGoalTorqueStep = 0.02;  ///< [Nm] likewise
   /// The next step begins at the server's proxy.
   void restart() noexcept { jumped_ = true; }
   /// Server's proxy pose of the hand. Precondition: hasManifold().
@@ -57,11 +61,14 @@ class LocalModel final : public ForceModel {
   /// Spring of another hand on the same object.
   struct OtherHandSpring {
     HandPull pull;
+    Pose X_WG;            ///< goal in force
+    Displacement offset;  ///< from the goal that was told to the one in force
     double weight = 1.0;  ///< [-] of its stiffness; falls to 0 after the manifold no longer lists it
     bool listed = true;
   };
-  void updateOtherSprings(bool same_object) noexcept;
-  void fadeOtherSprings() noexcept;
+  /// `after_gap`: the manifolds of ticks before it did not come.
+  void updateOtherSprings(bool same_object, bool after_gap) noexcept;
+  void moveOtherSprings() noexcept;
   [[nodiscard]] bool outdated(const WorldView& world) const noexcept;
   void solve(const Pose& X_WH, const WorldView& world) noexcept;
   void updateValidityCount() noexcept;
@@ -74,7 +81,8 @@ class LocalModel final : public ForceModel {
   FixedVector<collision::ContactConstraint, kManifoldContacts> constraints_;
   std::array<double, kManifoldContacts> multipliers_{};  ///< [N] of each constraint
   std::uint64_t beyond_validity_ = 0;
-  double now_ = 0.0;  ///< [ticks] of the server
+  double now_ = 0.0;           ///< [ticks] of the server
+  double manifold_age_ = 0.0;  ///< [s] since it was received
   bool has_manifold_ = false;
   bool jumped_ = false;
 };

@@ -25,17 +25,17 @@ class RateChooser {
   static constexpr std::uint32_t kFarPeriods = 5;
   static constexpr double kSlowAnswers = 0.020;  ///< [s] between two manifolds then
 
-  /// `round_trip` [s]; 0: not known. `known_loss` [-] of messages; none: not known yet, and a tenth is
+  /// `round_trip` [s]; none: not known. `known_loss` [-] of messages; none: not known yet, and a tenth is
   /// assumed. `jitter` [s] of the answers' age.
-  void step(double round_trip, ForceModelKind kind, std::optional<double> known_loss,
+  void step(std::optional<double> round_trip, ForceModelKind kind, std::optional<double> known_loss,
             double jitter) noexcept {
     const double loss = known_loss.value_or(kAssumedLoss);
     if (round_trip > kFar) is_far_ = true;
-    if (round_trip > 0.0 && round_trip < kNear) is_far_ = false;
+    if (round_trip && *round_trip < kNear) is_far_ = false;
     allowance_ = kSlowAnswers * (1.0 + lostInARow(loss));
     // what is lost in a row must not look like a gap, which takes the force away (AnswerAge)
     const bool is_safe =
-        jitter + allowance_ <= std::max(round_trip, AnswerAge::kLongestJitter) + kSlowAnswers;
+        jitter + allowance_ <= std::max(round_trip.value_or(0.0), AnswerAge::kLongestJitter) + kSlowAnswers;
     slow_answers_ = is_safe && (is_far_ || kind == ForceModelKind::kSceneCopy);
   }
   /// Inputs and states are sparse.

@@ -122,7 +122,7 @@ const LocalProxy& SceneCopy::step(const Pose& X_WH, const WorldView& /*world*/) 
 
 void SceneCopy::compute(const HandManifold& heard, std::uint32_t seq, const ServerTime& time,
                         const Pose& X_WH, const Twist& V_WH, const WorldView& world, bool rendered) noexcept {
-  silence_ += kTickSeconds;
+  heard_age_ += kTickSeconds;
   if (heard.tick != heard_tick_ || heard.server_epoch != heard_epoch_) hear(heard);
   const bool known = heard.object.value < mirrored_.size() && heard.hand.value < stiffness_.size() &&
                      world.size() == mirrored_.size() && time.known();
@@ -159,7 +159,7 @@ void SceneCopy::hear(const HandManifold& heard) noexcept {
   behind_ = behind;
   heard_tick_ = heard.tick;
   heard_epoch_ = heard.server_epoch;
-  silence_ = 0.0;
+  heard_age_ = 0.0;
 }
 
 void SceneCopy::takeHold(const HandManifold& heard) noexcept {
@@ -262,9 +262,10 @@ void SceneCopy::hearMotion(Mirrored& mirrored, const ObservedObject& seen) noexc
   const double dt = static_cast<double>(seen.updated_at - mirrored.updated_at) * kTickSeconds;
   const Displacement way = displacement(mirrored.X_WO, seen.X_WO);
   const Twist before = mirrored.mean_V_WO;
-  const double before_seconds = mirrored.mean_seconds;
+  const std::optional<double> before_seconds = mirrored.mean_seconds;
   mirrored.mean_V_WO = {way.translation / dt, way.rotation / dt};
-  mirrored.mean_seconds = dt > kTwistFilter && dt < kLongestFrame ? dt : 0.0;
+  mirrored.mean_seconds.reset();
+  if (dt > kTwistFilter && dt < kLongestFrame) mirrored.mean_seconds = dt;
   mirrored.updated_at = seen.updated_at;
   mirrored.X_WO = seen.X_WO;
   const bool stands = seen.V_WO.linear.isZero(0.0) && seen.V_WO.angular.isZero(0.0);
@@ -272,7 +273,7 @@ void SceneCopy::hearMotion(Mirrored& mirrored, const ObservedObject& seen) noexc
     mirrored.V_WO = seen.V_WO;
   } else if (dt > kTwistFilter) {
     // each is that of the middle of its time
-    const double ahead = before_seconds > 0.0 ? dt / (dt + before_seconds) : 0.0;
+    const double ahead = before_seconds ? dt / (dt + *before_seconds) : 0.0;
     mirrored.V_WO = mirrored.mean_V_WO;
     mirrored.V_WO.linear += ahead * (mirrored.mean_V_WO.linear - before.linear);
     mirrored.V_WO.angular += ahead * (mirrored.mean_V_WO.angular - before.angular);
@@ -289,7 +290,7 @@ void SceneCopy::mirrorOtherHands(const WorldView& world, const HandManifold& hea
     const HandId hand{i};
     const bool listed = std::any_of(heard.others.begin(), heard.others.end(),
                                     [&](const HandPull& pull) { return pull.hand == hand; });
-    if (!listed && others_[i].object.valid()) loosen(hand, world);
+    if (!listed && others_[i].object.valid()) fadePull(hand, world);
   }
   const double ahead = (now - static_cast<double>(heard.tick)) * kTickSeconds;
   for (const HandPull& pull : heard.others) {
@@ -314,22 +315,22 @@ void SceneCopy::contribute(const HandPull& pull) noexcept {
                           kLifetime);
 }
 
-void SceneCopy::loosen(HandId hand, const WorldView& world) noexcept {
+void SceneCopy::fadePull(HandId hand, const WorldView& world) noexcept {
   OtherHand& other = others_[hand.value];
   const bool is_own = other.object == object_;
   const ObservedObject& seen = world.object(other.object);
-  if (!is_own && other.grip > 0.0) other.X_WO_begun = seen.X_WO;
-  if (!is_own && hasLeft(other, seen)) return letGo(hand);
+  if (!is_own && other.weight > 0.0) other.X_WO_begun = seen.X_WO;
+  if (!is_own && hasLeft(other, seen)) return endGrasp(hand);
   // another's object stands where it is, so that nothing is to fade
-  other.grip = is_own ? std::max(0.0, other.grip - kTickSeconds / kEase) : 0.0;
-  if (other.grip > 0.0) {
-    applyGrip(hand);
+  other.weight = is_own ? std::max(0.0, other.weight - kTickSeconds / kPullFade) : 0.0;
+  if (other.weight > 0.0) {
+    applyWeight(hand);
   } else {
     environment_.setHandFrozen(hand, true);
   }
 }
 
-/// It has let its object go, or moves it out of reach. One that a frozen hand holds stands still.
+/// It has released its object, or moves it out of reach. One that a frozen hand holds stands still.
 bool SceneCopy::hasLeft(const OtherHand& other, const ObservedObject& seen) const noexcept {
   const ObservedObject& held = view_.object(object_);
   const auto objects = environment_.objects();
@@ -340,7 +341,7 @@ bool SceneCopy::hasLeft(const OtherHand& other, const ObservedObject& seen) cons
          maxPointMotion(way, seen.radius) > kStoodStill;
 }
 
-void SceneCopy::letGo(HandId hand) noexcept {
+void SceneCopy::endGrasp(HandId hand) noexcept {
   environment_.setHandPresent(hand, false);
   others_[hand.value] = {};
   enablePairs(0, collides_.size());
@@ -353,27 +354,27 @@ void SceneCopy::mirrorPull(const HandPull& pull, double ahead) noexcept {
   const Twist V_WG{pull.V_WG.head<3>().cast<double>(), pull.V_WG.tail<3>().cast<double>()};
   const double pace = pointSpeed(V_WG, object.radius);
   // between two manifolds a shared object needs slow motion, too, or the goal would move in steps
-  const double since = is_own ? std::min(silence_, kLongestExtrapolation) : 0.0;
+  const double since = is_own ? std::min(heard_age_, kLongestExtrapolation) : 0.0;
   const double rest = std::min(ahead, kLongestExtrapolation) - since;
   Pose X_WG = extrapolated(pull.X_WG, V_WG, object.p_OQ_O, since);
   X_WG = extrapolated(X_WG, faded(V_WG, pace), object.p_OQ_O, rest);
   const simulation::HandMotion& hand = environment_.hands()[pull.hand.value];
   const bool is_held = hand.present && hand.attached && hand.object == pull.object;
-  if (!is_held || other.grip <= 0.0) grasp(pull, X_WG);
+  if (!is_held || other.weight <= 0.0) grasp(pull, X_WG);
   other.stiffness = {pull.stiffness, pull.rotational_stiffness};
-  other.grip = std::min(1.0, other.grip + kTickSeconds / kEase);
-  if (!is_own && other.grip < 1.0) {
+  other.weight = std::min(1.0, other.weight + kTickSeconds / kPullFade);
+  if (!is_own && other.weight < 1.0) {
     // as much nearer as the coupling is stiffer: its force on the object is that of the listed one
     const Displacement way = displacement(other.X_WO_begun, X_WG, object.p_OQ_O);
-    X_WG =
-        displaced(other.X_WO_begun, {other.grip * way.translation, other.grip * way.rotation}, object.p_OQ_O);
+    X_WG = displaced(other.X_WO_begun, {other.weight * way.translation, other.weight * way.rotation},
+                     object.p_OQ_O);
   }
   other.X_WG = towards(other.X_WG, X_WG, object, pace);
-  applyGrip(pull.hand);
+  applyWeight(pull.hand);
   environment_.setHandPose(pull.hand, other.X_WG * hand.X_HO.inverse(), {});
 }
 
-/// A hand with which this one begins pulls at once; one that comes or goes on later, little by little.
+/// A hand with which this one begins pulls at once; one that comes or resumes later, within kPullFade.
 void SceneCopy::grasp(const HandPull& pull, const Pose& X_WG) noexcept {
   OtherHand& other = others_[pull.hand.value];
   const bool begins = !following_, is_own = pull.object == object_;
@@ -382,15 +383,15 @@ void SceneCopy::grasp(const HandPull& pull, const Pose& X_WG) noexcept {
   other = {.object = pull.object,
            .X_WG = begins || is_own ? X_WG : X_WO,
            .X_WO_begun = X_WO,
-           .grip = begins ? 1.0 : 0.0};
+           .weight = begins ? 1.0 : 0.0};
   stiffness_[pull.hand.value] = {};
   enablePairs(0, collides_.size());
 }
 
-void SceneCopy::applyGrip(HandId hand) noexcept {
+void SceneCopy::applyWeight(HandId hand) noexcept {
   const OtherHand& other = others_[hand.value];
-  // what pushes against another's object, which stood, makes it give way little by little
-  const double factor = other.object == object_ ? other.grip : 1.0 / other.grip;
+  // another's object stood: its coupling becomes soft from stiff, so that it gives way without a step
+  const double factor = other.object == object_ ? other.weight : 1.0 / other.weight;
   setStiffness(hand, {factor * other.stiffness.translational, factor * other.stiffness.rotational});
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "clients/haptic/force_model.h"
@@ -37,9 +38,9 @@ namespace tenon::haptic {
 ///   extrapolated likewise. So it gives way to a push at once: in the server it does so for the push of a
 ///   delay ago, and is heard another delay later.
 /// * A hand that the manifold lists no more, since it is frozen, keeps its object as in the server: without a
-///   pull, and without a jump when it goes on. One whose object moves nevertheless is out of reach, and let
-///   go. A pull on the hand's own object fades out and in, within kEase; one on another object grows soft
-///   within it.
+///   pull, and without a jump when its inputs resume. One whose object moves nevertheless is out of reach,
+///   and its grasp ends. A pull on the hand's own object fades out and in within kPullFade; one on another
+///   object becomes as stiff as listed within it.
 /// * The object starts at the server's proxy, and again after each of its jumps. On a scene at rest both then
 ///   solve one problem for one device pose. Where the answer to a pose nevertheless stays away from what the
 ///   copy had for that pose, with all at rest, the copy has jumped(): the hand is re-anchored at the
@@ -74,7 +75,7 @@ class SceneCopy final : public ForceModel {
   static constexpr double kTwistFilter = 0.005;
   /// [s] Of frames that are farther apart than that the mean velocity is too old.
   static constexpr double kLongestFrame = 0.03;
-  static constexpr double kEase = 0.02;  ///< [s] in which pulls of other hands begin and end
+  static constexpr double kPullFade = 0.02;  ///< [s] in which pulls of other hands begin and end
 
  private:
   /// What was heard of an object, as the copy has it.
@@ -83,11 +84,11 @@ class SceneCopy final : public ForceModel {
     std::uint32_t epoch = 0;
     ObjectStatus status = ObjectStatus::kHidden;
     Tick updated_at = 0;
-    Twist V_WO;                 ///< at updated_at, filtered
-    Pose X_WO;                  ///< heard last
-    Twist mean_V_WO;            ///< between the last two poses
-    double mean_seconds = 0.0;  ///< [s] between them; 0: not known
-    Tick compared_at = 0;       ///< of a free body
+    Twist V_WO;                          ///< at updated_at, filtered
+    Pose X_WO;                           ///< heard last
+    Twist mean_V_WO;                     ///< between the last two poses
+    std::optional<double> mean_seconds;  ///< [s] between them
+    Tick compared_at = 0;                ///< of a free body
   };
   /// Another hand that has an object in the copy, its own or that of this hand.
   struct OtherHand {
@@ -95,7 +96,7 @@ class SceneCopy final : public ForceModel {
     Pose X_WG;                ///< goal of the object in the copy
     Pose X_WO_begun;          ///< where it was when the hand began to pull it, or heard when it ceased
     HandStiffness stiffness;  ///< that was listed last
-    double grip = 0.0;        ///< [-] how far its coupling is the listed one; 0: frozen
+    double weight = 0.0;      ///< [-] of its coupling beside the listed one; 0: frozen
   };
   /// Which input the manifold of a tick answered.
   struct Answered {
@@ -123,16 +124,16 @@ class SceneCopy final : public ForceModel {
   static void hearMotion(Mirrored& mirrored, const ObservedObject& seen) noexcept;
   /// `now` [ticks] of the server.
   void mirrorOtherHands(const WorldView& world, const HandManifold& heard, double now) noexcept;
-  /// The hand pulls no more: it is frozen, has let go, or is out of reach.
-  void loosen(HandId hand, const WorldView& world) noexcept;
+  /// The hand pulls no more: it is frozen, has released its object, or is out of reach.
+  void fadePull(HandId hand, const WorldView& world) noexcept;
   [[nodiscard]] bool hasLeft(const OtherHand& other, const ObservedObject& seen) const noexcept;
-  void letGo(HandId hand) noexcept;
+  void endGrasp(HandId hand) noexcept;
   /// The hand pulls its object, by what was heard `ahead` [s] before the present tick.
   void mirrorPull(const HandPull& pull, double ahead) noexcept;
   void grasp(const HandPull& pull, const Pose& X_WG) noexcept;
   void contribute(const HandPull& pull) noexcept;
-  /// The coupling is as far as the grip says the one that was listed.
-  void applyGrip(HandId hand) noexcept;
+  /// The coupling has its weight of the one that was listed.
+  void applyWeight(HandId hand) noexcept;
   [[nodiscard]] bool isNeighbours(ObjectId object) const noexcept;
   void setStiffness(HandId hand, const HandStiffness& stiffness) noexcept;
   void listContacts(const HandManifold& heard, std::uint32_t seq) noexcept;
@@ -149,7 +150,7 @@ class SceneCopy final : public ForceModel {
   std::vector<bool> collides_;            ///< by pair: in the server
   HandManifold contacts_;
   Tick heard_tick_ = 0;
-  double silence_ = 0.0;                ///< [s] since then
+  double heard_age_ = 0.0;              ///< [s] since then
   std::int64_t behind_ = 0;             ///< [ticks] the heard tick less the input that it used
   std::array<Answered, 8> answered_{};  ///< by the last manifolds
   std::size_t answers_ = 0;             ///< so far

@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <functional>
@@ -101,10 +100,10 @@ class StationRunner {
   void printStep(const StepState& step);
   [[nodiscard]] Result<void> subscribeToClock();
   void takeLoadedScene();
-  void chooseForceModel(double round_trip, std::uint64_t late_cycles);
+  void chooseForceModel(std::optional<double> round_trip, std::uint64_t late_cycles);
   std::uint32_t sendInputs(const StationOutput& output);
-  void chooseRates(double round_trip);
-  double answersLost(const Telemetry& telemetry);
+  void chooseRates(std::optional<double> round_trip);
+  std::optional<double> answersLost(const Telemetry& telemetry);
   void sendTelemetry(Telemetry telemetry);
   void readKeys();
   /// In lockstep between two steps, unless `stop` comes or the run is over before the device answers.
@@ -203,7 +202,7 @@ Result<void> StationRunner::subscribe() {
   return all;
 }
 
-void StationRunner::chooseRates(double round_trip) {
+void StationRunner::chooseRates(std::optional<double> round_trip) {
   rates_.step(round_trip, force_model_, link_clock_.lossKnown() ? std::optional(choice_.loss) : std::nullopt,
               choice_.jitter);
   if (auto chosen = readers_.choose(rates_.slowAnswers()); !chosen) print(chosen.error().what);
@@ -218,10 +217,11 @@ Result<void> StationRunner::subscribeToClock() {
       });
 }
 
-/// [-] since the last Telemetry; NaN: not known.
-double StationRunner::answersLost(const Telemetry& telemetry) {
+/// [-] since the last Telemetry; none: not known.
+std::optional<double> StationRunner::answersLost(const Telemetry& telemetry) {
   const std::uint64_t answers = telemetry.samples - std::exchange(answers_counted_, telemetry.samples);
-  return readers_.hasSlowAlone() && answers >= 2 ? telemetry.answers_lost : std::nan("");
+  if (!readers_.hasSlowAlone() || answers < 2) return std::nullopt;
+  return telemetry.answers_lost;
 }
 
 void StationRunner::sendTelemetry(Telemetry telemetry) {
@@ -236,8 +236,8 @@ void StationRunner::sendTelemetry(Telemetry telemetry) {
   telemetry.limits = choice_.limits;
   telemetry.playout_ticks = choice_.playout_ticks;
   const std::uint64_t late = telemetry.loop_overruns - std::exchange(late_cycles_, telemetry.loop_overruns);
-  const double round_trip = telemetry.clock_known ? telemetry.round_trip : 0.0;
-  servo_.setLink(choice_.jitter + rates_.allowance(), round_trip);
+  const auto round_trip = telemetry.clock_known ? std::optional(telemetry.round_trip) : std::nullopt;
+  servo_.setLink(choice_.jitter + rates_.allowance(), round_trip.value_or(0.0));
   chooseForceModel(round_trip, late);
   chooseRates(round_trip);
   static_cast<void>(link_.send(telemetry));
@@ -250,7 +250,7 @@ void StationRunner::takeLoadedScene() {
   for (const auto& [part, matrix] : matrix_) servo_.receive(matrix);
 }
 
-void StationRunner::chooseForceModel(double round_trip, std::uint64_t late_cycles) {
+void StationRunner::chooseForceModel(std::optional<double> round_trip, std::uint64_t late_cycles) {
   if (round_trip > ForceModelChooser::kLong) copy_.loadBeside(sceneHash());
   const ForceModelKind kind = model_chooser_.step(round_trip, copy_.loaded(), late_cycles);
   if (kind == force_model_) return;
@@ -479,7 +479,7 @@ Result<RunState> StationRunner::takePart(const std::atomic<bool>& stop) {
       bool new_seat = false;
       if (auto back = rejoin(stop, new_seat); !back) return fail(back.error().what);
       if (new_seat && arming_.isUnderWay())
-        print("the session goes on once a device that is being armed answers");
+        print("the session continues once a device that is being armed answers");
       must_restart = must_restart || new_seat;
     }
     // meanwhile the loop obeys stops, and no force outlives the age of its contacts
@@ -487,6 +487,7 @@ Result<RunState> StationRunner::takePart(const std::atomic<bool>& stop) {
     if (std::exchange(must_restart, false)) {
       stopServo(false);
       restartStation();
+      armDevices(stop);
       startServo();
     }
     takeLoadedScene();

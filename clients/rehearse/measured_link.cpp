@@ -1,7 +1,6 @@
 #include "clients/rehearse/measured_link.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace tenon::rehearse {
 
@@ -15,20 +14,21 @@ void MeasuredLink::deliver(Tick now, haptic::Station& station) {
   rates_.step(round_trip_, station.forceModel(),
               clock_.lossKnown() ? std::optional(choice_.loss) : std::nullopt, choice_.jitter);
   station.setLinkJitter(choice_.jitter + rates_.allowance());
-  station.setLinkRoundTrip(round_trip_);
+  station.setLinkRoundTrip(round_trip_.value_or(0.0));
 }
 
 void MeasuredLink::measure(Tick now) {
   Telemetry telemetry;
   clock_.fill(telemetry, nanoseconds(now));
   ages_.fill(telemetry);
-  choice_ = chooser_.step({.input_gap = telemetry.input_gap,
-                           .trip_jitter = telemetry.trip_jitter,
-                           .age_jitter = telemetry.jitter,
-                           .inputs_lost = telemetry.inputs_lost,
-                           .answers_lost = rates_.slowAnswers() ? telemetry.answers_lost : std::nan(""),
-                           .input_period = rates_.inputPeriod(1)});
-  round_trip_ = telemetry.clock_known ? telemetry.round_trip : 0.0;
+  choice_ = chooser_.step(
+      {.input_gap = telemetry.input_gap,
+       .trip_jitter = telemetry.trip_jitter,
+       .age_jitter = telemetry.jitter,
+       .inputs_lost = telemetry.inputs_lost,
+       .answers_lost = rates_.slowAnswers() ? std::optional(telemetry.answers_lost) : std::nullopt,
+       .input_period = rates_.inputPeriod(1)});
+  round_trip_ = telemetry.clock_known ? std::optional(telemetry.round_trip) : std::nullopt;
 }
 
 void MeasuredLink::send(std::span<const DeviceInput> inputs, Tick now) {
@@ -86,7 +86,8 @@ void MeasuredLink::receive(Tick now, ClientId client, session::SessionRegistry& 
   buffer_.collect(now, taken_);
   for (const session::HandReading& reading : taken_.readings) readings.push_back(reading);
   // the choice is the station's: it is here after the link's delay
-  if (now % kPeriod == kPeriod / 2) registry.setLimits(client, choice_.limits, round_trip_);
+  if (now % kPeriod == kPeriod / 2)
+    registry.setLimits(client, choice_.limits, round_trip_.value_or(0.0), choice_.playout_ticks);
 }
 
 }  // namespace tenon::rehearse

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 
 #include "clients/haptic/force_age_statistics.h"
 #include "clients/haptic/input_pacer.h"
@@ -54,7 +55,7 @@ class MeasuredLink {
   haptic::LinkChoice choice_;
   haptic::RateChooser rates_;
   haptic::InputPacer pacer_;
-  double round_trip_ = 0.0;  ///< [s] 0: not known
+  std::optional<double> round_trip_;  ///< [s] none: not known
   session::InputBuffer buffer_;
   session::GapMeter gaps_;
   std::uint32_t received_ = 0, newest_seq_ = 0;  ///< as ClockSync says them

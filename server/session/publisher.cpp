@@ -11,13 +11,14 @@ namespace {
 constexpr Tick kPeriod50Hz = 20;  // [ticks]
 constexpr Tick kPeriod30Hz = 33;  // [ticks]
 
-// A slow manifold is sent out of turn when a neighbour's goal is farther off from where the one before lets
-// it be expected: above the resolution of encoders, which are in the velocities of single ticks.
-constexpr double kGoalError = 3e-5;         // [m]
-constexpr double kTurnRadius = 0.05;        // [m] at which an error of the orientation counts
-constexpr Tick kLeastSpacing = 2;           // [ticks]
-constexpr double kMostOutOfTurn = 12.0;     // at once: a turn
-constexpr double kOutOfTurnPerTick = 0.03;  // in the long run, of each hand
+// A slow manifold is sent at once (event-triggered) when a neighbour's goal is farther off from where the one
+// before lets it be expected: above the resolution of encoders, which are in the velocities of single ticks.
+constexpr double kGoalError = 3e-5;   // [m]
+constexpr double kTurnRadius = 0.05;  // [m] at which an error of the orientation counts
+constexpr Tick kLeastSpacing = 2;     // [ticks]
+// Token bucket of each hand.
+constexpr double kMostTokens = 12.0;  // a turn of 50 ms
+constexpr double kTokensPerTick = 0.03;
 
 /// [m] How far a goal is off from where `before`, `ahead` [s] earlier, lets it be expected (motion_law.h).
 double goalError(const HandPull& before, const HandPull& now, double ahead) {
@@ -87,7 +88,7 @@ void Publisher::addManifolds(const TickOutput& output, bool is_newest) {
     manifolds_[i].hand = HandId{static_cast<std::uint32_t>(i)};
     manifolds_[i].server_epoch = server_epoch_;
     if (is_due) outgoing_.manifolds.push_back(&manifolds_[i]);
-    if (is_50 || isOutOfTurn(manifolds_[i], slow_samples_[i])) {
+    if (is_50 || isTriggered(manifolds_[i], slow_samples_[i])) {
       slow_samples_[i].tick = output.tick;
       slow_samples_[i].others = manifolds_[i].others;
       outgoing_.manifolds_50.push_back(&manifolds_[i]);
@@ -95,8 +96,8 @@ void Publisher::addManifolds(const TickOutput& output, bool is_newest) {
   }
 }
 
-/// A neighbour turns, stops or starts: told within kLeastSpacing, as long as few are.
-bool Publisher::isOutOfTurn(const HandManifold& now, SlowSample& last) {
+/// A neighbour turns, stops or starts: told within kLeastSpacing, as long as there are tokens.
+bool Publisher::isTriggered(const HandManifold& now, SlowSample& last) {
   const Tick since = now.tick - last.tick;
   if (last.tick == 0 || since < kLeastSpacing) return false;
   const auto isOff = [&](const HandPull& pull) {
@@ -108,10 +109,10 @@ bool Publisher::isOutOfTurn(const HandManifold& now, SlowSample& last) {
   };
   if (std::none_of(now.others.begin(), now.others.end(), isOff)) return false;
   const double elapsed = static_cast<double>(now.tick - last.refilled);
-  last.left = std::min(kMostOutOfTurn, last.left + kOutOfTurnPerTick * elapsed);
+  last.tokens = std::min(kMostTokens, last.tokens + kTokensPerTick * elapsed);
   last.refilled = now.tick;
-  if (last.left < 1.0) return false;
-  last.left -= 1.0;
+  if (last.tokens < 1.0) return false;
+  last.tokens -= 1.0;
   return true;
 }
 

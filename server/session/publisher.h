@@ -58,12 +58,12 @@ class Publisher {
   struct SlowSample {
     Tick tick = 0;
     decltype(HandManifold::others) others;
-    Tick refilled = 0;  ///< `left`
-    double left = 0.0;  ///< [-] samples that may be sent out of turn now
+    Tick refilled = 0;    ///< `tokens`
+    double tokens = 0.0;  ///< [-] event-triggered samples that may be sent now
   };
 
   void addManifolds(const TickOutput& output, bool is_newest);
-  static bool isOutOfTurn(const HandManifold& now, SlowSample& last);
+  static bool isTriggered(const HandManifold& now, SlowSample& last);
   void addPairs(const TickOutput& output);
   void addStats(const TickOutput& output);
 

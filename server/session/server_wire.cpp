@@ -59,7 +59,10 @@ ServerWire::ServerWire(const WireOptions& options, std::shared_ptr<wire::Partici
       stops_(options.stop_file, *writers_) {
   stops_.not_kept = [this](const std::string& why) {
     log(Severity::kError, "emergency stop",
-        fmt::format("the emergency stop would not outlive a crash of the server: {}", why));
+        fmt::format("{} a crash of the server: {}",
+                    stops_.engaged() ? "the emergency stop would not outlive"
+                                     : "the emergency stop is over, but would stand again after",
+                    why));
   };
   if (options_.publish_journal) copies_ = std::make_unique<JournalCopies>(participant_, options_.session);
   if (!options_.seat_file.empty()) seats_ = std::make_unique<SeatKeeper>(options_.seat_file);
@@ -205,6 +208,7 @@ void ServerWire::update(const TickOutput& output) {
   now_ = output.tick;
   reception_->setTick(now_);
   registry_.updatePhase(output.phase);
+  registry_.updateCommands(output.commands_taken, output.commands_waiting);
   sendGuidance(output);
 }
 
@@ -393,7 +397,7 @@ void ServerWire::handle(const Telemetry& telemetry) {
   const auto now = std::chrono::steady_clock::now();
   if (now - inputs->second.limits_set_at < kBetweenLimits) return;
   const double round_trip = telemetry.clock_known ? telemetry.round_trip : 0.0;
-  if (!registry_.setLimits(telemetry.client, telemetry.limits, round_trip)) return;
+  if (!registry_.setLimits(telemetry.client, telemetry.limits, round_trip, telemetry.playout_ticks)) return;
   for (const HandId hand : station.hands)
     if (registry_.controllerOf(hand) == telemetry.client) passFreezeLimit(hand);
   inputs->second.limits_set_at = now;

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "idl/types/names.h"
+#include "server/session/input_buffer.h"
 #include "server/session/input_checks.h"
 
 namespace tenon::session {
@@ -266,11 +267,13 @@ Result<HandReading> SessionRegistry::validateDeviceInput(const DeviceInput& inpu
   return checkedReading(input, name);
 }
 
-bool SessionRegistry::setLimits(ClientId client, const HandLimits& limits, double round_trip) {
+bool SessionRegistry::setLimits(ClientId client, const HandLimits& limits, double round_trip,
+                                std::uint32_t playout) {
   const HandLimits bounded{std::clamp(limits.freeze_ticks, kFreezeTicks, kMostFreezeTicks),
                            std::clamp(limits.park_ticks, kParkTicks, kMostParkTicks)};
   constexpr double kMostTrip = 1.0;  // [s]
-  const double trip = round_trip > 0.0 ? std::min(round_trip, kMostTrip) : 0.0;
+  const double kept_back = kTickSeconds * std::min(playout, InputBuffer::kMostPlayout);
+  const double trip = std::min(kMostTrip, kept_back + (round_trip > 0.0 ? round_trip : 0.0));
   bool changed = false;
   for (std::uint32_t i = 0; i < controllers_.size(); ++i) {
     // a longer one counts at once, a shorter one when it is two steps shorter
@@ -342,9 +345,13 @@ CommandAck SessionRegistry::decide(const Command& command, Role role) {
   const bool is_vital = command.kind == CommandKind::kStop || command.kind == CommandKind::kPause ||
                         command.kind == CommandKind::kResume ||
                         command.kind == CommandKind::kClearEmergencyStop;
-  if (!is_vital && changes_.size() >= kMostWaitingChanges)
-    return answer(refuse(Refusal::kTooMany, fmt::format("{} changes wait already", changes_.size())));
+  // what is accepted has its place in the simulation
+  const bool is_of_steps = change->kind == ChangeKind::kGameCommand;
+  if (!is_vital &&
+      (changes_.size() >= kMostWaitingChanges || (is_of_steps && commandsThatWait() >= kMostWaitingCommands)))
+    return answer(refuse(Refusal::kTooMany, "too many commands wait already: send it again in a moment"));
   gate_.accept(change->kind);
+  if (is_of_steps) ++commands_accepted_;
   if (change->kind == ChangeKind::kSetEmergencyStop) {
     clearEmergencyStop();
     return answer({});

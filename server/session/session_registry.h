@@ -40,7 +40,7 @@ struct JoinProofs {
 class SessionRegistry {
  public:
   /// Commands beyond this many changes that no tick has taken are refused, but for pause, resume, stop and
-  /// the clear of an emergency stop.
+  /// the clear of an emergency stop; those to the state machine also beyond kMostWaitingCommands.
   static constexpr std::size_t kMostWaitingChanges = 16 * kMaxChanges;
 
   /// `scenario` must outlive this.
@@ -87,6 +87,11 @@ class SessionRegistry {
   [[nodiscard]] std::vector<ClientId> takeKicked();
   /// Phase after the last tick.
   void updatePhase(RunPhase phase) { gate_.update(phase); }
+  /// TickOutput::commands_taken and commands_waiting of a tick.
+  void updateCommands(std::uint64_t taken, std::size_t waiting) {
+    commands_taken_ = taken;
+    commands_waiting_ = waiting;
+  }
   /// Frees the client's hands. Its seat stays and can be taken again with its key. Unknown ids are ignored.
   void leave(ClientId client);
   /// A raise stands; of several the first one stops the simulation.
@@ -100,9 +105,11 @@ class SessionRegistry {
   /// (checkedReading).
   [[nodiscard]] Result<HandReading> validateDeviceInput(const DeviceInput& input) const;
   /// The station of `client` asks for these limits of all its hands, within those of HandLimits, and says the
-  /// `round_trip` [s] of its link: told to the simulation rounded up to steps of kTripStep, at once when it
-  /// grows, when it falls by two steps. False: it has no hands, or they are so already.
-  bool setLimits(ClientId client, const HandLimits& limits, double round_trip = 0.0);
+  /// `round_trip` [s] of its link. With the `playout` [ticks] for which the server keeps inputs back it is
+  /// told to the simulation, rounded up to steps of kTripStep, at once when it grows, when it falls by two
+  /// steps. False: it has no hands, or they are so already.
+  bool setLimits(ClientId client, const HandLimits& limits, double round_trip = 0.0,
+                 std::uint32_t playout = 0);
   /// In force with the next tick.
   [[nodiscard]] const HandLimits& limitsOf(HandId hand) const { return limits_[hand.value]; }
   /// [s] likewise; 0 up to kTripStep. Who comes back to a seat has that of before, until it is measured anew.
@@ -139,7 +146,7 @@ class SessionRegistry {
     CommandAck last_ack;      ///< id 0: none yet
     std::uint64_t left = 0;   ///< counts departures
     bool is_closed = false;   ///< its person was removed
-    double round_trip = 0.0;  ///< [s] of its link, as told to the simulation
+    double round_trip = 0.0;  ///< [s] from input to answer, as told to the simulation
   };
 
   /// Seats in all, of those that are present and of those that left: then that of who left first is given
@@ -159,6 +166,10 @@ class SessionRegistry {
   [[nodiscard]] tl::expected<void, Refused> kick(const Command& command, Role role);
   [[nodiscard]] tl::expected<ClientId, Refused> findPerson(const std::string& text) const;
   [[nodiscard]] bool isController(ClientId client, HandId hand) const;
+  /// On their way to the simulation and in it, as far as its last tick has told.
+  [[nodiscard]] std::uint64_t commandsThatWait() const {
+    return commands_accepted_ - commands_taken_ + commands_waiting_;
+  }
 
   const game_control::ScenarioFile& scenario_;
   CommandTranslator translator_;
@@ -175,6 +186,10 @@ class SessionRegistry {
   Mentoring mentoring_;
   CommandGate gate_;
   std::vector<ClientId> kicked_;
+  // to the state machine
+  std::uint64_t commands_accepted_ = 0;
+  std::uint64_t commands_taken_ = 0;
+  std::size_t commands_waiting_ = 0;
 };
 
 }  // namespace tenon::session

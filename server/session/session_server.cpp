@@ -29,6 +29,13 @@ constexpr auto kReturn = milliseconds(1500);
 constexpr auto kInputTimeout = std::chrono::seconds(30);  // in lockstep, for the input of a client
 constexpr auto kStopTimeout = std::chrono::seconds(1);    // likewise, once a command ends the run
 
+/// Those to the state machine.
+std::uint64_t countCommands(const TickInput& input) noexcept {
+  return static_cast<std::uint64_t>(
+      std::count_if(input.changes.begin(), input.changes.end(),
+                    [](const Change& change) { return change.kind == ChangeKind::kGameCommand; }));
+}
+
 /// [0.25 s since 2025] Larger at each start of a server, so that clients recognise frames of an earlier one.
 /// Larger than `former`, whatever the clock says.
 std::uint32_t newServerEpoch(std::uint32_t former) {
@@ -151,6 +158,8 @@ class Server final : public SessionServer {
     const auto begin = std::chrono::steady_clock::now();
     simulation_.tick(input);
     simulation_.fill(output);
+    commands_taken_ += countCommands(input);
+    output.commands_taken = commands_taken_;
     output.stats.compute_seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     govern(output.stats.compute_seconds);
@@ -189,6 +198,7 @@ class Server final : public SessionServer {
   std::uint64_t lost_entries_ = 0;  ///< of the journal, as was said
   std::uint64_t lost_copies_ = 0;   ///< likewise, of recorders
   std::uint64_t late_ticks_ = 0;
+  std::uint64_t commands_taken_ = 0;  ///< TickOutput::commands_taken
   // real time
   threads::SpscQueue<TickOutput> outputs_{64};
   TickInput input_;

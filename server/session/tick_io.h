@@ -72,6 +72,10 @@ inline constexpr Tick kMaxExternalPoseTicks = 1000;
 inline constexpr std::size_t kMaxHands = 16;
 inline constexpr std::size_t kMaxChanges = 16;
 
+/// Commands to the state machine that wait, those on their way to the simulation included: of some it takes
+/// one a tick.
+inline constexpr std::size_t kMostWaitingCommands = 256;
+
 /// All inputs of one tick. Together with the state before the tick it determines the state after it, bit for
 /// bit.
 ///
@@ -100,6 +104,8 @@ struct TickOutput {
   bool emergency_stop = false;
   bool forces_frozen = false;  ///< by ChangeKind::kFreezeForces
   game_control::StepStatus step;
+  std::uint64_t commands_taken = 0;     ///< to the state machine, by all ticks of this server
+  std::size_t commands_waiting = 0;     ///< of them and of those of a checkpoint: for a later tick
   std::vector<ObjectState> objects;     ///< index = ObjectId
   std::vector<HandManifold> manifolds;  ///< index = HandId; valid where `present`
   std::vector<bool> present;            ///< index = HandId: a client controls this hand and sends input

@@ -21,7 +21,9 @@ void RigStation::begin(std::span<const HandId> hands) {
   before_step_(0.0);
   device_.read(state);
   if (model_ == RigModel::kSceneCopy) hand_.setForceModel(haptic::ForceModelKind::kSceneCopy);
-  static_cast<void>(hand_.begin(hands.front(), client_, p_WD_ + state.X_DH.translation(), true));
+  hand_.begin(hands.front(), client_, p_WD_ + state.X_DH.translation(), true);
+  static_cast<void>(hand_.armDevice());
+  hand_.handBack();
 }
 
 void RigStation::manifoldReceived(const HandManifold& manifold) noexcept {

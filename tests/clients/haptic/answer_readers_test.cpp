@@ -97,14 +97,31 @@ TEST_F(AnswerReadersTest, KeepTheFormerOnesUntilTheNewOnesHaveHeardAll) {
   ASSERT_TRUE(readers_->open());
   ASSERT_TRUE(readers_->choose(true));
   ASSERT_TRUE(hearUntil([&] { return matches(1, 1); }));
+  ASSERT_TRUE(manifolds_.write({.hand = HandId{1}, .tick = 1}));
   ASSERT_TRUE(slow_frames_.write({.tick = 2}));
-  ASSERT_TRUE(hearUntil([&] { return slow_ == 1; }));
+  ASSERT_TRUE(hearUntil([&] { return of_each_tick_ == 1 && slow_ == 1; }));
   for (int call = 1; call < AnswerReaders::kMostCalls; ++call) {
     ASSERT_TRUE(readers_->choose(true));
     hear();
-    ASSERT_TRUE(matches(1, 1)) << "no manifold, call " << call;
+    ASSERT_TRUE(matches(1, 1)) << "no slow manifold, call " << call;
   }
   ASSERT_TRUE(readers_->choose(true));
+  expectRead(0, 1);
+}
+
+TEST_F(AnswerReadersTest, DoNotWaitForManifoldsOfAnAbsentHand) {
+  ASSERT_TRUE(readers_->open());
+  ASSERT_TRUE(readers_->choose(true));
+  ASSERT_TRUE(hearUntil([&] { return matches(1, 1); }));
+  ASSERT_TRUE(frames_.write({.tick = 1}));
+  ASSERT_TRUE(hearUntil([&] { return of_each_tick_ == 1; }));
+  ASSERT_TRUE(readers_->choose(true));
+  hear();
+  EXPECT_TRUE(matches(1, 1)) << "the new ones have heard nothing";
+  ASSERT_TRUE(slow_frames_.write({.tick = 2}));
+  ASSERT_TRUE(hearUntil([&] { return slow_ == 1; }));
+  ASSERT_TRUE(readers_->choose(true));
+  EXPECT_TRUE(readers_->hasSlowAlone());
   expectRead(0, 1);
 }
 

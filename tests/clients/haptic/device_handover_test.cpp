@@ -20,7 +20,11 @@ class SlowDevice : public devices::SimulatedDevice {
     if (during_arm) std::exchange(during_arm, {})();
     return SimulatedDevice::arm();
   }
-  int armed = 0;
+  [[nodiscard]] Result<void> resetFault() override {
+    ++reset;
+    return SimulatedDevice::resetFault();
+  }
+  int armed = 0, reset = 0;
   std::function<void()> during_arm;
 };
 
@@ -37,6 +41,28 @@ TEST(DeviceHandover, APressAfterAWithdrawnRequestIsNotLost) {
   ASSERT_TRUE(handover.pending());
   ASSERT_TRUE(handover.serve(device));
   EXPECT_EQ(device.armed, 1);
+  handover.handBack();
+  EXPECT_FALSE(handover.pending());
+}
+
+TEST(DeviceHandover, AHandThatBeginsArmsItsDeviceWithoutAResetWhichIsThePersonsAlone) {
+  DeviceHandover handover;
+  SlowDevice device;
+  handover.askWithoutReset();
+  ASSERT_TRUE(handover.serve(device));
+  EXPECT_EQ(device.armed, 1);
+  EXPECT_EQ(device.reset, 0);
+  handover.handBack();
+  EXPECT_FALSE(handover.pending());
+
+  // a press while it is armed is for a reset
+  handover.askWithoutReset();
+  device.during_arm = [&] { handover.ask(); };
+  ASSERT_TRUE(handover.serve(device));
+  handover.handBack();
+  ASSERT_TRUE(handover.pending());
+  ASSERT_TRUE(handover.serve(device));
+  EXPECT_EQ(device.reset, 1);
   handover.handBack();
   EXPECT_FALSE(handover.pending());
 }

@@ -17,10 +17,10 @@ TEST(ForceModelChooser, TakesTheCopyOverALongLinkAndTheManifoldOverAShortOne) {
   EXPECT_EQ(chooser.step(0.003, true, 0), kManifold);
   EXPECT_EQ(chooser.step(0.005, true, 0), kCopy);
   EXPECT_EQ(chooser.step(0.003, true, 0), kCopy) << "not to and fro";
-  EXPECT_EQ(chooser.step(0.0, true, 0), kCopy) << "not known";
+  EXPECT_EQ(chooser.step(std::nullopt, true, 0), kCopy) << "not known";
   EXPECT_EQ(chooser.step(0.001, true, 0), kManifold);
   EXPECT_EQ(ForceModelChooser(ForceModelWish::kManifold).step(0.05, true, 0), kManifold);
-  EXPECT_EQ(ForceModelChooser(ForceModelWish::kSceneCopy).step(0.0, true, 0), kCopy);
+  EXPECT_EQ(ForceModelChooser(ForceModelWish::kSceneCopy).step(std::nullopt, true, 0), kCopy);
 }
 
 TEST(ForceModelChooser, AStationThatIsTooSlowDoesWithoutTheCopyForAMinute) {

@@ -21,7 +21,9 @@ struct HandAboveFloor {
                           double stiffness = 1000.0)
       : server(stiffness), device(std::move(held)), hand(*device) {
     world.begin(server.objects(), 0, 0);
-    EXPECT_TRUE(hand.begin(kHand, ClientId{1}, Vector3(0.0, 0.0, height), true));
+    hand.begin(kHand, ClientId{1}, Vector3(0.0, 0.0, height), true);
+    EXPECT_TRUE(hand.armDevice());
+    hand.handBack();
   }
   [[nodiscard]] devices::HumanArm& arm() const { return *devices::simulatedHumanArm(*device); }
   [[nodiscard]] double force() const { return hand.state().F_Ho_W.force.norm(); }

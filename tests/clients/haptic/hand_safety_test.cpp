@@ -61,7 +61,9 @@ class RecordingDevice final : public devices::HapticDevice {
 
 struct RecordedHand {
   explicit RecordedHand(const devices::DeviceCaps& caps) : device(caps), hand(device) {
-    EXPECT_TRUE(hand.begin(test::kHand, ClientId{1}, Vector3::Zero(), true));
+    hand.begin(test::kHand, ClientId{1}, Vector3::Zero(), true);
+    EXPECT_TRUE(hand.armDevice());
+    hand.handBack();
     step();
     device.calls.clear();
   }
@@ -282,7 +284,9 @@ TEST(AnswerAge, AfterALongGapOldAnswersAreNotFresh) {
 TEST(Bracelet, IsSilentAndDisarmedAtTheEnd) {
   RecordingDevice device(devices::Vibrotac().caps());
   Bracelet bracelet(device, {});
-  ASSERT_TRUE(bracelet.begin(test::kHand, true));
+  bracelet.begin(test::kHand, true);
+  EXPECT_TRUE(bracelet.armDevice());
+  bracelet.handBack();
   bracelet.step(1, kTickSeconds);
   bracelet.finish(true);
   bracelet.step(2, kTickSeconds);
@@ -296,7 +300,9 @@ TEST(Bracelet, IsSilentAndDisarmedAtTheEnd) {
 TEST(Bracelet, VibratesAsLongAsItsContactsAreFreshAndNoStopSilencesIt) {
   devices::Vibrotac device;
   Bracelet bracelet(device, {});
-  ASSERT_TRUE(bracelet.begin(test::kHand, true));
+  bracelet.begin(test::kHand, true);
+  EXPECT_TRUE(bracelet.armDevice());
+  bracelet.handBack();
   HandManifold pressed;
   pressed.hand = test::kHand;
   ManifoldContact contact;

@@ -42,7 +42,7 @@ TEST(LimitChooser, TheLossIsThatOfTheWorseDirectionAndThatOfAnswersIsForgottenSl
   }
   EXPECT_NEAR(chooser.step(now).loss, 0.05, 0.01);
   EXPECT_EQ(chooser.step(now).playout_ticks, 1U) << "inputs alone are kept back";
-  now.answers_lost = std::numeric_limits<double>::quiet_NaN();
+  now.answers_lost.reset();
   EXPECT_GT(chooser.step(now).loss, 0.03);
   for (int i = 0; i < 300; ++i) static_cast<void>(chooser.step(now));
   EXPECT_NEAR(chooser.step(now).loss, 0.01, 1e-12);

@@ -1,12 +1,13 @@
 #include <algorithm>
 #include <cmath>
-#include <deque>
+#include <functional>
 #include <memory>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "clients/haptic/haptic_hand.h"
+#include "clients/haptic/rate_chooser.h"
 #include "devices/simulated/sigma7.h"
 #include "idl/types/motion_law.h"
 #include "tests/clients/haptic/delayed_station.h"
@@ -26,6 +27,7 @@ using test::kPart;
 using test::kRight;
 using test::kSlowAnswers;
 using test::kStiffness;
+using test::StationAnswers;
 
 constexpr Tick kWay = 10;  // [ticks] one way
 
@@ -35,86 +37,47 @@ class HandBesideAnother {
   using Path = std::function<Vector3(double)>;
 
   /// `right` [m] at a time [s], in the world.
-  explicit HandBesideAnother(const Path& right)
+  explicit HandBesideAnother(const Path& right, const StationAnswers& answers = {},
+                             ForceModelKind kind = ForceModelKind::kSceneCopy)
       : scene_(blocks()),
-        server(scene_, {}),
         device_(devices::sigma7Model(), [=](double t) { return Pose(right(t) - right(0.0)); }),
-        hand(device_) {
-    std::vector<SceneObject> objects(scene_->objects.size());
-    for (std::uint32_t i = 0; i < objects.size(); ++i) {
-      objects[i].object = ObjectId{i};
-      objects[i].size = scene_->objects[i].structures->info.box_M.sizes();
-    }
-    world_.begin(objects, 0, 0);
+        hand(device_),
+        server_(scene_, kWay, answers),
+        kind_(kind) {
     hand.setScene(scene_);
-    hand.setForceModel(ForceModelKind::kSceneCopy);
+    hand.setForceModel(kind);
+    if (answers.manifold_period > 1) hand.setLinkJitter(RateChooser::kSlowAnswers);
     hand.setLinkRoundTrip(2.0 * kWay * kTickSeconds);
-    EXPECT_TRUE(hand.begin(kRight, ClientId{1}, right(0.0), true));
-    for (const HandId one : {kRight, kLeft}) server.setHandPresent(one, true);
+    hand.begin(kRight, ClientId{1}, right(0.0), true);
+    EXPECT_TRUE(hand.armDevice());
+    hand.handBack();
   }
 
   /// One millisecond with the left hand at p_WLeft.
   void tick(const Vector3& p_WLeft) {
-    const auto seq = static_cast<std::uint32_t>(++now_);
-    for (; !frames_.empty() && frames_.front().tick + kWay < now_; frames_.pop_front())
-      world_.receive(frames_.front());
-    for (; !manifolds_.empty() && manifolds_.front().tick + kWay < now_; manifolds_.pop_front())
-      hand.receive(manifolds_.front());
-    hand.step(seq, world_, kTickSeconds);
-    inputs_.push_back(hand.input());
-    for (; inputs_.size() > kWay; inputs_.pop_front()) {
-      server.setHandPose(kRight, inputs_.front().sample.X_WH, inputs_.front().sample.V_WH);
-      answered_ = inputs_.front().sample.seq;
-    }
-    server.setHandPose(kLeft, Pose(p_WLeft), {});
-    server.step();
-    send();
+    const std::uint32_t seq =
+        server_.deliver([this](const HandManifold& manifold) { hand.receive(manifold); });
+    hand.step(seq, server_.world(), kTickSeconds);
+    server_.step(hand.input().sample.X_WH, hand.input().sample.V_WH, p_WLeft);
   }
+  [[nodiscard]] simulation::Environment& server() { return server_.environment(); }
   [[nodiscard]] Vector3 force() const { return hand.state().F_Ho_W.force; }
-  /// The force is that of the copy, and was not interrupted.
+  /// The force is that of the model, and was not interrupted.
   [[nodiscard]] bool isRendered() const {
     const std::uint32_t soft_start = devices::bit(devices::SafetyRule::kSoftStart);
-    return hand.forceModel() == ForceModelKind::kSceneCopy && (hand.state().safety_flags & soft_start) == 0;
+    return hand.forceModel() == kind_ && (hand.state().safety_flags & soft_start) == 0;
   }
 
  private:
-  void send() {
-    WorldFrame frame;
-    frame.tick = now_;
-    for (std::uint32_t i = 0; i < server.objects().size(); ++i) {
-      const simulation::ObjectMotion& motion = server.objects()[i];
-      ObjectState state{ObjectId{i}, motion.epoch, motion.X_WO};
-      state.V_WO << motion.V_WO.linear.cast<float>(), motion.V_WO.angular.cast<float>();
-      state.holder = motion.holder;
-      state.status = static_cast<std::uint8_t>(motion.status);
-      frame.states.push_back(state);
-    }
-    frames_.push_back(frame);
-    HandManifold manifold;
-    server.manifold(kRight, manifold);
-    manifold.tick = now_;
-    manifold.answers_seq = answered_;
-    manifolds_.push_back(manifold);
-  }
-
   std::shared_ptr<const simulation::Scene> scene_;
-
- public:
-  simulation::Environment server;
-
- private:
   test::PathDevice device_;
 
  public:
   HapticHand hand;
 
  private:
-  WorldView world_;
-  std::deque<DeviceInput> inputs_;
-  std::deque<WorldFrame> frames_;
-  std::deque<HandManifold> manifolds_;
-  std::uint32_t answered_ = 0;
-  Tick now_ = 0;
+  test::DelayedServer server_;
+  ForceModelKind kind_;
 };
 
 //   [block]->[part]     the block is pressed by 2 mm into the part of another person, whose link then fails
@@ -130,7 +93,7 @@ TEST(AnothersFreeze, IsNoStepOfTheForceForWhoPressesWhatTheyHold) {
   ASSERT_GT(pressed, 1.0);
   Vector3 last = both.force();
   for (const bool frozen : {true, false, true, false}) {
-    both.server.setHandFrozen(kLeft, frozen);
+    both.server().setHandFrozen(kLeft, frozen);
     for (int i = 0; i < 500; ++i) {
       both.tick(p_WLeft);
       ASSERT_TRUE(both.isRendered()) << i;
@@ -147,7 +110,7 @@ TEST(AnothersFreeze, FadesTheirPullOnASharedPartAndItReturnsWithoutAStep) {
   HandBesideAnother both([=](double) { return p_WH; });
   const Vector3 away(0.2, 0.0, 0.2);
   for (int i = 0; i < 500; ++i) both.tick(away);
-  both.server.grab(kLeft, kBlock);
+  both.server().grab(kLeft, kBlock);
   double aside = 0.0;  // [m]
   for (int i = 0; i < 3000; ++i) both.tick(away + Vector3(0.0, aside = std::min(0.005, aside + 1e-5), 0.0));
   ASSERT_TRUE(both.isRendered());
@@ -161,10 +124,10 @@ TEST(AnothersFreeze, FadesTheirPullOnASharedPartAndItReturnsWithoutAStep) {
       last = both.force();
     }
   };
-  both.server.setHandFrozen(kLeft, true);
+  both.server().setHandFrozen(kLeft, true);
   follow(500);
   EXPECT_LT(last.norm(), 0.1);
-  both.server.setHandFrozen(kLeft, false);
+  both.server().setHandFrozen(kLeft, false);
   follow(500);
   EXPECT_LT(last.norm(), 0.1) << "it holds the part where it is by then";
   for (int i = 0; i < 500; ++i) {
@@ -180,14 +143,14 @@ TEST(AnothersPull, FadesWhenTheyTakeTheirOwnPartInstead) {
   const Vector3 p_WH(0.0, 0.0, 0.2), away(0.15, 0.0, 0.2);
   HandBesideAnother both([=](double) { return p_WH; });
   for (int i = 0; i < 500; ++i) both.tick(away);
-  both.server.grab(kLeft, kBlock);
+  both.server().grab(kLeft, kBlock);
   double aside = 0.0;  // [m]
   for (int i = 0; i < 3000; ++i) both.tick(away + Vector3(0.0, aside = std::min(0.005, aside + 1e-5), 0.0));
   ASSERT_TRUE(both.isRendered());
   Vector3 last = both.force();
   ASSERT_GT(last.y(), 2.0);
   const double step = 0.2 * last.norm();  // the pull fades within 20 ms
-  both.server.grab(kLeft, kPart);
+  both.server().grab(kLeft, kPart);
   for (int i = 0; i < 500; ++i) {
     both.tick(away + Vector3(0.0, aside, 0.0));
     ASSERT_TRUE(both.isRendered()) << i;
@@ -224,6 +187,33 @@ TEST(ASharedPart, IsCarriedWithoutStepsOfTheForce) {
     EXPECT_GT(last.x(), 0.5) << "the other one pulls as before";
     EXPECT_LT(drag, 0.3);
   }
+}
+
+//   without copies likewise: what the other one does comes 50 times a second, and between that as it moved
+TEST(ASharedPart, IsCarriedWithoutStepsOfTheForceByWhoHasNoCopyOfTheScene) {
+  const auto carried = [](double t) {
+    const double since = std::max(0.0, t - 3.0);  // both accelerate within 100 ms
+    return Vector3(0.0, since < 0.1 ? 0.5 * since * since : 0.1 * (since - 0.05), 0.0);
+  };
+  HandBesideAnother both([&](double t) { return Vector3(0.0, 0.0, 0.2) + carried(t); }, kSlowAnswers,
+                         ForceModelKind::kManifold);
+  const Vector3 away(0.2, 0.0, 0.2);
+  for (int i = 0; i < 500; ++i) both.tick(away);
+  both.server().setHandRoundTrip(kRight, 2.0 * kTickSeconds * kWay);
+  both.server().grab(kLeft, kBlock);
+  Vector3 last = Vector3::Zero();
+  for (int i = 501; i <= 5000; ++i) {
+    const double t = 1e-3 * i;
+    // between two manifolds it jumps by 5 mm, as after a loss
+    both.tick(away + carried(t) + Vector3(t < 4.005 ? 0.003 : 0.008, 0.0, 0.0));
+    if (i <= 2500) continue;
+    ASSERT_TRUE(both.isRendered()) << i;
+    if (i > 2501) {
+      ASSERT_LE((both.force() - last).norm(), 0.2) << i;
+    }
+    last = both.force();
+  }
+  EXPECT_GT(last.x(), 1.0) << "the other one pulls";
 }
 
 //   a part that moves to and fro is heard 100 times a second: it is as old as its newest pose, not as the

@@ -1,6 +1,7 @@
 #include "clients/haptic/rate_chooser.h"
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -15,21 +16,21 @@ constexpr auto kListed = ForceModelKind::kManifold;
 
 TEST(RateChooser, ALongLinkHasSparseInputsAndSlowAnswersACopySlowAnswersAlone) {
   struct Second {
-    double round_trip;
+    std::optional<double> round_trip;
     ForceModelKind kind;
     bool far, slow;
   };
   RateChooser rates;
-  for (const Second& second : {Second{0.0, kListed, false, false},
+  for (const Second& second : {Second{std::nullopt, kListed, false, false},
                                {0.001, kListed, false, false},
                                {0.010, kCopy, false, true},
                                {0.021, kCopy, true, true},
                                {0.016, kCopy, true, true},
-                               {0.0, kListed, true, true},
+                               {std::nullopt, kListed, true, true},
                                {0.014, kListed, false, false}}) {
     rates.step(second.round_trip, second.kind, 0.0, 0.0);
-    EXPECT_EQ(rates.isFar(), second.far) << second.round_trip;
-    EXPECT_EQ(rates.slowAnswers(), second.slow) << second.round_trip;
+    EXPECT_EQ(rates.isFar(), second.far) << second.round_trip.value_or(0.0);
+    EXPECT_EQ(rates.slowAnswers(), second.slow) << second.round_trip.value_or(0.0);
   }
 }
 
@@ -59,7 +60,7 @@ TEST(RateChooser, AnswersAreSlowOnlyWhereThoseLostInARowAndJitterAreNoGap) {
 
 TEST(RateChooser, ATenthIsTakenToBeLostUntilTheLossIsKnown) {
   RateChooser rates;
-  rates.step(0.0, kCopy, std::nullopt, 0.0);
+  rates.step(std::nullopt, kCopy, std::nullopt, 0.0);
   EXPECT_FALSE(rates.isFar()) << "nothing is known yet";
   rates.step(0.05, kCopy, std::nullopt, 0.0);
   EXPECT_TRUE(rates.isFar());

@@ -51,7 +51,9 @@ class HandInPlate : public testing::Test {
     std::vector<SceneObject> objects(3);
     for (std::uint32_t i = 0; i < 3; ++i) objects[i].object = ObjectId{i};
     world_.begin(objects, 0, 0);
-    EXPECT_TRUE(hand_.begin(kHand, ClientId{1}, Vector3(0.0, 0.0, 0.02 - kDepth), true));
+    hand_.begin(kHand, ClientId{1}, Vector3(0.0, 0.0, 0.02 - kDepth), true);
+    EXPECT_TRUE(hand_.armDevice());
+    hand_.handBack();
     environment_->setHandPresent(kHand, true);
     environment_->setHandPose(kHand, hand_.pose(), {});
     environment_->grab(kHand, kBox);

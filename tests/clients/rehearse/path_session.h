@@ -64,7 +64,9 @@ class PathStation final : public haptic::Station {
 
  protected:
   void begin(std::span<const HandId> hands) override {
-    ASSERT_TRUE(hand.begin(hands.front(), client_, p_WH_, true));
+    hand.begin(hands.front(), client_, p_WH_, true);
+    EXPECT_TRUE(hand.armDevice());
+    hand.handBack();
   }
   void manifoldReceived(const HandManifold& manifold) noexcept override { hand.receive(manifold); }
   void armingChanged() noexcept override {}

@@ -245,12 +245,48 @@ TEST_F(RegistryCommands, ChangesThatWaitAreLimitedAndDoNotDelayAStop) {
   (void)changes();
   for (std::size_t i = 0; i < SessionRegistry::kMostWaitingChanges; ++i)
     ASSERT_TRUE(command(instructor, CommandKind::kRelease, "left").accepted) << i;
-  EXPECT_THAT(command(instructor, CommandKind::kRelease, "left").reason, HasSubstr("wait already"));
+  EXPECT_EQ(command(instructor, CommandKind::kRelease, "left").refusal, Refusal::kTooMany);
   registry_.engageEmergencyStop();
   const auto first = changes();
   ASSERT_FALSE(first.empty());
   EXPECT_EQ(first[0].kind, ChangeKind::kSetEmergencyStop);
   EXPECT_TRUE(command(instructor, CommandKind::kRelease, "left").accepted);
+}
+
+// of commands that may end a step the state machine takes one a tick, of which sixteen may come with each
+TEST_F(RegistryCommands, NoCommandThatWasAcceptedIsLostHoweverManyWait) {
+  const ClientId instructor = join("t", Role::kInstructor).client;
+  registry_.updatePhase(RunPhase::kRunning);
+  (void)changes();
+  std::uint64_t accepted = 0, taken = 0;
+  std::size_t waiting = 0, refused = 0;
+  for (int tick = 0; tick < 100; ++tick) {
+    for (std::size_t i = 0; i < kMaxChanges; ++i) {
+      const CommandAck ack = command(instructor, CommandKind::kSkipStep);
+      ack.accepted ? ++accepted : ++refused;
+      if (!ack.accepted) EXPECT_EQ(ack.refusal, Refusal::kTooMany);
+    }
+    const std::size_t arrived = changes().size();
+    taken += arrived;
+    waiting += arrived;
+    ASSERT_LE(waiting, kMostWaitingCommands) << "the simulation has no place for more";
+    if (waiting > 0) --waiting;
+    registry_.updateCommands(taken, waiting);
+  }
+  EXPECT_GT(refused, 0U);
+  EXPECT_GE(accepted, kMostWaitingCommands);
+  EXPECT_TRUE(command(instructor, CommandKind::kPause).accepted) << "it waits for none of them";
+  registry_.updateCommands(taken, 0);
+  EXPECT_TRUE(command(instructor, CommandKind::kSkipStep).accepted);
+}
+
+TEST_F(RegistryCommands, CommandsOfACheckpointCount) {
+  const ClientId instructor = join("t", Role::kInstructor).client;
+  registry_.updatePhase(RunPhase::kRunning);
+  registry_.updateCommands(0, kMostWaitingCommands);
+  EXPECT_EQ(command(instructor, CommandKind::kSkipStep).refusal, Refusal::kTooMany);
+  registry_.updateCommands(0, kMostWaitingCommands - 1);
+  EXPECT_TRUE(command(instructor, CommandKind::kSkipStep).accepted);
 }
 
 TEST_F(RegistryCommands, AStopIsNotLiftedByTheEndOfAnEarlierOneThatStillWaits) {

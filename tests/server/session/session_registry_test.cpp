@@ -208,6 +208,15 @@ TEST_F(SessionRegistryTest, ARoundTripIsToldInStepsAndNotForEachThatIsALittleDif
   EXPECT_EQ(registry_.roundTripOf(test::kRightHand), 0.0);
 }
 
+TEST_F(SessionRegistryTest, ForWhatInputsAreKeptBackTheirRoundTripIsLonger) {
+  const Welcome welcome = join("a", Role::kTrainee, {"right"});
+  EXPECT_FALSE(registry_.setLimits(welcome.client, {}, 0.0004, 2)) << "that of a local network with losses";
+  EXPECT_TRUE(registry_.setLimits(welcome.client, {}, 0.0041, 2));
+  EXPECT_NEAR(registry_.roundTripOf(test::kRightHand), 0.0075, 1e-12);
+  EXPECT_FALSE(registry_.setLimits(welcome.client, {}, 0.0041, 1'000'000))
+      << "no longer than the server does";
+}
+
 TEST_F(SessionRegistryTest, AStationChoosesTheLimitsOfItsOwnHandsWithinTheBoundsAndUntilItLeaves) {
   const Welcome welcome = join("a", Role::kTrainee, {"right"});
   (void)changes();
