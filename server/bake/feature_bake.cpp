@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -30,6 +31,10 @@ constexpr double kCos6 = 0.995;       // [-] a polyline that turns less at a ver
 constexpr double kCos30 = 0.866;      // [-] a polyline that turns by more at a vertex has a corner there
 constexpr double kEndless = 1.0;      // [m] from any end of an edge
 constexpr double kCos20 = 0.94;       // [-] faces of edges that are merged turn by less
+
+constexpr double kMaxSkew = 3.0;    // [-] of the plane in which an edge ends: 72 degrees
+constexpr double kFlatSkew = 1e-3;  // [-] less is rounding
+constexpr double kStraight = 0.02;  // [voxels] by which a vertex may be off a line
 
 /// [-] Of the widths of two faces, from which on they are no equal facets of one surface.
 constexpr double kChamfer = 3.0;
@@ -60,7 +65,7 @@ struct Sizes {
 
   double apart;           ///< of the other part's points, about
   double piece;           ///< longest piece of an edge
-  double straight;        ///< vertices nearer to a line, and faces to a plane, are on it
+  double straight;        ///< by which a vertex may be off a line at most
   double sharp_radius;    ///< rounder edges are sampled as surfaces, without their edges
   double largest_radius;  ///< rounder surfaces are no features; of facets, on a ball of equal ones 1.5 radii
 
@@ -81,12 +86,7 @@ class FeatureFinder {
  public:
   FeatureFinder(const WeldedMesh& mesh, const TriangleTree& surface, const structures::DistanceField& field,
                 const Sizes& sizes)
-      : mesh_(mesh),
-        field_(field),
-        normals_(field),
-        sizes_(sizes),
-        reach_(surface, sizes.straight),
-        grid_(sizes.apart) {
+      : mesh_(mesh), field_(field), normals_(field), sizes_(sizes), reach_(surface), grid_(sizes.apart) {
     const std::vector<Edge> edges = mesh.edges();
     const FaceSides sides(mesh, edges, field);
     for (const Edge& edge : edges) addIfConvex(edge, sides);
@@ -100,6 +100,11 @@ class FeatureFinder {
 
  private:
   [[nodiscard]] const Vector3& at(std::uint32_t vertex) const { return mesh_.positions[vertex]; }
+
+  /// [m] Vertices nearer to a line, and faces to a plane, are on it: a fit may be as narrow as a voxel.
+  [[nodiscard]] double straightAt(const Vector3& p) const {
+    return std::min(sizes_.straight, kStraight * field_.voxelAt(p));
+  }
 
   /// Sorts an edge into the sharp or the round ones when it is convex.
   void addIfConvex(const Edge& edge, const FaceSides& sides) {
@@ -155,6 +160,13 @@ class FeatureFinder {
       at_vertex[sharp_[i].from].push_back(i);
       at_vertex[sharp_[i].to].push_back(i);
     }
+    faces_at_.clear();
+    for (std::uint32_t i = 0; i < mesh_.corners.size(); ++i) {
+      for (const std::uint32_t vertex : mesh_.corners[i]) {
+        const std::size_t edges = at_vertex[vertex].size();
+        if (edges > 0 && edges != 2) faces_at_[vertex].push_back(i);
+      }
+    }
     std::vector<bool> done(sharp_.size(), false);
     const auto follow = [&](std::uint32_t vertex, std::uint32_t edge) {
       std::vector<std::uint32_t> chain{vertex};
@@ -195,7 +207,7 @@ class FeatureFinder {
     double reached = 0.0;
     for (std::size_t k = i + 1; k < j; ++k) {
       const Vector3 to = at(chain[k]) - a;
-      if ((to - along * along.dot(to)).norm() > sizes_.straight || along.dot(to) < reached) return false;
+      if ((to - along * along.dot(to)).norm() > straightAt(a) || along.dot(to) < reached) return false;
       reached = along.dot(to);
     }
     const auto& first = sharp_[edges[i]].into_M;
@@ -211,7 +223,46 @@ class FeatureFinder {
     std::array<Vector3, 2> into;         // as FeatureEdge
     double turn = -1.0;                  // [-] cosine of the angle to the segment before; -1: there is none
     std::array<double, 2> beyond{0, 0};  // [m] to the next corner, before and behind
+    // [-] of the planes in which it ends, before and behind, see skewOf
+    std::array<Vector3, 2> skew{Vector3::Zero(), Vector3::Zero()};
   };
+
+  /// [-] Of a plane in which an edge ends, with its normal: a point at r from the edge is at the end where it
+  /// is skew . r before the end of the edge. `out`: unit vector along the edge. Zero where the plane is too
+  /// oblique.
+  [[nodiscard]] static Vector3 skewOf(const Vector3& out, const Vector3& normal) {
+    const double slope = normal.dot(out);
+    const Vector3 across = normal - slope * out;
+    if (across.norm() >= kMaxSkew * std::abs(slope)) return Vector3::Zero();
+    return across / slope;
+  }
+
+  /// Whether an edge continues beyond a segment: it is no corner where it turns little, or around the outside
+  /// of a solid, as the rim of a hole does.
+  [[nodiscard]] static bool isContinued(const Segment& before, const Segment& behind) {
+    const double first = before.skew[1].dot(before.into[0]);
+    const double second = before.skew[1].dot(before.into[1]);
+    return behind.turn > kCos30 || (std::max(first, second) < kFlatSkew && first + second < -kFlatSkew);
+  }
+
+  /// The skew of the plane of the face at a corner where an edge ends. `out` as in skewOf(). Zero where
+  /// there is not one plane beside those of the edge itself.
+  [[nodiscard]] Vector3 skewAtCorner(std::uint32_t vertex, const Vector3& out,
+                                     const std::array<Vector3, 2>& into) const {
+    const auto faces = faces_at_.find(vertex);
+    if (faces == faces_at_.end()) return Vector3::Zero();
+    const std::array<Vector3, 2> sides{out.cross(into[0]), out.cross(into[1])};
+    Vector3 found = Vector3::Zero();
+    for (const std::uint32_t face : faces->second) {
+      const auto& [a, b, c] = mesh_.triangles[face];
+      Vector3 normal = (b - a).cross(c - a).normalized();
+      if (std::abs(normal.dot(sides[0])) > kCos6 || std::abs(normal.dot(sides[1])) > kCos6) continue;
+      if (normal.dot(out) < 0.0) normal = -normal;
+      if (!found.isZero() && normal.dot(found) < kCos6) return Vector3::Zero();
+      if (found.isZero()) found = normal;
+    }
+    return found.isZero() ? found : skewOf(out, found);
+  }
 
   /// Merges edges of one line.
   [[nodiscard]] std::vector<Segment> segmentsOf(const std::vector<std::uint32_t>& chain,
@@ -227,17 +278,27 @@ class FeatureFinder {
     }
     const std::size_t count = segments.size();
     const bool closed = chain.front() == chain.back();
-    for (std::size_t i = closed ? 0 : 1; i < count; ++i)
-      segments[i].turn = segments[(i + count - 1) % count].along.dot(segments[i].along);
+    for (std::size_t i = closed ? 0 : 1; i < count; ++i) {
+      Segment& before = segments[(i + count - 1) % count];
+      Segment& behind = segments[i];
+      behind.turn = before.along.dot(behind.along);
+      // the plane that halves the angle
+      before.skew[1] = skewOf(before.along, before.along + behind.along);
+      behind.skew[0] = skewOf(-behind.along, -before.along - behind.along);
+    }
+    if (!closed) {
+      segments.front().skew[0] = skewAtCorner(chain.front(), -segments.front().along, segments.front().into);
+      segments.back().skew[1] = skewAtCorner(chain.back(), segments.back().along, segments.back().into);
+    }
     // a ring without a corner has no end
-    const bool is_ring = segments.front().turn > kCos30;
+    const bool is_ring = closed && isContinued(segments.back(), segments.front());
     segments.front().beyond[0] = segments.back().beyond[1] = is_ring ? kEndless : 0.0;
     for (std::size_t i = 1; i < count; ++i) {
       const std::size_t k = count - 1 - i;
       const Segment& before = segments[i - 1];
       const Segment& behind = segments[k + 1];
-      segments[i].beyond[0] = segments[i].turn > kCos30 ? before.beyond[0] + before.length : 0.0;
-      segments[k].beyond[1] = behind.turn > kCos30 ? behind.beyond[1] + behind.length : 0.0;
+      segments[i].beyond[0] = isContinued(before, segments[i]) ? before.beyond[0] + before.length : 0.0;
+      segments[k].beyond[1] = isContinued(segments[k], behind) ? behind.beyond[1] + behind.length : 0.0;
     }
     return segments;
   }
@@ -257,11 +318,30 @@ class FeatureFinder {
         piece.into_M = {segment.into[0].cast<float>(), segment.into[1].cast<float>()};
         piece.beyond = {static_cast<float>(segment.beyond[0] + 2 * k * half),
                         static_cast<float>(segment.beyond[1] + 2 * (pieces - 1 - k) * half)};
-        piece.reach = static_cast<float>(
-            reach_.of(centre, half * segment.along, segment.into, kLargestReach * field_.voxelAt(centre)));
+        setReach({centre,
+                  half * segment.along,
+                  segment.into,
+                  {k == 0 ? segment.skew[0] : Vector3::Zero(),
+                   k + 1 == pieces ? segment.skew[1] : Vector3::Zero()}},
+                 piece);
         add(centre, bisector, piece);
       }
     }
+  }
+
+  /// Between skewed ends, or perpendicular ones where a surface behind the face at a corner is then farther.
+  void setReach(WedgePiece wedge, FeatureEdge& piece) const {
+    const double most = kLargestReach * field_.voxelAt(wedge.centre);
+    const double tolerance = straightAt(wedge.centre);
+    double reach = reach_.of(wedge, most, tolerance);
+    if (reach < most && !(wedge.skew[0].isZero(0.0) && wedge.skew[1].isZero(0.0))) {
+      const std::array<Vector3, 2> skewed = std::exchange(wedge.skew, {Vector3::Zero(), Vector3::Zero()});
+      const double between_perpendicular = reach_.of(wedge, most, tolerance);
+      if (between_perpendicular <= reach) wedge.skew = skewed;
+      reach = std::max(reach, between_perpendicular);
+    }
+    piece.reach = static_cast<float>(reach);
+    piece.skew = {inFaces(wedge.skew[0], wedge.into), inFaces(wedge.skew[1], wedge.into)};
   }
 
   [[nodiscard]] static std::array<Vector3, 2> perpendicular(const std::array<Vector3, 2>& into,
@@ -269,6 +349,16 @@ class FeatureFinder {
     const Vector3 unit = along.normalized();
     const auto one = [&unit](const Vector3& v) { return Vector3((v - unit * unit.dot(v)).normalized()); };
     return {one(into[0]), one(into[1])};
+  }
+
+  /// [-] A vector across an edge as a sum of `into`; zero where these are almost along each other.
+  [[nodiscard]] static Eigen::Vector2f inFaces(const Vector3& v, const std::array<Vector3, 2>& into) {
+    const double cosine = into[0].dot(into[1]);
+    const double sine2 = 1.0 - cosine * cosine;
+    if (sine2 < 0.01) return Eigen::Vector2f::Zero();
+    const double first = v.dot(into[0]);
+    const double second = v.dot(into[1]);
+    return (Eigen::Vector2d(first - cosine * second, second - cosine * first) / sine2).cast<float>();
   }
 
   /// Points on tight round surfaces, along the edges of their facets, the tightest first.
@@ -297,6 +387,7 @@ class FeatureFinder {
   const Sizes sizes_;
   const WedgeReach reach_;
   std::vector<ConvexEdge> sharp_, round_;
+  std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> faces_at_;  // of vertices where chains end
   std::vector<Feature> features_;
   structures::PointGrid grid_;
 };

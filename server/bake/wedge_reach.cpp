@@ -50,8 +50,8 @@ double distanceFromLine(const Outline& outline, const Vector3& along) {
 
 }  // namespace
 
-double WedgeReach::of(const Vector3& centre, const Vector3& half, const std::array<Vector3, 2>& into,
-                      double most) const {
+double WedgeReach::of(const WedgePiece& piece, double most, double tolerance) const {
+  const auto& [centre, half, into, skew] = piece;
   const double cosine = into[0].dot(into[1]);
   const double sine = into[0].cross(into[1]).norm();
   if (sine < kMinSine) return 0.0;
@@ -60,16 +60,18 @@ double WedgeReach::of(const Vector3& centre, const Vector3& half, const std::arr
   const double length = half.norm();
   const Vector3 along = half / length;
   double reach = most;
-  tree_.visitWithin(centre, std::hypot(length, most), [&](const structures::Triangle& triangle) {
+  const double farthest = length + most * std::max(skew[0].norm(), skew[1].norm());
+  tree_.visitWithin(centre, std::hypot(farthest, most), [&](const structures::Triangle& triangle) {
     const auto isIn = [&](const Vector3& normal) {
       return std::ranges::all_of(triangle, [&](const Vector3& corner) {
-        return std::abs(normal.dot(corner - centre)) <= tolerance_;
+        return std::abs(normal.dot(corner - centre)) <= tolerance;
       });
     };
     if (std::ranges::any_of(normals, isIn)) return false;
     Outline outline;
     for (const Vector3& corner : triangle) outline.push_back(corner - centre);
-    outline = cut(cut(outline, along, kBetweenEnds * length), -along, kBetweenEnds * length);
+    outline =
+        cut(cut(outline, skew[0] - along, kBetweenEnds * length), skew[1] + along, kBetweenEnds * length);
     if (!outline.empty()) reach = std::min(reach, distanceFromLine(outline, along));
     return false;
   });

@@ -34,6 +34,16 @@ constexpr double kGrazing = 1e-5;
 /// [m] By this a point may be deeper than its distance to the end of the edge: solving leaves that much.
 constexpr double kEndDepth = 1e-4;
 
+/// [-] As the bake's: less skew of a plane is rounding.
+constexpr double kFlatSkew = 1e-3;
+
+/// [-] Square of the skew of the plane between pieces that turn by 30 degrees: one of a round rim's is enough
+/// to hold a point.
+constexpr double kFlatCorner2 = 0.072;
+
+/// [voxels] By which interpolation rounds a convex edge off.
+constexpr double kRounding = 0.45;
+
 /// A frame's rotation as matrix: many vectors are turned by it.
 struct Transform {
   explicit Transform(const Pose& X) : R(X.matrix()), p(X.translation()) {}
@@ -49,7 +59,8 @@ EdgePiece pieceOf(const structures::FeatureShell& features, std::uint32_t point)
           edge.half_M.cast<double>(),
           {edge.into_M[0].cast<double>(), edge.into_M[1].cast<double>()},
           edge.reach,
-          {edge.beyond[0], edge.beyond[1]}};
+          {edge.beyond[0], edge.beyond[1]},
+          edge.skew};
 }
 
 EdgePiece pieceOf(const structures::FeatureShell& features, std::uint32_t point, const Transform& X_AB) {
@@ -58,7 +69,8 @@ EdgePiece pieceOf(const structures::FeatureShell& features, std::uint32_t point,
           X_AB.turned(edge.half_M),
           {X_AB.turned(edge.into_M[0]), X_AB.turned(edge.into_M[1])},
           edge.reach,
-          {edge.beyond[0], edge.beyond[1]}};
+          {edge.beyond[0], edge.beyond[1]},
+          edge.skew};
 }
 
 /// [-] The direction of +-c in which the body of a piece lies on the far side of a plane through the edge; 0:
@@ -71,12 +83,12 @@ double separatingSign(const EdgePiece& piece, const Vector3& c, double slack) {
 }
 
 /// Whether a contact at `along` [-] halves from the centre of a piece, or `slack` [m] beside it, is one of
-/// the piece, and at least `inside` [m] before the end of the edge: what grazes an end, as a corner that
-/// slides over a face, passes it.
-bool isWithin(const EdgePiece& piece, double half2, double along, double slack, double inside) {
+/// the piece, and not at the end of the edge: what grazes an end, as a corner that slides over a face, passes
+/// it.
+bool isWithin(const EdgePiece& piece, double half2, double along, double slack) {
   const double half = std::sqrt(half2);
   const double past = (std::abs(along) - 1.0) * half - slack;
-  return past <= kEndTolerance * half && piece.beyond[along > 0.0 ? 1 : 0] - past >= inside;
+  return past <= kEndTolerance * half && piece.beyond[along > 0.0 ? 1 : 0] - past >= kGrazing;
 }
 
 /// Two pieces as a contact of A against B, in their frame. `slack` [m] beyond their ends, `tolerance` [-] of
@@ -98,9 +110,39 @@ bool cross(const EdgePiece& a, const EdgePiece& b, double slack, double toleranc
   // closest points a.p + along_a * a.half, b.p + along_b * b.half of the two lines
   const double along_a = -r.dot(b.half.cross(c)) / c2;
   const double along_b = -r.dot(a.half.cross(c)) / c2;
-  if (!isWithin(a, a2, along_a, slack, kGrazing) || !isWithin(b, b2, along_b, slack, kGrazing)) return false;
+  if (!isWithin(a, a2, along_a, slack) || !isWithin(b, b2, along_b, slack)) return false;
   contact.n_W = sign / length * c;
   contact.p_WP = a.p + along_a * a.half;
+  return true;
+}
+
+/// Whether a point at `r` across an edge, in terms of `into` [m], is between the skewed planes in which a
+/// piece ends, and from those that end the edge as far as `depth` [m] and kGrazing. `along` [m] from the
+/// centre of the piece, `half` [m] its length, `cosine` [-] between its faces, `slack` [m].
+bool isBetweenEnds(const EdgePiece& piece, double along, double half, const std::array<double, 2>& r,
+                   double cosine, double slack, double depth) {
+  for (const std::size_t end : {0U, 1U}) {
+    const Eigen::Vector2f& skew = piece.skew[end];
+    double past = (end == 0 ? -along : along) - half;
+    double slope = 1.0;
+    if (!skew.isZero(0.0F)) {
+      const double first = skew[0];
+      const double second = skew[1];
+      const double towards_0 = first + cosine * second;
+      const double towards_1 = second + cosine * first;
+      double before = first * r[0] + second * r[1];
+      const double skew2 = first * towards_0 + second * towards_1;
+      // beside the solid, in an inner corner that is not flat, both neighbours hold a point
+      if (skew2 > kFlatCorner2 && std::max(towards_0, towards_1) < kFlatSkew) before = std::min(before, 0.0);
+      past += before;
+      slope = std::sqrt(1.0 + skew2);
+    }
+    past -= slope * slack;
+    // deeper than that the face at the end of the edge is nearer
+    if (past > kEndTolerance * half ||
+        piece.beyond[end] - past < std::max(kGrazing, slope * (depth - slack - kEndDepth)))
+      return false;
+  }
   return true;
 }
 
@@ -125,8 +167,9 @@ bool isBeside(const Vector3& p, const EdgePiece& piece, double slack, Contact& c
   // at the edge itself neither face is the nearer one, and a point may slide on from either to the other
   if (across.squaredNorm() < kGrazing * kGrazing) contact.n_W = (n_0 + n_1).normalized();
   contact.gap = contact.n_W.dot(across);
-  // deeper than that the face at the end of the edge is nearer
-  if (!isWithin(piece, half2, along, slack, std::max(kGrazing, -contact.gap - slack - kEndDepth)))
+  const double half = std::sqrt(half2);
+  if (!isBetweenEnds(piece, along * half, half, {piece.into[0].dot(across), piece.into[1].dot(across)},
+                     cosine, slack, -contact.gap))
     return false;
   contact.p_WP = p;
   return true;
@@ -182,6 +225,12 @@ void evaluateCrossing(const EdgePiece& a, const EdgePiece& b, const Transform& X
 bool canCross(const PairFeatures& features) {
   return !features.features_A->empty() &&
          (features.features_A->longestHalf() > 0.0 || features.features_B->longestHalf() > 0.0);
+}
+
+/// [m] By this a crossing may be nearer than the gap of a feature of B in A's field: half the feature's
+/// length, or where voxels are large, what interpolation rounds off A's edges.
+double nearerBy(double half, const PairFeatures& features) {
+  return std::max(half, kRounding * features.field_A->voxel());
 }
 
 /// B's features in A's field.
@@ -296,8 +345,7 @@ class CrossingSearch {
     const double reach_A = features_.features_A->longestHalf() + query_.margin;
     for (const Contact& contact : near_A) {
       const float half = features_.features_B->edges()[contact.point].half_M.norm();
-      // a crossing is nearer than the centre of B's piece by half its length at most
-      if (contact.gap > query_.margin + half) continue;
+      if (contact.gap > query_.margin + nearerBy(half, features_)) continue;
       EdgePiece& piece = near_.pieces[near_.count];
       piece = pieceOf(*features_.features_B, contact.point, X_AB);
       const Vector3f p_A = piece.p.cast<float>();
@@ -412,9 +460,9 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
                    PairQueryResult& result) noexcept {
   result.dormant_gap = std::numeric_limits<double>::infinity();
   if (!features.any()) return;
-  const double half_B = features.features_B->longestHalf();
+  const double nearer = nearerBy(features.features_B->longestHalf(), features);
   PairQueryResult& of_B = scratch.of_B;
-  queryPair(reversed(query, features, query.margin + half_B), of_B);
+  queryPair(reversed(query, features, query.margin + nearer), of_B);
   if (isDilationLimited(features)) {
     of_B.smallest_gap =
         limitDilation(features, query.X_WA, {of_B.contacts.begin(), of_B.contacts.size()}, of_B.unlisted_gap);
@@ -445,8 +493,7 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
   for (const Contact& contact : crossings) result.contacts.push_back(contact);
   if (!canCross(features)) return;
 
-  // a crossing is nearer than the centre of B's piece by half its length at most
-  double crossing_bound = of_B.unlisted_gap - half_B;
+  double crossing_bound = of_B.unlisted_gap - nearer;
   if (searched) crossing_bound = std::min(crossing_bound, query.margin);
   if (crossing_bound < query.margin) result.complete_to = std::min(result.complete_to, crossing_bound);
   result.smallest_gap = std::min(result.smallest_gap, crossing_bound);
@@ -456,9 +503,7 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
 double featureGap(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
                   QueryCounts& counts) noexcept {
   if (!features.any()) return std::numeric_limits<double>::infinity();
-  const double half_B = features.features_B->longestHalf();
-  // a crossing is nearer than the centre of B's piece by half its length at most
-  const double nearer = canCross(features) ? half_B : 0.0;
+  const double nearer = canCross(features) ? nearerBy(features.features_B->longestHalf(), features) : 0.0;
   PairQuery of_B = reversed(query, features, query.margin + nearer);
   of_B.list = false;
   queryPair(of_B, scratch.of_B);

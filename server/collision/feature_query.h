@@ -38,8 +38,9 @@ struct EdgePiece {
   Vector3 p = Vector3::Zero();     ///< [m] centre
   Vector3 half = Vector3::Zero();  ///< [m] from the centre to one end; zero: a point
   std::array<Vector3, 2> into{Vector3::Zero(), Vector3::Zero()};
-  double reach = 0.0;                      ///< [m]
-  std::array<double, 2> beyond{0.0, 0.0};  ///< [m]
+  double reach = 0.0;                                                                     ///< [m]
+  std::array<double, 2> beyond{0.0, 0.0};                                                 ///< [m]
+  std::array<Eigen::Vector2f, 2> skew{Eigen::Vector2f::Zero(), Eigen::Vector2f::Zero()};  ///< [-]
 
   [[nodiscard]] bool isPoint() const { return half.isZero(0.0); }
 };

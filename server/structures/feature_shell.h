@@ -20,6 +20,10 @@ struct FeatureEdge {
   float reach = 0.0F;
   /// [m] Length of the edge beyond the ends of the piece at -half and +half, up to a corner.
   std::array<float, 2> beyond{0.0F, 0.0F};
+  /// [-] The planes in which the piece ends at -half and +half: a point at r from the edge is at the end of
+  /// the piece where it is skew . (into_M[0] . r, into_M[1] . r) before the end of the edge. Zero: the plane
+  /// is perpendicular to the edge.
+  std::array<Eigen::Vector2f, 2> skew{Eigen::Vector2f::Zero(), Eigen::Vector2f::Zero()};
 };
 
 /// The sharp features of an object's surface: corners, pieces of convex edges, tips of pins.

@@ -12,6 +12,7 @@ using Problem = std::optional<std::string>;
 
 /// [m] No mesh has larger coordinates (server/bake refuses more than 100 km, and a field has a margin).
 constexpr double kMaxCoordinate = 1e6;
+constexpr float kMaxSkew = 100.0F;  // [-] of planes in which pieces of edges end
 
 bool plausible(const Vector3& p) { return p.allFinite() && p.cwiseAbs().maxCoeff() <= kMaxCoordinate; }
 
@@ -185,7 +186,8 @@ Problem problemOf(const Pointshell::Layout& points, std::span<const FeatureEdge>
     return plausible(edge.half_M.cast<double>()) && edge.into_M[0].norm() < 1.01F &&
            edge.into_M[1].norm() < 1.01F && edge.reach >= 0.0F && edge.reach <= kMaxCoordinate &&
            edge.beyond[0] >= 0.0F && edge.beyond[1] >= 0.0F && edge.beyond[0] <= kMaxCoordinate &&
-           edge.beyond[1] <= kMaxCoordinate &&
+           edge.beyond[1] <= kMaxCoordinate && edge.skew[0].norm() <= kMaxSkew &&
+           edge.skew[1].norm() <= kMaxSkew &&
            (edge.reach == 0.0F || edge.into_M[0].cross(edge.into_M[1]).norm() > 0.05F);
   };
   if (!std::all_of(edges.begin(), edges.end(), sound)) return "is damaged: an edge is not plausible";

@@ -24,7 +24,7 @@ namespace tenon::structures {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'T', 'E', 'N', 'O', 'N', 'H', 'S', '\n'};
-constexpr std::uint32_t kVersion = 9;
+constexpr std::uint32_t kVersion = 10;
 constexpr std::uint32_t kByteOrder = 0x01020304U;
 constexpr std::size_t kAlignment = 64;
 
@@ -86,7 +86,7 @@ struct FileHeader {
 };
 static_assert(std::is_trivially_copyable_v<FileHeader>);
 static_assert(sizeof(ShellPoint) == 28 && sizeof(ShellSphere) == 24 && sizeof(ShellLevel) == 32 &&
-              sizeof(FeatureEdge) == 48 && sizeof(FilledSpace) == 28);
+              sizeof(FeatureEdge) == 64 && sizeof(FilledSpace) == 28);
 
 std::uint64_t aligned(std::uint64_t offset) { return (offset + kAlignment - 1) / kAlignment * kAlignment; }
 

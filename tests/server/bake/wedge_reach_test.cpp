@@ -26,7 +26,7 @@ std::vector<structures::Triangle> trianglesOf(const TriangleMesh& mesh) {
 double reachOf(const TriangleMesh& mesh, const Vector3& centre = Vector3::Zero(),
                const std::array<Vector3, 2>& into = {Vector3::UnitY(), -Vector3::UnitZ()}) {
   const TriangleTree tree(trianglesOf(mesh), 0.01);
-  return WedgeReach(tree, kTolerance).of(centre, kHalf, into, kMost);
+  return WedgeReach(tree).of({centre, kHalf, into}, kMost, kTolerance);
 }
 
 TEST(WedgeReach, EndsAtTheFarSideOfAPlate) {
@@ -67,6 +67,31 @@ TEST(WedgeReach, EndsAtTheNextEdgeOfAChamfer) {
   quad({0.0, -0.001, -0.001}, {0.0, -0.001, -0.1});
   const Vector3 down = Vector3(0.0, -1.0, -1.0).normalized();
   EXPECT_NEAR(reachOf(mesh, Vector3::Zero(), {Vector3::UnitY(), down}), std::sqrt(2.0) * 0.001, 1e-6);
+}
+
+//  ____.  from above: the face at the end leans back over the piece by 60 degrees
+//      /
+TEST(WedgeReach, EndsOfAPieceMayBeSkewed) {
+  constexpr double kSkew = 1.73;
+  TriangleMesh mesh;
+  const auto quad = [&mesh](const std::array<Vector3, 4>& corners) {
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    for (const Vector3& p : corners) mesh.vertices.push_back(p.cast<float>());
+    mesh.triangles.push_back({first, first + 1, first + 2});
+    mesh.triangles.push_back({first, first + 2, first + 3});
+  };
+  const Vector3 end(0.002, 0.0, 0.0);
+  const Vector3 behind(0.002 - 0.1 * kSkew, 0.1, 0.0);
+  const Vector3 down(0.0, 0.0, -0.1);
+  quad({Vector3(-0.4, 0.0, 0.0), end, behind, Vector3(-0.4, 0.1, 0.0)});
+  quad({Vector3(-0.4, 0.0, 0.0), end, end + down, Vector3(-0.4, 0.0, -0.1)});
+  quad({end, behind, behind + down, end + down});
+  const TriangleTree tree(trianglesOf(mesh), 0.01);
+  const WedgeReach reach(tree);
+  WedgePiece piece{Vector3::Zero(), kHalf, {Vector3::UnitY(), -Vector3::UnitZ()}};
+  EXPECT_LT(reach.of(piece, kMost, kTolerance), 1e-5) << "the face at the end is between perpendicular ends";
+  piece.skew[1] = kSkew * Vector3::UnitY();
+  EXPECT_NEAR(reach.of(piece, kMost, kTolerance), kMost, 1e-9);
 }
 
 TEST(WedgeReach, OfASheetIsNone) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -300,6 +301,115 @@ TEST_F(PointsBesideEdges, HoldNothingBeyondTheEndsAndTheReachOfTheEdge) {
     const double beyond = std::max(std::abs(r.x()) - 0.003, 0.0);
     EXPECT_NEAR(found[0].gapBound(), std::hypot(beyond, r.y(), r.z()), 1e-7) << "distance of the segment";
   }
+}
+
+// From above, the edge along x; its end is skewed as the plane between two pieces of a rim.
+//   ____.    acute: the end is before the perpendicular one where the solid is
+//   ____.    of a hole's rim: it is behind it, so that no sector between two pieces is without a row
+TEST_F(PointsBesideEdges, AreBetweenSkewedEnds) {
+  const auto isHeld = [this](double before, double beyond, double y) {
+    add(Vector3(0.003 + beyond, y, 0.0199));
+    const structures::FeatureShell point = taken();
+    add({0.0, 0.0, 0.02}, {0.003, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, -1.0});
+    edges_.back().reach = kReach;
+    edges_.back().beyond = {1.0F, 1.0F};
+    edges_.back().skew[1] = {static_cast<float>(before), 0.0F};
+    query(point, taken(), structures::Pointshell(), structures::DistanceField());
+    const std::vector<Contact> found = crossings();
+    return found.size() == 1U && !found[0].dormant();
+  };
+  EXPECT_TRUE(isHeld(0.0, -0.0001, 0.001)) << "perpendicular";
+  EXPECT_FALSE(isHeld(0.0, 0.0001, 0.001));
+  EXPECT_TRUE(isHeld(0.5, -0.0006, 0.001)) << "acute";
+  EXPECT_FALSE(isHeld(0.5, -0.0004, 0.001));
+  EXPECT_TRUE(isHeld(-0.5, 0.0004, 0.001)) << "a rim";
+  EXPECT_FALSE(isHeld(-0.5, 0.0006, 0.001));
+  EXPECT_TRUE(isHeld(-0.5, -0.0001, -0.0005)) << "beside the solid both pieces hold";
+  EXPECT_FALSE(isHeld(-0.2, -0.00005, -0.0005)) << "one is enough where they turn little";
+}
+
+/// A plate of 60 x 60 x 10 mm, its upper side at z = 0, with a hole of `facets` facets and a radius [m].
+bake::TriangleMesh plateWithHole(int facets, double radius) {
+  bake::TriangleMesh mesh;
+  for (const double z : {-0.01, 0.0}) {
+    for (int k = 0; k < facets; ++k) {
+      const double angle = 2.0 * std::numbers::pi * k / facets;
+      const Vector3 out(std::cos(angle), std::sin(angle), 0.0);
+      const double to_side = 0.03 / out.cwiseAbs().maxCoeff();
+      for (const double r : {radius, to_side})
+        mesh.vertices.push_back((r * out + Vector3(0.0, 0.0, z)).cast<float>());
+    }
+  }
+  const auto vertex = [facets](int k, int outer, int upper) {
+    return static_cast<std::uint32_t>(2 * (facets * upper + k % facets) + outer);
+  };
+  const auto quad = [&mesh](std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d) {
+    mesh.triangles.push_back({a, b, c});
+    mesh.triangles.push_back({a, c, d});
+  };
+  for (int k = 0; k < facets; ++k) {
+    quad(vertex(k, 0, 1), vertex(k, 1, 1), vertex(k + 1, 1, 1), vertex(k + 1, 0, 1));
+    quad(vertex(k, 0, 0), vertex(k + 1, 0, 0), vertex(k + 1, 1, 0), vertex(k, 1, 0));
+    quad(vertex(k, 0, 0), vertex(k, 0, 1), vertex(k + 1, 0, 1), vertex(k + 1, 0, 0));
+    quad(vertex(k, 1, 0), vertex(k + 1, 1, 0), vertex(k + 1, 1, 1), vertex(k, 1, 1));
+  }
+  return mesh;
+}
+
+//  ____ . ____   a corner at the rim of a hole, in the plate, is held wherever it is: between two facets too
+//      | |
+TEST(RimOfAHole, LeavesNoSectorOut) {
+  constexpr int kFacets = 16;
+  constexpr double kRadius = 0.01;
+  const auto plate = test::baked(plateWithHole(kFacets, kRadius), 0.002, 2000);
+  ASSERT_TRUE(plate);
+  const auto result = std::make_unique<PairQueryResult>();
+  const auto scratch = std::make_unique<FeatureScratch>();
+  const structures::Pointshell no_shell;
+  const structures::DistanceField no_field;
+  for (int i = 0; i < 64; ++i) {
+    const double angle = 2.0 * std::numbers::pi * (i + 0.03) / 64.0;  // 0.03 mm beside a vertex
+    const double facet = 2.0 * std::numbers::pi / kFacets;
+    const double to_middle = angle - facet * (std::floor(angle / facet) + 0.5);
+    constexpr double kBeside = 0.0003;
+    constexpr double kBelow = 0.0002;
+    const double flat = kRadius * std::cos(0.5 * facet);  // of the facets
+    const double r = flat / std::cos(to_middle) + kBeside;
+    const std::vector<structures::SurfaceSample> samples{
+        {{r * std::cos(angle), r * std::sin(angle), -kBelow}, -Vector3::UnitZ(), 0.0}};
+    std::vector<std::uint32_t> order;
+    structures::FeatureStorage storage{structures::buildFlatShell(samples, 0.001, order), {}};
+    storage.edges.resize(1);
+    const structures::FeatureShell corner = structures::makeFeatureShell(std::move(storage));
+    const PairQuery query{&no_shell, &no_field, Pose(), Pose(), 0.001};
+    queryPair(query, *result);
+    queryFeatures(query, {&plate->features, &corner, &plate->field}, *scratch, *result);
+    const auto held = std::ranges::count_if(result->contacts, [](const Contact& one) {
+      return one.kind == ContactKind::kCrossing && !one.dormant();
+    });
+    EXPECT_EQ(held, 1) << "at " << angle << " rad";
+    for (const Contact& one : result->contacts) {
+      if (one.kind == ContactKind::kCrossing && !one.dormant()) {
+        EXPECT_NEAR(one.gap, -kBelow, 1e-7);
+      }
+    }
+  }
+}
+
+// Facets that are one line by the spacing of the points would narrow a hole that fits within a voxel.
+TEST(RimOfAHole, IsAsWideAsItsFacetsWhereVoxelsAreSmall) {
+  constexpr int kFacets = 64;
+  constexpr double kRadius = 0.005;
+  const Vector3 half(0.006, 0.006, 0.001);
+  const auto plate = test::baked(plateWithHole(kFacets, kRadius), 0.002, 2000, {{{-half, half}}});
+  int pieces = 0;
+  for (std::size_t i = 0; i < plate->features.edges().size(); ++i) {
+    const Vector3f& p = plate->features.points().points()[i].p_MP;
+    if (!isEdge(plate->features, i) || std::abs(p.z()) > 1e-6F || p.norm() > 0.01F) continue;
+    EXPECT_GE(p.norm(), kRadius * std::cos(std::numbers::pi / kFacets) - 1e-6);
+    ++pieces;
+  }
+  EXPECT_EQ(pieces, kFacets);
 }
 
 // A shell of one level with many clusters is descended by blocks of them.

@@ -99,7 +99,7 @@ TEST_F(CraftedStructureFile, FeaturesWithNumbersThatAreNoneAreRefused) {
   const float infinite = std::numeric_limits<float>::infinity();
   for (const float bad : {nan, infinite, -infinite, 1e30F}) {
     EXPECT_THAT(file.with(file.first(12), bad), HasSubstr("feature shell is damaged"));
-    for (std::size_t k = 0; k < 9; ++k)
+    for (std::size_t k = 0; k < sizeof(FeatureEdge) / 4; ++k)
       EXPECT_THAT(file.with(file.first(16) + 4 * k, bad), HasSubstr("an edge is not plausible"));
   }
   EXPECT_THAT(file.with(file.first(13) + 16, 1U), HasSubstr("feature shell is damaged"));
