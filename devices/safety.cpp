@@ -41,14 +41,17 @@ DeviceCommand Safety::step(const SafetyRequest& request, const DeviceState& stat
     if (request.restart || (late_ && !late) || (late && starting_)) restart();
     late_ = late;
     const Wrench damping = injectDamping(state, dt);
-    const double wall_growth = rampWall(state, dt);
-    const Wrench scene = applySoftStartAndSlew(prepareRequest(request), damping, wall_growth, dt);
-    command.F_Ho_D = limitOutput(scene + Wrench{wall_, Vector3::Zero()}, dt);
+    const Wrench requested = prepareRequest(request);
+    const double wall_growth = rampWall(requested.force, request.stiffness, state, dt);
+    const Wrench scene = applySoftStartAndSlew(requested, damping, wall_growth, dt);
+    command.F_Ho_D = limitOutput(scene + Wrench{wallBesideScene(), Vector3::Zero()}, dt);
     fadeTactors(request, command);
   } else {
     startFromZero();
     wall_since_ = 0.0;
     wall_.setZero();
+    wall_lags_ = false;
+    wall_distance_ = state.X_DH.translation().norm();
     heat_.update(0.0, dt, limits_);
   }
   output_ = command.F_Ho_D;
@@ -148,7 +151,7 @@ Wrench Safety::applySoftStartAndSlew(const Wrench& wrench, const Wrench& damping
                                      double dt) noexcept {
   // what was displayed, so not what hot motors took away
   if (!late_ && !starting_)
-    settled_force_ = std::min((slewed_.force + wall_).norm(), heat_.forceLimit(limits_));
+    settled_force_ = std::min((slewed_.force + wallBesideScene()).norm(), heat_.forceLimit(limits_));
   const double start = softStartFactor(since_start_, limits_);
   const double growth = std::min(dt, kLongestGrowth);
   since_start_ += growth;
@@ -177,16 +180,37 @@ Wrench Safety::injectDamping(const DeviceState& state, double dt) noexcept {
 
 /// A gap of the scene leaves a wall that stands standing; one that is met in the gap or in the soft start
 /// grows as slowly as the scene's force, since the hand fell into it.
-double Safety::rampWall(const DeviceState& state, double dt) noexcept {
+double Safety::rampWall(const Vector3& scene, double stiffness, const DeviceState& state,
+                        double dt) noexcept {
+  const Vector3& p_DH = state.X_DH.translation();
   const double growth = std::min(dt, kLongestGrowth);
   const double before = wall_.norm();
-  Vector3 wall = wallForce(state.X_DH.translation(), limits_) * softStartFactor(wall_since_, limits_);
+  Vector3 wall = wallForce(p_DH, limits_) * softStartFactor(wall_since_, limits_);
   if (starting_) wall = clampNorm(wall, std::max(before, startLimit()));
+  // what the scene's spring leaves at once, the rest slowly
+  const double stiffness_left = std::min(wallStiffnessBeside(scene, stiffness, p_DH, limits_),
+                                         wallStiffnessBeside(sceneForce(), stiffness, p_DH, limits_));
+  if (wall_lags_ || stiffness_left < limits_.wall_stiffness) {
+    const double step = limits_.start_force_slew * growth;
+    const double beyond = std::max(wall_distance_, limits_.wall_radius);
+    const double moved = std::max(std::min(0.0, p_DH.norm() - wall_distance_), p_DH.norm() - beyond);
+    const double followed = before + stiffness_left * moved;
+    double force = std::max(0.0, std::clamp(wall.norm(), followed - step, followed + step));
+    if (starting_) force = std::min(force, std::max(before, startLimit()));
+    wall_lags_ = force != wall.norm();
+    if (wall_lags_) wall = -force * p_DH.normalized();
+  }
   const bool slow = starting_ || late_ || wall_since_ < limits_.soft_start;
   wall_ = slewLimited(wall_, wall, (slow ? limits_.start_force_slew : limits_.force_slew) * growth);
   wall_since_ += growth;
+  wall_distance_ = p_DH.norm();
   setFlag(SafetyRule::kWorkspaceWall, !wall_.isZero(0.0));
   return std::max(0.0, wall_.norm() - before);
+}
+
+Vector3 Safety::wallBesideScene() const noexcept {
+  if (wall_.isZero(0.0)) return Vector3::Zero();
+  return wall_ * (1.0 - std::clamp(sceneForce().dot(wall_) / wall_.squaredNorm(), 0.0, 1.0));
 }
 
 /// Intensities fade like a force; a hand that is stopped or whose contacts are unknown feels none.

@@ -50,6 +50,12 @@ struct Intervention {
 /// most. Time is the sum of `dt`, which the caller measures; no clock is read. However long a step took,
 /// forces grow in it as in 2 ms at most.
 ///
+/// Scene and workspace wall are springs of one hand: with one contact they are together no stiffer than what
+/// the device renders passively. The wall adds what the scene's force towards the centre lacks of the wall's
+/// own. Where the scene pushes outwards, the wall follows the hand with the stiffness that the scene's spring
+/// leaves, and the rest of its force comes and goes by 20 N/s; within the wall's radius it fades at that
+/// rate.
+///
 /// Threads: the device's servo thread. Real-time: everything but the constructor.
 class Safety {
  public:
@@ -104,8 +110,16 @@ class Safety {
   /// `wall_growth` [N] in this step, which together with the scene's is limited; `dt` [s].
   [[nodiscard]] Wrench applySoftStartAndSlew(const Wrench& wrench, const Wrench& damping, double wall_growth,
                                              double dt) noexcept;
-  /// Advances wall_ by `dt` [s] and returns its growth [N].
-  [[nodiscard]] double rampWall(const DeviceState& state, double dt) noexcept;
+  /// Advances wall_ by `dt` [s], beside a spring of `stiffness` [N/m] that asks for `scene` [N]; its growth
+  /// [N].
+  [[nodiscard]] double rampWall(const Vector3& scene, double stiffness, const DeviceState& state,
+                                double dt) noexcept;
+  /// [N] the scene's, without injected damping, as it was displayed last.
+  [[nodiscard]] Vector3 sceneForce() const noexcept {
+    return slewed_.force + leaving_.force * leaving_share_;
+  }
+  /// [N] what the scene's force towards the centre lacks of the wall's.
+  [[nodiscard]] Vector3 wallBesideScene() const noexcept;
   void fadeTactors(const SafetyRequest& request, DeviceCommand& command) const noexcept;
   /// Command, thermal and motor limits; `dt` [s].
   [[nodiscard]] Wrench limitOutput(const Wrench& wrench, double dt) noexcept;
@@ -132,6 +146,8 @@ class Safety {
   double leaving_share_ = 0.0;      ///< [-] of it that is left
   Vector3 wall_ = Vector3::Zero();  ///< [N] last output of the workspace wall
   double wall_since_ = 0.0;         ///< [s] since forces are permitted
+  double wall_distance_ = 0.0;      ///< [m] of the hand from the centre, in the last step
+  bool wall_lags_ = false;          ///< it is not yet the force of its spring again
   Wrench output_;                   ///< last commanded wrench
   Pose X_DH_last_;
   bool has_last_pose_ = false;

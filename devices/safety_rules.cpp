@@ -7,6 +7,7 @@ namespace tenon::devices {
 namespace {
 
 constexpr double kWallRadiusFraction = 0.95;  ///< [-] of the workspace radius
+constexpr double kSmallForce = 0.01;          ///< [N] a scene's force below it is rounding
 constexpr double kStorageTravel = 0.02;       ///< [m] energy capacity = peak force along this displacement
 constexpr double kActiveSpeed = 0.01;         ///< [m/s] active power = peak force at this speed
 constexpr double kDeratingStart = 0.8;        ///< [-] motor heat above which the force limit falls
@@ -76,7 +77,7 @@ SafetyLimits safetyLimits(const DeviceCaps& caps) noexcept {
   limits.injected_rotational_damping = caps.injected_rotational_damping;
   limits.max_speed = caps.max_speed;
   limits.wall_radius = kWallRadiusFraction * caps.workspace_radius;
-  limits.wall_stiffness = 0.5 * limits.stiffness;  // contacts of the scene may push at the same time
+  limits.wall_stiffness = 0.5 * limits.stiffness;
   limits.clutch_force = caps.clutch_force;
   limits.clutch_warning = caps.clutch_warning;
   limits.force_quantum = caps.force_quantum;
@@ -118,6 +119,17 @@ Vector3 wallForce(const Vector3& p_DH, const SafetyLimits& limits) noexcept {
   const double beyond = p_DH.norm() - limits.wall_radius;
   if (limits.wall_radius <= 0.0 || beyond <= 0.0) return Vector3::Zero();
   return p_DH.normalized() * (-limits.wall_stiffness * beyond);
+}
+
+double wallStiffnessBeside(const Vector3& scene, double stiffness, const Vector3& p_DH,
+                           const SafetyLimits& limits) noexcept {
+  const double outwards = scene.dot(p_DH.normalized());
+  if (!(stiffness > 0.0) || !(outwards > kSmallForce)) return limits.wall_stiffness;
+  // largest k for which K - K_s n n^T - k r r^T has no negative eigenvalue
+  const double along = outwards * outwards / scene.squaredNorm();
+  const double K = limits.stiffness;
+  const double left = 1.0 / ((1.0 - along) / K + along / (K - std::min(stiffness, K)));
+  return std::min(left, limits.wall_stiffness);
 }
 
 Vector3 quantizeForce(const Vector3& force, double quantum) noexcept {

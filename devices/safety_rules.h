@@ -83,6 +83,11 @@ struct SafetyLimits {
 [[nodiscard]] Vector3 slewLimited(const Vector3& output, const Vector3& target, double step) noexcept;
 /// [N] inward force of the spring outside `wall_radius`; zero inside.
 [[nodiscard]] Vector3 wallForce(const Vector3& p_DH, const SafetyLimits& limits) noexcept;
+/// [N/m] of that spring which a scene's spring of `stiffness` [N/m] with force `scene` [N] leaves it at p_DH:
+/// all where the scene does not push outwards, else so much that both are in no direction stiffer than the
+/// passive stiffness.
+[[nodiscard]] double wallStiffnessBeside(const Vector3& scene, double stiffness, const Vector3& p_DH,
+                                         const SafetyLimits& limits) noexcept;
 /// Per axis rounded towards zero to whole motor counts of `quantum` [N] and saturated at +-kMaxMotorCounts.
 [[nodiscard]] Vector3 quantizeForce(const Vector3& force, double quantum) noexcept;
 
