@@ -248,9 +248,7 @@ void DeviceStation::beginHand(std::size_t index, HandId id) {
   haptic::HapticHand& hand = *arm.hand;
   hand.setScene(parts_->scene);
   hand.setForceModel(parts_->force_model);
-  if (!hand.begin(id, client_, moved.X_WStart.translation(), arming().permitsForces())) {
-    report(haptic::StationEventKind::kDeviceFault, id, static_cast<std::uint32_t>(hand.device().fault), 0.0);
-  }
+  hand.begin(id, client_, moved.X_WStart.translation(), arming().permitsForces());
   moved.hand = &hand;
   moved.X_WStart = hand.pose();
   // who has held the button all along does not press it
@@ -270,7 +268,7 @@ void DeviceStation::begin(std::span<const HandId> hand_ids) {
     haptic::Bracelet& bracelet =
         parts_->bracelet.emplace(*parts_->tactors, haptic::TactileOptions{parts_->options.tactile});
     // the session continues without vibration when the bracelet cannot be armed
-    static_cast<void>(bracelet.begin(hand_ids[arms], arming().permitsForces()));
+    bracelet.begin(hand_ids[arms], arming().permitsForces());
   }
   if (parts_->mover) parts_->mover->begin(sceneObjects(), parts_->moved);
 }

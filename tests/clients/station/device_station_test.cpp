@@ -1,7 +1,14 @@
 #include "clients/station/device_station.h"
 
+#include <atomic>
+#include <chrono>
+#include <memory>
+#include <thread>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "devices/simulated/sigma7.h"
 
 namespace tenon::station {
 namespace {
@@ -133,6 +140,58 @@ TEST(DeviceStation, ManifoldsOfOtherStationsAreNotItsOwn) {
   EXPECT_TRUE(scene.station->receive(manifold));
   manifold.hand = HandId{7};
   EXPECT_FALSE(scene.station->receive(manifold)) << "their age is that of another station's inputs";
+}
+
+/// A device that does not answer when it is to be armed, for ten seconds at most.
+class DeviceThatHangs final : public devices::SimulatedDevice {
+ public:
+  DeviceThatHangs() : SimulatedDevice(devices::sigma7Model(), 1) { EXPECT_TRUE(open()); }
+  [[nodiscard]] Result<void> arm() override {
+    ++armed;
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+    while (!answers && std::chrono::steady_clock::now() < until) std::this_thread::yield();
+    return SimulatedDevice::arm();
+  }
+  std::atomic<int> armed = 0;
+  std::atomic<bool> answers = false;
+};
+
+// from the beginning, where its person has armed the station before the session is joined
+TEST(DeviceStation, FramesStopsAndContactsAreHeardWhileADeviceIsArmedThatDoesNotAnswer) {
+  const auto device = std::make_shared<DeviceThatHangs>();
+  StationOptions options = defaultStation(Role::kInstructor);
+  options.kind = PersonKind::kNone;
+  options.devices.front().opened = device;
+  EmptyScene scene(options);
+  scene.station->press();
+  scene.rejoin({HandId{0}});
+  EXPECT_EQ(device->armed, 0) << "nothing waits for the device where the session begins";
+  ASSERT_TRUE(scene.station->wantsArming());
+  std::thread arming([&] { EXPECT_TRUE(scene.station->armDevices()); });
+  while (device->armed == 0) std::this_thread::yield();
+
+  std::uint32_t seq = 0;
+  WorldFrame frame;
+  frame.server_epoch = 1;
+  frame.tick = 7;
+  HandManifold manifold;
+  manifold.hand = HandId{0};
+  scene.station->receive(frame);
+  EXPECT_TRUE(scene.station->receive(manifold));
+  for (int i = 0; i < 10; ++i) scene.station->step(++seq);
+  EXPECT_EQ(scene.station->world().tick(), 7U);
+  EXPECT_FALSE(scene.hand().active);
+  scene.station->receive(haptic::StopSignal{1, true});
+  EXPECT_TRUE(scene.station->arming().stopped());
+  for (int i = 0; i < 10; ++i) scene.station->step(++seq);
+  EXPECT_FALSE(device->answers);
+
+  device->answers = true;
+  arming.join();
+  scene.station->step(++seq);
+  devices::DeviceState state;
+  device->read(state);
+  EXPECT_FALSE(state.forces_on) << "the stop holds what was armed meanwhile";
 }
 
 /// A device with a button that arms, held by its owner.

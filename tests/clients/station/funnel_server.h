@@ -55,6 +55,7 @@ class FunnelServer {
   /// One millisecond of station and server.
   void step(haptic::Station& station) {
     ++tick_;
+    static_cast<void>(station.armDevices());
     station.step(static_cast<std::uint32_t>(tick_));
     const DeviceInput& input = station.inputs()[0];
     const Pose& X_WH = input.sample.X_WH;

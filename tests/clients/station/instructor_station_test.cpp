@@ -62,6 +62,7 @@ class StuckPart {
  private:
   void step() {
     ++tick_;
+    EXPECT_TRUE(station->armDevices());
     station->step(static_cast<std::uint32_t>(tick_));
     const Pose& X_WH = station->inputs()[0].sample.X_WH;
     HandManifold manifold;
