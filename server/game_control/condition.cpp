@@ -26,7 +26,7 @@ double positionError(const SceneView& scene, ObjectId object, const Pose& X_WG) 
 }
 
 bool ConditionProgress::isMetNow(const Condition& condition, Node& node, const SceneView& scene,
-                                 std::span<const GameCommand> commands) noexcept {
+                                 std::span<const GameCommand> commands, std::uint32_t ticks) noexcept {
   ConditionReading& reading = node.reading;
   switch (condition.kind) {
     case ConditionKind::kPose:
@@ -43,12 +43,12 @@ bool ConditionProgress::isMetNow(const Condition& condition, Node& node, const S
       reading.limit = condition.within;
       return reading.value <= condition.within;
     case ConditionKind::kContact:
-      node.contact.step(scene.inContact(condition.object, condition.other), condition.lapse);
+      node.contact.step(scene.inContact(condition.object, condition.other), condition.lapse, ticks);
       reading.value = seconds(node.contact.contact_ticks);
       reading.limit = seconds(condition.limit_ticks);
       return node.contact.contact_ticks >= std::max(condition.limit_ticks, 1U);
     case ConditionKind::kContactTime:
-      if (scene.inAnyContact(condition.object)) ++node.contact.contact_ticks;
+      if (scene.inAnyContact(condition.object)) node.contact.contact_ticks += ticks;
       reading.value = seconds(node.contact.contact_ticks);
       reading.limit = seconds(condition.limit_ticks);
       return node.contact.contact_ticks >= condition.limit_ticks;
@@ -69,7 +69,7 @@ bool ConditionProgress::isMetNow(const Condition& condition, Node& node, const S
 }
 
 bool ConditionProgress::step(std::span<const Condition> tree, const SceneView& scene,
-                             std::span<const GameCommand> commands) noexcept {
+                             std::span<const GameCommand> commands, std::uint32_t ticks) noexcept {
   assert(tree.size() <= kMaxConditions);
   // parents precede their children: in reverse order a group is evaluated after all of its children
   std::array<std::uint32_t, kMaxConditions> children{};
@@ -83,9 +83,9 @@ bool ConditionProgress::step(std::span<const Condition> tree, const SceneView& s
       node.reading.value = met_children[i];
       node.reading.limit = condition.kind == ConditionKind::kAll ? children[i] : 1.0;
     } else {
-      met = isMetNow(condition, node, scene, commands);
+      met = isMetNow(condition, node, scene, commands, ticks);
     }
-    node.held_ticks = met ? node.held_ticks + 1 : 0;
+    node.held_ticks = met ? node.held_ticks + ticks : 0;
     met = met && node.held_ticks >= condition.dwell;
     if (i > 0 && tree[condition.parent].latched) {
       node.latched = node.latched || met;

@@ -80,11 +80,12 @@ struct ContactTimer {
   std::uint32_t contact_ticks = 0;  ///< [ticks] in contact
   std::uint32_t apart_ticks = 0;    ///< [ticks] since the last contact
 
-  void step(bool in_contact, std::uint32_t lapse) noexcept {
-    if (in_contact) {
-      ++contact_ticks;
+  /// After `ticks` [ticks]; 0: nothing changes.
+  void step(bool in_contact, std::uint32_t lapse, std::uint32_t ticks) noexcept {
+    if (in_contact && ticks > 0) {
+      contact_ticks += ticks;
       apart_ticks = 0;
-    } else if (++apart_ticks > lapse) {
+    } else if (!in_contact && (apart_ticks += ticks) > lapse) {
       contact_ticks = 0;
     }
   }
@@ -98,9 +99,10 @@ class ConditionProgress {
  public:
   void reset() noexcept { *this = {}; }
 
-  /// One tick: true when the root is met, false for an empty tree. At most kMaxConditions nodes (assert).
-  bool step(std::span<const Condition> tree, const SceneView& scene,
-            std::span<const GameCommand> commands) noexcept;
+  /// After `ticks` [ticks], 0 or 1: true when the root is met, false for an empty tree. At most
+  /// kMaxConditions nodes (assert).
+  bool step(std::span<const Condition> tree, const SceneView& scene, std::span<const GameCommand> commands,
+            std::uint32_t ticks = 1) noexcept;
 
   /// Progress of a node (index in the tree), as of the last step.
   [[nodiscard]] const ConditionReading& reading(std::size_t node) const { return nodes_[node].reading; }
@@ -128,7 +130,7 @@ class ConditionProgress {
     ConditionReading reading;
   };
   [[nodiscard]] static bool isMetNow(const Condition& condition, Node& node, const SceneView& scene,
-                                     std::span<const GameCommand> commands) noexcept;
+                                     std::span<const GameCommand> commands, std::uint32_t ticks) noexcept;
 
   std::array<Node, kMaxConditions> nodes_{};
 };

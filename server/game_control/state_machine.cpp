@@ -90,8 +90,8 @@ StateMachine::StateMachine(std::shared_ptr<const ScenarioFile> scenario) : scena
 
 void StateMachine::start(simulation::Environment& environment) noexcept { enter(environment, 0); }
 
-std::size_t StateMachine::step(simulation::Environment& environment,
-                               std::span<const GameCommand> commands) noexcept {
+std::size_t StateMachine::step(simulation::Environment& environment, std::span<const GameCommand> commands,
+                               std::uint32_t ticks) noexcept {
   StepStatus& status = memory_.status;
   status.tick = environment.tick();
   std::size_t taken = 0;
@@ -112,11 +112,11 @@ std::size_t StateMachine::step(simulation::Environment& environment,
   }
 
   const EnvironmentView scene(environment);
-  const bool met = memory_.progress.step(state().conditions, scene, commands);
-  ++memory_.elapsed;
-  updateMeasurements(scene);
-  regrabReleasedPart(environment, scene);
-  grabByHelpers(environment, scene);
+  const bool met = memory_.progress.step(state().conditions, scene, commands, ticks);
+  memory_.elapsed += ticks;
+  updateMeasurements(scene, ticks);
+  regrabReleasedPart(environment, scene, ticks);
+  grabByHelpers(environment, scene, ticks);
   const bool skipped = std::any_of(commands.begin(), commands.end(), [](const GameCommand& command) {
     return command.kind == CommandKind::kSkipStep;
   });
@@ -219,7 +219,7 @@ void StateMachine::enter(simulation::Environment& environment, std::uint32_t ste
   memory_.helpers = {};
   applyEffects(environment);
   status.hand = handInRole(*scenario_, environment, state().hand);
-  updateMeasurements(EnvironmentView(environment));
+  updateMeasurements(EnvironmentView(environment), 0);
 }
 
 /// What a state does to the scene when it begins.
@@ -255,7 +255,8 @@ void StateMachine::place(simulation::Environment& environment, const Placement& 
   }
 }
 
-void StateMachine::regrabReleasedPart(simulation::Environment& environment, const SceneView& scene) noexcept {
+void StateMachine::regrabReleasedPart(simulation::Environment& environment, const SceneView& scene,
+                                      std::uint32_t ticks) noexcept {
   const auto& assignments = state().hands;
   for (std::size_t i = 0; i < std::min(assignments.size(), kMaxRegrabs); ++i) {
     const HandAssignment& assignment = assignments[i];
@@ -263,21 +264,22 @@ void StateMachine::regrabReleasedPart(simulation::Environment& environment, cons
     const ObjectId own = environment.hands()[hand.value].default_object;
     if (assignment.object == own || environment.hands()[hand.value].object != own) continue;
     ContactTimer& timer = memory_.regrabs[i];
-    timer.step(scene.inContact(own, assignment.object), kRegrabLapse);
+    timer.step(scene.inContact(own, assignment.object), kRegrabLapse, ticks);
     if (timer.contact_ticks < kRegrabTicks) continue;
     timer = {};
     environment.grab(hand, assignment.object);
   }
 }
 
-void StateMachine::grabByHelpers(simulation::Environment& environment, const SceneView& scene) noexcept {
+void StateMachine::grabByHelpers(simulation::Environment& environment, const SceneView& scene,
+                                 std::uint32_t ticks) noexcept {
   for (std::size_t i = 0; i < state().may_take.size(); ++i) {
     const HandAssignment& helper = state().may_take[i];
     const HandId hand = handInRole(*scenario_, environment, helper.hand);
     const ObjectId own = environment.hands()[hand.value].default_object;
     ContactTimer& timer = memory_.helpers[i];
     if (environment.hands()[hand.value].object != own) continue;
-    timer.step(scene.inContact(own, helper.object), kRegrabLapse);
+    timer.step(scene.inContact(own, helper.object), kRegrabLapse, ticks);
     if (timer.contact_ticks < kRegrabTicks) continue;
     timer = {};
     environment.grab(hand, helper.object);
@@ -343,13 +345,13 @@ void StateMachine::countOutcomes() noexcept {
   memory_.status.timed_out = count(memory_.timed_out);
 }
 
-void StateMachine::updateMeasurements(const SceneView& scene) noexcept {
+void StateMachine::updateMeasurements(const SceneView& scene, std::uint32_t ticks) noexcept {
   StepStatus& status = memory_.status;
   const ScenarioState& current = state();
   status.position_error = 0.0;
   status.angle_error = 0.0;
   if (current.object.valid()) {
-    if (memory_.elapsed > 0 && scene.inAnyContact(current.object)) ++memory_.contact_ticks;
+    if (scene.inAnyContact(current.object)) memory_.contact_ticks += ticks;
     if (current.X_WG) {
       status.position_error = positionError(scene, current.object, *current.X_WG);
       status.angle_error = angleBetween(scene.pose(current.object).rotation(), current.X_WG->rotation());

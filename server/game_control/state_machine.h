@@ -44,8 +44,8 @@ struct StepStatus {
 ///
 /// A state that ends stays current for one tick as kDone, kSkipped or kTimedOut before the next begins, so
 /// each has a revision that tells how it ended. Skipping a state puts its object to its target (fixed where
-/// the state snaps, else if it is a free body), because the next states build on it. Time is counted in calls
-/// of step(), which in a pause come with commands alone: nothing times out meanwhile.
+/// the state snaps, else if it is a free body), because the next states build on it. Time is what the calls
+/// of step() say: in a pause, where they come with commands alone, none passes.
 ///
 /// Threads: one caller, the tick. Real-time: start, step, status, addTo.
 class StateMachine {
@@ -60,12 +60,14 @@ class StateMachine {
   /// many of the commands were taken, which are in order: those behind one that may end the state wait for
   /// the next one, and are to be given again with the next tick. Handles kFulfilled, kSignal, kSkipStep,
   /// kRelease, kSetCollision, kSwapHands, kReset (all objects, groups and pairs as at the start, first
-  /// state), kGoToStep, kBack, kRepeatStep and kHandOver; other commands are the session's.
+  /// state), kGoToStep, kBack, kRepeatStep and kHandOver; other commands are the session's. `ticks` [ticks]
+  /// of time have passed since the last call, 0 or 1.
   ///
   /// Going to a state makes the scene what it is when all states before have been skipped: what the trainee
   /// has moved since is undone. States that are passed over without having been visited count as skipped;
   /// those from the target on as not visited.
-  std::size_t step(simulation::Environment& environment, std::span<const GameCommand> commands) noexcept;
+  std::size_t step(simulation::Environment& environment, std::span<const GameCommand> commands,
+                   std::uint32_t ticks = 1) noexcept;
 
   /// A state has ended, and the next step() begins the one that follows it.
   [[nodiscard]] bool betweenStates() const noexcept;
@@ -118,12 +120,15 @@ class StateMachine {
   void applyEffects(simulation::Environment& environment) noexcept;
   void apply(simulation::Environment& environment, const GameCommand& command) noexcept;
   void place(simulation::Environment& environment, const Placement& placement) noexcept;
-  void regrabReleasedPart(simulation::Environment& environment, const SceneView& scene) noexcept;
-  void grabByHelpers(simulation::Environment& environment, const SceneView& scene) noexcept;
+  void regrabReleasedPart(simulation::Environment& environment, const SceneView& scene,
+                          std::uint32_t ticks) noexcept;
+  void grabByHelpers(simulation::Environment& environment, const SceneView& scene,
+                     std::uint32_t ticks) noexcept;
   void releaseHelpers(simulation::Environment& environment) noexcept;
   void swapHands(simulation::Environment& environment) noexcept;
   void countOutcomes() noexcept;
-  void updateMeasurements(const SceneView& scene) noexcept;
+  /// After `ticks` [ticks] of this state.
+  void updateMeasurements(const SceneView& scene, std::uint32_t ticks) noexcept;
   void collectReadings() noexcept;
   [[nodiscard]] const ScenarioState& state() const { return scenario_->states[memory_.status.step]; }
 

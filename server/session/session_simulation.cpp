@@ -9,9 +9,9 @@
 namespace tenon::session {
 namespace {
 
-/// Without an input for longer, a hand is told to others as one that stands: also of the sparsest inputs one
-/// may be lost.
-constexpr Tick kLateTicks = 2 * kMostInputPeriod;  // [ticks]
+/// Without a reading for longer, a hand is told to others as one that stands. Of sparse inputs each tick has
+/// one (ReadingPlayout); near the server so many are not lost in a row.
+constexpr Tick kLateTicks = kMostInputPeriod;  // [ticks]
 
 /// [points] of ChangeKind::kBudget; 0, no limit, for NaN and numbers below 1.
 std::uint64_t budgetPoints(double value) {
@@ -43,7 +43,8 @@ void SessionSimulation::tick(const TickInput& input) noexcept {
     if (change.kind == ChangeKind::kTake) take(change.hand, change.object);
   applyAgeLimits();
   if (stepsGoOn()) {
-    dropFirstCommands(machine_.step(environment_, {commands_.begin(), commands_.size()}));
+    const std::uint32_t ticks = phase_ == RunPhase::kPaused ? 0 : 1;
+    dropFirstCommands(machine_.step(environment_, {commands_.begin(), commands_.size()}, ticks));
     if (machine_.status().finished) phase_ = RunPhase::kSucceeded;
     if (machine_.status().failed) phase_ = RunPhase::kFailed;
   }
@@ -239,6 +240,7 @@ void SessionSimulation::fill(TickOutput& output) const noexcept {
   output.emergency_stop = emergency_stop_;
   output.forces_frozen = forces_frozen_;
   output.step = machine_.status();
+  output.commands_waiting = commands_.size();
 
   const auto objects = environment_.objects();
   for (std::uint32_t i = 0; i < objects.size(); ++i) {
@@ -337,7 +339,7 @@ void SessionSimulation::save(std::vector<std::uint8_t>& bytes) const {
 }
 
 std::size_t SessionSimulation::maxSavedBytes() const {
-  constexpr std::size_t kMostCommandBytes = kMaxCommands * sizeof(game_control::GameCommand);
+  constexpr std::size_t kMostCommandBytes = kMostWaitingCommands * sizeof(game_control::GameCommand);
   std::vector<std::uint8_t> bytes;
   save(bytes);
   return environment_.maxSavedBytes() + bytes.size() + kMostCommandBytes;
@@ -361,7 +363,7 @@ Result<void> SessionSimulation::restore(std::span<const std::uint8_t> bytes) {
   for (ExternalTrack& track : tracks_) in.get(track.X_WO), in.get(track.until);
   std::uint32_t commands = 0;
   in.get(commands);
-  if (commands > kMaxCommands) return fail("a checkpoint in the journal is damaged");
+  if (commands > kMostWaitingCommands) return fail("a checkpoint in the journal is damaged");
   commands_.resize(commands);
   for (game_control::GameCommand& command : commands_)
     in.get(command.kind), in.get(command.hand), in.get(command.signal), in.get(command.value);

@@ -124,11 +124,9 @@ class SessionSimulation {
   std::uint32_t collides_revision_ = 0;  ///< Environment::pairRevision() that they are of
   void dropFirstCommands(std::size_t count) noexcept;
 
-  static constexpr std::size_t kMaxCommands = 256;  ///< that wait; as many changes wait for ticks
-
   /// Commands for the next steps of the state machine: those that wait for one before them, and those of this
   /// tick; none in an emergency stop.
-  FixedVector<game_control::GameCommand, kMaxCommands> commands_;
+  FixedVector<game_control::GameCommand, kMostWaitingCommands> commands_;
   RunPhase phase_ = RunPhase::kWaitingForPeople;
   bool emergency_stop_ = false;
   bool forces_frozen_ = false;  ///< hands are held still, steps go on

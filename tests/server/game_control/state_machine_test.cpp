@@ -83,6 +83,20 @@ TEST(StateMachine, ATimeoutFailsTheTrainingOrSkipsTheState) {
   EXPECT_FALSE(skips.status().failed);
 }
 
+TEST(StateMachine, WhereNoTimePassesCommandsActAndNothingElseDoes) {
+  test::ScenarioFixture fixture(test::smallScenario());
+  fixture.moveTo(Vector3(0.2, 0, 0.129));
+  ASSERT_EQ(fixture.status().step, 0U);
+  const double seconds = fixture.status().contact_seconds;
+  const std::vector<GameCommand> none;
+  for (int i = 0; i < 2000; ++i) fixture.machine().step(fixture.environment(), none, 0);
+  EXPECT_EQ(fixture.status().step, 0U) << "a touch of 0.1 s ends it";
+  EXPECT_EQ(fixture.status().contact_seconds, seconds);
+  const std::vector<GameCommand> skip{command(CommandKind::kSkipStep)};
+  fixture.machine().step(fixture.environment(), skip, 0);
+  EXPECT_EQ(fixture.status().phase, StepPhase::kSkipped);
+}
+
 TEST(StateMachine, SkippingAStateThatSnapsFixesThePartAtItsTarget) {
   test::ScenarioFixture fixture(test::smallScenario());
   fixture.step({command(CommandKind::kSkipStep)});
