@@ -81,6 +81,7 @@ class Recorder {
   }
   /// Writes what has arrived within `timeout`; the number of samples.
   std::size_t take(milliseconds timeout) {
+    sayWhatIsLost();
     return subscriber_->dispatch(timeout, [this](const wire::RawSample& sample) {
       const auto note = [&]<class M>(const wire::Topic<M>& topic, std::set<std::uint32_t>& known, auto id) {
         if (sample.topic != topic.name || sample.gone) return;
@@ -91,6 +92,15 @@ class Recorder {
       note(wire::kSceneStep, steps_, [](const SceneStep& step) { return step.step; });
       recording_->add(sample);
     });
+  }
+  /// Of a server that had written more than can be kept before this program belonged to it.
+  void sayWhatIsLost() {
+    const std::uint64_t lost = subscriber_->lost();
+    if (lost == std::exchange(lost_, lost)) return;
+    recording_->lostBefore(lost);
+    if (options_.report)
+      options_.report(std::to_string(lost) +
+                      " samples that the server sent before this program had joined are not recorded");
   }
   /// As many samples of the scene are recorded as the server announces; one at least.
   [[nodiscard]] bool hasScene() const {
@@ -105,6 +115,7 @@ class Recorder {
   std::unique_ptr<Recording> recording_;
   std::unique_ptr<wire::RawSubscriber> subscriber_;
   std::unique_ptr<wire::Writer<RecorderStatus>> status_writer_;
+  std::uint64_t lost_ = 0;                           ///< that is said
   std::set<std::uint32_t> objects_, hands_, steps_;  ///< of the scene, recorded
 };
 

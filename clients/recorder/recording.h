@@ -72,6 +72,8 @@ class Recording {
   [[nodiscard]] std::vector<TopicCount> counts() const;
   /// Whether the run is over and the server has stated what it published up to its end.
   [[nodiscard]] bool hasStatement() const;
+  /// So many samples came before the recorder belonged to their server and could not be kept.
+  void lostBefore(std::uint64_t samples) { status_.lost = samples; }
   [[nodiscard]] bool runIsOver() const;
   /// The newest one recorded.
   [[nodiscard]] const std::optional<RunState>& run() const { return run_; }

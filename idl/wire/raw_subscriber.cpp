@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <map>
 #include <optional>
 #include <span>
 #include <utility>
@@ -34,11 +35,13 @@ Result<TopicSpec> specOf(std::string_view name) {
 
 class RawSubscription : public Subscription {
  public:
-  RawSubscription(const TopicSpec& spec, const std::function<void(const RawSample&)>* const& handler)
+  RawSubscription(const TopicSpec& spec, const std::function<void(const RawSample&)>* const& handler,
+                  std::uint64_t& lost)
       : spec_(spec),
         keeps_unheard_(spec.parameters.of_server &&
                        (spec.qos_class == QosClass::kState || spec.parameters.late_joiner_depth > 0)),
-        handler_(handler) {}
+        handler_(handler),
+        lost_(lost) {}
 
   [[nodiscard]] bool isRebound() const override { return reader->partition()->server != server_; }
 
@@ -55,8 +58,8 @@ class RawSubscription : public Subscription {
       if (!heard && !(keeps_unheard_ && from.known() && infos[i].valid_data)) continue;
       encodeSample(*spec_.type, samples[i], bytes_);
       if (!heard) {
-        keepUnheard(
-            {from, infos[i].source_timestamp, infos[i].instance_handle, infos[i].publication_handle, bytes_});
+        keepUnheard(from, infos[i].publication_handle,
+                    {infos[i].source_timestamp, infos[i].instance_handle, bytes_});
         continue;
       }
       const auto give = [&](bool gone) {
@@ -72,24 +75,38 @@ class RawSubscription : public Subscription {
 
  private:
   struct Unheard {
-    Origin from;
     std::int64_t source_ns;
     std::uint64_t instance;
-    std::uint64_t writer;
     std::vector<std::uint8_t> bytes;
   };
+  struct UnheardWriter {
+    Origin from;
+    std::deque<Unheard> samples;
+    std::uint64_t lost = 0;
+  };
+  static constexpr std::size_t kMostUnheardWriters = 16;  ///< lives of servers of one name
 
   /// What late joiners get comes once, maybe before it is known that this client will belong to its server.
-  void keepUnheard(Unheard sample) {
+  /// However much another one writes, it stays.
+  void keepUnheard(const Origin& from, std::uint64_t writer, Unheard sample) {
+    if (unheard_.size() >= kMostUnheardWriters && !unheard_.contains(writer)) return;
+    UnheardWriter& kept = unheard_[writer];
+    kept.from = from;
     const std::size_t most = std::max<std::size_t>(2000, 2 * spec_.parameters.late_joiner_depth);
-    if (unheard_.size() >= most) unheard_.pop_front();
-    unheard_.push_back(std::move(sample));
+    if (kept.samples.size() >= most) {
+      kept.samples.pop_front();
+      ++kept.lost;
+    }
+    kept.samples.push_back(std::move(sample));
   }
   void deliverUnheard() {
     server_ = reader->partition()->server;
-    for (const Unheard& sample : std::exchange(unheard_, {}))
-      if (server_ == sample.from)
-        deliver(sample.source_ns, false, sample.instance, sample.writer, sample.bytes);
+    for (const auto& [writer, kept] : std::exchange(unheard_, {})) {
+      if (server_ != kept.from) continue;
+      lost_ += kept.lost;
+      for (const Unheard& sample : kept.samples)
+        deliver(sample.source_ns, false, sample.instance, writer, sample.bytes);
+    }
   }
   void deliver(std::int64_t source_ns, bool gone, std::uint64_t instance, std::uint64_t writer,
                std::span<const std::uint8_t> bytes) {
@@ -100,7 +117,8 @@ class RawSubscription : public Subscription {
   bool keeps_unheard_;
   const std::function<void(const RawSample&)>* const& handler_;  ///< of the current dispatch()
   std::optional<Origin> server_;  ///< that the partition was bound to at the last samples
-  std::deque<Unheard> unheard_;
+  std::map<std::uint64_t, UnheardWriter> unheard_;
+  std::uint64_t& lost_;  ///< of all topics
   OriginCache origins_;
   std::uint64_t sequence_ = 0;
   std::vector<std::uint8_t> bytes_;
@@ -120,6 +138,7 @@ const std::vector<TopicName>& allTopics() {
 struct RawSubscriber::Impl {
   ReaderWaitSet wait_set;
   const std::function<void(const RawSample&)>* handler = nullptr;
+  std::uint64_t lost = 0;
 };
 
 RawSubscriber::RawSubscriber(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -144,8 +163,8 @@ Result<void> RawSubscriber::add(Partition& partition, const std::vector<std::str
     specs.push_back(*spec);
   }
   for (const TopicSpec& spec : specs) {
-    auto added =
-        impl_->wait_set.add(std::make_unique<RawSubscription>(spec, impl_->handler), partition, spec, true);
+    auto added = impl_->wait_set.add(std::make_unique<RawSubscription>(spec, impl_->handler, impl_->lost),
+                                     partition, spec, true);
     if (!added) return added;
   }
   return {};
@@ -158,6 +177,7 @@ std::size_t RawSubscriber::dispatch(std::chrono::nanoseconds timeout,
   impl_->handler = nullptr;
   return count;
 }
+std::uint64_t RawSubscriber::lost() const { return impl_->lost; }
 void RawSubscriber::wake() noexcept { impl_->wait_set.wake(); }
 
 struct RawWriter::Impl {

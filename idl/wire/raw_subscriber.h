@@ -57,6 +57,8 @@ class RawSubscriber {
   /// bytes are valid until the handler returns. Returns the number of samples.
   std::size_t dispatch(std::chrono::nanoseconds timeout,
                        const std::function<void(const RawSample&)>& handler);
+  /// Samples of the server that is heard that came before it was, and were too many to be kept.
+  [[nodiscard]] std::uint64_t lost() const;
   /// Ends the waiting of dispatch().
   void wake() noexcept;
 

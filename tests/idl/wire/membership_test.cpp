@@ -368,6 +368,52 @@ TEST(Membership, WhatTheNextServerKeepsForLateJoinersIsThereWhenARecorderBelongs
   EXPECT_THAT(ticks, ::testing::ElementsAre(5, 11, 12, 13, 14));
 }
 
+// Whatever somebody else writes meanwhile.
+TEST(Membership, OneThatWritesWithoutEndPushesNothingOfTheNextServerOut) {
+  constexpr std::uint64_t kMost = 2000;  // of a writer, for a topic that late joiners get 1000 of
+  const std::uint32_t domain = test::ownDomain();
+  auto next = test::participant(domain);
+  auto stranger = test::participant(domain);
+  auto client = test::participant(domain);
+  Partition next_session(next, "s/test"), strange_session(stranger, "s/test"), session(client, "s/test");
+  auto events = Writer<EventLog>::open(next_session, kEventLog);
+  auto flood = Writer<EventLog>::open(strange_session, kEventLog);
+  session.hearOnly(client->origin());  // nobody who writes
+  auto subscriber = RawSubscriber::open(session, {std::string(kEventLog.name)});
+  std::vector<std::uint64_t> heard;
+  const auto dispatch = [&] {
+    subscriber->dispatch(milliseconds(5), [&](const RawSample& sample) {
+      heard.push_back(decode<EventLog>(sample.bytes)->seq);
+    });
+  };
+  const auto writeAll = [&](Writer<EventLog>& writer, std::uint64_t first, std::uint64_t count) {
+    for (std::uint64_t seq = first; seq < first + count; ++seq) {
+      ASSERT_TRUE(writer.write({.seq = seq}));
+      if (seq % 100 == 0) dispatch();
+    }
+  };
+  for (int i = 0; i < 500 && (events->matchedReaders() == 0 || flood->matchedReaders() == 0); ++i) dispatch();
+  writeAll(*events, 1, 10);
+  writeAll(*flood, 1'000'000, 2 * kMost);
+  for (int i = 0; i < 20; ++i) dispatch();
+  EXPECT_TRUE(heard.empty());
+  session.hearOnly(next->origin());
+  dispatch();
+  EXPECT_THAT(heard, ::testing::ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9, 10));
+  EXPECT_EQ(subscriber->lost(), 0U);
+
+  // of its own too many
+  heard.clear();
+  session.hearOnly(client->origin());
+  dispatch();
+  writeAll(*events, 11, kMost + 7);
+  for (int i = 0; i < 20; ++i) dispatch();
+  session.hearOnly(next->origin());
+  dispatch();
+  EXPECT_EQ(heard.size(), kMost);
+  EXPECT_EQ(subscriber->lost(), 7U);
+}
+
 // two participants write equal samples to one topic: their origins differ
 TEST(Origin, IsThatOfTheWritingParticipant) {
   const std::uint32_t domain = test::ownDomain();
