@@ -14,7 +14,8 @@
 namespace tenon::record::mcap {
 namespace {
 
-constexpr std::uint64_t kMaxChunkBytes = 256U << 20U;  // uncompressed; a larger size is damage or an attack
+// Uncompressed; a larger size is damage or an attack.
+constexpr std::uint64_t kMaxChunkBytes = 256U << 20U;  // [bytes]
 
 }  // namespace
 
@@ -64,6 +65,7 @@ std::string openChunk(std::span<const std::uint8_t> fields, std::vector<std::uin
   const auto compressed = in.take(in.get<std::uint64_t>());
   const bool known = compression.empty() || compression == "zstd";
   if (!in.ok || !known || size > kMaxChunkBytes) return "cannot be read";
+  if (size > kAnyChunkBytes + kMostRatio * compressed.size()) return "claims to hold more than it can";
   if (compression.empty()) {
     plain.assign(compressed.begin(), compressed.end());
   } else {

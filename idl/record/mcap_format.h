@@ -33,6 +33,11 @@ enum Opcode : std::uint8_t {
 
 inline constexpr std::size_t kRecordHeaderBytes = 9;  // opcode and length
 
+// A chunk whose size is more than that beyond its compressed one is an attack. Messages that hardly differ
+// from each other shrink to a 150th, zeros to less: such a chunk is stored as it is.
+inline constexpr std::uint64_t kMostRatio = 256;             // [-]
+inline constexpr std::uint64_t kAnyChunkBytes = 64U << 10U;  // [bytes] whatever the ratio
+
 /// CRC-32 (IEEE 802.3), the checksum of the format. `crc`: result for the bytes before, to continue it.
 [[nodiscard]] std::uint32_t crc32(std::span<const std::uint8_t> bytes, std::uint32_t crc = 0);
 

@@ -131,6 +131,8 @@ void McapReader::Impl::scan() {
     complete = true;
     return checkSummary(bytes.subspan(summary, summary == 0 ? 0 : records.end() - summary));
   }
+  if (records.hasDamagedEnd() && !records.gaveUp())
+    reportDamage("is damaged from byte " + std::to_string(records.end()) + " to its end");
   if (records.gaveUp())
     reportDamage("is damaged from byte " + std::to_string(records.end()) +
                  " on, and what follows is not read: too much of it looks like records and is none");

@@ -36,7 +36,7 @@ struct McapAttachment {
 };
 
 /// Reads an MCAP file in file order. A truncated file (crash, full disk) is read up to its last complete
-/// chunk, and a damaged part is skipped; problem() reports both.
+/// chunk, and a damaged part is skipped, also one at the end; problem() tells them apart.
 ///
 /// Threads: one at a time. Real-time: no.
 class McapReader {

@@ -91,7 +91,10 @@ bool RecordSequence::next(std::uint8_t& opcode, Fields& fields) {
   std::size_t at = end_;
   if (!take(at, opcode, fields)) {
     const auto found = search(at + 1);
-    if (!found) return false;
+    if (!found) {
+      has_damaged_end_ = !isTornAt(at);
+      return false;
+    }
     unreadable_ = {at, *found};
     at = *found;
     take(at, opcode, fields);
@@ -148,6 +151,25 @@ bool RecordSequence::isRecordAt(std::size_t at) {
   std::uint8_t opcode = 0;
   Fields fields;
   return take(at, opcode, fields);
+}
+
+/// Whether the file ends within a record that begins here, as it does when its program was killed.
+bool RecordSequence::isTornAt(std::size_t at) const {
+  if (at >= zeros_ || zeros_ - at < kRecordHeaderBytes) return true;
+  FieldReader in(file_.subspan(at, zeros_ - at));
+  const auto opcode = in.get<std::uint8_t>();
+  const auto length = in.get<std::uint64_t>();
+  const std::size_t after = zeros_ - at - kRecordHeaderBytes;
+  if (opcode == kFooter && length == kFooterBytes) return after < length + sizeof(kMagic);
+  if (opcode > kDataEnd || length <= after) return false;
+  if (opcode != kChunk) return true;
+  constexpr std::size_t kBeforeName = 8 + 8 + 8 + 4;
+  in.take(kBeforeName);
+  const auto name = in.get<std::uint32_t>();
+  in.take(name);
+  const auto compressed = in.get<std::uint64_t>();
+  // all of that precedes the compressed messages, of which some are not there
+  return !in.ok || length == kBeforeName + sizeof(name) + name + sizeof(compressed) + compressed;
 }
 
 /// Whether a search ends here. What has no checksum has to be followed by another record.

@@ -13,7 +13,7 @@ struct UnreadablePart {
 };
 
 /// Follows the records of a file in their order. A record counts only where its own lengths agree with its
-/// length, and the footer only at the end of the file. Where there is none that counts, it goes on with the
+/// length, and the footer only at the end of the file. Where there is none that counts, it continues with the
 /// next chunk, attachment, metadata or end of the data: after damage nothing is lost that can be read. What
 /// is torn at the end is no record, with or without the zeros that a power loss leaves there.
 ///
@@ -33,10 +33,13 @@ class RecordSequence {
   [[nodiscard]] const std::optional<UnreadablePart>& unreadable() const { return unreadable_; }
   /// At the end: what follows end() was searched no further, although records may be there.
   [[nodiscard]] bool gaveUp() const { return has_given_up_; }
+  /// At the end: what follows end() is not the begin of a record that is torn, but one that is damaged.
+  [[nodiscard]] bool hasDamagedEnd() const { return has_damaged_end_; }
 
  private:
   bool take(std::size_t at, std::uint8_t& opcode, std::span<const std::uint8_t>& fields);
   bool isRecordAt(std::size_t at);
+  [[nodiscard]] bool isTornAt(std::size_t at) const;
   bool isFoundAt(std::size_t at);
   bool agrees(std::uint8_t opcode, std::span<const std::uint8_t> fields);
   bool isWholeChunk(std::span<const std::uint8_t> fields);
@@ -51,6 +54,7 @@ class RecordSequence {
   std::optional<UnreadablePart> unreadable_;
   std::uint64_t budget_;  ///< [bytes] that searches may still read in vain
   bool has_given_up_ = false;
+  bool has_damaged_end_ = false;
   std::vector<std::uint8_t> plain_;
 };
 

@@ -1,5 +1,6 @@
 #include "idl/record/mcap_unfinished.h"
 
+#include <algorithm>
 #include <set>
 #include <span>
 #include <string>
@@ -19,6 +20,7 @@ struct Found {
   std::uint32_t metadata = 0, attachments = 0;           ///< before it
   std::size_t metadata_index = 0, attachment_index = 0;  ///< [bytes] likewise
   std::map<std::uint16_t, std::uint64_t> counts;         ///< its messages by channel
+  std::size_t end = 0;                                   ///< [bytes] of it and its indices
 };
 
 /// Follows the records of a file in their order.
@@ -63,6 +65,7 @@ class Scan {
     chunk.index.compressed = in.get<std::uint64_t>();
     chunk.index.offset = records_.begin();
     chunk.index.length = length();
+    chunk.end = records_.end();
     chunk.metadata = summary.metadata;
     chunk.metadata_index = summary.metadata_index.bytes.size();
     chunk.attachments = summary.attachments;
@@ -75,6 +78,7 @@ class Scan {
     chunk.counts[channel] += in.get<std::uint32_t>() / kEntry;
     chunk.index.message_indices[channel] = records_.begin();
     chunk.index.indices_length += length();
+    chunk.end = records_.end();
   }
   void readMetadata(FieldReader in) {
     const Records whole = in.rest;
@@ -150,18 +154,25 @@ Result<Unfinished> readUnfinished(const std::filesystem::path& file) {
   scan.run();
   if (scan.closed) return fail(file.string() + ": is complete, there is nothing to continue");
   if (scan.gaveUp())
-    return fail(file.string() + ": is damaged, and where it goes on after that cannot be found");
+    return fail(file.string() + ": is damaged, and where it continues after that cannot be found");
 
   Unfinished result;
   std::vector<Found>& chunks = scan.chunks;
-  while (!chunks.empty() && !openChunk(chunks.back().fields, result.last_chunk).empty()) chunks.pop_back();
-  if (chunks.empty()) return fail(file.string() + ": has no complete chunk, there is nothing to continue");
+  std::vector<std::uint8_t> plain;
+  const auto is_sound = [&](const Found& chunk) { return openChunk(chunk.fields, plain).empty(); };
+  if (std::none_of(chunks.rbegin(), chunks.rend(), is_sound))
+    return fail(file.string() + ": has no complete chunk, there is nothing to continue");
   for (Scan::Metadata& metadata : scan.metadata)
     if (metadata.chunks >= chunks.size())
       result.later_metadata.emplace_back(std::move(metadata.name), std::move(metadata.fields));
-  const Found last = std::move(chunks.back());
-  chunks.pop_back();
-  result.end = last.index.offset;
+  const Found last = chunks.back();
+  if (openChunk(last.fields, result.last_chunk).empty()) {
+    chunks.pop_back();
+    result.end = last.index.offset;
+  } else {
+    result.last_chunk.clear();
+    result.end = last.end;
+  }
 
   Summary& summary = result.summary;
   summary.metadata_index.putBytes(Records(scan.summary.metadata_index.bytes).first(last.metadata_index));
@@ -172,7 +183,6 @@ Result<Unfinished> readUnfinished(const std::filesystem::path& file) {
   std::set<std::uint16_t> missing;
   for (const Found& chunk : chunks)
     for (const auto& [channel, count] : chunk.counts) missing.insert(channel);
-  std::vector<std::uint8_t> plain;
   for (auto chunk = chunks.begin(); chunk != chunks.end() && !missing.empty(); ++chunk)
     if (openChunk(chunk->fields, plain).empty()) define(plain, summary, missing);
   define(result.last_chunk, summary, missing);

@@ -14,9 +14,10 @@ namespace tenon::record::mcap {
 
 /// The content of a file whose program was killed while it wrote it.
 struct Unfinished {
-  Summary summary;                       ///< of what is before `end`
-  std::uint64_t end = 0;                 ///< [bytes] where the last complete chunk begins
-  std::vector<std::uint8_t> last_chunk;  ///< its records
+  Summary summary;  ///< of what is before `end`
+  /// [bytes] Where the last complete chunk begins; where that is damaged, it stays: its end.
+  std::uint64_t end = 0;
+  std::vector<std::uint8_t> last_chunk;  ///< the records of the one that begins there
   /// Its messages by channel: log time [ns] and place in last_chunk [bytes].
   std::map<std::uint16_t, std::vector<std::pair<std::uint64_t, std::uint64_t>>> last_index;
   /// Metadata after that chunk: name and fields of each record.

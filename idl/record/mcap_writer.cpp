@@ -240,22 +240,24 @@ Result<void> McapWriter::Impl::endChunk() {
     if (ZSTD_isError(size) != 0) return fail(file.string() + ": " + ZSTD_getErrorName(size));
     compressed_bytes.resize(size);
   }
+  const bool is_compressed =
+      compress && chunk.bytes.size() <= mcap::kAnyChunkBytes + mcap::kMostRatio * compressed_bytes.size();
   mcap::ChunkIndex entry;
   entry.first_time = has_messages ? first_time : 0;
   entry.last_time = has_messages ? last_time : 0;
   entry.offset = offset;
   entry.plain = chunk.bytes.size();
-  entry.compression = compress ? "zstd" : "";
-  entry.compressed = compress ? compressed_bytes.size() : chunk.bytes.size();
+  entry.compression = is_compressed ? "zstd" : "";
+  entry.compressed = is_compressed ? compressed_bytes.size() : chunk.bytes.size();
 
   record::mcap::FieldWriter fields;
   fields.put(entry.first_time);
   fields.put(entry.last_time);
   fields.put(entry.plain);
   fields.put(mcap::crc32(chunk.bytes));
-  fields.put(std::string_view(compress ? "zstd" : ""));
+  fields.put(std::string_view(is_compressed ? "zstd" : ""));
   fields.put(entry.compressed);
-  fields.putBytes(compress ? compressed_bytes : chunk.bytes);
+  fields.putBytes(is_compressed ? compressed_bytes : chunk.bytes);
   if (auto done = record(mcap::kChunk, fields); !done) return done;
   entry.length = offset - entry.offset;
   if (auto done = writeIndices(entry); !done) return done;

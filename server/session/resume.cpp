@@ -124,8 +124,7 @@ Result<ResumePoint> readResumePoint(const std::filesystem::path& journal, const 
     return failed(fmt::format("{}; {}", restored.error().what, instead(journal)));
   ResumePoint point{.tick = simulation.now(), .checkpoint = simulation.now(), .problem = {}, .entries = {}};
   if (reader->isDamaged())
-    point.problem =
-        reader->problem() + "; what is damaged stays in the file, and the session goes on from its end";
+    point.problem = reader->problem() + "; the session continues after the last chunk that can be read";
   auto entry = std::next(newest);
   for (; entry != tail->entries.end(); ++entry) {
     if (entry->input.tick != simulation.now() + 1) {

@@ -79,6 +79,20 @@ TEST_F(McapTest, AFullDiskIsAnErrorThatNamesTheFile) {
   EXPECT_THAT(writer.error().what, HasSubstr("/dev/full: cannot write"));
 }
 
+TEST_F(McapTest, WhatShrinksToNothingIsReadBack) {
+  const Bytes zeros(8192);
+  {
+    auto writer = McapWriter::open(file_);
+    const auto channel = writer->addChannel("A", "t::A", "");
+    for (std::uint32_t i = 0; i < 200; ++i) ASSERT_TRUE(writer->write(channel, 0, 0, zeros));
+    ASSERT_TRUE(writer->close());
+  }
+  auto reader = McapReader::open(file_);
+  ASSERT_TRUE(reader);
+  EXPECT_EQ(readAll(*reader).size(), 200U);
+  EXPECT_FALSE(reader->isDamaged()) << reader->problem();
+}
+
 TEST_F(McapTest, APipeIsAnErrorAndNotWaitedFor) {
   ASSERT_EQ(mkfifo(file_.c_str(), 0600), 0);
   const auto writer = McapWriter::open(file_);
