@@ -65,8 +65,8 @@ class CommandClient {
   wire::Inbox inbox_;
 };
 
-/// Raises the emergency stop and prints who has obeyed it. Returns the exit code: 0 when a server or a
-/// station has, else 1.
+/// Raises the emergency stop and prints who has obeyed it. Returns the exit code: 0 when a server has, or
+/// a station and all that listen have acknowledged it, else 1.
 [[nodiscard]] int emergencyOnce(const wire::MembershipOptions& options, const ParsedCommand& command,
                                 const std::atomic<bool>& stop);
 /// Sends the command of a command line and prints the answer. Returns the exit code: 0 when it was accepted,

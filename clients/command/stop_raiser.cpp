@@ -16,7 +16,8 @@ constexpr milliseconds kLateReaders{300};  // although a server has answered, ot
 constexpr milliseconds kAcknowledged{500};
 constexpr std::size_t kMaxReason = 255;  // [bytes] of tenon::EmergencyStop
 constexpr std::size_t kKept = 256;       // raises of which it is known who has heard them
-constexpr std::size_t kMost = 1024;      // servers that are known, and repeaters of a raise
+constexpr std::size_t kMostServers = 1024;
+constexpr std::size_t kMostRepeaters = 1024;  // of a raise
 
 bool contains(const std::vector<wire::Origin>& origins, const wire::Origin& origin) {
   return std::find(origins.begin(), origins.end(), origin) != origins.end();
@@ -69,7 +70,7 @@ Result<std::unique_ptr<StopRaiser>> StopRaiser::open(std::uint32_t domain, const
           const auto raise = self.raises_.find(stop.counter);
           if (stop.client_guid != self.guid_ || raise == self.raises_.end() || from == self.own_) return;
           std::vector<wire::Origin>& repeaters = raise->second.repeaters;
-          if (from.known() && repeaters.size() < kMost && !contains(repeaters, from))
+          if (from.known() && repeaters.size() < kMostRepeaters && !contains(repeaters, from))
             repeaters.push_back(from);
         });
   if (all)
@@ -77,8 +78,12 @@ Result<std::unique_ptr<StopRaiser>> StopRaiser::open(std::uint32_t domain, const
         *self.lobby_, wire::kSessionAnnounce,
         [&self, session](const SessionAnnounce& announce, const wire::Origin& from) {
           const bool is_meant = session.empty() || announce.session == session;
-          if (is_meant && self.servers_.size() < kMost)
-            self.servers_.insert_or_assign({announce.session, announce.server_epoch}, Server{from});
+          const std::pair key{announce.session, announce.server_epoch};
+          if (!is_meant) return;
+          if (self.servers_.size() < kMostServers || self.servers_.contains(key))
+            self.servers_.insert_or_assign(key, Server{from});
+          else
+            self.has_more_servers_ = true;
         });
   if (all)
     all = self.inbox_.onGone<SessionAnnounce>(
@@ -112,6 +117,7 @@ Result<StopHeard> StopRaiser::raise(const std::string& reason, milliseconds pati
 }
 
 Result<std::uint32_t> StopRaiser::write(const std::string& reason) {
+  std::erase_if(servers_, [](const auto& server) { return server.second.is_gone; });
   if (auto sent = stops_->write({guid_, ++counter_, person_, shortened(printable(reason), kMaxReason)});
       !sent)
     return fail(sent.error().what);
@@ -134,8 +140,9 @@ std::size_t StopRaiser::silentSessions(const std::vector<wire::Origin>& repeater
     else if (!server.is_gone)
       silent.insert(name.first);
   }
-  return static_cast<std::size_t>(std::count_if(
-      silent.begin(), silent.end(), [&](const std::string& name) { return !answered.contains(name); }));
+  const auto count =
+      std::count_if(silent.begin(), silent.end(), [&](const auto& name) { return !answered.contains(name); });
+  return static_cast<std::size_t>(count) + (has_more_servers_ ? 1 : 0);
 }
 
 std::optional<StopHeard> StopRaiser::heard(std::uint32_t raise, milliseconds patience) const {

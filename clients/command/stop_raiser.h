@@ -28,8 +28,8 @@ struct StopHeard {
   [[nodiscard]] bool isConfirmed() const { return by_server && silent_sessions == 0; }
 };
 
-/// What people are told of it: "accepted", or who has not answered. Fails when no server and no station has
-/// obeyed it.
+/// What people are told of it: "accepted", or who has not answered. Fails when no server has, and
+/// no station or not all that listen have acknowledged it.
 [[nodiscard]] Result<std::string> outcomeOf(const StopHeard& heard, std::uint32_t domain,
                                             const std::string& session);
 
@@ -81,6 +81,7 @@ class StopRaiser {
   std::size_t own_readers_ = 0;
   /// Of the sessions it is for, by session and epoch.
   std::map<std::pair<std::string, std::uint32_t>, Server> servers_;
+  bool has_more_servers_ = false;          ///< than are known
   std::map<std::uint32_t, Raise> raises_;  ///< the newest ones, by number
   wire::Inbox inbox_;
 };

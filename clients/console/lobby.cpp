@@ -15,15 +15,18 @@ std::vector<Channel> Lobby::channels() {
 void Lobby::add(const SessionAnnounce& announce) {
   const std::pair key{announce.session, announce.server_epoch};
   has_changed_ = true;
-  if (sessions_.size() >= kMaxSessions && !sessions_.contains(key)) {
-    has_more_ = true;
-    return;
-  }
-  sessions_.insert_or_assign(key, announce);
+  if (sessions_.size() < kMaxSessions || sessions_.contains(key))
+    sessions_.insert_or_assign(key, announce);
+  else if (unlisted_.size() < kMaxSessions || unlisted_.contains(key))
+    unlisted_.insert_or_assign(key, announce);
 }
 
 void Lobby::remove(const SessionAnnounce& gone) {
-  has_changed_ = sessions_.erase({gone.session, gone.server_epoch}) > 0 || has_changed_;
+  const std::pair key{gone.session, gone.server_epoch};
+  if (sessions_.erase(key) + unlisted_.erase(key) == 0) return;
+  has_changed_ = true;
+  if (sessions_.size() < kMaxSessions && !unlisted_.empty())
+    sessions_.insert(unlisted_.extract(unlisted_.begin()));
 }
 
 std::vector<std::string> Lobby::names() const {
@@ -52,7 +55,7 @@ std::vector<Publication> Lobby::take(std::int64_t now_ns) {
                     {"served", !unserved_.contains(session.session)},
                     {"lockstep", session.lockstep},
                     {"protocol", session.protocol_version}});
-  const nlohmann::json json{{"sessions", list}, {"more", has_more_}};
+  const nlohmann::json json{{"sessions", list}, {"more", !unlisted_.empty()}};
   const std::string text = json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   return {{1, 0, now_ns, std::make_shared<const std::vector<std::uint8_t>>(text.begin(), text.end())}};
 }

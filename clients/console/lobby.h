@@ -14,7 +14,7 @@
 namespace tenon::console {
 
 /// The sessions of the bus, as the channel /lobby of a room of its own: JSON, newest wins. Of more than
-/// kMaxSessions those that came last are not listed, which is said.
+/// kMaxSessions those that came last are not listed, which is said, until others end.
 ///
 /// Threads: one. Real-time: no.
 class Lobby {
@@ -34,8 +34,8 @@ class Lobby {
 
  private:
   std::map<std::pair<std::string, std::uint32_t>, SessionAnnounce> sessions_;  ///< by name and epoch
+  std::map<std::pair<std::string, std::uint32_t>, SessionAnnounce> unlisted_;  ///< likewise, beyond the bound
   std::set<std::string> unserved_;                                             ///< names
-  bool has_more_ = false;                                                      ///< than are listed
   bool has_changed_ = true;
 };
 

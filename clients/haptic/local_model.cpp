@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <span>
 
 #include "idl/types/motion_law.h"
@@ -18,6 +19,9 @@ constexpr double kUnknownRadius = 0.1;  // [m]
 // In which another hand's spring gets its stiffness, and loses it after the hand has released the object.
 constexpr double kFadeTicks = 20.0;  // [ticks]
 
+// After that manifolds of each tick have a gap.
+constexpr double kLate = 1.5 * kTickSeconds;  // [s]
+
 /// [m] Of a contact's point of the other body, from its pose of tick `heard_at` to `now`. Slow motion is that
 /// of what gives way to this hand.
 Vector3 expectedMotion(const ManifoldContact& contact, Tick heard_at, double now) {
@@ -26,10 +30,15 @@ Vector3 expectedMotion(const ManifoldContact& contact, Tick heard_at, double now
   return extrapolationWeight(v_W.norm()) * std::clamp(ahead, 0.0, LocalModel::kLongestExpectation) * v_W;
 }
 
-/// By what changes the force, or torque, of a spring by `step`.
+/// An offset that is shorter by so much that the force, or torque, of the spring changes by `step` at most.
 Vector3 shortened(const Vector3& offset, double step, double stiffness) {
   const double length = offset.norm();
   return length * stiffness <= step ? Vector3::Zero().eval() : offset * (1.0 - step / (length * stiffness));
+}
+
+bool isFinite(const HandPull& pull) {
+  return pull.X_WG.isFinite() && pull.V_WG.allFinite() && pull.p_BoC_B.allFinite() &&
+         std::isfinite(pull.stiffness) && std::isfinite(pull.rotational_stiffness);
 }
 
 bool anyBodyJumped(const HandManifold& before, const HandManifold& now) {
@@ -53,9 +62,10 @@ void LocalModel::receive(const HandManifold& manifold) noexcept {
                     manifold.object == manifold_.object && manifold.object_epoch == manifold_.object_epoch;
   if (!same || anyBodyJumped(manifold_, manifold)) jumped_ = true;
   const Tick since = has_manifold_ ? manifold.tick - manifold_.tick : 0;
+  late_ = late_ || since > 1 || manifold_age_ > kLate;
   if (!same || since > 0) manifold_age_ = 0.0;
   manifold_ = manifold;
-  updateOtherSprings(same, since > 1);
+  updateOtherSprings(same, late_);
   has_manifold_ = true;
 }
 
@@ -66,6 +76,7 @@ bool LocalModel::usable(const WorldView& world) const noexcept {
 const LocalProxy& LocalModel::step(const Pose& X_WH, const WorldView& world) noexcept {
   const bool was_active = proxy_.active;
   manifold_age_ += kTickSeconds;
+  late_ = false;
   proxy_.discontinuous = false;
   proxy_.active = usable(world);
   if (!proxy_.active) {
@@ -80,6 +91,10 @@ const LocalProxy& LocalModel::step(const Pose& X_WH, const WorldView& world) noe
     // the new planes fit the server's proxy only
     proxy_.discontinuous = was_active;
     proxy_.X_WO = manifold_.X_WO;
+    for (OtherHandSpring& other : other_springs_) {
+      other.X_WG = other.pull.X_WG;
+      other.offset = {};
+    }
     jumped_ = false;
   }
   proxy_.stiffness = manifold_.stiffness;
@@ -95,7 +110,7 @@ void LocalModel::updateOtherSprings(bool same_object, bool after_gap) noexcept {
   if (!same_object) other_springs_.clear();
   for (OtherHandSpring& known : other_springs_) known.listed = false;
   for (const HandPull& pull : manifold_.others) {
-    if (pull.object != manifold_.object || !pull.X_WG.isFinite() || !pull.p_BoC_B.allFinite()) continue;
+    if (pull.object != manifold_.object || !isFinite(pull)) continue;
     auto* const known =
         std::find_if(other_springs_.begin(), other_springs_.end(),
                      [&](const OtherHandSpring& other) { return other.pull.hand == pull.hand; });
@@ -116,6 +131,10 @@ void LocalModel::moveOtherSprings() noexcept {
   for (OtherHandSpring& other : other_springs_) {
     other.weight = std::min(1.0, other.weight + (other.listed ? 1.0 : -1.0) / kFadeTicks);
     if (other.weight <= 0.0) continue;
+    if (!other.listed) {  // it fades where it is
+      other_springs_[kept++] = other;
+      continue;
+    }
     const HandPull& pull = other.pull;
     const Twist V_WG{pull.V_WG.head<3>().cast<double>(), pull.V_WG.tail<3>().cast<double>()};
     other.X_WG = ahead > 0.0 ? extrapolated(pull.X_WG, V_WG, pull.p_BoC_B, ahead) : pull.X_WG;

@@ -85,6 +85,7 @@ class LocalModel final : public ForceModel {
   double manifold_age_ = 0.0;  ///< [s] since it was received
   bool has_manifold_ = false;
   bool jumped_ = false;
+  bool late_ = false;  ///< manifolds since the last step have followed a gap
 };
 
 }  // namespace tenon::haptic

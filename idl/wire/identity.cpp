@@ -16,7 +16,7 @@ namespace {
 using Bytes32 = std::array<std::uint8_t, 32>;
 static_assert(crypto_auth_KEYBYTES == 32 && crypto_auth_BYTES == 32 && crypto_sign_SEEDBYTES == 32 &&
               crypto_sign_PUBLICKEYBYTES == 32 && crypto_sign_BYTES == 64);
-constexpr int kPipeWait = 2000;  // [ms]
+constexpr int kPipeWait = 10000;  // [ms] for a program that asks for a password first
 
 void ready() {
   static const bool is_ready = sodium_init() >= 0;

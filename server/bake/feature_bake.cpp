@@ -256,6 +256,7 @@ class FeatureFinder {
     for (const std::uint32_t face : faces->second) {
       const auto& [a, b, c] = mesh_.triangles[face];
       Vector3 normal = (b - a).cross(c - a).normalized();
+      if (normal.isZero(0.0)) continue;
       if (std::abs(normal.dot(sides[0])) > kCos6 || std::abs(normal.dot(sides[1])) > kCos6) continue;
       if (normal.dot(out) < 0.0) normal = -normal;
       if (!found.isZero() && normal.dot(found) < kCos6) return Vector3::Zero();

@@ -60,7 +60,8 @@ void JournalCopies::open(const Request& request) {
   auto inputs = wire::Writer<TickInputPart>::open(partition, wire::kTickInput);
   auto checkpoints = wire::Writer<CheckpointPart>::open(partition, wire::kCheckpoint);
   std::uint64_t next = firstAfter(request.recorded_until);
-  if (request.recorded_until == 0 && end() > kBeginsWith) next = std::max(next, end() - kBeginsWith);
+  if (request.recorded_until == 0 && !inLockstep() && end() > kBeginsWith)
+    next = std::max(next, end() - kBeginsWith);
   if (inputs && checkpoints) {
     recorders_.push_back({request.client,
                           std::move(partition),

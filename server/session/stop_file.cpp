@@ -1,5 +1,6 @@
 #include "server/session/stop_file.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -86,8 +87,10 @@ Result<StopTruth> readStopFile(const std::filesystem::path& file) {
   const std::size_t end = text->rfind(kEnd);
   if (end == std::string::npos || text->substr(end) != endOf(text->substr(0, end))) return damaged();
   std::istringstream in(text->substr(0, end));
-  std::string kind, hex;
-  while (in >> kind >> hex) {
+  std::string line;
+  while (std::getline(in, line)) {
+    const std::string kind = line.substr(0, line.find(' ')),
+                      hex = line.substr(std::min(line.size(), kind.size() + 1));
     EmergencyStop stop;
     EmergencyClear cleared;
     if (kind == "raise" && read(hex, stop)) {

@@ -420,4 +420,4 @@ showPanels(0);
 // for tests, and for whoever wants to look
 Object.assign(window, { tenon: { session, view, player } });
 void begin();
-void described.then(() => requestAnimationFrame(frame)); // the session is asked for before anything is drawn
+void Promise.race([described, new Promise((done) => setTimeout(done, SETTLED))]).then(() => requestAnimationFrame(frame)); // the session is asked for before anything is drawn
