@@ -25,7 +25,6 @@ export class Presses {
   private pressed = 0; // [ms] of the computer's clock, which runs while the computer sleeps
   private session = ""; // in which it was pressed
   private hearing = 0;
-  private stands?: () => boolean; // the last one that was given to hear()
 
   /** `send` answers undefined when nothing could be sent, or the connection is lost. */
   constructor(private send: () => Promise<DeskAnswer | undefined>, private onChange: () => void) {}
@@ -57,7 +56,6 @@ export class Presses {
    * before its clear; and one of this page that is not answered yet may have reached the gateway alone.
    */
   hear(stands: () => boolean): void {
-    this.stands = stands;
     clearTimeout(this.hearing);
     if (this.confirmed !== this.sent) this.hearing = setTimeout(() => this.unanswered === 0 && stands() && this.forget(), PATIENCE);
   }
@@ -70,7 +68,6 @@ export class Presses {
     clearTimeout(timer);
     --this.unanswered;
     this.judge(mine, answer?.accepted === true, answer?.code);
-    if (this.stands !== undefined) this.hear(this.stands);
     return answer;
   }
 
