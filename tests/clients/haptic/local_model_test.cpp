@@ -1,5 +1,7 @@
 #include "clients/haptic/local_model.h"
 
+#include <algorithm>
+
 #include <gtest/gtest.h>
 
 #include "clients/haptic/coupling.h"
@@ -144,6 +146,69 @@ TEST(LocalModel, RendersNoForceWhileTheObjectIsFrozen) {
   Wrench wrench;
   for (int i = 0; i < 30; ++i) wrench = setup.step(BallAboveFloor::at(0.005));
   EXPECT_EQ(wrench.force.norm(), 0.0);
+}
+
+/// Another hand that holds the ball, with a goal that moves at 0.2 m/s along x; manifolds come every 20 ms.
+struct BallInTwoHands : BallAboveFloor {
+  static constexpr double kSpeed = 0.2;  // [m/s]
+  static constexpr int kPeriod = 20;     // [ticks]
+
+  HandManifold manifold(bool is_held_by_both) {
+    HandManifold told = server.manifold(tick, at(0.1));
+    if (is_held_by_both) {
+      HandPull pull{.hand = HandId{7}, .object = told.object, .X_WG = told.X_WO};
+      pull.X_WG.translation().x() += kSpeed * kStep * static_cast<double>(tick);
+      pull.V_WG[0] = kSpeed;
+      pull.stiffness = 1000.0;
+      told.others.push_back(pull);
+    }
+    return told;
+  }
+  /// [N] Largest change of the force from one cycle to the next in `ticks`.
+  double run(int ticks, bool is_held_by_both) {
+    double largest = 0.0;
+    for (int i = 0; i < ticks; ++i) {
+      world.receive(server.frame(++tick));
+      if (tick % kPeriod == 0) model.receive(manifold(is_held_by_both));
+      const Vector3 force = step(at(0.1)).force;
+      largest = std::max(largest, (force - last).norm());
+      last = force;
+    }
+    return largest;
+  }
+  Vector3 last = Vector3::Zero();
+};
+
+TEST(LocalModel, AHandThatLetsGoWhileItMovesLeavesNoStep) {
+  BallInTwoHands setup;
+  setup.run(20, true);
+  setup.run(60, true);
+  const double held = setup.run(40, true);
+  ASSERT_GT(setup.last.norm(), 1.0) << "it is felt";
+  // its spring of 20 N at most fades within 20 ticks
+  EXPECT_LT(setup.run(60, false), held + 1.5);
+  EXPECT_LT(setup.last.norm(), 0.1);
+}
+
+TEST(LocalModel, GoalsOfOtherHandsAreThoseToldAfterItWasInactive) {
+  BallInTwoHands setup;
+  setup.run(100, true);
+  HandManifold frozen = setup.manifold(true);
+  frozen.frozen = true;
+  setup.model.receive(frozen);
+  for (int i = 0; i < 5; ++i) setup.step(BallAboveFloor::at(0.1));
+  setup.tick += 500;  // 0.1 m farther
+  HandManifold back = setup.manifold(true);
+  back.others[0].V_WG.setZero();
+  for (int i = 0; i < 200; ++i) {
+    back.tick = ++setup.tick;
+    setup.world.receive(setup.server.frame(setup.tick));
+    setup.model.receive(back);
+    setup.step(BallAboveFloor::at(0.1));
+  }
+  // two equal springs: the ball is half way between the hands' goals
+  const double apart = back.others[0].X_WG.translation().x() - 0.3;
+  EXPECT_NEAR(setup.model.proxy().X_WO.translation().x(), 0.3 + apart / 2, 1e-4);
 }
 
 TEST(LocalModel, AllocatesNothingAndLocksNothing) {
