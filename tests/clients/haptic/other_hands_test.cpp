@@ -195,8 +195,8 @@ TEST(ASharedPart, IsCarriedWithoutStepsOfTheForceByWhoHasNoCopyOfTheScene) {
     const double since = std::max(0.0, t - 3.0);  // both accelerate within 100 ms
     return Vector3(0.0, since < 0.1 ? 0.5 * since * since : 0.1 * (since - 0.05), 0.0);
   };
-  HandBesideAnother both([&](double t) { return Vector3(0.0, 0.0, 0.2) + carried(t); }, kSlowAnswers,
-                         ForceModelKind::kManifold);
+  HandBesideAnother both([&](double t) -> Vector3 { return Vector3(0.0, 0.0, 0.2) + carried(t); },
+                         kSlowAnswers, ForceModelKind::kManifold);
   const Vector3 away(0.2, 0.0, 0.2);
   for (int i = 0; i < 500; ++i) both.tick(away);
   both.server().setHandRoundTrip(kRight, 2.0 * kTickSeconds * kWay);
