@@ -157,7 +157,7 @@ struct BallInTwoHands : BallAboveFloor {
     HandManifold told = server.manifold(tick, at(0.1));
     if (is_held_by_both) {
       HandPull pull{.hand = HandId{7}, .object = told.object, .X_WG = told.X_WO};
-      pull.X_WG.translation().x() += kSpeed * kStep * static_cast<double>(tick);
+      pull.X_WG.translation().x() += kSpeed * kStep * static_cast<double>(tick) + jump;
       pull.V_WG[0] = kSpeed;
       pull.stiffness = 1000.0;
       told.others.push_back(pull);
@@ -177,7 +177,16 @@ struct BallInTwoHands : BallAboveFloor {
     return largest;
   }
   Vector3 last = Vector3::Zero();
+  double jump = 0.0;  // [m] of the goal
 };
+
+TEST(LocalModel, AGoalThatIsToldElsewhereChangesTheForceSlowly) {
+  BallInTwoHands setup;
+  setup.run(100, true);
+  setup.jump = 0.01;
+  // 0.2 N, and what the goal moves in a cycle
+  EXPECT_LT(setup.run(60, true), 0.2 + 1000.0 * BallInTwoHands::kSpeed * kStep);
+}
 
 TEST(LocalModel, AHandThatLetsGoWhileItMovesLeavesNoStep) {
   BallInTwoHands setup;
