@@ -264,7 +264,9 @@ TEST_F(RegistryCommands, NoCommandThatWasAcceptedIsLostHoweverManyWait) {
     for (std::size_t i = 0; i < kMaxChanges; ++i) {
       const CommandAck ack = command(instructor, CommandKind::kSkipStep);
       ack.accepted ? ++accepted : ++refused;
-      if (!ack.accepted) EXPECT_EQ(ack.refusal, Refusal::kTooMany);
+      if (!ack.accepted) {
+        EXPECT_EQ(ack.refusal, Refusal::kTooMany);
+      }
     }
     const std::size_t arrived = changes().size();
     taken += arrived;
