@@ -345,6 +345,11 @@ export class Desk {
 
   async command(...words: string[]): Promise<boolean> {
     const label = this.buttons.find(({ button }) => [words[0], words.join(" ")].includes(button.dataset["command"] ?? ""))?.key ?? OTHER_LABELS[words[0]] ?? "desk.command";
+    const why = this.whyNot(words[0]);
+    if (why !== undefined) {
+      this.notify(false, `${t(label)}: ${t(why)}`);
+      return false;
+    }
     const answer = await this.source.ask("deskCommand", { words });
     if (words[0] === "record" && answer?.accepted === true) this.isRecording = words[1] === "start";
     this.tell(t(label), answer);
