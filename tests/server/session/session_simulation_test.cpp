@@ -278,14 +278,19 @@ TEST(SessionSimulation, FrozenForcesHoldHandsStillWhileStepsGoOn) {
   EXPECT_NEAR(rig.object("cube").X_WO.translation().z(), 0.4, 1e-3);
 }
 
-TEST(SessionSimulation, APauseFreezesHandsAndSuspendsTimeouts) {
-  test::SessionRig rig;
+/// Paused in a step whose timeout is 2 s.
+void pauseInATimedStep(test::SessionRig& rig) {
   rig.attach(test::kRightHand, kFreeSpace);
   rig.tick();
   rig.change(game(CommandKind::kSkipStep));
   rig.tick(2);
-  ASSERT_EQ(rig.output().step.step, 1U) << "its timeout is 2 s";
+  ASSERT_EQ(rig.output().step.step, 1U);
   rig.change({.kind = ChangeKind::kPause});
+}
+
+TEST(SessionSimulation, APauseFreezesHandsAndSuspendsTimeouts) {
+  test::SessionRig rig;
+  pauseInATimedStep(rig);
   EXPECT_EQ(rig.tick(3000).phase, RunPhase::kPaused);
   EXPECT_TRUE(rig.hand(test::kRightHand).frozen);
   rig.change({.kind = ChangeKind::kResume});
@@ -297,12 +302,7 @@ TEST(SessionSimulation, APauseFreezesHandsAndSuspendsTimeouts) {
 
 TEST(SessionSimulation, NoTimeOfAStepPassesWithTheCommandsOfAPause) {
   test::SessionRig rig;
-  rig.attach(test::kRightHand, kFreeSpace);
-  rig.tick();
-  rig.change(game(CommandKind::kSkipStep));
-  rig.tick(2);
-  ASSERT_EQ(rig.output().step.step, 1U) << "its timeout is 2 s";
-  rig.change({.kind = ChangeKind::kPause});
+  pauseInATimedStep(rig);
   rig.tick();
   const auto pairOn = [] {
     Change change = game(CommandKind::kSetCollision);
