@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 
 #include "clients/observer/observer_program.h"
+#include "idl/wire/joining_names.h"
 #include "idl/wire/key_option.h"
 #include "idl/wire/network.h"
 #include "idl/wire/session_name.h"
@@ -31,7 +32,8 @@ int run(int argc, char** argv) {
   tenon::wire::addKeyOption(
       app, membership.key_file,
       "file of the session's key, which a server beyond loopback may ask for (default: yours)");
-  app.add_option("--name", membership.person, "name shown to the other participants")->capture_default_str();
+  tenon::wire::addNameOption(app, "--name", membership.person, "name shown to the other participants")
+      ->capture_default_str();
   app.add_option("--language", options.language, "language of titles and instructions")
       ->capture_default_str();
   app.add_option("--wait", wait, "seconds to search for a server")->capture_default_str();

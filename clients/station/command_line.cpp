@@ -17,6 +17,7 @@
 #include "idl/types/number_range.h"
 #include "idl/types/printable_text.h"
 #include "idl/wire/identity.h"
+#include "idl/wire/joining_names.h"
 #include "idl/wire/key_option.h"
 #include "idl/wire/network.h"
 #include "idl/wire/session_name.h"
@@ -110,7 +111,11 @@ void declareStation(CLI::App& app, Typed& typed) {
          "the scenario's hands that the devices' arms move, of two arms the right one first (trainee: "
          "right,left, instructor: instructor)")
       ->option_text("NAME[,NAME]")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->check([](const std::string& name) {
+        const auto permitted = wire::checkHandName(name);
+        return permitted ? std::string() : permitted.error().what;
+      });
   app.add_option("--address", typed.addresses, "where each device is: a port, host or socket")
       ->option_text("ADDRESS[,ADDRESS]")
       ->delimiter(',');
@@ -162,7 +167,7 @@ void declareProgram(CLI::App& app, Typed& typed) {
   wire::addNetworkOption(app);
   app.add_flag("--lockstep", membership.lockstep,
                "require a lockstep session: one step for each received tick");
-  app.add_option("--name", typed.name, "name shown to the other participants (default: the role)");
+  wire::addNameOption(app, "--name", typed.name, "name shown to the other participants (default: the role)");
   app.add_option("--language", program.language, "language of the printed instructions")
       ->capture_default_str();
   app.add_option_function<unsigned>(
