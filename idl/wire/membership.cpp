@@ -42,7 +42,8 @@ bool waitFor(std::chrono::seconds timeout, const std::atomic<bool>& stop,
 
 }  // namespace
 
-Result<std::unique_ptr<Membership>> Membership::find(const MembershipOptions& options, const Stop& stop) {
+Result<std::unique_ptr<Membership>> Membership::find(const MembershipOptions& options, const Stop& stop,
+                                                     const std::function<void()>& meanwhile) {
   auto participant =
       Participant::open({.domain = options.domain,
                          .profile = options.lockstep ? LinkProfile::kLockstep : LinkProfile::kLan,
@@ -52,7 +53,7 @@ Result<std::unique_ptr<Membership>> Membership::find(const MembershipOptions& op
   member->participant_ = *participant;
   if (!member->options_.seat) member->options_.seat = SeatKey::random();
   member->lobby_ = std::make_unique<Partition>(*participant, kLobby, LinkProfile::kLan);
-  auto announce = member->awaitAnnounce(stop, {});
+  auto announce = member->awaitAnnounce(stop, meanwhile);
   if (!announce) return fail(announce.error().what);
   member->announce_ = std::move(*announce);
   member->options_.session = member->announce_.session;

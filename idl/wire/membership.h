@@ -52,8 +52,10 @@ class Membership {
  public:
   using Stop = std::atomic<bool>;
 
-  /// Fails when no session is announced in time, `stop` is set, or the protocol versions differ.
-  static Result<std::unique_ptr<Membership>> find(const MembershipOptions& options, const Stop& stop);
+  /// Fails when no session is announced in time, `stop` is set, or the protocol versions differ. Calls
+  /// `meanwhile` every 5 ms.
+  static Result<std::unique_ptr<Membership>> find(const MembershipOptions& options, const Stop& stop,
+                                                  const std::function<void()>& meanwhile = {});
   /// Disposes the presence, so that the server need not wait for its lease to expire.
   ~Membership();
   Membership(const Membership&) = delete;

@@ -81,17 +81,27 @@ class RawSubscription : public Subscription {
   };
   struct UnheardWriter {
     Origin from;
+    bool is_kept = false;
     std::deque<Unheard> samples;
     std::uint64_t lost = 0;
   };
-  static constexpr std::size_t kMostUnheardWriters = 16;  ///< lives of servers of one name
+  static constexpr std::size_t kMostUnheardWriters = 16;    ///< lives of servers of one name; of others
+  static constexpr std::size_t kMostCountedWriters = 1024;  ///< it is counted what they write
 
   /// What late joiners get comes once, maybe before it is known that this client will belong to its server.
   /// However much another one writes, it stays.
   void keepUnheard(const Origin& from, std::uint64_t writer, Unheard sample) {
-    if (unheard_.size() >= kMostUnheardWriters && !unheard_.contains(writer)) return;
+    const bool is_new = !unheard_.contains(writer);
+    if (is_new && unheard_.size() >= kMostCountedWriters) {
+      ++lost_of_unknown_;
+      return;
+    }
     UnheardWriter& kept = unheard_[writer];
-    kept.from = from;
+    if (is_new) kept.from = from, kept.is_kept = unheard_.size() <= kMostUnheardWriters;
+    if (!kept.is_kept) {
+      ++kept.lost;
+      return;
+    }
     const std::size_t most = std::max<std::size_t>(2000, 2 * spec_.parameters.late_joiner_depth);
     if (kept.samples.size() >= most) {
       kept.samples.pop_front();
@@ -101,12 +111,15 @@ class RawSubscription : public Subscription {
   }
   void deliverUnheard() {
     server_ = reader->partition()->server;
+    std::uint64_t lost_otherwise = std::exchange(lost_of_unknown_, 0);
     for (const auto& [writer, kept] : std::exchange(unheard_, {})) {
       if (server_ != kept.from) continue;
+      lost_otherwise = 0;
       lost_ += kept.lost;
       for (const Unheard& sample : kept.samples)
         deliver(sample.source_ns, false, sample.instance, writer, sample.bytes);
     }
+    lost_ += lost_otherwise;
   }
   void deliver(std::int64_t source_ns, bool gone, std::uint64_t instance, std::uint64_t writer,
                std::span<const std::uint8_t> bytes) {
@@ -118,7 +131,8 @@ class RawSubscription : public Subscription {
   const std::function<void(const RawSample&)>* const& handler_;  ///< of the current dispatch()
   std::optional<Origin> server_;  ///< that the partition was bound to at the last samples
   std::map<std::uint64_t, UnheardWriter> unheard_;
-  std::uint64_t& lost_;  ///< of all topics
+  std::uint64_t lost_of_unknown_ = 0;  ///< samples of writers beyond those, maybe of the server
+  std::uint64_t& lost_;                ///< of all topics
   OriginCache origins_;
   std::uint64_t sequence_ = 0;
   std::vector<std::uint8_t> bytes_;

@@ -414,6 +414,36 @@ TEST(Membership, OneThatWritesWithoutEndPushesNothingOfTheNextServerOut) {
   EXPECT_EQ(subscriber->lost(), 7U);
 }
 
+TEST(Membership, WhatANextServerWritesBehindTooManyOthersIsCountedAsLost) {
+  constexpr std::size_t kMostWriters = 16;  // whose samples are kept
+  const std::uint32_t domain = test::ownDomain();
+  auto next = test::participant(domain);
+  auto stranger = test::participant(domain);
+  auto client = test::participant(domain);
+  Partition next_session(next, "s/test"), strange_session(stranger, "s/test"), session(client, "s/test");
+  session.hearOnly(client->origin());  // nobody who writes
+  auto subscriber = RawSubscriber::open(session, {std::string(kEventLog.name)});
+  std::size_t heard = 0;
+  const auto write = [&](Writer<EventLog>& writer, int count) {
+    for (int i = 0; i < 500 && writer.matchedReaders() == 0; ++i)
+      subscriber->dispatch(milliseconds(5), [](const RawSample&) {});
+    for (int i = 0; i < count; ++i) ASSERT_TRUE(writer.write({.seq = 1}));
+    ASSERT_TRUE(writer.waitForReaders(std::chrono::seconds(10)));
+    subscriber->dispatch(milliseconds(5), [&](const RawSample&) { ++heard; });
+  };
+  std::vector<Writer<EventLog>> others;
+  for (std::size_t i = 0; i < kMostWriters; ++i) {
+    others.push_back(std::move(*Writer<EventLog>::open(strange_session, kEventLog)));
+    write(others.back(), 1);
+  }
+  auto events = Writer<EventLog>::open(next_session, kEventLog);
+  write(*events, 3);
+  session.hearOnly(next->origin());
+  subscriber->dispatch(milliseconds(5), [&](const RawSample&) { ++heard; });
+  EXPECT_EQ(heard, 0U);
+  EXPECT_EQ(subscriber->lost(), 3U);
+}
+
 // two participants write equal samples to one topic: their origins differ
 TEST(Origin, IsThatOfTheWritingParticipant) {
   const std::uint32_t domain = test::ownDomain();
