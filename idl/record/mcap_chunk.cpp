@@ -1,5 +1,6 @@
 #include "idl/record/mcap_chunk.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -54,6 +55,34 @@ bool takeRecord(std::span<const std::uint8_t>& rest, std::uint8_t& opcode,
   fields = rest.subspan(kRecordHeaderBytes, length);
   rest = rest.subspan(kRecordHeaderBytes + length);
   return true;
+}
+
+TimeRange timesOfIndex(std::span<const std::uint8_t> fields) {
+  constexpr std::size_t kEntry = 16;  // [bytes] time and place
+  FieldReader in(fields);
+  in.take(sizeof(std::uint16_t));
+  const auto entries = in.take(in.get<std::uint32_t>());
+  if (entries.size() < kEntry) return {};
+  FieldReader first(entries), last(entries.last(kEntry));
+  return {first.get<std::int64_t>(), last.get<std::int64_t>()};
+}
+
+TimeRange joined(const TimeRange& one, const TimeRange& other) {
+  if (one == TimeRange{} || other == TimeRange{}) return one == TimeRange{} ? other : one;
+  return {std::min(one.first, other.first), std::max(one.last, other.last)};
+}
+
+TimeRange timesOfMessages(std::span<const std::uint8_t> records) {
+  TimeRange times;
+  std::uint8_t opcode = 0;
+  for (std::span<const std::uint8_t> fields; takeRecord(records, opcode, fields);) {
+    if (opcode != kMessage) continue;
+    FieldReader in(fields);
+    in.take(sizeof(std::uint16_t) + sizeof(std::uint32_t));
+    const auto time = in.get<std::int64_t>();
+    if (in.ok) times = joined(times, {time, time});
+  }
+  return times;
 }
 
 std::string openChunk(std::span<const std::uint8_t> fields, std::vector<std::uint8_t>& plain) {

@@ -33,6 +33,18 @@ class MappedFile {
 bool takeRecord(std::span<const std::uint8_t>& rest, std::uint8_t& opcode,
                 std::span<const std::uint8_t>& fields);
 
+/// Log times [ns] of messages.
+struct TimeRange {
+  std::int64_t first = 0, last = 0;  ///< [ns] 0: there is no message
+  bool operator==(const TimeRange&) const = default;
+};
+/// Of a message index whose entries are in the order of their times.
+[[nodiscard]] TimeRange timesOfIndex(std::span<const std::uint8_t> fields);
+/// That of both; one without a message changes nothing.
+[[nodiscard]] TimeRange joined(const TimeRange& one, const TimeRange& other);
+/// Of the messages among the records of a chunk.
+[[nodiscard]] TimeRange timesOfMessages(std::span<const std::uint8_t> records);
+
 /// Replaces `plain` by the records of a chunk. What is wrong with it, as in "is damaged"; empty: nothing.
 [[nodiscard]] std::string openChunk(std::span<const std::uint8_t> fields, std::vector<std::uint8_t>& plain);
 

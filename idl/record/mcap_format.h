@@ -41,6 +41,13 @@ inline constexpr std::uint64_t kAnyChunkBytes = 64U << 10U;  // [bytes] whatever
 /// CRC-32 (IEEE 802.3), the checksum of the format. `crc`: result for the bytes before, to continue it.
 [[nodiscard]] std::uint32_t crc32(std::span<const std::uint8_t> bytes, std::uint32_t crc = 0);
 
+/// Metadata have no checksum in the format: ours have one among their values.
+inline constexpr const char* kChecksumKey = "tenon checksum";
+[[nodiscard]] std::string checksumOf(std::string_view title,
+                                     const std::map<std::string, std::string>& values);
+/// Takes it from `values`; false: it is another one than that of the rest. Those of other programs have none.
+[[nodiscard]] bool takeChecksum(std::string_view title, std::map<std::string, std::string>& values);
+
 /// Builds a record from little-endian fields.
 class FieldWriter {
  public:

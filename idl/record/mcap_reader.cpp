@@ -17,7 +17,8 @@ using mcap::takeRecord;
 constexpr std::size_t kDamageNamed = 3;  // places
 
 struct ChunkLocation {
-  std::int64_t first_time = 0, last_time = 0;
+  mcap::TimeRange times;    ///< by its head, which has no checksum
+  mcap::TimeRange indexed;  ///< by its message indices, which have none either
   std::span<const std::uint8_t> fields;
 };
 
@@ -45,6 +46,7 @@ struct McapReader::Impl {
   std::span<const std::uint8_t> rest;
 
   void scan();
+  void checkTimes();
   void checkSummary(std::span<const std::uint8_t> summary);
   void readDefinition(std::uint8_t opcode, std::span<const std::uint8_t> fields);
   void readTopLevel(std::uint8_t opcode, std::span<const std::uint8_t> fields);
@@ -73,8 +75,8 @@ McapReader::~McapReader() = default;
 std::int64_t McapReader::lastTime() const {
   const auto& chunks = impl_->chunks;
   const auto last = std::find_if(chunks.rbegin(), chunks.rend(),
-                                 [](const ChunkLocation& chunk) { return chunk.last_time != 0; });
-  return last == chunks.rend() ? 0 : last->last_time;
+                                 [](const ChunkLocation& chunk) { return chunk.times.last != 0; });
+  return last == chunks.rend() ? 0 : last->times.last;
 }
 bool McapReader::complete() const { return impl_->complete; }
 bool McapReader::isDamaged() const { return !impl_->damage.empty(); }
@@ -98,9 +100,11 @@ Result<McapReader> McapReader::open(const std::filesystem::path& file) {
   impl->name = file.string();
   const auto bytes = impl->mapped.map(file);
   if (!bytes) return fail(bytes.error().what);
-  if (!mcap::beginsWithMagic(*bytes)) return fail(file.string() + ": is not a recording (no MCAP file)");
+  if (!mcap::beginsWithMagic(*bytes))
+    return fail(file.string() + ": is not a recording (no MCAP file): `tenon record -o FILE` writes one");
   impl->bytes = *bytes;
   impl->scan();
+  impl->checkTimes();
 
   // without a summary the channels are those that the chunks define
   if (!impl->complete || !impl->summary_valid) {
@@ -138,6 +142,19 @@ void McapReader::Impl::scan() {
                  " on, and what follows is not read: too much of it looks like records and is none");
 }
 
+/// Times decide what is read after a seek: where a chunk's head and indices disagree its messages are asked.
+void McapReader::Impl::checkTimes() {
+  for (ChunkLocation& location : chunks) {
+    // a file of another program may have no indices
+    if (indexed.empty() || location.times == location.indexed || !decompress(location)) continue;
+    const mcap::TimeRange times = mcap::timesOfMessages(rest);
+    if (location.times != times)
+      reportDamage(place("a chunk", location.fields) + " says other times than those of its messages");
+    location.times = times;
+  }
+  rest = {};
+}
+
 void McapReader::Impl::checkSummary(std::span<const std::uint8_t> summary) {
   std::uint32_t crc = 0;
   if (summary.size() >= sizeof(crc)) {
@@ -156,8 +173,8 @@ void McapReader::Impl::readTopLevel(std::uint8_t opcode, std::span<const std::ui
   switch (opcode) {
     case mcap::kChunk: {
       ChunkLocation location;
-      location.first_time = in.get<std::int64_t>();
-      location.last_time = in.get<std::int64_t>();
+      location.times.first = in.get<std::int64_t>();
+      location.times.last = in.get<std::int64_t>();
       location.fields = fields;
       if (in.ok) chunks.push_back(location);
       return;
@@ -165,7 +182,9 @@ void McapReader::Impl::readTopLevel(std::uint8_t opcode, std::span<const std::ui
     case mcap::kMetadata: {
       const std::string title(in.text());
       auto values = in.values();
-      if (in.ok) metadata.emplace(title, std::move(values));
+      if (!in.ok) return;
+      if (!mcap::takeChecksum(title, values)) reportDamage(place("metadata", fields) + " are damaged");
+      metadata.emplace(title, std::move(values));
       return;
     }
     case mcap::kAttachment: {
@@ -182,7 +201,9 @@ void McapReader::Impl::readTopLevel(std::uint8_t opcode, std::span<const std::ui
     }
     case mcap::kMessageIndex: {
       const auto channel = in.get<std::uint16_t>();
-      if (in.ok) indexed.insert(channel);
+      if (!in.ok) return;
+      indexed.insert(channel);
+      if (!chunks.empty()) chunks.back().indexed = joined(chunks.back().indexed, mcap::timesOfIndex(fields));
       return;
     }
     case mcap::kStatistics:
@@ -255,7 +276,7 @@ bool McapReader::next(McapMessage& message) {
     }
     do {
       if (from.next_chunk == from.chunks.size()) return false;
-    } while (from.chunks[from.next_chunk].last_time < from.not_before
+    } while (from.chunks[from.next_chunk].times.last < from.not_before
                  ? (++from.next_chunk, true)
                  : !from.decompress(from.chunks[from.next_chunk++]));
   }

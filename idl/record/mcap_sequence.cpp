@@ -78,6 +78,14 @@ bool endsWithItsFields(std::uint8_t opcode, Fields fields) {
   return fits && in.ok && in.rest.empty();
 }
 
+/// Metadata of other programs have no checksum.
+bool agreesWithChecksum(Fields metadata) {
+  FieldReader in(metadata);
+  const std::string title(in.text());
+  auto values = in.values();
+  return takeChecksum(title, values);
+}
+
 }  // namespace
 
 RecordSequence::RecordSequence(Fields file)
@@ -112,6 +120,7 @@ bool RecordSequence::take(std::size_t at, std::uint8_t& opcode, Fields& fields) 
   const std::size_t end = file_.size() - rest.size();
   if (end > zeros_ && opcode == kChunk) return isWholeChunk(fields);
   if (end > zeros_ && opcode == kAttachment) return hasItsChecksum(fields);
+  if (end > zeros_ && opcode == kMetadata && !agreesWithChecksum(fields)) return false;
   constexpr std::size_t kZeros = 8;  // [bytes] as no metadata ends
   return end < zeros_ + kZeros || opcode != kMetadata;
 }

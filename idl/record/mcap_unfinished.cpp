@@ -20,6 +20,7 @@ struct Found {
   std::uint32_t metadata = 0, attachments = 0;           ///< before it
   std::size_t metadata_index = 0, attachment_index = 0;  ///< [bytes] likewise
   std::map<std::uint16_t, std::uint64_t> counts;         ///< its messages by channel
+  TimeRange indexed;                                     ///< of them, by the indices
   std::size_t end = 0;                                   ///< [bytes] of it and its indices
 };
 
@@ -34,6 +35,7 @@ class Scan {
   }
   /// Whether chunks may follow that were not found.
   [[nodiscard]] bool gaveUp() const { return records_.gaveUp(); }
+  [[nodiscard]] bool hasDamagedEnd() const { return records_.hasDamagedEnd(); }
 
   struct Metadata {
     std::size_t chunks = 0;  ///< before it
@@ -49,7 +51,10 @@ class Scan {
   void read(std::uint8_t opcode, Records fields) {
     FieldReader in(fields);
     if (opcode == kChunk) return readChunk(in);
-    if (opcode == kMessageIndex && !chunks.empty()) return readIndex(in);
+    if (opcode == kMessageIndex && !chunks.empty()) {
+      chunks.back().indexed = joined(chunks.back().indexed, timesOfIndex(fields));
+      return readIndex(in);
+    }
     if (opcode == kMetadata) return readMetadata(in);
     if (opcode == kAttachment) return readAttachment(in);
     if (opcode == kDataEnd) closed = true;
@@ -126,6 +131,27 @@ void define(Records chunk, Summary& summary, std::set<std::uint16_t>& missing) {
   }
 }
 
+/// Head and indices of a chunk have no checksum: where they disagree its messages are asked.
+void correctTimes(Found& chunk) {
+  TimeRange times{chunk.index.first_time, chunk.index.last_time};
+  std::vector<std::uint8_t> plain;
+  if (times == chunk.indexed || !openChunk(chunk.fields, plain).empty()) return;
+  times = timesOfMessages(plain);
+  chunk.index.first_time = times.first;
+  chunk.index.last_time = times.last;
+}
+
+/// Whether the indices of a chunk are all there.
+bool isIndexed(const Found& chunk, Records records) {
+  Records fields;
+  for (std::uint8_t opcode = 0; takeRecord(records, opcode, fields);) {
+    if (opcode != kMessage) continue;
+    FieldReader in(fields);
+    if (!chunk.counts.contains(in.get<std::uint16_t>())) return false;
+  }
+  return true;
+}
+
 void indexMessages(Unfinished& file) {
   const Records all(file.last_chunk);
   Records rest = all, fields;
@@ -149,7 +175,8 @@ Result<Unfinished> readUnfinished(const std::filesystem::path& file) {
   MappedFile mapped;
   const auto bytes = mapped.map(file);
   if (!bytes) return fail(bytes.error().what);
-  if (!beginsWithMagic(*bytes)) return fail(file.string() + ": is not a recording (no MCAP file)");
+  if (!beginsWithMagic(*bytes))
+    return fail(file.string() + ": is not a recording (no MCAP file): `tenon record -o FILE` writes one");
   Scan scan(*bytes);
   scan.run();
   if (scan.closed) return fail(file.string() + ": is complete, there is nothing to continue");
@@ -166,20 +193,30 @@ Result<Unfinished> readUnfinished(const std::filesystem::path& file) {
     if (metadata.chunks >= chunks.size())
       result.later_metadata.emplace_back(std::move(metadata.name), std::move(metadata.fields));
   const Found last = chunks.back();
-  if (openChunk(last.fields, result.last_chunk).empty()) {
+  const bool can_be_read = openChunk(last.fields, result.last_chunk).empty();
+  // damage that is not of its indices, which are written anew, is of what came after it, and is not cut off
+  const bool ends_damaged =
+      scan.hasDamagedEnd() && (!can_be_read || isIndexed(last, Records(result.last_chunk)));
+  if (can_be_read && !ends_damaged) {
     chunks.pop_back();
     result.end = last.index.offset;
   } else {
     result.last_chunk.clear();
-    result.end = last.end;
+    result.end = ends_damaged ? bytes->size() : last.end;
   }
+  for (Found& chunk : chunks) correctTimes(chunk);
 
   Summary& summary = result.summary;
-  summary.metadata_index.putBytes(Records(scan.summary.metadata_index.bytes).first(last.metadata_index));
-  summary.metadata = last.metadata;
-  summary.attachment_index.putBytes(
-      Records(scan.summary.attachment_index.bytes).first(last.attachment_index));
-  summary.attachments = last.attachments;
+  if (ends_damaged) {
+    result.later_metadata.clear();
+    summary = std::move(scan.summary);
+  } else {
+    summary.metadata_index.putBytes(Records(scan.summary.metadata_index.bytes).first(last.metadata_index));
+    summary.metadata = last.metadata;
+    summary.attachment_index.putBytes(
+        Records(scan.summary.attachment_index.bytes).first(last.attachment_index));
+    summary.attachments = last.attachments;
+  }
   std::set<std::uint16_t> missing;
   for (const Found& chunk : chunks)
     for (const auto& [channel, count] : chunk.counts) missing.insert(channel);

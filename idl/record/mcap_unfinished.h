@@ -15,7 +15,8 @@ namespace tenon::record::mcap {
 /// The content of a file whose program was killed while it wrote it.
 struct Unfinished {
   Summary summary;  ///< of what is before `end`
-  /// [bytes] Where the last complete chunk begins; where that is damaged, it stays: its end.
+  /// [bytes] Where the last complete chunk begins; where that is damaged, it stays: its end. Where what
+  /// follows that is damaged and not torn, it stays too: the end of the file.
   std::uint64_t end = 0;
   std::vector<std::uint8_t> last_chunk;  ///< the records of the one that begins there
   /// Its messages by channel: log time [ns] and place in last_chunk [bytes].

@@ -291,8 +291,10 @@ Result<void> McapWriter::addMetadata(std::string_view name,
   Impl& to = *impl_;
   if (auto done = to.endChunk(); !done) return done;
   record::mcap::FieldWriter fields;
+  std::map<std::string, std::string> all = values;
+  all[mcap::kChecksumKey] = mcap::checksumOf(name, values);
   fields.put(name);
-  fields.put(values);
+  fields.put(all);
   const std::uint64_t at = to.offset;
   if (auto done = to.record(mcap::kMetadata, fields); !done) return done;
   to.summary.addMetadata(name, at, to.offset - at);

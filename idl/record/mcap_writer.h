@@ -23,7 +23,8 @@ struct McapOptions {
 /// Messages are collected in chunks of about 1 MiB. A chunk is closed when it is McapOptions::chunk_age old
 /// at the next write, and the file is synchronised to disk (fdatasync) every second, so that after a crash
 /// all but the last second is readable. It has checksums of chunks, data and summary, and indices for
-/// seeking. Schemas and channels are repeated in some later chunks: damage of the first does not lose them.
+/// seeking; metadata have a checksum among their values. Schemas and channels are repeated in some later
+/// chunks: damage of the first does not lose them.
 ///
 /// Threads: one at a time. Real-time: no.
 class McapWriter {
@@ -31,7 +32,8 @@ class McapWriter {
   /// Overwrites `file` and creates its folder. Fails when it cannot be written.
   [[nodiscard]] static Result<McapWriter> open(const std::filesystem::path& file,
                                                const McapOptions& options = {});
-  /// Continues a file whose program was killed, after its last complete chunk; what follows that is cut.
+  /// Continues a file whose program was killed, after its last complete chunk; what is torn after that is
+  /// cut, and what is damaged stays.
   /// Its channels are found again by addChannel. Fails when it is no MCAP file, was closed, is being written
   /// by another program, or has no complete chunk.
   [[nodiscard]] static Result<McapWriter> reopen(const std::filesystem::path& file,

@@ -238,7 +238,7 @@ TEST_F(McapTest, ADamagedLastChunkOfAKilledFileIsNoTornEnd) {
   const Record last = chunksOf(left).back();
   constexpr std::size_t kTimes = mcap::kRecordHeaderBytes;  // 16 bytes that no checksum covers
   for (std::size_t at = last.begin; at < last.end; ++at) {
-    if (at >= last.begin + kTimes && at < last.begin + kTimes + 16) continue;
+    const bool is_of_times = at >= last.begin + kTimes && at < last.begin + kTimes + 16;
     for (unsigned bit = 0; bit < 8; ++bit) {
       Bytes bytes = left;
       bytes[at] ^= static_cast<std::uint8_t>(1U << bit);
@@ -247,9 +247,106 @@ TEST_F(McapTest, ADamagedLastChunkOfAKilledFileIsNoTornEnd) {
       ASSERT_TRUE(reader);
       const std::size_t read = readAll(*reader).size();
       // zstd leaves some bits unused
-      ASSERT_EQ(read, reader->isDamaged() ? 10U : 20U) << "bit " << bit << " of byte " << at - last.begin;
+      ASSERT_EQ(read, reader->isDamaged() && !is_of_times ? 10U : 20U)
+          << "bit " << bit << " of byte " << at - last.begin;
+      ASSERT_TRUE(reader->isDamaged() || !is_of_times) << "bit " << bit << " of byte " << at - last.begin;
     }
   }
+}
+
+// and it stays in the file, where it can be looked at: a kill leaves the begin of a chunk, and this is none
+TEST_F(McapTest, ADamagedEndStaysInAFileThatIsContinued) {
+  record(40);
+  const Bytes whole = fileBytes();
+  const Record last = chunksOf(whole).back();
+  const auto after = [&] {
+    for (const Record& next : recordsOf(whole))
+      if (next.begin >= last.end && next.opcode != mcap::kMessageIndex) return next.begin;
+    return whole.size();
+  }();
+  for (const std::size_t end : {last.end, after}) {
+    for (const auto& [at, damage] : {std::pair{0, 0x86}, {0, 0x07}, {1, 0x5A}, {7, 0x7F}}) {
+      SCOPED_TRACE(std::to_string(end) + ": byte " + std::to_string(at));
+      Bytes left(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(end));
+      left[last.begin + static_cast<std::size_t>(at)] ^= static_cast<std::uint8_t>(damage);
+      writeFile(left);
+      {
+        auto writer = McapWriter::reopen(file_);
+        ASSERT_TRUE(writer) << writer.error().what;
+        ASSERT_TRUE(writer->write(writer->addChannel("A", "t::A", ""), 5000, 77, Bytes(5)));
+        ASSERT_TRUE(writer->close());
+      }
+      const Bytes continued = fileBytes();
+      ASSERT_GT(continued.size(), left.size());
+      EXPECT_TRUE(std::equal(left.begin(), left.end(), continued.begin()));
+      auto reader = McapReader::open(file_);
+      ASSERT_TRUE(reader);
+      EXPECT_TRUE(reader->complete());
+      EXPECT_THAT(reader->problem(), HasSubstr("is damaged between bytes " + std::to_string(last.begin)));
+      const auto read = readAll(*reader);
+      ASSERT_EQ(read.size(), 31U);
+      EXPECT_EQ(read.back().sequence, 77U);
+    }
+  }
+}
+
+// by the times in their heads, which no checksum covers, chunks are passed over
+TEST_F(McapTest, ASeekFindsTheMessagesOfAChunkThatSaysOtherTimes) {
+  const auto written = record(40);
+  const Bytes whole = fileBytes();
+  const Record chunk = chunksOf(whole)[2];
+  for (const std::int64_t wrong : {std::int64_t{0}, std::int64_t{7}, std::int64_t{1} << 40}) {
+    for (const bool is_cut : {false, true}) {
+      SCOPED_TRACE(std::to_string(wrong) + (is_cut ? ", cut" : ""));
+      Bytes bytes = is_cut ? unfinished(whole) : whole;
+      std::memcpy(bytes.data() + chunk.begin + mcap::kRecordHeaderBytes + sizeof wrong, &wrong, sizeof wrong);
+      if (is_cut) bytes.resize(chunksOf(bytes)[3].begin);
+      writeFile(bytes);
+      auto reader = McapReader::open(file_);
+      ASSERT_TRUE(reader);
+      EXPECT_EQ(reader->lastTime(), written[is_cut ? 29 : 39].time);
+      EXPECT_THAT(reader->problem(), HasSubstr("a chunk (bytes " + std::to_string(chunk.begin)));
+      EXPECT_THAT(reader->problem(), HasSubstr("other times than those of its messages"));
+      reader->seek(written[25].time);
+      McapMessage message;
+      ASSERT_TRUE(reader->next(message));
+      EXPECT_EQ(message.sequence, 25U);
+    }
+    // nor do they come into the summary of a file that is continued
+    Bytes left = unfinished(whole);
+    std::memcpy(left.data() + chunk.begin + mcap::kRecordHeaderBytes + sizeof wrong, &wrong, sizeof wrong);
+    writeFile(left);
+    ASSERT_TRUE(McapWriter::reopen(file_)->close());
+    const Bytes continued = fileBytes();
+    std::vector<std::int64_t> ends;
+    for (const Record& record : recordsOf(continued)) {
+      if (record.opcode != mcap::kChunkIndex) continue;
+      ends.emplace_back();
+      std::memcpy(&ends.back(), continued.data() + record.begin + mcap::kRecordHeaderBytes + sizeof wrong,
+                  sizeof wrong);
+    }
+    ASSERT_EQ(ends.size(), 4U);
+    EXPECT_EQ(ends[2], written[29].time);
+  }
+}
+
+TEST_F(McapTest, DamagedMetadataAreReported) {
+  record(20);
+  const Bytes whole = fileBytes();
+  Record metadata;
+  for (const Record& record : recordsOf(whole))
+    if (record.opcode == mcap::kMetadata) metadata = record;
+  const auto name = std::search(whole.begin() + static_cast<std::ptrdiff_t>(metadata.begin), whole.end(),
+                                std::begin("Ada"), std::end("Ada") - 1);
+  Bytes bytes = whole;
+  bytes[static_cast<std::size_t>(name - whole.begin())] ^= 2U;
+  writeFile(bytes);
+  auto reader = McapReader::open(file_);
+  ASSERT_TRUE(reader);
+  EXPECT_TRUE(reader->isDamaged());
+  EXPECT_THAT(reader->problem(), HasSubstr("metadata (bytes " + std::to_string(metadata.begin)));
+  EXPECT_THAT(reader->metadata().find("about")->second,
+              testing::ElementsAre(testing::Pair("who", "Cda"), testing::Pair("why", "")));
 }
 
 // a chunk of zeros, a few hundred bytes that claim the most a chunk may hold
