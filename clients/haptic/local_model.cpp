@@ -22,18 +22,46 @@ constexpr double kFadeTicks = 20.0;  // [ticks]
 // After that manifolds of each tick have a gap.
 constexpr double kLate = 1.5 * kTickSeconds;  // [s]
 
+// What is told to move faster than a hand does was displaced within one tick, and does not go on. [m/s]
+constexpr double kFast = 1.0;
+
 /// [m] Of a contact's point of the other body, from its pose of tick `heard_at` to `now`. Slow motion is that
 /// of what gives way to this hand.
 Vector3 expectedMotion(const ManifoldContact& contact, Tick heard_at, double now) {
   const double ahead = (now - static_cast<double>(heard_at)) * kTickSeconds;
   const Vector3 v_W = contact.velocity_W.cast<double>();
-  return extrapolationWeight(v_W.norm()) * std::clamp(ahead, 0.0, LocalModel::kLongestExpectation) * v_W;
+  const double speed = v_W.norm();
+  const double weight = extrapolationWeight(speed) * std::clamp(2.0 - speed / kFast, 0.0, 1.0);
+  const Vector3 way = weight * std::clamp(ahead, 0.0, LocalModel::kLongestExpectation) * v_W;
+  return clampNorm(way, LocalModel::kFarthestExpectation);
 }
 
 /// An offset that is shorter by so much that the force, or torque, of the spring changes by `step` at most.
 Vector3 shortened(const Vector3& offset, double step, double stiffness) {
   const double length = offset.norm();
   return length * stiffness <= step ? Vector3::Zero().eval() : offset * (1.0 - step / (length * stiffness));
+}
+
+/// Where `motion` brings a body that nothing holds but its springs. Where two of them are far from their
+/// goals and turn it, a linearised step ends beyond the rest and the next one farther on the other side: of
+/// one that lowers the springs' energy by less than half of what it should, so much is taken as a parabola
+/// says.
+Pose movedBySprings(const collision::MovableBody& body, const Displacement& motion) {
+  constexpr double kRounding = 1e-12;  // [-]
+  double before = 0.0, after = 0.0;    // [J]
+  double slope = 0.0;                  // [J] per motion
+  const Pose X_WB = displaced(body.X_WB, motion, body.p_BQ);
+  const Vector3 p_QBo_W = -(body.X_WB.rotation() * body.p_BQ);
+  for (const collision::Spring& spring : body.springs) {
+    before += collision::springEnergy(spring, body.X_WB);
+    after += collision::springEnergy(spring, X_WB);
+    const Wrench F_Bo_W = collision::springWrench(spring, body.X_WB);
+    slope -= F_Bo_W.force.dot(motion.translation) +
+             (F_Bo_W.torque + p_QBo_W.cross(F_Bo_W.force)).dot(motion.rotation);
+  }
+  if (!(after - before > 0.25 * slope + kRounding * before)) return X_WB;
+  const double share = -0.5 * slope / (after - before - slope);
+  return displaced(body.X_WB, {share * motion.translation, share * motion.rotation}, body.p_BQ);
 }
 
 bool isFinite(const HandPull& pull) {
@@ -193,11 +221,10 @@ void LocalModel::solve(const Pose& X_WH, const WorldView& world) noexcept {
   std::array<Displacement, 1> motion{};
   solver_.solve({&body_, 1}, {constraints_.begin(), constraints_.size()}, motion,
                 {multipliers_.data(), constraints_.size()});
-  proxy_.X_WO = displaced(proxy_.X_WO, motion[0], body_.p_BQ);
-  proxy_.touching = false;
-  for (std::size_t i = 0; i < constraints_.size(); ++i) {
-    if (multipliers_[i] > kMinMultiplier) proxy_.touching = true;
-  }
+  proxy_.touching = std::any_of(multipliers_.begin(), multipliers_.begin() + constraints_.size(),
+                                [](double multiplier) { return multiplier > kMinMultiplier; });
+  proxy_.X_WO =
+      proxy_.touching ? displaced(body_.X_WB, motion[0], body_.p_BQ) : movedBySprings(body_, motion[0]);
 }
 
 void LocalModel::updateValidityCount() noexcept {

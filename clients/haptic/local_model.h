@@ -38,8 +38,11 @@ class LocalModel final : public ForceModel {
   /// [s] A part that gives way to the hand is heard late, so on long links to expect its motion makes it
   /// swing.
   static constexpr double kLongestExpectation = 0.02;
+  static constexpr double kFarthestExpectation =
+      0.002;  ///< [m] by which a contact's plane is off if it stops
   /// The next steps are those of `tick` [ticks] of the server: other bodies are expected where their velocity
-  /// brings them by then, within kLongestExpectation (idl/types/motion_law.h). 0: where they were heard.
+  /// brings them by then, within kLongestExpectation and kFarthestExpectation (idl/types/motion_law.h). 0:
+  /// where they were heard.
   void expectAt(double tick) noexcept { now_ = tick; }
   static constexpr double kGoalForceStep = 0.2;    ///< [N] a cycle
   static constexpr double kGoalTorqueStep = 0.02;  ///< [Nm] likewise

@@ -212,6 +212,51 @@ TEST_P(ForceReturnOf, AStationThatItselfStoodStillIsSoft) {
   setup.expectSoftReturn([&] { setup.hold(true); });
 }
 
+//   after a gap the server's answers catch up within 60 cycles, and each fifth cycle of the station is late;
+//   the person presses on meanwhile
+TEST_P(ForceReturnOf, ABusyMachineIsSoftForASecondOfTheStationsOwnTime) {
+  constexpr std::uint32_t kGap = 500, kCatchUp = 60;  // [cycles]
+  RestingHand setup(GetParam());
+  setup.hand.setLinkJitter(AnswerAge::kLongestJitter);
+  const auto acts = [&](devices::SafetyRule rule) {
+    return (setup.hand.state().safety_flags & devices::bit(rule)) != 0;
+  };
+  const auto press = [&](std::uint32_t cycle) {
+    const bool is_late = cycle % 5 == 4;
+    devices::DeviceState state;
+    for (int i = 0; is_late && i < 2; ++i) {
+      setup.device->read(state);
+      setup.device->write({});
+    }
+    setup.p_WI.z() -= 2e-6;
+    const double dt = is_late ? 3.0 * kTickSeconds : kTickSeconds;
+    setup.hold(false, dt);
+    return dt;
+  };
+  for (std::uint32_t i = 0; i < kGap; ++i) {
+    static_cast<void>(press(i));
+    if (!acts(devices::SafetyRule::kAgeFading)) setup.before = std::max(setup.before, setup.force());
+  }
+  const double limit = std::max(setup.before, kLeastLimit);
+  double since_start = 0.0;  // [s]
+  std::uint32_t cycles = 0;
+  for (double last = setup.force(); since_start < 1.0; ++cycles) {
+    HandManifold answer = setup.server.manifold(setup.tick, setup.hand.pose());
+    if (cycles < kCatchUp) answer.answers_seq -= kGap * (kCatchUp - cycles) / kCatchUp;
+    setup.world.receive(setup.server.frame(setup.tick));
+    setup.hand.receive(answer);
+    const double dt = press(cycles);
+    const bool starts = acts(devices::SafetyRule::kSoftStart) && !acts(devices::SafetyRule::kAgeFading);
+    since_start = starts ? since_start + dt : 0.0;
+    if (since_start >= 1.0) break;
+    ASSERT_LE(setup.force(), limit + 1e-3) << since_start << " s after the return";
+    ASSERT_LE(setup.force() - last, kGrowth * dt + 1e-3 + 2.0 * setup.hand.caps().force_quantum)
+        << since_start << " s after the return";
+    last = setup.force();
+  }
+  EXPECT_LT(cycles, 900U) << "fewer cycles than milliseconds";
+}
+
 INSTANTIATE_TEST_SUITE_P(Devices, ForceReturnOf,
                          testing::Values("hug-sim", "sigma7-sim", "omega3-sim", "falcon-sim"), nameOf);
 

@@ -94,6 +94,9 @@ TEST(LocalModel, ExpectsPlanesWhereTheirBodiesAreByNow) {
   EXPECT_NEAR(proxyHeight(0.1, -5.0), 0.012, 1e-8) << "a frame that is ahead";
   EXPECT_NEAR(proxyHeight(0.1, 100.0), 0.012 + 0.1 * LocalModel::kLongestExpectation, 1e-6);
   EXPECT_NEAR(proxyHeight(0.009, 10.0), 0.012, 1e-8) << "what gives way is not pushed on";
+  EXPECT_NEAR(proxyHeight(0.5, 2.0), 0.013, 1e-6);
+  EXPECT_NEAR(proxyHeight(0.5, 20.0), 0.012 + LocalModel::kFarthestExpectation, 1e-6) << "it may stop";
+  EXPECT_NEAR(proxyHeight(5.0, 20.0), 0.012, 1e-8) << "a displacement of one tick";
 }
 
 TEST(LocalModel, LimitsTheStiffnessToThatOfTheDevice) {
@@ -179,6 +182,27 @@ struct BallInTwoHands : BallAboveFloor {
   Vector3 last = Vector3::Zero();
   double jump = 0.0;  // [m] of the goal
 };
+
+//   [ball]--0.2 m--(other)     two springs that are 0.5 m from their goals, across the line between them
+TEST(LocalModel, SpringsFarFromTheirGoalsComeToRest) {
+  BallInTwoHands setup;
+  setup.tick = 1;
+  HandManifold held = setup.manifold(true);
+  HandPull& pull = held.others[0];
+  pull.X_WG = held.X_WO;
+  pull.V_WG.setZero();
+  pull.p_BoC_B = {0.2, 0.0, 0.0};
+  const Pose X_WH = displaced(held.X_WO, {Vector3(0.0, 1.0, 0.0), Vector3::Zero()}, Vector3::Zero());
+  setup.world.receive(setup.server.frame(1));
+  setup.model.receive(held);
+  for (int i = 0; i < 200; ++i) {
+    const Vector3 force = setup.step(X_WH).force;
+    if (i > 150) {
+      ASSERT_LT((force - setup.last).norm(), 1e-3) << i;
+    }
+    setup.last = force;
+  }
+}
 
 TEST(LocalModel, AGoalThatIsToldElsewhereChangesTheForceSlowly) {
   BallInTwoHands setup;
