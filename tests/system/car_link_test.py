@@ -106,6 +106,27 @@ class Judges(unittest.TestCase):
             list(safety_test.ForceReturn.returns(self, states(lambda i: 6.0)))
 
 
+    def test_a_second_of_soft_start_is_one_of_the_station_however_many_cycles_it_had(self):
+        late_share = 0.2  # of cycles, each of 2 ms
+
+        def states(limit):
+            """The force comes back as fast as it may, to `limit` for a second of the station's time; then on."""
+            samples = [safety_test.HandSample(10 * i, 4.2, 4.2, 3, 0, (0.0, 0.0, 0.0), 0.01 * i) for i in range(100)]
+            for i in range(60):  # late, by less than the jitter of the link, while the hand presses on
+                samples.append(safety_test.HandSample(1000 + i, 4.5, 4.5, 3 + i, 0, (0.0, 0.0, 0.0), 1.0 + 0.001 * i))
+            samples += [safety_test.HandSample(1060 + 10 * i, 0.0, 0.0, 200 + 10 * i, safety_test.AGE_FADING, (0.0, 0.0, 0.0), 1.06 + 0.01 * i)
+                        for i in range(40)]
+            for i in range(100):
+                since = 0.01 * i * (1.0 + late_share)
+                force = min(20.0 * since, limit) if since < 1.0 else limit + 20.0 * (since - 1.0)
+                samples.append(safety_test.HandSample(1460 + 10 * i, force, force, 3, safety_test.SOFT_START, (0.0, 0.0, 0.0), 1.46 + since))
+            return samples
+
+        self.assertEqual(len(list(safety_test.ForceReturn.returns(self, states(4.5)))), 1)
+        with self.assertRaises(AssertionError):
+            list(safety_test.ForceReturn.returns(self, states(4.9)))
+
+
 class CarOverLinksNightly(unittest.TestCase):
     def session(self, network, station_network, **link_model):
         with Link(**link_model) as link, Machines(link) as machines:

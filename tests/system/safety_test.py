@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from stage import Stage
 
-SOFT_START = 1 << 4  # of HandSample.rules
+AGE_FADING, SOFT_START = 1 << 1, 1 << 4  # of HandSample.rules
 ZSTD = ctypes.CDLL(ctypes.util.find_library("zstd") or "libzstd.so.1")
 
 
@@ -36,34 +36,48 @@ def records(data):
 
 def messages(recording):
     """Topic and content, after the header of CDR, of each message of an MCAP file, in order."""
+    return ((topic, message) for topic, _, message in timed_messages(recording))
+
+
+def timed_messages(recording):
+    """Likewise, with the time [s] at which it was sent, by the clock of its sender."""
     channels = {}
     for kind, body in records(Path(recording).read_bytes()[8:]):
         if kind == 4:
             size = struct.unpack_from("<I", body, 4)[0]
             channels[struct.unpack_from("<H", body)[0]] = body[8:8 + size].decode()
         if kind == 5:
-            yield channels[struct.unpack_from("<H", body)[0]], body[22 + 4:]
+            yield channels[struct.unpack_from("<H", body)[0]], 1e-9 * struct.unpack_from("<Q", body, 6)[0], body[22 + 4:]
 
 
 class HandSample(NamedTuple):
     """A HandState_100."""
 
-    step: int  # of its station
+    step: int  # of its station: a cycle of 1 ms, or a late one
     peak: float  # [N] largest force displayed since the last one
     force: float  # [N] displayed
     age: int  # [ms] of its contacts
     rules: int  # of the safety layer that act, as devices/safety_rules.h
     place: tuple  # [m] of the hand, in the world
+    time: float = 0.0  # [s] of the station
 
     @property
     def is_starting(self):
         return bool(self.rules & SOFT_START)
 
+    @property
+    def is_late(self):
+        return bool(self.rules & AGE_FADING)
+
+    def is_of_soft_start(self, began):
+        """Of one that began with that sample and takes a second of the station's time; late cycles are fewer."""
+        return self.step <= began.step + 900 and self.time <= began.time + 0.9
+
 
 def hand_states(recording):
     """Of each hand its samples, in order."""
     hands = {}
-    for topic, message in messages(recording):
+    for topic, time_sent, message in timed_messages(recording):
         if topic != "HandState_100":
             continue
         hand, step = struct.unpack_from("<II", message)
@@ -71,7 +85,7 @@ def hand_states(recording):
         peak = struct.unpack_from("<f", message, 208)[0]
         age, rules = struct.unpack_from("<II", message, 192)
         place = struct.unpack_from("<3d", message, 8)
-        hands.setdefault(hand, []).append(HandSample(step, peak, force, age, rules, place))
+        hands.setdefault(hand, []).append(HandSample(step, peak, force, age, rules, place, time_sent))
     return hands
 
 
@@ -106,8 +120,9 @@ class ForceReturn(unittest.TestCase):
             is_unseen = now.step - before.step > 150 and now.is_starting and not before.is_starting
             if not ((before.age > link + 150 or is_unseen) and now.age < link + 50):
                 continue  # not the end of a gap
-            # Until contacts are late, at 20 ms, the force follows the hand; the sample that names an age is up to 10 ms younger.
-            in_time = [state for state in states[:i] if state.age < link + 30]
+            # Until contacts are late, at 20 ms beyond the delay and at most 50 ms of jitter, the force follows the hand; the sample
+            # that names an age is up to 10 ms younger.
+            in_time = [state for state in states[:i] if state.age < link + 80 and not state.is_late]
             fresh = [state.peak for state in in_time if now.step - longest < state.step]
             if not fresh or fresh[-1] < 1.0:
                 continue
@@ -117,7 +132,7 @@ class ForceReturn(unittest.TestCase):
             limit = max([*fresh[-10:], *settled[-10:], 3.0]) + 0.3
             last = before
             for state in states[i:]:
-                if state.step > now.step + 900 or state.age > link + 20:
+                if not state.is_of_soft_start(now) or state.age > link + 20:
                     break
                 self.assertLessEqual(state.peak, limit, f"{state.step - now.step} ms after a gap that ended at step {now.step}")
                 # steps take 1 ms, and count as 2 ms at most

@@ -2,31 +2,15 @@
 What a device displays is read from the recording of the session."""
 import os
 import pty
-import struct
 import subprocess
 import time
 import unittest
-from pathlib import Path
 
 from resume_test import begin, kill, resume
-from safety_test import records
+from safety_test import hand_states
 from stage import PROGRAMS, Stage
 
-SOFT_START, EMERGENCY_STOP, FORCES_OFF = 1 << 4, 1 << 15, 1 << 16  # of devices/safety_rules.h
-
-
-def displayed(recording):
-    """Of each hand: (step of its station, rules of the safety layer that act, largest force [N] since the last one), in order."""
-    channels, hands = {}, {}
-    for kind, body in records(Path(recording).read_bytes()[8:]):
-        if kind == 4:
-            size = struct.unpack_from("<I", body, 4)[0]
-            channels[struct.unpack_from("<H", body)[0]] = body[8:8 + size].decode()
-        if kind == 5 and channels[struct.unpack_from("<H", body)[0]] == "HandState_100":
-            message = body[22 + 4:]  # a message's header, and that of CDR
-            hand, seq = struct.unpack_from("<II", message)
-            hands.setdefault(hand, []).append((seq, struct.unpack_from("<I", message, 196)[0], struct.unpack_from("<f", message, 208)[0]))
-    return hands
+EMERGENCY_STOP, FORCES_OFF = 1 << 15, 1 << 16  # of HandSample.rules
 
 
 class Arming(unittest.TestCase):
@@ -52,7 +36,7 @@ class Arming(unittest.TestCase):
         finally:
             station.kill()
             os.close(terminal)
-        [states] = displayed(stage.out / "session.mcap").values()
+        [states] = hand_states(stage.out / "session.mcap").values()
         self.assertGreater(len(states), 100)
         return states, said
 
@@ -60,23 +44,23 @@ class Arming(unittest.TestCase):
         with Stage(lockstep=False) as stage:
             states, said = self.session(stage, keys=b"\n")
             self.assertIn("not armed: press return", said)
-            off = [bool(flags & FORCES_OFF) for _, flags, _ in states]
+            off = [bool(state.rules & FORCES_OFF) for state in states]
             pressed = off.index(False)
             self.assertGreater(pressed, 10)
-            self.assertGreater(states[pressed][0], 2000, "two seconds without a press")
+            self.assertGreater(states[pressed].step, 2000, "two seconds without a press")
             self.assertFalse(any(off[pressed:-20]), "armed by one press, and stays so")
-            self.assertTrue(any(flags & SOFT_START for _, flags, _ in states[pressed:pressed + 20]), "softly")
+            self.assertTrue(any(state.is_starting for state in states[pressed:pressed + 20]), "softly")
 
     def test_other_keys_do_not_arm_and_neither_does_nobody(self):
         with Stage(lockstep=False) as stage:
             states, _ = self.session(stage, keys=b"arm me ")  # a terminal hands over whole lines
-            self.assertTrue(all(flags & FORCES_OFF for _, flags, _ in states))
+            self.assertTrue(all(state.rules & FORCES_OFF for state in states))
 
     def test_arm_says_that_somebody_is_there(self):
         with Stage(lockstep=False) as stage:
             states, said = self.session(stage, "--arm")
             self.assertNotIn("not armed", said)
-            self.assertFalse(any(flags & FORCES_OFF for _, flags, _ in states[20:-20]))
+            self.assertFalse(any(state.rules & FORCES_OFF for state in states[20:-20]))
 
 
 class TwoStations(unittest.TestCase):
@@ -103,28 +87,28 @@ class TwoStations(unittest.TestCase):
             self.assertEqual(server.wait(240), 0, server.text())
             for process in (*stations, recorder):
                 self.assertEqual(process.wait(60), 0, f"{process.name}: {process.text()}")
-            moved = {hand: states for hand, states in displayed(stage.out / "session.mcap").items() if any(flags for _, flags, _ in states)}
+            moved = {hand: states for hand, states in hand_states(stage.out / "session.mcap").items() if any(state.rules for state in states)}
             self.assertEqual(len(moved), 2, "the hands of the two stations")
             for hand, states in moved.items():
                 self.judge(hand, states)
 
     def judge(self, hand, states):
         """Stopped until the clear, over the death of the server; then a second of ramp, of 3 N at most and 20 N/s."""
-        stopped = [i for i, (_, flags, _) in enumerate(states) if flags & EMERGENCY_STOP]
+        stopped = [i for i, state in enumerate(states) if state.rules & EMERGENCY_STOP]
         self.assertTrue(stopped, f"hand {hand} was never stopped")
         first, last = stopped[0], stopped[-1]
         self.assertEqual(len(stopped), last - first + 1, f"hand {hand}: the stop was lifted meanwhile")
-        self.assertGreater(states[last][0] - states[first][0], 4000, f"hand {hand}: shorter than the server was away")
-        self.assertEqual(max(peak for _, _, peak in states[first + 2:last]), 0.0, f"hand {hand}")
+        self.assertGreater(states[last].step - states[first].step, 4000, f"hand {hand}: shorter than the server was away")
+        self.assertEqual(max(state.peak for state in states[first + 2:last]), 0.0, f"hand {hand}")
         after = states[last + 1:]
-        self.assertTrue(any(flags & SOFT_START for _, flags, _ in after[:50]), f"hand {hand} did not ramp")
-        began, peak_before = after[0][0], 0.0
-        for (before, *_), (seq, _, peak) in zip(after, after[1:]):
-            if seq > began + 900:
+        self.assertTrue(any(state.is_starting for state in after[:50]), f"hand {hand} did not ramp")
+        peak_before = 0.0
+        for before, now in zip(after, after[1:]):
+            if not now.is_of_soft_start(after[0]):
                 break
-            self.assertLessEqual(peak, 3.0 + 1e-3, f"hand {hand}, step {seq}")
-            self.assertLessEqual(peak - peak_before, 20.0 * 0.002 * (seq - before) + 0.02, f"hand {hand}, step {seq}")
-            peak_before = peak
+            self.assertLessEqual(now.peak, 3.0 + 1e-3, f"hand {hand}, step {now.step}")
+            self.assertLessEqual(now.peak - peak_before, 20.0 * 0.002 * (now.step - before.step) + 0.02, f"hand {hand}, step {now.step}")
+            peak_before = now.peak
 
 
 if __name__ == "__main__":
