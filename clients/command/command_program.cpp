@@ -1,8 +1,10 @@
 #include "clients/command/command_program.h"
 
+#include <cassert>
 #include <cstdio>
 #include <utility>
 
+#include "clients/command/stop_raiser.h"
 #include "idl/types/messages/steps.h"
 
 namespace tenon::command {
@@ -11,20 +13,8 @@ namespace {
 
 using std::chrono::milliseconds;
 constexpr std::chrono::seconds kPatience{5};  // for an answer
-constexpr milliseconds kSoon{1000};           // for a server to repeat an emergency stop, at the keys
-constexpr milliseconds kForAServer{3000};     // likewise, discovery included
+constexpr milliseconds kForAServer{3000};     // to repeat an emergency stop, discovery included
 constexpr milliseconds kResend{500};          // an answer sent before our reader was matched is lost
-
-/// Dispatches until `done`; false when that does not happen in time.
-bool dispatchUntil(wire::Inbox& inbox, const std::atomic<bool>& stop,
-                   std::chrono::steady_clock::duration timeout, const std::function<bool()>& done) {
-  const auto until = std::chrono::steady_clock::now() + timeout;
-  while (!done()) {
-    if (stop || std::chrono::steady_clock::now() >= until) return false;
-    inbox.dispatch(milliseconds(20));
-  }
-  return true;
-}
 
 /// Twice is as good as once.
 bool isRepeatable(CommandKind kind) {
@@ -32,25 +22,33 @@ bool isRepeatable(CommandKind kind) {
          kind == CommandKind::kSetCollision;
 }
 
-std::string reasonOf(const ParsedCommand& command) {
-  return command.text.empty() ? "requested" : command.text;
-}
-
 }  // namespace
 
-Result<std::unique_ptr<CommandClient>> CommandClient::open(wire::MembershipOptions options,
-                                                           const Stop& stop) {
+/// False when that does not happen in time.
+bool CommandClient::dispatchUntil(const Stop& stop, std::chrono::steady_clock::duration timeout,
+                                  const std::function<bool()>& done) {
+  const auto until = std::chrono::steady_clock::now() + timeout;
+  while (!done()) {
+    if (stop || std::chrono::steady_clock::now() >= until) return false;
+    if (meanwhile_) meanwhile_();
+    inbox_.dispatch(milliseconds(20));
+  }
+  return true;
+}
+
+Result<std::unique_ptr<CommandClient>> CommandClient::open(wire::MembershipOptions options, const Stop& stop,
+                                                           std::function<void()> meanwhile) {
   options.passive = true;
-  std::unique_ptr<CommandClient> client(new CommandClient(std::move(options)));
+  std::unique_ptr<CommandClient> client(new CommandClient(std::move(options), std::move(meanwhile)));
   if (auto connected = client->connect(stop); !connected) return fail(connected.error().what);
   return client;
 }
 
 Result<void> CommandClient::connect(const Stop& stop) {
-  auto found = wire::Membership::find(options_, stop);
+  auto found = wire::Membership::find(options_, stop, meanwhile_);
   if (!found) return fail(found.error().what);
   member_ = std::move(*found);
-  if (auto joined = member_->join(stop); !joined) return joined;
+  if (auto joined = member_->join(stop, meanwhile_); !joined) return joined;
   wire::Partition& session = member_->session();
   Result<void> all = member_->watch(inbox_);
   if (all) all = openInto(commands_, session, wire::kCommand);
@@ -68,15 +66,11 @@ Result<void> CommandClient::connect(const Stop& stop) {
     });
   }
   if (all) all = inbox_.on<RunState>(session, wire::kRunState, [this](const RunState& run) { receive(run); });
-  if (!all) return all;
-  auto raiser = StopRaiser::open(options_.domain, member_->sessionName(), options_.person);
-  if (!raiser) return fail(raiser.error().what);
-  raiser_ = std::move(*raiser);
-  return awaitReader(stop);
+  return all ? awaitReader(stop) : all;
 }
 
 Result<void> CommandClient::awaitReader(const Stop& stop) {
-  const bool matched = dispatchUntil(inbox_, stop, kPatience, [this] {
+  const bool matched = dispatchUntil(stop, kPatience, [this] {
     return commands_->matchedReaders() > 0 && inbox_.matchedWriters() > 1 && member_->isWatching();
   });
   if (!matched) return fail("the server of session '" + member_->sessionName() + "' does not read commands");
@@ -89,13 +83,7 @@ void CommandClient::receive(const RunState& run) {
 }
 
 Result<void> CommandClient::send(const ParsedCommand& command, const Stop& stop) {
-  if (!command.command) {
-    const auto heard = raiser_->raise(reasonOf(command), kSoon, stop);
-    if (!heard) return fail(heard.error().what);
-    if (heard->isConfirmed()) return {};
-    const auto outcome = outcomeOf(*heard, options_.domain, member_->sessionName());
-    return fail(outcome ? *outcome : outcome.error().what);
-  }
+  assert(command.command);
   if (lost()) return fail(*lost());
   auto sent = sendOnce(command, stop);
   if (sent || !member_->serverIsGone()) return sent;
@@ -103,10 +91,13 @@ Result<void> CommandClient::send(const ParsedCommand& command, const Stop& stop)
     return fail(*lost() +
                 " before it has answered, so it may have obeyed or not: look at the session that is resumed "
                 "(tenon command list), and repeat the command if it has not");
-  if (auto back = member_->rejoin(stop); !back)
-    return fail("the server has not answered; " + back.error().what);
-  if (auto matched = awaitReader(stop); !matched) return matched;
+  if (auto back = rejoin(stop); !back) return fail("the server has not answered; " + back.error().what);
   return sendOnce(command, stop);
+}
+
+Result<void> CommandClient::rejoin(const Stop& stop) {
+  auto back = member_->rejoin(stop, meanwhile_);
+  return back ? awaitReader(stop) : back;
 }
 
 Result<void> CommandClient::sendOnce(const ParsedCommand& command, const Stop& stop) {
@@ -119,7 +110,7 @@ Result<void> CommandClient::sendOnce(const ParsedCommand& command, const Stop& s
     if (stop || std::chrono::steady_clock::now() >= until)
       return fail("no answer from the server: it may hang or have ended");
     if (auto sent = commands_->write(message); !sent) return sent;
-    (void)dispatchUntil(inbox_, stop, kResend, [&] { return answered() || lost(); });
+    (void)dispatchUntil(stop, kResend, [&] { return answered() || lost(); });
     if (!answered() && lost()) return fail(*lost());
   } while (!answered());
   if (!ack_->accepted) return fail("refused: " + ack_->reason);
@@ -129,8 +120,8 @@ Result<void> CommandClient::sendOnce(const ParsedCommand& command, const Stop& s
 int emergencyOnce(const wire::MembershipOptions& options, const ParsedCommand& command,
                   const std::atomic<bool>& stop) {
   auto raiser = StopRaiser::open(options.domain, options.session, options.person);
-  const auto heard =
-      raiser ? (*raiser)->raise(reasonOf(command), kForAServer, stop) : fail(raiser.error().what);
+  const std::string reason = command.text.empty() ? "requested" : command.text;
+  const auto heard = raiser ? (*raiser)->raise(reason, kForAServer, stop) : fail(raiser.error().what);
   const auto outcome = heard ? outcomeOf(*heard, options.domain, options.session) : fail(heard.error().what);
   if (!outcome) {
     std::fprintf(stderr, "tenon command: %s\n", outcome.error().what.c_str());

@@ -9,15 +9,13 @@
 #include <vector>
 
 #include "clients/command/parser.h"
-#include "clients/command/stop_raiser.h"
 #include "idl/types/messages/run.h"
 #include "idl/types/result.h"
 #include "idl/wire/membership.h"
 
 namespace tenon::command {
 
-/// Joins a session and sends commands to its server; the emergency stop it sends to every device
-/// (StopRaiser), also when the server does not answer any more.
+/// Joins a session and sends commands to its server. The emergency stop is no command: StopRaiser.
 ///
 /// Threads: one. Real-time: no.
 class CommandClient {
@@ -25,16 +23,22 @@ class CommandClient {
   using Stop = wire::Membership::Stop;
 
   /// Fails with a sentence when no session is found, joining is refused, or the server does not read
-  /// commands.
+  /// commands. `meanwhile` is called every 20 ms at least, whatever this waits for, also later; it may be
+  /// empty.
   [[nodiscard]] static Result<std::unique_ptr<CommandClient>> open(wire::MembershipOptions options,
-                                                                   const Stop& stop);
+                                                                   const Stop& stop,
+                                                                   std::function<void()> meanwhile = {});
 
-  /// Sends a command and waits for the answer, at most 5 s. Fails with the server's reason, or when there is
-  /// no answer. When the server is killed meanwhile, the one that resumes the session is asked once more if
-  /// it does no harm to do twice what is asked for.
+  /// Sends a command that is no emergency stop and waits for the answer, at most 5 s. Fails with the server's
+  /// reason, or when there is no answer. When the server is killed meanwhile, the one that resumes the
+  /// session is asked once more if it does no harm to do twice what is asked for.
   [[nodiscard]] Result<void> send(const ParsedCommand& command, const Stop& stop);
   /// Why the server has refused the last command; kNone when it has not.
   [[nodiscard]] Refusal refusal() const { return ack_ ? ack_->refusal : Refusal::kNone; }
+  /// Whether its role may send the command, as the server has said.
+  [[nodiscard]] bool permits(CommandKind kind) const {
+    return (member_->welcome().permitted_commands & bitOf(kind)) != 0;
+  }
   /// Takes messages for `timeout`.
   void dispatch(std::chrono::milliseconds timeout) {
     inbox_.dispatch(timeout);
@@ -43,21 +47,29 @@ class CommandClient {
   [[nodiscard]] bool isOver() const { return tenon::isOver(run_.phase); }
   /// Why the server takes no more commands; none while it does.
   [[nodiscard]] const std::optional<std::string>& lost() const { return member_->lost(); }
+  /// It is lost because its server has ended: rejoin() finds the one that resumes the session.
+  [[nodiscard]] bool serverIsGone() const { return member_->serverIsGone(); }
+  /// Membership::rejoin.
+  [[nodiscard]] Result<void> rejoin(const Stop& stop);
+  [[nodiscard]] const std::string& sessionName() const { return member_->sessionName(); }
 
   /// Called with one line per change of step or run; may be empty.
   std::function<void(const std::string&)> report;
 
  private:
-  explicit CommandClient(wire::MembershipOptions options) : options_(std::move(options)) {}
+  CommandClient(wire::MembershipOptions options, std::function<void()> meanwhile)
+      : options_(std::move(options)), meanwhile_(std::move(meanwhile)) {}
   Result<void> connect(const Stop& stop);
   Result<void> awaitReader(const Stop& stop);
+  bool dispatchUntil(const Stop& stop, std::chrono::steady_clock::duration timeout,
+                     const std::function<bool()>& done);
   Result<void> sendOnce(const ParsedCommand& command, const Stop& stop);
   void receive(const RunState& run);
 
   wire::MembershipOptions options_;
+  std::function<void()> meanwhile_;
   std::unique_ptr<wire::Membership> member_;
   std::unique_ptr<wire::Writer<Command>> commands_;
-  std::unique_ptr<StopRaiser> raiser_;
   std::uint32_t sent_ = 0;  ///< commands, also the id of the newest
   std::optional<CommandAck> ack_;
   std::string step_;  ///< name of the active one
@@ -73,10 +85,13 @@ class CommandClient {
 /// else 1.
 [[nodiscard]] int commandOnce(CommandClient& client, const std::vector<std::string>& arguments,
                               const std::atomic<bool>& stop);
-/// Sends the command of each key pressed, until `q`, the end of the input or of the session. What ends or
-/// restarts a run is sent when the next key is `y`. After a loss of the server the emergency stop alone is
-/// left. Returns the exit code: 0.
-[[nodiscard]] int commandByKeys(CommandClient& client, const std::vector<std::string>& signals,
+/// Joins the session and sends the command of each key pressed, until `q`, the end of the input or of the
+/// session. What ends or restarts a run is sent when the next key is `y`. The emergency stop is raised at
+/// once, whatever else is waited for; it alone is left to who cannot join, for whom `why_not` is a known
+/// reason, or has lost the server, until another one resumes the session. Returns the exit code: 1 when it
+/// has not joined, else 0.
+[[nodiscard]] int commandByKeys(const wire::MembershipOptions& options,
+                                const std::vector<std::string>& signals, const Result<void>& why_not,
                                 const std::atomic<bool>& stop);
 
 }  // namespace tenon::command

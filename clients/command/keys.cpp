@@ -1,5 +1,8 @@
+#include <chrono>
 #include <cstdio>
+#include <deque>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include <poll.h>
@@ -7,10 +10,21 @@
 #include <unistd.h>
 
 #include "clients/command/command_program.h"
+#include "clients/command/stop_raiser.h"
 
 namespace tenon::command {
 
 namespace {
+
+using std::chrono::milliseconds;
+constexpr milliseconds kPause{20};           // between looks at the keys
+constexpr milliseconds kSoon{1000};          // for a server to repeat an emergency stop
+constexpr milliseconds kBetweenRaises{100};  // of a space bar that is held down
+constexpr milliseconds kBetweenTries{1000};  // to join again
+constexpr std::size_t kMostKeys = 256;       // that wait
+constexpr char kEmergencyKey = ' ';
+constexpr char kLeaveKey = 'q';
+constexpr const char* kWhatIsLeft = "space still stops every device, q leaves";
 
 /// Puts the terminal into unbuffered input without echo, and restores it in the end. Standard input that is
 /// no terminal is not changed.
@@ -54,6 +68,163 @@ std::string nameOf(const ParsedCommand& command) {
   return "command";
 }
 
+/// A person at the keys. The space bar acts whenever it is pressed, also while a server is searched for or an
+/// answer is awaited; other keys act one after the other.
+class KeyDesk {
+ public:
+  KeyDesk(const wire::MembershipOptions& options, const std::vector<std::string>& signals,
+          const std::atomic<bool>& stop)
+      : options_(options), signals_(signals), stop_(stop) {}
+
+  int run(const Result<void>& why_not) {
+    const KeyTerminal terminal;
+    show(keyLegend(signals_));
+    auto raiser = StopRaiser::open(options_.domain, options_.session, options_.person);
+    if (!raiser) return report(raiser.error().what);
+    raiser_ = std::move(*raiser);
+    why_not ? join() : stayOutside(why_not.error().what);
+    while (!ended_ && !(client_ && client_->isOver())) {
+      if (client_ && client_->lost() && !is_outside_) comeBack();
+      if (!keys_.empty()) {
+        const char key = keys_.front();
+        keys_.pop_front();
+        act(key);
+        continue;
+      }
+      client_ ? client_->dispatch(kPause) : std::this_thread::sleep_for(kPause);
+      listen();
+    }
+    while (!raised_.empty()) {
+      raiser_->dispatch(kPause);
+      tellOfRaises();
+    }
+    return client_ ? 0 : 1;
+  }
+
+ private:
+  static int report(const std::string& what) {
+    std::fprintf(stderr, "tenon command: %s\n", what.c_str());
+    return 1;
+  }
+
+  /// Reads the keys that were pressed; of these the emergency stop acts at once.
+  void listen() {
+    if (stop_) ended_ = true;
+    for (std::size_t read = 0; read < kMostKeys && !is_input_over_ && !ended_; ++read) {
+      char key = 0;
+      const KeyInput input = readKey(key);
+      if (input == KeyInput::kNone) break;
+      is_input_over_ = input == KeyInput::kEnd;
+      if (is_input_over_) key = kLeaveKey;
+      // what was pressed before it is done first, once there is a session
+      const bool is_first = !client_ && keys_.empty() && !is_input_over_;
+      if (key == kLeaveKey && (is_coming_back_ || is_first)) ended_ = true;
+      if (key == kEmergencyKey) raise();
+      if (!is_coming_back_ && (keys_.size() < kMostKeys || is_input_over_))
+        keys_.push_back(key);
+      else if (key != kEmergencyKey && parseCommand(key, signals_))
+        show(is_coming_back_ ? "not sent: the server is gone" : "not sent: too many keys wait");
+    }
+    raiser_->dispatch(milliseconds(0));
+    tellOfRaises();
+  }
+
+  void raise() {
+    const auto now = std::chrono::steady_clock::now();
+    if (now < next_raise_) return;
+    next_raise_ = now + kBetweenRaises;
+    const auto raised = raiser_->write("requested");
+    raised ? raised_.push_back(*raised) : show("emergency: " + raised.error().what);
+  }
+
+  void tellOfRaises() {
+    std::erase_if(raised_, [this](std::uint32_t raise) {
+      auto heard = raiser_->heard(raise, kSoon);
+      if (!heard) return false;
+      heard->acknowledged = heard->isConfirmed() || raiser_->isAcknowledged();
+      const auto outcome = outcomeOf(*heard, options_.domain, options_.session);
+      show("emergency: " + (outcome ? *outcome : outcome.error().what));
+      return true;
+    });
+  }
+
+  void join() {
+    auto client = CommandClient::open(options_, ended_, [this] { listen(); });
+    if (!client && !ended_) stayOutside(client.error().what);
+    if (!client) return;
+    client_ = std::move(*client);
+    client_->report = show;
+    // a raise that stands is repeated by who has raised it, of all sessions before one was known
+    const bool has_raised = next_raise_ != std::chrono::steady_clock::time_point{};
+    if (!options_.session.empty() || has_raised) return;
+    options_.session = client_->sessionName();
+    if (auto own = StopRaiser::open(options_.domain, options_.session, options_.person); own)
+      raiser_ = std::move(*own);
+  }
+
+  /// Without a seat, for good.
+  void stayOutside(const std::string& why) {
+    is_outside_ = true;
+    why_outside_ = why;
+    report(why);
+    show(std::string("the emergency stop alone can be raised from here, which needs no key: ") + kWhatIsLeft);
+  }
+
+  void comeBack() {
+    const std::string lost = *client_->lost();
+    if (!client_->serverIsGone()) return stayOutside(lost);
+    show(lost + "; waiting for one that resumes the session, " + kWhatIsLeft);
+    is_coming_back_ = true;
+    asked_.reset();
+    std::string said;
+    while (!ended_) {
+      const auto back = client_->rejoin(ended_);
+      if (back) {
+        show("joined session '" + client_->sessionName() + "' again: keys are sent to it");
+        break;
+      }
+      if (!ended_ && back.error().what != std::exchange(said, back.error().what)) show(back.error().what);
+      const auto next = std::chrono::steady_clock::now() + kBetweenTries;
+      while (!ended_ && std::chrono::steady_clock::now() < next) {
+        std::this_thread::sleep_for(kPause);
+        listen();
+      }
+    }
+    is_coming_back_ = false;
+  }
+
+  void act(char key) {
+    if (key == kLeaveKey) {
+      ended_ = true;
+      return;
+    }
+    if (key == '?') show(keyLegend(signals_));
+    auto command = key == 'y' ? std::exchange(asked_, std::nullopt) : parseCommand(key, signals_);
+    if (key == kEmergencyKey) command.reset();  // listen() has raised it
+    const bool asks = key != 'y' && command && needsConsent(*command);
+    asked_ = asks ? command : std::nullopt;
+    if (asks) show(nameOf(*command) + ": press y to do it, any other key not to");
+    if (!command || asks) return;
+    const auto sent = is_outside_ ? fail("not sent: " + why_outside_) : client_->send(*command, ended_);
+    show(nameOf(*command) + ": " + (sent ? "accepted" : sent.error().what));
+  }
+
+  wire::MembershipOptions options_;
+  const std::vector<std::string>& signals_;
+  const std::atomic<bool>& stop_;
+  std::atomic<bool> ended_{false};  ///< by a key or `stop_`
+  std::unique_ptr<StopRaiser> raiser_;
+  std::unique_ptr<CommandClient> client_;
+  std::deque<char> keys_;               ///< pressed, and not acted upon
+  std::optional<ParsedCommand> asked_;  ///< waits for `y`
+  std::vector<std::uint32_t> raised_;   ///< raises of which it is not told yet who has heard them
+  std::chrono::steady_clock::time_point next_raise_;
+  bool is_input_over_ = false;
+  bool is_coming_back_ = false;
+  bool is_outside_ = false;
+  std::string why_outside_;
+};
+
 }  // namespace
 
 int commandOnce(CommandClient& client, const std::vector<std::string>& arguments,
@@ -64,35 +235,17 @@ int commandOnce(CommandClient& client, const std::vector<std::string>& arguments
     show(nameOf(*command) + ": accepted");
     return 0;
   }
-  std::fprintf(stderr, "tenon command: %s\n", sent.error().what.c_str());
+  // of signals, which no list has, the server names those there are
+  const bool is_listed =
+      command && client.refusal() == Refusal::kUnknownName && command->command != CommandKind::kSignal;
+  std::fprintf(stderr, "tenon command: %s%s\n", sent.error().what.c_str(),
+               is_listed ? "; `tenon command list` prints all names" : "");
   return 1;
 }
 
-int commandByKeys(CommandClient& client, const std::vector<std::string>& signals,
-                  const std::atomic<bool>& stop) {
-  const KeyTerminal terminal;
-  show(keyLegend(signals));
-  client.report = show;
-  std::optional<ParsedCommand> asked;
-  bool said_lost = false;
-  while (!stop && !client.isOver()) {
-    client.dispatch(std::chrono::milliseconds(20));
-    if (client.lost() && !std::exchange(said_lost, true))
-      show(*client.lost() + "; space still stops every device, q leaves");
-    char key = 0;
-    const KeyInput input = readKey(key);
-    if (input == KeyInput::kNone) continue;
-    if (input == KeyInput::kEnd || key == 'q') return 0;
-    if (key == '?') show(keyLegend(signals));
-    auto command = key == 'y' ? std::exchange(asked, std::nullopt) : parseCommand(key, signals);
-    const bool asks = key != 'y' && command && needsConsent(*command);
-    asked = asks ? command : std::nullopt;
-    if (asks) show(nameOf(*command) + ": press y to do it, any other key not to");
-    if (!command || asks) continue;
-    const auto sent = client.send(*command, stop);
-    show(nameOf(*command) + ": " + (sent ? "accepted" : sent.error().what));
-  }
-  return 0;
+int commandByKeys(const wire::MembershipOptions& options, const std::vector<std::string>& signals,
+                  const Result<void>& why_not, const std::atomic<bool>& stop) {
+  return KeyDesk(options, signals, stop).run(why_not);
 }
 
 }  // namespace tenon::command

@@ -10,6 +10,8 @@
 
 #include "clients/command/command_program.h"
 #include "clients/command/session_lists.h"
+#include "idl/types/printable_text.h"
+#include "idl/wire/joining_names.h"
 #include "idl/wire/key_option.h"
 #include "idl/wire/network.h"
 #include "idl/wire/session_name.h"
@@ -87,7 +89,11 @@ int run(int argc, char** argv) {
   }
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
-  const bool lists = arguments.words == std::vector<std::string>{"list"} && !arguments.keys;
+  const bool lists = !arguments.words.empty() && arguments.words[0] == "list" && !arguments.keys;
+  if (lists && arguments.words.size() > 1)
+    return report("usage: list, without '" + tenon::shortened(tenon::printable(arguments.words[1]), 60) +
+                      "': it prints people, hands, steps and objects",
+                  2);
   if (!arguments.keys && !lists) {
     const auto parsed = tenon::command::parseCommand(arguments.words);
     if (!parsed) return report(parsed.error().what, 2);
@@ -97,12 +103,18 @@ int run(int argc, char** argv) {
   if (app.count("--key") > 0 && key_file.empty()) return report("--key: names no file", 2);
   if (app.count("--session") > 0 && arguments.options.session.empty())
     return report("--session: names no session", 2);
-  if (const auto key = tenon::wire::checkKeyOption(key_file); !key) return report(key.error().what);
+  if (const auto named = tenon::wire::checkPersonName(arguments.options.person); !named)
+    return report("--person: " + named.error().what, 2);
+  for (const std::string& signal : arguments.signals)
+    if (const auto parsed = tenon::command::parseCommand({"signal", signal}); !parsed)
+      return report("--signal: " + parsed.error().what, 2);
+  const auto key = tenon::wire::checkKeyOption(key_file);
+  if (arguments.keys) return tenon::command::commandByKeys(arguments.options, arguments.signals, key, stop);
+  if (!key) return report(key.error().what);
   if (lists) return printLists(arguments);
   auto client = tenon::command::CommandClient::open(arguments.options, stop);
   if (!client) return report(client.error().what);
-  return arguments.keys ? tenon::command::commandByKeys(**client, arguments.signals, stop)
-                        : tenon::command::commandOnce(**client, arguments.words, stop);
+  return tenon::command::commandOnce(**client, arguments.words, stop);
 }
 
 }  // namespace

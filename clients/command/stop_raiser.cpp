@@ -7,6 +7,7 @@
 #include "idl/types/messages/session.h"
 #include "idl/types/printable_text.h"
 #include "idl/wire/identity.h"
+#include "idl/wire/joining_names.h"
 
 namespace tenon::command {
 
@@ -50,14 +51,14 @@ Result<std::string> outcomeOf(const StopHeard& heard, std::uint32_t domain, cons
 }
 
 Result<std::unique_ptr<StopRaiser>> StopRaiser::open(std::uint32_t domain, const std::string& session,
-                                                     std::string person) {
+                                                     const std::string& person) {
   auto participant =
       wire::Participant::open({.domain = domain, .profile = wire::LinkProfile::kLan, .config = {}});
   if (!participant) return fail(participant.error().what);
   std::unique_ptr<StopRaiser> raiser(new StopRaiser());
   StopRaiser& self = *raiser;
   self.guid_ = wire::randomHex();
-  self.person_ = std::move(person);
+  self.person_ = shortened(printable(person), wire::kLongestPersonName);
   self.own_ = (*participant)->origin();
   self.lobby_ = std::make_unique<wire::Partition>(*participant, wire::kLobby);
   // DDS matches the asterisk with every session's partition

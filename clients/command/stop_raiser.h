@@ -42,7 +42,7 @@ class StopRaiser {
   /// `session` empty: all sessions of the DDS domain. Fails when DDS does.
   [[nodiscard]] static Result<std::unique_ptr<StopRaiser>> open(std::uint32_t domain,
                                                                 const std::string& session,
-                                                                std::string person);
+                                                                const std::string& person);
 
   /// Writes a raise, then waits for a server to repeat it, at most for `patience`, and until readers have it.
   [[nodiscard]] Result<StopHeard> raise(const std::string& reason, std::chrono::milliseconds patience,
@@ -55,6 +55,8 @@ class StopRaiser {
   /// Who has heard a raise; none as long as waiting can tell more: until it is confirmed and other programs
   /// had time to be discovered, at most for `patience` from its writing.
   [[nodiscard]] std::optional<StopHeard> heard(std::uint32_t raise, std::chrono::milliseconds patience) const;
+  /// Whether all that listen have acknowledged all raises by now.
+  [[nodiscard]] bool isAcknowledged() { return stops_->waitForReaders(std::chrono::nanoseconds(0)); }
 
  private:
   struct Raise {

@@ -194,6 +194,35 @@ class KilledServer(unittest.TestCase):
                 self.assertIn("the session has ended ('stopped'", again.stderr)
         self.assertEqual(ends, [1, 1], "not everything was mounted")
 
+    def test_keys_are_sent_to_the_server_that_resumes_the_session(self):
+        with Stage(lockstep=False) as stage:
+            server = begin(stage, "--wait-for", "right")
+            stage.start("trainee", "--seed", 1, "--wait", 60)
+            server.wait_for("run: running", 60)
+            keys = subprocess.Popen([PROGRAMS / "tenon-command", "--keys", "--session", stage.session, "--domain", str(stage.domain)],
+                                    stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
+
+            def press(key, answer):
+                keys.stdin.write(key)
+                keys.stdin.flush()
+                line = keys.stdout.readline()
+                while line and answer not in line:
+                    line = keys.stdout.readline()
+                self.assertIn(answer, line)
+
+            try:
+                press("p", "pause: accepted")
+                time.sleep(1)  # until the journal has it
+                kill(server)
+                press("", "waiting for one that resumes the session, space still stops every device")
+                server, _ = resume(stage)
+                press("", "joined session 'test' again")
+                press("r", "resume: accepted")
+                server.wait_for("run: running", 30)
+            finally:
+                keys.communicate("q", timeout=60)
+            self.assertEqual(keys.returncode, 0)
+
     def test_who_was_removed_just_before_the_kill_stays_removed_and_is_listed_no_more(self):
         def command(*words):
             done = tenon("command", *words, "--session", stage.session, "--domain", stage.domain)

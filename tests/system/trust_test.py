@@ -240,6 +240,32 @@ class EmergencyStop(unittest.TestCase):
             self.assertIn("reset: press y to do it", seen)
             self.assertIn("space still stops every device", said)
 
+    def test_with_a_wrong_key_the_space_bar_still_raises_it(self):
+        with Stage(lockstep=False) as stage:
+            server, trainee = peg_session(stage, "test")
+            server.wait_for("run: running", 120)
+            wrong = stage.out / "wrong"
+            wrong.write_text("ab" * 32, encoding="utf-8")
+            wrong.chmod(0o600)
+            for i, (key, why) in enumerate(((wrong, "the key is not the one of this session"), (stage.out / "nosuch", "nosuch: cannot be read"))):
+                keys = subprocess.Popen([PROGRAMS / "tenon-command", "--keys", "--key", key, "--session", stage.session, "--domain", str(stage.domain),
+                                         "--person", f"Eve {i}"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, bufsize=1)
+                try:
+                    line = seen = keys.stdout.readline()
+                    while line and "the emergency stop alone can be raised" not in line:
+                        line = keys.stdout.readline()
+                        seen += line
+                    self.assertIn(why, seen)
+                    keys.stdin.write("p ")
+                    keys.stdin.flush()
+                    server.wait_for(f"engaged by Eve {i}", 30)
+                finally:
+                    said, _ = keys.communicate("q", timeout=60)
+                self.assertIn("pause: not sent: ", said)
+                self.assertIn("emergency: accepted", said)
+                self.assertEqual(keys.returncode, 1, "it could not join")
+            trainee.wait_for("emergency stop by Eve 0", 30)
+
 
 if __name__ == "__main__":
     unittest.main()
