@@ -87,7 +87,8 @@ void MeasuredLink::receive(Tick now, ClientId client, session::SessionRegistry& 
   for (const session::HandReading& reading : taken_.readings) readings.push_back(reading);
   // the choice is the station's: it is here after the link's delay
   if (now % kPeriod == kPeriod / 2)
-    registry.setLimits(client, choice_.limits, round_trip_.value_or(0.0), choice_.playout_ticks);
+    registry.setLimits(client, choice_.limits, round_trip_.value_or(0.0),
+                       [this](HandId hand) { return buffer_.keptBack(hand); });
 }
 
 }  // namespace tenon::rehearse

@@ -159,6 +159,7 @@ void fields(auto& d, auto& c, Is<Welcome> auto& m) {
   d("tick", c.tick, m.tick);
   d("lockstep", c.lockstep, m.lockstep);
   d("people", c.people, m.people);
+  d("permitted_commands", c.permitted_commands, m.permitted_commands);
 }
 void fields(auto& d, auto& c, Is<Presence> auto& m) {
   d("client", c.client_id, m.client);
@@ -372,6 +373,8 @@ void fields(auto& d, auto& c, Is<RunState> auto& m) {
   d("steps_skipped", c.steps_skipped, m.steps_skipped);
   d("steps_timed_out", c.steps_timed_out, m.steps_timed_out);
   d("forces_frozen", c.forces_frozen, m.forces_frozen);
+  d("emergency_stop", c.emergency_stop, m.emergency_stop);
+  d("open_commands", c.open_commands, m.open_commands);
 }
 void fields(auto& d, auto& c, Is<CollisionMatrix> auto& m) {
   d("part", c.part, m.part);

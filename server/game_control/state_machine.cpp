@@ -113,7 +113,7 @@ std::size_t StateMachine::step(simulation::Environment& environment, std::span<c
 
   const EnvironmentView scene(environment);
   const bool met = memory_.progress.step(state().conditions, scene, commands, ticks);
-  memory_.elapsed += ticks;
+  status.elapsed += ticks;
   updateMeasurements(scene, ticks);
   regrabReleasedPart(environment, scene, ticks);
   grabByHelpers(environment, scene, ticks);
@@ -124,7 +124,7 @@ std::size_t StateMachine::step(simulation::Environment& environment, std::span<c
     leave(environment, StepPhase::kDone);
   } else if (skipped) {
     leave(environment, StepPhase::kSkipped);
-  } else if (state().timeout > 0 && memory_.elapsed >= state().timeout) {
+  } else if (state().timeout > 0 && status.elapsed >= state().timeout) {
     leave(environment, StepPhase::kTimedOut);
   }
   return taken;
@@ -213,7 +213,7 @@ void StateMachine::enter(simulation::Environment& environment, std::uint32_t ste
   status.tick = environment.tick();
   ++status.revision;
   memory_.progress.reset();
-  memory_.elapsed = 0;
+  status.elapsed = 0;
   memory_.contact_ticks = 0;
   memory_.regrabs = {};
   memory_.helpers = {};

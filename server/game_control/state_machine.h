@@ -27,6 +27,7 @@ struct StepStatus {
   StepPhase phase = StepPhase::kWaiting;
   HandId hand;                   ///< that has to do it; differs from the scenario's after hands were swapped
   Tick started = 0;              ///< tick of the Environment at which the state began
+  Tick elapsed = 0;              ///< [ticks] of this state, without pauses: what its timeout is compared with
   Tick changed = 0;              ///< tick of the last revision
   Tick tick = 0;                 ///< tick of the Environment of the values below
   bool finished = false;         ///< the last state has ended
@@ -97,7 +98,6 @@ class StateMachine {
     StateSet timed_out{};  ///< states whose last visit timed out
     StateSet visited{};    ///< states that have ended
     ConditionProgress progress;
-    std::uint64_t elapsed = 0;        ///< [ticks] in this state
     std::uint64_t contact_ticks = 0;  ///< [ticks] of the state's object in contact
     /// between a released part and the default object of the hand that has to move it, by entry of
     /// ScenarioState::hands

@@ -50,7 +50,7 @@ void StateMachine::visitMemory(Memory& memory, Visitor&& visit) {
   for (StateSet* set : {&memory.skipped, &memory.timed_out, &memory.visited})
     for (std::uint64_t& states : *set) visit(states);
   memory.progress.visitMemory(visit);
-  visit(memory.elapsed);
+  visit(status.elapsed);
   visit(memory.contact_ticks);
   visit(memory.regrabs.front().contact_ticks);
   visit(memory.regrabs.front().apart_ticks);

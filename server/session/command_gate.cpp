@@ -2,6 +2,38 @@
 
 namespace tenon::session {
 
+namespace {
+
+/// `expected`: the phase after all that was accepted.
+tl::expected<void, Refused> checkIn(RunPhase phase, RunPhase expected, bool is_stopped, CommandKind kind) {
+  if (kind == CommandKind::kNote || kind == CommandKind::kKick) return {};
+  if (isOver(phase)) return refuse(Refusal::kOver, "the run is over");
+  const bool in_any_phase = kind == CommandKind::kRelease || kind == CommandKind::kSetCollision ||
+                            kind == CommandKind::kStop || kind == CommandKind::kClearEmergencyStop ||
+                            kind == CommandKind::kFreezeForces || kind == CommandKind::kGuide;
+  if (in_any_phase) return {};
+  if (phase == RunPhase::kWaitingForPeople)
+    return refuse(Refusal::kWaiting, "the session still waits for people: repeat the command once it runs");
+  // a pause is what the clear of the stop leaves
+  if (is_stopped && kind != CommandKind::kPause)
+    return refuse(Refusal::kStopped, "the emergency stop stands: clear it first");
+  const bool is_paused = expected == RunPhase::kPaused;
+  if (kind == CommandKind::kResume && !is_paused)
+    return refuse(Refusal::kAlready, "the session is not paused");
+  if (kind == CommandKind::kPause && is_paused)
+    return refuse(Refusal::kAlready, "the session is paused already");
+  return {};
+}
+
+}  // namespace
+
+std::uint32_t openCommands(RunPhase phase, bool is_stopped) {
+  std::uint32_t open = 0;
+  for (const CommandKind kind : kCommandKinds)
+    if (checkIn(phase, phase, is_stopped, kind)) open |= bitOf(kind);
+  return open;
+}
+
 void CommandGate::update(RunPhase phase) {
   phase_ = phase;
   const bool active = phase == RunPhase::kRunning || phase == RunPhase::kPaused;
@@ -9,22 +41,7 @@ void CommandGate::update(RunPhase phase) {
 }
 
 tl::expected<void, Refused> CommandGate::check(CommandKind kind) const {
-  const bool in_any_phase = kind == CommandKind::kRelease || kind == CommandKind::kSetCollision ||
-                            kind == CommandKind::kStop || kind == CommandKind::kClearEmergencyStop ||
-                            kind == CommandKind::kFreezeForces;
-  if (isOver(phase_)) return refuse(Refusal::kOver, "the run is over");
-  if (in_any_phase) return {};
-  if (phase_ == RunPhase::kWaitingForPeople)
-    return refuse(Refusal::kWaiting, "the session still waits for people: repeat the command once it runs");
-  // a pause is what the clear of the stop leaves
-  if (is_stop_engaged_ && kind != CommandKind::kPause)
-    return refuse(Refusal::kStopped, "the emergency stop stands: clear it first");
-  const bool is_paused = expectedPhase() == RunPhase::kPaused;
-  if (kind == CommandKind::kResume && !is_paused)
-    return refuse(Refusal::kAlready, "the session is not paused");
-  if (kind == CommandKind::kPause && is_paused)
-    return refuse(Refusal::kAlready, "the session is paused already");
-  return {};
+  return checkIn(phase_, expectedPhase(), is_stop_engaged_, kind);
 }
 
 void CommandGate::accept(ChangeKind change) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "idl/types/messages/commands.h"
@@ -8,6 +9,9 @@
 #include "server/session/tick_io.h"
 
 namespace tenon::session {
+
+/// Commands that take effect in a phase in which none is on its way: RunState::open_commands.
+[[nodiscard]] std::uint32_t openCommands(RunPhase phase, bool is_stopped);
 
 /// Whether a command takes effect in the phase of the run that it will meet: the one after all commands that
 /// were accepted before it, of which the last ones wait for their tick. A command is accepted only if it

@@ -50,36 +50,21 @@ bool CommandTranslator::controlsBothHands(ClientId client, const CommandContext&
 
 CommandTranslator::Decision CommandTranslator::changeFor(const Command& command,
                                                          const CommandContext& context) const {
-  const Role role = context.role;
   if (!std::isfinite(command.value)) return refuse(Refusal::kOther, "its value is not a finite number");
-  switch (command.kind) {
-    case CommandKind::kFulfilled:
-    case CommandKind::kSignal:
-      if (!has(role, Right::kAnswerStep)) return notPermitted(role);
-      break;
-    case CommandKind::kRelease:
-    case CommandKind::kSwapHands:
-      if (!has(role, Right::kActOnOwnHands)) return notPermitted(role);
-      break;
-    case CommandKind::kClearEmergencyStop:
-      if (!has(role, Right::kClearStop)) return notPermitted(role);
-      break;
-    default:
-      if (!has(role, Right::kLeadRun)) return notPermitted(role);
-  }
   switch (command.kind) {
     case CommandKind::kFulfilled:
       return gameChange(command);
     case CommandKind::kSignal: {
       const int signal = scenario_.signalNamed(command.text);
       if (signal < 0)
-        return refuse(Refusal::kUnknownName, fmt::format("this scenario has no signal '{}'", command.text));
+        return refuse(Refusal::kUnknownName, "this scenario has no signal " + inQuotes(command.text) +
+                                                 namesInstead(scenario_.signals));
       return gameChange(command, static_cast<std::uint32_t>(signal));
     }
     case CommandKind::kRelease:
       return releaseChange(command, context);
     case CommandKind::kSwapHands:
-      if (!has(role, Right::kActOnAnyHand) && !controlsBothHands(command.client, context))
+      if (!has(context.role, Right::kActOnAnyHand) && !controlsBothHands(command.client, context))
         return refuse(Refusal::kNotYourHand, "you do not control both hands");
       return gameChange(command);
     case CommandKind::kClearEmergencyStop:
@@ -99,7 +84,8 @@ CommandTranslator::Decision CommandTranslator::releaseChange(const Command& comm
   if (hand.value >= context.controllers.size())
     return refuse(Refusal::kUnknownName, command.text.empty()
                                              ? "there is no such hand"
-                                             : fmt::format("this scenario has no hand '{}'", command.text));
+                                             : "this scenario has no hand " + inQuotes(command.text) +
+                                                   namesInstead(scenario_.hands));
   return Change{.kind = ChangeKind::kRelease, .hand = hand};
 }
 
@@ -113,7 +99,7 @@ CommandTranslator::Decision CommandTranslator::handOverChange(const Command& com
   if (!object.valid() || !hand.valid())
     return refuse(
         Refusal::kUnknownName,
-        fmt::format("'{}' does not name {}", command.text,
+        fmt::format("{} does not name {}", inQuotes(command.text),
                     object.valid() ? "a hand" : (hand.valid() ? "an object" : "an object and a hand")));
   const auto& hands = scenario_.hands;
   const bool is_own =
@@ -147,7 +133,7 @@ CommandTranslator::Decision CommandTranslator::collisionChange(const Command& co
                        : findPair(command.text.substr(0, space), command.text.substr(space + 1));
   if (pair < 0)
     return refuse(Refusal::kUnknownName,
-                  fmt::format("'{}' does not name the two objects of a collision pair", command.text));
+                  inQuotes(command.text) + " does not name the two objects of a collision pair");
   return Change{
       .kind = ChangeKind::kEnablePair, .index = static_cast<std::uint32_t>(pair), .value = command.value};
 }
@@ -172,8 +158,8 @@ CommandTranslator::Decision CommandTranslator::leadChange(const Command& command
       const int step = findStep(command.text);
       if (step < 0)
         return refuse(Refusal::kUnknownName,
-                      fmt::format("this scenario has no step '{}': it has 1 to {}, or name one", command.text,
-                                  scenario_.states.size()));
+                      fmt::format("this scenario has no step {}: it has 1 to {}, or name one",
+                                  inQuotes(command.text), scenario_.states.size()));
       return gameChange(command, static_cast<std::uint32_t>(step));
     }
     case CommandKind::kHandOver:

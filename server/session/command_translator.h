@@ -19,8 +19,9 @@ struct CommandContext {
   bool is_instructor_present = false;
 };
 
-/// What a command asks of the simulation: by the names of the scenario and the rights of its sender. It knows
-/// nothing of the run's phase.
+/// What a command asks of the simulation, by the names of the scenario, of a sender whose role may send it
+/// (rightFor()): what it may do with the hands of others is decided here. It knows nothing of the run's
+/// phase.
 ///
 /// Threads: any. Real-time: no.
 class CommandTranslator {

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "server/game_control/state_machine.h"
+#include "server/session/command_gate.h"
 #include "server/session/step_blocker.h"
 
 namespace tenon::session {
@@ -95,6 +96,15 @@ void EventGenerator::addMatrix(const TickOutput& output, TickEvents& events) con
   }
 }
 
+RunState EventGenerator::runBefore(bool is_stopped) const {
+  return {.phase = RunPhase::kWaitingForPeople,
+          .tick = tick_,
+          .reason = is_stopped ? "emergency stop" : "waiting for people",
+          .server_epoch = server_epoch_,
+          .emergency_stop = is_stopped,
+          .open_commands = openCommands(RunPhase::kWaitingForPeople, is_stopped)};
+}
+
 void EventGenerator::addRun(const TickOutput& output, TickEvents& events) {
   if (previous_ && previous_->phase == output.phase && previous_->emergency_stop == output.emergency_stop &&
       previous_->forces_frozen == output.forces_frozen)
@@ -125,6 +135,8 @@ void EventGenerator::addRun(const TickOutput& output, TickEvents& events) {
       break;
   }
   run.forces_frozen = output.forces_frozen;
+  run.emergency_stop = output.emergency_stop;
+  run.open_commands = openCommands(output.phase, output.emergency_stop);
   if (output.forces_frozen && output.phase == RunPhase::kRunning) run.reason = "forces frozen";
   if (output.emergency_stop && !isOver(output.phase)) run.reason = "emergency stop";
   run.steps_skipped = output.step.skipped;
@@ -146,10 +158,9 @@ void EventGenerator::addStep(const TickOutput& output, TickEvents& events) {
   if (previous_ && previous_->step.revision == output.step.revision) return;
   const game_control::ScenarioFile& scenario = *scenario_;
   if (const char* const end = endKind(output.step.phase))
-    events.log.push_back(
-        makeEvent(Severity::kInfo, end,
-                  fmt::format("{} ({:.1f} s)", scenario.states[output.step.step].name,
-                              static_cast<double>(output.tick - output.step.started) * kTickSeconds)));
+    events.log.push_back(makeEvent(Severity::kInfo, end,
+                                   fmt::format("{} ({:.1f} s)", scenario.states[output.step.step].name,
+                                               static_cast<double>(output.step.elapsed) * kTickSeconds)));
   events.step = describe(scenario, output.step);
   if (output.step.phase == StepPhase::kTimedOut)
     if (std::string blocker = blockerOf(output); !blocker.empty())

@@ -41,6 +41,8 @@ class EventGenerator {
   void resume(Tick tick);
   /// The changes since the output of the last call; for the first call, the whole state.
   [[nodiscard]] TickEvents generate(const TickOutput& output);
+  /// Of a session that waits for its first tick, which no output describes.
+  [[nodiscard]] RunState runBefore(bool is_stopped) const;
   /// A log entry of something outside the simulation (a join, a refused input), stamped with the last tick
   /// and the next number of the log.
   [[nodiscard]] EventLog makeEvent(Severity severity, std::string kind, std::string text);

@@ -49,6 +49,15 @@ class InputBuffer {
     hands_[hand.value].period.store(std::clamp<std::uint32_t>(ticks, 1, kMostInputPeriod),
                                     std::memory_order_relaxed);
   }
+  /// [ticks] by which readings of `hand` are taken later than they come: its playout; of sparse samples what
+  /// the newest is ahead, in the last seconds and without what is being worked off (ReadingPlayout).
+  [[nodiscard]] std::uint32_t keptBack(HandId hand) const noexcept {
+    const Hand& of = hands_[hand.value];
+    const std::uint32_t period = of.period.load(std::memory_order_relaxed);
+    if (period == 1) return playout(hand);
+    return std::clamp(of.most_behind.load(std::memory_order_relaxed), period - 1,
+                      ReadingPlayout::kUsualPeriodsBehind * period);
+  }
   /// From now on a silence of more than `ticks` [ticks] freezes `hand` (LinkLimits::freeze); kFreezeTicks at
   /// first.
   void setFreeze(HandId hand, std::uint32_t ticks) noexcept {
@@ -99,7 +108,8 @@ class InputBuffer {
     threads::Latest<HandReading> newest;
     threads::SpscQueue<HandReading> queue{64};  ///< used with a playout or a period
     std::atomic<std::uint32_t> playout = 0, period = 1, freeze = kFreezeTicks, replaced = 0, missed = 0;
-    std::atomic<bool> catches_up = false;  ///< the period is 1 again, and the ticks are still behind
+    std::atomic<std::uint32_t> most_behind = 0;  ///< [ticks] ReadingPlayout::mostBehind()
+    std::atomic<bool> catches_up = false;        ///< the period is 1 again, and the ticks are still behind
     std::atomic<bool> restarts = false;
     // of the tick
     ReadingPlayout readings;
@@ -131,6 +141,7 @@ class InputBuffer {
     const bool was_frozen = hand.silent > hand.freeze.load(std::memory_order_relaxed);
     const HandReading* const taken =
         is_between ? hand.readings.takeBetween(period, was_frozen) : hand.readings.takeBehind(playout);
+    hand.most_behind.store(hand.readings.mostBehind(), std::memory_order_relaxed);
     if (period == 1 && hand.readings.behind() == 0) hand.catches_up.store(false, std::memory_order_relaxed);
     const std::uint32_t replaced = hand.readings.replaced();
     hand.replaced.fetch_add(replaced - std::exchange(hand.counted, replaced), std::memory_order_relaxed);

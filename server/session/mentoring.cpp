@@ -51,14 +51,21 @@ std::string_view mentoringUsage() noexcept {
          "[pose] [by HAND], off [HAND]";
 }
 
+std::vector<std::string> Mentoring::handsOf(Role role) const {
+  std::vector<std::string> names;
+  for (const game_control::ScenarioHand& hand : scenario_.hands)
+    if (hand.role == role && hand.kind == simulation::HandKind::kCoupled) names.push_back(hand.name);
+  return names;
+}
+
 tl::expected<HandId, Refused> Mentoring::guideOf(std::string_view name, std::string_view otherwise,
                                                  ClientId client,
                                                  std::span<const ClientId> controllers) const {
   if (!name.empty()) {
     const HandId hand = scenario_.handNamed(name);
     if (!hand.valid() || scenario_.hands[hand.value].role != Role::kInstructor)
-      return refuse(Refusal::kUnknownName,
-                    fmt::format("'{}' is no hand of an instructor in this scenario", name));
+      return refuse(Refusal::kUnknownName, inQuotes(name) + " is no hand of an instructor in this scenario" +
+                                               namesInstead(handsOf(Role::kInstructor)));
     if (!controllers[hand.value].valid())
       return refuse(Refusal::kNobodyThere, fmt::format("nobody moves hand '{}'", name));
     return hand;
@@ -97,7 +104,8 @@ tl::expected<Mentoring::Choice, Refused> Mentoring::parse(std::string_view words
   if (!choice.hand.valid() || scenario_.hands[choice.hand.value].role != Role::kTrainee ||
       scenario_.hands[choice.hand.value].kind != simulation::HandKind::kCoupled)
     return refuse(Refusal::kUnknownName,
-                  fmt::format("'{}' is no hand of a trainee that displays forces", all[1]));
+                  inQuotes(all[1]) + " is no hand of a trainee that displays forces in this scenario" +
+                      namesInstead(handsOf(Role::kTrainee)));
   choice.hand_client = controllers[choice.hand.value];
   if (!choice.hand_client.valid())
     return refuse(Refusal::kNobodyThere, fmt::format("nobody moves hand '{}'", all[1]));
@@ -218,7 +226,8 @@ tl::expected<void, Refused> Mentoring::end(std::string_view words, Role role) {
   if (all.size() > 2) return expectedUsage();
   const HandId hand = all.size() == 2 ? scenario_.handNamed(all[1]) : HandId{};
   if (all.size() == 2 && !hand.valid())
-    return refuse(Refusal::kUnknownName, fmt::format("this scenario has no hand '{}'", all[1]));
+    return refuse(Refusal::kUnknownName,
+                  "this scenario has no hand " + inQuotes(all[1]) + namesInstead(handsOf(Role::kTrainee)));
   const std::size_t before = choices_.size();
   for (std::size_t i = choices_.size(); i-- > 0;)
     if (!hand.valid() || choices_[i].hand == hand || choices_[i].guide == hand) erase(i);

@@ -107,6 +107,8 @@ class Mentoring {
                                      std::span<const ClientId> controllers) const;
   [[nodiscard]] double mutualStiffness(const Choice& choice) const;
   [[nodiscard]] Guidance fixtureOf(Choice& choice, const TickOutput& output);
+  /// Names of those that display forces.
+  [[nodiscard]] std::vector<std::string> handsOf(Role role) const;
   [[nodiscard]] const std::string& nameOf(HandId hand) const { return scenario_.hands[hand.value].name; }
   void erase(std::size_t index);
 

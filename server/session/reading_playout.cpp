@@ -34,6 +34,8 @@ void ReadingPlayout::clear() noexcept {
   waiting_.clear();
   heard_.reset();
   from_.reset();
+  most_behind_ = {};
+  in_window_ = 0;
 }
 
 const HandReading* ReadingPlayout::take(const HandReading& newest) noexcept {
@@ -59,10 +61,21 @@ std::uint32_t ReadingPlayout::behind() const noexcept {
 }
 
 const HandReading* ReadingPlayout::takeBetween(std::uint32_t period, bool was_frozen) noexcept {
+  const HandReading* const taken = advance(period, was_frozen);
+  if (in_window_ == kWindow) {
+    most_behind_ = {0, most_behind_[0]};
+    in_window_ = 0;
+  }
+  ++in_window_;
+  most_behind_[0] = std::max(most_behind_[0], behind());
+  return taken;
+}
+
+const HandReading* ReadingPlayout::advance(std::uint32_t period, bool was_frozen) noexcept {
   if (!from_) return waiting_.empty() ? nullptr : take(HandReading(waiting_[waiting_.size() - 1]));
   const std::uint32_t ahead = behind();
   if (ahead == 0) return nullptr;
-  const std::uint32_t usual = period > 1 ? 3 * period : 1;  // [ticks] behind
+  const std::uint32_t usual = period > 1 ? kUsualPeriodsBehind * period : 1;  // [ticks] behind
   // an eighth faster: who is pushed by the hand feels little of it
   std::uint32_t step = ahead > usual && taken_.seq % 8 == 0 ? 2 : 1;
   if (ahead > kMostPeriodsBehind * period) step = 2;

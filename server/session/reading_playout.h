@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -36,16 +38,24 @@ class ReadingPlayout {
   const HandReading* takeBetween(std::uint32_t period, bool was_frozen = false) noexcept;
   /// [ticks] from the reading that was taken last to the newest that has come.
   [[nodiscard]] std::uint32_t behind() const noexcept;
+  /// [ticks] largest of behind(), after takeBetween(), in the last one to two kWindow: so far was the reading
+  /// of a tick behind the sample that took least time on its way.
+  [[nodiscard]] std::uint32_t mostBehind() const noexcept {
+    return std::max(most_behind_[0], most_behind_[1]);
+  }
 
   /// Readings that were never taken since a newer one was, since the start.
   [[nodiscard]] std::uint32_t replaced() const noexcept { return replaced_; }
 
   static constexpr std::uint32_t kMostPeriodsBehind = 8;
+  static constexpr std::uint32_t kUsualPeriodsBehind = 3;  ///< what is farther behind is worked off
+  static constexpr std::uint32_t kWindow = 1000;           ///< [ticks]
 
  private:
   /// From kMostFreezeTicks behind on, half of those ticks come while the others are taken two at a time.
   static constexpr std::size_t kWaiting = kMostFreezeTicks / 2 + kMostPeriodsBehind;
 
+  const HandReading* advance(std::uint32_t period, bool was_frozen) noexcept;
   void dropFirst(std::size_t count) noexcept;
   /// Of sequence numbers, which begin again at 0 after the largest.
   static bool isBefore(std::uint32_t a, std::uint32_t b) noexcept {
@@ -57,6 +67,8 @@ class ReadingPlayout {
   std::optional<std::uint32_t> heard_;          // seq of the newest one that has waited
   std::optional<HandReading> from_;             // the sample at or before taken_
   std::uint32_t replaced_ = 0;
+  std::array<std::uint32_t, 2> most_behind_{};  // [ticks] in this window and in the last one
+  std::uint32_t in_window_ = 0;                 // [ticks]
 };
 
 /// The reading of input `seq`, between those of two inputs: position, orientation and velocity on the

@@ -121,7 +121,13 @@ bool Reception::dismissKicked(const Command& command, const CommandAck& ack, con
   const std::vector<ClientId> kicked = registry_.takeKicked();
   if (kicked.empty()) return false;
   const std::uint64_t kept = seats_ != nullptr ? seats_->keep(registry_.seatsToKeep()) : 0;
-  for (const ClientId client : kicked) dismiss(client, "was removed by " + who);
+  for (const ClientId client : kicked) {
+    if (const Presence& person = *registry_.findClient(client); !person.alive)
+      callbacks.log(Severity::kWarning, "leave",
+                    fmt::format("{} ({}) had left, was removed by {}, and may not come back", person.name,
+                                roleName(person.role), who));
+    dismiss(client, "was removed by " + who);
+  }
   kicks_.push_back({command, ack, who, kept});
   finishKicks();
   return true;

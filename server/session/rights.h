@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <initializer_list>
 
+#include "idl/types/messages/commands.h"
 #include "idl/types/messages/role.h"
 
 /// The one table of what each role may do, and how many may have it.
@@ -61,6 +62,33 @@ inline constexpr std::array kRoles{
 [[nodiscard]] constexpr bool has(Role role, Right right) {
   const RoleRights* const row = rightsOf(role);
   return row != nullptr && (row->rights & static_cast<std::uint32_t>(right)) != 0;
+}
+
+/// What a command needs at least: a role may be kept to its own hands (Right::kActOnAnyHand) and to ending a
+/// guidance (Right::kGuide).
+[[nodiscard]] constexpr Right rightFor(CommandKind kind) {
+  switch (kind) {
+    case CommandKind::kFulfilled:
+    case CommandKind::kSignal:
+    case CommandKind::kNote:
+      return Right::kAnswerStep;
+    case CommandKind::kRelease:
+    case CommandKind::kSwapHands:
+    case CommandKind::kGuide:
+      return Right::kActOnOwnHands;
+    case CommandKind::kClearEmergencyStop:
+      return Right::kClearStop;
+    default:
+      return Right::kLeadRun;
+  }
+}
+
+/// Welcome::permitted_commands.
+[[nodiscard]] constexpr std::uint32_t permittedCommands(Role role) {
+  std::uint32_t all = 0;
+  for (const CommandKind kind : kCommandKinds)
+    if (has(role, rightFor(kind))) all |= bitOf(kind);
+  return all;
 }
 
 }  // namespace tenon::session

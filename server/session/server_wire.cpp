@@ -18,6 +18,7 @@ namespace tenon::session {
 namespace {
 
 constexpr auto kBetweenLimits = std::chrono::milliseconds(500);  // changes of a station's limits
+constexpr std::size_t kMostScenarioName = 63;    // [bytes] of SessionAnnounce in idl/tenon.idl
 constexpr std::uint32_t kLoggedFreezeStep = 30;  // [ticks] smaller changes of a freeze limit are not logged
 
 std::int64_t nowNanoseconds() {
@@ -38,7 +39,7 @@ SessionAnnounce announcementOf(const WireOptions& options, const LoadedScene& lo
           .host = hostName(),
           .pid = static_cast<std::uint32_t>(getpid()),
           .scene_hash = options.scene_hash,
-          .scenario = scenarioName(scenario.path),
+          .scenario = shortened(scenarioName(scenario.path), kMostScenarioName),
           .detail = options.detail,
           .freeze_ticks = static_cast<std::uint32_t>(options.limits.freeze),
           .park_ticks = static_cast<std::uint32_t>(options.limits.park)};
@@ -208,7 +209,8 @@ void ServerWire::update(const TickOutput& output) {
   now_ = output.tick;
   reception_->setTick(now_);
   registry_.updatePhase(output.phase);
-  registry_.updateCommands(output.commands_taken, output.commands_waiting);
+  registry_.updateCommands(output.commands);
+  for (const std::string& text : registry_.takeDroppedCommands()) log(Severity::kWarning, "dropped", text);
   sendGuidance(output);
 }
 
@@ -318,9 +320,7 @@ void ServerWire::answer(const Command& command, const CommandAck& ack, const std
   } else if (command.kind == CommandKind::kClearEmergencyStop) {
     clearEmergencyStop(command.client, command.text);
   } else {
-    log(Severity::kInfo, "command",
-        fmt::format("{}: {}{}{}", who, commandName(command.kind), command.text.empty() ? "" : " ",
-                    command.text));
+    log(Severity::kInfo, "command", commandText(command, who));
   }
 }
 
@@ -397,7 +397,8 @@ void ServerWire::handle(const Telemetry& telemetry) {
   const auto now = std::chrono::steady_clock::now();
   if (now - inputs->second.limits_set_at < kBetweenLimits) return;
   const double round_trip = telemetry.clock_known ? telemetry.round_trip : 0.0;
-  if (!registry_.setLimits(telemetry.client, telemetry.limits, round_trip, telemetry.playout_ticks)) return;
+  const auto kept_back = [this](HandId hand) { return input_buffer_.keptBack(hand); };
+  if (!registry_.setLimits(telemetry.client, telemetry.limits, round_trip, kept_back)) return;
   for (const HandId hand : station.hands)
     if (registry_.controllerOf(hand) == telemetry.client) passFreezeLimit(hand);
   inputs->second.limits_set_at = now;

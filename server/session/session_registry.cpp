@@ -7,11 +7,13 @@
 #include <fmt/format.h>
 
 #include "idl/types/names.h"
-#include "server/session/input_buffer.h"
+#include "idl/types/printable_text.h"
 #include "server/session/input_checks.h"
 
 namespace tenon::session {
 namespace {
+
+constexpr std::size_t kMostReason = 255;  // [bytes] of CommandAck in idl/tenon.idl
 
 bool mayControlHandOf(Role role, Role hand_role) {
   return has(role, Right::kMoveAnyHand) || (role == hand_role && has(role, Right::kMoveHands));
@@ -189,6 +191,7 @@ void SessionRegistry::assignSeat(const Join& join, Welcome& welcome, const wire:
   const auto former = indexOf(join.seat_key);
   const std::size_t index = former ? *former : newSeat();
   welcome.accepted = true;
+  welcome.permitted_commands = permittedCommands(join.role);
   welcome.client = ClientId{static_cast<std::uint32_t>(index + 1)};
   std::vector<HandId> controlled;
   for (std::size_t i = 0; i < join.hands.size(); ++i) {
@@ -268,24 +271,28 @@ Result<HandReading> SessionRegistry::validateDeviceInput(const DeviceInput& inpu
 }
 
 bool SessionRegistry::setLimits(ClientId client, const HandLimits& limits, double round_trip,
-                                std::uint32_t playout) {
+                                const KeptBack& kept_back) {
   const HandLimits bounded{std::clamp(limits.freeze_ticks, kFreezeTicks, kMostFreezeTicks),
                            std::clamp(limits.park_ticks, kParkTicks, kMostParkTicks)};
   constexpr double kMostTrip = 1.0;  // [s]
-  const double kept_back = kTickSeconds * std::min(playout, InputBuffer::kMostPlayout);
-  const double trip = std::min(kMostTrip, kept_back + (round_trip > 0.0 ? round_trip : 0.0));
   bool changed = false;
+  double longest = 0.0;  // [s]
   for (std::uint32_t i = 0; i < controllers_.size(); ++i) {
+    if (!isController(client, HandId{i})) continue;
+    const bool is_coupled = scenario_.hands[i].kind == simulation::HandKind::kCoupled;
+    const double kept = is_coupled && kept_back ? kTickSeconds * kept_back(HandId{i}) : 0.0;
+    const double trip = std::min(kMostTrip, kept + (round_trip > 0.0 ? round_trip : 0.0));
     // a longer one counts at once, a shorter one when it is two steps shorter
     const bool is_same_trip =
         trip <= std::max(round_trips_[i], kTripStep) && trip > round_trips_[i] - 2.0 * kTripStep;
-    if (!isController(client, HandId{i}) || (limits_[i] == bounded && is_same_trip)) continue;
-    limits_[i] = bounded;
     if (!is_same_trip) round_trips_[i] = trip <= kTripStep ? 0.0 : kTripStep * std::ceil(trip / kTripStep);
-    seats_[client.value - 1].round_trip = round_trips_[i];
+    longest = std::max(longest, round_trips_[i]);
+    if (limits_[i] == bounded && is_same_trip) continue;
+    limits_[i] = bounded;
     changed = true;
     pushLimits(HandId{i});
   }
+  if (changed) seats_[client.value - 1].round_trip = longest;
   return changed;
 }
 
@@ -330,12 +337,14 @@ const CommandAck* SessionRegistry::previousAck(const Command& command) const {
 CommandAck SessionRegistry::decide(const Command& command, Role role) {
   const auto answer = [&](const tl::expected<void, Refused>& done) {
     return done ? CommandAck{command.client, command.id, true, {}, Refusal::kNone}
-                : CommandAck{command.client, command.id, false, done.error().what, done.error().why};
+                : CommandAck{command.client, command.id, false, shortened(done.error().what, kMostReason),
+                             done.error().why};
   };
-  if (command.kind == CommandKind::kNote) return answer(checkNote(command, role));
+  if (!has(role, rightFor(command.kind))) return answer(notPermitted(role));
+  if (command.kind == CommandKind::kNote) return answer(checkNote(command));
   if (command.kind == CommandKind::kKick) return answer(kick(command, role));
   if (command.kind == CommandKind::kGuide) {
-    if (isOver(phase())) return answer(refuse(Refusal::kOver, "the run is over"));
+    if (const auto possible = gate_.check(command.kind); !possible) return answer(possible);
     return answer(mentoring_.decide(command.text, command.client, role, controllers_));
   }
   const auto change =
@@ -347,11 +356,11 @@ CommandAck SessionRegistry::decide(const Command& command, Role role) {
                         command.kind == CommandKind::kClearEmergencyStop;
   // what is accepted has its place in the simulation
   const bool is_of_steps = change->kind == ChangeKind::kGameCommand;
-  if (!is_vital &&
-      (changes_.size() >= kMostWaitingChanges || (is_of_steps && commandsThatWait() >= kMostWaitingCommands)))
+  if (!is_vital && (changes_.size() >= kMostWaitingChanges ||
+                    (is_of_steps && accepted_.waiting() >= kMostWaitingCommands)))
     return answer(refuse(Refusal::kTooMany, "too many commands wait already: send it again in a moment"));
   gate_.accept(change->kind);
-  if (is_of_steps) ++commands_accepted_;
+  if (is_of_steps) accepted_.add(commandText(command, findClient(command.client)->name));
   if (change->kind == ChangeKind::kSetEmergencyStop) {
     clearEmergencyStop();
     return answer({});
@@ -360,15 +369,13 @@ CommandAck SessionRegistry::decide(const Command& command, Role role) {
   return answer({});
 }
 
-tl::expected<void, Refused> SessionRegistry::checkNote(const Command& command, Role role) {
-  if (!has(role, Right::kAnswerStep)) return notPermitted(role);
+tl::expected<void, Refused> SessionRegistry::checkNote(const Command& command) {
   if (command.text.empty()) return refuse(Refusal::kOther, "the note is empty");
   return {};
 }
 
 /// Removes a person and closes the seat, which cannot be taken again with its key.
 tl::expected<void, Refused> SessionRegistry::kick(const Command& command, Role role) {
-  if (!has(role, Right::kLeadRun)) return notPermitted(role);
   const auto person = findPerson(command.text);
   if (!person) return tl::unexpected(person.error());
   const Presence& who = *findClient(*person);
@@ -376,8 +383,12 @@ tl::expected<void, Refused> SessionRegistry::kick(const Command& command, Role r
   if (who.role == Role::kAdmin && role != Role::kAdmin)
     return refuse(Refusal::kNotPermitted,
                   fmt::format("{} is an admin, whom an admin alone removes", who.name));
-  // who is away does not come back, and who was removed already stays so: a repeated command is no error
-  seats_[person->value - 1].is_closed = true;
+  Seat& seat = seats_[person->value - 1];
+  // of a server that was killed before it had answered the command, that is repeated then
+  const bool is_of_former_server = seat.guid.empty();
+  if (seat.is_closed && !is_of_former_server)
+    return refuse(Refusal::kAlready, fmt::format("{} has been removed already", who.name));
+  seat.is_closed = true;
   kicked_.push_back(*person);
   return {};
 }
@@ -392,13 +403,17 @@ tl::expected<ClientId, Refused> SessionRegistry::findPerson(const std::string& t
       if (person.name != text) continue;
       if (found.valid())
         return refuse(Refusal::kUnknownName,
-                      fmt::format("several people are named '{}': give the number, {} or {}", text,
+                      fmt::format("several people are named {}: give the number, {} or {}", inQuotes(text),
                                   found.value, person.client.value));
       found = person.client;
     }
     if (found.valid()) return found;
   }
-  return refuse(Refusal::kUnknownName, fmt::format("nobody here is named '{}'", text));
+  std::vector<std::string> people;
+  for (const Presence& person : clients_)
+    if (person.alive) people.push_back(person.name);
+  return refuse(Refusal::kUnknownName,
+                fmt::format("nobody is named {} in this session{}", inQuotes(text), namesInstead(people)));
 }
 
 std::vector<ClientId> SessionRegistry::takeKicked() { return std::exchange(kicked_, {}); }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "idl/types/messages/timing.h"
 #include "idl/wire/endpoint.h"
 #include "server/game_control/scenario.h"
+#include "server/session/accepted_commands.h"
 #include "server/session/command_gate.h"
 #include "server/session/command_translator.h"
 #include "server/session/mentoring.h"
@@ -87,11 +89,10 @@ class SessionRegistry {
   [[nodiscard]] std::vector<ClientId> takeKicked();
   /// Phase after the last tick.
   void updatePhase(RunPhase phase) { gate_.update(phase); }
-  /// TickOutput::commands_taken and commands_waiting of a tick.
-  void updateCommands(std::uint64_t taken, std::size_t waiting) {
-    commands_taken_ = taken;
-    commands_waiting_ = waiting;
-  }
+  /// TickOutput::commands of a tick; after updatePhase().
+  void updateCommands(const CommandCounts& counts) { accepted_.update(counts, isOver(phase())); }
+  /// Accepted commands that are not carried out, as sentences, since the last call.
+  [[nodiscard]] std::vector<std::string> takeDroppedCommands() { return accepted_.takeDropped(); }
   /// Frees the client's hands. Its seat stays and can be taken again with its key. Unknown ids are ignored.
   void leave(ClientId client);
   /// A raise stands; of several the first one stops the simulation.
@@ -104,12 +105,13 @@ class SessionRegistry {
   /// does not control this hand, the server epoch is another one, or the numbers are implausible
   /// (checkedReading).
   [[nodiscard]] Result<HandReading> validateDeviceInput(const DeviceInput& input) const;
+  using KeptBack = std::function<std::uint32_t(HandId)>;  ///< [ticks] InputBuffer::keptBack()
   /// The station of `client` asks for these limits of all its hands, within those of HandLimits, and says the
-  /// `round_trip` [s] of its link. With the `playout` [ticks] for which the server keeps inputs back it is
-  /// told to the simulation, rounded up to steps of kTripStep, at once when it grows, when it falls by two
-  /// steps. False: it has no hands, or they are so already.
+  /// `round_trip` [s] of its link. With what the server keeps back of a hand that feels forces (empty:
+  /// nothing) it is told to the simulation, rounded up to steps of kTripStep, at once when it grows, when it
+  /// falls by two steps. False: it has no hands, or they are so already.
   bool setLimits(ClientId client, const HandLimits& limits, double round_trip = 0.0,
-                 std::uint32_t playout = 0);
+                 const KeptBack& kept_back = {});
   /// In force with the next tick.
   [[nodiscard]] const HandLimits& limitsOf(HandId hand) const { return limits_[hand.value]; }
   /// [s] likewise; 0 up to kTripStep. Who comes back to a seat has that of before, until it is measured anew.
@@ -146,7 +148,7 @@ class SessionRegistry {
     CommandAck last_ack;      ///< id 0: none yet
     std::uint64_t left = 0;   ///< counts departures
     bool is_closed = false;   ///< its person was removed
-    double round_trip = 0.0;  ///< [s] from input to answer, as told to the simulation
+    double round_trip = 0.0;  ///< [s] from input to answer, the longest that was told to the simulation
   };
 
   /// Seats in all, of those that are present and of those that left: then that of who left first is given
@@ -162,14 +164,10 @@ class SessionRegistry {
   [[nodiscard]] std::size_t newSeat();
   void assignSeat(const Join& join, Welcome& welcome, const wire::Origin& from);
   [[nodiscard]] CommandAck decide(const Command& command, Role role);
-  [[nodiscard]] static tl::expected<void, Refused> checkNote(const Command& command, Role role);
+  [[nodiscard]] static tl::expected<void, Refused> checkNote(const Command& command);
   [[nodiscard]] tl::expected<void, Refused> kick(const Command& command, Role role);
   [[nodiscard]] tl::expected<ClientId, Refused> findPerson(const std::string& text) const;
   [[nodiscard]] bool isController(ClientId client, HandId hand) const;
-  /// On their way to the simulation and in it, as far as its last tick has told.
-  [[nodiscard]] std::uint64_t commandsThatWait() const {
-    return commands_accepted_ - commands_taken_ + commands_waiting_;
-  }
 
   const game_control::ScenarioFile& scenario_;
   CommandTranslator translator_;
@@ -186,10 +184,7 @@ class SessionRegistry {
   Mentoring mentoring_;
   CommandGate gate_;
   std::vector<ClientId> kicked_;
-  // to the state machine
-  std::uint64_t commands_accepted_ = 0;
-  std::uint64_t commands_taken_ = 0;
-  std::size_t commands_waiting_ = 0;
+  AcceptedCommands accepted_;  ///< to the state machine
 };
 
 }  // namespace tenon::session

@@ -9,6 +9,7 @@
 
 #include "idl/threads/cyclic_thread.h"
 #include "idl/wire/network.h"
+#include "server/session/command_gate.h"
 #include "server/session/journal_writer.h"
 #include "server/session/resume.h"
 #include "server/session/seat_list.h"
@@ -118,10 +119,7 @@ class Server final : public SessionServer {
     if (options_.resume && simulation_.now() > 0) {
       awaitReturn(stop);
     } else {
-      print(fmt::format("session '{}' is open{}, waiting for people", options_.name,
-                        options_.resume ? " again" : ""));
-      while (!stop && !registry_.stopRequested() && !wire_->replaced() && !start_condition_.isMet(registry_))
-        wire_->dispatch(milliseconds(100));
+      awaitPeople(stop);
     }
     const bool runs = !stop && !wire_->replaced() && !simulation_.over();
     if (runs) options_.lockstep ? runLockstep(stop) : runRealTime(stop);
@@ -130,6 +128,7 @@ class Server final : public SessionServer {
 
  private:
   Result<void> resume(const LoadedScene& loaded);
+  void awaitPeople(const std::atomic<bool>& stop);
   void awaitReturn(const std::atomic<bool>& stop);
   void runLockstep(const std::atomic<bool>& stop);
   void runRealTime(const std::atomic<bool>& stop);
@@ -159,7 +158,7 @@ class Server final : public SessionServer {
     simulation_.tick(input);
     simulation_.fill(output);
     commands_taken_ += countCommands(input);
-    output.commands_taken = commands_taken_;
+    output.commands.taken = commands_taken_;
     output.stats.compute_seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     govern(output.stats.compute_seconds);
@@ -198,7 +197,7 @@ class Server final : public SessionServer {
   std::uint64_t lost_entries_ = 0;  ///< of the journal, as was said
   std::uint64_t lost_copies_ = 0;   ///< likewise, of recorders
   std::uint64_t late_ticks_ = 0;
-  std::uint64_t commands_taken_ = 0;  ///< TickOutput::commands_taken
+  std::uint64_t commands_taken_ = 0;  ///< CommandCounts::taken
   // real time
   threads::SpscQueue<TickOutput> outputs_{64};
   TickInput input_;
@@ -367,12 +366,25 @@ void Server::noticeJournal() {
                            lost - std::exchange(lost_copies_, lost)));
 }
 
+void Server::awaitPeople(const std::atomic<bool>& stop) {
+  print(fmt::format("session '{}' is open{}, waiting for people", options_.name,
+                    options_.resume ? " again" : ""));
+  std::optional<bool> published;  // whether a stop stands
+  while (!stop && !registry_.stopRequested() && !wire_->replaced() && !start_condition_.isMet(registry_)) {
+    if (const bool is_stopped = registry_.isStopEngaged(); published != is_stopped)
+      wire_->send(publisher_.eventGenerator().runBefore(published.emplace(is_stopped)));
+    wire_->dispatch(milliseconds(100));
+  }
+}
+
 Result<SessionReport> Server::finish() {
   SessionReport report;
   report.run.phase = simulation_.over() ? simulation_.phase() : RunPhase::kStopped;
   report.run.tick = simulation_.now();
   report.run.final_hash = simulation_.hash();
   report.run.server_epoch = epoch_;
+  report.run.emergency_stop = registry_.isStopEngaged();
+  report.run.open_commands = openCommands(report.run.phase, report.run.emergency_stop);
   const std::string& reason = publisher_.eventGenerator().runReason();
   // empty: no tick of this life has said the end of a session that had ended when its server was killed
   report.run.reason = !simulation_.over() ? "stopped"

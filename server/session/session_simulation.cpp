@@ -48,7 +48,7 @@ void SessionSimulation::tick(const TickInput& input) noexcept {
     if (machine_.status().finished) phase_ = RunPhase::kSucceeded;
     if (machine_.status().failed) phase_ = RunPhase::kFailed;
   }
-  if (phase_ != RunPhase::kRunning && phase_ != RunPhase::kPaused) commands_.clear();
+  if (phase_ != RunPhase::kRunning && phase_ != RunPhase::kPaused) dropCommands();
   startWhenHandsPresent();
   environment_.setFreeBodiesPaused(isStill());
   environment_.step();
@@ -60,6 +60,11 @@ void SessionSimulation::dropFirstCommands(std::size_t count) noexcept {
   commands_.resize(commands_.size() - count);
 }
 
+void SessionSimulation::dropCommands() noexcept {
+  commands_dropped_ += commands_.size();
+  commands_.clear();
+}
+
 void SessionSimulation::apply(const Change& change) noexcept {
   switch (change.kind) {
     case ChangeKind::kAttach:
@@ -67,7 +72,7 @@ void SessionSimulation::apply(const Change& change) noexcept {
     case ChangeKind::kDetach:
       return detach(change.hand);
     case ChangeKind::kGameCommand:
-      if (!emergency_stop_) commands_.push_back(change.game);
+      if (emergency_stop_ || !commands_.push_back(change.game)) ++commands_dropped_;
       return;
     case ChangeKind::kRelease:
       return environment_.release(change.hand);
@@ -76,7 +81,7 @@ void SessionSimulation::apply(const Change& change) noexcept {
     case ChangeKind::kSetEmergencyStop:
       // what was accepted just before would act, unseen, when the stop is cleared
       emergency_stop_ = change.value != 0.0;
-      if (emergency_stop_) commands_.clear();
+      if (emergency_stop_) dropCommands();
       return;
     case ChangeKind::kFreezeForces:
       forces_frozen_ = change.value != 0.0;
@@ -240,7 +245,8 @@ void SessionSimulation::fill(TickOutput& output) const noexcept {
   output.emergency_stop = emergency_stop_;
   output.forces_frozen = forces_frozen_;
   output.step = machine_.status();
-  output.commands_waiting = commands_.size();
+  output.commands.waiting = commands_.size();
+  output.commands.dropped = commands_dropped_;
 
   const auto objects = environment_.objects();
   for (std::uint32_t i = 0; i < objects.size(); ++i) {

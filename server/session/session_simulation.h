@@ -123,10 +123,12 @@ class SessionSimulation {
   std::vector<std::uint8_t> collides_;   ///< CollisionMatrix::bits of all parts
   std::uint32_t collides_revision_ = 0;  ///< Environment::pairRevision() that they are of
   void dropFirstCommands(std::size_t count) noexcept;
+  void dropCommands() noexcept;
 
   /// Commands for the next steps of the state machine: those that wait for one before them, and those of this
   /// tick; none in an emergency stop.
   FixedVector<game_control::GameCommand, kMostWaitingCommands> commands_;
+  std::uint64_t commands_dropped_ = 0;  ///< CommandCounts::dropped; no state: nothing depends on it
   RunPhase phase_ = RunPhase::kWaitingForPeople;
   bool emergency_stop_ = false;
   bool forces_frozen_ = false;  ///< hands are held still, steps go on

@@ -96,6 +96,13 @@ struct PairState {
 /// Pairs refreshed round robin with each 100 Hz sample, at most.
 inline constexpr std::size_t kRoundRobinPairs = kPairsPerSample;
 
+/// Commands to the state machine, by all ticks of this server.
+struct CommandCounts {
+  std::uint64_t taken = 0;    ///< with the inputs of ticks
+  std::uint64_t waiting = 0;  ///< of them and of those of a checkpoint: for a later tick
+  std::uint64_t dropped = 0;  ///< likewise, and not carried out: by an emergency stop or the end of the run
+};
+
 /// All outputs of one tick. Sized once by SessionSimulation::makeOutput; filled without allocating.
 struct TickOutput {
   Tick tick = 0;
@@ -104,8 +111,7 @@ struct TickOutput {
   bool emergency_stop = false;
   bool forces_frozen = false;  ///< by ChangeKind::kFreezeForces
   game_control::StepStatus step;
-  std::uint64_t commands_taken = 0;     ///< to the state machine, by all ticks of this server
-  std::size_t commands_waiting = 0;     ///< of them and of those of a checkpoint: for a later tick
+  CommandCounts commands;
   std::vector<ObjectState> objects;     ///< index = ObjectId
   std::vector<HandManifold> manifolds;  ///< index = HandId; valid where `present`
   std::vector<bool> present;            ///< index = HandId: a client controls this hand and sends input

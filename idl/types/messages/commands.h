@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 
@@ -30,6 +31,33 @@ enum class CommandKind : std::uint32_t {
   kFreezeForces,  ///< value 1: hands are held still and display no force, the steps go on; 0: no more
   kKick,          ///< text: name, or number of the client, of who has to leave, then perhaps a reason
 };
+
+inline constexpr std::array kCommandKinds{
+    CommandKind::kFulfilled,
+    CommandKind::kSignal,
+    CommandKind::kPause,
+    CommandKind::kResume,
+    CommandKind::kReset,
+    CommandKind::kSkipStep,
+    CommandKind::kRelease,
+    CommandKind::kSwapHands,
+    CommandKind::kSetCollision,
+    CommandKind::kStop,
+    CommandKind::kClearEmergencyStop,
+    CommandKind::kGoToStep,
+    CommandKind::kBack,
+    CommandKind::kRepeatStep,
+    CommandKind::kHandOver,
+    CommandKind::kNote,
+    CommandKind::kGuide,
+    CommandKind::kFreezeForces,
+    CommandKind::kKick,
+};
+
+/// For sets of commands in a message.
+[[nodiscard]] constexpr std::uint32_t bitOf(CommandKind kind) {
+  return 1U << static_cast<std::uint32_t>(kind);
+}
 
 /// Why a command is refused, for displays that say it in their own language.
 enum class Refusal : std::uint32_t {

@@ -23,6 +23,8 @@ struct RunState {
   std::uint32_t steps_skipped = 0;    ///< so far, and not done since
   std::uint32_t steps_timed_out = 0;  ///< likewise
   bool forces_frozen = false;         ///< by a command: hands are held still, whatever the phase
+  bool emergency_stop = false;        ///< a raise stands
+  std::uint32_t open_commands = 0;    ///< that take effect in this state: of bitOf() of commands.h
 };
 
 /// Whether a run that has ended did what its exercise asks for; `allow_skips`: also when steps were skipped.

@@ -11,7 +11,7 @@
 /// Joining a session and leaving it.
 namespace tenon {
 
-inline constexpr std::uint32_t kProtocolVersion = 9;
+inline constexpr std::uint32_t kProtocolVersion = 10;
 
 /// Published by each server in the lobby partition: the session it runs.
 struct SessionAnnounce {
@@ -72,6 +72,7 @@ struct Welcome {
   Tick tick = 0;                  ///< newest of the server; in lockstep the first input is for the next one
   bool lockstep = false;
   std::uint32_t people = 0;  ///< clients that have a seat, this one included: so many Presences alive
+  std::uint32_t permitted_commands = 0;  ///< that the role may send: of bitOf() of commands.h
 };
 
 /// A client that has a seat. Published by the client; disposed, or lost with its writer, when it leaves.

@@ -11,7 +11,7 @@
 #include "tests/bench/stability/stability_result.h"
 #include "tests/support/known_shortfall.h"
 
-// Nineteen cells of `tenon bench stability`, with what must be true of each.
+// Twenty cells of `tenon bench stability`, with what must be true of each.
 
 namespace tenon::bench {
 namespace {
@@ -130,6 +130,21 @@ TEST(Stability, TwoPeopleAreStableAtALinkWithLossesThatLeavesNearlyAllOfTheStiff
   EXPECT_EQ(cell.stiffness, fullStiffness());
   EXPECT_NEAR(cell.other_share, 1.0, 0.3);
   EXPECT_LT(cell.ripple, 0.02);
+}
+
+//   above 20 ms of round trip inputs are sparse, and a reading is kept back until the next one has come
+TEST(Stability, TwoPeopleOverALinkWithSparseInputsHaveTheStiffnessThatAllOfTheWayLeaves) {
+  constexpr Tick kDelay = 11, kPeriod = 5;       // [ticks]
+  constexpr double kStiffnessTimesDelay = 24.0;  // [Ns/m] D-072
+  for (const char* const loss : {"0", "10%"}) {
+    const RigCell cell = cellOf("two_people", RigModel::kSceneCopy, kDelay, loss);
+    EXPECT_EQ(cell.stiffness, fullStiffness()) << loss;
+    EXPECT_NEAR(cell.other_share, 1.0, 0.3) << loss;
+    // there and back, for both
+    const double delay = 2.0 * kTickSeconds * static_cast<double>(2 * kDelay + kPeriod - 1);
+    EXPECT_LE(cell.coupling * delay, kStiffnessTimesDelay) << loss;
+    EXPECT_GT(cell.coupling * delay, 0.5 * kStiffnessTimesDelay) << loss;
+  }
 }
 
 TEST(Stability, EqualSeedsGiveEqualNumbers) {

@@ -101,6 +101,19 @@ TEST(CommandGateTest, DuringAnEmergencyStopWhatChangesTheSceneIsRefused) {
   }
 }
 
+TEST(CommandGateTest, TheCommandsThatAreSaidToBeOpenAreThoseThatItTakes) {
+  for (const RunPhase phase : {RunPhase::kWaitingForPeople, RunPhase::kRunning, RunPhase::kPaused,
+                               RunPhase::kSucceeded, RunPhase::kFailed, RunPhase::kStopped})
+    for (const bool is_stopped : {false, true}) {
+      CommandGate gate = gateIn(phase);
+      if (is_stopped) gate.engageStop();
+      for (const CommandKind kind : kCommandKinds)
+        EXPECT_EQ((openCommands(phase, is_stopped) & bitOf(kind)) != 0, gate.check(kind).has_value())
+            << static_cast<int>(phase) << ", " << is_stopped << ", " << static_cast<int>(kind);
+    }
+  EXPECT_EQ(openCommands(RunPhase::kFailed, false), bitOf(CommandKind::kNote) | bitOf(CommandKind::kKick));
+}
+
 TEST(CommandGateTest, AnEndStaysRequested) {
   CommandGate gate = gateIn(RunPhase::kRunning);
   EXPECT_FALSE(gate.endRequested());

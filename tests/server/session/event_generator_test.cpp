@@ -232,6 +232,10 @@ TEST(EventGenerator, AnEmergencyStopIsLoggedAsErrorAndItsEndIsLogged) {
   for (int i = 0; i < 5; ++i) generated.add(generator.generate(rig.tick()));
   EXPECT_THAT(generated.texts("run"), ElementsAre("running", "emergency stop", "running"));
   EXPECT_EQ(generated.runs[1].server_epoch, kEpoch);
+  EXPECT_TRUE(generated.runs[1].emergency_stop);
+  EXPECT_EQ(generated.runs[1].open_commands & bitOf(CommandKind::kSkipStep), 0U);
+  EXPECT_FALSE(generated.runs[2].emergency_stop);
+  EXPECT_NE(generated.runs[2].open_commands & bitOf(CommandKind::kSkipStep), 0U);
   const auto stop = std::find_if(generated.events.begin(), generated.events.end(),
                                  [](const EventLog& event) { return event.text == "emergency stop"; });
   EXPECT_EQ(stop->severity, Severity::kError);

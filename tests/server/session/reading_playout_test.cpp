@@ -143,6 +143,24 @@ TEST(SparseInputsOfAHand, FarBehindAreCaughtUpWithByOneMoreTickATick) {
   }
 }
 
+//   of the inputs' delay this is the server's part, which counts in the round trip of a shared part
+TEST(SparseInputsOfAHand, AreKeptBackByAsMuchAsTheServerTells) {
+  constexpr std::uint32_t kTicks = 20'000;
+  for (const SparseLink& link : {SparseLink{5, 0, 0.0}, SparseLink{5, 0, 0.02}, SparseLink{5, 4, 0.02}}) {
+    InputBuffer buffer(1);
+    const auto all = takenOver(link, kTicks, buffer);
+    std::uint32_t behind = 0;  // of the last second, of a sample that took no time
+    for (std::size_t i = all.size() - 1000; i < all.size(); ++i)
+      behind = std::max(behind, static_cast<std::uint32_t>(kTicks - (all.size() - 1 - i) - all[i].seq));
+    EXPECT_GE(behind, link.period - 1);
+    EXPECT_NEAR(buffer.keptBack(kMoved), behind, 2.0) << "jitter " << link.jitter << ", loss " << link.loss;
+    buffer.setPeriod(kMoved, 1);
+    EXPECT_EQ(buffer.keptBack(kMoved), 0U) << "what is left is worked off";
+    buffer.setPlayout(kMoved, 2);
+    EXPECT_EQ(buffer.keptBack(kMoved), 2U);
+  }
+}
+
 TEST(SparseInputsOfAHand, AfterASilenceAreOnePeriodBehind) {
   ReadingPlayout playout;
   for (const std::uint32_t seq : {5U, 10U}) playout.add(swinging(seq));

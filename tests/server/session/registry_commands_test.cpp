@@ -1,3 +1,4 @@
+#include "idl/wire/codec.h"
 #include "tests/server/session/registry_session.h"
 
 namespace tenon::session {
@@ -78,6 +79,20 @@ TEST_F(RegistryCommands, CommandsArePermittedByRole) {
   const CommandAck ack = command(instructor, CommandKind::kPause);
   EXPECT_EQ(ack.client, instructor);
   EXPECT_EQ(ack.id, commands_) << "the ack carries the id of its command";
+}
+
+TEST_F(RegistryCommands, AWelcomeSaysWhichCommandsTheRoleMaySend) {
+  registry_.updatePhase(RunPhase::kRunning);
+  for (const RoleRights& row : kRoles) {
+    const Welcome welcome = join(std::string(roleName(row.role)), row.role);
+    for (const CommandKind kind : kCommandKinds) {
+      const bool is_permitted = (welcome.permitted_commands & bitOf(kind)) != 0;
+      const char* const text = kind == CommandKind::kGuide ? "off" : "";  // which every guided hand may say
+      EXPECT_EQ(command(welcome.client, kind, text).refusal != Refusal::kNotPermitted, is_permitted)
+          << roleName(row.role) << ", " << static_cast<int>(kind);
+    }
+  }
+  EXPECT_EQ(join("x", Role::kObserver).permitted_commands, 0U);
 }
 
 TEST_F(RegistryCommands, StepsAreNamedByNameOrNumber) {
@@ -258,8 +273,8 @@ TEST_F(RegistryCommands, NoCommandThatWasAcceptedIsLostHoweverManyWait) {
   const ClientId instructor = join("t", Role::kInstructor).client;
   registry_.updatePhase(RunPhase::kRunning);
   (void)changes();
-  std::uint64_t accepted = 0, taken = 0;
-  std::size_t waiting = 0, refused = 0;
+  std::uint64_t accepted = 0, taken = 0, waiting = 0;
+  std::size_t refused = 0;
   for (int tick = 0; tick < 100; ++tick) {
     for (std::size_t i = 0; i < kMaxChanges; ++i) {
       const CommandAck ack = command(instructor, CommandKind::kSkipStep);
@@ -273,21 +288,21 @@ TEST_F(RegistryCommands, NoCommandThatWasAcceptedIsLostHoweverManyWait) {
     waiting += arrived;
     ASSERT_LE(waiting, kMostWaitingCommands) << "the simulation has no place for more";
     if (waiting > 0) --waiting;
-    registry_.updateCommands(taken, waiting);
+    registry_.updateCommands({taken, waiting});
   }
   EXPECT_GT(refused, 0U);
   EXPECT_GE(accepted, kMostWaitingCommands);
   EXPECT_TRUE(command(instructor, CommandKind::kPause).accepted) << "it waits for none of them";
-  registry_.updateCommands(taken, 0);
+  registry_.updateCommands({taken, 0});
   EXPECT_TRUE(command(instructor, CommandKind::kSkipStep).accepted);
 }
 
 TEST_F(RegistryCommands, CommandsOfACheckpointCount) {
   const ClientId instructor = join("t", Role::kInstructor).client;
   registry_.updatePhase(RunPhase::kRunning);
-  registry_.updateCommands(0, kMostWaitingCommands);
+  registry_.updateCommands({0, kMostWaitingCommands});
   EXPECT_EQ(command(instructor, CommandKind::kSkipStep).refusal, Refusal::kTooMany);
-  registry_.updateCommands(0, kMostWaitingCommands - 1);
+  registry_.updateCommands({0, kMostWaitingCommands - 1});
   EXPECT_TRUE(command(instructor, CommandKind::kSkipStep).accepted);
 }
 
@@ -301,6 +316,25 @@ TEST_F(RegistryCommands, AStopIsNotLiftedByTheEndOfAnEarlierOneThatStillWaits) {
   for (const Change& change : changes())
     if (change.kind == ChangeKind::kSetEmergencyStop) engaged = change.value;
   EXPECT_EQ(engaged, 1.0);
+}
+
+TEST_F(RegistryCommands, AReasonCanBeSentAndNamesWhatThereIsHoweverLongTheUnknownNameIs) {
+  const ClientId instructor = join("t", Role::kInstructor).client;
+  registry_.updatePhase(RunPhase::kRunning);
+  const std::string unknown(255, 'x');
+  for (const CommandKind kind :
+       {CommandKind::kSignal, CommandKind::kRelease, CommandKind::kGoToStep, CommandKind::kHandOver,
+        CommandKind::kSetCollision, CommandKind::kKick, CommandKind::kGuide}) {
+    const std::string text = kind == CommandKind::kGuide ? "show " + unknown.substr(5) : unknown;
+    const CommandAck ack = command(instructor, kind, text);
+    EXPECT_EQ(ack.refusal, Refusal::kUnknownName) << static_cast<int>(kind);
+    EXPECT_TRUE(wire::encode(ack)) << ack.reason;
+  }
+  EXPECT_THAT(command(instructor, CommandKind::kRelease, "third").reason,
+              HasSubstr("it has: right, instructor, left"));
+  EXPECT_THAT(command(instructor, CommandKind::kKick, "Eve").reason, HasSubstr("it has: t's station"));
+  EXPECT_THAT(command(instructor, CommandKind::kGuide, "show third").reason,
+              HasSubstr("it has: right, left"));
 }
 
 TEST_F(RegistryCommands, AHandIsReleasedByItsName) {

@@ -210,11 +210,13 @@ TEST_F(SessionRegistryTest, ARoundTripIsToldInStepsAndNotForEachThatIsALittleDif
 
 TEST_F(SessionRegistryTest, ForWhatInputsAreKeptBackTheirRoundTripIsLonger) {
   const Welcome welcome = join("a", Role::kTrainee, {"right"});
-  EXPECT_FALSE(registry_.setLimits(welcome.client, {}, 0.0004, 2)) << "that of a local network with losses";
-  EXPECT_TRUE(registry_.setLimits(welcome.client, {}, 0.0041, 2));
+  const auto ticks = [](std::uint32_t kept) { return [kept](HandId) { return kept; }; };
+  EXPECT_FALSE(registry_.setLimits(welcome.client, {}, 0.0004, ticks(2)))
+      << "that of a local network with losses";
+  EXPECT_TRUE(registry_.setLimits(welcome.client, {}, 0.0041, ticks(2)));
   EXPECT_NEAR(registry_.roundTripOf(test::kRightHand), 0.0075, 1e-12);
-  EXPECT_FALSE(registry_.setLimits(welcome.client, {}, 0.0041, 1'000'000))
-      << "no longer than the server does";
+  EXPECT_TRUE(registry_.setLimits(welcome.client, {}, 0.0221, ticks(14)));
+  EXPECT_NEAR(registry_.roundTripOf(test::kRightHand), 0.0375, 1e-12);
 }
 
 TEST_F(SessionRegistryTest, AStationChoosesTheLimitsOfItsOwnHandsWithinTheBoundsAndUntilItLeaves) {
@@ -257,7 +259,9 @@ TEST_F(SessionRegistryTest, WhoIsRemovedLeavesAndDoesNotGetTheSeatAgain) {
   EXPECT_EQ(taken[0].kind, ChangeKind::kDetach);
   EXPECT_THAT(join("a", Role::kTrainee, {"right"}).reason, HasSubstr("you were removed"));
   EXPECT_TRUE(join("z", Role::kTrainee, {"right"}).accepted) << "the hand is free for others";
-  EXPECT_TRUE(command(instructor, CommandKind::kKick, std::to_string(trainee.value)).accepted) << "still so";
+  const CommandAck again = command(instructor, CommandKind::kKick, std::to_string(trainee.value));
+  EXPECT_EQ(again.refusal, Refusal::kAlready);
+  EXPECT_THAT(again.reason, HasSubstr("a's station has been removed already"));
 }
 
 TEST_F(SessionRegistryTest, WhoIsAwayIsRemovedTooAndDoesNotComeBack) {

@@ -305,6 +305,25 @@ TEST(SessionServer, AnyClientEngagesAnEmergencyStopAndOnlyTheInstructorClearsIt)
   EXPECT_TRUE(trainee.receivesUntil([&] { return trainee.stops.engaged(); })) << "a new raise is not cleared";
 }
 
+// in lockstep no tick comes between the two
+TEST(SessionServer, ACommandWhoseTickAStopForestallsIsToldWithItsSender) {
+  RunningServer server({.name = "dropped", .lockstep = true, .wait_for = {"right"}});
+  test::ScriptedClient trainee("dropped", wire::LinkProfile::kLockstep);
+  ASSERT_TRUE(trainee.join("right", Role::kTrainee, {"right"}));
+  runInLockstep(trainee, 1, 3);
+  test::ScriptedClient instructor("dropped", wire::LinkProfile::kLockstep);
+  ASSERT_TRUE(instructor.join("Ada", Role::kInstructor, {}));
+  instructor.command(CommandKind::kSkipStep);
+  ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 1; }));
+  ASSERT_TRUE(instructor.ack.accepted) << instructor.ack.reason;
+  instructor.emergencyStop();
+  ASSERT_TRUE(
+      instructor.receivesUntil([&] { return instructor.received("emergency stop", "engaged by Ada"); }));
+  runInLockstep(trainee, 4, 4);
+  EXPECT_TRUE(instructor.receivesUntil(
+      [&] { return instructor.received("dropped", "Ada: skip (an emergency stop came before its tick)"); }));
+}
+
 TEST(SessionServer, WithoutAnInstructorAnAdminClearsTheEmergencyStopAndTheRunStaysPaused) {
   RunningServer server({.name = "alone", .lockstep = true, .wait_for = {"right"}});
   test::ScriptedClient trainee("alone", wire::LinkProfile::kLockstep);
@@ -410,6 +429,11 @@ TEST(SessionServer, AStopCommandEndsASessionThatStillWaitsForPeople) {
   ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 1; }));
   EXPECT_FALSE(instructor.ack.accepted) << "it would not take effect";
   EXPECT_THAT(instructor.ack.reason, HasSubstr("waits for people"));
+  instructor.emergencyStop();
+  ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.run.emergency_stop; })) << "without a tick";
+  EXPECT_EQ(instructor.run.phase, RunPhase::kWaitingForPeople);
+  EXPECT_EQ(instructor.run.open_commands & bitOf(CommandKind::kFulfilled), 0U);
+  EXPECT_NE(instructor.run.open_commands & bitOf(CommandKind::kStop), 0U);
   instructor.command(CommandKind::kStop);
   ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 2; }));
   EXPECT_TRUE(instructor.ack.accepted) << instructor.ack.reason;

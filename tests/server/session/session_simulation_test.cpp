@@ -447,7 +447,7 @@ TEST(SessionSimulation, ACheckpointKeepsACommandThatWaitsForOneBeforeIt) {
   rig.change(game(CommandKind::kSkipStep));
   rig.tick();
   ASSERT_EQ(rig.output().step.skipped, 1U);
-  EXPECT_EQ(rig.output().commands_waiting, 1U);
+  EXPECT_EQ(rig.output().commands.waiting, 1U);
   std::vector<std::uint8_t> saved;
   rig.simulation().save(saved);
   SessionSimulation again = test::SessionRig::makeSimulation(rig.loaded());
@@ -456,6 +456,16 @@ TEST(SessionSimulation, ACheckpointKeepsACommandThatWaitsForOneBeforeIt) {
   again.tick({.tick = 3});
   again.tick({.tick = 4});
   EXPECT_EQ(again.step().skipped, 2U);
+}
+
+TEST(SessionSimulation, TheTimeOfAStepStandsInAPause) {
+  test::SessionRig rig;
+  const Tick before = rig.tick(11).step.elapsed;
+  EXPECT_GT(before, 0U);
+  rig.change({.kind = ChangeKind::kPause});
+  EXPECT_EQ(rig.tick(50).step.elapsed, before);
+  rig.change({.kind = ChangeKind::kResume});
+  EXPECT_EQ(rig.tick(10).step.elapsed, before + 10);
 }
 
 // one waits for the skip before it, and one comes with the stop: neither acts when the stop is cleared
@@ -467,7 +477,7 @@ TEST(SessionSimulation, AStopDropsTheCommandsThatWait) {
   rig.tick();
   rig.change({.kind = ChangeKind::kSetEmergencyStop, .value = 1.0});
   rig.change(game(CommandKind::kSkipStep));
-  rig.tick(2);
+  EXPECT_EQ(rig.tick(2).commands.dropped, 2U);
   rig.change({.kind = ChangeKind::kPause});
   rig.change({.kind = ChangeKind::kSetEmergencyStop, .value = 0.0});
   rig.tick(3);
