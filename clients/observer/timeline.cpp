@@ -134,6 +134,7 @@ void Timeline::receiveHand(const EventLog& event) {
 }
 
 void Timeline::receive(const RunState& run) {
+  clock_.add(run);
   const std::pair newest{run.phase, run.server_epoch};
   if (newest == run_) return;
   run_ = newest;
@@ -164,7 +165,8 @@ void Timeline::beginStep(const StepState& step) {
 void Timeline::endStep(Tick tick, const char* how) {
   if (step_ended_) return;
   step_ended_ = true;
-  print(tick, fmt::format("{}: {} {:.1f} s", stepNumber(), how, seconds(tick - step_.started)));
+  print(tick,
+        fmt::format("{}: {} {:.1f} s", stepNumber(), how, seconds(clock_.between(step_.started, tick))));
 }
 
 void Timeline::printProgress(const StepProgress& progress) {

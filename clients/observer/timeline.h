@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "idl/types/messages.h"
+#include "idl/types/step_clock.h"
 
 namespace tenon::observer {
 
@@ -82,6 +83,7 @@ class Timeline {
   std::set<std::string> own_titles_;  ///< of the objects that hands hold when they hold nothing else
   std::map<ClientId, Presence> participants_;
   std::map<std::pair<ObjectId, Tick>, HandId> grabs_;
+  StepClock clock_;
   std::map<Tick, StepPhase> step_phases_;  ///< newest of the step that began in that tick
   std::map<std::pair<ObjectId, ObjectId>, bool> touching_;
   std::map<std::string, Tick> frozen_since_;                                ///< by hand

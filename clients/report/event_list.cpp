@@ -17,9 +17,9 @@ std::string_view toneOf(const SessionEvent& event) {
 
 bool isForTrainers(const SessionEvent& event) {
   static const std::set<std::string, std::less<>> kKinds{
-      "join",           "leave",       "run",         "step",      "step done", "step skipped",
-      "step timed out", "not in time", "taken",       "let go",    "mounted",   "put in place",
-      "emergency stop", "safety",      "hand frozen", "hand gone", "note",      "command"};
+      "join",        "leave",     "run",    "step",    "step done",    "step skipped",   "step timed out",
+      "not in time", "taken",     "let go", "mounted", "put in place", "emergency stop", "safety",
+      "hand frozen", "hand gone", "note",   "command", "dropped"};
   return event.severity == Severity::kError || kKinds.contains(event.kind);
 }
 

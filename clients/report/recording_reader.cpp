@@ -119,10 +119,12 @@ class RecordingReader {
     advanceTo(run.tick);
     session_.run = run;
     session_.has_run = true;
+    session_.clock.add(run);
   }
   void receive(const EventLog& event) {
     session_.events.push_back({secondsOf(event.tick), event.severity, event.kind, event.text});
-    if (event.kind == "command") countCommand(event.text);
+    if (event.kind == "command") countCommand(event.text, 1);
+    if (event.kind == "dropped") countCommand(event.text, -1);
   }
   void receive(const ClientEvent& event) {
     // a station names its devices again from time to time, for those that come late
@@ -146,7 +148,7 @@ class RecordingReader {
     session_.guided = session_.guided || guidance.mode != GuidanceMode::kOff;
   }
   void receive(const ForceContribution&) { session_.external_force = true; }
-  void countCommand(const std::string& text);
+  void countCommand(const std::string& text, int times);
 
   [[nodiscard]] bool isOfAHand(ObjectId object);
   void advanceTo(Tick tick) { session_.last = std::max(session_.last, tick); }
@@ -247,8 +249,8 @@ void RecordingReader::receive(const Telemetry& telemetry) {
   latency.clock_error = telemetry.clock_error;
 }
 
-/// "NAME: WORD ...": a command that the server has accepted.
-void RecordingReader::countCommand(const std::string& text) {
+/// "NAME: WORD ...": a command that the server has accepted; -1 `times`: and dropped.
+void RecordingReader::countCommand(const std::string& text, int times) {
   static const std::map<CommandKind, std::string> kAids{
       {CommandKind::kFulfilled, "condition confirmed by a person"},
       {CommandKind::kSkipStep, "step skipped"},
@@ -262,7 +264,7 @@ void RecordingReader::countCommand(const std::string& text) {
       {CommandKind::kSetCollision, "collisions of two objects changed"}};
   for (const auto& [kind, aid] : kAids) {
     const std::string word = ": " + std::string(commandName(kind));
-    if (text.ends_with(word) || text.find(word + " ") != std::string::npos) ++session_.commands[aid];
+    if (text.ends_with(word) || text.find(word + " ") != std::string::npos) session_.commands[aid] += times;
   }
 }
 

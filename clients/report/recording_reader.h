@@ -14,6 +14,7 @@
 #include "idl/types/messages/session.h"
 #include "idl/types/messages/steps.h"
 #include "idl/types/result.h"
+#include "idl/types/step_clock.h"
 
 namespace tenon::report {
 
@@ -73,6 +74,7 @@ struct RecordedSession {
   SessionAnnounce announce;
   RunState run;
   bool has_run = false;
+  StepClock clock;
   std::vector<SessionParticipant> participants;
   std::map<ClientId, Presence> present;
   std::map<HandId, HandSeries> hands;

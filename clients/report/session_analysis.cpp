@@ -1,6 +1,7 @@
 #include "clients/report/session_analysis.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <tuple>
 #include <utility>
@@ -9,6 +10,8 @@
 
 namespace tenon::report {
 namespace {
+
+Tick tickOf(double seconds) { return static_cast<Tick>(std::llround(seconds / kTickSeconds)); }
 
 /// Computes the figures of a session when all of its messages are read, by tick: equal sessions give equal
 /// figures.
@@ -160,7 +163,7 @@ void SessionAnalyzer::listAids() {
   if (session_.external_force) aids.emplace_back("forces from another program");
   if (session_.indexed) aids.emplace_back("workspace shifted (indexing)");
   for (const auto& [what, count] : session_.commands)
-    aids.push_back(count > 1 ? fmt::format("{} ({} times)", what, count) : what);
+    if (count > 0) aids.push_back(count > 1 ? fmt::format("{} ({} times)", what, count) : what);
 }
 
 SessionMetrics SessionAnalyzer::metrics(double begin, double end) const {
@@ -224,6 +227,7 @@ void SessionAnalyzer::summarize() {
   if (!analysis_.visits.empty()) analysis_.whole.contact_seconds = 0.0;
   for (StepVisit& visit : analysis_.visits) {
     visit.metrics = metrics(visit.begin, visit.end);
+    visit.seconds = secondsOf(session_.clock.between(tickOf(visit.begin), tickOf(visit.end)));
     // the server counts contacts of the step's object alone, every tick
     const auto counted = session_.contact_seconds.find(visit.revision);
     if (counted != session_.contact_seconds.end()) visit.metrics.contact_seconds = counted->second;

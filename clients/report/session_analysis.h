@@ -31,8 +31,9 @@ struct StepVisit {
   std::string part;
   ObjectId object;
   StepPhase phase = StepPhase::kActive;
-  double begin = 0.0;  ///< [s]
-  double end = 0.0;    ///< [s]
+  double begin = 0.0;    ///< [s]
+  double end = 0.0;      ///< [s]
+  double seconds = 0.0;  ///< [s] of the step's own time, without pauses and stops: StepClock
   SessionMetrics metrics;
   std::uint32_t attempt = 1;  ///< of this step, counted from 1: a step can be repeated
   double path = 0.0;          ///< [m] that the step's object was moved

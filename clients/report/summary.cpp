@@ -105,14 +105,15 @@ std::string summaryText(const SessionAnalysis& analysis) {
                       "[mm]", "[m]", "", "[N]", "[N]", "[s]");
   for (std::size_t i = 0; i < analysis.visits.size(); ++i) {
     const StepVisit& visit = analysis.visits[i];
-    text += fmt::format(
-        "{:3} {}  {:7.1f} {}  {}\n", i + 1, padded(titleText(visit), width), visit.end - visit.begin,
-        row(visit.metrics, errorText(visit), visit.path, visit.collisions), phaseName(visit.phase));
+    text += fmt::format("{:3} {}  {:7.1f} {}  {}\n", i + 1, padded(titleText(visit), width), visit.seconds,
+                        row(visit.metrics, errorText(visit), visit.path, visit.collisions),
+                        phaseName(visit.phase));
   }
   text += fmt::format("    {}  {:7.1f} {}\n", padded("session", width), analysis.duration,
                       row(analysis.whole, "", analysis.path, analysis.collisions));
   text +=
-      "error: last distance from the target, of what is allowed; path: how far the part was moved; peak and "
+      "time: of a step without pauses and emergency stops; error: last distance from the target, of what is "
+      "allowed; path: how far the part was moved; peak and "
       "mean "
       "(in contact): force on the hand\n\n";
 
@@ -187,7 +188,8 @@ nlohmann::json summaryJson(const SessionAnalysis& analysis) {
     }
     step["phase"] = phaseName(visit.phase);
     step["begin"] = visit.begin;
-    step["seconds"] = visit.end - visit.begin;
+    step["end"] = visit.end;
+    step["seconds"] = visit.seconds;
     all["steps"].push_back(std::move(step));
   }
   for (const ForceLatency& latency : analysis.force_latencies)

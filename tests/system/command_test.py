@@ -32,7 +32,10 @@ class Commands(unittest.TestCase):
             server.wait_for("run: paused", 30)
             self.assert_refused(stage, "paused already", "pause")
             self.assert_refused(stage, "ask the instructor", "resume", "--role", "trainee")
-            self.assert_refused(stage, "no signal 'trumpet'", "signal", "trumpet")
+            self.assert_refused(stage, "no signal 'trumpet'; it has none", "signal", "trumpet")
+            self.assert_refused(stage, "'foot' is no hand of a trainee that displays forces in this scenario; it has: right", "guide", "show", "foot")
+            self.assert_refused(stage, "`tenon command list` prints all names", "release", "foot")
+            self.assert_refused(stage, "nobody is named 'Eve' in this session; it has: trainee", "kick", "Eve")
             self.assert_accepted(stage, "fulfilled", "--role", "trainee")
             self.assert_accepted(stage, "skip")
             server.wait_for("step skipped", 30)  # at once

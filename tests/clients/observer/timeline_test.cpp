@@ -213,6 +213,19 @@ TEST_F(TimelineTest, TellsHowAStepEndedThatWasNotDone) {
 )");
 }
 
+TEST_F(TimelineTest, TheTimeOfAStepHasNoPausesAndNoStops) {
+  timeline_.receive(stepState(0, StepPhase::kActive, 0));
+  timeline_.receive(run(1, RunPhase::kRunning, "running"));
+  timeline_.receive(run(1001, RunPhase::kPaused, "paused"));
+  timeline_.receive(run(3001, RunPhase::kRunning, "running"));
+  RunState stop = run(4001, RunPhase::kRunning, "emergency stop");
+  stop.emergency_stop = true;
+  timeline_.receive(stop);
+  timeline_.receive(run(9001, RunPhase::kRunning, "running"));
+  timeline_.receive(stepState(1, StepPhase::kActive, 10000));
+  EXPECT_THAT(printed(), testing::HasSubstr("10.00 s  step 1 of 2: done after 3.0 s\n"));
+}
+
 TEST_F(TimelineTest, AStepOfASessionThatIsStoppedOrSetBackIsNotDone) {
   timeline_.receive(stepState(0, StepPhase::kActive, 0));
   timeline_.receive(stepState(1, StepPhase::kActive, 3000));

@@ -49,6 +49,19 @@ TEST_F(ReportTest, HasEveryStepWithItsTimes) {
   EXPECT_DOUBLE_EQ(analysis.duration, 8.0);
 }
 
+TEST_F(ReportTest, TheTimeOfAStepHasNoPauses) {
+  const SessionAnalysis analysis = analyze({.pauses = true});
+  ASSERT_EQ(analysis.visits.size(), 4U);
+  EXPECT_NEAR(analysis.visits[0].seconds, 2.0, 1e-9);
+  EXPECT_NEAR(analysis.visits[1].seconds, 1.5, 1e-9);
+  EXPECT_NEAR(analysis.visits[2].seconds, 2.0, 1e-9);
+  EXPECT_NEAR(analysis.visits[1].end - analysis.visits[1].begin, 2.0, 1e-9);
+  const nlohmann::json summary = summaryJson(analysis);
+  EXPECT_NEAR(summary["steps"][1]["seconds"].get<double>(), 1.5, 1e-9);
+  EXPECT_NEAR(summary["steps"][1]["end"].get<double>(), 4.0, 1e-9);
+  EXPECT_THAT(summaryText(analysis), HasSubstr("without pauses"));
+}
+
 TEST_F(ReportTest, AForceOfOneTickIsThePeakOfItsStepOnly) {
   const SessionAnalysis analysis = analyze({.peak_force = 40.0});
   EXPECT_FLOAT_EQ(analysis.visits[3].metrics.peak_force, 20.0);
@@ -135,6 +148,7 @@ TEST_F(ReportTest, AStepThatWasLeftByACommandIsNotDone) {
   EXPECT_FALSE(analysis.succeeded());
   EXPECT_THAT(analysis.aids, ::testing::Contains("led to a step"));
   EXPECT_THAT(analysis.aids, Not(::testing::Contains("step skipped"))) << "that was refused";
+  EXPECT_THAT(analysis.aids, Not(::testing::Contains("exercise reset"))) << "that was dropped";
 }
 
 TEST_F(ReportTest, ARunWithASkippedStepDidNotSucceed) {

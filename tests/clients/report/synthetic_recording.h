@@ -29,6 +29,7 @@ struct SyntheticSession {
   bool succeeds = true;
   bool skips_a_step = false;
   bool leaves_a_step = false;  ///< the second one, by `goto`
+  bool pauses = false;         ///< for the second quarter of the second step
   std::uint32_t steps = 4;
   Tick ticks_per_step = 2000;
   double peak_force = 18.0;       ///< [N] in the last step, for one tick
@@ -102,6 +103,10 @@ class SyntheticRecording {
     const Tick in_step = (tick_ - 1) % parameters_.ticks_per_step;
     const auto step = static_cast<std::uint32_t>((tick_ - 1) / parameters_.ticks_per_step);
     if (in_step == 0) beginStep(step);
+    if (parameters_.pauses && step == 1 && in_step == parameters_.ticks_per_step / 4)
+      put(wire::kRunState, RunState{.phase = RunPhase::kPaused, .tick = tick_});
+    if (parameters_.pauses && step == 1 && in_step == parameters_.ticks_per_step / 2)
+      put(wire::kRunState, RunState{.phase = RunPhase::kRunning, .tick = tick_});
     // contact in the second half of each step
     const double pressed = std::max(
         0.0, 2.0 * static_cast<double>(in_step) / static_cast<double>(parameters_.ticks_per_step) - 1.0);
@@ -131,6 +136,8 @@ class SyntheticRecording {
                                     "step_" + std::to_string(step - 1) + " (2.0 s)"});
     if (parameters_.leaves_a_step && step == 2) {
       put(wire::kEventLog, EventLog{30, tick_, Severity::kInfo, "command", "Mikel: goto 3"});
+      put(wire::kEventLog, EventLog{31, tick_, Severity::kInfo, "command", "Mikel: reset"});
+      put(wire::kEventLog, EventLog{32, tick_, Severity::kWarning, "dropped", "Mikel: reset (a stop)"});
       put(wire::kCommand, Command{.client = ClientId{1}, .id = 1, .kind = CommandKind::kSkipStep});
     }
     if (step > 0)
