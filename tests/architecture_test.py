@@ -52,11 +52,12 @@ ROOMS = {
     "clients/simulated_person": ("tenon::simulated_person", STATION, []),
     "clients/station": ("tenon::station", STATION + ["devices/simulated", "clients/simulated_person"], ["fmt", "CLI11", "POSIX"]),
     "clients/observer": ("tenon::observer", IDL, ["fmt", "CLI11", "JSON"]),
-    "clients/recorder": ("tenon::recorder", IDL, ["fmt", "CLI11"]),
+    "clients/foxglove": ("tenon::foxglove", IDL, ["fmt", "JSON"]),
+    "clients/recorder": ("tenon::recorder", IDL + ["clients/foxglove"], ["fmt", "CLI11"]),
     "clients/command": ("tenon::command", IDL, ["fmt", "CLI11", "POSIX"]),
-    "clients/report": ("tenon::report", IDL, ["fmt", "CLI11", "JSON"]),
+    "clients/report": ("tenon::report", IDL + ["clients/foxglove"], ["fmt", "CLI11", "JSON"]),
     # who takes part in a browser is a station of its own
-    "clients/console": ("tenon::console", STATION + ["devices/drivers", "clients/command", "clients/recorder", "clients/station"], ["fmt", "CLI11", "JSON", "Boost", "OpenSSL"]),
+    "clients/console": ("tenon::console", STATION + ["devices/drivers", "clients/command", "clients/foxglove", "clients/recorder", "clients/station"], ["fmt", "CLI11", "JSON", "Boost", "OpenSSL"]),
     "clients/other_vendor": ("tenon::other_vendor", [], ["Fast DDS"]),  # of ours it knows the IDL file alone
     "clients/rehearse": ("tenon::rehearse", [], ["fmt", "CLI11"]),  # the rooms: see EXCEPTION
     "scenarios/part_generator": ("tenon::part_generator", ["idl/types"], ["fmt", "CLI11"]),

@@ -61,7 +61,7 @@ function(tenon_tests name)
 endfunction()
 
 foreach(room idl/types idl/record server/structures server/game_control server/check devices devices/simulated clients/simulated_person
-             clients/station clients/observer clients/recorder clients/command clients/report clients/console clients/rehearse
+             clients/station clients/observer clients/foxglove clients/recorder clients/command clients/report clients/console clients/rehearse
              scenarios/part_generator)
   string(REPLACE "/" "_" target ${room})
   tenon_tests(${room} LINK ${target})

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "clients/console/channel.h"
-#include "clients/console/foxglove_messages.h"
+#include "clients/foxglove/displayed_scene.h"
 #include "idl/types/messages.h"
 #include "idl/wire/assets.h"
 #include "idl/wire/raw_subscriber.h"
@@ -42,30 +42,15 @@ class SessionChannels {
   [[nodiscard]] bool isOver() const { return is_over_; }
 
  private:
-  struct Part {
-    SceneObject object;
-    ObjectState state;
-    bool is_placed = false;  ///< a state has arrived
-    bool is_shown = false;   ///< its entity is published
-  };
-
   void publish(std::string_view topic, std::uint64_t instance, std::int64_t time_ns,
                std::vector<std::uint8_t> bytes, std::uint64_t writer = 0);
-  void receiveState(const ObjectState& state, std::int64_t time_ns);
-  void receiveStep(const StepState& step, std::int64_t time_ns);
-  void showOrHide(std::uint32_t id, std::int64_t time_ns);
-  [[nodiscard]] std::vector<std::uint8_t> modelOf(ObjectId id) const;
 
-  wire::AssetStore assets_;
+  foxglove::DisplayedScene view_;
   std::vector<Channel> channels_;
   std::map<std::string, ChannelId, std::less<>> ids_;  ///< by topic
   std::vector<Publication> published_;
 
   SessionAnnounce announce_;
-  std::vector<std::string> models_;  ///< assets by ObjectId; empty: none
-  std::map<std::uint32_t, Part> parts_;
-  std::map<std::uint32_t, Pose> X_WH_;  ///< devices by HandId
-  std::int64_t moved_ns_ = 0;           ///< [ns] of the newest pose that is not yet in /tf; 0: none
   /// of this gateway, of the sessions that it has begun: a page that comes back to another gateway forgets
   std::uint32_t lives_ = std::random_device{}();
   bool is_over_ = false;

@@ -1,4 +1,4 @@
-#include "clients/console/foxglove_messages.h"
+#include "clients/foxglove/messages.h"
 
 #include <algorithm>
 #include <charconv>
@@ -6,7 +6,7 @@
 #include <cstring>
 #include <span>
 
-namespace tenon::console {
+namespace tenon::foxglove {
 
 namespace {
 
@@ -169,7 +169,7 @@ std::vector<std::uint8_t> encodeEntity(const SceneEntity& entity, std::int64_t t
     out.put(entity.color);
     out.put(!entity.own_colors);
     out.put(std::string_view());
-    out.put(std::string_view("model/gltf-binary"));
+    out.put(kModelMediaType);
     out.put(std::span<const std::uint8_t>(entity.glb));
   }
   return out.take();
@@ -197,4 +197,4 @@ std::vector<std::uint8_t> encodeLog(const EventLog& event, std::int64_t time_ns)
   return out.take();
 }
 
-}  // namespace tenon::console
+}  // namespace tenon::foxglove

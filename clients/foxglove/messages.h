@@ -15,7 +15,7 @@
 /// fills are lists of length zero, whose types are empty but for their first member.
 ///
 /// Threads: pure. Real-time: no.
-namespace tenon::console {
+namespace tenon::foxglove {
 
 struct MessageType {
   std::string_view name;  ///< fully scoped
@@ -39,6 +39,8 @@ struct FrameTransform {
 [[nodiscard]] std::vector<std::uint8_t> encodeFrameTransforms(const std::vector<FrameTransform>& transforms,
                                                               std::int64_t time_ns);
 
+inline constexpr std::string_view kModelMediaType = "model/gltf-binary";
+
 /// A thing that is displayed: a model, or a box where there is none.
 struct SceneEntity {
   std::string id;     ///< replaces an earlier entity of this id
@@ -58,4 +60,4 @@ struct SceneEntity {
 
 [[nodiscard]] std::vector<std::uint8_t> encodeLog(const EventLog& event, std::int64_t time_ns);
 
-}  // namespace tenon::console
+}  // namespace tenon::foxglove

@@ -7,6 +7,7 @@
 
 #include "clients/recorder/recording.h"
 #include "idl/types/messages.h"
+#include "idl/types/printable_text.h"
 #include "idl/wire/codec.h"
 #include "idl/wire/endpoint.h"
 #include "idl/wire/membership.h"
@@ -65,7 +66,7 @@ class Recorder {
     if (done) recording_->joined(member_->welcome().tick);
     if (done) done = writeUntilOver();
     const Result<void> closed = recording_ ? recording_->close() : Result<void>{};
-    if (status_writer_) static_cast<void>(status_writer_->write(recording_->status()));
+    if (status_writer_) tellStatus();
     if (!done) return fail(done.error().what);
     if (!closed) return fail(closed.error().what);
     return RecordingReport{recording_->status(), recording_->counts()};
@@ -75,6 +76,14 @@ class Recorder {
   Result<void> subscribe();
   Result<void> writeUntilOver();
   Result<void> comeBack();
+  /// Of a file with a long path people are told the begin of it.
+  void tellStatus() {
+    constexpr std::size_t kMostText = 511;  // [bytes] of RecorderStatus in idl/tenon.idl
+    RecorderStatus status = recording_->status();
+    status.file = shortened(status.file, kMostText);
+    status.problem = shortened(status.problem, kMostText);
+    static_cast<void>(status_writer_->write(status));
+  }
   /// All that the server published and that can still be expected is recorded.
   [[nodiscard]] bool isComplete() const {
     return recording_->hasStatement() && (!member_->announce().lockstep || recording_->status().lost == 0);
@@ -121,7 +130,8 @@ class Recorder {
 
 Result<void> Recorder::subscribe() {
   auto recording =
-      Recording::open(options_.file, member_->announce(), options_.all ? Streams::kAll : Streams::kReduced);
+      Recording::open(options_.file, member_->announce(), options_.all ? Streams::kAll : Streams::kReduced,
+                      wire::AssetStore(options_.assets));
   if (!recording) return fail(recording.error().what);
   recording_ = std::make_unique<Recording>(std::move(*recording));
   auto subscriber = wire::RawSubscriber::open(member_->own(), kOwnTopics);
@@ -170,12 +180,12 @@ Result<void> Recorder::writeUntilOver() {
       break;
     // our own status is recorded as well, so it must not be sent while the end is awaited
     if (!over && now >= next_status) {
-      static_cast<void>(status_writer_->write(recording_->status()));
+      tellStatus();
       next_status = now + kStatusPeriod;
     }
   }
   if (!recording_->problem().empty()) {
-    static_cast<void>(status_writer_->write(recording_->status()));
+    tellStatus();
     return fail(recording_->problem());
   }
   return {};

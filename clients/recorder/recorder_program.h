@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "clients/recorder/recording.h"
+#include "idl/types/cache_folder.h"
 #include "idl/types/messages/run.h"
 #include "idl/types/result.h"
 
@@ -17,11 +18,12 @@ struct RecorderOptions {
   std::filesystem::path file;
   std::string session;  ///< empty: the first one announced
   std::uint32_t domain = 0;
-  std::filesystem::path key_file;                  ///< of the session; empty: wire::defaultKeyFile()
-  bool all = false;                                ///< Streams::kAll
-  bool lockstep = false;                           ///< refuse a session that runs in real time
-  std::chrono::seconds timeout{10};                ///< for a server to be found and to answer
-  std::function<void(const std::string&)> report;  ///< progress, one line per call; may be empty
+  std::filesystem::path key_file;  ///< of the session; empty: wire::defaultKeyFile()
+  std::filesystem::path assets = defaultCache() / "assets";  ///< of wire::AssetStore: display models
+  bool all = false;                                          ///< Streams::kAll
+  bool lockstep = false;                                     ///< refuse a session that runs in real time
+  std::chrono::seconds timeout{10};                          ///< for a server to be found and to answer
+  std::function<void(const std::string&)> report;            ///< progress, one line per call; may be empty
 };
 
 /// What a recording holds.

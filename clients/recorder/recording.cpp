@@ -34,7 +34,7 @@ concept HasEpoch = requires(const M& message) {
 }  // namespace
 
 Result<Recording> Recording::open(const std::filesystem::path& file, const SessionAnnounce& session,
-                                  Streams streams) {
+                                  Streams streams, const wire::AssetStore& models) {
   auto writer = record::McapWriter::open(file, {.chunk_age = kChunkAge});
   if (!writer) return fail(writer.error().what);
   const auto added =
@@ -48,7 +48,7 @@ Result<Recording> Recording::open(const std::filesystem::path& file, const Sessi
                                               {"park after ticks", std::to_string(session.park_ticks)},
                                               {"lockstep", session.lockstep ? "yes" : "no"}});
   if (!added) return fail(added.error().what);
-  Recording recording(std::move(*writer), session, streams);
+  Recording recording(std::move(*writer), session, streams, models);
   recording.status_.file = file.string();
   recording.status_.recording = true;
 
@@ -100,8 +100,11 @@ void Recording::resumed(const SessionAnnounce& session) {
   writeAnnounce(session);
 }
 
-Recording::Recording(record::McapWriter writer, const SessionAnnounce& session, Streams streams)
-    : writer_(std::move(writer)), streams_(streams), session_(session) {}
+Recording::Recording(record::McapWriter writer, const SessionAnnounce& session, Streams streams,
+                     const wire::AssetStore& models)
+    : writer_(std::move(writer)), streams_(streams), view_(models), session_(session) {
+  view_.begin(session);
+}
 
 void Recording::add(const wire::RawSample& sample) {
   if (start_ns_ == 0) start_ns_ = sample.source_ns;
@@ -115,6 +118,29 @@ void Recording::add(const wire::RawSample& sample) {
   const std::optional<Tick> tick = follow(sample);
   const bool is_omitted = streams_ == Streams::kReduced && StreamReduction::isOmitted(sample.topic);
   if (tick && !is_omitted) writeSample(sample, *tick);
+  if (tick) writeView(sample, *tick);
+}
+
+void Recording::writeView(const wire::RawSample& sample, Tick tick) {
+  wire::RawSample shown = sample;
+  // what the server keeps for late joiners has times of before
+  shown.source_ns = std::max(logTime(sample.source_ns, tick), start_ns_);
+  const auto add = [&](const foxglove::DisplayMessage& message, std::string_view topic,
+                       const foxglove::MessageType& type) {
+    write(channelOf(topic, type.name, type.schema), message.time_ns, 0, message.bytes);
+  };
+  for (const foxglove::DisplayMessage& message : view_.receive(shown)) {
+    if (message.topic == foxglove::kLogLines)
+      add(message, message.topic, foxglove::logType());
+    else
+      add(message,
+          message.instance == foxglove::kTargetInstance
+              ? fmt::format("/{}", foxglove::kTarget)
+              : fmt::format("{}/{}", foxglove::kModels, message.entity),
+          foxglove::sceneUpdateType());
+  }
+  if (sample.topic != wire::kWorldFrame30.name) return;
+  if (const auto frames = view_.frames()) add(*frames, frames->topic, foxglove::frameTransformsType());
 }
 
 void Recording::writeSample(const wire::RawSample& sample, Tick tick) {

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/foxglove/displayed_scene.h"
 #include "clients/recorder/stream_reduction.h"
 #include "idl/record/mcap_writer.h"
 #include "idl/types/messages/journal.h"
@@ -39,13 +40,18 @@ enum class Streams {
 /// source time of the first sample plus one millisecond per tick of the sample; one without a tick has that
 /// of the newest WorldFrame.
 ///
+/// Beside the samples it has what public viewers display by themselves (foxglove::DisplayedScene): after a
+/// seek a viewer knows the newest message of each channel alone, so each entity has a channel of its own,
+/// /scene/NAME, and the target /target.
+///
 /// Threads: one at a time. Real-time: no.
 class Recording {
  public:
-  /// Fails with a sentence when the file cannot be written.
+  /// `models`: has the display models of the session; what it lacks is shown as a box. Fails with a sentence
+  /// when the file cannot be written.
   [[nodiscard]] static Result<Recording> open(const std::filesystem::path& file,
-                                              const SessionAnnounce& session,
-                                              Streams streams = Streams::kAll);
+                                              const SessionAnnounce& session, Streams streams = Streams::kAll,
+                                              const wire::AssetStore& models = wire::AssetStore({}));
 
   /// From the tick after `tick` on, every sample of the server is expected.
   void joined(Tick tick) { joined_ = tick; }
@@ -79,13 +85,15 @@ class Recording {
   [[nodiscard]] const std::optional<RunState>& run() const { return run_; }
 
  private:
-  Recording(record::McapWriter writer, const SessionAnnounce& session, Streams streams);
+  Recording(record::McapWriter writer, const SessionAnnounce& session, Streams streams,
+            const wire::AssetStore& models);
   [[nodiscard]] std::uint16_t channelOf(std::string_view topic, std::string_view type,
                                         std::string_view schema);
   void writeAnnounce(const SessionAnnounce& session);
   void write(std::uint16_t channel, std::int64_t log_time_ns, std::uint64_t sequence,
              std::span<const std::uint8_t> bytes);
   void writeSample(const wire::RawSample& sample, Tick tick);
+  void writeView(const wire::RawSample& sample, Tick tick);
   void finishReduction();
   /// Whether the sample is written as it is.
   template <class M>
@@ -115,6 +123,7 @@ class Recording {
   record::McapWriter writer_;
   Streams streams_;
   StreamReduction reduction_;
+  foxglove::DisplayedScene view_;
   SessionAnnounce session_;
   std::map<std::string, std::uint16_t, std::less<>> channels_;
   RecorderStatus status_;

@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "clients/foxglove/displayed_scene.h"
 #include "idl/record/instance_state.h"
 #include "idl/record/mcap_reader.h"
 #include "idl/record/mcap_writer.h"
@@ -32,13 +33,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kPeriod = 33'000'000;       // [ns] of WorldFrame_30
-constexpr std::int64_t kSlowPeriod = 3 * kPeriod;  // [ns] of numbers that are read, not seen
-constexpr double kLengthSteps = 65536.0;           // [1/m] grid of 15 um
-constexpr double kForceSteps = 1024.0;             // [1/N]
-constexpr std::size_t kMaxMemory = 64U << 20U;     // [bytes] of messages before they are compressed
-constexpr double kShareOfModels = 0.4;             // of the budget
-constexpr int kMaxHalvings = 8;                    // 30 Hz to about one picture in 8 s
+constexpr std::int64_t kPeriod = 33'000'000;          // [ns] of WorldFrame_30
+constexpr std::int64_t kSlowPeriod = 3 * kPeriod;     // [ns] of numbers that are read, not seen
+constexpr double kLengthSteps = 65536.0;              // [1/m] grid of 15 um
+constexpr double kForceSteps = 1024.0;                // [1/N]
+constexpr std::size_t kMostEntityBytes = 32U << 20U;  // [bytes] of models in a recording
+constexpr std::size_t kMaxMemory = 64U << 20U;        // [bytes] of messages before they are compressed
+constexpr double kShareOfModels = 0.4;                // of the budget
+constexpr int kMaxHalvings = 8;                       // 30 Hz to about one picture in 8 s
 
 /// On the grid of 1/`steps`: trailing zeros of the numbers compress.
 double onGrid(double value, double steps) { return std::nearbyint(value * steps) / steps; }
@@ -57,6 +59,9 @@ class SessionReduction {
   /// Every second sample of each instance of a stream.
   void halve();
   [[nodiscard]] Result<std::vector<std::uint8_t>> write() const;
+  /// Writes the models, too, that the recorder kept for public viewers; the number of objects that have one.
+  /// 0: there are none, or they do not fit into `budget` [bytes].
+  std::size_t keepModels(std::size_t budget);
   [[nodiscard]] int halvings() const { return halvings_; }
   [[nodiscard]] const std::string& models() const { return models_; }
   [[nodiscard]] std::size_t objects() const { return objects_.size(); }
@@ -72,6 +77,12 @@ class SessionReduction {
   };
   using Instance = std::pair<std::string_view, std::uint32_t>;
 
+  /// An entity of foxglove::DisplayedScene.
+  struct Entity {
+    std::int64_t log_time_ns = 0;
+    std::vector<std::uint8_t> bytes;
+  };
+
   void add(const record::McapMessage& message);
   void addState(std::string_view topic, const record::McapMessage& message);
   bool isDue(Instance instance, std::int64_t log_time_ns, std::int64_t period);
@@ -80,11 +91,15 @@ class SessionReduction {
                  const M& sample);
   template <class M>
   void addNumbers(const wire::Topic<M>& topic, const record::McapMessage& message);
+  void addEntity(const record::McapMessage& message);
   void addFrame(const record::McapMessage& message);
   void addHand(const record::McapMessage& message);
   void addPairs(const record::McapMessage& message);
 
   std::vector<Sample> samples_;
+  std::map<std::string, Entity, std::less<>> entities_;  ///< by topic: the first of each object
+  std::size_t entity_bytes_ = 0;
+  bool writes_entities_ = false;
   std::map<Instance, std::int64_t> newest_;                                              // [ns]
   std::map<std::uint32_t, std::set<std::pair<std::uint32_t, std::uint32_t>>> touching_;  // pairs by part
   std::set<std::uint32_t> objects_;
@@ -125,6 +140,21 @@ void SessionReduction::add(const record::McapMessage& message) {
     addNumbers(wire::kTickStats100, message);
   else if (message.topic == wire::kStepProgress.name)
     addNumbers(wire::kStepProgress, message);
+  else if (message.topic.starts_with(fmt::format("{}/", foxglove::kModels)))
+    addEntity(message);
+}
+
+void SessionReduction::addEntity(const record::McapMessage& message) {
+  const std::string_view text(reinterpret_cast<const char*>(message.data.data()), message.data.size());
+  const bool is_box = text.find(foxglove::kModelMediaType) == std::string_view::npos;
+  if (is_box || entity_bytes_ + text.size() > kMostEntityBytes || entities_.contains(message.topic)) return;
+  entity_bytes_ += message.data.size();
+  entities_.emplace(message.topic, Entity{message.log_time_ns, {message.data.begin(), message.data.end()}});
+}
+
+std::size_t SessionReduction::keepModels(std::size_t budget) {
+  writes_entities_ = entity_bytes_ <= budget;
+  return writes_entities_ ? entities_.size() : 0;
 }
 
 void SessionReduction::addState(std::string_view topic, const record::McapMessage& message) {
@@ -230,6 +260,13 @@ Result<std::vector<std::uint8_t>> SessionReduction::write() const {
                                               is_gone ? record::kInstanceStateIdl : wire::idlText());
       if (auto done = writer->write(channel, sample.log_time_ns, 0, sample.bytes); !done) return done;
     }
+    if (writes_entities_) {
+      const foxglove::MessageType type = foxglove::sceneUpdateType();
+      for (const auto& [topic, entity] : entities_) {
+        const auto channel = writer->addChannel(topic, type.name, type.schema);
+        if (auto done = writer->write(channel, entity.log_time_ns, 0, entity.bytes); !done) return done;
+      }
+    }
     return writer->close();
   }();
   std::ifstream in(file, std::ios::binary);
@@ -300,8 +337,9 @@ Result<EmbeddedSession> embedSession(const fs::path& file, const fs::path& cache
   if (!reduction.hasPoses()) return fail("the recording has no poses (topic WorldFrame_30)");
   EmbeddedSession session;
   session.objects = reduction.objects();
-  addModels(reduction.models(), wire::AssetStore(cache / "assets"),
-            static_cast<std::size_t>(kShareOfModels * static_cast<double>(budget)), session);
+  const auto share = static_cast<std::size_t>(kShareOfModels * static_cast<double>(budget));
+  addModels(reduction.models(), wire::AssetStore(cache / "assets"), share, session);
+  if (session.models == 0) session.models = reduction.keepModels(share);
   for (const auto& [name, bytes] : session.assets) budget -= std::min(budget, bytes.size());
   while (true) {
     auto recording = reduction.write();

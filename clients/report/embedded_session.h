@@ -24,8 +24,9 @@ struct EmbeddedSession {
 };
 
 /// Takes from a recording what the player needs, in about `budget` [bytes] altogether: first coarser models,
-/// then fewer poses a second. Models come from the folder `cache`; those that are missing there are drawn as
-/// boxes. Fails with a sentence when `file` cannot be read, has no poses at 30 Hz, or does not fit.
+/// then fewer poses a second. Models come from the folder `cache`, or, where it has none of them, from the
+/// recording; those that are missing are drawn as boxes. Fails with a sentence when `file` cannot be read,
+/// has no poses at 30 Hz, or does not fit.
 ///
 /// Threads: any. Real-time: no.
 [[nodiscard]] Result<EmbeddedSession> embedSession(const std::filesystem::path& file,

@@ -55,6 +55,34 @@ class RecordingTest : public ::testing::Test {
       std::filesystem::temp_directory_path() / ("recording_" + std::to_string(getpid()) + ".mcap");
 };
 
+// a viewer that seeks is given the newest message of each channel
+TEST_F(RecordingTest, PublicViewersFindEachObjectInAChannelOfItsOwnAndAllFramesInOne) {
+  constexpr auto kParked = static_cast<std::uint8_t>(ObjectStatus::kParked);
+  Recording recording = open(true);
+  for (std::uint32_t id = 0; id < 2; ++id) {
+    add(recording, wire::kSceneObject, {.object = ObjectId{id}, .name = id == 0 ? "bay" : "peg"}, kStart - 9);
+    ObjectSnapshot snapshot;
+    snapshot.state.object = ObjectId{id};
+    snapshot.state.status = kParked;
+    add(recording, wire::kObjectSnapshot, snapshot, kStart - 9);
+  }
+  StepState step;
+  step.object = ObjectId{1};
+  step.phase = StepPhase::kActive;
+  step.has_target = true;
+  add(recording, wire::kStepState, step, kStart);
+  WorldFrame frame{.tick = 40};
+  frame.states.push_back({.object = ObjectId{1}, .status = kParked});
+  add(recording, wire::kWorldFrame30, frame, kStart + 5);
+  add(recording, wire::kEventLog, {.seq = 1, .kind = "run", .text = "running"}, kStart + 6);
+  ASSERT_TRUE(recording.close());
+  const std::int64_t begin = times("SessionAnnounce").at(0);
+  for (const char* topic : {"/scene/bay", "/scene/peg", "/target"})
+    EXPECT_THAT(times(topic), ::testing::ElementsAre(::testing::Ge(begin))) << topic;
+  EXPECT_EQ(times("/tf"), times("WorldFrame_30"));
+  EXPECT_EQ(times("/log"), times("EventLog"));
+}
+
 TEST_F(RecordingTest, InRealTimeTheLogTimeIsTheSourceTime) {
   Recording recording = open(false);
   add(recording, wire::kWorldFrame1k, WorldFrame{.tick = 500}, kStart + 7);
