@@ -20,8 +20,19 @@ constexpr std::size_t kMaxSeats = 16;
 constexpr std::size_t kMaxWaiting = 32;  // requests of a seat
 constexpr milliseconds kCollect{10};
 
+/// The word of the command that starts and stops recordings, here; who leads the run may give it.
+constexpr std::string_view kRecord = "record";
 constexpr std::string_view kNoSeat = "an observer gives no commands: sit down as instructor first";
 constexpr std::string_view kLeft = "the seat was left before the server answered";
+
+std::vector<std::pair<std::string, std::optional<CommandKind>>> commandsOf(
+    const command::CommandClient& client) {
+  std::vector<std::pair<std::string, std::optional<CommandKind>>> all;
+  for (const command::CommandWord& word : command::commandWords())
+    if (word.command && client.permits(*word.command)) all.emplace_back(word.word, word.command);
+  if (client.permits(CommandKind::kStop)) all.emplace_back(kRecord, std::nullopt);
+  return all;
+}
 
 }  // namespace
 
@@ -66,8 +77,8 @@ class Desk::Seat {
       answer_(viewer_, {request, false, client.error().what, {}});
       return client.error().what;
     }
-    answer_(viewer_, {request, true, {}, role});
-    leads_ = options_.role == Role::kInstructor || options_.role == Role::kAdmin;
+    leads_ = (*client)->permits(CommandKind::kStop);
+    answer_(viewer_, {.id = request, .accepted = true, .role = role, .commands = commandsOf(**client)});
     while (!stop_) {
       (*client)->dispatch(kCollect);
       while (auto waiting = take()) {
@@ -154,7 +165,7 @@ void Desk::handle(ViewerId viewer, const std::string& session, const DeskRequest
     answer.accepted = true;
     return answer_(viewer, answer);
   }
-  if (!request.words.empty() && request.words.front() == "record") return record(viewer, session, request);
+  if (!request.words.empty() && request.words.front() == kRecord) return record(viewer, session, request);
   std::vector<std::string> words;
   for (const std::string& word : request.words) words.push_back(printable(word));
   auto parsed = command::parseCommand(words);

@@ -75,12 +75,16 @@ Result<DeskRequest> parseDesk(const nlohmann::json& json, std::string_view op) {
 }  // namespace
 
 std::string deskAnswerText(const DeskAnswer& answer) {
+  auto commands = nlohmann::json::object();
+  for (const auto& [word, kind] : answer.commands)
+    commands[word] = kind ? nlohmann::json(static_cast<std::uint32_t>(*kind)) : nlohmann::json();
   return dump({{"op", answer.is_of_hands ? "handAnswer" : "deskAnswer"},
                {"id", answer.id},
                {"accepted", answer.accepted},
                {"text", answer.text},
                {"role", answer.role},
-               {"code", answer.code}});
+               {"code", answer.code},
+               {"commands", std::move(commands)}});
 }
 
 std::optional<std::string_view> chooseSubprotocol(std::string_view offered) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "clients/console/channel.h"
+#include "idl/types/messages/commands.h"
 #include "idl/types/result.h"
 
 /// The Foxglove WebSocket protocol, version 1, server side: texts are JSON, messages binary and
@@ -56,6 +57,9 @@ struct DeskAnswer {
   bool is_of_hands = false;
   /// Of a refusal, for pages that have their own text for it: refusalName(), or empty.
   std::string code;
+  /// Of a seat that is granted: the words of kCommand that its role may use, with the bit of each in
+  /// RunState::open_commands; none where it is the gateway that carries the command out.
+  std::vector<std::pair<std::string, std::optional<CommandKind>>> commands;
 };
 [[nodiscard]] std::string deskAnswerText(const DeskAnswer& answer);
 

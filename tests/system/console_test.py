@@ -698,6 +698,33 @@ class Page(unittest.TestCase):
                     self.assertEqual(browser("axe"), [], "the request for a seat")
             self.assertEqual(browser.problems, [])
 
+    def test_a_recording_shows_its_parts_where_there_are_no_assets_and_in_public_viewers(self):
+        with Stage() as stage, Browser() as browser:
+            recording = stage.out / "session.mcap"
+            server = stage.serve(SCENARIO, "--wait-for", "right,recorder")
+            recorder = stage.start("record", "-o", recording)
+            stage.start("trainee", "--seed", 1)
+            self.assertEqual((server.wait(), recorder.wait()), (0, 0), server.text())
+            _, port = start_console(stage, 0, "--cache", stage.out / "empty", shown=[recording])
+            browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
+            browser("await", expression="tenon.view?.models >= 3")
+            # the asset that is not there
+            self.assertTrue(all("404" in problem for problem in browser.problems), browser.problems)
+            browser.problems.clear()
+            listed = subprocess.run(["node", TOOLS / "read_recording.mjs", recording], capture_output=True, text=True, check=True).stdout
+            counts = {name: int(count) for name, count in map(str.split, listed.strip().splitlines())}
+            self.assertGreater(counts["/tf"], 100, listed)
+            self.assertEqual(counts["/tf"], counts["WorldFrame_30"])
+            self.assertEqual(counts["/log"], counts["EventLog"])
+            for topic in ("/scene/peg", "/scene/box", "/target"):
+                self.assertIn(topic, counts)
+            report = stage.out / "report"
+            report.mkdir()
+            done = tenon("report", recording, "-o", report, env={"TENON_CACHE": str(stage.out / "empty")})
+            self.assertEqual(done.returncode, 0, done.stderr)
+            browser("open", url=(report / "report.html").as_uri(), width=1280, height=800, theme="dark")
+            browser("await", expression="globalThis.tenon?.isReady && tenon.view.models >= 3")
+
     def test_a_recording_is_played_without_a_server(self):
         with Stage() as stage, Browser() as browser:
             recording = stage.out / "session.mcap"

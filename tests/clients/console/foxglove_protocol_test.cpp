@@ -68,6 +68,10 @@ TEST(FoxgloveProtocol, UnderstandsRequestsToTheDesk) {
   EXPECT_EQ(answer["id"], 4);
   EXPECT_EQ(answer["accepted"], false);
   EXPECT_EQ(answer["role"], "instructor");
+  EXPECT_TRUE(answer["commands"].empty());
+  const auto seat = nlohmann::json::parse(
+      deskAnswerText({.commands = {{"pause", CommandKind::kPause}, {"record", std::nullopt}}}));
+  EXPECT_EQ(seat["commands"], nlohmann::json::parse(R"({"pause": 2, "record": null})"));
 }
 
 TEST(FoxgloveProtocol, SaysWhatIsWrongWithARequest) {

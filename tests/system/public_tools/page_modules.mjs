@@ -262,23 +262,24 @@ const tests = {
     session.receive("RunState", { phase: RUNNING, tick: 1n, reason: "running" }, false);
     session.receive("EmergencyStop", { client_guid: "a", counter: 1, who: "Ada", reason: "" }, false);
     assert.deepEqual([session.standing.length, session.isStopped], [1, false]);
-    session.receive("RunState", { phase: RUNNING, tick: 2n, reason: "emergency stop" }, false);
+    session.receive("RunState", { phase: RUNNING, tick: 2n, reason: "emergency stop", emergency_stop: true }, false);
     assert.equal(session.isStopped, true);
     session.receive("EmergencyClear", { client_guid: "a", counter: 1, who: "Ada", reason: "" }, false);
     assert.equal(session.isStopped, false);
   },
 
-  "what the server refuses in a stop, before the run and of a trainee is forbidden, with its reason, and nothing else"() {
-    const session = (isWaiting, stops) => ({ isWaiting, standing: Array(stops).fill({}) });
-    const [runs, stopped, waits] = [session(false, 0), session(false, 1), session(true, 0)];
-    const every = ["pause", "resume", "freeze", "back", "repeat", "skip", "goto", "give", "swap", "reset", "fulfilled", "signal", "note", "kick", "guide", "record", "release", "collision", "stop", "clear"];
-    const forbidden = (role, state) => every.filter((word) => whyNot(word, role, state) !== undefined).join(" ");
-    assert.equal(forbidden("instructor", runs), "");
-    assert.equal(forbidden("instructor", stopped), "resume back repeat skip goto give swap reset fulfilled signal");
-    assert.equal(forbidden("instructor", waits), "pause resume back repeat skip goto give swap reset fulfilled signal");
-    assert.equal(forbidden("trainee", runs), every.filter((word) => !["fulfilled", "signal", "note"].includes(word)).join(" "));
-    assert.deepEqual(["skip", "signal", "note"].map((word) => whyNot(word, "trainee", stopped)), ["refusal.not_permitted", "refusal.stopped", undefined]);
-    assert.equal(forbidden("", stopped), "", "without a seat the gateway says what is missing");
+  "what the server says to be closed, or not permitted to the seat, is forbidden with its reason, and nothing else"() {
+    const run = (open_commands, more = {}) => ({ run: { open_commands, ...more }, isOver: false, isWaiting: false, ...more });
+    const seat = { pause: 2, skip: 5, kick: 18, record: null };
+    const reasons = (session, permitted = seat) => ["pause", "skip", "kick", "record", "clear"].map((word) => whyNot(word, permitted, session)?.replace("refusal.", "") ?? "");
+    const [PAUSE, SKIP, KICK] = [1 << 2, 1 << 5, 1 << 18];
+    assert.deepEqual(reasons(run(PAUSE | SKIP | KICK)), ["", "", "", "", "not_permitted"]);
+    assert.deepEqual(reasons(run(PAUSE | KICK, { emergency_stop: true })), ["", "stopped", "", "", "not_permitted"]);
+    assert.deepEqual(reasons(run(KICK, { isWaiting: true })), ["waiting", "waiting", "", "", "not_permitted"]);
+    assert.deepEqual(reasons(run(KICK, { isOver: true, emergency_stop: true })), ["over", "over", "", "", "not_permitted"]);
+    assert.deepEqual(reasons(run(SKIP | KICK)), ["already", "", "", "", "not_permitted"]);
+    assert.deepEqual(reasons({ isOver: false, isWaiting: false }), ["", "", "", "", "not_permitted"], "nothing is known of the run");
+    assert.equal(whyNot("skip", undefined, run(0)), undefined, "without a seat the gateway says what is missing");
     const button = new Element("button");
     forbid(button, "because");
     assert.deepEqual([button.title, button.attributes], ["because", { "aria-disabled": "true" }]);
@@ -333,7 +334,7 @@ const tests = {
     assert.equal(panels.phase(session).textContent, "Running");
     session.receive("EmergencyStop", { client_guid: "a", counter: 1, who: "Ada", reason: "" }, false);
     assert.deepEqual([panels.phase(session).textContent, panels.phase(session).className], ["Stop raised", "badge bad"], "the server has not said that it has heard it");
-    session.receive("RunState", { phase: RUNNING, tick: 2n, reason: "emergency stop" }, false);
+    session.receive("RunState", { phase: RUNNING, tick: 2n, reason: "emergency stop", emergency_stop: true }, false);
     assert.deepEqual([panels.phase(session).textContent, panels.phase(session).className], ["Forces stopped", "badge bad"]);
     session.receive("EmergencyClear", { client_guid: "a", counter: 1, who: "Ada", reason: "" }, false);
     assert.equal(panels.phase(session).textContent, "Running");

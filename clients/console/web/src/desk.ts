@@ -4,7 +4,7 @@ import type { DeskAnswer, LiveSource } from "./live";
 import { modelOf } from "./eventtext";
 import { NONE, RunPhase, Status, type SceneObject } from "./messages";
 import { Pairs } from "./pairs";
-import { whyNot } from "./permits";
+import { whyNot, type Permitted } from "./permits";
 import { Presses } from "./presses";
 import type { Session } from "./session";
 import { hasText, language, retold, t, type Key } from "./strings";
@@ -40,6 +40,7 @@ export class Desk {
   private listed = "";
   private presses = new Presses(() => this.source.ask("deskCommand", { words: ["emergency", t("stop.reason")] }), () => this.showAlarm());
   private isEnded = new AbortController();
+  private permitted: Permitted = {}; // to the seat that was granted last
   private lastRefusal = ""; // of a seat
   private place = ""; // the session that was joined last
 
@@ -168,7 +169,7 @@ export class Desk {
 
   /** Why the server would refuse a command now, by its first word. */
   whyNot(word: string): Key | undefined {
-    return whyNot(word, this.role, this.session);
+    return whyNot(word, this.role === "" ? undefined : this.permitted, this.session);
   }
 
   /** What does nothing now says why. */
@@ -193,7 +194,7 @@ export class Desk {
     const { session } = this;
     const isRaised = session.standing.length > 0;
     const words: Key = isRaised ? "stop.again" : this.isOfAll ? "stop.all" : "stop.press";
-    this.clear.hidden = !isRaised || this.role !== "instructor";
+    this.clear.hidden = !isRaised || this.role === "" || this.permitted["clear"] === undefined;
     if (this.stop.dataset["words"] !== t(words)) {
       this.stop.dataset["words"] = t(words);
       this.stop.replaceChildren(icon("stop"), h("span", "", t(words)), h("kbd", "", t("stop.key")));
@@ -262,6 +263,7 @@ export class Desk {
   private async takeSeat(role: string, name: string, key: string): Promise<boolean> {
     const answer = await this.source.ask("deskSit", { role, name: name || t("desk.somebody"), key });
     this.role = answer?.role ?? "";
+    this.permitted = answer?.commands ?? {};
     this.lastRefusal = answer === undefined ? t("desk.offline") : reasonOf(answer);
     if (answer?.accepted === true) {
       this.withdraw("seat");
@@ -368,6 +370,7 @@ export class Desk {
 
   notify(isGood: boolean, text: string): void {
     const notice = h("p", isGood ? "notice good" : "notice bad", icon(isGood ? "done" : "warn"), h("span", "", ...marked(text)));
+    notice.addEventListener("click", () => notice.remove()); // it may cover what is looked for
     this.notices.append(notice);
     const passing = [...this.notices.querySelectorAll(".notice:not([data-offer])")];
     for (const old of passing.slice(0, -NOTICES)) old.remove();

@@ -1,6 +1,7 @@
 // The gateway's WebSocket: subscribes to topics by name, connects again when the connection is lost, and carries requests to the desk.
 import { decoderOf, type Channel, type Decoder } from "./decode";
 import type { InstanceGone } from "./messages";
+import type { Permitted } from "./permits";
 import { decodeViews, HAND_SUBSCRIPTION, type HandView } from "./remote";
 
 const SUBPROTOCOLS = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
@@ -11,8 +12,8 @@ export type LiveState = { kind: "connecting" } | { kind: "open" } | { kind: "rec
 /** `isGone`: of the instance, of which the message has the key. */
 export type Handler = (topic: string, message: unknown, isGone: boolean) => void;
 /** What the gateway answers to a request to the desk; of id 0: what nobody asked for, as the loss of a seat. */
-/** `code`: the kind of a refusal, as refusalName() of idl/types/names.h has it. */
-export interface DeskAnswer { id: number; accepted: boolean; text: string; role: string; code?: string }
+/** `code`: the kind of a refusal, as refusalName() of idl/types/names.h has it; `commands`: of a seat that was granted. */
+export interface DeskAnswer { id: number; accepted: boolean; text: string; role: string; code?: string; commands?: Permitted }
 
 export const INSTANCE_STATE = "__instance_state";
 

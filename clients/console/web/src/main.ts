@@ -141,7 +141,7 @@ function setWords(): void {
   themeButton.setAttribute("aria-label", t("theme"));
   themeButton.title = t("theme");
   languages.setAttribute("aria-label", t("language"));
-  note.textContent = view?.simple === true ? t("view.simple") : "";
+  note.textContent = view?.parts.areBoxes === true ? t("view.boxes") : view?.simple === true ? t("view.simple") : "";
   view?.setLabel(t("view.label"));
   plots.rebuild();
   shown = "";

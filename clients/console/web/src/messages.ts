@@ -43,7 +43,7 @@ export interface StepProgress {
 export interface SceneStep { step: number; steps: number; name: string; title: Localized[]; part: string }
 export interface SceneHand { hand_id: number; name: string; role: number; object_id: number; freeze_ticks: number; park_ticks: number }
 export enum RunPhase { Waiting, Running, Paused, Succeeded, Failed, Stopped }
-export interface RunState { phase: RunPhase; tick: bigint; reason: string; forces_frozen?: boolean }
+export interface RunState { phase: RunPhase; tick: bigint; reason: string; forces_frozen?: boolean; emergency_stop?: boolean; open_commands?: number }
 export interface GrabState { object_id: number; hand_id: number; epoch: number; X_HO: Pose; tick: bigint }
 export interface Presence { client_id: number; name: string; role: number; hands: ArrayLike<number>; alive: boolean }
 export interface EmergencyStop { client_guid: string; counter: number; who: string; reason: string }
@@ -54,11 +54,15 @@ export interface SessionAnnounce { session: string; title: string; host: string;
 /** `client_id`: of a ClientEvent, which has no severity of its own. */
 export interface EventLog { seq: bigint; tick: bigint; severity: number; kind: string; text: string; client_id?: number }
 export interface InstanceGone { topic: string; key_sample: Uint8Array }
-/** Of the channel /console: how the gateway stands to its session. */
+/** Of the channel /console: how the gateway stands to its session. `modelOf`: of a recording. */
 export interface ConsoleState {
   state: "searching" | "joined" | "refused" | "lost" | "ended" | "recorded";
-  reason: string; life: number; session: string; title: string; lockstep: boolean; scene: string; protocol: number;
+  reason: string; life: number; session: string; title: string; lockstep: boolean; scene: string; protocol: number; modelOf?: RecordedModel;
 }
+/** The display model of an object, by its name, from a recording. */
+export type RecordedModel = (object: string) => Promise<ArrayBuffer>;
+/** foxglove.SceneUpdate, as far as it is read here: what is shown has one model, or none. */
+export interface SceneUpdate { entities: { models: { data: Uint8Array }[] }[] }
 /** A level of an object's display model; the list of a scene's assets. */
 export interface ModelLevel { model: string; triangles: number; error: number }
 export interface SceneModels { version: number; objects: ModelLevel[][] }

@@ -44,7 +44,7 @@ export function titleOfStep(step: { name: string; title: StepEntry["title"] }): 
 }
 
 export function phase({ run, isOver, isWaiting, isStopped, standing }: Session): HTMLElement | undefined {
-  if (standing.length > 0 && !isOver) return badge([isStopped || isWaiting ? "run.emergency" : "run.raised", "stop", "bad"]);
+  if (standing.length > 0 && !isOver) return badge([isStopped ? "run.emergency" : "run.raised", "stop", "bad"]);
   if (isWaiting) return badge(RUN[RunPhase.Waiting]);
   if (run?.forces_frozen === true && run.phase === RunPhase.Running && !isOver) return badge(["run.frozen", "frozen", "warn"]);
   return run === undefined ? undefined : badge(RUN[run.phase]);
@@ -114,8 +114,7 @@ export function steps(session: Session): Node[] {
   for (const entry of list) {
     if (entry.part !== part && entry.part !== "") rows.push(h("li", "group", session.retitled(entry.part)));
     part = entry.part;
-    const seconds = entry.started === undefined ? undefined : (entry.ended ?? (entry.isNow ? session.tick / 1000 : undefined));
-    const time = entry.started === undefined || seconds === undefined ? "" : `${n(Math.max(0, seconds - entry.started), 1)} s`;
+    const time = entry.seconds === undefined ? "" : `${n(entry.seconds, 1)} s`;
     const state = entry.phase === undefined ? h("span", "badge muted", t("step.ahead")) : badge(STEP[entry.phase]);
     const row = h("li", entry.isNow ? "now" : entry.phase === undefined ? "ahead" : "", state, h("span", "name", titleOfStep(entry)), h("time", "", time));
     row.dataset["step"] = entry.name;

@@ -6,7 +6,7 @@ import { MeshoptDecoder } from "three/examples/jsm/libs/meshopt_decoder.module.j
 import { asset } from "./assets";
 import { creases } from "./creases";
 import { place } from "./markers";
-import { Status, type SceneModels, type SceneObject } from "./messages";
+import { Status, type RecordedModel, type SceneModels, type SceneObject } from "./messages";
 import { release } from "./release";
 import type { Session } from "./session";
 
@@ -53,6 +53,11 @@ export class Parts {
     this.models = 0;
   }
 
+  /** No object of a scene that is complete has a model. */
+  get areBoxes(): boolean {
+    return this.isComplete && this.models === 0;
+  }
+
   /** All models are there that the scene has. */
   get isComplete(): boolean {
     return this.all.size > 0 && this.list !== undefined && this.sceneModels !== undefined && this.reading === 0;
@@ -72,8 +77,8 @@ export class Parts {
     }
   }
 
-  /** The models of all objects; of one without, or before it is there, a box. */
-  async takeModels(list: string): Promise<void> {
+  /** The models of all objects; of one without, or before it is there, a box. `recorded`: by an object's name, where the assets are not there. */
+  async takeModels(list: string, recorded?: RecordedModel): Promise<void> {
     if (list === this.list && this.sceneModels === undefined) return;
     if (list !== this.list) {
       this.list = list;
@@ -90,7 +95,7 @@ export class Parts {
       const level = this.simple ? levels[levels.length - 1] : levels[0];
       part.model = this.boxOf(part);
       part.group.add(part.model);
-      if (level !== undefined) void this.load(part, level.model);
+      if (level !== undefined || recorded !== undefined) void this.load(part, level?.model, recorded);
     }
     this.onChange();
   }
@@ -102,9 +107,14 @@ export class Parts {
     return box;
   }
 
-  private async load(part: Part, name: string): Promise<void> {
+  private async load(part: Part, model: string | undefined, recorded?: RecordedModel): Promise<void> {
+    const name = model ?? `/scene/${part.object.name}`;
+    const bytesOf = async (): Promise<ArrayBuffer> => {
+      const bytes = model === undefined ? undefined : await asset(model).catch((problem: unknown) => { if (recorded === undefined) throw problem; });
+      return bytes ?? (recorded as RecordedModel)(part.object.name);
+    };
     let loading = this.loaded.get(name);
-    if (loading === undefined) this.loaded.set(name, (loading = asset(name).then((bytes) => this.loader.parseAsync(bytes, "")).then((file) => file.scene)));
+    if (loading === undefined) this.loaded.set(name, (loading = bytesOf().then((bytes) => this.loader.parseAsync(bytes, "")).then((file) => file.scene)));
     ++this.reading;
     try {
       this.dress(part, (await loading).clone(true));

@@ -1,15 +1,17 @@
-// Which commands the server refuses now, as far as is known here, so that their buttons say so before they are pressed. As CommandGate and rights.h of the server have it.
+// Which commands the server refuses now, as it says itself, so that their buttons say so before they are pressed.
 import type { Session } from "./session";
 import type { Key } from "./strings";
 
-const OF_TRAINEES = ["fulfilled", "signal", "note"];
-/** Neither an emergency stop nor a session that waits for people holds them up. */
-const IN_ANY_PHASE = ["note", "kick", "guide", "record", "release", "collision", "stop", "clear", "freeze"];
+/** The words of the commands that a role may give, with the bit of each in RunState.open_commands; null: the gateway carries it out, in any state. */
+export type Permitted = Readonly<Record<string, number | null>>;
 
-/** Why not, by the first word of a command; `role`: of the seat at this page, empty where there is none. */
-export function whyNot(word: string, role: string, session: Pick<Session, "isWaiting" | "standing">): Key | undefined {
-  if (role === "trainee" && !OF_TRAINEES.includes(word)) return "refusal.not_permitted";
-  if (role === "" || IN_ANY_PHASE.includes(word)) return undefined;
-  if (session.isWaiting) return "refusal.waiting";
-  return session.standing.length > 0 && word !== "pause" ? "refusal.stopped" : undefined;
+/** Why not, by the first word of a command; `permitted`: to the seat at this page, undefined where there is none. */
+export function whyNot(word: string, permitted: Permitted | undefined, { run, isOver, isWaiting }: Pick<Session, "run" | "isOver" | "isWaiting">): Key | undefined {
+  if (permitted === undefined) return undefined;
+  const bit = permitted[word];
+  if (bit === undefined) return "refusal.not_permitted";
+  if (bit === null || run === undefined || ((run.open_commands ?? ~0) >>> bit & 1) === 1) return undefined;
+  if (isOver) return "refusal.over";
+  if (isWaiting) return "refusal.waiting";
+  return run.emergency_stop === true ? "refusal.stopped" : "refusal.already";
 }

@@ -5,7 +5,7 @@ import { decompress } from "fzstd";
 
 import { decoderOf, type Decoder } from "./decode";
 import { INSTANCE_STATE, type Handler } from "./live";
-import type { ConsoleState, ContactPairs, EventLog, HandState, InstanceGone, SessionAnnounce, Telemetry, TickStats } from "./messages";
+import type { ConsoleState, ContactPairs, EventLog, HandState, InstanceGone, SceneUpdate, SessionAnnounce, Telemetry, TickStats } from "./messages";
 import { t, type Key } from "./strings";
 import { Tracks } from "./tracks";
 
@@ -191,12 +191,17 @@ export class Recording {
   }
 
   private addChannel(id: number): void {
+    const topic = this.reader.channelsById.get(id)?.topic ?? "";
+    const decode = [...KEPT, ...STREAMS, ALL_OBJECTS].includes(topic) ? this.decoderOf(id) : undefined;
+    if (decode !== undefined) this.decoders.set(id, { topic, decode });
+  }
+
+  private decoderOf(id: number): Decoder | undefined {
     const channel = this.reader.channelsById.get(id);
     const schema = this.reader.schemasById.get(channel?.schemaId ?? 0);
-    if (channel === undefined || schema === undefined || ![...KEPT, ...STREAMS, ALL_OBJECTS].includes(channel.topic)) return;
+    if (channel === undefined || schema === undefined) return undefined;
     const text = new TextDecoder().decode(schema.data);
-    const decode = decoderOf({ id, topic: channel.topic, encoding: channel.messageEncoding, schemaName: schema.name, schema: text, schemaEncoding: schema.encoding });
-    this.decoders.set(id, { topic: channel.topic, decode });
+    return decoderOf({ id, topic: channel.topic, encoding: channel.messageEncoding, schemaName: schema.name, schema: text, schemaEncoding: schema.encoding });
   }
 
   private async readKept(onProgress: (fraction: number) => void): Promise<void> {
@@ -246,9 +251,20 @@ export class Recording {
   private tellLink(announce: SessionAnnounce): void {
     const link: ConsoleState = {
       state: "recorded", reason: "", life: this.life, session: announce.session, title: announce.title, lockstep: announce.lockstep, scene: announce.scene_hash,
-      protocol: announce.protocol_version,
+      protocol: announce.protocol_version, modelOf: (object) => this.modelOf(object),
     };
     this.handler("/console", link, false);
+  }
+
+  /** The display model of an object, which the recorder kept for public viewers. Fails where there is none. */
+  private async modelOf(object: string): Promise<ArrayBuffer> {
+    const topic = `/scene/${object}`;
+    for await (const { channelId, data } of this.reader.readMessages({ topics: [topic] })) {
+      const { entities } = this.decoderOf(channelId)?.(data) as SceneUpdate;
+      const model = entities[0]?.models[0]?.data;
+      if (model !== undefined) return model.slice().buffer;
+    }
+    throw new Error(`${topic} is not in the recording, or a box`);
   }
 
   /** Tells how it stood at a time. What was told before is to be forgotten, and the announcement comes first. */

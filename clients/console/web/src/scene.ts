@@ -222,7 +222,7 @@ export class SceneView {
     if (session.changed !== this.changed) {
       this.changed = session.changed;
       this.parts.takeObjects(session);
-      void this.parts.takeModels(session.link?.scene ?? "");
+      void this.parts.takeModels(session.link?.scene ?? "", session.link?.modelOf);
       this.moved = -1;
     }
     if (session.moved !== this.moved) {

@@ -14,10 +14,9 @@ export const TOPICS = [
 ] as const;
 
 const EVENTS = 200;
-const STOPPED = "emergency stop"; // RunState::reason, as event_generator.cpp of the server has it
 
-/** Times in s of the session. */
-interface Visit { started: number; ended?: number; phase?: StepPhase }
+/** Times in s of the session; `seconds` [s]: the step's own time, without pauses and emergency stops. */
+interface Visit { started: number; ended?: number; seconds?: number; phase?: StepPhase }
 export interface StepEntry extends SceneStep, Partial<Visit> { isNow: boolean }
 const STEP_ENDS: Record<string, StepPhase> = { "step done": StepPhase.Done, "step skipped": StepPhase.Skipped, "step timed out": StepPhase.TimedOut };
 
@@ -54,6 +53,7 @@ export class Session {
   private raises = new Map<string, EmergencyStop>();
   private clears = new Set<string>();
   private visits = new Map<string, Visit>(); // the last one of each step, by name
+  private runs: RunState[] = []; // by tick
 
   /** Another session begins. */
   reset(): void {
@@ -118,6 +118,7 @@ export class Session {
         break;
       case "RunState":
         this.run = message as RunState;
+        this.runs = [...this.runs.filter(({ tick }) => tick < this.run!.tick), this.run];
         break;
       case "GrabState":
         put(this.grabs, "object_id", message as GrabState);
@@ -192,7 +193,8 @@ export class Session {
     if (event.kind === "step") this.visit(event.text, seconds);
     const phase = STEP_ENDS[event.kind];
     const visit = this.visits.get(event.text.replace(/ \(.*$/, ""));
-    if (phase !== undefined && visit !== undefined) Object.assign(visit, { phase, ended: seconds });
+    const own = /\(([\d.]+) s\)$/.exec(event.text)?.[1];
+    if (phase !== undefined && visit !== undefined) Object.assign(visit, { phase, ended: seconds, seconds: own === undefined ? undefined : Number(own) });
   }
 
   /** A step begins. Those after it are to be done, too, also where they were done before it began again. */
@@ -221,8 +223,21 @@ export class Session {
       const visit = this.visits.get(scene.name);
       const isNow = now?.name === scene.name && now.phase <= StepPhase.Active;
       const started = isNow ? Number(now.started) / 1000 : visit?.started;
-      return { ...scene, isNow, phase: isNow ? StepPhase.Active : visit?.phase, started, ended: isNow ? undefined : visit?.ended };
+      const seconds = isNow && started !== undefined ? this.ownTime(started, this.tick / 1000) : visit?.seconds;
+      return { ...scene, isNow, phase: isNow ? StepPhase.Active : visit?.phase, started, ended: isNow ? undefined : visit?.ended, seconds };
     });
+  }
+
+  /** [s] of a step between two times [s], as StepClock of idl/types/step_clock.h counts it. */
+  private ownTime(begin: number, end: number): number {
+    let time = Math.max(0, end - begin);
+    this.runs.forEach((run, i) => {
+      if (run.phase === RunPhase.Running && !run.emergency_stop) return;
+      const next = this.runs[i + 1];
+      const until = next === undefined ? end : Math.min(end, Number(next.tick) / 1000);
+      time -= Math.max(0, until - Math.max(begin, Number(run.tick) / 1000));
+    });
+    return Math.max(0, time);
   }
 
   /** Raises of the emergency stop that no clear has named. */
@@ -232,12 +247,12 @@ export class Session {
 
   /** A raise stands, and the server has said of the run that it is stopped: others may have heard of a raise, and it not. */
   get isStopped(): boolean {
-    return this.standing.length > 0 && this.run?.reason === STOPPED;
+    return this.standing.length > 0 && this.run?.emergency_stop === true;
   }
 
-  /** It is open, and has not begun: the server says of no object where it is, only where it is to begin. */
+  /** It is open, and has not begun: of no object it is said where it is, only where it is to begin. */
   get isWaiting(): boolean {
-    return this.run === undefined ? this.link?.state === "joined" && this.objects.size > 0 && this.states.size === 0 : this.run.phase === RunPhase.Waiting;
+    return this.run?.phase === RunPhase.Waiting;
   }
 
   get isOver(): boolean {

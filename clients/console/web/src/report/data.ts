@@ -2,7 +2,7 @@
 
 export interface Metrics { peak_force: number; mean_force: number; contact_seconds: number; device_proxy_gap: number; field_depth: number; load_percent: number }
 export interface Visit extends Metrics {
-  step: number; name: string; title: string; part: string; attempt: number; path: number; collisions: number; phase: string; begin: number; seconds: number;
+  step: number; name: string; title: string; part: string; attempt: number; path: number; collisions: number; phase: string; begin: number; end: number; seconds: number; // of its own time, without pauses
   position_error?: number; position_tolerance?: number;
 }
 export interface Summary {

@@ -122,7 +122,7 @@ export class Plots {
     ctx.textBaseline = "alphabetic";
     this.report.summary.steps.forEach((visit, i) => {
       const left = Math.max(bbox.left, u.valToPos(visit.begin, "x", true));
-      const right = Math.min(bbox.left + bbox.width, u.valToPos(visit.begin + visit.seconds, "x", true));
+      const right = Math.min(bbox.left + bbox.width, u.valToPos(visit.end, "x", true));
       if (right <= left) return;
       ctx.fillStyle = colour(i % 2 === 0 ? "--band-0" : "--band-1");
       ctx.fillRect(left, bbox.top, right - left, bbox.height);
@@ -175,7 +175,7 @@ export class Plots {
       return;
     }
     const time = this.times[index];
-    const visit = this.report.summary.steps.find(({ begin, seconds }) => begin <= time && time < begin + seconds);
+    const visit = this.report.summary.steps.find(({ begin, end }) => begin <= time && time < end);
     const [first] = this.plots;
     const near = first === undefined ? 0 : Math.abs(first.plot.posToVal(MARK + 2, "x") - first.plot.posToVal(0, "x"));
     const event = this.report.events.find((known) => known.tone !== "" && Math.abs(known.time - time) <= near);
