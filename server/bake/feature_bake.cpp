@@ -21,16 +21,19 @@ using Edge = WeldedMesh::Edge;
 using structures::FeatureEdge;
 using structures::SurfaceSample;
 
-// [-] of the angle between faces: flatter ones (177 deg) are facets of a round surface, not sides of an edge,
-// and the flattest (179.7 deg) those of a plane, as far as its vertices are exact
-constexpr double kFlatCosine = -0.99863;
-constexpr double kPlaneCosine = -0.999986;
-constexpr double kTanHalf60 = 0.577;  // [-] of a facet of a round surface at most
+constexpr double kTanHalfFlat =
+    0.026182;  // [-] faces that turn by less (3 deg) are facets of a round surface
+constexpr double kPlaneCosine = -0.999986;  // [-] the flattest (179.7 deg) are facets of a plane
+constexpr double kTanHalf60 = 0.577;        // [-] of a facet of a round surface at most
 constexpr double kTanHalf40 = 0.364;  // [-] tan of half the turn from which an edge is sharp at any radius
 constexpr double kCos6 = 0.995;       // [-] a polyline that turns less at a vertex is straight there
 constexpr double kCos30 = 0.866;      // [-] a polyline that turns by more at a vertex has a corner there
 constexpr double kEndless = 1.0;      // [m] from any end of an edge
 constexpr double kCos20 = 0.94;       // [-] faces of edges that are merged turn by less
+
+constexpr double kCos40 = 0.766;  // [-] of the turn from which an edge is sharp at any radius
+constexpr double kNarrow = 25.0;  // [-] facets are narrow up to so many times what counts as straight
+constexpr int kMaxNarrow = 8;     // facets in a row
 
 constexpr double kMaxSkew = 3.0;    // [-] of the plane in which an edge ends: 72 degrees
 constexpr double kFlatSkew = 1e-3;  // [-] less is rounding
@@ -86,10 +89,23 @@ class FeatureFinder {
  public:
   FeatureFinder(const WeldedMesh& mesh, const TriangleTree& surface, const structures::DistanceField& field,
                 const Sizes& sizes)
-      : mesh_(mesh), field_(field), normals_(field), sizes_(sizes), reach_(surface), grid_(sizes.apart) {
-    const std::vector<Edge> edges = mesh.edges();
-    const FaceSides sides(mesh, edges, field);
-    for (const Edge& edge : edges) addIfConvex(edge, sides);
+      : mesh_(mesh),
+        field_(field),
+        normals_(field),
+        sizes_(sizes),
+        edges_(mesh.edges()),
+        sides_(mesh, edges_, field),
+        reach_(surface),
+        grid_(sizes.apart) {
+    edges_of_.resize(mesh.triangles.size(), {Edge::kNone, Edge::kNone, Edge::kNone});
+    for (std::uint32_t i = 0; i < edges_.size(); ++i) {
+      for (const std::uint32_t triangle : {edges_[i].first, edges_[i].second}) {
+        if (triangle == Edge::kNone) continue;
+        auto& of = edges_of_[triangle];
+        *std::find(of.begin(), of.end() - 1, Edge::kNone) = i;
+      }
+    }
+    for (std::uint32_t i = 0; i < edges_.size(); ++i) addIfConvex(i);
   }
 
   std::vector<Feature> find() {
@@ -106,13 +122,64 @@ class FeatureFinder {
     return std::min(sizes_.straight, kStraight * field_.voxelAt(p));
   }
 
+  /// A face beside an edge.
+  struct Side {
+    std::uint32_t triangle = Edge::kNone;
+    double width = 0.0;  // [m] height over the edge
+  };
+
+  [[nodiscard]] Side sideOf(const Edge& edge, std::uint32_t triangle) const {
+    const Vector3 along = (at(edge.to) - at(edge.from)).normalized();
+    const structures::Triangle& t = mesh_.triangles[triangle];
+    const Vector3 to = t[0] + t[1] + t[2] - 2.0 * at(edge.from) - at(edge.to);
+    return {triangle, (to - along * along.dot(to)).norm()};
+  }
+
+  /// From a face beside an edge on, away from it: the first one that is not narrow. Without a triangle where
+  /// there is none.
+  [[nodiscard]] Side wideSide(std::uint32_t edge, Side side, double narrow) const {
+    for (int k = 0; k < kMaxNarrow && side.width < narrow; ++k) {
+      // a narrow triangle has two long edges
+      std::uint32_t next = Edge::kNone;
+      double longest = 0.0;
+      for (const std::uint32_t other : edges_of_[side.triangle]) {
+        if (other == edge || other == Edge::kNone) continue;
+        const double length = (at(edges_[other].to) - at(edges_[other].from)).norm();
+        if (length > longest) next = other;
+        longest = std::max(longest, length);
+      }
+      if (next == Edge::kNone || edges_[next].second == Edge::kNone) return {};
+      const Edge& beyond = edges_[next];
+      side = sideOf(beyond, beyond.first == side.triangle ? beyond.second : beyond.first);
+      edge = next;
+    }
+    return side.width < narrow ? Side{} : side;
+  }
+
+  /// Of an edge that is not sharp and has a narrow face, the turn and the radius are those of the wide faces
+  /// to both sides: between vertices that are rounded, the direction of a narrow one is arbitrary.
+  void measureBeyondNarrow(std::uint32_t index, const std::array<Side, 2>& faces, ConvexEdge& convex) const {
+    const double width = std::min(faces[0].width, faces[1].width);
+    const double tolerance = straightAt(at(convex.from));
+    if (convex.tan_half_turn >= kTanHalf40 || width >= kNarrow * tolerance ||
+        2.0 * convex.tan_half_turn * width >= tolerance)
+      return;
+    const std::array<Side, 2> wide{wideSide(index, faces[0], kNarrow * tolerance),
+                                   wideSide(index, faces[1], kNarrow * tolerance)};
+    if (wide[0].triangle == Edge::kNone || wide[1].triangle == Edge::kNone) return;
+    const double flat = sides_.outward(wide[0].triangle).dot(sides_.outward(wide[1].triangle));
+    if (flat < kCos40) return;
+    convex.tan_half_turn = std::sqrt(std::max(1.0 - flat, 0.0) / (1.0 + flat));
+    convex.radius = 0.5 * std::min(wide[0].width, wide[1].width) / std::max(convex.tan_half_turn, 1e-9);
+  }
+
   /// Sorts an edge into the sharp or the round ones when it is convex.
-  void addIfConvex(const Edge& edge, const FaceSides& sides) {
+  void addIfConvex(std::uint32_t index) {
+    const Edge& edge = edges_[index];
     const bool open = edge.second == Edge::kNone;
     const Vector3 along = (at(edge.to) - at(edge.from)).normalized();
     ConvexEdge convex{edge.from, edge.to, {}, 1.0, 0.0};
-    double width = std::numeric_limits<double>::infinity();
-    double widest = 0.0;
+    std::array<double, 2> widths{};
     for (const std::size_t face : {0U, 1U}) {
       const structures::Triangle& t = mesh_.triangles[face == 0 || open ? edge.first : edge.second];
       const Vector3 to = t[0] + t[1] + t[2] - 2.0 * at(edge.from) - at(edge.to);
@@ -120,18 +187,19 @@ class FeatureFinder {
       const double height = towards.norm();
       // far from the mesh's origin the height of a thin triangle may be cancelled
       if (!(height > 0.0)) return;
-      width = std::min(width, height);
-      widest = std::max(widest, height);
+      widths[face] = height;
       convex.into_M[face] = towards / height;
     }
+    const auto [width, widest] = std::minmax(widths[0], widths[1]);
     if (!open) {
       const double flat = convex.into_M[0].dot(convex.into_M[1]);
       if (flat < kPlaneCosine) return;
-      const Vector3 outward = sides.outward(edge.first);
+      const Vector3 outward = sides_.outward(edge.first);
       if (outward.dot(convex.into_M[1]) > 0.0) return;
       convex.tan_half_turn = std::sqrt((1.0 + flat) / std::max(1.0 - flat, 1e-12));
       convex.radius = 0.5 * width / convex.tan_half_turn;
-      if (flat < kFlatCosine) {
+      measureBeyondNarrow(index, {Side{edge.first, widths[0]}, Side{edge.second, widths[1]}}, convex);
+      if (convex.tan_half_turn < kTanHalfFlat) {
         if (convex.radius <= sizes_.largest_radius) round_.push_back(convex);
         return;
       }
@@ -386,6 +454,9 @@ class FeatureFinder {
   const structures::DistanceField& field_;
   const NormalEstimator normals_;
   const Sizes sizes_;
+  const std::vector<Edge> edges_;
+  const FaceSides sides_;
+  std::vector<std::array<std::uint32_t, 3>> edges_of_;  // of each triangle, indices
   const WedgeReach reach_;
   std::vector<ConvexEdge> sharp_, round_;
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> faces_at_;  // of vertices where chains end

@@ -1,77 +1,18 @@
 #pragma once
 
-#include <array>
-#include <cstddef>
-#include <limits>
-
-#include "server/collision/pair_query.h"
-#include "server/structures/feature_shell.h"
+#include "server/collision/pair_features.h"
 
 namespace tenon::collision {
-
-/// The second direction of a pair: the features of both bodies, and the field of A.
-///
-/// The points of A's pointshell miss what is thinner than their spacing on B: a stud, an edge, a corner. So
-/// B's features are also asked in A's field, with contacts as of A against B (normals from B into A). Two
-/// edges that cross touch between the points of both: the gap there is that of the closest points of their
-/// segments, the fields only find candidates. Features are where the exact surface is: thin walls of B are
-/// thickened for A's points alone.
-struct PairFeatures {
-  const structures::FeatureShell* features_A = nullptr;
-  const structures::FeatureShell* features_B = nullptr;
-  const structures::DistanceField* field_A = nullptr;
-  /// [m] Of the dilation of A's field so much counts for features of B
-  double most_dilation_A = std::numeric_limits<double>::infinity();
-
-  [[nodiscard]] bool any() const {
-    return features_B != nullptr && !features_B->empty() && !field_A->empty();
-  }
-};
-
-/// Whether there is a feature of this index, and a piece of an edge about it.
-[[nodiscard]] inline bool isEdge(const structures::FeatureShell& features, std::size_t point) {
-  return point < features.edges().size() && features.edges()[point].half_M.squaredNorm() > 0.0F;
-}
-
-/// A feature in any frame: a piece of a convex edge, as structures::FeatureEdge, or a point.
-struct EdgePiece {
-  Vector3 p = Vector3::Zero();     ///< [m] centre
-  Vector3 half = Vector3::Zero();  ///< [m] from the centre to one end; zero: a point
-  std::array<Vector3, 2> into{Vector3::Zero(), Vector3::Zero()};
-  double reach = 0.0;                                                                     ///< [m]
-  std::array<double, 2> beyond{0.0, 0.0};                                                 ///< [m]
-  std::array<Eigen::Vector2f, 2> skew{Eigen::Vector2f::Zero(), Eigen::Vector2f::Zero()};  ///< [-]
-
-  [[nodiscard]] bool isPoint() const { return half.isZero(0.0); }
-};
-
-/// B's features near A, in A's frame.
-struct NearPieces {
-  struct Ball {
-    Vector3f p_A;
-    float reach = 0.0F;  ///< [m] centres of features that meet this one are no farther
-    std::uint32_t piece = 0;
-  };
-  using Balls = std::array<Ball, kMaxPairContacts>;
-
-  std::uint32_t count = 0;
-  std::array<EdgePiece, kMaxPairContacts> pieces;
-  std::array<std::uint32_t, kMaxPairContacts> point;  ///< index in B's features
-  Balls all, by_cluster, by_leaf;
-};
-
-/// Memory of the functions below; one for each thread.
-struct FeatureScratch {
-  PairQueryResult of_B;   ///< B's features in A's field
-  ContactList crossings;  ///< found, before the nearest are kept
-  NearPieces near;
-};
 
 /// Adds to the result of queryPair the contacts of features up to `query.margin`: of kFeaturePoint, then of
 /// kCrossing, after those of shell points. Levels and budget of the query do not apply to features; their
 /// points are counted. Where the list is full, feature contacts displace shell points with the largest gaps,
 /// at most kFeatureRoom; of the features' points, and of more than kMaxCrossings crossings, those with the
 /// smallest gaps are kept (`contacts_dropped`).
+///
+/// Where more features are near than a list takes, as in a tight fit, their points are reduced by leaf as
+/// those of the shell (PairQuery::reduce), have twice the room, and crossings are sought up to a smaller
+/// margin.
 ///
 /// A crossing is of two edges, or of a point of one body beside an edge of the other. There the solid is the
 /// wedge between two planes, and the gap is exact, while the interpolated field rounds the edge off.
@@ -86,6 +27,19 @@ struct FeatureScratch {
 void queryFeatures(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
                    PairQueryResult& result) noexcept;
 
+/// A plane that a point may be outside of.
+struct ContactSide {
+  Vector3 n_W = Vector3::Zero();  ///< [-] as Contact::n_W
+  double gap = 0.0;               ///< [m]
+};
+
+/// The planes of both faces of the edge of a crossing with a point; none for crossings of two edges. Free
+/// space is outside of either.
+///
+/// Threads: pure. Real-time.
+[[nodiscard]] FixedVector<ContactSide, 2> sidesOfWedge(const PairFeatures& features, const Contact& crossing,
+                                                       const Pose& X_WA, const Pose& X_WB) noexcept;
+
 /// resampleContacts() for a list with contacts of features, in the order of queryFeatures(); `displacement`
 /// [m] as there.
 ///
@@ -99,8 +53,5 @@ void resampleFeatures(const PairQuery& query, const PairFeatures& features, doub
 /// Threads: pure, but for the scratch. Real-time.
 [[nodiscard]] double featureGap(const PairQuery& query, const PairFeatures& features, FeatureScratch& scratch,
                                 QueryCounts& counts) noexcept;
-
-inline constexpr std::size_t kFeatureRoom = 128;
-inline constexpr std::size_t kMaxCrossings = 64;
 
 }  // namespace tenon::collision

@@ -19,6 +19,10 @@ constexpr double kReducedListSpacing = 0.03;
 /// which fills its list, still has to slide.
 constexpr double kMinValidity = 0.25;
 
+/// [-] A list that is full of features is traversed again when less than this fraction of its validity is
+/// left.
+constexpr double kUsedUp = 0.5;
+
 int movableBodies(const IslandPair& pair) {
   return (pair.body_a != ContactConstraint::kStatic ? 1 : 0) +
          (pair.body_b != ContactConstraint::kStatic ? 1 : 0);
@@ -153,8 +157,11 @@ bool IslandSolver::mustTraverse(const Job& job, std::size_t i, double approach) 
   if (!traversal.valid) return true;
   const IslandPair& pair = job.pairs[i];
   const PairQueryResult& result = job.results[i].query;
-  // without a displacement since, a traversal would give the same list
-  if (approach > 0.0 && result.unlisted_gap - approach < neededMargin(pair, job.limits)) return true;
+  // without a displacement since, a traversal would give the same list; one that was full is used longer
+  const double margin = neededMargin(pair, job.limits);
+  const bool is_full = pair.features.any() && result.reduced && result.complete_to < margin;
+  const double needed = is_full ? kUsedUp * result.complete_to : margin;
+  if (approach > 0.0 && result.unlisted_gap - approach < needed) return true;
   if (!result.reduced) return false;
   const Quaternion turn = (job.poseB(pair).rotation().conjugate() * job.poseA(pair).rotation()) *
                           (traversal.X_WB.rotation().conjugate() * traversal.X_WA.rotation()).conjugate();
@@ -182,8 +189,9 @@ std::size_t IslandSolver::pairOfRow(const Job& job, std::size_t row) {
 
 double IslandSolver::validityRadius(const Job& job) {
   double radius = job.limits.max_step_length;
-  for (const IslandPairResult& result : job.results) {
-    radius = std::min(radius, result.query.complete_to);
+  for (std::size_t i = 0; i < job.results.size(); ++i) {
+    const double complete_to = job.results[i].query.complete_to;
+    if (complete_to < radius) radius = std::min(radius, complete_to - approachSinceTraversal(job, i));
   }
   return std::max(radius, kMinValidity * job.limits.max_step_length);
 }

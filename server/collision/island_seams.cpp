@@ -19,13 +19,26 @@ constexpr double kMinSeamSlope = 0.3;
 /// [m] The plane beyond a border may be deeper than the contact by this: discretisation, not depth.
 constexpr double kSeamDepthNoise = 1e-6;
 
+/// [-] Normals whose dot product is nearer to 1 are equal.
+constexpr double kSameNormal = 1e-9;
+
 }  // namespace
 
-bool IslandSolver::findSeam(const Job& job, std::size_t pair, std::size_t c, std::size_t row) {
+void IslandSolver::addSeamAtEdge(const Job& job, std::size_t pair, std::size_t c, std::size_t row) {
+  const IslandPair& one = job.pairs[pair];
+  const Contact& contact = job.results[pair].query.contacts[c];
+  Seam seam{pair, c, row, {}};
+  for (const ContactSide& side : sidesOfWedge(one.features, contact, job.poseA(one), job.poseB(one))) {
+    const bool outside = side.gap >= std::min(contact.gap, 0.0) - kFieldNoise;
+    if (outside && side.n_W.dot(contact.n_W) < 1.0 - kSameNormal) seam.sides.push_back(side);
+  }
+  if (!seam.sides.empty()) seams_.push_back(seam);
+}
+
+void IslandSolver::addSeamAtBorder(const Job& job, std::size_t pair, std::size_t c, std::size_t row) {
   const IslandPair& one = job.pairs[pair];
   const Contact& contact = job.results[pair].query.contacts[c];
   const auto surface = job.surfaceOf(one, contact);
-  if (surface.field == nullptr) return false;
   const Pose& X_WB = *surface.X_WF;
   const Vector3 out_W = surface.sign * contact.n_W;
   Seam seam{pair, c, row, {}};
@@ -43,10 +56,10 @@ bool IslandSolver::findSeam(const Job& job, std::size_t pair, std::size_t c, std
         seam.sides.push_back({surface.sign * n_W, gap});
     }
   }
-  return !seam.sides.empty() && seams_.push_back(seam);
+  if (!seam.sides.empty()) seams_.push_back(seam);
 }
 
-bool IslandSolver::relaxSeamNormals(const Job& job, SolveReport& report) {
+void IslandSolver::findSeams(const Job& job, SeamKind kind) {
   seams_.clear();
   std::size_t pair = 0;
   std::size_t first = 0;
@@ -55,8 +68,30 @@ bool IslandSolver::relaxSeamNormals(const Job& job, SolveReport& report) {
     while (row >= first + job.results[pair].query.contacts.size()) {
       first += job.results[pair++].query.contacts.size();
     }
-    findSeam(job, pair, row - first, row);
+    const bool crosses = job.results[pair].query.contacts[row - first].kind == ContactKind::kCrossing;
+    if (crosses != (kind == SeamKind::kEdge)) continue;
+    if (crosses) {
+      addSeamAtEdge(job, pair, row - first, row);
+    } else {
+      addSeamAtBorder(job, pair, row - first, row);
+    }
   }
+  if (kind == SeamKind::kBorder || seams_.empty()) return;
+  // along a rim the next point would hold instead
+  first = 0;
+  for (pair = 0; pair < job.pairs.size(); ++pair) {
+    const ContactList& contacts = job.results[pair].query.contacts;
+    for (std::size_t c = 0; c < contacts.size(); ++c) {
+      if (contacts[c].kind == ContactKind::kCrossing && contacts[c].gap <= kTouchGap &&
+          multipliers_[first + c] <= 0.0)
+        addSeamAtEdge(job, pair, c, first + c);
+    }
+    first += contacts.size();
+  }
+}
+
+bool IslandSolver::relaxSeamNormals(const Job& job, SeamKind kind, SolveReport& report) {
+  findSeams(job, kind);
   if (seams_.empty()) return false;
   // the step if the contacts at seams did not hold
   FixedVector<std::uint32_t, kMaxSeams> excluded;
@@ -67,26 +102,26 @@ bool IslandSolver::relaxSeamNormals(const Job& job, SolveReport& report) {
           .iterations;
   const std::span<const std::uint32_t> active_without_seams = motion_.activeRows();
   // outside a convex surface, free space is the union of both half-spaces: the largest slack decides
-  bool changed = false;
+  std::size_t unchanged = rows_.size();
   for (const Seam& seam : seams_) {
     Contact& contact = job.results[seam.pair].query.contacts[seam.contact];
     const Vector3 u_W = relativeDisplacement(job, step, job.pairs[seam.pair], contact.p_WP);
     double largest_slack = contact.gap + contact.n_W.dot(u_W);
-    for (const Seam::Side& side : seam.sides) {
+    for (const ContactSide& side : seam.sides) {
       const double slack = side.gap + side.n_W.dot(u_W);
       if (slack <= largest_slack) continue;
       largest_slack = slack;
       contact.n_W = side.n_W;
       contact.gap = side.gap;
-      changed = true;
+      unchanged = std::min(unchanged, seam.row);
     }
     rows_[seam.row].n_W = contact.n_W;
     rows_[seam.row].gap = contact.gap;
   }
-  if (!changed) return false;
+  if (unchanged == rows_.size()) return false;
   active_.assign(active_without_seams.begin(), active_without_seams.end());
   std::sort(active_.begin(), active_.end());
-  solveQp(job, report, seams_[0].row);
+  solveQp(job, report, unchanged);
   return true;
 }
 

@@ -184,7 +184,7 @@ double IslandSolver::merit(const Job& job) {
 
 double IslandSolver::deepestOverlap(const Job& job) {
   double depth = 0.0;
-  for (const IslandPairResult& result : job.results) depth = std::max(depth, -result.query.smallest_gap);
+  for (const IslandPairResult& result : job.results) depth = std::max(depth, result.query.deepest);
   return depth;
 }
 
@@ -209,7 +209,12 @@ void IslandSolver::computeStep(const Job& job, SolveReport& report) {
   // the active set seldom changes between iterates
   const bool expected = evaluateCurvature(job);
   solveQp(job, report);
-  for (int round = 0; round < kSeamRounds && relaxSeamNormals(job, report);) ++round;
+  for (int round = 0; round < kSeamRounds; ++round) {
+    // surfaces hold a body while it is found whether edges do
+    const bool at_edges = relaxSeamNormals(job, SeamKind::kEdge, report);
+    const bool at_borders = relaxSeamNormals(job, SeamKind::kBorder, report);
+    if (!at_edges && !at_borders) break;
+  }
   if (!curvatureIsOfActiveRows()) {
     const bool found = evaluateCurvature(job);
     if (expected || found) solveQp(job, report, contact_row_count_);

@@ -128,7 +128,7 @@ struct SolveReport {
 ///   sharp for a curvature, overshoot damping.
 /// * Seams: the gradient of an interpolated field jumps at cell borders. Free space outside a convex surface
 ///   is the union of the half-spaces of both sides, so a contact there gets the side that restricts the
-///   step least.
+///   step least. So does a point at an edge, which may be outside of either face.
 /// * Convergence: the step of every body in contact is shorter than its `tolerance`. The step is then not
 ///   taken, so that a hand at rest means a body at rest.
 ///
@@ -136,7 +136,7 @@ struct SolveReport {
 /// constraints of a QP contradict each other, see MotionResult::infeasible. Skipped without a report are
 /// * contacts beyond kMaxPairContacts of a pair, those with the largest gaps. Steps are shortened so as not
 ///   to reach them, but not below a quarter of `max_step_length`;
-/// * seams beyond kMaxSeams (24): these contacts keep the normal of their own cell, and may hold the body
+/// * seams beyond kMaxSeams (64): these contacts keep the normal of their own cell, and may hold the body
 ///   back;
 /// * secondary planes beyond kMaxSecondaryPlanes (64): a step may overlap there, the next iterate corrects
 ///   it. Where a pair's list is full, their force is missing in its F_Ao_W;
@@ -240,13 +240,16 @@ class IslandSolver {
   /// Whether the active contact rows are still those that evaluateCurvature used.
   [[nodiscard]] bool curvatureIsOfActiveRows() const;
 
-  // cell borders (island_seams.cpp)
+  // cell borders and edges (island_seams.cpp)
+  enum class SeamKind : std::uint8_t { kBorder, kEdge };
   /// Gives active contacts at seams the normal of the side that restricts the step least, and solves again.
   /// False when no normal changed.
-  bool relaxSeamNormals(const Job& job, SolveReport& report);
-  /// Adds a seam for an active contact if a cell border beside it is convex. False when none is, or when
-  /// there is no capacity.
-  bool findSeam(const Job& job, std::size_t pair, std::size_t contact, std::size_t row);
+  bool relaxSeamNormals(const Job& job, SeamKind kind, SolveReport& report);
+  /// Sets seams_: active contacts at a convex border between cells; or, where one is at an edge, all that
+  /// touch at edges. As far as there is capacity.
+  void findSeams(const Job& job, SeamKind kind);
+  void addSeamAtBorder(const Job& job, std::size_t pair, std::size_t contact, std::size_t row);
+  void addSeamAtEdge(const Job& job, std::size_t pair, std::size_t contact, std::size_t row);
   /// [m] Displacement of A's point at p_WP relative to B's.
   [[nodiscard]] static Vector3 relativeDisplacement(const Job& job, std::span<const Displacement> step,
                                                     const IslandPair& pair, const Vector3& p_WP);
@@ -276,19 +279,15 @@ class IslandSolver {
     Contact contact;
   };
 
-  /// An active contact at a cell border, with the tangent planes beyond it.
+  /// A contact at a cell border or an edge, with the tangent planes beyond it.
   struct Seam {
-    struct Side {
-      Vector3 n_W = Vector3::Zero();
-      double gap = 0.0;  ///< [m]
-    };
     std::size_t pair = 0, contact = 0, row = 0;
-    FixedVector<Side, 4> sides;  ///< to both sides along two tangents
+    FixedVector<ContactSide, 4> sides;  ///< to both sides along two tangents, or of a wedge
   };
 
   MotionSolver motion_;
   FeatureScratch feature_scratch_;
-  static constexpr std::size_t kMaxSeams = 24;
+  static constexpr std::size_t kMaxSeams = 64;
   FixedVector<Seam, kMaxSeams> seams_;
   static constexpr std::size_t kMaxSecondaryPlanes = 64;
   std::array<SecondaryPlane, kMaxSecondaryPlanes> secondary_planes_;

@@ -429,8 +429,9 @@ ResampledPart resamplePart(const PairQuery& query, std::span<Contact> contacts) 
 
 void resampleContacts(const PairQuery& query, double displacement, PairQueryResult& result) noexcept {
   const ResampledPart part = resamplePart(query, {result.contacts.begin(), result.contacts.size()});
-  result.smallest_gap = std::min(result.unlisted_gap - displacement, part.smallest_gap);
-  result.deepest = std::max(-result.smallest_gap, 0.0);
+  // a bound below 0 is no overlap
+  result.smallest_gap = std::min(std::max(result.unlisted_gap - displacement, 0.0), part.smallest_gap);
+  result.deepest = std::max(-part.smallest_gap, 0.0);
   // unlisted_gap is for the poses of the traversal: a point that left may come nearer again when A moves back
   // there
   result.unlisted_gap = std::min(result.unlisted_gap, part.smallest_left_gap - displacement);
