@@ -14,6 +14,9 @@ namespace tenon::console {
 namespace {
 
 namespace fs = std::filesystem;
+using foxglove::colorOf;
+using foxglove::encodeFrameTransforms;
+using foxglove::Rgba;
 
 class SessionChannelsTest : public testing::Test {
  protected:
