@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "clients/recorder/recorder_program.h"
+#include "idl/types/names.h"
 #include "idl/types/printable_text.h"
 
 namespace tenon::console {
@@ -108,8 +109,8 @@ void DeskRecordings::handle(ViewerId viewer, const std::string& session, const D
   refuse(viewer, request.id, "usage: record start|stop");
 }
 
-void DeskRecordings::refuse(ViewerId viewer, std::uint32_t request, std::string why) const {
-  answer_(viewer, {.id = request, .text = std::move(why)});
+void DeskRecordings::refuse(ViewerId viewer, std::uint32_t request, std::string why, Refusal kind) const {
+  answer_(viewer, {.id = request, .text = std::move(why), .code = std::string(refusalName(kind))});
 }
 
 void DeskRecordings::start(ViewerId viewer, const std::string& session, std::uint32_t request) {
@@ -123,7 +124,7 @@ void DeskRecordings::start(ViewerId viewer, const std::string& session, std::uin
   const std::scoped_lock lock(mutex_);
   auto& one = running_[session];
   if (one != nullptr && !one->hasEnded())
-    return refuse(viewer, request, "this session is being recorded here already");
+    return refuse(viewer, request, "this session is being recorded here already", Refusal::kAlready);
   one = std::make_unique<One>(
       recorder::RecorderOptions{.file = freeFile(folder_, session), .session = session, .domain = domain_},
       answer_, viewer, request);
@@ -133,7 +134,7 @@ void DeskRecordings::stop(ViewerId viewer, const std::string& session, std::uint
   const std::scoped_lock lock(mutex_);
   const auto one = running_.find(session);
   if (one != running_.end() && one->second->stop(viewer, request)) return;
-  refuse(viewer, request, "this console records nothing of this session");
+  refuse(viewer, request, "this console records nothing of this session", Refusal::kAlready);
 }
 
 }  // namespace tenon::console

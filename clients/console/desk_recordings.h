@@ -39,7 +39,7 @@ class DeskRecordings {
 
   void start(ViewerId viewer, const std::string& session, std::uint32_t request);
   void stop(ViewerId viewer, const std::string& session, std::uint32_t request);
-  void refuse(ViewerId viewer, std::uint32_t request, std::string why) const;
+  void refuse(ViewerId viewer, std::uint32_t request, std::string why, Refusal kind = Refusal::kOther) const;
 
   std::filesystem::path folder_;
   std::uint32_t domain_;

@@ -523,6 +523,18 @@ class Page(unittest.TestCase):
             browser("await", expression=f"{forbidden}.length === 0 && document.querySelector('.desk .why').offsetHeight === 0")
             browser("value", expression="document.querySelector('[data-command=resume]').click()")
             browser("await", expression="tenon.session.run.phase === 1")
+            # the lists change all the time, and neither a press nor the focus is lost
+            step, asked = "document.querySelector('.steps li:not(.now) button.name')", "document.querySelector('dialog[open] .primary') !== null"
+            browser("press", selector=".steps li:not(.now) button.name", milliseconds=400)
+            browser("await", expression=asked)
+            browser("key", key="Escape")
+            browser("value", expression=f"{step}.focus()")
+            changed = browser("value", expression="tenon.session.tick")
+            browser("await", expression=f"tenon.session.tick > {changed} + 1000")
+            self.assertTrue(browser("value", expression=f"document.activeElement === {step}"))
+            browser("key", key="Enter")
+            browser("await", expression=asked)
+            browser("key", key="Escape")
             browser("value", expression="document.querySelector('[data-command=skip]').click()")
             browser("await", expression="[...document.querySelectorAll('.notice')].some(n => n.textContent === 'Skip: accepted')")
             server.wait_for("step skipped")

@@ -6,6 +6,7 @@
 //   {"do": "key", "key": K}   as Playwright names it
 //   {"do": "key down", "key": K}, {"do": "key up", "key": K}
 //   {"do": "click", "at": [X, Y]}
+//   {"do": "press", "selector": CSS, "milliseconds": T}   the mouse is held down for so long
 //   {"do": "sit down"}   takes part, as a person at the page would
 //   {"do": "mount", "seed": S, "seconds": T, "steps": [..]}   with the mouse, until the step is none of these
 //   {"do": "picture", "file": F}
@@ -64,6 +65,13 @@ const commands = {
   },
   async click({ at }) {
     await page.mouse.click(at[0], at[1]);
+  },
+  async press({ selector, milliseconds }) {
+    const { x, y, width, height } = await page.locator(selector).first().boundingBox();
+    await page.mouse.move(x + width / 2, y + height / 2);
+    await page.mouse.down();
+    await new Promise((done) => setTimeout(done, milliseconds));
+    await page.mouse.up();
   },
   async "sit down"() {
     await sitDown(page);

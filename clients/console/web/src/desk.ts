@@ -353,7 +353,8 @@ export class Desk {
       return false;
     }
     const answer = await this.source.ask("deskCommand", { words });
-    if (words[0] === "record" && answer?.accepted === true) this.isRecording = words[1] === "start";
+    // another page may have started or stopped it
+    if (words[0] === "record" && (answer?.accepted === true || answer?.code === "already")) this.isRecording = words[1] === "start";
     this.tell(t(label), answer);
     if (answer?.code === "not_joined" && this.role !== "") {
       this.role = "";

@@ -6,6 +6,34 @@ export function h<K extends keyof HTMLElementTagNameMap>(tag: K, className = "",
   return element;
 }
 
+const isSame = (a: Element, b: Element): boolean => {
+  const names = new Set([...Object.keys((a as HTMLElement).dataset), ...Object.keys((b as HTMLElement).dataset)]);
+  return a.tagName === b.tagName && [...names].every((name) => (a as HTMLElement).dataset[name] === (b as HTMLElement).dataset[name]);
+};
+
+/**
+ * Gives an element these children. What was at the same place stays, if its data are the same, with its focus and a press that has begun on it; its attributes and
+ * its text become the new ones. Listeners of the new ones are lost: they belong on the element.
+ */
+export function renew(element: Element, nodes: readonly Node[]): void {
+  nodes.forEach((next, i) => {
+    const old = element.childNodes[i];
+    if (old === undefined) element.append(next);
+    else if (old instanceof Element && next instanceof Element && isSame(old, next)) {
+      for (const { name } of [...old.attributes]) if (!next.hasAttribute(name)) old.removeAttribute(name);
+      for (const { name, value } of next.attributes) {
+        if (old.getAttribute(name) === value) continue;
+        if (name === "style") (old as HTMLElement | SVGElement).style.cssText = value; // as an attribute the page's policy forbids it
+        else old.setAttribute(name, value);
+      }
+      renew(old, [...next.childNodes]);
+    } else if (old instanceof Text && next instanceof Text) {
+      if (old.data !== next.data) old.data = next.data;
+    } else old.replaceWith(next);
+  });
+  while (element.childNodes.length > nodes.length) element.lastChild?.remove();
+}
+
 /** Says of a button why it does nothing now; an empty text: it acts. It can still be reached, so that its reason is read. */
 export function forbid(button: HTMLElement, why: string): void {
   if (button.title === why) return;

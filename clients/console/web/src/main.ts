@@ -3,7 +3,7 @@ import "./style.css";
 import { FRAME, playsBeside, showBeside, tellBeside, type Played } from "./beside";
 import { coverOf, isEmpty, isSilent, linkBadge, PROTOCOL, type Opening, type Standing } from "./cover";
 import { Desk, PASS } from "./desk";
-import { h, icon, marked } from "./dom";
+import { h, icon, marked, renew } from "./dom";
 import { addressOf, LiveSource, type LiveState } from "./live";
 import { Lobby } from "./lobby";
 import type { Gateway, LobbyState } from "./messages";
@@ -207,12 +207,11 @@ const standing = (): Standing => ({ isDropping, opening, player, lobby, live, se
 let shown = "";
 let shownAt = 0;
 
-/** Replaces the children only where that changes something, so that nothing is read out or loses its focus without reason. */
+/** Changes only what is another, so that nothing is read out, loses its focus or a press without reason. */
 function show(element: HTMLElement, nodes: Node[]): void {
-  const next = h("div", "", ...nodes);
-  if (next.innerHTML === element.innerHTML) return;
-  element.replaceChildren(...next.childNodes);
-  toCurrent(element);
+  const before = element.querySelector("[aria-current]");
+  renew(element, nodes);
+  if (element.querySelector("[aria-current]") !== before) toCurrent(element);
 }
 
 /** Scrolls a list to what is current in it. */
@@ -241,9 +240,9 @@ function showPanels(sinceLast: number): void {
   const whyNoTaking = desk?.whyNot("give");
   app.classList.toggle("leads", player !== undefined || (desk?.role === "instructor" && !session.isOver && whyNoSteps === undefined));
   show(card, panels.instruction(session));
-  show(sections.steps.body, panels.steps(session));
+  show(sections.steps.body, panels.steps(session, app.classList.contains("leads")));
   show(sections.people.body, panels.people(session, { leads: desk?.role === "instructor" && !session.isOver, hand: part?.handName, whyNoTaking: whyNoTaking && t(whyNoTaking) }));
-  show(sections.events.body, panels.events(session));
+  show(sections.events.body, panels.events(session, player !== undefined));
   show(status, panels.status(session, age));
   const over = coverOf(standing());
   cover.hidden = over === undefined;

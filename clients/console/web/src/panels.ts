@@ -106,7 +106,8 @@ function conditions(session: Session): Node[] {
   return rows.length === 0 ? [] : [h("ul", "conditions", ...rows)];
 }
 
-export function steps(session: Session): Node[] {
+/** `leads`: each can be gone to. */
+export function steps(session: Session, leads: boolean): Node[] {
   const list = session.steps;
   if (list.length === 0) return [h("p", "muted", t("step.none"))];
   let part = "";
@@ -116,7 +117,7 @@ export function steps(session: Session): Node[] {
     part = entry.part;
     const time = entry.seconds === undefined ? "" : `${n(entry.seconds, 1)} s`;
     const state = entry.phase === undefined ? h("span", "badge muted", t("step.ahead")) : badge(STEP[entry.phase]);
-    const row = h("li", entry.isNow ? "now" : entry.phase === undefined ? "ahead" : "", state, h("span", "name", titleOfStep(entry)), h("time", "", time));
+    const row = h("li", entry.isNow ? "now" : entry.phase === undefined ? "ahead" : "", state, h(leads ? "button" : "span", "name", titleOfStep(entry)), h("time", "", time));
     row.dataset["step"] = entry.name;
     if (entry.isNow) row.setAttribute("aria-current", "step");
     rows.push(row);
@@ -196,7 +197,8 @@ export function people(session: Session, { leads, hand, whyNoTaking }: Lead): No
 }
 
 /** Without "hand free", which only ends what "hand frozen" says, and with repetitions in one row. */
-export function events(session: Session): Node[] {
+/** `leads`: each can be gone to. */
+export function events(session: Session, leads: boolean): Node[] {
   const told: { event: EventLog; times: number }[] = [];
   for (const event of session.events) {
     const before = told[told.length - 1];
@@ -207,7 +209,7 @@ export function events(session: Session): Node[] {
   const rows = told.slice(-EVENTS_SHOWN).reverse().map(({ event, times }) => {
     const text = textOf(session, event);
     const kind = h("span", "kind", kindOf(event));
-    const row = h("li", ["", "warn", "bad"][event.severity] ?? "", h("time", "", clock(Number(event.tick) / 1000)), kind, h("span", "", times > 1 ? `${text} (×${times})` : text));
+    const row = h("li", ["", "warn", "bad"][event.severity] ?? "", h("time", "", clock(Number(event.tick) / 1000)), kind, h(leads ? "button" : "span", "text", times > 1 ? `${text} (×${times})` : text));
     row.dataset["tick"] = String(event.tick);
     return row;
   });
