@@ -10,12 +10,12 @@ tl::expected<void, Refused> checkIn(RunPhase phase, RunPhase expected, bool is_s
   if (isOver(phase)) return refuse(Refusal::kOver, "the run is over");
   const bool in_any_phase = kind == CommandKind::kRelease || kind == CommandKind::kSetCollision ||
                             kind == CommandKind::kStop || kind == CommandKind::kClearEmergencyStop ||
-                            kind == CommandKind::kFreezeForces || kind == CommandKind::kGuide;
+                            kind == CommandKind::kGuide;
   if (in_any_phase) return {};
   if (phase == RunPhase::kWaitingForPeople)
     return refuse(Refusal::kWaiting, "the session still waits for people: repeat the command once it runs");
   // a pause is what the clear of the stop leaves
-  if (is_stopped && kind != CommandKind::kPause)
+  if (is_stopped && kind != CommandKind::kPause && kind != CommandKind::kFreezeForces)
     return refuse(Refusal::kStopped, "the emergency stop stands: clear it first");
   const bool is_paused = expected == RunPhase::kPaused;
   if (kind == CommandKind::kResume && !is_paused)

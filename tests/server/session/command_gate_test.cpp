@@ -32,7 +32,7 @@ TEST(CommandGateTest, ACommandIsPossibleByThePhaseOfTheRun) {
       {CommandKind::kResume, kWaiting, kAlready, kNone, kOver},
       {CommandKind::kRelease, kNone, kNone, kNone, kOver},
       {CommandKind::kSetCollision, kNone, kNone, kNone, kOver},
-      {CommandKind::kFreezeForces, kNone, kNone, kNone, kOver},
+      {CommandKind::kFreezeForces, kWaiting, kNone, kNone, kOver},
       {CommandKind::kClearEmergencyStop, kNone, kNone, kNone, kOver},
       {CommandKind::kStop, kNone, kNone, kNone, kOver},
   };

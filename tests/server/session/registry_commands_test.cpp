@@ -153,7 +153,9 @@ TEST_F(RegistryCommands, ARefusalHasAKindForDisplays) {
 TEST_F(RegistryCommands, FrozenForcesAreAChange) {
   const ClientId instructor = join("b", Role::kInstructor).client;
   (void)changes();
-  EXPECT_TRUE(command(instructor, CommandKind::kFreezeForces, {}, 1.0).accepted) << "in any phase";
+  EXPECT_EQ(command(instructor, CommandKind::kFreezeForces, {}, 1.0).refusal, Refusal::kWaiting);
+  registry_.updatePhase(RunPhase::kPaused);
+  EXPECT_TRUE(command(instructor, CommandKind::kFreezeForces, {}, 1.0).accepted);
   const auto taken = changes();
   ASSERT_EQ(taken.size(), 1U);
   EXPECT_EQ(taken[0].kind, ChangeKind::kFreezeForces);
