@@ -20,6 +20,7 @@ namespace {
 
 constexpr std::int64_t kNanosecondsPerTick = 1'000'000;
 constexpr std::chrono::seconds kChunkAge{1};
+constexpr Tick kMostAhead = 1000;  // [ticks] of a hand, of the newest frame
 
 // of complete types alone: this file includes all messages
 template <class M>
@@ -167,7 +168,7 @@ std::optional<Tick> Recording::follow(const wire::RawSample& sample) {
   std::optional<Tick> tick = 0;
   wire::forEachTopic([&]<class M>(const wire::Topic<M>& topic) {
     if (sample.topic != topic.name) return;
-    if constexpr (HasTick<M> || std::same_as<M, PublishedSamples>) {
+    if constexpr (HasTick<M> || std::same_as<M, PublishedSamples> || std::same_as<M, HandState>) {
       auto message = wire::decode<M>(sample.bytes);
       if (!message) return;
       if constexpr (HasEpoch<M>)
@@ -178,6 +179,9 @@ std::optional<Tick> Recording::follow(const wire::RawSample& sample) {
         tick = message->tick;
         ++recorded_[std::string(topic.name)][periodOf(*tick)];
       }
+      if constexpr (std::same_as<M, HandState>)
+        // the input of each tick has its number; what is far off is not of this session
+        if (session_.lockstep) tick = std::min<Tick>(message->seq, newest_tick_ + kMostAhead);
       if constexpr (std::same_as<M, WorldFrame>) {
         if (first_tick_ == 0) first_tick_ = *tick;
         newest_tick_ = std::max(newest_tick_, *tick);

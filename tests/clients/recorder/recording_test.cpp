@@ -13,6 +13,7 @@
 #include "idl/record/mcap_reader.h"
 #include "idl/record/packed_inputs.h"
 #include "idl/types/messages/contacts.h"
+#include "idl/types/messages/hands.h"
 #include "idl/types/messages/journal.h"
 #include "idl/types/messages/log.h"
 #include "idl/types/messages/objects.h"
@@ -97,11 +98,18 @@ TEST_F(RecordingTest, InLockstepTheLogTimeAdvancesOneMillisecondPerTick) {
     add(recording, wire::kWorldFrame1k, WorldFrame{.tick = 100 * tick}, kStart);
     add(recording, wire::kEventLog, EventLog{.seq = tick, .tick = 100 * tick}, kStart + 5);
   }
+  for (const std::uint32_t tick : {310U, 320U, 4'000'000'000U})
+    add(recording, wire::kHandState100, HandState{.seq = tick}, kStart + 9);
   ASSERT_TRUE(recording.close());
   const auto found = times("EventLog");
   ASSERT_EQ(found.size(), 3U);
   EXPECT_EQ(found[1] - found[0], 100'000'000);
   EXPECT_EQ(found[2] - found[1], 100'000'000);
+  const auto hands = times("HandState_100");
+  ASSERT_EQ(hands.size(), 3U);
+  EXPECT_EQ(hands[0] - found[2], 10'000'000) << "whatever arrived before it";
+  EXPECT_EQ(hands[1] - found[2], 20'000'000);
+  EXPECT_EQ(hands[2] - found[2], 1'000'000'000) << "of a number that is wrong";
 }
 
 TEST_F(RecordingTest, FramesOfAnotherServerEpochDoNotAdvanceTheLogTime) {
