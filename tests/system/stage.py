@@ -68,7 +68,8 @@ class Process:
                                       stdin=subprocess.DEVNULL, stderr=subprocess.STDOUT, text=True,
                                       env={**os.environ, **(env or {})})
         self.changed = threading.Condition()
-        threading.Thread(target=self.listen, daemon=True).start()
+        self.listener = threading.Thread(target=self.listen, daemon=True)
+        self.listener.start()
 
     def listen(self):
         for line in self.popen.stdout:
@@ -100,8 +101,11 @@ class Process:
                 self.changed.wait(min(remaining, 1))
 
     def wait(self, seconds=300):
+        """The exit code; all output is in text() then, but what a program that it left behind may print."""
         try:
-            return self.popen.wait(seconds)
+            code = self.popen.wait(seconds)
+            self.listener.join(5)
+            return code
         except subprocess.TimeoutExpired:
             raise AssertionError(f"{self.name} did not end in {seconds} s; its output:\n{self.text()[-4000:]}") from None
 
