@@ -9,7 +9,7 @@
 namespace tenon {
 
 /// The time of steps, as their time limits are counted: it stands in pauses and while an emergency stop
-/// stands, and goes on while forces are frozen.
+/// stands, and runs while forces are frozen.
 ///
 /// Threads: one at a time. Real-time: no.
 class StepClock {

@@ -54,6 +54,16 @@ def memory(process):
     return int(re.search(r"VmRSS:\s+(\d+)", status)[1]) / 1024
 
 
+def recorded(test, stage):
+    """The recording of a whole session."""
+    recording = stage.out / "session.mcap"
+    server = stage.serve(SCENARIO, "--wait-for", "right,recorder")
+    recorder = stage.start("record", "-o", recording)
+    stage.start("trainee", "--seed", 1)
+    test.assertEqual((server.wait(), recorder.wait()), (0, 0), server.text())
+    return recording
+
+
 def taken_of(connection, frame, seconds):
     """Bytes that the other side takes of a frame that is sent again and again for so long."""
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 16)
@@ -712,11 +722,7 @@ class Page(unittest.TestCase):
 
     def test_a_recording_shows_its_parts_where_there_are_no_assets_and_in_public_viewers(self):
         with Stage() as stage, Browser() as browser:
-            recording = stage.out / "session.mcap"
-            server = stage.serve(SCENARIO, "--wait-for", "right,recorder")
-            recorder = stage.start("record", "-o", recording)
-            stage.start("trainee", "--seed", 1)
-            self.assertEqual((server.wait(), recorder.wait()), (0, 0), server.text())
+            recording = recorded(self, stage)
             _, port = start_console(stage, 0, "--cache", stage.out / "empty", shown=[recording])
             browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
             browser("await", expression="tenon.view?.models >= 3")
@@ -739,11 +745,7 @@ class Page(unittest.TestCase):
 
     def test_a_recording_is_played_without_a_server(self):
         with Stage() as stage, Browser() as browser:
-            recording = stage.out / "session.mcap"
-            server = stage.serve(SCENARIO, "--wait-for", "right,recorder")
-            recorder = stage.start("record", "-o", recording)
-            stage.start("trainee", "--seed", 1)
-            self.assertEqual((server.wait(), recorder.wait()), (0, 0), server.text())
+            recording = recorded(self, stage)
             _, port = start_console(stage, shown=[recording])
             browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
             browser("await", expression="tenon.player !== undefined && tenon.session.steps.length === 2")
