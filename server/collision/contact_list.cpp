@@ -21,7 +21,8 @@ Wrench penaltyWrench(const PairQueryResult& result, const Vector3& p_WAo, double
   return F_Ao_W;
 }
 
-std::size_t selectRepresentatives(const ContactList& contacts, std::span<std::uint32_t> out) noexcept {
+std::size_t selectRepresentatives(const ContactList& contacts, std::span<std::uint32_t> out,
+                                  std::size_t given) noexcept {
   // metric: a difference of 1 between unit normals counts as much as the extent of all contacts
   std::size_t chosen = 0;
   std::size_t active = 0;
@@ -39,11 +40,12 @@ std::size_t selectRepresentatives(const ContactList& contacts, std::span<std::ui
     ++active;
   }
   const std::size_t wanted = std::min(out.size(), active);
-  if (wanted == 0) return 0;
+  if (wanted <= given) return given;
   const double extent2 = std::max(box_W.diagonal().squaredNorm(), 1e-12);
 
   std::size_t count = 0;
   while (true) {
+    if (count < given) chosen = out[count];
     out[count++] = static_cast<std::uint32_t>(chosen);
     if (count == wanted) return count;
     const Contact& last = contacts[chosen];

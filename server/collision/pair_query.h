@@ -149,9 +149,10 @@ struct ResampledPart {
 [[nodiscard]] Wrench penaltyWrench(const PairQueryResult& result, const Vector3& p_WAo,
                                    double stiffness) noexcept;
 
-/// Selects at most `out.size()` contacts that represent all: the smallest gap, then always the one that
-/// differs most from those selected in position and normal. Dormant crossings are none. Writes indices into
-/// `contacts` in order of selection and returns their number.
-std::size_t selectRepresentatives(const ContactList& contacts, std::span<std::uint32_t> out) noexcept;
+/// Selects at most `out.size()` contacts that represent all: the first `given` indices of `out`, or without
+/// any the smallest gap, then always the one that differs most from those selected in position and normal.
+/// Dormant crossings are none. Writes indices into `contacts` in order of selection and returns their number.
+std::size_t selectRepresentatives(const ContactList& contacts, std::span<std::uint32_t> out,
+                                  std::size_t given = 0) noexcept;
 
 }  // namespace tenon::collision

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <array>
+#include <numeric>
+#include <span>
 
 #include "server/simulation/engine.h"
 #include "server/simulation/environment.h"
@@ -7,23 +9,50 @@
 namespace tenon::simulation {
 namespace {
 
-/// Contacts of all pairs of one object, with the pair of each.
+/// Contacts of all pairs of one object, with the pair of each; first those that hold it.
 struct Gathered {
   collision::ContactList contacts;
   std::array<std::uint16_t, collision::kMaxPairContacts> pair;
+  std::size_t holding = 0;
 };
+
+using Chosen = std::array<std::uint32_t, kManifoldContacts>;
 
 /// [-] cos(15 deg): for small motions, contacts of one pair with closer normals represent each other.
 constexpr double kSameNormal = 0.966;
 
-/// Adds the reduced contacts of a pair: reduced per pair, so that no pair displaces the contacts of another.
-void gather(const collision::ContactList& contacts, std::size_t pair, Gathered& all) {
-  std::array<std::uint32_t, kManifoldContacts> chosen{};
-  const std::size_t count = collision::selectRepresentatives(contacts, chosen);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!all.contacts.push_back(contacts[chosen[i]])) return;
+/// The contacts of a pair that have a force, as far as there is room. Returns their number.
+std::size_t findHolding(const collision::IslandPairResult& result, Chosen& chosen) {
+  std::size_t count = 0;
+  for (std::size_t c = 0; c < result.query.contacts.size() && count < chosen.size(); ++c) {
+    if (result.multipliers[c] > 0.0) chosen[count++] = static_cast<std::uint32_t>(c);
+  }
+  return count;
+}
+
+/// Adds contacts of a pair.
+void add(const collision::ContactList& contacts, std::span<const std::uint32_t> chosen, std::size_t pair,
+         Gathered& all) {
+  for (const std::uint32_t c : chosen) {
+    if (!all.contacts.push_back(contacts[c])) return;
     all.pair[all.contacts.size() - 1] = static_cast<std::uint16_t>(pair);
   }
+}
+
+void gatherHolding(const collision::IslandPairResult& result, std::size_t pair, Gathered& all) {
+  Chosen chosen{};
+  const std::size_t count = std::min(findHolding(result, chosen), kManifoldContacts - all.holding);
+  add(result.query.contacts, {chosen.data(), count}, pair, all);
+  all.holding += count;
+}
+
+/// Adds what represents the contacts of a pair beside those that hold: reduced per pair, so that no pair
+/// displaces the contacts of another.
+void gatherOthers(const collision::IslandPairResult& result, std::size_t pair, Gathered& all) {
+  Chosen chosen{};
+  const std::size_t holding = findHolding(result, chosen);
+  const std::size_t count = collision::selectRepresentatives(result.query.contacts, chosen, holding);
+  add(result.query.contacts, std::span(chosen).first(count).subspan(holding), pair, all);
 }
 
 Vector3 velocityAt(const ObjectMotion& object, const Vector3& p_WP) {
@@ -214,13 +243,17 @@ void Environment::listNeighbours(HandId hand, HandManifold& out) const noexcept 
 void Environment::listContacts(ObjectId object, HandManifold& out) const noexcept {
   Gathered all;
   out.validity_radius = engine_->limits.contact_margin;
-  for (const std::uint32_t i : engine_->near) {
-    const CollPair& pair = engine_->pairs[i];
-    if (!active(i) || (pair.spec().a != object && pair.spec().b != object)) continue;
-    if (pair.hasContacts()) gather(pair.result()->query.contacts, i, all);
+  // at the pose of the solve they alone give its force
+  for (const auto gather : {gatherHolding, gatherOthers}) {
+    for (const std::uint32_t i : engine_->near) {
+      const CollPair& pair = engine_->pairs[i];
+      if (!active(i) || (pair.spec().a != object && pair.spec().b != object)) continue;
+      if (pair.hasContacts()) gather(*pair.result(), i, all);
+    }
   }
-  std::array<std::uint32_t, kManifoldContacts> chosen{};
-  const std::size_t count = collision::selectRepresentatives(all.contacts, chosen);
+  Chosen chosen{};
+  std::iota(chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(all.holding), 0U);
+  const std::size_t count = collision::selectRepresentatives(all.contacts, chosen, all.holding);
   for (std::size_t i = 0; i < count; ++i) {
     const CollPair& pair = engine_->pairs[all.pair[chosen[i]]];
     const bool held_is_a = pair.spec().a == object;

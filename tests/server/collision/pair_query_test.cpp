@@ -292,6 +292,24 @@ TEST(SelectRepresentatives, SelectsAContactOfADifferentNormal) {
   EXPECT_EQ(selectRepresentatives(none, chosen), 0U);
 }
 
+//   0 1 2 ... 9   in a row: beside 5 and 3 the ends differ most, 9 more than 0
+TEST(SelectRepresentatives, ThoseThatAreGivenComeFirst) {
+  ContactList contacts;
+  for (std::uint32_t i = 0; i < 10; ++i) {
+    Contact contact;
+    contact.p_WP = Vector3(0.001 * i, 0.0, 0.0);
+    contact.n_W = Vector3::UnitZ();
+    contact.gap = i == 7 ? -0.001 : 0.0;
+    contacts.push_back(contact);
+  }
+  std::array<std::uint32_t, 4> chosen{5, 3};
+  ASSERT_EQ(selectRepresentatives(contacts, chosen, 2), 4U);
+  EXPECT_EQ(chosen, (std::array<std::uint32_t, 4>{5, 3, 9, 0}));
+  std::array<std::uint32_t, 2> full{5, 3};
+  ASSERT_EQ(selectRepresentatives(contacts, full, 2), 2U);
+  EXPECT_EQ(full, (std::array<std::uint32_t, 2>{5, 3}));
+}
+
 TEST(SelectRepresentatives, DormantCrossingsAreNone) {
   ContactList contacts;
   for (std::uint32_t i = 0; i < 40; ++i) {

@@ -1,9 +1,11 @@
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "server/collision/motion_solver.h"
 #include "server/simulation/environment.h"
 #include "tests/server/collision/baked_pair.h"
 #include "tests/server/simulation/small_scene.h"
@@ -136,6 +138,61 @@ TEST(Manifold, ContainsTheVelocityOfTheOtherBody) {
   EXPECT_EQ(manifold.bodies[0].object, cube);
   EXPECT_EQ(manifold.bodies[0].epoch, environment.objects()[cube.value].epoch);
   EXPECT_GT(manifold.bodies[0].epoch, 0U);
+}
+
+/// [m] By how much a station's problem, of the object, the hand's spring and the listed planes, moves any
+/// point of the object.
+double stationMoves(const Environment& environment, HandId hand) {
+  HandManifold manifold;
+  environment.manifold(hand, manifold);
+  collision::MovableBody body;
+  body.X_WB = manifold.X_WO;
+  body.radius = std::sqrt(0.75) * kCubeEdge;
+  body.springs.push_back({environment.hands()[hand.value].X_WH * manifold.X_HO,
+                          manifold.X_HO.inverse().translation(), manifold.stiffness,
+                          manifold.rotational_stiffness});
+  std::vector<collision::ContactConstraint> planes;
+  for (const ManifoldContact& contact : manifold.contacts) {
+    const Pose& X_WA = environment.objects()[contact.other.value].X_WO;
+    planes.push_back({.body_a = 0,
+                      .n_W = X_WA.rotation() * contact.normal_A.cast<double>(),
+                      .p_WP = manifold.X_WO * contact.p_BoP_B.cast<double>(),
+                      .gap = gapOf(contact, manifold.X_WO, X_WA)});
+  }
+  collision::MotionSolver solver(1, kManifoldContacts);
+  std::vector<Displacement> motion(1);
+  solver.solve({&body, 1}, planes, motion, {});
+  return maxPointMotion(motion[0], body.radius);
+}
+
+//   | |##||   a cube lies flush in a corner, 0.2 mm from two further walls, and the hand goes to and fro and
+//   |~~~~~|   turns: hundreds of contacts within the margin, of which a few hold the cube
+TEST(Manifold, ListsTheContactsThatHoldTheObject) {
+  test::SmallScene small;
+  constexpr double kThick = 0.03, kPlay = 2e-4;  // [m]
+  constexpr double kAway = 0.5 * (kCubeEdge + kThick);
+  const ObjectId held = small.object("held", test::cubeShape(), Vector3::Zero());
+  const HandId hand = small.hand("right", held);
+  for (const Vector3& side : {Vector3(0.0, 0.0, -1.0), Vector3(1.0, 0.0, 0.0), Vector3(-1.0, 0.0, 0.0),
+                              Vector3(0.0, 1.0, 0.0), Vector3(0.0, -1.0, 0.0)}) {
+    const double play = side.sum() < 0.0 && side.z() == 0.0 ? kPlay : 0.0;
+    const Vector3 size = Vector3::Constant(0.1) + (kThick - 0.1) * side.cwiseAbs();
+    small.pair(held, small.object("wall " + std::to_string(side.dot(Vector3(1.0, 2.0, 3.0))),
+                                  test::boxShape(size), (kAway + play) * side));
+  }
+  Environment environment(small.build(), {});
+  test::activateHand(environment, hand, Vector3::Zero());
+  double largest = 0.0;
+  for (int tick = 0; tick < 300; ++tick) {
+    const double angle = 0.03 * tick, grows = std::min(1.0, 0.01 * tick);
+    const Vector3 goal(0.001 * std::sin(angle), 0.001 * std::cos(angle), -0.001);
+    environment.setHandPose(
+        hand, Pose(grows * goal, expRotation({0.02 * grows * std::sin(1.3 * angle), 0.0, 0.0})), {});
+    environment.step();
+    largest = std::max(largest, stationMoves(environment, hand));
+  }
+  EXPECT_GT(environment.hands()[hand.value].F_Ho_W.force.norm(), 1.0);
+  EXPECT_LT(largest, 3.0 * collision::kSettleTolerance);
 }
 
 //   <> <>   a bar beside the end of another one: their edges pass each other, and cross when the hand goes
