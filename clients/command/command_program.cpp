@@ -107,7 +107,8 @@ Result<void> CommandClient::sendOnce(const ParsedCommand& command, const Stop& s
   const auto until = std::chrono::steady_clock::now() + kPatience;
   const auto answered = [&] { return ack_ && ack_->id == message.id; };
   do {
-    if (stop || std::chrono::steady_clock::now() >= until)
+    if (stop) return fail("its answer is not awaited any more: the server may obey or not");
+    if (std::chrono::steady_clock::now() >= until)
       return fail("no answer from the server: it may hang or have ended");
     if (auto sent = commands_->write(message); !sent) return sent;
     (void)dispatchUntil(stop, kResend, [&] { return answered() || lost(); });

@@ -69,7 +69,8 @@ std::string nameOf(const ParsedCommand& command) {
 }
 
 /// A person at the keys. The space bar acts whenever it is pressed, also while a server is searched for or an
-/// answer is awaited; other keys act one after the other.
+/// answer is awaited; other keys act one after the other. What was pressed before the space bar and has not
+/// been sent is not sent any more, so that nothing clears the stop that came after it.
 class KeyDesk {
  public:
   KeyDesk(const wire::MembershipOptions& options, const std::vector<std::string>& signals,
@@ -109,7 +110,7 @@ class KeyDesk {
 
   /// Reads the keys that were pressed; of these the emergency stop acts at once.
   void listen() {
-    if (stop_) ended_ = true;
+    if (stop_) end();
     for (std::size_t read = 0; read < kMostKeys && !is_input_over_ && !ended_; ++read) {
       char key = 0;
       const KeyInput input = readKey(key);
@@ -118,15 +119,31 @@ class KeyDesk {
       if (is_input_over_) key = kLeaveKey;
       // what was pressed before it is done first, once there is a session
       const bool is_first = !client_ && keys_.empty() && !is_input_over_;
-      if (key == kLeaveKey && (is_coming_back_ || is_first)) ended_ = true;
-      if (key == kEmergencyKey) raise();
+      if (key == kLeaveKey && (is_coming_back_ || is_first)) end();
+      if (key == kEmergencyKey) {
+        raise();
+        is_interrupted_ = true;
+        dropKeys("the emergency stop came after it");
+        continue;
+      }
       if (!is_coming_back_ && (keys_.size() < kMostKeys || is_input_over_))
         keys_.push_back(key);
-      else if (key != kEmergencyKey && parseCommand(key, signals_))
+      else if (parseCommand(key, signals_))
         show(is_coming_back_ ? "not sent: the server is gone" : "not sent: too many keys wait");
     }
     raiser_->dispatch(milliseconds(0));
     tellOfRaises();
+  }
+
+  void end() { ended_ = is_interrupted_ = true; }
+
+  /// Keys that wait are not sent, but to leave is still done.
+  void dropKeys(const std::string& why) {
+    if (asked_) show(nameOf(*std::exchange(asked_, std::nullopt)) + ": not done: " + why);
+    std::erase_if(keys_, [&](char key) {
+      if (const auto command = parseCommand(key, signals_)) show(nameOf(*command) + ": not sent: " + why);
+      return key != kLeaveKey;
+    });
   }
 
   void raise() {
@@ -175,7 +192,7 @@ class KeyDesk {
     if (!client_->serverIsGone()) return stayOutside(lost);
     show(lost + "; waiting for one that resumes the session, " + kWhatIsLeft);
     is_coming_back_ = true;
-    asked_.reset();
+    dropKeys("the server is gone");
     std::string said;
     while (!ended_) {
       const auto back = client_->rejoin(ended_);
@@ -193,26 +210,35 @@ class KeyDesk {
     is_coming_back_ = false;
   }
 
+  /// The server has given the seat away, as after a silence that it alone has noticed.
+  void joinAgain() {
+    show("the server knows this seat no more; joining again, " + std::string(kWhatIsLeft));
+    dropKeys("it was pressed before");
+    client_.reset();
+    join();
+    if (client_) show("joined session '" + client_->sessionName() + "' again: press the key again");
+  }
+
   void act(char key) {
-    if (key == kLeaveKey) {
-      ended_ = true;
-      return;
-    }
+    if (key == kLeaveKey) return end();
     if (key == '?') show(keyLegend(signals_));
     auto command = key == 'y' ? std::exchange(asked_, std::nullopt) : parseCommand(key, signals_);
-    if (key == kEmergencyKey) command.reset();  // listen() has raised it
     const bool asks = key != 'y' && command && needsConsent(*command);
     asked_ = asks ? command : std::nullopt;
     if (asks) show(nameOf(*command) + ": press y to do it, any other key not to");
     if (!command || asks) return;
-    const auto sent = is_outside_ ? fail("not sent: " + why_outside_) : client_->send(*command, ended_);
+    is_interrupted_ = ended_.load();
+    const auto sent =
+        is_outside_ ? fail("not sent: " + why_outside_) : client_->send(*command, is_interrupted_);
     show(nameOf(*command) + ": " + (sent ? "accepted" : sent.error().what));
+    if (!is_outside_ && client_->refusal() == Refusal::kNotJoined && !client_->lost()) joinAgain();
   }
 
   wire::MembershipOptions options_;
   const std::vector<std::string>& signals_;
   const std::atomic<bool>& stop_;
-  std::atomic<bool> ended_{false};  ///< by a key or `stop_`
+  std::atomic<bool> ended_{false};           ///< by a key or `stop_`
+  std::atomic<bool> is_interrupted_{false};  ///< likewise, or by the space bar: no answer is awaited
   std::unique_ptr<StopRaiser> raiser_;
   std::unique_ptr<CommandClient> client_;
   std::deque<char> keys_;               ///< pressed, and not acted upon

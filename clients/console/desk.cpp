@@ -61,7 +61,17 @@ class Desk::Seat {
     waiting_.emplace_back(id, std::move(command));
     return {};
   }
+  /// What waits is not sent any more, so that nothing clears an emergency stop that came after it.
+  void dropWaiting() {
+    const std::scoped_lock lock(mutex_);
+    for (const auto& [id, command] : std::exchange(waiting_, {}))
+      answer_(viewer_, {.id = id,
+                        .text = "not sent: the emergency stop came after it",
+                        .role = std::string(roleName(options_.role)),
+                        .code = std::string(refusalName(Refusal::kStopped))});
+  }
   void stop() { stop_ = true; }
+  [[nodiscard]] bool isOf(const std::string& session) const { return options_.session == session; }
   [[nodiscard]] bool hasEnded() const { return has_ended_; }
   /// The server has given a role that leads the run.
   [[nodiscard]] bool leads() const { return leads_ && !has_ended_; }
@@ -125,10 +135,10 @@ class Desk::Seat {
   std::thread thread_;
 };
 
-Desk::Desk(SeatRights rights, std::filesystem::path recordings, Answer answer)
+Desk::Desk(SeatRights rights, std::filesystem::path recordings, std::filesystem::path assets, Answer answer)
     : rights_(std::move(rights)),
       answer_(std::move(answer)),
-      recordings_(std::move(recordings), rights_.domain, answer_) {}
+      recordings_(std::move(recordings), std::move(assets), rights_.domain, answer_) {}
 
 /// All end together, instead of one after the other.
 Desk::~Desk() {
@@ -175,6 +185,8 @@ void Desk::handle(ViewerId viewer, const std::string& session, const DeskRequest
   }
   const std::scoped_lock lock(mutex_);
   if (!parsed->command) {
+    for (const auto& [of, seat] : seats_)
+      if (session.empty() || seat->isOf(session)) seat->dropWaiting();
     const std::string reason = parsed->text.empty() ? "requested" : parsed->text;
     if (stopperOf(session).add(viewer, request.id, reason)) return;
     answer.text = "too many emergency stops of this page wait for an answer";

@@ -30,8 +30,8 @@ class Desk {
  public:
   using Answer = Stopper::Answer;
 
-  /// `recordings`: folder for those that are started here; empty: none are.
-  Desk(SeatRights rights, std::filesystem::path recordings, Answer answer);
+  /// `recordings`: folder for those that are started here; empty: none are. `assets`: of display models.
+  Desk(SeatRights rights, std::filesystem::path recordings, std::filesystem::path assets, Answer answer);
   ~Desk();
   Desk(const Desk&) = delete;
   Desk& operator=(const Desk&) = delete;
@@ -44,6 +44,8 @@ class Desk {
   /// Prepares emergency stops for these sessions, so that they take effect at once; empty: for all. What was
   /// prepared for others ends when a server has heard what was raised there.
   void expect(const std::set<std::string>& sessions);
+  /// Whether a recording that was started here runs.
+  [[nodiscard]] bool records(const std::string& session) { return recordings_.records(session); }
 
  private:
   class Seat;

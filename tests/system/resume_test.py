@@ -213,8 +213,14 @@ class KilledServer(unittest.TestCase):
             try:
                 press("p", "pause: accepted")
                 time.sleep(1)  # until the journal has it
+                # what waits for an answer of a hung server is not sent to the next one
+                server.signal(signal.SIGSTOP)
+                keys.stdin.write("pny")
+                keys.stdin.flush()
+                time.sleep(0.5)
                 kill(server)
                 press("", "waiting for one that resumes the session, space still stops every device")
+                press("", "skip: not sent: the server is gone")
                 server, _ = resume(stage)
                 press("", "joined session 'test' again")
                 press("r", "resume: accepted")

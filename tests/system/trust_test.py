@@ -240,6 +240,50 @@ class EmergencyStop(unittest.TestCase):
             self.assertIn("reset: press y to do it", seen)
             self.assertIn("space still stops every device", said)
 
+    def test_keys_that_wait_are_not_sent_after_the_space_bar(self):
+        with Stage(lockstep=False) as stage:
+            server, _ = peg_session(stage, "test")
+            server.wait_for("run: running", 120)
+            self.assertEqual(tenon("command", "emergency", "--domain", stage.domain, "--session", "test").returncode, 0)
+            server.wait_for("run: emergency stop", 30)
+            keys = subprocess.Popen([PROGRAMS / "tenon-command", "--keys", "--session", "test", "--domain", str(stage.domain)],
+                                    stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+            said, _ = keys.communicate("ncr ?q", timeout=60)
+            for what in ("skip", "clear", "resume"):
+                self.assertRegex(said, f"(?m)^{what}: not (sent|done): the emergency stop came after it$")
+            self.assertIn("emergency: accepted", said)
+            server.wait_for("engaged by command line", 30)
+            self.assertNotIn("cleared by", server.text())
+
+    def test_a_seat_that_was_lost_in_silence_is_taken_again_by_the_keys(self):
+        with Stage(lockstep=False) as stage:
+            server, _ = peg_session(stage, "test")
+            server.wait_for("run: running", 120)
+            keys = subprocess.Popen([PROGRAMS / "tenon-command", "--keys", "--session", "test", "--domain", str(stage.domain)],
+                                    stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
+
+            def press(key):
+                """What is said of it."""
+                keys.stdin.write(key)
+                keys.stdin.flush()
+                line = keys.stdout.readline()
+                while line and not re.match(r"pause: |resume: |not sent", line):
+                    line = keys.stdout.readline()
+                return line
+
+            try:
+                self.assertEqual(press("p"), "pause: accepted\n")
+                # a machine that sleeps: it has heard nothing of the loss
+                keys.send_signal(signal.SIGSTOP)
+                server.wait_for(r"command line \(instructor\) has left", 30)
+                keys.send_signal(signal.SIGCONT)
+                end = time.monotonic() + 30
+                while (said := press("r")) != "resume: accepted\n":
+                    self.assertLess(time.monotonic(), end, said)
+                    time.sleep(0.2)
+            finally:
+                keys.communicate("q", timeout=60)
+
     def test_with_a_wrong_key_the_space_bar_still_raises_it(self):
         with Stage(lockstep=False) as stage:
             server, trainee = peg_session(stage, "test")
