@@ -9,6 +9,7 @@
 #include "clients/haptic/haptic_hand.h"
 #include "clients/simulated_person/people.h"
 #include "clients/simulated_person/posture.h"
+#include "clients/station/tracked_input.h"
 #include "devices/mounted_device.h"
 #include "devices/simulated/body_tracker.h"
 #include "devices/simulated/simulated_device.h"
@@ -35,17 +36,6 @@ Pose startOf(std::span<const SceneObject> objects, ObjectId moved, std::size_t i
 
 // [ticks] of a body part's inputs: it feels vibrations, and moves nothing that a hand holds
 constexpr std::uint8_t kTrackedPeriod = 4;
-
-/// Fills the input of a tracked body part at X_WH; its velocity is a difference quotient.
-void track(DeviceInput& input, std::uint32_t seq, const Pose& X_WH, const haptic::WorldView& world) {
-  const Displacement moved = displacement(input.sample.X_WH, X_WH);
-  const bool first = !input.active;
-  input.sample = {
-      seq, X_WH, first ? Twist{} : Twist{moved.translation / kTickSeconds, moved.rotation / kTickSeconds}, 0};
-  input.active = true;
-  input.period = kTrackedPeriod;
-  input.server_epoch = world.serverEpoch();
-}
 
 /// A device of the catalog; its arms share a clutch.
 struct OpenDevice {
@@ -399,12 +389,14 @@ void DeviceStation::trackBody(std::uint32_t seq) noexcept {
     parts_->tracker->read(kTracked[i].body, reading);
     if (!input.hand.valid()) continue;
     if (reading.visible) {
-      track(input, seq, reading.X_TB, world_);
+      setTrackedPose(input, reading.X_TB, kTickSeconds);
     } else {
       input.active = false;
-      input.sample.seq = seq;
       input.sample.V_WH = {};
     }
+    input.sample.seq = seq;
+    input.period = kTrackedPeriod;
+    input.server_epoch = world_.serverEpoch();
     inputs_.push_back(input);
     HandState state;
     state.hand = input.hand;
