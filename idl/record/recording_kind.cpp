@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <string_view>
+#include <utility>
+
+#include "idl/record/mcap_chunk.h"
+#include "idl/record/mcap_index.h"
 
 namespace tenon::record {
 
@@ -30,16 +34,25 @@ std::string refusalOfKind(const McapReader& reader, const std::filesystem::path&
   return {};
 }
 
-Result<void> checkPlayable(const std::filesystem::path& file) {
+Result<std::string> checkPlayable(const std::filesystem::path& file, const std::atomic<bool>& stop) {
   const auto reader = McapReader::open(file);
   if (!reader) return fail(reader.error().what);
   if (std::string refusal = refusalOfKind(*reader, file); !refusal.empty()) return fail(std::move(refusal));
-  if (!reader->complete())
-    return fail(
-        file.string() +
-        ": was cut off before its end, so it has no index by which it could be played; `tenon report " +
-        file.string() + "` reads what is there");
-  return {};
+  const auto refuse = [&file](const std::string& why) {
+    return fail(file.string() + ": " + why + ", so it cannot be played; `tenon report " + file.string() +
+                "` reads what is whole");
+  };
+  if (!reader->complete()) return refuse("was cut off before its end and has no index");
+  mcap::MappedFile mapped;
+  const auto bytes = mapped.map(file);
+  if (!bytes) return fail(bytes.error().what);
+  const mcap::IndexFindings findings = mcap::checkIndex(*bytes, stop);
+  if (!findings.problem.empty()) return refuse(findings.problem);
+  std::string remark = reader->problem();
+  if (findings.skipped > 0)
+    remark += (remark.empty() ? file.string() + ": " : "; ") + std::to_string(findings.skipped) +
+              " of its chunks are not in its index and are not played";
+  return remark;
 }
 
 }  // namespace tenon::record

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <string>
 
@@ -11,10 +12,13 @@ namespace tenon::record {
 /// Why an MCAP file is no recording of a session, what it is instead, and what reads it; empty: it is one.
 [[nodiscard]] std::string refusalOfKind(const McapReader& reader, const std::filesystem::path& file);
 
-/// Fails with a sentence when a player cannot play `file`: it is no recording of a session, or was cut off,
-/// and so has no index.
+/// Fails with a sentence, and what reads it, when a player cannot play `file`: it is no recording of a
+/// session, it was cut off and so has no index, its index is wrong, or a chunk is damaged: nearly each one
+/// has states and events, all of which a player reads before it begins. Else the damage that it can be played
+/// with, or nothing. Reads all of the file, unless `stop` is set meanwhile.
 ///
 /// Threads: any. Real-time: no.
-[[nodiscard]] Result<void> checkPlayable(const std::filesystem::path& file);
+[[nodiscard]] Result<std::string> checkPlayable(const std::filesystem::path& file,
+                                                const std::atomic<bool>& stop);
 
 }  // namespace tenon::record
