@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,6 +22,10 @@ inline constexpr std::string_view kLogLines = "/log";  ///< Log: events of the s
 inline constexpr std::string_view kTarget = "target";  ///< entity: the ghost of the part to be mounted
 inline constexpr std::uint64_t kTargetInstance = 1ULL << 32U;
 
+/// The first level of each object, by ObjectId, in the list of a scene's display models, which is the asset
+/// SessionAnnounce::scene_hash; empty: it has none.
+[[nodiscard]] std::vector<std::string> firstLevels(std::span<const std::uint8_t> list);
+
 struct DisplayMessage {
   std::string_view topic;      ///< kFrames, kModels or kLogLines
   std::string entity;          ///< of kModels: that the message shows or deletes
@@ -30,7 +35,8 @@ struct DisplayMessage {
 };
 
 /// Turns the samples of a session into messages that public viewers display: each object as an entity with
-/// the first level of its display model, or a box where the store has none, in a frame that moves it.
+/// the first level of its display model, or a box where the store has none, in a frame that moves it. Both
+/// are named object/NAME: a name in a scenario is any text, that of another frame or entity as well.
 ///
 /// Threads: one. Real-time: no.
 class DisplayedScene {
@@ -44,23 +50,39 @@ class DisplayedScene {
   /// All frames, since viewers may get the newest message alone; none when no pose has come since the last
   /// call.
   [[nodiscard]] std::optional<DisplayMessage> frames();
+  /// Shows with its model what is a box because the store had none, and has it now. `time_ns`: of now.
+  [[nodiscard]] std::vector<DisplayMessage> showModels(std::int64_t time_ns);
+  /// Names of objects that were shown as boxes at last because the store had not their models.
+  [[nodiscard]] std::vector<std::string> boxes() const;
 
  private:
+  struct Model {
+    std::vector<std::uint8_t> bytes;  ///< empty: a box
+    bool is_missing = false;          ///< there is one, which the store has not
+  };
   struct Part {
     SceneObject object;
     ObjectState state;
     bool is_placed = false;  ///< a state has arrived
     bool is_shown = false;   ///< its entity is published
+    bool is_box = false;     ///< because its model was missing
   };
 
   void receiveState(const ObjectState& state, std::int64_t time_ns, std::vector<DisplayMessage>& messages);
   void receiveStep(const StepState& step, std::int64_t time_ns, std::vector<DisplayMessage>& messages);
   void showOrHide(std::uint32_t id, std::int64_t time_ns, std::vector<DisplayMessage>& messages);
-  [[nodiscard]] std::vector<std::uint8_t> modelOf(ObjectId id) const;
+  [[nodiscard]] DisplayMessage objectMessage(std::uint32_t id, std::int64_t time_ns, Model model);
+  [[nodiscard]] DisplayMessage targetMessage(std::int64_t time_ns, Model model);
+  void readList();
+  [[nodiscard]] Model modelOf(ObjectId id) const;
 
   wire::AssetStore assets_;
+  std::string scene_hash_;
+  bool has_list_ = false;            ///< of models
   std::vector<std::string> models_;  ///< assets by ObjectId; empty: none
   std::map<std::uint32_t, Part> parts_;
+  StepState target_;                    ///< whose target is shown
+  bool is_target_box_ = false;          ///< because its model was missing
   std::map<std::uint32_t, Pose> X_WH_;  ///< devices by HandId
   std::int64_t moved_ns_ = 0;           ///< [ns] of the newest pose that frames() has not told; 0: none
 };

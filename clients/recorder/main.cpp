@@ -30,6 +30,9 @@ int run(int argc, char** argv) {
   tenon::wire::addKeyOption(
       app, options.key_file,
       "file of the session's key, which a server beyond loopback may ask for (default: yours)");
+  app.add_option("--assets", options.assets_url,
+                 "where display models are fetched that the cache does not have: a console at the server")
+      ->option_text("http://HOST:PORT");
   app.add_flag("--all", options.all,
                "also the streams of 1 kHz, sample by sample: about three times as large a file");
   app.add_flag("--lockstep", options.lockstep, "refuse a session that does not run in lockstep");
@@ -67,6 +70,10 @@ int run(int argc, char** argv) {
   for (const tenon::recorder::TopicCount& count : recorded->counts)
     options.report("  " + count.topic + ": " + std::to_string(count.recorded) + " of " +
                    std::to_string(count.published) + " samples");
+  if (!recorded->boxes.empty())
+    options.report(status.file + ": public viewers show " + std::to_string(recorded->boxes.size()) +
+                   " objects as boxes, for their display models are not on this machine: --assets "
+                   "http://HOST:PORT names a console at the server, which has them");
   if (const std::uint64_t missing = recorded->missingTicks(); missing > 0) {
     std::fprintf(
         stderr,

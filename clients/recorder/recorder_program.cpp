@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "clients/recorder/model_fetch.h"
 #include "clients/recorder/recording.h"
 #include "idl/types/messages.h"
 #include "idl/types/printable_text.h"
@@ -69,7 +70,7 @@ class Recorder {
     if (status_writer_) tellStatus();
     if (!done) return fail(done.error().what);
     if (!closed) return fail(closed.error().what);
-    return RecordingReport{recording_->status(), recording_->counts()};
+    return RecordingReport{recording_->status(), recording_->counts(), recording_->boxes()};
   }
 
  private:
@@ -91,6 +92,7 @@ class Recorder {
   /// Writes what has arrived within `timeout`; the number of samples.
   std::size_t take(milliseconds timeout) {
     sayWhatIsLost();
+    showModels();
     return subscriber_->dispatch(timeout, [this](const wire::RawSample& sample) {
       const auto note = [&]<class M>(const wire::Topic<M>& topic, std::set<std::uint32_t>& known, auto id) {
         if (sample.topic != topic.name || sample.gone) return;
@@ -101,6 +103,13 @@ class Recorder {
       note(wire::kSceneStep, steps_, [](const SceneStep& step) { return step.step; });
       recording_->add(sample);
     });
+  }
+  /// Those that have come.
+  void showModels() {
+    if (models_ == nullptr) return;
+    if (models_->takeArrivals()) recording_->showModels();
+    for (const std::string& line : models_->takeLines())
+      if (options_.report) options_.report(line);
   }
   /// Of a server that had written more than can be kept before this program belonged to it.
   void sayWhatIsLost() {
@@ -122,6 +131,7 @@ class Recorder {
   const std::atomic<bool>& stop_;
   std::unique_ptr<wire::Membership> member_;
   std::unique_ptr<Recording> recording_;
+  std::unique_ptr<ModelFetch> models_;  ///< none: they are looked for on this machine alone
   std::unique_ptr<wire::RawSubscriber> subscriber_;
   std::unique_ptr<wire::Writer<RecorderStatus>> status_writer_;
   std::uint64_t lost_ = 0;                           ///< that is said
@@ -134,6 +144,9 @@ Result<void> Recorder::subscribe() {
                       wire::AssetStore(options_.assets));
   if (!recording) return fail(recording.error().what);
   recording_ = std::make_unique<Recording>(std::move(*recording));
+  if (!options_.assets_url.empty())
+    models_ = std::make_unique<ModelFetch>(wire::AssetStore(options_.assets), member_->announce().scene_hash,
+                                           options_.assets_url);
   auto subscriber = wire::RawSubscriber::open(member_->own(), kOwnTopics);
   if (!subscriber) return fail(subscriber.error().what);
   if (auto added = subscriber->add(member_->everything(), sessionTopics(options_.all)); !added) return added;

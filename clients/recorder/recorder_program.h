@@ -20,16 +20,18 @@ struct RecorderOptions {
   std::uint32_t domain = 0;
   std::filesystem::path key_file;  ///< of the session; empty: wire::defaultKeyFile()
   std::filesystem::path assets = defaultCache() / "assets";  ///< of wire::AssetStore: display models
-  bool all = false;                                          ///< Streams::kAll
-  bool lockstep = false;                                     ///< refuse a session that runs in real time
-  std::chrono::seconds timeout{10};                          ///< for a server to be found and to answer
-  std::function<void(const std::string&)> report;            ///< progress, one line per call; may be empty
+  std::string assets_url;  ///< of a console at the server, for those that are not there; empty: boxes
+  bool all = false;        ///< Streams::kAll
+  bool lockstep = false;   ///< refuse a session that runs in real time
+  std::chrono::seconds timeout{10};                ///< for a server to be found and to answer
+  std::function<void(const std::string&)> report;  ///< progress, one line per call; may be empty
 };
 
 /// What a recording holds.
 struct RecordingReport {
   RecorderStatus status;
   std::vector<TopicCount> counts;  ///< by topic
+  std::vector<std::string> boxes;  ///< names of objects that it shows as boxes, for lack of their models
 
   /// Ticks whose inputs are not in it: a re-simulation ends at the first of them.
   [[nodiscard]] std::uint64_t missingTicks() const;

@@ -126,22 +126,25 @@ void Recording::writeView(const wire::RawSample& sample, Tick tick) {
   wire::RawSample shown = sample;
   // what the server keeps for late joiners has times of before
   shown.source_ns = std::max(logTime(sample.source_ns, tick), start_ns_);
-  const auto add = [&](const foxglove::DisplayMessage& message, std::string_view topic,
-                       const foxglove::MessageType& type) {
+  shown_ns_ = std::max(shown_ns_, shown.source_ns);
+  for (const foxglove::DisplayMessage& message : view_.receive(shown)) writeView(message);
+  if (sample.topic != wire::kWorldFrame30.name) return;
+  if (const auto frames = view_.frames()) writeView(*frames);
+}
+
+void Recording::writeView(const foxglove::DisplayMessage& message) {
+  const auto add = [&](std::string_view topic, const foxglove::MessageType& type) {
     write(channelOf(topic, type.name, type.schema), message.time_ns, 0, message.bytes);
   };
-  for (const foxglove::DisplayMessage& message : view_.receive(shown)) {
-    if (message.topic == foxglove::kLogLines)
-      add(message, message.topic, foxglove::logType());
-    else
-      add(message,
-          message.instance == foxglove::kTargetInstance
-              ? fmt::format("/{}", foxglove::kTarget)
-              : fmt::format("{}/{}", foxglove::kModels, message.entity),
-          foxglove::sceneUpdateType());
-  }
-  if (sample.topic != wire::kWorldFrame30.name) return;
-  if (const auto frames = view_.frames()) add(*frames, frames->topic, foxglove::frameTransformsType());
+  if (message.topic == foxglove::kLogLines) return add(message.topic, foxglove::logType());
+  if (message.topic == foxglove::kFrames) return add(message.topic, foxglove::frameTransformsType());
+  add(message.instance == foxglove::kTargetInstance ? fmt::format("/{}", foxglove::kTarget)
+                                                    : fmt::format("{}/{}", foxglove::kModels, message.entity),
+      foxglove::sceneUpdateType());
+}
+
+void Recording::showModels() {
+  for (const foxglove::DisplayMessage& message : view_.showModels(shown_ns_)) writeView(message);
 }
 
 void Recording::writeSample(const wire::RawSample& sample, Tick tick) {
@@ -328,6 +331,9 @@ Result<void> Recording::close() {
   std::map<std::string, std::string> samples;
   for (const TopicCount& count : counts())
     samples[count.topic] = fmt::format("{} of {}", count.recorded, count.published);
+  if (const auto names = boxes(); was_whole && !names.empty())
+    keepProblem(
+        writer_.addMetadata("tenon models", {{"missing", fmt::format("{}", fmt::join(names, ", "))}}));
   if (was_whole && !samples.empty()) keepProblem(writer_.addMetadata("tenon samples", samples));
   const auto closed = writer_.close();
   if (was_whole) keepProblem(closed);

@@ -42,7 +42,8 @@ enum class Streams {
 ///
 /// Beside the samples it has what public viewers display by themselves (foxglove::DisplayedScene): after a
 /// seek a viewer knows the newest message of each channel alone, so each entity has a channel of its own,
-/// /scene/NAME, and the target /target.
+/// /scene/NAME, and the target /target. Objects that are boxes at the end for lack of their models are named
+/// in the metadata "tenon models".
 ///
 /// Threads: one at a time. Real-time: no.
 class Recording {
@@ -78,6 +79,10 @@ class Recording {
   [[nodiscard]] std::vector<TopicCount> counts() const;
   /// Whether the run is over and the server has stated what it published up to its end.
   [[nodiscard]] bool hasStatement() const;
+  /// The store of models has got some: what is shown without its model is shown with it from now on.
+  void showModels();
+  /// Names of objects that are boxes at last because the store has not their models.
+  [[nodiscard]] std::vector<std::string> boxes() const { return view_.boxes(); }
   /// So many samples came before the recorder belonged to their server and could not be kept.
   void lostBefore(std::uint64_t samples) { status_.lost = samples; }
   [[nodiscard]] bool runIsOver() const;
@@ -94,6 +99,7 @@ class Recording {
              std::span<const std::uint8_t> bytes);
   void writeSample(const wire::RawSample& sample, Tick tick);
   void writeView(const wire::RawSample& sample, Tick tick);
+  void writeView(const foxglove::DisplayMessage& message);
   void finishReduction();
   /// Whether the sample is written as it is.
   template <class M>
@@ -124,6 +130,7 @@ class Recording {
   Streams streams_;
   StreamReduction reduction_;
   foxglove::DisplayedScene view_;
+  std::int64_t shown_ns_ = 0;  ///< log time of the newest sample for it
   SessionAnnounce session_;
   std::map<std::string, std::uint16_t, std::less<>> channels_;
   RecorderStatus status_;

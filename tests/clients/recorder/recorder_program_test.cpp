@@ -1,8 +1,11 @@
 #include "clients/recorder/recorder_program.h"
 
+#include <atomic>
 #include <filesystem>
 #include <map>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,6 +19,7 @@
 #include "idl/types/messages/session.h"
 #include "idl/wire/codec.h"
 #include "tests/idl/wire/peer.h"
+#include "tests/idl/wire/range_server.h"
 
 namespace tenon::recorder {
 namespace {
@@ -24,7 +28,7 @@ namespace {
 class ServerMock {
  public:
   explicit ServerMock(std::uint32_t domain) : bus_(test::participant(domain)) {
-    EXPECT_TRUE(announce_.write({.session = "class", .title = "Peg and box"}));
+    announce({});
     EXPECT_TRUE(objects_.write({.object = ObjectId{0}, .name = "peg"}));
     EXPECT_TRUE(inbox_.on<Join>(lobby_, wire::kJoin, [this](const Join& join) {
       role_ = join.role;
@@ -37,6 +41,10 @@ class ServerMock {
                                           [this](const RecorderStatus& status) { status_ = status; }));
   }
 
+  void announce(const std::string& scene_hash) {
+    EXPECT_TRUE(announce_.write({.session = "class", .title = "Peg and box", .scene_hash = scene_hash}));
+  }
+
   std::shared_ptr<wire::Participant> bus_;
   wire::Partition lobby_{bus_, wire::kLobby};
   wire::Partition session_{bus_, wire::sessionPartition("class")};
@@ -45,6 +53,8 @@ class ServerMock {
   wire::Writer<Welcome> welcome_ = std::move(*wire::Writer<Welcome>::open(lobby_, wire::kWelcome));
   wire::Writer<SceneObject> objects_ =
       std::move(*wire::Writer<SceneObject>::open(session_, wire::kSceneObject));
+  wire::Writer<ObjectSnapshot> snapshots_ =
+      std::move(*wire::Writer<ObjectSnapshot>::open(session_, wire::kObjectSnapshot));
   wire::Writer<EventLog> events_ = std::move(*wire::Writer<EventLog>::open(session_, wire::kEventLog));
   wire::Writer<RunState> run_ = std::move(*wire::Writer<RunState>::open(session_, wire::kRunState));
   wire::Inbox inbox_;
@@ -122,6 +132,65 @@ TEST_F(RecorderProgramTest, StaysWhileAClientFloodsTheBusWithStopsAndNames) {
   EXPECT_EQ(found.at("EmergencyStop"), kStops);
   EXPECT_GE(found.at("Presence"), kNames);
   EXPECT_EQ(found.at("EventLog"), 1);
+}
+
+/// A recorder with an empty cache, of a session of one object with a display model.
+class RecorderModelsTest : public RecorderProgramTest {
+ protected:
+  RecorderModelsTest() {
+    options_.assets = folder_;
+    options_.report = [this](const std::string& line) {
+      lines_ += line + "\n";
+      if (line.find("display models") != std::string::npos) is_said_ = true;
+    };
+    server_.announce(wire::assetName(bytesOf(list_)));
+    ObjectSnapshot snapshot;
+    snapshot.state.object = ObjectId{0};
+    snapshot.state.status = static_cast<std::uint8_t>(ObjectStatus::kParked);
+    EXPECT_TRUE(server_.snapshots_.write(snapshot));
+  }
+  ~RecorderModelsTest() override { std::filesystem::remove_all(folder_); }
+  static std::vector<std::uint8_t> bytesOf(const std::string& text) { return {text.begin(), text.end()}; }
+  void recordUntilModelsAreSaid() {
+    start();
+    ASSERT_TRUE(test::dispatchUntil(server_.inbox_, [&] { return server_.status_.recording && is_said_; }));
+    ASSERT_TRUE(server_.run_.write({.phase = RunPhase::kSucceeded, .reason = "done"}));
+    thread_.join();
+    ASSERT_TRUE(result_) << result_.error().what;
+  }
+
+  const std::filesystem::path folder_ =
+      std::filesystem::temp_directory_path() / ("recorder_cache_" + std::to_string(getpid()));
+  const std::string model_ = "a model of a peg";
+  const std::string list_ = R"({"objects":[[{"model":")" + wire::assetName(bytesOf(model_)) + R"("}]]})";
+  std::string lines_;
+  std::atomic<bool> is_said_{false};
+};
+
+TEST_F(RecorderModelsTest, ModelsThatItsCacheLacksComeFromAConsoleAtTheServer) {
+  const test::RangeServer assets({bytesOf(list_), bytesOf(model_)});
+  options_.assets_url = assets.url();
+  recordUntilModelsAreSaid();
+  EXPECT_THAT(lines_, testing::HasSubstr("fetched display models: 1"));
+  EXPECT_THAT(result_->boxes, testing::IsEmpty());
+  std::string newest;
+  auto reader = record::McapReader::open(options_.file);
+  for (record::McapMessage message; reader->next(message);)
+    if (message.topic == "/scene/peg") newest.assign(message.data.begin(), message.data.end());
+  EXPECT_THAT(newest, testing::HasSubstr(model_));
+  EXPECT_EQ(reader->metadata().count("tenon models"), 0U);
+}
+
+TEST_F(RecorderModelsTest, WithoutThemItRecordsBoxesAndSaysSo) {
+  options_.assets_url = "http://127.0.0.1:1";
+  recordUntilModelsAreSaid();
+  EXPECT_THAT(lines_, testing::HasSubstr("display models are not fetched, objects without them are boxes: "
+                                         "http://127.0.0.1:1: does not answer"));
+  EXPECT_THAT(result_->boxes, testing::ElementsAre("peg"));
+  auto reader = record::McapReader::open(options_.file);
+  ASSERT_EQ(reader->metadata().count("tenon models"), 1U);
+  EXPECT_EQ(reader->metadata().find("tenon models")->second.at("missing"), "peg");
+  EXPECT_EQ(counts().at("/scene/peg"), 1);
 }
 
 TEST_F(RecorderProgramTest, ClosesItsFileWhenStopped) {

@@ -84,6 +84,33 @@ TEST_F(RecordingTest, PublicViewersFindEachObjectInAChannelOfItsOwnAndAllFramesI
   EXPECT_EQ(times("/log"), times("EventLog"));
 }
 
+TEST_F(RecordingTest, AModelThatComesLateIsShownFromThenOn) {
+  const std::filesystem::path folder = file_.string() + "_models";
+  const wire::AssetStore store{folder};
+  const std::vector<std::uint8_t> model{'a', ' ', 'm', 'o', 'd', 'e', 'l'};
+  const std::string list = R"({"objects":[[{"model":")" + wire::assetName(model) + R"("}]]})";
+  const auto hash = store.put({reinterpret_cast<const std::uint8_t*>(list.data()), list.size()});
+  ASSERT_TRUE(hash);
+  Recording recording = std::move(*Recording::open(file_, {.scene_hash = *hash}, Streams::kAll, store));
+  add(recording, wire::kSceneObject, {.object = ObjectId{0}, .name = "peg"}, kStart);
+  ObjectSnapshot snapshot;
+  snapshot.state.object = ObjectId{0};
+  snapshot.state.status = static_cast<std::uint8_t>(ObjectStatus::kParked);
+  add(recording, wire::kObjectSnapshot, snapshot, kStart);
+  EXPECT_THAT(recording.boxes(), ::testing::ElementsAre("peg"));
+  WorldFrame frame{.tick = 40};
+  add(recording, wire::kWorldFrame30, frame, 2 * kStart);  // after the announcement, which has today's time
+  ASSERT_TRUE(store.put(model));
+  recording.showModels();
+  EXPECT_THAT(recording.boxes(), ::testing::IsEmpty());
+  ASSERT_TRUE(recording.close());
+  const auto shown = times("/scene/peg");
+  ASSERT_EQ(shown.size(), 2U);
+  EXPECT_GE(shown[1], shown[0]);
+  EXPECT_EQ(shown[1], times("WorldFrame_30").at(0)) << "when it came";
+  std::filesystem::remove_all(folder);
+}
+
 TEST_F(RecordingTest, InRealTimeTheLogTimeIsTheSourceTime) {
   Recording recording = open(false);
   add(recording, wire::kWorldFrame1k, WorldFrame{.tick = 500}, kStart + 7);

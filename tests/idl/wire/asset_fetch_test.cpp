@@ -2,101 +2,24 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <poll.h>
-#include <sys/socket.h>
 #include <unistd.h>
+
+#include "tests/idl/wire/range_server.h"
 
 namespace tenon::wire {
 namespace {
 
 namespace fs = std::filesystem;
+using test::RangeServer;
 using testing::HasSubstr;
-
-/// Serves ranges of one file on loopback, as the console does; a request at a time.
-class RangeServer {
- public:
-  explicit RangeServer(std::vector<std::uint8_t> content) : content_(std::move(content)) {
-    listener_ = socket(AF_INET, SOCK_STREAM, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof address;
-    EXPECT_EQ(bind(listener_, reinterpret_cast<sockaddr*>(&address), size), 0);
-    EXPECT_EQ(listen(listener_, 8), 0);
-    EXPECT_EQ(getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &size), 0);
-    port_ = ntohs(address.sin_port);
-    thread_ = std::thread([this] { serve(); });
-  }
-  ~RangeServer() {
-    over_ = true;
-    thread_.join();
-    close(listener_);
-  }
-  [[nodiscard]] std::string url() const { return "http://127.0.0.1:" + std::to_string(port_); }
-
-  std::atomic<std::size_t> most_bytes = SIZE_MAX;  ///< of an answer; then the connection ends
-  std::atomic<bool> damages = false;
-  std::atomic<std::size_t> sent = 0;  ///< [bytes] of content
-  std::atomic<int> requests = 0;
-
- private:
-  void serve() {
-    while (!over_) {
-      pollfd entry{listener_, POLLIN, 0};
-      if (poll(&entry, 1, 20) <= 0) continue;
-      const int connection = accept(listener_, nullptr, nullptr);
-      answer(connection);
-      close(connection);
-    }
-  }
-  void answer(int connection) {
-    std::string request;
-    char buffer[4096];
-    while (request.find("\r\n\r\n") == std::string::npos) {
-      const ssize_t got = recv(connection, buffer, sizeof buffer, 0);
-      if (got <= 0) return;
-      request.append(buffer, static_cast<std::size_t>(got));
-    }
-    ++requests;
-    std::size_t first = 0, last = 0;
-    const std::size_t range = request.find("Range: bytes=");
-    if (range == std::string::npos || !request.starts_with("GET /assets/") ||
-        std::sscanf(request.c_str() + range, "Range: bytes=%zu-%zu", &first, &last) != 2)
-      return put(connection, "HTTP/1.1 404 Not Found\r\n\r\n");
-    last = std::min(last, content_.size() - 1);
-    std::string text = "HTTP/1.1 206 Partial Content\r\nContent-Range: bytes " + std::to_string(first) + "-" +
-                       std::to_string(last) + "/" + std::to_string(content_.size()) + "\r\n\r\n";
-    const std::size_t count = std::min(last + 1 - first, most_bytes.load());
-    text.append(reinterpret_cast<const char*>(content_.data()) + first, count);
-    if (damages) text.back() = static_cast<char>(text.back() ^ 1);
-    sent += count;
-    put(connection, text);
-  }
-  static void put(int connection, const std::string& text) {
-    for (std::size_t at = 0; at < text.size();) {
-      const ssize_t count = send(connection, text.data() + at, text.size() - at, MSG_NOSIGNAL);
-      if (count <= 0) return;
-      at += static_cast<std::size_t>(count);
-    }
-  }
-
-  std::vector<std::uint8_t> content_;
-  int listener_ = -1;
-  std::uint16_t port_ = 0;
-  std::atomic<bool> over_ = false;
-  std::thread thread_;
-};
 
 std::vector<std::uint8_t> content() {
   std::vector<std::uint8_t> bytes(std::size_t{40} << 20U);  // more than two ranges
@@ -117,7 +40,7 @@ class AssetFetchTest : public testing::Test {
 };
 
 TEST_F(AssetFetchTest, FetchesOnceSaysHowFarAndKeepsIt) {
-  RangeServer server(bytes_);
+  RangeServer server({bytes_});
   std::uint64_t last = 0;
   const auto fetched = fetchAsset(
       store_, name_, server.url(),
@@ -137,7 +60,7 @@ TEST_F(AssetFetchTest, FetchesOnceSaysHowFarAndKeepsIt) {
 }
 
 TEST_F(AssetFetchTest, GoesOnWhereItWasInterrupted) {
-  RangeServer server(bytes_);
+  RangeServer server({bytes_});
   server.most_bytes = 10U << 20U;
   const std::atomic<bool> stop = false;
   // the connection ends again and again, and so does the program
@@ -155,7 +78,7 @@ TEST_F(AssetFetchTest, GoesOnWhereItWasInterrupted) {
 }
 
 TEST_F(AssetFetchTest, OfProgramsThatShareAFolderOneFetches) {
-  RangeServer server(bytes_);
+  RangeServer server({bytes_});
   std::vector<std::vector<std::uint8_t>> got(4);
   std::vector<std::thread> programs;
   for (auto& mine : got)
@@ -169,7 +92,7 @@ TEST_F(AssetFetchTest, OfProgramsThatShareAFolderOneFetches) {
 }
 
 TEST_F(AssetFetchTest, WhatHasAnotherHashIsRefusedAndNotKept) {
-  RangeServer server(bytes_);
+  RangeServer server({bytes_});
   server.damages = true;
   const auto fetched = fetchAsset(store_, name_, server.url(), {}, stop_);
   ASSERT_FALSE(fetched);
@@ -185,7 +108,7 @@ TEST_F(AssetFetchTest, WhatIsNotThereIsASentence) {
               HasSubstr("expected http://"));
   std::string nobody;
   {
-    const RangeServer gone(bytes_);
+    const RangeServer gone({bytes_});
     nobody = gone.url();
   }
   EXPECT_THAT(fetchAsset(store_, name_, nobody, {}, stop_).error().what, HasSubstr("does not answer"));
