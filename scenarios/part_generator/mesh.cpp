@@ -33,8 +33,9 @@ void append(std::vector<char>& bytes, const void* data, std::size_t size) {
 }
 
 /// The attribute of an STL facet as most viewers and assimp read it: bit 15 says that it is a colour, of 5
-/// bits each for red, green and blue.
+/// bits each for red, green and blue; 0: none.
 std::uint16_t attributeOf(Color color) {
+  if (color == kUnpainted) return 0;
   std::uint32_t bits = 1;
   for (const std::uint32_t shift : {16U, 8U, 0U})
     bits = bits << 5U | (((color >> shift & 0xFFU) * 31 + 127) / 255);

@@ -12,6 +12,8 @@ namespace tenon::part_generator {
 
 /// 0xRRGGBB, sRGB.
 using Color = std::uint32_t;
+/// Of triangles that have the colour that a scenario gives their object.
+inline constexpr Color kUnpainted = 0xFFFFFFFF;
 
 /// Triangles as a CAD system exports them: shells that overlap, share no vertices and need not be closed.
 ///

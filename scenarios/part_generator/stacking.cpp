@@ -12,10 +12,10 @@ PartMesh tableTop(double detail) {
   return b.take();
 }
 
-/// A block of 60 mm, origin at its centre.
+/// A block of 60 mm, origin at its centre. Scenarios tell several of it apart by their colours.
 PartMesh block(double detail) {
   MeshBuilder b(detail);
-  b.paint(0xD98C2B);
+  b.paint(kUnpainted);
   b.box(Vector3::Constant(-0.030), Vector3::Constant(0.030));
   return b.take();
 }

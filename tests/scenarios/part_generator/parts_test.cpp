@@ -90,6 +90,10 @@ TEST(Parts, TheErrorNamesAFileThatCannotBeWritten) {
 //  |    | 40 |    |
 //  |    |____|    |  z = -60
 //  |______________|  z = -80
+TEST(Stacking, ABlockHasTheColourOfItsObject) {
+  for (const Color color : makePart(stackingParts(), "block", 0.0).paint) EXPECT_EQ(color, kUnpainted);
+}
+
 TEST(PegAndBox, HasAClearanceOfHalfAMillimetre) {
   const PartMesh box = makePart(pegAndBoxParts(), "box_with_hole", 0.0);
   const PartMesh peg = makePart(pegAndBoxParts(), "peg", 0.0);
