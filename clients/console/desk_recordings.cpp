@@ -49,8 +49,8 @@ class DeskRecordings::One {
   /// `begun`, then `ended`, are called by the thread; `begun` not when it fails before.
   One(recorder::RecorderOptions options, const Answer& answer, ViewerId viewer, std::uint32_t request)
       : options_(std::move(options)), answer_(answer), asker_(Asker{viewer, request}) {
-    options_.report = [this](const std::string& text) {
-      if (asker_) answer_(asker_->first, {.id = asker_->second, .accepted = true, .text = printable(text)});
+    options_.report = [this](const std::string&) {
+      if (asker_) answer_(asker_->first, {.id = asker_->second, .accepted = true, .text = fileName()});
       asker_.reset();
     };
     thread_ = std::thread([this] { run(); });
@@ -75,12 +75,11 @@ class DeskRecordings::One {
  private:
   using Asker = std::pair<ViewerId, std::uint32_t>;
 
+  [[nodiscard]] std::string fileName() const { return options_.file.filename().string(); }
   void run() {
     const auto recorded = recorder::recordSession(options_, stop_);
     const std::scoped_lock lock(mutex_);
-    const std::string text = recorded ? fmt::format("{}: {} messages", options_.file.filename().string(),
-                                                    recorded->status.messages)
-                                      : recorded.error().what;
+    const std::string text = recorded ? fileName() : recorded.error().what;
     for (const auto& waiting : {asker_, stopper_})
       if (waiting)
         answer_(waiting->first,
@@ -97,8 +96,8 @@ class DeskRecordings::One {
   std::thread thread_;
 };
 
-DeskRecordings::DeskRecordings(fs::path folder, std::uint32_t domain, const Answer& answer)
-    : folder_(std::move(folder)), domain_(domain), answer_(answer) {}
+DeskRecordings::DeskRecordings(fs::path folder, fs::path assets, std::uint32_t domain, const Answer& answer)
+    : folder_(std::move(folder)), assets_(std::move(assets)), domain_(domain), answer_(answer) {}
 
 DeskRecordings::~DeskRecordings() = default;
 
@@ -107,6 +106,12 @@ void DeskRecordings::handle(ViewerId viewer, const std::string& session, const D
   if (what == "start") return start(viewer, session, request.id);
   if (what == "stop") return stop(viewer, session, request.id);
   refuse(viewer, request.id, "usage: record start|stop");
+}
+
+bool DeskRecordings::records(const std::string& session) {
+  const std::scoped_lock lock(mutex_);
+  const auto one = running_.find(session);
+  return one != running_.end() && !one->second->hasEnded();
 }
 
 void DeskRecordings::refuse(ViewerId viewer, std::uint32_t request, std::string why, Refusal kind) const {
@@ -126,7 +131,8 @@ void DeskRecordings::start(ViewerId viewer, const std::string& session, std::uin
   if (one != nullptr && !one->hasEnded())
     return refuse(viewer, request, "this session is being recorded here already", Refusal::kAlready);
   one = std::make_unique<One>(
-      recorder::RecorderOptions{.file = freeFile(folder_, session), .session = session, .domain = domain_},
+      recorder::RecorderOptions{
+          .file = freeFile(folder_, session), .session = session, .domain = domain_, .assets = assets_},
       answer_, viewer, request);
 }
 

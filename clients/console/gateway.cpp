@@ -13,7 +13,6 @@
 #include "clients/console/desk.h"
 #include "clients/console/lobby.h"
 #include "clients/console/session_feed.h"
-#include "idl/record/mcap_reader.h"
 #include "idl/record/recording_kind.h"
 #include "idl/types/names.h"
 #include "idl/types/printable_text.h"
@@ -48,7 +47,7 @@ class Gateway {
                 .pass = pass_,
                 .key_file = options.key_file,
                 .is_local = isLoopbackAddress(options.web.address)},
-        desk_(rights_, options.recordings,
+        desk_(rights_, options.recordings, options.cache / "assets",
               [this](ViewerId viewer, const DeskAnswer& answer) { say(viewer, answer); }),
         hands_(
             rights_, [this](ViewerId viewer, const DeskAnswer& answer) { say(viewer, answer); },
@@ -62,11 +61,13 @@ class Gateway {
   Gateway& operator=(const Gateway&) = delete;
 
   Result<void> run() {
-    if (!options_.recording.empty())
-      if (auto playable = record::checkPlayable(options_.recording); !playable) return playable;
+    if (!options_.recording.empty()) {
+      const auto playable = record::checkPlayable(options_.recording, stop_);
+      if (!playable) return fail(playable.error().what);
+      if (!playable->empty()) options_.print("warning: " + *playable);
+    }
     if (auto opened = openServer(); !opened) return opened;
     if (options_.recording.empty()) return followSessions();
-    checkRecording();
     while (!stop_) std::this_thread::sleep_for(kPeriod);
     return {};
   }
@@ -74,16 +75,16 @@ class Gateway {
  private:
   Result<void> openServer();
   Result<void> followSessions();
-  void checkRecording();
   void enter(const std::string& room);
   void leave(const std::string& room);
   void offerFeeds(Lobby& lobby);
   void endFeeds(const std::set<std::string>& rooms);
   bool offerFeed(const std::string& room, const std::string& session);
   void startFeeds();
+  void tellRecorded();
   [[nodiscard]] std::set<std::string> expectedSessions();
   [[nodiscard]] std::string sessionOf(const std::string& room);
-  void say(ViewerId viewer, const DeskAnswer& answer) { server_->answer(viewer, deskAnswerText(answer)); }
+  void say(ViewerId viewer, const DeskAnswer& answer) { server_->answer(viewer, answer); }
 
   const GatewayOptions& options_;
   const std::atomic<bool>& stop_;
@@ -150,14 +151,6 @@ Result<void> Gateway::openServer() {
   return {};
 }
 
-/// Reads all of it, since only then every damage is known; it is served meanwhile.
-void Gateway::checkRecording() {
-  auto reader = record::McapReader::open(options_.recording);
-  if (!reader) return;
-  for (record::McapMessage message; !stop_ && reader->next(message);) continue;
-  if (!reader->problem().empty()) options_.print("warning: " + reader->problem());
-}
-
 Result<void> Gateway::followSessions() {
   auto participant = wire::Participant::open({.domain = options_.domain, .config = {}});
   if (!participant) return fail(participant.error().what);
@@ -177,6 +170,7 @@ Result<void> Gateway::followSessions() {
     server_->publish(std::string(kLobbyRoom), lobby.take(nowNanoseconds()));
     startFeeds();
     desk_.expect(expectedSessions());
+    tellRecorded();
   }
   return {};
 }
@@ -241,6 +235,11 @@ void Gateway::startFeeds() {
     if (feed != feeds_.end()) feed->second->start();
     if (feed != feeds_.end() || room == kLobbyRoom) started_.insert(room);
   }
+}
+
+void Gateway::tellRecorded() {
+  const std::scoped_lock lock(mutex_);
+  for (const auto& [room, feed] : feeds_) feed->setRecorded(desk_.records(feed->sessionName()));
 }
 
 /// Whose emergency stop somebody may press.

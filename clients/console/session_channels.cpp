@@ -102,11 +102,13 @@ void SessionChannels::begin(const SessionAnnounce& announce, std::int64_t now_ns
   publish(foxglove::kModels, foxglove::kTargetInstance, now_ns, foxglove::encodeDeletion({}, now_ns));
 }
 
-void SessionChannels::setState(LinkState state, const std::string& reason, std::int64_t now_ns) {
+void SessionChannels::setState(LinkState state, const std::string& reason, bool is_recorded,
+                               std::int64_t now_ns) {
   const nlohmann::json json{{"state", stateName(state)},     {"reason", reason},
                             {"life", lives_ & kMostLives},   {"session", announce_.session},
                             {"title", announce_.title},      {"lockstep", announce_.lockstep},
-                            {"scene", announce_.scene_hash}, {"protocol", kProtocolVersion}};
+                            {"scene", announce_.scene_hash}, {"protocol", kProtocolVersion},
+                            {"recorded", is_recorded}};
   const std::string text = json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   publish(kConsole, 0, now_ns, {text.begin(), text.end()});
 }

@@ -34,7 +34,8 @@ class SessionChannels {
 
   /// A session begins: what was known of the one before is forgotten.
   void begin(const SessionAnnounce& announce, std::int64_t now_ns);
-  void setState(LinkState state, const std::string& reason, std::int64_t now_ns);
+  /// `is_recorded`: by this gateway.
+  void setState(LinkState state, const std::string& reason, bool is_recorded, std::int64_t now_ns);
   void receive(const wire::RawSample& sample);
   /// What is to be published since the last call.
   [[nodiscard]] std::vector<Publication> take();

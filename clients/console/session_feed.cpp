@@ -53,7 +53,8 @@ void SessionFeed::setState(LinkState state, const std::string& reason) {
   const bool is_new = state != state_ || reason != reason_;
   state_ = state;
   reason_ = reason;
-  channels_.setState(state, reason, nowNanoseconds());
+  is_recorded_told_ = is_recorded_;
+  channels_.setState(state, reason, is_recorded_told_, nowNanoseconds());
   server_.publish(options_.room, channels_.take());
   if (is_new && !reason.empty()) options_.print(reason);
 }
@@ -96,6 +97,7 @@ void SessionFeed::forward(wire::Membership& member, wire::RawSubscriber& subscri
     subscriber.dispatch(kCollect, receive);
     inbox.dispatch(milliseconds(0));
     server_.publish(options_.room, channels_.take());
+    if (is_recorded_ != is_recorded_told_) setState(state_, reason_);
   }
   if (stop_) return;
   subscriber.dispatch(milliseconds(0), receive);  // samples that arrived before the end

@@ -26,8 +26,8 @@ struct FeedOptions {
 /// Follows a session into a room of the WebServer, once for all viewers: joins it as an observer, and the
 /// next one of its name when it ends. A session that is not there yet, refuses or is lost is told to viewers.
 ///
-/// Threads: one of its own, which alone uses DDS; sessionName from any. `server` must outlive it.
-/// Real-time: no.
+/// Threads: one of its own, which alone uses DDS; sessionName and setRecorded from any. `server` must outlive
+/// it. Real-time: no.
 class SessionFeed {
  public:
   SessionFeed(FeedOptions options, WebServer& server);
@@ -39,6 +39,8 @@ class SessionFeed {
   void start();
   /// Of the session that is followed; empty when none has been found yet.
   [[nodiscard]] std::string sessionName() const;
+  /// Whether this gateway records the session, for viewers.
+  void setRecorded(bool is_recorded) { is_recorded_ = is_recorded; }
 
  private:
   void run();
@@ -53,7 +55,8 @@ class SessionFeed {
   std::string reason_;
   mutable std::mutex mutex_;
   std::string session_name_;
-  std::atomic<bool> stop_{false};
+  bool is_recorded_told_ = false;
+  std::atomic<bool> stop_{false}, is_recorded_{false};
   std::thread thread_;
 };
 

@@ -18,29 +18,22 @@ Answer plain(unsigned status, std::string_view text) {
 
 }  // namespace
 
-WebConnection::WebConnection(WebService& server, tcp::socket socket)
-    : server_(server), stream_(std::move(socket), kMaxBytesASecond), waiting_(server.waiting.end()) {
+WebConnection::WebConnection(WebService& server, tcp::socket socket, std::string host)
+    : server_(server),
+      stream_(std::move(socket), kMaxBytesASecond),
+      host_(std::move(host)),
+      asking_(server.asking.insert(server.asking.end(), this)) {
   ++server_.connections;
 }
 
 WebConnection::~WebConnection() {
-  stopWaiting();
+  if (asking_ != server_.asking.end()) server_.asking.erase(asking_);
   --server_.connections;
 }
 
-/// For what the other side has to send; not for long.
-void WebConnection::startWaiting() {
-  stream_.next_layer().expires_after(kRequestTimeout);
-  waiting_ = server_.waiting.insert(server_.waiting.end(), this);
-}
-
-void WebConnection::stopWaiting() {
-  if (waiting_ != server_.waiting.end()) server_.waiting.erase(waiting_);
-  waiting_ = server_.waiting.end();
-}
-
 void WebConnection::abort() {
-  stopWaiting();
+  server_.asking.erase(asking_);
+  asking_ = server_.asking.end();
   beast::error_code ignored;
   stream_.next_layer().socket().close(ignored);
 }
@@ -48,20 +41,18 @@ void WebConnection::abort() {
 void WebConnection::run() {
   if (!server_.tls) return read();
   // who speaks plain HTTP to a port with TLS is told so
-  startWaiting();
+  stream_.next_layer().expires_after(kRequestTimeout);
   beast::async_detect_ssl(stream_.next_layer(), incoming_,
                           [self = shared_from_this()](beast::error_code error, bool is_tls) {
-                            self->stopWaiting();
                             if (error) return;
                             is_tls ? self->handshake() : self->read();
                           });
 }
 
 void WebConnection::handshake() {
-  startWaiting();
+  stream_.next_layer().expires_after(kRequestTimeout);
   stream_.handshake(*server_.tls, incoming_.data(),
                     [self = shared_from_this()](beast::error_code error, std::size_t taken) {
-                      self->stopWaiting();
                       self->incoming_.consume(taken);
                       if (!error) self->read();
                     });
@@ -71,12 +62,13 @@ void WebConnection::read() {
   parser_.emplace();
   parser_->header_limit(kMaxHeaderBytes);
   parser_->body_limit(std::uint64_t{0});
-  startWaiting();
-  http::async_read(stream_, incoming_, *parser_,
-                   [self = shared_from_this()](beast::error_code error, std::size_t) {
-                     self->stopWaiting();
-                     if (!error) self->handle();
-                   });
+  stream_.next_layer().expires_after(kRequestTimeout);
+  http::async_read(
+      stream_, incoming_, *parser_, [self = shared_from_this()](beast::error_code error, std::size_t) {
+        if (error || self->asking_ == self->server_.asking.end()) return;
+        self->server_.asking.splice(self->server_.asking.end(), self->server_.asking, self->asking_);
+        self->handle();
+      });
 }
 
 namespace {
@@ -138,7 +130,9 @@ void WebConnection::handleUpgrade(const Request& request, std::string_view origi
   } else {
     stream_.next_layer().expires_never();
     const bool is_own_page = isPermittedOrigin(origin, host, stream_.isSecure(), {});
-    std::make_shared<WebViewer>(server_, std::move(stream_), path, is_own_page)->run(request, *subprotocol);
+    server_.makeRoomForViewer(host_);
+    std::make_shared<WebViewer>(server_, std::move(stream_), host_, path, is_own_page)
+        ->run(request, *subprotocol);
   }
 }
 
@@ -176,15 +170,14 @@ void WebConnection::respond(const Request& request, Answer answer) {
 /// As much as is taken at once; the time that is permitted begins anew with each piece.
 void WebConnection::send(const std::shared_ptr<Response>& response) {
   stream_.next_layer().expires_after(server_.options.send_timeout);
-  http::async_write_some(
-      stream_, *response->serializer,
-      [self = shared_from_this(), response](beast::error_code error, std::size_t) {
-        if (error) return;
-        if (!response->serializer->is_done()) return self->send(response);
-        if (response->message.keep_alive()) return self->read();
-        self->startWaiting();  // for the other side's end: it makes room like any that waits
-        self->stream_.end([self](beast::error_code) { self->stopWaiting(); });
-      });
+  http::async_write_some(stream_, *response->serializer,
+                         [self = shared_from_this(), response](beast::error_code error, std::size_t) {
+                           if (error) return;
+                           if (!response->serializer->is_done()) return self->send(response);
+                           if (response->message.keep_alive()) return self->read();
+                           self->stream_.next_layer().expires_after(kRequestTimeout);
+                           self->stream_.end([self](beast::error_code) {});
+                         });
 }
 
 }  // namespace tenon::console

@@ -11,10 +11,32 @@ namespace tenon::console {
 
 namespace {
 
-constexpr std::size_t kMaxConnections = 256;
 constexpr int kSendBuffer =
     256 << 10;  // [bytes] of a socket: what the system keeps for a viewer that does not read
 constexpr int kMaxWaitingCalls = 64;
+
+/// Whose connections are counted together. A machine has a network of 64 bits for itself in IPv6.
+std::string hostOf(const tcp::socket& socket) {
+  beast::error_code error;
+  const asio::ip::address address = socket.remote_endpoint(error).address();
+  if (error || !address.is_v6()) return address.to_string();
+  const asio::ip::address_v6 whole = address.to_v6();
+  if (whole.is_v4_mapped()) return asio::ip::make_address_v4(asio::ip::v4_mapped, whole).to_string();
+  asio::ip::address_v6::bytes_type network = whole.to_bytes();
+  std::fill(network.begin() + 8, network.end(), std::uint8_t{0});
+  return asio::ip::make_address_v6(network).to_string();
+}
+
+/// The first one of the host that has most of them, with the one that comes; null: there is none.
+template <class Connection>
+Connection* firstOfMost(const std::vector<Connection*>& connections, const std::string& newcomer) {
+  std::map<std::string_view, std::size_t> counts{{newcomer, 1}};
+  for (const Connection* const connection : connections) ++counts[connection->host()];
+  const auto first = std::max_element(
+      connections.begin(), connections.end(),
+      [&](const Connection* a, const Connection* b) { return counts[a->host()] < counts[b->host()]; });
+  return first == connections.end() ? nullptr : *first;
+}
 
 }  // namespace
 
@@ -39,17 +61,39 @@ WebService::WebService(const WebOptions& web_options, Site web_site, WebHandlers
 void WebService::accept() {
   acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
-    // beyond the limit the one that has asked for nothing for longest makes room, else it is closed at once
-    const bool is_full = connections >= kMaxConnections;
-    if (!error && (!is_full || !waiting.empty())) {
-      if (is_full) waiting.front()->abort();
-      beast::error_code ignored;
-      socket.set_option(tcp::no_delay(true), ignored);
-      socket.set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
-      std::make_shared<WebConnection>(*this, std::move(socket))->run();
+    if (!error) {
+      std::string host = hostOf(socket);
+      if (connections < WebServer::kMaxConnections || makeRoom(host)) {
+        beast::error_code ignored;
+        socket.set_option(tcp::no_delay(true), ignored);
+        socket.set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
+        std::make_shared<WebConnection>(*this, std::move(socket), std::move(host))->run();
+      }
     }
     accept();
   });
+}
+
+/// For a connection of `host`; false: there is nobody who could make room.
+bool WebService::makeRoom(const std::string& host) {
+  // who was told to end had its time
+  for (WebViewer* const viewer : viewers)
+    if (viewer->isClosing()) return viewer->abort(), true;
+  WebConnection* const idle = firstOfMost(std::vector(asking.begin(), asking.end()), host);
+  if (idle != nullptr) idle->abort();
+  return idle != nullptr;
+}
+
+void WebService::makeRoomForViewer(const std::string& host) {
+  std::vector<WebViewer*> without_place;
+  for (WebViewer* const viewer : viewers)
+    if (!viewer->hasPlace() && !viewer->isClosing()) without_place.push_back(viewer);
+  if (without_place.size() < WebServer::kMaxViewers) return;
+  std::sort(without_place.begin(), without_place.end(),
+            [](const WebViewer* a, const WebViewer* b) { return a->id() < b->id(); });
+  firstOfMost(without_place, host)
+      ->close("a newer viewer came: " + std::to_string(WebServer::kMaxViewers) +
+              " look on here at most, without a seat or hands");
 }
 
 void WebService::deliver(const std::string& path, const std::vector<Publication>& publications) {
@@ -187,11 +231,11 @@ void WebServer::publish(const std::string& path, std::vector<Publication> public
   });
 }
 
-void WebServer::answer(ViewerId viewer, std::string text) {
-  asio::post(impl_->io, [impl = impl_.get(), viewer, text = std::move(text)] {
+void WebServer::answer(ViewerId viewer, DeskAnswer answer) {
+  asio::post(impl_->io, [impl = impl_.get(), viewer, answer = std::move(answer)] {
     WebViewer* const found = impl->find(viewer);
     if (found == nullptr) return;
-    found->offer(text);
+    found->offer(answer);
     found->send();
   });
 }

@@ -28,23 +28,30 @@ struct WebService;
 /// One WebSocket connection. It lives as long as an operation of it is pending.
 class WebViewer : public std::enable_shared_from_this<WebViewer> {
  public:
-  /// `is_own_page`: it is no page from elsewhere.
-  WebViewer(WebService& server, WebStream stream, std::string room, bool is_own_page);
+  /// `host`: whose connections are counted together; `is_own_page`: it is no page from elsewhere.
+  WebViewer(WebService& server, WebStream stream, std::string host, std::string room, bool is_own_page);
   ~WebViewer();
   WebViewer(const WebViewer&) = delete;
   WebViewer& operator=(const WebViewer&) = delete;
 
   void run(const http::request<http::empty_body>& request, std::string_view subprotocol);
   void offer(const Publication& publication, Delivery delivery);
-  void offer(std::string text) { queue_.addText(std::move(text)); }
+  void offer(const DeskAnswer& answer);
   void offerHands(const Payload& views) {
     queue_.add(kHandSubscription, Delivery::kNewest, {.payload = views});
   }
   void send();
   /// The connection is closed: its room is no more.
   void leaveRoom();
+  void close(const std::string& reason);
+  /// Ends the connection without waiting for the other side.
+  void abort();
   [[nodiscard]] ViewerId id() const { return id_; }
+  [[nodiscard]] const std::string& host() const { return host_; }
   [[nodiscard]] const std::string& room() const { return room_; }
+  /// Has a seat or hands.
+  [[nodiscard]] bool hasPlace() const { return has_seat_ || has_hands_; }
+  [[nodiscard]] bool isClosing() const { return is_closing_; }
 
  private:
   void begin();
@@ -53,13 +60,13 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
   /// A binary message.
   void moveHands(std::span<const std::uint8_t> targets);
   void apply(const ViewerRequest& request);
-  void close(const std::string& reason);
   void finish();
-  /// Ends the connection without waiting for the other side.
-  void abort();
+  /// It is none of the server's viewers any more.
+  void leave();
 
   WebService& server_;
   ViewerId id_;
+  std::string host_;
   std::string room_;
   bool is_own_page_;
   websocket::stream<WebStream> socket_;
@@ -71,6 +78,7 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
   std::string close_reason_;
   std::chrono::steady_clock::time_point second_;
   int received_ = 0;  ///< messages, since second_
+  bool has_seat_ = false, has_hands_ = false;
   bool is_sending_ = false;
   bool is_closing_ = false;
   bool is_closed_ = false;
@@ -79,7 +87,7 @@ class WebViewer : public std::enable_shared_from_this<WebViewer> {
 /// One HTTP connection, which may become a viewer's.
 class WebConnection : public std::enable_shared_from_this<WebConnection> {
  public:
-  WebConnection(WebService& server, tcp::socket socket);
+  WebConnection(WebService& server, tcp::socket socket, std::string host);
   ~WebConnection();
   WebConnection(const WebConnection&) = delete;
   WebConnection& operator=(const WebConnection&) = delete;
@@ -87,11 +95,10 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
   void run();
   /// Ends it without an answer.
   void abort();
+  [[nodiscard]] const std::string& host() const { return host_; }
 
  private:
   using Request = http::request<http::empty_body>;
-  void startWaiting();
-  void stopWaiting();
   void handshake();
   void read();
   void handle();
@@ -103,9 +110,10 @@ class WebConnection : public std::enable_shared_from_this<WebConnection> {
 
   WebService& server_;
   WebStream stream_;
+  std::string host_;  ///< whose connections are counted together
   beast::flat_buffer incoming_;
   std::optional<http::request_parser<http::empty_body>> parser_;
-  std::list<WebConnection*>::iterator waiting_;  ///< in WebService::waiting, or its end
+  std::list<WebConnection*>::iterator asking_;  ///< in WebService::asking, or its end
 };
 
 /// The channels of one session.
@@ -121,6 +129,9 @@ struct WebService {
   WebService(const WebOptions& web_options, Site web_site, WebHandlers web_handlers);
 
   void accept();
+  bool makeRoom(const std::string& host);
+  /// One of `host` comes.
+  void makeRoomForViewer(const std::string& host);
   void deliver(const std::string& path, const std::vector<Publication>& publications);
   void removeRoom(const std::string& path);
   /// Null when it is not there any more.
@@ -137,7 +148,7 @@ struct WebService {
   std::string host_name;  ///< of this machine
   std::uint16_t port = 0;
   std::size_t connections = 0;
-  std::list<WebConnection*> waiting;  ///< for a request, the longest first
+  std::list<WebConnection*> asking;  ///< the one that has asked for nothing for longest first
   std::set<WebViewer*> viewers;
   ViewerId next_viewer = 1;
   std::atomic<std::size_t> viewer_count{0};

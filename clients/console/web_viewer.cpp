@@ -14,9 +14,11 @@ constexpr int kMaxMessagesASecond = 200;
 
 }  // namespace
 
-WebViewer::WebViewer(WebService& server, WebStream stream, std::string room, bool is_own_page)
+WebViewer::WebViewer(WebService& server, WebStream stream, std::string host, std::string room,
+                     bool is_own_page)
     : server_(server),
       id_(server.next_viewer++),
+      host_(std::move(host)),
       room_(std::move(room)),
       is_own_page_(is_own_page),
       socket_(std::move(stream)),
@@ -25,10 +27,14 @@ WebViewer::WebViewer(WebService& server, WebStream stream, std::string room, boo
 }
 
 WebViewer::~WebViewer() {
-  const bool has_entered = server_.viewers.erase(this) > 0;
-  server_.viewer_count = server_.viewers.size();
+  leave();
   --server_.connections;
-  if (has_entered && server_.handlers.left) server_.handlers.left(id_, room_);
+}
+
+void WebViewer::leave() {
+  if (server_.viewers.erase(this) == 0) return;
+  server_.viewer_count = server_.viewers.size();
+  if (server_.handlers.left) server_.handlers.left(id_, room_);
 }
 
 void WebViewer::run(const http::request<http::empty_body>& request, std::string_view subprotocol) {
@@ -135,7 +141,19 @@ void WebViewer::moveHands(std::span<const std::uint8_t> targets) {
         statusText(StatusLevel::kWarning, "a binary message that is no target of this viewer's hands"));
 }
 
+/// A place begins with the answer that gives it, and ends with the next request for one, or with a notice.
+void WebViewer::offer(const DeskAnswer& answer) {
+  bool& has_place = answer.is_of_hands ? has_hands_ : has_seat_;
+  if (answer.accepted && !answer.role.empty()) has_place = true;
+  if (!answer.accepted && answer.id == 0) has_place = false;
+  queue_.addText(deskAnswerText(answer));
+}
+
 void WebViewer::apply(const ViewerRequest& request) {
+  if (request.desk && request.desk->isOfHands()) has_hands_ = false;
+  if (request.desk &&
+      (request.desk->kind == DeskRequest::Kind::kSit || request.desk->kind == DeskRequest::Kind::kLeave))
+    has_seat_ = false;
   if (request.desk && is_own_page_ && server_.handlers.desk) {
     server_.handlers.desk(id_, room_, *request.desk);
   } else if (request.desk) {
@@ -169,6 +187,7 @@ void WebViewer::apply(const ViewerRequest& request) {
 }
 
 void WebViewer::close(const std::string& reason) {
+  if (is_closing_) return;
   is_closing_ = true;
   close_reason_ = reason;
   if (!is_sending_) finish();
@@ -190,6 +209,7 @@ void WebViewer::abort() {
   is_closing_ = is_closed_ = true;
   send_timer_.cancel();
   beast::get_lowest_layer(socket_).close();
+  leave();
 }
 
 }  // namespace tenon::console

@@ -15,6 +15,7 @@ import threading
 import time
 import unittest
 import urllib.parse
+import zlib
 from pathlib import Path
 
 from stage import COARSE, PROGRAMS, Process, SOURCE, Stage, final_hash, tenon
@@ -109,7 +110,7 @@ class Gateway(unittest.TestCase):
             seen.add(topic)
             if topic == "/tf":
                 frames = frame_transforms(payload)
-                pointer = frames.get("pointer")
+                pointer = frames.get("object/pointer")
                 first = first or pointer
                 moved = max(moved, math.dist(first, pointer) if pointer else 0)
             elif topic == "/scene" and (at := payload.find(b"glTF")) >= 0:
@@ -460,6 +461,28 @@ class Browser:
 
 
 @unittest.skipUnless(shutil.which("chromium") and (TOOLS / "node_modules").exists(), "no chromium or no playwright-core: deploy/setup test, and npm ci in tests/system/public_tools")
+def damaged_copies(recording):
+    """One with a damaged chunk, one whose footer and one whose index point elsewhere, behind right checksums."""
+    whole = recording.read_bytes()
+    records, at = {}, 8
+    while at + 9 <= len(whole) - 8:
+        length = struct.unpack_from("<Q", whole, at + 1)[0]
+        records.setdefault(whole[at], []).append((at, at + 9 + length))
+        at += 9 + length
+    footer, summary, index, chunk = records[2][0][0], records[15][0][1], records[8][1][0], records[6][1][1]
+
+    def write(name, at, count=1, is_in_summary=True):
+        content = bytearray(whole)
+        content[at] = (content[at] + count) % 256
+        if is_in_summary:
+            struct.pack_into("<I", content, len(whole) - 12, zlib.crc32(content[summary:-12]))
+        file = recording.parent / name
+        file.write_bytes(content)
+        return file
+
+    return write("chunk.mcap", chunk - 1, is_in_summary=False), write("moved.mcap", footer + 9), write("wrong.mcap", index + 9 + 16)
+
+
 class Page(unittest.TestCase):
     def test_the_page_follows_a_session_and_a_gateway_that_was_killed(self):
         pictures = os.environ.get("TENON_PICTURES")
@@ -507,6 +530,10 @@ class Page(unittest.TestCase):
             self.assertEqual(browser("value", expression="location.hash"), "", "the pass does not stay in the address")
             browser("value", expression="document.querySelector('[data-command=pause]').click()")
             browser("await", expression="tenon.session.run.phase === 2")
+            # each block has the colour that its instruction names
+            browser("await", expression="tenon.view.models >= 4")
+            colors = "['red', 'green', 'blue'].map(name => [...tenon.view.parts.all.values()].find(p => p.object.name === name).material).map(m => m.vertexColors ? '' : m.color.getHexString()).join()"
+            self.assertEqual(browser("value", expression=colors), "c0392b,27ae60,2980b9")
             # a space in a text is a space
             browser("type", selector=".desk input", text="mind the edge")
             browser("key", key="Enter")
@@ -534,8 +561,9 @@ class Page(unittest.TestCase):
             browser("value", expression="document.querySelector('[data-command=resume]').click()")
             browser("await", expression="tenon.session.run.phase === 1")
             # the lists change all the time, and neither a press nor the focus is lost
-            step, asked = "document.querySelector('.steps li:not(.now) button.name')", "document.querySelector('dialog[open] .primary') !== null"
-            browser("press", selector=".steps li:not(.now) button.name", milliseconds=400)
+            row = ".steps li:last-child button.name"
+            step, asked = f"document.querySelector('{row}')", "document.querySelector('dialog[open] .primary') !== null"
+            browser("press", selector=row, milliseconds=400)
             browser("await", expression=asked)
             browser("key", key="Escape")
             browser("value", expression=f"{step}.focus()")
@@ -763,8 +791,18 @@ class Page(unittest.TestCase):
             first, again = places[round(0.2 * end, 3)]
             self.assertEqual(first, again, "a place is the same from both sides")
             self.assertNotEqual(first, places[round(0.95 * end, 3)][0])
+            # rows come before the one that has the focus
+            browser("await", expression="(window.row = document.querySelector('.events button')) !== null")
+            browser("value", expression="window.row.focus()")
             browser("key", key="Space")
             browser("await", expression=f"tenon.player.time > {0.2 * end + 0.5}")
+            browser("value", expression="tenon.player.toggle()")
+            browser("value", expression=f"tenon.player.seek({0.95 * end})")
+            browser("await", expression="document.querySelector('.events button') !== window.row && window.row.isConnected")
+            self.assertTrue(browser("value", expression="document.activeElement === window.row"))
+            browser("value", expression=f"tenon.player.seek({0.2 * end})")
+            browser("await", expression=f"!tenon.player.isReading && tenon.player.recording.secondsOf(tenon.session.tick) < {0.5 * end}")
+            browser("key", key="Space")
             self.look(browser)
             # what cannot be read is said, and the next place can be
             fail_once = "((r, name) => { r[name] = () => { delete r[name]; return Promise.reject(new Error('the disk is gone')); }; })(tenon.player.recording, 'NAME')"
@@ -812,7 +850,9 @@ class Page(unittest.TestCase):
             whole = recording.read_bytes()
             cut.write_bytes(whole[:len(whole) * 2 // 3])
             soon.write_bytes(whole[:1000])
-            for file, reason in ((journal, f"is the journal of a server.*`tenon resimulate {journal}`"), (cut, f"was cut off.*`tenon report {cut}`"), (soon, "was cut off so soon"), (foreign, "is not a recording"), (stage.out / "none.mcap", "")):
+            chunk, moved, wrong = damaged_copies(recording)
+            for file, reason in ((journal, f"is the journal of a server.*`tenon resimulate {journal}`"), (cut, f"was cut off.*`tenon report {cut}`"), (chunk, f"1 of its .* chunks are damaged.*`tenon report {chunk}`"),
+                                 (moved, f"the summary at its end.*`tenon report {moved}`"), (wrong, f"1 of its .* chunks are damaged or not where its index says.*`tenon report {wrong}`"), (soon, "was cut off so soon"), (foreign, "is not a recording"), (stage.out / "none.mcap", "")):
                 refused = tenon("console", file, "--port", 0)
                 self.assertEqual(refused.returncode, 1, refused.stderr)
                 self.assertRegex(refused.stderr, rf"^tenon-console: {file}: .*{reason}")

@@ -70,7 +70,7 @@ class DeskTest : public ::testing::Test {
   std::mutex mutex_;
   std::vector<Told> told_;
   std::unique_ptr<Desk> desk_ =
-      std::make_unique<Desk>(SeatRights{.domain = test::ownDomain(), .pass = "secret"}, "",
+      std::make_unique<Desk>(SeatRights{.domain = test::ownDomain(), .pass = "secret"}, "", "",
                              [this](ViewerId viewer, const DeskAnswer& answer) {
                                const std::scoped_lock lock(mutex_);
                                told_.push_back({viewer, answer});
@@ -207,6 +207,23 @@ TEST_F(DeskTest, CommandsThatWaitAreRefusedWhenTheSeatIsLeft) {
     EXPECT_FALSE(one.answer.text.empty() && one.answer.id != 5);
   }
   EXPECT_THAT(ids, testing::UnorderedElementsAre(1U, 2U, 3U, 4U, 5U));
+}
+
+TEST_F(DeskTest, CommandsThatWaitAreNotSentAfterAStop) {
+  SessionMock session("a");
+  desk_->handle(kAda, "a", {.kind = DeskRequest::Kind::kSit, .id = 1, .role = "trainee", .name = "Ada"});
+  desk_->handle(kBob, "b", {.kind = DeskRequest::Kind::kSit, .id = 1, .role = "trainee", .name = "Bob"});
+  desk_->handle(kAda, "a", {.id = 2, .words = {"clear"}});
+  desk_->handle(kBob, "b", {.id = 2, .words = {"pause"}});
+  desk_->handle(kBob, "a", emergency(3));
+  ASSERT_TRUE(session.hears(1));
+  const auto first = answers(1)[0];
+  EXPECT_EQ(first.viewer, kAda);
+  EXPECT_EQ(first.answer.id, 2U);
+  EXPECT_EQ(first.answer.text, "not sent: the emergency stop came after it");
+  EXPECT_EQ(first.answer.code, "stopped");
+  for (const Told& one : told())
+    EXPECT_FALSE(one.viewer == kBob && one.answer.id == 2) << "of another session";
 }
 
 // each seat has a DDS participant of its own, until its thread has ended

@@ -27,7 +27,7 @@ class SessionChannelsTest : public testing::Test {
         R"({"version":1,"objects":[[],[{"model":")" + *asset + R"(","triangles":1,"error":0}]]})";
     announce_.scene_hash = assets_.put(bytesOf(list)).value();
     channels_.begin(announce_, 1);
-    channels_.setState(LinkState::kJoined, "", 1);
+    channels_.setState(LinkState::kJoined, "", false, 1);
     static_cast<void>(channels_.take());
   }
   ~SessionChannelsTest() override { fs::remove_all(folder_); }
@@ -124,7 +124,8 @@ TEST_F(SessionChannelsTest, FramesOfAllObjectsAreInEachMessage) {
   ASSERT_EQ(frames.size(), 1U);
   // CDR: two transforms, their stamps 5 s and 7 ns
   std::vector<std::uint8_t> expected = encodeFrameTransforms(
-      {{"world", "object 0", {}}, {"world", "object 1", Pose(Vector3(4, 5, 6))}}, 5'000'000'007);
+      {{"world", "object/object 0", {}}, {"world", "object/object 1", Pose(Vector3(4, 5, 6))}},
+      5'000'000'007);
   EXPECT_EQ(frames[0], std::string(expected.begin(), expected.end()));
   EXPECT_EQ(expected[0], 0);
   EXPECT_EQ(expected[1], 1) << "little-endian";
@@ -169,10 +170,10 @@ TEST_F(SessionChannelsTest, AnotherSessionForgetsTheOneBefore) {
   place(1, ObjectStatus::kParked);
   static_cast<void>(channels_.take());
   channels_.begin(announce_, 8);
-  channels_.setState(LinkState::kJoined, "", 8);
+  channels_.setState(LinkState::kJoined, "", false, 8);
   const auto before = nlohmann::json::parse(*channels_.take()[2].payload);
   channels_.begin(announce_, 9);
-  channels_.setState(LinkState::kJoined, "", 9);
+  channels_.setState(LinkState::kJoined, "", false, 9);
   const auto published = channels_.take();
   ASSERT_EQ(published.size(), 3U);
   EXPECT_EQ(published[0].channel, 0U) << "nothing of before is kept";

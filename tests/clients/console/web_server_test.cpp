@@ -1,9 +1,13 @@
 #include "clients/console/web_server.h"
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <fstream>
+#include <memory>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
@@ -104,6 +108,147 @@ TEST_F(WebServerTest, SendsAllWhenARangeIsAskedForOnCondition) {
   const std::string answer = take(ask("GET", "Range: bytes=5-\r\nIf-Range: \"a\"\r\n"));
   EXPECT_TRUE(answer.starts_with("HTTP/1.1 200 "));
   EXPECT_EQ(answer.size() - (answer.find("\r\n\r\n") + 4), kFile);
+}
+
+/// A connection from an address of the loopback interface, which stands for another machine.
+int connectFrom(const char* own, std::uint16_t port) {
+  const int connection = socket(AF_INET, SOCK_STREAM, 0);
+  const timeval patience{10, 0};
+  setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  inet_pton(AF_INET, own, &address.sin_addr);
+  EXPECT_EQ(bind(connection, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  address.sin_port = htons(port);
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  EXPECT_EQ(connect(connection, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  return connection;
+}
+
+std::string statusFrom(const char* own, std::uint16_t port) {
+  const int connection = connectFrom(own, port);
+  const std::string request = "HEAD /recording.mcap HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  EXPECT_EQ(write(connection, request.data(), request.size()), static_cast<ssize_t>(request.size()));
+  std::string status(sizeof "HTTP/1.1 200" - 1, '\0');
+  status.resize(static_cast<std::size_t>(
+      std::max<ssize_t>(0, recv(connection, status.data(), status.size(), MSG_WAITALL))));
+  close(connection);
+  return status;
+}
+
+/// Somebody who looks on.
+class OnlookerMock {
+ public:
+  OnlookerMock(const char* own, std::uint16_t port) : socket_(connectFrom(own, port)) {
+    const std::string request =
+        "GET /live HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+        "Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n";
+    EXPECT_EQ(write(socket_, request.data(), request.size()), static_cast<ssize_t>(request.size()));
+    std::string head;
+    while (!head.ends_with("\r\n\r\n")) {
+      const std::string next = bytes(1);
+      if (next.empty()) break;
+      head += next;
+    }
+    EXPECT_TRUE(head.starts_with("HTTP/1.1 101 ")) << head;
+    EXPECT_NE(text().find("serverInfo"), std::string::npos) << "it has entered";
+  }
+  ~OnlookerMock() { close(socket_); }
+  OnlookerMock(const OnlookerMock&) = delete;
+  OnlookerMock& operator=(const OnlookerMock&) = delete;
+
+  /// Asks the desk for a seat; the answer.
+  std::string sit() {
+    const std::string request = R"({"op":"deskSit","id":7,"role":"instructor","name":"","key":""})";
+    const std::string mask(4, '\0');
+    const std::string frame{"\x81" + std::string(1, static_cast<char>(0x80 | request.size())) + mask +
+                            request};
+    EXPECT_EQ(write(socket_, frame.data(), frame.size()), static_cast<ssize_t>(frame.size()));
+    for (std::string answer; !(answer = text()).empty();)
+      if (answer.find("deskAnswer") != std::string::npos) return answer;
+    return {};
+  }
+  /// The next text or, of its end, the reason; empty: nothing came.
+  std::string text() {
+    std::string head = bytes(2);
+    if (head.empty()) return {};
+    std::size_t size = static_cast<std::uint8_t>(head[1]);
+    if (size == 126) {
+      const std::string length = bytes(2);
+      size = static_cast<std::size_t>(static_cast<std::uint8_t>(length[0])) << 8U |
+             static_cast<std::uint8_t>(length[1]);
+    }
+    const std::string content = bytes(size);
+    const bool is_end = (static_cast<std::uint8_t>(head[0]) & 0x0fU) == 8U;
+    return is_end && content.size() > 2 ? content.substr(2) : content;
+  }
+
+ private:
+  std::string bytes(std::size_t size) const {
+    std::string all(size, '\0');
+    const ssize_t got = recv(socket_, all.data(), size, MSG_WAITALL);
+    return got == static_cast<ssize_t>(size) ? all : std::string();
+  }
+
+  int socket_;
+};
+
+/// A server that gives a seat to whoever asks.
+class CrowdedWebServerTest : public testing::Test {
+ protected:
+  CrowdedWebServerTest() {
+    fs::create_directories(folder_);
+    std::ofstream(folder_ / "a.mcap") << "recording";
+    fs::resize_file(folder_ / "a.mcap", kFile);
+    Site site(folder_ / "none", wire::AssetStore(folder_));
+    EXPECT_TRUE(site.serveRecording(folder_ / "a.mcap"));
+    WebHandlers handlers;
+    handlers.desk = [this](ViewerId viewer, const std::string&, const DeskRequest& request) {
+      server_->answer(viewer, {.id = request.id, .accepted = true, .role = request.role});
+    };
+    server_ = WebServer::open({.port = 0}, std::move(site), std::move(handlers)).value();
+    server_->addRoom(std::string(kFirstRoom), {});
+    server_->start();
+  }
+  ~CrowdedWebServerTest() override {
+    server_->stop();
+    fs::remove_all(folder_);
+  }
+
+  const fs::path folder_ = fs::temp_directory_path() / ("tenon_crowd_test_" + std::to_string(getpid()));
+  std::unique_ptr<WebServer> server_;
+};
+
+TEST_F(CrowdedWebServerTest, ManyViewersOfOneMachineKeepNobodyOut) {
+  OnlookerMock seated("127.0.0.2", server_->port()), alone("127.0.0.3", server_->port());
+  EXPECT_NE(seated.sit().find(R"("role":"instructor")"), std::string::npos);
+  std::vector<std::unique_ptr<OnlookerMock>> many;
+  for (std::size_t i = 0; i < WebServer::kMaxViewers; ++i)
+    many.push_back(std::make_unique<OnlookerMock>("127.0.0.2", server_->port()));
+  OnlookerMock newcomer("127.0.0.1", server_->port());
+  for (const std::size_t oldest : {0U, 1U}) {
+    EXPECT_NE(many[oldest]->text().find("advertise"), std::string::npos);
+    EXPECT_EQ(many[oldest]->text(), "a newer viewer came: 192 look on here at most, without a seat or hands");
+  }
+  EXPECT_EQ(statusFrom("127.0.0.1", server_->port()), "HTTP/1.1 200");
+  // who else is there stays, and may sit down
+  for (OnlookerMock* const viewer : {many[2].get(), &seated, &alone, &newcomer})
+    EXPECT_NE(viewer->sit().find(R"("role":"instructor")"), std::string::npos);
+}
+
+TEST_F(CrowdedWebServerTest, DownloadsThatNobodyReadsKeepNobodyOut) {
+  const std::string request = "GET /recording.mcap HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  std::vector<int> downloads;
+  for (std::size_t i = 0; i < WebServer::kMaxConnections; ++i) {
+    downloads.push_back(connectFrom("127.0.0.2", server_->port()));
+    ASSERT_EQ(write(downloads.back(), request.data(), request.size()), static_cast<ssize_t>(request.size()));
+    char first = 0;
+    ASSERT_EQ(recv(downloads.back(), &first, 1, 0), 1) << i;
+  }
+  for (const char* own : {"127.0.0.1", "127.0.0.2"})
+    EXPECT_EQ(statusFrom(own, server_->port()), "HTTP/1.1 200");
+  for (const int download : downloads) close(download);
 }
 
 TEST(LoopbackAddress, IsOneThatThisMachineAloneReaches) {

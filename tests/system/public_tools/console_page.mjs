@@ -67,6 +67,7 @@ const commands = {
     await page.mouse.click(at[0], at[1]);
   },
   async press({ selector, milliseconds }) {
+    await page.locator(selector).first().scrollIntoViewIfNeeded();
     const { x, y, width, height } = await page.locator(selector).first().boundingBox();
     await page.mouse.move(x + width / 2, y + height / 2);
     await page.mouse.down();

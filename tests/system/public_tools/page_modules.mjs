@@ -382,6 +382,16 @@ const tests = {
     assert.equal(textOf(session, { kind: "note", text: "Mind the edge." }), "Mind the edge.", "what a person wrote stays");
   },
 
+  "numbers, switches and those who have no name are in the page's language"() {
+    const session = sessionOf();
+    setLanguage("de");
+    assert.equal(textOf(session, { kind: "step done", text: "take (3.25 s)" }), "take (3,25 s)");
+    assert.equal(textOf(session, { kind: "command", text: "command line: freeze on" }), "Befehlszeile: Kräfte einfrieren an");
+    session.receive("EmergencyStop", { client_guid: "a", counter: 1, who: "console", reason: "pressed in the browser" }, false);
+    assert.equal(panels.strip(session).text, "Not-Halt von Konsole: im Browser gedrückt");
+    setLanguage("en");
+  },
+
   "why a seat is lost is said in words of the page"() {
     assert.equal(reasonOfLoss("the server of session 'a' removed this client: was removed by Ada"), "Ada has removed you");
     assert.equal(reasonOfLoss("the server of session 'a' is gone"), "the server is gone");

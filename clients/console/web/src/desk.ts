@@ -7,7 +7,7 @@ import { Pairs } from "./pairs";
 import { whyNot, type Permitted } from "./permits";
 import { Presses } from "./presses";
 import type { Session } from "./session";
-import { hasText, language, retold, t, type Key } from "./strings";
+import { hasText, language, retold, SPEAKERS, t, type Key } from "./strings";
 
 const NOTICE = 8000; // [ms] that an answer is shown
 const NOTICES = 3;
@@ -24,9 +24,8 @@ export class Desk {
   readonly alarm = h("span", "alarm");
   /** That the server has granted; empty: looks on. */
   role = "";
-  /** Whether this console has a folder for recordings, and writes one of this session. */
+  /** Whether this console has a folder for recordings. */
   canRecord = false;
-  isRecording = false;
   private dialog = h("dialog", "");
   private buttons: { button: HTMLButtonElement; key: Key; icon?: Icon; shows?: () => boolean }[] = [];
   private signals = h("span", "signals");
@@ -91,7 +90,7 @@ export class Desk {
     add(this.bar, "desk.back", ["back"], "back");
     add(this.bar, "desk.repeat", ["repeat"], "repeat");
     add(this.bar, "desk.skip", ["skip"], "skip");
-    const isRecording = (): boolean => this.isRecording;
+    const isRecording = (): boolean => this.session.link?.recorded === true;
     add(this.bar, "desk.record", ["record", "start"], "record", () => this.canRecord && !isRecording());
     add(this.bar, "desk.record.stop", ["record", "stop"], "over", () => this.canRecord && isRecording());
     this.bar.append(this.signals);
@@ -204,6 +203,7 @@ export class Desk {
     if (this.sit.textContent !== label) this.sit.replaceChildren(icon("person"), label);
     this.sit.hidden = this.role === "" && session.link?.state !== "joined"; // in no session there is a seat
     this.bar.hidden = this.role === "" || session.isOver;
+    if (session.isOver) this.withdraw("seat");
     for (const offer of this.notices.querySelectorAll<HTMLElement>("[data-offer] button")) offer.hidden = session.isOver || session.link?.state !== "joined";
     for (const { button, shows } of this.buttons) button.hidden = shows !== undefined && !shows();
     if (this.more.open) this.pairs.show();
@@ -241,7 +241,7 @@ export class Desk {
     const role = sessionStorage.getItem("role");
     const key = sessionStorage.getItem(PASS);
     if (role === null || key === null || this.role !== "") return;
-    if (!(await this.takeSeat(role, localStorage.getItem("name") ?? "", key))) this.offerSeat(this.lastRefusal);
+    if (!(await this.takeSeat(role, localStorage.getItem("name") ?? "", key, true))) this.offerSeat(this.lastRefusal);
   }
 
   loseSeat(): void {
@@ -250,6 +250,7 @@ export class Desk {
   }
 
   private offerSeat(reason: string): void {
+    if (this.session.isOver) return;
     this.offer("seat", t("desk.lost", { reason }), t("desk.sit.again"), () => this.askForSeat());
   }
 
@@ -260,7 +261,8 @@ export class Desk {
     for (const element of [this.stop, this.clear, this.sit, this.bar, this.notices, this.alarm, this.dialog]) element.remove();
   }
 
-  private async takeSeat(role: string, name: string, key: string): Promise<boolean> {
+  /** `isAgain`: its refusal is not said here. */
+  private async takeSeat(role: string, name: string, key: string, isAgain = false): Promise<boolean> {
     const answer = await this.source.ask("deskSit", { role, name: name || t("desk.somebody"), key });
     this.role = answer?.role ?? "";
     this.permitted = answer?.commands ?? {};
@@ -270,7 +272,7 @@ export class Desk {
       sessionStorage.setItem(PASS, key);
       sessionStorage.setItem("role", role);
     }
-    this.tell(t(`role.name.${role}` as Key), answer);
+    if (!isAgain || answer?.accepted === true) this.tell(t(`role.name.${role}` as Key), answer);
     this.show();
     return answer?.accepted === true;
   }
@@ -353,8 +355,6 @@ export class Desk {
       return false;
     }
     const answer = await this.source.ask("deskCommand", { words });
-    // another page may have started or stopped it
-    if (words[0] === "record" && (answer?.accepted === true || answer?.code === "already")) this.isRecording = words[1] === "start";
     this.tell(t(label), answer);
     if (answer?.code === "not_joined" && this.role !== "") {
       this.role = "";
@@ -406,7 +406,7 @@ const LOSSES: [RegExp, Key][] = [
 export function reasonOfLoss(text: string): string {
   const known = LOSSES.find(([pattern]) => pattern.test(text));
   if (known === undefined) return text.replace(/\.$/, "");
-  return t(known[1], { by: retold(known[0].exec(text)?.groups?.["by"] ?? "", "desk.somebody") });
+  return t(known[1], { by: retold(known[0].exec(text)?.groups?.["by"] ?? "", ...SPEAKERS) });
 }
 
 /** What the gateway or the server answers, in this page's language where it has words for it. In English the server says more: it names what is missing. */

@@ -6,20 +6,25 @@ export function h<K extends keyof HTMLElementTagNameMap>(tag: K, className = "",
   return element;
 }
 
-const isSame = (a: Element, b: Element): boolean => {
-  const names = new Set([...Object.keys((a as HTMLElement).dataset), ...Object.keys((b as HTMLElement).dataset)]);
-  return a.tagName === b.tagName && [...names].every((name) => (a as HTMLElement).dataset[name] === (b as HTMLElement).dataset[name]);
-};
+const keyOf = (node: Node): string | undefined => (node instanceof HTMLElement ? node.dataset["key"] : undefined);
+const isSame = (a: Node, b: Node): boolean => a.nodeName === b.nodeName && keyOf(a) === keyOf(b);
 
 /**
- * Gives an element these children. What was at the same place stays, if its data are the same, with its focus and a press that has begun on it; its attributes and
- * its text become the new ones. Listeners of the new ones are lost: they belong on the element.
+ * Gives an element these children. Those with a `data-key` are known by it, others by their place: what was there stays, with its focus and a press that has begun on it,
+ * and takes the new attributes and text. Rows may come and go between; a row that changes its order is made anew. Listeners of the new ones are lost: they belong on
+ * the element.
  */
 export function renew(element: Element, nodes: readonly Node[]): void {
   nodes.forEach((next, i) => {
+    const stays = (node: Node): boolean => keyOf(node) !== undefined && nodes.slice(i).some((one) => isSame(node, one));
+    if (keyOf(next) !== undefined && [...element.childNodes].slice(i).some((old) => isSame(old, next)))
+      for (let old = element.childNodes[i]; old !== undefined && !isSame(old, next) && !stays(old); old = element.childNodes[i]) old.remove();
     const old = element.childNodes[i];
     if (old === undefined) element.append(next);
-    else if (old instanceof Element && next instanceof Element && isSame(old, next)) {
+    else if (!isSame(old, next)) {
+      if (stays(old)) old.before(next);
+      else old.replaceWith(next);
+    } else if (old instanceof Element && next instanceof Element) {
       for (const { name } of [...old.attributes]) if (!next.hasAttribute(name)) old.removeAttribute(name);
       for (const { name, value } of next.attributes) {
         if (old.getAttribute(name) === value) continue;
@@ -27,9 +32,7 @@ export function renew(element: Element, nodes: readonly Node[]): void {
         else old.setAttribute(name, value);
       }
       renew(old, [...next.childNodes]);
-    } else if (old instanceof Text && next instanceof Text) {
-      if (old.data !== next.data) old.data = next.data;
-    } else old.replaceWith(next);
+    } else if (old instanceof Text && next instanceof Text && old.data !== next.data) old.data = next.data;
   });
   while (element.childNodes.length > nodes.length) element.lastChild?.remove();
 }

@@ -1,7 +1,7 @@
 // Events of the server in the language of this page. The server writes English; what has no rule here stays as it is.
 import type { EventLog } from "./messages";
 import type { Session } from "./session";
-import { hasText, localized, retold, t, type Key } from "./strings";
+import { hasText, localized, n, retold, SPEAKERS, t, type Key } from "./strings";
 
 const ROLES = ["admin", "instructor", "trainee", "observer", "recorder"]; // as in the messages
 /** The rules of the safety layer by their bits, as devices/safety_rules.cpp names them. */
@@ -121,7 +121,8 @@ function value(session: Session, name: string, text: string): string {
     }
     case "role": return ROLES.includes(text) ? t(`role.${ROLES.indexOf(text)}` as Key) : text;
     case "word": return command(text);
-    case "who": case "by": return retold(text, "desk.somebody");
+    case "who": case "by": return retold(text, ...SPEAKERS);
+    case "seconds": case "ms": case "force": case "lost": return n(Number(text), /\.(\d+)/.exec(text)?.[1].length ?? 0);
     case "reason": return retold(text, "stop.reason", "refusal.stopped", "refusal.too_many");
     case "rule": return SAFETY.includes(text) ? t(`safety.${SAFETY.indexOf(text)}` as Key) : text;
     default: return text;
@@ -138,7 +139,7 @@ export function textOf(session: Session, event: Pick<EventLog, "kind" | "text">)
   if (event.kind === "mounted" || event.kind === "put in place") return session.retitled(event.text);
   if (event.kind === "command") {
     const [, who, word, rest] = /^(.+?): (\w+) ?(.*)$/.exec(event.text) ?? [];
-    return word === undefined ? event.text : `${retold(who, "desk.somebody")}: ${command(word)} ${readable(session, rest)}`.trim();
+    return word === undefined ? event.text : `${retold(who, ...SPEAKERS)}: ${command(word)} ${readable(session, rest).replace(/\b(on|off)$/, (state) => t(`event.${state as "on" | "off"}`))}`.trim();
   }
   for (const [pattern, key] of RULES) {
     const groups = pattern.exec(event.text)?.groups;

@@ -211,7 +211,8 @@ let shownAt = 0;
 function show(element: HTMLElement, nodes: Node[]): void {
   const before = element.querySelector("[aria-current]");
   renew(element, nodes);
-  if (element.querySelector("[aria-current]") !== before) toCurrent(element);
+  // not away from under a pointer or the focus
+  if (element.querySelector("[aria-current]") !== before && !element.matches(":hover, :focus-within")) toCurrent(element);
 }
 
 /** Scrolls a list to what is current in it. */

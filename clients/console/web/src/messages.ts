@@ -57,7 +57,9 @@ export interface InstanceGone { topic: string; key_sample: Uint8Array }
 /** Of the channel /console: how the gateway stands to its session. `modelOf`: of a recording. */
 export interface ConsoleState {
   state: "searching" | "joined" | "refused" | "lost" | "ended" | "recorded";
-  reason: string; life: number; session: string; title: string; lockstep: boolean; scene: string; protocol: number; modelOf?: RecordedModel;
+  reason: string; life: number; session: string; title: string; lockstep: boolean; scene: string; protocol: number;
+  /** Whether this gateway records the session. */
+  recorded?: boolean; modelOf?: RecordedModel;
 }
 /** The display model of an object, by its name, from a recording. */
 export type RecordedModel = (object: string) => Promise<ArrayBuffer>;

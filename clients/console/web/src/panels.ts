@@ -7,7 +7,7 @@ import { conditionOf, interventions, kindOf, textOf } from "./eventtext";
 import type { Label } from "./labels";
 import { NONE, RunPhase, StepPhase, type EventLog } from "./messages";
 import type { Session, StepEntry } from "./session";
-import { localized, n, retold, significant, t, type Key } from "./strings";
+import { localized, n, retold, significant, SPEAKERS, t, type Key } from "./strings";
 
 const RUN: Record<RunPhase, [Key, Icon, string]> = {
   [RunPhase.Waiting]: ["run.waiting", "wait", "info"],
@@ -118,7 +118,7 @@ export function steps(session: Session, leads: boolean): Node[] {
     const time = entry.seconds === undefined ? "" : `${n(entry.seconds, 1)} s`;
     const state = entry.phase === undefined ? h("span", "badge muted", t("step.ahead")) : badge(STEP[entry.phase]);
     const row = h("li", entry.isNow ? "now" : entry.phase === undefined ? "ahead" : "", state, h(leads ? "button" : "span", "name", titleOfStep(entry)), h("time", "", time));
-    row.dataset["step"] = entry.name;
+    row.dataset["step"] = row.dataset["key"] = entry.name;
     if (entry.isNow) row.setAttribute("aria-current", "step");
     rows.push(row);
   }
@@ -147,7 +147,7 @@ export function holders(session: Session): Label[] {
     const holds = [...session.grabs.values()].some(({ hand_id, object_id }) => hand_id === id && !session.isOwn(object_id) && session.holderOf(object_id) === id);
     const person = [...session.people.values()].find(({ alive, hands }) => alive && Array.from(hands).includes(id));
     if (!holds || person === undefined || session.isTracked(id)) return [];
-    return [{ place: new Vector3(X_WH.p[0], X_WH.p[1], X_WH.p[2]), text: `${person.name} · ${session.nameOfHand(id)}` }];
+    return [{ place: new Vector3(X_WH.p[0], X_WH.p[1], X_WH.p[2]), text: `${retold(person.name, ...SPEAKERS)} · ${session.nameOfHand(id)}` }];
   });
 }
 
@@ -163,13 +163,14 @@ export function people(session: Session, { leads, hand, whyNoTaking }: Lead): No
     const held = [...session.grabs.values()].filter((grab) => grab.hand_id !== NONE && hands.includes(grab.hand_id) && !session.isOwn(grab.object_id));
     const what = held.map((grab) => session.titleOf(grab.object_id)).join(", ");
     const devices = devicesOf(session, hands);
-    const head = h("div", "", h("span", "name", retold(person.name, "desk.somebody")), h("span", "muted", t(`role.${person.role}` as Key)), h("span", "holds", what === "" ? "" : t("holds", { what })));
+    const head = h("div", "", h("span", "name", retold(person.name, ...SPEAKERS)), h("span", "muted", t(`role.${person.role}` as Key)), h("span", "holds", what === "" ? "" : t("holds", { what })));
     const link = linkOf(session, person.client_id);
     const actions: HTMLElement[] = [];
     const act = (name: string, value: string, label: string, more: string, text = label, why = ""): void => {
       const button = h("button", "", text);
       if (why !== "") forbid(button, why);
       button.dataset[name] = value;
+      button.dataset["key"] = `${name} ${value}`;
       button.setAttribute("aria-label", `${label}: ${more}`);
       actions.push(button);
     };
@@ -191,26 +192,28 @@ export function people(session: Session, { leads, hand, whyNoTaking }: Lead): No
     head.title = link.text; // all of it, of a link that is not worth a line
     const details = [devices, link.isQuiet ? "" : link.text, guidance].filter((text) => text !== "").map((text) => h("small", "muted", text));
     if (limited !== "") details.push(h("small", "warn", limited));
-    return h("li", "", icon("person"), head, ...details, ...(actions.length === 0 ? [] : [h("div", "row", ...actions)]));
+    const row = h("li", "", icon("person"), head, ...details, ...(actions.length === 0 ? [] : [h("div", "row", ...actions)]));
+    row.dataset["key"] = String(person.client_id);
+    return row;
   });
   return [h("ul", "people", ...rows)];
 }
 
-/** Without "hand free", which only ends what "hand frozen" says, and with repetitions in one row. */
-/** `leads`: each can be gone to. */
+/** Without "hand free", which only ends what "hand frozen" says, and with repetitions in one row. `leads`: each can be gone to. */
 export function events(session: Session, leads: boolean): Node[] {
-  const told: { event: EventLog; times: number }[] = [];
+  const told: { event: EventLog; first: EventLog; times: number }[] = [];
   for (const event of session.events) {
     const before = told[told.length - 1];
     if (event.kind === "hand free") continue;
-    if (before?.event.kind === event.kind && ["hand frozen", "safety"].includes(event.kind)) told[told.length - 1] = { event, times: before.times + 1 };
-    else told.push({ event, times: 1 });
+    if (before?.event.kind === event.kind && ["hand frozen", "safety"].includes(event.kind)) Object.assign(before, { event, times: before.times + 1 });
+    else told.push({ event, first: event, times: 1 });
   }
-  const rows = told.slice(-EVENTS_SHOWN).reverse().map(({ event, times }) => {
+  const rows = told.slice(-EVENTS_SHOWN).reverse().map(({ event, first, times }) => {
     const text = textOf(session, event);
     const kind = h("span", "kind", kindOf(event));
     const row = h("li", ["", "warn", "bad"][event.severity] ?? "", h("time", "", clock(Number(event.tick) / 1000)), kind, h(leads ? "button" : "span", "text", times > 1 ? `${text} (×${times})` : text));
     row.dataset["tick"] = String(event.tick);
+    row.dataset["key"] = `${first.tick} ${first.kind} ${first.text}`;
     return row;
   });
   return [h("ol", "events", ...rows)];
@@ -219,7 +222,7 @@ export function events(session: Session, leads: boolean): Node[] {
 /** The emergency strip: always there. */
 export function strip(session: Session): { text: string; isRaised: boolean } {
   const [raise] = session.standing;
-  return raise === undefined ? { text: t("stop.none"), isRaised: false } : { text: t("stop.raised", { who: raise.who, reason: retold(raise.reason, "stop.reason") }), isRaised: true };
+  return raise === undefined ? { text: t("stop.none"), isRaised: false } : { text: t("stop.raised", { who: retold(raise.who, ...SPEAKERS), reason: retold(raise.reason, "stop.reason") }), isRaised: true };
 }
 
 export function status(session: Session, age: number): Node[] {
@@ -232,7 +235,7 @@ export function status(session: Session, age: number): Node[] {
     items.push(item("status.compute", `${n(ms, 2)} ms`, ms > 1 && session.link?.lockstep !== true ? "warn" : ""), item("status.load", `${n(stats.load_percent, 0)} %`), item("status.late", String(stats.late_ticks)));
     // in lockstep ticks wait, so slow writes delay nothing that is missed
     const slow = session.link?.lockstep === true ? 0n : stats.slow_writes;
-    if (slow + stats.unsent_samples > 0n) items.push(item("status.writes", `${stats.slow_writes} / ${stats.unsent_samples}`, "warn"));
+    if (slow + stats.unsent_samples > 0n) items.push(item("status.writes", `${stats.slow_writes} / ${stats.unsent_samples}`, stats.unsent_samples > 0n ? "warn" : ""));
   }
   items.push(item("status.contacts", String(touching)));
   const { recorder } = session;

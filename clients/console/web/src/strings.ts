@@ -74,6 +74,9 @@ export function t(key: Key, values: Record<string, string | number> = {}): strin
   return filled(languages[language][key], values);
 }
 
+/** What programs and people without a name are called. */
+export const SPEAKERS: Key[] = ["desk.somebody", "person.console", "person.trainee", "person.instructor", "person.observer", "person.recorder", "person.command_line"];
+
 /** A text that a page of any language has sent, in this page's. */
 export function retold(text: string, ...keys: Key[]): string {
   const key = keys.find((known) => Object.values(languages).some((texts) => texts[known] === text));
