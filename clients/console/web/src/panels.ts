@@ -163,7 +163,8 @@ export function people(session: Session, { leads, hand, whyNoTaking }: Lead): No
     const held = [...session.grabs.values()].filter((grab) => grab.hand_id !== NONE && hands.includes(grab.hand_id) && !session.isOwn(grab.object_id));
     const what = held.map((grab) => session.titleOf(grab.object_id)).join(", ");
     const devices = devicesOf(session, hands);
-    const head = h("div", "", h("span", "name", retold(person.name, ...SPEAKERS)), h("span", "muted", t(`role.${person.role}` as Key)), h("span", "holds", what === "" ? "" : t("holds", { what })));
+    const [name, role] = [retold(person.name, ...SPEAKERS), t(`role.${person.role}` as Key)];
+    const head = h("div", "", h("span", "name", name), h("span", "muted", name === role ? "" : role), h("span", "holds", what === "" ? "" : t("holds", { what })));
     const link = linkOf(session, person.client_id);
     const actions: HTMLElement[] = [];
     const act = (name: string, value: string, label: string, more: string, text = label, why = ""): void => {
