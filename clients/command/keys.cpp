@@ -11,6 +11,7 @@
 
 #include "clients/command/command_program.h"
 #include "clients/command/stop_raiser.h"
+#include "idl/types/printable_text.h"
 
 namespace tenon::command {
 
@@ -64,7 +65,7 @@ void show(const std::string& line) {
 std::string nameOf(const ParsedCommand& command) {
   for (const CommandWord& word : commandWords())
     if (word.command == command.command)
-      return std::string(word.word) + (command.text.empty() ? "" : " " + command.text);
+      return std::string(word.word) + (command.text.empty() ? "" : " " + printable(command.text));
   return "command";
 }
 

@@ -29,6 +29,12 @@ std::size_t sequenceLength(std::string_view text) {
   return 0;
 }
 
+/// Whether a character changes the direction in which those after it are shown: U+202A to 202E, 2066 to 2069.
+bool turnsText(std::string_view character) {
+  return character.size() == 3 && ((character >= "\xE2\x80\xAA" && character <= "\xE2\x80\xAE") ||
+                                   (character >= "\xE2\x81\xA6" && character <= "\xE2\x81\xA9"));
+}
+
 }  // namespace
 
 std::string printable(std::string_view text) {
@@ -40,7 +46,7 @@ std::string printable(std::string_view text) {
     const bool is_c1 = length == 2 && first == 0xC2 && static_cast<std::uint8_t>(text[1]) < 0xA0;
     if (length == 0) {
       clean += '?';
-    } else if (first < 0x20 || first == 0x7F || is_c1) {
+    } else if (first < 0x20 || first == 0x7F || is_c1 || turnsText(text.substr(0, length))) {
       clean += ' ';
     } else {
       clean += text.substr(0, length);

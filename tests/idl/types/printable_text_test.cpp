@@ -18,6 +18,8 @@ TEST(PrintableText, KeepsWhatCanBeReadAndReplacesTheRest) {
             " 31m")
       << "a control sequence in one character";
   EXPECT_EQ(printable(std::string("a\0b", 3)), "a b");
+  EXPECT_EQ(printable("Eve\xE2\x80\xAE (admin)"), "Eve  (admin)") << "nobody is shown backwards";
+  EXPECT_EQ(printable("\xE2\x80\xA9\xE2\x81\xA6\xE2\x80\xAF"), "\xE2\x80\xA9 \xE2\x80\xAF");
 }
 
 TEST(PrintableText, IsShortenedBetweenCharacters) {

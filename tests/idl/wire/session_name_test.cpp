@@ -12,6 +12,9 @@ TEST(SessionName, IsATextOfOneTo63Bytes) {
        {std::string("test"), std::string("lab 3, morning"), std::string("J\xc3\xbcrg"), std::string(63, 'a')})
     EXPECT_TRUE(checkSessionName(name)) << name;
   EXPECT_FALSE(checkSessionName(""));
+  EXPECT_FALSE(checkSessionName("."));
+  EXPECT_FALSE(checkSessionName(".."));
+  EXPECT_TRUE(checkSessionName("..."));
   EXPECT_FALSE(checkSessionName(std::string(64, 'a')));
   EXPECT_FALSE(checkSessionName(std::string(300, 'a')));
 }
