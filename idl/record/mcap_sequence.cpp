@@ -170,8 +170,9 @@ bool RecordSequence::isTornAt(std::size_t at) const {
   const auto length = in.get<std::uint64_t>();
   const std::size_t after = zeros_ - at - kRecordHeaderBytes;
   if (opcode == kFooter && length == kFooterBytes) return after < length + sizeof(kMagic);
-  if (opcode > kDataEnd || length <= after) return false;
-  if (opcode != kChunk) return true;
+  if (opcode == 0 || opcode > kDataEnd || length <= after) return false;
+  constexpr std::uint64_t kMostBesides = std::uint64_t{64} << 20U;  // [bytes] of a record that is no chunk
+  if (opcode != kChunk) return opcode == kAttachment || length <= kMostBesides;
   constexpr std::size_t kBeforeName = 8 + 8 + 8 + 4;
   in.take(kBeforeName);
   const auto name = in.get<std::uint32_t>();

@@ -290,6 +290,22 @@ TEST_F(McapTest, ADamagedEndStaysInAFileThatIsContinued) {
   }
 }
 
+// with an opcode of the format, and a length as none of its records has
+TEST_F(McapTest, WhatFollowsAWholeFileAndIsNoRecordIsDamage) {
+  record(20);
+  const Bytes left = unfinished(fileBytes());
+  for (const std::uint8_t opcode : {mcap::kStatistics, mcap::kMessageIndex, mcap::kMetadata}) {
+    Bytes bytes = left;
+    bytes.push_back(opcode);
+    bytes.resize(left.size() + 500, 0xA7);
+    writeFile(bytes);
+    auto reader = McapReader::open(file_);
+    ASSERT_TRUE(reader);
+    EXPECT_EQ(readAll(*reader).size(), 20U);
+    EXPECT_TRUE(reader->isDamaged()) << int{opcode};
+  }
+}
+
 // by the times in their heads, which no checksum covers, chunks are passed over
 TEST_F(McapTest, ASeekFindsTheMessagesOfAChunkThatSaysOtherTimes) {
   const auto written = record(40);
