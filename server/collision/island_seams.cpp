@@ -76,15 +76,21 @@ void IslandSolver::findSeams(const Job& job, SeamKind kind) {
       addSeamAtBorder(job, pair, row - first, row);
     }
   }
-  if (kind == SeamKind::kBorder || seams_.empty()) return;
+  if (seams_.empty()) return;
   // along a rim the next point would hold instead
   first = 0;
   for (pair = 0; pair < job.pairs.size(); ++pair) {
     const ContactList& contacts = job.results[pair].query.contacts;
     for (std::size_t c = 0; c < contacts.size(); ++c) {
-      if (contacts[c].kind == ContactKind::kCrossing && contacts[c].gap <= kTouchGap &&
-          multipliers_[first + c] <= 0.0)
+      const bool crosses = contacts[c].kind == ContactKind::kCrossing;
+      if (crosses != (kind == SeamKind::kEdge) || contacts[c].gap > kTouchGap ||
+          multipliers_[first + c] > 0.0)
+        continue;
+      if (crosses) {
         addSeamAtEdge(job, pair, c, first + c);
+      } else {
+        addSeamAtBorder(job, pair, c, first + c);
+      }
     }
     first += contacts.size();
   }

@@ -245,8 +245,8 @@ class IslandSolver {
   /// Gives active contacts at seams the normal of the side that restricts the step least, and solves again.
   /// False when no normal changed.
   bool relaxSeamNormals(const Job& job, SeamKind kind, SolveReport& report);
-  /// Sets seams_: active contacts at a convex border between cells; or, where one is at an edge, all that
-  /// touch at edges. As far as there is capacity.
+  /// Sets seams_: where an active contact is at a convex border between cells, or at an edge, all that touch
+  /// at one, the active ones first. As far as there is capacity.
   void findSeams(const Job& job, SeamKind kind);
   void addSeamAtBorder(const Job& job, std::size_t pair, std::size_t contact, std::size_t row);
   void addSeamAtEdge(const Job& job, std::size_t pair, std::size_t contact, std::size_t row);

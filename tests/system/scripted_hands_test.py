@@ -6,7 +6,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from stage import final_hash, tenon
+from stage import SOURCE, final_hash, tenon
 
 STIFFNESS = 1000.0  # [N/m] default of a hand
 REST = 0.02  # [m] height of the part's centre when it lies on the plate
@@ -83,6 +83,17 @@ class Forces(Scripted):
             self.assertAlmostEqual(pair["F_Ao_W"][2], sign * force, delta=0.01 * force)
             self.assertAlmostEqual(pair["gap"], 0, delta=2e-5)
             self.assertAlmostEqual(pair["depth"], 0, delta=2e-5)
+
+    def test_an_upright_peg_slides_past_the_rim_of_its_hole_from_each_side(self):
+        # [mm] beside the axis of a hole with 0.25 mm of play: the chamfer's upper edge comes to lie along the rim
+        for beside in ((0.5, -0.3), (1.0, -0.5), (1.1, -0.4), (1.0, -1.0), (-1.0, 0.5)):
+            x, y = (1e-3 * away for away in beside)
+            path = self.file("peg.csv", (0, x, y, 0.08, 1, 0, 0, 0), (1.5, x, y, -0.07, 1, 0, 0, 0))
+            self.rehearse("--input", f"right={path}", "--take", "right=peg", "--seconds", 2.5, "--log", self.log, "--overwrite",
+                          scene=SOURCE / "scenarios" / "peg_and_box")
+            last = json.loads(self.log.read_text(encoding="utf-8").splitlines()[-1])
+            self.assertAlmostEqual(last["objects"]["peg"]["X_WO"][2], -0.06, delta=1e-4, msg=str(beside))
+            self.assertLess(math.hypot(*last["hands"]["right"]["F_Ho_W"][:3]), 15, beside)
 
     def test_an_object_that_is_taken_starts_at_the_first_row_with_its_frame_at_the_hands(self):
         turned = (0.8, 0, 0.6, 0)
