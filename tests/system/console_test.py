@@ -791,7 +791,13 @@ class Page(unittest.TestCase):
             first, again = places[round(0.2 * end, 3)]
             self.assertEqual(first, again, "a place is the same from both sides")
             self.assertNotEqual(first, places[round(0.95 * end, 3)][0])
+            # while it plays, rows of events come before the one that has the focus
+            browser("await", expression="(window.row = document.querySelector('.events button')) !== null")
+            browser("value", expression="window.row.focus()")
             browser("key", key="Space")
+            browser("await", expression="document.querySelector('.events button') !== window.row")
+            self.assertTrue(browser("value", expression="document.activeElement === window.row"))
+            browser("value", expression=f"tenon.player.seek({0.2 * end})")
             browser("await", expression=f"tenon.player.time > {0.2 * end + 0.5}")
             self.look(browser)
             # what cannot be read is said, and the next place can be
