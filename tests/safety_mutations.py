@@ -54,6 +54,7 @@ RULES = [
     ("a device that is being armed does not", [("clients/haptic/arming_thread.h", r"while \(isUnderWay\(\)\) hear\(\);", "while (isUnderWay()) static_cast<void>(hear);")],
      "clients_haptic_tests", "ArmingThread.*"),
     ("a device that is being armed does not", [(HAND, r"handover_\.askWithoutReset\(\);", "static_cast<void>(device_.arm());")], "clients_station_tests", "DeviceStation.FramesStopsAndContacts*"),
+    ("a clear meets a raise", [("server/session/server_wire.cpp", r", stops_\.otherThan\(command\.raises\)\)", ")")], "server_session_tests", "SessionServer.ARaise*"),
     ("motion starts when a stop is cleared", [(REGISTRY, r"  changes_\.push_back\(\{\.kind = ChangeKind::kPause\}\);\n", "")],
      "server_session_tests", "RegistryCommands.AClearedEmergencyStopLeavesTheRunPaused"),
     ("after a gap the hand is thrown", [(HAND, r"workspace_\.shift\(([^;]*)\);", r"workspace_.shift(0.0 * (\1));")], "clients_haptic_tests",

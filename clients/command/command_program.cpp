@@ -6,6 +6,7 @@
 
 #include "clients/command/stop_raiser.h"
 #include "idl/types/messages/steps.h"
+#include "idl/types/printable_text.h"
 
 namespace tenon::command {
 
@@ -14,6 +15,7 @@ namespace {
 using std::chrono::milliseconds;
 constexpr std::chrono::seconds kPatience{5};  // for an answer
 constexpr milliseconds kForAServer{3000};     // to repeat an emergency stop, discovery included
+constexpr milliseconds kForRaises{1000};      // for the raises of a stop that the run is in
 constexpr milliseconds kResend{500};          // an answer sent before our reader was matched is lost
 
 /// Twice is as good as once.
@@ -66,6 +68,14 @@ Result<void> CommandClient::connect(const Stop& stop) {
     });
   }
   if (all) all = inbox_.on<RunState>(session, wire::kRunState, [this](const RunState& run) { receive(run); });
+  if (all) {
+    all = inbox_.on<EmergencyStop>(session, wire::kEmergencyStop,
+                                   [this](const EmergencyStop& stop) { receive(stop); });
+  }
+  if (all) {
+    all = inbox_.on<EmergencyClear>(session, wire::kEmergencyClear,
+                                    [this](const EmergencyClear& cleared) { stops_.clear(cleared); });
+  }
   return all ? awaitReader(stop) : all;
 }
 
@@ -78,8 +88,25 @@ Result<void> CommandClient::awaitReader(const Stop& stop) {
 }
 
 void CommandClient::receive(const RunState& run) {
-  if (report && run.reason != run_.reason) report("session: " + run.reason);
+  if (report && (!run_ || run.reason != run_->reason)) report("session: " + run.reason);
   run_ = run;
+}
+
+void CommandClient::receive(const EmergencyStop& stop) {
+  if (stops_.raise(stop) && report)
+    report("emergency stop by " + printable(stop.who) + ": " + printable(stop.reason));
+}
+
+std::vector<RaiseId> CommandClient::standingRaises() const {
+  std::vector<RaiseId> all;
+  for (const auto& [id, stop] : stops_.standing()) all.push_back(id);
+  return all;
+}
+
+/// Until those that stand are heard, by who has just joined.
+void CommandClient::awaitRaises(const Stop& stop) {
+  (void)dispatchUntil(stop, kForRaises,
+                      [this] { return run_ && (!run_->emergency_stop || stops_.engaged()); });
 }
 
 Result<void> CommandClient::send(const ParsedCommand& command, const Stop& stop) {
@@ -102,8 +129,11 @@ Result<void> CommandClient::rejoin(const Stop& stop) {
 
 Result<void> CommandClient::sendOnce(const ParsedCommand& command, const Stop& stop) {
   ack_.reset();
-  const Command message{
-      member_->welcome().client, ++sent_, *command.command, {}, command.text, command.value};
+  Command message{member_->welcome().client, ++sent_, *command.command, {}, command.text, command.value, {}};
+  if (command.command == CommandKind::kClearEmergencyStop) {
+    if (!command.raises) awaitRaises(stop);
+    message.raises = rangesOf(command.raises ? *command.raises : standingRaises());
+  }
   const auto until = std::chrono::steady_clock::now() + kPatience;
   const auto answered = [&] { return ack_ && ack_->id == message.id; };
   do {

@@ -11,6 +11,7 @@
 #include "clients/command/parser.h"
 #include "idl/types/messages/run.h"
 #include "idl/types/result.h"
+#include "idl/types/stop_truth.h"
 #include "idl/wire/membership.h"
 
 namespace tenon::command {
@@ -44,7 +45,7 @@ class CommandClient {
     inbox_.dispatch(timeout);
     if (lost()) member_->leave();  // nobody comes back to this seat
   }
-  [[nodiscard]] bool isOver() const { return tenon::isOver(run_.phase); }
+  [[nodiscard]] bool isOver() const { return run_ && tenon::isOver(run_->phase); }
   /// Why the server takes no more commands; none while it does.
   [[nodiscard]] const std::optional<std::string>& lost() const { return member_->lost(); }
   /// It is lost because its server has ended: rejoin() finds the one that resumes the session.
@@ -52,6 +53,8 @@ class CommandClient {
   /// Membership::rejoin.
   [[nodiscard]] Result<void> rejoin(const Stop& stop);
   [[nodiscard]] const std::string& sessionName() const { return member_->sessionName(); }
+  /// Raises of the emergency stop that stand, as heard so far.
+  [[nodiscard]] std::vector<RaiseId> standingRaises() const;
 
   /// Called with one line per change of step or run; may be empty.
   std::function<void(const std::string&)> report;
@@ -65,6 +68,8 @@ class CommandClient {
                      const std::function<bool()>& done);
   Result<void> sendOnce(const ParsedCommand& command, const Stop& stop);
   void receive(const RunState& run);
+  void receive(const EmergencyStop& stop);
+  void awaitRaises(const Stop& stop);
 
   wire::MembershipOptions options_;
   std::function<void()> meanwhile_;
@@ -73,7 +78,8 @@ class CommandClient {
   std::uint32_t sent_ = 0;  ///< commands, also the id of the newest
   std::optional<CommandAck> ack_;
   std::string step_;  ///< name of the active one
-  RunState run_;
+  std::optional<RunState> run_;
+  StopTruth stops_;
   wire::Inbox inbox_;
 };
 

@@ -88,9 +88,9 @@ class KeyDesk {
     while (!ended_ && !(client_ && client_->isOver())) {
       if (client_ && client_->lost() && !is_outside_) comeBack();
       if (!keys_.empty()) {
-        const char key = keys_.front();
+        const Pressed pressed = std::move(keys_.front());
         keys_.pop_front();
-        act(key);
+        act(pressed);
         continue;
       }
       client_ ? client_->dispatch(kPause) : std::this_thread::sleep_for(kPause);
@@ -104,6 +104,11 @@ class KeyDesk {
   }
 
  private:
+  struct Pressed {
+    char key = 0;
+    std::vector<RaiseId> seen;  ///< raises of the emergency stop that were told of before: a clear names them
+  };
+
   static int report(const std::string& what) {
     std::fprintf(stderr, "tenon command: %s\n", what.c_str());
     return 1;
@@ -128,7 +133,7 @@ class KeyDesk {
         continue;
       }
       if (!is_coming_back_ && (keys_.size() < kMostKeys || is_input_over_))
-        keys_.push_back(key);
+        keys_.push_back({key, client_ ? client_->standingRaises() : std::vector<RaiseId>{}});
       else if (parseCommand(key, signals_))
         show(is_coming_back_ ? "not sent: the server is gone" : "not sent: too many keys wait");
     }
@@ -141,9 +146,10 @@ class KeyDesk {
   /// Keys that wait are not sent, but to leave is still done.
   void dropKeys(const std::string& why) {
     if (asked_) show(nameOf(*std::exchange(asked_, std::nullopt)) + ": not done: " + why);
-    std::erase_if(keys_, [&](char key) {
-      if (const auto command = parseCommand(key, signals_)) show(nameOf(*command) + ": not sent: " + why);
-      return key != kLeaveKey;
+    std::erase_if(keys_, [&](const Pressed& pressed) {
+      if (const auto command = parseCommand(pressed.key, signals_))
+        show(nameOf(*command) + ": not sent: " + why);
+      return pressed.key != kLeaveKey;
     });
   }
 
@@ -220,7 +226,8 @@ class KeyDesk {
     if (client_) show("joined session '" + client_->sessionName() + "' again: press the key again");
   }
 
-  void act(char key) {
+  void act(const Pressed& pressed) {
+    const char key = pressed.key;
     if (key == kLeaveKey) return end();
     if (key == '?') show(keyLegend(signals_));
     auto command = key == 'y' ? std::exchange(asked_, std::nullopt) : parseCommand(key, signals_);
@@ -228,6 +235,7 @@ class KeyDesk {
     asked_ = asks ? command : std::nullopt;
     if (asks) show(nameOf(*command) + ": press y to do it, any other key not to");
     if (!command || asks) return;
+    command->raises = pressed.seen;
     is_interrupted_ = ended_.load();
     const auto sent =
         is_outside_ ? fail("not sent: " + why_outside_) : client_->send(*command, is_interrupted_);
@@ -242,7 +250,7 @@ class KeyDesk {
   std::atomic<bool> is_interrupted_{false};  ///< likewise, or by the space bar: no answer is awaited
   std::unique_ptr<StopRaiser> raiser_;
   std::unique_ptr<CommandClient> client_;
-  std::deque<char> keys_;               ///< pressed, and not acted upon
+  std::deque<Pressed> keys_;            ///< and not acted upon
   std::optional<ParsedCommand> asked_;  ///< waits for `y`
   std::vector<std::uint32_t> raised_;   ///< raises of which it is not told yet who has heard them
   std::chrono::steady_clock::time_point next_raise_;

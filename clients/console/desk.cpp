@@ -183,6 +183,7 @@ void Desk::handle(ViewerId viewer, const std::string& session, const DeskRequest
     answer.text = parsed.error().what;
     return answer_(viewer, answer);
   }
+  parsed->raises = request.raises;
   const std::scoped_lock lock(mutex_);
   if (!parsed->command) {
     for (const auto& [of, seat] : seats_)

@@ -29,10 +29,10 @@ namespace tenon {
 
 /// For displays that have their own texts for refusals.
 [[nodiscard]] constexpr std::string_view refusalName(Refusal refusal) noexcept {
-  constexpr std::array<std::string_view, 13> kNames{
+  constexpr std::array<std::string_view, 14> kNames{
       "",        "other",        "not_joined",    "not_permitted", "over",         "waiting",
       "already", "unknown_name", "not_your_hand", "not_holdable",  "nobody_there", "too_many",
-      "stopped"};
+      "stopped", "raised_again"};
   const auto index = static_cast<std::size_t>(refusal);
   return index < kNames.size() ? kNames[index] : "other";
 }

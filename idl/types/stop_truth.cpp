@@ -1,5 +1,6 @@
 #include "idl/types/stop_truth.h"
 
+#include <algorithm>
 #include <iterator>
 
 namespace tenon {
@@ -19,6 +20,19 @@ std::optional<RaiseId> surplus(const std::map<RaiseId, M>& kept, const RaiseId& 
 }
 
 }  // namespace
+
+std::vector<RaiseRange> rangesOf(std::vector<RaiseId> raises) {
+  std::sort(raises.begin(), raises.end());
+  std::vector<RaiseRange> all;
+  for (const RaiseId& raise : raises) {
+    const bool continues =
+        !all.empty() && all.back().client_guid == raise.client_guid && raise.counter - all.back().last <= 1;
+    if (!continues && all.size() == kMostRanges) break;
+    if (!continues) all.push_back({raise.client_guid, raise.counter, raise.counter});
+    all.back().last = raise.counter;
+  }
+  return all;
+}
 
 StopChange StopTruth::raise(const EmergencyStop& stop) {
   const RaiseId id{stop.client_guid, stop.counter};

@@ -1,23 +1,16 @@
 #pragma once
 
-#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "idl/types/messages/commands.h"
 #include "idl/types/messages/run.h"
 
 namespace tenon {
-
-/// The name of one raise of the emergency stop.
-struct RaiseId {
-  std::string client_guid;
-  std::uint32_t counter = 0;
-
-  auto operator<=>(const RaiseId&) const = default;
-};
 
 /// What a message has changed in a StopTruth.
 struct StopChange {
@@ -27,6 +20,10 @@ struct StopChange {
 
   explicit operator bool() const { return changed; }
 };
+
+/// As few ranges as name these raises and no other ones. At most kMostRanges, as many as a clear takes:
+/// raises beyond stand until the next clear.
+[[nodiscard]] std::vector<RaiseRange> rangesOf(std::vector<RaiseId> raises);
 
 /// Which raises of the emergency stop stand: those that were heard and that no clear names.
 ///

@@ -122,6 +122,10 @@ CommandTranslator::Decision CommandTranslator::clearStopChange(const CommandCont
   if (context.role == Role::kAdmin && context.is_instructor_present)
     return refuse(Refusal::kNotPermitted,
                   "an instructor is present: it is for the instructor to clear the emergency stop");
+  if (context.unnamed != nullptr)
+    return refuse(Refusal::kRaisedAgain,
+                  fmt::format("it was raised again, by {}: {}; look, then clear it again",
+                              context.unnamed->who, context.unnamed->reason));
   return Change{.kind = ChangeKind::kSetEmergencyStop, .value = 0.0};
 }
 

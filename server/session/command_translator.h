@@ -5,6 +5,7 @@
 
 #include "idl/types/messages/commands.h"
 #include "idl/types/messages/role.h"
+#include "idl/types/messages/run.h"
 #include "server/game_control/scenario.h"
 #include "server/session/refused.h"
 #include "server/session/tick_io.h"
@@ -14,8 +15,9 @@ namespace tenon::session {
 /// Who gives a command, and in what session.
 struct CommandContext {
   Role role = Role::kObserver;
-  std::span<const ClientId> controllers;  ///< of each hand, index = HandId; valid during the call
-  bool is_stop_engaged = false;           ///< emergency stop
+  std::span<const ClientId> controllers;   ///< of each hand, index = HandId; valid during the call
+  bool is_stop_engaged = false;            ///< emergency stop
+  const EmergencyStop* unnamed = nullptr;  ///< a raise that the clear does not name; null: none
   bool is_instructor_present = false;
 };
 

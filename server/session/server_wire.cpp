@@ -307,18 +307,19 @@ void ServerWire::handle(const Command& command, const wire::Origin& from) {
   }
   const Presence* sender = registry_.findClient(command.client);
   const std::string who = sender != nullptr ? sender->name : fmt::format("client {}", command.client.value);
-  const CommandAck ack = registry_.handleCommand(command);
+  const CommandAck ack = registry_.handleCommand(command, stops_.otherThan(command.raises));
   if (!reception_->dismissKicked(command, ack, who)) answer(command, ack, who);
 }
 
 void ServerWire::answer(const Command& command, const CommandAck& ack, const std::string& who) {
   writers_->ack.send(ack);
+  if (ack.refusal == Refusal::kRaisedAgain) stops_.clear(command.raises, who, command.text);
   if (!ack.accepted) {
     logRefusal(fmt::format("{}: '{}': {}", who, commandName(command.kind), ack.reason));
   } else if (command.kind == CommandKind::kNote) {
     log(Severity::kInfo, "note", fmt::format("{}: {}", who, command.text));
   } else if (command.kind == CommandKind::kClearEmergencyStop) {
-    clearEmergencyStop(command.client, command.text);
+    clearEmergencyStop(command, who);
   } else {
     log(Severity::kInfo, "command", commandText(command, who));
   }
@@ -358,9 +359,9 @@ void ServerWire::logStandingStops() {
                   one.reason, others == 0 ? "" : fmt::format(", and {} more", others)));
 }
 
-void ServerWire::clearEmergencyStop(ClientId client, const std::string& reason) {
-  const std::string& who = registry_.findClient(client)->name;
-  stops_.clear(who, reason);
+void ServerWire::clearEmergencyStop(const Command& command, const std::string& who) {
+  const std::string& reason = command.text;
+  stops_.clear(command.raises, who, reason);
   const char* const next = registry_.phase() == RunPhase::kWaitingForPeople
                                ? "the session still waits for people"
                                : "the session is paused until 'resume'";

@@ -128,7 +128,7 @@ class ServerWire {
   void handleGone(const Presence& presence, const wire::Origin& from);
   [[nodiscard]] bool isGenuine(ClientId client, const wire::Origin& from, const std::string& what);
   void engage(const EmergencyStop& stop);
-  void clearEmergencyStop(ClientId client, const std::string& reason);
+  void clearEmergencyStop(const Command& command, const std::string& who);
   void refuse(const std::string& why);
   void logRefusal(const std::string& why);
   void sendGuidance(const TickOutput& output);

@@ -318,11 +318,11 @@ Result<Change> SessionRegistry::validateExternalPose(const ExternalPose& pose) c
   return checkedPose(pose, scenario_);
 }
 
-CommandAck SessionRegistry::handleCommand(const Command& command) {
+CommandAck SessionRegistry::handleCommand(const Command& command, const EmergencyStop* unnamed) {
   const Presence* who = findClient(command.client);
   if (who == nullptr || !who->alive)
     return {command.client, command.id, false, "join first", Refusal::kNotJoined};
-  CommandAck ack = decide(command, who->role);
+  CommandAck ack = decide(command, who->role, unnamed);
   seats_[command.client.value - 1].last_ack = ack;
   return ack;
 }
@@ -334,7 +334,7 @@ const CommandAck* SessionRegistry::previousAck(const Command& command) const {
   return ack.id == command.id && command.id != 0 ? &ack : nullptr;
 }
 
-CommandAck SessionRegistry::decide(const Command& command, Role role) {
+CommandAck SessionRegistry::decide(const Command& command, Role role, const EmergencyStop* unnamed) {
   const auto answer = [&](const tl::expected<void, Refused>& done) {
     return done ? CommandAck{command.client, command.id, true, {}, Refusal::kNone}
                 : CommandAck{command.client, command.id, false, shortened(done.error().what, kMostReason),
@@ -348,7 +348,11 @@ CommandAck SessionRegistry::decide(const Command& command, Role role) {
     return answer(mentoring_.decide(command.text, command.client, role, controllers_));
   }
   const auto change =
-      translator_.changeFor(command, {role, controllers_, isStopEngaged(), isRolePresent(Role::kInstructor)});
+      translator_.changeFor(command, {.role = role,
+                                      .controllers = controllers_,
+                                      .is_stop_engaged = isStopEngaged(),
+                                      .unnamed = unnamed,
+                                      .is_instructor_present = isRolePresent(Role::kInstructor)});
   if (!change) return answer(tl::unexpected(change.error()));
   if (const auto possible = gate_.check(command.kind); !possible) return answer(possible);
   const bool is_vital = command.kind == CommandKind::kStop || command.kind == CommandKind::kPause ||

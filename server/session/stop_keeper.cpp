@@ -1,10 +1,20 @@
 #include "server/session/stop_keeper.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "server/session/stop_file.h"
 
 namespace tenon::session {
+
+namespace {
+
+bool isNamed(const RaiseId& raise, const std::vector<RaiseRange>& named) {
+  return std::any_of(named.begin(), named.end(),
+                     [&](const RaiseRange& range) { return range.contains(raise); });
+}
+
+}  // namespace
 
 StopKeeper::StopKeeper(std::filesystem::path file, ServerWriters& writers)
     : file_(std::move(file)), writers_(writers) {
@@ -33,10 +43,18 @@ void StopKeeper::publish(const EmergencyStop& stop) {
   step();
 }
 
-void StopKeeper::clear(const std::string& who, const std::string& reason) {
+const EmergencyStop* StopKeeper::otherThan(const std::vector<RaiseRange>& named) const {
+  for (const auto& [id, stop] : truth_.standing())
+    if (!isNamed(id, named)) return &stop;
+  return nullptr;
+}
+
+void StopKeeper::clear(const std::vector<RaiseRange>& named, const std::string& who,
+                       const std::string& reason) {
   const auto standing = truth_.standing();
   for (const auto& [id, stop] : standing) {
-    ended_.push_back({stop.client_guid, stop.counter, who, reason});
+    if (!isNamed(id, named)) continue;
+    ended_.push_back({id.client_guid, id.counter, who, reason});
     note(truth_.clear(ended_.back()));
   }
   step();

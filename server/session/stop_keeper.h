@@ -38,8 +38,10 @@ class StopKeeper {
   [[nodiscard]] StopChange raise(const EmergencyStop& stop) { return note(truth_.raise(stop)); }
   /// Of a raise that stands.
   void publish(const EmergencyStop& stop);
-  /// Clears all raises that stand, and those alone: one that is on its way will stand.
-  void clear(const std::string& who, const std::string& reason);
+  /// A raise that stands and that is not of `named`; null when there is none.
+  [[nodiscard]] const EmergencyStop* otherThan(const std::vector<RaiseRange>& named) const;
+  /// Clears those of the raises that stand: one that is on its way will stand.
+  void clear(const std::vector<RaiseRange>& named, const std::string& who, const std::string& reason);
   [[nodiscard]] bool engaged() const { return truth_.engaged(); }
   [[nodiscard]] const std::map<RaiseId, EmergencyStop>& standing() const { return truth_.standing(); }
   /// Whether this raise was cleared before: it would not stand.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <string>
 
@@ -48,6 +49,26 @@ struct EmergencyStop {
   std::uint32_t counter = 0;  ///< of its raises, from 1
   std::string who;
   std::string reason;
+};
+
+/// The name of one raise of the emergency stop.
+struct RaiseId {
+  std::string client_guid;
+  std::uint32_t counter = 0;
+
+  auto operator<=>(const RaiseId&) const = default;
+};
+
+/// Raises of one client.
+struct RaiseRange {
+  std::string client_guid;
+  std::uint32_t first = 0;  ///< counter
+  std::uint32_t last = 0;   ///< likewise, `first` or more
+
+  [[nodiscard]] bool contains(const RaiseId& raise) const {
+    return raise.client_guid == client_guid && first <= raise.counter && raise.counter <= last;
+  }
+  bool operator==(const RaiseRange&) const = default;
 };
 
 /// The end of one raise, by the server alone.

@@ -43,6 +43,40 @@ void runServer(std::uint32_t domain, std::uint32_t epoch, bool answers) {
   while (true) inbox.dispatch(std::chrono::seconds(1));
 }
 
+/// A server that is stopped by three raises, and answers whether a clear names them all.
+void runStoppedServer(std::uint32_t domain) {
+  auto participant = test::participant(domain);
+  wire::Partition lobby(participant, wire::kLobby);
+  wire::Partition session(participant, wire::sessionPartition("test"));
+  auto announces = wire::Writer<SessionAnnounce>::open(lobby, wire::kSessionAnnounce);
+  auto welcomes = wire::Writer<Welcome>::open(lobby, wire::kWelcome);
+  auto acks = wire::Writer<CommandAck>::open(session, wire::kCommandAck);
+  auto runs = wire::Writer<RunState>::open(session, wire::kRunState);
+  auto stops = wire::Writer<EmergencyStop>::open(session, wire::kEmergencyStop);
+  auto clears = wire::Writer<EmergencyClear>::open(session, wire::kEmergencyClear);
+  if (!announces || !welcomes || !acks || !runs || !stops || !clears) _exit(1);
+  (void)runs->write({.emergency_stop = true});
+  for (const std::uint32_t counter : {1U, 2U, 3U, 4U}) (void)stops->write({"Ben", counter, "Ben", "caught"});
+  (void)clears->write({"Ben", 2, "Ada", "seen to"});
+  (void)announces->write({.session = "test", .server_epoch = 7});
+  wire::Inbox inbox;
+  auto heard = inbox.on<Join>(lobby, wire::kJoin, [&](const Join& join) {
+    (void)welcomes->write({.client_guid = join.client_guid,
+                           .session = join.session,
+                           .server_epoch = 7,
+                           .accepted = true,
+                           .client = ClientId{1}});
+  });
+  if (heard) {
+    heard = inbox.on<Command>(session, wire::kCommand, [&](const Command& command) {
+      const bool is_named = command.raises == std::vector<RaiseRange>{{"Ben", 1, 1}, {"Ben", 3, 4}};
+      (void)acks->write({command.client, command.id, is_named, "not named", Refusal::kNone});
+    });
+  }
+  if (!heard) _exit(1);
+  while (true) inbox.dispatch(std::chrono::seconds(1));
+}
+
 /// Sends a command to a server that is killed by it; another one resumes the session.
 Result<void> sendOverAKill(CommandKind kind) {
   const std::uint32_t domain = test::ownDomain();
@@ -69,6 +103,16 @@ TEST(CommandClient, WhatMayNotBeDoneTwiceIsNotRepeatedAndThePersonIsToldSo) {
   const auto sent = sendOverAKill(CommandKind::kSkipStep);
   ASSERT_FALSE(sent);
   EXPECT_THAT(sent.error().what, ::testing::HasSubstr("may have obeyed or not"));
+}
+
+TEST(CommandClient, AClearNamesTheRaisesThatItsSenderHasHeard) {
+  const std::uint32_t domain = test::ownDomain();
+  const test::Peer server([domain] { runStoppedServer(domain); });
+  const std::atomic<bool> stop = false;
+  auto client = CommandClient::open({.domain = domain, .timeout = std::chrono::seconds(60)}, stop);
+  ASSERT_TRUE(client) << client.error().what;
+  const auto sent = (*client)->send({.command = CommandKind::kClearEmergencyStop}, stop);
+  EXPECT_TRUE(sent) << sent.error().what;
 }
 
 }  // namespace

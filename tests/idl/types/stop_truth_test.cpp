@@ -74,6 +74,16 @@ TEST(StopTruth, InEveryOrderOfArrivalTheSameRaisesStand) {
   EXPECT_EQ(orders, 1956) << "sum over k of 6! / (6 - k)!, less the empty one";
 }
 
+TEST(StopTruth, RaisesAreNamedByAsFewRangesAsNameNoOther) {
+  EXPECT_TRUE(rangesOf({}).empty());
+  EXPECT_EQ(rangesOf({{"b", 7}, {"a", 4}, {"a", 1}, {"a", 2}, {"a", 2}, {"b", 8}}),
+            (std::vector<RaiseRange>{{"a", 1, 2}, {"a", 4, 4}, {"b", 7, 8}}));
+  std::vector<RaiseId> many;
+  for (std::uint32_t i = 0; i < 2 * kMostRanges; ++i) many.push_back({"a", 2 * i});
+  EXPECT_EQ(rangesOf(many).size(), kMostRanges);
+  EXPECT_FALSE((RaiseRange{"a", 1, 2}.contains({"b", 1})));
+}
+
 TEST(StopTruth, OfAClientThatRaisesWithoutEndTheNewestRaisesStandUntilAllThatStandAreCleared) {
   StopTruth truth;
   constexpr std::uint32_t kRaises = 1000;

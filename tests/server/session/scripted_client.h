@@ -115,6 +115,17 @@ class ScriptedClient {
     (void)presence_.dispose({.client = welcome.client});
   }
   void command(CommandKind kind) { (void)commands_.write({welcome.client, ++commands_sent_, kind}); }
+  /// Of the raises that it has heard; an id is that of command().
+  void clearStop() {
+    std::vector<RaiseId> named;
+    for (const auto& [id, stop] : stops.standing()) named.push_back(id);
+    clearStop(named);
+  }
+  void clearStop(const std::vector<RaiseId>& named) {
+    Command clear{welcome.client, ++commands_sent_, CommandKind::kClearEmergencyStop};
+    clear.raises = rangesOf(named);
+    (void)commands_.write(clear);
+  }
 
   [[nodiscard]] HandId controlledHand() const { return welcome.hands.empty() ? HandId{} : welcome.hands[0]; }
   [[nodiscard]] bool received(const std::string& kind, const std::string& part_of_text) const {

@@ -285,24 +285,48 @@ TEST(SessionServer, AnyClientEngagesAnEmergencyStopAndOnlyTheInstructorClearsIt)
   EXPECT_TRUE(
       trainee.receivesUntil([&] { return trainee.received("emergency stop", "engaged by trainee"); }));
 
-  trainee.command(CommandKind::kClearEmergencyStop);
+  trainee.clearStop();
   ASSERT_TRUE(trainee.receivesUntil([&] { return trainee.ack.id == 1; }));
   EXPECT_FALSE(trainee.ack.accepted);
-  admin.command(CommandKind::kClearEmergencyStop);
+  admin.clearStop();
   ASSERT_TRUE(admin.receivesUntil([&] { return admin.ack.id == 1; }));
   EXPECT_THAT(admin.ack.reason, HasSubstr("an instructor is present"));
 
-  instructor.command(CommandKind::kClearEmergencyStop);
+  instructor.clearStop({{"trainee", 1}, {"trainee", 2}});
   ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 1; }));
   EXPECT_TRUE(instructor.ack.accepted) << instructor.ack.reason;
   EXPECT_TRUE(trainee.receivesUntil([&] { return trainee.stops.cleared().size() == 2; }));
   EXPECT_FALSE(trainee.stops.engaged());
-  instructor.command(CommandKind::kClearEmergencyStop);
+  instructor.clearStop({});
   ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 2; }));
   EXPECT_EQ(instructor.ack.reason, "there is no emergency stop");
 
   trainee.emergencyStop();
   EXPECT_TRUE(trainee.receivesUntil([&] { return trainee.stops.engaged(); })) << "a new raise is not cleared";
+}
+
+TEST(SessionServer, ARaiseThatWhoClearsHasNotSeenStands) {
+  RunningServer server({.name = "unseen", .wait_for = {"right"}});
+  test::ScriptedClient trainee("unseen", wire::LinkProfile::kLan);
+  test::ScriptedClient instructor("unseen", wire::LinkProfile::kLan);
+  ASSERT_TRUE(trainee.join("trainee", Role::kTrainee, {"right"}));
+  ASSERT_TRUE(instructor.join("instructor", Role::kInstructor, {}));
+  trainee.emergencyStop();
+  trainee.emergencyStop();
+  ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.received("emergency stop", "engaged by"); }));
+  ASSERT_TRUE(trainee.receivesUntil([&] { return trainee.stops.standing().size() == 2; }));
+
+  instructor.clearStop({{"trainee", 1}});
+  ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 1; }));
+  EXPECT_EQ(instructor.ack.refusal, Refusal::kRaisedAgain);
+  EXPECT_THAT(instructor.ack.reason, HasSubstr("raised again, by trainee: a test"));
+  EXPECT_TRUE(trainee.receivesUntil([&] { return trainee.stops.cleared().size() == 1; }));
+  EXPECT_TRUE(trainee.stops.engaged());
+
+  instructor.clearStop({{"trainee", 2}});
+  ASSERT_TRUE(instructor.receivesUntil([&] { return instructor.ack.id == 2; }));
+  EXPECT_TRUE(instructor.ack.accepted) << instructor.ack.reason;
+  EXPECT_TRUE(trainee.receivesUntil([&] { return !trainee.stops.engaged(); }));
 }
 
 // in lockstep no tick comes between the two
@@ -336,7 +360,8 @@ TEST(SessionServer, WithoutAnInstructorAnAdminClearsTheEmergencyStopAndTheRunSta
       trainee.receivesUntil([&] { return trainee.received("emergency stop", "engaged by trainee"); }));
   runInLockstep(trainee, 4, 6);
   EXPECT_TRUE(trainee.newest.frozen);
-  admin.command(CommandKind::kClearEmergencyStop);
+  ASSERT_TRUE(admin.receivesUntil([&] { return admin.stops.engaged(); }));
+  admin.clearStop();
   ASSERT_TRUE(admin.receivesUntil([&] { return admin.ack.id == 1; }));
   EXPECT_TRUE(admin.ack.accepted) << admin.ack.reason;
   runInLockstep(trainee, 7, 9);
@@ -370,7 +395,7 @@ TEST(SessionServer, AnEmergencyStopStandsAfterARestartUntilItIsCleared) {
     ASSERT_TRUE(late.join("late", Role::kInstructor, {}));
     ASSERT_TRUE(late.receivesUntil([&] { return late.stops.engaged(); }));
     EXPECT_EQ(late.stops.standing().begin()->first.client_guid, raised.client_guid);
-    late.command(CommandKind::kClearEmergencyStop);
+    late.clearStop();
     ASSERT_TRUE(late.receivesUntil([&] { return late.ack.id == 1; }));
     EXPECT_TRUE(late.ack.accepted) << late.ack.reason;
   }

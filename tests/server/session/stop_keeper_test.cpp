@@ -79,7 +79,7 @@ TEST_F(StopKeeperTest, IsEngagedFromARaiseToItsClearAndTakesUpWhatItsFileHas) {
   StopKeeper keeper(file_, writers_);
   ASSERT_TRUE(keeper.restore());
   EXPECT_TRUE(keeper.engaged()) << "after a restart";
-  keeper.clear("Ben", "all is well");
+  keeper.clear({{"a", 1, 1}}, "Ben", "all is well");
   EXPECT_FALSE(keeper.engaged());
   EXPECT_TRUE(turnsUntil(keeper, [&] { return !truth_.engaged(); }));
   EXPECT_EQ(truth_.cleared().at({"a", 1}).who, "Ben");
@@ -108,7 +108,7 @@ TEST_F(StopKeeperTest, ARaiseIsPublishedAtOnceAndAClearWhenItIsOnTheDisk) {
   keeper.not_kept = [&](const std::string& why) { problem = why; };
   raise(keeper, raiseOf("a", 1));
   ASSERT_TRUE(turnsUntil(keeper, [&] { return truth_.engaged(); })) << "without the disk";
-  keeper.clear("Ben", "all is well");
+  keeper.clear({{"a", 1, 1}}, "Ben", "all is well");
   EXPECT_FALSE(keeper.engaged());
   EXPECT_TRUE(keeper.waits());
   for (int turn = 0; turn < 10; ++turn) {
@@ -140,7 +140,7 @@ TEST_F(StopKeeperTest, OfAClientThatRaisesWithoutEndTheNewestRaisesStandHereAndF
   EXPECT_EQ(readStopFile(file_)->standing().size(), StopTruth::kMostOfClient);
   EXPECT_EQ(readStopFile(file_)->cleared().size(), StopTruth::kMostOfClient);
   EXPECT_TRUE(keeper.engaged());
-  keeper.clear("Ben", "all is well");
+  keeper.clear({{"a", 1, kRaises}}, "Ben", "all is well");
   EXPECT_TRUE(turnsUntil(keeper, [&] { return !truth_.engaged(); }));
 }
 

@@ -11,6 +11,7 @@ import { hasText, language, retold, SPEAKERS, t, type Key } from "./strings";
 
 const NOTICE = 8000; // [ms] that an answer is shown
 const NOTICES = 3;
+const RAISES = 256; // of the emergency stop that a clear names
 const OTHER_LABELS: Record<string, Key> = { note: "desk.note.said", clear: "stop.clear", collision: "desk.collision", kick: "desk.kick", give: "desk.give", guide: "guide" };
 export const PASS = "pass"; // in the address, and in this tab's memory
 
@@ -354,7 +355,8 @@ export class Desk {
       this.notify(false, `${t(label)}: ${t(why)}`);
       return false;
     }
-    const answer = await this.source.ask("deskCommand", { words });
+    const seen = this.session.standing.slice(0, RAISES).map(({ client_guid, counter }) => ({ client_guid, counter }));
+    const answer = await this.source.ask("deskCommand", words[0] === "clear" ? { words, raises: seen } : { words });
     this.tell(t(label), answer);
     if (answer?.code === "not_joined" && this.role !== "") {
       this.role = "";
