@@ -84,6 +84,8 @@ void TickLog::write(const session::SessionSimulation& simulation, const session:
   if (options_.timing) {
     line_ += ",\"compute_us\":";
     add(line_, 1e6 * output.stats.compute_seconds);
+    const simulation::Environment::Work& work = simulation.environment().work();
+    line_ += fmt::format(",\"work\":{},\"limited_islands\":{}", work.solve_work, work.limited_islands);
   }
   line_ += "}\n";
   stream_ << line_;

@@ -22,6 +22,7 @@ CrossingSearch::CrossingSearch(const PairQuery& query, const PairFeatures& featu
     : query_(query),
       features_(features),
       near_(scratch.near),
+      pieces_tested_(scratch.pieces_tested),
       crossings_(scratch.crossings),
       result_(result),
       X_WA_(query.X_WA),
@@ -129,6 +130,7 @@ void CrossingSearch::crossFeature(std::uint32_t point_A, std::span<const Ball> n
   const float half_A = features_.features_A->edges()[point_A].half_M.norm();
   EdgePiece piece;
   bool known = false;
+  std::uint64_t tested = 0;
   for (const Ball& ball : near) {
     const float reach = ball.half + half_A + static_cast<float>(margin_);
     if ((ball.p_A - p_A).squaredNorm() > reach * reach) continue;
@@ -137,6 +139,7 @@ void CrossingSearch::crossFeature(std::uint32_t point_A, std::span<const Ball> n
     const EdgePiece& other = near_.pieces[ball.piece];
     Contact contact;
     if (piece.isPoint() && other.isPoint()) continue;
+    ++tested;
     if (!meet(piece, other, margin_, kListedTolerance, contact) || contact.gap > margin_) continue;
     contact.kind = ContactKind::kCrossing;
     contact.point = point_A;
@@ -144,6 +147,7 @@ void CrossingSearch::crossFeature(std::uint32_t point_A, std::span<const Ball> n
     evaluateCrossing(piece, other, X_WA_, contact);
     list(contact);
   }
+  pieces_tested_ += tested;
 }
 
 void CrossingSearch::list(const Contact& crossing) {

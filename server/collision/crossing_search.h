@@ -63,6 +63,7 @@ class CrossingSearch {
   const PairQuery& query_;
   const PairFeatures& features_;
   NearPieces& near_;
+  std::uint64_t& pieces_tested_;
   ContactList& crossings_;
   PairQueryResult& result_;
   const Transform X_WA_;

@@ -106,7 +106,9 @@ void queryFeatures(const PairQuery& query, const PairFeatures& features, Feature
   if (!features.any()) return;
   const double nearer = nearerBy(features.features_B->longestHalf(), features);
   PairQueryResult& of_B = scratch.of_B;
-  queryPair(reversed(query, features, query.margin + nearer), of_B);
+  PairQuery all = reversed(query, features, query.margin + nearer);
+  all.stop_when_full = true;
+  queryPair(all, of_B);
   const bool crowded = of_B.counts.contacts_dropped > 0;
   if (crowded) {
     PairQuery reduced = reversed(query, features, query.margin);

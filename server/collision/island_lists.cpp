@@ -23,6 +23,10 @@ constexpr double kMinValidity = 0.25;
 /// left.
 constexpr double kUsedUp = 0.5;
 
+/// [points of a traversal] that take as long as to evaluate a listed contact, or to test two pieces of edges.
+constexpr std::uint64_t kResampledWork = 4;
+constexpr std::uint64_t kPieceWork = 2;
+
 int movableBodies(const IslandPair& pair) {
   return (pair.body_a != ContactConstraint::kStatic ? 1 : 0) +
          (pair.body_b != ContactConstraint::kStatic ? 1 : 0);
@@ -108,6 +112,7 @@ bool IslandSolver::updatePair(const Job& job, std::size_t i, SolveReport& report
   resampleFeatures(job.queryOf(job.pairs[i], 0.0), job.pairs[i].features, approach, result);
   ++report.resamplings;
   report.points_visited += listed;
+  report.work += kResampledWork * listed;
   return result.contacts.size() == listed;
 }
 
@@ -120,12 +125,14 @@ void IslandSolver::traversePair(const Job& job, std::size_t i, SolveReport& repo
   query.reduce = true;
   queryPair(query, job.results[i].query);
   const PairQueryResult& found = job.results[i].query;
+  feature_scratch_.pieces_tested = 0;
   queryFeatures(query, pair.features, feature_scratch_, job.results[i].query);
   job.results[i].traversal = {true,        query.X_WA,
                               query.X_WB,  found.smallest_gap - found.skipped_gap_error,
                               pair.levels, found.levels_used};
   ++report.traversals;
   report.points_visited += job.results[i].query.counts.points_visited;
+  report.work += job.results[i].query.counts.points_visited + kPieceWork * feature_scratch_.pieces_tested;
 }
 
 double IslandSolver::approachSinceTraversal(const Job& job, std::size_t i) {
@@ -177,6 +184,7 @@ void IslandSolver::buildConstraints(const Job& job) {
     }
   }
   contact_row_count_ = rows_.size();
+  std::fill_n(inside_cell_.begin(), contact_row_count_, std::uint8_t{0});
 }
 
 std::size_t IslandSolver::pairOfRow(const Job& job, std::size_t row) {

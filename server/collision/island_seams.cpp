@@ -22,26 +22,28 @@ constexpr double kSeamDepthNoise = 1e-6;
 /// [-] Normals whose dot product is nearer to 1 are equal.
 constexpr double kSameNormal = 1e-9;
 
+/// [points of a traversal] that take as long as the planes beside a contact.
+constexpr std::uint64_t kBorderWork = 30;
+constexpr std::uint64_t kEdgeWork = 8;
+
 }  // namespace
 
-void IslandSolver::addSeamAtEdge(const Job& job, std::size_t pair, std::size_t c, std::size_t row) {
-  const IslandPair& one = job.pairs[pair];
-  const Contact& contact = job.results[pair].query.contacts[c];
-  Seam seam{pair, c, row, {}};
-  for (const ContactSide& side : sidesOfWedge(one.features, contact, job.poseA(one), job.poseB(one))) {
+IslandSolver::SeamSides IslandSolver::sidesAtEdge(const Job& job, const IslandPair& pair,
+                                                  const Contact& contact) {
+  SeamSides sides;
+  for (const ContactSide& side : sidesOfWedge(pair.features, contact, job.poseA(pair), job.poseB(pair))) {
     const bool outside = side.gap >= std::min(contact.gap, 0.0) - kFieldNoise;
-    if (outside && side.n_W.dot(contact.n_W) < 1.0 - kSameNormal) seam.sides.push_back(side);
+    if (outside && side.n_W.dot(contact.n_W) < 1.0 - kSameNormal) sides.push_back(side);
   }
-  if (!seam.sides.empty()) seams_.push_back(seam);
+  return sides;
 }
 
-void IslandSolver::addSeamAtBorder(const Job& job, std::size_t pair, std::size_t c, std::size_t row) {
-  const IslandPair& one = job.pairs[pair];
-  const Contact& contact = job.results[pair].query.contacts[c];
-  const auto surface = job.surfaceOf(one, contact);
+IslandSolver::SeamSides IslandSolver::sidesAtBorder(const Job& job, const IslandPair& pair,
+                                                    const Contact& contact) {
+  SeamSides sides;
+  const auto surface = job.surfaceOf(pair, contact);
   const Pose& X_WB = *surface.X_WF;
   const Vector3 out_W = surface.sign * contact.n_W;
-  Seam seam{pair, c, row, {}};
   for (const Vector3& t_W : tangentsOf(contact.n_W)) {
     for (const double offset : {kSeamDistance, -kSeamDistance}) {
       const structures::FieldSample sample = surface.sample(X_WB.inverse() * (contact.p_WP + offset * t_W));
@@ -52,14 +54,43 @@ void IslandSolver::addSeamAtBorder(const Job& job, std::size_t pair, std::size_t
       // on a concave surface both sides hold
       if (offset * (n_W - out_W).dot(t_W) < kSeamTurn * kSeamDistance) continue;
       const double gap = sample.distance - offset * gradient_W.dot(t_W);
-      if (gap >= std::min(contact.gap, 0.0) - kSeamDepthNoise)
-        seam.sides.push_back({surface.sign * n_W, gap});
+      if (gap >= std::min(contact.gap, 0.0) - kSeamDepthNoise) sides.push_back({surface.sign * n_W, gap});
     }
   }
-  if (!seam.sides.empty()) seams_.push_back(seam);
+  return sides;
 }
 
-void IslandSolver::findSeams(const Job& job, SeamKind kind) {
+void IslandSolver::addSeam(const Job& job, Seam seam, SeamKind kind, std::size_t active,
+                           SolveReport& report) {
+  const auto contactOf = [&job](const Seam& one) -> const Contact& {
+    return job.results[one.pair].query.contacts[one.contact];
+  };
+  const auto nearer = [&](const Seam& one, const Seam& other) {
+    return contactOf(one).gap < contactOf(other).gap;
+  };
+  const bool at_border = kind == SeamKind::kBorder;
+  if (at_border && inside_cell_[seam.row] != 0) return;
+  Seam* farthest = seams_.end();
+  if (seams_.full()) {
+    farthest = std::max_element(seams_.begin() + active, seams_.end(), nearer);
+    if (farthest == seams_.end() || !nearer(seam, *farthest)) return;
+  }
+  const IslandPair& pair = job.pairs[seam.pair];
+  report.work += at_border ? kBorderWork : kEdgeWork;
+  seam.sides =
+      at_border ? sidesAtBorder(job, pair, contactOf(seam)) : sidesAtEdge(job, pair, contactOf(seam));
+  if (seam.sides.empty()) {
+    if (at_border) inside_cell_[seam.row] = 1;
+    return;
+  }
+  if (farthest != seams_.end()) {
+    *farthest = seam;
+  } else {
+    seams_.push_back(seam);
+  }
+}
+
+void IslandSolver::findSeams(const Job& job, SeamKind kind, SolveReport& report) {
   seams_.clear();
   std::size_t pair = 0;
   std::size_t first = 0;
@@ -70,13 +101,10 @@ void IslandSolver::findSeams(const Job& job, SeamKind kind) {
     }
     const bool crosses = job.results[pair].query.contacts[row - first].kind == ContactKind::kCrossing;
     if (crosses != (kind == SeamKind::kEdge)) continue;
-    if (crosses) {
-      addSeamAtEdge(job, pair, row - first, row);
-    } else {
-      addSeamAtBorder(job, pair, row - first, row);
-    }
+    addSeam(job, {pair, row - first, row, {}}, kind, seams_.size(), report);
   }
   if (seams_.empty()) return;
+  const std::size_t active = seams_.size();
   // along a rim the next point would hold instead
   first = 0;
   for (pair = 0; pair < job.pairs.size(); ++pair) {
@@ -86,18 +114,14 @@ void IslandSolver::findSeams(const Job& job, SeamKind kind) {
       if (crosses != (kind == SeamKind::kEdge) || contacts[c].gap > kTouchGap ||
           multipliers_[first + c] > 0.0)
         continue;
-      if (crosses) {
-        addSeamAtEdge(job, pair, c, first + c);
-      } else {
-        addSeamAtBorder(job, pair, c, first + c);
-      }
+      addSeam(job, {pair, c, first + c, {}}, kind, active, report);
     }
     first += contacts.size();
   }
 }
 
 bool IslandSolver::relaxSeamNormals(const Job& job, SeamKind kind, SolveReport& report) {
-  findSeams(job, kind);
+  findSeams(job, kind, report);
   if (seams_.empty()) return false;
   // the step if the contacts at seams did not hold
   FixedVector<std::uint32_t, kMaxSeams> excluded;

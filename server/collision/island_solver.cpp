@@ -29,6 +29,9 @@ constexpr int kMaxNonmonotoneSteps = 1;
 /// So many steps in a row may leave an overlap into which a step has led; their iterates need not be better.
 constexpr int kMaxRestorations = 4;
 
+/// [-] A solve whose bodies are no better off than at its start may do so many times SolveLimits::work.
+constexpr std::uint64_t kMostWork = 3;
+
 /// [m] A step shorter than this may be blocked by the field's discretisation alone.
 constexpr double kSmallStep = 1e-4;
 
@@ -65,6 +68,7 @@ IslandSolver::IslandSolver(std::size_t max_bodies, std::size_t max_pairs)
   active_.reserve(6 * max_bodies);
   carried_.reserve(active_.capacity());
   curvature_rows_.reserve(6 * max_bodies);
+  inside_cell_.resize(multipliers_.size());
 }
 
 SolveReport IslandSolver::solve(std::span<MovableBody> bodies, std::span<const IslandPair> pairs,
@@ -111,6 +115,7 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
   };
 
   while (true) {
+    const std::uint64_t work_before = report.work;
     computeStep(job, report);
     const double here = merit(job);
     if (report.steps == 0) at_start = here, overlap_at_start = deepestOverlap(job);
@@ -126,7 +131,10 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
     if (dampOvershoot(job)) solveQp(job, report, rows_.size());
     if (converged(job, nonmonotone == 0 && report.steps > 0 ? kRelaxedTolerance : 1.0)) break;
     double length = stepLength(job);
-    const bool spent = isBudgetSpent() && report.steps > 0;
+    const bool certified = nonmonotone == 0 && !restores && best < at_start &&
+                           deepestOverlap(job) <= std::max(overlap_at_start, kFieldNoise);
+    report.work_limited = report.steps > 0 && isWorkSpent(job, report, report.work - work_before, certified);
+    const bool spent = (isBudgetSpent() && report.steps > 0) || report.work_limited;
     const bool last =
         report.steps - free_steps == job.limits.max_steps || free_steps == job.limits.max_free_steps || spent;
     // no small step from the initial poses lowers the merit function: the bodies stay there
@@ -158,6 +166,12 @@ void IslandSolver::solveIsland(const Job& job, SolveReport& report) {
     body.curvatures.clear();
     body.friction_Bq_W = Wrench{};
   }
+}
+
+bool IslandSolver::isWorkSpent(const Job& job, const SolveReport& report, std::uint64_t last,
+                               bool certified) {
+  const std::uint64_t needed = report.work + last;
+  return needed / (certified ? 1 : kMostWork) > job.limits.work;
 }
 
 void IslandSolver::restoreBestIterate(const Job& job) {

@@ -85,6 +85,10 @@ struct SolveLimits {
   double penalty_stiffness = 1000.0;  ///< [N/m] of the baselines
   /// Work limit: points tested by the queries of one solve. At least one step is made.
   std::uint64_t points = std::numeric_limits<std::uint64_t>::max();
+  /// Work limit in SolveReport::work: a step that would exceed it is left to the next solve, once the bodies
+  /// are better off than at the start, without a new overlap. Until then up to kMostWork times of it is done.
+  /// At least one step is made.
+  std::uint64_t work = std::numeric_limits<std::uint64_t>::max();
 };
 
 /// [m] Contacts with a gap up to this touch. It covers what interpolation and an unconverged step leave. The
@@ -97,7 +101,10 @@ struct SolveReport {
   std::uint32_t traversals = 0;      ///< queries that descended a pointshell's hierarchy, over all steps
   std::uint32_t resamplings = 0;     ///< queries that evaluated listed points again
   std::uint64_t points_visited = 0;  ///< by both kinds of queries
-  bool infeasible = false;           ///< of the last QP: MotionResult::infeasible
+  /// All that took time, counted: in points of a traversal, which others are converted to
+  std::uint64_t work = 0;
+  bool work_limited = false;  ///< the solve ended because of SolveLimits::work
+  bool infeasible = false;    ///< of the last QP: MotionResult::infeasible
   /// Steps or points ran out with a step of more than 1 um left: the bodies are at the best iterate, and the
   /// next tick continues from there.
   bool unconverged = false;
@@ -136,8 +143,8 @@ struct SolveReport {
 /// constraints of a QP contradict each other, see MotionResult::infeasible. Skipped without a report are
 /// * contacts beyond kMaxPairContacts of a pair, those with the largest gaps. Steps are shortened so as not
 ///   to reach them, but not below a quarter of `max_step_length`;
-/// * seams beyond kMaxSeams (64): these contacts keep the normal of their own cell, and may hold the body
-///   back;
+/// * seams beyond kMaxSeams (64), those with the largest gaps: these contacts keep the normal of their own
+///   cell, and may hold the body back;
 /// * secondary planes beyond kMaxSecondaryPlanes (64): a step may overlap there, the next iterate corrects
 ///   it. Where a pair's list is full, their force is missing in its F_Ao_W;
 /// * friction patches beyond kMaxPatches (16): the contacts of the others are frictionless.
@@ -155,6 +162,15 @@ class IslandSolver {
 
  private:
   struct Job;  ///< the arguments of solve
+
+  /// Planes to both sides along two tangents, or of a wedge.
+  using SeamSides = FixedVector<ContactSide, 4>;
+
+  /// A contact at a cell border or an edge, with the tangent planes beyond it.
+  struct Seam {
+    std::size_t pair = 0, contact = 0, row = 0;
+    SeamSides sides;
+  };
 
   /// Active contacts of a pair with about one normal, treated as one frictional contact at the centre of
   /// their normal forces. It transmits no moment about the normal.
@@ -207,6 +223,10 @@ class IslandSolver {
   /// Every body's step is shorter than `slack` [-] times its tolerance; without any contact, than
   /// kStepTolerance.
   [[nodiscard]] bool converged(const Job& job, double slack) const;
+  /// Whether SolveLimits::work leaves no further step, which would take as much as the last evaluation,
+  /// `last` [work]. `certified`: the iterate is better than the initial poses and has no new overlap.
+  [[nodiscard]] static bool isWorkSpent(const Job& job, const SolveReport& report, std::uint64_t last,
+                                        bool certified);
   /// Sets fractions_ for a trust region of `trust` [m]. True for a step in free motion: bodies stop before
   /// contacts, none because of the trust region.
   bool limitStep(const Job& job, double trust);
@@ -246,10 +266,14 @@ class IslandSolver {
   /// False when no normal changed.
   bool relaxSeamNormals(const Job& job, SeamKind kind, SolveReport& report);
   /// Sets seams_: where an active contact is at a convex border between cells, or at an edge, all that touch
-  /// at one, the active ones first. As far as there is capacity.
-  void findSeams(const Job& job, SeamKind kind);
-  void addSeamAtBorder(const Job& job, std::size_t pair, std::size_t contact, std::size_t row);
-  void addSeamAtEdge(const Job& job, std::size_t pair, std::size_t contact, std::size_t row);
+  /// at one. As far as there is capacity: the active ones first, then those with the smallest gaps.
+  void findSeams(const Job& job, SeamKind kind, SolveReport& report);
+  /// Adds a contact when it is at a seam. When there is no room it displaces the one with the largest gap
+  /// behind the `active` first ones, if its own gap is smaller.
+  void addSeam(const Job& job, Seam seam, SeamKind kind, std::size_t active, SolveReport& report);
+  [[nodiscard]] static SeamSides sidesAtBorder(const Job& job, const IslandPair& pair,
+                                               const Contact& contact);
+  [[nodiscard]] static SeamSides sidesAtEdge(const Job& job, const IslandPair& pair, const Contact& contact);
   /// [m] Displacement of A's point at p_WP relative to B's.
   [[nodiscard]] static Vector3 relativeDisplacement(const Job& job, std::span<const Displacement> step,
                                                     const IslandPair& pair, const Vector3& p_WP);
@@ -279,12 +303,6 @@ class IslandSolver {
     Contact contact;
   };
 
-  /// A contact at a cell border or an edge, with the tangent planes beyond it.
-  struct Seam {
-    std::size_t pair = 0, contact = 0, row = 0;
-    FixedVector<ContactSide, 4> sides;  ///< to both sides along two tangents, or of a wedge
-  };
-
   MotionSolver motion_;
   FeatureScratch feature_scratch_;
   static constexpr std::size_t kMaxSeams = 64;
@@ -302,6 +320,8 @@ class IslandSolver {
   std::vector<std::pair<std::size_t, double>> carried_;
   std::vector<std::uint32_t> curvature_rows_;  ///< rows whose curvatures the bodies have
   std::size_t contact_row_count_ = 0;
+  /// by row: at this iterate the contact was found to be at no border
+  std::vector<std::uint8_t> inside_cell_;
   std::vector<ContactConstraint> rows_;
   std::vector<double> multipliers_;               ///< [N] by row
   std::vector<Displacement> step_;                ///< the QP's solution, by body

@@ -58,6 +58,7 @@ struct FeatureScratch {
   PairQueryResult of_B;   ///< B's features in A's field
   ContactList crossings;  ///< found, before the nearest are kept
   NearPieces near;
+  std::uint64_t pieces_tested = 0;  ///< of A's features, against one near piece each: work, counted up
 };
 
 }  // namespace tenon::collision

@@ -51,6 +51,7 @@ class Traversal {
         reduce_(query.reduce),
         correct_ridges_(query.correct_ridges),
         correct_valleys_(query.correct_valleys),
+        stop_when_full_(query.stop_when_full),
         result_(result),
         reducer_(result, -query.field_B->band(), query.margin) {}
 
@@ -80,6 +81,9 @@ class Traversal {
     lowerGapBound(std::min(frame_.gapOf(culled_.smallest_bound), kFarGap));
     return k;
   }
+
+  /// Whether it gave up (PairQuery::stop_when_full).
+  [[nodiscard]] bool full() const { return full_; }
 
   /// Areas by point [m^2]; points beyond the end have area 0.
   void setAreas(std::span<const float> areas) { areas_ = areas; }
@@ -170,6 +174,10 @@ class Traversal {
   }
 
   void traverseClusters() {
+    if (full_) {
+      clusters_.clear();
+      return;
+    }
     if (!candidates_.fitsBatch()) evaluateCandidates();
     if (prune_) {
       kernels_.candidates(frame_, shell_, {clusters_.begin(), clusters_.end()}, candidates_, culled_);
@@ -223,6 +231,7 @@ class Traversal {
     for (std::uint32_t from = 0; from < candidates_.count; from += structures::ShellBlock::kLanes)
       takeBlock(from);
     if (reduce_) reducer_.reduceLeaves(frame_, shell_, first, near_);
+    full_ = stop_when_full_ && near_.count > kMaxPairContacts;
   }
 
   /// Takes the near ones of the sixteen candidates from number `first` on.
@@ -315,6 +324,8 @@ class Traversal {
   NearPoints near_;
   bool correct_ridges_;
   bool correct_valleys_;
+  bool stop_when_full_;
+  bool full_ = false;  ///< with stop_when_full_: more are near than the list takes
   PairQueryResult& result_;
   ContactReducer reducer_;
 };
@@ -352,6 +363,10 @@ void queryPair(const PairQuery& query, PairQueryResult& result) noexcept {
   const std::size_t budget =
       std::max<std::size_t>(query.budget, query.priority_points.size()) - query.priority_points.size();
   const std::size_t used = traversal.run(allowed, budget);
+  if (traversal.full()) {
+    result.counts.contacts_dropped = 1;
+    return;
+  }
   result.levels_used = static_cast<std::uint32_t>(used);
   if (used > 0 && used < levels.size()) {
     result.skipped_gap_error = levels[used - 1].spacing * query.field_B->slope();

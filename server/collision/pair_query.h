@@ -82,6 +82,9 @@ struct PairQuery {
   bool correct_valleys = false;
   bool list = true;   ///< false: no contacts are listed; for PairQueryResult::smallest_gap alone
   bool prune = true;  ///< false: every point is tested, for comparison
+  /// Give up as soon as more contacts are near than the list takes. Of the result, `counts.contacts_dropped`
+  /// above 0 says so, and the rest is not valid. Not with `reduce`.
+  bool stop_when_full = false;
 };
 
 struct PairQueryResult {

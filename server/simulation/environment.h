@@ -204,7 +204,9 @@ class Environment {
     std::uint32_t steps = 0;          ///< SQP steps of all islands
     std::uint32_t iterations = 0;     ///< of the active-set method, in all islands
     std::uint64_t points_visited = 0;
-    std::uint32_t near_pairs = 0;      ///< found by the broad phase
+    std::uint64_t solve_work = 0;       ///< of all islands: collision::SolveReport::work
+    std::uint32_t limited_islands = 0;  ///< left a step to the next tick: SolveReport::work_limited
+    std::uint32_t near_pairs = 0;       ///< found by the broad phase
     std::uint32_t deferred_pairs = 0;  ///< due, but without a contact list: their movable objects stood still
     std::uint32_t limited_pairs = 0;   ///< queried with skipped levels
     /// that the lists of queried pairs did not take: collision::QueryCounts::contacts_dropped

@@ -124,6 +124,8 @@ void Environment::countWork() noexcept {
     work_.steps += island.report.steps;
     work_.iterations += island.report.iterations;
     work_.points_visited += island.report.points_visited;
+    work_.solve_work += island.report.work;
+    work_.limited_islands += island.report.work_limited ? 1U : 0U;
     work_.infeasible |= island.report.infeasible;
   }
 }

@@ -168,6 +168,8 @@ class Log(Scripted):
         timed, _ = self.logged(*arguments, "--timing")
         for tick in timed:
             self.assertGreater(tick.pop("compute_us"), 0)
+            self.assertGreaterEqual(tick.pop("work"), 0)
+            self.assertEqual(tick.pop("limited_islands"), 0)
         self.assertEqual(plain, timed)
         self.assertEqual(list(plain[0]), ["t", "hands", "objects", "pairs"])
 

@@ -345,6 +345,57 @@ TEST(IslandSolver, ReportsUnconvergedWhenStepsRunOutAndContinuesInTheNextTick) {
   EXPECT_NEAR(rig.pose(box).translation().x(), 0.0, 1e-5);
 }
 
+//   the hand is 2 mm ahead, inside the ground; one step of 0.25 mm takes the whole work limit
+TEST(IslandSolver, WhatExceedsTheWorkLimitIsLeftToTheNextTick) {
+  test::IslandRig free, limited;
+  for (test::IslandRig* rig : {&free, &limited}) {
+    const auto box =
+        rig->addBody(test::boxStructures({0.02, 0.02, 0.02}, 0.002, 0.004), Pose(Vector3(0.0, 0.0, 0.0003)));
+    rig->addStatic(box, test::boxStructures({0.1, 0.1, 0.02}, 0.002, 0.004), Pose(Vector3(0.0, 0.0, -0.02)),
+                   0.0);
+    rig->limits.max_step_length = 0.00025;
+    rig->setHand(box, Pose(Vector3(0.002, 0.0, -0.001)));
+  }
+  limited.limits.work = 1;
+  const SolveReport at_once = free.step();
+  EXPECT_FALSE(at_once.work_limited);
+  EXPECT_GT(at_once.work, 0U);
+  int limited_ticks = 0;
+  double before = 0.0;
+  for (int tick = 0; tick < 30; ++tick) {
+    const SolveReport report = limited.step();
+    limited_ticks += report.work_limited ? 1 : 0;
+    if (!report.work_limited) continue;
+    EXPECT_TRUE(report.unconverged);
+    EXPECT_LT(report.steps, at_once.steps);
+    const double x = limited.pose(0).translation().x();
+    EXPECT_GT(x, before) << "in each tick it goes on";
+    EXPECT_LE(x, before + 2.0 * limited.limits.max_step_length) << "one step, or two";
+    EXPECT_GT(limited.smallest_gap, -5e-6) << "and never into the ground";
+    before = x;
+  }
+  EXPECT_GE(limited_ticks, 4);
+  free.settle(30);
+  EXPECT_FALSE(limited.step().work_limited) << "at the goal";
+  EXPECT_NEAR(limited.pose(0).translation().x(), free.pose(0).translation().x(), 5e-6);
+  EXPECT_NEAR(limited.pose(0).translation().z(), free.pose(0).translation().z(), 5e-6);
+}
+
+//   a sheet 0.5 mm thin: a hand at 3 m/s goes through, its body does not, with the least work there is
+TEST(IslandSolver, TheWorkLimitLetsNothingThroughASheet) {
+  test::IslandRig rig;
+  const auto box =
+      rig.addBody(test::boxStructures({0.02, 0.02, 0.02}, 0.002, 0.004), Pose(Vector3(0.0, 0.0, 0.02)));
+  rig.addStatic(box, test::boxStructures({0.1, 0.1, 0.0005}, 0.002, 0.004), Pose(), 0.001);
+  rig.limits.work = 1;
+  for (int tick = 1; tick <= 40; ++tick) {
+    rig.setHand(box, Pose(Vector3(0.0, 0.0, 0.02 - 0.003 * tick), expRotation({0.0, 0.01 * tick, 0.0})));
+    rig.step();
+    ASSERT_GT(rig.pose(box).translation().z(), 0.0);
+  }
+  EXPECT_GT(rig.smallest_gap, -1e-4);
+}
+
 TEST(IslandSolver, AllocatesNothing) {
   test::IslandRig rig;
   const auto box =
