@@ -14,15 +14,12 @@
 #include "clients/haptic/answer_readers.h"
 #include "clients/haptic/arming_thread.h"
 #include "clients/haptic/copy_loader.h"
-#include "clients/haptic/input_pacer.h"
-#include "clients/haptic/limit_chooser.h"
-#include "clients/haptic/link_clock.h"
+#include "clients/haptic/link_adaptation.h"
 #include "clients/haptic/lockstep_answers.h"
-#include "clients/haptic/rate_chooser.h"
-#include "clients/haptic/repeated_events.h"
 #include "clients/haptic/return_key.h"
 #include "clients/haptic/seat_file.h"
 #include "clients/haptic/servo_loop.h"
+#include "clients/haptic/station_events.h"
 #include "clients/haptic/station_link.h"
 #include "clients/haptic/station_stops.h"
 #include "idl/threads/cyclic_thread.h"
@@ -38,10 +35,6 @@ constexpr std::chrono::seconds kMinSeatTime{10};
 constexpr int kMaxRejoins = 3;
 constexpr int kServoPriority = 75;
 constexpr int kFinishSteps = 200;  // milliseconds, or steps in lockstep, to take the forces away, at most
-
-std::int64_t nowNs() {
-  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
-}
 
 std::atomic<bool>& stopFlag() {
   static std::atomic<bool> flag{false};
@@ -71,19 +64,21 @@ class StationRunner {
                 [this](const std::string& text) { print(text); }},
                options.read_keys),
         arming_(station, [this](const std::string& text) { print(text); }),
+        events_(
+            station, link, [this](const std::string& text) { print(text); }, options.read_keys),
         copy_(station, options.scene, options.force_model),
-        model_chooser_(options.force_model) {}
+        adaptation_(link, options.force_model) {}
 
   Result<RunState> run(const std::atomic<bool>& stop) {
     if (auto subscribed = subscribe(); !subscribed) return fail(subscribed.error().what);
     if (auto matched = link_.awaitMatch(stop); !matched) return fail(matched.error().what);
     if (auto loaded = copy_.loadIfAsked(sceneHash(), options_.print, stop); !loaded)
       return fail(loaded.error().what);
-    if (copy_.loaded()) chooseForceModel(0.0, 0);
+    if (copy_.loaded()) use(adaptation_.chooseFirstModel(true));
     station_.welcome(link_.welcome(), link_.objects());
-    sendDevices();
+    events_.sendDevices();
     auto run = lockstep_ ? runLockstep(stop) : runRealTime(stop);
-    while (const auto repeated = repeated_.takeWaiting()) send(*repeated);
+    events_.sendWaiting();
     return run;
   }
 
@@ -94,16 +89,10 @@ class StationRunner {
   void send(const StationOutput& output);
   /// Of the station's steps up to `seq`.
   void sendEvents(std::uint32_t seq);
-  void send(const StationEvent& event);
-  void send(Tick tick, const char* kind, const std::string& text);
-  void sendDevices();
   void printStep(const StepState& step);
-  [[nodiscard]] Result<void> subscribeToClock();
   void takeLoadedScene();
-  void chooseForceModel(std::optional<double> round_trip, std::uint64_t late_cycles);
+  void use(ForceModelKind kind);
   std::uint32_t sendInputs(const StationOutput& output);
-  void chooseRates(std::optional<double> round_trip);
-  std::optional<double> answersLost(const Telemetry& telemetry);
   void sendTelemetry(Telemetry telemetry);
   void readKeys();
   /// In lockstep between two steps, unless `stop` comes or the run is over before the device answers.
@@ -156,21 +145,11 @@ class StationRunner {
   std::chrono::steady_clock::time_point rejoined_at_{};
   std::optional<StepState> step_;
   std::map<std::uint32_t, CollisionMatrix> matrix_;  // by part
-  // of the link
-  LinkClock link_clock_;
-  LimitChooser limits_;
-  LinkChoice choice_;
+  StationEvents events_;
   CopyLoader copy_;
-  ForceModelChooser model_chooser_;
+  LinkAdaptation adaptation_;
   ForceModelKind force_model_ = ForceModelKind::kManifold;
-  RateChooser rates_;
-  InputPacer pacer_;
-  std::uint64_t late_cycles_ = 0;      // as the last Telemetry has them
-  std::uint64_t answers_counted_ = 0;  // likewise
-  std::uint32_t output_seq_ = 0;       // of the loop's last output
-  RepeatedEvents repeated_;
-  std::uint64_t event_seq_ = 0;
-  std::uint64_t devices_seq_ = 0;  // of the last event that names a device
+  std::uint32_t output_seq_ = 0;  // of the loop's last output
   std::string printed_step_;
 };
 
@@ -197,49 +176,18 @@ Result<void> StationRunner::subscribe() {
     });
   }
   if (all) all = stops_.subscribe();
-  if (all && !lockstep_) all = subscribeToClock();
+  if (all && !lockstep_) all = adaptation_.subscribe();
   if (all) all = inbox.on<RunState>(session, wire::kRunState, [this](const RunState& run) { run_ = run; });
   return all;
 }
 
-void StationRunner::chooseRates(std::optional<double> round_trip) {
-  rates_.step(round_trip, force_model_, link_clock_.lossKnown() ? std::optional(choice_.loss) : std::nullopt,
-              choice_.jitter);
-  if (auto chosen = readers_.choose(rates_.slowAnswers()); !chosen) print(chosen.error().what);
-}
-
-/// In real time alone: the time of a session in lockstep is that of its ticks.
-Result<void> StationRunner::subscribeToClock() {
-  return link_.inbox().onFrom<ClockSync>(
-      link_.member().session(), wire::kClockSync, [this](const ClockSync& answer, const wire::Origin& from) {
-        if (answer.client != link_.welcome().client || answer.server_sent_ns == 0) return;
-        if (link_.member().isServer(from)) link_clock_.receive(answer, nowNs());
-      });
-}
-
-/// [-] since the last Telemetry; none: not known.
-std::optional<double> StationRunner::answersLost(const Telemetry& telemetry) {
-  const std::uint64_t answers = telemetry.samples - std::exchange(answers_counted_, telemetry.samples);
-  if (!readers_.hasSlowAlone() || answers < 2) return std::nullopt;
-  return telemetry.answers_lost;
-}
-
 void StationRunner::sendTelemetry(Telemetry telemetry) {
   telemetry.client = link_.welcome().client;
-  link_clock_.fill(telemetry, nowNs());
-  choice_ = limits_.step({.input_gap = telemetry.input_gap,
-                          .trip_jitter = telemetry.trip_jitter,
-                          .age_jitter = telemetry.jitter,
-                          .inputs_lost = telemetry.inputs_lost,
-                          .answers_lost = answersLost(telemetry),
-                          .input_period = rates_.inputPeriod(1)});
-  telemetry.limits = choice_.limits;
-  telemetry.playout_ticks = choice_.playout_ticks;
-  const std::uint64_t late = telemetry.loop_overruns - std::exchange(late_cycles_, telemetry.loop_overruns);
-  const auto round_trip = telemetry.clock_known ? std::optional(telemetry.round_trip) : std::nullopt;
-  servo_.setLink(choice_.jitter + rates_.allowance(), round_trip.value_or(0.0));
-  chooseForceModel(round_trip, late);
-  chooseRates(round_trip);
+  adaptation_.measure(telemetry, readers_.hasSlowAlone());
+  servo_.setLink(adaptation_.jitter(), adaptation_.roundTrip().value_or(0.0));
+  if (adaptation_.isLong()) copy_.loadBeside(sceneHash());
+  use(adaptation_.chooseModel(copy_.loaded()));
+  if (auto chosen = readers_.choose(adaptation_.chooseRates()); !chosen) print(chosen.error().what);
   static_cast<void>(link_.send(telemetry));
 }
 
@@ -250,9 +198,7 @@ void StationRunner::takeLoadedScene() {
   for (const auto& [part, matrix] : matrix_) servo_.receive(matrix);
 }
 
-void StationRunner::chooseForceModel(std::optional<double> round_trip, std::uint64_t late_cycles) {
-  if (round_trip > ForceModelChooser::kLong) copy_.loadBeside(sceneHash());
-  const ForceModelKind kind = model_chooser_.step(round_trip, copy_.loaded(), late_cycles);
+void StationRunner::use(ForceModelKind kind) {
   if (kind == force_model_) return;
   force_model_ = kind;
   lockstep_ ? station_.setForceModel(kind) : servo_.setForceModel(kind);
@@ -260,7 +206,7 @@ void StationRunner::chooseForceModel(std::optional<double> round_trip, std::uint
                                ? "forces from this station's copy of the scene"
                                : "forces from the contacts that the server lists";
   print(text);
-  send(0, "station", text);
+  events_.send(0, "station", text);
 }
 
 void StationRunner::readKeys() {
@@ -298,7 +244,7 @@ std::uint32_t StationRunner::sendInputs(const StationOutput& output) {
   for (std::size_t i = 0; i < output.inputs.size(); ++i) {
     DeviceInput each = output.inputs[i];
     if (lockstep_) each.period = 1;
-    const auto input = pacer_.due(each, i, output.seq, rates_, lockstep_ ? 0 : choice_.playout_ticks);
+    const auto input = adaptation_.due(each, i, output.seq, !lockstep_);
     if (!input) continue;
     static_cast<void>(link_.send(*input));
     ++sent;
@@ -307,8 +253,8 @@ std::uint32_t StationRunner::sendInputs(const StationOutput& output) {
 }
 
 void StationRunner::send(const StationOutput& output) {
-  link_clock_.sent(output.seq, sendInputs(output));
-  if (output.seq - stated_seq_ < rates_.statePeriod()) return;
+  adaptation_.sent(output.seq, sendInputs(output));
+  if (output.seq - stated_seq_ < adaptation_.statePeriod()) return;
   stated_seq_ = output.seq;
   for (std::size_t i = 0; i < output.states.size(); ++i) {
     HandState state = output.states[i];
@@ -317,37 +263,10 @@ void StationRunner::send(const StationOutput& output) {
   }
 }
 
-/// Others see what a hand can reach by this and HandState::p_WC.
-void StationRunner::sendDevices() {
-  const Welcome& welcome = link_.welcome();
-  for (const HandDevice& device : station_.handDevices())
-    static_cast<void>(
-        link_.send(ClientEvent{welcome.client, ++event_seq_, welcome.tick, "device", describe(device)}));
-  devices_seq_ = event_seq_;
-}
-
-/// Of a client's events late joiners get the last ones alone: its devices are always among them.
-void StationRunner::send(Tick tick, const char* kind, const std::string& text) {
-  if (event_seq_ - devices_seq_ >= wire::kClientEvent.parameters.late_joiner_depth / 2) sendDevices();
-  static_cast<void>(link_.send(ClientEvent{link_.welcome().client, ++event_seq_, tick, kind, text}));
-}
-
 void StationRunner::sendEvents(std::uint32_t seq) {
   StationEvent event;
-  while (lockstep_ ? station_.takeEvent(event) : servo_.takeEvent(event))
-    if (repeated_.passes(event)) send(event);
-  while (const auto repeated = repeated_.takeDue(seq)) send(*repeated);
-}
-
-void StationRunner::send(const StationEvent& event) {
-  const std::string text = station_.describe(event);
-  const bool is_safety =
-      event.kind == StationEventKind::kSafetyBegan || event.kind == StationEventKind::kSafetyEnded;
-  send(event.tick, is_safety ? "safety" : "station", text);
-  if (event.kind == StationEventKind::kGuidanceBegan || event.kind == StationEventKind::kGuidanceEnded)
-    print(text);
-  if (event.kind != StationEventKind::kDeviceFault) return;
-  print(text + (options_.read_keys ? "; look at the device, then press return to reset it" : ""));
+  while (lockstep_ ? station_.takeEvent(event) : servo_.takeEvent(event)) events_.receive(event);
+  events_.sendDue(seq);
 }
 
 Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat) {
@@ -375,8 +294,8 @@ Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat
   if (back) back = link_.awaitMatch(stop, meanwhile);
   if (!back) return fail(why + "; " + back.error().what);
   rejoined_at_ = std::chrono::steady_clock::now();
-  limits_.interrupted();
-  if (member.welcome().server_epoch != before.server_epoch) link_clock_ = {};  // another process, or machine
+  adaptation_.interrupted();
+  if (member.welcome().server_epoch != before.server_epoch) adaptation_.resetClock();
   new_seat = member.welcome().client != before.client || member.welcome().hands != before.hands ||
              member.welcome().server_epoch != before.server_epoch;
   print("rejoined as client " + std::to_string(member.welcome().client.value));
@@ -386,7 +305,7 @@ Result<void> StationRunner::rejoin(const std::atomic<bool>& stop, bool& new_seat
 
 void StationRunner::restartStation() {
   station_.welcome(link_.welcome(), link_.objects());
-  sendDevices();
+  events_.sendDevices();
   if (step_) station_.receive(*step_);
   for (const auto& [part, matrix] : matrix_) station_.receive(matrix);
 }
@@ -496,8 +415,7 @@ Result<RunState> StationRunner::takePart(const std::atomic<bool>& stop) {
       output_seq_ = output->seq;
     }
     sendEvents(output_seq_);
-    if (ClockSync request; link_clock_.ask(link_.welcome().client, nowNs(), request))
-      static_cast<void>(link_.send(request));
+    adaptation_.askClock();
     if (const Telemetry* const statistics = servo_.takeTelemetry()) {
       Telemetry telemetry = *statistics;
       telemetry.loop_overruns = servo_thread_->lateTicks();
