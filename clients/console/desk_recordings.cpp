@@ -19,6 +19,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
+constexpr std::string_view kFailed = "record_failed";
+
 /// A name of a session as a part of a file's name: one that leads nowhere else.
 std::string fileNamePart(std::string name) {
   constexpr std::size_t kMost = 63;  // [bytes]
@@ -82,8 +84,10 @@ class DeskRecordings::One {
     const std::string text = recorded ? fileName() : recorded.error().what;
     for (const auto& waiting : {asker_, stopper_})
       if (waiting)
-        answer_(waiting->first,
-                {.id = waiting->second, .accepted = recorded.has_value(), .text = printable(text)});
+        answer_(waiting->first, {.id = waiting->second,
+                                 .accepted = recorded.has_value(),
+                                 .text = printable(text),
+                                 .code = std::string(recorded ? "" : kFailed)});
     has_ended_ = true;
   }
 
@@ -105,7 +109,7 @@ void DeskRecordings::handle(ViewerId viewer, const std::string& session, const D
   const std::string what = request.words.size() == 2 ? request.words[1] : "";
   if (what == "start") return start(viewer, session, request.id);
   if (what == "stop") return stop(viewer, session, request.id);
-  refuse(viewer, request.id, "usage: record start|stop");
+  refuse(viewer, request.id, "usage: record start|stop", refusalName(Refusal::kOther));
 }
 
 bool DeskRecordings::records(const std::string& session) {
@@ -114,22 +118,25 @@ bool DeskRecordings::records(const std::string& session) {
   return one != running_.end() && !one->second->hasEnded();
 }
 
-void DeskRecordings::refuse(ViewerId viewer, std::uint32_t request, std::string why, Refusal kind) const {
-  answer_(viewer, {.id = request, .text = std::move(why), .code = std::string(refusalName(kind))});
+void DeskRecordings::refuse(ViewerId viewer, std::uint32_t request, std::string why,
+                            std::string_view code) const {
+  answer_(viewer, {.id = request, .text = std::move(why), .code = std::string(code)});
 }
 
 void DeskRecordings::start(ViewerId viewer, const std::string& session, std::uint32_t request) {
   if (folder_.empty())
     return refuse(viewer, request,
-                  "this console has no folder for recordings: start it with --recordings FOLDER");
-  if (session.empty()) return refuse(viewer, request, "there is no session yet");
+                  "this console has no folder for recordings: start it with --recordings FOLDER",
+                  "record_no_folder");
+  if (session.empty()) return refuse(viewer, request, "there is no session yet", "record_none");
   std::error_code error;
   fs::create_directories(folder_, error);
-  if (error) return refuse(viewer, request, folder_.string() + ": " + error.message());
+  if (error) return refuse(viewer, request, folder_.string() + ": " + error.message(), kFailed);
   const std::scoped_lock lock(mutex_);
   auto& one = running_[session];
   if (one != nullptr && !one->hasEnded())
-    return refuse(viewer, request, "this session is being recorded here already", Refusal::kAlready);
+    return refuse(viewer, request, "this session is being recorded here already",
+                  refusalName(Refusal::kAlready));
   one = std::make_unique<One>(
       recorder::RecorderOptions{
           .file = freeFile(folder_, session), .session = session, .domain = domain_, .assets = assets_},
@@ -140,7 +147,7 @@ void DeskRecordings::stop(ViewerId viewer, const std::string& session, std::uint
   const std::scoped_lock lock(mutex_);
   const auto one = running_.find(session);
   if (one != running_.end() && one->second->stop(viewer, request)) return;
-  refuse(viewer, request, "this console records nothing of this session", Refusal::kAlready);
+  refuse(viewer, request, "this console records nothing of this session", refusalName(Refusal::kAlready));
 }
 
 }  // namespace tenon::console

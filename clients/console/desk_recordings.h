@@ -41,7 +41,8 @@ class DeskRecordings {
 
   void start(ViewerId viewer, const std::string& session, std::uint32_t request);
   void stop(ViewerId viewer, const std::string& session, std::uint32_t request);
-  void refuse(ViewerId viewer, std::uint32_t request, std::string why, Refusal kind = Refusal::kOther) const;
+  /// `code`: of the page's texts; of refusalName(), or one of its own.
+  void refuse(ViewerId viewer, std::uint32_t request, std::string why, std::string_view code) const;
 
   std::filesystem::path folder_, assets_;
   std::uint32_t domain_;

@@ -62,9 +62,7 @@ class Gateway {
 
   Result<void> run() {
     if (!options_.recording.empty()) {
-      const auto playable = record::checkPlayable(options_.recording, stop_);
-      if (!playable) return fail(playable.error().what);
-      if (!playable->empty()) options_.print("warning: " + *playable);
+      if (auto checked = checkRecording(); !checked || stop_) return checked;
     }
     if (auto opened = openServer(); !opened) return opened;
     if (options_.recording.empty()) return followSessions();
@@ -73,6 +71,7 @@ class Gateway {
   }
 
  private:
+  Result<void> checkRecording();
   Result<void> openServer();
   Result<void> followSessions();
   void enter(const std::string& room);
@@ -99,6 +98,21 @@ class Gateway {
   Desk desk_;
   BrowserHands hands_;
 };
+
+/// Before it is served: 20 s for 1 GB.
+Result<void> Gateway::checkRecording() {
+  auto told = std::chrono::steady_clock::now();
+  const auto playable = record::checkPlayable(options_.recording, stop_, [&](double fraction) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!options_.progress || now - told < options_.progress_period) return;
+    told = now;
+    options_.progress(options_.recording.string() + ": checking that it is whole, " +
+                      std::to_string(static_cast<int>(100.0 * fraction)) + " %");
+  });
+  if (!playable) return fail(playable.error().what);
+  if (!playable->empty()) options_.print("warning: " + *playable);
+  return {};
+}
 
 Result<void> Gateway::openServer() {
   const wire::AssetStore assets(options_.cache / "assets");

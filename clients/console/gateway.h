@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -24,6 +25,9 @@ struct GatewayOptions {
   std::filesystem::path page;                     ///< folder of the built page; may be missing
   std::filesystem::path cache;                    ///< of baked structures and display models, as the server's
   std::function<void(const std::string&)> print;  ///< gets lines for the terminal; any thread
+  /// Gets lines of a check of the recording that takes long, for who waits; may be empty.
+  std::function<void(const std::string&)> progress;
+  std::chrono::milliseconds progress_period{2000};  ///< at least between these lines
 };
 
 /// Serves one session, all sessions of a DDS domain, or a recording, to browsers until `stop` is set. Of all

@@ -93,6 +93,9 @@ int run(int argc, char** argv) {
   // a terminal that stands still does not stop the gateway
   tenon::threads::LinePrinter printer(tenon::threads::LinePrinter::kOutput);
   options.print = [&printer](const std::string& text) { printer.print(text); };
+  options.progress = [](const std::string& text) {
+    std::fprintf(stderr, "tenon-console: %s\n", text.c_str());
+  };
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
   if (const auto served = tenon::console::runGateway(options, stop); !served) {

@@ -38,7 +38,7 @@ class Index {
     }
   }
 
-  [[nodiscard]] IndexFindings check(const std::atomic<bool>& stop) {
+  [[nodiscard]] IndexFindings check(const std::atomic<bool>& stop, const CheckProgress& progress) {
     if (!hasSummary()) return {"the summary at its end, which says where everything is, is damaged"};
     std::set<std::uint64_t> known;
     std::size_t wrong = 0;
@@ -54,8 +54,10 @@ class Index {
       in.take(8 + 8);
       const auto begin = in.get<std::uint64_t>(), length = in.get<std::uint64_t>();
       known.insert(begin);
-      if (isAt(kChunk, begin, length) && agrees(index.fields)) continue;
-      if (wrong++ == 0) first = std::to_string(begin) + " to " + std::to_string(begin + length);
+      const bool is_whole = isAt(kChunk, begin, length) && agrees(index.fields);
+      if (!is_whole && wrong++ == 0) first = std::to_string(begin) + " to " + std::to_string(begin + length);
+      if (progress)
+        progress(std::min(1.0, static_cast<double>(begin + length) / static_cast<double>(file_.size())));
     }
     IndexFindings findings;
     if (wrong > 0)
@@ -137,8 +139,9 @@ class Index {
 
 }  // namespace
 
-IndexFindings checkIndex(std::span<const std::uint8_t> file, const std::atomic<bool>& stop) {
-  return Index(file).check(stop);
+IndexFindings checkIndex(std::span<const std::uint8_t> file, const std::atomic<bool>& stop,
+                         const CheckProgress& progress) {
+  return Index(file).check(stop, progress);
 }
 
 }  // namespace tenon::record::mcap

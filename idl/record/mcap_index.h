@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 
@@ -15,9 +16,13 @@ struct IndexFindings {
   std::size_t skipped = 0;  ///< chunks that are not in the index: they are not played
 };
 
+/// Called with the fraction that is checked, after each chunk.
+using CheckProgress = std::function<void(double fraction)>;
+
 /// Reads all chunks, unless `stop` is set meanwhile. `file` begins with the magic and ends with a footer.
 ///
 /// Threads: any. Real-time: no.
-[[nodiscard]] IndexFindings checkIndex(std::span<const std::uint8_t> file, const std::atomic<bool>& stop);
+[[nodiscard]] IndexFindings checkIndex(std::span<const std::uint8_t> file, const std::atomic<bool>& stop,
+                                       const CheckProgress& progress);
 
 }  // namespace tenon::record::mcap

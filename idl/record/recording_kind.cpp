@@ -34,7 +34,8 @@ std::string refusalOfKind(const McapReader& reader, const std::filesystem::path&
   return {};
 }
 
-Result<std::string> checkPlayable(const std::filesystem::path& file, const std::atomic<bool>& stop) {
+Result<std::string> checkPlayable(const std::filesystem::path& file, const std::atomic<bool>& stop,
+                                  const std::function<void(double)>& progress) {
   const auto reader = McapReader::open(file);
   if (!reader) return fail(reader.error().what);
   if (std::string refusal = refusalOfKind(*reader, file); !refusal.empty()) return fail(std::move(refusal));
@@ -46,7 +47,7 @@ Result<std::string> checkPlayable(const std::filesystem::path& file, const std::
   mcap::MappedFile mapped;
   const auto bytes = mapped.map(file);
   if (!bytes) return fail(bytes.error().what);
-  const mcap::IndexFindings findings = mcap::checkIndex(*bytes, stop);
+  const mcap::IndexFindings findings = mcap::checkIndex(*bytes, stop, progress);
   if (!findings.problem.empty()) return refuse(findings.problem);
   std::string remark = reader->problem();
   if (findings.skipped > 0)

@@ -460,7 +460,6 @@ class Browser:
         return answer["value"]
 
 
-@unittest.skipUnless(shutil.which("chromium") and (TOOLS / "node_modules").exists(), "no chromium or no playwright-core: deploy/setup test, and npm ci in tests/system/public_tools")
 def damaged_copies(recording):
     """One with a damaged chunk, one whose footer and one whose index point elsewhere, behind right checksums."""
     whole = recording.read_bytes()
@@ -483,6 +482,7 @@ def damaged_copies(recording):
     return write("chunk.mcap", chunk - 1, is_in_summary=False), write("moved.mcap", footer + 9), write("wrong.mcap", index + 9 + 16)
 
 
+@unittest.skipUnless(shutil.which("chromium") and (TOOLS / "node_modules").exists(), "no chromium or no playwright-core: deploy/setup test, and npm ci in tests/system/public_tools")
 class Page(unittest.TestCase):
     def test_the_page_follows_a_session_and_a_gateway_that_was_killed(self):
         pictures = os.environ.get("TENON_PICTURES")
@@ -516,6 +516,17 @@ class Page(unittest.TestCase):
             if pictures:
                 browser("picture", file=f"{pictures}/{SCENARIO}.png")
             self.assertEqual(browser.problems, [])
+
+    def test_a_page_that_makes_room_for_newer_ones_says_so(self):
+        with Stage() as stage, Browser() as browser:
+            _, port = start_console(stage)
+            browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="dark")
+            browser("await", expression="document.querySelector('.cover').dataset.state === 'searching'")
+            viewers = [Viewer(port) for _ in range(192)]
+            browser("await", expression="document.querySelector('.cover').textContent.includes('a newer page came, and no more than 192')")
+            for viewer in viewers:
+                viewer.socket.close()
+            browser("await", expression="document.querySelector('.cover').dataset.state === 'searching'")
 
     def test_an_instructor_skips_a_step_and_stops_the_forces(self):
         with Stage(lockstep=False) as stage, Browser() as browser:
@@ -792,12 +803,24 @@ class Page(unittest.TestCase):
             self.assertEqual(first, again, "a place is the same from both sides")
             self.assertNotEqual(first, places[round(0.95 * end, 3)][0])
             # while it plays, rows of events come before the one that has the focus
-            browser("await", expression="(window.row = document.querySelector('.events button')) !== null")
+            browser("await", expression="(window.row = document.querySelector('.events button'))?.closest('li').dataset.tick <= tenon.session.tick")
             browser("value", expression="window.row.focus()")
             browser("key", key="Space")
             browser("await", expression="document.querySelector('.events button') !== window.row")
             self.assertTrue(browser("value", expression="document.activeElement === window.row"))
-            browser("value", expression=f"tenon.player.seek({0.2 * end})")
+            # and a seek to a row of a list leaves the focus there
+            browser("key", key="Space")
+            slow = "(r => { const { seek } = Object.getPrototypeOf(r); r.seek = async (to) => { await new Promise(done => setTimeout(done, 300)); await seek.call(r, to); }; })(tenon.player.recording)"
+            browser("value", expression=slow)
+            for row in (".events li:nth-last-child(2) button", ".steps li:last-child button"):
+                browser("value", expression="tenon.player.seek(1e9)")
+                browser("await", expression=f"!tenon.player.isReading && tenon.session.isOver && (window.row = document.querySelector('{row}')) !== null")
+                browser("value", expression="window.row.focus(); window.row.click()")
+                browser("await", expression="!tenon.player.isReading && !tenon.session.isOver")
+                browser("value", expression="new Promise(done => setTimeout(done, 300))")  # the lists are shown anew
+                self.assertTrue(browser("value", expression="document.activeElement === window.row"), row)
+            browser("value", expression=f"document.activeElement.blur(); delete tenon.player.recording.seek; tenon.player.seek({0.2 * end})")
+            browser("key", key="Space")
             browser("await", expression=f"tenon.player.time > {0.2 * end + 0.5}")
             self.look(browser)
             # what cannot be read is said, and the next place can be
@@ -998,6 +1021,11 @@ class DeskNightly(unittest.TestCase):
             self.assertRegex(file.name, r"^test-\d{8}-\d{6}\.mcap$")
             self.assertGreater(file.stat().st_size, 10_000)
             self.assertEqual(browser.problems, [])
+            # its parts are in it: other machines show them, too
+            _, port = start_console(stage, 0, "--cache", stage.out / "empty", shown=[file])
+            browser("open", url=f"http://localhost:{port}/", width=1280, height=800, theme="light")
+            browser("await", expression="tenon.view?.models >= 3 && !tenon.view.parts.areBoxes")
+            self.assertTrue(all("404" in problem for problem in browser.problems), browser.problems)
 
 
 @unittest.skipUnless(shutil.which("chromium") and (TOOLS / "node_modules").exists(), "no chromium or no playwright-core: deploy/setup test, and npm ci in tests/system/public_tools")

@@ -272,5 +272,34 @@ TEST_F(DeskTest, WhatCannotBeSentIsSaidInWords) {
   EXPECT_EQ(told[1].answer.text, "unknown command 'conquer [31m'; tenon command --help lists all");
 }
 
+/// Requests of a page that records.
+class DeskRecordingsTest : public ::testing::Test {
+ protected:
+  DeskAnswer answerTo(const std::string& folder, const std::string& session, const std::string& word) {
+    DeskAnswer told;
+    const DeskRecordings::Answer answer = [&told](ViewerId, const DeskAnswer& given) { told = given; };
+    DeskRecordings(folder, "", test::ownDomain(), answer)
+        .handle(kAda, session, {.id = 1, .words = {"record", word}});
+    return told;
+  }
+};
+
+// the page has words of its own for each code
+TEST_F(DeskRecordingsTest, EachRefusalHasACode) {
+  EXPECT_EQ(answerTo("", "a", "start").code, "record_no_folder");
+  EXPECT_EQ(answerTo("/tmp", "", "start").code, "record_none");
+  EXPECT_EQ(answerTo("/dev/null/below", "a", "start").code, "record_failed");
+  EXPECT_EQ(answerTo("/tmp", "a", "stop").code, "already");
+  EXPECT_EQ(answerTo("/tmp", "a", "pause").code, "other");
+}
+
+// no server is there, and the gateway ends
+TEST_F(DeskRecordingsTest, ARecorderThatHasNotJoinedIsRefusedWithItsReason) {
+  const DeskAnswer refused = answerTo("/tmp", "a", "start");
+  EXPECT_FALSE(refused.accepted);
+  EXPECT_EQ(refused.code, "record_failed");
+  EXPECT_FALSE(refused.text.empty());
+}
+
 }  // namespace
 }  // namespace tenon::console

@@ -179,5 +179,20 @@ TEST_F(RecordingGatewayTest, SaysThatAnAttachmentIsDamagedAndServesIt) {
   EXPECT_NE(lines[0].find("an attachment"), std::string::npos);
 }
 
+TEST_F(RecordingGatewayTest, SaysHowFarALongCheckIsBeforeItsAddress) {
+  damage("note");
+  std::vector<std::string> lines;
+  options_.progress_period = {};
+  options_.progress = [&](const std::string& line) { lines.push_back(line); };
+  options_.print = [&](const std::string& line) {
+    lines.push_back(line);
+    if (line.starts_with("console: ")) stop_ = true;
+  };
+  ASSERT_TRUE(runGateway(options_, stop_));
+  ASSERT_FALSE(lines.empty());
+  EXPECT_TRUE(std::regex_match(lines[0], std::regex(file_.string() + ": checking that it is whole, \\d+ %")))
+      << lines[0];
+}
+
 }  // namespace
 }  // namespace tenon::console

@@ -69,6 +69,16 @@ TEST_F(RecordingKindTest, AWholeRecordingCanBePlayed) {
   EXPECT_THAT(*playable, IsEmpty());
 }
 
+TEST_F(RecordingKindTest, HowFarItIsIsToldAfterEachChunk) {
+  std::vector<double> fractions;
+  ASSERT_TRUE(checkPlayable(file_, stop_, [&](double fraction) { fractions.push_back(fraction); }));
+  ASSERT_EQ(fractions.size(), 3U);
+  EXPECT_GT(fractions[0], 0.0);
+  EXPECT_LT(fractions[0], fractions[1]);
+  EXPECT_LT(fractions[1], fractions[2]);
+  EXPECT_LE(fractions[2], 1.0);
+}
+
 TEST_F(RecordingKindTest, DamagedChunksAreCountedAndTheFirstIsNamed) {
   const auto chunks = chunksOf(whole_);
   ASSERT_EQ(chunks.size(), 3U);

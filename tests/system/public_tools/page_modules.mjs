@@ -38,8 +38,8 @@ class Element extends Node {
 }
 globalThis.document = { documentElement: {}, createElement: (tag) => new Element(tag), createElementNS: (_, tag) => new Element(tag), createTextNode: (text) => new Node(text) };
 
-const { Presses, isSilent, Session, panels, textOf, reasonOfLoss, reasonOf, whyNot, forbid, setLanguage, isTooEarly, Parts, Markers, Scene, setAssetSource } = await loadPage(...process.argv.slice(2), [
-  'export { Presses } from "./presses";', 'export { isSilent } from "./cover";', 'export { Session } from "./session";', 'export * as panels from "./panels";',
+const { Presses, coverOf, isSilent, Session, panels, textOf, reasonOfLoss, reasonOf, whyNot, forbid, setLanguage, isTooEarly, Parts, Markers, Scene, setAssetSource } = await loadPage(...process.argv.slice(2), [
+  'export { Presses } from "./presses";', 'export { coverOf, isSilent } from "./cover";', 'export { Session } from "./session";', 'export * as panels from "./panels";',
   'export { textOf } from "./eventtext";', 'export { reasonOfLoss, reasonOf } from "./desk";', 'export { whyNot } from "./permits";', 'export { forbid } from "./dom";', 'export { isTooEarly } from "./pace";', 'export { setLanguage } from "./strings";', 'export { Parts } from "./parts";', 'export { Markers } from "./markers";',
   'export { Scene } from "three";', 'export { setAssetSource } from "./assets";',
 ]);
@@ -387,6 +387,8 @@ const tests = {
     setLanguage("de");
     assert.equal(textOf(session, { kind: "step done", text: "take (3.25 s)" }), "take (3,25 s)");
     assert.equal(textOf(session, { kind: "command", text: "command line: freeze on" }), "Befehlszeile: Kräfte einfrieren an");
+    assert.equal(textOf(session, { kind: "join", text: "trainee (trainee) has joined" }), "Auszubildende ist da");
+    assert.equal(textOf(session, { kind: "join", text: "Ada (trainee) has joined" }), "Ada (Auszubildende) ist da");
     session.receive("EmergencyStop", { client_guid: "a", counter: 1, who: "console", reason: "pressed in the browser" }, false);
     assert.equal(panels.strip(session).text, "Not-Halt von Konsole: im Browser gedrückt");
     setLanguage("en");
@@ -397,6 +399,31 @@ const tests = {
     assert.equal(reasonOfLoss("the server of session 'a' is gone"), "the server is gone");
     assert.equal(reasonOfLoss("refused: join first"), "the server has heard nothing of it for a while");
     assert.equal(reasonOfLoss("the cable is broken."), "the cable is broken");
+  },
+
+  "why the gateway has closed the connection is said in words of the page"() {
+    const session = sessionOf();
+    session.link = { state: "joined" };
+    const moreOf = (reason) => coverOf({ live: { kind: "reconnecting", seconds: 8, reason }, session, view: {}, age: 0 }).more;
+    assert.match(moreOf(""), /start `tenon console` again/);
+    assert.match(moreOf("a newer viewer came: 192 look on here at most, without a seat or hands"), /a newer page came, and no more than 192 .* in 8 s/);
+    assert.match(moreOf("the moon is full"), /the moon is full/);
+    setLanguage("de");
+    for (const reason of ["a newer viewer came: 192 look on here at most, without a seat or hands", "more than 200 messages a second", "more was asked for than was read", "the session is over"])
+      assert.ok(!moreOf(reason).includes(reason), reason);
+    setLanguage("en");
+  },
+
+  // the gateway's own, and those of the server without words of their own
+  "a refusal without words of its own has the reason, and no more than that"() {
+    const said = (code, text) => reasonOf({ accepted: false, text, code });
+    setLanguage("de");
+    assert.equal(said("record_failed", "session 'a' is full"), "die Aufzeichnung ist misslungen: session 'a' is full");
+    assert.match(said("record_no_folder", "this console has no folder"), /^diese Konsole hat keinen Ordner/);
+    assert.equal(said("record_none", "there is no session yet"), "es gibt noch keine Sitzung");
+    assert.equal(said("other", ""), "das geht so nicht");
+    setLanguage("en");
+    assert.equal(said("record_failed", "session 'a' is full"), "session 'a' is full");
   },
 
   async "parts give back all that they have drawn when another session begins"() {

@@ -9,6 +9,20 @@ import { t, type Key } from "./strings";
 
 export const PROTOCOL = TENON_PROTOCOL;
 const COMMAND = "./tenon demo";
+/** Why the gateway closes a connection, in its words. */
+const CLOSES: [RegExp, Key][] = [
+  [/^a newer viewer came: (?<count>\d+) /, "closed.crowded"],
+  [/^more than \d+ messages a second/, "closed.messages"],
+  [/^more was asked for than was read/, "closed.unread"],
+  [/^the session is over/, "closed.over"],
+];
+
+/** In this page's language where it has words for it. */
+export function reasonOfClose(text: string): string {
+  const known = CLOSES.find(([pattern]) => pattern.test(text));
+  return known === undefined ? text : t(known[1], known[0].exec(text)?.groups ?? {});
+}
+
 
 /** `opening`: of a recording that is opened: how much is read, or why it cannot be. */
 export interface Opening { fraction: number; problem?: string }
@@ -30,7 +44,10 @@ export function coverOf({ isDropping, opening, player, lobby, live, session, vie
     return { state, icon: name, head: t(`cover.${state}` as Key), more: t(more, values), covers };
   };
   const { link: gateway } = session;
-  if (player === undefined && live.kind === "reconnecting") return make("reconnecting", "warn", session.link === undefined, { seconds: live.seconds });
+  if (player === undefined && live.kind === "reconnecting") {
+    const over = make("reconnecting", "warn", session.link === undefined, { seconds: live.seconds });
+    return live.reason === "" ? over : { ...over, more: t("cover.reconnecting.closed", { reason: reasonOfClose(live.reason), seconds: live.seconds }) };
+  }
   if (player !== undefined) return view === undefined ? { state: "webgl", icon: "warn", head: t("cover.webgl"), more: t("cover.webgl.more"), covers: true } : undefined;
   if (live.kind === "connecting" || gateway === undefined) return make("connecting", "wait", true);
   if (gateway.protocol !== PROTOCOL) return make("protocol", "warn", true);

@@ -146,7 +146,8 @@ export function textOf(session: Session, event: Pick<EventLog, "kind" | "text">)
     if (groups === undefined && !pattern.test(event.text)) continue;
     const values = Object.fromEntries(Object.entries(groups ?? {}).map(([name, text]) => [name, text === undefined ? "" : value(session, name, text)]));
     if (key === "event.by.hand" && values["title"] === values["hand"]) return values["hand"]; // its own object
-    return t(key, values).replace(/[:;,.] *$/, "").trim();
+    const twice = values["who"] !== undefined && values["who"] === values["role"] ? ` (${values["role"]})` : ""; // who has no name is called by the role
+    return t(key, values).replace(twice, "").replace(/[:;,.] *$/, "").trim();
   }
   return (event.kind.startsWith("step") ? readable(session, event.text) : event.text).replace(/(?<!\.)\.$/, "");
 }

@@ -7,8 +7,10 @@ import { decodeViews, HAND_SUBSCRIPTION, type HandView } from "./remote";
 const SUBPROTOCOLS = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 const FIRST_RETRY = 0.5; // s
 const LONGEST_RETRY = 8; // s
+const CROWDED = "a newer viewer came";
 
-export type LiveState = { kind: "connecting" } | { kind: "open" } | { kind: "reconnecting"; seconds: number };
+/** `reason`: of the gateway, in its English; empty: it gave none. */
+export type LiveState = { kind: "connecting" } | { kind: "open" } | { kind: "reconnecting"; seconds: number; reason: string };
 /** `isGone`: of the instance, of which the message has the key. */
 export type Handler = (topic: string, message: unknown, isGone: boolean) => void;
 /** What the gateway answers to a request to the desk; of id 0: what nobody asked for, as the loss of a seat. */
@@ -79,11 +81,12 @@ export class LiveSource {
       this.retry = FIRST_RETRY;
       this.onState({ kind: "open" });
     };
-    socket.onclose = () => {
+    socket.onclose = ({ reason }) => {
       for (const answer of this.asked.values()) answer(undefined);
       this.asked.clear();
       if (this.isClosed) return;
-      this.onState({ kind: "reconnecting", seconds: this.retry });
+      if (reason.startsWith(CROWDED)) this.retry = LONGEST_RETRY; // else pages put each other out all the time
+      this.onState({ kind: "reconnecting", seconds: this.retry, reason });
       this.timer = window.setTimeout(() => this.connect(), this.retry * 1000);
       this.retry = Math.min(LONGEST_RETRY, 2 * this.retry);
     };

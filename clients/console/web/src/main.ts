@@ -241,9 +241,12 @@ function showPanels(sinceLast: number): void {
   const whyNoTaking = desk?.whyNot("give");
   app.classList.toggle("leads", player !== undefined || (desk?.role === "instructor" && !session.isOver && whyNoSteps === undefined));
   show(card, panels.instruction(session));
-  show(sections.steps.body, panels.steps(session, app.classList.contains("leads")));
-  show(sections.people.body, panels.people(session, { leads: desk?.role === "instructor" && !session.isOver, hand: part?.handName, whyNoTaking: whyNoTaking && t(whyNoTaking) }));
-  show(sections.events.body, panels.events(session, player !== undefined));
+  // a seek begins with nothing known: a row that it brings back keeps its focus
+  if (player?.isReading !== true) {
+    show(sections.steps.body, panels.steps(session, app.classList.contains("leads")));
+    show(sections.people.body, panels.people(session, { leads: desk?.role === "instructor" && !session.isOver, hand: part?.handName, whyNoTaking: whyNoTaking && t(whyNoTaking) }));
+    show(sections.events.body, panels.events(session, player !== undefined));
+  }
   show(status, panels.status(session, age));
   const over = coverOf(standing());
   cover.hidden = over === undefined;
@@ -274,7 +277,7 @@ function frame(now: number): void {
   if (isPicture) picture(now);
   plots.update(session, now);
   const hand = part?.hand;
-  const state = `${hand?.views.length} ${hand?.isOn} ${hand?.current} ${hand?.isAligning} ${hand?.isDeepening} ${hand?.isFine} ${hand?.isTurning} ${session.changed} ${session.moved} ${live.kind} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${player?.problem} ${view?.hasWorkspace} ${sinceLast > 0.5 ? sinceLast.toFixed(1) : ""}`;
+  const state = `${hand?.views.length} ${hand?.isOn} ${hand?.current} ${hand?.isAligning} ${hand?.isDeepening} ${hand?.isFine} ${hand?.isTurning} ${session.changed} ${session.moved} ${JSON.stringify(live)} ${desk?.role} ${isDropping} ${opening?.fraction.toFixed(2)} ${opening?.problem} ${player?.problem} ${player?.isReading} ${view?.hasWorkspace} ${sinceLast > 0.5 ? sinceLast.toFixed(1) : ""}`;
   if (now - shownAt >= PANEL_PERIOD && state !== shown) {
     shownAt = now;
     shown = state;
